@@ -25,6 +25,7 @@ from .heights import HeightDistribution
 
 TABLE_ERROR = 1e-10  # asked of S, relative to its largest value
 WORST_ERROR = 1e-6  # refused beyond
+_FARTHEST = 1e300  # m; S is 1 long before
 _CELLS = (128, 256, 512, 1024, 2048, 4096, 8192)
 
 
@@ -69,7 +70,8 @@ class Curve(NamedTuple):
 
     def _cell(self, y: Array) -> tuple[Array, Array, Array, Array]:
         """Place within its cell, cell number, t and 1 - t of each y."""
-        v = np.sqrt(np.maximum(y, 0.0))
+        # the bounds keep the place in the table for an infinite or NaN y, whose force shows it
+        v = np.sqrt(np.fmin(np.fmax(y, 0.0), _FARTHEST))
         t, s = v / (v + self.scale), self.scale / (v + self.scale)
         cells = len(self.S)
         i = np.minimum((t * cells).astype(np.intp), cells - 1)
@@ -77,7 +79,7 @@ class Curve(NamedTuple):
 
     def _weight(self, y: Array) -> Array:
         """t (1 - t)/2 times the number of cells: D in units of the place within a cell."""
-        v = np.sqrt(np.maximum(y, 0.0))
+        v = np.sqrt(np.fmin(np.fmax(y, 0.0), _FARTHEST))
         return 0.5 * len(self.S) * v * self.scale / (v + self.scale) ** 2
 
 

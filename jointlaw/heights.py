@@ -135,7 +135,8 @@ class Heights:
             counts, edges = (np.array(v) for v in self.distribution)
             density = np.concatenate([[0.0], counts / (counts.sum() * np.diff(edges)), [0.0]])
             return density[np.searchsorted(edges, np.asarray(r), side="right")]
-        return self._frozen.pdf(r)
+        with np.errstate(divide="ignore"):  # a density may be infinite where it begins
+            return self._frozen.pdf(r)
 
     def cdf(self, r: ArrayLike) -> Any:
         """Share P(r) of the asperities in touch at the overlap r in m."""
@@ -153,7 +154,7 @@ class Heights:
         if self.is_histogram:
             return np.array(self.distribution[1])
         low, high = self._frozen.ppf(_TAILS), self._frozen.isf(_TAILS[::-1])
-        points = np.unique(np.concatenate([low, high]))
+        points = np.unique(np.concatenate([low, high, self._frozen.support()]))
         finite: Array = points[np.isfinite(points)]
         return finite
 

@@ -210,7 +210,9 @@ class JointBatch:
         path = write_replay(
             self.law.to_toml(), old[:, at : at + 1], d[:, at : at + 1], C is not None
         )
-        again = f"`jointlaw replay {path}` repeats it" if path else "no replay file could be written"
+        again = "no replay file could be written"
+        if path is not None:
+            again = f"`jointlaw replay {path}` repeats it"
         raise NonFiniteError(
             f"joint {joint}: the step d = {d[:, at]} m gives a result that is not finite; nothing "
             f"was moved. Take a smaller step; {again}",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import sys
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -24,6 +25,7 @@ from .resolution import Resolution, resolve
 if TYPE_CHECKING:
     from .joint import Joint, JointBatch
 
+_SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
 DEFAULT_STRESS = 20e6  # Pa; its closure is the default closure_range
 
 
@@ -223,22 +225,24 @@ class JointLaw:
         return float(np.sum(k.area * (k.c1 + np.sin(self.facets.theta) * shear)))
 
     def _closure_at(self, stress: float) -> float:
-        if stress == 0.0:
+        if stress < _SMALLEST:
             return 0.0
-        high = self.closure_range
-        while self.normal_stress(high) < stress:
-            high *= 4.0
-        low = high
-        while self.normal_stress(low) > stress:
-            low /= 4.0
 
-        def misfit(log_y: float) -> float:
-            return math.log(float(self.normal_stress(math.exp(log_y))) / stress)
+        def misfit(log_y: float) -> float:  # finite where the force is zero or overflows
+            force = float(self.normal_stress(math.exp(log_y)))
+            return math.log(min(max(force, _SMALLEST), _LARGEST)) - math.log(stress)
 
-        if low == high:
-            return high
-        root = brentq(misfit, math.log(low), math.log(high), xtol=1e-15, rtol=1e-15)
-        return math.exp(root)
+        low = high = math.log(self.closure_range)
+        with np.errstate(over="ignore"):
+            while misfit(high) < 0.0:
+                high += 1.0
+                if high > 700.0:
+                    raise ValueError(f"normal_stress = {stress!r} Pa is beyond any closure")
+            while misfit(low) > 0.0:
+                low -= 1.0
+            if low == high:
+                return self.closure_range
+            return math.exp(brentq(misfit, low, high, xtol=1e-15, rtol=1e-15, maxiter=500))
 
     # ----------------------------------------------------------------- files
 

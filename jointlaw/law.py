@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from . import _toml
-from ._checks import Array, above, at_least, number
+from ._checks import Array, above, at_least, number, numbers
 from .asperity import Asperity
 from .curve import Curve, virgin_curve
 from .heights import GammaHeights, HeightDistribution, Heights
@@ -137,17 +137,15 @@ class JointLaw:
 
     def normal_stress(self, closure: ArrayLike) -> Any:
         """Normal stress (Pa) of a joint closed from zero to `closure` (m), unsheared."""
-        y = np.asarray(closure, float)
-        if not np.isfinite(y).all():
-            raise ValueError(f"closure = {closure!r} is not finite; give finite closures in m")
+        y = _finite("closure", closure, "m")
         force, _ = self.curve.force(y)
         return (self._closure_factor * force)[()]
 
     def closure(self, normal_stress: ArrayLike) -> Any:
         """Closure (m) at which the normal stress (Pa, >= 0) is reached: inverse of the above."""
-        stress = np.asarray(normal_stress, float)
-        if not (np.isfinite(stress).all() and (stress >= 0).all()):
-            raise ValueError(f"normal_stress = {normal_stress!r} must be finite and >= 0 Pa")
+        stress = _finite("normal_stress", normal_stress, "Pa")
+        if not (stress >= 0).all():
+            raise ValueError(f"normal_stress = {normal_stress!r} is out of bounds: it must be >= 0")
         result = np.array([self._closure_at(float(value)) for value in stress.ravel()])
         return result.reshape(stress.shape)[()]
 
@@ -156,7 +154,7 @@ class JointLaw:
 
         With `direction` = (theta, phi) in rad: per m2 and steradian in that direction, Eq. 16.
         """
-        y = np.asarray(closure, float)
+        y = _finite("closure", closure, "m")
         if self.heights is None:
             share: Any = np.where(y > 0, 1.0, 0.0)
         else:
@@ -169,7 +167,7 @@ class JointLaw:
     def max_stiffness(self, closure: ArrayLike) -> Any:
         """Upper bound of |C| (Pa/m) while no facet's effective closure exceeds `closure` (m)."""
         k, p = self.tables, self.asperity
-        _, slope = k.curve.force(np.asarray(closure, float))
+        _, slope = k.curve.force(_finite("closure", closure, "m"))
         per_facet = float(np.sum(k.area / k.c1))
         return ((max(1.0, 1.0 / p.lam) + p.mu) * per_facet * slope)[()]
 
@@ -263,6 +261,13 @@ class JointLaw:
     def __getstate__(self) -> dict[str, Any]:
         names = self.__dataclass_fields__
         return {name: value for name, value in self.__dict__.items() if name in names}
+
+
+def _finite(name: str, value: ArrayLike, unit: str) -> Array:
+    array = numbers(name, value, unit)
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} = {value!r} is not finite; give finite values in {unit}")
+    return array
 
 
 def depth_nodes(closure_range: float, slope: Array, cells: int) -> Array:

@@ -168,9 +168,8 @@ def _write_histogram(heights: Heights, path: Path | None) -> list[str]:
     rows = [f"{low!r},{high!r},{n!r}" for low, high, n in zip(edges, edges[1:], counts)]  # noqa: B905
     text = "lower_m,upper_m,count\n" + "\n".join(rows) + "\n"
     replace_file(csv_path, text.encode())
-    return [
-        f"histogram = {json.dumps(csv_path.name, ensure_ascii=False)}  # lower edge (m), upper edge (m), count"
-    ]
+    name = json.dumps(csv_path.name, ensure_ascii=False)
+    return [f"histogram = {name}  # lower edge (m), upper edge (m), count"]
 
 
 def _read_histogram(path: Path, where: str) -> tuple[list[float], list[float]]:

@@ -77,10 +77,10 @@ def _save(path: Path, **arrays: Any) -> None:
 
 def _load(path: Path, keys: tuple[str, ...], what: str) -> dict[str, Any]:
     try:
-        data = np.load(path, allow_pickle=False)
-        if not isinstance(data, np.lib.npyio.NpzFile):
-            raise ValueError("one array, not an NPZ file")
-        with data:
+        with path.open("rb") as stream:
+            if not zipfile.is_zipfile(stream):
+                raise ValueError("not an NPZ file")
+        with np.load(path, allow_pickle=False) as data:
             version = int(data["version"])
             if version != _VERSION:
                 raise ValueError(f"its version is {version}, this jointlaw reads {_VERSION}")

@@ -1,4 +1,4 @@
-"""The paper's own total form: F = (C^e - C^p) delta for monotonic loading from zero (Eq. 19-23, 37).
+"""The paper's total form: F = (C^e - C^p) delta, loaded monotonically from zero (Eq. 19-23, 37).
 
 Stateless, and no incremental law: driven around a loop it makes energy. It is here to reproduce the
 paper; joints with memory are `law.joint()`.
@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -99,9 +100,11 @@ def shear_factor(x: ArrayLike, eta: float, contact: str = "exact") -> Array:
     """
     x = np.asarray(x, float)
     if contact == "series":
-        return (1 + eta) * (1 - eta / 2 * x - eta * (1 - eta) / 6 * x**2)
+        factor: Array = (1 + eta) * (1 - eta / 2 * x - eta * (1 - eta) / 6 * x**2)
+        return factor
     inside = np.clip(x, 1e-12, 1 - 1e-16)
-    return -np.expm1((1 + eta) * np.log1p(-inside)) / inside
+    exact: Array = -np.expm1((1 + eta) * np.log1p(-inside)) / inside
+    return exact
 
 
 def series_limit(eta: float) -> float:
@@ -148,11 +151,11 @@ def _panels(
     edges = np.unique([0.0, top, *(point for point in breaks if 0.0 < point < top)])
     x, w = _crowded(_THETA_NODES)
     y, v = _crowded(_PHI_NODES)
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in pairwise(edges):
         theta = low + (high - low) * x
         ends = [np.zeros_like(theta), *(_crossing(theta, tilt, r) for r in circles)]
         ends.append(np.full_like(theta, math.pi))
-        for zone, (start, stop) in enumerate(zip(ends[:-1], ends[1:], strict=True)):
+        for zone, (start, stop) in enumerate(pairwise(ends)):
             width = stop - start
             if not (width > 0).any():
                 continue

@@ -86,7 +86,7 @@ def figure_12() -> Sheet:
     for part, kind in ((0, TOTAL), (1, LAW)):
         curves = []
         for name, label, color in WESTERLY:
-            values = np.array([initial_shear_stiffness(name, float(s))[part] for s in stress])
+            values = np.array([initial_shear_stiffness(law(name), float(s))[part] for s in stress])
             curves.append(Curve(label, stress * 1e-6, values * 1e-12, "-", color))
         axis = "initial shear stiffness (MPa/µm)"
         title = f"(a) granite, {kind}"
@@ -96,9 +96,12 @@ def figure_12() -> Sheet:
         curves = []
         for azimuth, style in ((0, "-"), (45, "--"), (90, ":")):
             turn = math.radians(azimuth)
-            unit = initial_shear_stiffness("jing-replica", 10e6)[1]
+            unit = initial_shear_stiffness(law("jing-replica"), 10e6)[1]
             shares = np.array(
-                [initial_shear_stiffness("jing-replica", float(s), turn)[part] / unit for s in low]
+                [
+                    initial_shear_stiffness(law("jing-replica"), float(s), turn)[part] / unit
+                    for s in low
+                ]
             )
             curves.append(Curve(f"azimuth {azimuth}°", low * 1e-6, shares, style, "C2"))
         axis = "stiffness/(incremental, 0°, 10 MPa)"
@@ -118,7 +121,7 @@ def figure_13() -> Sheet:
         curves = []
         for stress, style in ((0.5e6, "-"), (2e6, "--"), (10e6, ":")):
             quarter = {
-                x: initial_shear_stiffness("jing-replica", stress, math.radians(x))[part]
+                x: initial_shear_stiffness(law("jing-replica"), stress, math.radians(x))[part]
                 for x in np.arange(0.0, 91.0, 7.5)
             }
             values = np.array([quarter[_folded(x)] for x in azimuth])
@@ -134,9 +137,10 @@ def figure_13() -> Sheet:
 
 
 @cache
-def initial_shear_stiffness(name: str, stress: float, azimuth: float = 0.0) -> tuple[float, float]:
+def initial_shear_stiffness(
+    found: JointLaw, stress: float, azimuth: float = 0.0
+) -> tuple[float, float]:
     """dF/d(shear) in Pa/m along an azimuth at zero shear: total form, incremental law."""
-    found = law(name)
     along = np.array([0.0, math.cos(azimuth), math.sin(azimuth)])
     closure = float(found.closure(stress))
     slip = 1e-6 * closure

@@ -23,6 +23,7 @@ BIEGEL = (("biegel-smooth", "smooth", "C0"), ("biegel-rough", "rough", "C1"))
 
 # Fine enough that the claims' numbers hold to about 1 %: 12 x 32 orientations, one spring bed cell
 # where asperities are linear (it is exact there), 8 where they are not.
+_TAIL = np.linspace(0.0, 0.95, 30)
 _LINEAR, _CURVED = Resolution(12, 16, 1), Resolution(12, 16, 8)
 
 
@@ -35,10 +36,13 @@ def law(name: str) -> JointLaw:
 
 @cache
 def changed(name: str, heights: str = "", orientation: str = "", formation: str = "") -> JointLaw:
-    """The law of a preset with the heights or the orientation of another, or another formation."""
+    """The law of a preset with the heights or the orientation of another, or another formation.
+
+    heights = "none" takes the heights away: all asperities touch at zero closure.
+    """
     found = law(name)
     if heights:
-        found = replace(found, heights=law(heights).heights)
+        found = replace(found, heights=None if heights == "none" else law(heights).heights)
     if orientation:
         found = replace(found, orientation=law(orientation).orientation)
     if formation and found.heights is not None:
@@ -75,13 +79,14 @@ def total(
     azimuth: float = 0.0,
     contact: str = "exact",
 ) -> TotalShear:
-    """The same test by the total form, up to the displacement `to` (m) or a ratio of 60."""
+    """The same test by the total form, up to the displacement `to` (m) if it gets so far."""
     found = law(name)
     if closure:
-        ratios = np.linspace(0.0, to / closure, 101)
-        return total_shear(found, ratios, azimuth, closure=closure, contact=contact)
-    ratios = np.concatenate([np.linspace(0.0, 2.0, 41), np.geomspace(2.1, 60.0, 50)])
-    test = total_shear(found, ratios, azimuth, normal=normal, contact=contact)
+        tilts = np.arctan(np.linspace(0.0, to / closure, 101))
+        return total_shear(found, tilts, azimuth, closure=closure, contact=contact)
+    steepest = 90 / found.orientation.a
+    tilts = np.radians(np.concatenate([np.arange(0.0, 90.0), 90 + steepest * _TAIL]))
+    test = total_shear(found, tilts, azimuth, normal=normal, contact=contact)
     last = min(int(np.searchsorted(test.shear, to)) + 1, len(test.shear))
     return TotalShear(**{key: value[:last] for key, value in vars(test).items()})
 

@@ -89,7 +89,7 @@ class Sheet:
         for panel in self.panels:
             for curve in panel.curves:
                 for x, y in zip(np.asarray(curve.x), np.asarray(curve.y), strict=True):
-                    place = [panel.title, curve.label, panel.x, panel.y]
+                    place = [panel.title, curve.label.lstrip("_"), panel.x, panel.y]
                     rows.writerow([*place, f"{x:.8g}", f"{y:.8g}"])
         return out.getvalue()
 

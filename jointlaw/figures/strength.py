@@ -55,7 +55,7 @@ def figure_18() -> Sheet:
             curves.append(Curve("every normal stress", whole, _mirrored(quarter), "-", "C0"))
         else:
             for stress, style in ((NEARLY_ZERO, "--"), (1e6, "-"), (10e6, ":")):
-                quarter = np.array([replica_test(stress, math.radians(x)).angle for x in azimuth])
+                quarter = np.array([law_yield(stress, math.radians(x)).angle for x in azimuth])
                 label = "normal stress to 0" if stress == NEARLY_ZERO else f"{stress * 1e-6:g} MPa"
                 curves.append(Curve(label, whole, _mirrored(quarter), style))
         limit = np.full(whole.shape, slip_limit())
@@ -78,9 +78,8 @@ def figure_19() -> Sheet:
                 slides = np.full(x.shape, total_yield(turn))
                 fixed = np.array([total_slip_angle(s, turn) for s in STRESSES])
             else:
-                tests = [replica_test(s, turn) for s in STRESSES]
-                slides = np.array([test.angle for test in tests])
-                fixed = np.array([test.slip_angle for test in tests])
+                slides = np.array([law_yield(s, turn).angle for s in STRESSES])
+                fixed = np.array([law_slip_angle(s, turn) for s in STRESSES])
             curves.append(Curve(f"all in touch slide, {degrees}°", x, slides, "o-", color))
             curves.append(Curve(f"slip of 1 mm, {degrees}°", x, fixed, "s--", color))
         band = Band("y", slip_limit() - 0.3, slip_limit() + 0.3, "normal stress 0, any slip")
@@ -99,27 +98,30 @@ def figure_19() -> Sheet:
     return sheet("19", panels)
 
 
-class ReplicaTest(NamedTuple):
-    """Incremental law: shear (m), friction angle (deg) when all in touch slide, and at SLIP."""
+class Yield(NamedTuple):
+    """When all asperities in touch slide: shear and seated closure (m), friction angle (deg)."""
 
     shear: float
     closure: float
     angle: float
-    slip_angle: float
 
 
 @cache
-def replica_test(stress: float, azimuth: float) -> ReplicaTest:
-    """Shear of the replica at a kept normal stress (Pa) along an azimuth (rad)."""
+def law_yield(stress: float, azimuth: float) -> Yield:
+    """Yield of the replica at a kept normal stress (Pa) along an azimuth (rad)."""
     found = replace(law(REPLICA), resolution=_COARSE)
     closure = float(found.closure(stress))
-    points = sorted({0.6 * closure, SLIP if stress > NEARLY_ZERO else 60 * closure})
-    record = direct_shear(found.joint(), points, stress, "stress", azimuth, steps=40)
+    record = direct_shear(found.joint(), 0.6 * closure, stress, "stress", azimuth, steps=40)
     row = first_sliding(record.sliding, record.separated)
-    at_slip = float(np.interp(SLIP, record.shear, record.friction_angle))
-    return ReplicaTest(
-        float(record.shear[row]), closure, float(record.friction_angle[row]), at_slip
-    )
+    return Yield(float(record.shear[row]), closure, float(record.friction_angle[row]))
+
+
+@cache
+def law_slip_angle(stress: float, azimuth: float) -> float:
+    """Friction angle (deg) of the replica at a fixed slip, incremental law."""
+    found = replace(law(REPLICA), resolution=_COARSE)
+    record = direct_shear(found.joint(), SLIP, stress, "stress", azimuth, steps=40)
+    return float(record.friction_angle[-1])
 
 
 def first_sliding(sliding: np.ndarray, separated: np.ndarray) -> int:
@@ -135,8 +137,13 @@ def total_yield(azimuth: float) -> float:
     """
     found = law(REPLICA)
     cone = math.atan(found.asperity.mu * found.asperity.lam)
-    t = math.tan(0.5 * math.pi / found.orientation.a + cone)
-    test = total_shear(found, [t], azimuth, normal=1e6)
+    return total_angle(0.5 * math.pi / found.orientation.a + cone, azimuth)
+
+
+def total_angle(tilt: float, azimuth: float) -> float:
+    """Friction angle (deg) of the replica at a tilt arctan(shear/closure) (rad), total form."""
+    found = replace(law(REPLICA), heights=None)  # their count cancels
+    test = total_shear(found, [tilt], azimuth, normal=1e6)
     return math.degrees(math.atan2(test.shear_stress[0], test.F1[0]))
 
 

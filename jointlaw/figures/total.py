@@ -1,8 +1,9 @@
 """Direct shear by the total form, at a kept closure or a kept normal stress.
 
-With K_n a power of the deformation the total form is homogeneous: F(delta) = P(r0 + delta_1)
-delta_1^(1+eta) f(t), with the ratio t = shear/closure. So a test is a walk along t: f comes from
-`secant` once for each t, and the closure that keeps the normal stress from one scalar equation.
+With K_n a power of the deformation the total form is homogeneous, but for the count of asperities
+in touch: for delta = size (cos tilt, sin tilt), F = P(r0 + delta_1) size^(1+eta) f(tilt). So a test
+is a walk along the tilt: f comes from `secant` once for each, the size from one scalar equation.
+Beyond 90 degrees the joint has dilated above the closure at which it first touched.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from .._checks import Array
 from ..law import JointLaw
@@ -38,38 +39,34 @@ class TotalShear:
 
 def total_shear(
     law: JointLaw,
-    ratios: ArrayLike,
+    tilts: ArrayLike,
     azimuth: float = 0.0,
     closure: float | None = None,
     normal: float | None = None,
     contact: str = "exact",
 ) -> TotalShear:
-    """Shear a joint by the total form to each ratio shear/closure.
+    """Shear a joint by the total form to each tilt arctan(shear/closure).
 
-    ratios: (rows,), >= 0; azimuth: direction of shear in rad; and either the closure (m) or the
-    normal stress (Pa) that is kept. `contact` as in `secant`. Raises ValueError unless exactly one
-    of the two is given.
+    tilts: (rows,) in rad, ascending from 0; azimuth: direction of shear in rad; and either the
+    closure (m) or the normal stress (Pa) that is kept. `contact` as in `secant`. The rows end where
+    the normal stress cannot be kept. Raises ValueError unless exactly one of the two is given.
     """
     if (closure is None) == (normal is None):
         raise ValueError("give either the closure (m) or the normal stress (Pa) that is kept")
-    t = np.asarray(ratios, float)
     unit = replace(law, heights=None, closure_range=1.0)
-    along = (math.cos(azimuth), math.sin(azimuth))
-    results = [secant(unit, (1.0, r * along[0], r * along[1]), contact) for r in t]
-    f = np.array([r.F for r in results])
-    if closure is not None:
-        size = np.full(t.shape, closure)
-    else:
-        size = np.array([_closure_at(law, float(f1), float(normal or 0.0)) for f1 in f[:, 0]])
-    scale = _touching(law, size) * size ** (1 + law.asperity.eta)
-    return TotalShear(
-        closure=size,
-        shear=t * size,
-        F1=scale * f[:, 0],
-        shear_stress=scale * (f[:, 1] * along[0] + f[:, 2] * along[1]),
-        sliding=np.array([r.sliding for r in results]),
-        separated=np.array([r.separated for r in results]),
-    )
+    rows = []
+    for tilt in np.asarray(tilts, float):
+        cos, sin = math.cos(tilt), math.sin(tilt)
+        along = np.array([math.cos(azimuth), math.sin(azimuth)])
+        result = secant(unit, (cos, *(sin * along)), contact)
+        f1, shear = float(result.F[0]), float(result.F[1:] @ along)
+        size = closure / cos if closure is not None else _size(law, cos, f1, float(normal or 0.0))
+        if size is None:
+            break
+        scale = float(_touching(law, size * cos)) * size ** (1 + law.asperity.eta)
+        shares = (result.sliding, result.separated)
+        rows.append((size * cos, size * sin, scale * f1, scale * shear, *shares))
+    return TotalShear(*np.array(rows).reshape(-1, 6).T)
 
 
 def total_closure(law: JointLaw, closure: Sequence[float] | Array) -> Array:
@@ -81,21 +78,29 @@ def total_closure(law: JointLaw, closure: Sequence[float] | Array) -> Array:
     return stress
 
 
-def _touching(law: JointLaw, closure: Array) -> Array:
+def _touching(law: JointLaw, closure: float | Array) -> Array:
     """P(r0 + delta_1), one without heights."""
     if law.heights is None:
         return np.ones_like(closure)
     return np.asarray(law.heights.cdf(law.heights.overlap + closure))
 
 
-def _closure_at(law: JointLaw, f1: float, normal: float) -> float:
-    """The closure (m) at which P(r0 + delta_1) delta_1^(1+eta) f1 is the normal stress."""
+def _size(law: JointLaw, cos: float, f1: float, normal: float) -> float | None:
+    """The least size (m) at which P(r0 + size cos) size^(1+eta) f1 is the normal stress."""
     power = 1 + law.asperity.eta
+    if not f1 > 0:
+        return None
     if law.heights is None:
         return float((normal / f1) ** (1 / power))
 
-    def misfit(log_closure: float) -> float:
-        touching = float(_touching(law, np.array(math.exp(log_closure))))
-        return math.log(max(touching, 1e-300)) + power * log_closure + math.log(f1 / normal)
+    def misfit(log_size: float) -> float:
+        touching = float(_touching(law, math.exp(log_size) * cos))
+        return math.log(max(touching, 1e-300)) + power * log_size + math.log(f1 / normal)
 
-    return math.exp(brentq(misfit, -80.0, 10.0, xtol=1e-12))
+    high = 10.0
+    if cos < 0:  # dilated: contacts are lost as the size grows, so the stress has a largest value
+        top = math.log(max(law.heights.overlap, 1e-12) / -cos)
+        high = float(minimize_scalar(lambda x: -misfit(x), bounds=(top - 20, top)).x)
+    if misfit(high) < 0:
+        return None
+    return math.exp(brentq(misfit, -80.0, high, xtol=1e-12))

@@ -138,7 +138,7 @@ def slowing_reason() -> Finding:
     formed, without = _exponent(law(SMOOTH)), _exponent(changed(SMOOTH, heights="none"))
     text = (
         f"stiffness goes with stress to the power {formed:.2f} at 10 MPa; without any forming of "
-        f"contacts to the power {without:.2f} (Hertz: 1/3), slower still: forming straightens the curve"
+        f"contacts to the power {without:.2f} (Hertz: 1/3), slower still: forming straightens it"
     )
     return Finding("fails", text, {"with": formed, "without": without})
 

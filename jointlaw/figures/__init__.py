@@ -14,7 +14,7 @@ from .._progress import track
 from .._toml import replace_file
 from .elastic import figure_8, figure_9
 from .normal import figure_10, figure_11, figure_12, figure_13
-from .render import png
+from .render import png, require_matplotlib
 from .shear import figure_14, figure_15, figure_16
 from .sheet import Sheet
 from .strength import figure_17, figure_18, figure_19
@@ -39,6 +39,7 @@ def write(folder: str | Path, numbers: Sequence[int] = ()) -> list[Path]:
         if number not in FIGURES:
             known = ", ".join(str(n) for n in sorted({*FIGURES, *_SAME}))
             raise ValueError(f"figure {number} is not one of {known} (1 and 2 are sketches)")
+    require_matplotlib()
     out = Path(folder)
     out.mkdir(parents=True, exist_ok=True)
     files, captions = [], {}

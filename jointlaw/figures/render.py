@@ -11,13 +11,20 @@ import numpy as np
 from .sheet import Mark, Panel, Sheet
 
 
-def png(sheet: Sheet, dpi: int = 130) -> bytes:
-    """The figure as PNG, its caption below. Raises ImportError without matplotlib."""
+def require_matplotlib() -> None:
+    """Raise ImportError, with the remedy, if matplotlib is missing."""
     try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
+        import matplotlib.figure  # noqa: F401
     except ImportError as error:
         raise ImportError("figures need matplotlib: pip install 'jointlaw[plot]'") from error
+
+
+def png(sheet: Sheet, dpi: int = 130) -> bytes:
+    """The figure as PNG, its caption below. Raises ImportError without matplotlib."""
+    require_matplotlib()
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
     columns = min(len(sheet.panels), 3 if len(sheet.panels) != 4 else 2)
     rows = -(-len(sheet.panels) // columns)
     width = 5.2 * columns if columns > 1 else 7.0

@@ -79,7 +79,7 @@ def measured_ratios() -> Finding:
     whole = _range(2 / 3, 0.0), _range(2 / 3, 1.0)
     quartz = _range(hertz_mindlin_ratio(0.3), 0.0), _range(hertz_mindlin_ratio(0.3), 1.0)
     text = (
-        f"in part: isotropic (c = 0) interfaces reach {whole[0][0]:.3f} to {whole[0][1]:.3f} "
+        f"isotropic (c = 0) interfaces reach {whole[0][0]:.3f} to {whole[0][1]:.3f} "
         "over all "
         f"ν, {quartz[0][0]:.3f} to {quartz[0][1]:.3f} for quartz (ν = 0.3); with c up to its bound "
         f"{whole[1][1]:.3f} and {quartz[1][1]:.3f}. No orientation takes "
@@ -89,7 +89,7 @@ def measured_ratios() -> Finding:
         "low": whole[0][0], "high": whole[0][1], "high_c": whole[1][1],
         "quartz_low": quartz[0][0], "quartz_high": quartz[0][1], "quartz_high_c": quartz[1][1],
     }  # fmt: skip
-    return Finding("one reading", text, numbers)
+    return Finding("in part", text, numbers)
 
 
 @claim(

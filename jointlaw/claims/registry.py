@@ -6,16 +6,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 
-VERDICTS = ("holds", "misprint", "one reading", "fails")
+VERDICTS = ("holds", "misprint", "in part", "one reading", "fails")
 
 
 @dataclass(frozen=True)
 class Finding:
     """What we measured: a verdict, the sentence for the table, and the numbers in it.
 
-    "holds": as printed. "misprint": the print is wrong, the form given here holds. "one reading":
-    true under one reading or in part of the range, which the sentence names. "fails": not so in
-    either form of the law.
+    "holds": as printed, in both forms of the law where both apply. "misprint": the print is wrong,
+    the form given here holds. "in part": true in a part of the range that the sentence names. "one
+    reading": true under one reading that the sentence names. "fails": not so in either form.
     """
 
     verdict: str

@@ -60,7 +60,7 @@ def nonlinear_above_linear() -> Finding:
             f"never below {min(excess[3].min(), excess[6].min()):.3f}, a = 3 ahead from "
             f"{order * 1e6:.1f} µm on"
         )
-    return Finding("holds", "; ".join(parts), numbers)
+    return Finding("in part", "; ".join(parts), numbers)
 
 
 @claim(

@@ -14,7 +14,7 @@ def numbers(key, verdict="holds"):
 
 
 def test_smooth_is_stiffer_in_closure_beyond_a_crossing():
-    found = numbers("closure-stiffer", "one reading")
+    found = numbers("closure-stiffer", "in part")
     # the forms differ in shear force only: the crossing moves by a few per cent
     assert found["crossing"] == pytest.approx(0.16e-6, rel=0.05)
     assert found["total"] == pytest.approx(found["crossing"], rel=0.05)
@@ -34,10 +34,11 @@ def test_both_reasons_for_the_stiffer_closure_count():
 
 
 def test_smooth_is_stiffer_in_initial_shear():
-    found = numbers("shear-stiffness")
-    assert all(ratio > 1.0 for ratio in found.values())
+    found = numbers("shear-stiffness", "in part")
     for kind in ("total", "law"):
-        assert found[f"{kind}_50"] > found[f"{kind}_10"] > found[f"{kind}_1"]
+        assert found[f"{kind}_50"] > found[f"{kind}_10"] > found[f"{kind}_1"] > 1.0
+    assert found["total_0.1"] > 1.0  # the paper's own form, at every stress
+    assert 0.9 < found["law_0.1"] < 1.0  # the incremental law: above about 0.5 MPa only
 
 
 @pytest.mark.parametrize("kind", ["total form", "incremental law"])

@@ -14,7 +14,7 @@ def numbers(key, verdict="holds"):
 
 
 def test_smooth_interface_is_stronger_at_10_mpa():
-    found = numbers("smooth-stronger")
+    found = numbers("smooth-stronger", "in part")
     assert found["law_least"] > 0  # from the first 0.02 um on
     assert 0 < found["total_overtakes"] < 0.2  # um; the total form starts the other way round
     assert found["total_end"] > 0.02

@@ -31,7 +31,7 @@ def closure_stiffer() -> Finding:
     text = (
         f"beyond a crossing at {cross * 1e6:.3f} µm, {at / 1e6:.1f} MPa (total form "
         f'{printed * 1e6:.3f} µm; formation "individual" {alone * 1e6:.3f} µm), softer before it, '
-        f"since fewer of its asperities touch at zero closure; at 50 MPa it has closed "
+        "since fewer of its asperities touch at zero closure; at 50 MPa it has closed "
         f"{two[0]:.3f} µm, the rough one {two[1]:.3f} µm"
     )
     numbers = {
@@ -155,7 +155,8 @@ def replica_stiffness() -> Finding:
         ratio[stress] = [x / y for x, y in zip(two, three, strict=True)]
     text = (
         f"axis 2 over axis 3: total form {ratio[2e6][0]:.3f}, incremental law {ratio[2e6][1]:.3f}, "
-        "the same at every stress. Axis 2 is stiffer though c < 0, because λ = 0.33 makes K_s > K_n"
+        "the same at every stress. Axis 2 is stiffer though c < 0, because λ = 0.33 makes K_s > "
+        "K_n"
     )
     numbers = {
         f"{k}_{s / 1e6:g}": r[i] for s, r in ratio.items() for i, k in enumerate(("total", "law"))

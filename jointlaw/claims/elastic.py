@@ -79,11 +79,10 @@ def measured_ratios() -> Finding:
     whole = _range(2 / 3, 0.0), _range(2 / 3, 1.0)
     quartz = _range(hertz_mindlin_ratio(0.3), 0.0), _range(hertz_mindlin_ratio(0.3), 1.0)
     text = (
-        f"isotropic (c = 0) interfaces reach {whole[0][0]:.3f} to {whole[0][1]:.3f} "
-        "over all "
-        f"ν, {quartz[0][0]:.3f} to {quartz[0][1]:.3f} for quartz (ν = 0.3); with c up to its bound "
-        f"{whole[1][1]:.3f} and {quartz[1][1]:.3f}. No orientation takes "
-        "the ratio below K_s/K_n itself, so 0.78 is out of reach for quartz"
+        f"isotropic (c = 0) interfaces reach {whole[0][0]:.3f} to {whole[0][1]:.3f} over all ν, "
+        f"{quartz[0][0]:.3f} to {quartz[0][1]:.3f} for quartz (ν = 0.3); with c up to its bound "
+        f"{whole[1][1]:.3f} and {quartz[1][1]:.3f}. No orientation takes the ratio below K_s/K_n "
+        "itself, so 0.78 is out of reach for quartz"
     )
     numbers = {
         "low": whole[0][0], "high": whole[0][1], "high_c": whole[1][1],
@@ -104,8 +103,8 @@ def anisotropic_stiffness() -> Finding:
     roundness = max(circle) / min(circle) - 1
     reverse = shear_stiffness(skew, 0.5, 1.0, 0.0) / shear_stiffness(skew, 0.5, 1.0, math.pi / 2)
     text = (
-        f"C_s/C11 = {two:.3f} along 2, {three:.3f} along 3; for c = 0 round to {roundness:.0e}. "
-        f"It needs K_s < K_n: at K_s = 2 K_n the order reverses (C22/C33 = {reverse:.3f})"
+        f"C_s/C11 = {two:.3f} along 2, {three:.3f} along 3; for c = 0 round to {roundness:.0e}. It "
+        f"needs K_s < K_n: at K_s = 2 K_n the order reverses (C22/C33 = {reverse:.3f})"
     )
     numbers = {"axis_2": two, "axis_3": three, "roundness": roundness, "reverse": reverse}
     return Finding("holds", text, numbers)

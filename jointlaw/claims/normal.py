@@ -64,9 +64,8 @@ def sliding_angle_claim() -> Finding:
         worst = max(worst, abs(secant(_simple(a, mu, lam=lam), (1.0, 0.0, 0.0)).sliding - share))
     half, double = (math.degrees(sliding_angle(1.0, k, 0.6)) for k in (0.5, 2.0))
     text = (
-        f"sliding share to {worst:.0e}; at μ = 0.6 the angle runs from {half:.1f}° (K_s = "
-        "K_n/2) to "
-        f"{double:.1f}° (K_s = 2 K_n)"
+        f"sliding share to {worst:.0e}; at μ = 0.6 the angle runs from {half:.1f}° (K_s = K_n/2) "
+        f"to {double:.1f}° (K_s = 2 K_n)"
     )
     return Finding("holds", text, {"worst": worst, "half": half, "double": double})
 
@@ -80,8 +79,8 @@ def table_2() -> Finding:
     rough = inelastic(Shape(math.inf), 1.0, 0.5, 0.1)
     text = (
         f"every a, b, c: quadrature agrees to {worst:.0e}; rows a = 1, 2 as printed to {rows:.0e}. "
-        f"Last row wrong: C22p is {free[1] / 0.5:g} K_s at μ = 0 and {rough[1]:g} for μ > 0, "
-        "not K_s"
+        f"Last row wrong: C22p is {free[1] / 0.5:g} K_s at μ = 0 and {rough[1]:g} for μ > 0, not "
+        "K_s"
     )
     numbers = {"worst": worst, "rows": rows, "free": free[1] / 0.5, "rough": rough[1]}
     return Finding("misprint", text, numbers)
@@ -125,8 +124,8 @@ def inelastic_vanishes() -> Finding:
     rough = float(inelastic(Shape(3.0), 1.0, 1.0, 0.6)[0])
     c11 = closure_stiffness(Shape(math.inf), 1.0, 0.5, 0.3)
     text = (
-        f"μ = 0: {free:.1e} K_n at a = 100; μ = 0.6, K_s = K_n: exactly {rough:g} from a = "
-        f"2.91; C11 = {c11:g} K_n"
+        f"μ = 0: {free:.1e} K_n at a = 100; μ = 0.6, K_s = K_n: exactly {rough:g} from a = 2.91; "
+        f"C11 = {c11:g} K_n"
     )
     return Finding("holds", text, {"free": free, "rough": rough, "c11": c11})
 
@@ -168,8 +167,8 @@ def shear_series() -> Finding:
     peak = float(force.max())
     text = (
         f"{start:.4f} to {end:.4f}, so f_s would be {end:.4f} μ f_n at sliding (and up to "
-        f"{peak:.3f}): "
-        f"it must be capped, and the cap is reached at d_s = {limit:.3f} μλ d_n already"
+        f"{peak:.3f}): it must be capped, and the cap is reached at d_s = {limit:.3f} μλ d_n "
+        "already"
     )
     return Finding("one reading", text, {"start": start, "end": end, "limit": limit, "peak": peak})
 
@@ -196,9 +195,9 @@ def sliding_limits() -> Finding:
     """C11p at mu = 0 over both domains."""
     beyond = float(inelastic(Shape(1.0), 1.0, 1.0, 0.0)[0])
     text = (
-        "the limits are those of the asperities that do not slide: at μ = 0 they would give "
-        "C11p = 0 "
-        f"where Eq. 31 has {beyond:.4f} K_s; the text above it and Eq. 29 (θ_s to π/2a) are right"
+        "the limits are those of the asperities that do not slide: at μ = 0 they would give C11p "
+        f"= 0 where Eq. 31 has {beyond:.4f} K_s; the text above it and Eq. 29 (θ_s to π/2a) are "
+        "right"
     )
     return Finding("misprint", text, {"beyond": beyond})
 

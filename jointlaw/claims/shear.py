@@ -81,8 +81,8 @@ def sliding_complete() -> Finding:
     text = (
         f"complete (all in touch slide) at {full[6]:.3f} µm for a = 6, {full[3]:.3f} µm for a = 3 "
         f"(incremental {ours[6]:.2f}, {ours[3]:.2f}); but it begins at {begin[6]:.3f} against "
-        f"{begin[3]:.3f} µm and is half done at {half[6]:.3f} against {half[3]:.3f} µm: "
-        "earlier for a = 3"
+        f"{begin[3]:.3f} µm and is half done at {half[6]:.3f} against {half[3]:.3f} µm: earlier "
+        "for a = 3"
     )
     numbers = {
         f"{name}_a{a}": values[a]

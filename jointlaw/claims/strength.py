@@ -80,8 +80,7 @@ def smooth_hardens() -> Finding:
         numbers |= {f"yield_{label}": float(ratio(run)[row]), f"at_{label}": start * 1e6}
         parts.append(
             f"{label} + {gain:.3f} (total form + {after[1] - after[0]:.3f}) from "
-            f"{ratio(run)[row]:.3f} "
-            f"at {start * 1e6:.2f} µm"
+            f"{ratio(run)[row]:.3f} at {start * 1e6:.2f} µm"
         )
     return Finding("holds", "F₂/F₁ over 1 µm after yield: " + "; ".join(parts), numbers)
 
@@ -146,12 +145,10 @@ def friction_independent() -> Finding:
     fixed = [law_slip_angle(s, 0.0) for s in STRESSES]
     printed = [total_slip_angle(s, 0.0) for s in (STRESSES[0], STRESSES[-1])]
     text = (
-        f"if yield is when all in touch slide: {min(slides):.1f}° to {max(slides):.1f}° from "
-        "0.1 to 10 "
-        f"MPa (total form: {total_yield(0.0):.1f}° at every stress). Not if yield is a slip of "
-        "1 mm: "
-        f"{fixed[0]:.1f}° falls to {fixed[-1]:.1f}° (total form {printed[0]:.1f}° to "
-        f"{printed[1]:.1f}°)"
+        f"if yield is when all in touch slide: {min(slides):.1f}° to {max(slides):.1f}° from 0.1 "
+        f"to 10 MPa (total form: {total_yield(0.0):.1f}° at every stress). Not if yield is a slip "
+        f"of 1 mm, at the assumed contact density: {fixed[0]:.1f}° falls to {fixed[-1]:.1f}° "
+        f"(total form {printed[0]:.1f}° to {printed[1]:.1f}°)"
     )
     numbers = {
         "slides_low": min(slides), "slides_high": max(slides), "fixed_first": fixed[0],
@@ -168,13 +165,11 @@ def friction_at_zero() -> Finding:
     steepest = math.pi / 2 / law(REPLICA).orientation.a
     far = total_angle(math.pi / 2 + 0.98 * steepest, 0.0)
     text = (
-        "at zero normal stress every slip is far above the closure, and the angle is arctan μ "
-        "+ π/2a = "
-        f"{limit:.1f}° ({far:.1f}° in the total form, all but the steepest 2 % separated), "
-        f"against {one.angle:.1f}° at 1 MPa "
-        "when all in touch slide. But in the limit of small stress the yield at which all in "
-        "touch "
-        f"slide comes at {small.shear / small.closure:.2f} closures and {small.angle:.1f}°, lower"
+        "at zero normal stress every slip is far above the closure, and the angle is arctan μ + "
+        f"π/2a = {limit:.1f}° ({far:.1f}° in the total form, all but the steepest 2 % separated), "
+        f"against {one.angle:.1f}° at 1 MPa when all in touch slide. But in the limit of small "
+        f"stress the yield at which all in touch slide comes at {small.shear / small.closure:.2f} "
+        f"closures and {small.angle:.1f}°, lower"
     )
     numbers = {"limit": limit, "far": far, "at_1MPa": one.angle, "small": small.angle}
     return Finding("one reading", text, numbers)

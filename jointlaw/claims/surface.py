@@ -65,8 +65,8 @@ def density_domain() -> Finding:
     """The integral of Eq. 15 over both domains."""
     wide, _ = quad(lambda theta: 2.0 * math.sin(2.0 * theta), 0.0, math.pi)  # 2 pi/a at a = 2
     text = (
-        f"the sentence is wrong: over 2pi/a the density sums to {abs(wide):.0f} (b = c = 0), "
-        "over pi/(2a) to 1"
+        f"the sentence is wrong: over 2pi/a the density sums to {abs(wide):.0f} (b = c = 0), over "
+        "pi/(2a) to 1"
     )
     return Finding("misprint", text, {"sum_over_2pi/a": wide})
 
@@ -116,8 +116,8 @@ def density_bounds() -> Finding:
     on = max(abs(_least(b, c)) for b, c in _boundary())
     outside = max(_least(b, c) for b, c in _boundary(1.01))
     text = (
-        f"exact: least density (over its value at b = c = 0) {inside:.1e} > 0 inside, {on:.0e} "
-        f"on the bounds, negative (at most {outside:.1e}) 1 % outside"
+        f"exact: least density (over its value at b = c = 0) {inside:.1e} > 0 inside, {on:.0e} on "
+        f"the bounds, negative (at most {outside:.1e}) 1 % outside"
     )
     return Finding("holds", text, {"inside": inside, "on": on, "outside": outside})
 
@@ -127,8 +127,8 @@ def smooth_limit() -> Finding:
     """Mean and standard deviation of the inclination at large a."""
     mean, variance = inclination(Shape(1e4))
     text = (
-        f"E[θ] = {math.degrees(mean):.4f}° ± {math.degrees(math.sqrt(variance)):.4f}° at a = "
-        "10⁴, 0 at a = ∞"
+        f"E[θ] = {math.degrees(mean):.4f}° ± {math.degrees(math.sqrt(variance)):.4f}° at a = 10⁴, "
+        "0 at a = ∞"
     )
     return Finding("holds", text, {"mean": mean, "at_infinity": inclination(Shape(math.inf))[0]})
 
@@ -162,9 +162,8 @@ def shape_b0() -> Finding:
     }
     text = (
         "per solid angle at a = 1 only: density at the axis over that at the edge is "
-        f"{spread[1.0]:.3f} "
-        f"(a = 1), {spread[2.0]:.3f} (a = 2), {spread[3.0]:.3f} (a = 3); uniform in cos aθ for "
-        "every a"
+        f"{spread[1.0]:.3f} (a = 1), {spread[2.0]:.3f} (a = 2), {spread[3.0]:.3f} (a = 3); uniform "
+        "in cos aθ for every a"
     )
     return Finding("one reading", text, {f"a={a:g}": value for a, value in spread.items()})
 
@@ -177,8 +176,8 @@ def shape_c() -> Finding:
     two, three = (float(skew.density(edge, phi)) for phi in (0.0, edge))
     ratio = float(even.density(edge, 0.0) / even.density(edge, edge))
     text = (
-        f"at θ = 90°, a = 1: {two:.3f} along axis 2, {abs(three):.0e} along axis 3 (1/sr); "
-        f"ratio {ratio:.0f} for c = 0"
+        f"at θ = 90°, a = 1: {two:.3f} along axis 2, {abs(three):.0e} along axis 3 (1/sr); ratio "
+        f"{ratio:.0f} for c = 0"
     )
     return Finding("holds", text, {"axis_2": two, "axis_3": three, "ratio_c0": ratio})
 

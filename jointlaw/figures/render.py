@@ -55,9 +55,12 @@ def _draw(axes: Any, panel: Panel) -> None:
     for mark in panel.marks:
         _mark(axes, mark)
     axes.set_title(panel.title, fontsize=9)
+    if panel.xlim is not None:
+        axes.set_xlim(*panel.xlim)
+    if panel.ylim is not None:
+        axes.set_ylim(*panel.ylim)
     if panel.picture:
         axes.set_aspect("equal")
-        axes.set(xlim=panel.xlim, ylim=panel.ylim)
         axes.set_axis_off()
         return
     if panel.polar:
@@ -67,13 +70,12 @@ def _draw(axes: Any, panel: Panel) -> None:
         axes.set_xlabel(panel.x, fontsize=9)
         axes.set_ylabel(panel.y, fontsize=9)
         axes.grid(alpha=0.3, lw=0.5)
-        axes.margins(x=0)
+        if panel.xlim is None:
+            axes.margins(x=0)
     if panel.log_ticks:
         axes.set_xscale("log")
         axes.set_xticks(panel.log_ticks, [f"{tick:g}" for tick in panel.log_ticks])
         axes.minorticks_off()
-    if panel.ylim is not None:
-        axes.set_ylim(*panel.ylim)
     axes.tick_params(labelsize=8)
     if any(not curve.label.startswith("_") for curve in panel.curves) or panel.bands:
         outside = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16)} if panel.polar else {}

@@ -39,7 +39,9 @@ def figure_17() -> Sheet:
                 at = np.array([test.shear[row] * 1e6])
                 text = f"{label}: all in touch slide"
                 curves.append(Curve(text, at, ratio(test)[row : row + 1], "o", color))
-        panels.append(Panel(kind, "shear displacement δ₂ (µm)", "F₂/F₁", curves, ylim=(0.0, 0.85)))
+        axis = "shear displacement δ₂ (µm)"
+        limits = (0.0, TO * 1e6)
+        panels.append(Panel(kind, axis, "F₂/F₁", curves, xlim=limits, ylim=(0.0, 0.85)))
     return sheet("17", panels)
 
 

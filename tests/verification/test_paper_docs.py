@@ -1,10 +1,13 @@
 """The claims table of the docs is the one that the package computes, and every claim has a test."""
 
+import importlib
 import re
 from pathlib import Path
 
 import pytest
 
+import jointlaw as jl
+import jointlaw.closed_form
 from jointlaw import claims
 
 ROOT = Path(__file__).parents[2]
@@ -53,3 +56,12 @@ def test_equations_are_all_placed():
         ):
             placed |= set(range(int(first), int(last or first) + 1))
     assert placed >= set(range(1, 38))
+
+
+def test_the_example_of_the_page_runs(monkeypatch):
+    # jl.secant is the function, whether or not the package exports it yet
+    monkeypatch.setattr(jl, "secant", importlib.import_module("jointlaw.secant").secant)
+    space = {}
+    exec(PRINTED.split("```python")[1].split("```")[0], space)
+    # F2/F1 depends on shear/closure alone: 0.476 at 2, as in the shear test at 10 MPa
+    assert space["result"].F[1] / space["result"].F[0] == pytest.approx(0.476, abs=5e-4)

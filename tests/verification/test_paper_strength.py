@@ -49,9 +49,9 @@ def test_friction_angle_against_normal_stress_by_two_definitions_of_yield():
     found = numbers("friction-independent", "one reading")
     # all in touch slide: 3 deg over two decades of stress
     assert found["slides_high"] - found["slides_low"] < 3.0
-    # fixed slip: falls by more than 10 deg in both forms
-    assert found["fixed_first"] - found["fixed_last"] > 10.0
-    assert found["total_first"] - found["total_last"] > 10.0
+    # fixed slip: falls by several times as much in both forms, whatever contact density is assumed
+    assert found["fixed_first"] - found["fixed_last"] > 6.0
+    assert found["total_first"] - found["total_last"] > 6.0
 
 
 def test_friction_angle_at_zero_normal_stress_by_two_readings():

@@ -4,7 +4,7 @@ One function for each claim, in the order of the paper; it runs once, and the ta
 command `jointlaw figures --claims` and the tests all read its finding.
 """
 
-from . import surface, elastic, normal, closure, shear, strength  # noqa: F401, I001  (in this order)
+from . import surface, elastic, normal, asperity, closure, shear, strength  # noqa: F401, I001  (in this order)
 from .registry import Claim, Finding, get, header, keys, measure, row, table
 
 __all__ = ["Claim", "Finding", "get", "header", "keys", "measure", "row", "table"]

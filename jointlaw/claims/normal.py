@@ -1,4 +1,4 @@
-"""Claims on sliding in closure and on one asperity: Table 2, Eq. 10, 21, 29-36."""
+"""Claims on sliding: Eq. 5 to 10, 19 to 23, Table 2, Eq. 29 to 32."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def total_force() -> Finding:
     worst = 0.0
     for delta in ((1.0, 0.0, 0.0), (1.0, 0.8, 0.3), (1.0, 2.5, -1.0), (0.1, 0.6, 0.2)):
         for eta, contact in ((0.0, "exact"), (0.5, "exact"), (0.5, "series")):
-            found = _simple(2.0, 0.6, eta=eta, lam=1.2, b=0.5, c=0.1)
+            found = simple(2.0, 0.6, eta=eta, lam=1.2, b=0.5, c=0.1)
             F = secant(found, delta, contact).F
             brute = _brute_force(found, np.array(delta), contact)
             worst = max(worst, float(np.max(np.abs(F - brute)) / np.max(np.abs(F))))
@@ -61,7 +61,7 @@ def sliding_angle_claim() -> Finding:
     for a, lam, mu in ((1.0, 1.0, 0.6), (2.0, 1.5, 0.3), (3.0, 1.2, 0.3)):
         start = sliding_angle(lam, 1.0, mu)
         share = math.cos(a * start) if a * start < math.pi / 2 else 0.0
-        worst = max(worst, abs(secant(_simple(a, mu, lam=lam), (1.0, 0.0, 0.0)).sliding - share))
+        worst = max(worst, abs(secant(simple(a, mu, lam=lam), (1.0, 0.0, 0.0)).sliding - share))
     half, double = (math.degrees(sliding_angle(1.0, k, 0.6)) for k in (0.5, 2.0))
     text = (
         f"sliding share to {worst:.0e}; at μ = 0.6 the angle runs from {half:.1f}° (K_s = K_n/2) "
@@ -90,7 +90,7 @@ def table_2() -> Finding:
 def inelastic_cross_terms() -> Finding:
     """Off-diagonal terms by quadrature, and in the total form."""
     cross = _against_quadrature()[1]
-    Cp = secant(_simple(1.5, 0.3, b=0.5, c=0.2), (1.0, 0.0, 0.0)).Cp
+    Cp = secant(simple(1.5, 0.3, b=0.5, c=0.2), (1.0, 0.0, 0.0)).Cp
     ours = float(np.max(np.abs(Cp - np.diag(np.diag(Cp)))))
     text = f"largest {cross:.0e} K_n at 200 random a, b, c; {ours:.0e} in `secant`"
     return Finding("holds", text, {"worst": cross, "secant": ours})
@@ -130,79 +130,7 @@ def inelastic_vanishes() -> Finding:
     return Finding("holds", text, {"free": free, "rough": rough, "c11": c11})
 
 
-@claim(
-    "hertz-parameters",
-    "section 4.1",
-    "G = 20 GPa, nu = 0.3, R = 40 um give K = 200 GPa um^1/2, lambda = 1.2",
-)
-def hertz_parameters() -> Finding:
-    """Eq. 34."""
-    asperity = Asperity.hertz_mindlin(20e9, 0.3, 40e-6, 0.3)
-    K = asperity.K * 1e-6
-    text = f"K = {K:.1f} GPa µm^1/2, λ = {asperity.lam:.3f}"
-    return Finding("holds", text, {"K": K, "lam": asperity.lam})
-
-
-@claim("shear-law", "Eq. 35", "K_s falls from 3 K_n/2 lambda to K_n/lambda at sliding")
-def shear_law() -> Finding:
-    """Secant factor of Eq. 35, and the incremental law at constant normal load."""
-    start, end = (float(shear_factor(x, 0.5)) for x in (0.0, 1.0))
-    worst = _flat_contact_error()
-    text = (
-        f"factors {start:.6f} and {end:.6f}; the incremental law on a flat facet follows Eq. 35 to "
-        f"{worst:.0e} μ f_n (64 depth cells)"
-    )
-    return Finding("holds", text, {"start": start, "end": end, "law": worst})
-
-
-@claim(
-    "shear-series", "Eq. 36", "the series falls from 3 K_n/2 lambda to 1.063 K_n/lambda at sliding"
-)
-def shear_series() -> Finding:
-    """Secant factor of Eq. 36 and the point where it reaches friction."""
-    start, end = (float(shear_factor(x, 0.5, "series")) for x in (0.0, 1.0))
-    limit = series_limit(0.5)
-    x = np.linspace(0.0, 2.0, 200001)
-    force = x * shear_factor(x, 0.5, "series")
-    peak = float(force.max())
-    text = (
-        f"{start:.4f} to {end:.4f}, so f_s would be {end:.4f} μ f_n at sliding (and up to "
-        f"{peak:.3f}): it must be capped, and the cap is reached at d_s = {limit:.3f} μλ d_n "
-        "already"
-    )
-    return Finding("one reading", text, {"start": start, "end": end, "limit": limit, "peak": peak})
-
-
-@claim("sliding-angle-power", "section 4", "theta_s = arctan(lambda mu) for the power law")
-def sliding_angle_power() -> Finding:
-    """Sliding share of both contact forms in closure."""
-    a, mu, lam = 3.0, 0.3, 1.2
-    found = _simple(a, mu, eta=0.5, lam=lam)
-    edge = {}
-    for contact in ("exact", "series"):
-        share = secant(found, (1.0, 0.0, 0.0), contact).sliding
-        edge[contact] = math.degrees(math.acos(share) / a)
-    exact = math.degrees(math.atan(lam * mu))
-    text = (
-        f"{edge['exact']:.3f}° with Eq. 35 (arctan λμ = {exact:.3f}°; a = 3, λ = 1.2, μ = 0.3); "
-        f"{edge['series']:.3f}° with the capped series of Eq. 36"
-    )
-    return Finding("holds", text, {"arctan": exact, **edge})
-
-
-@claim("sliding-limits", "Eq. 37b", "the sliding domain runs from 0 to theta_s")
-def sliding_limits() -> Finding:
-    """C11p at mu = 0 over both domains."""
-    beyond = float(inelastic(Shape(1.0), 1.0, 1.0, 0.0)[0])
-    text = (
-        "the limits are those of the asperities that do not slide: at μ = 0 they would give C11p "
-        f"= 0 where Eq. 31 has {beyond:.4f} K_s; the text above it and Eq. 29 (θ_s to π/2a) are "
-        "right"
-    )
-    return Finding("misprint", text, {"beyond": beyond})
-
-
-def _simple(
+def simple(
     a: float, mu: float, eta: float = 0.0, lam: float = 1.0, b: float = 0.0, c: float = 0.0
 ) -> JointLaw:
     """A law without heights, K = 1 and N = 1."""
@@ -265,23 +193,3 @@ def _printed_difference(a: float, mu: float) -> float:
         c22 += ks * (4 * cos(2 * t) + cos(4 * t) + 1) / 16
     ours = inelastic(Shape(a), kn, ks, mu)
     return float(max(abs(c11 - ours[0]), abs(c22 - ours[1]), abs(c22 - ours[2])))
-
-
-def _flat_contact_error() -> float:
-    """Largest miss of Eq. 35 by the incremental law on nearly flat facets, over mu f_n."""
-    mu, lam = 0.3, 1.2
-    found = JointLaw(
-        orientation=Orientation(1e6),
-        asperity=Asperity(K=1.0, lam=lam, eta=0.5, mu=mu),
-        asperity_density=1.0,
-        closure_range=1.0,
-        resolution=Resolution(1, 3, 64),
-    )
-    joint = found.joint()
-    joint.update([1.0, 0.0, 0.0])
-    worst = 0.0
-    for x in np.linspace(0.0, 1.2, 61):
-        F, _ = joint.trial([0.0, x * mu * lam, 0.0])
-        exact = min(x, 1.0) * float(shear_factor(min(x, 1.0), 0.5))
-        worst = max(worst, abs(float(F[1]) / (mu * float(F[0])) - exact))
-    return worst

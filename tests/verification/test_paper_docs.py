@@ -5,8 +5,6 @@ from pathlib import Path
 
 import pytest
 
-import jointlaw as jl
-import jointlaw.closed_form
 from jointlaw import claims
 
 ROOT = Path(__file__).parents[2]

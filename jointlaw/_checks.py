@@ -1,0 +1,54 @@
+"""Checks on numbers that come from outside: each error names parameter, value, bound and remedy."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def number(name: str, value: Any, *, infinite: bool = False) -> float:
+    """Return `value` as a float, or say which parameter is not a finite real number."""
+    try:
+        result = float(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} = {value!r} is not a number; give a real number") from None
+    if math.isnan(result) or (math.isinf(result) and not infinite):
+        raise ValueError(f"{name} = {result} is not finite; give a finite number")
+    return result
+
+
+def above(name: str, value: Any, bound: float, *, infinite: bool = False) -> float:
+    """Return `value` as a float that is strictly larger than `bound`."""
+    result = number(name, value, infinite=infinite)
+    if not result > bound:
+        raise ValueError(f"{name} = {result:g} is out of bounds: it must be > {bound:g}")
+    return result
+
+
+def at_least(name: str, value: Any, bound: float, *, infinite: bool = False) -> float:
+    """Return `value` as a float that is not smaller than `bound`."""
+    result = number(name, value, infinite=infinite)
+    if not result >= bound:
+        raise ValueError(f"{name} = {result:g} is out of bounds: it must be >= {bound:g}")
+    return result
+
+
+def one_of(name: str, value: Any, choices: tuple[str, ...]) -> str:
+    """Return `value` if it is one of the named choices."""
+    if value not in choices:
+        raise ValueError(f"{name} = {value!r} is unknown; choose one of {', '.join(choices)}")
+    return str(value)
+
+
+def whole(name: str, value: Any, bound: int) -> int:
+    """Return `value` as an int that is not smaller than `bound`."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < bound:
+        raise ValueError(
+            f"{name} = {value!r} is out of bounds: it must be a whole number >= {bound}"
+        )
+    return int(value)

@@ -1,0 +1,273 @@
+"""The joint law: frozen parameters, and the tables that every joint of the law shares."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq
+
+from . import _toml
+from ._checks import Array, above, at_least, number
+from .asperity import Asperity
+from .curve import Curve, virgin_curve
+from .heights import GammaHeights, HeightDistribution, Heights
+from .orientation import Facets, Orientation
+from .resolution import Resolution, resolve
+
+if TYPE_CHECKING:
+    from .joint import Joint, JointBatch
+
+DEFAULT_STRESS = 20e6  # Pa; its closure is the default closure_range
+
+
+class Tables(NamedTuple):
+    """What a kernel reads: everything per facet (M facets, D depth cells), physical axes first.
+
+    `m` (dim, M) maps closure and in-plane offset to the effective closure y of a facet, `s`, `t`
+    (dim, M) are the in-facet directions, `area` is A = N w lam K c1^(1+eta), `depth` (M, D+1) the
+    cell limits zeta with the virgin force and slope there (slope 0 at the first by definition).
+    """
+
+    curve: Curve
+    n: Array
+    m: Array
+    s: Array
+    t: Array
+    c1: Array
+    area: Array
+    weight: Array
+    depth: Array
+    depth_force: Array
+    depth_slope: Array
+    lam: float
+    mu: float
+    critical_slip: float
+
+    @property
+    def dim(self) -> int:
+        """Components of a displacement: 3, or 2 in one plane."""
+        return len(self.m)
+
+    @property
+    def cells(self) -> int:
+        """Depth cells per facet."""
+        return int(self.depth.shape[1]) - 1
+
+    @property
+    def rows(self) -> int:
+        """State numbers per joint: delta, offset, dissipated energy, and q of every slider."""
+        return 2 * self.dim + 2 * len(self.c1) * self.cells
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointLaw:
+    """A micromechanical, anisotropic, path-dependent law for a rough rock joint (Misra 1999).
+
+    Parameters
+    ----------
+    orientation: density of asperity inclinations and azimuths.
+    asperity: stiffness and friction of one asperity contact.
+    heights: distribution of asperity heights, or None when all asperities touch at zero closure.
+    asperity_density: N, asperities per m2, > 0.
+    closure_range: largest closure (m) that the depth cells are placed for, > 0; beyond it the
+        normal force stays exact. None takes the closure at 20 MPa.
+    resolution: "fast", "balanced", "fine", "reference" or a `Resolution`.
+    plane: None for motion in 3-D, or the azimuth (rad) of the one plane in which the joint moves:
+        vectors then have two components, closure and shear along the plane. The traction across
+        the plane, which is zero only for c = 0 or on a symmetry axis, is dropped.
+    critical_slip: D_c (m), > 0: sliding that renews the asperity contacts, so that friction and
+        dilation settle. Infinite (off) by default.
+
+    Raises ValueError when a parameter is out of bounds or the virgin curve is not convex.
+    """
+
+    orientation: Orientation
+    asperity: Asperity
+    heights: HeightDistribution | None = None
+    asperity_density: float
+    closure_range: float = field(default=None)  # type: ignore[assignment]
+    resolution: Resolution = field(default="balanced")  # type: ignore[assignment]
+    plane: float | None = None
+    critical_slip: float = math.inf
+
+    def __post_init__(self) -> None:
+        set_ = object.__setattr__
+        for name, kind in (("orientation", Orientation), ("asperity", Asperity)):
+            if not isinstance(value := getattr(self, name), kind):
+                raise ValueError(f"{name} = {value!r} must be of type {kind.__name__}")
+        if not (self.heights is None or isinstance(self.heights, (GammaHeights, Heights))):
+            raise ValueError(f"heights = {self.heights!r} must be GammaHeights, Heights or None")
+        set_(self, "asperity_density", above("asperity_density", self.asperity_density, 0.0))
+        set_(self, "resolution", resolve(self.resolution))
+        if self.plane is not None:
+            set_(self, "plane", number("plane", self.plane))
+        set_(self, "critical_slip", above("critical_slip", self.critical_slip, 0.0, infinite=True))
+        if self.closure_range is None:
+            set_(self, "closure_range", 1.0)
+            set_(self, "closure_range", float(self.closure(DEFAULT_STRESS)))
+            for cached in ("curve", "tables", "_closure_factor"):
+                self.__dict__.pop(cached, None)
+        set_(self, "closure_range", above("closure_range", self.closure_range, 0.0))
+        _ = self.curve  # a law that exists has a valid virgin curve
+
+    # ----------------------------------------------------------------- joints
+
+    def joint(self) -> Joint:
+        """One joint of this law, unloaded."""
+        from .joint import Joint
+
+        return Joint(self)
+
+    def joints(self, n: int) -> JointBatch:
+        """A batch of n unloaded joints of this law, advanced together."""
+        from .joint import JointBatch
+
+        return JointBatch(self, n)
+
+    # ----------------------------------------------------- virgin closure curve
+
+    def normal_stress(self, closure: ArrayLike) -> Any:
+        """Normal stress (Pa) of a joint closed from zero to `closure` (m), unsheared."""
+        y = np.asarray(closure, float)
+        if not np.isfinite(y).all():
+            raise ValueError(f"closure = {closure!r} is not finite; give finite closures in m")
+        force, _ = self.curve.force(y)
+        return (self._closure_factor * force)[()]
+
+    def closure(self, normal_stress: ArrayLike) -> Any:
+        """Closure (m) at which the normal stress (Pa, >= 0) is reached: inverse of the above."""
+        stress = np.asarray(normal_stress, float)
+        if not (np.isfinite(stress).all() and (stress >= 0).all()):
+            raise ValueError(f"normal_stress = {normal_stress!r} must be finite and >= 0 Pa")
+        result = np.array([self._closure_at(float(value)) for value in stress.ravel()])
+        return result.reshape(stress.shape)[()]
+
+    def contacts(self, closure: ArrayLike, direction: tuple[float, float] | None = None) -> Any:
+        """Asperities in touch per m2 at this closure (m), Eq. 11.
+
+        With `direction` = (theta, phi) in rad: per m2 and steradian in that direction, Eq. 16.
+        """
+        y = np.asarray(closure, float)
+        if self.heights is None:
+            share: Any = np.where(y > 0, 1.0, 0.0)
+        else:
+            share = np.asarray(self.heights.cdf(np.maximum(self.heights.overlap + y, 0.0)))
+        density = 1.0 if direction is None else self.orientation.density(*direction)
+        return (self.asperity_density * share * density)[()]
+
+    # ------------------------------------------------- stiffness and time step
+
+    def max_stiffness(self, closure: ArrayLike) -> Any:
+        """Upper bound of |C| (Pa/m) while no facet's effective closure exceeds `closure` (m)."""
+        k, p = self.tables, self.asperity
+        _, slope = k.curve.force(np.asarray(closure, float))
+        per_facet = float(np.sum(k.area / k.c1))
+        return ((max(1.0, 1.0 / p.lam) + p.mu) * per_facet * slope)[()]
+
+    def critical_time_step(self, mass: float, area: float, closure: float) -> float:
+        """Largest stable explicit step (s) of one translating mass on one joint.
+
+        mass: reduced mass m1 m2/(m1 + m2) in kg; area: of the joint in m2; closure: the largest
+        reached, in m. 2 sqrt(m/(K area)); a block code adds rotation.
+        """
+        mass, area = above("mass", mass, 0.0), above("area", area, 0.0)
+        closure = at_least("closure", closure, 0.0)
+        stiffness = float(self.max_stiffness(closure))
+        return 2 * math.sqrt(mass / (stiffness * area)) if stiffness > 0 else math.inf
+
+    # ---------------------------------------------------------------- tables
+
+    @cached_property
+    def curve(self) -> Curve:
+        """Tabulated virgin curve of one asperity."""
+        return virgin_curve(self.asperity.eta, self.heights, self.closure_range)
+
+    @cached_property
+    def facets(self) -> Facets:
+        """Quadrature nodes of the orientation density."""
+        return self.orientation.facets(self.resolution.u, self.resolution.phi, self.plane)
+
+    @cached_property
+    def tables(self) -> Tables:
+        """Tables that the kernels read."""
+        f, p = self.facets, self.asperity
+        c1 = np.cos(f.theta)
+        area = self.asperity_density * f.weight * p.lam * p.K * c1 ** (1 + p.eta)
+        depth = depth_nodes(self.closure_range, np.tan(f.theta), self.resolution.depth)
+        force, slope = self.curve.force(np.where(np.isfinite(depth), depth, 0.0))
+        force[:, -1] = slope[:, -1] = np.inf
+        slope[:, 0] = 0.0  # a spring that touches at once (eta = 0) belongs to the first cell
+        return Tables(
+            self.curve, f.n, f.n / c1, f.s, f.t, c1, area, f.weight, depth, force, slope,
+            p.lam, p.mu, self.critical_slip,
+        )  # fmt: skip
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Hash of all parameters: states fit only joints of the law that wrote them."""
+        return hashlib.sha256(self.to_toml().encode()).hexdigest()
+
+    @cached_property
+    def _closure_factor(self) -> float:
+        """F1/Phi under pure closure: cos + sin min(tan/lam, mu) summed over the facets."""
+        k = self.tables
+        tangent = np.tan(self.facets.theta)
+        shear = np.minimum(tangent / k.lam, k.mu)
+        return float(np.sum(k.area * (k.c1 + np.sin(self.facets.theta) * shear)))
+
+    def _closure_at(self, stress: float) -> float:
+        if stress == 0.0:
+            return 0.0
+        high = self.closure_range
+        while self.normal_stress(high) < stress:
+            high *= 4.0
+        low = high
+        while self.normal_stress(low) > stress:
+            low /= 4.0
+
+        def misfit(log_y: float) -> float:
+            return math.log(float(self.normal_stress(math.exp(log_y))) / stress)
+
+        if low == high:
+            return high
+        root = brentq(misfit, math.log(low), math.log(high), xtol=1e-15, rtol=1e-15)
+        return math.exp(root)
+
+    # ----------------------------------------------------------------- files
+
+    def to_toml(self, path: str | Path | None = None) -> str:
+        """The law as TOML text, also written to `path` if given (histograms then as CSV beside)."""
+        return _toml.write_law(self, None if path is None else Path(path))
+
+    @classmethod
+    def from_toml(cls, source: str | Path) -> JointLaw:
+        """A law from a TOML file or from TOML text; the keys are the parameters above."""
+        return _toml.read_law(cls, source)
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any], where: str = "law") -> JointLaw:
+        """A law from the mapping that such a file holds; `where` is named in error messages."""
+        return _toml.build_law(cls, data, where)
+
+    def __getstate__(self) -> dict[str, Any]:
+        names = self.__dataclass_fields__
+        return {name: value for name, value in self.__dict__.items() if name in names}
+
+
+def depth_nodes(closure_range: float, slope: Array, cells: int) -> Array:
+    """Limits zeta (M, cells + 1) of the depth cells, graded, the last cell open-ended (m).
+
+    They span the effective closure y = closure + slope * shear, not the closure: y_max takes a
+    shear of one closure range on top of the closure.
+    """
+    reach = closure_range * (1.0 + np.minimum(slope, 10.0))
+    inner = 30.0 ** -(1.0 - np.arange(1, cells) / cells)
+    zero, end = np.zeros((len(slope), 1)), np.full((len(slope), 1), np.inf)
+    return np.concatenate([zero, reach[:, None] * inner, end], axis=1)

@@ -1,7 +1,7 @@
 """The law as a brute-force bed: fixed linear springs with sliders, no lumping, no shortcuts.
 
 Every orientation carries many linear unilateral springs that touch at fixed closures z_j. Each has
-its own Coulomb slider. Slow and obvious: it exists to judge the package, and shares no code with it.
+its own Coulomb slider. Slow and obvious: it exists to judge the package and shares no code with it.
 """
 
 import numpy as np

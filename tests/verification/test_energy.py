@@ -54,11 +54,11 @@ def test_no_step_of_a_random_closed_path_makes_energy(seed):
         lost = meter.dissipated
     peak = np.max(stored, axis=0)
     assert np.min(np.array(dissipation) / peak) >= -1e-12
-    # the force has kinks at touch and slip: 32 x 4 Gauss points miss work by up to 1.3e-5 of the
-    # peak (eta = 0, a step four closure ranges long) and by a tenth of that at 128 x 4
-    assert np.min((np.array(work) - np.diff(stored, axis=0)) / peak) > -3e-5
+    # a kink inside a panel of 1/32 step costs its jump of stiffness times (step/32)^2/8 and less:
+    # at eta = 0 in steps of four closure ranges 4e-5 of the peak seen, and 2e-6 at 256 panels
+    assert np.min((np.array(work) - np.diff(stored, axis=0)) / peak) > -1e-4
     # around the whole path, likewise
-    assert np.min((np.sum(work, axis=0) - stored[-1]) / peak) > -3e-5
+    assert np.min((np.sum(work, axis=0) - stored[-1]) / peak) > -1e-4
     assert np.all(lost > 0.0)
 
 
@@ -67,7 +67,7 @@ def test_work_is_stored_or_dissipated_to_the_order_of_the_step(seed):
     corners = random_corners(np.random.default_rng(seed), 4)
     steps, gaps = np.array([16, 32, 64, 128]), []
     for n in steps:
-        meter = WorkMeter(random_law(seed), 4, panels=2)
+        meter = WorkMeter(random_law(seed), 4, panels=1)
         work = sum(meter.step(d) for d in np.moveaxis(increments(corners, n), 1, 0))
         gaps.append(np.abs(work - meter.stored - meter.dissipated) / meter.dissipated)
     slope = -np.polyfit(np.log(steps), np.log(np.max(gaps, axis=1)), 1)[0]
@@ -92,7 +92,7 @@ def test_the_pump_returns_no_work(formation, low, sense, steps, critical_slip):
     square.append(high)
     loop = np.stack(square if sense > 0 else [*square[2::-1], high], axis=1)
     meter = WorkMeter(law(formation=formation, resolution=jl.Resolution(2, 4, 3),
-                          critical_slip=critical_slip), 3, panels=64 // steps + 1)  # fmt: skip
+                          critical_slip=critical_slip), 3, panels=96 // steps + 1)  # fmt: skip
     meter.step(high)
     d = increments(loop - high[:, None], steps)
     for _ in range(3):

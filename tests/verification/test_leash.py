@@ -99,3 +99,18 @@ def test_dissipation_of_the_drag_is_never_negative():
         assert np.min(joints.dissipated_energy - lost) > -1e-15
         lost = joints.dissipated_energy
     assert np.min(lost) > 0.0
+
+
+def test_steady_friction_under_constant_stress_tends_to_the_steepest_contacts():
+    """atan(mu) + 90 deg/a for a leash far longer than the closure: the joint rides up its rim."""
+    gaps = []
+    for length in (100.0, 1000.0):
+        one = law(b=0.0, c=0.0, mu=0.3, plane=0.0, critical_slip=length,
+                  resolution=jl.Resolution(60, 60, 1))  # fmt: skip
+        stress = float(one.normal_stress(1.0))
+        record = jl.direct_shear(one.joint(), 6.0 * length, normal=stress, steps=60)
+        friction = np.degrees(np.arctan2(record.F2[-1], record.F1[-1]))
+        gaps.append(np.degrees(np.arctan(0.3)) + 30.0 - friction)
+    # the loaded rim narrows as the root of closure over length: sqrt(10) = 3.2 times a decade
+    assert gaps[0] > 2.0 * gaps[1] > 0.0
+    assert gaps[1] < 1.0

@@ -50,7 +50,7 @@ def test_first_separation(a):
 
     exact = 1.0 / np.tan(np.pi / (2.0 * a))
     # the outermost node lies 4e-5 in u and half an azimuth, 3e-5, inside the rim
-    assert bisect(parted, 0.5 * exact, 2.0 * exact, xtol=1e-7) == pytest.approx(exact, abs=2e-4)
+    assert bisect(parted, 0.5 * exact, 2.0 * exact, xtol=1e-7) == pytest.approx(exact, rel=1e-4)
 
 
 @pytest.mark.parametrize(("a", "degrees"), [(3.0, 19.1), (6.0, 9.5)])
@@ -79,7 +79,7 @@ def test_mean_inclination(a, degrees):
 def test_initial_stiffness_ratio_of_a_smooth_joint(nu):
     """C22/C11 tends to 2 (1 - nu)/(2 - nu), Eq. 27, as a grows."""
     ratios = []
-    for a in (50.0, 100.0, 1000.0):
+    for a in (200.0, 400.0, 2000.0):
         smooth = jl.JointLaw(
             orientation=jl.Orientation(a, 0.0, 0.0),
             asperity=jl.Asperity.hertz_mindlin(G=20e9, nu=nu, R=40e-6, mu=0.6),

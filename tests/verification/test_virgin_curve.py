@@ -48,21 +48,15 @@ def test_normal_force_far_beyond_the_closure_range_under_shear(formation):
     assert np.allclose(F, exact, rtol=0.0, atol=1e-4 * exact[0])
 
 
-def built(eta, alpha, beta, overlap, formation="population"):
-    """Whether a law with these heights is accepted."""
-    try:
-        jl.JointLaw(
-            orientation=jl.Orientation(3.0, 0.0, 0.0),
-            asperity=jl.Asperity(K=1.0, lam=1.0, eta=eta, mu=0.4),
-            heights=jl.GammaHeights(alpha=alpha, beta=beta, overlap=overlap, formation=formation),
-            asperity_density=1.0,
-            closure_range=1.0,
-        )
-    except ValueError as error:
-        assert "convex" in str(error)
-        assert "individual" in str(error)
-        return False
-    return True
+def build(eta, alpha, beta, overlap, formation="population"):
+    """A law with these gamma heights."""
+    return jl.JointLaw(
+        orientation=jl.Orientation(3.0, 0.0, 0.0),
+        asperity=jl.Asperity(K=1.0, lam=1.0, eta=eta, mu=0.4),
+        heights=jl.GammaHeights(alpha=alpha, beta=beta, overlap=overlap, formation=formation),
+        asperity_density=1.0,
+        closure_range=1.0,
+    )
 
 
 @pytest.mark.parametrize(
@@ -70,8 +64,9 @@ def built(eta, alpha, beta, overlap, formation="population"):
 )
 def test_printed_heights_are_convex_from_a_known_exponent(heights, least):
     # the two exponents are known to three digits
-    assert not built(least - 0.001, *heights)
-    assert built(least + 0.001, *heights)
+    with pytest.raises(ValueError, match=r"convex.*individual"):
+        build(least - 0.001, *heights)
+    build(least + 0.001, *heights)
 
 
 def test_narrow_heights_need_individual_formation():
@@ -79,8 +74,9 @@ def test_narrow_heights_need_individual_formation():
         y = np.linspace(0.01, 2.0 * narrow[1] * (narrow[0] + 1.0), 400)
         slope = [virgin(v, 0.5, SlowGamma(*narrow, "population"))[1] for v in y]
         assert np.diff(slope).min() < 0.0  # the slope does fall
-        assert not built(0.5, *narrow)
-        assert built(0.5, *narrow, formation="individual")
+        with pytest.raises(ValueError, match=r"convex.*individual"):
+            build(0.5, *narrow)
+        build(0.5, *narrow, formation="individual")
 
 
 @pytest.mark.parametrize("critical_slip", [np.inf, 0.3])

@@ -70,6 +70,19 @@ def test_restore_repeats_a_thousand_steps_to_the_bit(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
+def test_restore_of_a_single_joint(kind):
+    d = path(8, kind, 1, 4)[0]
+    joint = law(**kind).joint()
+    joint.update(d[0])
+    start, shown = joint.snapshot(), everything(joint)
+    first = [joint.update(step)[0] for step in d[1:]]
+    joint.restore(start)  # a snapshot is a copy, not a view of the joint
+    for a, b in zip(everything(joint), shown, strict=True):
+        assert np.array_equal(a, b)
+    assert np.array_equal([joint.update(step)[0] for step in d[1:]], first)
+
+
+@pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
 def test_trial_leaves_no_trace_and_foretells_the_update(kind):
     one = law(**kind)
     d = path(3, kind, 4, 3)

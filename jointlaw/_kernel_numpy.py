@@ -137,7 +137,7 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
         hardening = trial2 / chord * (1 - chord / kappa1) + np.where(
             kappa0 > 0, q2 / kappa0 * (1 - kappa0 / chord), 0.0
         )
-        softening = (kappa0 - kappa1) * q2 / kappa0**2
+        softening = (1 - kappa1 / kappa0) * (q2 / kappa0)  # kappa0**2 could underflow
         lost = np.where(
             grows, np.where(chord > 0, hardening, 0.0), np.where(kappa0 > 0, softening, 0.0)
         )

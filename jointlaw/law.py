@@ -127,11 +127,14 @@ class JointLaw:
 
         return Joint(self)
 
-    def joints(self, n: int) -> JointBatch:
-        """A batch of n unloaded joints of this law, advanced together."""
+    def joints(self, n: int, ledger: bool = True) -> JointBatch:
+        """A batch of n unloaded joints of this law, advanced together.
+
+        Without `ledger` dissipated energy is not added up, which is faster.
+        """
         from .joint import JointBatch
 
-        return JointBatch(self, n)
+        return JointBatch(self, n, ledger)
 
     # ----------------------------------------------------- virgin closure curve
 
@@ -210,6 +213,18 @@ class JointLaw:
         )  # fmt: skip
 
     @cached_property
+    def largest_reach(self) -> float:
+        """Effective closure (m) up to which forces, energies and their squares stay finite."""
+        k, p = self.tables, self.asperity
+        y = 10.0 ** np.arange(-300.0, 101.0)
+        stiffest = float(np.max(k.area / k.c1)) * max(p.lam, 1 / p.lam, 1.0) * (1.0 + p.mu)
+        with np.errstate(over="ignore"):
+            force, slope = self.curve.force(y)
+            worst = stiffest * (force + y * slope) + float(np.max(k.area)) * self.curve.energy(y)
+        bad = ~(worst < 1e140)
+        return float(y[int(np.argmax(bad)) - 1]) if bad.any() else float(y[-1])
+
+    @cached_property
     def fingerprint(self) -> str:
         """Hash of all parameters: states fit only joints of the law that wrote them."""
         return hashlib.sha256(self.to_toml().encode()).hexdigest()
@@ -277,6 +292,6 @@ def depth_nodes(closure_range: float, slope: Array, cells: int) -> Array:
     shear of one closure range on top of the closure.
     """
     reach = closure_range * (1.0 + np.minimum(slope, 10.0))
-    inner = 30.0 ** -(1.0 - np.arange(1, cells) / cells)
+    inner = (np.arange(1, cells) / cells) ** 1.5
     zero, end = np.zeros((len(slope), 1)), np.full((len(slope), 1), np.inf)
     return np.concatenate([zero, reach[:, None] * inner, end], axis=1)

@@ -192,7 +192,7 @@ def traction(k: Tables, state: Array) -> Array:
 class Measures(NamedTuple):
     """What the states of joints amount to, arrays (n,): law.md section 8b."""
 
-    sliding: Array  # share of the asperities in touch whose every cell is at its friction limit
+    sliding: Array  # share of all asperities: in touch, every cell at its friction limit
     slipping: Array  # share of the friction capacity that is at its limit
     separated: Array  # share of all asperities
     stored: Array  # elastic energy, J/m2

@@ -216,7 +216,8 @@ def _slide(desk, L, lower, upper, ended, A, a, compliance, lam_mu, ledger, tange
         slips = size > cap
         share = cap / (size if slips else 1.0)
         share = share if slips else 1.0
-        qs, qt = share * ts, share * tt
+        part = share if new2 > TINY else 0.0  # a size that underflows has no cap
+        qs, qt = part * ts, part * tt
         desk[_QS + l], desk[_QT + l] = qs, qt
         desk[_SUMS + l] += qs
         desk[_SUMT + l] += qt

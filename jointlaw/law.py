@@ -206,6 +206,7 @@ class JointLaw:
         force, slope = self.curve.force(np.where(np.isfinite(depth), depth, 0.0))
         force[:, -1] = slope[:, -1] = np.inf
         slope[:, 0] = 0.0  # a spring that touches at once (eta = 0) belongs to the first cell
+        slope = np.maximum.accumulate(slope, axis=1)  # but for the rounding of the table it rises
         return Tables(
             self.curve, f.n, f.n / c1, f.s, f.t, c1, area, f.weight, depth, force, slope,
             p.lam, p.mu, self.critical_slip,

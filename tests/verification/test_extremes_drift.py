@@ -1,4 +1,4 @@
-"""Millions of small cycles: what repeats after shakedown, and what is forgotten on the way there."""
+"""Millions of small cycles: what repeats after shakedown, and what is forgotten on the way."""
 
 import numpy as np
 import pytest

@@ -65,8 +65,8 @@ class Mass:
         return energies, reach
 
 
-def swing(case, steps, n=8):
-    """Runs at 0.95 of the critical step of the largest closure reached.
+def swing(case, steps, n=4, share=0.95):
+    """Runs at this share of the critical step of the largest closure reached.
 
     Returns the growth of energy (largest later less largest in the first tenth, of the work that
     the load does up to rest and the kinetic energy at impact), and the largest reach over that
@@ -77,23 +77,32 @@ def swing(case, steps, n=8):
     short = 0.1 * probe.law.critical_time_step(MASS, AREA, bound)
     bound = 1.1 * Mass(case, n).run(6000, short)[1]  # the closure reached, on a fine step
     mass = Mass(case, n)
-    energies, reach = mass.run(steps, 0.95 * mass.law.critical_time_step(MASS, AREA, bound))
+    energies, reach = mass.run(steps, share * mass.law.critical_time_step(MASS, AREA, bound))
     early = len(energies) // 10
     scale = mass.rest * mass.load[0] + 0.5 * MASS * np.sum(mass.start**2, axis=1)
     growth = (energies[early:].max(axis=0) - energies[:early].max(axis=0)) / scale
     return float(np.max(growth)), reach / bound
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_energy_never_grows(case):
-    """Leapfrog keeps the energy of a linear spring to rounding; friction takes from it.
+# Bouncing without any loss: leapfrog misses where within a step the joint touches, and near the
+# critical step every bounce adds or takes some energy, at random. Seen to grow without bound at
+# 0.95, by 2 % in all at 0.5 and by 0.2 % at 0.2; any friction at all takes more than that.
+LOSSLESS_IMPACT = "impact, no friction"
 
-    Without friction a Hertz contact at 0.95 of its critical step is integrated with errors of
-    some per cent that come and go: they must not add up, and in the report's 1e6 steps do not.
-    """
+
+@pytest.mark.parametrize("case", [case for case in CASES if case != LOSSLESS_IMPACT])
+def test_energy_never_grows(case):
+    """Leapfrog keeps the energy of a linear spring to rounding, friction takes from it, and that
+    of a lossless Hertz contact at 0.95 of its critical step comes and goes by 1e-4."""
     growth, reached = swing(case, 4000)
     assert reached <= 1.0
-    assert growth <= (0.1 if "no friction" in case else 1e-9)
+    assert growth <= (1e-3 if case == "Hertz, no friction" else 1e-9)
+
+
+def test_lossless_impacts_need_a_fifth_of_the_critical_step():
+    growth, reached = swing(LOSSLESS_IMPACT, 10_000, share=0.2)
+    assert reached <= 1.0
+    assert growth < 0.01
 
 
 def test_beyond_the_critical_step_a_linear_joint_explodes():

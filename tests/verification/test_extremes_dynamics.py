@@ -105,10 +105,11 @@ def test_lossless_impacts_need_a_fifth_of_the_critical_step():
     assert growth < 0.01
 
 
-def test_beyond_the_critical_step_a_linear_joint_explodes():
-    """The bound is no idle one: it is reached to 0.87 here, so 1.2 times its step is too long."""
+def test_beyond_the_critical_step_a_linear_joint_breaks_loose():
+    """The bound is no idle one: the sum of A/c1 in it is the stiffness to the mean of cos^2, so
+    1.2 times its step is too long. Opening ends the growth: a factor, not an overflow."""
     mass = Mass("linear, no friction")
     critical = mass.law.critical_time_step(MASS, AREA, mass.rest)
-    calm, _ = Mass("linear, no friction").run(2000, 0.95 * critical)
-    wild, _ = mass.run(200, 1.2 * critical)
-    assert np.abs(wild[-1]).max() > 1e6 * np.abs(calm).max()
+    calm, _ = Mass("linear, no friction").run(300, 0.95 * critical)
+    wild, _ = mass.run(300, 1.2 * critical)
+    assert np.abs(wild[-1]).max() > 1e3 * np.abs(calm).max()

@@ -30,9 +30,7 @@ class Rows(NamedTuple):
 
     def sigma(self, noise: Sequence[Noise]) -> Array:
         """Standard errors of all residuals."""
-        return np.concatenate(
-            [n.sigma(s) for n, s in zip(noise, self.steepness, strict=True)]
-        )
+        return np.concatenate([n.sigma(s) for n, s in zip(noise, self.steepness, strict=True)])
 
 
 class Solution(NamedTuple):

@@ -61,9 +61,7 @@ def fit_closure(
     Source: Misra 1999, Eq. 11, 12, 33, 37; law.md section 5 for the "individual" reading.
     """
     curve = ClosureCurve(np.asarray(stress), np.asarray(closure), seating, noise, closure_noise)
-    return fit_curves(
-        [curve], free=free, fixed=fixed, law=law, formation=formation, priors=priors
-    )
+    return fit_curves([curve], free=free, fixed=fixed, law=law, formation=formation, priors=priors)
 
 
 def fit_shear(

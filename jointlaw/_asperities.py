@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +10,6 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from ._checks import Array
-
 
 FEWEST = 8  # summits that a fit can stand on
 
@@ -19,11 +19,11 @@ class Asperities(NamedTuple):
 
     depth: Array  # (n,) m below the highest summit
     slope: Array  # (facets, dim) gradients
-    summit: Array  # (facets,) the summit that each belongs to
+    summit: NDArray[np.intp]  # (facets,) the summit that each belongs to
     slope_noise: float  # standard error of one component of a gradient
     density: float  # per m2, or per m of a profile
     size: float  # edge of a facet in m
-    places: Array  # (n, dim) grid indices of the summits
+    places: NDArray[np.intp]  # (n, dim) grid indices of the summits
 
 
 def extract(z: Array, spacing: float, samples: int) -> Asperities:
@@ -37,9 +37,10 @@ def extract(z: Array, spacing: float, samples: int) -> Asperities:
        beside it (in a profile the stretches on its two sides): a plane is fitted to each.
     4. Facets that miss their plane by more than three times the median lie across an edge and are
        left out; the median of the others gives the error of a gradient.
-    5. A summit that keeps less than three quarters of its facets, or whose facets together do not
-       fall away from it by six times that error, is a bump of noise on a facet or at an edge, and
-       left out with them.
+    5. Facets of one summit whose gradients agree within three standard errors are one facet: noise
+       has put the summit down beside its true place, and one plane surrounds it.
+    6. A summit whose facets together do not fall away from it by six times the error of a gradient
+       is a bump of noise and left out with them.
 
     Summits within `samples` and two of the rim are left out.
     """
@@ -81,9 +82,13 @@ def extract(z: Array, spacing: float, samples: int) -> Asperities:
     # the median of chi^2 with n degrees of freedom is n (1 - 2/(9n))^3
     middle = count * (1 - 2 / (9 * count)) ** 3
     noise = float(np.sqrt(np.median(left) / middle / arms)) / spacing
-    sides = keep.reshape(2**dim, -1)
+    sides, gradients = keep.reshape(2**dim, -1), np.stack(slopes)
     fall, kept = np.sum(np.stack(falls) * sides, axis=0), np.sum(sides, axis=0)
-    hill = (kept >= 0.75 * 2**dim) & (fall > 6 * noise * np.sqrt(kept))
+    hill = fall > 6 * noise * np.sqrt(np.maximum(kept, 1))
+    for first, second in combinations(range(2**dim), 2):
+        apart = np.max(np.abs(gradients[first] - gradients[second]), axis=-1)
+        sides[second] &= ~(sides[first] & (apart < 3 * np.sqrt(2) * noise))
+    keep = sides.ravel()
     if hill.sum() < FEWEST:
         raise ValueError(
             f"z has {int(hill.sum())} summits at a sampling length of {m * spacing:g} m: at least "
@@ -112,4 +117,5 @@ def _levelled(z: Array) -> Array:
     level = z - z.mean()
     for g in grid:
         level = level - g * (np.sum(g * level) / np.sum(g * g))
-    return level
+    levelled: Array = level
+    return levelled

@@ -78,9 +78,10 @@ def _column(header: list[str], kind: str, asked: str | None, path: Path) -> tupl
             if not unit:
                 return at, 1.0
             return at, units.parse(f"1{unit}", _UNITS[kind])
+    unit = "MPa" if kind == "stress" else "mm"
     raise ValueError(
         f"{path}: no column of {kind} among {', '.join(header)}; name it with its unit, "
-        f'for example --{kind}-column "{header[-1].split()[0]}:{"MPa" if kind == "stress" else "mm"}"'
+        f'for example --{kind}-column "{header[-1].split()[0]}:{unit}"'
     )
 
 

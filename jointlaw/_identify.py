@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -19,8 +20,8 @@ _ONE_FACTOR = ("asperity_density", "K", "lam", "mu", "a", "b", "c")
 class Profile(NamedTuple):
     """Misfit against one parameter, all others free: closed where the data bound it.
 
-    `values` (n,) in SI units, `deviance` (n,) = rise of sum (r/sigma)^2 over its least value, `low` and
-    `high` the ends of the 95 % interval or None where it is open.
+    `values` (n,) in SI units, `deviance` (n,) = rise of sum (r/sigma)^2 over its least value, `low`
+    and `high` the ends of the 95 % interval or None where it is open.
     """
 
     name: str
@@ -91,9 +92,9 @@ def profile(fit: Fit, name: str, points: int, priors: bool) -> Profile:
 
             if others.any():
                 found = minimise(
-                    lambda y, full=full: problem.data(full(y)),
+                    _after(problem.data, full),
                     sigma,
-                    lambda y, full=full: problem.prior(full(y)),
+                    _after(problem.prior, full),
                     x[others],
                     low[others],
                     high[others],
@@ -120,3 +121,8 @@ def profile(fit: Fit, name: str, points: int, priors: bool) -> Profile:
     values = np.array([scale.back(float(x)) for x in grid])
     down, up = crossing(range(best, 0, -1)), crossing(range(best, grid.size - 1))
     return Profile(name, values, deviance, down, up)
+
+
+def _after(f: Callable[[Array], Array], g: Callable[[Array], Array]) -> Callable[[Array], Array]:
+    """f of g."""
+    return lambda y: f(g(y))

@@ -76,7 +76,7 @@ def solve(
     known = all(n.known for n in noise)
     freedom = np.inf if known else NOISE_WEIGHT + r.size - float(np.sum(leverage))
     share = np.diag(C @ precision @ C) / np.diag(C)
-    return Solution(best.x, C, noise, freedom, share)
+    return Solution(best.x, np.asarray(C, np.float64), noise, freedom, share)
 
 
 def minimise(

@@ -128,7 +128,7 @@ def compare(
             "at least 4 are needed, and one above to predict"
         )
     fit = fit_closure(s[seen], u[seen], **options)
-    laws = {
+    laws: dict[str, Any] = {
         "jointlaw": fit,
         "power law": fit_power_law(s[seen], u[seen]),
         "Barton-Bandis": fit_barton_bandis(s[seen], u[seen]),

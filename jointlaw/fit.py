@@ -21,6 +21,9 @@ from .law import JointLaw
 from .measured import ClosureCurve, Settings, ShearCurve, build, log_stress
 
 PRIOR_SHARE = 0.05  # of the variance: up to here the data, not the priors, decide
+# Standard error of ln(stress) per doubling of the stress beyond the data, from curves of other
+# laws: power laws of exponent 1.5 to 6 and Gaussian heights, lower half fitted, upper predicted
+MODEL_ERROR = 0.03
 WIDEST = math.log(2) / 1.96  # standard error of a logarithm: a factor of 2 either way
 
 
@@ -44,9 +47,11 @@ class Problem:
 
     def place(self, values: Mapping[str, float]) -> Array:
         """Where these values lie on the scale of the fit."""
-        low, high = self.bounds()
-        return np.clip([scale_of(n).to(max(values[n], 1e-12) if scale_of(n).log and not
-                        scale_of(n).shift else values[n]) for n in self.free], low, high)  # fmt: skip
+        inside = []
+        for name in self.free:
+            scale = scale_of(name)
+            inside.append(scale.to(min(max(values[name], scale.low), scale.high)))
+        return np.array(inside)
 
     def scaled(self, values: Mapping[str, float]) -> Array:
         """The same with the stiffness brought to the level of the closure curves."""
@@ -175,7 +180,8 @@ class Fit:
         """Band (low, high) in Pa around `predict`.
 
         closure: in m, as in `predict`; level: probability; measured: whether the band is for a
-        point yet to be measured, noise included, or for the curve itself.
+        point yet to be measured, noise included, or for the curve itself. Beyond the largest
+        fitted stress it widens by `MODEL_ERROR` per doubling, for the law is not the rock.
         """
         u = np.atleast_1d(np.asarray(closure, float))
         name = "seating" if curve == 1 else f"seating_{curve}"
@@ -193,6 +199,8 @@ class Fit:
             v = self.parameters
             above = log_stress(v, v[name] + u + step, self.problem.settings)
             variance = variance + noise.sigma((above - centre) / step) ** 2
+        beyond = np.maximum(centre - np.log(self._closures()[curve - 1].stress.max()), 0.0)
+        variance = variance + (MODEL_ERROR * beyond / math.log(2)) ** 2
         reach = self._quantile(level) * np.sqrt(variance)
         return np.exp(centre - reach), np.exp(centre + reach)
 

@@ -138,7 +138,9 @@ class ShearCurve:
     def predict(self, law: JointLaw, substeps: int = 1) -> Array:
         """Shear stress (Pa) of a law along the path of this test, (n,)."""
         path = self.shear if self.shear[0] else self.shear[1:]
-        record = direct_shear(law.joint(), path, self.normal, azimuth=self.azimuth, steps=substeps)
+        record = direct_shear(
+            law.joint(), path.tolist(), self.normal, azimuth=self.azimuth, steps=substeps
+        )
         stress = record.shear_stress[::substeps]
         return stress[1:] if self.shear[0] else stress
 

@@ -169,7 +169,12 @@ def _base(law: JointLaw | None, formation: str | None) -> tuple[dict[str, float]
             settings = replace(settings, formation=h.formation)
         elif h is not None:
             raise ValueError(f"law: heights = {h!r} cannot be fitted; give it GammaHeights")
-        settings = replace(settings, resolution=law.resolution, has_heights=h is not None)
+        settings = replace(
+            settings,
+            resolution=law.resolution,
+            has_heights=h is not None,
+            closure_range=law.closure_range,
+        )
     if formation is not None:
         settings = replace(settings, formation=one_of("formation", formation, FORMATIONS))
     return values, settings

@@ -55,6 +55,7 @@ def extract(z: Array, spacing: float, samples: int) -> Asperities:
     summits = _highest_near(z, summits)
     area = float(np.prod([(n - 2 * rim) * spacing for n in z.shape]))
     height = z[tuple(summits.T)]
+    _enough(len(summits), m * spacing)
     axis = np.arange(1, m + 1)
     centred = axis - axis.mean()
     arms = m ** (dim - 1) * float(centred @ centred)
@@ -89,17 +90,21 @@ def extract(z: Array, spacing: float, samples: int) -> Asperities:
         apart = np.max(np.abs(gradients[first] - gradients[second]), axis=-1)
         sides[second] &= ~(sides[first] & (apart < 3 * np.sqrt(2) * noise))
     keep = sides.ravel()
-    if hill.sum() < FEWEST:
-        raise ValueError(
-            f"z has {int(hill.sum())} summits at a sampling length of {m * spacing:g} m: at least "
-            f"{FEWEST} are needed; scan a larger area or change sampling_length"
-        )
+    _enough(int(hill.sum()), m * spacing)
     keep &= np.tile(hill, 2**dim)
     number = np.cumsum(hill) - 1
     of = np.tile(number, 2**dim)[keep]
     depth = height[hill].max() - height[hill]
     density, slope = int(hill.sum()) / area, np.concatenate(slopes)[keep]
     return Asperities(depth, slope, of, noise, density, m * spacing, summits[hill])
+
+
+def _enough(summits: int, length: float) -> None:
+    if summits < FEWEST:
+        raise ValueError(
+            f"z has {summits} summits at a sampling length of {length:g} m: at least {FEWEST} are "
+            "needed; scan a larger area or change sampling_length"
+        )
 
 
 def _highest_near(z: Array, places: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -21,7 +21,7 @@ class Loop:
     """A loading cycle against the law, as shares of the work of loading.
 
     measured: loss of the measured cycle; friction: loss of the law; largest_friction: the largest
-    that any friction coefficient gives at these inclinations, at friction `worst_mu`; open_closure
+    of several friction coefficients at these inclinations, that of `worst_mu`; open_closure
     (m): closure the test did not recover on the way back to its first stress; law_closure (m): that
     of the law.
     """
@@ -39,8 +39,9 @@ class Loop:
             f"The measured cycle loses {100 * self.measured:.0f} % of the work of loading and "
             f"keeps {1e6 * self.open_closure:.1f} um of closure at the stress it began with. "
             f"Friction on the asperities, all that the law has, loses {100 * self.friction:.2g} % "
-            f"and keeps {1e6 * self.law_closure:.2f} um; no friction coefficient makes it lose more "
-            f"than {100 * self.largest_friction:.1f} % at these inclinations (mu = {self.worst_mu:g}). "
+            f"and keeps {1e6 * self.law_closure:.2f} um; of friction coefficients from "
+            f"{_FRICTIONS[0]} to {_FRICTIONS[-1]}, {self.worst_mu:g} loses most at these "
+            f"inclinations, {100 * self.largest_friction:.1f} %. "
             "The rest is not in the law: crushed and flattened asperities, seating of the halves, "
             "gouge. Use the fitted law for loading, and for small cycles below the largest stress "
             "with care."

@@ -37,6 +37,13 @@ class JointBatch:
         self._reach = 0.0  # no facet's effective closure exceeds it, in either sense
         self._stretch = 1.0 + 2.0 * float(np.max(np.abs(law.tables.m)))  # of y over that of d
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {k: v for k, v in self.__dict__.items() if k != "_engine"}  # holds compiled code
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._engine = engine(self.law.tables)
+
     def __len__(self) -> int:
         return self._n
 
@@ -151,7 +158,7 @@ class JointBatch:
 
     @property
     def sliding(self) -> Array:
-        """Share (n,) of asperities in touch whose every cell is at its friction limit."""
+        """Share (n,) of all asperities: in touch, and every cell at its friction limit."""
         return self.measures().sliding
 
     @property
@@ -310,7 +317,7 @@ class Joint:
 
     @property
     def sliding(self) -> float:
-        """Share of asperities in touch whose every cell is at its friction limit."""
+        """Share of all asperities: in touch, and every cell at its friction limit."""
         return float(self._batch.sliding[0])
 
     @property

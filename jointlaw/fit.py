@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import stats
+from scipy import special
 
 from ._checks import Array
 from ._noise import Noise
@@ -242,7 +242,10 @@ class Fit:
     def _quantile(self, level: float) -> float:
         if not 0 < level < 1:
             raise ValueError(f"level = {level!r} is out of bounds: it must lie between 0 and 1")
-        return float(stats.t.ppf(0.5 + level / 2, self.solution.freedom))
+        freedom = self.solution.freedom
+        if math.isinf(freedom):
+            return float(special.ndtri(0.5 + level / 2))
+        return float(special.stdtrit(freedom, 0.5 + level / 2))
 
     def _closures(self) -> list[ClosureCurve]:
         return [c for c in self.problem.curves if isinstance(c, ClosureCurve)]

@@ -29,18 +29,18 @@ def strength(law):
 
 
 def test_friction_and_inclination_are_covered_by_their_intervals(law, strength):
-    """Both are fixed by one shear test: 15 draws x 2, of which 95 % should hold the truth."""
+    """Both are fixed by one shear test: 8 draws x 2, of which 95 % should hold the truth."""
     start = replace(law, orientation=jl.Orientation(2.6, 0.3))
     start = replace(start, asperity=replace(law.asperity, mu=0.6))
     rng, hits = np.random.default_rng(0), 0
-    for _ in range(15):
+    for _ in range(8):
         measured = strength + 0.01 * strength.max() * rng.standard_normal(SHEAR.size)
         fit = fit_shear(SHEAR, measured, 5e6, law=start)
         assert set(fit.identifiable) == {"mu", "a"}
         for name, value in (("mu", 0.5), ("a", 3.0)):
             low, high = fit.interval(name)
             hits += low <= value <= high
-    assert hits >= 25  # fewer has a probability of 0.3 % when the intervals are right
+    assert hits >= 13  # fewer has a probability of 0.7 % when the intervals are right
 
 
 def test_shear_fixes_what_closure_cannot(law, strength):

@@ -409,7 +409,7 @@ class Joints:
         n0, old = self.c["n"], self.c["t2"]
         both, share = n + n0, 1 + dot(n, n0)
         old = old - both * (dot(old, n) / share)
-        twist = 2 * np.arctan(dot(both, w) / (4 * share))
+        twist = 2 * np.arctan(dot(both, w) / (4 * share + dot(w, cross(n0, n))))
         return twist + np.arctan2(dot(old, cross(n, t2)), dot(old, t2))
 
     def _take_back(self, fresh):

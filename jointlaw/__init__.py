@@ -4,11 +4,14 @@ The law of A. Misra, Micromechanical model for anisotropic rock joints, J. Geoph
 1999, made incremental and energy-consistent. All quantities are SI: m, Pa, 1/m2.
 """
 
+from . import presets
 from .asperity import Asperity
 from .heights import GammaHeights, Heights
 from .joint import Joint, JointBatch
 from .law import JointLaw
 from .orientation import Orientation
+from .paths import PathError, closure_test, direct_shear
+from .record import Record
 from .resolution import Resolution
 from .state import JointState, NonFiniteError, load_state
 
@@ -24,6 +27,11 @@ __all__ = [
     "JointState",
     "NonFiniteError",
     "Orientation",
+    "PathError",
+    "Record",
     "Resolution",
+    "closure_test",
+    "direct_shear",
     "load_state",
+    "presets",
 ]

@@ -36,7 +36,7 @@ def parts(k: Tables, state: Array) -> State:
 
 def closures(k: Tables, closure: Array, offset: Array) -> Array:
     """Effective closure y = n . (closure, offset)/c1 of every facet (M, B)."""
-    y = k.m[0][:, None] * closure
+    y: Array = k.m[0][:, None] * closure
     for row, o in zip(k.m[1:], offset, strict=True):
         y = y + row[:, None] * o
     return y
@@ -178,7 +178,8 @@ def traction(k: Tables, state: Array) -> Array:
     now = parts(k, state)
     force, _ = k.curve.force(closures(k, now.delta[0], now.offset))
     shear = np.einsum("edm,emb->db", np.stack([k.s, k.t]), now.q.sum(axis=2))
-    return k.n @ (k.area[:, None] * force) + shear / k.lam
+    F: Array = k.n @ (k.area[:, None] * force) + shear / k.lam
+    return F
 
 
 def shares(k: Tables, state: Array) -> tuple[Array, Array, Array]:
@@ -206,4 +207,5 @@ def stored_energy(k: Tables, state: Array) -> Array:
     normal = np.sum((k.area * k.c1)[:, None] * k.curve.energy(y), axis=0)
     q2 = now.q[0] ** 2 + now.q[1] ** 2
     elastic = np.divide(q2, kappa, out=np.zeros_like(q2), where=kappa > 0)
-    return normal + np.sum(compliance(k) * elastic, axis=(0, 1))
+    total: Array = normal + np.sum(compliance(k) * elastic, axis=(0, 1))
+    return total

@@ -8,7 +8,7 @@ import os
 import tomllib
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
@@ -24,6 +24,7 @@ _LAW_KEYS = {
     "orientation", "asperity", "heights", "asperity_density", "closure_range", "resolution",
     "plane", "critical_slip",
 }  # fmt: skip
+T = TypeVar("T")
 _ABOUT = "about"  # free table for title, source and notes
 
 
@@ -117,11 +118,11 @@ def _heights(data: Any, where: str, folder: Path | None) -> GammaHeights | Heigh
     return _part(Heights, data, where, "heights")
 
 
-def _part(kind: type[Any], data: Any, where: str, path: str) -> Any:
+def _part(kind: type[T], data: Any, where: str, path: str) -> T:
     """One of the parameter classes from its table."""
     if not isinstance(data, dict):
         raise ValueError(f"{where}: key {path!r} must be a table")
-    allowed = {f.name for f in fields(kind) if f.init}
+    allowed = {f.name for f in fields(cast(Any, kind)) if f.init}
     _known(data, allowed, where, path + ".")
     try:
         return kind(**data)

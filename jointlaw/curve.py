@@ -64,7 +64,8 @@ class Curve(NamedTuple):
         x, i, _, _ = self._cell(y)
         c = self.T[i]
         T = c[..., 0] + x * (c[..., 1] + x * (c[..., 2] + x * c[..., 3]))
-        return np.maximum(y, 0.0) ** (2 + self.eta) * T
+        energy: Array = np.maximum(y, 0.0) ** (2 + self.eta) * T
+        return energy
 
     def _cell(self, y: Array) -> tuple[Array, Array, Array, Array]:
         """Place within its cell, cell number, t and 1 - t of each y."""

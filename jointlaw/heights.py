@@ -141,7 +141,11 @@ class Heights:
         """Share P(r) of the asperities in touch at the overlap r in m."""
         if self.is_histogram:
             counts, edges = (np.array(v) for v in self.distribution)
-            return np.interp(r, edges, np.concatenate([[0.0], np.cumsum(counts) / counts.sum()]))
+            return np.interp(
+                np.asarray(r, float),
+                edges,
+                np.concatenate([[0.0], np.cumsum(counts) / counts.sum()]),
+            )
         return self._frozen.cdf(r)
 
     def breakpoints(self) -> Array:
@@ -150,7 +154,8 @@ class Heights:
             return np.array(self.distribution[1])
         low, high = self._frozen.ppf(_TAILS), self._frozen.isf(_TAILS[::-1])
         points = np.unique(np.concatenate([low, high]))
-        return points[np.isfinite(points)]
+        finite: Array = points[np.isfinite(points)]
+        return finite
 
 
 def _histogram(pair: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _kernel_numpy as kernel
 from ._checks import Array, whole
-from .law import JointLaw
+from .law import JointLaw, Tables
 from .state import JointState, NonFiniteError, write_replay
 
 CHUNK = 4096  # joints per call of the numpy kernel: keeps its temporaries in cache
@@ -119,47 +119,50 @@ class JointBatch:
     @property
     def delta(self) -> Array:
         """Displacement since the virgin state (n, dim): closure and shear, in m."""
-        return self._state[: self.law.tables.dim, : self._n].T.copy()
+        delta: Array = self._state[: self.law.tables.dim, : self._n].T.copy()
+        return delta
 
     @property
     def F(self) -> Array:
         """Traction (n, dim) in Pa."""
-        return self._of(kernel.traction).T
+        return self._measure(kernel.traction, slice(None)).T
 
     @property
     def sliding(self) -> Array:
         """Share (n,) of asperities in touch whose every cell is at its friction limit."""
-        return self._of(kernel.shares)[0]
+        return self._measure(kernel.shares, 0)
 
     @property
     def slipping(self) -> Array:
         """Share (n,) of friction capacity that is at its limit: partial slip."""
-        return self._of(kernel.shares)[1]
+        return self._measure(kernel.shares, 1)
 
     @property
     def separated(self) -> Array:
         """Share (n,) of asperities out of touch."""
-        return self._of(kernel.shares)[2]
+        return self._measure(kernel.shares, 2)
 
     @property
     def stored_energy(self) -> Array:
         """Elastic energy (n,) in J/m2."""
-        return self._of(kernel.stored_energy)
+        return self._measure(kernel.stored_energy)
 
     @property
     def dissipated_energy(self) -> Array:
         """Energy (n,) in J/m2 lost to friction since the virgin state; never decreases."""
-        return self._state[2 * self.law.tables.dim - 1, : self._n].copy()
+        lost: Array = self._state[2 * self.law.tables.dim - 1, : self._n].copy()
+        return lost
 
     # --------------------------------------------------------------- internals
 
-    def _of(self, measure: Any) -> Any:
+    def _measure(self, measure: Callable[[Tables, Array], Any], row: Any = 0) -> Array:
+        """One or more rows of a measure of all states, taken in chunks."""
         parts = [
             np.atleast_2d(measure(self.law.tables, self._state[:, : self._n][:, i : i + CHUNK]))
             for i in range(0, max(self._n, 1), CHUNK)
         ]
-        result = np.concatenate(parts, axis=-1)
-        return result if len(result) > 1 else result[0]
+        rows: Array = np.concatenate(parts, axis=-1)[row]
+        return rows
 
     def _index(self, where: Index | None) -> NDArray[np.intp] | None:
         if where is None:
@@ -181,10 +184,7 @@ class JointBatch:
 
     def _increments(self, d: ArrayLike, index: NDArray[np.intp] | None) -> Array:
         """Increments as (dim, m), checked."""
-        try:
-            values = np.asarray(d, float)
-        except (TypeError, ValueError):
-            raise ValueError(f"d = {d!r} is not an array of numbers (m)") from None
+        values = _floats(d)
         shape = (self._n if index is None else len(index), self.law.tables.dim)
         if values.shape != shape:
             raise ValueError(f"d has shape {values.shape}; expected {shape}: joints, components")
@@ -214,6 +214,13 @@ class JointBatch:
         )
 
 
+def _floats(d: ArrayLike) -> Array:
+    try:
+        return np.asarray(d, float)
+    except (TypeError, ValueError):
+        raise ValueError(f"d = {d!r} is not an array of numbers (m)") from None
+
+
 class Joint:
     """One joint: as `JointBatch`, with vectors (dim,) and a matrix (dim, dim)."""
 
@@ -233,9 +240,10 @@ class Joint:
         return self._advance(d, tangent, keep=False)
 
     def _advance(self, d: ArrayLike, tangent: bool, keep: bool) -> tuple[Array, Array | None]:
-        if np.shape(d) != (self.law.tables.dim,):
-            raise ValueError(f"d has shape {np.shape(d)}; expected ({self.law.tables.dim},)")
-        F, C = self._batch._advance([d], None, tangent, keep)
+        values = _floats(d)
+        if values.shape != (self.law.tables.dim,):
+            raise ValueError(f"d has shape {values.shape}; expected ({self.law.tables.dim},)")
+        F, C = self._batch._advance(values[None], None, tangent, keep)
         return F[0], None if C is None else C[0]
 
     def snapshot(self) -> JointState:
@@ -253,12 +261,14 @@ class Joint:
     @property
     def delta(self) -> Array:
         """Displacement since the virgin state (dim,): closure and shear, in m."""
-        return self._batch.delta[0]
+        delta: Array = self._batch.delta[0]
+        return delta
 
     @property
     def F(self) -> Array:
         """Traction (dim,) in Pa."""
-        return self._batch.F[0]
+        F: Array = self._batch.F[0]
+        return F
 
     @property
     def sliding(self) -> float:

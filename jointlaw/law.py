@@ -58,7 +58,7 @@ class Tables(NamedTuple):
     @property
     def cells(self) -> int:
         """Depth cells per facet."""
-        return self.depth.shape[1] - 1
+        return int(self.depth.shape[1]) - 1
 
     @property
     def rows(self) -> int:

@@ -1,0 +1,224 @@
+"""The command line: `jointlaw shear`, `closure`, `presets`, `replay`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import presets, units
+from ._toml import replace_file
+from .joint import JointBatch
+from .law import JointLaw
+from .paths import CONTROLS, PathError, closure_test, direct_shear
+from .record import UNITS, Record
+from .resolution import NAMED
+from .state import JointState, NonFiniteError, read_replay
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; returns the exit status."""
+    parser = argparse.ArgumentParser(
+        prog="jointlaw", description="A micromechanical, anisotropic, path-dependent rock joint."
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    _add_shear(commands)
+    _add_closure(commands)
+    _add_presets(commands)
+    _add_replay(commands)
+    options = parser.parse_args(arguments)
+    try:
+        return int(options.run(options))
+    except (ValueError, ImportError, OSError) as error:
+        print(f"jointlaw {options.command}: {error}", file=sys.stderr)
+        return 2
+
+
+# -------------------------------------------------------------------- shear
+
+
+def _add_shear(commands: Any) -> None:
+    parser = _command(
+        commands,
+        "shear",
+        "direct shear test: seat the joint at a normal stress, shear it, write curve and picture",
+        "jointlaw shear biegel-rough --normal-stress 10MPa --to 2um --reverse=-2um --out out",
+    )
+    parser.add_argument("law", metavar="PRESET_OR_FILE", help="preset name or TOML file")
+    parser.add_argument("--normal-stress", default="10MPa", help="normal stress (default 10MPa)")
+    parser.add_argument("--to", required=True, help="shear displacement, such as 2um")
+    parser.add_argument(
+        "--reverse",
+        default="",
+        help="further turning points, separated by commas: --reverse=-2um,0",
+    )
+    parser.add_argument("--azimuth", default="0", help="direction of shear, such as 30deg")
+    parser.add_argument("--control", choices=CONTROLS, default="stress", help="normal condition")
+    parser.add_argument("--normal-stiffness", help="for --control stiffness, such as 5GPa/m")
+    _common(parser, steps=200)
+    parser.set_defaults(run=_shear)
+
+
+def _shear(options: argparse.Namespace) -> int:
+    law = _law(options)
+    points = [options.to, *(p for p in options.reverse.split(",") if p.strip())]
+    stiffness = options.normal_stiffness
+    try:
+        record = direct_shear(
+            law.joint(),
+            [units.parse(p, "m") for p in points],
+            normal=units.parse(options.normal_stress, "Pa"),
+            control=options.control,
+            azimuth=units.parse(options.azimuth, "rad"),
+            stiffness=None if stiffness is None else units.parse(stiffness, "Pa/m"),
+            steps=options.steps,
+        )
+    except PathError as error:
+        return _stopped(error, law, options, "shear")
+    _write(record, law, options, "shear")
+    print(
+        f"peak friction angle {record.peak_friction_angle:.2f} deg, at the end "
+        f"{record.residual_friction_angle:.2f} deg, largest dilation angle "
+        f"{record.dilation_angle:.2f} deg, secant stiffness {record.secant_stiffness:.4g} Pa/m"
+    )
+    return 0
+
+
+# ------------------------------------------------------------------ closure
+
+
+def _add_closure(commands: Any) -> None:
+    parser = _command(
+        commands,
+        "closure",
+        "closure test: load the joint to a normal stress and unload it",
+        "jointlaw closure westerly-smooth --normal-stress 20MPa --out out",
+    )
+    parser.add_argument("law", metavar="PRESET_OR_FILE", help="preset name or TOML file")
+    parser.add_argument(
+        "--normal-stress", default="20MPa", help="largest normal stress, one per cycle: 5MPa,20MPa"
+    )
+    parser.add_argument("--no-unload", action="store_true", help="stop at the largest stress")
+    _common(parser, steps=100)
+    parser.set_defaults(run=_closure)
+
+
+def _closure(options: argparse.Namespace) -> int:
+    law = _law(options)
+    stresses = [units.parse(s, "Pa") for s in options.normal_stress.split(",")]
+    try:
+        record = closure_test(
+            law.joint(), stresses, unload=not options.no_unload, steps=options.steps
+        )
+    except PathError as error:
+        return _stopped(error, law, options, "closure")
+    _write(record, law, options, "closure")
+    at = int(np.argmax(record.F1))
+    print(
+        f"closure {record.closure[at]:.4g} m at {record.F1[at]:.4g} Pa, "
+        f"{record.dissipated[-1]:.3g} J/m2 lost to friction"
+    )
+    return 0
+
+
+# ---------------------------------------------------------- presets, replay
+
+
+def _add_presets(commands: Any) -> None:
+    parser = _command(
+        commands,
+        "presets",
+        "list the parameter sets of the paper, or print one as TOML to start a file of your own",
+        "jointlaw presets biegel-rough > mine.toml",
+    )
+    parser.add_argument("name", nargs="?", help="print this one")
+    parser.set_defaults(run=_presets)
+
+
+def _presets(options: argparse.Namespace) -> int:
+    if options.name:
+        print(presets.text(options.name), end="")
+        return 0
+    for name in presets.names():
+        print(f"{name:16s} {presets.about(name)['title']}")
+    return 0
+
+
+def _add_replay(commands: Any) -> None:
+    parser = _command(
+        commands,
+        "replay",
+        "run the step again that a NonFiniteError left in a file",
+        "jointlaw replay jointlaw-replay-4711-1.npz",
+    )
+    parser.add_argument("file", help="the file that the error named")
+    parser.set_defaults(run=_replay)
+
+
+def _replay(options: argparse.Namespace) -> int:
+    data = read_replay(options.file)
+    law = JointLaw.from_toml(str(data["law"]))
+    values, d = np.array(data["values"], float), np.array(data["d"], float)
+    batch = JointBatch(law, values.shape[1])
+    batch.restore(JointState(law.fingerprint, values))
+    print(f"{law}\nstate: delta = {batch.delta} m, F = {batch.F} Pa\nstep: d = {d.T} m")
+    try:
+        F, _ = batch.trial(d.T, tangent=bool(data["tangent"]))
+    except NonFiniteError as error:
+        print(f"fails again: {error}")
+        return 1
+    print(f"passes: F = {F} Pa")
+    return 0
+
+
+# ----------------------------------------------------------------- together
+
+
+def _command(commands: Any, name: str, what: str, example: str) -> argparse.ArgumentParser:
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name, help=what, description=what, epilog=f"example: {example}"
+    )
+    return parser
+
+
+def _common(parser: argparse.ArgumentParser, steps: int) -> None:
+    parser.add_argument("--resolution", choices=tuple(NAMED), help="instead of the law's own")
+    parser.add_argument("--steps", type=int, default=steps, help=f"per leg (default {steps})")
+    parser.add_argument("--out", type=Path, required=True, help="folder for the results")
+
+
+def _law(options: argparse.Namespace) -> JointLaw:
+    law = presets.load_any(options.law)
+    return law if options.resolution is None else replace(law, resolution=options.resolution)
+
+
+def _write(record: Record, law: JointLaw, options: argparse.Namespace, name: str) -> None:
+    """Curve (CSV, NPZ), picture, law and summary of a test."""
+    folder: Path = options.out
+    folder.mkdir(parents=True, exist_ok=True)
+    record.to_csv(folder / f"{name}.csv")
+    record.to_npz(folder / f"{name}.npz")
+    law.to_toml(folder / "law.toml")
+    settings = {k: str(v) for k, v in vars(options).items() if k not in ("run", "out")}
+    summary = {"settings": settings, "result": record.summary(), "units": UNITS}
+    replace_file(folder / "summary.json", (json.dumps(summary, indent=2) + "\n").encode())
+    files = [f"{name}.csv", f"{name}.npz", "law.toml", "summary.json"]
+    try:
+        record.plot(folder / f"{name}.png")
+        files.insert(0, f"{name}.png")
+    except ImportError as error:
+        print(f"no picture: {error}", file=sys.stderr)
+    print(f"wrote {', '.join(files)} to {folder}")
+
+
+def _stopped(error: PathError, law: JointLaw, options: argparse.Namespace, name: str) -> int:
+    print(f"jointlaw {name}: {error}", file=sys.stderr)
+    if len(error.record):
+        _write(error.record, law, options, name)
+    return 1

@@ -1,0 +1,37 @@
+"""Quantities as people write them: 10MPa, 2um, 30deg, 5GPa/m; a bare number is SI."""
+
+from __future__ import annotations
+
+import math
+import re
+
+_PREFIX = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2, "": 1.0,
+           "k": 1e3, "M": 1e6, "G": 1e9}  # fmt: skip
+_PATTERN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
+
+
+def parse(text: str, unit: str) -> float:
+    """The SI value of `text`, whose suffix must be `unit` ("Pa", "m", "Pa/m", "rad") or none.
+
+    Raises ValueError naming the text, the unit and an example.
+    """
+    match = _PATTERN.fullmatch(text)
+    if match:
+        value, suffix = float(match.group(1)), match.group(2)
+        factor = 1.0 if suffix == "" else _factor(suffix, unit)
+        if factor is not None:
+            return value * factor
+    example = {"Pa": "10MPa", "m": "2um", "Pa/m": "5GPa/m", "rad": "30deg"}[unit]
+    raise ValueError(f"{text!r} is not a quantity in {unit}; write a number in {unit} or {example}")
+
+
+def _factor(suffix: str, unit: str) -> float | None:
+    if unit == "rad":
+        return {"rad": 1.0, "deg": math.pi / 180, "°": math.pi / 180}.get(suffix)
+    if unit == "Pa/m":
+        top, _, bottom = suffix.partition("/")
+        over, under = _factor(top, "Pa"), _factor(bottom, "m")
+        return None if over is None or under is None else over / under
+    if not suffix.endswith(unit):
+        return None
+    return _PREFIX.get(suffix[: -len(unit)])

@@ -163,8 +163,13 @@ class JointTable:
         mean = self.peak_friction.mean(axis=1)
         parts = (self.closure, self.normal_stress, self.kn_secant, self.kn_tangent, mean)
         result = dict(zip(_BY_CLOSURE, parts, strict=True))
-        parts = (self.shear_stiffness, self.peak_friction, self.mobilised_friction, self.dilation)
-        for name, values in zip(_BY_AZIMUTH, parts, strict=True):
+        by_azimuth = (
+            self.shear_stiffness,
+            self.peak_friction,
+            self.mobilised_friction,
+            self.dilation,
+        )
+        for name, values in zip(_BY_AZIMUTH, by_azimuth, strict=True):
             for psi, column in zip(np.degrees(self.azimuth), values.T, strict=True):
                 result[f"{name}_{round(psi):03d}"] = column
         return result
@@ -199,10 +204,10 @@ def load_table(path: str | Path) -> JointTable:
             lines = path.read_text().splitlines()
             metadata = json.loads(next(s for s in lines if s.startswith(_MARKER))[len(_MARKER) :])
         angles = sorted(int(name[3:]) for name in column if name.startswith("kt_"))
-        by_azimuth = (
+        un, sn, secant, tangent = (column[name] for name in _BY_CLOSURE[:4])
+        kt, mu, mob, dil = (
             np.array([column[f"{name}_{a:03d}"] for a in angles]).T for name in _BY_AZIMUTH
         )
-        by_closure = (column[name] for name in _BY_CLOSURE[:4])
-        return JointTable(*by_closure, np.radians(angles), *by_azimuth, metadata)
+        return JointTable(un, sn, secant, tangent, np.radians(angles), kt, mu, mob, dil, metadata)
     except (OSError, KeyError, ValueError, TypeError, StopIteration, zipfile.BadZipFile) as error:
         raise ValueError(f"{str(path)!r} is not a joint table: {error!r}") from None

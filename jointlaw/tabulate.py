@@ -54,7 +54,7 @@ def tabulate(
             )
         shear_limit = law.critical_slip
     limit = above("shear_limit", shear_limit, 0.0)
-    psi = np.arange(azimuths) * (math.pi / azimuths)
+    psi: Array = np.arange(azimuths, dtype=np.float64) * (math.pi / azimuths)
     u, worst = _grid(law, end, psi, tolerance)
     secant, tangent = _normal(law, u)
     kt = _shear_stiffness(law, u, psi)
@@ -86,7 +86,7 @@ def _metadata(
         "units": "un m; sn Pa; kn_secant, kn_tangent, kt Pa/m; mu, mob, dil dimensionless",
         "signs": "un > 0 is closure, sn > 0 is compression; the force on a body that moves by "
         "+delta is -area*traction",
-        "azimuth": "degrees in the joint plane from axis 2 towards axis 3; the column name's digits",
+        "azimuth": "degrees in the joint plane from axis 2 towards axis 3: digits of column names",
         "use": "kn_secant is for laws that take the total normal force kn*un; kt is the tangent "
         "for incremental shear, dFs = kt*dus",
         "loading_path": "virgin joint; kn: pure closure; kt: first shear after pure closure; "

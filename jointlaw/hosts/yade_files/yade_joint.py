@@ -16,9 +16,10 @@ Displacement is that of body id1 against body id2, closure positive; the force o
 SI units: m, Pa, N, s, kg.
 """
 
+# ruff: noqa: B905 (runs on older Python too)
+
 import gc
 import json
-import sys
 
 import numpy as np
 from yade import FrictPhys, O, PyRunner, Quaternion, ScGeom, Sphere, Vector3
@@ -108,7 +109,7 @@ class Table:
         row, w, secant = self.at(closure)
         normal = np.where(closure > 0, secant * closure, 0.0)
         K, old = self.shear_stiffness(row, w), self.K
-        c, s = np.cos(spin), np.sin(spin)
+        c, s = np.cos(spin / 2), np.sin(spin / 2)  # half before the new shear is added, half after
         f = np.array([c * self.f[0] - s * self.f[1], s * self.f[0] + c * self.f[1]])
         falls = np.flatnonzero(K[0] + K[1] < old[0] + old[1])
         if falls.size:  # a joint that softens gives back elastic force: no energy is made
@@ -116,6 +117,7 @@ class Table:
             f2, f3 = f[:, falls] / (a * b - g * g)
             f[:, falls] = times(K[:, falls], np.array([b * f2 - g * f3, a * f3 - g * f2]))
         f += times(K, d[1:])
+        f = np.array([c * f[0] - s * f[1], s * f[0] + c * f[1]])
         size = np.hypot(f[0], f[1])
         over = np.flatnonzero(size > self.mu_low * normal)
         if over.size:
@@ -206,8 +208,10 @@ class Live:
 
 # ---------------------------------------------------------------- the adapter
 
-PER_CONTACT = "id1 id2 made b1 b2 R1 R2 area ball zero closure".split()  # shape (n,)
-VECTORS = "n t2 c1 c2 axis plane".split()  # shape (3, n)
+# Numbers per contact, shape (n,): ids, step that made it, places of the bodies, radii, area,
+PER_CONTACT = ["id1", "id2", "made", "b1", "b2", "R1", "R2", "area"]
+PER_CONTACT += ["ball", "zero", "closure"]  # two spheres?, overlap at zero closure
+VECTORS = ["n", "t2", "c1", "c2", "axis", "plane"]  # shape (3, n)
 
 
 class Joints:
@@ -282,7 +286,8 @@ class Joints:
             command=f"import yade_joint; yade_joint.run({self.name!r})",
             iterPeriod=1, initRun=True, label=f"joint_{self.name}",
         )  # fmt: skip
-        O.engines = engines[: at + 1] + [runner] + engines[at + 1 :]
+        engines.insert(at + 1, runner)
+        O.engines = engines
 
     def time_step(self, safety=0.25, closure=None):
         """A fixed step (s): `safety` of the shortest stable one over all free spheres.
@@ -634,7 +639,7 @@ class Joints:
             self.last = None
 
     def contacts(self):
-        """Arrays: ids (n, 2), closure (n,) in m, traction (n, 3) in Pa, normal (n, 3), area (n,)."""
+        """Arrays: ids (n, 2), closure (n,), traction (n, 3) in Pa, normal (n, 3), area (n,)."""
         c = self.c
         return {
             "ids": np.array([c["id1"], c["id2"]]).T, "closure": c["closure"].copy(),
@@ -642,7 +647,7 @@ class Joints:
         }  # fmt: skip
 
     def write_back(self):
-        """Show the joint forces in i.phys, for utils.getStress and the like, until the next step."""
+        """Show the joint forces in i.phys, for utils.getStress and such, until the next step."""
         c, F = self.c, self.F
         normal = (c["n"] * F[0] * c["area"]).T.tolist()
         shear = ((c["t2"] * F[1] + cross(c["n"], c["t2"]) * F[2]) * c["area"]).T.tolist()
@@ -718,6 +723,3 @@ def turned(q, old):
     """
     u = old[0] * q[1:] - q[0] * old[1:] + cross(old[1:], q[1:])
     return 2 * u / (q[0] * old[0] + dot(q[1:], old[1:]))
-
-
-sys.modules.setdefault("yade_joint", sys.modules[__name__])  # also when run by exec or runpy

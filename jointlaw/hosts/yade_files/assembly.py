@@ -54,12 +54,12 @@ O.engines = [
         [Ip2_FrictMat_FrictMat_FrictPhys()],
         [Law2_ScGeom_FrictPhys_CundallStrack()],
     ),
-    NewtonIntegrator(damping=0.4, gravity=(0, 0, -gravity)),
+    NewtonIntegrator(damping=0.7, gravity=(0, 0, -gravity)),
 ]
 joints = Joints(law)
 joints.attach()
-O.dt = joints.time_step()
-for _ in range(10):
+O.dt = joints.time_step(safety=0.5)
+for _ in range(12):
     O.run(1500, True)
     joints.write_back()  # so that YADE's own measures see the joint forces
     print(f"step {O.iter}: {len(joints)} joints, kinetic energy {utils.kineticEnergy():.3e} J, "

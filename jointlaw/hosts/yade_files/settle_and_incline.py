@@ -93,7 +93,8 @@ for azimuth in (0.0, 45.0, 90.0):
             share = min(1.0, k / 80)
             fx, fy = (pull * share * direction).tolist()
             O.forces.setPermF(1, (fx, fy, -stress * area))
-            O.run(8, True)
+            for _ in range(8):  # O.run(..., True) polls: slow for a few steps
+                O.step()
         x, y, _ = O.bodies[1].state.pos
         before = np.hypot(x, y)
         O.run(500, True)

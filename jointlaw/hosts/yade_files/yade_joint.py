@@ -286,6 +286,8 @@ class Joints:
             command=f"import yade_joint; yade_joint.run({self.name!r})",
             iterPeriod=1, initRun=True, label=f"joint_{self.name}",
         )  # fmt: skip
+        if hasattr(runner, "updateGlobals"):  # else YADE writes the caller's locals into globals
+            runner.updateGlobals = False
         engines.insert(at + 1, runner)
         O.engines = engines
 
@@ -497,6 +499,7 @@ class Joints:
     def _keep(self, mask):
         for key, value in self.c.items():
             self.c[key] = value[..., mask]
+        self.F = self.F[:, mask]
         self.own = [i for i, keep in zip(self.own, mask) if keep]
         number = np.cumsum(mask) - 1
         self.odd = [(int(number[k]), geom) for k, geom in self.odd if mask[k]]

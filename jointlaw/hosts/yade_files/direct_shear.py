@@ -75,7 +75,7 @@ joints.attach()
 O.dt = 1e-4  # the blocks are driven: no mass is accelerated, any step is stable
 
 # --- the path: (closure, shear) corners, and the number of steps to reach each
-corners = [(0.5, 0, 200), (0.5, 0.5, 200), (0.5, -0.25, 300), (-0.5, -0.25, 200), (0.5, -0.25, 200)]
+corners = [(0.5, 0, 200), (0.5, 0.5, 200), (0.5, -0.25, 200), (-0.5, -0.25, 200), (0.5, -0.25, 200)]
 rows, here = [], (0.0, 0.0)
 
 

@@ -20,6 +20,7 @@ SI units: m, Pa, N, s, kg.
 
 import gc
 import json
+import warnings
 
 import numpy as np
 from yade import FrictPhys, O, PyRunner, Quaternion, ScGeom, Sphere, Vector3
@@ -211,7 +212,7 @@ class Live:
 # Numbers per contact, shape (n,): ids, step that made it, places of the bodies, radii, area,
 PER_CONTACT = ["id1", "id2", "made", "b1", "b2", "R1", "R2", "area"]
 PER_CONTACT += ["ball", "zero", "closure"]  # two spheres?, overlap at zero closure
-VECTORS = ["n", "t2", "c1", "c2", "axis", "plane"]  # shape (3, n)
+VECTORS = ["n", "t2", "c1", "c2", "axis", "plane", "F"]  # shape (3, n)
 
 
 class Joints:
@@ -226,7 +227,8 @@ class Joints:
         flat joint (a "smooth joint") whatever the direction between the two spheres.
     mated: closure counts from the position in which the contact is first seen, not from touch.
     lagged: instead of adding forces, rewrite kn, ks and friction of YADE's own contact, which acts
-        one step late: cheaper, isotropic, and it makes energy (Table only; docs/yade.md).
+        one step late: cheaper, isotropic, and it makes energy, so that NewtonIntegrator needs a
+        damping of 0.7 O.dt/sqrt(m/k) or more (Table only; measured in docs/yade.md).
     forget: with neverErase, contacts without force open by more than this (m) are given up.
     """
 
@@ -247,13 +249,17 @@ class Joints:
         self.c = {key: np.zeros(0, int if key in "id1 id2 made b1 b2" else float)
                   for key in PER_CONTACT}  # fmt: skip
         self.c.update({key: np.zeros((3, 0)) for key in VECTORS})
-        self.F = np.zeros((3, 0))
         self.own, self.others = [], []  # interactions that are joints, and that are not
         self.odd = []  # (place, geom) of joints that are not between two spheres
         self.states, self.ids, self.index = [], [], {}  # bodies with joints
         self.x, self.q = np.zeros((3, 0)), np.zeros((4, 0))
         self.last, self.waiting = None, None
         self.bodies = len(O.bodies)
+
+    @property
+    def F(self):
+        """Tractions (3, n) of the last step in the contacts' frames, Pa."""
+        return self.c["F"]
 
     def __len__(self):
         return len(self.own)
@@ -274,6 +280,12 @@ class Joints:
             raise ValueError(
                 "GlobalStiffnessTimeStepper sees kn = 0 on joints; remove it and set "
                 "O.dt = joints.time_step()"
+            )
+        if self.lagged:
+            warnings.warn(
+                "lagged=True acts one step late and makes energy: amplitudes grow without "
+                "NewtonIntegrator(damping=...) of at least 0.7 O.dt/sqrt(m/k); k = area*kn_tangent",
+                stacklevel=2,
             )
         at = kinds.index("InteractionLoop")
         for law2 in engines[at].lawDispatcher.functors:
@@ -364,9 +376,9 @@ class Joints:
                 before, d[:, fresh] = np.zeros(len(fresh)), 0.0
             self.law.add(before)
             d[0, fresh] = closure[fresh] - before
-        F = self.F = self.law.step(d, closure, spin)
+        F = self.law.step(d, closure, spin)
         force = (n * F[0] + t2 * F[1] + cross(n, t2) * F[2]) * -c["area"]
-        c.update(n=n, t2=t2, c1=c1, c2=c2, closure=closure)
+        c.update(n=n, t2=t2, c1=c1, c2=c2, closure=closure, F=F)
         extra = force
         if fresh.size:
             extra = force.copy()
@@ -499,11 +511,11 @@ class Joints:
     def _keep(self, mask):
         for key, value in self.c.items():
             self.c[key] = value[..., mask]
-        self.F = self.F[:, mask]
         self.own = [i for i, keep in zip(self.own, mask) if keep]
         number = np.cumsum(mask) - 1
         self.odd = [(int(number[k]), geom) for k, geom in self.odd if mask[k]]
-        self.law.keep(mask)
+        if not self.lagged:
+            self.law.keep(mask)
 
     def _join(self, contacts):
         """New contacts: choose the joints among them and set up what stays constant."""
@@ -614,7 +626,7 @@ class Joints:
         data.update({f"law_{key}": value for key, value in self.law.state().items()})
         last = -1 if self.last is None else self.last
         others = np.array([(i.id1, i.id2, i.iterMadeReal) for i in self.others], int)
-        np.savez(path, ids=self.ids, x=self.x, q=self.q, last=last, F=self.F, others=others, **data)
+        np.savez(path, ids=self.ids, x=self.x, q=self.q, last=last, others=others, **data)
 
     def load(self, path):
         """Take up a state that `save` wrote: call it after O.load, before the next step."""
@@ -631,7 +643,6 @@ class Joints:
         self.ids, self.x, self.q = data["ids"].tolist(), data["x"], data["q"]
         self.index = {k: place for place, k in enumerate(self.ids)}
         self.states = [O.bodies[k].state for k in self.ids]
-        self.F = data["F"]
         self.own = [_Unbound] * len(self.c["id1"])
         other = {tuple(row) for row in data["others"].reshape(-1, 3).tolist()}
         contacts = O.interactions.all(True)
@@ -646,12 +657,12 @@ class Joints:
         c = self.c
         return {
             "ids": np.array([c["id1"], c["id2"]]).T, "closure": c["closure"].copy(),
-            "traction": self.F.T.copy(), "normal": c["n"].T.copy(), "area": c["area"].copy(),
+            "traction": c["F"].T.copy(), "normal": c["n"].T.copy(), "area": c["area"].copy(),
         }  # fmt: skip
 
     def write_back(self):
         """Show the joint forces in i.phys, for utils.getStress and such, until the next step."""
-        c, F = self.c, self.F
+        c, F = self.c, self.c["F"]
         normal = (c["n"] * F[0] * c["area"]).T.tolist()
         shear = ((c["t2"] * F[1] + cross(c["n"], c["t2"]) * F[2]) * c["area"]).T.tolist()
         for i, a, b in zip(self.own, normal, shear):

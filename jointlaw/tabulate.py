@@ -54,7 +54,7 @@ def tabulate(
             )
         shear_limit = law.critical_slip
     limit = above("shear_limit", shear_limit, 0.0)
-    psi: Array = np.arange(azimuths, dtype=np.float64) * (math.pi / azimuths)
+    psi: Array = np.radians(np.arange(azimuths) * (180 // azimuths), dtype=np.float64)
     u, worst = _grid(law, end, psi, tolerance)
     secant, tangent = _normal(law, u)
     kt = _shear_stiffness(law, u, psi)

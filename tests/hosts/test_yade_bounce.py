@@ -54,6 +54,6 @@ def test_lagged_rewrite_pumps_energy(yade, make_table, tmp_path):
     make_table(tmp_path / "joint.txt", 1e8, 5e7, 0.4, eta=0.5)
     out = yade(BOUNCE + "result(**{f'at{s}': bounce(True, s, 6) for s in (0.02, 0.1, 0.3)})")
     for share in (0.02, 0.1, 0.3):
-        print(share, out[f"at{share}"] , growth(out[f"at{share}"][:3]))
+        print(share, out[f"at{share}"], growth(out[f"at{share}"][:3]))
     assert 0.01 < growth(out["at0.02"][:3]) < 0.1
     assert growth(out["at0.1"][:3]) > 0.05

@@ -6,7 +6,9 @@ import pytest
 import jointlaw as jl
 from jointlaw.hosts import export_yade
 
-LAW = "from jointlaw import JointLaw\nlaw = JointLaw.from_toml('law.toml')\nend = law.closure_range\n"
+LAW = (
+    "from jointlaw import JointLaw\nlaw = JointLaw.from_toml('law.toml')\nend = law.closure_range\n"
+)
 
 
 @pytest.fixture
@@ -86,7 +88,10 @@ def test_direct_shear_at_constant_normal_stress(yade, tmp_path, law):
     exact = np.interp(shear, record.shear, record.shear_stress)
     dilation = np.interp(shear, record.shear, record.closure[0] - record.closure)
     peak = record.shear_stress.max()
-    print(np.abs(F2 - exact).max() / peak, np.abs(closure[0] - closure - dilation).max() / record.closure[0])
+    print(
+        np.abs(F2 - exact).max() / peak,
+        np.abs(closure[0] - closure - dilation).max() / record.closure[0],
+    )
     assert np.abs(F2 - exact).max() < 1e-3 * peak
     assert np.abs(closure[0] - closure - dilation).max() < 1e-3 * record.closure[0]
 

@@ -49,7 +49,9 @@ def test_normal_force_and_shear_follow_the_table(yade, exported, tmp_path):
     legs.append(np.stack([closure, 0 * closure, 0 * closure], axis=1))
     for azimuth in (0.0, 40.0, 110.0):
         direction = np.array([np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth))])
-        s = np.concatenate([np.zeros(50), np.linspace(0, end, 120), np.linspace(end, -end / 2, 180)])
+        s = np.concatenate(
+            [np.zeros(50), np.linspace(0, end, 120), np.linspace(end, -end / 2, 180)]
+        )
         u = np.concatenate([np.linspace(0, end / 2, 50), np.full(250, end / 2),
                             np.linspace(end / 2, end / 9, 50)])  # fmt: skip
         s = np.concatenate([s, np.full(50, s[-1])])

@@ -455,16 +455,23 @@ class Joints:
     def _rewrite(self):
         """The lagged option: what YADE's own law will use in the next step."""
         c = self.c
+        if not self.own:
+            return
         x, q = self._read()
-        if self.own:
-            un = self._geometry(x, q.take(c["b1"], axis=1))[1]
-            c["closure"] = un - c["zero"]
-            row, w, secant = self.law.at(np.maximum(c["closure"], 0.0))
-            area, mu = c["area"], between(self.law.mu_mean, row, w)
-            kn, ks = area * secant, area * between(self.law.kt, row, w)
-            for i, a, b, m in zip(self.own, kn.tolist(), ks.tolist(), mu.tolist()):
-                phys = i.phys
-                phys.kn, phys.ks, phys.tangensOfFrictionAngle = a, b, m
+        n, un, c1, c2 = self._geometry(x, q.take(c["b1"], axis=1))
+        closure = c["closure"] = un - c["zero"]
+        row, w, secant = self.law.at(np.maximum(closure, 0.0))
+        area, mu = c["area"], between(self.law.mu_mean, row, w)
+        kn, ks = area * secant, area * between(self.law.kt, row, w)
+        fresh = self.fresh
+        if fresh.size:  # made with the stiffness of YADE's material: this step is put right
+            force = np.zeros((3, len(self.own)))
+            force[:, fresh] = -n[:, fresh] * (kn * np.maximum(closure, 0.0))[fresh]
+            force[:, fresh] -= self._take_back(fresh)
+            self._add(force, c1, c2)
+        for i, a, b, m in zip(self.own, kn.tolist(), ks.tolist(), mu.tolist()):
+            phys = i.phys
+            phys.kn, phys.ks, phys.tangensOfFrictionAngle = a, b, m
 
     # ---------------------------------------------------------------- contacts
 

@@ -39,7 +39,8 @@ def build(law):
         O.bodies[-1].state.vel = Vector3(*(1e-3 * rng.uniform(-1, 1, 3)).tolist())
         O.bodies[-1].state.angVel = Vector3(*(1e-3 * rng.uniform(-1, 1, 3)).tolist())
     ip2, law2 = Ip2_FrictMat_FrictMat_FrictPhys(), Law2_ScGeom_FrictPhys_CundallStrack()
-    if law == "hertz": ip2, law2 = Ip2_FrictMat_FrictMat_MindlinPhys(), Law2_ScGeom_MindlinPhys_Mindlin()
+    if law == "hertz":
+        ip2, law2 = Ip2_FrictMat_FrictMat_MindlinPhys(), Law2_ScGeom_MindlinPhys_Mindlin()
     if law in ("table", "live"): law2.neverErase = True
     O.engines = [ForceResetter(), InsertionSortCollider([Bo1_Sphere_Aabb()], verletDist=.01),
                  InteractionLoop([Ig2_Sphere_Sphere_ScGeom()], [ip2], [law2]),

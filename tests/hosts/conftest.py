@@ -35,7 +35,8 @@ def engines(kn=0.0, ks=0.0, mu=0.5, damping=0.0, ratchet=True, keep=False, gravi
         InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Box_Aabb()]),
         InteractionLoop(
             [Ig2_Sphere_Sphere_ScGeom(avoidGranularRatcheting=ratchet), Ig2_Box_Sphere_ScGeom()],
-            [Ip2_FrictMat_FrictMat_FrictPhys(kn=value(kn), ks=value(ks), frictAngle=value(atan(mu)))],
+            [Ip2_FrictMat_FrictMat_FrictPhys(
+                kn=value(kn), ks=value(ks), frictAngle=value(atan(mu)))],
             [Law2_ScGeom_FrictPhys_CundallStrack(neverErase=keep)]),
         NewtonIntegrator(damping=damping, gravity=gravity),
     ]
@@ -47,7 +48,7 @@ def slab_and_sphere(R=0.5):
     O.bodies.append(utils.sphere((0, 0, R), R))
 
 def drive(path, closed=0.0, R=0.5):
-    \"\"\"Move the sphere along (closure, x, y) points, note the force on it (z, x, y) at each.\"\"\"
+    \"\"\"Move the sphere along (closure, x, y), note the force on it (z, x, y) at each point.\"\"\"
     sphere, out = O.bodies[1], []
     sphere.state.blockedDOFs = "xyzXYZ"
     for u, x, y in path:
@@ -76,7 +77,8 @@ def yade(tmp_path):
             env["PYTHONPATH"] = str(ROOT)
         done = subprocess.run(
             [program, "-n", "-x", str(path), *args],
-            cwd=folder, env=env, capture_output=True, text=True, timeout=300, stdin=subprocess.DEVNULL,
+            cwd=folder, env=env, capture_output=True, text=True, timeout=300,
+            stdin=subprocess.DEVNULL,
         )  # fmt: skip
         text = done.stdout + done.stderr
         if script is None:
@@ -102,7 +104,8 @@ def make_table():
         friction = np.repeat(mu * (1 + uneven_mu * wave)[None], 81, axis=0)
         table = JointTable(
             un, kn * un ** (1 + eta), kn * un**eta, (1 + eta) * kn * un**eta, psi,
-            ks * power * (1 + uneven * wave), friction, friction, 0 * friction, {"shear_limit": end},
+            ks * power * (1 + uneven * wave), friction, friction, 0 * friction,
+            {"shear_limit": end},
         )  # fmt: skip
         table.save(path)
         return table

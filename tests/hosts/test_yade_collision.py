@@ -19,7 +19,8 @@ def go(joint, N, touch):
     if joint:
         Joints(Table("joint.txt")).attach()
     def momenta():
-        L = sum((s.mass * s.pos.cross(s.vel) + s.inertia[0] * s.angVel for s in (a, b)), Vector3.Zero)
+        spins = [s.mass * s.pos.cross(s.vel) + s.inertia[0] * s.angVel for s in (a, b)]
+        L = spins[0] + spins[1]
         return list(a.mass * a.vel + b.mass * b.vel) + list(L)
     a, b = [body.state for body in O.bodies]
     before = momenta()

@@ -160,7 +160,8 @@ def build():
     for k in range(12):
         apart = 0.93 if live else 0.9
         x, y = apart * (k % 3), apart * (k // 3)
-        O.bodies.append(utils.sphere((x, y, 0.5 + (0.37 if live else 0.4) * ((k % 3 + k // 3) % 2)), 0.5))
+        z = 0.5 + (0.37 if live else 0.4) * ((k % 3 + k // 3) % 2)
+        O.bodies.append(utils.sphere((x, y, z), 0.5))
         O.bodies[-1].state.vel = Vector3(*rng.uniform(-0.3, 0.3, 3).tolist())
         O.bodies[-1].state.angVel = Vector3(*rng.uniform(-3, 3, 3).tolist())
     engines(keep=live, gravity=(0, 0, -200 if live else -30), damping=0.4 if live else 0.1)

@@ -99,7 +99,8 @@ def test_shear_error_against_the_law_is_the_one_stated(yade, exported, tmp_path)
 def test_exported_folder_runs_without_jointlaw(yade, exported):
     """Settling sphere and incline, in a folder elsewhere, with no jointlaw to import."""
     check = subprocess.run(
-        ["/usr/bin/env", "-u", "PYTHONPATH", "yade", "-n", "-x", str(exported / "settle_and_incline.py")],
+        ["/usr/bin/env", "-u", "PYTHONPATH", "yade", "-n", "-x",
+         str(exported / "settle_and_incline.py")],
         capture_output=True, text=True, cwd=exported, timeout=300, stdin=subprocess.DEVNULL,
     )  # fmt: skip
     text = check.stdout

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import sys
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from . import _toml
-from ._checks import Array, above, at_least, number
+from ._checks import Array, above, at_least, number, numbers
 from .asperity import Asperity
 from .curve import Curve, virgin_curve
 from .heights import GammaHeights, HeightDistribution, Heights
@@ -24,6 +25,7 @@ from .resolution import Resolution, resolve
 if TYPE_CHECKING:
     from .joint import Joint, JointBatch
 
+_SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
 DEFAULT_STRESS = 20e6  # Pa; its closure is the default closure_range
 
 
@@ -125,27 +127,28 @@ class JointLaw:
 
         return Joint(self)
 
-    def joints(self, n: int) -> JointBatch:
-        """A batch of n unloaded joints of this law, advanced together."""
+    def joints(self, n: int, ledger: bool = True) -> JointBatch:
+        """A batch of n unloaded joints of this law, advanced together.
+
+        Without `ledger` dissipated energy is not added up, which is faster.
+        """
         from .joint import JointBatch
 
-        return JointBatch(self, n)
+        return JointBatch(self, n, ledger)
 
     # ----------------------------------------------------- virgin closure curve
 
     def normal_stress(self, closure: ArrayLike) -> Any:
         """Normal stress (Pa) of a joint closed from zero to `closure` (m), unsheared."""
-        y = np.asarray(closure, float)
-        if not np.isfinite(y).all():
-            raise ValueError(f"closure = {closure!r} is not finite; give finite closures in m")
+        y = _finite("closure", closure, "m")
         force, _ = self.curve.force(y)
         return (self._closure_factor * force)[()]
 
     def closure(self, normal_stress: ArrayLike) -> Any:
         """Closure (m) at which the normal stress (Pa, >= 0) is reached: inverse of the above."""
-        stress = np.asarray(normal_stress, float)
-        if not (np.isfinite(stress).all() and (stress >= 0).all()):
-            raise ValueError(f"normal_stress = {normal_stress!r} must be finite and >= 0 Pa")
+        stress = _finite("normal_stress", normal_stress, "Pa")
+        if not (stress >= 0).all():
+            raise ValueError(f"normal_stress = {normal_stress!r} is out of bounds: it must be >= 0")
         result = np.array([self._closure_at(float(value)) for value in stress.ravel()])
         return result.reshape(stress.shape)[()]
 
@@ -154,7 +157,7 @@ class JointLaw:
 
         With `direction` = (theta, phi) in rad: per m2 and steradian in that direction, Eq. 16.
         """
-        y = np.asarray(closure, float)
+        y = _finite("closure", closure, "m")
         if self.heights is None:
             share: Any = np.where(y > 0, 1.0, 0.0)
         else:
@@ -167,7 +170,7 @@ class JointLaw:
     def max_stiffness(self, closure: ArrayLike) -> Any:
         """Upper bound of |C| (Pa/m) while no facet's effective closure exceeds `closure` (m)."""
         k, p = self.tables, self.asperity
-        _, slope = k.curve.force(np.asarray(closure, float))
+        _, slope = k.curve.force(_finite("closure", closure, "m"))
         per_facet = float(np.sum(k.area / k.c1))
         return ((max(1.0, 1.0 / p.lam) + p.mu) * per_facet * slope)[()]
 
@@ -210,6 +213,18 @@ class JointLaw:
         )  # fmt: skip
 
     @cached_property
+    def largest_reach(self) -> float:
+        """Effective closure (m) up to which forces, energies and their squares stay finite."""
+        k, p = self.tables, self.asperity
+        y = 10.0 ** np.arange(-300.0, 101.0)
+        stiffest = float(np.max(k.area / k.c1)) * max(p.lam, 1 / p.lam, 1.0) * (1.0 + p.mu)
+        with np.errstate(over="ignore"):
+            force, slope = self.curve.force(y)
+            worst = stiffest * (force + y * slope) + float(np.max(k.area)) * self.curve.energy(y)
+        bad = ~(worst < 1e140)
+        return float(y[int(np.argmax(bad)) - 1]) if bad.any() else float(y[-1])
+
+    @cached_property
     def fingerprint(self) -> str:
         """Hash of all parameters: states fit only joints of the law that wrote them."""
         return hashlib.sha256(self.to_toml().encode()).hexdigest()
@@ -223,22 +238,24 @@ class JointLaw:
         return float(np.sum(k.area * (k.c1 + np.sin(self.facets.theta) * shear)))
 
     def _closure_at(self, stress: float) -> float:
-        if stress == 0.0:
+        if stress < _SMALLEST:
             return 0.0
-        high = self.closure_range
-        while self.normal_stress(high) < stress:
-            high *= 4.0
-        low = high
-        while self.normal_stress(low) > stress:
-            low /= 4.0
 
-        def misfit(log_y: float) -> float:
-            return math.log(float(self.normal_stress(math.exp(log_y))) / stress)
+        def misfit(log_y: float) -> float:  # finite where the force is zero or overflows
+            force = float(self.normal_stress(math.exp(log_y)))
+            return math.log(min(max(force, _SMALLEST), _LARGEST)) - math.log(stress)
 
-        if low == high:
-            return high
-        root = brentq(misfit, math.log(low), math.log(high), xtol=1e-15, rtol=1e-15)
-        return math.exp(root)
+        low = high = math.log(self.closure_range)
+        with np.errstate(over="ignore"):
+            while misfit(high) < 0.0:
+                high += 1.0
+                if high > 700.0:
+                    raise ValueError(f"normal_stress = {stress!r} Pa is beyond any closure")
+            while misfit(low) > 0.0:
+                low -= 1.0
+            if low == high:
+                return self.closure_range
+            return math.exp(brentq(misfit, low, high, xtol=1e-15, rtol=1e-15, maxiter=500))
 
     # ----------------------------------------------------------------- files
 
@@ -261,6 +278,13 @@ class JointLaw:
         return {name: value for name, value in self.__dict__.items() if name in names}
 
 
+def _finite(name: str, value: ArrayLike, unit: str) -> Array:
+    array = numbers(name, value, unit)
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} = {value!r} is not finite; give finite values in {unit}")
+    return array
+
+
 def depth_nodes(closure_range: float, slope: Array, cells: int) -> Array:
     """Limits zeta (M, cells + 1) of the depth cells, graded, the last cell open-ended (m).
 
@@ -268,6 +292,6 @@ def depth_nodes(closure_range: float, slope: Array, cells: int) -> Array:
     shear of one closure range on top of the closure.
     """
     reach = closure_range * (1.0 + np.minimum(slope, 10.0))
-    inner = 30.0 ** -(1.0 - np.arange(1, cells) / cells)
+    inner = (np.arange(1, cells) / cells) ** 1.5
     zero, end = np.zeros((len(slope), 1)), np.full((len(slope), 1), np.inf)
     return np.concatenate([zero, reach[:, None] * inner, end], axis=1)

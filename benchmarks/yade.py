@@ -113,6 +113,7 @@ def main() -> int:
         (Path(folder) / "scene.py").write_text(scene)
         env = os.environ | {
             "OMP_NUM_THREADS": "1",
+            "JOINTLAW_THREADS": "1",
             "PYTHONPATH": str(Path(jl.__file__).parents[1]),
         }
         done = subprocess.run(

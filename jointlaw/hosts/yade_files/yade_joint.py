@@ -151,15 +151,16 @@ class Live:
 
     Memory belongs to a contact as long as YADE keeps it, so `Law2...(neverErase=True)` is needed:
     a sheared joint dilates and carries stress at negative closure. A new contact counts the shear
-    made in touch only. The memory turns with body id1.
+    made in touch only. The memory turns with body id1. `ledger` adds up the energy that friction
+    takes, for `batch.dissipated_energy`, at some cost.
     """
 
     live = True
 
-    def __init__(self, law):
+    def __init__(self, law, ledger=False):
         if law.plane is not None:
             raise ValueError("law.plane is set; contacts in YADE move in 3-D, give plane=None")
-        self.law, self.batch = law, law.joints(0)
+        self.law, self.batch = law, law.joints(0, ledger=ledger)
         self.slots, self.free = np.zeros(0, int), []
 
     def stiffness(self, closure=None):

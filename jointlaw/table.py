@@ -204,6 +204,8 @@ def load_table(path: str | Path) -> JointTable:
             lines = path.read_text().splitlines()
             metadata = json.loads(next(s for s in lines if s.startswith(_MARKER))[len(_MARKER) :])
         angles = sorted(int(name[3:]) for name in column if name.startswith("kt_"))
+        if not (np.isfinite(list(column.values())).all() and (np.diff(column["un"]) > 0).all()):
+            raise ValueError("column un must increase and all values must be finite")
         un, sn, secant, tangent = (column[name] for name in _BY_CLOSURE[:4])
         kt, mu, mob, dil = (
             np.array([column[f"{name}_{a:03d}"] for a in angles]).T for name in _BY_AZIMUTH

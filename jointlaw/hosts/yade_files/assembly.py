@@ -59,11 +59,15 @@ O.engines = [
 joints = Joints(law)
 joints.attach()
 O.dt = joints.time_step(safety=0.5)
-for _ in range(12):
+for k in range(1, 41):
     O.run(1500, True)
     joints.write_back()  # so that YADE's own measures see the joint forces
-    print(f"step {O.iter}: {len(joints)} joints, kinetic energy {utils.kineticEnergy():.3e} J, "
-          f"unbalanced force {utils.unbalancedForce():.1e}")  # fmt: skip
+    unbalanced = utils.unbalancedForce()
+    if k % 4 == 0 or unbalanced < 0.01:
+        print(f"step {O.iter}: {len(joints)} joints, kinetic energy {utils.kineticEnergy():.3e} J, "
+              f"unbalanced force {unbalanced:.1e}")  # fmt: skip
+    if unbalanced < 0.01:
+        break
 floor = -sum(O.forces.f(b.id)[2] for b in O.bodies if not b.dynamic)
 heap = sum(b.state.mass for b in O.bodies if b.dynamic) * gravity
 print(f"force on the box {floor:.6g} N, weight of the heap {heap:.6g} N")

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 from . import _toml
 from ._checks import Array, above, at_least, number, numbers
@@ -238,6 +237,8 @@ class JointLaw:
         return float(np.sum(k.area * (k.c1 + np.sin(self.facets.theta) * shear)))
 
     def _closure_at(self, stress: float) -> float:
+        from scipy.optimize import brentq  # a third of the package's import time
+
         if stress < _SMALLEST:
             return 0.0
 

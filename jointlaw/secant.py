@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 from ._checks import Array, one_of
 
@@ -114,6 +113,8 @@ def series_limit(eta: float) -> float:
     """
     if not 0.0 <= eta < 1.0:
         raise ValueError(f'asperity.eta = {eta:g}: "series" needs 0 <= eta < 1; use "exact"')
+    from scipy.optimize import brentq  # a third of the package's import time
+
     return float(brentq(lambda x: x * float(shear_factor(x, eta, "series")) - 1, 0.0, 1.0))
 
 

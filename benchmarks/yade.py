@@ -1,6 +1,6 @@
 """Cost per contact and step in the real YADE: its own laws, a joint table, the live joint law.
 
-    python benchmarks/yade.py [--contacts 20000] [--runs 6] [--preset jing-replica]
+    python benchmarks/yade.py [--contacts 20000] [--runs 60] [--preset jing-replica]
 
 One thread; minima of several runs; prints a table and JSON. `loop` is the whole step of YADE's
 InteractionLoop with its own law and the geometry; `adapter` is what a joint adds to it, torque
@@ -24,7 +24,7 @@ import json, sys, time
 sys.path.insert(0, ".")
 import numpy as np
 from yade_joint import Joints, Live, Table
-contacts, runs, steps = {contacts}, {runs}, 5
+contacts, runs, steps = {contacts}, {runs}, 1
 N = round((contacts / 3) ** (1 / 3)) + 1
 R = 0.5
 
@@ -97,7 +97,7 @@ def main() -> int:
     """Run the scene and print the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--contacts", type=int, default=20000)
-    parser.add_argument("--runs", type=int, default=6)
+    parser.add_argument("--runs", type=int, default=60, help="single steps; the minimum counts")
     parser.add_argument("--preset", default="jing-replica")
     options = parser.parse_args()
     yade = shutil.which("yade")

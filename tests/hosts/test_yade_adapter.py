@@ -136,6 +136,8 @@ j = joints()
 j.attach()
 j.attach()
 count = len(O.engines)
+attempt("taken", lambda: joints().attach())
+yade_joint._running["joints"] = j
 O.dt = 1e-6
 O.run(5, True)
 O.engines[3].dead = True
@@ -169,7 +171,7 @@ def test_refusals_name_the_remedy(yade, make_table, tmp_path):
         "no loop": "set O.engines before attach", "stepper": "joints.time_step()",
         "keep": "neverErase=True", "lagged live": "Table only", "name": "identifier",
         "run": ".load(file)", "periodic": "O.periodic", "area": "area = -1", "phys": "select=",
-        "missed": "every step",
+        "missed": "every step", "taken": "give another name=",
     }  # fmt: skip
     for name, words in told.items():
         assert words in out["messages"][name], (name, out["messages"][name])

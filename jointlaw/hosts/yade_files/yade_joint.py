@@ -210,7 +210,7 @@ class Live:
 
 # ---------------------------------------------------------------- the adapter
 
-# Numbers per contact, shape (n,): ids, step that made it, places of the bodies, radii, area,
+# Numbers per contact, shape (n,): ids, step that made it, places of the bodies, radii, area
 PER_CONTACT = ["id1", "id2", "made", "b1", "b2", "R1", "R2", "area"]
 PER_CONTACT += ["ball", "zero", "closure"]  # two spheres?, overlap at zero closure
 VECTORS = ["n", "t2", "c1", "c2", "axis", "plane", "F"]  # shape (3, n)
@@ -228,7 +228,7 @@ class Joints:
         flat joint (a "smooth joint") whatever the direction between the two spheres.
     mated: closure counts from the position in which the contact is first seen, not from touch.
     lagged: instead of adding forces, rewrite kn, ks and friction of YADE's own contact, which acts
-        one step late: cheaper, isotropic, and it makes energy, so that NewtonIntegrator needs a
+        one step late: isotropic, and it makes energy, so that NewtonIntegrator needs a
         damping of 0.7 O.dt/sqrt(m/k) or more (Table only; measured in docs/yade.md).
     forget: with neverErase, contacts without force open by more than this (m) are given up.
     """
@@ -243,6 +243,7 @@ class Joints:
         self.azimuth = unit(np.array(azimuth, float))
         self.plane = None if plane is None else unit(np.array(plane, float))
         self.mated, self.lagged, self.forget = mated, lagged, forget
+        self.attached = False
         self._clear()
         _running[name] = self
 
@@ -274,7 +275,12 @@ class Joints:
         if "InteractionLoop" not in kinds:
             raise ValueError("O.engines has no InteractionLoop; set O.engines before attach()")
         if any(e.label == f"joint_{self.name}" for e in engines):
-            return
+            if self.attached or self.waiting is not None:
+                return
+            raise ValueError(
+                f"name = {self.name!r} is taken in O.engines: give another name=, or call "
+                ".load(file) instead of .attach() to continue a saved run"
+            )
         if O.periodic:
             raise ValueError("O.periodic = True: joints across a periodic boundary are not covered")
         if any(k == "GlobalStiffnessTimeStepper" and not e.dead for k, e in zip(kinds, engines)):
@@ -303,6 +309,7 @@ class Joints:
             runner.updateGlobals = False
         engines.insert(at + 1, runner)
         O.engines = engines
+        self.attached = True
 
     def time_step(self, safety=0.25, closure=None):
         """A fixed step (s): `safety` of the shortest stable one over all free spheres.
@@ -630,11 +637,14 @@ class Joints:
 
     def save(self, path):
         """Write the adapter's state (NPZ): call it with every O.save, between two runs."""
+        if self.waiting is not None:
+            self._resume()
         data = {f"contact_{key}": value for key, value in self.c.items()}
         data.update({f"law_{key}": value for key, value in self.law.state().items()})
         last = -1 if self.last is None else self.last
         others = np.array([(i.id1, i.id2, i.iterMadeReal) for i in self.others], int)
-        np.savez(path, ids=self.ids, x=self.x, q=self.q, last=last, others=others, **data)
+        with open(path, "wb") as file:
+            np.savez(file, ids=self.ids, x=self.x, q=self.q, last=last, others=others, **data)
 
     def load(self, path):
         """Take up a state that `save` wrote: call it after O.load, before the next step."""

@@ -114,6 +114,7 @@ def main() -> int:
         env = os.environ | {
             "OMP_NUM_THREADS": "1",
             "JOINTLAW_THREADS": "1",
+            "NUMBA_CACHE_DIR": str(Path(tempfile.gettempdir()) / "jointlaw-yade-numba"),
             "PYTHONPATH": str(Path(jl.__file__).parents[1]),
         }
         done = subprocess.run(

@@ -12,7 +12,7 @@ from .law import JointLaw
 from .table import JointTable
 
 FLOOR = 1e-4  # stresses below this share of the largest are held to an absolute tolerance
-ROWS = 12  # closures at which friction and dilation are computed
+ROWS = 30  # closures at which friction and dilation are computed
 PROBE = 1e-7  # shear probe over closure: small against any curvature, large against rounding
 
 

@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import subprocess
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -73,8 +74,9 @@ def yade(tmp_path):
             path.write_text((PREAMBLE if preamble else "") + script)
         env = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME")}
         env |= {"OMP_NUM_THREADS": "1", "MPLBACKEND": "Agg"}
-        if live:
-            env["PYTHONPATH"] = str(ROOT)
+        if live:  # two versions of numba in one cache throw each other's kernels away
+            cache = Path(tempfile.gettempdir()) / "jointlaw-yade-numba"
+            env |= {"PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(cache)}
         done = subprocess.run(
             [program, "-n", "-x", str(path), *args],
             cwd=folder, env=env, capture_output=True, text=True, timeout=300,
@@ -82,7 +84,7 @@ def yade(tmp_path):
         )  # fmt: skip
         text = done.stdout + done.stderr
         if script is None:
-            assert "Error" not in text, text
+            assert "Traceback" not in text, text
             return done.stdout
         found = [line for line in done.stdout.splitlines() if line.startswith(MARK)]
         assert found, f"the scene gave no result:\n{text}"

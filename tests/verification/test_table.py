@@ -175,7 +175,7 @@ def test_export_command(tmp_path, capsys):
     """`jointlaw export yade PRESET --out DIR` through its own function."""
     import argparse
 
-    from jointlaw._cli_export import add_export_command
+    from jointlaw.cli_export import add_export_command
 
     parser = argparse.ArgumentParser()
     add_export_command(parser.add_subparsers())

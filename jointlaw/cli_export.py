@@ -8,17 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from . import presets, units
+from ._command import add_command
 from .resolution import NAMED
 
 
 def add_export_command(commands: Any) -> None:
     """Add `export` to the subparsers of the command line."""
-    what = "write a law for a host code: table, adapter and scripts in one folder"
-    parser = commands.add_parser(
+    parser = add_command(
+        commands,
         "export",
-        help=what,
-        description=what,
-        epilog="example: jointlaw export yade jing-replica --out joint-for-yade",
+        "write a law for a host code: table, adapter and scripts in one folder",
+        "jointlaw export yade jing-replica --out joint-for-yade",
     )
     parser.add_argument("host", choices=("yade",), help="the host code")
     parser.add_argument("law", metavar="PRESET_OR_FILE", help="preset name or TOML file")

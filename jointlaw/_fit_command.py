@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from . import datasets, units
+from ._command import add_command
 from ._curve_files import Curve, read_closure
 from ._fit_plot import plot_fit
 from ._toml import replace_file
@@ -24,12 +25,11 @@ from .unloading import explain
 def add_fit_command(commands: Any) -> None:
     """Add `fit` to the subparsers of the command line."""
     what = "fit the law to measured closure curves; write preset, report and plot"
-    parser = commands.add_parser(
-        "fit",
-        help=what,
-        description=what + ". Only the first loading is fitted; an unloading branch is compared "
-        "with what friction explains.",
-        epilog="example: jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out out",
+    example = "jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out out"
+    parser = add_command(commands, "fit", what, example)
+    parser.description = (
+        f"{what}. Only the first loading is fitted; an unloading branch is compared with what "
+        "friction explains."
     )
     parser.add_argument(
         "data", nargs="+", metavar="CSV", help="files of stress and closure, or a shipped data set"

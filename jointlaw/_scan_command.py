@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from . import units
+from ._command import add_command
 from ._scan_files import read_scan
 from ._toml import replace_file
 from .surface import SurfaceFit, from_surface
@@ -18,12 +19,9 @@ from .surface import SurfaceFit, from_surface
 def add_scan_command(commands: Any) -> None:
     """Add `scan` to the subparsers of the command line."""
     what = "read heights, directions and number of asperities off a scanned surface"
-    parser = commands.add_parser(
-        "scan",
-        help=what,
-        description=what + ". Give the composite surface of both sides, or a profile.",
-        epilog="example: jointlaw scan scan.csv --spacing 20um --height-unit um --out out",
-    )
+    example = "jointlaw scan scan.csv --spacing 20um --height-unit um --out out"
+    parser = add_command(commands, "scan", what, example)
+    parser.description = f"{what}. Give the composite surface of both sides, or a profile."
     parser.add_argument("file", help="CSV, NPY, or a format of SurfaceTopography (extra scan)")
     parser.add_argument("--spacing", help="of the points, such as 20um; needed for CSV and NPY")
     parser.add_argument("--height-unit", default="m", help="of CSV and NPY, such as um (default m)")

@@ -187,8 +187,9 @@ def build(values: Values, settings: Settings, plane: float | None = None) -> Joi
         "asperity_density": v["asperity_density"],
         "resolution": settings.resolution,
         "plane": plane,
+        "closure_range": settings.closure_range,
     }
-    return JointLaw(**parts, closure_range=settings.closure_range)
+    return JointLaw(**parts)
 
 
 def log_stress(values: Values, closure: Array, settings: Settings) -> Array:

@@ -1,0 +1,304 @@
+"""Blocks, joints and time: one step of the whole, and the states it can return to."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from . import geometry, timestep
+from .drives import Drives
+from .energy import COLUMNS, Ledger
+from .interfaces import Interfaces, Refused
+from .joints import Joints
+from .scene import Scene, parse
+from .seat import equilibrium
+from .world import World
+
+HEADROOM = 1.25  # stiffness growth between two checks of the time step
+
+
+class Simulation:
+    """A scene in motion. `step()` advances it; `state()` and `restore()` are bit-exact."""
+
+    def __init__(self, scene: Scene, step: float | None = None, begin: bool = True) -> None:
+        self.scene, run, blocks = scene, scene.run, scene.blocks
+        width = min(b.width for b in blocks)
+        self.skin = run.skin or 0.02 * width
+        self.world = World(blocks, scene.thickness, self.skin)
+        self.interfaces = Interfaces(blocks, self.skin, run.point_spacing, run.max_overlap)
+        self.joints = Joints(scene.laws, scene.law_of)
+        self.drives = Drives(scene.drives)
+        self.inertia = np.stack([self.world.mass, self.world.mass, self.world.moment], axis=1)
+        self.mobile = np.array([[not b.fixed] * 3 for b in blocks])
+        self.free = self.mobile.copy()
+        self.free[self.drives.rows, self.drives.axes] = False
+        self.reach = np.array([b.reach for b in blocks])
+        self.gravity = self.mobile * self.inertia * [*scene.gravity, 0.0]
+        self.loads = np.array([[*b.load, 0.0] for b in blocks]) * self.mobile
+        self.ledger = Ledger(self.inertia, self.gravity, self.loads)
+        self.limit = timestep.StepLimit(self.inertia, self.free)
+        held = self.free[:, :2].any(axis=1)
+        self._lightness = held / self.world.mass
+        self.t0, self.n, self.dt = 0.0, 0, step or run.step or 0.0
+        self.step_limit = self.least_limit = np.inf
+        self.balanced, self.motion = True, self.world.motion()
+        if begin:
+            self._begin()
+
+    # ------------------------------------------------------------------ start
+
+    def _begin(self) -> None:
+        self.interfaces.renew(self.motion, self.world.near)
+        self._arrange()
+        slid = np.zeros(self.joints.n)
+        if self.scene.run.seat and self.joints.n:
+            slid = self._seat()
+        for i, block in enumerate(self.scene.blocks):
+            if not block.fixed:
+                self.motion[3:, i] = [*block.velocity, block.spin]
+        points = geometry.evaluate(self.edges, self.motion)
+        self.traction = self.joints.update(self.joints.increments(points.closure, slid))
+        self._check_step(points)
+        if not self.dt:
+            self.dt = self._choose_step()
+        self._require_step()
+        self.motion[3:][self.drives.axes, self.drives.rows] = self.drives.velocity(0.0, self.dt)
+        points = geometry.evaluate(self.edges, self.motion)
+        velocity = self.motion[3:].T
+        forces = self._forces(points, 0.5 * self.dt)
+        self.ledger.start(velocity, forces, self.dt, *self._joint_energies(points))
+        self.motion[3:] += (0.5 * self.dt * forces[0] / self.inertia * self.free).T
+        self.world.place(self.motion)
+
+    def _seat(self) -> np.ndarray:
+        """Move the blocks to where their joints carry them; the joints' first sliding (m)."""
+        points = geometry.evaluate(self.edges, self.motion)
+        rows = self.limit.rows(self.edges, points, self.motion)
+        force = ((self.gravity + self.loads).ravel() * self.limit.root)[self.free.ravel()]
+        area = points.length * self.scene.thickness
+        moved, slid, self.balanced = equilibrium(self.joints, rows, points.closure, area, force)
+        shift = np.zeros(self.free.size)
+        shift[self.free.ravel()] = moved * self.limit.root[self.free.ravel()]
+        self.motion[:3] += shift.reshape(-1, 3).T
+        self.interfaces.renewed_at = self.motion[:3].copy()
+        return slid
+
+    def _choose_step(self) -> float:
+        run, stiffness = self.scene.run, 0.0
+        for curve in self.joints.curves.values():
+            stiffness = max(stiffness, float(curve.at_stress(np.array([run.largest_stress]))[0]))
+        limit = self.step_limit
+        if stiffness:
+            blocks, thick = self.scene.blocks, self.scene.thickness
+            limit = min(
+                limit, timestep.impact_limit(blocks, thick, self.inertia, self.free, stiffness)
+            )
+        if not np.isfinite(limit):
+            raise Refused(
+                "nothing touches at the start, so no time step follows: set run.largest_stress "
+                "(Pa) to the normal stress expected in impacts, or run.step (s)"
+            )
+        return run.fraction * limit
+
+    # ------------------------------------------------------------------- step
+
+    @property
+    def time(self) -> float:
+        """Model time (s)."""
+        return self.t0 + self.n * self.dt
+
+    def step(self) -> None:
+        """One time step. Raises Refused for a state that the method cannot carry."""
+        self.world.step(self.dt, self._at_new_positions)
+
+    def _at_new_positions(self, motion: np.ndarray) -> np.ndarray:
+        """Forces (n, 3) at the positions just reached; velocities are those that led there."""
+        self._require_slow(motion)
+        self.motion, self.n = motion, self.n + 1
+        if self.interfaces.stale(motion) and self.interfaces.renew(motion, self.world.near):
+            self._arrange()
+        points = geometry.evaluate(self.edges, motion)
+        self._require_carried(points)
+        d = self.joints.increments(points.closure, points.along[1] * self.dt)
+        self.traction = self.joints.update(d)
+        forces = self._forces(points, self.dt)
+        if (self._stiffness > self._checked).any():
+            self._check_step(points)
+            self._require_step()
+        self.ledger.step(motion[3:].T, forces, self.dt, *self._joint_energies(points))
+        return forces[0]
+
+    def _forces(self, points: geometry.Points, dt: float) -> np.ndarray:
+        """(3, n, 3): all forces, those of the dashpots, those of the drives."""
+        self.points = points
+        self.area = area = points.length * self.scene.thickness
+        stress, shear = self.traction.T
+        self._stiffness = self.joints.stiffness(stress)
+        push, drag = self._dashpots(points)
+        push = np.maximum(push, -area * stress)  # a dashpot never pulls
+        self.assembly.move(self.motion)
+        forces = np.empty((3, len(self.mobile), 3))
+        forces[1] = self.assembly(points, push, drag)
+        forces[0] = self.assembly(points, area * stress, -area * shear)
+        forces[0] += forces[1] + self.gravity + self.loads
+        forces[0] *= self.mobile
+        forces[1] *= self.mobile
+        forces[2] = 0.0
+        if rows := len(self.drives.rows):
+            at = self.drives.rows, self.drives.axes
+            wanted = self.drives.velocity(self.time, self.dt)
+            needed = self.inertia[at] * (wanted - self.motion[3:].T[at]) / dt - forces[0][at]
+            forces[2][at] = needed[:rows]
+            forces[0][at] += needed
+        return forces
+
+    def _dashpots(self, points: geometry.Points):
+        """Forces of the dashpots along normal and tangent, (k,) each."""
+        run = self.scene.run
+        damping = self._damping()
+        if run.dashpot_shear:
+            stick = 1.0 - self.joints.read("separated") - self.joints.read("slipping")
+        else:
+            stick = 0.0
+        push = -run.dashpot_normal * damping * points.along[0]
+        drag = -run.dashpot_shear * damping * np.maximum(stick, 0.0) * points.along[1]
+        return push, drag
+
+    def _damping(self) -> np.ndarray:
+        """Critical damping (k,) in N s/m: 2 sqrt(stiffness times reduced mass), by share."""
+        return 2.0 * np.sqrt(self.area * self._stiffness * self._share)
+
+    def _joint_energies(self, points: geometry.Points):
+        return self.area, self.joints.read("stored_energy"), self.joints.read("dissipated_energy")
+
+    def _arrange(self) -> None:
+        """Joints, masses and books for a new list of edge pairs."""
+        before = {}
+        if getattr(self, "points", None) is not None:
+            before = dict(zip(self._identity, self.area.tolist(), strict=True))
+        self.edges = self.interfaces.edges
+        self._identity = self.interfaces.of_points
+        self.joints.assign(self._identity)
+        self.assembly = geometry.Assembly(self.edges, len(self.scene.blocks))
+        light = self._lightness[self.edges.a] + self._lightness[self.edges.b]
+        self._share = self.edges.weight / np.where(light > 0, light, np.inf)
+        self._checked = np.zeros(self.joints.n)
+        if before:
+            area = np.array([before.get(who, 0.0) for who in self._identity])
+            energies = self.joints.read("stored_energy"), self.joints.read("dissipated_energy")
+            self.ledger.remember(self.ledger.forces, area, *energies)
+
+    # ----------------------------------------------------------------- guards
+
+    def _check_step(self, points: geometry.Points) -> None:
+        """The step limit (s) of this moment, with headroom for stiffness to grow."""
+        self.area = points.length * self.scene.thickness
+        stress = self.traction[:, 0]
+        now = np.maximum(self.joints.stiffness(stress), self.joints.stiffness_at(points.closure))
+        self._stiffness = now
+        self._checked = HEADROOM * now
+        rows = self.limit.rows(self.edges, points, self.motion)
+        run, damping = self.scene.run, self._damping()
+        self.step_limit = self.limit(
+            rows,
+            np.tile(now * self.area, 2),
+            np.concatenate([run.dashpot_normal * damping, run.dashpot_shear * damping]),
+        )
+        self.least_limit = min(self.least_limit, self.step_limit)
+
+    def _require_step(self) -> None:
+        if self.dt > 0.98 * self.step_limit:
+            raise Refused(
+                f"time step {self.dt:.3g} s: must stay below 0.98 of the limit, which has fallen "
+                f"to {self.step_limit:.3g} s as the joints closed; resume with a smaller step or "
+                "set run.largest_stress (Pa)"
+            )
+
+    def _require_slow(self, motion: np.ndarray) -> None:
+        way = np.abs(motion[3]) + np.abs(motion[4]) + np.abs(motion[5]) * self.reach
+        fastest = int(way.argmax())
+        if not way[fastest] * self.dt < 0.25 * self.skin:  # also true for NaN
+            raise Refused(
+                f"block {self.scene.blocks[fastest].name!r} moves {way[fastest] * self.dt:.3g} m "
+                f"in one step: must stay below {0.25 * self.skin:.3g} m (a quarter of run.skin); "
+                "resume with a smaller step"
+            )
+
+    def _require_carried(self, points: geometry.Points) -> None:
+        m = len(self.edges.first)
+        closure = points.closure * (points.length > 0)
+        limit = np.minimum(*(self.interfaces.depth_limit[b] for b in (self.edges.a, self.edges.b)))
+        if (closure > limit).any():
+            i = int((closure - limit).argmax())
+            self.interfaces.refuse_overlap((self.edges.a[i], self.edges.b[i]), closure[i], limit[i])
+        tilted = np.abs(points.tilt) > np.sin(1.25 * np.radians(5.0))
+        if tilted.any() and (closure[:m] > 0)[tilted].any():
+            raise Refused("edges in contact have turned past 5 degrees: corners are not carried")
+
+    # ------------------------------------------------------------------ states
+
+    def state(self) -> dict:
+        """A copy of everything that the future depends on."""
+        arrays = {
+            "motion": self.motion_after_step(),
+            "renewed_at": self.interfaces.renewed_at.copy(),
+            "keys": np.array(self.interfaces.keys, int).reshape(-1, 4),
+            "forces": self.ledger.forces.copy(),
+            "area": self.ledger.area.copy(),
+            "e_stored": self.ledger.e_stored.copy(),
+            "e_lost": self.ledger.e_lost.copy(),
+            "ledger": np.array([*(self.ledger.value[c] for c in COLUMNS), self.ledger.total0]),
+            "clock": np.array([self.t0, self.n, self.dt, self.step_limit, self.least_limit]),
+        }
+        return {"arrays": arrays, "joints": self.joints.snapshot()}
+
+    def motion_after_step(self) -> np.ndarray:
+        """Positions of now with the velocities that will carry the blocks on (6, n)."""
+        return self.world.motion().copy()
+
+    def restore(self, state: dict, step: float | None = None) -> None:
+        """Return to a state; with `step`, go on from there with another time step."""
+        a = state["arrays"]
+        self.t0, self.n, self.dt, self.step_limit, self.least_limit = a["clock"].tolist()
+        self.n = int(self.n)
+        if step:
+            self.t0, self.n, self.dt = self.time, 0, step
+        self.interfaces.adopt([tuple(k) for k in a["keys"].tolist()])
+        self.interfaces.renewed_at = a["renewed_at"].copy()
+        self.points = None
+        self.joints.restore(state["joints"], self.interfaces.of_points)
+        self._arrange()
+        self.motion = a["motion"].copy()
+        self.traction = self.joints.read("F")
+        self.area = a["area"].copy()
+        self.ledger.value = dict(zip(COLUMNS, a["ledger"].tolist(), strict=False))
+        self.ledger.total0 = float(a["ledger"][-1])
+        self.ledger.remember(
+            a["forces"].copy(), self.area, a["e_stored"].copy(), a["e_lost"].copy()
+        )
+        self.points = geometry.evaluate(self.edges, self.motion)
+        self.world.place(self.motion)
+
+    def save(self, folder: Path, state: dict | None = None) -> None:
+        """Write a state (default: now) and its scene to a folder."""
+        folder.mkdir(parents=True, exist_ok=True)
+        state = state or self.state()
+        np.savez(folder / "blocks.npz", **state["arrays"])
+        joints = self.joints.save(state["joints"], folder)
+        (folder / "joints.json").write_text(json.dumps(joints))
+        (folder / "scene.toml").write_text(self.scene.text)
+
+    @classmethod
+    def load(cls, folder: Path, step: float | None = None) -> Simulation:
+        """Continue from a folder that `save` wrote."""
+        folder = Path(folder)
+        if not (folder / "blocks.npz").is_file():
+            raise ValueError(f"{str(folder)!r} holds no saved state (blocks.npz is missing)")
+        sim = cls(parse((folder / "scene.toml").read_text(), "scene.toml"), begin=False)
+        with np.load(folder / "blocks.npz") as data:
+            arrays = {name: data[name] for name in data.files}
+        joints = sim.joints.load(json.loads((folder / "joints.json").read_text()), folder)
+        sim.restore({"arrays": arrays, "joints": joints}, step)
+        return sim

@@ -87,7 +87,9 @@ class Joints:
             parts.append(value if where is None else value[where])
         if len(self.groups) == 1:
             return parts[0]
-        out = np.zeros((self.n, *(parts[0].shape[1:] if parts else (2,) * (what in ("delta", "F")))))
+        out = np.zeros(
+            (self.n, *(parts[0].shape[1:] if parts else (2,) * (what in ("delta", "F"))))
+        )
         for (_, rows, _), part in zip(self.groups, parts, strict=True):
             out[rows] = part
         return out

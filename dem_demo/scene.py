@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .drives import AXES, Drive
+from .drives import AXES, Back, Drive
 from .laws import build_law
 from .shapes import Block, box, check_convex
+from .tables import SceneError, Table
 
 SCENES = Path(__file__).parent / "scenes"
-
-
-class SceneError(ValueError):
-    """A scene file that cannot be run: says which key, its value, the bound and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -59,56 +55,6 @@ class Scene:
         return self.pairs.get(frozenset((key[0], key[2])), self.default_law)
 
 
-class Table:
-    """A TOML table that knows its place in the file and which of its keys were read."""
-
-    def __init__(self, data: dict[str, Any], where: str) -> None:
-        self.data, self.where, self.known = data, where, set()
-
-    def take(self, key: str, kind, default=..., above=None, least=None, say=""):
-        """A value, checked; `kind` is float, str, bool, list or dict."""
-        self.known.add(key)
-        if key not in self.data:
-            if default is ...:
-                raise SceneError(f"{self.path(key)} is missing{': ' + say if say else ''}")
-            return default
-        value = self.data[key]
-        if kind is float and isinstance(value, int) and not isinstance(value, bool):
-            value = float(value)
-        if not isinstance(value, kind):
-            name = {float: "a number", str: "a text", bool: "true or false", list: "a list"}
-            raise SceneError(f"{self.path(key)} = {value!r}: must be {name.get(kind, 'a table')}")
-        if kind is float and not (np.isfinite(value) or (key == "point_spacing" and value > 0)):
-            raise SceneError(f"{self.path(key)} = {value}: must be finite")
-        if above is not None and not value > above:
-            raise SceneError(f"{self.path(key)} = {value}: must be > {above}{' ' + say}".rstrip())
-        if least is not None and not value >= least:
-            raise SceneError(f"{self.path(key)} = {value}: must be >= {least}{' ' + say}".rstrip())
-        return value
-
-    def vector(self, key: str, default=...):
-        """Two finite numbers."""
-        value = self.take(key, list, default)
-        if value is default:
-            return default
-        numbers = [v for v in value if isinstance(v, (int, float)) and np.isfinite(v)]
-        if len(value) != 2 or len(numbers) != 2:
-            raise SceneError(f"{self.path(key)} = {value!r}: must be two numbers [x, y]")
-        return tuple(float(v) for v in value)
-
-    def path(self, key: str) -> str:
-        """The key with its place in the file."""
-        return f"{self.where}.{key}" if "=" not in self.where else f"{self.where}: {key}"
-
-    def finish(self) -> None:
-        """Refuse keys that nobody asked for."""
-        for key in self.data:
-            if key not in self.known:
-                near = get_close_matches(key, self.known, 1)
-                hint = f"did you mean {near[0]!r}?" if near else "known: " + ", ".join(sorted(self.known))
-                raise SceneError(f"{self.path(key)} is unknown; {hint}")
-
-
 def names() -> list[str]:
     """Scenes that come with the package."""
     return sorted(path.stem for path in SCENES.glob("*.toml"))
@@ -120,7 +66,9 @@ def load(source: str | Path) -> Scene:
     if not (isinstance(source, str) and path.is_file()):
         path = Path(source)
     if not path.is_file():
-        raise SceneError(f"no scene {str(source)!r}: give a TOML file or one of {', '.join(names())}")
+        raise SceneError(
+            f"no scene {str(source)!r}: give a TOML file or one of {', '.join(names())}"
+        )
     return parse(path.read_text(), path.name)
 
 
@@ -209,20 +157,37 @@ def _drives(top: Table, where: str, number: dict[str, int], blocks: list[Block])
         table = Table(data, f"{where}.drive[{n}]")
         block, motion = table.take("block", str), table.take("motion", str)
         if block not in number or blocks[number[block]].fixed:
-            raise SceneError(f"{table.path('block')} = {block!r}: must be a block that is not fixed")
+            raise SceneError(
+                f"{table.path('block')} = {block!r}: must be a block that is not fixed"
+            )
         if motion not in AXES:
             raise SceneError(f"{table.path('motion')} = {motion!r}: must be x, y or turn")
         times, values = (np.array(table.take(key, list), float) for key in ("times", "values"))
         if len(times) != len(values) or len(times) < 1 or (np.diff(times) <= 0).any():
             raise SceneError(f"{table.path('times')}: must increase, one for each of `values`")
-        values = np.radians(values) if motion == "turn" else values
+        unit = np.pi / 180 if motion == "turn" else 1.0
         ease = table.take("ease", float, 0.1, least=0)
-        out.append(Drive(number[block], AXES[motion], tuple(times), tuple(values), ease))
+        way = tuple(times), tuple(unit * values)
+        back = _way_back(table, number, unit)
+        out.append(Drive(number[block], AXES[motion], *way, ease, back))
         table.finish()
     moved = [(d.block, d.axis) for d in out]
     if len(set(moved)) < len(moved):
         raise SceneError(f"{where}.drive: a motion of a block is prescribed twice")
     return tuple(out)
+
+
+def _way_back(table: Table, number: dict[str, int], unit: float) -> Back | None:
+    if not (data := table.take("back", dict, {})):
+        return None
+    back = Table(data, table.path("back"))
+    block = back.take("block", str)
+    if block not in number:
+        raise SceneError(f"{back.path('block')} = {block!r}: no such block")
+    slid = back.take("slid", float, above=0, say="m")
+    by, rate = (back.take(key, float, above=0) * unit for key in ("by", "rate"))
+    back.finish()
+    return Back(number[block], slid, by, rate)
 
 
 def _hold(block: Block, number: int, drives) -> Block:
@@ -263,12 +228,14 @@ def _run(table: Table) -> Run:
     return run
 
 
-def _watch(top: Table, where: str, number: dict[str, int]) -> dict[str, Any]:
-    table = Table(top.take("watch", dict, {}), f"{where}.watch")
-    watch = {"slip": table.take("slip", list, []), "shear": table.take("shear", str, "")}
-    watch["base"] = table.take("base", str, "")
+def _watch(top: Table, where: str, number: dict[str, int]) -> dict[str, list]:
+    """Joints to report on, as pairs of block numbers (moving, base)."""
+    table, out = Table(top.take("watch", dict, {}), f"{where}.watch"), {}
+    for kind in ("slip", "shear"):
+        out[kind] = []
+        for pair in table.take(kind, list, []):
+            if not (isinstance(pair, list) and len(pair) == 2 and set(pair) <= set(number)):
+                raise SceneError(f"{table.path(kind)}: {pair!r} must be [moving block, its base]")
+            out[kind].append((number[pair[0]], number[pair[1]]))
     table.finish()
-    for name in [*watch["slip"], *filter(None, (watch["shear"], watch["base"]))]:
-        if name not in number:
-            raise SceneError(f"{where}.watch: {name!r} is not a block")
-    return watch
+    return out

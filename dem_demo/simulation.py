@@ -127,6 +127,8 @@ class Simulation:
         if (self._stiffness > self._checked).any():
             self._check_step(points)
             self._require_step()
+        if self.drives.waiting and self.n % 16 == 0:
+            self.drives.watch(self.time, self.slid)
         self.ledger.step(motion[3:].T, forces, self.dt, *self._joint_energies(points))
         return forces[0]
 
@@ -169,6 +171,19 @@ class Simulation:
     def _damping(self) -> np.ndarray:
         """Critical damping (k,) in N s/m: 2 sqrt(stiffness times reduced mass), by share."""
         return 2.0 * np.sqrt(self.area * self._stiffness * self._share)
+
+    def slid(self, moving: int, base: int) -> float:
+        """Shear displacement (m) of the joints between two blocks, mean over their area."""
+        here = self.points_between(moving, base)
+        area = self.area[here]
+        if not area.any():
+            return 0.0
+        return abs(float(self.joints.read("delta")[here, 1] @ area / area.sum()))
+
+    def points_between(self, one: int, other: int) -> np.ndarray:
+        """Mask (k,) of the law points between two blocks."""
+        a, b = self.edges.a, self.edges.b
+        return ((a == one) & (b == other)) | ((a == other) & (b == one))
 
     def _joint_energies(self, points: geometry.Points):
         return self.area, self.joints.read("stored_energy"), self.joints.read("dissipated_energy")
@@ -250,6 +265,7 @@ class Simulation:
             "e_stored": self.ledger.e_stored.copy(),
             "e_lost": self.ledger.e_lost.copy(),
             "ledger": np.array([*(self.ledger.value[c] for c in COLUMNS), self.ledger.total0]),
+            "turned_at": self.drives.turned_at.copy(),
             "clock": np.array([self.t0, self.n, self.dt, self.step_limit, self.least_limit]),
         }
         return {"arrays": arrays, "joints": self.joints.snapshot()}
@@ -263,6 +279,7 @@ class Simulation:
         a = state["arrays"]
         self.t0, self.n, self.dt, self.step_limit, self.least_limit = a["clock"].tolist()
         self.n = int(self.n)
+        self.drives.turned_at = a["turned_at"].copy()
         if step:
             self.t0, self.n, self.dt = self.time, 0, step
         self.interfaces.adopt([tuple(k) for k in a["keys"].tolist()])

@@ -92,8 +92,12 @@ def impact_limit(blocks, thickness: float, inertia, free, stiffness: float) -> f
         K = np.zeros((3, 3))
         for arm in (p, q):
             for way in (np.array([1.0, 0.0]), np.array([0.0, 1.0])):
-                j = np.stack([*np.tile(way, (len(arm), 1)).T, arm[:, 0] * way[1] - arm[:, 1] * way[0]])
+                j = np.stack(
+                    [*np.tile(way, (len(arm), 1)).T, arm[:, 0] * way[1] - arm[:, 1] * way[0]]
+                )
                 K += (j * half) @ j.T
         root = 1 / np.sqrt(mass[moves])
-        top = max(top, 2 * float(np.linalg.eigvalsh(K[np.ix_(moves, moves)] * np.outer(root, root))[-1]))
+        top = max(
+            top, 2 * float(np.linalg.eigvalsh(K[np.ix_(moves, moves)] * np.outer(root, root))[-1])
+        )
     return 2 / np.sqrt(top)

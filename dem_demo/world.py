@@ -48,7 +48,9 @@ class World:
             self.bodies.append(body)
             self._number[shape] = i
         self.space.on_collision(1, 1, begin=self._begin, separate=self._separate)
-        mover = next(body for body, block in zip(self.bodies, blocks, strict=True) if not block.fixed)
+        mover = next(
+            body for body, block in zip(self.bodies, blocks, strict=True) if not block.fixed
+        )
         self._hook = pymunk.SimpleMotor(mover, self.space.static_body, 0.0)
         self._hook.max_force = 0.0
         self.space.add(self._hook)

@@ -1,0 +1,230 @@
+"""Pictures of a run: what slides, what opens, what carries, and where the energy went."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from PIL import Image
+
+from .energy import COLUMNS
+from .record import Record
+from .shapes import turn
+
+CLOSURE, SHEAR, STRESS, TAU, SLIDING, SLIPPING, SEPARATED, LENGTH = range(8)
+FIXED, DRIVEN, FREE, OPEN, SLIDES = "#8d8d8d", "#b9b4a7", "#efe9dc", "#1f9ed1", "#d81b1b"
+MAP = "viridis"
+FRAMES = 60  # most frames of an animation
+
+
+class Scale:
+    """What colours and widths mean, the same in every frame: friction angle and stress."""
+
+    def __init__(self, record: Record, frames) -> None:
+        values = np.concatenate([record.joints[i]["values"] for i in frames])
+        closed = values[values[:, STRESS] > 0]
+        angle = np.degrees(np.arctan2(np.abs(closed[:, TAU]), closed[:, STRESS]))
+        self.stress = float(np.percentile(closed[:, STRESS], 98)) if len(closed) else 1.0
+        firm = angle[closed[:, STRESS] > 0.02 * self.stress]
+        top = max(5.0, np.ceil(float(firm.max(initial=0.0)) / 5 - 1e-6) * 5)
+        self.angle = Normalize(0.0, top)
+        corners = np.concatenate([_outline(record, i, b) for i in frames for b in _all(record)])
+        self.low, self.high = corners.min(axis=0), corners.max(axis=0)
+        self.size = float(max(self.high - self.low))
+
+    def width(self, stress):
+        """Line width (points) of a normal stress (Pa)."""
+        return 1.0 + 8.0 * np.sqrt(np.clip(np.asarray(stress) / self.stress, 0, 1.2))
+
+
+def draw(axes, record: Record, i: int, scale: Scale) -> None:
+    """The blocks and joints of frame i."""
+    blocks = record.scene.blocks
+    start = [_outline(record, 0, b) for b in _all(record) if not blocks[b].fixed]
+    axes.add_collection(
+        PolyCollection(start, facecolors="none", edgecolors="0.6", linestyles=":", linewidths=0.8)
+    )
+    colours = [FIXED if b.fixed else DRIVEN if len(b.held) > 1 else FREE for b in blocks]
+    shapes = [_outline(record, i, b) for b in _all(record)]
+    axes.add_collection(
+        PolyCollection(shapes, facecolors=colours, edgecolors="0.35", linewidths=0.7)
+    )
+    if len(blocks) <= 12:
+        for block, shape in zip(blocks, shapes, strict=True):
+            if not block.fixed:
+                axes.annotate(block.name, shape.mean(axis=0), ha="center", va="center", fontsize=8)
+    frame = record.joints[i]
+    values, ends = frame["values"], frame["ends"]
+    closed = values[:, STRESS] > 1e-3 * scale.stress
+    gap = ~closed & (values[:, CLOSURE] > -0.05 * scale.size)
+    angle = np.degrees(np.arctan2(np.abs(values[:, TAU]), values[:, STRESS]))
+    carried = LineCollection(ends[closed], cmap=MAP, norm=scale.angle, zorder=3)
+    carried.set_array(angle[closed])
+    carried.set_linewidths(scale.width(values[closed, STRESS]))
+    axes.add_collection(carried)
+    axes.add_collection(
+        LineCollection(ends[gap], colors=OPEN, linestyles=(0, (2, 2)), linewidths=1.4, zorder=3)
+    )
+    sliding = closed & (values[:, SLIPPING] > 0.9 * (1 - values[:, SEPARATED]))
+    middle = ends[sliding].mean(axis=1)
+    axes.plot(*middle.T, "D", ms=6, mfc="white", mec=SLIDES, mew=1.6, zorder=4, clip_on=False)
+    axes.set_xlim(scale.low[0] - 0.04 * scale.size, scale.high[0] + 0.04 * scale.size)
+    axes.set_ylim(scale.low[1] - 0.04 * scale.size, scale.high[1] + 0.04 * scale.size)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x (m)")
+    axes.set_ylabel("y (m)")
+
+
+def frame_figure(record: Record, i: int, scale: Scale, dpi: int) -> Figure:
+    """One frame with its colour bar and legend."""
+    shape = (scale.high - scale.low) / scale.size
+    figure = Figure(figsize=(8.4, float(np.clip(7.0 * shape[1] + 1.9, 3.4, 8.0))), dpi=dpi)
+    FigureCanvasAgg(figure)
+    figure.set_layout_engine("constrained")
+    axes = figure.add_subplot()
+    draw(axes, record, i, scale)
+    bar = figure.colorbar(ScalarMappable(scale.angle, MAP), ax=axes, shrink=0.85, pad=0.02)
+    bar.set_label("mobilised friction angle (degrees)")
+    marks = [
+        Line2D([], [], color="0.3", lw=scale.width(s), label=f"{s / 1e3:.3g} kPa")
+        for s in _round(scale.stress) * np.array([0.25, 1.0])
+    ]
+    marks += [
+        Line2D([], [], ls="", marker="D", mfc="white", mec=SLIDES, mew=1.6, label="sliding"),
+        Line2D([], [], color=OPEN, ls=(0, (2, 2)), lw=1.4, label="open"),
+        Line2D([], [], color="0.6", ls=":", lw=0.9, label="at start"),
+    ]
+    figure.legend(
+        handles=marks, loc="outside lower center", ncols=5, fontsize=8, frameon=False,
+        title="joints: normal stress as width", title_fontsize=8,
+    )  # fmt: skip
+    axes.set_title(f"{record.scene.title}\n{caption(record, i)}", fontsize=10)
+    return figure
+
+
+def caption(record: Record, i: int) -> str:
+    """Time and what is watched, for the title of a frame."""
+    parts = [f"t = {record.times[i]:.2f} s"]
+    row = record.watched[i]
+    for moving, _ in record.scene.watch.get("slip", []):
+        name = record.scene.blocks[moving].name
+        angle, slid = row[f"{name}: base angle_deg"], 1e3 * abs(row[f"{name}: slid_m"])
+        parts.append(f"{name}: base at {angle:.2f}°, slid {slid:.2f} mm")
+    for moving, _ in record.scene.watch.get("shear", []):
+        name = record.scene.blocks[moving].name
+        slid, tau = 1e3 * row[f"{name}: slid_m"], 1e-3 * row[f"{name}: shear_Pa"]
+        parts.append(f"{name}: slid {slid:.2f} mm, shear stress {tau:.1f} kPa")
+    return "   ".join(parts)
+
+
+def final(record: Record, path: Path) -> None:
+    """The last frame as PNG."""
+    last = len(record.times) - 1
+    frame_figure(record, last, Scale(record, [0, last]), 130).savefig(path)
+
+
+def motion(record: Record, path: Path) -> None:
+    """The whole run as GIF."""
+    n = len(record.times)
+    frames = np.unique(np.linspace(0, n - 1, min(n, FRAMES)).round().astype(int))
+    scale, images = Scale(record, frames), []
+    for i in frames:
+        figure = frame_figure(record, i, scale, 75)
+        figure.canvas.draw()
+        image = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3])
+        images.append(image.quantize(128, dither=Image.Dither.NONE))
+    pause = [90] * (len(images) - 1) + [2000]
+    images[0].save(path, save_all=True, append_images=images[1:], duration=pause, loop=0)
+
+
+def energy(record: Record, path: Path) -> None:
+    """Where the energy is and went, and how well the books balance."""
+    t, table = np.array(record.times), np.array(record.energy)
+    figure = Figure(figsize=(8, 7.5), dpi=120, layout="constrained")
+    top, middle, low = figure.subplots(3, sharex=True, height_ratios=[3, 3, 2])
+    of = dict(zip([*COLUMNS, "error"], table.T, strict=True))
+    labels = {
+        "potential": "potential (gravity)", "work": "work of drives and loads",
+        "kinetic": "kinetic", "stored": "stored in joints", "friction": "friction in joints",
+        "dashpots": "dashpots", "area": "changing overlap area",
+    }  # fmt: skip
+    for number, (name, label) in enumerate(labels.items()):
+        top.plot(t, of[name], label=label, color=f"C{number}")
+        if name not in ("potential", "work"):
+            size = np.abs(of[name])
+            middle.semilogy(t, np.where(size > 0, size, np.nan), color=f"C{number}")
+    top.set_ylabel("energy (J)")
+    top.legend(fontsize=8, ncols=2)
+    top.set_title(f"{record.scene.title}: energy")
+    middle.set_ylabel("size of energy (J)")
+    peak = float(np.nanmax(np.abs(table[:, 2:6]), initial=1e-12))
+    middle.set_ylim(max(1e-9 * peak, 1e-12), 3 * peak)
+    low.plot(t, 1e6 * of["error"], color="k")
+    low.set_ylabel("imbalance /\nenergy turned over ($10^{-6}$)")
+    low.set_xlabel("time (s)")
+    for axes in (top, middle, low):
+        axes.grid(alpha=0.3)
+    figure.savefig(path)
+
+
+def curves(record: Record, path: Path, slips: list[dict]) -> None:
+    """Tilt: base angle against sliding. Shear: stress and dilation against sliding."""
+    watch, blocks = record.scene.watch, record.scene.blocks
+    shear = bool(watch["shear"])
+    figure = Figure(figsize=(8, 7 if shear else 4.8), dpi=120, layout="constrained")
+    if shear:
+        upper, lower = figure.subplots(2, sharex=True)
+        for moving, _ in watch["shear"]:
+            name = blocks[moving].name
+            slid = 1e3 * record.column(f"{name}: slid_m")
+            upper.plot(slid, 1e-3 * record.column(f"{name}: shear_Pa"), label=f"{name} (blocks)")
+            closure = record.column(f"{name}: closure_m")
+            lower.plot(slid, 1e3 * (closure[0] - closure))
+        upper.set_ylabel("shear stress (kPa)")
+        upper.set_title(record.scene.title)
+        lower.set_ylabel("dilation since seating (mm)")
+        lower.set_xlabel("shear displacement (mm)")
+        both = (upper, lower)
+    else:
+        axes = figure.subplots()
+        for number, entry in enumerate(slips):
+            name, colour = entry["block"], f"C{number}"
+            slid = 1e3 * np.abs(record.column(f"{name}: slid_m"))
+            angle = record.column(f"{name}: base angle_deg")
+            axes.semilogx(np.maximum(slid, 1e-4), angle, color=colour, label=f"{name}, blocks")
+            axes.axhline(
+                entry["predicted_angle"], color=colour, ls="--", lw=1,
+                label=f"{name}, peak of the law alone: {entry['predicted_angle']:.2f}°",
+            )  # fmt: skip
+            if entry["slip_angle"] is not None:
+                axes.plot(1e3 * entry["slip_distance"], entry["slip_angle"], "o", color=colour)
+        axes.axvline(1e3 * slips[0]["slip_distance"], color="0.5", lw=1, ls=":")
+        axes.set_xlabel("shear displacement (mm); dotted: critical slip distance")
+        axes.set_ylabel("angle of the base (degrees)")
+        axes.set_title(record.scene.title)
+        both = (axes,)
+    both[0].legend(fontsize=8)
+    for axes in both:
+        axes.grid(alpha=0.3)
+    figure.savefig(path)
+
+
+def _all(record: Record) -> range:
+    return range(len(record.scene.blocks))
+
+
+def _outline(record: Record, i: int, b: int) -> np.ndarray:
+    x, y, angle = record.motion[i][:3, b]
+    return record.scene.blocks[b].local @ turn(angle).T + [x, y]
+
+
+def _round(value: float) -> float:
+    """One leading digit of 1, 2 or 5."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(power * max(d for d in (1, 2, 5) if d * power <= value * (1 + 1e-9)))

@@ -10,12 +10,17 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+# Types that float() would take, but that nobody means as a number ("3" in a file, a flag)
+_NO_NUMBERS = (bool, np.bool_, str, bytes, complex, np.complexfloating)
+
 
 def number(name: str, value: Any, *, infinite: bool = False) -> float:
     """Return `value` as a float, or say which parameter is not a finite real number."""
     try:
+        if isinstance(value, _NO_NUMBERS) or np.ndim(value) != 0:
+            raise TypeError
         result = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{name} = {value!r} is not a number; give a real number") from None
     if math.isnan(result) or (math.isinf(result) and not infinite):
         raise ValueError(f"{name} = {result} is not finite; give a finite number")
@@ -26,7 +31,7 @@ def above(name: str, value: Any, bound: float, *, infinite: bool = False) -> flo
     """Return `value` as a float that is strictly larger than `bound`."""
     result = number(name, value, infinite=infinite)
     if not result > bound:
-        raise ValueError(f"{name} = {result:g} is out of bounds: it must be > {bound:g}")
+        raise ValueError(f"{name} = {result!r} is out of bounds: it must be > {bound:g}")
     return result
 
 
@@ -34,7 +39,7 @@ def at_least(name: str, value: Any, bound: float, *, infinite: bool = False) -> 
     """Return `value` as a float that is not smaller than `bound`."""
     result = number(name, value, infinite=infinite)
     if not result >= bound:
-        raise ValueError(f"{name} = {result:g} is out of bounds: it must be >= {bound:g}")
+        raise ValueError(f"{name} = {result!r} is out of bounds: it must be >= {bound:g}")
     return result
 
 
@@ -52,3 +57,15 @@ def whole(name: str, value: Any, bound: int) -> int:
             f"{name} = {value!r} is out of bounds: it must be a whole number >= {bound}"
         )
     return int(value)
+
+
+def numbers(name: str, value: Any, unit: str) -> Array:
+    """Return `value` as an array of floats, finite or not; text, flags and objects are refused."""
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind not in "iuf":
+            raise TypeError
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name} = {value!r} is not an array of numbers ({unit})") from None
+    with np.errstate(over="ignore"):  # from long double: reported as not finite by the caller
+        return np.asarray(array, float)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import csv
-import math
+import json
 import os
 import tomllib
-from dataclasses import fields
+from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
@@ -72,13 +72,21 @@ def write_law(law: JointLaw, path: Path | None) -> str:
 
 
 def read_law(cls: type[JointLaw], source: str | Path) -> JointLaw:
-    """A law from a TOML file, or from TOML text (anything with a line break)."""
-    if isinstance(source, str) and ("\n" in source or "=" in source):
+    """A law from a TOML file, or from TOML text (a line break, or "=" and no such file)."""
+    if isinstance(source, str) and _is_text(source):
         return build_law(cls, _parse(source, "TOML text"), "TOML text")
     path = Path(source)
     if not path.is_file():
         raise ValueError(f"law file {str(path)!r} does not exist; give a TOML file of parameters")
-    return build_law(cls, _parse(path.read_text(), str(path)), str(path), path.parent)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{str(path)!r} is not a text file in UTF-8: {error}") from None
+    return build_law(cls, _parse(text, str(path)), str(path), path.parent)
+
+
+def _is_text(source: str) -> bool:
+    return "\n" in source or ("=" in source and not Path(source).is_file())
 
 
 def build_law(
@@ -88,7 +96,7 @@ def build_law(
     _known(data, _LAW_KEYS | {_ABOUT}, where, "")
     for key in ("orientation", "asperity", "asperity_density"):
         if key not in data:
-            raise ValueError(f"{where}: key {key!r} is missing")
+            raise ValueError(f"{where}: key {key!r} is missing; a law needs it")
     values = {key: value for key, value in data.items() if key != _ABOUT}
     values["orientation"] = _part(Orientation, data["orientation"], where, "orientation")
     values["asperity"] = _part(Asperity, data["asperity"], where, "asperity")
@@ -122,13 +130,13 @@ def _part(kind: type[T], data: Any, where: str, path: str) -> T:
     """One of the parameter classes from its table."""
     if not isinstance(data, dict):
         raise ValueError(f"{where}: key {path!r} must be a table")
-    allowed = {f.name for f in fields(cast(Any, kind)) if f.init}
-    _known(data, allowed, where, path + ".")
+    allowed = {f.name: f.default is MISSING for f in fields(cast(Any, kind)) if f.init}
+    _known(data, set(allowed), where, path + ".")
+    missing = [name for name, required in allowed.items() if required and name not in data]
+    if missing:
+        raise ValueError(f"{where}: key '{path}.{missing[0]}' is missing; table {path!r} needs it")
     try:
         return kind(**data)
-    except TypeError as error:
-        missing = str(error).rsplit(":", 1)[-1].strip()
-        raise ValueError(f"{where}: table {path!r} lacks {missing}") from None
     except ValueError as error:
         raise ValueError(f"{where}: {error}") from None
 
@@ -149,7 +157,7 @@ def _parse(text: str, where: str) -> dict[str, Any]:
 
 
 def _num(value: float) -> str:
-    return "inf" if math.isinf(value) else repr(float(value))
+    return repr(float(value))  # inf and -inf are TOML too
 
 
 def _write_histogram(heights: Heights, path: Path | None) -> list[str]:
@@ -160,12 +168,13 @@ def _write_histogram(heights: Heights, path: Path | None) -> list[str]:
     rows = [f"{low!r},{high!r},{n!r}" for low, high, n in zip(edges, edges[1:], counts)]  # noqa: B905
     text = "lower_m,upper_m,count\n" + "\n".join(rows) + "\n"
     replace_file(csv_path, text.encode())
-    return [f'histogram = "{csv_path.name}"  # lower edge (m), upper edge (m), count']
+    name = json.dumps(csv_path.name, ensure_ascii=False)
+    return [f"histogram = {name}  # lower edge (m), upper edge (m), count"]
 
 
 def _read_histogram(path: Path, where: str) -> tuple[list[float], list[float]]:
     try:
-        with path.open(newline="") as stream:
+        with path.open(newline="", encoding="utf-8") as stream:
             rows = list(csv.DictReader(stream))
         lower = np.array([float(row["lower_m"]) for row in rows])
         upper = np.array([float(row["upper_m"]) for row in rows])

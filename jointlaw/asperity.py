@@ -44,7 +44,7 @@ class Asperity:
         G, R = above("G", G, 0.0), above("R", R, 0.0)
         nu = number("nu", nu)
         if not 0.0 <= nu <= 0.5:
-            raise ValueError(f"nu = {nu:g} is out of bounds: 0 <= nu <= 0.5")
+            raise ValueError(f"nu = {nu!r} is out of bounds: 0 <= nu <= 0.5")
         K = 8 * G * math.sqrt(R) / (3 * (2 - nu))
         return cls(K=K, lam=(2 - nu) / (2 * (1 - nu)), eta=0.5, mu=mu)
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
+import re
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from . import presets, units
+from . import __version__, presets, units
+from ._checks import number
 from ._toml import replace_file
 from .joint import JointBatch
 from .law import JointLaw
@@ -25,19 +28,33 @@ from .state import JointState, NonFiniteError, read_replay
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status."""
     parser = argparse.ArgumentParser(
-        prog="jointlaw", description="A micromechanical, anisotropic, path-dependent rock joint."
+        prog="jointlaw",
+        description="A micromechanical, anisotropic, path-dependent rock joint.",
+        epilog="each command has its own help with an example: jointlaw shear --help",
     )
+    parser.add_argument("--version", action="version", version=f"jointlaw {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _add_shear(commands)
     _add_closure(commands)
     _add_presets(commands)
     _add_replay(commands)
-    options = parser.parse_args(arguments)
+    options = parser.parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
     try:
         return int(options.run(options))
     except (ValueError, ImportError, OSError) as error:
         print(f"jointlaw {options.command}: {error}", file=sys.stderr)
         return 2
+
+
+def _joined(arguments: Sequence[str]) -> list[str]:
+    """Arguments with "--reverse -2um" joined to "--reverse=-2um", lest -2um pass for an option."""
+    joined: list[str] = []
+    for argument in arguments:
+        if joined and re.match(r"--[a-z-]+$", joined[-1]) and re.match(r"-[.\d]", argument):
+            joined[-1] += "=" + argument
+        else:
+            joined.append(argument)
+    return joined
 
 
 # -------------------------------------------------------------------- shear
@@ -48,44 +65,68 @@ def _add_shear(commands: Any) -> None:
         commands,
         "shear",
         "direct shear test: seat the joint at a normal stress, shear it, write curve and picture",
-        "jointlaw shear biegel-rough --normal-stress 10MPa --to 2um --reverse=-2um --out out",
+        "jointlaw shear biegel-rough --normal-stress 10MPa --to 2um --reverse -2um --out out",
     )
     parser.add_argument("law", metavar="PRESET_OR_FILE", help="preset name or TOML file")
-    parser.add_argument("--normal-stress", default="10MPa", help="normal stress (default 10MPa)")
-    parser.add_argument("--to", required=True, help="shear displacement, such as 2um")
+    parser.add_argument(
+        "--normal-stress", metavar="STRESS", default="10MPa", help="normal stress (default 10MPa)"
+    )
+    parser.add_argument(
+        "--to", metavar="LENGTH", required=True, help="shear displacement, such as 2um"
+    )
     parser.add_argument(
         "--reverse",
+        metavar="LENGTHS",
         default="",
-        help="further turning points, separated by commas: --reverse=-2um,0",
+        help="further turning points, separated by commas: --reverse -2um,0",
     )
-    parser.add_argument("--azimuth", default="0", help="direction of shear, such as 30deg")
-    parser.add_argument("--control", choices=CONTROLS, default="stress", help="normal condition")
-    parser.add_argument("--normal-stiffness", help="for --control stiffness, such as 5GPa/m")
+    parser.add_argument(
+        "--azimuth",
+        metavar="ANGLE",
+        default="0",
+        help="direction of shear from axis 2 towards axis 3, such as 30deg (default 0)",
+    )
+    parser.add_argument(
+        "--control",
+        choices=CONTROLS,
+        default="stress",
+        help="keep the normal stress (default), let it grow with dilation by --normal-stiffness, "
+        "or keep the closure",
+    )
+    parser.add_argument(
+        "--normal-stiffness",
+        metavar="STIFFNESS",
+        help="of the surroundings, for --control stiffness, such as 5GPa/m",
+    )
     _common(parser, steps=200)
     parser.set_defaults(run=_shear)
 
 
 def _shear(options: argparse.Namespace) -> int:
     law = _law(options)
-    points = [options.to, *(p for p in options.reverse.split(",") if p.strip())]
-    stiffness = options.normal_stiffness
+    points = [_quantity("--to", options.to, "m")]
+    if options.reverse:
+        points += [_quantity("--reverse", p, "m") for p in options.reverse.split(",")]
+    stiffness = None
+    if options.normal_stiffness is not None:
+        stiffness = _quantity("--normal-stiffness", options.normal_stiffness, "Pa/m")
+    if (options.control == "stiffness") != (stiffness is not None):
+        raise ValueError("--control stiffness and --normal-stiffness go together; give both")
+    normal = _quantity("--normal-stress", options.normal_stress, "Pa", positive=True)
+    azimuth = _quantity("--azimuth", options.azimuth, "rad")
     try:
         record = direct_shear(
-            law.joint(),
-            [units.parse(p, "m") for p in points],
-            normal=units.parse(options.normal_stress, "Pa"),
-            control=options.control,
-            azimuth=units.parse(options.azimuth, "rad"),
-            stiffness=None if stiffness is None else units.parse(stiffness, "Pa/m"),
-            steps=options.steps,
+            law.joint(), points, normal, options.control, azimuth, stiffness, options.steps
         )
     except PathError as error:
         return _stopped(error, law, options, "shear")
     _write(record, law, options, "shear")
+    secant = record.secant_stiffness
     print(
         f"peak friction angle {record.peak_friction_angle:.2f} deg, at the end "
         f"{record.residual_friction_angle:.2f} deg, largest dilation angle "
-        f"{record.dilation_angle:.2f} deg, secant stiffness {record.secant_stiffness:.4g} Pa/m"
+        f"{record.dilation_angle:.2f} deg"
+        + ("" if math.isnan(secant) else f", secant shear stiffness {secant:.4g} Pa/m")
     )
     return 0
 
@@ -102,7 +143,10 @@ def _add_closure(commands: Any) -> None:
     )
     parser.add_argument("law", metavar="PRESET_OR_FILE", help="preset name or TOML file")
     parser.add_argument(
-        "--normal-stress", default="20MPa", help="largest normal stress, one per cycle: 5MPa,20MPa"
+        "--normal-stress",
+        metavar="STRESSES",
+        default="20MPa",
+        help="largest normal stress (default 20MPa), or one per cycle: 5MPa,20MPa",
     )
     parser.add_argument("--no-unload", action="store_true", help="stop at the largest stress")
     _common(parser, steps=100)
@@ -111,7 +155,10 @@ def _add_closure(commands: Any) -> None:
 
 def _closure(options: argparse.Namespace) -> int:
     law = _law(options)
-    stresses = [units.parse(s, "Pa") for s in options.normal_stress.split(",")]
+    stresses = [
+        _quantity("--normal-stress", s, "Pa", positive=True)
+        for s in options.normal_stress.split(",")
+    ]
     try:
         record = closure_test(
             law.joint(), stresses, unload=not options.no_unload, steps=options.steps
@@ -171,7 +218,9 @@ def _replay(options: argparse.Namespace) -> int:
     try:
         F, _ = batch.trial(d.T, tangent=bool(data["tangent"]))
     except NonFiniteError as error:
-        print(f"fails again: {error}")
+        if error.replay is not None:  # the same file once more
+            error.replay.unlink(missing_ok=True)
+        print("fails again: the result is not finite")
         return 1
     print(f"passes: F = {F} Pa")
     return 0
@@ -182,15 +231,35 @@ def _replay(options: argparse.Namespace) -> int:
 
 def _command(commands: Any, name: str, what: str, example: str) -> argparse.ArgumentParser:
     parser: argparse.ArgumentParser = commands.add_parser(
-        name, help=what, description=what, epilog=f"example: {example}"
+        name,
+        help=what,
+        description=what,
+        epilog=f"example:\n  {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     return parser
 
 
 def _common(parser: argparse.ArgumentParser, steps: int) -> None:
     parser.add_argument("--resolution", choices=tuple(NAMED), help="instead of the law's own")
-    parser.add_argument("--steps", type=int, default=steps, help=f"per leg (default {steps})")
-    parser.add_argument("--out", type=Path, required=True, help="folder for the results")
+    parser.add_argument(
+        "--steps", metavar="N", type=int, default=steps, help=f"steps per leg (default {steps})"
+    )
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, required=True, help="folder for the results"
+    )
+
+
+def _quantity(option: str, text: str, unit: str, *, positive: bool = False) -> float:
+    """The SI value of an option, named in errors."""
+    try:
+        value = units.parse(text, unit)
+    except ValueError as error:
+        raise ValueError(f"{option}: {error}") from None
+    number(option, value)
+    if positive and value <= 0:
+        raise ValueError(f"{option} = {text} is out of bounds: it must be > 0 {unit}")
+    return value
 
 
 def _law(options: argparse.Namespace) -> JointLaw:
@@ -205,8 +274,9 @@ def _write(record: Record, law: JointLaw, options: argparse.Namespace, name: str
     record.to_csv(folder / f"{name}.csv")
     record.to_npz(folder / f"{name}.npz")
     law.to_toml(folder / "law.toml")
-    settings = {k: str(v) for k, v in vars(options).items() if k not in ("run", "out")}
-    summary = {"settings": settings, "result": record.summary(), "units": UNITS}
+    settings = {k: v for k, v in vars(options).items() if k not in ("run", "out")}
+    result = {k: v if math.isfinite(v) else None for k, v in record.summary().items()}
+    summary = {"settings": settings, "result": result, "units": UNITS}
     replace_file(folder / "summary.json", (json.dumps(summary, indent=2) + "\n").encode())
     files = [f"{name}.csv", f"{name}.npz", "law.toml", "summary.json"]
     try:

@@ -18,13 +18,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import special
 
 from ._checks import Array
+from ._formation import factor
 from .heights import HeightDistribution
 
 TABLE_ERROR = 1e-10  # asked of S, relative to its largest value
 WORST_ERROR = 1e-6  # refused beyond
+_FARTHEST = 1e300  # m; S is 1 long before
 _CELLS = (128, 256, 512, 1024, 2048, 4096, 8192)
 
 
@@ -69,7 +70,8 @@ class Curve(NamedTuple):
 
     def _cell(self, y: Array) -> tuple[Array, Array, Array, Array]:
         """Place within its cell, cell number, t and 1 - t of each y."""
-        v = np.sqrt(np.maximum(y, 0.0))
+        # the bounds keep the place in the table for an infinite or NaN y, whose force shows it
+        v = np.sqrt(np.fmin(np.fmax(y, 0.0), _FARTHEST))
         t, s = v / (v + self.scale), self.scale / (v + self.scale)
         cells = len(self.S)
         i = np.minimum((t * cells).astype(np.intp), cells - 1)
@@ -77,7 +79,7 @@ class Curve(NamedTuple):
 
     def _weight(self, y: Array) -> Array:
         """t (1 - t)/2 times the number of cells: D in units of the place within a cell."""
-        v = np.sqrt(np.maximum(y, 0.0))
+        v = np.sqrt(np.fmin(np.fmax(y, 0.0), _FARTHEST))
         return 0.5 * len(self.S) * v * self.scale / (v + self.scale) ** 2
 
 
@@ -100,7 +102,7 @@ def virgin_curve(eta: float, heights: HeightDistribution | None, range_: float) 
         t = np.arange(2 * cells + 1) / (2 * cells)  # nodes and, between them, the points that test
         with np.errstate(divide="ignore"):
             y = (scale * t / (1 - t)) ** 2
-        S, DS = _factor(y, eta, heights, beyond)
+        S, DS = factor(y, eta, heights, beyond)
         St = np.zeros_like(t)  # S is smooth in y, hence flat in t at both ends
         St[1:-1] = 2 * DS[1:-1] / (t * (1 - t))[1:-1]
         table = _hermite(S[::2], St[::2] / cells)
@@ -110,8 +112,9 @@ def virgin_curve(eta: float, heights: HeightDistribution | None, range_: float) 
             break
     if not error < WORST_ERROR:
         raise ValueError(
-            f"heights are too narrow against the overlap of {r0:g} m to tabulate: the virgin curve "
-            f"is off by {error:.1e} with {cells} cells; drop them (heights=None) or widen them"
+            f"heights cannot be tabulated: the virgin curve is off by {error:.1e} with {cells} "
+            f"cells; they rise too steeply at the overlap of {r0:g} m (widen them, or drop them "
+            "with heights=None) or have too long a tail (cut it)"
         )
     return Curve(eta, scale, table, _energy_table(eta, scale, table), error)
 
@@ -121,84 +124,20 @@ def exact_force(y: Array, eta: float, heights: HeightDistribution | None) -> tup
     if heights is None:
         return y ** (1 + eta), (1 + eta) * y**eta
     points = heights.breakpoints()
-    S, DS = _factor(y, eta, heights, points[points > heights.overlap] - heights.overlap)
+    S, DS = factor(y, eta, heights, points[points > heights.overlap] - heights.overlap)
     return y ** (1 + eta) * S, y**eta * ((1 + eta) * S + DS)
 
 
-def _factor(
-    y: Array, eta: float, heights: HeightDistribution, beyond: Array
-) -> tuple[Array, Array]:
-    """S and D S at y >= 0, infinity included; `beyond` holds the breakpoints above the overlap."""
-    r0 = heights.overlap
-    S, DS = np.ones_like(y), np.zeros_like(y)
-    finite = np.isfinite(y)
-    yf = y[finite]
-    if heights.formation == "population":
-        S[finite] = heights.cdf(r0 + yf)
-        with np.errstate(invalid="ignore"):  # 0 times an infinite density at r = 0
-            DS[finite] = np.where(yf > 0, yf * heights.pdf(r0 + yf), 0.0)
-        return S, DS
-    base = float(heights.cdf(r0))
-    grown, slope = _individual(yf, eta, heights, beyond)
-    S[finite] = base + grown
-    DS[finite] = (1 + eta) * (slope - grown)
-    return S, DS
-
-
-def _individual(
-    y: Array, eta: float, heights: HeightDistribution, beyond: Array
-) -> tuple[Array, Array]:
-    """int_0^y H(r0 + s) (1 - s/y)^p ds for p = 1 + eta and p = eta.
-
-    Gauss-Legendre on panels between the breakpoints, and a Gauss-Jacobi rule that knows the power
-    on the panel in which y lies together with the one below it, so that the end singularity of
-    (1 - s/y)^p is never seen by an ordinary rule.
-    """
-    r0 = heights.overlap
-    edges = _panels(r0, beyond)
-    x, w = np.polynomial.legendre.leggauss(16)
-    x, w = 0.5 * (x + 1), 0.5 * w
-    widths = np.diff(edges)
-    nodes = edges[:-1, None] + widths[:, None] * x
-    mass = widths[:, None] * w * heights.pdf(r0 + nodes)
-    panel = np.searchsorted(edges, y, side="left") - 1  # edges[panel] < y
-    panel = np.minimum(panel, len(widths))  # beyond the last edge every panel is an ordinary one
-    start = edges[np.maximum(panel - 1, 0)]
-    start = np.where(panel >= len(widths), edges[np.minimum(panel, len(edges) - 1)], start)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.clip(1 - nodes.ravel() / y[:, None], 0.0, None)
-    below = (
-        np.repeat(np.arange(len(widths)), 16)
-        < np.where(panel >= len(widths), len(widths), panel - 1)[:, None]
-    )
-    ratio = np.where(below & (y[:, None] > 0), ratio, 0.0)
-    power = np.where(ratio > 0, ratio**eta, 0.0)
-    results = []
-    for p, bed in ((1 + eta, power * ratio), (eta, power)):
-        far = bed @ mass.ravel()
-        xj, wj = special.roots_jacobi(40, p, 0.0)
-        xj, wj = 0.5 * (xj + 1), wj / 2 ** (p + 1)
-        span = np.maximum(y - start, 0.0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share = np.where(y > 0, span / y, 0.0)
-        near = span * share**p * (heights.pdf(r0 + start[:, None] + span[:, None] * xj) @ wj)
-        results.append(far + np.where(panel < len(widths), near, 0.0))
-    return results[0], results[1]
-
-
-def _panels(r0: float, beyond: Array) -> Array:
-    """Panel edges in s = r - r0: the breakpoints, and halvings towards r = 0 (H may blow up)."""
-    if beyond.size == 0:
-        return np.array([0.0, 1.0])
-    top = r0 + beyond[-1]
-    halvings = top * 0.5 ** np.arange(1.0, 50.0)
-    edges = np.concatenate([[0.0], beyond, halvings[halvings > r0] - r0])
-    return np.unique(edges)
-
-
 def _hermite(value: Array, slope: Array) -> Array:
-    """Cubic coefficients (cells, 4) through node values and slopes per cell."""
+    """Cubic coefficients (cells, 4) through rising node values and slopes per cell.
+
+    Slopes are held below three times the rise of either neighbour, so that the cubics rise too:
+    where nearly no asperity touches yet, S grows too steeply for its cells, and an overshoot below
+    zero would be tension.
+    """
     rise = np.diff(value)
+    most = 3 * np.maximum(rise, 0.0)
+    slope = np.clip(slope, 0.0, np.minimum(np.append(most, np.inf), np.append(np.inf, most)))
     left, right = slope[:-1], slope[1:]
     return np.stack([value[:-1], left, 3 * rise - 2 * left - right, left + right - 2 * rise], -1)
 
@@ -229,10 +168,12 @@ def _energy_table(eta: float, scale: float, S: Array) -> Array:
 
 
 def _require_convex(eta: float, heights: HeightDistribution, far: float) -> None:
-    """Refuse a "population" curve whose slope falls anywhere up to the last asperity."""
+    """Refuse a "population" curve whose slope falls anywhere up to, or at, the last asperity."""
     if heights.formation == "individual":
         return
-    y = far * np.concatenate([np.geomspace(1e-9, 1e-3, 200), np.linspace(1e-3, 1.0, 4000)[1:]])
+    near, body = np.geomspace(1e-9, 1e-3, 200), np.linspace(1e-3, 1.0, 4000)[1:]
+    past = np.array([1 + 1e-9, 1 + 1e-6, 1.001, 1.01])  # a density may end in a step
+    y = far * np.concatenate([near, body, past])
     _, slope = exact_force(y, eta, heights)
     fall = np.diff(slope) < -1e-12 * np.max(slope)
     if fall.any():

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
-from ._checks import Array, above, at_least, one_of
+from ._checks import Array, above, at_least, number, one_of
 
 FORMATIONS = ("population", "individual")
 
@@ -119,7 +119,13 @@ class Heights:
         if isinstance(self.distribution, (tuple, list)):
             set_(self, "distribution", _histogram(self.distribution))
             return
-        name, parameters = _name_and_parameters(self.distribution, dict(self.parameters))
+        try:
+            given = dict(self.parameters)
+        except (TypeError, ValueError):
+            raise ValueError(
+                f"heights.parameters = {self.parameters!r} must map names to numbers"
+            ) from None
+        name, parameters = _name_and_parameters(self.distribution, given)
         set_(self, "distribution", name)
         set_(self, "parameters", tuple(sorted(parameters.items())))
         set_(self, "_frozen", _freeze(name, parameters))
@@ -135,7 +141,8 @@ class Heights:
             counts, edges = (np.array(v) for v in self.distribution)
             density = np.concatenate([[0.0], counts / (counts.sum() * np.diff(edges)), [0.0]])
             return density[np.searchsorted(edges, np.asarray(r), side="right")]
-        return self._frozen.pdf(r)
+        with np.errstate(divide="ignore"):  # a density may be infinite where it begins
+            return self._frozen.pdf(r)
 
     def cdf(self, r: ArrayLike) -> Any:
         """Share P(r) of the asperities in touch at the overlap r in m."""
@@ -153,7 +160,7 @@ class Heights:
         if self.is_histogram:
             return np.array(self.distribution[1])
         low, high = self._frozen.ppf(_TAILS), self._frozen.isf(_TAILS[::-1])
-        points = np.unique(np.concatenate([low, high]))
+        points = np.unique(np.concatenate([low, high, self._frozen.support()]))
         finite: Array = points[np.isfinite(points)]
         return finite
 
@@ -181,7 +188,9 @@ def _histogram(pair: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
 def _name_and_parameters(distribution: Any, parameters: dict[str, Any]) -> tuple[str, Any]:
     """Name and parameters of a distribution given by name or as a frozen scipy distribution."""
     if isinstance(distribution, str):
-        return distribution, {k: float(v) for k, v in parameters.items()}
+        return distribution, {
+            k: number(f"heights.parameters.{k}", v) for k, v in parameters.items()
+        }
     try:
         generator, values, named = distribution.dist, distribution.args, distribution.kwds
         names = [n.strip() for n in (generator.shapes or "").split(",") if n.strip()]
@@ -209,7 +218,10 @@ def _freeze(name: str, parameters: dict[str, float]) -> Any:
         frozen = generator(**parameters)
         median = float(frozen.median())
     except TypeError as error:
-        raise ValueError(f"heights.parameters of {name!r}: {error}") from None
+        takes = ", ".join(n for n in (generator.shapes, "loc", "scale") if n)
+        raise ValueError(
+            f"heights.parameters = {parameters} do not fit {name!r}, which takes {takes}: {error}"
+        ) from None
     if not np.isfinite(median):
         raise ValueError(f"heights.parameters = {parameters} are out of bounds for {name!r}")
     return frozen

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _kernel_numpy as kernel
-from ._checks import Array, whole
+from ._checks import Array, numbers, whole
 from .law import JointLaw, Tables
 from .state import JointState, NonFiniteError, write_replay
 
@@ -90,6 +90,8 @@ class JointBatch:
 
     def restore(self, state: JointState) -> None:
         """Return to a snapshot. Raises ValueError if another law or batch size wrote it."""
+        if not isinstance(state, JointState):
+            raise ValueError(f"state = {state!r} is not a snapshot; give one of snapshot()")
         if state.fingerprint != self.law.fingerprint:
             raise ValueError("state belongs to a joint law with other parameters")
         if state.values.shape != (len(self._state), self._n):
@@ -177,14 +179,15 @@ class JointBatch:
         if index.ndim != 1 or not np.issubdtype(index.dtype, np.integer):
             raise ValueError("where must be a one-dimensional array of joint numbers or a mask")
         if index.min() < 0 or index.max() >= self._n:
-            raise ValueError(f"where names joint {index.max()}; joints are 0 to {self._n - 1}")
+            wrong = index.min() if index.min() < 0 else index.max()
+            raise ValueError(f"where names joint {wrong}; joints are 0 to {self._n - 1}")
         if len(np.unique(index)) != len(index):
             raise ValueError("where names a joint twice; each joint takes one increment per step")
         return index.astype(np.intp)
 
     def _increments(self, d: ArrayLike, index: NDArray[np.intp] | None) -> Array:
         """Increments as (dim, m), checked."""
-        values = _floats(d)
+        values = numbers("d", d, "m")
         shape = (self._n if index is None else len(index), self.law.tables.dim)
         if values.shape != shape:
             raise ValueError(f"d has shape {values.shape}; expected {shape}: joints, components")
@@ -207,18 +210,14 @@ class JointBatch:
         path = write_replay(
             self.law.to_toml(), old[:, at : at + 1], d[:, at : at + 1], C is not None
         )
+        again = "no replay file could be written"
+        if path is not None:
+            again = f"`jointlaw replay {path}` repeats it"
         raise NonFiniteError(
             f"joint {joint}: the step d = {d[:, at]} m gives a result that is not finite; nothing "
-            f"was moved. Take a smaller step; `jointlaw replay {path}` repeats it",
+            f"was moved. Take a smaller step; {again}",
             path,
         )
-
-
-def _floats(d: ArrayLike) -> Array:
-    try:
-        return np.asarray(d, float)
-    except (TypeError, ValueError):
-        raise ValueError(f"d = {d!r} is not an array of numbers (m)") from None
 
 
 class Joint:
@@ -240,7 +239,7 @@ class Joint:
         return self._advance(d, tangent, keep=False)
 
     def _advance(self, d: ArrayLike, tangent: bool, keep: bool) -> tuple[Array, Array | None]:
-        values = _floats(d)
+        values = numbers("d", d, "m")
         if values.shape != (self.law.tables.dim,):
             raise ValueError(f"d has shape {values.shape}; expected ({self.law.tables.dim},)")
         F, C = self._batch._advance(values[None], None, tangent, keep)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import sys
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from . import _toml
-from ._checks import Array, above, at_least, number
+from ._checks import Array, above, at_least, number, numbers
 from .asperity import Asperity
 from .curve import Curve, virgin_curve
 from .heights import GammaHeights, HeightDistribution, Heights
@@ -24,6 +25,7 @@ from .resolution import Resolution, resolve
 if TYPE_CHECKING:
     from .joint import Joint, JointBatch
 
+_SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
 DEFAULT_STRESS = 20e6  # Pa; its closure is the default closure_range
 
 
@@ -135,17 +137,15 @@ class JointLaw:
 
     def normal_stress(self, closure: ArrayLike) -> Any:
         """Normal stress (Pa) of a joint closed from zero to `closure` (m), unsheared."""
-        y = np.asarray(closure, float)
-        if not np.isfinite(y).all():
-            raise ValueError(f"closure = {closure!r} is not finite; give finite closures in m")
+        y = _finite("closure", closure, "m")
         force, _ = self.curve.force(y)
         return (self._closure_factor * force)[()]
 
     def closure(self, normal_stress: ArrayLike) -> Any:
         """Closure (m) at which the normal stress (Pa, >= 0) is reached: inverse of the above."""
-        stress = np.asarray(normal_stress, float)
-        if not (np.isfinite(stress).all() and (stress >= 0).all()):
-            raise ValueError(f"normal_stress = {normal_stress!r} must be finite and >= 0 Pa")
+        stress = _finite("normal_stress", normal_stress, "Pa")
+        if not (stress >= 0).all():
+            raise ValueError(f"normal_stress = {normal_stress!r} is out of bounds: it must be >= 0")
         result = np.array([self._closure_at(float(value)) for value in stress.ravel()])
         return result.reshape(stress.shape)[()]
 
@@ -154,7 +154,7 @@ class JointLaw:
 
         With `direction` = (theta, phi) in rad: per m2 and steradian in that direction, Eq. 16.
         """
-        y = np.asarray(closure, float)
+        y = _finite("closure", closure, "m")
         if self.heights is None:
             share: Any = np.where(y > 0, 1.0, 0.0)
         else:
@@ -167,7 +167,7 @@ class JointLaw:
     def max_stiffness(self, closure: ArrayLike) -> Any:
         """Upper bound of |C| (Pa/m) while no facet's effective closure exceeds `closure` (m)."""
         k, p = self.tables, self.asperity
-        _, slope = k.curve.force(np.asarray(closure, float))
+        _, slope = k.curve.force(_finite("closure", closure, "m"))
         per_facet = float(np.sum(k.area / k.c1))
         return ((max(1.0, 1.0 / p.lam) + p.mu) * per_facet * slope)[()]
 
@@ -223,22 +223,24 @@ class JointLaw:
         return float(np.sum(k.area * (k.c1 + np.sin(self.facets.theta) * shear)))
 
     def _closure_at(self, stress: float) -> float:
-        if stress == 0.0:
+        if stress < _SMALLEST:
             return 0.0
-        high = self.closure_range
-        while self.normal_stress(high) < stress:
-            high *= 4.0
-        low = high
-        while self.normal_stress(low) > stress:
-            low /= 4.0
 
-        def misfit(log_y: float) -> float:
-            return math.log(float(self.normal_stress(math.exp(log_y))) / stress)
+        def misfit(log_y: float) -> float:  # finite where the force is zero or overflows
+            force = float(self.normal_stress(math.exp(log_y)))
+            return math.log(min(max(force, _SMALLEST), _LARGEST)) - math.log(stress)
 
-        if low == high:
-            return high
-        root = brentq(misfit, math.log(low), math.log(high), xtol=1e-15, rtol=1e-15)
-        return math.exp(root)
+        low = high = math.log(self.closure_range)
+        with np.errstate(over="ignore"):
+            while misfit(high) < 0.0:
+                high += 1.0
+                if high > 700.0:
+                    raise ValueError(f"normal_stress = {stress!r} Pa is beyond any closure")
+            while misfit(low) > 0.0:
+                low -= 1.0
+            if low == high:
+                return self.closure_range
+            return math.exp(brentq(misfit, low, high, xtol=1e-15, rtol=1e-15, maxiter=500))
 
     # ----------------------------------------------------------------- files
 
@@ -259,6 +261,13 @@ class JointLaw:
     def __getstate__(self) -> dict[str, Any]:
         names = self.__dataclass_fields__
         return {name: value for name, value in self.__dict__.items() if name in names}
+
+
+def _finite(name: str, value: ArrayLike, unit: str) -> Array:
+    array = numbers(name, value, unit)
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} = {value!r} is not finite; give finite values in {unit}")
+    return array
 
 
 def depth_nodes(closure_range: float, slope: Array, cells: int) -> Array:

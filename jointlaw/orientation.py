@@ -52,19 +52,23 @@ class Orientation:
         set_(self, "c", number("orientation.c", self.c))
         if not -1.0 <= self.b <= 2.0:
             raise ValueError(
-                f"orientation.b = {self.b:g} is out of bounds: -1 <= b <= 2 (Eq. 18), "
+                f"orientation.b = {self.b!r} is out of bounds: -1 <= b <= 2 (Eq. 18), "
                 "or the density turns negative"
             )
         bound = 1 / 3 - self.b / 6
         if abs(self.c) > bound + 1e-12:  # 1e-12 admits the bound itself typed in decimals
             raise ValueError(
-                f"orientation.c = {self.c:g} is out of bounds: |c| <= 1/3 - b/6 = {bound:.6g} "
+                f"orientation.c = {self.c!r} is out of bounds: |c| <= 1/3 - b/6 = {bound:.9g} "
                 "(Eq. 18), or the density turns negative"
             )
 
     @classmethod
     def from_moments(cls, mean: float, variance: float, c: float = 0.0) -> Orientation:
-        """The a and b that give inclinations of this mean (rad) and variance (rad^2): Eq. 17."""
+        """The a and b that give inclinations of this mean (rad) and variance (rad^2): Eq. 17.
+
+        Where two values of b fit (the variance over the squared mean peaks near b = 1.4), the
+        smaller is taken.
+        """
         mean = above("mean", mean, 0.0)
         variance = above("variance", variance, 0.0)
         # Eq. 17 leaves one quadratic in b: v0 + v1 b - b^2 = ratio (6 - b)^2

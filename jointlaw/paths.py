@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._checks import Array, above, at_least, number, one_of, whole
+from ._checks import Array, above, at_least, number, numbers, one_of, whole
 from ._progress import track
 from .joint import Joint
 from .record import UNITS, Record
@@ -22,8 +22,11 @@ class PathError(RuntimeError):
     """A test could not go on; `record` holds all rows measured so far."""
 
     def __init__(self, message: str, record: Record) -> None:
-        super().__init__(message)
+        super().__init__(message, record)  # both, so that it can be pickled
         self.record = record
+
+    def __str__(self) -> str:
+        return str(self.args[0])
 
 
 def closure_test(
@@ -41,7 +44,7 @@ def closure_test(
     Raises ValueError for a bad argument and PathError, with the record so far, when a stress
     cannot be reached.
     """
-    peaks = [above("stress", s, 0.0) for s in np.atleast_1d(np.asarray(stress, float))]
+    peaks = [above("stress", s, 0.0) for s in _series("stress", stress, "Pa")]
     steps = whole("steps", steps, 1)
     grading = (np.arange(1, steps + 1) / steps) ** (1 + joint.law.asperity.eta)
     levels: list[float] = []
@@ -87,7 +90,7 @@ def direct_shear(
     normal = above("normal", normal, 0.0)
     control = one_of("control", control, CONTROLS)
     steps = whole("steps", steps, 1)
-    points = [number("to", p) for p in np.atleast_1d(np.asarray(to, float)).ravel()]
+    points = [number("to", p) for p in _series("to", to, "m")]
     azimuth = number("azimuth", azimuth)
     if control == "stiffness":
         if stiffness is None:
@@ -110,6 +113,14 @@ def direct_shear(
     for length in track(legs, "direct shear", len(legs)):
         log.advance(length * along, None if control == "closure" else goal)
     return log.record()
+
+
+def _series(name: str, value: float | Sequence[float], unit: str) -> Array:
+    """One number or several as a one-dimensional array."""
+    series = np.atleast_1d(numbers(name, value, unit))
+    if series.ndim != 1 or series.size == 0:
+        raise ValueError(f"{name} = {value!r} must be one number ({unit}) or a sequence of them")
+    return series
 
 
 class Normal(NamedTuple):

@@ -88,7 +88,7 @@ class Record:
 
     @property
     def secant_stiffness(self) -> float:
-        """Shear stress over shear displacement at the peak friction angle, in Pa/m."""
+        """Shear stress over shear displacement at the peak friction angle, in Pa/m; NaN if none."""
         at = int(np.argmax(np.abs(self.friction_angle)))
         shear = float(self.shear[at] - self.shear[0])
         return float(self.shear_stress[at]) / shear if shear else math.nan

@@ -44,14 +44,23 @@ class JointState:
 def load_state(path: str | Path) -> JointState:
     """Read a state that `JointState.save` wrote. Raises ValueError if the file is not one."""
     data = _load(Path(path), ("fingerprint", "values"), "a saved joint state")
-    return JointState(str(data["fingerprint"]), np.array(data["values"], float))
+    values = data["values"]
+    if getattr(values, "ndim", 0) != 2 or values.dtype.kind != "f":
+        raise ValueError(f"{str(path)!r} is not a saved joint state: its values are no table")
+    return JointState(str(data["fingerprint"]), np.array(values, float))
 
 
-def write_replay(law_toml: str, values: Array, d: Array, tangent: bool) -> Path:
-    """Write state and increment of a failed step; in JOINTLAW_REPLAY_DIR or the working folder."""
+def write_replay(law_toml: str, values: Array, d: Array, tangent: bool) -> Path | None:
+    """Write state and increment of a failed step; in JOINTLAW_REPLAY_DIR or the working folder.
+
+    Returns the file, or None where it could not be written: the failure of the step matters more.
+    """
     folder = Path(os.environ.get("JOINTLAW_REPLAY_DIR", "."))
     path = folder / f"jointlaw-replay-{os.getpid()}-{time.time_ns()}.npz"
-    _save(path, law=law_toml, values=values, d=d, tangent=tangent)
+    try:
+        _save(path, law=law_toml, values=values, d=d, tangent=tangent)
+    except OSError:
+        return None
     return path
 
 
@@ -68,7 +77,13 @@ def _save(path: Path, **arrays: Any) -> None:
 
 def _load(path: Path, keys: tuple[str, ...], what: str) -> dict[str, Any]:
     try:
+        with path.open("rb") as stream:
+            if not zipfile.is_zipfile(stream):
+                raise ValueError("not an NPZ file")
         with np.load(path, allow_pickle=False) as data:
+            version = int(data["version"])
+            if version != _VERSION:
+                raise ValueError(f"its version is {version}, this jointlaw reads {_VERSION}")
             return {key: data[key][()] for key in keys}
-    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
+    except (OSError, KeyError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
         raise ValueError(f"{str(path)!r} is not {what}: {error}") from None

@@ -70,12 +70,15 @@ def evaluate(edges: Edges, motion: np.ndarray) -> Points:
     # Ends: 0 at the start of A (end of B), 1 at the end of A (start of B).
     corner_a, corner_b = place[:, : 2 * m], np.concatenate([b1, b0], axis=1)
     d = corner_b - corner_a
-    tax, tay = np.concatenate([ta, ta], axis=1)
-    inside = d[0] * tax + d[1] * tay
-    inside[m:] *= -1
-    length = edges.length - np.maximum(inside[:m], 0) - np.maximum(inside[m:], 0)
+    t = ta - tb  # along both, so that the blocks may trade roles
+    t /= np.sqrt(t[0] * t[0] + t[1] * t[1])
+    span = (a1[0] - a0[0]) * t[0] + (a1[1] - a0[1]) * t[1]
+    inside = d * np.concatenate([t, -t], axis=1)
+    inside = inside[0] + inside[1]
+    length = span - np.maximum(inside[:m], 0) - np.maximum(inside[m:], 0)
     by_b = inside > 0  # corner of B over edge A, else corner of A over edge B
-    normal = np.where(by_b, (tay, -tax), (-np.tile(tb[1], 2), np.tile(tb[0], 2)))
+    facing = np.array([[ta[1], -ta[0]], [-tb[1], tb[0]]])
+    normal = np.where(by_b, *np.concatenate([facing, facing], axis=2))
     closure = -(d[0] * normal[0] + d[1] * normal[1])
     at = np.where(by_b, corner_b, corner_a)
     if len(edges.inner_of):

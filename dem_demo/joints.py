@@ -104,7 +104,7 @@ class Joints:
 
     def stress_at(self, closure: np.ndarray) -> np.ndarray:
         """Normal stress (Pa) of virgin joints at a closure (m)."""
-        return self._per_law("at_closure_stress", closure)
+        return self._per_law("virgin_stress", closure)
 
     def _per_law(self, method: str, x: np.ndarray) -> np.ndarray:
         out = np.empty(self.n)

@@ -78,6 +78,6 @@ class StiffnessCurve:
         """Stiffness (Pa/m) of a virgin joint at a closure."""
         return np.interp(closure, self.closure, self.stiffness)
 
-    def at_closure_stress(self, closure: np.ndarray) -> np.ndarray:
+    def virgin_stress(self, closure: np.ndarray) -> np.ndarray:
         """Normal stress (Pa) of a virgin joint at a closure."""
         return np.interp(closure, self.closure, self.stress)

@@ -40,7 +40,7 @@ class Scale:
 
     def width(self, stress):
         """Line width (points) of a normal stress (Pa)."""
-        return 1.0 + 8.0 * np.sqrt(np.clip(np.asarray(stress) / self.stress, 0, 1.2))
+        return 0.8 + 8.0 * np.clip(np.asarray(stress) / self.stress, 0, 1.2)
 
 
 def draw(axes, record: Record, i: int, scale: Scale) -> None:
@@ -58,7 +58,11 @@ def draw(axes, record: Record, i: int, scale: Scale) -> None:
     if len(blocks) <= 12:
         for block, shape in zip(blocks, shapes, strict=True):
             if not block.fixed:
-                axes.annotate(block.name, shape.mean(axis=0), ha="center", va="center", fontsize=8)
+                angle = np.degrees(record.motion[i][2, blocks.index(block)])
+                axes.text(
+                    *shape.mean(axis=0), block.name, rotation=angle, fontsize=8,
+                    ha="center", va="center", rotation_mode="anchor",
+                )  # fmt: skip
     frame = record.joints[i]
     values, ends = frame["values"], frame["ends"]
     closed = values[:, STRESS] > 1e-3 * scale.stress
@@ -82,15 +86,23 @@ def draw(axes, record: Record, i: int, scale: Scale) -> None:
 
 
 def frame_figure(record: Record, i: int, scale: Scale, dpi: int) -> Figure:
-    """One frame with its colour bar and legend."""
-    shape = (scale.high - scale.low) / scale.size
-    figure = Figure(figsize=(8.4, float(np.clip(7.0 * shape[1] + 1.9, 3.4, 8.0))), dpi=dpi)
+    """One frame with its colour bar and legend, laid out in inches so that frames do not jump."""
+    wide, high = (scale.high - scale.low) + 0.08 * scale.size
+    across = min(6.8, 5.6 * wide / high)
+    tall, left, right, low, up = across * high / wide, 0.75, 1.15, 1.15, 0.6
+    size = max(left + across + right, 6.2), low + tall + up
+    left += 0.5 * (size[0] - left - across - right)
+    figure = Figure(figsize=size, dpi=dpi)
     FigureCanvasAgg(figure)
-    figure.set_layout_engine("constrained")
-    axes = figure.add_subplot()
+
+    def part(x, y, width, height):
+        return figure.add_axes((x / size[0], y / size[1], width / size[0], height / size[1]))
+
+    axes = part(left, low, across, tall)
     draw(axes, record, i, scale)
-    bar = figure.colorbar(ScalarMappable(scale.angle, MAP), ax=axes, shrink=0.85, pad=0.02)
-    bar.set_label("mobilised friction angle (degrees)")
+    colours = ScalarMappable(scale.angle, MAP)
+    bar = figure.colorbar(colours, cax=part(left + across + 0.15, low, 0.17, tall))
+    bar.set_label("mobilised friction angle (degrees)", fontsize=9)
     marks = [
         Line2D([], [], color="0.3", lw=scale.width(s), label=f"{s / 1e3:.3g} kPa")
         for s in _round(scale.stress) * np.array([0.25, 1.0])
@@ -101,10 +113,12 @@ def frame_figure(record: Record, i: int, scale: Scale, dpi: int) -> Figure:
         Line2D([], [], color="0.6", ls=":", lw=0.9, label="at start"),
     ]
     figure.legend(
-        handles=marks, loc="outside lower center", ncols=5, fontsize=8, frameon=False,
+        handles=marks, loc="lower center", ncols=5, fontsize=8, frameon=False,
         title="joints: normal stress as width", title_fontsize=8,
     )  # fmt: skip
-    axes.set_title(f"{record.scene.title}\n{caption(record, i)}", fontsize=10)
+    figure.suptitle(
+        f"{record.scene.title}\n{caption(record, i)}", fontsize=9.5, y=1 - 0.06 / size[1], va="top"
+    )
     return figure
 
 
@@ -115,12 +129,12 @@ def caption(record: Record, i: int) -> str:
     for moving, _ in record.scene.watch.get("slip", []):
         name = record.scene.blocks[moving].name
         angle, slid = row[f"{name}: base angle_deg"], 1e3 * abs(row[f"{name}: slid_m"])
-        parts.append(f"{name}: base at {angle:.2f}°, slid {slid:.2f} mm")
+        parts.append(f"{name}: base at {angle:.2f}°, slid {slid:.3g} mm")
     for moving, _ in record.scene.watch.get("shear", []):
         name = record.scene.blocks[moving].name
         slid, tau = 1e3 * row[f"{name}: slid_m"], 1e-3 * row[f"{name}: shear_Pa"]
         parts.append(f"{name}: slid {slid:.2f} mm, shear stress {tau:.1f} kPa")
-    return "   ".join(parts)
+    return "; ".join(parts)
 
 
 def final(record: Record, path: Path) -> None:

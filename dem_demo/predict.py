@@ -22,7 +22,8 @@ def friction_angle(law, stress: float) -> float:
     """Peak of F2/F1 (degrees) of the law in direct shear at a constant normal stress (Pa)."""
     if isinstance(law, CoulombLaw):
         return float(np.degrees(np.arctan(law.friction)))
-    record = jl.direct_shear(law.joint(), to=[1.5 * slip_distance(law)], normal=stress)
+    to = [1.2 * slip_distance(law)]  # friction peaks where the contacts begin to be renewed
+    record = jl.direct_shear(law.joint(), to=to, normal=stress, steps=120)
     return float(record.peak_friction_angle)
 
 
@@ -34,8 +35,8 @@ def slip_angle(scene: Scene, moving: int, base: int, length: float) -> dict[str,
     law = scene.laws[scene.law_of((moving, 0, base, 0))]
     block = scene.blocks[moving]
     flat = block.density * block.area * np.hypot(*scene.gravity) / length
-    angle = 30.0
-    for _ in range(6):
-        stress = flat * np.cos(np.radians(angle))
+    angle, before = 35.0, 0.0
+    while abs(angle - before) > 5e-3:
+        before, stress = angle, float(flat * np.cos(np.radians(angle)))
         angle = friction_angle(law, stress)
     return {"predicted_angle": angle, "normal_stress": stress}

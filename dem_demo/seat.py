@@ -11,16 +11,19 @@ from .joints import Joints
 TIGHT = 1e-11  # residual force as a share of the applied one
 
 
-def equilibrium(joints: Joints, rows: csr_array, closure, area, force):
+def equilibrium(joints: Joints, rows: csr_array, closure, slid, area, force):
     """Displacements of the free motions that balance `force`; rows as in `StepLimit.rows`.
 
-    First with joints that cannot slide, which always has an answer; then with the law itself,
-    loaded in one step from the virgin state. Returns (displacement, sliding (k,) in m, balanced):
-    balanced is False when the law cannot hold the blocks: they will move from step 0.
+    closure, slid (k,): where the joints are without these displacements (m), reached in one step
+    from the virgin state.
+
+    First with joints that cannot slide, which always has an answer; then with the law itself.
+    Returns (displacement, slid (k,) in m, balanced): balanced is False when the law cannot hold
+    the blocks: they will move from step 0.
     """
     k = len(closure)
     rows = diags_array(np.concatenate([-np.ones(k), np.ones(k)])) @ rows  # to (closure, shear)
-    start = np.concatenate([closure, np.zeros(k)])
+    start = np.concatenate([closure, slid])
     weight = np.concatenate([area, area])
 
     def bonded(d):
@@ -41,7 +44,7 @@ def equilibrium(joints: Joints, rows: csr_array, closure, area, force):
     best, balanced = _newton(law, rows, start, weight, force, guess, 100)
     if not balanced:
         best = guess
-    return best, (rows @ best)[k:], balanced
+    return best, slid + (rows @ best)[k:], balanced
 
 
 def _newton(law, rows, start, weight, force, y, most):

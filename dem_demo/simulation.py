@@ -74,14 +74,20 @@ class Simulation:
 
     def _seat(self) -> np.ndarray:
         """Move the blocks to where their joints carry them; the joints' first sliding (m)."""
-        points = geometry.evaluate(self.edges, self.motion)
-        rows = self.limit.rows(self.edges, points, self.motion)
-        force = ((self.gravity + self.loads).ravel() * self.limit.root)[self.free.ravel()]
-        area = points.length * self.scene.thickness
-        moved, slid, self.balanced = equilibrium(self.joints, rows, points.closure, area, force)
-        shift = np.zeros(self.free.size)
-        shift[self.free.ravel()] = moved * self.limit.root[self.free.ravel()]
-        self.motion[:3] += shift.reshape(-1, 3).T
+        slid, free = np.zeros(self.joints.n), self.free.ravel()
+        force = ((self.gravity + self.loads).ravel() * self.limit.root)[free]
+        for _ in range(3):  # each time at the places just found: the joints turn with the blocks
+            points = geometry.evaluate(self.edges, self.motion)
+            rows = self.limit.rows(self.edges, points, self.motion)
+            area = points.length * self.scene.thickness
+            moved, slid, self.balanced = equilibrium(
+                self.joints, rows, points.closure, slid, area, force
+            )
+            shift = np.zeros(self.free.size)
+            shift[free] = moved * self.limit.root[free]
+            self.motion[:3] += shift.reshape(-1, 3).T
+            if not self.balanced:
+                break
         self.interfaces.renewed_at = self.motion[:3].copy()
         return slid
 
@@ -180,6 +186,12 @@ class Simulation:
             return 0.0
         return abs(float(self.joints.read("delta")[here, 1] @ area / area.sum()))
 
+    def contact_forces(self) -> np.ndarray:
+        """Forces and torques (n, 3) of the joints on the blocks, dashpots left out (N, N m)."""
+        stress, shear = self.traction.T
+        self.assembly.move(self.motion)
+        return self.assembly(self.points, self.area * stress, -self.area * shear)
+
     def points_between(self, one: int, other: int) -> np.ndarray:
         """Mask (k,) of the law points between two blocks."""
         a, b = self.edges.a, self.edges.b
@@ -190,7 +202,7 @@ class Simulation:
 
     def _arrange(self) -> None:
         """Joints, masses and books for a new list of edge pairs."""
-        before = {}
+        before = None
         if getattr(self, "points", None) is not None:
             before = dict(zip(self._identity, self.area.tolist(), strict=True))
         self.edges = self.interfaces.edges
@@ -200,7 +212,7 @@ class Simulation:
         light = self._lightness[self.edges.a] + self._lightness[self.edges.b]
         self._share = self.edges.weight / np.where(light > 0, light, np.inf)
         self._checked = np.zeros(self.joints.n)
-        if before:
+        if before is not None:
             area = np.array([before.get(who, 0.0) for who in self._identity])
             energies = self.joints.read("stored_energy"), self.joints.read("dissipated_energy")
             self.ledger.remember(self.ledger.forces, area, *energies)

@@ -23,6 +23,7 @@ class Ledger:
 
     def __init__(self, inertia: np.ndarray, gravity: np.ndarray, loads: np.ndarray) -> None:
         self.inertia, self.gravity, self.loads = inertia, gravity, loads
+        self.loaded = bool(loads.any())
         self.value = dict.fromkeys(COLUMNS, 0.0)
         self.total0 = 0.0
 
@@ -43,17 +44,21 @@ class Ledger:
     def step(self, velocity, forces, dt: float, area, stored, dissipated) -> None:
         """Book a step in which the blocks moved with `velocity` (n, 3)."""
         v = self.value
-        both = 0.5 * dt * ((self.forces + forces) * velocity).sum(axis=2)
+        _, damped, driven = 0.5 * dt * ((self.forces + forces) * velocity).sum(axis=(1, 2))
         middle = 0.5 * (area + self.area)
-        fall, push = ((f * velocity).sum(axis=1) * dt for f in (self.gravity, self.loads))
+        fall = dt * (self.gravity * velocity).sum(axis=1)
         v["kinetic"] = 0.5 * float((velocity * (self.inertia * velocity + dt * forces[0])).sum())
         v["potential"] -= float(fall.sum())
-        v["dashpots"] -= float(both[1].sum())
-        v["work"] += float(both[2].sum() + push.sum())
+        v["dashpots"] -= float(damped)
+        v["work"] += float(driven)
+        v["turned"] += float(np.abs(fall).sum() + abs(driven))
+        if self.loaded:
+            push = dt * (self.loads * velocity).sum(axis=1)
+            v["work"] += float(push.sum())
+            v["turned"] += float(np.abs(push).sum())
         v["stored"] = float(area @ stored)
         v["friction"] += float(middle @ (dissipated - self.e_lost))
         v["area"] += 0.5 * float((stored + self.e_stored) @ (area - self.area))
-        v["turned"] += float(np.abs(fall).sum() + np.abs(push).sum() + np.abs(both[2]).sum())
         self.remember(forces, area, stored, dissipated)
 
     @property

@@ -36,16 +36,6 @@ def build_law(table: dict[str, Any], where: str):
         raise ValueError(f"{where}.{error}") from None
 
 
-def coulomb_like(law, stress: float, friction: float | None = None) -> CoulombLaw:
-    """Plain Coulomb with the stiffness that `law` has at a normal stress (Pa)."""
-    if isinstance(law, CoulombLaw):
-        return law
-    closure = float(law.closure(stress))
-    kn = float(law.normal_stress(1.01 * closure) - law.normal_stress(0.99 * closure))
-    kn /= 0.02 * closure
-    return CoulombLaw(kn, kn / law.asperity.lam, law.asperity.mu if friction is None else friction)
-
-
 def load_state(law, path):
     """The state of a law's batch from the file that its `save` wrote."""
     return CoulombState.load(path) if isinstance(law, CoulombLaw) else jl.load_state(path)

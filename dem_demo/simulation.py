@@ -10,13 +10,15 @@ import numpy as np
 from . import geometry, timestep
 from .drives import Drives
 from .energy import COLUMNS, Ledger
-from .interfaces import Interfaces, Refused
+from .interfaces import ANGLE, Interfaces, Refused
 from .joints import Joints
 from .scene import Scene, parse
 from .seat import equilibrium
 from .world import World
 
 HEADROOM = 1.25  # stiffness growth between two checks of the time step
+FLOOR = 0.2  # least stiffness in the time step, as a share of the stiffest joint's
+STEEP = np.sin(1.25 * ANGLE)  # tilt between two edges beyond which they are no joint
 
 
 class Simulation:
@@ -28,6 +30,7 @@ class Simulation:
         self.skin = run.skin or 0.02 * width
         self.world = World(blocks, scene.thickness, self.skin)
         self.interfaces = Interfaces(blocks, self.skin, run.point_spacing, run.max_overlap)
+        self._least_depth = self.interfaces.depth_limit.min()
         self.joints = Joints(scene.laws, scene.law_of)
         self.drives = Drives(scene.drives)
         self.inertia = np.stack([self.world.mass, self.world.mass, self.world.moment], axis=1)
@@ -37,6 +40,8 @@ class Simulation:
         self.reach = np.array([b.reach for b in blocks])
         self.gravity = self.mobile * self.inertia * [*scene.gravity, 0.0]
         self.loads = np.array([[*b.load, 0.0] for b in blocks]) * self.mobile
+        self._steady = self.gravity + self.loads
+        self._damped = bool(run.dashpot_normal or run.dashpot_shear)
         self.ledger = Ledger(self.inertia, self.gravity, self.loads)
         self.limit = timestep.StepLimit(self.inertia, self.free)
         held = self.free[:, :2].any(axis=1)
@@ -144,35 +149,31 @@ class Simulation:
         self.area = area = points.length * self.scene.thickness
         stress, shear = self.traction.T
         self._stiffness = self.joints.stiffness(stress)
-        push, drag = self._dashpots(points)
-        push = np.maximum(push, -area * stress)  # a dashpot never pulls
+        push, drag = self._dashpots(points, area * stress)
         self.assembly.move(self.motion)
-        forces = np.empty((3, len(self.mobile), 3))
-        forces[1] = self.assembly(points, push, drag)
-        forces[0] = self.assembly(points, area * stress, -area * shear)
-        forces[0] += forces[1] + self.gravity + self.loads
-        forces[0] *= self.mobile
-        forces[1] *= self.mobile
+        forces = np.empty((3, *self.mobile.shape))
+        damped = self.assembly(points, push, drag) if self._damped else 0.0
+        forces[1] = damped * self.mobile
+        forces[0] = self.assembly(points, area * stress, -area * shear) + damped
+        forces[0] = (forces[0] + self._steady) * self.mobile
         forces[2] = 0.0
-        if rows := len(self.drives.rows):
+        if len(self.drives.rows):
             at = self.drives.rows, self.drives.axes
             wanted = self.drives.velocity(self.time, self.dt)
             needed = self.inertia[at] * (wanted - self.motion[3:].T[at]) / dt - forces[0][at]
-            forces[2][at] = needed[:rows]
+            forces[2][at] = needed
             forces[0][at] += needed
         return forces
 
-    def _dashpots(self, points: geometry.Points):
-        """Forces of the dashpots along normal and tangent, (k,) each."""
+    def _dashpots(self, points: geometry.Points, pressed: np.ndarray):
+        """Forces of the dashpots along normal and tangent, (k,) each; never a pull."""
         run = self.scene.run
         damping = self._damping()
-        if run.dashpot_shear:
-            stick = 1.0 - self.joints.read("separated") - self.joints.read("slipping")
-        else:
-            stick = 0.0
-        push = -run.dashpot_normal * damping * points.along[0]
-        drag = -run.dashpot_shear * damping * np.maximum(stick, 0.0) * points.along[1]
-        return push, drag
+        push = np.maximum(-run.dashpot_normal * damping * points.along[0], -pressed)
+        if not run.dashpot_shear:
+            return push, np.zeros(len(push))
+        stick = 1.0 - self.joints.read("separated") - self.joints.read("slipping")
+        return push, -run.dashpot_shear * damping * np.maximum(stick, 0.0) * points.along[1]
 
     def _damping(self) -> np.ndarray:
         """Critical damping (k,) in N s/m: 2 sqrt(stiffness times reduced mass), by share."""
@@ -224,6 +225,8 @@ class Simulation:
         self.area = points.length * self.scene.thickness
         stress = self.traction[:, 0]
         now = np.maximum(self.joints.stiffness(stress), self.joints.stiffness_at(points.closure))
+        # Joints that open and close at little stress count as closed, or each touch asks again.
+        now = np.maximum(now, FLOOR * now.max(initial=0.0))
         self._stiffness = now
         self._checked = HEADROOM * now
         rows = self.limit.rows(self.edges, points, self.motion)
@@ -254,15 +257,20 @@ class Simulation:
             )
 
     def _require_carried(self, points: geometry.Points) -> None:
-        m = len(self.edges.first)
-        closure = points.closure * (points.length > 0)
-        limit = np.minimum(*(self.interfaces.depth_limit[b] for b in (self.edges.a, self.edges.b)))
-        if (closure > limit).any():
-            i = int((closure - limit).argmax())
-            self.interfaces.refuse_overlap((self.edges.a[i], self.edges.b[i]), closure[i], limit[i])
-        tilted = np.abs(points.tilt) > np.sin(1.25 * np.radians(5.0))
-        if tilted.any() and (closure[:m] > 0)[tilted].any():
-            raise Refused("edges in contact have turned past 5 degrees: corners are not carried")
+        pressed = points.closure * (points.length > 0)
+        if pressed.max(initial=0.0) > self._least_depth:
+            a, b, depth = self.edges.a, self.edges.b, self.interfaces.depth_limit
+            limit = np.minimum(depth[a], depth[b])
+            i = int((pressed - limit).argmax())
+            if pressed[i] > limit[i]:
+                self.interfaces.refuse_overlap((a[i], b[i]), pressed[i], limit[i])
+        if np.abs(points.tilt).max(initial=0.0) > STEEP:
+            tilted = np.abs(points.tilt)[self.edges.of] > STEEP
+            if (tilted & (pressed > 0)).any():
+                raise Refused(
+                    "edges in contact have turned past 5 degrees from each other: a corner on an "
+                    "edge is not carried; keep blocks closer to parallel or end the run earlier"
+                )
 
     # ------------------------------------------------------------------ states
 

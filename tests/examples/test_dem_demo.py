@@ -46,6 +46,7 @@ slip = [["one", "base"]]
 [run]
 end = 0.12
 record = 0.02
+fraction = 0.15
 """
 
 
@@ -116,7 +117,7 @@ def test_resume_of_a_tilt_test_by_command(tmp_path):
         ('name = "one"', 'name = "one"\ndensty = 3', "densty is unknown; did you mean 'density'"),
         ("box = [1.0, 0.5]", "box = [1.0, -0.5]", "box = .* must be > 0"),
         ("end = 0.12", "end = 0.0", "end = 0.0: must be > 0"),
-        ("end = 0.12", "end = 0.12\nfraction = 2.0", "fraction = 2.0: must be <= 0.95"),
+        ("fraction = 0.15", "fraction = 2.0", "fraction = 2.0: must be <= 0.95"),
         ("mu = 0.4", "mu = -0.4", "mu"),
         ("friction = 0.3", "friction = -0.3", "friction = -0.3: must be >= 0"),
         ('law = "plain"', 'law = "plane"', "law 'plane' is not among"),
@@ -152,7 +153,7 @@ def test_refusals_leave_a_state_that_goes_on_with_a_smaller_step(tmp_path):
 
 def test_overlap_and_speed_are_refused():
     deep = SHORT.replace("at = [0.0, 0.25]", "at = [0.0, 0.2]")
-    with pytest.raises(Refused, match="overlap by 0.05 m: must stay below"):
+    with pytest.raises(Refused, match=r"overlap by 0.05 m.* must stay below"):
         Simulation(parse(deep))
     fast = Simulation(parse(SHORT.replace("velocity = [0.0, 0.1]", "velocity = [0.0, 90.0]")))
     with pytest.raises(Refused, match="in one step"):

@@ -89,6 +89,21 @@ def test_error_falls_with_the_step():
     assert errors[1] < 0.4 * errors[0]
 
 
+def test_long_joints_take_more_points():
+    """1 m at a spacing of 0.3 m: four spans, five points; ends carry half a span each."""
+    sim = Simulation(one_block(REPLICA, gravity=(4.0, -9.0), run="point_spacing = 0.3"))
+    assert sim.balanced
+    assert sim.joints.n == 5
+    assert np.sort(sim.points.length) == pytest.approx([0.125, 0.125, 0.25, 0.25, 0.25], rel=1e-6)
+    places = [place for _, place in sim.interfaces.of_points]
+    assert sorted(places) == [-1, 0, 1, 2, 3]
+    for _ in range(300):
+        sim.step()
+    force = sim.contact_forces()[1]
+    assert force == pytest.approx([-4.0 * 1300, 9.0 * 1300, 0.0], abs=0.02)
+    assert abs(sim.ledger.error) < 1e-6
+
+
 def test_linear_joint_conserves_to_round_off():
     """Half-step kinetic energy: a linear spring without dashpots loses nothing at all."""
     run = "dashpot_normal = 0.0\ndashpot_shear = 0.0"

@@ -102,7 +102,9 @@ def _go(sim: Simulation, given: argparse.Namespace) -> int:
     given.out.mkdir(parents=True, exist_ok=True)
     _, summary = run(sim, given.out, end, not given.no_pictures)
     for slip in summary["slip"]:
-        if slip["slip_angle"] is None:
+        if slip["slipped_before"]:
+            print(f"{slip['block']}: had slipped before this run")
+        elif slip["slip_angle"] is None:
             print(f"{slip['block']}: no slip (predicted at {slip['predicted_angle']:.2f} degrees)")
         else:
             print(

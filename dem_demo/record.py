@@ -111,7 +111,7 @@ def _joints(sim: Simulation) -> dict[str, np.ndarray]:
     at, w = points.at, edges.weight
     before = np.where(np.arange(len(w)) < m, 0.0, np.where(np.arange(len(w)) < 2 * m, w, 0.5 * w))
     ends = np.stack([at - before * along, at + (w - before) * along], axis=0)
-    who = np.array([[*key, place] for key, place in sim._identity], int).reshape(-1, 5)
+    who = np.array([[*key, place] for key, place in sim.identity], int).reshape(-1, 5)
     values = np.column_stack(
         [points.closure, delta[:, 1], *sim.traction.T, read("sliding"), read("slipping"),
          read("separated"), points.length]

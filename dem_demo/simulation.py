@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 
-from . import geometry, timestep
+from . import geometry, states, timestep
 from .drives import Drives
-from .energy import COLUMNS, Ledger
+from .energy import Ledger
 from .interfaces import ANGLE, Interfaces, Refused
 from .joints import Joints
 from .scene import Scene, parse
-from .seat import equilibrium
+from .start import begin
 from .world import World
 
 HEADROOM = 1.25  # stiffness growth between two checks of the time step
@@ -24,7 +23,7 @@ STEEP = np.sin(1.25 * ANGLE)  # tilt between two edges beyond which they are no 
 class Simulation:
     """A scene in motion. `step()` advances it; `state()` and `restore()` are bit-exact."""
 
-    def __init__(self, scene: Scene, step: float | None = None, begin: bool = True) -> None:
+    def __init__(self, scene: Scene, step: float | None = None, fresh: bool = True) -> None:
         self.scene, run, blocks = scene, scene.run, scene.blocks
         width = min(b.width for b in blocks)
         self.skin = run.skin or 0.02 * width
@@ -49,69 +48,8 @@ class Simulation:
         self.t0, self.n, self.dt = 0.0, 0, step or run.step or 0.0
         self.step_limit = self.least_limit = np.inf
         self.balanced, self.motion = True, self.world.motion()
-        if begin:
-            self._begin()
-
-    # ------------------------------------------------------------------ start
-
-    def _begin(self) -> None:
-        self.interfaces.renew(self.motion, self.world.near)
-        self._arrange()
-        slid = np.zeros(self.joints.n)
-        if self.scene.run.seat and self.joints.n:
-            slid = self._seat()
-        for i, block in enumerate(self.scene.blocks):
-            if not block.fixed:
-                self.motion[3:, i] = [*block.velocity, block.spin]
-        points = geometry.evaluate(self.edges, self.motion)
-        self.traction = self.joints.update(self.joints.increments(points.closure, slid))
-        self._check_step(points)
-        if not self.dt:
-            self.dt = self._choose_step()
-        self._require_step()
-        self.motion[3:][self.drives.axes, self.drives.rows] = self.drives.velocity(0.0, self.dt)
-        points = geometry.evaluate(self.edges, self.motion)
-        velocity = self.motion[3:].T
-        forces = self._forces(points, 0.5 * self.dt)
-        self.ledger.start(velocity, forces, self.dt, *self._joint_energies(points))
-        self.motion[3:] += (0.5 * self.dt * forces[0] / self.inertia * self.free).T
-        self.world.place(self.motion)
-
-    def _seat(self) -> np.ndarray:
-        """Move the blocks to where their joints carry them; the joints' first sliding (m)."""
-        slid, free = np.zeros(self.joints.n), self.free.ravel()
-        force = ((self.gravity + self.loads).ravel() * self.limit.root)[free]
-        for _ in range(3):  # each time at the places just found: the joints turn with the blocks
-            points = geometry.evaluate(self.edges, self.motion)
-            rows = self.limit.rows(self.edges, points, self.motion)
-            area = points.length * self.scene.thickness
-            moved, slid, self.balanced = equilibrium(
-                self.joints, rows, points.closure, slid, area, force
-            )
-            shift = np.zeros(self.free.size)
-            shift[free] = moved * self.limit.root[free]
-            self.motion[:3] += shift.reshape(-1, 3).T
-            if not self.balanced:
-                break
-        self.interfaces.renewed_at = self.motion[:3].copy()
-        return slid
-
-    def _choose_step(self) -> float:
-        run, stiffness = self.scene.run, 0.0
-        for curve in self.joints.curves.values():
-            stiffness = max(stiffness, float(curve.at_stress(np.array([run.largest_stress]))[0]))
-        limit = self.step_limit
-        if stiffness:
-            blocks, thick = self.scene.blocks, self.scene.thickness
-            limit = min(
-                limit, timestep.impact_limit(blocks, thick, self.inertia, self.free, stiffness)
-            )
-        if not np.isfinite(limit):
-            raise Refused(
-                "nothing touches at the start, so no time step follows: set run.largest_stress "
-                "(Pa) to the normal stress expected in impacts, or run.step (s)"
-            )
-        return run.fraction * limit
+        if fresh:
+            begin(self)
 
     # ------------------------------------------------------------------- step
 
@@ -129,21 +67,21 @@ class Simulation:
         self._require_slow(motion)
         self.motion, self.n = motion, self.n + 1
         if self.interfaces.stale(motion) and self.interfaces.renew(motion, self.world.near):
-            self._arrange()
+            self.arrange()
         points = geometry.evaluate(self.edges, motion)
         self._require_carried(points)
         d = self.joints.increments(points.closure, points.along[1] * self.dt)
         self.traction = self.joints.update(d)
-        forces = self._forces(points, self.dt)
+        forces = self.forces(points, self.dt)
         if (self._stiffness > self._checked).any():
-            self._check_step(points)
-            self._require_step()
+            self.check_step(points)
+            self.require_step()
         if self.drives.waiting and self.n % 16 == 0:
             self.drives.watch(self.time, self.slid)
-        self.ledger.step(motion[3:].T, forces, self.dt, *self._joint_energies(points))
+        self.ledger.step(motion[3:].T, forces, self.dt, *self.joint_energies(points))
         return forces[0]
 
-    def _forces(self, points: geometry.Points, dt: float) -> np.ndarray:
+    def forces(self, points: geometry.Points, dt: float) -> np.ndarray:
         """(3, n, 3): all forces, those of the dashpots, those of the drives."""
         self.points = points
         self.area = area = points.length * self.scene.thickness
@@ -198,29 +136,29 @@ class Simulation:
         a, b = self.edges.a, self.edges.b
         return ((a == one) & (b == other)) | ((a == other) & (b == one))
 
-    def _joint_energies(self, points: geometry.Points):
+    def joint_energies(self, points: geometry.Points):
         return self.area, self.joints.read("stored_energy"), self.joints.read("dissipated_energy")
 
-    def _arrange(self) -> None:
+    def arrange(self) -> None:
         """Joints, masses and books for a new list of edge pairs."""
         before = None
         if getattr(self, "points", None) is not None:
-            before = dict(zip(self._identity, self.area.tolist(), strict=True))
+            before = dict(zip(self.identity, self.area.tolist(), strict=True))
         self.edges = self.interfaces.edges
-        self._identity = self.interfaces.of_points
-        self.joints.assign(self._identity)
+        self.identity = self.interfaces.of_points
+        self.joints.assign(self.identity)
         self.assembly = geometry.Assembly(self.edges, len(self.scene.blocks))
         light = self._lightness[self.edges.a] + self._lightness[self.edges.b]
         self._share = self.edges.weight / np.where(light > 0, light, np.inf)
         self._checked = np.zeros(self.joints.n)
         if before is not None:
-            area = np.array([before.get(who, 0.0) for who in self._identity])
+            area = np.array([before.get(who, 0.0) for who in self.identity])
             energies = self.joints.read("stored_energy"), self.joints.read("dissipated_energy")
             self.ledger.remember(self.ledger.forces, area, *energies)
 
     # ----------------------------------------------------------------- guards
 
-    def _check_step(self, points: geometry.Points) -> None:
+    def check_step(self, points: geometry.Points) -> None:
         """The step limit (s) of this moment, with headroom for stiffness to grow."""
         self.area = points.length * self.scene.thickness
         stress = self.traction[:, 0]
@@ -238,7 +176,7 @@ class Simulation:
         )
         self.least_limit = min(self.least_limit, self.step_limit)
 
-    def _require_step(self) -> None:
+    def require_step(self) -> None:
         if self.dt > 0.98 * self.step_limit:
             raise Refused(
                 f"time step {self.dt:.3g} s: must stay below 0.98 of the limit, which has fallen "
@@ -276,56 +214,15 @@ class Simulation:
 
     def state(self) -> dict:
         """A copy of everything that the future depends on."""
-        arrays = {
-            "motion": self.motion_after_step(),
-            "renewed_at": self.interfaces.renewed_at.copy(),
-            "keys": np.array(self.interfaces.keys, int).reshape(-1, 4),
-            "forces": self.ledger.forces.copy(),
-            "area": self.ledger.area.copy(),
-            "e_stored": self.ledger.e_stored.copy(),
-            "e_lost": self.ledger.e_lost.copy(),
-            "ledger": np.array([*(self.ledger.value[c] for c in COLUMNS), self.ledger.total0]),
-            "turned_at": self.drives.turned_at.copy(),
-            "clock": np.array([self.t0, self.n, self.dt, self.step_limit, self.least_limit]),
-        }
-        return {"arrays": arrays, "joints": self.joints.snapshot()}
-
-    def motion_after_step(self) -> np.ndarray:
-        """Positions of now with the velocities that will carry the blocks on (6, n)."""
-        return self.world.motion().copy()
+        return states.state(self)
 
     def restore(self, state: dict, step: float | None = None) -> None:
         """Return to a state; with `step`, go on from there with another time step."""
-        a = state["arrays"]
-        self.t0, self.n, self.dt, self.step_limit, self.least_limit = a["clock"].tolist()
-        self.n = int(self.n)
-        self.drives.turned_at = a["turned_at"].copy()
-        if step:
-            self.t0, self.n, self.dt = self.time, 0, step
-        self.interfaces.adopt([tuple(k) for k in a["keys"].tolist()])
-        self.interfaces.renewed_at = a["renewed_at"].copy()
-        self.points = None
-        self.joints.restore(state["joints"], self.interfaces.of_points)
-        self._arrange()
-        self.motion = a["motion"].copy()
-        self.traction = self.joints.read("F")
-        self.area = a["area"].copy()
-        self.ledger.value = dict(zip(COLUMNS, a["ledger"].tolist(), strict=False))
-        self.ledger.total0 = float(a["ledger"][-1])
-        self.ledger.remember(
-            a["forces"].copy(), self.area, a["e_stored"].copy(), a["e_lost"].copy()
-        )
-        self.points = geometry.evaluate(self.edges, self.motion)
-        self.world.place(self.motion)
+        states.restore(self, state, step)
 
     def save(self, folder: Path, state: dict | None = None) -> None:
         """Write a state (default: now) and its scene to a folder."""
-        folder.mkdir(parents=True, exist_ok=True)
-        state = state or self.state()
-        np.savez(folder / "blocks.npz", **state["arrays"])
-        joints = self.joints.save(state["joints"], folder)
-        (folder / "joints.json").write_text(json.dumps(joints))
-        (folder / "scene.toml").write_text(self.scene.text)
+        states.save(self, Path(folder), state or self.state())
 
     @classmethod
     def load(cls, folder: Path, step: float | None = None) -> Simulation:
@@ -333,9 +230,6 @@ class Simulation:
         folder = Path(folder)
         if not (folder / "blocks.npz").is_file():
             raise ValueError(f"{str(folder)!r} holds no saved state (blocks.npz is missing)")
-        sim = cls(parse((folder / "scene.toml").read_text(), "scene.toml"), begin=False)
-        with np.load(folder / "blocks.npz") as data:
-            arrays = {name: data[name] for name in data.files}
-        joints = sim.joints.load(json.loads((folder / "joints.json").read_text()), folder)
-        sim.restore({"arrays": arrays, "joints": joints}, step)
+        sim = cls(parse((folder / "scene.toml").read_text(), "scene.toml"), fresh=False)
+        sim.restore(states.load(sim, folder), step)
         return sim

@@ -25,6 +25,7 @@ class Watch:
                 "slip_distance": slip_distance(law),
                 "slip_angle": None,
                 "slip_time": None,
+                "slipped_before": sim.slid(moving, base) > slip_distance(law),
             }
         self.lengths = {
             pair: float(sim.points.length[sim.points_between(*pair)].sum()) for pair in self.slips
@@ -33,14 +34,14 @@ class Watch:
     def look(self, sim: Simulation) -> None:
         """Note the base angle at which a joint passes its slip distance."""
         for (moving, base), entry in self.slips.items():
-            if entry["slip_angle"] is None and sim.slid(moving, base) > entry["slip_distance"]:
+            if _waits(entry) and sim.slid(moving, base) > entry["slip_distance"]:
                 entry["slip_angle"] = base_angle(sim, base)
                 entry["slip_time"] = sim.time
 
     @property
     def waiting(self) -> bool:
         """Is there a slip still to come?"""
-        return any(entry["slip_angle"] is None for entry in self.slips.values())
+        return any(_waits(entry) for entry in self.slips.values())
 
     def report(self) -> list[dict]:
         """Measured and predicted slip angles (degrees)."""
@@ -49,6 +50,10 @@ class Watch:
             law = slip_angle(self.scene, *pair, self.lengths[pair])
             out.append({**entry, **law})
         return out
+
+
+def _waits(entry: dict) -> bool:
+    return entry["slip_angle"] is None and not entry["slipped_before"]
 
 
 def base_angle(sim: Simulation, base: int) -> float:

@@ -129,11 +129,11 @@ def caption(record: Record, i: int) -> str:
     for moving, _ in record.scene.watch.get("slip", []):
         name = record.scene.blocks[moving].name
         angle, slid = row[f"{name}: base angle_deg"], 1e3 * abs(row[f"{name}: slid_m"])
-        parts.append(f"{name}: base at {angle:.2f}°, slid {slid:.3g} mm")
+        parts.append(f"{name}: base at {angle:.2f}°, slid {_digits(slid)} mm")
     for moving, _ in record.scene.watch.get("shear", []):
         name = record.scene.blocks[moving].name
         slid, tau = 1e3 * row[f"{name}: slid_m"], 1e-3 * row[f"{name}: shear_Pa"]
-        parts.append(f"{name}: slid {slid:.2f} mm, shear stress {tau:.1f} kPa")
+        parts.append(f"{name}: slid {_digits(slid)} mm, shear stress {tau:.1f} kPa")
     return "; ".join(parts)
 
 
@@ -144,15 +144,19 @@ def final(record: Record, path: Path) -> None:
 
 
 def motion(record: Record, path: Path) -> None:
-    """The whole run as GIF."""
-    n = len(record.times)
-    frames = np.unique(np.linspace(0, n - 1, min(n, FRAMES)).round().astype(int))
+    """The whole run as GIF; more frames where more moves (the time stands in every frame)."""
+    places = np.array(record.motion)[:, :2]
+    moved = np.append(0.0, np.cumsum(np.abs(np.diff(places, axis=0)).max(axis=(1, 2))))
+    even = np.linspace(0.0, 1.0, len(moved))
+    progress = 0.5 * even + 0.5 * (moved / moved[-1] if moved[-1] > 0 else even)
+    wanted = np.linspace(0.0, 1.0, min(len(moved), FRAMES))
+    frames = np.unique(np.searchsorted(progress, wanted - 1e-12))
     scale, images = Scale(record, frames), []
     for i in frames:
         figure = frame_figure(record, i, scale, 75)
         figure.canvas.draw()
         image = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3])
-        images.append(image.quantize(128, dither=Image.Dither.NONE))
+        images.append(image.quantize(256, dither=Image.Dither.NONE))
     pause = [90] * (len(images) - 1) + [2000]
     images[0].save(path, save_all=True, append_images=images[1:], duration=pause, loop=0)
 
@@ -236,6 +240,10 @@ def _all(record: Record) -> range:
 def _outline(record: Record, i: int, b: int) -> np.ndarray:
     x, y, angle = record.motion[i][:3, b]
     return record.scene.blocks[b].local @ turn(angle).T + [x, y]
+
+
+def _digits(millimetres: float) -> str:
+    return f"{millimetres:.2f}" if abs(millimetres) < 10 else f"{millimetres:.0f}"
 
 
 def _round(value: float) -> float:

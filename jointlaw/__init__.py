@@ -4,7 +4,7 @@ The law of A. Misra, Micromechanical model for anisotropic rock joints, J. Geoph
 1999, made incremental and energy-consistent. All quantities are SI: m, Pa, 1/m2.
 """
 
-from . import presets
+from . import closed_form, presets
 from .asperity import Asperity
 from .heights import GammaHeights, Heights
 from .joint import Joint, JointBatch
@@ -13,6 +13,7 @@ from .orientation import Orientation
 from .paths import PathError, closure_test, direct_shear
 from .record import Record
 from .resolution import Resolution
+from .secant import Secant, secant
 from .state import JointState, NonFiniteError, load_state
 
 __version__ = "0.1.0"
@@ -30,8 +31,11 @@ __all__ = [
     "PathError",
     "Record",
     "Resolution",
+    "Secant",
+    "closed_form",
     "closure_test",
     "direct_shear",
     "load_state",
     "presets",
+    "secant",
 ]

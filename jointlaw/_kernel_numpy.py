@@ -17,6 +17,11 @@ import numpy as np
 from ._checks import Array
 from .law import Tables
 
+NEAR = 1e-5  # of y: below such a change of y the chord of G is lost in rounding, the mean is not
+GRAZING = 1e-12  # cosine at which the leash grows taut: its derivative has a pole at 0
+NOTHING = 1e-140  # m: closures below it count as zero, for their powers would underflow
+TINY = 1e-290  # stiffness whose reciprocal might overflow: its energy is nothing
+
 
 class State(NamedTuple):
     """The parts of a state array (rows, B), as views."""
@@ -39,7 +44,7 @@ def closures(k: Tables, closure: Array, offset: Array) -> Array:
     y: Array = k.m[0][:, None] * closure
     for row, o in zip(k.m[1:], offset, strict=True):
         y = y + row[:, None] * o
-    return y
+    return np.where(np.abs(y) < NOTHING, 0.0, y)
 
 
 def cells(k: Tables, y: Array, force: Array, slope: Array) -> tuple[Array, Array]:
@@ -53,6 +58,11 @@ def cells(k: Tables, y: Array, force: Array, slope: Array) -> tuple[Array, Array
     stored = np.clip(force, low_force, high_force) - low_force - low_slope * (reach - low)
     G = kappa * (y - reach) + stored
     return np.clip(G, 0.0, kappa * np.maximum(y - low, 0.0)), kappa
+
+
+def reciprocal(kappa: Array) -> Array:
+    """1/kappa, 0 where there is no stiffness."""
+    return np.divide(1.0, kappa, out=np.zeros_like(kappa), where=kappa > TINY)
 
 
 def compliance(k: Tables) -> Array:
@@ -71,11 +81,12 @@ def drag(k: Tables, offset: Array, p: Array) -> tuple[Array, Array, Array]:
     J = np.broadcast_to(np.eye(size)[:, :, None], (size, *free.shape)).copy()
     slip = np.zeros(free.shape[1])
     D = k.critical_slip
-    taut = np.flatnonzero((np.sum(free**2, axis=0) > D * D) & (np.abs(p).max(axis=0) > 0))
+    # outside by rounding and on the way in is not taut
+    taut = np.flatnonzero((np.sum(free**2, axis=0) > D * D) & (np.sum(free * p, axis=0) > 0))
     if taut.size == 0:
         return free, J, slip
     o, step = offset[:, taut], p[:, taut]
-    length = np.sqrt(np.sum(step**2, axis=0))
+    length = np.hypot(step[0], step[-1] if size == 2 else 0.0)
     e = step / length
     along = np.sum(o * e, axis=0)
     inside = -along + np.sqrt(np.maximum(D * D - np.sum(o**2, axis=0) + along**2, 0.0))
@@ -90,7 +101,7 @@ def drag(k: Tables, offset: Array, p: Array) -> tuple[Array, Array, Array]:
     free[:, taut] = D * (cos1 * e + sin1 * across)
     slip[taut] = D * (x + np.log(bottom / 2))
     # d(angle of the offset) = turn d(angle of e) - sin1/D d(length), and e turns with step
-    grazing = np.maximum(cos, 1e-300)
+    grazing = np.maximum(cos, GRAZING)
     turn = (rest**2 + cos * rest * (1 + decay)) / bottom
     turn = turn + inside / (D * grazing) * (2 * decay / bottom - sin1 * sin)
     new_across = np.array([-free[1, taut], free[0, taut]]) if size == 2 else np.zeros_like(e)
@@ -114,8 +125,9 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     G0, kappa0 = cells(k, y0, *k.curve.force(y0))
     G1, kappa1 = cells(k, y1, force1, slope1)
     dy = (y1 - y0)[:, None]
+    near = np.abs(dy) <= NEAR * np.abs(y1)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
-        chord = np.where(dy == 0, kappa1, (G1 - G0) / dy)
+        chord = np.where(near, 0.5 * (kappa0 + kappa1), (G1 - G0) / dy)
     chord = np.clip(chord, np.minimum(kappa0, kappa1), np.maximum(kappa0, kappa1))
 
     basis = np.stack([k.s, k.t])  # (2, dim, M)
@@ -133,15 +145,11 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
 
     # Dissipation, each term >= 0 as written (law.md section 6, kappa0 <= chord <= kappa1)
     trial2, q2 = size**2, old.q[0] ** 2 + old.q[1] ** 2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        hardening = trial2 / chord * (1 - chord / kappa1) + np.where(
-            kappa0 > 0, q2 / kappa0 * (1 - kappa0 / chord), 0.0
-        )
-        softening = (kappa0 - kappa1) * q2 / kappa0**2
-        lost = np.where(
-            grows, np.where(chord > 0, hardening, 0.0), np.where(kappa0 > 0, softening, 0.0)
-        )
-        lost = lost + np.where(kappa1 > 0, 2 * share * (1 - share) * trial2 / kappa1, 0.0)
+    r0, r1, rc = reciprocal(kappa0), reciprocal(kappa1), reciprocal(chord)
+    hardening = trial2 * (rc - r1) + np.where(kappa0 > TINY, q2 * (r0 - rc), 0.0)
+    softening = (kappa0 - kappa1) * r0 * (q2 * r0)
+    lost = np.where(grows, np.where(chord > TINY, hardening, 0.0), softening)
+    lost = lost + 2 * share * (1 - share) * (trial2 * r1)
     new.dissipated[:] = old.dissipated + np.sum(compliance(k) * lost, axis=(0, 1))
     if slip.any():
         pull = k.n[1:] @ (k.area[:, None] * force1)  # in-plane resultant of the normal forces
@@ -152,10 +160,9 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     # Tangent, law.md section 7: J_q = beta (I - s s^T) E + v g^T per cell, summed over cells
     p = np.where((y1[:, None] > k.depth[:, :-1, None]) & (y1[:, None] < k.depth[:, 1:, None]),
                  k.curve.curvature(y1)[:, None], 0.0)  # fmt: skip
-    near = np.abs(dy) < 1e-7 * np.abs(y1)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         chord_slope = np.where(near, p / 2, (kappa1 - chord) / dy)
-        v = np.where(grows, a * chord_slope * de, np.where(kappa1 > 0, p / kappa1, 0.0) * trial)
+    v = np.where(grows, a * chord_slope * de, p * r1 * trial)
     beta = np.where(kappa1 > 0, a * np.where(grows, chord, kappa1), 0.0)
     unit = np.divide(trial, size, out=np.zeros_like(trial), where=size > 0)
     slips = size > cap
@@ -182,30 +189,31 @@ def traction(k: Tables, state: Array) -> Array:
     return F
 
 
-def shares(k: Tables, state: Array) -> tuple[Array, Array, Array]:
-    """Shares (B) of sliding, partly slipping and separated asperities, law.md section 8b."""
+class Measures(NamedTuple):
+    """What the states of joints amount to, arrays (n,): law.md section 8b."""
+
+    sliding: Array  # share of the asperities in touch whose every cell is at its friction limit
+    slipping: Array  # share of the friction capacity that is at its limit
+    separated: Array  # share of all asperities
+    stored: Array  # elastic energy, J/m2
+    reach: Array  # largest effective closure of any facet, m
+
+
+def measures(k: Tables, state: Array) -> Measures:
+    """Shares, stored energy and reach of a batch of states (rows, B)."""
     now = parts(k, state)
     y = closures(k, now.delta[0], now.offset)
     force, slope = k.curve.force(y)
-    G, _ = cells(k, y, force, slope)
+    G, kappa = cells(k, y, force, slope)
+    q2 = now.q[0] ** 2 + now.q[1] ** 2
     cap = k.mu * k.lam * k.area[:, None, None] * G
-    size = np.sqrt(now.q[0] ** 2 + now.q[1] ** 2)
-    capped = size >= cap * (1 - 1e-9)  # the cap itself, less the rounding of q
+    capped = np.sqrt(q2) >= cap * (1 - 1e-9)  # the cap itself, less the rounding of q
     weight = (k.weight / k.weight.sum())[:, None]
     touches = y > 0
     sliding = np.sum(weight * (touches & np.all(capped | (G == 0), axis=1)), axis=0)
     total = np.where(force > 0, force, 1.0)
     slipping = np.sum(weight * np.sum(np.where(capped, G, 0.0), axis=1) / total, axis=0)
-    return sliding, slipping, np.sum(weight * ~touches, axis=0)
-
-
-def stored_energy(k: Tables, state: Array) -> Array:
-    """Energy (J/m2, (B)) stored in the contacts: normal bed and sliders, law.md section 6."""
-    now = parts(k, state)
-    y = closures(k, now.delta[0], now.offset)
-    _, kappa = cells(k, y, *k.curve.force(y))
-    normal = np.sum((k.area * k.c1)[:, None] * k.curve.energy(y), axis=0)
-    q2 = now.q[0] ** 2 + now.q[1] ** 2
-    elastic = np.divide(q2, kappa, out=np.zeros_like(q2), where=kappa > 0)
-    total: Array = normal + np.sum(compliance(k) * elastic, axis=(0, 1))
-    return total
+    separated = np.sum(weight * ~touches, axis=0)
+    stored = np.sum((k.area * k.c1)[:, None] * k.curve.energy(y), axis=0)
+    stored = stored + np.sum(compliance(k) * q2 * reciprocal(kappa), axis=(0, 1))
+    return Measures(sliding, slipping, separated, stored, np.max(y, axis=0))

@@ -17,6 +17,7 @@ import numpy as np
 from . import __version__, presets, units
 from ._checks import number
 from ._toml import replace_file
+from .figures.command import add_figures_command
 from .joint import JointBatch
 from .law import JointLaw
 from .paths import CONTROLS, PathError, closure_test, direct_shear
@@ -38,6 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _add_closure(commands)
     _add_presets(commands)
     _add_replay(commands)
+    add_figures_command(commands)
     options = parser.parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
     try:
         return int(options.run(options))

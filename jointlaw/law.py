@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 from . import _toml
 from ._checks import Array, above, at_least, number, numbers
@@ -127,11 +126,14 @@ class JointLaw:
 
         return Joint(self)
 
-    def joints(self, n: int) -> JointBatch:
-        """A batch of n unloaded joints of this law, advanced together."""
+    def joints(self, n: int, ledger: bool = True) -> JointBatch:
+        """A batch of n unloaded joints of this law, advanced together.
+
+        Without `ledger` dissipated energy is not added up, which is faster.
+        """
         from .joint import JointBatch
 
-        return JointBatch(self, n)
+        return JointBatch(self, n, ledger)
 
     # ----------------------------------------------------- virgin closure curve
 
@@ -210,6 +212,18 @@ class JointLaw:
         )  # fmt: skip
 
     @cached_property
+    def largest_reach(self) -> float:
+        """Effective closure (m) up to which forces, energies and their squares stay finite."""
+        k, p = self.tables, self.asperity
+        y = 10.0 ** np.arange(-300.0, 101.0)
+        stiffest = float(np.max(k.area / k.c1)) * max(p.lam, 1 / p.lam, 1.0) * (1.0 + p.mu)
+        with np.errstate(over="ignore"):
+            force, slope = self.curve.force(y)
+            worst = stiffest * (force + y * slope) + float(np.max(k.area)) * self.curve.energy(y)
+        bad = ~(worst < 1e140)
+        return float(y[int(np.argmax(bad)) - 1]) if bad.any() else float(y[-1])
+
+    @cached_property
     def fingerprint(self) -> str:
         """Hash of all parameters: states fit only joints of the law that wrote them."""
         return hashlib.sha256(self.to_toml().encode()).hexdigest()
@@ -223,6 +237,8 @@ class JointLaw:
         return float(np.sum(k.area * (k.c1 + np.sin(self.facets.theta) * shear)))
 
     def _closure_at(self, stress: float) -> float:
+        from scipy.optimize import brentq  # a third of the package's import time
+
         if stress < _SMALLEST:
             return 0.0
 
@@ -277,6 +293,6 @@ def depth_nodes(closure_range: float, slope: Array, cells: int) -> Array:
     shear of one closure range on top of the closure.
     """
     reach = closure_range * (1.0 + np.minimum(slope, 10.0))
-    inner = 30.0 ** -(1.0 - np.arange(1, cells) / cells)
+    inner = (np.arange(1, cells) / cells) ** 1.5
     zero, end = np.zeros((len(slope), 1)), np.full((len(slope), 1), np.inf)
     return np.concatenate([zero, reach[:, None] * inner, end], axis=1)

@@ -34,7 +34,7 @@ class Resolution:
 NAMED = {
     "fast": Resolution(2, 3, 1),
     "balanced": Resolution(2, 4, 2),
-    "fine": Resolution(4, 6, 6),
+    "fine": Resolution(6, 6, 10),
     "reference": Resolution(10, 16, 24),
 }
 

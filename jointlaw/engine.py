@@ -1,0 +1,172 @@
+"""Which kernel advances a law's joints, and on how many threads.
+
+Both engines keep states in blocks (blocks, rows, lanes) and offer the same `advance`: numba
+compiles the inner loops (extra `fast`), numpy is the readable reference. JOINTLAW_KERNEL=numpy or
+numba chooses; by default numba is taken where it can be imported. JOINTLAW_THREADS bounds the
+threads.
+"""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _kernel_numpy
+from ._checks import Array, one_of
+from .law import Tables
+
+LANES = 64  # joints per block
+CHUNK = 4096  # joints per call of the numpy kernel: keeps its temporaries in cache
+SERIAL = 20_000  # sliders below which a second thread costs more than it saves
+
+Index = NDArray[np.intp]
+
+
+class Engine(Protocol):
+    """What a batch asks of a kernel."""
+
+    def advance(
+        self,
+        state: Array,
+        d: Array,
+        F: Array,
+        C: Array | None,
+        index: Index | None,
+        keep: bool,
+        ledger: bool,
+    ) -> None:
+        """Advance the joints of `index` (all if None) by d (m, dim): write F, C, state."""
+
+
+def engine(tables: Tables) -> Engine:
+    """The engine for a law's joints."""
+    choice = os.environ.get("JOINTLAW_KERNEL", "")
+    if choice:
+        one_of("JOINTLAW_KERNEL", choice, ("numpy", "numba"))
+    if choice != "numpy":
+        try:
+            return NumbaEngine(tables)
+        except ImportError:
+            if choice == "numba":
+                raise
+    return NumpyEngine(tables)
+
+
+def rows_of(state: Array, n: int, index: Index | None = None) -> Array:
+    """State of n joints, or those of `index`, as a copy (rows, n) with joints last."""
+    if index is None:
+        blocks = -(-n // state.shape[2])
+        part = state[:blocks].transpose(1, 0, 2).reshape(state.shape[1], -1)[:, :n]
+        return np.ascontiguousarray(part)
+    lanes = state.shape[2]
+    return np.ascontiguousarray(state[index // lanes, :, index % lanes].T)
+
+
+def write_rows(state: Array, rows: Array, index: Index) -> None:
+    """Write states (rows, n) of the joints of `index` back into the blocks."""
+    lanes = state.shape[2]
+    state[index // lanes, :, index % lanes] = rows.T
+
+
+class NumpyEngine:
+    """The reference: whole chunks of joints through `_kernel_numpy.step`."""
+
+    def __init__(self, tables: Tables) -> None:
+        self.tables = tables
+
+    def advance(
+        self,
+        state: Array,
+        d: Array,
+        F: Array,
+        C: Array | None,
+        index: Index | None,
+        keep: bool,
+        ledger: bool,
+    ) -> None:
+        """As `Engine.advance`; the ledger is always kept."""
+        where = np.arange(len(d)) if index is None else index
+        for first in range(0, len(d), CHUNK):
+            part = slice(first, first + CHUNK)
+            old = rows_of(state, 0, where[part])
+            new, F_part, C_part = _kernel_numpy.step(self.tables, old, d[part].T, C is not None)
+            F[part] = F_part.T
+            if C is not None and C_part is not None:
+                C[part] = np.moveaxis(C_part, 2, 0)
+            if keep:
+                write_rows(state, new, where[part])
+
+
+class NumbaEngine:
+    """The compiled kernel, on all threads where there is work for them."""
+
+    def __init__(self, tables: Tables) -> None:
+        from . import _kernel_numba as kernel
+
+        self._kernel = kernel
+        self._packed = kernel.pack(tables, _kernel_numpy.compliance(tables).ravel())
+        self._dim = tables.dim
+        self._sliders = len(tables.c1) * tables.cells
+        self._work = [kernel.work(tables.rows)]
+        self._rows = tables.rows
+        self._all = np.empty(0, np.intp)
+        self._none = np.empty((0, tables.dim, tables.dim))
+
+    def advance(
+        self,
+        state: Array,
+        d: Array,
+        F: Array,
+        C: Array | None,
+        index: Index | None,
+        keep: bool,
+        ledger: bool,
+    ) -> None:
+        """As `Engine.advance`."""
+        n = len(d)
+        fixed = (state, d, F, self._none if C is None else C,
+                 self._all if index is None else index, keep)  # fmt: skip
+        options = (self._dim, True if ledger else None, None if C is None else True)
+        threads = 1
+        if n * self._sliders > SERIAL:
+            threads = min(thread_count(), -(-n // LANES))
+        while len(self._work) < threads:
+            self._work.append(self._kernel.work(self._rows))
+        share = -(-n // (threads * LANES)) * LANES  # whole blocks, so threads change no result
+        waiting: list[Future[Any]] = []
+        for k in range(1, threads):
+            span = (min(k * share, n), min((k + 1) * share, n))
+            waiting.append(
+                _pool().submit(
+                    self._kernel.advance, *fixed, *span, *self._work[k], *self._packed, *options
+                )
+            )
+        self._kernel.advance(*fixed, 0, min(share, n), *self._work[0], *self._packed, *options)
+        for one in waiting:
+            one.result()
+
+
+def thread_count() -> int:
+    """Threads that a large batch may use: JOINTLAW_THREADS, or all processors of this process."""
+    asked = os.environ.get("JOINTLAW_THREADS", "")
+    if asked:
+        if not asked.isdigit() or int(asked) < 1:
+            raise ValueError(f"JOINTLAW_THREADS = {asked!r} is out of bounds: a whole number >= 1")
+        return int(asked)
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+_pools: dict[int, ThreadPoolExecutor] = {}
+
+
+def _pool() -> ThreadPoolExecutor:
+    """Threads of this process: a forked child starts its own."""
+    process = os.getpid()
+    if process not in _pools:
+        _pools.clear()
+        _pools[process] = ThreadPoolExecutor(max(thread_count() - 1, 1), "jointlaw")
+    return _pools[process]

@@ -1,0 +1,42 @@
+"""Laws and paths that the verification tests share, in units of the closure range."""
+
+import numpy as np
+from slow_virgin import SlowGamma
+
+import jointlaw as jl
+
+SMOOTH = {"alpha": 3.82, "beta": 1.15, "overlap": 2.0}  # Westerly granite, in um
+
+
+def law(a=3.0, b=0.5, c=0.1, K=1.0, lam=1.2, eta=0.5, mu=0.4, formation=None, **more):
+    """A joint law of unit closure range; `formation` switches the printed smooth heights on."""
+    heights = None if formation is None else jl.GammaHeights(**SMOOTH, formation=formation)
+    more = {"asperity_density": 1.0, "closure_range": 1.0, "resolution": "fine"} | more
+    return jl.JointLaw(
+        orientation=jl.Orientation(a, b, c),
+        asperity=jl.Asperity(K=K, lam=lam, eta=eta, mu=mu),
+        heights=heights,
+        **more,
+    )
+
+
+def slow_heights(formation):
+    """The same heights for the slow bed."""
+    return None if formation is None else SlowGamma(**SMOOTH, formation=formation)
+
+
+def random_corners(rng, n, legs=6):
+    """Corners (n, legs, 3): closing first, then anything, apart in the middle, shut again."""
+    corners = rng.uniform(-1.0, 1.0, (n, legs, 3)) * [0.6, 1.0, 1.0] + [0.4, 0.0, 0.0]
+    corners[:, 0] *= [0.0, 0.3, 0.3]
+    corners[:, 0, 0] = rng.uniform(0.5, 1.0, n)
+    corners[:, legs // 2] *= [0.0, 1.0, 1.0]
+    corners[:, legs // 2, 0] = rng.uniform(-4.0, -3.0, n) * (rng.random(n) < 0.5) - 0.2
+    corners[:, -1, 0] = rng.uniform(0.5, 1.0, n)
+    return corners
+
+
+def increments(corners, steps):
+    """Equal increments (n, legs * steps, 3) through corners (n, legs, 3), from zero."""
+    legs = np.diff(corners, axis=1, prepend=0.0)
+    return np.repeat(legs / steps, steps, axis=1)

@@ -1,0 +1,113 @@
+"""The law as a brute-force bed: fixed linear springs with sliders, no lumping, no shortcuts.
+
+Every orientation carries many linear unilateral springs that touch at fixed closures z_j. Each has
+its own Coulomb slider. Slow and obvious: it exists to judge the package and shares no code with it.
+"""
+
+import numpy as np
+from slow_virgin import virgin
+
+
+def cap_quadrature(a, b, c, n_u, n_phi):
+    """Contact normals (m, 3) and weights (m,) that integrate Eq. 14 in u = cos(a theta) and phi."""
+    x, g = np.polynomial.legendre.leggauss(n_u)
+    u = np.repeat(0.5 * (x + 1.0), n_phi)
+    phi = np.tile(2.0 * np.pi * np.arange(n_phi) / n_phi, n_u)
+    theta = np.arccos(u) / a
+    weight = np.repeat(0.5 * g, n_phi) / n_phi
+    weight *= 1.0 + 0.5 * b * (3.0 * u**2 - 1.0) + 3.0 * c * (1.0 - u**2) * np.cos(2.0 * phi)
+    sin = np.sin(theta)
+    return np.stack([np.cos(theta), sin * np.cos(phi), sin * np.sin(phi)], axis=1), weight
+
+
+def depth_bins(y_max, n_depth, eta, heights):
+    """Touch depths z (n,) and stiffnesses k (n,): sum k = Phi', sum k (y - z) = Phi at every edge.
+
+    k is Phi'' integrated over its bin; z is the centroid of Phi'' in the bin. A finite Phi'(0)
+    is one more spring at z = 0. Edges crowd towards touch, where Phi'' may be singular.
+    """
+    edges = y_max * (np.arange(n_depth) / (n_depth - 1.0)) ** 2
+    phi, slope = np.array([virgin(e, eta, heights) for e in edges]).T
+    k = np.diff(slope)
+    moment = np.diff(phi) - slope[:-1] * np.diff(edges)  # int Phi''(t) (right edge - t) dt
+    z = edges[1:] - np.divide(moment, k, out=np.diff(edges) / 2.0, where=k > 0.0)
+    return np.append(0.0, z), np.append(slope[0], k)
+
+
+class SlowBed:
+    """One joint. `reach` (m,) is the largest closure y that each orientation will see."""
+
+    def __init__(
+        self, normals, weights, reach, *, K, lam, eta, mu, density, heights=None, n_depth=240,
+        max_step=np.inf, critical_slip=np.inf,
+    ):  # fmt: skip
+        self.n, self.c1 = normals, normals[:, 0]
+        self.lam, self.mu = lam, mu
+        self.scale = density * weights * lam * K * self.c1 ** (1.0 + eta)
+        reach = [float(f"{r:.12g}") for r in reach]  # rows of equal tilt share their depths
+        bins = {r: depth_bins(r, n_depth, eta, heights) for r in set(reach)}
+        pairs = [bins[r] for r in reach]
+        self.z = np.array([p[0] for p in pairs])
+        self.k = np.array([p[1] for p in pairs])
+        self.max_step, self.critical_slip = max_step, critical_slip
+        azimuth = np.arctan2(normals[:, 2], normals[:, 1])
+        cos, sin, sin_theta = np.cos(azimuth), np.sin(azimuth), np.hypot(*normals[:, 1:].T)
+        s = np.stack([-sin_theta, self.c1 * cos, self.c1 * sin], axis=1)  # Eq. 25
+        t = np.stack([0.0 * azimuth, -sin, cos], axis=1)
+        self.basis = np.stack([s, t], axis=1)  # (m, 2, 3)
+        self.delta, self.offset = np.zeros(3), np.zeros(2)
+        self.y = np.zeros(len(normals))
+        self.e = np.zeros((2, *self.z.shape))  # in-plane stretch of every spring
+
+    def update(self, d):
+        """Advance by the increment d (3,) in equal small steps; return the traction (3,)."""
+        d = np.asarray(d, dtype=float)
+        pieces = max(1, int(np.ceil(np.linalg.norm(d) / self.max_step)))
+        for _ in range(pieces):
+            self._small_step(d / pieces)
+        return self.traction()
+
+    def _small_step(self, d):
+        self.delta = self.delta + d
+        self.offset = self.offset + d[1:]
+        pull = np.hypot(*self.offset)
+        if pull > self.critical_slip:  # the leash is taut: drag its end, small step by small step
+            self.offset *= self.critical_slip / pull
+        y0, self.y = self.y, self._closure()
+        y1 = self.y
+        touching = y1[:, None] > self.z
+        # a spring that touches inside the step has moved along the facet only since its touch
+        rise = np.where(y1 > y0, y1 - y0, 1.0)[:, None]
+        part = np.where(y0[:, None] < self.z, (y1[:, None] - self.z) / rise, 1.0) * touching
+        de = self.basis @ d  # (m, 2)
+        free = self.e * touching + part * de.T[:, :, None]
+        limit = self.mu * self.lam * self.c1[:, None] * np.clip(y1[:, None] - self.z, 0.0, None)
+        size = np.sqrt(free[0] ** 2 + free[1] ** 2)
+        self.e = free * (limit / np.maximum(size, np.maximum(limit, 1e-300)))
+
+    def _closure(self):
+        return self.delta[0] + self.n[:, 1:] @ self.offset / self.c1
+
+    def facet_forces(self):
+        """Normal (m,) and shear (m, 2) force of every orientation, per area of joint."""
+        normal = self.scale * np.sum(self.k * np.clip(self.y[:, None] - self.z, 0.0, None), axis=1)
+        return normal, (self.scale / (self.c1 * self.lam) * np.sum(self.k * self.e, axis=2)).T
+
+    def traction(self):
+        """Sum of the facet forces, axis 1 the joint normal."""
+        normal, shear = self.facet_forces()
+        return normal @ self.n + np.einsum("oi,oij->j", shear, self.basis)
+
+    def stored(self):
+        """Energy in all springs, per area."""
+        squeeze = np.clip(self.y[:, None] - self.z, 0.0, None)
+        normal = self.scale * self.c1 * np.sum(self.k * squeeze**2, axis=1)
+        shear = self.scale / (self.c1 * self.lam) * np.sum(self.k * np.sum(self.e**2, axis=0), 1)
+        return 0.5 * float(np.sum(normal + shear))
+
+
+def reach_of(path, normals, margin=1.0 + 1e-9):
+    """Largest closure y of every orientation along a path of displacements (steps, 3)."""
+    tilt = np.hypot(normals[:, 1], normals[:, 2]) / normals[:, 0]
+    shear = np.max(np.hypot(path[:, 1], path[:, 2]))
+    return margin * (np.max(np.clip(path[:, 0], 0.0, None)) + tilt * shear)

@@ -1,0 +1,52 @@
+"""The virgin curve Phi(y) and its slope straight from their definitions, one integral a value."""
+
+import math
+from dataclasses import dataclass
+
+from scipy.integrate import quad
+from scipy.special import gammainc, gammaln
+
+
+@dataclass(frozen=True)
+class SlowGamma:
+    """Gamma heights of Eq. 12 with the overlap r0 at zero closure."""
+
+    alpha: float
+    beta: float
+    overlap: float
+    formation: str
+
+    def density(self, r):
+        """H(r), Eq. 12."""
+        if r <= 0.0:
+            return 0.0
+        x = r / self.beta
+        return math.exp(self.alpha * math.log(x) - x - gammaln(self.alpha + 1.0)) / self.beta
+
+    def cumulative(self, r):
+        """P(r), the share of asperities that overlap by less than r."""
+        return float(gammainc(self.alpha + 1.0, max(r, 0.0) / self.beta))
+
+
+def virgin(y, eta, heights=None):
+    """Phi(y) and Phi'(y) of a single closure y >= 0."""
+    if y <= 0.0:
+        p0 = 1.0 if heights is None else heights.cumulative(heights.overlap)
+        return 0.0, (p0 if eta == 0.0 else 0.0)
+    force, slope = y ** (1.0 + eta), (1.0 + eta) * y**eta
+    if heights is None:
+        return force, slope
+    r0 = heights.overlap
+    if heights.formation == "population":
+        p, h = heights.cumulative(r0 + y), heights.density(r0 + y)
+        return p * force, p * slope + h * force
+    p0 = heights.cumulative(r0)
+
+    def new(power):
+        def f(s):
+            return heights.density(r0 + s)
+
+        # quad's algebraic weight (y - s)**power: no loss at the end where contacts are born
+        return quad(f, 0.0, y, weight="alg", wvar=(0.0, power), epsrel=1e-12, epsabs=0.0)[0]
+
+    return p0 * force + new(1.0 + eta), p0 * slope + (1.0 + eta) * new(eta)

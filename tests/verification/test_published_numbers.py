@@ -1,0 +1,104 @@
+"""Figures of the paper and of this law that were computed before the package existed."""
+
+import numpy as np
+import pytest
+from builders import law
+from scipy.integrate import quad
+from scipy.optimize import bisect
+
+import jointlaw as jl
+
+STEP = 0.0025
+FRICTION = {  # F2/F1 at delta_2 = 1, 2, 4, closure 1, linear, mu = 0.6, K_n = K_s
+    2.0: (0.7157, 1.0739, 1.3032),
+    3.0: (0.6393, 0.8097, 0.9463),
+    6.0: (0.6179, 0.6482, 0.6959),
+}
+NORMAL = {3.0: (0.887, 0.820, 0.845)}  # F1/F1(0), printed to three digits
+
+
+@pytest.mark.parametrize("a", FRICTION)
+def test_shear_at_fixed_closure(a):
+    """Incremental law, closed in one step, then sheared in steps of 0.0025."""
+    joint = law(a=a, b=0.0, c=0.0, lam=1.0, eta=0.0, mu=0.6, plane=0.0,
+                resolution=jl.Resolution(60, 60, 1)).joint()  # fmt: skip
+    first = joint.update([1.0, 0.0], tangent=False)[0][0]
+    friction, normal = [], []
+    for k in range(1, round(4.0 / STEP) + 1):
+        F = joint.update([0.0, STEP], tangent=False)[0]
+        if k * STEP in (1.0, 2.0, 4.0):
+            friction.append(F[1] / F[0])
+            normal.append(F[0] / first)
+    # printed to four digits; step and 60 x 60 orientations leave less than 1e-4
+    assert friction == pytest.approx(FRICTION[a], abs=2e-4)
+    if a in NORMAL:
+        assert normal == pytest.approx(NORMAL[a], abs=6e-4)  # half a unit of the third digit
+
+
+@pytest.mark.parametrize("a", [2.0, 3.0, 6.0])
+def test_first_separation(a):
+    """Contacts part first at delta_2/delta_1 = cot(pi/(2a)), at the rim of the cap."""
+    rule = jl.Resolution(200, 200, 1)
+    joint = law(a=a, b=0.0, c=0.0, eta=0.0, plane=0.0, resolution=rule).joint()
+    joint.update([1.0, 0.0], tangent=False)
+    start = joint.snapshot()
+
+    def parted(d2):
+        joint.restore(start)
+        joint.update([0.0, d2], tangent=False)
+        return 1.0 if joint.separated > 0.0 else -1.0
+
+    exact = 1.0 / np.tan(np.pi / (2.0 * a))
+    # the outermost node lies 4e-5 in u and half an azimuth, 3e-5, inside the rim
+    assert bisect(parted, 0.5 * exact, 2.0 * exact, xtol=1e-7) == pytest.approx(exact, rel=1e-4)
+
+
+@pytest.mark.parametrize(("a", "degrees"), [(3.0, 19.1), (6.0, 9.5)])
+def test_mean_inclination(a, degrees):
+    for b in (-1.0, 0.0, 1.3):
+        o = jl.Orientation(a, b, 0.1)
+
+        def moment(power, o=o):
+            def ring(theta):  # cos 2 phi averages out over 8 azimuths
+                azimuths = np.arange(8) * np.pi / 4
+                density = np.mean([o.density(theta, phi) for phi in azimuths])
+                return 2 * np.pi * np.sin(theta) * theta**power * density
+
+            return quad(ring, 0.0, np.pi / (2 * a), epsabs=1e-13)[0]
+
+        mean = (6.0 - b) / (6.0 * a)  # Eq. 17
+        variance = (36 * np.pi - 108 + 20 * b - 6 * b * np.pi - b * b) / (36 * a**2)
+        assert moment(0) == pytest.approx(1.0, abs=1e-11)  # Eq. 15
+        assert moment(1) == pytest.approx(mean, abs=1e-11)
+        assert moment(2) - mean**2 == pytest.approx(variance, abs=1e-11)
+        assert (o.mean, o.variance) == pytest.approx((mean, variance), abs=1e-14)
+    assert np.degrees(jl.Orientation(a, 0.0, 0.0).mean) == pytest.approx(degrees, abs=0.05)
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.2, 0.5])
+def test_initial_stiffness_ratio_of_a_smooth_joint(nu):
+    """C22/C11 tends to 2 (1 - nu)/(2 - nu), Eq. 27, as a grows."""
+    ratios = []
+    for a in (200.0, 400.0, 2000.0):
+        smooth = jl.JointLaw(
+            orientation=jl.Orientation(a, 0.0, 0.0),
+            asperity=jl.Asperity.hertz_mindlin(G=20e9, nu=nu, R=40e-6, mu=0.6),
+            asperity_density=1e10,
+            closure_range=1e-6,
+            resolution="reference",
+        )
+        joint = smooth.joint()
+        joint.update([1e-6, 0.0, 0.0])
+        C = joint.trial([0.0, 0.0, 0.0])[1]
+        ratios.append(C[1, 1] / C[0, 0] - 2.0 * (1.0 - nu) / (2.0 - nu))
+    # second order in the inclination 1/a: four times less per doubling, and higher orders
+    assert ratios[0] / ratios[1] == pytest.approx(4.0, rel=0.05)
+    assert ratios[2] == pytest.approx(0.0, abs=1e-5)
+
+
+def test_shear_can_be_stiffer_than_closure():
+    """a = 1, b = -1, K_s/K_n = 0.5: C22/C11 = 0.7/0.6, section 3.1."""
+    joint = law(a=1.0, b=-1.0, c=0.0, lam=2.0, eta=0.0, mu=1e9, resolution="reference").joint()
+    joint.update([1.0, 0.0, 0.0])
+    C = joint.trial([0.0, 0.0, 0.0])[1]
+    assert C[1, 1] / C[0, 0] == pytest.approx(0.7 / 0.6, abs=1e-10)  # polynomial in u: exact

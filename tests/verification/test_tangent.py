@@ -1,0 +1,79 @@
+"""The tangent against central differences: a V-curve of slope 2, then rounding."""
+
+import numpy as np
+import pytest
+from builders import law
+
+STEPS = np.geomspace(3e-3, 3e-7, 30)  # in closure ranges
+
+# name: law, steps that lead to the state, the step whose tangent is checked
+STATES = {
+    "stick": ({"mu": 5.0}, [[0.5, 0.02, 0.01]], [0.21, 0.03, -0.02]),
+    "slip": ({"mu": 0.3, "a": 8.0}, [[0.6, 0.0, 0.0], [0.0, 0.9, 0.3]], [-0.13, 0.5, 0.4]),
+    "mixed": ({"mu": 0.4}, [[0.6, 0.0, 0.0], [0.05, 0.1, 0.04]], [0.11, 0.15, 0.06]),
+    "unloading": ({"mu": 0.4}, [[0.9, 0.1, 0.0], [0.0, 0.15, 0.1]], [-0.25, -0.08, -0.05]),
+    "parted": ({"mu": 0.4, "a": 1.2}, [[0.4, 0.0, 0.0], [0.1, 0.8, 0.5]], [-0.31, 0.15, 0.19]),
+    "touching": ({"mu": 0.4, "a": 2.0}, [[-0.2, 0.3, 0.1]], [0.57, 0.25, 0.13]),
+}
+IS = {
+    "stick": lambda joint: joint.slipping == 0.0,
+    "slip": lambda joint: joint.sliding > 1.0 - 1e-12,
+    "mixed": lambda joint: 0.1 < joint.slipping < 0.9,
+    "unloading": lambda joint: joint.slipping < 0.5,
+    "parted": lambda joint: 0.0 < joint.separated < 1.0,
+    "touching": lambda joint: joint.separated < 0.5,
+}
+OPTIONS = {
+    "plain": {},
+    "population": {"formation": "population"},
+    "individual": {"formation": "individual"},
+    "leash": {"critical_slip": 0.2},
+    "taut leash, heights": {"critical_slip": 0.12, "formation": "population"},
+    "concave stiffness": {"eta": 0.2},
+}
+
+
+def v_curve(copies, d):
+    """Relative error of the tangent at the step d for every difference step.
+
+    `copies` hold one and the same state, 2 dim for every difference step.
+    """
+    dim = len(d)
+    nudge = (STEPS[:, None, None, None] * np.eye(dim)[:, None] * [[1.0], [-1.0]]).reshape(-1, dim)
+    F = copies.trial(d + nudge, tangent=False)[0].reshape(len(STEPS), dim, 2, dim)
+    difference = (F[:, :, 0] - F[:, :, 1]) / (2.0 * STEPS[:, None, None])
+    exact = copies.trial(d[None], where=[0])[1][0]
+    return np.abs(difference - exact.T).max(axis=(1, 2)) / np.abs(exact).max()
+
+
+def descent_slope(errors):
+    """Slope of the V-curve over the six steps above ten times rounding."""
+    last = int(np.argmin(errors))
+    while last > 5 and errors[last] < 2e-10:
+        last -= 1
+    part = slice(last - 5, last + 1)
+    return np.polyfit(np.log(STEPS[part]), np.log(errors[part]), 1)[0]
+
+
+@pytest.mark.parametrize("plane", [None, 0.6])
+@pytest.mark.parametrize("option", OPTIONS)
+@pytest.mark.parametrize("state", STATES)
+def test_tangent(state, option, plane):
+    parameters, path, d = STATES[state]
+    one = law(**parameters, **OPTIONS[option], plane=plane)
+    dim = 3 if plane is None else 2
+    joint, copies = one.joint(), one.joints(2 * dim * len(STEPS))
+    for step in path:
+        joint.update(step[:dim])
+        copies.update(np.tile(step[:dim], (len(copies), 1)), tangent=False)
+    d = np.array(d[:dim])
+    curves = [v_curve(copies, (1.0 + 0.02 * k) * d) for k in range(3)]
+    # second order wherever no slider changes branch within the difference: a wrong tangent is
+    # wrong at all three steps, a kink spoils one
+    slope, least = min(
+        ((descent_slope(curve), curve.min()) for curve in curves), key=lambda v: abs(v[0] - 2.0)
+    )
+    assert slope == pytest.approx(2.0, abs=0.1)
+    assert least < 1e-8  # eps^(2/3) of rounding is 4e-11; the promise is 1e-8
+    joint.update(d)
+    assert IS[state](joint)

@@ -1,0 +1,101 @@
+"""The virgin curve and its bounds, against integrals written independently."""
+
+import numpy as np
+import pytest
+from builders import law, slow_heights
+from slow_bed import cap_quadrature
+from slow_virgin import SlowGamma, virgin
+
+import jointlaw as jl
+
+FORMATIONS = [None, "population", "individual"]
+FAR = [1e-4, 0.01, 0.3, 1.0, 3.0, 12.0, 60.0, 500.0]  # closure ranges
+
+
+def closure_stress(y, formation, eta, mu, lam=1.2, a=3.0, b=0.5):
+    """F1 under pure closure: each facet at min(tan/lam, mu) of its normal force."""
+    n, w = cap_quadrature(a, b, 0.0, 60, 8)  # a kink in theta: second order in 60
+    c1, s1 = n[:, 0], np.hypot(n[:, 1], n[:, 2])
+    per_facet = w * lam * c1 ** (1.0 + eta) * (c1 + s1 * np.minimum(s1 / c1 / lam, mu))
+    return per_facet.sum() * virgin(y, eta, slow_heights(formation))[0]
+
+
+@pytest.mark.parametrize("formation", FORMATIONS)
+@pytest.mark.parametrize("eta", [0.3, 0.5, 1.0])
+def test_closure_from_tiny_to_huge(formation, eta):
+    one = law(eta=eta, mu=5.0, formation=formation, resolution="reference")
+    for y in FAR:
+        exact = closure_stress(y, formation, eta, mu=5.0)
+        # the curve's table is asked for 1e-10 of its largest value, P(r0) is 0.06 of that
+        assert one.normal_stress(y) == pytest.approx(exact, rel=1e-8)
+        joint = one.joint()
+        assert joint.update([y, 0.0, 0.0])[0][0] == pytest.approx(exact, rel=1e-8)
+        assert one.closure(exact) == pytest.approx(y, rel=1e-8)
+
+
+@pytest.mark.parametrize("formation", FORMATIONS)
+def test_normal_force_far_beyond_the_closure_range_under_shear(formation):
+    n, w = cap_quadrature(2.0, 0.0, 0.0, 80, 160)
+    one = law(a=2.0, b=0.0, c=0.0, mu=0.0, formation=formation, resolution="reference")
+    delta = np.array([40.0, 15.0, -9.0])
+    y = n @ delta / n[:, 0]
+    grid = np.linspace(0.0, 60.0, 400)
+    phi = [virgin(g, 0.5, slow_heights(formation))[0] for g in grid]
+    phi = np.interp(y, grid, phi)
+    exact = (w * 1.2 * n[:, 0] ** 1.5 * phi) @ n
+    F = one.joint().update(delta)[0]
+    # interpolated on 400 points, (60/400)^2 Phi''/8 = 1e-5 of F1
+    assert np.allclose(F, exact, rtol=0.0, atol=1e-4 * exact[0])
+
+
+def build(eta, alpha, beta, overlap, formation="population"):
+    """A law with these gamma heights."""
+    return jl.JointLaw(
+        orientation=jl.Orientation(3.0, 0.0, 0.0),
+        asperity=jl.Asperity(K=1.0, lam=1.0, eta=eta, mu=0.4),
+        heights=jl.GammaHeights(alpha=alpha, beta=beta, overlap=overlap, formation=formation),
+        asperity_density=1.0,
+        closure_range=1.0,
+    )
+
+
+@pytest.mark.parametrize(
+    ("heights", "least"), [((3.82, 1.15, 2.0), 0.287), ((6.14, 3.52, 12.0), 0.312)]
+)
+def test_printed_heights_are_convex_from_a_known_exponent(heights, least):
+    # the two exponents are known to three digits
+    with pytest.raises(ValueError, match=r"convex.*individual"):
+        build(least - 0.001, *heights)
+    build(least + 0.001, *heights)
+
+
+def test_narrow_heights_need_individual_formation():
+    for narrow in ((20.0, 0.2, 0.1), (50.0, 0.05, 0.1), (8.0, 0.5, 0.5)):
+        y = np.linspace(0.01, 2.0 * narrow[1] * (narrow[0] + 1.0), 400)
+        slope = [virgin(v, 0.5, SlowGamma(*narrow, "population"))[1] for v in y]
+        assert np.diff(slope).min() < 0.0  # the slope does fall
+        with pytest.raises(ValueError, match=r"convex.*individual"):
+            build(0.5, *narrow)
+        build(0.5, *narrow, formation="individual")
+
+
+@pytest.mark.parametrize("critical_slip", [np.inf, 0.3])
+@pytest.mark.parametrize("lam", [0.6, 1.3])
+@pytest.mark.parametrize("formation", FORMATIONS)
+def test_stiffness_bound_holds_in_random_states(formation, lam, critical_slip):
+    rng = np.random.default_rng(9)
+    one = law(a=2.0, mu=0.8, lam=lam, formation=formation, critical_slip=critical_slip)
+    joints = one.joints(60)
+    tan = np.tan(np.pi / 4.0)  # the rim of the cap at a = 2
+    closest = 0.0
+    for _ in range(12):
+        d = rng.normal(0.0, 0.4, (60, 3))
+        d[:, 0] += 0.3 - 0.5 * joints.delta[:, 0]
+        C = joints.update(d)[1]
+        shear = np.hypot(*joints.delta[:, 1:].T)
+        y = joints.delta[:, 0] + tan * np.minimum(shear, critical_slip)  # no facet sees more
+        size = np.linalg.norm(C, 2, axis=(1, 2))
+        bound = one.max_stiffness(np.maximum(y, 0.0))
+        assert np.all(size <= bound * (1.0 + 1e-12))
+        closest = max(closest, np.max(size[bound > 0.0] / bound[bound > 0.0]))
+    assert closest > 0.3  # a bound, but not an empty one

@@ -7,6 +7,7 @@ table: two numbers in (closure, shear), two numbers out (normal and shear tracti
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -47,6 +48,16 @@ class CoulombLaw:
         return np.full(np.shape(closure), stiffest) if np.ndim(closure) else stiffest
 
 
+class Measures(NamedTuple):
+    """As in ``jointlaw``; one slider per joint, so partial slip is sliding."""
+
+    sliding: np.ndarray
+    slipping: np.ndarray
+    separated: np.ndarray
+    stored: np.ndarray
+    reach: np.ndarray
+
+
 class CoulombState:
     """A copy of a batch's state that can be written to a file."""
 
@@ -76,10 +87,10 @@ class CoulombJoints:
         self.sliding = np.zeros(n)
         self.separated = np.ones(n)
 
-    @property
-    def slipping(self) -> np.ndarray:
-        """Partial slip: one slider per joint, so the same as ``sliding``."""
-        return self.sliding
+    def measures(self) -> Measures:
+        """Shares, stored energy and largest closure, as arrays (n,)."""
+        shares = self.sliding, self.sliding, self.separated
+        return Measures(*shares, self.stored_energy, self.delta[:, 0])
 
     def update(self, d, where=None, tangent=False):
         """Move by ``d`` (m, 2) and return the traction ``F`` (m, 2) and ``C`` or None."""

@@ -14,6 +14,8 @@ import numpy as np
 
 from .laws import StiffnessCurve, load_state
 
+MEASURED = ("sliding", "slipping", "separated", "stored", "lost")
+
 Identity = tuple[tuple[int, int, int, int], int]
 
 
@@ -46,6 +48,7 @@ class Joints:
                 where = None if straight else slots
                 self.groups.append((name, slice(None) if all_points else np.array(rows), where))
         self.n = len(points)
+        self.measure()
 
     def _place(self, name: str, wanted: list[Identity]) -> np.ndarray:
         taken, free, batch = self._slots[name], self._free[name], self.batches[name]
@@ -70,7 +73,17 @@ class Joints:
         F = np.empty((self.n, 2))
         for name, rows, where in self.groups:
             F[rows] = self.batches[name].update(d[rows], where=where, tangent=False)[0]
+        self.measure()
         return F
+
+    def measure(self) -> None:
+        """Take the shares and energies of now: sliding, slipping, separated, stored, lost."""
+        self.now: dict[str, np.ndarray] = {what: np.zeros(self.n) for what in MEASURED}
+        for name, rows, where in self.groups:
+            batch = self.batches[name]
+            values = [*batch.measures()[:4], batch.dissipated_energy]
+            for what, value in zip(MEASURED, values, strict=True):
+                self.now[what][rows] = value if where is None else value[where]
 
     def trial(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Tractions (k, 2) and tangents (k, 2, 2) for d, leaving the state alone."""
@@ -80,18 +93,11 @@ class Joints:
         return F, C
 
     def read(self, what: str) -> np.ndarray:
-        """A property of all joints: "delta", "F", "sliding", "stored_energy", ..."""
-        parts = []
-        for name, _, where in self.groups:
+        """A property of all joints with two components: "delta" or "F"."""
+        out = np.zeros((self.n, 2))
+        for name, rows, where in self.groups:
             value = getattr(self.batches[name], what)
-            parts.append(value if where is None else value[where])
-        if len(self.groups) == 1:
-            return parts[0]
-        out = np.zeros(
-            (self.n, *(parts[0].shape[1:] if parts else (2,) * (what in ("delta", "F"))))
-        )
-        for (_, rows, _), part in zip(self.groups, parts, strict=True):
-            out[rows] = part
+            out[rows] = value if where is None else value[where]
         return out
 
     def stiffness(self, stress: np.ndarray) -> np.ndarray:

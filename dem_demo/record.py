@@ -105,7 +105,7 @@ def _joints(sim: Simulation) -> dict[str, np.ndarray]:
     """Joints that touch or almost touch."""
     points, edges, m = sim.points, sim.edges, len(sim.edges.first)
     keep = points.length > 0
-    delta, read = sim.joints.read("delta"), sim.joints.read
+    delta, now = sim.joints.read("delta"), sim.joints.now
     along = (points.at[:, m : 2 * m] - points.at[:, :m])[:, edges.of]
     # The stretch of joint that a law point stands for: half at the ends, whole between.
     at, w = points.at, edges.weight
@@ -113,8 +113,8 @@ def _joints(sim: Simulation) -> dict[str, np.ndarray]:
     ends = np.stack([at - before * along, at + (w - before) * along], axis=0)
     who = np.array([[*key, place] for key, place in sim.identity], int).reshape(-1, 5)
     values = np.column_stack(
-        [points.closure, delta[:, 1], *sim.traction.T, read("sliding"), read("slipping"),
-         read("separated"), points.length]
+        [points.closure, delta[:, 1], *sim.traction.T, now["sliding"], now["slipping"],
+         now["separated"], points.length]
     )  # fmt: skip
     return {
         "who": who[keep],

@@ -110,7 +110,7 @@ class Simulation:
         push = np.maximum(-run.dashpot_normal * damping * points.along[0], -pressed)
         if not run.dashpot_shear:
             return push, np.zeros(len(push))
-        stick = 1.0 - self.joints.read("separated") - self.joints.read("slipping")
+        stick = 1.0 - self.joints.now["separated"] - self.joints.now["slipping"]
         return push, -run.dashpot_shear * damping * np.maximum(stick, 0.0) * points.along[1]
 
     def _damping(self) -> np.ndarray:
@@ -137,7 +137,7 @@ class Simulation:
         return ((a == one) & (b == other)) | ((a == other) & (b == one))
 
     def joint_energies(self, points: geometry.Points):
-        return self.area, self.joints.read("stored_energy"), self.joints.read("dissipated_energy")
+        return self.area, self.joints.now["stored"], self.joints.now["lost"]
 
     def arrange(self) -> None:
         """Joints, masses and books for a new list of edge pairs."""
@@ -153,8 +153,8 @@ class Simulation:
         self._checked = np.zeros(self.joints.n)
         if before is not None:
             area = np.array([before.get(who, 0.0) for who in self.identity])
-            energies = self.joints.read("stored_energy"), self.joints.read("dissipated_energy")
-            self.ledger.remember(self.ledger.forces, area, *energies)
+            now = self.joints.now
+            self.ledger.remember(self.ledger.forces, area, now["stored"], now["lost"])
 
     # ----------------------------------------------------------------- guards
 

@@ -75,5 +75,5 @@ def joint_state(sim: Simulation, moving: int, base: int) -> dict[str, float]:
         "shear": float(share @ F[:, 1]),
         "closure": float(share @ delta[:, 0]),
         "slid": float(share @ delta[:, 1]),
-        "sliding": float(share @ sim.joints.read("sliding")[here]),
+        "sliding": float(share @ sim.joints.now["sliding"][here]),
     }

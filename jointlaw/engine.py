@@ -61,7 +61,7 @@ def rows_of(state: Array, n: int, index: Index | None = None) -> Array:
     if index is None:
         blocks = -(-n // state.shape[2])
         part = state[:blocks].transpose(1, 0, 2).reshape(state.shape[1], -1)[:, :n]
-        return np.ascontiguousarray(part)
+        return np.array(part, order="C")  # never a view
     lanes = state.shape[2]
     return np.ascontiguousarray(state[index // lanes, :, index % lanes].T)
 

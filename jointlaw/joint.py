@@ -37,6 +37,13 @@ class JointBatch:
         self._reach = 0.0  # no facet's effective closure exceeds it, in either sense
         self._stretch = 1.0 + 2.0 * float(np.max(np.abs(law.tables.m)))  # of y over that of d
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {k: v for k, v in self.__dict__.items() if k != "_engine"}  # holds compiled code
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._engine = engine(self.law.tables)
+
     def __len__(self) -> int:
         return self._n
 

@@ -166,7 +166,7 @@ class _Log:
         joint = self.joint
         here = float(joint.delta[0])
         size = max(abs(here), float(np.max(np.abs(shear), initial=0.0)))
-        reach = size or float(joint.law.closure(goal.scale))
+        length = reach = size or float(joint.law.closure(goal.scale))
         u, low, high = 0.0, -math.inf, math.inf
         for _ in range(200):
             F, C = joint.trial(np.concatenate([[u], shear]))
@@ -174,7 +174,8 @@ class _Log:
             if abs(value) <= TOLERANCE * goal.scale and not (F[0] == 0.0 and value == 0.0):
                 return u
             low, high = (u, high) if value <= 0 else (low, u)
-            if high - low <= 4e-16 * max(abs(here + u), reach):
+            finest = 4e-16 * max(abs(here + u), length)  # what rounding of the closure leaves
+            if high - low <= finest:
                 return high
             slope = goal.spring + (float(C[0, 0]) if C is not None else 0.0)
             newton = u - value / slope if slope > 0 else math.nan
@@ -182,6 +183,8 @@ class _Log:
                 bound = u + reach if math.isinf(high) else u - reach
                 if not (math.isfinite(newton) and abs(newton - u) < abs(bound - u)):
                     newton = bound
+                if abs(newton - u) < finest:  # there but for rounding: step across, to bracket it
+                    newton = u + math.copysign(finest, bound - u)
                 reach *= 2.0
                 u = newton
                 continue

@@ -14,7 +14,8 @@ def add_figures_command(subparsers: Any) -> None:
         "figures",
         help=what,
         description=what,
-        epilog="example: jointlaw figures 14 15 --out out; jointlaw figures --claims table-1",
+        epilog="example:\n  jointlaw figures 14 15 --out out\n  jointlaw figures --claims table-1",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("numbers", metavar="N", nargs="*", type=int, help="figures (default: all)")
     parser.add_argument("--out", type=Path, help="folder for PNG, CSV and summary.json")

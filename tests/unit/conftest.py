@@ -9,7 +9,7 @@ import jointlaw as jl
 
 # Derandomized: the same cases on every machine, so that a failure is a change of the code.
 hypothesis.settings.register_profile(
-    "jointlaw", deadline=None, max_examples=60, derandomize=True, database=None
+    "jointlaw", deadline=None, max_examples=40, derandomize=True, database=None
 )
 hypothesis.settings.load_profile("jointlaw")
 

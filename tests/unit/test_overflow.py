@@ -106,3 +106,14 @@ def test_any_finite_increment_passes_or_raises_and_leaves_the_state(
                 assert np.isfinite(C).all()
                 assert joint.stored_energy >= 0.0
                 assert joint.dissipated_energy >= 0.0
+
+
+@pytest.mark.parametrize("alpha", [20.0, 100.0])
+def test_next_to_no_asperity_in_touch_is_no_overflow(make_law, replays, alpha):
+    """Far below the asperities the slope of the virgin curve is 1e-200; its square is no number."""
+    law = make_law(heights=jl.GammaHeights(alpha, 1.15e-6, 1e-7, "individual"))
+    joint = law.joint()
+    for d in ([1e-7, 0, 0], [0, 0, 0], [-5e-8, 1e-8, 0], [-1e-6, 0, 0], [2e-6, 1e-6, 0]):
+        F, C = joint.update(d)
+        assert np.isfinite(F).all()
+        assert np.isfinite(C).all()

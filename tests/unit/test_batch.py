@@ -1,0 +1,234 @@
+"""Batches: contacts come and go, any array goes in, none is changed."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import jointlaw as jl
+
+COLUMNS = ("delta", "F", "sliding", "slipping", "separated", "stored_energy", "dissipated_energy")
+
+
+def test_a_batch_equals_a_loop(any_law):
+    rng, dim = np.random.default_rng(3), any_law.tables.dim
+    batch, singles = any_law.joints(6), [any_law.joint() for _ in range(6)]
+    for _ in range(40):
+        d = rng.normal(0.0, 1e-7, (6, dim))
+        d[:, 0] += 2e-8
+        F, C = batch.update(d)
+        for i, joint in enumerate(singles):
+            Fi, Ci = joint.update(d[i])
+            # 1e-12: sums over facets may run in another order
+            np.testing.assert_allclose(F[i], Fi, rtol=1e-12, atol=1e-12 * np.abs(F).max())
+            np.testing.assert_allclose(C[i], Ci, rtol=1e-12, atol=1e-12 * np.abs(C).max())
+    for name in COLUMNS:
+        singly = np.array([getattr(joint, name) for joint in singles])
+        np.testing.assert_allclose(getattr(batch, name), singly, rtol=1e-12, atol=1e-12)
+
+
+def test_shapes(any_law):
+    dim, batch, joint = any_law.tables.dim, any_law.joints(4), any_law.joint()
+    F, C = batch.update(np.zeros((4, dim)))
+    assert (F.shape, C.shape) == ((4, dim), (4, dim, dim))
+    assert batch.update(np.zeros((4, dim)), tangent=False)[1] is None
+    F, C = joint.update(np.zeros(dim))
+    assert (F.shape, C.shape) == ((dim,), (dim, dim))
+    assert joint.trial(np.zeros(dim), tangent=False)[1] is None
+    assert batch.delta.shape == batch.F.shape == (4, dim)
+    assert joint.delta.shape == joint.F.shape == (dim,)
+    for name in COLUMNS[2:]:
+        assert getattr(batch, name).shape == (4,)
+        assert isinstance(getattr(joint, name), float)
+
+
+def test_without_a_tangent_the_same_step(any_law):
+    d = np.full((3, any_law.tables.dim), 1e-7)
+    one, other = any_law.joints(3), any_law.joints(3)
+    np.testing.assert_array_equal(one.update(d)[0], other.update(d, tangent=False)[0])
+    np.testing.assert_array_equal(one.snapshot().values, other.snapshot().values)
+
+
+@pytest.mark.parametrize("mask", [False, True])
+def test_where_moves_the_named_joints_only(law, moved, mask):
+    index = np.array([3, 1])
+    before = moved.snapshot().values
+    d = np.array([[1e-7, 2e-8, 0.0], [2e-7, 0.0, 1e-8]])
+    singles = [law.joint() for _ in index]
+    for joint, i in zip(singles, index, strict=True):
+        joint.restore(jl.JointState(law.fingerprint, before[:, i : i + 1]))
+    expected = np.array([j.update(x)[0] for j, x in zip(singles, d, strict=True)])
+    if mask:  # a mask names the joints in ascending order
+        F, _ = moved.update(d[::-1], where=[False, True, False, True, False])
+        F = F[::-1]
+    else:
+        F, _ = moved.update(d, where=index)
+    np.testing.assert_allclose(F, expected, rtol=1e-12)
+    after = moved.snapshot().values
+    np.testing.assert_array_equal(after[:, [0, 2, 4]], before[:, [0, 2, 4]])
+    assert (after[0, index] != before[0, index]).all()
+
+
+@pytest.mark.parametrize("where", [[], np.zeros(0, int), np.zeros(5, bool), [False] * 5])
+def test_an_empty_selection_moves_nothing(moved, where):
+    before = moved.snapshot().values
+    F, C = moved.update(np.zeros((0, 3)), where=where)
+    assert (F.shape, C.shape) == ((0, 3), (0, 3, 3))
+    moved.reset(where)
+    np.testing.assert_array_equal(moved.snapshot().values, before)
+
+
+def test_an_empty_batch(any_law):
+    batch = any_law.joints(0)
+    dim = any_law.tables.dim
+    F, C = batch.update(np.zeros((0, dim)))
+    assert (F.shape, C.shape) == ((0, dim), (0, dim, dim))
+    assert len(batch) == 0
+    for name in COLUMNS:
+        assert len(getattr(batch, name)) == 0
+    batch.restore(batch.snapshot())
+    batch.reset()
+    batch.resize(2)
+    assert batch.F.tolist() == [[0.0] * dim] * 2
+
+
+def test_reset(moved):
+    before = moved.snapshot().values
+    moved.reset([4, 0])
+    after = moved.snapshot().values
+    assert not after[:, [0, 4]].any()
+    np.testing.assert_array_equal(after[:, 1:4], before[:, 1:4])
+    moved.reset(np.array([False, True, False, False, False]))
+    assert not moved.snapshot().values[:, 1].any()
+    moved.reset()
+    assert not moved.snapshot().values.any()
+
+
+def test_resize(moved):
+    before = moved.snapshot().values
+    moved.resize(9)
+    np.testing.assert_array_equal(moved.snapshot().values[:, :5], before)
+    assert not moved.snapshot().values[:, 5:].any()
+    moved.update(np.full((9, 3), 1e-8))
+    moved.resize(2)
+    kept = moved.snapshot().values
+    assert len(moved) == 2
+    moved.resize(6)  # the old joints do not come back
+    np.testing.assert_array_equal(moved.snapshot().values[:, :2], kept)
+    assert not moved.snapshot().values[:, 2:].any()
+    with pytest.raises(ValueError, match="joint 6"):
+        moved.update(np.zeros((1, 3)), where=[6])
+
+
+def test_resize_in_small_steps(law):
+    batch = law.joints(0)
+    for n in range(1, 40):
+        batch.resize(n)
+        batch.update([[1e-8 * n, 0.0, 0.0]], where=[n - 1])
+    np.testing.assert_allclose(batch.delta[:, 0], 1e-8 * np.arange(1, 40), rtol=1e-15)
+
+
+@given(data=st.data())
+def test_a_history_of_contacts_equals_single_joints(law, data):
+    """Any sequence of the verbs of a batch does to each joint what was done to it alone."""
+    batch, singles = law.joints(2), [law.joint() for _ in range(2)]
+    lengths = st.floats(-1e-6, 1e-6)
+    for _ in range(data.draw(st.integers(1, 6))):
+        n = len(singles)
+        verb = data.draw(st.sampled_from(["update", "reset", "resize"]))
+        which = data.draw(st.lists(st.integers(0, n - 1), unique=True) if n else st.just([]))
+        if verb == "update":
+            d = [[abs(data.draw(lengths)), data.draw(lengths), data.draw(lengths)] for _ in which]
+            batch.update(np.array(d).reshape(-1, 3), where=which)
+            for i, x in zip(which, d, strict=True):
+                singles[i].update(x)
+        elif verb == "reset":
+            batch.reset(which)
+            for i in which:
+                singles[i].reset()
+        else:
+            m = data.draw(st.integers(0, 5))
+            batch.resize(m)
+            singles = singles[:m] + [law.joint() for _ in range(m - n)]
+    assert len(batch) == len(singles)
+    for i, joint in enumerate(singles):
+        single = joint.snapshot().values[:, 0]
+        np.testing.assert_allclose(
+            batch.snapshot().values[:, i], single, rtol=1e-12, atol=1e-12 * np.abs(single).max()
+        )
+
+
+def forms(d):
+    frozen = d.copy()
+    frozen.flags.writeable = False
+    wide = np.zeros((2 * len(d), 2 * d.shape[1]))
+    wide[::2, ::2] = d
+    return {
+        "list": d.tolist(),
+        "tuple": tuple(map(tuple, d.tolist())),
+        "read-only": frozen,
+        "strided": wide[::2, ::2],
+        "reversed": d[::-1].copy()[::-1],
+        "fortran": np.asfortranarray(d),
+        "big-endian": d.astype(">f8"),
+    }
+
+
+@pytest.mark.parametrize("form", forms(np.zeros((1, 3))))
+def test_any_array_is_accepted_and_left_alone(law, form):
+    d = np.array([[1e-7, 2e-8, 0.0], [2e-7, -1e-8, 3e-8]])
+    given_ = forms(d)[form]
+    one, other = law.joints(2), law.joints(2)
+    F, _ = one.update(d)
+    np.testing.assert_array_equal(other.update(given_)[0], F)
+    np.testing.assert_array_equal(np.asarray(given_), d)
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float16, np.longdouble, np.int64, np.uint8])
+def test_other_number_types(law, kind):
+    d = np.array([1, 0, 0], kind)  # 1 m of closure
+    F, _ = law.joint().update(d)
+    np.testing.assert_array_equal(F, law.joint().update([1.0, 0.0, 0.0])[0])
+    assert F.dtype == np.float64
+    assert d.tolist() == [1, 0, 0]
+
+
+def test_results_belong_to_the_caller(law):
+    joint = law.joint()
+    F, C = joint.update([1e-7, 2e-8, 0.0])
+    before = joint.snapshot().values
+    F[:], C[:], joint.delta[:], joint.F[:] = 0.0, 0.0, 0.0, 0.0
+    np.testing.assert_array_equal(joint.snapshot().values, before)
+    assert joint.F[0] > 0
+
+
+def test_joints_do_not_share_state(law):
+    one, other = law.joint(), law.joint()
+    one.update([1e-7, 0.0, 0.0])
+    assert not other.snapshot().values.any()
+
+
+def test_a_virgin_joint(any_law):
+    joint = any_law.joint()
+    assert not joint.F.any()
+    assert not joint.delta.any()
+    assert (joint.sliding, joint.slipping, joint.separated) == (0.0, 0.0, pytest.approx(1.0))
+    assert (joint.stored_energy, joint.dissipated_energy) == (0.0, 0.0)
+
+
+def test_a_separated_joint_carries_nothing(any_law):
+    joint = any_law.joint()
+    dim = any_law.tables.dim
+    joint.update([3e-7, 2e-7, 0.0][:dim])
+    F, C = joint.update([-1e-4, 0.0, 0.0][:dim])
+    assert not F.any()
+    assert not C.any()
+    assert not joint.F.any()
+    assert joint.separated == pytest.approx(1.0)
+    assert joint.stored_energy == 0.0
+    assert joint.dissipated_energy >= 0.0
+
+
+def test_repr_says_what_it_is(law):
+    assert repr(law.joints(3)) == "<JointBatch of 3 joints, 3-D>"
+    assert "delta = [0. 0. 0.] m" in repr(law.joint())

@@ -1,0 +1,43 @@
+"""Which heights the reading "population" admits: the virgin curve must be convex."""
+
+import pytest
+
+import jointlaw as jl
+
+SMOOTH = {"alpha": 3.82, "beta": 1.15e-6, "overlap": 2e-6}
+ROUGH = {"alpha": 6.14, "beta": 3.52e-6, "overlap": 12e-6}
+
+
+@pytest.mark.parametrize(("heights", "least"), [(SMOOTH, 0.287), (ROUGH, 0.312)])
+def test_least_exponent_of_the_printed_heights(make_law, heights, least):
+    """law.md section 5 to its three printed digits."""
+    make_law(heights=jl.GammaHeights(**heights), eta=least)
+    with pytest.raises(ValueError, match="not convex") as error:
+        make_law(heights=jl.GammaHeights(**heights), eta=least - 0.001)
+    for remedy in ('formation = "individual"', "broader", "larger overlap", "larger eta"):
+        assert remedy in str(error.value)
+    assert f"asperity.eta = {least - 0.001:g}" in str(error.value)
+
+
+@pytest.mark.parametrize("eta", [0.0, 0.1, 0.5, 1.0])
+@pytest.mark.parametrize(
+    "heights", [SMOOTH, ROUGH, SMOOTH | {"beta": 1e-9}, ROUGH | {"overlap": 0}]
+)
+def test_individual_is_always_convex(make_law, heights, eta):
+    make_law(heights=jl.GammaHeights(**heights, formation="individual"), eta=eta)
+
+
+@pytest.mark.parametrize("overlap", [0.0, 2e-6, 9.9e-6])
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [("uniform", {"scale": 1e-5}), ("beta", {"a": 2.0, "b": 1.0, "scale": 1e-5})],
+)
+def test_a_density_that_ends_in_a_step_is_refused(make_law, name, parameters, overlap):
+    """Its slope falls at the very end, beyond every quantile."""
+    with pytest.raises(ValueError, match="not convex"):
+        make_law(heights=jl.Heights(name, overlap, parameters=parameters))
+
+
+def test_narrow_heights_are_refused(make_law):
+    with pytest.raises(ValueError, match="not convex"):
+        make_law(heights=jl.GammaHeights(alpha=100.0, beta=1e-7, overlap=2e-6))

@@ -1,0 +1,104 @@
+"""Laws written to TOML and read again; a write that fails leaves the old file."""
+
+import math
+import os
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+import jointlaw as jl
+
+HISTOGRAM = ([1, 2.5, 1 / 3], [0.1e-6, 2e-6, 4e-6, 5e-6])
+KINDS = {
+    "gamma": {},
+    "individual": {"heights": "individual"},
+    "no heights": {"heights": None},
+    "chi2": {"heights": jl.Heights("chi2", 2e-6, parameters={"df": 9.6, "scale": 1 / 3e6})},
+    "frozen": {"heights": jl.Heights(stats.lognorm(0.9, scale=3e-6), 2e-6, "individual")},
+    "no parameters": {"heights": jl.Heights("expon", 1e-6, "individual", {})},
+    "histogram": {"heights": jl.Heights(HISTOGRAM, 1e-6, "individual")},
+    "plane": {"plane": -1 / 3, "critical_slip": 1 / 3e4},
+    "own resolution": {"resolution": jl.Resolution(3, 5, 7)},
+    "named resolution": {"resolution": "fine"},
+    "default range": {"closure_range": None},
+}
+
+
+@pytest.fixture(params=KINDS)
+def kind(request, make_law):
+    return make_law(**KINDS[request.param])
+
+
+def test_file_round_trip(kind, tmp_path):
+    path = tmp_path / "law.toml"
+    text = kind.to_toml(path)
+    assert path.read_text(encoding="utf-8") == text
+    back = jl.JointLaw.from_toml(path)
+    assert back == kind
+    assert back.fingerprint == kind.fingerprint
+    assert jl.JointLaw.from_toml(str(path)) == kind
+
+
+def test_text_round_trip(kind):
+    assert jl.JointLaw.from_toml(kind.to_toml()) == kind
+
+
+@given(
+    a=st.floats(1, 1e3), b=st.floats(-1, 2), share=st.floats(-1, 1), K=st.floats(1e-300, 1e300),
+    mu=st.floats(0, 1e3), plane=st.none() | st.floats(-10, 10), slip=st.floats(1e-300, math.inf),
+)  # fmt: skip
+def test_every_number_is_kept_to_the_last_bit(make_law, a, b, share, K, mu, plane, slip):
+    law = make_law(a=a, b=b, c=share * (1 / 3 - b / 6), K=K, mu=mu, plane=plane, critical_slip=slip)
+    assert jl.JointLaw.from_toml(law.to_toml()) == law
+
+
+def test_infinite_critical_slip_is_written_as_inf(law):
+    assert "critical_slip = inf" in law.to_toml()
+
+
+def test_histogram_goes_to_a_csv_beside_the_law(make_law, tmp_path):
+    law = make_law(**KINDS["histogram"])
+    law.to_toml(tmp_path / 'my "law".toml')
+    lines = (tmp_path / 'my "law"-heights.csv').read_text().splitlines()
+    assert lines[0] == "lower_m,upper_m,count"
+    assert [float(x) for x in lines[2].split(",")] == [2e-6, 4e-6, 2.5]
+    assert jl.JointLaw.from_toml(tmp_path / 'my "law".toml') == law
+
+
+def test_histogram_in_a_relative_folder(make_law, tmp_path, monkeypatch):
+    law = make_law(**KINDS["histogram"])
+    monkeypatch.chdir(tmp_path)
+    os.mkdir("mu=0.3")
+    law.to_toml("mu=0.3/law.toml")
+    assert jl.JointLaw.from_toml("mu=0.3/law.toml") == law  # a path, though it holds "="
+
+
+def test_a_note_about_the_law_is_allowed(law):
+    text = law.to_toml() + '[about]\ntitle = "mine"\nanything = 3\n'
+    assert jl.JointLaw.from_toml(text) == law
+
+
+@pytest.mark.parametrize("broken", ["write_bytes", "replace"])
+def test_an_interrupted_write_leaves_the_old_file(law, make_law, tmp_path, monkeypatch, broken):
+    path = tmp_path / "law.toml"
+    law.to_toml(path)
+    state = tmp_path / "state.npz"
+    law.joint().snapshot().save(state)
+    before = path.read_bytes(), state.read_bytes()
+
+    def fail(*_, **__):
+        raise OSError("disk full")
+
+    if broken == "replace":
+        monkeypatch.setattr("os.replace", fail)
+    else:
+        real = type(path).write_bytes
+        monkeypatch.setattr(type(path), "write_bytes", lambda p, data: (real(p, data[:9]), fail()))
+    with pytest.raises(OSError, match="disk full"):
+        make_law(a=5.0).to_toml(path)
+    with pytest.raises(OSError, match="disk full"):
+        law.joint().snapshot().save(state)
+    assert (path.read_bytes(), state.read_bytes()) == before
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["law.toml", "state.npz"]

@@ -1,0 +1,35 @@
+"""`import jointlaw` needs numpy and scipy alone, and leaves the slow parts until they are asked."""
+
+import subprocess
+import sys
+
+HEAVY = ("matplotlib", "pymunk", "numba", "tqdm", "dask", "pandas", "scipy.stats")
+
+
+def modules_after(code):
+    listing = subprocess.run(
+        [sys.executable, "-c", f"import sys; {code}; print(*sys.modules)"],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return set(listing.stdout.split())
+
+
+def test_import_pulls_in_nothing_heavy():
+    assert not modules_after("import jointlaw, jointlaw.cli").intersection(HEAVY)
+
+
+def test_presets_and_gamma_heights_need_no_scipy_stats():
+    code = "import jointlaw as jl; jl.presets.load('biegel-rough').normal_stress(1e-7)"
+    assert "scipy.stats" not in modules_after(code)
+
+
+def test_promised_names():
+    import jointlaw as jl
+
+    names = (
+        "JointLaw Orientation Asperity GammaHeights Heights Resolution Joint JointBatch JointState "
+        "NonFiniteError PathError Record closure_test direct_shear load_state presets"
+    )
+    for name in names.split():
+        assert hasattr(jl, name)
+        assert name in jl.__all__

@@ -1,0 +1,104 @@
+"""Parameters are values: frozen, comparable, hashable, picklable, with a repr that builds them."""
+
+import copy
+import dataclasses
+import pickle
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+
+NAMES = {name: getattr(jl, name) for name in jl.__all__} | {"inf": float("inf")}
+PARTS = [
+    jl.Orientation(a=3.0, b=0.5, c=0.1),
+    jl.Asperity(K=2.0e8, lam=1.2, eta=0.5, mu=0.3),
+    jl.GammaHeights(alpha=3.82, beta=1.15e-6, overlap=2e-6),
+    jl.Heights("chi2", 2e-6, "individual", {"df": 9.6, "scale": 5e-7}),
+    jl.Heights(([1, 2, 1], [0.0, 1e-6, 2e-6, 3e-6]), 1e-6, "individual"),
+    jl.Resolution(u=2, phi=4, depth=3),
+]
+
+
+@pytest.fixture(params=[*PARTS, "law"], ids=lambda p: type(p).__name__)
+def value(request, law):
+    _ = law.tables  # tables computed on the way must not show
+    return law if request.param == "law" else request.param
+
+
+def test_frozen(value):
+    name = dataclasses.fields(value)[0].name
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        setattr(value, name, getattr(value, name))
+
+
+def test_comparable_and_hashable(value):
+    twin = pickle.loads(pickle.dumps(value))
+    assert twin == value
+    assert hash(twin) == hash(value)
+    assert copy.deepcopy(value) == value
+    assert len({value, twin}) == 1
+
+
+def test_a_changed_value_differs(law):
+    assert jl.Orientation(3.0, 0.5) != jl.Orientation(3.0, 0.6)
+    assert dataclasses.replace(law, plane=0.0) != law
+    assert dataclasses.replace(law, plane=0.0).fingerprint != law.fingerprint
+
+
+def test_repr_builds_the_value(value):
+    assert eval(repr(value), NAMES) == value
+
+
+def test_a_pickled_law_gives_the_same_joint(any_law):
+    twin = pickle.loads(pickle.dumps(any_law))
+    d = np.array([2e-7, 1e-7, 5e-8])[: any_law.tables.dim]
+    for mine, other in zip(any_law.joint().update(d), twin.joint().update(d), strict=True):
+        np.testing.assert_array_equal(mine, other)
+
+
+def test_a_pickled_joint_goes_on_where_it_was(law):
+    joint = law.joint()
+    joint.update([2e-7, 1e-7, 0.0])
+    twin = pickle.loads(pickle.dumps(joint))
+    np.testing.assert_array_equal(twin.snapshot().values, joint.snapshot().values)
+    twin.update([1e-7, 0.0, 0.0])
+    assert twin.delta[0] > joint.delta[0]
+
+
+def test_whole_numbers_are_numbers():
+    assert jl.Orientation(3, 0, 0) == jl.Orientation(3.0, 0.0, 0.0)
+    assert jl.Asperity(np.float32(2.0), np.int64(1), 0, 0) == jl.Asperity(2.0, 1.0, 0.0, 0.0)
+
+
+def test_names_of_resolutions(law, make_law):
+    sizes = [make_law(resolution=name).resolution.sliders for name in ("fast", "balanced", "fine")]
+    assert sizes == sorted(set(sizes))
+    assert make_law(resolution="balanced") == make_law(resolution=jl.Resolution(2, 4, 2))
+    assert jl.JointLaw(
+        orientation=law.orientation, asperity=law.asperity, asperity_density=1e10
+    ).resolution == jl.Resolution(2, 4, 2)
+
+
+def test_default_closure_range_is_the_closure_at_20_MPa(make_law):
+    law = make_law(closure_range=None)
+    # 1e-12: the inverse is solved to rounding
+    assert law.normal_stress(law.closure_range) == pytest.approx(20e6, rel=1e-12)
+
+
+def test_hertz_mindlin_is_eq_34():
+    G, nu, R = 20e9, 0.3, 40e-6
+    asperity = jl.Asperity.hertz_mindlin(G, nu, R, mu=0.3)
+    printed = (8 * G * R**0.5 / (3 * (2 - nu)), (2 - nu) / (2 * (1 - nu)))
+    assert (asperity.K, asperity.lam) == pytest.approx(printed, rel=1e-15)
+    assert (asperity.eta, asperity.mu) == (0.5, 0.3)
+
+
+def test_linear_asperities_have_the_stiffness_given(make_law):
+    asperity = jl.Asperity.linear(kn=3e5, ks=2e5, mu=0.4)
+    law = make_law(
+        K=asperity.K, lam=asperity.lam, eta=asperity.eta, mu=0.4, heights=None, a=1e6, b=0, c=0
+    )
+    _, C = law.joint().update([1e-7, 0.0, 0.0])  # nearly flat: every facet faces the joint normal
+    # 1e-9: inclinations up to pi/2e6 rad leave errors of their square
+    np.testing.assert_allclose(np.diag(C), 1e10 * np.array([3e5, 2e5, 2e5]), rtol=1e-9)

@@ -1,0 +1,190 @@
+"""Laboratory tests: the normal condition, turning points, unloading, and what stops them."""
+
+import math
+import pickle
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+
+N = 10e6  # Pa
+
+
+@pytest.mark.parametrize("stress", [1.0, 1e3, 1e6, 10e6, 1e9])
+def test_constant_normal_stress(any_law, stress):
+    record = jl.direct_shear(any_law.joint(), 5e-7, normal=stress, steps=40)
+    # 1e-9, or what one rounding of a closure of some 5e-7 m makes in the stiffest joint
+    rounding = 2e-16 * 1e-6 * any_law.max_stiffness(1e-6)
+    np.testing.assert_allclose(record.F1, stress, rtol=1e-9, atol=rounding)
+
+
+def test_constant_normal_stiffness(any_law):
+    spring = 2e13
+    record = jl.direct_shear(
+        any_law.joint(), [5e-7, -2e-7], N, control="stiffness", stiffness=spring, steps=30
+    )
+    asked = N + spring * (record.closure[0] - record.closure)
+    np.testing.assert_allclose(record.F1, asked, atol=1e-9 * N, rtol=1e-9)
+    assert np.ptp(record.F1) > 0.001 * N
+
+
+def test_stiffness_zero_is_constant_stress(law):
+    one = jl.direct_shear(law.joint(), 5e-7, N, control="stiffness", stiffness=0.0, steps=20)
+    other = jl.direct_shear(law.joint(), 5e-7, N, steps=20)
+    np.testing.assert_allclose(one.F2, other.F2, rtol=1e-9, atol=1e-9 * N)
+
+
+def test_constant_closure(any_law):
+    record = jl.direct_shear(any_law.joint(), 5e-7, N, control="closure", steps=30)
+    assert (record.closure == record.closure[0]).all()
+    assert record.F1[0] == pytest.approx(N, rel=1e-9)
+
+
+def test_the_first_row_is_the_seated_joint(any_law):
+    record = jl.direct_shear(any_law.joint(), 5e-7, N, steps=7)
+    assert len(record) == 8
+    # 1e-9: the normal condition; the virgin curve tells the closure
+    assert record.closure[0] == pytest.approx(any_law.closure(N), rel=1e-8)
+    assert record.shear[0] == 0.0
+
+
+@pytest.mark.parametrize("azimuth", [0.0, math.radians(30), math.pi / 2, -2.5])
+def test_reversals_end_where_they_should(law, azimuth):
+    to = [6e-7, -4e-7, 0.0, 2e-7]
+    joint = law.joint()
+    record = jl.direct_shear(joint, to, N, azimuth=azimuth, steps=25)
+    assert len(record) == 1 + 25 * len(to)
+    # 1e-12 of the longest leg: 25 equal increments are summed
+    np.testing.assert_allclose(record.shear[25::25], to, atol=1e-18)
+    across = record.shear_3 * math.cos(azimuth) - record.shear_2 * math.sin(azimuth)
+    np.testing.assert_allclose(across, 0.0, atol=1e-18)
+    np.testing.assert_allclose(joint.delta[1:], [record.shear_2[-1], record.shear_3[-1]])
+    assert (np.diff(record.dissipated) >= 0).all()
+
+
+def test_turning_points_count_from_where_the_joint_stands(law):
+    joint = law.joint()
+    jl.direct_shear(joint, 3e-7, N, steps=10)
+    record = jl.direct_shear(joint, 3e-7, N, steps=10)
+    assert record.shear[0] == pytest.approx(3e-7)
+    assert record.shear[-1] == pytest.approx(6e-7)
+
+
+def test_a_law_with_a_plane_is_recorded_in_three_dimensions(make_law):
+    law = make_law(plane=0.4)
+    record = jl.direct_shear(law.joint(), 5e-7, N, steps=10)
+    assert record.azimuth == 0.4
+    assert record.shear_3[-1] == pytest.approx(5e-7 * math.sin(0.4))
+    assert record.shear_stress[-1] == pytest.approx(math.hypot(record.F2[-1], record.F3[-1]))
+    same = jl.direct_shear(law.joint(), 5e-7, N, azimuth=0.4, steps=10)
+    np.testing.assert_array_equal(same.F2, record.F2)
+
+
+def test_closure_test_loads_and_unloads(any_law):
+    joint = any_law.joint()
+    record = jl.closure_test(joint, 20e6, steps=30)
+    assert record.F1[0] == 0.0
+    assert record.F1.max() == pytest.approx(20e6, rel=1e-9)
+    assert int(np.argmax(record.F1)) == 30
+    assert len(record) == 61
+    assert record.F1[-1] == pytest.approx(0.0, abs=20e6 * 1e-9)
+    assert (np.diff(record.F1[:31]) > 0).all()
+    assert (np.diff(record.F1[30:]) < 0).all()
+    assert (np.diff(record.closure[:31]) > 0).all()
+    assert not record.shear.any()
+    assert (np.diff(record.dissipated) >= 0).all()
+    np.testing.assert_allclose(joint.F[0], record.F1[-1])
+
+
+def test_closure_test_without_unloading(law):
+    record = jl.closure_test(law.joint(), 20e6, unload=False, steps=10)
+    assert len(record) == 11
+    assert record.closure[-1] == pytest.approx(law.closure(20e6), rel=1e-8)
+
+
+def test_cycles_of_a_closure_test(law):
+    record = jl.closure_test(law.joint(), [5e6, 20e6], steps=10)
+    assert [record.F1[10], record.F1[20], record.F1[30]] == pytest.approx([5e6, 0, 20e6], abs=1e-2)
+    up = jl.closure_test(law.joint(), [5e6, 20e6], unload=False, steps=10)
+    assert [up.F1[10], up.F1[20]] == pytest.approx([5e6, 20e6])
+
+
+def test_one_step_per_branch(law):
+    assert len(jl.closure_test(law.joint(), 20e6, steps=1)) == 3
+    assert len(jl.direct_shear(law.joint(), 1e-7, N, steps=1)) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ({"to": float("nan")}, "to = nan"),
+        ({"to": [1e-7, float("inf")]}, "to = inf"),
+        ({"to": []}, r"to = \[\]"),
+        ({"to": "2um"}, "to = '2um'"),
+        ({"to": [[1e-7]]}, "to = "),
+        ({"normal": 0.0}, r"normal = 0\.0 .*> 0"),
+        ({"normal": -1e6}, "normal = -1000000"),
+        ({"normal": float("inf")}, "normal = inf"),
+        ({"control": "force"}, "control = 'force' .*stress, stiffness, closure"),
+        ({"control": "stiffness"}, "stiffness is missing"),
+        ({"control": "stiffness", "stiffness": -1.0}, r"stiffness = -1\.0 .*>= 0"),
+        ({"control": "stiffness", "stiffness": float("nan")}, "stiffness = nan"),
+        ({"stiffness": 1e9}, "stiffness is for control"),
+        ({"azimuth": float("nan")}, "azimuth = nan"),
+        ({"steps": 0}, "steps = 0"),
+        ({"steps": 2.5}, r"steps = 2\.5"),
+    ],
+)
+def test_bad_arguments_of_direct_shear(law, arguments, told):
+    joint = law.joint()
+    with pytest.raises(ValueError, match=told):
+        jl.direct_shear(joint, **({"to": 1e-7, "normal": N} | arguments))
+    assert not joint.snapshot().values.any()
+
+
+def test_a_plane_admits_one_azimuth(make_law):
+    joint = make_law(plane=0.4).joint()
+    with pytest.raises(ValueError, match=r"azimuth = 1 rad: this law moves in its plane at 0\.4"):
+        jl.direct_shear(joint, 1e-7, N, azimuth=1.0)
+    assert not joint.snapshot().values.any()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ({"stress": 0.0}, r"stress = 0\.0"),
+        ({"stress": [1e6, -1.0]}, r"stress = -1\.0"),
+        ({"stress": []}, r"stress = \[\]"),
+        ({"stress": "20MPa"}, "stress = '20MPa'"),
+        ({"stress": float("inf")}, "stress = inf"),
+        ({"stress": 1e6, "steps": -1}, "steps = -1"),
+    ],
+)
+def test_bad_arguments_of_closure_test(law, arguments, told):
+    joint = law.joint()
+    with pytest.raises(ValueError, match=told):
+        jl.closure_test(joint, **arguments)
+    assert not joint.snapshot().values.any()
+
+
+def test_a_path_error_keeps_the_record_so_far(law, replays):
+    """The third turning point is so far away that the tractions overflow."""
+    joint = law.joint()
+    with pytest.raises(jl.PathError, match="stopped after 21 rows") as error:
+        jl.direct_shear(joint, [1e-7, -1e-7, 1e301], N, steps=10)
+    record = error.value.record
+    assert len(record) == 21
+    assert record.shear[-1] == pytest.approx(-1e-7)
+    np.testing.assert_allclose(joint.F, [record.F1[-1], record.F2[-1], record.F3[-1]])
+    twin = pickle.loads(pickle.dumps(error.value))
+    assert str(twin) == str(error.value)
+    assert len(twin.record) == 21
+
+
+@pytest.mark.parametrize("stress", [1e200, 1e300])
+def test_a_stress_beyond_numbers_is_a_path_error(law, replays, stress):
+    with pytest.raises(jl.PathError) as error:
+        jl.closure_test(law.joint(), [1e6, stress], steps=5)
+    assert len(error.value.record) >= 6
+    assert np.isfinite(error.value.record.F1).all()

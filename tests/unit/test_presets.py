@@ -1,0 +1,106 @@
+"""The presets hold the numbers that the paper prints, in its own units, converted here."""
+
+import math
+import tomllib
+
+import pytest
+
+import jointlaw as jl
+
+UM, MM, GPA = 1e-6, 1e-3, 1e9
+PER_UM2 = 1e12  # 1/um2 in 1/m2
+
+# K in GPa um^(1/2) (section 4.1 to 4.3), r0 and beta in um unless noted, N in 1/um2
+HERTZ_200 = {"K": 200, "lam": 1.2, "eta": 0.5}
+SMOOTH = {"alpha": 3.82, "beta": 1.15, "overlap": 2.0}
+ROUGH = {"alpha": 6.14, "beta": 3.52, "overlap": 12.0}
+PRINTED = {
+    "westerly-smooth": ((6.0, 0.0, 0.0), HERTZ_200, SMOOTH, UM),
+    "westerly-rough": ((3.0, 0.0, 0.0), HERTZ_200, ROUGH, UM),
+    "biegel-smooth": ((3.0, 0.5, 0.0), HERTZ_200 | {"mu": 0.3}, SMOOTH, UM),
+    "biegel-rough": ((2.5, 2.0, 0.0), HERTZ_200 | {"mu": 0.3}, ROUGH, UM),
+    "jing-replica": (
+        (3.0, -1.0, -0.3), {"K": 300, "lam": 0.33, "eta": 0.5, "mu": 0.47},
+        SMOOTH | {"overlap": 3.0}, MM,
+    ),
+    "linear-a2": ((2.0, 0.0, 0.0), {"lam": 1.0, "eta": 0.0, "mu": 0.6}, None, UM),
+    "linear-a3": ((3.0, 0.0, 0.0), {"lam": 1.0, "eta": 0.0, "mu": 0.6}, None, UM),
+    "linear-a6": ((6.0, 0.0, 0.0), {"lam": 1.0, "eta": 0.0, "mu": 0.6}, None, UM),
+    "linear-a9": ((9.0, 0.0, 0.0), {"lam": 1.0, "eta": 0.0, "mu": 0.6}, None, UM),
+    "nonlinear-a3": ((3.0, 0.0, 0.0), {"K": 100, "lam": 1.0, "eta": 0.5, "mu": 0.6}, None, UM),
+    "nonlinear-a6": ((6.0, 0.0, 0.0), {"K": 100, "lam": 1.0, "eta": 0.5, "mu": 0.6}, None, UM),
+}  # fmt: skip
+
+
+def test_every_printed_set_is_a_preset_and_every_preset_is_printed():
+    assert jl.presets.names() == sorted(PRINTED)
+
+
+@pytest.mark.parametrize("name", PRINTED)
+def test_numbers_of_the_paper(name):
+    (a, b, c), asperity, heights, length = PRINTED[name]
+    law = jl.presets.load(name)
+    assert (law.orientation.a, law.orientation.b, law.orientation.c) == (a, b, c)
+    for key in ("lam", "eta", "mu"):
+        if key in asperity:
+            assert getattr(law.asperity, key) == asperity[key]
+    if "K" in asperity:  # GPa um^(1/2), for every length scale of the heights
+        printed = asperity["K"] * GPA * UM**0.5
+        assert abs(law.asperity.K / printed - 1) < 1e-12
+    if heights is None:
+        assert law.heights is None
+        assert law.closure_range == 1 * UM  # the closure kept in Fig. 14 to 16
+    else:
+        assert law.heights.alpha == heights["alpha"]
+        assert law.heights.beta == pytest.approx(heights["beta"] * length, rel=1e-12)
+        assert law.heights.overlap == pytest.approx(heights["overlap"] * length, rel=1e-12)
+        assert law.heights.formation == "population"
+
+
+@pytest.mark.parametrize("name", ["westerly-smooth", "westerly-rough"])
+def test_density_of_section_4_1(name):
+    assert jl.presets.load(name).asperity_density == 1e-2 * PER_UM2
+
+
+@pytest.mark.parametrize("name", ["westerly-smooth", "westerly-rough", "biegel-smooth"])
+def test_printed_stiffness_is_near_that_of_the_printed_granite(name):
+    """Section 4.1: G = 20 GPa, nu = 0.3, R = 40 um give K = 200 and lam = 1.2 to two digits."""
+    hertz = jl.Asperity.hertz_mindlin(G=20 * GPA, nu=0.3, R=40 * UM, mu=0.3)
+    law = jl.presets.load(name)
+    assert abs(law.asperity.K / hertz.K - 1) < 0.01
+    assert abs(law.asperity.lam - hertz.lam) < 0.05
+
+
+@pytest.mark.parametrize("name", PRINTED)
+def test_each_tells_title_source_and_assumptions(name):
+    about = jl.presets.about(name)
+    assert set(about) == {"title", "source", "assumptions"}
+    assert all(len(text) > 20 for text in about.values())
+    assert "Misra 1999" in about["source"]
+    assert "section 4." in about["source"]
+
+
+def test_the_replica_says_that_its_density_is_not_printed():
+    assert "no contact density" in jl.presets.about("jing-replica")["assumptions"]
+
+
+@pytest.mark.parametrize("name", PRINTED)
+def test_text_is_the_law(name):
+    text = jl.presets.text(name)
+    assert jl.JointLaw.from_toml(text) == jl.presets.load(name)
+    assert "about" in tomllib.loads(text)
+
+
+@pytest.mark.parametrize("name", PRINTED)
+def test_each_closes_and_shears(name):
+    law = jl.presets.load(name)
+    F, C = law.joint().update([law.closure_range, 0.1 * law.closure_range, 0.0])
+    assert F[0] > 0
+    assert F[1] > 0
+    assert math.isfinite(C.sum())
+
+
+def test_an_unknown_preset():
+    for read in (jl.presets.load, jl.presets.text, jl.presets.about):
+        with pytest.raises(ValueError, match="'granite' is unknown; choose one of biegel-rough"):
+            read("granite")

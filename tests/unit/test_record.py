@@ -1,0 +1,116 @@
+"""Records: columns, files, and summary figures against hand-computed ones."""
+
+import copy
+import json
+import math
+import pickle
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+from jointlaw.record import UNITS
+
+COLUMNS = ("closure", "shear_2", "shear_3", "F1", "F2", "F3", "sliding", "separated")
+COLUMNS += ("stored", "dissipated")
+
+
+def analytic(azimuth=0.0, sense=1.0):
+    """Shear to 4 um at 10 MPa: friction peaks at 45 degrees at 2 um, ends at 30; opens at 1:2."""
+    shear = np.array([0.0, 1e-6, 2e-6, 3e-6, 4e-6])
+    stress = 10e6 * np.array([0.0, 0.5, 1.0, 0.8, math.tan(math.radians(30))])
+    closure = np.array([1.0, 1.1, 1.0, 0.5, 0.25]) * 1e-6
+    columns = dict.fromkeys(COLUMNS, np.zeros(5)) | {
+        "closure": closure,
+        "shear_2": sense * shear * math.cos(azimuth),
+        "shear_3": sense * shear * math.sin(azimuth),
+        "F1": np.full(5, 10e6),
+        "F2": sense * stress * math.cos(azimuth),
+        "F3": sense * stress * math.sin(azimuth),
+        "stored": np.linspace(1.0, 2.0, 5),
+        "dissipated": np.linspace(0.0, 3.0, 5),
+    }
+    return jl.Record(columns, azimuth)
+
+
+def test_columns_and_units():
+    record = analytic()
+    assert tuple(record.columns) == COLUMNS == tuple(UNITS)
+    assert [UNITS[c] for c in ("closure", "F1", "sliding", "stored")] == ["m", "Pa", "1", "J/m2"]
+    for name in COLUMNS:
+        assert getattr(record, name) is record.columns[name]
+    assert len(record) == 5
+
+
+def test_an_unknown_column_is_told():
+    with pytest.raises(AttributeError, match="no column 'F4'; columns: closure"):
+        _ = analytic().F4
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 0.7, math.pi / 2, math.pi])
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_summary_figures(azimuth, sense):
+    record = analytic(azimuth, sense)
+    assert record.peak_friction_angle == pytest.approx(45.0, rel=1e-12)
+    assert record.residual_friction_angle == pytest.approx(30.0, rel=1e-12)
+    # steepest between 2 and 3 um: 0.5 um of opening on 1 um of shear
+    assert record.dilation_angle == pytest.approx(math.degrees(math.atan(0.5)), rel=1e-9)
+    assert record.secant_stiffness == pytest.approx(10e6 / 2e-6, rel=1e-12)
+    np.testing.assert_allclose(record.shear, sense * np.arange(5) * 1e-6, atol=1e-20)
+    assert record.summary() == {
+        "rows": 5,
+        "largest_closure_m": 1.1e-6,
+        "largest_normal_stress_Pa": 10e6,
+        "stored_J_per_m2": 2.0,
+        "dissipated_J_per_m2": 3.0,
+        "peak_friction_angle_deg": record.peak_friction_angle,
+        "residual_friction_angle_deg": record.residual_friction_angle,
+        "dilation_angle_deg": record.dilation_angle,
+        "secant_shear_stiffness_Pa_per_m": record.secant_stiffness,
+    }
+
+
+def test_figures_of_a_record_without_shear():
+    columns = {name: np.zeros(3) for name in COLUMNS}
+    record = jl.Record(columns)
+    assert record.peak_friction_angle == record.residual_friction_angle == 0.0
+    assert record.dilation_angle == 0.0
+    assert math.isnan(record.secant_stiffness)
+    assert "peak_friction_angle_deg" not in record.summary()
+
+
+def test_csv_round_trip(tmp_path):
+    record = analytic(0.3)
+    record.to_csv(tmp_path / "r.csv")
+    table = np.genfromtxt(tmp_path / "r.csv", delimiter=",", names=True)
+    assert table.dtype.names == COLUMNS
+    for name in COLUMNS:  # twelve digits are written
+        np.testing.assert_allclose(table[name], record.columns[name], rtol=1e-11)
+
+
+def test_npz_round_trip(tmp_path):
+    record = analytic(0.3)
+    record.to_npz(str(tmp_path / "r.npz"))
+    with np.load(tmp_path / "r.npz") as data:
+        for name in COLUMNS:
+            np.testing.assert_array_equal(data[name], record.columns[name])
+        assert data["azimuth"] == 0.3
+        assert json.loads(str(data["units"])) == UNITS
+
+
+def test_copies_and_pickles():
+    record = analytic()
+    for twin in (copy.copy(record), copy.deepcopy(record), pickle.loads(pickle.dumps(record))):
+        np.testing.assert_array_equal(twin.F2, record.F2)
+        assert twin.azimuth == record.azimuth
+
+
+def test_plots_of_both_tests(tmp_path):
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    flat = {name: np.linspace(0, 1, 3) * (not name.startswith("shear")) for name in COLUMNS}
+    for i, record in enumerate((analytic(), jl.Record(flat))):
+        record.plot(tmp_path / f"{i}.png")
+        assert (tmp_path / f"{i}.png").read_bytes().startswith(b"\x89PNG")
+        labels = [axis.get_ylabel() + axis.get_xlabel() for axis in record.plot().axes]
+        assert all("(" in label for label in labels)  # every axis tells its unit

@@ -1,0 +1,120 @@
+"""Snapshots: bit-identical return, files, and what does not belong to the joint."""
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+
+
+def walk(joint, rng, steps=30):
+    dim = joint.law.tables.dim
+    for _ in range(steps):
+        d = rng.normal(0.0, 1e-7, dim)
+        d[0] += 2e-8
+        joint.update(d)
+
+
+def test_trial_leaves_no_trace(any_law):
+    joint = any_law.joint()
+    walk(joint, np.random.default_rng(1))
+    before = joint.snapshot().values
+    d = np.full(any_law.tables.dim, 1e-7)
+    F, C = joint.trial(d)
+    np.testing.assert_array_equal(joint.snapshot().values, before)
+    F2, C2 = joint.update(d)
+    np.testing.assert_array_equal(F, F2)
+    np.testing.assert_array_equal(C, C2)
+    np.testing.assert_allclose(joint.F, F2, rtol=1e-14, atol=1e-14 * np.abs(F2).max())
+
+
+def test_restore_then_the_same_steps_bit_for_bit(any_law, tmp_path):
+    joint = any_law.joint()
+    walk(joint, np.random.default_rng(1))
+    state = joint.snapshot()
+    state.save(tmp_path / "state.npz")
+    walk(joint, np.random.default_rng(2), 300)
+    end = joint.snapshot().values
+    joint.restore(state)
+    walk(joint, np.random.default_rng(2), 300)
+    np.testing.assert_array_equal(joint.snapshot().values, end)
+    other = any_law.joint()
+    other.restore(jl.load_state(tmp_path / "state.npz"))
+    walk(other, np.random.default_rng(2), 300)
+    np.testing.assert_array_equal(other.snapshot().values, end)
+
+
+def test_a_snapshot_is_a_copy(law):
+    joint = law.joint()
+    state = joint.snapshot()
+    joint.update([1e-7, 0.0, 0.0])
+    assert not state.values.any()
+    joint.restore(state)
+    joint.update([1e-7, 0.0, 0.0])
+    assert not state.values.any()
+    assert len(state) == 1
+    assert len(law.joints(7).snapshot()) == 7
+
+
+def test_a_law_read_from_its_file_takes_the_state(law, tmp_path):
+    joint = law.joint()
+    joint.update([3e-7, 1e-7, 0.0])
+    twin = jl.JointLaw.from_toml(law.to_toml(tmp_path / "law.toml")).joint()
+    twin.restore(joint.snapshot())
+    np.testing.assert_array_equal(twin.F, joint.F)
+
+
+def test_another_law_is_refused(law, make_law):
+    for other in (make_law(mu=0.31), make_law(resolution="fine"), make_law(plane=0.0)):
+        joint = other.joint()
+        with pytest.raises(ValueError, match="joint law with other parameters"):
+            joint.restore(law.joint().snapshot())
+        assert not joint.snapshot().values.any()
+
+
+def test_another_size_is_refused(law, moved):
+    before = moved.snapshot().values
+    with pytest.raises(ValueError, match="state holds 3 joints, this batch 5"):
+        moved.restore(law.joints(3).snapshot())
+    np.testing.assert_array_equal(moved.snapshot().values, before)
+
+
+@pytest.mark.parametrize("state", [None, np.zeros((5, 3)), "state.npz"])
+def test_what_is_no_snapshot_is_refused(moved, state):
+    with pytest.raises(ValueError, match="not a snapshot"):
+        moved.restore(state)
+
+
+def test_a_damaged_state_is_refused(law):
+    values = law.joint().snapshot().values
+    values[3] = np.nan
+    with pytest.raises(ValueError, match="damaged"):
+        law.joint().restore(jl.JointState(law.fingerprint, values))
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        lambda path: None,
+        lambda path: path.write_bytes(b""),
+        lambda path: path.write_text("closure,F1\n0,0\n"),
+        lambda path: np.save(path.open("wb"), np.zeros(3)),
+        lambda path: np.savez(path.open("wb"), values=np.zeros((3, 1))),
+        lambda path: np.savez(path.open("wb"), version=99, fingerprint="a", values=np.zeros(3)),
+        lambda path: np.savez(path.open("wb"), version=1, fingerprint="a", values=np.zeros(3)),
+        lambda path: np.savez(path.open("wb"), version=1, fingerprint="a", values="text"),
+        lambda path: path.mkdir(),
+    ],
+)
+def test_a_file_that_is_no_state(tmp_path, content):
+    path = tmp_path / "state.npz"
+    content(path)
+    with pytest.raises(ValueError, match=r"state\.npz.* is not a saved joint state"):
+        jl.load_state(path)
+
+
+def test_half_a_file_is_refused(law, tmp_path):
+    path = tmp_path / "state.npz"
+    law.joint().snapshot().save(path)
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(ValueError, match="not a saved joint state"):
+        jl.load_state(path)

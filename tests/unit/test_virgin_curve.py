@@ -1,0 +1,160 @@
+"""The virgin curve against scipy's own quadrature, its derivative, its inverse, its counts."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy import integrate
+
+import jointlaw as jl
+
+CASES = {
+    "population": jl.GammaHeights(3.82, 1.15e-6, 2e-6),
+    "rough": jl.GammaHeights(6.14, 3.52e-6, 12e-6),
+    "individual": jl.GammaHeights(3.82, 1.15e-6, 2e-6, "individual"),
+    "no overlap": jl.GammaHeights(6.14, 3.52e-6, 0.0, "individual"),
+    "histogram": jl.Heights(([1, 3, 2], [1e-6, 2e-6, 4e-6, 5e-6]), 0.5e-6, "individual"),
+    "histogram, in touch": jl.Heights(([1, 3, 2], [0, 2e-6, 4e-6, 5e-6]), 3e-6, "individual"),
+    "late uniform": jl.Heights("uniform", 0.0, "individual", {"loc": 1e-6, "scale": 1e-5}),
+}
+# From touch far below an asperity to far beyond the last, and next to the edges of the histograms
+Y = [*np.geomspace(1e-10, 1e-3, 15), 0.5e-6 * (1 + 1e-9), 1.5e-6 * (1 - 1e-9), 4.5e-6]
+
+
+@pytest.fixture(scope="module", params=CASES)
+def case(request, make_law):
+    """A law with these heights."""
+    return make_law(heights=CASES[request.param])
+
+
+def by_quadrature(h, eta, y):
+    """Phi and Phi' of law.md section 5, the integrals by QUADPACK piece by piece."""
+    if h.formation == "population":
+        P, H = h.cdf(h.overlap + y), h.pdf(h.overlap + y)
+        return P * y ** (1 + eta), (1 + eta) * P * y**eta + H * y ** (1 + eta)
+    P = h.cdf(h.overlap)
+    ends = [0.0, *(s for s in h.breakpoints() - h.overlap if 0 < s < y), y]
+    integrals = []
+    for p in (1 + eta, eta):
+        total = 0.0
+        for low, high in pairwise(ends):
+            # the density in u = s/y; the last piece with QUADPACK's weight for (1 - u)^p
+            last = high == y
+            f = lambda u, q: float(h.pdf(h.overlap + u * y)) * (1 - u) ** q  # noqa: E731
+            rule = {"weight": "alg", "wvar": (0.0, p)} if last else {}
+            total += integrate.quad(
+                f, low / y, high / y, (0.0 if last else p,), epsabs=0, epsrel=1e-10, **rule
+            )[0]
+        integrals.append(y * total)
+    return y ** (1 + eta) * (P + integrals[0]), (1 + eta) * y**eta * (P + integrals[1])
+
+
+@pytest.mark.filterwarnings("ignore::scipy.integrate.IntegrationWarning")
+def test_curve_and_slope(case):
+    eta = case.asperity.eta
+    force, slope = case.curve.force(np.array(Y))
+    for y, F, K in zip(Y, force, slope, strict=True):
+        exact, exact_slope = by_quadrature(case.heights, eta, y)
+        # S = Phi/y^(1+eta), at most 1, is tabulated to 1e-10 (1e-9 at the edges of a histogram),
+        # its derivative is one order lower
+        assert F / y ** (1 + eta) == pytest.approx(exact / y ** (1 + eta), abs=1e-9)
+        assert K / y**eta == pytest.approx(exact_slope / y**eta, abs=1e-6)
+
+
+def test_slope_curvature_and_energy_are_derivatives(case):
+    curve = case.curve
+    y = np.geomspace(1e-8, 1e-4, 41) * 1.01
+    h = 1e-4 * y
+    force, slope = curve.force(y)
+
+    def rate(f):
+        return (f(y + h) - f(y - h)) / (2 * h)
+
+    # against what the curve would be with all asperities in touch; central differences leave 1e-8,
+    # more where asperities begin, and the table is a cubic, so that Phi'' is good to 1e-3
+    for mine, other, most, size in (
+        (slope, rate(lambda y: curve.force(y)[0]), 1e-6, y**0.5),
+        (force, rate(curve.energy), 1e-6, y**1.5),
+        (curve.curvature(y), rate(lambda y: curve.force(y)[1]), 2e-2, y**-0.5),
+    ):
+        np.testing.assert_allclose(mine / size, other / size, atol=most, rtol=0)
+
+
+def test_no_tension_anywhere(case):
+    y = np.concatenate([[-1.0, 0.0], np.geomspace(1e-300, 1e100, 500)])
+    force, slope = case.curve.force(y)
+    assert (force >= 0).all()
+    assert (slope >= 0).all()
+    assert (np.diff(force) >= 0).all()
+    assert (case.curve.energy(y) >= 0).all()
+    assert not force[:2].any()
+    assert not slope[:2].any()
+
+
+def test_closure_is_the_inverse_of_normal_stress(case):
+    inverse(case)
+
+
+@pytest.mark.parametrize("eta", [0.0, 0.5])
+def test_closure_is_the_inverse_of_normal_stress_without_heights(make_law, eta):
+    inverse(make_law(heights=None, eta=eta))
+
+
+def inverse(law):
+    stress = np.geomspace(1.0, 1e10, 21)
+    closure = law.closure(stress)
+    assert (np.diff(closure) > 0).all()
+    # the closure is solved to a few units in the last place
+    np.testing.assert_allclose(law.normal_stress(closure), stress, rtol=1e-11)
+    assert law.closure(0.0) == 0.0
+    assert law.closure([[1e6]]).shape == (1, 1)
+
+
+def test_normal_stress_is_that_of_a_joint(any_law):
+    closure = 3e-7
+    F, _ = any_law.joint().update([closure, *[0.0] * (any_law.tables.dim - 1)])
+    assert any_law.normal_stress(closure) == pytest.approx(F[0], rel=1e-12)
+    assert any_law.normal_stress(-1e-6) == 0.0
+
+
+@pytest.mark.parametrize("stress", [5e-324, 1e-310, 1e-300, 1e300])
+def test_closure_at_the_ends_of_the_number_range(make_law, stress):
+    for heights in (None, CASES["no overlap"], CASES["histogram"]):
+        assert math.isfinite(make_law(heights=heights).closure(stress))
+
+
+def test_contact_numbers_are_eq_11(law):
+    r0, N, h = law.heights.overlap, law.asperity_density, law.heights
+    for closure in (0.0, 1e-6, 1e-4, -1e-6, -1.0):
+        count = N * integrate.quad(h.pdf, 0.0, max(r0 + closure, 0.0), epsabs=0, epsrel=1e-12)[0]
+        assert law.contacts(closure) == pytest.approx(count, rel=1e-10)
+
+
+def test_contact_numbers_by_direction_are_eq_16(law):
+    direction = (0.2, 0.7)
+    assert law.contacts(1e-6, direction) == pytest.approx(
+        law.contacts(1e-6) * law.orientation.density(*direction), rel=1e-14
+    )
+    assert law.contacts(1e-6, (1.0, 0.0)) == 0.0  # beyond pi/(2a)
+    assert law.contacts([0.0, 1e-6]).shape == (2,)
+
+
+def test_without_heights_all_asperities_touch_at_once(make_law):
+    law = make_law(heights=None)
+    assert law.contacts([-1e-9, 0.0, 1e-9]).tolist() == [0.0, 0.0, 1e10]
+
+
+def test_stiffness_bound_and_time_step(any_law):
+    joint = any_law.joint()
+    dim = any_law.tables.dim
+    _, C = joint.update([4e-7, 1e-8, 0.0][:dim])
+    y = 4e-7 + 1e-8 * math.tan(math.pi / (2 * any_law.orientation.a) * 0.98)
+    bound = any_law.max_stiffness(y)
+    assert np.linalg.norm(C, 2) <= bound
+    step = any_law.critical_time_step(mass=2.0, area=0.5, closure=y)
+    assert step == pytest.approx(2 * math.sqrt(2.0 / (0.5 * bound)), rel=1e-14)
+
+
+def test_time_step_of_an_open_joint_is_unbounded(law):
+    assert law.critical_time_step(1.0, 1.0, 0.0) == math.inf

@@ -28,6 +28,7 @@ class Run:
     record: float = 0.05  # time between records
     dashpot_normal: float = 0.05  # shares of critical
     dashpot_shear: float = 0.05
+    law_steps: int = 1  # steps of the law per time step: 4 keeps the books within 0.5 % in impacts
     largest_stress: float = 0.0  # Pa, expected in impacts: sets the step before anything touches
     skin: float | None = None  # reach of the search for contacts; default 0.02 of the least width
     point_spacing: float = np.inf  # largest distance of law points along a joint
@@ -217,6 +218,7 @@ def _run(table: Table) -> Run:
         record=table.take("record", float, Run.record, above=0, say="s"),
         dashpot_normal=table.take("dashpot_normal", float, Run.dashpot_normal, least=0),
         dashpot_shear=table.take("dashpot_shear", float, Run.dashpot_shear, least=0),
+        law_steps=int(table.take("law_steps", float, Run.law_steps, least=1)),
         largest_stress=table.take("largest_stress", float, Run.largest_stress, least=0, say="Pa"),
         skin=table.take("skin", float, None, above=0, say="m"),
         point_spacing=table.take("point_spacing", float, Run.point_spacing, above=0, say="m"),

@@ -71,7 +71,7 @@ class Simulation:
         points = geometry.evaluate(self.edges, motion)
         self._require_carried(points)
         d = self.joints.increments(points.closure, points.along[1] * self.dt)
-        self.traction = self.joints.update(d)
+        self.traction = self.joints.update(d, self.scene.run.law_steps)
         forces = self.forces(points, self.dt)
         if (self._stiffness > self._checked).any():
             self.check_step(points)

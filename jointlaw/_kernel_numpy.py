@@ -192,7 +192,7 @@ def traction(k: Tables, state: Array) -> Array:
 class Measures(NamedTuple):
     """What the states of joints amount to, arrays (n,): law.md section 8b."""
 
-    sliding: Array  # share of the asperities in touch whose every cell is at its friction limit
+    sliding: Array  # share of all asperities: in touch, every cell at its friction limit
     slipping: Array  # share of the friction capacity that is at its limit
     separated: Array  # share of all asperities
     stored: Array  # elastic energy, J/m2
@@ -206,8 +206,9 @@ def measures(k: Tables, state: Array) -> Measures:
     force, slope = k.curve.force(y)
     G, kappa = cells(k, y, force, slope)
     q2 = now.q[0] ** 2 + now.q[1] ** 2
-    cap = k.mu * k.lam * k.area[:, None, None] * G
-    capped = np.sqrt(q2) >= cap * (1 - 1e-9)  # the cap itself, less the rounding of q
+    strength = k.mu * k.lam * k.area[:, None, None]
+    # the cap itself, less the rounding of q and of G next to a node
+    capped = np.sqrt(q2) >= strength * (G * (1 - 1e-9) - 1e-12 * force[:, None])
     weight = (k.weight / k.weight.sum())[:, None]
     touches = y > 0
     sliding = np.sum(weight * (touches & np.all(capped | (G == 0), axis=1)), axis=0)

@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from PIL import Image
 
 from .energy import COLUMNS
+from .predict import shear_curve
 from .record import Record
 from .shapes import turn
 
@@ -198,12 +199,18 @@ def curves(record: Record, path: Path, slips: list[dict]) -> None:
     figure = Figure(figsize=(8, 7 if shear else 4.8), dpi=120, layout="constrained")
     if shear:
         upper, lower = figure.subplots(2, sharex=True)
-        for moving, _ in watch["shear"]:
+        for moving, base in watch["shear"]:
             name = blocks[moving].name
             slid = 1e3 * record.column(f"{name}: slid_m")
             upper.plot(slid, 1e-3 * record.column(f"{name}: shear_Pa"), label=f"{name} (blocks)")
             closure = record.column(f"{name}: closure_m")
             lower.plot(slid, 1e3 * (closure[0] - closure))
+            law = record.scene.laws[record.scene.law_of((moving, 0, base, 0))]
+            stress = float(record.column(f"{name}: normal_Pa")[0])
+            if alone := shear_curve(law, stress, 1e-3 * slid):
+                x, style = 1e3 * alone["slid"], {"color": "k", "ls": ":", "lw": 1.5}
+                upper.plot(x, 1e-3 * alone["shear"], label="law alone, direct shear", **style)
+                lower.plot(x, 1e3 * alone["dilation"], **style)
         upper.set_ylabel("shear stress (kPa)")
         upper.set_title(record.scene.title)
         lower.set_ylabel("dilation since seating (mm)")
@@ -243,7 +250,7 @@ def _outline(record: Record, i: int, b: int) -> np.ndarray:
 
 
 def _digits(millimetres: float) -> str:
-    return f"{millimetres:.2f}" if abs(millimetres) < 10 else f"{millimetres:.0f}"
+    return f"{round(millimetres, 2) + 0.0:.2f}" if abs(millimetres) < 10 else f"{millimetres:.0f}"
 
 
 def _round(value: float) -> float:

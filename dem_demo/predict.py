@@ -40,3 +40,20 @@ def slip_angle(scene: Scene, moving: int, base: int, length: float) -> dict[str,
         before, stress = angle, float(flat * np.cos(np.radians(angle)))
         angle = friction_angle(law, stress)
     return {"predicted_angle": angle, "normal_stress": stress}
+
+
+def shear_curve(law, stress: float, slid: np.ndarray) -> dict[str, np.ndarray] | None:
+    """Direct shear of the law alone along the turning points of `slid` (m), at a normal stress.
+
+    Returns slid (m), shear stress (Pa) and dilation (m), or None for plain Coulomb.
+    """
+    if isinstance(law, CoulombLaw):
+        return None
+    inner = np.flatnonzero(np.diff(np.sign(np.diff(slid)))) + 1
+    turns = [float(u) for u in [*slid[inner], slid[-1]]]
+    test = jl.direct_shear(law.joint(), to=turns, normal=stress, steps=400)
+    return {
+        "slid": test.shear_2,
+        "shear": test.F2,
+        "dilation": test.closure[0] - test.closure,
+    }

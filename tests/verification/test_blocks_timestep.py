@@ -35,24 +35,29 @@ dashpot_shear = {zeta}
 
 
 def ring(scene, share, steps):
-    """Velocities after small pushes, per step, at a share of the predicted limit."""
-    limit = Simulation(scene, step=1e-9).step_limit
-    sim = Simulation(scene, step=share * limit)
+    """Largest velocity after small pushes, per step, at a share of the predicted limit."""
+    sim = Simulation(scene, step=1e-9)
+    sim.dt = share * sim.step_limit
     sim.require_step = lambda: None  # the guard would refuse the very thing tested here
     rng = np.random.default_rng(3)
-    sim.motion[3:] += 1e-7 * rng.standard_normal(sim.motion[3:].shape) * sim.mobile.T
+    sim.motion[3:] = 1e-7 * rng.standard_normal(sim.motion[3:].shape) * sim.mobile.T
     sim.world.place(sim.motion)
     size = []
-    for _ in range(steps):
-        sim.step()
-        size.append(np.abs(sim.motion[3:]).max())
+    try:
+        for _ in range(steps):
+            sim.step()
+            size.append(np.abs(sim.motion[3:]).max())
+    except Refused:  # overlap or speed: it has diverged as far as it can
+        pass
     return np.array(size)
 
 
 @pytest.mark.parametrize("zeta", [0.0, 0.1])
 @pytest.mark.parametrize("blocks", [1, 10])
 def test_bounded_below_the_limit(blocks, zeta):
-    size = ring(column(blocks, zeta), 0.95, STEPS if zeta == 0 else STEPS // 5)
+    steps = STEPS if zeta == 0 else STEPS // 5
+    size = ring(column(blocks, zeta), 0.95, steps)
+    assert len(size) == steps
     # Energy of the leapfrog at 0.95 of the limit lets velocities grow by 1/sqrt(1 - 0.95^2) = 3.2
     # over the pushes, times a few modes that add up.
     assert size.max() < 10 * size[:50].max()
@@ -63,11 +68,8 @@ def test_bounded_below_the_limit(blocks, zeta):
 @pytest.mark.parametrize("zeta", [0.0, 0.1])
 @pytest.mark.parametrize("blocks", [1, 10])
 def test_diverges_above_the_limit(blocks, zeta):
-    """Growth per step at 1.05 of the limit is a factor 1.9 (less with dashpots): 1e4 in 60."""
-    try:
-        size = ring(column(blocks, zeta), 1.05, 200)
-    except Refused:
-        return
+    """Without dashpots the growth per step is 1.88 at 1.05 of the limit: 1e4 within 30 steps."""
+    size = ring(column(blocks, zeta), 1.05, 300)
     assert size.max() > 1e4 * size[0]
 
 

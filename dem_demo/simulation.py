@@ -15,8 +15,8 @@ from .scene import Scene, parse
 from .start import begin
 from .world import World
 
-HEADROOM = 1.25  # stiffness growth between two checks of the time step
-FLOOR = 0.2  # least stiffness in the time step, as a share of the stiffest joint's
+HEADROOM = 1.25  # most growth of a joint's stiffness between two checks of the time step
+SAFE = 0.98  # largest time step as a share of the limit
 STEEP = np.sin(1.25 * ANGLE)  # tilt between two edges beyond which they are no joint
 
 
@@ -66,14 +66,16 @@ class Simulation:
         """Forces (n, 3) at the positions just reached; velocities are those that led there."""
         self._require_slow(motion)
         self.motion, self.n = motion, self.n + 1
-        if self.interfaces.stale(motion) and self.interfaces.renew(motion, self.world.near):
-            self.arrange()
+        if self.interfaces.stale(motion):
+            self._checked = np.zeros(self.joints.n)  # lever arms have changed
+            if self.interfaces.renew(motion, self.world.near):
+                self.arrange()
         points = geometry.evaluate(self.edges, motion)
         self._require_carried(points)
         d = self.joints.increments(points.closure, points.along[1] * self.dt)
         self.traction = self.joints.update(d, self.scene.run.law_steps)
         forces = self.forces(points, self.dt)
-        if (self._stiffness > self._checked).any():
+        if (self._stiffness * self.area > self._checked).any():
             self.check_step(points)
             self.require_step()
         if self.drives.waiting and self.n % 16 == 0:
@@ -137,6 +139,7 @@ class Simulation:
         return ((a == one) & (b == other)) | ((a == other) & (b == one))
 
     def joint_energies(self, points: geometry.Points):
+        """Area (m2), stored and dissipated energy (J/m2) of the law points."""
         return self.area, self.joints.now["stored"], self.joints.now["lost"]
 
     def arrange(self) -> None:
@@ -159,30 +162,36 @@ class Simulation:
     # ----------------------------------------------------------------- guards
 
     def check_step(self, points: geometry.Points) -> None:
-        """The step limit (s) of this moment, with headroom for stiffness to grow."""
-        self.area = points.length * self.scene.thickness
+        """Find the step limit (s) of this moment from stiffness, dashpots and lever arms."""
+        area = points.length * self.scene.thickness
         stress = self.traction[:, 0]
         now = np.maximum(self.joints.stiffness(stress), self.joints.stiffness_at(points.closure))
-        # Joints that open and close at little stress count as closed, or each touch asks again.
-        now = np.maximum(now, FLOOR * now.max(initial=0.0))
-        self._stiffness = now
-        self._checked = HEADROOM * now
+        # Joints that barely touch count as touching well, or each touch would ask again.
+        self._stiffness = np.maximum(now, 0.2 * now.max(initial=0.0))
+        self.area = np.maximum(area, 0.02 * area.max(initial=0.0))
+        self._known = self._stiffness * self.area
         rows = self.limit.rows(self.edges, points, self.motion)
         run, damping = self.scene.run, self._damping()
         self.step_limit = self.limit(
             rows,
-            np.tile(now * self.area, 2),
+            np.tile(self._known, 2),
             np.concatenate([run.dashpot_normal * damping, run.dashpot_shear * damping]),
         )
         self.least_limit = min(self.least_limit, self.step_limit)
+        self.area = area
 
     def require_step(self) -> None:
-        if self.dt > 0.98 * self.step_limit:
+        """Refuse a time step beyond the limit, and note by how much joints may stiffen until then.
+
+        The limit falls at most as the square root of the largest growth of any joint's stiffness.
+        """
+        if self.dt > SAFE * self.step_limit:
             raise Refused(
-                f"time step {self.dt:.3g} s: must stay below 0.98 of the limit, which has fallen "
+                f"time step {self.dt:.3g} s: must stay below {SAFE} of the limit, which has fallen "
                 f"to {self.step_limit:.3g} s as the joints closed; resume with a smaller step or "
                 "set run.largest_stress (Pa)"
             )
+        self._checked = min(HEADROOM, (SAFE * self.step_limit / self.dt) ** 2) * self._known
 
     def _require_slow(self, motion: np.ndarray) -> None:
         way = np.abs(motion[3]) + np.abs(motion[4]) + np.abs(motion[5]) * self.reach

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from . import picture
+from . import picture, plots
 from .energy import COLUMNS
 from .interfaces import Refused
 from .record import Record
@@ -74,8 +74,8 @@ def write(record: Record, summary: dict, folder: Path, pictures: bool) -> None:
     record.write(folder)
     (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
     if pictures:
-        picture.final(record, folder / "final.png")
-        picture.energy(record, folder / "energy.png")
+        picture.final(record, folder / "final.png", summary["slip"])
+        plots.energy(record, folder / "energy.png")
         if record.watched[0]:
-            picture.curves(record, folder / "curves.png", summary["slip"])
+            plots.curves(record, folder / "curves.png", summary["slip"])
         picture.motion(record, folder / "motion.gif")

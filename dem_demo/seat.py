@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import csr_array, diags
 from scipy.sparse.linalg import spsolve
 
 from .joints import Joints
@@ -22,7 +22,7 @@ def equilibrium(joints: Joints, rows: csr_array, closure, slid, area, force):
     the blocks: they will move from step 0.
     """
     k = len(closure)
-    rows = diags_array(np.concatenate([-np.ones(k), np.ones(k)])) @ rows  # to (closure, shear)
+    rows = diags(np.concatenate([-np.ones(k), np.ones(k)])) @ rows  # to (closure, shear)
     start = np.concatenate([closure, slid])
     weight = np.concatenate([area, area])
 
@@ -31,7 +31,7 @@ def equilibrium(joints: Joints, rows: csr_array, closure, slid, area, force):
         shear = joints.stiffness_at(c)
         slope = (joints.stress_at(1.01 * c) - joints.stress_at(0.99 * c)) / (0.02 * c)
         F = np.concatenate([joints.stress_at(c) * (d[:k] > 0), shear * d[k:]])
-        return F, diags_array(np.concatenate([slope * (d[:k] > 0), shear]))
+        return F, diags(np.concatenate([slope * (d[:k] > 0), shear]))
 
     def law(d):
         F, C = joints.trial(np.stack([d[:k], d[k:]], axis=1))
@@ -60,11 +60,11 @@ def _newton(law, rows, start, weight, force, y, most):
     for _ in range(most):
         if size <= target:
             return y, True
-        K = (rows.T @ diags_array(weight) @ C @ rows).tocsc()
+        K = (rows.T @ diags(weight) @ C @ rows).tocsc()
         if damp is None:
             damp = max(1e-3 * abs(K).max(), 1.0)
         for _ in range(40):
-            step = spsolve((K + damp * diags_array(np.ones(len(y)))).tocsc(), r)
+            step = spsolve((K + damp * diags(np.ones(len(y)))).tocsc(), r)
             r_new, C_new = unbalanced(y + step)
             if np.linalg.norm(r_new) < size:
                 break

@@ -38,15 +38,18 @@ def _seat(sim) -> np.ndarray:
     """Move the blocks to where their joints carry them; the joints' first sliding (m)."""
     slid, free = np.zeros(sim.joints.n), sim.free.ravel()
     force = ((sim.gravity + sim.loads).ravel() * sim.limit.root)[free]
-    for _ in range(3):  # each time at the places just found: the joints turn with the blocks
+    for attempt in range(3):  # each at the places just found: the joints turn with the blocks
         points = geometry.evaluate(sim.edges, sim.motion)
         rows = sim.limit.rows(sim.edges, points, sim.motion)
         area = points.length * sim.scene.thickness
-        moved, slid, sim.balanced = equilibrium(sim.joints, rows, points.closure, slid, area, force)
+        moved, further, balanced = equilibrium(sim.joints, rows, points.closure, slid, area, force)
+        if attempt > 0 and not balanced:
+            break  # what was found before is balanced but for the turning of the joints
+        slid, sim.balanced = further, balanced
         shift = np.zeros(sim.free.size)
         shift[free] = moved * sim.limit.root[free]
         sim.motion[:3] += shift.reshape(-1, 3).T
-        if not sim.balanced:
+        if not balanced:
             break
     sim.interfaces.renewed_at = sim.motion[:3].copy()
     return slid

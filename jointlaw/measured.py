@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 from ._checks import Array, above, at_least, number
 from ._noise import Noise
 from .asperity import Asperity
-from .curve import exact_force, virgin_curve
+from .curve import exact_force
 from .heights import GammaHeights
-from .law import DEFAULT_STRESS, JointLaw
+from .law import JointLaw
 from .orientation import Orientation
 from .paths import direct_shear
 from .resolution import resolve
@@ -188,27 +188,7 @@ def build(values: Values, settings: Settings, plane: float | None = None) -> Joi
         "resolution": settings.resolution,
         "plane": plane,
     }
-    if heights is None:
-        return JointLaw(**parts)
-    # The virgin curve is most of the work of a law, and a fit of shear curves seldom changes it
-    curve = _curve(v["eta"], heights)
-    reach = settings.closure_range
-    if reach is None:
-        reach = float(_with_curve(curve, parts, 1.0).closure(DEFAULT_STRESS))
-    return _with_curve(curve, parts, reach)
-
-
-def _with_curve(curve: Any, parts: dict[str, Any], closure_range: float) -> JointLaw:
-    """A law that has its virgin curve before it is initialised, and so does not tabulate it."""
-    law = JointLaw.__new__(JointLaw)
-    law.__dict__["curve"] = curve
-    JointLaw.__init__(law, **parts, closure_range=closure_range)
-    return law
-
-
-@lru_cache(maxsize=64)
-def _curve(eta: float, heights: GammaHeights) -> Any:
-    return virgin_curve(eta, heights, 1.0)
+    return JointLaw(**parts, closure_range=settings.closure_range)
 
 
 def log_stress(values: Values, closure: Array, settings: Settings) -> Array:

@@ -12,6 +12,9 @@ import numpy as np
 
 from . import __version__, presets
 from ._command import add_command
+from ._fit_command import add_fit_command
+from ._scan_command import add_scan_command
+from .cli_export import add_export_command
 from .cli_laboratory import add_closure_command, add_shear_command
 from .figures.command import add_figures_command
 from .joint import JointBatch
@@ -33,6 +36,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _add_presets(commands)
     _add_replay(commands)
     add_figures_command(commands)
+    add_export_command(commands)
+    add_fit_command(commands)
+    add_scan_command(commands)
     options = parser.parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
     try:
         return int(options.run(options))

@@ -42,7 +42,9 @@ def test_in_pairs(key):
     faults = {
         name(changes): found
         for seed, changes in enumerate(pairs())
-        if next(iter(changes)) == key and (found := examine(changes, seed, n=6, steps=10))
+        if next(iter(changes)) == key
+        and not ends(changes)  # alone, and in the report, for they are slow to refuse
+        and (found := examine(changes, seed, n=6, steps=10))
     }
     assert not faults
 

@@ -32,7 +32,7 @@ def _rows(first: int, count: int) -> tuple[int, ...]:
 
 # The desk. Pairs "0, 1" are before and after the step.
 _Y0, _Y1, _F0, _F1, _S0, _S1, _X = _rows(0, 7)  # a facet: y, Phi, Phi', place in the curve
-_DES, _DET, _QS, _QT, _SUMS, _SUMT = _rows(7, 6)  # its sliders
+_DES, _DET, _SUMS, _SUMT = _rows(7, 4)  # its sliders
 _CURVING, _BSS, _BST, _BTT, _VS, _VT, _G0, _G1, _G2 = _rows(13, 9)  # its tangent
 _P, _P1, _P2, _OLD, _OLD1, _OLD2, _NEW, _NEW1, _NEW2 = _rows(22, 9)  # a joint: step, y's origin
 _J00, _J01, _J10, _J11, _SLIP, _PULL1, _PULL2, _LOST, _F, _FS, _FT = _rows(31, 11)
@@ -79,9 +79,12 @@ def work(rows: int) -> Work:
 
 
 @_jit
-def _virgin(desk, place, piece, which, L, curve, eta, scale):
+def _virgin(desk, place, piece, after, L, curve, eta, scale):
     """Phi and Phi' of the row of y: three loops, so that only the look-up itself is not vector."""
-    y, force, slope = _Y0 + which, _F0 + which, _S0 + which
+    if after is None:  # a constant for the compiler
+        y, force, slope = _Y0, _F0, _S0
+    else:
+        y, force, slope = _Y1, _F1, _S1
     cells = curve.size // 4
     top = np.float64(cells - 1)
     for l in range(L):
@@ -181,7 +184,7 @@ def _drag(desk, L, limit, dim):
 
 
 @_jit
-def _slide(desk, L, lower, upper, ended, A, a, compliance, lam_mu, ledger, tangent):
+def _slide(desk, qs, qt, L, lower, upper, ended, A, a, compliance, lam_mu, ledger, tangent):
     """One depth cell of one facet: steps 2 and 3 of law.md section 6."""
     zl, fl, sl = lower[0], lower[1], lower[2]
     zh, fh, sh = upper[0], upper[1], upper[2]
@@ -214,7 +217,7 @@ def _slide(desk, L, lower, upper, ended, A, a, compliance, lam_mu, ledger, tange
         chord = chord if chord < k1 else k1
         kept = 1.0 if grows else ratio
         add = a * (chord if grows else k1)
-        olds, oldt, des, det = desk[_QS + l], desk[_QT + l], desk[_DES + l], desk[_DET + l]
+        olds, oldt, des, det = qs[l], qt[l], desk[_DES + l], desk[_DET + l]
         ts, tt = olds * kept + add * des, oldt * kept + add * det
         new2 = ts * ts + tt * tt
         size = np.sqrt(new2)
@@ -222,10 +225,9 @@ def _slide(desk, L, lower, upper, ended, A, a, compliance, lam_mu, ledger, tange
         slips = size > cap
         share = cap / (size if slips else 1.0)
         share = share if slips else 1.0
-        qs, qt = share * ts, share * tt
-        desk[_QS + l], desk[_QT + l] = qs, qt
-        desk[_SUMS + l] += qs
-        desk[_SUMT + l] += qt
+        qs[l], qt[l] = share * ts, share * tt
+        desk[_SUMS + l] += share * ts
+        desk[_SUMT + l] += share * tt
         if ledger is not None:  # each term is >= 0 as written
             r0 = 1.0 / (k0 if k0 > TINY else 1.0)
             r1 = 1.0 / (k1 if k1 > TINY else 1.0)
@@ -327,8 +329,8 @@ def _facet(desk, place, piece, s, L, facet, depth, f, curve, scalars, dim, ledge
             desk[_Y1 + l] += m2 * desk[_NEW2 + l]
             desk[_DES + l] += s2 * desk[_P2 + l]
             desk[_DET + l] += t2 * desk[_P2 + l]
-    _virgin(desk, place, piece, 0, L, curve, eta, scale)
-    _virgin(desk, place, piece, LANES, L, curve, eta, scale)
+    _virgin(desk, place, piece, None, L, curve, eta, scale)
+    _virgin(desk, place, piece, True, L, curve, eta, scale)
     if tangent is not None:
         _curvature(desk, piece, L, np.float64(curve.size // 4), eta, scale)
         _gradient(desk, L, m0, m1, m2, limit < np.inf)
@@ -337,16 +339,8 @@ def _facet(desk, place, piece, s, L, facet, depth, f, curve, scalars, dim, ledge
             desk[_VS + l] = desk[_VT + l] = 0.0
     for i in range(D):
         rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
-        for l in range(L):
-            desk[_QS + l] = s[rs, l]
-        for l in range(L):
-            desk[_QT + l] = s[rt, l]
-        _slide(desk, L, depth[f, i], depth[f, i + 1], i < D - 1, A, a, compliance, lam * mu,
+        _slide(desk, s[rs], s[rt], L, depth[f, i], depth[f, i + 1], i < D - 1, A, a, compliance, lam * mu,
                ledger, tangent)  # fmt: skip
-        for l in range(L):
-            s[rs, l] = desk[_QS + l]
-        for l in range(L):
-            s[rt, l] = desk[_QT + l]
     soft = 1.0 / lam
     for l in range(L):
         normal, q0, q1 = A * desk[_F1 + l], soft * desk[_SUMS + l], soft * desk[_SUMT + l]

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._checks import Array
-from ._kernel_numpy import GRAZING, NEAR, NOTHING, TINY
+from ._kernel_numpy import GRAZING, LIMIT, NEAR, NOTHING, TINY
 from .law import Tables
 
 # Strict arithmetic: no fused or reordered operations, so results are the same on every machine
@@ -39,13 +39,17 @@ _J00, _J01, _J10, _J11, _SLIP, _PULL1, _PULL2, _LOST, _F, _FS, _FT = _rows(31, 1
 _C00, _C01, _C02, _C10, _C11, _C12, _C20, _C21, _C22 = _rows(42, 9)
 _DESK = 51 * LANES
 
-_M, _S, _T, _N, _REST = 0, 3, 6, 9, 12  # rows of the facet table; then A, a, compliance
+# The same rows while joints are measured
+_WHOLE, _LIMIT, _SLIDING, _SLIPPING, _APART, _STORED, _REACH = _rows(22, 7)
+
+_M, _S, _T, _N, _REST = 0, 3, 6, 9, 12  # columns of the facet table; then A, a, compliance,
+_POTENTIAL, _SHARE = 15, 16  # A c1 and the share of asperities
 
 
 class Packed(NamedTuple):
     """The tables of a law as few plain arrays: fewer arguments make a cheaper call."""
 
-    facet: Array  # (M, 15): m, s, t, n (3 each, 0 where the plane drops one), A, a, compliance
+    facet: Array  # (M, 17): m, s, t, n (3 each, 0 where the plane drops one), then the above
     depth: Array  # (M, D + 1, 3): zeta, force and slope there, infinity as the largest float
     curve: Array  # (4 cells,): coefficients of S
     scalars: Array  # lam, mu, critical slip, eta, scale of the curve
@@ -53,10 +57,12 @@ class Packed(NamedTuple):
 
 def pack(k: Tables, compliance: Array) -> Packed:
     """Arrange the tables of a law for the compiled kernel."""
-    facet = np.zeros((len(k.c1), 15))
+    facet = np.zeros((len(k.c1), 17))
     for first, rows in ((_M, k.m), (_S, k.s), (_T, k.t), (_N, k.n)):
         facet[:, first : first + k.dim] = rows.T
-    facet[:, _REST:] = np.stack([k.area, k.area / k.c1, compliance], axis=-1)
+    share = k.weight / k.weight.sum()
+    rest = (k.area, k.area / k.c1, compliance, k.area * k.c1, share)
+    facet[:, _REST:] = np.stack(rest, axis=-1)
     largest = np.finfo(float).max
     depth = np.minimum(np.stack([k.depth, k.depth_force, k.depth_slope], axis=-1), largest)
     scalars = np.array([k.lam, k.mu, k.critical_slip, k.curve.eta, k.curve.scale])
@@ -79,6 +85,16 @@ def work(rows: int) -> Work:
 
 
 @_jit
+def _fetch(place, piece, L, table):
+    """The four coefficients of each lane's cell, moved as a whole: one wide load and store."""
+    four, one, two, three = np.uint64(4), np.uint64(1), np.uint64(2), np.uint64(3)
+    for l in range(L):
+        i, o = four * np.uint64(place[l]), four * np.uint64(l)
+        c0, c1, c2, c3 = table[i], table[i + one], table[i + two], table[i + three]
+        piece[o], piece[o + one], piece[o + two], piece[o + three] = c0, c1, c2, c3
+
+
+@_jit
 def _virgin(desk, place, piece, after, L, curve, eta, scale):
     """Phi and Phi' of the row of y: three loops, so that only the look-up itself is not vector."""
     if after is None:  # a constant for the compiler
@@ -98,11 +114,7 @@ def _virgin(desk, place, piece, after, L, curve, eta, scale):
         desk[_X + l] = at - np.float64(i)
         desk[force + l] = v
         desk[slope + l] = v * r * r
-    four, one, two, three = np.uint64(4), np.uint64(1), np.uint64(2), np.uint64(3)
-    for l in range(L):  # as a whole, which is one wide load and store
-        i, o = four * np.uint64(place[l]), four * np.uint64(l)
-        c0, c1, c2, c3 = curve[i], curve[i + one], curve[i + two], curve[i + three]
-        piece[o], piece[o + one], piece[o + two], piece[o + three] = c0, c1, c2, c3
+    _fetch(place, piece, L, curve)
     weight = 0.5 * cells * scale
     for l in range(L):
         x, o = desk[_X + l], 4 * l
@@ -339,8 +351,8 @@ def _facet(desk, place, piece, s, L, facet, depth, f, curve, scalars, dim, ledge
             desk[_VS + l] = desk[_VT + l] = 0.0
     for i in range(D):
         rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
-        _slide(desk, s[rs], s[rt], L, depth[f, i], depth[f, i + 1], i < D - 1, A, a, compliance, lam * mu,
-               ledger, tangent)  # fmt: skip
+        _slide(desk, s[rs], s[rt], L, depth[f, i], depth[f, i + 1], i < D - 1, A, a, compliance,
+               lam * mu, ledger, tangent)  # fmt: skip
     soft = 1.0 / lam
     for l in range(L):
         normal, q0, q1 = A * desk[_F1 + l], soft * desk[_SUMS + l], soft * desk[_SUMT + l]
@@ -442,3 +454,76 @@ def advance(
                 home, at = index[start + l] // W, index[start + l] % W
                 for r in range(rows):
                     state[home, r, at] = block[r, l]
+
+
+@_jit
+def _count(desk, qs, qt, L, lower, upper, strength, compliance):
+    """One depth cell of one facet: is it at its friction limit, and what does it store."""
+    zl, fl, sl = lower[0], lower[1], lower[2]
+    zh, fh, sh = upper[0], upper[1], upper[2]
+    for l in range(L):
+        y, force, slope = desk[_Y0 + l], desk[_F0 + l], desk[_S0 + l]
+        reach = min(max(y, zl), zh)
+        k = min(max(slope, sl), sh) - sl
+        G = k * (y - reach) + (min(max(force, fl), fh) - fl - sl * (reach - zl))
+        most = k * (y - zl if y > zl else 0.0)
+        G = min(max(G, 0.0), most)
+        q2 = qs[l] * qs[l] + qt[l] * qt[l]
+        limit = np.sqrt(q2) >= strength * G * (1.0 - LIMIT)
+        desk[_WHOLE + l] = desk[_WHOLE + l] if limit | (G == 0.0) else 0.0
+        desk[_LIMIT + l] += G if limit else 0.0
+        soft = 1.0 / (k if k > TINY else 1.0)
+        desk[_STORED + l] += compliance * q2 * (soft if k > TINY else 0.0)
+
+
+@_jit
+def _measure_facet(desk, place, piece, s, L, facet, depth, f, curve, energy, scalars, dim):
+    """What one facet of a block adds to the measures."""
+    lam, mu, eta, scale = scalars[0], scalars[1], scalars[3], scalars[4]
+    M, D = depth.shape[0], depth.shape[1] - 1
+    m0, m1, m2 = facet[f, _M], facet[f, _M + 1], facet[f, _M + 2]
+    potential, share = facet[f, _POTENTIAL], facet[f, _SHARE]
+    closure, offset, other = s[0], s[dim], s[2 * dim - 2]  # in one plane m2 is 0
+    for l in range(L):
+        desk[_Y0 + l] = m0 * closure[l] + m1 * offset[l] + m2 * other[l]
+        desk[_WHOLE + l], desk[_LIMIT + l] = 1.0, 0.0
+    _virgin(desk, place, piece, None, L, curve, eta, scale)
+    _fetch(place, piece, L, energy)
+    for l in range(L):
+        y, x, o = desk[_Y0 + l], desk[_X + l], 4 * l
+        T = piece[o] + x * (piece[o + 1] + x * (piece[o + 2] + x * piece[o + 3]))
+        y = y if y > 0.0 else 0.0
+        power = np.sqrt(y) if eta == 0.5 else 1.0
+        desk[_CURVING + l] = potential * T * y * y * power
+    if eta != 0.5:
+        for l in range(L):
+            desk[_CURVING + l] *= desk[_Y0 + l] ** eta if desk[_Y0 + l] > 0.0 else 0.0
+    for i in range(D):
+        rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
+        _count(desk, s[rs], s[rt], L, depth[f, i], depth[f, i + 1], mu * lam * facet[f, _REST],
+               facet[f, _REST + 2])  # fmt: skip
+    for l in range(L):
+        y, force = desk[_Y0 + l], desk[_F0 + l]
+        desk[_STORED + l] += desk[_CURVING + l]
+        desk[_SLIDING + l] += share * desk[_WHOLE + l] if y > 0.0 else 0.0
+        desk[_SLIPPING + l] += share * desk[_LIMIT + l] / (force if force > 0.0 else 1.0)
+        desk[_APART + l] += 0.0 if y > 0.0 else share
+        desk[_REACH + l] = y if y > desk[_REACH + l] else desk[_REACH + l]
+
+
+@_jit
+def measures(
+    state, out, first, last, block, desk, place, piece, facet, depth, curve, scalars, dim, energy
+):
+    """Measures (5, n) of joints first..last, as `_kernel_numpy.measures`; arguments as above."""
+    W = state.shape[2]
+    for start in range(first, last, W):
+        L = min(W, last - start)
+        s = state[start // W]
+        desk[_SLIDING:_REACH] = 0.0
+        desk[_REACH : _REACH + LANES] = -np.inf
+        for f in range(facet.shape[0]):
+            _measure_facet(desk, place, piece, s, L, facet, depth, f, curve, energy, scalars, dim)
+        for i in range(5):
+            for l in range(L):
+                out[i, start + l] = desk[_SLIDING + i * LANES + l]

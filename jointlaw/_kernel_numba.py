@@ -23,7 +23,7 @@ from .law import Tables
 # Strict arithmetic: no fused or reordered operations, so results are the same on every machine
 _jit = numba.njit(error_model="numpy", nogil=True, cache=True)
 
-LANES = 64  # joints per block
+LANES = 128  # joints per block
 
 
 def _rows(first: int, count: int) -> tuple[int, ...]:
@@ -196,11 +196,11 @@ def _drag(desk, L, limit, dim):
 
 
 @_jit
-def _slide(desk, qs, qt, L, lower, upper, ended, A, a, compliance, lam_mu, ledger, tangent):
+def _slide(desk, qs, qt, L, depth, f, i, strength, a, compliance, ledger, tangent):
     """One depth cell of one facet: steps 2 and 3 of law.md section 6."""
-    zl, fl, sl = lower[0], lower[1], lower[2]
-    zh, fh, sh = upper[0], upper[1], upper[2]
-    strength = lam_mu * A
+    zl, fl, sl = depth[f, i, 0], depth[f, i, 1], depth[f, i, 2]
+    zh, fh, sh = depth[f, i + 1, 0], depth[f, i + 1, 1], depth[f, i + 1, 2]
+    ended = i + 2 < depth.shape[1]
     for l in range(L):
         # the bed beyond the lower limit of the cell less that beyond the upper
         y0, y1, f0, f1 = desk[_Y0 + l], desk[_Y1 + l], desk[_F0 + l], desk[_F1 + l]
@@ -288,10 +288,11 @@ def _gradient(desk, L, m0, m1, m2, leash):
 
 
 @_jit
-def _add_tangent(desk, L, s, t, n, A, lam, dim):
+def _add_tangent(desk, L, facet, f, lam, dim):
     """C += along g^T + E^T B E of one facet, law.md section 7; B and v count in units of lam."""
-    s0, s1, s2, t1, t2 = s[0], s[1], s[2], t[1], t[2]
-    n0, n1, n2, soft = A * n[0], A * n[1], A * n[2], 1.0 / lam
+    s0, s1, s2 = facet[f, _S], facet[f, _S + 1], facet[f, _S + 2]
+    t1, t2, A, soft = facet[f, _T + 1], facet[f, _T + 2], facet[f, _REST], 1.0 / lam
+    n0, n1, n2 = A * facet[f, _N], A * facet[f, _N + 1], A * facet[f, _N + 2]
     for l in range(L):
         slope, vs, vt = desk[_S1 + l], soft * desk[_VS + l], soft * desk[_VT + l]
         bss, bst, btt = soft * desk[_BSS + l], soft * desk[_BST + l], soft * desk[_BTT + l]
@@ -351,8 +352,7 @@ def _facet(desk, place, piece, s, L, facet, depth, f, curve, scalars, dim, ledge
             desk[_VS + l] = desk[_VT + l] = 0.0
     for i in range(D):
         rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
-        _slide(desk, s[rs], s[rt], L, depth[f, i], depth[f, i + 1], i < D - 1, A, a, compliance,
-               lam * mu, ledger, tangent)  # fmt: skip
+        _slide(desk, s[rs], s[rt], L, depth, f, i, lam * mu * A, a, compliance, ledger, tangent)
     soft = 1.0 / lam
     for l in range(L):
         normal, q0, q1 = A * desk[_F1 + l], soft * desk[_SUMS + l], soft * desk[_SUMT + l]
@@ -367,7 +367,7 @@ def _facet(desk, place, piece, s, L, facet, depth, f, curve, scalars, dim, ledge
             desk[_PULL1 + l] += n1 * A * desk[_F1 + l]
             desk[_PULL2 + l] += n2 * A * desk[_F1 + l]
     if tangent is not None:
-        _add_tangent(desk, L, facet[f, _S:_T], facet[f, _T:_N], facet[f, _N:_REST], A, lam, dim)
+        _add_tangent(desk, L, facet, f, lam, dim)
 
 
 @_jit
@@ -443,7 +443,9 @@ def advance(
         elif keep:
             s = state[start // W]
         else:
-            block[:, :W] = state[start // W]
+            for r in range(rows):
+                for l in range(L):
+                    block[r, l] = state[start // W, r, l]
             s = block
         _begin(desk, s, d, start, L, limit, dim, tangent)
         for f in range(facet.shape[0]):
@@ -457,10 +459,10 @@ def advance(
 
 
 @_jit
-def _count(desk, qs, qt, L, lower, upper, strength, compliance):
+def _count(desk, qs, qt, L, depth, f, i, strength, compliance):
     """One depth cell of one facet: is it at its friction limit, and what does it store."""
-    zl, fl, sl = lower[0], lower[1], lower[2]
-    zh, fh, sh = upper[0], upper[1], upper[2]
+    zl, fl, sl = depth[f, i, 0], depth[f, i, 1], depth[f, i, 2]
+    zh, fh, sh = depth[f, i + 1, 0], depth[f, i + 1, 1], depth[f, i + 1, 2]
     for l in range(L):
         y, force, slope = desk[_Y0 + l], desk[_F0 + l], desk[_S0 + l]
         reach = min(max(y, zl), zh)
@@ -483,6 +485,7 @@ def _measure_facet(desk, place, piece, s, L, facet, depth, f, curve, energy, sca
     M, D = depth.shape[0], depth.shape[1] - 1
     m0, m1, m2 = facet[f, _M], facet[f, _M + 1], facet[f, _M + 2]
     potential, share = facet[f, _POTENTIAL], facet[f, _SHARE]
+    strength, compliance = mu * lam * facet[f, _REST], facet[f, _REST + 2]
     closure, offset, other = s[0], s[dim], s[2 * dim - 2]  # in one plane m2 is 0
     for l in range(L):
         desk[_Y0 + l] = m0 * closure[l] + m1 * offset[l] + m2 * other[l]
@@ -500,8 +503,7 @@ def _measure_facet(desk, place, piece, s, L, facet, depth, f, curve, energy, sca
             desk[_CURVING + l] *= desk[_Y0 + l] ** eta if desk[_Y0 + l] > 0.0 else 0.0
     for i in range(D):
         rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
-        _count(desk, s[rs], s[rt], L, depth[f, i], depth[f, i + 1], mu * lam * facet[f, _REST],
-               facet[f, _REST + 2])  # fmt: skip
+        _count(desk, s[rs], s[rt], L, depth, f, i, strength, compliance)
     for l in range(L):
         y, force = desk[_Y0 + l], desk[_F0 + l]
         desk[_STORED + l] += desk[_CURVING + l]

@@ -21,7 +21,7 @@ from . import _kernel_numpy
 from ._checks import Array, one_of
 from .law import JointLaw, Tables
 
-LANES = 64  # joints per block
+LANES = 128  # joints per block
 CHUNK = 4096  # joints per call of the numpy kernel: keeps its temporaries in cache
 SERIAL = 20_000  # sliders below which a second thread costs more than it saves
 

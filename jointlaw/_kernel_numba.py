@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._checks import Array
-from ._kernel_numpy import GRAZING, LIMIT, NEAR, NOTHING, TINY
+from ._kernel_numpy import GRAZING, LIMIT, NEAR, NOTHING, ROUNDED, TINY
 from .law import Tables
 
 # Strict arithmetic: no fused or reordered operations, so results are the same on every machine
@@ -471,8 +471,8 @@ def _count(desk, qs, qt, L, depth, f, i, strength, compliance):
         most = k * (y - zl if y > zl else 0.0)
         G = min(max(G, 0.0), most)
         q2 = qs[l] * qs[l] + qt[l] * qt[l]
-        limit = np.sqrt(q2) >= strength * G * (1.0 - LIMIT)
-        desk[_WHOLE + l] = desk[_WHOLE + l] if limit | (G == 0.0) else 0.0
+        limit = np.sqrt(q2) >= strength * (G * (1.0 - LIMIT) - ROUNDED * force)
+        desk[_WHOLE + l] = desk[_WHOLE + l] if limit else 0.0
         desk[_LIMIT + l] += G if limit else 0.0
         soft = 1.0 / (k if k > TINY else 1.0)
         desk[_STORED + l] += compliance * q2 * (soft if k > TINY else 0.0)

@@ -4,6 +4,9 @@ The law of A. Misra, Micromechanical model for anisotropic rock joints, J. Geoph
 1999, made incremental and energy-consistent. All quantities are SI: m, Pa, 1/m2.
 """
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from . import closed_form, presets
 from .asperity import Asperity
 from .heights import GammaHeights, Heights
@@ -15,27 +18,88 @@ from .record import Record
 from .resolution import Resolution
 from .secant import Secant, secant
 from .state import JointState, NonFiniteError, load_state
+from .table import JointTable, load_table
+
+if TYPE_CHECKING:
+    from . import baselines, datasets, unloading
+    from ._tabulate import tabulate
+    from .calibrate import fit_closure, fit_curves, fit_shear
+    from .fit import Fit
+    from .hosts import export_yade
+    from .measured import ClosureCurve, ShearCurve, first_loading
+    from .surface import SurfaceFit, from_surface
+    from .sweep import fit_many
+    from .synthetic import synthetic_surface
 
 __version__ = "0.1.0"
 
 __all__ = [
     "Asperity",
+    "ClosureCurve",
+    "Fit",
     "GammaHeights",
     "Heights",
     "Joint",
     "JointBatch",
     "JointLaw",
     "JointState",
+    "JointTable",
     "NonFiniteError",
     "Orientation",
     "PathError",
     "Record",
     "Resolution",
     "Secant",
+    "ShearCurve",
+    "SurfaceFit",
+    "baselines",
     "closed_form",
     "closure_test",
+    "datasets",
     "direct_shear",
+    "export_yade",
+    "first_loading",
+    "fit_closure",
+    "fit_curves",
+    "fit_many",
+    "fit_shear",
+    "from_surface",
     "load_state",
+    "load_table",
     "presets",
     "secant",
+    "synthetic_surface",
+    "tabulate",
+    "unloading",
 ]
+
+# Tools for measurements and hosts load on first use: a DEM code that embeds the law needs none
+_LATER = {
+    "ClosureCurve": "measured",
+    "Fit": "fit",
+    "ShearCurve": "measured",
+    "SurfaceFit": "surface",
+    "baselines": "baselines",
+    "datasets": "datasets",
+    "export_yade": "hosts",
+    "first_loading": "measured",
+    "fit_closure": "calibrate",
+    "fit_curves": "calibrate",
+    "fit_many": "sweep",
+    "fit_shear": "calibrate",
+    "from_surface": "surface",
+    "synthetic_surface": "synthetic",
+    "tabulate": "_tabulate",
+    "unloading": "unloading",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LATER:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module = import_module(f".{_LATER[name]}", __name__)
+    return module if _LATER[name] == name else getattr(module, name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

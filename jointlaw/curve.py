@@ -15,6 +15,7 @@ closure lies beyond the table. With D = y d/dy = t (1 - t)/2 d/dt,
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -83,18 +84,19 @@ class Curve(NamedTuple):
         return 0.5 * len(self.S) * v * self.scale / (v + self.scale) ** 2
 
 
-def virgin_curve(eta: float, heights: HeightDistribution | None, range_: float) -> Curve:
-    """Tabulate the virgin curve; `range_` (m) is a typical closure, used where heights set none.
+@lru_cache(maxsize=256)
+def virgin_curve(eta: float, heights: HeightDistribution | None) -> Curve:
+    """Tabulate the virgin curve; laws that differ in other parameters share the table.
 
     Raises ValueError when Phi is not convex (the touch-depth density would turn negative and the
     energy guarantee would be lost), or when the heights are too narrow or too wide to tabulate.
     """
     if heights is None:
         flat = np.array([[1.0, 0.0, 0.0, 0.0]])
-        return Curve(eta, float(np.sqrt(range_)), flat, flat / (2 + eta), 0.0)
+        return Curve(eta, 1.0, flat, flat / (2 + eta), 0.0)
     r0, points = heights.overlap, heights.breakpoints()
     beyond = points[points > r0] - r0
-    far = float(beyond[-1]) if beyond.size else range_
+    far = float(beyond[-1]) if beyond.size else r0
     middle = float(points[len(points) // 2]) - r0
     scale = float(np.sqrt(max(middle, far / 30)))
     _require_convex(eta, heights, far)

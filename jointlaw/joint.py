@@ -161,7 +161,7 @@ class JointBatch:
 
     @property
     def sliding(self) -> Array:
-        """Share (n,) of asperities in touch whose every cell is at its friction limit."""
+        """Share (n,) of all asperities: in touch, and every cell at its friction limit."""
         return self.measures().sliding
 
     @property
@@ -332,7 +332,7 @@ class Joint:
 
     @property
     def sliding(self) -> float:
-        """Share of asperities in touch whose every cell is at its friction limit."""
+        """Share of all asperities: in touch, and every cell at its friction limit."""
         return float(self._batch.sliding[0])
 
     @property

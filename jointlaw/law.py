@@ -114,7 +114,7 @@ class JointLaw:
         if self.closure_range is None:
             set_(self, "closure_range", 1.0)
             set_(self, "closure_range", float(self.closure(DEFAULT_STRESS)))
-            for cached in ("curve", "tables", "_closure_factor"):
+            for cached in ("tables", "_closure_factor"):
                 self.__dict__.pop(cached, None)
         set_(self, "closure_range", above("closure_range", self.closure_range, 0.0))
         _ = self.curve  # a law that exists has a valid virgin curve
@@ -190,7 +190,7 @@ class JointLaw:
     @cached_property
     def curve(self) -> Curve:
         """Tabulated virgin curve of one asperity."""
-        return virgin_curve(self.asperity.eta, self.heights, self.closure_range)
+        return virgin_curve(self.asperity.eta, self.heights)
 
     @cached_property
     def facets(self) -> Facets:

@@ -6,17 +6,13 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from .._command import add_command
+
 
 def add_figures_command(subparsers: Any) -> None:
     """Add `figures` to the subcommands, with `run`, a function of the options, as its default."""
     what = "regenerate the figures of Misra 1999, or print the table of its claims with our numbers"
-    parser: argparse.ArgumentParser = subparsers.add_parser(
-        "figures",
-        help=what,
-        description=what,
-        epilog="example:\n  jointlaw figures 14 15 --out out\n  jointlaw figures --claims table-1",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = add_command(subparsers, "figures", what, "jointlaw figures 14 15 --out out")
     parser.add_argument("numbers", metavar="N", nargs="*", type=int, help="figures (default: all)")
     parser.add_argument("--out", type=Path, help="folder for PNG, CSV and summary.json")
     parser.add_argument(

@@ -105,7 +105,7 @@ def test_histogram_needs_the_individual_reading(make_law, counts, overlap):
         (("one", "two"), "numpy.histogram"),
         (([1, 2], [0.0, 1.0, 2.0], "extra"), "numpy.histogram"),
     ],
-    ids=repr,
+    ids=lambda value: getattr(value, "name", repr(value)),
 )
 def test_bad_distributions(distribution, told):
     with pytest.raises(ValueError, match=r"heights\.distribution") as error:

@@ -1,0 +1,118 @@
+"""Command line: run a scene, check a scene file, resume a saved state."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from .interfaces import Refused
+from .run import run
+from .scene import load, names
+from .simulation import Simulation
+from .tables import SceneError
+
+DEFAULT = "tilt"
+
+ABOUT = """\
+Rigid rock blocks in 2-D whose every contact force comes from a joint law.
+
+  python -m dem_demo [SCENE] --out DIR     run a scene: a name or a TOML file
+  python -m dem_demo check FILE            check a scene file without running it
+  python -m dem_demo resume STATE --out DIR [--until T] [--step DT]
+                                           go on from DIR/state or DIR/refused
+"""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Entry point; returns the exit code."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    verb = words[0] if words and words[0] in ("check", "resume") else "run"
+    try:
+        return {"check": _check, "resume": _resume, "run": _run}[verb](
+            words[1:] if verb != "run" else words
+        )
+    except (SceneError, Refused, ValueError, OSError) as error:
+        print(f"dem_demo: {error}", file=sys.stderr)
+        return 2
+
+
+def _run(words: list[str]) -> int:
+    parser = argparse.ArgumentParser(
+        "python -m dem_demo",
+        description=ABOUT,
+        epilog=f"scenes: {', '.join(names())}\nexample: python -m dem_demo tilt --out out/tilt",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("scene", nargs="?", default=DEFAULT, help=f"default {DEFAULT}")
+    _outputs(parser)
+    given = parser.parse_args(words)
+    return _go(Simulation(load(given.scene)), given)
+
+
+def _resume(words: list[str]) -> int:
+    parser = argparse.ArgumentParser(
+        "python -m dem_demo resume",
+        description="Go on from a saved state; without --step bit for bit as if never stopped.",
+        epilog="example: python -m dem_demo resume out/tilt/state --until 45 --out out/longer",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("state", type=Path, help="folder that a run left: DIR/state, DIR/refused")
+    _outputs(parser)
+    parser.add_argument("--step", type=float, help="another time step (s)")
+    given = parser.parse_args(words)
+    return _go(Simulation.load(given.state, given.step), given)
+
+
+def _check(words: list[str]) -> int:
+    parser = argparse.ArgumentParser(
+        "python -m dem_demo check",
+        description="Read a scene file, seat its blocks, find its time step; run nothing.",
+        epilog="example: python -m dem_demo check my-scene.toml",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("file")
+    scene = load(Path(parser.parse_args(words).file))
+    sim = Simulation(scene)
+    _announce(sim, scene.run.end)
+    print("the scene is valid")
+    return 0
+
+
+def _outputs(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for the results")
+    parser.add_argument("--until", type=float, help="model time to stop at (s)")
+    parser.add_argument("--no-pictures", action="store_true", help="tables only")
+
+
+def _announce(sim: Simulation, end: float) -> None:
+    free = sum(1 for block in sim.scene.blocks if not block.fixed)
+    print(f"{sim.scene.title}: {free} moving blocks, {sim.joints.n} law points in reach")
+    print(
+        f"time step {sim.dt:.3g} s, limit {sim.step_limit:.3g} s (safety factor "
+        f"{sim.step_limit / sim.dt:.2f}), {max(round((end - sim.time) / sim.dt), 0)} steps"
+    )
+    if not sim.balanced:
+        print("the joints cannot hold the blocks where they are drawn: they move from step 0")
+
+
+def _go(sim: Simulation, given: argparse.Namespace) -> int:
+    end = given.until if given.until is not None else sim.scene.run.end
+    _announce(sim, end)
+    given.out.mkdir(parents=True, exist_ok=True)
+    _, summary = run(sim, given.out, end, not given.no_pictures)
+    for slip in summary["slip"]:
+        if slip["slipped_before"]:
+            print(f"{slip['block']}: had slipped before this run")
+        elif slip["slip_angle"] is None:
+            print(f"{slip['block']}: no slip (predicted at {slip['predicted_angle']:.2f} degrees)")
+        else:
+            print(
+                f"{slip['block']}: slipped at {slip['slip_angle']:.2f} degrees, "
+                f"the law alone says {slip['predicted_angle']:.2f}"
+            )
+    print(
+        f"energy balanced to {summary['largest_energy_error']:.1e}, smallest safety factor "
+        f"{summary['safety_factor']:.2f}; results in {given.out}"
+    )
+    return 0

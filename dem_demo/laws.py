@@ -1,0 +1,73 @@
+"""Laws of a scene: built from its TOML tables, and tabulated once for the host.
+
+A host needs from a law, besides `joints(n)`: how stiff a joint is at a given normal stress (time
+step, dashpots) and how far it closes (seating). Both come from the virgin curve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+import jointlaw as jl
+
+from .coulomb import CoulombLaw, CoulombState
+
+
+def build_law(table: dict[str, Any], where: str):
+    """A law from a scene's `[laws.NAME]` table; `kind` is "joint" (default) or "coulomb"."""
+    table = dict(table)
+    kind = table.pop("kind", "joint")
+    if kind == "joint":
+        return jl.JointLaw.from_dict({"plane": 0.0, **table}, where)
+    if kind != "coulomb":
+        raise ValueError(f"{where}.kind = {kind!r}: must be 'joint' or 'coulomb'")
+    known = {f.name for f in fields(CoulombLaw)}
+    for key in table:
+        if key not in known:
+            raise ValueError(f"{where}.{key} is unknown; known here: {', '.join(sorted(known))}")
+    if missing := known - set(table):
+        raise ValueError(f"{where} lacks {', '.join(sorted(missing))}")
+    try:
+        return CoulombLaw(**table)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{where}.{error}") from None
+
+
+def load_state(law, path):
+    """The state of a law's batch from the file that its `save` wrote."""
+    return CoulombState.load(path) if isinstance(law, CoulombLaw) else jl.load_state(path)
+
+
+@dataclass(frozen=True)
+class StiffnessCurve:
+    """Upper bound of a law's stiffness (Pa/m) against normal stress (Pa) and closure (m).
+
+    At a given normal stress the unsheared joint is the stiffest one (Phi' is a concave function of
+    Phi), so the virgin curve bounds the sheared joint as well.
+    """
+
+    closure: np.ndarray
+    stress: np.ndarray
+    stiffness: np.ndarray
+
+    @classmethod
+    def of(cls, law) -> StiffnessCurve:
+        """Tabulate a law from no closure to 20 MPa."""
+        top = float(law.closure(20e6))
+        closure = np.concatenate([[0.0], np.geomspace(1e-6 * top, top, 400)])
+        return cls(closure, law.normal_stress(closure), law.max_stiffness(closure))
+
+    def at_stress(self, stress: np.ndarray) -> np.ndarray:
+        """Stiffness (Pa/m) at a normal stress; 0 for an open joint."""
+        return np.interp(stress, self.stress, self.stiffness) * (stress > 0)
+
+    def at_closure(self, closure: np.ndarray) -> np.ndarray:
+        """Stiffness (Pa/m) of a virgin joint at a closure."""
+        return np.interp(closure, self.closure, self.stiffness)
+
+    def virgin_stress(self, closure: np.ndarray) -> np.ndarray:
+        """Normal stress (Pa) of a virgin joint at a closure."""
+        return np.interp(closure, self.closure, self.stress)

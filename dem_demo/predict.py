@@ -1,0 +1,59 @@
+"""What the law alone says about a scene: slip angles and direct shear curves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import jointlaw as jl
+
+from .coulomb import CoulombLaw
+from .scene import Scene
+
+SLIP_DISTANCE = 2e-3  # m, for laws without a critical slip distance
+
+
+def slip_distance(law) -> float:
+    """Sliding (m) that counts as slip: the law's critical slip distance."""
+    distance = getattr(law, "critical_slip", np.inf)
+    return distance if np.isfinite(distance) else SLIP_DISTANCE
+
+
+def friction_angle(law, stress: float) -> float:
+    """Peak of F2/F1 (degrees) of the law in direct shear at a constant normal stress (Pa)."""
+    if isinstance(law, CoulombLaw):
+        return float(np.degrees(np.arctan(law.friction)))
+    to = [1.2 * slip_distance(law)]  # friction peaks where the contacts begin to be renewed
+    record = jl.direct_shear(law.joint(), to=to, normal=stress, steps=120)
+    return float(record.peak_friction_angle)
+
+
+def slip_angle(scene: Scene, moving: int, base: int, length: float) -> dict[str, float]:
+    """Base angle (degrees) at which a block of contact `length` (m) should slip, and the stress.
+
+    The normal stress falls as the base tilts, so angle and stress are found together.
+    """
+    law = scene.laws[scene.law_of((moving, 0, base, 0))]
+    block = scene.blocks[moving]
+    flat = block.density * block.area * np.hypot(*scene.gravity) / length
+    angle, before = 35.0, 0.0
+    while abs(angle - before) > 5e-3:
+        before, stress = angle, float(flat * np.cos(np.radians(angle)))
+        angle = friction_angle(law, stress)
+    return {"predicted_angle": angle, "normal_stress": stress}
+
+
+def shear_curve(law, stress: float, slid: np.ndarray) -> dict[str, np.ndarray] | None:
+    """Direct shear of the law alone along the turning points of `slid` (m), at a normal stress.
+
+    Returns slid (m), shear stress (Pa) and dilation (m), or None for plain Coulomb.
+    """
+    if isinstance(law, CoulombLaw):
+        return None
+    inner = np.flatnonzero(np.diff(np.sign(np.diff(slid)))) + 1
+    turns = [float(u) for u in [*slid[inner], slid[-1]]]
+    test = jl.direct_shear(law.joint(), to=turns, normal=stress, steps=400)
+    return {
+        "slid": test.shear_2,
+        "shear": test.F2,
+        "dilation": test.closure[0] - test.closure,
+    }

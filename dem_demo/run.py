@@ -1,0 +1,81 @@
+"""Run a scene to its end and write what a user wants to see."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from pathlib import Path
+
+from tqdm import tqdm
+
+from . import picture, plots
+from .energy import COLUMNS
+from .interfaces import Refused
+from .record import Record
+from .simulation import Simulation
+from .watch import EVERY, Watch
+
+
+def run(sim: Simulation, folder: Path | None = None, until: float | None = None, pictures=True):
+    """Run to `until` (s, default the scene's end); writes into `folder` if given.
+
+    Returns (record, summary). A state that the method cannot carry raises Refused and leaves the
+    last good one in `folder`/refused, from where the run can be repeated or resumed.
+    """
+    scene, end = sim.scene, until if until is not None else sim.scene.run.end
+    record, watch = Record(sim), Watch(sim)
+    record.take(sim)
+    started, good, first_step = time.perf_counter(), sim.state(), sim.n
+    steps = max(round((end - sim.time) / sim.dt), 0)
+    every = max(round(scene.run.record / sim.dt), 1)
+    worst, summary = 0.0, {}
+    try:
+        for i in tqdm(range(1, steps + 1), desc=scene.title, disable=not sys.stderr.isatty()):
+            sim.step()
+            if i % EVERY == 0 and watch.waiting:
+                watch.look(sim)
+            if i % every == 0 or i == steps:
+                record.take(sim)
+                good = sim.state()
+                worst = max(worst, abs(sim.ledger.error))
+    except Refused as trouble:
+        if folder:
+            sim.save(folder / "refused", good)
+            (folder / "refused" / "why.txt").write_text(f"{trouble}\n")
+            write(record, {"refused": str(trouble)}, folder, False)
+            raise Refused(f"{trouble}\nThe last good state is in {folder / 'refused'}") from None
+        raise
+    wall = time.perf_counter() - started
+    summary = {
+        "scene": scene.title,
+        "model_time_s": sim.time,
+        "steps": sim.n - first_step,
+        "time_step_s": sim.dt,
+        "step_limit_s": sim.least_limit,
+        "safety_factor": sim.least_limit / sim.dt,
+        "started_in_equilibrium": bool(sim.balanced),
+        "law_points": sim.joints.n,
+        "energy_J": {c: sim.ledger.value[c] for c in COLUMNS},
+        "energy_error": sim.ledger.error,
+        "largest_energy_error": worst,
+        "slip": watch.report(),
+        "wall_time_s": wall,
+    }
+    if folder:
+        write(record, summary, folder, pictures)
+        sim.save(folder / "state")
+    return record, summary
+
+
+def write(record: Record, summary: dict, folder: Path, pictures: bool) -> None:
+    """All files of a run."""
+    folder.mkdir(parents=True, exist_ok=True)
+    record.write(folder)
+    (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    if pictures:
+        picture.final(record, folder / "final.png", summary["slip"])
+        plots.energy(record, folder / "energy.png")
+        if record.watched[0]:
+            plots.curves(record, folder / "curves.png", summary["slip"])
+        picture.motion(record, folder / "motion.gif")

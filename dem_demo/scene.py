@@ -1,0 +1,243 @@
+"""A scene: blocks, laws, drives and how to run them, read from TOML and checked."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .drives import AXES, Back, Drive
+from .laws import build_law
+from .shapes import Block, box, check_convex
+from .tables import SceneError, Table
+
+SCENES = Path(__file__).parent / "scenes"
+
+
+@dataclass(frozen=True)
+class Run:
+    """How to run a scene; times in s, lengths in m."""
+
+    end: float
+    fraction: float = 0.3  # time step as a share of the limit
+    step: float | None = None  # or the time step itself
+    seat: bool = True  # start at the gravity closure
+    record: float = 0.05  # time between records
+    dashpot_normal: float = 0.05  # shares of critical
+    dashpot_shear: float = 0.05
+    law_steps: int = 1  # steps of the law per time step: 4 keeps the books within 0.5 % in impacts
+    largest_stress: float = 0.0  # Pa, expected in impacts: sets the step before anything touches
+    skin: float | None = None  # reach of the search for contacts; default 0.02 of the least width
+    point_spacing: float = np.inf  # largest distance of law points along a joint
+    max_overlap: float = 0.03  # share of the smaller block's width
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything that a simulation needs. `text` is the file it came from."""
+
+    title: str
+    blocks: tuple[Block, ...]
+    laws: dict[str, Any]
+    run: Run
+    default_law: str
+    pairs: dict[frozenset, str] = field(default_factory=dict)
+    drives: tuple[Drive, ...] = ()
+    gravity: tuple[float, float] = (0.0, -9.81)
+    thickness: float = 1.0
+    watch: dict[str, Any] = field(default_factory=dict)
+    text: str = ""
+
+    def law_of(self, key: tuple[int, int, int, int]) -> str:
+        """Name of the law of an interface (block, edge, block, edge)."""
+        return self.pairs.get(frozenset((key[0], key[2])), self.default_law)
+
+
+def names() -> list[str]:
+    """Scenes that come with the package."""
+    return sorted(path.stem for path in SCENES.glob("*.toml"))
+
+
+def load(source: str | Path) -> Scene:
+    """A scene by name, or from a TOML file."""
+    path = SCENES / f"{source}.toml"
+    if not (isinstance(source, str) and path.is_file()):
+        path = Path(source)
+    if not path.is_file():
+        raise SceneError(
+            f"no scene {str(source)!r}: give a TOML file or one of {', '.join(names())}"
+        )
+    return parse(path.read_text(), path.name)
+
+
+def parse(text: str, where: str = "scene") -> Scene:
+    """A scene from TOML text; `where` is named in error messages."""
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"{where} is not valid TOML: {error}") from None
+    top = Table(data, where)
+    laws = {}
+    for name, table in top.take("laws", dict, say="give at least one [laws.NAME] table").items():
+        try:
+            laws[name] = build_law(table, f"{where}.laws.{name}")
+        except (ValueError, AttributeError) as error:
+            raise SceneError(str(error)) from None
+    default = top.take("law", str, next(iter(laws), ""))
+    thickness = top.take("thickness", float, 1.0, above=0)
+    density = top.take("density", float, 2600.0, above=0)
+    tables = top.take("block", list, say="give [[block]] tables")
+    blocks = [_block(Table(t, f"{where}.block[{i}]"), density) for i, t in enumerate(tables)]
+    number = {block.name: i for i, block in enumerate(blocks)}
+    if len(number) < len(blocks):
+        raise SceneError(f"{where}.block: two blocks have the same name; names must differ")
+    if all(block.fixed for block in blocks):
+        raise SceneError(f"{where}.block: all blocks are fixed; at least one must be free to move")
+    drives = _drives(top, where, number, blocks)
+    run = _run(Table(top.take("run", dict, say="give a [run] table with `end`"), f"{where}.run"))
+    scene = Scene(
+        title=top.take("title", str, where),
+        blocks=tuple(_hold(block, i, drives) for i, block in enumerate(blocks)),
+        laws=laws,
+        run=run,
+        default_law=default,
+        pairs=_pairs(top, where, number),
+        drives=drives,
+        gravity=top.vector("gravity", (0.0, -9.81)),
+        thickness=thickness,
+        watch=_watch(top, where, number),
+        text=text,
+    )
+    top.finish()
+    for law in [default, *scene.pairs.values()]:
+        if law not in laws:
+            raise SceneError(f"{where}: law {law!r} is not among [laws]: {', '.join(laws)}")
+    return scene
+
+
+def _block(table: Table, density: float) -> Block:
+    name = table.take("name", str)
+    table.where = f"{table.where.rsplit('[', 1)[0]}[{name!r}]"
+    if "box" in table.data:
+        size = table.vector("box")
+        if min(size) <= 0:
+            raise SceneError(f"{table.path('box')} = {list(size)}: width and height must be > 0")
+        corners = box(*size, table.vector("at", (0.0, 0.0)), table.take("angle", float, 0.0))
+    else:
+        given = table.take("corners", list, say="give `corners`, or `box` with `at` and `angle`")
+        try:
+            corners = np.array(given, float)
+        except (TypeError, ValueError):
+            raise SceneError(f"{table.path('corners')}: must be numbers [x, y]") from None
+    if trouble := check_convex(corners):
+        raise SceneError(f"{table.path('corners')} {trouble}")
+    block = Block(
+        name=name,
+        corners=corners,
+        density=table.take("density", float, density, above=0),
+        fixed=table.take("fixed", bool, False),
+        velocity=table.vector("velocity", (0.0, 0.0)),
+        spin=table.take("spin", float, 0.0),
+        load=table.vector("load", (0.0, 0.0)),
+        held=tuple(table.take("held", list, [])),
+    )
+    table.finish()
+    if unknown := set(block.held) - set(AXES):
+        raise SceneError(f"{table.path('held')}: {unknown.pop()!r} is unknown: x, y or turn")
+    return block
+
+
+def _drives(top: Table, where: str, number: dict[str, int], blocks: list[Block]):
+    out = [
+        Drive(i, AXES[axis], (0.0,), (0.0,), 0.0) for i, b in enumerate(blocks) for axis in b.held
+    ]
+    for n, data in enumerate(top.take("drive", list, [])):
+        table = Table(data, f"{where}.drive[{n}]")
+        block, motion = table.take("block", str), table.take("motion", str)
+        if block not in number or blocks[number[block]].fixed:
+            raise SceneError(
+                f"{table.path('block')} = {block!r}: must be a block that is not fixed"
+            )
+        if motion not in AXES:
+            raise SceneError(f"{table.path('motion')} = {motion!r}: must be x, y or turn")
+        times, values = (np.array(table.take(key, list), float) for key in ("times", "values"))
+        if len(times) != len(values) or len(times) < 1 or (np.diff(times) <= 0).any():
+            raise SceneError(f"{table.path('times')}: must increase, one for each of `values`")
+        unit = np.pi / 180 if motion == "turn" else 1.0
+        ease = table.take("ease", float, 0.1, least=0)
+        way = tuple(times), tuple(unit * values)
+        back = _way_back(table, number, unit)
+        out.append(Drive(number[block], AXES[motion], *way, ease, back))
+        table.finish()
+    moved = [(d.block, d.axis) for d in out]
+    if len(set(moved)) < len(moved):
+        raise SceneError(f"{where}.drive: a motion of a block is prescribed twice")
+    return tuple(out)
+
+
+def _way_back(table: Table, number: dict[str, int], unit: float) -> Back | None:
+    if not (data := table.take("back", dict, {})):
+        return None
+    back = Table(data, table.path("back"))
+    block = back.take("block", str)
+    if block not in number:
+        raise SceneError(f"{back.path('block')} = {block!r}: no such block")
+    slid = back.take("slid", float, above=0, say="m")
+    by, rate = (back.take(key, float, above=0) * unit for key in ("by", "rate"))
+    back.finish()
+    return Back(number[block], slid, by, rate)
+
+
+def _hold(block: Block, number: int, drives) -> Block:
+    name = {value: key for key, value in AXES.items()}
+    held = tuple(name[d.axis] for d in drives if d.block == number)
+    return Block(**{**block.__dict__, "held": held})
+
+
+def _pairs(top: Table, where: str, number: dict[str, int]) -> dict[frozenset, str]:
+    pairs = {}
+    for n, data in enumerate(top.take("joint", list, [])):
+        table = Table(data, f"{where}.joint[{n}]")
+        between = table.take("between", list)
+        if len(between) != 2 or not set(between) <= set(number):
+            raise SceneError(f"{table.path('between')} = {between}: must name two blocks")
+        pairs[frozenset(number[b] for b in between)] = table.take("law", str)
+        table.finish()
+    return pairs
+
+
+def _run(table: Table) -> Run:
+    run = Run(
+        end=table.take("end", float, above=0, say="s"),
+        fraction=table.take("fraction", float, Run.fraction, above=0),
+        step=table.take("step", float, None, above=0, say="s"),
+        seat=table.take("seat", bool, Run.seat),
+        record=table.take("record", float, Run.record, above=0, say="s"),
+        dashpot_normal=table.take("dashpot_normal", float, Run.dashpot_normal, least=0),
+        dashpot_shear=table.take("dashpot_shear", float, Run.dashpot_shear, least=0),
+        law_steps=int(table.take("law_steps", float, Run.law_steps, least=1)),
+        largest_stress=table.take("largest_stress", float, Run.largest_stress, least=0, say="Pa"),
+        skin=table.take("skin", float, None, above=0, say="m"),
+        point_spacing=table.take("point_spacing", float, Run.point_spacing, above=0, say="m"),
+        max_overlap=table.take("max_overlap", float, Run.max_overlap, above=0),
+    )
+    table.finish()
+    if not run.fraction <= 0.95:
+        raise SceneError(f"{table.path('fraction')} = {run.fraction}: must be <= 0.95 of the limit")
+    return run
+
+
+def _watch(top: Table, where: str, number: dict[str, int]) -> dict[str, list]:
+    """Joints to report on, as pairs of block numbers (moving, base)."""
+    table, out = Table(top.take("watch", dict, {}), f"{where}.watch"), {}
+    for kind in ("slip", "shear"):
+        out[kind] = []
+        for pair in table.take(kind, list, []):
+            if not (isinstance(pair, list) and len(pair) == 2 and set(pair) <= set(number)):
+                raise SceneError(f"{table.path(kind)}: {pair!r} must be [moving block, its base]")
+            out[kind].append((number[pair[0]], number[pair[1]]))
+    table.finish()
+    return out

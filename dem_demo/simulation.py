@@ -1,0 +1,244 @@
+"""Blocks, joints and time: one step of the whole, and the states it can return to."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from . import geometry, states, timestep
+from .drives import Drives
+from .energy import Ledger
+from .interfaces import ANGLE, Interfaces, Refused
+from .joints import Joints
+from .scene import Scene, parse
+from .start import begin
+from .world import World
+
+HEADROOM = 1.25  # most growth of a joint's stiffness between two checks of the time step
+SAFE = 0.98  # largest time step as a share of the limit
+STEEP = np.sin(1.25 * ANGLE)  # tilt between two edges beyond which they are no joint
+
+
+class Simulation:
+    """A scene in motion. `step()` advances it; `state()` and `restore()` are bit-exact."""
+
+    def __init__(self, scene: Scene, step: float | None = None, fresh: bool = True) -> None:
+        self.scene, run, blocks = scene, scene.run, scene.blocks
+        width = min(b.width for b in blocks)
+        self.skin = run.skin or 0.02 * width
+        self.world = World(blocks, scene.thickness, self.skin)
+        self.interfaces = Interfaces(blocks, self.skin, run.point_spacing, run.max_overlap)
+        self._least_depth = self.interfaces.depth_limit.min()
+        self.joints = Joints(scene.laws, scene.law_of)
+        self.drives = Drives(scene.drives)
+        self.inertia = np.stack([self.world.mass, self.world.mass, self.world.moment], axis=1)
+        self.mobile = np.array([[not b.fixed] * 3 for b in blocks])
+        self.free = self.mobile.copy()
+        self.free[self.drives.rows, self.drives.axes] = False
+        self.reach = np.array([b.reach for b in blocks])
+        self.gravity = self.mobile * self.inertia * [*scene.gravity, 0.0]
+        self.loads = np.array([[*b.load, 0.0] for b in blocks]) * self.mobile
+        self._steady = self.gravity + self.loads
+        self._damped = bool(run.dashpot_normal or run.dashpot_shear)
+        self.ledger = Ledger(self.inertia, self.gravity, self.loads)
+        self.limit = timestep.StepLimit(self.inertia, self.free)
+        held = self.free[:, :2].any(axis=1)
+        self._lightness = held / self.world.mass
+        self.t0, self.n, self.dt = 0.0, 0, step or run.step or 0.0
+        self.step_limit = self.least_limit = np.inf
+        self.balanced, self.motion = True, self.world.motion()
+        if fresh:
+            begin(self)
+
+    # ------------------------------------------------------------------- step
+
+    @property
+    def time(self) -> float:
+        """Model time (s)."""
+        return self.t0 + self.n * self.dt
+
+    def step(self) -> None:
+        """One time step. Raises Refused for a state that the method cannot carry."""
+        self.world.step(self.dt, self._at_new_positions)
+
+    def _at_new_positions(self, motion: np.ndarray) -> np.ndarray:
+        """Forces (n, 3) at the positions just reached; velocities are those that led there."""
+        self._require_slow(motion)
+        self.motion, self.n = motion, self.n + 1
+        if self.interfaces.stale(motion):
+            self._checked = np.zeros(self.joints.n)  # lever arms have changed
+            if self.interfaces.renew(motion, self.world.near):
+                self.arrange()
+        points = geometry.evaluate(self.edges, motion)
+        self._require_carried(points)
+        d = self.joints.increments(points.closure, points.along[1] * self.dt)
+        self.traction = self.joints.update(d, self.scene.run.law_steps)
+        forces = self.forces(points, self.dt)
+        if (self._stiffness * self.area > self._checked).any():
+            self.check_step(points)
+            self.require_step()
+        if self.drives.waiting and self.n % 16 == 0:
+            self.drives.watch(self.time, self.slid)
+        self.ledger.step(motion[3:].T, forces, self.dt, *self.joint_energies(points))
+        return forces[0]
+
+    def forces(self, points: geometry.Points, dt: float) -> np.ndarray:
+        """(3, n, 3): all forces, those of the dashpots, those of the drives."""
+        self.points = points
+        self.area = area = points.length * self.scene.thickness
+        stress, shear = self.traction.T
+        self._stiffness = self.joints.stiffness(stress)
+        push, drag = self._dashpots(points, area * stress)
+        self.assembly.move(self.motion)
+        forces = np.empty((3, *self.mobile.shape))
+        damped = self.assembly(points, push, drag) if self._damped else 0.0
+        forces[1] = damped * self.mobile
+        forces[0] = self.assembly(points, area * stress, -area * shear) + damped
+        forces[0] = (forces[0] + self._steady) * self.mobile
+        forces[2] = 0.0
+        if len(self.drives.rows):
+            at = self.drives.rows, self.drives.axes
+            wanted = self.drives.velocity(self.time, self.dt)
+            needed = self.inertia[at] * (wanted - self.motion[3:].T[at]) / dt - forces[0][at]
+            forces[2][at] = needed
+            forces[0][at] += needed
+        return forces
+
+    def _dashpots(self, points: geometry.Points, pressed: np.ndarray):
+        """Forces of the dashpots along normal and tangent, (k,) each; never a pull."""
+        run = self.scene.run
+        damping = self._damping()
+        push = np.maximum(-run.dashpot_normal * damping * points.along[0], -pressed)
+        if not run.dashpot_shear:
+            return push, np.zeros(len(push))
+        stick = 1.0 - self.joints.now["separated"] - self.joints.now["slipping"]
+        return push, -run.dashpot_shear * damping * np.maximum(stick, 0.0) * points.along[1]
+
+    def _damping(self) -> np.ndarray:
+        """Critical damping (k,) in N s/m: 2 sqrt(stiffness times reduced mass), by share."""
+        return 2.0 * np.sqrt(self.area * self._stiffness * self._share)
+
+    def slid(self, moving: int, base: int) -> float:
+        """Shear displacement (m) of the joints between two blocks, mean over their area."""
+        here = self.points_between(moving, base)
+        area = self.area[here]
+        if not area.any():
+            return 0.0
+        return abs(float(self.joints.read("delta")[here, 1] @ area / area.sum()))
+
+    def contact_forces(self) -> np.ndarray:
+        """Forces and torques (n, 3) of the joints on the blocks, dashpots left out (N, N m)."""
+        stress, shear = self.traction.T
+        self.assembly.move(self.motion)
+        return self.assembly(self.points, self.area * stress, -self.area * shear)
+
+    def points_between(self, one: int, other: int) -> np.ndarray:
+        """Mask (k,) of the law points between two blocks."""
+        a, b = self.edges.a, self.edges.b
+        return ((a == one) & (b == other)) | ((a == other) & (b == one))
+
+    def joint_energies(self, points: geometry.Points):
+        """Area (m2), stored and dissipated energy (J/m2) of the law points."""
+        return self.area, self.joints.now["stored"], self.joints.now["lost"]
+
+    def arrange(self) -> None:
+        """Joints, masses and books for a new list of edge pairs."""
+        before = None
+        if getattr(self, "points", None) is not None:
+            before = dict(zip(self.identity, self.area.tolist(), strict=True))
+        self.edges = self.interfaces.edges
+        self.identity = self.interfaces.of_points
+        self.joints.assign(self.identity)
+        self.assembly = geometry.Assembly(self.edges, len(self.scene.blocks))
+        light = self._lightness[self.edges.a] + self._lightness[self.edges.b]
+        self._share = self.edges.weight / np.where(light > 0, light, np.inf)
+        self._checked = np.zeros(self.joints.n)
+        if before is not None:
+            area = np.array([before.get(who, 0.0) for who in self.identity])
+            now = self.joints.now
+            self.ledger.remember(self.ledger.forces, area, now["stored"], now["lost"])
+
+    # ----------------------------------------------------------------- guards
+
+    def check_step(self, points: geometry.Points) -> None:
+        """Find the step limit (s) of this moment from stiffness, dashpots and lever arms."""
+        area = points.length * self.scene.thickness
+        stress = self.traction[:, 0]
+        now = np.maximum(self.joints.stiffness(stress), self.joints.stiffness_at(points.closure))
+        # Joints that barely touch count as touching well, or each touch would ask again.
+        self._stiffness = np.maximum(now, 0.2 * now.max(initial=0.0))
+        self.area = np.maximum(area, 0.02 * area.max(initial=0.0))
+        self._known = self._stiffness * self.area
+        rows = self.limit.rows(self.edges, points, self.motion)
+        run, damping = self.scene.run, self._damping()
+        self.step_limit = self.limit(
+            rows,
+            np.tile(self._known, 2),
+            np.concatenate([run.dashpot_normal * damping, run.dashpot_shear * damping]),
+        )
+        self.least_limit = min(self.least_limit, self.step_limit)
+        self.area = area
+
+    def require_step(self) -> None:
+        """Refuse a time step beyond the limit, and note by how much joints may stiffen until then.
+
+        The limit falls at most as the square root of the largest growth of any joint's stiffness.
+        """
+        if self.dt > SAFE * self.step_limit:
+            raise Refused(
+                f"time step {self.dt:.3g} s: must stay below {SAFE} of the limit, which has fallen "
+                f"to {self.step_limit:.3g} s as the joints closed; resume with a smaller step or "
+                "set run.largest_stress (Pa)"
+            )
+        self._checked = min(HEADROOM, (SAFE * self.step_limit / self.dt) ** 2) * self._known
+
+    def _require_slow(self, motion: np.ndarray) -> None:
+        way = np.abs(motion[3]) + np.abs(motion[4]) + np.abs(motion[5]) * self.reach
+        fastest = int(way.argmax())
+        if not way[fastest] * self.dt < 0.25 * self.skin:  # also true for NaN
+            raise Refused(
+                f"block {self.scene.blocks[fastest].name!r} moves {way[fastest] * self.dt:.3g} m "
+                f"in one step: must stay below {0.25 * self.skin:.3g} m (a quarter of run.skin); "
+                "resume with a smaller step"
+            )
+
+    def _require_carried(self, points: geometry.Points) -> None:
+        pressed = points.closure * (points.length > 0)
+        if pressed.max(initial=0.0) > self._least_depth:
+            a, b, depth = self.edges.a, self.edges.b, self.interfaces.depth_limit
+            limit = np.minimum(depth[a], depth[b])
+            i = int((pressed - limit).argmax())
+            if pressed[i] > limit[i]:
+                self.interfaces.refuse_overlap((a[i], b[i]), pressed[i], limit[i])
+        if np.abs(points.tilt).max(initial=0.0) > STEEP:
+            tilted = np.abs(points.tilt)[self.edges.of] > STEEP
+            if (tilted & (pressed > 0)).any():
+                raise Refused(
+                    "edges in contact have turned past 5 degrees from each other: a corner on an "
+                    "edge is not carried; keep blocks closer to parallel or end the run earlier"
+                )
+
+    # ------------------------------------------------------------------ states
+
+    def state(self) -> dict:
+        """A copy of everything that the future depends on."""
+        return states.state(self)
+
+    def restore(self, state: dict, step: float | None = None) -> None:
+        """Return to a state; with `step`, go on from there with another time step."""
+        states.restore(self, state, step)
+
+    def save(self, folder: Path, state: dict | None = None) -> None:
+        """Write a state (default: now) and its scene to a folder."""
+        states.save(self, Path(folder), state or self.state())
+
+    @classmethod
+    def load(cls, folder: Path, step: float | None = None) -> Simulation:
+        """Continue from a folder that `save` wrote."""
+        folder = Path(folder)
+        if not (folder / "blocks.npz").is_file():
+            raise ValueError(f"{str(folder)!r} holds no saved state (blocks.npz is missing)")
+        sim = cls(parse((folder / "scene.toml").read_text(), "scene.toml"), fresh=False)
+        sim.restore(states.load(sim, folder), step)
+        return sim

@@ -1,0 +1,71 @@
+"""From the drawing to step 0: seated blocks, a time step, velocities half a step on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import geometry, timestep
+from .interfaces import Refused
+from .seat import equilibrium
+
+
+def begin(sim) -> None:
+    """Seat the blocks, choose the time step, and take the first half step of the velocities."""
+    sim.interfaces.renew(sim.motion, sim.world.near)
+    sim.arrange()
+    slid = np.zeros(sim.joints.n)
+    if sim.scene.run.seat and sim.joints.n:
+        slid = _seat(sim)
+    for i, block in enumerate(sim.scene.blocks):
+        if not block.fixed:
+            sim.motion[3:, i] = [*block.velocity, block.spin]
+    points = geometry.evaluate(sim.edges, sim.motion)
+    sim.traction = sim.joints.update(sim.joints.increments(points.closure, slid))
+    sim.check_step(points)
+    if not sim.dt:
+        sim.dt = _choose_step(sim)
+    sim.require_step()
+    sim.motion[3:][sim.drives.axes, sim.drives.rows] = sim.drives.velocity(0.0, sim.dt)
+    points = geometry.evaluate(sim.edges, sim.motion)
+    velocity = sim.motion[3:].T
+    forces = sim.forces(points, 0.5 * sim.dt)
+    sim.ledger.start(velocity, forces, sim.dt, *sim.joint_energies(points))
+    sim.motion[3:] += (0.5 * sim.dt * forces[0] / sim.inertia * sim.free).T
+    sim.world.place(sim.motion)
+
+
+def _seat(sim) -> np.ndarray:
+    """Move the blocks to where their joints carry them; the joints' first sliding (m)."""
+    slid, free = np.zeros(sim.joints.n), sim.free.ravel()
+    force = ((sim.gravity + sim.loads).ravel() * sim.limit.root)[free]
+    for attempt in range(3):  # each at the places just found: the joints turn with the blocks
+        points = geometry.evaluate(sim.edges, sim.motion)
+        rows = sim.limit.rows(sim.edges, points, sim.motion)
+        area = points.length * sim.scene.thickness
+        moved, further, balanced = equilibrium(sim.joints, rows, points.closure, slid, area, force)
+        if attempt > 0 and not balanced:
+            break  # what was found before is balanced but for the turning of the joints
+        slid, sim.balanced = further, balanced
+        shift = np.zeros(sim.free.size)
+        shift[free] = moved * sim.limit.root[free]
+        sim.motion[:3] += shift.reshape(-1, 3).T
+        if not balanced:
+            break
+    sim.interfaces.renewed_at = sim.motion[:3].copy()
+    return slid
+
+
+def _choose_step(sim) -> float:
+    run, stiffness = sim.scene.run, 0.0
+    for curve in sim.joints.curves.values():
+        stiffness = max(stiffness, float(curve.at_stress(np.array([run.largest_stress]))[0]))
+    limit = sim.step_limit
+    if stiffness:
+        blocks, thick = sim.scene.blocks, sim.scene.thickness
+        limit = min(limit, timestep.impact_limit(blocks, thick, sim.inertia, sim.free, stiffness))
+    if not np.isfinite(limit):
+        raise Refused(
+            "nothing touches at the start, so no time step follows: set run.largest_stress "
+            "(Pa) to the normal stress expected in impacts, or run.step (s)"
+        )
+    return run.fraction * limit

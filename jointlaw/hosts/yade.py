@@ -1,0 +1,58 @@
+"""Export of a joint law to YADE: table, law, adapter and scripts, in one folder."""
+
+from __future__ import annotations
+
+import json
+import math
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from .._tabulate import tabulate
+from .._toml import replace_file
+from ..law import JointLaw
+from ..table import JointTable
+
+SCRIPTS = ("direct_shear.py", "settle_and_incline.py", "assembly.py")
+DEFAULT_LIMIT = 10.0  # shear limit over closure range, where the law has no critical slip
+
+
+def export_yade(
+    law: JointLaw, directory: str | Path, table: JointTable | None = None, **options: Any
+) -> JointTable:
+    """Write all that an unmodified YADE needs to run this joint; the folder may be copied away.
+
+    Parameters
+    ----------
+    law: a law in 3-D (`plane=None`).
+    directory: folder to write to; made if missing, files of the same names are replaced.
+    table: a table of this law; made with `tabulate(law, **options)` by default. Where the
+        critical slip is infinite and no `shear_limit` is given, friction is read at a shear of ten
+        closure ranges; the table's metadata state it.
+
+    Writes `joint.txt` and `joint.npz` (the table), `law.toml` (for live mode), `yade_joint.py` (the
+    adapter: YADE and numpy alone), the scripts and `summary.json`. Returns the table. Raises
+    ValueError for a law or option that cannot be tabulated.
+    """
+    if table is None:
+        if "shear_limit" not in options and math.isinf(law.critical_slip):
+            options["shear_limit"] = DEFAULT_LIMIT * law.closure_range
+        table = tabulate(law, **options)
+    elif options:
+        raise ValueError(f"{', '.join(options)}: give a table or options for one, not both")
+    folder = Path(directory)
+    folder.mkdir(parents=True, exist_ok=True)
+    table.save(folder / "joint.txt")
+    table.save(folder / "joint.npz")
+    law.to_toml(folder / "law.toml")
+    source = resources.files(__package__) / "yade_files"
+    for name in ("yade_joint.py", *SCRIPTS):
+        replace_file(folder / name, (source / name).read_bytes())
+    report = table.report(law)
+    summary = {
+        "files": ["joint.txt", "joint.npz", "law.toml", "yade_joint.py", *SCRIPTS],
+        "table": {k: v for k, v in table.metadata.items() if k != "law"},
+        "dropped_by_the_table": report.as_dict(),
+    }
+    replace_file(folder / "summary.json", (json.dumps(summary, indent=2) + "\n").encode())
+    return table

@@ -1,0 +1,84 @@
+"""Two blocks on a slope with plain Coulomb: answers known without any code."""
+
+import numpy as np
+import pytest
+
+from dem_demo import Refused, Simulation, parse, run
+
+G, RHO, MU = 9.81, 2600.0, 0.6
+
+
+def slope(angle, mu=MU, end=1.0, stiffness=2e9):
+    """Two 1 m blocks on a base, gravity turned by `angle` degrees instead of the base."""
+    gravity = [G * np.sin(np.radians(angle)), -G * np.cos(np.radians(angle))]
+    return parse(f"""
+gravity = [{gravity[0]!s}, {gravity[1]!s}]
+[laws.rock]
+kind = "coulomb"
+normal_stiffness = {stiffness}
+shear_stiffness = {stiffness}
+friction = {mu}
+[[block]]
+name = "base"
+box = [12.0, 1.0]
+at = [2.0, -0.5]
+fixed = true
+[[block]]
+name = "lower"
+box = [1.0, 1.0]
+at = [0.0, 0.5]
+[[block]]
+name = "upper"
+box = [1.0, 1.0]
+at = [1.5, 0.5]
+[run]
+end = {end}
+""")
+
+
+def test_base_shear_at_20_degrees():
+    """The joints carry the blocks' weight along the slope, from step 0 on."""
+    sim = Simulation(slope(20.0))
+    assert sim.balanced
+    shear = []
+    for _ in range(1000):
+        sim.step()
+        shear.append(sim.contact_forces()[0, 0])
+    expected = 2 * RHO * G * np.sin(np.radians(20.0))
+    assert expected == pytest.approx(17447.132, abs=5e-4)
+    # At rest from step 0; the issue asks for 1e-6.
+    assert np.array(shear) == pytest.approx(expected, rel=1e-9)
+
+
+def test_sliding_acceleration_at_35_degrees():
+    """g (sin - mu cos), once the shear springs are wound up."""
+    sim = Simulation(slope(35.0))
+    assert not sim.balanced
+    speed = []
+    for _ in range(1200):
+        sim.step()
+        speed.append(sim.motion[3, 1:].copy())
+    a = (speed[-1] - speed[400]) / ((len(speed) - 401) * sim.dt)
+    angle = np.radians(35.0)
+    expected = G * (np.sin(angle) - MU * np.cos(angle))
+    assert expected == pytest.approx(0.805256, abs=1e-6)
+    assert a == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize(("angle", "slides"), [(30.92, False), (31.02, True)])
+def test_threshold_is_the_friction_angle(angle, slides):
+    """atan 0.6 = 30.964 degrees; the edges of a 1 m cube carry unequal loads and still agree."""
+    sim = Simulation(slope(angle))
+    start = sim.motion[0].copy()
+    for _ in range(2500):
+        sim.step()
+    moved = (sim.motion[0] - start)[1:]
+    # Sliding for this long at 0.1 degrees beyond the threshold: millimetres; sticking: nanometres.
+    assert (moved > 2e-3).all() if slides else (np.abs(moved) < 1e-8).all()
+
+
+def test_a_block_topples_before_it_slides_and_is_refused_as_a_corner():
+    """Friction enough for 60 degrees: a cube turns over its edge at 45; corners are issue 7."""
+    sim = Simulation(slope(50.0, mu=2.0))
+    with pytest.raises(Refused, match="corner"):
+        run(sim, until=3.0)

@@ -1,0 +1,113 @@
+"""The predicted critical time step is sharp: bounded at 0.95 of it, diverging at 1.05."""
+
+import numpy as np
+import pytest
+
+from dem_demo import Refused, Simulation, parse
+from dem_demo.laws import build_law
+
+STEPS = 20_000
+
+
+def column(blocks, zeta):
+    """Blocks on each other with a linear law that neither slides nor differs by direction."""
+    boxes = "".join(
+        f'[[block]]\nname = "{i}"\nbox = [1.0, 0.6]\nat = [0.0, {0.3 + 0.6 * i}]\n'
+        for i in range(blocks)
+    )
+    return parse(f"""
+[laws.linear]
+kind = "coulomb"
+normal_stiffness = 1e8
+shear_stiffness = 1e8
+friction = inf
+[[block]]
+name = "base"
+box = [2.0, 1.0]
+at = [0.0, -0.5]
+fixed = true
+{boxes}
+[run]
+end = 1.0
+dashpot_normal = {zeta}
+dashpot_shear = {zeta}
+""")
+
+
+def ring(scene, share, steps):
+    """Largest velocity after small pushes, per step, at a share of the predicted limit."""
+    sim = Simulation(scene, step=1e-9)
+    sim.dt = share * sim.step_limit
+    sim.require_step = lambda: None  # the guard would refuse the very thing tested here
+    rng = np.random.default_rng(3)
+    sim.motion[3:] = 1e-7 * rng.standard_normal(sim.motion[3:].shape) * sim.mobile.T
+    sim.world.place(sim.motion)
+    size = []
+    try:
+        for _ in range(steps):
+            sim.step()
+            size.append(np.abs(sim.motion[3:]).max())
+    except Refused:  # overlap or speed: it has diverged as far as it can
+        pass
+    return np.array(size)
+
+
+@pytest.mark.parametrize("zeta", [0.0, 0.1])
+@pytest.mark.parametrize("blocks", [1, 10])
+def test_bounded_below_the_limit(blocks, zeta):
+    steps = STEPS if zeta == 0 else STEPS // 5
+    size = ring(column(blocks, zeta), 0.95, steps)
+    assert len(size) == steps
+    # Energy of the leapfrog at 0.95 of the limit lets velocities grow by 1/sqrt(1 - 0.95^2) = 3.2
+    # over the pushes, times a few modes that add up.
+    assert size.max() < 10 * size[:50].max()
+    if zeta:
+        assert size[-1] < 0.5 * size[0]  # the slowest mode of ten blocks rings longest
+
+
+@pytest.mark.parametrize("zeta", [0.0, 0.1])
+@pytest.mark.parametrize("blocks", [1, 10])
+def test_diverges_above_the_limit(blocks, zeta):
+    """Without dashpots the growth per step is 1.88 at 1.05 of the limit: 1e4 within 30 steps."""
+    size = ring(column(blocks, zeta), 1.05, 300)
+    assert size.max() > 1e4 * size[0]
+
+
+def test_refused_when_the_step_is_too_long():
+    with pytest.raises(Refused, match="smaller step"):
+        Simulation(column(1, 0.0), step=1.0)
+
+
+def test_rocking_is_in_the_limit():
+    """One block on two end points: omega = 1.74 to 1.79 sqrt(kA/m), more than translation."""
+    sim = Simulation(column(1, 0.0))
+    k, m = 1e8 * 1.0, 2600 * 0.6
+    translation = 2 / np.sqrt(k / m)
+    assert translation / sim.step_limit == pytest.approx(1.77, abs=0.2)
+
+
+def test_stiffness_at_stress_bounds_a_sheared_joint():
+    """The time step takes stiffness from normal stress: the unsheared joint must be stiffest."""
+    law = build_law(
+        {
+            "asperity_density": 1e4,
+            "critical_slip": 2e-3,
+            "orientation": {"a": 3.0},
+            "asperity": {"K": 9.5e6, "lam": 1.2, "eta": 0.5, "mu": 0.4},
+            "heights": {"alpha": 3.82, "beta": 1.15e-3, "overlap": 3e-3},
+        },
+        "law",
+    )
+    from dem_demo.laws import StiffnessCurve
+
+    curve, rng = StiffnessCurve.of(law), np.random.default_rng(5)
+    batch, closure = law.joints(40), law.closure(np.geomspace(5e3, 3e5, 40))
+    batch.update(np.column_stack([closure, np.zeros(40)]), tangent=False)
+    worst = 0.0
+    for _ in range(150):
+        d = np.column_stack([rng.normal(0, 0.02, 40) * closure, rng.normal(2e-5, 1e-4, 40)])
+        d[:, 0] = np.maximum(d[:, 0], 0.05 * closure - batch.delta[:, 0])
+        F, C = batch.update(d, tangent=True)
+        size = np.linalg.norm(C, ord=2, axis=(1, 2))
+        worst = max(worst, float((size / curve.at_stress(F[:, 0]))[F[:, 0] > 1e3].max()))
+    assert 0.3 < worst < 1.0

@@ -1,0 +1,59 @@
+"""Shear curves alone, and together with closure."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+from jointlaw.calibrate import fit_curves, fit_shear
+from jointlaw.measured import ClosureCurve, ShearCurve
+
+SHEAR = np.linspace(0, 3e-5, 12)
+
+
+@pytest.fixture(scope="module")
+def law():
+    return jl.JointLaw(
+        orientation=jl.Orientation(3.0, 0.3),
+        asperity=jl.Asperity.hertz_mindlin(G=20e9, nu=0.25, R=1e-3, mu=0.5),
+        heights=jl.GammaHeights(3.0, 2e-5, 0.0, "individual"),
+        asperity_density=1e6,
+        resolution="fast",
+    )
+
+
+@pytest.fixture(scope="module")
+def strength(law):
+    return ShearCurve(SHEAR, np.ones(12), 5e6).predict(replace(law, plane=0.0))
+
+
+def test_friction_and_inclination_are_covered_by_their_intervals(law, strength):
+    """Both are fixed by one shear test: 8 draws x 2, of which 95 % should hold the truth."""
+    start = replace(law, orientation=jl.Orientation(2.6, 0.3))
+    start = replace(start, asperity=replace(law.asperity, mu=0.6))
+    rng, hits = np.random.default_rng(0), 0
+    for _ in range(8):
+        measured = strength + 0.01 * strength.max() * rng.standard_normal(SHEAR.size)
+        fit = fit_shear(SHEAR, measured, 5e6, law=start)
+        assert set(fit.identifiable) == {"mu", "a"}
+        for name, value in (("mu", 0.5), ("a", 3.0)):
+            low, high = fit.interval(name)
+            hits += low <= value <= high
+    assert hits >= 13  # fewer has a probability of 0.7 % when the intervals are right
+
+
+def test_shear_fixes_what_closure_cannot(law, strength):
+    stress = np.geomspace(0.2e6, 10e6, 10)
+    y = law.closure(stress)
+    curves = [
+        ClosureCurve(stress, y - y[0], noise=0.01),
+        ShearCurve(SHEAR, strength, 5e6, noise=0.01),
+    ]
+    free = ("asperity_density", "mu", "a")
+    fit = fit_curves(curves, law=replace(law, orientation=jl.Orientation(2.8, 0.3)), free=free)
+    assert {"mu", "a", "asperity_density"} <= set(fit.identifiable)
+    assert fit.parameters["mu"] == pytest.approx(0.5, rel=1e-2)
+    assert fit.parameters["a"] == pytest.approx(3.0, rel=1e-2)
+    alone = fit_curves(curves[:1], law=law, free=free)
+    assert {"mu", "a"} <= set(alone.not_identifiable)

@@ -1,0 +1,190 @@
+"""The table against the law it was made from: where it must be exact, and what it drops."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+from jointlaw._tabulate import tabulate
+from jointlaw.table import JointTable, load_table
+
+
+@pytest.fixture(scope="module")
+def law():
+    return jl.presets.load("jing-replica")  # anisotropic: b = -1, c = -0.3
+
+
+@pytest.fixture(scope="module")
+def table(law):
+    return tabulate(law, shear_limit=2 * law.closure_range)
+
+
+def test_normal_stress_is_within_the_stated_tolerance(law, table):
+    """Between rows: 1e-3 of the value, or of 1e-4 of the largest where that is more."""
+    u = np.random.default_rng(0).uniform(0, 1, 3000) ** 3 * law.closure_range
+    at, exact = table.lookup(u), law.normal_stress(u)
+    allowed = 1.05e-3 * np.maximum(exact, 1e-4 * exact.max())
+    assert (np.abs(at.normal_stress - exact) < allowed).all()
+    assert np.allclose(at.normal_stress, at.kn_secant * u, rtol=1e-15)
+
+
+def test_tangent_is_the_slope_of_the_normal_stress(law, table):
+    """Central differences of the law's own curve: error of second order, here below 1e-6."""
+    u = table.closure[5:-1]
+    h = 1e-4 * u
+    slope = (law.normal_stress(u + h) - law.normal_stress(u - h)) / (2 * h)
+    assert np.allclose(table.kn_tangent[5:-1], slope, rtol=1e-6)
+
+
+def test_shear_stiffness_is_that_of_a_small_shear(law, table):
+    """A probe of 1e-4 of the closure at azimuths between the columns; friction hardly acts yet."""
+    u = 0.3 * law.closure_range
+    for azimuth in (0.1, 1.0, 2.5):
+        joint = law.joint()
+        joint.update([u, 0, 0])
+        probe = 1e-4 * u * np.array([0, math.cos(azimuth), math.sin(azimuth)])
+        ahead, back = joint.trial(probe)[0], joint.trial(-probe)[0]
+        stiffness = (ahead - back) @ probe / (2 * probe @ probe)
+        assert table.lookup(u, azimuth).shear_stiffness == pytest.approx(stiffness, rel=2e-3)
+    assert table.metadata["azimuth_fit_error"] < 1e-6  # stiffness over azimuth is a matrix
+
+
+def test_friction_is_that_of_a_shear_test(law, table):
+    """Against `direct_shear` with twice the steps: peak within 0.5 % at three azimuths."""
+    for azimuth in (0.0, math.pi / 3, math.pi / 2):
+        u = 0.5 * law.closure_range
+        record = jl.direct_shear(
+            law.joint(), 2 * law.closure_range, normal=float(law.normal_stress(u)),
+            azimuth=azimuth, steps=120,
+        )  # fmt: skip
+        at = table.lookup(u, azimuth)
+        peak = np.tan(np.radians(record.peak_friction_angle))
+        assert at.peak_friction == pytest.approx(peak, rel=5e-3)
+        assert at.mobilised_friction <= at.peak_friction
+        rate = -np.diff(record.closure)[-1] / np.diff(record.shear)[-1]
+        assert at.dilation == pytest.approx(rate, rel=0.05)  # over the last, longer step
+
+
+def test_linear_asperities_give_constant_stiffness():
+    """eta = 0, no heights: normal stress is exactly proportional to closure."""
+    law = jl.presets.load("linear-a3")
+    table = tabulate(law, shear_limit=law.closure_range)
+    assert np.ptp(table.kn_secant) < 1e-12 * table.kn_secant[0]
+    assert np.allclose(table.kn_secant, table.kn_tangent, rtol=1e-12)
+    u = np.linspace(0, 2 * law.closure_range, 50)  # past the table along the last tangent
+    assert np.allclose(table.lookup(u).normal_stress, law.normal_stress(u), rtol=1e-12)
+
+
+def test_critical_slip_sets_the_shear_limit():
+    """With a finite D_c friction has an end value and needs no limit; without, one is asked for."""
+    law = jl.presets.load("linear-a3")
+    with pytest.raises(ValueError, match="shear_limit is missing"):
+        tabulate(law)
+    short = replace(law, critical_slip=0.3 * law.closure_range)
+    assert tabulate(short).metadata["shear_limit"] == short.critical_slip
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"closure": -1.0}, "closure = -1"),
+        ({"tolerance": 0.0}, "tolerance = 0"),
+        ({"azimuths": 7}, "azimuths = 7"),
+        ({"steps": 1}, "steps = 1"),
+        ({"shear_limit": math.nan}, "shear_limit"),
+    ],
+)
+def test_bad_options_are_named(law, options, words):
+    with pytest.raises(ValueError, match=words):
+        tabulate(law, **({"shear_limit": 1e-3} | options))
+
+
+def test_plane_law_is_refused(law):
+    with pytest.raises(ValueError, match="plane=None"):
+        tabulate(replace(law, plane=0.0), shear_limit=1e-3)
+
+
+@pytest.mark.parametrize("name", ["joint.txt", "joint.npz"])
+def test_files_keep_every_digit(table, tmp_path, name):
+    table.save(tmp_path / name)
+    back = load_table(tmp_path / name)
+    for key in JointTable.__dataclass_fields__:
+        if key == "metadata":
+            assert dict(back.metadata) == dict(table.metadata)
+        else:
+            assert np.array_equal(getattr(back, key), getattr(table, key)), key
+    assert jl.JointLaw.from_toml(str(back.metadata["law"])) is not None
+
+
+def test_text_is_what_numpy_users_expect(table, tmp_path):
+    """Column names in the first line; secant and tangent under their own names."""
+    table.save(tmp_path / "joint.txt")
+    data = np.genfromtxt(tmp_path / "joint.txt", names=True)
+    assert data.dtype.names[:7] == ("un", "sn", "kn_secant", "kn_tangent", "mu", "kt_000", "kt_015")
+    assert np.array_equal(data["kt_090"], table.shear_stiffness[:, 6])
+
+
+def test_damaged_files_are_refused(tmp_path):
+    (tmp_path / "a.txt").write_text("# un sn\n1 2\n")
+    (tmp_path / "a.npz").write_bytes(b"not a zip")
+    for name in ("a.txt", "a.npz", "missing.txt"):
+        with pytest.raises(ValueError, match="not a joint table"):
+            load_table(tmp_path / name)
+
+
+def test_report_says_what_is_dropped(law, table):
+    """Pure closure is kept; unloading, coupling and reversal are dropped, and show as errors."""
+    report = table.report(law)
+    assert report["closure"].largest < 1.1e-3
+    assert report["closure, unloading"].normal > 0.05  # hysteresis
+    assert report["shear at 0 deg, closure held"].normal > 0.05  # shear changes normal stress
+    assert report["shear at 45 deg, closure held"].across > 0.05  # off-diagonal terms
+    assert report["shear and reversal"].along > 0.2  # path dependence
+    lines = str(report).splitlines()
+    assert len(lines) == 1 + len(report.rows)
+    assert set(report.as_dict()) == {row.name for row in report.rows}
+
+
+def test_follow_makes_no_energy(table):
+    """Closed loops in closure and shear: an elastic, softening, frictional host loses work only.
+
+    2000 steps per loop; the trapezoid's own error is of second order in the step.
+    """
+    rng = np.random.default_rng(2)
+    for _ in range(5):
+        corners = rng.uniform([0.1, -0.3, -0.3], [0.8, 0.3, 0.3], (4, 3)) * table.closure[-1]
+        legs = [
+            np.linspace(a, b, 300) for a, b in zip(corners, np.roll(corners, -1, 0), strict=True)
+        ]
+        path = np.concatenate([np.linspace(0 * corners[0], corners[0], 100), *legs])
+        F = table.follow(path)[100:]
+        d = np.diff(path[100:], axis=0)
+        work = np.sum((F[1:] + F[:-1]) / 2 * d)
+        assert work > -1e-4 * np.abs(F).max() * table.closure[-1]
+
+
+def test_plot(table, tmp_path):
+    pytest.importorskip("matplotlib").use("Agg")
+    table.plot(tmp_path / "table.png")
+    assert (tmp_path / "table.png").stat().st_size > 1000
+
+
+def test_export_command(tmp_path, capsys):
+    """`jointlaw export yade PRESET --out DIR` through its own function."""
+    import argparse
+
+    from jointlaw.cli_export import add_export_command
+
+    parser = argparse.ArgumentParser()
+    add_export_command(parser.add_subparsers())
+    options = parser.parse_args(
+        ["export", "yade", "linear-a3", "--out", str(tmp_path / "x"), "--shear-limit", "2um"]
+    )
+    assert options.run(options) == 0
+    assert {p.name for p in (tmp_path / "x").iterdir()} == {
+        "joint.txt", "joint.npz", "law.toml", "yade_joint.py", "direct_shear.py",
+        "settle_and_incline.py", "assembly.py", "summary.json",
+    }  # fmt: skip
+    assert "what the table drops" in capsys.readouterr().out

@@ -22,6 +22,7 @@ from .orientation import Facets, Orientation
 from .resolution import Resolution, resolve
 
 if TYPE_CHECKING:
+    from .engine import Engine
     from .joint import Joint, JointBatch
 
 _SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
@@ -210,6 +211,11 @@ class JointLaw:
             self.curve, f.n, f.n / c1, f.s, f.t, c1, area, f.weight, depth, force, slope,
             p.lam, p.mu, self.critical_slip,
         )  # fmt: skip
+
+    @cached_property
+    def engines(self) -> dict[str, Engine]:
+        """Kernels that advance this law's joints, by name; `engine.engine` fills it."""
+        return {}
 
     @cached_property
     def largest_reach(self) -> float:

@@ -67,5 +67,7 @@ def numbers(name: str, value: Any, unit: str) -> Array:
             raise TypeError
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{name} = {value!r} is not an array of numbers ({unit})") from None
+    if array.dtype == np.float64:
+        return array
     with np.errstate(over="ignore"):  # from long double: reported as not finite by the caller
         return np.asarray(array, float)

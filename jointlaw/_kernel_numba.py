@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._checks import Array
-from ._kernel_numpy import GRAZING, NEAR, NOTHING, TINY
+from ._kernel_numpy import GRAZING, LIMIT, NEAR, NOTHING, ROUNDED, TINY
 from .law import Tables
 
 # Strict arithmetic: no fused or reordered operations, so results are the same on every machine
 _jit = numba.njit(error_model="numpy", nogil=True, cache=True)
 
-LANES = 64  # joints per block
+LANES = 128  # joints per block
 
 
 def _rows(first: int, count: int) -> tuple[int, ...]:
@@ -31,20 +31,25 @@ def _rows(first: int, count: int) -> tuple[int, ...]:
 
 
 # The desk. Pairs "0, 1" are before and after the step.
-_Y0, _Y1, _F0, _F1, _S0, _S1, _X, _C0, _C1, _C2, _C3 = _rows(0, 11)  # a facet: y, Phi, Phi', curve
-_DES, _DET, _QS, _QT, _SUMS, _SUMT, _CURVING = _rows(11, 7)  # its sliders
-_BSS, _BST, _BTT, _VS, _VT = _rows(18, 5)  # its tangent
-_P, _OLD, _NEW, _J, _SLIP = 23 * LANES, 26 * LANES, 29 * LANES, 32 * LANES, 36 * LANES  # a joint
-_F, _PULL, _C, _LOST = 37 * LANES, 40 * LANES, 42 * LANES, 51 * LANES
-_DESK = 52 * LANES
+_Y0, _Y1, _F0, _F1, _S0, _S1, _X = _rows(0, 7)  # a facet: y, Phi, Phi', place in the curve
+_DES, _DET, _SUMS, _SUMT = _rows(7, 4)  # its sliders
+_CURVING, _BSS, _BST, _BTT, _VS, _VT, _G0, _G1, _G2 = _rows(13, 9)  # its tangent
+_P, _P1, _P2, _OLD, _OLD1, _OLD2, _NEW, _NEW1, _NEW2 = _rows(22, 9)  # a joint: step, y's origin
+_J00, _J01, _J10, _J11, _SLIP, _PULL1, _PULL2, _LOST, _F, _FS, _FT = _rows(31, 11)
+_C00, _C01, _C02, _C10, _C11, _C12, _C20, _C21, _C22 = _rows(42, 9)
+_DESK = 51 * LANES
 
-_M, _S, _T, _N, _REST = 0, 3, 6, 9, 12  # rows of the facet table; then A, a, compliance
+# The same rows while joints are measured
+_WHOLE, _LIMIT, _SLIDING, _SLIPPING, _APART, _STORED, _REACH = _rows(22, 7)
+
+_M, _S, _T, _N, _REST = 0, 3, 6, 9, 12  # columns of the facet table; then A, a, compliance,
+_POTENTIAL, _SHARE = 15, 16  # A c1 and the share of asperities
 
 
 class Packed(NamedTuple):
     """The tables of a law as few plain arrays: fewer arguments make a cheaper call."""
 
-    facet: Array  # (M, 15): m, s, t, n (3 each, 0 where the plane drops one), A, a, compliance
+    facet: Array  # (M, 17): m, s, t, n (3 each, 0 where the plane drops one), then the above
     depth: Array  # (M, D + 1, 3): zeta, force and slope there, infinity as the largest float
     curve: Array  # (4 cells,): coefficients of S
     scalars: Array  # lam, mu, critical slip, eta, scale of the curve
@@ -52,10 +57,12 @@ class Packed(NamedTuple):
 
 def pack(k: Tables, compliance: Array) -> Packed:
     """Arrange the tables of a law for the compiled kernel."""
-    facet = np.zeros((len(k.c1), 15))
+    facet = np.zeros((len(k.c1), 17))
     for first, rows in ((_M, k.m), (_S, k.s), (_T, k.t), (_N, k.n)):
         facet[:, first : first + k.dim] = rows.T
-    facet[:, _REST:] = np.stack([k.area, k.area / k.c1, compliance], axis=-1)
+    share = k.weight / k.weight.sum()
+    rest = (k.area, k.area / k.c1, compliance, k.area * k.c1, share)
+    facet[:, _REST:] = np.stack(rest, axis=-1)
     largest = np.finfo(float).max
     depth = np.minimum(np.stack([k.depth, k.depth_force, k.depth_slope], axis=-1), largest)
     scalars = np.array([k.lam, k.mu, k.critical_slip, k.curve.eta, k.curve.scale])
@@ -67,39 +74,52 @@ class Work(NamedTuple):
 
     block: Array  # (rows, LANES): copy of a block of states
     desk: Array
-    place: NDArray[np.int32]
+    place: NDArray[np.int32]  # cell of the curve, per lane
+    piece: Array  # its four coefficients, per lane
 
 
 def work(rows: int) -> Work:
     """Working space for states of this many rows."""
-    return Work(np.zeros((rows, LANES)), np.zeros(_DESK), np.zeros(LANES, np.int32))
+    place, piece = np.zeros(LANES, np.int32), np.zeros(4 * LANES)
+    return Work(np.zeros((rows, LANES)), np.zeros(_DESK), place, piece)
 
 
 @_jit
-def _virgin(desk, place, which, L, curve, eta, scale):
+def _fetch(place, piece, L, table):
+    """The four coefficients of each lane's cell, moved as a whole: one wide load and store."""
+    four, one, two, three = np.uint64(4), np.uint64(1), np.uint64(2), np.uint64(3)
+    for l in range(L):
+        i, o = four * np.uint64(place[l]), four * np.uint64(l)
+        c0, c1, c2, c3 = table[i], table[i + one], table[i + two], table[i + three]
+        piece[o], piece[o + one], piece[o + two], piece[o + three] = c0, c1, c2, c3
+
+
+@_jit
+def _virgin(desk, place, piece, after, L, curve, eta, scale):
     """Phi and Phi' of the row of y: three loops, so that only the look-up itself is not vector."""
-    y, force, slope = _Y0 + which, _F0 + which, _S0 + which
+    if after is None:  # a constant for the compiler
+        y, force, slope = _Y0, _F0, _S0
+    else:
+        y, force, slope = _Y1, _F1, _S1
     cells = curve.size // 4
     top = np.float64(cells - 1)
     for l in range(L):
-        v = np.sqrt(desk[y + l] if desk[y + l] > 0.0 else 0.0)
+        here = desk[y + l] if abs(desk[y + l]) >= NOTHING else 0.0
+        v = np.sqrt(here if here > 0.0 else 0.0)
         r = 1.0 / (v + scale)
         at = v * r * cells
         i = np.int32(at if at < top else top)
         place[l] = i
+        desk[y + l] = here
         desk[_X + l] = at - np.float64(i)
         desk[force + l] = v
         desk[slope + l] = v * r * r
-    for l in range(L):
-        i = np.uint64(place[l]) * np.uint64(4)
-        desk[_C0 + l] = curve[i]
-        desk[_C1 + l] = curve[i + np.uint64(1)]
-        desk[_C2 + l] = curve[i + np.uint64(2)]
-        desk[_C3 + l] = curve[i + np.uint64(3)]
+    _fetch(place, piece, L, curve)
     weight = 0.5 * cells * scale
     for l in range(L):
-        x, c1, c2, c3 = desk[_X + l], desk[_C1 + l], desk[_C2 + l], desk[_C3 + l]
-        S = desk[_C0 + l] + x * (c1 + x * (c2 + x * c3))
+        x, o = desk[_X + l], 4 * l
+        c0, c1, c2, c3 = piece[o], piece[o + 1], piece[o + 2], piece[o + 3]
+        S = c0 + x * (c1 + x * (c2 + x * c3))
         D = weight * desk[slope + l] * (c1 + x * (2.0 * c2 + x * (3.0 * c3)))
         v = desk[force + l]
         power = v if eta == 0.5 else 1.0  # y^eta where it is at hand
@@ -113,38 +133,39 @@ def _virgin(desk, place, which, L, curve, eta, scale):
 
 
 @_jit
-def _curvature(desk, L, curve, eta, scale):
-    """Phi'' of the row of y after the step."""
-    cells = curve.size // 4
+def _curvature(desk, piece, L, cells, eta, scale):
+    """Phi'' of the row of y after the step, from the pieces that `_virgin` just fetched for it."""
     for l in range(L):
-        y = desk[_Y1 + l]
+        y, x, o = desk[_Y1 + l], desk[_X + l], 4 * l
+        c0, c1, c2, c3 = piece[o], piece[o + 1], piece[o + 2], piece[o + 3]
         v = np.sqrt(y if y > 0.0 else 1.0)
-        t, s = v / (v + scale), scale / (v + scale)
-        i = min(np.int32(t * cells), np.int32(cells - 1))
-        x, i4 = t * cells - np.float64(i), np.uint64(i) * np.uint64(4)
-        c1, c2, c3 = curve[i4 + np.uint64(1)], curve[i4 + np.uint64(2)], curve[i4 + np.uint64(3)]
-        S = curve[i4] + x * (c1 + x * (c2 + x * c3))
+        r = 1.0 / (v + scale)
+        t, s = v * r, scale * r
+        S = c0 + x * (c1 + x * (c2 + x * c3))
         S1 = cells * (c1 + x * (2.0 * c2 + x * (3.0 * c3)))
         S2 = cells * cells * (2.0 * c2 + x * (6.0 * c3))
         ts = t * s
         D = 0.5 * ts * S1
         DD = 0.25 * (ts * ts) * S2 + 0.25 * ts * (s - t) * S1
         value = eta * (1.0 + eta) * S + (1.0 + 2.0 * eta) * D + DD
-        power = 1.0 / v if eta == 0.5 else (v * v) ** (eta - 1.0)
-        desk[_CURVING + l] = power * value if y > 0.0 else 0.0
+        value = value / v if eta == 0.5 else value
+        desk[_CURVING + l] = value if y > 0.0 else 0.0
+    if eta != 0.5:
+        for l in range(L):
+            desk[_CURVING + l] *= desk[_Y1 + l] ** (eta - 1.0) if desk[_Y1 + l] > 0.0 else 0.0
 
 
 @_jit
 def _drag(desk, L, limit, dim):
     """The leash: new offsets, their derivative and the slip; see `_kernel_numpy.drag`."""
     for l in range(L):
-        a0, a1 = desk[_OLD + LANES + l], desk[_OLD + 2 * LANES + l]
-        p0, p1 = desk[_P + LANES + l], desk[_P + 2 * LANES + l]
+        a0, a1 = desk[_OLD1 + l], desk[_OLD2 + l]
+        p0, p1 = desk[_P1 + l], desk[_P2 + l]
         f0, f1 = a0 + p0, a1 + p1
-        desk[_NEW + LANES + l], desk[_NEW + 2 * LANES + l] = f0, f1
+        desk[_NEW1 + l], desk[_NEW2 + l] = f0, f1
         desk[_SLIP + l] = 0.0
-        desk[_J + l] = desk[_J + 3 * LANES + l] = 1.0
-        desk[_J + LANES + l] = desk[_J + 2 * LANES + l] = 0.0
+        desk[_J00 + l] = desk[_J11 + l] = 1.0
+        desk[_J01 + l] = desk[_J10 + l] = 0.0
         length = np.hypot(p0, p1)
         if f0 * f0 + f1 * f1 <= limit * limit or f0 * p0 + f1 * p1 <= 0.0:
             continue
@@ -162,7 +183,7 @@ def _drag(desk, L, limit, dim):
         cos1 = ((1.0 + cos) - (1.0 - cos) * decay * decay) / bottom
         sin1 = 2.0 * sin * decay / bottom
         b0, b1 = limit * (cos1 * e0 - sin1 * e1), limit * (cos1 * e1 + sin1 * e0)
-        desk[_NEW + LANES + l], desk[_NEW + 2 * LANES + l] = b0, b1
+        desk[_NEW1 + l], desk[_NEW2 + l] = b0, b1
         desk[_SLIP + l] = limit * (x + np.log(bottom / 2.0))
         turn = (rest * rest + cos * rest * (1.0 + decay)) / bottom
         turn += inside / (limit * max(cos, GRAZING)) * (2.0 * decay / bottom - sin1 * sin)
@@ -170,16 +191,16 @@ def _drag(desk, L, limit, dim):
         row0, row1 = -turn * e1 - sin1 / limit * e0, turn * e0 - sin1 / limit * e1
         if dim == 2:
             row0 = row1 = 0.0  # along one line the end of the leash does not turn
-        desk[_J + l], desk[_J + LANES + l] = -b1 * row0, -b1 * row1
-        desk[_J + 2 * LANES + l], desk[_J + 3 * LANES + l] = b0 * row0, b0 * row1
+        desk[_J00 + l], desk[_J01 + l] = -b1 * row0, -b1 * row1
+        desk[_J10 + l], desk[_J11 + l] = b0 * row0, b0 * row1
 
 
 @_jit
-def _slide(desk, L, lower, upper, ended, A, a, compliance, lam_mu, ledger, tangent):
+def _slide(desk, qs, qt, L, depth, f, i, strength, a, compliance, ledger, tangent):
     """One depth cell of one facet: steps 2 and 3 of law.md section 6."""
-    zl, fl, sl = lower[0], lower[1], lower[2]
-    zh, fh, sh = upper[0], upper[1], upper[2]
-    strength = lam_mu * A
+    zl, fl, sl = depth[f, i, 0], depth[f, i, 1], depth[f, i, 2]
+    zh, fh, sh = depth[f, i + 1, 0], depth[f, i + 1, 1], depth[f, i + 1, 2]
+    ended = i + 2 < depth.shape[1]
     for l in range(L):
         # the bed beyond the lower limit of the cell less that beyond the upper
         y0, y1, f0, f1 = desk[_Y0 + l], desk[_Y1 + l], desk[_F0 + l], desk[_F1 + l]
@@ -208,7 +229,7 @@ def _slide(desk, L, lower, upper, ended, A, a, compliance, lam_mu, ledger, tange
         chord = chord if chord < k1 else k1
         kept = 1.0 if grows else ratio
         add = a * (chord if grows else k1)
-        olds, oldt, des, det = desk[_QS + l], desk[_QT + l], desk[_DES + l], desk[_DET + l]
+        olds, oldt, des, det = qs[l], qt[l], desk[_DES + l], desk[_DET + l]
         ts, tt = olds * kept + add * des, oldt * kept + add * det
         new2 = ts * ts + tt * tt
         size = np.sqrt(new2)
@@ -217,10 +238,9 @@ def _slide(desk, L, lower, upper, ended, A, a, compliance, lam_mu, ledger, tange
         share = cap / (size if slips else 1.0)
         share = share if slips else 1.0
         part = share if new2 > TINY else 0.0  # a size that underflows has no cap
-        qs, qt = part * ts, part * tt
-        desk[_QS + l], desk[_QT + l] = qs, qt
-        desk[_SUMS + l] += qs
-        desk[_SUMT + l] += qt
+        qs[l], qt[l] = part * ts, part * tt
+        desk[_SUMS + l] += part * ts
+        desk[_SUMT + l] += part * tt
         if ledger is not None:  # each term is >= 0 as written
             r0 = 1.0 / (k0 if k0 > TINY else 1.0)
             r1 = 1.0 / (k1 if k1 > TINY else 1.0)
@@ -256,29 +276,53 @@ def _slide(desk, L, lower, upper, ended, A, a, compliance, lam_mu, ledger, tange
 
 
 @_jit
-def _add_tangent(desk, L, facet, lam, leash, dim):
-    """C += along g^T + (1/lam) E^T B E of one facet, law.md section 7."""
-    A = facet[_REST]
-    for i in range(dim):
-        ni, si, ti = facet[_N + i] * A, facet[_S + i], facet[_T + i]
-        for j in range(dim):
-            sj, tj, mj = facet[_S + j], facet[_T + j], facet[_M + j]
-            ss, st, tt = si * sj / lam, (si * tj + ti * sj) / lam, ti * tj / lam
-            here = _C + (dim * i + j) * LANES
-            for l in range(L):
-                along = ni * desk[_S1 + l] + (si * desk[_VS + l] + ti * desk[_VT + l]) / lam
-                bed = ss * desk[_BSS + l] + st * desk[_BST + l] + tt * desk[_BTT + l]
-                desk[here + l] += along * mj + bed
-            if leash and j > 0:  # g follows the offset, not the joint
-                m1, m2 = facet[_M + 1], facet[_M + 2]
-                J1, J2 = _J + (j - 1) * LANES, _J + (j + 1) * LANES
-                for l in range(L):
-                    along = ni * desk[_S1 + l] + (si * desk[_VS + l] + ti * desk[_VT + l]) / lam
-                    desk[here + l] += along * (m1 * desk[J1 + l] + m2 * desk[J2 + l] - mj)
+def _gradient(desk, L, m0, m1, m2, leash):
+    """g = dy/dd of one facet, a row per component; a taut leash turns its in-plane part."""
+    if leash:
+        for l in range(L):
+            desk[_G0 + l] = m0
+            desk[_G1 + l] = m1 * desk[_J00 + l] + m2 * desk[_J10 + l]
+            desk[_G2 + l] = m1 * desk[_J01 + l] + m2 * desk[_J11 + l]
+    else:
+        for l in range(L):
+            desk[_G0 + l], desk[_G1 + l], desk[_G2 + l] = m0, m1, m2
 
 
 @_jit
-def _facet(desk, place, s, L, facet, depth, f, curve, scalars, dim, ledger, tangent):
+def _add_tangent(desk, L, facet, f, lam, dim):
+    """C += along g^T + E^T B E of one facet, law.md section 7; B and v count in units of lam."""
+    s0, s1, s2 = facet[f, _S], facet[f, _S + 1], facet[f, _S + 2]
+    t1, t2, A, soft = facet[f, _T + 1], facet[f, _T + 2], facet[f, _REST], 1.0 / lam
+    n0, n1, n2 = A * facet[f, _N], A * facet[f, _N + 1], A * facet[f, _N + 2]
+    for l in range(L):
+        slope, vs, vt = desk[_S1 + l], soft * desk[_VS + l], soft * desk[_VT + l]
+        bss, bst, btt = soft * desk[_BSS + l], soft * desk[_BST + l], soft * desk[_BTT + l]
+        g0, g1 = desk[_G0 + l], desk[_G1 + l]
+        along = n0 * slope + s0 * vs
+        left, right = s0 * bss, s0 * bst
+        desk[_C00 + l] += along * g0 + left * s0
+        desk[_C01 + l] += along * g1 + left * s1 + right * t1
+        along = n1 * slope + s1 * vs + t1 * vt
+        left, right = s1 * bss + t1 * bst, s1 * bst + t1 * btt
+        desk[_C10 + l] += along * g0 + left * s0
+        desk[_C11 + l] += along * g1 + left * s1 + right * t1
+    if dim == 2:
+        return
+    for l in range(L):
+        slope, vs, vt = desk[_S1 + l], soft * desk[_VS + l], soft * desk[_VT + l]
+        bss, bst, btt = soft * desk[_BSS + l], soft * desk[_BST + l], soft * desk[_BTT + l]
+        g0, g1, g2 = desk[_G0 + l], desk[_G1 + l], desk[_G2 + l]
+        left, right = s2 * bss + t2 * bst, s2 * bst + t2 * btt
+        desk[_C02 + l] += (n0 * slope + s0 * vs) * g2 + s0 * left
+        desk[_C12 + l] += (n1 * slope + s1 * vs + t1 * vt) * g2 + s1 * left + t1 * right
+        along = n2 * slope + s2 * vs + t2 * vt
+        desk[_C20 + l] += along * g0 + left * s0
+        desk[_C21 + l] += along * g1 + left * s1 + right * t1
+        desk[_C22 + l] += along * g2 + left * s2 + right * t2
+
+
+@_jit
+def _facet(desk, place, piece, s, L, facet, depth, f, curve, scalars, dim, ledger, tangent):
     """One facet of a block: closures, virgin curve, sliders, and its part of F and C."""
     lam, mu, limit, eta, scale = scalars[0], scalars[1], scalars[2], scalars[3], scalars[4]
     M, D = depth.shape[0], depth.shape[1] - 1
@@ -288,57 +332,97 @@ def _facet(desk, place, s, L, facet, depth, f, curve, scalars, dim, ledger, tang
     n0, n1, n2 = facet[f, _N], facet[f, _N + 1], facet[f, _N + 2]
     A, a, compliance = facet[f, _REST], facet[f, _REST + 1], facet[f, _REST + 2]
     for l in range(L):
-        desk[_Y0 + l] = m0 * desk[_OLD + l] + m1 * desk[_OLD + LANES + l]
-        desk[_Y1 + l] = m0 * desk[_NEW + l] + m1 * desk[_NEW + LANES + l]
-        desk[_DES + l] = s0 * desk[_P + l] + s1 * desk[_P + LANES + l]
-        desk[_DET + l] = t1 * desk[_P + LANES + l]
+        desk[_Y0 + l] = m0 * desk[_OLD + l] + m1 * desk[_OLD1 + l]
+        desk[_Y1 + l] = m0 * desk[_NEW + l] + m1 * desk[_NEW1 + l]
+        desk[_DES + l] = s0 * desk[_P + l] + s1 * desk[_P1 + l]
+        desk[_DET + l] = t1 * desk[_P1 + l]
         desk[_SUMS + l] = desk[_SUMT + l] = 0.0
     if dim == 3:
         for l in range(L):
-            desk[_Y0 + l] += m2 * desk[_OLD + 2 * LANES + l]
-            desk[_Y1 + l] += m2 * desk[_NEW + 2 * LANES + l]
-            desk[_DES + l] += s2 * desk[_P + 2 * LANES + l]
-            desk[_DET + l] += t2 * desk[_P + 2 * LANES + l]
-    for l in range(L):
-        desk[_Y0 + l] = desk[_Y0 + l] if abs(desk[_Y0 + l]) >= NOTHING else 0.0
-        desk[_Y1 + l] = desk[_Y1 + l] if abs(desk[_Y1 + l]) >= NOTHING else 0.0
-    _virgin(desk, place, 0, L, curve, eta, scale)
-    _virgin(desk, place, LANES, L, curve, eta, scale)
+            desk[_Y0 + l] += m2 * desk[_OLD2 + l]
+            desk[_Y1 + l] += m2 * desk[_NEW2 + l]
+            desk[_DES + l] += s2 * desk[_P2 + l]
+            desk[_DET + l] += t2 * desk[_P2 + l]
+    _virgin(desk, place, piece, None, L, curve, eta, scale)
+    _virgin(desk, place, piece, True, L, curve, eta, scale)
     if tangent is not None:
-        _curvature(desk, L, curve, eta, scale)
+        _curvature(desk, piece, L, np.float64(curve.size // 4), eta, scale)
+        _gradient(desk, L, m0, m1, m2, limit < np.inf)
         for l in range(L):
             desk[_BSS + l] = desk[_BST + l] = desk[_BTT + l] = 0.0
             desk[_VS + l] = desk[_VT + l] = 0.0
     for i in range(D):
         rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
-        for l in range(L):
-            desk[_QS + l] = s[rs, l]
-        for l in range(L):
-            desk[_QT + l] = s[rt, l]
-        _slide(desk, L, depth[f, i], depth[f, i + 1], i < D - 1, A, a, compliance, lam * mu,
-               ledger, tangent)  # fmt: skip
-        for l in range(L):
-            s[rs, l] = desk[_QS + l]
-        for l in range(L):
-            s[rt, l] = desk[_QT + l]
+        _slide(desk, s[rs], s[rt], L, depth, f, i, lam * mu * A, a, compliance, ledger, tangent)
+    soft = 1.0 / lam
     for l in range(L):
-        normal = A * desk[_F1 + l]
-        q0, q1 = desk[_SUMS + l] / lam, desk[_SUMT + l] / lam
+        normal, q0, q1 = A * desk[_F1 + l], soft * desk[_SUMS + l], soft * desk[_SUMT + l]
         desk[_F + l] += n0 * normal + s0 * q0
-        desk[_F + LANES + l] += n1 * normal + s1 * q0 + t1 * q1
-        desk[_F + 2 * LANES + l] += n2 * normal + s2 * q0 + t2 * q1
+        desk[_FS + l] += n1 * normal + s1 * q0 + t1 * q1
+    if dim == 3:
+        for l in range(L):
+            normal, q0, q1 = A * desk[_F1 + l], soft * desk[_SUMS + l], soft * desk[_SUMT + l]
+            desk[_FT + l] += n2 * normal + s2 * q0 + t2 * q1
     if limit < np.inf and ledger is not None:
         for l in range(L):
-            desk[_PULL + l] += n1 * A * desk[_F1 + l]
-            desk[_PULL + LANES + l] += n2 * A * desk[_F1 + l]
+            desk[_PULL1 + l] += n1 * A * desk[_F1 + l]
+            desk[_PULL2 + l] += n2 * A * desk[_F1 + l]
     if tangent is not None:
-        _add_tangent(desk, L, facet[f], lam, limit < np.inf, dim)
+        _add_tangent(desk, L, facet, f, lam, dim)
+
+
+@_jit
+def _begin(desk, s, d, start, L, limit, dim, tangent):
+    """Lay out the old and new place of each joint of a block, and move it."""
+    if limit < np.inf:
+        desk[_P:_J00] = 0.0  # in one plane the leash has no second component
+    desk[_PULL1:_C00] = 0.0
+    if tangent is not None:
+        desk[_C00:] = 0.0
+    for i in range(dim):
+        for l in range(L):
+            desk[_P + i * LANES + l] = d[start + l, i]
+    for i in range(dim):
+        row, origin = i * LANES, 0 if i == 0 else dim + i - 1
+        for l in range(L):
+            desk[_OLD + row + l] = s[origin, l]
+        for l in range(L):
+            desk[_NEW + row + l] = desk[_OLD + row + l] + desk[_P + row + l]
+    if limit < np.inf:
+        _drag(desk, L, limit, dim)
+    for i in range(dim):
+        row = i * LANES
+        for l in range(L):
+            s[i, l] += desk[_P + row + l]
+        if i > 0:
+            for l in range(L):
+                s[dim + i - 1, l] = desk[_NEW + row + l]
+
+
+@_jit
+def _finish(desk, s, F, C, start, L, limit, dim, ledger, tangent):
+    """Hand out F and C, and add up the ledger."""
+    for i in range(dim):
+        for l in range(L):
+            F[start + l, i] = desk[_F + i * LANES + l]
+    if tangent is not None:
+        for i in range(dim):
+            for j in range(dim):
+                for l in range(L):
+                    C[start + l, i, j] = desk[_C00 + (3 * i + j) * LANES + l]
+    if ledger is not None:
+        if limit < np.inf:
+            for l in range(L):
+                pull = desk[_PULL1 + l] * desk[_NEW1 + l] + desk[_PULL2 + l] * desk[_NEW2 + l]
+                desk[_LOST + l] += desk[_SLIP + l] * pull / limit
+        for l in range(L):
+            s[2 * dim - 1, l] += desk[_LOST + l]
 
 
 @_jit
 def advance(
-    state, d, F, C, index, keep, first, last, block, desk, place, facet, depth, curve, scalars,
-    dim, ledger, tangent,
+    state, d, F, C, index, keep, first, last, block, desk, place, piece, facet, depth, curve,
+    scalars, dim, ledger, tangent,
 ):  # fmt: skip
     """Advance numbers first..last of the list `index` (of all joints if it is empty).
 
@@ -360,49 +444,89 @@ def advance(
         elif keep:
             s = state[start // W]
         else:
-            block[:, :W] = state[start // W]
-            s = block
-        desk[_P:_J] = 0.0
-        desk[_F:_DESK] = 0.0
-        for i in range(dim):
-            for l in range(L):
-                desk[_P + i * LANES + l] = d[start + l, i]
-        for l in range(L):
-            desk[_OLD + l] = s[0, l]
-            desk[_NEW + l] = s[0, l] + desk[_P + l]
-        for i in range(1, dim):
-            row = i * LANES
-            for l in range(L):
-                desk[_OLD + row + l] = s[dim + i - 1, l]
-                desk[_NEW + row + l] = s[dim + i - 1, l] + desk[_P + row + l]
-        if limit < np.inf:
-            _drag(desk, L, limit, dim)
-        for i in range(dim):
-            for l in range(L):
-                s[i, l] += desk[_P + i * LANES + l]
-        for i in range(1, dim):
-            for l in range(L):
-                s[dim + i - 1, l] = desk[_NEW + i * LANES + l]
-        for f in range(facet.shape[0]):
-            _facet(desk, place, s, L, facet, depth, f, curve, scalars, dim, ledger, tangent)
-        for i in range(dim):
-            for l in range(L):
-                F[start + l, i] = desk[_F + i * LANES + l]
-        if tangent is not None:
-            for i in range(dim):
-                for j in range(dim):
-                    for l in range(L):
-                        C[start + l, i, j] = desk[_C + (dim * i + j) * LANES + l]
-        if ledger is not None:
-            if limit < np.inf:
+            for r in range(rows):
                 for l in range(L):
-                    pull = desk[_PULL + l] * desk[_NEW + LANES + l]
-                    pull += desk[_PULL + LANES + l] * desk[_NEW + 2 * LANES + l]
-                    desk[_LOST + l] += desk[_SLIP + l] * pull / limit
-            for l in range(L):
-                s[2 * dim - 1, l] += desk[_LOST + l]
+                    block[r, l] = state[start // W, r, l]
+            s = block
+        _begin(desk, s, d, start, L, limit, dim, tangent)
+        for f in range(facet.shape[0]):
+            _facet(desk, place, piece, s, L, facet, depth, f, curve, scalars, dim, ledger, tangent)
+        _finish(desk, s, F, C, start, L, limit, dim, ledger, tangent)
         if listed and keep:
             for l in range(L):
                 home, at = index[start + l] // W, index[start + l] % W
                 for r in range(rows):
                     state[home, r, at] = block[r, l]
+
+
+@_jit
+def _count(desk, qs, qt, L, depth, f, i, strength, compliance):
+    """One depth cell of one facet: is it at its friction limit, and what does it store."""
+    zl, fl, sl = depth[f, i, 0], depth[f, i, 1], depth[f, i, 2]
+    zh, fh, sh = depth[f, i + 1, 0], depth[f, i + 1, 1], depth[f, i + 1, 2]
+    for l in range(L):
+        y, force, slope = desk[_Y0 + l], desk[_F0 + l], desk[_S0 + l]
+        reach = min(max(y, zl), zh)
+        k = min(max(slope, sl), sh) - sl
+        G = k * (y - reach) + (min(max(force, fl), fh) - fl - sl * (reach - zl))
+        most = k * (y - zl if y > zl else 0.0)
+        G = min(max(G, 0.0), most)
+        q2 = qs[l] * qs[l] + qt[l] * qt[l]
+        limit = np.sqrt(q2) >= strength * (G * (1.0 - LIMIT) - ROUNDED * force)
+        desk[_WHOLE + l] = desk[_WHOLE + l] if limit else 0.0
+        desk[_LIMIT + l] += G if limit else 0.0
+        soft = 1.0 / (k if k > TINY else 1.0)
+        desk[_STORED + l] += compliance * q2 * (soft if k > TINY else 0.0)
+
+
+@_jit
+def _measure_facet(desk, place, piece, s, L, facet, depth, f, curve, energy, scalars, dim):
+    """What one facet of a block adds to the measures."""
+    lam, mu, eta, scale = scalars[0], scalars[1], scalars[3], scalars[4]
+    M, D = depth.shape[0], depth.shape[1] - 1
+    m0, m1, m2 = facet[f, _M], facet[f, _M + 1], facet[f, _M + 2]
+    potential, share = facet[f, _POTENTIAL], facet[f, _SHARE]
+    strength, compliance = mu * lam * facet[f, _REST], facet[f, _REST + 2]
+    closure, offset, other = s[0], s[dim], s[2 * dim - 2]  # in one plane m2 is 0
+    for l in range(L):
+        desk[_Y0 + l] = m0 * closure[l] + m1 * offset[l] + m2 * other[l]
+        desk[_WHOLE + l], desk[_LIMIT + l] = 1.0, 0.0
+    _virgin(desk, place, piece, None, L, curve, eta, scale)
+    _fetch(place, piece, L, energy)
+    for l in range(L):
+        y, x, o = desk[_Y0 + l], desk[_X + l], 4 * l
+        T = piece[o] + x * (piece[o + 1] + x * (piece[o + 2] + x * piece[o + 3]))
+        y = y if y > 0.0 else 0.0
+        power = np.sqrt(y) if eta == 0.5 else 1.0
+        desk[_CURVING + l] = potential * T * y * y * power
+    if eta != 0.5:
+        for l in range(L):
+            desk[_CURVING + l] *= desk[_Y0 + l] ** eta if desk[_Y0 + l] > 0.0 else 0.0
+    for i in range(D):
+        rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
+        _count(desk, s[rs], s[rt], L, depth, f, i, strength, compliance)
+    for l in range(L):
+        y, force = desk[_Y0 + l], desk[_F0 + l]
+        desk[_STORED + l] += desk[_CURVING + l]
+        desk[_SLIDING + l] += share * desk[_WHOLE + l] if y > 0.0 else 0.0
+        desk[_SLIPPING + l] += share * desk[_LIMIT + l] / (force if force > 0.0 else 1.0)
+        desk[_APART + l] += 0.0 if y > 0.0 else share
+        desk[_REACH + l] = y if y > desk[_REACH + l] else desk[_REACH + l]
+
+
+@_jit
+def measures(
+    state, out, first, last, block, desk, place, piece, facet, depth, curve, scalars, dim, energy
+):
+    """Measures (5, n) of joints first..last, as `_kernel_numpy.measures`; arguments as above."""
+    W = state.shape[2]
+    for start in range(first, last, W):
+        L = min(W, last - start)
+        s = state[start // W]
+        desk[_SLIDING:_REACH] = 0.0
+        desk[_REACH : _REACH + LANES] = -np.inf
+        for f in range(facet.shape[0]):
+            _measure_facet(desk, place, piece, s, L, facet, depth, f, curve, energy, scalars, dim)
+        for i in range(5):
+            for l in range(L):
+                out[i, start + l] = desk[_SLIDING + i * LANES + l]

@@ -20,6 +20,8 @@ from .law import Tables
 NEAR = 1e-5  # of y: below such a change of y the chord of G is lost in rounding, the mean is not
 GRAZING = 1e-12  # cosine at which the leash grows taut: its derivative has a pole at 0
 NOTHING = 1e-140  # m: closures below it count as zero, for their powers would underflow
+LIMIT = 1e-9  # of the friction limit: a slider this close is at it, less the rounding of q
+ROUNDED = 1e-12  # of Phi: as much may be lost in a G next to a node
 TINY = 1e-290  # a stiffness whose reciprocal might overflow, or a square that underflows: nothing
 
 
@@ -210,11 +212,10 @@ def measures(k: Tables, state: Array) -> Measures:
     G, kappa = cells(k, y, force, slope)
     q2 = now.q[0] ** 2 + now.q[1] ** 2
     strength = k.mu * k.lam * k.area[:, None, None]
-    # the cap itself, less the rounding of q and of G next to a node
-    capped = np.sqrt(q2) >= strength * (G * (1 - 1e-9) - 1e-12 * force[:, None])
+    capped = np.sqrt(q2) >= strength * (G * (1 - LIMIT) - ROUNDED * force[:, None])
     weight = (k.weight / k.weight.sum())[:, None]
     touches = y > 0
-    sliding = np.sum(weight * (touches & np.all(capped | (G == 0), axis=1)), axis=0)
+    sliding = np.sum(weight * (touches & np.all(capped, axis=1)), axis=0)
     total = np.where(force > 0, force, 1.0)
     slipping = np.sum(weight * np.sum(np.where(capped, G, 0.0), axis=1) / total, axis=0)
     separated = np.sum(weight * ~touches, axis=0)

@@ -9,7 +9,9 @@ threads.
 from __future__ import annotations
 
 import os
-from concurrent.futures import Future, ThreadPoolExecutor
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,13 +19,14 @@ from numpy.typing import NDArray
 
 from . import _kernel_numpy
 from ._checks import Array, one_of
-from .law import Tables
+from .law import JointLaw, Tables
 
-LANES = 64  # joints per block
+LANES = 128  # joints per block
 CHUNK = 4096  # joints per call of the numpy kernel: keeps its temporaries in cache
 SERIAL = 20_000  # sliders below which a second thread costs more than it saves
 
 Index = NDArray[np.intp]
+Call = Callable[..., None]
 
 
 class Engine(Protocol):
@@ -41,12 +44,22 @@ class Engine(Protocol):
     ) -> None:
         """Advance the joints of `index` (all if None) by d (m, dim): write F, C, state."""
 
+    def measures(self, state: Array, out: Array) -> None:
+        """Write the `Measures` of the first n joints into the rows of out (5, n)."""
 
-def engine(tables: Tables) -> Engine:
-    """The engine for a law's joints."""
+
+def engine(law: JointLaw) -> Engine:
+    """The engine of a law, which all its joints share: it holds nothing of theirs."""
     choice = os.environ.get("JOINTLAW_KERNEL", "")
     if choice:
         one_of("JOINTLAW_KERNEL", choice, ("numpy", "numba"))
+    made = law.engines
+    if choice not in made:
+        made[choice] = _make(law.tables, choice)
+    return made[choice]
+
+
+def _make(tables: Tables, choice: str) -> Engine:
     if choice != "numpy":
         try:
             return NumbaEngine(tables)
@@ -100,6 +113,14 @@ class NumpyEngine:
             if keep:
                 write_rows(state, new, where[part])
 
+    def measures(self, state: Array, out: Array) -> None:
+        """As `Engine.measures`."""
+        n = out.shape[1]
+        for first in range(0, n, CHUNK):
+            index = np.arange(first, min(first + CHUNK, n))
+            rows = rows_of(state, 0, index)
+            out[:, index] = _kernel_numpy.measures(self.tables, rows)
+
 
 class NumbaEngine:
     """The compiled kernel, on all threads where there is work for them."""
@@ -108,11 +129,14 @@ class NumbaEngine:
         from . import _kernel_numba as kernel
 
         self._kernel = kernel
-        self._packed = kernel.pack(tables, _kernel_numpy.compliance(tables).ravel())
-        self._dim = tables.dim
-        self._sliders = len(tables.c1) * tables.cells
-        self._work = [kernel.work(tables.rows)]
-        self._rows = tables.rows
+        packed = (*kernel.pack(tables, _kernel_numpy.compliance(tables).ravel()), tables.dim)
+        self._fixed = {  # last arguments of the kernel: (ledger, tangent)
+            (ledger, tangent): (*packed, True if ledger else None, True if tangent else None)
+            for ledger in (False, True)
+            for tangent in (False, True)
+        }
+        self._fixed_measures = (*packed, tables.curve.T.ravel().copy())
+        self._rows, self._sliders = tables.rows, len(tables.c1) * tables.cells
         self._all = np.empty(0, np.intp)
         self._none = np.empty((0, tables.dim, tables.dim))
 
@@ -127,27 +151,44 @@ class NumbaEngine:
         ledger: bool,
     ) -> None:
         """As `Engine.advance`."""
-        n = len(d)
-        fixed = (state, d, F, self._none if C is None else C,
+        tangent = C is not None
+        given = (state, d, F, C if tangent else self._none,
                  self._all if index is None else index, keep)  # fmt: skip
-        options = (self._dim, True if ledger else None, None if C is None else True)
-        threads = 1
-        if n * self._sliders > SERIAL:
-            threads = min(thread_count(), -(-n // LANES))
-        while len(self._work) < threads:
-            self._work.append(self._kernel.work(self._rows))
+        self._run(self._kernel.advance, len(d), given, self._fixed[ledger, tangent])
+
+    def measures(self, state: Array, out: Array) -> None:
+        """As `Engine.measures`."""
+        self._run(self._kernel.measures, out.shape[1], (state, out), self._fixed_measures)
+
+    def _run(self, call: Call, n: int, given: tuple[Any, ...], fixed: tuple[Any, ...]) -> None:
+        """call(*given, first, last, *work, *fixed) over n joints, on one thread or several."""
+        if n * self._sliders <= SERIAL or (threads := min(thread_count(), -(-n // LANES))) == 1:
+            call(*given, 0, n, *self._work(), *fixed)
+            return
         share = -(-n // (threads * LANES)) * LANES  # whole blocks, so threads change no result
-        waiting: list[Future[Any]] = []
-        for k in range(1, threads):
-            span = (min(k * share, n), min((k + 1) * share, n))
-            waiting.append(
-                _pool().submit(
-                    self._kernel.advance, *fixed, *span, *self._work[k], *self._packed, *options
-                )
-            )
-        self._kernel.advance(*fixed, 0, min(share, n), *self._work[0], *self._packed, *options)
+
+        def part(k: int) -> None:
+            call(*given, min(k * share, n), min((k + 1) * share, n), *self._work(), *fixed)
+
+        waiting = [_pool().submit(part, k) for k in range(1, threads)]
+        try:
+            part(0)
+        finally:
+            wait(waiting)
         for one in waiting:
             one.result()
+
+    def _work(self) -> tuple[Any, ...]:
+        """Working space of the thread that asks: shared by all batches it advances."""
+        try:
+            space: tuple[Any, ...] = _spaces.by_rows[self._rows]
+        except (AttributeError, KeyError):
+            space = self._kernel.work(self._rows)
+            _spaces.__dict__.setdefault("by_rows", {})[self._rows] = space
+        return space
+
+
+_spaces = threading.local()
 
 
 def thread_count() -> int:

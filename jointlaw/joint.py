@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _kernel_numpy as kernel
 from ._checks import Array, numbers, whole
 from ._kernel_numpy import Measures
-from .engine import CHUNK, LANES, engine, rows_of, write_rows
+from .engine import LANES, engine, rows_of, write_rows
 from .law import JointLaw
 from .state import JointState, NonFiniteError, write_replay
 
@@ -30,7 +30,7 @@ class JointBatch:
 
     def __init__(self, law: JointLaw, n: int, ledger: bool = True) -> None:
         self.law, self.ledger = law, ledger
-        self._engine = engine(law.tables)
+        self._engine = engine(law)
         self._n = whole("n", n, 0)
         lanes = 1 if self._n == 1 else LANES
         self._state = np.zeros((-(-self._n // lanes), law.tables.rows, lanes))
@@ -42,7 +42,7 @@ class JointBatch:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        self._engine = engine(self.law.tables)
+        self._engine = engine(self.law)
 
     def __len__(self) -> int:
         return self._n
@@ -139,11 +139,14 @@ class JointBatch:
 
     def measures(self) -> Measures:
         """Shares, stored energy and reach of all joints in one pass, as arrays (n,)."""
-        parts = [
-            kernel.measures(self.law.tables, rows_of(self._state, 0, index))
-            for index in np.array_split(np.arange(self._n), max(1, -(-self._n // CHUNK)))
-        ]
-        return Measures(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+        values = np.empty((5, self._n))
+        self._engine.measures(self._state, values)
+        return Measures(*values)
+
+    def max_stiffness(self) -> Array:
+        """Upper bound (n,) of |C| in Pa/m at each joint's own reach, for explicit time steps."""
+        bound: Array = self.law.max_stiffness(self.measures().reach)
+        return bound
 
     @property
     def delta(self) -> Array:
@@ -220,7 +223,8 @@ class JointBatch:
         The bound of the whole batch costs one pass over d; joints are looked at only beyond it.
         """
         limit = self.law.largest_reach
-        reach = self._reach + self._stretch * float(np.abs(d).max(initial=0.0))
+        largest = max(float(d.max(initial=0.0)), -float(d.min(initial=0.0)))  # both NaN if one is
+        reach = self._reach + self._stretch * largest
         if reach <= limit:
             return reach
         finite = np.isfinite(d).all(axis=1)
@@ -272,6 +276,8 @@ class Joint:
     def __init__(self, law: JointLaw) -> None:
         self.law = law
         self._batch = JointBatch(law, 1)
+        dim = law.tables.dim
+        self._shape, self._shape_C, self._step = (dim,), (1, dim, dim), np.zeros((1, dim))
 
     def __repr__(self) -> str:
         return f"<Joint at delta = {self.delta} m>"
@@ -285,10 +291,19 @@ class Joint:
         return self._advance(d, tangent, keep=False)
 
     def _advance(self, d: ArrayLike, tangent: bool, keep: bool) -> tuple[Array, Array | None]:
-        values = numbers("d", d, "m")
-        if values.shape != (self.law.tables.dim,):
-            raise ValueError(f"d has shape {values.shape}; expected ({self.law.tables.dim},)")
-        F, C = self._batch._advance(values[None], None, tangent, None, keep)
+        values, batch = numbers("d", d, "m"), self._batch
+        if values.shape != self._shape:
+            raise ValueError(f"d has shape {values.shape}; expected {self._shape}")
+        # the sum is no less than the largest, and NaN if one is
+        reach = batch._reach + batch._stretch * sum(map(abs, values.tolist()))
+        if not reach <= self.law.largest_reach:  # the batch finds out and says why
+            F, C = batch._advance(values[None], None, tangent, None, keep)
+            return F[0], None if C is None else C[0]
+        self._step[0] = values
+        F, C = np.empty(self._step.shape), np.empty(self._shape_C) if tangent else None
+        batch._engine.advance(batch._state, self._step, F, C, None, keep, True)
+        if keep:
+            batch._reach = reach
         return F[0], None if C is None else C[0]
 
     def snapshot(self) -> JointState:

@@ -22,6 +22,7 @@ from .orientation import Facets, Orientation
 from .resolution import Resolution, resolve
 
 if TYPE_CHECKING:
+    from .engine import Engine
     from .joint import Joint, JointBatch
 
 _SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
@@ -224,6 +225,11 @@ class JointLaw:
         )  # fmt: skip
 
     @cached_property
+    def engines(self) -> dict[str, Engine]:
+        """Kernels that advance this law's joints, by name; `engine.engine` fills it."""
+        return {}
+
+    @cached_property
     def largest_reach(self) -> float:
         """Effective closure (m) up to which forces, energies and their squares stay finite."""
         k, p = self.tables, self.asperity
@@ -256,11 +262,9 @@ class JointLaw:
 
     @cached_property
     def _closure_factor(self) -> float:
-        """F1/Phi under pure closure: cos + sin min(tan/lam, mu) summed over the facets."""
+        """F1/Phi under pure closure."""
         k = self.tables
-        tangent = np.tan(self.facets.theta)
-        shear = np.minimum(tangent / k.lam, k.mu)
-        return float(np.sum(k.area * (k.c1 + np.sin(self.facets.theta) * shear)))
+        return facet_sum(self.facets.theta, k.area, k.lam, k.mu)
 
     def _closure_at(self, stress: float) -> float:
         from scipy.optimize import brentq  # a third of the package's import time
@@ -310,6 +314,12 @@ def _finite(name: str, value: ArrayLike, unit: str) -> Array:
     if not np.isfinite(array).all():
         raise ValueError(f"{name} = {value!r} is not finite; give finite values in {unit}")
     return array
+
+
+def facet_sum(theta: Array, area: Array, lam: float, mu: float) -> float:
+    """Sum of area (cos theta + sin theta min(tan theta/lam, mu)): facets under pure closure."""
+    shear = np.minimum(np.tan(theta) / lam, mu)
+    return float(np.sum(area * (np.cos(theta) + np.sin(theta) * shear)))
 
 
 def depth_nodes(closure_range: float, slope: Array, cells: int) -> Array:

@@ -1,0 +1,258 @@
+"""Time of one joint update, as a table and as JSON.
+
+    python benchmarks/update.py                      every case, a few minutes
+    python benchmarks/update.py --short              the main cases, under a minute
+    python benchmarks/update.py --json update.json   also the numbers, for other programs
+
+Each figure is the least of several rounds, spread over the whole run, in nanoseconds per joint and
+update. Motion in one plane (--space: in 3-D), random steps around a closure of 1 um. A batch of 1
+is `Joint.update` through Python. F: traction alone; FC: with tangent; +L: with the ledger; x2: on
+two threads. Cases whose states need more than --memory, or one run more than --longest, are left
+out and shown as a dash.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+import time
+from typing import Any
+
+import numpy as np
+
+import jointlaw as jl
+from jointlaw.resolution import NAMED
+
+NAMES = ("fast", "balanced", "fine", "reference")
+SIZES = (1, 100, 10_000, 1_000_000)
+# column: kernel, threads, tangent, ledger
+COLUMNS = {
+    "F": ("numba", 1, False, False),
+    "F+L": ("numba", 1, False, True),
+    "FC": ("numba", 1, True, False),
+    "FC+L": ("numba", 1, True, True),
+    "F x2": ("numba", 2, False, False),
+    "FC x2": ("numba", 2, True, False),
+    "numpy F": ("numpy", 1, False, False),
+    "numpy FC": ("numpy", 1, True, False),
+}
+STEPS = 4  # different increments, so that no branch is learnt by heart
+
+FIRST = """
+import time
+import jointlaw as jl
+law = jl.presets.load("westerly-smooth")
+times = []
+for n in (1, 100):
+    batch = law.joints(n, ledger=False)
+    d = [[1e-7] * law.tables.dim] * n
+    for tangent in (False, True):
+        start = time.perf_counter()
+        batch.update(d, tangent=tangent)
+        times.append(time.perf_counter() - start)
+print(sum(times))
+"""
+
+
+def law(name: str, plane: bool) -> jl.JointLaw:
+    """Smooth Westerly granite at a named resolution."""
+    return jl.JointLaw(
+        orientation=jl.Orientation(3.0, 0.5, 0.0),
+        asperity=jl.Asperity(K=2.0e8, lam=1.2, eta=0.5, mu=0.3),
+        heights=jl.GammaHeights(alpha=3.82, beta=1.15e-6, overlap=2e-6),
+        asperity_density=1e10,
+        closure_range=2e-6,
+        resolution=name,
+        plane=0.0 if plane else None,
+    )
+
+
+class Case:
+    """One law, batch size and column; holds its least time."""
+
+    def __init__(self, made: jl.JointLaw, n: int, column: str, rng: np.random.Generator) -> None:
+        self.law, self.n, self.column = made, n, column
+        self.kernel, self.threads, self.tangent, self.ledger = COLUMNS[column]
+        self.best, self.rng = np.inf, rng
+
+    def run(self, seconds: float) -> None:
+        """Time single updates for a while, two at least."""
+        os.environ |= {"JOINTLAW_KERNEL": self.kernel, "JOINTLAW_THREADS": str(self.threads)}
+        n, dim = self.n, self.law.tables.dim
+        d = self.rng.normal(0.0, 1e-7, (STEPS, n, dim)) * ([0.3] + [1.0] * (dim - 1))
+        d = np.concatenate([d, -d])
+        first = np.zeros((n, dim))
+        first[:, 0] = self.rng.uniform(5e-7, 1.5e-6, n)
+        if n == 1:
+            joint, calls = self.law.joint(), 50
+            joint.update(first[0])
+            steps = list(d[:, 0])
+
+            def once(k: int) -> None:
+                for i in range(k, k + calls):
+                    joint.update(steps[i % len(steps)], tangent=self.tangent)
+        else:
+            batch, calls = self.law.joints(n, ledger=self.ledger), 1
+            F, C = np.empty((n, dim)), np.empty((n, dim, dim)) if self.tangent else None
+            batch.update(first, tangent=False)
+
+            def once(k: int) -> None:
+                batch.update(d[k % len(d)], tangent=self.tangent, out=(F, C))
+
+        once(0)  # compiles, or loads from the cache
+        end, k = time.perf_counter() + seconds, 0
+        while k < 2 * calls or time.perf_counter() < end:
+            start = time.perf_counter()
+            once(k)
+            took = (time.perf_counter() - start) / (calls * n)
+            self.best, k = min(self.best, took), k + calls
+
+
+def cases(names: tuple[str, ...], sizes: tuple[int, ...], args: argparse.Namespace) -> list[Case]:
+    """Cases that fit in memory."""
+    made, rng = [], np.random.default_rng(0)
+    for name in names:
+        one = law(name, not args.space)
+        for n in sizes:
+            if n * (8 * one.tables.rows + 400) > args.memory * 1e9:
+                continue
+            for column, (kernel, threads, _, ledger) in COLUMNS.items():
+                if threads > 1 and n < 10_000:  # too little work to share
+                    continue
+                if n == 1 and kernel == "numba" and not ledger:  # one joint always keeps its own
+                    continue
+                made.append(Case(one, n, column, rng))
+    return made
+
+
+def compile_times() -> tuple[float, float]:
+    """Seconds of the first updates in a new process: compiled, and loaded from the cache."""
+    with tempfile.TemporaryDirectory() as folder:
+        env = os.environ | {"NUMBA_CACHE_DIR": folder, "JOINTLAW_KERNEL": "numba"}
+        runs = [
+            float(subprocess.run([sys.executable, "-c", FIRST], env=env, check=True,
+                                 capture_output=True, text=True).stdout)
+            for _ in range(2)
+        ]  # fmt: skip
+    return runs[0], runs[1]
+
+
+def exponent(x: list[float], y: list[float]) -> float | None:
+    """Power with which y grows in x."""
+    return float(np.polyfit(np.log(x), np.log(y), 1)[0]) if len(x) > 1 else None
+
+
+def summary(found: list[Case]) -> dict[str, Any]:
+    """Growth of the time of a whole step with sliders and with joints, and ratios."""
+    best = {(c.law.resolution, c.n, c.column): c.best * 1e9 for c in found}
+    laws = {c.law.resolution: c.law for c in found}
+    sliders = {r: len(one.tables.c1) * one.tables.cells for r, one in laws.items()}
+    result: dict[str, Any] = {}
+    for column in ("F", "FC"):
+        same_n = [(sliders[r], v) for (r, n, c), v in best.items() if n == 10_000 and c == column]
+        result[f"{column}: time ~ sliders^p at 10 000 joints"] = exponent(
+            *map(list, zip(*same_n, strict=True))
+        )
+        balanced = NAMED["balanced"]
+        joints = [
+            (n, n * v) for (r, n, c), v in best.items() if r == balanced and n > 1 and c == column
+        ]
+        result[f"{column}: time ~ joints^p at balanced"] = exponent(
+            *map(list, zip(*joints, strict=True))
+        )
+        if (balanced, 10_000, f"{column} x2") in best:
+            two = best[balanced, 10_000, f"{column} x2"]
+            result[f"{column}: two threads, times faster at 10 000"] = (
+                best[balanced, 10_000, column] / two
+            )
+    return result
+
+
+def table(found: list[Case], names: tuple[str, ...], sizes: tuple[int, ...]) -> str:
+    """Markdown: one line per resolution and batch size."""
+    lines = [
+        f"| resolution | sliders | bytes | joints | {' | '.join(COLUMNS)} |",
+        "|---|" + "---:|" * (3 + len(COLUMNS)),
+    ]
+    best = {(c.law.resolution, c.n, c.column): c.best * 1e9 for c in found}
+    for name in names:
+        one = next(c.law for c in found if c.law.resolution == NAMED[name])
+        sliders, size = len(one.tables.c1) * one.tables.cells, 8 * one.tables.rows
+        for n in sizes:
+            cells = [best.get((one.resolution, n, column)) for column in COLUMNS]
+            if any(cells):
+                text = " | ".join("-" if v is None else f"{v:.0f}" for v in cells)
+                lines.append(f"| {name} | {sliders} | {size} | {n} | {text} |")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--short", action="store_true", help="fewer cases and rounds")
+    parser.add_argument("--space", action="store_true", help="motion in 3-D, not in one plane")
+    parser.add_argument("--rounds", type=int, help="rounds over all cases (default 6, short 3)")
+    parser.add_argument("--seconds", type=float, default=0.1, help="per case and round")
+    parser.add_argument("--longest", type=float, default=5.0, help="seconds that one run may take")
+    parser.add_argument("--memory", type=float, default=1.0, help="GB that one batch may take")
+    parser.add_argument("--json", help="file to write the numbers to")
+    args = parser.parse_args()
+    names, sizes = (NAMES[:2], SIZES[:3]) if args.short else (NAMES, SIZES)
+    rounds = args.rounds or (3 if args.short else 6)
+
+    first, cached = compile_times()
+    todo, left = cases(names, sizes, args), []
+    for turn in range(rounds):
+        for case in todo:
+            if case not in left:
+                smaller = [c.best for c in todo if c.law is case.law and c.column == case.column]
+                known = min(smaller)  # of smaller batches, in seconds per joint
+                if np.isfinite(known) and known * case.n > args.longest:
+                    left.append(case)
+                    continue
+                case.run(args.seconds)
+        print(f"round {turn + 1} of {rounds}", file=sys.stderr)
+    found = [case for case in todo if np.isfinite(case.best)]
+
+    import numba
+
+    about = {
+        "processors": os.cpu_count(),
+        "machine": platform.machine(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "numba": numba.__version__,
+        "first updates, compiled (s)": first,
+        "first updates, from the cache (s)": cached,
+    }
+    print(table(found, names, sizes))
+    print()
+    for key, value in (about | summary(found)).items():
+        print(f"{key}: {value:.3g}" if isinstance(value, float) else f"{key}: {value}")
+    if args.json:
+        rows = [
+            {
+                "resolution": [c.law.resolution.u, c.law.resolution.phi, c.law.resolution.depth],
+                "sliders": len(c.law.tables.c1) * c.law.tables.cells,
+                "bytes": 8 * c.law.tables.rows,
+                "joints": c.n,
+                "kernel": c.kernel,
+                "threads": c.threads,
+                "tangent": c.tangent,
+                "ledger": c.ledger or c.n == 1,
+                "ns": c.best * 1e9,
+            }
+            for c in found
+        ]
+        with open(args.json, "w") as stream:
+            json.dump({"about": about, "summary": summary(found), "rows": rows}, stream, indent=1)
+
+
+if __name__ == "__main__":
+    main()

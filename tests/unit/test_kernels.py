@@ -1,0 +1,238 @@
+"""The compiled kernel gives the numbers of the readable one, however it is called."""
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+from jointlaw import engine
+
+pytest.importorskip("numba")
+
+# Either kernel sums a few hundred terms per facet in its own order and carries q over the path: a
+# few hundred times the rounding of 1e-16. That is the share of the largest value that may differ.
+SAME = 1e-12
+# C holds d(chord)/dy, a second difference of G: rounding grows by (y/dy)^2, up to (1/NEAR)^2 =
+# 1e10, in the few facets that a step hardly opens or closes, and is usual in nearly all joints.
+SAME_C, USUAL_C = 2e-6, 1e-12
+N = engine.LANES + 11  # one block of joints and part of another
+
+
+def random_law(make_law, seed):
+    """A law of any kind: each choice comes up within every few seeds."""
+    rng = np.random.default_rng(seed)
+    heights = [None, "population", "individual"][seed % 3]
+    eta = [0.5, 0.0, 1.0, 0.37, 0.5][seed % 5]
+    if heights == "population" and eta == 0.0:
+        eta = 0.8  # not convex
+    return make_law(
+        a=rng.uniform(1.0, 6.0),
+        b=rng.uniform(-0.4, 0.8),
+        c=rng.uniform(-0.15, 0.15),
+        lam=rng.uniform(0.5, 2.0),
+        mu=[0.0, 0.3, 0.7][rng.integers(3)],
+        eta=eta,
+        heights=heights,
+        plane=[None, 0.0, 0.7][rng.integers(3)],
+        critical_slip=[np.inf, 8e-7][seed % 2],
+        resolution=jl.Resolution(int(rng.integers(1, 4)), int(rng.integers(3, 6)), 1 + seed % 6),
+    )
+
+
+def path(law, seed, steps=25, n=N):
+    """Increments (steps, n, dim): a closure, then anything, apart in the middle."""
+    rng = np.random.default_rng(100 + seed)
+    d = rng.normal(0.0, 3e-7, (steps, n, law.tables.dim))
+    d[0, :, 0] = rng.uniform(2e-7, 1.5e-6, n)
+    d[steps // 2, :, 0] = -rng.uniform(0.0, 4e-6, n)
+    d[steps // 2 + 2, :, 0] = rng.uniform(0.0, 4e-6, n)
+    return d
+
+
+@pytest.fixture
+def both(monkeypatch):
+    """Makes two of the same: advanced by numpy and by numba."""
+
+    def make(build):
+        made = []
+        for name, kind in (("numpy", engine.NumpyEngine), ("numba", engine.NumbaEngine)):
+            monkeypatch.setenv("JOINTLAW_KERNEL", name)
+            made.append(build())
+            batch = getattr(made[-1], "_batch", made[-1])
+            assert isinstance(batch._engine, kind)
+        return made
+
+    return make
+
+
+def worst(one, other, peak):
+    return np.max(np.abs(np.asarray(one) - np.asarray(other)), initial=0.0) / peak
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_same_numbers_on_random_laws_and_paths(both, make_law, seed):
+    law = random_law(make_law, seed)
+    slow, fast = both(lambda: law.joints(N))
+    peak, peak_C, off, off_C = 0.0, 0.0, 0.0, []
+    for d in path(law, seed):
+        (F, C), (F2, C2) = slow.update(d), fast.update(d)
+        peak, peak_C = max(peak, np.abs(F).max()), max(peak_C, np.abs(C).max())
+        off = max(off, np.abs(F - F2).max())
+        off_C.append(np.abs(C - C2).max(axis=(1, 2)))
+    assert off < SAME * peak
+    assert np.max(off_C) < SAME_C * peak_C
+    assert np.quantile(off_C, 0.95) < USUAL_C * peak_C
+    lost = slow.dissipated_energy
+    assert worst(lost, fast.dissipated_energy, max(lost.max(), 1e-300)) < 10 * SAME
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_same_measures_of_the_same_state(both, make_law, seed):
+    law = random_law(make_law, seed)
+    slow, fast = both(lambda: law.joints(N))
+    for d in path(law, seed, 12):
+        slow.update(d, tangent=False)
+        fast.restore(slow.snapshot())
+        for one, other in zip(slow.measures(), fast.measures(), strict=True):
+            assert worst(one, other, max(np.abs(one).max(), 1e-300)) < SAME
+    stiffness = law.max_stiffness(slow.measures().reach)
+    np.testing.assert_allclose(fast.max_stiffness(), stiffness, rtol=SAME)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("ledger", [True, False])
+def test_same_numbers_while_contacts_come_and_go(both, make_law, seed, ledger):
+    law = random_law(make_law, seed)
+    d, dim = path(law, seed, 20, 400), law.tables.dim
+    results = []
+    for batch in both(lambda: law.joints(N, ledger)):
+        given = []
+
+        def note(result, given=given):
+            given.append(np.array(result[0]))
+
+        note(batch.update(d[0, :N], tangent=False))
+        note(batch.update(d[1, :40], where=np.arange(N)[::-1][:40], tangent=False))
+        batch.reset([0, 7, 64, N - 1])
+        note(batch.trial(d[2, :N], tangent=False))
+        note(batch.update(d[3, :N]))
+        batch.resize(400)  # from two blocks to more
+        note(batch.update(d[4]))
+        mask = np.arange(400) % 3 == 0
+        note(batch.update(d[5, mask], where=mask))
+        note(batch.trial(d[5, mask], where=mask))
+        batch.resize(30)
+        batch.resize(150)
+        out = np.empty((150, dim)), np.empty((150, dim, dim))
+        for step in d[6:]:
+            F, C = batch.update(step[:150], out=out)
+            assert F is out[0]
+            assert C is out[1]
+            note((F, C))
+        note(batch.update(np.empty((0, dim)), where=[]))
+        note((batch.F, None))
+        results.append(given)
+    peak = max(np.abs(F).max() for F in results[0] if F.size)
+    for one, other in zip(*results, strict=True):
+        assert worst(one, other, peak) < SAME
+
+
+def test_the_ledger_changes_no_number(both, make_law):
+    law = random_law(make_law, 0)
+    _, kept = both(lambda: law.joints(N))
+    _, left = both(lambda: law.joints(N, ledger=False))
+    for d in path(law, 0):
+        np.testing.assert_array_equal(kept.update(d)[0], left.update(d, tangent=False)[0])
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_same_numbers_for_one_joint(both, make_law, seed):
+    law = random_law(make_law, seed)
+    slow, fast = both(law.joint)
+    d = path(law, seed)[:, 0]
+    peak = 0.0
+    for step in d:
+        given = step.tolist() if seed else step[::1]
+        F, C = slow.update(given)
+        trial, _ = fast.trial(given, tangent=False)
+        F2, C2 = fast.update(given)
+        np.testing.assert_array_equal(trial, F2)
+        peak = max(peak, np.abs(F).max())
+        assert worst(F, F2, peak) < SAME
+        assert worst(C, C2, max(np.abs(C).max(), 1e-300)) < SAME_C
+    assert worst(slow.snapshot().values, fast.snapshot().values, peak) < SAME
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_threads_change_no_bit(make_law, monkeypatch, seed):
+    law = random_law(make_law, seed)
+    monkeypatch.setattr(engine, "SERIAL", 0)
+    monkeypatch.setenv("JOINTLAW_KERNEL", "numba")
+    d, index = path(law, seed, 6, 500), np.random.default_rng(0).permutation(500)[:333]
+    results = []
+    for threads in ("1", "2", "5"):
+        monkeypatch.setenv("JOINTLAW_THREADS", threads)
+        batch, given = law.joints(500), []
+        for step in d[:4]:
+            given += batch.update(step)
+        given += batch.update(d[4, :333], where=index)
+        given += batch.trial(d[5])
+        results.append([*given, batch.snapshot().values, *batch.measures()])
+    for other in results[1:]:
+        for a, b in zip(results[0], other, strict=True):
+            np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("threads", ["1", "2"])
+def test_what_is_not_finite_is_refused(both, law, monkeypatch, bad, threads):
+    monkeypatch.setattr(engine, "SERIAL", 0)
+    monkeypatch.setenv("JOINTLAW_THREADS", threads)
+    d = np.full((N, 3), 1e-7)
+    d[66, 1] = bad
+    for batch in both(lambda: law.joints(N)):
+        batch.update(np.full((N, 3), 1e-7), tangent=False)
+        before = batch.snapshot().values
+        for tangent in (False, True):
+            with pytest.raises(ValueError, match=r"d of joint 66 = .* is not finite"):
+                batch.update(d, tangent=tangent)
+        with pytest.raises(ValueError, match=r"d of joint 3 = .* is not finite"):
+            batch.update(d[65:67], where=[5, 3])
+        np.testing.assert_array_equal(batch.snapshot().values, before)
+    for joint in both(law.joint):
+        for given in (d[66], d[66].tolist()):
+            with pytest.raises(ValueError, match="is not finite"):
+                joint.update(given)
+        assert not joint.snapshot().values.any()
+
+
+def test_an_overflow_is_refused(both, law, replays):
+    for joint in both(law.joint):
+        with pytest.raises(jl.NonFiniteError):
+            joint.update([1e200, 0.0, 0.0])
+        assert not joint.snapshot().values.any()
+
+
+def test_a_joint_takes_any_numbers(both, law):
+    for joint in both(law.joint):
+        expected, _ = joint.trial([2.0, 1.0, 0.0])
+        for d in ([2, 1, 0], (2.0, 1, 0), np.array([2, 1, 0], ">f8"), np.arange(6.0)[::-1][3::1]):
+            np.testing.assert_array_equal(joint.trial(d)[0], expected)
+        with pytest.raises(ValueError, match="shape"):
+            joint.update([1e-6])
+        with pytest.raises(ValueError, match="not an array of numbers"):
+            joint.update(["1", "0", "0"])
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("JOINTLAW_KERNEL", "cuda", "choose one of numpy, numba"),
+        ("JOINTLAW_THREADS", "0", "a whole number >= 1"),
+        ("JOINTLAW_THREADS", "two", "a whole number >= 1"),
+    ],
+)
+def test_bad_settings_are_named(law, monkeypatch, name, value, message):
+    monkeypatch.setattr(engine, "SERIAL", 0)
+    monkeypatch.setenv(name, value)
+    with pytest.raises(ValueError, match=f"{name} = '{value}'.*{message}"):
+        law.joints(N).update(np.zeros((N, 3)))

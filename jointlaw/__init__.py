@@ -21,15 +21,15 @@ from .state import JointState, NonFiniteError, load_state
 from .table import JointTable, load_table
 
 if TYPE_CHECKING:
-    from . import baselines, datasets, unloading
-    from ._tabulate import tabulate
-    from .calibrate import fit_closure, fit_curves, fit_shear
-    from .fit import Fit
     from .hosts import export_yade
-    from .measured import ClosureCurve, ShearCurve, first_loading
-    from .surface import SurfaceFit, from_surface
-    from .sweep import fit_many
-    from .synthetic import synthetic_surface
+    from .measurements import baselines, datasets, unloading
+    from .measurements.calibrate import fit_closure, fit_curves, fit_shear
+    from .measurements.fit import Fit
+    from .measurements.measured import ClosureCurve, ShearCurve, first_loading
+    from .measurements.surface import SurfaceFit, from_surface
+    from .measurements.sweep import fit_many
+    from .measurements.synthetic import synthetic_surface
+    from .tables.tabulate import tabulate
 
 __version__ = "0.1.0"
 
@@ -75,30 +75,29 @@ __all__ = [
 
 # Tools for measurements and hosts load on first use: a DEM code that embeds the law needs none
 _LATER = {
-    "ClosureCurve": "measured",
-    "Fit": "fit",
-    "ShearCurve": "measured",
-    "SurfaceFit": "surface",
-    "baselines": "baselines",
-    "datasets": "datasets",
+    "ClosureCurve": "measurements.measured",
+    "Fit": "measurements.fit",
+    "ShearCurve": "measurements.measured",
+    "SurfaceFit": "measurements.surface",
     "export_yade": "hosts",
-    "first_loading": "measured",
-    "fit_closure": "calibrate",
-    "fit_curves": "calibrate",
-    "fit_many": "sweep",
-    "fit_shear": "calibrate",
-    "from_surface": "surface",
-    "synthetic_surface": "synthetic",
-    "tabulate": "_tabulate",
-    "unloading": "unloading",
+    "first_loading": "measurements.measured",
+    "fit_closure": "measurements.calibrate",
+    "fit_curves": "measurements.calibrate",
+    "fit_many": "measurements.sweep",
+    "fit_shear": "measurements.calibrate",
+    "from_surface": "measurements.surface",
+    "synthetic_surface": "measurements.synthetic",
+    "tabulate": "tables.tabulate",
 }
+_LATER_MODULES = {name: f"measurements.{name}" for name in ("baselines", "datasets", "unloading")}
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _LATER:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module = import_module(f".{_LATER[name]}", __name__)
-    return module if _LATER[name] == name else getattr(module, name)
+    if name in _LATER_MODULES:
+        return import_module(f".{_LATER_MODULES[name]}", __name__)
+    if name in _LATER:
+        return getattr(import_module(f".{_LATER[name]}", __name__), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

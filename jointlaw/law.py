@@ -236,11 +236,9 @@ class JointLaw:
 
     @cached_property
     def _closure_factor(self) -> float:
-        """F1/Phi under pure closure: cos + sin min(tan/lam, mu) summed over the facets."""
+        """F1/Phi under pure closure."""
         k = self.tables
-        tangent = np.tan(self.facets.theta)
-        shear = np.minimum(tangent / k.lam, k.mu)
-        return float(np.sum(k.area * (k.c1 + np.sin(self.facets.theta) * shear)))
+        return facet_sum(self.facets.theta, k.area, k.lam, k.mu)
 
     def _closure_at(self, stress: float) -> float:
         from scipy.optimize import brentq  # a third of the package's import time
@@ -290,6 +288,12 @@ def _finite(name: str, value: ArrayLike, unit: str) -> Array:
     if not np.isfinite(array).all():
         raise ValueError(f"{name} = {value!r} is not finite; give finite values in {unit}")
     return array
+
+
+def facet_sum(theta: Array, area: Array, lam: float, mu: float) -> float:
+    """Sum of area (cos theta + sin theta min(tan theta/lam, mu)): facets under pure closure."""
+    shear = np.minimum(np.tan(theta) / lam, mu)
+    return float(np.sum(area * (np.cos(theta) + np.sin(theta) * shear)))
 
 
 def depth_nodes(closure_range: float, slope: Array, cells: int) -> Array:

@@ -17,8 +17,8 @@ from ._checks import Array
 from ._toml import replace_file
 
 if TYPE_CHECKING:
-    from ._table_report import Report
     from .law import JointLaw
+    from .tables.report import Report
 
 _BY_CLOSURE = ("un", "sn", "kn_secant", "kn_tangent", "mu")
 _BY_AZIMUTH = ("kt", "mu", "mob", "dil")
@@ -142,13 +142,13 @@ class JointTable:
 
     def report(self, law: JointLaw, steps: int = 60) -> Report:
         """What the table drops: its error against the law on a suite of paths."""
-        from ._table_report import report
+        from .tables.report import report
 
         return report(self, law, steps)
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Draw the table (needs matplotlib); returns the figure, written to `path` if given."""
-        from ._table_plot import plot_table
+        from .tables.plot import plot_table
 
         return plot_table(self, path)
 

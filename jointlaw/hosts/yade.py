@@ -8,10 +8,10 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from .._tabulate import tabulate
 from .._toml import replace_file
 from ..law import JointLaw
 from ..table import JointTable
+from ..tables.tabulate import tabulate
 
 SCRIPTS = ("direct_shear.py", "settle_and_incline.py", "assembly.py")
 DEFAULT_LIMIT = 10.0  # shear limit over closure range, where the law has no critical slip

@@ -18,6 +18,12 @@ def test_import_pulls_in_nothing_heavy():
     assert not modules_after("import jointlaw, jointlaw.cli").intersection(HEAVY)
 
 
+def test_a_code_that_embeds_the_law_loads_no_tools_for_measurements():
+    modules = modules_after("import jointlaw")
+    assert not modules.intersection((*HEAVY, "scipy.optimize", "scipy.spatial"))
+    assert not {m for m in modules if m.startswith(("jointlaw.measurements", "jointlaw.tables"))}
+
+
 def test_presets_and_gamma_heights_need_no_scipy_stats():
     code = "import jointlaw as jl; jl.presets.load('biegel-rough').normal_stress(1e-7)"
     assert "scipy.stats" not in modules_after(code)
@@ -33,3 +39,13 @@ def test_promised_names():
     for name in names.split():
         assert hasattr(jl, name)
         assert name in jl.__all__
+
+
+def test_every_public_name_loads_and_is_what_it_is_called():
+    import jointlaw as jl
+
+    for name in jl.__all__:
+        found = getattr(jl, name)
+        if name not in ("closed_form", "presets", "baselines", "datasets", "unloading"):
+            assert callable(found), name
+        assert found.__name__.rpartition(".")[2] == name

@@ -5,8 +5,8 @@ import pytest
 
 import jointlaw as jl
 from jointlaw import baselines, datasets, unloading
-from jointlaw.calibrate import fit_closure
-from jointlaw.measured import first_loading
+from jointlaw.measurements.calibrate import fit_closure
+from jointlaw.measurements.measured import first_loading
 
 ROCK = jl.Asperity.hertz_mindlin(G=20e9, nu=0.25, R=1e-3, mu=0.6)
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw._tabulate import tabulate
 from jointlaw.table import JointTable, load_table
+from jointlaw.tables.tabulate import tabulate
 
 
 @pytest.fixture(scope="module")

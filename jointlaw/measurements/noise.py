@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._checks import Array
+from .._checks import Array
 
 FACTOR = 4.0  # 95 % range of a level about the expected one, either way
 _SD = np.log(FACTOR) / 1.96

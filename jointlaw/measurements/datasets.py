@@ -7,7 +7,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ._curve_files import Curve, read_closure
+from .curve_files import Curve, read_closure
 
 
 def names() -> list[str]:

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import units
-from ._checks import Array
+from .. import units
+from .._checks import Array
 
 _NAMES = {
     "stress": ("stress", "normal_stress", "sigma", "sigmaz", "sigma_n", "f1"),

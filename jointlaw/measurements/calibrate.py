@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import _priors
-from ._checks import Array, number, one_of
-from .asperity import Asperity
+from .._checks import Array, number, one_of
+from ..asperity import Asperity
+from ..heights import FORMATIONS, GammaHeights
+from ..law import JointLaw
 from .fit import Fit, Problem
-from .heights import FORMATIONS, GammaHeights
-from .law import JointLaw
 from .measured import ClosureCurve, Settings, ShearCurve
+from .priors import SCALES, chosen
 
 # Rock of shear modulus 20 GPa and Poisson's ratio 0.25 with asperities of 1 mm radius (Eq. 34),
 # friction 0.6 (Byerlee 1978), mean inclination 19 degrees as for the paper's rough granite.
@@ -113,7 +113,7 @@ def fit_curves(
     fixed: values of parameters that are known otherwise, in SI units.
     law: values of all parameters that are not free; None takes `DEFAULTS`.
     formation: "individual" or "population"; None takes that of `law`, or "individual".
-    priors: 95 % ranges (low, high) in physical units instead of the defaults of `_priors.PRIORS`,
+    priors: 95 % ranges (low, high) in physical units instead of the defaults of `priors.PRIORS`,
         or None to drop one. Besides the parameters: "overlap_share", "full_contact_stress".
 
     Returns a `Fit`. Raises ValueError naming the parameter when something does not fit.
@@ -123,7 +123,7 @@ def fit_curves(
     values, settings = _base(law, formation)
     for name, value in (fixed or {}).items():
         _known("fixed", name)
-        scale = _priors.SCALES[name]
+        scale = SCALES[name]
         values[name] = number(f"fixed[{name!r}]", value)
         low = 0.0 if name == "overlap" else scale.low
         if not low <= values[name] <= scale.high:
@@ -150,7 +150,7 @@ def fit_curves(
         tuple(curves),
         tuple(names),
         tuple(values.items()),
-        tuple(_priors.chosen(tuple(names), priors).items()),
+        tuple(chosen(tuple(names), priors).items()),
         settings,
     )
     return problem.solve(_starts(problem, law is not None))

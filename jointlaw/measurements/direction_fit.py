@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, special
 
-from ._checks import Array
+from .._checks import Array
 
 BLUR = 0.03
 _RADII, _SECTORS = 160, 9

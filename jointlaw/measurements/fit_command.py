@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from . import datasets, units
-from ._command import add_command
-from ._curve_files import Curve, read_closure
-from ._fit_plot import plot_fit
-from ._toml import replace_file
+from .. import units
+from .._command import add_command
+from .._toml import replace_file
+from . import datasets
 from .baselines import Comparison, compare
+from .curve_files import Curve, read_closure
 from .fit import Fit
+from .fit_plot import plot_fit
 from .measured import first_loading
 from .sweep import fit_many
 from .unloading import explain

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ._checks import Array
+from .._checks import Array
 
 _TEXT = {".csv", ".txt", ".dat", ".asc"}
 

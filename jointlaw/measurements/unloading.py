@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._checks import Array, above
-from ._progress import track
-from .law import JointLaw
+from .._checks import Array, above
+from .._progress import track
+from ..law import JointLaw
+from ..resolution import NAMED
 from .measured import first_loading
-from .resolution import NAMED
 
 _FRICTIONS = (0.1, 0.15, 0.2, 0.3, 0.45)
 

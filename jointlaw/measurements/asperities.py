@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from ._checks import Array
+from .._checks import Array
 
 FEWEST = 8  # summits that a fit can stand on
 

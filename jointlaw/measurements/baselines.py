@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
-from ._checks import Array, number
+from .._checks import Array, number
 from .calibrate import fit_closure
 from .measured import ClosureCurve
 

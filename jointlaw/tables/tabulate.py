@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ._checks import Array, above, whole
-from .law import JointLaw
-from .table import JointTable
+from .._checks import Array, above, whole
+from ..law import JointLaw
+from ..table import JointTable
 
 FLOOR = 1e-4  # stresses below this share of the largest are held to an absolute tolerance
 ROWS = 30  # closures at which friction and dilation are computed
@@ -78,7 +78,7 @@ def _metadata(
     limit: float,
     steps: int,
 ) -> dict[str, Any]:
-    from . import __version__
+    from .. import __version__
 
     kn, kt = float(table.kn_tangent.max()), float(table.shear_stiffness.max())
     return {

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import optimize, special
 
-from ._checks import Array
+from .._checks import Array
 
 _LOW, _HIGH = np.log([0.05, 1e-3, 1e-6]), np.log([200.0, 1e3, 1e3])
 

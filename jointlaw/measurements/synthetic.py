@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._checks import Array, above, at_least, whole
-from .heights import GammaHeights
-from .orientation import Orientation
+from .._checks import Array, above, at_least, whole
+from ..heights import GammaHeights
+from ..orientation import Orientation
 
 
 def synthetic_surface(

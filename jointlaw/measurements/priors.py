@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from ._checks import number
+from .._checks import number
 
 Values = Mapping[str, float]
 

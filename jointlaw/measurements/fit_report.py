@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ._priors import scale_of
-from ._toml import replace_file
+from .._toml import replace_file
 from .fit import Fit
 from .measured import ClosureCurve
+from .priors import scale_of
 
 
 def report(fit: Fit) -> str:

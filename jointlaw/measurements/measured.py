@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._checks import Array, above, at_least, number
-from ._noise import Noise
-from .asperity import Asperity
-from .curve import exact_force
-from .heights import GammaHeights
-from .law import JointLaw
-from .orientation import Orientation
-from .paths import direct_shear
-from .resolution import resolve
+from .._checks import Array, above, at_least, number
+from ..asperity import Asperity
+from ..curve import exact_force
+from ..heights import GammaHeights
+from ..law import JointLaw, facet_sum
+from ..orientation import Orientation
+from ..paths import direct_shear
+from ..resolution import resolve
+from .noise import Noise
 
 Values = Mapping[str, float]
 STRESS_NOISE = 0.01  # of the stress: a load cell with the friction of its loading frame
@@ -217,9 +217,7 @@ def _facet_factor(
     """F1/(N lam K Phi) under pure closure, summed over the facets as `JointLaw` does."""
     r = resolve(resolution)
     facets = Orientation(a, b, c).facets(r.u, r.phi)
-    shear = np.minimum(np.tan(facets.theta) / lam, mu)
-    c1 = np.cos(facets.theta)
-    return float(np.sum(facets.weight * c1 ** (1 + eta) * (c1 + np.sin(facets.theta) * shear)))
+    return facet_sum(facets.theta, facets.weight * np.cos(facets.theta) ** (1 + eta), lam, mu)
 
 
 def _pair(name: str, x: Any, other: str, y: Any) -> tuple[Array, Array]:

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
-from ._checks import Array
-from ._noise import Noise
-from ._priors import quantity, scale_of
-from ._solve import Rows, Solution, solve
-from .law import JointLaw
+from .._checks import Array
+from ..law import JointLaw
 from .measured import ClosureCurve, Settings, ShearCurve, build, log_stress
+from .noise import Noise
+from .priors import quantity, scale_of
+from .solve import Rows, Solution, solve
 
 PRIOR_SHARE = 0.05  # of the variance: up to here the data, not the priors, decide
 # Standard error of ln(stress) per doubling of the stress beyond the data, from curves of other
@@ -94,7 +94,7 @@ class Problem:
 
     @property
     def rows(self) -> Rows:
-        """The data as `_solve` takes them."""
+        """The data as `solve` takes them."""
         steepness = tuple(curve.steepness for curve in self.curves)
         return Rows(self.data, steepness, tuple(curve.expected for curve in self.curves))
 
@@ -166,7 +166,7 @@ class Fit:
     @cached_property
     def not_identifiable(self) -> dict[str, str]:
         """Parameters that these data do not fix, each with the reason."""
-        from ._identify import reasons
+        from .identify import reasons
 
         return reasons(self)
 
@@ -205,26 +205,26 @@ class Fit:
         return np.exp(centre - reach), np.exp(centre + reach)
 
     def profile(self, name: str, points: int = 21, priors: bool = False) -> Any:
-        """Profile likelihood of a fitted parameter: see `jointlaw._identify.Profile`."""
-        from ._identify import profile
+        """Profile likelihood of a fitted parameter: see `identify.Profile`."""
+        from .identify import profile
 
         return profile(self, name, points, priors)
 
     def report(self) -> str:
         """The fit in words and a table (Markdown)."""
-        from ._fit_report import report
+        from .fit_report import report
 
         return report(self)
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Draw data, fit and bands (needs matplotlib: extra `plot`)."""
-        from ._fit_plot import plot_fit
+        from .fit_plot import plot_fit
 
         return plot_fit(self, path)
 
     def to_toml(self, path: str | Path | None = None, title: str = "Fitted joint") -> str:
         """The law as a preset in TOML with what is known of its parameters; written to `path`."""
-        from ._fit_report import preset
+        from .fit_report import preset
 
         return preset(self, title, None if path is None else Path(path))
 

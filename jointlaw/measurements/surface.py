@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._asperities import Asperities, extract
-from ._checks import Array, above, whole
-from ._direction_fit import DirectionFit, fit_directions
-from ._height_fit import HeightFit, fit_heights
-from .asperity import Asperity
-from .heights import GammaHeights
-from .law import JointLaw
-from .orientation import Orientation
+from .._checks import Array, above, whole
+from ..asperity import Asperity
+from ..heights import GammaHeights
+from ..law import JointLaw
+from ..orientation import Orientation
+from .asperities import Asperities, extract
+from .direction_fit import DirectionFit, fit_directions
+from .height_fit import HeightFit, fit_heights
 
 SAMPLES = 4  # points along the edge of a facet, by default
 WIDEST = math.log(2) / 1.96  # standard error of a logarithm: a factor of 2 either way
@@ -188,13 +188,13 @@ class SurfaceFit:
 
     def report(self) -> str:
         """The fit in words and tables (Markdown), and how it depends on the sampling length."""
-        from ._scan_report import report
+        from .scan_report import report
 
         return report(self)
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Draw data against fit (needs matplotlib: extra `plot`)."""
-        from ._fit_plot import plot_surface
+        from .fit_plot import plot_surface
 
         return plot_surface(self, path)
 
@@ -222,7 +222,7 @@ def from_surface(
     Returns a `SurfaceFit`. Raises ValueError for a bad array or too few summits.
 
     Source: Misra 1999, sections 2.2.1, 2.2.2 and Eq. 12 to 18; summits, facets and estimators are
-    described in `_asperities`, `_height_fit` and `_direction_fit`.
+    described in `asperities`, `height_fit` and `direction_fit`.
     """
     try:
         heights = np.asarray(z, float)

@@ -2,7 +2,7 @@
 
 Minimised is sum (r/sigma)^2 + sum ((x - centre)/sd)^2 over the free parameters x (mostly
 logarithms), r being the residuals of the data. The noise sigma of every curve is estimated in turn
-with the parameters, see `_noise`.
+with the parameters, see `noise`.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from ._checks import Array
-from ._noise import Noise, estimate
+from .._checks import Array
+from .noise import Noise, estimate
 
 ROUNDS = 12  # at most, of fitting and estimating the noise in turn
 NOISE_WEIGHT = 4.0  # degrees of freedom that the expectation of the noise is worth

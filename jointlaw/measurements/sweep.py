@@ -9,7 +9,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from ._progress import track
+from .._progress import track
 from .calibrate import fit_closure
 from .fit import Fit
 

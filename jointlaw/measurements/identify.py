@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._checks import Array
-from ._priors import scale_of
-from ._solve import minimise
+from .._checks import Array
 from .fit import PRIOR_SHARE, WIDEST, Fit
 from .measured import ClosureCurve
+from .priors import scale_of
+from .solve import minimise
 
 # What acts on a closure curve only as one factor: N lam K times a sum over the inclinations
 _ONE_FACTOR = ("asperity_density", "K", "lam", "mu", "a", "b", "c")

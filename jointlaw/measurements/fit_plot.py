@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ._direction_fit import model_inclination
+from ..plot import _pyplot
+from .direction_fit import model_inclination
 from .measured import ClosureCurve, build
-from .plot import _pyplot
 
 if TYPE_CHECKING:
     from .baselines import Comparison

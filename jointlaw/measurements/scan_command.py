@@ -9,10 +9,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from . import units
-from ._command import add_command
-from ._scan_files import read_scan
-from ._toml import replace_file
+from .. import units
+from .._command import add_command
+from .._toml import replace_file
+from .scan_files import read_scan
 from .surface import SurfaceFit, from_surface
 
 

@@ -7,8 +7,8 @@
 Each figure is the least of several rounds, spread over the whole run, in nanoseconds per joint and
 update. Motion in one plane (--space: in 3-D), random steps around a closure of 1 um. A batch of 1
 is `Joint.update` through Python. F: traction alone; FC: with tangent; +L: with the ledger; x2: on
-two threads. Cases whose states need more than --memory, or one run more than --longest, are left
-out and shown as a dash.
+two threads; measures: `batch.measures()`, the shares, energy and reach of all joints. Cases whose
+states need more than --memory, or one run more than --longest, are left out and shown as a dash.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ COLUMNS = {
     "FC+L": ("numba", 1, True, True),
     "F x2": ("numba", 2, False, False),
     "FC x2": ("numba", 2, True, False),
+    "measures": ("numba", 1, False, False),
     "numpy F": ("numpy", 1, False, False),
     "numpy FC": ("numpy", 1, True, False),
 }
@@ -148,6 +149,9 @@ class Case:
             batch.update(first, tangent=False)
 
             def once(k: int) -> None:
+                if self.column == "measures":
+                    batch.measures()
+                    return
                 batch.update(d[k % len(d)], tangent=self.tangent, out=(F, C))
 
         once(0)  # compiles, or loads from the cache

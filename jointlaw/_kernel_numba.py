@@ -127,10 +127,11 @@ def _virgin(desk, place, piece, after, L, curve, eta, scale):
         S = c0 + x * (c1 + x * (c2 + x * c3))
         D = weight * desk[slope + l] * (c1 + x * (2.0 * c2 + x * (3.0 * c3)))
         v = desk[force + l]
-        power = v if eta == 0.5 else 1.0  # y^eta where it is at hand
+        one = 1.0 if v > 0.0 else 0.0
+        power = v if eta == 0.5 else one  # y^eta where it is at hand
         desk[force + l] = power * v * v * S
         desk[slope + l] = power * ((1.0 + eta) * S + D)
-    if eta != 0.5:
+    if (eta != 0.5) & (eta != 0.0):
         for l in range(L):
             power = desk[y + l] ** eta if desk[y + l] > 0.0 else 0.0
             desk[force + l] *= power
@@ -153,11 +154,11 @@ def _curvature(desk, piece, L, cells, eta, scale):
         D = 0.5 * ts * S1
         DD = 0.25 * (ts * ts) * S2 + 0.25 * ts * (s - t) * S1
         value = eta * (1.0 + eta) * S + (1.0 + 2.0 * eta) * D + DD
-        value = value / v if eta == 0.5 else value
+        value = value / (v if eta == 0.5 else v * v)
         desk[_CURVING + l] = value if y > 0.0 else 0.0
-    if eta != 0.5:
+    if (eta != 0.5) & (eta != 0.0):
         for l in range(L):
-            desk[_CURVING + l] *= desk[_Y1 + l] ** (eta - 1.0) if desk[_Y1 + l] > 0.0 else 0.0
+            desk[_CURVING + l] *= desk[_Y1 + l] ** eta if desk[_Y1 + l] > 0.0 else 0.0
 
 
 @_jit
@@ -523,7 +524,7 @@ def _measure_facet(desk, place, piece, s, L, facet, depth, f, curve, energy, sca
         y = y if y > 0.0 else 0.0
         power = np.sqrt(y) if eta == 0.5 else 1.0
         desk[_CURVING + l] = potential * T * y * y * power
-    if eta != 0.5:
+    if (eta != 0.5) & (eta != 0.0):
         for l in range(L):
             desk[_CURVING + l] *= desk[_Y0 + l] ** eta if desk[_Y0 + l] > 0.0 else 0.0
     for i in range(D):

@@ -243,9 +243,10 @@ def _slide(desk, qs, qt, L, depth, f, i, strength, a, compliance, ledger, tangen
         slips = size > cap
         share = cap / (size if slips else 1.0)
         share = share if slips else 1.0
-        qs[l], qt[l] = share * ts, share * tt
-        desk[_SUMS + l] += share * ts
-        desk[_SUMT + l] += share * tt
+        part = share if new2 > TINY else 0.0  # a size that underflows has no cap
+        qs[l], qt[l] = part * ts, part * tt
+        desk[_SUMS + l] += part * ts
+        desk[_SUMT + l] += part * tt
         if ledger is not None:  # each term is >= 0 as written
             r0 = 1.0 / (k0 if k0 > TINY else 1.0)
             r1 = 1.0 / (k1 if k1 > TINY else 1.0)
@@ -429,7 +430,7 @@ def _finish(desk, s, F, C, start, L, limit, dim, ledger, tangent):
         if limit < np.inf:
             for l in range(L):
                 pull = desk[_PULL1 + l] * desk[_NEW1 + l] + desk[_PULL2 + l] * desk[_NEW2 + l]
-                desk[_LOST + l] += desk[_SLIP + l] * pull / limit
+                desk[_LOST + l] += desk[_SLIP + l] * (pull if pull > 0.0 else 0.0) / limit
         for l in range(L):
             s[2 * dim - 1, l] += desk[_LOST + l]
 

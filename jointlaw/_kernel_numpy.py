@@ -22,7 +22,7 @@ GRAZING = 1e-12  # cosine at which the leash grows taut: its derivative has a po
 NOTHING = 1e-140  # m: closures below it count as zero, for their powers would underflow
 LIMIT = 1e-9  # of the friction limit: a slider this close is at it, less the rounding of q
 ROUNDED = 1e-12  # of Phi: as much may be lost in a G next to a node
-TINY = 1e-290  # stiffness whose reciprocal might overflow: its energy is nothing
+TINY = 1e-290  # a stiffness whose reciprocal might overflow, or a square that underflows: nothing
 
 
 class State(NamedTuple):
@@ -56,7 +56,9 @@ def cells(k: Tables, y: Array, force: Array, slope: Array) -> tuple[Array, Array
     low_slope, high_slope = k.depth_slope[:, :-1, None], k.depth_slope[:, 1:, None]
     y, force, slope = y[:, None], force[:, None], slope[:, None]
     reach = np.clip(y, low, high)
-    kappa = np.clip(slope, low_slope, high_slope) - low_slope
+    # by place, not by size: beyond its last height a tabulated slope wavers by its rounding
+    kappa = np.where(y > high, high_slope, slope) - low_slope
+    kappa = np.where(y > low, np.maximum(kappa, 0.0), 0.0)
     stored = np.clip(force, low_force, high_force) - low_force - low_slope * (reach - low)
     G = kappa * (y - reach) + stored
     return np.clip(G, 0.0, kappa * np.maximum(y - low, 0.0)), kappa
@@ -141,12 +143,13 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     cap = k.mu * k.lam * k.area[:, None, None] * G1
     size = np.sqrt(trial[0] ** 2 + trial[1] ** 2)
     share = np.divide(cap, size, out=np.ones_like(size), where=size > cap)
-    new.q[:] = share * trial
+    trial2 = size**2
+    new.q[:] = np.where(trial2 > TINY, share, 0.0) * trial  # a size that underflows has no cap
     F = k.n @ (k.area[:, None] * force1)
     F = F + np.einsum("edm,emb->db", basis, new.q.sum(axis=2)) / k.lam
 
     # Dissipation, each term >= 0 as written (law.md section 6, kappa0 <= chord <= kappa1)
-    trial2, q2 = size**2, old.q[0] ** 2 + old.q[1] ** 2
+    q2 = old.q[0] ** 2 + old.q[1] ** 2
     r0, r1, rc = reciprocal(kappa0), reciprocal(kappa1), reciprocal(chord)
     hardening = trial2 * (rc - r1) + np.where(kappa0 > TINY, q2 * (r0 - rc), 0.0)
     softening = (kappa0 - kappa1) * r0 * (q2 * r0)
@@ -155,7 +158,9 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     new.dissipated[:] = old.dissipated + np.sum(compliance(k) * lost, axis=(0, 1))
     if slip.any():
         pull = k.n[1:] @ (k.area[:, None] * force1)  # in-plane resultant of the normal forces
-        new.dissipated[:] += slip * np.sum(pull * offset, axis=0) / k.critical_slip
+        # >= 0 by symmetry of the facets, but for rounding
+        pulled = np.maximum(np.sum(pull * offset, axis=0), 0.0)
+        new.dissipated[:] += slip * pulled / k.critical_slip
     if not tangent:
         return new_state, F, None
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .joint import Joint, JointBatch
 
 _SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
+_NOTHING = 1e-140  # m, and Pa/m: below it squares underflow
 DEFAULT_STRESS = 20e6  # Pa; its closure is the default closure_range
 
 
@@ -111,13 +112,23 @@ class JointLaw:
         if self.plane is not None:
             set_(self, "plane", number("plane", self.plane))
         set_(self, "critical_slip", above("critical_slip", self.critical_slip, 0.0, infinite=True))
-        if self.closure_range is None:
-            set_(self, "closure_range", 1.0)
-            set_(self, "closure_range", float(self.closure(DEFAULT_STRESS)))
-            for cached in ("tables", "_closure_factor"):
-                self.__dict__.pop(cached, None)
-        set_(self, "closure_range", above("closure_range", self.closure_range, 0.0))
-        _ = self.curve  # a law that exists has a valid virgin curve
+        if self.critical_slip < _NOTHING:
+            raise ValueError(
+                f"critical_slip = {self.critical_slip!r} m is out of bounds: it must be >= "
+                f"{_NOTHING:g}"
+            )
+        with np.errstate(all="ignore"):  # what is no number in the end is refused
+            if self.closure_range is None:
+                set_(self, "closure_range", 1.0)
+                try:
+                    set_(self, "closure_range", float(self.closure(DEFAULT_STRESS)))
+                except ValueError:
+                    self._require_numbers()  # the likely reason
+                    raise
+                for cached in ("tables", "_closure_factor"):
+                    self.__dict__.pop(cached, None)
+            set_(self, "closure_range", above("closure_range", self.closure_range, 0.0))
+            self._require_numbers()  # and with it that the virgin curve is valid
 
     # ----------------------------------------------------------------- joints
 
@@ -207,6 +218,7 @@ class JointLaw:
         force, slope = self.curve.force(np.where(np.isfinite(depth), depth, 0.0))
         force[:, -1] = slope[:, -1] = np.inf
         slope[:, 0] = 0.0  # a spring that touches at once (eta = 0) belongs to the first cell
+        slope = np.maximum.accumulate(slope, axis=1)  # but for the rounding of the table it rises
         return Tables(
             self.curve, f.n, f.n / c1, f.s, f.t, c1, area, f.weight, depth, force, slope,
             p.lam, p.mu, self.critical_slip,
@@ -223,16 +235,30 @@ class JointLaw:
         k, p = self.tables, self.asperity
         y = 10.0 ** np.arange(-300.0, 101.0)
         stiffest = float(np.max(k.area / k.c1)) * max(p.lam, 1 / p.lam, 1.0) * (1.0 + p.mu)
-        with np.errstate(over="ignore"):
+        with np.errstate(over="ignore", invalid="ignore"):
             force, slope = self.curve.force(y)
             worst = stiffest * (force + y * slope) + float(np.max(k.area)) * self.curve.energy(y)
         bad = ~(worst < 1e140)
+        if bad[0]:
+            return 0.0
         return float(y[int(np.argmax(bad)) - 1]) if bad.any() else float(y[-1])
 
     @cached_property
     def fingerprint(self) -> str:
         """Hash of all parameters: states fit only joints of the law that wrote them."""
         return hashlib.sha256(self.to_toml().encode()).hexdigest()
+
+    def _require_numbers(self) -> None:
+        """Refuse parameters whose forces, within the closure range, no float can hold."""
+        weak = not float(np.max(self.tables.area)) * min(self.asperity.lam, 1.0) > _NOTHING
+        if weak or not self.largest_reach >= self.closure_range:
+            p = self.asperity
+            raise ValueError(
+                f"asperity.K = {p.K:g}, lam = {p.lam:g}, eta = {p.eta:g}, mu = {p.mu:g} with "
+                f"asperity_density = {self.asperity_density:g} per m2 give forces that are too "
+                f"{'small' if weak else 'large'} for floating point within closure_range = "
+                f"{self.closure_range:g} m; check the units"
+            )
 
     @cached_property
     def _closure_factor(self) -> float:

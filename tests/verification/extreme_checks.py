@@ -1,0 +1,114 @@
+"""What must hold after every step of every law: `faults` names what does not."""
+
+import numpy as np
+
+import jointlaw as jl
+from jointlaw import _kernel_numpy as kernel
+
+ROUNDING = 1e-12  # of the facet's normal force: a cell's G is a difference of numbers of that size
+KERNELS = 1e-11  # of the largest traction: rounding of y, 1e-16, over a step of NEAR y, 1e-5
+
+
+def sliders_within_friction(batch):
+    """Largest excess of |f_s| over mu f_n of any slider, as a share of mu f_n of its facet."""
+    k, values = batch.law.tables, batch.snapshot().values
+    now = kernel.parts(k, values)
+    y = kernel.closures(k, now.delta[0], now.offset)
+    force, slope = k.curve.force(y)
+    G, _ = kernel.cells(k, y, force, slope)
+    strength = k.mu * k.lam * k.area[:, None]
+    size = np.hypot(now.q[0], now.q[1])
+    excess = size - strength[:, None] * G
+    whole = np.where(strength * force > 0, strength * force, np.inf)[:, None]
+    lifted = np.where((y <= 0)[:, None] & (size > 0), np.inf, 0.0)
+    return float(np.max(np.maximum(excess / whole, lifted), initial=0.0))
+
+
+class Watch:
+    """A batch with what it showed before the step."""
+
+    def __init__(self, law, n):
+        self.batch = law.joints(n)
+        self.lost = np.zeros(n)
+        self.peak = np.zeros(n)
+        self.forces = np.zeros(n)
+
+    def step(self, d):
+        """Advance by d (n, 3); the list of what is wrong afterwards."""
+        faults = []
+        before = self.batch.snapshot().values
+        F, C = self.batch.update(d)
+        if not np.isfinite(F).all():
+            faults.append("F is not finite")
+        if not np.isfinite(C).all():
+            faults.append("C is not finite")
+        lost, stored = self.batch.dissipated_energy, self.batch.stored_energy
+        self.peak = np.maximum(self.peak, stored)
+        if not (lost - self.lost >= 0.0).all():
+            faults.append(f"dissipation {np.min(lost - self.lost):.1e} of {np.max(self.peak):.1e}")
+        if not (np.isfinite(stored) & (stored >= 0.0)).all():
+            faults.append(f"stored energy {np.min(stored):.1e}")
+        if not (excess := sliders_within_friction(self.batch)) <= ROUNDING:
+            faults.append(f"a slider exceeds friction by {excess:.1e}")
+        if not np.isfinite(self.batch.snapshot().values).all():
+            faults.append("the state is not finite")
+        self.forces = np.maximum(self.forces, np.abs(F).max(axis=1))
+        if not (gap := self._other_kernel(before, d, F)) <= KERNELS:
+            faults.append(f"the two kernels differ by {gap:.1e}")
+        self.lost = lost
+        return faults
+
+    def _other_kernel(self, before, d, F):
+        """How far the reference kernel is from F, as a share of the largest traction so far."""
+        _, reference, _ = kernel.step(self.batch.law.tables, before, d.T, False)
+        peak = np.where(self.forces > 0, self.forces, 1.0)
+        return float(np.max(np.abs(reference.T - F) / peak[:, None], initial=0.0))
+
+
+def path(rng, n, steps, size):
+    """Increments (steps, n, 3) of all kinds and sizes, the first a closure; and where instead
+    (steps, n) to return to zero closure exactly, the very point of contact."""
+    kinds = rng.integers(8, size=(steps, n))
+    d = rng.normal(size=(steps, n, 3)) * size
+    d *= 10.0 ** rng.uniform(-4.0, 0.5, (steps, n, 1))
+    d[kinds == 1, 1:] = 0.0  # pure closure
+    d[kinds == 2, 0] = 0.0  # pure shear
+    d[kinds == 3] *= 1e-290 / size  # 1e-300 and around
+    d[kinds == 4] *= 1e-10
+    d[kinds == 5] = 0.0
+    d[kinds == 6] *= 1e4
+    d[0] = [size, 0.0, 0.0]
+    return d, kinds == 7
+
+
+def run(law, size, seed, n=8, steps=32):
+    """All faults along random paths of n joints, each with its step."""
+    watch = Watch(law, n)
+    d, home = path(np.random.default_rng(seed), n, steps, size)
+    found = []
+    for k in range(steps):
+        delta = watch.batch.delta
+        d[k, home[k]] = -delta[home[k]] * np.array([1.0, 0.0, 0.0])
+        found += [f"step {k}: {fault}" for fault in watch.step(d[k])]
+    return found
+
+
+def refused(law, size):
+    """Names of refused inputs that changed the state, or were not refused."""
+    batch = law.joints(3)
+    batch.update(np.full((3, 3), 0.3 * size))
+    before = batch.snapshot().values
+    wrong = []
+    for bad in (np.nan, np.inf, -np.inf, 1e308, 10.0 * law.largest_reach):
+        for slot in range(3):
+            d = np.full((3, 3), 1e-2 * size)
+            d[1, slot] = bad
+            for act in (batch.update, batch.trial):
+                try:
+                    act(d)
+                    wrong.append(f"{bad} in slot {slot} passes")
+                except (ValueError, jl.NonFiniteError):
+                    pass
+    if not np.array_equal(before, batch.snapshot().values):
+        wrong.append("state moved")
+    return wrong

@@ -1,0 +1,105 @@
+"""Laws at the ends of what the parameters allow: one extreme at a time, in pairs, at random."""
+
+from itertools import combinations
+
+import numpy as np
+
+import jointlaw as jl
+
+SCALE = 2e-6  # m: closure range and asperity height of the ordinary law
+ORDINARY = {
+    "a": 3.0, "b": 0.5, "c": 0.1, "K": 2e8, "lam": 1.2, "eta": 0.5, "mu": 0.4, "density": 1e10,
+    "heights": None, "range": SCALE, "critical_slip": np.inf, "resolution": jl.Resolution(2, 4, 3),
+}  # fmt: skip
+
+_ROUGH = (3.82, 1.15e-6, 2e-6)  # alpha, beta, overlap: Westerly granite
+HEIGHTS = {
+    "printed, population": (*_ROUGH, "population"),
+    "printed, individual": (*_ROUGH, "individual"),
+    "1e6 times as wide": (3.82, 1.15, 2e-6, "individual"),
+    "alpha = -0.99": (-0.99, 1.15e-6, 2e-6, "individual"),
+    "alpha = -0.5, overlap 0": (-0.5, 1.15e-6, 0.0, "individual"),
+    "overlap 0": (3.82, 1.15e-6, 0.0, "individual"),
+    "overlap in the lower tail": (3.82, 1.15e-6, 1e-9, "individual"),
+    "overlap in the upper tail": (3.82, 1.15e-6, 1e-4, "population"),
+}
+EXTREMES = {
+    "a": [1.0, 1.0 + 1e-12, 1e3, 1e8],
+    "b, c": [(-1.0, 0.5), (-1.0, -0.5), (2.0, 0.0), (0.0, 1 / 3)],
+    "mu": [0.0, 1e-8, 10.0, 1e6],
+    "lam": [0.1, 10.0],
+    "eta": [0.0, 1e-6, 1.0, 2.0],
+    "K": [1e-20, 1e20],
+    "density": [1e-20, 1e20],
+    "range": [SCALE * 1e-6, SCALE * 1e6],
+    "heights": list(HEIGHTS),
+    "critical_slip": [SCALE * 1e-3, SCALE * 0.3],
+}
+
+
+def build(**changes):
+    """The ordinary law with these changes; "b, c" is set as a pair, heights by name or values."""
+    p = ORDINARY | changes
+    b, c = p.get("b, c", (p["b"], p["c"]))
+    heights = HEIGHTS.get(p["heights"], p["heights"])
+    return jl.JointLaw(
+        orientation=jl.Orientation(p["a"], b, c),
+        asperity=jl.Asperity(K=p["K"], lam=p["lam"], eta=p["eta"], mu=p["mu"]),
+        heights=heights and jl.GammaHeights(*heights),
+        asperity_density=p["density"],
+        closure_range=p["range"],
+        critical_slip=p["critical_slip"],
+        resolution=p["resolution"],
+    )
+
+
+def name(changes):
+    """What distinguishes a law from the ordinary one."""
+    return ", ".join(f"{key} = {value}" for key, value in changes.items()) or "ordinary"
+
+
+def alone():
+    """The ordinary law, and each extreme alone."""
+    return [{}, *({key: value} for key, values in EXTREMES.items() for value in values)]
+
+
+def pairs():
+    """Every two extremes together."""
+    return [
+        {k1: v1, k2: v2}
+        for k1, k2 in combinations(EXTREMES, 2)
+        for v1 in EXTREMES[k1]
+        for v2 in EXTREMES[k2]
+    ]
+
+
+def random_changes(rng):
+    """Any admissible parameters, over many decades, a third of them exactly on an extreme."""
+
+    def pick(key, otherwise):
+        chance = rng.random()
+        return EXTREMES[key][rng.integers(len(EXTREMES[key]))] if chance < 0.3 else otherwise
+
+    b = rng.uniform(-1.0, 2.0)
+    unit = 10.0 ** rng.uniform(-8.0, 8.0)  # of length, with the ordinary one
+    changes = {
+        "a": pick("a", 1.0 + 10.0 ** rng.uniform(-8.0, 4.0)),
+        "b, c": pick("b, c", (b, rng.uniform(-1.0, 1.0) * (1 / 3 - b / 6))),
+        "mu": pick("mu", 10.0 ** rng.uniform(-3.0, 1.0)),
+        "lam": pick("lam", 10.0 ** rng.uniform(-1.0, 1.0)),
+        "eta": pick("eta", rng.uniform(0.0, 2.0)),
+        "K": 10.0 ** rng.uniform(-20.0, 20.0),
+        "density": 10.0 ** rng.uniform(-20.0, 20.0),
+        "range": SCALE * unit * 10.0 ** rng.choice([0.0, 0.0, rng.uniform(-6.0, 6.0)]),
+        "resolution": jl.Resolution(*(int(rng.integers(*r)) for r in ((1, 4), (3, 6), (1, 5)))),
+        "critical_slip": SCALE * unit * 10.0 ** rng.uniform(-3, 1)
+        if rng.random() < 0.3
+        else np.inf,
+    }
+    if rng.random() < 0.5:
+        alpha = float(rng.choice([-0.9, -0.5, 0.0, 3.82, 20.0, rng.uniform(-0.9, 30.0)]))
+        beta = SCALE * unit * 10.0 ** rng.choice([0.0, rng.uniform(-1.0, 3.0)]) / (alpha + 1.0)
+        overlap = float(rng.choice([0.0, beta, 10.0 * beta, beta * 10.0 ** rng.uniform(-6, 2)]))
+        formation = "population" if rng.random() < 0.3 else "individual"
+        changes["heights"] = (alpha, float(beta), overlap, formation)
+    return changes, SCALE * unit

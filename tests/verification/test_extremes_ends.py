@@ -1,0 +1,46 @@
+"""Where the numbers end, the law says so when it is built; just inside, everything holds."""
+
+import pytest
+from extreme_checks import refused, run
+from extreme_laws import SCALE, build, name
+
+BEYOND = [
+    {"K": 1e300}, {"density": 1e300}, {"K": 1e200, "density": 1e200}, {"mu": 1e300}, {"lam": 1e300},
+    {"K": 1e-300}, {"K": 5e-324}, {"lam": 1e-300}, {"range": 1e300}, {"eta": 1e300},
+    {"range": None, "K": 1e300}, {"range": None, "K": 1e-300},
+]  # fmt: skip
+INSIDE = [
+    {"K": 1e100}, {"density": 1e110}, {"K": 1e-120}, {"mu": 1e100}, {"lam": 1e60}, {"eta": 50.0},
+    {"eta": 1e3}, {"a": 1e300}, {"range": 5e-324}, {"critical_slip": 1e-140},
+    {"heights": (3.82, 1.15e-12, 0.0, "individual")},
+    {"heights": (3.82, 1.15e-12, 2e-6, "population")},
+    {"heights": (3.82, 1e-300, 0.0, "individual")},
+    {"heights": (3.82, 1e300, 0.0, "individual")},
+    {"heights": (3.82, 1.15e-6, 1e300, "individual")},
+    {"heights": (-1.0 + 1e-15, 1.15e-6, 2e-6, "individual")},
+    {"heights": (1e9, 1e-15, 1e-6, "individual")},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("changes", BEYOND, ids=name)
+def test_numbers_that_no_float_can_hold_are_refused(changes):
+    with pytest.raises(ValueError, match=r"asperity.K = .* too (small|large) for floating point"):
+        build(**changes)
+
+
+def test_a_leash_shorter_than_nothing_is_refused():
+    with pytest.raises(ValueError, match="critical_slip = 1e-300 m is out of bounds"):
+        build(critical_slip=1e-300)
+
+
+def test_a_density_that_is_infinite_at_the_point_of_contact_is_refused():
+    with pytest.raises(ValueError, match="heights cannot be tabulated"):
+        build(heights=(-1.0 + 1e-9, 1.15e-6, 0.0, "individual"))
+
+
+@pytest.mark.parametrize("changes", INSIDE, ids=name)
+def test_just_inside_everything_holds(changes, tmp_path, monkeypatch):
+    monkeypatch.setenv("JOINTLAW_REPLAY_DIR", str(tmp_path))
+    law = build(**changes)
+    size = min(SCALE, 1e-6 * law.largest_reach)
+    assert not run(law, size, 1, n=6, steps=12) + refused(law, size)

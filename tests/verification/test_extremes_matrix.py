@@ -1,0 +1,60 @@
+"""Every extreme alone and every two together: what must hold does, after every step."""
+
+import numpy as np
+import pytest
+from extreme_checks import refused, run, sliders_within_friction
+from extreme_laws import EXTREMES, SCALE, alone, build, name, pairs
+
+# what has no virgin curve that can be tabulated, or none that is convex, is refused when built
+REFUSED = "cannot be tabulated|not convex"
+# chosen to be refused: a density infinite at the very point of contact; a population of eta near 0
+NONE = [{"heights": "alpha = -0.5, overlap 0"}, *(
+    {"eta": eta, "heights": "printed, population"} for eta in (0.0, 1e-6))]  # fmt: skip
+
+
+def ends(changes):
+    """Whether the mathematics ends before this law."""
+    return any(item.items() <= changes.items() for item in NONE)
+
+
+def examine(changes, seed, n=8, steps=32):
+    """Faults of one law: None when it was refused at construction, as it must be."""
+    if ends(changes):
+        with pytest.raises(ValueError, match=REFUSED):
+            build(**changes)
+        return None
+    law = build(**changes)
+    return run(law, SCALE, seed, n, steps) + refused(law, SCALE)
+
+
+@pytest.fixture(autouse=True)
+def replays(tmp_path, monkeypatch):
+    monkeypatch.setenv("JOINTLAW_REPLAY_DIR", str(tmp_path))
+
+
+@pytest.mark.parametrize("changes", alone(), ids=name)
+def test_alone(changes):
+    assert not examine(changes, 1)
+
+
+@pytest.mark.parametrize("key", list(EXTREMES)[:-1])
+def test_in_pairs(key):
+    faults = {
+        name(changes): found
+        for seed, changes in enumerate(pairs())
+        if next(iter(changes)) == key
+        and not ends(changes)  # alone, and in the report, for they are slow to refuse
+        and (found := examine(changes, seed, n=6, steps=10))
+    }
+    assert not faults
+
+
+def test_the_checks_can_fail():
+    """A joint that is pushed beyond friction by hand is caught."""
+    law = build()
+    joints = law.joints(2)
+    joints.update(np.full((2, 3), 0.3 * SCALE))
+    state = joints.snapshot()
+    state.values[6:] *= 10.0  # delta, offset and dissipated energy come first
+    joints.restore(state)
+    assert sliders_within_friction(joints) > 1e-3

@@ -1,0 +1,86 @@
+"""A million joints, threads that each own joints, forked and spawned processes, two laws at once.
+
+Arrays of any kind (read-only, strided, float32, integer, empty), pickling, states of the wrong law
+and interrupted writes: tests/unit/test_batch.py, test_snapshot.py and test_files.py.
+"""
+
+import multiprocessing
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from extreme_checks import path
+from extreme_laws import SCALE, build
+
+import jointlaw as jl
+
+FAST = jl.Resolution(1, 3, 1)
+LAWS = ({"mu": 0.3}, {"a": 1.0, "eta": 0.0}, {"heights": "printed, individual"}, {"lam": 10.0})
+
+
+def walk(task):
+    """Tractions at the end of a path of its own, of 200 joints of a law of its own."""
+    which, seed = task
+    joints = build(resolution=FAST, **LAWS[which]).joints(200)
+    for d in path(np.random.default_rng(seed), 200, 20, SCALE)[0]:
+        F, _ = joints.update(d)
+    return F
+
+
+TASKS = [(k % len(LAWS), k) for k in range(8)]
+
+
+def test_threads_with_laws_and_joints_of_their_own():
+    with ThreadPoolExecutor(8) as pool:
+        together = list(pool.map(walk, TASKS))
+    for task, F in zip(TASKS, together, strict=True):
+        np.testing.assert_array_equal(F, walk(task))
+
+
+def test_threads_with_joints_of_one_law():
+    law = build(resolution=FAST)
+
+    def one(seed):
+        joints = law.joints(100)
+        for d in path(np.random.default_rng(seed), 100, 20, SCALE)[0]:
+            F, _ = joints.update(d)
+        return F
+
+    with ThreadPoolExecutor(8) as pool:
+        together = list(pool.map(one, range(8)))
+    for seed, F in enumerate(together):
+        np.testing.assert_array_equal(F, one(seed))
+
+
+def go_on(batch):
+    """A batch that came from another process takes a step."""
+    return batch.update(np.full((len(batch), 3), 0.01 * SCALE), tangent=False)[0]
+
+
+@pytest.mark.parametrize("method", ["fork", "spawn"])
+def test_a_batch_goes_on_in_another_process(method):
+    """After the parent has used its threads, which a fork does not take along."""
+    batch = build(resolution=FAST).joints(5000)
+    for d in path(np.random.default_rng(1), 5000, 3, SCALE)[0]:
+        batch.update(d)
+    with multiprocessing.get_context(method).Pool(1) as pool:
+        elsewhere = pool.apply(go_on, (batch,))
+    np.testing.assert_array_equal(elsewhere, go_on(pickle.loads(pickle.dumps(batch))))
+
+
+def test_a_million_joints_are_a_million_single_joints():
+    n = 1_000_000
+    law = build(resolution=FAST)
+    batch = law.joints(n, ledger=False)
+    rng = np.random.default_rng(2)
+    steps = [rng.normal(size=(n, 3)) * 0.1 * SCALE + [SCALE, 0.0, 0.0] for _ in range(2)]
+    for d in steps:
+        F, C = batch.update(d, tangent=False)
+    assert C is None
+    assert np.isfinite(F).all()
+    for k in (0, 63, 64, 499_999, n - 1):
+        joint = law.joint()
+        for d in steps:
+            one, _ = joint.update(d[k], tangent=False)
+        np.testing.assert_array_equal(F[k], one)

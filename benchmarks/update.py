@@ -7,8 +7,8 @@
 Each figure is the least of several rounds, spread over the whole run, in nanoseconds per joint and
 update. Motion in one plane (--space: in 3-D), random steps around a closure of 1 um. A batch of 1
 is `Joint.update` through Python. F: traction alone; FC: with tangent; +L: with the ledger; x2: on
-two threads. Cases whose states need more than --memory, or one run more than --longest, are left
-out and shown as a dash.
+two threads; measures: `batch.measures()`, the shares, energy and reach of all joints. Cases whose
+states need more than --memory, or one run more than --longest, are left out and shown as a dash.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ import tempfile
 import time
 from typing import Any
 
+import numba
 import numpy as np
 
 import jointlaw as jl
@@ -38,6 +39,7 @@ COLUMNS = {
     "FC+L": ("numba", 1, True, True),
     "F x2": ("numba", 2, False, False),
     "FC x2": ("numba", 2, True, False),
+    "measures": ("numba", 1, False, False),
     "numpy F": ("numpy", 1, False, False),
     "numpy FC": ("numpy", 1, True, False),
 }
@@ -72,6 +74,51 @@ def law(name: str, plane: bool) -> jl.JointLaw:
     )
 
 
+def state_bytes(made: jl.JointLaw) -> int:
+    """Bytes that a joint of a large batch occupies."""
+    os.environ["JOINTLAW_KERNEL"] = "numba"
+    return 8 * made.joints(0)._engine.rows
+
+
+def limits() -> dict[str, float]:
+    """What this processor can do, one thread, in ns per number: the floor under any kernel."""
+
+    @numba.njit(error_model="numpy")
+    def divide(x: Any, y: Any) -> None:
+        for _ in range(1000):
+            for i in range(x.size):
+                y[i] = 1.5 / (x[i] + 1.0)
+
+    @numba.njit(error_model="numpy")
+    def root(x: Any, y: Any) -> None:
+        for _ in range(1000):
+            for i in range(x.size):
+                y[i] = np.sqrt(x[i] + 1.0)
+
+    @numba.njit(error_model="numpy")
+    def move(x: Any, y: Any) -> None:  # reads and writes, as a step does to the state
+        for i in range(x.size):
+            x[i] += 1.0
+
+    few, many = np.random.default_rng(0).random(1024), np.zeros(40_000_000)
+    some = np.zeros(520_000)  # as much as 10 000 joints
+    result = {}
+    for name, call, x, count in (
+        ("division (ns)", divide, few, 1000 * few.size),
+        ("square root (ns)", root, few, 1000 * few.size),
+        ("8 bytes of state moved, 4 MB (ns)", move, some, some.size),
+        ("8 bytes of state moved, 320 MB (ns)", move, many, many.size),
+    ):
+        y, best = np.empty_like(x), np.inf
+        call(x, y)
+        for _ in range(15):
+            start = time.perf_counter()
+            call(x, y)
+            best = min(best, time.perf_counter() - start)
+        result[name] = best / count * 1e9
+    return result
+
+
 class Case:
     """One law, batch size and column; holds its least time."""
 
@@ -102,6 +149,9 @@ class Case:
             batch.update(first, tangent=False)
 
             def once(k: int) -> None:
+                if self.column == "measures":
+                    batch.measures()
+                    return
                 batch.update(d[k % len(d)], tangent=self.tangent, out=(F, C))
 
         once(0)  # compiles, or loads from the cache
@@ -119,7 +169,7 @@ def cases(names: tuple[str, ...], sizes: tuple[int, ...], args: argparse.Namespa
     for name in names:
         one = law(name, not args.space)
         for n in sizes:
-            if n * (8 * one.tables.rows + 400) > args.memory * 1e9:
+            if n * (state_bytes(one) + 400) > args.memory * 1e9:
                 continue
             for column, (kernel, threads, _, ledger) in COLUMNS.items():
                 if threads > 1 and n < 10_000:  # too little work to share
@@ -182,7 +232,7 @@ def table(found: list[Case], names: tuple[str, ...], sizes: tuple[int, ...]) -> 
     best = {(c.law.resolution, c.n, c.column): c.best * 1e9 for c in found}
     for name in names:
         one = next(c.law for c in found if c.law.resolution == NAMED[name])
-        sliders, size = len(one.tables.c1) * one.tables.cells, 8 * one.tables.rows
+        sliders, size = len(one.tables.c1) * one.tables.cells, state_bytes(one)
         for n in sizes:
             cells = [best.get((one.resolution, n, column)) for column in COLUMNS]
             if any(cells):
@@ -220,8 +270,6 @@ def main() -> None:
         print(f"round {turn + 1} of {rounds}", file=sys.stderr)
     found = [case for case in todo if np.isfinite(case.best)]
 
-    import numba
-
     about = {
         "processors": os.cpu_count(),
         "machine": platform.machine(),
@@ -230,6 +278,7 @@ def main() -> None:
         "numba": numba.__version__,
         "first updates, compiled (s)": first,
         "first updates, from the cache (s)": cached,
+        **limits(),
     }
     print(table(found, names, sizes))
     print()
@@ -240,7 +289,7 @@ def main() -> None:
             {
                 "resolution": [c.law.resolution.u, c.law.resolution.phi, c.law.resolution.depth],
                 "sliders": len(c.law.tables.c1) * c.law.tables.cells,
-                "bytes": 8 * c.law.tables.rows,
+                "bytes": state_bytes(c.law),
                 "joints": c.n,
                 "kernel": c.kernel,
                 "threads": c.threads,

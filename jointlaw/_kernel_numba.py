@@ -69,6 +69,11 @@ def pack(k: Tables, compliance: Array) -> Packed:
     return Packed(facet, depth, k.curve.S.ravel().copy(), scalars)
 
 
+def block_rows(k: Tables) -> int:
+    """Rows of a block: the state, then Phi and Phi' of all facets, which save half the look-ups."""
+    return k.rows + 2 * len(k.c1)
+
+
 class Work(NamedTuple):
     """Working space of one thread, so that no step allocates any."""
 
@@ -79,7 +84,7 @@ class Work(NamedTuple):
 
 
 def work(rows: int) -> Work:
-    """Working space for states of this many rows."""
+    """Working space for blocks of this many rows."""
     place, piece = np.zeros(LANES, np.int32), np.zeros(4 * LANES)
     return Work(np.zeros((rows, LANES)), np.zeros(_DESK), place, piece)
 
@@ -122,10 +127,11 @@ def _virgin(desk, place, piece, after, L, curve, eta, scale):
         S = c0 + x * (c1 + x * (c2 + x * c3))
         D = weight * desk[slope + l] * (c1 + x * (2.0 * c2 + x * (3.0 * c3)))
         v = desk[force + l]
-        power = v if eta == 0.5 else 1.0  # y^eta where it is at hand
+        one = 1.0 if v > 0.0 else 0.0
+        power = v if eta == 0.5 else one  # y^eta where it is at hand
         desk[force + l] = power * v * v * S
         desk[slope + l] = power * ((1.0 + eta) * S + D)
-    if eta != 0.5:
+    if (eta != 0.5) & (eta != 0.0):
         for l in range(L):
             power = desk[y + l] ** eta if desk[y + l] > 0.0 else 0.0
             desk[force + l] *= power
@@ -148,11 +154,11 @@ def _curvature(desk, piece, L, cells, eta, scale):
         D = 0.5 * ts * S1
         DD = 0.25 * (ts * ts) * S2 + 0.25 * ts * (s - t) * S1
         value = eta * (1.0 + eta) * S + (1.0 + 2.0 * eta) * D + DD
-        value = value / v if eta == 0.5 else value
+        value = value / (v if eta == 0.5 else v * v)
         desk[_CURVING + l] = value if y > 0.0 else 0.0
-    if eta != 0.5:
+    if (eta != 0.5) & (eta != 0.0):
         for l in range(L):
-            desk[_CURVING + l] *= desk[_Y1 + l] ** (eta - 1.0) if desk[_Y1 + l] > 0.0 else 0.0
+            desk[_CURVING + l] *= desk[_Y1 + l] ** eta if desk[_Y1 + l] > 0.0 else 0.0
 
 
 @_jit
@@ -343,8 +349,18 @@ def _facet(desk, place, piece, s, L, facet, depth, f, curve, scalars, dim, ledge
             desk[_Y1 + l] += m2 * desk[_NEW2 + l]
             desk[_DES + l] += s2 * desk[_P2 + l]
             desk[_DET + l] += t2 * desk[_P2 + l]
-    _virgin(desk, place, piece, None, L, curve, eta, scale)
+    for l in range(L):
+        desk[_Y0 + l] = desk[_Y0 + l] if abs(desk[_Y0 + l]) >= NOTHING else 0.0
+    rf, rs = 2 * dim + 2 * M * D + f, 2 * dim + 2 * M * D + M + f
+    for l in range(L):
+        desk[_F0 + l] = s[rf, l]
+    for l in range(L):
+        desk[_S0 + l] = s[rs, l]
     _virgin(desk, place, piece, True, L, curve, eta, scale)
+    for l in range(L):
+        s[rf, l] = desk[_F1 + l]
+    for l in range(L):
+        s[rs, l] = desk[_S1 + l]
     if tangent is not None:
         _curvature(desk, piece, L, np.float64(curve.size // 4), eta, scale)
         _gradient(desk, L, m0, m1, m2, limit < np.inf)
@@ -414,7 +430,7 @@ def _finish(desk, s, F, C, start, L, limit, dim, ledger, tangent):
         if limit < np.inf:
             for l in range(L):
                 pull = desk[_PULL1 + l] * desk[_NEW1 + l] + desk[_PULL2 + l] * desk[_NEW2 + l]
-                desk[_LOST + l] += desk[_SLIP + l] * pull / limit
+                desk[_LOST + l] += desk[_SLIP + l] * (pull if pull > 0.0 else 0.0) / limit
         for l in range(L):
             s[2 * dim - 1, l] += desk[_LOST + l]
 
@@ -480,16 +496,26 @@ def _count(desk, qs, qt, L, depth, f, i, strength, compliance):
 
 
 @_jit
+def _effective(desk, s, L, facet, f, dim):
+    """Effective closure y of one facet in the states s."""
+    m0, m1, m2 = facet[f, _M], facet[f, _M + 1], facet[f, _M + 2]
+    closure, offset, other = s[0], s[dim], s[2 * dim - 2]
+    for l in range(L):
+        desk[_Y0 + l] = m0 * closure[l] + m1 * offset[l]
+    if dim == 3:
+        for l in range(L):
+            desk[_Y0 + l] += m2 * other[l]
+
+
+@_jit
 def _measure_facet(desk, place, piece, s, L, facet, depth, f, curve, energy, scalars, dim):
     """What one facet of a block adds to the measures."""
     lam, mu, eta, scale = scalars[0], scalars[1], scalars[3], scalars[4]
     M, D = depth.shape[0], depth.shape[1] - 1
-    m0, m1, m2 = facet[f, _M], facet[f, _M + 1], facet[f, _M + 2]
     potential, share = facet[f, _POTENTIAL], facet[f, _SHARE]
     strength, compliance = mu * lam * facet[f, _REST], facet[f, _REST + 2]
-    closure, offset, other = s[0], s[dim], s[2 * dim - 2]  # in one plane m2 is 0
+    _effective(desk, s, L, facet, f, dim)
     for l in range(L):
-        desk[_Y0 + l] = m0 * closure[l] + m1 * offset[l] + m2 * other[l]
         desk[_WHOLE + l], desk[_LIMIT + l] = 1.0, 0.0
     _virgin(desk, place, piece, None, L, curve, eta, scale)
     _fetch(place, piece, L, energy)
@@ -499,7 +525,7 @@ def _measure_facet(desk, place, piece, s, L, facet, depth, f, curve, energy, sca
         y = y if y > 0.0 else 0.0
         power = np.sqrt(y) if eta == 0.5 else 1.0
         desk[_CURVING + l] = potential * T * y * y * power
-    if eta != 0.5:
+    if (eta != 0.5) & (eta != 0.0):
         for l in range(L):
             desk[_CURVING + l] *= desk[_Y0 + l] ** eta if desk[_Y0 + l] > 0.0 else 0.0
     for i in range(D):
@@ -530,3 +556,18 @@ def measures(
         for i in range(5):
             for l in range(L):
                 out[i, start + l] = desk[_SLIDING + i * LANES + l]
+
+
+@_jit
+def refresh(state, first, last, block, desk, place, piece, facet, depth, curve, scalars, dim):
+    """Phi and Phi' in the blocks of joints first..last, after their states were written."""
+    M, D, W = depth.shape[0], depth.shape[1] - 1, state.shape[2]
+    for start in range(first, last, W):
+        L = min(W, last - start)
+        s = state[start // W]
+        for f in range(M):
+            rf, rs = 2 * dim + 2 * M * D + f, 2 * dim + 2 * M * D + M + f
+            _effective(desk, s, L, facet, f, dim)
+            _virgin(desk, place, piece, None, L, curve, scalars[3], scalars[4])
+            for l in range(L):
+                s[rf, l], s[rs, l] = desk[_F0 + l], desk[_S0 + l]

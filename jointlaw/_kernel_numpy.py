@@ -158,7 +158,9 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     new.dissipated[:] = old.dissipated + np.sum(compliance(k) * lost, axis=(0, 1))
     if slip.any():
         pull = k.n[1:] @ (k.area[:, None] * force1)  # in-plane resultant of the normal forces
-        new.dissipated[:] += slip * np.sum(pull * offset, axis=0) / k.critical_slip
+        # >= 0 by symmetry of the facets, but for rounding
+        pulled = np.maximum(np.sum(pull * offset, axis=0), 0.0)
+        new.dissipated[:] += slip * pulled / k.critical_slip
     if not tangent:
         return new_state, F, None
 

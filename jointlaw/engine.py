@@ -32,6 +32,8 @@ Call = Callable[..., None]
 class Engine(Protocol):
     """What a batch asks of a kernel."""
 
+    rows: int  # of a block: those of the state, then what the kernel keeps beside it
+
     def advance(
         self,
         state: Array,
@@ -43,6 +45,9 @@ class Engine(Protocol):
         ledger: bool,
     ) -> None:
         """Advance the joints of `index` (all if None) by d (m, dim): write F, C, state."""
+
+    def refresh(self, state: Array, n: int) -> None:
+        """Bring what the kernel keeps beside the first n states up to date with them."""
 
     def measures(self, state: Array, out: Array) -> None:
         """Write the `Measures` of the first n joints into the rows of out (5, n)."""
@@ -89,7 +94,7 @@ class NumpyEngine:
     """The reference: whole chunks of joints through `_kernel_numpy.step`."""
 
     def __init__(self, tables: Tables) -> None:
-        self.tables = tables
+        self.tables, self.rows = tables, tables.rows
 
     def advance(
         self,
@@ -112,6 +117,9 @@ class NumpyEngine:
                 C[part] = np.moveaxis(C_part, 2, 0)
             if keep:
                 write_rows(state, new, where[part])
+
+    def refresh(self, state: Array, n: int) -> None:
+        """As `Engine.refresh`: nothing."""
 
     def measures(self, state: Array, out: Array) -> None:
         """As `Engine.measures`."""
@@ -136,7 +144,8 @@ class NumbaEngine:
             for tangent in (False, True)
         }
         self._fixed_measures = (*packed, tables.curve.T.ravel().copy())
-        self._rows, self._sliders = tables.rows, len(tables.c1) * tables.cells
+        self.rows, self._sliders = kernel.block_rows(tables), len(tables.c1) * tables.cells
+        self._packed = packed
         self._all = np.empty(0, np.intp)
         self._none = np.empty((0, tables.dim, tables.dim))
 
@@ -155,6 +164,10 @@ class NumbaEngine:
         given = (state, d, F, C if tangent else self._none,
                  self._all if index is None else index, keep)  # fmt: skip
         self._run(self._kernel.advance, len(d), given, self._fixed[ledger, tangent])
+
+    def refresh(self, state: Array, n: int) -> None:
+        """As `Engine.refresh`."""
+        self._run(self._kernel.refresh, n, (state,), self._packed)
 
     def measures(self, state: Array, out: Array) -> None:
         """As `Engine.measures`."""
@@ -181,10 +194,10 @@ class NumbaEngine:
     def _work(self) -> tuple[Any, ...]:
         """Working space of the thread that asks: shared by all batches it advances."""
         try:
-            space: tuple[Any, ...] = _spaces.by_rows[self._rows]
+            space: tuple[Any, ...] = _spaces.by_rows[self.rows]
         except (AttributeError, KeyError):
-            space = self._kernel.work(self._rows)
-            _spaces.__dict__.setdefault("by_rows", {})[self._rows] = space
+            space = self._kernel.work(self.rows)
+            _spaces.__dict__.setdefault("by_rows", {})[self.rows] = space
         return space
 
 

@@ -33,16 +33,21 @@ class JointBatch:
         self._engine = engine(law)
         self._n = whole("n", n, 0)
         lanes = 1 if self._n == 1 else LANES
-        self._state = np.zeros((-(-self._n // lanes), law.tables.rows, lanes))
+        self._state = np.zeros((-(-self._n // lanes), self._engine.rows, lanes))
         self._reach = 0.0  # no facet's effective closure exceeds it, in either sense
         self._stretch = 1.0 + 2.0 * float(np.max(np.abs(law.tables.m)))  # of y over that of d
 
     def __getstate__(self) -> dict[str, Any]:
-        return {k: v for k, v in self.__dict__.items() if k != "_engine"}  # holds compiled code
+        kept = {k: v for k, v in self.__dict__.items() if k != "_engine"}  # holds compiled code
+        return kept | {"_state": self._state[:, : self.law.tables.rows]}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        self._engine = engine(self.law)
+        self._engine, rows = engine(self.law), state["_state"]
+        blocks, kept, lanes = rows.shape
+        self._state = np.zeros((blocks, self._engine.rows, lanes))
+        self._state[:, :kept] = rows
+        self._engine.refresh(self._state, self._n)
 
     def __len__(self) -> int:
         return self._n
@@ -99,7 +104,7 @@ class JointBatch:
 
     def snapshot(self) -> JointState:
         """A copy of the state of all joints."""
-        return JointState(self.law.fingerprint, rows_of(self._state, self._n))
+        return JointState(self.law.fingerprint, self._rows())
 
     def restore(self, state: JointState) -> None:
         """Return to a snapshot. Raises ValueError if another law or batch size wrote it."""
@@ -111,7 +116,9 @@ class JointBatch:
             raise ValueError(f"state holds {len(state)} joints, this batch {self._n}: resize first")
         if not np.isfinite(state.values).all():
             raise ValueError("state holds values that are not finite; it is damaged")
-        write_rows(self._state, state.values, np.arange(self._n))
+        rows = self._state[:, : self.law.tables.rows]
+        write_rows(rows, state.values, np.arange(self._n))
+        self._engine.refresh(self._state, self._n)
         self._reach = self._bound(state.values).max(initial=0.0)
 
     def reset(self, index: Index | None = None) -> None:
@@ -157,7 +164,7 @@ class JointBatch:
     @property
     def F(self) -> Array:
         """Traction (n, dim) in Pa."""
-        return kernel.traction(self.law.tables, rows_of(self._state, self._n)).T
+        return kernel.traction(self.law.tables, self._rows()).T
 
     @property
     def sliding(self) -> Array:
@@ -189,6 +196,10 @@ class JointBatch:
         return lost
 
     # --------------------------------------------------------------- internals
+
+    def _rows(self, index: NDArray[np.intp] | None = None) -> Array:
+        """States (rows, n) of all joints or those of `index`, as a copy."""
+        return rows_of(self._state[:, : self.law.tables.rows], self._n, index)
 
     def _index(self, where: Index) -> NDArray[np.intp]:
         index = np.asarray(where)
@@ -232,7 +243,7 @@ class JointBatch:
             row = int(np.argmin(finite))
             joint = row if index is None else int(index[row])
             raise ValueError(f"d of joint {joint} = {d[row]} is not finite; nothing was moved")
-        old = rows_of(self._state, self._n, index)
+        old = self._rows(index)
         with np.errstate(over="ignore"):
             new = self._bound(old) + self._stretch * np.abs(d).max(axis=1)
         if (new > limit).any():
@@ -247,7 +258,7 @@ class JointBatch:
                 f"nothing was moved. Take a smaller step; {again}",
                 path,
             )
-        rest = self._bound(rows_of(self._state, self._n)).max(initial=0.0)
+        rest = self._bound(self._rows()).max(initial=0.0)
         return max(float(rest), float(new.max(initial=0.0)))
 
     def _bound(self, rows: Array) -> Array:

@@ -1,5 +1,7 @@
 """The compiled kernel gives the numbers of the readable one, however it is called."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -134,6 +136,24 @@ def test_same_numbers_while_contacts_come_and_go(both, make_law, seed, ledger):
     peak = max(np.abs(F).max() for F in results[0] if F.size)
     for one, other in zip(*results, strict=True):
         assert worst(one, other, peak) < SAME
+
+
+def test_a_state_moves_from_kernel_to_kernel(both, make_law, monkeypatch):
+    law = random_law(make_law, 1)
+    d = path(law, 1, 6)
+    batches = both(lambda: law.joints(N))
+    for batch in batches:
+        for step in d[:3]:
+            batch.update(step)
+    data = [pickle.dumps(batch) for batch in batches]
+    results = []
+    for name in ("numpy", "numba"):
+        monkeypatch.setenv("JOINTLAW_KERNEL", name)
+        for stored in data:
+            results.append([pickle.loads(stored).update(step)[0] for step in d[3:]])
+    peak = np.max(np.abs(results[0]))
+    for other in results[1:]:
+        assert worst(results[0], other, peak) < SAME
 
 
 def test_the_ledger_changes_no_number(both, make_law):

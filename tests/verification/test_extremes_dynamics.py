@@ -86,7 +86,7 @@ def swing(case, steps, n=4, share=0.95):
 
 # Bouncing without any loss: leapfrog misses where within a step the joint touches, and near the
 # critical step every bounce adds or takes some energy, at random. Seen to grow without bound at
-# 0.95, by 2 % in all at 0.5 and by 0.2 % at 0.2; any friction at all takes more than that.
+# 0.95; in 20 000 steps by 2 % at 0.5 and by 0.2 % at 0.2, where 1e6 steps add 1.4 %.
 LOSSLESS_IMPACT = "impact, no friction"
 
 
@@ -99,7 +99,7 @@ def test_energy_never_grows(case):
     assert growth <= (1e-3 if case == "Hertz, no friction" else 1e-9)
 
 
-def test_lossless_impacts_need_a_fifth_of_the_critical_step():
+def test_lossless_impacts_hardly_drift_at_a_fifth_of_the_critical_step():
     growth, reached = swing(LOSSLESS_IMPACT, 10_000, share=0.2)
     assert reached <= 1.0
     assert growth < 0.01

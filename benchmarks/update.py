@@ -249,7 +249,7 @@ def main() -> None:
     parser.add_argument("--space", action="store_true", help="motion in 3-D, not in one plane")
     parser.add_argument("--rounds", type=int, help="rounds over all cases (default 6, short 3)")
     parser.add_argument("--seconds", type=float, default=0.1, help="per case and round")
-    parser.add_argument("--longest", type=float, default=5.0, help="seconds that one run may take")
+    parser.add_argument("--longest", type=float, default=1.0, help="seconds that one run may take")
     parser.add_argument("--memory", type=float, default=1.0, help="GB that one batch may take")
     parser.add_argument("--json", help="file to write the numbers to")
     args = parser.parse_args()

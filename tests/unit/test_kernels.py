@@ -183,6 +183,19 @@ def test_same_numbers_for_one_joint(both, make_law, seed):
 
 
 @pytest.mark.parametrize("seed", [0, 1])
+def test_a_batch_and_its_joints_agree_to_the_bit(make_law, monkeypatch, seed):
+    law = random_law(make_law, seed)
+    monkeypatch.setenv("JOINTLAW_KERNEL", "numba")
+    d = path(law, seed, 10)
+    batch, joint = law.joints(N), law.joint()
+    for step in d:
+        F, C = batch.update(step)
+        alone = joint.update(step[N - 2])
+        np.testing.assert_array_equal(F[N - 2], alone[0])
+        np.testing.assert_array_equal(C[N - 2], alone[1])
+
+
+@pytest.mark.parametrize("seed", [0, 1])
 def test_threads_change_no_bit(make_law, monkeypatch, seed):
     law = random_law(make_law, seed)
     monkeypatch.setattr(engine, "SERIAL", 0)

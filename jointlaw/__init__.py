@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from . import closed_form, presets
 from .asperity import Asperity
+from .batch import JointBatch
 from .heights import GammaHeights, Heights
-from .joint import Joint, JointBatch
+from .joint import Joint
 from .law import JointLaw
 from .orientation import Orientation
 from .paths import PathError, closure_test, direct_shear

@@ -12,10 +12,10 @@ import numpy as np
 
 from . import __version__, presets
 from ._command import add_command
+from .batch import JointBatch
 from .cli_export import add_export_command
 from .cli_laboratory import add_closure_command, add_shear_command
 from .figures.command import add_figures_command
-from .joint import JointBatch
 from .law import JointLaw
 from .measurements.fit_command import add_fit_command
 from .measurements.scan_command import add_scan_command

@@ -22,8 +22,9 @@ from .orientation import Facets, Orientation
 from .resolution import Resolution, resolve
 
 if TYPE_CHECKING:
+    from .batch import JointBatch
     from .engine import Engine
-    from .joint import Joint, JointBatch
+    from .joint import Joint
 
 _SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
 _NOTHING = 1e-140  # m, and Pa/m: below it squares underflow
@@ -143,7 +144,7 @@ class JointLaw:
 
         Without `ledger` dissipated energy is not added up, which is faster.
         """
-        from .joint import JointBatch
+        from .batch import JointBatch
 
         return JointBatch(self, n, ledger)
 

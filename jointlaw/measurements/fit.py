@@ -24,6 +24,9 @@ PRIOR_SHARE = 0.05  # of the variance: up to here the data, not the priors, deci
 # Standard error of ln(stress) per doubling of the stress beyond the data, from curves of other
 # laws: power laws of exponent 1.5 to 6 and Gaussian heights, lower half fitted, upper predicted
 MODEL_ERROR = 0.03
+# The same per unit of `Fit.wander`, from hyperbolas and logarithms (benchmarks/held_out.py)
+WANDER_ERROR = 6.0
+WANDERS = 1.5  # of the expected scatter: from this `Fit.wander` on the law is not the rock
 WIDEST = math.log(2) / 1.96  # standard error of a logarithm: a factor of 2 either way
 
 
@@ -135,6 +138,25 @@ class Fit:
         return self.solution.noise
 
     @property
+    def bends_otherwise(self) -> tuple[bool, ...]:
+        """Whether each closure curve shows that the rock does not close as the law does."""
+        pairs = zip(self.wander, self._closures(), strict=True)
+        return tuple(wander > WANDERS * curve.expected.share for wander, curve in pairs)
+
+    @cached_property
+    def wander(self) -> tuple[float, ...]:
+        """Misfit that neighbouring points of each closure curve share, as a part of the stress.
+
+        The root of the mean product of neighbouring residuals, 0 where that is negative: scatter
+        averages out of it, a curve that bends otherwise than the law does not.
+        """
+        found = []
+        for number, curve in enumerate(self._closures(), 1):
+            r = curve.residuals(self.parameters, self._seating(number), self.problem.settings)
+            found.append(math.sqrt(max(float(np.mean(r[1:] * r[:-1])), 0.0)))
+        return tuple(found)
+
+    @property
     def covariance(self) -> Array:
         """Covariance (p, p) of the fitted parameters in SI units, in the order of `free`."""
         slope = [scale_of(name).slope(self.parameters[name]) for name in self.free]
@@ -181,7 +203,8 @@ class Fit:
 
         closure: in m, as in `predict`; level: probability; measured: whether the band is for a
         point yet to be measured, noise included, or for the curve itself. Beyond the largest
-        fitted stress it widens by `MODEL_ERROR` per doubling, for the law is not the rock.
+        fitted stress it widens per doubling by `MODEL_ERROR`, for the law is not the rock, and
+        by `WANDER_ERROR` times `wander`, where the points say so themselves.
         """
         u = np.atleast_1d(np.asarray(closure, float))
         name = "seating" if curve == 1 else f"seating_{curve}"
@@ -200,7 +223,9 @@ class Fit:
             above = log_stress(v, v[name] + u + step, self.problem.settings)
             variance = variance + noise.sigma((above - centre) / step) ** 2
         beyond = np.maximum(centre - np.log(self._closures()[curve - 1].stress.max()), 0.0)
-        variance = variance + (MODEL_ERROR * beyond / math.log(2)) ** 2
+        wander = self.wander[curve - 1]
+        model_error = math.hypot(MODEL_ERROR, WANDER_ERROR * wander)
+        variance = variance + wander**2 + (model_error * beyond / math.log(2)) ** 2
         reach = self._quantile(level) * np.sqrt(variance)
         return np.exp(centre - reach), np.exp(centre + reach)
 

@@ -80,4 +80,12 @@ def _curve(fit: Fit, curve: ClosureCurve, number: int) -> list[str]:
             f"| {1e6 * u:.4g} | {stress / 1e6:.4g} | {lo / 1e6:.4g} to {hi / 1e6:.4g} | "
             f"{rise / (2 * step) / 1e9:.4g} |"
         )
+    if fit.bends_otherwise[number - 1]:
+        lines += [
+            "",
+            f"**This curve does not bend as the law does**: neighbouring points miss it together, "
+            f"by {100 * fit.wander[number - 1]:.2g} % of the stress. Between the points use it "
+            "with that error; beyond them trust neither the curve nor its band: a hyperbola (mated "
+            "joints) or a logarithm (unmated ones) may follow this rock better.",
+        ]
     return lines

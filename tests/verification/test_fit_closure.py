@@ -62,6 +62,17 @@ def test_one_curve_cannot_fix_heights_and_says_so(grimsel):
     assert not profile.closed  # eight points alone leave alpha open
 
 
+def test_a_rock_that_bends_otherwise_is_called_so(law):
+    stress = np.geomspace(0.3e6, 10e6, 16)
+    hyperbola = 1e-4 * stress / (stress + 1e6)  # closes fully: no asperities do that
+    fit = fit_closure(stress, hyperbola - hyperbola[0])
+    assert fit.bends_otherwise == (True,)
+    assert "does not bend as the law does" in fit.report()
+    y = law.closure(stress)
+    own = fit_closure(stress * (1 + 0.01 * np.random.default_rng(0).standard_normal(16)), y - y[0])
+    assert own.bends_otherwise == (False,)
+
+
 def test_known_parameters_are_covered_by_their_intervals(law):
     """1 % noise, alpha known from a scan: 95 % intervals hold the truth in 45 to 49 of 50 draws."""
     stress = np.geomspace(0.25e6, 10e6, 30)

@@ -1,0 +1,97 @@
+"""Stresses that a fit did not see: error and band of the joint law on curves made by other laws.
+
+    python benchmarks/held_out.py --draws 40
+
+Closure tests of 16 points from 0.3 to 10 MPa with 1 % noise, fitted up to 5 MPa. For each kind of
+rock: median over the draws of the absolute error at 10 MPa of the joint law, of the power law and
+of Barton-Bandis, the draws whose 95 % band of the joint law covers the stress there, and those
+whose report says that the rock does not close as the law does.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+
+import numpy as np
+
+import jointlaw as jl
+from jointlaw import baselines
+from jointlaw._progress import track
+
+STRESS = np.geomspace(0.3e6, 10e6, 16)  # Pa
+LIMIT = 5e6  # Pa
+Rng = np.random.Generator
+
+
+def power_law(rng: Rng) -> np.ndarray:
+    """Exponent of 1.5 to 6, closure of 0.1 mm at 10 MPa."""
+    return 1e-4 * (STRESS / 10e6) ** (1 / rng.uniform(1.5, 6.0))
+
+
+def hyperbola(rng: Rng) -> np.ndarray:
+    """Barton-Bandis of 0.1 mm, half closed at 0.3 to 3 MPa."""
+    half = 10 ** rng.uniform(5.5, 6.5)
+    return 1e-4 * STRESS / (STRESS + half)
+
+
+def semi_logarithm(rng: Rng) -> np.ndarray:
+    """Closure that rises with the logarithm of the stress (unmated joints)."""
+    return rng.uniform(1e-5, 5e-5) * np.log(STRESS / 0.1e6)
+
+
+def asperities(rng: Rng) -> np.ndarray:
+    """The joint law itself, alpha of 1 to 8, density over a decade and a half."""
+    law = jl.JointLaw(
+        orientation=jl.Orientation(3.0),
+        asperity=jl.Asperity.hertz_mindlin(G=20e9, nu=0.25, R=1e-3, mu=0.6),
+        heights=jl.GammaHeights(rng.uniform(1, 8), 1e-5, 0.0, "individual"),
+        asperity_density=10 ** rng.uniform(5.0, 6.5),
+    )
+    return np.asarray(law.closure(STRESS))
+
+
+ROCKS: dict[str, Callable[[Rng], np.ndarray]] = {
+    "joint law": asperities,
+    "power law": power_law,
+    "hyperbola": hyperbola,
+    "semi-logarithm": semi_logarithm,
+}
+
+
+def draw(rock: str, seed: int) -> tuple[dict[str, float], bool, bool]:
+    """Errors at the largest stress, whether the band covers it, and whether the fit warns."""
+    rng = np.random.default_rng(seed)
+    closure = ROCKS[rock](rng)
+    noisy = STRESS * (1 + 0.01 * rng.standard_normal(STRESS.size))
+    noisy[-1] = STRESS[-1]  # judged by the curve, not by one draw of the noise
+    found = baselines.compare(noisy, closure - closure[0], LIMIT)
+    low, high = found.band
+    errors = {name: float(error[-1]) for name, error in found.errors.items()}
+    fitted = jl.fit_closure(noisy[STRESS <= LIMIT], (closure - closure[0])[STRESS <= LIMIT])
+    return errors, bool(low[-1] <= STRESS[-1] <= high[-1]), fitted.bends_otherwise[0]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--draws", type=int, default=40, help="draws per kind of rock (40)")
+    parser.add_argument("--workers", type=int, default=None, help="processes (all cores)")
+    args = parser.parse_args()
+    print("| rock | jointlaw | power law | Barton-Bandis | covered | warned |")
+    print("|---|---:|---:|---:|---:|---:|")
+    with ProcessPoolExecutor(args.workers) as pool:
+        for rock in ROCKS:
+            draws = pool.map(partial(draw, rock), range(args.draws))
+            found = list(track(draws, rock, args.draws))
+            worst = [
+                f"{100 * np.median([abs(e[name]) for e, _, _ in found]):.1f} %"
+                for name in found[0][0]
+            ]
+            covered, warned = (sum(row[k] for row in found) for k in (1, 2))
+            print(f"| {rock} | {' | '.join(worst)} | {covered}/{len(found)} | {warned} |")
+
+
+if __name__ == "__main__":
+    main()

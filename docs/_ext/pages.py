@@ -5,7 +5,7 @@ from pathlib import Path
 
 
 def read(app, name, source):
-    """Gallery scripts are linked as scripts; `page?` in a list of pages is one that may not exist."""
+    """Links to gallery scripts lead to their pages; `page?` in a list is one that may not exist."""
     text = re.sub(r"\]\(gallery/(plot_\w+)\.py\)", r"](examples/\1.rst)", source[0])
     for page in re.findall(r"^([\w-]+)\?$", text, re.MULTILINE):
         there = (Path(app.srcdir) / f"{page}.md").exists()

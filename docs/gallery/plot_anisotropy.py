@@ -35,7 +35,9 @@ for psi in azimuth:
 friction = np.array(friction)
 
 # %%
-figure, axis = plt.subplots(subplot_kw={"projection": "polar"}, figsize=(6, 6), layout="constrained")
+figure, axis = plt.subplots(
+    subplot_kw={"projection": "polar"}, figsize=(6, 6), layout="constrained"
+)
 around = np.concatenate([azimuth, azimuth[1:] + np.pi])  # half a turn gives the same joint
 for k, shear in enumerate(shears):
     values = np.concatenate([friction[:, k], friction[1:, k]])

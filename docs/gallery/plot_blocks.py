@@ -7,6 +7,7 @@ A block is pushed along its bed and lets go: pymunk moves it, every contact forc
 
 import matplotlib.pyplot as plt
 
+import jointlaw as jl
 from dem_demo import Simulation, parse, run
 
 # %%
@@ -52,20 +53,24 @@ record, summary = run(Simulation(parse(SCENE)))
 print(f"{summary['steps']} steps, energy balanced to {summary['largest_energy_error']:.0e}")
 
 # %%
-# The record holds the motion of all blocks, the energies, and the joints that the scene watches. The
-# law alone, on the same path, draws the same curve: the blocks add nothing of their own.
+# The record holds the motion of all blocks, the energies, and the joints that the scene watches.
+# A direct shear test of the law alone, on the same path, draws the same curve: the blocks add
+# nothing of their own.
 
 slid = record.column("block: slid_m")
 shear, normal = record.column("block: shear_Pa"), record.column("block: normal_Pa")
 closure = record.column("block: closure_m")
+alone = jl.direct_shear(record.scene.laws["replica"].joint(), slid[1:], normal[0], steps=1)
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
 left.plot(slid * 1e3, shear / 1e3, label="shear")
+left.plot(slid * 1e3, alone.shear_stress / 1e3, "k:", label="shear, the law alone")
 left.plot(slid * 1e3, normal / 1e3, "--", color="0.5", label="normal")
 left.set_xlabel("shear displacement (mm)")
 left.set_ylabel("stress on the joint (kPa)")
-left.legend()
+left.legend(loc="center left")
 right.plot(slid * 1e3, (closure[0] - closure) * 1e3, color="C2")
+right.plot(slid * 1e3, (alone.closure[0] - alone.closure) * 1e3, "k:")
 right.set_xlabel("shear displacement (mm)")
 right.set_ylabel("dilation (mm)")
 plt.show()

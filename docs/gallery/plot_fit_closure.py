@@ -2,7 +2,8 @@ r"""
 Fit a measured closure curve
 ============================
 
-Eight points of a fracture in Grimsel granodiorite, fitted; five more, at twice the stress, predicted.
+Eight points of a fracture in Grimsel granodiorite, fitted; five more, up to twice the stress,
+predicted.
 """
 
 import matplotlib.pyplot as plt
@@ -11,8 +12,8 @@ import numpy as np
 import jointlaw as jl
 
 # %%
-# The curve comes with the package (Vogler et al. 2018). Only the loading up to 5.3 MPa is fitted, and
-# the fit says what eight points leave open.
+# The curve comes with the package (Vogler et al. 2018). Only the loading up to 5.3 MPa is fitted,
+# and the fit says what eight points leave open.
 
 stress, closure, stress_back, closure_back = jl.first_loading(
     *jl.datasets.load("grimsel_vd1_closure")

@@ -13,8 +13,8 @@ import matplotlib.pyplot as plt
 import jointlaw as jl
 
 # %%
-# The critical slip distance D_c is the field's: the sliding that it takes to renew the population of
-# contacts. Without it the joint rises for ever.
+# The critical slip distance D_c is the field's: the sliding that it takes to renew the population
+# of contacts. Without it the joint rises for ever.
 
 kept = replace(jl.presets.load("biegel-rough"), plane=0.0, resolution="fine")
 renewed = replace(kept, critical_slip=2e-6)

@@ -31,13 +31,15 @@ stress = law.normal_stress(closure)
 at_10_MPa = law.closure(10e6)
 
 # %%
-# A joint has memory. Closed to 10 MPa, its tangent is its stiffness in all directions.
+# A joint has memory. ``C`` is the tangent of the step taken: closing gives the normal stiffness, a
+# first bit of shear of the closed joint its shear stiffness (``trial`` leaves the joint alone).
 
 joint = law.joint()
 F, C = joint.update([at_10_MPa, 0.0, 0.0])
+_, sheared = joint.trial([0.0, 1e-6 * at_10_MPa, 0.0])
 print(f"closure at 10 MPa    {at_10_MPa * 1e6:.3f} µm")
 print(f"normal stiffness     {C[0, 0] / 1e12:.1f} MPa/µm")
-print(f"shear stiffness      {C[1, 1] / 1e12:.1f} MPa/µm")
+print(f"shear stiffness      {sheared[1, 1] / 1e12:.1f} MPa/µm")
 print(f"asperities in touch  {law.contacts(at_10_MPa) / 1e6:.0f} per mm²")
 
 # %%

@@ -13,7 +13,7 @@ import jointlaw as jl
 # %%
 # An implicit code asks: which displacement of the block balances the load? ``trial`` answers
 # without moving the joint, with traction and consistent tangent; ``update`` keeps the step that
-# converged. The block (1 m² of joint below and above it) may move in all three directions. Its upper
+# converged. The block (1 m² of joint below and above it) may move in all directions. Its upper
 # joint is upside down: motion of the block away from one is closure of the other.
 
 law = jl.presets.load("biegel-rough")

@@ -8,9 +8,7 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib import pyplot
-from pages import ROOT, text
-
-import jointlaw as jl
+from pages import ROOT
 
 GALLERY = {path.stem.removeprefix("plot_"): path for path in ROOT.glob("docs/gallery/plot_*.py")}
 
@@ -117,12 +115,3 @@ def test_gallery_is_in_order_and_complete():
     settings = (ROOT / "docs" / "conf.py").read_text(encoding="utf-8")
     order = settings.split("ORDER = (")[1].split(")")[0]
     assert sorted(re.findall(r"\w+", order)) == sorted(GALLERY)
-
-
-def test_api_page_names_everything_public():
-    page = text("docs/api.md")
-    modules = {"presets", "closed_form", "baselines", "datasets", "unloading"}
-    for name in set(jl.__all__) - modules:
-        assert f":: {name}\n" in page, f"docs/api.md lacks {name}"
-    for name in modules:
-        assert f"{name}\n" in page

@@ -53,7 +53,7 @@ html_copy_source = False
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
-autodoc_type_aliases = {"ArrayLike": "ArrayLike", "Index": "Index", "Out": "Out"}
+autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Index", "Out")}
 python_use_unqualified_type_names = True
 
 ORDER = (

@@ -63,6 +63,13 @@ def process(app, what, name, obj, options, lines):
     lines[:] = convert(lines)
 
 
+def process_signature(app, what, name, obj, options, signature, returns):
+    """Names of our types within others, where Sphinx writes its own wrapper about them."""
+    wrapper = re.compile(r"TypeAliasForwardRef\('(\w+)'\)")
+    return tuple(text and wrapper.sub(r"\1", text) for text in (signature, returns))
+
+
 def setup(app):
+    app.connect("autodoc-process-signature", process_signature)
     app.connect("autodoc-process-docstring", process)
     return {"parallel_read_safe": True}

@@ -6,6 +6,8 @@ They are written to be read in a terminal: `code` in single backticks, plain for
 
 import re
 
+from sphinx.util.inspect import TypeAliasForwardRef
+
 PARAMETER = re.compile(r"(\w+(?:, \w+)*): (.*)")
 CODE = re.compile(r"`+([^`]+)`+")
 
@@ -63,13 +65,7 @@ def process(app, what, name, obj, options, lines):
     lines[:] = convert(lines)
 
 
-def process_signature(app, what, name, obj, options, signature, returns):
-    """Names of our types within others, where Sphinx writes its own wrapper about them."""
-    wrapper = re.compile(r"TypeAliasForwardRef\('(\w+)'\)")
-    return tuple(text and wrapper.sub(r"\1", text) for text in (signature, returns))
-
-
 def setup(app):
-    app.connect("autodoc-process-signature", process_signature)
+    TypeAliasForwardRef.__repr__ = lambda self: self.name  # as in dict[str, Array]
     app.connect("autodoc-process-docstring", process)
     return {"parallel_read_safe": True}

@@ -172,12 +172,9 @@ def test_history_survives_a_gap():
     assert sim.joints._slots == slots
 
 
-def test_embed_page_runs_and_is_short():
-    """The worked example of docs/embed.md: under 60 lines of user code, and it slides."""
+def test_embed_page_is_short():
+    """The worked example of docs/embed.md, which runs in test_docs_code.py: under 60 lines."""
     page = Path(__file__).parents[2] / "docs" / "embed.md"
     code = "\n".join(re.findall(r"```python\n(.*?)```", page.read_text(), re.S))
     lines = [s for s in code.splitlines() if s.strip() and not s.strip().startswith("#")]
     assert len(lines) < 60
-    space = {}
-    exec(compile(code, str(page), "exec"), space)
-    assert space["slid"] > 1e-3

@@ -1,0 +1,74 @@
+"""Site of the documentation: `python -m sphinx -W --keep-going docs docs/_build/html`.
+
+Needs the extra `docs` and no network. The pages are Markdown that also reads well on GitHub; the
+gallery is run while the site is built.
+"""
+
+import os
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+from sphinx_gallery.sorting import ExplicitOrder
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE / "_ext"), str(HERE.parent)]
+os.environ.setdefault("MPLBACKEND", "Agg")
+
+import jointlaw  # noqa: E402
+
+# One script within the site that draws letters as outlines: formulas need neither network nor fonts
+MATHJAX = Path(find_spec("sphinx-mathjax-offline").origin).parent / "static/mathjax/tex-svg-full.js"
+
+project = "jointlaw"
+author = "The jointlaw developers"
+project_copyright = author
+version = release = jointlaw.__version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx_gallery.gen_gallery",
+    "sphinx.ext.mathjax",
+    "docstrings",
+    "pages",
+]
+exclude_patterns = ["_build", "gallery", "_ext"]
+suppress_warnings = [
+    "config.cache",  # the settings of the gallery hold objects
+]
+nitpicky = True  # a reference that leads nowhere is an error
+nitpick_ignore_regex = [(r"py:.*", r".*")]  # types of numpy and Python live on other sites
+
+myst_enable_extensions = ["dollarmath", "amsmath"]
+myst_heading_anchors = 3
+
+html_theme = "furo"
+html_title = f"jointlaw {release}"
+html_static_path = ["_static", str(MATHJAX)]
+html_css_files = ["site.css"]
+mathjax_path = MATHJAX.name
+html_show_sourcelink = False
+html_copy_source = False
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Index", "Out")}
+python_use_unqualified_type_names = True
+
+ORDER = (
+    "first_curve", "closure_hysteresis", "direct_shear", "cyclic_shear", "anisotropy",
+    "large_shear", "fit_closure", "from_scan", "table", "batch", "blocks", "newton", "snapshot",
+)  # fmt: skip
+sphinx_gallery_conf = {
+    "examples_dirs": "gallery",
+    "gallery_dirs": "examples",
+    "within_subsection_order": ExplicitOrder([f"plot_{name}.py" for name in ORDER]),
+    "remove_config_comments": True,
+    "download_all_examples": False,
+    "show_memory": False,
+    "write_computation_times": False,
+    "min_reported_time": 5,
+    "show_signature": False,
+    "abort_on_example_error": True,
+}

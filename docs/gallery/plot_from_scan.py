@@ -1,0 +1,46 @@
+r"""
+From a scanned surface to a law
+===============================
+
+Heights and directions of asperities off a scan, with errors, and the joint that follows.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import jointlaw as jl
+
+# %%
+# A made-up scan with known asperities stands for yours: composite heights in m, 20 µm apart.
+
+true = jl.Orientation(3.0, 0.5, 0.1)
+z = jl.synthetic_surface(true, jl.GammaHeights(4.0, 10e-6), spacing=20e-6, noise=0.3e-6)
+scan = jl.from_surface(z, spacing=20e-6)
+for name in ("a", "b", "c", "alpha", "beta"):
+    low, high = scan.interval(name)
+    print(f"{name:6s} {scan.parameters[name]:.3g}, 95 % interval {low:.3g} to {high:.3g}")
+
+# %%
+# A scan knows shape, not stiffness: that is the rock's, by Hertz.
+
+law = scan.law(jl.Asperity.hertz_mindlin(G=20e9, nu=0.25, R=1e-3, mu=0.6))
+
+# %%
+figure, axes = plt.subplots(1, 3, figsize=(11, 3.6), layout="constrained")
+extent = 1e3 * 20e-6 * np.array([0, z.shape[1], 0, z.shape[0]])
+image = axes[0].imshow(z * 1e6, extent=extent, origin="lower", cmap="cividis")
+figure.colorbar(image, ax=axes[0], label="height (µm)", shrink=0.8)
+axes[0].set(xlabel="along rows (mm)", ylabel="along columns (mm)", title="scan")
+slope = np.linalg.norm(scan.asperities.slope.reshape(-1, 2), axis=1)
+theta = np.degrees(np.arctan(slope))
+axes[1].hist(theta, bins=30, density=True, alpha=0.4, label="facets")
+x = np.linspace(0, 90 / scan.orientation.a, 100)
+ring = np.linspace(0, np.pi, 16, endpoint=False)
+density = scan.orientation.density(np.radians(x)[:, None], ring).mean(axis=1)
+axes[1].plot(x, 2 * np.pi * np.sin(np.radians(x)) * density * np.pi / 180, label="Eq. 14, fitted")
+axes[1].set(xlabel="inclination (°)", ylabel="density (1/°)", title="directions")
+axes[1].legend()
+u = np.linspace(0, law.closure(20e6), 100)
+axes[2].plot(u * 1e6, law.normal_stress(u) / 1e6)
+axes[2].set(xlabel="closure (µm)", ylabel="normal stress (MPa)", title="the joint")
+plt.show()

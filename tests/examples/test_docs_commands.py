@@ -1,0 +1,61 @@
+"""The commands of the docs: short ones run, all of them exist."""
+
+import re
+import shlex
+
+import numpy as np
+import pytest
+from pages import PAGES, ROOT, commands, text
+
+import dem_demo.cli
+import jointlaw as jl
+import jointlaw.cli
+
+# by what they begin with: too long for here, and what runs the same instead
+LONG = {
+    "jointlaw figures --out": "tests/verification/test_paper_figures.py",
+    "jointlaw figures 14 15": "tests/verification/test_paper_figures.py",
+    "jointlaw figures --claims": "tests/verification/test_paper_docs.py",
+    "jointlaw fit grimsel_vd1_closure --out": "the fit with --up-to, which does more",
+    "jointlaw fit grimsel_vd1_closure --set": "the fit with --up-to, which does more",
+    "python -m dem_demo tilt": "tests/verification/test_blocks_tilt.py",
+}
+MINE = re.compile(r"(jointlaw|python -m (?:jointlaw|dem_demo)) ")
+FOUND = sorted({line for page in PAGES for line in commands(page) if MINE.match(line)})
+
+
+def is_long(line):
+    return any(line.startswith(beginning) for beginning in LONG)
+
+
+@pytest.fixture
+def _files_that_the_reader_has():
+    z = jl.synthetic_surface(jl.Orientation(3.0), jl.GammaHeights(4.0, 10e-6), spacing=20e-6)
+    np.savetxt("scan.csv", z * 1e6, delimiter=",")
+
+
+@pytest.mark.usefixtures("_files_that_the_reader_has")
+@pytest.mark.parametrize("line", [line for line in FOUND if not is_long(line)])
+def test_short_commands_run(line, tmp_path):
+    words = shlex.split(line)
+    words = words[words.index("-m") + 1 :] if "-m" in words else words
+    main = {"jointlaw": jointlaw.cli.main, "dem_demo": dem_demo.cli.main}[words[0]]
+    assert main(words[1:]) == 0
+    if "--out" in words:
+        assert any((tmp_path / words[words.index("--out") + 1]).iterdir())
+
+
+def test_long_commands_are_still_printed():
+    for beginning in LONG:
+        assert any(line.startswith(beginning) for line in FOUND), beginning
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_files_that_commands_name_exist(page):
+    named = re.findall(r"(?:python|pytest) ((?:docs|benchmarks|tests)/?[\w/.]*)", text(page))
+    for name in named:
+        assert (ROOT / name).exists(), f"{page} names {name}"
+    for command in re.findall(r"`jointlaw (\w+)", text(page)):
+        with pytest.raises(SystemExit) as stop:
+            jointlaw.cli.main([command, "--help"])
+        assert stop.value.code == 0

@@ -5,6 +5,7 @@ from itertools import combinations
 import numpy as np
 
 import jointlaw as jl
+from jointlaw.engine import NumbaEngine, engine
 
 SCALE = 2e-6  # m: closure range and asperity height of the ordinary law
 ORDINARY = {
@@ -52,6 +53,10 @@ def build(**changes):
         critical_slip=p["critical_slip"],
         resolution=p["resolution"],
     )
+
+
+# the numpy kernel takes 20 times as long for small batches: long runs are shorter there
+COMPILED = isinstance(engine(build()), NumbaEngine)
 
 
 def name(changes):

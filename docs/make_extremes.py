@@ -178,7 +178,7 @@ def main():
             ["case", "of the critical step", "steps", "above the first energy",
              "growth after a tenth", "reach / bound"], dynamics_rows()),
         "impact": lambda: table(
-            ["of the critical step", "looks at an impact", "one impact, bare law",
+            ["of the critical step", "samples of an impact", "one impact, bare law",
              "one impact, joint", "1e6 steps, bare law", "1e6 steps, joint"], impact_rows()),
         "drift": lambda: table(
             ["law", "amplitude / closure", "cycles to shake down", "F, of its peak",

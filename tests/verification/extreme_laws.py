@@ -18,6 +18,7 @@ HEIGHTS = {
     "printed, population": (*_ROUGH, "population"),
     "printed, individual": (*_ROUGH, "individual"),
     "1e6 times as wide": (3.82, 1.15, 2e-6, "individual"),
+    "1e-6 times as wide": (3.82, 1.15e-12, 2e-12, "individual"),
     "alpha = -0.99": (-0.99, 1.15e-6, 2e-6, "individual"),
     "alpha = -0.99, overlap 0": (-0.99, 1.15e-6, 0.0, "individual"),
     "alpha = -0.5, overlap 0": (-0.5, 1.15e-6, 0.0, "population"),

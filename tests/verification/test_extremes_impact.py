@@ -59,7 +59,7 @@ def deepest(eta, load=0.0):
 
 def gains(contact, eta, share, n=400):
     """Change of energy, of itself, of one impact at each of n phases of the step; and of each
-    phase the places, as shares of a step, of the first and the last look at the contact."""
+    phase the places, as shares of a step, of the first and the last sample in contact."""
     dt = share * 2.0 / np.sqrt((1.0 + eta) * deepest(eta) ** eta)
     contact, v = contact(n, eta), np.ones(n)
     x = -(np.arange(n) + 0.5) / n * dt
@@ -108,7 +108,7 @@ def test_joints_gain_what_the_bare_power_law_gains(eta, share):
 @pytest.mark.parametrize("share", [0.95, 0.7, 0.3, 0.05])
 def test_impact_on_a_linear_contact_in_closed_form(share):
     """In contact leapfrog keeps v- v+ + omega^2 x^2 exactly, and free flight keeps v^2. With the
-    first look at the contact a part u of a step past touch, and the last a part w before the end,
+    first sample in contact a part u of a step past touch, and the last a part w before the end,
     E_out/E_in = [1 - 4 share^2 u (1 - u)] / [1 - 4 share^2 w (1 - w)], at most 1/(1 - share^2)."""
     gained, u, w = gains(Flat, 0.0, share)
     lost = [1.0 - 4.0 * share**2 * s * (1.0 - s) for s in (u, w)]

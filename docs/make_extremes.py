@@ -1,6 +1,6 @@
 """Regenerate the tables of docs/extremes.md by running the stability suite at full length.
 
-`python docs/make_extremes.py [PART ...]`: all parts take about a quarter of an hour on one core. A part is
+`python docs/make_extremes.py [PART ...]`: all parts take about ten minutes on one core. A part is
 what stands between its two marks in the page. The measures are those of
 tests/verification/test_extremes_*.py.
 """

@@ -8,6 +8,11 @@ from scipy import special
 from ._checks import Array
 from .heights import HeightDistribution, Heights
 
+_CLOSE = 1e-15  # of the heights: this near the point of contact their density is a power
+_SAME = 1e-9  # breakpoints closer than that are one
+_APART = 0.4  # least distance of a halving from a breakpoint, in halvings
+_SMOOTH = 0.999  # a power that needs no help
+
 
 def factor(y: Array, eta: float, heights: HeightDistribution, beyond: Array) -> tuple[Array, Array]:
     """S and D S at y >= 0, infinity included; `beyond` holds the breakpoints above the overlap."""
@@ -27,6 +32,17 @@ def factor(y: Array, eta: float, heights: HeightDistribution, beyond: Array) -> 
     return S, DS
 
 
+def rise(heights: HeightDistribution) -> float:
+    """p of S ~ y^p where the density is infinite at the very point of contact; 0 elsewhere."""
+    r0, top = heights.overlap, float(heights.breakpoints()[-1])
+    if heights.cdf(r0) > 0:
+        return 0.0
+    y = max(top - r0, 0.0) * _CLOSE
+    touching = float(heights.cdf(r0 + y))
+    power = y * float(heights.pdf(r0 + y)) / touching if touching > 0 else 1.0
+    return power if power < _SMOOTH else 0.0
+
+
 def _individual(
     y: Array, eta: float, heights: HeightDistribution, beyond: Array
 ) -> tuple[Array, Array]:
@@ -40,12 +56,19 @@ def _individual(
     if isinstance(heights, Heights) and heights.is_histogram:
         return _steps(y, 1 + eta, heights, beyond), _steps(y, eta, heights, beyond)
     first = max(float(heights.breakpoints()[0]) - r0, 0.0)  # no asperity, and no panel, below
+    rising = rise(heights)
+    if rising:  # its quantiles may lie decades below the halvings
+        beyond = beyond[beyond > beyond[-1] * _CLOSE]
     edges = _panels(r0, beyond)
     x, w = np.polynomial.legendre.leggauss(16)
     x, w = 0.5 * (x + 1), 0.5 * w
     widths = np.diff(edges)
     nodes = edges[:-1, None] + widths[:, None] * x
     mass = widths[:, None] * w * heights.pdf(r0 + nodes)
+    if rising:  # in the panels next to the point of contact the density is a power
+        xj, wj = special.roots_jacobi(16, 0.0, rising - 1)
+        nodes[0] = edges[1] * 0.5 * (xj + 1)
+        mass[0] = heights.cdf(r0 + edges[1]) * wj / wj.sum()
     panel = np.searchsorted(edges, y, side="left") - 1  # edges[panel] < y
     panel = np.minimum(panel, len(widths))  # beyond the last edge every panel is an ordinary one
     start = edges[np.maximum(panel - 1, 0)]
@@ -70,6 +93,9 @@ def _individual(
         reached = np.flatnonzero((span > 0) & (panel < len(widths)))  # H(0) may be infinite
         s = start[reached, None] + span[reached, None] * xj
         far[reached] += (span * share**p)[reached] * (heights.pdf(r0 + s) @ wj)
+        if rising:
+            near = np.flatnonzero((y > 0) & (panel < 2))
+            far[near] = heights.cdf(r0 + y[near]) * rising * special.beta(rising, p + 1)
         results.append(far)
     return results[0], results[1]
 
@@ -89,10 +115,16 @@ def _steps(y: Array, p: float, heights: HeightDistribution, beyond: Array) -> Ar
 
 
 def _panels(r0: float, beyond: Array) -> Array:
-    """Panel edges in s = r - r0: the breakpoints, and halvings towards r = 0 (H may blow up)."""
+    """Panel edges in s = r - r0: the breakpoints, and halvings towards r = 0 (H may blow up).
+
+    A panel far narrower than the one below it would bring the end singularity of (1 - s/y)^p near
+    to an ordinary rule: no two breakpoints that differ by rounding, no halving next to one.
+    """
     if beyond.size == 0:
         return np.array([0.0, 1.0])
-    top = r0 + beyond[-1]
-    halvings = top * 0.5 ** np.arange(1.0, 50.0)
-    edges = np.concatenate([[0.0], beyond, halvings[halvings > r0] - r0])
+    points = beyond[np.diff(beyond, prepend=0.0) > _SAME * beyond]
+    halvings = (r0 + beyond[-1]) * 0.5 ** np.arange(1.0, 50.0)
+    halvings = halvings[halvings > r0]
+    away = np.abs(np.log2(halvings[:, None] / (r0 + points))).min(axis=1)
+    edges = np.concatenate([[0.0], points, halvings[away > _APART] - r0])
     return np.unique(edges)

@@ -52,7 +52,7 @@ class Packed(NamedTuple):
     facet: Array  # (M, 17): m, s, t, n (3 each, 0 where the plane drops one), then the above
     depth: Array  # (M, D + 1, 3): zeta, force and slope there, infinity as the largest float
     curve: Array  # (4 cells,): coefficients of S
-    scalars: Array  # lam, mu, critical slip, eta, scale of the curve
+    scalars: Array  # lam, mu, critical slip, eta, scale and rise of the curve
 
 
 def pack(k: Tables, compliance: Array) -> Packed:
@@ -65,7 +65,8 @@ def pack(k: Tables, compliance: Array) -> Packed:
     facet[:, _REST:] = np.stack(rest, axis=-1)
     largest = np.finfo(float).max
     depth = np.minimum(np.stack([k.depth, k.depth_force, k.depth_slope], axis=-1), largest)
-    scalars = np.array([k.lam, k.mu, k.critical_slip, k.curve.eta, k.curve.scale])
+    virgin = (k.curve.eta, k.curve.scale, k.curve.rise)
+    scalars = np.array([k.lam, k.mu, k.critical_slip, *virgin])
     return Packed(facet, depth, k.curve.S.ravel().copy(), scalars)
 
 
@@ -100,7 +101,7 @@ def _fetch(place, piece, L, table):
 
 
 @_jit
-def _virgin(desk, place, piece, after, L, curve, eta, scale):
+def _virgin(desk, place, piece, after, L, curve, eta, scale, rise):
     """Phi and Phi' of the row of y: three loops, so that only the look-up itself is not vector."""
     if after is None:  # a constant for the compiler
         y, force, slope = _Y0, _F0, _S0
@@ -131,6 +132,15 @@ def _virgin(desk, place, piece, after, L, curve, eta, scale):
         power = v if eta == 0.5 else one  # y^eta where it is at hand
         desk[force + l] = power * v * v * S
         desk[slope + l] = power * ((1.0 + eta) * S + D)
+    if rise > 0.0:  # S over w^rise: D S gains rise (1 - w) S
+        W = scale * scale
+        for l in range(L):
+            here = desk[y + l] if desk[y + l] > 0.0 else 0.0
+            w, rest = here / (here + W), W / (here + W)
+            lift = w**rise
+            by_y = desk[force + l] / (here if here > 0.0 else 1.0)
+            desk[slope + l] = lift * (desk[slope + l] + rise * rest * by_y)
+            desk[force + l] *= lift
     if (eta != 0.5) & (eta != 0.0):
         for l in range(L):
             power = desk[y + l] ** eta if desk[y + l] > 0.0 else 0.0
@@ -139,23 +149,39 @@ def _virgin(desk, place, piece, after, L, curve, eta, scale):
 
 
 @_jit
-def _curvature(desk, piece, L, cells, eta, scale):
+def _bend(piece, o, x, v, cells, scale):
+    """S, D S and D D S of one lane, v its sqrt(y)."""
+    c0, c1, c2, c3 = piece[o], piece[o + 1], piece[o + 2], piece[o + 3]
+    r = 1.0 / (v + scale)
+    t, s = v * r, scale * r
+    S = c0 + x * (c1 + x * (c2 + x * c3))
+    S1 = cells * (c1 + x * (2.0 * c2 + x * (3.0 * c3)))
+    S2 = cells * cells * (2.0 * c2 + x * (6.0 * c3))
+    ts = t * s
+    return S, 0.5 * ts * S1, 0.25 * (ts * ts) * S2 + 0.25 * ts * (s - t) * S1
+
+
+@_jit
+def _curvature(desk, piece, L, cells, eta, scale, rise):
     """Phi'' of the row of y after the step, from the pieces that `_virgin` just fetched for it."""
     for l in range(L):
-        y, x, o = desk[_Y1 + l], desk[_X + l], 4 * l
-        c0, c1, c2, c3 = piece[o], piece[o + 1], piece[o + 2], piece[o + 3]
+        y = desk[_Y1 + l]
         v = np.sqrt(y if y > 0.0 else 1.0)
-        r = 1.0 / (v + scale)
-        t, s = v * r, scale * r
-        S = c0 + x * (c1 + x * (c2 + x * c3))
-        S1 = cells * (c1 + x * (2.0 * c2 + x * (3.0 * c3)))
-        S2 = cells * cells * (2.0 * c2 + x * (6.0 * c3))
-        ts = t * s
-        D = 0.5 * ts * S1
-        DD = 0.25 * (ts * ts) * S2 + 0.25 * ts * (s - t) * S1
+        S, D, DD = _bend(piece, 4 * l, desk[_X + l], v, cells, scale)
         value = eta * (1.0 + eta) * S + (1.0 + 2.0 * eta) * D + DD
         value = value / (v if eta == 0.5 else v * v)
         desk[_CURVING + l] = value if y > 0.0 else 0.0
+    if rise > 0.0:
+        W = scale * scale
+        for l in range(L):
+            y = desk[_Y1 + l]
+            v = np.sqrt(y if y > 0.0 else 1.0)
+            S, D, DD = _bend(piece, 4 * l, desk[_X + l], v, cells, scale)
+            w, more = v * v / (v * v + W), rise * W / (v * v + W)
+            DD = DD + 2.0 * more * D + (more * more - more * w) * S
+            value = eta * (1.0 + eta) * S + (1.0 + 2.0 * eta) * (D + more * S) + DD
+            value = w**rise * value / (v if eta == 0.5 else v * v)
+            desk[_CURVING + l] = value if y > 0.0 else 0.0
     if (eta != 0.5) & (eta != 0.0):
         for l in range(L):
             desk[_CURVING + l] *= desk[_Y1 + l] ** eta if desk[_Y1 + l] > 0.0 else 0.0
@@ -330,7 +356,8 @@ def _add_tangent(desk, L, facet, f, lam, dim):
 @_jit
 def _facet(desk, place, piece, s, L, facet, depth, f, curve, scalars, dim, ledger, tangent):
     """One facet of a block: closures, virgin curve, sliders, and its part of F and C."""
-    lam, mu, limit, eta, scale = scalars[0], scalars[1], scalars[2], scalars[3], scalars[4]
+    lam, mu, limit = scalars[0], scalars[1], scalars[2]
+    eta, scale, rise = scalars[3], scalars[4], scalars[5]
     M, D = depth.shape[0], depth.shape[1] - 1
     m0, m1, m2 = facet[f, _M], facet[f, _M + 1], facet[f, _M + 2]
     s0, s1, s2 = facet[f, _S], facet[f, _S + 1], facet[f, _S + 2]
@@ -356,13 +383,13 @@ def _facet(desk, place, piece, s, L, facet, depth, f, curve, scalars, dim, ledge
         desk[_F0 + l] = s[rf, l]
     for l in range(L):
         desk[_S0 + l] = s[rs, l]
-    _virgin(desk, place, piece, True, L, curve, eta, scale)
+    _virgin(desk, place, piece, True, L, curve, eta, scale, rise)
     for l in range(L):
         s[rf, l] = desk[_F1 + l]
     for l in range(L):
         s[rs, l] = desk[_S1 + l]
     if tangent is not None:
-        _curvature(desk, piece, L, np.float64(curve.size // 4), eta, scale)
+        _curvature(desk, piece, L, np.float64(curve.size // 4), eta, scale, rise)
         _gradient(desk, L, m0, m1, m2, limit < np.inf)
         for l in range(L):
             desk[_BSS + l] = desk[_BST + l] = desk[_BTT + l] = 0.0
@@ -510,14 +537,15 @@ def _effective(desk, s, L, facet, f, dim):
 @_jit
 def _measure_facet(desk, place, piece, s, L, facet, depth, f, curve, energy, scalars, dim):
     """What one facet of a block adds to the measures."""
-    lam, mu, eta, scale = scalars[0], scalars[1], scalars[3], scalars[4]
+    lam, mu = scalars[0], scalars[1]
+    eta, scale, rise = scalars[3], scalars[4], scalars[5]
     M, D = depth.shape[0], depth.shape[1] - 1
     potential, share = facet[f, _POTENTIAL], facet[f, _SHARE]
     strength, compliance = mu * lam * facet[f, _REST], facet[f, _REST + 2]
     _effective(desk, s, L, facet, f, dim)
     for l in range(L):
         desk[_WHOLE + l], desk[_LIMIT + l] = 1.0, 0.0
-    _virgin(desk, place, piece, None, L, curve, eta, scale)
+    _virgin(desk, place, piece, None, L, curve, eta, scale, rise)
     _fetch(place, piece, L, energy)
     for l in range(L):
         y, x, o = desk[_Y0 + l], desk[_X + l], 4 * l
@@ -525,6 +553,10 @@ def _measure_facet(desk, place, piece, s, L, facet, depth, f, curve, energy, sca
         y = y if y > 0.0 else 0.0
         power = np.sqrt(y) if eta == 0.5 else 1.0
         desk[_CURVING + l] = potential * T * y * y * power
+    if rise > 0.0:
+        for l in range(L):
+            y = desk[_Y0 + l] if desk[_Y0 + l] > 0.0 else 0.0
+            desk[_CURVING + l] *= (y / (y + scale * scale)) ** rise
     if (eta != 0.5) & (eta != 0.0):
         for l in range(L):
             desk[_CURVING + l] *= desk[_Y0 + l] ** eta if desk[_Y0 + l] > 0.0 else 0.0
@@ -568,6 +600,6 @@ def refresh(state, first, last, block, desk, place, piece, facet, depth, curve, 
         for f in range(M):
             rf, rs = 2 * dim + 2 * M * D + f, 2 * dim + 2 * M * D + M + f
             _effective(desk, s, L, facet, f, dim)
-            _virgin(desk, place, piece, None, L, curve, scalars[3], scalars[4])
+            _virgin(desk, place, piece, None, L, curve, scalars[3], scalars[4], scalars[5])
             for l in range(L):
                 s[rf, l], s[rs, l] = desk[_F0 + l], desk[_S0 + l]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import threading
 import tomllib
 from dataclasses import MISSING, fields
 from pathlib import Path
@@ -30,7 +31,8 @@ _ABOUT = "about"  # free table for title, source and notes
 
 def replace_file(path: Path, data: bytes) -> None:
     """Write a file whole or not at all."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    mine = f"{os.getpid()}-{threading.get_ident()}"  # another thread may write the same file
+    temporary = path.with_name(f".{path.name}.{mine}.tmp")
     try:
         temporary.write_bytes(data)
         os.replace(temporary, path)

@@ -21,12 +21,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ._checks import Array
-from ._formation import factor
+from ._formation import factor, rise
 from .heights import HeightDistribution
 
 TABLE_ERROR = 1e-10  # asked of S, relative to its largest value
 WORST_ERROR = 1e-6  # refused beyond
 _FARTHEST = 1e300  # m; S is 1 long before
+_NEARLY = 1e-20  # of the first cell: where the limit at y = 0 is taken
 _CELLS = (128, 256, 512, 1024, 2048, 4096, 8192)
 
 
@@ -38,6 +39,7 @@ class Curve(NamedTuple):
     S: Array
     T: Array
     error: float  # largest error of S seen between the nodes
+    rise: float = 0.0  # p: S and T are tabulated over w^p
 
     def force(self, y: Array) -> tuple[Array, Array]:
         """Phi and its slope Phi' at y (m); both zero where y <= 0."""
@@ -45,6 +47,9 @@ class Curve(NamedTuple):
         c = self.S[i]
         S = c[..., 0] + x * (c[..., 1] + x * (c[..., 2] + x * c[..., 3]))
         DS = self._weight(y) * (c[..., 1] + x * (2 * c[..., 2] + x * (3 * c[..., 3])))
+        if self.rise:
+            lift, slope, _ = self._lift(y)
+            S, DS = lift * S, lift * (DS + slope * S)
         power = np.where(y > 0, np.maximum(y, 0.0) ** self.eta, 0.0)
         return power * y * S, power * ((1 + self.eta) * S + DS)
 
@@ -57,6 +62,10 @@ class Curve(NamedTuple):
         S2 = cells**2 * (2 * c[..., 2] + x * (6 * c[..., 3]))
         DS = 0.5 * t * s * S1
         DDS = 0.25 * (t * s) ** 2 * S2 + 0.25 * t * s * (s - t) * S1
+        if self.rise:
+            lift, slope, bend = self._lift(y)
+            DDS = lift * (DDS + 2 * slope * DS + (slope**2 + bend) * S)
+            S, DS = lift * S, lift * (DS + slope * S)
         value = self.eta * (1 + self.eta) * S + (1 + 2 * self.eta) * DS + DDS
         power = np.where(y > 0, y, 1.0) ** (self.eta - 1)
         return np.where(y > 0, power * value, 0.0)
@@ -66,6 +75,8 @@ class Curve(NamedTuple):
         x, i, _, _ = self._cell(y)
         c = self.T[i]
         T = c[..., 0] + x * (c[..., 1] + x * (c[..., 2] + x * c[..., 3]))
+        if self.rise:
+            T = self._lift(y)[0] * T
         energy: Array = np.maximum(y, 0.0) ** (2 + self.eta) * T
         return energy
 
@@ -83,6 +94,18 @@ class Curve(NamedTuple):
         v = np.sqrt(np.fmin(np.fmax(y, 0.0), _FARTHEST))
         return 0.5 * len(self.S) * v * self.scale / (v + self.scale) ** 2
 
+    def _lift(self, y: Array) -> tuple[Array, Array, Array]:
+        """w^p, and D w^p / w^p with its own D."""
+        w, rest = shares(y, self.scale)
+        slope = self.rise * rest
+        return w**self.rise, slope, -slope * w
+
+
+def shares(y: Array, scale: float) -> tuple[Array, Array]:
+    """w = y/(y + V^2) and 1 - w of each y."""
+    y, W = np.fmin(np.fmax(y, 0.0), _FARTHEST), scale * scale
+    return y / (y + W), W / (y + W)
+
 
 @lru_cache(maxsize=256)
 def virgin_curve(eta: float, heights: HeightDistribution | None) -> Curve:
@@ -99,26 +122,23 @@ def virgin_curve(eta: float, heights: HeightDistribution | None) -> Curve:
     far = float(beyond[-1]) if beyond.size else r0
     middle = float(points[len(points) // 2]) - r0
     scale = float(np.sqrt(max(middle, far / 30)))
+    power = rise(heights)
     _require_convex(eta, heights, far)
-    for cells in _CELLS:
-        t = np.arange(2 * cells + 1) / (2 * cells)  # nodes and, between them, the points that test
-        with np.errstate(divide="ignore"):
-            y = (scale * t / (1 - t)) ** 2
-        S, DS = factor(y, eta, heights, beyond)
-        St = np.zeros_like(t)  # S is smooth in y, hence flat in t at both ends
-        St[1:-1] = 2 * DS[1:-1] / (t * (1 - t))[1:-1]
-        table = _hermite(S[::2], St[::2] / cells)
-        half = table @ np.array([1.0, 0.5, 0.25, 0.125])
-        error = float(np.max(np.abs(half - S[1::2])))
-        if error < TABLE_ERROR * float(np.max(S)):
+    shape = (eta, heights, beyond, scale, power)
+    # what is too steep for the finest table is so at the very start: no need for all of it
+    error = _tabulate(*shape, _CELLS[-1], 16)[1]
+    for cells in _CELLS if error < WORST_ERROR else ():
+        table, error = _tabulate(*shape, cells, cells)
+        if error < TABLE_ERROR * float(np.max(table[:, 0])):
             break
     if not error < WORST_ERROR:
         raise ValueError(
-            f"heights cannot be tabulated: the virgin curve is off by {error:.1e} with {cells} "
-            f"cells; they rise too steeply at the overlap of {r0:g} m (widen them, or drop them "
-            "with heights=None) or have too long a tail (cut it)"
+            f"heights cannot be tabulated: the virgin curve is off by {error:.1e} with "
+            f"{_CELLS[-1]} cells; they rise too steeply at the overlap of {r0:g} m (widen them, "
+            "begin them exactly there, or drop them with heights=None) or have too long a tail "
+            "(cut it)"
         )
-    return Curve(eta, scale, table, _energy_table(eta, scale, table), error)
+    return Curve(eta, scale, table, _energy_table(eta, scale, table, power), error, power)
 
 
 def exact_force(y: Array, eta: float, heights: HeightDistribution | None) -> tuple[Array, Array]:
@@ -130,21 +150,45 @@ def exact_force(y: Array, eta: float, heights: HeightDistribution | None) -> tup
     return y ** (1 + eta) * S, y**eta * ((1 + eta) * S + DS)
 
 
-def _hermite(value: Array, slope: Array) -> Array:
-    """Cubic coefficients (cells, 4) through rising node values and slopes per cell.
+def _tabulate(
+    eta: float, heights: HeightDistribution, beyond: Array, scale: float, power: float,
+    cells: int, first: int,
+) -> tuple[Array, float]:  # fmt: skip
+    """The first so many cells of the table of S/w^p, and its largest error between the nodes."""
+    t = np.arange(2 * first + 1) / (2 * cells)  # nodes and, between them, the points that test
+    with np.errstate(divide="ignore"):
+        y = (scale * t / (1 - t)) ** 2
+    if power:
+        y[0] = _NEARLY * y[1]
+    S, DS = factor(y, eta, heights, beyond)
+    if power:
+        w, rest = shares(y, scale)
+        S = S / w**power
+        DS = DS / w**power - power * rest * S
+    inside = (t > 0) & (t < 1)
+    St = np.zeros_like(t)  # S is smooth in y, hence flat in t at both ends
+    St[inside] = 2 * DS[inside] / (t * (1 - t))[inside]
+    table = _hermite(S[::2], St[::2] / cells, rises=not power)
+    half = table @ np.array([1.0, 0.5, 0.25, 0.125])
+    return table, float(np.max(np.abs(half - S[1::2])))
 
-    Slopes are held below three times the rise of either neighbour, so that the cubics rise too:
-    where nearly no asperity touches yet, S grows too steeply for its cells, and an overshoot below
-    zero would be tension.
+
+def _hermite(value: Array, slope: Array, rises: bool = True) -> Array:
+    """Cubic coefficients (cells, 4) through node values and slopes per cell.
+
+    Slopes of what `rises` are held below three times the rise of either neighbour, so that the
+    cubics rise too: where nearly no asperity touches yet, S grows too steeply for its cells, and an
+    overshoot below zero would be tension.
     """
-    rise = np.diff(value)
-    most = 3 * np.maximum(rise, 0.0)
-    slope = np.clip(slope, 0.0, np.minimum(np.append(most, np.inf), np.append(np.inf, most)))
+    step = np.diff(value)
+    if rises:
+        most = 3 * np.maximum(step, 0.0)
+        slope = np.clip(slope, 0.0, np.minimum(np.append(most, np.inf), np.append(np.inf, most)))
     left, right = slope[:-1], slope[1:]
-    return np.stack([value[:-1], left, 3 * rise - 2 * left - right, left + right - 2 * rise], -1)
+    return np.stack([value[:-1], left, 3 * step - 2 * left - right, left + right - 2 * step], -1)
 
 
-def _energy_table(eta: float, scale: float, S: Array) -> Array:
+def _energy_table(eta: float, scale: float, S: Array, power: float) -> Array:
     """Table of T = Psi / y^(2+eta) by exact integration of the tabulated force, cell by cell."""
     cells = len(S)
     t = np.arange(cells + 1) / cells
@@ -157,16 +201,19 @@ def _energy_table(eta: float, scale: float, S: Array) -> Array:
     dy = 2 * scale**2 * inner / (1 - inner) ** 3 / cells
     Si = S[:-1, :1] + x * (S[:-1, 1:2] + x * (S[:-1, 2:3] + x * S[:-1, 3:]))
     top = y[1:-1, None]
-    piece = ((yi / top) ** (1 + eta) * Si * dy / top) @ w
-    T = np.empty(cells + 1)
-    T[0], T[-1] = S[0, 0] / (2 + eta), S[-1].sum() / (2 + eta)
+    # T is that of Phi = y^(1+eta) w^p S over y^(2+eta) w^p
+    lift = np.divide(*(shares(v, scale)[0] for v in (yi, top))) ** power
+    piece = ((yi / top) ** (1 + eta) * lift * Si * dy / top) @ w
+    T, nodes = np.empty(cells + 1), np.append(S[:, 0], S[-1].sum())
+    T[0], T[-1] = nodes[0] / (2 + eta + power), nodes[-1] / (2 + eta)
+    grown = shares(y, scale)[0] ** power
     for k in range(1, cells):
-        T[k] = (y[k - 1] / y[k]) ** (2 + eta) * T[k - 1] + piece[k - 1]
-    nodes = np.append(S[:, 0], S[-1].sum())
+        T[k] = (y[k - 1] / y[k]) ** (2 + eta) * grown[k - 1] / grown[k] * T[k - 1] + piece[k - 1]
     slope = np.zeros(cells + 1)
     inside = t[1:-1]
-    slope[1:-1] = (nodes[1:-1] - (2 + eta) * T[1:-1]) / (0.5 * inside * (1 - inside))
-    return _hermite(T, slope / cells)
+    away = (2 + eta + power * shares(y[1:-1], scale)[1]) * T[1:-1]
+    slope[1:-1] = (nodes[1:-1] - away) / (0.5 * inside * (1 - inside))
+    return _hermite(T, slope / cells, rises=not power)
 
 
 def _require_convex(eta: float, heights: HeightDistribution, far: float) -> None:

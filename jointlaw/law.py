@@ -191,6 +191,9 @@ class JointLaw:
 
         mass: reduced mass m1 m2/(m1 + m2) in kg; area: of the joint in m2; closure: the largest
         reached, in m. 2 sqrt(m/(K area)); a block code adds rotation.
+
+        Safe to 0.95 in lasting contact, and where friction takes from every impact. Impacts that
+        lose nothing need 0.2 or less: they last but 2/share steps (docs/sharp-bits.md).
         """
         mass, area = above("mass", mass, 0.0), above("area", area, 0.0)
         closure = at_least("closure", closure, 0.0)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from extreme_checks import refused, run
-from extreme_laws import build, random_changes
+from extreme_laws import COMPILED, build, random_changes
 
 # what this very suite found: caps of sizes whose squares underflow (56, 61), and cells beyond the
 # last height, where the slope of the table wavers by its rounding (238, 594)
@@ -34,7 +34,8 @@ def test_what_was_found_stays_mended(seed):
 
 @pytest.mark.parametrize("first", range(10_000, 10_100, 20))
 def test_random_laws_on_random_paths(first):
-    found = {seed: fuzz(seed) for seed in range(first, first + 20)}
+    count = 20 if COMPILED else 8
+    found = {seed: fuzz(seed) for seed in range(first, first + count)}
     assert not {seed: faults for seed, faults in found.items() if faults}
     # one law in eight is refused: heights too narrow for a population, or too steep for a table
-    assert sum(faults is None for faults in found.values()) < 10
+    assert sum(faults is None for faults in found.values()) < count / 2

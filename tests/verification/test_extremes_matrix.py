@@ -7,9 +7,12 @@ from extreme_laws import EXTREMES, SCALE, alone, build, name, pairs
 
 # what has no virgin curve that can be tabulated, or none that is convex, is refused when built
 REFUSED = "cannot be tabulated|not convex"
-# chosen to be refused: a density infinite at the very point of contact; a population of eta near 0
-NONE = [{"heights": "alpha = -0.5, overlap 0"}, *(
-    {"eta": eta, "heights": "printed, population"} for eta in (0.0, 1e-6))]  # fmt: skip
+# chosen to be refused: a population of eta near 0
+NONE = [
+    {"eta": eta, "heights": heights}
+    for eta in (0.0, 1e-6)
+    for heights in ("printed, population", "alpha = -0.5, overlap 0")
+]
 
 
 def ends(changes):

@@ -1,7 +1,8 @@
 """A million joints, threads that each own joints, forked and spawned processes, two laws at once.
 
 Arrays of any kind (read-only, strided, float32, integer, empty), pickling, states of the wrong law
-and interrupted writes: tests/unit/test_batch.py, test_snapshot.py and test_files.py.
+and failed writes: tests/unit/test_batch.py, test_snapshot.py and test_files.py; killed and
+concurrent writes: test_extremes_files.py.
 """
 
 import multiprocessing
@@ -11,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from extreme_checks import path
-from extreme_laws import SCALE, build
+from extreme_laws import COMPILED, SCALE, build
 
 import jointlaw as jl
 
@@ -70,7 +71,7 @@ def test_a_batch_goes_on_in_another_process(method):
 
 
 def test_a_million_joints_are_a_million_single_joints():
-    n = 1_000_000
+    n = 1_000_000 if COMPILED else 100_000
     law = build(resolution=FAST)
     batch = law.joints(n, ledger=False)
     rng = np.random.default_rng(2)
@@ -79,8 +80,10 @@ def test_a_million_joints_are_a_million_single_joints():
         F, C = batch.update(d, tangent=False)
     assert C is None
     assert np.isfinite(F).all()
-    for k in (0, 63, 64, 499_999, n - 1):
+    for k in (0, 63, 64, n // 2 - 1, n - 1):
         joint = law.joint()
         for d in steps:
             one, _ = joint.update(d[k], tangent=False)
-        np.testing.assert_array_equal(F[k], one)
+        # to the bit; but numpy's matrix product adds up one column in another order than many
+        rounding = 0.0 if COMPILED else 1e-15 * np.abs(one).max()
+        np.testing.assert_allclose(F[k], one, rtol=0.0, atol=rounding)

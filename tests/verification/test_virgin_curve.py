@@ -1,5 +1,6 @@
 """The virgin curve and its bounds, against integrals written independently."""
 
+import mpmath as mp
 import numpy as np
 import pytest
 from builders import law, slow_heights
@@ -7,6 +8,7 @@ from slow_bed import cap_quadrature
 from slow_virgin import SlowGamma, virgin
 
 import jointlaw as jl
+from jointlaw.curve import exact_force, virgin_curve
 
 FORMATIONS = [None, "population", "individual"]
 FAR = [1e-4, 0.01, 0.3, 1.0, 3.0, 12.0, 60.0, 500.0]  # closure ranges
@@ -99,3 +101,33 @@ def test_stiffness_bound_holds_in_random_states(formation, lam, critical_slip):
         assert np.all(size <= bound * (1.0 + 1e-12))
         closest = max(closest, np.max(size[bound > 0.0] / bound[bound > 0.0]))
     assert closest > 0.3  # a bound, but not an empty one
+
+
+@pytest.mark.parametrize("eta", [0.0, 0.5, 2.0])
+@pytest.mark.parametrize("alpha", [-1.0 + 1e-9, -0.99, -0.5, -0.1])
+def test_a_density_infinite_at_the_point_of_contact(alpha, eta):
+    """Phi of "individual" gamma heights without overlap is Kummer's function, and rises as
+    y^(2 + alpha + eta): over thirty decades, from a table good to 1e-10 of the largest S / w^p."""
+    heights = jl.GammaHeights(alpha, 1.15, 0.0, "individual")
+    curve = virgin_curve(eta, heights)
+    p, q = mp.mpf(alpha) + 1, mp.mpf(eta) + 1
+    rise = mp.gamma(q + 1) / mp.gamma(p + q + 1)
+    y = np.geomspace(1e-30, 1e4, 35)
+    force, slope = curve.force(y)
+    with mp.workdps(30):
+        for k, z in enumerate(map(mp.mpf, y / 1.15)):
+            S = rise * z**p * mp.hyp1f1(p, p + q + 1, -z)
+            DS = p * (S - rise * z ** (p + 1) / (p + q + 1) * mp.hyp1f1(p + 1, p + q + 2, -z))
+            assert force[k] / y[k] ** (1 + eta) == pytest.approx(float(S), rel=1e-9)
+            # a derivative of the table is one order lower
+            assert slope[k] / y[k] ** eta == pytest.approx(float((1 + eta) * S + DS), rel=1e-6)
+            assert exact_force(y[k : k + 1], eta, heights)[0] == pytest.approx(force[k], rel=1e-9)
+
+
+def test_chi_square_heights_of_one_degree_of_freedom_are_gamma_heights():
+    """The density that the paper names, infinite at zero height."""
+    chi = virgin_curve(0.5, jl.Heights("chi2", 0.0, "individual", {"df": 1.0, "scale": 0.5}))
+    gamma = virgin_curve(0.5, jl.GammaHeights(-0.5, 1.0, 0.0, "individual"))
+    y = np.geomspace(1e-12, 1e3, 60)
+    # both tables are good to 1e-10 of S, which is 1e-6 at the smallest y
+    np.testing.assert_allclose(chi.force(y)[0], gamma.force(y)[0], rtol=1e-9)

@@ -1,0 +1,95 @@
+"""Snapshots and replay files whose writing is killed, fails, or happens twice at once."""
+
+import multiprocessing
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from extreme_laws import SCALE, build
+
+import jointlaw as jl
+from jointlaw.cli import main
+
+FAST = jl.Resolution(1, 3, 1)
+
+
+def one_of_two(k, n=2000):
+    """State of n joints, all 0.1 or all 0.2 closed: any mixture shows."""
+    joints = build(resolution=FAST).joints(n, ledger=False)
+    joints.update(np.tile([0.1 * SCALE * (1 + k % 2), 0.0, 0.0], (n, 1)), tangent=False)
+    return joints.snapshot()
+
+
+def whole(path):
+    """Whether the file is one of the two states."""
+    closures = jl.load_state(path).values[0]
+    return len(closures) == 2000 and np.ptp(closures) == 0.0 and closures[0] > 0.0
+
+
+def write_for_ever(path):
+    states = one_of_two(0), one_of_two(1)
+    while True:
+        for state in states:
+            state.save(path)
+
+
+def test_a_process_killed_while_it_writes_leaves_a_whole_file(tmp_path):
+    path = tmp_path / "state.npz"
+    one_of_two(0).save(path)
+    for wait in (0.02, 0.051, 0.083):
+        writer = multiprocessing.get_context("fork").Process(target=write_for_ever, args=(path,))
+        before = path.stat().st_mtime_ns
+        writer.start()
+        while path.stat().st_mtime_ns == before:  # until it writes
+            time.sleep(0.001)
+        time.sleep(wait)
+        writer.kill()
+        writer.join()
+        assert whole(path)
+
+
+def test_threads_that_write_one_file_at_once_leave_a_whole_file(tmp_path):
+    path = tmp_path / "state.npz"
+    states = [one_of_two(k) for k in range(8)]
+    with ThreadPoolExecutor(8) as pool:
+        for _ in range(20):
+            for done in [pool.submit(state.save, path) for state in states]:
+                done.result()
+            assert whole(path)
+    assert [p.name for p in tmp_path.iterdir()] == ["state.npz"]
+
+
+@pytest.mark.parametrize("broken", ["write_bytes", "replace"])
+def test_a_replay_file_that_cannot_be_written_hides_no_error(tmp_path, monkeypatch, broken):
+    """The step is refused, nothing moves, and no half a file is left."""
+    monkeypatch.setenv("JOINTLAW_REPLAY_DIR", str(tmp_path))
+    joint = build().joint()
+    joint.update([0.3 * SCALE, 0.0, 0.0])
+    before = joint.snapshot().values
+
+    def fail(*_, **__):
+        raise OSError("disk full")
+
+    if broken == "replace":
+        monkeypatch.setattr("os.replace", fail)
+    else:
+        real = type(tmp_path).write_bytes
+        monkeypatch.setattr(
+            type(tmp_path), "write_bytes", lambda path, data: (real(path, data[:9]), fail())
+        )
+    with pytest.raises(jl.NonFiniteError, match="no replay file could be written") as error:
+        joint.update([1e300, 0.0, 0.0])
+    assert error.value.replay is None
+    np.testing.assert_array_equal(joint.snapshot().values, before)
+    assert not list(tmp_path.iterdir())
+
+
+def test_half_a_replay_file_is_refused(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("JOINTLAW_REPLAY_DIR", str(tmp_path))
+    with pytest.raises(jl.NonFiniteError) as error:
+        build().joint().update([1e300, 0.0, 0.0])
+    path = error.value.replay
+    path.write_bytes(path.read_bytes()[:-50])
+    assert main(["replay", str(path)]) == 2
+    assert "is not a replay file" in capsys.readouterr().err

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import _toml
+from . import _toml, nodes
 from ._checks import Array, above, at_least, number, numbers
 from .asperity import Asperity
 from .curve import Curve, virgin_curve
@@ -215,7 +215,8 @@ class JointLaw:
         f, p = self.facets, self.asperity
         c1 = np.cos(f.theta)
         area = self.asperity_density * f.weight * p.lam * p.K * c1 ** (1 + p.eta)
-        depth = depth_nodes(self.closure_range, np.tan(f.theta), self.resolution.depth)
+        slope, cells = np.tan(f.theta), self.resolution.depth
+        depth = nodes.depth_nodes(self.curve, self.closure_range, slope, cells)
         force, slope = self.curve.force(np.where(np.isfinite(depth), depth, 0.0))
         force[:, -1] = slope[:, -1] = np.inf
         slope[:, 0] = 0.0  # a spring that touches at once (eta = 0) belongs to the first cell
@@ -321,15 +322,3 @@ def facet_sum(theta: Array, area: Array, lam: float, mu: float) -> float:
     """Sum of area (cos theta + sin theta min(tan theta/lam, mu)): facets under pure closure."""
     shear = np.minimum(np.tan(theta) / lam, mu)
     return float(np.sum(area * (np.cos(theta) + np.sin(theta) * shear)))
-
-
-def depth_nodes(closure_range: float, slope: Array, cells: int) -> Array:
-    """Limits zeta (M, cells + 1) of the depth cells, graded, the last cell open-ended (m).
-
-    They span the effective closure y = closure + slope * shear, not the closure: y_max takes a
-    shear of one closure range on top of the closure.
-    """
-    reach = closure_range * (1.0 + np.minimum(slope, 10.0))
-    inner = (np.arange(1, cells) / cells) ** 1.5
-    zero, end = np.zeros((len(slope), 1)), np.full((len(slope), 1), np.inf)
-    return np.concatenate([zero, reach[:, None] * inner, end], axis=1)

@@ -11,7 +11,7 @@ from ._checks import whole
 class Resolution:
     """Number of nodes that the law sums over.
 
-    u: inclinations (Gauss-Legendre in cos(a theta)), >= 1.
+    u: inclinations (Gauss rule of the density in cos(a theta)), >= 1.
     phi: azimuths on the half circle, >= 3; motion in 3-D uses twice as many.
     depth: cells of touch depth per orientation, >= 1.
     """

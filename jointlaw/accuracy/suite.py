@@ -1,0 +1,132 @@
+"""The standard paths on which accuracy is measured, and errors along them.
+
+With R the law's closure range and S the normal stress there, the paths are
+
+    closure            close to R, open, close again to R/2
+    shear 0, 45, 90    at the normal stress S/2, along these azimuths to a shear of R
+    reversal           at S/2, to 0.6 R, back to -0.6 R, and to zero
+    constant closure   0.6 R, shear along 30 degrees to R
+    re-contact         closed and sheared, opened under shear until it separates, closed again
+    walk               a smooth random walk in closure and both shears
+
+A law with a plane takes those along azimuth 0 and the others projected on its plane. The paths at
+constant stress are found once, at the reference resolution, and are paths of displacement from then
+on, so that every resolution is asked the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .._checks import Array
+from ..law import JointLaw
+from ..resolution import Resolution
+
+STEPS = 120  # of each path
+REFERENCE = Resolution(16, 24, 24)
+CHECK = Resolution(11, 16, 16)  # what the reference is compared with, to know its own error
+
+
+@dataclass(frozen=True)
+class Suite:
+    """Paths of one law: increments d (steps, paths, dim) in m and reference tractions F in Pa."""
+
+    names: tuple[str, ...]
+    d: Array
+    F: Array
+    uncertainty: Array
+
+    def errors(self, law: JointLaw) -> tuple[Array, Array]:
+        """Largest and rms error (paths,) of another resolution, as shares of the peak |F|."""
+        return errors(tractions(law, self.d), self.F)
+
+
+def standard_suite(law: JointLaw) -> Suite:
+    """The standard paths of a law, with tractions at the reference resolution."""
+    best = replace(law, resolution=REFERENCE)
+    stress = float(law.normal_stress(law.closure_range))
+    names, goal, held = _paths(law, stress)
+    d = np.diff(goal, axis=0, prepend=0.0)
+    d, F = _hold_stress(best, d, held, stress / 2)
+    check, _ = errors(tractions(replace(law, resolution=CHECK), d), F)
+    return Suite(names, d, F, check)
+
+
+def tractions(law: JointLaw, d: Array) -> Array:
+    """F (steps, paths, dim) in Pa along increments d of the same shape, from the virgin state."""
+    batch, F = law.joints(d.shape[1], ledger=False), np.empty_like(d)
+    for k, step in enumerate(d):
+        batch.update(step, tangent=False, out=(F[k], None))
+    return F
+
+
+def errors(F: Array, reference: Array) -> tuple[Array, Array]:
+    """Largest and rms of |F - reference| (steps, paths, dim), over the path's largest |reference|."""
+    peak = np.linalg.norm(reference, axis=2).max(axis=0)
+    off = np.linalg.norm(F - reference, axis=2)
+    return off.max(axis=0) / peak, np.sqrt(np.mean(off**2, axis=0)) / peak
+
+
+def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]:
+    """Names, places (steps, paths, dim) in m, and which paths hold the normal stress from STEPS/10.
+
+    The closures of those that hold it are first guesses.
+    """
+    R, seat = law.closure_range, float(law.closure(stress / 2)) / law.closure_range
+    s = np.arange(1, STEPS + 1) / STEPS
+    zero = np.zeros_like(s)
+
+    def legs(at: list[float], *columns: list[float]) -> Array:
+        return np.stack([np.interp(s, at, column) for column in columns], axis=-1)
+
+    def along(path: Array, degrees: float) -> Array:
+        cos, sin = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+        return np.stack([path[:, 0], cos * path[:, 1], sin * path[:, 1]], axis=-1)
+
+    shear = legs([0, 0.1, 1], [0, seat, seat], [0, 0, 1])
+    back = legs([0, 0.1, 0.35, 0.75, 1], [0, *4 * [seat]], [0, 0, 0.6, -0.6, 0])
+    fixed = legs([0, 0.2, 1], [0, 0.6, 0.6], [0, 0, 1])
+    again = legs([0, 0.15, 0.35, 0.6, 0.7, 1], [0, 0.7, 0.7, -0.6, -0.6, 0.8],
+                 [0, 0, 0.4, 0.7, 0.2, 0.5])  # fmt: skip
+    turn = 2 * np.pi * s
+    walk = np.stack([
+        0.45 * (1 - np.cos(3 * turn)) * (0.7 + 0.3 * np.sin(turn)) + 0.1 * np.sin(turn / 4),
+        0.5 * np.sin(2 * turn) + 0.3 * np.sin(3.3 * turn + 0.4) - 0.3 * np.sin(0.4),
+        0.45 * np.sin(1.7 * turn) + 0.25 * np.sin(4.1 * turn + 1.0) - 0.25 * np.sin(1.0),
+    ], axis=-1)  # fmt: skip
+    named = {
+        "closure": np.stack([np.interp(s, [0, 0.4, 0.8, 1], [0, 1, 0, 0.5]), zero, zero], -1),
+        "shear 0": along(shear, 0),
+        "shear 45": along(shear, 45),
+        "shear 90": along(shear, 90),
+        "reversal": along(back, 0),
+        "constant closure": along(fixed, 30),
+        "re-contact": along(again, 60),
+        "walk": walk,
+    }
+    if law.plane is not None:
+        plain = {"shear 0": shear, "reversal": back, "constant closure": fixed, "re-contact": again}
+        named = {k: plain.get(k, v)[:, :2] for k, v in named.items() if k not in ("shear 45", "shear 90")}
+    held = np.array([name.startswith(("shear", "reversal")) for name in named])
+    return tuple(named), R * np.stack(list(named.values()), axis=1), held
+
+
+def _hold_stress(law: JointLaw, d: Array, held: Array, stress: float) -> tuple[Array, Array]:
+    """Mend the closures of the paths `held` to keep the normal stress; tractions of all paths.
+
+    Two Newton steps per increment keep it to some 1e-3, and what is left is mended in the next:
+    enough, for what is compared are tractions along one and the same path.
+    """
+    batch, F, d = law.joints(d.shape[1], ledger=False), np.empty_like(d), d.copy()
+    which = np.flatnonzero(held)
+    for k, step in enumerate(d):
+        if k >= STEPS // 10:
+            for _ in range(2):
+                now, C = batch.trial(step[which], where=which)
+                assert C is not None
+                slope = np.maximum(C[:, 0, 0], stress / law.closure_range * 1e-3)
+                step[which, 0] -= (now[:, 0] - stress) / slope
+        batch.update(step, tangent=False, out=(F[k], None))
+    return d, F

@@ -13,10 +13,10 @@ import numpy as np
 from ._checks import Array
 from .curve import Curve
 
-# Fitted on 40 random laws by `benchmarks/nodes.py`
-_SPAN, _TILT = 0.8, 0.6  # of the closure range: what the cells are graded over, plus tilt tan theta
+# Chosen on random laws with `benchmarks/nodes.py`
 _STEEPEST = 10.0  # largest tan(theta) that counts: at a = 1 it grows without bound
 _LOW = 0.1  # power of Phi that draws nodes towards small loads
+_OPEN = 1.5  # shares of the grading left to the last cell: few cells then sit where most loads are
 _GRID = 512  # panels on which the touch-depth density is summed
 
 
@@ -50,10 +50,10 @@ def depth_nodes(curve: Curve, closure_range: float, slope: Array, cells: int) ->
 
     A cell of width h lumps springs of density Phi'' and by that errs by Phi'' h^2/8 at most: equal
     shares of int sqrt(Phi'') dz make the error of all cells the same. A small power of Phi shifts
-    nodes towards small loads. The last cell is open-ended. They span the effective closure
-    y = closure + tan(theta) shear, not the closure.
+    nodes towards small loads. They span the effective closure y = closure + tan(theta) shear, not
+    the closure; the last cell is open-ended.
     """
-    reach = closure_range * (_SPAN + _TILT * np.minimum(slope, _STEEPEST))
+    reach = closure_range * (1.0 + np.minimum(slope, _STEEPEST))
     # graded: Phi'' may be singular at touch
     edges = reach.max() * (np.arange(_GRID + 1) / _GRID) ** 4
     middle = 0.5 * (edges[1:] + edges[:-1])
@@ -64,7 +64,7 @@ def depth_nodes(curve: Curve, closure_range: float, slope: Array, cells: int) ->
     # the floor serves curves without curvature, one linear spring, where any nodes will do
     floor = 1e-6 * density.max() if density.max() > 0.0 else 1.0
     total = np.concatenate([[0.0], np.cumsum((density + floor) * np.diff(edges))])
-    wanted = np.interp(reach, edges, total)[:, None] * (np.arange(1, cells) / cells)
+    wanted = np.interp(reach, edges, total)[:, None] * (np.arange(1, cells) / (cells - 1 + _OPEN))
     inner = np.interp(wanted, total, edges)
     zero, end = np.zeros((len(slope), 1)), np.full((len(slope), 1), np.inf)
     return np.concatenate([zero, inner, end], axis=1)

@@ -32,10 +32,10 @@ class Resolution:
 
 
 NAMED = {
-    "fast": Resolution(2, 3, 1),
-    "balanced": Resolution(2, 4, 2),
-    "fine": Resolution(6, 6, 10),
-    "reference": Resolution(10, 16, 24),
+    "fast": Resolution(1, 3, 2),
+    "balanced": Resolution(2, 3, 4),
+    "fine": Resolution(4, 5, 10),
+    "reference": Resolution(16, 10, 24),
 }
 
 

@@ -16,6 +16,7 @@ on, so that every resolution is asked the same.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,8 +26,15 @@ from ..law import JointLaw
 from ..resolution import Resolution
 
 STEPS = 120  # of each path
-REFERENCE = Resolution(16, 24, 24)
-CHECK = Resolution(11, 16, 16)  # what the reference is compared with, to know its own error
+
+
+def reference_resolution(law: JointLaw) -> Resolution:
+    """The resolution whose tractions count as exact: steep facets (small a) need the most of it."""
+    return Resolution(math.ceil(4 + 36 / law.orientation.a), 12, 36)
+
+
+def _coarser(r: Resolution, share: float) -> Resolution:
+    return Resolution(*(max(3, round(share * n)) for n in (r.u, r.phi, r.depth)))
 
 
 @dataclass(frozen=True)
@@ -45,13 +53,14 @@ class Suite:
 
 def standard_suite(law: JointLaw) -> Suite:
     """The standard paths of a law, with tractions at the reference resolution."""
-    best = replace(law, resolution=REFERENCE)
-    stress = float(law.normal_stress(law.closure_range))
+    best = reference_resolution(law)
+    stress = float(law.normal_stress(law.closure_range)) / 2
     names, goal, held = _paths(law, stress)
     d = np.diff(goal, axis=0, prepend=0.0)
-    d, F = _hold_stress(best, d, held, stress / 2)
-    check, _ = errors(tractions(replace(law, resolution=CHECK), d), F)
-    return Suite(names, d, F, check)
+    d = _hold_stress(replace(law, resolution=_coarser(best, 1 / 2)), d, held, stress)
+    F = tractions(replace(law, resolution=best), d)
+    check = tractions(replace(law, resolution=_coarser(best, 2 / 3)), d)
+    return Suite(names, d, F, errors(check, F)[0])
 
 
 def tractions(law: JointLaw, d: Array) -> Array:
@@ -74,7 +83,7 @@ def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]
 
     The closures of those that hold it are first guesses.
     """
-    R, seat = law.closure_range, float(law.closure(stress / 2)) / law.closure_range
+    R, seat = law.closure_range, float(law.closure(stress)) / law.closure_range
     s = np.arange(1, STEPS + 1) / STEPS
     zero = np.zeros_like(s)
 
@@ -113,20 +122,20 @@ def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]
     return tuple(named), R * np.stack(list(named.values()), axis=1), held
 
 
-def _hold_stress(law: JointLaw, d: Array, held: Array, stress: float) -> tuple[Array, Array]:
-    """Mend the closures of the paths `held` to keep the normal stress; tractions of all paths.
+def _hold_stress(law: JointLaw, d: Array, held: Array, stress: float) -> Array:
+    """Increments with the closures of the paths `held` mended to keep the normal stress.
 
     Two Newton steps per increment keep it to some 1e-3, and what is left is mended in the next:
     enough, for what is compared are tractions along one and the same path.
     """
-    batch, F, d = law.joints(d.shape[1], ledger=False), np.empty_like(d), d.copy()
-    which = np.flatnonzero(held)
-    for k, step in enumerate(d):
-        if k >= STEPS // 10:
-            for _ in range(2):
-                now, C = batch.trial(step[which], where=which)
-                assert C is not None
-                slope = np.maximum(C[:, 0, 0], stress / law.closure_range * 1e-3)
-                step[which, 0] -= (now[:, 0] - stress) / slope
-        batch.update(step, tangent=False, out=(F[k], None))
-    return d, F
+    d, which = d.copy(), np.flatnonzero(held)
+    batch, least = law.joints(len(which), ledger=False), 1e-3 * stress / law.closure_range
+    for k in range(len(d)):
+        step = d[k, which]
+        for _ in range(2 if k >= STEPS // 10 else 0):
+            F, C = batch.trial(step)
+            assert C is not None
+            step[:, 0] -= (F[:, 0] - stress) / np.maximum(C[:, 0, 0], least)
+        batch.update(step, tangent=False)
+        d[k, which] = step
+    return d

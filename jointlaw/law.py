@@ -197,6 +197,21 @@ class JointLaw:
         stiffness = float(self.max_stiffness(closure))
         return 2 * math.sqrt(mass / (stiffness * area)) if stiffness > 0 else math.inf
 
+    # -------------------------------------------------------------- accuracy
+
+    def at_tolerance(self, tolerance: float) -> JointLaw:
+        """This law at the resolution with the fewest sliders that is this accurate.
+
+        tolerance: largest error of the traction on a path, as a share of the path's largest
+        traction, > 0: 0.01 is one per cent. Held on the standard paths within the law's closure
+        range (`jointlaw.accuracy.suite`) with a margin for others; nothing is timed, so the answer
+        is the same on every machine. Takes about a second. Raises ValueError where no resolution
+        tried is that accurate.
+        """
+        from .accuracy.tolerance import at_tolerance
+
+        return at_tolerance(self, tolerance)
+
     # ---------------------------------------------------------------- tables
 
     @cached_property

@@ -57,13 +57,14 @@ def depth_nodes(curve: Curve, closure_range: float, slope: Array, cells: int) ->
     # graded: Phi'' may be singular at touch
     edges = reach.max() * (np.arange(_GRID + 1) / _GRID) ** 4
     middle = 0.5 * (edges[1:] + edges[:-1])
+    # ratios throughout, so that the same joint in other units has the same nodes to the bit
     with np.errstate(all="ignore"):
-        force, _ = curve.force(middle)
-        density = np.sqrt(np.maximum(curve.curvature(middle), 0.0)) * force**-_LOW
+        force, bend = curve.force(middle)[0], np.maximum(curve.curvature(middle), 0.0)
+        density = np.sqrt(bend / bend.max()) * (force / force[-1]) ** -_LOW
     density = np.where(np.isfinite(density), density, 0.0)
-    # the floor serves curves without curvature, one linear spring, where any nodes will do
-    floor = 1e-6 * density.max() if density.max() > 0.0 else 1.0
-    total = np.concatenate([[0.0], np.cumsum((density + floor) * np.diff(edges))])
+    # a floor for curves without curvature, as of one linear spring, where any nodes will do
+    density = density / density.max() + 1e-6 if density.max() > 0.0 else np.ones_like(density)
+    total = np.concatenate([[0.0], np.cumsum(density * np.diff(edges))])
     wanted = np.interp(reach, edges, total)[:, None] * (np.arange(1, cells) / (cells - 1 + _OPEN))
     inner = np.interp(wanted, total, edges)
     zero, end = np.zeros((len(slope), 1)), np.full((len(slope), 1), np.inf)

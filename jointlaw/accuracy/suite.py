@@ -84,8 +84,17 @@ def tractions(law: JointLaw, d: Array) -> Array:
     return F
 
 
+def tangents(law: JointLaw, d: Array) -> Array:
+    """C (steps, paths, dim, dim) in Pa/m along increments d, from the virgin state."""
+    batch, dim = law.joints(d.shape[1], ledger=False), d.shape[2]
+    F, C = np.empty(d.shape[1:]), np.empty((*d.shape, dim))
+    for k, step in enumerate(d):
+        batch.update(step, out=(F, C[k]))
+    return C
+
+
 def errors(F: Array, reference: Array) -> tuple[Array, Array]:
-    """Largest and rms of |F - reference| (steps, paths, dim), over the path's largest |reference|."""
+    """Largest and rms |F - reference| (steps, paths, dim) over the path's largest |reference|."""
     peak = np.linalg.norm(reference, axis=2).max(axis=0)
     off = np.linalg.norm(F - reference, axis=2)
     return off.max(axis=0) / peak, np.sqrt(np.mean(off**2, axis=0)) / peak
@@ -129,8 +138,9 @@ def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]
         "walk": walk,
     }
     if law.plane is not None:
-        plain = {"shear 0": shear, "reversal": back, "constant closure": fixed, "re-contact": again}
-        named = {k: plain.get(k, v)[:, :2] for k, v in named.items() if k not in ("shear 45", "shear 90")}
+        turned = ("shear 45", "shear 90")
+        named |= {"constant closure": fixed, "re-contact": again}
+        named = {name: path[:, :2] for name, path in named.items() if name not in turned}
     held = np.array([name.startswith(("shear", "reversal")) for name in named])
     return tuple(named), R * np.stack(list(named.values()), axis=1), held
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from . import __version__, presets
 from ._command import add_command
+from .accuracy.command import add_tradeoff_command
 from .batch import JointBatch
 from .cli_export import add_export_command
 from .cli_laboratory import add_closure_command, add_shear_command
@@ -39,6 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add_export_command(commands)
     add_fit_command(commands)
     add_scan_command(commands)
+    add_tradeoff_command(commands)
     options = parser.parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
     try:
         return int(options.run(options))

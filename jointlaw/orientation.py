@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from . import nodes
 from ._checks import Array, above, at_least, number
 
 
@@ -107,20 +108,19 @@ class Orientation:
         return np.where(inside, ratio * shape / (2 * math.pi), 0.0)[()]
 
     def facets(self, u: int, phi: int, plane: float | None = None) -> Facets:
-        """Quadrature nodes: Gauss-Legendre in cos(a theta), midpoints in azimuth.
+        """Quadrature nodes: the Gauss rule of the density in cos(a theta), midpoints in azimuth.
 
         `u` nodes in inclination, `phi` on the half circle. With `plane` None the whole circle is
         covered by 2 phi azimuths; with a plane at that azimuth (rad) the half circle measured from
         it suffices, c being replaced by c cos(2 plane): mirror images across it share one motion.
         """
-        x, wx = np.polynomial.legendre.leggauss(u)
-        cos_a, wu = 0.5 * (x + 1), 0.5 * wx
+        cos_a, share = nodes.inclinations(self.b, u)
         count = 2 * phi if plane is None else phi
         c = self.c if plane is None else self.c * math.cos(2 * plane)
         azimuth = (np.arange(count) + 0.5) * (math.pi / phi)
         U, P = (g.ravel() for g in np.meshgrid(cos_a, azimuth, indexing="ij"))
-        weight = np.repeat(wu, count) / count
-        weight = weight * (1 + self.b / 2 * (3 * U**2 - 1) + 3 * c * (1 - U**2) * np.cos(2 * P))
+        lean = 3 * c * (1 - U**2) / (1 + self.b / 2 * (3 * U**2 - 1))  # no more than 1 by Eq. 18
+        weight = np.repeat(share, count) / count * (1 + lean * np.cos(2 * P))
         theta = np.arccos(U) / self.a
         ct, st, cp, sp = np.cos(theta), np.sin(theta), np.cos(P), np.sin(P)
         zero = np.zeros_like(ct)

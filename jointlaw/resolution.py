@@ -11,7 +11,7 @@ from ._checks import whole
 class Resolution:
     """Number of nodes that the law sums over.
 
-    u: inclinations (Gauss-Legendre in cos(a theta)), >= 1.
+    u: inclinations (Gauss rule of the density in cos(a theta)), >= 1.
     phi: azimuths on the half circle, >= 3; motion in 3-D uses twice as many.
     depth: cells of touch depth per orientation, >= 1.
     """
@@ -32,10 +32,10 @@ class Resolution:
 
 
 NAMED = {
-    "fast": Resolution(2, 3, 1),
-    "balanced": Resolution(2, 4, 2),
-    "fine": Resolution(6, 6, 10),
-    "reference": Resolution(10, 16, 24),
+    "fast": Resolution(1, 3, 2),
+    "balanced": Resolution(2, 3, 4),
+    "fine": Resolution(4, 5, 10),
+    "reference": Resolution(16, 10, 24),
 }
 
 

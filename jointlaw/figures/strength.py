@@ -20,7 +20,7 @@ REPLICA = "jing-replica"
 STRESSES = (0.1e6, 0.3e6, 1e6, 3e6, 10e6)  # Pa, our choice
 NEARLY_ZERO = 10.0  # Pa
 SLIP = 1e-3  # m, our choice of a fixed slip at which to read a friction angle
-_COARSE = Resolution(8, 12, 6)
+_COARSE = Resolution(8, 12, 16)  # cells: yield is read where the last of them slides
 
 
 def figure_17() -> Sheet:

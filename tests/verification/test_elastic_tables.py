@@ -90,7 +90,7 @@ def test_elastic_stiffness_is_equation_26_at_any_a(a):
 def test_sliding_under_closure_starts_at_equation_30(a, eta):
     tan = np.tan(np.arccos(0.5) / a)  # the one inclination of a rule of one node
     for factor, share in ((1.0 + 1e-6, 0.0), (1.0 - 1e-6, 1.0)):
-        one = law(a=a, c=0.0, K=KS, lam=KN / KS, eta=eta, mu=factor * tan * KS / KN,
+        one = law(a=a, b=0.0, c=0.0, K=KS, lam=KN / KS, eta=eta, mu=factor * tan * KS / KN,
                   resolution=jl.Resolution(1, 3, 4))  # fmt: skip
         joint = one.joint()
         joint.update([0.7, 0.0, 0.0])

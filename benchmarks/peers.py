@@ -1,0 +1,317 @@
+"""The law beside its peers, in one run on one core: contacts of a DEM code, and the obvious numpy.
+
+    python benchmarks/peers.py [--preset westerly-smooth] [--rounds 12] [--json peers.json]
+    python benchmarks/peers.py --million       a million joints at the 1 % setting: memory, time
+
+Nanoseconds per joint (or contact) and step, the least of rounds in which all take turns; ratios are
+those of these least times.
+
+- ours: `law.at_tolerance(t)` for motion in one plane, traction alone, no ledger, a batch of 10 000.
+  At 1 % also with the tangent.
+- numpy: the same law the obvious way, which is how the tests judge the package
+  (tests/verification/slow_bed.py) with an axis of joints added: a bed of linear springs that touch
+  at fixed depths, each with its slider, for every orientation of a Gauss rule in inclination times
+  even azimuths on the circle; array operations over all 10 000 joints. The bed is the smallest of a
+  spread that meets the same tolerance on the standard paths, with the margin that ours has too. "in blocks" is the same for 64 joints,
+  whose arrays stay in the cache.
+- Hertz-Mindlin: YADE's InteractionLoop with its Law2_ScGeom_MindlinPhys_Mindlin, geometry included,
+  on one thread (`yade -n -x`).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+os.environ["JOINTLAW_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
+
+import numpy as np
+
+import jointlaw as jl
+from jointlaw.accuracy.suite import Suite, errors, standard_suite
+from jointlaw.accuracy.tolerance import MARGIN
+
+TOLERANCES = (0.025, 0.01, 0.001)
+JOINTS, BLOCK = 10_000, 64
+
+YADE = """
+import sys
+import numpy as np
+contacts = {contacts}
+N = round((contacts / 3) ** (1 / 3)) + 1
+R = 0.5
+O.materials.append(FrictMat(young=1e7, poisson=.3, frictionAngle=.5, density=2600))
+rng = np.random.default_rng(1)
+for k in range(N**3):
+    x = (2 * R - 1e-3) * np.array([k % N, k // N % N, k // N**2])
+    O.bodies.append(utils.sphere(x.tolist(), R))
+    O.bodies[-1].state.vel = Vector3(*(1e-3 * rng.uniform(-1, 1, 3)).tolist())
+O.engines = [ForceResetter(), InsertionSortCollider([Bo1_Sphere_Aabb()], verletDist=.01),
+             InteractionLoop([Ig2_Sphere_Sphere_ScGeom()], [Ip2_FrictMat_FrictMat_MindlinPhys()],
+                             [Law2_ScGeom_MindlinPhys_Mindlin()]),
+             NewtonIntegrator(damping=.2)]
+O.dt = 1e-8
+O.timingEnabled = True
+for _ in range(3): O.step()
+while sys.stdin.readline().strip() == "go":
+    best = 1e18
+    for _ in range(10):
+        O.engines[2].execTime = 0
+        O.step()
+        best = min(best, O.engines[2].execTime / O.interactions.countReal())
+    print("RESULT", best, flush=True)
+"""
+
+
+class PlainBed:
+    """n joints as numpy would have them: fixed springs, each with its slider.
+
+    Springs (M, D, n): M orientations, D touch depths with stiffness k (M, D), all of them stepped
+    whether they touch or not. No lumping and no shortcut but one: the traction across the plane of
+    motion is not summed.
+    """
+
+    def __init__(self, law: jl.JointLaw, n: int, u: int, phi: int, depth: int) -> None:
+        o, p = law.orientation, law.asperity
+        x, w = np.polynomial.legendre.leggauss(u)
+        U, P = np.repeat(0.5 * (x + 1), phi), np.tile(np.arange(phi) * 2 * np.pi / phi, u)
+        weight = np.repeat(0.5 * w, phi) / phi
+        weight *= 1 + o.b / 2 * (3 * U**2 - 1) + 3 * o.c * (1 - U**2) * np.cos(2 * P)
+        theta = np.arccos(U) / o.a
+        c1, st = np.cos(theta), np.sin(theta)
+        self.n = np.stack([c1, st * np.cos(P)])  # (2, M): closure and shear in the plane
+        self.s, self.t = np.stack([-st, c1 * np.cos(P)]), np.stack([0 * c1, -np.sin(P)])
+        self.c1, self.lam, self.mu = c1[:, None, None], p.lam, p.mu
+        reach = 1.2 * law.closure_range * (1 + np.tan(theta))  # the standard paths' and some more
+        edges = reach[:, None] * (np.arange(depth) / (depth - 1)) ** 2
+        force, slope = law.curve.force(edges)
+        k = np.diff(slope, axis=1)
+        moment = np.diff(force, axis=1) - slope[:, :-1] * np.diff(edges, axis=1)
+        z = edges[:, 1:] - np.divide(moment, k, out=np.zeros_like(k), where=k > 0)
+        at_once = slope[:, :1]
+        k, z = np.concatenate([at_once, k], axis=1), np.concatenate([0 * at_once, z], axis=1)
+        scale = law.asperity_density * weight * p.lam * p.K * c1 ** (1 + p.eta)
+        self.k, self.z = (scale[:, None] * k)[:, :, None], z[:, :, None]
+        self.delta = np.zeros((2, n))
+        self.e = np.zeros((2, *k.shape, n))
+        self.y = np.zeros((len(U), 1, n))
+
+    def update(self, d: np.ndarray) -> np.ndarray:
+        """Advance by d (2, n); traction (2, n)."""
+        self.delta += d
+        y0, y1 = self.y, np.einsum("im,in->mn", self.n, self.delta)[:, None] / self.c1
+        squeeze = np.maximum(y1 - self.z, 0.0)
+        rise = np.where(y1 > y0, y1 - y0, 1.0)
+        part = np.where(y0 < self.z, np.minimum(squeeze / rise, 1.0), 1.0) * (squeeze > 0)
+        self.e *= squeeze > 0
+        for e, direction in zip(self.e, (self.s, self.t), strict=True):
+            e += part * np.einsum("im,in->mn", direction, d)[:, None]
+        limit = self.mu * self.lam * self.c1 * squeeze
+        size = np.hypot(*self.e)
+        self.e *= limit / np.maximum(np.maximum(size, limit), 1e-300)
+        self.y = y1
+        normal = np.sum(self.k * squeeze, axis=1)
+        shear = np.sum(self.k * self.e, axis=2) / (self.c1[:, :, 0] * self.lam)
+        F: np.ndarray = self.n @ normal + self.s @ shear[0] + self.t @ shear[1]
+        return F
+
+
+def plain_error(law: jl.JointLaw, suite: Suite, rule: tuple[int, int, int]) -> float:
+    """Largest error of a plain bed on the standard paths."""
+    bed = PlainBed(law, suite.d.shape[1], *rule)
+    F = np.stack([bed.update(step.T).T for step in suite.d])
+    return float(errors(F, suite.F)[0].max())
+
+
+def plain_rule(law: jl.JointLaw, suite: Suite, tolerance: float) -> tuple[tuple[int, ...], float]:
+    """The smallest plain bed that meets the tolerance, and its error."""
+    spread = [(u, phi, depth) for u in (1, 2, 3, 4, 6, 8, 12) for phi in (6, 8, 12, 16)
+              for depth in (8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384)]  # fmt: skip
+    fine = (12, 16, 384)
+    alone = [  # what each direction needs while the others are fine
+        next((n for n in sorted({rule[i] for rule in spread})
+              if plain_error(law, suite, (*fine[:i], n, *fine[i + 1 :])) <= tolerance), fine[i])
+        for i in range(3)
+    ]  # fmt: skip
+    best = 1.0
+    for rule in sorted(spread, key=lambda r: r[0] * r[1] * r[2]):
+        if all(a >= b for a, b in zip(rule, alone, strict=True)):
+            best = min(best, error := plain_error(law, suite, rule))
+            if error <= tolerance:
+                return rule, error
+    raise SystemExit(
+        f"no plain bed of the spread meets {tolerance:.2g}; the best reaches {best:.2g}"
+    )
+
+
+def steps_of(law: jl.JointLaw, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """A closure (n, 2), and steps (6, n, 2) that shake the joint around it: slip and separation."""
+    rng = np.random.default_rng(0)
+    first = np.stack([law.closure_range * rng.uniform(0.3, 0.8, n), np.zeros(n)], axis=1)
+    steps = rng.normal(0.0, 0.1 * law.closure_range, (3, n, 2)) * [0.5, 1.0]
+    return first, np.concatenate([steps, -steps])
+
+
+def ours(law: jl.JointLaw, n: int, tangent: bool) -> Any:
+    """A function that takes one timed step and returns its seconds per joint."""
+    batch = law.joints(n, ledger=False)
+    first, steps = steps_of(law, n)
+    F, C = np.empty((n, 2)), np.empty((n, 2, 2)) if tangent else None
+    batch.update(first, tangent=tangent, out=(F, C))
+    count = [0]
+
+    def once() -> float:
+        count[0] += 1
+        start = time.perf_counter()
+        batch.update(steps[count[0] % 6], tangent=tangent, out=(F, C))
+        return (time.perf_counter() - start) / n
+
+    return once
+
+
+def plain(law: jl.JointLaw, n: int, rule: tuple[int, ...]) -> Any:
+    """As `ours`, for the plain bed."""
+    bed = PlainBed(law, n, *rule)
+    first, steps = steps_of(law, n)
+    bed.update(first.T.copy())
+    count = [0]
+
+    def once() -> float:
+        count[0] += 1
+        d = steps[count[0] % 6].T.copy()
+        start = time.perf_counter()
+        bed.update(d)
+        return (time.perf_counter() - start) / n
+
+    return once
+
+
+class Yade:
+    """YADE in a process of its own that takes ten steps whenever it is told to."""
+
+    def __init__(self, folder: str, contacts: int = 20_000) -> None:
+        program = shutil.which("yade")
+        if program is None:
+            raise SystemExit("YADE is not installed (Debian: apt-get install yade)")
+        (Path(folder) / "scene.py").write_text(YADE.format(contacts=contacts))
+        self.process = subprocess.Popen(
+            [program, "-n", "-x", "-j1", "scene.py"], cwd=folder, text=True,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+
+    def once(self) -> float:
+        """Least seconds per contact of ten steps of its InteractionLoop."""
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.process.stdin.write("go\n")
+        self.process.stdin.flush()
+        for line in self.process.stdout:
+            if line.startswith("RESULT"):
+                return float(line.split()[1]) * 1e-9
+        raise SystemExit("YADE ended without a result")
+
+    def close(self) -> None:
+        """End it."""
+        self.process.communicate("stop\n", timeout=60)
+
+
+def compare(law: jl.JointLaw, rounds: int) -> dict[str, Any]:
+    """Least times of all, in ns, with what each is."""
+    suite = standard_suite(law)
+    rows: dict[str, dict[str, Any]] = {}
+    cases: dict[str, Any] = {}
+    for tolerance in TOLERANCES:
+        made = law.at_tolerance(tolerance)
+        error = float(suite.errors(made)[0].max())
+        r = made.resolution
+        about = {"tolerance": tolerance, "error": error, "sliders": r.sliders,
+                 "resolution": f"{r.u} x {r.phi} x {r.depth}"}  # fmt: skip
+        for tangent in (False, True) if tolerance == 0.01 else (False,):
+            name = f"ours at {tolerance:.1%}" + (", with tangent" if tangent else "")
+            rows[name], cases[name] = about, ours(made, JOINTS, tangent)
+        rule, error = plain_rule(law, suite, tolerance / MARGIN)
+        about = {"tolerance": tolerance, "error": error, "sliders": int(np.prod(rule)),
+                 "resolution": " x ".join(map(str, rule))}  # fmt: skip
+        for size, how in ((JOINTS, ""), (BLOCK, ", in blocks")):
+            name = f"numpy at {tolerance:.1%}{how}"
+            rows[name], cases[name] = about, plain(law, size, rule)
+    with tempfile.TemporaryDirectory() as folder:
+        yade = Yade(folder)
+        rows["Hertz-Mindlin, YADE"], cases["Hertz-Mindlin, YADE"] = {}, yade.once
+        best = dict.fromkeys(cases, float("inf"))
+        for turn in range(rounds):
+            for name, once in cases.items():
+                times = 30 if name.startswith("ours") or name.endswith("blocks") else 2
+                best[name] = min(best[name], *(once() for _ in range(times)))
+            print(f"round {turn + 1} of {rounds}", file=sys.stderr)
+        yade.close()
+    for name, value in best.items():
+        rows[name] = rows[name] | {"ns": value * 1e9}
+    return rows
+
+
+def table(rows: dict[str, dict[str, Any]]) -> str:
+    """Markdown, with ratios to Hertz-Mindlin and of numpy to ours at the same tolerance."""
+    hertz = rows["Hertz-Mindlin, YADE"]["ns"]
+    head = "| what | u x phi x depth | sliders | error | ns | over Hertz-Mindlin | over ours |"
+    lines = [head,
+             "| --- | --- | ---: | ---: | ---: | ---: | ---: |"]  # fmt: skip
+    for name, row in rows.items():
+        ratio = ""
+        if name.startswith("numpy"):
+            ratio = f"{row['ns'] / rows[name.split(',')[0].replace('numpy', 'ours')]['ns']:.0f}"
+        error = f"{row['error']:.2%}" if "error" in row else ""
+        lines.append(f"| {name} | {row.get('resolution', '')} | {row.get('sliders', '')} | {error} "
+                     f"| {row['ns']:.0f} | {row['ns'] / hertz:.2f} | {ratio} |")  # fmt: skip
+    return "\n".join(lines)
+
+
+def million(law: jl.JointLaw, n: int = 1_000_000) -> dict[str, Any]:
+    """A million joints at 1 %: bytes, memory of the process, and the time of steps."""
+    made = law.at_tolerance(0.01)
+    base = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    once = ours(made, n, False)
+    best = min(once() for _ in range(7))
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    state = 8 * made.joints(0)._engine.rows * n
+    steps = 8 * n * 2 * 8  # six steps, the first and the result
+    r = made.resolution
+    print(f"{n} joints at 1 % ({r.u} x {r.phi} x {r.depth}, {r.sliders} sliders): "
+          f"state {state / 1e6:.0f} MB, increments and tractions {steps / 1e6:.0f} MB, "
+          f"process {peak / 1e6:.0f} MB of which {base / 1e6:.0f} MB before, "
+          f"{best * 1e9:.0f} ns per joint, {best * n * 1e3:.0f} ms per step")  # fmt: skip
+    return {"joints": n, "state": state, "process": peak, "before": base, "ns": best * 1e9}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--preset", default="westerly-smooth")
+    parser.add_argument("--rounds", type=int, default=12)
+    parser.add_argument("--million", action="store_true", help="only a million joints at 1 %%")
+    parser.add_argument("--json", help="file to write the numbers to")
+    options = parser.parse_args()
+    law = replace(jl.presets.load(options.preset), plane=0.0)
+    result: dict[str, Any]
+    if options.million:
+        result = million(law)
+    else:
+        result = compare(law, options.rounds)
+        print(f"{options.preset}, plane motion, traction alone, one core\n\n{table(result)}")
+    if options.json:
+        Path(options.json).write_text(json.dumps(result, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

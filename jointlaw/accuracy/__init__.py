@@ -1,0 +1,1 @@
+"""How accurate a resolution is: the standard paths, the price list, and the law for a tolerance."""

@@ -1,0 +1,164 @@
+"""The standard paths on which accuracy is measured, and errors along them.
+
+With R the law's closure range and S the normal stress there, the paths are
+
+    closure            close to R, open, close again to R/2
+    shear 0, 45, 90    at the normal stress S/2, along these azimuths to a shear of R
+    reversal           at S/2, to 0.6 R, back to -0.6 R, and to zero
+    constant closure   0.6 R, shear along 30 degrees to R
+    re-contact         closed and sheared, opened under shear until it separates, closed again
+    walk               a smooth random walk in closure and both shears
+
+A law with a plane takes those along azimuth 0 and the others projected on its plane. The paths at
+constant stress are found once, at the reference resolution, and are paths of displacement from then
+on, so that every resolution is asked the same.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from .._checks import Array
+from ..law import JointLaw
+from ..resolution import Resolution
+
+STEPS = 120  # of each path
+
+
+def reference_resolution(law: JointLaw) -> Resolution:
+    """The resolution whose tractions count as exact: steep facets (small a) need the most of it."""
+    if law.heights is None and law.asperity.eta == 0.0:  # one spring, whose slip has a sharp onset
+        return Resolution(64, 48, 1)
+    return Resolution(math.ceil(6 + 36 / law.orientation.a), 16, 36)
+
+
+def coarser(r: Resolution, share: float) -> Resolution:
+    """A share of the nodes in each direction."""
+    u, phi, depth = (round(share * n) for n in (r.u, r.phi, r.depth))
+    return Resolution(max(u, 1), max(phi, 3), max(depth, 1))
+
+
+@dataclass(frozen=True)
+class Suite:
+    """Paths of one law: increments d (steps, paths, dim) in m and reference tractions F in Pa."""
+
+    names: tuple[str, ...]
+    d: Array
+    F: Array
+    uncertainty: Array  # (paths,) of F: its difference from two thirds of the nodes
+
+    def errors(self, law: JointLaw) -> tuple[Array, Array]:
+        """Largest and rms error (paths,) of another resolution, as shares of the peak |F|."""
+        return errors(tractions(law, self.d), self.F)
+
+
+def standard_suite(law: JointLaw) -> Suite:
+    """The standard paths of a law, with tractions at the reference resolution.
+
+    Second-order convergence makes the reference's own error about 0.8 of its `uncertainty`.
+    """
+    return _suite(replace(law, resolution=reference_resolution(law)))
+
+
+@lru_cache(maxsize=16)
+def _suite(law: JointLaw) -> Suite:
+    best = law.resolution
+    stress = float(law.normal_stress(law.closure_range)) / 2
+    names, goal, held = _paths(law, stress)
+    d = np.diff(goal, axis=0, prepend=0.0)
+    d = _hold_stress(replace(law, resolution=coarser(best, 1 / 2)), d, held, stress)
+    F = tractions(law, d)
+    check = tractions(replace(law, resolution=coarser(best, 2 / 3)), d)
+    return Suite(names, d, F, errors(check, F)[0])
+
+
+def tractions(law: JointLaw, d: Array) -> Array:
+    """F (steps, paths, dim) in Pa along increments d of the same shape, from the virgin state."""
+    batch, F = law.joints(d.shape[1], ledger=False), np.empty_like(d)
+    for k, step in enumerate(d):
+        batch.update(step, tangent=False, out=(F[k], None))
+    return F
+
+
+def tangents(law: JointLaw, d: Array) -> Array:
+    """C (steps, paths, dim, dim) in Pa/m along increments d, from the virgin state."""
+    batch, dim = law.joints(d.shape[1], ledger=False), d.shape[2]
+    F, C = np.empty(d.shape[1:]), np.empty((*d.shape, dim))
+    for k, step in enumerate(d):
+        batch.update(step, out=(F, C[k]))
+    return C
+
+
+def errors(F: Array, reference: Array) -> tuple[Array, Array]:
+    """Largest and rms |F - reference| (steps, paths, dim) over the path's largest |reference|."""
+    peak = np.linalg.norm(reference, axis=2).max(axis=0)
+    off = np.linalg.norm(F - reference, axis=2)
+    return off.max(axis=0) / peak, np.sqrt(np.mean(off**2, axis=0)) / peak
+
+
+def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]:
+    """Names, places (steps, paths, dim) in m, and which paths hold the normal stress from STEPS/10.
+
+    The closures of those that hold it are first guesses.
+    """
+    R, seat = law.closure_range, float(law.closure(stress)) / law.closure_range
+    s = np.arange(1, STEPS + 1) / STEPS
+    zero = np.zeros_like(s)
+
+    def legs(at: list[float], *columns: list[float]) -> Array:
+        return np.stack([np.interp(s, at, column) for column in columns], axis=-1)
+
+    def along(path: Array, degrees: float) -> Array:
+        cos, sin = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+        return np.stack([path[:, 0], cos * path[:, 1], sin * path[:, 1]], axis=-1)
+
+    shear = legs([0, 0.1, 1], [0, seat, seat], [0, 0, 1])
+    back = legs([0, 0.1, 0.35, 0.75, 1], [0, *4 * [seat]], [0, 0, 0.6, -0.6, 0])
+    fixed = legs([0, 0.2, 1], [0, 0.6, 0.6], [0, 0, 1])
+    again = legs([0, 0.15, 0.35, 0.6, 0.7, 1], [0, 0.7, 0.7, -0.6, -0.6, 0.8],
+                 [0, 0, 0.4, 0.7, 0.2, 0.5])  # fmt: skip
+    turn = 2 * np.pi * s
+    walk = np.stack([
+        0.45 * (1 - np.cos(3 * turn)) * (0.7 + 0.3 * np.sin(turn)) + 0.1 * np.sin(turn / 4),
+        0.5 * np.sin(2 * turn) + 0.3 * np.sin(3.3 * turn + 0.4) - 0.3 * np.sin(0.4),
+        0.45 * np.sin(1.7 * turn) + 0.25 * np.sin(4.1 * turn + 1.0) - 0.25 * np.sin(1.0),
+    ], axis=-1)  # fmt: skip
+    named = {
+        "closure": np.stack([np.interp(s, [0, 0.4, 0.8, 1], [0, 1, 0, 0.5]), zero, zero], -1),
+        "shear 0": along(shear, 0),
+        "shear 45": along(shear, 45),
+        "shear 90": along(shear, 90),
+        "reversal": along(back, 0),
+        "constant closure": along(fixed, 30),
+        "re-contact": along(again, 60),
+        "walk": walk,
+    }
+    if law.plane is not None:
+        turned = ("shear 45", "shear 90")
+        named |= {"constant closure": fixed, "re-contact": again}
+        named = {name: path[:, :2] for name, path in named.items() if name not in turned}
+    held = np.array([name.startswith(("shear", "reversal")) for name in named])
+    return tuple(named), R * np.stack(list(named.values()), axis=1), held
+
+
+def _hold_stress(law: JointLaw, d: Array, held: Array, stress: float) -> Array:
+    """Increments with the closures of the paths `held` mended to keep the normal stress.
+
+    Two Newton steps per increment keep it to some 1e-3, and what is left is mended in the next:
+    enough, for what is compared are tractions along one and the same path.
+    """
+    d, which = d.copy(), np.flatnonzero(held)
+    batch, least = law.joints(len(which), ledger=False), 1e-3 * stress / law.closure_range
+    for k in range(len(d)):
+        step = d[k, which]
+        for _ in range(2 if k >= STEPS // 10 else 0):
+            F, C = batch.trial(step)
+            assert C is not None
+            step[:, 0] -= (F[:, 0] - stress) / np.maximum(C[:, 0, 0], least)
+        batch.update(step, tangent=False)
+        d[k, which] = step
+    return d

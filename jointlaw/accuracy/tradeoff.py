@@ -1,0 +1,197 @@
+"""The price list of a law: what each resolution costs and how far its tractions are off."""
+
+from __future__ import annotations
+
+import csv
+import io
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._checks import Array, whole
+from .._progress import track
+from .._toml import replace_file
+from ..engine import thread_count
+from ..resolution import NAMED, Resolution, resolve
+from .suite import Suite, coarser, errors, reference_resolution, standard_suite, tangents
+
+if TYPE_CHECKING:
+    from ..law import JointLaw
+
+SPREAD = tuple(
+    Resolution(u, phi, depth)
+    for u, phi in ((1, 3), (2, 3), (2, 4), (3, 4), (4, 5), (6, 6))
+    for depth in (1, 2, 3, 4, 6, 10, 16)
+)
+_MEMORY = 100_000_000  # bytes of state that a timing may use; very fine laws get a smaller batch
+
+
+@dataclass(frozen=True)
+class Price:
+    """One resolution: errors are shares of the largest traction (or tangent) of each path.
+
+    `error`, `rms` (paths,): of the traction. `tangent_rms`, `tangent_max`: of the tangent, over all
+    paths; it jumps between stick and slip, and the largest error is that of a jump that comes one
+    step early or late. `ns`, `ns_tangent`: nanoseconds per joint and update without and with
+    tangent, no ledger, least of several runs; NaN where nothing was timed. `bytes`: per joint.
+    """
+
+    resolution: Resolution
+    sliders: int
+    error: Array
+    rms: Array
+    tangent_rms: float
+    tangent_max: float
+    ns: float
+    ns_tangent: float
+    bytes: int
+
+    @property
+    def worst(self) -> float:
+        """Largest error of the traction on any path."""
+        return float(self.error.max())
+
+
+@dataclass(frozen=True)
+class Tradeoff:
+    """Prices by ascending sliders; print it to read its frontier.
+
+    `uncertainty` (paths,) is that of the reference that errors are measured against; `joints` the
+    size of the batch that was timed, on the kernel and threads named in `how`.
+    """
+
+    paths: tuple[str, ...]
+    uncertainty: Array
+    rows: tuple[Price, ...]
+    joints: int
+    how: str
+
+    def frontier(self) -> tuple[Price, ...]:
+        """The prices that no other with as few sliders beats in its largest error."""
+        best: list[Price] = []
+        for row in sorted(self.rows, key=lambda row: (row.sliders, row.worst)):
+            if not best or row.worst < best[-1].worst:
+                best.append(row)
+        return tuple(best)
+
+    def __str__(self) -> str:
+        lines = [
+            f"{'u phi depth':>12s} {'sliders':>8s} {'bytes':>7s} {'max error':>10s} {'rms':>8s} "
+            f"{'tangent rms':>12s} {'ns':>8s} {'with tangent':>13s}  worst path"
+        ]
+        for row in self.frontier():
+            r = row.resolution
+            name = next((f"  = {n}" for n, value in NAMED.items() if value == r), "")
+            lines.append(
+                f"{f'{r.u} {r.phi} {r.depth}':>12s} {row.sliders:8d} {row.bytes:7d} "
+                f"{row.worst:10.2%} {row.rms.max():8.2%} {row.tangent_rms:12.2%} {_ns(row.ns):>8s} "
+                f"{_ns(row.ns_tangent):>13s}  {self.paths[int(row.error.argmax())]}{name}"
+            )
+        timed = f"ns per joint and update: {self.joints} joints, {self.how}"
+        lines.append(
+            f"the frontier of {len(self.rows)} resolutions; reference uncertain by "
+            f"{self.uncertainty.max():.2%}; {timed if self.joints else 'nothing was timed'}"
+        )
+        return "\n".join(lines)
+
+    def columns(self) -> dict[str, list[Any]]:
+        """All prices by column name, one column of largest and of rms error per path."""
+        rows = self.rows
+        table: dict[str, list[Any]] = {
+            "u": [r.resolution.u for r in rows],
+            "phi": [r.resolution.phi for r in rows],
+            "depth": [r.resolution.depth for r in rows],
+            "sliders": [r.sliders for r in rows],
+            "bytes": [r.bytes for r in rows],
+            "ns": [r.ns for r in rows],
+            "ns_tangent": [r.ns_tangent for r in rows],
+            "error": [r.worst for r in rows],
+            "rms": [float(r.rms.max()) for r in rows],
+            "tangent_rms": [r.tangent_rms for r in rows],
+            "tangent_max": [r.tangent_max for r in rows],
+        }
+        for i, path in enumerate(self.paths):
+            table[f"error {path}"] = [float(r.error[i]) for r in rows]
+            table[f"rms {path}"] = [float(r.rms[i]) for r in rows]
+        return table
+
+    def to_csv(self, path: str | Path) -> None:
+        """All prices as CSV; errors are shares (1), times ns, sizes bytes."""
+        stream = io.StringIO(newline="")
+        writer, table = csv.writer(stream), self.columns()
+        writer.writerow(table)
+        writer.writerows(zip(*table.values(), strict=True))
+        replace_file(Path(path), stream.getvalue().encode())
+
+    def plot(self, path: str | Path | None = None) -> Any:
+        """The frontier as a matplotlib figure; with `path` it is written there and closed."""
+        from .plot import plot_tradeoff
+
+        return plot_tradeoff(self, path)
+
+
+def tradeoff(
+    law: JointLaw,
+    resolutions: Sequence[str | Resolution] | None = None,
+    joints: int = 10_000,
+    seconds: float = 0.05,
+) -> Tradeoff:
+    """See `JointLaw.tradeoff`."""
+    joints = whole("joints", joints, 0)
+    chosen = (*SPREAD, *NAMED.values()) if resolutions is None else map(resolve, resolutions)
+    found = sorted(dict.fromkeys(chosen), key=lambda r: (r.sliders, r.u, r.phi))
+    if not found:
+        raise ValueError("resolutions is empty; give some, or None for the usual spread")
+    suite = standard_suite(law)
+    fine = replace(law, resolution=coarser(reference_resolution(law), 0.5))
+    exact = tangents(fine, suite.d)
+    rows = tuple(
+        _price(replace(law, resolution=r), suite, exact, joints, seconds)
+        for r in track(found, "resolutions", len(found))
+    )
+    kernel = type(law.joints(0)._engine).__name__.removesuffix("Engine").lower()
+    return Tradeoff(
+        suite.names, suite.uncertainty, rows, joints, f"{kernel}, at most {thread_count()} threads"
+    )
+
+
+def _price(law: JointLaw, suite: Suite, exact: Array, joints: int, seconds: float) -> Price:
+    error, rms = suite.errors(law)
+    steps, paths = exact.shape[:2]
+    C = tangents(law, suite.d).reshape(steps, paths, -1)
+    tangent_max, tangent_rms = errors(C, exact.reshape(steps, paths, -1))
+    ns = [_time(law, joints, tangent, seconds) for tangent in (False, True)]
+    made = law.joints(0)._engine.rows
+    return Price(
+        law.resolution, len(law.tables.c1) * law.tables.cells, error, rms,
+        float(np.sqrt(np.mean(tangent_rms**2))), float(tangent_max.max()), ns[0], ns[1], 8 * made,
+    )  # fmt: skip
+
+
+def _time(law: JointLaw, n: int, tangent: bool, seconds: float) -> float:
+    """Least time of an update in ns per joint, of runs that take this long together."""
+    if n == 0:
+        return float("nan")
+    n = min(n, max(_MEMORY // (8 * law.tables.rows), 1))
+    batch, dim = law.joints(n, ledger=False), law.tables.dim
+    rng = np.random.default_rng(0)
+    steps = rng.normal(0.0, 0.1 * law.closure_range, (3, n, dim))
+    steps = np.concatenate([steps, -steps])
+    first = np.zeros((n, dim))
+    first[:, 0] = law.closure_range * rng.uniform(0.3, 0.8, n)
+    out = np.empty((n, dim)), np.empty((n, dim, dim)) if tangent else None
+    batch.update(first, tangent=tangent, out=out)
+    best, k, end = float("inf"), 0, time.perf_counter() + seconds
+    while k < 3 or time.perf_counter() < end:
+        start = time.perf_counter()
+        batch.update(steps[k % len(steps)], tangent=tangent, out=out)
+        best, k = min(best, time.perf_counter() - start), k + 1
+    return best / n * 1e9
+
+
+def _ns(value: float) -> str:
+    return "-" if np.isnan(value) else f"{value:.0f}"

@@ -16,7 +16,7 @@ from .curve import Curve
 # Chosen on random laws with `benchmarks/nodes.py`
 _STEEPEST = 10.0  # largest tan(theta) that counts: at a = 1 it grows without bound
 _LOW = 0.1  # power of Phi that draws nodes towards small loads
-_OPEN = 1.5  # shares of the grading left to the last cell: few cells then sit where most loads are
+_OPEN = 1.8  # shares of the grading left to the last cell: few cells then sit where most loads are
 _GRID = 512  # panels on which the touch-depth density is summed
 
 

@@ -3,7 +3,7 @@
     python benchmarks/nodes.py [--laws 16] [--picture docs/pictures/frontier.png]
 
 Largest error of the traction on the standard paths, in per cent: median over the laws, and the 90th
-percentile in brackets. Laws are drawn as in benchmarks/tolerance.py, a >= 1.4, motion in one plane
+percentile in brackets; then those of the named resolutions for the paper's presets. Laws are drawn as in benchmarks/tolerance.py, a >= 1.4, motion in one plane
 (staggered azimuths: in space). `before` is what the package did up to version 0.1.0: Gauss-Legendre
 inclinations, depths (i/n)^1.5 of closure_range (1 + tan theta).
 """
@@ -26,6 +26,7 @@ from jointlaw import nodes
 from jointlaw._progress import track
 from jointlaw.accuracy.suite import Suite, standard_suite
 from jointlaw.orientation import Facets, Orientation
+from jointlaw.resolution import NAMED
 
 Rule = Callable[..., Any]
 KEPT, NOW = Orientation.facets, nodes.inclinations
@@ -280,10 +281,17 @@ def main() -> None:
     with placed(inclinations=legendre, depths=graded(1.5)):
         before = frontier(cases)
     print("\n| sliders | before | now |\n|---:|---:|---:|")
-    for (sliders, old), (_, new) in zip(before, after, strict=True):
-        if sliders in (6, 12, 24, 48, 96, 200, 576):
-            print(f"| {sliders} | {np.median(old):.2f} ({np.quantile(old, 0.9):.2f}) "
-                  f"| {np.median(new):.2f} ({np.quantile(new, 0.9):.2f}) |")  # fmt: skip
+    shown = {}
+    for (sliders, old), (_, new) in zip(before, after, strict=True):  # the last of each counts
+        cells = [f"{np.median(e):.2f} ({np.quantile(e, 0.9):.2f})" for e in (old, new)]
+        shown[sliders] = f"| {sliders} | {' | '.join(cells)} |"
+    print("\n".join(shown[n] for n in (6, 12, 24, 48, 96, 200, 576)))
+
+    print("\n" + head("named", ["sliders", *jl.presets.names()]))
+    for name, r in NAMED.items():
+        errors = worst(cases[len(laws) :], (r.u, r.phi, r.depth))
+        print(f"| {name} | {r.sliders} | {' | '.join(f'{e:.2f}' for e in errors)} |")
+        numbers[name] = errors.tolist()
     numbers["frontier"] = {k: [(s, e.tolist()) for s, e in found]
                            for k, found in (("before", before), ("now", after))}  # fmt: skip
     if options.picture:

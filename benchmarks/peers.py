@@ -12,8 +12,8 @@ those of these least times.
   (tests/verification/slow_bed.py) with an axis of joints added: a bed of linear springs that touch
   at fixed depths, each with its slider, for every orientation of a Gauss rule in inclination times
   even azimuths on the circle; array operations over all 10 000 joints. The bed is the smallest of a
-  spread that meets the same tolerance on the standard paths, with the margin that ours has too. "in blocks" is the same for 64 joints,
-  whose arrays stay in the cache.
+  spread that meets the same tolerance on the standard paths, with the margin that ours has too.
+  "in blocks" is the same for 64 joints, whose arrays stay in the cache.
 - Hertz-Mindlin: YADE's InteractionLoop with its Law2_ScGeom_MindlinPhys_Mindlin, geometry included,
   on one thread (`yade -n -x`).
 """
@@ -39,7 +39,7 @@ import numpy as np
 
 import jointlaw as jl
 from jointlaw.accuracy.suite import Suite, errors, standard_suite
-from jointlaw.accuracy.tolerance import MARGIN
+from jointlaw.accuracy.tolerance import margin
 
 TOLERANCES = (0.025, 0.01, 0.001)
 JOINTS, BLOCK = 10_000, 64
@@ -239,7 +239,7 @@ def compare(law: jl.JointLaw, rounds: int) -> dict[str, Any]:
         for tangent in (False, True) if tolerance == 0.01 else (False,):
             name = f"ours at {tolerance:.1%}" + (", with tangent" if tangent else "")
             rows[name], cases[name] = about, ours(made, JOINTS, tangent)
-        rule, error = plain_rule(law, suite, tolerance / MARGIN)
+        rule, error = plain_rule(law, suite, tolerance / margin(tolerance))
         about = {"tolerance": tolerance, "error": error, "sliders": int(np.prod(rule)),
                  "resolution": " x ".join(map(str, rule))}  # fmt: skip
         for size, how in ((JOINTS, ""), (BLOCK, ", in blocks")):

@@ -5,7 +5,7 @@
 Laws: a from 1 to 10 (evenly in log a), b and c over their bounds, mu 0.05 to 1, eta 0 to 0.7,
 heights of either formation or none, in a plane or in space. Paths: six per law, five to eight legs
 between random corners, closures up to the law's closure range R and openings to -0.3 R, shear up to
-R. The truth is a resolution finer than the one that `at_tolerance` uses.
+R. The truth is 1.25 times the reference resolution in each direction.
 
 `met` is the share of laws that keep the tolerance on all six paths, `paths` the share of paths that
 do, `worst` the largest error over the tolerance. a < 1.4 is reported apart.
@@ -25,7 +25,7 @@ import numpy as np
 
 import jointlaw as jl
 from jointlaw._progress import track
-from jointlaw.accuracy.suite import errors, reference_resolution, tractions
+from jointlaw.accuracy.suite import errors, reference_resolution, scaled, tractions
 
 TOLERANCES = (0.05, 0.025, 0.01, 0.003, 0.001)
 PATHS, STEPS = 6, 160
@@ -78,9 +78,7 @@ def misses(law: jl.JointLaw, rng: np.random.Generator) -> list[dict[str, Any]]:
     """Per tolerance: largest error of each random path over the tolerance, and the sliders."""
     d = random_paths(law, rng)
     best = reference_resolution(law)
-    u, phi = math.ceil(1.3 * best.u), math.ceil(1.3 * best.phi)
-    finer = jl.Resolution(u, phi, best.depth + best.depth // 3)
-    truth = tractions(replace(law, resolution=finer), d)
+    truth = tractions(replace(law, resolution=scaled(best, 1.25)), d)
     found = []
     for tolerance in TOLERANCES:
         start = time.perf_counter()

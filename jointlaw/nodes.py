@@ -16,7 +16,7 @@ from .curve import Curve
 # Chosen on random laws with `benchmarks/nodes.py`
 _STEEPEST = 10.0  # largest tan(theta) that counts: at a = 1 it grows without bound
 _LOW = 0.1  # power of Phi that draws nodes towards small loads
-_OPEN = 1.5  # shares of the grading left to the last cell: few cells then sit where most loads are
+_OPEN = 1.8  # shares of the grading left to the last cell: few cells then sit where most loads are
 _GRID = 512  # panels on which the touch-depth density is summed
 
 
@@ -62,9 +62,10 @@ def depth_nodes(curve: Curve, closure_range: float, slope: Array, cells: int) ->
         force, bend = curve.force(middle)[0], np.maximum(curve.curvature(middle), 0.0)
         density = np.sqrt(bend / bend.max()) * (force / force[-1]) ** -_LOW
     density = np.where(np.isfinite(density), density, 0.0)
+    share = density * np.diff(edges)
     # a floor for curves without curvature, as of one linear spring, where any nodes will do
-    density = density / density.max() + 1e-6 if density.max() > 0.0 else np.ones_like(density)
-    total = np.concatenate([[0.0], np.cumsum(density * np.diff(edges))])
+    share = share / max(share.sum(), 1e-300) + 1e-6 * np.diff(edges) / edges[-1]
+    total = np.concatenate([[0.0], np.cumsum(share)])
     wanted = np.interp(reach, edges, total)[:, None] * (np.arange(1, cells) / (cells - 1 + _OPEN))
     inner = np.interp(wanted, total, edges)
     zero, end = np.zeros((len(slope), 1)), np.full((len(slope), 1), np.inf)

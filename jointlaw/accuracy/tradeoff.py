@@ -17,7 +17,7 @@ from .._progress import track
 from .._toml import replace_file
 from ..engine import thread_count
 from ..resolution import NAMED, Resolution, resolve
-from .suite import Suite, coarser, errors, reference_resolution, standard_suite, tangents
+from .suite import Suite, errors, reference_resolution, scaled, standard_suite, tangents
 
 if TYPE_CHECKING:
     from ..law import JointLaw
@@ -147,7 +147,7 @@ def tradeoff(
     if not found:
         raise ValueError("resolutions is empty; give some, or None for the usual spread")
     suite = standard_suite(law)
-    fine = replace(law, resolution=coarser(reference_resolution(law), 0.5))
+    fine = replace(law, resolution=scaled(reference_resolution(law), 0.5))
     exact = tangents(fine, suite.d)
     rows = tuple(
         _price(replace(law, resolution=r), suite, exact, joints, seconds)

@@ -1,0 +1,305 @@
+"""Where to put the nodes: rules tried, and the frontier before and after.
+
+    python benchmarks/nodes.py [--laws 16] [--picture docs/pictures/frontier.png]
+
+Largest error of the traction on the standard paths, in per cent: median over the laws, and the 90th
+percentile in brackets; then those of the named resolutions for the paper's presets. Laws are drawn as in benchmarks/tolerance.py, a >= 1.4, motion in one plane
+(staggered azimuths: in space). `before` is what the package did up to version 0.1.0: Gauss-Legendre
+inclinations, depths (i/n)^1.5 of closure_range (1 + tan theta).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from tolerance import random_law
+
+import jointlaw as jl
+from jointlaw import nodes
+from jointlaw._progress import track
+from jointlaw.accuracy.suite import Suite, standard_suite
+from jointlaw.orientation import Facets, Orientation
+from jointlaw.resolution import NAMED
+
+Rule = Callable[..., Any]
+KEPT, NOW = Orientation.facets, nodes.inclinations
+CELLS = (1, 2, 3, 4, 6, 10, 16)
+RULES = ((1, 3), (1, 4), (2, 3), (2, 4), (3, 4), (4, 6), (6, 8))
+GRID = [(u, phi, n) for u, phi in ((1, 3), (2, 3), (2, 4), (3, 4), (4, 5), (4, 6), (6, 6), (6, 8))
+        for n in CELLS]  # fmt: skip
+
+
+@contextmanager
+def placed(inclinations: Rule | None = None, depths: Rule | None = None,
+           facets: Rule | None = None) -> Iterator[None]:  # fmt: skip
+    """Other rules while the block runs."""
+    kept = nodes.inclinations, nodes.depth_nodes, Orientation.facets
+    nodes.inclinations = inclinations or kept[0]
+    nodes.depth_nodes = depths or kept[1]
+    Orientation.facets = facets or kept[2]
+    try:
+        yield
+    finally:
+        nodes.inclinations, nodes.depth_nodes, Orientation.facets = kept
+
+
+# ------------------------------------------------------------------ inclinations: u and shares
+
+
+def density(u: np.ndarray, b: float) -> np.ndarray:
+    return 1 + b / 2 * (3 * u**2 - 1)
+
+
+def mapped(place: Rule, rate: Rule) -> Rule:
+    """Gauss-Legendre in v, u = place(v)."""
+
+    def rule(b: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+        x, w = np.polynomial.legendre.leggauss(count)
+        v = 0.5 * (x + 1)
+        return place(v), 0.5 * w * rate(v) * density(place(v), b)
+
+    return rule
+
+
+def legendre(b: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+    return mapped(lambda v: v, np.ones_like)(b, count)
+
+
+def midpoints(b: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+    u = (np.arange(count) + 0.5) / count
+    return u, density(u, b) / count
+
+
+def radau(steepest: bool) -> Rule:
+    """The density's rule with one node fixed at u = 0 (steepest) or 1 (flat)."""
+
+    def rule(b: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+        if count == 1:
+            return NOW(b, 1)
+        x, w = np.polynomial.legendre.leggauss(2 * count + 2)
+        x = 0.5 * (x + 1)
+        w = 0.5 * w * density(x, b)
+        end = 1e-6 if steepest else 1 - 1e-6  # at the very end the density may be zero
+        u, share = gauss(x, w * np.abs(x - end), count - 1)
+        share = share / np.abs(u - end)
+        return np.append(u, end), np.append(share, w.sum() - share.sum())
+
+    return rule
+
+
+def gauss(x: np.ndarray, w: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss rule of a discrete weight w at x, by Lanczos' recurrence."""
+    middle, side = np.zeros(count), np.zeros(count)
+    before, now = np.zeros_like(x), np.sqrt(w / w.sum())
+    for k in range(count):
+        middle[k] = np.sum(x * now**2)
+        after = (x - middle[k]) * now - (side[k - 1] * before if k else 0.0)
+        side[k] = np.linalg.norm(after)
+        before, now = now, after / side[k]
+    u, vectors = np.linalg.eigh(np.diag(middle) + np.diag(side[:-1], 1) + np.diag(side[:-1], -1))
+    return u, w.sum() * vectors[0] ** 2
+
+
+INCLINATIONS: dict[str, Rule | None] = {
+    "Gauss rule of the density (now)": None,
+    "Gauss-Legendre in u (before)": legendre,
+    "Gauss-Legendre in sqrt(u)": mapped(lambda v: v**2, lambda v: 2 * v),
+    "Gauss-Legendre in theta": mapped(
+        lambda v: np.sin(np.pi / 2 * v), lambda v: np.pi / 2 * np.cos(np.pi / 2 * v)
+    ),
+    "midpoints in u": midpoints,
+    "density, a node at the steepest": radau(True),
+    "density, a node at the flattest": radau(False),
+}
+
+
+def staggered(self: Orientation, u: int, phi: int, plane: float | None = None) -> Facets:
+    """Every second ring of the whole circle turned by half a spacing."""
+    made = KEPT(self, u, phi, plane)
+    count = 2 * phi
+    shift = np.array([0.0, 0.5])[np.arange(u) % 2, None] * math.pi / phi
+    turned = made.phi.reshape(u, count) - shift
+    P, U = turned.ravel(), np.cos(self.a * made.theta)
+    lean = 3 * self.c * (1 - U**2) / density(U, self.b)
+    weight = made.weight * (1 + lean * np.cos(2 * P)) / (1 + lean * np.cos(2 * made.phi))
+    ct, st, cp, sp = np.cos(made.theta), np.sin(made.theta), np.cos(P), np.sin(P)
+    return Facets(made.theta, P, weight, np.array([ct, st * cp, st * sp]),
+                  np.array([-st, ct * cp, ct * sp]), np.array([0 * ct, -sp, cp]))  # fmt: skip
+
+
+# --------------------------------------------------------------------------------- depth cells
+
+
+def limits(inner: np.ndarray) -> np.ndarray:
+    zero = np.zeros((len(inner), 1))
+    return np.concatenate([zero, inner, zero + np.inf], axis=1)
+
+
+def graded(power: float, share: float = 1.0) -> Rule:
+    def rule(curve: Any, closure_range: float, slope: np.ndarray, cells: int) -> np.ndarray:
+        reach = share * closure_range * (1 + np.minimum(slope, 10.0))
+        return limits(reach[:, None] * (np.arange(1, cells) / cells) ** power)
+
+    return rule
+
+
+def geometric(curve: Any, closure_range: float, slope: np.ndarray, cells: int) -> np.ndarray:
+    """The fair start of the first design: 30^-(1 - i/n)."""
+    reach = closure_range * (1 + np.minimum(slope, 10.0))
+    return limits(reach[:, None] * 30.0 ** -(1 - np.arange(1, cells) / cells))
+
+
+def quantiles(power: float, low: float, beyond: float) -> Rule:
+    """Equal shares of int Phi''^power Phi^-low dz, the last cell `beyond` of them."""
+
+    def rule(curve: Any, closure_range: float, slope: np.ndarray, cells: int) -> np.ndarray:
+        reach = closure_range * (1 + np.minimum(slope, 10.0))
+        edges = reach.max() * (np.arange(513) / 512) ** 4
+        z = 0.5 * (edges[1:] + edges[:-1])
+        with np.errstate(all="ignore"):
+            w = np.maximum(curve.curvature(z), 0.0) ** power * curve.force(z)[0] ** -low
+        w = np.where(np.isfinite(w), w, 0.0)
+        w = w / w.max() + 1e-6 if w.max() > 0 else np.ones_like(w)
+        total = np.concatenate([[0.0], np.cumsum(w * np.diff(edges))])
+        share = np.arange(1, cells) / (cells - 1 + beyond)
+        return limits(np.interp(np.interp(reach, edges, total)[:, None] * share, total, edges))
+
+    return rule
+
+
+DEPTHS: dict[str, Rule | None] = {
+    "sqrt(Phi'') Phi^-0.1, last 1.8 (now)": None,
+    "(i/n)^1.5 (before)": graded(1.5),
+    "(i/n)^1.2": graded(1.2),
+    "(i/n)^1": graded(1.0),
+    "(i/n)^1.2 of 0.8": graded(1.2, 0.8),
+    "30^-(1 - i/n)": geometric,
+    "Phi'' (equal stiffness), last 1": quantiles(1.0, 0.0, 1.0),
+    "sqrt(Phi''), last 1": quantiles(0.5, 0.0, 1.0),
+    "sqrt(Phi''), last 1.8": quantiles(0.5, 0.0, 1.8),
+    "sqrt(Phi'') Phi^-0.1, last 1": quantiles(0.5, 0.1, 1.0),
+    "sqrt(Phi'') Phi^-0.1, last 2.5": quantiles(0.5, 0.1, 2.5),
+    "sqrt(Phi'') Phi^-0.2, last 1.8": quantiles(0.5, 0.2, 1.8),
+}
+
+
+# ------------------------------------------------------------------------------------- measure
+
+
+def worst(cases: list[tuple[jl.JointLaw, Suite]], rule: tuple[int, int, int]) -> np.ndarray:
+    """Largest error in per cent of each law."""
+    r = jl.Resolution(*rule)
+    return np.array([100 * s.errors(replace(law, resolution=r))[0].max() for law, s in cases])
+
+
+def row(name: str, errors: list[np.ndarray]) -> str:
+    cells = [f"{np.median(e):.2f} ({np.quantile(e, 0.9):.2f})" for e in errors]
+    return f"| {name} | {' | '.join(cells)} |"
+
+
+def head(title: str, labels: list[str]) -> str:
+    return f"| {title} | {' | '.join(labels)} |\n|---|{'---:|' * len(labels)}"
+
+
+def frontier(cases: list[tuple[jl.JointLaw, Suite]]) -> list[tuple[int, np.ndarray]]:
+    """Sliders, and per law the least error with as many or fewer."""
+    found: list[tuple[int, np.ndarray]] = []
+    best = np.full(len(cases), np.inf)
+    for rule in sorted(GRID, key=lambda r: r[0] * r[1] * r[2]):
+        best = np.minimum(best, worst(cases, rule))
+        found.append((rule[0] * rule[1] * rule[2], best))
+    return found
+
+
+def picture(path: str, before: Any, after: Any) -> None:
+    """Median and 90th percentile of both frontiers."""
+    from matplotlib import pyplot
+
+    figure, axis = pyplot.subplots(figsize=(6.5, 4.5), layout="constrained")
+    for found, color, label in ((before, "0.5", "before"), (after, "C0", "now")):
+        x = [sliders for sliders, _ in found]
+        axis.loglog(x, [np.median(e) for _, e in found], "o-", ms=3, color=color, label=label)
+        axis.loglog(x, [np.quantile(e, 0.9) for _, e in found], "--", color=color, lw=1,
+                    label=f"{label}, 90 % of the laws")  # fmt: skip
+    axis.set_xlabel("sliders per joint, motion in one plane")
+    axis.set_ylabel("largest error on the standard paths (% of the peak)")
+    axis.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axis.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axis.grid(True, which="both", alpha=0.2)
+    axis.legend()
+    figure.savefig(path, dpi=150)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--laws", type=int, default=16, help="random ones, beside the presets")
+    parser.add_argument("--picture", help="file for the frontier before and after")
+    parser.add_argument("--json", help="file to write the numbers to")
+    options = parser.parse_args()
+    rng, laws = np.random.default_rng(4), []
+    while len(laws) < options.laws:
+        if (law := random_law(rng)).orientation.a >= 1.4:
+            laws.append(law)
+    flat = [replace(law, plane=0.0) for law in laws]
+    flat += [replace(jl.presets.load(name), plane=0.0) for name in jl.presets.names()]
+    cases = [(law, standard_suite(law)) for law in track(flat, "references", len(flat))]
+    numbers: dict[str, Any] = {}
+
+    print(head("depth cells, at 6 x 6 orientations", [str(n) for n in CELLS[1:]]))
+    for name, rule in DEPTHS.items():
+        with placed(depths=rule):
+            errors = [worst(cases, (6, 6, n)) for n in CELLS[1:]]
+        print(row(name, errors), flush=True)
+        numbers[name] = [e.tolist() for e in errors]
+
+    print("\n" + head("inclinations, u x phi at 16 cells", [f"{u} x {p}" for u, p in RULES]))
+    for name, rule in INCLINATIONS.items():
+        with placed(inclinations=rule):
+            errors = [worst(cases, (u, p, 16)) for u, p in RULES]
+        print(row(name, errors), flush=True)
+        numbers[name] = [e.tolist() for e in errors]
+
+    space = [replace(law, plane=None) for law in laws[:8]]
+    there = [(law, standard_suite(law)) for law in track(space, "references", len(space))]
+    print("\n" + head("in space, u x phi at 16 cells", [f"{u} x {p}" for u, p in RULES]))
+    for name, rule in (("azimuths in line (now)", None), ("staggered", staggered)):
+        with placed(facets=rule):
+            errors = [worst(there, (u, p, 16)) for u, p in RULES]
+        print(row(name, errors), flush=True)
+        numbers[name] = [e.tolist() for e in errors]
+
+    after = frontier(cases)
+    with placed(inclinations=legendre, depths=graded(1.5)):
+        before = frontier(cases)
+    print("\n| sliders | before | now |\n|---:|---:|---:|")
+    shown = {}
+    for (sliders, old), (_, new) in zip(before, after, strict=True):  # the last of each counts
+        cells = [f"{np.median(e):.2f} ({np.quantile(e, 0.9):.2f})" for e in (old, new)]
+        shown[sliders] = f"| {sliders} | {' | '.join(cells)} |"
+    print("\n".join(shown[n] for n in (6, 12, 24, 48, 96, 200, 576)))
+
+    print("\n" + head("named", ["sliders", *jl.presets.names()]))
+    for name, r in NAMED.items():
+        errors = worst(cases[len(laws) :], (r.u, r.phi, r.depth))
+        print(f"| {name} | {r.sliders} | {' | '.join(f'{e:.2f}' for e in errors)} |")
+        numbers[name] = errors.tolist()
+    numbers["frontier"] = {k: [(s, e.tolist()) for s, e in found]
+                           for k, found in (("before", before), ("now", after))}  # fmt: skip
+    if options.picture:
+        picture(options.picture, before, after)
+    if options.json:
+        with open(options.json, "w") as stream:
+            json.dump(numbers, stream)
+
+
+if __name__ == "__main__":
+    main()

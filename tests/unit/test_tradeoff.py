@@ -1,0 +1,101 @@
+"""The price list: its table, files, picture and command. Nothing is timed here."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+from jointlaw.accuracy.tradeoff import SPREAD
+from jointlaw.cli import main
+
+CHOSEN = ["fast", jl.Resolution(2, 3, 2), "balanced", jl.Resolution(1, 3, 1), "fast"]
+
+
+@pytest.fixture(scope="module")
+def found():
+    law = jl.JointLaw(
+        orientation=jl.Orientation(6.0),
+        asperity=jl.Asperity(K=2.0e8, lam=1.2, eta=0.5, mu=0.3),
+        asperity_density=1e10,
+        plane=0.0,
+    )
+    return law.tradeoff(CHOSEN, joints=0)
+
+
+def test_each_resolution_has_its_price(found):
+    assert [row.sliders for row in found.rows] == [3, 6, 12, 24]
+    assert len(found.paths) == len(found.uncertainty) == 6
+    for row in found.rows:
+        assert row.error.shape == row.rms.shape == (6,)
+        assert (row.rms <= row.error).all()
+        assert row.bytes >= 8 * (2 * row.sliders + 4)
+        assert np.isnan(row.ns)
+        # each is coarser than the reference by far
+        assert row.worst > found.uncertainty.max()
+    # more cells, less error: 1, 2 and 4 of them on the same or more orientations
+    worst = [row.worst for row in found.rows]
+    assert worst[0] > worst[1] > worst[3]
+    assert found.rows[3].tangent_rms < found.rows[0].tangent_rms
+
+
+def test_the_frontier_falls(found):
+    frontier = found.frontier()
+    assert [row.sliders for row in frontier] == sorted({row.sliders for row in frontier})
+    assert (np.diff([row.worst for row in frontier]) < 0).all()
+    assert frontier[0].sliders == 3
+    text = str(found)
+    assert "= fast" in text
+    assert "nothing was timed" in text
+
+
+def test_csv_holds_every_number(found, tmp_path):
+    found.to_csv(tmp_path / "t.csv")
+    with open(tmp_path / "t.csv", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [int(row["sliders"]) for row in rows] == [3, 6, 12, 24]
+    for row, price in zip(rows, found.rows, strict=True):
+        each = [float(row[f"error {path}"]) for path in found.paths]
+        assert each == price.error.tolist()
+        assert float(row["error"]) == max(each)
+
+
+def test_picture_has_units(found, tmp_path):
+    pytest.importorskip("matplotlib")
+    figure = found.plot()
+    (axis,) = figure.axes
+    assert "%" in axis.get_ylabel()
+    found.plot(tmp_path / "t.png")
+    assert (tmp_path / "t.png").stat().st_size > 10_000
+
+
+def test_the_usual_spread_holds_the_named_resolutions_too():
+    assert len(set(SPREAD)) == 42
+
+
+def test_command_writes_table_law_and_summary(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("jointlaw.accuracy.tradeoff.SPREAD", (jl.Resolution(1, 3, 1),))
+    monkeypatch.setattr("jointlaw.accuracy.tradeoff.NAMED", {"fast": jl.Resolution(1, 3, 2)})
+    out = tmp_path / "out"
+    arguments = "tradeoff linear-a6 --plane 0 --joints 0 --tolerance 0.05 --out"
+    assert main([*arguments.split(), str(out)]) == 0
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["at tolerance"]["0.05"] == {"u": 1, "phi": 3, "depth": 1}
+    assert summary["frontier"][0]["ns"] is None
+    assert (out / "tradeoff.csv").read_text().count("\n") == 3
+    assert jl.JointLaw.from_toml(out / "law.toml").plane == 0.0
+    assert "at_tolerance(0.05)" in capsys.readouterr().out
+
+
+def test_bad_arguments_are_named():
+    law = jl.presets.load("linear-a6")
+    with pytest.raises(ValueError, match="resolutions is empty"):
+        law.tradeoff([])
+    with pytest.raises(ValueError, match="rough"):
+        law.tradeoff(["rough"])
+    with pytest.raises(ValueError, match="joints = -1"):
+        law.tradeoff(joints=-1)
+    for value in (0.0, -0.1, float("nan")):
+        with pytest.raises(ValueError, match="tolerance"):
+            law.at_tolerance(value)

@@ -1,0 +1,82 @@
+"""Accuracy that is promised is kept: the reference against the slow bed, tolerances elsewhere."""
+
+import importlib.util
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from slow_bed import SlowBed, cap_quadrature, reach_of
+
+import jointlaw as jl
+from jointlaw.accuracy.suite import errors, reference_resolution, standard_suite, tractions
+
+pytest.importorskip("numba")  # the same numbers without it, in minutes
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def benchmark():
+    """benchmarks/tolerance.py, of which this is the short form."""
+    spec = importlib.util.spec_from_file_location("tolerance", ROOT / "benchmarks" / "tolerance.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_reference_of_the_suite_agrees_with_the_slow_bed():
+    law = jl.JointLaw(
+        orientation=jl.Orientation(4.0, 0.5, 0.1),
+        asperity=jl.Asperity(K=1.0, lam=1.2, eta=0.5, mu=0.5),
+        asperity_density=1.0,
+        closure_range=1.0,
+    )
+    suite = standard_suite(law)
+    n, w = cap_quadrature(4.0, 0.5, 0.1, 6, 16)
+    F = np.zeros_like(suite.F)
+    for i in range(len(suite.names)):
+        path = np.cumsum(suite.d[:, i], axis=0)
+        bed = SlowBed(n, w, reach_of(path, n), K=1.0, lam=1.2, eta=0.5, mu=0.5, density=1.0,
+                      n_depth=120)  # fmt: skip
+        F[:, i] = [bed.update(d) for d in suite.d[:, i]]
+    # the bed's own orientations (0.12 % here) and springs, and the reference's uncertainty
+    assert errors(F, suite.F)[0].max() < 2.5e-3
+    assert suite.uncertainty.max() < 5e-4
+    # and the paths do what they say: the normal stress is kept while sheared
+    held = [i for i, name in enumerate(suite.names) if name.startswith(("shear", "reversal"))]
+    stress = float(law.normal_stress(1.0)) / 2
+    np.testing.assert_allclose(suite.F[15:, held, 0], stress, rtol=2e-2)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_tolerances_are_kept_on_paths_never_seen(benchmark, seed):
+    rng = np.random.default_rng(seed)
+    law = benchmark.random_law(rng)
+    while law.orientation.a < benchmark.SMALL_A:
+        law = benchmark.random_law(rng)
+    law = replace(law, plane=0.0)
+    d = benchmark.random_paths(law, rng)
+    truth = tractions(replace(law, resolution=reference_resolution(law)), d)
+    sliders = []
+    for tolerance in (0.05, 0.01, 0.003):
+        made = law.at_tolerance(tolerance)
+        sliders.append(made.resolution.sliders)
+        ratio = errors(tractions(made, d), truth)[0] / tolerance
+        # never twice the tolerance, and on these six paths the tolerance but for one at most
+        assert ratio.max() < 2.0
+        assert np.sort(ratio)[-2] <= 1.0
+    assert sliders == sorted(sliders)
+
+
+def test_answer_is_the_same_again_and_keeps_the_law():
+    law = jl.presets.load("westerly-smooth")
+    made = law.at_tolerance(0.02)
+    assert made == law.at_tolerance(0.02)
+    assert replace(made, resolution=law.resolution) == law
+
+
+def test_what_cannot_be_met_is_refused_with_what_was_reached():
+    law = replace(jl.presets.load("linear-a6"), plane=0.0)
+    with pytest.raises(ValueError, match=r"tolerance = 1e-07 cannot be met .* was reached"):
+        law.at_tolerance(1e-7)

@@ -31,9 +31,8 @@ STEPS = 4  # different increments, so that no branch is learnt by heart
 WHOLE = jl.JointLaw(
     orientation=jl.Orientation(3.0, 0.5, 0.0),
     asperity=jl.Asperity(K=2.0e8, lam=1.2, eta=0.5, mu=0.3),
-    heights=jl.GammaHeights(
-        alpha=3.82, beta=1.15e-6, overlap=2e-6, formation="individual"
-    ),  # convex at every eta
+    # "individual" is convex at every eta
+    heights=jl.GammaHeights(alpha=3.82, beta=1.15e-6, overlap=2e-6, formation="individual"),
     asperity_density=1e10,
     closure_range=2e-6,
     resolution="balanced",
@@ -54,8 +53,9 @@ NO_CAP = (
     ),
 )
 ONE_WAY = (  # closure alone moves no slider along t
-    ("ts, tt = olds * kept + add * des, oldt * kept + add * det", "ts, tt = olds * kept + add * des, 0.0"),
-    ("new2 = ts * ts + tt * tt\n        size = np.sqrt(new2)", "new2 = ts * ts\n        size = abs(ts)"),
+    ("des, oldt * kept + add * det", "des, 0.0"),
+    ("new2 = ts * ts + tt * tt", "new2 = ts * ts"),
+    ("size = np.sqrt(new2)", "size = abs(ts)"),
     ("qs[l], qt[l] = part * ts, part * tt", "qs[l] = part * ts"),
     ("        desk[_SUMT + l] += part * tt\n", ""),
 )  # fmt: skip
@@ -158,11 +158,12 @@ def pairs() -> list[Pair]:
         Pair("closure that never opens: `law.normal_stress`", closure, Looked(WHOLE)),
         Pair("no heights", plane, Timed(BARE)),
         Pair("no heights, linear asperities: one depth cell", Timed(linear), Timed(bare)),
-        Pair("no large shear (`critical_slip = inf`)", Timed(replace(PLANE, critical_slip=1e-3)), plane),
+        Pair("no large shear: `critical_slip = inf`", Timed(replace(PLANE, critical_slip=1e-3)),
+             plane),
         Pair("c = 0", Timed(replace(WHOLE, orientation=jl.Orientation(3.0, 0.5, 0.1))), space),
-        Pair("no slip: caps left out of the kernel", plane, Timed(PLANE, lines=NO_CAP), built=False),
+        Pair("no slip: caps left out of the kernel", plane, Timed(PLANE, lines=NO_CAP), False),
         Pair("closure only: sliders of one component", closure,
-             Timed(replace(WHOLE, closure_only=True), lines=ONE_WAY), built=False),
+             Timed(replace(WHOLE, closure_only=True), lines=ONE_WAY), False),
     ]  # fmt: skip
 
 

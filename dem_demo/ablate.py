@@ -172,7 +172,8 @@ def write(rows: list[Row], folder: Path) -> None:
     with (folder / "ablation.csv").open("w", newline="") as stream:
         writer = csv.writer(stream)
         columns = [column for key in keys for column in (key, f"change of {key}")]
-        writer.writerow(["without", *columns, "steps", "time_step_s", "cpu_s", "time_ratio", "note"])
+        cost = ["steps", "time_step_s", "cpu_s", "time_ratio", "note"]
+        writer.writerow(["without", *columns, *cost])
         for row, change, ratio in zip(rows, changes(rows), time_ratios(rows), strict=True):
             cells = [cell for key in keys for cell in (row.outcome.get(key), change.get(key))]
             writer.writerow([row.name, *cells, row.steps, row.time_step, row.cpu, ratio, row.note])

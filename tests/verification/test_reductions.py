@@ -8,7 +8,6 @@ import pytest
 import jointlaw as jl
 from jointlaw import _kernel_numpy as kernel
 from jointlaw import engine
-from jointlaw.law import depth_nodes
 
 # The full law sums the same terms over all azimuths, a reduced one over one of them: what differs
 # is the rounding of a few hundred sums, carried along the path.
@@ -103,7 +102,8 @@ def test_closure_only_refuses_shear_and_keeps_its_state(single):
     law = random_law(2, closure_only=True)
     joint = law.joint() if single else law.joints(1)
     F, C = joint.update([0.3] if single else [[0.3]])
-    assert F.shape[-1:] == (1,) and C.shape[-2:] == (1, 1)
+    assert F.shape[-1:] == (1,)
+    assert C.shape[-2:] == (1, 1)
     before = joint.snapshot().values
     for d in ([0.1, 0.0], [0.1, 0.0, 0.0]):
         with pytest.raises(ValueError, match="for shear take a law without closure_only"):
@@ -130,7 +130,7 @@ def test_closure_only_in_files_snapshots_and_tests():
     assert jl.JointLaw.from_toml(law.to_toml()) == law
     joint, full = law.joint(), replace(law, closure_only=False).joint()
     mine, theirs = (jl.closure_test(j, 0.3, steps=10) for j in (joint, full))
-    assert mine.F1 == pytest.approx(theirs.F1, abs=EXACT)
+    assert np.abs(mine.F1 - theirs.F1).max() < EXACT
     # The stress is met to 1e-11 of its peak, so closure and losses to the same.
     assert mine.dissipated == pytest.approx(theirs.dissipated, abs=1e-10)
     assert (mine.F2 == 0).all()
@@ -145,10 +145,12 @@ def test_closure_only_in_files_snapshots_and_tests():
 def test_linear_asperities_without_heights_need_one_depth_cell(plane):
     """One spring touches at once: deeper cells, here added by hand, hold nothing."""
     law = replace(random_law(9, plane=plane), asperity=jl.Asperity.linear(1.0, 0.7, 0.3))
-    assert law.heights is None and law.resolution.depth > 1
+    assert law.heights is None
+    assert law.resolution.depth > 1
     few = law.tables
     assert few.cells == 1
-    depth = depth_nodes(law.closure_range, np.tan(law.facets.theta), 6)
+    inner = np.tile([0.0, 0.1, 0.3, 0.6, 1.0, 1.5, np.inf], (len(law.facets.theta), 1))
+    depth = law.closure_range * inner
     force, slope = law.curve.force(np.where(np.isfinite(depth), depth, 0.0))
     force[:, -1] = slope[:, -1] = np.inf
     slope[:, 0] = 0.0
@@ -180,7 +182,8 @@ def test_without_a_critical_slip_nothing_changes_inside_the_leash():
         apart.append(np.abs(one - other).max() / np.abs(one).max())
     taut = np.linalg.norm(batches[0].delta[:, 1:], axis=1).min()
     assert taut > 2.0
-    assert max(apart[:15]) == 0.0 and apart[-1] > 1e-3
+    assert max(apart[:15]) == 0.0
+    assert apart[-1] > 1e-3
 
 
 def test_normal_stress_is_closure_that_never_opens():

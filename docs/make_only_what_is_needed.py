@@ -1,8 +1,8 @@
 """Regenerate the tables of docs/only-what-is-needed.md.
 
 `python docs/make_only_what_is_needed.py [PART ...]`: all parts take about twenty minutes on
-one core. A part is what stands between its two marks in the page: savings, slip, plane, or a scene
-that comes with dem_demo.
+one core. A part is what stands between its two marks in the page: savings, slip, plane, angles, or a
+scene that comes with dem_demo.
 """
 
 import sys
@@ -17,6 +17,7 @@ import reductions  # noqa: E402
 
 import jointlaw as jl  # noqa: E402
 from dem_demo import ablate, load  # noqa: E402
+from dem_demo.predict import friction_angle  # noqa: E402
 from dem_demo.scene import names  # noqa: E402
 from jointlaw.resolution import NAMED  # noqa: E402
 
@@ -82,8 +83,23 @@ def _planes_apart(law, way):
     return np.abs(full - reduced).max() / peak, np.abs(across).max() / peak
 
 
+def angles():
+    """Friction angle of the two laws of the tilt test, alone, by stress and resolution."""
+    rows, laws = [], load("tilt").laws
+    for u, phi, depth in ((2, 3, 1), (2, 4, 1), (2, 10, 1), (4, 6, 1), (4, 10, 1), (4, 10, 6),
+                          (16, 24, 1)):  # fmt: skip
+        found = []
+        for stress in (26e3, 6e3):
+            for name in ("along", "across"):
+                law = replace(laws[name], resolution=jl.Resolution(u, phi, depth))
+                found.append(f"{friction_angle(law, stress):.2f}")
+        rows.append([f"{u} x {phi} x {depth}", *found])
+    head = ["u x phi x depth", "along, 26 kPa", "across, 26 kPa", "along, 6 kPa", "across, 6 kPa"]
+    return table(head, rows)
+
+
 def main():
-    parts = {"savings": savings, "slip": slip, "plane": plane}
+    parts = {"savings": savings, "slip": slip, "plane": plane, "angles": angles}
     parts |= {name: lambda name=name: ablate.table(ablate.ablate(load(name))) for name in names()}
     for key in sys.argv[1:] or parts:
         if f"<!-- {key} -->\n" not in PAGE.read_text(encoding="utf-8"):

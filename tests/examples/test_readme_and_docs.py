@@ -30,3 +30,9 @@ def test_lumping_loss_is_as_printed(capsys):
     assert shown == printed
     losses = [float(value.rstrip("%")) for value in shown]
     assert losses == sorted(losses, reverse=True)  # finer cells lose less
+
+
+def test_a_law_that_only_closes_is_as_printed(capsys):
+    (block,) = code("docs/only-what-is-needed.md")
+    exec(block, {})
+    assert capsys.readouterr().out == "True\n"

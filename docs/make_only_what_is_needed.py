@@ -1,8 +1,8 @@
 """Regenerate the tables of docs/only-what-is-needed.md.
 
-`python docs/make_only_what_is_needed.py [PART ...]`: all parts take about a quarter of
-an hour of processor time. A part is what stands between its two marks in the page: savings, slip, plane, angles, or
-a scene that comes with dem_demo.
+`python docs/make_only_what_is_needed.py [PART ...]`: all parts take about a quarter of an hour of
+processor time. A part is what stands between its two marks in the page: savings, slip, plane,
+angles, or a scene that comes with dem_demo.
 """
 
 import sys

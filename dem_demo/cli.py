@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from . import ablate
 from .interfaces import Refused
 from .run import run
 from .scene import load, names
@@ -18,6 +19,8 @@ ABOUT = """\
 Rigid rock blocks in 2-D whose every contact force comes from a joint law.
 
   python -m dem_demo [SCENE] --out DIR     run a scene: a name or a TOML file
+  python -m dem_demo ablate SCENE --out DIR
+                                           run it without each of its ingredients in turn
   python -m dem_demo check FILE            check a scene file without running it
   python -m dem_demo resume STATE --out DIR [--until T] [--step DT]
                                            go on from DIR/state or DIR/refused
@@ -27,11 +30,11 @@ Rigid rock blocks in 2-D whose every contact force comes from a joint law.
 def main(arguments: list[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    verb = words[0] if words and words[0] in ("check", "resume") else "run"
+    verbs = {"ablate": _ablate, "check": _check, "resume": _resume}
     try:
-        return {"check": _check, "resume": _resume, "run": _run}[verb](
-            words[1:] if verb != "run" else words
-        )
+        if words and words[0] in verbs:
+            return verbs[words[0]](words[1:])
+        return _run(words)
     except (SceneError, Refused, ValueError, OSError) as error:
         print(f"dem_demo: {error}", file=sys.stderr)
         return 2
@@ -62,6 +65,26 @@ def _resume(words: list[str]) -> int:
     parser.add_argument("--step", type=float, help="another time step (s)")
     given = parser.parse_args(words)
     return _go(Simulation.load(given.state, given.step), given)
+
+
+def _ablate(words: list[str]) -> int:
+    parser = argparse.ArgumentParser(
+        "python -m dem_demo ablate",
+        description="Run a scene without each of its ingredients in turn: what it changes in the "
+        "outcome (differences against the whole scene) and in the time (ratios).",
+        epilog=f"scenes: {', '.join(names())}\n"
+        "example: python -m dem_demo ablate shear-box --out out/ablation",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("scene", help="a name or a TOML file")
+    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for the results")
+    parser.add_argument("--until", type=float, help="model time to stop at (s)")
+    given = parser.parse_args(words)
+    rows = ablate.ablate(load(given.scene), given.until)
+    ablate.write(rows, given.out)
+    print(ablate.table(rows))
+    print(f"results in {given.out}: ablation.csv, ablation.md, summary.json")
+    return 0
 
 
 def _check(words: list[str]) -> int:

@@ -20,6 +20,8 @@ def build_law(table: dict[str, Any], where: str):
     """A law from a scene's `[laws.NAME]` table; `kind` is "joint" (default) or "coulomb"."""
     table = dict(table)
     kind = table.pop("kind", "joint")
+    if table.get("closure_only"):
+        raise ValueError(f"{where}.closure_only = true: joints between blocks shear; leave it out")
     if kind == "joint":
         return jl.JointLaw.from_dict({"plane": 0.0, **table}, where)
     if kind != "coulomb":

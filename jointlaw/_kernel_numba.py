@@ -109,7 +109,18 @@ def _virgin(desk, place, piece, after, L, curve, eta, scale, rise):
         y, force, slope = _Y1, _F1, _S1
     cells = curve.size // 4
     top = np.float64(cells - 1)
-    for l in range(L):
+    looked = 0 if cells == 1 else L  # without heights S is 1, and there is nothing to look up
+    for l in range(L - looked):
+        here = desk[y + l] if abs(desk[y + l]) >= NOTHING else 0.0
+        v = np.sqrt(here if here > 0.0 else 0.0)
+        one = 1.0 if v > 0.0 else 0.0
+        power = v if eta == 0.5 else one
+        place[l] = 0
+        desk[y + l] = here
+        desk[_X + l] = 0.0
+        desk[force + l] = power * v * v
+        desk[slope + l] = power * (1.0 + eta)
+    for l in range(looked):
         here = desk[y + l] if abs(desk[y + l]) >= NOTHING else 0.0
         v = np.sqrt(here if here > 0.0 else 0.0)
         r = 1.0 / (v + scale)
@@ -120,9 +131,9 @@ def _virgin(desk, place, piece, after, L, curve, eta, scale, rise):
         desk[_X + l] = at - np.float64(i)
         desk[force + l] = v
         desk[slope + l] = v * r * r
-    _fetch(place, piece, L, curve)
+    _fetch(place, piece, looked, curve)
     weight = 0.5 * cells * scale
-    for l in range(L):
+    for l in range(looked):
         x, o = desk[_X + l], 4 * l
         c0, c1, c2, c3 = piece[o], piece[o + 1], piece[o + 2], piece[o + 3]
         S = c0 + x * (c1 + x * (c2 + x * c3))
@@ -389,6 +400,8 @@ def _facet(desk, place, piece, s, L, facet, depth, f, curve, scalars, dim, ledge
     for l in range(L):
         s[rs, l] = desk[_S1 + l]
     if tangent is not None:
+        if curve.size == 4:  # not fetched yet
+            _fetch(place, piece, L, curve)
         _curvature(desk, piece, L, np.float64(curve.size // 4), eta, scale, rise)
         _gradient(desk, L, m0, m1, m2, limit < np.inf)
         for l in range(L):
@@ -417,8 +430,8 @@ def _facet(desk, place, piece, s, L, facet, depth, f, curve, scalars, dim, ledge
 @_jit
 def _begin(desk, s, d, start, L, limit, dim, tangent):
     """Lay out the old and new place of each joint of a block, and move it."""
-    if limit < np.inf:
-        desk[_P:_J00] = 0.0  # in one plane the leash has no second component
+    if limit < np.inf or dim == 1:
+        desk[_P:_J00] = 0.0  # in one plane the leash has no second component, on closure no offset
     desk[_PULL1:_C00] = 0.0
     if tangent is not None:
         desk[_C00:] = 0.0

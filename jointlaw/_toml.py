@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _LAW_KEYS = {
     "orientation", "asperity", "heights", "asperity_density", "closure_range", "resolution",
-    "plane", "critical_slip",
+    "plane", "closure_only", "critical_slip",
 }  # fmt: skip
 T = TypeVar("T")
 _ABOUT = "about"  # free table for title, source and notes
@@ -53,6 +53,8 @@ def write_law(law: JointLaw, path: Path | None) -> str:
     ]
     if law.plane is not None:
         lines.append(f"plane = {_num(law.plane)}  # rad")
+    if law.closure_only:
+        lines.append("closure_only = true")
     o, p, h = law.orientation, law.asperity, law.heights
     lines += ["", "[orientation]", f"a = {_num(o.a)}", f"b = {_num(o.b)}", f"c = {_num(o.c)}"]
     lines += ["", "[asperity]", f"K = {_num(p.K)}  # Pa m^(1-eta)", f"lam = {_num(p.lam)}"]

@@ -21,7 +21,8 @@ Out = tuple[Array, Array | None]
 
 class JointBatch:
     """n joints of one law. Arrays over joints: displacements (n, dim) in m, tractions (n, dim) in
-    Pa; dim is 3 (closure, shear along axes 2 and 3), or 2 for a law with a plane.
+    Pa; dim is 3 (closure, shear along axes 2 and 3), 2 for a law with a plane, or 1 for a law with
+    closure_only.
 
     The traction is the joint's resistance in the sense of the displacement: the force on the body
     that moves by +d is -area * F. Without `ledger` no dissipated energy is added up, which is
@@ -225,7 +226,9 @@ class JointBatch:
         """Increments (m, dim), contiguous and checked."""
         values = np.ascontiguousarray(numbers("d", d, "m"))
         if values.shape != shape:
-            raise ValueError(f"d has shape {values.shape}; expected {shape}: joints, components")
+            raise ValueError(
+                f"d has shape {values.shape}; expected {shape}: joints, {components(self.law)}"
+            )
         return values
 
     def _admit(self, d: Array, index: NDArray[np.intp] | None, tangent: bool) -> float:
@@ -264,9 +267,18 @@ class JointBatch:
     def _bound(self, rows: Array) -> Array:
         """Bound of the reach of states (rows, n), from closure and offset."""
         now = kernel.parts(self.law.tables, rows)
-        far = np.maximum(np.abs(now.delta).max(axis=0), np.abs(now.offset).max(axis=0))
+        far = np.maximum(np.abs(now.delta).max(axis=0), np.abs(now.offset).max(axis=0, initial=0.0))
         bound: Array = self._stretch * far
         return bound
+
+
+def components(law: JointLaw) -> str:
+    """What a displacement of this law is made of, and how to have more."""
+    return {
+        1: "closure; for shear take a law without closure_only",
+        2: "closure and shear along the plane; for motion in 3-D take a law with plane=None",
+        3: "closure and shear along axes 2 and 3",
+    }[law.tables.dim]
 
 
 def _require_out(out: Out, m: int, dim: int, tangent: bool) -> Out:

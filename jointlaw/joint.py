@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._checks import Array, numbers
-from .batch import JointBatch
+from .batch import JointBatch, components
 from .law import JointLaw
 from .state import JointState
 
@@ -34,7 +34,9 @@ class Joint:
     def _advance(self, d: ArrayLike, tangent: bool, keep: bool) -> tuple[Array, Array | None]:
         values, batch = numbers("d", d, "m"), self._batch
         if values.shape != self._shape:
-            raise ValueError(f"d has shape {values.shape}; expected {self._shape}")
+            raise ValueError(
+                f"d has shape {values.shape}; expected {self._shape}: {components(self.law)}"
+            )
         # the sum is no less than the largest, and NaN if one is
         reach = batch._reach + batch._stretch * sum(map(abs, values.tolist()))
         if not reach <= self.law.largest_reach:  # the batch finds out and says why

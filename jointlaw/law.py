@@ -89,6 +89,8 @@ class JointLaw:
     plane: None for motion in 3-D, or the azimuth (rad) of the one plane in which the joint moves:
         vectors then have two components, closure and shear along the plane. The traction across
         the plane, which is zero only for c = 0 or on a symmetry axis, is dropped.
+    closure_only: True for a joint that only opens and closes: vectors then have one component, the
+        closure. Exact, whatever c, for all azimuths then share one motion.
     critical_slip: D_c (m), > 0: sliding that renews the asperity contacts, so that friction and
         dilation settle. Infinite (off) by default.
 
@@ -102,6 +104,7 @@ class JointLaw:
     closure_range: float = field(default=None)  # type: ignore[assignment]
     resolution: Resolution = field(default="balanced")  # type: ignore[assignment]
     plane: float | None = None
+    closure_only: bool = False
     critical_slip: float = math.inf
 
     def __post_init__(self) -> None:
@@ -115,6 +118,12 @@ class JointLaw:
         set_(self, "resolution", resolve(self.resolution))
         if self.plane is not None:
             set_(self, "plane", number("plane", self.plane))
+        if not isinstance(self.closure_only, bool):
+            raise ValueError(f"closure_only = {self.closure_only!r} must be True or False")
+        if self.closure_only and self.plane is not None:
+            raise ValueError(
+                f"plane = {self.plane!r}: a joint with closure_only does not shear; leave plane out"
+            )
         set_(self, "critical_slip", above("critical_slip", self.critical_slip, 0.0, infinite=True))
         if self.critical_slip < _NOTHING:
             raise ValueError(
@@ -244,7 +253,8 @@ class JointLaw:
     @cached_property
     def facets(self) -> Facets:
         """Quadrature nodes of the orientation density."""
-        return self.orientation.facets(self.resolution.u, self.resolution.phi, self.plane)
+        r = self.resolution
+        return self.orientation.facets(r.u, r.phi, self.plane, self.closure_only)
 
     @cached_property
     def tables(self) -> Tables:
@@ -252,7 +262,8 @@ class JointLaw:
         f, p = self.facets, self.asperity
         c1 = np.cos(f.theta)
         area = self.asperity_density * f.weight * p.lam * p.K * c1 ** (1 + p.eta)
-        slope, cells = np.tan(f.theta), self.resolution.depth
+        one_spring = p.eta == 0 and self.heights is None  # touches at once: all in the first cell
+        slope, cells = np.tan(f.theta), 1 if one_spring else self.resolution.depth
         depth = nodes.depth_nodes(self.curve, self.closure_range, slope, cells)
         force, slope = self.curve.force(np.where(np.isfinite(depth), depth, 0.0))
         force[:, -1] = slope[:, -1] = np.inf

@@ -98,6 +98,8 @@ def direct_shear(
         stiffness = at_least("stiffness", stiffness, 0.0)
     elif stiffness is not None:
         raise ValueError(f'stiffness is for control = "stiffness", not {control!r}')
+    if joint.law.closure_only:
+        raise ValueError("joint: its law has closure_only; direct shear needs a law without")
     plane = joint.law.plane
     if plane is not None and azimuth not in (0.0, plane):
         raise ValueError(
@@ -198,6 +200,8 @@ class _Log:
         """Add a row from the joint's state."""
         j = self.joint
         delta, F = list(j.delta), list(j.F)
+        if len(delta) == 1:
+            delta, F = [*delta, 0.0, 0.0], [*F, 0.0, 0.0]
         if len(delta) == 2:
             cos, sin = math.cos(self.azimuth), math.sin(self.azimuth)
             delta = [delta[0], delta[1] * cos, delta[1] * sin]

@@ -84,13 +84,13 @@ def _cycle(law: JointLaw, low: float, high: float, steps: int) -> tuple[float, f
     At the finest resolution: few depth cells lock whole contacts where the law locks their rims,
     and lose up to ten times too much when friction is high.
     """
-    joint, top = replace(law, resolution=NAMED["reference"]).joint(), float(law.closure(high))
-    still = np.zeros(2 if law.plane is None else 1)
+    finest = replace(law, resolution=NAMED["reference"], plane=None, closure_only=True)
+    joint, top = finest.joint(), float(law.closure(high))
     branches = []
     for increment in (top / steps, -top / steps):
         rows = [(float(joint.F[0]), float(joint.delta[0]))]
         for _ in range(steps):
-            joint.update(np.concatenate([[increment], still]), tangent=False)
+            joint.update([increment], tangent=False)
             rows.append((float(joint.F[0]), float(joint.delta[0])))
         stress, closure = np.array(rows).T
         order = np.argsort(closure)

@@ -41,6 +41,8 @@ def tabulate(
     """
     if law.plane is not None:
         raise ValueError(f"law.plane = {law.plane:g}: a table needs a law in 3-D; set plane=None")
+    if law.closure_only:
+        raise ValueError("law.closure_only = True: a table holds shear; set closure_only=False")
     end = above("closure", law.closure_range if closure is None else closure, 0.0)
     tolerance = above("tolerance", tolerance, 0.0)
     steps = whole("steps", steps, 2)

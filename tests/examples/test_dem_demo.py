@@ -119,6 +119,7 @@ def test_resume_of_a_tilt_test_by_command(tmp_path):
         ("end = 0.12", "end = 0.0", "end = 0.0: must be > 0"),
         ("fraction = 0.15", "fraction = 2.0", "fraction = 2.0: must be <= 0.95"),
         ("mu = 0.4", "mu = -0.4", "mu"),
+        ("critical_slip = 2e-3", "closure_only = true", "closure_only = true: .* leave it out"),
         ("friction = 0.3", "friction = -0.3", "friction = -0.3: must be >= 0"),
         ('law = "plain"', 'law = "plane"', "law 'plane' is not among"),
         ('"two", "one"', '"two", "none"', "must name two blocks"),

@@ -79,10 +79,15 @@ def index(space, printed):
     assert np.isfinite(space["C"]).all()
 
 
+def only_what_is_needed(space, printed):
+    assert printed == ["True"]
+
+
 CHECKS = {
     "README.md": readme, "docs/start.md": start, "docs/sharp-bits.md": sharp_bits,
     "docs/field.md": field, "docs/measurements.md": measurements, "docs/speed.md": speed,
     "docs/paper.md": paper, "docs/embed.md": embed, "docs/index.md": index,
+    "docs/only-what-is-needed.md": only_what_is_needed,
 }  # fmt: skip
 
 

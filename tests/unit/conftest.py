@@ -39,21 +39,27 @@ def law():
     return _make_law()
 
 
-@pytest.fixture(
-    scope="session",
-    params=["population", "individual", "no heights", "linear", "plane", "leash"],
-)
+KINDS = {
+    "population": {},
+    "individual": {"heights": "individual", "lam": 0.7},
+    "no heights": {"heights": None, "a": 1.0, "b": -1.0, "c": 0.5},
+    "linear": {"heights": None, "eta": 0.0, "a": 1.0, "mu": 0.0},
+    "plane": {"plane": 0.4},
+    "leash": {"critical_slip": 2e-6, "plane": math.pi},
+    "closure only": {"closure_only": True, "critical_slip": 2e-6},
+}
+
+
+@pytest.fixture(scope="session", params=KINDS)
 def any_law(request):
     """One law of each kind of joint that the code knows."""
-    kinds = {
-        "population": {},
-        "individual": {"heights": "individual", "lam": 0.7},
-        "no heights": {"heights": None, "a": 1.0, "b": -1.0, "c": 0.5},
-        "linear": {"heights": None, "eta": 0.0, "a": 1.0, "mu": 0.0},
-        "plane": {"plane": 0.4},
-        "leash": {"critical_slip": 2e-6, "plane": math.pi},
-    }
-    return _make_law(**kinds[request.param])
+    return _make_law(**KINDS[request.param])
+
+
+@pytest.fixture(scope="session", params=[kind for kind in KINDS if kind != "closure only"])
+def any_sheared_law(request):
+    """One law of each kind that can shear."""
+    return _make_law(**KINDS[request.param])
 
 
 @pytest.fixture

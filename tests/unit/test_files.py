@@ -20,6 +20,7 @@ KINDS = {
     "no parameters": {"heights": jl.Heights("expon", 1e-6, "individual", {})},
     "histogram": {"heights": jl.Heights(HISTOGRAM, 1e-6, "individual")},
     "plane": {"plane": -1 / 3, "critical_slip": 1 / 3e4},
+    "closure only": {"closure_only": True},
     "own resolution": {"resolution": jl.Resolution(3, 5, 7)},
     "named resolution": {"resolution": "fine"},
     "default range": {"closure_range": None},

@@ -12,17 +12,17 @@ N = 10e6  # Pa
 
 
 @pytest.mark.parametrize("stress", [1.0, 1e3, 1e6, 10e6, 1e9])
-def test_constant_normal_stress(any_law, stress):
-    record = jl.direct_shear(any_law.joint(), 5e-7, normal=stress, steps=40)
+def test_constant_normal_stress(any_sheared_law, stress):
+    record = jl.direct_shear(any_sheared_law.joint(), 5e-7, normal=stress, steps=40)
     # 1e-9, or what one rounding of a closure of some 5e-7 m makes in the stiffest joint
-    rounding = 2e-16 * 1e-6 * any_law.max_stiffness(1e-6)
+    rounding = 2e-16 * 1e-6 * any_sheared_law.max_stiffness(1e-6)
     np.testing.assert_allclose(record.F1, stress, rtol=1e-9, atol=rounding)
 
 
-def test_constant_normal_stiffness(any_law):
+def test_constant_normal_stiffness(any_sheared_law):
     spring = 2e13
     record = jl.direct_shear(
-        any_law.joint(), [5e-7, -2e-7], N, control="stiffness", stiffness=spring, steps=30
+        any_sheared_law.joint(), [5e-7, -2e-7], N, control="stiffness", stiffness=spring, steps=30
     )
     asked = N + spring * (record.closure[0] - record.closure)
     np.testing.assert_allclose(record.F1, asked, atol=1e-9 * N, rtol=1e-9)
@@ -35,17 +35,17 @@ def test_stiffness_zero_is_constant_stress(law):
     np.testing.assert_allclose(one.F2, other.F2, rtol=1e-9, atol=1e-9 * N)
 
 
-def test_constant_closure(any_law):
-    record = jl.direct_shear(any_law.joint(), 5e-7, N, control="closure", steps=30)
+def test_constant_closure(any_sheared_law):
+    record = jl.direct_shear(any_sheared_law.joint(), 5e-7, N, control="closure", steps=30)
     assert (record.closure == record.closure[0]).all()
     assert record.F1[0] == pytest.approx(N, rel=1e-9)
 
 
-def test_the_first_row_is_the_seated_joint(any_law):
-    record = jl.direct_shear(any_law.joint(), 5e-7, N, steps=7)
+def test_the_first_row_is_the_seated_joint(any_sheared_law):
+    record = jl.direct_shear(any_sheared_law.joint(), 5e-7, N, steps=7)
     assert len(record) == 8
     # 1e-9: the normal condition; the virgin curve tells the closure
-    assert record.closure[0] == pytest.approx(any_law.closure(N), rel=1e-8)
+    assert record.closure[0] == pytest.approx(any_sheared_law.closure(N), rel=1e-8)
     assert record.shear[0] == 0.0
 
 

@@ -160,6 +160,8 @@ class Live:
     def __init__(self, law, ledger=False):
         if law.plane is not None:
             raise ValueError("law.plane is set; contacts in YADE move in 3-D, give plane=None")
+        if law.closure_only:
+            raise ValueError("law.closure_only is set; contacts in YADE shear, set it to False")
         self.law, self.batch = law, law.joints(0, ledger=ledger)
         self.slots, self.free = np.zeros(0, int), []
 

@@ -1,0 +1,197 @@
+"""What a law leaves out under an assumption changes nothing while the assumption holds."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+from jointlaw import _kernel_numpy as kernel
+from jointlaw import engine
+
+# The full law sums the same terms over all azimuths, a reduced one over one of them: what differs
+# is the rounding of a few hundred sums, carried along the path.
+EXACT = 1e-12
+ENGINES = {"numpy": engine.NumpyEngine, "numba": engine.NumbaEngine}
+
+
+@pytest.fixture(params=ENGINES)
+def with_kernel(request, monkeypatch):
+    """Each kernel in turn; skipped where numba is missing."""
+    if request.param == "numba":
+        pytest.importorskip("numba")
+    monkeypatch.setenv("JOINTLAW_KERNEL", request.param)
+    return ENGINES[request.param]
+
+
+def random_law(seed, **more):
+    """A law of any kind; heights and exponents come up in all combinations that are convex."""
+    rng = np.random.default_rng(seed)
+    a, b = rng.uniform(1.0, 8.0), rng.uniform(-1.0, 2.0)
+    formation = [None, "population", "individual"][seed % 3]
+    heights = None
+    if formation:
+        heights = jl.GammaHeights(alpha=3.82, beta=1.15, overlap=2.0, formation=formation)
+    asperity = jl.Asperity(
+        K=1.0,
+        lam=rng.uniform(0.5, 2.0),
+        eta=0.5 if formation == "population" else [0.5, 0.0, 1.0, 0.3][seed % 4],
+        mu=[0.0, 0.2, 1.0][rng.integers(3)],
+    )
+    resolution = jl.Resolution(int(rng.integers(1, 5)), int(rng.integers(3, 7)), 1 + seed % 5)
+    return jl.JointLaw(
+        orientation=jl.Orientation(a, b, rng.uniform(-1.0, 1.0) * (1 / 3 - b / 6)),
+        asperity=asperity,
+        heights=heights,
+        asperity_density=1.0,
+        closure_range=1.0,
+        resolution=resolution,
+        **more,
+    )
+
+
+def closures(seed, n, steps=40):
+    """Closure increments (steps, n): in and out, apart in the middle, in again."""
+    rng = np.random.default_rng(seed)
+    d = rng.normal(0.0, 0.3, (steps, n))
+    d[0] = rng.uniform(0.2, 1.5, n)
+    d[steps // 2] -= rng.uniform(0.0, 3.0, n)
+    d[steps // 2 + 1] += rng.uniform(0.0, 3.0, n)
+    return d
+
+
+def followed(law, d):
+    """F1, C11, measures and ledger of a batch along closure increments d (steps, n)."""
+    batch, rows = law.joints(d.shape[1]), []
+    for closing in d:
+        step = np.zeros((d.shape[1], law.tables.dim))
+        step[:, 0] = closing
+        F, C = batch.update(step)
+        rows.append([F[:, 0], C[:, 0, 0], *batch.measures(), batch.dissipated_energy])
+    return batch, np.array(rows)
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_closure_only_is_the_whole_law_on_a_path_of_closure(with_kernel, seed):
+    """Traction, tangent, energies and shares, against the law in 3-D and in a plane."""
+    d = closures(seed, 7)
+    batch, found = followed(random_law(seed, closure_only=True), d)
+    assert isinstance(batch._engine, with_kernel)
+    peak = np.abs(found).max(axis=(0, 2))
+    for plane in (None, 0.9):
+        _, full = followed(random_law(seed, plane=plane), d)
+        gap = np.abs(found - full).max(axis=(0, 2)) / np.where(peak > 0, peak, 1.0)
+        F1, C11, sliding, slipping, separated, stored, reach, lost = gap
+        assert max(F1, sliding, slipping, separated, stored, reach, lost) < EXACT
+        # C holds second differences of G in the few facets that hardly move: see test_kernels.py
+        assert C11 < 2e-6
+        assert np.median(np.abs(found - full)[:, 1]) < EXACT * peak[1]
+
+
+def test_closure_only_has_one_facet_per_inclination():
+    law = random_law(1, closure_only=True)
+    whole = replace(law, closure_only=False)
+    assert len(law.facets.weight) == law.resolution.u
+    assert len(whole.facets.weight) == 2 * law.resolution.phi * law.resolution.u
+    assert law.max_stiffness(0.7) == pytest.approx(whole.max_stiffness(0.7), rel=EXACT)
+    assert law.normal_stress(0.7) == pytest.approx(whole.normal_stress(0.7), rel=EXACT)
+
+
+@pytest.mark.parametrize("single", [False, True])
+def test_closure_only_refuses_shear_and_keeps_its_state(single):
+    law = random_law(2, closure_only=True)
+    joint = law.joint() if single else law.joints(1)
+    F, C = joint.update([0.3] if single else [[0.3]])
+    assert F.shape[-1:] == (1,)
+    assert C.shape[-2:] == (1, 1)
+    before = joint.snapshot().values
+    for d in ([0.1, 0.0], [0.1, 0.0, 0.0]):
+        with pytest.raises(ValueError, match="for shear take a law without closure_only"):
+            joint.update(d if single else [d])
+    assert (joint.snapshot().values == before).all()
+
+
+def test_closure_only_is_refused_where_joints_shear(tmp_path):
+    law = random_law(2, closure_only=True)
+    for use in (
+        lambda: replace(law, plane=0.0),
+        lambda: jl.direct_shear(law.joint(), to=0.1, normal=0.1),
+        lambda: jl.tabulate(law, shear_limit=1.0),
+        lambda: jl.export_yade(law, tmp_path, shear_limit=1.0),
+    ):
+        with pytest.raises(ValueError, match="closure_only"):
+            use()
+    with pytest.raises(ValueError, match="closure_only = 1 must be True or False"):
+        replace(law, closure_only=1)
+
+
+def test_closure_only_in_files_snapshots_and_tests():
+    law = random_law(4, closure_only=True)
+    assert jl.JointLaw.from_toml(law.to_toml()) == law
+    joint, full = law.joint(), replace(law, closure_only=False).joint()
+    mine, theirs = (jl.closure_test(j, 0.3, steps=10) for j in (joint, full))
+    assert np.abs(mine.F1 - theirs.F1).max() < EXACT
+    # The stress is met to 1e-11 of its peak, so closure and losses to the same.
+    assert mine.dissipated == pytest.approx(theirs.dissipated, abs=1e-10)
+    assert (mine.F2 == 0).all()
+    kept = joint.snapshot()
+    one, _ = joint.update([0.2])
+    joint.restore(kept)
+    again, _ = joint.update([0.2])
+    assert (one == again).all()
+
+
+@pytest.mark.parametrize("plane", [None, 0.0])
+def test_linear_asperities_without_heights_need_one_depth_cell(plane):
+    """One spring touches at once: deeper cells, here added by hand, hold nothing."""
+    law = replace(random_law(9, plane=plane), asperity=jl.Asperity.linear(1.0, 0.7, 0.3))
+    assert law.heights is None
+    assert law.resolution.depth > 1
+    few = law.tables
+    assert few.cells == 1
+    inner = np.tile([0.0, 0.1, 0.3, 0.6, 1.0, 1.5, np.inf], (len(law.facets.theta), 1))
+    depth = law.closure_range * inner
+    force, slope = law.curve.force(np.where(np.isfinite(depth), depth, 0.0))
+    force[:, -1] = slope[:, -1] = np.inf
+    slope[:, 0] = 0.0
+    many = few._replace(depth=depth, depth_force=force, depth_slope=slope)
+    rng = np.random.default_rng(3)
+    states = [np.zeros((k.rows, 9)) for k in (few, many)]
+    for step in range(30):
+        d = rng.normal(0.2 if step == 0 else 0.0, 0.3, (few.dim, 9))
+        results = [kernel.step(k, s, d, True) for k, s in zip((few, many), states, strict=True)]
+        states = [result[0] for result in results]
+        for one, other in zip(results[0][1:], results[1][1:], strict=True):
+            assert np.abs(one - other).max() <= EXACT * max(np.abs(other).max(), 1e-3)
+        lost, lost_many = (s[2 * few.dim - 1] for s in states)
+        assert np.abs(lost - lost_many).max() <= EXACT * max(lost.max(), 1e-3)
+
+
+def test_without_a_critical_slip_nothing_changes_inside_the_leash():
+    """critical_slip = inf leaves the leash out: the same until an offset reaches its length."""
+    free = random_law(3)
+    held = replace(free, critical_slip=2.0)
+    rng = np.random.default_rng(5)
+    batches = [law.joints(20) for law in (free, held)]
+    apart = []
+    for k in range(40):
+        d = np.column_stack(
+            [0.5 * (k == 0) * np.ones(20), np.full(20, 0.1), rng.normal(0, 0.01, 20)]
+        )
+        one, other = (batch.update(d, tangent=False)[0] for batch in batches)
+        apart.append(np.abs(one - other).max() / np.abs(one).max())
+    taut = np.linalg.norm(batches[0].delta[:, 1:], axis=1).min()
+    assert taut > 2.0
+    assert max(apart[:15]) == 0.0
+    assert apart[-1] > 1e-3
+
+
+def test_normal_stress_is_closure_that_never_opens():
+    """No state at all is needed while a virgin joint only closes: in any steps, slip or none."""
+    for seed in range(6):
+        law = random_law(seed, closure_only=True)
+        way = np.sort(np.random.default_rng(seed).uniform(0.0, 2.0, 30))
+        joint = law.joint()
+        for before, after in zip([0.0, *way[:-1]], way, strict=True):
+            F, _ = joint.update([after - before], tangent=False)
+            assert F[0] == pytest.approx(law.normal_stress(joint.delta[0]), rel=1e-11)

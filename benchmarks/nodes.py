@@ -3,9 +3,10 @@
     python benchmarks/nodes.py [--laws 16] [--picture docs/pictures/frontier.png]
 
 Largest error of the traction on the standard paths, in per cent: median over the laws, and the 90th
-percentile in brackets; then those of the named resolutions for the paper's presets. Laws are drawn as in benchmarks/tolerance.py, a >= 1.4, motion in one plane
-(staggered azimuths: in space). `before` is what the package did up to version 0.1.0: Gauss-Legendre
-inclinations, depths (i/n)^1.5 of closure_range (1 + tan theta).
+percentile in brackets; then that of the named resolutions for each preset. Laws are drawn as in
+benchmarks/tolerance.py, a >= 1.4, with the presets, motion in one plane (staggered azimuths: in
+space). `before` is what the package did up to version 0.1.0: Gauss-Legendre inclinations, depths
+(i/n)^1.5 of closure_range (1 + tan theta).
 """
 
 from __future__ import annotations

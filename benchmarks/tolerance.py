@@ -5,10 +5,12 @@
 Laws: a from 1 to 10 (evenly in log a), b and c over their bounds, mu 0.05 to 1, eta 0 to 0.7,
 heights of either formation or none, in a plane or in space. Paths: six per law, five to eight legs
 between random corners, closures up to the law's closure range R and openings to -0.3 R, shear up to
-R. The truth is 1.25 times the reference resolution in each direction.
+R; one corner is closed to between half the normal stress at R and all of it. The truth is 1.25
+times the reference resolution in each direction.
 
 `met` is the share of laws that keep the tolerance on all six paths, `paths` the share of paths that
-do, `worst` the largest error over the tolerance. a < 1.4 is reported apart.
+do, `worst` the largest error over the tolerance, `seconds` the longest call of `at_tolerance` (the
+first of a law makes its reference). a < 1.4 is reported apart.
 """
 
 from __future__ import annotations
@@ -60,17 +62,18 @@ def random_law(
 
 def random_paths(law: jl.JointLaw, rng: np.random.Generator) -> np.ndarray:
     """Increments (STEPS, PATHS, dim) in m."""
-    at = []
+    at, R = [], law.closure_range
+    stress = float(law.normal_stress(R))
     for _ in range(PATHS):
         legs = int(rng.integers(5, 9))
         closure = np.concatenate([[0.0, rng.uniform(0.4, 1.0)], rng.uniform(-0.3, 1.0, legs - 1)])
-        closure[int(rng.integers(1, legs + 1))] = rng.uniform(0.7, 1.0)  # some of the range is used
+        closure[int(rng.integers(1, legs + 1))] = law.closure(stress * rng.uniform(0.5, 1.0)) / R
         shear = np.sqrt(rng.random(legs + 1)) * (np.arange(legs + 1) > 0)
         turn = rng.uniform(0.0, 2 * math.pi, legs + 1)
         corners = np.stack([closure, shear * np.cos(turn), shear * np.sin(turn)], axis=1)
         when = np.arange(1, STEPS + 1) / STEPS * legs
         at.append(np.stack([np.interp(when, np.arange(legs + 1), x) for x in corners.T], axis=1))
-    place = law.closure_range * np.stack(at, axis=1)[:, :, : law.tables.dim]
+    place = R * np.stack(at, axis=1)[:, :, : law.tables.dim]
     return np.diff(place, axis=0, prepend=0.0)
 
 
@@ -100,7 +103,7 @@ def report(draws: list[tuple[jl.JointLaw, list[dict[str, Any]]]], title: str) ->
     print(f"\n{title}: {len(draws)} laws")
     if not draws:
         return {}
-    print(" tolerance     met   paths  worst  sliders  refused")
+    print(" tolerance     met   paths  worst  sliders  refused  seconds")
     result = {}
     for k, tolerance in enumerate(TOLERANCES):
         kept = [found[k] for _, found in draws if "ratio" in found[k]]
@@ -113,10 +116,10 @@ def report(draws: list[tuple[jl.JointLaw, list[dict[str, Any]]]], title: str) ->
             "worst": float(ratio.max()),
             "median sliders": float(np.median([one["sliders"] for one in kept])),
             "refused": len(draws) - len(kept),
-            "slowest (s)": max(one["seconds"] for one in kept),
+            "seconds": max(one["seconds"] for one in kept),
         }
-        print(f"{tolerance:10.1%} {row['met']:7.1%} {row['paths']:7.1%} {row['worst']:6.2f} "
-              f"{row['median sliders']:8.0f} {row['refused']:8d}")  # fmt: skip
+        shares = f"{tolerance:10.1%} {row['met']:7.1%} {row['paths']:7.1%} {row['worst']:6.2f}"
+        print(f"{shares} {row['median sliders']:8.0f} {row['refused']:8d} {row['seconds']:8.1f}")
     return result
 
 
@@ -136,8 +139,6 @@ def main() -> None:
     steep = [one for one in draws if one[0].orientation.a < SMALL_A]
     usual = [one for one in draws if one[0].orientation.a >= SMALL_A]
     result = {"a >= 1.4": report(usual, "a >= 1.4"), "a < 1.4": report(steep, "a < 1.4")}
-    slowest = max(one["seconds"] for _, found in draws for one in found if "seconds" in one)
-    print(f"\nslowest call of at_tolerance: {slowest:.1f} s")
     if options.json:
         rows = [{"law": law.to_toml(), "found": found} for law, found in draws]
         with open(options.json, "w") as stream:

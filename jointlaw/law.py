@@ -218,7 +218,7 @@ class JointLaw:
         self,
         resolutions: Sequence[str | Resolution] | None = None,
         joints: int = 10_000,
-        seconds: float = 0.05,
+        seconds: float = 0.2,
     ) -> Tradeoff:
         """What resolutions cost and how accurate they are, measured for this law on this machine.
 

@@ -138,7 +138,7 @@ def tradeoff(
     law: JointLaw,
     resolutions: Sequence[str | Resolution] | None = None,
     joints: int = 10_000,
-    seconds: float = 0.05,
+    seconds: float = 0.2,
 ) -> Tradeoff:
     """See `JointLaw.tradeoff`."""
     joints = whole("joints", joints, 0)

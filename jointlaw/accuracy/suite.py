@@ -9,10 +9,10 @@ With R the law's closure range and S the normal stress there, the paths are
     re-contact         closed and sheared, opened under shear until it separates, closed again
     walk               a smooth random walk in closure and both shears
 
-Along 0, 45 and 90 degrees the rings of azimuths look alike, so the other directions lie between: a
-ring of few azimuths errs most there. A law with a plane takes those along azimuth 0 and the others projected on its plane. The paths at
-constant stress are found once, at the reference resolution, and are paths of displacement from then
-on, so that every resolution is asked the same.
+Along 0, 45 and 90 degrees the rings of azimuths look alike; the other directions lie between, where
+a ring of few azimuths errs most. A law with a plane takes the paths along azimuth 0 and the others
+projected on its plane. Those at constant stress are found once, at half the reference resolution,
+and are paths of displacement from then on, so that every resolution is asked the same.
 """
 
 from __future__ import annotations

@@ -4,14 +4,15 @@ With R the law's closure range and S the normal stress there, the paths are
 
     closure            close to R, open, close again to R/2
     shear 0, 45, 90    at the normal stress S/2, along these azimuths to a shear of R
-    reversal           at S/2, to 0.6 R, back to -0.6 R, and to zero
-    constant closure   R, shear along 30 degrees to R: the largest load of all
+    reversal           at S/2 along 30 degrees, to 0.6 R, back to -0.6 R, and to zero
+    constant closure   R, shear along 20 degrees to R: the largest load of all
     re-contact         closed and sheared, opened under shear until it separates, closed again
     walk               a smooth random walk in closure and both shears
 
-A law with a plane takes those along azimuth 0 and the others projected on its plane. The paths at
-constant stress are found once, at the reference resolution, and are paths of displacement from then
-on, so that every resolution is asked the same.
+Along 0, 45 and 90 degrees the rings of azimuths look alike; the other directions lie between, where
+a ring of few azimuths errs most. A law with a plane takes the paths along azimuth 0 and the others
+projected on its plane. Those at constant stress are found once, at half the reference resolution,
+and are paths of displacement from then on, so that every resolution is asked the same.
 """
 
 from __future__ import annotations
@@ -133,14 +134,14 @@ def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]
         "shear 0": along(shear, 0),
         "shear 45": along(shear, 45),
         "shear 90": along(shear, 90),
-        "reversal": along(back, 0),
-        "constant closure": along(fixed, 30),
-        "re-contact": along(again, 60),
+        "reversal": along(back, 30),
+        "constant closure": along(fixed, 20),
+        "re-contact": along(again, 65),
         "walk": walk,
     }
     if law.plane is not None:
         turned = ("shear 45", "shear 90")
-        named |= {"constant closure": fixed, "re-contact": again}
+        named |= {"reversal": back, "constant closure": fixed, "re-contact": again}
         named = {name: path[:, :2] for name, path in named.items() if name not in turned}
     held = np.array([name.startswith(("shear", "reversal")) for name in named])
     return tuple(named), R * np.stack(list(named.values()), axis=1), held

@@ -80,3 +80,11 @@ def test_what_cannot_be_met_is_refused_with_what_was_reached():
     law = replace(jl.presets.load("linear-a6"), plane=0.0)
     with pytest.raises(ValueError, match=r"tolerance = 1e-07 cannot be met .* was reached"):
         law.at_tolerance(1e-7)
+
+
+def test_example_of_the_docs_prints_what_it_says(capsys):
+    page = (ROOT / "docs" / "how-accurate.md").read_text()
+    block = page.split("```python\n")[1].split("```")[0]
+    exec(block, {})
+    printed = block.split("print(")[1].split("# ")[1].strip()
+    assert capsys.readouterr().out.strip() == printed

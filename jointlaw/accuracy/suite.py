@@ -8,6 +8,7 @@ With R the law's closure range and S the normal stress there, the paths are
     constant closure   R, shear along 20 degrees to R: the largest load of all
     re-contact         closed and sheared, opened under shear until it separates, closed again
     walk               a smooth random walk in closure and both shears
+    weave              closed five times while the shear crosses itself (in space)
 
 Along 0, 45 and 90 degrees the rings of azimuths look alike; the other directions lie between, where
 a ring of few azimuths errs most. A law with a plane takes the paths along azimuth 0 and the others
@@ -129,6 +130,11 @@ def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]
         0.5 * np.sin(2 * turn) + 0.3 * np.sin(3.3 * turn + 0.4) - 0.3 * np.sin(0.4),
         0.45 * np.sin(1.7 * turn) + 0.25 * np.sin(4.1 * turn + 1.0) - 0.25 * np.sin(1.0),
     ], axis=-1)  # fmt: skip
+    weave = np.stack([
+        0.525 - 0.525 * np.cos(5 * turn) + 0.4 * s * (1 - s),
+        0.7 * np.sin(1.3 * turn),
+        0.7 * (np.sin(2.1 * turn + 0.7) - np.sin(0.7)) / (1 + np.sin(0.7)),
+    ], axis=-1)  # fmt: skip
     named = {
         "closure": np.stack([np.interp(s, [0, 0.4, 0.8, 1], [0, 1, 0, 0.5]), zero, zero], -1),
         "shear 0": along(shear, 0),
@@ -138,9 +144,10 @@ def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]
         "constant closure": along(fixed, 20),
         "re-contact": along(again, 65),
         "walk": walk,
+        "weave": weave,
     }
     if law.plane is not None:
-        turned = ("shear 45", "shear 90")
+        turned = ("shear 45", "shear 90", "weave")
         named |= {"reversal": back, "constant closure": fixed, "re-contact": again}
         named = {name: path[:, :2] for name, path in named.items() if name not in turned}
     held = np.array([name.startswith(("shear", "reversal")) for name in named])

@@ -7,17 +7,20 @@ import sys
 from pathlib import Path
 
 from .interfaces import Refused
+from .outcome import sentence
 from .run import run
 from .scene import load, names
 from .simulation import Simulation
 from .tables import SceneError
 
 DEFAULT = "tilt"
+TEMPLATE = Path(__file__).parent / "template.toml"
 
 ABOUT = """\
 Rigid rock blocks in 2-D whose every contact force comes from a joint law.
 
   python -m dem_demo [SCENE] --out DIR     run a scene: a name or a TOML file
+  python -m dem_demo new FILE              write a commented scene of a jointed rock to start from
   python -m dem_demo check FILE            check a scene file without running it
   python -m dem_demo resume STATE --out DIR [--until T] [--step DT]
                                            go on from DIR/state or DIR/refused
@@ -27,11 +30,9 @@ Rigid rock blocks in 2-D whose every contact force comes from a joint law.
 def main(arguments: list[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    verb = words[0] if words and words[0] in ("check", "resume") else "run"
+    verbs = {"new": _new, "check": _check, "resume": _resume}
     try:
-        return {"check": _check, "resume": _resume, "run": _run}[verb](
-            words[1:] if verb != "run" else words
-        )
+        return verbs[words[0]](words[1:]) if words and words[0] in verbs else _run(words)
     except (SceneError, Refused, ValueError, OSError) as error:
         print(f"dem_demo: {error}", file=sys.stderr)
         return 2
@@ -64,6 +65,21 @@ def _resume(words: list[str]) -> int:
     return _go(Simulation.load(given.state, given.step), given)
 
 
+def _new(words: list[str]) -> int:
+    parser = argparse.ArgumentParser(
+        "python -m dem_demo new",
+        description="Write a commented scene of a rock slope cut by joint sets, ready to run.",
+        epilog="example: python -m dem_demo new my-slope.toml",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("file", type=Path)
+    file = parser.parse_args(words).file
+    with file.open("x") as stream:  # never over a file that is there
+        stream.write(TEMPLATE.read_text())
+    print(f"{file} written; next: python -m dem_demo check {file}")
+    return 0
+
+
 def _check(words: list[str]) -> int:
     parser = argparse.ArgumentParser(
         "python -m dem_demo check",
@@ -92,6 +108,8 @@ def _announce(sim: Simulation, end: float) -> None:
         f"time step {sim.dt:.3g} s, limit {sim.step_limit:.3g} s (safety factor "
         f"{sim.step_limit / sim.dt:.2f}), {max(round((end - sim.time) / sim.dt), 0)} steps"
     )
+    for rock in sim.scene.rocks:
+        print(f"rock {rock.name!r}: {len(rock.blocks)} blocks, {rock.fixed} fixed; {rock.slivers}")
     if not sim.balanced:
         print("the joints cannot hold the blocks where they are drawn: they move from step 0")
 
@@ -111,6 +129,8 @@ def _go(sim: Simulation, given: argparse.Namespace) -> int:
                 f"{slip['block']}: slipped at {slip['slip_angle']:.2f} degrees, "
                 f"the law alone says {slip['predicted_angle']:.2f}"
             )
+    for rock in summary["rocks"]:
+        print(sentence(rock))
     print(
         f"energy balanced to {summary['largest_energy_error']:.1e}, smallest safety factor "
         f"{summary['safety_factor']:.2f}; results in {given.out}"

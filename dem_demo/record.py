@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from .energy import COLUMNS
+from .shapes import turn
 from .simulation import Simulation
 from .watch import base_angle, joint_state
 
@@ -45,6 +46,8 @@ class Record:
                 row[f"{name}: base angle_deg"] = base_angle(sim, base)
                 for key, value in joint_state(sim, moving, base).items():
                     row[f"{name}: {key}_{UNITS[key]}"] = value
+        for i, pin in enumerate(self.scene.watch.get("pins", [])):
+            row[f"pin {i + 1}: moved_m"] = float(np.hypot(*_moved(sim, *pin)))
         self.watched.append(row)
 
     def column(self, name: str) -> np.ndarray:
@@ -99,6 +102,13 @@ class Record:
 
 
 UNITS = {"normal": "Pa", "shear": "Pa", "closure": "m", "slid": "m", "sliding": "share"}
+
+
+def _moved(sim: Simulation, block: int, point: tuple[float, float]) -> np.ndarray:
+    """Displacement (m) of a point of a block since it was drawn."""
+    x, y, angle = sim.motion[:3, block]
+    arm = np.asarray(point) - sim.scene.blocks[block].centroid
+    return turn(angle) @ arm + [x, y] - point
 
 
 def _joints(sim: Simulation) -> dict[str, np.ndarray]:

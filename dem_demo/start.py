@@ -38,18 +38,22 @@ def _seat(sim) -> np.ndarray:
     """Move the blocks to where their joints carry them; the joints' first sliding (m)."""
     slid, free = np.zeros(sim.joints.n), sim.free.ravel()
     force = ((sim.gravity + sim.loads).ravel() * sim.limit.root)[free]
+    settle = np.ones(len(force), bool)
     for attempt in range(3):  # each at the places just found: the joints turn with the blocks
         points = geometry.evaluate(sim.edges, sim.motion)
         rows = sim.limit.rows(sim.edges, points, sim.motion)
         area = points.length * sim.scene.thickness
-        moved, further, balanced = equilibrium(sim.joints, rows, points.closure, slid, area, force)
-        if attempt > 0 and not balanced:
-            break  # what was found before is balanced but for the turning of the joints
-        slid, sim.balanced = further, balanced
+        moved, balanced = equilibrium(sim.joints, rows, points.closure, slid, area, force, settle)
+        if attempt == 0:
+            sim.balanced = bool(balanced.all())
+        else:  # what was found before is balanced but for the turning of the joints
+            moved = np.where(balanced & settle, moved, 0.0)
+        slid = slid + (rows @ moved)[len(slid) :]
         shift = np.zeros(sim.free.size)
         shift[free] = moved * sim.limit.root[free]
         sim.motion[:3] += shift.reshape(-1, 3).T
-        if not balanced:
+        settle &= balanced
+        if not settle.any():
             break
     sim.interfaces.renewed_at = sim.motion[:3].copy()
     return slid

@@ -16,7 +16,7 @@ from PIL import Image
 from .record import Record
 from .shapes import turn
 
-CLOSURE, SHEAR, STRESS, TAU, SLIDING, SLIPPING, SEPARATED, LENGTH = range(8)
+CLOSURE, SHEAR, STRESS, TAU, SLIDING, SLIPPING, SEPARATED, LENGTH, RATE = range(9)
 FIXED, DRIVEN, FREE, OPEN, SLIDES = "#8d8d8d", "#b9b4a7", "#efe9dc", "#1f9ed1", "#d81b1b"
 MAP = "viridis"
 FRAMES = 60  # most frames of an animation

@@ -14,7 +14,7 @@ from .watch import base_angle, joint_state
 
 JOINT_COLUMNS = (
     "closure_m", "shear_m", "normal_stress_Pa", "shear_stress_Pa",
-    "sliding", "slipping", "separated", "length_m",
+    "sliding", "slipping", "separated", "length_m", "sliding_m/s",
 )  # fmt: skip
 
 
@@ -22,7 +22,7 @@ class Record:
     """Frames of a run: times (f,), motion (f, 6, n), energies (f, 8), joints as lists of arrays.
 
     joints[f]: "who" (k, 5) block, edge, block, edge, place; "ends" (k, 2, 2) the stretch of joint
-    that a law point carries; "values" (k, 8) as JOINT_COLUMNS.
+    that a law point carries; "values" (k, 9) as JOINT_COLUMNS.
     """
 
     def __init__(self, sim: Simulation) -> None:
@@ -124,7 +124,7 @@ def _joints(sim: Simulation) -> dict[str, np.ndarray]:
     who = np.array([[*key, place] for key, place in sim.identity], int).reshape(-1, 5)
     values = np.column_stack(
         [points.closure, delta[:, 1], *sim.traction.T, now["sliding"], now["slipping"],
-         now["separated"], points.length]
+         now["separated"], points.length, points.along[1]]
     )  # fmt: skip
     return {
         "who": who[keep],

@@ -10,21 +10,30 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from .outcome import displacement, kinetic, outcomes, sentence
-from .picture import FIXED, FREE, SEPARATED, SLIPPING, STRESS, Scale, outline
+from .outcome import CREEP, displacement, kinetic, outcomes, sentence
+from .picture import FIXED, FREE, RATE, SEPARATED, SLIPPING, STRESS, Scale, outline
 from .record import Record
 
 STUCK, PARTLY, SLIDES, OPEN = "#3a3a3a", "#e69f00", "#d81b1b", "#1f9ed1"
 STATES = {"stuck": STUCK, "partly sliding": PARTLY, "sliding": SLIDES, "open": OPEN}
+BELOW = {
+    "loc": "upper center", "bbox_to_anchor": (0.5, -0.13), "ncols": 6, "fontsize": 8,
+    "frameon": False,
+}  # fmt: skip
 PARTIAL, FULL = 0.05, 0.9  # shares of the shear capacity in sliding that divide the states
 
 
 def states(record: Record, i: int, scale: Scale) -> np.ndarray:
-    """State (k,) of the joints of frame i, as one of the names in STATES."""
+    """State (k,) of the joints of frame i, as one of the names in STATES.
+
+    A joint that moves along itself slower than CREEP is stuck, whatever part of its asperities
+    waits at the friction limit.
+    """
     values = record.joints[i]["values"]
-    slipping = values[:, SLIPPING] / np.maximum(1 - values[:, SEPARATED], 1e-12)
-    names = np.where(slipping > FULL, "sliding", np.where(slipping > PARTIAL, "partly sliding", ""))
-    names = np.where(names == "", "stuck", names)
+    shares = values[:, SLIPPING] / np.maximum(1 - values[:, SEPARATED], 1e-12)
+    full, partial = shares > FULL, shares > PARTIAL
+    moves = np.abs(values[:, RATE]) > CREEP
+    names = np.where(moves & full, "sliding", np.where(moves & partial, "partly sliding", "stuck"))
     return np.where(values[:, STRESS] > 1e-3 * scale.stress, names, "open")
 
 
@@ -56,7 +65,7 @@ def draw_vectors(axes, record: Record, i: int, scale: Scale) -> None:
             angles="xy", scale_units="xy", scale=1, width=0.0022, color=f"C{number}", zorder=4,
         )  # fmt: skip
         arrow.set_label(f"{rock.name}: longest arrow {_metres(most)}")
-    axes.legend(loc="upper left", fontsize=8)
+    axes.legend(**BELOW)
 
 
 def frame(record: Record, i: int, scale: Scale, dpi: int) -> Figure:
@@ -82,7 +91,7 @@ def report(record: Record, path: Path) -> None:
     parts = figure.subplots(4, 1, height_ratios=[tall, tall, tall, 3.2])
     draw_states(parts[0], record, 0, scale)
     parts[0].set_title(f"before: t = {record.times[0]:.2f} s", fontsize=10)
-    parts[0].legend(handles=_key(scale), ncols=3, fontsize=8, loc="upper left")
+    parts[0].legend(handles=_key(scale), **BELOW)
     draw_states(parts[1], record, last, scale)
     parts[1].set_title(f"after: t = {record.times[last]:.2f} s", fontsize=10)
     draw_vectors(parts[2], record, last, scale)
@@ -146,7 +155,7 @@ def _key(scale: Scale) -> list[Line2D]:
     ]  # fmt: skip
     for stress in scale.marks():
         mark = Line2D([], [], color="0.3", lw=0.5 * scale.width(stress))
-        mark.set_label(f"{stress / 1e3:.3g} kPa")
+        mark.set_label(f"{stress / 1e3:g} kPa" if stress < 1e6 else f"{stress / 1e6:g} MPa")
         marks.append(mark)
     return marks
 

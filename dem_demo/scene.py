@@ -92,6 +92,11 @@ def parse(text: str, where: str = "scene") -> Scene:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise SceneError(f"{where} is not valid TOML: {error}") from None
+    return build(data, where, text)
+
+
+def build(data: dict[str, Any], where: str = "scene", text: str = "") -> Scene:
+    """A scene from the tables of its file; `text` is kept for states saved to files."""
     top = Table(data, where)
     laws = {}
     for name, table in top.take("laws", dict, say="give at least one [laws.NAME] table").items():

@@ -31,7 +31,7 @@ def test_a_regular_grid_is_exact():
 
 @pytest.mark.parametrize("seed", range(6))
 def test_blocks_are_convex_wide_enough_and_fill_the_rock(seed):
-    """Nothing is lost but what is reported, nothing overlaps; the toe of the slope bends inwards."""
+    """Nothing is lost but what is reported, nothing overlaps; the toe bends inwards."""
     rock = cut(SLOPE, [FLAT, STEEP], seed, least_width=0.25)
     shapes = [Polygon(block) for block in rock.blocks]
     assert all(check_convex(block) is None for block in rock.blocks)

@@ -33,6 +33,7 @@ class Run:
     largest_stress: float = 0.0  # Pa, expected in impacts: sets the step before anything touches
     skin: float | None = None  # reach of the search for contacts; default 0.02 of the least width
     point_spacing: float = np.inf  # largest distance of law points along a joint
+    corner_length: float | None = None  # of a corner on an edge; default 0.05 of the least width
     max_overlap: float = 0.03  # share of the smaller block's width
 
 
@@ -219,6 +220,7 @@ def _run(table: Table) -> Run:
         largest_stress=table.take("largest_stress", float, Run.largest_stress, least=0, say="Pa"),
         skin=table.take("skin", float, None, above=0, say="m"),
         point_spacing=table.take("point_spacing", float, Run.point_spacing, above=0, say="m"),
+        corner_length=table.take("corner_length", float, None, above=0, say="m"),
         max_overlap=table.take("max_overlap", float, Run.max_overlap, above=0),
     )
     table.finish()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import geometry, timestep
+from . import timestep
 from .interfaces import Refused
 from .seat import equilibrium
 
@@ -19,14 +19,14 @@ def begin(sim) -> None:
     for i, block in enumerate(sim.scene.blocks):
         if not block.fixed:
             sim.motion[3:, i] = [*block.velocity, block.spin]
-    points = geometry.evaluate(sim.edges, sim.motion)
+    points = sim.evaluate(sim.motion)
     sim.traction = sim.joints.update(sim.joints.increments(points.closure, slid))
     sim.check_step(points)
     if not sim.dt:
         sim.dt = _choose_step(sim)
     sim.require_step()
     sim.motion[3:][sim.drives.axes, sim.drives.rows] = sim.drives.velocity(0.0, sim.dt)
-    points = geometry.evaluate(sim.edges, sim.motion)
+    points = sim.evaluate(sim.motion)
     velocity = sim.motion[3:].T
     forces = sim.forces(points, 0.5 * sim.dt)
     sim.ledger.start(velocity, forces, sim.dt, *sim.joint_energies(points))
@@ -40,8 +40,8 @@ def _seat(sim) -> np.ndarray:
     force = ((sim.gravity + sim.loads).ravel() * sim.limit.root)[free]
     settle = np.ones(len(force), bool)
     for attempt in range(3):  # each at the places just found: the joints turn with the blocks
-        points = geometry.evaluate(sim.edges, sim.motion)
-        rows = sim.limit.rows(sim.edges, points, sim.motion)
+        points = sim.evaluate(sim.motion)
+        rows = sim.limit.rows(sim.contacts, points, sim.motion)
         area = points.length * sim.scene.thickness
         moved, balanced = equilibrium(sim.joints, rows, points.closure, slid, area, force, settle)
         if attempt == 0:

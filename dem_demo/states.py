@@ -10,16 +10,19 @@ from pathlib import Path
 
 import numpy as np
 
-from . import geometry
 from .energy import COLUMNS
 
 
 def state(sim) -> dict:
     """A copy of everything that the future depends on."""
+    it = sim.interfaces
     arrays = {
         "motion": sim.world.motion(),
-        "renewed_at": sim.interfaces.renewed_at.copy(),
-        "keys": np.array(sim.interfaces.keys, int).reshape(-1, 4),
+        "renewed_at": it.renewed_at.copy(),
+        "corners": np.stack([it.contacts.corner, it.contacts.edge, it.numbers]),
+        "keys": np.array(it.keys, int).reshape(-1, 4),
+        "overlaps": np.array(it.overlaps, int).reshape(-1, 4),
+        "given": np.array(it.given),
         "forces": sim.ledger.forces.copy(),
         "area": sim.ledger.area.copy(),
         "e_stored": sim.ledger.e_stored.copy(),
@@ -39,8 +42,10 @@ def restore(sim, state: dict, step: float | None = None) -> None:
     sim.drives.turned_at = a["turned_at"].copy()
     if step:
         sim.t0, sim.n, sim.dt = sim.time, 0, step
-    sim.interfaces.adopt([tuple(k) for k in a["keys"].tolist()])
-    sim.interfaces.renewed_at = a["renewed_at"].copy()
+    keys, overlaps = ([tuple(k) for k in a[what].tolist()] for what in ("keys", "overlaps"))
+    corner, edge, numbers = a["corners"].copy()
+    sim.interfaces.adopt(corner, edge, keys, numbers, overlaps, int(a["given"]))
+    sim.interfaces.renewed_at, sim.interfaces.urgent = a["renewed_at"].copy(), False
     sim.points = None
     sim.joints.restore(state["joints"], sim.interfaces.of_points)
     sim.arrange()
@@ -50,7 +55,7 @@ def restore(sim, state: dict, step: float | None = None) -> None:
     sim.ledger.value = dict(zip(COLUMNS, a["ledger"].tolist(), strict=False))
     sim.ledger.total0 = float(a["ledger"][-1])
     sim.ledger.remember(a["forces"].copy(), sim.area, a["e_stored"].copy(), a["e_lost"].copy())
-    sim.points = geometry.evaluate(sim.edges, sim.motion)
+    sim.points = sim.evaluate(sim.motion)
     sim.world.place(sim.motion)
 
 

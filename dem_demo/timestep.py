@@ -29,11 +29,11 @@ class StepLimit:
         self.free = free
         self.size = int(free.sum())
 
-    def rows(self, edges, points: Points, motion: np.ndarray) -> csr_array:
+    def rows(self, contacts, points: Points, motion: np.ndarray) -> csr_array:
         """(2 k, free motions): opening rates along normal and tangent of unit-mass motions."""
         k = len(points.closure)
         data, row, col = [], [], []
-        for block, sign in ((edges.a, -1.0), (edges.b, 1.0)):
+        for block, sign in ((contacts.a, -1.0), (contacts.b, 1.0)):
             arm = points.at - motion[:2, block]
             for first, way in ((0, points.normal), (k, points.tangent)):
                 parts = (way[0], way[1], arm[0] * way[1] - arm[1] * way[0])

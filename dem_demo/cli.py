@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from pathlib import Path
 
+from .compare import compare
 from .interfaces import Refused
 from .outcome import sentence
 from .run import run
@@ -22,6 +24,8 @@ Rigid rock blocks in 2-D whose every contact force comes from a joint law.
   python -m dem_demo [SCENE] --out DIR     run a scene: a name or a TOML file
   python -m dem_demo new FILE              write a commented scene of a jointed rock to start from
   python -m dem_demo check FILE            check a scene file without running it
+  python -m dem_demo compare SCENE [--seeds 1 2 3] [--until T]
+                                           every rock of a scene alone, with plain Coulomb as well
   python -m dem_demo resume STATE --out DIR [--until T] [--step DT]
                                            go on from DIR/state or DIR/refused
 """
@@ -30,7 +34,7 @@ Rigid rock blocks in 2-D whose every contact force comes from a joint law.
 def main(arguments: list[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    verbs = {"new": _new, "check": _check, "resume": _resume}
+    verbs = {"new": _new, "check": _check, "resume": _resume, "compare": _compare}
     try:
         return verbs[words[0]](words[1:]) if words and words[0] in verbs else _run(words)
     except (SceneError, Refused, ValueError, OSError) as error:
@@ -95,6 +99,35 @@ def _check(words: list[str]) -> int:
     return 0
 
 
+def _compare(words: list[str]) -> int:
+    parser = argparse.ArgumentParser(
+        "python -m dem_demo compare",
+        description="Run every rock of a scene alone, cut with several seeds, with its own laws and "
+        "with plain Coulomb friction of its asperities. A rock that moves 1 m has failed and stops.",
+        epilog="example: python -m dem_demo compare slope --seeds 1 2 3 --until 10",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("scene", help="a name or a TOML file")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="default 1 2 3")
+    parser.add_argument("--until", type=float, help="model time to stop at (s)")
+    parser.add_argument("--out", type=Path, help="a JSON file for the numbers")
+    given = parser.parse_args(words)
+    scene = load(given.scene)
+    if not scene.rocks:
+        raise ValueError(f"{given.scene} has no [[rock]] to compare")
+    end = given.until if given.until is not None else scene.run.end
+    rows = []
+    for row in compare(scene.text, str(given.scene), given.seeds, end):
+        rows.append(row)
+        print(f"seed {row['seed']}, {row['law']:7s} {row['time_s']:6.2f} s  {sentence(row)}"
+              f", books to {row['largest_energy_error']:.1e}", flush=True)  # fmt: skip
+        if row["refused"]:
+            print(f"    stopped: {row['refused']}")
+    if given.out:
+        given.out.write_text(json.dumps(rows, indent=2) + "\n")
+    return 0
+
+
 def _outputs(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder for the results")
     parser.add_argument("--until", type=float, help="model time to stop at (s)")
@@ -109,7 +142,10 @@ def _announce(sim: Simulation, end: float) -> None:
         f"{sim.step_limit / sim.dt:.2f}), {max(round((end - sim.time) / sim.dt), 0)} steps"
     )
     for rock in sim.scene.rocks:
-        print(f"rock {rock.name!r}: {len(rock.blocks)} blocks, {rock.fixed} fixed; {rock.slivers}")
+        print(
+            f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
+            f"{len(rock.blocks) - len(rock.free)} fixed; {rock.slivers}"
+        )
     if not sim.balanced:
         print("the joints cannot hold the blocks where they are drawn: they move from step 0")
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 import time
+import tomllib
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -25,8 +26,9 @@ from .simulation import Simulation
 FAR = 1.0  # m: a rock whose blocks have moved farther has failed, and need not go on
 
 
-def compare(data: dict[str, Any], where: str, seeds: Sequence[int], until: float) -> Iterator[dict]:
-    """Run every rock of a scene's tables for each seed and each kind of law; yields outcomes."""
+def compare(text: str, where: str, seeds: Sequence[int], until: float) -> Iterator[dict]:
+    """Run every rock of a scene's text for each seed and each kind of law; yields outcomes."""
+    data = tomllib.loads(text)
     for rock in _whole(data["rock"]):
         for seed in seeds:
             for kind in ("joint", "coulomb"):

@@ -129,7 +129,9 @@ class Interfaces:
                 fresh.append(i)
         stay.sort()
         chosen = [i for _, i, _ in stay] + fresh
-        overlaps = self._long_overlaps(corner[chosen], edge[chosen], rise[:, chosen], overlap[:, chosen])
+        overlaps = self._long_overlaps(
+            corner[chosen], edge[chosen], rise[:, chosen], overlap[:, chosen]
+        )
         same = len(stay) == len(self.numbers) and not fresh and overlaps == self.overlaps
         numbers = [n for n, _, _ in stay] + [self.given + n for n in range(len(fresh))]
         names = [key for _, _, key in stay] + [keys[i] for i in fresh]

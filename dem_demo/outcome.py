@@ -39,7 +39,7 @@ def outcomes(record: Record) -> list[dict]:
     crept = np.hypot(*(last - displacement(record, before)).T)
     crept /= max(times[-1] - times[before], 1e-300)
     for rock in record.scene.rocks:
-        free = [b for b in rock.blocks if not record.scene.blocks[b].fixed]
+        free = rock.free
         moved = np.hypot(*(last - first)[free].T)
         creep = float(crept[free].max())
         failed = int((moved > FAILED).sum())

@@ -16,9 +16,9 @@ from .record import Record
 
 STUCK, PARTLY, SLIDES, OPEN = "#3a3a3a", "#e69f00", "#d81b1b", "#1f9ed1"
 STATES = {"stuck": STUCK, "partly sliding": PARTLY, "sliding": SLIDES, "open": OPEN}
-BELOW = {
-    "loc": "upper center", "bbox_to_anchor": (0.5, -0.13), "ncols": 6, "fontsize": 8,
-    "frameon": False,
+ABOVE = {
+    "loc": "lower right", "bbox_to_anchor": (1.0, 0.99), "ncols": 6, "fontsize": 8,
+    "frameon": False, "handlelength": 1.6, "columnspacing": 1.2,
 }  # fmt: skip
 PARTIAL, FULL = 0.05, 0.9  # shares of the shear capacity in sliding that divide the states
 
@@ -51,21 +51,20 @@ def draw_states(axes, record: Record, i: int, scale: Scale) -> None:
 
 
 def draw_vectors(axes, record: Record, i: int, scale: Scale) -> None:
-    """Displacement of the blocks since they were drawn; every rock has its own arrow scale."""
+    """Displacement of the blocks since they were drawn; small ones enlarged, rock by rock."""
     _rock(axes, record, i, scale)
-    moved = displacement(record, i)
-    places = record.motion[i][:2].T
+    moved, places = displacement(record, i), record.motion[i][:2].T
     for number, rock in enumerate(record.scene.rocks):
-        free = [b for b in rock.blocks if not record.scene.blocks[b].fixed]
+        free = rock.free
         most = float(np.hypot(*moved[free].T).max())
-        unit = 0.06 * scale.size / most
-        start = places[free] - (moved[free] if most > 0.01 * scale.size else 0)
-        arrow = axes.quiver(
-            *start.T, *(moved[free] * (1 if most > 0.01 * scale.size else unit)).T,
-            angles="xy", scale_units="xy", scale=1, width=0.0022, color=f"C{number}", zorder=4,
+        true = most > 0.02 * scale.size
+        arrows = moved[free] * (1.0 if true else 0.06 * scale.size / most)
+        axes.quiver(
+            *(places[free] - arrows * true).T, *arrows.T, color=f"C{number}", zorder=4,
+            angles="xy", scale_units="xy", scale=1, width=0.0022,
+            label=f"{rock.name}: longest arrow {_metres(most)}{'' if true else ' (enlarged)'}",
         )  # fmt: skip
-        arrow.set_label(f"{rock.name}: longest arrow {_metres(most)}")
-    axes.legend(**BELOW)
+    axes.legend(**ABOVE)
 
 
 def frame(record: Record, i: int, scale: Scale, dpi: int) -> Figure:
@@ -87,40 +86,44 @@ def report(record: Record, path: Path) -> None:
     scale = Scale(record, [0, last])
     wide, high = scale.high - scale.low
     tall = max(9.0 * high / wide, 2.0)
-    figure = Figure(figsize=(9.6, 3 * tall + 6.0), dpi=120, layout="constrained")
-    parts = figure.subplots(4, 1, height_ratios=[tall, tall, tall, 3.2])
-    draw_states(parts[0], record, 0, scale)
-    parts[0].set_title(f"before: t = {record.times[0]:.2f} s", fontsize=10)
-    parts[0].legend(handles=_key(scale), **BELOW)
-    draw_states(parts[1], record, last, scale)
-    parts[1].set_title(f"after: t = {record.times[last]:.2f} s", fontsize=10)
-    draw_vectors(parts[2], record, last, scale)
-    parts[2].set_title("displacement since the blocks were drawn without weight", fontsize=10)
-    _histories(parts[3], record)
+    figure = Figure(figsize=(9.6, 3 * tall + 5.5), dpi=120, layout="constrained")
+    part = figure.subplot_mosaic(
+        [["before"] * 2, ["after"] * 2, ["vectors"] * 2, ["energy", "moved"]],
+        height_ratios=[tall, tall, tall, 2.8],
+    )
+    for name, i in (("before", 0), ("after", last)):
+        draw_states(part[name], record, i, scale)
+        part[name].set_title(f"{name}: t = {record.times[i]:.2f} s", fontsize=10, loc="left")
+        part[name].legend(handles=_key(scale), **ABOVE)
+    draw_vectors(part["vectors"], record, last, scale)
+    part["vectors"].set_title("displacement", fontsize=10, loc="left")
+    _histories(part["energy"], part["moved"], record)
     said = "\n".join(sentence(entry) for entry in outcomes(record))
     figure.suptitle(f"{record.scene.title}\n{said}", fontsize=10)
     figure.savefig(path)
 
 
-def _histories(axes, record: Record) -> None:
-    times, right = np.array(record.times), axes.twinx()
+def _histories(energy_axes, moved_axes, record: Record) -> None:
+    """Kinetic energy and largest displacement since step 0 of every rock."""
+    times = np.array(record.times)
     energy = np.array([kinetic(record, i) for i in range(len(times))])
     moved = np.array([displacement(record, i) for i in range(len(times))])
     moved = np.hypot(*np.moveaxis(moved - moved[0], 2, 0))
     for number, rock in enumerate(record.scene.rocks):
-        here = list(rock.blocks)
-        axes.semilogy(
-            times, np.maximum(energy[:, here].sum(axis=1), 1e-300), color=f"C{number}",
-            label=f"{rock.name}: kinetic energy",
-        )  # fmt: skip
-        right.plot(times, moved[:, here].max(axis=1), color=f"C{number}", ls="--")
-    top = float(energy.sum(axis=1).max())
-    axes.set_ylim(max(1e-14 * top, 1e-14), 5 * top)
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel("kinetic energy (J), full line")
-    right.set_ylabel("largest displacement\nsince step 0 (m), dashed")
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=8, loc="lower right")
+        style = {"color": f"C{number}", "label": rock.name}
+        energy_axes.semilogy(times, _seen(energy[:, rock.free].sum(axis=1)), **style)
+        moved_axes.semilogy(times, _seen(moved[:, rock.free].max(axis=1)), **style)
+    energy_axes.set_ylabel("kinetic energy (J)")
+    moved_axes.set_ylabel("largest displacement\nsince step 0 (m)")
+    for axes in (energy_axes, moved_axes):
+        axes.set_xlabel("time (s)")
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize=8)
+
+
+def _seen(values: np.ndarray) -> np.ndarray:
+    """What a logarithmic axis can show."""
+    return np.where(values > 0, values, np.nan)
 
 
 def _rock(axes, record: Record, i: int, scale: Scale) -> None:

@@ -19,13 +19,13 @@ LEAST = 0.2  # narrowest block as a share of the smallest spacing
 class Rock:
     """A rock mass of a scene, cut into blocks.
 
-    blocks: their numbers in the scene; fixed: how many of them never move; laws: of each (block,
-    edge) that lies on a joint, the law of its set; slivers: what became of them, for a person.
+    blocks: their numbers in the scene; free: those that can move; laws: of each (block, edge) that
+    lies on a joint, the law of its set; slivers: what became of them, for a person.
     """
 
     name: str
     blocks: range
-    fixed: int
+    free: list[int]
     laws: dict[tuple[int, int], str]
     slivers: str
 
@@ -95,7 +95,10 @@ def _one(table: Table, name: str, density: float, first: int) -> tuple[list[Bloc
     slivers = f"{parts.joined} slivers joined to neighbours"
     if parts.dropped:
         slivers += f", {len(parts.dropped)} left out ({sum(parts.dropped):.2g} m2)"
-    return blocks, Rock(name, numbers, sum(b.fixed for b in blocks), laws, slivers)
+    free = [number for number, block in zip(numbers, blocks, strict=True) if not block.fixed]
+    if not free:
+        raise SceneError(f"{table.path('fixed')}: all blocks of the rock are fixed")
+    return blocks, Rock(name, numbers, free, laws, slivers)
 
 
 def _set(table: Table) -> JointSet:

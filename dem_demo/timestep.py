@@ -14,7 +14,7 @@ from scipy.sparse.linalg import eigsh
 
 from .geometry import Points
 
-DENSE = 120  # degrees of freedom up to which a dense eigenproblem is the faster one
+DENSE = 24  # degrees of freedom up to which a dense eigenproblem is the faster one
 
 
 class StepLimit:

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from .energy import COLUMNS
-from .stretches import names, stretches
 from .simulation import Simulation
+from .stretches import names, stretches
 from .watch import base_angle, joint_state
 
 JOINT_COLUMNS = (
@@ -106,7 +106,7 @@ def _joints(sim: Simulation) -> dict[str, np.ndarray]:
     """Joints that touch or almost touch."""
     points, keep = sim.points, sim.points.length > 0
     delta, now = sim.joints.read("delta"), sim.joints.now
-    who = names(sim.contacts, points, sim.interfaces.numbers)
+    who = names(sim.contacts, points, [number for _, number in sim.identity])
     values = np.column_stack(
         [points.closure, delta[:, 1], *sim.traction.T, now["sliding"], now["slipping"],
          now["separated"], points.length]

@@ -17,8 +17,8 @@ def equilibrium(joints: Joints, rows: csr_array, closure, slid, area, force):
     closure, slid (k,): where the joints are without these displacements (m), reached in one step
     from the virgin state.
 
-    First with joints that cannot slide, which always has an answer; then with the law itself.
-    Returns (displacement, slid (k,) in m, balanced): balanced is False when the law cannot hold
+    First with joints that cannot slide; then with the law itself. If the law cannot hold the
+    blocks, with joints that neither slide nor open, which always has an answer. Returns (displacement, slid (k,) in m, balanced): balanced is False when the law cannot hold
     the blocks: they will move from step 0.
     """
     k = len(closure)
@@ -26,12 +26,13 @@ def equilibrium(joints: Joints, rows: csr_array, closure, slid, area, force):
     start = np.concatenate([closure, slid])
     weight = np.concatenate([area, area])
 
-    def bonded(d):
-        c = np.maximum(d[:k], 1e-9)
+    def bonded(d, pull=0.0):
+        c = np.maximum(np.abs(d[:k]), 1e-9)
         shear = joints.stiffness_at(c)
         slope = (joints.stress_at(1.01 * c) - joints.stress_at(0.99 * c)) / (0.02 * c)
-        F = np.concatenate([joints.stress_at(c) * (d[:k] > 0), shear * d[k:]])
-        return F, diags(np.concatenate([slope * (d[:k] > 0), shear]))
+        acts = np.where(d[:k] > 0, 1.0, pull)
+        F = np.concatenate([joints.stress_at(c) * acts * np.sign(d[:k]), shear * d[k:]])
+        return F, diags(np.concatenate([slope * acts, shear]))
 
     def law(d):
         F, C = joints.trial(np.stack([d[:k], d[k:]], axis=1))
@@ -43,7 +44,8 @@ def equilibrium(joints: Joints, rows: csr_array, closure, slid, area, force):
     guess, _ = _newton(bonded, rows, start, weight, force, np.zeros(rows.shape[1]), 300)
     best, balanced = _newton(law, rows, start, weight, force, guess, 100)
     if not balanced:
-        best = guess
+        nothing = np.zeros(rows.shape[1])
+        best, _ = _newton(lambda d: bonded(d, 1.0), rows, start, weight, force, nothing, 300)
     return best, slid + (rows @ best)[k:], balanced
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .tilt import raised
+from .tilt import raised, soft_size
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,37 +29,47 @@ class Between:
     weight: np.ndarray
 
 
-def interpolate(between: Between, place: np.ndarray, ways: np.ndarray) -> tuple:
+def interpolate(between: Between, place: np.ndarray, ways: np.ndarray, soft: float) -> tuple:
     """Place, normal, closure, length of the points, and its derivatives `pull` and `twist`.
 
-    place, ways (2, c): corners and unit vectors along the edges. The ends are as in `geometry`:
-    at either end a corner of one block over the other's edge.
+    place, ways (2, c): corners and unit vectors along the edges; soft (m): see `geometry`. At
+    either end there is a corner of one block over the other's edge.
     """
     u, f, of = between, between.fraction, between.of
     ta, tb = ways[:, u.first], ways[:, u.second]
     t = ta - tb  # along both, so that the blocks may trade roles
-    t /= np.sqrt(t[0] * t[0] + t[1] * t[1])
+    t /= np.sqrt(_dot(t, t))
     facing = np.array([[ta[1], -ta[0]], [-tb[1], tb[0]]])
-    ends = []
-    for own, other, way in ((u.first, u.second_end, t), (u.first_end, u.second, -t)):
-        d = place[:, other] - place[:, own]
-        by_b = d[0] * way[0] + d[1] * way[1] > 0
-        normal = np.where(by_b, *facing)
-        closure = -(d[0] * normal[0] + d[1] * normal[1])
-        ends.append((np.where(by_b, place[:, other], place[:, own]), normal, closure, by_b))
-    (at0, n0, c0, b0), (at1, n1, c1, b1) = ends
-    at = (1 - f) * at0[:, of] + f * at1[:, of]
-    normal = (1 - f) * n0[:, of] + f * n1[:, of]
-    normal /= np.sqrt(normal[0] ** 2 + normal[1] ** 2)
-    closure = (1 - f) * c0[of] + f * c1[of]
-    overlap = ((at1 - at0) * t).sum(axis=0)
-    sine, cosine = ta[1] * tb[0] - ta[0] * tb[1], -(ta * tb).sum(axis=0)
+    places, normals, closures, turns = [], [], [], []
+    overlap = _dot(place[:, u.first_end] - place[:, u.first], t)
+    for mine, yours, way in ((u.first, u.second_end, t), (u.first_end, u.second, -t)):
+        one, other = place[:, mine], place[:, yours]
+        inside = _dot(other - one, way)
+        normal = np.where(inside > 0, *facing)
+        places.append(np.where(inside > 0, other, one))
+        normals.append(normal)
+        closures.append(-_dot(other - one, normal))
+        size, slope = soft_size(inside, soft)
+        overlap = overlap - 0.5 * (inside + size)
+        turns.append((one, other, 0.5 * (1 + slope)))
+    at, normal, closure = (
+        (1 - f) * ends[0][..., of] + f * ends[1][..., of] for ends in (places, normals, closures)
+    )
+    normal /= np.sqrt(_dot(normal, normal))
+    sine, cosine = ta[1] * tb[0] - ta[0] * tb[1], -_dot(ta, tb)
     gone, slope = raised(sine, cosine)
-    lies, held = (1 - gone) * (overlap > 0), np.maximum(overlap, 0.0)
-    pull = (lies * (b1.astype(float) - b0) * t)[:, of]
-    across = np.stack([-t[1], t[0]])[:, of]
-    low, high = (((end[:, of] - at) * across).sum(axis=0) for end in (at0, at1))
-    twist = lies[of] * ((b0[of] - 0.5) * low - (b1[of] - 0.5) * high)
-    twist -= (np.sign(sine) * slope * held)[of]
+    lies = (1 - gone) * (overlap > 0)
+    (one0, other0, by0), (one1, other1, by1) = turns
+    pull = (lies * (by1 - by0) * t)[:, of]
+    across = np.stack([-t[1], t[0]])
+    # Seen from the point: each end turns with its own block, the direction with the mean of both.
+    twist = (1 - by1) * _dot(one1, across) - by1 * _dot(other1, across)
+    twist -= (1 - by0) * _dot(one0, across) - by0 * _dot(other0, across)
+    twist = twist[of] + 2 * (by1 - by0)[of] * _dot(at, across[:, of])
+    twist = 0.5 * lies[of] * twist - (np.sign(sine) * slope * np.maximum(overlap, 0.0))[of]
     w = u.weight
-    return at, normal, closure, w * (lies * held)[of], w * pull, w * twist
+    return at, normal, closure, w * (lies * overlap)[of], w * pull, w * twist
+
+
+def _dot(p, q):
+    return p[0] * q[0] + p[1] * q[1]

@@ -102,8 +102,8 @@ def _check(words: list[str]) -> int:
 def _compare(words: list[str]) -> int:
     parser = argparse.ArgumentParser(
         "python -m dem_demo compare",
-        description="Run every rock of a scene alone, cut with several seeds, with its own laws and "
-        "with plain Coulomb friction of its asperities. A rock that moves 1 m has failed and stops.",
+        description="Run every rock of a scene alone, cut with several seeds, with its own laws "
+        "and with plain Coulomb friction of its asperities. What moves 1 m has failed and stops.",
         epilog="example: python -m dem_demo compare slope --seeds 1 2 3 --until 10",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

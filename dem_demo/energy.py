@@ -16,8 +16,8 @@ class Ledger:
     """Energies in J: kinetic + potential + stored + friction + dashpots + dropped = start + work.
 
     friction: dissipated in the joints; dropped: stored in law points that were given up while they
-    still carried; work: done by drives and loads; turned: gravity's, the drives' and the loads' power summed in absolute value, plus what was
-    there at the start.
+    still carried; work: done by drives and loads; turned: gravity's, the drives' and the loads'
+    power summed in absolute value, plus what was there at the start.
     """
 
     def __init__(self, inertia: np.ndarray, gravity: np.ndarray, loads: np.ndarray) -> None:

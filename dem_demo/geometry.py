@@ -143,7 +143,7 @@ def evaluate(contacts: Contacts, motion: np.ndarray) -> Points:
     inside, own = _limits(c, ways, way, side, both, rest)
     normal = c.sign * out
     if c.between is not None:
-        more = interpolate(c.between, place, ways)
+        more = interpolate(c.between, place, ways, c.soft)
         at, normal, closure, length, pull, twist = (
             np.concatenate(pair, axis=-1)
             for pair in zip((at, normal, closure, length, pull, twist), more, strict=True)

@@ -129,16 +129,12 @@ class Interfaces:
                 fresh.append(i)
         stay.sort()
         chosen = [i for _, i, _ in stay] + fresh
-        overlaps = self._long_overlaps(
-            corner[chosen], edge[chosen], rise[:, chosen], overlap[:, chosen]
-        )
+        here = corner[chosen], edge[chosen]
+        overlaps = self._long_overlaps(*here, rise[:, chosen], overlap[:, chosen])
         same = len(stay) == len(self.numbers) and not fresh and overlaps == self.overlaps
         numbers = [n for n, _, _ in stay] + [self.given + n for n in range(len(fresh))]
         names = [key for _, _, key in stay] + [keys[i] for i in fresh]
-        self.adopt(
-            corner[chosen], edge[chosen], names, np.array(numbers, int), overlaps,
-            self.given + len(fresh),
-        )  # fmt: skip
+        self.adopt(*here, names, np.array(numbers, int), overlaps, self.given + len(fresh))
         return not same
 
     def _same(self, one: Key, other: Key) -> bool:

@@ -116,7 +116,7 @@ def _joints(sim: Simulation) -> dict[str, np.ndarray]:
     """Joints that touch or almost touch."""
     points, keep = sim.points, sim.points.length > 0
     delta, now = sim.joints.read("delta"), sim.joints.now
-    who = names(sim.contacts, points, sim.interfaces.numbers)
+    who = names(sim.contacts, points, [number for _, number in sim.identity])
     values = np.column_stack(
         [points.closure, delta[:, 1], *sim.traction.T, now["sliding"], now["slipping"],
          now["separated"], points.length, points.along[1]]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from scipy.sparse import csr_array, diags
 from scipy.sparse.csgraph import connected_components
@@ -18,22 +20,24 @@ def equilibrium(joints: Joints, rows: csr_array, closure, slid, area, force, set
     closure, slid (k,): where the joints are without these displacements (m), reached in one step
     from the virgin state. settle (free motions,): those that are asked for.
 
-    First with joints that cannot slide, which always has an answer; then with the law itself.
-    Blocks that no joint connects, such as two slopes side by side, find their answers apart.
-    Returns (displacement, balanced), both (free motions,): balanced is False for blocks that the
-    law cannot hold: they will move from step 0.
+    First with joints that cannot slide; then with the law itself. Blocks that the law cannot hold
+    are seated with joints that neither slide nor open, which always has an answer. Blocks that no
+    joint connects, such as two slopes side by side, find their answers apart. Returns
+    (displacement, balanced), both (free motions,): balanced is False where the law cannot hold:
+    those blocks will move from step 0.
     """
     k = len(closure)
     rows = diags(np.concatenate([-np.ones(k), np.ones(k)])) @ rows  # to (closure, shear)
     start = np.concatenate([closure, slid])
     weight = np.concatenate([area, area])
 
-    def bonded(d):
-        c = np.maximum(d[:k], 1e-9)
+    def bonded(d, pull=0.0):
+        c = np.maximum(np.abs(d[:k]), 1e-9)
         shear = joints.stiffness_at(c)
         slope = (joints.stress_at(1.01 * c) - joints.stress_at(0.99 * c)) / (0.02 * c)
-        F = np.concatenate([joints.stress_at(c) * (d[:k] > 0), shear * d[k:]])
-        return F, diags(np.concatenate([slope * (d[:k] > 0), shear]))
+        acts = np.where(d[:k] > 0, 1.0, pull)
+        F = np.concatenate([joints.stress_at(c) * acts * np.sign(d[:k]), shear * d[k:]])
+        return F, diags(np.concatenate([slope * acts, shear]))
 
     def law(d):
         F, C = joints.trial(np.stack([d[:k], d[k:]], axis=1))
@@ -44,10 +48,15 @@ def equilibrium(joints: Joints, rows: csr_array, closure, slid, area, force, set
 
     touched = abs(rows[:k]) + abs(rows[k:])  # the law couples closure and shear
     _, island = connected_components(touched.T @ touched, directed=False)
-    idle = np.bincount(island, settle) == 0
-    guess, _ = _newton(bonded, rows, start, weight, force, 0.0 * force, 300, island, idle)
+    idle, nothing = np.bincount(island, settle) == 0, np.zeros(len(force))
+    guess, _ = _newton(bonded, rows, start, weight, force, nothing, 300, island, idle)
     best, balanced = _newton(law, rows, start, weight, force, guess, 100, island, idle)
-    return np.where(balanced[island], best, guess), balanced[island]
+    if not (balanced | idle).all():
+        idle = idle | balanced
+        glue = partial(bonded, pull=1.0)
+        glued, _ = _newton(glue, rows, start, weight, force, nothing, 300, island, idle)
+        best = np.where(balanced[island], best, glued)
+    return best, balanced[island]
 
 
 def _newton(law, rows, start, weight, force, y, most, island, idle):

@@ -162,8 +162,8 @@ class Simulation:
         """Joints, masses and books for a new list of law points."""
         before = None
         if getattr(self, "points", None) is not None:
-            held = (self.area * self.joints.now["stored"]).tolist()
-            before = dict(zip(self.identity, zip(self.area.tolist(), held), strict=True))
+            held = np.stack([self.area, self.area * self.joints.now["stored"]], axis=1)
+            before = dict(zip(self.identity, held.tolist(), strict=True))
         self.contacts = c = self.interfaces.contacts
         self.identity = self.interfaces.of_points
         self.joints.assign(self.identity)
@@ -172,7 +172,7 @@ class Simulation:
         self._share = c.weight / np.where(light > 0, light, np.inf)
         self._checked = np.zeros(self.joints.n)
         if before is not None:
-            area = np.array([before.pop(who, (0.0, 0.0))[0] for who in self.identity])
+            area = np.array([before.pop(who, [0.0, 0.0])[0] for who in self.identity])
             self.ledger.value["dropped"] += sum(held for _, held in before.values())
             now = self.joints.now
             self.ledger.remember(self.ledger.forces, area, now["stored"], now["lost"])

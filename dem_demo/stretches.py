@@ -25,7 +25,7 @@ def stretches(contacts: Contacts, points: Points, motion: np.ndarray) -> np.ndar
     return np.moveaxis(np.stack(ends), 2, 0)
 
 
-def names(contacts: Contacts, points: Points, numbers: np.ndarray) -> np.ndarray:
+def names(contacts: Contacts, points: Points, numbers: list[int]) -> np.ndarray:
     """Who meets at every law point: (n, 5) block, edge, block, edge and the point's number.
 
     Of the two edges at a corner the flatter one counts. Points between have numbers below 0.
@@ -37,6 +37,5 @@ def names(contacts: Contacts, points: Points, numbers: np.ndarray) -> np.ndarray
         u = c.between
         one = np.concatenate([one, u.first[u.of]])
         other = np.concatenate([other, u.second[u.of]])
-        numbers = np.concatenate([numbers, -1 - np.arange(len(u.of))])
     first, second = o.block[one], o.block[other]
     return np.stack([first, one - o.start[first], second, other - o.start[second], numbers], axis=1)

@@ -8,6 +8,7 @@ from . import timestep
 from .interfaces import Refused
 from .seat import equilibrium
 
+ATTEMPTS = 5
 
 def begin(sim) -> None:
     """Seat the blocks, choose the time step, and take the first half step of the velocities."""
@@ -37,10 +38,16 @@ def begin(sim) -> None:
 def _seat(sim) -> np.ndarray:
     """Move the blocks to where their joints carry them; the joints' first sliding (m)."""
     slid, free = np.zeros(sim.joints.n), sim.free.ravel()
-    force = ((sim.gravity + sim.loads).ravel() * sim.limit.root)[free]
-    settle = np.ones(len(force), bool)
-    for attempt in range(3):  # each at the places just found: the joints turn with the blocks
+    settle = np.ones(int(free.sum()), bool)
+    for attempt in range(ATTEMPTS):  # each at the places just found: joints turn with the blocks
         points = sim.evaluate(sim.motion)
+        if sim.interfaces.renew(sim.motion, sim.world.near):
+            known = dict(zip(sim.identity, slid.tolist(), strict=True))
+            sim.arrange()
+            slid = np.array([known.get(who, 0.0) for who in sim.identity])
+            points = sim.evaluate(sim.motion)
+        force = sim.gravity + sim.loads + (_length_forces(sim, points, slid) if attempt else 0.0)
+        force = (force.ravel() * sim.limit.root)[free]
         rows = sim.limit.rows(sim.contacts, points, sim.motion)
         area = points.length * sim.scene.thickness
         moved, balanced = equilibrium(sim.joints, rows, points.closure, slid, area, force, settle)
@@ -57,6 +64,16 @@ def _seat(sim) -> np.ndarray:
             break
     sim.interfaces.renewed_at = sim.motion[:3].copy()
     return slid
+
+
+def _length_forces(sim, points, slid) -> np.ndarray:
+    """Forces (n, 3) of joints whose length changes as the blocks move, after their first step."""
+    before, none = sim.joints.snapshot(), np.zeros(sim.joints.n)
+    sim.joints.update(sim.joints.increments(points.closure, slid))
+    sim.assembly.move(sim.motion)
+    forces = sim.assembly(points, none, none, sim.joints.now["stored"] * sim.scene.thickness)
+    sim.joints.restore(before, sim.identity)
+    return forces * sim.mobile
 
 
 def _choose_step(sim) -> float:

@@ -18,7 +18,8 @@ def equilibrium(joints: Joints, rows: csr_array, closure, slid, area, force):
     from the virgin state.
 
     First with joints that cannot slide; then with the law itself. If the law cannot hold the
-    blocks, with joints that neither slide nor open, which always has an answer. Returns (displacement, slid (k,) in m, balanced): balanced is False when the law cannot hold
+    blocks, with joints that neither slide nor open, which always has an answer.
+    Returns (displacement, slid (k,) in m, balanced): balanced is False when the law cannot hold
     the blocks: they will move from step 0.
     """
     k = len(closure)

@@ -7,6 +7,9 @@ overlap are such corners, and each carries half of the overlap; a corner that st
 carries a fixed length. In between the length changes smoothly with the tilt, and wherever it
 changes it carries energy: `pull` and `twist` are its derivatives, and minus the stored energy per
 length times these acts on the blocks, so that no energy is made or lost.
+
+Vectors are complex numbers x + iy: conj(p) q holds their dot product and their cross product, and
+dividing by the direction of an edge takes all into its frame.
 """
 
 from __future__ import annotations
@@ -20,12 +23,15 @@ from .between import Between, interpolate
 from .shapes import Block
 from .tilt import raised, soft_size
 
+LEVEL = 1e-6  # sine of a tilt that is none, for corners past the limit of their range
+_AHEAD = np.array([[1.0], [-1.0]])  # the sides of a corner: towards the edge's end, and its start
+
 
 class Outlines:
     """Corners of all blocks in one list: edge i starts at corner i and ends at corner next[i].
 
-    local (2, c): corners from the centroids; way (2, c): unit vectors along the edges; length (c,)
-    of the edges; block, before, next (c,): numbers.
+    local (c,): corners from the centroids; way (c,): directions of the edges; length (c,) of the
+    edges; block, before, next (c,): numbers; start (blocks,): first corner of each block.
     """
 
     def __init__(self, blocks: Sequence[Block]) -> None:
@@ -35,26 +41,24 @@ class Outlines:
         first, size = self.start[self.block], sizes[self.block]
         place = np.arange(len(first)) - first
         self.next, self.before = first + (place + 1) % size, first + (place - 1) % size
-        self.local = np.concatenate([block.local for block in blocks]).T.copy()
-        edge = self.local[:, self.next] - self.local
-        self.length = np.hypot(*edge)
+        self.local = np.concatenate([block.local for block in blocks]) @ [1, 1j]
+        edge = self.local[self.next] - self.local
+        self.length = np.abs(edge)
         self.way = edge / self.length
 
     def place(self, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Corners and unit vectors along edges, (2, c) each, where the blocks are."""
-        c, s = np.cos(motion[2])[self.block], np.sin(motion[2])[self.block]
-        x = motion[:2, self.block]
-        x[0] += c * self.local[0] - s * self.local[1]
-        x[1] += s * self.local[0] + c * self.local[1]
-        return x, np.stack([c * self.way[0] - s * self.way[1], s * self.way[0] + c * self.way[1]])
+        """Corners and directions of edges (c,) for a motion (6, n) of the blocks."""
+        turn = np.exp(1j * motion[2])[self.block]
+        return (motion[0] + 1j * motion[1])[self.block] + turn * self.local, turn * self.way
 
 
 class Contacts:
     """Law points: k corners on edges, then the points between the ends of long overlaps.
 
-    corner, edge (k,): numbers in the outlines; spacing: largest distance of law points (m);
-    corner_length (m): of a corner that stands on an edge. a, b (n,): blocks of all law points,
-    a < b; weight (n,): share of an overlap that a point carries.
+    corner, edge (k,): numbers in the outlines; corner_length (m): of a corner that stands on an
+    edge; soft (m): over which the end of an edge takes over from another; spacing: largest distance
+    of law points (m). a, b (n,): blocks of all law points, a < b; weight (n,): share of an overlap
+    that a point carries.
     """
 
     def __init__(
@@ -70,12 +74,16 @@ class Contacts:
         self.outlines, self.corner, self.edge = outlines, corner, edge
         self.corner_length, self.soft = corner_length, soft
         self.spacing, self.between = spacing, between
-        self.end, self.back = outlines.next[edge], outlines.before[corner]
-        x, y = outlines.block[corner], outlines.block[edge]
+        o = outlines
+        x, y = o.block[corner], o.block[edge]
         self.sign = np.where(x > y, 1.0, -1.0)  # +1: the corner belongs to block b
-        self.sides = np.stack([self.back, corner])  # the edges that meet at the corner
-        self.size = outlines.length[self.sides]
-        self.share = 0.5 / spans(np.minimum(self.size, outlines.length[edge]), spacing)
+        self.sides = np.stack([o.before[corner], corner])  # the edges that meet at the corner
+        self.size, self.length = o.length[self.sides], o.length[edge]
+        # In the frame of the edge: its end and start, and the edges beyond, behind each side.
+        self.ends = self.length * np.array([[1.0], [0.0]])
+        self.behind = np.stack([o.before[edge], o.next[edge]])
+        self.following = _AHEAD * o.way[self.behind] / o.way[edge]
+        self.share = 0.5 / spans(np.minimum(self.size, self.length), spacing)
         self.a, self.b, self.weight = np.minimum(x, y), np.maximum(x, y), self.share.min(axis=0)
         if between is not None:
             self.a = np.concatenate([self.a, between.a])
@@ -98,25 +106,25 @@ def spans(length: np.ndarray, spacing: float) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Law points: n of them, of which the first k are corners. SI units.
+    """Law points: n of them, of which the first k are corners. SI units, vectors complex.
 
-    at (2, n): place; normal (2, n): from block a to block b; tangent (2, n): a quarter turn
-    clockwise from it; closure (n,): positive when pressed together; length (n,): of the joint that
-    the point stands for; pull (2, n), twist (n,): derivatives of the length by displacement (at
-    the point) and rotation of b relative to a; along (2, n): relative velocity of b to a along
-    normal and tangent. For the sides of the corners, that to the end of the edge first: rise
-    (2, k) sine of the angle to the edge; overlap (2, k); inside (2, k): how far the corner is from
-    the limit behind it, beyond which the next corner takes over if `own`, else the next edge.
+    at (n,): place; normal (n,): from block a to block b; closure (n,): positive when pressed
+    together; length (n,): of the joint that the point stands for; pull (n,) vector and twist (n,):
+    derivatives of the length by displacement (at the point) and rotation of b relative to a;
+    opening, sliding (n,): velocity of b relative to a along the normal and a quarter turn
+    clockwise from it. Of the sides (2, k): rise, sine of the angle to the edge; overlap (m);
+    inside (m), what the corner is away from the limit behind it in terms of its depth; beyond it
+    the next corner takes over if `own`, else the next edge.
     """
 
     at: np.ndarray
     normal: np.ndarray
-    tangent: np.ndarray
     closure: np.ndarray
     length: np.ndarray
     pull: np.ndarray
     twist: np.ndarray
-    along: np.ndarray
+    opening: np.ndarray
+    sliding: np.ndarray
     rise: np.ndarray
     overlap: np.ndarray
     inside: np.ndarray
@@ -127,31 +135,34 @@ def evaluate(contacts: Contacts, motion: np.ndarray) -> Points:
     """Law points for a motion (6, n) of the blocks."""
     c = contacts
     place, ways = c.outlines.place(motion)
-    at, start, end = place[:, c.corner], place[:, c.edge], place[:, c.end]
-    edge = ways[:, c.edge]
-    out = np.stack([edge[1], -edge[0]])  # away from the edge's block
-    closure = -_dot(at - start, out)
-    # Two sides: from the corner to the end of the edge, and to its start. All (2, 2, k).
-    way = np.stack([edge, -edge], axis=1)
-    side = np.stack([-ways[:, c.back], ways[:, c.corner]], axis=1)
-    rest = np.stack([end - at, start - at], axis=1)
-    rise, level = _dot(side, out[:, None]), _dot(side, way)
-    both = way + side
-    mean = both / np.maximum(np.sqrt(_dot(both, both)), 1e-9)
+    at, edge = place[c.corner], ways[c.edge]
+    frame = edge.conj()
+    here = (at - place[c.edge]) * frame  # in the frame of the edge: its block is on the left
+    side = ways[c.sides] * (-_AHEAD * frame)
+    rest = c.ends - here
+    both = _AHEAD + side
+    mean = both / np.maximum(np.abs(both), 1e-9)
+    rise, level = -side.imag, _AHEAD * side.real
     overlap, pull, twist = _overlaps(rest, c.size * side, mean, c.soft)
-    length, pull, twist = _lengths(c, rise, level, mean, overlap, pull, twist)
-    inside, own = _limits(c, ways, way, side, both, rest)
-    normal = c.sign * out
+    length, pull, twist = _lengths(c, rise, level, overlap, pull, twist)
+    # Behind a corner its edge ends at another corner. Of what follows there, a side of this corner
+    # or the next edge of the other block, the one that is turned less is next; the limit is where
+    # both are equally deep.
+    own = _AHEAD * (side.conj() * c.following).imag <= 0
+    toward = np.where(own, both, _AHEAD + c.following)
+    inside = -(rest[::-1] * toward.conj()).real
+    inside *= np.where(own, np.abs(rise) + LEVEL, 1.0)
+    normal, closure, pull = c.sign * (-1j * edge), here.imag, pull * edge
     if c.between is not None:
         more = interpolate(c.between, place, ways, c.soft)
         at, normal, closure, length, pull, twist = (
-            np.concatenate(pair, axis=-1)
+            np.concatenate(pair)
             for pair in zip((at, normal, closure, length, pull, twist), more, strict=True)
         )
-    tangent = np.stack([normal[1], -normal[0]])
-    along = _slide(c, motion, at, normal, tangent)
+    v = _velocity(motion, c.b, at) - _velocity(motion, c.a, at)
+    v *= normal.conj()
     return Points(
-        at, normal, tangent, closure, length, pull, twist, along, rise, overlap, inside, own
+        at, normal, closure, length, pull, twist, v.real, -v.imag, rise, overlap, inside, own
     )
 
 
@@ -162,59 +173,34 @@ def _overlaps(rest, whole, mean, soft):
     It runs from the corner or from what lies behind it, whichever comes later, to where the edge
     or the side ends, whichever comes first; within `soft` (m) of a tie the choice is gradual.
     """
-    far, near, behind = _dot(rest, mean), _dot(whole, mean), -_dot(rest[:, ::-1], mean)
-    size, slope = soft_size(far - near, soft)
-    step, rate = soft_size(behind, soft)
-    overlap = 0.5 * (far + near - size + behind - step)
-    by_edge, by_end = 0.5 * (1 - slope), 0.5 * (rate - 1)
-    pull = mean * (-by_edge - by_end)
-    twist = by_edge * _across(rest, mean) + by_end * _across(rest[:, ::-1], mean)
-    return overlap, pull, 0.5 * (twist - (1 - by_edge) * _across(whole, mean))
+    along = mean.conj()
+    rest, whole = rest * along, whole * along
+    back = rest[::-1] * (along * mean[::-1])
+    size, slope = soft_size(rest.real - whole.real, soft)
+    step, rate = soft_size(back.real, soft)
+    overlap = 0.5 * (rest.real + whole.real - size - back.real - step)
+    by_edge, by_end = 0.5 - 0.5 * slope, -0.5 - 0.5 * rate
+    twist = by_edge * (rest.imag + whole.imag) + by_end * back.imag - whole.imag
+    return overlap, -(by_edge + by_end) * mean, 0.5 * twist
 
 
-def _lengths(c, rise, level, mean, overlap, pull, twist):
+def _lengths(c, rise, level, overlap, pull, twist):
     """Length of joint at the corners, with its derivatives by motion of block b relative to a."""
     up = rise > 0
     gone, bend = raised(rise, level)
+    held = np.maximum(overlap, 0.0)
     lies = c.share * (1 - gone) * (overlap > 0)
     stands = gone * up
-    length = (lies * overlap).sum(axis=0) + c.corner_length * stands[0] * stands[1]
+    length = (lies * held).sum(axis=0) + c.corner_length * stands[0] * stands[1]
     # The tilt of the first side falls as the corner's block turns, that of the second rises.
-    by_tilt = -c.share * np.maximum(overlap, 0.0) * np.where(up, bend, -bend)
-    by_tilt += c.corner_length * bend * up * stands[::-1]
-    twist = (lies * twist).sum(axis=0) - by_tilt[0] + by_tilt[1]
-    return length, c.sign * (lies * pull).sum(axis=1), c.sign * twist
+    by_tilt = c.corner_length * up * stands[::-1] - c.share * held * np.sign(rise)
+    twist = (lies * twist - _AHEAD * bend * by_tilt).sum(axis=0)
+    return length, c.sign * (lies * pull).sum(axis=0), c.sign * twist
 
 
-def _limits(c, ways, way, side, both, rest):
-    """Where the range of a corner along its edge ends: at equal depth under what comes next.
-
-    Behind the corner (seen along a side) the edge ends at a corner of its own. Of what follows
-    there, the side of the corner's block or the next edge, the one that is turned less is next.
-    """
-    o = c.outlines
-    following = np.stack([ways[:, o.before[c.edge]], -ways[:, c.end]], axis=1)
-    turned = side[0] * following[1] - side[1] * following[0]
-    own = np.stack([turned[0] <= 0, turned[1] >= 0])
-    toward = np.where(own, both, way + following)
-    return -_dot(rest[:, ::-1], toward), own
-
-
-def _dot(p, q):
-    return p[0] * q[0] + p[1] * q[1]
-
-
-def _across(r, t):
-    """Of r (2, ...) across t, to its left."""
-    return t[0] * r[1] - t[1] * r[0]
-
-
-def _slide(c, motion, at, normal, tangent):
-    """Relative velocity of b to a at the points, along normal and tangent."""
-    A, B = motion[:, c.a], motion[:, c.b]
-    u = B[3] - A[3] - B[5] * (at[1] - B[1]) + A[5] * (at[1] - A[1])
-    v = B[4] - A[4] + B[5] * (at[0] - B[0]) - A[5] * (at[0] - A[0])
-    return np.stack([u * normal[0] + v * normal[1], u * tangent[0] + v * tangent[1]])
+def _velocity(motion, block, at):
+    x, y, _, u, v, spin = motion
+    return (u + 1j * v)[block] + 1j * spin[block] * (at - (x + 1j * y)[block])
 
 
 class Assembly:
@@ -226,26 +212,19 @@ class Assembly:
         self._slot = np.concatenate([one, one + 1, one + 2])
 
     def __call__(self, points: Points, push, drag, energy=None) -> np.ndarray:
-        """Forces (n, 3) on the blocks; b is pushed by `push` along the normal, `drag` along the
-        tangent (N), a by the opposite at the same place; energy (J/m) stored per contact length."""
-        fx = push * points.normal[0] + drag * points.tangent[0]
-        fy = push * points.normal[1] + drag * points.tangent[1]
-        couple = np.zeros(len(fx))
+        """Forces (n, 3) on the blocks; b is pushed by `push` along the normal, `drag` in the sense
+        of sliding (N), a by the opposite at the same place; energy (J/m): stored per length."""
+        force, couple = (push - 1j * drag) * points.normal, 0.0
         if energy is not None:
-            fx, fy = fx - energy * points.pull[0], fy - energy * points.pull[1]
-            couple = -energy * points.twist
-        return np.bincount(
-            self._slot, np.concatenate(self._parts(points.at, fx, fy, couple)), 3 * self.blocks
-        ).reshape(-1, 3)
-
-    def _parts(self, at, fx, fy, couple):
-        xa, xb = self.centre_a, self.centre_b
-        return (
-            -fx, fx, -fy, fy,
-            (at[1] - xa[1]) * fx - (at[0] - xa[0]) * fy - couple,
-            (at[0] - xb[0]) * fy - (at[1] - xb[1]) * fx + couple,
-        )  # fmt: skip
+            force -= energy * points.pull
+            couple = energy * points.twist
+        arms = (points.at - self.centre_a).conj(), (points.at - self.centre_b).conj()
+        x, y = force.real, force.imag
+        on_a, on_b = (arms[0] * force).imag, (arms[1] * force).imag
+        parts = np.concatenate([-x, x, -y, y, couple - on_a, on_b - couple])
+        return np.bincount(self._slot, parts, 3 * self.blocks).reshape(-1, 3)
 
     def move(self, motion: np.ndarray) -> None:
         """Take the centroids from which torques are counted."""
-        self.centre_a, self.centre_b = motion[:2, self.a], motion[:2, self.b]
+        centre = motion[0] + 1j * motion[1]
+        self.centre_a, self.centre_b = centre[self.a], centre[self.b]

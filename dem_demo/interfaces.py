@@ -22,7 +22,7 @@ Key = tuple[int, int, int, int]  # block, edge, block, edge
 
 TILT = np.sin(np.radians(CORNER + 1.5))  # how far a side of a corner may dip below the edge
 CARRIED = 0.5  # share of an overlap that some joint must see
-ROUNDING = 1e-9  # m: corners as close as this to the end of their range stay
+ROUNDING = 1e-10  # m: corners stay until their depth is wrong by this, so that none chatters
 
 
 class Refused(RuntimeError):
@@ -147,8 +147,8 @@ class Interfaces:
             self._corners[x][:, :, None], self._corners[y][:, None, :]
         )
         place, ways = self.outlines.place(motion)
-        d, t = place[:, corner] - place[:, edge], ways[:, edge]
-        height = np.where(corner < 0, np.inf, d[0] * t[1] - d[1] * t[0])
+        depth = ((place[corner] - place[edge]) * ways[edge].conj()).imag
+        height = np.where(corner < 0, np.inf, -depth)
         apart = np.where(edge[:, 0] < 0, -np.inf, height.min(axis=1)).max(axis=1)
         limit = np.minimum(self.depth_limit[x], self.depth_limit[y])
         near = (height < 1.5 * self.skin) & (height > -10 * limit[:, None, None])
@@ -238,12 +238,11 @@ class Interfaces:
 def _beyond(c: Contacts, points: Points):
     """Corner and edge that come next at the nearer limit of each corner's range, and whether the
     corner at the end of the edge takes over there."""
-    side = points.inside.argmin(axis=0)
-    trade = np.take_along_axis(points.own, side[None], axis=0)[0]
-    behind = np.where(side == 0, c.edge, c.end)
-    beside = np.take_along_axis(c.sides, side[None], axis=0)[0]
-    following = np.where(side == 0, c.outlines.before[c.edge], c.end)
-    return np.where(trade, behind, c.corner), np.where(trade, beside, following), trade
+    side, k = points.inside.argmin(axis=0), np.arange(len(c.corner))
+    trade = points.own[side, k]
+    corner_there = np.where(side == 0, c.edge, c.outlines.next[c.edge])
+    corner, edge = np.where(trade, corner_there, c.corner), c.behind[side, k]
+    return corner, np.where(trade, c.sides[side, k], edge), trade
 
 
 def _pairs(c: Contacts) -> list[tuple[int, int]]:

@@ -119,7 +119,7 @@ def _joints(sim: Simulation) -> dict[str, np.ndarray]:
     who = names(sim.contacts, points, [number for _, number in sim.identity])
     values = np.column_stack(
         [points.closure, delta[:, 1], *sim.traction.T, now["sliding"], now["slipping"],
-         now["separated"], points.length, points.along[1]]
+         now["separated"], points.length, points.sliding]
     )  # fmt: skip
     return {
         "who": who[keep],

@@ -33,7 +33,7 @@ class Run:
     largest_stress: float = 0.0  # Pa, expected in impacts: sets the step before anything touches
     skin: float | None = None  # reach of the search for contacts; default 0.02 of the least width
     point_spacing: float = np.inf  # largest distance of law points along a joint
-    corner_length: float | None = None  # of a corner on an edge; default 0.05 of the least width
+    corner_length: float | None = None  # of a corner on an edge; default 0.1 of the least width
     max_overlap: float = 0.03  # share of the smaller block's width
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from . import geometry, states, timestep
 from .drives import Drives
 from .energy import Ledger
-from .interfaces import Interfaces, Refused
+from .interfaces import ROUNDING, Interfaces, Refused
 from .joints import Joints
 from .scene import Scene, parse
 from .start import begin
@@ -17,7 +17,7 @@ from .world import World
 
 HEADROOM = 1.25  # most growth of a joint's stiffness between two checks of the time step
 SAFE = 0.98  # largest time step as a share of the limit
-CORNER = 0.05  # contact length of a corner as a share of the least block width, by default
+CORNER = 0.1  # contact length of a corner as a share of the least block width, by default
 
 
 class Simulation:
@@ -76,7 +76,7 @@ class Simulation:
                 self.arrange()
             points = self.evaluate(motion)
         self._require_carried(points)
-        d = self.joints.increments(points.closure, points.along[1] * self.dt)
+        d = self.joints.increments(points.closure, points.sliding * self.dt)
         self.traction = self.joints.update(d, self.scene.run.law_steps)
         forces = self.forces(points, self.dt)
         if (self._stiffness * self.area > self._checked).any():
@@ -90,7 +90,7 @@ class Simulation:
     def evaluate(self, motion: np.ndarray) -> geometry.Points:
         """Law points at a motion (6, n), each at the corner and edge where it is by then."""
         points = geometry.evaluate(self.interfaces.contacts, motion)
-        if points.inside.min(initial=0.0) < 0:
+        if points.inside.min(initial=0.0) < -ROUNDING:
             points = self.interfaces.follow(points, motion)
         self.contacts = self.interfaces.contacts
         return points
@@ -121,11 +121,11 @@ class Simulation:
         """Forces of the dashpots along normal and tangent, (k,) each; never a pull."""
         run = self.scene.run
         damping = self._damping()
-        push = np.maximum(-run.dashpot_normal * damping * points.along[0], -pressed)
+        push = np.maximum(-run.dashpot_normal * damping * points.opening, -pressed)
         if not run.dashpot_shear:
             return push, np.zeros(len(push))
         stick = 1.0 - self.joints.now["separated"] - self.joints.now["slipping"]
-        return push, -run.dashpot_shear * damping * np.maximum(stick, 0.0) * points.along[1]
+        return push, -run.dashpot_shear * damping * np.maximum(stick, 0.0) * points.sliding
 
     def _damping(self) -> np.ndarray:
         """Critical damping (k,) in N s/m: 2 sqrt(stiffness times reduced mass), by share."""

@@ -14,15 +14,13 @@ def stretches(contacts: Contacts, points: Points, motion: np.ndarray) -> np.ndar
     lies = 1 - raised(points.rise, np.ones_like(points.rise))[0]
     part = c.share * lies * np.maximum(points.overlap, 0.0)
     part += 0.5 * (points.length[:k] - part.sum(axis=0))
-    way = c.outlines.place(motion)[1][:, c.edge]
-    ahead, back = np.full(points.length.shape, 0.5), np.full(points.length.shape, 0.5)
-    ahead[:k], back[:k] = part / np.maximum(part.sum(axis=0), 1e-300)
+    way = c.outlines.place(motion)[1][c.edge]
+    ahead = np.full(len(c), 0.5)
+    ahead[:k] = part[0] / np.maximum(part.sum(axis=0), 1e-300)
     if c.between is not None:
-        inner = points.tangent[:, k:]
-        way = np.concatenate([way, inner], axis=1)
-    at = points.at
-    ends = [at + ahead * points.length * way, at - back * points.length * way]
-    return np.moveaxis(np.stack(ends), 2, 0)
+        way = np.concatenate([way, 1j * points.normal[k:]])
+    ends = points.at + np.stack([ahead, ahead - 1], axis=0) * points.length * way
+    return np.stack([ends.real, ends.imag], axis=-1).swapaxes(0, 1)
 
 
 def names(contacts: Contacts, points: Points, numbers: list[int]) -> np.ndarray:
@@ -31,7 +29,7 @@ def names(contacts: Contacts, points: Points, numbers: list[int]) -> np.ndarray:
     Of the two edges at a corner the flatter one counts. Points between have numbers below 0.
     """
     c, o = contacts, contacts.outlines
-    side = np.where(points.rise[0] < points.rise[1], c.back, c.corner)
+    side = np.where(points.rise[0] < points.rise[1], *c.sides)
     one, other = np.minimum(side, c.edge), np.maximum(side, c.edge)
     if c.between is not None:
         u = c.between

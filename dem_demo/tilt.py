@@ -11,8 +11,8 @@ _LOW, _HIGH = np.sin(np.radians([FACE, CORNER]))
 def raised(sine: np.ndarray, cosine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """0 for an edge that lies on the other, 1 for one that does not, smooth between; and its
     derivative by the size of the tilt (1/rad). sine, cosine: of the tilt, any shape."""
-    part = np.clip((np.abs(sine) - _LOW) / (_HIGH - _LOW), 0.0, 1.0)
-    part = np.where(cosine > 0, part, 1.0)
+    part = (np.abs(sine) - _LOW) / (_HIGH - _LOW)
+    part = np.minimum(np.maximum(part, cosine <= 0), 1.0)
     return part * part * (3 - 2 * part), 6 / (_HIGH - _LOW) * part * (1 - part) * cosine
 
 
@@ -20,4 +20,4 @@ def soft_size(x: np.ndarray, soft: float) -> tuple[np.ndarray, np.ndarray]:
     """|x| and its derivative, without the kink: differs from |x| only within `soft` of 0."""
     size = np.abs(x)
     part = np.minimum(size / soft, 1.0)
-    return np.where(part < 1, size * part * (2 - part), size), np.sign(x) * part * (4 - 3 * part)
+    return size * part * (2 - part), np.sign(x) * part * (4 - 3 * part)

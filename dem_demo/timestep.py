@@ -34,9 +34,9 @@ class StepLimit:
         k = len(points.closure)
         data, row, col = [], [], []
         for block, sign in ((contacts.a, -1.0), (contacts.b, 1.0)):
-            arm = points.at - motion[:2, block]
-            for first, way in ((0, points.normal), (k, points.tangent)):
-                parts = (way[0], way[1], arm[0] * way[1] - arm[1] * way[0])
+            arm = points.at - (motion[0] + 1j * motion[1])[block]
+            for first, way in ((0, points.normal), (k, -1j * points.normal)):
+                parts = (way.real, way.imag, (arm.conj() * way).imag)
                 for axis, part in enumerate(parts):
                     ok = self.free[block, axis]
                     data.append((sign * part * self.root[3 * block + axis])[ok])

@@ -121,9 +121,14 @@ class Interfaces:
                 self.urgent = True  # there may be something new next to it
         return points
 
-    def renew(self, motion: np.ndarray, near: Iterable[tuple[int, int]]) -> bool:
-        """Look again at pymunk's pairs; True if the list of law points has changed."""
-        first = self.renewed_at is None
+    def renew(
+        self, motion: np.ndarray, near: Iterable[tuple[int, int]], pressed: bool = True
+    ) -> bool:
+        """Look again at pymunk's pairs; True if the list of law points has changed.
+
+        Of new law points that are pressed already, the closure counts (`pressed`, at the start of a
+        run) or is crushed, so that they make no energy.
+        """
         self.renewed_at, self.urgent = motion[:3].copy(), False
         pairs = np.array(sorted(p for p in near if not self._fixed[list(p)].all()), int)
         corner, edge, closure, rise, overlap = self._within_reach(motion, pairs.reshape(-1, 2))
@@ -144,8 +149,7 @@ class Interfaces:
         here = corner[chosen], edge[chosen]
         overlaps = self._long_overlaps(*here, rise[:, chosen], overlap[:, chosen])
         same = len(stay) == len(self.numbers) and not fresh and overlaps == self.overlaps
-        # A law point that is found when it is pressed already starts unloaded there.
-        lost = np.where(first, 0.0, np.maximum(closure[fresh], 0.0))
+        lost = np.maximum(closure[fresh], 0.0) * (not pressed)
         self.adopt(
             *here,
             [self.keys[o] for o in old] + [keys[i] for i in fresh],

@@ -73,7 +73,7 @@ class Simulation:
         points = self.evaluate(motion, hand_over=True)
         if self.interfaces.stale(motion):
             self._checked = np.zeros(self.joints.n)  # lever arms have changed
-            if self.interfaces.renew(motion, self.world.near):
+            if self.interfaces.renew(motion, self.world.near, pressed=False):
                 self.arrange()
             points = self.evaluate(motion)
         self._require_carried(points)
@@ -107,10 +107,10 @@ class Simulation:
         is crushed: it starts anew at a closure at which it holds what the shorter one held.
         """
         now, thick = self.joints.now, self.scene.thickness
-        held = now["stored"] * before
-        for i in np.flatnonzero((points.length != before) & (held > 0)).tolist():
+        held, ratio = now["stored"] * before, points.length / np.maximum(before, 1e-300)
+        for i in np.flatnonzero((np.abs(ratio - 1) > MATCH) & (held > 0)).tolist():
             length, kept = points.length[i], now["stored"][i]
-            if length > (1 + MATCH) * before[i]:
+            if ratio[i] > 1:
                 most = self.interfaces.closure(points)[i]
                 closure = min(self.joints.closure_at_work(i, held[i] / length), most)
                 self.interfaces.crushed[i] += most - closure

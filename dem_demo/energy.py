@@ -33,12 +33,12 @@ class Ledger:
         self.value["stored"] = float(area @ stored)
         self.value["turned"] = self.value["kinetic"] + self.value["stored"]
         self.total0 = self.total
-        self.remember(forces, area, stored, dissipated)
+        self.remember(forces, area, dissipated)
 
-    def remember(self, forces, area, stored, dissipated) -> None:
+    def remember(self, forces, area, dissipated) -> None:
         """Keep the end of this step as the start of the next; also after joints came or went."""
         self.forces, self.area = forces, area
-        self.e_stored, self.e_lost = stored, dissipated
+        self.e_lost = dissipated
 
     def step(self, velocity, forces, dt: float, area, stored, dissipated) -> None:
         """Book a step in which the blocks moved with `velocity` (n, 3)."""
@@ -57,7 +57,7 @@ class Ledger:
             v["turned"] += float(np.abs(push).sum())
         v["stored"] = float(area @ stored)
         v["friction"] += float(middle @ (dissipated - self.e_lost))
-        self.remember(forces, area, stored, dissipated)
+        self.remember(forces, area, dissipated)
 
     @property
     def total(self) -> float:

@@ -147,8 +147,8 @@ def evaluate(contacts: Contacts, motion: np.ndarray) -> Points:
     length, pull, twist = _lengths(c, rise, level, overlap, pull, twist)
     # Behind a corner its edge ends at another corner. Of what follows there, a side of this corner
     # or the next edge of the other block, the one that is turned less is next; the limit is where
-    # both are equally deep.
-    own = _AHEAD * (side.conj() * c.following).imag <= 0
+    # both are equally deep. The raised end of an edge on an edge has its side next.
+    own = (_AHEAD * (side.conj() * c.following).imag <= 0) | (rise[::-1] < 0)
     toward = np.where(own, both, _AHEAD + c.following)
     inside = -(rest[::-1] * toward.conj()).real
     inside *= np.where(own, np.abs(rise) + LEVEL, 1.0)

@@ -35,7 +35,8 @@ class Interfaces:
     skin: pymunk reports pairs within 2 skins; a corner counts from a gap of 1 skin and is
     forgotten beyond 1.5 (m). spacing: largest distance of law points along an overlap (m).
     max_overlap: largest depth as a share of the smaller block's width. law_of: names the law of a
-    key. After `renew` or `follow`: contacts, and keys and numbers of all law points.
+    key. After `renew` or `follow`: contacts, and of their corners: keys when found, numbers,
+    crushed (m), the depth that each had to give up (see `Simulation.hand_over`).
     """
 
     def __init__(
@@ -62,16 +63,17 @@ class Interfaces:
         self._fixed = np.array([b.fixed for b in blocks])
         self.depth_limit = max_overlap * np.array([b.width for b in blocks])
         none = np.zeros(0, int)
-        self.adopt(none, none, [], none, [], 0)
+        self.adopt(none, none, [], none, np.zeros(0), [], 0)
         self.renewed_at: np.ndarray | None = None
         self.urgent = True  # must be renewed, whatever has moved
 
-    def adopt(self, corner, edge, keys, numbers, overlaps: list[Key], given: int) -> None:
+    def adopt(self, corner, edge, keys, numbers, crushed, overlaps, given: int) -> None:
         """Take law points as they are: corners on edges, and overlaps with points between."""
         between = self._between(overlaps)
         rest = self.corner_length, self.soft, self.spacing, between
         self.contacts = Contacts(self.outlines, corner, edge, *rest)
-        self.keys, self.numbers, self.overlaps, self.given = keys, numbers, overlaps, given
+        self.keys, self.numbers, self.crushed = keys, numbers, crushed
+        self.overlaps, self.given = overlaps, given
 
     @property
     def of_points(self) -> list[tuple[Key, int]]:
@@ -93,6 +95,17 @@ class Interfaces:
         moved = np.hypot(x, y) + np.abs(turned) * self._reach
         return bool(moved.max() > 0.25 * self.skin)
 
+    def closure(self, points: Points) -> np.ndarray:
+        """Closure (n,) that the joints see: of the depth less what has been crushed at a corner.
+
+        A corner that has opened is whole again: another part of it will touch next.
+        """
+        if not self.crushed.any():
+            return points.closure
+        k = len(self.crushed)
+        self.crushed[points.closure[:k] <= 0] = 0.0
+        return points.closure - np.pad(self.crushed, (0, len(points.closure) - k))
+
     def follow(self, points: Points, motion: np.ndarray) -> Points:
         """Let corners that have left the range of their edge go on to what is next there."""
         for _ in range(8):
@@ -108,8 +121,14 @@ class Interfaces:
                 self.urgent = True  # there may be something new next to it
         return points
 
-    def renew(self, motion: np.ndarray, near: Iterable[tuple[int, int]]) -> bool:
-        """Look again at pymunk's pairs; True if the list of law points has changed."""
+    def renew(
+        self, motion: np.ndarray, near: Iterable[tuple[int, int]], pressed: bool = True
+    ) -> bool:
+        """Look again at pymunk's pairs; True if the list of law points has changed.
+
+        Of new law points that are pressed already, the closure counts (`pressed`, at the start of a
+        run) or is crushed, so that they make no energy.
+        """
         self.renewed_at, self.urgent = motion[:3].copy(), False
         pairs = np.array(sorted(p for p in near if not self._fixed[list(p)].all()), int)
         corner, edge, closure, rise, overlap = self._within_reach(motion, pairs.reshape(-1, 2))
@@ -120,25 +139,29 @@ class Interfaces:
         fresh, stay = [], []
         for i, who in enumerate(zip(corner.tolist(), edge.tolist(), strict=True)):
             old = known.get(who)
-            closed = closure[i] > 0
-            if old is not None and (
-                closed or self.keys[old] == keys[i] or self._same(self.keys[old], keys[i])
-            ):
-                stay.append((int(self.numbers[old]), i, self.keys[old]))
+            if old is not None and (closure[i] > 0 or self._same(self.keys[old], keys[i])):
+                stay.append((old, i))
             elif closure[i] > -self.skin:
                 fresh.append(i)
         stay.sort()
-        chosen = [i for _, i, _ in stay] + fresh
+        old = [o for o, _ in stay]
+        chosen = [i for _, i in stay] + fresh
         here = corner[chosen], edge[chosen]
         overlaps = self._long_overlaps(*here, rise[:, chosen], overlap[:, chosen])
         same = len(stay) == len(self.numbers) and not fresh and overlaps == self.overlaps
-        numbers = [n for n, _, _ in stay] + [self.given + n for n in range(len(fresh))]
-        names = [key for _, _, key in stay] + [keys[i] for i in fresh]
-        self.adopt(*here, names, np.array(numbers, int), overlaps, self.given + len(fresh))
+        lost = np.maximum(closure[fresh], 0.0) * (not pressed)
+        self.adopt(
+            *here,
+            [self.keys[o] for o in old] + [keys[i] for i in fresh],
+            np.concatenate([self.numbers[old], self.given + np.arange(len(fresh))]).astype(int),
+            np.concatenate([self.crushed[old], lost]),
+            overlaps,
+            self.given + len(fresh),
+        )
         return not same
 
     def _same(self, one: Key, other: Key) -> bool:
-        return self.law_of(one) == self.law_of(other)
+        return one == other or self.law_of(one) == self.law_of(other)
 
     def _within_reach(self, motion, pairs):
         """Corners that are over an edge of another block, near it and in its range."""
@@ -151,7 +174,7 @@ class Interfaces:
         height = np.where(corner < 0, np.inf, -depth)
         apart = np.where(edge[:, 0] < 0, -np.inf, height.min(axis=1)).max(axis=1)
         limit = np.minimum(self.depth_limit[x], self.depth_limit[y])
-        near = (height < 1.5 * self.skin) & (height > -10 * limit[:, None, None])
+        near = (height < 1.5 * self.skin) & (height > -1.5 * limit[:, None, None])
         near &= (corner >= 0) & (edge >= 0)
         which = np.nonzero(near)[0]
         corner, edge = corner[near], edge[near]

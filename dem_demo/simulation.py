@@ -17,6 +17,7 @@ from .world import World
 
 HEADROOM = 1.25  # most growth of a joint's stiffness between two checks of the time step
 SAFE = 0.98  # largest time step as a share of the limit
+MATCH = 1e-6  # relative: lengths that are equal but for rounding
 CORNER = 0.1  # contact length of a corner as a share of the least block width, by default
 
 
@@ -69,14 +70,15 @@ class Simulation:
         """Forces (n, 3) at the positions just reached; velocities are those that led there."""
         self._require_slow(motion)
         self.motion, self.n = motion, self.n + 1
-        points = self.evaluate(motion)
+        points = self.evaluate(motion, hand_over=True)
         if self.interfaces.stale(motion):
             self._checked = np.zeros(self.joints.n)  # lever arms have changed
-            if self.interfaces.renew(motion, self.world.near):
+            if self.interfaces.renew(motion, self.world.near, pressed=False):
                 self.arrange()
             points = self.evaluate(motion)
         self._require_carried(points)
-        d = self.joints.increments(points.closure, points.sliding * self.dt)
+        closure = self.interfaces.closure(points)
+        d = self.joints.increments(closure, points.sliding * self.dt)
         self.traction = self.joints.update(d, self.scene.run.law_steps)
         forces = self.forces(points, self.dt)
         if (self._stiffness * self.area > self._checked).any():
@@ -87,13 +89,36 @@ class Simulation:
         self.ledger.step(motion[3:].T, forces, self.dt, *self.joint_energies(points))
         return forces[0]
 
-    def evaluate(self, motion: np.ndarray) -> geometry.Points:
+    def evaluate(self, motion: np.ndarray, hand_over=False) -> geometry.Points:
         """Law points at a motion (6, n), each at the corner and edge where it is by then."""
         points = geometry.evaluate(self.interfaces.contacts, motion)
         if points.inside.min(initial=0.0) < -ROUNDING:
-            points = self.interfaces.follow(points, motion)
+            before, points = points, self.interfaces.follow(points, motion)
+            if hand_over:
+                self.hand_over(before.length, points)
         self.contacts = self.interfaces.contacts
         return points
+
+    def hand_over(self, before: np.ndarray, points: geometry.Points) -> None:
+        """Keep the books where a law point has gone on to a corner of another length (n,) in m.
+
+        Lengths match wherever an edge that lies on another, or a corner of 5 degrees or more, goes
+        on to the same. Else a joint that became shorter drops the rest, and one that became longer
+        is crushed: it starts anew at a closure at which it holds what the shorter one held.
+        """
+        now, thick = self.joints.now, self.scene.thickness
+        held, ratio = now["stored"] * before, points.length / np.maximum(before, 1e-300)
+        for i in np.flatnonzero((np.abs(ratio - 1) > MATCH) & (held > 0)).tolist():
+            length, kept = points.length[i], now["stored"][i]
+            if ratio[i] > 1:
+                most = self.interfaces.closure(points)[i]
+                closure = min(self.joints.closure_at_work(i, held[i] / length), most)
+                self.interfaces.crushed[i] += most - closure
+                kept = self.joints.work_at(i, closure)
+                self.joints.forget(i)
+                self.ledger.e_lost[i] = 0.0
+            self.ledger.value["dropped"] += max(held[i] - kept * length, 0.0) * thick
+            self.area[i] = length * thick
 
     def forces(self, points: geometry.Points, dt: float) -> np.ndarray:
         """(3, n, 3): all forces, those of the dashpots, those of the drives."""
@@ -175,7 +200,7 @@ class Simulation:
             area = np.array([before.pop(who, [0.0, 0.0])[0] for who in self.identity])
             self.ledger.value["dropped"] += sum(held for _, held in before.values())
             now = self.joints.now
-            self.ledger.remember(self.ledger.forces, area, now["stored"], now["lost"])
+            self.ledger.remember(self.ledger.forces, area, now["lost"])
 
     # ----------------------------------------------------------------- guards
 

@@ -21,11 +21,11 @@ def state(sim) -> dict:
         "renewed_at": it.renewed_at.copy(),
         "corners": np.stack([it.contacts.corner, it.contacts.edge, it.numbers]),
         "keys": np.array(it.keys, int).reshape(-1, 4),
+        "crushed": it.crushed.copy(),
         "overlaps": np.array(it.overlaps, int).reshape(-1, 4),
         "given": np.array(it.given),
         "forces": sim.ledger.forces.copy(),
         "area": sim.ledger.area.copy(),
-        "e_stored": sim.ledger.e_stored.copy(),
         "e_lost": sim.ledger.e_lost.copy(),
         "ledger": np.array([*(sim.ledger.value[c] for c in COLUMNS), sim.ledger.total0]),
         "turned_at": sim.drives.turned_at.copy(),
@@ -44,7 +44,8 @@ def restore(sim, state: dict, step: float | None = None) -> None:
         sim.t0, sim.n, sim.dt = sim.time, 0, step
     keys, overlaps = ([tuple(k) for k in a[what].tolist()] for what in ("keys", "overlaps"))
     corner, edge, numbers = a["corners"].copy()
-    sim.interfaces.adopt(corner, edge, keys, numbers, overlaps, int(a["given"]))
+    crushed, given = a["crushed"].copy(), int(a["given"])
+    sim.interfaces.adopt(corner, edge, keys, numbers, crushed, overlaps, given)
     sim.interfaces.renewed_at, sim.interfaces.urgent = a["renewed_at"].copy(), False
     sim.points = None
     sim.joints.restore(state["joints"], sim.interfaces.of_points)
@@ -54,7 +55,7 @@ def restore(sim, state: dict, step: float | None = None) -> None:
     sim.area = a["area"].copy()
     sim.ledger.value = dict(zip(COLUMNS, a["ledger"].tolist(), strict=False))
     sim.ledger.total0 = float(a["ledger"][-1])
-    sim.ledger.remember(a["forces"].copy(), sim.area, a["e_stored"].copy(), a["e_lost"].copy())
+    sim.ledger.remember(a["forces"].copy(), sim.area, a["e_lost"].copy())
     sim.points = sim.evaluate(sim.motion)
     if step:  # velocities are half a step ahead of the places: of the new step
         sim.motion[3:] += 0.5 * (step - a["clock"][2]) * (a["forces"][0] / sim.inertia * sim.free).T

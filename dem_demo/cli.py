@@ -110,6 +110,7 @@ def _compare(words: list[str]) -> int:
     parser.add_argument("scene", help="a name or a TOML file")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="default 1 2 3")
     parser.add_argument("--until", type=float, help="model time to stop at (s)")
+    parser.add_argument("--tilt", type=float, default=0.0, help="degrees: turn gravity towards +x")
     parser.add_argument("--out", type=Path, help="a JSON file for the numbers")
     given = parser.parse_args(words)
     scene = load(given.scene)
@@ -117,7 +118,7 @@ def _compare(words: list[str]) -> int:
         raise ValueError(f"{given.scene} has no [[rock]] to compare")
     end = given.until if given.until is not None else scene.run.end
     rows = []
-    for row in compare(scene.text, str(given.scene), given.seeds, end):
+    for row in compare(scene.text, str(given.scene), given.seeds, end, given.tilt):
         rows.append(row)
         print(f"seed {row['seed']}, {row['law']:7s} {row['time_s']:6.2f} s  {sentence(row)}"
               f", books to {row['largest_energy_error']:.1e}", flush=True)  # fmt: skip

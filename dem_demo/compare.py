@@ -21,14 +21,22 @@ from .laws import build_law
 from .outcome import outcomes
 from .record import Record
 from .scene import build
+from .shapes import turn
 from .simulation import Simulation
 
 FAR = 1.0  # m: a rock whose blocks have moved farther has failed, and need not go on
 
 
-def compare(text: str, where: str, seeds: Sequence[int], until: float) -> Iterator[dict]:
-    """Run every rock of a scene's text for each seed and each kind of law; yields outcomes."""
+def compare(
+    text: str, where: str, seeds: Sequence[int], until: float, tilt: float = 0.0
+) -> Iterator[dict]:
+    """Run every rock of a scene's text for each seed and each kind of law; yields outcomes.
+
+    until: model time to stop at (s); tilt: angle by which gravity is turned towards +x (degrees).
+    """
     data = tomllib.loads(text)
+    gravity = turn(np.radians(tilt)) @ data.get("gravity", [0.0, -9.81])
+    data["gravity"] = gravity.tolist()
     for rock in _whole(data["rock"]):
         for seed in seeds:
             for kind in ("joint", "coulomb"):
@@ -37,6 +45,7 @@ def compare(text: str, where: str, seeds: Sequence[int], until: float) -> Iterat
                 if kind == "coulomb":
                     laws = data["laws"].items()
                     alone["laws"] = {name: _plain(law, rock, data) for name, law in laws}
+                    alone["run"] = {**data["run"], "max_overlap": 0.1}  # springs that never harden
                 yield {"law": kind, "seed": seed, **_one(alone, where, until)}
 
 

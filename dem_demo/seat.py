@@ -14,11 +14,12 @@ from .joints import Joints
 TIGHT = 1e-11  # residual force as a share of the applied one
 
 
-def equilibrium(joints: Joints, rows: csr_array, closure, slid, area, force, settle):
+def equilibrium(joints: Joints, rows: csr_array, closure, slid, area, force, settle, near):
     """Displacements of the free motions that balance `force`; rows as in `StepLimit.rows`.
 
     closure, slid (k,): where the joints are without these displacements (m), reached in one step
-    from the virgin state. settle (free motions,): those that are asked for.
+    from the virgin state. settle (free motions,): those that are asked for; near: they are almost
+    in balance.
 
     First with joints that cannot slide; then with the law itself. Blocks that the law cannot hold
     are seated with joints that neither slide nor open, which always has an answer. Blocks that no
@@ -49,12 +50,13 @@ def equilibrium(joints: Joints, rows: csr_array, closure, slid, area, force, set
     touched = abs(rows[:k]) + abs(rows[k:])  # the law couples closure and shear
     _, island = connected_components(touched.T @ touched, directed=False)
     idle, nothing = np.bincount(island, settle) == 0, np.zeros(len(force))
-    guess, _ = _newton(bonded, rows, start, weight, force, nothing, 300, island, idle)
+    guess = nothing
+    if not near:
+        guess, _ = _newton(bonded, rows, start, weight, force, nothing, 300, island, idle)
     best, balanced = _newton(law, rows, start, weight, force, guess, 100, island, idle)
-    if not (balanced | idle).all():
-        idle = idle | balanced
+    if not (near or balanced.all()):
         glue = partial(bonded, pull=1.0)
-        glued, _ = _newton(glue, rows, start, weight, force, nothing, 300, island, idle)
+        glued, _ = _newton(glue, rows, start, weight, force, nothing, 300, island, balanced)
         best = np.where(balanced[island], best, glued)
     return best, balanced[island]
 

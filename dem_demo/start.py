@@ -8,7 +8,9 @@ from . import timestep
 from .interfaces import Refused
 from .seat import equilibrium
 
-ATTEMPTS = 5
+ATTEMPTS = 40  # most rounds of seating
+SETTLED = 1e-10  # movement of a round, as a share of the first, that ends them
+
 
 def begin(sim) -> None:
     """Seat the blocks, choose the time step, and take the first half step of the velocities."""
@@ -50,9 +52,10 @@ def _seat(sim) -> np.ndarray:
         force = (force.ravel() * sim.limit.root)[free]
         rows = sim.limit.rows(sim.contacts, points, sim.motion)
         area = points.length * sim.scene.thickness
-        moved, balanced = equilibrium(sim.joints, rows, points.closure, slid, area, force, settle)
+        state = points.closure, slid, area, force, settle
+        moved, balanced = equilibrium(sim.joints, rows, *state, near=attempt > 0)
         if attempt == 0:
-            sim.balanced = bool(balanced.all())
+            sim.balanced, first = bool(balanced.all()), np.abs(moved).max()
         else:  # what was found before is balanced but for the turning of the joints
             moved = np.where(balanced & settle, moved, 0.0)
         slid = slid + (rows @ moved)[len(slid) :]
@@ -60,7 +63,7 @@ def _seat(sim) -> np.ndarray:
         shift[free] = moved * sim.limit.root[free]
         sim.motion[:3] += shift.reshape(-1, 3).T
         settle &= balanced
-        if not settle.any():
+        if not settle.any() or np.abs(moved).max() < SETTLED * first:
             break
     sim.interfaces.renewed_at = sim.motion[:3].copy()
     return slid

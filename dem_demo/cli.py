@@ -7,7 +7,7 @@ import json
 import sys
 from pathlib import Path
 
-from .compare import compare
+from .compare import compare, critical_tilts
 from .interfaces import Refused
 from .outcome import sentence
 from .run import run
@@ -110,20 +110,32 @@ def _compare(words: list[str]) -> int:
     parser.add_argument("scene", help="a name or a TOML file")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="default 1 2 3")
     parser.add_argument("--until", type=float, help="model time to stop at (s)")
+    parser.add_argument(
+        "--critical",
+        action="store_true",
+        help="find the tilt that the rock just bears; run nothing",
+    )
     parser.add_argument("--tilt", type=float, default=0.0, help="degrees: turn gravity towards +x")
     parser.add_argument("--out", type=Path, help="a JSON file for the numbers")
     given = parser.parse_args(words)
     scene = load(given.scene)
     if not scene.rocks:
         raise ValueError(f"{given.scene} has no [[rock]] to compare")
-    end = given.until if given.until is not None else scene.run.end
-    rows = []
-    for row in compare(scene.text, str(given.scene), given.seeds, end, given.tilt):
-        rows.append(row)
-        print(f"seed {row['seed']}, {row['law']:7s} {row['time_s']:6.2f} s  {sentence(row)}"
-              f", books to {row['largest_energy_error']:.1e}", flush=True)  # fmt: skip
-        if row["refused"]:
-            print(f"    stopped: {row['refused']}")
+    rows, scene_is = [], (scene.text, str(given.scene), given.seeds)
+    if given.critical:
+        for row in critical_tilts(*scene_is):
+            rows.append(row)
+            angle = row["critical_tilt"]
+            told = "beyond 60 degrees" if angle is None else f"{angle:+.1f} degrees"
+            print(f"seed {row['seed']}, {row['law']:7s}  {row['rock']}: {told}", flush=True)
+    else:
+        end = given.until if given.until is not None else scene.run.end
+        for row in compare(*scene_is, end, given.tilt):
+            rows.append(row)
+            print(f"seed {row['seed']}, {row['law']:7s} {row['time_s']:6.2f} s  {sentence(row)}"
+                  f", books to {row['largest_energy_error']:.1e}", flush=True)  # fmt: skip
+            if row["refused"]:
+                print(f"    stopped: {row['refused']}")
     if given.out:
         given.out.write_text(json.dumps(rows, indent=2) + "\n")
     return 0

@@ -3,25 +3,32 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from pathlib import Path
 
 from . import ablate
+from .compare import compare, critical_tilts
 from .interfaces import Refused
+from .outcome import sentence
 from .run import run
 from .scene import load, names
 from .simulation import Simulation
 from .tables import SceneError
 
 DEFAULT = "tilt"
+TEMPLATE = Path(__file__).parent / "template.toml"
 
 ABOUT = """\
 Rigid rock blocks in 2-D whose every contact force comes from a joint law.
 
   python -m dem_demo [SCENE] --out DIR     run a scene: a name or a TOML file
+  python -m dem_demo new FILE              write a commented scene of a jointed rock to start from
   python -m dem_demo ablate SCENE --out DIR
                                            run it without each of its ingredients in turn
   python -m dem_demo check FILE            check a scene file without running it
+  python -m dem_demo compare SCENE [--seeds 1 2 3] [--until T]
+                                           every rock of a scene alone, with plain Coulomb as well
   python -m dem_demo resume STATE --out DIR [--until T] [--step DT]
                                            go on from DIR/state or DIR/refused
 """
@@ -30,11 +37,11 @@ Rigid rock blocks in 2-D whose every contact force comes from a joint law.
 def main(arguments: list[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    verbs = {"ablate": _ablate, "check": _check, "resume": _resume}
+    verbs = {
+        "new": _new, "check": _check, "resume": _resume, "compare": _compare, "ablate": _ablate,
+    }  # fmt: skip
     try:
-        if words and words[0] in verbs:
-            return verbs[words[0]](words[1:])
-        return _run(words)
+        return verbs[words[0]](words[1:]) if words and words[0] in verbs else _run(words)
     except (SceneError, Refused, ValueError, OSError) as error:
         print(f"dem_demo: {error}", file=sys.stderr)
         return 2
@@ -87,6 +94,21 @@ def _ablate(words: list[str]) -> int:
     return 0
 
 
+def _new(words: list[str]) -> int:
+    parser = argparse.ArgumentParser(
+        "python -m dem_demo new",
+        description="Write a commented scene of a rock slope cut by joint sets, ready to run.",
+        epilog="example: python -m dem_demo new my-slope.toml",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("file", type=Path)
+    file = parser.parse_args(words).file
+    with file.open("x") as stream:  # never over a file that is there
+        stream.write(TEMPLATE.read_text())
+    print(f"{file} written; next: python -m dem_demo check {file}")
+    return 0
+
+
 def _check(words: list[str]) -> int:
     parser = argparse.ArgumentParser(
         "python -m dem_demo check",
@@ -99,6 +121,48 @@ def _check(words: list[str]) -> int:
     sim = Simulation(scene)
     _announce(sim, scene.run.end)
     print("the scene is valid")
+    return 0
+
+
+def _compare(words: list[str]) -> int:
+    parser = argparse.ArgumentParser(
+        "python -m dem_demo compare",
+        description="Run every rock of a scene alone, cut with several seeds, with its own laws "
+        "and with plain Coulomb friction of its asperities. What moves 1 m has failed and stops.",
+        epilog="example: python -m dem_demo compare slope --seeds 1 2 3 --until 10",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("scene", help="a name or a TOML file")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="default 1 2 3")
+    parser.add_argument("--until", type=float, help="model time to stop at (s)")
+    parser.add_argument(
+        "--critical",
+        action="store_true",
+        help="find the tilt that the rock just bears; run nothing",
+    )
+    parser.add_argument("--tilt", type=float, default=0.0, help="degrees: turn gravity towards +x")
+    parser.add_argument("--out", type=Path, help="a JSON file for the numbers")
+    given = parser.parse_args(words)
+    scene = load(given.scene)
+    if not scene.rocks:
+        raise ValueError(f"{given.scene} has no [[rock]] to compare")
+    rows, scene_is = [], (scene.text, str(given.scene), given.seeds)
+    if given.critical:
+        for row in critical_tilts(*scene_is):
+            rows.append(row)
+            angle = row["critical_tilt"]
+            told = "beyond 60 degrees" if angle is None else f"{angle:+.1f} degrees"
+            print(f"seed {row['seed']}, {row['law']:7s}  {row['rock']}: {told}", flush=True)
+    else:
+        end = given.until if given.until is not None else scene.run.end
+        for row in compare(*scene_is, end, given.tilt):
+            rows.append(row)
+            print(f"seed {row['seed']}, {row['law']:7s} {row['time_s']:6.2f} s  {sentence(row)}"
+                  f", books to {row['largest_energy_error']:.1e}", flush=True)  # fmt: skip
+            if row["refused"]:
+                print(f"    stopped: {row['refused']}")
+    if given.out:
+        given.out.write_text(json.dumps(rows, indent=2) + "\n")
     return 0
 
 
@@ -115,6 +179,11 @@ def _announce(sim: Simulation, end: float) -> None:
         f"time step {sim.dt:.3g} s, limit {sim.step_limit:.3g} s (safety factor "
         f"{sim.step_limit / sim.dt:.2f}), {max(round((end - sim.time) / sim.dt), 0)} steps"
     )
+    for rock in sim.scene.rocks:
+        print(
+            f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
+            f"{len(rock.blocks) - len(rock.free)} fixed; {rock.slivers}"
+        )
     if not sim.balanced:
         print("the joints cannot hold the blocks where they are drawn: they move from step 0")
 
@@ -134,6 +203,8 @@ def _go(sim: Simulation, given: argparse.Namespace) -> int:
                 f"{slip['block']}: slipped at {slip['slip_angle']:.2f} degrees, "
                 f"the law alone says {slip['predicted_angle']:.2f}"
             )
+    for rock in summary["rocks"]:
+        print(sentence(rock))
     print(
         f"energy balanced to {summary['largest_energy_error']:.1e}, smallest safety factor "
         f"{summary['safety_factor']:.2f}; results in {given.out}"

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+from .shapes import Block
+from .tables import SceneError, Table
 
 AXES = {"x": 0, "y": 1, "turn": 2}
 
@@ -80,3 +84,50 @@ class Drives:
         self.waiting = any(
             d.back and t < at for d, at in zip(self.drives, self.turned_at, strict=True)
         )
+
+
+def read_drives(
+    top: Table, where: str, number: dict[str, int], blocks: Sequence[Block]
+) -> tuple[Drive, ...]:
+    """The drives of a scene's `[[drive]]` tables and of its blocks' `held` motions.
+
+    number: of each block by name. Raises SceneError.
+    """
+    out = [
+        Drive(i, AXES[axis], (0.0,), (0.0,), 0.0) for i, b in enumerate(blocks) for axis in b.held
+    ]
+    for n, data in enumerate(top.take("drive", list, [])):
+        table = Table(data, f"{where}.drive[{n}]")
+        block, motion = table.take("block", str), table.take("motion", str)
+        if block not in number or blocks[number[block]].fixed:
+            raise SceneError(
+                f"{table.path('block')} = {block!r}: must be a block that is not fixed"
+            )
+        if motion not in AXES:
+            raise SceneError(f"{table.path('motion')} = {motion!r}: must be x, y or turn")
+        times, values = (np.array(table.take(key, list), float) for key in ("times", "values"))
+        if len(times) != len(values) or len(times) < 1 or (np.diff(times) <= 0).any():
+            raise SceneError(f"{table.path('times')}: must increase, one for each of `values`")
+        unit = np.pi / 180 if motion == "turn" else 1.0
+        ease = table.take("ease", float, 0.1, least=0)
+        way = tuple(times), tuple(unit * values)
+        back = _way_back(table, number, unit)
+        out.append(Drive(number[block], AXES[motion], *way, ease, back))
+        table.finish()
+    moved = [(d.block, d.axis) for d in out]
+    if len(set(moved)) < len(moved):
+        raise SceneError(f"{where}.drive: a motion of a block is prescribed twice")
+    return tuple(out)
+
+
+def _way_back(table: Table, number: dict[str, int], unit: float) -> Back | None:
+    if not (data := table.take("back", dict, {})):
+        return None
+    back = Table(data, table.path("back"))
+    block = back.take("block", str)
+    if block not in number:
+        raise SceneError(f"{back.path('block')} = {block!r}: no such block")
+    slid = back.take("slid", float, above=0, say="m")
+    by, rate = (back.take(key, float, above=0) * unit for key in ("by", "rate"))
+    back.finish()
+    return Back(number[block], slid, by, rate)

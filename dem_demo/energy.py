@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import numpy as np
 
-COLUMNS = ("kinetic", "potential", "stored", "friction", "dashpots", "area", "work", "turned")
+COLUMNS = ("kinetic", "potential", "stored", "friction", "dashpots", "dropped", "work", "turned")
 
 
 class Ledger:
-    """Energies in J. kinetic + potential + stored + friction + dashpots = start + work + area.
+    """Energies in J: kinetic + potential + stored + friction + dashpots + dropped = start + work.
 
-    friction: dissipated in the joints; work: done by drives and loads; area: energy that joints
-    gained because their overlap area grew (lost: shrank) under load, which no force accounts for;
-    turned: gravity's, the drives' and the loads' power summed in absolute value, plus what was
-    there at the start.
+    friction: dissipated in the joints; dropped: stored in law points that were given up while they
+    still carried; work: done by drives and loads; turned: gravity's, the drives' and the loads'
+    power summed in absolute value, plus what was there at the start.
     """
 
     def __init__(self, inertia: np.ndarray, gravity: np.ndarray, loads: np.ndarray) -> None:
@@ -34,12 +33,12 @@ class Ledger:
         self.value["stored"] = float(area @ stored)
         self.value["turned"] = self.value["kinetic"] + self.value["stored"]
         self.total0 = self.total
-        self.remember(forces, area, stored, dissipated)
+        self.remember(forces, area, dissipated)
 
-    def remember(self, forces, area, stored, dissipated) -> None:
+    def remember(self, forces, area, dissipated) -> None:
         """Keep the end of this step as the start of the next; also after joints came or went."""
         self.forces, self.area = forces, area
-        self.e_stored, self.e_lost = stored, dissipated
+        self.e_lost = dissipated
 
     def step(self, velocity, forces, dt: float, area, stored, dissipated) -> None:
         """Book a step in which the blocks moved with `velocity` (n, 3)."""
@@ -58,15 +57,14 @@ class Ledger:
             v["turned"] += float(np.abs(push).sum())
         v["stored"] = float(area @ stored)
         v["friction"] += float(middle @ (dissipated - self.e_lost))
-        v["area"] += 0.5 * float((stored + self.e_stored) @ (area - self.area))
-        self.remember(forces, area, stored, dissipated)
+        self.remember(forces, area, dissipated)
 
     @property
     def total(self) -> float:
         """What the balance says is constant (J)."""
         v = self.value
-        held = v["kinetic"] + v["potential"] + v["stored"] + v["friction"] + v["dashpots"]
-        return held - v["work"] - v["area"]
+        held = v["kinetic"] + v["potential"] + v["stored"]
+        return held + v["friction"] + v["dashpots"] + v["dropped"] - v["work"]
 
     @property
     def error(self) -> float:

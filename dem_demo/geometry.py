@@ -1,147 +1,230 @@
-"""Edge against edge: overlap, closure and sliding at the law points. Numpy only, no law, no pymunk.
+"""Corners on edges: overlap, closure, sliding and contact length. Numpy only, no law, no pymunk.
 
-Each end of an overlap is a corner of one edge over the line of the other. The closure there is
-the depth of that corner below that line, so closure, shear and force share one normal and the work
-of the force on the blocks is the work done on the joint.
+A law point is a corner over the line of an edge of another block. Its closure is the depth of the
+corner below that line, so closure, shear and force share one normal and the work of the force on
+the blocks is the work done on the joint. Where two edges lie on each other, the ends of their
+overlap are such corners, and each carries half of the overlap; a corner that stands on an edge
+carries a fixed length. In between the length changes smoothly with the tilt, and wherever it
+changes it carries energy: `pull` and `twist` are its derivatives, and minus the stored energy per
+length times these acts on the blocks, so that no energy is made or lost.
+
+Vectors are complex numbers x + iy: conj(p) q holds their dot product and their cross product, and
+dividing by the direction of an edge takes all into its frame.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from .between import Between, interpolate
+from .shapes import Block
+from .tilt import raised, soft_size
 
-@dataclass(frozen=True, eq=False)
-class Edges:
-    """Interfaces as arrays: m pairs of edges, edge A of block `first`, edge B of `second`.
+LEVEL = 1e-6  # sine of a tilt that is none, for corners past the limit of their range
+_AHEAD = np.array([[1.0], [-1.0]])  # the sides of a corner: towards the edge's end, and its start
 
-    corners (2, 4 m): start and end of edge A, start and end of edge B, each from its block's
-    centroid; length (m,) of edge A; inner (list of law points between the two ends) as interface
-    numbers `inner_of` with their fractions `inner_at` along the overlap; weight (k,): share of the
-    overlap length that each law point carries.
+
+class Outlines:
+    """Corners of all blocks in one list: edge i starts at corner i and ends at corner next[i].
+
+    local (c,): corners from the centroids; way (c,): directions of the edges; length (c,) of the
+    edges; block, before, next (c,): numbers; start (blocks,): first corner of each block.
     """
 
-    first: np.ndarray
-    second: np.ndarray
-    corners: np.ndarray
-    length: np.ndarray
-    inner_of: np.ndarray
-    inner_at: np.ndarray
-    weight: np.ndarray
+    def __init__(self, blocks: Sequence[Block]) -> None:
+        sizes = np.array([len(block.corners) for block in blocks])
+        self.start = np.cumsum(sizes) - sizes
+        self.block = np.repeat(np.arange(len(blocks)), sizes)
+        first, size = self.start[self.block], sizes[self.block]
+        place = np.arange(len(first)) - first
+        self.next, self.before = first + (place + 1) % size, first + (place - 1) % size
+        self.local = np.concatenate([block.local for block in blocks]) @ [1, 1j]
+        edge = self.local[self.next] - self.local
+        self.length = np.abs(edge)
+        self.way = edge / self.length
 
-    def __post_init__(self) -> None:
-        m = len(self.first)
-        set_ = object.__setattr__
-        set_(self, "corner_block", np.repeat([self.first, self.second], 2, axis=0).ravel())
-        of = np.concatenate([np.arange(m), np.arange(m), self.inner_of])
-        set_(self, "of", of)  # interface of each law point
-        set_(self, "a", self.first[of])
-        set_(self, "b", self.second[of])
+    def place(self, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Corners and directions of edges (c,) for a motion (6, n) of the blocks."""
+        turn = np.exp(1j * motion[2])[self.block]
+        return (motion[0] + 1j * motion[1])[self.block] + turn * self.local, turn * self.way
+
+
+class Contacts:
+    """Law points: k corners on edges, then the points between the ends of long overlaps.
+
+    corner, edge (k,): numbers in the outlines; corner_length (m): of a corner that stands on an
+    edge; soft (m): over which the end of an edge takes over from another; spacing: largest distance
+    of law points (m). a, b (n,): blocks of all law points, a < b; weight (n,): share of an overlap
+    that a point carries.
+    """
+
+    def __init__(
+        self,
+        outlines: Outlines,
+        corner: np.ndarray,
+        edge: np.ndarray,
+        corner_length: float,
+        soft: float,
+        spacing: float = np.inf,
+        between: Between | None = None,
+    ) -> None:
+        self.outlines, self.corner, self.edge = outlines, corner, edge
+        self.corner_length, self.soft = corner_length, soft
+        self.spacing, self.between = spacing, between
+        o = outlines
+        x, y = o.block[corner], o.block[edge]
+        self.sign = np.where(x > y, 1.0, -1.0)  # +1: the corner belongs to block b
+        self.sides = np.stack([o.before[corner], corner])  # the edges that meet at the corner
+        self.size, self.length = o.length[self.sides], o.length[edge]
+        # In the frame of the edge: its end and start, and the edges beyond, behind each side.
+        self.ends = self.length * np.array([[1.0], [0.0]])
+        self.behind = np.stack([o.before[edge], o.next[edge]])
+        self.following = _AHEAD * o.way[self.behind] / o.way[edge]
+        self.share = 0.5 / spans(np.minimum(self.size, self.length), spacing)
+        self.a, self.b, self.weight = np.minimum(x, y), np.maximum(x, y), self.share.min(axis=0)
+        if between is not None:
+            self.a = np.concatenate([self.a, between.a])
+            self.b = np.concatenate([self.b, between.b])
+            self.weight = np.concatenate([self.weight, between.weight])
+
+    def __len__(self) -> int:
+        return len(self.a)
+
+    def at(self, corner: np.ndarray, edge: np.ndarray) -> Contacts:
+        """The same law points on other corners and edges."""
+        rest = self.corner_length, self.soft, self.spacing, self.between
+        return Contacts(self.outlines, corner, edge, *rest)
+
+
+def spans(length: np.ndarray, spacing: float) -> np.ndarray:
+    """Into how many parts of at most `spacing` a length (m) is cut."""
+    return np.maximum(np.ceil(length / spacing - 1e-9), 1).astype(int)
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Law points: k = 2 m ends, then the points between. All arrays (k,) or (2, k), SI units.
+    """Law points: n of them, of which the first k are corners. SI units, vectors complex.
 
-    at: place; normal: from block A to block B; tangent: a quarter turn clockwise from it; closure:
-    positive when pressed together; length: share of the overlap; tilt (m,): angle between the two
-    edges in rad; along (2, k): relative velocity of B to A along normal and tangent.
+    at (n,): place; normal (n,): from block a to block b; closure (n,): positive when pressed
+    together; length (n,): of the joint that the point stands for; pull (n,) vector and twist (n,):
+    derivatives of the length by displacement (at the point) and rotation of b relative to a;
+    opening, sliding (n,): velocity of b relative to a along the normal and a quarter turn
+    clockwise from it. Of the sides (2, k): rise, sine of the angle to the edge; overlap (m);
+    inside (m), what the corner is away from the limit behind it in terms of its depth; beyond it
+    the next corner takes over if `own`, else the next edge.
     """
 
     at: np.ndarray
     normal: np.ndarray
-    tangent: np.ndarray
     closure: np.ndarray
     length: np.ndarray
-    tilt: np.ndarray
-    along: np.ndarray
+    pull: np.ndarray
+    twist: np.ndarray
+    opening: np.ndarray
+    sliding: np.ndarray
+    rise: np.ndarray
+    overlap: np.ndarray
+    inside: np.ndarray
+    own: np.ndarray
 
 
-def evaluate(edges: Edges, motion: np.ndarray) -> Points:
-    """Law points of the interfaces for a motion (6, n) of the blocks."""
-    m = len(edges.first)
-    place = place_corners(edges.corners, edges.corner_block, motion)
-    a0, a1, b0, b1 = place[:, :m], place[:, m : 2 * m], place[:, 2 * m : 3 * m], place[:, 3 * m :]
-    ta = (a1 - a0) / edges.length
-    tb = b1 - b0
-    tb /= np.sqrt(tb[0] * tb[0] + tb[1] * tb[1])
-    tilt = ta[1] * tb[0] - ta[0] * tb[1]  # the edges run in opposite senses
-    # Ends: 0 at the start of A (end of B), 1 at the end of A (start of B).
-    corner_a, corner_b = place[:, : 2 * m], np.concatenate([b1, b0], axis=1)
-    d = corner_b - corner_a
-    t = ta - tb  # along both, so that the blocks may trade roles
-    t /= np.sqrt(t[0] * t[0] + t[1] * t[1])
-    span = (a1[0] - a0[0]) * t[0] + (a1[1] - a0[1]) * t[1]
-    inside = d * np.concatenate([t, -t], axis=1)
-    inside = inside[0] + inside[1]
-    length = span - np.maximum(inside[:m], 0) - np.maximum(inside[m:], 0)
-    by_b = inside > 0  # corner of B over edge A, else corner of A over edge B
-    facing = np.array([[ta[1], -ta[0]], [-tb[1], tb[0]]])
-    normal = np.where(by_b, *np.concatenate([facing, facing], axis=2))
-    closure = -(d[0] * normal[0] + d[1] * normal[1])
-    at = np.where(by_b, corner_b, corner_a)
-    if len(edges.inner_of):
-        at, normal, closure = _with_inner(edges, at, normal, closure)
-    tangent = np.stack([normal[1], -normal[0]])
-    along = _slide(edges, motion, at, normal, tangent)
-    share = np.maximum(length, 0.0)[edges.of] * edges.weight
-    return Points(at, normal, tangent, closure, share, tilt, along)
+def evaluate(contacts: Contacts, motion: np.ndarray) -> Points:
+    """Law points for a motion (6, n) of the blocks."""
+    c = contacts
+    place, ways = c.outlines.place(motion)
+    at, edge = place[c.corner], ways[c.edge]
+    frame = edge.conj()
+    here = (at - place[c.edge]) * frame  # in the frame of the edge: its block is on the left
+    side = ways[c.sides] * (-_AHEAD * frame)
+    rest = c.ends - here
+    both = _AHEAD + side
+    mean = both / np.maximum(np.abs(both), 1e-9)
+    rise, level = -side.imag, _AHEAD * side.real
+    overlap, pull, twist = _overlaps(rest, c.size * side, mean, c.soft)
+    length, pull, twist = _lengths(c, rise, level, overlap, pull, twist)
+    # Behind a corner its edge ends at another corner. Of what follows there, a side of this corner
+    # or the next edge of the other block, the one that is turned less is next; the limit is where
+    # both are equally deep. The raised end of an edge on an edge has its side next.
+    own = (_AHEAD * (side.conj() * c.following).imag <= 0) | (rise[::-1] < 0)
+    toward = np.where(own, both, _AHEAD + c.following)
+    inside = -(rest[::-1] * toward.conj()).real
+    inside *= np.where(own, np.abs(rise) + LEVEL, 1.0)
+    normal, closure, pull = c.sign * (-1j * edge), here.imag, pull * edge
+    if c.between is not None:
+        more = interpolate(c.between, place, ways, c.soft)
+        at, normal, closure, length, pull, twist = (
+            np.concatenate(pair)
+            for pair in zip((at, normal, closure, length, pull, twist), more, strict=True)
+        )
+    v = _velocity(motion, c.b, at) - _velocity(motion, c.a, at)
+    v *= normal.conj()
+    return Points(
+        at, normal, closure, length, pull, twist, v.real, -v.imag, rise, overlap, inside, own
+    )
 
 
-def place_corners(local: np.ndarray, block: np.ndarray, motion: np.ndarray) -> np.ndarray:
-    """Corners (2, k), given from the centroids, in the places where their blocks are."""
-    c, s = np.cos(motion[2])[block], np.sin(motion[2])[block]
-    x = motion[:2, block]
-    x[0] += c * local[0] - s * local[1]
-    x[1] += s * local[0] + c * local[1]
-    return x
+def _overlaps(rest, whole, mean, soft):
+    """Overlap of each side with the edge (2, k), measured along the mean of both so that the blocks
+    may trade roles; its derivatives by motion of the corner's block relative to the edge's.
+
+    It runs from the corner or from what lies behind it, whichever comes later, to where the edge
+    or the side ends, whichever comes first; within `soft` (m) of a tie the choice is gradual.
+    """
+    along = mean.conj()
+    rest, whole = rest * along, whole * along
+    back = rest[::-1] * (along * mean[::-1])
+    size, slope = soft_size(rest.real - whole.real, soft)
+    step, rate = soft_size(back.real, soft)
+    overlap = 0.5 * (rest.real + whole.real - size - back.real - step)
+    by_edge, by_end = 0.5 - 0.5 * slope, -0.5 - 0.5 * rate
+    twist = by_edge * (rest.imag + whole.imag) + by_end * back.imag - whole.imag
+    return overlap, -(by_edge + by_end) * mean, 0.5 * twist
 
 
-def _with_inner(edges, at, normal, closure):
-    """Add the points between the ends, by linear interpolation."""
-    lo, hi = edges.inner_of, edges.inner_of + len(edges.first)
-    f = edges.inner_at
-    between = (1 - f) * normal[:, lo] + f * normal[:, hi]
-    between /= np.sqrt(between[0] ** 2 + between[1] ** 2)
-    at = np.concatenate([at, (1 - f) * at[:, lo] + f * at[:, hi]], axis=1)
-    closure = np.concatenate([closure, (1 - f) * closure[lo] + f * closure[hi]])
-    return at, np.concatenate([normal, between], axis=1), closure
+def _lengths(c, rise, level, overlap, pull, twist):
+    """Length of joint at the corners, with its derivatives by motion of block b relative to a."""
+    up = rise > 0
+    gone, bend = raised(rise, level)
+    held = np.maximum(overlap, 0.0)
+    lies = c.share * (1 - gone) * (overlap > 0)
+    stands = gone * up
+    length = (lies * held).sum(axis=0) + c.corner_length * stands[0] * stands[1]
+    # The tilt of the first side falls as the corner's block turns, that of the second rises.
+    by_tilt = c.corner_length * up * stands[::-1] - c.share * held * np.sign(rise)
+    twist = (lies * twist - _AHEAD * bend * by_tilt).sum(axis=0)
+    return length, c.sign * (lies * pull).sum(axis=0), c.sign * twist
 
 
-def _slide(edges, motion, at, normal, tangent):
-    """Relative velocity of B to A at the points, along normal and tangent."""
-    A, B = motion[:, edges.a], motion[:, edges.b]
-    u = B[3] - A[3] - B[5] * (at[1] - B[1]) + A[5] * (at[1] - A[1])
-    v = B[4] - A[4] + B[5] * (at[0] - B[0]) - A[5] * (at[0] - A[0])
-    return np.stack([u * normal[0] + v * normal[1], u * tangent[0] + v * tangent[1]])
+def _velocity(motion, block, at):
+    x, y, _, u, v, spin = motion
+    return (u + 1j * v)[block] + 1j * spin[block] * (at - (x + 1j * y)[block])
 
 
 class Assembly:
     """Sums forces at the law points into forces and torques of the blocks."""
 
-    def __init__(self, edges: Edges, blocks: int) -> None:
-        self.edges, self.blocks = edges, blocks
-        one = np.concatenate([3 * edges.a, 3 * edges.b])
+    def __init__(self, a: np.ndarray, b: np.ndarray, blocks: int) -> None:
+        self.a, self.b, self.blocks = a, b, blocks
+        one = np.concatenate([3 * a, 3 * b])
         self._slot = np.concatenate([one, one + 1, one + 2])
 
-    def __call__(self, points: Points, push: np.ndarray, drag: np.ndarray) -> np.ndarray:
-        """Forces (n, 3) on the blocks; B is pushed by `push` along the normal, `drag` along the
-        tangent (N), A by the opposite at the same place."""
-        fx = push * points.normal[0] + drag * points.tangent[0]
-        fy = push * points.normal[1] + drag * points.tangent[1]
-        return np.bincount(
-            self._slot, np.concatenate(self._parts(points.at, fx, fy)), 3 * self.blocks
-        ).reshape(-1, 3)
-
-    def _parts(self, at, fx, fy):
-        xa, xb = self.centre_a, self.centre_b
-        return (
-            -fx, fx, -fy, fy,
-            (at[1] - xa[1]) * fx - (at[0] - xa[0]) * fy,
-            (at[0] - xb[0]) * fy - (at[1] - xb[1]) * fx,
-        )  # fmt: skip
+    def __call__(self, points: Points, push, drag, energy=None) -> np.ndarray:
+        """Forces (n, 3) on the blocks; b is pushed by `push` along the normal, `drag` in the sense
+        of sliding (N), a by the opposite at the same place; energy (J/m): stored per length."""
+        force, couple = (push - 1j * drag) * points.normal, 0.0
+        if energy is not None:
+            force -= energy * points.pull
+            couple = energy * points.twist
+        arms = (points.at - self.centre_a).conj(), (points.at - self.centre_b).conj()
+        x, y = force.real, force.imag
+        on_a, on_b = (arms[0] * force).imag, (arms[1] * force).imag
+        parts = np.concatenate([-x, x, -y, y, couple - on_a, on_b - couple])
+        return np.bincount(self._slot, parts, 3 * self.blocks).reshape(-1, 3)
 
     def move(self, motion: np.ndarray) -> None:
         """Take the centroids from which torques are counted."""
-        self.centre_a, self.centre_b = motion[:2, self.edges.a], motion[:2, self.edges.b]
+        centre = motion[0] + 1j * motion[1]
+        self.centre_a, self.centre_b = centre[self.a], centre[self.b]

@@ -116,6 +116,31 @@ class Joints:
         """Normal stress (Pa) of virgin joints at a closure (m)."""
         return self._per_law("virgin_stress", closure)
 
+    def work_at(self, i: int, closure: float) -> float:
+        """Work (J/m2) that joint i, were it virgin, takes up to a closure (m)."""
+        curve = self.curves[self._law(i)[0]]
+        return float(np.interp(closure, curve.closure, curve.work))
+
+    def closure_at_work(self, i: int, work: float) -> float:
+        """Closure (m) that joint i, were it virgin, has taken up `work` (J/m2) at."""
+        curve = self.curves[self._law(i)[0]]
+        return float(np.interp(work, curve.work, curve.closure))
+
+    def forget(self, i: int) -> None:
+        """Make joint i virgin again."""
+        name, slot = self._law(i)
+        self.batches[name].reset(np.array([slot]))
+        self.measure()
+
+    def _law(self, i: int) -> tuple[str, int]:
+        """Name of the law of joint i, and its slot there."""
+        for name, rows, where in self.groups:
+            at = np.arange(self.n)[rows]
+            if i in at:
+                place = int(np.searchsorted(at, i))
+                return name, place if where is None else int(where[place])
+        raise IndexError(f"there is no joint {i}: {self.n} joints")
+
     def _per_law(self, method: str, x: np.ndarray) -> np.ndarray:
         out = np.empty(self.n)
         for name, rows, _ in self.groups:

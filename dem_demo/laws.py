@@ -45,7 +45,8 @@ def load_state(law, path):
 
 @dataclass(frozen=True)
 class StiffnessCurve:
-    """Upper bound of a law's stiffness (Pa/m) against normal stress (Pa) and closure (m).
+    """Upper bound of a law's stiffness (Pa/m) against normal stress (Pa) and closure (m), and the
+    work (J/m2) that a virgin joint takes up to a closure.
 
     At a given normal stress the unsheared joint is the stiffest one (Phi' is a concave function of
     Phi), so the virgin curve bounds the sheared joint as well.
@@ -54,13 +55,18 @@ class StiffnessCurve:
     closure: np.ndarray
     stress: np.ndarray
     stiffness: np.ndarray
+    work: np.ndarray
 
     @classmethod
     def of(cls, law) -> StiffnessCurve:
         """Tabulate a law from no closure to 20 MPa."""
         top = float(law.closure(20e6))
         closure = np.concatenate([[0.0], np.geomspace(1e-6 * top, top, 400)])
-        return cls(closure, law.normal_stress(closure), law.max_stiffness(closure))
+        stress = law.normal_stress(closure)
+        work = np.concatenate(
+            [[0.0], np.cumsum(0.5 * (stress[1:] + stress[:-1]) * np.diff(closure))]
+        )
+        return cls(closure, stress, law.max_stiffness(closure), work)
 
     def at_stress(self, stress: np.ndarray) -> np.ndarray:
         """Stiffness (Pa/m) at a normal stress; 0 for an open joint."""

@@ -16,7 +16,7 @@ from PIL import Image
 from .record import Record
 from .shapes import turn
 
-CLOSURE, SHEAR, STRESS, TAU, SLIDING, SLIPPING, SEPARATED, LENGTH = range(8)
+CLOSURE, SHEAR, STRESS, TAU, SLIDING, SLIPPING, SEPARATED, LENGTH, RATE = range(9)
 FIXED, DRIVEN, FREE, OPEN, SLIDES = "#8d8d8d", "#b9b4a7", "#efe9dc", "#1f9ed1", "#d81b1b"
 MAP = "viridis"
 FRAMES = 60  # most frames of an animation
@@ -33,7 +33,7 @@ class Scale:
         firm = angle[closed[:, STRESS] > 0.02 * self.stress]
         top = max(5.0, np.ceil(float(firm.max(initial=0.0)) / 5 - 1e-6) * 5)
         self.angle = Normalize(0.0, top)
-        corners = np.concatenate([_outline(record, i, b) for i in frames for b in _all(record)])
+        corners = np.concatenate([outline(record, i, b) for i in frames for b in _all(record)])
         self.low, self.high = corners.min(axis=0), corners.max(axis=0)
         self.size = float(max(self.high - self.low))
 
@@ -41,16 +41,20 @@ class Scale:
         """Line width (points) of a normal stress (Pa)."""
         return 0.8 + 8.0 * np.clip(np.asarray(stress) / self.stress, 0, 1.2)
 
+    def marks(self) -> np.ndarray:
+        """Two round stresses (Pa) for a legend."""
+        return _round(self.stress) * np.array([0.25, 1.0])
+
 
 def draw(axes, record: Record, i: int, scale: Scale) -> None:
     """The blocks and joints of frame i."""
     blocks = record.scene.blocks
-    start = [_outline(record, 0, b) for b in _all(record) if not blocks[b].fixed]
+    start = [outline(record, 0, b) for b in _all(record) if not blocks[b].fixed]
     axes.add_collection(
         PolyCollection(start, facecolors="none", edgecolors="0.6", linestyles=":", linewidths=0.8)
     )
     colours = [FIXED if b.fixed else DRIVEN if len(b.held) > 1 else FREE for b in blocks]
-    shapes = [_outline(record, i, b) for b in _all(record)]
+    shapes = [outline(record, i, b) for b in _all(record)]
     axes.add_collection(
         PolyCollection(shapes, facecolors=colours, edgecolors="0.35", linewidths=0.7)
     )
@@ -104,7 +108,7 @@ def frame_figure(record: Record, i: int, scale: Scale, dpi: int, note: str = "")
     bar.set_label("mobilised friction angle (degrees)", fontsize=9)
     marks = [
         Line2D([], [], color="0.3", lw=scale.width(s), label=f"{s / 1e3:.3g} kPa")
-        for s in _round(scale.stress) * np.array([0.25, 1.0])
+        for s in scale.marks()
     ]
     marks += [
         Line2D([], [], ls="", marker="D", mfc="white", mec=SLIDES, mew=1.6, label="sliding"),
@@ -152,7 +156,7 @@ def final(record: Record, path: Path, slips: list[dict]) -> None:
     frame_figure(record, last, Scale(record, [0, last]), 130, note).savefig(path)
 
 
-def motion(record: Record, path: Path) -> None:
+def motion(record: Record, path: Path, frame=frame_figure) -> None:
     """The whole run as GIF; more frames where more moves (the time stands in every frame)."""
     places = np.array(record.motion)[:, :2]
     moved = np.append(0.0, np.cumsum(np.abs(np.diff(places, axis=0)).max(axis=(1, 2))))
@@ -162,7 +166,7 @@ def motion(record: Record, path: Path) -> None:
     frames = np.unique(np.searchsorted(progress, wanted - 1e-12))
     scale, images = Scale(record, frames), []
     for i in frames:
-        figure = frame_figure(record, i, scale, 75)
+        figure = frame(record, i, scale, 75)
         figure.canvas.draw()
         image = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3])
         images.append(image.quantize(256, dither=Image.Dither.NONE))
@@ -174,7 +178,8 @@ def _all(record: Record) -> range:
     return range(len(record.scene.blocks))
 
 
-def _outline(record: Record, i: int, b: int) -> np.ndarray:
+def outline(record: Record, i: int, b: int) -> np.ndarray:
+    """Corners of block b in frame i."""
     x, y, angle = record.motion[i][:3, b]
     return record.scene.blocks[b].local @ turn(angle).T + [x, y]
 

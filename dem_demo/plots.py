@@ -21,7 +21,7 @@ def energy(record: Record, path: Path) -> None:
     labels = {
         "potential": "potential (gravity)", "work": "work of drives and loads",
         "kinetic": "kinetic", "stored": "stored in joints", "friction": "friction in joints",
-        "dashpots": "dashpots", "area": "changing overlap area",
+        "dashpots": "dashpots", "dropped": "given up",
     }  # fmt: skip
     for number, (name, label) in enumerate(labels.items()):
         top.plot(t, of[name], label=label, color=f"C{number}")

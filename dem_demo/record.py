@@ -8,20 +8,22 @@ from pathlib import Path
 import numpy as np
 
 from .energy import COLUMNS
+from .shapes import turn
 from .simulation import Simulation
+from .stretches import names, stretches
 from .watch import base_angle, joint_state
 
 JOINT_COLUMNS = (
     "closure_m", "shear_m", "normal_stress_Pa", "shear_stress_Pa",
-    "sliding", "slipping", "separated", "length_m",
+    "sliding", "slipping", "separated", "length_m", "sliding_m/s",
 )  # fmt: skip
 
 
 class Record:
     """Frames of a run: times (f,), motion (f, 6, n), energies (f, 8), joints as lists of arrays.
 
-    joints[f]: "who" (k, 5) block, edge, block, edge, place; "ends" (k, 2, 2) the stretch of joint
-    that a law point carries; "values" (k, 8) as JOINT_COLUMNS.
+    joints[f]: "who" (k, 5) block, edge, block, edge, point; "ends" (k, 2, 2) the stretch of joint
+    that a law point carries; "values" (k, 9) as JOINT_COLUMNS.
     """
 
     def __init__(self, sim: Simulation) -> None:
@@ -45,6 +47,8 @@ class Record:
                 row[f"{name}: base angle_deg"] = base_angle(sim, base)
                 for key, value in joint_state(sim, moving, base).items():
                     row[f"{name}: {key}_{UNITS[key]}"] = value
+        for i, pin in enumerate(self.scene.watch.get("pins", [])):
+            row[f"pin {i + 1}: moved_m"] = float(np.hypot(*_moved(sim, *pin)))
         self.watched.append(row)
 
     def column(self, name: str) -> np.ndarray:
@@ -74,7 +78,7 @@ class Record:
         )
         _csv(
             folder / "joints.csv",
-            ["time_s", "block_a", "edge_a", "block_b", "edge_b", "place", *JOINT_COLUMNS],
+            ["time_s", "block_a", "edge_a", "block_b", "edge_b", "point", *JOINT_COLUMNS],
             (
                 [t, names[who[0]], who[1], names[who[2]], who[3], who[4], *values]
                 for t, frame in zip(self.times, self.joints, strict=True)
@@ -101,24 +105,25 @@ class Record:
 UNITS = {"normal": "Pa", "shear": "Pa", "closure": "m", "slid": "m", "sliding": "share"}
 
 
+def _moved(sim: Simulation, block: int, point: tuple[float, float]) -> np.ndarray:
+    """Displacement (m) of a point of a block since it was drawn."""
+    x, y, angle = sim.motion[:3, block]
+    arm = np.asarray(point) - sim.scene.blocks[block].centroid
+    return turn(angle) @ arm + [x, y] - point
+
+
 def _joints(sim: Simulation) -> dict[str, np.ndarray]:
     """Joints that touch or almost touch."""
-    points, edges, m = sim.points, sim.edges, len(sim.edges.first)
-    keep = points.length > 0
+    points, keep = sim.points, sim.points.length > 0
     delta, now = sim.joints.read("delta"), sim.joints.now
-    along = (points.at[:, m : 2 * m] - points.at[:, :m])[:, edges.of]
-    # The stretch of joint that a law point stands for: half at the ends, whole between.
-    at, w = points.at, edges.weight
-    before = np.where(np.arange(len(w)) < m, 0.0, np.where(np.arange(len(w)) < 2 * m, w, 0.5 * w))
-    ends = np.stack([at - before * along, at + (w - before) * along], axis=0)
-    who = np.array([[*key, place] for key, place in sim.identity], int).reshape(-1, 5)
+    who = names(sim.contacts, points, [number for _, number in sim.identity])
     values = np.column_stack(
         [points.closure, delta[:, 1], *sim.traction.T, now["sliding"], now["slipping"],
-         now["separated"], points.length]
+         now["separated"], points.length, points.sliding]
     )  # fmt: skip
     return {
         "who": who[keep],
-        "ends": np.moveaxis(ends, 2, 0)[keep],
+        "ends": stretches(sim.contacts, points, sim.motion)[keep],
         "values": values[keep],
     }
 

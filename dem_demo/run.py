@@ -9,9 +9,10 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from . import picture, plots
+from . import picture, plots, report
 from .energy import COLUMNS
 from .interfaces import Refused
+from .outcome import outcomes
 from .record import Record
 from .simulation import Simulation
 from .watch import EVERY, Watch
@@ -60,6 +61,7 @@ def run(sim: Simulation, folder: Path | None = None, until: float | None = None,
         "energy_error": sim.ledger.error,
         "largest_energy_error": worst,
         "slip": watch.report(),
+        "rocks": outcomes(record),
         "wall_time_s": wall,
     }
     if folder:
@@ -74,8 +76,12 @@ def write(record: Record, summary: dict, folder: Path, pictures: bool) -> None:
     record.write(folder)
     (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
     if pictures:
-        picture.final(record, folder / "final.png", summary["slip"])
         plots.energy(record, folder / "energy.png")
-        if record.watched[0]:
+        if record.scene.watch.get("slip") or record.scene.watch.get("shear"):
             plots.curves(record, folder / "curves.png", summary["slip"])
-        picture.motion(record, folder / "motion.gif")
+        if record.scene.rocks:
+            report.report(record, folder / "report.png")
+            picture.motion(record, folder / "motion.gif", report.frame)
+        else:
+            picture.final(record, folder / "final.png", summary["slip"])
+            picture.motion(record, folder / "motion.gif")

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from .drives import AXES, Back, Drive
+from .drives import AXES, Drive, read_drives
 from .laws import build_law
+from .rocks import Rock, read_rocks
 from .shapes import Block, box, check_convex
 from .tables import SceneError, Table
 
@@ -32,6 +33,7 @@ class Run:
     largest_stress: float = 0.0  # Pa, expected in impacts: sets the step before anything touches
     skin: float | None = None  # reach of the search for contacts; default 0.02 of the least width
     point_spacing: float = np.inf  # largest distance of law points along a joint
+    corner_length: float | None = None  # of a corner on an edge; default 0.1 of the least width
     max_overlap: float = 0.03  # share of the smaller block's width
 
 
@@ -45,6 +47,8 @@ class Scene:
     run: Run
     default_law: str
     pairs: dict[frozenset, str] = field(default_factory=dict)
+    rocks: tuple[Rock, ...] = ()
+    edge_laws: dict[tuple[int, int], str] = field(default_factory=dict)
     drives: tuple[Drive, ...] = ()
     gravity: tuple[float, float] = (0.0, -9.81)
     thickness: float = 1.0
@@ -52,8 +56,18 @@ class Scene:
     text: str = ""
 
     def law_of(self, key: tuple[int, int, int, int]) -> str:
-        """Name of the law of an interface (block, edge, block, edge)."""
-        return self.pairs.get(frozenset((key[0], key[2])), self.default_law)
+        """Name of the law of an interface (block, edge, block, edge).
+
+        The law of a [[joint]] table if one names the blocks; else that of the joint set that cut
+        both edges; else the scene's.
+        """
+        one, other = key[0], key[2]
+        for blocks in ((one, other), (one,), (other,)):
+            if law := self.pairs.get(frozenset(blocks)):
+                return law
+        law = self.edge_laws.get((one, key[1]))
+        same = law is not None and law == self.edge_laws.get((other, key[3]))
+        return law if same else self.default_law
 
 
 def names() -> list[str]:
@@ -79,6 +93,11 @@ def parse(text: str, where: str = "scene") -> Scene:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise SceneError(f"{where} is not valid TOML: {error}") from None
+    return build(data, where, text)
+
+
+def build(data: dict[str, Any], where: str = "scene", text: str = "") -> Scene:
+    """A scene from the tables of its file; `text` is kept for states saved to files."""
     top = Table(data, where)
     laws = {}
     for name, table in top.take("laws", dict, say="give at least one [laws.NAME] table").items():
@@ -89,14 +108,18 @@ def parse(text: str, where: str = "scene") -> Scene:
     default = top.take("law", str, next(iter(laws), ""))
     thickness = top.take("thickness", float, 1.0, above=0)
     density = top.take("density", float, 2600.0, above=0)
-    tables = top.take("block", list, say="give [[block]] tables")
+    tables = top.take("block", list, [])
     blocks = [_block(Table(t, f"{where}.block[{i}]"), density) for i, t in enumerate(tables)]
+    cut, rocks = read_rocks(top.take("rock", list, []), where, density, len(blocks))
+    blocks += cut
+    if not blocks:
+        raise SceneError(f"{where}: no blocks; give [[block]] or [[rock]] tables")
     number = {block.name: i for i, block in enumerate(blocks)}
     if len(number) < len(blocks):
         raise SceneError(f"{where}.block: two blocks have the same name; names must differ")
     if all(block.fixed for block in blocks):
         raise SceneError(f"{where}.block: all blocks are fixed; at least one must be free to move")
-    drives = _drives(top, where, number, blocks)
+    drives = read_drives(top, where, number, blocks)
     run = _run(Table(top.take("run", dict, say="give a [run] table with `end`"), f"{where}.run"))
     scene = Scene(
         title=top.take("title", str, where),
@@ -104,15 +127,17 @@ def parse(text: str, where: str = "scene") -> Scene:
         laws=laws,
         run=run,
         default_law=default,
-        pairs=_pairs(top, where, number),
+        pairs=_pairs(top, where, number, blocks),
+        rocks=tuple(rocks),
+        edge_laws={edge: law for rock in rocks for edge, law in rock.laws.items()},
         drives=drives,
         gravity=top.vector("gravity", (0.0, -9.81)),
         thickness=thickness,
-        watch=_watch(top, where, number),
+        watch=_watch(top, where, number, blocks),
         text=text,
     )
     top.finish()
-    for law in [default, *scene.pairs.values()]:
+    for law in [default, *scene.pairs.values(), *scene.edge_laws.values()]:
         if law not in laws:
             raise SceneError(f"{where}: law {law!r} is not among [laws]: {', '.join(laws)}")
     return scene
@@ -150,63 +175,36 @@ def _block(table: Table, density: float) -> Block:
     return block
 
 
-def _drives(top: Table, where: str, number: dict[str, int], blocks: list[Block]):
-    out = [
-        Drive(i, AXES[axis], (0.0,), (0.0,), 0.0) for i, b in enumerate(blocks) for axis in b.held
-    ]
-    for n, data in enumerate(top.take("drive", list, [])):
-        table = Table(data, f"{where}.drive[{n}]")
-        block, motion = table.take("block", str), table.take("motion", str)
-        if block not in number or blocks[number[block]].fixed:
-            raise SceneError(
-                f"{table.path('block')} = {block!r}: must be a block that is not fixed"
-            )
-        if motion not in AXES:
-            raise SceneError(f"{table.path('motion')} = {motion!r}: must be x, y or turn")
-        times, values = (np.array(table.take(key, list), float) for key in ("times", "values"))
-        if len(times) != len(values) or len(times) < 1 or (np.diff(times) <= 0).any():
-            raise SceneError(f"{table.path('times')}: must increase, one for each of `values`")
-        unit = np.pi / 180 if motion == "turn" else 1.0
-        ease = table.take("ease", float, 0.1, least=0)
-        way = tuple(times), tuple(unit * values)
-        back = _way_back(table, number, unit)
-        out.append(Drive(number[block], AXES[motion], *way, ease, back))
-        table.finish()
-    moved = [(d.block, d.axis) for d in out]
-    if len(set(moved)) < len(moved):
-        raise SceneError(f"{where}.drive: a motion of a block is prescribed twice")
-    return tuple(out)
-
-
-def _way_back(table: Table, number: dict[str, int], unit: float) -> Back | None:
-    if not (data := table.take("back", dict, {})):
-        return None
-    back = Table(data, table.path("back"))
-    block = back.take("block", str)
-    if block not in number:
-        raise SceneError(f"{back.path('block')} = {block!r}: no such block")
-    slid = back.take("slid", float, above=0, say="m")
-    by, rate = (back.take(key, float, above=0) * unit for key in ("by", "rate"))
-    back.finish()
-    return Back(number[block], slid, by, rate)
-
-
 def _hold(block: Block, number: int, drives) -> Block:
     name = {value: key for key, value in AXES.items()}
     held = tuple(name[d.axis] for d in drives if d.block == number)
     return Block(**{**block.__dict__, "held": held})
 
 
-def _pairs(top: Table, where: str, number: dict[str, int]) -> dict[frozenset, str]:
+def _pairs(top: Table, where: str, number: dict[str, int], blocks) -> dict[frozenset, str]:
+    """Laws named by [[joint]] tables, for two blocks or for all joints of one."""
     pairs = {}
     for n, data in enumerate(top.take("joint", list, [])):
         table = Table(data, f"{where}.joint[{n}]")
-        between = table.take("between", list)
+        if "around" in data:
+            point = table.vector("around")
+            block = _block_at(point, blocks, table.path("around"))
+            pairs[frozenset([block])] = table.take("law", str)
+            table.finish()
+            continue
+        between = table.take("between", list, say="or give `around`, a point of one block")
         if len(between) != 2 or not set(between) <= set(number):
             raise SceneError(f"{table.path('between')} = {between}: must name two blocks")
         pairs[frozenset(number[b] for b in between)] = table.take("law", str)
         table.finish()
     return pairs
+
+
+def _block_at(point, blocks, path: str) -> int:
+    for i, block in enumerate(blocks):
+        if not block.fixed and block.holds(point):
+            return i
+    raise SceneError(f"{path} = {list(point)}: must lie inside a block that can move")
 
 
 def _run(table: Table) -> Run:
@@ -222,6 +220,7 @@ def _run(table: Table) -> Run:
         largest_stress=table.take("largest_stress", float, Run.largest_stress, least=0, say="Pa"),
         skin=table.take("skin", float, None, above=0, say="m"),
         point_spacing=table.take("point_spacing", float, Run.point_spacing, above=0, say="m"),
+        corner_length=table.take("corner_length", float, None, above=0, say="m"),
         max_overlap=table.take("max_overlap", float, Run.max_overlap, above=0),
     )
     table.finish()
@@ -230,8 +229,8 @@ def _run(table: Table) -> Run:
     return run
 
 
-def _watch(top: Table, where: str, number: dict[str, int]) -> dict[str, list]:
-    """Joints to report on, as pairs of block numbers (moving, base)."""
+def _watch(top: Table, where: str, number: dict[str, int], blocks) -> dict[str, list]:
+    """Joints to report on, as pairs of block numbers (moving, base); pins as (block, point)."""
     table, out = Table(top.take("watch", dict, {}), f"{where}.watch"), {}
     for kind in ("slip", "shear"):
         out[kind] = []
@@ -239,5 +238,8 @@ def _watch(top: Table, where: str, number: dict[str, int]) -> dict[str, list]:
             if not (isinstance(pair, list) and len(pair) == 2 and set(pair) <= set(number)):
                 raise SceneError(f"{table.path(kind)}: {pair!r} must be [moving block, its base]")
             out[kind].append((number[pair[0]], number[pair[1]]))
+    places = table.take("pins", list, [])
+    pins = [Table({"pins": point}, table.where).vector("pins") for point in places]
+    out["pins"] = [(_block_at(point, blocks, table.path("pins")), point) for point in pins]
     table.finish()
     return out

@@ -64,6 +64,11 @@ class Block:
         """Distance (m) from the centroid to the farthest corner."""
         return float(np.hypot(*self.local.T).max())
 
+    def holds(self, point) -> bool:
+        """Is a point (m) inside the block?"""
+        edge = np.roll(self.corners, -1, axis=0) - self.corners
+        return bool((_cross(edge, np.asarray(point) - self.corners) > 0).all())
+
 
 def box(width: float, height: float, at=(0.0, 0.0), angle: float = 0.0) -> np.ndarray:
     """Corners of a box centred at `at`, turned by `angle` (degrees)."""

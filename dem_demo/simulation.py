@@ -9,7 +9,7 @@ import numpy as np
 from . import geometry, states, timestep
 from .drives import Drives
 from .energy import Ledger
-from .interfaces import ANGLE, Interfaces, Refused
+from .interfaces import ROUNDING, Interfaces, Refused
 from .joints import Joints
 from .scene import Scene, parse
 from .start import begin
@@ -17,7 +17,8 @@ from .world import World
 
 HEADROOM = 1.25  # most growth of a joint's stiffness between two checks of the time step
 SAFE = 0.98  # largest time step as a share of the limit
-STEEP = np.sin(1.25 * ANGLE)  # tilt between two edges beyond which they are no joint
+MATCH = 1e-6  # relative: lengths that are equal but for rounding
+CORNER = 0.1  # contact length of a corner as a share of the least block width, by default
 
 
 class Simulation:
@@ -28,7 +29,10 @@ class Simulation:
         width = min(b.width for b in blocks)
         self.skin = run.skin or 0.02 * width
         self.world = World(blocks, scene.thickness, self.skin)
-        self.interfaces = Interfaces(blocks, self.skin, run.point_spacing, run.max_overlap)
+        self.interfaces = Interfaces(
+            blocks, self.skin, run.point_spacing, run.max_overlap,
+            run.corner_length or CORNER * width, scene.law_of,
+        )  # fmt: skip
         self._least_depth = self.interfaces.depth_limit.min()
         self.joints = Joints(scene.laws, scene.law_of)
         self.drives = Drives(scene.drives)
@@ -66,13 +70,15 @@ class Simulation:
         """Forces (n, 3) at the positions just reached; velocities are those that led there."""
         self._require_slow(motion)
         self.motion, self.n = motion, self.n + 1
+        points = self.evaluate(motion, hand_over=True)
         if self.interfaces.stale(motion):
             self._checked = np.zeros(self.joints.n)  # lever arms have changed
-            if self.interfaces.renew(motion, self.world.near):
+            if self.interfaces.renew(motion, self.world.near, pressed=False):
                 self.arrange()
-        points = geometry.evaluate(self.edges, motion)
+            points = self.evaluate(motion)
         self._require_carried(points)
-        d = self.joints.increments(points.closure, points.along[1] * self.dt)
+        closure = self.interfaces.closure(points)
+        d = self.joints.increments(closure, points.sliding * self.dt)
         self.traction = self.joints.update(d, self.scene.run.law_steps)
         forces = self.forces(points, self.dt)
         if (self._stiffness * self.area > self._checked).any():
@@ -82,6 +88,37 @@ class Simulation:
             self.drives.watch(self.time, self.slid)
         self.ledger.step(motion[3:].T, forces, self.dt, *self.joint_energies(points))
         return forces[0]
+
+    def evaluate(self, motion: np.ndarray, hand_over=False) -> geometry.Points:
+        """Law points at a motion (6, n), each at the corner and edge where it is by then."""
+        points = geometry.evaluate(self.interfaces.contacts, motion)
+        if points.inside.min(initial=0.0) < -ROUNDING:
+            before, points = points, self.interfaces.follow(points, motion)
+            if hand_over:
+                self.hand_over(before.length, points)
+        self.contacts = self.interfaces.contacts
+        return points
+
+    def hand_over(self, before: np.ndarray, points: geometry.Points) -> None:
+        """Keep the books where a law point has gone on to a corner of another length (n,) in m.
+
+        Lengths match wherever an edge that lies on another, or a corner of 5 degrees or more, goes
+        on to the same. Else a joint that became shorter drops the rest, and one that became longer
+        is crushed: it starts anew at a closure at which it holds what the shorter one held.
+        """
+        now, thick = self.joints.now, self.scene.thickness
+        held, ratio = now["stored"] * before, points.length / np.maximum(before, 1e-300)
+        for i in np.flatnonzero((np.abs(ratio - 1) > MATCH) & (held > 0)).tolist():
+            length, kept = points.length[i], now["stored"][i]
+            if ratio[i] > 1:
+                most = self.interfaces.closure(points)[i]
+                closure = min(self.joints.closure_at_work(i, held[i] / length), most)
+                self.interfaces.crushed[i] += most - closure
+                kept = self.joints.work_at(i, closure)
+                self.joints.forget(i)
+                self.ledger.e_lost[i] = 0.0
+            self.ledger.value["dropped"] += max(held[i] - kept * length, 0.0) * thick
+            self.area[i] = length * thick
 
     def forces(self, points: geometry.Points, dt: float) -> np.ndarray:
         """(3, n, 3): all forces, those of the dashpots, those of the drives."""
@@ -94,7 +131,7 @@ class Simulation:
         forces = np.empty((3, *self.mobile.shape))
         damped = self.assembly(points, push, drag) if self._damped else 0.0
         forces[1] = damped * self.mobile
-        forces[0] = self.assembly(points, area * stress, -area * shear) + damped
+        forces[0] = self.assembly(points, area * stress, -area * shear, self._energy()) + damped
         forces[0] = (forces[0] + self._steady) * self.mobile
         forces[2] = 0.0
         if len(self.drives.rows):
@@ -109,11 +146,11 @@ class Simulation:
         """Forces of the dashpots along normal and tangent, (k,) each; never a pull."""
         run = self.scene.run
         damping = self._damping()
-        push = np.maximum(-run.dashpot_normal * damping * points.along[0], -pressed)
+        push = np.maximum(-run.dashpot_normal * damping * points.opening, -pressed)
         if not run.dashpot_shear:
             return push, np.zeros(len(push))
         stick = 1.0 - self.joints.now["separated"] - self.joints.now["slipping"]
-        return push, -run.dashpot_shear * damping * np.maximum(stick, 0.0) * points.along[1]
+        return push, -run.dashpot_shear * damping * np.maximum(stick, 0.0) * points.sliding
 
     def _damping(self) -> np.ndarray:
         """Critical damping (k,) in N s/m: 2 sqrt(stiffness times reduced mass), by share."""
@@ -131,11 +168,15 @@ class Simulation:
         """Forces and torques (n, 3) of the joints on the blocks, dashpots left out (N, N m)."""
         stress, shear = self.traction.T
         self.assembly.move(self.motion)
-        return self.assembly(self.points, self.area * stress, -self.area * shear)
+        return self.assembly(self.points, self.area * stress, -self.area * shear, self._energy())
+
+    def _energy(self) -> np.ndarray:
+        """Stored energy (k,) per contact length in J/m: what a change of that length costs."""
+        return self.joints.now["stored"] * self.scene.thickness
 
     def points_between(self, one: int, other: int) -> np.ndarray:
         """Mask (k,) of the law points between two blocks."""
-        a, b = self.edges.a, self.edges.b
+        a, b = self.contacts.a, self.contacts.b
         return ((a == one) & (b == other)) | ((a == other) & (b == one))
 
     def joint_energies(self, points: geometry.Points):
@@ -143,21 +184,23 @@ class Simulation:
         return self.area, self.joints.now["stored"], self.joints.now["lost"]
 
     def arrange(self) -> None:
-        """Joints, masses and books for a new list of edge pairs."""
+        """Joints, masses and books for a new list of law points."""
         before = None
         if getattr(self, "points", None) is not None:
-            before = dict(zip(self.identity, self.area.tolist(), strict=True))
-        self.edges = self.interfaces.edges
+            held = np.stack([self.area, self.area * self.joints.now["stored"]], axis=1)
+            before = dict(zip(self.identity, held.tolist(), strict=True))
+        self.contacts = c = self.interfaces.contacts
         self.identity = self.interfaces.of_points
         self.joints.assign(self.identity)
-        self.assembly = geometry.Assembly(self.edges, len(self.scene.blocks))
-        light = self._lightness[self.edges.a] + self._lightness[self.edges.b]
-        self._share = self.edges.weight / np.where(light > 0, light, np.inf)
+        self.assembly = geometry.Assembly(c.a, c.b, len(self.scene.blocks))
+        light = self._lightness[c.a] + self._lightness[c.b]
+        self._share = c.weight / np.where(light > 0, light, np.inf)
         self._checked = np.zeros(self.joints.n)
         if before is not None:
-            area = np.array([before.get(who, 0.0) for who in self.identity])
+            area = np.array([before.pop(who, [0.0, 0.0])[0] for who in self.identity])
+            self.ledger.value["dropped"] += sum(held for _, held in before.values())
             now = self.joints.now
-            self.ledger.remember(self.ledger.forces, area, now["stored"], now["lost"])
+            self.ledger.remember(self.ledger.forces, area, now["lost"])
 
     # ----------------------------------------------------------------- guards
 
@@ -170,7 +213,7 @@ class Simulation:
         self._stiffness = np.maximum(now, 0.2 * now.max(initial=0.0))
         self.area = np.maximum(area, 0.02 * area.max(initial=0.0))
         self._known = self._stiffness * self.area
-        rows = self.limit.rows(self.edges, points, self.motion)
+        rows = self.limit.rows(self.contacts, points, self.motion)
         run, damping = self.scene.run, self._damping()
         self.step_limit = self.limit(
             rows,
@@ -206,18 +249,11 @@ class Simulation:
     def _require_carried(self, points: geometry.Points) -> None:
         pressed = points.closure * (points.length > 0)
         if pressed.max(initial=0.0) > self._least_depth:
-            a, b, depth = self.edges.a, self.edges.b, self.interfaces.depth_limit
+            a, b, depth = self.contacts.a, self.contacts.b, self.interfaces.depth_limit
             limit = np.minimum(depth[a], depth[b])
             i = int((pressed - limit).argmax())
             if pressed[i] > limit[i]:
                 self.interfaces.refuse_overlap((a[i], b[i]), pressed[i], limit[i])
-        if np.abs(points.tilt).max(initial=0.0) > STEEP:
-            tilted = np.abs(points.tilt)[self.edges.of] > STEEP
-            if (tilted & (pressed > 0)).any():
-                raise Refused(
-                    "edges in contact have turned past 5 degrees from each other: a corner on an "
-                    "edge is not carried; keep blocks closer to parallel or end the run earlier"
-                )
 
     # ------------------------------------------------------------------ states
 

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import geometry, timestep
+from . import timestep
 from .interfaces import Refused
 from .seat import equilibrium
+
+ATTEMPTS = 40  # most rounds of seating
+SETTLED = 1e-10  # movement of a round, as a share of the first, that ends them
 
 
 def begin(sim) -> None:
@@ -19,14 +22,14 @@ def begin(sim) -> None:
     for i, block in enumerate(sim.scene.blocks):
         if not block.fixed:
             sim.motion[3:, i] = [*block.velocity, block.spin]
-    points = geometry.evaluate(sim.edges, sim.motion)
+    points = sim.evaluate(sim.motion)
     sim.traction = sim.joints.update(sim.joints.increments(points.closure, slid))
     sim.check_step(points)
     if not sim.dt:
         sim.dt = _choose_step(sim)
     sim.require_step()
     sim.motion[3:][sim.drives.axes, sim.drives.rows] = sim.drives.velocity(0.0, sim.dt)
-    points = geometry.evaluate(sim.edges, sim.motion)
+    points = sim.evaluate(sim.motion)
     velocity = sim.motion[3:].T
     forces = sim.forces(points, 0.5 * sim.dt)
     sim.ledger.start(velocity, forces, sim.dt, *sim.joint_energies(points))
@@ -37,22 +40,43 @@ def begin(sim) -> None:
 def _seat(sim) -> np.ndarray:
     """Move the blocks to where their joints carry them; the joints' first sliding (m)."""
     slid, free = np.zeros(sim.joints.n), sim.free.ravel()
-    force = ((sim.gravity + sim.loads).ravel() * sim.limit.root)[free]
-    for attempt in range(3):  # each at the places just found: the joints turn with the blocks
-        points = geometry.evaluate(sim.edges, sim.motion)
-        rows = sim.limit.rows(sim.edges, points, sim.motion)
+    settle = np.ones(int(free.sum()), bool)
+    for attempt in range(ATTEMPTS):  # each at the places just found: joints turn with the blocks
+        points = sim.evaluate(sim.motion)
+        if sim.interfaces.renew(sim.motion, sim.world.near):
+            known = dict(zip(sim.identity, slid.tolist(), strict=True))
+            sim.arrange()
+            slid = np.array([known.get(who, 0.0) for who in sim.identity])
+            points = sim.evaluate(sim.motion)
+        force = sim.gravity + sim.loads + (_length_forces(sim, points, slid) if attempt else 0.0)
+        force = (force.ravel() * sim.limit.root)[free]
+        rows = sim.limit.rows(sim.contacts, points, sim.motion)
         area = points.length * sim.scene.thickness
-        moved, further, balanced = equilibrium(sim.joints, rows, points.closure, slid, area, force)
-        if attempt > 0 and not balanced:
-            break  # what was found before is balanced but for the turning of the joints
-        slid, sim.balanced = further, balanced
+        state = points.closure, slid, area, force, settle
+        moved, balanced = equilibrium(sim.joints, rows, *state, near=attempt > 0)
+        if attempt == 0:
+            sim.balanced, first = bool(balanced.all()), np.abs(moved).max()
+        else:  # what was found before is balanced but for the turning of the joints
+            moved = np.where(balanced & settle, moved, 0.0)
+        slid = slid + (rows @ moved)[len(slid) :]
         shift = np.zeros(sim.free.size)
         shift[free] = moved * sim.limit.root[free]
         sim.motion[:3] += shift.reshape(-1, 3).T
-        if not balanced:
+        settle &= balanced
+        if not settle.any() or np.abs(moved).max() < SETTLED * first:
             break
     sim.interfaces.renewed_at = sim.motion[:3].copy()
     return slid
+
+
+def _length_forces(sim, points, slid) -> np.ndarray:
+    """Forces (n, 3) of joints whose length changes as the blocks move, after their first step."""
+    before, none = sim.joints.snapshot(), np.zeros(sim.joints.n)
+    sim.joints.update(sim.joints.increments(points.closure, slid))
+    sim.assembly.move(sim.motion)
+    forces = sim.assembly(points, none, none, sim.joints.now["stored"] * sim.scene.thickness)
+    sim.joints.restore(before, sim.identity)
+    return forces * sim.mobile
 
 
 def _choose_step(sim) -> float:

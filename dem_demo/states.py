@@ -10,19 +10,22 @@ from pathlib import Path
 
 import numpy as np
 
-from . import geometry
 from .energy import COLUMNS
 
 
 def state(sim) -> dict:
     """A copy of everything that the future depends on."""
+    it = sim.interfaces
     arrays = {
         "motion": sim.world.motion(),
-        "renewed_at": sim.interfaces.renewed_at.copy(),
-        "keys": np.array(sim.interfaces.keys, int).reshape(-1, 4),
+        "renewed_at": it.renewed_at.copy(),
+        "corners": np.stack([it.contacts.corner, it.contacts.edge, it.numbers]),
+        "keys": np.array(it.keys, int).reshape(-1, 4),
+        "crushed": it.crushed.copy(),
+        "overlaps": np.array(it.overlaps, int).reshape(-1, 4),
+        "given": np.array(it.given),
         "forces": sim.ledger.forces.copy(),
         "area": sim.ledger.area.copy(),
-        "e_stored": sim.ledger.e_stored.copy(),
         "e_lost": sim.ledger.e_lost.copy(),
         "ledger": np.array([*(sim.ledger.value[c] for c in COLUMNS), sim.ledger.total0]),
         "turned_at": sim.drives.turned_at.copy(),
@@ -39,8 +42,11 @@ def restore(sim, state: dict, step: float | None = None) -> None:
     sim.drives.turned_at = a["turned_at"].copy()
     if step:
         sim.t0, sim.n, sim.dt = sim.time, 0, step
-    sim.interfaces.adopt([tuple(k) for k in a["keys"].tolist()])
-    sim.interfaces.renewed_at = a["renewed_at"].copy()
+    keys, overlaps = ([tuple(k) for k in a[what].tolist()] for what in ("keys", "overlaps"))
+    corner, edge, numbers = a["corners"].copy()
+    crushed, given = a["crushed"].copy(), int(a["given"])
+    sim.interfaces.adopt(corner, edge, keys, numbers, crushed, overlaps, given)
+    sim.interfaces.renewed_at, sim.interfaces.urgent = a["renewed_at"].copy(), False
     sim.points = None
     sim.joints.restore(state["joints"], sim.interfaces.of_points)
     sim.arrange()
@@ -49,8 +55,10 @@ def restore(sim, state: dict, step: float | None = None) -> None:
     sim.area = a["area"].copy()
     sim.ledger.value = dict(zip(COLUMNS, a["ledger"].tolist(), strict=False))
     sim.ledger.total0 = float(a["ledger"][-1])
-    sim.ledger.remember(a["forces"].copy(), sim.area, a["e_stored"].copy(), a["e_lost"].copy())
-    sim.points = geometry.evaluate(sim.edges, sim.motion)
+    sim.ledger.remember(a["forces"].copy(), sim.area, a["e_lost"].copy())
+    sim.points = sim.evaluate(sim.motion)
+    if step:  # velocities are half a step ahead of the places: of the new step
+        sim.motion[3:] += 0.5 * (step - a["clock"][2]) * (a["forces"][0] / sim.inertia * sim.free).T
     sim.world.place(sim.motion)
 
 

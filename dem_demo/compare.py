@@ -1,0 +1,142 @@
+"""The rocks of a scene one by one: for several seeds, with their own laws and with plain Coulomb.
+
+Plain Coulomb has the friction of the asperities themselves, the same in all directions, and
+stiffnesses like those of the joint at half the height of the rock. What it lacks is dilation,
+hardening and direction: the difference between the two runs is what these do.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+import tomllib
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from .interfaces import Refused
+from .laws import build_law
+from .outcome import outcomes
+from .record import Record
+from .scene import build
+from .shapes import turn
+from .simulation import Simulation
+
+FAR = 1.0  # m: a rock whose blocks have moved farther has failed, and need not go on
+
+
+def compare(
+    text: str, where: str, seeds: Sequence[int], until: float, tilt: float = 0.0
+) -> Iterator[dict]:
+    """Run every rock of a scene's text for each seed and each kind of law; yields outcomes.
+
+    until: model time to stop at (s); tilt: angle by which gravity is turned towards +x (degrees).
+    """
+    for case, data in _cases(text, seeds):
+        yield {**case, **_run(_tilted(data, tilt), where, until)}
+
+
+def critical_tilts(text: str, where: str, seeds: Sequence[int]) -> Iterator[dict]:
+    """For the same cases the turn of gravity (degrees) beyond which no balance is found.
+
+    Found by bisection to 0.1 degrees on the seating of the blocks, without running them; None
+    if it is beyond 60 degrees either way.
+    """
+    for case, data in _cases(text, seeds):
+        rock = data["rock"][0]["name"]
+        yield {**case, "rock": rock, "critical_tilt": _bisect(data, where)}
+
+
+def _bisect(data: dict[str, Any], where: str) -> float | None:
+    def holds(tilt: float) -> bool:
+        return Simulation(build(_tilted(data, tilt), where)).balanced
+
+    step, low, high = 8.0, 0.0, 0.0
+    way = 1.0 if holds(0.0) else -1.0
+    while holds(high) == (way > 0):
+        low, high = high, high + way * step
+        if abs(high) > 60:
+            return None
+    while abs(high - low) > 0.1:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if holds(middle) == (way > 0) else (low, middle)
+    return 0.5 * (low + high)
+
+
+def _cases(text: str, seeds: Sequence[int]) -> Iterator[tuple[dict, dict[str, Any]]]:
+    """Every rock alone, for each seed and kind of law: what it is, and the scene's tables."""
+    data = tomllib.loads(text)
+    for rock in _whole(data["rock"]):
+        joints = [j for j in data.get("joint", []) if _belongs(j, rock)]
+        for seed in seeds:
+            alone = {**data, "rock": [{**rock, "seed": seed}], "watch": {}, "joint": joints}
+            yield {"law": "joint", "seed": seed}, alone
+            plain = {name: _plain(law, rock, data) for name, law in data["laws"].items()}
+            run = {**data["run"], "max_overlap": 0.1}  # constant springs are soft in impacts
+            yield {"law": "coulomb", "seed": seed}, {**alone, "laws": plain, "run": run}
+
+
+def _tilted(data: dict[str, Any], tilt: float) -> dict[str, Any]:
+    gravity = turn(np.radians(tilt)) @ data.get("gravity", [0.0, -9.81])
+    return {**data, "gravity": gravity.tolist()}
+
+
+def _run(data: dict[str, Any], where: str, until: float) -> dict:
+    started = time.perf_counter()
+    sim, trouble = Simulation(build(data, where)), ""
+    record = Record(sim)
+    record.take(sim)
+    every = max(round(sim.scene.run.record / sim.dt), 1)
+    steps, worst = round(until / sim.dt), 0.0
+    try:
+        for i in tqdm(range(1, steps + 1), leave=False, disable=not sys.stderr.isatty()):
+            sim.step()
+            if i % every == 0 or i == steps:
+                record.take(sim)
+                worst = max(worst, abs(sim.ledger.error))
+                moved = np.hypot(*(record.motion[-1] - record.motion[0])[:2])
+                if moved.max() > FAR:
+                    break
+    except Refused as error:
+        trouble = str(error)
+    (outcome,) = outcomes(record)
+    return {
+        **outcome,
+        "time_s": sim.time,
+        "steps": sim.n,
+        "largest_energy_error": worst,
+        "refused": trouble,
+        "wall_time_s": time.perf_counter() - started,
+    }
+
+
+def _whole(tables: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The [[rock]] tables with what they are `like` filled in."""
+    known: dict[str, dict[str, Any]] = {}
+    for table in tables:
+        known[table["name"]] = {**known.get(table.get("like", ""), {}), **table, "like": ""}
+    return list(known.values())
+
+
+def _belongs(joint: dict[str, Any], rock: dict[str, Any]) -> bool:
+    if "around" not in joint:
+        return False
+    low, high = np.quantile(np.add(rock["outline"], rock.get("at", [0, 0])), [0, 1], axis=0)
+    return bool((low < joint["around"]).all() and (joint["around"] < high).all())
+
+
+def _plain(table: dict[str, Any], rock: dict[str, Any], data: dict[str, Any]) -> dict[str, Any]:
+    if table.get("kind", "joint") == "coulomb":
+        return table
+    height = np.ptp(np.array(rock["outline"], float)[:, 1])
+    stress = 0.5 * data.get("density", 2600.0) * np.hypot(*data.get("gravity", (0, -9.81))) * height
+    law = build_law(table, "law")
+    stiffness = float(stress / law.closure(stress))
+    return {
+        "kind": "coulomb",
+        "normal_stiffness": stiffness,
+        "shear_stiffness": stiffness / law.asperity.lam,
+        "friction": law.asperity.mu,
+    }

@@ -194,7 +194,8 @@ def test_failed_runs_are_resumed_with_a_smaller_step(tmp_path, capsys, height, s
     file.write_text(text.replace("STEP", str(step)))
     assert main([str(file), "--no-pictures", "--out", str(out)]) == 2
     said = capsys.readouterr().err
-    assert re.search(why, said) and str(out / "refused") in said
+    assert re.search(why, said)
+    assert str(out / "refused") in said
     assert re.search(why, (out / "refused/why.txt").read_text())
     words = ["resume", str(out / "refused"), "--step", "1e-4", "--no-pictures", "--out", str(more)]
     assert main(words) == 0

@@ -35,7 +35,7 @@ def reference_resolution(law: JointLaw) -> Resolution:
     """The resolution whose tractions count as exact: steep facets (small a) need the most of it."""
     if law.heights is None and law.asperity.eta == 0.0:  # one spring, whose slip has a sharp onset
         return Resolution(64, 48, 1)
-    return Resolution(math.ceil(6 + 32 / law.orientation.a), 12, 36)
+    return Resolution(math.ceil(6 + 32 / law.orientation.a), 16, 36)
 
 
 def scaled(r: Resolution, share: float) -> Resolution:

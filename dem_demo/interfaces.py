@@ -253,8 +253,8 @@ class Interfaces:
         one, other = (self.blocks[n].name for n in pair)
         raise Refused(
             f"blocks {one!r} and {other!r} overlap by {depth:.3g} m: must stay below {limit:.3g} m "
-            "(a share of the smaller block's width); use stiffer joints, lower loads or speeds, or "
-            "a larger run.max_overlap"
+            "(a share of the smaller block's width); resume with a smaller step, or use stiffer "
+            "joints, lower loads or speeds, a larger run.corner_length or run.max_overlap"
         )
 
 

@@ -57,9 +57,9 @@ class StiffnessCurve:
 
     @classmethod
     def of(cls, law) -> StiffnessCurve:
-        """Tabulate a law from no closure to 20 MPa."""
-        top = float(law.closure(20e6))
-        closure = np.concatenate([[0.0], np.geomspace(1e-6 * top, top, 400)])
+        """Tabulate a law from no closure to 2 GPa, more than any corner of rock stands."""
+        top = float(law.closure(2e9))
+        closure = np.concatenate([[0.0], np.geomspace(1e-8 * top, top, 600)])
         stress = law.normal_stress(closure)
         work = np.concatenate(
             [[0.0], np.cumsum(0.5 * (stress[1:] + stress[:-1]) * np.diff(closure))]

@@ -15,6 +15,7 @@ from .scene import Scene, parse
 from .start import begin
 from .world import World
 
+NEAR = 0.4  # share of the step's limit below which no change of lever arms matters
 HEADROOM = 1.25  # most growth of a joint's stiffness between two checks of the time step
 SAFE = 0.98  # largest time step as a share of the limit
 MATCH = 1e-6  # relative: lengths that are equal but for rounding
@@ -72,7 +73,8 @@ class Simulation:
         self.motion, self.n = motion, self.n + 1
         points = self.evaluate(motion, hand_over=True)
         if self.interfaces.stale(motion):
-            self._checked = np.zeros(self.joints.n)  # lever arms have changed
+            if self.dt > NEAR * self.step_limit:
+                self._checked[:] = 0.0  # lever arms have changed
             if self.interfaces.renew(motion, self.world.near, pressed=False):
                 self.arrange()
             points = self.evaluate(motion)
@@ -187,7 +189,7 @@ class Simulation:
         """Joints, masses and books for a new list of law points."""
         before = None
         if getattr(self, "points", None) is not None:
-            held = np.stack([self.area, self.area * self.joints.now["stored"]], axis=1)
+            held = np.stack([self.area, self.area * self.joints.now["stored"], self._checked], 1)
             before = dict(zip(self.identity, held.tolist(), strict=True))
         self.contacts = c = self.interfaces.contacts
         self.identity = self.interfaces.of_points
@@ -197,10 +199,11 @@ class Simulation:
         self._share = c.weight / np.where(light > 0, light, np.inf)
         self._checked = np.zeros(self.joints.n)
         if before is not None:
-            area = np.array([before.pop(who, [0.0, 0.0])[0] for who in self.identity])
-            self.ledger.value["dropped"] += sum(held for _, held in before.values())
-            now = self.joints.now
-            self.ledger.remember(self.ledger.forces, area, now["lost"])
+            none = [0.0, 0.0, 0.0]
+            kept = np.array([before.pop(who, none) for who in self.identity]).reshape(-1, 3)
+            self.ledger.value["dropped"] += sum(held for _, held, _ in before.values())
+            self._checked = kept[:, 2]
+            self.ledger.remember(self.ledger.forces, kept[:, 0], self.joints.now["lost"])
 
     # ----------------------------------------------------------------- guards
 

@@ -86,7 +86,8 @@ def _choose_step(sim) -> float:
     limit = sim.step_limit
     if stiffness:
         blocks, thick = sim.scene.blocks, sim.scene.thickness
-        limit = min(limit, timestep.impact_limit(blocks, thick, sim.inertia, sim.free, stiffness))
+        whole = sim.inertia, sim.free, stiffness, sim.interfaces.corner_length
+        limit = min(limit, timestep.impact_limit(blocks, thick, *whole))
     if not np.isfinite(limit):
         raise Refused(
             "nothing touches at the start, so no time step follows: set run.largest_stress "

@@ -73,9 +73,10 @@ class StepLimit:
         return eigsh(matrix, k=1, v0=start, tol=1e-4)[1][:, 0]
 
 
-def impact_limit(blocks, thickness: float, inertia, free, stiffness: float) -> float:
+def impact_limit(blocks, thickness, inertia, free, stiffness, corner_length) -> float:
     """Step limit (s) with every block touched along its whole outline at `stiffness` (Pa/m).
 
+    Half of every edge acts at either end, or half a corner_length (m) if that is more.
     Proven for any contacts between them: a joint's energy is at most twice what its two blocks
     would store in it alone, so the largest eigenvalue is at most twice that of the worst block.
     """
@@ -84,7 +85,7 @@ def impact_limit(blocks, thickness: float, inertia, free, stiffness: float) -> f
         if not moves.any():
             continue
         p, q = block.local, np.roll(block.local, -1, axis=0)
-        half = 0.5 * np.hypot(*(q - p).T) * thickness * stiffness
+        half = 0.5 * np.maximum(np.hypot(*(q - p).T), corner_length) * thickness * stiffness
         K = np.zeros((3, 3))
         for arm in (p, q):
             for way in (np.array([1.0, 0.0]), np.array([0.0, 1.0])):

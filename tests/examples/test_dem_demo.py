@@ -151,6 +151,59 @@ def test_refusals_leave_a_state_that_goes_on_with_a_smaller_step(tmp_path):
     assert np.isfinite(record.motion[-1]).all()
 
 
+DROP = """
+[laws.rock]
+asperity_density = 1e4
+critical_slip = 2e-3
+orientation = { a = 3.0 }
+asperity = { K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }
+heights = { alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }
+[[block]]
+name = "base"
+box = [4.0, 1.0]
+at = [0.0, -0.5]
+fixed = true
+[[block]]
+name = "block"
+box = [1.0, 0.5]
+at = [0.0, HEIGHT]
+velocity = [0.0, SPEED]
+[run]
+end = 0.05
+seat = false
+record = 0.002
+skin = 0.05
+max_overlap = 0.02
+step = STEP
+"""
+
+
+@pytest.mark.parametrize(
+    ("height", "speed", "step", "why"),
+    [
+        (0.251, -1.7, 7e-3, "overlap by .* must stay below 0.01 m"),  # 12 mm in the first step
+        (0.26, -1.0, 6e-4, "time step 0.0006 s: .* has fallen"),  # short enough for the first touch
+        (8.0, -19.6, 6.3e-4, "in one step: must stay below 0.0125 m"),  # and it falls ever faster
+    ],
+    ids=["overlap", "step", "speed"],
+)
+def test_failed_runs_are_resumed_with_a_smaller_step(tmp_path, capsys, height, speed, step, why):
+    """By command, for each kind of failure: refused, then resumed to the end of the scene."""
+    text = DROP.replace("HEIGHT", str(height)).replace("SPEED", str(speed))
+    file, out, more = tmp_path / "scene.toml", tmp_path / "out", tmp_path / "more"
+    file.write_text(text.replace("STEP", str(step)))
+    assert main([str(file), "--no-pictures", "--out", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert re.search(why, said)
+    assert str(out / "refused") in said
+    assert re.search(why, (out / "refused/why.txt").read_text())
+    words = ["resume", str(out / "refused"), "--step", "1e-4", "--no-pictures", "--out", str(more)]
+    assert main(words) == 0
+    summary = json.loads((more / "summary.json").read_text())
+    assert summary["model_time_s"] == pytest.approx(0.05, abs=1e-4)
+    assert summary["time_step_s"] == 1e-4
+
+
 def test_overlap_and_speed_are_refused():
     deep = SHORT.replace("at = [0.0, 0.25]", "at = [0.0, 0.2]")
     with pytest.raises(Refused, match=r"overlap by 0.05 m.* must stay below"):

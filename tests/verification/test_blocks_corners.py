@@ -1,0 +1,226 @@
+"""Corners on edges: energy of rocking and tumbling blocks, continuity, one joint all along."""
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+from dem_demo import Simulation, parse
+
+ELASTIC = """
+kind = "coulomb"
+normal_stiffness = 1e9
+shear_stiffness = 8e8
+friction = 0.0
+"""
+COULOMB = ELASTIC.replace("0.0", "1.0")
+JOINT = """
+asperity_density = 1e4
+critical_slip = 2e-3
+orientation = { a = 4.0, b = 0.0, c = 0.0 }
+asperity = { K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }
+heights = { alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }
+"""
+
+
+def scene(law, width, height, at, angle=0.0, velocity=(0.0, 0.0), spin=0.0, run="", more=""):
+    """One block on a fixed base whose top is y = 0, without dashpots."""
+    return parse(f"""
+[laws.rock]
+{law}
+[[block]]
+name = "base"
+box = [10.0, 1.0]
+at = [0.0, -0.5]
+fixed = true
+[[block]]
+name = "block"
+box = [{width}, {height}]
+at = [{at[0]}, {at[1]}]
+angle = {angle}
+velocity = [{velocity[0]}, {velocity[1]}]
+spin = {spin}
+{more}
+[run]
+end = 10.0
+seat = false
+dashpot_normal = 0.0
+dashpot_shear = 0.0
+{run}
+""")
+
+
+def on_corner(law, width, height, tilt, spin, run):
+    """Turned clockwise by `tilt` degrees about the lower right corner, which is at the origin."""
+    c, s = np.cos(np.radians(tilt)), np.sin(np.radians(tilt))
+    x, y = -0.5 * width * c + 0.5 * height * s, 0.5 * width * s + 0.5 * height * c
+    return scene(law, width, height, (x, y), -tilt, (spin * y, -spin * x), -spin, run)
+
+
+def play(sim, tilt, end):
+    """Run on: tilts (degrees), energies of the balance and potential energies (J), law points."""
+    tilts, total, potential, numbers = [], [], [], []
+    while sim.time < end:
+        sim.step()
+        tilts.append(tilt - np.degrees(sim.motion[2, 1]))
+        total.append(sim.ledger.total - sim.ledger.total0)
+        potential.append(sim.ledger.value["potential"])
+        pressed = sim.traction[: len(sim.interfaces.numbers), 0] > 0
+        numbers.append(set(sim.interfaces.numbers[pressed].tolist()))
+    return np.array(tilts), np.array(total), np.ptp(potential), numbers
+
+
+@pytest.mark.parametrize(
+    ("law", "end", "within"), [(ELASTIC, 0.8, 2e-3), (COULOMB, 0.5, 1e-3), (JOINT, 0.5, 4e-3)],
+    ids=["elastic", "coulomb", "joint"],
+)  # fmt: skip
+def test_rocking_block_keeps_its_energy(law, end, within):
+    """Released at 8 degrees, it falls through the transition, lands on its base and goes on.
+
+    Energies against the potential energy in play; the issue asks for 0.5 % across the transition,
+    which is kept a hundred times better; the landing, 10 to 20 steps long, takes the rest.
+    """
+    sim = Simulation(on_corner(law, 0.5, 1.0, 8.0, 0.0, "step = 1e-4\nlaw_steps = 4"))
+    tilts, total, in_play, _ = play(sim, 8.0, end)
+    transition = int((tilts < 1.9).argmax())
+    assert tilts[0] > 7.9
+    assert tilts.min() < 0.1
+    assert np.abs(total[:transition]).max() < 5e-5 * in_play
+    assert np.abs(total).max() < within * in_play
+    assert sim.ledger.value["dropped"] == 0
+    if law == ELASTIC:
+        assert sim.ledger.value["friction"] == 0
+        assert np.ptp(tilts[len(tilts) // 2 :]) > 2  # degrees: it still rocks, as nothing is lost
+
+
+@pytest.mark.parametrize(
+    ("law", "spin", "steps", "within"),
+    [(ELASTIC, 3.5, 1, 2e-3), (COULOMB, 2.0, 1, 2e-3), (JOINT, 2.0, 24, 5e-3)],
+    ids=["elastic", "coulomb", "joint"],
+)
+def test_tumbling_block_keeps_its_energy(law, spin, steps, within):
+    """Set spinning at 20 degrees, it goes over its corner and lands on its next side at 2 m/s.
+
+    The law's friction work is first order in its own step: it takes many of them in the landing.
+    """
+    sim = Simulation(on_corner(law, 1.0, 1.0, 20.0, spin, f"step = 1e-4\nlaw_steps = {steps}"))
+    tilts, total, in_play, numbers = play(sim, 20.0, 0.75)
+    landing = int((tilts > 88.0).argmax())
+    assert landing < len(tilts) - 400
+    assert np.abs(total[:landing]).max() < 1e-4 * in_play
+    assert np.abs(total).max() < within * in_play
+    # One and the same joint on the corner from one side to the next, and in the landing.
+    stood = set().union(*numbers[:landing])
+    assert len(stood) == 1
+    assert stood <= set().union(*numbers[landing:])
+
+
+def held(law, at, angle, more=""):
+    """A block 1 m square to be put where one likes, and what it stores and feels there."""
+    sim = Simulation(scene(law, 1.0, 1.0, at, angle, run="step = 1e-6\nmax_overlap = 0.2"))
+
+    def place(x, y, tilt):
+        motion = sim.motion.copy()
+        motion[:3, 1] = x, y, np.radians(tilt - angle)
+        points = sim.evaluate(motion)
+        if sim.interfaces.stale(motion):
+            sim.interfaces.renew(motion, {(0, 1)})
+            sim.arrange()
+            points = sim.evaluate(motion)
+        sim.motion = motion
+        slid = np.zeros(len(points.closure))
+        sim.traction = sim.joints.update(sim.joints.increments(points.closure, slid))
+        sim.forces(points, 1e-6)
+        return sim.area @ sim.joints.now["stored"], sim.contact_forces()[1]
+
+    return place
+
+
+def standing(tilt, depth=1e-3):
+    """Centre of the block when its lower right corner is `depth` below (0, 0)."""
+    c, s = np.cos(np.radians(tilt)), np.sin(np.radians(tilt))
+    return -0.5 * c - 0.5 * s, 0.5 * c - 0.5 * s - depth
+
+
+def sweep(law, low, high, n, where):
+    """Energy (n + 1,) and force (n + 1, 3) along a path of n steps."""
+    path = np.linspace(low, high, n + 1)
+    place = held(law, where(low)[:2], where(low)[2])
+    energy, force = zip(*(place(*where(s)) for s in path), strict=True)
+    return path, np.array(energy), np.array(force)
+
+
+@pytest.mark.parametrize("law", [ELASTIC, JOINT], ids=["elastic", "joint"])
+def test_force_and_energy_are_continuous_in_tilt(law):
+    """From 1 to 7 degrees about a corner held at a depth: the largest differences between
+    neighbours halve with the step, and the moment is minus the derivative of the energy."""
+    where = lambda tilt: (*standing(-tilt), -tilt)  # noqa: E731
+    largest = []
+    for n in (100, 200, 400, 800):
+        tilts, energy, force = sweep(law, 1.0, 7.0, n, where)
+        largest.append([np.abs(np.diff(x)).max() for x in (energy, force[:, 1], force[:, 2])])
+        assert np.abs(force[:, 0]).max() < 1e-10 * force[:, 1].max()  # nothing slides
+    ratios = np.array(largest[:-1]) / np.array(largest[1:])
+    assert ratios[1:] == pytest.approx(2.0, rel=0.02)
+    assert energy[0] / energy[-1] == pytest.approx(5.0, rel=1e-3)  # 0.5 m of face, 0.1 of corner
+    centre = np.array([where(t)[:2] for t in tilts])
+    about = force[:, 2] + centre[:, 0] * force[:, 1] - (centre[:, 1] + 1e-3) * force[:, 0]
+    slope = np.gradient(energy, np.radians(-tilts))[1:-1]
+    assert (
+        np.abs(about[1:-1] + slope).max() < 2e-3 * np.abs(slope).max()
+    )  # second order in 0.13 mrad
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1.0, 3.5, 20.0], ids=str)
+def test_energy_is_continuous_over_the_end_of_an_edge(tilt):
+    """A block is moved over the end of its base, at a height, until it hangs on the base's corner.
+
+    Where its corner trades roles with that of the base, energy is continuous at any tilt; so is the
+    force along the path unless the tilt shows: its direction turns with the edge that carries.
+    """
+    x0, y = standing(-tilt)
+    where = lambda x: (x0 + x, y, -tilt)  # noqa: E731
+    largest, jumps = [], []
+    for n in (150, 300, 600):
+        path, energy, force = sweep(ELASTIC, 4.9, 5.1, n, where)
+        largest.append(np.abs(np.diff(energy)).max())
+        jumps.append(np.abs(np.diff(force[:, 0])).max())
+    assert largest[1] / largest[2] == pytest.approx(2.0, rel=0.15)
+    work = np.concatenate([[0.0], -np.cumsum(0.5 * (force[1:, 0] + force[:-1, 0]) * np.diff(path))])
+    # One kink on the path: trapezoid of its jump over one step.
+    assert energy - energy[0] == pytest.approx(work, abs=jumps[-1] * np.diff(path)[0] + 1e-9)
+    if tilt == 0.0:
+        assert jumps[1] / jumps[2] == pytest.approx(2.0, rel=0.1)
+
+
+def test_metres_of_sliding():
+    """Driven over 3 m at 10 kPa: the joints of the start, at the law's own steady friction."""
+    more = """
+held = ["turn"]
+[[drive]]
+block = "block"
+motion = "x"
+times = [0.0, 3.0]
+values = [0.0, 3.0]
+"""
+    text = scene(JOINT, 1.0, 0.4, (-2.0, 0.2), more=more).text
+    text = text.replace("seat = false", "seat = true").replace(
+        "dashpot_normal = 0.0", "law_steps = 4"
+    )
+    sim = Simulation(parse(text.replace("end = 10.0", "end = 3.0\nfraction = 0.5")))
+    friction, closure = [], []
+    while sim.time < 3.0:
+        sim.step()
+        friction.append(-sim.contact_forces()[1, 0] / sim.contact_forces()[1, 1])
+        closure.append(sim.points.closure.mean())
+    assert sim.interfaces.numbers.tolist() == [0, 1]
+    slid = sim.joints.read("delta")[:, 1]
+    assert slid == pytest.approx(3.0, abs=0.06)  # the drive eases in and out
+    stress = 2600 * 9.81 * 0.4
+    law = sim.scene.laws["rock"]
+    alone = jl.direct_shear(law.joint(), to=[20 * law.critical_slip], normal=stress, steps=2000)
+    steady = alone.F2[-1] / alone.F1[-1]
+    last = len(friction) // 2
+    assert np.mean(friction[last:-800]) == pytest.approx(steady, rel=0.01)
+    assert np.ptp(closure[last:-800]) < 0.02 * np.ptp(closure)  # dilation has ended
+    # At 1 m/s a step of the law is 0.02 of the critical slip distance, and its error of that order.
+    assert abs(sim.ledger.error) < 5e-4

@@ -64,7 +64,8 @@ def sentence(entry: dict) -> str:
     if entry["failed"]:
         many = f"{entry['failed']} of {entry['blocks']} blocks moved more than {FAILED:g} m"
         return f"{start}{many}, the farthest {entry['moved_m']:.2f} m"
+    moved = max(1e3 * entry["moved_m"], 1e-3)
     return (
-        f"{start}no block of {entry['blocks']} moved more than {1e3 * entry['moved_m']:.2g} mm, "
+        f"{start}no block of {entry['blocks']} moved more than {moved:.2g} mm, "
         f"creep {entry['creep_m_per_s']:.1e} m/s"
     )

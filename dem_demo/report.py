@@ -69,6 +69,7 @@ def draw_vectors(axes, record: Record, i: int, scale: Scale) -> None:
 
 def frame(record: Record, i: int, scale: Scale, dpi: int) -> Figure:
     """One frame of the animation."""
+    scale = _still(scale, record)
     wide, high = scale.high - scale.low
     figure = Figure(figsize=(9.0, max(9.0 * high / wide, 2.0) + 1.3), dpi=dpi)
     FigureCanvasAgg(figure)
@@ -83,7 +84,7 @@ def frame(record: Record, i: int, scale: Scale, dpi: int) -> Figure:
 def report(record: Record, path: Path) -> None:
     """Before and after, displacement vectors, kinetic energy and displacement in time."""
     last = len(record.times) - 1
-    scale = Scale(record, [0, last])
+    scale = _still(Scale(record, [0, last]), record)
     wide, high = scale.high - scale.low
     tall = max(9.0 * high / wide, 2.0)
     figure = Figure(figsize=(9.6, 3 * tall + 5.5), dpi=120, layout="constrained")
@@ -148,6 +149,15 @@ def _rock(axes, record: Record, i: int, scale: Scale) -> None:
     axes.set_aspect("equal")
     axes.set_xlabel("x (m)")
     axes.set_ylabel("y (m)")
+
+
+def _still(scale: Scale, record: Record) -> Scale:
+    """Widths by the stresses at the start: those of impacts would make all others hair lines."""
+    values = record.joints[0]["values"]
+    pressed = values[values[:, STRESS] > 0]
+    if len(pressed):
+        scale.stress = float(np.quantile(pressed[:, STRESS], 0.9))
+    return scale
 
 
 def _key(scale: Scale) -> list[Line2D]:

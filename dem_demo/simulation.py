@@ -119,7 +119,7 @@ class Simulation:
                 kept = self.joints.work_at(i, closure)
                 self.joints.forget(i)
                 self.ledger.e_lost[i] = 0.0
-            self.ledger.value["dropped"] += max(held[i] - kept * length, 0.0) * thick
+            self.ledger.value["dropped"] += max(float(held[i] - kept * length), 0.0) * thick
             self.area[i] = length * thick
 
     def forces(self, points: geometry.Points, dt: float) -> np.ndarray:

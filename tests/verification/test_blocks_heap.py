@@ -123,4 +123,5 @@ dashpot_shear = 0.0
     assert np.diff(dropped).min() >= 0
     assert crushed.max() > 1e-3
     assert work[-1] == pytest.approx(dropped[-1], rel=1e-2)  # all that the drive spent
-    assert abs(sim.ledger.error) < 1e-3
+    # The corner is 7 micrometres past the other when it gives way, of 2 mm: a share of that order.
+    assert abs(sim.ledger.error) < 5e-3

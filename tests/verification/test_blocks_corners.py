@@ -70,7 +70,7 @@ def play(sim, tilt, end):
 
 
 @pytest.mark.parametrize(
-    ("law", "end", "within"), [(ELASTIC, 0.8, 2e-3), (COULOMB, 0.5, 1e-3), (JOINT, 0.5, 4e-3)],
+    ("law", "end", "within"), [(ELASTIC, 0.6, 2e-3), (COULOMB, 0.5, 1e-3), (JOINT, 0.5, 4e-3)],
     ids=["elastic", "coulomb", "joint"],
 )  # fmt: skip
 def test_rocking_block_keeps_its_energy(law, end, within):
@@ -103,7 +103,7 @@ def test_tumbling_block_keeps_its_energy(law, spin, steps, within):
     The law's friction work is first order in its own step: it takes many of them in the landing.
     """
     sim = Simulation(on_corner(law, 1.0, 1.0, 20.0, spin, f"step = 1e-4\nlaw_steps = {steps}"))
-    tilts, total, in_play, numbers = play(sim, 20.0, 0.75)
+    tilts, total, in_play, numbers = play(sim, 20.0, 0.72)
     landing = int((tilts > 88.0).argmax())
     assert landing < len(tilts) - 400
     assert np.abs(total[:landing]).max() < 1e-4 * in_play
@@ -224,3 +224,19 @@ values = [0.0, 3.0]
     assert np.ptp(closure[last:-800]) < 0.02 * np.ptp(closure)  # dilation has ended
     # At 1 m/s a step of the law is 0.02 of the critical slip distance, and its error of that order.
     assert abs(sim.ledger.error) < 5e-4
+
+
+def test_another_step_keeps_the_energy():
+    """Velocities are half a step ahead of the places: of the new step, when it changes.
+
+    A falling block gains m g v dt/2 in half a step of 1 ms: 100 times what is allowed here.
+    """
+    sim = Simulation(on_corner(ELASTIC, 0.5, 1.0, 30.0, 0.0, "step = 1e-3"))
+    for _ in range(200):
+        sim.step()
+    start, state = sim.ledger.total, sim.state()
+    sim.restore(state, step=1e-5)
+    sim.step()
+    speed = abs(sim.motion[4, 1])
+    assert speed > 0.1
+    assert abs(sim.ledger.total - start) < 5e-6 * 1300 * 9.81 * speed

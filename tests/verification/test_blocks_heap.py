@@ -1,0 +1,127 @@
+"""Corners against corners: irregular blocks thrown together, and a corner forced over another."""
+
+import numpy as np
+import pytest
+
+from dem_demo import Simulation, parse
+
+SHAPES = [
+    [[-0.9, 0.5], [-0.3, 0.4], [-0.1, 0.8], [-0.6, 1.1]],
+    [[0.1, 0.35], [0.8, 0.6], [0.3, 1.0]],
+    [[-0.8, 1.4], [-0.4, 1.2], [0.0, 1.3], [0.1, 1.6], [-0.5, 1.75]],
+    [[0.4, 1.3], [0.9, 1.2], [1.0, 1.5], [0.7, 1.8], [0.3, 1.7]],
+    [[-0.4, 2.1], [0.3, 2.0], [0.4, 2.5], [-0.3, 2.6]],
+]
+
+
+def heap(friction):
+    """Five irregular blocks, 3 to 5 corners each, dropped into a trough."""
+    text = [
+        f"""
+[laws.rock]
+kind = "coulomb"
+normal_stiffness = 1e9
+shear_stiffness = 8e8
+friction = {friction}
+"""
+    ]
+    walls = (("floor", [4.0, 0.4], [0.0, -0.2]), ("left", [0.4, 3.0], [-1.3, 1.5]),
+             ("right", [0.4, 3.0], [1.3, 1.5]))  # fmt: skip
+    for name, size, at in walls:
+        text.append(f'[[block]]\nname = "{name}"\nbox = {size}\nat = {at}\nfixed = true')
+    for i, corners in enumerate(SHAPES):
+        text.append(f'[[block]]\nname = "{i}"\ncorners = {corners}\nspin = {0.5 * i - 1}')
+    text.append("""
+[run]
+end = 1.0
+seat = false
+step = 1e-4
+law_steps = 4
+max_overlap = 0.1
+corner_length = 0.05
+dashpot_normal = 0.0
+dashpot_shear = 0.0
+""")
+    return parse("\n".join(text))
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.6])
+def test_tumbling_heap(friction, tmp_path):
+    """Corners meet edges, corners and sides of all tilts at 3 to 5 m/s: the books close within the
+    0.5 % of an impact, nothing dissipated comes back, a saved state goes on bit for bit."""
+    sim = Simulation(heap(friction))
+    gone, most, twice, potential = [], 0, 0, []
+    for n in range(6000):
+        sim.step()
+        c, v = sim.contacts, sim.ledger.value
+        most = max(most, int((sim.traction[:, 0] > 0).sum()))
+        twice += len(set(zip(c.corner.tolist(), c.edge.tolist(), strict=True))) < len(c.corner)
+        gone.append([v["friction"], v["dropped"]])
+        potential.append(v["potential"])
+        if n == 4999:
+            sim.save(tmp_path)
+    assert most >= 3
+    assert twice <= 2  # of two that arrive at one corner one is dropped in the next step
+    assert np.diff(gone, axis=0).min() >= -1e-9 * np.ptp(potential)
+    assert abs(sim.ledger.total - sim.ledger.total0) < 5e-3 * np.ptp(potential)
+    again = Simulation.load(tmp_path)
+    for _ in range(1000):
+        again.step()
+    assert (again.motion == sim.motion).all()
+    assert again.ledger.value == sim.ledger.value
+
+
+def test_a_corner_forced_over_another_makes_no_energy():
+    """A block, held at its height, is pushed over the edge of a base 2 mm too high, and back.
+
+    Its bottom is parallel to the base's top, its side is not parallel to the base's: a corner of
+    0.1 m gives way to an edge that overlaps by 2 mm, and takes over again on the way back. The
+    first drops stored energy, the second would make it: the corner is crushed instead.
+    """
+    scene = parse("""
+gravity = [0.0, 0.0]
+[laws.rock]
+kind = "coulomb"
+normal_stiffness = 1e9
+shear_stiffness = 8e8
+friction = 0.0
+[[block]]
+name = "base"
+box = [4.0, 1.0]
+at = [2.0, -0.5]
+fixed = true
+[[block]]
+name = "block"
+corners = [[-1.0, -0.002], [-0.005, -0.002], [-0.3, 0.998], [-1.0, 0.998]]
+held = ["y", "turn"]
+[[block]]
+name = "free"
+box = [0.1, 0.1]
+at = [0.0, 5.0]
+[[drive]]
+block = "block"
+motion = "x"
+times = [0.0, 0.3, 0.6]
+values = [0.0, 0.02, 0.0]
+[run]
+end = 0.75
+seat = false
+step = 1e-4
+corner_length = 0.1
+dashpot_normal = 0.0
+dashpot_shear = 0.0
+""")
+    sim = Simulation(scene)
+    rows = []
+    while sim.time < scene.run.end:
+        sim.step()
+        v = sim.ledger.value
+        rows.append([v["dropped"], v["stored"], v["work"], sim.interfaces.crushed.max(initial=0.0)])
+    dropped, stored, work, crushed = np.array(rows).T
+    assert stored.max() > 100
+    assert dropped[-1] > 100
+    assert np.diff(dropped).min() >= 0
+    assert crushed.max() > 1e-3
+    assert work[-1] == pytest.approx(dropped[-1], rel=1e-2)  # all that the drive spent
+    # The corner is 7 micrometres past the other when it gives way, of 2 mm: a share of that order.
+    assert abs(sim.ledger.error) < 5e-3

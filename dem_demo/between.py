@@ -28,6 +28,23 @@ class Between:
     fraction: np.ndarray
     weight: np.ndarray
 
+    @classmethod
+    def on(cls, outlines, overlaps: list[tuple[int, int, int, int]], spacing: float) -> Between:
+        """Points at most `spacing` (m) apart on overlaps (block, edge, block, edge)."""
+        o = outlines
+        a, i, b, j = np.array(overlaps, int).T
+        first, second = o.start[a] + i, o.start[b] + j
+        parts = spans(np.minimum(o.length[first], o.length[second]), spacing)
+        of = np.repeat(np.arange(len(a)), parts - 1)
+        fraction = np.concatenate([np.arange(1, n) / n for n in parts])
+        ends = o.next[first], o.next[second]
+        return cls(first, second, *ends, a[of], b[of], of, fraction, 1.0 / parts[of])
+
+
+def spans(length: np.ndarray, spacing: float) -> np.ndarray:
+    """Into how many parts of at most `spacing` a length (m) is cut."""
+    return np.maximum(np.ceil(length / spacing - 1e-9), 1).astype(int)
+
 
 def interpolate(between: Between, place: np.ndarray, ways: np.ndarray, soft: float) -> tuple:
     """Place, normal, closure, length of the points, and its derivatives `pull` and `twist`.

@@ -103,8 +103,9 @@ def _new(words: list[str]) -> int:
     )
     parser.add_argument("file", type=Path)
     file = parser.parse_args(words).file
-    with file.open("x") as stream:  # never over a file that is there
-        stream.write(TEMPLATE.read_text())
+    if file.exists():
+        raise ValueError(f"{file} exists: give another name")
+    file.write_text(TEMPLATE.read_text())
     print(f"{file} written; next: python -m dem_demo check {file}")
     return 0
 

@@ -70,8 +70,9 @@ def cut(outline: np.ndarray, sets: Sequence[JointSet], seed: int, least_width: f
     """Cut a simple outline (m, 2) into convex blocks no narrower than `least_width` (m).
 
     A piece that is still not convex (the outline bends inwards) is cut along the first set that
-    runs through its inward corner. A sliver joins the neighbour with which it shares most
-    boundary and makes a convex block; one without such a neighbour is dropped.
+    runs through its inward corner. A sliver joins a neighbour with which it makes a convex block,
+    across a joint of the last set if it can, so that joints of the first sets stay whole; one
+    without such a neighbour is dropped.
     """
     tiny = EXACT * float(np.ptp(outline, axis=0).max())
     pieces, lines = [Polygon(outline)], []
@@ -85,7 +86,7 @@ def cut(outline: np.ndarray, sets: Sequence[JointSet], seed: int, least_width: f
                 for part in _crossed(piece, joints.normal, offset, tiny, joints.persistence, rng)
             ]
     pieces = [part for piece in pieces for part in _convex_parts(piece, sets, lines, tiny)]
-    pieces, joined, dropped = _without_slivers(pieces, least_width, tiny)
+    pieces, joined, dropped = _without_slivers(pieces, lines, least_width, tiny)
     shapes = [_corners(piece, tiny) for piece in pieces]
     shapes.sort(key=lambda c: tuple(np.round(c.mean(axis=0)[::-1], 6)))
     return CutRock(shapes, [_sets_of(c, lines, tiny) for c in shapes], joined, dropped)
@@ -122,7 +123,7 @@ def _convex_parts(piece: Polygon, sets, lines, tiny) -> list[Polygon]:
     raise ValueError(f"no set runs through the inward corner {inward[0].round(3).tolist()} m")
 
 
-def _without_slivers(pieces: list[Polygon], least: float, tiny: float):
+def _without_slivers(pieces: list[Polygon], lines, least: float, tiny: float):
     """Join or drop what is narrower than `least`, the narrowest first."""
     pieces, joined, dropped = list(pieces), 0, []
     widths = [_width(piece) for piece in pieces]
@@ -130,11 +131,7 @@ def _without_slivers(pieces: list[Polygon], least: float, tiny: float):
         i = int(np.argmin(widths))
         sliver = pieces.pop(i)
         widths.pop(i)
-        shared = [sliver.buffer(tiny).intersection(p.exterior).length for p in pieces]
-        for j in np.argsort(shared, kind="stable")[::-1]:
-            if shared[j] < 10 * tiny:
-                dropped.append(sliver.area)
-                break
+        for j in _neighbours(sliver, pieces, lines, tiny):
             whole = sliver.union(pieces[j]).convex_hull
             if whole.area - sliver.area - pieces[j].area < tiny * whole.length:
                 pieces[j], widths[j] = whole, _width(whole)
@@ -143,6 +140,17 @@ def _without_slivers(pieces: list[Polygon], least: float, tiny: float):
         else:
             dropped.append(sliver.area)
     return pieces, joined, dropped
+
+
+def _neighbours(sliver: Polygon, pieces: list[Polygon], lines, tiny: float) -> list[int]:
+    """Those across a joint of the last set first, then those that share most boundary."""
+    corners, found = _corners(sliver, tiny), []
+    sides = zip(corners, np.roll(corners, -1, axis=0), _sets_of(corners, lines, tiny), strict=True)
+    for start, end, number in sides:
+        side = LineString([start, end]).buffer(tiny)
+        shared = [side.intersection(piece.exterior).length for piece in pieces]
+        found += [(int(number), part, j) for j, part in enumerate(shared) if part > 10 * tiny]
+    return [j for *_, j in sorted(found, reverse=True)]
 
 
 def _width(piece: Polygon) -> float:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .between import Between, interpolate
+from .between import Between, interpolate, spans
 from .shapes import Block
 from .tilt import raised, soft_size
 
@@ -93,15 +93,14 @@ class Contacts:
     def __len__(self) -> int:
         return len(self.a)
 
-    def at(self, corner: np.ndarray, edge: np.ndarray) -> Contacts:
-        """The same law points on other corners and edges."""
-        rest = self.corner_length, self.soft, self.spacing, self.between
+    def at(self, corner: np.ndarray, edge: np.ndarray, between: Between | None = None) -> Contacts:
+        """Law points on other corners and edges, all else the same."""
+        rest = self.corner_length, self.soft, self.spacing, between
         return Contacts(self.outlines, corner, edge, *rest)
 
-
-def spans(length: np.ndarray, spacing: float) -> np.ndarray:
-    """Into how many parts of at most `spacing` a length (m) is cut."""
-    return np.maximum(np.ceil(length / spacing - 1e-9), 1).astype(int)
+    def pairs(self) -> list[tuple[int, int]]:
+        """Corner and edge of each of the k corners."""
+        return list(zip(self.corner.tolist(), self.edge.tolist(), strict=True))
 
 
 @dataclass(frozen=True, eq=False)

@@ -71,10 +71,10 @@ def frame(record: Record, i: int, scale: Scale, dpi: int) -> Figure:
     """One frame of the animation."""
     scale = _still(scale, record)
     wide, high = scale.high - scale.low
-    figure = Figure(figsize=(9.0, max(9.0 * high / wide, 2.0) + 1.3), dpi=dpi)
+    tall = max(9.0 * high / wide, 2.0) + 1.3
+    figure = Figure(figsize=(9.0, tall), dpi=dpi)
     FigureCanvasAgg(figure)
-    axes = figure.add_axes((0.07, 0.75 / figure.get_figheight(), 0.91, 1))
-    axes.set_position((0.07, 0.75 / figure.get_figheight(), 0.91, 1 - 1.2 / figure.get_figheight()))
+    axes = figure.add_axes((0.07, 0.75 / tall, 0.91, 1 - 1.2 / tall))
     draw_states(axes, record, i, scale)
     figure.legend(handles=_key(scale), loc="lower center", ncols=6, fontsize=8, frameon=False)
     figure.suptitle(f"{record.scene.title}: t = {record.times[i]:.2f} s", fontsize=10)

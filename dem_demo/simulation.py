@@ -9,6 +9,7 @@ import numpy as np
 from . import geometry, states, timestep
 from .drives import Drives
 from .energy import Ledger
+from .handover import hand_over
 from .interfaces import ROUNDING, Interfaces, Refused
 from .joints import Joints
 from .scene import Scene, parse
@@ -18,7 +19,6 @@ from .world import World
 NEAR = 0.4  # share of the step's limit below which no change of lever arms matters
 HEADROOM = 1.25  # most growth of a joint's stiffness between two checks of the time step
 SAFE = 0.98  # largest time step as a share of the limit
-MATCH = 1e-6  # relative: lengths that are equal but for rounding
 CORNER = 0.1  # contact length of a corner as a share of the least block width, by default
 
 
@@ -34,7 +34,7 @@ class Simulation:
             blocks, self.skin, run.point_spacing, run.max_overlap,
             run.corner_length or CORNER * width, scene.law_of,
         )  # fmt: skip
-        self._least_depth = self.interfaces.depth_limit.min()
+        self._least_depth = self.interfaces.search.depth_limit.min()
         self.joints = Joints(scene.laws, scene.law_of)
         self.drives = Drives(scene.drives)
         self.inertia = np.stack([self.world.mass, self.world.mass, self.world.moment], axis=1)
@@ -71,7 +71,7 @@ class Simulation:
         """Forces (n, 3) at the positions just reached; velocities are those that led there."""
         self._require_slow(motion)
         self.motion, self.n = motion, self.n + 1
-        points = self.evaluate(motion, hand_over=True)
+        points = self.evaluate(motion, moving=True)
         if self.interfaces.stale(motion):
             if self.dt > NEAR * self.step_limit:
                 self._checked[:] = 0.0  # lever arms have changed
@@ -91,36 +91,15 @@ class Simulation:
         self.ledger.step(motion[3:].T, forces, self.dt, *self.joint_energies(points))
         return forces[0]
 
-    def evaluate(self, motion: np.ndarray, hand_over=False) -> geometry.Points:
+    def evaluate(self, motion: np.ndarray, moving: bool = False) -> geometry.Points:
         """Law points at a motion (6, n), each at the corner and edge where it is by then."""
         points = geometry.evaluate(self.interfaces.contacts, motion)
         if points.inside.min(initial=0.0) < -ROUNDING:
             before, points = points, self.interfaces.follow(points, motion)
-            if hand_over:
-                self.hand_over(before.length, points)
+            if moving:
+                hand_over(self, before.length, points)
         self.contacts = self.interfaces.contacts
         return points
-
-    def hand_over(self, before: np.ndarray, points: geometry.Points) -> None:
-        """Keep the books where a law point has gone on to a corner of another length (n,) in m.
-
-        Lengths match wherever an edge that lies on another, or a corner of 5 degrees or more, goes
-        on to the same. Else a joint that became shorter drops the rest, and one that became longer
-        is crushed: it starts anew at a closure at which it holds what the shorter one held.
-        """
-        now, thick = self.joints.now, self.scene.thickness
-        held, ratio = now["stored"] * before, points.length / np.maximum(before, 1e-300)
-        for i in np.flatnonzero((np.abs(ratio - 1) > MATCH) & (held > 0)).tolist():
-            length, kept = points.length[i], now["stored"][i]
-            if ratio[i] > 1:
-                most = self.interfaces.closure(points)[i]
-                closure = min(self.joints.closure_at_work(i, held[i] / length), most)
-                self.interfaces.crushed[i] += most - closure
-                kept = self.joints.work_at(i, closure)
-                self.joints.forget(i)
-                self.ledger.e_lost[i] = 0.0
-            self.ledger.value["dropped"] += max(float(held[i] - kept * length), 0.0) * thick
-            self.area[i] = length * thick
 
     def forces(self, points: geometry.Points, dt: float) -> np.ndarray:
         """(3, n, 3): all forces, those of the dashpots, those of the drives."""
@@ -252,11 +231,11 @@ class Simulation:
     def _require_carried(self, points: geometry.Points) -> None:
         pressed = points.closure * (points.length > 0)
         if pressed.max(initial=0.0) > self._least_depth:
-            a, b, depth = self.contacts.a, self.contacts.b, self.interfaces.depth_limit
+            a, b, depth = self.contacts.a, self.contacts.b, self.interfaces.search.depth_limit
             limit = np.minimum(depth[a], depth[b])
             i = int((pressed - limit).argmax())
             if pressed[i] > limit[i]:
-                self.interfaces.refuse_overlap((a[i], b[i]), pressed[i], limit[i])
+                self.interfaces.search.refuse_overlap((a[i], b[i]), pressed[i], limit[i])
 
     # ------------------------------------------------------------------ states
 

@@ -96,8 +96,8 @@ corners = [[-1.0, -0.002], [-0.005, -0.002], [-0.3, 0.998], [-1.0, 0.998]]
 held = ["y", "turn"]
 [[block]]
 name = "free"
-box = [0.1, 0.1]
-at = [0.0, 5.0]
+box = [1.0, 1.0]
+at = [3.0, 0.5]
 [[drive]]
 block = "block"
 motion = "x"

@@ -51,13 +51,15 @@ class StepLimit:
         The largest eigenvalue of dt^2 K + 2 dt C must be 4. Any vector gives too long a step, the
         eigenvector of the step before a better one: two or three eigenproblems in all.
         """
-        if rows.shape[0] == 0 or not stiffness.any():
+        if 0 in rows.shape or not stiffness.any():
             return np.inf
         K, C = ((rows.T @ (diags(part) @ rows)).tocsc() for part in (stiffness, dashpot))
         step, last = np.inf, np.inf
         vector = self._top(K)
         for _ in range(40):
             k, c = vector @ (K @ vector), vector @ (C @ vector)
+            if not k + c > 0:
+                return np.inf  # contacts between driven and fixed blocks only
             step, last = 4 / (c + np.sqrt(c * c + 4 * k)), step
             if last - step < 1e-6 * step:
                 break

@@ -19,6 +19,10 @@ LONG = {
     "jointlaw fit grimsel_vd1_closure --out": "the fit with --up-to, which does more",
     "jointlaw fit grimsel_vd1_closure --set": "the fit with --up-to, which does more",
     "python -m dem_demo ablate SCENE": "tests/examples/test_ablate.py",
+    "python -m dem_demo new my-slope.toml": "tests/examples/test_rocks.py",
+    "python -m dem_demo check my-slope.toml": "tests/examples/test_rocks.py",
+    "python -m dem_demo my-slope.toml": "tests/examples/test_rocks.py",
+    "python -m dem_demo compare": "tests/examples/test_rocks.py",
     "python -m dem_demo tilt": "tests/verification/test_blocks_tilt.py",
 }
 MINE = re.compile(r"(jointlaw|python -m (?:jointlaw|dem_demo)) ")

@@ -71,14 +71,15 @@ def _without(variant: Variant, record: Record, until: float | None, count: str) 
 def _run(scene: Scene, name: str, until: float | None) -> tuple[Row, Record | None]:
     note, step = "", scene.run.step
     for halvings in range(HALVINGS + 1):
-        started = time.process_time()
+        started, sim = time.process_time(), None
         try:
             sim = Simulation(replace(scene, run=replace(scene.run, step=step)))
             record, summary = run(sim, None, until)
         except Refused as trouble:
-            if "smaller step" not in str(trouble) or halvings == HALVINGS:
+            used = step or (sim and sim.dt)  # none if the start itself is refused
+            if "smaller step" not in str(trouble) or halvings == HALVINGS or not used:
                 return Row(name, note=f"refused: {trouble}"), None
-            step = 0.5 * (step or sim.dt)
+            step = 0.5 * used
             note = f"time step / {2 ** (halvings + 1)}"
             continue
         cpu = time.process_time() - started

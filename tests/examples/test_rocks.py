@@ -162,7 +162,7 @@ def test_what_fails_moves_down_the_joint():
         ("seed = 1", "seed = 1.5", "seed = 1.5: must be a whole number"),
         ("seed = 1", "sead = 1", "did you mean 'seed'"),
         ("[4.0, 1.0], [1.5, 1.0]", "[-9.0, 9.0], [1.5, 1.0]", "outline: must not cross"),
-        ("corners = [[-11.0", "corners = [[-11.0, 3.0], [-11.0", "fixed.*corners: must not cross"),
+        ("corners = [[-11.0", "corners = [[9.0, 9.0], [-11.0", "fixed.*corners: must not cross"),
         ('name = "slope"', 'name = "slope"\nlike = "hill"', "like = 'hill': must be the name"),
         ('name = "slope"', 'name = "slope"\nlaws = { rough = "joint" }', "no set .* law 'rough'"),
         ("pins = [[-2.0, 7.5]", "pins = [[-2.0, 17.5]", r"pins = \[-2.0, 17.5\]: must lie inside"),

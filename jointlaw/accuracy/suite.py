@@ -31,6 +31,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from .._checks import Array
+from .._progress import track
 from ..law import JointLaw
 from ..resolution import Resolution
 
@@ -93,7 +94,7 @@ def _suite(law: JointLaw, excursions: int) -> Suite:
 def tractions(law: JointLaw, d: Array) -> Array:
     """F (steps, paths, dim) in Pa along increments d of the same shape, from the virgin state."""
     batch, F = law.joints(d.shape[1], ledger=False), np.empty_like(d)
-    for k, step in enumerate(d):
+    for k, step in enumerate(track(d, "steps of the paths", len(d))):
         batch.update(step, tangent=False, out=(F[k], None))
     return F
 

@@ -7,6 +7,7 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 from .._checks import above
+from .._progress import track
 from ..resolution import Resolution
 from .suite import Suite, reference_resolution, scaled, standard_suite
 
@@ -58,7 +59,7 @@ def coarsest(law: JointLaw, bound: float, excursions: int = 0) -> tuple[Resoluti
     for name, choices, times in (("u", _U, 2), ("phi", _PHI, 2), ("depth", _DEPTH, 1)):
         below = [n for n in choices if n <= getattr(best, name)]
         reached: list[float] = []
-        for n in below:
+        for n in track(below, f"nodes of {name}", len(below)):
             reached.append(error(replace(rest, **{name: n})))
             if max(reached[-times:]) <= bound and len(reached) >= times:
                 break

@@ -12,11 +12,10 @@ space). `before` is what the package did up to version 0.1.0: Gauss-Legendre inc
 from __future__ import annotations
 
 import argparse
-import json
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -238,68 +237,84 @@ def picture(path: str, before: Any, after: Any) -> None:
     figure.savefig(path, dpi=150)
 
 
+@dataclass
+class Laws:
+    """The laws measured, each with its standard paths; all tables are Markdown."""
+
+    random: list[tuple[jl.JointLaw, Suite]]
+    presets: list[tuple[jl.JointLaw, Suite]]
+
+    @classmethod
+    def draw(cls, count: int) -> Laws:
+        """That many random laws and all presets, for motion in one plane."""
+        rng, laws = np.random.default_rng(4), []
+        while len(laws) < count:
+            if (law := random_law(rng)).orientation.a >= 1.4:
+                laws.append(replace(law, plane=0.0))
+        presets = [replace(jl.presets.load(name), plane=0.0) for name in jl.presets.names()]
+        cases = [(law, standard_suite(law)) for law in track([*laws, *presets], "references",
+                                                             count + len(presets))]  # fmt: skip
+        return cls(cases[:count], cases[count:])
+
+    def depths(self) -> str:
+        lines = [head("depth cells, at 6 x 6 orientations", [str(n) for n in CELLS[1:]])]
+        for name, rule in DEPTHS.items():
+            with placed(depths=rule):
+                lines.append(row(name, [self._worst((6, 6, n)) for n in CELLS[1:]]))
+        return "\n".join(lines)
+
+    def inclinations(self) -> str:
+        lines = [head("inclinations, u x phi at 16 cells", [f"{u} x {p}" for u, p in RULES])]
+        for name, rule in INCLINATIONS.items():
+            with placed(inclinations=rule):
+                lines.append(row(name, [self._worst((u, p, 16)) for u, p in RULES]))
+        return "\n".join(lines)
+
+    def azimuths(self) -> str:
+        space = [replace(law, plane=None) for law, _ in self.random[:8]]
+        there = [(law, standard_suite(law)) for law in track(space, "references", len(space))]
+        lines = [head("in space, u x phi at 16 cells", [f"{u} x {p}" for u, p in RULES])]
+        for name, rule in (("azimuths in line (now)", None), ("staggered", staggered)):
+            with placed(facets=rule):
+                lines.append(row(name, [worst(there, (u, p, 16)) for u, p in RULES]))
+        return "\n".join(lines)
+
+    def frontier(self, path: str | None = None) -> str:
+        """Before and after, and the picture of both where a path is given."""
+        cases = self.random + self.presets
+        after = frontier(cases)
+        with placed(inclinations=legendre, depths=graded(1.5)):
+            before = frontier(cases)
+        if path:
+            picture(path, before, after)
+        shown = {}
+        for (sliders, old), (_, new) in zip(before, after, strict=True):  # the last of each counts
+            shown[sliders] = row(str(sliders), [old, new])
+        return "\n".join([head("sliders", ["before", "now"]),
+                          *(shown[n] for n in (6, 12, 24, 48, 96, 200, 576))])  # fmt: skip
+
+    def named(self) -> str:
+        lines = [head("named", ["sliders", *jl.presets.names()])]
+        for name, r in NAMED.items():
+            errors = worst(self.presets, (r.u, r.phi, r.depth))
+            lines.append(f"| {name} | {r.sliders} | {' | '.join(f'{e:.2f}' for e in errors)} |")
+        return "\n".join(lines)
+
+    def _worst(self, rule: tuple[int, int, int]) -> np.ndarray:
+        return worst(self.random + self.presets, rule)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--laws", type=int, default=16, help="random ones, beside the presets")
     parser.add_argument("--picture", help="file for the frontier before and after")
-    parser.add_argument("--json", help="file to write the numbers to")
     options = parser.parse_args()
-    rng, laws = np.random.default_rng(4), []
-    while len(laws) < options.laws:
-        if (law := random_law(rng)).orientation.a >= 1.4:
-            laws.append(law)
-    flat = [replace(law, plane=0.0) for law in laws]
-    flat += [replace(jl.presets.load(name), plane=0.0) for name in jl.presets.names()]
-    cases = [(law, standard_suite(law)) for law in track(flat, "references", len(flat))]
-    numbers: dict[str, Any] = {}
-
-    print(head("depth cells, at 6 x 6 orientations", [str(n) for n in CELLS[1:]]))
-    for name, rule in DEPTHS.items():
-        with placed(depths=rule):
-            errors = [worst(cases, (6, 6, n)) for n in CELLS[1:]]
-        print(row(name, errors), flush=True)
-        numbers[name] = [e.tolist() for e in errors]
-
-    print("\n" + head("inclinations, u x phi at 16 cells", [f"{u} x {p}" for u, p in RULES]))
-    for name, rule in INCLINATIONS.items():
-        with placed(inclinations=rule):
-            errors = [worst(cases, (u, p, 16)) for u, p in RULES]
-        print(row(name, errors), flush=True)
-        numbers[name] = [e.tolist() for e in errors]
-
-    space = [replace(law, plane=None) for law in laws[:8]]
-    there = [(law, standard_suite(law)) for law in track(space, "references", len(space))]
-    print("\n" + head("in space, u x phi at 16 cells", [f"{u} x {p}" for u, p in RULES]))
-    for name, rule in (("azimuths in line (now)", None), ("staggered", staggered)):
-        with placed(facets=rule):
-            errors = [worst(there, (u, p, 16)) for u, p in RULES]
-        print(row(name, errors), flush=True)
-        numbers[name] = [e.tolist() for e in errors]
-
-    after = frontier(cases)
-    with placed(inclinations=legendre, depths=graded(1.5)):
-        before = frontier(cases)
-    print("\n| sliders | before | now |\n|---:|---:|---:|")
-    shown = {}
-    for (sliders, old), (_, new) in zip(before, after, strict=True):  # the last of each counts
-        cells = [f"{np.median(e):.2f} ({np.quantile(e, 0.9):.2f})" for e in (old, new)]
-        shown[sliders] = f"| {sliders} | {' | '.join(cells)} |"
-    print("\n".join(shown[n] for n in (6, 12, 24, 48, 96, 200, 576)))
-
-    print("\n" + head("named", ["sliders", *jl.presets.names()]))
-    for name, r in NAMED.items():
-        errors = worst(cases[len(laws) :], (r.u, r.phi, r.depth))
-        print(f"| {name} | {r.sliders} | {' | '.join(f'{e:.2f}' for e in errors)} |")
-        numbers[name] = errors.tolist()
-    numbers["frontier"] = {k: [(s, e.tolist()) for s, e in found]
-                           for k, found in (("before", before), ("now", after))}  # fmt: skip
-    if options.picture:
-        picture(options.picture, before, after)
-    if options.json:
-        with open(options.json, "w") as stream:
-            json.dump(numbers, stream)
+    laws = Laws.draw(options.laws)
+    for made in (laws.depths, laws.inclinations, laws.azimuths,
+                 lambda: laws.frontier(options.picture), laws.named):  # fmt: skip
+        print(made(), end="\n\n", flush=True)
 
 
 if __name__ == "__main__":

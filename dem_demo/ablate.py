@@ -148,7 +148,9 @@ def table(rows: list[Row]) -> str:
 
 
 def _title(key: str) -> str:
-    what, _, unit = key.rpartition("_")
+    what, has_unit, unit = key.rpartition("_")
+    if not has_unit:
+        return key
     return what if unit == "1" else f"{what} ({unit})"
 
 

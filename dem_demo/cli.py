@@ -186,7 +186,7 @@ def _announce(sim: Simulation, end: float) -> None:
             f"{len(rock.blocks) - len(rock.free)} fixed; {rock.slivers}"
         )
     if not sim.balanced:
-        print("the joints cannot hold the blocks where they are drawn: they move from step 0")
+        print("not all blocks can be held where they are drawn: those that cannot move from step 0")
 
 
 def _go(sim: Simulation, given: argparse.Namespace) -> int:

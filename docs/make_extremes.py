@@ -27,6 +27,7 @@ import test_extremes_impact as impact  # noqa: E402
 import test_extremes_matrix as matrix  # noqa: E402
 import test_extremes_symmetry as symmetry  # noqa: E402
 import test_extremes_units as units  # noqa: E402
+from _pages import fill, table  # noqa: E402
 
 import jointlaw as jl  # noqa: E402
 
@@ -34,12 +35,6 @@ CYCLES = 1_000_000
 STEPS = 1_000_000
 SEEDS = range(20_000, 20_700)
 JOINTS, PATH = 64, 32  # of each fuzzed law
-
-
-def table(head, rows):
-    """A table in Markdown."""
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(str(cell) for cell in row) + " |" for row in lines) + "\n"
 
 
 def verdict(faults):
@@ -188,10 +183,7 @@ def main():
         begun = time.perf_counter()
         made = parts[key]()
         print(f"{key}: {time.perf_counter() - begun:.0f} s", flush=True)
-        page = HERE / "extremes.md"
-        before, rest = page.read_text(encoding="utf-8").split(f"<!-- {key} -->\n")
-        after = rest[rest.index(f"<!-- end of {key} -->") :]
-        page.write_text(f"{before}<!-- {key} -->\n{made}{after}", encoding="utf-8")
+        fill("extremes.md", key, made)
 
 
 if __name__ == "__main__":

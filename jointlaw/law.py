@@ -234,10 +234,11 @@ class JointLaw:
         """This law at the resolution with the fewest sliders that is this accurate.
 
         tolerance: largest error of the traction on a path, as a share of the path's largest
-        traction, > 0: 0.01 is one per cent. Held on the standard paths within the law's closure
-        range (`jointlaw.accuracy.suite`) with a margin for others; nothing is timed, so the answer
-        is the same on every machine. Takes about a second. Raises ValueError where no resolution
-        tried is that accurate.
+        traction, > 0: 0.01 is one per cent. Held with a margin on the standard paths and on 128
+        random ones within the law's closure range (`jointlaw.accuracy.suite`); nothing is timed, so
+        the answer is the same on every machine. Takes seconds, at 0.001 up to a minute; a minute or
+        more without the compiled kernel. Raises ValueError where no resolution tried is that
+        accurate.
         """
         from .accuracy.tolerance import at_tolerance
 

@@ -10,10 +10,15 @@ With R the law's closure range and S the normal stress there, the paths are
     walk               a smooth random walk in closure and both shears
     weave              closed five times while the shear crosses itself (in space)
 
+Excursions are random: four to ten legs between corners with closures from -0.3 R to R (one of them
+at a stress of S/2 to S) and shears up to R, every second one rounded. They are drawn once and for
+all, so that they too are the same for every resolution.
+
 Along 0, 45 and 90 degrees the rings of azimuths look alike; the other directions lie between, where
 a ring of few azimuths errs most. A law with a plane takes the paths along azimuth 0 and the others
-projected on its plane. Those at constant stress are found once, at half the reference resolution,
-and are paths of displacement from then on, so that every resolution is asked the same.
+projected on its plane; one of closure only the closures of those that shut more than once. Those at
+constant stress are found once, at half the reference resolution, and are paths of displacement from
+then on, so that every resolution is asked the same.
 """
 
 from __future__ import annotations
@@ -23,8 +28,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
 from .._checks import Array
+from .._progress import track
 from ..law import JointLaw
 from ..resolution import Resolution
 
@@ -58,20 +65,25 @@ class Suite:
         return errors(tractions(law, self.d), self.F)
 
 
-def standard_suite(law: JointLaw, finer: float = 1.0) -> Suite:
+def standard_suite(law: JointLaw, finer: float = 1.0, excursions: int = 0) -> Suite:
     """The standard paths of a law, with tractions at `finer` times the reference resolution.
 
-    Second-order convergence makes the reference's own error about 0.8 of its `uncertainty`.
+    `excursions` random paths come after them. Second-order convergence makes the reference's own
+    error about 0.8 of its `uncertainty`.
     """
-    return _suite(replace(law, resolution=scaled(reference_resolution(law), finer)))
+    return _suite(replace(law, resolution=scaled(reference_resolution(law), finer)), excursions)
 
 
 @lru_cache(maxsize=16)
-def _suite(law: JointLaw) -> Suite:
+def _suite(law: JointLaw, excursions: int) -> Suite:
     """The suite of a law at its reference resolution."""
     best = law.resolution
     stress = float(law.normal_stress(law.closure_range)) / 2
     names, goal, held = _paths(law, stress)
+    if excursions:
+        goal = np.concatenate([goal, _excursions(law, stress, excursions)], axis=1)
+        held = np.append(held, np.zeros(excursions, bool))
+        names += tuple(f"excursion {i + 1}" for i in range(excursions))
     d = np.diff(goal, axis=0, prepend=0.0)
     d = _hold_stress(replace(law, resolution=scaled(best, 1 / 2)), d, held, stress)
     F = tractions(law, d)
@@ -82,7 +94,7 @@ def _suite(law: JointLaw) -> Suite:
 def tractions(law: JointLaw, d: Array) -> Array:
     """F (steps, paths, dim) in Pa along increments d of the same shape, from the virgin state."""
     batch, F = law.joints(d.shape[1], ledger=False), np.empty_like(d)
-    for k, step in enumerate(d):
+    for k, step in enumerate(track(d, "steps of the paths", len(d))):
         batch.update(step, tangent=False, out=(F[k], None))
     return F
 
@@ -146,12 +158,33 @@ def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]
         "walk": walk,
         "weave": weave,
     }
-    if law.plane is not None:
+    if law.closure_only:
+        named = {name: named[name][:, :1] for name in ("closure", "re-contact", "walk", "weave")}
+    elif law.plane is not None:
         turned = ("shear 45", "shear 90", "weave")
         named |= {"reversal": back, "constant closure": fixed, "re-contact": again}
         named = {name: path[:, :2] for name, path in named.items() if name not in turned}
     held = np.array([name.startswith(("shear", "reversal")) for name in named])
     return tuple(named), R * np.stack(list(named.values()), axis=1), held
+
+
+def _excursions(law: JointLaw, stress: float, count: int) -> Array:
+    """Random places (steps, count, dim) in m."""
+    rng, R, s = np.random.default_rng(8), law.closure_range, np.arange(1, STEPS + 1) / STEPS
+    goal = []
+    for i in range(count):
+        legs = int(rng.integers(4, 11))
+        closure = np.append(0.0, rng.uniform(-0.3, 1.0, legs))
+        highest = float(law.closure(stress * rng.uniform(1.0, 2.0))) / R
+        closure[rng.integers(1, legs + 1)] = highest
+        shear = np.append(0.0, np.sqrt(rng.random(legs)))
+        turn = rng.uniform(0.0, 2.0 * np.pi, legs + 1)
+        corners = np.stack([closure, shear * np.cos(turn), shear * np.sin(turn)], axis=-1)
+        at = np.linspace(0.0, 1.0, legs + 1)
+        rounded = PchipInterpolator(at, corners)(s)
+        straight = np.stack([np.interp(s, at, x) for x in corners.T], axis=-1)
+        goal.append(rounded if i % 2 else straight)
+    return R * np.stack(goal, axis=1)[:, :, : law.tables.dim]
 
 
 def _hold_stress(law: JointLaw, d: Array, held: Array, stress: float) -> Array:

@@ -88,3 +88,14 @@ def test_example_of_the_docs_prints_what_it_says(capsys):
     exec(block, {})
     printed = block.split("print(")[1].split("# ")[1].strip()
     assert capsys.readouterr().out.strip() == printed
+
+
+def test_closure_only_takes_closures_alone(benchmark):
+    law = replace(jl.presets.load("westerly-rough"), closure_only=True)
+    d = benchmark.random_paths(law, np.random.default_rng(3))
+    truth = tractions(replace(law, resolution="reference"), d)
+    for tolerance in (0.03, 0.003):
+        made = law.at_tolerance(tolerance)
+        assert made.closure_only
+        assert errors(tractions(made, d), truth)[0].max() < tolerance
+    assert [p.error.shape for p in law.tradeoff(["fast"], joints=0).rows] == [(4,)]

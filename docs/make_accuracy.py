@@ -1,19 +1,28 @@
-"""Regenerate the tables of docs/only-what-is-needed.md.
+"""Regenerate docs/how-accurate.md and docs/only-what-is-needed.md: their tables and pictures.
 
-`python docs/make_only_what_is_needed.py [PART ...]`: all parts take about a quarter of an hour of
-processor time. A part is what stands between its two marks in the page: savings, slip, plane,
-angles, or a scene that comes with dem_demo.
+`python docs/make_accuracy.py [PART ...]`: all parts take about an hour and a half; every part
+prints what it took. A part is what stands between its two marks in one of the pages. Times are
+those of this machine: let nothing else run beside it.
 """
 
+import shutil
+import subprocess
 import sys
+import tempfile
+import time
 from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
 
-HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE.parent / "benchmarks"))
+ROOT = Path(__file__).parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
 
+import nodes  # noqa: E402
 import numpy as np  # noqa: E402
 import reductions  # noqa: E402
+import tolerance  # noqa: E402
+from _ablations import HEAD, by_ingredient, rows_of  # noqa: E402, F401
+from _pages import HERE, fill, has, read, table  # noqa: E402
 
 import jointlaw as jl  # noqa: E402
 from dem_demo import ablate, load  # noqa: E402
@@ -21,14 +30,53 @@ from dem_demo.predict import friction_angle  # noqa: E402
 from dem_demo.scene import names  # noqa: E402
 from jointlaw.resolution import NAMED  # noqa: E402
 
+PAGES = "how-accurate.md", "only-what-is-needed.md"
+PICTURES = HERE / "pictures"
+SCENES = [name for name in names() if has(PAGES[1], name)]
 STRESS = 10e6  # Pa
-PAGE = HERE / "only-what-is-needed.md"
+LAWS, SEED = 60, 13  # of the tolerances
+DRAWN = 12  # random laws of the placing of nodes
 
 
-def table(head, rows):
-    """A table in Markdown."""
-    lines = [head, ["---", *["---:"] * (len(head) - 1)], *rows]
-    return "\n".join("| " + " | ".join(str(cell) for cell in row) + " |" for row in lines) + "\n"
+def run(*command):
+    """What a command of this project prints."""
+    done = subprocess.run([sys.executable, *command], cwd=ROOT, check=True, stdout=subprocess.PIPE)
+    return done.stdout.decode()
+
+
+def price_list():
+    """The picture and the frontier of one preset."""
+    command = ["-m", "jointlaw", "tradeoff", "westerly-smooth", "--plane", "0", "--out"]
+    with tempfile.TemporaryDirectory() as folder:
+        printed = run(*command, folder)
+        shutil.copy(Path(folder) / "tradeoff.png", PICTURES / "tradeoff.png")
+    return f"```\n{printed.split('wrote ')[0]}```\n"
+
+
+def peers(*options):
+    """A run of benchmarks/peers.py in a process of its own: it wants one thread."""
+    return run("benchmarks/peers.py", *options).split("\n\n")[-1]
+
+
+def million():
+    """A million joints."""
+    return f"```\n{run('benchmarks/peers.py', '--million')}```\n"
+
+
+def tolerances():
+    """Whether tolerances are kept on random laws and paths."""
+    return tolerance.table(tolerance.draw(LAWS, SEED)) + "\n"
+
+
+@cache
+def laws():
+    """Laws on which nodes are placed, with their standard paths."""
+    return nodes.Laws.draw(DRAWN)
+
+
+def ingredients():
+    """Over all scenes, from their tables as they stand in the page."""
+    return table(HEAD, by_ingredient({name: read(PAGES[1], name) for name in SCENES}))
 
 
 def savings():
@@ -98,18 +146,32 @@ def angles():
     return table(head, rows)
 
 
+PARTS = {
+    "price-list": price_list,
+    "peers-smooth": peers,
+    "peers-rough": partial(peers, "--preset", "westerly-rough"),
+    "million": million,
+    "tolerances": tolerances,
+    "named": lambda: laws().named(),
+    "frontier": lambda: laws().frontier(str(PICTURES / "frontier.png")),
+    "inclinations": lambda: laws().inclinations(),
+    "depths": lambda: laws().depths(),
+    "azimuths": lambda: laws().azimuths(),
+    "savings": savings,
+    "slip": slip,
+    "plane": plane,
+    "angles": angles,
+    **{name: lambda name=name: ablate.table(ablate.ablate(load(name))) for name in SCENES},
+    "ingredients": ingredients,
+}
+
+
 def main():
-    parts = {"savings": savings, "slip": slip, "plane": plane, "angles": angles}
-    parts |= {name: lambda name=name: ablate.table(ablate.ablate(load(name))) for name in names()}
-    for key in sys.argv[1:] or parts:
-        if f"<!-- {key} -->\n" not in PAGE.read_text(encoding="utf-8"):
-            print(f"{key} is left out: {PAGE.name} has no marks <!-- {key} --> for it")
-            continue
-        made = parts[key]().rstrip() + "\n"
-        page = PAGE.read_text(encoding="utf-8")
-        before, rest = page.split(f"<!-- {key} -->\n")
-        after = rest[rest.index(f"<!-- end of {key} -->") :]
-        PAGE.write_text(f"{before}<!-- {key} -->\n{made}{after}", encoding="utf-8")
+    for key in sys.argv[1:] or PARTS:
+        begun = time.perf_counter()
+        made = PARTS[key]()
+        fill(next(page for page in PAGES if has(page, key)), key, made)
+        print(f"{key}: {time.perf_counter() - begun:.0f} s", flush=True)
 
 
 if __name__ == "__main__":

@@ -120,9 +120,9 @@ INCLINATIONS: dict[str, Rule | None] = {
 }
 
 
-def staggered(self: Orientation, u: int, phi: int, plane: float | None = None) -> Facets:
+def staggered(self: Orientation, u: int, phi: int, *scene: Any) -> Facets:
     """Every second ring of the whole circle turned by half a spacing."""
-    made = KEPT(self, u, phi, plane)
+    made = KEPT(self, u, phi, *scene)
     count = 2 * phi
     shift = np.array([0.0, 0.5])[np.arange(u) % 2, None] * math.pi / phi
     turned = made.phi.reshape(u, count) - shift

@@ -56,3 +56,14 @@ def test_changes_are_gathered_over_scenes(made):
     tables = {"one": head + rule + first + "\n(1) a note\n", "two": head + rule + other}
     found = made.by_ingredient(tables)
     assert found == [["c = 0", "2", "1.50", "40%", "3 to 700", "1", "0.90 to 1.10"]]
+
+
+def test_rules_for_nodes_are_measured_against_each_other(made):
+    law = made.jl.presets.load("westerly-rough")
+    laws = made.nodes.Laws([(law, made.nodes.standard_suite(law))], [])
+    now, staggered = made.rows_of(laws.azimuths())
+    # one ring cannot be staggered; with more, errors are others and as small
+    for title, value in list(now.items())[1:]:
+        a, b = (float(text.split()[0]) for text in (value, staggered[title]))
+        assert (a == b) == title.startswith("1 x")
+        assert b < 1.6 * a

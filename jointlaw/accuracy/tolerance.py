@@ -72,7 +72,7 @@ def coarsest(law: JointLaw, bound: float, excursions: int = 0) -> tuple[Resoluti
                 break
         else:
             return None, closest
-        needs.append(below[len(alone) - times : len(alone) + 1])  # one finer, as errors add up
+        needs.append(below[len(alone) - times :])  # finer ones too, for errors add up
     tried = [Resolution(*nodes) for nodes in product(*needs)]
     for r in sorted(tried, key=lambda r: (r.sliders, r.u, r.phi)):
         if error(r) <= bound:

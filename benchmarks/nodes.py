@@ -120,9 +120,9 @@ INCLINATIONS: dict[str, Rule | None] = {
 }
 
 
-def staggered(self: Orientation, u: int, phi: int, plane: float | None = None) -> Facets:
+def staggered(self: Orientation, u: int, phi: int, *scene: Any) -> Facets:
     """Every second ring of the whole circle turned by half a spacing."""
-    made = KEPT(self, u, phi, plane)
+    made = KEPT(self, u, phi, *scene)
     count = 2 * phi
     shift = np.array([0.0, 0.5])[np.arange(u) % 2, None] * math.pi / phi
     turned = made.phi.reshape(u, count) - shift
@@ -208,13 +208,12 @@ def head(title: str, labels: list[str]) -> str:
     return f"| {title} | {' | '.join(labels)} |\n|---|{'---:|' * len(labels)}"
 
 
-def frontier(cases: list[tuple[jl.JointLaw, Suite]]) -> list[tuple[int, np.ndarray]]:
-    """Sliders, and per law the least error with as many or fewer."""
-    found: list[tuple[int, np.ndarray]] = []
+def frontier(cases: list[tuple[jl.JointLaw, Suite]]) -> dict[int, np.ndarray]:
+    """By sliders: per law the least error with as many or fewer."""
+    found: dict[int, np.ndarray] = {}
     best = np.full(len(cases), np.inf)
     for rule in sorted(GRID, key=lambda r: r[0] * r[1] * r[2]):
-        best = np.minimum(best, worst(cases, rule))
-        found.append((rule[0] * rule[1] * rule[2], best))
+        found[rule[0] * rule[1] * rule[2]] = best = np.minimum(best, worst(cases, rule))
     return found
 
 
@@ -224,9 +223,9 @@ def picture(path: str, before: Any, after: Any) -> None:
 
     figure, axis = pyplot.subplots(figsize=(6.5, 4.5), layout="constrained")
     for found, color, label in ((before, "0.5", "before"), (after, "C0", "now")):
-        x = [sliders for sliders, _ in found]
-        axis.loglog(x, [np.median(e) for _, e in found], "o-", ms=3, color=color, label=label)
-        axis.loglog(x, [np.quantile(e, 0.9) for _, e in found], "--", color=color, lw=1,
+        x, errors = list(found), np.array(list(found.values()))
+        axis.loglog(x, np.median(errors, axis=1), "o-", ms=3, color=color, label=label)
+        axis.loglog(x, np.quantile(errors, 0.9, axis=1), "--", color=color, lw=1,
                     label=f"{label}, 90 % of the laws")  # fmt: skip
     axis.set_xlabel("sliders per joint, motion in one plane")
     axis.set_ylabel("largest error on the standard paths (% of the peak)")
@@ -287,11 +286,8 @@ class Laws:
             before = frontier(cases)
         if path:
             picture(path, before, after)
-        shown = {}
-        for (sliders, old), (_, new) in zip(before, after, strict=True):  # the last of each counts
-            shown[sliders] = row(str(sliders), [old, new])
-        return "\n".join([head("sliders", ["before", "now"]),
-                          *(shown[n] for n in (6, 12, 24, 48, 96, 200, 576))])  # fmt: skip
+        rows = [row(str(n), [before[n], after[n]]) for n in (6, 12, 24, 48, 96, 200, 576)]
+        return "\n".join([head("sliders", ["before", "now"]), *rows])
 
     def named(self) -> str:
         lines = [head("named", ["sliders", *jl.presets.names()])]

@@ -34,8 +34,8 @@ PAGES = "how-accurate.md", "only-what-is-needed.md"
 PICTURES = HERE / "pictures"
 SCENES = [name for name in names() if has(PAGES[1], name)]
 STRESS = 10e6  # Pa
-LAWS, SEED = 60, 13  # of the tolerances
-DRAWN = 12  # random laws of the placing of nodes
+LAWS, SEED = 40, 13  # of the tolerances
+DRAWN = 30  # random laws of the placing of nodes
 
 
 def run(*command):

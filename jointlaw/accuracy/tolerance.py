@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 MARGIN = 1.5  # how many times better than the tolerance, calibrated by `benchmarks/tolerance.py`
 EXCURSIONS = 128  # random paths beside the standard ones: what others ask shows in few of them
-_U = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40)
+_FINER = (1.0, 1.5, 2.0)  # times the reference
+_U = _DEPTH = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48)
 _PHI = (3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 32)
-_DEPTH = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40)
 _SHARES = (0.5, 0.75)  # of the reference, for the directions that are not being tried
 
 
@@ -40,9 +40,13 @@ def coarsest(law: JointLaw, bound: float, excursions: int = 0) -> tuple[Resoluti
 
     None where no resolution within the reference's meets it.
     """
-    suite, best = standard_suite(law, 1.0, excursions), reference_resolution(law)
-    if _left_out(suite, 1.0) > bound / 2:  # the reference itself must be better than what it judges
-        suite, best = standard_suite(law, 1.5, excursions), scaled(best, 1.5)
+    for finer in _FINER:
+        suite = standard_suite(law, finer, excursions)
+        best = scaled(reference_resolution(law), finer)
+        if _left_out(suite, 1.0) <= bound / 2:  # the reference must be better than what it judges
+            break
+    if (left_out := _left_out(suite, 1.0)) > bound:
+        return None, left_out
     known: dict[Resolution, float] = {}
 
     def error(r: Resolution) -> float:
@@ -58,14 +62,17 @@ def coarsest(law: JointLaw, bound: float, excursions: int = 0) -> tuple[Resoluti
     needs = []
     for name, choices, times in (("u", _U, 2), ("phi", _PHI, 2), ("depth", _DEPTH, 1)):
         below = [n for n in choices if n <= getattr(best, name)]
-        reached: list[float] = []
+        alone: list[float] = []
+        closest = float("inf")
         for n in track(below, f"nodes of {name}", len(below)):
-            reached.append(error(replace(rest, **{name: n})))
-            if max(reached[-times:]) <= bound and len(reached) >= times:
+            alone.append(error(replace(rest, **{name: n})))
+            if len(alone) >= times:
+                closest = min(closest, max(alone[-times:]))
+            if closest <= bound:
                 break
         else:
-            return None, min(reached)
-        needs.append(below[len(reached) - times :])
+            return None, closest
+        needs.append(below[len(alone) - times :])  # finer ones too, for errors add up
     tried = [Resolution(*nodes) for nodes in product(*needs)]
     for r in sorted(tried, key=lambda r: (r.sliders, r.u, r.phi)):
         if error(r) <= bound:

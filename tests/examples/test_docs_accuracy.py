@@ -56,3 +56,13 @@ def test_changes_are_gathered_over_scenes(made):
     tables = {"one": head + rule + first + "\n(1) a note\n", "two": head + rule + other}
     found = made.by_ingredient(tables)
     assert found == [["c = 0", "2", "1.50", "40%", "3 to 700", "1", "0.90 to 1.10"]]
+
+
+def test_rules_for_nodes_are_measured_against_each_other(made):
+    law = made.jl.presets.load("westerly-rough")
+    laws = made.nodes.Laws([(law, made.nodes.standard_suite(law))], [])
+    now, staggered = made.rows_of(laws.azimuths())
+    pairs = {t: [float(row[t].split()[0]) for row in (now, staggered)] for t in list(now)[1:]}
+    assert all(a == b for t, (a, b) in pairs.items() if t.startswith("1 x"))  # one ring: no other
+    assert any(a != b for a, b in pairs.values())
+    assert all(b < 1.6 * a for a, b in pairs.values())

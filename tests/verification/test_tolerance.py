@@ -76,6 +76,24 @@ def test_answer_is_the_same_again_and_keeps_the_law():
     assert replace(made, resolution=law.resolution) == law
 
 
+def test_errors_that_add_up_ask_for_more_than_each_direction_alone(benchmark):
+    law = jl.JointLaw(
+        orientation=jl.Orientation(1.9186658847280933, 1.49203355976077, 0.008761543460804024),
+        asperity=jl.Asperity(
+            K=6023934.454440096, lam=0.989442676702933, eta=0.24647504034315013, mu=0.52448474274427
+        ),
+        asperity_density=1e10,
+        heights=jl.GammaHeights(
+            7.187562116553808, 1.1144834507488927e-06, 1.6284759080927048e-06,
+            formation="individual",
+        ),
+        plane=0.0,
+    )  # fmt: skip
+    d = benchmark.random_paths(law, np.random.default_rng(5))
+    truth = tractions(replace(law, resolution=reference_resolution(law)), d)
+    assert errors(tractions(law.at_tolerance(0.01), d), truth)[0].max() < 0.01
+
+
 def test_what_cannot_be_met_is_refused_with_what_was_reached():
     law = replace(jl.presets.load("linear-a6"), plane=0.0)
     with pytest.raises(ValueError, match=r"tolerance = 1e-07 cannot be met .* was reached"):

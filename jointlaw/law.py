@@ -236,8 +236,8 @@ class JointLaw:
         tolerance: largest error of the traction on a path, as a share of the path's largest
         traction, > 0: 0.01 is one per cent. Held with a margin on the standard paths and on 128
         random ones within the law's closure range (`jointlaw.accuracy.suite`); nothing is timed, so
-        the answer is the same on every machine. Takes seconds, at 0.001 up to two minutes, without
-        the compiled kernel more. Raises ValueError where no resolution tried is that accurate.
+        the answer is the same on every machine. Takes seconds, at 0.001 minutes for steep
+        facets, without the compiled kernel more. Raises ValueError where no resolution tried is that accurate.
         """
         from .accuracy.tolerance import at_tolerance
 

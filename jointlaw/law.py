@@ -237,7 +237,8 @@ class JointLaw:
         traction, > 0: 0.01 is one per cent. Held with a margin on the standard paths and on 128
         random ones within the law's closure range (`jointlaw.accuracy.suite`); nothing is timed, so
         the answer is the same on every machine. Takes seconds, at 0.001 minutes for steep
-        facets, without the compiled kernel more. Raises ValueError where no resolution tried is that accurate.
+        facets, without the compiled kernel more. Raises ValueError where no resolution tried is
+        that accurate.
         """
         from .accuracy.tolerance import at_tolerance
 

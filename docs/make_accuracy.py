@@ -21,7 +21,7 @@ import nodes  # noqa: E402
 import numpy as np  # noqa: E402
 import reductions  # noqa: E402
 import tolerance  # noqa: E402
-from _ablations import HEAD, by_ingredient, rows_of  # noqa: E402, F401
+from _ablations import HEAD, by_ingredient  # noqa: E402
 from _pages import HERE, fill, has, read, table  # noqa: E402
 
 import jointlaw as jl  # noqa: E402

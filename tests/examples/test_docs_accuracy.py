@@ -37,8 +37,10 @@ def test_all_short_scenes_are_ablated(made):
 
 @pytest.mark.parametrize("key", ["ingredients", "slip", "plane"])
 def test_printed_tables_are_the_computed_ones(made, key):
+    from _ablations import rows_of  # on the path of `made`
+
     page = next(page for page in made.PAGES if made.has(page, key))
-    printed, computed = (made.rows_of(t) for t in (made.read(page, key), made.PARTS[key]()))
+    printed, computed = (rows_of(t) for t in (made.read(page, key), made.PARTS[key]()))
     assert len(printed) == len(computed)
     for old, new in zip(printed, computed, strict=True):
         for title, value in new.items():
@@ -59,9 +61,11 @@ def test_changes_are_gathered_over_scenes(made):
 
 
 def test_rules_for_nodes_are_measured_against_each_other(made):
+    from _ablations import rows_of
+
     law = made.jl.presets.load("westerly-rough")
     laws = made.nodes.Laws([(law, made.nodes.standard_suite(law))], [])
-    now, staggered = made.rows_of(laws.azimuths())
+    now, staggered = rows_of(laws.azimuths())
     pairs = {t: [float(row[t].split()[0]) for row in (now, staggered)] for t in list(now)[1:]}
     assert all(a == b for t, (a, b) in pairs.items() if t.startswith("1 x"))  # one ring: no other
     assert any(a != b for a, b in pairs.values())

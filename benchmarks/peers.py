@@ -9,12 +9,11 @@ those of these least times.
 - ours: the fewest sliders that meet the tolerance on the standard paths, motion in one plane,
   traction alone, no ledger, a batch of 10 000; at 1 % also with the tangent. "at_tolerance" is
   `law.at_tolerance(t)`, which keeps the tolerance on other paths too and needs more sliders.
-- numpy: the same law the obvious way, which is how the tests judge the package
-  (tests/verification/slow_bed.py) with an axis of joints added: a bed of linear springs that touch
-  at fixed depths, each with its slider, for every orientation of a Gauss rule in inclination times
-  even azimuths on the circle; array operations over all 10 000 joints. The bed is the smallest of a
-  spread that meets the same tolerance on the standard paths.
-  "in blocks" is the same for 64 joints, whose arrays stay in the cache, "one by one" for one.
+- numpy: the same law the obvious way (`plain_bed.py`): fixed springs, each with its slider, evenly
+  spaced in inclination, azimuth and touch depth, array operations over all joints (10 000, or as
+  many as make ten million springs). "tuned" places the springs as well as the tests do. Either is
+  the smallest bed of a spread that meets the same tolerance on the standard paths. "in blocks" is
+  the tuned one for 64 joints, whose arrays stay in the cache, "one by one" for one.
 - Hertz-Mindlin: YADE's InteractionLoop with its Law2_ScGeom_MindlinPhys_Mindlin, geometry included,
   on one thread (`yade -n -x`).
 """
@@ -37,13 +36,15 @@ from typing import Any
 os.environ["JOINTLAW_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
 
 import numpy as np
+from plain_bed import PlainBed, Springs, even, smallest, tuned
 
 import jointlaw as jl
-from jointlaw.accuracy.suite import Suite, errors, standard_suite
+from jointlaw.accuracy.suite import standard_suite
 from jointlaw.accuracy.tolerance import coarsest
 
 TOLERANCES = (0.025, 0.01, 0.001)
 JOINTS, BLOCK = 10_000, 64
+SPRINGS = 10_000_000  # most of a plain bed: its arrays take half a gigabyte
 
 YADE = """
 import sys
@@ -74,87 +75,6 @@ while sys.stdin.readline().strip() == "go":
 """
 
 
-class PlainBed:
-    """n joints as numpy would have them: fixed springs, each with its slider.
-
-    Springs (M, D, n): M orientations, D touch depths with stiffness k (M, D), all of them stepped
-    whether they touch or not. No lumping and no shortcut but one: the traction across the plane of
-    motion is not summed.
-    """
-
-    def __init__(self, law: jl.JointLaw, n: int, u: int, phi: int, depth: int) -> None:
-        o, p = law.orientation, law.asperity
-        x, w = np.polynomial.legendre.leggauss(u)
-        U, P = np.repeat(0.5 * (x + 1), phi), np.tile(np.arange(phi) * 2 * np.pi / phi, u)
-        weight = np.repeat(0.5 * w, phi) / phi
-        weight *= 1 + o.b / 2 * (3 * U**2 - 1) + 3 * o.c * (1 - U**2) * np.cos(2 * P)
-        theta = np.arccos(U) / o.a
-        c1, st = np.cos(theta), np.sin(theta)
-        self.n = np.stack([c1, st * np.cos(P)])  # (2, M): closure and shear in the plane
-        self.s, self.t = np.stack([-st, c1 * np.cos(P)]), np.stack([0 * c1, -np.sin(P)])
-        self.c1, self.lam, self.mu = c1[:, None, None], p.lam, p.mu
-        reach = 1.2 * law.closure_range * (1 + np.tan(theta))  # the standard paths' and some more
-        edges = reach[:, None] * (np.arange(depth) / (depth - 1)) ** 2
-        force, slope = law.curve.force(edges)
-        k = np.diff(slope, axis=1)
-        moment = np.diff(force, axis=1) - slope[:, :-1] * np.diff(edges, axis=1)
-        z = edges[:, 1:] - np.divide(moment, k, out=np.zeros_like(k), where=k > 0)
-        at_once = slope[:, :1]
-        k, z = np.concatenate([at_once, k], axis=1), np.concatenate([0 * at_once, z], axis=1)
-        scale = law.asperity_density * weight * p.lam * p.K * c1 ** (1 + p.eta)
-        self.k, self.z = (scale[:, None] * k)[:, :, None], z[:, :, None]
-        self.delta = np.zeros((2, n))
-        self.e = np.zeros((2, *k.shape, n))
-        self.y = np.zeros((len(U), 1, n))
-
-    def update(self, d: np.ndarray) -> np.ndarray:
-        """Advance by d (2, n); traction (2, n)."""
-        self.delta += d
-        y0, y1 = self.y, np.einsum("im,in->mn", self.n, self.delta)[:, None] / self.c1
-        squeeze = np.maximum(y1 - self.z, 0.0)
-        rise = np.where(y1 > y0, y1 - y0, 1.0)
-        part = np.where(y0 < self.z, np.minimum(squeeze / rise, 1.0), 1.0) * (squeeze > 0)
-        self.e *= squeeze > 0
-        for e, direction in zip(self.e, (self.s, self.t), strict=True):
-            e += part * np.einsum("im,in->mn", direction, d)[:, None]
-        limit = self.mu * self.lam * self.c1 * squeeze
-        size = np.hypot(*self.e)
-        self.e *= limit / np.maximum(np.maximum(size, limit), 1e-300)
-        self.y = y1
-        normal = np.sum(self.k * squeeze, axis=1)
-        shear = np.sum(self.k * self.e, axis=2) / (self.c1[:, :, 0] * self.lam)
-        F: np.ndarray = self.n @ normal + self.s @ shear[0] + self.t @ shear[1]
-        return F
-
-
-def plain_error(law: jl.JointLaw, suite: Suite, rule: tuple[int, int, int]) -> float:
-    """Largest error of a plain bed on the standard paths."""
-    bed = PlainBed(law, suite.d.shape[1], *rule)
-    F = np.stack([bed.update(step.T).T for step in suite.d])
-    return float(errors(F, suite.F)[0].max())
-
-
-def plain_rule(law: jl.JointLaw, suite: Suite, tolerance: float) -> tuple[tuple[int, ...], float]:
-    """The smallest plain bed that meets the tolerance, and its error."""
-    spread = [(u, phi, depth) for u in (1, 2, 3, 4, 6, 8, 12) for phi in (6, 8, 12, 16)
-              for depth in (8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384)]  # fmt: skip
-    fine = (12, 16, 384)
-    alone = [  # what each direction needs while the others are fine
-        next((n for n in sorted({rule[i] for rule in spread})
-              if plain_error(law, suite, (*fine[:i], n, *fine[i + 1 :])) <= tolerance), fine[i])
-        for i in range(3)
-    ]  # fmt: skip
-    best = 1.0
-    for rule in sorted(spread, key=lambda r: r[0] * r[1] * r[2]):
-        if all(a >= b for a, b in zip(rule, alone, strict=True)):
-            best = min(best, error := plain_error(law, suite, rule))
-            if error <= tolerance:
-                return rule, error
-    raise SystemExit(
-        f"no plain bed of the spread meets {tolerance:.2g}; the best reaches {best:.2g}"
-    )
-
-
 def steps_of(law: jl.JointLaw, n: int) -> tuple[np.ndarray, np.ndarray]:
     """A closure (n, 2), and steps (6, n, 2) that shake the joint around it: slip and separation."""
     rng = np.random.default_rng(0)
@@ -180,9 +100,9 @@ def ours(law: jl.JointLaw, n: int, tangent: bool) -> Any:
     return once
 
 
-def plain(law: jl.JointLaw, n: int, rule: tuple[int, ...]) -> Any:
+def plain(law: jl.JointLaw, springs: Springs, n: int) -> Any:
     """As `ours`, for the plain bed."""
-    bed = PlainBed(law, n, *rule)
+    bed = PlainBed(law, springs, n)
     first, steps = steps_of(law, n)
     bed.update(first.T.copy())
     count = [0]
@@ -245,21 +165,25 @@ def compare(law: jl.JointLaw, rounds: int) -> dict[str, Any]:
             rows[name] = {"tolerance": tolerance, "error": error, "sliders": r.sliders,
                           "resolution": f"{r.u} x {r.phi} x {r.depth}"}  # fmt: skip
             cases[name] = ours(made, JOINTS, tangent)
-        bed, error = plain_rule(law, suite, tolerance)
-        about = {"tolerance": tolerance, "error": error, "sliders": int(np.prod(bed)),
-                 "resolution": " x ".join(map(str, bed))}  # fmt: skip
-        for size, how in ((JOINTS, ""), (BLOCK, ", in blocks"), (1, ", one by one")):
-            name = f"numpy at {tolerance:.1%}{how}"
-            rows[name], cases[name] = about, plain(law, size, bed)
+        for place, form in ((even, ""), (tuned, ", tuned")):
+            rule, error = smallest(law, suite, tolerance, place)
+            count, springs = int(np.prod(rule)), place(law, rule)
+            about = {"tolerance": tolerance, "error": error, "sliders": count,
+                     "resolution": " x ".join(map(str, rule))}  # fmt: skip
+            sizes = {"": min(JOINTS, SPRINGS // count)}
+            if place is tuned:
+                sizes |= {", in blocks": BLOCK, ", one by one": 1}
+            for how, size in sizes.items():
+                name = f"numpy at {tolerance:.1%}{form}{how}"
+                rows[name], cases[name] = about, plain(law, springs, size)
     with tempfile.TemporaryDirectory() as folder:
         yade = Yade(folder)
         rows["Hertz-Mindlin, YADE"], cases["Hertz-Mindlin, YADE"] = {}, yade.once
         best = dict.fromkeys(cases, float("inf"))
-        long = {name for name in cases if name.startswith("numpy") and "," not in name}
-        long.add("Hertz-Mindlin, YADE")
+        quick = ("ours", "at_tolerance"), (", in blocks", ", one by one")
         for turn in range(rounds):
             for name, once in cases.items():
-                times = 2 if name in long else 30
+                times = 30 if name.startswith(quick[0]) or name.endswith(quick[1]) else 2
                 best[name] = min(best[name], *(once() for _ in range(times)))
             print(f"round {turn + 1} of {rounds}", file=sys.stderr)
         yade.close()

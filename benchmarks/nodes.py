@@ -1,12 +1,12 @@
-"""Where to put the nodes: rules tried, and the frontier before and after.
+"""Where to put the nodes: rules tried, and the frontier with plain nodes and with ours.
 
     python benchmarks/nodes.py [--laws 16] [--picture docs/pictures/frontier.png]
 
 Largest error of the traction on the standard paths, in per cent: median over the laws, and the 90th
 percentile in brackets; then that of the named resolutions for each preset. Laws are drawn as in
 benchmarks/tolerance.py, a >= 1.4, with the presets, motion in one plane (staggered azimuths: in
-space). `before` is what the package did up to version 0.1.0: Gauss-Legendre inclinations, depths
-(i/n)^1.5 of closure_range (1 + tan theta).
+space). Plain nodes are Gauss-Legendre inclinations, and depths (i/n)^1.5 of closure_range
+(1 + tan theta).
 """
 
 from __future__ import annotations
@@ -108,8 +108,8 @@ def gauss(x: np.ndarray, w: np.ndarray, count: int) -> tuple[np.ndarray, np.ndar
 
 
 INCLINATIONS: dict[str, Rule | None] = {
-    "Gauss rule of the density (now)": None,
-    "Gauss-Legendre in u (before)": legendre,
+    "Gauss rule of the density (ours)": None,
+    "Gauss-Legendre in u (plain)": legendre,
     "Gauss-Legendre in sqrt(u)": mapped(lambda v: v**2, lambda v: 2 * v),
     "Gauss-Legendre in theta": mapped(
         lambda v: np.sin(np.pi / 2 * v), lambda v: np.pi / 2 * np.cos(np.pi / 2 * v)
@@ -175,8 +175,8 @@ def quantiles(power: float, low: float, beyond: float) -> Rule:
 
 
 DEPTHS: dict[str, Rule | None] = {
-    "sqrt(Phi'') Phi^-0.1, last 1.8 (now)": None,
-    "(i/n)^1.5 (before)": graded(1.5),
+    "sqrt(Phi'') Phi^-0.1, last 1.8 (ours)": None,
+    "(i/n)^1.5 (plain)": graded(1.5),
     "(i/n)^1.2": graded(1.2),
     "(i/n)^1": graded(1.0),
     "(i/n)^1.2 of 0.8": graded(1.2, 0.8),
@@ -217,12 +217,12 @@ def frontier(cases: list[tuple[jl.JointLaw, Suite]]) -> dict[int, np.ndarray]:
     return found
 
 
-def picture(path: str, before: Any, after: Any) -> None:
+def picture(path: str, plain: Any, ours: Any) -> None:
     """Median and 90th percentile of both frontiers."""
     from matplotlib import pyplot
 
     figure, axis = pyplot.subplots(figsize=(6.5, 4.5), layout="constrained")
-    for found, color, label in ((before, "0.5", "before"), (after, "C0", "now")):
+    for found, color, label in ((plain, "0.5", "plain nodes"), (ours, "C0", "our nodes")):
         x, errors = list(found), np.array(list(found.values()))
         axis.loglog(x, np.median(errors, axis=1), "o-", ms=3, color=color, label=label)
         axis.loglog(x, np.quantile(errors, 0.9, axis=1), "--", color=color, lw=1,
@@ -273,21 +273,21 @@ class Laws:
         space = [replace(law, plane=None) for law, _ in self.random[:8]]
         there = [(law, standard_suite(law)) for law in track(space, "references", len(space))]
         lines = [head("in space, u x phi at 16 cells", [f"{u} x {p}" for u, p in RULES])]
-        for name, rule in (("azimuths in line (now)", None), ("staggered", staggered)):
+        for name, rule in (("azimuths in line (ours)", None), ("staggered", staggered)):
             with placed(facets=rule):
                 lines.append(row(name, [worst(there, (u, p, 16)) for u, p in RULES]))
         return "\n".join(lines)
 
     def frontier(self, path: str | None = None) -> str:
-        """Before and after, and the picture of both where a path is given."""
+        """With plain nodes and with ours, and the picture of both where a path is given."""
         cases = self.random + self.presets
-        after = frontier(cases)
+        ours = frontier(cases)
         with placed(inclinations=legendre, depths=graded(1.5)):
-            before = frontier(cases)
+            plain = frontier(cases)
         if path:
-            picture(path, before, after)
-        rows = [row(str(n), [before[n], after[n]]) for n in (6, 12, 24, 48, 96, 200, 576)]
-        return "\n".join([head("sliders", ["before", "now"]), *rows])
+            picture(path, plain, ours)
+        rows = [row(str(n), [plain[n], ours[n]]) for n in (6, 12, 24, 48, 96, 200, 576)]
+        return "\n".join([head("sliders", ["plain nodes", "our nodes"]), *rows])
 
     def named(self) -> str:
         lines = [head("named", ["sliders", *jl.presets.names()])]
@@ -305,7 +305,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--laws", type=int, default=16, help="random ones, beside the presets")
-    parser.add_argument("--picture", help="file for the frontier before and after")
+    parser.add_argument("--picture", help="file for the picture of the frontiers")
     options = parser.parse_args()
     laws = Laws.draw(options.laws)
     for made in (laws.depths, laws.inclinations, laws.azimuths,

@@ -34,7 +34,7 @@ PAGES = "how-accurate.md", "only-what-is-needed.md"
 PICTURES = HERE / "pictures"
 SCENES = [name for name in names() if has(PAGES[1], name)]
 STRESS = 10e6  # Pa
-LAWS, SEED = 40, 13  # of the tolerances
+LAWS, SEED = 50, 31  # of the tolerances
 DRAWN = 30  # random laws of the placing of nodes
 
 

@@ -65,13 +65,13 @@ class Suite:
         return errors(tractions(law, self.d), self.F)
 
 
-def standard_suite(law: JointLaw, finer: float = 1.0, excursions: int = 0) -> Suite:
-    """The standard paths of a law, with tractions at `finer` times the reference resolution.
+def standard_suite(law: JointLaw, best: Resolution | None = None, excursions: int = 0) -> Suite:
+    """The standard paths of a law, with tractions at `best`, by default the reference resolution.
 
     `excursions` random paths come after them. Second-order convergence makes the reference's own
     error about 0.8 of its `uncertainty`.
     """
-    return _suite(replace(law, resolution=scaled(reference_resolution(law), finer)), excursions)
+    return _suite(replace(law, resolution=best or reference_resolution(law)), excursions)
 
 
 @lru_cache(maxsize=16)

@@ -14,12 +14,12 @@ from .suite import Suite, reference_resolution, scaled, standard_suite
 if TYPE_CHECKING:
     from ..law import JointLaw
 
-MARGIN = 1.5  # how many times better than the tolerance, calibrated by `benchmarks/tolerance.py`
+MARGIN = 1.75  # how many times better than the tolerance, calibrated by `benchmarks/tolerance.py`
 EXCURSIONS = 128  # random paths beside the standard ones: what others ask shows in few of them
-_FINER = (1.0, 1.5, 2.0)  # times the reference
-_U = _DEPTH = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48)
-_PHI = (3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 32)
-_SHARES = (0.5, 0.75)  # of the reference, for the directions that are not being tried
+_LARGEST = 4  # times the sliders of the usual reference: the finest that is tried
+_U = _DEPTH = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64, 80, 96, 112)
+_PHI = (3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 32, 40, 48)
+_SHARES = (0.5, 0.75, 1.0)  # of the reference, for the directions that are not being tried
 
 
 def at_tolerance(law: JointLaw, tolerance: float) -> JointLaw:
@@ -40,11 +40,7 @@ def coarsest(law: JointLaw, bound: float, excursions: int = 0) -> tuple[Resoluti
 
     None where no resolution within the reference's meets it.
     """
-    for finer in _FINER:
-        suite = standard_suite(law, finer, excursions)
-        best = scaled(reference_resolution(law), finer)
-        if _left_out(suite, 1.0) <= bound / 2:  # the reference must be better than what it judges
-            break
+    suite, best = _reference(law, bound, excursions)
     if (left_out := _left_out(suite, 1.0)) > bound:
         return None, left_out
     known: dict[Resolution, float] = {}
@@ -56,28 +52,52 @@ def coarsest(law: JointLaw, bound: float, excursions: int = 0) -> tuple[Resoluti
 
     # What each direction needs by itself, the others being fine: a resolution with less of it can
     # meet the suite by luck alone, when errors of two directions cancel. Orientations, whose error
-    # wavers as contacts slip and part one by one, must meet it with the next finer choice as well.
-    share = next((s for s in _SHARES if _left_out(suite, s) < bound / 4), _SHARES[-1])
+    # wavers as contacts slip and part one by one, must meet it with the next finer choice as well,
+    # or have as many as the reference.
+    share = next((s for s in _SHARES if _left_out(suite, s) < bound / 3), _SHARES[-1])
     rest = scaled(best, share)
     needs = []
     for name, choices, times in (("u", _U, 2), ("phi", _PHI, 2), ("depth", _DEPTH, 1)):
-        below = [n for n in choices if n <= getattr(best, name)]
+        most = getattr(best, name)
+        tried = [n for n in choices if n < most] + [most]
         alone: list[float] = []
-        closest = float("inf")
-        for n in track(below, f"nodes of {name}", len(below)):
+        for n in track(tried, f"nodes of {name}", len(tried)):
             alone.append(error(replace(rest, **{name: n})))
-            if len(alone) >= times:
-                closest = min(closest, max(alone[-times:]))
-            if closest <= bound:
+            if len(alone) >= times and max(alone[-times:]) <= bound:
                 break
-        else:
-            return None, closest
-        needs.append(below[len(alone) - times :])  # finer ones too, for errors add up
-    tried = [Resolution(*nodes) for nodes in product(*needs)]
-    for r in sorted(tried, key=lambda r: (r.sliders, r.u, r.phi)):
+        meets = next((k for k in range(len(alone)) if max(alone[k:]) <= bound), None)
+        if meets is None:
+            return None, min(alone)
+        needs.append(tried[meets:])  # finer ones too, for errors add up
+    several = [Resolution(*nodes) for nodes in product(*needs)]
+    for r in sorted(several, key=lambda r: (r.sliders, r.u, r.phi)):
         if error(r) <= bound:
             return r, error(r)
-    return None, min(map(error, tried))
+    return None, min(map(error, several))
+
+
+def _reference(law: JointLaw, bound: float, excursions: int) -> tuple[Suite, Resolution]:
+    """The suite with a reference that errs by half of `bound` at most, or the finest, and which."""
+    best = finer = reference_resolution(law)
+    most = _LARGEST * best.sliders
+    while finer.sliders <= most:
+        best = finer
+        suite = standard_suite(law, best, excursions)
+        if _left_out(suite, 1.0) <= bound / 2:
+            break
+        finer = _refined(law, suite, best)
+    return suite, best
+
+
+def _refined(law: JointLaw, suite: Suite, best: Resolution) -> Resolution:
+    """1.5 times the nodes in the direction that errs most with two thirds of them."""
+
+    def lost(name: str) -> float:
+        fewer = replace(best, **{name: getattr(scaled(best, 2 / 3), name)})
+        return float(suite.errors(replace(law, resolution=fewer))[0].max())
+
+    worst = max(("u", "phi", "depth"), key=lost)
+    return replace(best, **{worst: getattr(scaled(best, 1.5), worst)})
 
 
 def _left_out(suite: Suite, share: float) -> float:

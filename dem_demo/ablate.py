@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import csv
-import json
 import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from jointlaw._files import write_json
 
 from .ingredients import Variant, variants, working_stress
 from .interfaces import Refused
@@ -182,4 +183,4 @@ def write(rows: list[Row], folder: Path) -> None:
             writer.writerow([row.name, *cells, row.steps, row.time_step, row.cpu, ratio, row.note])
     (folder / "ablation.md").write_text(table(rows) + "\n")
     summary = {"runs": [row.__dict__ for row in rows], "time_ratio": time_ratios(rows)}
-    (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    write_json(folder / "summary.json", summary)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
+
+from jointlaw._files import write_json
 
 from . import ablate
 from .compare import compare, critical_tilts
@@ -163,7 +164,7 @@ def _compare(words: list[str]) -> int:
             if row["refused"]:
                 print(f"    stopped: {row['refused']}")
     if given.out:
-        given.out.write_text(json.dumps(rows, indent=2) + "\n")
+        write_json(given.out, rows)
     return 0
 
 

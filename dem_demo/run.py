@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from pathlib import Path
 
 from tqdm import tqdm
+
+from jointlaw._files import write_json
 
 from . import picture, plots, report
 from .energy import COLUMNS
@@ -74,7 +75,7 @@ def write(record: Record, summary: dict, folder: Path, pictures: bool) -> None:
     """All files of a run."""
     folder.mkdir(parents=True, exist_ok=True)
     record.write(folder)
-    (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    write_json(folder / "summary.json", summary)
     if pictures:
         plots.energy(record, folder / "energy.png")
         if record.scene.watch.get("slip") or record.scene.watch.get("shear"):

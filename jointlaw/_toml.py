@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
-import threading
 import tomllib
 from dataclasses import MISSING, fields
 from pathlib import Path
@@ -13,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
+from ._files import replace_file
 from .asperity import Asperity
 from .heights import GammaHeights, Heights
 from .orientation import Orientation
@@ -27,17 +26,6 @@ _LAW_KEYS = {
 }  # fmt: skip
 T = TypeVar("T")
 _ABOUT = "about"  # free table for title, source and notes
-
-
-def replace_file(path: Path, data: bytes) -> None:
-    """Write a file whole or not at all."""
-    mine = f"{os.getpid()}-{threading.get_ident()}"  # another thread may write the same file
-    temporary = path.with_name(f".{path.name}.{mine}.tmp")
-    try:
-        temporary.write_bytes(data)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def write_law(law: JointLaw, path: Path | None) -> str:

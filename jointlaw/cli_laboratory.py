@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
 from dataclasses import replace
@@ -15,7 +14,7 @@ import numpy as np
 from . import presets, units
 from ._checks import number
 from ._command import add_command
-from ._toml import replace_file
+from ._files import write_json
 from .law import JointLaw
 from .paths import CONTROLS, PathError, closure_test, direct_shear
 from .record import UNITS, Record
@@ -167,9 +166,8 @@ def _write(record: Record, law: JointLaw, options: argparse.Namespace, name: str
     record.to_npz(folder / f"{name}.npz")
     law.to_toml(folder / "law.toml")
     settings = {k: v for k, v in vars(options).items() if k not in ("run", "out")}
-    result = {k: v if math.isfinite(v) else None for k, v in record.summary().items()}
-    summary = {"settings": settings, "result": result, "units": UNITS}
-    replace_file(folder / "summary.json", (json.dumps(summary, indent=2) + "\n").encode())
+    summary = {"settings": settings, "result": record.summary(), "units": UNITS}
+    write_json(folder / "summary.json", summary)
     files = [f"{name}.csv", f"{name}.npz", "law.toml", "summary.json"]
     try:
         record.plot(folder / f"{name}.png")

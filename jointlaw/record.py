@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ._checks import Array
-from ._toml import replace_file
+from ._files import replace_file
 
 UNITS = {
     "closure": "m",

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ._checks import Array
-from ._toml import replace_file
+from ._files import replace_file
 
 if TYPE_CHECKING:
     from .law import JointLaw

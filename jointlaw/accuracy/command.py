@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
-import math
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +10,7 @@ from typing import Any
 
 from .. import presets, units
 from .._command import add_command
-from .._toml import replace_file
+from .._files import write_json
 
 
 def add_tradeoff_command(commands: Any) -> None:
@@ -45,11 +43,12 @@ def _tradeoff(options: argparse.Namespace) -> int:
     law = presets.load_any(options.law)
     if options.plane is not None:
         law = replace(law, plane=units.parse(options.plane, "rad"))
-    found = law.tradeoff(joints=options.joints)
     chosen = {}
-    for tolerance in options.tolerance or ():
-        r = law.at_tolerance(tolerance).resolution
-        chosen[f"{tolerance:g}"] = {"u": r.u, "phi": r.phi, "depth": r.depth}
+    for tolerance in options.tolerance or ():  # before the long work: a bad one is refused at once
+        made = law.at_tolerance(tolerance)
+        r, sliders = made.resolution, len(made.tables.c1) * made.tables.cells
+        chosen[f"{tolerance:g}"] = {"u": r.u, "phi": r.phi, "depth": r.depth, "sliders": sliders}
+    found = law.tradeoff(joints=options.joints)
     folder: Path = options.out
     folder.mkdir(parents=True, exist_ok=True)
     found.to_csv(folder / "tradeoff.csv")
@@ -62,11 +61,11 @@ def _tradeoff(options: argparse.Namespace) -> int:
         "joints": found.joints,
         "timed on": found.how,
         "reference uncertainty": dict(zip(found.paths, found.uncertainty.tolist(), strict=True)),
-        "frontier": [_plain(r) for r in rows if (r["u"], r["phi"], r["depth"]) in frontier],
+        "frontier": [r for r in rows if (r["u"], r["phi"], r["depth"]) in frontier],
         "at tolerance": chosen,
         "units": {"error": "share of the path's largest traction", "ns": "ns per joint and update"},
     }
-    replace_file(folder / "summary.json", (json.dumps(result, indent=2) + "\n").encode())
+    write_json(folder / "summary.json", result)
     files = ["tradeoff.csv", "law.toml", "summary.json"]
     try:
         found.plot(folder / "tradeoff.png")
@@ -75,12 +74,7 @@ def _tradeoff(options: argparse.Namespace) -> int:
         print(f"no picture: {error}", file=sys.stderr)
     print(found)
     for text, nodes in chosen.items():
-        given = ", ".join(f"{k}={n}" for k, n in nodes.items())
-        print(f"at_tolerance({text}): Resolution({given}), {math.prod(nodes.values())} sliders")
+        given = ", ".join(f"{k}={nodes[k]}" for k in ("u", "phi", "depth"))
+        print(f"at_tolerance({text}): Resolution({given}), {nodes['sliders']} sliders")
     print(f"wrote {', '.join(files)} to {folder}")
     return 0
-
-
-def _plain(row: dict[str, Any]) -> dict[str, Any]:
-    """NaN is no JSON."""
-    return {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in row.items()}

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._checks import Array, whole
+from .._files import replace_file
 from .._progress import track
-from .._toml import replace_file
 from ..engine import thread_count
 from ..resolution import NAMED, Resolution, resolve
 from .suite import Suite, errors, reference_resolution, scaled, standard_suite, tangents

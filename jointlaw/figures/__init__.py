@@ -6,12 +6,11 @@ needs matplotlib (extra `plot`).
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from .._files import replace_file, write_json
 from .._progress import track
-from .._toml import replace_file
 from .elastic import figure_8, figure_9
 from .normal import figure_10, figure_11, figure_12, figure_13
 from .render import png, require_matplotlib
@@ -49,6 +48,5 @@ def write(folder: str | Path, numbers: Sequence[int] = ()) -> list[Path]:
         replace_file(out / f"{page.name}.csv", page.csv().encode())
         files += [out / f"{page.name}.png", out / f"{page.name}.csv"]
         captions[page.name] = {"title": page.title, "caption": page.caption}
-    text = json.dumps({"figures": captions}, indent=2, ensure_ascii=False)
-    replace_file(out / "summary.json", (text + "\n").encode())
+    write_json(out / "summary.json", {"figures": captions})
     return [*files, out / "summary.json"]

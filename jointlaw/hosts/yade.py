@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import math
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from .._toml import replace_file
+from .._files import replace_file, write_json
 from ..law import JointLaw
 from ..table import JointTable
 from ..tables.tabulate import tabulate
@@ -54,5 +53,5 @@ def export_yade(
         "table": {k: v for k, v in table.metadata.items() if k != "law"},
         "dropped_by_the_table": report.as_dict(),
     }
-    replace_file(folder / "summary.json", (json.dumps(summary, indent=2) + "\n").encode())
+    write_json(folder / "summary.json", summary)
     return table

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ import numpy as np
 
 from .. import units
 from .._command import add_command
-from .._toml import replace_file
+from .._files import replace_file, write_json
 from . import datasets
 from .baselines import Comparison, compare
 from .curve_files import Curve, read_closure
@@ -100,7 +99,7 @@ def _write(folder: Path, item: str, fit: Fit, curve: Curve, held: Comparison | N
         summary["unloading"] = vars(loop)
     fit.to_toml(folder / "law.toml", title=f"Fit to {Path(item).name}")
     replace_file(folder / "report.md", text.encode())
-    replace_file(folder / "summary.json", (json.dumps(summary, indent=2) + "\n").encode())
+    write_json(folder / "summary.json", summary)
     files = ["law.toml", "report.md", "summary.json"]
     try:
         plot_fit(fit, folder / "fit.png", held)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .._toml import replace_file
+from .._files import replace_file
 from .fit import Fit
 from .measured import ClosureCurve
 from .priors import scale_of

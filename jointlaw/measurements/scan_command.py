@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import json
-import math
 import sys
 from pathlib import Path
 from typing import Any
 
 from .. import units
 from .._command import add_command
-from .._toml import replace_file
+from .._files import replace_file, write_json
 from .scan_files import read_scan
 from .surface import SurfaceFit, from_surface
 
@@ -39,7 +37,7 @@ def _run(options: argparse.Namespace) -> int:
     folder.mkdir(parents=True, exist_ok=True)
     text = fit.report()
     replace_file(folder / "report.md", text.encode())
-    replace_file(folder / "summary.json", (json.dumps(_summary(fit), indent=2) + "\n").encode())
+    write_json(folder / "summary.json", _summary(fit))
     replace_file(folder / "surface.toml", _toml(fit, Path(options.file).name).encode())
     files = ["surface.toml", "report.md", "summary.json"]
     try:
@@ -53,12 +51,9 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _summary(fit: SurfaceFit) -> dict[str, Any]:
-    def finite(values: dict[str, float]) -> dict[str, float | None]:
-        return {name: None if math.isnan(v) else v for name, v in values.items()}
-
     return {
-        "parameters_SI": finite(fit.parameters),
-        "standard_error_SI": finite(fit.standard_error),
+        "parameters_SI": fit.parameters,
+        "standard_error_SI": fit.standard_error,
         "sampling_length_m": fit.sampling_length,
         "summits": int(fit.asperities.depth.size),
         "facets": len(fit.asperities.slope),

@@ -41,14 +41,15 @@ def balance(load, use_tangent):
 
 
 # %%
-# One load step of 6 MPa sideways and 2 MPa downwards, two ways.
+# One load step, two ways: 2 MPa downwards, 6 MPa along axis 2 and 1 MPa along axis 3.
 
 load = np.array([2e6, 6e6, 1e6])
 u, newton = balance(load, use_tangent=True)
 _, modified = balance(load, use_tangent=False)
 lower.update(u)
 upper.update(turn @ u)
-print(f"displacement {u * 1e9} nm; {len(newton)} and {len(modified)} iterations")
+print(f"displacement {u * 1e9} nm in {len(newton)} iterations with the consistent tangent")
+print(f"with the tangent of the start {modified[-1]:.0e} Pa are left after {len(modified)}")
 
 figure, axis = plt.subplots(layout="constrained")
 axis.semilogy(newton, "o-", label="consistent tangent")
@@ -59,4 +60,5 @@ axis.legend()
 plt.show()
 
 # %%
-# The digits double from step to step once the branch (stick or slip of every cell) is found.
+# With the consistent tangent the number of correct digits doubles from step to step once the branch
+# (stick or slip of every cell) is found.

@@ -93,7 +93,7 @@ def test_files_give_the_array_back(tmp_path):
     z = scan(4, rows=8, columns=6)
     np.savetxt(tmp_path / "z.csv", z * 1e6, delimiter=",", header="heights in um")
     np.save(tmp_path / "z.npy", z)
-    for name, factor in (("z.csv", 1e-6), ("z.npy", 1.0)):
+    for name, factor in (("z.csv", 1e-6), ("z.npy", None)):
         read, spacing = read_scan(tmp_path / name, SPACING, factor)
         assert read == pytest.approx(z, abs=1e-15)
         assert spacing == SPACING

@@ -65,7 +65,7 @@ class ClosureCurve:
                 "only, jointlaw.first_loading(stress, closure) cuts it out"
             )
         if self.seating is None and stress[0] == 0.0:
-            set_(self, "seating", -float(closure[0]))
+            set_(self, "seating", 0.0 - float(closure[0]))  # not -0.0
         elif self.seating is not None:
             set_(self, "seating", number("seating", self.seating))
         keep = stress > 0  # a point at zero stress only says where the closure is zero

@@ -36,6 +36,7 @@ def test_a_cycle_that_begins_at_zero(tmp_path, cycle, capsys):
     summary = json.loads((tmp_path / "o" / "summary.json").read_text())
     assert summary["unloading"]["stress"] == pytest.approx(cycle[0][1])  # the first above zero
     assert "## Unloading" in out
+    assert "(seating closure 0 um)" in out
     jl.JointLaw.from_toml(tmp_path / "o" / "law.toml")
 
 

@@ -102,7 +102,8 @@ class Heights:
         measured histogram as `numpy.histogram` returns it: (counts, edges in m).
     overlap: r0, overlap at zero closure, in m, >= 0.
     formation: as in `GammaHeights`. A histogram has steps, so it needs "individual".
-    parameters: mapping of the distribution's parameters by their scipy names, with its name.
+    parameters: mapping of the distribution's parameters by their scipy names, with its name; a
+        histogram takes none.
 
     Raises ValueError for an unknown name, missing parameters, or a histogram that is none.
     """
@@ -117,15 +118,21 @@ class Heights:
         set_ = object.__setattr__
         set_(self, "overlap", at_least("heights.overlap", self.overlap, 0.0))
         one_of("heights.formation", self.formation, FORMATIONS)
-        if isinstance(self.distribution, (tuple, list)):
-            set_(self, "distribution", _histogram(self.distribution))
-            return
         try:
             given = dict(self.parameters)
         except (TypeError, ValueError):
             raise ValueError(
                 f"heights.parameters = {self.parameters!r} must map names to numbers"
             ) from None
+        if isinstance(self.distribution, (tuple, list)):
+            if given:
+                raise ValueError(
+                    f"heights.parameters = {self.parameters!r}: a histogram takes none; leave them "
+                    "out"
+                )
+            set_(self, "distribution", _histogram(self.distribution))
+            set_(self, "parameters", ())
+            return
         name, parameters = _name_and_parameters(self.distribution, given)
         set_(self, "distribution", name)
         set_(self, "parameters", tuple(sorted(parameters.items())))

@@ -74,9 +74,9 @@ class Orientation:
         mean = above("mean", mean, 0.0)
         variance = above("variance", variance, 0.0)
         # Eq. 17 leaves one quadratic in b: v0 + v1 b - b^2 = ratio (6 - b)^2
-        ratio = variance / mean**2
+        ratio = variance / mean / mean  # the square of a mean may be no float
         v0, v1 = 36 * math.pi - 108, 20 - 6 * math.pi
-        roots = np.roots([-1 - ratio, v1 + 12 * ratio, v0 - 36 * ratio])
+        roots = np.roots([-1 - ratio, v1 + 12 * ratio, v0 - 36 * ratio] if ratio < 1 else [])
         for root in sorted(roots[np.abs(roots.imag) < 1e-12].real):
             b = float(np.clip(root, -1.0, 2.0))
             if abs(b - root) < 1e-9 and (a := (6 - b) / (6 * mean)) >= 1.0 - 1e-12:

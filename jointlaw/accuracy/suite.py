@@ -86,7 +86,7 @@ def _suite(law: JointLaw, excursions: int) -> Suite:
         names += tuple(f"excursion {i + 1}" for i in range(excursions))
     d = np.diff(goal, axis=0, prepend=0.0)
     d = _hold_stress(replace(law, resolution=scaled(best, 1 / 2)), d, held, stress)
-    F = tractions(law, d)
+    F = tractions(replace(law), d)  # a copy: the cache keeps this law, and would its working space
     check = tractions(replace(law, resolution=scaled(best, 2 / 3)), d)
     return Suite(names, d, F, errors(check, F)[0])
 

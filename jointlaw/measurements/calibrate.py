@@ -14,7 +14,7 @@ from ..asperity import Asperity
 from ..heights import FORMATIONS, GammaHeights
 from ..law import JointLaw
 from .fit import Fit, Problem
-from .measured import ClosureCurve, Settings, ShearCurve
+from .measured import ClosureCurve, Settings, ShearCurve, Values
 from .priors import SCALES, chosen
 
 # Rock of shear modulus 20 GPa and Poisson's ratio 0.25 with asperities of 1 mm radius (Eq. 34),
@@ -111,7 +111,8 @@ def fit_curves(
         K (Pa m^(1-eta)), lam, eta, mu, a, b, c. Positive ones are fitted as logarithms. Every
         closure curve that does not begin at zero stress adds its seating closure (m).
     fixed: values of parameters that are known otherwise, in SI units.
-    law: values of all parameters that are not free; None takes `DEFAULTS`.
+    law: values of all parameters that are not free, `critical_slip` among them; None takes
+        `DEFAULTS`. A law of one plane or of closure alone stays one.
     formation: "individual" or "population"; None takes that of `law`, or "individual".
     priors: 95 % ranges (low, high) in physical units instead of the defaults of `priors.PRIORS`,
         or None to drop one. Besides the parameters: "overlap_share", "full_contact_stress".
@@ -121,6 +122,8 @@ def fit_curves(
     if not curves:
         raise ValueError("curves is empty: give at least one ClosureCurve or ShearCurve")
     values, settings = _base(law, formation)
+    if settings.closure_only and any(isinstance(curve, ShearCurve) for curve in curves):
+        raise ValueError("law: closure_only = True cannot shear; set it False to fit a ShearCurve")
     for name, value in (fixed or {}).items():
         _known("fixed", name)
         scale = SCALES[name]
@@ -140,6 +143,7 @@ def fit_curves(
         "seating" if i == 0 else f"seating_{i + 1}"
         for i, curve in enumerate(c for c in curves if isinstance(c, ClosureCurve))
     ]
+    _orientation_fits(values, names)
     closures = [c for c in curves if isinstance(c, ClosureCurve)]
     for name, curve in zip(seatings, closures, strict=True):
         values[name] = curve.seating if curve.seating is not None else float(np.ptp(curve.closure))
@@ -174,6 +178,9 @@ def _base(law: JointLaw | None, formation: str | None) -> tuple[dict[str, float]
             resolution=law.resolution,
             has_heights=h is not None,
             closure_range=law.closure_range,
+            critical_slip=law.critical_slip,
+            plane=law.plane,
+            closure_only=law.closure_only,
         )
     if formation is not None:
         settings = replace(settings, formation=one_of("formation", formation, FORMATIONS))
@@ -198,6 +205,20 @@ def _starts(problem: Problem, near: bool) -> list[Array]:
         values |= {name: value for name, value in guess.items() if name in free}
         starts.append(problem.scaled(values))
     return starts
+
+
+def _orientation_fits(values: Values, names: list[str]) -> None:
+    """Refuse a held c that breaks Eq. 18 with the b that is held, or with every b to be fitted."""
+    if "c" in names:
+        return
+    free, c = "b" in names, values["c"]
+    bound = 0.5 if free else 1 / 3 - values["b"] / 6
+    if abs(c) > bound + 1e-12 or (free and abs(c) >= bound):
+        what = "b > -1, which is fitted" if free else f"b = {values['b']:g}"
+        raise ValueError(
+            f"c = {c:g} is out of bounds: |c| {'<' if free else '<='} 1/3 - b/6 = {bound:.9g} "
+            f"(Eq. 18) for {what}; hold a smaller c or another b"
+        )
 
 
 def _known(where: str, name: str) -> None:

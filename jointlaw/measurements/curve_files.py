@@ -44,6 +44,8 @@ def read_closure(path: str | Path, stress: str | None = None, closure: str | Non
             rows = [row for row in csv.reader(stream) if row and not row[0].startswith("#")]
     except OSError as error:
         raise ValueError(f"{path}: cannot be read ({error.strerror}); give a CSV file") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ValueError(f"{path}: is no CSV file in UTF-8 ({error}); save it as one") from None
     if len(rows) < 2:
         raise ValueError(f"{path}: has no rows of data under its first row of column names")
     header = [cell.strip() for cell in rows[0]]

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -44,8 +45,9 @@ class Problem:
         """All parameters at a place on the scale of the fit."""
         values = dict(self.values)
         values |= {n: scale_of(n).back(float(v)) for n, v in zip(self.free, x, strict=True)}
-        bound = 1 / 3 - values["b"] / 6  # Eq. 18
-        values["c"] = min(max(values["c"], -bound), bound)
+        if "c" in self.free:
+            bound = 1 / 3 - values["b"] / 6  # Eq. 18
+            values["c"] = min(max(values["c"], -bound), bound)
         return values
 
     def place(self, values: Mapping[str, float]) -> Array:
@@ -54,7 +56,7 @@ class Problem:
         for name in self.free:
             scale = scale_of(name)
             inside.append(scale.to(min(max(values[name], scale.low), scale.high)))
-        return np.array(inside)
+        return np.clip(inside, *self.bounds())
 
     def scaled(self, values: Mapping[str, float]) -> Array:
         """The same with the stiffness brought to the level of the closure curves."""
@@ -72,7 +74,11 @@ class Problem:
     def bounds(self) -> tuple[Array, Array]:
         """Lower and upper ends of the scale of the fit."""
         scales = [scale_of(name) for name in self.free]
-        return np.array([s.to(s.low) for s in scales]), np.array([s.to(s.high) for s in scales])
+        low = np.array([s.to(s.low) for s in scales])
+        high = np.array([s.to(s.high) for s in scales])
+        if "b" in self.free and "c" not in self.free:
+            high[self.free.index("b")] = 2 - 6 * abs(dict(self.values)["c"])  # Eq. 18
+        return low, high
 
     def data(self, x: Array) -> Array:
         """Residuals of all curves, one after the other."""
@@ -122,15 +128,20 @@ class Fit:
         """Names of the fitted parameters, the seating closures last."""
         return self.problem.free
 
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Every parameter in SI units, fitted or held, and the seating closures (m); read-only."""
+        return MappingProxyType(self._values)
+
     @cached_property
-    def parameters(self) -> dict[str, float]:
-        """Every parameter in SI units, fitted or held, and the seating closures (m)."""
-        return self.problem.unpack(self.solution.x)
+    def _values(self) -> dict[str, float]:
+        return self.problem.unpack(self.solution.x)  # a proxy of it could not be pickled
 
     @cached_property
     def law(self) -> JointLaw:
         """The law of these parameters."""
-        return build(self.parameters, self.problem.settings)
+        settings = self.problem.settings
+        return build(self.parameters, settings, settings.plane)
 
     @property
     def noise(self) -> tuple[Noise, ...]:
@@ -206,6 +217,7 @@ class Fit:
         fitted stress it widens per doubling by `MODEL_ERROR`, for the law is not the rock, and
         by `WANDER_ERROR` times `wander`, where the points say so themselves.
         """
+        self._seating(curve)  # there is such a curve
         u = np.atleast_1d(np.asarray(closure, float))
         name = "seating" if curve == 1 else f"seating_{curve}"
 

@@ -55,6 +55,7 @@ def add_fit_command(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    folders = _folders(options)
     curves = [_read(options, item) for item in options.data]
     keywords = _keywords(options)
     loading = [first_loading(*curve)[:2] for curve in curves]
@@ -68,9 +69,22 @@ def _run(options: argparse.Namespace) -> int:
         held = None
         if (loading[k][0] > limits[k]).any():
             held = compare(*loading[k], limits[k], **keywords)
-        folder = options.out if len(curves) == 1 else options.out / Path(item).stem
-        _write(folder, item, fit, curve, held)
+        _write(folders[k], item, fit, curve, held)
     return 0
+
+
+def _folders(options: argparse.Namespace) -> list[Path]:
+    """One folder for the results of each file, named after it when there are several."""
+    if len(options.data) == 1:
+        return [options.out]
+    items: dict[str, str] = {}
+    for item in options.data:
+        if (other := items.setdefault(Path(item).stem, item)) is not item:
+            raise ValueError(
+                f"{other} and {item} would both be written to {options.out / Path(item).stem}; "
+                "rename one, or fit them one at a time"
+            )
+    return [options.out / stem for stem in items]
 
 
 def _write(folder: Path, item: str, fit: Fit, curve: Curve, held: Comparison | None) -> None:
@@ -94,9 +108,13 @@ def _write(folder: Path, item: str, fit: Fit, curve: Curve, held: Comparison | N
         )
         summary["error_at_largest_stress"] = {n: float(e[-1]) for n, e in held.errors.items()}
     if first_loading(*curve)[2].size >= 3:
-        loop = explain(fit.law, *curve)
-        text += f"\n## Unloading\n\n{loop.text()}\n"
-        summary["unloading"] = vars(loop)
+        try:
+            loop = explain(fit.law, *curve)
+            text += f"\n## Unloading\n\n{loop.text()}\n"
+            summary["unloading"] = vars(loop)
+        except ValueError as error:  # the fit is not lost for it
+            text += f"\n## Unloading\n\nNot compared with the law: {error}.\n"
+            print(f"unloading is not compared: {error}", file=sys.stderr)
     fit.to_toml(folder / "law.toml", title=f"Fit to {Path(item).name}")
     replace_file(folder / "report.md", text.encode())
     write_json(folder / "summary.json", summary)

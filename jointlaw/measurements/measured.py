@@ -65,7 +65,7 @@ class ClosureCurve:
                 "only, jointlaw.first_loading(stress, closure) cuts it out"
             )
         if self.seating is None and stress[0] == 0.0:
-            set_(self, "seating", -float(closure[0]))
+            set_(self, "seating", 0.0 - float(closure[0]))  # not -0.0
         elif self.seating is not None:
             set_(self, "seating", number("seating", self.seating))
         keep = stress > 0  # a point at zero stress only says where the closure is zero
@@ -84,6 +84,11 @@ class ClosureCurve:
         set_(self, "closure", closure)
         set_(self, "steepness", _steepness(closure, stress))
         if self.noise is None:
+            if self.closure_noise != 0:
+                raise ValueError(
+                    f"closure_noise = {self.closure_noise!r} goes with a known noise; give noise "
+                    "too, or leave both out to have them estimated"
+                )
             expected = Noise(STRESS_NOISE, CLOSURE_NOISE * float(np.ptp(closure)))
         else:
             share = above("noise", self.noise, 0.0)
@@ -103,7 +108,7 @@ class ShearCurve:
     Parameters
     ----------
     shear: shear displacement in m, (n,), from zero; it may turn round.
-    shear_stress: in Pa, (n,).
+    shear_stress: in Pa, (n,), not all zero.
     normal: normal stress in Pa, > 0.
     azimuth: direction of shear in rad, from axis 2 of the law.
     noise: standard error as a share of the largest shear stress, taken as known; None expects 2 %
@@ -122,6 +127,8 @@ class ShearCurve:
         shear, stress = _pair("shear", self.shear, "shear_stress", self.shear_stress)
         if shear.size < 3 or not np.ptp(shear) > 0:
             raise ValueError(f"shear has {shear.size} points: at least 3 that move are needed")
+        if not stress.any():
+            raise ValueError("shear_stress is zero throughout: there is no strength to fit")
         set_(self, "shear", shear)
         set_(self, "shear_stress", stress)
         set_(self, "normal", above("normal", self.normal, 0.0))
@@ -132,7 +139,7 @@ class ShearCurve:
 
     @property
     def steepness(self) -> Array:
-        """None: the displacement is taken as exact."""
+        """Zeros (n,): the displacement is taken as exact."""
         return np.zeros(self.shear.size)
 
     def predict(self, law: JointLaw, substeps: int = 1) -> Array:
@@ -159,6 +166,9 @@ class Settings:
     resolution: Any = "balanced"
     has_heights: bool = True
     closure_range: float | None = None
+    critical_slip: float = math.inf
+    plane: float | None = None  # of the law to be found; every shear curve has its own
+    closure_only: bool = False
 
 
 def first_loading(stress: ArrayLike, closure: ArrayLike) -> tuple[Array, Array, Array, Array]:
@@ -188,6 +198,8 @@ def build(values: Values, settings: Settings, plane: float | None = None) -> Joi
         "resolution": settings.resolution,
         "plane": plane,
         "closure_range": settings.closure_range,
+        "critical_slip": settings.critical_slip,
+        "closure_only": settings.closure_only,
     }
     return JointLaw(**parts)
 

@@ -22,7 +22,7 @@ def add_scan_command(commands: Any) -> None:
     parser.description = f"{what}. Give the composite surface of both sides, or a profile."
     parser.add_argument("file", help="CSV, NPY, or a format of SurfaceTopography (extra scan)")
     parser.add_argument("--spacing", help="of the points, such as 20um; needed for CSV and NPY")
-    parser.add_argument("--height-unit", default="m", help="of CSV and NPY, such as um (default m)")
+    parser.add_argument("--height-unit", help="of CSV and NPY, such as um (default m)")
     parser.add_argument("--sampling-length", help="edge of a facet (default 4 spacings)")
     parser.add_argument("--out", type=Path, required=True, help="folder for the results")
     parser.set_defaults(run=_run)
@@ -30,7 +30,9 @@ def add_scan_command(commands: Any) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     spacing = None if options.spacing is None else units.parse(options.spacing, "m")
-    z, spacing = read_scan(options.file, spacing, units.parse(f"1{options.height_unit}", "m"))
+    unit = options.height_unit
+    factor = None if unit is None else units.parse(f"1{unit}", "m")
+    z, spacing = read_scan(options.file, spacing, factor)
     length = options.sampling_length
     fit = from_surface(z, spacing, None if length is None else units.parse(length, "m"))
     folder: Path = options.out

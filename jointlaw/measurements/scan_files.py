@@ -14,7 +14,7 @@ _TEXT = {".csv", ".txt", ".dat", ".asc"}
 
 
 def read_scan(
-    path: str | Path, spacing: float | None = None, factor: float = 1.0
+    path: str | Path, spacing: float | None = None, factor: float | None = None
 ) -> tuple[Array, float]:
     """Heights (ny, nx) or (nx,) in m and their spacing in m.
 
@@ -24,21 +24,23 @@ def read_scan(
         or blanks), NPY, or any of the profilometer formats that SurfaceTopography reads (extra
         `scan`), which bring their own spacing and unit.
     spacing: of the points in m; needed for CSV and NPY.
-    factor: m per unit of the heights in CSV and NPY, such as 1e-6 for micrometres.
+    factor: m per unit of the heights, such as 1e-6 for micrometres; None takes m for CSV and NPY.
+        Needed for files of instruments that give no unit, refused for those that do.
 
     Raises ValueError naming the file and the remedy, ImportError when SurfaceTopography is needed.
     """
     path = Path(path)
+    unit = 1.0 if factor is None else factor
     if not path.is_file():
         raise ValueError(f"{path}: does not exist; give a file of heights")
     if path.suffix.lower() == ".npy":
-        return np.squeeze(np.load(path)) * factor, _needed(path, spacing)
+        return np.squeeze(np.load(path)) * unit, _needed(path, spacing)
     if path.suffix.lower() in _TEXT:
         try:
-            return _text(path) * factor, _needed(path, spacing)
+            return _text(path) * unit, _needed(path, spacing)
         except UnicodeDecodeError:
             pass  # some instruments give such names to files of their own
-    return _topography(path, spacing)
+    return _topography(path, spacing, factor)
 
 
 def _text(path: Path) -> Array:
@@ -63,7 +65,7 @@ def _needed(path: Path, spacing: float | None) -> float:
     return spacing
 
 
-def _topography(path: Path, spacing: float | None) -> tuple[Array, float]:
+def _topography(path: Path, spacing: float | None, factor: float | None) -> tuple[Array, float]:
     try:
         read_topography = import_module("SurfaceTopography").read_topography
     except ImportError as error:
@@ -72,13 +74,16 @@ def _topography(path: Path, spacing: float | None) -> tuple[Array, float]:
         ) from error
     surface: Any = read_topography(str(path))
     if surface.unit is not None:
+        if factor is not None:
+            raise ValueError(f"{path}: gives its own unit, {surface.unit}; leave --height-unit out")
         surface = surface.to_unit("m")
+    elif spacing is None or factor is None:
+        raise ValueError(f"{path}: the file gives no unit; give --spacing and --height-unit")
     z = np.asarray(np.ma.filled(surface.heights(), np.nan), float)
     pixel = np.atleast_1d(np.asarray(surface.pixel_size, float))
     if pixel.size == 2 and abs(pixel[0] / pixel[1] - 1) > 1e-3:
         raise ValueError(
             f"{path}: its points are {pixel[0]:g} x {pixel[1]:g} apart; resample it to squares"
         )
-    if surface.unit is None and spacing is None:
-        raise ValueError(f"{path}: the file gives no unit; convert it to CSV and give --spacing")
+    z = z if factor is None else z * factor
     return z.T, float(pixel[0]) if spacing is None else spacing  # its first axis is x

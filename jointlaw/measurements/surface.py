@@ -11,17 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._checks import Array, above, whole
+from .._checks import Array, above
 from ..asperity import Asperity
 from ..heights import GammaHeights
 from ..law import JointLaw
 from ..orientation import Orientation
 from .asperities import Asperities, extract
 from .direction_fit import DirectionFit, fit_directions
+from .fit import WIDEST
 from .height_fit import HeightFit, fit_heights
 
 SAMPLES = 4  # points along the edge of a facet, by default
-WIDEST = math.log(2) / 1.96  # standard error of a logarithm: a factor of 2 either way
 NOISY = 0.04  # error of a gradient over the median gradient, from which summits get misplaced
 
 
@@ -235,9 +235,13 @@ def from_surface(
         )
     spacing = above("spacing", spacing, 0.0)
     length = SAMPLES * spacing if sampling_length is None else sampling_length
-    samples = whole(
-        "sampling_length/spacing", round(above("sampling_length", length, 0.0) / spacing), 3
-    )
+    ratio = above("sampling_length", length, 0.0) / spacing
+    samples = max(round(ratio), 3)
+    if abs(ratio - samples) > 1e-6 * samples:
+        raise ValueError(
+            f"sampling_length = {length:g} m is {ratio:.6g} spacings: it must be a whole number of "
+            f"at least 3; give {samples * spacing:.9g} m"
+        )
     if min(heights.shape) < 6 * samples:
         raise ValueError(
             f"z has shape {heights.shape}: at a sampling length of {samples} points at least "

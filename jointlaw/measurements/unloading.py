@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._checks import Array, above
+from .._checks import Array
 from .._progress import track
 from ..law import JointLaw
 from ..resolution import NAMED
@@ -18,14 +18,16 @@ _FRICTIONS = (0.1, 0.15, 0.2, 0.3, 0.45)
 
 @dataclass(frozen=True)
 class Loop:
-    """A loading cycle against the law, as shares of the work of loading.
+    """A loading cycle against the law above a stress, as shares of the work of loading.
 
+    stress (Pa): the lowest, above zero, that both branches of the test reach;
     measured: loss of the measured cycle; friction: loss of the law; largest_friction: the largest
     of several friction coefficients at these inclinations, that of `worst_mu`; open_closure
-    (m): closure the test did not recover on the way back to its first stress; law_closure (m): that
-    of the law.
+    (m): closure the test did not recover on the way back to `stress`; law_closure (m): that of the
+    law.
     """
 
+    stress: float
     measured: float
     friction: float
     largest_friction: float
@@ -37,7 +39,8 @@ class Loop:
         """The same in words."""
         return (
             f"The measured cycle loses {100 * self.measured:.0f} % of the work of loading and "
-            f"keeps {1e6 * self.open_closure:.1f} um of closure at the stress it began with. "
+            f"keeps {1e6 * self.open_closure:.1f} um of closure back at {self.stress / 1e6:.3g} "
+            "MPa. "
             f"Friction on the asperities, all that the law has, loses {100 * self.friction:.2g} % "
             f"and keeps {1e6 * self.law_closure:.2f} um; of friction coefficients from "
             f"{_FRICTIONS[0]} to {_FRICTIONS[-1]}, {self.worst_mu:g} loses most at these "
@@ -54,14 +57,15 @@ def explain(law: JointLaw, stress: ArrayLike, closure: ArrayLike, steps: int = 1
     stress: Pa, (n,), loading and unloading; closure: m, (n,); law: such as that of a fit to the
     loading branch; steps: of the law per branch.
 
-    Raises ValueError when the data do not unload.
+    Raises ValueError when the data do not load and unload above zero stress.
     """
     s_up, u_up, s_down, u_down = first_loading(stress, closure)
-    if s_down.size < 3:
-        raise ValueError("stress never falls: give loading and unloading of one cycle")
-    low, high = above("stress[0]", s_up[0], 0.0), float(s_up[-1])
-    end = float(np.interp(low, s_down[::-1], u_down[::-1]))
-    measured = 1 - _area(s_down[::-1], u_down[::-1]) / _area(s_up, u_up)
+    high = float(s_up[-1])
+    low = float(max(s_up[0], s_down.min(), s_up[s_up > 0].min(initial=high)))
+    if s_down.size < 3 or not low < high:
+        raise ValueError("stress does not rise and fall above 0: give one cycle, both branches")
+    up, down = _above(s_up, u_up, low), _above(s_down[::-1], u_down[::-1], low)
+    measured = 1 - _area(*down) / _area(*up)
     friction, left = _cycle(law, low, high, steps)
     losses = []
     for mu in track(_FRICTIONS, "friction", len(_FRICTIONS)):
@@ -69,11 +73,12 @@ def explain(law: JointLaw, stress: ArrayLike, closure: ArrayLike, steps: int = 1
         losses.append(_cycle(other, low, high, steps)[0])
     worst = int(np.argmax(losses))
     return Loop(
-        float(measured),
+        low,
+        measured,
         friction,
         max(friction, losses[worst]),
         _FRICTIONS[worst] if losses[worst] > friction else law.asperity.mu,
-        end - float(u_up[0]),
+        float(down[1][0] - up[1][0]),
         left,
     )
 
@@ -106,7 +111,7 @@ def _area(stress: Array, closure: Array) -> float:
 
 
 def _above(stress: Array, closure: Array, low: float) -> tuple[Array, Array]:
-    """An ascending branch cut at the stress `low`."""
-    keep = stress > low
-    first = float(np.interp(low, stress, closure))
-    return np.concatenate([[low], stress[keep]]), np.concatenate([[first], closure[keep]])
+    """An ascending branch from where it leaves the stress `low`, at or below which it begins."""
+    at = int(np.flatnonzero(stress <= low)[-1])
+    first = float(np.interp(low, stress[at : at + 2], closure[at : at + 2]))
+    return np.concatenate([[low], stress[at + 1 :]]), np.concatenate([[first], closure[at + 1 :]])

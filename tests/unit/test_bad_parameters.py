@@ -149,6 +149,9 @@ def test_unknown_formation():
         (lambda: jl.Orientation.from_moments(0.0, 0.01), "mean"),
         (lambda: jl.Orientation.from_moments(0.3, -0.01), "variance"),
         (lambda: jl.Orientation.from_moments(0.3, 10.0), "variance"),
+        (lambda: jl.Orientation.from_moments(1e-200, 1e-300), "variance"),
+        (lambda: jl.Orientation.from_moments(1e200, 1.0), "variance"),
+        (lambda: jl.Orientation.from_moments(1e-300, 1e300), "variance"),
         (lambda: jl.GammaHeights.from_moments(1e-6, float("nan")), "variance"),
     ],
 )

@@ -113,6 +113,14 @@ def test_bad_distributions(distribution, told):
     assert told in str(error.value)
 
 
+def test_a_histogram_takes_no_parameters():
+    pair = ([1, 2, 1], [0, 1e-6, 2e-6, 3e-6])
+    with pytest.raises(ValueError, match="a histogram takes none"):
+        jl.Heights(pair, formation="individual", parameters={"loc": 1.0})
+    none = jl.Heights(pair, formation="individual", parameters={})
+    assert hash(none) == hash(jl.Heights(pair, formation="individual"))
+
+
 @pytest.mark.parametrize(
     ("parameters", "told"),
     [

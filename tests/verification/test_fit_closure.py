@@ -1,5 +1,7 @@
 """Fits of closure curves: held-out stresses, honest intervals, what one curve cannot tell."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -126,6 +128,45 @@ def test_friction_explains_little_of_the_loop(grimsel):
     assert 0 < loop.friction <= loop.largest_friction < 0.09
 
 
+def test_a_cycle_is_compared_above_the_lowest_stress_that_both_branches_reach(law):
+    """Linear branches of slopes 1 and 2 up to 4 MPa, cut at 1 MPa: areas 7.5 and 3.75, loss 1/2."""
+    up = np.linspace(0.0, 4.0, 9)
+    for bottom, low in ((0.0, 0.5), (1.0, 1.0)):  # back to zero stress; stopped on the way
+        down = np.linspace(4.0, bottom, 7)
+        stress = 1e6 * np.concatenate([up, down[1:]])
+        closure = 1e-5 * np.concatenate([up, 4.0 - (4.0 - down[1:]) / 2])
+        loop = unloading.explain(law, stress, closure, steps=5)
+        assert loop.stress == pytest.approx(1e6 * low)
+        assert loop.measured == pytest.approx(0.5)
+        assert loop.open_closure == pytest.approx(1e-5 * (4.0 - low) / 2)
+    with pytest.raises(ValueError, match="rise and fall"):
+        unloading.explain(law, [1e6, 2e6, 2e6, 2e6], [0, 1e-5, 1e-5, 1e-5])
+
+
+def test_a_held_anisotropy_is_held_or_refused(grimsel):
+    """Eq. 18: |c| <= 1/3 - b/6. With b held the two must agree, with b free it keeps within."""
+    with pytest.raises(ValueError, match=r"c = 0.45 .* 1/3 - b/6 = 0.333333333"):
+        fit_closure(*grimsel, fixed={"c": 0.45})
+    with pytest.raises(ValueError, match=r"c = 0.5 .* hold a smaller c"):
+        fit_closure(*grimsel, fixed={"c": 0.5}, free=("b",))
+    fit = fit_closure(*grimsel, fixed={"c": 0.45}, free=("asperity_density", "b"))
+    assert fit.parameters["c"] == 0.45
+    assert fit.parameters["b"] <= 2 - 6 * 0.45 + 1e-12
+    assert fit.law.orientation.c == 0.45
+
+
+def test_a_fit_cannot_be_altered_and_can_be_sent(grimsel):
+    fit = fit_closure(*grimsel, fixed={"alpha": 3.8, "beta": 2e-5})
+    with pytest.raises(TypeError):
+        fit.parameters["asperity_density"] *= 2
+    back = pickle.loads(pickle.dumps(fit))
+    assert back.parameters == fit.parameters
+    assert back.predict(1e-5) == fit.predict(1e-5)
+    for ask in (fit.predict, fit.band):
+        with pytest.raises(ValueError, match="curve = 5"):
+            ask([1e-6], curve=5)
+
+
 def test_presets_of_fits_can_be_read_again(grimsel, tmp_path):
     fit = fit_closure(*grimsel)
     fit.to_toml(tmp_path / "law.toml", title='a "quoted" title')
@@ -144,6 +185,7 @@ def test_presets_of_fits_can_be_read_again(grimsel, tmp_path):
         ({"priors": {"alpha": (5, 1)}}, "ascending"),
         ({"formation": "both"}, "formation"),
         ({"noise": 0.0}, "noise"),
+        ({"closure_noise": -5.0}, "give noise too"),
     ],
 )
 def test_bad_input_is_named(change, words):

@@ -43,6 +43,42 @@ def test_friction_and_inclination_are_covered_by_their_intervals(law, strength):
     assert hits >= 13  # fewer has a probability of 0.7 % when the intervals are right
 
 
+def test_a_law_is_found_again_with_all_that_is_not_fitted(law):
+    """The other parameters are the law's own, so mu and a come back: 2 % is left to the priors."""
+    own = replace(
+        law, orientation=jl.Orientation(6.0, 0.3), critical_slip=2e-6, plane=0.0, closure_range=5e-5
+    )
+    measured = ShearCurve(SHEAR, np.ones(12), 5e6).predict(own)
+    start = replace(own, asperity=replace(own.asperity, mu=0.6), orientation=jl.Orientation(5, 0.3))
+    fit = fit_shear(SHEAR, measured, 5e6, law=start, noise=1e-3)
+    assert fit.parameters["mu"] == pytest.approx(0.5, rel=0.02)
+    assert fit.parameters["a"] == pytest.approx(6.0, rel=0.02)
+    found = {name: fit.parameters[name] for name in ("mu", "a")}
+    back = replace(
+        own,
+        asperity=replace(own.asperity, mu=found["mu"]),
+        orientation=jl.Orientation(found["a"], 0.3),
+    )
+    assert fit.law == back
+
+
+def test_closure_alone_stays_closure_alone(law):
+    own = replace(law, closure_only=True, critical_slip=1e-6)
+    stress = np.geomspace(0.25e6, 10e6, 12)
+    y = own.closure(stress)
+    curve = ClosureCurve(stress, y - y[0], seating=y[0], noise=0.01)
+    fit = fit_curves([curve], law=own, free=("asperity_density",))
+    assert fit.law == replace(own, asperity_density=fit.parameters["asperity_density"])
+    assert fit.parameters["asperity_density"] == pytest.approx(1e6, rel=1e-3)
+    with pytest.raises(ValueError, match="closure_only"):
+        fit_shear(SHEAR, np.ones(12), 5e6, law=own)
+
+
+def test_no_shear_stress_at_all_is_refused():
+    with pytest.raises(ValueError, match="shear_stress is zero"):
+        ShearCurve(SHEAR, np.zeros(12), 5e6)
+
+
 def test_shear_fixes_what_closure_cannot(law, strength):
     stress = np.geomspace(0.2e6, 10e6, 10)
     y = law.closure(stress)

@@ -93,7 +93,7 @@ def test_files_give_the_array_back(tmp_path):
     z = scan(4, rows=8, columns=6)
     np.savetxt(tmp_path / "z.csv", z * 1e6, delimiter=",", header="heights in um")
     np.save(tmp_path / "z.npy", z)
-    for name, factor in (("z.csv", 1e-6), ("z.npy", 1.0)):
+    for name, factor in (("z.csv", 1e-6), ("z.npy", None)):
         read, spacing = read_scan(tmp_path / name, SPACING, factor)
         assert read == pytest.approx(z, abs=1e-15)
         assert spacing == SPACING
@@ -110,6 +110,29 @@ def test_the_topography_library_is_read(tmp_path):
     read, spacing = read_scan(tmp_path / "z.nc")
     assert spacing == pytest.approx(SPACING)
     assert read == pytest.approx(z, abs=1e-12)
+
+
+def test_a_unit_is_taken_once_from_the_file_or_the_caller(tmp_path):
+    """Heights come out in m whoever names the unit; nobody, or both, is refused."""
+    library = pytest.importorskip("SurfaceTopography")
+    z = scan(5, rows=4, columns=6)
+    sizes = (z.shape[1] * 20.0, z.shape[0] * 20.0)
+    library.Topography(z.T * 1e6, sizes).to_netcdf(str(tmp_path / "bare.nc"))
+    library.Topography(z.T * 1e6, sizes, unit="um").to_netcdf(str(tmp_path / "um.nc"))
+    read, spacing = read_scan(tmp_path / "bare.nc", SPACING, 1e-6)
+    assert spacing == SPACING
+    assert read == pytest.approx(z, abs=1e-12)
+    for spacing, factor in ((None, None), (SPACING, None), (None, 1e-6)):
+        with pytest.raises(ValueError, match="gives no unit; give --spacing and --height-unit"):
+            read_scan(tmp_path / "bare.nc", spacing, factor)
+    with pytest.raises(ValueError, match="gives its own unit"):
+        read_scan(tmp_path / "um.nc", None, 1e-6)
+
+
+@pytest.mark.parametrize("length", [4.84 * SPACING, 2 * SPACING, 3.5 * SPACING])
+def test_a_sampling_length_is_whole_spacings_and_at_least_three(length):
+    with pytest.raises(ValueError, match=r"spacings: it must be a whole number of at least 3"):
+        from_surface(scan(1, rows=8, columns=8), SPACING, length)
 
 
 @pytest.mark.parametrize(

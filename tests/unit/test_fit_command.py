@@ -1,0 +1,65 @@
+"""`jointlaw fit` on files as laboratories write them."""
+
+import json
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+from jointlaw.cli import main
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+
+
+def write(path, stress, closure):
+    path.parent.mkdir(exist_ok=True)
+    table = np.column_stack([stress, closure])
+    np.savetxt(path, table, delimiter=",", header="stress,closure", comments="")
+
+
+@pytest.fixture
+def cycle():
+    """Loading from (0, 0) and unloading, made by the law itself."""
+    law = jl.presets.load("biegel-smooth")
+    record = jl.closure_test(law.joint(), 10e6, steps=12)
+    return record.F1, record.closure
+
+
+def test_a_cycle_that_begins_at_zero(tmp_path, cycle, capsys):
+    write(tmp_path / "loop.csv", *cycle)
+    assert main(["fit", "loop.csv", "--set", "alpha=3.8", "--out", "o"]) == 0
+    out = capsys.readouterr().out
+    summary = json.loads((tmp_path / "o" / "summary.json").read_text())
+    assert summary["unloading"]["stress"] == pytest.approx(cycle[0][1])  # the first above zero
+    assert "## Unloading" in out
+    assert "(seating closure 0 um)" in out
+    jl.JointLaw.from_toml(tmp_path / "o" / "law.toml")
+
+
+def test_an_unloading_branch_of_no_use_does_not_cost_the_fit(tmp_path, cycle, capsys):
+    stress, closure = (x[:13] for x in cycle)
+    held = np.full(3, stress[-1]), np.full(3, closure[-1])  # the machine rests at its peak
+    write(tmp_path / "u.csv", np.append(stress, held[0]), np.append(closure, held[1]))
+    assert main(["fit", "u.csv", "--set", "alpha=3.8", "--out", "o"]) == 0
+    told = "stress does not rise and fall"
+    assert told in capsys.readouterr().err
+    assert told in (tmp_path / "o" / "report.md").read_text()
+    assert (tmp_path / "o" / "law.toml").is_file()
+
+
+def test_results_that_would_overwrite_each_other_are_refused_first(tmp_path, cycle, capsys):
+    for folder in ("a", "b"):
+        write(tmp_path / folder / "c.csv", *cycle)
+    assert main(["fit", "a/c.csv", "b/c.csv", "--out", "o"]) == 2
+    assert "a/c.csv and b/c.csv would both be written" in capsys.readouterr().err
+    assert not (tmp_path / "o").exists()
+
+
+def test_a_file_in_another_encoding_is_named(tmp_path, capsys):
+    (tmp_path / "old.csv").write_bytes(b"stress,closure_\xb5m\n1,2\n")
+    assert main(["fit", "old.csv", "--out", "o"]) == 2
+    assert "old.csv: is no CSV file in UTF-8" in capsys.readouterr().err

@@ -215,6 +215,7 @@ def test_time_step_knows_the_area_however_it_is_given(yade, make_table, tmp_path
     for name in ("number", "array"):
         assert np.allclose(out[name], expected, rtol=1e-12, atol=0)
     before, after = out["function"]
-    assert "area is a function" in before and "after the first step" in before
+    assert "area is a function" in before
+    assert "after the first step" in before
     assert np.isclose(float(after), expected, rtol=1e-12, atol=0)
     assert np.allclose(out["circle"], expected * np.sqrt(10.0 / (np.pi * 0.25)), rtol=1e-12, atol=0)

@@ -71,6 +71,13 @@ def _make(tables: Tables, choice: str) -> Engine:
         except ImportError:
             if choice == "numba":
                 raise
+        except RuntimeError as error:
+            if "cannot cache" not in str(error):
+                raise
+            raise OSError(
+                "numba finds no folder that it can write compiled kernels to: set NUMBA_CACHE_DIR "
+                "to one, or JOINTLAW_KERNEL=numpy to do without numba"
+            ) from error
     return NumpyEngine(tables)
 
 

@@ -321,7 +321,7 @@ class JointLaw:
         if (y > self.largest_reach).any():
             raise ValueError(
                 f"closure = {float(y.max())!r} m is out of bounds: it must be <= largest_reach = "
-                f"{self.largest_reach:g} m, beyond which squares of forces overflow; check the units"
+                f"{self.largest_reach:g} m, beyond which squares of forces overflow"
             )
         return y
 

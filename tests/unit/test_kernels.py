@@ -1,6 +1,11 @@
 """The compiled kernel gives the numbers of the readable one, however it is called."""
 
+import os
 import pickle
+import shutil
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -271,3 +276,24 @@ def test_bad_settings_are_named(law, monkeypatch, name, value, message):
     monkeypatch.setenv(name, value)
     with pytest.raises(ValueError, match=f"{name} = '{value}'.*{message}"):
         law.joints(N).update(np.zeros((N, 3)))
+
+
+def test_no_folder_for_compiled_kernels_is_told_with_the_remedy(tmp_path):
+    """A package that cannot be written to, as for a user without a home; root may write anywhere,
+    but not into a folder whose name is taken by a file."""
+    shutil.copytree(Path(jl.__file__).parent, tmp_path / "jointlaw",
+                    ignore=shutil.ignore_patterns("__pycache__"))  # fmt: skip
+    (tmp_path / "jointlaw" / "__pycache__").touch()
+    code = "import jointlaw as jl; jl.presets.load('westerly-smooth').joint()"
+    env = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "JOINTLAW_KERNEL")}
+    env |= {"PYTHONPATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "jointlaw/__init__.py")}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, env=env, capture_output=True, text=True
+    )
+    assert done.stderr.splitlines()[-1].startswith("OSError: numba finds no folder")
+    assert "NUMBA_CACHE_DIR" in done.stderr.splitlines()[-1]
+    env["NUMBA_CACHE_DIR"] = str(tmp_path / "cache")  # the remedy
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, env=env, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr

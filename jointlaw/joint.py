@@ -82,7 +82,7 @@ class Joint:
 
     @property
     def sliding(self) -> float:
-        """Share of all asperities: in touch, and every cell at its friction limit."""
+        """Share of all facet orientations: in touch, and every cell at its friction limit."""
         return float(self._batch.sliding[0])
 
     @property
@@ -92,7 +92,7 @@ class Joint:
 
     @property
     def separated(self) -> float:
-        """Share of asperities out of touch."""
+        """Share of all facet orientations: out of touch."""
         return float(self._batch.separated[0])
 
     @property

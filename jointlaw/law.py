@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from .joint import Joint
 
 _SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
-_NOTHING = 1e-140  # m, and Pa/m: below it squares underflow
+NOTHING = 1e-140  # m, and Pa/m: counts as zero, for powers and squares below it underflow
 DEFAULT_STRESS = 20e6  # Pa; its closure is the default closure_range
 
 
@@ -125,10 +125,10 @@ class JointLaw:
                 f"plane = {self.plane!r}: a joint with closure_only does not shear; leave plane out"
             )
         set_(self, "critical_slip", above("critical_slip", self.critical_slip, 0.0, infinite=True))
-        if self.critical_slip < _NOTHING:
+        if self.critical_slip < NOTHING:
             raise ValueError(
                 f"critical_slip = {self.critical_slip!r} m is out of bounds: it must be >= "
-                f"{_NOTHING:g}"
+                f"{NOTHING:g}"
             )
         with np.errstate(all="ignore"):  # what is no number in the end is refused
             if self.closure_range is None:
@@ -299,7 +299,7 @@ class JointLaw:
 
     def _require_numbers(self) -> None:
         """Refuse parameters whose forces, within the closure range, no float can hold."""
-        weak = not float(np.max(self.tables.area)) * min(self.asperity.lam, 1.0) > _NOTHING
+        weak = not float(np.max(self.tables.area)) * min(self.asperity.lam, 1.0) > NOTHING
         if weak or not self.largest_reach >= self.closure_range:
             p = self.asperity
             raise ValueError(

@@ -68,6 +68,7 @@ def both(monkeypatch):
             made.append(build())
             batch = getattr(made[-1], "_batch", made[-1])
             assert isinstance(batch._engine, kind)
+            assert batch.kernel == name
         return made
 
     return make
@@ -75,6 +76,19 @@ def both(monkeypatch):
 
 def worst(one, other, peak):
     return np.max(np.abs(np.asarray(one) - np.asarray(other)), initial=0.0) / peak
+
+
+def test_the_compiled_block_is_the_one_that_states_come_in():
+    """It is a constant of the kernel's own file: changed elsewhere it leaves old machine code."""
+    from jointlaw import _kernel_numba
+
+    assert _kernel_numba.LANES == engine.LANES
+
+
+def test_memory_of_a_joint(both, law):
+    """The state of whole blocks, nothing else that grows with their number."""
+    for batch in both(lambda: law.joints(2 * engine.LANES)):
+        assert batch.bytes_per_joint * len(batch) == batch._state.nbytes
 
 
 @pytest.mark.parametrize("seed", range(30))

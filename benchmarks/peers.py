@@ -215,7 +215,7 @@ def million(law: jl.JointLaw, n: int = 1_000_000) -> dict[str, Any]:
     once = ours(made, n, False)
     best = min(once() for _ in range(7))
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-    state = 8 * made.joints(0)._engine.rows * n
+    state = made.joints(0).bytes_per_joint * n
     steps = 8 * n * 2 * 8  # six steps, the first and the result
     r = made.resolution
     return {"joints": n, "resolution": f"{r.u} x {r.phi} x {r.depth}", "sliders": r.sliders,

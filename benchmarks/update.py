@@ -77,7 +77,7 @@ def law(name: str, plane: bool) -> jl.JointLaw:
 def state_bytes(made: jl.JointLaw) -> int:
     """Bytes that a joint of a large batch occupies."""
     os.environ["JOINTLAW_KERNEL"] = "numba"
-    return 8 * made.joints(0)._engine.rows
+    return made.joints(0).bytes_per_joint
 
 
 def limits() -> dict[str, float]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Arrays = TypeVar("Arrays", bound="tuple[Any, ...]")
 
 # Types that float() would take, but that nobody means as a number ("3" in a file, a flag)
 _NO_NUMBERS = (bool, np.bool_, str, bytes, complex, np.complexfloating)
@@ -71,3 +72,19 @@ def numbers(name: str, value: Any, unit: str) -> Array:
         return array
     with np.errstate(over="ignore"):  # from long double: reported as not finite by the caller
         return np.asarray(array, float)
+
+
+def finite(name: str, value: Any, unit: str) -> Array:
+    """Return `value` as an array of finite floats."""
+    array = numbers(name, value, unit)
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} = {value!r} is not finite; give finite values in {unit}")
+    return array
+
+
+def frozen(arrays: Arrays) -> Arrays:
+    """Return a tuple whose arrays nobody can write to any more: laws share them."""
+    for array in arrays:
+        if isinstance(array, np.ndarray):
+            array.flags.writeable = False
+    return arrays

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._checks import Array
-from ._kernel_numpy import GRAZING, LIMIT, NEAR, NOTHING, ROUNDED, TINY
-from .law import Tables
+from ._kernel_numpy import GRAZING, LIMIT, NEAR, ROUNDED, TINY
+from .law import NOTHING, Tables
 
 # Strict arithmetic: no fused or reordered operations, so results are the same on every machine
 _jit = numba.njit(error_model="numpy", nogil=True, cache=True)
@@ -43,7 +43,7 @@ _DESK = 51 * LANES
 _WHOLE, _LIMIT, _SLIDING, _SLIPPING, _APART, _STORED, _REACH = _rows(22, 7)
 
 _M, _S, _T, _N, _REST = 0, 3, 6, 9, 12  # columns of the facet table; then A, a, compliance,
-_POTENTIAL, _SHARE = 15, 16  # A c1 and the share of asperities
+_POTENTIAL, _SHARE = 15, 16  # A c1 and the share of the facet orientation
 
 
 class Packed(NamedTuple):

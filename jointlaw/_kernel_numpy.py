@@ -15,11 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ._checks import Array
-from .law import Tables
+from .law import NOTHING, Tables
 
 NEAR = 1e-5  # of y: below such a change of y the chord of G is lost in rounding, the mean is not
 GRAZING = 1e-12  # cosine at which the leash grows taut: its derivative has a pole at 0
-NOTHING = 1e-140  # m: closures below it count as zero, for their powers would underflow
 LIMIT = 1e-9  # of the friction limit: a slider this close is at it, less the rounding of q
 ROUNDED = 1e-12  # of Phi: as much may be lost in a G next to a node
 TINY = 1e-290  # a stiffness whose reciprocal might overflow, or a square that underflows: nothing
@@ -199,9 +198,9 @@ def traction(k: Tables, state: Array) -> Array:
 class Measures(NamedTuple):
     """What the states of joints amount to, arrays (n,): law.md section 8b."""
 
-    sliding: Array  # share of all asperities: in touch, every cell at its friction limit
+    sliding: Array  # share of all facet orientations: in touch, every cell at its limit
     slipping: Array  # share of the friction capacity that is at its limit
-    separated: Array  # share of all asperities
+    separated: Array  # share of all facet orientations: out of touch
     stored: Array  # elastic energy, J/m2
     reach: Array  # largest effective closure of any facet, m
 

@@ -149,7 +149,7 @@ def _parse(text: str, where: str) -> dict[str, Any]:
 
 
 def _num(value: float) -> str:
-    return repr(float(value))  # inf and -inf are TOML too
+    return repr(float(value) + 0.0)  # -0.0 is 0.0; inf and -inf are TOML too
 
 
 def _write_histogram(heights: Heights, path: Path | None) -> list[str]:

@@ -90,7 +90,7 @@ class JointBatch:
     ) -> Out:
         index = None if where is None else self._index(where)
         m, dim = self._n if index is None else len(index), self.law.tables.dim
-        step = self._increments(d, index, (m, dim))
+        step = self._increments(d, (m, dim))
         reach = self._admit(step, index, tangent)
         if out is None:
             F, C = np.empty((m, dim)), np.empty((m, dim, dim)) if tangent else None
@@ -151,6 +151,16 @@ class JointBatch:
         self._engine.measures(self._state, values)
         return Measures(*values)
 
+    @property
+    def kernel(self) -> str:
+        """Which kernel advances these joints: "numba" or "numpy"."""
+        return self._engine.name
+
+    @property
+    def bytes_per_joint(self) -> int:
+        """Memory that the state of one joint of a large batch takes."""
+        return 8 * self._engine.rows
+
     def max_stiffness(self) -> Array:
         """Upper bound (n,) of |C| in Pa/m at each joint's own reach, for explicit time steps."""
         bound: Array = self.law.max_stiffness(self.measures().reach)
@@ -169,7 +179,7 @@ class JointBatch:
 
     @property
     def sliding(self) -> Array:
-        """Share (n,) of all asperities: in touch, and every cell at its friction limit."""
+        """Share (n,) of all facet orientations: in touch, every cell at its friction limit."""
         return self.measures().sliding
 
     @property
@@ -179,7 +189,7 @@ class JointBatch:
 
     @property
     def separated(self) -> Array:
-        """Share (n,) of asperities out of touch."""
+        """Share (n,) of all facet orientations: out of touch."""
         return self.measures().separated
 
     @property
@@ -220,9 +230,7 @@ class JointBatch:
             raise ValueError("where names a joint twice; each joint takes one increment per step")
         return index.astype(np.intp)
 
-    def _increments(
-        self, d: ArrayLike, index: NDArray[np.intp] | None, shape: tuple[int, int]
-    ) -> Array:
+    def _increments(self, d: ArrayLike, shape: tuple[int, int]) -> Array:
         """Increments (m, dim), contiguous and checked."""
         values = np.ascontiguousarray(numbers("d", d, "m"))
         if values.shape != shape:

@@ -8,8 +8,6 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from . import __version__, presets
 from ._command import add_command
 from .accuracy.command import add_tradeoff_command
@@ -94,7 +92,7 @@ def _add_replay(commands: Any) -> None:
 def _replay(options: argparse.Namespace) -> int:
     data = read_replay(options.file)
     law = JointLaw.from_toml(str(data["law"]))
-    values, d = np.array(data["values"], float), np.array(data["d"], float)
+    values, d = data["values"], data["d"]
     batch = JointBatch(law, values.shape[1])
     batch.restore(JointState(law.fingerprint, values))
     print(f"{law}\nstate: delta = {batch.delta} m, F = {batch.F} Pa\nstep: d = {d.T} m")

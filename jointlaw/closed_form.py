@@ -21,6 +21,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ._checks import Array, at_least, number
+from .orientation import bounded
 
 
 class HasShape(Protocol):
@@ -47,10 +48,10 @@ def elastic(orientation: HasShape, kn: float, ks: float) -> Array:
 
     kn, ks: normal and shear stiffness of an asperity (N/m), >= 0.
     Returns (C11, C22, C33)/N in N/m, shape (3,); the cross terms are zero.
-    Raises ValueError for a negative or non-finite stiffness.
+    Raises ValueError for a negative or non-finite stiffness and outside the bounds of Eq. 18.
     """
     kn, ks = at_least("kn", kn, 0.0), at_least("ks", ks, 0.0)
-    m = _moments(orientation, 0.0)
+    m = _moments(_shape(orientation), 0.0)
     normal = kn * m.cos2 + ks * m.sin2
     shear = (kn * m.sin2 + ks * (1.0 + m.cos2)) / 2
     twist = (kn - ks) * m.sin2_twist / 2
@@ -64,13 +65,13 @@ def inelastic(orientation: HasShape, kn: float, ks: float, mu: float) -> Array:
     Returns (C11p, C22p, C33p)/N in N/m, shape (3,); the cross terms are zero. All is zero where no
     asperity leans beyond the sliding angle of Eq. 30, so at a = infinity for every mu > 0; at
     mu = 0 the limit is (0, ks (1 + c)/2, ks (1 - c)/2).
-    Raises ValueError for a negative or non-finite number.
+    Raises ValueError for a negative or non-finite number and outside the bounds of Eq. 18.
     """
-    start = sliding_angle(kn, ks, mu)
-    start_U = start * orientation.a if start > 0 else 0.0
+    shape, start = _shape(orientation), sliding_angle(kn, ks, mu)
+    start_U = start * shape.a if start > 0 else 0.0
     if start_U >= math.pi / 2:
         return np.zeros(3)
-    m = _moments(orientation, start_U)
+    m = _moments(shape, start_U)
     normal = ks * m.sin2 - mu * kn * m.sincos
     shear = (ks * m.cos2 + mu * kn * m.sincos) / 2
     twist = (ks * m.cos2_twist + mu * kn * m.sincos_twist) / 2
@@ -111,7 +112,7 @@ def hertz_mindlin_ratio(nu: float) -> float:
 
 def inclination(orientation: HasShape) -> tuple[float, float]:
     """Mean (rad) and variance (rad^2) of the inclinations, Eq. 17; both 0 at a = infinity."""
-    a, b = orientation.a, orientation.b
+    a, b, _ = _shape(orientation)
     spread = 36 * math.pi - 108 + (20 - 6 * math.pi) * b - b**2
     return (6 - b) / (6 * a), spread / (6 * a) ** 2
 
@@ -127,9 +128,14 @@ class _Moments(NamedTuple):
     sincos_twist: float
 
 
-def _moments(orientation: HasShape, U0: float) -> _Moments:
+def _shape(orientation: HasShape) -> Shape:
+    """a, b and c within their bounds; a may be infinite."""
+    return Shape(*bounded(orientation.a, orientation.b, orientation.c, smooth=True))
+
+
+def _moments(shape: Shape, U0: float) -> _Moments:
     """The integrals above over theta from U0/a to pi/(2a)."""
-    b, c, beta = orientation.b, orientation.c, 2.0 / orientation.a
+    b, c, beta = shape.b, shape.c, 2.0 / shape.a
     first, third = _integrals(1.0, beta, U0), _integrals(3.0, beta, U0)
     values = []
     for weight_1, weight_3 in ((1 - b / 8, 3 * b / 8), (9 * c / 8, -3 * c / 8)):

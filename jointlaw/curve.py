@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._checks import Array
+from ._checks import Array, frozen
 from ._formation import factor, rise
 from .heights import HeightDistribution
 
@@ -116,7 +116,7 @@ def virgin_curve(eta: float, heights: HeightDistribution | None) -> Curve:
     """
     if heights is None:
         flat = np.array([[1.0, 0.0, 0.0, 0.0]])
-        return Curve(eta, 1.0, flat, flat / (2 + eta), 0.0)
+        return frozen(Curve(eta, 1.0, flat, flat / (2 + eta), 0.0))
     r0, points = heights.overlap, heights.breakpoints()
     beyond = points[points > r0] - r0
     far = float(beyond[-1]) if beyond.size else r0
@@ -138,7 +138,8 @@ def virgin_curve(eta: float, heights: HeightDistribution | None) -> Curve:
             "begin them exactly there, or drop them with heights=None) or have too long a tail "
             "(cut it)"
         )
-    return Curve(eta, scale, table, _energy_table(eta, scale, table, power), error, power)
+    energy = _energy_table(eta, scale, table, power)
+    return frozen(Curve(eta, scale, table, energy, error, power))
 
 
 def exact_force(y: Array, eta: float, heights: HeightDistribution | None) -> tuple[Array, Array]:

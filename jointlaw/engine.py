@@ -21,7 +21,7 @@ from . import _kernel_numpy
 from ._checks import Array, one_of
 from .law import JointLaw, Tables
 
-LANES = 128  # joints per block
+LANES = 128  # joints per block; again in _kernel_numba, where a change discards compiled code
 CHUNK = 4096  # joints per call of the numpy kernel: keeps its temporaries in cache
 SERIAL = 20_000  # sliders below which a second thread costs more than it saves
 
@@ -32,6 +32,7 @@ Call = Callable[..., None]
 class Engine(Protocol):
     """What a batch asks of a kernel."""
 
+    name: str
     rows: int  # of a block: those of the state, then what the kernel keeps beside it
 
     def advance(
@@ -71,6 +72,13 @@ def _make(tables: Tables, choice: str) -> Engine:
         except ImportError:
             if choice == "numba":
                 raise
+        except RuntimeError as error:
+            if "cannot cache" not in str(error):
+                raise
+            raise OSError(
+                "numba finds no folder that it can write compiled kernels to: set NUMBA_CACHE_DIR "
+                "to one, or JOINTLAW_KERNEL=numpy to do without numba"
+            ) from error
     return NumpyEngine(tables)
 
 
@@ -92,6 +100,8 @@ def write_rows(state: Array, rows: Array, index: Index) -> None:
 
 class NumpyEngine:
     """The reference: whole chunks of joints through `_kernel_numpy.step`."""
+
+    name = "numpy"
 
     def __init__(self, tables: Tables) -> None:
         self.tables, self.rows = tables, tables.rows
@@ -132,6 +142,8 @@ class NumpyEngine:
 
 class NumbaEngine:
     """The compiled kernel, on all threads where there is work for them."""
+
+    name = "numba"
 
     def __init__(self, tables: Tables) -> None:
         from . import _kernel_numba as kernel

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -18,7 +20,12 @@ class Joint:
         self.law = law
         self._batch = JointBatch(law, 1)
         dim = law.tables.dim
-        self._shape, self._shape_C, self._step = (dim,), (1, dim, dim), np.zeros((1, dim))
+        self._shape, self._shape_F, self._shape_C = (dim,), (1, dim), (1, dim, dim)
+
+    def __copy__(self) -> Joint:
+        twin = Joint(self.law)
+        twin._batch = copy(self._batch)
+        return twin
 
     def __repr__(self) -> str:
         return f"<Joint at delta = {self.delta} m>"
@@ -42,9 +49,9 @@ class Joint:
         if not reach <= self.law.largest_reach:  # the batch finds out and says why
             F, C = batch._advance(values[None], None, tangent, None, keep)
             return F[0], None if C is None else C[0]
-        self._step[0] = values
-        F, C = np.empty(self._step.shape), np.empty(self._shape_C) if tangent else None
-        batch._engine.advance(batch._state, self._step, F, C, None, keep, True)
+        step = values[None].copy()  # contiguous and writeable, as the kernel is compiled for
+        F, C = np.empty(self._shape_F), np.empty(self._shape_C) if tangent else None
+        batch._engine.advance(batch._state, step, F, C, None, keep, True)
         if keep:
             batch._reach = reach
         return F[0], None if C is None else C[0]
@@ -75,7 +82,7 @@ class Joint:
 
     @property
     def sliding(self) -> float:
-        """Share of all asperities: in touch, and every cell at its friction limit."""
+        """Share of all facet orientations: in touch, and every cell at its friction limit."""
         return float(self._batch.sliding[0])
 
     @property
@@ -85,7 +92,7 @@ class Joint:
 
     @property
     def separated(self) -> float:
-        """Share of asperities out of touch."""
+        """Share of all facet orientations: out of touch."""
         return float(self._batch.separated[0])
 
     @property

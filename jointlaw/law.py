@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _toml, nodes
-from ._checks import Array, above, at_least, number, numbers
+from ._checks import Array, above, at_least, finite, frozen, number
 from .asperity import Asperity
 from .curve import Curve, virgin_curve
 from .heights import GammaHeights, HeightDistribution, Heights
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from .joint import Joint
 
 _SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
-_NOTHING = 1e-140  # m, and Pa/m: below it squares underflow
+NOTHING = 1e-140  # m, and Pa/m: counts as zero, for powers and squares below it underflow
 DEFAULT_STRESS = 20e6  # Pa; its closure is the default closure_range
 
 
@@ -125,10 +125,10 @@ class JointLaw:
                 f"plane = {self.plane!r}: a joint with closure_only does not shear; leave plane out"
             )
         set_(self, "critical_slip", above("critical_slip", self.critical_slip, 0.0, infinite=True))
-        if self.critical_slip < _NOTHING:
+        if self.critical_slip < NOTHING:
             raise ValueError(
                 f"critical_slip = {self.critical_slip!r} m is out of bounds: it must be >= "
-                f"{_NOTHING:g}"
+                f"{NOTHING:g}"
             )
         with np.errstate(all="ignore"):  # what is no number in the end is refused
             if self.closure_range is None:
@@ -164,13 +164,11 @@ class JointLaw:
 
     def normal_stress(self, closure: ArrayLike) -> Any:
         """Normal stress (Pa) of a joint closed from zero to `closure` (m), unsheared."""
-        y = _finite("closure", closure, "m")
-        force, _ = self.curve.force(y)
-        return (self._closure_factor * force)[()]
+        return self._stress(self._within_reach(closure))[()]
 
     def closure(self, normal_stress: ArrayLike) -> Any:
         """Closure (m) at which the normal stress (Pa, >= 0) is reached: inverse of the above."""
-        stress = _finite("normal_stress", normal_stress, "Pa")
+        stress = finite("normal_stress", normal_stress, "Pa")
         if not (stress >= 0).all():
             raise ValueError(f"normal_stress = {normal_stress!r} is out of bounds: it must be >= 0")
         result = np.array([self._closure_at(float(value)) for value in stress.ravel()])
@@ -181,7 +179,7 @@ class JointLaw:
 
         With `direction` = (theta, phi) in rad: per m2 and steradian in that direction, Eq. 16.
         """
-        y = _finite("closure", closure, "m")
+        y = finite("closure", closure, "m")
         if self.heights is None:
             share: Any = np.where(y > 0, 1.0, 0.0)
         else:
@@ -194,7 +192,7 @@ class JointLaw:
     def max_stiffness(self, closure: ArrayLike) -> Any:
         """Upper bound of |C| (Pa/m) while no facet's effective closure exceeds `closure` (m)."""
         k, p = self.tables, self.asperity
-        _, slope = k.curve.force(_finite("closure", closure, "m"))
+        _, slope = k.curve.force(self._within_reach(closure))
         per_facet = float(np.sum(k.area / k.c1))
         return ((max(1.0, 1.0 / p.lam) + p.mu) * per_facet * slope)[()]
 
@@ -270,10 +268,10 @@ class JointLaw:
         force[:, -1] = slope[:, -1] = np.inf
         slope[:, 0] = 0.0  # a spring that touches at once (eta = 0) belongs to the first cell
         slope = np.maximum.accumulate(slope, axis=1)  # but for the rounding of the table it rises
-        return Tables(
+        return frozen(Tables(
             self.curve, f.n, f.n / c1, f.s, f.t, c1, area, f.weight, depth, force, slope,
             p.lam, p.mu, self.critical_slip,
-        )  # fmt: skip
+        ))  # fmt: skip
 
     @cached_property
     def engines(self) -> dict[str, Engine]:
@@ -301,7 +299,7 @@ class JointLaw:
 
     def _require_numbers(self) -> None:
         """Refuse parameters whose forces, within the closure range, no float can hold."""
-        weak = not float(np.max(self.tables.area)) * min(self.asperity.lam, 1.0) > _NOTHING
+        weak = not float(np.max(self.tables.area)) * min(self.asperity.lam, 1.0) > NOTHING
         if weak or not self.largest_reach >= self.closure_range:
             p = self.asperity
             raise ValueError(
@@ -317,6 +315,21 @@ class JointLaw:
         k = self.tables
         return facet_sum(self.facets.theta, k.area, k.lam, k.mu)
 
+    def _within_reach(self, closure: ArrayLike) -> Array:
+        """Closures (m) that are finite and whose forces are."""
+        y = finite("closure", closure, "m")
+        if (y > self.largest_reach).any():
+            raise ValueError(
+                f"closure = {float(y.max())!r} m is out of bounds: it must be <= largest_reach = "
+                f"{self.largest_reach:g} m, beyond which squares of forces overflow"
+            )
+        return y
+
+    def _stress(self, closure: Array) -> Array:
+        """Normal stress (Pa) at closures (m), infinite where it overflows."""
+        stress: Array = self._closure_factor * self.curve.force(closure)[0]
+        return stress
+
     def _closure_at(self, stress: float) -> float:
         from scipy.optimize import brentq  # a third of the package's import time
 
@@ -324,7 +337,7 @@ class JointLaw:
             return 0.0
 
         def misfit(log_y: float) -> float:  # finite where the force is zero or overflows
-            force = float(self.normal_stress(math.exp(log_y)))
+            force = float(self._stress(np.array(math.exp(log_y))))
             return math.log(min(max(force, _SMALLEST), _LARGEST)) - math.log(stress)
 
         low = high = math.log(self.closure_range)
@@ -358,13 +371,6 @@ class JointLaw:
     def __getstate__(self) -> dict[str, Any]:
         names = self.__dataclass_fields__
         return {name: value for name, value in self.__dict__.items() if name in names}
-
-
-def _finite(name: str, value: ArrayLike, unit: str) -> Array:
-    array = numbers(name, value, unit)
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} = {value!r} is not finite; give finite values in {unit}")
-    return array
 
 
 def facet_sum(theta: Array, area: Array, lam: float, mu: float) -> float:

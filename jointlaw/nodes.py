@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ._checks import Array
+from ._checks import Array, frozen
 from .curve import Curve
 
 # Chosen on random laws with `benchmarks/nodes.py`
@@ -40,9 +40,7 @@ def inclinations(b: float, count: int) -> tuple[Array, Array]:
     matrix = np.diag(middle) + np.diag(side[:-1], 1) + np.diag(side[:-1], -1)
     places, vectors = np.linalg.eigh(matrix)
     places, shares = np.clip(places, 0.0, 1.0), vectors[0] ** 2
-    for array in (places, shares):
-        array.flags.writeable = False  # shared by all laws of this b
-    return places, shares
+    return frozen((places, shares))
 
 
 def depth_nodes(curve: Curve, closure_range: float, slope: Array, cells: int) -> Array:

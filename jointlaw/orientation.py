@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import nodes
-from ._checks import Array, above, at_least, number
+from ._checks import Array, above, at_least, finite, frozen, number
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,24 @@ class Facets:
     n: Array
     s: Array
     t: Array
+
+
+def bounded(a: Any, b: Any, c: Any, *, smooth: bool = False) -> tuple[float, float, float]:
+    """Return a, b and c of Eq. 14 within the bounds of Eq. 18; `smooth` admits an infinite a."""
+    a = at_least("orientation.a", a, 1.0, infinite=smooth)
+    b, c = number("orientation.b", b), number("orientation.c", c)
+    if not -1.0 <= b <= 2.0:
+        raise ValueError(
+            f"orientation.b = {b!r} is out of bounds: -1 <= b <= 2 (Eq. 18), "
+            "or the density turns negative"
+        )
+    bound = 1 / 3 - b / 6
+    if abs(c) > bound + 1e-12:  # 1e-12 admits the bound itself typed in decimals
+        raise ValueError(
+            f"orientation.c = {c!r} is out of bounds: |c| <= 1/3 - b/6 = {bound:.9g} "
+            "(Eq. 18), or the density turns negative"
+        )
+    return a, b, c
 
 
 @dataclass(frozen=True)
@@ -48,21 +66,8 @@ class Orientation:
     c: float = 0.0
 
     def __post_init__(self) -> None:
-        set_ = object.__setattr__
-        set_(self, "a", at_least("orientation.a", self.a, 1.0))
-        set_(self, "b", number("orientation.b", self.b))
-        set_(self, "c", number("orientation.c", self.c))
-        if not -1.0 <= self.b <= 2.0:
-            raise ValueError(
-                f"orientation.b = {self.b!r} is out of bounds: -1 <= b <= 2 (Eq. 18), "
-                "or the density turns negative"
-            )
-        bound = 1 / 3 - self.b / 6
-        if abs(self.c) > bound + 1e-12:  # 1e-12 admits the bound itself typed in decimals
-            raise ValueError(
-                f"orientation.c = {self.c!r} is out of bounds: |c| <= 1/3 - b/6 = {bound:.9g} "
-                "(Eq. 18), or the density turns negative"
-            )
+        for name, value in zip("abc", bounded(self.a, self.b, self.c), strict=True):
+            object.__setattr__(self, name, value)
 
     @classmethod
     def from_moments(cls, mean: float, variance: float, c: float = 0.0) -> Orientation:
@@ -100,7 +105,7 @@ class Orientation:
 
     def density(self, theta: ArrayLike, phi: ArrayLike = 0.0) -> Any:
         """Density per solid angle (1/sr) at inclination theta and azimuth phi in rad, Eq. 14."""
-        th, ph = np.asarray(theta, float), np.asarray(phi, float)
+        th, ph = finite("theta", theta, "rad"), finite("phi", phi, "rad")
         # a sin(a theta)/sin(theta) -> a^2 as theta -> 0, by the ratio of two sinc functions
         ratio = self.a**2 * np.sinc(self.a * th / np.pi) / np.sinc(th / np.pi)
         shape = 1 + self.b / 4 * (3 * np.cos(2 * self.a * th) + 1)
@@ -134,4 +139,5 @@ class Orientation:
         s = np.array([-st, ct * cp, ct * sp])
         t = np.array([zero, -sp, cp])
         dim = 1 if closure_only else 3 if plane is None else 2
-        return Facets(theta, P, np.maximum(weight, 0.0), n[:dim], s[:dim], t[:dim])
+        arrays = (theta, P, np.maximum(weight, 0.0), n[:dim], s[:dim], t[:dim])
+        return Facets(*frozen(arrays))

@@ -32,7 +32,7 @@ class PathError(RuntimeError):
 def closure_test(
     joint: Joint, stress: float | Sequence[float], unload: bool = True, steps: int = 100
 ) -> Record:
-    """Close a joint to a normal stress, and open it again.
+    """Close a joint to a normal stress, from the one it carries, and open it again.
 
     Parameters
     ----------
@@ -41,18 +41,19 @@ def closure_test(
     unload: whether to unload to zero stress after each peak.
     steps: steps per branch; rows crowd towards small stress as the stiffness does.
 
-    Raises ValueError for a bad argument and PathError, with the record so far, when a stress
-    cannot be reached.
+    Returns the Record, its first row the joint as it was given. Raises ValueError for a bad
+    argument and PathError, with the record so far, when a stress cannot be reached.
     """
     peaks = [above("stress", s, 0.0) for s in _series("stress", stress, "Pa")]
     steps = whole("steps", steps, 1)
     grading = (np.arange(1, steps + 1) / steps) ** (1 + joint.law.asperity.eta)
     levels: list[float] = []
+    start = max(float(joint.F[0]), 0.0)
     for peak in peaks:
-        start = levels[-1] if levels else 0.0
         levels += list(start + (peak - start) * grading)
         if unload:
             levels += [*list(peak * grading[-2::-1]), 0.0]
+        start = levels[-1]
     log = _Log(joint, 0.0, "closure test")
     still = np.zeros(joint.law.tables.dim - 1)
     for level in track(levels, "closure test", len(levels)):

@@ -60,7 +60,7 @@ def _shear_figure(pyplot: Any, record: Record) -> Any:
     axes[1, 0].set_ylabel(f"dilation ({small})")
     axes[1, 1].plot(shear, 100 * record.sliding, label="sliding")
     axes[1, 1].plot(shear, 100 * record.separated, label="separated")
-    axes[1, 1].set_ylabel("share of all asperities (%)")
+    axes[1, 1].set_ylabel("share of facet orientations (%)")
     axes[1, 1].set_ylim(-3, 103)
     axes[1, 1].legend(loc="upper center", bbox_to_anchor=(0.5, 1.12), ncols=2, frameon=False)
     for axis in axes[1]:

@@ -31,10 +31,11 @@ UNITS = {
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """Columns of a test, one row per step, the first row being the seated joint.
+    """Columns of a test: a row for the joint at its start (direct shear: seated), one per step.
 
     Columns (also as attributes, arrays (rows,)): closure, shear_2, shear_3 in m; F1, F2, F3 in Pa;
-    sliding, separated as shares; stored, dissipated in J/m2. `azimuth` is the direction of shear.
+    sliding, separated as shares of the facet orientations; stored, dissipated in J/m2. `azimuth`
+    is the direction of shear.
     """
 
     columns: Mapping[str, Array]

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._checks import Array, one_of
+from ._checks import Array, numbers, one_of
 
 if TYPE_CHECKING:
     from .asperity import Asperity
@@ -66,12 +66,17 @@ def secant(law: JointLaw, delta: ArrayLike, contact: str = "exact") -> Secant:
     (Eq. 33) is lam K max(d_n, 0)^eta, so they matter at eta = 0 only. At delta = 0 all are
     separated.
 
-    Raises ValueError for a wrong shape, a number that is not finite, an unknown `contact`, or
-    "series" with eta >= 1.
+    Raises ValueError for a wrong shape, a number that is not finite or beyond `law.largest_reach`,
+    an unknown `contact`, or "series" with eta >= 1.
     """
-    d = np.asarray(delta, float)
+    d = numbers("delta", delta, "m")
     if d.shape != (3,) or not np.isfinite(d).all():
         raise ValueError(f"delta = {delta!r} must be three finite numbers (m): closure, two shears")
+    if not np.abs(d).sum() <= law.largest_reach:
+        raise ValueError(
+            f"delta = {delta!r} m is out of bounds: its components must add up to no more than "
+            f"law.largest_reach = {law.largest_reach:g} m, beyond which squares of forces overflow"
+        )
     one_of("contact", contact, ("exact", "series"))
     asperity = law.asperity
     limit = 1.0 if contact == "exact" else series_limit(asperity.eta)

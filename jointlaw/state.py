@@ -43,11 +43,8 @@ class JointState:
 
 def load_state(path: str | Path) -> JointState:
     """Read a state that `JointState.save` wrote. Raises ValueError if the file is not one."""
-    data = _load(Path(path), ("fingerprint", "values"), "a saved joint state")
-    values = data["values"]
-    if getattr(values, "ndim", 0) != 2 or values.dtype.kind != "f":
-        raise ValueError(f"{str(path)!r} is not a saved joint state: its values are no table")
-    return JointState(str(data["fingerprint"]), np.array(values, float))
+    data = _load(Path(path), ("fingerprint",), ("values",), "a saved joint state")
+    return JointState(str(data["fingerprint"]), data["values"])
 
 
 def write_replay(law_toml: str, values: Array, d: Array, tangent: bool) -> Path | None:
@@ -66,7 +63,7 @@ def write_replay(law_toml: str, values: Array, d: Array, tangent: bool) -> Path 
 
 def read_replay(path: str | Path) -> dict[str, Any]:
     """Law (TOML text), state values (rows, n), increments (dim, n) and tangent flag of a replay."""
-    return _load(Path(path), ("law", "values", "d", "tangent"), "a replay file")
+    return _load(Path(path), ("law", "tangent"), ("values", "d"), "a replay file")
 
 
 def _save(path: Path, **arrays: Any) -> None:
@@ -75,7 +72,7 @@ def _save(path: Path, **arrays: Any) -> None:
     replace_file(path, buffer.getvalue())
 
 
-def _load(path: Path, keys: tuple[str, ...], what: str) -> dict[str, Any]:
+def _load(path: Path, keys: tuple[str, ...], tables: tuple[str, ...], what: str) -> dict[str, Any]:
     try:
         with path.open("rb") as stream:
             if not zipfile.is_zipfile(stream):
@@ -84,6 +81,11 @@ def _load(path: Path, keys: tuple[str, ...], what: str) -> dict[str, Any]:
             version = int(data["version"])
             if version != _VERSION:
                 raise ValueError(f"its version is {version}, this jointlaw reads {_VERSION}")
-            return {key: data[key][()] for key in keys}
+            found = {key: data[key][()] for key in keys}
+            for key in tables:
+                if data[key].ndim != 2 or data[key].dtype.kind != "f":
+                    raise ValueError(f"{key} is no table of numbers")
+                found[key] = np.array(data[key], float)
+            return found
     except (OSError, KeyError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
         raise ValueError(f"{str(path)!r} is not {what}: {error}") from None

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import io
 import json
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -206,10 +206,12 @@ def load_table(path: str | Path) -> JointTable:
         angles = sorted(int(name[3:]) for name in column if name.startswith("kt_"))
         if not (np.isfinite(list(column.values())).all() and (np.diff(column["un"]) > 0).all()):
             raise ValueError("column un must increase and all values must be finite")
+        if len(angles) < 3:
+            raise ValueError(f"it has {len(angles)} columns kt_...; 3 azimuths are the least")
         un, sn, secant, tangent = (column[name] for name in _BY_CLOSURE[:4])
         kt, mu, mob, dil = (
             np.array([column[f"{name}_{a:03d}"] for a in angles]).T for name in _BY_AZIMUTH
         )
         return JointTable(un, sn, secant, tangent, np.radians(angles), kt, mu, mob, dil, metadata)
-    except (OSError, KeyError, ValueError, TypeError, StopIteration, zipfile.BadZipFile) as error:
+    except (OSError, EOFError, KeyError, ValueError, TypeError, StopIteration, BadZipFile) as error:
         raise ValueError(f"{str(path)!r} is not a joint table: {error!r}") from None

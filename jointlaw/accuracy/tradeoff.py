@@ -153,10 +153,8 @@ def tradeoff(
         _price(replace(law, resolution=r), suite, exact, joints, seconds)
         for r in track(found, "resolutions", len(found))
     )
-    kernel = type(law.joints(0)._engine).__name__.removesuffix("Engine").lower()
-    return Tradeoff(
-        suite.names, suite.uncertainty, rows, joints, f"{kernel}, at most {thread_count()} threads"
-    )
+    how = f"{law.joints(0).kernel}, at most {thread_count()} threads"
+    return Tradeoff(suite.names, suite.uncertainty, rows, joints, how)
 
 
 def _price(law: JointLaw, suite: Suite, exact: Array, joints: int, seconds: float) -> Price:
@@ -165,10 +163,10 @@ def _price(law: JointLaw, suite: Suite, exact: Array, joints: int, seconds: floa
     C = tangents(law, suite.d).reshape(steps, paths, -1)
     tangent_max, tangent_rms = errors(C, exact.reshape(steps, paths, -1))
     ns = [_time(law, joints, tangent, seconds) for tangent in (False, True)]
-    made = law.joints(0)._engine.rows
     return Price(
         law.resolution, len(law.tables.c1) * law.tables.cells, error, rms,
-        float(np.sqrt(np.mean(tangent_rms**2))), float(tangent_max.max()), ns[0], ns[1], 8 * made,
+        float(np.sqrt(np.mean(tangent_rms**2))), float(tangent_max.max()), ns[0], ns[1],
+        law.joints(0).bytes_per_joint,
     )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from .._files import replace_file, write_json
 from ..law import JointLaw
 from ..table import JointTable
-from ..tables.tabulate import tabulate
+from ..tables.tabulate import require_3d, tabulate
 
 SCRIPTS = ("direct_shear.py", "settle_and_incline.py", "assembly.py")
 DEFAULT_LIMIT = 10.0  # shear limit over closure range, where the law has no critical slip
@@ -31,14 +31,22 @@ def export_yade(
 
     Writes `joint.txt` and `joint.npz` (the table), `law.toml` (for live mode), `yade_joint.py` (the
     adapter: YADE and numpy alone), the scripts and `summary.json`. Returns the table. Raises
-    ValueError for a law or option that cannot be tabulated.
+    ValueError for a law or option that cannot be tabulated and for a table of another law, before
+    anything is written.
     """
+    require_3d(law)
     if table is None:
         if "shear_limit" not in options and math.isinf(law.critical_slip):
             options["shear_limit"] = DEFAULT_LIMIT * law.closure_range
         table = tabulate(law, **options)
     elif options:
         raise ValueError(f"{', '.join(options)}: give a table or options for one, not both")
+    elif table.metadata.get("law") != law.to_toml():
+        raise ValueError(
+            "table is of another law: joint.txt and law.toml would differ; give the law that its "
+            'metadata["law"] holds, or leave the table out'
+        )
+    report = table.report(law)
     folder = Path(directory)
     folder.mkdir(parents=True, exist_ok=True)
     table.save(folder / "joint.txt")
@@ -47,7 +55,6 @@ def export_yade(
     source = resources.files(__package__) / "yade_files"
     for name in ("yade_joint.py", *SCRIPTS):
         replace_file(folder / name, (source / name).read_bytes())
-    report = table.report(law)
     summary = {
         "files": ["joint.txt", "joint.npz", "law.toml", "yade_joint.py", *SCRIPTS],
         "table": {k: v for k, v in table.metadata.items() if k != "law"},

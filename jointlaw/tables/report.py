@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class PathError:
+class PathDifference:
     """Error of the table on one path, as shares of the law's largest traction on that path.
 
     `largest`, `rms`: over all components; `normal`, `along`, `across`: the largest in the normal
@@ -35,7 +35,7 @@ class PathError:
 class Report:
     """Errors of a table against its law, one row per path; print it to read it."""
 
-    rows: tuple[PathError, ...]
+    rows: tuple[PathDifference, ...]
 
     def __str__(self) -> str:
         head = (
@@ -47,7 +47,7 @@ class Report:
             lines.append(f"{r.name:34s} " + " ".join(f"{100 * v:6.1f} %" for v in values))
         return "\n".join(lines)
 
-    def __getitem__(self, name: str) -> PathError:
+    def __getitem__(self, name: str) -> PathDifference:
         return next(row for row in self.rows if row.name == name)
 
     def as_dict(self) -> dict[str, dict[str, Any]]:
@@ -103,7 +103,7 @@ def _steps(path: Array) -> Array:
 
 def _error(
     name: str, got: Array, exact: Array, corners: list[tuple[float, float, float]]
-) -> PathError:
+) -> PathDifference:
     scale = float(np.sqrt(np.sum(exact**2, axis=1)).max())
     psi = np.radians(corners[-1][2])
     along = np.array([0.0, np.cos(psi), np.sin(psi)])
@@ -111,4 +111,4 @@ def _error(
     off = (got - exact) / scale
     size = np.sqrt(np.sum(off**2, axis=1))
     parts = [float(np.abs(x).max()) for x in (off[:, 0], off @ along, off @ across)]
-    return PathError(name, float(size.max()), float(np.sqrt(np.mean(size**2))), *parts)
+    return PathDifference(name, float(size.max()), float(np.sqrt(np.mean(size**2))), *parts)

@@ -39,10 +39,7 @@ def tabulate(
 
     Raises ValueError for a bad argument.
     """
-    if law.plane is not None:
-        raise ValueError(f"law.plane = {law.plane:g}: a table needs a law in 3-D; set plane=None")
-    if law.closure_only:
-        raise ValueError("law.closure_only = True: a table holds shear; set closure_only=False")
+    require_3d(law)
     end = above("closure", law.closure_range if closure is None else closure, 0.0)
     tolerance = above("tolerance", tolerance, 0.0)
     steps = whole("steps", steps, 2)
@@ -69,6 +66,14 @@ def tabulate(
         table, "metadata", _metadata(law, table, tolerance, worst, harmonic, limit, steps)
     )
     return table
+
+
+def require_3d(law: JointLaw) -> None:
+    """Refuse a law without the shear in all directions that a table holds."""
+    if law.plane is not None:
+        raise ValueError(f"law.plane = {law.plane:g}: a table needs a law in 3-D; set plane=None")
+    if law.closure_only:
+        raise ValueError("law.closure_only = True: a table holds shear; set closure_only=False")
 
 
 def _metadata(

@@ -181,3 +181,41 @@ def test_refusals_name_the_remedy(yade, make_table, tmp_path):
     assert np.isclose(out["forces"][1], 1e3 * 1e-3, rtol=1e-6)
     assert np.isclose(out["shown"], out["forces"][0], rtol=1e-9)
     assert out["left"].tolist() == [1, 0]
+
+
+AREAS = """
+def steps(area):
+    slab_and_sphere()
+    O.bodies.append(utils.sphere((3, 0, .5), .5))       # no contact: takes the largest area seen
+    for k in (1, 2): O.bodies[k].state.blockedDOFs = "xyzXYZ"
+    O.bodies[1].state.pos = (0, 0, .499)
+    engines()
+    joints = Joints(Table("joint.txt"), area=area)
+    joints.attach()
+    try:
+        before = joints.time_step()
+    except ValueError as error:
+        before = str(error)
+    O.dt = 1e-7
+    O.step()
+    return before, joints.time_step()
+result(number=steps(10.0), array=steps(np.array(10.0)), function=steps(lambda i: 10.0),
+       circle=steps(None), k=Table("joint.txt").stiffness(), m=O.bodies[1].state.mass)
+"""
+
+
+def test_time_step_knows_the_area_however_it_is_given(yade, make_table, tmp_path):
+    """A number, an array without axes and a function of the same value give the same safe step.
+
+    Rounding of a sum of one area against a product: 1e-12.
+    """
+    make_table(tmp_path / "joint.txt", 1e8, 5e7, 0.4)
+    out = yade(AREAS)
+    expected = 0.25 * 2 * np.sqrt(out["m"] / (2 * 3.5 * out["k"] * 10.0 * 6))
+    for name in ("number", "array"):
+        assert np.allclose(out[name], expected, rtol=1e-12, atol=0)
+    before, after = out["function"]
+    assert "area is a function" in before
+    assert "after the first step" in before
+    assert np.isclose(float(after), expected, rtol=1e-12, atol=0)
+    assert np.allclose(out["circle"], expected * np.sqrt(10.0 / (np.pi * 0.25)), rtol=1e-12, atol=0)

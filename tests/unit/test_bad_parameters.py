@@ -175,6 +175,55 @@ def test_arguments_of_the_virgin_curve(law, method, value):
         getattr(law, method)(value)
 
 
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda law, u: law.normal_stress(u),
+        lambda law, u: law.normal_stress([1e-7, u]),
+        lambda law, u: law.max_stiffness(u),
+        lambda law, u: law.critical_time_step(1, 1, u),
+        lambda law, u: jl.secant(law, [u, 0, 0]),
+        lambda law, u: jl.secant(law, [0, -u, 0]),
+    ],
+)
+def test_closures_whose_forces_overflow(law, ask):
+    """Beyond `largest_reach` a number would be infinite, or next to it: refused."""
+    ask(law, 0.9 * law.largest_reach)
+    for value in (1.1 * law.largest_reach, 1e300):
+        with pytest.raises(ValueError, match=r"(closure|delta) = .* is out of bounds.*overflow"):
+            ask(law, value)
+
+
+@pytest.mark.parametrize("delta", [["1e-6", "0", "0"], [True, False, False], [1e-6, np.nan, 0]])
+def test_displacements_of_the_total_form(law, delta):
+    with pytest.raises(ValueError, match="delta = "):
+        jl.secant(law, delta)
+
+
+@pytest.mark.parametrize("direction", [(np.nan, 0.0), (0.1, np.inf), ("0.1", 0.0)])
+def test_directions(law, direction):
+    with pytest.raises(ValueError, match=r"(theta|phi) = "):
+        law.contacts(1e-6, direction)
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda shape: jl.closed_form.elastic(shape, 1, 1),
+        lambda shape: jl.closed_form.inelastic(shape, 1, 1, 0.1),
+        lambda shape: jl.closed_form.inelastic(shape, 1, 1, 1e3),  # where nothing slides
+        jl.closed_form.inclination,
+    ],
+)
+@pytest.mark.parametrize(
+    ("shape", "name"),
+    [((0.5,), "a"), ((np.nan,), "a"), ((3.0, 7.0), "b"), ((3.0, 0.0, 0.4), "c")],
+)
+def test_shapes_of_the_closed_forms(ask, shape, name):
+    with pytest.raises(ValueError, match=rf"orientation\.{name} = "):
+        ask(jl.closed_form.Shape(*shape))
+
+
 def test_negative_normal_stress_has_no_closure(law):
     with pytest.raises(ValueError, match=r"normal_stress = -1\.0 .* >= 0"):
         law.closure(-1.0)

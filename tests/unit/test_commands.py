@@ -101,6 +101,17 @@ def test_replay_of_a_step_that_passes(law, tmp_path, capsys):
     assert "passes: F = " in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("wrong", ["values", "d"])
+def test_replay_of_a_damaged_file_is_refused_by_name(law, tmp_path, capsys, wrong):
+    values, d = np.zeros((law.tables.rows, 1)), np.zeros((3, 1))
+    for bad in (np.float64(0.0), np.zeros(3), np.zeros((3, 1), bool)):
+        arrays = {"law": law.to_toml(), "values": values, "d": d, "tangent": True, wrong: bad}
+        np.savez("bad.npz", version=1, **arrays)
+        assert main(["replay", "bad.npz"]) == 2
+        told = f"'bad.npz' is not a replay file: {wrong} is no table of numbers"
+        assert told in capsys.readouterr().err
+
+
 def test_every_command_has_an_example(capsys):
     with pytest.raises(SystemExit):
         main(["--help"])

@@ -1,6 +1,11 @@
 """The compiled kernel gives the numbers of the readable one, however it is called."""
 
+import os
 import pickle
+import shutil
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -63,6 +68,7 @@ def both(monkeypatch):
             made.append(build())
             batch = getattr(made[-1], "_batch", made[-1])
             assert isinstance(batch._engine, kind)
+            assert batch.kernel == name
         return made
 
     return make
@@ -70,6 +76,19 @@ def both(monkeypatch):
 
 def worst(one, other, peak):
     return np.max(np.abs(np.asarray(one) - np.asarray(other)), initial=0.0) / peak
+
+
+def test_the_compiled_block_is_the_one_that_states_come_in():
+    """It is a constant of the kernel's own file: changed elsewhere it leaves old machine code."""
+    from jointlaw import _kernel_numba
+
+    assert _kernel_numba.LANES == engine.LANES
+
+
+def test_memory_of_a_joint(both, law):
+    """The state of whole blocks, nothing else that grows with their number."""
+    for batch in both(lambda: law.joints(2 * engine.LANES)):
+        assert batch.bytes_per_joint * len(batch) == batch._state.nbytes
 
 
 @pytest.mark.parametrize("seed", range(30))
@@ -271,3 +290,24 @@ def test_bad_settings_are_named(law, monkeypatch, name, value, message):
     monkeypatch.setenv(name, value)
     with pytest.raises(ValueError, match=f"{name} = '{value}'.*{message}"):
         law.joints(N).update(np.zeros((N, 3)))
+
+
+def test_no_folder_for_compiled_kernels_is_told_with_the_remedy(tmp_path):
+    """A package that cannot be written to, as for a user without a home; root may write anywhere,
+    but not into a folder whose name is taken by a file."""
+    shutil.copytree(Path(jl.__file__).parent, tmp_path / "jointlaw",
+                    ignore=shutil.ignore_patterns("__pycache__"))  # fmt: skip
+    (tmp_path / "jointlaw" / "__pycache__").touch()
+    code = "import jointlaw as jl; jl.presets.load('westerly-smooth').joint()"
+    env = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "JOINTLAW_KERNEL")}
+    env |= {"PYTHONPATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "jointlaw/__init__.py")}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, env=env, capture_output=True, text=True
+    )
+    assert done.stderr.splitlines()[-1].startswith("OSError: numba finds no folder")
+    assert "NUMBA_CACHE_DIR" in done.stderr.splitlines()[-1]
+    env["NUMBA_CACHE_DIR"] = str(tmp_path / "cache")  # the remedy
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, env=env, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr

@@ -46,6 +46,23 @@ def test_a_changed_value_differs(law):
     assert dataclasses.replace(law, plane=0.0).fingerprint != law.fingerprint
 
 
+def test_tables_that_laws_share_are_not_writeable(any_law):
+    """The virgin curve and the inclinations outlive the law: a later law reads the same arrays."""
+    for shared in (any_law.curve, any_law.tables, vars(any_law.facets).values()):
+        for array in shared:
+            if isinstance(array, np.ndarray):
+                with pytest.raises(ValueError, match="read-only"):
+                    array[...] *= 2
+
+
+def test_equal_laws_have_one_fingerprint(make_law):
+    """-0.0 == 0.0: a state goes from one to the other."""
+    one, other = make_law(c=0.0), make_law(c=-0.0)
+    assert one == other
+    assert one.fingerprint == other.fingerprint
+    one.joint().restore(other.joint().snapshot())
+
+
 def test_repr_builds_the_value(value):
     assert eval(repr(value), NAMES) == value
 

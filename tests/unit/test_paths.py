@@ -103,6 +103,17 @@ def test_closure_test_without_unloading(law):
     assert record.closure[-1] == pytest.approx(law.closure(20e6), rel=1e-8)
 
 
+def test_closure_test_goes_on_from_the_stress_that_the_joint_carries(law):
+    joint = law.joint()
+    jl.closure_test(joint, 20e6, unload=False, steps=10)
+    record = jl.closure_test(joint, 30e6, unload=False, steps=5)
+    # 1e-9: the normal stress is met to 1e-11 of the largest
+    assert [record.F1[0], record.F1[-1]] == pytest.approx([20e6, 30e6], rel=1e-9)
+    assert (np.diff(record.F1) > 0).all()
+    lower = jl.closure_test(joint, 10e6, unload=False, steps=5)
+    assert (np.diff(lower.F1) < 0).all()
+
+
 def test_cycles_of_a_closure_test(law):
     record = jl.closure_test(law.joint(), [5e6, 20e6], steps=10)
     assert [record.F1[10], record.F1[20], record.F1[30]] == pytest.approx([5e6, 0, 20e6], abs=1e-2)

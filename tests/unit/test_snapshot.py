@@ -1,5 +1,8 @@
 """Snapshots: bit-identical return, files, and what does not belong to the joint."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -53,6 +56,43 @@ def test_a_snapshot_is_a_copy(law):
     assert not state.values.any()
     assert len(state) == 1
     assert len(law.joints(7).snapshot()) == 7
+
+
+@pytest.mark.parametrize(
+    "twin_of", [copy.copy, copy.deepcopy, lambda joint: pickle.loads(pickle.dumps(joint))]
+)
+def test_a_copy_of_a_joint_moves_alone(any_law, twin_of):
+    joint = any_law.joint()
+    walk(joint, np.random.default_rng(1))
+    before, twin = joint.snapshot().values, twin_of(joint)
+    np.testing.assert_array_equal(twin.snapshot().values, before)
+    walk(twin, np.random.default_rng(2))
+    np.testing.assert_array_equal(joint.snapshot().values, before)
+    walk(joint, np.random.default_rng(2))  # and both go the same way
+    np.testing.assert_array_equal(twin.snapshot().values, joint.snapshot().values)
+
+
+class Interrupted:
+    """An engine that is interrupted by another trial of the joint before it reads its increment."""
+
+    def __init__(self, engine, first):
+        self.engine, self.first = engine, first
+
+    def advance(self, *given):
+        first, self.first = self.first, lambda: None
+        first()
+        self.engine.advance(*given)
+
+
+def test_trials_of_two_threads_do_not_meet(law):
+    """A trial writes nothing that another trial of the joint reads."""
+    joint = law.joint()
+    alone, C_alone = joint.trial([3e-7, 1e-7, 0.0])
+    batch = joint._batch
+    batch._engine = Interrupted(batch._engine, lambda: joint.trial([9e-7, 0.0, 0.0]))
+    F, C = joint.trial([3e-7, 1e-7, 0.0])
+    np.testing.assert_array_equal(F, alone)
+    np.testing.assert_array_equal(C, C_alone)
 
 
 def test_a_law_read_from_its_file_takes_the_state(law, tmp_path):

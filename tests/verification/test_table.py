@@ -1,5 +1,6 @@
 """The table against the law it was made from: where it must be exact, and what it drops."""
 
+import json
 import math
 from dataclasses import replace
 
@@ -188,3 +189,31 @@ def test_export_command(tmp_path, capsys):
         "settle_and_incline.py", "assembly.py", "summary.json",
     }  # fmt: skip
     assert "what the table drops" in capsys.readouterr().out
+
+
+def test_export_refuses_a_table_of_another_law_and_writes_nothing(law, table, tmp_path):
+    """Else joint.txt and law.toml of one folder would hold different joints."""
+    softer = replace(law, asperity=replace(law.asperity, K=law.asperity.K / 2))
+    for wrong, words in (
+        (softer, "table is of another law"),
+        (replace(law, plane=0.0), "law.plane = 0"),
+        (replace(law, closure_only=True), "law.closure_only = True"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            jl.export_yade(wrong, tmp_path / "folder", table=table)
+    assert not (tmp_path / "folder").exists()
+    table.save(tmp_path / "joint.txt")  # one that was read back is as good
+    jl.export_yade(law, tmp_path / "folder", table=load_table(tmp_path / "joint.txt"))
+    assert jl.JointLaw.from_toml(tmp_path / "folder" / "law.toml") == law
+
+
+def test_a_file_that_is_no_table_is_refused_by_name(table, tmp_path):
+    """An empty file, and one without the shear stiffnesses that `lookup` needs."""
+    empty, bare = tmp_path / "empty.npz", tmp_path / "bare.npz"
+    empty.write_bytes(b"")
+    column = {k: v for k, v in table.columns.items() if not k.startswith("kt_")}
+    data = np.array(list(column.values())).T
+    np.savez(bare, names=list(column), data=data, metadata=json.dumps(dict(table.metadata)))
+    for path, words in ((empty, "EOFError"), (bare, "3 azimuths are the least")):
+        with pytest.raises(ValueError, match=rf"{path.name}' is not a joint table: .*{words}"):
+            load_table(path)

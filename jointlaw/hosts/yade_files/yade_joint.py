@@ -241,7 +241,8 @@ class Joints:
             raise ValueError(f"name = {name!r} must be a Python identifier: it labels the engine")
         if lagged and law.live:
             raise ValueError("lagged = True works with a Table only: a live law has no kn and ks")
-        self.law, self.area, self.select, self.name = law, area, select, name
+        self.law, self.select, self.name = law, select, name
+        self.area = area if area is None or callable(area) else float(area)
         self.azimuth = unit(np.array(azimuth, float))
         self.plane = None if plane is None else unit(np.array(plane, float))
         self.mated, self.lagged, self.forget = mated, lagged, forget
@@ -317,19 +318,34 @@ class Joints:
         """A fixed step (s): `safety` of the shortest stable one over all free spheres.
 
         closure: the largest expected (m); the end of the table or the closure range by default.
-        Every sphere is taken to carry the joints that it has, and six at least.
+        Every sphere is taken to carry the joints that it has, and six at least. Where `area` is a
+        function, only contacts tell the areas: ValueError before there are any.
         """
         k, shortest = self.law.stiffness(closure), np.inf
-        count = np.bincount(np.concatenate([self.c["id1"], self.c["id2"]]), minlength=len(O.bodies))
+        place = np.concatenate([self.c["id1"], self.c["id2"]])
+        areas = np.tile(self.c["area"], 2)
+        count = np.bincount(place, minlength=len(O.bodies))
+        if callable(self.area):
+            if not len(areas):
+                raise ValueError(
+                    "area is a function, and no contact tells its values yet: call time_step() "
+                    "after the first step, or give O.dt"
+                )
+            total = np.bincount(place, areas, minlength=len(count))
+            largest = np.zeros(len(count))
+            np.maximum.at(largest, place, areas)
+            largest[count == 0] = areas.max()
         for body in O.bodies:
             if body is None or not isinstance(body.shape, Sphere) or body.state.mass <= 0:
                 continue
-            area = np.pi * body.shape.radius**2
-            if np.isscalar(self.area):
-                area = self.area
+            if callable(self.area):
+                carried = max(6 * largest[body.id], total[body.id])
+            else:
+                one = np.pi * body.shape.radius**2 if self.area is None else self.area
+                carried = one * max(6, count[body.id])
             # two bodies (2), rolling (1 + m R^2/I = 3.5 for a sphere)
-            total = 2 * 3.5 * k * area * max(6, count[body.id])
-            shortest = min(shortest, 2 * np.sqrt(body.state.mass / total))
+            stiffness = 2 * 3.5 * k * carried
+            shortest = min(shortest, 2 * np.sqrt(body.state.mass / stiffness))
         if not np.isfinite(shortest):
             raise ValueError("no free sphere in O.bodies: set O.dt by hand")
         return safety * shortest
@@ -605,7 +621,7 @@ class Joints:
         if self.area is None:
             area = np.pi * np.nanmin([*R, i.geom.refR1, i.geom.refR2]) ** 2
         else:
-            area = float(self.area(i) if callable(self.area) else self.area)
+            area = float(self.area(i)) if callable(self.area) else self.area
         if not 0 < area < np.inf:
             raise ValueError(f"area = {area} m2 of contact {i.id1}-{i.id2} must be > 0 and finite")
         return (*(R if ball else (i.geom.refR1, i.geom.refR2)), ball, area)

@@ -18,6 +18,8 @@ from .coulomb import CoulombLaw, CoulombState
 
 def build_law(table: dict[str, Any], where: str):
     """A law from a scene's `[laws.NAME]` table; `kind` is "joint" (default) or "coulomb"."""
+    if not isinstance(table, dict):
+        raise ValueError(f"{where} = {table!r}: must be a table")
     table = dict(table)
     kind = table.pop("kind", "joint")
     if table.get("closure_only"):

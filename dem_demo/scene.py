@@ -106,7 +106,7 @@ def build(data: dict[str, Any], where: str = "scene", text: str = "") -> Scene:
     for name, table in top.take("laws", dict, say="give at least one [laws.NAME] table").items():
         try:
             laws[name] = build_law(table, f"{where}.laws.{name}")
-        except (ValueError, TypeError, AttributeError) as error:
+        except (ValueError, TypeError, AttributeError, OverflowError) as error:
             raise SceneError(str(error)) from None
     default = top.take("law", str, next(iter(laws), ""))
     thickness = top.take("thickness", float, 1.0, above=0)

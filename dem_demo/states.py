@@ -75,9 +75,10 @@ def restore(sim, state: dict, step: float | None = None) -> None:
     sim.points = sim.evaluate(sim.motion)
     if step:  # velocities are half a step ahead of the places: of the new step
         sim.motion[3:] += 0.5 * (step - a["clock"][2]) * (a["forces"][0] / sim.inertia * sim.free).T
+    sim.world.place(sim.motion)
+    if step:
         sim.check_step(sim.points)
         sim.require_step()
-    sim.world.place(sim.motion)
 
 
 def save(sim, folder: Path, state: dict) -> None:

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from jointlaw._files import write_json
+import jointlaw as jl
+from jointlaw._files import replace_file, write_json
 
 from .ingredients import Variant, variants, working_stress
 from .interfaces import Refused
@@ -60,7 +61,7 @@ def ablate(scene: Scene, until: float | None = None) -> list[Row]:
 def _without(variant: Variant, record: Record, until: float | None, count: str) -> Row:
     try:
         scene = variant.make()
-    except ValueError as error:
+    except (ValueError, jl.PathError) as error:
         return Row(variant.name, note=f"cannot be built: {error}")
     row, other = _run(replace(scene, title=f"{count} {variant.name}"), variant.name, until)
     if other is not None:
@@ -181,6 +182,6 @@ def write(rows: list[Row], folder: Path) -> None:
         for row, change, ratio in zip(rows, changes(rows), time_ratios(rows), strict=True):
             cells = [cell for key in keys for cell in (row.outcome.get(key), change.get(key))]
             writer.writerow([row.name, *cells, row.steps, row.time_step, row.cpu, ratio, row.note])
-    (folder / "ablation.md").write_text(table(rows) + "\n")
+    replace_file(folder / "ablation.md", (table(rows) + "\n").encode())
     summary = {"runs": [row.__dict__ for row in rows], "time_ratio": time_ratios(rows)}
     write_json(folder / "summary.json", summary)

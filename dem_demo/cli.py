@@ -6,13 +6,14 @@ import argparse
 import sys
 from pathlib import Path
 
-from jointlaw._files import write_json
+import jointlaw as jl
+from jointlaw._files import replace_file, write_json
 
 from . import ablate
 from .compare import compare, critical_tilts
 from .interfaces import Refused
 from .outcome import sentence
-from .run import run
+from .run import run, steps_to
 from .scene import load, names
 from .simulation import Simulation
 from .tables import SceneError
@@ -43,7 +44,7 @@ def main(arguments: list[str] | None = None) -> int:
     }  # fmt: skip
     try:
         return verbs[words[0]](words[1:]) if words and words[0] in verbs else _run(words)
-    except (SceneError, Refused, ValueError, OSError) as error:
+    except (SceneError, Refused, jl.PathError, ValueError, OSError) as error:
         print(f"dem_demo: {error}", file=sys.stderr)
         return 2
 
@@ -88,6 +89,7 @@ def _ablate(words: list[str]) -> int:
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder for the results")
     parser.add_argument("--until", type=float, help="model time to stop at (s)")
     given = parser.parse_args(words)
+    given.out.mkdir(parents=True, exist_ok=True)  # a folder that cannot be is known before the work
     rows = ablate.ablate(load(given.scene), given.until)
     ablate.write(rows, given.out)
     print(ablate.table(rows))
@@ -106,7 +108,7 @@ def _new(words: list[str]) -> int:
     file = parser.parse_args(words).file
     if file.exists():
         raise ValueError(f"{file} exists: give another name")
-    file.write_text(TEMPLATE.read_text())
+    replace_file(file, TEMPLATE.read_bytes())
     print(f"{file} written; next: python -m dem_demo check {file}")
     return 0
 
@@ -120,8 +122,7 @@ def _check(words: list[str]) -> int:
     )
     parser.add_argument("file")
     scene = load(Path(parser.parse_args(words).file))
-    sim = Simulation(scene)
-    _announce(sim, scene.run.end)
+    _announce(Simulation(scene))
     print("the scene is valid")
     return 0
 
@@ -148,6 +149,8 @@ def _compare(words: list[str]) -> int:
     scene = load(given.scene)
     if not scene.rocks:
         raise ValueError(f"{given.scene} has no [[rock]] to compare")
+    if given.out:
+        given.out.parent.mkdir(parents=True, exist_ok=True)
     rows, scene_is = [], (scene.text, str(given.scene), given.seeds)
     if given.critical:
         for row in critical_tilts(*scene_is):
@@ -174,12 +177,13 @@ def _outputs(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-pictures", action="store_true", help="tables only")
 
 
-def _announce(sim: Simulation, end: float) -> None:
+def _announce(sim: Simulation, until: float | None = None) -> None:
+    steps = steps_to(sim, until)
     free = sum(1 for block in sim.scene.blocks if not block.fixed)
     print(f"{sim.scene.title}: {free} moving blocks, {sim.joints.n} law points in reach")
     print(
         f"time step {sim.dt:.3g} s, limit {sim.step_limit:.3g} s (safety factor "
-        f"{sim.step_limit / sim.dt:.2f}), {max(round((end - sim.time) / sim.dt), 0)} steps"
+        f"{sim.step_limit / sim.dt:.2f}), {steps} steps"
     )
     for rock in sim.scene.rocks:
         print(
@@ -191,19 +195,19 @@ def _announce(sim: Simulation, end: float) -> None:
 
 
 def _go(sim: Simulation, given: argparse.Namespace) -> int:
-    end = given.until if given.until is not None else sim.scene.run.end
-    _announce(sim, end)
-    given.out.mkdir(parents=True, exist_ok=True)
-    _, summary = run(sim, given.out, end, not given.no_pictures)
+    _announce(sim, given.until)
+    _, summary = run(sim, given.out, given.until, not given.no_pictures)
     for slip in summary["slip"]:
+        predicted = slip["predicted_angle"]
+        alone = "nothing" if predicted is None else f"{predicted:.2f}"
         if slip["slipped_before"]:
             print(f"{slip['block']}: had slipped before this run")
         elif slip["slip_angle"] is None:
-            print(f"{slip['block']}: no slip (predicted at {slip['predicted_angle']:.2f} degrees)")
+            print(f"{slip['block']}: no slip (the law alone says {alone})")
         else:
             print(
                 f"{slip['block']}: slipped at {slip['slip_angle']:.2f} degrees, "
-                f"the law alone says {slip['predicted_angle']:.2f}"
+                f"the law alone says {alone}"
             )
     for rock in summary["rocks"]:
         print(sentence(rock))

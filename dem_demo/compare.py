@@ -20,6 +20,7 @@ from .interfaces import Refused
 from .laws import build_law
 from .outcome import outcomes
 from .record import Record
+from .run import steps_to
 from .scene import build
 from .shapes import turn
 from .simulation import Simulation
@@ -89,7 +90,7 @@ def _run(data: dict[str, Any], where: str, until: float) -> dict:
     record = Record(sim)
     record.take(sim)
     every = max(round(sim.scene.run.record / sim.dt), 1)
-    steps, worst = round(until / sim.dt), 0.0
+    steps, worst = steps_to(sim, until), 0.0
     try:
         for i in tqdm(range(1, steps + 1), leave=False, disable=not sys.stderr.isatty()):
             sim.step()

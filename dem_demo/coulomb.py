@@ -100,7 +100,7 @@ class CoulombJoints:
                 setattr(self, name, value)
             else:
                 getattr(self, name)[where] = value
-        return new["F"], C
+        return new["F"].copy(), C  # the host's own: `self.F` is state
 
     def trial(self, d, where=None, tangent=True):
         """The same, with the state left alone."""

@@ -105,7 +105,7 @@ def read_drives(
             )
         if motion not in AXES:
             raise SceneError(f"{table.path('motion')} = {motion!r}: must be x, y or turn")
-        times, values = (np.array(table.take(key, list), float) for key in ("times", "values"))
+        times, values = table.numbers("times"), table.numbers("values")
         if len(times) != len(values) or len(times) < 1 or (np.diff(times) <= 0).any():
             raise SceneError(f"{table.path('times')}: must increase, one for each of `values`")
         unit = np.pi / 180 if motion == "turn" else 1.0

@@ -7,12 +7,11 @@ reach, so history is never handed to the wrong joint.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .laws import StiffnessCurve, load_state
+from .laws import StiffnessCurve
 
 MEASURED = ("sliding", "slipping", "separated", "stored", "lost")
 
@@ -162,28 +161,12 @@ class Joints:
         }
 
     def restore(self, state: dict[str, Any], points: Sequence[Identity]) -> None:
-        """Back to a snapshot whose law points were `points`."""
+        """Back to a snapshot whose law points were `points`. Raises ValueError for another's."""
+        held = {point for _, slots, _ in state.values() for point in slots}
+        if set(state) != set(self.batches) or held != set(points):
+            raise ValueError("the state's joints are not those of the scene's laws and law points")
         for name, (values, slots, free) in state.items():
             self.batches[name].resize(len(slots) + len(free))
             self.batches[name].restore(values)
             self._slots[name], self._free[name] = dict(slots), list(free)
         self.assign(points)
-
-    def save(self, state: dict[str, Any], folder: Path) -> dict[str, Any]:
-        """Write a snapshot's law states to `folder`; returns the rest, fit for JSON."""
-        plain = {}
-        for name, (values, slots, free) in state.items():
-            values.save(folder / f"law-{name}.npz")
-            plain[name] = {"slots": [[*k, p, s] for (k, p), s in slots.items()], "free": free}
-        return plain
-
-    def load(self, plain: dict[str, Any], folder: Path) -> dict[str, Any]:
-        """The snapshot that `save` wrote."""
-        return {
-            name: (
-                load_state(self.laws[name], folder / f"law-{name}.npz"),
-                {(tuple(s[:4]), s[4]): s[5] for s in entry["slots"]},
-                entry["free"],
-            )
-            for name, entry in plain.items()
-        }

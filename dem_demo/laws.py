@@ -14,10 +14,13 @@ import numpy as np
 import jointlaw as jl
 
 from .coulomb import CoulombLaw, CoulombState
+from .tables import finite
 
 
 def build_law(table: dict[str, Any], where: str):
     """A law from a scene's `[laws.NAME]` table; `kind` is "joint" (default) or "coulomb"."""
+    if not isinstance(table, dict):
+        raise ValueError(f"{where} = {table!r}: must be a table")
     table = dict(table)
     kind = table.pop("kind", "joint")
     if table.get("closure_only"):
@@ -32,9 +35,12 @@ def build_law(table: dict[str, Any], where: str):
             raise ValueError(f"{where}.{key} is unknown; known here: {', '.join(sorted(known))}")
     if missing := known - set(table):
         raise ValueError(f"{where} lacks {', '.join(sorted(missing))}")
+    for key, value in table.items():
+        if not (finite(value) or value == np.inf):
+            raise ValueError(f"{where}.{key} = {value!r}: must be a number")
     try:
-        return CoulombLaw(**table)
-    except (TypeError, ValueError) as error:
+        return CoulombLaw(**{key: float(value) for key, value in table.items()})
+    except ValueError as error:
         raise ValueError(f"{where}.{error}") from None
 
 

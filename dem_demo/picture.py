@@ -148,10 +148,9 @@ def final(record: Record, path: Path, slips: list[dict]) -> None:
     last, parts = len(record.times) - 1, []
     for slip in slips:
         if slip["slip_angle"] is not None:
-            parts.append(
-                f"{slip['block']} slipped at {slip['slip_angle']:.2f}° "
-                f"(law alone {slip['predicted_angle']:.2f}°)"
-            )
+            predicted = slip["predicted_angle"]
+            alone = f" (law alone {predicted:.2f}°)" if predicted is not None else ""
+            parts.append(f"{slip['block']} slipped at {slip['slip_angle']:.2f}°{alone}")
     note = "\n" + "; ".join(parts) if parts else ""
     frame_figure(record, last, Scale(record, [0, last]), 130, note).savefig(path)
 

@@ -73,10 +73,11 @@ def curves(record: Record, path: Path, slips: list[dict]) -> None:
             slid = 1e3 * np.abs(record.column(f"{name}: slid_m"))
             angle = record.column(f"{name}: base angle_deg")
             axes.semilogx(np.maximum(slid, 1e-4), angle, color=colour, label=f"{name}, blocks")
-            axes.axhline(
-                entry["predicted_angle"], color=colour, ls="--", lw=1,
-                label=f"{name}, peak of the law alone: {entry['predicted_angle']:.2f}°",
-            )  # fmt: skip
+            if entry["predicted_angle"] is not None:
+                axes.axhline(
+                    entry["predicted_angle"], color=colour, ls="--", lw=1,
+                    label=f"{name}, peak of the law alone: {entry['predicted_angle']:.2f}°",
+                )  # fmt: skip
             if entry["slip_angle"] is not None:
                 axes.plot(1e3 * entry["slip_distance"], entry["slip_angle"], "o", color=colour)
         axes.axvline(1e3 * slips[0]["slip_distance"], color="0.5", lw=1, ls=":")

@@ -20,7 +20,7 @@ JOINT_COLUMNS = (
 
 
 class Record:
-    """Frames of a run: times (f,), motion (f, 6, n), energies (f, 8), joints as lists of arrays.
+    """Frames of a run: times (f,), motion (f, 6, n), energies (f, 9), joints as lists of arrays.
 
     joints[f]: "who" (k, 5) block, edge, block, edge, point; "ends" (k, 2, 2) the stretch of joint
     that a law point carries; "values" (k, 9) as JOINT_COLUMNS.
@@ -44,7 +44,7 @@ class Record:
         for kind in ("slip", "shear"):
             for moving, base in self.scene.watch.get(kind, []):
                 name = self.scene.blocks[moving].name
-                row[f"{name}: base angle_deg"] = base_angle(sim, base)
+                row[f"{name}: base angle_deg"] = base_angle(sim, moving, base)
                 for key, value in joint_state(sim, moving, base).items():
                     row[f"{name}: {key}_{UNITS[key]}"] = value
         for i, pin in enumerate(self.scene.watch.get("pins", [])):

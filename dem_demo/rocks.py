@@ -72,15 +72,15 @@ def _one(table: Table, name: str, density: float, first: int) -> tuple[list[Bloc
         part.finish()
     least = LEAST * min((s.spacing for s in sets), default=0.0)
     least = table.take("least_width", float, least, above=0, say="m")
-    seed = table.take("seed", float, 0.0, least=0)
+    seed = table.whole("seed", 0, least=0)
     density = table.take("density", float, density, above=0)
     table.finish()
-    if seed % 1:
-        raise SceneError(f"{table.path('seed')} = {seed}: must be a whole number")
+    if not all(isinstance(law, str) for law in other.values()):
+        raise SceneError(f"{table.path('laws')} = {other}: must name laws")
     if unknown := set(other) - {s.law for s in sets}:
         raise SceneError(f"{table.path('laws')}: no set of this rock has the law {unknown.pop()!r}")
     try:
-        parts = cut(outline, sets, int(seed), least)
+        parts = cut(outline, sets, seed, least)
     except ValueError as error:
         raise SceneError(f"{table.path('outline')}: {error}") from None
     blocks, laws = [], {}
@@ -124,15 +124,7 @@ def _set(table: Table) -> JointSet:
 
 def _polygon(table: Table, key: str) -> np.ndarray:
     """Corners (m, 2) of a simple polygon, in either sense."""
-    given = table.take(key, list, say="give at least 3 corners [x, y] in m")
-    try:
-        corners = np.array(given, float)
-        ok = corners.ndim == 2 and corners.shape[1] == 2 and len(corners) >= 3
-        ok = ok and bool(np.isfinite(corners).all())
-    except (TypeError, ValueError):
-        ok = False
-    if not ok:
-        raise SceneError(f"{table.path(key)}: must be a list of at least 3 corners [x, y] in m")
+    corners = table.corners(key, "give at least 3 corners [x, y] in m")
     if not Polygon(corners).is_valid:
         raise SceneError(f"{table.path(key)}: must not cross or touch itself")
     return corners

@@ -13,7 +13,7 @@ from .drives import AXES, Drive, read_drives
 from .laws import build_law
 from .rocks import Rock, read_rocks
 from .shapes import Block, box, check_convex
-from .tables import SceneError, Table
+from .tables import SceneError, Table, distinct
 
 SCENES = Path(__file__).parent / "scenes"
 
@@ -84,7 +84,10 @@ def load(source: str | Path) -> Scene:
         raise SceneError(
             f"no scene {str(source)!r}: give a TOML file or one of {', '.join(names())}"
         )
-    return parse(path.read_text(), path.name)
+    try:
+        return parse(path.read_text(encoding="utf-8"), path.name)
+    except UnicodeDecodeError as error:
+        raise SceneError(f"{path} is not UTF-8 text: {error}") from None
 
 
 def parse(text: str, where: str = "scene") -> Scene:
@@ -103,7 +106,7 @@ def build(data: dict[str, Any], where: str = "scene", text: str = "") -> Scene:
     for name, table in top.take("laws", dict, say="give at least one [laws.NAME] table").items():
         try:
             laws[name] = build_law(table, f"{where}.laws.{name}")
-        except (ValueError, AttributeError) as error:
+        except (ValueError, TypeError, AttributeError, OverflowError) as error:
             raise SceneError(str(error)) from None
     default = top.take("law", str, next(iter(laws), ""))
     thickness = top.take("thickness", float, 1.0, above=0)
@@ -152,13 +155,12 @@ def _block(table: Table, density: float) -> Block:
             raise SceneError(f"{table.path('box')} = {list(size)}: width and height must be > 0")
         corners = box(*size, table.vector("at", (0.0, 0.0)), table.take("angle", float, 0.0))
     else:
-        given = table.take("corners", list, say="give `corners`, or `box` with `at` and `angle`")
-        try:
-            corners = np.array(given, float)
-        except (TypeError, ValueError):
-            raise SceneError(f"{table.path('corners')}: must be numbers [x, y]") from None
+        corners = table.corners("corners", "give `corners`, or `box` with `at` and `angle`")
     if trouble := check_convex(corners):
         raise SceneError(f"{table.path('corners')} {trouble}")
+    held = table.take("held", list, [])
+    if not distinct(held, AXES):
+        raise SceneError(f"{table.path('held')} = {held!r}: must be some of x, y, turn, each once")
     block = Block(
         name=name,
         corners=corners,
@@ -167,11 +169,9 @@ def _block(table: Table, density: float) -> Block:
         velocity=table.vector("velocity", (0.0, 0.0)),
         spin=table.take("spin", float, 0.0),
         load=table.vector("load", (0.0, 0.0)),
-        held=tuple(table.take("held", list, [])),
+        held=tuple(held),
     )
     table.finish()
-    if unknown := set(block.held) - set(AXES):
-        raise SceneError(f"{table.path('held')}: {unknown.pop()!r} is unknown: x, y or turn")
     return block
 
 
@@ -193,7 +193,7 @@ def _pairs(top: Table, where: str, number: dict[str, int], blocks) -> dict[froze
             table.finish()
             continue
         between = table.take("between", list, say="or give `around`, a point of one block")
-        if len(between) != 2 or not set(between) <= set(number):
+        if not distinct(between, number, 2):
             raise SceneError(f"{table.path('between')} = {between}: must name two blocks")
         pairs[frozenset(number[b] for b in between)] = table.take("law", str)
         table.finish()
@@ -216,7 +216,7 @@ def _run(table: Table) -> Run:
         record=table.take("record", float, Run.record, above=0, say="s"),
         dashpot_normal=table.take("dashpot_normal", float, Run.dashpot_normal, least=0),
         dashpot_shear=table.take("dashpot_shear", float, Run.dashpot_shear, least=0),
-        law_steps=int(table.take("law_steps", float, Run.law_steps, least=1)),
+        law_steps=table.whole("law_steps", Run.law_steps, least=1),
         largest_stress=table.take("largest_stress", float, Run.largest_stress, least=0, say="Pa"),
         skin=table.take("skin", float, None, above=0, say="m"),
         point_spacing=table.take("point_spacing", float, Run.point_spacing, above=0, say="m"),
@@ -235,7 +235,7 @@ def _watch(top: Table, where: str, number: dict[str, int], blocks) -> dict[str, 
     for kind in ("slip", "shear"):
         out[kind] = []
         for pair in table.take(kind, list, []):
-            if not (isinstance(pair, list) and len(pair) == 2 and set(pair) <= set(number)):
+            if not distinct(pair, number, 2):
                 raise SceneError(f"{table.path(kind)}: {pair!r} must be [moving block, its base]")
             out[kind].append((number[pair[0]], number[pair[1]]))
     places = table.take("pins", list, [])

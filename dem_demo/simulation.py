@@ -12,7 +12,7 @@ from .energy import Ledger
 from .handover import hand_over
 from .interfaces import ROUNDING, Interfaces, Refused
 from .joints import Joints
-from .scene import Scene, parse
+from .scene import Scene
 from .start import begin
 from .world import World
 
@@ -26,6 +26,7 @@ class Simulation:
     """A scene in motion. `step()` advances it; `state()` and `restore()` are bit-exact."""
 
     def __init__(self, scene: Scene, step: float | None = None, fresh: bool = True) -> None:
+        timestep.require_positive(step)
         self.scene, run, blocks = scene, scene.run, scene.blocks
         width = min(b.width for b in blocks)
         self.skin = run.skin or 0.02 * width
@@ -145,12 +146,6 @@ class Simulation:
             return 0.0
         return abs(float(self.joints.read("delta")[here, 1] @ area / area.sum()))
 
-    def contact_forces(self) -> np.ndarray:
-        """Forces and torques (n, 3) of the joints on the blocks, dashpots left out (N, N m)."""
-        stress, shear = self.traction.T
-        self.assembly.move(self.motion)
-        return self.assembly(self.points, self.area * stress, -self.area * shear, self._energy())
-
     def _energy(self) -> np.ndarray:
         """Stored energy (k,) per contact length in J/m: what a change of that length costs."""
         return self.joints.now["stored"] * self.scene.thickness
@@ -244,19 +239,27 @@ class Simulation:
         return states.state(self)
 
     def restore(self, state: dict, step: float | None = None) -> None:
-        """Return to a state; with `step`, go on from there with another time step."""
+        """Return to a state; with `step`, go on from there with another time step (s).
+
+        Raises ValueError for a step that is no finite number > 0, Refused beyond the limit.
+        """
         states.restore(self, state, step)
 
     def save(self, folder: Path, state: dict | None = None) -> None:
-        """Write a state (default: now) and its scene to a folder."""
+        """Write a state (default: now) and its scene to a folder; what else is there stays.
+
+        Raises ValueError for a scene that its own text does not give: one that was changed or made
+        in memory. `state` and `restore` need no text.
+        """
         states.save(self, Path(folder), state or self.state())
 
     @classmethod
     def load(cls, folder: Path, step: float | None = None) -> Simulation:
-        """Continue from a folder that `save` wrote."""
-        folder = Path(folder)
-        if not (folder / "blocks.npz").is_file():
-            raise ValueError(f"{str(folder)!r} holds no saved state (blocks.npz is missing)")
-        sim = cls(parse((folder / "scene.toml").read_text(), "scene.toml"), fresh=False)
-        sim.restore(states.load(sim, folder), step)
+        """Continue from a folder that `save` wrote, with `step` as in `restore`.
+
+        Raises ValueError if a file is missing, damaged or of another state, or the scene another.
+        """
+        scene, state = states.load(Path(folder))
+        sim = cls(scene, fresh=False)
+        sim.restore(state, step)
         return sim

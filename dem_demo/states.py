@@ -1,16 +1,31 @@
 """States of a simulation, in memory and in a folder: restart is exact to the last bit.
 
+A folder holds the scene's text, files of arrays, and `state.json`: the hashes of these files and of
+the scene that they belong to.
+
 The velocities stored are those that will carry the blocks on, half a step ahead of the places.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
+import os
+from dataclasses import asdict, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from jointlaw._files import write_json
+
+from . import timestep
+from .coulomb import CoulombLaw
 from .energy import COLUMNS
+from .laws import load_state
+from .scene import Scene, parse
+
+INDEX = "state.json"
 
 
 def state(sim) -> dict:
@@ -36,6 +51,7 @@ def state(sim) -> dict:
 
 def restore(sim, state: dict, step: float | None = None) -> None:
     """Return to a state; with `step`, go on from there with another time step."""
+    timestep.require_positive(step)
     a = state["arrays"]
     sim.t0, sim.n, sim.dt, sim.step_limit, sim.least_limit = a["clock"].tolist()
     sim.n = int(sim.n)
@@ -60,20 +76,91 @@ def restore(sim, state: dict, step: float | None = None) -> None:
     if step:  # velocities are half a step ahead of the places: of the new step
         sim.motion[3:] += 0.5 * (step - a["clock"][2]) * (a["forces"][0] / sim.inertia * sim.free).T
     sim.world.place(sim.motion)
+    if step:
+        sim.check_step(sim.points)
+        sim.require_step()
 
 
 def save(sim, folder: Path, state: dict) -> None:
-    """Write a state and its scene to a folder."""
+    """Write a state and its scene to a folder; a state that is there is kept until all is written.
+
+    Raises ValueError for a scene that `text_of` refuses.
+    """
+    text = text_of(sim.scene)
     folder.mkdir(parents=True, exist_ok=True)
-    np.savez(folder / "blocks.npz", **state["arrays"])
-    joints = sim.joints.save(state["joints"], folder)
-    (folder / "joints.json").write_text(json.dumps(joints))
-    (folder / "scene.toml").write_text(sim.scene.text)
+    with TemporaryDirectory(prefix=".state-", dir=folder) as new:
+        fresh, tables = Path(new), {}
+        for i, (values, slots, free) in enumerate(state["joints"].values()):
+            values.save(fresh / f"law-{i}.npz")  # numbered: a law's name may be no file's name
+            tables[f"slots-{i}"] = np.array([[*k, p, s] for (k, p), s in slots.items()], int)
+            tables[f"free-{i}"] = np.array(free, int)
+        np.savez(fresh / "joints.npz", **tables)
+        np.savez(fresh / "blocks.npz", **state["arrays"])
+        hashes = {file.name: _hash(file.read_bytes()) for file in sorted(fresh.iterdir())}
+        (fresh / "scene.toml").write_text(text, encoding="utf-8")
+        write_json(fresh / INDEX, {"scene": fingerprint(sim.scene), "files": hashes})
+        for file in list(fresh.iterdir()):
+            os.replace(file, folder / file.name)
 
 
-def load(sim, folder: Path) -> dict:
-    """The state that `save` wrote, for a simulation of the same scene."""
+def load(folder: Path) -> tuple[Scene, dict]:
+    """The scene and the state that `save` wrote. Raises ValueError if they are not whole."""
+    index = folder / INDEX
+    if not index.is_file():
+        raise ValueError(f"{str(folder)!r} holds no saved state ({INDEX} is missing)")
+    try:
+        about = json.loads(index.read_text(encoding="utf-8"))
+        whose, hashes = about["scene"], dict(about["files"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"{index} is damaged ({error!r}): run the scene again") from None
+    scene = parse((folder / "scene.toml").read_text(encoding="utf-8"), "scene.toml")
+    if fingerprint(scene) != whose:
+        raise ValueError(
+            f"{folder / 'scene.toml'} is not the scene of this state: only end, record, fraction, "
+            "step, title and watch may change; undo the rest, or run it as a scene of its own"
+        )
+    laws = [f"law-{i}.npz" for i in range(len(scene.laws))]
+    for name in ["blocks.npz", "joints.npz", *laws]:
+        file = folder / name
+        if not file.is_file() or _hash(file.read_bytes()) != hashes.get(name):
+            raise ValueError(f"{file} is missing, damaged or of another state: run the scene again")
     with np.load(folder / "blocks.npz") as data:
         arrays = {name: data[name] for name in data.files}
-    joints = sim.joints.load(json.loads((folder / "joints.json").read_text()), folder)
-    return {"arrays": arrays, "joints": joints}
+    joints = {}
+    with np.load(folder / "joints.npz") as data:
+        for i, (name, law) in enumerate(scene.laws.items()):
+            slots = {(tuple(s[:4]), s[4]): s[5] for s in data[f"slots-{i}"].tolist()}
+            joints[name] = load_state(law, folder / laws[i]), slots, data[f"free-{i}"].tolist()
+    return scene, {"arrays": arrays, "joints": joints}
+
+
+def text_of(scene: Scene) -> str:
+    """The text of a scene. Raises ValueError where it is not what the scene was read from."""
+    if not scene.text or fingerprint(parse(scene.text)) != fingerprint(scene):
+        raise ValueError(
+            "the scene was made or changed in memory, so its text would go on with another one: "
+            "write the change into the TOML text and parse that, or keep the state with "
+            "Simulation.state()"
+        )
+    return scene.text
+
+
+def fingerprint(scene: Scene) -> str:
+    """Hash of what the motion depends on, but not when a run ends, records, or at which step."""
+    run = replace(scene.run, end=0.0, record=0.0, fraction=0.0, step=None)
+    laws = {
+        name: asdict(law) if isinstance(law, CoulombLaw) else law.fingerprint
+        for name, law in scene.laws.items()
+    }
+    pairs = sorted((sorted(blocks), law) for blocks, law in scene.pairs.items())
+    whole = [
+        [block.__dict__ | {"corners": block.corners.tolist()} for block in scene.blocks],
+        laws, scene.default_law, pairs, sorted(scene.edge_laws.items()), asdict(run),
+        [asdict(drive) for drive in scene.drives], [float(g) for g in scene.gravity],
+        float(scene.thickness),
+    ]  # fmt: skip
+    return _hash(json.dumps(whole).encode())
+
+
+def _hash(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()

@@ -17,6 +17,12 @@ from .geometry import Points
 DENSE = 24  # degrees of freedom up to which a dense eigenproblem is the faster one
 
 
+def require_positive(step: float | None) -> None:
+    """Refuse a time step (s) that is none; None leaves the choice to others."""
+    if step is not None and not 0 < step < np.inf:
+        raise ValueError(f"step = {step} s: must be a finite number > 0")
+
+
 class StepLimit:
     """Assembles law points into a matrix over the free motions of the blocks.
 

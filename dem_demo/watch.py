@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .predict import slip_angle, slip_distance
+from .shapes import turn
 from .simulation import Simulation
 
 EVERY = 8  # steps between two looks
@@ -35,7 +36,7 @@ class Watch:
         """Note the base angle at which a joint passes its slip distance."""
         for (moving, base), entry in self.slips.items():
             if _waits(entry) and sim.slid(moving, base) > entry["slip_distance"]:
-                entry["slip_angle"] = base_angle(sim, base)
+                entry["slip_angle"] = base_angle(sim, moving, base)
                 entry["slip_time"] = sim.time
 
     @property
@@ -56,10 +57,19 @@ def _waits(entry: dict) -> bool:
     return entry["slip_angle"] is None and not entry["slipped_before"]
 
 
-def base_angle(sim: Simulation, base: int) -> float:
-    """Angle (degrees) of a block against the horizontal that gravity defines."""
-    gravity = np.degrees(np.arctan2(sim.scene.gravity[0], -sim.scene.gravity[1]))
-    return abs(float(np.degrees(sim.motion[2, base])) + float(gravity))
+def base_angle(sim: Simulation, moving: int, base: int) -> float:
+    """Angle (degrees, 0 to 90) of a base against the horizontal that gravity defines; 0 without it.
+
+    Of the base's face that `moving` lies on: the one that its centroid is farthest outside of.
+    """
+    x, y, angle = sim.motion[:3, base]
+    corners = sim.scene.blocks[base].local @ turn(angle).T + [x, y]
+    along = np.roll(corners, -1, axis=0) - corners
+    along /= np.hypot(*along.T)[:, None]
+    outward = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    face = ((sim.motion[:2, moving] - corners) * outward).sum(axis=1).argmax()
+    down = np.array(sim.scene.gravity)
+    return float(np.degrees(np.arctan2(abs(along[face] @ down), abs(outward[face] @ down))))
 
 
 def joint_state(sim: Simulation, moving: int, base: int) -> dict[str, float]:

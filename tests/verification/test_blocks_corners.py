@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from block_forces import contact_forces
 
 import jointlaw as jl
 from dem_demo import Simulation, parse
@@ -130,7 +131,7 @@ def held(law, at, angle, more=""):
         slid = np.zeros(len(points.closure))
         sim.traction = sim.joints.update(sim.joints.increments(points.closure, slid))
         sim.forces(points, 1e-6)
-        return sim.area @ sim.joints.now["stored"], sim.contact_forces()[1]
+        return sim.area @ sim.joints.now["stored"], contact_forces(sim)[1]
 
     return place
 
@@ -210,7 +211,7 @@ values = [0.0, 3.0]
     friction, closure = [], []
     while sim.time < 3.0:
         sim.step()
-        friction.append(-sim.contact_forces()[1, 0] / sim.contact_forces()[1, 1])
+        friction.append(-contact_forces(sim)[1, 0] / contact_forces(sim)[1, 1])
         closure.append(sim.points.closure.mean())
     assert sim.interfaces.numbers.tolist() == [0, 1]
     slid = sim.joints.read("delta")[:, 1]

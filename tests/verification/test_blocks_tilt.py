@@ -1,9 +1,90 @@
 """The tilt test: blocks slip where the law alone says they should, by azimuth."""
 
+import numpy as np
 import pytest
 
-from dem_demo import Simulation, load
-from dem_demo.watch import EVERY, Watch
+from dem_demo import Simulation, load, parse
+from dem_demo.shapes import turn
+from dem_demo.watch import EVERY, Watch, base_angle
+
+BLOCK = """
+gravity = {gravity}
+[laws.plain]
+kind = "coulomb"
+normal_stiffness = 1e9
+shear_stiffness = 1e9
+friction = 0.5
+[[block]]
+name = "base"
+box = [4.0, 1.0]
+at = {base}
+angle = {drawn}
+held = ["x", "y"]
+[[block]]
+name = "top"
+box = [1.0, 0.5]
+at = {top}
+angle = {drawn}
+[[drive]]
+block = "base"
+motion = "turn"
+times = [0.0, 0.5]
+values = [0.0, {driven}]
+[watch]
+slip = [["top", "base"]]
+[run]
+end = 0.7
+"""
+
+
+def block(gravity=0.0, drawn=0.0, driven=0.0, gap=0.0, weight=9.81):
+    """A block on a base: gravity turned, the base drawn at an angle, and driven on (degrees)."""
+    down = turn(np.radians(gravity)) @ [0.0, -weight]
+    out = turn(np.radians(drawn)) @ [0.0, 1.0]
+    words = {"gravity": down.tolist(), "drawn": drawn, "driven": driven}
+    words |= {"base": (-0.5 * out).tolist(), "top": ((0.25 + gap) * out).tolist()}
+    return parse(BLOCK.format(**words) + ("step = 1e-4\n" if gap or not weight else ""))
+
+
+@pytest.mark.parametrize(
+    ("given", "angle"),
+    [
+        ({"gravity": 20.0}, 20.0),
+        ({"gravity": -20.0}, 20.0),
+        ({"drawn": 15.0}, 15.0),
+        ({"drawn": -15.0, "gravity": 10.0}, 25.0),
+        ({"drawn": 15.0, "gravity": 15.0}, 0.0),
+        ({"drawn": 180.0, "gravity": 165.0}, 15.0),
+        ({"drawn": 90.0, "gravity": 65.0}, 25.0),
+        ({"drawn": 15.0, "gap": 2.0}, 15.0),  # before they touch
+        ({"drawn": 15.0, "weight": 0.0}, 0.0),
+    ],
+)
+def test_angle_of_the_base_is_that_against_gravity(given, angle):
+    assert base_angle(Simulation(block(**given)), 1, 0) == pytest.approx(angle, abs=1e-6)
+
+
+def test_a_base_that_turns_with_gravity_ends_level():
+    """Gravity turned by 5 degrees, the base driven by 5: nothing pulls along the joint any more."""
+    sim = Simulation(block(gravity=5.0, driven=5.0))
+    assert base_angle(sim, 1, 0) == pytest.approx(5.0, abs=1e-4)
+    while sim.time < 0.7:
+        sim.step()
+    assert base_angle(sim, 1, 0) == pytest.approx(0.0, abs=1e-6)
+    normal, shear = sim.traction.T
+    assert abs(shear @ sim.area) < 0.01 * (normal @ sim.area)
+
+
+def test_a_base_drawn_beyond_the_friction_angle_slips_there():
+    """atan 0.5 is 26.57 degrees; at 45 it slides from the start, and that is what is told."""
+    sim = Simulation(block(drawn=45.0))
+    watch = Watch(sim)
+    while watch.waiting and sim.time < 0.7:
+        sim.step()
+        watch.look(sim)
+    (slip,) = watch.report()
+    assert slip["slip_angle"] == pytest.approx(45.0, abs=1e-3)
+    assert slip["predicted_angle"] == pytest.approx(np.degrees(np.arctan(0.5)))
 
 
 @pytest.fixture(scope="module")

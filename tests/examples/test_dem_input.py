@@ -1,0 +1,181 @@
+"""What a user gives the block demo: named if it is nonsense, and no run is thrown away for it."""
+
+import json
+import os
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+from dem_demo import CoulombLaw, SceneError, cli, load, parse, predict
+from dem_demo.ablate import _without
+from dem_demo.cli import main
+from dem_demo.ingredients import Variant
+from dem_demo.scene import build
+
+TEXT = """
+gravity = [0.0, -9.81]
+[laws.rock]
+asperity_density = 1e4
+critical_slip = 2e-3
+orientation = { a = 3.0 }
+asperity = { K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }
+heights = { alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }
+[laws.plain]
+kind = "coulomb"
+normal_stiffness = 1e9
+shear_stiffness = 1e9
+friction = 0.3
+[[block]]
+name = "base"
+box = [4.0, 1.0]
+at = [0.0, -0.5]
+fixed = true
+[[block]]
+name = "top"
+box = [1.0, 0.5]
+at = [0.0, 0.25]
+held = ["turn"]
+[[joint]]
+between = ["top", "base"]
+law = "rock"
+[watch]
+slip = [["top", "base"]]
+shear = [["top", "base"]]
+[[drive]]
+block = "top"
+motion = "x"
+times = [0.0, 0.1]
+values = [0.0, 1e-3]
+[run]
+end = 0.002
+record = 0.001
+step = 1e-4
+law_steps = 2
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[laws.plain]", "[laws]\nx = 1\n[laws.plain]", r"scene\.laws\.x = 1: must be a table"),
+        ("orientation = { a = 3.0 }", "orientation = 1", "orientation"),
+        ("friction = 0.3", "friction = true", "friction = True: must be a number"),
+        ('held = ["turn"]', 'held = [["x"]]', r"held = \[\['x'\]\]: must be some of x, y, turn"),
+        ('held = ["turn"]', 'held = ["x", "x"]', "held = .*must be some of x, y, turn, each once"),
+        ('held = ["turn"]', 'held = ["z"]', "held = .*must be some of x, y, turn"),
+        ('slip = [["top", "base"]]', 'slip = [[["top"], "base"]]', r"slip.*\[moving block, its"),
+        ('slip = [["top", "base"]]', 'slip = [["top", "top"]]', r"slip.*\[moving block, its base"),
+        ('between = ["top", "base"]', 'between = [["top"], "base"]', "between.*must name two bloc"),
+        ('between = ["top", "base"]', 'between = ["top", "top"]', "between.*must name two blocks"),
+        ("law_steps = 2", "law_steps = 2.9", "law_steps = 2.9: must be a whole number"),
+        ("values = [0.0, 1e-3]", "values = [0.0, nan]", "values = .*: must be finite numbers"),
+        ("times = [0.0, 0.1]", "times = [0.0, nan]", "times = .*: must be finite numbers"),
+        ("values = [0.0, 1e-3]", "values = [[0.0, 1e-3]]", "values = .*: must be finite numbers"),
+        ("times = [0.0, 0.1]", 'times = ["a"]', "times = .*: must be finite numbers"),
+        ("at = [0.0, 0.25]", "at = [false, 0.25]", "at = .*: must be two numbers"),
+        ("box = [4.0, 1.0]", "corners = [[true, 0], [1, 0], [0, 1]]", "corners must be a list of"),
+        ("box = [4.0, 1.0]", 'corners = [["0", 0], [1, 0], [0, 1]]', "corners must be a list of"),
+        ("end = 0.002", "end = 1" + 400 * "0", "end = inf: must be finite"),
+    ],
+)
+def test_nonsense_is_named(old, new, message):
+    assert old in TEXT
+    with pytest.raises(SceneError, match=message):
+        parse(TEXT.replace(old, new, 1))
+
+
+@pytest.mark.parametrize("table", ["joint", "block", "drive", "rock"])
+def test_lists_of_tables_hold_tables(table):
+    with pytest.raises(SceneError, match=rf"scene\.{table}\[0\] = 1: must be a table"):
+        build({**tomllib.loads(TEXT), table: [1]})
+
+
+def test_a_file_that_is_no_text_is_named(tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(SceneError, match=r"scene\.toml is not UTF-8 text"):
+        load(file)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [("at = [0.0, 0.25]", "at = [0.0, 0.3]"), ("gravity = [0.0, -9.81]", "gravity = [0.0, 0.0]")],
+    ids=["in the air", "without gravity"],
+)
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_a_run_without_a_prediction_is_kept(old, new, tmp_path, capsys):
+    file, out = tmp_path / "scene.toml", tmp_path / "out"
+    file.write_text(TEXT.replace(old, new))
+    assert main([str(file), "--out", str(out)]) == 0
+    assert "top: no slip (the law alone says nothing)" in capsys.readouterr().out
+    slip = json.loads((out / "summary.json").read_text())["slip"][0]
+    assert slip["predicted_angle"] is slip["normal_stress"] is None
+    assert (out / "state").is_dir()
+    for name in ("curves.png", "final.png", "history.csv"):
+        assert (out / name).is_file()
+
+
+def test_a_law_that_fails_on_its_path_predicts_nothing(monkeypatch):
+    scene, none = parse(TEXT), {"predicted_angle": None, "normal_stress": None}
+    assert predict.slip_angle(scene, 1, 0, 1.0)["predicted_angle"] > 20
+
+    def fails(*_args, **_keys):
+        raise jl.PathError("no further", None)
+
+    monkeypatch.setattr(jl, "direct_shear", fails)
+    assert predict.slip_angle(scene, 1, 0, 1.0) == none
+    assert predict.shear_curve(scene.laws["rock"], 1e4, np.array([0.0, 1e-3])) is None
+    row = _without(
+        Variant("plain", lambda: predict.friction_angle(scene.laws["rock"], 1e4)), *3 * [None]
+    )
+    assert row.note == "cannot be built: no further"
+
+
+def test_an_angle_that_is_not_found_is_given_up(monkeypatch):
+    """Two angles in turn, for ever: no fixed point to predict."""
+    angles = iter(10 * [20.0, 40.0] + 10_000 * [20.0, 40.0])
+    monkeypatch.setattr(predict, "friction_angle", lambda law, stress: next(angles))
+    assert predict.slip_angle(parse(TEXT), 1, 0, 1.0)["predicted_angle"] is None
+
+
+@pytest.mark.parametrize("verb", ["compare", "ablate"])
+def test_a_place_for_the_results_is_made_before_the_work(verb, tmp_path, monkeypatch, capsys):
+    """One that cannot be is refused before anything runs, not after."""
+    ran = []
+    where = {"compare": cli, "ablate": cli.ablate}[verb]
+    monkeypatch.setattr(where, verb, lambda *_: ran.append(1) or [])
+    (tmp_path / "file").touch()
+    assert main([verb, "slope", "--out", str(tmp_path / "file" / "below" / "x.json")]) == 2
+    assert not ran
+    if verb == "compare":
+        out = tmp_path / "no" / "such" / "x.json"
+        assert main([verb, "slope", "--out", str(out)]) == 0
+        assert json.loads(out.read_text()) == []
+
+
+def test_a_missing_package_is_told_in_one_line(tmp_path):
+    (tmp_path / "pymunk.py").write_text("raise ModuleNotFoundError('No module named pymunk')\n")
+    here = Path(__file__).parents[2]
+    path = os.pathsep.join([str(tmp_path), str(here)])
+    done = subprocess.run(
+        [sys.executable, "-m", "dem_demo"], env={**os.environ, "PYTHONPATH": path}, cwd=tmp_path,
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode != 0
+    assert "No module named pymunk" in done.stderr
+    assert "pip install 'jointlaw[demo]'" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_tractions_of_coulomb_joints_are_copies():
+    """As those of the law: what a host does to them is not done to the joints."""
+    joints = CoulombLaw(1e9, 1e9, 0.3).joints(2)
+    F, _ = joints.update(np.full((2, 2), 1e-5))
+    kept = joints.F.copy()
+    F *= 0.1
+    assert np.array_equal(joints.F, kept)

@@ -10,6 +10,7 @@ from slow_bed import SlowBed, cap_quadrature, reach_of
 
 import jointlaw as jl
 from jointlaw.accuracy.suite import errors, reference_resolution, standard_suite, tractions
+from jointlaw.accuracy.tolerance import coarsest
 
 pytest.importorskip("numba")  # the same numbers without it, in minutes
 
@@ -92,6 +93,24 @@ def test_errors_that_add_up_ask_for_more_than_each_direction_alone(benchmark):
     d = benchmark.random_paths(law, np.random.default_rng(5))
     truth = tractions(replace(law, resolution=reference_resolution(law)), d)
     assert errors(tractions(law.at_tolerance(0.01), d), truth)[0].max() < 0.01
+
+
+def test_reference_is_refined_in_the_direction_that_errs():
+    law = jl.JointLaw(  # nearly linear: all slip begins at once, and azimuths decide
+        orientation=jl.Orientation(2.0, -0.4, -0.35),
+        asperity=jl.Asperity(K=1.0, lam=1.4, eta=0.02, mu=0.36),
+        asperity_density=1.0,
+        closure_range=1.0,
+        plane=0.0,
+    )
+    usual, bound = reference_resolution(law), 6e-4
+    assert standard_suite(law).uncertainty.max() > bound  # too coarse a judge
+    found, reached = coarsest(law, bound)
+    fine = standard_suite(law, replace(usual, phi=2 * usual.phi))
+    assert found is not None
+    assert reached <= bound
+    # half of the bound may be the judge's own error
+    assert fine.errors(replace(law, resolution=found))[0].max() < 1.5 * bound
 
 
 def test_what_cannot_be_met_is_refused_with_what_was_reached():

@@ -1,6 +1,6 @@
 """Regenerate docs/how-accurate.md and docs/only-what-is-needed.md: their tables and pictures.
 
-`python docs/make_accuracy.py [PART ...]`: all parts take about an hour and a half; every part
+`python docs/make_accuracy.py [PART ...]`: all parts take about two hours; every part
 prints what it took. A part is what stands between its two marks in one of the pages. Times are
 those of this machine: let nothing else run beside it.
 """

@@ -8,7 +8,7 @@ no shortcut but one: the traction across the plane of motion is not summed.
 Where the springs are is one of two choices:
 
 - `even`: what one writes first, midpoint sums of the integrals over inclination, azimuth and touch
-  depth. "About 1000 sliders for what 24 give" is this one.
+  depth.
 - `tuned`: as in the tests, a Gauss rule in u = cos(a theta), springs at the centroid of what their
   cell holds, cells crowded towards touch.
 """

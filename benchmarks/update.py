@@ -201,7 +201,7 @@ def summary(found: list[Case]) -> dict[str, Any]:
     """Growth of the time of a whole step with sliders and with joints, and ratios."""
     best = {(c.law.resolution, c.n, c.column): c.best * 1e9 for c in found}
     laws = {c.law.resolution: c.law for c in found}
-    sliders = {r: len(one.tables.c1) * one.tables.cells for r, one in laws.items()}
+    sliders = {r: one.tables.sliders for r, one in laws.items()}
     result: dict[str, Any] = {}
     for column in ("F", "FC"):
         same_n = [(sliders[r], v) for (r, n, c), v in best.items() if n == 10_000 and c == column]
@@ -232,7 +232,7 @@ def table(found: list[Case], names: tuple[str, ...], sizes: tuple[int, ...]) -> 
     best = {(c.law.resolution, c.n, c.column): c.best * 1e9 for c in found}
     for name in names:
         one = next(c.law for c in found if c.law.resolution == NAMED[name])
-        sliders, size = len(one.tables.c1) * one.tables.cells, state_bytes(one)
+        sliders, size = one.tables.sliders, state_bytes(one)
         for n in sizes:
             cells = [best.get((one.resolution, n, column)) for column in COLUMNS]
             if any(cells):
@@ -288,7 +288,7 @@ def main() -> None:
         rows = [
             {
                 "resolution": [c.law.resolution.u, c.law.resolution.phi, c.law.resolution.depth],
-                "sliders": len(c.law.tables.c1) * c.law.tables.cells,
+                "sliders": c.law.tables.sliders,
                 "bytes": state_bytes(c.law),
                 "joints": c.n,
                 "kernel": c.kernel,

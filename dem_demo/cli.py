@@ -199,7 +199,7 @@ def _go(sim: Simulation, given: argparse.Namespace) -> int:
     _, summary = run(sim, given.out, given.until, not given.no_pictures)
     for slip in summary["slip"]:
         predicted = slip["predicted_angle"]
-        alone = "nothing" if predicted is None else f"{predicted:.2f}"
+        alone = "nothing" if predicted is None else f"{predicted:.2f} degrees"
         if slip["slipped_before"]:
             print(f"{slip['block']}: had slipped before this run")
         elif slip["slip_angle"] is None:

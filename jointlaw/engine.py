@@ -156,7 +156,7 @@ class NumbaEngine:
             for tangent in (False, True)
         }
         self._fixed_measures = (*packed, tables.curve.T.ravel().copy())
-        self.rows, self._sliders = kernel.block_rows(tables), len(tables.c1) * tables.cells
+        self.rows, self._sliders = kernel.block_rows(tables), tables.sliders
         self._packed = packed
         self._all = np.empty(0, np.intp)
         self._none = np.empty((0, tables.dim, tables.dim))

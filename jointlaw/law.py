@@ -68,9 +68,14 @@ class Tables(NamedTuple):
         return int(self.depth.shape[1]) - 1
 
     @property
+    def sliders(self) -> int:
+        """Sliders per joint: one for each cell of each facet."""
+        return len(self.c1) * self.cells
+
+    @property
     def rows(self) -> int:
         """State numbers per joint: delta, offset, dissipated energy, and q of every slider."""
-        return 2 * self.dim + 2 * len(self.c1) * self.cells
+        return 2 * self.dim + 2 * self.sliders
 
 
 @dataclass(frozen=True, kw_only=True)

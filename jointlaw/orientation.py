@@ -30,6 +30,11 @@ class Facets:
     t: Array
 
 
+def largest_c(b: float) -> float:
+    """Largest |c| at which the density stays positive, Eq. 18."""
+    return 1 / 3 - b / 6
+
+
 def bounded(a: Any, b: Any, c: Any, *, smooth: bool = False) -> tuple[float, float, float]:
     """Return a, b and c of Eq. 14 within the bounds of Eq. 18; `smooth` admits an infinite a."""
     a = at_least("orientation.a", a, 1.0, infinite=smooth)
@@ -39,7 +44,7 @@ def bounded(a: Any, b: Any, c: Any, *, smooth: bool = False) -> tuple[float, flo
             f"orientation.b = {b!r} is out of bounds: -1 <= b <= 2 (Eq. 18), "
             "or the density turns negative"
         )
-    bound = 1 / 3 - b / 6
+    bound = largest_c(b)
     if abs(c) > bound + 1e-12:  # 1e-12 admits the bound itself typed in decimals
         raise ValueError(
             f"orientation.c = {c!r} is out of bounds: |c| <= 1/3 - b/6 = {bound:.9g} "

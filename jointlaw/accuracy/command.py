@@ -46,7 +46,7 @@ def _tradeoff(options: argparse.Namespace) -> int:
     chosen = {}
     for tolerance in options.tolerance or ():  # before the long work: a bad one is refused at once
         made = law.at_tolerance(tolerance)
-        r, sliders = made.resolution, len(made.tables.c1) * made.tables.cells
+        r, sliders = made.resolution, made.tables.sliders
         chosen[f"{tolerance:g}"] = {"u": r.u, "phi": r.phi, "depth": r.depth, "sliders": sliders}
     found = law.tradeoff(joints=options.joints)
     folder: Path = options.out

@@ -164,7 +164,7 @@ def _price(law: JointLaw, suite: Suite, exact: Array, joints: int, seconds: floa
     tangent_max, tangent_rms = errors(C, exact.reshape(steps, paths, -1))
     ns = [_time(law, joints, tangent, seconds) for tangent in (False, True)]
     return Price(
-        law.resolution, len(law.tables.c1) * law.tables.cells, error, rms,
+        law.resolution, law.tables.sliders, error, rms,
         float(np.sqrt(np.mean(tangent_rms**2))), float(tangent_max.max()), ns[0], ns[1],
         law.joints(0).bytes_per_joint,
     )  # fmt: skip

@@ -13,6 +13,7 @@ from .._checks import Array, number, one_of
 from ..asperity import Asperity
 from ..heights import FORMATIONS, GammaHeights
 from ..law import JointLaw
+from ..orientation import largest_c
 from .fit import Fit, Problem
 from .measured import ClosureCurve, Settings, ShearCurve, Values
 from .priors import SCALES, chosen
@@ -212,7 +213,7 @@ def _orientation_fits(values: Values, names: list[str]) -> None:
     if "c" in names:
         return
     free, c = "b" in names, values["c"]
-    bound = 0.5 if free else 1 / 3 - values["b"] / 6
+    bound = largest_c(-1.0 if free else values["b"])
     if abs(c) > bound + 1e-12 or (free and abs(c) >= bound):
         what = "b > -1, which is fitted" if free else f"b = {values['b']:g}"
         raise ValueError(

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy import optimize, special
 
 from .._checks import Array
+from ..orientation import largest_c
 
 BLUR = 0.03
 _RADII, _SECTORS = 160, 9
@@ -74,7 +75,7 @@ def fit_directions(slope: Array, summit: NDArray[np.intp], noise: float) -> Dire
     p = _density(bins, _components(bins, a), b, c).sum(axis=1)
     model, seen = np.cumsum(p), np.cumsum(bins.counts.sum(axis=1)) / bins.counts.sum()
     distance = float(np.max(np.abs(model - seen)))
-    bound = 1 / 3 - b / 6
+    bound = largest_c(b)
     at_bound = b < -0.98 or b > 1.98 or (abs(c) > 0.99 * bound and not bins.profile) or a < 1.001
     return DirectionFit(a, b, c, covariance, distance, bool(at_bound))
 
@@ -161,7 +162,7 @@ def _shape(bins: _Bins, parts: Array) -> tuple[float, float, float]:
 def _inside(b: float, c: float) -> tuple[float, float]:
     """The nearest b and c that Eq. 18 allows."""
     b = float(min(max(b, -1.0), 2.0))
-    bound = 1 / 3 - b / 6
+    bound = largest_c(b)
     return b, float(min(max(c, -bound), bound))
 
 

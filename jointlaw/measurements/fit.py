@@ -16,6 +16,7 @@ from scipy import special
 
 from .._checks import Array
 from ..law import JointLaw
+from ..orientation import largest_c
 from .measured import ClosureCurve, Settings, ShearCurve, build, log_stress
 from .noise import Noise
 from .priors import quantity, scale_of
@@ -46,7 +47,7 @@ class Problem:
         values = dict(self.values)
         values |= {n: scale_of(n).back(float(v)) for n, v in zip(self.free, x, strict=True)}
         if "c" in self.free:
-            bound = 1 / 3 - values["b"] / 6  # Eq. 18
+            bound = largest_c(values["b"])
             values["c"] = min(max(values["c"], -bound), bound)
         return values
 

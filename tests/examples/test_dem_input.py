@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scene_text import PLAIN, ROCK
 
 import jointlaw as jl
 from dem_demo import CoulombLaw, SceneError, cli, load, parse, predict
@@ -17,20 +18,11 @@ from dem_demo.cli import main
 from dem_demo.ingredients import Variant
 from dem_demo.scene import build
 
-TEXT = """
+TEXT = f"""
 gravity = [0.0, -9.81]
 [laws.rock]
-asperity_density = 1e4
-critical_slip = 2e-3
-orientation = { a = 3.0 }
-asperity = { K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }
-heights = { alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }
-[laws.plain]
-kind = "coulomb"
-normal_stiffness = 1e9
-shear_stiffness = 1e9
-friction = 0.3
-[[block]]
+{ROCK}[laws.plain]
+{PLAIN}[[block]]
 name = "base"
 box = [4.0, 1.0]
 at = [0.0, -0.5]

@@ -6,24 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scene_text import PLAIN, ROCK
 
 from dem_demo import Refused, Simulation, parse, run
 from dem_demo.cli import main
 from dem_demo.scene import build
 
-TEXT = """
+TEXT = f"""
 [laws."rock/rough"]
-asperity_density = 1e4
-critical_slip = 2e-3
-orientation = { a = 3.0 }
-asperity = { K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }
-heights = { alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }
-[laws."../../escaped"]
-kind = "coulomb"
-normal_stiffness = 1e9
-shear_stiffness = 1e9
-friction = 0.3
-[[block]]
+{ROCK}[laws."../../escaped"]
+{PLAIN}[[block]]
 name = "base"
 box = [4.0, 1.0]
 at = [0.5, -0.5]

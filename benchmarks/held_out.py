@@ -19,7 +19,7 @@ import numpy as np
 
 import jointlaw as jl
 from jointlaw import baselines
-from jointlaw._progress import track
+from jointlaw.support.progress import track
 
 STRESS = np.geomspace(0.3e6, 10e6, 16)  # Pa
 LIMIT = 5e6  # Pa

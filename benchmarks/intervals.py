@@ -19,7 +19,7 @@ from functools import partial
 import numpy as np
 
 import jointlaw as jl
-from jointlaw._progress import track
+from jointlaw.support.progress import track
 
 NOISE = 0.01
 ALPHA, NU, G, R = 3.0, 0.25, 20e9, 1e-3

@@ -22,11 +22,11 @@ import numpy as np
 from tolerance import random_law
 
 import jointlaw as jl
-from jointlaw import nodes
-from jointlaw._progress import track
 from jointlaw.accuracy.suite import Suite, standard_suite
-from jointlaw.orientation import Facets, Orientation
-from jointlaw.resolution import NAMED
+from jointlaw.discretisation import nodes
+from jointlaw.parameters.orientation import Facets, Orientation
+from jointlaw.parameters.resolution import NAMED
+from jointlaw.support.progress import track
 
 Rule = Callable[..., Any]
 KEPT, NOW = Orientation.facets, nodes.inclinations

@@ -23,8 +23,8 @@ from typing import Any
 import numpy as np
 
 import jointlaw as jl
-from jointlaw import _kernel_numba as kernel
-from jointlaw.engine import NumbaEngine
+from jointlaw.kernels import compiled as kernel
+from jointlaw.kernels.engine import NumbaEngine
 
 N = 10_000
 STEPS = 4  # different increments, so that no branch is learnt by heart
@@ -121,7 +121,7 @@ def without(lines: Any) -> types.ModuleType:
         if text.count(old) != 1:
             raise RuntimeError(f"the kernel has changed: it no longer holds {old!r} once")
         text = text.replace(old, new)
-    made = types.ModuleType("jointlaw._kernel_reduced")
+    made = types.ModuleType("jointlaw.kernels.reduced")
     made.__package__, made.__file__ = "jointlaw", str(path)
     exec(compile(text, str(path), "exec"), made.__dict__)
     return made

@@ -27,8 +27,8 @@ from typing import Any
 import numpy as np
 
 import jointlaw as jl
-from jointlaw._progress import track
 from jointlaw.accuracy.suite import errors, reference_resolution, scaled, tractions
+from jointlaw.support.progress import track
 
 TOLERANCES = (0.05, 0.025, 0.01, 0.003, 0.001)
 PATHS, STEPS = 6, 160  # of each kind

@@ -27,7 +27,7 @@ import numba
 import numpy as np
 
 import jointlaw as jl
-from jointlaw.resolution import NAMED
+from jointlaw.parameters.resolution import NAMED
 
 NAMES = ("fast", "balanced", "fine", "reference")
 SIZES = (1, 100, 10_000, 1_000_000)

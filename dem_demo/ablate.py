@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import jointlaw as jl
-from jointlaw._files import replace_file, write_json
+from jointlaw.support.files import replace_file, write_json
 
 from .ingredients import Variant, variants, working_stress
 from .interfaces import Refused

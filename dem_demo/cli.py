@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import jointlaw as jl
-from jointlaw._files import replace_file, write_json
+from jointlaw.support.files import replace_file, write_json
 
 from . import ablate
 from .compare import compare, critical_tilts

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import jointlaw as jl
-from jointlaw.resolution import NAMED
+from jointlaw.parameters.resolution import NAMED
 
 from .coulomb import CoulombLaw
 from .predict import friction_angle

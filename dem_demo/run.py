@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from jointlaw._files import replace_file, write_json
+from jointlaw.support.files import replace_file, write_json
 
 from . import picture, plots, report, states
 from .energy import COLUMNS

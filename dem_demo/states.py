@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from jointlaw._files import write_json
+from jointlaw.support.files import write_json
 
 from . import timestep
 from .coulomb import CoulombLaw

@@ -28,7 +28,7 @@ import jointlaw as jl  # noqa: E402
 from dem_demo import ablate, load  # noqa: E402
 from dem_demo.predict import friction_angle  # noqa: E402
 from dem_demo.scene import names  # noqa: E402
-from jointlaw.resolution import NAMED  # noqa: E402
+from jointlaw.parameters.resolution import NAMED  # noqa: E402
 
 PAGES = "how-accurate.md", "only-what-is-needed.md"
 PICTURES = HERE / "pictures"

@@ -7,29 +7,30 @@ The law of A. Misra, Micromechanical model for anisotropic rock joints, J. Geoph
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from . import closed_form, presets
-from .asperity import Asperity
-from .batch import JointBatch
-from .heights import GammaHeights, Heights
-from .joint import Joint
+from . import presets
+from .joints.batch import JointBatch
+from .joints.joint import Joint
+from .joints.state import JointState, NonFiniteError, load_state
+from .laboratory.experiments import PathError, closure_test, direct_shear
+from .laboratory.record import Record
 from .law import JointLaw
-from .orientation import Orientation
-from .paths import PathError, closure_test, direct_shear
-from .record import Record
-from .resolution import Resolution
-from .secant import Secant, secant
-from .state import JointState, NonFiniteError, load_state
-from .table import JointTable, load_table
+from .paper import closed_form
+from .paper.secant import Secant, secant
+from .parameters.asperity import Asperity
+from .parameters.heights import GammaHeights, Heights
+from .parameters.orientation import Orientation
+from .parameters.resolution import Resolution
+from .tables.table import JointTable, load_table
 
 if TYPE_CHECKING:
+    from .calibration import baselines, datasets, unloading
+    from .calibration.calibrate import fit_closure, fit_curves, fit_shear
+    from .calibration.fit import Fit
+    from .calibration.measured import ClosureCurve, ShearCurve, first_loading
+    from .calibration.sweep import fit_many
     from .hosts import export_yade
-    from .measurements import baselines, datasets, unloading
-    from .measurements.calibrate import fit_closure, fit_curves, fit_shear
-    from .measurements.fit import Fit
-    from .measurements.measured import ClosureCurve, ShearCurve, first_loading
-    from .measurements.surface import SurfaceFit, from_surface
-    from .measurements.sweep import fit_many
-    from .measurements.synthetic import synthetic_surface
+    from .surface.fit import SurfaceFit, from_surface
+    from .surface.synthetic import synthetic_surface
     from .tables.tabulate import tabulate
 
 __version__ = "0.1.0"
@@ -76,21 +77,21 @@ __all__ = [
 
 # Tools for measurements and hosts load on first use: a DEM code that embeds the law needs none
 _LATER = {
-    "ClosureCurve": "measurements.measured",
-    "Fit": "measurements.fit",
-    "ShearCurve": "measurements.measured",
-    "SurfaceFit": "measurements.surface",
+    "ClosureCurve": "calibration.measured",
+    "Fit": "calibration.fit",
+    "ShearCurve": "calibration.measured",
+    "SurfaceFit": "surface.fit",
     "export_yade": "hosts",
-    "first_loading": "measurements.measured",
-    "fit_closure": "measurements.calibrate",
-    "fit_curves": "measurements.calibrate",
-    "fit_many": "measurements.sweep",
-    "fit_shear": "measurements.calibrate",
-    "from_surface": "measurements.surface",
-    "synthetic_surface": "measurements.synthetic",
+    "first_loading": "calibration.measured",
+    "fit_closure": "calibration.calibrate",
+    "fit_curves": "calibration.calibrate",
+    "fit_many": "calibration.sweep",
+    "fit_shear": "calibration.calibrate",
+    "from_surface": "surface.fit",
+    "synthetic_surface": "surface.synthetic",
     "tabulate": "tables.tabulate",
 }
-_LATER_MODULES = {name: f"measurements.{name}" for name in ("baselines", "datasets", "unloading")}
+_LATER_MODULES = {name: f"calibration.{name}" for name in ("baselines", "datasets", "unloading")}
 
 
 def __getattr__(name: str) -> Any:

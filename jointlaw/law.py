@@ -13,21 +13,22 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import _toml, nodes
-from ._checks import Array, above, at_least, finite, frozen, number
-from .asperity import Asperity
-from .curve import Curve, virgin_curve
-from .heights import GammaHeights, HeightDistribution, Heights
-from .orientation import Facets, Orientation
-from .resolution import Resolution, resolve
+from .discretisation import nodes
+from .discretisation.virgin_curve import Curve, virgin_curve
+from .parameters import toml as _toml
+from .parameters.asperity import Asperity
+from .parameters.heights import GammaHeights, HeightDistribution, Heights
+from .parameters.orientation import Facets, Orientation
+from .parameters.resolution import Resolution, resolve
+from .support.checks import Array, above, at_least, finite, frozen, number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from .accuracy.tradeoff import Tradeoff
-    from .batch import JointBatch
-    from .engine import Engine
-    from .joint import Joint
+    from .joints.batch import JointBatch
+    from .joints.joint import Joint
+    from .kernels.engine import Engine
 
 _SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
 NOTHING = 1e-140  # m, and Pa/m: counts as zero, for powers and squares below it underflow
@@ -152,7 +153,7 @@ class JointLaw:
 
     def joint(self) -> Joint:
         """One joint of this law, unloaded."""
-        from .joint import Joint
+        from .joints.joint import Joint
 
         return Joint(self)
 
@@ -161,7 +162,7 @@ class JointLaw:
 
         Without `ledger` dissipated energy is not added up, which is faster.
         """
-        from .batch import JointBatch
+        from .joints.batch import JointBatch
 
         return JointBatch(self, n, ledger)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..plot import _pyplot
-from ..resolution import NAMED
+from ..laboratory.plot import _pyplot
+from ..parameters.resolution import NAMED
 
 if TYPE_CHECKING:
     from .tradeoff import Tradeoff

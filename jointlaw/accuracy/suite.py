@@ -30,10 +30,10 @@ from functools import lru_cache
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from .._checks import Array
-from .._progress import track
 from ..law import JointLaw
-from ..resolution import Resolution
+from ..parameters.resolution import Resolution
+from ..support.checks import Array
+from ..support.progress import track
 
 STEPS = 120  # of each path
 

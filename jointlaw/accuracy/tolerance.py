@@ -6,9 +6,9 @@ from dataclasses import replace
 from itertools import product
 from typing import TYPE_CHECKING
 
-from .._checks import above
-from .._progress import track
-from ..resolution import Resolution
+from ..parameters.resolution import Resolution
+from ..support.checks import above
+from ..support.progress import track
 from .suite import Suite, reference_resolution, scaled, standard_suite
 
 if TYPE_CHECKING:

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._checks import Array, whole
-from .._files import replace_file
-from .._progress import track
-from ..engine import thread_count
-from ..resolution import NAMED, Resolution, resolve
+from ..kernels.engine import thread_count
+from ..parameters.resolution import NAMED, Resolution, resolve
+from ..support.checks import Array, whole
+from ..support.files import replace_file
+from ..support.progress import track
 from .suite import Suite, errors, reference_resolution, scaled, standard_suite, tangents
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from .._files import replace_file, write_json
 from ..law import JointLaw
-from ..table import JointTable
+from ..support.files import replace_file, write_json
+from ..tables.table import JointTable
 from ..tables.tabulate import require_3d, tabulate
 
 SCRIPTS = ("direct_shear.py", "settle_and_incline.py", "assembly.py")

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..plot import _pyplot
+from ..laboratory.plot import _pyplot
 
 if TYPE_CHECKING:
-    from ..table import JointTable
+    from .table import JointTable
 
 
 def plot_table(table: JointTable, path: str | Path | None = None) -> Any:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._checks import Array, whole
+from ..support.checks import Array, whole
 
 if TYPE_CHECKING:
     from ..law import JointLaw
-    from ..table import JointTable
+    from .table import JointTable
 
 
 @dataclass(frozen=True)

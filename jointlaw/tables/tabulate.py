@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from .._checks import Array, above, whole
 from ..law import JointLaw
-from ..table import JointTable
+from ..support.checks import Array, above, whole
+from .table import JointTable
 
 FLOOR = 1e-4  # stresses below this share of the largest are held to an absolute tolerance
 ROWS = 30  # closures at which friction and dilation are computed

@@ -9,7 +9,7 @@ from pages import PAGES, ROOT, commands, text
 
 import dem_demo.cli
 import jointlaw as jl
-import jointlaw.cli
+import jointlaw.cli.main
 
 # by what they begin with: too long for here, and what runs the same instead
 LONG = {

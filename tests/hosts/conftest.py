@@ -12,7 +12,7 @@ import pytest
 
 import jointlaw
 from jointlaw.hosts import yade as host
-from jointlaw.table import JointTable
+from jointlaw.tables.table import JointTable
 
 ROOT = Path(jointlaw.__file__).parents[1]
 FILES = Path(host.__file__).parent / "yade_files"

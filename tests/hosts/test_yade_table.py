@@ -8,7 +8,7 @@ import pytest
 
 import jointlaw as jl
 from jointlaw.hosts import export_yade
-from jointlaw.table import load_table
+from jointlaw.tables.table import load_table
 
 R = 0.5
 AREA = np.pi * R**2

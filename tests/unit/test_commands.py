@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.cli import main
+from jointlaw.cli.main import main
 
 FILES = {"csv", "npz", "png"}
 
@@ -94,7 +94,7 @@ def test_replay_example_names_a_file_of_the_kind_that_errors_leave(capsys):
 
 
 def test_replay_of_a_step_that_passes(law, tmp_path, capsys):
-    from jointlaw.state import write_replay
+    from jointlaw.joints.state import write_replay
 
     path = write_replay(law.to_toml(), law.joint().snapshot().values, np.full((3, 1), 1e-7), True)
     assert main(["replay", str(path)]) == 0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.cli import main
+from jointlaw.cli.main import main
 
 
 @pytest.fixture(autouse=True)

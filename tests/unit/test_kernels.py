@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw import engine
+from jointlaw.kernels import engine
 
 pytest.importorskip("numba")
 
@@ -80,9 +80,8 @@ def worst(one, other, peak):
 
 def test_the_compiled_block_is_the_one_that_states_come_in():
     """It is a constant of the kernel's own file: changed elsewhere it leaves old machine code."""
-    from jointlaw import _kernel_numba
 
-    assert _kernel_numba.LANES == engine.LANES
+    assert compiled.LANES == engine.LANES
 
 
 def test_memory_of_a_joint(both, law):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.curve import virgin_curve
-from jointlaw.nodes import depth_nodes, inclinations
+from jointlaw.discretisation.nodes import depth_nodes, inclinations
+from jointlaw.discretisation.virgin_curve import virgin_curve
 
 
 @pytest.mark.parametrize("b", [-1.0, -0.3, 0.0, 0.5, 2.0])

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import jointlaw as jl
-from jointlaw.cli import main
+from jointlaw.cli.main import main
 
 HUGE = 1e300  # m: its power 1.5 overflows
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.record import UNITS
+from jointlaw.laboratory.record import UNITS
 
 COLUMNS = ("closure", "shear_2", "shear_3", "F1", "F2", "F3", "sliding", "separated")
 COLUMNS += ("stored", "dissipated")

@@ -8,7 +8,7 @@ import pytest
 
 import jointlaw as jl
 from jointlaw.accuracy.tradeoff import SPREAD
-from jointlaw.cli import main
+from jointlaw.cli.main import main
 
 CHOSEN = ["fast", jl.Resolution(2, 3, 2), "balanced", jl.Resolution(1, 3, 1), "fast"]
 

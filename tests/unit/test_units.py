@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from jointlaw import units
+from jointlaw.support import units
 
 
 @pytest.mark.parametrize(

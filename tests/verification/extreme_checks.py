@@ -3,7 +3,7 @@
 import numpy as np
 
 import jointlaw as jl
-from jointlaw import _kernel_numpy as kernel
+from jointlaw.kernels import reference as kernel
 
 ROUNDING = 1e-12  # of the facet's normal force: a cell's G is a difference of numbers of that size
 KERNELS = 1e-11  # of the largest traction: rounding of y, 1e-16, over a step of NEAR y, 1e-5

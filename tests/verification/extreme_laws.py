@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 
 import jointlaw as jl
-from jointlaw.engine import NumbaEngine, engine
+from jointlaw.kernels.engine import NumbaEngine, engine
 
 SCALE = 2e-6  # m: closure range and asperity height of the ordinary law
 ORDINARY = {

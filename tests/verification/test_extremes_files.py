@@ -9,7 +9,7 @@ import pytest
 from extreme_laws import SCALE, build
 
 import jointlaw as jl
-from jointlaw.cli import main
+from jointlaw.cli.main import main
 
 FAST = jl.Resolution(1, 3, 1)
 

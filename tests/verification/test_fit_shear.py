@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.measurements.calibrate import fit_curves, fit_shear
-from jointlaw.measurements.measured import ClosureCurve, ShearCurve
+from jointlaw.calibration.calibrate import fit_curves, fit_shear
+from jointlaw.calibration.measured import ClosureCurve, ShearCurve
 
 SHEAR = np.linspace(0, 3e-5, 12)
 

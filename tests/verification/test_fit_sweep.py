@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from jointlaw import datasets
-from jointlaw.measurements.calibrate import fit_closure
-from jointlaw.measurements.measured import first_loading
-from jointlaw.measurements.sweep import fit_many
+from jointlaw.calibration.calibrate import fit_closure
+from jointlaw.calibration.measured import first_loading
+from jointlaw.calibration.sweep import fit_many
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from jointlaw import claims
+from jointlaw.paper import claims
 
 ROOT = Path(__file__).parents[2]
 NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")

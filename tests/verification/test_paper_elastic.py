@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from jointlaw import claims, closed_form
-from jointlaw.closed_form import Shape
+from jointlaw import closed_form
+from jointlaw.paper import claims
+from jointlaw.paper.closed_form import Shape
 
 
 def numbers(key, verdict="holds"):

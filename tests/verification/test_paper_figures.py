@@ -8,9 +8,9 @@ import json
 import numpy as np
 import pytest
 
-from jointlaw import figures
-from jointlaw.figures.captions import CAPTIONS
-from jointlaw.figures.command import add_figures_command
+from jointlaw.cli.figures import add_figures_command
+from jointlaw.paper import figures
+from jointlaw.paper.figures.captions import CAPTIONS
 
 pytest.importorskip("matplotlib")
 

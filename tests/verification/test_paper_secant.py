@@ -8,9 +8,9 @@ import pytest
 
 import jointlaw as jl
 from jointlaw import closed_form, presets
-from jointlaw.figures.total import total_closure, total_shear
+from jointlaw.paper.figures.total import total_closure, total_shear
 
-module = importlib.import_module("jointlaw.secant")  # jl.secant may be the function
+module = importlib.import_module("jointlaw.paper.secant")  # jl.secant may be the function
 secant = module.secant
 
 

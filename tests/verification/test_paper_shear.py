@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import pytest
 
-from jointlaw import claims
+from jointlaw.paper import claims
 
 
 def numbers(key, verdict="holds"):

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from jointlaw import claims
+from jointlaw.paper import claims
 
 
 def numbers(key, verdict="holds"):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from jointlaw import claims
+from jointlaw.paper import claims
 
 
 def numbers(key, verdict="holds"):

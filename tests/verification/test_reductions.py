@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw import _kernel_numpy as kernel
-from jointlaw import engine
+from jointlaw.kernels import engine
+from jointlaw.kernels import reference as kernel
 
 # The full law sums the same terms over all azimuths, a reduced one over one of them: what differs
 # is the rounding of a few hundred sums, carried along the path.

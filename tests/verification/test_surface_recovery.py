@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.measurements.scan_files import read_scan
-from jointlaw.measurements.surface import from_surface
-from jointlaw.measurements.synthetic import draw_directions, synthetic_surface
+from jointlaw.surface.fit import from_surface
+from jointlaw.surface.scan_files import read_scan
+from jointlaw.surface.synthetic import draw_directions, synthetic_surface
 
 SPACING = 20e-6
 ORIENTATION, HEIGHTS = jl.Orientation(3.0, 0.5, 0.1), jl.GammaHeights(4.0, 1e-5)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.table import JointTable, load_table
+from jointlaw.tables.table import JointTable, load_table
 from jointlaw.tables.tabulate import tabulate
 
 
@@ -176,7 +176,7 @@ def test_export_command(tmp_path, capsys):
     """`jointlaw export yade PRESET --out DIR` through its own function."""
     import argparse
 
-    from jointlaw.cli_export import add_export_command
+    from jointlaw.cli.export import add_export_command
 
     parser = argparse.ArgumentParser()
     add_export_command(parser.add_subparsers())

@@ -8,7 +8,7 @@ from slow_bed import cap_quadrature
 from slow_virgin import SlowGamma, virgin
 
 import jointlaw as jl
-from jointlaw.curve import exact_force, virgin_curve
+from jointlaw.discretisation.virgin_curve import exact_force, virgin_curve
 
 FORMATIONS = [None, "population", "individual"]
 FAR = [1e-4, 0.01, 0.3, 1.0, 3.0, 12.0, 60.0, 500.0]  # closure ranges

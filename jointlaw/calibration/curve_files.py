@@ -1,0 +1,98 @@
+"""Closure curves in CSV files: columns found by their names, units taken from them."""
+
+from __future__ import annotations
+
+import csv
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ..support import units
+from ..support.checks import Array
+
+_NAMES = {
+    "stress": ("stress", "normal_stress", "sigma", "sigmaz", "sigma_n", "f1"),
+    "closure": ("closure", "normal_closure", "disp", "displacement"),
+}
+_UNITS = {"stress": "Pa", "closure": "m"}
+
+
+class Curve(NamedTuple):
+    """Stress (Pa) and closure (m), (n,), in the order measured."""
+
+    stress: Array
+    closure: Array
+
+
+def read_closure(path: str | Path, stress: str | None = None, closure: str | None = None) -> Curve:
+    """A closure curve from a CSV file.
+
+    Parameters
+    ----------
+    path: the file. Its first row names the columns; the unit follows the name, "closure_mm" or
+        "closure [mm]", or stands in a row of its own; without one it is SI.
+    stress, closure: names of the two columns, with their unit if the file gives none ("Disp:mm");
+        None finds closure, disp, stress, normal_stress, sigma, sigmaz or F1.
+
+    Raises ValueError naming file, column or row.
+    """
+    path = Path(path)
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as stream:
+            rows = [row for row in csv.reader(stream) if row and not row[0].startswith("#")]
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read ({error.strerror}); give a CSV file") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ValueError(f"{path}: is no CSV file in UTF-8 ({error}); save it as one") from None
+    if len(rows) < 2:
+        raise ValueError(f"{path}: has no rows of data under its first row of column names")
+    header = [cell.strip() for cell in rows[0]]
+    second = [cell.strip() for cell in rows[1]]
+    unit_row = all(re.fullmatch(r"\[.*\]|\(.*\)", cell) for cell in second)
+    if unit_row:
+        header = [f"{name} {unit}" for name, unit in zip(header, second, strict=False)]
+    body = rows[2:] if unit_row else rows[1:]
+    columns = []
+    for kind, asked in (("stress", stress), ("closure", closure)):
+        at, factor = _column(header, kind, asked, path)
+        try:
+            columns.append(np.array([float(row[at]) for row in body]) * factor)
+        except (ValueError, IndexError):
+            raise ValueError(
+                f"{path}: column {header[at]!r} holds something not a number"
+            ) from None
+    return Curve(*columns)
+
+
+def _column(header: list[str], kind: str, asked: str | None, path: Path) -> tuple[int, float]:
+    """Number of a column and the factor that turns it into SI units."""
+    unit_asked = None
+    wanted: tuple[str, ...] = _NAMES[kind]
+    if asked is not None:
+        name, _, unit_asked = asked.partition(":")
+        wanted = (name.strip().lower(),)
+    for at, title in enumerate(header):
+        name, unit = _name_and_unit(title, _UNITS[kind])
+        if name.lower() in wanted or title.lower() in wanted:
+            unit = unit_asked or unit
+            if not unit:
+                return at, 1.0
+            return at, units.parse(f"1{unit}", _UNITS[kind])
+    unit = "MPa" if kind == "stress" else "mm"
+    raise ValueError(
+        f"{path}: no column of {kind} among {', '.join(header)}; name it with its unit, "
+        f'for example --{kind}-column "{header[-1].split()[0]}:{unit}"'
+    )
+
+
+def _name_and_unit(title: str, base: str) -> tuple[str, str]:
+    """ "closure_mm", "closure [mm]" and "closure (mm)" in two parts; no unit if there is none."""
+    match = re.fullmatch(r"(.*?)\s*[\[(]\s*(.*?)\s*[\])]", title)
+    if match:
+        return match.group(1), match.group(2).strip("-")
+    name, _, unit = title.rpartition("_")
+    if name and re.fullmatch(rf"[numkcMGµμ]?{base}", unit):
+        return name, unit
+    return title, ""

@@ -1,0 +1,263 @@
+"""Measured curves, each with the noise it is expected to carry and what the law says of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..discretisation.virgin_curve import exact_force
+from ..laboratory.experiments import direct_shear
+from ..law import JointLaw, facet_sum
+from ..parameters.asperity import Asperity
+from ..parameters.heights import GammaHeights
+from ..parameters.orientation import Orientation
+from ..parameters.resolution import resolve
+from ..support.checks import Array, above, at_least, number
+from .noise import Noise
+
+Values = Mapping[str, float]
+STRESS_NOISE = 0.01  # of the stress: a load cell with the friction of its loading frame
+CLOSURE_NOISE = 0.005  # of the largest closure: linearity and repeatability of a transducer
+SHEAR_NOISE = 0.02  # of the largest shear stress
+
+
+@dataclass(frozen=True, eq=False)
+class ClosureCurve:
+    """First loading of a joint in closure: normal stress against closure.
+
+    Parameters
+    ----------
+    stress: normal stress in Pa, (n,), >= 0.
+    closure: closure in m, (n,), measured from wherever the test began; unloading left out (see
+        `first_loading`).
+    seating: closure (m) of the law at the closure zero of the test, or None to fit it. A test that
+        begins at a non-zero stress is always fitted; one whose first row is (0, 0) begins at 0.
+    noise: standard error of the stress as a share of it, taken as known. None expects 1 % of the
+        stress and 0.5 % of the largest closure and estimates both from the scatter.
+    closure_noise: standard error of the closure in m that goes with a given `noise`.
+
+    Raises ValueError for arrays that do not fit, fewer than four points or a branch that unloads.
+    """
+
+    stress: Array
+    closure: Array
+    seating: float | None = None
+    noise: float | None = None
+    closure_noise: float = 0.0
+    expected: Noise = field(init=False, repr=False)
+    steepness: Array = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        set_ = object.__setattr__
+        stress, closure = _pair("stress", self.stress, "closure", self.closure)
+        if (stress < 0).any():
+            raise ValueError(f"stress = {stress.min():g} Pa is out of bounds: it must be >= 0")
+        top = int(np.argmax(stress))
+        if (stress[top:] < 0.8 * stress[top]).any():
+            raise ValueError(
+                f"stress falls from {stress[top]:g} Pa after point {top}: fit the first loading "
+                "only, jointlaw.first_loading(stress, closure) cuts it out"
+            )
+        if self.seating is None and stress[0] == 0.0:
+            set_(self, "seating", 0.0 - float(closure[0]))  # not -0.0
+        elif self.seating is not None:
+            set_(self, "seating", number("seating", self.seating))
+        keep = stress > 0  # a point at zero stress only says where the closure is zero
+        stress, closure = stress[keep], closure[keep]
+        if stress.size < 4 or not np.ptp(closure) > 0:
+            raise ValueError(
+                f"stress has {stress.size} points above zero over a closure of "
+                f"{np.ptp(closure) if closure.size else 0:g} m: at least 4 are needed"
+            )
+        if self.seating is not None and closure.min() + self.seating <= 0:
+            raise ValueError(
+                f"seating = {self.seating:g} m: the law would be open at closure = "
+                f"{closure.min():g} m where a stress was measured; give a larger seating or None"
+            )
+        set_(self, "stress", stress)
+        set_(self, "closure", closure)
+        set_(self, "steepness", _steepness(closure, stress))
+        if self.noise is None:
+            if self.closure_noise != 0:
+                raise ValueError(
+                    f"closure_noise = {self.closure_noise!r} goes with a known noise; give noise "
+                    "too, or leave both out to have them estimated"
+                )
+            expected = Noise(STRESS_NOISE, CLOSURE_NOISE * float(np.ptp(closure)))
+        else:
+            share = above("noise", self.noise, 0.0)
+            expected = Noise(share, at_least("closure_noise", self.closure_noise, 0.0), True)
+        set_(self, "expected", expected)
+
+    def residuals(self, values: Values, seating: float, settings: Settings) -> Array:
+        """ln(model/measured), (n,)."""
+        residual: Array = log_stress(values, seating + self.closure, settings) - np.log(self.stress)
+        return residual
+
+
+@dataclass(frozen=True, eq=False)
+class ShearCurve:
+    """Direct shear at constant normal stress: shear stress against shear displacement.
+
+    Parameters
+    ----------
+    shear: shear displacement in m, (n,), from zero; it may turn round.
+    shear_stress: in Pa, (n,), not all zero.
+    normal: normal stress in Pa, > 0.
+    azimuth: direction of shear in rad, from axis 2 of the law.
+    noise: standard error as a share of the largest shear stress, taken as known; None expects 2 %
+        and estimates the level from the scatter.
+    """
+
+    shear: Array
+    shear_stress: Array
+    normal: float
+    azimuth: float = 0.0
+    noise: float | None = None
+    expected: Noise = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        set_ = object.__setattr__
+        shear, stress = _pair("shear", self.shear, "shear_stress", self.shear_stress)
+        if shear.size < 3 or not np.ptp(shear) > 0:
+            raise ValueError(f"shear has {shear.size} points: at least 3 that move are needed")
+        if not stress.any():
+            raise ValueError("shear_stress is zero throughout: there is no strength to fit")
+        set_(self, "shear", shear)
+        set_(self, "shear_stress", stress)
+        set_(self, "normal", above("normal", self.normal, 0.0))
+        set_(self, "azimuth", number("azimuth", self.azimuth))
+        known = self.noise is not None
+        share = above("noise", self.noise, 0.0) if known else SHEAR_NOISE
+        set_(self, "expected", Noise(share, 0.0, known))
+
+    @property
+    def steepness(self) -> Array:
+        """Zeros (n,): the displacement is taken as exact."""
+        return np.zeros(self.shear.size)
+
+    def predict(self, law: JointLaw, substeps: int = 1) -> Array:
+        """Shear stress (Pa) of a law along the path of this test, (n,)."""
+        path = self.shear if self.shear[0] else self.shear[1:]
+        record = direct_shear(
+            law.joint(), path.tolist(), self.normal, azimuth=self.azimuth, steps=substeps
+        )
+        stress = record.shear_stress[::substeps]
+        return stress[1:] if self.shear[0] else stress
+
+    def residuals(self, values: Values, settings: Settings) -> Array:
+        """(model - measured)/largest measured, (n,)."""
+        model = self.predict(build(values, settings, plane=self.azimuth))
+        residual: Array = (model - self.shear_stress) / np.max(np.abs(self.shear_stress))
+        return residual
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is decided rather than fitted."""
+
+    formation: str = "individual"
+    resolution: Any = "balanced"
+    has_heights: bool = True
+    closure_range: float | None = None
+    critical_slip: float = math.inf
+    plane: float | None = None  # of the law to be found; every shear curve has its own
+    closure_only: bool = False
+
+
+def first_loading(stress: ArrayLike, closure: ArrayLike) -> tuple[Array, Array, Array, Array]:
+    """Cut one loading cycle at its largest stress.
+
+    Returns stress (Pa) and closure (m) of the loading branch, the peak included, then those of the
+    unloading branch, the peak included again.
+    """
+    s, u = _pair("stress", stress, "closure", closure)
+    top = int(np.argmax(s))
+    return s[: top + 1], u[: top + 1], s[top:], u[top:]
+
+
+def build(values: Values, settings: Settings, plane: float | None = None) -> JointLaw:
+    """The law of these parameters; `plane` restricts it to motion at that azimuth (rad)."""
+    v = values
+    heights = (
+        GammaHeights(v["alpha"], v["beta"], v["overlap"], settings.formation)
+        if settings.has_heights
+        else None
+    )
+    parts: dict[str, Any] = {
+        "orientation": Orientation(v["a"], v["b"], v["c"]),
+        "asperity": Asperity(v["K"], v["lam"], v["eta"], v["mu"]),
+        "heights": heights,
+        "asperity_density": v["asperity_density"],
+        "resolution": settings.resolution,
+        "plane": plane,
+        "closure_range": settings.closure_range,
+        "critical_slip": settings.critical_slip,
+        "closure_only": settings.closure_only,
+    }
+    return JointLaw(**parts)
+
+
+def log_stress(values: Values, closure: Array, settings: Settings) -> Array:
+    """Logarithm of the normal stress (Pa) at closures (m), as `JointLaw.normal_stress`.
+
+    Without the table of a law: a fit asks for a hundred sets of parameters at ten closures each.
+    """
+    heights = (
+        GammaHeights(values["alpha"], values["beta"], values["overlap"], settings.formation)
+        if settings.has_heights
+        else None
+    )
+    force, _ = exact_force(np.maximum(closure, 1e-15), values["eta"], heights)
+    names = ("a", "b", "c", "lam", "eta", "mu")
+    factor = _facet_factor(*(values[name] for name in names), settings.resolution)
+    scale = values["asperity_density"] * values["lam"] * values["K"] * factor
+    result: Array = math.log(scale) + np.log(np.maximum(force, 1e-300))
+    return result
+
+
+@lru_cache(maxsize=256)
+def _facet_factor(
+    a: float, b: float, c: float, lam: float, eta: float, mu: float, resolution: Any
+) -> float:
+    """F1/(N lam K Phi) under pure closure, summed over the facets as `JointLaw` does."""
+    r = resolve(resolution)
+    facets = Orientation(a, b, c).facets(r.u, r.phi)
+    return facet_sum(facets.theta, facets.weight * np.cos(facets.theta) ** (1 + eta), lam, mu)
+
+
+def _pair(name: str, x: Any, other: str, y: Any) -> tuple[Array, Array]:
+    try:
+        first, second = np.asarray(x, float), np.asarray(y, float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} and {other} must be arrays of numbers") from None
+    if first.ndim != 1 or first.shape != second.shape or first.size == 0:
+        raise ValueError(
+            f"{name} has shape {first.shape}, {other} {second.shape}: "
+            "give two arrays of one dimension and the same length"
+        )
+    for label, array in ((name, first), (other, second)):
+        if not np.isfinite(array).all():
+            at = int(np.argmin(np.isfinite(array)))
+            raise ValueError(f"{label}[{at}] = {array[at]} is not finite; leave such points out")
+    return first, second
+
+
+def _steepness(closure: Array, stress: Array) -> Array:
+    """d ln(stress)/d closure (1/m) of measured points, smoothed by a power law through them.
+
+    Differences of neighbouring points would carry the noise into the weights.
+    """
+    span = float(np.ptp(closure))
+    x = (closure - closure.min()) / span
+    shifts = np.geomspace(0.02, 5.0, 25)
+    fits = [np.polyfit(np.log(x + s), np.log(stress), 1, full=True) for s in shifts]
+    at = int(np.argmin([float(f[1][0]) if f[1].size else np.inf for f in fits]))
+    slope: Array = float(fits[at][0][0]) / ((x + shifts[at]) * span)
+    return np.abs(slope)

@@ -1,0 +1,151 @@
+"""What is known of a joint before it is measured: scales, bounds and 95 % ranges of parameters.
+
+One closure curve holds about three numbers, the law has eleven. What a curve leaves open is filled
+in from here, in physical units and with its reason, and the fit says which parameters that were.
+A range is a normal distribution of the parameter's scale (mostly its logarithm), centred between
+the two ends, with 95 % between them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from ..support.checks import number
+
+Values = Mapping[str, float]
+
+
+class Scale(NamedTuple):
+    """How a parameter is fitted: the unit, the bounds, and the logarithm of (value + shift)."""
+
+    unit: str
+    low: float
+    high: float
+    log: bool = True
+    shift: float = 0.0
+
+    def to(self, value: float) -> float:
+        """Place on the scale of the fit."""
+        return math.log(value + self.shift) if self.log else value
+
+    def back(self, x: float) -> float:
+        """Value at a place on the scale of the fit."""
+        return math.exp(x) - self.shift if self.log else x
+
+    def slope(self, value: float) -> float:
+        """d value / d x."""
+        return value + self.shift if self.log else 1.0
+
+
+SCALES = {
+    "alpha": Scale("1", -0.99, 1e3, shift=1.0),
+    "beta": Scale("m", 1e-10, 1.0),
+    "overlap": Scale("m", 1e-12, 1.0),
+    "asperity_density": Scale("1/m2", 1e-3, 1e18),
+    "K": Scale("Pa m^(1-eta)", 1e3, 1e16),
+    "lam": Scale("1", 0.05, 20.0),
+    "eta": Scale("1", 0.0, 1.0, log=False),
+    "mu": Scale("1", 1e-3, 5.0),
+    "a": Scale("1", 1.0, 100.0),
+    "b": Scale("1", -1.0, 2.0, log=False),
+    "c": Scale("1", -0.5, 0.5, log=False),
+    "seating": Scale("m", 1e-12, 1.0),
+}
+
+# Reason and 95 % range of each prior; "seating" has none: the data alone place it.
+PRIORS: dict[str, tuple[float, float]] = {
+    # Westerly granite, lapped and rough: 3.82 and 6.14 (Yoshioka & Scholz 1989a)
+    "alpha": (1.0, 10.0),
+    # Six decades around 10 um: says nothing within any one laboratory
+    "beta": (1e-8, 1e-2),
+    # r0 over the mean height; 0.36 and 0.48 in the paper's two sets (Misra 1999, section 4.1)
+    "overlap_share": (0.1, 1.6),
+    # N lam K sigma^(1+eta), see `quantity`: 0.63 GPa within a factor of 32
+    "full_contact_stress": (2e7, 2e10),
+    # Hertz (Eq. 34): shear modulus of rock 10 to 30 GPa, radius of curvature 40 um to 4 cm
+    "K": (1e8, 1e10),
+    # (2 - nu)/(2 (1 - nu)) for any Poisson's ratio from 0 to 0.5 (Eq. 34)
+    "lam": (1.0, 1.5),
+    # plastic to elastic asperities (Johnson 1985, after Eq. 34)
+    "eta": (0.0, 0.5),
+    # 0.3 to 0.6 in the paper, 0.6 to 0.85 for rock on rock (Byerlee 1978)
+    "mu": (0.2, 1.0),
+    # 2.5 to 6 in the paper; mean inclinations from 45 down to 6 degrees
+    "a": (1.3, 9.0),
+    "b": (-1.0, 2.0),  # all of Eq. 18
+    "c": (-1 / 3, 1 / 3),  # all of Eq. 18
+}
+
+_DERIVED = {
+    "overlap_share": Scale("1", 0.0, math.inf),
+    "full_contact_stress": Scale("Pa", 0.0, math.inf),
+}
+_CONCERNS = {
+    "overlap_share": {"overlap"},
+    "full_contact_stress": {"asperity_density", "K"},
+}
+
+
+def quantity(name: str, values: Values) -> float:
+    """A parameter, or one of the two combinations that priors are stated for.
+
+    overlap_share: overlap over the mean height.
+    full_contact_stress: N lam K sigma^(1+eta) in Pa, the stress that would press all asperities in
+        by one standard deviation of their heights. With K of Hertz and N R sigma near 0.05 and
+        (sigma/R)^(1/2), the slope of asperities, near 0.3, as measured on random surfaces
+        (Greenwood & Williamson 1966; Johnson 1985, section 13.4), it is about 0.03 times the shear
+        modulus, 0.6 GPa for G = 20 GPa, whatever the size of the asperities.
+    """
+    if name == "overlap_share":
+        return values["overlap"] / (values["beta"] * (values["alpha"] + 1))
+    if name == "full_contact_stress":
+        sigma = values["beta"] * math.sqrt(values["alpha"] + 1)
+        stiffness = values["asperity_density"] * values["lam"] * values["K"]
+        return float(stiffness * sigma ** (1 + values["eta"]))
+    return values[name]
+
+
+def scale_of(name: str) -> Scale:
+    """Scale of a parameter, a seating closure ("seating", "seating_2", ...) or a combination."""
+    if name.startswith("seating"):
+        return SCALES["seating"]
+    return _DERIVED[name] if name in _DERIVED else SCALES[name]
+
+
+def chosen(
+    free: tuple[str, ...], given: Mapping[str, tuple[float, float] | None] | None
+) -> dict[str, tuple[float, float]]:
+    """Centre and standard deviation, on the scale of the fit, of every prior that matters here.
+
+    `given` replaces defaults by 95 % ranges in physical units, or drops one with None.
+    """
+    ranges: dict[str, tuple[float, float] | None] = {
+        name: ends for name, ends in PRIORS.items() if _CONCERNS.get(name, {name}) & set(free)
+    }
+    for name, ends in (given or {}).items():
+        if name not in SCALES and name not in _DERIVED:
+            known = ", ".join([*SCALES, *_DERIVED])
+            raise ValueError(f"priors: {name!r} is unknown; choose one of {known}")
+        ranges[name] = ends
+        if name == "overlap":
+            ranges.pop("overlap_share", None)
+    return {name: _normal(name, ends) for name, ends in ranges.items() if ends is not None}
+
+
+def _normal(name: str, ends: tuple[float, float]) -> tuple[float, float]:
+    try:
+        low, high = (number(f"priors[{name!r}]", end) for end in ends)
+    except TypeError:
+        raise ValueError(
+            f"priors[{name!r}] = {ends!r} must be a pair (low, high), the 95 % range"
+        ) from None
+    scale = scale_of(name)
+    if not low < high or (scale.log and low + scale.shift <= 0):
+        raise ValueError(
+            f"priors[{name!r}] = ({low:g}, {high:g}) must be ascending"
+            + (f" and above {-scale.shift:g}" if scale.log else "")
+        )
+    x0, x1 = scale.to(low), scale.to(high)
+    return 0.5 * (x0 + x1), (x1 - x0) / (2 * 1.959964)

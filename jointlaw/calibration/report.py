@@ -1,0 +1,91 @@
+"""A fit in words and tables, and as a preset."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..support.files import replace_file
+from .fit import Fit
+from .measured import ClosureCurve
+from .priors import scale_of
+
+
+def report(fit: Fit) -> str:
+    """Parameters with intervals, what the data fix and what not, noise, and stiffness."""
+    lines = [
+        "# Fit of the joint law",
+        "",
+        "| parameter | value | 95 % interval | unit | from the priors | fixed by the data |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name, share in fit.prior_share.items():
+        low, high = fit.interval(name)
+        lines.append(
+            f"| {name} | {fit.parameters[name]:.4g} | {low:.3g} to {high:.3g} | "
+            f"{scale_of(name).unit} | {100 * share:.0f} % | "
+            f"{'yes' if name in fit.identifiable else 'no'} |"
+        )
+    held = [name for name in fit.parameters if name not in fit.free]
+    lines += ["", "Held: " + ", ".join(f"{n} = {fit.parameters[n]:.4g}" for n in held) + "."]
+    lines += ["", "Not identifiable from these data:", ""]
+    grouped: dict[str, list[str]] = {}
+    for name, reason in fit.not_identifiable.items():
+        grouped.setdefault(reason, []).append(name)
+    lines += [f"- {', '.join(names)}: {reason}" for reason, names in grouped.items()]
+    for number, noise in enumerate(fit.noise, 1):
+        text = f"Curve {number}: scatter {100 * noise.share:.2g} % of the stress"
+        if noise.absolute:
+            text += f" and {1e6 * noise.absolute:.2g} um of closure"
+        lines += ["", text + (" (given)." if noise.known else " (estimated).")]
+    closures = [c for c in fit.problem.curves if isinstance(c, ClosureCurve)]
+    for number, curve in enumerate(closures, 1):
+        lines += ["", *_curve(fit, curve, number)]
+    return "\n".join(lines) + "\n"
+
+
+def preset(fit: Fit, title: str, path: Path | None) -> str:
+    """The law as TOML with title, source and what is not identifiable in its table `about`."""
+    closures = sum(isinstance(c, ClosureCurve) for c in fit.problem.curves)
+    others = len(fit.problem.curves) - closures
+    source = f"fitted by jointlaw to {closures} closure and {others} shear curves"
+    open_ones = ", ".join(fit.not_identifiable)
+    clean = title.replace("\\", "/").replace('"', "'")
+    text = fit.law.to_toml() + (
+        f'\n[about]\ntitle = "{clean}"\nsource = "{source}"\n'
+        f'assumptions = "not identifiable from these data: {open_ones}"\n'
+    )
+    if path is not None:
+        replace_file(path, text.encode())
+    return text
+
+
+def _curve(fit: Fit, curve: ClosureCurve, number: int) -> list[str]:
+    """What a closure curve does fix: stress and stiffness along it."""
+    at = np.array([0.5, 1.0]) * curve.closure[-1]
+    low, high = fit.band(at, curve=number, measured=False)
+    seating = fit.parameters["seating" if number == 1 else f"seating_{number}"]
+    lines = [
+        f"Closure curve {number} (seating closure {1e6 * seating:.3g} um):",
+        "",
+        "| closure (um) | stress (MPa) | 95 % band (MPa) | normal stiffness (GPa/m) |",
+        "|---|---|---|---|",
+    ]
+    for u, lo, hi in zip(at, low, high, strict=True):
+        stress = float(fit.predict(u, number))
+        step = 1e-4 * float(curve.closure[-1])
+        rise = float(fit.predict(u + step, number)) - float(fit.predict(u - step, number))
+        lines.append(
+            f"| {1e6 * u:.4g} | {stress / 1e6:.4g} | {lo / 1e6:.4g} to {hi / 1e6:.4g} | "
+            f"{rise / (2 * step) / 1e9:.4g} |"
+        )
+    if fit.bends_otherwise[number - 1]:
+        lines += [
+            "",
+            f"**This curve does not bend as the law does**: neighbouring points miss it together, "
+            f"by {100 * fit.wander[number - 1]:.2g} % of the stress. Between the points use it "
+            "with that error; beyond them trust neither the curve nor its band: a hyperbola (mated "
+            "joints) or a logarithm (unmated ones) may follow this rock better.",
+        ]
+    return lines

@@ -1,0 +1,158 @@
+"""`jointlaw fit`: measured closure curves to laws, with report, plot and held-out errors."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..calibration import datasets
+from ..calibration.baselines import Comparison, compare
+from ..calibration.curve_files import Curve, read_closure
+from ..calibration.fit import Fit
+from ..calibration.measured import first_loading
+from ..calibration.plot import plot_fit
+from ..calibration.sweep import fit_many
+from ..calibration.unloading import explain
+from ..support import units
+from ..support.files import replace_file, write_json
+from .command import add_command
+
+
+def add_fit_command(commands: Any) -> None:
+    """Add `fit` to the subparsers of the command line."""
+    what = "fit the law to measured closure curves; write preset, report and plot"
+    example = "jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out out"
+    parser = add_command(commands, "fit", what, example)
+    parser.description = (
+        f"{what}. Only the first loading is fitted; an unloading branch is compared with what "
+        "friction explains."
+    )
+    parser.add_argument(
+        "data", nargs="+", metavar="CSV", help="files of stress and closure, or a shipped data set"
+    )
+    parser.add_argument("--stress-column", help="name and unit of that column, such as sigmaZ:MPa")
+    parser.add_argument("--closure-column", help="name and unit of that column, such as Disp:mm")
+    parser.add_argument(
+        "--up-to", help="fit up to this stress, predict the rest: 5.3MPa; or half, of the largest"
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="hold a parameter at a value in SI units, such as alpha=3.8; repeatable",
+    )
+    parser.add_argument("--free", help="parameters to fit: asperity_density,alpha,beta")
+    parser.add_argument("--formation", choices=("individual", "population"), default="individual")
+    parser.add_argument("--noise", type=float, help="known error of the stress, such as 0.01")
+    parser.add_argument("--workers", type=int, help="processes for several files")
+    parser.add_argument("--out", type=Path, required=True, help="folder for the results")
+    parser.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    folders = _folders(options)
+    curves = [_read(options, item) for item in options.data]
+    keywords = _keywords(options)
+    loading = [first_loading(*curve)[:2] for curve in curves]
+    limits = [_limit(options.up_to, stress) for stress, _ in loading]
+    seen = [(s[s <= limit], u[s <= limit]) for (s, u), limit in zip(loading, limits, strict=True)]
+    fits = fit_many(seen, workers=options.workers, **keywords) if len(seen) > 1 else None
+    for k, (item, curve) in enumerate(zip(options.data, curves, strict=True)):
+        from ..calibration.calibrate import fit_closure
+
+        fit = fits[k] if fits else fit_closure(*seen[k], **keywords)
+        held = None
+        if (loading[k][0] > limits[k]).any():
+            held = compare(*loading[k], limits[k], **keywords)
+        _write(folders[k], item, fit, curve, held)
+    return 0
+
+
+def _folders(options: argparse.Namespace) -> list[Path]:
+    """One folder for the results of each file, named after it when there are several."""
+    if len(options.data) == 1:
+        return [options.out]
+    items: dict[str, str] = {}
+    for item in options.data:
+        if (other := items.setdefault(Path(item).stem, item)) is not item:
+            raise ValueError(
+                f"{other} and {item} would both be written to {options.out / Path(item).stem}; "
+                "rename one, or fit them one at a time"
+            )
+    return [options.out / stem for stem in items]
+
+
+def _write(folder: Path, item: str, fit: Fit, curve: Curve, held: Comparison | None) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    text = fit.report()
+    summary: dict[str, Any] = {
+        "data": Path(item).name,
+        "parameters_SI": fit.parameters,
+        "standard_error_SI": fit.standard_error,
+        "identifiable": list(fit.identifiable),
+        "not_identifiable": fit.not_identifiable,
+    }
+    if held is not None:
+        inside = (held.band[0] <= held.stress) & (held.stress <= held.band[1])
+        text += (
+            f"\n## Held out: {held.stress.size} points above {held.limit / 1e6:.4g} MPa\n\n"
+            f"{held.table()}\n\nThe 95 % band of the law covers {int(inside.sum())} of "
+            f"{inside.size} of them, at the largest stress from "
+            f"{100 * (held.band[0][-1] / held.stress[-1] - 1):+.1f} to "
+            f"{100 * (held.band[1][-1] / held.stress[-1] - 1):+.1f} % of it.\n"
+        )
+        summary["error_at_largest_stress"] = {n: float(e[-1]) for n, e in held.errors.items()}
+    if first_loading(*curve)[2].size >= 3:
+        try:
+            loop = explain(fit.law, *curve)
+            text += f"\n## Unloading\n\n{loop.text()}\n"
+            summary["unloading"] = vars(loop)
+        except ValueError as error:  # the fit is not lost for it
+            text += f"\n## Unloading\n\nNot compared with the law: {error}.\n"
+            print(f"unloading is not compared: {error}", file=sys.stderr)
+    fit.to_toml(folder / "law.toml", title=f"Fit to {Path(item).name}")
+    replace_file(folder / "report.md", text.encode())
+    write_json(folder / "summary.json", summary)
+    files = ["law.toml", "report.md", "summary.json"]
+    try:
+        plot_fit(fit, folder / "fit.png", held)
+        files.insert(0, "fit.png")
+    except ImportError as error:
+        print(f"no picture: {error}", file=sys.stderr)
+    print(text)
+    print(f"wrote {', '.join(files)} to {folder}")
+
+
+def _read(options: argparse.Namespace, item: str) -> Curve:
+    if item in datasets.names() and not Path(item).exists():
+        return datasets.load(item)
+    return read_closure(item, options.stress_column, options.closure_column)
+
+
+def _limit(text: str | None, stress: Any) -> float:
+    if text is None:
+        return float("inf")
+    return 0.5 * float(np.max(stress)) if text == "half" else units.parse(text, "Pa")
+
+
+def _keywords(options: argparse.Namespace) -> dict[str, Any]:
+    fixed = {}
+    for item in options.set:
+        name, _, value = item.partition("=")
+        try:
+            fixed[name.strip()] = float(value)
+        except ValueError:
+            raise ValueError(
+                f"--set {item!r}: write a name and a number, such as alpha=3.8"
+            ) from None
+    keywords: dict[str, Any] = {"fixed": fixed, "formation": options.formation}
+    if options.free:
+        keywords["free"] = tuple(name.strip() for name in options.free.split(","))
+    if options.noise is not None:
+        keywords["noise"] = options.noise
+    return keywords

@@ -1,0 +1,79 @@
+"""`jointlaw scan`: a scanned surface to orientation and heights, with report and picture."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from ..support import units
+from ..support.files import replace_file, write_json
+from ..surface.fit import SurfaceFit, from_surface
+from ..surface.scan_files import read_scan
+from .command import add_command
+
+
+def add_scan_command(commands: Any) -> None:
+    """Add `scan` to the subparsers of the command line."""
+    what = "read heights, directions and number of asperities off a scanned surface"
+    example = "jointlaw scan scan.csv --spacing 20um --height-unit um --out out"
+    parser = add_command(commands, "scan", what, example)
+    parser.description = f"{what}. Give the composite surface of both sides, or a profile."
+    parser.add_argument("file", help="CSV, NPY, or a format of SurfaceTopography (extra scan)")
+    parser.add_argument("--spacing", help="of the points, such as 20um; needed for CSV and NPY")
+    parser.add_argument("--height-unit", help="of CSV and NPY, such as um (default m)")
+    parser.add_argument("--sampling-length", help="edge of a facet (default 4 spacings)")
+    parser.add_argument("--out", type=Path, required=True, help="folder for the results")
+    parser.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    spacing = None if options.spacing is None else units.parse(options.spacing, "m")
+    unit = options.height_unit
+    factor = None if unit is None else units.parse(f"1{unit}", "m")
+    z, spacing = read_scan(options.file, spacing, factor)
+    length = options.sampling_length
+    fit = from_surface(z, spacing, None if length is None else units.parse(length, "m"))
+    folder: Path = options.out
+    folder.mkdir(parents=True, exist_ok=True)
+    text = fit.report()
+    replace_file(folder / "report.md", text.encode())
+    write_json(folder / "summary.json", _summary(fit))
+    replace_file(folder / "surface.toml", _toml(fit, Path(options.file).name).encode())
+    files = ["surface.toml", "report.md", "summary.json"]
+    try:
+        fit.plot(folder / "scan.png")
+        files.insert(0, "scan.png")
+    except ImportError as error:
+        print(f"no picture: {error}", file=sys.stderr)
+    print(text)
+    print(f"wrote {', '.join(files)} to {folder}")
+    return 0
+
+
+def _summary(fit: SurfaceFit) -> dict[str, Any]:
+    return {
+        "parameters_SI": fit.parameters,
+        "standard_error_SI": fit.standard_error,
+        "sampling_length_m": fit.sampling_length,
+        "summits": int(fit.asperities.depth.size),
+        "facets": len(fit.asperities.slope),
+        "identifiable": list(fit.identifiable),
+        "not_identifiable": fit.not_identifiable,
+        "warnings": fit.warnings,
+    }
+
+
+def _toml(fit: SurfaceFit, name: str) -> str:
+    """The part of a law file that a scan knows; stiffness and friction are left to add."""
+    p = fit.parameters
+    density = "" if fit.is_profile else f"asperity_density = {p['asperity_density']!r}  # 1/m2\n"
+    clean = name.replace("\\", "/").replace('"', "'")
+    return (
+        f"# From {clean}, sampling length {fit.sampling_length:.4g} m. To make it a law, add\n"
+        "# asperity_density if it is missing, and [asperity] with K, lam, eta and mu.\n"
+        f"{density}\n[orientation]\na = {max(p['a'], 1.0)!r}\nb = {p['b']!r}\nc = {p['c']!r}\n\n"
+        f"[heights]\nalpha = {p['alpha']!r}\nbeta = {p['beta']!r}  # m\n"
+        f'overlap = {p["overlap"]!r}  # m\nformation = "individual"\n'
+    )

@@ -1,0 +1,70 @@
+"""Where the law puts its nodes: inclinations against the density, touch depths against the curve.
+
+Both rules only choose places. What the law keeps exact (docs/how-accurate.md) holds at any number
+of nodes; `benchmarks/nodes.py` measures these rules against others.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from ..support.checks import Array, frozen
+from .virgin_curve import Curve
+
+# Chosen on random laws with `benchmarks/nodes.py`
+_STEEPEST = 10.0  # largest tan(theta) that counts: at a = 1 it grows without bound
+_LOW = 0.1  # power of Phi that draws nodes towards small loads
+_OPEN = 1.8  # shares of the grading left to the last cell: few cells then sit where most loads are
+_GRID = 512  # panels on which the touch-depth density is summed
+
+
+@lru_cache(maxsize=256)
+def inclinations(b: float, count: int) -> tuple[Array, Array]:
+    """Places in u = cos(a theta) and shares (count,) of the density 1 + b/2 (3u^2 - 1) on 0..1.
+
+    The Gauss rule of that very weight, by the three-term recurrence of its orthogonal polynomials
+    (Golub & Welsch 1969): shares sum to 1 even for one node, which then lies at the mean of u.
+    """
+    x, w = np.polynomial.legendre.leggauss(2 * count + 2)
+    x, w = 0.5 * (x + 1.0), 0.5 * w
+    w = w * np.maximum(1.0 + 0.5 * b * (3.0 * x**2 - 1.0), 0.0)
+    middle, side = np.zeros(count), np.zeros(count)
+    before, now = np.zeros_like(x), np.sqrt(w / w.sum())  # orthonormal polynomials times sqrt(w)
+    for k in range(count):
+        middle[k] = np.sum(x * now**2)
+        after = (x - middle[k]) * now - (side[k - 1] * before if k else 0.0)
+        side[k] = np.linalg.norm(after)
+        before, now = now, after / side[k]
+    matrix = np.diag(middle) + np.diag(side[:-1], 1) + np.diag(side[:-1], -1)
+    places, vectors = np.linalg.eigh(matrix)
+    places, shares = np.clip(places, 0.0, 1.0), vectors[0] ** 2
+    return frozen((places, shares))
+
+
+def depth_nodes(curve: Curve, closure_range: float, slope: Array, cells: int) -> Array:
+    """Limits zeta (M, cells + 1) in m of the depth cells of facets of this tan(theta) (M,).
+
+    A cell of width h lumps springs of density Phi'' and by that errs by Phi'' h^2/8 at most: equal
+    shares of int sqrt(Phi'') dz make the error of all cells the same. A small power of Phi shifts
+    nodes towards small loads. They span the effective closure y = closure + tan(theta) shear, not
+    the closure; the last cell is open-ended.
+    """
+    reach = closure_range * (1.0 + np.minimum(slope, _STEEPEST))
+    # graded: Phi'' may be singular at touch
+    edges = reach.max() * (np.arange(_GRID + 1) / _GRID) ** 4
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    # ratios throughout, so that the same joint in other units has the same nodes to the bit
+    with np.errstate(all="ignore"):
+        force, bend = curve.force(middle)[0], np.maximum(curve.curvature(middle), 0.0)
+        density = np.sqrt(bend / bend.max()) * (force / force[-1]) ** -_LOW
+    density = np.where(np.isfinite(density), density, 0.0)
+    share = density * np.diff(edges)
+    # a floor for curves without curvature, as of one linear spring, where any nodes will do
+    share = share / max(share.sum(), 1e-300) + 1e-6 * np.diff(edges) / edges[-1]
+    total = np.concatenate([[0.0], np.cumsum(share)])
+    wanted = np.interp(reach, edges, total)[:, None] * (np.arange(1, cells) / (cells - 1 + _OPEN))
+    inner = np.interp(wanted, total, edges)
+    zero, end = np.zeros((len(slope), 1)), np.full((len(slope), 1), np.inf)
+    return np.concatenate([zero, inner, end], axis=1)

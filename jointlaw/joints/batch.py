@@ -1,0 +1,301 @@
+"""Joints with memory, a batch of them advanced together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..kernels import reference as kernel
+from ..kernels.engine import LANES, engine, rows_of, write_rows
+from ..kernels.reference import Measures
+from ..law import JointLaw
+from ..support.checks import Array, numbers, whole
+from .state import JointState, NonFiniteError, write_replay
+
+Index = Sequence[int] | NDArray[np.integer[Any]] | NDArray[np.bool_]
+Out = tuple[Array, Array | None]
+
+
+class JointBatch:
+    """n joints of one law. Arrays over joints: displacements (n, dim) in m, tractions (n, dim) in
+    Pa; dim is 3 (closure, shear along axes 2 and 3), 2 for a law with a plane, or 1 for a law with
+    closure_only.
+
+    The traction is the joint's resistance in the sense of the displacement: the force on the body
+    that moves by +d is -area * F. Without `ledger` no dissipated energy is added up, which is
+    faster with the compiled kernel.
+    """
+
+    def __init__(self, law: JointLaw, n: int, ledger: bool = True) -> None:
+        self.law, self.ledger = law, ledger
+        self._engine = engine(law)
+        self._n = whole("n", n, 0)
+        lanes = 1 if self._n == 1 else LANES
+        self._state = np.zeros((-(-self._n // lanes), self._engine.rows, lanes))
+        self._reach = 0.0  # no facet's effective closure exceeds it, in either sense
+        self._stretch = 1.0 + 2.0 * float(np.max(np.abs(law.tables.m)))  # of y over that of d
+
+    def __getstate__(self) -> dict[str, Any]:
+        kept = {k: v for k, v in self.__dict__.items() if k != "_engine"}  # holds compiled code
+        return kept | {"_state": self._state[:, : self.law.tables.rows]}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._engine, rows = engine(self.law), state["_state"]
+        blocks, kept, lanes = rows.shape
+        self._state = np.zeros((blocks, self._engine.rows, lanes))
+        self._state[:, :kept] = rows
+        self._engine.refresh(self._state, self._n)
+
+    def __len__(self) -> int:
+        return self._n
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {self._n} joints, {self.law.tables.dim}-D>"
+
+    # ------------------------------------------------------------------ steps
+
+    def update(
+        self,
+        d: ArrayLike,
+        where: Index | None = None,
+        tangent: bool = True,
+        out: Out | None = None,
+    ) -> Out:
+        """Advance by the displacement increments d and keep the new state.
+
+        d: (n, dim) in m; with `where`, an index or mask of m joints, (m, dim).
+        out: arrays F and C (or None) to write into instead of new ones.
+        Returns F (n or m, dim) in Pa and C = dF/dd (n or m, dim, dim) in Pa/m, None without
+        `tangent`. Raises ValueError for a wrong shape, index or a non-finite increment, and
+        NonFiniteError when the result would overflow; the state is then as it was.
+        """
+        return self._advance(d, where, tangent, out, keep=True)
+
+    def trial(
+        self,
+        d: ArrayLike,
+        where: Index | None = None,
+        tangent: bool = True,
+        out: Out | None = None,
+    ) -> Out:
+        """As `update`, but the state is left untouched."""
+        return self._advance(d, where, tangent, out, keep=False)
+
+    def _advance(
+        self, d: ArrayLike, where: Index | None, tangent: bool, out: Out | None, keep: bool
+    ) -> Out:
+        index = None if where is None else self._index(where)
+        m, dim = self._n if index is None else len(index), self.law.tables.dim
+        step = self._increments(d, (m, dim))
+        reach = self._admit(step, index, tangent)
+        if out is None:
+            F, C = np.empty((m, dim)), np.empty((m, dim, dim)) if tangent else None
+        else:
+            F, C = _require_out(out, m, dim, tangent)
+        self._engine.advance(self._state, step, F, C, index, keep, self.ledger)
+        if keep:
+            self._reach = reach
+        return F, C
+
+    # ------------------------------------------------------------------ state
+
+    def snapshot(self) -> JointState:
+        """A copy of the state of all joints."""
+        return JointState(self.law.fingerprint, self._rows())
+
+    def restore(self, state: JointState) -> None:
+        """Return to a snapshot. Raises ValueError if another law or batch size wrote it."""
+        if not isinstance(state, JointState):
+            raise ValueError(f"state = {state!r} is not a snapshot; give one of snapshot()")
+        if state.fingerprint != self.law.fingerprint:
+            raise ValueError("state belongs to a joint law with other parameters")
+        if state.values.shape != (self.law.tables.rows, self._n):
+            raise ValueError(f"state holds {len(state)} joints, this batch {self._n}: resize first")
+        if not np.isfinite(state.values).all():
+            raise ValueError("state holds values that are not finite; it is damaged")
+        rows = self._state[:, : self.law.tables.rows]
+        write_rows(rows, state.values, np.arange(self._n))
+        self._engine.refresh(self._state, self._n)
+        self._reach = self._bound(state.values).max(initial=0.0)
+
+    def reset(self, index: Index | None = None) -> None:
+        """Return the joints at `index` (all if None) to the virgin state: new contacts."""
+        which = np.arange(self._n) if index is None else self._index(index)
+        lanes = self._state.shape[2]
+        self._state[which // lanes, :, which % lanes] = 0.0
+
+    def resize(self, n: int) -> None:
+        """Change the number of joints; joints beyond the old number are new and unloaded."""
+        n = whole("n", n, 0)
+        blocks, rows, lanes = self._state.shape
+        if n < self._n:
+            self.reset(np.arange(n, self._n))
+        elif n > blocks * lanes:  # grow by doubling, so that steady growth copies rarely
+            grown = np.zeros((max(-(-n // LANES), 2 * blocks), rows, LANES))
+            if lanes == LANES:
+                grown[:blocks] = self._state
+            else:
+                write_rows(grown, rows_of(self._state, self._n), np.arange(self._n))
+            self._state = grown
+        self._n = n
+
+    # ---------------------------------------------------------- what they show
+
+    def measures(self) -> Measures:
+        """Shares, stored energy and reach of all joints in one pass, as arrays (n,)."""
+        values = np.empty((5, self._n))
+        self._engine.measures(self._state, values)
+        return Measures(*values)
+
+    @property
+    def kernel(self) -> str:
+        """Which kernel advances these joints: "numba" or "numpy"."""
+        return self._engine.name
+
+    @property
+    def bytes_per_joint(self) -> int:
+        """Memory that the state of one joint of a large batch takes."""
+        return 8 * self._engine.rows
+
+    def max_stiffness(self) -> Array:
+        """Upper bound (n,) of |C| in Pa/m at each joint's own reach, for explicit time steps."""
+        bound: Array = self.law.max_stiffness(self.measures().reach)
+        return bound
+
+    @property
+    def delta(self) -> Array:
+        """Displacement since the virgin state (n, dim): closure and shear, in m."""
+        delta: Array = rows_of(self._state[:, : self.law.tables.dim], self._n).T
+        return delta
+
+    @property
+    def F(self) -> Array:
+        """Traction (n, dim) in Pa."""
+        return kernel.traction(self.law.tables, self._rows()).T
+
+    @property
+    def sliding(self) -> Array:
+        """Share (n,) of all facet orientations: in touch, every cell at its friction limit."""
+        return self.measures().sliding
+
+    @property
+    def slipping(self) -> Array:
+        """Share (n,) of friction capacity that is at its limit: partial slip."""
+        return self.measures().slipping
+
+    @property
+    def separated(self) -> Array:
+        """Share (n,) of all facet orientations: out of touch."""
+        return self.measures().separated
+
+    @property
+    def stored_energy(self) -> Array:
+        """Elastic energy (n,) in J/m2."""
+        return self.measures().stored
+
+    @property
+    def dissipated_energy(self) -> Array:
+        """Energy (n,) in J/m2 lost to friction since the virgin state; never decreases."""
+        if not self.ledger:
+            raise ValueError("dissipated_energy is not added up: make the joints with ledger=True")
+        row = 2 * self.law.tables.dim - 1
+        lost: Array = rows_of(self._state[:, row : row + 1], self._n)[0]
+        return lost
+
+    # --------------------------------------------------------------- internals
+
+    def _rows(self, index: NDArray[np.intp] | None = None) -> Array:
+        """States (rows, n) of all joints or those of `index`, as a copy."""
+        return rows_of(self._state[:, : self.law.tables.rows], self._n, index)
+
+    def _index(self, where: Index) -> NDArray[np.intp]:
+        index = np.asarray(where)
+        if index.dtype == bool:
+            if index.shape != (self._n,):
+                raise ValueError(f"where has shape {index.shape}; a mask needs ({self._n},)")
+            return np.flatnonzero(index)
+        if index.size == 0:
+            return np.empty(0, np.intp)
+        if index.ndim != 1 or not np.issubdtype(index.dtype, np.integer):
+            raise ValueError("where must be a one-dimensional array of joint numbers or a mask")
+        low, high = int(index.min()), int(index.max())
+        if low < 0 or high >= self._n:
+            wrong = low if low < 0 else high
+            raise ValueError(f"where names joint {wrong}; joints are 0 to {self._n - 1}")
+        if len(index) > 1 and np.bincount(index, minlength=1).max() > 1:
+            raise ValueError("where names a joint twice; each joint takes one increment per step")
+        return index.astype(np.intp)
+
+    def _increments(self, d: ArrayLike, shape: tuple[int, int]) -> Array:
+        """Increments (m, dim), contiguous and checked."""
+        values = np.ascontiguousarray(numbers("d", d, "m"))
+        if values.shape != shape:
+            raise ValueError(
+                f"d has shape {values.shape}; expected {shape}: joints, {components(self.law)}"
+            )
+        return values
+
+    def _admit(self, d: Array, index: NDArray[np.intp] | None, tangent: bool) -> float:
+        """New bound of the reach; raises for increments that are not finite or would overflow.
+
+        The bound of the whole batch costs one pass over d; joints are looked at only beyond it.
+        """
+        limit = self.law.largest_reach
+        largest = max(float(d.max(initial=0.0)), -float(d.min(initial=0.0)))  # both NaN if one is
+        reach = self._reach + self._stretch * largest
+        if reach <= limit:
+            return reach
+        finite = np.isfinite(d).all(axis=1)
+        if not finite.all():
+            row = int(np.argmin(finite))
+            joint = row if index is None else int(index[row])
+            raise ValueError(f"d of joint {joint} = {d[row]} is not finite; nothing was moved")
+        old = self._rows(index)
+        with np.errstate(over="ignore"):
+            new = self._bound(old) + self._stretch * np.abs(d).max(axis=1)
+        if (new > limit).any():
+            row = int(np.argmax(new > limit))
+            joint = row if index is None else int(index[row])
+            path = write_replay(self.law.to_toml(), old[:, [row]], d[[row]].T, tangent)
+            again = "no replay file could be written"
+            if path is not None:
+                again = f"`jointlaw replay {path}` repeats it"
+            raise NonFiniteError(
+                f"joint {joint}: the step d = {d[row]} m gives a result that is not finite; "
+                f"nothing was moved. Take a smaller step; {again}",
+                path,
+            )
+        rest = self._bound(self._rows()).max(initial=0.0)
+        return max(float(rest), float(new.max(initial=0.0)))
+
+    def _bound(self, rows: Array) -> Array:
+        """Bound of the reach of states (rows, n), from closure and offset."""
+        now = kernel.parts(self.law.tables, rows)
+        far = np.maximum(np.abs(now.delta).max(axis=0), np.abs(now.offset).max(axis=0, initial=0.0))
+        bound: Array = self._stretch * far
+        return bound
+
+
+def components(law: JointLaw) -> str:
+    """What a displacement of this law is made of, and how to have more."""
+    return {
+        1: "closure; for shear take a law without closure_only",
+        2: "closure and shear along the plane; for motion in 3-D take a law with plane=None",
+        3: "closure and shear along axes 2 and 3",
+    }[law.tables.dim]
+
+
+def _require_out(out: Out, m: int, dim: int, tangent: bool) -> Out:
+    """Arrays that the caller gave for the results, checked."""
+    for name, array, shape in (("F", out[0], (m, dim)), ("C", out[1], (m, dim, dim))):
+        if name == "C" and not tangent:
+            continue
+        if array is None or array.shape != shape or array.dtype != np.float64:
+            raise ValueError(f"out: {name} must be a float64 array of shape {shape}")
+        if not (array.flags.c_contiguous and array.flags.writeable):
+            raise ValueError(f"out: {name} must be C-contiguous and writeable")
+    return out[0], out[1] if tangent else None

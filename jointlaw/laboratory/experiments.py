@@ -1,0 +1,216 @@
+"""Laboratory tests on one joint: closure and direct shear under normal control."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..joints.joint import Joint
+from ..joints.state import NonFiniteError
+from ..support.checks import Array, above, at_least, number, numbers, one_of, whole
+from ..support.progress import track
+from .record import UNITS, Record
+
+CONTROLS = ("stress", "stiffness", "closure")
+TOLERANCE = 1e-11  # of the normal stress scale, in normal control
+
+
+class PathError(RuntimeError):
+    """A test could not go on; `record` holds all rows measured so far."""
+
+    def __init__(self, message: str, record: Record) -> None:
+        super().__init__(message, record)  # both, so that it can be pickled
+        self.record = record
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+def closure_test(
+    joint: Joint, stress: float | Sequence[float], unload: bool = True, steps: int = 100
+) -> Record:
+    """Close a joint to a normal stress, from the one it carries, and open it again.
+
+    Parameters
+    ----------
+    joint: the joint; it is left in the state at the end of the test.
+    stress: largest normal stress in Pa, > 0, or one for each cycle.
+    unload: whether to unload to zero stress after each peak.
+    steps: steps per branch; rows crowd towards small stress as the stiffness does.
+
+    Returns the Record, its first row the joint as it was given. Raises ValueError for a bad
+    argument and PathError, with the record so far, when a stress cannot be reached.
+    """
+    peaks = [above("stress", s, 0.0) for s in _series("stress", stress, "Pa")]
+    steps = whole("steps", steps, 1)
+    grading = (np.arange(1, steps + 1) / steps) ** (1 + joint.law.asperity.eta)
+    levels: list[float] = []
+    start = max(float(joint.F[0]), 0.0)
+    for peak in peaks:
+        levels += list(start + (peak - start) * grading)
+        if unload:
+            levels += [*list(peak * grading[-2::-1]), 0.0]
+        start = levels[-1]
+    log = _Log(joint, 0.0, "closure test")
+    still = np.zeros(joint.law.tables.dim - 1)
+    for level in track(levels, "closure test", len(levels)):
+        log.advance(still, Normal(level, max(peaks)))
+    return log.record()
+
+
+def direct_shear(
+    joint: Joint,
+    to: float | Sequence[float],
+    normal: float = 10e6,
+    control: str = "stress",
+    azimuth: float = 0.0,
+    stiffness: float | None = None,
+    steps: int = 200,
+) -> Record:
+    """Seat a joint at a normal stress and shear it to one or more turning points.
+
+    Parameters
+    ----------
+    joint: the joint; it is left in the state at the end of the test.
+    to: turning points of the shear displacement in m, along the azimuth from where the joint
+        stands: one number, or several for reversals. No motion across the azimuth.
+    normal: normal stress in Pa at which the joint is seated, > 0.
+    control: "stress" keeps the normal stress, "stiffness" lets it grow by `stiffness` times the
+        dilation, "closure" keeps the closure.
+    azimuth: direction of shear in rad, from axis 2 towards axis 3; a law with a plane shears
+        along that plane.
+    stiffness: normal stiffness of the surroundings in Pa/m, for control = "stiffness".
+    steps: steps per leg.
+
+    Returns the Record, its first row the seated joint. Raises ValueError for a bad argument and
+    PathError, with the record so far, when the normal condition cannot be met.
+    """
+    normal = above("normal", normal, 0.0)
+    control = one_of("control", control, CONTROLS)
+    steps = whole("steps", steps, 1)
+    points = [number("to", p) for p in _series("to", to, "m")]
+    azimuth = number("azimuth", azimuth)
+    if control == "stiffness":
+        if stiffness is None:
+            raise ValueError('stiffness is missing: control = "stiffness" needs it in Pa/m')
+        stiffness = at_least("stiffness", stiffness, 0.0)
+    elif stiffness is not None:
+        raise ValueError(f'stiffness is for control = "stiffness", not {control!r}')
+    if joint.law.closure_only:
+        raise ValueError("joint: its law has closure_only; direct shear needs a law without")
+    plane = joint.law.plane
+    if plane is not None and azimuth not in (0.0, plane):
+        raise ValueError(
+            f"azimuth = {azimuth:g} rad: this law moves in its plane at {plane:g} rad only; "
+            "use a law with plane=None"
+        )
+    log = _Log(joint, azimuth if plane is None else plane, "direct shear")
+    along = np.array([math.cos(azimuth), math.sin(azimuth)]) if plane is None else np.ones(1)
+    log.seat(normal)
+    goal = Normal(normal, normal, stiffness or 0.0, float(joint.delta[0]))
+    increments = np.diff(np.concatenate([[0.0], points])) / steps
+    legs = np.repeat(increments, steps)
+    for length in track(legs, "direct shear", len(legs)):
+        log.advance(length * along, None if control == "closure" else goal)
+    return log.record()
+
+
+def _series(name: str, value: float | Sequence[float], unit: str) -> Array:
+    """One number or several as a one-dimensional array."""
+    series = np.atleast_1d(numbers(name, value, unit))
+    if series.ndim != 1 or series.size == 0:
+        raise ValueError(f"{name} = {value!r} must be one number ({unit}) or a sequence of them")
+    return series
+
+
+class Normal(NamedTuple):
+    """Normal condition F1 = stress + spring (seat - closure), met to a share of `scale` (Pa)."""
+
+    stress: float
+    scale: float
+    spring: float = 0.0
+    seat: float = 0.0
+
+    def misfit(self, F1: float, closure: float) -> float:
+        """How far F1 (Pa) lies above what the condition asks at this closure (m)."""
+        return F1 - self.stress - self.spring * (self.seat - closure)
+
+
+class _Log:
+    """Rows of a test in progress, and the steps that add them."""
+
+    def __init__(self, joint: Joint, azimuth: float, name: str) -> None:
+        self.joint, self.azimuth, self.name = joint, azimuth, name
+        self.rows: list[list[float]] = []
+        if name == "closure test":
+            self.measure()
+
+    def seat(self, normal: float) -> None:
+        """Bring the joint to the normal stress without shear, and begin the record there."""
+        still = np.zeros(self.joint.law.tables.dim - 1)
+        self.advance(still, Normal(normal, normal))
+
+    def advance(self, shear: Array, goal: Normal | None) -> None:
+        """One step with the in-plane increment `shear` that meets the normal condition."""
+        try:
+            closing = 0.0 if goal is None else self._solve(shear, goal)
+            self.joint.update(np.concatenate([[closing], shear]), tangent=False)
+        except (NonFiniteError, ArithmeticError) as error:
+            raise PathError(
+                f"{self.name} stopped after {len(self.rows)} rows: {error}", self.record()
+            ) from error
+        self.measure()
+
+    def _solve(self, shear: Array, goal: Normal) -> float:
+        """Closure increment at which the normal condition holds: Newton kept inside a bracket."""
+        joint = self.joint
+        here = float(joint.delta[0])
+        size = max(abs(here), float(np.max(np.abs(shear), initial=0.0)))
+        length = reach = size or float(joint.law.closure(goal.scale))
+        u, low, high = 0.0, -math.inf, math.inf
+        for _ in range(200):
+            F, C = joint.trial(np.concatenate([[u], shear]))
+            value = goal.misfit(float(F[0]), here + u)
+            if abs(value) <= TOLERANCE * goal.scale and not (F[0] == 0.0 and value == 0.0):
+                return u
+            low, high = (u, high) if value <= 0 else (low, u)
+            finest = 4e-16 * max(abs(here + u), length)  # what rounding of the closure leaves
+            if high - low <= finest:
+                return high
+            slope = goal.spring + (float(C[0, 0]) if C is not None else 0.0)
+            newton = u - value / slope if slope > 0 else math.nan
+            if math.isinf(low) or math.isinf(high):
+                bound = u + reach if math.isinf(high) else u - reach
+                if not (math.isfinite(newton) and abs(newton - u) < abs(bound - u)):
+                    newton = bound
+                if abs(newton - u) < finest:  # there but for rounding: step across, to bracket it
+                    newton = u + math.copysign(finest, bound - u)
+                reach *= 2.0
+                u = newton
+                continue
+            u = newton if low < newton < high else 0.5 * (low + high)
+        raise ArithmeticError(
+            f"no closure between {here + low:g} and {here + high:g} m gives a normal stress of "
+            f"{goal.stress:g} Pa (spring {goal.spring:g} Pa/m)"
+        )
+
+    def measure(self) -> None:
+        """Add a row from the joint's state."""
+        j = self.joint
+        delta, F = list(j.delta), list(j.F)
+        if len(delta) == 1:
+            delta, F = [*delta, 0.0, 0.0], [*F, 0.0, 0.0]
+        if len(delta) == 2:
+            cos, sin = math.cos(self.azimuth), math.sin(self.azimuth)
+            delta = [delta[0], delta[1] * cos, delta[1] * sin]
+            F = [F[0], F[1] * cos, F[1] * sin]
+        row = [*delta, *F, j.sliding, j.separated, j.stored_energy, j.dissipated_energy]
+        self.rows.append([float(x) for x in row])
+
+    def record(self) -> Record:
+        """The rows so far."""
+        table = np.array(self.rows).reshape(-1, len(UNITS))
+        return Record(dict(zip(UNITS, table.T, strict=True)), self.azimuth, self.name)

@@ -1,0 +1,153 @@
+"""Closed forms of section 3: Tables 1 and 2 for every real a >= 1 and every admissible b and c.
+
+With U = a theta in [0, pi/2], beta = 2/a and the azimuth integrated out, the density of Eq. 14 is
+
+    g0(U) = (1 - b/8) sin U + (3b/8) sin 3U         the count, and
+    g2(U) = (3c/8) (3 sin U - sin 3U)               its share of cos 2 phi,
+
+while sin^2, cos^2 and sin cos of theta are 1, cos and sin of beta U. So every entry of both tables
+is a sum of integrals of sin pU cos beta U and sin pU sin beta U with p = 1 and 3, that is of sin kU
+and cos kU with k = p + beta and p - beta. Written with sinc they have no pole at k = 0 (a = 2).
+
+Stiffnesses are per asperity, C/N, in the unit of kn and ks (N/m). Where an `orientation` is asked
+for, any object with a, b and c serves: `Shape` is one whose a may be infinite.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from ..parameters.orientation import bounded
+from ..support.checks import Array, at_least, number
+
+
+class HasShape(Protocol):
+    """What the closed forms read of an orientation."""
+
+    @property
+    def a(self) -> float: ...
+    @property
+    def b(self) -> float: ...
+    @property
+    def c(self) -> float: ...
+
+
+class Shape(NamedTuple):
+    """a, b and c alone (Eq. 14): `Shape(math.inf)` is the perfectly smooth interface."""
+
+    a: float
+    b: float = 0.0
+    c: float = 0.0
+
+
+def elastic(orientation: HasShape, kn: float, ks: float) -> Array:
+    """Elastic stiffness of the interface: Table 1, which is Eq. 26, for any a, b, c.
+
+    kn, ks: normal and shear stiffness of an asperity (N/m), >= 0.
+    Returns (C11, C22, C33)/N in N/m, shape (3,); the cross terms are zero.
+    Raises ValueError for a negative or non-finite stiffness and outside the bounds of Eq. 18.
+    """
+    kn, ks = at_least("kn", kn, 0.0), at_least("ks", ks, 0.0)
+    m = _moments(_shape(orientation), 0.0)
+    normal = kn * m.cos2 + ks * m.sin2
+    shear = (kn * m.sin2 + ks * (1.0 + m.cos2)) / 2
+    twist = (kn - ks) * m.sin2_twist / 2
+    return np.array([normal, shear + twist, shear - twist])
+
+
+def inelastic(orientation: HasShape, kn: float, ks: float, mu: float) -> Array:
+    """Inelastic stiffness under closure: Table 2, which is Eq. 29, for any a, b, c.
+
+    kn, ks: normal and shear stiffness of an asperity (N/m), >= 0; mu: its friction, >= 0.
+    Returns (C11p, C22p, C33p)/N in N/m, shape (3,); the cross terms are zero. All is zero where no
+    asperity leans beyond the sliding angle of Eq. 30, so at a = infinity for every mu > 0; at
+    mu = 0 the limit is (0, ks (1 + c)/2, ks (1 - c)/2).
+    Raises ValueError for a negative or non-finite number and outside the bounds of Eq. 18.
+    """
+    shape, start = _shape(orientation), sliding_angle(kn, ks, mu)
+    start_U = start * shape.a if start > 0 else 0.0
+    if start_U >= math.pi / 2:
+        return np.zeros(3)
+    m = _moments(shape, start_U)
+    normal = ks * m.sin2 - mu * kn * m.sincos
+    shear = (ks * m.cos2 + mu * kn * m.sincos) / 2
+    twist = (ks * m.cos2_twist + mu * kn * m.sincos_twist) / 2
+    return np.array([normal, shear + twist, shear - twist])
+
+
+def closure_stiffness(orientation: HasShape, kn: float, ks: float, mu: float) -> float:
+    """C11/N = (C11e - C11p)/N of a closing interface, in N/m: Eq. 31 and 32 at mu = 0, for any a.
+
+    Without friction it is kn times the mean of cos^2 theta, whatever ks.
+    """
+    return float(elastic(orientation, kn, ks)[0] - inelastic(orientation, kn, ks, mu)[0])
+
+
+def sliding_angle(kn: float, ks: float, mu: float) -> float:
+    """Inclination in rad beyond which asperities slide in closure: arctan(mu kn/ks), Eq. 30."""
+    kn, ks = at_least("kn", kn, 0.0), at_least("ks", ks, 0.0)
+    return math.atan2(at_least("mu", mu, 0.0) * kn, ks)
+
+
+def shear_stiffness(orientation: HasShape, kn: float, ks: float, azimuth: float) -> float:
+    """Resultant elastic shear stiffness C_s/N in N/m along an azimuth (rad): Eq. 28."""
+    azimuth = number("azimuth", azimuth)
+    _, c22, c33 = elastic(orientation, kn, ks)
+    return math.hypot(c22 * math.cos(azimuth), c33 * math.sin(azimuth))
+
+
+def hertz_mindlin_ratio(nu: float) -> float:
+    """ks/kn of a Hertz-Mindlin contact without slip: 2 (1 - nu)/(2 - nu), Eq. 27.
+
+    nu: Poisson's ratio, 0 to 0.5; the ratio falls from 1 to 2/3.
+    """
+    nu = number("nu", nu)
+    if not 0.0 <= nu <= 0.5:
+        raise ValueError(f"nu = {nu:g} is out of bounds: 0 <= nu <= 0.5")
+    return 2 * (1 - nu) / (2 - nu)
+
+
+def inclination(orientation: HasShape) -> tuple[float, float]:
+    """Mean (rad) and variance (rad^2) of the inclinations, Eq. 17; both 0 at a = infinity."""
+    a, b, _ = _shape(orientation)
+    spread = 36 * math.pi - 108 + (20 - 6 * math.pi) * b - b**2
+    return (6 - b) / (6 * a), spread / (6 * a) ** 2
+
+
+class _Moments(NamedTuple):
+    """Integrals of sin^2, cos^2, sin cos of theta, weighted with g0 and (twist) with g2."""
+
+    sin2: float
+    cos2: float
+    sincos: float
+    sin2_twist: float
+    cos2_twist: float
+    sincos_twist: float
+
+
+def _shape(orientation: HasShape) -> Shape:
+    """a, b and c within their bounds; a may be infinite."""
+    return Shape(*bounded(orientation.a, orientation.b, orientation.c, smooth=True))
+
+
+def _moments(shape: Shape, U0: float) -> _Moments:
+    """The integrals above over theta from U0/a to pi/(2a)."""
+    b, c, beta = shape.b, shape.c, 2.0 / shape.a
+    first, third = _integrals(1.0, beta, U0), _integrals(3.0, beta, U0)
+    values = []
+    for weight_1, weight_3 in ((1 - b / 8, 3 * b / 8), (9 * c / 8, -3 * c / 8)):
+        one, cos, sin = weight_1 * first + weight_3 * third
+        values += [(one - cos) / 2, (one + cos) / 2, sin / 2]
+    return _Moments(*values)
+
+
+def _integrals(p: float, beta: float, U0: float) -> Array:
+    """Integrals of sin pU times 1, cos beta U and sin beta U from U0 to pi/2, shape (3,)."""
+    middle, half = (math.pi / 2 + U0) / 2, (math.pi / 2 - U0) / 2
+    k = np.array([p, p + beta, p - beta])
+    length = 2 * half * np.sinc(k * half / math.pi)
+    sine, cosine = length * np.sin(k * middle), length * np.cos(k * middle)
+    return np.array([sine[0], (sine[1] + sine[2]) / 2, (cosine[2] - cosine[1]) / 2])

@@ -1,0 +1,189 @@
+"""The paper's total form: F = (C^e - C^p) delta, loaded monotonically from zero (Eq. 19-23, 37).
+
+Stateless, and no incremental law: driven around a loop it makes energy. It is here to reproduce the
+paper; joints with memory are `law.joint()`.
+
+For a displacement delta every asperity of normal n carries d_n = n . delta and slides by the rest,
+d_s. It is separated where d_n <= 0 and slides where d_s >= x_s mu lam d_n. Both limits are circles
+about the direction of delta on the sphere of normals, at pi/2 and at arctan(x_s mu lam). So the
+integrals are split there: at each inclination theta the azimuths at which the two circles are
+crossed are known, and so are the inclinations at which the crossings begin and end. On every panel
+between them a Gauss rule, crowded at both ends, sees no kink and no root.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..support.checks import Array, numbers, one_of
+
+if TYPE_CHECKING:
+    from ..law import JointLaw
+    from ..parameters.asperity import Asperity
+    from ..parameters.orientation import Orientation
+
+_THETA_NODES, _PHI_NODES = 32, 24  # per panel: 1e-8 of |C| at worst, 1e-12 as a rule
+
+
+@dataclass(frozen=True)
+class Secant:
+    """Result of the total form.
+
+    F (3,) in Pa, the traction (Ce - Cp) delta; Ce and Cp (3, 3) in Pa/m, the elastic and the
+    inelastic part of Eq. 22 and 23; `sliding` and `separated`, shares of all orientations.
+    """
+
+    F: Array
+    Ce: Array
+    Cp: Array
+    sliding: float
+    separated: float
+
+
+def secant(law: JointLaw, delta: ArrayLike, contact: str = "exact") -> Secant:
+    """Traction and stiffness at the total displacement delta, reached from zero in one direction.
+
+    Reads orientation, asperity, heights (distribution and overlap) and asperity_density of the law.
+    The share of asperities in touch is P(r0 + delta_1) for every orientation (Eq. 37 as printed),
+    so `formation` is not read, nor are resolution, closure_range, plane and critical_slip.
+
+    Parameters
+    ----------
+    delta: (3,) in m: closure, shear along axis 2, shear along axis 3.
+    contact: shear stiffness of an asperity before it slides. "exact" is Eq. 35 (with the exponent
+        1 + eta, so constant at eta = 0), "series" the truncation of Eq. 36, capped: it reaches
+        friction, and slides, at x_s = d_s/(mu lam d_n) = 0.899 for eta = 1/2, before the exact
+        form does at 1. An asperity that slides keeps the K_s at which it began.
+
+    C^e includes the separated asperities and C^p takes them out again, as in Eq. 22 and 23; K_n
+    (Eq. 33) is lam K max(d_n, 0)^eta, so they matter at eta = 0 only. At delta = 0 all are
+    separated.
+
+    Raises ValueError for a wrong shape, a number that is not finite or beyond `law.largest_reach`,
+    an unknown `contact`, or "series" with eta >= 1.
+    """
+    d = numbers("delta", delta, "m")
+    if d.shape != (3,) or not np.isfinite(d).all():
+        raise ValueError(f"delta = {delta!r} must be three finite numbers (m): closure, two shears")
+    if not np.abs(d).sum() <= law.largest_reach:
+        raise ValueError(
+            f"delta = {delta!r} m is out of bounds: its components must add up to no more than "
+            f"law.largest_reach = {law.largest_reach:g} m, beyond which squares of forces overflow"
+        )
+    one_of("contact", contact, ("exact", "series"))
+    asperity = law.asperity
+    limit = 1.0 if contact == "exact" else series_limit(asperity.eta)
+    Ce, Cp = np.zeros((3, 3)), np.zeros((3, 3))
+    shares = np.zeros(3)
+    for theta, phi, weight, zone in _panels(law.orientation, asperity, d, limit):
+        shares += np.bincount(zone, weight, minlength=3)
+        st = np.sin(theta)
+        n = np.array([np.cos(theta), st * np.cos(phi), st * np.sin(phi)])
+        elastic, inelastic = _stiffness(asperity, d, n, zone, limit, contact)
+        Ce += (weight * elastic).sum(-1)
+        Cp += (weight * inelastic).sum(-1)
+    touching = 1.0
+    if law.heights is not None:
+        touching = float(law.heights.cdf(law.heights.overlap + d[0]))
+    scale = law.asperity_density * touching
+    Ce, Cp = scale * Ce, scale * Cp
+    return Secant((Ce - Cp) @ d, Ce, Cp, float(shares[1]), float(shares[2]))
+
+
+def shear_factor(x: ArrayLike, eta: float, contact: str = "exact") -> Array:
+    """K_s lam/K_n at x = d_s/(mu lam d_n), 0 <= x <= 1: Eq. 35, or Eq. 36 for "series".
+
+    Both with the exponent 1 + eta in place of the printed 3/2, which is eta = 1/2.
+    """
+    x = np.asarray(x, float)
+    if contact == "series":
+        factor: Array = (1 + eta) * (1 - eta / 2 * x - eta * (1 - eta) / 6 * x**2)
+        return factor
+    inside = np.clip(x, 1e-12, 1 - 1e-16)
+    exact: Array = -np.expm1((1 + eta) * np.log1p(-inside)) / inside
+    return exact
+
+
+def series_limit(eta: float) -> float:
+    """The x = d_s/(mu lam d_n) at which the series of Eq. 36 reaches friction, f_s = mu f_n.
+
+    0.899 at eta = 1/2; the exact Eq. 35 gets there at 1. Raises ValueError unless 0 <= eta < 1.
+    """
+    if not 0.0 <= eta < 1.0:
+        raise ValueError(f'asperity.eta = {eta:g}: "series" needs 0 <= eta < 1; use "exact"')
+    from scipy.optimize import brentq  # a third of the package's import time
+
+    return float(brentq(lambda x: x * float(shear_factor(x, eta, "series")) - 1, 0.0, 1.0))
+
+
+def _stiffness(
+    asperity: Asperity, d: Array, n: Array, zone: Array, limit: float, contact: str
+) -> tuple[Array, Array]:
+    """K_ij of Eq. 24 and the integrand of Eq. 23, each (3, 3, M), for the normals n (3, M)."""
+    dn = d @ n
+    slip = d[:, None] - dn * n
+    ds = np.sqrt(np.einsum("im,im->m", slip, slip))
+    touch = np.maximum(dn, 0.0)
+    kn = asperity.lam * asperity.K * touch**asperity.eta
+    reach = asperity.mu * asperity.lam * touch
+    x = np.where(zone == 0, np.minimum(ds / np.where(reach > 0, reach, 1.0), limit), limit)
+    ks = kn / asperity.lam * shear_factor(x, asperity.eta, contact)
+    nn = n[:, None] * n[None]
+    K = kn * nn + ks * (np.eye(3)[:, :, None] - nn)
+    tau = slip / np.where(ds > 0, ds, 1.0)  # zeta = -tau: friction opposes the sliding, Eq. 6
+    slide = tau[:, None] * (ks * tau - asperity.mu * kn * n)[None]
+    return K, np.where(zone == 0, 0.0, np.where(zone == 1, slide, K))
+
+
+def _panels(
+    orientation: Orientation, asperity: Asperity, d: Array, limit: float
+) -> Iterator[tuple[Array, Array, Array, Array]]:
+    """theta, phi, weight and zone (0 elastic, 1 sliding, 2 separated) of the nodes, panel-wise."""
+    shear = math.hypot(d[1], d[2])
+    tilt, azimuth = math.atan2(shear, d[0]), math.atan2(d[2], d[1])
+    cone = math.atan(limit * asperity.mu * asperity.lam)
+    circles = (cone, 0.5 * math.pi) if d.any() else (0.0, 0.0)
+    top = 0.5 * math.pi / orientation.a
+    breaks = [tilt]
+    for radius in circles:
+        breaks += [abs(tilt - radius), tilt + radius, 2 * math.pi - tilt - radius]
+    edges = np.unique([0.0, top, *(point for point in breaks if 0.0 < point < top)])
+    x, w = _crowded(_THETA_NODES)
+    y, v = _crowded(_PHI_NODES)
+    for low, high in pairwise(edges):
+        theta = low + (high - low) * x
+        ends = [np.zeros_like(theta), *(_crossing(theta, tilt, r) for r in circles)]
+        ends.append(np.full_like(theta, math.pi))
+        for zone, (start, stop) in enumerate(pairwise(ends)):
+            width = stop - start
+            if not (width > 0).any():
+                continue
+            turn = start[:, None] + width[:, None] * y
+            area = (high - low) * w[:, None] * width[:, None] * v
+            T = np.broadcast_to(theta[:, None], turn.shape)
+            for phi in (azimuth + turn, azimuth - turn):
+                weight = area * orientation.density(T, phi) * np.sin(T)
+                yield T.ravel(), phi.ravel(), weight.ravel(), np.full(T.size, zone)
+
+
+def _crossing(theta: Array, tilt: float, radius: float) -> Array:
+    """Azimuth from delta at which the parallel theta leaves the circle about delta, 0 to pi."""
+    reach = np.sin(theta) * math.sin(tilt)
+    rise = math.cos(radius) - np.cos(theta) * math.cos(tilt)
+    inside = np.where(rise > 0, 0.0, math.pi)
+    cosine = np.clip(rise / np.where(reach > 0, reach, 1.0), -1.0, 1.0)
+    return np.where(reach > 1e-300, np.arccos(cosine), inside)
+
+
+def _crowded(order: int) -> tuple[Array, Array]:
+    """Gauss-Legendre on 0..1 through sin^2: square roots at the ends become smooth."""
+    x, w = np.polynomial.legendre.leggauss(order)
+    angle = 0.25 * math.pi * (x + 1)
+    return np.sin(angle) ** 2, 0.25 * math.pi * w * np.sin(2 * angle)

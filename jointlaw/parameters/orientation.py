@@ -1,0 +1,148 @@
+"""Directions of asperity contacts: the density of Eq. 14 and its quadrature."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..discretisation import nodes
+from ..support.checks import Array, above, at_least, finite, frozen, number
+
+
+@dataclass(frozen=True)
+class Facets:
+    """Quadrature nodes of the orientation density, as arrays over the facets (M,).
+
+    `n`, `s`, `t` (dim, M) are the facet normal and the two in-facet directions of Eq. 25; dim is 3,
+    2 (closure, shear along the plane) for motion in one plane, or 1 for closure alone. `weight`
+    sums to 1.
+    """
+
+    theta: Array
+    phi: Array
+    weight: Array
+    n: Array
+    s: Array
+    t: Array
+
+
+def largest_c(b: float) -> float:
+    """Largest |c| at which the density stays positive, Eq. 18."""
+    return 1 / 3 - b / 6
+
+
+def bounded(a: Any, b: Any, c: Any, *, smooth: bool = False) -> tuple[float, float, float]:
+    """Return a, b and c of Eq. 14 within the bounds of Eq. 18; `smooth` admits an infinite a."""
+    a = at_least("orientation.a", a, 1.0, infinite=smooth)
+    b, c = number("orientation.b", b), number("orientation.c", c)
+    if not -1.0 <= b <= 2.0:
+        raise ValueError(
+            f"orientation.b = {b!r} is out of bounds: -1 <= b <= 2 (Eq. 18), "
+            "or the density turns negative"
+        )
+    bound = largest_c(b)
+    if abs(c) > bound + 1e-12:  # 1e-12 admits the bound itself typed in decimals
+        raise ValueError(
+            f"orientation.c = {c!r} is out of bounds: |c| <= 1/3 - b/6 = {bound:.9g} "
+            "(Eq. 18), or the density turns negative"
+        )
+    return a, b, c
+
+
+@dataclass(frozen=True)
+class Orientation:
+    """Density of asperity contact orientations, Eq. 14.
+
+    Parameters
+    ----------
+    a: extent of the inclinations, theta <= pi/(2a); a >= 1 (dimensionless). Large a is smooth.
+    b: shape within that extent, -1 <= b <= 2; b = 2 crowds the contacts towards the joint normal.
+    c: azimuthal anisotropy, |c| <= 1/3 - b/6; c > 0 makes axis 2 (azimuth 0) the stiffer direction.
+
+    Raises ValueError when a bound of Eq. 18 is broken.
+    """
+
+    a: float
+    b: float = 0.0
+    c: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in zip("abc", bounded(self.a, self.b, self.c), strict=True):
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def from_moments(cls, mean: float, variance: float, c: float = 0.0) -> Orientation:
+        """The a and b that give inclinations of this mean (rad) and variance (rad^2): Eq. 17.
+
+        Where two values of b fit (the variance over the squared mean peaks near b = 1.4), the
+        smaller is taken.
+        """
+        mean = above("mean", mean, 0.0)
+        variance = above("variance", variance, 0.0)
+        # Eq. 17 leaves one quadratic in b: v0 + v1 b - b^2 = ratio (6 - b)^2
+        ratio = variance / mean / mean  # the square of a mean may be no float
+        v0, v1 = 36 * math.pi - 108, 20 - 6 * math.pi
+        roots = np.roots([-1 - ratio, v1 + 12 * ratio, v0 - 36 * ratio] if ratio < 1 else [])
+        for root in sorted(roots[np.abs(roots.imag) < 1e-12].real):
+            b = float(np.clip(root, -1.0, 2.0))
+            if abs(b - root) < 1e-9 and (a := (6 - b) / (6 * mean)) >= 1.0 - 1e-12:
+                return cls(max(a, 1.0), b, c)
+        raise ValueError(
+            f"no density of Eq. 14 has a mean inclination of {mean:g} rad and a variance of "
+            f"{variance:g} rad^2: variance/mean^2 = {ratio:.4g} must give -1 <= b <= 2 and a >= 1 "
+            "(Eq. 17, 18)"
+        )
+
+    @property
+    def mean(self) -> float:
+        """Mean inclination E[theta] in rad, Eq. 17."""
+        return (6 - self.b) / (6 * self.a)
+
+    @property
+    def variance(self) -> float:
+        """Variance of the inclination in rad^2, Eq. 17."""
+        b = self.b
+        return (36 * math.pi - 108 + 20 * b - 6 * b * math.pi - b * b) / (36 * self.a**2)
+
+    def density(self, theta: ArrayLike, phi: ArrayLike = 0.0) -> Any:
+        """Density per solid angle (1/sr) at inclination theta and azimuth phi in rad, Eq. 14."""
+        th, ph = finite("theta", theta, "rad"), finite("phi", phi, "rad")
+        # a sin(a theta)/sin(theta) -> a^2 as theta -> 0, by the ratio of two sinc functions
+        ratio = self.a**2 * np.sinc(self.a * th / np.pi) / np.sinc(th / np.pi)
+        shape = 1 + self.b / 4 * (3 * np.cos(2 * self.a * th) + 1)
+        shape = shape + 3 * self.c * np.sin(self.a * th) ** 2 * np.cos(2 * ph)
+        inside = (th >= 0) & (th <= math.pi / (2 * self.a) * (1 + 1e-15))
+        return np.where(inside, ratio * shape / (2 * math.pi), 0.0)[()]
+
+    def facets(
+        self, u: int, phi: int, plane: float | None = None, closure_only: bool = False
+    ) -> Facets:
+        """Quadrature nodes: the Gauss rule of the density in cos(a theta), midpoints in azimuth.
+
+        `u` nodes in inclination, `phi` on the half circle. With `plane` None the whole circle is
+        covered by 2 phi azimuths; with a plane at that azimuth (rad) the half circle measured from
+        it suffices, c being replaced by c cos(2 plane): mirror images across it share one motion.
+        With `closure_only` all azimuths share one motion, and one stands for them: c sums to zero.
+        """
+        cos_a, share = nodes.inclinations(self.b, u)
+        count = 2 * phi if plane is None else phi
+        c = self.c if plane is None else self.c * math.cos(2 * plane)
+        if closure_only:
+            count, c = 1, 0.0
+        azimuth = (np.arange(count) + 0.5) * (math.pi / phi)
+        U, P = (g.ravel() for g in np.meshgrid(cos_a, azimuth, indexing="ij"))
+        lean = 3 * c * (1 - U**2) / (1 + self.b / 2 * (3 * U**2 - 1))  # no more than 1 by Eq. 18
+        weight = np.repeat(share, count) / count * (1 + lean * np.cos(2 * P))
+        theta = np.arccos(U) / self.a
+        ct, st, cp, sp = np.cos(theta), np.sin(theta), np.cos(P), np.sin(P)
+        zero = np.zeros_like(ct)
+        n = np.array([ct, st * cp, st * sp])
+        s = np.array([-st, ct * cp, ct * sp])
+        t = np.array([zero, -sp, cp])
+        dim = 1 if closure_only else 3 if plane is None else 2
+        arrays = (theta, P, np.maximum(weight, 0.0), n[:dim], s[:dim], t[:dim])
+        return Facets(*frozen(arrays))

@@ -1,0 +1,43 @@
+"""Parameter sets printed in the paper, in SI units, each with its source."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import resources
+from pathlib import Path
+
+from ..law import JointLaw
+
+
+def names() -> list[str]:
+    """Names of all presets."""
+    folder = resources.files(__package__)
+    return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def text(name: str) -> str:
+    """TOML text of a preset. Raises ValueError for an unknown name."""
+    if name not in names():
+        raise ValueError(f"preset {name!r} is unknown; choose one of {', '.join(names())}")
+    return (resources.files(__package__) / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def about(name: str) -> dict[str, str]:
+    """Title, source and assumptions of a preset."""
+    return dict(tomllib.loads(text(name))["about"])
+
+
+def load(name: str) -> JointLaw:
+    """The law of a preset. Raises ValueError for an unknown name."""
+    return JointLaw.from_dict(tomllib.loads(text(name)), f"preset {name!r}")
+
+
+def load_any(name_or_file: str) -> JointLaw:
+    """The law of a preset, or of a TOML file if `name_or_file` names one."""
+    if name_or_file in names():
+        return load(name_or_file)
+    if Path(name_or_file).is_file():
+        return JointLaw.from_toml(Path(name_or_file))
+    raise ValueError(
+        f"{name_or_file!r} is neither a preset ({', '.join(names())}) nor an existing TOML file"
+    )

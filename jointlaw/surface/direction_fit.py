@@ -1,0 +1,189 @@
+"""Eq. 14 through measured facet slopes, the error of the slopes included.
+
+A density that ends at theta = pi/(2a) has no usual likelihood: one noisy facet beyond the end rules
+it out. So the density of gradients is the law's, ring by ring of equal inclination, blurred by the
+error of a measured gradient (sd s in each component; the gradients of a good scan are blurred on
+purpose, by 3 % of the largest, so that the likelihood is smooth in a). In polar coordinates the
+blur of a ring of radius R keeps its azimuthal harmonic h,
+
+    p(r, phi) = r/(2 pi s^2) sum_k w_k exp(-(r - R_k)^2/(2 s^2)) [i0 (1 + b/2 (3u^2 - 1))
+                + i2 3c (1 - u^2) cos 2 phi],   R_k = tan(arccos(u_k)/a),
+
+with ih the exponentially scaled Bessel functions of r R_k/s^2. Facets of one summit are kin, so
+the errors are summed over summits first (sandwich).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize, special
+
+from ..parameters.orientation import largest_c
+from ..support.checks import Array
+
+BLUR = 0.03
+_RADII, _SECTORS = 160, 9
+_X, _W = np.polynomial.legendre.leggauss(96)
+_U, _WEIGHT = 0.5 * (_X + 1), 0.5 * _W
+
+
+class DirectionFit(NamedTuple):
+    """a, b, c, covariance (3, 3), largest difference of the cumulative curves of inclination."""
+
+    a: float
+    b: float
+    c: float
+    covariance: Array
+    distance: float
+    at_bound: bool
+
+
+class _Bins(NamedTuple):
+    """Counts over slope and folded azimuth, and the place of every facet in them."""
+
+    radius: Array  # (bins,) middle of the slope classes
+    width: float
+    counts: Array  # (bins, sectors)
+    place: NDArray[np.intp]  # (n,) flat index
+    blur: float
+    profile: bool
+
+
+def fit_directions(slope: Array, summit: NDArray[np.intp], noise: float) -> DirectionFit:
+    """Fit facet gradients (n, dim), of the summits (n,), with the standard error `noise`."""
+    bins = _count(slope, noise)
+    mean = float(np.mean(np.arctan(np.linalg.norm(slope, axis=-1))))
+    mean *= np.pi / 2 if bins.profile else 1.0  # a profile sees 2/pi of it
+
+    def loss(log_a: float) -> float:
+        return _shape(bins, _components(bins, np.exp(log_a)))[0]
+
+    low, high = max(0.0, np.log(0.5 / mean)), max(0.1, np.log(1.5 / mean))  # Eq. 17 with a margin
+    grid = np.linspace(low, high, 9)
+    start = int(np.argmin([loss(g) for g in grid]))
+    found = optimize.minimize_scalar(
+        loss, bounds=(grid[max(start - 1, 0)], grid[min(start + 1, 8)]), method="bounded",
+        options={"xatol": 1e-4},
+    )  # fmt: skip
+    a = float(np.exp(found.x))
+    _, b, c = _shape(bins, _components(bins, a))
+    x = np.array([a, b, c])
+    covariance = _covariance(bins, x, summit)
+    p = _density(bins, _components(bins, a), b, c).sum(axis=1)
+    model, seen = np.cumsum(p), np.cumsum(bins.counts.sum(axis=1)) / bins.counts.sum()
+    distance = float(np.max(np.abs(model - seen)))
+    bound = largest_c(b)
+    at_bound = b < -0.98 or b > 1.98 or (abs(c) > 0.99 * bound and not bins.profile) or a < 1.001
+    return DirectionFit(a, b, c, covariance, distance, bool(at_bound))
+
+
+def model_inclination(fit: DirectionFit, slope: Array, noise: float) -> tuple[Array, Array, Array]:
+    """Inclination (rad), measured share per class and the share of the fit, for a picture."""
+    bins = _count(slope, noise)
+    p = _density(bins, _components(bins, fit.a), fit.b, fit.c).sum(axis=1)
+    return np.arctan(bins.radius), bins.counts.sum(axis=1) / bins.counts.sum(), p
+
+
+def _count(slope: Array, noise: float) -> _Bins:
+    added = BLUR * float(np.quantile(np.linalg.norm(slope, axis=-1), 0.99))
+    slope = slope + added * np.random.default_rng(0).standard_normal(slope.shape)
+    radius = np.asarray(np.linalg.norm(slope, axis=-1), np.float64)
+    profile = slope.shape[-1] == 1
+    blur = float(np.hypot(noise, added))
+    end = 1.2 * float(radius.max()) + 4 * blur
+    width = end / _RADII
+    i = np.minimum((radius / width).astype(np.intp), _RADII - 1)
+    sectors = 1 if profile else _SECTORS
+    j = np.zeros_like(i)
+    if not profile:
+        azimuth = np.arctan2(np.abs(slope[..., 0]), np.abs(slope[..., 1]))  # cos 2 phi is even
+        j = np.minimum((azimuth / (np.pi / 2) * sectors).astype(np.intp), sectors - 1)
+    place = i * sectors + j
+    counts = np.bincount(place.ravel(), minlength=_RADII * sectors).reshape(_RADII, sectors)
+    middle: Array = (0.5 + np.arange(_RADII, dtype=np.float64)) * float(width)
+    return _Bins(middle, width, counts.astype(float), place, blur, profile)
+
+
+def _components(bins: _Bins, a: float) -> Array:
+    """Probabilities (3, bins, sectors) of the classes that go with 1, b and c."""
+    u, w = _U, _WEIGHT
+    ring = np.tan(np.minimum(np.arccos(u) / a, 1.5))
+    s, r = bins.blur, bins.radius[:, None]
+    weights = np.stack([w, w * (3 * u**2 - 1) / 2, w * 3 * (1 - u**2)])
+    if bins.profile:  # only the slope along the profile is seen: rings are projected on it
+        angle = (np.arange(16) + 0.5) * np.pi / 32
+        seen = ring[:, None] * np.cos(angle)  # (rings, 16)
+        bell = sum(
+            np.exp(-0.5 * ((r[..., None] - side * seen) / s) ** 2).mean(axis=-1) for side in (1, -1)
+        )
+        part = np.asarray(bell) @ weights[:2].T * (bins.width / (s * np.sqrt(2 * np.pi)))
+        return np.stack([part[:, 0], part[:, 1], np.zeros(_RADII)])[:, :, None]
+    z = r * ring / s**2
+    bell = r / s**2 * np.exp(-0.5 * ((r - ring) / s) ** 2) * bins.width
+    mean = (bell * special.ive(0, z)) @ weights[:2].T
+    second = (bell * special.ive(2, z)) @ weights[2]
+    edge = np.linspace(0, np.pi / 2, _SECTORS + 1)
+    harmonic = np.diff(np.sin(2 * edge)) / 2 / (np.pi / 2)  # cos 2 phi over a sector
+    flat = np.full(_SECTORS, 1 / _SECTORS)
+    return np.stack(
+        [np.outer(mean[:, 0], flat), np.outer(mean[:, 1], flat), np.outer(second, harmonic)]
+    )
+
+
+def _density(bins: _Bins, parts: Array, b: float, c: float) -> Array:
+    p: Array = np.maximum(parts[0] + b * parts[1] + c * parts[2], 1e-14)
+    return p
+
+
+def _shape(bins: _Bins, parts: Array) -> tuple[float, float, float]:
+    """Least negative log-likelihood at this a, with its b and c (within Eq. 18)."""
+    full = bins.counts > 0
+    n, (p0, p1, p2) = bins.counts[full], parts[:, full]
+
+    b, c = 0.0, 0.0
+    for _ in range(60):  # Newton on a concave likelihood
+        p = np.maximum(p0 + b * p1 + c * p2, 1e-14)
+        q1, q2 = p1 / p, p2 / p
+        g = np.array([n @ q1, n @ q2])
+        H = np.array([[n @ q1**2, n @ (q1 * q2)], [n @ (q1 * q2), n @ q2**2]])
+        step = np.array([g[0] / H[0, 0], 0.0]) if bins.profile else np.linalg.solve(H, g)
+        at = _inside(b + step[0], c + step[1])
+        moved = max(abs(at[0] - b), abs(at[1] - c))
+        b, c = at
+        if moved < 1e-7:
+            break
+    p = np.maximum(p0 + b * p1 + c * p2, 1e-14)
+    return -float(n @ np.log(p)), b, c
+
+
+def _inside(b: float, c: float) -> tuple[float, float]:
+    """The nearest b and c that Eq. 18 allows."""
+    b = float(min(max(b, -1.0), 2.0))
+    bound = largest_c(b)
+    return b, float(min(max(c, -bound), bound))
+
+
+def _covariance(bins: _Bins, x: Array, summit: NDArray[np.intp]) -> Array:
+    """Sandwich covariance of a, b, c; c of a profile has none."""
+    p = _density(bins, _components(bins, x[0]), x[1], x[2])
+    scores = []
+    for k, step in enumerate((1e-3 * x[0], 1e-3, 1e-3)):
+        up, down = x.copy(), x.copy()
+        up[k], down[k] = x[k] + step, x[k] - step
+        high = _density(bins, _components(bins, up[0]), up[1], up[2])
+        low = _density(bins, _components(bins, down[0]), down[1], down[2])
+        scores.append((np.log(high) - np.log(low)) / (2 * step))
+    score = np.stack(scores, -1)  # (bins, sectors, 3)
+    free = 2 if bins.profile else 3
+    score = score[..., :free]
+    information = bins.counts.sum() * np.einsum("ij,ijk,ijl->kl", p, score, score)
+    per_summit = np.zeros((int(summit.max()) + 1, free))
+    np.add.at(per_summit, summit, score.reshape(-1, free)[bins.place])
+    meat = per_summit.T @ per_summit
+    bread = np.linalg.pinv(information, hermitian=True)
+    covariance = np.zeros((3, 3))
+    covariance[:free, :free] = bread @ meat @ bread
+    return covariance

@@ -81,6 +81,8 @@ def worst(one, other, peak):
 def test_the_compiled_block_is_the_one_that_states_come_in():
     """It is a constant of the kernel's own file: changed elsewhere it leaves old machine code."""
 
+    from jointlaw.kernels import compiled
+
     assert compiled.LANES == engine.LANES
 
 

@@ -41,6 +41,11 @@ class Curve(NamedTuple):
     error: float  # largest error of S seen between the nodes
     rise: float = 0.0  # p: S and T are tabulated over w^p
 
+    @property
+    def linear(self) -> bool:
+        """Whether one linear spring that touches at once is all: eta = 0, no heights."""
+        return self.eta == 0.0 and len(self.S) == 1
+
     def force(self, y: Array) -> tuple[Array, Array]:
         """Phi and its slope Phi' at y (m); both zero where y <= 0."""
         x, i, _, _ = self._cell(y)

@@ -19,6 +19,11 @@ from .state import JointState, NonFiniteError, write_replay
 
 Index = Sequence[int] | NDArray[np.integer[Any]] | NDArray[np.bool_]
 Out = tuple[Array, Array | None]
+COMPONENTS = {  # of a displacement, by their number, and how to have more
+    1: "closure; for shear take a law without closure_only",
+    2: "closure and shear along the plane; for motion in 3-D take a law with plane=None",
+    3: "closure and shear along axes 2 and 3",
+}
 FEW = 8  # numbers of an increment up to which Python looks at them faster than numpy
 
 
@@ -112,7 +117,7 @@ class JointBatch:
     ) -> Out:
         index = None if where is None else self._index(where)
         m, dim = self._n if index is None else len(index), self.law.tables.dim
-        values = increments(d, (m, dim), "joints, " + components(dim))
+        values = increments(d, (m, dim))
         if out is None:
             F, C = np.empty((m, dim)), np.empty((m, dim, dim)) if tangent else None
         else:
@@ -299,21 +304,15 @@ class JointBatch:
         return bound
 
 
-def increments(d: ArrayLike, shape: tuple[int, ...], what: str) -> Array:
-    """Increments of this shape, in m; `what` says what its axes are and how to have more."""
+def increments(d: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """Increments of this shape, (dim,) or (joints, dim), in m."""
     values = numbers("d", d, "m")
     if values.shape != shape:
-        raise ValueError(f"d has shape {values.shape}; expected {shape}: {what}")
+        joints = "joints, " if len(shape) == 2 else ""
+        raise ValueError(
+            f"d has shape {values.shape}; expected {shape}: {joints}{COMPONENTS[shape[-1]]}"
+        )
     return values
-
-
-def components(dim: int) -> str:
-    """What a displacement of so many components is made of, and how to have more."""
-    return {
-        1: "closure; for shear take a law without closure_only",
-        2: "closure and shear along the plane; for motion in 3-D take a law with plane=None",
-        3: "closure and shear along axes 2 and 3",
-    }[dim]
 
 
 def _require_out(out: Out, m: int, dim: int, tangent: bool) -> Out:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ..kernels.engine import Step
 from ..kernels.reference import Measures
 from ..support.checks import Array
-from .batch import JointBatch, Law, components, increments
+from .batch import JointBatch, Law, increments
 from .state import JointState
 
 
@@ -20,7 +20,8 @@ class Joint:
     def __init__(self, law: Law) -> None:
         self.law = law
         self._batch = JointBatch(law, 1)
-        self._dim = law.tables.dim
+        dim = law.tables.dim
+        self._shape, self._shape_F, self._shape_C = (dim,), (1, dim), (1, dim, dim)
 
     def __copy__(self) -> Joint:
         twin = Joint(self.law)
@@ -39,9 +40,8 @@ class Joint:
         return self._step(d, tangent, keep=False)
 
     def _step(self, d: ArrayLike, tangent: bool, keep: bool) -> tuple[Array, Array | None]:
-        dim = self._dim
-        values = increments(d, (dim,), components(dim))[None].copy()  # the caller's may be strided
-        F, C = np.empty((1, dim)), np.empty((1, dim, dim)) if tangent else None
+        values = increments(d, self._shape)[None].copy()  # the caller's may be strided
+        F, C = np.empty(self._shape_F), np.empty(self._shape_C) if tangent else None
         self._batch.take(Step(values, F, C, None, keep))
         return F[0], None if C is None else C[0]
 

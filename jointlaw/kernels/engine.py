@@ -122,7 +122,12 @@ class NumbaEngine:
 
         self._kernel, self._sliders = compiled, tables.sliders
         self.rows = compiled.block_rows(tables)
-        self._law = tuple(compiled.pack(tables))
+        self._law = law = tuple(compiled.pack(tables))
+        self._with = {  # ledger, tangent: True or None, for which the compiler leaves the code out
+            (ledger, tangent): (*law, ledger or None, tangent or None)
+            for ledger in (False, True)
+            for tangent in (False, True)
+        }
         self._energy = tables.curve.T.ravel().copy()
         self._all = np.empty(0, np.intp)
         self._none = np.empty((0, tables.dim, tables.dim))
@@ -132,9 +137,7 @@ class NumbaEngine:
         d, F, C, where, keep = step
         given = (state, d, F, self._none if C is None else C,
                  self._all if where is None else where, keep)  # fmt: skip
-        # True or None: for None the compiler leaves the code out
-        wanted = (True if ledger else None, None if C is None else True)
-        self._run(self._kernel.advance, len(d), given, (*self._law, *wanted))
+        self._run(self._kernel.advance, len(d), given, self._with[ledger, C is not None])
 
     def refresh(self, state: Array, n: int) -> None:
         """As `Engine.refresh`."""
@@ -159,10 +162,14 @@ class NumbaEngine:
 
     def _work(self) -> tuple[Any, ...]:
         """Working space of the thread that asks: one for all laws, as large as any has needed."""
-        space: tuple[Any, ...] | None = getattr(_spaces, "work", None)
-        if space is None or len(space[0]) < self.rows:
-            space = _spaces.work = self._kernel.new_work(self.rows)
+        space: tuple[Any, ...] = _space.work
+        if len(space) == 0 or len(space[0]) < self.rows:
+            space = _space.work = self._kernel.new_work(self.rows)
         return space
 
 
-_spaces = threading.local()
+class _Space(threading.local):
+    work: tuple[Any, ...] = ()
+
+
+_space = _Space()

@@ -32,9 +32,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
-from ..discretisation.tables import Tables
-from ..joints.batch import JointBatch
-from ..parameters.asperity import Asperity
+from ..joints import batch as joints
 from ..parameters.heights import HeightDistribution
 from ..parameters.orientation import Orientation
 from ..parameters.resolution import Resolution
@@ -44,7 +42,7 @@ from ..support.progress import track
 STEPS = 120  # of each path
 
 
-class Law(Protocol):
+class Law(joints.Law, Protocol):
     """What is read of a law whose accuracy is measured; `replace` gives it other resolutions."""
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
@@ -53,22 +51,13 @@ class Law(Protocol):
     @property
     def orientation(self) -> Orientation: ...
     @property
-    def asperity(self) -> Asperity: ...
-    @property
     def heights(self) -> HeightDistribution | None: ...
     @property
     def closure_range(self) -> float: ...
     @property
     def resolution(self) -> Resolution: ...
-    @property
-    def plane(self) -> float | None: ...
-    @property
-    def closure_only(self) -> bool: ...
-    @property
-    def tables(self) -> Tables: ...
     def normal_stress(self, closure: ArrayLike) -> Any: ...
-    def closure(self, normal_stress: ArrayLike) -> Any: ...
-    def joints(self, n: int, ledger: bool = True) -> JointBatch: ...
+    def joints(self, n: int, ledger: bool = True) -> joints.JointBatch: ...
 
 
 def reference_resolution(law: Law) -> Resolution:

@@ -10,7 +10,7 @@ from ..parameters.asperity import Asperity
 from ..support.checks import Array, frozen
 from .facets import Facets
 from .nodes import depth_nodes
-from .virgin_curve import Curve
+from .virgin_curve import VirginCurve
 
 UNDERFLOW = 1e-140  # m, and Pa/m: counts as zero, for powers and squares below it underflow
 VERSION = 1  # of the discretisation: a change of nodes or state changes it, old states are refused
@@ -26,7 +26,7 @@ class Tables:
     cell limits zeta with the virgin force and slope there (slope 0 at the first by definition).
     """
 
-    curve: Curve
+    curve: VirginCurve
     n: Array
     m: Array
     s: Array
@@ -64,7 +64,7 @@ class Tables:
 
 def tables(
     facets: Facets,
-    curve: Curve,
+    curve: VirginCurve,
     asperity: Asperity,
     asperity_density: float,
     closure_range: float,
@@ -85,7 +85,7 @@ def tables(
     return Tables(curve, *frozen(arrays), asperity.lam, asperity.mu, critical_slip)
 
 
-def largest_reach(curve: Curve, scale: Array, theta: Array, asperity: Asperity) -> float:
+def largest_reach(curve: VirginCurve, scale: Array, theta: Array, asperity: Asperity) -> float:
     """Effective closure (m) up to which forces, energies and their squares stay finite.
 
     scale, theta: A and inclination of every facet (M,).

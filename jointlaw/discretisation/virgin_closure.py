@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..support.checks import Array
-from .virgin_curve import Curve
+from .virgin_curve import VirginCurve
 
 _SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
 
@@ -17,7 +17,7 @@ _SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
 class VirginClosure(NamedTuple):
     """F1 = factor Phi(closure): the virgin curve summed over the facets, `facet_sum`."""
 
-    curve: Curve
+    curve: VirginCurve
     factor: float
 
     def stress(self, closure: Array) -> Array:

@@ -311,16 +311,19 @@ def _slide(scratch, qs, qt, L, law, f, i, ledger, tangent):
             bend = a * (0.5 * c if near else bend)
             fade = c / (k1 if k1 > TINY else 1.0)
             fade = fade if k1 > TINY else 0.0
-            ws = bend * des if grows else fade * ts
-            wt = bend * det if grows else fade * tt
+            # exactly as in the reference where rounding would decide
+            stiffer = grows & (dy > ROUNDED * abs(y1))
+            limited = size >= strength * (G1 * (1.0 - LIMIT) - ROUNDED * f1)
+            ws = bend * des if stiffer else fade * ts
+            wt = bend * det if stiffer else fade * tt
             unit = 1.0 / (size if size > 0.0 else 1.0)
             us, ut = ts * unit, tt * unit
             dot = us * ws + ut * wt
             push = strength * k1
-            scratch[_VS + l] += share * (ws - us * dot) + push * us if slips else ws
-            scratch[_VT + l] += share * (wt - ut * dot) + push * ut if slips else wt
-            beta = share * add
-            sliding = beta if slips else 0.0
+            scratch[_VS + l] += share * (ws - us * dot) + push * us if limited else ws
+            scratch[_VT + l] += share * (wt - ut * dot) + push * ut if limited else wt
+            beta = share * add if cap > 0.0 else 0.0
+            sliding = beta if limited else 0.0
             scratch[_BSS + l] += beta - sliding * us * us
             scratch[_BST + l] -= sliding * us * ut
             scratch[_BTT + l] += beta - sliding * ut * ut

@@ -21,7 +21,7 @@ from ..support.checks import Array
 NEAR = 1e-5  # of y: below such a change of y the chord of G is lost in rounding, the mean is not
 GRAZING = 1e-12  # cosine at which the offset meets its limit: its derivative has a pole at 0
 LIMIT = 1e-9  # of the friction limit: a slider this close is at it, less the rounding of q
-ROUNDED = 1e-12  # of Phi: as much may be lost in a G next to a node
+ROUNDED = 1e-12  # of Phi and of y: as much may be lost in a G next to a node, and in dy
 TINY = 1e-290  # a stiffness whose reciprocal might overflow, or a square that underflows: zero
 
 
@@ -160,6 +160,13 @@ def strength(k: Tables) -> Array:
     return k.mu * k.lam * k.area[:, None, None]
 
 
+def at_limit(k: Tables, now: Cells, size: Array) -> Flags:
+    """Whether sliders whose |q| is `size` are at their friction limit, but for rounding."""
+    limit = strength(k) * (now.G * (1 - LIMIT) - ROUNDED * now.force[:, None])
+    flags: Flags = size >= limit
+    return flags
+
+
 def compliance(k: Tables) -> Array:
     """c1/(2 A lam) per facet (M, 1, 1): turns |q|^2/kappa into energy; 0 for an empty facet."""
     scale = 2 * k.area * k.lam
@@ -240,10 +247,12 @@ def stiffness(
     p = np.where(inside, k.curve.curvature(y)[:, None], 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         chord_slope = np.where(sliders.near, p / 2, (kappa - chord) / (y - before.y)[:, None])
-    v = np.where(grows, a * chord_slope * de, p * reciprocal(kappa) * trial)
-    beta = np.where(kappa > 0, a * np.where(grows, chord, kappa), 0.0)
+    # where rounding would decide: what did not close has not grown, what is at its limit slips
+    stiffer = grows & ((y - before.y) > ROUNDED * np.abs(y))[:, None]
+    slips = at_limit(k, after, size)
+    v = np.where(stiffer, a * chord_slope * de, p * reciprocal(kappa) * trial)
+    beta = np.where(sliders.cap > 0, a * np.where(grows, chord, kappa), 0.0)
     unit = np.divide(trial, size, out=np.zeros_like(trial), where=size > 0)
-    slips = size > sliders.cap
     v = np.where(slips, share * (v - unit * np.sum(unit * v, axis=0)), v)
     v = v + np.where(slips, strength(k) * kappa * unit, 0.0)
     beta = np.where(slips, share * beta, beta)
@@ -284,7 +293,7 @@ def measures(k: Tables, state: Array) -> Measures:
     now = cells(k, effective_closure(k, state_now.delta[0], state_now.offset))
     y, force, G = now.y, now.force, now.G
     q2 = state_now.q[0] ** 2 + state_now.q[1] ** 2
-    capped = np.sqrt(q2) >= strength(k) * (G * (1 - LIMIT) - ROUNDED * force[:, None])
+    capped = at_limit(k, now, np.sqrt(q2))
     weight = (k.weight / k.weight.sum())[:, None]
     touches = y > 0
     sliding = np.sum(weight * (touches & np.all(capped, axis=1)), axis=0)

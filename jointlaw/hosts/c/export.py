@@ -14,7 +14,7 @@ from ...law import JointLaw
 from ...support.checks import Array
 from ...support.files import replace_file
 
-LANES = 4  # facets side by side, as in jointlaw.h
+LANES = 16  # facets side by side, as in jointlaw.h
 FORMAT = 1  # of table files: a change of their keywords or columns changes it
 FILES = ("jointlaw.h", "example.c", "example.cpp", "Makefile", "README.md")
 _MODEL = "granite"  # the name of the tables in these files
@@ -63,7 +63,7 @@ def table_text(law: JointLaw) -> str:
         lines.append(f"{key} {value if isinstance(value, int) else value.hex()}")
     for key, array in arrays.items():
         lines.append(key)
-        lines += [" ".join(map(float.hex, row.tolist())) for row in array.reshape(-1, LANES)]
+        lines += [" ".join(map(float.hex, row.tolist())) for row in array.reshape(-1, 4)]
     text = "\n".join([*lines, ""])
     return f"{text}sum {_sum(text.encode()):016x}\n"
 
@@ -80,7 +80,7 @@ def header_text(law: JointLaw, name: str) -> str:
         f'#error "{name}.h is of format {FORMAT}, jointlaw.h of another: export both anew"\n#endif',
     ]
     for key, array in arrays.items():
-        rows = ",\n".join(", ".join(map(repr, row.tolist())) for row in array.reshape(-1, LANES))
+        rows = ",\n".join(", ".join(map(repr, row.tolist())) for row in array.reshape(-1, 4))
         parts.append(f"static const double {name}_{key}[{array.size}] = {{\n{rows}}};")
     values = ", ".join(map(repr, scalars.values()))
     tables = ", ".join(f"{name}_{key}" for key in arrays)
@@ -111,14 +111,14 @@ def _scalars(law: JointLaw) -> dict[str, int | float]:
 
 
 def _arrays(law: JointLaw) -> dict[str, Array]:
-    """The arrays of `struct jlaw_law`, LANES facets side by side, the last one repeated."""
+    """The arrays of `struct jlaw_law`, LANES facets side by side, zeros beyond the last one."""
     k = law.tables
     M = len(k.c1)
-    lanes = np.minimum(np.arange(-(-M // LANES) * LANES), M - 1)
-    real = np.arange(len(lanes)) < M
 
     def blocks(columns: Array) -> Array:  # (M, ...) -> (blocks, ..., LANES)
-        return np.moveaxis(columns.reshape(-1, LANES, *columns.shape[1:]), 1, -1)
+        full = np.zeros((-(-M // LANES), LANES, *columns.shape[1:]))
+        full.reshape(-1, *columns.shape[1:])[:M] = columns
+        return np.moveaxis(full, 1, -1)
 
     facet = np.zeros((M, 20))
     for first, rows in ((0, k.m), (3, k.s), (6, k.t), (9, k.n)):
@@ -130,13 +130,11 @@ def _arrays(law: JointLaw) -> dict[str, Array]:
         ],
         axis=-1,
     )  # fmt: skip
-    facet = facet[lanes]
-    facet[~real, 12] = facet[~real, 15:19] = 0.0  # no force, no energy, no share
     largest = sys.float_info.max
     depth = np.minimum(np.stack([k.depth, k.depth_force, k.depth_slope], axis=-1), largest)
     return {
         "facet": blocks(facet),
-        "depth": blocks(depth[lanes]),
+        "depth": blocks(depth),
         "curve": k.curve.S,
         "energy": k.curve.T,
     }

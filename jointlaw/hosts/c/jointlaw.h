@@ -75,7 +75,7 @@ const char *jlaw_fingerprint(const jlaw_law *law);
 /* The tables, for files NAME.h; not for the host. LANES facets lie side by side in a block. */
 #define JLAW_FORMAT 1 /* of table files */
 enum {
-  JLAW_LANES = 4,
+  JLAW_LANES = 16,
   JLAW_M = 0, JLAW_S = 3, JLAW_T = 6, JLAW_N = 9, /* m = n/c1, s, t, n: 3 columns each */
   JLAW_A = 12, JLAW_STIFF = 13,    /* A; A/c1 */
   JLAW_STRENGTH = 14,              /* mu lam A */
@@ -91,7 +91,7 @@ struct jlaw_law {
   double eta, scale, rise;                  /* of the virgin curve */
   double closure_factor, stiffness_factor;  /* normal stress over Phi, bound of |C| over Phi' */
   double largest_reach, stretch;            /* m; bound of |y| over that of the displacement */
-  const double *facet;  /* (blocks, JLAW_COLUMNS, LANES); the last facet repeated, without weight */
+  const double *facet;  /* (blocks, JLAW_COLUMNS, LANES); zeros beyond the last facet */
   const double *depth;  /* (blocks, cells + 1, 3, LANES): zeta, and Phi and Phi' there */
   const double *curve;  /* (pieces, 4): S of the virgin curve */
   const double *energy; /* (pieces, 4): T */
@@ -129,9 +129,9 @@ extern "C" {
 #define JLAW_INLINE static inline
 #endif
 #if defined(__GNUC__) && !defined(__clang__)
-#define JLAW_EACH _Pragma("GCC ivdep") for (int l = 0; l < JLAW_LANES; l++)
+#define JLAW_EACH(n) _Pragma("GCC ivdep") for (int l = 0; l < (n); l++)
 #else
-#define JLAW_EACH for (int l = 0; l < JLAW_LANES; l++)
+#define JLAW_EACH(n) for (int l = 0; l < (n); l++)
 #endif
 #define JLAW_W(column) w[(column) * JLAW_LANES + l] /* of the facets w, lane l */
 #if defined(__x86_64__) && defined(__gnu_linux__) && defined(__OPTIMIZE__) && !defined(__AVX2__) \
@@ -191,13 +191,13 @@ static void jlaw_say_number_(jlaw_text_ *text, double x)
 /* -------------------------------------------------------------- virgin curve */
 
 /* Phi and Phi' at y, and Phi'' if asked; zero where y <= 0. What counts as zero becomes zero. */
-JLAW_INLINE void jlaw_virgin_(const jlaw_law *law, double *y, double *force, double *slope,
-                              double *bend)
+JLAW_INLINE void jlaw_virgin_(const jlaw_law *law, int n, double *y, double *force,
+                              double *slope, double *bend)
 {
   jlaw_lanes_ x, v, ts, c0, c1, c2, c3, power;
   int at[JLAW_LANES];
   const double pieces = law->pieces, top = pieces - 1.0, scale = law->scale, eta = law->eta;
-  JLAW_EACH {
+  JLAW_EACH(n) {
     const double here = fabs(y[l]) >= JLAW_UNDERFLOW ? y[l] : 0.0;
     const double root = sqrt(here > 0.0 ? here : 0.0), r = 1.0 / (root + scale);
     const double place = root * r * pieces;
@@ -207,25 +207,25 @@ JLAW_INLINE void jlaw_virgin_(const jlaw_law *law, double *y, double *force, dou
     v[l] = root;
     ts[l] = root * r * r * scale; /* t (1 - t) */
   }
-  for (int l = 0; l < JLAW_LANES; l++) {
+  JLAW_EACH(n) {
     const double *c = law->curve + 4 * at[l];
     c0[l] = c[0], c1[l] = c[1], c2[l] = c[2], c3[l] = c[3];
   }
-  if (eta == 0.5) JLAW_EACH power[l] = v[l];
-  else if (eta == 0.0) JLAW_EACH power[l] = v[l] > 0.0 ? 1.0 : 0.0;
-  else for (int l = 0; l < JLAW_LANES; l++) power[l] = v[l] > 0.0 ? pow(y[l], eta) : 0.0;
+  if (eta == 0.5) JLAW_EACH(n) power[l] = v[l];
+  else if (eta == 0.0) JLAW_EACH(n) power[l] = v[l] > 0.0 ? 1.0 : 0.0;
+  else for (int l = 0; l < n; l++) power[l] = v[l] > 0.0 ? pow(y[l], eta) : 0.0;
   jlaw_lanes_ S, DS, DDS;
-  JLAW_EACH {
+  JLAW_EACH(n) {
     S[l] = c0[l] + x[l] * (c1[l] + x[l] * (c2[l] + x[l] * c3[l]));
     DS[l] = 0.5 * ts[l] * (pieces * (c1[l] + x[l] * (2.0 * c2[l] + x[l] * (3.0 * c3[l]))));
   }
-  if (bend) JLAW_EACH {
+  if (bend) JLAW_EACH(n) {
     const double S2 = pieces * pieces * (2.0 * c2[l] + x[l] * (6.0 * c3[l]));
     DDS[l] = 0.25 * ts[l] * ts[l] * S2 + 0.5 * (scale - v[l]) / (scale + v[l]) * DS[l];
   }
   if (law->rise > 0.0) { /* S is tabulated over w^rise */
     const double W = scale * scale;
-    for (int l = 0; l < JLAW_LANES; l++) {
+    for (int l = 0; l < n; l++) {
       const double here = y[l] > 0.0 ? y[l] : 0.0, w = here / (here + W);
       const double more = law->rise * W / (here + W), lift = pow(w, law->rise);
       if (bend) DDS[l] = lift * (DDS[l] + 2.0 * more * DS[l] + (more * more - more * w) * S[l]);
@@ -233,11 +233,11 @@ JLAW_INLINE void jlaw_virgin_(const jlaw_law *law, double *y, double *force, dou
       S[l] = lift * S[l];
     }
   }
-  JLAW_EACH {
+  JLAW_EACH(n) {
     force[l] = power[l] * (y[l] > 0.0 ? y[l] : 0.0) * S[l];
     slope[l] = power[l] * ((1.0 + eta) * S[l] + DS[l]);
   }
-  if (bend) JLAW_EACH {
+  if (bend) JLAW_EACH(n) {
     const double all = eta * (1.0 + eta) * S[l] + (1.0 + 2.0 * eta) * DS[l] + DDS[l];
     bend[l] = power[l] / (y[l] > 0.0 ? y[l] : 1.0) * all;
   }
@@ -306,16 +306,18 @@ static void jlaw_limit_offset_(const jlaw_law *law, jlaw_move_ *m)
 }
 
 /* Share of a depth cell in Phi, and its slope: the bed beyond its lower limit less that beyond its
- * upper. z: zeta, Phi, Phi' at both limits. */
-JLAW_INLINE void jlaw_cell_(double y, double force, double slope, const double *z, int ended,
+ * upper, which for the last cell is never reached. z: zeta, Phi, Phi' at both limits. */
+JLAW_INLINE void jlaw_cell_(double y, double force, double slope, const double *z,
                             double *G, double *kappa)
 {
-  const double low = y - z[0], high = y - z[3 * JLAW_LANES];
-  double g = force - z[JLAW_LANES] - z[2 * JLAW_LANES] * low, k = slope - z[2 * JLAW_LANES];
-  if (ended) {
-    g -= high > 0.0 ? force - z[4 * JLAW_LANES] - z[5 * JLAW_LANES] * high : 0.0;
-    k = high > 0.0 ? z[5 * JLAW_LANES] - z[2 * JLAW_LANES] : k;
-  }
+  enum { NEXT = 3 * JLAW_LANES };
+  const double from = z[0], force0 = z[JLAW_LANES], slope0 = z[2 * JLAW_LANES];
+  const double to = z[NEXT], force1 = z[NEXT + JLAW_LANES], slope1 = z[NEXT + 2 * JLAW_LANES];
+  const double low = y - from, high = y - to;
+  const double past = force - force1 - slope1 * high;
+  double g = force - force0 - slope0 * low, k = slope - slope0;
+  g = high > 0.0 ? g - past : g;
+  k = high > 0.0 ? slope1 - slope0 : k;
   k = ((low > 0.0) & (k > 0.0)) ? k : 0.0;
   const double most = k * low;
   g = g < most ? g : most;
@@ -325,13 +327,13 @@ JLAW_INLINE void jlaw_cell_(double y, double force, double slope, const double *
 
 /* One depth cell of a block of facets: load, friction limit, loss, tangent. q holds the sliders
  * of the cell before and after. */
-JLAW_INLINE void jlaw_slide_(const double *w, const double *z, int ended, jlaw_block_ *b,
+JLAW_INLINE void jlaw_slide_(const double *w, const double *z, int n, jlaw_block_ *b,
                              jlaw_lanes_ q[2], jlaw_sum_ *sum, int ledger, int tangent)
 {
-  JLAW_EACH {
+  JLAW_EACH(n) {
     double G0, G1, k0, k1;
-    jlaw_cell_(b->y0[l], b->f0[l], b->k0[l], z + l, ended, &G0, &k0);
-    jlaw_cell_(b->y1[l], b->f1[l], b->k1[l], z + l, ended, &G1, &k1);
+    jlaw_cell_(b->y0[l], b->f0[l], b->k0[l], z + l, &G0, &k0);
+    jlaw_cell_(b->y1[l], b->f1[l], b->k1[l], z + l, &G1, &k1);
     /* trial force: by the chord where stiffness grows, scaled down where it falls */
     const double a = JLAW_W(JLAW_STIFF), dy = b->y1[l] - b->y0[l];
     const int grows = k1 > k0, near = fabs(dy) <= JLAW_NEAR * fabs(b->y1[l]);
@@ -362,7 +364,7 @@ JLAW_INLINE void jlaw_slide_(const double *w, const double *z, int ended, jlaw_b
     }
     if (tangent) { /* "The tangent": J_q = beta (I - s s^T) E + v g^T */
       const double y = b->y1[l], low = y - z[l], high = y - z[3 * JLAW_LANES + l];
-      const double bend = ((low > 0.0) & ((high < 0.0) | !ended)) ? b->bend[l] : 0.0;
+      const double curving = b->bend[l], bend = ((low > 0.0) & (high < 0.0)) ? curving : 0.0;
       const double chord1 = near ? 0.5 * bend : (k1 - chord) / (near ? 1.0 : dy);
       const double fade = k1 > JLAW_TINY ? bend / (k1 > JLAW_TINY ? k1 : 1.0) : 0.0;
       /* exactly at its limit a slider slips, and exactly as stiff as before a cell has not grown */
@@ -383,12 +385,12 @@ JLAW_INLINE void jlaw_slide_(const double *w, const double *z, int ended, jlaw_b
 }
 
 /* C += along g^T + E^T B E of a block of facets */
-JLAW_INLINE void jlaw_add_tangent_(const double *w, const jlaw_move_ *m, const jlaw_block_ *b,
+JLAW_INLINE void jlaw_add_tangent_(const double *w, int n, const jlaw_move_ *m, const jlaw_block_ *b,
                                    jlaw_sum_ *sum, int dim)
 {
   for (int i = 0; i < dim; i++)
     for (int j = 0; j < dim; j++)
-      JLAW_EACH {
+      JLAW_EACH(n) {
         const double soft = JLAW_W(JLAW_SOFT), A = JLAW_W(JLAW_A);
         const double si = JLAW_W(JLAW_S + i), ti = JLAW_W(JLAW_T + i);
         const double sj = JLAW_W(JLAW_S + j), tj = JLAW_W(JLAW_T + j);
@@ -406,11 +408,13 @@ JLAW_INLINE void jlaw_facets_(const jlaw_law *law, int block, const jlaw_move_ *
                               double *q1, jlaw_sum_ *sum, int dim, int ledger, int tangent)
 {
   const double *w = law->facet + (size_t) block * JLAW_COLUMNS * JLAW_LANES;
-  const int D = law->cells, last = law->facets - 1;
+  const int D = law->cells, first = block * JLAW_LANES;
+  const int real = law->facets - first < JLAW_LANES ? law->facets - first : JLAW_LANES;
+  const int n = (real + 3) & ~3; /* whole vectors */
   const double *z = law->depth + (size_t) block * (size_t) (D + 1) * 3 * JLAW_LANES;
   const size_t other = (size_t) law->facets * (size_t) D; /* from q_s to q_t of a slider */
   jlaw_block_ b;
-  JLAW_EACH {
+  JLAW_EACH(n) {
     double y0 = JLAW_W(JLAW_M) * m->from[0], y1 = JLAW_W(JLAW_M) * m->to[0];
     double es = JLAW_W(JLAW_S) * m->p[0], et = 0.0;
     for (int i = 1; i < dim; i++) {
@@ -420,28 +424,33 @@ JLAW_INLINE void jlaw_facets_(const jlaw_law *law, int block, const jlaw_move_ *
     b.y0[l] = y0, b.y1[l] = y1, b.es[l] = es, b.et[l] = et;
     b.qs[l] = b.qt[l] = b.vs[l] = b.vt[l] = b.bss[l] = b.bst[l] = b.btt[l] = 0.0;
   }
-  jlaw_virgin_(law, b.y0, b.f0, b.k0, NULL);
-  jlaw_virgin_(law, b.y1, b.f1, b.k1, tangent ? b.bend : NULL);
-  size_t at[JLAW_LANES]; /* lanes beyond the last facet repeat it */
-  for (int l = 0; l < JLAW_LANES; l++)
-    at[l] = (size_t) (block * JLAW_LANES + l < last ? block * JLAW_LANES + l : last) * (size_t) D;
-  for (int i = 0; i < D; i++, z += 3 * JLAW_LANES) {
-    jlaw_lanes_ q[2];
-    for (int l = 0; l < JLAW_LANES; l++) q[0][l] = q0[at[l] + (size_t) i], q[1][l] = q0[other + at[l] + (size_t) i];
-    jlaw_slide_(w, z, i + 1 < D, &b, q, sum, ledger, tangent);
-    for (int l = 0; l < JLAW_LANES; l++) q1[at[l] + (size_t) i] = q[0][l], q1[other + at[l] + (size_t) i] = q[1][l];
+  jlaw_virgin_(law, n, b.y0, b.f0, b.k0, NULL);
+  jlaw_virgin_(law, n, b.y1, b.f1, b.k1, tangent ? b.bend : NULL);
+  jlaw_lanes_ q[2];
+  JLAW_EACH(n) q[0][l] = q[1][l] = 0.0;
+  q0 += (size_t) first * (size_t) D, q1 += (size_t) first * (size_t) D;
+  for (int i = 0; i < D; i++, q0++, q1++, z += 3 * JLAW_LANES) {
+    JLAW_EACH(real) q[0][l] = q0[(size_t) (l * D)], q[1][l] = q0[other + (size_t) (l * D)];
+    jlaw_slide_(w, z, n, &b, q, sum, ledger, tangent);
+    JLAW_EACH(real) q1[(size_t) (l * D)] = q[0][l], q1[other + (size_t) (l * D)] = q[1][l];
   }
   for (int i = 0; i < dim; i++)
-    JLAW_EACH {
+    JLAW_EACH(n) {
       const double normal = JLAW_W(JLAW_A) * b.f1[l], soft = JLAW_W(JLAW_SOFT);
       const double pull = JLAW_W(JLAW_N + i) * normal;
       sum->F[i][l] += pull + soft * (JLAW_W(JLAW_S + i) * b.qs[l] + JLAW_W(JLAW_T + i) * b.qt[l]);
       if (i > 0) sum->pull[i - 1][l] += pull;
     }
-  if (tangent) jlaw_add_tangent_(w, m, &b, sum, dim);
+  if (tangent) jlaw_add_tangent_(w, n, m, &b, sum, dim);
 }
 
-JLAW_INLINE double jlaw_total_(const double *x) { return (x[0] + x[2]) + (x[1] + x[3]); }
+/* In an order that no compiler changes */
+JLAW_INLINE double jlaw_total_(const double *x)
+{
+  double part[4];
+  for (int l = 0; l < 4; l++) part[l] = (x[l] + x[l + 8]) + (x[l + 4] + x[l + 12]);
+  return (part[0] + part[2]) + (part[1] + part[3]);
+}
 
 JLAW_INLINE void jlaw_all_(const jlaw_law *law, const jlaw_move_ *m, const double *s0, double *s1,
                            double *F, double *C, int dim, int ledger, int tangent)
@@ -494,7 +503,7 @@ static int jlaw_sound_(const double *q, int n)
   for (; i + 4 <= n; i += 4)
     for (int l = 0; l < 4; l++) sum[l] += q[i + l] * q[i + l];
   for (; i < n; i++) sum[0] += q[i] * q[i];
-  return jlaw_total_(sum) < 1e300;
+  return (sum[0] + sum[2]) + (sum[1] + sum[3]) < 1e300;
 }
 
 static int jlaw_refuse_(const jlaw_law *law, const double *s, const double *d, int damaged,
@@ -560,15 +569,15 @@ static jlaw_measures_ jlaw_measure_(const jlaw_law *law, const double *s)
     const double *w = law->facet + (size_t) (f / JLAW_LANES) * JLAW_COLUMNS * JLAW_LANES + f % JLAW_LANES;
     const double *z = law->depth + (size_t) (f / JLAW_LANES) * (size_t) (D + 1) * 3 * JLAW_LANES + f % JLAW_LANES;
     const double *qs = s + 2 * dim + f * D, *qt = qs + law->facets * D, share = w[JLAW_SHARE * JLAW_LANES];
-    jlaw_lanes_ y = {0.0, 0.0, 0.0, 0.0}, force, slope;
+    jlaw_lanes_ y, force, slope;
     y[0] = w[JLAW_M * JLAW_LANES] * s[0];
     for (int i = 1; i < dim; i++) y[0] += w[(JLAW_M + i) * JLAW_LANES] * s[dim + i - 1];
-    jlaw_virgin_(law, y, force, slope, NULL);
+    jlaw_virgin_(law, 1, y, force, slope, NULL);
     double at_limit = 0.0;
     int whole = 1;
     for (int i = 0; i < D; i++, z += 3 * JLAW_LANES) {
       double G, kappa;
-      jlaw_cell_(y[0], force[0], slope[0], z, i + 1 < D, &G, &kappa);
+      jlaw_cell_(y[0], force[0], slope[0], z, &G, &kappa);
       const double q2 = qs[i] * qs[i] + qt[i] * qt[i];
       const double cap = w[JLAW_STRENGTH * JLAW_LANES] * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * force[0]);
       const int held = sqrt(q2) >= cap;
@@ -596,9 +605,9 @@ void jlaw_shares(const jlaw_law *law, const double *s, double shares[3])
 
 static double jlaw_virgin_one_(const jlaw_law *law, double closure, double *slope)
 {
-  jlaw_lanes_ y = {0.0, 0.0, 0.0, 0.0}, force, slopes;
+  jlaw_lanes_ y, force, slopes;
   y[0] = closure;
-  jlaw_virgin_(law, y, force, slopes, NULL);
+  jlaw_virgin_(law, 1, y, force, slopes, NULL);
   *slope = slopes[0];
   return force[0];
 }

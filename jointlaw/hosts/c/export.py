@@ -14,7 +14,7 @@ from ...law import JointLaw
 from ...support.checks import Array
 from ...support.files import replace_file
 
-LANES = 16  # facets side by side, as in jointlaw.h
+LANES = 4  # facets side by side, as in jointlaw.h
 FORMAT = 1  # of table files: a change of their keywords or columns changes it
 FILES = ("jointlaw.h", "example.c", "example.cpp", "Makefile", "README.md")
 _MODEL = "granite"  # the name of the tables in these files

@@ -75,7 +75,7 @@ const char *jlaw_fingerprint(const jlaw_law *law);
 /* The tables, for files NAME.h; not for the host. LANES facets lie side by side in a block. */
 #define JLAW_FORMAT 1 /* of table files */
 enum {
-  JLAW_LANES = 16,
+  JLAW_LANES = 4,
   JLAW_M = 0, JLAW_S = 3, JLAW_T = 6, JLAW_N = 9, /* m = n/c1, s, t, n: 3 columns each */
   JLAW_A = 12, JLAW_STIFF = 13,    /* A; A/c1 */
   JLAW_STRENGTH = 14,              /* mu lam A */
@@ -121,19 +121,34 @@ extern "C" {
 #pragma STDC FP_CONTRACT OFF
 #endif
 
-/* The loops over lanes become vector instructions: of AVX2 where the machine has it, found out
- * at run time. (AVX2 without FMA: no fused operations.) */
+/* Four facets side by side in one vector, or (JOINTLAW_PLAIN, other compilers) one after the
+ * other with the same bits. AVX2 where the machine has it, found out at run time; without FMA, so
+ * that no operations are fused. */
 #if defined(__GNUC__)
 #define JLAW_INLINE static inline __attribute__((always_inline))
 #else
 #define JLAW_INLINE static inline
 #endif
-#if defined(__GNUC__) && !defined(__clang__)
-#define JLAW_EACH(n) _Pragma("GCC ivdep") for (int l = 0; l < (n); l++)
+#if defined(__GNUC__) && !defined(JOINTLAW_PLAIN)
+#pragma GCC diagnostic push /* all functions of vectors are inline */
+#pragma GCC diagnostic ignored "-Wpsabi"
+#define JLAW_WIDE 4
+typedef double jlaw_v_ __attribute__((vector_size(32)));
+typedef double jlaw_loose_ __attribute__((vector_size(32), aligned(8), may_alias));
+typedef long long jlaw_mask_ __attribute__((vector_size(32)));
+#define JLAW_LOAD(p) ((jlaw_v_) *(const jlaw_loose_ *) (p))
+#define JLAW_AT(v, l) ((v)[l])
+#define JLAW_PICK(m, a, b) ((jlaw_v_) (((m) & (jlaw_mask_) (a)) | (~(m) & (jlaw_mask_) (b))))
 #else
-#define JLAW_EACH(n) for (int l = 0; l < (n); l++)
+#define JLAW_WIDE 1
+typedef double jlaw_v_;
+typedef int jlaw_mask_;
+#define JLAW_LOAD(p) (*(p))
+#define JLAW_AT(v, l) (v)
+#define JLAW_PICK(m, a, b) ((m) ? (a) : (b))
 #endif
-#define JLAW_W(column) w[(column) * JLAW_LANES + l] /* of the facets w, lane l */
+#define JLAW_ABS(x) JLAW_PICK((x) < 0.0, -(x), x)
+#define JLAW_W(column) JLAW_LOAD(w + (column) * JLAW_LANES) /* of the facets w */
 #if defined(__x86_64__) && defined(__gnu_linux__) && defined(__OPTIMIZE__) && !defined(__AVX2__) \
     && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && !defined(JOINTLAW_PLAIN)
 #define JLAW_CLONES __attribute__((target_clones("avx2", "default")))
@@ -148,8 +163,6 @@ extern "C" {
 #define JLAW_GRAZING 1e-12    /* cosine at which the offset meets its limit */
 #define JLAW_LIMIT 1e-9       /* of the friction limit: a slider this close is at it */
 #define JLAW_ROUNDED 1e-12    /* of Phi, and of y: as much may be lost in rounding */
-
-typedef double jlaw_lanes_[JLAW_LANES];
 
 /* ------------------------------------------------------------------ messages */
 
@@ -190,57 +203,68 @@ static void jlaw_say_number_(jlaw_text_ *text, double x)
 
 /* -------------------------------------------------------------- virgin curve */
 
-/* Phi and Phi' at y, and Phi'' if asked; zero where y <= 0. What counts as zero becomes zero. */
-JLAW_INLINE void jlaw_virgin_(const jlaw_law *law, int n, double *y, double *force,
-                              double *slope, double *bend)
+JLAW_INLINE void jlaw_root_(jlaw_v_ *x)
 {
-  jlaw_lanes_ x, v, ts, c0, c1, c2, c3, power;
-  int at[JLAW_LANES];
+  for (int l = 0; l < JLAW_WIDE; l++) JLAW_AT(*x, l) = sqrt(JLAW_AT(*x, l));
+}
+JLAW_INLINE void jlaw_power_(jlaw_v_ *x, double exponent) /* 0 where x is not above 0 */
+{
+  for (int l = 0; l < JLAW_WIDE; l++)
+    JLAW_AT(*x, l) = JLAW_AT(*x, l) > 0.0 ? pow(JLAW_AT(*x, l), exponent) : 0.0;
+}
+
+/* Phi and Phi' at y, and Phi'' if asked; zero where y <= 0. What counts as zero becomes zero. */
+JLAW_INLINE void jlaw_virgin_(const jlaw_law *law, jlaw_v_ *y, jlaw_v_ *force, jlaw_v_ *slope,
+                              jlaw_v_ *bend)
+{
   const double pieces = law->pieces, top = pieces - 1.0, scale = law->scale, eta = law->eta;
-  JLAW_EACH(n) {
-    const double here = fabs(y[l]) >= JLAW_UNDERFLOW ? y[l] : 0.0;
-    const double root = sqrt(here > 0.0 ? here : 0.0), r = 1.0 / (root + scale);
-    const double place = root * r * pieces;
-    at[l] = (int) (place < top ? place : top);
-    x[l] = place - at[l];
-    y[l] = here;
-    v[l] = root;
-    ts[l] = root * r * r * scale; /* t (1 - t) */
+  const jlaw_v_ zero = {0.0};
+  *y = JLAW_PICK(JLAW_ABS(*y) >= JLAW_UNDERFLOW, *y, zero);
+  const jlaw_v_ here = JLAW_PICK(*y > 0.0, *y, zero);
+  jlaw_v_ v = here;
+  jlaw_root_(&v);
+  const jlaw_v_ r = 1.0 / (v + scale);
+  jlaw_v_ x = v * r * pieces, c0 = zero, c1 = zero, c2 = zero, c3 = zero;
+  for (int l = 0; l < JLAW_WIDE; l++) {
+    const double place = JLAW_AT(x, l);
+    const int at = (int) (place < top ? place : top);
+    const double *c = law->curve + 4 * at;
+    JLAW_AT(x, l) = place - at;
+    JLAW_AT(c0, l) = c[0], JLAW_AT(c1, l) = c[1], JLAW_AT(c2, l) = c[2], JLAW_AT(c3, l) = c[3];
   }
-  JLAW_EACH(n) {
-    const double *c = law->curve + 4 * at[l];
-    c0[l] = c[0], c1[l] = c[1], c2[l] = c[2], c3[l] = c[3];
-  }
-  if (eta == 0.5) JLAW_EACH(n) power[l] = v[l];
-  else if (eta == 0.0) JLAW_EACH(n) power[l] = v[l] > 0.0 ? 1.0 : 0.0;
-  else for (int l = 0; l < n; l++) power[l] = v[l] > 0.0 ? pow(y[l], eta) : 0.0;
-  jlaw_lanes_ S, DS, DDS;
-  JLAW_EACH(n) {
-    S[l] = c0[l] + x[l] * (c1[l] + x[l] * (c2[l] + x[l] * c3[l]));
-    DS[l] = 0.5 * ts[l] * (pieces * (c1[l] + x[l] * (2.0 * c2[l] + x[l] * (3.0 * c3[l]))));
-  }
-  if (bend) JLAW_EACH(n) {
-    const double S2 = pieces * pieces * (2.0 * c2[l] + x[l] * (6.0 * c3[l]));
-    DDS[l] = 0.25 * ts[l] * ts[l] * S2 + 0.5 * (scale - v[l]) / (scale + v[l]) * DS[l];
-  }
+  const jlaw_v_ ts = v * r * r * scale; /* t (1 - t) */
+  jlaw_v_ S = c0 + x * (c1 + x * (c2 + x * c3)), DDS = zero;
+  jlaw_v_ DS = 0.5 * ts * (pieces * (c1 + x * (2.0 * c2 + x * (3.0 * c3))));
+  if (bend)
+    DDS = 0.25 * ts * ts * (pieces * pieces * (2.0 * c2 + x * (6.0 * c3)))
+          + 0.5 * (scale - v) * r * DS;
   if (law->rise > 0.0) { /* S is tabulated over w^rise */
     const double W = scale * scale;
-    for (int l = 0; l < n; l++) {
-      const double here = y[l] > 0.0 ? y[l] : 0.0, w = here / (here + W);
-      const double more = law->rise * W / (here + W), lift = pow(w, law->rise);
-      if (bend) DDS[l] = lift * (DDS[l] + 2.0 * more * DS[l] + (more * more - more * w) * S[l]);
-      DS[l] = lift * (DS[l] + more * S[l]);
-      S[l] = lift * S[l];
-    }
+    const jlaw_v_ w = here / (here + W), more = law->rise * W / (here + W);
+    jlaw_v_ lift = w;
+    jlaw_power_(&lift, law->rise);
+    DDS = lift * (DDS + 2.0 * more * DS + (more * more - more * w) * S);
+    DS = lift * (DS + more * S);
+    S = lift * S;
   }
-  JLAW_EACH(n) {
-    force[l] = power[l] * (y[l] > 0.0 ? y[l] : 0.0) * S[l];
-    slope[l] = power[l] * ((1.0 + eta) * S[l] + DS[l]);
-  }
-  if (bend) JLAW_EACH(n) {
-    const double all = eta * (1.0 + eta) * S[l] + (1.0 + 2.0 * eta) * DS[l] + DDS[l];
-    bend[l] = power[l] / (y[l] > 0.0 ? y[l] : 1.0) * all;
-  }
+  jlaw_v_ power = eta == 0.5 ? v : here;
+  if (eta == 0.0) power = JLAW_PICK(v > 0.0, zero + 1.0, zero);
+  else if (eta != 0.5) jlaw_power_(&power, eta);
+  *force = power * here * S;
+  *slope = power * ((1.0 + eta) * S + DS);
+  if (bend)
+    *bend = power / JLAW_PICK(*y > 0.0, *y, zero + 1.0)
+            * (eta * (1.0 + eta) * S + (1.0 + 2.0 * eta) * DS + DDS);
+}
+
+/* Phi and Phi' at one y */
+static double jlaw_virgin_one_(const jlaw_law *law, double y, double *slope)
+{
+  const jlaw_v_ zero = {0.0};
+  jlaw_v_ at = zero + y, force, slopes;
+  jlaw_virgin_(law, &at, &force, &slopes, NULL);
+  *slope = JLAW_AT(slopes, 0);
+  return JLAW_AT(force, 0);
 }
 
 /* Psi, the integral of Phi, at one y */
@@ -263,13 +287,14 @@ typedef struct {
 } jlaw_move_;
 
 typedef struct { /* what the blocks add up to, lane by lane */
-  jlaw_lanes_ F[3], C[9], pull[2], lost;
+  jlaw_v_ F[3][JLAW_LANES / JLAW_WIDE], C[9][JLAW_LANES / JLAW_WIDE];
+  jlaw_v_ pull[2][JLAW_LANES / JLAW_WIDE], lost[JLAW_LANES / JLAW_WIDE];
 } jlaw_sum_;
 
-typedef struct { /* a block of facets */
-  jlaw_lanes_ y0, y1, f0, f1, k0, k1, es, et, bend; /* y, Phi, Phi'; de; Phi'' */
-  jlaw_lanes_ qs, qt, vs, vt, bss, bst, btt;        /* sums over the cells: q; v and B of C */
-} jlaw_block_;
+typedef struct { /* facets side by side */
+  jlaw_v_ y0, y1, f0, f1, k0, k1, es, et, bend; /* y, Phi, Phi'; de; Phi'' */
+  jlaw_v_ qs, qt, lost, vs, vt, bss, bst, btt;  /* sums over the cells: q, loss, v and B of C */
+} jlaw_facets_;
 
 /* Moves the offset by p, dragged along where it is at its limit: "Large shear" */
 static void jlaw_limit_offset_(const jlaw_law *law, jlaw_move_ *m)
@@ -307,167 +332,165 @@ static void jlaw_limit_offset_(const jlaw_law *law, jlaw_move_ *m)
 
 /* Share of a depth cell in Phi, and its slope: the bed beyond its lower limit less that beyond its
  * upper, which for the last cell is never reached. z: zeta, Phi, Phi' at both limits. */
-JLAW_INLINE void jlaw_cell_(double y, double force, double slope, const double *z,
-                            double *G, double *kappa)
+JLAW_INLINE void jlaw_cell_(const jlaw_v_ *y, const jlaw_v_ *force, const jlaw_v_ *slope,
+                            const jlaw_v_ z[6], jlaw_v_ *G, jlaw_v_ *kappa)
 {
-  enum { NEXT = 3 * JLAW_LANES };
-  const double from = z[0], force0 = z[JLAW_LANES], slope0 = z[2 * JLAW_LANES];
-  const double to = z[NEXT], force1 = z[NEXT + JLAW_LANES], slope1 = z[NEXT + 2 * JLAW_LANES];
-  const double low = y - from, high = y - to;
-  const double past = force - force1 - slope1 * high;
-  double g = force - force0 - slope0 * low, k = slope - slope0;
-  g = high > 0.0 ? g - past : g;
-  k = high > 0.0 ? slope1 - slope0 : k;
-  k = ((low > 0.0) & (k > 0.0)) ? k : 0.0;
-  const double most = k * low;
-  g = g < most ? g : most;
-  *G = g > 0.0 ? g : 0.0;
+  const jlaw_v_ zero = {0.0}, low = *y - z[0], high = *y - z[3];
+  jlaw_v_ g = *force - z[1] - z[2] * low, k = *slope - z[2];
+  g = JLAW_PICK(high > 0.0, g - (*force - z[4] - z[5] * high), g);
+  k = JLAW_PICK(high > 0.0, z[5] - z[2], k);
+  k = JLAW_PICK((low > 0.0) & (k > 0.0), k, zero);
+  const jlaw_v_ most = k * low;
+  g = JLAW_PICK(g < most, g, most);
+  *G = JLAW_PICK(g > 0.0, g, zero);
   *kappa = k;
 }
 
-/* One depth cell of a block of facets: load, friction limit, loss, tangent. q holds the sliders
- * of the cell before and after. */
-JLAW_INLINE void jlaw_slide_(const double *w, const double *z, int n, jlaw_block_ *b,
-                             jlaw_lanes_ q[2], jlaw_sum_ *sum, int ledger, int tangent)
+/* One depth cell of facets: load, friction limit, loss, tangent; q: sliders before and after */
+JLAW_INLINE void jlaw_slide_(const double *w, const double *limits, jlaw_facets_ *f, jlaw_v_ q[2],
+                             int ledger, int tangent)
 {
-  JLAW_EACH(n) {
-    double G0, G1, k0, k1;
-    jlaw_cell_(b->y0[l], b->f0[l], b->k0[l], z + l, &G0, &k0);
-    jlaw_cell_(b->y1[l], b->f1[l], b->k1[l], z + l, &G1, &k1);
-    /* trial force: by the chord where stiffness grows, scaled down where it falls */
-    const double a = JLAW_W(JLAW_STIFF), dy = b->y1[l] - b->y0[l];
-    const int grows = k1 > k0, near = fabs(dy) <= JLAW_NEAR * fabs(b->y1[l]);
-    const double bottom = grows ? dy : k0;
-    const double ratio = (grows ? G1 - G0 : k1) / (bottom != 0.0 ? bottom : 1.0);
-    double chord = near ? 0.5 * (k0 + k1) : ratio;
-    chord = chord > k0 ? chord : k0;
-    chord = chord < k1 ? chord : k1;
-    const double kept = grows ? 1.0 : ratio, add = a * (grows ? chord : k1);
-    const double olds = q[0][l], oldt = q[1][l], es = b->es[l], et = b->et[l];
-    const double ts = olds * kept + add * es, tt = oldt * kept + add * et;
-    /* friction: |q| <= mu lam A G */
-    const double new2 = ts * ts + tt * tt, size = sqrt(new2);
-    const double strength = JLAW_W(JLAW_STRENGTH), cap = strength * G1;
-    const double held = cap / (size > cap ? size : 1.0);
-    const double share = size > cap ? held : 1.0, part = new2 > JLAW_TINY ? share : 0.0;
-    q[0][l] = part * ts, q[1][l] = part * tt;
-    b->qs[l] += part * ts, b->qt[l] += part * tt;
-    if (ledger) { /* "No step can make energy": each term is >= 0 as written */
-      const double r0 = 1.0 / (k0 > JLAW_TINY ? k0 : 1.0), r1 = 1.0 / (k1 > JLAW_TINY ? k1 : 1.0);
-      const double rc = 1.0 / (chord > JLAW_TINY ? chord : 1.0), old2 = olds * olds + oldt * oldt;
-      double hard = new2 * (rc - r1) + (k0 > JLAW_TINY ? old2 * (r0 - rc) : 0.0);
-      double soft = (k0 - k1) * r0 * (old2 * r0), rub = 2.0 * share * (1.0 - share) * (new2 * r1);
-      hard = chord > JLAW_TINY ? hard : 0.0;
-      soft = k0 > JLAW_TINY ? soft : 0.0;
-      rub = k1 > JLAW_TINY ? rub : 0.0;
-      sum->lost[l] += JLAW_W(JLAW_COMPLIANCE) * ((grows ? hard : soft) + rub);
-    }
-    if (tangent) { /* "The tangent": J_q = beta (I - s s^T) E + v g^T */
-      const double y = b->y1[l], low = y - z[l], high = y - z[3 * JLAW_LANES + l];
-      const double curving = b->bend[l], bend = ((low > 0.0) & (high < 0.0)) ? curving : 0.0;
-      const double chord1 = near ? 0.5 * bend : (k1 - chord) / (near ? 1.0 : dy);
-      const double fade = k1 > JLAW_TINY ? bend / (k1 > JLAW_TINY ? k1 : 1.0) : 0.0;
-      /* exactly at its limit a slider slips, and exactly as stiff as before a cell has not grown */
-      const int slips = size >= strength * (G1 * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * b->f1[l]);
-      const int stiffer = grows & (dy > JLAW_ROUNDED * fabs(y));
-      const double unit = 1.0 / (size > 0.0 ? size : 1.0), us = ts * unit, ut = tt * unit;
-      const double ws = stiffer ? a * chord1 * es : fade * ts;
-      const double wt = stiffer ? a * chord1 * et : fade * tt;
-      const double dot = us * ws + ut * wt, push = strength * k1;
-      const double beta = cap > 0.0 ? share * add : 0.0, along = slips ? beta : 0.0;
-      b->vs[l] += slips ? share * (ws - us * dot) + push * us : ws;
-      b->vt[l] += slips ? share * (wt - ut * dot) + push * ut : wt;
-      b->bss[l] += beta - along * us * us;
-      b->bst[l] -= along * us * ut;
-      b->btt[l] += beta - along * ut * ut;
+  const jlaw_v_ zero = {0.0}, one = zero + 1.0;
+  jlaw_v_ z[6], G0, G1, k0, k1;
+  for (int i = 0; i < 6; i++) z[i] = JLAW_LOAD(limits + i * JLAW_LANES);
+  jlaw_cell_(&f->y0, &f->f0, &f->k0, z, &G0, &k0);
+  jlaw_cell_(&f->y1, &f->f1, &f->k1, z, &G1, &k1);
+  /* trial force: by the chord where stiffness grows, scaled down where it falls */
+  const jlaw_v_ a = JLAW_W(JLAW_STIFF), dy = f->y1 - f->y0;
+  const jlaw_mask_ grows = k1 > k0, near = JLAW_ABS(dy) <= JLAW_NEAR * JLAW_ABS(f->y1);
+  const jlaw_v_ bottom = JLAW_PICK(grows, dy, k0);
+  const jlaw_v_ ratio = JLAW_PICK(grows, G1 - G0, k1) / JLAW_PICK(bottom != 0.0, bottom, one);
+  jlaw_v_ chord = JLAW_PICK(near, 0.5 * (k0 + k1), ratio);
+  chord = JLAW_PICK(chord > k0, chord, k0);
+  chord = JLAW_PICK(chord < k1, chord, k1);
+  const jlaw_v_ kept = JLAW_PICK(grows, one, ratio), add = a * JLAW_PICK(grows, chord, k1);
+  const jlaw_v_ old2 = q[0] * q[0] + q[1] * q[1];
+  const jlaw_v_ ts = q[0] * kept + add * f->es, tt = q[1] * kept + add * f->et;
+  /* friction: |q| <= mu lam A G */
+  const jlaw_v_ new2 = ts * ts + tt * tt;
+  jlaw_v_ size = new2;
+  jlaw_root_(&size);
+  const jlaw_v_ strength = JLAW_W(JLAW_STRENGTH), cap = strength * G1;
+  const jlaw_mask_ beyond = size > cap;
+  const jlaw_v_ share = JLAW_PICK(beyond, cap / JLAW_PICK(beyond, size, one), one);
+  const jlaw_v_ part = JLAW_PICK(new2 > JLAW_TINY, share, zero);
+  q[0] = part * ts, q[1] = part * tt;
+  f->qs += q[0], f->qt += q[1];
+  if (ledger) { /* "No step can make energy": each term is >= 0 as written */
+    const jlaw_v_ r0 = 1.0 / JLAW_PICK(k0 > JLAW_TINY, k0, one);
+    const jlaw_v_ r1 = 1.0 / JLAW_PICK(k1 > JLAW_TINY, k1, one);
+    const jlaw_v_ rc = 1.0 / JLAW_PICK(chord > JLAW_TINY, chord, one);
+    const jlaw_v_ hard = new2 * (rc - r1) + JLAW_PICK(k0 > JLAW_TINY, old2 * (r0 - rc), zero);
+    const jlaw_v_ soft = (k0 - k1) * r0 * (old2 * r0);
+    const jlaw_v_ rub = 2.0 * share * (1.0 - share) * (new2 * r1);
+    f->lost += JLAW_PICK(grows, JLAW_PICK(chord > JLAW_TINY, hard, zero),
+                          JLAW_PICK(k0 > JLAW_TINY, soft, zero))
+               + JLAW_PICK(k1 > JLAW_TINY, rub, zero);
+  }
+  if (tangent) { /* "The tangent": J_q = beta (I - s s^T) E + v g^T */
+    const jlaw_v_ bend = JLAW_PICK((f->y1 > z[0]) & (f->y1 < z[3]), f->bend, zero);
+    const jlaw_v_ chord1 = JLAW_PICK(near, 0.5 * bend, (k1 - chord) / JLAW_PICK(near, one, dy));
+    const jlaw_v_ fade = JLAW_PICK(k1 > JLAW_TINY, bend / JLAW_PICK(k1 > JLAW_TINY, k1, one), zero);
+    /* where rounding would decide: what did not close has not grown, what is at its limit slips */
+    const jlaw_mask_ stiffer = grows & (dy > JLAW_ROUNDED * JLAW_ABS(f->y1));
+    const jlaw_mask_ slips = size >= strength * (G1 * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * f->f1);
+    const jlaw_v_ unit = 1.0 / JLAW_PICK(size > 0.0, size, one), us = ts * unit, ut = tt * unit;
+    const jlaw_v_ ws = JLAW_PICK(stiffer, a * chord1 * f->es, fade * ts);
+    const jlaw_v_ wt = JLAW_PICK(stiffer, a * chord1 * f->et, fade * tt);
+    const jlaw_v_ dot = us * ws + ut * wt, push = strength * k1;
+    const jlaw_v_ beta = JLAW_PICK(cap > 0.0, share * add, zero), along = JLAW_PICK(slips, beta, zero);
+    f->vs += JLAW_PICK(slips, share * (ws - us * dot) + push * us, ws);
+    f->vt += JLAW_PICK(slips, share * (wt - ut * dot) + push * ut, wt);
+    f->bss += beta - along * us * us;
+    f->bst -= along * us * ut;
+    f->btt += beta - along * ut * ut;
+  }
+}
+
+/* C += along g^T + E^T B E of facets */
+JLAW_INLINE void jlaw_add_tangent_(const double *w, const jlaw_move_ *m, const jlaw_facets_ *f,
+                                   jlaw_sum_ *sum, int at, int dim)
+{
+  const jlaw_v_ soft = JLAW_W(JLAW_SOFT), stiff = JLAW_W(JLAW_A) * f->k1;
+  for (int i = 0; i < dim; i++) {
+    const jlaw_v_ s = JLAW_W(JLAW_S + i), t = JLAW_W(JLAW_T + i);
+    const jlaw_v_ along = stiff * JLAW_W(JLAW_N + i) + soft * (s * f->vs + t * f->vt);
+    const jlaw_v_ left = soft * (s * f->bss + t * f->bst), right = soft * (s * f->bst + t * f->btt);
+    for (int j = 0; j < dim; j++) {
+      jlaw_v_ g = JLAW_W(JLAW_M); /* dy/dd */
+      if (j > 0) g = JLAW_W(JLAW_M + 1) * m->J[j - 1] + JLAW_W(JLAW_M + 2) * m->J[j + 1];
+      sum->C[3 * i + j][at] += along * g + left * JLAW_W(JLAW_S + j) + right * JLAW_W(JLAW_T + j);
     }
   }
 }
 
-/* C += along g^T + E^T B E of a block of facets */
-JLAW_INLINE void jlaw_add_tangent_(const double *w, int n, const jlaw_move_ *m, const jlaw_block_ *b,
-                                   jlaw_sum_ *sum, int dim)
+/* Facets from number `first` on: y before and after, virgin curve, cells, and their part of F, C */
+JLAW_INLINE void jlaw_add_facets_(const jlaw_law *law, int first, const jlaw_move_ *m,
+                                  const double *q0, double *q1, jlaw_sum_ *sum, int dim, int ledger,
+                                  int tangent)
 {
-  for (int i = 0; i < dim; i++)
-    for (int j = 0; j < dim; j++)
-      JLAW_EACH(n) {
-        const double soft = JLAW_W(JLAW_SOFT), A = JLAW_W(JLAW_A);
-        const double si = JLAW_W(JLAW_S + i), ti = JLAW_W(JLAW_T + i);
-        const double sj = JLAW_W(JLAW_S + j), tj = JLAW_W(JLAW_T + j);
-        const double along = A * JLAW_W(JLAW_N + i) * b->k1[l]
-                             + soft * (si * b->vs[l] + ti * b->vt[l]);
-        const double m1 = JLAW_W(JLAW_M + 1), m2 = JLAW_W(JLAW_M + 2);
-        const double g = j == 0 ? JLAW_W(JLAW_M) : m1 * m->J[j - 1] + m2 * m->J[j + 1];
-        sum->C[3 * i + j][l] += along * g + soft * ((si * b->bss[l] + ti * b->bst[l]) * sj
-                                                    + (si * b->bst[l] + ti * b->btt[l]) * tj);
-      }
-}
-
-/* A block of facets: y before and after, virgin curve, all cells, and its part of F and C */
-JLAW_INLINE void jlaw_facets_(const jlaw_law *law, int block, const jlaw_move_ *m, const double *q0,
-                              double *q1, jlaw_sum_ *sum, int dim, int ledger, int tangent)
-{
-  const double *w = law->facet + (size_t) block * JLAW_COLUMNS * JLAW_LANES;
-  const int D = law->cells, first = block * JLAW_LANES;
-  const int real = law->facets - first < JLAW_LANES ? law->facets - first : JLAW_LANES;
-  const int n = (real + 3) & ~3; /* whole vectors */
-  const double *z = law->depth + (size_t) block * (size_t) (D + 1) * 3 * JLAW_LANES;
+  const int D = law->cells, block = first / JLAW_LANES, lane = first % JLAW_LANES;
+  const int at = lane / JLAW_WIDE, real = law->facets - first;
+  const double *w = law->facet + (size_t) block * JLAW_COLUMNS * JLAW_LANES + lane;
+  const double *z = law->depth + (size_t) block * (size_t) (D + 1) * 3 * JLAW_LANES + lane;
   const size_t other = (size_t) law->facets * (size_t) D; /* from q_s to q_t of a slider */
-  jlaw_block_ b;
-  JLAW_EACH(n) {
-    double y0 = JLAW_W(JLAW_M) * m->from[0], y1 = JLAW_W(JLAW_M) * m->to[0];
-    double es = JLAW_W(JLAW_S) * m->p[0], et = 0.0;
-    for (int i = 1; i < dim; i++) {
-      y0 += JLAW_W(JLAW_M + i) * m->from[i], y1 += JLAW_W(JLAW_M + i) * m->to[i];
-      es += JLAW_W(JLAW_S + i) * m->p[i], et += JLAW_W(JLAW_T + i) * m->p[i];
-    }
-    b.y0[l] = y0, b.y1[l] = y1, b.es[l] = es, b.et[l] = et;
-    b.qs[l] = b.qt[l] = b.vs[l] = b.vt[l] = b.bss[l] = b.bst[l] = b.btt[l] = 0.0;
+  const jlaw_v_ zero = {0.0};
+  jlaw_facets_ f = {zero, zero, zero, zero, zero, zero, zero, zero, zero,
+                    zero, zero, zero, zero, zero, zero, zero, zero};
+  for (int i = 0; i < dim; i++) {
+    f.y0 += JLAW_W(JLAW_M + i) * m->from[i], f.y1 += JLAW_W(JLAW_M + i) * m->to[i];
+    f.es += JLAW_W(JLAW_S + i) * m->p[i];
+    if (i > 0) f.et += JLAW_W(JLAW_T + i) * m->p[i];
   }
-  jlaw_virgin_(law, n, b.y0, b.f0, b.k0, NULL);
-  jlaw_virgin_(law, n, b.y1, b.f1, b.k1, tangent ? b.bend : NULL);
-  jlaw_lanes_ q[2];
-  JLAW_EACH(n) q[0][l] = q[1][l] = 0.0;
+  jlaw_virgin_(law, &f.y0, &f.f0, &f.k0, NULL);
+  jlaw_virgin_(law, &f.y1, &f.f1, &f.k1, tangent ? &f.bend : NULL);
   q0 += (size_t) first * (size_t) D, q1 += (size_t) first * (size_t) D;
   for (int i = 0; i < D; i++, q0++, q1++, z += 3 * JLAW_LANES) {
-    JLAW_EACH(real) q[0][l] = q0[(size_t) (l * D)], q[1][l] = q0[other + (size_t) (l * D)];
-    jlaw_slide_(w, z, n, &b, q, sum, ledger, tangent);
-    JLAW_EACH(real) q1[(size_t) (l * D)] = q[0][l], q1[other + (size_t) (l * D)] = q[1][l];
+    jlaw_v_ q[2] = {zero, zero};
+    for (int l = 0; l < JLAW_WIDE; l++)
+      if (l < real) JLAW_AT(q[0], l) = q0[l * D], JLAW_AT(q[1], l) = (q0 + other)[l * D];
+    jlaw_slide_(w, z, &f, q, ledger, tangent);
+    for (int l = 0; l < JLAW_WIDE; l++)
+      if (l < real) q1[l * D] = JLAW_AT(q[0], l), (q1 + other)[l * D] = JLAW_AT(q[1], l);
   }
-  for (int i = 0; i < dim; i++)
-    JLAW_EACH(n) {
-      const double normal = JLAW_W(JLAW_A) * b.f1[l], soft = JLAW_W(JLAW_SOFT);
-      const double pull = JLAW_W(JLAW_N + i) * normal;
-      sum->F[i][l] += pull + soft * (JLAW_W(JLAW_S + i) * b.qs[l] + JLAW_W(JLAW_T + i) * b.qt[l]);
-      if (i > 0) sum->pull[i - 1][l] += pull;
-    }
-  if (tangent) jlaw_add_tangent_(w, n, m, &b, sum, dim);
+  const jlaw_v_ normal = JLAW_W(JLAW_A) * f.f1, soft = JLAW_W(JLAW_SOFT);
+  for (int i = 0; i < dim; i++) {
+    const jlaw_v_ pull = JLAW_W(JLAW_N + i) * normal;
+    sum->F[i][at] += pull + soft * (JLAW_W(JLAW_S + i) * f.qs + JLAW_W(JLAW_T + i) * f.qt);
+    if (i > 0) sum->pull[i - 1][at] += pull;
+  }
+  if (ledger) sum->lost[at] += JLAW_W(JLAW_COMPLIANCE) * f.lost;
+  if (tangent) jlaw_add_tangent_(w, m, &f, sum, at, dim);
 }
 
-/* In an order that no compiler changes */
-JLAW_INLINE double jlaw_total_(const double *x)
+JLAW_INLINE double jlaw_total_(const jlaw_v_ *x)
 {
-  double part[4];
-  for (int l = 0; l < 4; l++) part[l] = (x[l] + x[l + 8]) + (x[l + 4] + x[l + 12]);
-  return (part[0] + part[2]) + (part[1] + part[3]);
+  double lane[JLAW_LANES];
+  for (int l = 0; l < JLAW_LANES; l++) lane[l] = JLAW_AT(x[l / JLAW_WIDE], l);
+  return (lane[0] + lane[2]) + (lane[1] + lane[3]);
 }
 
-JLAW_INLINE void jlaw_all_(const jlaw_law *law, const jlaw_move_ *m, const double *s0, double *s1,
-                           double *F, double *C, int dim, int ledger, int tangent)
+JLAW_INLINE void jlaw_step_(const jlaw_law *law, const jlaw_move_ *m, const double *s0, double *s1,
+                            double *F, double *C, int dim, int ledger, int tangent)
 {
+  const jlaw_v_ zero = {0.0};
   jlaw_sum_ sum;
-  memset(&sum, 0, tangent ? sizeof sum : sizeof sum); /* TODO */
-  for (int block = 0; block * JLAW_LANES < law->facets; block++)
-    jlaw_facets_(law, block, m, s0 + 2 * dim, s1 + 2 * dim, &sum, dim, ledger, tangent);
-  double lost = jlaw_total_(sum.lost);
+  for (int at = 0; at < JLAW_LANES / JLAW_WIDE; at++) {
+    sum.lost[at] = sum.pull[0][at] = sum.pull[1][at] = zero;
+    for (int i = 0; i < dim; i++) sum.F[i][at] = zero;
+    for (int i = 0; tangent && i < 9; i++) sum.C[i][at] = zero;
+  }
+  for (int first = 0; first < law->facets; first += JLAW_WIDE)
+    jlaw_add_facets_(law, first, m, s0 + 2 * dim, s1 + 2 * dim, &sum, dim, ledger, tangent);
+  double lost = s0[2 * dim - 1] + jlaw_total_(sum.lost);
   const double drag = jlaw_total_(sum.pull[0]) * m->to[1] + jlaw_total_(sum.pull[1]) * m->to[2];
-  if (m->slip > 0.0 && drag > 0.0) lost += m->slip * drag / law->critical_slip;
+  if (ledger && m->slip > 0.0 && drag > 0.0) lost += m->slip * drag / law->critical_slip;
   for (int i = 0; i < dim; i++) F[i] = jlaw_total_(sum.F[i]);
   for (int i = 0; tangent && i < dim; i++)
     for (int j = 0; j < dim; j++) C[dim * i + j] = jlaw_total_(sum.C[3 * i + j]);
   for (int i = 0; i < dim; i++) s1[i] = s0[i] + m->p[i];
   for (int i = 1; i < dim; i++) s1[dim + i - 1] = m->to[i];
-  s1[2 * dim - 1] = s0[2 * dim - 1] + (ledger ? lost : 0.0);
+  s1[2 * dim - 1] = lost;
 }
 
 #ifdef JOINTLAW_NO_LEDGER
@@ -480,11 +503,11 @@ enum { JLAW_LEDGER = 1 };
 JLAW_CLONES static void jlaw_advance_(const jlaw_law *law, const jlaw_move_ *m, const double *s0,
                                       double *s1, double *F, double *C)
 {
-  if (law->dim == 3 && !C) jlaw_all_(law, m, s0, s1, F, C, 3, JLAW_LEDGER, 0);
-  else if (law->dim == 3) jlaw_all_(law, m, s0, s1, F, C, 3, JLAW_LEDGER, 1);
-  else if (law->dim == 2 && !C) jlaw_all_(law, m, s0, s1, F, C, 2, JLAW_LEDGER, 0);
-  else if (law->dim == 2) jlaw_all_(law, m, s0, s1, F, C, 2, JLAW_LEDGER, 1);
-  else jlaw_all_(law, m, s0, s1, F, C, 1, JLAW_LEDGER, C != NULL);
+  if (law->dim == 3 && !C) jlaw_step_(law, m, s0, s1, F, C, 3, JLAW_LEDGER, 0);
+  else if (law->dim == 3) jlaw_step_(law, m, s0, s1, F, C, 3, JLAW_LEDGER, 1);
+  else if (law->dim == 2 && !C) jlaw_step_(law, m, s0, s1, F, C, 2, JLAW_LEDGER, 0);
+  else if (law->dim == 2) jlaw_step_(law, m, s0, s1, F, C, 2, JLAW_LEDGER, 1);
+  else jlaw_step_(law, m, s0, s1, F, C, 1, JLAW_LEDGER, C != NULL);
 }
 
 /* The largest of |closure|, |shear| and |offset| of a state: with `stretch` it bounds every |y| */
@@ -564,31 +587,34 @@ typedef struct { double stored, sliding, slipping, separated; } jlaw_measures_;
 static jlaw_measures_ jlaw_measure_(const jlaw_law *law, const double *s)
 {
   jlaw_measures_ all = {0.0, 0.0, 0.0, 0.0};
+  const jlaw_v_ zero = {0.0};
   const int dim = law->dim, D = law->cells;
   for (int f = 0; f < law->facets; f++) {
     const double *w = law->facet + (size_t) (f / JLAW_LANES) * JLAW_COLUMNS * JLAW_LANES + f % JLAW_LANES;
     const double *z = law->depth + (size_t) (f / JLAW_LANES) * (size_t) (D + 1) * 3 * JLAW_LANES + f % JLAW_LANES;
     const double *qs = s + 2 * dim + f * D, *qt = qs + law->facets * D, share = w[JLAW_SHARE * JLAW_LANES];
-    jlaw_lanes_ y, force, slope;
-    y[0] = w[JLAW_M * JLAW_LANES] * s[0];
-    for (int i = 1; i < dim; i++) y[0] += w[(JLAW_M + i) * JLAW_LANES] * s[dim + i - 1];
-    jlaw_virgin_(law, 1, y, force, slope, NULL);
+    double y = w[JLAW_M * JLAW_LANES] * s[0], slope;
+    for (int i = 1; i < dim; i++) y += w[(JLAW_M + i) * JLAW_LANES] * s[dim + i - 1];
+    const double force = jlaw_virgin_one_(law, y, &slope);
     double at_limit = 0.0;
     int whole = 1;
     for (int i = 0; i < D; i++, z += 3 * JLAW_LANES) {
-      double G, kappa;
-      jlaw_cell_(y[0], force[0], slope[0], z, &G, &kappa);
+      const jlaw_v_ at_y = zero + y, at_force = zero + force, at_slope = zero + slope;
+      jlaw_v_ cell[6], share_of, slope_of;
+      for (int j = 0; j < 6; j++) cell[j] = zero + z[j * JLAW_LANES];
+      jlaw_cell_(&at_y, &at_force, &at_slope, cell, &share_of, &slope_of);
+      const double G = JLAW_AT(share_of, 0), kappa = JLAW_AT(slope_of, 0);
       const double q2 = qs[i] * qs[i] + qt[i] * qt[i];
-      const double cap = w[JLAW_STRENGTH * JLAW_LANES] * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * force[0]);
+      const double cap = w[JLAW_STRENGTH * JLAW_LANES] * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * force);
       const int held = sqrt(q2) >= cap;
       at_limit += held ? G : 0.0;
       whole = whole && held;
       if (kappa > JLAW_TINY) all.stored += w[JLAW_COMPLIANCE * JLAW_LANES] * q2 / kappa;
     }
-    all.stored += w[JLAW_POTENTIAL * JLAW_LANES] * jlaw_psi_(law, y[0]);
-    if (force[0] > 0.0) all.slipping += share * at_limit / force[0];
-    if (y[0] > 0.0 && whole) all.sliding += share;
-    if (!(y[0] > 0.0)) all.separated += share;
+    all.stored += w[JLAW_POTENTIAL * JLAW_LANES] * jlaw_psi_(law, y);
+    if (force > 0.0) all.slipping += share * at_limit / force;
+    if (y > 0.0 && whole) all.sliding += share;
+    if (!(y > 0.0)) all.separated += share;
   }
   return all;
 }
@@ -602,15 +628,6 @@ void jlaw_shares(const jlaw_law *law, const double *s, double shares[3])
 }
 
 /* ------------------------------------------------------------ unsheared joint */
-
-static double jlaw_virgin_one_(const jlaw_law *law, double closure, double *slope)
-{
-  jlaw_lanes_ y, force, slopes;
-  y[0] = closure;
-  jlaw_virgin_(law, 1, y, force, slopes, NULL);
-  *slope = slopes[0];
-  return force[0];
-}
 
 double jlaw_normal_stress(const jlaw_law *law, double closure)
 {
@@ -833,6 +850,9 @@ void jlaw_free(jlaw_law *law)
   free(law);
 }
 
+#if defined(__GNUC__) && !defined(JOINTLAW_PLAIN)
+#pragma GCC diagnostic pop
+#endif
 #ifdef __cplusplus
 }
 #endif

@@ -376,16 +376,12 @@ JLAW_INLINE void jlaw_slide_(const double *w, const double *limits, jlaw_facets_
   const jlaw_v_ part = JLAW_PICK(new2 > JLAW_TINY, share, zero);
   q[0] = part * ts, q[1] = part * tt;
   f->qs += q[0], f->qt += q[1];
-  if (ledger) { /* "No step can make energy": each term is >= 0 as written */
-    const jlaw_v_ r0 = 1.0 / JLAW_PICK(k0 > JLAW_TINY, k0, one);
-    const jlaw_v_ r1 = 1.0 / JLAW_PICK(k1 > JLAW_TINY, k1, one);
-    const jlaw_v_ rc = 1.0 / JLAW_PICK(chord > JLAW_TINY, chord, one);
-    const jlaw_v_ hard = new2 * (rc - r1) + JLAW_PICK(k0 > JLAW_TINY, old2 * (r0 - rc), zero);
-    const jlaw_v_ soft = (k0 - k1) * r0 * (old2 * r0);
-    const jlaw_v_ rub = 2.0 * share * (1.0 - share) * (new2 * r1);
-    f->lost += JLAW_PICK(grows, JLAW_PICK(chord > JLAW_TINY, hard, zero),
-                          JLAW_PICK(k0 > JLAW_TINY, soft, zero))
-               + JLAW_PICK(k1 > JLAW_TINY, rub, zero);
+  if (ledger) { /* "No step can make energy": each factor is >= 0 as written */
+    const jlaw_v_ now = JLAW_PICK(grows, chord, k1), high = JLAW_PICK(grows, chord, k0);
+    const jlaw_v_ low = JLAW_PICK(grows, k0, k1), k01 = k0 * high, k11 = k1 * now;
+    const jlaw_v_ rub = k1 - now + 2.0 * share * (1.0 - share) * now;
+    f->lost += JLAW_PICK(k01 > JLAW_TINY, old2 * ((high - low) / k01), zero)
+               + JLAW_PICK(k11 > JLAW_TINY, new2 * (rub / k11), zero);
   }
   if (tangent) { /* "The tangent": J_q = beta (I - s s^T) E + v g^T */
     const jlaw_v_ bend = JLAW_PICK((f->y1 > z[0]) & (f->y1 < z[3]), f->bend, zero);
@@ -654,6 +650,31 @@ double jlaw_closure(const jlaw_law *law, double normal_stress)
     if (!(middle > low && middle < high)) return low == 0.0 ? 0.0 : high;
     if (jlaw_normal_stress(law, middle) < normal_stress) low = middle;
     else high = middle;
+  }
+}
+
+/* --------------------------------------------------------------- turned axes */
+
+static double jlaw_of_facet_(const jlaw_law *law, int facet, int column)
+{
+  const int block = facet / JLAW_LANES, lane = facet % JLAW_LANES;
+  return law->facet[((size_t) block * JLAW_COLUMNS + (size_t) column) * JLAW_LANES + (size_t) lane];
+}
+
+void jlaw_swap_bodies(const jlaw_law *law, double *s)
+{
+  const int dim = law->dim, D = law->cells, M = law->facets;
+  for (int i = 1; i < 2 * dim - 1; i += dim - 1) s[i] = -s[i]; /* shear and offset along axis 2 */
+  double *qs = s + 2 * dim, *qt = qs + M * D;
+  for (int f = 0; f < M; f++) {
+    const int other = (int) jlaw_of_facet_(law, f, JLAW_MIRROR);
+    for (int i = 0; i < D; i++) {
+      const double here = qs[f * D + i], turned = qt[f * D + i];
+      if (other > f) {
+        qs[f * D + i] = qs[other * D + i], qt[f * D + i] = -qt[other * D + i];
+        qs[other * D + i] = here, qt[other * D + i] = -turned;
+      } else if (other == f) qt[f * D + i] = -turned; /* t changes its sense in the mirror */
+    }
   }
 }
 

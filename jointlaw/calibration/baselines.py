@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from ..support.checks import Array, number
-from .calibrate import fit_closure
+from .fit import fit_closure
 from .measured import ClosureCurve
 
 

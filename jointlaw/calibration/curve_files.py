@@ -19,14 +19,16 @@ _NAMES = {
 _UNITS = {"stress": "Pa", "closure": "m"}
 
 
-class Curve(NamedTuple):
+class ClosureData(NamedTuple):
     """Stress (Pa) and closure (m), (n,), in the order measured."""
 
     stress: Array
     closure: Array
 
 
-def read_closure(path: str | Path, stress: str | None = None, closure: str | None = None) -> Curve:
+def read_closure(
+    path: str | Path, stress: str | None = None, closure: str | None = None
+) -> ClosureData:
     """A closure curve from a CSV file.
 
     Parameters
@@ -63,7 +65,7 @@ def read_closure(path: str | Path, stress: str | None = None, closure: str | Non
             raise ValueError(
                 f"{path}: column {header[at]!r} holds something not a number"
             ) from None
-    return Curve(*columns)
+    return ClosureData(*columns)
 
 
 def _column(header: list[str], kind: str, asked: str | None, path: Path) -> tuple[int, float]:

@@ -7,7 +7,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from .curve_files import Curve, read_closure
+from .curve_files import ClosureData, read_closure
 
 
 def names() -> list[str]:
@@ -23,7 +23,7 @@ def about(name: str) -> dict[str, Any]:
     return tomllib.loads((folder / f"{name}.toml").read_text(encoding="utf-8"))
 
 
-def load(name: str) -> Curve:
+def load(name: str) -> ClosureData:
     """Stress (Pa) and closure (m) of a data set, loading and unloading in the order measured."""
     _known(name)
     with resources.as_file(resources.files(__package__) / "data" / f"{name}.csv") as path:

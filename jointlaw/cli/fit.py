@@ -11,11 +11,9 @@ import numpy as np
 
 from ..calibration import datasets
 from ..calibration.baselines import Comparison, compare
-from ..calibration.curve_files import Curve, read_closure
-from ..calibration.fit import Fit
+from ..calibration.curve_files import ClosureData, read_closure
+from ..calibration.fit import Fit, fit_closure, fit_many
 from ..calibration.measured import first_loading
-from ..calibration.plot import plot_fit
-from ..calibration.sweep import fit_many
 from ..calibration.unloading import explain
 from ..support import units
 from ..support.files import replace_file, write_json
@@ -63,8 +61,6 @@ def _run(options: argparse.Namespace) -> int:
     seen = [(s[s <= limit], u[s <= limit]) for (s, u), limit in zip(loading, limits, strict=True)]
     fits = fit_many(seen, workers=options.workers, **keywords) if len(seen) > 1 else None
     for k, (item, curve) in enumerate(zip(options.data, curves, strict=True)):
-        from ..calibration.calibrate import fit_closure
-
         fit = fits[k] if fits else fit_closure(*seen[k], **keywords)
         held = None
         if (loading[k][0] > limits[k]).any():
@@ -87,7 +83,7 @@ def _folders(options: argparse.Namespace) -> list[Path]:
     return [options.out / stem for stem in items]
 
 
-def _write(folder: Path, item: str, fit: Fit, curve: Curve, held: Comparison | None) -> None:
+def _write(folder: Path, item: str, fit: Fit, curve: ClosureData, held: Comparison | None) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     text = fit.report()
     summary: dict[str, Any] = {
@@ -120,7 +116,7 @@ def _write(folder: Path, item: str, fit: Fit, curve: Curve, held: Comparison | N
     write_json(folder / "summary.json", summary)
     files = ["law.toml", "report.md", "summary.json"]
     try:
-        plot_fit(fit, folder / "fit.png", held)
+        fit.plot(folder / "fit.png", held and (held.stress, held.closure))
         files.insert(0, "fit.png")
     except ImportError as error:
         print(f"no picture: {error}", file=sys.stderr)
@@ -128,7 +124,7 @@ def _write(folder: Path, item: str, fit: Fit, curve: Curve, held: Comparison | N
     print(f"wrote {', '.join(files)} to {folder}")
 
 
-def _read(options: argparse.Namespace, item: str) -> Curve:
+def _read(options: argparse.Namespace, item: str) -> ClosureData:
     if item in datasets.names() and not Path(item).exists():
         return datasets.load(item)
     return read_closure(item, options.stress_column, options.closure_column)

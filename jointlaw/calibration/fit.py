@@ -17,7 +17,7 @@ from ..support.progress import track
 from .estimate import Estimate
 from .identify import Profile, profile, reasons
 from .measured import ClosureCurve, ShearCurve
-from .plot import plot_fit
+from .plot import Points, plot_fit
 from .priors import Ranges, Values
 from .problem import pose, start_places
 from .report import preset, report
@@ -50,11 +50,7 @@ class Fit(Estimate):
         """The fit in words and a table (Markdown)."""
         return report(self, self.not_identifiable)
 
-    def plot(
-        self,
-        path: str | Path | None = None,
-        held_out: tuple[ArrayLike, ArrayLike] | None = None,
-    ) -> Any:
+    def plot(self, path: str | Path | None = None, held_out: Points | None = None) -> Any:
         """Draw data, fit and bands (needs matplotlib: extra `plot`).
 
         held_out: stress (Pa) and closure (m) of points of the first closure curve that were not

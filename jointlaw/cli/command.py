@@ -1,9 +1,16 @@
-"""How every subcommand of `jointlaw` is made: one line of help and one worked example."""
+"""What the subcommands of `jointlaw` share: help with an example, options, and files of results."""
 
 from __future__ import annotations
 
 import argparse
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
+
+from ..support.files import replace_file, write_json
+
+SUMMARY_VERSION = 1  # of summary.json; higher once a key changes its meaning
 
 
 def add_command(commands: Any, name: str, what: str, example: str) -> argparse.ArgumentParser:
@@ -16,3 +23,36 @@ def add_command(commands: Any, name: str, what: str, example: str) -> argparse.A
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     return parser
+
+
+def add_out(parser: argparse.ArgumentParser, *, required: bool = True) -> None:
+    """Add the option --out."""
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, required=required, help="folder for the results"
+    )
+
+
+def write_results(
+    folder: Path,
+    files: Mapping[str, str | Callable[[Path], Any]],
+    summary: Mapping[str, Any],
+) -> None:
+    """Write a folder of results and say so.
+
+    files: by name the text of a file, or a function that writes it to a path; what needs
+    matplotlib is left out with a message where that is not installed. summary: goes to
+    summary.json with a version.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for name, content in files.items():
+        try:
+            if isinstance(content, str):
+                replace_file(folder / name, content.encode())
+            else:
+                content(folder / name)
+            written.append(name)
+        except ImportError as error:
+            print(f"no picture: {error}", file=sys.stderr)
+    write_json(folder / "summary.json", {"version": SUMMARY_VERSION, **summary})
+    print(f"wrote {', '.join([*written, 'summary.json'])} to {folder}")

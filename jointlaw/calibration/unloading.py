@@ -75,8 +75,8 @@ def explain(law: JointLaw, stress: ArrayLike, closure: ArrayLike, steps: int = 1
     return Loop(low, measured, friction, largest, worst_mu, open_closure, law_closure)
 
 
-def _cycle(law: JointLaw, high: float, steps: int) -> Array:
-    """Stress (Pa) and closure (m), (2, n), of a law loaded to a stress and unloaded.
+def _cycle(law: JointLaw, high: float, steps: int) -> tuple[Array, Array]:
+    """Stress (Pa) and closure (m), (n,), of a law loaded to a stress and unloaded.
 
     At the finest resolution: few depth cells lock whole contacts where the law locks their rims,
     and lose up to ten times too much when friction is high.
@@ -87,7 +87,8 @@ def _cycle(law: JointLaw, high: float, steps: int) -> Array:
     for increment in [step] * steps + [-step] * steps:
         joint.update([increment], tangent=False)
         rows.append((float(joint.F[0]), float(joint.delta[0])))
-    return np.array(rows).T
+    stress, closure = np.array(rows).T
+    return stress, closure
 
 
 def _loss(stress: ArrayLike, closure: ArrayLike, low: float) -> tuple[float, float]:

@@ -10,6 +10,7 @@ from typing import Any
 
 from ..support.files import replace_file, write_json
 
+Files = Mapping[str, str | Callable[[Path], Any]]
 SUMMARY_VERSION = 1  # of summary.json; higher once a key changes its meaning
 
 
@@ -34,7 +35,7 @@ def add_out(parser: argparse.ArgumentParser, *, required: bool = True) -> None:
 
 def write_results(
     folder: Path,
-    files: Mapping[str, str | Callable[[Path], Any]],
+    files: Files,
     summary: Mapping[str, Any],
 ) -> None:
     """Write a folder of results and say so.

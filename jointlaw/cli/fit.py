@@ -17,7 +17,7 @@ from ..calibration.fit import Fit, fit_closure, fit_many
 from ..calibration.measured import first_loading
 from ..calibration.unloading import explain
 from ..support import units
-from .command import add_command, add_out, write_results
+from .command import Files, add_command, add_out, write_results
 
 
 def add_fit_command(commands: Any) -> None:
@@ -105,8 +105,9 @@ def _write(folder: Path, name: str, fit: Fit, test: ClosureData, held: Compariso
             text += f"\n## Unloading\n\nNot compared with the law: {error}.\n"
             print(f"unloading is not compared: {error}", file=sys.stderr)
     print(text)
-    files = {
-        "fit.png": partial(fit.plot, held_out=held and (held.stress, held.closure)),
+    points = None if held is None else (held.stress, held.closure)
+    files: Files = {
+        "fit.png": partial(fit.plot, held_out=points),
         "law.toml": partial(fit.to_toml, title=f"Fit to {name}"),
         "report.md": text,
     }

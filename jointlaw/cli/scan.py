@@ -9,7 +9,7 @@ from typing import Any
 from ..support import units
 from ..surface.fit import SurfaceFit, from_surface
 from ..surface.scan_files import read_scan
-from .command import add_command, add_out, write_results
+from .command import Files, add_command, add_out, write_results
 
 
 def add_scan_command(commands: Any) -> None:
@@ -46,7 +46,7 @@ def _run(options: argparse.Namespace) -> int:
         "warnings": fit.warnings,
     }
     toml = _toml(fit, Path(options.file).name)
-    files = {"scan.png": fit.plot, "surface.toml": toml, "report.md": text}
+    files: Files = {"scan.png": fit.plot, "surface.toml": toml, "report.md": text}
     write_results(options.out, files, summary)
     return 0
 

@@ -12,11 +12,10 @@ import numpy as np
 from ..support import units
 from ..support.checks import Array
 
-_NAMES = {
-    "stress": ("stress", "normal_stress", "sigma", "sigmaz", "sigma_n", "f1"),
-    "closure": ("closure", "normal_closure", "disp", "displacement"),
+_COLUMNS = {  # unit, and the names that laboratories give it
+    "stress": ("Pa", ("stress", "normal_stress", "sigma", "sigmaz", "sigma_n", "f1")),
+    "closure": ("m", ("closure", "normal_closure", "disp", "displacement")),
 }
-_UNITS = {"stress": "Pa", "closure": "m"}
 
 
 class ClosureData(NamedTuple):
@@ -50,17 +49,15 @@ def read_closure(
         raise ValueError(f"{path}: is no CSV file in UTF-8 ({error}); save it as one") from None
     if len(rows) < 2:
         raise ValueError(f"{path}: has no rows of data under its first row of column names")
-    header = [cell.strip() for cell in rows[0]]
-    second = [cell.strip() for cell in rows[1]]
-    unit_row = all(re.fullmatch(r"\[.*\]|\(.*\)", cell) for cell in second)
-    if unit_row:
+    header, second = ([cell.strip() for cell in row] for row in rows[:2])
+    if all(re.fullmatch(r"\[.*\]|\(.*\)", cell) for cell in second):  # a row of units
         header = [f"{name} {unit}" for name, unit in zip(header, second, strict=False)]
-    body = rows[2:] if unit_row else rows[1:]
+        del rows[1]
     columns = []
     for kind, asked in (("stress", stress), ("closure", closure)):
         at, factor = _column(header, kind, asked, path)
         try:
-            columns.append(np.array([float(row[at]) for row in body]) * factor)
+            columns.append(np.array([float(row[at]) for row in rows[1:]]) * factor)
         except (ValueError, IndexError):
             raise ValueError(
                 f"{path}: column {header[at]!r} holds something not a number"
@@ -70,18 +67,14 @@ def read_closure(
 
 def _column(header: list[str], kind: str, asked: str | None, path: Path) -> tuple[int, float]:
     """Number of a column and the factor that turns it into SI units."""
-    unit_asked = None
-    wanted: tuple[str, ...] = _NAMES[kind]
-    if asked is not None:
-        name, _, unit_asked = asked.partition(":")
-        wanted = (name.strip().lower(),)
+    base, names = _COLUMNS[kind]
+    name_asked, _, unit_asked = (asked or "").partition(":")
+    wanted = names if asked is None else (name_asked.strip().lower(),)
     for at, title in enumerate(header):
-        name, unit = _name_and_unit(title, _UNITS[kind])
+        name, unit = _name_and_unit(title, base)
         if name.lower() in wanted or title.lower() in wanted:
             unit = unit_asked or unit
-            if not unit:
-                return at, 1.0
-            return at, units.parse(f"1{unit}", _UNITS[kind])
+            return at, units.parse(f"1{unit}", base)
     unit = "MPa" if kind == "stress" else "mm"
     raise ValueError(
         f"{path}: no column of {kind} among {', '.join(header)}; name it with its unit, "

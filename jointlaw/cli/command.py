@@ -5,9 +5,13 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from .. import presets
+from ..law import JointLaw
+from ..parameters.resolution import NAMED
 from ..support.files import replace_file, write_json
 
 Files = Mapping[str, str | Callable[[Path], Any]]
@@ -31,6 +35,20 @@ def add_out(parser: argparse.ArgumentParser, *, required: bool = True) -> None:
     parser.add_argument(
         "--out", metavar="DIR", type=Path, required=required, help="folder for the results"
     )
+
+
+def add_law(parser: argparse.ArgumentParser, *, resolution: bool = True) -> None:
+    """Add a law, by its preset or file, and the option --resolution; `read_law` reads both."""
+    parser.add_argument("law", metavar="PRESET_OR_FILE", help="preset name or TOML file")
+    if resolution:
+        parser.add_argument("--resolution", choices=tuple(NAMED), help="instead of the law's own")
+
+
+def read_law(options: argparse.Namespace) -> JointLaw:
+    """The law that the options name."""
+    law = presets.load_any(options.law)
+    resolution = getattr(options, "resolution", None)
+    return law if resolution is None else replace(law, resolution=resolution)
 
 
 def write_results(

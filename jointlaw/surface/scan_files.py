@@ -44,8 +44,8 @@ def read_scan(
 
 
 def _text(path: Path) -> Array:
-    lines = [line for line in path.read_text(encoding="utf-8-sig").splitlines() if line.strip()]
-    lines = [line for line in lines if not line.lstrip().startswith("#")]
+    text = path.read_text(encoding="utf-8-sig").splitlines()
+    lines = [line for line in text if line.strip() and not line.lstrip().startswith("#")]
     if not lines:
         raise ValueError(f"{path}: holds no heights")
     delimiter = next((d for d in (";", "\t", ",") if d in lines[-1]), None)

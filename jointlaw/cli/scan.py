@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from ..parameters.toml import VERSION
 from ..support import units
 from ..surface.fit import SurfaceFit, from_surface
 from ..surface.scan_files import read_scan
@@ -59,6 +60,7 @@ def _toml(fit: SurfaceFit, name: str) -> str:
     return (
         f"# From {clean}, sampling length {fit.sampling_length:.4g} m. To make it a law, add\n"
         "# asperity_density if it is missing, and [asperity] with K, lam, eta and mu.\n"
+        f"version = {VERSION}\n"
         f"{density}\n[orientation]\na = {max(p['a'], 1.0)!r}\nb = {p['b']!r}\nc = {p['c']!r}\n\n"
         f"[heights]\nalpha = {p['alpha']!r}\nbeta = {p['beta']!r}  # m\n"
         f'overlap = {p["overlap"]!r}  # m\nformation = "individual"\n'

@@ -12,7 +12,6 @@ import numpy as np
 
 from ..calibration import datasets
 from ..calibration.baselines import Comparison, compare
-from ..calibration.curve_files import ClosureData, read_closure
 from ..calibration.fit import Fit, fit_closure, fit_many
 from ..calibration.measured import first_loading
 from ..calibration.unloading import explain
@@ -84,7 +83,9 @@ def _folders(options: argparse.Namespace) -> list[Path]:
     return [options.out / stem for stem in items]
 
 
-def _write(folder: Path, name: str, fit: Fit, test: ClosureData, held: Comparison | None) -> None:
+def _write(
+    folder: Path, name: str, fit: Fit, test: datasets.ClosureData, held: Comparison | None
+) -> None:
     text = fit.report()
     summary: dict[str, Any] = {
         "data": name,
@@ -126,10 +127,10 @@ def _held_out(held: Comparison) -> str:
     )
 
 
-def _read(options: argparse.Namespace, item: str) -> ClosureData:
+def _read(options: argparse.Namespace, item: str) -> datasets.ClosureData:
     if item in datasets.names() and not Path(item).exists():
         return datasets.load(item)
-    return read_closure(item, options.stress_column, options.closure_column)
+    return datasets.read_closure(item, options.stress_column, options.closure_column)
 
 
 def _limit(text: str | None, stress: Any) -> float:

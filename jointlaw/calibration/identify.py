@@ -105,17 +105,11 @@ def _least_misfit(
 ) -> tuple[float, Array]:
     """Least sum of squares with one parameter held at a value, and the others (p - 1,) there."""
 
-    def whole(y: Array) -> Array:
-        return np.insert(y, at, value)
+    def residuals(y: Array) -> Array:
+        return problem.residuals(np.insert(y, at, value), sigma)
 
     if not others.size:
-        x = whole(others)
-        return float(np.sum((problem.data(x) / sigma) ** 2) + np.sum(problem.prior(x) ** 2)), others
-    found = minimise(
-        lambda y: problem.data(whole(y)),
-        lambda y: problem.prior(whole(y)),
-        sigma,
-        others,
-        *(np.delete(bound, at) for bound in problem.bounds()),
-    )
+        return float(np.sum(residuals(others) ** 2)), others
+    low, high = (np.delete(bound, at) for bound in problem.bounds())
+    found = minimise(residuals, others, low, high)
     return 2 * float(found.cost), found.x

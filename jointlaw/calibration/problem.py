@@ -92,6 +92,10 @@ class Problem:
             for name, (centre, sd) in self.priors.items()
         ])  # fmt: skip
 
+    def residuals(self, x: Array, sigma: Array) -> Array:
+        """Residuals of the data over their standard errors, then those of the priors."""
+        return np.concatenate([self.data(x) / sigma, self.prior(x)])
+
     def sigma(self, noise: Sequence[Noise]) -> Array:
         """Standard errors of all residuals at these noises of the curves."""
         pairs = zip(noise, self.curves, strict=True)

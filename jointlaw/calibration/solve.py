@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,7 +55,7 @@ def solve(problem: Problem, starts: Sequence[Array]) -> Solution:
     cuts = np.cumsum([s.size for s in steepness])[:-1]
     low, high = problem.bounds()
     noise, sigma = expected, problem.sigma(expected)
-    fits = [minimise(problem.data, problem.prior, sigma, x, low, high) for x in starts]
+    fits = [minimise(partial(problem.residuals, sigma=sigma), x, low, high) for x in starts]
     best = min(fits, key=lambda fit: float(fit.cost))
     for _ in range(ROUNDS):
         r = problem.data(best.x)
@@ -70,21 +71,15 @@ def solve(problem: Problem, starts: Sequence[Array]) -> Solution:
         if noise == previous:
             break
         sigma = problem.sigma(noise)
-        best = minimise(problem.data, problem.prior, sigma, best.x, low, high)
+        best = minimise(partial(problem.residuals, sigma=sigma), best.x, low, high)
     known = all(n.known for n in noise)
     freedom = np.inf if known else NOISE_WEIGHT + r.size - float(np.sum(leverage))
     share = np.diag(C @ precision @ C) / np.diag(C)
     return Solution(best.x, np.asarray(C, np.float64), noise, freedom, share)
 
 
-def minimise(
-    data: Function, prior: Function, sigma: Array, start: Array, low: Array, high: Array
-) -> Any:
+def minimise(residuals: Function, start: Array, low: Array, high: Array) -> Any:
     """One least squares problem, from one start; the result of `least_squares`."""
-
-    def residuals(x: Array) -> Array:
-        return np.concatenate([data(x) / sigma, prior(x)])
-
     margin = 1e-9 * (high - low)
     inside = np.clip(start, low + margin, high - margin)
     return least_squares(residuals, inside, bounds=(low, high), x_scale="jac", xtol=1e-9)

@@ -19,7 +19,7 @@ from .identify import Profile, profile, reasons
 from .measured import ClosureCurve, ShearCurve
 from .plot import Points, plot_fit
 from .priors import Ranges, Values
-from .problem import pose, start_places
+from .problem import pose, starting_points
 from .report import preset, report
 from .solve import solve
 
@@ -157,7 +157,7 @@ def fit_curves(
     Returns a `Fit`. Raises ValueError naming the parameter when something does not fit.
     """
     problem = pose(curves, free, fixed, law, formation, priors)
-    return Fit(problem, solve(problem, start_places(problem, near=law is not None)))
+    return Fit(problem, solve(problem, starting_points(problem, near=law is not None)))
 
 
 def fit_many(

@@ -24,7 +24,7 @@ Curves = Sequence[ClosureCurve | ShearCurve]
 class Problem:
     """Curves, free parameters, the values of all others, and priors (centre, sd) by name.
 
-    A place x (p,) holds the free parameters after their transforms, mostly logarithms.
+    A vector x (p,) holds the free parameters after their transforms, mostly logarithms.
     """
 
     curves: tuple[ClosureCurve | ShearCurve, ...]
@@ -39,7 +39,7 @@ class Problem:
         return name_seatings(self.curves)
 
     def unpack(self, x: Array) -> dict[str, float]:
-        """All parameters in SI units at a place."""
+        """All parameters in SI units from the vector of the free ones."""
         values = dict(self.values)
         values |= {n: transform_of(n).back(float(v)) for n, v in zip(self.free, x, strict=True)}
         if "c" in self.free:
@@ -47,17 +47,17 @@ class Problem:
             values["c"] = min(max(values["c"], -bound), bound)
         return values
 
-    def place(self, values: Values) -> Array:
-        """The place of these values, or the nearest within bounds."""
+    def pack(self, values: Values) -> Array:
+        """The vector of these values, or the nearest within bounds."""
         inside = []
         for name in self.free:
             transform = transform_of(name)
             inside.append(transform.to(min(max(values[name], transform.low), transform.high)))
         return np.clip(inside, *self.bounds())
 
-    def scaled_place(self, values: Values) -> Array:
+    def pack_scaled(self, values: Values) -> Array:
         """The same with the stiffness brought to the level of the first closure curve."""
-        x = self.place(values)
+        x = self.pack(values)
         stiff = next((n for n in ("asperity_density", "K") if n in self.free), None)
         if stiff is not None and self.closures:
             v, (seating, curve) = self.unpack(x), self.closures[0]
@@ -66,7 +66,7 @@ class Problem:
         return x
 
     def bounds(self) -> tuple[Array, Array]:
-        """Lower and upper bounds of a place."""
+        """Lower and upper bounds of the vector."""
         transforms = [transform_of(name) for name in self.free]
         low = np.array([t.to(t.low) for t in transforms])
         high = np.array([t.to(t.high) for t in transforms])
@@ -138,25 +138,25 @@ def pose(
     return Problem(tuple(curves), tuple(names), values, chosen, settings)
 
 
-def start_places(problem: Problem, near: bool) -> list[Array]:
-    """Places to start from: the values at hand, and for closure narrow to broad heights.
+def starting_points(problem: Problem, near: bool) -> list[Array]:
+    """Vectors to start from: the values at hand, and for closure narrow to broad heights.
 
     near: whether the values at hand are those of a law and not the defaults.
     """
     if not problem.closures:
-        return [problem.place(problem.values)]
+        return [problem.pack(problem.values)]
     free = set(problem.free)
     if not free & {"alpha", "beta"} or (near and len(problem.closures) < len(problem.curves)):
-        return [problem.scaled_place(problem.values)]
+        return [problem.pack_scaled(problem.values)]
     span = float(np.ptp(problem.closures[0][1].closure))
-    places = []
+    starts = []
     for shape in (2.0, 5.0, 10.0) if "alpha" in free else (problem.values["alpha"] + 1,):
         guess: dict[str, Any] = {"alpha": shape - 1, "beta": 1.5 * span / shape}
         guess["overlap"] = 0.1 * shape * guess["beta"]
         guess |= {name: span / 2 for name in free if name.startswith("seating")}
         chosen = {name: value for name, value in guess.items() if name in free}
-        places.append(problem.scaled_place({**problem.values, **chosen}))
-    return places
+        starts.append(problem.pack_scaled({**problem.values, **chosen}))
+    return starts
 
 
 def name_seatings(curves: Curves) -> list[tuple[str, ClosureCurve]]:

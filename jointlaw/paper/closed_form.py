@@ -16,23 +16,12 @@ for, any object with a, b and c serves: `Shape` is one whose a may be infinite.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
-from ..parameters.orientation import bounded
+from ..parameters.orientation import Orientation, bounded
 from ..support.checks import Array, at_least, number
-
-
-class HasShape(Protocol):
-    """What the closed forms read of an orientation."""
-
-    @property
-    def a(self) -> float: ...
-    @property
-    def b(self) -> float: ...
-    @property
-    def c(self) -> float: ...
 
 
 class Shape(NamedTuple):
@@ -41,6 +30,9 @@ class Shape(NamedTuple):
     a: float
     b: float = 0.0
     c: float = 0.0
+
+
+HasShape = Orientation | Shape
 
 
 def elastic(orientation: HasShape, kn: float, ks: float) -> Array:

@@ -17,17 +17,14 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..law import JointLaw
+from ..parameters.asperity import Asperity
+from ..parameters.orientation import Orientation
 from ..support.checks import Array, numbers, one_of
-
-if TYPE_CHECKING:
-    from ..law import JointLaw
-    from ..parameters.asperity import Asperity
-    from ..parameters.orientation import Orientation
 
 _THETA_NODES, _PHI_NODES = 32, 24  # per panel: 1e-8 of |C| at worst, 1e-12 as a rule
 

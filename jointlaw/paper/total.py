@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq, minimize_scalar
 
-from ...law import JointLaw
-from ...support.checks import Array
-from ..secant import secant
+from ..law import JointLaw
+from ..support.checks import Array
+from .secant import secant
 
 
 @dataclass(frozen=True, eq=False)

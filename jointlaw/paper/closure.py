@@ -15,11 +15,10 @@ from scipy.optimize import brentq
 from ..law import JointLaw
 from ..support.checks import Array
 from .draw import LAW, TOTAL
-from .runs import gamma_heights, law
+from .runs import gamma_heights, law, total_closure
 from .secant import secant
 from .section import Bound, Numbers, Section
 from .surface import WESTERLY
-from .total import total_closure
 
 SECTION = Section()
 SMOOTH, ROUGH, REPLICA = "westerly-smooth", "westerly-rough", "jing-replica"

@@ -33,16 +33,14 @@ def write_figures(folder: str | Path, numbers: Sequence[int] = ()) -> list[Path]
             raise ValueError(f"figure {number} is not one of {known} (1 and 2 are sketches)")
     wanted = sorted({FIGURES[number].numbers[0] for number in numbers or FIGURES})
     out, files, captions = Path(folder), [], {}
-    with draw.style():
+    for number in track(wanted, "figures", len(wanted)):
+        figure = FIGURES[number]
+        png, curves = draw.rendered(figure)
         out.mkdir(parents=True, exist_ok=True)
-        for number in track(wanted, "figures", len(wanted)):
-            figure = FIGURES[number]
-            page = draw.drawn(figure)
-            pair = [out / f"{figure.name}.png", out / f"{figure.name}.csv"]
-            replace_file(pair[0], draw.png(page))
-            replace_file(pair[1], draw.points(page).encode())
-            files += pair
-            captions[figure.name] = {"title": figure.title, "caption": figure.caption}
+        for ending, data in ((".png", png), (".csv", curves.encode())):
+            files.append(out / f"{figure.name}{ending}")
+            replace_file(files[-1], data)
+        captions[figure.name] = {"title": figure.title, "caption": figure.caption}
     write_json(out / "summary.json", {"figures": captions})
     return [*files, out / "summary.json"]
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import textwrap
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -23,15 +21,17 @@ _STYLE: dict[Any, Any] = {
 }  # fmt: skip
 
 
-@contextmanager
-def style() -> Iterator[None]:
-    """Draw and save within it, in the style of these figures. ImportError without matplotlib."""
+def rendered(figure: Figure) -> tuple[bytes, str]:
+    """The figure as PNG, and its curves as CSV. Raises ImportError without matplotlib."""
     try:
         from matplotlib import rc_context
     except ImportError as error:
         raise ImportError("figures need matplotlib: pip install 'jointlaw[plot]'") from error
+    out = io.BytesIO()
     with rc_context(_STYLE):
-        yield
+        page = drawn(figure)
+        page.savefig(out, format="png")
+    return out.getvalue(), points(page)
 
 
 def drawn(figure: Figure) -> Any:
@@ -53,19 +53,13 @@ def drawn(figure: Figure) -> Any:
     for panel in panels:
         if figure.polar:
             panel.set_thetagrids(range(0, 360, 30))
-            panel.yaxis.labelpad = 25
+            panel.yaxis.labelpad = 32
         if panel.get_legend_handles_labels()[1]:
             panel.legend(**place)
-    page.suptitle(f"{figure.shown}: {figure.title}")
+    shown = "Figure " if len(figure.numbers) == 1 else "Figures "
+    page.suptitle(f"{shown}{' and '.join(map(str, figure.numbers))}: {figure.title}")
     page.text(0.02, 0.1 / height, caption, fontsize=8, va="bottom")
     return page
-
-
-def png(page: Any) -> bytes:
-    """The drawn figure as PNG."""
-    out = io.BytesIO()
-    page.savefig(out, format="png")
-    return out.getvalue()
 
 
 def points(page: Any) -> str:
@@ -84,10 +78,3 @@ def points(page: Any) -> str:
                 curve = line.get_label().lstrip("_")
                 rows.writerow([panel.get_title(), curve, *axes, *(f"{v:.8g}" for v in point)])
     return out.getvalue()
-
-
-def log_ticks(axes: Any, ticks: Sequence[float]) -> None:
-    """A logarithmic x axis with these ticks alone."""
-    axes.set_xscale("log")
-    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
-    axes.minorticks_off()

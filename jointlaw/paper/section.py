@@ -26,16 +26,10 @@ class Bound(NamedTuple):
     most: float | str = math.inf
     why: str = ""
 
-    def interval(self, numbers: Numbers) -> tuple[float, float]:
-        """Both ends as values."""
-        least, most = (
-            numbers[end] if isinstance(end, str) else end for end in (self.least, self.most)
-        )
-        return least, most
-
     def holds(self, numbers: Numbers) -> bool:
         """Whether the number is inside; NaN is not."""
-        least, most = self.interval(numbers)
+        ends = (self.least, self.most)
+        least, most = (numbers[end] if isinstance(end, str) else end for end in ends)
         return least < numbers[self.number] < most
 
 
@@ -105,12 +99,6 @@ class Figure:
     def name(self) -> str:
         """File name without its ending."""
         return "-".join(["figure", *(f"{number:02d}" for number in self.numbers)])
-
-    @property
-    def shown(self) -> str:
-        """What the paper calls it."""
-        plural = "s" if len(self.numbers) > 1 else ""
-        return f"Figure{plural} {' and '.join(map(str, self.numbers))}"
 
 
 @dataclass(frozen=True)

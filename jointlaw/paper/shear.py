@@ -166,13 +166,6 @@ def figure_16(*panels: Any) -> None:
         axes.set(title=kind, xlabel=AXIS, ylabel="share of asperities", ylim=(-0.02, 1.05))
 
 
-def _sliding_tilts(a: int) -> tuple[float, float]:
-    """Shear over closure at which sliding begins and is complete in the total form."""
-    p, edge = law(f"linear-a{a}").asperity, 0.5 * math.pi / a
-    cone = math.atan(p.mu * p.lam)
-    return math.tan(max(cone - edge, 0.0)), math.tan(cone + edge)
-
-
 @SECTION.claim(
     "sliding-complete",
     "Fig. 16",
@@ -184,48 +177,43 @@ def _sliding_tilts(a: int) -> tuple[float, float]:
     [Bound(f"{stage}_a6", most=f"{stage}_a3") for stage in ("begin", "half", "full", "law")],
     one_reading=[Bound(f"{stage}_a6", most=f"{stage}_a3") for stage in ("full", "law")],
 )
-def sliding_complete() -> Numbers:
+def sliding_during_shear() -> Numbers:
     numbers: Numbers = {}
     for a in (3, 6):
-        begin, full = _sliding_tilts(a)
-        run = incremental(f"linear-a{a}", TO, closure=CLOSURE)
+        name, p, edge = f"linear-a{a}", law(f"linear-a{a}").asperity, 0.5 * math.pi / a
+        cone = math.atan(p.mu * p.lam)
 
-        def misfit(t: float, name: str = f"linear-a{a}") -> float:
+        def misfit(t: float, name: str = name) -> float:
             return secant(law(name), (1.0, t, 0.0)).sliding - 0.5
 
+        full, run = math.tan(cone + edge), incremental(name, TO, closure=CLOSURE)
+        row, F = first_sliding(run), secant(law(name), (1.0, full, 0.0)).F
         numbers |= {
-            f"begin_a{a}": begin,
+            f"begin_a{a}": math.tan(max(cone - edge, 0.0)),
             f"half_a{a}": float(brentq(misfit, 0.01, 1.5)),
             f"full_a{a}": full,
-            f"law_a{a}": float(run.shear[first_sliding(run)]) * 1e6,
+            f"law_a{a}": float(run.shear[row]) * 1e6,
+            f"total_at_a{a}": float(F[1] / F[0]),
+            f"law_at_a{a}": float(ratio(run)[row]),
         }
     return numbers
 
 
-@SECTION.claim(
+SECTION.claim(
     "sliding-resistance",
     "Fig. 16",
     "and at a lower shear resistance, close to mu, for a = 6",
-    "F₂/F₁ when sliding is complete: {law_a6:.3f} (a = 6) and {law_a3:.3f} (a = 3); total form "
-    "{total_a6:.3f} and {total_a3:.3f}",
+    "F₂/F₁ when sliding is complete: {law_at_a6:.3f} (a = 6) and {law_at_a3:.3f} (a = 3); total "
+    "form {total_at_a6:.3f} and {total_at_a3:.3f}",
     [
         bound
         for kind in FORMS
         for bound in (
-            Bound(f"{kind}_a6", most=f"{kind}_a3"),
-            near(f"{kind}_a6", FRICTION, 0.03, "close: within 5 %"),
+            Bound(f"{kind}_at_a6", most=f"{kind}_at_a3"),
+            near(f"{kind}_at_a6", FRICTION, 0.03, "close: within 5 %"),
         )
     ],
-)
-def sliding_resistance() -> Numbers:
-    numbers: Numbers = {}
-    for a in (3, 6):
-        _, full = _sliding_tilts(a)
-        F = secant(law(f"linear-a{a}"), (CLOSURE, full * CLOSURE, 0.0)).F
-        run = incremental(f"linear-a{a}", TO, closure=CLOSURE)
-        numbers[f"total_a{a}"] = float(F[1] / F[0])
-        numbers[f"law_a{a}"] = float(ratio(run)[first_sliding(run)])
-    return numbers
+)(sliding_during_shear)
 
 
 @SECTION.claim(

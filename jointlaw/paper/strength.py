@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from ..parameters.heights import GammaHeights
 from ..parameters.resolution import Resolution
 from .closed_form import inclination
 from .closure import mirrored
-from .draw import LAW, QUOTED, TOTAL, log_ticks
+from .draw import LAW, QUOTED, TOTAL
 from .runs import (
     first_sliding,
     gamma_heights,
@@ -24,9 +24,9 @@ from .runs import (
     resistance,
     simple,
     total,
+    total_shear,
 )
 from .section import Bound, Numbers, Section
-from .total import total_shear
 
 SECTION = Section()
 BIEGEL = (("biegel-smooth", "smooth", "C0"), ("biegel-rough", "rough", "C1"))
@@ -158,21 +158,17 @@ SLIP = 1e-3  # m, our choice of a fixed slip at which to read a friction angle
 _COARSE = Resolution(8, 12, 16)  # cells: yield is read where the last of them slides
 
 
-class Yield(NamedTuple):
-    """When all asperities in touch slide: shear over seated closure, friction angle (deg)."""
-
-    slip: float
-    angle: float
-
-
 @cache
-def law_yield(stress: float, azimuth: float) -> Yield:
-    """Yield of the replica at a kept normal stress (Pa) along an azimuth (rad)."""
+def law_yield(stress: float, azimuth: float) -> tuple[float, float]:
+    """When all asperities of the replica in touch slide, along an azimuth (rad).
+
+    At a kept normal stress (Pa): friction angle (deg), and shear over the seated closure.
+    """
     found = replace(law(REPLICA), resolution=_COARSE)
     closure = float(found.closure(stress))
     record = direct_shear(found.joint(), 0.6 * closure, stress, "stress", azimuth, steps=40)
     row = first_sliding(record)
-    return Yield(float(record.shear[row]) / closure, float(record.friction_angle[row]))
+    return float(record.friction_angle[row]), float(record.shear[row]) / closure
 
 
 def total_yield(azimuth: float) -> float:
@@ -233,7 +229,7 @@ def figure_18(left: Any, right: Any) -> None:
         (1e6, "-", "1 MPa"),
         (10e6, ":", "10 MPa"),
     ):
-        angles = mirrored([law_yield(stress, x).angle for x in quarter])
+        angles = mirrored([law_yield(stress, x)[0] for x in quarter])
         right.plot(whole, angles, style, label=label)
     limit = np.full(whole.shape, slip_limit())
     for axes, title in ((left, TOTAL), (right, LAW)):
@@ -252,7 +248,7 @@ def figure_18(left: Any, right: Any) -> None:
 )
 def friction_anisotropy() -> Numbers:
     numbers: Numbers = {}
-    for kind, angle in (("total", total_yield), ("law", lambda x: law_yield(1e6, x).angle)):
+    for kind, angle in (("total", total_yield), ("law", lambda x: law_yield(1e6, x)[0])):
         angles = {f"{kind}_{x}": angle(math.radians(x)) for x in (0, 45, 90)}
         numbers |= angles | {f"{kind}_range": max(angles.values()) - min(angles.values())}
     return numbers
@@ -275,17 +271,16 @@ def figure_19(*panels: Any) -> None:
     for part, (axes, kind) in enumerate(zip(panels, (TOTAL, LAW), strict=True)):
         for degrees, color in ((0, "C0"), (90, "C1")):
             turn = math.radians(degrees)
-            slides = [
-                total_yield(turn) if part == 0 else law_yield(s, turn).angle for s in STRESSES
-            ]
+            slides = [total_yield(turn) if part == 0 else law_yield(s, turn)[0] for s in STRESSES]
             fixed = [slip_angles(s, turn)[part] for s in STRESSES]
             axes.plot(x, slides, "o-", color=color, label=f"all in touch slide, {degrees}°")
             axes.plot(x, fixed, "s--", color=color, label=f"slip of 1 mm, {degrees}°")
         label = "normal stress 0, any slip"
         axes.axhspan(limit - 0.3, limit + 0.3, color="C7", label=label, **QUOTED)
-        log_ticks(axes, (0.1, 0.3, 1, 3, 10))
         axes.set(title=kind, xlabel="normal stress (MPa)", ylabel="friction angle (°)")
-        axes.set_ylim(0.0, 65.0)
+        axes.set(xscale="log", ylim=(0.0, 65.0))
+        axes.set_xticks(x, [f"{stress:g}" for stress in x])
+        axes.minorticks_off()
 
 
 @SECTION.claim(
@@ -304,13 +299,21 @@ def figure_19(*panels: Any) -> None:
         Bound("slides_range", most=3.0, why="our reading of nearly, over two decades of stress")
     ],
 )
-def friction_independent() -> Numbers:
-    slides = [law_yield(s, 0.0).angle for s in STRESSES]
+def friction_against_stress() -> Numbers:
+    angles = [law_yield(s, 0.0)[0] for s in STRESSES]
+    small, slip = law_yield(NEARLY_ZERO, 0.0)
     numbers = {
-        "low": min(slides),
-        "high": max(slides),
-        "slides_range": max(slides) - min(slides),
+        "low": min(angles),
+        "high": max(angles),
+        "slides_range": max(angles) - min(angles),
         "total": total_yield(0.0),
+        "limit": slip_limit(),
+        "far": total_angle(math.pi / 2 + 0.98 * _steepest(), 0.0),
+        "at_1MPa": angles[2],
+        "slip": slip,
+        "small": small,
+        "rise": slip_limit() - angles[2],
+        "rise_small": small - angles[2],
     }
     ends = (slip_angles(s, 0.0) for s in (STRESSES[0], STRESSES[-1]))
     for kind, first, last in zip(FORMS, *ends, strict=True):
@@ -319,7 +322,7 @@ def friction_independent() -> Numbers:
     return numbers
 
 
-@SECTION.claim(
+SECTION.claim(
     "friction-at-zero",
     "Fig. 18, 19",
     "friction angle distinctly larger at zero normal stress",
@@ -332,18 +335,7 @@ def friction_independent() -> Numbers:
         Bound("rise_small", least=3.0, why="more than it changes with stress above zero"),
     ],
     one_reading=[Bound("rise", least=3.0, why="more than it changes with stress above zero")],
-)
-def friction_at_zero() -> Numbers:
-    small, one = law_yield(NEARLY_ZERO, 0.0), law_yield(1e6, 0.0)
-    return {
-        "limit": slip_limit(),
-        "far": total_angle(math.pi / 2 + 0.98 * _steepest(), 0.0),
-        "at_1MPa": one.angle,
-        "slip": small.slip,
-        "small": small.angle,
-        "rise": slip_limit() - one.angle,
-        "rise_small": small.angle - one.angle,
-    }
+)(friction_against_stress)
 
 
 # -------------------------------------------------------------------------------- section 5

@@ -137,17 +137,11 @@ def figure_4(side: Any, plan: Any) -> None:
         (plan, (0.55, -0.3), "azimuth turns from 2 to 3", "0.2"),
     ):
         axes.text(*where, text, fontsize=8, color=color, ha="center")
-    for axes, title, xlabel, ylabel in (
-        (
-            side,
-            "section along the azimuth of the asperity",
-            "along the interface",
-            "axis 1 (downwards)",
-        ),
-        (plan, "plan of the interface, seen along axis 1", "axis 2", "axis 3"),
-    ):
-        axes.set(title=title, xlabel=xlabel, ylabel=ylabel, aspect="equal")
-        axes.set(xlim=(-1.8, 1.8), ylim=(-1.4, 1.4))
+    side.set(title="section along the azimuth of the asperity", xlabel="along the interface")
+    side.set_ylabel("axis 1 (downwards)")
+    plan.set(title="plan of the interface, seen along axis 1", xlabel="axis 2", ylabel="axis 3")
+    for axes in (side, plan):
+        axes.set(xlim=(-1.8, 1.8), ylim=(-1.4, 1.4), aspect="equal")
         axes.set_axis_off()
 
 

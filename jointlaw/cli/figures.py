@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
-from .command import add_command
+from .command import add_command, add_out
 
 
 def add_figures_command(subparsers: Any) -> None:
@@ -14,7 +13,7 @@ def add_figures_command(subparsers: Any) -> None:
     what = "regenerate the figures of Misra 1999, or print the table of its claims with our numbers"
     parser = add_command(subparsers, "figures", what, "jointlaw figures 14 15 --out out")
     parser.add_argument("numbers", metavar="N", nargs="*", type=int, help="figures (default: all)")
-    parser.add_argument("--out", type=Path, help="folder for PNG, CSV and summary.json")
+    add_out(parser, required=False)
     parser.add_argument(
         "--claims",
         metavar="KEY",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..laboratory.plot import _pyplot
+from ..support.pyplot import pyplot as _pyplot
 from ..parameters.resolution import NAMED
 
 if TYPE_CHECKING:

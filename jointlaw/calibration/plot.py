@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..laboratory.plot import _pyplot
+from ..support.pyplot import pyplot as _pyplot
 from ..surface.direction_fit import model_inclination
 from .measured import ClosureCurve, build
 

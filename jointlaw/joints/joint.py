@@ -7,6 +7,7 @@ from copy import copy
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..kernels.reference import Measures
 from ..law import JointLaw
 from ..support.checks import Array, numbers
 from .batch import JointBatch, components
@@ -79,6 +80,10 @@ class Joint:
         """Traction (dim,) in Pa."""
         F: Array = self._batch.F[0]
         return F
+
+    def measures(self) -> Measures:
+        """Shares, stored energy and reach of `JointBatch.measures` in one pass, as numbers."""
+        return Measures(*(value[0] for value in self._batch.measures()))
 
     @property
     def sliding(self) -> float:

@@ -14,6 +14,9 @@ import numpy as np
 
 from ..support.checks import Array
 from ..support.files import replace_file
+from .plot import plot_record
+
+VERSION = 1  # of the NPZ file
 
 UNITS = {
     "closure": "m",
@@ -121,14 +124,15 @@ class Record:
         replace_file(Path(path), buffer.getvalue().encode())
 
     def to_npz(self, path: str | Path) -> None:
-        """Write the columns as NPZ with the azimuth and a JSON text of the units."""
+        """Write the columns as NPZ with the azimuth, a JSON text of the units and a version."""
         buffer = io.BytesIO()
         arrays: dict[str, Any] = dict(self.columns)
-        np.savez(buffer, **arrays, azimuth=self.azimuth, units=json.dumps(UNITS))
+        units = json.dumps(UNITS)
+        np.savez(buffer, **arrays, azimuth=self.azimuth, units=units, version=VERSION)
         replace_file(Path(path), buffer.getvalue())
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Draw the test (needs matplotlib: extra `plot`); returns the figure, saved to `path`."""
-        from .plot import plot_record
-
-        return plot_record(self, path)
+        derived = ("shear", "shear_stress", "friction_angle")
+        curves = {**self.columns, **{name: getattr(self, name) for name in derived}}
+        return plot_record(curves, self.azimuth, path)

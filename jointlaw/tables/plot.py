@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..laboratory.plot import _pyplot
+from ..support.pyplot import pyplot as _pyplot
 
 if TYPE_CHECKING:
     from .table import JointTable

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..support.pyplot import pyplot as _pyplot
 from ..parameters.resolution import NAMED
+from ..support.pyplot import pyplot as _pyplot
 
 if TYPE_CHECKING:
     from .tradeoff import Tradeoff

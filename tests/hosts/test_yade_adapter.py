@@ -11,7 +11,7 @@ def turn(N):
     O.bodies.append([utils.sphere((0, 0, 0), 0.5), utils.sphere((.999, 0, 0), 0.4999)])
     for b in O.bodies: b.state.blockedDOFs = "xyzXYZ"
     engines()
-    joints = Joints(Table("joint.txt"))
+    joints = Joints(TableLaw("joint.txt"))
     joints.attach()
     O.dt = 1e-3
     O.step()
@@ -68,8 +68,8 @@ def scene(joints, keep, gone):
         O.bodies[1].state.pos = (0, 0, .5 + gone)
         O.step()
     return out
-result(table=scene(Joints(Table("joint.txt")), False, 1e-3),
-       live=scene(Joints(Live(law), forget=.1 * end), True, .3 * end))
+result(table=scene(Joints(TableLaw("joint.txt")), False, 1e-3),
+       live=scene(Joints(LiveLaw(law), forget=.1 * end), True, .3 * end))
 """
 )
 
@@ -100,7 +100,7 @@ def attempt(name, action):
     except Exception as error:
         messages[name] = str(error)
 def joints(**options):
-    return Joints(Table("joint.txt"), **options)
+    return Joints(TableLaw("joint.txt"), **options)
 slab_and_sphere()
 attempt("no loop", lambda: joints().attach())
 engines()
@@ -169,7 +169,7 @@ def test_refusals_name_the_remedy(yade, make_table, tmp_path):
     out = yade(REFUSALS)
     told = {
         "no loop": "set O.engines before attach", "stepper": "joints.time_step()",
-        "keep": "neverErase=True", "lagged live": "Table only", "name": "identifier",
+        "keep": "neverErase=True", "lagged live": "TableLaw only", "name": "identifier",
         "run": ".load(file)", "periodic": "O.periodic", "area": "area = -1", "phys": "select=",
         "missed": "every step", "taken": "give another name=",
     }  # fmt: skip
@@ -190,7 +190,7 @@ def steps(area):
     for k in (1, 2): O.bodies[k].state.blockedDOFs = "xyzXYZ"
     O.bodies[1].state.pos = (0, 0, .499)
     engines()
-    joints = Joints(Table("joint.txt"), area=area)
+    joints = Joints(TableLaw("joint.txt"), area=area)
     joints.attach()
     try:
         before = joints.time_step()
@@ -200,7 +200,7 @@ def steps(area):
     O.step()
     return before, joints.time_step()
 result(number=steps(10.0), array=steps(np.array(10.0)), function=steps(lambda i: 10.0),
-       circle=steps(None), k=Table("joint.txt").stiffness(), m=O.bodies[1].state.mass)
+       circle=steps(None), k=TableLaw("joint.txt").stiffness(), m=O.bodies[1].state.mass)
 """
 
 

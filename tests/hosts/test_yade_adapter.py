@@ -107,8 +107,8 @@ engines()
 O.engines = O.engines[:3] + [GlobalStiffnessTimeStepper()] + O.engines[3:]
 attempt("stepper", lambda: joints().attach())
 engines()
-class LiveStub:
-    live = True
+class LiveStub:  # no TableLaw
+    pass
 attempt("keep", lambda: Joints(LiveStub()).attach())
 attempt("lagged live", lambda: Joints(LiveStub(), lagged=True))
 attempt("name", lambda: joints(name="a b"))
@@ -169,7 +169,7 @@ def test_refusals_name_the_remedy(yade, make_table, tmp_path):
     out = yade(REFUSALS)
     told = {
         "no loop": "set O.engines before attach", "stepper": "joints.time_step()",
-        "keep": "neverErase=True", "lagged live": "TableLaw only", "name": "identifier",
+        "keep": "neverErase=True", "lagged live": "needs a TableLaw", "name": "identifier",
         "run": ".load(file)", "periodic": "O.periodic", "area": "area = -1", "phys": "select=",
         "missed": "every step", "taken": "give another name=",
     }  # fmt: skip

@@ -32,9 +32,9 @@ def export_yade(
         closure ranges; the table's metadata state it.
 
     Writes `joint.txt` and `joint.npz` (the table), `law.toml` (for live mode), `yade_joint.py` with
-    `table_law.py` (the adapter: YADE and numpy alone), the scripts and `summary.json`. Returns the table. Raises
-    ValueError for a law or option that cannot be tabulated and for a table of another law, before
-    anything is written.
+    `table_law.py` (the adapter: YADE and numpy alone), the scripts and `summary.json`. Returns the
+    table. Raises ValueError for a law or option that cannot be tabulated and for a table of another
+    law, before anything is written.
     """
     require_3d(law)
     if table is None:

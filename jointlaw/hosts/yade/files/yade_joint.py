@@ -142,9 +142,7 @@ class Joints:
         if not name.isidentifier():
             raise ValueError(f"name = {name!r} must be a Python identifier: it labels the engine")
         if lagged and not isinstance(law, TableLaw):
-            raise ValueError(
-                "lagged = True works with a TableLaw only: a live law has no kn and ks"
-            )
+            raise ValueError("lagged = True needs a TableLaw: a live law has no kn and ks")
         self.law, self.select, self.name = law, select, name
         self.area = area if area is None or callable(area) else float(area)
         self.azimuth = unit(np.array(azimuth, float))
@@ -192,8 +190,7 @@ class Joints:
             raise ValueError("O.periodic = True: joints across a periodic boundary are not covered")
         if any(k == "GlobalStiffnessTimeStepper" and not e.dead for k, e in zip(kinds, engines)):
             raise ValueError(
-                "GlobalStiffnessTimeStepper sees kn = 0 on joints; remove it and set "
-                "O.dt = joints.time_step()"
+                "GlobalStiffnessTimeStepper sees kn = 0: remove it, set O.dt = joints.time_step()"
             )
         if self.lagged:
             warnings.warn(
@@ -270,10 +267,8 @@ class Joints:
         gc.disable()  # thousands of small YADE handles are made and dropped: no cycles among them
         try:
             self._find(now)
-            if self.lagged:
-                self._rewrite()
-            elif self.own:
-                self._act()
+            if self.own:
+                self._rewrite() if self.lagged else self._act()
             elif self.ids:
                 self.x, self.q = self._read()
         finally:
@@ -309,11 +304,9 @@ class Joints:
         F = self.law.step(d, closure, spin)
         force = (n * F[0] + t2 * F[1] + cross(n, t2) * F[2]) * -c["area"]
         c.update(n=n, t2=t2, c1=c1, c2=c2, closure=closure, F=F)
-        extra = force
         if fresh.size:
-            extra = force.copy()
-            extra[:, fresh] -= self._take_back(fresh)
-        self._add(extra, c1, c2)
+            force[:, fresh] -= self._take_back(fresh)
+        self._add(force, c1, c2)
         if self.forget < np.inf:
             for k in np.flatnonzero((closure < -self.forget) & ~F.any(axis=0)):
                 O.interactions.erase(int(c["id1"][k]), int(c["id2"][k]))
@@ -385,8 +378,6 @@ class Joints:
     def _rewrite(self):
         """The lagged option: what YADE's own law will use in the next step."""
         c = self.c
-        if not self.own:
-            return
         x, q = self._read()
         n, un, c1, c2 = self._geometry(x, q.take(c["b1"], axis=1))
         closure = c["closure"] = un - c["zero"]
@@ -452,7 +443,7 @@ class Joints:
 
     def _join(self, contacts):
         """New contacts: choose the joints among them and set up what stays constant."""
-        rows = []
+        own, rows = [], []
         for i in contacts:
             if self.select is not None and not self.select(i):
                 self.others.append(i)
@@ -463,27 +454,19 @@ class Joints:
                     f"{type(i.phys).__name__}; joints need ScGeom and FrictPhys (Ip2_FrictMat_"
                     "FrictMat_FrictPhys, Law2_ScGeom_FrictPhys_CundallStrack); select= excludes it"
                 )
-            rows.append((i, *self._radii(i)))
-        if not rows:
+            own.append(i)
+            rows.append((i.id1, i.id2, i.iterMadeReal, *self._radii(i)))
+        if not own:
             return
-        first, m = len(self.own), len(rows)
-        self.own += [row[0] for row in rows]
-        new = {
-            "id1": [i.id1 for i, *_ in rows],
-            "id2": [i.id2 for i, *_ in rows],
-            "made": [i.iterMadeReal for i, *_ in rows],
-            "R1": [row[1] for row in rows],
-            "R2": [row[2] for row in rows],
-            "ball": [row[3] for row in rows],
-            "area": [row[4] for row in rows],
-        }
+        first, m = len(self.own), len(own)
+        self.own += own
+        new = dict(zip(("id1", "id2", "made", "R1", "R2", "ball", "area"), zip(*rows)))
         new["b1"], new["b2"] = ([self._body(k) for k in new[key]] for key in ("id1", "id2"))
         self._before()
-        self.odd += [(first + k, row[0].geom) for k, row in enumerate(rows) if not row[3]]
+        self.odd += [(first + k, own[k].geom) for k in range(m) if not new["ball"][k]]
         for key, value in self.c.items():
-            tail = np.array(new.get(key, np.zeros(m)), value.dtype)
-            if key in VECTORS:
-                tail = np.zeros((3, m))
+            tail = np.zeros((*value.shape[:-1], m), value.dtype)
+            tail[...] = new.get(key, 0)
             self.c[key] = np.concatenate([value, tail], axis=-1)
         self.fresh = np.arange(first, first + m)
         self._orient(self.fresh)
@@ -608,7 +591,7 @@ class Joints:
             i.phys.normalForce, i.phys.shearForce = Vector3(*a), Vector3(*b)
 
 
-# ------------------------------------------------------------------- helpers
+# ------------------------------------------------------- vectors and rotations
 
 
 def dot(a, b):

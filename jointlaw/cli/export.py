@@ -32,7 +32,7 @@ def add_export_command(commands: Any) -> None:
 
 
 def _export(options: argparse.Namespace) -> int:
-    from ..hosts.yade import export_yade
+    from ..hosts.yade.export import export_yade
 
     law = presets.load_any(options.law)
     if options.resolution is not None:

@@ -7,8 +7,7 @@ from collections.abc import Hashable, Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..law import JointLaw
-from .batch import JointBatch
+from .batch import JointBatch, Law
 from .state import JointState
 
 Places = NDArray[np.intp]
@@ -23,7 +22,7 @@ class JointPool:
     starts virgin.
     """
 
-    def __init__(self, law: JointLaw, ledger: bool = True) -> None:
+    def __init__(self, law: Law, ledger: bool = True) -> None:
         self.batch = JointBatch(law, 0, ledger)
         self._place: dict[Hashable, int] = {}
         self._free: list[int] = []

@@ -16,8 +16,6 @@ from ..support.checks import Array
 from ..support.files import replace_file
 from .plot import plot_record
 
-VERSION = 1  # of the NPZ file
-
 UNITS = {
     "closure": "m",
     "shear_2": "m",
@@ -124,11 +122,10 @@ class Record:
         replace_file(Path(path), buffer.getvalue().encode())
 
     def to_npz(self, path: str | Path) -> None:
-        """Write the columns as NPZ with the azimuth, a JSON text of the units and a version."""
+        """Write the columns as NPZ with a version, the azimuth and a JSON text of the units."""
         buffer = io.BytesIO()
         arrays: dict[str, Any] = dict(self.columns)
-        units = json.dumps(UNITS)
-        np.savez(buffer, **arrays, azimuth=self.azimuth, units=units, version=VERSION)
+        np.savez(buffer, version=1, **arrays, azimuth=self.azimuth, units=json.dumps(UNITS))
         replace_file(Path(path), buffer.getvalue())
 
     def plot(self, path: str | Path | None = None) -> Any:

@@ -84,17 +84,11 @@ def closing_increments(batch: JointBatch, step: Array, stress: Array) -> Array:
         if met.all():
             return x
         low, high = np.where(miss < 0, x, low), np.where(miss < 0, high, x)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            newton = x - miss / C[:, 0, 0]
-        open_ended = np.isinf(low) | np.isinf(high)
-        bound = x - np.sign(miss) * reach
-        reach = np.where(open_ended, 2 * reach, reach)
-        free = np.isfinite(newton) & (np.abs(newton - x) <= np.abs(bound - x))
-        inside = (newton > low) & (newton < high)
-        with np.errstate(invalid="ignore"):
-            half = np.where(open_ended, bound, (low + high) / 2)
-        better = np.where(open_ended, np.where(free, newton, bound), np.where(inside, newton, half))
-        x = np.where(met, x, better)
+        slope = np.maximum(C[:, 0, 0], 1e-3 * stress / reach)  # an open joint has none
+        newton = x - np.clip(miss / slope, -reach, reach)
+        inside = (low < newton) & (newton < high)
+        half = low / 2 + high / 2  # finite wherever it is taken: both ends are known then
+        x, reach = np.where(met, x, np.where(inside, newton, half)), 2 * reach
     joint = int(np.argmin(met))
     raise ArithmeticError(
         f"joint {joint}: no closure between {low[joint]:g} and {high[joint]:g} m from here gives "

@@ -212,7 +212,7 @@ def test_export_command(tmp_path, capsys):
     )
     assert options.run(options) == 0
     assert {p.name for p in (tmp_path / "x").iterdir()} == {
-        "joint.txt", "joint.npz", "law.toml", "yade_joint.py", "direct_shear.py",
+        "joint.txt", "joint.npz", "law.toml", "yade_joint.py", "table_law.py", "direct_shear.py",
         "settle_and_incline.py", "assembly.py", "summary.json",
     }  # fmt: skip
     assert "what the table drops" in capsys.readouterr().out

@@ -65,16 +65,8 @@ def _shear(options: argparse.Namespace) -> int:
         raise ValueError("--control stiffness and --normal-stiffness go together; give both")
     normal = quantity("--normal-stress", options.normal_stress, "Pa", positive=True)
     azimuth = quantity("--azimuth", options.azimuth, "rad")
-    test = partial(
-        direct_shear,
-        law.joint(),
-        points,
-        normal,
-        options.control,
-        azimuth,
-        stiffness,
-        options.steps,
-    )
+    control, steps = options.control, options.steps
+    test = partial(direct_shear, law.joint(), points, normal, control, azimuth, stiffness, steps)
     record = run_test(test, law, options)
     if record is None:
         return 1

@@ -1,5 +1,7 @@
 """The adapter's bookkeeping: contacts that come and go, large turns, refusals."""
 
+from pathlib import Path
+
 import numpy as np
 
 import jointlaw as jl
@@ -113,6 +115,8 @@ attempt("keep", lambda: Joints(LiveStub()).attach())
 attempt("lagged live", lambda: Joints(LiveStub(), lagged=True))
 attempt("name", lambda: joints(name="a b"))
 attempt("run", lambda: yade_joint.run("nobody"))
+np.savez("old.npz", ids=[])
+attempt("version", lambda: joints().load("old.npz"))
 O.periodic = True
 attempt("periodic", lambda: joints().attach())
 O.periodic = False
@@ -171,7 +175,7 @@ def test_refusals_name_the_remedy(yade, make_table, tmp_path):
         "no loop": "set O.engines before attach", "stepper": "joints.time_step()",
         "keep": "neverErase=True", "lagged live": "needs a TableLaw", "name": "identifier",
         "run": ".load(file)", "periodic": "O.periodic", "area": "area = -1", "phys": "select=",
-        "missed": "every step", "taken": "give another name=",
+        "version": "start the run anew", "missed": "every step", "taken": "give another name=",
     }  # fmt: skip
     for name, words in told.items():
         assert words in out["messages"][name], (name, out["messages"][name])
@@ -219,3 +223,29 @@ def test_time_step_knows_the_area_however_it_is_given(yade, make_table, tmp_path
     assert "after the first step" in before
     assert np.isclose(float(after), expected, rtol=1e-12, atol=0)
     assert np.allclose(out["circle"], expected * np.sqrt(10.0 / (np.pi * 0.25)), rtol=1e-12, atol=0)
+
+
+SPECIMEN = """
+slab_and_sphere()
+engines()
+joints = Joints(TableLaw("joint.txt"))
+joints.attach()
+O.dt = 1e-4
+path = [(1e-3 * k, 2e-4 * k, 1e-4 * k) for k in range(10)]
+drive(path[:6])
+joints.save("now.npz")
+if specimen:
+    joints.load(specimen)
+result(force=drive(path[6:]))
+"""
+
+
+def test_a_saved_state_of_version_1_is_read(yade, make_table, tmp_path):
+    """The run goes on from the specimen as from the state in memory."""
+    make_table(tmp_path / "joint.txt", 1e8, 5e7, 0.4, eta=0.5, uneven=0.2)
+    there = Path(__file__).with_name("specimens") / "joints.npz"
+    unbroken, resumed = (
+        yade(f"specimen = {str(file)!r}\n" + SPECIMEN)["force"] for file in ("", there)
+    )
+    assert unbroken[-1, 1] < 0 < unbroken[-1, 0]
+    np.testing.assert_array_equal(resumed, unbroken)

@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -117,6 +118,25 @@ def test_files_keep_every_digit(table, tmp_path, name):
         else:
             assert np.array_equal(getattr(back, key), getattr(table, key)), key
     assert jl.JointLaw.from_toml(str(back.metadata["law"])) is not None
+
+
+@pytest.mark.parametrize("name", ["table.txt", "table.npz"])
+def test_a_table_of_version_1_is_read_and_of_another_refused(tmp_path, name):
+    """Of `linear-a3`; the law in its metadata tells what it must hold."""
+    specimen = Path(__file__).parents[1] / "unit" / "specimens" / name
+    table = load_table(specimen)
+    law = jl.JointLaw.from_toml(table.metadata["law"])
+    u = np.linspace(0, law.closure_range, 9)[1:]
+    assert np.allclose(table.lookup(u).normal_stress, law.normal_stress(u), rtol=1e-3)
+    other = tmp_path / name
+    if name.endswith("txt"):
+        other.write_text(specimen.read_text().replace('"version": 1', '"version": 9'))
+    else:
+        with np.load(specimen) as data:
+            meta = str(data["metadata"]).replace('"version": 1', '"version": 9')
+            np.savez(other, names=data["names"], data=data["data"], metadata=meta)
+    with pytest.raises(ValueError, match="version 9 of the table is not 1: tabulate the law again"):
+        load_table(other)
 
 
 def test_text_is_what_numpy_users_expect(table, tmp_path):

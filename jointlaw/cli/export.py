@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..support import units
-from .command import add_command, add_law, add_out, read_law
+from ..hosts.yade.export import export_yade
+from .command import add_command, add_law, add_out, quantity, read_law
 
 
 def add_export_command(commands: Any) -> None:
@@ -27,13 +27,11 @@ def add_export_command(commands: Any) -> None:
 
 
 def _export(options: argparse.Namespace) -> int:
-    from ..hosts.yade import export_yade
-
     law = read_law(options)
     settings: dict[str, Any] = {"tolerance": options.tolerance}
     for name in ("closure", "shear_limit"):
         if (text := getattr(options, name)) is not None:
-            settings[name] = units.parse(text, "m")
+            settings[name] = quantity(f"--{name.replace('_', '-')}", text, "m")
     table = export_yade(law, options.out, **settings)
     print(f"wrote the joint for YADE to {options.out}: {len(table.closure)} rows")
     print("what the table drops (error against the law, share of each path's largest traction):")

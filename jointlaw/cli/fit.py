@@ -16,7 +16,7 @@ from ..calibration.fit import Fit, fit_closure, fit_many
 from ..calibration.measured import first_loading
 from ..calibration.unloading import explain
 from ..support import units
-from .command import Files, add_command, add_out, write_results
+from .command import Written, add_command, add_out, write_results
 
 
 def add_fit_command(commands: Any) -> None:
@@ -107,7 +107,7 @@ def _write(
             print(f"unloading is not compared: {error}", file=sys.stderr)
     print(text)
     points = None if held is None else (held.stress, held.closure)
-    files: Files = {
+    files: Written = {
         "fit.png": partial(fit.plot, held_out=points),
         "law.toml": partial(fit.to_toml, title=f"Fit to {name}"),
         "report.md": text,

@@ -10,7 +10,7 @@ from ..parameters.toml import VERSION
 from ..support import units
 from ..surface.fit import SurfaceFit, from_surface
 from ..surface.scan_files import read_scan
-from .command import Files, add_command, add_out, write_results
+from .command import Written, add_command, add_out, write_results
 
 
 def add_scan_command(commands: Any) -> None:
@@ -47,7 +47,7 @@ def _run(options: argparse.Namespace) -> int:
         "warnings": fit.warnings,
     }
     toml = _toml(fit, Path(options.file).name)
-    files: Files = {"scan.png": fit.plot, "surface.toml": toml, "report.md": text}
+    files: Written = {"scan.png": fit.plot, "surface.toml": toml, "report.md": text}
     write_results(options.out, files, summary)
     return 0
 

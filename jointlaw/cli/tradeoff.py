@@ -6,8 +6,7 @@ import argparse
 from dataclasses import replace
 from typing import Any
 
-from ..support import units
-from .command import Files, add_command, add_law, add_out, read_law, write_results
+from .command import Written, add_command, add_law, add_out, quantity, read_law, write_results
 
 
 def add_tradeoff_command(commands: Any) -> None:
@@ -39,7 +38,7 @@ def add_tradeoff_command(commands: Any) -> None:
 def _tradeoff(options: argparse.Namespace) -> int:
     law = read_law(options)
     if options.plane is not None:
-        law = replace(law, plane=units.parse(options.plane, "rad"))
+        law = replace(law, plane=quantity("--plane", options.plane, "rad"))
     chosen = {}
     for tolerance in options.tolerance or ():  # before the long work: a bad one is refused at once
         made = law.at_tolerance(tolerance)
@@ -62,8 +61,10 @@ def _tradeoff(options: argparse.Namespace) -> int:
     for text, nodes in chosen.items():
         given = ", ".join(f"{k}={nodes[k]}" for k in ("u", "phi", "depth"))
         print(f"at_tolerance({text}): Resolution({given}), {nodes['sliders']} sliders")
-    files: Files = {
-        "tradeoff.png": found.plot, "tradeoff.csv": found.to_csv, "law.toml": law.to_toml,
-    }  # fmt: skip
+    files: Written = {
+        "tradeoff.csv": found.to_csv,
+        "law.toml": law.to_toml,
+        "tradeoff.png": found.plot,
+    }
     write_results(options.out, files, summary)
     return 0

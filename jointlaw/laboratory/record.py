@@ -14,6 +14,7 @@ import numpy as np
 
 from ..support.checks import Array
 from ..support.files import replace_file
+from .plot import plot_record
 
 UNITS = {
     "closure": "m",
@@ -129,6 +130,6 @@ class Record:
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Draw the test (needs matplotlib: extra `plot`); returns the figure, saved to `path`."""
-        from .plot import plot_record
-
-        return plot_record(self, path)
+        derived = ("shear", "shear_stress", "friction_angle")
+        curves = {**self.columns, **{name: getattr(self, name) for name in derived}}
+        return plot_record(curves, self.azimuth, path)

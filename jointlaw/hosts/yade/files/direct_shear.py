@@ -28,16 +28,16 @@ from yade import (
 
 folder = os.path.dirname(os.path.abspath(sys.argv[0]))
 sys.path.insert(0, folder)
-from yade_joint import Joints, Live, Table  # noqa: E402
+from yade_joint import Joints, LiveLaw, TableLaw  # noqa: E402
 
 live = "live" in sys.argv[1:]
 if live:
     from jointlaw import JointLaw
 
-    law = Live(JointLaw.from_toml(os.path.join(folder, "law.toml")))
+    law = LiveLaw(JointLaw.from_toml(os.path.join(folder, "law.toml")))
     end = law.law.closure_range
 else:
-    law = Table(os.path.join(folder, "joint.txt"))
+    law = TableLaw(os.path.join(folder, "joint.txt"))
     end = law.un[-1]
 
 # --- two blocks: 6 x 6 x 2 spheres each, face to face across z = 0

@@ -30,9 +30,9 @@ from yade import (
 
 folder = os.path.dirname(os.path.abspath(sys.argv[0]))
 sys.path.insert(0, folder)
-from yade_joint import Joints, Table  # noqa: E402
+from yade_joint import Joints, TableLaw  # noqa: E402
 
-law = Table(os.path.join(folder, "joint.txt"))
+law = TableLaw(os.path.join(folder, "joint.txt"))
 random.seed(1)
 R = max(0.1, 50 * law.un[-1])
 O.materials.append(FrictMat(young=1e9, poisson=0.3, frictionAngle=0.5, density=2600))

@@ -7,11 +7,13 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ..law import JointLaw
-from ..support.files import replace_file, write_json
-from ..tables.table import JointTable
-from ..tables.tabulate import require_3d, tabulate
+from ... import tables
+from ...law import JointLaw
+from ...support.files import replace_file, write_json
+from ...tables.table import JointTable
+from ...tables.tabulate import require_3d, tabulate
 
+ADAPTER = ("yade_joint.py", "table_law.py")
 SCRIPTS = ("direct_shear.py", "settle_and_incline.py", "assembly.py")
 DEFAULT_LIMIT = 10.0  # shear limit over closure range, where the law has no critical slip
 
@@ -29,10 +31,10 @@ def export_yade(
         critical slip is infinite and no `shear_limit` is given, friction is read at a shear of ten
         closure ranges; the table's metadata state it.
 
-    Writes `joint.txt` and `joint.npz` (the table), `law.toml` (for live mode), `yade_joint.py` (the
-    adapter: YADE and numpy alone), the scripts and `summary.json`. Returns the table. Raises
-    ValueError for a law or option that cannot be tabulated and for a table of another law, before
-    anything is written.
+    Writes `joint.txt` and `joint.npz` (the table), `law.toml` (for live mode), `yade_joint.py` with
+    `table_law.py` (the adapter: YADE and numpy alone), the scripts and `summary.json`. Returns the
+    table. Raises ValueError for a law or option that cannot be tabulated and for a table of another
+    law, before anything is written.
     """
     require_3d(law)
     if table is None:
@@ -52,13 +54,20 @@ def export_yade(
     table.save(folder / "joint.txt")
     table.save(folder / "joint.npz")
     law.to_toml(folder / "law.toml")
-    source = resources.files(__package__) / "yade_files"
-    for name in ("yade_joint.py", *SCRIPTS):
-        replace_file(folder / name, (source / name).read_bytes())
+    copy_adapter(folder)
     summary = {
-        "files": ["joint.txt", "joint.npz", "law.toml", "yade_joint.py", *SCRIPTS],
+        "version": 1,
+        "files": ["joint.txt", "joint.npz", "law.toml", *ADAPTER, *SCRIPTS],
         "table": {k: v for k, v in table.metadata.items() if k != "law"},
         "dropped_by_the_table": report.as_dict(),
     }
     write_json(folder / "summary.json", summary)
     return table
+
+
+def copy_adapter(folder: Path) -> None:
+    """Copy the adapter, the table law that it needs, and the scripts."""
+    own, table_law = resources.files(__package__) / "files", resources.files(tables)
+    for name in (*ADAPTER, *SCRIPTS):
+        source = table_law if name == "table_law.py" else own
+        replace_file(folder / name, (source / name).read_bytes())

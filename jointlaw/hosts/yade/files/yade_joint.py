@@ -1,7 +1,7 @@
-"""Rock joints on the contacts of a YADE simulation. Needs YADE and numpy; no other file.
+"""Rock joints on the contacts of a YADE simulation. Needs YADE, numpy and `table_law.py`.
 
-    from yade_joint import Joints, Table        # this file in the script's folder (on sys.path)
-    joints = Joints(Table("joint.txt"))         # or Joints(Live(law)), law a jointlaw.JointLaw
+    from yade_joint import Joints, TableLaw     # both files in the script's folder (on sys.path)
+    joints = Joints(TableLaw("joint.txt"))      # or Joints(LiveLaw(law)), law a jointlaw.JointLaw
     joints.attach()                             # after O.engines is set
     O.dt = joints.time_step()
 
@@ -19,13 +19,15 @@ SI units: m, Pa, N, s, kg.
 # ruff: noqa: B905 (runs on older Python too)
 
 import gc
-import json
 import warnings
 
 import numpy as np
+from table_law import TableLaw, between
 from yade import FrictPhys, O, PyRunner, Quaternion, ScGeom, Sphere, Vector3
 
 assert Quaternion((0, 0, 1), 0.0).__getinitargs__() == (1.0, 0.0, 0.0, 0.0)  # w first
+
+VERSION = 1  # of the files that `Joints.save` writes
 
 _running = {}  # name -> Joints: what the PyRunner of each adapter calls
 
@@ -40,114 +42,11 @@ def run(name):
     _running[name].step()
 
 
-# --------------------------------------------------------------- the two laws
+# -------------------------------------------------------------- the live law
 
 
-class Table:
-    """A tabulated joint: normal stress by closure, and elastic-frictional shear by azimuth.
-
-    path: `joint.txt` or `joint.npz` as jointlaw exports them. As YADE's own laws do, shear is
-    incremental and a new contact counts the whole shear of its first step; the shear force turns
-    with the contact and with the mean spin of the two bodies about the normal.
-    """
-
-    live = False
-
-    def __init__(self, path):
-        column, self.metadata = read_table(path)
-        self.un, self.kn_secant = column["un"], column["kn_secant"]
-        self.kn_tangent, self.sn = column["kn_tangent"], column["sn"]
-        angles = sorted(int(name[3:]) for name in column if name.startswith("kt_"))
-        psi = np.radians(angles)
-        kt = np.array([column[f"kt_{a:03d}"] for a in angles])
-        if f"mu_{angles[0]:03d}" in column:
-            mu = np.array([column[f"mu_{a:03d}"] for a in angles])
-        else:  # a table written by hand may give one friction for all azimuths
-            mu = np.repeat(column["mu"][None], len(angles), axis=0)
-        # Stiffness over azimuth is e.K.e with a symmetric K: mean and second harmonic give K
-        self.kt = kt.mean(axis=0)
-        c, s = np.cos(2 * psi)[:, None] * kt, np.sin(2 * psi)[:, None] * kt
-        many = len(angles) > 2
-        self.kc = 2 * c.mean(axis=0) if many else c.mean(axis=0) * (len(angles) == 2)
-        self.ks = 2 * s.mean(axis=0) if many else np.zeros_like(self.kt)
-        self.mu, self.mu_low, self.mu_mean = mu, mu.min(), mu.mean(axis=0)
-        self.k_max = max(self.kn_tangent.max(), self.kn_secant.max(), kt.max())
-        self.f = np.zeros((2, 0))  # shear traction in the contact's frame
-        self.K = np.zeros((3, 0))  # shear stiffness K22, K33, K23 of the last step
-
-    def stiffness(self, closure=None):
-        """Largest stiffness (Pa/m) up to `closure`; the whole table by default."""
-        return self.k_max
-
-    def at(self, closure):
-        """Rows and weights of linear interpolation, and secant normal stiffness (Pa/m)."""
-        row = np.clip(np.searchsorted(self.un, closure, "right") - 1, 0, len(self.un) - 2)
-        low = self.un[row]
-        w = np.clip((closure - low) / (self.un[row + 1] - low), 0.0, 1.0)
-        secant = between(self.kn_secant, row, w)
-        beyond = closure > self.un[-1]
-        if beyond.any():  # past the table: along its last tangent
-            extra = closure[beyond] - self.un[-1]
-            secant[beyond] = (self.sn[-1] + self.kn_tangent[-1] * extra) / closure[beyond]
-        return row, w, secant
-
-    def shear_stiffness(self, row, w):
-        """K22, K33, K23 (Pa/m)."""
-        k, c = between(self.kt, row, w), between(self.kc, row, w)
-        return np.array([k + c, k - c, between(self.ks, row, w)])
-
-    def friction(self, f, row, w):
-        """Friction coefficient in the direction of the shear tractions f (2, m)."""
-        place = (np.arctan2(f[1], f[0]) % np.pi) * (len(self.mu) / np.pi)
-        a = place.astype(int) % len(self.mu)
-        x, b = place - np.floor(place), (a + 1) % len(self.mu)
-        low = self.mu[a, row] * (1 - w) + self.mu[a, row + 1] * w
-        high = self.mu[b, row] * (1 - w) + self.mu[b, row + 1] * w
-        return low * (1 - x) + high * x
-
-    def step(self, d, closure, spin):
-        """Tractions (3, n) after increments d (3, n); `spin` (n) turns the old shear force."""
-        row, w, secant = self.at(closure)
-        normal = np.where(closure > 0, secant * closure, 0.0)
-        K, old = self.shear_stiffness(row, w), self.K
-        c, s = np.cos(spin / 2), np.sin(spin / 2)  # half before the new shear is added, half after
-        f = np.array([c * self.f[0] - s * self.f[1], s * self.f[0] + c * self.f[1]])
-        falls = np.flatnonzero(K[0] + K[1] < old[0] + old[1])
-        if falls.size:  # a joint that softens gives back elastic force: no energy is made
-            a, b, g = old[:, falls]
-            f2, f3 = f[:, falls] / (a * b - g * g)
-            f[:, falls] = times(K[:, falls], np.array([b * f2 - g * f3, a * f3 - g * f2]))
-        f += times(K, d[1:])
-        f = np.array([c * f[0] - s * f[1], s * f[0] + c * f[1]])
-        size = np.hypot(f[0], f[1])
-        over = np.flatnonzero(size > self.mu_low * normal)
-        if over.size:
-            cap = normal[over] * self.friction(f[:, over], row[over], w[over])
-            f[:, over] *= np.minimum(1.0, cap / np.where(size[over] > 0, size[over], 1.0))
-        self.f, self.K = f, K
-        return np.array([normal, f[0], f[1]])
-
-    def add(self, closure):
-        """Contacts that came, at the end of the list."""
-        row, w, _ = self.at(closure)
-        self.f = np.concatenate([self.f, np.zeros((2, len(closure)))], axis=1)
-        self.K = np.concatenate([self.K, self.shear_stiffness(row, w)], axis=1)
-
-    def keep(self, mask):
-        """Forget the contacts where `mask` is False."""
-        self.f, self.K = self.f[:, mask], self.K[:, mask]
-
-    def state(self):
-        """Arrays to save."""
-        return {"f": self.f, "K": self.K}
-
-    def restore(self, data):
-        """State from such arrays."""
-        self.f, self.K = data["f"].copy(), data["K"].copy()
-
-
-class Live:
-    """The full path-dependent law: a jointlaw batch behind the contacts (`jointlaw` importable).
+class LiveLaw:
+    """The full path-dependent law: a pool of joints behind the contacts (`jointlaw` importable).
 
     Memory belongs to a contact as long as YADE keeps it, so `Law2...(neverErase=True)` is needed:
     a sheared joint dilates and carries stress at negative closure. A new contact counts the shear
@@ -155,15 +54,20 @@ class Live:
     takes, for `batch.dissipated_energy`, at some cost.
     """
 
-    live = True
-
     def __init__(self, law, ledger=False):
         if law.plane is not None:
             raise ValueError("law.plane is set; contacts in YADE move in 3-D, give plane=None")
         if law.closure_only:
             raise ValueError("law.closure_only is set; contacts in YADE shear, set it to False")
-        self.law, self.batch = law, law.joints(0, ledger=ledger)
-        self.slots, self.free = np.zeros(0, int), []
+        from jointlaw import JointPool  # table mode does without
+
+        self.law, self.pool = law, JointPool(law, ledger)
+        self.came = 0  # contacts so far: numbered as they came, which are the keys of the pool
+
+    @property
+    def batch(self):
+        """The joints; `pool.places` are those of the contacts."""
+        return self.pool.batch
 
     def stiffness(self, closure=None):
         """Upper bound of the stiffness (Pa/m) up to `closure`, closure_range by default."""
@@ -171,43 +75,41 @@ class Live:
 
     def step(self, d, closure, spin):
         """Tractions (3, n) after increments d (3, n)."""
-        in_order = len(self.slots) == len(self.batch) and not self.free and self.sorted
-        return self.batch.update(d.T, where=None if in_order else self.slots, tangent=False)[0].T
+        return self.batch.update(d.T, where=self.where, tangent=False)[0].T
 
     def add(self, closure):
         """Contacts that came: virgin joints at this closure (m; negative before touch)."""
-        reused = [self.free.pop() for _ in range(min(len(self.free), len(closure)))]
-        first, more = len(self.batch), len(closure) - len(reused)
-        self.batch.resize(first + more)
-        new = np.array([*reused, *range(first, first + more)], int)
-        start = np.zeros((len(new), 3))
+        first, self.came = self.came, self.came + len(closure)
+        start = np.zeros((len(closure), 3))
         start[:, 0] = closure
+        new = self.pool.add(range(first, self.came))
         self.batch.update(start, where=new, tangent=False)
-        self.place(np.concatenate([self.slots, new]))
+        self.find()
 
     def keep(self, mask):
         """Forget the contacts where `mask` is False."""
-        gone = self.slots[~mask]
-        self.batch.reset(gone)
-        self.free += gone.tolist()
-        self.place(self.slots[mask])
+        self.pool.drop([key for key, kept in zip(self.pool.keys, mask) if not kept])
+        self.find()
 
-    def place(self, slots):
-        """Set the place of every contact in the batch."""
-        self.slots, self.sorted = slots, bool((slots == np.arange(len(slots))).all())
+    def find(self):
+        """Find the places of all contacts; None if they are all of the batch, in order."""
+        places = self.pool.places
+        whole = len(places) == len(self.batch) and (places == np.arange(len(places))).all()
+        self.where = None if whole else places
 
     def state(self):
         """Arrays to save."""
-        state = self.batch.snapshot()
-        return {"values": state.values, "fingerprint": state.fingerprint, "slots": self.slots}
+        state = self.pool.snapshot()
+        return {"fingerprint": state.fingerprint, "values": state.values}
 
     def restore(self, data):
         """State from such arrays."""
-        self.batch.resize(data["values"].shape[1])
-        kind = type(self.batch.snapshot())
-        self.batch.restore(kind(str(data["fingerprint"]), data["values"]))
-        self.place(data["slots"].copy())
-        self.free = sorted(set(range(len(self.batch))) - set(self.slots.tolist()))
+        from jointlaw import JointState
+
+        self.came = data["values"].shape[1]
+        state = JointState(str(data["fingerprint"]), data["values"])
+        self.pool.restore(range(self.came), state)
+        self.find()
 
 
 # ---------------------------------------------------------------- the adapter
@@ -221,7 +123,7 @@ VECTORS = ["n", "t2", "c1", "c2", "axis", "plane", "F"]  # shape (3, n)
 class Joints:
     """A joint law on contacts of the simulation.
 
-    law: a `Table` or a `Live`.
+    law: a `TableLaw` or a `LiveLaw`.
     area: of one contact in m2: a number, a function of the interaction, or None for the circle of
         the smaller sphere.
     select: function of an interaction: is it a joint? Asked once, when the contact is new.
@@ -231,7 +133,7 @@ class Joints:
     mated: closure counts from the position in which the contact is first seen, not from touch.
     lagged: instead of adding forces, rewrite kn, ks and friction of YADE's own contact, which acts
         one step late: isotropic, and it makes energy, so that NewtonIntegrator needs a
-        damping of 0.7 O.dt/sqrt(m/k) or more (Table only; measured in docs/yade.md).
+        damping of 0.7 O.dt/sqrt(m/k) or more (TableLaw only; measured in docs/yade.md).
     forget: with neverErase, contacts without force open by more than this (m) are given up.
     """
 
@@ -239,8 +141,8 @@ class Joints:
                  lagged=False, forget=np.inf, name="joints"):  # fmt: skip
         if not name.isidentifier():
             raise ValueError(f"name = {name!r} must be a Python identifier: it labels the engine")
-        if lagged and law.live:
-            raise ValueError("lagged = True works with a Table only: a live law has no kn and ks")
+        if lagged and not isinstance(law, TableLaw):
+            raise ValueError("lagged = True needs a TableLaw: a live law has no kn and ks")
         self.law, self.select, self.name = law, select, name
         self.area = area if area is None or callable(area) else float(area)
         self.azimuth = unit(np.array(azimuth, float))
@@ -267,7 +169,7 @@ class Joints:
         return self.c["F"]
 
     def __len__(self):
-        return len(self.own)
+        return len(self.c["made"])
 
     # ------------------------------------------------------------------ set-up
 
@@ -288,8 +190,7 @@ class Joints:
             raise ValueError("O.periodic = True: joints across a periodic boundary are not covered")
         if any(k == "GlobalStiffnessTimeStepper" and not e.dead for k, e in zip(kinds, engines)):
             raise ValueError(
-                "GlobalStiffnessTimeStepper sees kn = 0 on joints; remove it and set "
-                "O.dt = joints.time_step()"
+                "GlobalStiffnessTimeStepper sees kn = 0: remove it, set O.dt = joints.time_step()"
             )
         if self.lagged:
             warnings.warn(
@@ -297,9 +198,9 @@ class Joints:
                 "NewtonIntegrator(damping=...) of at least 0.7 O.dt/sqrt(m/k); k = area*kn_tangent",
                 stacklevel=2,
             )
-        at = kinds.index("InteractionLoop")
+        at, needs_all = kinds.index("InteractionLoop"), not isinstance(self.law, TableLaw)
         for law2 in engines[at].lawDispatcher.functors:
-            if self.law.live and not getattr(law2, "neverErase", True):
+            if needs_all and not getattr(law2, "neverErase", True):
                 raise ValueError(
                     f"{type(law2).__name__}.neverErase = False: YADE would drop joints that dilate;"
                     " set neverErase=True (and forget= here, so that open contacts are given up)"
@@ -366,10 +267,8 @@ class Joints:
         gc.disable()  # thousands of small YADE handles are made and dropped: no cycles among them
         try:
             self._find(now)
-            if self.lagged:
-                self._rewrite()
-            elif self.own:
-                self._act()
+            if self.own:
+                self._rewrite() if self.lagged else self._act()
             elif self.ids:
                 self.x, self.q = self._read()
         finally:
@@ -394,7 +293,7 @@ class Joints:
         du += (cross(w1, c1 + c["c1"]) - cross(w2, c2 + c["c2"])) / 2
         middle, across = unit(n + c["n"]), unit(t2 + c["t2"])
         d = np.array([closure - c["closure"], dot(du, across), dot(du, cross(middle, across))])
-        spin = None if self.law.live else self._spin(n, t2, w1 + w2)
+        spin = self._spin(n, t2, w1 + w2) if isinstance(self.law, TableLaw) else None
         fresh = self.fresh
         if fresh.size:
             before = closure[fresh] - dot(du[:, fresh], n[:, fresh])
@@ -405,11 +304,9 @@ class Joints:
         F = self.law.step(d, closure, spin)
         force = (n * F[0] + t2 * F[1] + cross(n, t2) * F[2]) * -c["area"]
         c.update(n=n, t2=t2, c1=c1, c2=c2, closure=closure, F=F)
-        extra = force
         if fresh.size:
-            extra = force.copy()
-            extra[:, fresh] -= self._take_back(fresh)
-        self._add(extra, c1, c2)
+            force[:, fresh] -= self._take_back(fresh)
+        self._add(force, c1, c2)
         if self.forget < np.inf:
             for k in np.flatnonzero((closure < -self.forget) & ~F.any(axis=0)):
                 O.interactions.erase(int(c["id1"][k]), int(c["id2"][k]))
@@ -481,8 +378,6 @@ class Joints:
     def _rewrite(self):
         """The lagged option: what YADE's own law will use in the next step."""
         c = self.c
-        if not self.own:
-            return
         x, q = self._read()
         n, un, c1, c2 = self._geometry(x, q.take(c["b1"], axis=1))
         closure = c["closure"] = un - c["zero"]
@@ -504,27 +399,26 @@ class Joints:
     def _find(self, now):
         """Follow YADE's list of contacts: some went, some came."""
         self.fresh = np.zeros(0, int)
+        if len(O.bodies) != self.bodies:
+            self._join(self._match())
+            return
         real = [i.isReal for i in self.own]
         if not all(real):
             self._keep(np.array(real))
         if self.others:
             self.others = [i for i in self.others if i.isReal]
         missing = O.interactions.countReal() - len(self.own) - len(self.others)
-        if missing == 0 and len(O.bodies) == self.bodies:
-            return
-        contacts = O.interactions.all(True)
-        new = [i for i in contacts if i.iterMadeReal == now]
-        if len(new) != missing or len(O.bodies) != self.bodies:
-            new = self._match(contacts)
-        self._join(new)
+        if missing:
+            new = [i for i in O.interactions.all(True) if i.iterMadeReal == now]
+            self._join(new if len(new) == missing else self._match())
 
-    def _match(self, contacts):
+    def _match(self):
         """The slow way: compare with what YADE has, by ids and by the step that made them."""
         c = self.c
         have = {key: k for k, key in enumerate(zip(c["id1"], c["id2"], c["made"]))}
         place, others = {}, {(i.id1, i.id2, i.iterMadeReal) for i in self.others}
         new, self.others = [], []
-        for i in contacts:
+        for i in O.interactions.all(True):
             key = (i.id1, i.id2, i.iterMadeReal)
             if key in have:
                 place[have[key]] = i
@@ -532,11 +426,8 @@ class Joints:
                 self.others.append(i)
             else:
                 new.append(i)
-        kept = sorted(place)
-        mask = np.zeros(len(self.own), bool)
-        mask[kept] = True
-        self._keep(mask)
-        self.own = [place[k] for k in kept]
+        self._keep(np.isin(np.arange(len(c["made"])), list(place)))
+        self.own = [place[k] for k in sorted(place)]
         self.odd = [(k, i.geom) for k, i in enumerate(self.own) if not self.c["ball"][k]]
         self.bodies = len(O.bodies)
         return new
@@ -552,7 +443,7 @@ class Joints:
 
     def _join(self, contacts):
         """New contacts: choose the joints among them and set up what stays constant."""
-        rows = []
+        own, rows = [], []
         for i in contacts:
             if self.select is not None and not self.select(i):
                 self.others.append(i)
@@ -563,27 +454,19 @@ class Joints:
                     f"{type(i.phys).__name__}; joints need ScGeom and FrictPhys (Ip2_FrictMat_"
                     "FrictMat_FrictPhys, Law2_ScGeom_FrictPhys_CundallStrack); select= excludes it"
                 )
-            rows.append((i, *self._radii(i)))
-        if not rows:
+            own.append(i)
+            rows.append((i.id1, i.id2, i.iterMadeReal, *self._radii(i)))
+        if not own:
             return
-        first, m = len(self.own), len(rows)
-        self.own += [row[0] for row in rows]
-        new = {
-            "id1": [i.id1 for i, *_ in rows],
-            "id2": [i.id2 for i, *_ in rows],
-            "made": [i.iterMadeReal for i, *_ in rows],
-            "R1": [row[1] for row in rows],
-            "R2": [row[2] for row in rows],
-            "ball": [row[3] for row in rows],
-            "area": [row[4] for row in rows],
-        }
+        first, m = len(self.own), len(own)
+        self.own += own
+        new = dict(zip(("id1", "id2", "made", "R1", "R2", "ball", "area"), zip(*rows)))
         new["b1"], new["b2"] = ([self._body(k) for k in new[key]] for key in ("id1", "id2"))
         self._before()
-        self.odd += [(first + k, row[0].geom) for k, row in enumerate(rows) if not row[3]]
+        self.odd += [(first + k, own[k].geom) for k in range(m) if not new["ball"][k]]
         for key, value in self.c.items():
-            tail = np.array(new.get(key, np.zeros(m)), value.dtype)
-            if key in VECTORS:
-                tail = np.zeros((3, m))
+            tail = np.zeros((*value.shape[:-1], m), value.dtype)
+            tail[...] = new.get(key, 0)
             self.c[key] = np.concatenate([value, tail], axis=-1)
         self.fresh = np.arange(first, first + m)
         self._orient(self.fresh)
@@ -662,31 +545,34 @@ class Joints:
         last = -1 if self.last is None else self.last
         others = np.array([(i.id1, i.id2, i.iterMadeReal) for i in self.others], int)
         with open(path, "wb") as file:
-            np.savez(file, ids=self.ids, x=self.x, q=self.q, last=last, others=others, **data)
+            np.savez(file, version=VERSION, ids=self.ids, x=self.x, q=self.q, last=last,
+                     others=others, **data)  # fmt: skip
 
     def load(self, path):
         """Take up a state that `save` wrote: call it after O.load, before the next step."""
         with np.load(path) as file:
-            self.waiting = {key: file[key] for key in file.files}
-        self.last = None
+            data = {key: file[key] for key in file.files}
+        if data.get("version") != VERSION:
+            raise ValueError(
+                f"{path!r} has version {data.get('version')}, this adapter reads {VERSION}: start "
+                "the run anew, or go on with the yade_joint.py that saved it"
+            )
+        self.waiting, self.last = data, None
 
     def _resume(self):
         """Bind a loaded state to the contacts that YADE has now."""
         data = self.waiting
-        self._clear()
+        self._clear()  # nothing waits any more
         self.c = {key[8:]: value for key, value in data.items() if key.startswith("contact_")}
         self.law.restore({key[4:]: value for key, value in data.items() if key.startswith("law_")})
         self.ids, self.x, self.q = data["ids"].tolist(), data["x"], data["q"]
         self.index = {k: place for place, k in enumerate(self.ids)}
         self.states = [O.bodies[k].state for k in self.ids]
-        self.own = [_Unbound] * len(self.c["id1"])
         other = {tuple(row) for row in data["others"].reshape(-1, 3).tolist()}
         contacts = O.interactions.all(True)
         self.others = [i for i in contacts if (i.id1, i.id2, i.iterMadeReal) in other]
-        self.bodies = -1  # makes _find compare by ids
-        self.last, self.waiting = int(data["last"]), None
-        if self.last < 0:
-            self.last = None
+        self.own, self.bodies = [], -1  # makes _find compare by ids
+        self.last = int(data["last"]) if data["last"] >= 0 else None
 
     def contacts(self):
         """Arrays: ids (n, 2), closure (n,), traction (n, 3) in Pa, normal (n, 3), area (n,)."""
@@ -705,40 +591,7 @@ class Joints:
             i.phys.normalForce, i.phys.shearForce = Vector3(*a), Vector3(*b)
 
 
-class _Unbound:
-    """Stands for a contact that is not bound yet."""
-
-    isReal = True
-
-
-# ------------------------------------------------------------------- helpers
-
-
-def read_table(path):
-    """Columns by name, and metadata, of `joint.txt` or `joint.npz`."""
-    if str(path).endswith(".npz"):
-        with np.load(path) as file:
-            names, data = file["names"].tolist(), file["data"]
-            metadata = json.loads(str(file["metadata"]))
-        return dict(zip(names, data.T)), metadata
-    data = np.genfromtxt(path, names=True)
-    marker, metadata = "# metadata: ", {}
-    with open(path) as file:
-        for line in file:
-            if line.startswith(marker):
-                metadata = json.loads(line[len(marker) :])
-    return {name: np.atleast_1d(data[name]) for name in data.dtype.names}, metadata
-
-
-def between(values, row, w):
-    """Linear interpolation."""
-    low = values[row]
-    return low + (values[row + 1] - low) * w
-
-
-def times(K, v):
-    """Products of symmetric matrices K (22, 33, 23; n) with vectors v (2, n)."""
-    return np.array([K[0] * v[0] + K[2] * v[1], K[2] * v[0] + K[1] * v[1]])
+# ------------------------------------------------------- vectors and rotations
 
 
 def dot(a, b):

@@ -28,7 +28,7 @@ from yade import (
 
 folder = os.path.dirname(os.path.abspath(sys.argv[0]))
 sys.path.insert(0, folder)
-from yade_joint import Joints, Table  # noqa: E402
+from yade_joint import Joints, TableLaw  # noqa: E402
 
 R = 0.1
 
@@ -36,7 +36,7 @@ R = 0.1
 def scene():
     """Sphere on a box, joined by the table."""
     O.reset()
-    law = Table(os.path.join(folder, "joint.txt"))
+    law = TableLaw(os.path.join(folder, "joint.txt"))
     O.materials.append(FrictMat(young=1e9, poisson=0.3, frictionAngle=0.5, density=2600))
     O.bodies.append(utils.box((0, 0, -0.1), (10, 10, 0.1), fixed=True))
     O.bodies.append(utils.sphere((0, 0, R), R))

@@ -15,19 +15,21 @@ import os  # noqa: E402
 import tempfile  # noqa: E402
 import time  # noqa: E402
 
-import extreme_laws as laws  # noqa: E402
 import numpy as np  # noqa: E402
-import test_extremes_continuity as continuity  # noqa: E402
-import test_extremes_control as control  # noqa: E402
-import test_extremes_drift as drift  # noqa: E402
-import test_extremes_dynamics as dynamics  # noqa: E402
-import test_extremes_exact as exact  # noqa: E402
-import test_extremes_fuzz as fuzz  # noqa: E402
-import test_extremes_impact as impact  # noqa: E402
-import test_extremes_matrix as matrix  # noqa: E402
-import test_extremes_symmetry as symmetry  # noqa: E402
-import test_extremes_units as units  # noqa: E402
 from _pages import fill, table  # noqa: E402
+from extremes import (  # noqa: E402
+    continuity,
+    control,
+    drift,
+    dynamics,
+    exact,
+    fuzz,
+    impact,
+    laws,
+    matrix,
+    symmetry,
+    units,
+)
 
 import jointlaw as jl  # noqa: E402
 

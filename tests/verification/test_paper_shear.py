@@ -14,7 +14,8 @@ def numbers(key, verdict="holds"):
     return found.numbers
 
 
-# law.md section 10: known figures at delta_2 = 1, 2, 4 um, delta_1 = 1 um
+# F2/F1 at delta_2 = 1, 2, 4 um and delta_1 = 1 um, by both forms of docs/theory.md and
+# docs/theory-incremental.md integrated once in a code of their own
 TOTAL = {2: (0.6529, 1.0081, 1.2661), 3: (0.6290, 0.7952, 0.9356), 6: (0.6157, 0.6451, 0.6939)}
 LAW = {2: (0.7157, 1.0739, 1.3032), 3: (0.6393, 0.8097, 0.9463), 6: (0.6179, 0.6482, 0.6959)}
 

@@ -16,7 +16,7 @@ def fields(paragraph):
     text = paragraph[titled.end() :] if titled else paragraph
     starts = [line for line in text.splitlines() if not line.startswith(" ")]
     if all(map(PARAMETER.match, starts)) and (titled or len(starts) > 1):
-        return PARAMETER.sub(r":param \1: ", text)
+        return PARAMETER.sub(lambda name: f":param {name[1].replace(', ', ',')}: ", text)
     return text
 
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from .surface.synthetic import synthetic_surface
     from .tables.tabulate import tabulate
 
-__version__ = "0.1.0"
+__version__ = "0.2.0.dev0"
 
 __all__ = [
     "Asperity",

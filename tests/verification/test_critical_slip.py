@@ -68,7 +68,7 @@ def test_friction_and_dilation_settle_beyond_the_limit():
     assert np.allclose(back, F * [1.0, -1.0, 1.0], rtol=1e-9, atol=1e-12)
 
 
-def test_drag_with_friction_agrees_with_the_slow_bed():
+def test_motion_at_the_limit_with_friction_agrees_with_the_slow_bed():
     n, w = cap_quadrature(3.0, 0.5, 0.1, 8, 24)
     reach = 1.01 * (1.0 + D * np.hypot(n[:, 1], n[:, 2]) / n[:, 0])
     bed = SlowBed(n, w, reach, K=1.0, lam=1.2, eta=0.5, mu=0.4, density=1.0, n_depth=200,
@@ -84,13 +84,13 @@ def test_drag_with_friction_agrees_with_the_slow_bed():
                 joint.update([0.0, *(leg / 320)], tangent=False)
             F.append(joint.F)
     gap = np.linalg.norm(np.subtract(F, exact), axis=1).max()
-    # as without a leash; the bed's small radial returns of 1 % of D_c are converged to 0.05 %
+    # as without a limit; the bed's small radial returns of 1 % of D_c are converged to 0.05 %
     assert gap < 3e-3 * np.linalg.norm(exact, axis=1).max()
 
 
-def test_dissipation_of_the_drag_is_never_negative():
+def test_dissipation_at_the_limit_is_never_negative():
     rng = np.random.default_rng(8)
-    joints = law(mu=0.0, c=0.2, critical_slip=D).joints(200)  # no friction: all loss is drag
+    joints = law(mu=0.0, c=0.2, critical_slip=D).joints(200)  # no friction: all loss is at the limit
     lost = np.zeros(200)
     for _ in range(20):
         d = rng.normal(0.0, 0.4, (200, 3)) * [0.3, 1.0, 1.0]
@@ -102,7 +102,7 @@ def test_dissipation_of_the_drag_is_never_negative():
 
 
 def test_steady_friction_under_constant_stress_tends_to_the_steepest_contacts():
-    """atan(mu) + 90 deg/a for a leash far longer than the closure: the joint rides up its rim."""
+    """atan(mu) + 90 deg/a for a critical slip far above the closure: the joint rides up its rim."""
     gaps = []
     for length in (100.0, 1000.0):
         one = law(b=0.0, c=0.0, mu=0.3, plane=0.0, critical_slip=length,

@@ -168,7 +168,7 @@ def test_linear_asperities_without_heights_need_one_depth_cell(plane):
 
 
 def test_without_a_critical_slip_nothing_changes_below_it():
-    """critical_slip = inf leaves the limit of the offset out: the same until an offset reaches it."""
+    """critical_slip = inf leaves the limit out: the same until an offset reaches it."""
     free = random_law(3)
     held = replace(free, critical_slip=2.0)
     rng = np.random.default_rng(5)

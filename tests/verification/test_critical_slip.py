@@ -90,7 +90,7 @@ def test_motion_at_the_limit_with_friction_agrees_with_the_slow_bed():
 
 def test_dissipation_at_the_limit_is_never_negative():
     rng = np.random.default_rng(8)
-    joints = law(mu=0.0, c=0.2, critical_slip=D).joints(200)  # no friction: all loss is at the limit
+    joints = law(mu=0.0, c=0.2, critical_slip=D).joints(200)  # no friction: no other loss
     lost = np.zeros(200)
     for _ in range(20):
         d = rng.normal(0.0, 0.4, (200, 3)) * [0.3, 1.0, 1.0]

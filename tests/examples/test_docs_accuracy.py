@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from dem_demo.scene import names
+
 DOCS = Path(__file__).parents[2] / "docs"
 
 
@@ -34,6 +36,10 @@ def test_each_part_has_its_place_and_each_place_its_part(made):
         for key in re.findall(r"<!-- end of (.+) -->", (DOCS / page).read_text(encoding="utf-8"))
     ]
     assert sorted(marks) == sorted(made.PARTS)
+
+
+def test_all_shipped_scenes_are_ablated(made):
+    assert set(made.SCENES) == {name for name in names() if not name.endswith("-full")}
 
 
 @pytest.mark.parametrize("key", ["ingredients", "slip", "plane"])

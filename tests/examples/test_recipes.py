@@ -21,7 +21,6 @@ def run(code):
     return space
 
 
-@pytest.mark.xfail(strict=True, reason="the law takes the package's own height classes only")
 def test_height_distribution(capsys):
     space = run(HEIGHTS)
     law, heights = space["law"], space["EvenHeights"](10e-6)

@@ -216,11 +216,3 @@ def test_history_survives_a_gap():
         opened |= bool((sim.traction[sim.points_between(1, 2), 0] == 0).all())
     assert opened
     assert sim.joints._slots == slots
-
-
-def test_embed_page_is_short():
-    """The worked example of docs/embed.md, which runs in test_docs_code.py: under 60 lines."""
-    page = Path(__file__).parents[2] / "docs" / "embed.md"
-    code = "\n".join(re.findall(r"```python\n(.*?)```", page.read_text(), re.S))
-    lines = [s for s in code.splitlines() if s.strip() and not s.strip().startswith("#")]
-    assert len(lines) < 60

@@ -1,4 +1,4 @@
-"""critical_slip: the in-plane offset is a leash that drags along the exact tractrix."""
+"""critical_slip: the end of the in-plane offset follows the exact tractrix."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ CORNERS = np.array([[0.1, 0.05], [0.9, 0.4], [0.5, 1.2], [-0.8, 0.9], [-0.7, 0.9
 
 
 def tractrix(corners, length):
-    """Offset after an in-plane path: inside the leash it moves along, at its end it is dragged."""
+    """Offset after an in-plane path: below the limit it moves along, at the limit it turns."""
     o = np.zeros(2)
     for leg in np.diff(corners, axis=0, prepend=0.0):
         e, way = leg / np.linalg.norm(leg), np.linalg.norm(leg)
@@ -32,30 +32,30 @@ def tractrix(corners, length):
 
 @pytest.mark.parametrize("division", [1, 3, 50])
 @pytest.mark.parametrize("formation", [None, "population"])
-def test_the_leash_is_the_tractrix_in_steps_of_any_size(formation, division):
-    """Without friction the traction tells the offset: compare with an unleashed joint put there."""
-    leashed = law(mu=0.0, formation=formation, critical_slip=D).joint()
-    leashed.update([0.8, 0.0, 0.0])
+def test_the_offset_follows_the_tractrix_in_steps_of_any_size(formation, division):
+    """Without friction the traction tells the offset: compare with an unlimited joint put there."""
+    limited = law(mu=0.0, formation=formation, critical_slip=D).joint()
+    limited.update([0.8, 0.0, 0.0])
     for k, leg in enumerate(np.diff(CORNERS, axis=0, prepend=0.0)):
         for _ in range(division):
-            F = leashed.update([0.0, *(leg / division)])[0]
+            F = limited.update([0.0, *(leg / division)])[0]
         free = law(mu=0.0, formation=formation).joint()
         exact = free.update([0.8, *tractrix(CORNERS[: k + 1], D)])[0]
-        # the drag is solved in closed form: the integration's 1e-12 and rounding are left
+        # the turning is solved in closed form: the integration's 1e-12 and rounding are left
         assert np.allclose(F, exact, rtol=0.0, atol=1e-10)
 
 
-def test_within_the_leash_nothing_changes():
+def test_below_the_limit_nothing_changes():
     rng = np.random.default_rng(3)
     inside = rng.normal(0.0, 1.0, (40, 2))
     inside *= 0.99 * D * rng.random((40, 1)) / np.linalg.norm(inside, axis=1)[:, None]
-    leashed, free = law(critical_slip=D).joint(), law().joint()
+    limited, free = law(critical_slip=D).joint(), law().joint()
     steps = np.column_stack([rng.uniform(-0.2, 0.3, 40), np.diff(inside, axis=0, prepend=0.0)])
     for d in steps:
-        assert np.array_equal(leashed.update(d)[0], free.update(d)[0])
+        assert np.array_equal(limited.update(d)[0], free.update(d)[0])
 
 
-def test_friction_and_dilation_settle_beyond_the_leash():
+def test_friction_and_dilation_settle_beyond_the_limit():
     joint = law(critical_slip=D).joint()
     joint.update([1.0, 0.0, 0.0])
     for _ in range(200):
@@ -68,7 +68,7 @@ def test_friction_and_dilation_settle_beyond_the_leash():
     assert np.allclose(back, F * [1.0, -1.0, 1.0], rtol=1e-9, atol=1e-12)
 
 
-def test_drag_with_friction_agrees_with_the_slow_bed():
+def test_motion_at_the_limit_with_friction_agrees_with_the_slow_bed():
     n, w = cap_quadrature(3.0, 0.5, 0.1, 8, 24)
     reach = 1.01 * (1.0 + D * np.hypot(n[:, 1], n[:, 2]) / n[:, 0])
     bed = SlowBed(n, w, reach, K=1.0, lam=1.2, eta=0.5, mu=0.4, density=1.0, n_depth=200,
@@ -84,13 +84,13 @@ def test_drag_with_friction_agrees_with_the_slow_bed():
                 joint.update([0.0, *(leg / 320)], tangent=False)
             F.append(joint.F)
     gap = np.linalg.norm(np.subtract(F, exact), axis=1).max()
-    # as without a leash; the bed's small radial returns of 1 % of D_c are converged to 0.05 %
+    # as without a limit; the bed's small radial returns of 1 % of D_c are converged to 0.05 %
     assert gap < 3e-3 * np.linalg.norm(exact, axis=1).max()
 
 
-def test_dissipation_of_the_drag_is_never_negative():
+def test_dissipation_at_the_limit_is_never_negative():
     rng = np.random.default_rng(8)
-    joints = law(mu=0.0, c=0.2, critical_slip=D).joints(200)  # no friction: all loss is drag
+    joints = law(mu=0.0, c=0.2, critical_slip=D).joints(200)  # no friction: no other loss
     lost = np.zeros(200)
     for _ in range(20):
         d = rng.normal(0.0, 0.4, (200, 3)) * [0.3, 1.0, 1.0]
@@ -102,7 +102,7 @@ def test_dissipation_of_the_drag_is_never_negative():
 
 
 def test_steady_friction_under_constant_stress_tends_to_the_steepest_contacts():
-    """atan(mu) + 90 deg/a for a leash far longer than the closure: the joint rides up its rim."""
+    """atan(mu) + 90 deg/a for a critical slip far above the closure: the joint rides up its rim."""
     gaps = []
     for length in (100.0, 1000.0):
         one = law(b=0.0, c=0.0, mu=0.3, plane=0.0, critical_slip=length,

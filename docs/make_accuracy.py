@@ -25,9 +25,10 @@ from _ablations import HEAD, by_ingredient  # noqa: E402
 from _pages import HERE, fill, has, read, table  # noqa: E402
 
 import jointlaw as jl  # noqa: E402
-from dem_demo import ablate, load  # noqa: E402
-from dem_demo.predict import friction_angle  # noqa: E402
+from dem_demo import load  # noqa: E402
+from dem_demo.output.law_alone import friction_angle  # noqa: E402
 from dem_demo.scene import names  # noqa: E402
+from dem_demo.studies import ablate  # noqa: E402
 from jointlaw.parameters.resolution import NAMED  # noqa: E402
 
 PAGES = "how-accurate.md", "only-what-is-needed.md"

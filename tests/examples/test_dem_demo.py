@@ -83,9 +83,9 @@ def test_resume_is_bit_identical(tmp_path):
     for _ in range(230):
         again.step()
     assert again.time == whole.time
-    assert (again.motion == whole.motion).all()
-    assert (again.traction == whole.traction).all()
-    assert again.ledger.value == whole.ledger.value
+    assert (again.now.motion == whole.now.motion).all()
+    assert (again.now.traction == whole.now.traction).all()
+    assert again.now.ledger.value == whole.now.ledger.value
 
 
 def test_resume_of_a_tilt_test_by_command(tmp_path):
@@ -213,7 +213,7 @@ def test_history_survives_a_gap():
     opened = False
     for _ in range(600):
         sim.step()
-        opened |= bool((sim.traction[sim.points_between(1, 2), 0] == 0).all())
+        opened |= bool((sim.now.traction[sim.now.between(1, 2), 0] == 0).all())
     assert opened
     assert sim.joints._slots == slots
 

@@ -13,9 +13,9 @@ from scene_text import PLAIN, ROCK
 
 import jointlaw as jl
 from dem_demo import CoulombLaw, SceneError, cli, load, parse, predict
-from dem_demo.ablate import _without
+from dem_demo.studies.ablate import _without
 from dem_demo.cli import main
-from dem_demo.ingredients import Variant
+from dem_demo.studies.ingredients import Variant
 from dem_demo.scene import build
 
 TEXT = f"""

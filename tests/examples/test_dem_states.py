@@ -60,8 +60,8 @@ def test_any_name_of_a_law_can_be_saved(saved, tmp_path):
     again, whole = Simulation.load(saved), begun(steps=25)
     for _ in range(20):
         again.step()
-    assert (again.motion == whole.motion).all()
-    assert again.ledger.value == whole.ledger.value
+    assert (again.now.motion == whole.now.motion).all()
+    assert again.now.ledger.value == whole.now.ledger.value
 
 
 def changed_in_memory():
@@ -82,7 +82,7 @@ def test_a_scene_that_its_text_does_not_give_is_not_saved(scene, tmp_path):
         sim.save(tmp_path / "state")
     with pytest.raises(ValueError, match="changed in memory"):  # before the work, not after it
         run(sim, tmp_path / "out")
-    assert (sim.n, list(tmp_path.iterdir())) == (0, [])
+    assert (sim.now.n, list(tmp_path.iterdir())) == (0, [])
 
 
 def test_a_scene_that_its_text_gives_is_saved_however_it_was_made(tmp_path):
@@ -188,10 +188,10 @@ def test_a_step_is_a_finite_number_above_zero(step, saved, capsys):
     with pytest.raises(ValueError, match=r"step = .* s: must be a finite number > 0"):
         Simulation(parse(TEXT), step)
     sim = begun()
-    state, motion = sim.state(), sim.motion.copy()
+    state, motion = sim.state(), sim.now.motion.copy()
     with pytest.raises(ValueError, match=r"step = .* s: must be a finite number > 0"):
         sim.restore(state, step)
-    assert (sim.motion == motion).all()
+    assert (sim.now.motion == motion).all()
     out = saved.parent / "out"
     assert main(["resume", str(saved), f"--step={step}", "--out", str(out)]) == 2
     assert "must be a finite number > 0" in capsys.readouterr().err
@@ -204,7 +204,7 @@ def test_a_step_beyond_the_limit_is_refused_at_once(saved):
         Simulation.load(saved, step=1.01 * limit)
     sim = Simulation.load(saved, step=0.5 * limit)
     sim.step()
-    assert sim.dt == 0.5 * limit
+    assert sim.now.dt == 0.5 * limit
 
 
 @pytest.mark.parametrize("until", ["inf", "nan", "-5", "1e308"])

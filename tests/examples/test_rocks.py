@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from dem_demo import SceneError, Simulation, load, parse, run
-from dem_demo.cli import TEMPLATE, main
-from dem_demo.compare import critical_tilts
-from dem_demo.outcome import displacement
+from dem_demo.cli import main
+from dem_demo.studies.compare import critical_tilts
+from dem_demo.output.outcome import displacement
+from dem_demo.scene.read import TEMPLATE
 
 TEXT = TEMPLATE.read_text()
 PLAIN = """
@@ -32,7 +33,7 @@ def test_short_scenes_end_as_intended(name, until, failed):
     scene = load(name)
     assert sum(not block.fixed for block in scene.blocks) <= 60
     sim = Simulation(scene)
-    assert scene.run.end / sim.dt < 25_000
+    assert scene.run.end / sim.now.dt < 25_000
     _, summary = run(sim, until=until)
     stands, fails = summary["rocks"]
     assert stands["state"] == "stands"
@@ -102,8 +103,8 @@ def test_a_saved_rock_goes_on_bit_for_bit(tmp_path):
     for _ in range(40):
         whole.step()
         again.step()
-    assert (again.motion == whole.motion).all()
-    assert (again.traction == whole.traction).all()
+    assert (again.now.motion == whole.now.motion).all()
+    assert (again.now.traction == whole.now.traction).all()
 
 
 def test_joints_have_the_law_of_their_set():

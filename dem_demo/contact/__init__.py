@@ -1,0 +1,11 @@
+"""Contact: corners on edges, the identity of law points, the joints between blocks.
+
+smoothing      soft choices of the geometry
+edge_points    law points along a long overlap
+geometry       closure, sliding and length of joint at corners on edges
+narrow_phase   which corners are over which edges
+law_points     the identity of every law point through time
+assembly       forces at law points summed into forces of blocks
+stiffness      the virgin curve of a law, tabulated for the host
+joints         one batch of joints for each law
+"""

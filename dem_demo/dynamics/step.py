@@ -1,0 +1,102 @@
+"""One step: from a state to the next one, at positions that pymunk has just reached."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from ..contact.joints import Joints
+from ..contact.law_points import LawPoints
+from ..contact.stiffness import VirginCurve
+from . import guards
+from .energy import booked
+from .forces import forces
+from .state import Layout, State
+from .system import System
+from .transfer import transferred
+
+NEAR = 0.4  # share of the step's limit below which no change of lever arms matters
+LOOKS = 16  # steps between two looks at the drives
+
+
+def advance(
+    system: System, joints: Joints, now: State, motion: np.ndarray, near: Iterable[tuple[int, int]]
+) -> State:
+    """The state at a motion (6, n): positions just reached, velocities that led there.
+
+    near: pairs of blocks that pymunk reports. Joints move along. Raises Refused for a state that
+    the method cannot carry.
+
+    1. Follow the law points to where they are by now; look for new ones if blocks have moved far.
+    2. Closure is the depth from the geometry, sliding the velocity times the step: the joints say
+       tractions.
+    3. Tractions, dashpots, weight and drives make forces.
+    4. Check the time step if a joint has stiffened, send back drives, book the energies.
+    """
+    guards.require_slow(system, motion, now.dt)
+    now, run = replace(now, motion=motion, n=now.n + 1), system.scene.run
+    now = _followed(system, joints, now, near)
+    points, law_points = now.points, now.law_points
+    guards.require_shallow(system, law_points.contacts, points)
+    d = joints.increments(law_points.closure(points), points.sliding * now.dt)
+    traction = joints.update(d, run.law_steps)
+    area = points.length * system.scene.thickness
+    stiffness = joints.virgin(VirginCurve.at_stress, traction[:, 0]) * area
+    velocity = system.drives.velocity(now.time, now.dt, now.reversed_at)
+    force = forces(
+        system, joints, now.layout, motion, points, traction, stiffness, velocity, now.dt
+    )
+    limit, reversed_at = now.limit, now.reversed_at
+    if (stiffness > limit.checked).any():
+        limit = guards.step_limit(
+            system, joints, now.layout, law_points.contacts, motion, points, traction, limit.least
+        )
+        limit = guards.require_step(limit, now.dt)
+    now = replace(
+        now, law_points=law_points.reopened(points), traction=traction, area=area, limit=limit
+    )
+    if now.n % LOOKS == 0 and system.drives.waiting(now.time, reversed_at):
+        reversed_at = system.drives.reverse(
+            now.time, reversed_at, lambda moving, base: now.slid(joints, moving, base)
+        )
+    ledger = booked(
+        now.ledger, system.inertia, system.gravity, system.loads, motion[3:].T, force, now.dt,
+        area, joints.now["stored"], joints.now["lost"],
+    )  # fmt: skip
+    return replace(now, reversed_at=reversed_at, ledger=ledger)
+
+
+def _followed(system: System, joints: Joints, now: State, near: Iterable[tuple[int, int]]) -> State:
+    """The state with the law points of its motion."""
+    motion, tracker = now.motion, system.tracker
+    law_points, points, before = tracker.evaluate(now.law_points, motion)
+    if law_points is not now.law_points:
+        now = transferred(joints, now, law_points, points, before, system.scene.thickness)
+    if not tracker.stale(now.law_points, motion):
+        return replace(now, points=points)
+    if now.dt > NEAR * now.limit.now:  # lever arms have changed
+        now = replace(now, limit=replace(now.limit, checked=np.zeros(joints.n)))
+    law_points, changed = tracker.renew(now.law_points, motion, near, pressed=False)
+    if changed:
+        now = _rearranged(system, joints, now, law_points)
+    law_points, points, _ = tracker.evaluate(law_points, motion)
+    return replace(now, law_points=law_points, points=points)
+
+
+def _rearranged(system: System, joints: Joints, now: State, law_points: LawPoints) -> State:
+    """The state with joints and books for a new list of law points."""
+    held = np.stack([now.area, now.area * joints.now["stored"], now.limit.checked], axis=1)
+    gone = dict(zip(now.layout.identities, held.tolist(), strict=True))
+    layout, none = Layout.of(system, law_points), [0.0, 0.0, 0.0]
+    joints.assign(layout.identities)
+    kept = np.array([gone.pop(who, none) for who in layout.identities]).reshape(-1, 3)
+    ledger = now.ledger.dropping(sum(stored for _, stored, _ in gone.values()))
+    return replace(
+        now,
+        law_points=law_points,
+        layout=layout,
+        limit=replace(now.limit, checked=kept[:, 2]),
+        ledger=replace(ledger, area=kept[:, 0], lost=joints.now["lost"]),
+    )

@@ -1,4 +1,4 @@
-"""The narrow phase: which corners are over which edges of other blocks, near them and in their range.
+"""The narrow phase: which corners are over which edges, near them and in their range.
 
 The range of a corner along an edge ends where what comes next is as deep: another corner that
 takes over, or the next edge. So of the corners of two blocks that overlap the least deep are found.

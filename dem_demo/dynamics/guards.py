@@ -1,4 +1,4 @@
-"""What is refused: steps that are too long, blocks that are too fast, overlaps that are too deep."""
+"""What is refused: too long steps, too fast blocks, too deep overlaps."""
 
 from __future__ import annotations
 

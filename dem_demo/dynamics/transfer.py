@@ -1,4 +1,4 @@
-"""Transfer of history where a law point goes on to a corner that stands for another length of joint.
+"""Transfer of history where a law point goes on to a corner with another length of joint.
 
 Lengths match wherever an edge that lies on another, or a corner that stands on an edge, goes on to
 the same. Else a joint that became shorter drops what it stored on the rest. One that became longer
@@ -24,7 +24,7 @@ def transferred(
     joints: Joints, now: State, law_points: LawPoints, points: Points, before: np.ndarray,
     thickness: float,
 ) -> State:  # fmt: skip
-    """The state with joints and books for the lengths of `points`, which were `before` (n,) in m."""
+    """The state with joints and books for the lengths of `points`, `before` (n,) in m."""
     stored = joints.now["stored"]
     held, ratio = stored * before, points.length / np.maximum(before, 1e-300)
     changed = np.flatnonzero((np.abs(ratio - 1) > MATCH) & (held > 0)).tolist()

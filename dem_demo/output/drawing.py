@@ -56,7 +56,8 @@ def outlines(record: Record, i: int) -> list[np.ndarray]:
 
 
 def draw_blocks(
-    axes: Axes, record: Record, i: int, scale: Scale, line=0.7, edge="0.35", start="0.6", margin=0.04
+    axes: Axes, record: Record, i: int, scale: Scale,
+    line=0.7, edge="0.35", start="0.6", margin=0.04,
 ) -> list[np.ndarray]:  # fmt: skip
     """The blocks of frame i, dotted where they were at the start; their corners.
 

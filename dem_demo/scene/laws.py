@@ -9,7 +9,7 @@ import jointlaw as jl
 from ..errors import SceneError
 from .tables import Table
 
-FLAT = 1e8  # orientation.a: no asperity is inclined by more than 1.6e-8 rad
+FLAT = 1e15  # orientation.a: no asperity is inclined by more than 2e-15 rad
 STICKS = 1e30  # friction of a joint that never slides
 
 

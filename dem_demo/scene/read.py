@@ -13,7 +13,7 @@ from .blocks import Block, box, check_convex
 from .drives import AXES, read_drives
 from .laws import build_law
 from .rocks import read_rocks
-from .scene import Run, Scene, Monitors
+from .scene import Monitors, Run, Scene
 from .tables import Table, distinct
 
 SCENES = Path(__file__).parent / "scenes"

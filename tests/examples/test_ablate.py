@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from dem_demo import Refused, Simulation, parse
-from dem_demo.studies.ablate import Row, _run, ablate, table
 from dem_demo.cli import main
-from dem_demo.studies.ingredients import variants, working_stress
 from dem_demo.output.run import run
+from dem_demo.studies.ablate import Row, _run, ablate, table
+from dem_demo.studies.ingredients import variants, working_stress
 
 # A smooth joint, atan(0.4) + 90/20 = 26.3 degrees at most, on a slope of 22 degrees.
 SLOPE = """

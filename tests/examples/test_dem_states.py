@@ -90,7 +90,7 @@ def test_a_scene_that_its_text_gives_is_saved_however_it_was_made(tmp_path):
     made = replace(build(tomllib.loads(TEXT)), text=TEXT, title="another")
     assert made.laws.keys() == scene.laws.keys()
     Simulation(made).save(tmp_path)
-    assert Simulation.load(tmp_path).n == 0
+    assert Simulation.load(tmp_path).now.n == 0
 
 
 @pytest.mark.parametrize(
@@ -139,7 +139,7 @@ def test_files_of_two_states_do_not_mix(saved, tmp_path):
         Simulation.load(saved)
 
 
-@pytest.mark.parametrize("text", ["{}", "", "[1]", '{"scene": 1, "files": 2}'])
+@pytest.mark.parametrize("text", ["{}", "", "[1]", '{"version": 2, "files": 2}'])
 def test_a_damaged_index_is_named(text, saved):
     (saved / "state.json").write_text(text)
     with pytest.raises(ValueError, match=r"state\.json is damaged"):
@@ -154,11 +154,11 @@ def test_joints_must_be_those_of_the_law_points():
         lambda slots: slots.update({((9, 9, 9, 9), 9): 9}),
     ):
         state = sim.state()
-        spoil(state["joints"]["rock/rough"][1])
+        spoil(state.joints["rock/rough"][1])
         with pytest.raises(ValueError, match="not those of the scene's laws and law points"):
             sim.restore(state)
     state = sim.state()
-    del state["joints"]["rock/rough"]
+    del state.joints["rock/rough"]
     with pytest.raises(ValueError, match="not those of the scene's laws"):
         sim.restore(state)
 
@@ -180,7 +180,7 @@ def test_what_else_is_in_the_folder_stays(saved):
     (saved / "notes.txt").write_text("mine")
     begun(steps=7).save(saved)
     assert (saved / "notes.txt").read_text() == "mine"
-    assert Simulation.load(saved).n == 7
+    assert Simulation.load(saved).now.n == 7
 
 
 @pytest.mark.parametrize("step", [0.0, -1e-4, np.inf, np.nan])
@@ -199,7 +199,7 @@ def test_a_step_is_a_finite_number_above_zero(step, saved, capsys):
 
 
 def test_a_step_beyond_the_limit_is_refused_at_once(saved):
-    limit = Simulation.load(saved).step_limit
+    limit = Simulation.load(saved).now.limit.now
     with pytest.raises(Refused, match=r"must stay below 0\.98 of the limit"):
         Simulation.load(saved, step=1.01 * limit)
     sim = Simulation.load(saved, step=0.5 * limit)
@@ -231,6 +231,6 @@ def test_the_index_holds_hashes_only(saved):
     """Of the scene and of the files: what is in these is read from nowhere else."""
     about = json.loads((saved / "state.json").read_text())
     names = {"blocks.npz", "joints.npz", "law-0.npz", "law-1.npz"}
-    assert about.keys() == {"scene", "files"}
+    assert about.keys() == {"version", "scene", "files"}
     assert about["files"].keys() == names
     assert {len(word) for word in [about["scene"], *about["files"].values()]} == {64}

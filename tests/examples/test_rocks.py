@@ -7,9 +7,9 @@ import pytest
 
 from dem_demo import SceneError, Simulation, load, parse, run
 from dem_demo.cli import main
-from dem_demo.studies.compare import critical_tilts
 from dem_demo.output.outcome import displacement
 from dem_demo.scene.read import TEMPLATE
+from dem_demo.studies.compare import critical_tilts
 
 TEXT = TEMPLATE.read_text()
 PLAIN = """

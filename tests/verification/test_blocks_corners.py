@@ -1,11 +1,14 @@
 """Corners on edges: energy of rocking and tumbling blocks, continuity, one joint all along."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from block_forces import contact_forces
 
 import jointlaw as jl
 from dem_demo import Simulation, parse
+from dem_demo.dynamics.state import Layout
 
 ELASTIC = """
 kind = "coulomb"
@@ -120,17 +123,20 @@ def held(law, at, angle, more=""):
     sim = Simulation(scene(law, 1.0, 1.0, at, angle, run="step = 1e-6\nmax_overlap = 0.2"))
 
     def place(x, y, tilt):
-        motion = sim.now.motion.copy()
+        motion, tracker = sim.now.motion.copy(), sim.system.tracker
         motion[:3, 1] = x, y, np.radians(tilt - angle)
-        points = sim.evaluate(motion)
-        if sim.interfaces.stale(motion):
-            sim.interfaces.renew(motion, {(0, 1)})
-            sim.arrange()
-            points = sim.evaluate(motion)
-        sim.now.motion = motion
-        slid = np.zeros(len(points.closure))
-        sim.now.traction = sim.joints.update(sim.joints.increments(points.closure, slid))
-        sim.forces(points, 1e-6)
+        law_points, _, _ = tracker.evaluate(sim.now.law_points, motion)
+        if tracker.stale(law_points, motion):
+            law_points, _ = tracker.renew(law_points, motion, {(0, 1)})
+        law_points, points, _ = tracker.evaluate(law_points, motion)
+        layout = Layout.of(sim.system, law_points)
+        sim.joints.assign(layout.identities)
+        slid = np.zeros(sim.joints.n)
+        sim.now = replace(
+            sim.now, motion=motion, law_points=law_points, points=points, layout=layout,
+            area=points.length * sim.scene.thickness,
+            traction=sim.joints.update(sim.joints.increments(points.closure, slid)),
+        )  # fmt: skip
         return sim.now.area @ sim.joints.now["stored"], contact_forces(sim)[1]
 
     return place

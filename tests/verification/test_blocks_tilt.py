@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from dem_demo import Simulation, load, parse
-from dem_demo.scene.blocks import turn
 from dem_demo.output.monitors import LOOKS, SlipMonitor, base_angle
+from dem_demo.scene.blocks import turn
 
 BLOCK = """
 gravity = {gravity}

@@ -16,7 +16,6 @@ except ImportError as error:  # `python -m` tells it in one line if it is about 
 from .dynamics.simulation import Simulation
 from .errors import Refused, SceneError
 from .output.run import run
-from .scene import Scene, load, parse
-from .scene.laws import coulomb_law
+from .scene import Scene, coulomb_law, load, parse
 
 __all__ = ["Refused", "Scene", "SceneError", "Simulation", "coulomb_law", "load", "parse", "run"]

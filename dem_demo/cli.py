@@ -13,8 +13,7 @@ from .dynamics.simulation import Simulation
 from .errors import Refused, SceneError
 from .output.outcome import sentence
 from .output.run import run, steps_to
-from .scene.read import TEMPLATE, load, names
-from .scene.scene import Scene
+from .scene import TEMPLATE, Scene, load, names
 from .studies import ablate, compare
 
 DEFAULT = "tilt"
@@ -33,6 +32,22 @@ Rigid rock blocks in 2-D whose every contact force comes from a joint law.
   python -m dem_demo resume STATE --out DIR [--until T] [--step DT]
                                            go on from DIR/state or DIR/refused
 """
+OPTIONS = {  # the first word is what a user types
+    "scene": {"help": "a name or a TOML file"},
+    "scene or default": {"nargs": "?", "default": DEFAULT, "help": f"default {DEFAULT}"},
+    "file": {"type": Path},
+    "state": {"type": Path, "help": "folder that a run left: DIR/state, DIR/refused"},
+    "--out": {"type": Path, "default": Path("out"), "help": "folder for the results"},
+    "--out of numbers": {"type": Path, "help": "a JSON file for the numbers"},
+    "--until": {"type": float, "help": "model time to stop at (s)"},
+    "--step": {"type": float, "help": "another time step (s)"},
+    "--no-pictures": {"action": "store_true", "help": "tables only"},
+    "--seeds": {"type": int, "nargs": "+", "default": [1, 2, 3], "help": "default 1 2 3"},
+    "--critical": {
+        "action": "store_true", "help": "find the tilt that the rock just bears; run nothing",
+    },
+    "--tilt": {"type": float, "default": 0.0, "help": "degrees: turn gravity towards +x"},
+}  # fmt: skip
 Words = list[str]
 
 
@@ -53,51 +68,32 @@ def main(arguments: Words | None = None) -> int:
     return 0
 
 
-class Parser(argparse.ArgumentParser):
-    """The options of a command, the same words for the same thing."""
-
-    def __init__(self, verb: str, about: str, example: str, scenes: bool = False) -> None:
-        known = f"scenes: {', '.join(names())}\n" if scenes else ""
-        super().__init__(
-            f"python -m dem_demo {verb}".rstrip(),
-            description=about,
-            epilog=f"{known}example: python -m dem_demo {example}",
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
-
-    def scene(self, **options) -> None:
-        """A scene to run."""
-        self.add_argument("scene", **{"help": "a name or a TOML file", **options})
-
-    def out(self) -> None:
-        """Where results go."""
-        self.add_argument("--out", type=Path, default=Path("out"), help="folder for the results")
-
-    def until(self) -> None:
-        """When to stop."""
-        self.add_argument("--until", type=float, help="model time to stop at (s)")
-
-    def run(self, words: Words) -> argparse.Namespace:
-        """The words of a command that runs blocks."""
-        self.out()
-        self.until()
-        self.add_argument("--no-pictures", action="store_true", help="tables only")
-        return self.parse_args(words)
+def _parse(words: Words, verb: str, about: str, example: str, *options: str) -> argparse.Namespace:
+    """The words of a command, which knows these of OPTIONS."""
+    has_scene = any(option.startswith("scene") for option in options)
+    known = f"scenes: {', '.join(names())}\n" if has_scene else ""
+    parser = argparse.ArgumentParser(
+        f"python -m dem_demo {verb}".rstrip(),
+        description=about,
+        epilog=f"{known}example: python -m dem_demo {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    for option in options:
+        parser.add_argument(option.split()[0], **OPTIONS[option])
+    return parser.parse_args(words)
 
 
 def _run(words: Words) -> None:
-    parser = Parser("", ABOUT, "tilt --out out/tilt", scenes=True)
-    parser.scene(nargs="?", default=DEFAULT, help=f"default {DEFAULT}")
-    given = parser.run(words)
+    options = "scene or default", "--out", "--until", "--no-pictures"
+    given = _parse(words, "", ABOUT, "tilt --out out/tilt", *options)
     _go(Simulation(load(given.scene)), given)
 
 
 def _resume(words: Words) -> None:
     about = "Go on from a saved state; without --step bit for bit as if never stopped."
-    parser = Parser("resume", about, "resume out/tilt/state --until 45 --out out/longer")
-    parser.add_argument("state", type=Path, help="folder that a run left: DIR/state, DIR/refused")
-    parser.add_argument("--step", type=float, help="another time step (s)")
-    given = parser.run(words)
+    example = "resume out/tilt/state --until 45 --out out/longer"
+    options = "state", "--out", "--until", "--no-pictures", "--step"
+    given = _parse(words, "resume", about, example, *options)
     _go(Simulation.load(given.state, given.step), given)
 
 
@@ -106,11 +102,8 @@ def _ablate(words: Words) -> None:
         "Run a scene without each of its ingredients in turn: what it changes in the outcome "
         "(differences against the whole scene) and in the time (ratios)."
     )
-    parser = Parser("ablate", about, "ablate shear-box --out out/ablation", scenes=True)
-    parser.scene()
-    parser.out()
-    parser.until()
-    given = parser.parse_args(words)
+    example = "ablate shear-box --out out/ablation"
+    given = _parse(words, "ablate", about, example, "scene", "--out", "--until")
     given.out.mkdir(parents=True, exist_ok=True)  # a folder that cannot be is known before the work
     rows = ablate.ablate(load(given.scene), given.until)
     ablate.write(rows, given.out)
@@ -120,9 +113,7 @@ def _ablate(words: Words) -> None:
 
 def _new(words: Words) -> None:
     about = "Write a commented scene of a rock slope cut by joint sets, ready to run."
-    parser = Parser("new", about, "new my-slope.toml")
-    parser.add_argument("file", type=Path)
-    file = parser.parse_args(words).file
+    file = _parse(words, "new", about, "new my-slope.toml", "file").file
     if file.exists():
         raise ValueError(f"{file} exists: give another name")
     replace_file(file, TEMPLATE.read_bytes())
@@ -131,9 +122,8 @@ def _new(words: Words) -> None:
 
 def _check(words: Words) -> None:
     about = "Read a scene file, seat its blocks, find its time step; run nothing."
-    parser = Parser("check", about, "check my-scene.toml", scenes=True)
-    parser.scene()
-    _announce(Simulation(load(parser.parse_args(words).scene)))
+    given = _parse(words, "check", about, "check my-scene.toml", "scene")
+    _announce(Simulation(load(given.scene)))
     print("the scene is valid")
 
 
@@ -142,18 +132,9 @@ def _compare(words: Words) -> None:
         "Run every rock of a scene alone, cut with several seeds, with its own laws and with plain "
         "Coulomb friction of its asperities. What moves 1 m has failed and stops."
     )
-    parser = Parser("compare", about, "compare slope --seeds 1 2 3 --until 10", scenes=True)
-    parser.scene()
-    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="default 1 2 3")
-    parser.until()
-    parser.add_argument(
-        "--critical",
-        action="store_true",
-        help="find the tilt that the rock just bears; run nothing",
-    )
-    parser.add_argument("--tilt", type=float, default=0.0, help="degrees: turn gravity towards +x")
-    parser.add_argument("--out", type=Path, help="a JSON file for the numbers")
-    given = parser.parse_args(words)
+    example = "compare slope --seeds 1 2 3 --until 10"
+    options = "scene", "--seeds", "--until", "--critical", "--tilt", "--out of numbers"
+    given = _parse(words, "compare", about, example, *options)
     scene = load(given.scene)
     if not scene.rocks:
         raise ValueError(f"{given.scene} has no [[rock]] to compare")

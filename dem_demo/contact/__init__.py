@@ -5,7 +5,25 @@ edge_points    law points along a long overlap
 geometry       closure, sliding and length of joint at corners on edges
 narrow_phase   which corners are over which edges
 law_points     the identity of every law point through time
-assembly       forces at law points summed into forces of blocks
 stiffness      the virgin curve of a law, tabulated for the host
 joints         one batch of joints for each law
 """
+
+from .geometry import Assembly, Contacts, Points
+from .joints import BatchState, Joints
+from .law_points import Identity, LawPoints, Tracker
+from .smoothing import raised
+from .stiffness import VirginCurve
+
+__all__ = [
+    "Assembly",
+    "BatchState",
+    "Contacts",
+    "Identity",
+    "Joints",
+    "LawPoints",
+    "Points",
+    "Tracker",
+    "VirginCurve",
+    "raised",
+]

@@ -12,7 +12,7 @@ import numpy as np
 
 import jointlaw as jl
 
-from ..scene.scene import Key
+from ..scene import Key
 from .law_points import Identity
 from .stiffness import VirginCurve
 
@@ -114,24 +114,15 @@ class Joints:
             out[rows] = of(self.curves[name], x[rows])
         return out
 
-    def curve(self, i: int) -> VirginCurve:
-        """The virgin curve of joint i."""
-        return self.curves[self._law(i)[0]]
+    def curve(self, point: Identity) -> VirginCurve:
+        """The virgin curve of a law point's joint."""
+        return self.curves[self.choose(point[0])]
 
-    def renew(self, i: int) -> None:
-        """Make joint i virgin again."""
-        name, slot = self._law(i)
-        self.batches[name].reset(np.array([slot]))
+    def renew(self, point: Identity) -> None:
+        """Make the joint of a law point virgin again."""
+        name = self.choose(point[0])
+        self.batches[name].reset(np.array([self._slots[name][point]]))
         self.measure()
-
-    def _law(self, i: int) -> tuple[str, int]:
-        """Name of the law of joint i, and its slot there."""
-        for name, rows, where in self.groups:
-            at = np.arange(self.n)[rows]
-            if i in at:
-                place = int(np.searchsorted(at, i))
-                return name, place if where is None else int(where[place])
-        raise IndexError(f"there is no joint {i}: {self.n} joints")
 
     def snapshot(self) -> dict[str, BatchState]:
         """A copy of all state, with the slots."""

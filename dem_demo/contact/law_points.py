@@ -14,8 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..scene.blocks import Block
-from ..scene.scene import Key
+from ..scene import Block, Key
 from .edge_points import EdgePoints, spans
 from .geometry import Contacts, Outlines, Points, evaluate
 from .narrow_phase import ROUNDING, TILT, Found, NarrowPhase, what_is_next

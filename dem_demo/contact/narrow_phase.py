@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import Refused
-from ..scene.blocks import Block
-from ..scene.scene import Key
+from ..scene import Block, Key
 from .geometry import Contacts, Outlines, Points, evaluate
 from .smoothing import CORNER
 

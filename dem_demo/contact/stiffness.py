@@ -11,7 +11,7 @@ import numpy as np
 
 import jointlaw as jl
 
-from ..scene.laws import is_coulomb
+from ..scene import is_coulomb
 
 
 @dataclass(frozen=True)

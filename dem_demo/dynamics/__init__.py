@@ -2,7 +2,6 @@
 
 world                everything that touches pymunk
 energy               the ledger of energies
-drives               prescribed motions at work
 timestep             the largest stable step
 system               what stays the same during a run
 state                what changes

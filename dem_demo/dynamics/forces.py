@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..contact.geometry import Points
-from ..contact.joints import Joints
+from ..contact import Joints, Points
 from .state import Layout
 from .system import System
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..contact.geometry import Contacts, Points
-from ..contact.joints import Joints
-from ..contact.stiffness import VirginCurve
+from ..contact import Contacts, Joints, Points, VirginCurve
 from ..errors import Refused
 from .forces import damping
 from .state import Layout, Limit

@@ -9,8 +9,7 @@ from scipy.sparse import csr_array, diags
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
-from ..contact.joints import Joints
-from ..contact.stiffness import VirginCurve
+from ..contact import Joints, VirginCurve
 
 TIGHT = 1e-11  # residual force as a share of the applied one
 

@@ -20,9 +20,8 @@ import numpy as np
 import jointlaw as jl
 from jointlaw.support.files import write_json
 
-from ..contact.joints import BatchState, Joints
-from ..scene.read import parse
-from ..scene.scene import Scene
+from ..contact import BatchState, Joints
+from ..scene import Scene, parse
 from . import guards
 from .energy import COLUMNS, Ledger
 from .state import Layout, Limit, State
@@ -80,7 +79,7 @@ def unpack(system: System, joints: Joints, saved: Saved, step: float | None = No
     law_points, points, _ = system.tracker.evaluate(law_points, motion)
     value = dict(zip(COLUMNS, a["ledger"].tolist(), strict=False))
     now = State(
-        t0, int(n), dt, motion, law_points, points, layout, joints.read("F"), a["area"],
+        t0, int(n), dt, motion, law_points, points, layout, joints.read("F"),
         a["reversed_at"], Ledger(value, float(a["ledger"][-1]), a["forces"], a["area"], a["lost"]),
         Limit(limit, least, np.zeros(joints.n)),
     )  # fmt: skip

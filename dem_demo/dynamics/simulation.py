@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..contact.joints import Joints
-from ..scene.scene import Scene
+from ..contact import Joints
+from ..scene import Scene
 from . import guards, saved_states
 from .start import begin
 from .state import State

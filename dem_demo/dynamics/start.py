@@ -7,9 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..contact.joints import Joints
-from ..contact.law_points import LawPoints
-from ..contact.stiffness import VirginCurve
+from ..contact import Joints, LawPoints, VirginCurve
 from ..errors import Refused
 from . import guards, timestep
 from .energy import opened
@@ -59,7 +57,7 @@ def begin(
     ledger = opened(system.inertia, motion[3:].T, force, dt, *books)
     motion[3:] += (0.5 * dt * force[0] / system.inertia * system.free).T
     return State(
-        0.0, 0, dt, motion, law_points, points, layout, traction, area, reversed_at, ledger, limit
+        0.0, 0, dt, motion, law_points, points, layout, traction, reversed_at, ledger, limit
     ), balanced
 
 

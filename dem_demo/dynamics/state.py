@@ -10,10 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..contact.assembly import Assembly
-from ..contact.geometry import Points
-from ..contact.joints import Joints
-from ..contact.law_points import Identity, LawPoints
+from ..contact import Assembly, Identity, Joints, LawPoints, Points
 from .energy import Ledger
 from .system import System
 
@@ -57,7 +54,7 @@ class State:
     """A moment of a run.
 
     Time is t0 + n dt (s). motion (6, blocks): positions, angles, velocities, spins; velocities are
-    those that led to the positions. Of the k law points: traction (k, 2) in Pa, area (k,) in m2.
+    those that led to the positions. traction (k, 2) of the law points in Pa.
     reversed_at: when each drive was sent back (s).
     """
 
@@ -69,7 +66,6 @@ class State:
     points: Points
     layout: Layout
     traction: np.ndarray
-    area: np.ndarray
     reversed_at: np.ndarray
     ledger: Ledger
     limit: Limit
@@ -78,6 +74,11 @@ class State:
     def time(self) -> float:
         """Model time (s)."""
         return self.t0 + self.n * self.dt
+
+    @property
+    def area(self) -> np.ndarray:
+        """Area of joint (k,) that each law point stands for (m2)."""
+        return self.ledger.area
 
     def between(self, one: int, other: int) -> np.ndarray:
         """Mask (k,) of the law points between two blocks."""

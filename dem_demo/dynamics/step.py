@@ -7,9 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..contact.joints import Joints
-from ..contact.law_points import LawPoints
-from ..contact.stiffness import VirginCurve
+from ..contact import Joints, LawPoints, Points, VirginCurve
 from . import guards
 from .energy import booked
 from .forces import forces
@@ -36,53 +34,58 @@ def advance(
     4. Check the time step if a joint has stiffened, send back drives, book the energies.
     """
     guards.require_slow(system, motion, now.dt)
-    now, run = replace(now, motion=motion, n=now.n + 1), system.scene.run
-    now = _followed(system, joints, now, near)
-    points, law_points = now.points, now.law_points
+    now, points = _followed(system, joints, now, motion, near)
+    law_points, run, dt = now.law_points, system.scene.run, now.dt
     guards.require_shallow(system, law_points.contacts, points)
-    d = joints.increments(law_points.closure(points), points.sliding * now.dt)
+    d = joints.increments(law_points.closure(points), points.sliding * dt)
     traction = joints.update(d, run.law_steps)
     area = points.length * system.scene.thickness
     stiffness = joints.virgin(VirginCurve.at_stress, traction[:, 0]) * area
-    velocity = system.drives.velocity(now.time, now.dt, now.reversed_at)
-    force = forces(
-        system, joints, now.layout, motion, points, traction, stiffness, velocity, now.dt
-    )
-    limit, reversed_at = now.limit, now.reversed_at
+    n, limit = now.n + 1, now.limit
+    velocity = system.drives.velocity(now.t0 + n * dt, dt, now.reversed_at)
+    force = forces(system, joints, now.layout, motion, points, traction, stiffness, velocity, dt)
     if (stiffness > limit.checked).any():
         limit = guards.step_limit(
             system, joints, now.layout, law_points.contacts, motion, points, traction, limit.least
         )
-        limit = guards.require_step(limit, now.dt)
-    now = replace(
-        now, law_points=law_points.reopened(points), traction=traction, area=area, limit=limit
-    )
-    if now.n % LOOKS == 0 and system.drives.waiting(now.time, reversed_at):
-        reversed_at = system.drives.reverse(
-            now.time, reversed_at, lambda moving, base: now.slid(joints, moving, base)
-        )
+        limit = guards.require_step(limit, dt)
     ledger = booked(
-        now.ledger, system.inertia, system.gravity, system.loads, motion[3:].T, force, now.dt,
+        now.ledger, system.inertia, system.gravity, system.loads, motion[3:].T, force, dt,
         area, joints.now["stored"], joints.now["lost"],
     )  # fmt: skip
-    return replace(now, reversed_at=reversed_at, ledger=ledger)
+    after = replace(
+        now, n=n, motion=motion, law_points=law_points.reopened(points), points=points,
+        traction=traction, ledger=ledger, limit=limit,
+    )  # fmt: skip
+    if n % LOOKS or not system.drives.waiting(after.time, after.reversed_at):
+        return after
+    return replace(
+        after,
+        reversed_at=system.drives.reverse(
+            after.time,
+            after.reversed_at,
+            lambda moving, base: after.slid(joints, moving, base),
+        ),
+    )
 
 
-def _followed(system: System, joints: Joints, now: State, near: Iterable[tuple[int, int]]) -> State:
-    """The state with the law points of its motion."""
-    motion, tracker = now.motion, system.tracker
+def _followed(
+    system: System, joints: Joints, now: State, motion: np.ndarray, near: Iterable[tuple[int, int]]
+) -> tuple[State, Points]:
+    """The state with the law points of a motion, and these at that motion."""
+    tracker = system.tracker
     law_points, points, before = tracker.evaluate(now.law_points, motion)
     if law_points is not now.law_points:
         now = transferred(joints, now, law_points, points, before, system.scene.thickness)
     if not tracker.stale(now.law_points, motion):
-        return replace(now, points=points)
+        return now, points
     if now.dt > NEAR * now.limit.now:  # lever arms have changed
         now = replace(now, limit=replace(now.limit, checked=np.zeros(joints.n)))
     law_points, changed = tracker.renew(now.law_points, motion, near, pressed=False)
     if changed:
         now = _rearranged(system, joints, now, law_points)
     law_points, points, _ = tracker.evaluate(law_points, motion)
-    return replace(now, law_points=law_points, points=points)
+    return replace(now, law_points=law_points), points
 
 
 def _rearranged(system: System, joints: Joints, now: State, law_points: LawPoints) -> State:

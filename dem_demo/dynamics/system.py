@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..contact.law_points import Tracker
-from ..scene.scene import Scene
-from .drives import Drives
+from ..contact import Tracker
+from ..scene import Drives, Scene
 from .timestep import StepLimit
 
 CORNER = 0.1  # contact length of a corner as a share of the least block width, by default

@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 from scipy.sparse import csc_array, csr_array, diags
 from scipy.sparse.linalg import eigsh
 
-from ..contact.geometry import Contacts, Points
+from ..contact import Contacts, Points
 
 DENSE = 24  # degrees of freedom up to which a dense eigenproblem is the faster one
 

@@ -12,9 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..contact.geometry import Points
-from ..contact.joints import Joints
-from ..contact.law_points import LawPoints
+from ..contact import Joints, LawPoints, Points
 from .state import State
 
 MATCH = 1e-6  # relative: lengths that are equal but for rounding
@@ -28,18 +26,20 @@ def transferred(
     stored = joints.now["stored"]
     held, ratio = stored * before, points.length / np.maximum(before, 1e-300)
     changed = np.flatnonzero((np.abs(ratio - 1) > MATCH) & (held > 0)).tolist()
-    area, lost, ledger = now.area.copy(), now.ledger.lost.copy(), now.ledger
+    ledger = now.ledger
+    area, lost = ledger.area.copy(), ledger.lost.copy()
     offset = law_points.closure_offset.copy()
     for i in changed:
         length, kept = points.length[i], stored[i]
         if ratio[i] > 1:
-            curve, depth = joints.curve(i), law_points.closure(points)[i]
+            point = now.layout.identities[i]
+            curve, depth = joints.curve(point), law_points.closure(points)[i]
             closure = min(curve.closure_at_work(held[i] / length), depth)
             offset[i] += depth - closure
             kept = curve.work_at(closure)
-            joints.renew(i)
+            joints.renew(point)
             lost[i] = 0.0
         ledger = ledger.dropping(max(float(held[i] - kept * length), 0.0) * thickness)
         area[i] = length * thickness
     law_points = replace(law_points, closure_offset=offset)
-    return replace(now, law_points=law_points, area=area, ledger=replace(ledger, lost=lost))
+    return replace(now, law_points=law_points, ledger=replace(ledger, area=area, lost=lost))

@@ -13,7 +13,7 @@ import numpy as np
 import pymunk
 from pymunk import batch
 
-from ..scene.blocks import Block
+from ..scene import Block
 
 MOTION = (
     batch.BodyFields.POSITION
@@ -89,10 +89,13 @@ class World:
             body.position = (state[X], state[Y])
             body.angle = state[ANGLE]
             if body.body_type == pymunk.Body.DYNAMIC:
-                body.velocity = (state[VX], state[VY])
-                body.angular_velocity = state[SPIN]
+                body.velocity, body.angular_velocity = (0.0, 0.0), 0.0
         self.space.reindex_static()
         self._find_first_pairs()
+        for body, state in zip(self.bodies, motion.T.tolist(), strict=True):
+            if body.body_type == pymunk.Body.DYNAMIC:
+                body.velocity = (state[VX], state[VY])
+                body.angular_velocity = state[SPIN]
 
     def _push(self, forces: np.ndarray) -> None:
         self._forces[self._from_batch] = forces
@@ -108,15 +111,8 @@ class World:
 
     def _find_first_pairs(self) -> None:
         """Let pymunk look for pairs while nothing moves."""
-        velocity = [(b.velocity, b.angular_velocity) for b in self.bodies]
-        for body in self.bodies:
-            if body.body_type == pymunk.Body.DYNAMIC:
-                body.velocity, body.angular_velocity = (0.0, 0.0), 0.0
         self._hook.pre_solve = lambda _constraint, _space: None
         self.space.step(1e-9)
-        for body, (linear, angular) in zip(self.bodies, velocity, strict=True):
-            if body.body_type == pymunk.Body.DYNAMIC:
-                body.velocity, body.angular_velocity = linear, angular
 
     def _pair(self, arbiter: pymunk.Arbiter) -> tuple[int, int] | None:
         numbers = [self._number.get(shape) for shape in arbiter.shapes]

@@ -2,7 +2,6 @@
 
 law_alone    what the law says without blocks
 monitors     what a scene's [watch] table asks for
-segments     the segment of joint that a law point stands for
 record       the history of a run
 outcome      what became of each rock mass
 drawing      what the pictures share

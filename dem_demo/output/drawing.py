@@ -10,7 +10,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.lines import Line2D
 
-from ..scene.blocks import turn
+from ..scene import turn
 from .record import JOINT_COLUMNS, Record
 
 CLOSURE, _, STRESS, TAU, _, SLIPPING, SEPARATED, _, RATE = range(len(JOINT_COLUMNS))

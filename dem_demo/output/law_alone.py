@@ -6,8 +6,7 @@ import numpy as np
 
 import jointlaw as jl
 
-from ..scene.laws import is_coulomb
-from ..scene.scene import Scene
+from ..scene import Scene, is_coulomb
 
 SLIP_DISTANCE = 2e-3  # m, for laws without a critical slip distance
 ROUNDS = 50  # most trials of an angle; a handful is enough where there is one

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..dynamics.simulation import Simulation
-from ..scene.blocks import turn
+from ..scene import turn
 from .law_alone import slip_angle, slip_distance
 
 LOOKS = 8  # steps between two looks
@@ -38,11 +38,6 @@ class SlipMonitor:
             if _waits(entry) and sim.now.slid(sim.joints, moving, base) > entry["slip_distance"]:
                 entry["slip_angle"] = base_angle(sim, moving, base)
                 entry["slip_time"] = sim.time
-
-    @property
-    def waiting(self) -> bool:
-        """Is there a slip still to come?"""
-        return any(_waits(entry) for entry in self.slips.values())
 
     def report(self) -> list[dict]:
         """Measured and predicted slip angles (degrees)."""

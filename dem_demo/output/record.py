@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ..contact import Contacts, Points, raised
 from ..dynamics.energy import COLUMNS
 from ..dynamics.simulation import Simulation
 from .monitors import SlipMonitor, readings
-from .segments import names, segments
 
 JOINT_COLUMNS = (
     "closure_m", "shear_m", "normal_stress_Pa", "shear_stress_Pa",
@@ -113,16 +113,47 @@ def _joints(sim: Simulation) -> dict[str, np.ndarray]:
     now, measured = sim.now, sim.joints.now
     points, contacts = now.points, now.law_points.contacts
     keep = points.length > 0
-    who = names(contacts, points, [number for _, number in now.layout.identities])
+    who = _who(contacts, points, [number for _, number in now.layout.identities])
     values = np.column_stack(
         [points.closure, sim.joints.read("delta")[:, 1], *now.traction.T, measured["sliding"],
          measured["slipping"], measured["separated"], points.length, points.sliding]
     )  # fmt: skip
     return {
         "who": who[keep],
-        "ends": segments(contacts, points, now.motion)[keep],
+        "ends": _segments(contacts, points, now.motion)[keep],
         "values": values[keep],
     }
+
+
+def _segments(contacts: Contacts, points: Points, motion: np.ndarray) -> np.ndarray:
+    """Ends (n, 2, 2) of the segment of joint that each law point stands for: [point, end, x y]."""
+    c, k = contacts, len(contacts.corner)
+    lies = 1 - raised(points.rise, np.ones_like(points.rise))[0]
+    part = c.share * lies * np.maximum(points.overlap, 0.0)
+    part += 0.5 * (points.length[:k] - part.sum(axis=0))
+    way = c.outlines.place(motion)[1][c.edge]
+    ahead = np.full(len(c), 0.5)
+    ahead[:k] = part[0] / np.maximum(part.sum(axis=0), 1e-300)
+    if c.along is not None:
+        way = np.concatenate([way, 1j * points.normal[k:]])
+    ends = points.at + np.stack([ahead, ahead - 1], axis=0) * points.length * way
+    return np.stack([ends.real, ends.imag], axis=-1).swapaxes(0, 1)
+
+
+def _who(contacts: Contacts, points: Points, numbers: list[int]) -> np.ndarray:
+    """Who meets at every law point: (n, 5) block, edge, block, edge and the point's number.
+
+    Of the two edges at a corner the flatter one counts. Points along an edge have numbers below 0.
+    """
+    c, o = contacts, contacts.outlines
+    side = np.where(points.rise[0] < points.rise[1], *c.sides)
+    one, other = np.minimum(side, c.edge), np.maximum(side, c.edge)
+    if c.along is not None:
+        u = c.along
+        one = np.concatenate([one, u.first[u.of]])
+        other = np.concatenate([other, u.second[u.of]])
+    first, second = o.block[one], o.block[other]
+    return np.stack([first, one - o.start[first], second, other - o.start[second], numbers], axis=1)
 
 
 def _csv(path: Path, header, rows) -> None:

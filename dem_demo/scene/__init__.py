@@ -10,7 +10,28 @@ scene      a scene in memory
 read       a scene from its file
 """
 
-from .read import build, load, names, parse
-from .scene import Scene
+from .blocks import Block, turn
+from .drives import Drive, Drives
+from .laws import build_law, coulomb_law, is_coulomb
+from .read import DENSITY, GRAVITY, TEMPLATE, build, load, names, parse, read_tables
+from .scene import Key, Scene
 
-__all__ = ["Scene", "build", "load", "names", "parse"]
+__all__ = [
+    "DENSITY",
+    "GRAVITY",
+    "TEMPLATE",
+    "Block",
+    "Drive",
+    "Drives",
+    "Key",
+    "Scene",
+    "build",
+    "build_law",
+    "coulomb_law",
+    "is_coulomb",
+    "load",
+    "names",
+    "parse",
+    "read_tables",
+    "turn",
+]

@@ -17,7 +17,7 @@ from ..dynamics.simulation import Simulation
 from ..errors import Refused
 from ..output.record import Record
 from ..output.run import run
-from ..scene.scene import Scene
+from ..scene import Scene
 from .ingredients import Variant, variants, working_stress
 
 WARM = 20  # steps before the first run, which else would pay for compiled code

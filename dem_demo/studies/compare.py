@@ -18,9 +18,7 @@ from ..errors import Refused
 from ..output.outcome import outcomes
 from ..output.record import Record
 from ..output.run import play
-from ..scene.blocks import turn
-from ..scene.laws import build_law
-from ..scene.read import DENSITY, GRAVITY, build, read_tables
+from ..scene import DENSITY, GRAVITY, build, build_law, read_tables, turn
 
 FAR = 1.0  # m: a rock whose blocks have moved farther has failed, and need not go on
 

@@ -19,8 +19,7 @@ from jointlaw.parameters.resolution import NAMED
 
 from ..output.law_alone import friction_angle
 from ..output.record import JOINT_COLUMNS, Record
-from ..scene.laws import coulomb_law, is_coulomb
-from ..scene.scene import Scene
+from ..scene import Scene, coulomb_law, is_coulomb
 
 SHALLOW = 1e-3  # step of closure, as a share, over which a stiffness is read
 LONGEST = 0.95  # of the stability limit

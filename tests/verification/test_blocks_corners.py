@@ -134,7 +134,7 @@ def held(law, at, angle, more=""):
         slid = np.zeros(sim.joints.n)
         sim.now = replace(
             sim.now, motion=motion, law_points=law_points, points=points, layout=layout,
-            area=points.length * sim.scene.thickness,
+            ledger=replace(sim.now.ledger, area=points.length * sim.scene.thickness),
             traction=sim.joints.update(sim.joints.increments(points.closure, slid)),
         )  # fmt: skip
         return sim.now.area @ sim.joints.now["stored"], contact_forces(sim)[1]

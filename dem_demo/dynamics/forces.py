@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..contact import Joints, Points
-from .state import Layout
+from .state import Layout, Moment
 from .system import System
 
 
@@ -15,14 +15,19 @@ def damping(layout: Layout, stiffness: np.ndarray) -> np.ndarray:
 
 
 def forces(
-    system: System, joints: Joints, layout: Layout, motion: np.ndarray, points: Points,
-    traction: np.ndarray, stiffness: np.ndarray, velocity: np.ndarray, dt: float,
-) -> np.ndarray:  # fmt: skip
+    system: System,
+    joints: Joints,
+    at: Moment,
+    stiffness: np.ndarray,
+    velocity: np.ndarray,
+    dt: float,
+) -> np.ndarray:
     """(3, n, 3): all forces, those of the dashpots, those of the drives.
 
-    traction (k, 2) in Pa; stiffness (k,) of the law points in N/m; velocity (d,): to which the
-    drives bring their blocks within dt (s).
+    stiffness (k,) of the law points in N/m; velocity (d,): to which the drives bring their blocks
+    within dt (s).
     """
+    layout, _, motion, points, traction = at
     thick = system.scene.thickness
     stress, shear = (points.length * thick * part for part in traction.T)
     energy = joints.now["stored"] * thick  # J/m: what a change of the length costs
@@ -35,10 +40,11 @@ def forces(
     out[0] = layout.assembly(motion, points, stress, -shear, energy) + damped
     out[0] = (out[0] + system.steady) * system.mobile
     if len(velocity):
-        at = system.drives.rows, system.drives.axes
-        needed = system.inertia[at] * (velocity - motion[3:].T[at]) / dt - out[0][at]
-        out[2][at] = needed
-        out[0][at] += needed
+        driven = system.drives.rows, system.drives.axes
+        lacking = velocity - motion[3:].T[driven]
+        needed = system.inertia[driven] * lacking / dt - out[0][driven]
+        out[2][driven] = needed
+        out[0][driven] += needed
     return out
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from ..contact import Contacts, Joints, Points, VirginCurve
 from ..errors import Refused
 from .forces import damping
-from .state import Layout, Limit
+from .state import Limit, Moment
 from .system import System
 
 HEADROOM = 1.25  # most growth of a joint's stiffness between two checks of the time step
@@ -20,11 +20,9 @@ def require_positive(step: float | None) -> None:
         raise ValueError(f"step = {step} s: must be a finite number > 0")
 
 
-def step_limit(
-    system: System, joints: Joints, layout: Layout, contacts: Contacts, motion: np.ndarray,
-    points: Points, traction: np.ndarray, least: float,
-) -> Limit:  # fmt: skip
-    """The limit of this moment from stiffness, dashpots and lever arms; least: so far (s)."""
+def step_limit(system: System, joints: Joints, at: Moment, least: float) -> Limit:
+    """The limit of a moment from stiffness, dashpots and lever arms; least: so far (s)."""
+    layout, contacts, motion, points, traction = at
     area, stress = points.length * system.scene.thickness, traction[:, 0]
     stiffness = np.maximum(
         joints.virgin(VirginCurve.at_stress, stress),

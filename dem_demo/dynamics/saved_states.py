@@ -24,7 +24,7 @@ from ..contact import BatchState, Joints
 from ..scene import Scene, parse
 from . import guards
 from .energy import COLUMNS, Ledger
-from .state import Layout, Limit, State
+from .state import Layout, Limit, Moment, State
 from .system import System
 
 INDEX = "state.json"
@@ -87,8 +87,8 @@ def unpack(system: System, joints: Joints, saved: Saved, step: float | None = No
         return now
     # velocities are half a step ahead of the places: of the new step
     motion[3:] += 0.5 * (step - dt) * (a["forces"][0] / system.inertia * system.free).T
-    at = system, joints, layout, law_points.contacts, motion, points, now.traction
-    found = guards.require_step(guards.step_limit(*at, least), step)
+    at = Moment(layout, law_points.contacts, motion, points, now.traction)
+    found = guards.require_step(guards.step_limit(system, joints, at, least), step)
     return replace(now, t0=now.time, n=0, dt=step, limit=found)
 
 

@@ -13,7 +13,7 @@ from . import guards, timestep
 from .energy import opened
 from .forces import forces
 from .initial_equilibrium import equilibrium
-from .state import Layout, State
+from .state import Layout, Moment, State
 from .system import System
 
 ATTEMPTS = 40  # most rounds of the initial equilibrium
@@ -42,8 +42,8 @@ def begin(
             motion[3:, i] = [*block.velocity, block.spin]
     law_points, points, _ = system.tracker.evaluate(law_points, motion)
     traction = joints.update(joints.increments(points.closure, slid))
-    at_rest = system, joints, layout, law_points.contacts, motion, points, traction
-    limit = guards.step_limit(*at_rest, np.inf)
+    at = Moment(layout, law_points.contacts, motion, points, traction)
+    limit = guards.step_limit(system, joints, at, np.inf)
     dt = step or scene.run.step or _choose_step(system, joints, limit.now)
     limit = guards.require_step(limit, dt)
     reversed_at = np.full(len(scene.drives), np.inf)
@@ -52,7 +52,8 @@ def begin(
     law_points, points, _ = system.tracker.evaluate(law_points, motion)
     area = points.length * scene.thickness
     stiffness = joints.virgin(VirginCurve.at_stress, traction[:, 0]) * area
-    force = forces(system, joints, layout, motion, points, traction, stiffness, velocity, 0.5 * dt)
+    at = Moment(layout, law_points.contacts, motion, points, traction)
+    force = forces(system, joints, at, stiffness, velocity, 0.5 * dt)
     books = area, joints.now["stored"], joints.now["lost"]
     ledger = opened(system.inertia, motion[3:].T, force, dt, *books)
     motion[3:] += (0.5 * dt * force[0] / system.inertia * system.free).T

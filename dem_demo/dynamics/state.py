@@ -7,10 +7,11 @@ the batches of joints (`Joints`).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from ..contact import Assembly, Identity, Joints, LawPoints, Points
+from ..contact import Assembly, Contacts, Identity, Joints, LawPoints, Points
 from .energy import Ledger
 from .system import System
 
@@ -35,6 +36,16 @@ class Layout:
         mass = c.weight / np.where(light > 0, light, np.inf)
         assembly = Assembly(c.a, c.b, len(system.scene.blocks))
         return cls(law_points.identities, assembly, mass)
+
+
+class Moment(NamedTuple):
+    """Law points and their tractions (k, 2) in Pa at a motion (6, blocks): what forces need."""
+
+    layout: Layout
+    contacts: Contacts
+    motion: np.ndarray
+    points: Points
+    traction: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from ..contact import Joints, LawPoints, Points, VirginCurve
 from . import guards
 from .energy import booked
 from .forces import forces
-from .state import Layout, State
+from .state import Layout, Moment, State
 from .system import System
 from .transfer import transferred
 
@@ -43,12 +43,10 @@ def advance(
     stiffness = joints.virgin(VirginCurve.at_stress, traction[:, 0]) * area
     n, limit = now.n + 1, now.limit
     velocity = system.drives.velocity(now.t0 + n * dt, dt, now.reversed_at)
-    force = forces(system, joints, now.layout, motion, points, traction, stiffness, velocity, dt)
+    at = Moment(now.layout, law_points.contacts, motion, points, traction)
+    force = forces(system, joints, at, stiffness, velocity, dt)
     if (stiffness > limit.checked).any():
-        limit = guards.step_limit(
-            system, joints, now.layout, law_points.contacts, motion, points, traction, limit.least
-        )
-        limit = guards.require_step(limit, dt)
+        limit = guards.require_step(guards.step_limit(system, joints, at, limit.least), dt)
     ledger = booked(
         now.ledger, system.inertia, system.gravity, system.loads, motion[3:].T, force, dt,
         area, joints.now["stored"], joints.now["lost"],

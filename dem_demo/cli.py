@@ -1,7 +1,5 @@
 """Command line: run a scene, check a scene file, resume a saved state."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

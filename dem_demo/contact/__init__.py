@@ -13,7 +13,7 @@ from .geometry import Assembly, Contacts, Points
 from .joints import BatchState, Joints
 from .law_points import Identity, LawPoints, Tracker
 from .smoothing import raised
-from .stiffness import VirginCurve
+from .stiffness import StiffnessCurve
 
 __all__ = [
     "Assembly",
@@ -23,7 +23,7 @@ __all__ = [
     "Joints",
     "LawPoints",
     "Points",
+    "StiffnessCurve",
     "Tracker",
-    "VirginCurve",
     "raised",
 ]

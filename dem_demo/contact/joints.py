@@ -4,8 +4,6 @@ Law points come and go; each keeps a slot of its law's batch for as long as its 
 reach, so history is never given to the wrong joint.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -14,7 +12,7 @@ import jointlaw as jl
 
 from ..scene import Key
 from .law_points import Identity
-from .stiffness import VirginCurve
+from .stiffness import StiffnessCurve
 
 MEASURED = ("sliding", "slipping", "separated", "stored", "lost")
 
@@ -30,7 +28,7 @@ class Joints:
     def __init__(self, laws: dict[str, jl.JointLaw], choose: Callable[[Key], str]) -> None:
         self.laws, self.choose = laws, choose
         self.batches = {name: law.joints(0) for name, law in laws.items()}
-        self.curves = {name: VirginCurve.of(law) for name, law in laws.items()}
+        self.curves = {name: StiffnessCurve.of(law) for name, law in laws.items()}
         self._slots: dict[str, dict[Identity, int]] = {name: {} for name in laws}
         self._free: dict[str, list[int]] = {name: [] for name in laws}
         self.assign([])
@@ -106,15 +104,15 @@ class Joints:
         return out
 
     def virgin(
-        self, of: Callable[[VirginCurve, np.ndarray], np.ndarray], x: np.ndarray
+        self, of: Callable[[StiffnessCurve, np.ndarray], np.ndarray], x: np.ndarray
     ) -> np.ndarray:
-        """A function of the virgin curves, such as `VirginCurve.at_stress`, for each joint."""
+        """A function of the virgin curves, such as `StiffnessCurve.at_stress`, for each joint."""
         out = np.empty(self.n)
         for name, rows, _ in self.groups:
             out[rows] = of(self.curves[name], x[rows])
         return out
 
-    def curve(self, point: Identity) -> VirginCurve:
+    def curve(self, point: Identity) -> StiffnessCurve:
         """The virgin curve of a law point's joint."""
         return self.curves[self.choose(point[0])]
 

@@ -4,8 +4,6 @@ The range of a corner along an edge ends where what comes next is as deep: anoth
 takes over, or the next edge. So of the corners of two blocks that overlap the least deep are found.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

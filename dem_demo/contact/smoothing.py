@@ -1,7 +1,5 @@
 """How far an edge that is tilted against another still lies on it, and other soft choices."""
 
-from __future__ import annotations
-
 import numpy as np
 
 FACE, CORNER = 2.0, 5.0  # degrees: up to the first it lies on it, from the second it does not

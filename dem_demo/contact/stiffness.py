@@ -15,7 +15,7 @@ from ..scene import is_coulomb
 
 
 @dataclass(frozen=True)
-class VirginCurve:
+class StiffnessCurve:
     """Upper bound of a law's stiffness (Pa/m) against normal stress (Pa) and closure (m), and the
     work (J/m2) that a virgin joint takes up to a closure.
 
@@ -29,7 +29,7 @@ class VirginCurve:
     work: np.ndarray
 
     @classmethod
-    def of(cls, law: jl.JointLaw) -> VirginCurve:
+    def of(cls, law: jl.JointLaw) -> StiffnessCurve:
         """Tabulate a law from no closure to 2 GPa, more than any corner of rock stands."""
         top = float(law.closure(2e9))
         closure = np.concatenate([[0.0], np.geomspace(1e-8 * top, top, 600)])

@@ -1,7 +1,5 @@
 """Forces on the blocks: joints, dashpots, gravity, loads, drives."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..contact import Joints, Points

@@ -1,10 +1,8 @@
 """What is refused: too long steps, too fast blocks, too deep overlaps."""
 
-from __future__ import annotations
-
 import numpy as np
 
-from ..contact import Contacts, Joints, Points, VirginCurve
+from ..contact import Contacts, Joints, Points, StiffnessCurve
 from ..errors import Refused
 from .forces import damping
 from .state import Limit, Moment
@@ -25,8 +23,8 @@ def step_limit(system: System, joints: Joints, at: Moment, least: float) -> Limi
     layout, contacts, motion, points, traction = at
     area, stress = points.length * system.scene.thickness, traction[:, 0]
     stiffness = np.maximum(
-        joints.virgin(VirginCurve.at_stress, stress),
-        joints.virgin(VirginCurve.at_closure, points.closure),
+        joints.virgin(StiffnessCurve.at_stress, stress),
+        joints.virgin(StiffnessCurve.at_closure, points.closure),
     )
     # Joints that barely touch count as touching well, or each touch would ask again.
     stiffness = np.maximum(stiffness, 0.2 * stiffness.max(initial=0.0))

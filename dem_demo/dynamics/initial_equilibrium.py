@@ -1,7 +1,5 @@
 """The initial equilibrium: displacements with which the joints carry gravity and loads."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np
@@ -9,7 +7,7 @@ from scipy.sparse import csr_array, diags
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
-from ..contact import Joints, VirginCurve
+from ..contact import Joints, StiffnessCurve
 
 TIGHT = 1e-11  # residual force as a share of the applied one
 
@@ -34,9 +32,9 @@ def equilibrium(joints: Joints, rows: csr_array, closure, slid, area, force, set
 
     def bonded(d, pull=0.0):
         c = np.maximum(np.abs(d[:k]), 1e-9)
-        shear = joints.virgin(VirginCurve.at_closure, c)
+        shear = joints.virgin(StiffnessCurve.at_closure, c)
         stress, above, below = (
-            joints.virgin(VirginCurve.stress_at, part * c) for part in (1.0, 1.01, 0.99)
+            joints.virgin(StiffnessCurve.stress_at, part * c) for part in (1.0, 1.01, 0.99)
         )
         slope = (above - below) / (0.02 * c)
         acts = np.where(d[:k] > 0, 1.0, pull)

@@ -6,8 +6,6 @@ the hashes of them and of the scene that they belong to.
 The velocities stored are those that will carry the blocks on, half a step ahead of the places.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,13 +1,11 @@
 """From the drawing to step 0: blocks in equilibrium, a time step, velocities half a step on."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
-from ..contact import Joints, LawPoints, VirginCurve
+from ..contact import Joints, LawPoints, StiffnessCurve
 from ..errors import Refused
 from . import guards, timestep
 from .energy import opened
@@ -51,7 +49,7 @@ def begin(
     motion[3:][system.drives.axes, system.drives.rows] = velocity
     law_points, points, _ = system.tracker.evaluate(law_points, motion)
     area = points.length * scene.thickness
-    stiffness = joints.virgin(VirginCurve.at_stress, traction[:, 0]) * area
+    stiffness = joints.virgin(StiffnessCurve.at_stress, traction[:, 0]) * area
     at = Moment(layout, law_points.contacts, motion, points, traction)
     force = forces(system, joints, at, stiffness, velocity, 0.5 * dt)
     books = area, joints.now["stored"], joints.now["lost"]

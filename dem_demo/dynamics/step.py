@@ -1,13 +1,11 @@
 """One step: from a state to the next one, at positions that pymunk has just reached."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
-from ..contact import Joints, LawPoints, Points, VirginCurve
+from ..contact import Joints, LawPoints, Points, StiffnessCurve
 from . import guards
 from .energy import booked
 from .forces import forces
@@ -40,7 +38,7 @@ def advance(
     d = joints.increments(law_points.closure(points), points.sliding * dt)
     traction = joints.update(d, run.law_steps)
     area = points.length * system.scene.thickness
-    stiffness = joints.virgin(VirginCurve.at_stress, traction[:, 0]) * area
+    stiffness = joints.virgin(StiffnessCurve.at_stress, traction[:, 0]) * area
     n, limit = now.n + 1, now.limit
     velocity = system.drives.velocity(now.t0 + n * dt, dt, now.reversed_at)
     at = Moment(now.layout, law_points.contacts, motion, points, traction)

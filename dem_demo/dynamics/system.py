@@ -1,7 +1,5 @@
 """What stays the same during a run: masses, steady forces, and how contacts are followed."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..contact import Tracker

@@ -5,8 +5,6 @@ dt^2 K + 2 dt C against the mass matrix stays below 4. For one oscillator that i
 dt < (2/omega)(sqrt(1 + zeta^2) - zeta). Rocking is in K because every law point is, at its place.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse import csc_array, csr_array, diags

@@ -6,8 +6,6 @@ would make energy: it starts anew instead, at a closure at which it holds what t
 the rest of the depth becomes its closure offset.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -5,8 +5,6 @@ pushes them. Forces go in from the `pre_solve` of a constraint that does nothing
 per step after the positions have moved and before the velocities do: symplectic Euler.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Curves of a run: where the energy went, and the monitored joints against the law alone."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

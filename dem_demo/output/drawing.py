@@ -1,7 +1,5 @@
 """What the pictures of a run share: scales, blocks, keys."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pictures of a run of single blocks: what slides, what opens, what carries; and animations."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What the law alone says about a scene: slip angles and direct shear curves."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import jointlaw as jl

@@ -1,7 +1,5 @@
 """Monitors of a run: slip in a tilt test, stress and dilation in shear, points of a rock."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..dynamics.simulation import Simulation

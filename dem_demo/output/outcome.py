@@ -1,7 +1,5 @@
 """What became of each rock mass of a run: does it stand, and how far did its blocks move?"""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .record import Record

@@ -1,7 +1,5 @@
 """The history of a run, in memory and as files."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Pictures of a rock mass for a report: joints by state, displacement vectors, histories."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

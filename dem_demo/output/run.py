@@ -1,7 +1,5 @@
 """Run a scene to its end and write what a user wants to see."""
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Convex blocks: corners, area, centroid, moment of inertia."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,8 +6,6 @@ would end inside a block does not weaken it. Sets cut in the order given, so the
 set may end at those of an earlier one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Prescribed motions: a base that tilts, a machine that shears."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

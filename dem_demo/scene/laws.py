@@ -1,7 +1,5 @@
 """Laws of a scene, built from its TOML tables. All are `jointlaw.JointLaw`."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import jointlaw as jl

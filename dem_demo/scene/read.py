@@ -1,7 +1,5 @@
 """Reads scenes: TOML files, or their text, checked."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The `[[rock]]` tables of a scene: an outline, the joint sets that cut it, what stays fixed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

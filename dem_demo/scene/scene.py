@@ -1,7 +1,5 @@
 """A scene in memory: blocks, laws, drives and how to run them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

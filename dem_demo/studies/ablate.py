@@ -1,7 +1,5 @@
 """Run a scene with each ingredient removed in turn: what it changes, and what it costs."""
 
-from __future__ import annotations
-
 import csv
 import time
 from dataclasses import dataclass, field, replace

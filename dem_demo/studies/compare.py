@@ -5,8 +5,6 @@ stiffnesses like those of the joint at half the height of the rock. What it lack
 hardening and direction: the difference between the two runs is what these do.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Sequence
 from typing import Any

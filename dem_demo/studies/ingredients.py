@@ -5,8 +5,6 @@ stiff the joints are, the stiffness K of an asperity is scaled so that each law 
 before at the normal stress that its joints carried: what is left is the change of form.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial

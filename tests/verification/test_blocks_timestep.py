@@ -125,9 +125,9 @@ def test_stiffness_at_stress_bounds_a_sheared_joint():
         },
         "law",
     )
-    from dem_demo.contact.stiffness import VirginCurve
+    from dem_demo.contact.stiffness import StiffnessCurve
 
-    curve, rng = VirginCurve.of(law), np.random.default_rng(5)
+    curve, rng = StiffnessCurve.of(law), np.random.default_rng(5)
     batch, closure = law.joints(40), law.closure(np.geomspace(5e3, 3e5, 40))
     batch.update(np.column_stack([closure, np.zeros(40)]), tangent=False)
     worst = 0.0

@@ -24,7 +24,7 @@ import numpy as np
 
 import jointlaw as jl
 from jointlaw.kernels import compiled as kernel
-from jointlaw.kernels.engine import NumbaEngine
+from jointlaw.kernels.engine import NumbaEngine, Step
 
 N = 10_000
 STEPS = 4  # different increments, so that no branch is learnt by heart
@@ -57,7 +57,7 @@ ONE_WAY = (  # closure alone moves no slider along t
     ("new2 = ts * ts + tt * tt", "new2 = ts * ts"),
     ("size = np.sqrt(new2)", "size = abs(ts)"),
     ("qs[l], qt[l] = part * ts, part * tt", "qs[l] = part * ts"),
-    ("        desk[_SUMT + l] += part * tt\n", ""),
+    ("        scratch[_SUMT + l] += part * tt\n", ""),
 )  # fmt: skip
 
 
@@ -83,7 +83,7 @@ class Timed:
         self._advance(first)
 
     def _advance(self, d: Any) -> None:
-        self.engine.advance(self.state, d, self.F, self.C, None, True, self.ledger)
+        self.engine.advance(self.state, Step(d, self.F, self.C, None, True), self.ledger)
 
     def run(self, seconds: float) -> None:
         """Time single updates for a while."""

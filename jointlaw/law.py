@@ -1,82 +1,36 @@
-"""The joint law: frozen parameters, and the tables that every joint of the law shares."""
+"""The joint law: parameters in, joints out."""
 
 from __future__ import annotations
 
-import hashlib
 import math
-import sys
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .discretisation import nodes
-from .discretisation.virgin_curve import Curve, virgin_curve
-from .parameters import toml as _toml
+from .discretisation.facets import Facets, facet_sum, facets
+from .discretisation.tables import UNDERFLOW, VERSION, Tables, largest_reach, tables
+from .discretisation.virgin_closure import VirginClosure
+from .discretisation.virgin_curve import VirginCurve, virgin_curve
+from .joints.batch import JointBatch
+from .joints.joint import Joint
+from .kernels import reference
+from .parameters import toml
 from .parameters.asperity import Asperity
-from .parameters.heights import GammaHeights, HeightDistribution, Heights
-from .parameters.orientation import Facets, Orientation
+from .parameters.fingerprint import fingerprint
+from .parameters.heights import HeightDistribution
+from .parameters.orientation import Orientation
 from .parameters.resolution import Resolution, resolve
-from .support.checks import Array, above, at_least, finite, frozen, number
+from .support.checks import Array, above, at_least, finite, number
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from .accuracy.tradeoff import Tradeoff
-    from .joints.batch import JointBatch
-    from .joints.joint import Joint
-    from .kernels.engine import Engine
 
-_SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
-NOTHING = 1e-140  # m, and Pa/m: counts as zero, for powers and squares below it underflow
 DEFAULT_STRESS = 20e6  # Pa; its closure is the default closure_range
-
-
-class Tables(NamedTuple):
-    """What a kernel reads: everything per facet (M facets, D depth cells), physical axes first.
-
-    `m` (dim, M) maps closure and in-plane offset to the effective closure y of a facet, `s`, `t`
-    (dim, M) are the in-facet directions, `area` is A = N w lam K c1^(1+eta), `depth` (M, D+1) the
-    cell limits zeta with the virgin force and slope there (slope 0 at the first by definition).
-    """
-
-    curve: Curve
-    n: Array
-    m: Array
-    s: Array
-    t: Array
-    c1: Array
-    area: Array
-    weight: Array
-    depth: Array
-    depth_force: Array
-    depth_slope: Array
-    lam: float
-    mu: float
-    critical_slip: float
-
-    @property
-    def dim(self) -> int:
-        """Components of a displacement: 3, or 2 in one plane."""
-        return len(self.m)
-
-    @property
-    def cells(self) -> int:
-        """Depth cells per facet."""
-        return int(self.depth.shape[1]) - 1
-
-    @property
-    def sliders(self) -> int:
-        """Sliders per joint: one for each cell of each facet."""
-        return len(self.c1) * self.cells
-
-    @property
-    def rows(self) -> int:
-        """State numbers per joint: delta, offset, dissipated energy, and q of every slider."""
-        return 2 * self.dim + 2 * self.sliders
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,8 +72,11 @@ class JointLaw:
         for name, kind in (("orientation", Orientation), ("asperity", Asperity)):
             if not isinstance(value := getattr(self, name), kind):
                 raise ValueError(f"{name} = {value!r} must be of type {kind.__name__}")
-        if not (self.heights is None or isinstance(self.heights, (GammaHeights, Heights))):
-            raise ValueError(f"heights = {self.heights!r} must be GammaHeights, Heights or None")
+        if not (self.heights is None or isinstance(self.heights, HeightDistribution)):
+            raise ValueError(
+                f"heights = {self.heights!r} must be GammaHeights, Heights, None, or an object "
+                "with their overlap, formation, pdf, cdf and breakpoints"
+            )
         set_(self, "asperity_density", above("asperity_density", self.asperity_density, 0.0))
         set_(self, "resolution", resolve(self.resolution))
         if self.plane is not None:
@@ -131,30 +88,21 @@ class JointLaw:
                 f"plane = {self.plane!r}: a joint with closure_only does not shear; leave plane out"
             )
         set_(self, "critical_slip", above("critical_slip", self.critical_slip, 0.0, infinite=True))
-        if self.critical_slip < NOTHING:
+        if self.critical_slip < UNDERFLOW:
             raise ValueError(
                 f"critical_slip = {self.critical_slip!r} m is out of bounds: it must be >= "
-                f"{NOTHING:g}"
+                f"{UNDERFLOW:g}"
             )
         with np.errstate(all="ignore"):  # what is no number in the end is refused
             if self.closure_range is None:
-                set_(self, "closure_range", 1.0)
-                try:
-                    set_(self, "closure_range", float(self.closure(DEFAULT_STRESS)))
-                except ValueError:
-                    self._require_numbers()  # the likely reason
-                    raise
-                for cached in ("tables", "_closure_factor"):
-                    self.__dict__.pop(cached, None)
+                set_(self, "closure_range", self._default_range())
             set_(self, "closure_range", above("closure_range", self.closure_range, 0.0))
-            self._require_numbers()  # and with it that the virgin curve is valid
+            self._require_numbers(self.closure_range)  # and with it that the curve is valid
 
     # ----------------------------------------------------------------- joints
 
     def joint(self) -> Joint:
         """One joint of this law, unloaded."""
-        from .joints.joint import Joint
-
         return Joint(self)
 
     def joints(self, n: int, ledger: bool = True) -> JointBatch:
@@ -162,22 +110,52 @@ class JointLaw:
 
         Without `ledger` dissipated energy is not added up, which is faster.
         """
-        from .joints.batch import JointBatch
-
         return JointBatch(self, n, ledger)
+
+    def step(
+        self, state: ArrayLike, d: ArrayLike, tangent: bool = True
+    ) -> tuple[Array, Array, Array | None]:
+        """One step as a pure function, for a host that keeps the states itself.
+
+        state: (state_size,), or (state_size, n) for n joints; zeros are the virgin state.
+        d: displacement increment in m, (dim,) or (dim, n).
+        Returns the new state, F in Pa (dim,) or (dim, n), and C in Pa/m (dim, dim) or
+        (dim, dim, n), None without `tangent`; what was given stays as it was. The algorithm and its
+        equations: `jointlaw.kernels.reference.step`, which this calls. Raises ValueError for a
+        wrong shape or a number that is not finite.
+        """
+        old, move = finite("state", state, "numbers of state"), finite("d", d, "m")
+        k, several = self.tables, old.ndim == 2
+        rest = old.shape[1:]
+        if old.shape not in ((k.rows,), (k.rows, *rest)) or move.shape != (k.dim, *rest):
+            raise ValueError(
+                f"state has shape {old.shape} and d {move.shape}; expected ({k.rows},) and "
+                f"({k.dim},), or ({k.rows}, n) and ({k.dim}, n) for n joints"
+            )
+        columns = old.reshape(k.rows, -1), move.reshape(k.dim, -1)
+        new, F, C = reference.step(k, *columns, tangent)
+        if several:
+            return new, F, C
+        return new[:, 0], F[:, 0], None if C is None else C[..., 0]
+
+    @property
+    def state_size(self) -> int:
+        """Numbers of state of one joint, as `step` takes them and a snapshot holds them."""
+        return self.tables.rows
 
     # ----------------------------------------------------- virgin closure curve
 
     def normal_stress(self, closure: ArrayLike) -> Any:
         """Normal stress (Pa) of a joint closed from zero to `closure` (m), unsheared."""
-        return self._stress(self._within_reach(closure))[()]
+        return self._virgin.stress(self._within_reach(closure))[()]
 
     def closure(self, normal_stress: ArrayLike) -> Any:
         """Closure (m) at which the normal stress (Pa, >= 0) is reached: inverse of the above."""
         stress = finite("normal_stress", normal_stress, "Pa")
         if not (stress >= 0).all():
             raise ValueError(f"normal_stress = {normal_stress!r} is out of bounds: it must be >= 0")
-        result = np.array([self._closure_at(float(value)) for value in stress.ravel()])
+        start = self.closure_range
+        result = np.array([self._virgin.closure(float(one), start) for one in stress.ravel()])
         return result.reshape(stress.shape)[()]
 
     def contacts(self, closure: ArrayLike, direction: tuple[float, float] | None = None) -> Any:
@@ -230,7 +208,7 @@ class JointLaw:
         batch that is timed; 0 times nothing. seconds: spent on each timing. Errors are those of the
         standard paths within the closure range, as shares of each path's largest traction.
         """
-        from .accuracy.tradeoff import tradeoff
+        from .accuracy.tradeoff import tradeoff  # loads scipy.interpolate, slow to import
 
         return tradeoff(self, resolutions, joints, seconds)
 
@@ -251,7 +229,7 @@ class JointLaw:
     # ---------------------------------------------------------------- tables
 
     @cached_property
-    def curve(self) -> Curve:
+    def curve(self) -> VirginCurve:
         """Tabulated virgin curve of one asperity."""
         return virgin_curve(self.asperity.eta, self.heights)
 
@@ -259,67 +237,59 @@ class JointLaw:
     def facets(self) -> Facets:
         """Quadrature nodes of the orientation density."""
         r = self.resolution
-        return self.orientation.facets(r.u, r.phi, self.plane, self.closure_only)
+        return facets(self.orientation, r.u, r.phi, self.plane, self.closure_only)
 
     @cached_property
     def tables(self) -> Tables:
         """Tables that the kernels read."""
-        f, p = self.facets, self.asperity
-        c1 = np.cos(f.theta)
-        area = self.asperity_density * f.weight * p.lam * p.K * c1 ** (1 + p.eta)
-        one_spring = p.eta == 0 and self.heights is None  # touches at once: all in the first cell
-        slope, cells = np.tan(f.theta), 1 if one_spring else self.resolution.depth
-        depth = nodes.depth_nodes(self.curve, self.closure_range, slope, cells)
-        force, slope = self.curve.force(np.where(np.isfinite(depth), depth, 0.0))
-        force[:, -1] = slope[:, -1] = np.inf
-        slope[:, 0] = 0.0  # a spring that touches at once (eta = 0) belongs to the first cell
-        slope = np.maximum.accumulate(slope, axis=1)  # but for the rounding of the table it rises
-        return frozen(Tables(
-            self.curve, f.n, f.n / c1, f.s, f.t, c1, area, f.weight, depth, force, slope,
-            p.lam, p.mu, self.critical_slip,
-        ))  # fmt: skip
-
-    @cached_property
-    def engines(self) -> dict[str, Engine]:
-        """Kernels that advance this law's joints, by name; `engine.engine` fills it."""
-        return {}
+        return tables(
+            self.facets, self.curve, self.asperity, self.asperity_density,
+            self.closure_range, self.resolution.depth, self.critical_slip,
+        )  # fmt: skip
 
     @cached_property
     def largest_reach(self) -> float:
         """Effective closure (m) up to which forces, energies and their squares stay finite."""
-        k, p = self.tables, self.asperity
-        y = 10.0 ** np.arange(-300.0, 101.0)
-        stiffest = float(np.max(k.area / k.c1)) * max(p.lam, 1 / p.lam, 1.0) * (1.0 + p.mu)
-        with np.errstate(over="ignore", invalid="ignore"):
-            force, slope = self.curve.force(y)
-            worst = stiffest * (force + y * slope) + float(np.max(k.area)) * self.curve.energy(y)
-        bad = ~(worst < 1e140)
-        if bad[0]:
-            return 0.0
-        return float(y[int(np.argmax(bad)) - 1]) if bad.any() else float(y[-1])
+        return largest_reach(self.curve, self._scale, self.facets.theta, self.asperity)
 
     @cached_property
     def fingerprint(self) -> str:
-        """Hash of all parameters: states fit only joints of the law that wrote them."""
-        return hashlib.sha256(self.to_toml().encode()).hexdigest()
+        """Version of the discretisation, and a hash of the parameters that differ from default.
 
-    def _require_numbers(self) -> None:
+        States fit only joints of the law that wrote them.
+        """
+        return f"{VERSION}:{fingerprint(self)}"
+
+    @cached_property
+    def _scale(self) -> Array:
+        """A of every facet (M,)."""
+        return self.facets.scale(self.asperity, self.asperity_density)
+
+    @cached_property
+    def _virgin(self) -> VirginClosure:
+        """Closure without shear."""
+        p = self.asperity
+        return VirginClosure(self.curve, facet_sum(self.facets.theta, self._scale, p.lam, p.mu))
+
+    def _default_range(self) -> float:
+        """The closure (m) at 20 MPa."""
+        try:
+            return self._virgin.closure(DEFAULT_STRESS, 1.0)
+        except ValueError:
+            self._require_numbers(1.0)  # the likely reason
+            raise
+
+    def _require_numbers(self, closure_range: float) -> None:
         """Refuse parameters whose forces, within the closure range, no float can hold."""
-        weak = not float(np.max(self.tables.area)) * min(self.asperity.lam, 1.0) > NOTHING
-        if weak or not self.largest_reach >= self.closure_range:
-            p = self.asperity
+        p = self.asperity
+        weak = not float(np.max(self._scale)) * min(p.lam, 1.0) > UNDERFLOW
+        if weak or not self.largest_reach >= closure_range:
             raise ValueError(
                 f"asperity.K = {p.K:g}, lam = {p.lam:g}, eta = {p.eta:g}, mu = {p.mu:g} with "
                 f"asperity_density = {self.asperity_density:g} per m2 give forces that are too "
                 f"{'small' if weak else 'large'} for floating point within closure_range = "
-                f"{self.closure_range:g} m; check the units"
+                f"{closure_range:g} m; check the units"
             )
-
-    @cached_property
-    def _closure_factor(self) -> float:
-        """F1/Phi under pure closure."""
-        k = self.tables
-        return facet_sum(self.facets.theta, k.area, k.lam, k.mu)
 
     def _within_reach(self, closure: ArrayLike) -> Array:
         """Closures (m) that are finite and whose forces are."""
@@ -331,55 +301,23 @@ class JointLaw:
             )
         return y
 
-    def _stress(self, closure: Array) -> Array:
-        """Normal stress (Pa) at closures (m), infinite where it overflows."""
-        stress: Array = self._closure_factor * self.curve.force(closure)[0]
-        return stress
-
-    def _closure_at(self, stress: float) -> float:
-        from scipy.optimize import brentq  # a third of the package's import time
-
-        if stress < _SMALLEST:
-            return 0.0
-
-        def misfit(log_y: float) -> float:  # finite where the force is zero or overflows
-            force = float(self._stress(np.array(math.exp(log_y))))
-            return math.log(min(max(force, _SMALLEST), _LARGEST)) - math.log(stress)
-
-        low = high = math.log(self.closure_range)
-        with np.errstate(over="ignore"):
-            while misfit(high) < 0.0:
-                high += 1.0
-                if high > 700.0:
-                    raise ValueError(f"normal_stress = {stress!r} Pa is beyond any closure")
-            while misfit(low) > 0.0:
-                low -= 1.0
-            if low == high:
-                return self.closure_range
-            return math.exp(brentq(misfit, low, high, xtol=1e-15, rtol=1e-15, maxiter=500))
-
     # ----------------------------------------------------------------- files
 
     def to_toml(self, path: str | Path | None = None) -> str:
         """The law as TOML text, also written to `path` if given (histograms then as CSV beside)."""
-        return _toml.write_law(self, None if path is None else Path(path))
+        values = {one.name: getattr(self, one.name) for one in fields(self)}
+        return toml.write_law(values, None if path is None else Path(path))
 
     @classmethod
     def from_toml(cls, source: str | Path) -> JointLaw:
         """A law from a TOML file or from TOML text; the keys are the parameters above."""
-        return _toml.read_law(cls, source)
+        return toml.read_law(cls, source)
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], where: str = "law") -> JointLaw:
         """A law from the mapping that such a file holds; `where` is named in error messages."""
-        return _toml.build_law(cls, data, where)
+        return toml.build_law(cls, data, where)
 
     def __getstate__(self) -> dict[str, Any]:
-        names = self.__dataclass_fields__
+        names = {one.name for one in fields(self)}  # what is cached is made anew
         return {name: value for name, value in self.__dict__.items() if name in names}
-
-
-def facet_sum(theta: Array, area: Array, lam: float, mu: float) -> float:
-    """Sum of area (cos theta + sin theta min(tan theta/lam, mu)): facets under pure closure."""
-    shear = np.minimum(np.tan(theta) / lam, mu)
-    return float(np.sum(area * (np.cos(theta) + np.sin(theta) * shear)))

@@ -26,11 +26,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
-from ..law import JointLaw
+from ..joints import batch as joints
+from ..parameters.heights import HeightDistribution
+from ..parameters.orientation import Orientation
 from ..parameters.resolution import Resolution
 from ..support.checks import Array
 from ..support.progress import track
@@ -38,7 +42,25 @@ from ..support.progress import track
 STEPS = 120  # of each path
 
 
-def reference_resolution(law: JointLaw) -> Resolution:
+class Law(joints.Law, Protocol):
+    """What is read of a law whose accuracy is measured; `replace` gives it other resolutions."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    def __hash__(self) -> int: ...
+    @property
+    def orientation(self) -> Orientation: ...
+    @property
+    def heights(self) -> HeightDistribution | None: ...
+    @property
+    def closure_range(self) -> float: ...
+    @property
+    def resolution(self) -> Resolution: ...
+    def normal_stress(self, closure: ArrayLike) -> Any: ...
+    def joints(self, n: int, ledger: bool = True) -> joints.JointBatch: ...
+
+
+def reference_resolution(law: Law) -> Resolution:
     """The resolution whose tractions count as exact: steep facets (small a) need the most of it."""
     if law.heights is None and law.asperity.eta == 0.0:  # one spring, whose slip has a sharp onset
         return Resolution(64, 48, 1)
@@ -60,12 +82,12 @@ class Suite:
     F: Array
     uncertainty: Array  # (paths,) of F: its difference from two thirds of the nodes
 
-    def errors(self, law: JointLaw) -> tuple[Array, Array]:
+    def errors(self, law: Law) -> tuple[Array, Array]:
         """Largest and rms error (paths,) of another resolution, as shares of the peak |F|."""
         return errors(tractions(law, self.d), self.F)
 
 
-def standard_suite(law: JointLaw, best: Resolution | None = None, excursions: int = 0) -> Suite:
+def standard_suite(law: Law, best: Resolution | None = None, excursions: int = 0) -> Suite:
     """The standard paths of a law, with tractions at `best`, by default the reference resolution.
 
     `excursions` random paths come after them. Second-order convergence makes the reference's own
@@ -75,7 +97,7 @@ def standard_suite(law: JointLaw, best: Resolution | None = None, excursions: in
 
 
 @lru_cache(maxsize=16)
-def _suite(law: JointLaw, excursions: int) -> Suite:
+def _suite(law: Law, excursions: int) -> Suite:
     """The suite of a law at its reference resolution."""
     best = law.resolution
     stress = float(law.normal_stress(law.closure_range)) / 2
@@ -91,7 +113,7 @@ def _suite(law: JointLaw, excursions: int) -> Suite:
     return Suite(names, d, F, errors(check, F)[0])
 
 
-def tractions(law: JointLaw, d: Array) -> Array:
+def tractions(law: Law, d: Array) -> Array:
     """F (steps, paths, dim) in Pa along increments d of the same shape, from the virgin state."""
     batch, F = law.joints(d.shape[1], ledger=False), np.empty_like(d)
     for k, step in enumerate(track(d, "steps of the paths", len(d))):
@@ -99,7 +121,7 @@ def tractions(law: JointLaw, d: Array) -> Array:
     return F
 
 
-def tangents(law: JointLaw, d: Array) -> Array:
+def tangents(law: Law, d: Array) -> Array:
     """C (steps, paths, dim, dim) in Pa/m along increments d, from the virgin state."""
     batch, dim = law.joints(d.shape[1], ledger=False), d.shape[2]
     F, C = np.empty(d.shape[1:]), np.empty((*d.shape, dim))
@@ -115,7 +137,7 @@ def errors(F: Array, reference: Array) -> tuple[Array, Array]:
     return off.max(axis=0) / peak, np.sqrt(np.mean(off**2, axis=0)) / peak
 
 
-def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]:
+def _paths(law: Law, stress: float) -> tuple[tuple[str, ...], Array, Array]:
     """Names, places (steps, paths, dim) in m, and which paths hold the normal stress from STEPS/10.
 
     The closures of those that hold it are first guesses.
@@ -168,7 +190,7 @@ def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]
     return tuple(named), R * np.stack(list(named.values()), axis=1), held
 
 
-def _excursions(law: JointLaw, stress: float, count: int) -> Array:
+def _excursions(law: Law, stress: float, count: int) -> Array:
     """Random places (steps, count, dim) in m."""
     rng, R, s = np.random.default_rng(8), law.closure_range, np.arange(1, STEPS + 1) / STEPS
     goal = []
@@ -187,7 +209,7 @@ def _excursions(law: JointLaw, stress: float, count: int) -> Array:
     return R * np.stack(goal, axis=1)[:, :, : law.tables.dim]
 
 
-def _hold_stress(law: JointLaw, d: Array, held: Array, stress: float) -> Array:
+def _hold_stress(law: Law, d: Array, held: Array, stress: float) -> Array:
     """Increments with the closures of the paths `held` mended to keep the normal stress.
 
     Two Newton steps per increment keep it to some 1e-3, and what is left is mended in the next:

@@ -8,19 +8,18 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ..kernels.engine import thread_count
+from ..kernels.threads import thread_count
 from ..parameters.resolution import NAMED, Resolution, resolve
 from ..support.checks import Array, whole
 from ..support.files import replace_file
 from ..support.progress import track
-from .suite import Suite, errors, reference_resolution, scaled, standard_suite, tangents
-
-if TYPE_CHECKING:
-    from ..law import JointLaw
+from .plot import plot_prices
+from .price import Price, frontier
+from .suite import Law, Suite, errors, reference_resolution, scaled, standard_suite, tangents
 
 SPREAD = tuple(
     Resolution(u, phi, depth)
@@ -28,32 +27,6 @@ SPREAD = tuple(
     for depth in (1, 2, 3, 4, 6, 10, 16)
 )
 _MEMORY = 100_000_000  # bytes of state that a timing may use; very fine laws get a smaller batch
-
-
-@dataclass(frozen=True)
-class Price:
-    """One resolution: errors are shares of the largest traction (or tangent) of each path.
-
-    `error`, `rms` (paths,): of the traction. `tangent_rms`, `tangent_max`: of the tangent, over all
-    paths; it jumps between stick and slip, and the largest error is that of a jump that comes one
-    step early or late. `ns`, `ns_tangent`: nanoseconds per joint and update without and with
-    tangent, no ledger, least of several runs; NaN where nothing was timed. `bytes`: per joint.
-    """
-
-    resolution: Resolution
-    sliders: int
-    error: Array
-    rms: Array
-    tangent_rms: float
-    tangent_max: float
-    ns: float
-    ns_tangent: float
-    bytes: int
-
-    @property
-    def worst(self) -> float:
-        """Largest error of the traction on any path."""
-        return float(self.error.max())
 
 
 @dataclass(frozen=True)
@@ -72,11 +45,7 @@ class Tradeoff:
 
     def frontier(self) -> tuple[Price, ...]:
         """The prices that no other with as few sliders beats in its largest error."""
-        best: list[Price] = []
-        for row in sorted(self.rows, key=lambda row: (row.sliders, row.worst)):
-            if not best or row.worst < best[-1].worst:
-                best.append(row)
-        return tuple(best)
+        return frontier(self.rows)
 
     def __str__(self) -> str:
         lines = [
@@ -129,13 +98,11 @@ class Tradeoff:
 
     def plot(self, path: str | Path | None = None) -> Any:
         """The frontier as a matplotlib figure; with `path` it is written there and closed."""
-        from .plot import plot_tradeoff
-
-        return plot_tradeoff(self, path)
+        return plot_prices(self.rows, self.uncertainty, self.joints, self.how, path)
 
 
 def tradeoff(
-    law: JointLaw,
+    law: Law,
     resolutions: Sequence[str | Resolution] | None = None,
     joints: int = 10_000,
     seconds: float = 0.2,
@@ -157,7 +124,7 @@ def tradeoff(
     return Tradeoff(suite.names, suite.uncertainty, rows, joints, how)
 
 
-def _price(law: JointLaw, suite: Suite, exact: Array, joints: int, seconds: float) -> Price:
+def _price(law: Law, suite: Suite, exact: Array, joints: int, seconds: float) -> Price:
     error, rms = suite.errors(law)
     steps, paths = exact.shape[:2]
     C = tangents(law, suite.d).reshape(steps, paths, -1)
@@ -170,7 +137,7 @@ def _price(law: JointLaw, suite: Suite, exact: Array, joints: int, seconds: floa
     )  # fmt: skip
 
 
-def _time(law: JointLaw, n: int, tangent: bool, seconds: float) -> float:
+def _time(law: Law, n: int, tangent: bool, seconds: float) -> float:
     """Least time of an update in ns per joint, of runs that take this long together."""
     if n == 0:
         return float("nan")

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..discretisation.facets import facet_sum, facets
 from ..discretisation.virgin_curve import exact_force
 from ..laboratory.experiments import direct_shear
-from ..law import JointLaw, facet_sum
+from ..law import JointLaw
 from ..parameters.asperity import Asperity
 from ..parameters.heights import GammaHeights
 from ..parameters.orientation import Orientation
@@ -228,8 +229,8 @@ def _facet_factor(
 ) -> float:
     """F1/(N lam K Phi) under pure closure, summed over the facets as `JointLaw` does."""
     r = resolve(resolution)
-    facets = Orientation(a, b, c).facets(r.u, r.phi)
-    return facet_sum(facets.theta, facets.weight * np.cos(facets.theta) ** (1 + eta), lam, mu)
+    nodes = facets(Orientation(a, b, c), r.u, r.phi)
+    return facet_sum(nodes.theta, nodes.weight * np.cos(nodes.theta) ** (1 + eta), lam, mu)
 
 
 def _pair(name: str, x: Any, other: str, y: Any) -> tuple[Array, Array]:

@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..support.checks import Array, frozen
-from .virgin_curve import Curve
+from .virgin_curve import VirginCurve
 
 # Chosen on random laws with `benchmarks/nodes.py`
 _STEEPEST = 10.0  # largest tan(theta) that counts: at a = 1 it grows without bound
@@ -43,7 +43,7 @@ def inclinations(b: float, count: int) -> tuple[Array, Array]:
     return frozen((places, shares))
 
 
-def depth_nodes(curve: Curve, closure_range: float, slope: Array, cells: int) -> Array:
+def depth_nodes(curve: VirginCurve, closure_range: float, slope: Array, cells: int) -> Array:
     """Limits zeta (M, cells + 1) in m of the depth cells of facets of this tan(theta) (M,).
 
     A cell of width h lumps springs of density Phi'' and by that errs by Phi'' h^2/8 at most: equal

@@ -31,7 +31,7 @@ _NEARLY = 1e-20  # of the first cell: where the limit at y = 0 is taken
 _CELLS = (128, 256, 512, 1024, 2048, 4096, 8192)
 
 
-class Curve(NamedTuple):
+class VirginCurve(NamedTuple):
     """Table of the virgin curve: cubic pieces on equal cells of t, coefficients (cells, 4)."""
 
     eta: float
@@ -40,6 +40,11 @@ class Curve(NamedTuple):
     T: Array
     error: float  # largest error of S seen between the nodes
     rise: float = 0.0  # p: S and T are tabulated over w^p
+
+    @property
+    def linear(self) -> bool:
+        """Whether one linear spring that touches at once is all: eta = 0, no heights."""
+        return self.eta == 0.0 and len(self.S) == 1
 
     def force(self, y: Array) -> tuple[Array, Array]:
         """Phi and its slope Phi' at y (m); both zero where y <= 0."""
@@ -108,7 +113,7 @@ def shares(y: Array, scale: float) -> tuple[Array, Array]:
 
 
 @lru_cache(maxsize=256)
-def virgin_curve(eta: float, heights: HeightDistribution | None) -> Curve:
+def virgin_curve(eta: float, heights: HeightDistribution | None) -> VirginCurve:
     """Tabulate the virgin curve; laws that differ in other parameters share the table.
 
     Raises ValueError when Phi is not convex (the touch-depth density would turn negative and the
@@ -116,7 +121,7 @@ def virgin_curve(eta: float, heights: HeightDistribution | None) -> Curve:
     """
     if heights is None:
         flat = np.array([[1.0, 0.0, 0.0, 0.0]])
-        return frozen(Curve(eta, 1.0, flat, flat / (2 + eta), 0.0))
+        return frozen(VirginCurve(eta, 1.0, flat, flat / (2 + eta), 0.0))
     r0, points = heights.overlap, heights.breakpoints()
     beyond = points[points > r0] - r0
     far = float(beyond[-1]) if beyond.size else r0
@@ -139,7 +144,7 @@ def virgin_curve(eta: float, heights: HeightDistribution | None) -> Curve:
             "(cut it)"
         )
     energy = _energy_table(eta, scale, table, power)
-    return frozen(Curve(eta, scale, table, energy, error, power))
+    return frozen(VirginCurve(eta, scale, table, energy, error, power))
 
 
 def exact_force(y: Array, eta: float, heights: HeightDistribution | None) -> tuple[Array, Array]:

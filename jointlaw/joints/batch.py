@@ -3,20 +3,48 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..kernels import reference as kernel
-from ..kernels.engine import LANES, engine, rows_of, write_rows
+from ..discretisation.tables import Tables
+from ..kernels import reference
+from ..kernels.blocks import LANES, empty_blocks, rows_of, write_rows
+from ..kernels.engine import Step, engine
 from ..kernels.reference import Measures
-from ..law import JointLaw
+from ..parameters.asperity import Asperity
 from ..support.checks import Array, numbers, whole
 from .state import JointState, NonFiniteError, write_replay
 
 Index = Sequence[int] | NDArray[np.integer[Any]] | NDArray[np.bool_]
 Out = tuple[Array, Array | None]
+COMPONENTS = {  # of a displacement, by their number, and how to have more
+    1: "closure; for shear take a law without closure_only",
+    2: "closure and shear along the plane; for motion in 3-D take a law with plane=None",
+    3: "closure and shear along axes 2 and 3",
+}
+FEW = 8  # numbers of an increment up to which Python looks at them faster than numpy
+
+
+class Law(Protocol):
+    """What joints, and tests on them, read of a law."""
+
+    @property
+    def tables(self) -> Tables: ...
+    @property
+    def asperity(self) -> Asperity: ...
+    @property
+    def plane(self) -> float | None: ...
+    @property
+    def closure_only(self) -> bool: ...
+    @property
+    def largest_reach(self) -> float: ...
+    @property
+    def fingerprint(self) -> str: ...
+    def closure(self, normal_stress: ArrayLike) -> Any: ...
+    def max_stiffness(self, closure: ArrayLike) -> Any: ...
+    def to_toml(self) -> str: ...
 
 
 class JointBatch:
@@ -29,12 +57,11 @@ class JointBatch:
     faster with the compiled kernel.
     """
 
-    def __init__(self, law: JointLaw, n: int, ledger: bool = True) -> None:
+    def __init__(self, law: Law, n: int, ledger: bool = True) -> None:
         self.law, self.ledger = law, ledger
-        self._engine = engine(law)
+        self._engine = engine(law.tables)
         self._n = whole("n", n, 0)
-        lanes = 1 if self._n == 1 else LANES
-        self._state = np.zeros((-(-self._n // lanes), self._engine.rows, lanes))
+        self._state = empty_blocks(self._engine.rows, self._n)
         self._reach = 0.0  # no facet's effective closure exceeds it, in either sense
         self._stretch = 1.0 + 2.0 * float(np.max(np.abs(law.tables.m)))  # of y over that of d
 
@@ -44,7 +71,7 @@ class JointBatch:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        self._engine, rows = engine(self.law), state["_state"]
+        self._engine, rows = engine(self.law.tables), state["_state"]
         blocks, kept, lanes = rows.shape
         self._state = np.zeros((blocks, self._engine.rows, lanes))
         self._state[:, :kept] = rows
@@ -73,7 +100,7 @@ class JointBatch:
         `tangent`. Raises ValueError for a wrong shape, index or a non-finite increment, and
         NonFiniteError when the result would overflow; the state is then as it was.
         """
-        return self._advance(d, where, tangent, out, keep=True)
+        return self._step(d, where, tangent, out, keep=True)
 
     def trial(
         self,
@@ -83,23 +110,27 @@ class JointBatch:
         out: Out | None = None,
     ) -> Out:
         """As `update`, but the state is left untouched."""
-        return self._advance(d, where, tangent, out, keep=False)
+        return self._step(d, where, tangent, out, keep=False)
 
-    def _advance(
+    def _step(
         self, d: ArrayLike, where: Index | None, tangent: bool, out: Out | None, keep: bool
     ) -> Out:
         index = None if where is None else self._index(where)
         m, dim = self._n if index is None else len(index), self.law.tables.dim
-        step = self._increments(d, (m, dim))
-        reach = self._admit(step, index, tangent)
+        values = increments(d, (m, dim))
         if out is None:
             F, C = np.empty((m, dim)), np.empty((m, dim, dim)) if tangent else None
         else:
             F, C = _require_out(out, m, dim, tangent)
-        self._engine.advance(self._state, step, F, C, index, keep, self.ledger)
-        if keep:
-            self._reach = reach
+        self.take(Step(np.ascontiguousarray(values), F, C, index, keep))
         return F, C
+
+    def take(self, step: Step) -> None:
+        """Take a step whose arrays have the right shapes: check its numbers, then the kernel."""
+        reach = self._admit(step)
+        self._engine.advance(self._state, step, self.ledger)
+        if step.keep:
+            self._reach = reach
 
     # ------------------------------------------------------------------ state
 
@@ -111,8 +142,7 @@ class JointBatch:
         """Return to a snapshot. Raises ValueError if another law or batch size wrote it."""
         if not isinstance(state, JointState):
             raise ValueError(f"state = {state!r} is not a snapshot; give one of snapshot()")
-        if state.fingerprint != self.law.fingerprint:
-            raise ValueError("state belongs to a joint law with other parameters")
+        state.require(self.law.fingerprint)
         if state.values.shape != (self.law.tables.rows, self._n):
             raise ValueError(f"state holds {len(state)} joints, this batch {self._n}: resize first")
         if not np.isfinite(state.values).all():
@@ -136,10 +166,7 @@ class JointBatch:
             self.reset(np.arange(n, self._n))
         elif n > blocks * lanes:  # grow by doubling, so that steady growth copies rarely
             grown = np.zeros((max(-(-n // LANES), 2 * blocks), rows, LANES))
-            if lanes == LANES:
-                grown[:blocks] = self._state
-            else:
-                write_rows(grown, rows_of(self._state, self._n), np.arange(self._n))
+            write_rows(grown, rows_of(self._state, self._n), np.arange(self._n))
             self._state = grown
         self._n = n
 
@@ -175,7 +202,7 @@ class JointBatch:
     @property
     def F(self) -> Array:
         """Traction (n, dim) in Pa."""
-        return kernel.traction(self.law.tables, self._rows()).T
+        return reference.traction(self.law.tables, self._rows()).T
 
     @property
     def sliding(self) -> Array:
@@ -230,25 +257,22 @@ class JointBatch:
             raise ValueError("where names a joint twice; each joint takes one increment per step")
         return index.astype(np.intp)
 
-    def _increments(self, d: ArrayLike, shape: tuple[int, int]) -> Array:
-        """Increments (m, dim), contiguous and checked."""
-        values = np.ascontiguousarray(numbers("d", d, "m"))
-        if values.shape != shape:
-            raise ValueError(
-                f"d has shape {values.shape}; expected {shape}: joints, {components(self.law)}"
-            )
-        return values
-
-    def _admit(self, d: Array, index: NDArray[np.intp] | None, tangent: bool) -> float:
+    def _admit(self, step: Step) -> float:
         """New bound of the reach; raises for increments that are not finite or would overflow.
 
         The bound of the whole batch costs one pass over d; joints are looked at only beyond it.
         """
-        limit = self.law.largest_reach
-        largest = max(float(d.max(initial=0.0)), -float(d.min(initial=0.0)))  # both NaN if one is
+        d, limit = step.d, self.law.largest_reach
+        if d.size <= FEW:  # the sum is no less than the largest, and NaN if one is
+            largest = sum(map(abs, d.ravel().tolist()))
+        else:
+            largest = max(float(d.max()), -float(d.min()))  # both NaN if one is
         reach = self._reach + self._stretch * largest
-        if reach <= limit:
-            return reach
+        return reach if reach <= limit else self._admit_each(step, limit)
+
+    def _admit_each(self, step: Step, limit: float) -> float:
+        """As `_admit`, joint by joint."""
+        d, index = step.d, step.where
         finite = np.isfinite(d).all(axis=1)
         if not finite.all():
             row = int(np.argmin(finite))
@@ -260,7 +284,7 @@ class JointBatch:
         if (new > limit).any():
             row = int(np.argmax(new > limit))
             joint = row if index is None else int(index[row])
-            path = write_replay(self.law.to_toml(), old[:, [row]], d[[row]].T, tangent)
+            path = write_replay(self.law, old[:, [row]], d[[row]].T, step.C is not None)
             again = "no replay file could be written"
             if path is not None:
                 again = f"`jointlaw replay {path}` repeats it"
@@ -274,19 +298,21 @@ class JointBatch:
 
     def _bound(self, rows: Array) -> Array:
         """Bound of the reach of states (rows, n), from closure and offset."""
-        now = kernel.parts(self.law.tables, rows)
+        now = reference.parts(self.law.tables, rows)
         far = np.maximum(np.abs(now.delta).max(axis=0), np.abs(now.offset).max(axis=0, initial=0.0))
         bound: Array = self._stretch * far
         return bound
 
 
-def components(law: JointLaw) -> str:
-    """What a displacement of this law is made of, and how to have more."""
-    return {
-        1: "closure; for shear take a law without closure_only",
-        2: "closure and shear along the plane; for motion in 3-D take a law with plane=None",
-        3: "closure and shear along axes 2 and 3",
-    }[law.tables.dim]
+def increments(d: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """Increments of this shape, (dim,) or (joints, dim), in m."""
+    values = numbers("d", d, "m")
+    if values.shape != shape:
+        joints = "joints, " if len(shape) == 2 else ""
+        raise ValueError(
+            f"d has shape {values.shape}; expected {shape}: {joints}{COMPONENTS[shape[-1]]}"
+        )
+    return values
 
 
 def _require_out(out: Out, m: int, dim: int, tangent: bool) -> Out:

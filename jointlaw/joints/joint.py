@@ -7,16 +7,17 @@ from copy import copy
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..law import JointLaw
-from ..support.checks import Array, numbers
-from .batch import JointBatch, components
+from ..kernels.engine import Step
+from ..kernels.reference import Measures
+from ..support.checks import Array
+from .batch import JointBatch, Law, increments
 from .state import JointState
 
 
 class Joint:
     """One joint: as `JointBatch`, with vectors (dim,) and a matrix (dim, dim)."""
 
-    def __init__(self, law: JointLaw) -> None:
+    def __init__(self, law: Law) -> None:
         self.law = law
         self._batch = JointBatch(law, 1)
         dim = law.tables.dim
@@ -32,28 +33,16 @@ class Joint:
 
     def update(self, d: ArrayLike, tangent: bool = True) -> tuple[Array, Array | None]:
         """Advance by the increment d (dim,) in m: F (dim,) in Pa, C (dim, dim) in Pa/m."""
-        return self._advance(d, tangent, keep=True)
+        return self._step(d, tangent, keep=True)
 
     def trial(self, d: ArrayLike, tangent: bool = True) -> tuple[Array, Array | None]:
         """As `update`, but the state is left untouched."""
-        return self._advance(d, tangent, keep=False)
+        return self._step(d, tangent, keep=False)
 
-    def _advance(self, d: ArrayLike, tangent: bool, keep: bool) -> tuple[Array, Array | None]:
-        values, batch = numbers("d", d, "m"), self._batch
-        if values.shape != self._shape:
-            raise ValueError(
-                f"d has shape {values.shape}; expected {self._shape}: {components(self.law)}"
-            )
-        # the sum is no less than the largest, and NaN if one is
-        reach = batch._reach + batch._stretch * sum(map(abs, values.tolist()))
-        if not reach <= self.law.largest_reach:  # the batch finds out and says why
-            F, C = batch._advance(values[None], None, tangent, None, keep)
-            return F[0], None if C is None else C[0]
-        step = values[None].copy()  # contiguous and writeable, as the kernel is compiled for
+    def _step(self, d: ArrayLike, tangent: bool, keep: bool) -> tuple[Array, Array | None]:
+        values = increments(d, self._shape)[None].copy()  # the caller's may be strided
         F, C = np.empty(self._shape_F), np.empty(self._shape_C) if tangent else None
-        batch._engine.advance(batch._state, step, F, C, None, keep, True)
-        if keep:
-            batch._reach = reach
+        self._batch.take(Step(values, F, C, None, keep))
         return F[0], None if C is None else C[0]
 
     def snapshot(self) -> JointState:
@@ -79,6 +68,10 @@ class Joint:
         """Traction (dim,) in Pa."""
         F: Array = self._batch.F[0]
         return F
+
+    def measures(self) -> Measures:
+        """Shares, stored energy and reach in one pass, as numbers."""
+        return Measures(*(values[0] for values in self._batch.measures()))
 
     @property
     def sliding(self) -> float:

@@ -8,7 +8,7 @@ import time
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -36,6 +36,18 @@ class JointState:
     def __len__(self) -> int:
         return int(self.values.shape[1])
 
+    def require(self, fingerprint: str) -> None:
+        """Raise ValueError if the law of this fingerprint did not write the state."""
+        if self.fingerprint == fingerprint:
+            return
+        mine, here = (text.partition(":")[0] for text in (self.fingerprint, fingerprint))
+        if mine != here:
+            raise ValueError(
+                f"state is of discretisation {mine}, this jointlaw has {here}: facets and cells "
+                "are not the same; run the path again, or install the version that wrote the state"
+            )
+        raise ValueError("state belongs to a joint law with other parameters")
+
     def save(self, path: str | Path) -> None:
         """Write the state to an NPZ file, whole or not at all."""
         _save(Path(path), fingerprint=self.fingerprint, values=self.values)
@@ -47,7 +59,13 @@ def load_state(path: str | Path) -> JointState:
     return JointState(str(data["fingerprint"]), data["values"])
 
 
-def write_replay(law_toml: str, values: Array, d: Array, tangent: bool) -> Path | None:
+class Written(Protocol):
+    """A law that can be written as text."""
+
+    def to_toml(self) -> str: ...
+
+
+def write_replay(law: Written, values: Array, d: Array, tangent: bool) -> Path | None:
     """Write state and increment of a failed step; in JOINTLAW_REPLAY_DIR or the working folder.
 
     Returns the file, or None where it could not be written: the failure of the step matters more.
@@ -55,8 +73,8 @@ def write_replay(law_toml: str, values: Array, d: Array, tangent: bool) -> Path 
     folder = Path(os.environ.get("JOINTLAW_REPLAY_DIR", "."))
     path = folder / f"jointlaw-replay-{os.getpid()}-{time.time_ns()}.npz"
     try:
-        _save(path, law=law_toml, values=values, d=d, tangent=tangent)
-    except OSError:
+        _save(path, law=law.to_toml(), values=values, d=d, tangent=tangent)
+    except (OSError, ValueError):  # ValueError: heights that have no form as TOML
         return None
     return path
 

@@ -1,11 +1,11 @@
 """The fast kernel: the numbers of `reference`, compiled, with the inner loops over joints.
 
 States live in blocks of LANES joints, (blocks, rows, lanes), so that within a block every quantity
-is one contiguous row. All that a block needs while it is advanced lies on a desk: one array of rows
+is one contiguous row. All that a block needs while it is advanced lies in one scratch array: rows
 of LANES numbers at constant offsets. Only so does the compiler see that no two rows overlap, and
 turns each loop over l, the joint, into vector instructions. Branches in such loops are selections.
 
-Symbols are those of law.md sections 6 to 8 and of the numpy kernel.
+Symbols are those of docs/theory-incremental.md and of the reference kernel.
 """
 
 from __future__ import annotations
@@ -16,31 +16,31 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from ..law import NOTHING, Tables
+from ..discretisation.tables import UNDERFLOW, Tables
 from ..support.checks import Array
-from .reference import GRAZING, LIMIT, NEAR, ROUNDED, TINY
+from .reference import GRAZING, LIMIT, NEAR, ROUNDED, TINY, compliance
 
 # Strict arithmetic: no fused or reordered operations, so results are the same on every machine
 _jit = numba.njit(error_model="numpy", nogil=True, cache=True)
 
-LANES = 128  # joints per block
+LANES = 128  # joints per block, as in blocks.py
 
 
 def _rows(first: int, count: int) -> tuple[int, ...]:
     return tuple(LANES * row for row in range(first, first + count))
 
 
-# The desk. Pairs "0, 1" are before and after the step.
+# Rows of the scratch array. Pairs "0, 1" are before and after the step.
 _Y0, _Y1, _F0, _F1, _S0, _S1, _X = _rows(0, 7)  # a facet: y, Phi, Phi', place in the curve
 _DES, _DET, _SUMS, _SUMT = _rows(7, 4)  # its sliders
-_CURVING, _BSS, _BST, _BTT, _VS, _VT, _G0, _G1, _G2 = _rows(13, 9)  # its tangent
-_P, _P1, _P2, _OLD, _OLD1, _OLD2, _NEW, _NEW1, _NEW2 = _rows(22, 9)  # a joint: step, y's origin
-_J00, _J01, _J10, _J11, _SLIP, _PULL1, _PULL2, _LOST, _F, _FS, _FT = _rows(31, 11)
-_C00, _C01, _C02, _C10, _C11, _C12, _C20, _C21, _C22 = _rows(42, 9)
-_DESK = 51 * LANES
+_CURVING, _BSS, _BST, _BTT, _VS, _VT, _G0, _G1, _G2 = _rows(11, 9)  # its tangent
+_P, _P1, _P2, _OLD, _OLD1, _OLD2, _NEW, _NEW1, _NEW2 = _rows(20, 9)  # a joint: step, y's origin
+_J00, _J01, _J10, _J11, _SLIP, _PULL1, _PULL2, _LOST, _F, _FS, _FT = _rows(29, 11)
+_C00, _C01, _C02, _C10, _C11, _C12, _C20, _C21, _C22 = _rows(40, 9)
+_SCRATCH = 49 * LANES
 
 # The same rows while joints are measured
-_WHOLE, _LIMIT, _SLIDING, _SLIPPING, _APART, _STORED, _REACH = _rows(22, 7)
+_WHOLE, _LIMIT, _SLIDING, _SLIPPING, _APART, _STORED, _REACH = _rows(20, 7)
 
 _M, _S, _T, _N, _REST = 0, 3, 6, 9, 12  # columns of the facet table; then A, a, compliance,
 _POTENTIAL, _SHARE = 15, 16  # A c1 and the share of the facet orientation
@@ -53,21 +53,22 @@ class Packed(NamedTuple):
     depth: Array  # (M, D + 1, 3): zeta, force and slope there, infinity as the largest float
     curve: Array  # (4 cells,): coefficients of S
     scalars: Array  # lam, mu, critical slip, eta, scale and rise of the curve
+    dim: int
 
 
-def pack(k: Tables, compliance: Array) -> Packed:
+def pack(k: Tables) -> Packed:
     """Arrange the tables of a law for the compiled kernel."""
     facet = np.zeros((len(k.c1), 17))
     for first, rows in ((_M, k.m), (_S, k.s), (_T, k.t), (_N, k.n)):
         facet[:, first : first + k.dim] = rows.T
     share = k.weight / k.weight.sum()
-    rest = (k.area, k.area / k.c1, compliance, k.area * k.c1, share)
+    rest = (k.area, k.area / k.c1, compliance(k).ravel(), k.area * k.c1, share)
     facet[:, _REST:] = np.stack(rest, axis=-1)
     largest = np.finfo(float).max
     depth = np.minimum(np.stack([k.depth, k.depth_force, k.depth_slope], axis=-1), largest)
     virgin = (k.curve.eta, k.curve.scale, k.curve.rise)
     scalars = np.array([k.lam, k.mu, k.critical_slip, *virgin])
-    return Packed(facet, depth, k.curve.S.ravel().copy(), scalars)
+    return Packed(facet, depth, k.curve.S.ravel().copy(), scalars, k.dim)
 
 
 def block_rows(k: Tables) -> int:
@@ -79,15 +80,15 @@ class Work(NamedTuple):
     """Working space of one thread, so that no step allocates any."""
 
     block: Array  # (rows, LANES): copy of a block of states
-    desk: Array
+    scratch: Array
     place: NDArray[np.int32]  # cell of the curve, per lane
     piece: Array  # its four coefficients, per lane
 
 
-def work(rows: int) -> Work:
+def new_work(rows: int) -> Work:
     """Working space for blocks of this many rows."""
     place, piece = np.zeros(LANES, np.int32), np.zeros(4 * LANES)
-    return Work(np.zeros((rows, LANES)), np.zeros(_DESK), place, piece)
+    return Work(np.zeros((rows, LANES)), np.zeros(_SCRATCH), place, piece)
 
 
 @_jit
@@ -101,8 +102,10 @@ def _fetch(place, piece, L, table):
 
 
 @_jit
-def _virgin(desk, place, piece, after, L, curve, eta, scale, rise):
+def _virgin(work, law, after, L):
     """Phi and Phi' of the row of y: three loops, so that only the look-up itself is not vector."""
+    scratch, place, piece, curve = work.scratch, work.place, work.piece, law.curve
+    eta, scale, rise = law.scalars[3], law.scalars[4], law.scalars[5]
     if after is None:  # a constant for the compiler
         y, force, slope = _Y0, _F0, _S0
     else:
@@ -111,52 +114,52 @@ def _virgin(desk, place, piece, after, L, curve, eta, scale, rise):
     top = np.float64(cells - 1)
     looked = 0 if cells == 1 else L  # without heights S is 1, and there is nothing to look up
     for l in range(L - looked):
-        here = desk[y + l] if abs(desk[y + l]) >= NOTHING else 0.0
+        here = scratch[y + l] if abs(scratch[y + l]) >= UNDERFLOW else 0.0
         v = np.sqrt(here if here > 0.0 else 0.0)
         one = 1.0 if v > 0.0 else 0.0
         power = v if eta == 0.5 else one
         place[l] = 0
-        desk[y + l] = here
-        desk[_X + l] = 0.0
-        desk[force + l] = power * v * v
-        desk[slope + l] = power * (1.0 + eta)
+        scratch[y + l] = here
+        scratch[_X + l] = 0.0
+        scratch[force + l] = power * v * v
+        scratch[slope + l] = power * (1.0 + eta)
     for l in range(looked):
-        here = desk[y + l] if abs(desk[y + l]) >= NOTHING else 0.0
+        here = scratch[y + l] if abs(scratch[y + l]) >= UNDERFLOW else 0.0
         v = np.sqrt(here if here > 0.0 else 0.0)
         r = 1.0 / (v + scale)
         at = v * r * cells
         i = np.int32(at if at < top else top)
         place[l] = i
-        desk[y + l] = here
-        desk[_X + l] = at - np.float64(i)
-        desk[force + l] = v
-        desk[slope + l] = v * r * r
+        scratch[y + l] = here
+        scratch[_X + l] = at - np.float64(i)
+        scratch[force + l] = v
+        scratch[slope + l] = v * r * r
     _fetch(place, piece, looked, curve)
     weight = 0.5 * cells * scale
     for l in range(looked):
-        x, o = desk[_X + l], 4 * l
+        x, o = scratch[_X + l], 4 * l
         c0, c1, c2, c3 = piece[o], piece[o + 1], piece[o + 2], piece[o + 3]
         S = c0 + x * (c1 + x * (c2 + x * c3))
-        D = weight * desk[slope + l] * (c1 + x * (2.0 * c2 + x * (3.0 * c3)))
-        v = desk[force + l]
+        D = weight * scratch[slope + l] * (c1 + x * (2.0 * c2 + x * (3.0 * c3)))
+        v = scratch[force + l]
         one = 1.0 if v > 0.0 else 0.0
         power = v if eta == 0.5 else one  # y^eta where it is at hand
-        desk[force + l] = power * v * v * S
-        desk[slope + l] = power * ((1.0 + eta) * S + D)
+        scratch[force + l] = power * v * v * S
+        scratch[slope + l] = power * ((1.0 + eta) * S + D)
     if rise > 0.0:  # S over w^rise: D S gains rise (1 - w) S
         W = scale * scale
         for l in range(L):
-            here = desk[y + l] if desk[y + l] > 0.0 else 0.0
+            here = scratch[y + l] if scratch[y + l] > 0.0 else 0.0
             w, rest = here / (here + W), W / (here + W)
             lift = w**rise
-            by_y = desk[force + l] / (here if here > 0.0 else 1.0)
-            desk[slope + l] = lift * (desk[slope + l] + rise * rest * by_y)
-            desk[force + l] *= lift
+            by_y = scratch[force + l] / (here if here > 0.0 else 1.0)
+            scratch[slope + l] = lift * (scratch[slope + l] + rise * rest * by_y)
+            scratch[force + l] *= lift
     if (eta != 0.5) & (eta != 0.0):
         for l in range(L):
-            power = desk[y + l] ** eta if desk[y + l] > 0.0 else 0.0
-            desk[force + l] *= power
-            desk[slope + l] *= power
+            power = scratch[y + l] ** eta if scratch[y + l] > 0.0 else 0.0
+            scratch[force + l] *= power
+            scratch[slope + l] *= power
 
 
 @_jit
@@ -173,42 +176,44 @@ def _bend(piece, o, x, v, cells, scale):
 
 
 @_jit
-def _curvature(desk, piece, L, cells, eta, scale, rise):
+def _curvature(work, law, L):
     """Phi'' of the row of y after the step, from the pieces that `_virgin` just fetched for it."""
+    scratch, piece, cells = work.scratch, work.piece, np.float64(law.curve.size // 4)
+    eta, scale, rise = law.scalars[3], law.scalars[4], law.scalars[5]
     for l in range(L):
-        y = desk[_Y1 + l]
+        y = scratch[_Y1 + l]
         v = np.sqrt(y if y > 0.0 else 1.0)
-        S, D, DD = _bend(piece, 4 * l, desk[_X + l], v, cells, scale)
+        S, D, DD = _bend(piece, 4 * l, scratch[_X + l], v, cells, scale)
         value = eta * (1.0 + eta) * S + (1.0 + 2.0 * eta) * D + DD
         value = value / (v if eta == 0.5 else v * v)
-        desk[_CURVING + l] = value if y > 0.0 else 0.0
+        scratch[_CURVING + l] = value if y > 0.0 else 0.0
     if rise > 0.0:
         W = scale * scale
         for l in range(L):
-            y = desk[_Y1 + l]
+            y = scratch[_Y1 + l]
             v = np.sqrt(y if y > 0.0 else 1.0)
-            S, D, DD = _bend(piece, 4 * l, desk[_X + l], v, cells, scale)
+            S, D, DD = _bend(piece, 4 * l, scratch[_X + l], v, cells, scale)
             w, more = v * v / (v * v + W), rise * W / (v * v + W)
             DD = DD + 2.0 * more * D + (more * more - more * w) * S
             value = eta * (1.0 + eta) * S + (1.0 + 2.0 * eta) * (D + more * S) + DD
             value = w**rise * value / (v if eta == 0.5 else v * v)
-            desk[_CURVING + l] = value if y > 0.0 else 0.0
+            scratch[_CURVING + l] = value if y > 0.0 else 0.0
     if (eta != 0.5) & (eta != 0.0):
         for l in range(L):
-            desk[_CURVING + l] *= desk[_Y1 + l] ** eta if desk[_Y1 + l] > 0.0 else 0.0
+            scratch[_CURVING + l] *= scratch[_Y1 + l] ** eta if scratch[_Y1 + l] > 0.0 else 0.0
 
 
 @_jit
-def _drag(desk, L, limit, dim):
-    """The leash: new offsets, their derivative and the slip; see `reference.drag`."""
+def _limit_offset(scratch, L, limit, dim):
+    """New offsets, their derivative and the slip; see `reference.limited_offset`."""
     for l in range(L):
-        a0, a1 = desk[_OLD1 + l], desk[_OLD2 + l]
-        p0, p1 = desk[_P1 + l], desk[_P2 + l]
+        a0, a1 = scratch[_OLD1 + l], scratch[_OLD2 + l]
+        p0, p1 = scratch[_P1 + l], scratch[_P2 + l]
         f0, f1 = a0 + p0, a1 + p1
-        desk[_NEW1 + l], desk[_NEW2 + l] = f0, f1
-        desk[_SLIP + l] = 0.0
-        desk[_J00 + l] = desk[_J11 + l] = 1.0
-        desk[_J01 + l] = desk[_J10 + l] = 0.0
+        scratch[_NEW1 + l], scratch[_NEW2 + l] = f0, f1
+        scratch[_SLIP + l] = 0.0
+        scratch[_J00 + l] = scratch[_J11 + l] = 1.0
+        scratch[_J01 + l] = scratch[_J10 + l] = 0.0
         length = np.hypot(p0, p1)
         if f0 * f0 + f1 * f1 <= limit * limit or f0 * p0 + f1 * p1 <= 0.0:
             continue
@@ -226,30 +231,33 @@ def _drag(desk, L, limit, dim):
         cos1 = ((1.0 + cos) - (1.0 - cos) * decay * decay) / bottom
         sin1 = 2.0 * sin * decay / bottom
         b0, b1 = limit * (cos1 * e0 - sin1 * e1), limit * (cos1 * e1 + sin1 * e0)
-        desk[_NEW1 + l], desk[_NEW2 + l] = b0, b1
-        desk[_SLIP + l] = limit * (x + np.log(bottom / 2.0))
+        scratch[_NEW1 + l], scratch[_NEW2 + l] = b0, b1
+        scratch[_SLIP + l] = limit * (x + np.log(bottom / 2.0))
         turn = (rest * rest + cos * rest * (1.0 + decay)) / bottom
         turn += inside / (limit * max(cos, GRAZING)) * (2.0 * decay / bottom - sin1 * sin)
         turn /= length
         row0, row1 = -turn * e1 - sin1 / limit * e0, turn * e0 - sin1 / limit * e1
         if dim == 2:
-            row0 = row1 = 0.0  # along one line the end of the leash does not turn
-        desk[_J00 + l], desk[_J01 + l] = -b1 * row0, -b1 * row1
-        desk[_J10 + l], desk[_J11 + l] = b0 * row0, b0 * row1
+            row0 = row1 = 0.0  # along one line the offset does not turn
+        scratch[_J00 + l], scratch[_J01 + l] = -b1 * row0, -b1 * row1
+        scratch[_J10 + l], scratch[_J11 + l] = b0 * row0, b0 * row1
 
 
 @_jit
-def _slide(desk, qs, qt, L, depth, f, i, strength, a, compliance, ledger, tangent):
-    """One depth cell of one facet: steps 2 and 3 of law.md section 6."""
+def _slide(scratch, qs, qt, L, law, f, i, ledger, tangent):
+    """One depth cell of one facet: steps 3 and 4 of `reference.step`."""
+    facet, depth = law.facet, law.depth
+    A, a, compliance = facet[f, _REST], facet[f, _REST + 1], facet[f, _REST + 2]
+    strength = law.scalars[0] * law.scalars[1] * A
     zl, fl, sl = depth[f, i, 0], depth[f, i, 1], depth[f, i, 2]
     zh, fh, sh = depth[f, i + 1, 0], depth[f, i + 1, 1], depth[f, i + 1, 2]
     ended = i + 2 < depth.shape[1]
     for l in range(L):
         # the bed beyond the lower limit of the cell less that beyond the upper
-        y0, y1, f0, f1 = desk[_Y0 + l], desk[_Y1 + l], desk[_F0 + l], desk[_F1 + l]
+        y0, y1, f0, f1 = scratch[_Y0 + l], scratch[_Y1 + l], scratch[_F0 + l], scratch[_F1 + l]
         from0, from1 = y0 - zl, y1 - zl
         G0, G1 = f0 - fl - sl * from0, f1 - fl - sl * from1
-        k0, k1 = desk[_S0 + l] - sl, desk[_S1 + l] - sl
+        k0, k1 = scratch[_S0 + l] - sl, scratch[_S1 + l] - sl
         if ended:
             G0 -= f0 - fh - sh * (y0 - zh) if y0 > zh else 0.0
             G1 -= f1 - fh - sh * (y1 - zh) if y1 > zh else 0.0
@@ -272,7 +280,7 @@ def _slide(desk, qs, qt, L, depth, f, i, strength, a, compliance, ledger, tangen
         chord = chord if chord < k1 else k1
         kept = 1.0 if grows else ratio
         add = a * (chord if grows else k1)
-        olds, oldt, des, det = qs[l], qt[l], desk[_DES + l], desk[_DET + l]
+        olds, oldt, des, det = qs[l], qt[l], scratch[_DES + l], scratch[_DET + l]
         ts, tt = olds * kept + add * des, oldt * kept + add * det
         new2 = ts * ts + tt * tt
         size = np.sqrt(new2)
@@ -282,8 +290,8 @@ def _slide(desk, qs, qt, L, depth, f, i, strength, a, compliance, ledger, tangen
         share = share if slips else 1.0
         part = share if new2 > TINY else 0.0  # a size that underflows has no cap
         qs[l], qt[l] = part * ts, part * tt
-        desk[_SUMS + l] += part * ts
-        desk[_SUMT + l] += part * tt
+        scratch[_SUMS + l] += part * ts
+        scratch[_SUMT + l] += part * tt
         if ledger is not None:  # each term is >= 0 as written
             r0 = 1.0 / (k0 if k0 > TINY else 1.0)
             r1 = 1.0 / (k1 if k1 > TINY else 1.0)
@@ -295,10 +303,10 @@ def _slide(desk, qs, qt, L, depth, f, i, strength, a, compliance, ledger, tangen
             soft = soft if k0 > TINY else 0.0
             rub = 2.0 * share * (1.0 - share) * (new2 * r1)
             rub = rub if k1 > TINY else 0.0
-            desk[_LOST + l] += compliance * ((hard if grows else soft) + rub)
-        if tangent is not None:  # J_q = beta (I - s s^T) E + v g^T, law.md section 7
+            scratch[_LOST + l] += compliance * ((hard if grows else soft) + rub)
+        if tangent is not None:  # J_q = beta (I - s s^T) E + v g^T, "The tangent"
             curves = (from1 > 0.0) & ((y1 < zh) | (not ended))
-            c = desk[_CURVING + l] if curves else 0.0
+            c = scratch[_CURVING + l] if curves else 0.0
             bend = (k1 - chord) / (1.0 if near else dy)
             bend = a * (0.5 * c if near else bend)
             fade = c / (k1 if k1 > TINY else 1.0)
@@ -309,185 +317,199 @@ def _slide(desk, qs, qt, L, depth, f, i, strength, a, compliance, ledger, tangen
             us, ut = ts * unit, tt * unit
             dot = us * ws + ut * wt
             push = strength * k1
-            desk[_VS + l] += share * (ws - us * dot) + push * us if slips else ws
-            desk[_VT + l] += share * (wt - ut * dot) + push * ut if slips else wt
+            scratch[_VS + l] += share * (ws - us * dot) + push * us if slips else ws
+            scratch[_VT + l] += share * (wt - ut * dot) + push * ut if slips else wt
             beta = share * add
             sliding = beta if slips else 0.0
-            desk[_BSS + l] += beta - sliding * us * us
-            desk[_BST + l] -= sliding * us * ut
-            desk[_BTT + l] += beta - sliding * ut * ut
+            scratch[_BSS + l] += beta - sliding * us * us
+            scratch[_BST + l] -= sliding * us * ut
+            scratch[_BTT + l] += beta - sliding * ut * ut
 
 
 @_jit
-def _gradient(desk, L, m0, m1, m2, leash):
-    """g = dy/dd of one facet, a row per component; a taut leash turns its in-plane part."""
-    if leash:
+def _gradient(scratch, L, m0, m1, m2, limited):
+    """g = dy/dd of one facet, a row per component; an offset at its limit turns with the step."""
+    if limited:
         for l in range(L):
-            desk[_G0 + l] = m0
-            desk[_G1 + l] = m1 * desk[_J00 + l] + m2 * desk[_J10 + l]
-            desk[_G2 + l] = m1 * desk[_J01 + l] + m2 * desk[_J11 + l]
+            scratch[_G0 + l] = m0
+            scratch[_G1 + l] = m1 * scratch[_J00 + l] + m2 * scratch[_J10 + l]
+            scratch[_G2 + l] = m1 * scratch[_J01 + l] + m2 * scratch[_J11 + l]
     else:
         for l in range(L):
-            desk[_G0 + l], desk[_G1 + l], desk[_G2 + l] = m0, m1, m2
+            scratch[_G0 + l], scratch[_G1 + l], scratch[_G2 + l] = m0, m1, m2
 
 
 @_jit
-def _add_tangent(desk, L, facet, f, lam, dim):
-    """C += along g^T + E^T B E of one facet, law.md section 7; B and v count in units of lam."""
+def _add_tangent(scratch, L, law, f):
+    """C += along g^T + E^T B E of one facet, "The tangent"; B and v count in units of lam."""
+    facet, dim = law.facet, law.dim
     s0, s1, s2 = facet[f, _S], facet[f, _S + 1], facet[f, _S + 2]
-    t1, t2, A, soft = facet[f, _T + 1], facet[f, _T + 2], facet[f, _REST], 1.0 / lam
+    t1, t2, A, soft = facet[f, _T + 1], facet[f, _T + 2], facet[f, _REST], 1.0 / law.scalars[0]
     n0, n1, n2 = A * facet[f, _N], A * facet[f, _N + 1], A * facet[f, _N + 2]
     for l in range(L):
-        slope, vs, vt = desk[_S1 + l], soft * desk[_VS + l], soft * desk[_VT + l]
-        bss, bst, btt = soft * desk[_BSS + l], soft * desk[_BST + l], soft * desk[_BTT + l]
-        g0, g1 = desk[_G0 + l], desk[_G1 + l]
+        slope, vs, vt = scratch[_S1 + l], soft * scratch[_VS + l], soft * scratch[_VT + l]
+        bss, bst, btt = soft * scratch[_BSS + l], soft * scratch[_BST + l], soft * scratch[_BTT + l]
+        g0, g1 = scratch[_G0 + l], scratch[_G1 + l]
         along = n0 * slope + s0 * vs
         left, right = s0 * bss, s0 * bst
-        desk[_C00 + l] += along * g0 + left * s0
-        desk[_C01 + l] += along * g1 + left * s1 + right * t1
+        scratch[_C00 + l] += along * g0 + left * s0
+        scratch[_C01 + l] += along * g1 + left * s1 + right * t1
         along = n1 * slope + s1 * vs + t1 * vt
         left, right = s1 * bss + t1 * bst, s1 * bst + t1 * btt
-        desk[_C10 + l] += along * g0 + left * s0
-        desk[_C11 + l] += along * g1 + left * s1 + right * t1
+        scratch[_C10 + l] += along * g0 + left * s0
+        scratch[_C11 + l] += along * g1 + left * s1 + right * t1
     if dim == 2:
         return
     for l in range(L):
-        slope, vs, vt = desk[_S1 + l], soft * desk[_VS + l], soft * desk[_VT + l]
-        bss, bst, btt = soft * desk[_BSS + l], soft * desk[_BST + l], soft * desk[_BTT + l]
-        g0, g1, g2 = desk[_G0 + l], desk[_G1 + l], desk[_G2 + l]
+        slope, vs, vt = scratch[_S1 + l], soft * scratch[_VS + l], soft * scratch[_VT + l]
+        bss, bst, btt = soft * scratch[_BSS + l], soft * scratch[_BST + l], soft * scratch[_BTT + l]
+        g0, g1, g2 = scratch[_G0 + l], scratch[_G1 + l], scratch[_G2 + l]
         left, right = s2 * bss + t2 * bst, s2 * bst + t2 * btt
-        desk[_C02 + l] += (n0 * slope + s0 * vs) * g2 + s0 * left
-        desk[_C12 + l] += (n1 * slope + s1 * vs + t1 * vt) * g2 + s1 * left + t1 * right
+        scratch[_C02 + l] += (n0 * slope + s0 * vs) * g2 + s0 * left
+        scratch[_C12 + l] += (n1 * slope + s1 * vs + t1 * vt) * g2 + s1 * left + t1 * right
         along = n2 * slope + s2 * vs + t2 * vt
-        desk[_C20 + l] += along * g0 + left * s0
-        desk[_C21 + l] += along * g1 + left * s1 + right * t1
-        desk[_C22 + l] += along * g2 + left * s2 + right * t2
+        scratch[_C20 + l] += along * g0 + left * s0
+        scratch[_C21 + l] += along * g1 + left * s1 + right * t1
+        scratch[_C22 + l] += along * g2 + left * s2 + right * t2
 
 
 @_jit
-def _facet(desk, place, piece, s, L, facet, depth, f, curve, scalars, dim, ledger, tangent):
+def _facet(work, s, L, law, f, ledger, tangent):
     """One facet of a block: closures, virgin curve, sliders, and its part of F and C."""
-    lam, mu, limit = scalars[0], scalars[1], scalars[2]
-    eta, scale, rise = scalars[3], scalars[4], scalars[5]
-    M, D = depth.shape[0], depth.shape[1] - 1
+    scratch, facet, dim = work.scratch, law.facet, law.dim
+    lam, limit = law.scalars[0], law.scalars[2]
+    M, D = law.depth.shape[0], law.depth.shape[1] - 1
     m0, m1, m2 = facet[f, _M], facet[f, _M + 1], facet[f, _M + 2]
     s0, s1, s2 = facet[f, _S], facet[f, _S + 1], facet[f, _S + 2]
     t1, t2 = facet[f, _T + 1], facet[f, _T + 2]
     n0, n1, n2 = facet[f, _N], facet[f, _N + 1], facet[f, _N + 2]
-    A, a, compliance = facet[f, _REST], facet[f, _REST + 1], facet[f, _REST + 2]
+    A = facet[f, _REST]
     for l in range(L):
-        desk[_Y0 + l] = m0 * desk[_OLD + l] + m1 * desk[_OLD1 + l]
-        desk[_Y1 + l] = m0 * desk[_NEW + l] + m1 * desk[_NEW1 + l]
-        desk[_DES + l] = s0 * desk[_P + l] + s1 * desk[_P1 + l]
-        desk[_DET + l] = t1 * desk[_P1 + l]
-        desk[_SUMS + l] = desk[_SUMT + l] = 0.0
+        scratch[_Y0 + l] = m0 * scratch[_OLD + l] + m1 * scratch[_OLD1 + l]
+        scratch[_Y1 + l] = m0 * scratch[_NEW + l] + m1 * scratch[_NEW1 + l]
+        scratch[_DES + l] = s0 * scratch[_P + l] + s1 * scratch[_P1 + l]
+        scratch[_DET + l] = t1 * scratch[_P1 + l]
+        scratch[_SUMS + l] = scratch[_SUMT + l] = 0.0
     if dim == 3:
         for l in range(L):
-            desk[_Y0 + l] += m2 * desk[_OLD2 + l]
-            desk[_Y1 + l] += m2 * desk[_NEW2 + l]
-            desk[_DES + l] += s2 * desk[_P2 + l]
-            desk[_DET + l] += t2 * desk[_P2 + l]
+            scratch[_Y0 + l] += m2 * scratch[_OLD2 + l]
+            scratch[_Y1 + l] += m2 * scratch[_NEW2 + l]
+            scratch[_DES + l] += s2 * scratch[_P2 + l]
+            scratch[_DET + l] += t2 * scratch[_P2 + l]
     for l in range(L):
-        desk[_Y0 + l] = desk[_Y0 + l] if abs(desk[_Y0 + l]) >= NOTHING else 0.0
+        scratch[_Y0 + l] = scratch[_Y0 + l] if abs(scratch[_Y0 + l]) >= UNDERFLOW else 0.0
     rf, rs = 2 * dim + 2 * M * D + f, 2 * dim + 2 * M * D + M + f
     for l in range(L):
-        desk[_F0 + l] = s[rf, l]
+        scratch[_F0 + l] = s[rf, l]
     for l in range(L):
-        desk[_S0 + l] = s[rs, l]
-    _virgin(desk, place, piece, True, L, curve, eta, scale, rise)
+        scratch[_S0 + l] = s[rs, l]
+    _virgin(work, law, True, L)
     for l in range(L):
-        s[rf, l] = desk[_F1 + l]
+        s[rf, l] = scratch[_F1 + l]
     for l in range(L):
-        s[rs, l] = desk[_S1 + l]
+        s[rs, l] = scratch[_S1 + l]
     if tangent is not None:
-        if curve.size == 4:  # not fetched yet
-            _fetch(place, piece, L, curve)
-        _curvature(desk, piece, L, np.float64(curve.size // 4), eta, scale, rise)
-        _gradient(desk, L, m0, m1, m2, limit < np.inf)
+        if law.curve.size == 4:  # not fetched yet
+            _fetch(work.place, work.piece, L, law.curve)
+        _curvature(work, law, L)
+        _gradient(scratch, L, m0, m1, m2, limit < np.inf)
         for l in range(L):
-            desk[_BSS + l] = desk[_BST + l] = desk[_BTT + l] = 0.0
-            desk[_VS + l] = desk[_VT + l] = 0.0
+            scratch[_BSS + l] = scratch[_BST + l] = scratch[_BTT + l] = 0.0
+            scratch[_VS + l] = scratch[_VT + l] = 0.0
     for i in range(D):
         rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
-        _slide(desk, s[rs], s[rt], L, depth, f, i, lam * mu * A, a, compliance, ledger, tangent)
+        _slide(scratch, s[rs], s[rt], L, law, f, i, ledger, tangent)
     soft = 1.0 / lam
     for l in range(L):
-        normal, q0, q1 = A * desk[_F1 + l], soft * desk[_SUMS + l], soft * desk[_SUMT + l]
-        desk[_F + l] += n0 * normal + s0 * q0
-        desk[_FS + l] += n1 * normal + s1 * q0 + t1 * q1
+        normal, q0, q1 = A * scratch[_F1 + l], soft * scratch[_SUMS + l], soft * scratch[_SUMT + l]
+        scratch[_F + l] += n0 * normal + s0 * q0
+        scratch[_FS + l] += n1 * normal + s1 * q0 + t1 * q1
     if dim == 3:
         for l in range(L):
-            normal, q0, q1 = A * desk[_F1 + l], soft * desk[_SUMS + l], soft * desk[_SUMT + l]
-            desk[_FT + l] += n2 * normal + s2 * q0 + t2 * q1
+            normal, q0, q1 = (
+                A * scratch[_F1 + l],
+                soft * scratch[_SUMS + l],
+                soft * scratch[_SUMT + l],
+            )
+            scratch[_FT + l] += n2 * normal + s2 * q0 + t2 * q1
     if limit < np.inf and ledger is not None:
         for l in range(L):
-            desk[_PULL1 + l] += n1 * A * desk[_F1 + l]
-            desk[_PULL2 + l] += n2 * A * desk[_F1 + l]
+            scratch[_PULL1 + l] += n1 * A * scratch[_F1 + l]
+            scratch[_PULL2 + l] += n2 * A * scratch[_F1 + l]
     if tangent is not None:
-        _add_tangent(desk, L, facet, f, lam, dim)
+        _add_tangent(scratch, L, law, f)
 
 
 @_jit
-def _begin(desk, s, d, start, L, limit, dim, tangent):
+def _begin(scratch, s, d, start, L, law, tangent):
     """Lay out the old and new place of each joint of a block, and move it."""
+    limit, dim = law.scalars[2], law.dim
     if limit < np.inf or dim == 1:
-        desk[_P:_J00] = 0.0  # in one plane the leash has no second component, on closure no offset
-    desk[_PULL1:_C00] = 0.0
+        scratch[_P:_J00] = 0.0  # the offset has one component in a plane, none on closure
+    scratch[_PULL1:_C00] = 0.0
     if tangent is not None:
-        desk[_C00:] = 0.0
+        scratch[_C00:] = 0.0
     for i in range(dim):
         for l in range(L):
-            desk[_P + i * LANES + l] = d[start + l, i]
+            scratch[_P + i * LANES + l] = d[start + l, i]
     for i in range(dim):
         row, origin = i * LANES, 0 if i == 0 else dim + i - 1
         for l in range(L):
-            desk[_OLD + row + l] = s[origin, l]
+            scratch[_OLD + row + l] = s[origin, l]
         for l in range(L):
-            desk[_NEW + row + l] = desk[_OLD + row + l] + desk[_P + row + l]
+            scratch[_NEW + row + l] = scratch[_OLD + row + l] + scratch[_P + row + l]
     if limit < np.inf:
-        _drag(desk, L, limit, dim)
+        _limit_offset(scratch, L, limit, dim)
     for i in range(dim):
         row = i * LANES
         for l in range(L):
-            s[i, l] += desk[_P + row + l]
+            s[i, l] += scratch[_P + row + l]
         if i > 0:
             for l in range(L):
-                s[dim + i - 1, l] = desk[_NEW + row + l]
+                s[dim + i - 1, l] = scratch[_NEW + row + l]
 
 
 @_jit
-def _finish(desk, s, F, C, start, L, limit, dim, ledger, tangent):
+def _finish(scratch, s, F, C, start, L, law, ledger, tangent):
     """Hand out F and C, and add up the ledger."""
+    limit, dim = law.scalars[2], law.dim
     for i in range(dim):
         for l in range(L):
-            F[start + l, i] = desk[_F + i * LANES + l]
+            F[start + l, i] = scratch[_F + i * LANES + l]
     if tangent is not None:
         for i in range(dim):
             for j in range(dim):
                 for l in range(L):
-                    C[start + l, i, j] = desk[_C00 + (3 * i + j) * LANES + l]
+                    C[start + l, i, j] = scratch[_C00 + (3 * i + j) * LANES + l]
     if ledger is not None:
         if limit < np.inf:
             for l in range(L):
-                pull = desk[_PULL1 + l] * desk[_NEW1 + l] + desk[_PULL2 + l] * desk[_NEW2 + l]
-                desk[_LOST + l] += desk[_SLIP + l] * (pull if pull > 0.0 else 0.0) / limit
+                pull = (
+                    scratch[_PULL1 + l] * scratch[_NEW1 + l]
+                    + scratch[_PULL2 + l] * scratch[_NEW2 + l]
+                )
+                scratch[_LOST + l] += scratch[_SLIP + l] * (pull if pull > 0.0 else 0.0) / limit
         for l in range(L):
-            s[2 * dim - 1, l] += desk[_LOST + l]
+            s[2 * dim - 1, l] += scratch[_LOST + l]
 
 
 @_jit
 def advance(
-    state, d, F, C, index, keep, first, last, block, desk, place, piece, facet, depth, curve,
+    state, d, F, C, index, keep, first, last, block, scratch, place, piece, facet, depth, curve,
     scalars, dim, ledger, tangent,
 ):  # fmt: skip
     """Advance numbers first..last of the list `index` (of all joints if it is empty).
+
+    The arguments are the fields of the engine's `Step`, of `Work` and of `Packed`, one by one:
+    numba takes 5 us more to be called with a tuple of arrays than with the arrays themselves.
 
     d (m, dim) are the increments; F (m, dim) and C (m, dim, dim) are written. first is a multiple
     of the lanes in a block. Without `keep` the states stay as they were. `ledger` adds up the
     dissipated energy, `tangent` works out C; both are True or None, for which the compiler leaves
     the code out.
     """
-    rows, W, limit = state.shape[1], state.shape[2], scalars[2]
+    work, law = Work(block, scratch, place, piece), Packed(facet, depth, curve, scalars, dim)
+    rows, W = state.shape[1], state.shape[2]
     listed = index.size > 0
     for start in range(first, last, W):
         L = min(W, last - start)
@@ -504,10 +526,10 @@ def advance(
                 for l in range(L):
                     block[r, l] = state[start // W, r, l]
             s = block
-        _begin(desk, s, d, start, L, limit, dim, tangent)
+        _begin(scratch, s, d, start, L, law, tangent)
         for f in range(facet.shape[0]):
-            _facet(desk, place, piece, s, L, facet, depth, f, curve, scalars, dim, ledger, tangent)
-        _finish(desk, s, F, C, start, L, limit, dim, ledger, tangent)
+            _facet(work, s, L, law, f, ledger, tangent)
+        _finish(scratch, s, F, C, start, L, law, ledger, tangent)
         if listed and keep:
             for l in range(L):
                 home, at = index[start + l] // W, index[start + l] % W
@@ -516,12 +538,15 @@ def advance(
 
 
 @_jit
-def _count(desk, qs, qt, L, depth, f, i, strength, compliance):
+def _count(scratch, qs, qt, L, law, f, i):
     """One depth cell of one facet: is it at its friction limit, and what does it store."""
+    facet, depth = law.facet, law.depth
+    strength = law.scalars[1] * law.scalars[0] * facet[f, _REST]
+    compliance = facet[f, _REST + 2]
     zl, fl, sl = depth[f, i, 0], depth[f, i, 1], depth[f, i, 2]
     zh, fh, sh = depth[f, i + 1, 0], depth[f, i + 1, 1], depth[f, i + 1, 2]
     for l in range(L):
-        y, force, slope = desk[_Y0 + l], desk[_F0 + l], desk[_S0 + l]
+        y, force, slope = scratch[_Y0 + l], scratch[_F0 + l], scratch[_S0 + l]
         reach = min(max(y, zl), zh)
         k = min(max(slope, sl), sh) - sl
         G = k * (y - reach) + (min(max(force, fl), fh) - fl - sl * (reach - zl))
@@ -529,90 +554,92 @@ def _count(desk, qs, qt, L, depth, f, i, strength, compliance):
         G = min(max(G, 0.0), most)
         q2 = qs[l] * qs[l] + qt[l] * qt[l]
         limit = np.sqrt(q2) >= strength * (G * (1.0 - LIMIT) - ROUNDED * force)
-        desk[_WHOLE + l] = desk[_WHOLE + l] if limit else 0.0
-        desk[_LIMIT + l] += G if limit else 0.0
+        scratch[_WHOLE + l] = scratch[_WHOLE + l] if limit else 0.0
+        scratch[_LIMIT + l] += G if limit else 0.0
         soft = 1.0 / (k if k > TINY else 1.0)
-        desk[_STORED + l] += compliance * q2 * (soft if k > TINY else 0.0)
+        scratch[_STORED + l] += compliance * q2 * (soft if k > TINY else 0.0)
 
 
 @_jit
-def _effective(desk, s, L, facet, f, dim):
+def _effective(scratch, s, L, law, f):
     """Effective closure y of one facet in the states s."""
+    facet, dim = law.facet, law.dim
     m0, m1, m2 = facet[f, _M], facet[f, _M + 1], facet[f, _M + 2]
     closure, offset, other = s[0], s[dim], s[2 * dim - 2]
     for l in range(L):
-        desk[_Y0 + l] = m0 * closure[l] + m1 * offset[l]
+        scratch[_Y0 + l] = m0 * closure[l] + m1 * offset[l]
     if dim == 3:
         for l in range(L):
-            desk[_Y0 + l] += m2 * other[l]
+            scratch[_Y0 + l] += m2 * other[l]
 
 
 @_jit
-def _measure_facet(desk, place, piece, s, L, facet, depth, f, curve, energy, scalars, dim):
+def _measure_facet(work, s, L, law, f, energy):
     """What one facet of a block adds to the measures."""
-    lam, mu = scalars[0], scalars[1]
-    eta, scale, rise = scalars[3], scalars[4], scalars[5]
-    M, D = depth.shape[0], depth.shape[1] - 1
-    potential, share = facet[f, _POTENTIAL], facet[f, _SHARE]
-    strength, compliance = mu * lam * facet[f, _REST], facet[f, _REST + 2]
-    _effective(desk, s, L, facet, f, dim)
+    scratch, piece, dim = work.scratch, work.piece, law.dim
+    eta, scale, rise = law.scalars[3], law.scalars[4], law.scalars[5]
+    M, D = law.depth.shape[0], law.depth.shape[1] - 1
+    potential, share = law.facet[f, _POTENTIAL], law.facet[f, _SHARE]
+    _effective(scratch, s, L, law, f)
     for l in range(L):
-        desk[_WHOLE + l], desk[_LIMIT + l] = 1.0, 0.0
-    _virgin(desk, place, piece, None, L, curve, eta, scale, rise)
-    _fetch(place, piece, L, energy)
+        scratch[_WHOLE + l], scratch[_LIMIT + l] = 1.0, 0.0
+    _virgin(work, law, None, L)
+    _fetch(work.place, piece, L, energy)
     for l in range(L):
-        y, x, o = desk[_Y0 + l], desk[_X + l], 4 * l
+        y, x, o = scratch[_Y0 + l], scratch[_X + l], 4 * l
         T = piece[o] + x * (piece[o + 1] + x * (piece[o + 2] + x * piece[o + 3]))
         y = y if y > 0.0 else 0.0
         power = np.sqrt(y) if eta == 0.5 else 1.0
-        desk[_CURVING + l] = potential * T * y * y * power
+        scratch[_CURVING + l] = potential * T * y * y * power
     if rise > 0.0:
         for l in range(L):
-            y = desk[_Y0 + l] if desk[_Y0 + l] > 0.0 else 0.0
-            desk[_CURVING + l] *= (y / (y + scale * scale)) ** rise
+            y = scratch[_Y0 + l] if scratch[_Y0 + l] > 0.0 else 0.0
+            scratch[_CURVING + l] *= (y / (y + scale * scale)) ** rise
     if (eta != 0.5) & (eta != 0.0):
         for l in range(L):
-            desk[_CURVING + l] *= desk[_Y0 + l] ** eta if desk[_Y0 + l] > 0.0 else 0.0
+            scratch[_CURVING + l] *= scratch[_Y0 + l] ** eta if scratch[_Y0 + l] > 0.0 else 0.0
     for i in range(D):
         rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
-        _count(desk, s[rs], s[rt], L, depth, f, i, strength, compliance)
+        _count(scratch, s[rs], s[rt], L, law, f, i)
     for l in range(L):
-        y, force = desk[_Y0 + l], desk[_F0 + l]
-        desk[_STORED + l] += desk[_CURVING + l]
-        desk[_SLIDING + l] += share * desk[_WHOLE + l] if y > 0.0 else 0.0
-        desk[_SLIPPING + l] += share * desk[_LIMIT + l] / (force if force > 0.0 else 1.0)
-        desk[_APART + l] += 0.0 if y > 0.0 else share
-        desk[_REACH + l] = y if y > desk[_REACH + l] else desk[_REACH + l]
+        y, force = scratch[_Y0 + l], scratch[_F0 + l]
+        scratch[_STORED + l] += scratch[_CURVING + l]
+        scratch[_SLIDING + l] += share * scratch[_WHOLE + l] if y > 0.0 else 0.0
+        scratch[_SLIPPING + l] += share * scratch[_LIMIT + l] / (force if force > 0.0 else 1.0)
+        scratch[_APART + l] += 0.0 if y > 0.0 else share
+        scratch[_REACH + l] = y if y > scratch[_REACH + l] else scratch[_REACH + l]
 
 
 @_jit
 def measures(
-    state, out, first, last, block, desk, place, piece, facet, depth, curve, scalars, dim, energy
+    state, out, first, last, block, scratch, place, piece, facet, depth, curve, scalars, dim, energy
 ):
     """Measures (5, n) of joints first..last, as `reference.measures`; arguments as above."""
+    work, law = Work(block, scratch, place, piece), Packed(facet, depth, curve, scalars, dim)
     W = state.shape[2]
     for start in range(first, last, W):
         L = min(W, last - start)
         s = state[start // W]
-        desk[_SLIDING:_REACH] = 0.0
-        desk[_REACH : _REACH + LANES] = -np.inf
+        scratch[_SLIDING:_REACH] = 0.0
+        scratch[_REACH : _REACH + LANES] = -np.inf
         for f in range(facet.shape[0]):
-            _measure_facet(desk, place, piece, s, L, facet, depth, f, curve, energy, scalars, dim)
+            _measure_facet(work, s, L, law, f, energy)
         for i in range(5):
             for l in range(L):
-                out[i, start + l] = desk[_SLIDING + i * LANES + l]
+                out[i, start + l] = scratch[_SLIDING + i * LANES + l]
 
 
 @_jit
-def refresh(state, first, last, block, desk, place, piece, facet, depth, curve, scalars, dim):
+def refresh(state, first, last, block, scratch, place, piece, facet, depth, curve, scalars, dim):
     """Phi and Phi' in the blocks of joints first..last, after their states were written."""
+    work, law = Work(block, scratch, place, piece), Packed(facet, depth, curve, scalars, dim)
     M, D, W = depth.shape[0], depth.shape[1] - 1, state.shape[2]
     for start in range(first, last, W):
         L = min(W, last - start)
         s = state[start // W]
         for f in range(M):
             rf, rs = 2 * dim + 2 * M * D + f, 2 * dim + 2 * M * D + M + f
-            _effective(desk, s, L, facet, f, dim)
-            _virgin(desk, place, piece, None, L, curve, scalars[3], scalars[4], scalars[5])
+            _effective(scratch, s, L, law, f)
+            _virgin(work, law, None, L)
             for l in range(L):
-                s[rf, l], s[rs, l] = desk[_F0 + l], desk[_S0 + l]
+                s[rf, l], s[rs, l] = scratch[_F0 + l], scratch[_S0 + l]

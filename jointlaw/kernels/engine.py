@@ -1,9 +1,8 @@
 """Which kernel advances a law's joints, and on how many threads.
 
-Both engines keep states in blocks (blocks, rows, lanes) and offer the same `advance`: numba
-compiles the inner loops (extra `fast`), numpy is the readable reference. JOINTLAW_KERNEL=numpy or
-numba chooses; by default numba is taken where it can be imported. JOINTLAW_THREADS bounds the
-threads.
+Both engines keep states in blocks and offer the same `advance`: numba compiles the inner loops
+(extra `fast`), numpy is the readable reference. JOINTLAW_KERNEL=numpy or numba chooses; by default
+numba is taken where it can be imported. JOINTLAW_THREADS bounds the threads.
 """
 
 from __future__ import annotations
@@ -11,22 +10,31 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, wait
-from typing import Any, Protocol
+from functools import lru_cache
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..law import JointLaw, Tables
+from ..discretisation.tables import Tables
 from ..support.checks import Array, one_of
 from . import reference
+from .blocks import LANES, Index, rows_of, write_rows
+from .threads import share_out, thread_count
 
-LANES = 128  # joints per block; again in compiled, where a change discards compiled code
 CHUNK = 4096  # joints per call of the numpy kernel: keeps its temporaries in cache
 SERIAL = 20_000  # sliders below which a second thread costs more than it saves
 
-Index = NDArray[np.intp]
 Call = Callable[..., None]
+
+
+class Step(NamedTuple):
+    """One step of m joints: increments in, results out."""
+
+    d: Array  # (m, dim) in m
+    F: Array  # (m, dim), written
+    C: Array | None  # (m, dim, dim), written; None for no tangent
+    where: Index | None  # the joints that move, (m,); None for all
+    keep: bool  # whether the states advance, or stay as they were
 
 
 class Engine(Protocol):
@@ -35,17 +43,8 @@ class Engine(Protocol):
     name: str
     rows: int  # of a block: those of the state, then what the kernel keeps beside it
 
-    def advance(
-        self,
-        state: Array,
-        d: Array,
-        F: Array,
-        C: Array | None,
-        index: Index | None,
-        keep: bool,
-        ledger: bool,
-    ) -> None:
-        """Advance the joints of `index` (all if None) by d (m, dim): write F, C, state."""
+    def advance(self, state: Array, step: Step, ledger: bool) -> None:
+        """Take a step; `ledger` adds up the dissipated energy."""
 
     def refresh(self, state: Array, n: int) -> None:
         """Bring what the kernel keeps beside the first n states up to date with them."""
@@ -54,18 +53,16 @@ class Engine(Protocol):
         """Write the `Measures` of the first n joints into the rows of out (5, n)."""
 
 
-def engine(law: JointLaw) -> Engine:
-    """The engine of a law, which all its joints share: it holds nothing of theirs."""
+def engine(tables: Tables) -> Engine:
+    """The engine of a law's tables, which all its joints share: it holds nothing of theirs."""
     choice = os.environ.get("JOINTLAW_KERNEL", "")
     if choice:
         one_of("JOINTLAW_KERNEL", choice, ("numpy", "numba"))
-    made = law.engines
-    if choice not in made:
-        made[choice] = _make(law.tables, choice)
-    return made[choice]
+    return _engine(tables, choice)
 
 
-def _make(tables: Tables, choice: str) -> Engine:
+@lru_cache(maxsize=64)
+def _engine(tables: Tables, choice: str) -> Engine:
     if choice != "numpy":
         try:
             return NumbaEngine(tables)
@@ -82,22 +79,6 @@ def _make(tables: Tables, choice: str) -> Engine:
     return NumpyEngine(tables)
 
 
-def rows_of(state: Array, n: int, index: Index | None = None) -> Array:
-    """State of n joints, or those of `index`, as a copy (rows, n) with joints last."""
-    if index is None:
-        blocks = -(-n // state.shape[2])
-        part = state[:blocks].transpose(1, 0, 2).reshape(state.shape[1], -1)[:, :n]
-        return np.array(part, order="C")  # never a view
-    lanes = state.shape[2]
-    return np.ascontiguousarray(state[index // lanes, :, index % lanes].T)
-
-
-def write_rows(state: Array, rows: Array, index: Index) -> None:
-    """Write states (rows, n) of the joints of `index` back into the blocks."""
-    lanes = state.shape[2]
-    state[index // lanes, :, index % lanes] = rows.T
-
-
 class NumpyEngine:
     """The reference: whole chunks of joints through `reference.step`."""
 
@@ -106,27 +87,18 @@ class NumpyEngine:
     def __init__(self, tables: Tables) -> None:
         self.tables, self.rows = tables, tables.rows
 
-    def advance(
-        self,
-        state: Array,
-        d: Array,
-        F: Array,
-        C: Array | None,
-        index: Index | None,
-        keep: bool,
-        ledger: bool,
-    ) -> None:
+    def advance(self, state: Array, step: Step, ledger: bool) -> None:
         """As `Engine.advance`; the ledger is always kept."""
-        where = np.arange(len(d)) if index is None else index
-        for first in range(0, len(d), CHUNK):
+        index = np.arange(len(step.d)) if step.where is None else step.where
+        for first in range(0, len(step.d), CHUNK):
             part = slice(first, first + CHUNK)
-            old = rows_of(state, 0, where[part])
-            new, F_part, C_part = reference.step(self.tables, old, d[part].T, C is not None)
-            F[part] = F_part.T
-            if C is not None and C_part is not None:
-                C[part] = np.moveaxis(C_part, 2, 0)
-            if keep:
-                write_rows(state, new, where[part])
+            old, d = rows_of(state, 0, index[part]), step.d[part].T
+            new, F, C = reference.step(self.tables, old, d, step.C is not None)
+            step.F[part] = F.T
+            if step.C is not None and C is not None:
+                step.C[part] = np.moveaxis(C, 2, 0)
+            if step.keep:
+                write_rows(state, new, index[part])
 
     def refresh(self, state: Array, n: int) -> None:
         """As `Engine.refresh`: nothing."""
@@ -146,93 +118,58 @@ class NumbaEngine:
     name = "numba"
 
     def __init__(self, tables: Tables) -> None:
-        from . import compiled as kernel
+        from . import compiled
 
-        self._kernel = kernel
-        packed = (*kernel.pack(tables, reference.compliance(tables).ravel()), tables.dim)
-        self._fixed = {  # last arguments of the kernel: (ledger, tangent)
-            (ledger, tangent): (*packed, True if ledger else None, True if tangent else None)
+        self._kernel, self._sliders = compiled, tables.sliders
+        self.rows = compiled.block_rows(tables)
+        self._law = law = tuple(compiled.pack(tables))
+        self._with = {  # ledger, tangent: True or None, for which the compiler leaves the code out
+            (ledger, tangent): (*law, ledger or None, tangent or None)
             for ledger in (False, True)
             for tangent in (False, True)
         }
-        self._fixed_measures = (*packed, tables.curve.T.ravel().copy())
-        self.rows, self._sliders = kernel.block_rows(tables), tables.sliders
-        self._packed = packed
+        self._energy = tables.curve.T.ravel().copy()
         self._all = np.empty(0, np.intp)
         self._none = np.empty((0, tables.dim, tables.dim))
 
-    def advance(
-        self,
-        state: Array,
-        d: Array,
-        F: Array,
-        C: Array | None,
-        index: Index | None,
-        keep: bool,
-        ledger: bool,
-    ) -> None:
+    def advance(self, state: Array, step: Step, ledger: bool) -> None:
         """As `Engine.advance`."""
-        tangent = C is not None
-        given = (state, d, F, C if tangent else self._none,
-                 self._all if index is None else index, keep)  # fmt: skip
-        self._run(self._kernel.advance, len(d), given, self._fixed[ledger, tangent])
+        d, F, C, where, keep = step
+        given = (state, d, F, self._none if C is None else C,
+                 self._all if where is None else where, keep)  # fmt: skip
+        self._run(self._kernel.advance, len(d), given, self._with[ledger, C is not None])
 
     def refresh(self, state: Array, n: int) -> None:
         """As `Engine.refresh`."""
-        self._run(self._kernel.refresh, n, (state,), self._packed)
+        self._run(self._kernel.refresh, n, (state,), self._law)
 
     def measures(self, state: Array, out: Array) -> None:
         """As `Engine.measures`."""
-        self._run(self._kernel.measures, out.shape[1], (state, out), self._fixed_measures)
+        given = (state, out)
+        self._run(self._kernel.measures, out.shape[1], given, (*self._law, self._energy))
 
-    def _run(self, call: Call, n: int, given: tuple[Any, ...], fixed: tuple[Any, ...]) -> None:
-        """call(*given, first, last, *work, *fixed) over n joints, on one thread or several."""
+    def _run(self, call: Call, n: int, given: tuple[Any, ...], law: tuple[Any, ...]) -> None:
+        """call(*given, first, last, *work, *law) over n joints, on one thread or several."""
         if n * self._sliders <= SERIAL or (threads := min(thread_count(), -(-n // LANES))) == 1:
-            call(*given, 0, n, *self._work(), *fixed)
+            call(*given, 0, n, *self._work(), *law)
             return
         share = -(-n // (threads * LANES)) * LANES  # whole blocks, so threads change no result
 
         def part(k: int) -> None:
-            call(*given, min(k * share, n), min((k + 1) * share, n), *self._work(), *fixed)
+            call(*given, min(k * share, n), min((k + 1) * share, n), *self._work(), *law)
 
-        waiting = [_pool().submit(part, k) for k in range(1, threads)]
-        try:
-            part(0)
-        finally:
-            wait(waiting)
-        for one in waiting:
-            one.result()
+        share_out(part, threads)
 
     def _work(self) -> tuple[Any, ...]:
-        """Working space of the thread that asks: shared by all batches it advances."""
-        try:
-            space: tuple[Any, ...] = _spaces.by_rows[self.rows]
-        except (AttributeError, KeyError):
-            space = self._kernel.work(self.rows)
-            _spaces.__dict__.setdefault("by_rows", {})[self.rows] = space
+        """Working space of the thread that asks: one for all laws, as large as any has needed."""
+        space: tuple[Any, ...] = _space.work
+        if len(space) == 0 or len(space[0]) < self.rows:
+            space = _space.work = self._kernel.new_work(self.rows)
         return space
 
 
-_spaces = threading.local()
+class _Space(threading.local):
+    work: tuple[Any, ...] = ()
 
 
-def thread_count() -> int:
-    """Threads that a large batch may use: JOINTLAW_THREADS, or all processors of this process."""
-    asked = os.environ.get("JOINTLAW_THREADS", "")
-    if asked:
-        if not asked.isdigit() or int(asked) < 1:
-            raise ValueError(f"JOINTLAW_THREADS = {asked!r} is out of bounds: a whole number >= 1")
-        return int(asked)
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-_pools: dict[int, ThreadPoolExecutor] = {}
-
-
-def _pool() -> ThreadPoolExecutor:
-    """Threads of this process: a forked child starts its own."""
-    process = os.getpid()
-    if process not in _pools:
-        _pools.clear()
-        _pools[process] = ThreadPoolExecutor(max(thread_count() - 1, 1), "jointlaw")
-    return _pools[process]
+_space = _Space()

@@ -1,7 +1,7 @@
-"""The readable kernel: one step of a batch of joints, in the order of law.md sections 6 to 8.
+"""The readable kernel: one step of a batch of joints. Every other kernel is tested against it.
 
-Every other kernel is tested against this one. Arrays carry physical axes first and joints last:
-facets (M, B), cells (M, D, B), sliders (2, M, D, B). State (rows, B) holds
+Symbols and order are those of docs/theory-incremental.md. Arrays carry physical axes first and
+joints last: facets (M, B), cells (M, D, B), sliders (2, M, D, B). State (rows, B) holds
 
     delta (dim) | in-plane offset (dim - 1) | dissipated energy (1) | q (2 M D)
 
@@ -13,15 +13,19 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..law import NOTHING, Tables
+from ..discretisation.tables import UNDERFLOW, Tables
 from ..support.checks import Array
 
 NEAR = 1e-5  # of y: below such a change of y the chord of G is lost in rounding, the mean is not
-GRAZING = 1e-12  # cosine at which the leash grows taut: its derivative has a pole at 0
+GRAZING = 1e-12  # cosine at which the offset meets its limit: its derivative has a pole at 0
 LIMIT = 1e-9  # of the friction limit: a slider this close is at it, less the rounding of q
 ROUNDED = 1e-12  # of Phi: as much may be lost in a G next to a node
-TINY = 1e-290  # a stiffness whose reciprocal might overflow, or a square that underflows: nothing
+TINY = 1e-290  # a stiffness whose reciprocal might overflow, or a square that underflows: zero
+
+
+Flags = NDArray[np.bool_]
 
 
 class State(NamedTuple):
@@ -33,6 +37,74 @@ class State(NamedTuple):
     q: Array
 
 
+class Cells(NamedTuple):
+    """The depth cells of all facets at one moment."""
+
+    y: Array  # effective closure (M, B)
+    force: Array  # Phi (M, B)
+    slope: Array  # Phi' (M, B)
+    G: Array  # share of Phi of each cell (M, D, B)
+    kappa: Array  # its slope dG/dy
+
+
+class Sliders(NamedTuple):
+    """The sliders of a step: trial forces (2, M, D, B), the rest (M, D, B)."""
+
+    trial: Array  # q before the friction limit
+    size: Array  # |trial|
+    cap: Array  # mu lam A G: the friction limit of q
+    share: Array  # cap over size where the slider slips, 1 elsewhere
+    chord: Array  # of G over the step: stiffness of springs that were added on the way
+    grows: Flags  # whether the stiffness of the cell has grown
+    near: Flags  # whether y has hardly changed
+
+
+def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array, Array | None]:
+    """Advance joints by the increments d (dim, B): new state, F (dim, B), C (dim, dim, B).
+
+    1. The joint moves: delta += d, and the in-plane offset with it, up to critical_slip ("Large
+       shear"). Every facet then has y = n . (closure, offset)/c1, before and after.
+    2. Virgin curve at y: Phi, Phi', and the share G, kappa = dG/dy of every depth cell ("Few
+       cells, exact virgin curve").
+    3. Sliders are loaded by the facet-plane increment de = (I - n n^T) d. Where kappa grew,
+       q += A/c1 chord de; where it fell, the springs that part take their force along,
+       q = q kappa1/kappa0 + A/c1 kappa1 de.
+    4. Coulomb friction: |q| <= mu lam A G (Eq. 5, 6).
+    5. Traction: F = sum of A Phi n + (1/lam) sum of q (Eq. 21).
+    6. Dissipated energy, every term >= 0 ("No step can make energy").
+    7. Tangent C = dF/dd ("The tangent"), not without `tangent`.
+    """
+    old = parts(k, state)
+    new_state = np.empty_like(state)
+    new = parts(k, new_state)
+    new.delta[:] = old.delta + d
+    offset, J_offset, slip = limited_offset(k, old.offset, d[1:])
+    new.offset[:] = offset
+
+    before = cells(k, effective_closure(k, old.delta[0], old.offset))
+    after = cells(k, effective_closure(k, new.delta[0], offset))
+
+    basis = np.stack([k.s, k.t])  # (2, dim, M)
+    de = np.einsum("edm,db->emb", basis, d)[:, :, None]  # facet-plane increment (2, M, 1, B)
+    sliders = load(k, before, after, old.q, de)
+    whole = sliders.size**2 > TINY  # a size that underflows has no cap
+    new.q[:] = np.where(whole, sliders.share, 0.0) * sliders.trial
+
+    F = k.n @ (k.area[:, None] * after.force)
+    F = F + np.einsum("edm,emb->db", basis, new.q.sum(axis=2)) / k.lam
+
+    lost = friction_loss(k, before, after, old.q, sliders)
+    new.dissipated[:] = old.dissipated + lost
+    if slip.any():
+        pull = k.n[1:] @ (k.area[:, None] * after.force)  # in-plane part of the normal forces
+        # >= 0 by symmetry of the facets, but for rounding
+        pulled = np.maximum(np.sum(pull * offset, axis=0), 0.0)
+        new.dissipated[:] += slip * pulled / k.critical_slip
+    if not tangent:
+        return new_state, F, None
+    return new_state, F, stiffness(k, before, after, sliders, de, J_offset)
+
+
 def parts(k: Tables, state: Array) -> State:
     """Views of delta, offset, dissipated energy and q (2, M, D, B) in a state array."""
     dim = k.dim
@@ -40,32 +112,52 @@ def parts(k: Tables, state: Array) -> State:
     return State(state[:dim], state[dim : 2 * dim - 1], state[2 * dim - 1], q)
 
 
-def closures(k: Tables, closure: Array, offset: Array) -> Array:
+def effective_closure(k: Tables, closure: Array, offset: Array) -> Array:
     """Effective closure y = n . (closure, offset)/c1 of every facet (M, B)."""
     y: Array = k.m[0][:, None] * closure
     for row, o in zip(k.m[1:], offset, strict=True):
         y = y + row[:, None] * o
-    return np.where(np.abs(y) < NOTHING, 0.0, y)
+    return np.where(np.abs(y) < UNDERFLOW, 0.0, y)
 
 
-def cells(k: Tables, y: Array, force: Array, slope: Array) -> tuple[Array, Array]:
-    """G_i and kappa_i of every depth cell (M, D, B), law.md section 6."""
+def cells(k: Tables, y: Array) -> Cells:
+    """Virgin curve at y (M, B), and the share of every depth cell in it."""
+    force, slope = k.curve.force(y)
     low, high = k.depth[:, :-1, None], k.depth[:, 1:, None]
     low_force, high_force = k.depth_force[:, :-1, None], k.depth_force[:, 1:, None]
     low_slope, high_slope = k.depth_slope[:, :-1, None], k.depth_slope[:, 1:, None]
-    y, force, slope = y[:, None], force[:, None], slope[:, None]
-    reach = np.clip(y, low, high)
+    at, at_force, at_slope = y[:, None], force[:, None], slope[:, None]
+    reach = np.clip(at, low, high)
     # by place, not by size: beyond its last height a tabulated slope wavers by its rounding
-    kappa = np.where(y > high, high_slope, slope) - low_slope
-    kappa = np.where(y > low, np.maximum(kappa, 0.0), 0.0)
-    stored = np.clip(force, low_force, high_force) - low_force - low_slope * (reach - low)
-    G = kappa * (y - reach) + stored
-    return np.clip(G, 0.0, kappa * np.maximum(y - low, 0.0)), kappa
+    kappa = np.where(at > high, high_slope, at_slope) - low_slope
+    kappa = np.where(at > low, np.maximum(kappa, 0.0), 0.0)
+    stored = np.clip(at_force, low_force, high_force) - low_force - low_slope * (reach - low)
+    G = kappa * (at - reach) + stored
+    G = np.clip(G, 0.0, kappa * np.maximum(at - low, 0.0))
+    return Cells(y, force, slope, G, kappa)
 
 
-def reciprocal(kappa: Array) -> Array:
-    """1/kappa, 0 where there is no stiffness."""
-    return np.divide(1.0, kappa, out=np.zeros_like(kappa), where=kappa > TINY)
+def load(k: Tables, before: Cells, after: Cells, q: Array, de: Array) -> Sliders:
+    """Trial forces of all sliders and their friction limits: steps 3 and 4 of `step`."""
+    kappa0, kappa1 = before.kappa, after.kappa
+    dy = (after.y - before.y)[:, None]
+    near = np.abs(dy) <= NEAR * np.abs(after.y)[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        chord = np.where(near, 0.5 * (kappa0 + kappa1), (after.G - before.G) / dy)
+    chord = np.clip(chord, np.minimum(kappa0, kappa1), np.maximum(kappa0, kappa1))
+    a = (k.area / k.c1)[:, None, None]
+    grows = kappa1 > kappa0
+    kept = np.divide(kappa1, kappa0, out=np.zeros_like(kappa0), where=kappa0 > 0)
+    trial = np.where(grows, q + a * chord * de, q * kept + a * kappa1 * de)
+    cap = strength(k) * after.G
+    size = np.sqrt(trial[0] ** 2 + trial[1] ** 2)
+    share = np.divide(cap, size, out=np.ones_like(size), where=size > cap)
+    return Sliders(trial, size, cap, share, chord, grows, near)
+
+
+def strength(k: Tables) -> Array:
+    """mu lam A per facet (M, 1, 1): the friction limit of q over G."""
+    return k.mu * k.lam * k.area[:, None, None]
 
 
 def compliance(k: Tables) -> Array:
@@ -74,26 +166,48 @@ def compliance(k: Tables) -> Array:
     return np.divide(k.c1, scale, out=np.zeros_like(scale), where=scale > 0)[:, None, None]
 
 
-def drag(k: Tables, offset: Array, p: Array) -> tuple[Array, Array, Array]:
-    """The leash of law.md section 8: offset after the in-plane step p, its derivative, the slip.
+def reciprocal(kappa: Array) -> Array:
+    """1/kappa, 0 where there is no stiffness."""
+    return np.divide(1.0, kappa, out=np.zeros_like(kappa), where=kappa > TINY)
+
+
+def friction_loss(k: Tables, before: Cells, after: Cells, q: Array, sliders: Sliders) -> Array:
+    """Energy (B,) in J/m2 that sliders, and springs that part under shear, lose in a step.
+
+    Each term is >= 0 as written, for kappa0 <= chord <= kappa1 where the stiffness grows.
+    """
+    kappa0, chord, share = before.kappa, sliders.chord, sliders.share
+    q2, trial2 = q[0] ** 2 + q[1] ** 2, sliders.size**2
+    r0, r1, rc = reciprocal(kappa0), reciprocal(after.kappa), reciprocal(chord)
+    hardening = trial2 * (rc - r1) + np.where(kappa0 > TINY, q2 * (r0 - rc), 0.0)
+    softening = (kappa0 - after.kappa) * r0 * (q2 * r0)
+    lost = np.where(sliders.grows, np.where(chord > TINY, hardening, 0.0), softening)
+    lost = lost + 2 * share * (1 - share) * (trial2 * r1)
+    total: Array = np.sum(compliance(k) * lost, axis=(0, 1))
+    return total
+
+
+def limited_offset(k: Tables, offset: Array, p: Array) -> tuple[Array, Array, Array]:
+    """The offset after the in-plane step p, dragged along where it is at its limit D_c.
 
     Returns offset (dim-1, B), d offset/d p (dim-1, dim-1, B) and int cos(alpha) ds (B), the part of
     the drag along the offset, which times the resultant T . o/|o| is the energy it dissipates.
+    docs/theory-incremental.md, "Large shear".
     """
     size, free = len(offset), offset + p
     J = np.broadcast_to(np.eye(size)[:, :, None], (size, *free.shape)).copy()
     slip = np.zeros(free.shape[1])
     D = k.critical_slip
-    # outside by rounding and on the way in is not taut
-    taut = np.flatnonzero((np.sum(free**2, axis=0) > D * D) & (np.sum(free * p, axis=0) > 0))
-    if taut.size == 0:
+    # outside by rounding and on the way in is not at the limit
+    held = np.flatnonzero((np.sum(free**2, axis=0) > D * D) & (np.sum(free * p, axis=0) > 0))
+    if held.size == 0:
         return free, J, slip
-    o, step = offset[:, taut], p[:, taut]
+    o, step = offset[:, held], p[:, held]
     length = np.hypot(step[0], step[-1] if size == 2 else 0.0)
     e = step / length
     along = np.sum(o * e, axis=0)
     inside = -along + np.sqrt(np.maximum(D * D - np.sum(o**2, axis=0) + along**2, 0.0))
-    inside = np.clip(inside, 0.0, length)  # way until the leash is taut
+    inside = np.clip(inside, 0.0, length)  # way until the offset is at its limit
     o = o + inside * e
     x = (length - inside) / D
     across = np.array([-e[1], e[0]]) if size == 2 else np.zeros_like(e)
@@ -101,102 +215,61 @@ def drag(k: Tables, offset: Array, p: Array) -> tuple[Array, Array, Array]:
     decay, rest = np.exp(-x), -np.expm1(-x)
     bottom = (1 + cos) + (1 - cos) * decay**2
     cos1, sin1 = ((1 + cos) - (1 - cos) * decay**2) / bottom, 2 * sin * decay / bottom
-    free[:, taut] = D * (cos1 * e + sin1 * across)
-    slip[taut] = D * (x + np.log(bottom / 2))
+    free[:, held] = D * (cos1 * e + sin1 * across)
+    slip[held] = D * (x + np.log(bottom / 2))
     # d(angle of the offset) = turn d(angle of e) - sin1/D d(length), and e turns with step
     grazing = np.maximum(cos, GRAZING)
     turn = (rest**2 + cos * rest * (1 + decay)) / bottom
     turn = turn + inside / (D * grazing) * (2 * decay / bottom - sin1 * sin)
-    new_across = np.array([-free[1, taut], free[0, taut]]) if size == 2 else np.zeros_like(e)
+    new_across = np.array([-free[1, held], free[0, held]]) if size == 2 else np.zeros_like(e)
     row = turn / length * across - sin1 / D * e
-    J[:, :, taut] = new_across[:, None] * row[None]
+    J[:, :, held] = new_across[:, None] * row[None]
     return free, J, slip
 
 
-def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array, Array | None]:
-    """Advance a batch by the increments d (dim, B): new state, F (dim, B), C (dim, dim, B)."""
-    old = parts(k, state)
-    new_state = np.empty_like(state)
-    new = parts(k, new_state)
-    new.delta[:] = old.delta + d
-    offset, J_offset, slip = drag(k, old.offset, d[1:])
-    new.offset[:] = offset
-
-    y0 = closures(k, old.delta[0], old.offset)
-    y1 = closures(k, new.delta[0], offset)
-    force1, slope1 = k.curve.force(y1)
-    G0, kappa0 = cells(k, y0, *k.curve.force(y0))
-    G1, kappa1 = cells(k, y1, force1, slope1)
-    dy = (y1 - y0)[:, None]
-    near = np.abs(dy) <= NEAR * np.abs(y1)[:, None]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        chord = np.where(near, 0.5 * (kappa0 + kappa1), (G1 - G0) / dy)
-    chord = np.clip(chord, np.minimum(kappa0, kappa1), np.maximum(kappa0, kappa1))
-
-    basis = np.stack([k.s, k.t])  # (2, dim, M)
-    de = np.einsum("edm,db->emb", basis, d)[:, :, None]  # facet-plane increment (2, M, 1, B)
+def stiffness(
+    k: Tables, before: Cells, after: Cells, sliders: Sliders, de: Array, J_offset: Array
+) -> Array:
+    """Tangent C = dF/dd (dim, dim, B): J_q = beta (I - s s^T) E + v g^T per cell, summed."""
+    trial, size, share, chord, grows = (
+        sliders.trial, sliders.size, sliders.share, sliders.chord, sliders.grows,
+    )  # fmt: skip
+    y, kappa = after.y, after.kappa
     a = (k.area / k.c1)[:, None, None]
-    grows = kappa1 > kappa0
-    kept = np.divide(kappa1, kappa0, out=np.zeros_like(kappa0), where=kappa0 > 0)
-    trial = np.where(grows, old.q + a * chord * de, old.q * kept + a * kappa1 * de)
-    cap = k.mu * k.lam * k.area[:, None, None] * G1
-    size = np.sqrt(trial[0] ** 2 + trial[1] ** 2)
-    share = np.divide(cap, size, out=np.ones_like(size), where=size > cap)
-    trial2 = size**2
-    new.q[:] = np.where(trial2 > TINY, share, 0.0) * trial  # a size that underflows has no cap
-    F = k.n @ (k.area[:, None] * force1)
-    F = F + np.einsum("edm,emb->db", basis, new.q.sum(axis=2)) / k.lam
-
-    # Dissipation, each term >= 0 as written (law.md section 6, kappa0 <= chord <= kappa1)
-    q2 = old.q[0] ** 2 + old.q[1] ** 2
-    r0, r1, rc = reciprocal(kappa0), reciprocal(kappa1), reciprocal(chord)
-    hardening = trial2 * (rc - r1) + np.where(kappa0 > TINY, q2 * (r0 - rc), 0.0)
-    softening = (kappa0 - kappa1) * r0 * (q2 * r0)
-    lost = np.where(grows, np.where(chord > TINY, hardening, 0.0), softening)
-    lost = lost + 2 * share * (1 - share) * (trial2 * r1)
-    new.dissipated[:] = old.dissipated + np.sum(compliance(k) * lost, axis=(0, 1))
-    if slip.any():
-        pull = k.n[1:] @ (k.area[:, None] * force1)  # in-plane resultant of the normal forces
-        # >= 0 by symmetry of the facets, but for rounding
-        pulled = np.maximum(np.sum(pull * offset, axis=0), 0.0)
-        new.dissipated[:] += slip * pulled / k.critical_slip
-    if not tangent:
-        return new_state, F, None
-
-    # Tangent, law.md section 7: J_q = beta (I - s s^T) E + v g^T per cell, summed over cells
-    p = np.where((y1[:, None] > k.depth[:, :-1, None]) & (y1[:, None] < k.depth[:, 1:, None]),
-                 k.curve.curvature(y1)[:, None], 0.0)  # fmt: skip
+    inside = (y[:, None] > k.depth[:, :-1, None]) & (y[:, None] < k.depth[:, 1:, None])
+    p = np.where(inside, k.curve.curvature(y)[:, None], 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        chord_slope = np.where(near, p / 2, (kappa1 - chord) / dy)
-    v = np.where(grows, a * chord_slope * de, p * r1 * trial)
-    beta = np.where(kappa1 > 0, a * np.where(grows, chord, kappa1), 0.0)
+        chord_slope = np.where(sliders.near, p / 2, (kappa - chord) / (y - before.y)[:, None])
+    v = np.where(grows, a * chord_slope * de, p * reciprocal(kappa) * trial)
+    beta = np.where(kappa > 0, a * np.where(grows, chord, kappa), 0.0)
     unit = np.divide(trial, size, out=np.zeros_like(trial), where=size > 0)
-    slips = size > cap
+    slips = size > sliders.cap
     v = np.where(slips, share * (v - unit * np.sum(unit * v, axis=0)), v)
-    v = v + np.where(slips, k.mu * k.lam * k.area[:, None, None] * kappa1 * unit, 0.0)
+    v = v + np.where(slips, strength(k) * kappa * unit, 0.0)
     beta = np.where(slips, share * beta, beta)
     outer = np.where(slips, unit[:, None] * unit[None], 0.0)
     inner = np.sum(beta * (np.eye(2)[:, :, None, None, None] - outer), axis=3)  # (2, 2, M, B)
-    g = np.broadcast_to(k.m[:, :, None], (k.dim, *y1.shape)).copy()
+    g = np.broadcast_to(k.m[:, :, None], (k.dim, *y.shape)).copy()  # dy/dd
     g[1:] = np.einsum("om,opb->pmb", k.m[1:], J_offset)
-    along = k.n[:, :, None] * (k.area[:, None] * slope1)
+    basis = np.stack([k.s, k.t])
+    along = k.n[:, :, None] * (k.area[:, None] * after.slope)
     along = along + np.einsum("edm,emb->dmb", basis, np.sum(v, axis=2)) / k.lam
-    C = np.einsum("imb,jmb->ijb", along, g)
+    C: Array = np.einsum("imb,jmb->ijb", along, g)
     C = C + np.einsum("eim,efmb,fjm->ijb", basis, inner, basis) / k.lam
-    return new_state, F, C
+    return C
 
 
 def traction(k: Tables, state: Array) -> Array:
     """Traction F (dim, B) in Pa that a state carries."""
     now = parts(k, state)
-    force, _ = k.curve.force(closures(k, now.delta[0], now.offset))
+    force, _ = k.curve.force(effective_closure(k, now.delta[0], now.offset))
     shear = np.einsum("edm,emb->db", np.stack([k.s, k.t]), now.q.sum(axis=2))
     F: Array = k.n @ (k.area[:, None] * force) + shear / k.lam
     return F
 
 
 class Measures(NamedTuple):
-    """What the states of joints amount to, arrays (n,): law.md section 8b."""
+    """What the states of joints amount to, arrays (n,): docs/theory-incremental.md."""
 
     sliding: Array  # share of all facet orientations: in touch, every cell at its limit
     slipping: Array  # share of the friction capacity that is at its limit
@@ -207,13 +280,11 @@ class Measures(NamedTuple):
 
 def measures(k: Tables, state: Array) -> Measures:
     """Shares, stored energy and reach of a batch of states (rows, B)."""
-    now = parts(k, state)
-    y = closures(k, now.delta[0], now.offset)
-    force, slope = k.curve.force(y)
-    G, kappa = cells(k, y, force, slope)
-    q2 = now.q[0] ** 2 + now.q[1] ** 2
-    strength = k.mu * k.lam * k.area[:, None, None]
-    capped = np.sqrt(q2) >= strength * (G * (1 - LIMIT) - ROUNDED * force[:, None])
+    state_now = parts(k, state)
+    now = cells(k, effective_closure(k, state_now.delta[0], state_now.offset))
+    y, force, G = now.y, now.force, now.G
+    q2 = state_now.q[0] ** 2 + state_now.q[1] ** 2
+    capped = np.sqrt(q2) >= strength(k) * (G * (1 - LIMIT) - ROUNDED * force[:, None])
     weight = (k.weight / k.weight.sum())[:, None]
     touches = y > 0
     sliding = np.sum(weight * (touches & np.all(capped, axis=1)), axis=0)
@@ -221,5 +292,5 @@ def measures(k: Tables, state: Array) -> Measures:
     slipping = np.sum(weight * np.sum(np.where(capped, G, 0.0), axis=1) / total, axis=0)
     separated = np.sum(weight * ~touches, axis=0)
     stored = np.sum((k.area * k.c1)[:, None] * k.curve.energy(y), axis=0)
-    stored = stored + np.sum(compliance(k) * q2 * reciprocal(kappa), axis=(0, 1))
+    stored = stored + np.sum(compliance(k) * q2 * reciprocal(now.kappa), axis=(0, 1))
     return Measures(sliding, slipping, separated, stored, np.max(y, axis=0))

@@ -121,10 +121,10 @@ class Record:
         replace_file(Path(path), buffer.getvalue().encode())
 
     def to_npz(self, path: str | Path) -> None:
-        """Write the columns as NPZ with the azimuth and a JSON text of the units."""
+        """Write the columns as NPZ with a version, the azimuth and a JSON text of the units."""
         buffer = io.BytesIO()
         arrays: dict[str, Any] = dict(self.columns)
-        np.savez(buffer, **arrays, azimuth=self.azimuth, units=json.dumps(UNITS))
+        np.savez(buffer, version=1, **arrays, azimuth=self.azimuth, units=json.dumps(UNITS))
         replace_file(Path(path), buffer.getvalue())
 
     def plot(self, path: str | Path | None = None) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,7 @@ FORMATIONS = ("population", "individual")
 _TAILS = np.array([1e-15, 1e-12, 1e-9, 1e-6, 1e-4, 1e-2, 0.1, 0.3, 0.5])
 
 
+@runtime_checkable
 class HeightDistribution(Protocol):
     """What the law asks of a distribution of heights (m), measured from the highest peak."""
 

@@ -1,4 +1,4 @@
-"""Directions of asperity contacts: the density of Eq. 14 and its quadrature."""
+"""Directions of asperity contacts: the density of Eq. 14."""
 
 from __future__ import annotations
 
@@ -9,25 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..discretisation import nodes
-from ..support.checks import Array, above, at_least, finite, frozen, number
-
-
-@dataclass(frozen=True)
-class Facets:
-    """Quadrature nodes of the orientation density, as arrays over the facets (M,).
-
-    `n`, `s`, `t` (dim, M) are the facet normal and the two in-facet directions of Eq. 25; dim is 3,
-    2 (closure, shear along the plane) for motion in one plane, or 1 for closure alone. `weight`
-    sums to 1.
-    """
-
-    theta: Array
-    phi: Array
-    weight: Array
-    n: Array
-    s: Array
-    t: Array
+from ..support.checks import above, at_least, finite, number
 
 
 def largest_c(b: float) -> float:
@@ -117,32 +99,3 @@ class Orientation:
         shape = shape + 3 * self.c * np.sin(self.a * th) ** 2 * np.cos(2 * ph)
         inside = (th >= 0) & (th <= math.pi / (2 * self.a) * (1 + 1e-15))
         return np.where(inside, ratio * shape / (2 * math.pi), 0.0)[()]
-
-    def facets(
-        self, u: int, phi: int, plane: float | None = None, closure_only: bool = False
-    ) -> Facets:
-        """Quadrature nodes: the Gauss rule of the density in cos(a theta), midpoints in azimuth.
-
-        `u` nodes in inclination, `phi` on the half circle. With `plane` None the whole circle is
-        covered by 2 phi azimuths; with a plane at that azimuth (rad) the half circle measured from
-        it suffices, c being replaced by c cos(2 plane): mirror images across it share one motion.
-        With `closure_only` all azimuths share one motion, and one stands for them: c sums to zero.
-        """
-        cos_a, share = nodes.inclinations(self.b, u)
-        count = 2 * phi if plane is None else phi
-        c = self.c if plane is None else self.c * math.cos(2 * plane)
-        if closure_only:
-            count, c = 1, 0.0
-        azimuth = (np.arange(count) + 0.5) * (math.pi / phi)
-        U, P = (g.ravel() for g in np.meshgrid(cos_a, azimuth, indexing="ij"))
-        lean = 3 * c * (1 - U**2) / (1 + self.b / 2 * (3 * U**2 - 1))  # no more than 1 by Eq. 18
-        weight = np.repeat(share, count) / count * (1 + lean * np.cos(2 * P))
-        theta = np.arccos(U) / self.a
-        ct, st, cp, sp = np.cos(theta), np.sin(theta), np.cos(P), np.sin(P)
-        zero = np.zeros_like(ct)
-        n = np.array([ct, st * cp, st * sp])
-        s = np.array([-st, ct * cp, ct * sp])
-        t = np.array([zero, -sp, cp])
-        dim = 1 if closure_only else 3 if plane is None else 2
-        arrays = (theta, P, np.maximum(weight, 0.0), n[:dim], s[:dim], t[:dim])
-        return Facets(*frozen(arrays))

@@ -5,9 +5,10 @@ from __future__ import annotations
 import csv
 import json
 import tomllib
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -17,33 +18,32 @@ from .heights import GammaHeights, Heights
 from .orientation import Orientation
 from .resolution import NAMED, Resolution
 
-if TYPE_CHECKING:
-    from ..law import JointLaw
-
 _LAW_KEYS = {
     "orientation", "asperity", "heights", "asperity_density", "closure_range", "resolution",
     "plane", "closure_only", "critical_slip",
 }  # fmt: skip
 T = TypeVar("T")
 _ABOUT = "about"  # free table for title, source and notes
+VERSION = 1  # of the keys; a file without one is of version 1
 
 
-def write_law(law: JointLaw, path: Path | None) -> str:
-    """TOML text of a law; written to `path` too, a histogram then as CSV beside it."""
-    r = law.resolution
+def write_law(law: Mapping[str, Any], path: Path | None) -> str:
+    """TOML text of a law's parameters; written to `path` too, a histogram then as CSV beside it."""
+    r = law["resolution"]
     name = next((n for n, value in NAMED.items() if value == r), None)
     resolution = f'"{name}"' if name else f"{{ u = {r.u}, phi = {r.phi}, depth = {r.depth} }}"
     lines = [
-        f"asperity_density = {_num(law.asperity_density)}  # 1/m2",
-        f"closure_range = {_num(law.closure_range)}  # m",
+        f"version = {VERSION}  # of this file's keys",
+        f"asperity_density = {_num(law['asperity_density'])}  # 1/m2",
+        f"closure_range = {_num(law['closure_range'])}  # m",
         f"resolution = {resolution}",
-        f"critical_slip = {_num(law.critical_slip)}  # m",
+        f"critical_slip = {_num(law['critical_slip'])}  # m",
     ]
-    if law.plane is not None:
-        lines.append(f"plane = {_num(law.plane)}  # rad")
-    if law.closure_only:
+    if law["plane"] is not None:
+        lines.append(f"plane = {_num(law['plane'])}  # rad")
+    if law["closure_only"]:
         lines.append("closure_only = true")
-    o, p, h = law.orientation, law.asperity, law.heights
+    o, p, h = law["orientation"], law["asperity"], law["heights"]
     lines += ["", "[orientation]", f"a = {_num(o.a)}", f"b = {_num(o.b)}", f"c = {_num(o.c)}"]
     lines += ["", "[asperity]", f"K = {_num(p.K)}  # Pa m^(1-eta)", f"lam = {_num(p.lam)}"]
     lines += [f"eta = {_num(p.eta)}", f"mu = {_num(p.mu)}"]
@@ -56,6 +56,10 @@ def write_law(law: JointLaw, path: Path | None) -> str:
         elif isinstance(h, Heights):
             inner = ", ".join(f"{k} = {_num(v)}" for k, v in h.parameters)
             lines += [f'distribution = "{h.distribution}"', f"parameters = {{ {inner} }}"]
+        else:
+            raise ValueError(
+                f"heights = {h!r} cannot be written as TOML: only GammaHeights and Heights can"
+            )
         lines += [f"overlap = {_num(h.overlap)}  # m", f'formation = "{h.formation}"']
     text = "\n".join(lines) + "\n"
     if path is not None:
@@ -63,10 +67,10 @@ def write_law(law: JointLaw, path: Path | None) -> str:
     return text
 
 
-def read_law(cls: type[JointLaw], source: str | Path) -> JointLaw:
+def read_law(build: Callable[..., T], source: str | Path) -> T:
     """A law from a TOML file, or from TOML text (a line break, or "=" and no such file)."""
     if isinstance(source, str) and _is_text(source):
-        return build_law(cls, _parse(source, "TOML text"), "TOML text")
+        return build_law(build, _parse(source, "TOML text"), "TOML text")
     path = Path(source)
     if not path.is_file():
         raise ValueError(f"law file {str(path)!r} does not exist; give a TOML file of parameters")
@@ -74,7 +78,7 @@ def read_law(cls: type[JointLaw], source: str | Path) -> JointLaw:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
         raise ValueError(f"{str(path)!r} is not a text file in UTF-8: {error}") from None
-    return build_law(cls, _parse(text, str(path)), str(path), path.parent)
+    return build_law(build, _parse(text, str(path)), str(path), path.parent)
 
 
 def _is_text(source: str) -> bool:
@@ -82,14 +86,20 @@ def _is_text(source: str) -> bool:
 
 
 def build_law(
-    cls: type[JointLaw], data: dict[str, Any], where: str, folder: Path | None = None
-) -> JointLaw:
+    build: Callable[..., T], data: dict[str, Any], where: str, folder: Path | None = None
+) -> T:
     """A law from a mapping with the keys of the constructor; `where` is named in errors."""
-    _known(data, _LAW_KEYS | {_ABOUT}, where, "")
+    version = data.get("version", VERSION)
+    if version != VERSION:
+        raise ValueError(
+            f"{where}: key 'version' = {version!r}: this jointlaw reads version {VERSION}; write "
+            "the law again with this version, or install the one that wrote it"
+        )
+    _known(data, _LAW_KEYS | {_ABOUT, "version"}, where, "")
     for key in ("orientation", "asperity", "asperity_density"):
         if key not in data:
             raise ValueError(f"{where}: key {key!r} is missing; a law needs it")
-    values = {key: value for key, value in data.items() if key != _ABOUT}
+    values = {key: value for key, value in data.items() if key in _LAW_KEYS}
     values["orientation"] = _part(Orientation, data["orientation"], where, "orientation")
     values["asperity"] = _part(Asperity, data["asperity"], where, "asperity")
     if "heights" in data:
@@ -97,7 +107,7 @@ def build_law(
     if isinstance(data.get("resolution"), dict):
         values["resolution"] = _part(Resolution, data["resolution"], where, "resolution")
     try:
-        return cls(**values)
+        return build(**values)
     except ValueError as error:
         raise ValueError(f"{where}: {error}") from None
 

@@ -298,7 +298,7 @@ def test_no_folder_for_compiled_kernels_is_told_with_the_remedy(tmp_path):
     but not into a folder whose name is taken by a file."""
     shutil.copytree(Path(jl.__file__).parent, tmp_path / "jointlaw",
                     ignore=shutil.ignore_patterns("__pycache__"))  # fmt: skip
-    (tmp_path / "jointlaw" / "__pycache__").touch()
+    (tmp_path / "jointlaw" / "kernels" / "__pycache__").touch()
     code = "import jointlaw as jl; jl.presets.load('westerly-smooth').joint()"
     env = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "JOINTLAW_KERNEL")}
     env |= {"PYTHONPATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "jointlaw/__init__.py")}
@@ -312,3 +312,30 @@ def test_no_folder_for_compiled_kernels_is_told_with_the_remedy(tmp_path):
         [sys.executable, "-c", code], cwd=tmp_path, env=env, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("plane", [None, 0.0])
+def test_a_host_that_keeps_the_states_itself(make_law, plane):
+    """`law.step` is a pure function: the same path as a joint's, and nothing given is changed."""
+    law = make_law(plane=plane)
+    rng, joint = np.random.default_rng(4), law.joint()
+    state = np.zeros(law.state_size)
+    for _ in range(20):
+        d = rng.normal(0.0, 1e-7, law.tables.dim)
+        given = state.copy()
+        new, F, C = law.step(state, d)
+        assert (state == given).all()
+        state, (F_joint, C_joint) = new, joint.update(d)
+        assert worst(F, F_joint, np.abs(F_joint).max() + 1.0) < 1e-12
+        assert worst(C, C_joint, np.abs(C_joint).max() + 1.0) < 1e-9
+    assert worst(state, joint.snapshot().values[:, 0], np.abs(state).max()) < 1e-12
+    two, F_two, _ = law.step(np.stack([state, state], axis=1), np.stack([d, d], axis=1))
+    assert two.shape == (law.state_size, 2)
+    assert (F_two[:, 0] == F_two[:, 1]).all()
+
+
+@pytest.mark.parametrize(("state", "d"), [((3,), (3,)), ((0, 2), (3,)), ((0,), (2,)), ((), (3,))])
+def test_a_step_of_other_shapes_is_refused(law, state, d):
+    size = tuple(law.state_size if n == 0 else n for n in state)
+    with pytest.raises(ValueError, match="expected"):
+        law.step(np.zeros(size), np.zeros(d))

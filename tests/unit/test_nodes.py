@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
+from jointlaw.discretisation.facets import facets
 from jointlaw.discretisation.nodes import depth_nodes, inclinations
 from jointlaw.discretisation.virgin_curve import virgin_curve
 
@@ -26,7 +27,7 @@ def test_inclinations_integrate_the_density_exactly(b, count):
 def test_weights_add_up_at_any_number_of_nodes(plane):
     orientation = jl.Orientation(3.0, 1.2, -0.1)
     for u in (1, 2, 5):
-        assert orientation.facets(u, 3, plane).weight.sum() == pytest.approx(1.0, abs=1e-14)
+        assert facets(orientation, u, 3, plane).weight.sum() == pytest.approx(1.0, abs=1e-14)
 
 
 def test_cells_of_a_power_law_are_a_power_grading():

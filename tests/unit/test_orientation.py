@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy import integrate
 
 import jointlaw as jl
+from jointlaw.discretisation.facets import facets
 
 extents, shapes, shares = st.floats(1.0, 20.0), st.floats(-1.0, 2.0), st.floats(-1.0, 1.0)
 
@@ -93,7 +94,7 @@ def test_density_outside_the_cap_is_zero():
 @given(a=extents, b=shapes, share=shares, u=st.integers(2, 6), phi=st.integers(3, 8),
        plane=st.none() | st.floats(-4, 4))  # fmt: skip
 def test_facets(a, b, share, u, phi, plane):
-    f = orientation(a, b, share).facets(u, phi, plane)
+    f = facets(orientation(a, b, share), u, phi, plane)
     dim = 3 if plane is None else 2
     assert f.n.shape == f.s.shape == f.t.shape == (dim, len(f.weight))
     assert len(f.weight) == u * phi * (2 if plane is None else 1)

@@ -48,7 +48,7 @@ def test_a_changed_value_differs(law):
 
 def test_tables_that_laws_share_are_not_writeable(any_law):
     """The virgin curve and the inclinations outlive the law: a later law reads the same arrays."""
-    for shared in (any_law.curve, any_law.tables, vars(any_law.facets).values()):
+    for shared in (any_law.curve, vars(any_law.tables).values(), vars(any_law.facets).values()):
         for array in shared:
             if isinstance(array, np.ndarray):
                 with pytest.raises(ValueError, match="read-only"):

@@ -13,13 +13,12 @@ def sliders_within_friction(batch):
     """Largest excess of |f_s| over mu f_n of any slider, as a share of mu f_n of its facet."""
     k, values = batch.law.tables, batch.snapshot().values
     now = kernel.parts(k, values)
-    y = kernel.closures(k, now.delta[0], now.offset)
-    force, slope = k.curve.force(y)
-    G, _ = kernel.cells(k, y, force, slope)
+    y = kernel.effective_closure(k, now.delta[0], now.offset)
+    cells = kernel.cells(k, y)
     strength = k.mu * k.lam * k.area[:, None]
     size = np.hypot(now.q[0], now.q[1])
-    excess = size - strength[:, None] * G
-    whole = np.where(strength * force > 0, strength * force, np.inf)[:, None]
+    excess = size - strength[:, None] * cells.G
+    whole = np.where(strength * cells.force > 0, strength * cells.force, np.inf)[:, None]
     lifted = np.where((y <= 0)[:, None] & (size > 0), np.inf, 0.0)
     return float(np.max(np.maximum(excess / whole, lifted), initial=0.0))
 

@@ -57,7 +57,7 @@ def build(**changes):
 
 
 # the numpy kernel takes 20 times as long for small batches: long runs are shorter there
-COMPILED = isinstance(engine(build()), NumbaEngine)
+COMPILED = isinstance(engine(build().tables), NumbaEngine)
 
 
 def name(changes):

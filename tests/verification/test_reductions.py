@@ -154,7 +154,7 @@ def test_linear_asperities_without_heights_need_one_depth_cell(plane):
     force, slope = law.curve.force(np.where(np.isfinite(depth), depth, 0.0))
     force[:, -1] = slope[:, -1] = np.inf
     slope[:, 0] = 0.0
-    many = few._replace(depth=depth, depth_force=force, depth_slope=slope)
+    many = replace(few, depth=depth, depth_force=force, depth_slope=slope)
     rng = np.random.default_rng(3)
     states = [np.zeros((k.rows, 9)) for k in (few, many)]
     for step in range(30):

@@ -1,0 +1,78 @@
+"""Facets: the few orientations that stand for the density of Eq. 14, and sums over them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..parameters.asperity import Asperity
+from ..parameters.orientation import Orientation
+from ..support.checks import Array, frozen
+from .nodes import inclinations
+
+
+@dataclass(frozen=True)
+class Facets:
+    """Quadrature nodes of the orientation density, as arrays over the facets (M,).
+
+    `n`, `s`, `t` (dim, M) are the facet normal and the two in-facet directions of Eq. 25; dim is 3,
+    2 (closure, shear along the plane) for motion in one plane, or 1 for closure alone. `weight`
+    sums to 1.
+    """
+
+    theta: Array
+    phi: Array
+    weight: Array
+    n: Array
+    s: Array
+    t: Array
+
+    def scale(self, asperity: Asperity, asperity_density: float) -> Array:
+        """A = N w lam K c1^(1+eta) of each facet (M,): its normal force is A Phi(y)."""
+        c1 = np.cos(self.theta)
+        K: Array = asperity_density * self.weight * asperity.lam * asperity.K
+        return K * c1 ** (1 + asperity.eta)
+
+
+def facets(
+    orientation: Orientation,
+    u: int,
+    phi: int,
+    plane: float | None = None,
+    closure_only: bool = False,
+) -> Facets:
+    """Quadrature nodes: the Gauss rule of the density in cos(a theta), midpoints in azimuth.
+
+    `u` nodes in inclination, `phi` on the half circle. With `plane` None the whole circle is
+    covered by 2 phi azimuths; with a plane at that azimuth (rad) the half circle measured from
+    it suffices, c being replaced by c cos(2 plane): mirror images across it share one motion.
+    With `closure_only` all azimuths share one motion, and one stands for them: c sums to zero.
+    """
+    cos_a, share = inclinations(orientation.b, u)
+    count = 2 * phi if plane is None else phi
+    b, c = orientation.b, orientation.c
+    if plane is not None:
+        c *= math.cos(2 * plane)
+    if closure_only:
+        count, c = 1, 0.0
+    azimuth = (np.arange(count) + 0.5) * (math.pi / phi)
+    U, P = (g.ravel() for g in np.meshgrid(cos_a, azimuth, indexing="ij"))
+    lean = 3 * c * (1 - U**2) / (1 + b / 2 * (3 * U**2 - 1))  # no more than 1 by Eq. 18
+    weight = np.repeat(share, count) / count * (1 + lean * np.cos(2 * P))
+    theta = np.arccos(U) / orientation.a
+    ct, st, cp, sp = np.cos(theta), np.sin(theta), np.cos(P), np.sin(P)
+    zero = np.zeros_like(ct)
+    n = np.array([ct, st * cp, st * sp])
+    s = np.array([-st, ct * cp, ct * sp])
+    t = np.array([zero, -sp, cp])
+    dim = 1 if closure_only else 3 if plane is None else 2
+    arrays = (theta, P, np.maximum(weight, 0.0), n[:dim], s[:dim], t[:dim])
+    return Facets(*frozen(arrays))
+
+
+def facet_sum(theta: Array, scale: Array, lam: float, mu: float) -> float:
+    """Sum of scale (cos theta + sin theta min(tan theta/lam, mu)): F1/Phi under pure closure."""
+    shear = np.minimum(np.tan(theta) / lam, mu)
+    return float(np.sum(scale * (np.cos(theta) + np.sin(theta) * shear)))

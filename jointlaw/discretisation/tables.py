@@ -1,0 +1,101 @@
+"""The tables of a law: everything that a kernel reads, shared by all joints of the law."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..parameters.asperity import Asperity
+from ..support.checks import Array, frozen
+from .facets import Facets
+from .nodes import depth_nodes
+from .virgin_curve import VirginCurve
+
+UNDERFLOW = 1e-140  # m, and Pa/m: counts as zero, for powers and squares below it underflow
+VERSION = 1  # of the discretisation: a change of nodes or state changes it, old states are refused
+_OVERFLOW = 1e140  # Pa and J/m2: squares beyond it overflow
+
+
+@dataclass(frozen=True, eq=False)
+class Tables:
+    """What a kernel reads: everything per facet (M facets, D depth cells), physical axes first.
+
+    `m` (dim, M) maps closure and in-plane offset to the effective closure y of a facet, `s`, `t`
+    (dim, M) are the in-facet directions, `area` is A = N w lam K c1^(1+eta), `depth` (M, D+1) the
+    cell limits zeta with the virgin force and slope there (slope 0 at the first by definition).
+    """
+
+    curve: VirginCurve
+    n: Array
+    m: Array
+    s: Array
+    t: Array
+    c1: Array
+    area: Array
+    weight: Array
+    depth: Array
+    depth_force: Array
+    depth_slope: Array
+    lam: float
+    mu: float
+    critical_slip: float
+
+    @property
+    def dim(self) -> int:
+        """Components of a displacement: 3, or 2 in one plane."""
+        return len(self.m)
+
+    @property
+    def cells(self) -> int:
+        """Depth cells per facet."""
+        return int(self.depth.shape[1]) - 1
+
+    @property
+    def sliders(self) -> int:
+        """Sliders per joint: one for each cell of each facet."""
+        return len(self.c1) * self.cells
+
+    @property
+    def rows(self) -> int:
+        """State numbers per joint: delta, offset, dissipated energy, and q of every slider."""
+        return 2 * self.dim + 2 * self.sliders
+
+
+def tables(
+    facets: Facets,
+    curve: VirginCurve,
+    asperity: Asperity,
+    asperity_density: float,
+    closure_range: float,
+    cells: int,
+    critical_slip: float,
+) -> Tables:
+    """Lay out the tables; `cells` per facet, one where the curve is linear."""
+    c1, slope = np.cos(facets.theta), np.tan(facets.theta)
+    depth = depth_nodes(curve, closure_range, slope, 1 if curve.linear else cells)
+    force, slope = curve.force(np.where(np.isfinite(depth), depth, 0.0))
+    force[:, -1] = slope[:, -1] = np.inf
+    slope[:, 0] = 0.0  # a spring that touches at once (eta = 0) belongs to the first cell
+    slope = np.maximum.accumulate(slope, axis=1)  # but for the rounding of the table it rises
+    arrays = (
+        facets.n, facets.n / c1, facets.s, facets.t, c1,
+        facets.scale(asperity, asperity_density), facets.weight, depth, force, slope,
+    )  # fmt: skip
+    return Tables(curve, *frozen(arrays), asperity.lam, asperity.mu, critical_slip)
+
+
+def largest_reach(curve: VirginCurve, scale: Array, theta: Array, asperity: Asperity) -> float:
+    """Effective closure (m) up to which forces, energies and their squares stay finite.
+
+    scale, theta: A and inclination of every facet (M,).
+    """
+    y, p = 10.0 ** np.arange(-300.0, 101.0), asperity
+    stiffest = float(np.max(scale / np.cos(theta))) * max(p.lam, 1 / p.lam, 1.0) * (1.0 + p.mu)
+    with np.errstate(over="ignore", invalid="ignore"):
+        force, slope = curve.force(y)
+        worst = stiffest * (force + y * slope) + float(np.max(scale)) * curve.energy(y)
+    bad = ~(worst < _OVERFLOW)
+    if bad[0]:
+        return 0.0
+    return float(y[int(np.argmax(bad)) - 1]) if bad.any() else float(y[-1])

@@ -1,0 +1,34 @@
+"""States of many joints in blocks (blocks, rows, lanes): the joints of a block lie side by side."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..support.checks import Array
+
+LANES = 128  # joints per block; again in compiled.py, where a change discards compiled code
+
+Index = NDArray[np.intp]
+
+
+def empty_blocks(rows: int, n: int) -> Array:
+    """Blocks of virgin states for n joints; one joint alone lies in a block of its own."""
+    lanes = 1 if n == 1 else LANES
+    return np.zeros((-(-n // lanes), rows, lanes))
+
+
+def rows_of(state: Array, n: int, index: Index | None = None) -> Array:
+    """State of n joints, or those of `index`, as a copy (rows, n) with joints last."""
+    if index is None:
+        blocks = -(-n // state.shape[2])
+        part = state[:blocks].transpose(1, 0, 2).reshape(state.shape[1], -1)[:, :n]
+        return np.array(part, order="C")  # never a view
+    lanes = state.shape[2]
+    return np.ascontiguousarray(state[index // lanes, :, index % lanes].T)
+
+
+def write_rows(state: Array, rows: Array, index: Index) -> None:
+    """Write states (rows, n) of the joints of `index` back into the blocks."""
+    lanes = state.shape[2]
+    state[index // lanes, :, index % lanes] = rows.T

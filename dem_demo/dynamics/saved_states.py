@@ -1,32 +1,32 @@
 """States of a simulation, in memory and in a folder: restart is exact to the last bit.
 
-A folder holds the scene's text, files of arrays, and `state.json`: the version of these files, and
-the hashes of them and of the scene that they belong to.
+A folder holds the scene's text and `state.npz`: its version, the hash of the scene that it belongs
+to, and arrays.
 
 The velocities stored are those that will carry the blocks on, half a step ahead of the places.
 """
 
 import hashlib
+import io
 import json
-import os
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from zipfile import BadZipFile
 
 import numpy as np
 
 import jointlaw as jl
-from jointlaw.support.files import write_json
+from jointlaw.support.files import replace_file
 
 from ..contact import BatchState, Joints
-from ..scene import Scene, parse
+from ..scene import Run, Scene, parse
 from . import guards
 from .energy import COLUMNS, Ledger
 from .state import Layout, Limit, Moment, State
 from .system import System
 
-INDEX = "state.json"
-VERSION = 2  # of the files of a folder; those of version 1 have no version in their index
+SCENE, STATE = "scene.toml", "state.npz"
+VERSION = 2  # of state.npz; version 1 was several files
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,58 +95,52 @@ def save(scene: Scene, saved: Saved, folder: Path) -> None:
 
     Raises ValueError for a scene that `text_of` refuses.
     """
-    text = text_of(scene)
+    text, buffer, tables = text_of(scene), io.BytesIO(), {}
+    for i, (law, slots, free) in enumerate(saved.joints.values()):
+        # numbered: a law's name may be no array's name
+        tables[f"law-{i}"], tables[f"fingerprint-{i}"] = law.values, np.array(law.fingerprint)
+        tables[f"slots-{i}"] = np.array([[*k, p, s] for (k, p), s in slots.items()], int)
+        tables[f"free-{i}"] = np.array(free, int)
+    about = {"version": VERSION, "scene": fingerprint(scene)}
+    np.savez(buffer, **about, **saved.arrays, **tables)
     folder.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory(prefix=".state-", dir=folder) as new:
-        fresh, tables = Path(new), {}
-        for i, (values, slots, free) in enumerate(saved.joints.values()):
-            values.save(fresh / f"law-{i}.npz")  # numbered: a law's name may be no file's name
-            tables[f"slots-{i}"] = np.array([[*k, p, s] for (k, p), s in slots.items()], int)
-            tables[f"free-{i}"] = np.array(free, int)
-        np.savez(fresh / "joints.npz", **tables)
-        np.savez(fresh / "blocks.npz", **saved.arrays)
-        hashes = {file.name: _hash(file.read_bytes()) for file in sorted(fresh.iterdir())}
-        (fresh / "scene.toml").write_text(text, encoding="utf-8")
-        index = {"version": VERSION, "scene": fingerprint(scene), "files": hashes}
-        write_json(fresh / INDEX, index)
-        for file in list(fresh.iterdir()):
-            os.replace(file, folder / file.name)
+    replace_file(folder / SCENE, text.encode())
+    replace_file(folder / STATE, buffer.getvalue())
 
 
 def load(folder: Path) -> tuple[Scene, Saved]:
     """The scene and the state that `save` wrote. Raises ValueError if they are not whole."""
-    index = folder / INDEX
-    if not index.is_file():
-        raise ValueError(f"{str(folder)!r} holds no saved state ({INDEX} is missing)")
-    try:
-        about = json.loads(index.read_text(encoding="utf-8"))
-        version, whose, hashes = about.get("version", 1), about["scene"], dict(about["files"])
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise ValueError(f"{index} is damaged ({error!r}): run the scene again") from None
-    if version != VERSION:
+    data = _read(folder / STATE)
+    scene = parse((folder / SCENE).read_text(encoding="utf-8"), SCENE)
+    if data.pop("scene") != fingerprint(scene):
         raise ValueError(
-            f"{index}: version = {version!r}, must be {VERSION}: another version of the demo wrote "
-            "this state; go on with that one, or run the scene again"
-        )
-    scene = parse((folder / "scene.toml").read_text(encoding="utf-8"), "scene.toml")
-    if fingerprint(scene) != whose:
-        raise ValueError(
-            f"{folder / 'scene.toml'} is not the scene of this state: only end, record, fraction, "
+            f"{folder / SCENE} is not the scene of this state: only end, record, fraction, "
             "step, title and watch may change; undo the rest, or run it as a scene of its own"
         )
-    laws = [f"law-{i}.npz" for i in range(len(scene.laws))]
-    for name in ["blocks.npz", "joints.npz", *laws]:
-        file = folder / name
-        if not file.is_file() or _hash(file.read_bytes()) != hashes.get(name):
-            raise ValueError(f"{file} is missing, damaged or of another state: run the scene again")
-    with np.load(folder / "blocks.npz") as data:
-        arrays = {name: data[name] for name in data.files}
     joints = {}
-    with np.load(folder / "joints.npz") as data:
-        for i, (name, file) in enumerate(zip(scene.laws, laws, strict=True)):
-            slots = {(tuple(s[:4]), s[4]): s[5] for s in data[f"slots-{i}"].tolist()}
-            joints[name] = jl.load_state(folder / file), slots, data[f"free-{i}"].tolist()
-    return scene, Saved(arrays, joints)
+    for i, name in enumerate(scene.laws):
+        law = jl.JointState(str(data.pop(f"fingerprint-{i}")), data.pop(f"law-{i}"))
+        slots = {(tuple(s[:4]), s[4]): s[5] for s in data.pop(f"slots-{i}").tolist()}
+        joints[name] = law, slots, data.pop(f"free-{i}").tolist()
+    return scene, Saved(data, joints)
+
+
+def _read(file: Path) -> dict[str, np.ndarray]:
+    """The arrays of a file of this version."""
+    if not file.is_file():
+        raise ValueError(f"{str(file.parent)!r} holds no saved state ({STATE} is missing)")
+    try:
+        with np.load(file, allow_pickle=False) as stored:  # a ZIP file: it checks its sums
+            data = {name: stored[name] for name in stored.files}
+        version = int(data.pop("version"))
+    except (OSError, EOFError, LookupError, ValueError, AttributeError, BadZipFile) as error:
+        raise ValueError(f"{file} is damaged ({error}): run the scene again") from None
+    if version != VERSION:
+        raise ValueError(
+            f"{file} has version {version}, this demo reads {VERSION}: go on with the version of "
+            "the demo that wrote it, or run the scene again"
+        )
+    return data
 
 
 def text_of(scene: Scene) -> str:
@@ -161,18 +155,20 @@ def text_of(scene: Scene) -> str:
 
 
 def fingerprint(scene: Scene) -> str:
-    """Hash of what the motion depends on, but not when a run ends, records, or at which step."""
-    run = replace(scene.run, end=0.0, record=0.0, fraction=0.0, step=None)
+    """Hash of what the motion depends on, but not when a run ends, records, or at which step.
+
+    Keys of [run] at their defaults are left out, so that a key that is added later leaves the
+    hashes of scenes without it as they were.
+    """
+    run = asdict(replace(scene.run, end=0.0, record=Run.record, fraction=Run.fraction, step=None))
+    given = {key: value for key, value in run.items() if value != getattr(Run, key, None)}
     pairs = sorted((sorted(blocks), law) for blocks, law in scene.pairs.items())
     whole = [
         [block.__dict__ | {"corners": block.corners.tolist()} for block in scene.blocks],
-        {name: law.fingerprint for name, law in scene.laws.items()},
-        scene.default_law, pairs, sorted(scene.edge_laws.items()), asdict(run),
+        # the parameters alone: another discretisation is refused with its own remedy
+        {name: law.fingerprint.rpartition(":")[2] for name, law in scene.laws.items()},
+        scene.default_law, pairs, sorted(scene.edge_laws.items()), given,
         [asdict(drive) for drive in scene.drives], [float(g) for g in scene.gravity],
         float(scene.thickness),
     ]  # fmt: skip
-    return _hash(json.dumps(whole).encode())
-
-
-def _hash(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()
+    return hashlib.sha256(json.dumps(whole).encode()).hexdigest()

@@ -37,6 +37,11 @@ class SlipMonitor:
                 entry["slip_angle"] = base_angle(sim, moving, base)
                 entry["slip_time"] = sim.time
 
+    @property
+    def waiting(self) -> bool:
+        """Is there a slip still to come?"""
+        return any(_waits(entry) for entry in self.slips.values())
+
     def report(self) -> list[dict]:
         """Measured and predicted slip angles (degrees)."""
         out = []

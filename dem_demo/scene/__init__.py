@@ -14,7 +14,7 @@ from .blocks import Block, turn
 from .drives import Drive, Drives
 from .laws import build_law, coulomb_law, is_coulomb
 from .read import DENSITY, GRAVITY, TEMPLATE, build, load, names, parse, read_tables
-from .scene import Key, Scene
+from .scene import Key, Run, Scene
 
 __all__ = [
     "DENSITY",
@@ -24,6 +24,7 @@ __all__ = [
     "Drive",
     "Drives",
     "Key",
+    "Run",
     "Scene",
     "build",
     "build_law",

@@ -96,8 +96,8 @@ def test_resume_of_a_tilt_test_by_command(tmp_path):
     words = ["resume", str(tmp_path / "a/state"), "--until", "0.2", "--no-pictures"]
     assert main([*words, "--out", str(tmp_path / "b")]) == 0
     with (
-        np.load(tmp_path / "b/state/blocks.npz") as b,
-        np.load(tmp_path / "whole/state/blocks.npz") as whole,
+        np.load(tmp_path / "b/state/state.npz") as b,
+        np.load(tmp_path / "whole/state/state.npz") as whole,
     ):
         assert (b["motion"] == whole["motion"]).all()
         assert (b["ledger"] == whole["ledger"]).all()

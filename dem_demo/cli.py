@@ -119,7 +119,7 @@ def _new(words: Words) -> None:
 
 
 def _check(words: Words) -> None:
-    about = "Read a scene file, seat its blocks, find its time step; run nothing."
+    about = "Read a scene file, find its initial equilibrium and its time step; run nothing."
     given = _parse(words, "check", about, "check my-scene.toml", "scene")
     _announce(Simulation(load(given.scene)))
     print("the scene is valid")

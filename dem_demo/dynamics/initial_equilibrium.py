@@ -20,7 +20,7 @@ def equilibrium(joints: Joints, rows: csr_array, closure, slid, area, force, set
     in balance.
 
     First with joints that cannot slide; then with the law itself. Blocks that the law cannot hold
-    are seated with joints that neither slide nor open, which always has an answer. Blocks that no
+    are placed with joints that neither slide nor open, which always has an answer. Blocks that no
     joint connects, such as two slopes side by side, find their answers apart. Returns
     (displacement, balanced), both (free motions,): balanced is False where the law cannot hold:
     those blocks will move from step 0.

@@ -25,7 +25,7 @@ def kinetic(record: Record, i: int) -> np.ndarray:
 def outcomes(record: Record) -> list[dict]:
     """One entry for each `[[rock]]` of the scene.
 
-    settled_m: largest displacement of seating, from the drawing to step 0; moved_m: largest since
+    settled_m: largest displacement from the drawing to step 0; moved_m: largest since
     then; failed: blocks that moved more than FAILED; creep_m_per_s: largest mean speed over the
     last second (or the whole run, if shorter).
     """

@@ -35,7 +35,7 @@ def compare(
 def critical_tilts(text: str, where: str, seeds: Sequence[int]) -> Iterator[dict]:
     """For the same cases the turn of gravity (degrees) beyond which no balance is found.
 
-    Found by bisection to 0.1 degrees on the seating of the blocks, without running them; None
+    Found by bisection to 0.1 degrees on the initial equilibrium, without running the blocks; None
     if it is beyond 60 degrees either way.
     """
     for case, data in _cases(text, seeds):

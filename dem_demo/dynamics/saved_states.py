@@ -128,7 +128,9 @@ def load(folder: Path) -> tuple[Scene, Saved]:
 def _read(file: Path) -> dict[str, np.ndarray]:
     """The arrays of a file of this version."""
     if not file.is_file():
-        raise ValueError(f"{str(file.parent)!r} holds no saved state ({STATE} is missing)")
+        raise ValueError(
+            f"{str(file.parent)!r} holds no saved state ({STATE} is missing): run the scene"
+        )
     try:
         with np.load(file, allow_pickle=False) as stored:  # a ZIP file: it checks its sums
             data = {name: stored[name] for name in stored.files}

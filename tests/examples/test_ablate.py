@@ -118,7 +118,7 @@ def test_table_and_csv_show_changes_against_the_whole(folder, rows):
 
 def test_a_variant_that_is_too_stiff_takes_half_the_step():
     scene = parse(SLOPE)
-    limit = Simulation(scene).step_limit
+    limit = Simulation(scene).now.limit.now
     row, _ = _run(replace(scene, run=replace(scene.run, step=1.5 * limit)), "stiff", 0.01)
     assert row.note == "time step / 2"
     assert row.time_step == pytest.approx(0.75 * limit)

@@ -24,10 +24,8 @@ from .tables.table import JointTable, load_table
 
 if TYPE_CHECKING:
     from .calibration import baselines, datasets, unloading
-    from .calibration.calibrate import fit_closure, fit_curves, fit_shear
-    from .calibration.fit import Fit
+    from .calibration.fit import Fit, fit_closure, fit_curves, fit_many, fit_shear
     from .calibration.measured import ClosureCurve, ShearCurve, first_loading
-    from .calibration.sweep import fit_many
     from .hosts import export_yade
     from .surface.fit import SurfaceFit, from_surface
     from .surface.synthetic import synthetic_surface
@@ -83,10 +81,10 @@ _LATER = {
     "SurfaceFit": "surface.fit",
     "export_yade": "hosts",
     "first_loading": "calibration.measured",
-    "fit_closure": "calibration.calibrate",
-    "fit_curves": "calibration.calibrate",
-    "fit_many": "calibration.sweep",
-    "fit_shear": "calibration.calibrate",
+    "fit_closure": "calibration.fit",
+    "fit_curves": "calibration.fit",
+    "fit_many": "calibration.fit",
+    "fit_shear": "calibration.fit",
     "from_surface": "surface.fit",
     "synthetic_surface": "surface.synthetic",
     "tabulate": "tables.tabulate",

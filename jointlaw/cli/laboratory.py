@@ -6,20 +6,16 @@ import argparse
 import math
 import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .. import presets
 from ..laboratory.experiments import CONTROLS, PathError, closure_test, direct_shear
 from ..laboratory.record import UNITS, Record
 from ..law import JointLaw
-from ..parameters.resolution import NAMED
 from ..support import units
 from ..support.checks import number
-from ..support.files import write_json
-from .command import add_command
+from .command import Files, add_command, add_law, add_out, read_law, write_results
 
 
 def add_shear_command(commands: Any) -> None:
@@ -29,7 +25,7 @@ def add_shear_command(commands: Any) -> None:
         "direct shear test: seat the joint at a normal stress, shear it, write curve and picture",
         "jointlaw shear biegel-rough --normal-stress 10MPa --to 2um --reverse -2um --out out",
     )
-    parser.add_argument("law", metavar="PRESET_OR_FILE", help="preset name or TOML file")
+    add_law(parser)
     parser.add_argument(
         "--normal-stress", metavar="STRESS", default="10MPa", help="normal stress (default 10MPa)"
     )
@@ -65,7 +61,7 @@ def add_shear_command(commands: Any) -> None:
 
 
 def _shear(options: argparse.Namespace) -> int:
-    law = _law(options)
+    law = read_law(options)
     points = [_quantity("--to", options.to, "m")]
     if options.reverse:
         points += [_quantity("--reverse", p, "m") for p in options.reverse.split(",")]
@@ -100,7 +96,7 @@ def add_closure_command(commands: Any) -> None:
         "closure test: load the joint to a normal stress and unload it",
         "jointlaw closure westerly-smooth --normal-stress 20MPa --out out",
     )
-    parser.add_argument("law", metavar="PRESET_OR_FILE", help="preset name or TOML file")
+    add_law(parser)
     parser.add_argument(
         "--normal-stress",
         metavar="STRESSES",
@@ -113,7 +109,7 @@ def add_closure_command(commands: Any) -> None:
 
 
 def _closure(options: argparse.Namespace) -> int:
-    law = _law(options)
+    law = read_law(options)
     stresses = [
         _quantity("--normal-stress", s, "Pa", positive=True)
         for s in options.normal_stress.split(",")
@@ -133,13 +129,10 @@ def _closure(options: argparse.Namespace) -> int:
 
 
 def _common(parser: argparse.ArgumentParser, steps: int) -> None:
-    parser.add_argument("--resolution", choices=tuple(NAMED), help="instead of the law's own")
     parser.add_argument(
         "--steps", metavar="N", type=int, default=steps, help=f"steps per leg (default {steps})"
     )
-    parser.add_argument(
-        "--out", metavar="DIR", type=Path, required=True, help="folder for the results"
-    )
+    add_out(parser)
 
 
 def _quantity(option: str, text: str, unit: str, *, positive: bool = False) -> float:
@@ -154,28 +147,17 @@ def _quantity(option: str, text: str, unit: str, *, positive: bool = False) -> f
     return value
 
 
-def _law(options: argparse.Namespace) -> JointLaw:
-    law = presets.load_any(options.law)
-    return law if options.resolution is None else replace(law, resolution=options.resolution)
-
-
 def _write(record: Record, law: JointLaw, options: argparse.Namespace, name: str) -> None:
-    """Curve (CSV, NPZ), picture, law and summary of a test."""
-    folder: Path = options.out
-    folder.mkdir(parents=True, exist_ok=True)
-    record.to_csv(folder / f"{name}.csv")
-    record.to_npz(folder / f"{name}.npz")
-    law.to_toml(folder / "law.toml")
+    """Picture, curve (CSV, NPZ), law and summary of a test."""
+    files: Files = {
+        f"{name}.png": record.plot,
+        f"{name}.csv": record.to_csv,
+        f"{name}.npz": record.to_npz,
+        "law.toml": law.to_toml,
+    }
     settings = {k: v for k, v in vars(options).items() if k not in ("run", "out")}
     summary = {"settings": settings, "result": record.summary(), "units": UNITS}
-    write_json(folder / "summary.json", summary)
-    files = [f"{name}.csv", f"{name}.npz", "law.toml", "summary.json"]
-    try:
-        record.plot(folder / f"{name}.png")
-        files.insert(0, f"{name}.png")
-    except ImportError as error:
-        print(f"no picture: {error}", file=sys.stderr)
-    print(f"wrote {', '.join(files)} to {folder}")
+    write_results(options.out, files, summary)
 
 
 def _stopped(error: PathError, law: JointLaw, options: argparse.Namespace, name: str) -> int:

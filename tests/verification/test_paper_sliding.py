@@ -4,30 +4,14 @@ import math
 
 import numpy as np
 import pytest
+from paper_numbers import numbers
 
 from jointlaw import closed_form
-from jointlaw.paper import claims
 from jointlaw.paper.closed_form import Shape
-
-
-def numbers(key, verdict="holds"):
-    found = claims.measure(key)
-    assert found.verdict == verdict
-    return found.numbers
-
-
-def test_eq_10_sliding_asperity_obeys_friction():
-    assert numbers("sliding-asperity")["worst"] < 1e-13  # 3 x 3 algebra in doubles
-
-
-def test_eq_19_to_23_total_force_is_the_sum_of_asperity_forces():
-    # midpoint sums over kinks: error about (grid step)^2, 1/600^2 = 3e-6
-    assert numbers("total-force")["worst"] < 3e-6
 
 
 def test_eq_30_sliding_angle():
     found = numbers("sliding-angle")
-    assert found["worst"] < 1e-12  # share cos(a theta_s), Gauss rule on a smooth panel
     assert found["half"] == pytest.approx(math.degrees(math.atan(1.2)))
     assert found["double"] == pytest.approx(math.degrees(math.atan(0.3)))
     assert found["half"] > found["double"]  # not by friction alone
@@ -35,8 +19,6 @@ def test_eq_30_sliding_angle():
 
 def test_table_2_against_quadrature_and_print():
     found = numbers("table-2", "misprint")
-    assert found["worst"] < 1e-12  # asked for; both sides are exact to rounding
-    assert found["rows"] < 1e-14
     assert found["free"] == pytest.approx(0.5, rel=1e-14)  # mean of cos^2 phi, not 1 as printed
     assert found["rough"] == 0.0  # the sliding domain lies outside the cap
 
@@ -47,38 +29,6 @@ def test_last_row_of_table_2_is_approached(a):
     free = closed_form.inelastic(Shape(a, 0.0, 0.2), 1.0, 1.0, 0.0)
     np.testing.assert_allclose(free, [0.0, 0.6, 0.4], atol=2 / a**2)
     assert not closed_form.inelastic(Shape(a), 1.0, 1.0, 0.2).any()
-
-
-def test_inelastic_cross_terms_vanish():
-    found = numbers("inelastic-cross-terms")
-    assert found["worst"] < 1e-14
-    assert found["secant"] < 1e-14
-
-
-def test_eq_31_frictionless_inelastic_stiffness():
-    found = numbers("frictionless-c11p")
-    assert found["a=1"] == pytest.approx(2 / 3, rel=1e-14)
-    assert found["a=2"] == pytest.approx(1 / 4, rel=1e-14)
-
-
-def test_eq_32_frictionless_closure_stiffness():
-    found = numbers("frictionless-c11")
-    assert found["a=1"] == pytest.approx(1 / 3, rel=1e-14)
-    assert found["a=2"] == pytest.approx(3 / 4, rel=1e-14)
-    assert found["spread"] < 1e-14  # whatever K_s
-
-
-def test_inelastic_part_vanishes_as_a_grows():
-    found = numbers("inelastic-vanishes")
-    assert 0 < found["free"] < 2 / 100**2  # K_s E[theta^2]
-    assert found["rough"] == 0.0
-    assert found["c11"] == pytest.approx(1.0, rel=1e-14)
-
-
-def test_hertz_mindlin_parameters_of_section_4_1():
-    found = numbers("hertz-parameters")
-    assert found["K"] == pytest.approx(200, rel=0.01)  # printed with one or two digits
-    assert found["lam"] == pytest.approx(1.2, abs=0.05)
 
 
 def test_eq_35_range_and_the_incremental_law_at_constant_load():

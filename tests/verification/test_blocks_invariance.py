@@ -90,7 +90,7 @@ step = 5e-5
     )
 
     def momentum(motion):
-        m, moment = sim.world.mass, sim.world.moment
+        m, _, moment = sim.system.inertia.T
         x, y, _, vx, vy, spin = motion
         return np.array([m @ vx, m @ vy, m @ (x * vy - y * vx) + moment @ spin])
 
@@ -99,7 +99,7 @@ step = 5e-5
         sim.step()
         pushed += bool((sim.now.traction[:, 0] > 0).any())
     assert 20 < pushed < 1400  # met and parted
-    scale = (sim.world.mass * np.hypot(*sim.now.motion[3:5])).sum()
+    scale = (sim.system.inertia[:, 0] * np.hypot(*sim.now.motion[3:5])).sum()
     # Angular momentum is exact at equal times; the half step between place and velocity shows as
     # dt times the force couple, which is zero again once they have parted.
     assert momentum(sim.now.motion) == pytest.approx(start, abs=1e-11 * scale)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from . import presets
 from .joints.batch import JointBatch
 from .joints.joint import Joint
+from .joints.pool import JointPool
 from .joints.state import JointState, NonFiniteError, load_state
 from .laboratory.experiments import PathError, closure_test, direct_shear
 from .laboratory.record import Record
@@ -20,20 +21,18 @@ from .parameters.asperity import Asperity
 from .parameters.heights import GammaHeights, Heights
 from .parameters.orientation import Orientation
 from .parameters.resolution import Resolution
+from .support.version import __version__ as __version__
 from .tables.table import JointTable, load_table
 
 if TYPE_CHECKING:
     from .calibration import baselines, datasets, unloading
-    from .calibration.calibrate import fit_closure, fit_curves, fit_shear
-    from .calibration.fit import Fit
+    from .calibration.fit import Fit, fit_closure, fit_curves, fit_many, fit_shear
     from .calibration.measured import ClosureCurve, ShearCurve, first_loading
-    from .calibration.sweep import fit_many
-    from .hosts import export_yade
+    from .hosts.c.export import export_c, include_dir
+    from .hosts.yade.export import export_yade
     from .surface.fit import SurfaceFit, from_surface
     from .surface.synthetic import synthetic_surface
     from .tables.tabulate import tabulate
-
-__version__ = "0.1.0"
 
 __all__ = [
     "Asperity",
@@ -44,6 +43,7 @@ __all__ = [
     "Joint",
     "JointBatch",
     "JointLaw",
+    "JointPool",
     "JointState",
     "JointTable",
     "NonFiniteError",
@@ -59,6 +59,7 @@ __all__ = [
     "closure_test",
     "datasets",
     "direct_shear",
+    "export_c",
     "export_yade",
     "first_loading",
     "fit_closure",
@@ -66,6 +67,7 @@ __all__ = [
     "fit_many",
     "fit_shear",
     "from_surface",
+    "include_dir",
     "load_state",
     "load_table",
     "presets",
@@ -81,13 +83,15 @@ _LATER = {
     "Fit": "calibration.fit",
     "ShearCurve": "calibration.measured",
     "SurfaceFit": "surface.fit",
-    "export_yade": "hosts",
+    "export_c": "hosts.c.export",
+    "export_yade": "hosts.yade.export",
     "first_loading": "calibration.measured",
-    "fit_closure": "calibration.calibrate",
-    "fit_curves": "calibration.calibrate",
-    "fit_many": "calibration.sweep",
-    "fit_shear": "calibration.calibrate",
+    "fit_closure": "calibration.fit",
+    "fit_curves": "calibration.fit",
+    "fit_many": "calibration.fit",
+    "fit_shear": "calibration.fit",
     "from_surface": "surface.fit",
+    "include_dir": "hosts.c.export",
     "synthetic_surface": "surface.synthetic",
     "tabulate": "tables.tabulate",
 }

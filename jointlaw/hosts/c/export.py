@@ -15,6 +15,7 @@ from ...support.checks import Array
 from ...support.files import replace_file
 
 LANES = 4  # facets side by side, as in jointlaw.h
+AZIMUTHS = 512  # of a ring of facets at most, as in jointlaw.h
 FORMAT = 1  # of table files: a change of their keywords or columns changes it
 FILES = ("jointlaw.h", "example.c", "example.cpp", "Makefile", "README.md")
 _MODEL = "granite"  # the name of the tables in these files
@@ -33,8 +34,13 @@ def export_c(law: JointLaw, directory: str | Path, name: str = "joint") -> list[
 
     Writes `jointlaw.h` (the law), `NAME.jlaw` (its tables, for `jlaw_read`), `NAME.h` (the same as
     constants), `example.c`, `example.cpp`, `Makefile` and `README.md`. Returns the names. Raises
-    ValueError for a name that C cannot have, before anything is written.
+    ValueError for a name that C cannot have or too many azimuths, before anything is written.
     """
+    if len(law.facets.theta) > AZIMUTHS * law.resolution.u:
+        raise ValueError(
+            f"resolution.phi = {law.resolution.phi} is out of bounds: jointlaw.h takes at most "
+            f"{AZIMUTHS} azimuths on the circle"
+        )
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,40}", name):
         raise ValueError(
             f"name = {name!r} is no identifier of C; take letters, digits and underscores, a "
@@ -49,6 +55,12 @@ def export_c(law: JointLaw, directory: str | Path, name: str = "joint") -> list[
     _write(folder / f"{name}.jlaw", table_text(law))
     _write(folder / f"{name}.h", header_text(law, name))
     return [f"{name}.jlaw", f"{name}.h", *FILES]
+
+
+def identifier(text: str) -> str:
+    """A name for tables out of any text: letters, digits and underscores, a letter first."""
+    name = re.sub(r"[^A-Za-z0-9]+", "_", text).strip("_")[:40]
+    return name if name[:1].isalpha() else f"joint_{name}".rstrip("_")
 
 
 def table_text(law: JointLaw) -> str:
@@ -123,13 +135,11 @@ def _arrays(law: JointLaw) -> dict[str, Array]:
     facet = np.zeros((M, 20))
     for first, rows in ((0, k.m), (3, k.s), (6, k.t), (9, k.n)):
         facet[:, first : first + k.dim] = rows.T
-    facet[:, 12:] = np.stack(
-        [
-            k.area, k.area / k.c1, strength(k).ravel(), compliance(k).ravel(),
-            np.full(M, 1.0 / k.lam), k.area * k.c1, k.weight / k.weight.sum(), _mirror(k.n),
-        ],
-        axis=-1,
+    rest = (
+        k.area, k.area / k.c1, strength(k).ravel(), compliance(k).ravel(),
+        np.full(M, 1.0 / k.lam), k.area * k.c1, k.weight / k.weight.sum(), _mirror(k.n),
     )  # fmt: skip
+    facet[:, 12:] = np.stack(rest, axis=-1)
     largest = sys.float_info.max
     depth = np.minimum(np.stack([k.depth, k.depth_force, k.depth_slope], axis=-1), largest)
     return {

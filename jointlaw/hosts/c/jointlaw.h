@@ -63,7 +63,9 @@ double jlaw_max_stiffness(const jlaw_law *law, double closure);
 
 /* The state in axes 2 and 3 that are turned by this angle (rad, from 2 to 3) about the normal. For a
  * host that cannot carry its axes with a body; for laws without a preferred direction (c = 0).
- * Exact for whole azimuths of the facets; in a plane the axis keeps or changes its sense. */
+ * What
+ * sliders lose by it counts as dissipated. Exact for whole azimuths of the facets, between them as
+ * good as the azimuths are many; in a plane the axis keeps or changes its sense. */
 void jlaw_rotate(const jlaw_law *law, double *s, double angle);
 /* The state after the bodies changed their roles: axis 1 turned round, axis 2 kept, axis 3 turned
  * round with it. Shear along 2 changes its sign, along 3 not. Exact. */
@@ -83,7 +85,8 @@ enum {
   JLAW_SOFT = 16,                  /* 1/lam */
   JLAW_POTENTIAL = 17,             /* A c1 */
   JLAW_SHARE = 18, JLAW_MIRROR = 19, /* of all orientations; the facet mirrored along axis 2 */
-  JLAW_COLUMNS = 20
+  JLAW_COLUMNS = 20,
+  JLAW_AZIMUTHS = 512 /* most */
 };
 struct jlaw_law {
   int dim, facets, cells, pieces, azimuths; /* pieces of the curve; azimuths of a ring of facets */
@@ -578,36 +581,49 @@ int jlaw_state_size(const jlaw_law *law) { return 2 * law->dim + 2 * law->facets
 const char *jlaw_fingerprint(const jlaw_law *law) { return law->fingerprint; }
 double jlaw_dissipated(const jlaw_law *law, const double *s) { return s[2 * law->dim - 1]; }
 
+static double jlaw_of_facet_(const jlaw_law *law, int facet, int column)
+{
+  const int block = facet / JLAW_LANES, lane = facet % JLAW_LANES;
+  return law->facet[((size_t) block * JLAW_COLUMNS + (size_t) column) * JLAW_LANES + (size_t) lane];
+}
+
+/* zeta, Phi and Phi' at both limits of a cell of a facet */
+static void jlaw_limits_(const jlaw_law *law, int facet, int cell, jlaw_v_ limits[6])
+{
+  const jlaw_v_ zero = {0.0};
+  const int row = (facet / JLAW_LANES * (law->cells + 1) + cell) * 3;
+  for (int j = 0; j < 6; j++)
+    limits[j] = zero + law->depth[(size_t) (row + j) * JLAW_LANES + (size_t) (facet % JLAW_LANES)];
+}
+
 typedef struct { double stored, sliding, slipping, separated; } jlaw_measures_;
 
 static jlaw_measures_ jlaw_measure_(const jlaw_law *law, const double *s)
 {
   jlaw_measures_ all = {0.0, 0.0, 0.0, 0.0};
-  const jlaw_v_ zero = {0.0};
   const int dim = law->dim, D = law->cells;
+  const jlaw_v_ zero = {0.0};
   for (int f = 0; f < law->facets; f++) {
-    const double *w = law->facet + (size_t) (f / JLAW_LANES) * JLAW_COLUMNS * JLAW_LANES + f % JLAW_LANES;
-    const double *z = law->depth + (size_t) (f / JLAW_LANES) * (size_t) (D + 1) * 3 * JLAW_LANES + f % JLAW_LANES;
-    const double *qs = s + 2 * dim + f * D, *qt = qs + law->facets * D, share = w[JLAW_SHARE * JLAW_LANES];
-    double y = w[JLAW_M * JLAW_LANES] * s[0], slope;
-    for (int i = 1; i < dim; i++) y += w[(JLAW_M + i) * JLAW_LANES] * s[dim + i - 1];
-    const double force = jlaw_virgin_one_(law, y, &slope);
-    double at_limit = 0.0;
+    const double *qs = s + 2 * dim + f * D, *qt = qs + law->facets * D;
+    const double share = jlaw_of_facet_(law, f, JLAW_SHARE);
+    double y = 0.0, slope, at_limit = 0.0;
     int whole = 1;
-    for (int i = 0; i < D; i++, z += 3 * JLAW_LANES) {
-      const jlaw_v_ at_y = zero + y, at_force = zero + force, at_slope = zero + slope;
-      jlaw_v_ cell[6], share_of, slope_of;
-      for (int j = 0; j < 6; j++) cell[j] = zero + z[j * JLAW_LANES];
-      jlaw_cell_(&at_y, &at_force, &at_slope, cell, &share_of, &slope_of);
-      const double G = JLAW_AT(share_of, 0), kappa = JLAW_AT(slope_of, 0);
+    for (int i = 0; i < dim; i++) y += jlaw_of_facet_(law, f, JLAW_M + i) * s[i ? dim + i - 1 : 0];
+    const double force = jlaw_virgin_one_(law, y, &slope);
+    const jlaw_v_ at = zero + y, forces = zero + force, slopes = zero + slope;
+    for (int i = 0; i < D; i++) {
+      jlaw_v_ limits[6], G, kappa;
+      jlaw_limits_(law, f, i, limits);
+      jlaw_cell_(&at, &forces, &slopes, limits, &G, &kappa);
+      const double part = JLAW_AT(G, 0), stiff = JLAW_AT(kappa, 0);
       const double q2 = qs[i] * qs[i] + qt[i] * qt[i];
-      const double cap = w[JLAW_STRENGTH * JLAW_LANES] * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * force);
-      const int held = sqrt(q2) >= cap;
-      at_limit += held ? G : 0.0;
+      const double cap = part * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * force;
+      const int held = sqrt(q2) >= jlaw_of_facet_(law, f, JLAW_STRENGTH) * cap;
+      at_limit += held ? part : 0.0;
       whole = whole && held;
-      if (kappa > JLAW_TINY) all.stored += w[JLAW_COMPLIANCE * JLAW_LANES] * q2 / kappa;
+      if (stiff > JLAW_TINY) all.stored += jlaw_of_facet_(law, f, JLAW_COMPLIANCE) * q2 / stiff;
     }
-    all.stored += w[JLAW_POTENTIAL * JLAW_LANES] * jlaw_psi_(law, y);
+    all.stored += jlaw_of_facet_(law, f, JLAW_POTENTIAL) * jlaw_psi_(law, y);
     if (force > 0.0) all.slipping += share * at_limit / force;
     if (y > 0.0 && whole) all.sliding += share;
     if (!(y > 0.0)) all.separated += share;
@@ -655,12 +671,6 @@ double jlaw_closure(const jlaw_law *law, double normal_stress)
 
 /* --------------------------------------------------------------- turned axes */
 
-static double jlaw_of_facet_(const jlaw_law *law, int facet, int column)
-{
-  const int block = facet / JLAW_LANES, lane = facet % JLAW_LANES;
-  return law->facet[((size_t) block * JLAW_COLUMNS + (size_t) column) * JLAW_LANES + (size_t) lane];
-}
-
 void jlaw_swap_bodies(const jlaw_law *law, double *s)
 {
   const int dim = law->dim, D = law->cells, M = law->facets;
@@ -676,6 +686,61 @@ void jlaw_swap_bodies(const jlaw_law *law, double *s)
       } else if (other == f) qt[f * D + i] = -turned; /* t changes its sense in the mirror */
     }
   }
+}
+
+/* q of one cell over the azimuths of a ring of facets, read at azimuths turned by the angle: the
+ * trigonometric interpolation of n (even) places */
+static void jlaw_turn_(double *q, int n, int step, double angle)
+{
+  double old[JLAW_AZIMUTHS];
+  const double pi = 3.14159265358979323846;
+  for (int j = 0; j < n; j++) old[j] = q[j * step], q[j * step] = 0.0;
+  for (int j = 0; j < n; j++)
+    for (int k = 0; k < n; k++) {
+      const double x = angle + 2.0 * pi * (j - k) / n, half = sin(0.5 * x);
+      const double weight = fabs(half) < 1e-9 ? 1.0 : sin(0.5 * n * x) * cos(0.5 * x) / (n * half);
+      q[j * step] += weight * old[k];
+    }
+}
+
+/* Brings sliders beyond their friction limit back to it */
+static void jlaw_hold_(const jlaw_law *law, double *s)
+{
+  const int dim = law->dim, D = law->cells;
+  const jlaw_v_ zero = {0.0};
+  for (int f = 0; f < law->facets; f++) {
+    double *qs = s + 2 * dim + f * D, *qt = qs + law->facets * D, y = 0.0, slope;
+    for (int i = 0; i < dim; i++) y += jlaw_of_facet_(law, f, JLAW_M + i) * s[i ? dim + i - 1 : 0];
+    const jlaw_v_ force = zero + jlaw_virgin_one_(law, y, &slope), at = zero + y;
+    const jlaw_v_ slopes = zero + slope;
+    for (int i = 0; i < D; i++) {
+      jlaw_v_ limits[6], G, kappa;
+      jlaw_limits_(law, f, i, limits);
+      jlaw_cell_(&at, &force, &slopes, limits, &G, &kappa);
+      const double cap = jlaw_of_facet_(law, f, JLAW_STRENGTH) * JLAW_AT(G, 0);
+      const double size = sqrt(qs[i] * qs[i] + qt[i] * qt[i]);
+      const double share = size > cap ? cap / size : 1.0;
+      qs[i] *= share, qt[i] *= share;
+    }
+  }
+}
+
+void jlaw_rotate(const jlaw_law *law, double *s, double angle)
+{
+  const int dim = law->dim, D = law->cells, n = law->azimuths;
+  const double before = jlaw_stored(law, s), c = cos(angle), d = sin(angle);
+  if (dim == 2 && c < 0.0) jlaw_swap_bodies(law, s); /* the axis changes its sense */
+  if (dim != 3) return;
+  for (int i = 1; i <= 3; i += 2) { /* shear and offset */
+    const double along = s[i], across = s[i + 1];
+    s[i] = c * along + d * across, s[i + 1] = c * across - d * along;
+  }
+  for (int half = 0; half < 2; half++)
+    for (int ring = 0; ring < law->facets / n; ring++)
+      for (int i = 0; i < D; i++)
+        jlaw_turn_(s + 6 + ((half * law->facets + ring * n) * D + i), n, D, angle);
+  jlaw_hold_(law, s);
+  s[5] += fmax(before - jlaw_stored(law, s), 0.0);
 }
 
 /* ------------------------------------------------------------- table files */
@@ -778,7 +843,7 @@ static const char *jlaw_parse_(const char *at, jlaw_law *law, size_t length)
   double dim = 0, facets = 0, cells = 0, pieces = 0, azimuths = 0;
   const jlaw_key_ keys[] = {
     {"dim", &dim, 1, 3}, {"facets", &facets, 1, 1e6}, {"cells", &cells, 1, 1e6},
-    {"pieces", &pieces, 1, 1e6}, {"azimuths", &azimuths, 1, 1e6},
+    {"pieces", &pieces, 1, 1e6}, {"azimuths", &azimuths, 1, JLAW_AZIMUTHS},
     {"critical_slip", &law->critical_slip, JLAW_UNDERFLOW, DBL_MAX},
     {"eta", &law->eta, 0, DBL_MAX}, {"scale", &law->scale, DBL_MIN, DBL_MAX},
     {"rise", &law->rise, 0, DBL_MAX}, {"closure_factor", &law->closure_factor, 0, DBL_MAX},

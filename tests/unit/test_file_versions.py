@@ -1,0 +1,85 @@
+"""Every file that a program reads back carries a version; specimens of each are kept and read.
+
+`specimens/` holds what version 0.2 wrote. A change of a format keeps them and adds new ones beside
+them; a version that is no longer read is refused with the remedy.
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+from jointlaw.cli.main import main
+from jointlaw.joints.state import JointState
+
+SPECIMENS = Path(__file__).with_name("specimens")
+TRACTION = [63180411.6466886, 23333364.99114673, 7606558.90179419]  # Pa, of state.npz
+
+
+@pytest.fixture(scope="module")
+def law():
+    return jl.JointLaw.from_toml(SPECIMENS / "law.toml")
+
+
+def test_a_law_of_version_1(law):
+    assert law.orientation == jl.Orientation(3.0, 0.5, 0.1)
+    assert law.resolution == jl.Resolution(1, 3, 2)
+    assert law.critical_slip == 1e-3
+    assert "version = 1" in law.to_toml()
+
+
+def test_a_state_of_version_1(law):
+    joint = law.joint()
+    joint.restore(jl.load_state(SPECIMENS / "state.npz"))
+    assert joint.delta == pytest.approx([5e-7, 3e-7, 1e-7])
+    assert pytest.approx(TRACTION, rel=1e-9) == joint.F
+
+
+def test_a_replay_of_version_1(capsys):
+    assert main(["replay", str(SPECIMENS / "replay.npz")]) == 0
+    assert "passes: F = " in capsys.readouterr().out
+
+
+def test_a_record_of_version_1():
+    with np.load(SPECIMENS / "record.npz") as data:
+        assert int(data["version"]) == 1
+        assert json.loads(str(data["units"]))["F1"] == "Pa"
+        assert data["F1"].max() == pytest.approx(5e6)
+
+
+def test_a_law_of_another_version_is_refused(law):
+    text = law.to_toml().replace("version = 1", "version = 99")
+    with pytest.raises(ValueError, match="'version' = 99: this jointlaw reads version 1; write"):
+        jl.JointLaw.from_toml(text)
+
+
+def test_a_state_of_another_discretisation_is_refused(law):
+    state = law.joint().snapshot()
+    version, _, parameters = state.fingerprint.partition(":")
+    other = JointState(f"{int(version) + 1}:{parameters}", state.values)
+    with pytest.raises(ValueError, match="run the path again, or install the version"):
+        law.joint().restore(other)
+
+
+def test_a_parameter_at_its_default_leaves_the_fingerprint_as_it_was(law):
+    """So that states outlive the parameters that later versions add."""
+    import dataclasses
+
+    from jointlaw.parameters.fingerprint import fingerprint
+
+    @dataclasses.dataclass(frozen=True)
+    class Asperity:
+        K: float
+        new: float = 0.0
+
+    @dataclasses.dataclass(frozen=True)
+    class Before:
+        K: float
+
+    Before.__name__ = "Asperity"
+    assert fingerprint(Asperity(1.0)) == fingerprint(Before(1.0))
+    assert fingerprint(Asperity(1.0, 2.0)) != fingerprint(Before(1.0))
+    for name, value in {"critical_slip": 2e-3, "plane": 0.0, "closure_range": 2e-6}.items():
+        assert dataclasses.replace(law, **{name: value}).fingerprint != law.fingerprint

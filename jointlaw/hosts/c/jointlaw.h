@@ -513,7 +513,8 @@ JLAW_CLONES static void jlaw_advance_(const jlaw_law *law, const jlaw_move_ *m, 
 static double jlaw_far_(const double *x, int n)
 {
   double far = 0.0;
-  for (int i = 0; i < n; i++) far = fabs(x[i]) <= far ? far : fabs(x[i]); /* NaN stays */
+  for (int i = 0; i < n; i++) /* NaN stays */
+    if (fabs(x[i]) > far || x[i] != x[i]) far = fabs(x[i]);
   return far;
 }
 

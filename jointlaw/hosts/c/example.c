@@ -42,13 +42,14 @@ int main(int count, char **words)
   double F[3], d[3] = {jlaw_closure(law, stress), 0.0, 0.0}, shares[3];
   int wrong = !state || !next || jlaw_update(law, state, state, d, F, NULL, message, sizeof message);
   if (wrong) failed(state && next ? message : "there is no memory");
-  if (!wrong) printf("shear_m,closure_m,normal_stress_Pa,shear_stress_Pa,sliding,dissipated_J_m2\n");
-  for (int i = 0; !wrong && i <= (dim > 1 ? 2 * steps : 0); i++) {
-    if (i > 0) wrong = step_at_stress(law, state, next, stress, i <= steps ? end / steps : -end / steps, F);
+  if (!wrong) printf("shear_um,closure_um,normal_MPa,shear_MPa,sliding,dissipated_J_m2\n");
+  for (int i = 1; !wrong && i <= (dim > 1 ? 2 * steps : 1); i++) {
+    const double shear = i <= steps ? end / steps : -end / steps;
+    if (dim > 1) wrong = step_at_stress(law, state, next, stress, shear, F);
     jlaw_shares(law, state, shares);
     if (!wrong)
-      printf("%.9e,%.9e,%.9e,%.9e,%.4f,%.6e\n", dim > 1 ? state[1] : 0.0, state[0], F[0],
-             dim > 1 ? F[1] : 0.0, shares[0], jlaw_dissipated(law, state));
+      printf("%.3f,%.4f,%.4f,%.4f,%.4f,%.4f\n", dim > 1 ? 1e6 * state[1] : 0.0, 1e6 * state[0],
+             1e-6 * F[0], dim > 1 ? 1e-6 * F[1] : 0.0, shares[0], jlaw_dissipated(law, state));
   }
   free(next);
   free(state);

@@ -26,7 +26,7 @@ int main()
 
   std::vector<Sphere> spheres;
   for (int i = 0; i < 5; i++)
-    spheres.push_back({0.2 * i, radius + 1e-3 + 2e-4 * i, 0.02 * i, 0.0, 0.0});
+    spheres.push_back({0.2 * i, radius + 1e-3 + 2e-4 * i, 0.02 * (i + 1), 0.0, 0.0});
   std::map<std::size_t, std::vector<double>> contacts; // of a sphere with the rock: its state
   int begun = 0, ended = 0;
   double lost = 0.0; // by contacts that have ended

@@ -3,9 +3,9 @@
     python benchmarks/native.py              the table of docs/native.md, two minutes
     python benchmarks/native.py --cc clang   with another compiler
 
-Each figure is the least of many short rounds, taken in turn, in nanoseconds of one thread's own time
-per joint and update, so that other programs on the machine count little. C: `jlaw_update`, one joint
-at a time as in a pair loop, built with the flags of the Makefile. numba: `JointBatch.update` of all
+Each figure is the least of many short rounds, taken in turn, in nanoseconds of one thread's own
+time per joint and update, so that other programs count little. C: `jlaw_update`, one joint at a
+time as in a pair loop, built with the flags of the Makefile. numba: `JointBatch.update` of all
 joints. F: traction alone, FC: with tangent. Steps are random around a closure of 1 um.
 """
 
@@ -51,7 +51,8 @@ double loop(const jlaw_law *law, double *states, const double *d, long n, int ta
   char message[JLAW_MESSAGE];
   const double start = now();
   for (long i = 0; i < n; i++, states += rows, d += dim)
-    if (jlaw_update(law, states, states, d, F, tangent ? C : NULL, message, sizeof message)) return -1;
+    if (jlaw_update(law, states, states, d, F, tangent ? C : NULL, message, sizeof message))
+      return -1;
   return (now() - start) / (double) n;
 }
 """
@@ -122,11 +123,13 @@ def main() -> None:
             law = replace(preset, resolution=resolution, plane=plane)
             t = measure(law, libs, folder, options.joints, options.rounds)
             where = "space" if plane is None else "plane"
-            cells = [f"{t[key]:.0f}" for key in ("C F", "bare F", "C FC", "numba F",
-                                                 "numba + ledger F", "numba + ledger FC")]  # fmt: skip
+            columns = ("C F", "bare F", "C FC", "numba F", "numba + ledger F", "numba + ledger FC")
+            cells = [f"{t[key]:.0f}" for key in columns]
             with_ledger = t["C F"] / t["numba + ledger F"]
             cells += [f"{with_ledger:.2f}", f"{t['bare F'] / t['numba F']:.2f}"]
-            print(f"| {law.tables.sliders} ({where}) | {8 * law.state_size} | {' | '.join(cells)} |")
+            print(
+                f"| {law.tables.sliders} ({where}) | {8 * law.state_size} | {' | '.join(cells)} |"
+            )
 
 
 if __name__ == "__main__":

@@ -48,7 +48,9 @@ def _export_c(law: JointLaw, options: argparse.Namespace) -> int:
 
 
 def _export_yade(law: JointLaw, options: argparse.Namespace) -> int:
-    settings: dict[str, Any] = {"tolerance": 1e-3 if options.tolerance is None else options.tolerance}
+    settings: dict[str, Any] = {
+        "tolerance": 1e-3 if options.tolerance is None else options.tolerance
+    }
     for name in ("closure", "shear_limit"):
         if (text := getattr(options, name)) is not None:
             settings[name] = quantity(f"--{name.replace('_', '-')}", text, "m")

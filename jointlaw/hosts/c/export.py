@@ -86,7 +86,7 @@ def header_text(law: JointLaw, name: str) -> str:
     about = "\n".join(" * " + line.replace("*/", "* /") for line in _toml(law))
     guard = f"JOINTLAW_TABLES_{name.upper()}"
     parts = [
-        f"/* {name}: tables of a joint law for jointlaw.h, made by `jointlaw export c`.\n{about}\n */",
+        f"/* {name}: tables of a joint law, made by `jointlaw export c`.\n{about}\n */",
         f'#ifndef {guard}\n#define {guard}\n#include "jointlaw.h"\n'
         f"#if JLAW_FORMAT != {FORMAT}\n"
         f'#error "{name}.h is of format {FORMAT}, jointlaw.h of another: export both anew"\n#endif',
@@ -154,7 +154,8 @@ def _mirror(n: Array) -> Array:
     """Number of the facet (M,) whose normal has the other sign along axis 2."""
     image = n * np.where(np.arange(len(n)) == 1, -1.0, 1.0)[:, None]
     away = np.sum((image[:, :, None] - n[:, None]) ** 2, axis=0)
-    return np.argmin(away, axis=1).astype(float)
+    number: Array = np.argmin(away, axis=1).astype(float)
+    return number
 
 
 def _toml(law: JointLaw) -> list[str]:

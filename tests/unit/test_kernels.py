@@ -178,6 +178,26 @@ def test_a_state_moves_from_kernel_to_kernel(both, make_law, monkeypatch):
         assert worst(results[0], other, peak) < SAME
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_the_tangent_exactly_at_the_friction_limit_is_that_of_sliding_on(both, make_law, seed):
+    """A step of nothing leaves sliders exactly at their limit: rounding must not decide C."""
+    law = random_law(make_law, seed)
+    slow, fast = both(lambda: law.joints(N))
+    for d in path(law, seed, 8):
+        slow.update(d)
+        fast.update(d)
+        nothing = np.zeros_like(d)
+        C, C2 = slow.trial(nothing)[1], fast.trial(nothing)[1]
+        assert worst(C, C2, max(np.abs(C).max(), 1e-300)) < USUAL_C
+    # pure shear, far: all slide, and a step of nothing has the C of a small step onward
+    law = make_law(heights=None, eta=0.0, a=1e6, mu=0.3)  # one spring, no dilation
+    for batch in both(lambda: law.joints(1)):
+        batch.update([[1e-6, 0.0, 0.0]])
+        batch.update([[0.0, 1e-5, 0.0]])
+        onward, still = batch.trial([[0.0, 1e-12, 0.0]])[1], batch.trial(np.zeros((1, 3)))[1]
+        assert worst(onward[:, :, :2], still[:, :, :2], np.abs(onward).max()) < 1e-5
+
+
 def test_the_ledger_changes_no_number(both, make_law):
     law = random_law(make_law, 0)
     _, kept = both(lambda: law.joints(N))

@@ -139,15 +139,20 @@ extern "C" {
 typedef double jlaw_v_ __attribute__((vector_size(32)));
 typedef double jlaw_loose_ __attribute__((vector_size(32), aligned(8), may_alias));
 typedef long long jlaw_mask_ __attribute__((vector_size(32)));
+typedef int jlaw_whole_ __attribute__((vector_size(16)));
 #define JLAW_LOAD(p) ((jlaw_v_) *(const jlaw_loose_ *) (p))
 #define JLAW_AT(v, l) ((v)[l])
+#define JLAW_WHOLE(x) __builtin_convertvector(x, jlaw_whole_)
+#define JLAW_DOUBLE(i) __builtin_convertvector(i, jlaw_v_)
 #define JLAW_PICK(m, a, b) ((jlaw_v_) (((m) & (jlaw_mask_) (a)) | (~(m) & (jlaw_mask_) (b))))
 #else
 #define JLAW_WIDE 1
 typedef double jlaw_v_;
-typedef int jlaw_mask_;
+typedef int jlaw_mask_, jlaw_whole_;
 #define JLAW_LOAD(p) (*(p))
 #define JLAW_AT(v, l) (v)
+#define JLAW_WHOLE(x) ((int) (x))
+#define JLAW_DOUBLE(i) ((double) (i))
 #define JLAW_PICK(m, a, b) ((m) ? (a) : (b))
 #endif
 #define JLAW_ABS(x) JLAW_PICK((x) < 0.0, -(x), x)
@@ -162,6 +167,7 @@ typedef int jlaw_mask_;
 /* The thresholds of kernels/reference.py */
 #define JLAW_UNDERFLOW 1e-140 /* m: counts as zero */
 #define JLAW_TINY 1e-290      /* a stiffness whose reciprocal might overflow: zero */
+#define JLAW_LEAST 1e-300     /* lost in any stiffness or force but 0: no division by 0 */
 #define JLAW_NEAR 1e-5        /* of y: below such a change the chord is lost in rounding */
 #define JLAW_GRAZING 1e-12    /* cosine at which the offset meets its limit */
 #define JLAW_LIMIT 1e-9       /* of the friction limit: a slider this close is at it */
@@ -228,11 +234,11 @@ JLAW_INLINE void jlaw_virgin_(const jlaw_law *law, jlaw_v_ *y, jlaw_v_ *force, j
   jlaw_root_(&v);
   const jlaw_v_ r = 1.0 / (v + scale);
   jlaw_v_ x = v * r * pieces, c0 = zero, c1 = zero, c2 = zero, c3 = zero;
+  const jlaw_v_ bound = JLAW_PICK(x < top, x, zero + top);
+  const jlaw_whole_ at = JLAW_WHOLE(bound);
+  x = x - JLAW_DOUBLE(at);
   for (int l = 0; l < JLAW_WIDE; l++) {
-    const double place = JLAW_AT(x, l);
-    const int at = (int) (place < top ? place : top);
-    const double *c = law->curve + 4 * at;
-    JLAW_AT(x, l) = place - at;
+    const double *c = law->curve + 4 * JLAW_AT(at, l);
     JLAW_AT(c0, l) = c[0], JLAW_AT(c1, l) = c[1], JLAW_AT(c2, l) = c[2], JLAW_AT(c3, l) = c[3];
   }
   const jlaw_v_ ts = v * r * r * scale; /* t (1 - t) */
@@ -361,8 +367,7 @@ JLAW_INLINE void jlaw_slide_(const double *w, const double *limits, jlaw_facets_
   /* trial force: by the chord where stiffness grows, scaled down where it falls */
   const jlaw_v_ a = JLAW_W(JLAW_STIFF), dy = f->y1 - f->y0;
   const jlaw_mask_ grows = k1 > k0, near = JLAW_ABS(dy) <= JLAW_NEAR * JLAW_ABS(f->y1);
-  const jlaw_v_ bottom = JLAW_PICK(grows, dy, k0);
-  const jlaw_v_ ratio = JLAW_PICK(grows, G1 - G0, k1) / JLAW_PICK(bottom != 0.0, bottom, one);
+  const jlaw_v_ ratio = JLAW_PICK(grows, G1 - G0, k1) / JLAW_PICK(grows, dy, k0 + JLAW_LEAST);
   jlaw_v_ chord = JLAW_PICK(near, 0.5 * (k0 + k1), ratio);
   chord = JLAW_PICK(chord > k0, chord, k0);
   chord = JLAW_PICK(chord < k1, chord, k1);
@@ -375,7 +380,7 @@ JLAW_INLINE void jlaw_slide_(const double *w, const double *limits, jlaw_facets_
   jlaw_root_(&size);
   const jlaw_v_ strength = JLAW_W(JLAW_STRENGTH), cap = strength * G1;
   const jlaw_mask_ beyond = size > cap;
-  const jlaw_v_ share = JLAW_PICK(beyond, cap / JLAW_PICK(beyond, size, one), one);
+  const jlaw_v_ share = cap / (JLAW_PICK(beyond, size, cap) + JLAW_LEAST);
   const jlaw_v_ part = JLAW_PICK(new2 > JLAW_TINY, share, zero);
   q[0] = part * ts, q[1] = part * tt;
   f->qs += q[0], f->qt += q[1];

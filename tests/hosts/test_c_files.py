@@ -219,7 +219,7 @@ def test_examples_build_as_written_and_run(tmp_path, capsys, monkeypatch):
     )  # fmt: skip
     law = jl.presets.load("westerly-smooth")
     test = jl.direct_shear(law.joint(), 2e-6, normal=2e6, steps=20)
-    assert table["shear_MPa"][19] == pytest.approx(1e-6 * test.F[-1, 1], abs=2e-4)  # as printed
+    assert table["shear_MPa"][19] == pytest.approx(1e-6 * test.F2[-1], abs=2e-4)  # as printed
 
 
 def test_ten_lines_to_a_first_force(tmp_path, law):

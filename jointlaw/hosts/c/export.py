@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 from importlib import resources
@@ -46,15 +47,16 @@ def export_c(law: JointLaw, directory: str | Path, name: str = "joint") -> list[
             f"name = {name!r} is no identifier of C; take letters, digits and underscores, a "
             "letter first, at most 41"
         )
+    tables = {f"{name}.jlaw": table_text(law), f"{name}.h": header_text(law, name)}
     folder = Path(directory)
     folder.mkdir(parents=True, exist_ok=True)
     source = resources.files(__package__)
     for file in FILES:
         text = (source / file).read_text(encoding="utf-8")
         _write(folder / file, text if file == "jointlaw.h" else text.replace(_MODEL, name))
-    _write(folder / f"{name}.jlaw", table_text(law))
-    _write(folder / f"{name}.h", header_text(law, name))
-    return [f"{name}.jlaw", f"{name}.h", *FILES]
+    for file, text in tables.items():
+        _write(folder / file, text)
+    return [*tables, *FILES]
 
 
 def identifier(text: str) -> str:
@@ -103,8 +105,14 @@ def header_text(law: JointLaw, name: str) -> str:
 
 
 def _scalars(law: JointLaw) -> dict[str, int | float]:
-    """Keywords and numbers, in the order of `struct jlaw_law`."""
+    """Keywords and numbers, in the order of `struct jlaw_law`; refuses what C does not hold."""
     k, p = law.tables, law.asperity
+    for name in ("yield_interference", "wear_slip"):
+        if (value := getattr(p, name, math.inf)) != math.inf:
+            raise ValueError(
+                f"asperity.{name} = {value:g} m: jointlaw.h holds no asperities that yield or "
+                "wear; leave it out"
+            )
     return {
         "dim": k.dim,
         "facets": len(k.c1),

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from ..discretisation.tables import UNDERFLOW, Tables
 from ..support.checks import Array
-from .reference import GRAZING, LIMIT, NEAR, ROUNDED, TINY, compliance
+from .cells import TINY, compliance
+from .reference import GRAZING, LIMIT, NEAR, ROUNDED
 
 # Strict arithmetic: no fused or reordered operations, so results are the same on every machine
 _jit = numba.njit(error_model="numpy", nogil=True, cache=True)

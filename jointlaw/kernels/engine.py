@@ -122,9 +122,9 @@ class NumbaEngine:
 
         self._kernel, self._sliders = compiled, tables.sliders
         self.rows = compiled.block_rows(tables)
-        self._law = law = tuple(compiled.pack(tables))
+        self._law = law = compiled.pack(tables)  # wear takes the ledger, of which slip is made
         self._with = {  # ledger, tangent: True or None, for which the compiler leaves the code out
-            (ledger, tangent): (*law, ledger or None, tangent or None)
+            (ledger, tangent): (*law, ledger or law.wears, tangent or None)
             for ledger in (False, True)
             for tangent in (False, True)
         }

@@ -283,15 +283,18 @@ def _press(work, s, L, law, f):
     first, _, beside = _places(law)
     at, kept = first + f, beside + 2 * law.depth.shape[0] + f
     deep, o = facet[f, _YIELD], np.int64(facet[f, _OPPOSITE])
+    for l in range(L):  # one copy a loop, or the compiler makes no vectors of it
+        scratch[_Z0 + l] = s[at, l]
     for l in range(L):
-        scratch[_Z0 + l], scratch[_FZ0 + l] = s[at, l], s[kept, l]
+        scratch[_FZ0 + l] = s[kept, l]
+    for l in range(L):
         scratch[_Z1 + l] = scratch[_Y1 + l]
     if o != f:
         m0, m1, m2 = facet[o, _M], facet[o, _M + 1], facet[o, _M + 2]
         for l in range(L):
             other = m0 * scratch[_NEW + l] + m1 * scratch[_NEW1 + l] + m2 * scratch[_NEW2 + l]
             scratch[_Z1 + l] = other if other > scratch[_Y1 + l] else scratch[_Y1 + l]
-    pressed = 0
+    pressed = 0.0
     for l in range(L):
         z0, y1, z1 = scratch[_Z0 + l], scratch[_Y1 + l], scratch[_Z1 + l] - deep
         moves = z1 > z0
@@ -300,16 +303,19 @@ def _press(work, s, L, law, f):
         scratch[_Z1 + l], scratch[_FZ1 + l] = z1, scratch[_FZ0 + l]
         scratch[_MOVES + l] = own if moves & (y1 > z1) else 0.0
         scratch[_SZ1 + l] = y1
-        pressed += 1 if moves else 0
-    if pressed > 0:
+        pressed += 1.0 if moves else 0.0
+    if pressed > 0.0:
         for l in range(L):
             scratch[_Y1 + l] = scratch[_Z1 + l]
         _virgin(work, law, True, L)
         for l in range(L):
             scratch[_Y1 + l] = scratch[_SZ1 + l]
             scratch[_FZ1 + l], scratch[_SZ1 + l] = scratch[_F1 + l], scratch[_S1 + l]
+        for l in range(L):
+            s[at, l] = scratch[_Z1 + l]
+        for l in range(L):
+            s[kept, l] = scratch[_FZ1 + l]
     for l in range(L):
-        s[at, l], s[kept, l] = scratch[_Z1 + l], scratch[_FZ1 + l]
         touches = scratch[_Y0 + l] > scratch[_Z0 + l]
         scratch[_AT0 + l] = scratch[_Y0 + l] if touches else scratch[_Z0 + l]
         scratch[_FAT0 + l] = scratch[_F0 + l] if touches else scratch[_FZ0 + l]
@@ -323,8 +329,7 @@ def _relieve(scratch, L, law, f, ledger):
         y1, z1, f1 = scratch[_Y1 + l], scratch[_Z1 + l], scratch[_F1 + l] - scratch[_FZ1 + l]
         scratch[_F1 + l] = f1 if (y1 > z1) & (f1 > 0.0) else 0.0
         scratch[_S1 + l] = scratch[_S1 + l] if y1 > z1 else 0.0
-        f0 = scratch[_F0 + l] - scratch[_FZ0 + l]
-        scratch[_F0 + l] = f0 if (scratch[_Y0 + l] > scratch[_Z0 + l]) & (f0 > 0.0) else 0.0
+        scratch[_F0 + l] = scratch[_FAT0 + l] - scratch[_FZ0 + l]
     if ledger is not None:
         for l in range(L):
             c0, c1 = scratch[_Y0 + l] - scratch[_Z0 + l], scratch[_Y1 + l] - scratch[_Z1 + l]
@@ -356,6 +361,8 @@ def _slide(scratch, qs, qt, L, law, f, i, ledger, tangent):
     for l in range(L):
         # the bed beyond the lower limit of the cell less that beyond the upper
         y0, y1, f0, f1 = scratch[_Y0 + l], scratch[_Y1 + l], scratch[_F0 + l], scratch[_F1 + l]
+        if law.yields is not None:  # from the flattened depth on, where y is above it
+            y0, f0 = scratch[_AT0 + l], scratch[_FAT0 + l]
         from0, from1 = y0 - zl, y1 - zl
         G0, G1 = f0 - fl - sl * from0, f1 - fl - sl * from1
         k0, k1 = scratch[_S0 + l] - sl, scratch[_S1 + l] - sl
@@ -367,15 +374,16 @@ def _slide(scratch, qs, qt, L, law, f, i, ledger, tangent):
         k0 = k0 if (from0 > 0.0) & (k0 > 0.0) else 0.0
         k1 = k1 if (from1 > 0.0) & (k1 > 0.0) else 0.0
         h0, h1 = k0 * from0, k1 * from1
+        if law.yields is not None:  # at the flattened depth the slope is not at hand
+            begun = G0 if from0 > 0.0 else 0.0
+            h0 = h0 if y0 > scratch[_Z0 + l] else begun
         G0, G1 = G0 if h0 > G0 else h0, G1 if h1 > G1 else h1
         G0, G1 = G0 if G0 > 0.0 else 0.0, G1 if G1 > 0.0 else 0.0
-        reached, begun = G1, G0
+        reached = G1
         if law.yields is not None:  # less what the bed holds at the flattened depth
-            z0, z1 = scratch[_Z0 + l], scratch[_Z1 + l]
-            k0, k1 = k0 if y0 > z0 else 0.0, k1 if y1 > z1 else 0.0
-            begun = _share_at(
-                scratch[_AT0 + l], scratch[_FAT0 + l], zl, fl, sl, zh, fh, sh, ended
-            )
+            z1, touched = scratch[_Z1 + l], y0 > scratch[_Z0 + l]
+            k0, k1 = k0 if touched else 0.0, k1 if y1 > z1 else 0.0
+            y0 = scratch[_Y0 + l]
             G1 -= _share_at(z1, scratch[_FZ1 + l], zl, fl, sl, zh, fh, sh, ended)
             h1 = k1 * (y1 - z1)
             G1 = G1 if h1 > G1 else h1
@@ -386,7 +394,7 @@ def _slide(scratch, qs, qt, L, law, f, i, ledger, tangent):
         near = abs(dy) <= NEAR * abs(y1)
         if law.yields is not None:  # flattened springs touch at once: no mean where they do
             near = near & ((k0 > 0.0) | (k1 == 0.0))
-        top = reached - begun if grows else k1
+        top = reached - G0 if grows else k1
         bottom = dy if grows else k0
         ratio = top / (bottom if bottom != 0.0 else 1.0)
         chord = 0.5 * (k0 + k1) if near else ratio

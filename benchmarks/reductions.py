@@ -57,7 +57,7 @@ ONE_WAY = (  # closure alone moves no slider along t
     ("new2 = ts * ts + tt * tt", "new2 = ts * ts"),
     ("size = np.sqrt(new2)", "size = abs(ts)"),
     ("qs[l], qt[l] = part * ts, part * tt", "qs[l] = part * ts"),
-    ("        scratch[_SUMT + l] += part * tt\n", ""),
+    ("        pad[_SUMT + l] += part * tt\n", ""),
 )  # fmt: skip
 
 

@@ -17,13 +17,13 @@ import tempfile
 from pathlib import Path
 
 import jointlaw as jl
-from jointlaw.hosts import export_yade
+from jointlaw.hosts.yade.export import export_yade
 
 SCENE = """
 import json, sys, time
 sys.path.insert(0, ".")
 import numpy as np
-from yade_joint import Joints, Live, Table
+from yade_joint import Joints, LiveLaw, TableLaw
 contacts, runs, steps = {contacts}, {runs}, 1
 N = round((contacts / 3) ** (1 / 3)) + 1
 R = 0.5
@@ -76,10 +76,10 @@ out = {{}}
 for law in ("cundall", "hertz", "table", "live"):
     build(law)
     if law in ("table", "live"):
-        if law == "table": joints = Joints(Table("joint.txt"))
+        if law == "table": joints = Joints(TableLaw("joint.txt"))
         else:
             from jointlaw import JointLaw
-            joints = Joints(Live(JointLaw.from_toml("law.toml")))
+            joints = Joints(LiveLaw(JointLaw.from_toml("law.toml")))
         joints.attach()
     for _ in range(3): O.step()
     n = O.interactions.countReal()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from . import presets
 from .joints.batch import JointBatch
 from .joints.joint import Joint
+from .joints.pool import JointPool
 from .joints.state import JointState, NonFiniteError, load_state
 from .laboratory.experiments import PathError, closure_test, direct_shear
 from .laboratory.record import Record
@@ -20,20 +21,17 @@ from .parameters.asperity import Asperity
 from .parameters.heights import GammaHeights, Heights
 from .parameters.orientation import Orientation
 from .parameters.resolution import Resolution
+from .support.version import __version__ as __version__
 from .tables.table import JointTable, load_table
 
 if TYPE_CHECKING:
     from .calibration import baselines, datasets, unloading
-    from .calibration.calibrate import fit_closure, fit_curves, fit_shear
-    from .calibration.fit import Fit
+    from .calibration.fit import Fit, fit_closure, fit_curves, fit_many, fit_shear
     from .calibration.measured import ClosureCurve, ShearCurve, first_loading
-    from .calibration.sweep import fit_many
-    from .hosts import export_yade
+    from .hosts.yade.export import export_yade
     from .surface.fit import SurfaceFit, from_surface
     from .surface.synthetic import synthetic_surface
     from .tables.tabulate import tabulate
-
-__version__ = "0.1.0"
 
 __all__ = [
     "Asperity",
@@ -44,6 +42,7 @@ __all__ = [
     "Joint",
     "JointBatch",
     "JointLaw",
+    "JointPool",
     "JointState",
     "JointTable",
     "NonFiniteError",
@@ -81,12 +80,12 @@ _LATER = {
     "Fit": "calibration.fit",
     "ShearCurve": "calibration.measured",
     "SurfaceFit": "surface.fit",
-    "export_yade": "hosts",
+    "export_yade": "hosts.yade.export",
     "first_loading": "calibration.measured",
-    "fit_closure": "calibration.calibrate",
-    "fit_curves": "calibration.calibrate",
-    "fit_many": "calibration.sweep",
-    "fit_shear": "calibration.calibrate",
+    "fit_closure": "calibration.fit",
+    "fit_curves": "calibration.fit",
+    "fit_many": "calibration.fit",
+    "fit_shear": "calibration.fit",
     "from_surface": "surface.fit",
     "synthetic_surface": "surface.synthetic",
     "tabulate": "tables.tabulate",

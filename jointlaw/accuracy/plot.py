@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..laboratory.plot import _pyplot
 from ..parameters.resolution import NAMED
 from ..support.checks import Array
+from ..support.pyplot import pyplot
 from .price import Price, frontier
 
 
@@ -19,10 +19,9 @@ def plot_prices(
 
     The arguments are the fields of a `Tradeoff`.
     """
-    pyplot = _pyplot()
     timed = bool(joints)
     size = (9.5, 4.6) if timed else (5.5, 4.6)
-    figure, axes = pyplot.subplots(
+    figure, axes = pyplot().subplots(
         1, 1 + timed, figsize=size, layout="constrained", sharey=True, squeeze=False
     )
     best = frontier(prices)
@@ -60,5 +59,5 @@ def plot_prices(
                           title_fontsize=8)  # fmt: skip
     if path is not None:
         figure.savefig(path, dpi=150)
-        pyplot.close(figure)
+        pyplot().close(figure)
     return figure

@@ -1,31 +1,18 @@
-"""Measurements of a joint, and what they say of its law: tests, scans, and the fits through them.
+"""Laboratory tests on a joint, in the order in which measured curves become a law.
 
-Tests (closure and shear curves), in the order a value passes:
+    datasets        closure tests in files: those of the package, in data/, and CSV files
+    priors          what is known before: transforms, bounds, 95 % ranges
+    noise           how noisy a curve is, from its scatter
+    forward         parameters to a law and its closure curve, and back
+    measured        closure and shear curves, and their misfit
+    problem         what is free, what is held, where to start
+    solve           least squares with priors and noise
+    estimate        parameters, intervals, predicted stresses and bands
+    identify        what the data fix and what they leave open
+    report, plot    the same in words, as a preset, and as a picture
+    fit             fit_closure, fit_shear, fit_curves, fit_many and their result
+    baselines       empirical closure laws to judge a fit by
+    unloading       what friction explains of a measured loop
 
-    curve_files   CSV files of closure curves: columns and units
-    datasets      curves that come with the package, in data/
-    measured      a curve with its noise, and what the law says of it
-    priors        what is known before: scales, bounds, 95 % ranges
-    noise         how noisy a curve is, from its scatter
-    solve         least squares with priors and noise
-    calibrate     fit_closure, fit_shear, fit_curves
-    fit           the result: law, parameters, covariance, bands
-    identify      what the data fix and what they leave open
-    fit_report    a fit in words and as a preset
-    fit_plot      pictures of fits and of scans
-    sweep         many fits at once
-    baselines     empirical closure laws to judge a fit by
-    unloading     what friction explains of a measured loop
-    fit_command   `jointlaw fit`
-
-Scans (measured heights of a surface):
-
-    scan_files    files of heights
-    asperities    summits and facets of a surface
-    height_fit    a gamma distribution through summit depths
-    direction_fit Eq. 14 through facet slopes
-    surface       from_surface, and the law it gives
-    scan_report   a scan in words
-    scan_command  `jointlaw scan`
-    synthetic     surfaces whose asperities are known
+Each file imports from those above it only.
 """

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from ..support.checks import Array, number
-from .calibrate import fit_closure
+from .fit import fit_closure
 from .measured import ClosureCurve
 
 
@@ -42,31 +42,23 @@ class Baseline:
 
 def fit_power_law(stress: ArrayLike, closure: ArrayLike) -> Baseline:
     """stress (Pa) = scale (closure + offset)^exponent through points (n,), n >= 4."""
-    curve = ClosureCurve(np.asarray(stress), np.asarray(closure))
-    span, first = float(np.ptp(curve.closure)), float(curve.closure[0])
-    x, target = (curve.closure - first) / span, curve.stress / curve.stress[-1]
 
-    def model(q: Array) -> Array:
+    def model(q: Array, x: Array) -> Array:
         value: Array = np.exp(q[0] + np.exp(q[2]) * np.log(np.exp(q[1]) + x))
         return value
 
     starts = [(-n * np.log1p(o), np.log(o), np.log(n)) for o in (0.1, 0.5, 2.0) for n in (1.5, 4.0)]
-    q = _best(lambda q: model(q) - target, starts, [-60, -12, -4], [60, 8, 6])
+    q, curve = _fitted(stress, closure, model, starts, [-60, -12, -4], [60, 8, 6])
+    span, first = float(np.ptp(curve.closure)), float(curve.closure[0])
     n, scale = float(np.exp(q[2])), float(np.exp(q[0]) * curve.stress[-1])
     offset = float(np.exp(q[1])) * span - first
-    return Baseline(
-        "power law",
-        {"scale": scale / span**n, "exponent": n, "offset": offset},
-    )
+    return Baseline("power law", {"scale": scale / span**n, "exponent": n, "offset": offset})
 
 
 def fit_barton_bandis(stress: ArrayLike, closure: ArrayLike) -> Baseline:
     """The hyperbola of Barton and Bandis with a seating closure through points (n,), n >= 4."""
-    curve = ClosureCurve(np.asarray(stress), np.asarray(closure))
-    span, first = float(np.ptp(curve.closure)), float(curve.closure[0])
-    x, target = (curve.closure - first) / span, curve.stress / curve.stress[-1]
 
-    def model(q: Array) -> Array:
+    def model(q: Array, x: Array) -> Array:
         offset = np.exp(q[1])
         largest = (1 + offset) * (1 + np.exp(q[2]))  # beyond the last point
         y = x + offset
@@ -74,8 +66,8 @@ def fit_barton_bandis(stress: ArrayLike, closure: ArrayLike) -> Baseline:
         return value
 
     starts = [(-2.0, np.log(o), np.log(v)) for o in (0.02, 0.2) for v in (0.05, 0.5, 5.0)]
-    q = _best(lambda q: model(q) - target, starts, [-60, -12, -12], [60, 8, 12])
-    offset = float(np.exp(q[1]))
+    q, curve = _fitted(stress, closure, model, starts, [-60, -12, -12], [60, 8, 12])
+    span, first, offset = float(np.ptp(curve.closure)), float(curve.closure[0]), float(np.exp(q[1]))
     return Baseline(
         "Barton-Bandis",
         {
@@ -137,10 +129,18 @@ def compare(
     return Comparison(limit, u[~seen], s[~seen], errors, fit.band(u[~seen]))
 
 
-def _best(residuals: Any, starts: Any, low: Any, high: Any) -> Array:
+def _fitted(
+    stress: ArrayLike, closure: ArrayLike, model: Any, starts: Any, low: Any, high: Any
+) -> tuple[Array, ClosureCurve]:
+    """Best parameters of a model over closures from 0 to 1, stress as a share of the last one."""
+    curve = ClosureCurve(np.asarray(stress), np.asarray(closure))
+    x = (curve.closure - float(curve.closure[0])) / float(np.ptp(curve.closure))
+    target = curve.stress / curve.stress[-1]
     fits = [
-        least_squares(residuals, np.array(start), bounds=(low, high), x_scale="jac", xtol=1e-12)
+        least_squares(
+            lambda q: model(q, x) - target, start, bounds=(low, high), x_scale="jac", xtol=1e-12
+        )
         for start in starts
     ]
     best: Array = min(fits, key=lambda fit: float(fit.cost)).x
-    return best
+    return best, curve

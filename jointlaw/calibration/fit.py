@@ -1,196 +1,36 @@
-"""A fit: the problem it solved, the law it found, what it knows and what it does not."""
+"""From tests to a law: fits of closure and shear curves, alone, together, or many at once."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import special
 
 from ..law import JointLaw
-from ..parameters.orientation import largest_c
-from ..support.checks import Array
-from .measured import ClosureCurve, Settings, ShearCurve, build, log_stress
-from .noise import Noise
-from .priors import quantity, scale_of
-from .solve import Rows, Solution, solve
-
-PRIOR_SHARE = 0.05  # of the variance: up to here the data, not the priors, decide
-# Standard error of ln(stress) per doubling of the stress beyond the data, from curves of other
-# laws: power laws of exponent 1.5 to 6 and Gaussian heights, lower half fitted, upper predicted
-MODEL_ERROR = 0.03
-# The same per unit of `Fit.wander`, from hyperbolas and logarithms (benchmarks/held_out.py)
-WANDER_ERROR = 6.0
-WANDERS = 1.5  # of the expected scatter: from this `Fit.wander` on the law is not the rock
-WIDEST = math.log(2) / 1.96  # standard error of a logarithm: a factor of 2 either way
+from ..support.progress import track
+from .estimate import Estimate
+from .identify import Profile, profile, reasons
+from .measured import ClosureCurve, ShearCurve
+from .plot import Points, plot_fit
+from .priors import Ranges, Values
+from .problem import pose, starting_points
+from .report import preset, report
+from .solve import solve
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
-    """Curves, free parameters, the values of all others, and priors (centre, sd) by name."""
-
-    curves: tuple[ClosureCurve | ShearCurve, ...]
-    free: tuple[str, ...]
-    values: tuple[tuple[str, float], ...]
-    priors: tuple[tuple[str, tuple[float, float]], ...]
-    settings: Settings
-
-    def unpack(self, x: Array) -> dict[str, float]:
-        """All parameters at a place on the scale of the fit."""
-        values = dict(self.values)
-        values |= {n: scale_of(n).back(float(v)) for n, v in zip(self.free, x, strict=True)}
-        if "c" in self.free:
-            bound = largest_c(values["b"])
-            values["c"] = min(max(values["c"], -bound), bound)
-        return values
-
-    def place(self, values: Mapping[str, float]) -> Array:
-        """Where these values lie on the scale of the fit."""
-        inside = []
-        for name in self.free:
-            scale = scale_of(name)
-            inside.append(scale.to(min(max(values[name], scale.low), scale.high)))
-        return np.clip(inside, *self.bounds())
-
-    def scaled(self, values: Mapping[str, float]) -> Array:
-        """The same with the stiffness brought to the level of the closure curves."""
-        x = self.place(values)
-        for name in ("asperity_density", "K"):
-            closures = [c for c in self.curves if isinstance(c, ClosureCurve)]
-            if name in self.free and closures:
-                v = self.unpack(x)
-                u = v["seating"] + closures[0].closure
-                off = np.log(closures[0].stress) - log_stress(v, u, self.settings)
-                x[self.free.index(name)] += float(np.mean(off))
-                break
-        return x
-
-    def bounds(self) -> tuple[Array, Array]:
-        """Lower and upper ends of the scale of the fit."""
-        scales = [scale_of(name) for name in self.free]
-        low = np.array([s.to(s.low) for s in scales])
-        high = np.array([s.to(s.high) for s in scales])
-        if "b" in self.free and "c" not in self.free:
-            high[self.free.index("b")] = 2 - 6 * abs(dict(self.values)["c"])  # Eq. 18
-        return low, high
-
-    def data(self, x: Array) -> Array:
-        """Residuals of all curves, one after the other."""
-        values, parts, seat = self.unpack(x), [], 0
-        for curve in self.curves:
-            if isinstance(curve, ClosureCurve):
-                seat += 1
-                seating = values["seating" if seat == 1 else f"seating_{seat}"]
-                parts.append(curve.residuals(values, seating, self.settings))
-            else:
-                parts.append(curve.residuals(values, self.settings))
-        return np.concatenate(parts)
-
-    def prior(self, x: Array) -> Array:
-        """Residuals of the priors."""
-        values = self.unpack(x)
-        rows = [
-            (scale_of(name).to(quantity(name, values)) - centre) / sd
-            for name, (centre, sd) in self.priors
-        ]
-        return np.array(rows)
-
-    @property
-    def rows(self) -> Rows:
-        """The data as `solve` takes them."""
-        steepness = tuple(curve.steepness for curve in self.curves)
-        return Rows(self.data, steepness, tuple(curve.expected for curve in self.curves))
-
-    def solve(self, starts: list[Array]) -> Fit:
-        """The best fit from these starts."""
-        return Fit(self, solve(self.rows, self.prior, starts, *self.bounds()))
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
+class Fit(Estimate):
     """Outcome of `fit_closure`, `fit_shear` and `fit_curves`.
 
     `free` names the fitted parameters in the order of `covariance`; `parameters` holds all values
     in SI units.
     """
-
-    problem: Problem
-    solution: Solution
-
-    @property
-    def free(self) -> tuple[str, ...]:
-        """Names of the fitted parameters, the seating closures last."""
-        return self.problem.free
-
-    @property
-    def parameters(self) -> Mapping[str, float]:
-        """Every parameter in SI units, fitted or held, and the seating closures (m); read-only."""
-        return MappingProxyType(self._values)
-
-    @cached_property
-    def _values(self) -> dict[str, float]:
-        return self.problem.unpack(self.solution.x)  # a proxy of it could not be pickled
-
-    @cached_property
-    def law(self) -> JointLaw:
-        """The law of these parameters."""
-        settings = self.problem.settings
-        return build(self.parameters, settings, settings.plane)
-
-    @property
-    def noise(self) -> tuple[Noise, ...]:
-        """Noise of every curve: `share` of the stress and `absolute` of the closure (m)."""
-        return self.solution.noise
-
-    @property
-    def bends_otherwise(self) -> tuple[bool, ...]:
-        """Whether each closure curve shows that the rock does not close as the law does."""
-        pairs = zip(self.wander, self._closures(), strict=True)
-        return tuple(wander > WANDERS * curve.expected.share for wander, curve in pairs)
-
-    @cached_property
-    def wander(self) -> tuple[float, ...]:
-        """Misfit that neighbouring points of each closure curve share, as a part of the stress.
-
-        The root of the mean product of neighbouring residuals, 0 where that is negative: scatter
-        averages out of it, a curve that bends otherwise than the law does not.
-        """
-        found = []
-        for number, curve in enumerate(self._closures(), 1):
-            r = curve.residuals(self.parameters, self._seating(number), self.problem.settings)
-            found.append(math.sqrt(max(float(np.mean(r[1:] * r[:-1])), 0.0)))
-        return tuple(found)
-
-    @property
-    def covariance(self) -> Array:
-        """Covariance (p, p) of the fitted parameters in SI units, in the order of `free`."""
-        slope = [scale_of(name).slope(self.parameters[name]) for name in self.free]
-        result: Array = self.solution.covariance * np.outer(slope, slope)
-        return result
-
-    @property
-    def standard_error(self) -> dict[str, float]:
-        """Standard error of every fitted parameter in SI units."""
-        return dict(zip(self.free, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
-
-    @property
-    def prior_share(self) -> dict[str, float]:
-        """Share of the variance of every fitted parameter that the priors contribute."""
-        return dict(zip(self.free, self.solution.prior_share.tolist(), strict=True))
-
-    def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
-        """Interval of a fitted parameter (SI units) that holds it with this probability."""
-        at, scale = self._index(name), scale_of(name)
-        reach = self._quantile(level) * math.sqrt(self.solution.covariance[at, at])
-        x = float(self.solution.x[at])
-        return scale.back(x - reach), scale.back(x + reach)
 
     @cached_property
     def identifiable(self) -> tuple[str, ...]:
@@ -200,108 +40,148 @@ class Fit:
     @cached_property
     def not_identifiable(self) -> dict[str, str]:
         """Parameters that these data do not fix, each with the reason."""
-        from .identify import reasons
-
         return reasons(self)
 
-    def predict(self, closure: ArrayLike, curve: int = 1) -> Any:
-        """Normal stress (Pa) at closures (m) counted as in the closure curve number `curve`."""
-        return self.law.normal_stress(np.asarray(closure, float) + self._seating(curve))
-
-    def band(
-        self, closure: ArrayLike, level: float = 0.95, curve: int = 1, measured: bool = True
-    ) -> tuple[Array, Array]:
-        """Band (low, high) in Pa around `predict`.
-
-        closure: in m, as in `predict`; level: probability; measured: whether the band is for a
-        point yet to be measured, noise included, or for the curve itself. Beyond the largest
-        fitted stress it widens per doubling by `MODEL_ERROR`, for the law is not the rock, and
-        by `WANDER_ERROR` times `wander`, where the points say so themselves.
-        """
-        self._seating(curve)  # there is such a curve
-        u = np.atleast_1d(np.asarray(closure, float))
-        name = "seating" if curve == 1 else f"seating_{curve}"
-
-        def model(x: Array) -> Array:
-            v = self.problem.unpack(x)
-            return log_stress(v, v[name] + u, self.problem.settings)
-
-        centre, slope = model(self.solution.x), self._slope(model)
-        variance = np.einsum("ip,pq,iq->i", slope, self.solution.covariance, slope)
-        if measured:
-            data = self._closures()[curve - 1]
-            noise = self.noise[self.problem.curves.index(data)]
-            step = 1e-4 * float(np.ptp(data.closure))
-            v = self.parameters
-            above = log_stress(v, v[name] + u + step, self.problem.settings)
-            variance = variance + noise.sigma((above - centre) / step) ** 2
-        beyond = np.maximum(centre - np.log(self._closures()[curve - 1].stress.max()), 0.0)
-        wander = self.wander[curve - 1]
-        model_error = math.hypot(MODEL_ERROR, WANDER_ERROR * wander)
-        variance = variance + wander**2 + (model_error * beyond / math.log(2)) ** 2
-        reach = self._quantile(level) * np.sqrt(variance)
-        return np.exp(centre - reach), np.exp(centre + reach)
-
-    def profile(self, name: str, points: int = 21, priors: bool = False) -> Any:
+    def profile(self, name: str, points: int = 21, priors: bool = False) -> Profile:
         """Profile likelihood of a fitted parameter: see `identify.Profile`."""
-        from .identify import profile
-
         return profile(self, name, points, priors)
 
     def report(self) -> str:
         """The fit in words and a table (Markdown)."""
-        from .report import report
+        return report(self, self.not_identifiable)
 
-        return report(self)
+    def plot(self, path: str | Path | None = None, held_out: Points | None = None) -> Any:
+        """Draw data, fit and bands (needs matplotlib: extra `plot`).
 
-    def plot(self, path: str | Path | None = None) -> Any:
-        """Draw data, fit and bands (needs matplotlib: extra `plot`)."""
-        from .plot import plot_fit
-
-        return plot_fit(self, path)
+        held_out: stress (Pa) and closure (m) of points of the first closure curve that were not
+        fitted.
+        """
+        return plot_fit(self, path, held_out)
 
     def to_toml(self, path: str | Path | None = None, title: str = "Fitted joint") -> str:
         """The law as a preset in TOML with what is known of its parameters; written to `path`."""
-        from .report import preset
+        return preset(self, self.not_identifiable, title, path)
 
-        return preset(self, title, None if path is None else Path(path))
 
-    # ------------------------------------------------------------------ inner
+def fit_closure(
+    stress: ArrayLike,
+    closure: ArrayLike,
+    *,
+    free: Sequence[str] = ("asperity_density", "alpha", "beta"),
+    fixed: Values | None = None,
+    law: JointLaw | None = None,
+    formation: str | None = None,
+    priors: Ranges | None = None,
+    seating: float | None = None,
+    noise: float | None = None,
+    closure_noise: float = 0.0,
+) -> Fit:
+    """Fit the law to one first loading in closure.
 
-    def without_priors(self) -> Problem:
-        """The same problem with the data alone."""
-        return replace(self.problem, priors=())
+    Parameters
+    ----------
+    stress: normal stress in Pa, (n,), n >= 4.
+    closure: closure in m, (n,), from wherever the test began.
+    free: names of the parameters to fit; see `fit_curves`. `overlap` is held at 0 by default: the
+        law's closure then counts from the first touch of the highest asperity, and the seating
+        closure, which is fitted, already says how far the test began beyond it.
+    fixed: values of parameters that are known otherwise, such as alpha from a scan.
+    law: values of all parameters that are not free; None takes rock asperities, see
+        `forward.DEFAULTS`.
+    formation: "individual" (default, and the one that predicts best) or "population".
+    priors: 95 % ranges (low, high) in physical units instead of the defaults, or None to drop one.
+    seating, noise, closure_noise: as in `ClosureCurve`.
 
-    def _index(self, name: str) -> int:
-        if name not in self.free:
-            raise ValueError(f"{name!r} was not fitted; fitted are {', '.join(self.free)}")
-        return self.free.index(name)
+    Returns a `Fit`. Raises ValueError for curves or names that do not fit.
 
-    def _quantile(self, level: float) -> float:
-        if not 0 < level < 1:
-            raise ValueError(f"level = {level!r} is out of bounds: it must lie between 0 and 1")
-        freedom = self.solution.freedom
-        if math.isinf(freedom):
-            return float(special.ndtri(0.5 + level / 2))
-        return float(special.stdtrit(freedom, 0.5 + level / 2))
+    Source: Misra 1999, Eq. 11, 12, 33, 37; docs/theory-incremental.md, "Heights, direction and
+    Hertz become one curve", for the "individual" reading.
+    """
+    curve = ClosureCurve(np.asarray(stress), np.asarray(closure), seating, noise, closure_noise)
+    return fit_curves([curve], free=free, fixed=fixed, law=law, formation=formation, priors=priors)
 
-    def _closures(self) -> list[ClosureCurve]:
-        return [c for c in self.problem.curves if isinstance(c, ClosureCurve)]
 
-    def _seating(self, curve: int) -> float:
-        if not 1 <= curve <= len(self._closures()):
-            raise ValueError(
-                f"curve = {curve!r} is out of bounds: this fit has {len(self._closures())} closure "
-                "curves, counted from 1"
-            )
-        return self.parameters["seating" if curve == 1 else f"seating_{curve}"]
+def fit_shear(
+    shear: ArrayLike,
+    shear_stress: ArrayLike,
+    normal: float,
+    *,
+    law: JointLaw,
+    azimuth: float = 0.0,
+    free: Sequence[str] = ("mu", "a"),
+    fixed: Values | None = None,
+    priors: Ranges | None = None,
+    noise: float | None = None,
+) -> Fit:
+    """Fit friction and inclination to one direct shear test at constant normal stress.
 
-    def _slope(self, model: Any) -> Array:
-        """Derivative (n, p) of a function of the place, by central differences."""
-        columns = []
-        low, high = self.problem.bounds()
-        for k in range(len(self.free)):
-            up, down = self.solution.x.copy(), self.solution.x.copy()
-            up[k], down[k] = min(up[k] + 1e-4, high[k]), max(down[k] - 1e-4, low[k])
-            columns.append((model(up) - model(down)) / (up[k] - down[k]))
-        return np.stack(columns, -1)
+    Parameters
+    ----------
+    shear: shear displacement in m, (n,), from zero; it may turn round.
+    shear_stress: in Pa, (n,).
+    normal: normal stress in Pa.
+    law: the law whose other parameters are kept, such as that of `fit_closure`.
+    azimuth: direction of shear in rad.
+    free, fixed, priors: as in `fit_curves`; noise: as in `ShearCurve`.
+
+    Returns a `Fit`. Raises ValueError for curves or names that do not fit.
+    """
+    curve = ShearCurve(np.asarray(shear), np.asarray(shear_stress), normal, azimuth, noise)
+    return fit_curves([curve], free=free, fixed=fixed, law=law, priors=priors)
+
+
+def fit_curves(
+    curves: Sequence[ClosureCurve | ShearCurve],
+    *,
+    free: Sequence[str] = ("asperity_density", "alpha", "beta", "mu", "a"),
+    fixed: Values | None = None,
+    law: JointLaw | None = None,
+    formation: str | None = None,
+    priors: Ranges | None = None,
+) -> Fit:
+    """Fit one law to several measured curves at once.
+
+    Parameters
+    ----------
+    curves: `ClosureCurve` and `ShearCurve`, at least one.
+    free: parameters to fit, of alpha, beta (m), overlap (m), asperity_density (1/m2),
+        K (Pa m^(1-eta)), lam, eta, mu, a, b, c. Positive ones are fitted as logarithms. Every
+        closure curve that does not begin at zero stress adds its seating closure (m).
+    fixed: values of parameters that are known otherwise, in SI units.
+    law: values of all parameters that are not free, `critical_slip` among them; None takes
+        `forward.DEFAULTS`. A law of one plane or of closure alone stays one.
+    formation: "individual" or "population"; None takes that of `law`, or "individual".
+    priors: 95 % ranges (low, high) in physical units instead of the defaults of `priors.PRIORS`,
+        or None to drop one. Besides the parameters: "overlap_share", "full_contact_stress".
+
+    Returns a `Fit`. Raises ValueError naming the parameter when something does not fit.
+    """
+    problem = pose(curves, free, fixed, law, formation, priors)
+    return Fit(problem, solve(problem, starting_points(problem, near=law is not None)))
+
+
+def fit_many(
+    curves: Sequence[tuple[ArrayLike, ArrayLike]],
+    executor: Executor | None = None,
+    workers: int | None = None,
+    **options: Any,
+) -> list[Fit]:
+    """Fit many closure curves; the results stand in the order of the curves.
+
+    Parameters
+    ----------
+    curves: pairs (stress in Pa, closure in m), each as `fit_closure` takes them.
+    executor: any `concurrent.futures.Executor`, left open; None makes a process pool of `workers`
+        (as many as there are cores by default). For more than one machine:
+        `dask.distributed.Client(address).get_executor()`, extra `sweep`.
+    options: keywords of `fit_closure`.
+
+    Raises what `fit_closure` raises for the first curve that cannot be fitted. A fit does not
+    depend on where it runs: every executor gives the same numbers.
+    """
+    if executor is None:
+        with ProcessPoolExecutor(workers) as pool:
+            return fit_many(curves, pool, **options)
+    job = partial(fit_closure, **options)
+    futures = [executor.submit(job, *curve) for curve in curves]
+    return [future.result() for future in track(futures, "fits", len(futures))]

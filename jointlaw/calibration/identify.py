@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ..support.checks import Array
-from .fit import PRIOR_SHARE, WIDEST, Fit
-from .measured import ClosureCurve
-from .priors import scale_of
+from .estimate import Estimate
+from .priors import transform_of
+from .problem import Problem
 from .solve import minimise
 
+PRIOR_SHARE = 0.05  # of the variance: up to here the data, not the priors, decide
+WIDEST = math.log(2) / 1.96  # standard error of a logarithm: a factor of 2 either way
 # What acts on a closure curve only as one factor: N lam K times a sum over the inclinations
 _ONE_FACTOR = ("asperity_density", "K", "lam", "mu", "a", "b", "c")
 
@@ -36,20 +39,17 @@ class Profile(NamedTuple):
         return self.low is not None and self.high is not None
 
 
-def reasons(fit: Fit) -> dict[str, str]:
+def reasons(fit: Estimate) -> dict[str, str]:
     """Parameters that the data of a fit do not fix, each with the reason."""
     found: dict[str, str] = {}
-    closure_only = all(isinstance(c, ClosureCurve) for c in fit.problem.curves)
-    for k, name in enumerate(fit.free):
-        share = float(fit.solution.prior_share[k])
-        error = float(np.sqrt(fit.solution.covariance[k, k]))
-        wide = error > (WIDEST if scale_of(name).log else 0.5)
+    errors = np.sqrt(np.diag(fit.solution.covariance))
+    for (name, share), error in zip(fit.prior_share.items(), errors, strict=True):
         if share > PRIOR_SHARE:
             found[name] = f"the priors supply {100 * share:.0f} % of its variance"
-        elif wide:
+        elif error > (WIDEST if transform_of(name).log else 0.5):
             low, high = fit.interval(name)
             found[name] = f"the data leave it anywhere from {low:.3g} to {high:.3g}"
-    if closure_only:
+    if len(fit.problem.closures) == len(fit.problem.curves):
         stiff = next((n for n in ("asperity_density", "K") if n in fit.free), None)
         for name in _ONE_FACTOR:
             if name not in fit.free:
@@ -65,64 +65,51 @@ def reasons(fit: Fit) -> dict[str, str]:
     return found
 
 
-def profile(fit: Fit, name: str, points: int, priors: bool) -> Profile:
+def profile(fit: Estimate, name: str, points: int, priors: bool) -> Profile:
     """Profile likelihood of one fitted parameter.
 
     With `priors` the priors of all parameters take part, as in the fit; without, the data alone.
     """
-    at = fit._index(name)
-    problem = fit.problem if priors else fit.without_priors()
+    at, solution = fit.index(name), fit.solution
+    problem = fit.problem if priors else replace(fit.problem, priors={})
     low, high = problem.bounds()
-    centre, sd = fit.solution.x[at], float(np.sqrt(fit.solution.covariance[at, at]))
+    centre, sd = solution.x[at], float(np.sqrt(solution.covariance[at, at]))
     reach = max(4 * sd, 0.5)
     grid = np.linspace(max(low[at], centre - reach), min(high[at], centre + reach), points | 1)
-    misfit = np.empty(grid.size)
-    sigma = problem.rows.sigma(fit.noise)
-    others = np.arange(len(fit.free)) != at
+    misfit, sigma = np.empty(grid.size), problem.sigma(fit.noise)
     middle = int(np.argmin(np.abs(grid - centre)))
     for side in (range(middle, grid.size), range(middle - 1, -1, -1)):
-        x = fit.solution.x.copy()
+        others = np.delete(solution.x, at)
         for k in side:
-            x[at] = grid[k]
-
-            def full(y: Array, x: Array = x) -> Array:
-                z = x.copy()
-                z[others] = y
-                return z
-
-            if others.any():
-                found = minimise(
-                    _after(problem.data, full),
-                    sigma,
-                    _after(problem.prior, full),
-                    x[others],
-                    low[others],
-                    high[others],
-                )
-                x = full(found.x)
-                misfit[k] = 2 * float(found.cost)
-            else:
-                misfit[k] = float(
-                    np.sum((problem.data(x) / sigma) ** 2) + np.sum(problem.prior(x) ** 2)
-                )
+            misfit[k], others = _least_misfit(problem, sigma, at, float(grid[k]), others)
     deviance = misfit - misfit.min()
     best = int(np.argmin(deviance))
-    limit = fit._quantile(0.95) ** 2
-    scale = scale_of(name)
+    limit = solution.quantile(0.95) ** 2
+    back = transform_of(name).back
 
     def crossing(side: range) -> float | None:
         for i in side:
             j = i + side.step
             if deviance[j] > limit:
                 part = (limit - deviance[i]) / (deviance[j] - deviance[i])
-                return scale.back(float(grid[i] + part * (grid[j] - grid[i])))
+                return back(float(grid[i] + part * (grid[j] - grid[i])))
         return None
 
-    values = np.array([scale.back(float(x)) for x in grid])
+    values = np.array([back(float(x)) for x in grid])
     down, up = crossing(range(best, 0, -1)), crossing(range(best, grid.size - 1))
     return Profile(name, values, deviance, down, up)
 
 
-def _after(f: Callable[[Array], Array], g: Callable[[Array], Array]) -> Callable[[Array], Array]:
-    """f of g."""
-    return lambda y: f(g(y))
+def _least_misfit(
+    problem: Problem, sigma: Array, at: int, value: float, others: Array
+) -> tuple[float, Array]:
+    """Least sum of squares with one parameter held at a value, and the others (p - 1,) there."""
+
+    def residuals(y: Array) -> Array:
+        return problem.residuals(np.insert(y, at, value), sigma)
+
+    if not others.size:
+        return float(np.sum(residuals(others) ** 2)), others
+    low, high = (np.delete(bound, at) for bound in problem.bounds())
+    found = minimise(residuals, others, low, high)
+    return 2 * float(found.cost), found.x

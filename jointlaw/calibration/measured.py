@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..discretisation.facets import facet_sum, facets
-from ..discretisation.virgin_curve import exact_force
 from ..laboratory.experiments import direct_shear
 from ..law import JointLaw
-from ..parameters.asperity import Asperity
-from ..parameters.heights import GammaHeights
-from ..parameters.orientation import Orientation
-from ..parameters.resolution import resolve
 from ..support.checks import Array, above, at_least, number
+from .forward import Settings, build, log_stress
 from .noise import Noise
+from .priors import Values
 
-Values = Mapping[str, float]
 STRESS_NOISE = 0.01  # of the stress: a load cell with the friction of its loading frame
 CLOSURE_NOISE = 0.005  # of the largest closure: linearity and repeatability of a transducer
 SHEAR_NOISE = 0.02  # of the largest shear stress
@@ -159,19 +151,6 @@ class ShearCurve:
         return residual
 
 
-@dataclass(frozen=True)
-class Settings:
-    """What is decided rather than fitted."""
-
-    formation: str = "individual"
-    resolution: Any = "balanced"
-    has_heights: bool = True
-    closure_range: float | None = None
-    critical_slip: float = math.inf
-    plane: float | None = None  # of the law to be found; every shear curve has its own
-    closure_only: bool = False
-
-
 def first_loading(stress: ArrayLike, closure: ArrayLike) -> tuple[Array, Array, Array, Array]:
     """Cut one loading cycle at its largest stress.
 
@@ -181,56 +160,6 @@ def first_loading(stress: ArrayLike, closure: ArrayLike) -> tuple[Array, Array, 
     s, u = _pair("stress", stress, "closure", closure)
     top = int(np.argmax(s))
     return s[: top + 1], u[: top + 1], s[top:], u[top:]
-
-
-def build(values: Values, settings: Settings, plane: float | None = None) -> JointLaw:
-    """The law of these parameters; `plane` restricts it to motion at that azimuth (rad)."""
-    v = values
-    heights = (
-        GammaHeights(v["alpha"], v["beta"], v["overlap"], settings.formation)
-        if settings.has_heights
-        else None
-    )
-    parts: dict[str, Any] = {
-        "orientation": Orientation(v["a"], v["b"], v["c"]),
-        "asperity": Asperity(v["K"], v["lam"], v["eta"], v["mu"]),
-        "heights": heights,
-        "asperity_density": v["asperity_density"],
-        "resolution": settings.resolution,
-        "plane": plane,
-        "closure_range": settings.closure_range,
-        "critical_slip": settings.critical_slip,
-        "closure_only": settings.closure_only,
-    }
-    return JointLaw(**parts)
-
-
-def log_stress(values: Values, closure: Array, settings: Settings) -> Array:
-    """Logarithm of the normal stress (Pa) at closures (m), as `JointLaw.normal_stress`.
-
-    Without the table of a law: a fit asks for a hundred sets of parameters at ten closures each.
-    """
-    heights = (
-        GammaHeights(values["alpha"], values["beta"], values["overlap"], settings.formation)
-        if settings.has_heights
-        else None
-    )
-    force, _ = exact_force(np.maximum(closure, 1e-15), values["eta"], heights)
-    names = ("a", "b", "c", "lam", "eta", "mu")
-    factor = _facet_factor(*(values[name] for name in names), settings.resolution)
-    scale = values["asperity_density"] * values["lam"] * values["K"] * factor
-    result: Array = math.log(scale) + np.log(np.maximum(force, 1e-300))
-    return result
-
-
-@lru_cache(maxsize=256)
-def _facet_factor(
-    a: float, b: float, c: float, lam: float, eta: float, mu: float, resolution: Any
-) -> float:
-    """F1/(N lam K Phi) under pure closure, summed over the facets as `JointLaw` does."""
-    r = resolve(resolution)
-    nodes = facets(Orientation(a, b, c), r.u, r.phi)
-    return facet_sum(nodes.theta, nodes.weight * np.cos(nodes.theta) ** (1 + eta), lam, mu)
 
 
 def _pair(name: str, x: Any, other: str, y: Any) -> tuple[Array, Array]:

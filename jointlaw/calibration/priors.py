@@ -1,9 +1,9 @@
-"""What is known of a joint before it is measured: scales, bounds and 95 % ranges of parameters.
+"""What is known of a joint before it is measured: units, bounds and 95 % ranges of parameters.
 
 One closure curve holds about three numbers, the law has eleven. What a curve leaves open is filled
 in from here, in physical units and with its reason, and the fit says which parameters that were.
-A range is a normal distribution of the parameter's scale (mostly its logarithm), centred between
-the two ends, with 95 % between them.
+A range is a normal distribution of the transformed parameter (mostly its logarithm), centred
+between the two ends, with 95 % between them.
 """
 
 from __future__ import annotations
@@ -15,10 +15,11 @@ from typing import NamedTuple
 from ..support.checks import number
 
 Values = Mapping[str, float]
+Ranges = Mapping[str, tuple[float, float] | None]
 
 
-class Scale(NamedTuple):
-    """How a parameter is fitted: the unit, the bounds, and the logarithm of (value + shift)."""
+class Transform(NamedTuple):
+    """How a parameter is fitted: its unit, its bounds, and as the logarithm of (value + shift)."""
 
     unit: str
     low: float
@@ -27,11 +28,11 @@ class Scale(NamedTuple):
     shift: float = 0.0
 
     def to(self, value: float) -> float:
-        """Place on the scale of the fit."""
+        """The transformed value x."""
         return math.log(value + self.shift) if self.log else value
 
     def back(self, x: float) -> float:
-        """Value at a place on the scale of the fit."""
+        """The value whose transform is x."""
         return math.exp(x) - self.shift if self.log else x
 
     def slope(self, value: float) -> float:
@@ -39,19 +40,22 @@ class Scale(NamedTuple):
         return value + self.shift if self.log else 1.0
 
 
-SCALES = {
-    "alpha": Scale("1", -0.99, 1e3, shift=1.0),
-    "beta": Scale("m", 1e-10, 1.0),
-    "overlap": Scale("m", 1e-12, 1.0),
-    "asperity_density": Scale("1/m2", 1e-3, 1e18),
-    "K": Scale("Pa m^(1-eta)", 1e3, 1e16),
-    "lam": Scale("1", 0.05, 20.0),
-    "eta": Scale("1", 0.0, 1.0, log=False),
-    "mu": Scale("1", 1e-3, 5.0),
-    "a": Scale("1", 1.0, 100.0),
-    "b": Scale("1", -1.0, 2.0, log=False),
-    "c": Scale("1", -0.5, 0.5, log=False),
-    "seating": Scale("m", 1e-12, 1.0),
+TRANSFORMS = {
+    "alpha": Transform("1", -0.99, 1e3, shift=1.0),
+    "beta": Transform("m", 1e-10, 1.0),
+    "overlap": Transform("m", 1e-12, 1.0),
+    "asperity_density": Transform("1/m2", 1e-3, 1e18),
+    "K": Transform("Pa m^(1-eta)", 1e3, 1e16),
+    "lam": Transform("1", 0.05, 20.0),
+    "eta": Transform("1", 0.0, 1.0, log=False),
+    "mu": Transform("1", 1e-3, 5.0),
+    "a": Transform("1", 1.0, 100.0),
+    "b": Transform("1", -1.0, 2.0, log=False),
+    "c": Transform("1", -0.5, 0.5, log=False),
+    "seating": Transform("m", 1e-12, 1.0),
+    # combinations that priors are stated for, see `quantity`
+    "overlap_share": Transform("1", 0.0, math.inf),
+    "full_contact_stress": Transform("Pa", 0.0, math.inf),
 }
 
 # Reason and 95 % range of each prior; "seating" has none: the data alone place it.
@@ -78,10 +82,6 @@ PRIORS: dict[str, tuple[float, float]] = {
     "c": (-1 / 3, 1 / 3),  # all of Eq. 18
 }
 
-_DERIVED = {
-    "overlap_share": Scale("1", 0.0, math.inf),
-    "full_contact_stress": Scale("Pa", 0.0, math.inf),
-}
 _CONCERNS = {
     "overlap_share": {"overlap"},
     "full_contact_stress": {"asperity_density", "K"},
@@ -107,17 +107,13 @@ def quantity(name: str, values: Values) -> float:
     return values[name]
 
 
-def scale_of(name: str) -> Scale:
-    """Scale of a parameter, a seating closure ("seating", "seating_2", ...) or a combination."""
-    if name.startswith("seating"):
-        return SCALES["seating"]
-    return _DERIVED[name] if name in _DERIVED else SCALES[name]
+def transform_of(name: str) -> Transform:
+    """That of a parameter, a seating closure ("seating", "seating_2", ...) or a combination."""
+    return TRANSFORMS["seating" if name.startswith("seating") else name]
 
 
-def chosen(
-    free: tuple[str, ...], given: Mapping[str, tuple[float, float] | None] | None
-) -> dict[str, tuple[float, float]]:
-    """Centre and standard deviation, on the scale of the fit, of every prior that matters here.
+def normal_priors(free: tuple[str, ...], given: Ranges | None) -> dict[str, tuple[float, float]]:
+    """Centre and standard deviation, after the transform, of every prior that matters here.
 
     `given` replaces defaults by 95 % ranges in physical units, or drops one with None.
     """
@@ -125,9 +121,8 @@ def chosen(
         name: ends for name, ends in PRIORS.items() if _CONCERNS.get(name, {name}) & set(free)
     }
     for name, ends in (given or {}).items():
-        if name not in SCALES and name not in _DERIVED:
-            known = ", ".join([*SCALES, *_DERIVED])
-            raise ValueError(f"priors: {name!r} is unknown; choose one of {known}")
+        if name not in TRANSFORMS:
+            raise ValueError(f"priors: {name!r} is unknown; choose one of {', '.join(TRANSFORMS)}")
         ranges[name] = ends
         if name == "overlap":
             ranges.pop("overlap_share", None)
@@ -141,11 +136,11 @@ def _normal(name: str, ends: tuple[float, float]) -> tuple[float, float]:
         raise ValueError(
             f"priors[{name!r}] = {ends!r} must be a pair (low, high), the 95 % range"
         ) from None
-    scale = scale_of(name)
-    if not low < high or (scale.log and low + scale.shift <= 0):
+    transform = transform_of(name)
+    if not low < high or (transform.log and low + transform.shift <= 0):
         raise ValueError(
             f"priors[{name!r}] = ({low:g}, {high:g}) must be ascending"
-            + (f" and above {-scale.shift:g}" if scale.log else "")
+            + (f" and above {-transform.shift:g}" if transform.log else "")
         )
-    x0, x1 = scale.to(low), scale.to(high)
+    x0, x1 = transform.to(low), transform.to(high)
     return 0.5 * (x0 + x1), (x1 - x0) / (2 * 1.959964)

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from ..support.files import replace_file
-from .fit import Fit
+from .estimate import Estimate
 from .measured import ClosureCurve
-from .priors import scale_of
+from .priors import transform_of
 
 
-def report(fit: Fit) -> str:
+def report(fit: Estimate, not_identifiable: Mapping[str, str]) -> str:
     """Parameters with intervals, what the data fix and what not, noise, and stiffness."""
     lines = [
         "# Fit of the joint law",
@@ -24,14 +25,14 @@ def report(fit: Fit) -> str:
         low, high = fit.interval(name)
         lines.append(
             f"| {name} | {fit.parameters[name]:.4g} | {low:.3g} to {high:.3g} | "
-            f"{scale_of(name).unit} | {100 * share:.0f} % | "
-            f"{'yes' if name in fit.identifiable else 'no'} |"
+            f"{transform_of(name).unit} | {100 * share:.0f} % | "
+            f"{'no' if name in not_identifiable else 'yes'} |"
         )
     held = [name for name in fit.parameters if name not in fit.free]
     lines += ["", "Held: " + ", ".join(f"{n} = {fit.parameters[n]:.4g}" for n in held) + "."]
     lines += ["", "Not identifiable from these data:", ""]
     grouped: dict[str, list[str]] = {}
-    for name, reason in fit.not_identifiable.items():
+    for name, reason in not_identifiable.items():
         grouped.setdefault(reason, []).append(name)
     lines += [f"- {', '.join(names)}: {reason}" for reason, names in grouped.items()]
     for number, noise in enumerate(fit.noise, 1):
@@ -39,33 +40,32 @@ def report(fit: Fit) -> str:
         if noise.absolute:
             text += f" and {1e6 * noise.absolute:.2g} um of closure"
         lines += ["", text + (" (given)." if noise.known else " (estimated).")]
-    closures = [c for c in fit.problem.curves if isinstance(c, ClosureCurve)]
-    for number, curve in enumerate(closures, 1):
-        lines += ["", *_curve(fit, curve, number)]
+    for number, (seating, curve) in enumerate(fit.problem.closures, 1):
+        lines += ["", *_curve(fit, fit.parameters[seating], curve, number)]
     return "\n".join(lines) + "\n"
 
 
-def preset(fit: Fit, title: str, path: Path | None) -> str:
+def preset(
+    fit: Estimate, not_identifiable: Mapping[str, str], title: str, path: str | Path | None
+) -> str:
     """The law as TOML with title, source and what is not identifiable in its table `about`."""
-    closures = sum(isinstance(c, ClosureCurve) for c in fit.problem.curves)
+    closures = len(fit.problem.closures)
     others = len(fit.problem.curves) - closures
     source = f"fitted by jointlaw to {closures} closure and {others} shear curves"
-    open_ones = ", ".join(fit.not_identifiable)
     clean = title.replace("\\", "/").replace('"', "'")
     text = fit.law.to_toml() + (
         f'\n[about]\ntitle = "{clean}"\nsource = "{source}"\n'
-        f'assumptions = "not identifiable from these data: {open_ones}"\n'
+        f'assumptions = "not identifiable from these data: {", ".join(not_identifiable)}"\n'
     )
     if path is not None:
-        replace_file(path, text.encode())
+        replace_file(Path(path), text.encode())
     return text
 
 
-def _curve(fit: Fit, curve: ClosureCurve, number: int) -> list[str]:
+def _curve(fit: Estimate, seating: float, curve: ClosureCurve, number: int) -> list[str]:
     """What a closure curve does fix: stress and stiffness along it."""
     at = np.array([0.5, 1.0]) * curve.closure[-1]
     low, high = fit.band(at, curve=number, measured=False)
-    seating = fit.parameters["seating" if number == 1 else f"seating_{number}"]
     lines = [
         f"Closure curve {number} (seating closure {1e6 * seating:.3g} um):",
         "",

@@ -7,34 +7,26 @@ with the parameters, see `noise`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy import special
 from scipy.optimize import least_squares
 
 from ..support.checks import Array
 from .noise import Noise, estimate
+from .problem import Problem
 
 ROUNDS = 12  # at most, of fitting and estimating the noise in turn
 NOISE_WEIGHT = 4.0  # degrees of freedom that the expectation of the noise is worth
-Residuals = Callable[[Array], Array]
-
-
-class Rows(NamedTuple):
-    """Residuals of all curves, one after the other, and what their noise depends on."""
-
-    residuals: Residuals
-    steepness: tuple[Array, ...]
-    expected: tuple[Noise, ...]
-
-    def sigma(self, noise: Sequence[Noise]) -> Array:
-        """Standard errors of all residuals."""
-        return np.concatenate([n.sigma(s) for n, s in zip(noise, self.steepness, strict=True)])
+Function = Callable[[Array], Array]
 
 
 class Solution(NamedTuple):
-    """Outcome of `solve`, on the scale of the fit (p parameters)."""
+    """Outcome of `solve`, p parameters after their transforms."""
 
     x: Array
     covariance: Array  # (p, p)
@@ -42,65 +34,62 @@ class Solution(NamedTuple):
     freedom: float  # degrees of freedom that the noise was estimated with
     prior_share: Array  # (p,) share of each variance that the priors contribute
 
+    def quantile(self, level: float) -> float:
+        """Standard errors either way that hold a parameter with this probability."""
+        if not 0 < level < 1:
+            raise ValueError(f"level = {level!r} is out of bounds: it must lie between 0 and 1")
+        if math.isinf(self.freedom):
+            return float(special.ndtri(0.5 + level / 2))
+        return float(special.stdtrit(self.freedom, 0.5 + level / 2))
 
-def solve(
-    rows: Rows, prior: Residuals, starts: Sequence[Array], low: Array, high: Array
-) -> Solution:
+
+def solve(problem: Problem, starts: Sequence[Array]) -> Solution:
     """Best of several starts, then parameters and noise in turn until both stand.
 
     With C = (D + L)^-1 the covariance, D the information of the data and L that of the priors,
     C = C D C + C L C: the share of the priors in the variance of a parameter is the ratio of the
     diagonals of C L C and C.
     """
-    noise = rows.expected
-    sigma = rows.sigma(noise)
-    fits = [minimise(rows.residuals, sigma, prior, start, low, high) for start in starts]
+    expected = tuple(curve.expected for curve in problem.curves)
+    steepness = [curve.steepness for curve in problem.curves]
+    cuts = np.cumsum([s.size for s in steepness])[:-1]
+    low, high = problem.bounds()
+    noise, sigma = expected, problem.sigma(expected)
+    fits = [minimise(partial(problem.residuals, sigma=sigma), x, low, high) for x in starts]
     best = min(fits, key=lambda fit: float(fit.cost))
     for _ in range(ROUNDS):
-        r, J, Jp = _linear(rows.residuals, prior, best.x, low, high)
-        weighted = J / sigma[:, None]
+        r = problem.data(best.x)
+        weighted = derivative(problem.data, best.x, low, high) / sigma[:, None]
+        Jp = derivative(problem.prior, best.x, low, high)
         precision = Jp.T @ Jp
         C = np.linalg.pinv(weighted.T @ weighted + precision, hermitian=True)
         leverage = np.einsum("ip,pq,iq->i", weighted, C, weighted)
         if all(n.known for n in noise):
             break
-        cuts = np.cumsum([s.size for s in rows.steepness])[:-1]
-        pieces = zip(
-            rows.expected, np.split(r, cuts), np.split(leverage, cuts), rows.steepness, strict=True
-        )
+        pieces = zip(expected, np.split(r, cuts), np.split(leverage, cuts), steepness, strict=True)
         previous, noise = noise, tuple(estimate(*piece) for piece in pieces)
         if noise == previous:
             break
-        sigma = rows.sigma(noise)
-        best = minimise(rows.residuals, sigma, prior, best.x, low, high)
+        sigma = problem.sigma(noise)
+        best = minimise(partial(problem.residuals, sigma=sigma), best.x, low, high)
     known = all(n.known for n in noise)
     freedom = np.inf if known else NOISE_WEIGHT + r.size - float(np.sum(leverage))
     share = np.diag(C @ precision @ C) / np.diag(C)
     return Solution(best.x, np.asarray(C, np.float64), noise, freedom, share)
 
 
-def minimise(
-    data: Residuals, sigma: Array, prior: Residuals, start: Array, low: Array, high: Array
-) -> Any:
+def minimise(residuals: Function, start: Array, low: Array, high: Array) -> Any:
     """One least squares problem, from one start; the result of `least_squares`."""
-
-    def residuals(x: Array) -> Array:
-        return np.concatenate([data(x) / sigma, prior(x)])
-
     margin = 1e-9 * (high - low)
     inside = np.clip(start, low + margin, high - margin)
     return least_squares(residuals, inside, bounds=(low, high), x_scale="jac", xtol=1e-9)
 
 
-def _linear(
-    data: Residuals, prior: Residuals, x: Array, low: Array, high: Array
-) -> tuple[Array, Array, Array]:
-    """Data residuals, and the derivatives of data and prior residuals by central differences."""
-    columns, prior_columns = [], []
+def derivative(f: Function, x: Array, low: Array, high: Array) -> Array:
+    """Derivative (n, p) of a function within bounds, by central differences."""
+    columns = []
     for k in range(x.size):
         up, down = x.copy(), x.copy()
         up[k], down[k] = min(x[k] + 1e-4, high[k]), max(x[k] - 1e-4, low[k])
-        width = up[k] - down[k]
-        columns.append((data(up) - data(down)) / width)
-        prior_columns.append((prior(up) - prior(down)) / width)
-    return data(x), np.stack(columns, -1), np.stack(prior_columns, -1)
+        columns.append((f(up) - f(down)) / (up[k] - down[k]))
+    return np.stack(columns, -1)

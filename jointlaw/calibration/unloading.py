@@ -59,50 +59,46 @@ def explain(law: JointLaw, stress: ArrayLike, closure: ArrayLike, steps: int = 1
 
     Raises ValueError when the data do not load and unload above zero stress.
     """
-    s_up, u_up, s_down, u_down = first_loading(stress, closure)
+    s_up, _, s_down, _ = first_loading(stress, closure)
     high = float(s_up[-1])
     low = float(max(s_up[0], s_down.min(), s_up[s_up > 0].min(initial=high)))
     if s_down.size < 3 or not low < high:
         raise ValueError("stress does not rise and fall above 0: give one cycle, both branches")
-    up, down = _above(s_up, u_up, low), _above(s_down[::-1], u_down[::-1], low)
-    measured = 1 - _area(*down) / _area(*up)
-    friction, left = _cycle(law, low, high, steps)
-    losses = []
+    measured, open_closure = _loss(stress, closure, low)
+    friction, law_closure = _loss(*_cycle(law, high, steps), low)
+    largest, worst_mu = friction, law.asperity.mu
     for mu in track(_FRICTIONS, "friction", len(_FRICTIONS)):
         other = replace(law, asperity=replace(law.asperity, mu=mu))
-        losses.append(_cycle(other, low, high, steps)[0])
-    worst = int(np.argmax(losses))
-    return Loop(
-        low,
-        measured,
-        friction,
-        max(friction, losses[worst]),
-        _FRICTIONS[worst] if losses[worst] > friction else law.asperity.mu,
-        float(down[1][0] - up[1][0]),
-        left,
-    )
+        loss, _ = _loss(*_cycle(other, high, steps), low)
+        if loss > largest:
+            largest, worst_mu = loss, mu
+    return Loop(low, measured, friction, largest, worst_mu, open_closure, law_closure)
 
 
-def _cycle(law: JointLaw, low: float, high: float, steps: int) -> tuple[float, float]:
-    """Loss as a share of the work of loading between two stresses, and the closure left open.
+def _cycle(law: JointLaw, high: float, steps: int) -> tuple[Array, Array]:
+    """Stress (Pa) and closure (m), (n,), of a law loaded to a stress and unloaded.
 
     At the finest resolution: few depth cells lock whole contacts where the law locks their rims,
     and lose up to ten times too much when friction is high.
     """
     finest = replace(law, resolution=NAMED["reference"], plane=None, closure_only=True)
-    joint, top = finest.joint(), float(law.closure(high))
-    branches = []
-    for increment in (top / steps, -top / steps):
-        rows = [(float(joint.F[0]), float(joint.delta[0]))]
-        for _ in range(steps):
-            joint.update([increment], tangent=False)
-            rows.append((float(joint.F[0]), float(joint.delta[0])))
-        stress, closure = np.array(rows).T
-        order = np.argsort(closure)
-        branches.append(_above(stress[order], closure[order], low))
-    up, down = branches
-    loss = 1 - _area(*down) / _area(*up)
-    return float(loss), float(down[1][0] - up[1][0])
+    joint, step = finest.joint(), float(law.closure(high)) / steps
+    rows = [(float(joint.F[0]), float(joint.delta[0]))]
+    for increment in [step] * steps + [-step] * steps:
+        joint.update([increment], tangent=False)
+        rows.append((float(joint.F[0]), float(joint.delta[0])))
+    stress, closure = np.array(rows).T
+    return stress, closure
+
+
+def _loss(stress: ArrayLike, closure: ArrayLike, low: float) -> tuple[float, float]:
+    """What a cycle loses above the stress `low`, as a share of the work of loading.
+
+    With it the closure (m) that it keeps back there.
+    """
+    s_up, u_up, s_down, u_down = first_loading(stress, closure)
+    up, down = _above(s_up, u_up, low), _above(s_down[::-1], u_down[::-1], low)
+    return 1 - _area(*down) / _area(*up), float(down[1][0] - up[1][0])
 
 
 def _area(stress: Array, closure: Array) -> float:

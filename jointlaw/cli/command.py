@@ -1,9 +1,25 @@
-"""How every subcommand of `jointlaw` is made: one line of help and one worked example."""
+"""What the subcommands of `jointlaw` share: help with a worked example, options, results."""
 
 from __future__ import annotations
 
 import argparse
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
+
+from .. import presets
+from ..laboratory.experiments import PathError
+from ..laboratory.record import UNITS, Record
+from ..law import JointLaw
+from ..parameters.resolution import NAMED
+from ..support import units
+from ..support.checks import number
+from ..support.files import replace_file, write_json
+
+VERSION = 1  # of summary.json
+Written = Mapping[str, str | Callable[[Path], object]]
 
 
 def add_command(commands: Any, name: str, what: str, example: str) -> argparse.ArgumentParser:
@@ -16,3 +32,94 @@ def add_command(commands: Any, name: str, what: str, example: str) -> argparse.A
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     return parser
+
+
+def add_law(parser: argparse.ArgumentParser, *, resolution: bool = True) -> None:
+    """Add the law, a preset or a file, and its resolution; `read_law` reads them."""
+    parser.add_argument("law", metavar="PRESET_OR_FILE", help="preset name or TOML file")
+    if resolution:
+        parser.add_argument("--resolution", choices=tuple(NAMED), help="instead of the law's own")
+
+
+def read_law(options: argparse.Namespace) -> JointLaw:
+    """The law that the options name."""
+    law = presets.load_any(options.law)
+    resolution = getattr(options, "resolution", None)
+    return law if resolution is None else replace(law, resolution=resolution)
+
+
+def add_out(parser: argparse.ArgumentParser, *, required: bool = True) -> None:
+    """Add the folder for the results."""
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, required=required, help="folder for the results"
+    )
+
+
+def quantity(option: str, text: str, unit: str, *, positive: bool = False) -> float:
+    """The SI value of an option, which errors name."""
+    try:
+        value = units.parse(text, unit)
+    except ValueError as error:
+        raise ValueError(f"{option}: {error}") from None
+    number(option, value)
+    if positive and value <= 0:
+        raise ValueError(f"{option} = {text} is out of bounds: it must be > 0 {unit}")
+    return value
+
+
+def write_results(folder: Path, files: Written, summary: Mapping[str, Any]) -> None:
+    """Write each file, its text or by its function, and summary.json; no PNG without matplotlib."""
+    folder.mkdir(parents=True, exist_ok=True)
+    names = []
+    for name, content in files.items():
+        try:
+            if isinstance(content, str):
+                replace_file(folder / name, content.encode())
+            else:
+                content(folder / name)
+        except ImportError as error:
+            if not name.endswith(".png"):
+                raise
+            print(f"no picture: {error}", file=sys.stderr)
+            continue
+        names.append(name)
+    write_json(folder / "summary.json", {"version": VERSION, **summary})
+    print(f"wrote {', '.join([*names, 'summary.json'])} to {folder}")
+
+
+def add_test_options(parser: argparse.ArgumentParser, steps: int) -> None:
+    """Add what the laboratory tests take: law, steps and folder for the results."""
+    add_law(parser)
+    parser.add_argument(
+        "--steps", metavar="N", type=int, default=steps, help=f"steps per leg (default {steps})"
+    )
+    add_out(parser)
+
+
+def run_test(
+    test: Callable[[], Record], law: JointLaw, options: argparse.Namespace
+) -> Record | None:
+    """Run a laboratory test and write its record; None if it stopped early."""
+    try:
+        record = test()
+    except PathError as error:
+        print(f"jointlaw {options.command}: {error}", file=sys.stderr)
+        if len(error.record):
+            _write(error.record, law, options)
+        return None
+    _write(record, law, options)
+    return record
+
+
+def _write(record: Record, law: JointLaw, options: argparse.Namespace) -> None:
+    """Curve (CSV, NPZ), picture, law and summary of a test."""
+    name = options.command
+    files: Written = {
+        f"{name}.csv": record.to_csv,
+        f"{name}.npz": record.to_npz,
+        "law.toml": law.to_toml,
+        f"{name}.png": record.plot,
+    }
+    settings = {k: v for k, v in vars(options).items() if k not in ("run", "out")}
+    summary = {"settings": settings, "result": record.summary(), "units": UNITS}
+    write_results(options.out, files, summary)

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
-from .. import presets
-from ..parameters.resolution import NAMED
-from ..support import units
-from .command import add_command
+from ..hosts.yade.export import export_yade
+from .command import add_command, add_law, add_out, quantity, read_law
 
 
 def add_export_command(commands: Any) -> None:
@@ -22,25 +18,20 @@ def add_export_command(commands: Any) -> None:
         "jointlaw export yade jing-replica --out joint-for-yade",
     )
     parser.add_argument("host", choices=("yade",), help="the host code")
-    parser.add_argument("law", metavar="PRESET_OR_FILE", help="preset name or TOML file")
+    add_law(parser)
     parser.add_argument("--closure", help="last closure of the table, such as 2um")
     parser.add_argument("--shear-limit", help="shear at which friction is read, such as 5um")
     parser.add_argument("--tolerance", type=float, default=1e-3, help="of interpolation (0.001)")
-    parser.add_argument("--resolution", choices=tuple(NAMED), help="instead of the law's own")
-    parser.add_argument("--out", type=Path, required=True, help="folder for the files")
+    add_out(parser)
     parser.set_defaults(run=_export)
 
 
 def _export(options: argparse.Namespace) -> int:
-    from ..hosts.yade import export_yade
-
-    law = presets.load_any(options.law)
-    if options.resolution is not None:
-        law = replace(law, resolution=options.resolution)
+    law = read_law(options)
     settings: dict[str, Any] = {"tolerance": options.tolerance}
     for name in ("closure", "shear_limit"):
         if (text := getattr(options, name)) is not None:
-            settings[name] = units.parse(text, "m")
+            settings[name] = quantity(f"--{name.replace('_', '-')}", text, "m")
     table = export_yade(law, options.out, **settings)
     print(f"wrote the joint for YADE to {options.out}: {len(table.closure)} rows")
     print("what the table drops (error against the law, share of each path's largest traction):")

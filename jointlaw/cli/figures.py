@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
-from .command import add_command
+from .command import add_command, add_out
 
 
 def add_figures_command(subparsers: Any) -> None:
@@ -14,7 +13,7 @@ def add_figures_command(subparsers: Any) -> None:
     what = "regenerate the figures of Misra 1999, or print the table of its claims with our numbers"
     parser = add_command(subparsers, "figures", what, "jointlaw figures 14 15 --out out")
     parser.add_argument("numbers", metavar="N", nargs="*", type=int, help="figures (default: all)")
-    parser.add_argument("--out", type=Path, help="folder for PNG, CSV and summary.json")
+    add_out(parser, required=False)
     parser.add_argument(
         "--claims",
         metavar="KEY",
@@ -25,25 +24,15 @@ def add_figures_command(subparsers: Any) -> None:
 
 
 def _figures(options: argparse.Namespace) -> int:
+    from ..paper.contents import claims_table, write_figures  # numbers are computed on demand only
+
     if options.claims is not None:
         if options.numbers or options.out:
             raise ValueError("--claims prints a table: give neither figures nor --out with it")
-        return _claims(options.claims)
+        print(claims_table(options.claims))
+        return 0
     if options.out is None:
         raise ValueError("--out is missing: name the folder for the figures")
-    from ..paper.figures import write  # numbers are computed on demand only
-
-    files = write(options.out, options.numbers)
+    files = write_figures(options.out, options.numbers)
     print(f"wrote {len(files)} files to {options.out}")
-    return 0
-
-
-def _claims(keys: list[str]) -> int:
-    from ..paper import claims
-    from ..support.progress import track
-
-    chosen = [claims.get(key).key for key in keys] or claims.keys()
-    for key in track(chosen, "claims", len(chosen)):
-        claims.measure(key)
-    print(claims.table(chosen))
     return 0

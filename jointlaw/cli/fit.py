@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,15 +12,11 @@ import numpy as np
 
 from ..calibration import datasets
 from ..calibration.baselines import Comparison, compare
-from ..calibration.curve_files import Curve, read_closure
-from ..calibration.fit import Fit
+from ..calibration.fit import Fit, fit_closure, fit_many
 from ..calibration.measured import first_loading
-from ..calibration.plot import plot_fit
-from ..calibration.sweep import fit_many
 from ..calibration.unloading import explain
 from ..support import units
-from ..support.files import replace_file, write_json
-from .command import add_command
+from .command import Written, add_command, add_out, write_results
 
 
 def add_fit_command(commands: Any) -> None:
@@ -50,26 +47,25 @@ def add_fit_command(commands: Any) -> None:
     parser.add_argument("--formation", choices=("individual", "population"), default="individual")
     parser.add_argument("--noise", type=float, help="known error of the stress, such as 0.01")
     parser.add_argument("--workers", type=int, help="processes for several files")
-    parser.add_argument("--out", type=Path, required=True, help="folder for the results")
+    add_out(parser)
     parser.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
     folders = _folders(options)
-    curves = [_read(options, item) for item in options.data]
+    tests = [_read(options, item) for item in options.data]
     keywords = _keywords(options)
-    loading = [first_loading(*curve)[:2] for curve in curves]
+    loading = [first_loading(*test)[:2] for test in tests]
     limits = [_limit(options.up_to, stress) for stress, _ in loading]
     seen = [(s[s <= limit], u[s <= limit]) for (s, u), limit in zip(loading, limits, strict=True)]
-    fits = fit_many(seen, workers=options.workers, **keywords) if len(seen) > 1 else None
-    for k, (item, curve) in enumerate(zip(options.data, curves, strict=True)):
-        from ..calibration.calibrate import fit_closure
-
-        fit = fits[k] if fits else fit_closure(*seen[k], **keywords)
-        held = None
-        if (loading[k][0] > limits[k]).any():
-            held = compare(*loading[k], limits[k], **keywords)
-        _write(folders[k], item, fit, curve, held)
+    if len(seen) > 1:
+        fits = fit_many(seen, workers=options.workers, **keywords)
+    else:
+        fits = [fit_closure(*seen[0], **keywords)]
+    for k, fit in enumerate(fits):
+        (stress, closure), limit = loading[k], limits[k]
+        held = compare(stress, closure, limit, **keywords) if (stress > limit).any() else None
+        _write(folders[k], Path(options.data[k]).name, fit, tests[k], held)
     return 0
 
 
@@ -87,51 +83,54 @@ def _folders(options: argparse.Namespace) -> list[Path]:
     return [options.out / stem for stem in items]
 
 
-def _write(folder: Path, item: str, fit: Fit, curve: Curve, held: Comparison | None) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
+def _write(
+    folder: Path, name: str, fit: Fit, test: datasets.ClosureData, held: Comparison | None
+) -> None:
     text = fit.report()
     summary: dict[str, Any] = {
-        "data": Path(item).name,
+        "data": name,
         "parameters_SI": fit.parameters,
         "standard_error_SI": fit.standard_error,
         "identifiable": list(fit.identifiable),
         "not_identifiable": fit.not_identifiable,
     }
     if held is not None:
-        inside = (held.band[0] <= held.stress) & (held.stress <= held.band[1])
-        text += (
-            f"\n## Held out: {held.stress.size} points above {held.limit / 1e6:.4g} MPa\n\n"
-            f"{held.table()}\n\nThe 95 % band of the law covers {int(inside.sum())} of "
-            f"{inside.size} of them, at the largest stress from "
-            f"{100 * (held.band[0][-1] / held.stress[-1] - 1):+.1f} to "
-            f"{100 * (held.band[1][-1] / held.stress[-1] - 1):+.1f} % of it.\n"
-        )
+        text += _held_out(held)
         summary["error_at_largest_stress"] = {n: float(e[-1]) for n, e in held.errors.items()}
-    if first_loading(*curve)[2].size >= 3:
+    if first_loading(*test)[2].size >= 3:
         try:
-            loop = explain(fit.law, *curve)
+            loop = explain(fit.law, *test)
             text += f"\n## Unloading\n\n{loop.text()}\n"
             summary["unloading"] = vars(loop)
         except ValueError as error:  # the fit is not lost for it
             text += f"\n## Unloading\n\nNot compared with the law: {error}.\n"
             print(f"unloading is not compared: {error}", file=sys.stderr)
-    fit.to_toml(folder / "law.toml", title=f"Fit to {Path(item).name}")
-    replace_file(folder / "report.md", text.encode())
-    write_json(folder / "summary.json", summary)
-    files = ["law.toml", "report.md", "summary.json"]
-    try:
-        plot_fit(fit, folder / "fit.png", held)
-        files.insert(0, "fit.png")
-    except ImportError as error:
-        print(f"no picture: {error}", file=sys.stderr)
     print(text)
-    print(f"wrote {', '.join(files)} to {folder}")
+    points = None if held is None else (held.stress, held.closure)
+    files: Written = {
+        "fit.png": partial(fit.plot, held_out=points),
+        "law.toml": partial(fit.to_toml, title=f"Fit to {name}"),
+        "report.md": text,
+    }
+    write_results(folder, files, summary)
 
 
-def _read(options: argparse.Namespace, item: str) -> Curve:
+def _held_out(held: Comparison) -> str:
+    low, high = held.band
+    inside = (low <= held.stress) & (held.stress <= high)
+    return (
+        f"\n## Held out: {held.stress.size} points above {held.limit / 1e6:.4g} MPa\n\n"
+        f"{held.table()}\n\nThe 95 % band of the law covers {int(inside.sum())} of "
+        f"{inside.size} of them, at the largest stress from "
+        f"{100 * (low[-1] / held.stress[-1] - 1):+.1f} to "
+        f"{100 * (high[-1] / held.stress[-1] - 1):+.1f} % of it.\n"
+    )
+
+
+def _read(options: argparse.Namespace, item: str) -> datasets.ClosureData:
     if item in datasets.names() and not Path(item).exists():
         return datasets.load(item)
-    return read_closure(item, options.stress_column, options.closure_column)
+    return datasets.read_closure(item, options.stress_column, options.closure_column)
 
 
 def _limit(text: str | None, stress: Any) -> float:

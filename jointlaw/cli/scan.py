@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 from typing import Any
 
+from ..parameters.toml import VERSION
 from ..support import units
-from ..support.files import replace_file, write_json
 from ..surface.fit import SurfaceFit, from_surface
 from ..surface.scan_files import read_scan
-from .command import add_command
+from .command import Written, add_command, add_out, write_results
 
 
 def add_scan_command(commands: Any) -> None:
@@ -24,7 +23,7 @@ def add_scan_command(commands: Any) -> None:
     parser.add_argument("--spacing", help="of the points, such as 20um; needed for CSV and NPY")
     parser.add_argument("--height-unit", help="of CSV and NPY, such as um (default m)")
     parser.add_argument("--sampling-length", help="edge of a facet (default 4 spacings)")
-    parser.add_argument("--out", type=Path, required=True, help="folder for the results")
+    add_out(parser)
     parser.set_defaults(run=_run)
 
 
@@ -35,25 +34,9 @@ def _run(options: argparse.Namespace) -> int:
     z, spacing = read_scan(options.file, spacing, factor)
     length = options.sampling_length
     fit = from_surface(z, spacing, None if length is None else units.parse(length, "m"))
-    folder: Path = options.out
-    folder.mkdir(parents=True, exist_ok=True)
     text = fit.report()
-    replace_file(folder / "report.md", text.encode())
-    write_json(folder / "summary.json", _summary(fit))
-    replace_file(folder / "surface.toml", _toml(fit, Path(options.file).name).encode())
-    files = ["surface.toml", "report.md", "summary.json"]
-    try:
-        fit.plot(folder / "scan.png")
-        files.insert(0, "scan.png")
-    except ImportError as error:
-        print(f"no picture: {error}", file=sys.stderr)
     print(text)
-    print(f"wrote {', '.join(files)} to {folder}")
-    return 0
-
-
-def _summary(fit: SurfaceFit) -> dict[str, Any]:
-    return {
+    summary = {
         "parameters_SI": fit.parameters,
         "standard_error_SI": fit.standard_error,
         "sampling_length_m": fit.sampling_length,
@@ -63,6 +46,10 @@ def _summary(fit: SurfaceFit) -> dict[str, Any]:
         "not_identifiable": fit.not_identifiable,
         "warnings": fit.warnings,
     }
+    toml = _toml(fit, Path(options.file).name)
+    files: Written = {"scan.png": fit.plot, "surface.toml": toml, "report.md": text}
+    write_results(options.out, files, summary)
+    return 0
 
 
 def _toml(fit: SurfaceFit, name: str) -> str:
@@ -73,6 +60,7 @@ def _toml(fit: SurfaceFit, name: str) -> str:
     return (
         f"# From {clean}, sampling length {fit.sampling_length:.4g} m. To make it a law, add\n"
         "# asperity_density if it is missing, and [asperity] with K, lam, eta and mu.\n"
+        f"version = {VERSION}\n"
         f"{density}\n[orientation]\na = {max(p['a'], 1.0)!r}\nb = {p['b']!r}\nc = {p['c']!r}\n\n"
         f"[heights]\nalpha = {p['alpha']!r}\nbeta = {p['beta']!r}  # m\n"
         f'overlap = {p["overlap"]!r}  # m\nformation = "individual"\n'

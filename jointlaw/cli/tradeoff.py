@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
-from .. import presets
-from ..support import units
-from ..support.files import write_json
-from .command import add_command
+from .command import Written, add_command, add_law, add_out, quantity, read_law, write_results
 
 
 def add_tradeoff_command(commands: Any) -> None:
@@ -22,7 +17,7 @@ def add_tradeoff_command(commands: Any) -> None:
         "measure what resolutions of a law cost here and how accurate they are; table and picture",
         "jointlaw tradeoff westerly-smooth --plane 0 --out out",
     )
-    parser.add_argument("law", metavar="PRESET_OR_FILE", help="preset name or TOML file")
+    add_law(parser, resolution=False)
     parser.add_argument(
         "--plane", metavar="ANGLE", help="motion in one plane at this azimuth, such as 30deg"
     )
@@ -36,28 +31,24 @@ def add_tradeoff_command(commands: Any) -> None:
     parser.add_argument(
         "--joints", type=int, default=10_000, help="of the batch that is timed; 0 times nothing"
     )
-    parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for files")
+    add_out(parser)
     parser.set_defaults(run=_tradeoff)
 
 
 def _tradeoff(options: argparse.Namespace) -> int:
-    law = presets.load_any(options.law)
+    law = read_law(options)
     if options.plane is not None:
-        law = replace(law, plane=units.parse(options.plane, "rad"))
+        law = replace(law, plane=quantity("--plane", options.plane, "rad"))
     chosen = {}
     for tolerance in options.tolerance or ():  # before the long work: a bad one is refused at once
         made = law.at_tolerance(tolerance)
         r, sliders = made.resolution, made.tables.sliders
         chosen[f"{tolerance:g}"] = {"u": r.u, "phi": r.phi, "depth": r.depth, "sliders": sliders}
     found = law.tradeoff(joints=options.joints)
-    folder: Path = options.out
-    folder.mkdir(parents=True, exist_ok=True)
-    found.to_csv(folder / "tradeoff.csv")
-    law.to_toml(folder / "law.toml")
     rows = [dict(zip(found.columns(), row, strict=True))
             for row in zip(*found.columns().values(), strict=True)]  # fmt: skip
     frontier = {(p.resolution.u, p.resolution.phi, p.resolution.depth) for p in found.frontier()}
-    result = {
+    summary = {
         "law": options.law,
         "joints": found.joints,
         "timed on": found.how,
@@ -66,16 +57,14 @@ def _tradeoff(options: argparse.Namespace) -> int:
         "at tolerance": chosen,
         "units": {"error": "share of the path's largest traction", "ns": "ns per joint and update"},
     }
-    write_json(folder / "summary.json", result)
-    files = ["tradeoff.csv", "law.toml", "summary.json"]
-    try:
-        found.plot(folder / "tradeoff.png")
-        files.insert(0, "tradeoff.png")
-    except ImportError as error:
-        print(f"no picture: {error}", file=sys.stderr)
     print(found)
     for text, nodes in chosen.items():
         given = ", ".join(f"{k}={nodes[k]}" for k in ("u", "phi", "depth"))
         print(f"at_tolerance({text}): Resolution({given}), {nodes['sliders']} sliders")
-    print(f"wrote {', '.join(files)} to {folder}")
+    files: Written = {
+        "tradeoff.csv": found.to_csv,
+        "law.toml": law.to_toml,
+        "tradeoff.png": found.plot,
+    }
+    write_results(options.out, files, summary)
     return 0

@@ -1,5 +1,1 @@
-"""Host codes: what they need on disk to run a joint law."""
-
-from .yade import export_yade
-
-__all__ = ["export_yade"]
+"""Host codes: one folder each, with what it needs to run a joint law."""

@@ -1,7 +1,7 @@
 """The fast kernel: the numbers of `reference`, compiled, with the inner loops over joints.
 
 States live in blocks of LANES joints, (blocks, rows, lanes), so that within a block every quantity
-is one contiguous row. All that a block needs while it is advanced lies in one scratch array: rows
+is one contiguous row. All that a block needs while it is advanced lies on one scratch pad: rows
 of LANES numbers at constant offsets. Only so does the compiler see that no two rows overlap, and
 turns each loop over l, the joint, into vector instructions. Branches in such loops are selections.
 
@@ -31,7 +31,7 @@ def _rows(first: int, count: int) -> tuple[int, ...]:
     return tuple(LANES * row for row in range(first, first + count))
 
 
-# Rows of the scratch array. Pairs "0, 1" are before and after the step.
+# Rows of the scratch pad. Pairs "0, 1" are before and after the step.
 _Y0, _Y1, _F0, _F1, _S0, _S1, _X = _rows(0, 7)  # a facet: y, Phi, Phi', place in the curve
 _DES, _DET, _SUMS, _SUMT = _rows(7, 4)  # its sliders
 _CURVING, _BSS, _BST, _BTT, _VS, _VT, _G0, _G1, _G2 = _rows(11, 9)  # its tangent
@@ -40,7 +40,7 @@ _J00, _J01, _J10, _J11, _SLIP, _PULL1, _PULL2, _LOST, _F, _FS, _FT = _rows(29, 1
 _C00, _C01, _C02, _C10, _C11, _C12, _C20, _C21, _C22 = _rows(40, 9)
 _NORMAL, _CRUSHED, _MU = _rows(49, 3)  # a joint whose asperities wear or yield
 _Z0, _Z1, _FZ0, _FZ1, _SZ1, _AT0, _FAT0, _MOVES, _WS, _WT = _rows(52, 10)  # its flattened facets
-_SCRATCH = 62 * LANES
+_PAD = 62 * LANES
 
 # The same rows while joints are measured
 _WHOLE, _LIMIT, _SLIDING, _SLIPPING, _APART, _STORED, _REACH = _rows(20, 7)
@@ -93,7 +93,7 @@ class Work(NamedTuple):
     """Working space of one thread, so that no step allocates any."""
 
     block: Array  # (rows, LANES): copy of a block of states
-    scratch: Array
+    pad: Array
     place: NDArray[np.int32]  # cell of the curve, per lane
     piece: Array  # its four coefficients, per lane
 
@@ -101,7 +101,7 @@ class Work(NamedTuple):
 def new_work(rows: int) -> Work:
     """Working space for blocks of this many rows."""
     place, piece = np.zeros(LANES, np.int32), np.zeros(4 * LANES)
-    return Work(np.zeros((rows, LANES)), np.zeros(_SCRATCH), place, piece)
+    return Work(np.zeros((rows, LANES)), np.zeros(_PAD), place, piece)
 
 
 @_jit
@@ -117,7 +117,7 @@ def _fetch(place, piece, L, table):
 @_jit
 def _virgin(work, law, after, L):
     """Phi and Phi' of the row of y: three loops, so that only the look-up itself is not vector."""
-    scratch, place, piece, curve = work.scratch, work.place, work.piece, law.curve
+    pad, place, piece, curve = work.pad, work.place, work.piece, law.curve
     eta, scale, rise = law.scalars[3], law.scalars[4], law.scalars[5]
     if after is None:  # a constant for the compiler
         y, force, slope = _Y0, _F0, _S0
@@ -127,52 +127,52 @@ def _virgin(work, law, after, L):
     top = np.float64(cells - 1)
     looked = 0 if cells == 1 else L  # without heights S is 1, and there is nothing to look up
     for l in range(L - looked):
-        here = scratch[y + l] if abs(scratch[y + l]) >= UNDERFLOW else 0.0
+        here = pad[y + l] if abs(pad[y + l]) >= UNDERFLOW else 0.0
         v = np.sqrt(here if here > 0.0 else 0.0)
         one = 1.0 if v > 0.0 else 0.0
         power = v if eta == 0.5 else one
         place[l] = 0
-        scratch[y + l] = here
-        scratch[_X + l] = 0.0
-        scratch[force + l] = power * v * v
-        scratch[slope + l] = power * (1.0 + eta)
+        pad[y + l] = here
+        pad[_X + l] = 0.0
+        pad[force + l] = power * v * v
+        pad[slope + l] = power * (1.0 + eta)
     for l in range(looked):
-        here = scratch[y + l] if abs(scratch[y + l]) >= UNDERFLOW else 0.0
+        here = pad[y + l] if abs(pad[y + l]) >= UNDERFLOW else 0.0
         v = np.sqrt(here if here > 0.0 else 0.0)
         r = 1.0 / (v + scale)
         at = v * r * cells
         i = np.int32(at if at < top else top)
         place[l] = i
-        scratch[y + l] = here
-        scratch[_X + l] = at - np.float64(i)
-        scratch[force + l] = v
-        scratch[slope + l] = v * r * r
+        pad[y + l] = here
+        pad[_X + l] = at - np.float64(i)
+        pad[force + l] = v
+        pad[slope + l] = v * r * r
     _fetch(place, piece, looked, curve)
     weight = 0.5 * cells * scale
     for l in range(looked):
-        x, o = scratch[_X + l], 4 * l
+        x, o = pad[_X + l], 4 * l
         c0, c1, c2, c3 = piece[o], piece[o + 1], piece[o + 2], piece[o + 3]
         S = c0 + x * (c1 + x * (c2 + x * c3))
-        D = weight * scratch[slope + l] * (c1 + x * (2.0 * c2 + x * (3.0 * c3)))
-        v = scratch[force + l]
+        D = weight * pad[slope + l] * (c1 + x * (2.0 * c2 + x * (3.0 * c3)))
+        v = pad[force + l]
         one = 1.0 if v > 0.0 else 0.0
         power = v if eta == 0.5 else one  # y^eta where it is at hand
-        scratch[force + l] = power * v * v * S
-        scratch[slope + l] = power * ((1.0 + eta) * S + D)
+        pad[force + l] = power * v * v * S
+        pad[slope + l] = power * ((1.0 + eta) * S + D)
     if rise > 0.0:  # S over w^rise: D S gains rise (1 - w) S
         W = scale * scale
         for l in range(L):
-            here = scratch[y + l] if scratch[y + l] > 0.0 else 0.0
+            here = pad[y + l] if pad[y + l] > 0.0 else 0.0
             w, rest = here / (here + W), W / (here + W)
             lift = w**rise
-            by_y = scratch[force + l] / (here if here > 0.0 else 1.0)
-            scratch[slope + l] = lift * (scratch[slope + l] + rise * rest * by_y)
-            scratch[force + l] *= lift
+            by_y = pad[force + l] / (here if here > 0.0 else 1.0)
+            pad[slope + l] = lift * (pad[slope + l] + rise * rest * by_y)
+            pad[force + l] *= lift
     if (eta != 0.5) & (eta != 0.0):
         for l in range(L):
-            power = scratch[y + l] ** eta if scratch[y + l] > 0.0 else 0.0
-            scratch[force + l] *= power
-            scratch[slope + l] *= power
+            power = pad[y + l] ** eta if pad[y + l] > 0.0 else 0.0
+            pad[force + l] *= power
+            pad[slope + l] *= power
 
 
 @_jit
@@ -191,42 +191,42 @@ def _bend(piece, o, x, v, cells, scale):
 @_jit
 def _curvature(work, law, L):
     """Phi'' of the row of y after the step, from the pieces that `_virgin` just fetched for it."""
-    scratch, piece, cells = work.scratch, work.piece, np.float64(law.curve.size // 4)
+    pad, piece, cells = work.pad, work.piece, np.float64(law.curve.size // 4)
     eta, scale, rise = law.scalars[3], law.scalars[4], law.scalars[5]
     for l in range(L):
-        y = scratch[_Y1 + l]
+        y = pad[_Y1 + l]
         v = np.sqrt(y if y > 0.0 else 1.0)
-        S, D, DD = _bend(piece, 4 * l, scratch[_X + l], v, cells, scale)
+        S, D, DD = _bend(piece, 4 * l, pad[_X + l], v, cells, scale)
         value = eta * (1.0 + eta) * S + (1.0 + 2.0 * eta) * D + DD
         value = value / (v if eta == 0.5 else v * v)
-        scratch[_CURVING + l] = value if y > 0.0 else 0.0
+        pad[_CURVING + l] = value if y > 0.0 else 0.0
     if rise > 0.0:
         W = scale * scale
         for l in range(L):
-            y = scratch[_Y1 + l]
+            y = pad[_Y1 + l]
             v = np.sqrt(y if y > 0.0 else 1.0)
-            S, D, DD = _bend(piece, 4 * l, scratch[_X + l], v, cells, scale)
+            S, D, DD = _bend(piece, 4 * l, pad[_X + l], v, cells, scale)
             w, more = v * v / (v * v + W), rise * W / (v * v + W)
             DD = DD + 2.0 * more * D + (more * more - more * w) * S
             value = eta * (1.0 + eta) * S + (1.0 + 2.0 * eta) * (D + more * S) + DD
             value = w**rise * value / (v if eta == 0.5 else v * v)
-            scratch[_CURVING + l] = value if y > 0.0 else 0.0
+            pad[_CURVING + l] = value if y > 0.0 else 0.0
     if (eta != 0.5) & (eta != 0.0):
         for l in range(L):
-            scratch[_CURVING + l] *= scratch[_Y1 + l] ** eta if scratch[_Y1 + l] > 0.0 else 0.0
+            pad[_CURVING + l] *= pad[_Y1 + l] ** eta if pad[_Y1 + l] > 0.0 else 0.0
 
 
 @_jit
-def _limit_offset(scratch, L, limit, dim):
+def _limit_offset(pad, L, limit, dim):
     """New offsets, their derivative and the slip; see `reference.limited_offset`."""
     for l in range(L):
-        a0, a1 = scratch[_OLD1 + l], scratch[_OLD2 + l]
-        p0, p1 = scratch[_P1 + l], scratch[_P2 + l]
+        a0, a1 = pad[_OLD1 + l], pad[_OLD2 + l]
+        p0, p1 = pad[_P1 + l], pad[_P2 + l]
         f0, f1 = a0 + p0, a1 + p1
-        scratch[_NEW1 + l], scratch[_NEW2 + l] = f0, f1
-        scratch[_SLIP + l] = 0.0
-        scratch[_J00 + l] = scratch[_J11 + l] = 1.0
-        scratch[_J01 + l] = scratch[_J10 + l] = 0.0
+        pad[_NEW1 + l], pad[_NEW2 + l] = f0, f1
+        pad[_SLIP + l] = 0.0
+        pad[_J00 + l] = pad[_J11 + l] = 1.0
+        pad[_J01 + l] = pad[_J10 + l] = 0.0
         length = np.hypot(p0, p1)
         if f0 * f0 + f1 * f1 <= limit * limit or f0 * p0 + f1 * p1 <= 0.0:
             continue
@@ -244,16 +244,16 @@ def _limit_offset(scratch, L, limit, dim):
         cos1 = ((1.0 + cos) - (1.0 - cos) * decay * decay) / bottom
         sin1 = 2.0 * sin * decay / bottom
         b0, b1 = limit * (cos1 * e0 - sin1 * e1), limit * (cos1 * e1 + sin1 * e0)
-        scratch[_NEW1 + l], scratch[_NEW2 + l] = b0, b1
-        scratch[_SLIP + l] = limit * (x + np.log(bottom / 2.0))
+        pad[_NEW1 + l], pad[_NEW2 + l] = b0, b1
+        pad[_SLIP + l] = limit * (x + np.log(bottom / 2.0))
         turn = (rest * rest + cos * rest * (1.0 + decay)) / bottom
         turn += inside / (limit * max(cos, GRAZING)) * (2.0 * decay / bottom - sin1 * sin)
         turn /= length
         row0, row1 = -turn * e1 - sin1 / limit * e0, turn * e0 - sin1 / limit * e1
         if dim == 2:
             row0 = row1 = 0.0  # along one line the offset does not turn
-        scratch[_J00 + l], scratch[_J01 + l] = -b1 * row0, -b1 * row1
-        scratch[_J10 + l], scratch[_J11 + l] = b0 * row0, b0 * row1
+        pad[_J00 + l], pad[_J01 + l] = -b1 * row0, -b1 * row1
+        pad[_J10 + l], pad[_J11 + l] = b0 * row0, b0 * row1
 
 
 @_jit
@@ -269,75 +269,75 @@ def _places(law):
 
 
 @_jit
-def _weaken(scratch, s, L, law):
+def _weaken(pad, s, L, law):
     """Friction of the asperities of each joint, after their slip."""
     slip, first, last = _places(law)[1], law.scalars[1], law.scalars[6]
     for l in range(L):
-        scratch[_MU + l] = last + (first - last) * np.exp(-s[slip, l] / law.scalars[7])
+        pad[_MU + l] = last + (first - last) * np.exp(-s[slip, l] / law.scalars[7])
 
 
 @_jit
 def _press(work, s, L, law, f):
     """Flattened depths of a facet before and after the step, and Phi there; see `yielding`."""
-    scratch, facet = work.scratch, law.facet
+    pad, facet = work.pad, law.facet
     first, _, beside = _places(law)
     at, kept = first + f, beside + 2 * law.depth.shape[0] + f
     deep, o = facet[f, _YIELD], np.int64(facet[f, _OPPOSITE])
     for l in range(L):  # one copy a loop, or the compiler makes no vectors of it
-        scratch[_Z0 + l] = s[at, l]
+        pad[_Z0 + l] = s[at, l]
     for l in range(L):
-        scratch[_FZ0 + l] = s[kept, l]
+        pad[_FZ0 + l] = s[kept, l]
     for l in range(L):
-        scratch[_Z1 + l] = scratch[_Y1 + l]
+        pad[_Z1 + l] = pad[_Y1 + l]
     if o != f:
         m0, m1, m2 = facet[o, _M], facet[o, _M + 1], facet[o, _M + 2]
         for l in range(L):
-            other = m0 * scratch[_NEW + l] + m1 * scratch[_NEW1 + l] + m2 * scratch[_NEW2 + l]
-            scratch[_Z1 + l] = other if other > scratch[_Y1 + l] else scratch[_Y1 + l]
+            other = m0 * pad[_NEW + l] + m1 * pad[_NEW1 + l] + m2 * pad[_NEW2 + l]
+            pad[_Z1 + l] = other if other > pad[_Y1 + l] else pad[_Y1 + l]
     pressed = 0.0
     for l in range(L):
-        z0, y1, z1 = scratch[_Z0 + l], scratch[_Y1 + l], scratch[_Z1 + l] - deep
+        z0, y1, z1 = pad[_Z0 + l], pad[_Y1 + l], pad[_Z1 + l] - deep
         moves = z1 > z0
         z1 = z1 if moves else z0
         own = 1.0 if z1 <= y1 - deep else 2.0
-        scratch[_Z1 + l], scratch[_FZ1 + l] = z1, scratch[_FZ0 + l]
-        scratch[_MOVES + l] = own if moves & (y1 > z1) else 0.0
-        scratch[_SZ1 + l] = y1
+        pad[_Z1 + l], pad[_FZ1 + l] = z1, pad[_FZ0 + l]
+        pad[_MOVES + l] = own if moves & (y1 > z1) else 0.0
+        pad[_SZ1 + l] = y1
         pressed += 1.0 if moves else 0.0
     if pressed > 0.0:
         for l in range(L):
-            scratch[_Y1 + l] = scratch[_Z1 + l]
+            pad[_Y1 + l] = pad[_Z1 + l]
         _virgin(work, law, True, L)
         for l in range(L):
-            scratch[_Y1 + l] = scratch[_SZ1 + l]
-            scratch[_FZ1 + l], scratch[_SZ1 + l] = scratch[_F1 + l], scratch[_S1 + l]
+            pad[_Y1 + l] = pad[_SZ1 + l]
+            pad[_FZ1 + l], pad[_SZ1 + l] = pad[_F1 + l], pad[_S1 + l]
         for l in range(L):
-            s[at, l] = scratch[_Z1 + l]
+            s[at, l] = pad[_Z1 + l]
         for l in range(L):
-            s[kept, l] = scratch[_FZ1 + l]
+            s[kept, l] = pad[_FZ1 + l]
     for l in range(L):
-        touches = scratch[_Y0 + l] > scratch[_Z0 + l]
-        scratch[_AT0 + l] = scratch[_Y0 + l] if touches else scratch[_Z0 + l]
-        scratch[_FAT0 + l] = scratch[_F0 + l] if touches else scratch[_FZ0 + l]
+        touches = pad[_Y0 + l] > pad[_Z0 + l]
+        pad[_AT0 + l] = pad[_Y0 + l] if touches else pad[_Z0 + l]
+        pad[_FAT0 + l] = pad[_F0 + l] if touches else pad[_FZ0 + l]
 
 
 @_jit
-def _relieve(scratch, L, law, f, ledger):
+def _relieve(pad, L, law, f, ledger):
     """Take the part at the flattened depth off Phi and Phi', and add up what the springs lost."""
     deep, potential = law.facet[f, _YIELD], law.facet[f, _POTENTIAL]
     for l in range(L):
-        y1, z1, f1 = scratch[_Y1 + l], scratch[_Z1 + l], scratch[_F1 + l] - scratch[_FZ1 + l]
-        scratch[_F1 + l] = f1 if (y1 > z1) & (f1 > 0.0) else 0.0
-        scratch[_S1 + l] = scratch[_S1 + l] if y1 > z1 else 0.0
-        scratch[_F0 + l] = scratch[_FAT0 + l] - scratch[_FZ0 + l]
+        y1, z1, f1 = pad[_Y1 + l], pad[_Z1 + l], pad[_F1 + l] - pad[_FZ1 + l]
+        pad[_F1 + l] = f1 if (y1 > z1) & (f1 > 0.0) else 0.0
+        pad[_S1 + l] = pad[_S1 + l] if y1 > z1 else 0.0
+        pad[_F0 + l] = pad[_FAT0 + l] - pad[_FZ0 + l]
     if ledger is not None:
         for l in range(L):
-            c0, c1 = scratch[_Y0 + l] - scratch[_Z0 + l], scratch[_Y1 + l] - scratch[_Z1 + l]
-            own = scratch[_Y1 + l] - deep >= scratch[_Z1 + l]
+            c0, c1 = pad[_Y0 + l] - pad[_Z0 + l], pad[_Y1 + l] - pad[_Z1 + l]
+            own = pad[_Y1 + l] - deep >= pad[_Z1 + l]
             c0, c1 = c0 if c0 > 0.0 else 0.0, c1 if c1 > 0.0 else 0.0
             mean = 0.5 * ((c0 if c0 < deep else deep) + (c1 if c1 < deep else deep))
-            lost = scratch[_FZ1 + l] - scratch[_FZ0 + l]
-            scratch[_CRUSHED + l] += potential * (deep if own else mean) * lost
+            lost = pad[_FZ1 + l] - pad[_FZ0 + l]
+            pad[_CRUSHED + l] += potential * (deep if own else mean) * lost
 
 
 @_jit
@@ -349,7 +349,7 @@ def _share_at(y, force, zl, fl, sl, zh, fh, sh, ended):
 
 
 @_jit
-def _slide(scratch, qs, qt, L, law, f, i, ledger, tangent):
+def _slide(pad, qs, qt, L, law, f, i, ledger, tangent):
     """One depth cell of one facet: steps 3 and 4 of `reference.step`."""
     facet, depth = law.facet, law.depth
     A, a, compliance = facet[f, _REST], facet[f, _REST + 1], facet[f, _REST + 2]
@@ -360,12 +360,12 @@ def _slide(scratch, qs, qt, L, law, f, i, ledger, tangent):
     ended = i + 2 < depth.shape[1]
     for l in range(L):
         # the bed beyond the lower limit of the cell less that beyond the upper
-        y0, y1, f0, f1 = scratch[_Y0 + l], scratch[_Y1 + l], scratch[_F0 + l], scratch[_F1 + l]
+        y0, y1, f0, f1 = pad[_Y0 + l], pad[_Y1 + l], pad[_F0 + l], pad[_F1 + l]
         if law.yields is not None:  # from the flattened depth on, where y is above it
-            y0, f0 = scratch[_AT0 + l], scratch[_FAT0 + l]
+            y0, f0 = pad[_AT0 + l], pad[_FAT0 + l]
         from0, from1 = y0 - zl, y1 - zl
         G0, G1 = f0 - fl - sl * from0, f1 - fl - sl * from1
-        k0, k1 = scratch[_S0 + l] - sl, scratch[_S1 + l] - sl
+        k0, k1 = pad[_S0 + l] - sl, pad[_S1 + l] - sl
         if ended:
             G0 -= f0 - fh - sh * (y0 - zh) if y0 > zh else 0.0
             G1 -= f1 - fh - sh * (y1 - zh) if y1 > zh else 0.0
@@ -376,15 +376,15 @@ def _slide(scratch, qs, qt, L, law, f, i, ledger, tangent):
         h0, h1 = k0 * from0, k1 * from1
         if law.yields is not None:  # at the flattened depth the slope is not at hand
             begun = G0 if from0 > 0.0 else 0.0
-            h0 = h0 if y0 > scratch[_Z0 + l] else begun
+            h0 = h0 if y0 > pad[_Z0 + l] else begun
         G0, G1 = G0 if h0 > G0 else h0, G1 if h1 > G1 else h1
         G0, G1 = G0 if G0 > 0.0 else 0.0, G1 if G1 > 0.0 else 0.0
         reached = G1
         if law.yields is not None:  # less what the bed holds at the flattened depth
-            z1, touched = scratch[_Z1 + l], y0 > scratch[_Z0 + l]
+            z1, touched = pad[_Z1 + l], y0 > pad[_Z0 + l]
             k0, k1 = k0 if touched else 0.0, k1 if y1 > z1 else 0.0
-            y0 = scratch[_Y0 + l]
-            G1 -= _share_at(z1, scratch[_FZ1 + l], zl, fl, sl, zh, fh, sh, ended)
+            y0 = pad[_Y0 + l]
+            G1 -= _share_at(z1, pad[_FZ1 + l], zl, fl, sl, zh, fh, sh, ended)
             h1 = k1 * (y1 - z1)
             G1 = G1 if h1 > G1 else h1
             G1 = G1 if G1 > 0.0 else 0.0
@@ -402,14 +402,14 @@ def _slide(scratch, qs, qt, L, law, f, i, ledger, tangent):
         chord = chord if chord < k1 else k1
         kept = 1.0 if grows else ratio
         add = a * (chord if grows else k1)
-        olds, oldt, des, det = qs[l], qt[l], scratch[_DES + l], scratch[_DET + l]
+        olds, oldt, des, det = qs[l], qt[l], pad[_DES + l], pad[_DET + l]
         if law.wears is not None:  # back to the limit, that fell since
-            strength = by_mu * scratch[_MU + l]
+            strength = by_mu * pad[_MU + l]
             if law.yields is not None:
                 G0 -= _share_at(
-                    scratch[_Z0 + l], scratch[_FZ0 + l], zl, fl, sl, zh, fh, sh, ended
+                    pad[_Z0 + l], pad[_FZ0 + l], zl, fl, sl, zh, fh, sh, ended
                 )
-                h0 = k0 * (y0 - scratch[_Z0 + l])
+                h0 = k0 * (y0 - pad[_Z0 + l])
                 G0 = G0 if h0 > G0 else h0
                 G0 = G0 if G0 > 0.0 else 0.0
             size0 = np.sqrt(olds * olds + oldt * oldt)
@@ -418,7 +418,7 @@ def _slide(scratch, qs, qt, L, law, f, i, ledger, tangent):
             back = back if size0 > cap0 else 1.0
             soft0 = 1.0 / (k0 if k0 > TINY else 1.0)
             worn = (1.0 - back) * (1.0 + back) * size0 * size0 * soft0
-            scratch[_LOST + l] += compliance * (worn if k0 > TINY else 0.0)
+            pad[_LOST + l] += compliance * (worn if k0 > TINY else 0.0)
             olds, oldt = back * olds, back * oldt
         ts, tt = olds * kept + add * des, oldt * kept + add * det
         new2 = ts * ts + tt * tt
@@ -429,8 +429,8 @@ def _slide(scratch, qs, qt, L, law, f, i, ledger, tangent):
         share = share if slips else 1.0
         part = share if new2 > TINY else 0.0  # a size that underflows has no cap
         qs[l], qt[l] = part * ts, part * tt
-        scratch[_SUMS + l] += part * ts
-        scratch[_SUMT + l] += part * tt
+        pad[_SUMS + l] += part * ts
+        pad[_SUMT + l] += part * tt
         if ledger is not None:  # each term is >= 0 as written
             r0 = 1.0 / (k0 if k0 > TINY else 1.0)
             r1 = 1.0 / (k1 if k1 > TINY else 1.0)
@@ -442,10 +442,10 @@ def _slide(scratch, qs, qt, L, law, f, i, ledger, tangent):
             soft = soft if k0 > TINY else 0.0
             rub = 2.0 * share * (1.0 - share) * (new2 * r1)
             rub = rub if k1 > TINY else 0.0
-            scratch[_LOST + l] += compliance * ((hard if grows else soft) + rub)
+            pad[_LOST + l] += compliance * ((hard if grows else soft) + rub)
         if tangent is not None:  # J_q = beta (I - s s^T) E + v g^T, "The tangent"
             curves = (from1 > 0.0) & ((y1 < zh) | (not ended))
-            c = scratch[_CURVING + l] if curves else 0.0
+            c = pad[_CURVING + l] if curves else 0.0
             bend = (k1 - chord) / (1.0 if near else dy)
             bend = a * (0.5 * c if near else bend)
             fade = c / (k1 if k1 > TINY else 1.0)
@@ -456,95 +456,95 @@ def _slide(scratch, qs, qt, L, law, f, i, ledger, tangent):
             us, ut = ts * unit, tt * unit
             dot = us * ws + ut * wt
             push = strength * k1
-            scratch[_VS + l] += share * (ws - us * dot) + push * us if slips else ws
-            scratch[_VT + l] += share * (wt - ut * dot) + push * ut if slips else wt
+            pad[_VS + l] += share * (ws - us * dot) + push * us if slips else ws
+            pad[_VT + l] += share * (wt - ut * dot) + push * ut if slips else wt
             if law.yields is not None:
-                kz = scratch[_SZ1 + l] - sl
+                kz = pad[_SZ1 + l] - sl
                 kz = sh - sl if ended & (z1 > zh) else kz
                 kz = kz if (z1 > zl) & (kz > 0.0) & (k1 > 0.0) & slips else 0.0
-                scratch[_WS + l] += strength * kz * us
-                scratch[_WT + l] += strength * kz * ut
+                pad[_WS + l] += strength * kz * us
+                pad[_WT + l] += strength * kz * ut
             beta = share * add
             sliding = beta if slips else 0.0
-            scratch[_BSS + l] += beta - sliding * us * us
-            scratch[_BST + l] -= sliding * us * ut
-            scratch[_BTT + l] += beta - sliding * ut * ut
+            pad[_BSS + l] += beta - sliding * us * us
+            pad[_BST + l] -= sliding * us * ut
+            pad[_BTT + l] += beta - sliding * ut * ut
 
 
 @_jit
-def _gradient(scratch, L, m0, m1, m2, limited):
+def _gradient(pad, L, m0, m1, m2, limited):
     """g = dy/dd of one facet, a row per component; an offset at its limit turns with the step."""
     if limited:
         for l in range(L):
-            scratch[_G0 + l] = m0
-            scratch[_G1 + l] = m1 * scratch[_J00 + l] + m2 * scratch[_J10 + l]
-            scratch[_G2 + l] = m1 * scratch[_J01 + l] + m2 * scratch[_J11 + l]
+            pad[_G0 + l] = m0
+            pad[_G1 + l] = m1 * pad[_J00 + l] + m2 * pad[_J10 + l]
+            pad[_G2 + l] = m1 * pad[_J01 + l] + m2 * pad[_J11 + l]
     else:
         for l in range(L):
-            scratch[_G0 + l], scratch[_G1 + l], scratch[_G2 + l] = m0, m1, m2
+            pad[_G0 + l], pad[_G1 + l], pad[_G2 + l] = m0, m1, m2
 
 
 @_jit
-def _add_tangent(scratch, L, law, f):
+def _add_tangent(pad, L, law, f):
     """C += along g^T + E^T B E of one facet, "The tangent"; B and v count in units of lam."""
     facet, dim = law.facet, law.dim
     s0, s1, s2 = facet[f, _S], facet[f, _S + 1], facet[f, _S + 2]
     t1, t2, A, soft = facet[f, _T + 1], facet[f, _T + 2], facet[f, _REST], 1.0 / law.scalars[0]
     n0, n1, n2 = A * facet[f, _N], A * facet[f, _N + 1], A * facet[f, _N + 2]
     for l in range(L):
-        slope, vs, vt = scratch[_S1 + l], soft * scratch[_VS + l], soft * scratch[_VT + l]
-        bss, bst, btt = soft * scratch[_BSS + l], soft * scratch[_BST + l], soft * scratch[_BTT + l]
-        g0, g1 = scratch[_G0 + l], scratch[_G1 + l]
+        slope, vs, vt = pad[_S1 + l], soft * pad[_VS + l], soft * pad[_VT + l]
+        bss, bst, btt = soft * pad[_BSS + l], soft * pad[_BST + l], soft * pad[_BTT + l]
+        g0, g1 = pad[_G0 + l], pad[_G1 + l]
         along = n0 * slope + s0 * vs
         left, right = s0 * bss, s0 * bst
-        scratch[_C00 + l] += along * g0 + left * s0
-        scratch[_C01 + l] += along * g1 + left * s1 + right * t1
+        pad[_C00 + l] += along * g0 + left * s0
+        pad[_C01 + l] += along * g1 + left * s1 + right * t1
         along = n1 * slope + s1 * vs + t1 * vt
         left, right = s1 * bss + t1 * bst, s1 * bst + t1 * btt
-        scratch[_C10 + l] += along * g0 + left * s0
-        scratch[_C11 + l] += along * g1 + left * s1 + right * t1
+        pad[_C10 + l] += along * g0 + left * s0
+        pad[_C11 + l] += along * g1 + left * s1 + right * t1
     if dim == 2:
         return
     for l in range(L):
-        slope, vs, vt = scratch[_S1 + l], soft * scratch[_VS + l], soft * scratch[_VT + l]
-        bss, bst, btt = soft * scratch[_BSS + l], soft * scratch[_BST + l], soft * scratch[_BTT + l]
-        g0, g1, g2 = scratch[_G0 + l], scratch[_G1 + l], scratch[_G2 + l]
+        slope, vs, vt = pad[_S1 + l], soft * pad[_VS + l], soft * pad[_VT + l]
+        bss, bst, btt = soft * pad[_BSS + l], soft * pad[_BST + l], soft * pad[_BTT + l]
+        g0, g1, g2 = pad[_G0 + l], pad[_G1 + l], pad[_G2 + l]
         left, right = s2 * bss + t2 * bst, s2 * bst + t2 * btt
-        scratch[_C02 + l] += (n0 * slope + s0 * vs) * g2 + s0 * left
-        scratch[_C12 + l] += (n1 * slope + s1 * vs + t1 * vt) * g2 + s1 * left + t1 * right
+        pad[_C02 + l] += (n0 * slope + s0 * vs) * g2 + s0 * left
+        pad[_C12 + l] += (n1 * slope + s1 * vs + t1 * vt) * g2 + s1 * left + t1 * right
         along = n2 * slope + s2 * vs + t2 * vt
-        scratch[_C20 + l] += along * g0 + left * s0
-        scratch[_C21 + l] += along * g1 + left * s1 + right * t1
-        scratch[_C22 + l] += along * g2 + left * s2 + right * t2
+        pad[_C20 + l] += along * g0 + left * s0
+        pad[_C21 + l] += along * g1 + left * s1 + right * t1
+        pad[_C22 + l] += along * g2 + left * s2 + right * t2
 
 
 @_jit
-def _soften(scratch, L, law, f):
+def _soften(pad, L, law, f):
     """C -= along g^T of a facet whose flattened depth moves, with the y that presses it."""
     facet, dim, o = law.facet, law.dim, np.int64(law.facet[f, _OPPOSITE])
     A, soft, limited = facet[f, _REST], 1.0 / law.scalars[0], law.scalars[2] < np.inf
     m0, m1, m2 = facet[o, _M], facet[o, _M + 1], facet[o, _M + 2]
     for l in range(L):
-        if scratch[_MOVES + l] == 0.0:
+        if pad[_MOVES + l] == 0.0:
             continue
-        g0, g1, g2 = scratch[_G0 + l], scratch[_G1 + l], scratch[_G2 + l]
-        if (scratch[_MOVES + l] == 2.0) & limited:
+        g0, g1, g2 = pad[_G0 + l], pad[_G1 + l], pad[_G2 + l]
+        if (pad[_MOVES + l] == 2.0) & limited:
             g0 = m0
-            g1 = m1 * scratch[_J00 + l] + m2 * scratch[_J10 + l]
-            g2 = m1 * scratch[_J01 + l] + m2 * scratch[_J11 + l]
-        slope, ws, wt = A * scratch[_SZ1 + l], soft * scratch[_WS + l], soft * scratch[_WT + l]
+            g1 = m1 * pad[_J00 + l] + m2 * pad[_J10 + l]
+            g2 = m1 * pad[_J01 + l] + m2 * pad[_J11 + l]
+        slope, ws, wt = A * pad[_SZ1 + l], soft * pad[_WS + l], soft * pad[_WT + l]
         for i in range(dim):
             along = facet[f, _N + i] * slope + facet[f, _S + i] * ws + facet[f, _T + i] * wt
             row = _C00 + 3 * i * LANES + l
-            scratch[row] -= along * g0
-            scratch[row + LANES] -= along * g1
-            scratch[row + 2 * LANES] -= along * g2
+            pad[row] -= along * g0
+            pad[row + LANES] -= along * g1
+            pad[row + 2 * LANES] -= along * g2
 
 
 @_jit
 def _facet(work, s, L, law, f, ledger, tangent):
     """One facet of a block: closures, virgin curve, sliders, and its part of F and C."""
-    scratch, facet, dim = work.scratch, law.facet, law.dim
+    pad, facet, dim = work.pad, law.facet, law.dim
     lam, limit = law.scalars[0], law.scalars[2]
     M, D = law.depth.shape[0], law.depth.shape[1] - 1
     m0, m1, m2 = facet[f, _M], facet[f, _M + 1], facet[f, _M + 2]
@@ -553,144 +553,142 @@ def _facet(work, s, L, law, f, ledger, tangent):
     n0, n1, n2 = facet[f, _N], facet[f, _N + 1], facet[f, _N + 2]
     A = facet[f, _REST]
     for l in range(L):
-        scratch[_Y0 + l] = m0 * scratch[_OLD + l] + m1 * scratch[_OLD1 + l]
-        scratch[_Y1 + l] = m0 * scratch[_NEW + l] + m1 * scratch[_NEW1 + l]
-        scratch[_DES + l] = s0 * scratch[_P + l] + s1 * scratch[_P1 + l]
-        scratch[_DET + l] = t1 * scratch[_P1 + l]
-        scratch[_SUMS + l] = scratch[_SUMT + l] = 0.0
+        pad[_Y0 + l] = m0 * pad[_OLD + l] + m1 * pad[_OLD1 + l]
+        pad[_Y1 + l] = m0 * pad[_NEW + l] + m1 * pad[_NEW1 + l]
+        pad[_DES + l] = s0 * pad[_P + l] + s1 * pad[_P1 + l]
+        pad[_DET + l] = t1 * pad[_P1 + l]
+        pad[_SUMS + l] = pad[_SUMT + l] = 0.0
     if dim == 3:
         for l in range(L):
-            scratch[_Y0 + l] += m2 * scratch[_OLD2 + l]
-            scratch[_Y1 + l] += m2 * scratch[_NEW2 + l]
-            scratch[_DES + l] += s2 * scratch[_P2 + l]
-            scratch[_DET + l] += t2 * scratch[_P2 + l]
+            pad[_Y0 + l] += m2 * pad[_OLD2 + l]
+            pad[_Y1 + l] += m2 * pad[_NEW2 + l]
+            pad[_DES + l] += s2 * pad[_P2 + l]
+            pad[_DET + l] += t2 * pad[_P2 + l]
     for l in range(L):
-        scratch[_Y0 + l] = scratch[_Y0 + l] if abs(scratch[_Y0 + l]) >= UNDERFLOW else 0.0
+        pad[_Y0 + l] = pad[_Y0 + l] if abs(pad[_Y0 + l]) >= UNDERFLOW else 0.0
     beside = _places(law)[2]
     rf, rs = beside + f, beside + M + f
     for l in range(L):
-        scratch[_F0 + l] = s[rf, l]
+<<<<<<< ch2.py
+        pad[_F0 + l] = s[rf, l]
     for l in range(L):
-        scratch[_S0 + l] = s[rs, l]
+        pad[_S0 + l] = s[rs, l]
     if law.yields is not None:
         _press(work, s, L, law, f)
+||||||| cb2.py
+        pad[_F0 + l] = s[rf, l]
+    for l in range(L):
+        pad[_S0 + l] = s[rs, l]
+=======
+        pad[_F0 + l], pad[_S0 + l] = s[rf, l], s[rs, l]
+>>>>>>> cm.py
     _virgin(work, law, True, L)
     for l in range(L):
-        s[rf, l] = scratch[_F1 + l]
-    for l in range(L):
-        s[rs, l] = scratch[_S1 + l]
+        s[rf, l], s[rs, l] = pad[_F1 + l], pad[_S1 + l]
     if tangent is not None:
         if law.curve.size == 4:  # not fetched yet
             _fetch(work.place, work.piece, L, law.curve)
         _curvature(work, law, L)
-        _gradient(scratch, L, m0, m1, m2, limit < np.inf)
+        _gradient(pad, L, m0, m1, m2, limit < np.inf)
         for l in range(L):
-            scratch[_BSS + l] = scratch[_BST + l] = scratch[_BTT + l] = 0.0
-            scratch[_VS + l] = scratch[_VT + l] = 0.0
+            pad[_BSS + l] = pad[_BST + l] = pad[_BTT + l] = 0.0
+            pad[_VS + l] = pad[_VT + l] = 0.0
         if law.yields is not None:
             for l in range(L):
-                scratch[_WS + l] = scratch[_WT + l] = 0.0
+                pad[_WS + l] = pad[_WT + l] = 0.0
     for i in range(D):
         rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
-        _slide(scratch, s[rs], s[rt], L, law, f, i, ledger, tangent)
+        _slide(pad, s[rs], s[rt], L, law, f, i, ledger, tangent)
     if law.yields is not None:
-        _relieve(scratch, L, law, f, ledger)
+        _relieve(pad, L, law, f, ledger)
     if law.wears is not None:
         for l in range(L):
-            scratch[_NORMAL + l] += A * (scratch[_F0 + l] + scratch[_F1 + l])
+            pad[_NORMAL + l] += A * (pad[_F0 + l] + pad[_F1 + l])
     soft = 1.0 / lam
     for l in range(L):
-        normal, q0, q1 = A * scratch[_F1 + l], soft * scratch[_SUMS + l], soft * scratch[_SUMT + l]
-        scratch[_F + l] += n0 * normal + s0 * q0
-        scratch[_FS + l] += n1 * normal + s1 * q0 + t1 * q1
+        normal, q0, q1 = A * pad[_F1 + l], soft * pad[_SUMS + l], soft * pad[_SUMT + l]
+        pad[_F + l] += n0 * normal + s0 * q0
+        pad[_FS + l] += n1 * normal + s1 * q0 + t1 * q1
     if dim == 3:
         for l in range(L):
-            normal, q0, q1 = (
-                A * scratch[_F1 + l],
-                soft * scratch[_SUMS + l],
-                soft * scratch[_SUMT + l],
-            )
-            scratch[_FT + l] += n2 * normal + s2 * q0 + t2 * q1
+            normal, q0, q1 = A * pad[_F1 + l], soft * pad[_SUMS + l], soft * pad[_SUMT + l]
+            pad[_FT + l] += n2 * normal + s2 * q0 + t2 * q1
     if limit < np.inf and ledger is not None:
         for l in range(L):
-            scratch[_PULL1 + l] += n1 * A * scratch[_F1 + l]
-            scratch[_PULL2 + l] += n2 * A * scratch[_F1 + l]
+            pad[_PULL1 + l] += n1 * A * pad[_F1 + l]
+            pad[_PULL2 + l] += n2 * A * pad[_F1 + l]
     if tangent is not None:
-        _add_tangent(scratch, L, law, f)
+        _add_tangent(pad, L, law, f)
         if law.yields is not None:
-            _soften(scratch, L, law, f)
+            _soften(pad, L, law, f)
 
 
 @_jit
-def _begin(scratch, s, d, start, L, law, tangent):
+def _begin(pad, s, d, start, L, law, tangent):
     """Lay out the old and new place of each joint of a block, and move it."""
     limit, dim = law.scalars[2], law.dim
     if limit < np.inf or dim == 1:
-        scratch[_P:_J00] = 0.0  # the offset has one component in a plane, none on closure
-    scratch[_PULL1:_C00] = 0.0
+        pad[_P:_J00] = 0.0  # the offset has one component in a plane, none on closure
+    pad[_PULL1:_C00] = 0.0
     if tangent is not None:
-        scratch[_C00:_NORMAL] = 0.0
+        pad[_C00:_NORMAL] = 0.0
     if law.yields is not None or law.wears is not None:
-        scratch[_NORMAL:_MU] = 0.0
+        pad[_NORMAL:_MU] = 0.0
     if law.wears is not None:
-        _weaken(scratch, s, L, law)
-    for i in range(dim):
-        for l in range(L):
-            scratch[_P + i * LANES + l] = d[start + l, i]
+        _weaken(pad, s, L, law)
     for i in range(dim):
         row, origin = i * LANES, 0 if i == 0 else dim + i - 1
         for l in range(L):
-            scratch[_OLD + row + l] = s[origin, l]
+            pad[_P + row + l] = d[start + l, i]
         for l in range(L):
-            scratch[_NEW + row + l] = scratch[_OLD + row + l] + scratch[_P + row + l]
+            pad[_OLD + row + l] = s[origin, l]
+        for l in range(L):
+            pad[_NEW + row + l] = pad[_OLD + row + l] + pad[_P + row + l]
     if limit < np.inf:
-        _limit_offset(scratch, L, limit, dim)
+        _limit_offset(pad, L, limit, dim)
     for i in range(dim):
         row = i * LANES
         for l in range(L):
-            s[i, l] += scratch[_P + row + l]
+            s[i, l] += pad[_P + row + l]
         if i > 0:
             for l in range(L):
-                s[dim + i - 1, l] = scratch[_NEW + row + l]
+                s[dim + i - 1, l] = pad[_NEW + row + l]
 
 
 @_jit
-def _finish(scratch, s, F, C, start, L, law, ledger, tangent):
+def _finish(pad, s, F, C, start, L, law, ledger, tangent):
     """Hand out F and C, and add up the ledger."""
     limit, dim = law.scalars[2], law.dim
     for i in range(dim):
         for l in range(L):
-            F[start + l, i] = scratch[_F + i * LANES + l]
+            F[start + l, i] = pad[_F + i * LANES + l]
     if tangent is not None:
         for i in range(dim):
             for j in range(dim):
                 for l in range(L):
-                    C[start + l, i, j] = scratch[_C00 + (3 * i + j) * LANES + l]
+                    C[start + l, i, j] = pad[_C00 + (3 * i + j) * LANES + l]
     if ledger is not None:
         if limit < np.inf:
             for l in range(L):
-                pull = (
-                    scratch[_PULL1 + l] * scratch[_NEW1 + l]
-                    + scratch[_PULL2 + l] * scratch[_NEW2 + l]
-                )
-                scratch[_LOST + l] += scratch[_SLIP + l] * (pull if pull > 0.0 else 0.0) / limit
+                pull = pad[_PULL1 + l] * pad[_NEW1 + l] + pad[_PULL2 + l] * pad[_NEW2 + l]
+                pad[_LOST + l] += pad[_SLIP + l] * (pull if pull > 0.0 else 0.0) / limit
         for l in range(L):
-            s[2 * dim - 1, l] += scratch[_LOST + l]
+            s[2 * dim - 1, l] += pad[_LOST + l]
         first, slip, _ = _places(law)
         if law.yields is not None:
             for l in range(L):
-                s[slip - 1, l] += scratch[_CRUSHED + l]
-                s[2 * dim - 1, l] += scratch[_CRUSHED + l]
+                s[slip - 1, l] += pad[_CRUSHED + l]
+                s[2 * dim - 1, l] += pad[_CRUSHED + l]
         if law.wears is not None:
             for l in range(L):
-                capacity = 0.5 * scratch[_MU + l] * scratch[_NORMAL + l]
-                rubbed = scratch[_LOST + l] / (capacity if capacity > 0.0 else 1.0)
+                capacity = 0.5 * pad[_MU + l] * pad[_NORMAL + l]
+                rubbed = pad[_LOST + l] / (capacity if capacity > 0.0 else 1.0)
                 s[slip, l] += rubbed if capacity > 0.0 else 0.0
 
 
 @_jit
 def advance(
-    state, d, F, C, index, keep, first, last, block, scratch, place, piece, facet, depth, curve,
+    state, d, F, C, index, keep, first, last, block, pad, place, piece, facet, depth, curve,
     scalars, dim, yields, wears, ledger, tangent,
 ):  # fmt: skip
     """Advance numbers first..last of the list `index` (of all joints if it is empty).
@@ -703,7 +701,7 @@ def advance(
     dissipated energy, `tangent` works out C; both are True or None, for which the compiler leaves
     the code out.
     """
-    work = Work(block, scratch, place, piece)
+    work = Work(block, pad, place, piece)
     law = Packed(facet, depth, curve, scalars, dim, yields, wears)
     rows, W = state.shape[1], state.shape[2]
     listed = index.size > 0
@@ -722,10 +720,10 @@ def advance(
                 for l in range(L):
                     block[r, l] = state[start // W, r, l]
             s = block
-        _begin(scratch, s, d, start, L, law, tangent)
+        _begin(pad, s, d, start, L, law, tangent)
         for f in range(facet.shape[0]):
             _facet(work, s, L, law, f, ledger, tangent)
-        _finish(scratch, s, F, C, start, L, law, ledger, tangent)
+        _finish(pad, s, F, C, start, L, law, ledger, tangent)
         if listed and keep:
             for l in range(L):
                 home, at = index[start + l] // W, index[start + l] % W
@@ -734,7 +732,7 @@ def advance(
 
 
 @_jit
-def _count(scratch, qs, qt, L, law, f, i):
+def _count(pad, qs, qt, L, law, f, i):
     """One depth cell of one facet: is it at its friction limit, and what does it store."""
     facet, depth = law.facet, law.depth
     strength = law.scalars[1] * law.scalars[0] * facet[f, _REST]
@@ -743,129 +741,129 @@ def _count(scratch, qs, qt, L, law, f, i):
     zh, fh, sh = depth[f, i + 1, 0], depth[f, i + 1, 1], depth[f, i + 1, 2]
     ended = i + 2 < depth.shape[1]
     for l in range(L):
-        y, force, slope = scratch[_Y0 + l], scratch[_F0 + l], scratch[_S0 + l]
+        y, force, slope = pad[_Y0 + l], pad[_F0 + l], pad[_S0 + l]
         reach = min(max(y, zl), zh)
         k = min(max(slope, sl), sh) - sl
         G = k * (y - reach) + (min(max(force, fl), fh) - fl - sl * (reach - zl))
         most = k * (y - zl if y > zl else 0.0)
         G = min(max(G, 0.0), most)
         if law.yields is not None:
-            z = scratch[_Z0 + l]
+            z = pad[_Z0 + l]
             k = k if y > z else 0.0
-            G -= _share_at(z, scratch[_FZ0 + l], zl, fl, sl, zh, fh, sh, ended)
+            G -= _share_at(z, pad[_FZ0 + l], zl, fl, sl, zh, fh, sh, ended)
             G = max(min(G, k * (y - z)), 0.0)
         if law.wears is not None:
-            strength = scratch[_MU + l] * law.scalars[0] * facet[f, _REST]
+            strength = pad[_MU + l] * law.scalars[0] * facet[f, _REST]
         q2 = qs[l] * qs[l] + qt[l] * qt[l]
         limit = np.sqrt(q2) >= strength * (G * (1.0 - LIMIT) - ROUNDED * force)
-        scratch[_WHOLE + l] = scratch[_WHOLE + l] if limit else 0.0
-        scratch[_LIMIT + l] += G if limit else 0.0
+        pad[_WHOLE + l] = pad[_WHOLE + l] if limit else 0.0
+        pad[_LIMIT + l] += G if limit else 0.0
         soft = 1.0 / (k if k > TINY else 1.0)
-        scratch[_STORED + l] += compliance * q2 * (soft if k > TINY else 0.0)
+        pad[_STORED + l] += compliance * q2 * (soft if k > TINY else 0.0)
 
 
 @_jit
-def _effective(scratch, s, L, law, f):
+def _effective(pad, s, L, law, f):
     """Effective closure y of one facet in the states s."""
     facet, dim = law.facet, law.dim
     m0, m1, m2 = facet[f, _M], facet[f, _M + 1], facet[f, _M + 2]
     closure, offset, other = s[0], s[dim], s[2 * dim - 2]
     for l in range(L):
-        scratch[_Y0 + l] = m0 * closure[l] + m1 * offset[l]
+        pad[_Y0 + l] = m0 * closure[l] + m1 * offset[l]
     if dim == 3:
         for l in range(L):
-            scratch[_Y0 + l] += m2 * other[l]
+            pad[_Y0 + l] += m2 * other[l]
 
 
 @_jit
 def _squeeze(work, law, L, energy, potential):
     """Energy of the normal springs at the row of y, from the table of T; Phi and Phi' beside."""
-    scratch, piece = work.scratch, work.piece
+    pad, piece = work.pad, work.piece
     eta, scale, rise = law.scalars[3], law.scalars[4], law.scalars[5]
     _virgin(work, law, None, L)
     _fetch(work.place, piece, L, energy)
     for l in range(L):
-        y, x, o = scratch[_Y0 + l], scratch[_X + l], 4 * l
+        y, x, o = pad[_Y0 + l], pad[_X + l], 4 * l
         T = piece[o] + x * (piece[o + 1] + x * (piece[o + 2] + x * piece[o + 3]))
         y = y if y > 0.0 else 0.0
         power = np.sqrt(y) if eta == 0.5 else 1.0
-        scratch[_CURVING + l] = potential * T * y * y * power
+        pad[_CURVING + l] = potential * T * y * y * power
     if rise > 0.0:
         for l in range(L):
-            y = scratch[_Y0 + l] if scratch[_Y0 + l] > 0.0 else 0.0
-            scratch[_CURVING + l] *= (y / (y + scale * scale)) ** rise
+            y = pad[_Y0 + l] if pad[_Y0 + l] > 0.0 else 0.0
+            pad[_CURVING + l] *= (y / (y + scale * scale)) ** rise
     if (eta != 0.5) & (eta != 0.0):
         for l in range(L):
-            scratch[_CURVING + l] *= scratch[_Y0 + l] ** eta if scratch[_Y0 + l] > 0.0 else 0.0
+            pad[_CURVING + l] *= pad[_Y0 + l] ** eta if pad[_Y0 + l] > 0.0 else 0.0
 
 
 @_jit
 def _measure_facet(work, s, L, law, f, energy):
     """What one facet of a block adds to the measures."""
-    scratch, dim = work.scratch, law.dim
+    pad, dim = work.pad, law.dim
     M, D = law.depth.shape[0], law.depth.shape[1] - 1
     potential, share = law.facet[f, _POTENTIAL], law.facet[f, _SHARE]
     for l in range(L):
-        scratch[_WHOLE + l], scratch[_LIMIT + l], scratch[_Z0 + l] = 1.0, 0.0, 0.0
+        pad[_WHOLE + l], pad[_LIMIT + l], pad[_Z0 + l] = 1.0, 0.0, 0.0
     if law.yields is not None:
         at = _places(law)[0] + f
         for l in range(L):
-            scratch[_Z0 + l] = scratch[_Y0 + l] = s[at, l]
+            pad[_Z0 + l] = pad[_Y0 + l] = s[at, l]
         _squeeze(work, law, L, energy, potential)
         for l in range(L):
-            scratch[_FZ0 + l], scratch[_FZ1 + l] = scratch[_F0 + l], scratch[_CURVING + l]
-    _effective(scratch, s, L, law, f)
+            pad[_FZ0 + l], pad[_FZ1 + l] = pad[_F0 + l], pad[_CURVING + l]
+    _effective(pad, s, L, law, f)
     _squeeze(work, law, L, energy, potential)
     if law.yields is not None:
         for l in range(L):
-            y, z = scratch[_Y0 + l], scratch[_Z0 + l]
-            squeezed = scratch[_CURVING + l] - scratch[_FZ1 + l]
-            squeezed -= potential * scratch[_FZ0 + l] * (y - z)
-            scratch[_CURVING + l] = squeezed if (y > z) & (squeezed > 0.0) else 0.0
+            y, z = pad[_Y0 + l], pad[_Z0 + l]
+            squeezed = pad[_CURVING + l] - pad[_FZ1 + l]
+            squeezed -= potential * pad[_FZ0 + l] * (y - z)
+            pad[_CURVING + l] = squeezed if (y > z) & (squeezed > 0.0) else 0.0
     for i in range(D):
         rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
-        _count(scratch, s[rs], s[rt], L, law, f, i)
+        _count(pad, s[rs], s[rt], L, law, f, i)
     for l in range(L):
-        y, force, z = scratch[_Y0 + l], scratch[_F0 + l], scratch[_Z0 + l]
+        y, force, z = pad[_Y0 + l], pad[_F0 + l], pad[_Z0 + l]
         if law.yields is not None:
-            force = force - scratch[_FZ0 + l] if y > z else 0.0
-        scratch[_STORED + l] += scratch[_CURVING + l]
-        scratch[_SLIDING + l] += share * scratch[_WHOLE + l] if y > z else 0.0
-        scratch[_SLIPPING + l] += share * scratch[_LIMIT + l] / (force if force > 0.0 else 1.0)
-        scratch[_APART + l] += 0.0 if y > z else share
-        scratch[_REACH + l] = y if y > scratch[_REACH + l] else scratch[_REACH + l]
+            force = force - pad[_FZ0 + l] if y > z else 0.0
+        pad[_STORED + l] += pad[_CURVING + l]
+        pad[_SLIDING + l] += share * pad[_WHOLE + l] if y > z else 0.0
+        pad[_SLIPPING + l] += share * pad[_LIMIT + l] / (force if force > 0.0 else 1.0)
+        pad[_APART + l] += 0.0 if y > z else share
+        pad[_REACH + l] = y if y > pad[_REACH + l] else pad[_REACH + l]
 
 
 @_jit
 def measures(
-    state, out, first, last, block, scratch, place, piece, facet, depth, curve, scalars, dim,
+    state, out, first, last, block, pad, place, piece, facet, depth, curve, scalars, dim,
     yields, wears, energy,
 ):  # fmt: skip
     """Measures (5, n) of joints first..last, as `reference.measures`; arguments as above."""
-    work = Work(block, scratch, place, piece)
+    work = Work(block, pad, place, piece)
     law = Packed(facet, depth, curve, scalars, dim, yields, wears)
     W = state.shape[2]
     for start in range(first, last, W):
         L = min(W, last - start)
         s = state[start // W]
-        scratch[_SLIDING:_REACH] = 0.0
+        pad[_SLIDING:_REACH] = 0.0
         if law.wears is not None:
-            _weaken(scratch, s, L, law)
-        scratch[_REACH : _REACH + LANES] = -np.inf
+            _weaken(pad, s, L, law)
+        pad[_REACH : _REACH + LANES] = -np.inf
         for f in range(facet.shape[0]):
             _measure_facet(work, s, L, law, f, energy)
         for i in range(5):
             for l in range(L):
-                out[i, start + l] = scratch[_SLIDING + i * LANES + l]
+                out[i, start + l] = pad[_SLIDING + i * LANES + l]
 
 
 @_jit
 def refresh(
-    state, first, last, block, scratch, place, piece, facet, depth, curve, scalars, dim, yields,
+    state, first, last, block, pad, place, piece, facet, depth, curve, scalars, dim, yields,
     wears,
 ):  # fmt: skip
     """Phi and Phi' in the blocks of joints first..last, after their states were written."""
-    work = Work(block, scratch, place, piece)
+    work = Work(block, pad, place, piece)
     law = Packed(facet, depth, curve, scalars, dim, yields, wears)
     M, W = depth.shape[0], state.shape[2]
     for start in range(first, last, W):
@@ -873,13 +871,13 @@ def refresh(
         s = state[start // W]
         for f in range(M):
             first_depth, _, beside = _places(law)
-            _effective(scratch, s, L, law, f)
+            _effective(pad, s, L, law, f)
             _virgin(work, law, None, L)
             for l in range(L):
-                s[beside + f, l], s[beside + M + f, l] = scratch[_F0 + l], scratch[_S0 + l]
+                s[beside + f, l], s[beside + M + f, l] = pad[_F0 + l], pad[_S0 + l]
             if law.yields is not None:
                 for l in range(L):
-                    scratch[_Y0 + l] = s[first_depth + f, l]
+                    pad[_Y0 + l] = s[first_depth + f, l]
                 _virgin(work, law, None, L)
                 for l in range(L):
-                    s[beside + 2 * M + f, l] = scratch[_F0 + l]
+                    s[beside + 2 * M + f, l] = pad[_F0 + l]

@@ -47,9 +47,7 @@ def plastic_work(k: Tables, y0: Array, y1: Array, flat0: Cells, flat1: Cells) ->
     return lost
 
 
-def softening(
-    k: Tables, after: Cells, flat0: Cells, flat1: Cells, push: Array, g: Array
-) -> Array:
+def softening(k: Tables, after: Cells, flat0: Cells, flat1: Cells, push: Array, g: Array) -> Array:
     """Part (dim, dim, B) by which yielding lowers the tangent: the flattened depth moves along.
 
     push: derivative (2, M, D, B) of q by G in slipping sliders. g: dy/dd (dim, M, B).

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -12,10 +12,10 @@ from ..joints.joint import Joint
 from ..joints.state import NonFiniteError
 from ..support.checks import Array, above, at_least, number, numbers, one_of, whole
 from ..support.progress import track
+from .normal_control import NormalCondition, closing_increment
 from .record import UNITS, Record
 
 CONTROLS = ("stress", "stiffness", "closure")
-TOLERANCE = 1e-11  # of the normal stress scale, in normal control
 
 
 class PathError(RuntimeError):
@@ -55,9 +55,10 @@ def closure_test(
             levels += [*list(peak * grading[-2::-1]), 0.0]
         start = levels[-1]
     log = _Log(joint, 0.0, "closure test")
+    log.measure(joint.F)
     still = np.zeros(joint.law.tables.dim - 1)
     for level in track(levels, "closure test", len(levels)):
-        log.advance(still, Normal(level, max(peaks)))
+        log.advance(still, NormalCondition(level, max(peaks)))
     return log.record()
 
 
@@ -109,12 +110,12 @@ def direct_shear(
         )
     log = _Log(joint, azimuth if plane is None else plane, "direct shear")
     along = np.array([math.cos(azimuth), math.sin(azimuth)]) if plane is None else np.ones(1)
-    log.seat(normal)
-    goal = Normal(normal, normal, stiffness or 0.0, float(joint.delta[0]))
+    log.advance(np.zeros_like(along), NormalCondition(normal, normal))  # seated without shear
+    condition = NormalCondition(normal, normal, stiffness or 0.0, float(joint.delta[0]))
     increments = np.diff(np.concatenate([[0.0], points])) / steps
     legs = np.repeat(increments, steps)
     for length in track(legs, "direct shear", len(legs)):
-        log.advance(length * along, None if control == "closure" else goal)
+        log.advance(length * along, None if control == "closure" else condition)
     return log.record()
 
 
@@ -126,89 +127,41 @@ def _series(name: str, value: float | Sequence[float], unit: str) -> Array:
     return series
 
 
-class Normal(NamedTuple):
-    """Normal condition F1 = stress + spring (seat - closure), met to a share of `scale` (Pa)."""
-
-    stress: float
-    scale: float
-    spring: float = 0.0
-    seat: float = 0.0
-
-    def misfit(self, F1: float, closure: float) -> float:
-        """How far F1 (Pa) lies above what the condition asks at this closure (m)."""
-        return F1 - self.stress - self.spring * (self.seat - closure)
-
-
 class _Log:
     """Rows of a test in progress, and the steps that add them."""
 
     def __init__(self, joint: Joint, azimuth: float, name: str) -> None:
         self.joint, self.azimuth, self.name = joint, azimuth, name
         self.rows: list[list[float]] = []
-        if name == "closure test":
-            self.measure()
 
-    def seat(self, normal: float) -> None:
-        """Bring the joint to the normal stress without shear, and begin the record there."""
-        still = np.zeros(self.joint.law.tables.dim - 1)
-        self.advance(still, Normal(normal, normal))
-
-    def advance(self, shear: Array, goal: Normal | None) -> None:
+    def advance(self, shear: Array, condition: NormalCondition | None) -> None:
         """One step with the in-plane increment `shear` that meets the normal condition."""
         try:
-            closing = 0.0 if goal is None else self._solve(shear, goal)
-            self.joint.update(np.concatenate([[closing], shear]), tangent=False)
+            closing = 0.0
+            if condition is not None:
+                closing = closing_increment(self.joint, shear, condition)
+            F, _ = self.joint.update(np.concatenate([[closing], shear]), tangent=False)
         except (NonFiniteError, ArithmeticError) as error:
             raise PathError(
                 f"{self.name} stopped after {len(self.rows)} rows: {error}", self.record()
             ) from error
-        self.measure()
+        self.measure(F)
 
-    def _solve(self, shear: Array, goal: Normal) -> float:
-        """Closure increment at which the normal condition holds: Newton kept inside a bracket."""
-        joint = self.joint
-        here = float(joint.delta[0])
-        size = max(abs(here), float(np.max(np.abs(shear), initial=0.0)))
-        length = reach = size or float(joint.law.closure(goal.scale))
-        u, low, high = 0.0, -math.inf, math.inf
-        for _ in range(200):
-            F, C = joint.trial(np.concatenate([[u], shear]))
-            value = goal.misfit(float(F[0]), here + u)
-            if abs(value) <= TOLERANCE * goal.scale and not (F[0] == 0.0 and value == 0.0):
-                return u
-            low, high = (u, high) if value <= 0 else (low, u)
-            finest = 4e-16 * max(abs(here + u), length)  # what rounding of the closure leaves
-            if high - low <= finest:
-                return high
-            slope = goal.spring + (float(C[0, 0]) if C is not None else 0.0)
-            newton = u - value / slope if slope > 0 else math.nan
-            if math.isinf(low) or math.isinf(high):
-                bound = u + reach if math.isinf(high) else u - reach
-                if not (math.isfinite(newton) and abs(newton - u) < abs(bound - u)):
-                    newton = bound
-                if abs(newton - u) < finest:  # there but for rounding: step across, to bracket it
-                    newton = u + math.copysign(finest, bound - u)
-                reach *= 2.0
-                u = newton
-                continue
-            u = newton if low < newton < high else 0.5 * (low + high)
-        raise ArithmeticError(
-            f"no closure between {here + low:g} and {here + high:g} m gives a normal stress of "
-            f"{goal.stress:g} Pa (spring {goal.spring:g} Pa/m)"
-        )
-
-    def measure(self) -> None:
-        """Add a row from the joint's state."""
-        j = self.joint
-        delta, F = list(j.delta), list(j.F)
-        if len(delta) == 1:
-            delta, F = [*delta, 0.0, 0.0], [*F, 0.0, 0.0]
-        if len(delta) == 2:
-            cos, sin = math.cos(self.azimuth), math.sin(self.azimuth)
-            delta = [delta[0], delta[1] * cos, delta[1] * sin]
-            F = [F[0], F[1] * cos, F[1] * sin]
-        row = [*delta, *F, j.sliding, j.separated, j.stored_energy, j.dissipated_energy]
+    def measure(self, F: Array) -> None:
+        """Add a row from the joint's state and its traction F."""
+        now, space = self.joint.measures(), self._in_space
+        shares, energies = (now.sliding, now.separated), (now.stored, self.joint.dissipated_energy)
+        row: list[Any] = [*space(self.joint.delta), *space(F), *shares, *energies]
         self.rows.append([float(x) for x in row])
+
+    def _in_space(self, vector: Array) -> list[float]:
+        """Three components of a vector with one, two or three."""
+        if len(vector) == 1:
+            return [vector[0], 0.0, 0.0]
+        if len(vector) == 2:
+            cos, sin = math.cos(self.azimuth), math.sin(self.azimuth)
+            return [vector[0], vector[1] * cos, vector[1] * sin]
+        return list(vector)
 
     def record(self) -> Record:
         """The rows so far."""

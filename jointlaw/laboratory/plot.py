@@ -2,40 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from ..support.checks import Array
-    from .record import Record
+from ..support.checks import Array
+from ..support.pyplot import pyplot
 
 _LENGTHS = ((1e-9, "nm"), (1e-6, "µm"), (1e-3, "mm"), (1.0, "m"))
 _STRESSES = ((1.0, "Pa"), (1e3, "kPa"), (1e6, "MPa"), (1e9, "GPa"))
 _ENERGIES = ((1e-6, "µJ/m²"), (1e-3, "mJ/m²"), (1.0, "J/m²"), (1e3, "kJ/m²"))
 
 
-def plot_record(record: Record, path: str | Path | None = None) -> Any:
+def plot_record(curves: Mapping[str, Array], azimuth: float, path: str | Path | None = None) -> Any:
     """Draw a closure test or a direct shear test; returns the matplotlib figure.
 
-    With `path` the figure is also written there and closed.
+    curves: the columns of a record with its shear, shear_stress and friction_angle, arrays
+    (rows,); azimuth of the shear in rad. With `path` the figure is also written there and closed.
     """
-    pyplot = _pyplot()
-    sheared = bool(np.any(record.shear != record.shear[0]))
-    figure = _shear_figure(pyplot, record) if sheared else _closure_figure(pyplot, record)
+    sheared = bool(np.any(curves["shear"] != curves["shear"][0]))
+    figure = _shear_figure(curves, azimuth) if sheared else _closure_figure(curves)
     if path is not None:
         figure.savefig(path, dpi=150)
-        pyplot.close(figure)
+        pyplot().close(figure)
     return figure
-
-
-def _pyplot() -> Any:
-    try:
-        from matplotlib import pyplot
-    except ImportError as error:
-        raise ImportError("pictures need matplotlib: pip install 'jointlaw[plot]'") from error
-    return pyplot
 
 
 def _scaled(values: Array, units: tuple[tuple[float, str], ...]) -> tuple[Array, str]:
@@ -45,40 +37,38 @@ def _scaled(values: Array, units: tuple[tuple[float, str], ...]) -> tuple[Array,
     return values / factor, name
 
 
-def _shear_figure(pyplot: Any, record: Record) -> Any:
-    shear, length = _scaled(record.shear, _LENGTHS)
-    figure, axes = pyplot.subplots(2, 2, figsize=(9, 6.5), layout="constrained", sharex=True)
-    stress, unit = _scaled(np.stack([record.shear_stress, record.F1]), _STRESSES)
+def _shear_figure(curves: Mapping[str, Array], azimuth: float) -> Any:
+    shear, length = _scaled(curves["shear"], _LENGTHS)
+    figure, axes = pyplot().subplots(2, 2, figsize=(9, 6.5), layout="constrained", sharex=True)
+    stress, unit = _scaled(np.stack([curves["shear_stress"], curves["F1"]]), _STRESSES)
     axes[0, 0].plot(shear, stress[0], label="shear stress")
     axes[0, 0].plot(shear, stress[1], "--", color="0.5", label="normal stress")
     axes[0, 0].set_ylabel(f"stress ({unit})")
     axes[0, 0].legend()
-    axes[0, 1].plot(shear, record.friction_angle, color="C3")
+    axes[0, 1].plot(shear, curves["friction_angle"], color="C3")
     axes[0, 1].set_ylabel("mobilised friction angle (°)")
-    dilation, small = _scaled(record.closure[0] - record.closure, _LENGTHS)
+    dilation, small = _scaled(curves["closure"][0] - curves["closure"], _LENGTHS)
     axes[1, 0].plot(shear, dilation, color="C2")
     axes[1, 0].set_ylabel(f"dilation ({small})")
-    axes[1, 1].plot(shear, 100 * record.sliding, label="sliding")
-    axes[1, 1].plot(shear, 100 * record.separated, label="separated")
+    axes[1, 1].plot(shear, 100 * curves["sliding"], label="sliding")
+    axes[1, 1].plot(shear, 100 * curves["separated"], label="separated")
     axes[1, 1].set_ylabel("share of facet orientations (%)")
     axes[1, 1].set_ylim(-3, 103)
     axes[1, 1].legend(loc="upper center", bbox_to_anchor=(0.5, 1.12), ncols=2, frameon=False)
     for axis in axes[1]:
         axis.set_xlabel(f"shear displacement ({length})")
-    azimuth = np.degrees(record.azimuth)
-    figure.suptitle(f"Direct shear at azimuth {azimuth:.0f}°" + _peak(record))
+    peak = np.max(np.abs(curves["friction_angle"]))
+    figure.suptitle(
+        f"Direct shear at azimuth {np.degrees(azimuth):.0f}°, peak friction angle {peak:.1f}°"
+    )
     return figure
 
 
-def _peak(record: Record) -> str:
-    return f", peak friction angle {record.peak_friction_angle:.1f}°"
-
-
-def _closure_figure(pyplot: Any, record: Record) -> Any:
-    closure, length = _scaled(record.closure, _LENGTHS)
-    stress, unit = _scaled(record.F1, _STRESSES)
-    energy, joule = _scaled(np.stack([record.stored, record.dissipated]), _ENERGIES)
-    figure, axes = pyplot.subplots(1, 2, figsize=(9, 4), layout="constrained")
+def _closure_figure(curves: Mapping[str, Array]) -> Any:
+    closure, length = _scaled(curves["closure"], _LENGTHS)
+    stress, unit = _scaled(curves["F1"], _STRESSES)
+    energy, joule = _scaled(np.stack([curves["stored"], curves["dissipated"]]), _ENERGIES)
+    figure, axes = pyplot().subplots(1, 2, figsize=(9, 4), layout="constrained")
     axes[0].plot(closure, stress)
     axes[0].set_xlabel(f"closure ({length})")
     axes[0].set_ylabel(f"normal stress ({unit})")

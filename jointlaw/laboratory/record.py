@@ -14,6 +14,7 @@ import numpy as np
 
 from ..support.checks import Array
 from ..support.files import replace_file
+from .plot import plot_record
 
 UNITS = {
     "closure": "m",
@@ -79,7 +80,7 @@ class Record:
 
     @property
     def dilation_angle(self) -> float:
-        """Largest dilation angle atan(-d closure/|d shear|) in degrees; 0 without dilation."""
+        """Largest dilation angle atan(opening/shear) of a step, in degrees; 0 without dilation."""
         slip = np.abs(np.diff(self.shear))
         opening = -np.diff(self.closure)
         moved = slip > 1e-9 * max(float(np.max(np.abs(self.shear))), 1e-300)
@@ -129,6 +130,6 @@ class Record:
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Draw the test (needs matplotlib: extra `plot`); returns the figure, saved to `path`."""
-        from .plot import plot_record
-
-        return plot_record(self, path)
+        derived = ("shear", "shear_stress", "friction_angle")
+        curves = {**self.columns, **{name: getattr(self, name) for name in derived}}
+        return plot_record(curves, self.azimuth, path)

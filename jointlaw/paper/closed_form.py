@@ -16,23 +16,12 @@ for, any object with a, b and c serves: `Shape` is one whose a may be infinite.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
-from ..parameters.orientation import bounded
+from ..parameters.orientation import Orientation, bounded
 from ..support.checks import Array, at_least, number
-
-
-class HasShape(Protocol):
-    """What the closed forms read of an orientation."""
-
-    @property
-    def a(self) -> float: ...
-    @property
-    def b(self) -> float: ...
-    @property
-    def c(self) -> float: ...
 
 
 class Shape(NamedTuple):
@@ -43,6 +32,9 @@ class Shape(NamedTuple):
     c: float = 0.0
 
 
+HasShape = Orientation | Shape
+
+
 def elastic(orientation: HasShape, kn: float, ks: float) -> Array:
     """Elastic stiffness of the interface: Table 1, which is Eq. 26, for any a, b, c.
 
@@ -51,10 +43,10 @@ def elastic(orientation: HasShape, kn: float, ks: float) -> Array:
     Raises ValueError for a negative or non-finite stiffness and outside the bounds of Eq. 18.
     """
     kn, ks = at_least("kn", kn, 0.0), at_least("ks", ks, 0.0)
-    m = _moments(_shape(orientation), 0.0)
-    normal = kn * m.cos2 + ks * m.sin2
-    shear = (kn * m.sin2 + ks * (1.0 + m.cos2)) / 2
-    twist = (kn - ks) * m.sin2_twist / 2
+    (sin2, sin2_twist), (cos2, _), _ = _moments(_shape(orientation), 0.0)
+    normal = kn * cos2 + ks * sin2
+    shear = (kn * sin2 + ks * (1.0 + cos2)) / 2
+    twist = (kn - ks) * sin2_twist / 2
     return np.array([normal, shear + twist, shear - twist])
 
 
@@ -71,10 +63,10 @@ def inelastic(orientation: HasShape, kn: float, ks: float, mu: float) -> Array:
     start_U = start * shape.a if start > 0 else 0.0
     if start_U >= math.pi / 2:
         return np.zeros(3)
-    m = _moments(shape, start_U)
-    normal = ks * m.sin2 - mu * kn * m.sincos
-    shear = (ks * m.cos2 + mu * kn * m.sincos) / 2
-    twist = (ks * m.cos2_twist + mu * kn * m.sincos_twist) / 2
+    (sin2, _), (cos2, cos2_twist), (sincos, sincos_twist) = _moments(shape, start_U)
+    normal = ks * sin2 - mu * kn * sincos
+    shear = (ks * cos2 + mu * kn * sincos) / 2
+    twist = (ks * cos2_twist + mu * kn * sincos_twist) / 2
     return np.array([normal, shear + twist, shear - twist])
 
 
@@ -117,31 +109,21 @@ def inclination(orientation: HasShape) -> tuple[float, float]:
     return (6 - b) / (6 * a), spread / (6 * a) ** 2
 
 
-class _Moments(NamedTuple):
-    """Integrals of sin^2, cos^2, sin cos of theta, weighted with g0 and (twist) with g2."""
-
-    sin2: float
-    cos2: float
-    sincos: float
-    sin2_twist: float
-    cos2_twist: float
-    sincos_twist: float
-
-
 def _shape(orientation: HasShape) -> Shape:
     """a, b and c within their bounds; a may be infinite."""
     return Shape(*bounded(orientation.a, orientation.b, orientation.c, smooth=True))
 
 
-def _moments(shape: Shape, U0: float) -> _Moments:
-    """The integrals above over theta from U0/a to pi/(2a)."""
+def _moments(shape: Shape, U0: float) -> Array:
+    """Integrals of sin^2, cos^2, sin cos (3 rows) of theta from U0/a to pi/(2a).
+
+    Weighted with g0 (first column) and with g2 (second).
+    """
     b, c, beta = shape.b, shape.c, 2.0 / shape.a
     first, third = _integrals(1.0, beta, U0), _integrals(3.0, beta, U0)
-    values = []
-    for weight_1, weight_3 in ((1 - b / 8, 3 * b / 8), (9 * c / 8, -3 * c / 8)):
-        one, cos, sin = weight_1 * first + weight_3 * third
-        values += [(one - cos) / 2, (one + cos) / 2, sin / 2]
-    return _Moments(*values)
+    weight_1, weight_3 = np.array([1 - b / 8, 9 * c / 8]), np.array([3 * b / 8, -3 * c / 8])
+    one, cos, sin = np.outer(first, weight_1) + np.outer(third, weight_3)
+    return np.array([(one - cos) / 2, (one + cos) / 2, sin / 2])
 
 
 def _integrals(p: float, beta: float, U0: float) -> Array:

@@ -17,17 +17,15 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..law import JointLaw
+from ..parameters.asperity import Asperity
+from ..parameters.orientation import Orientation
 from ..support.checks import Array, numbers, one_of
-
-if TYPE_CHECKING:
-    from ..law import JointLaw
-    from ..parameters.asperity import Asperity
-    from ..parameters.orientation import Orientation
 
 _THETA_NODES, _PHI_NODES = 32, 24  # per panel: 1e-8 of |C| at worst, 1e-12 as a rule
 
@@ -89,12 +87,16 @@ def secant(law: JointLaw, delta: ArrayLike, contact: str = "exact") -> Secant:
         elastic, inelastic = _stiffness(asperity, d, n, zone, limit, contact)
         Ce += (weight * elastic).sum(-1)
         Cp += (weight * inelastic).sum(-1)
-    touching = 1.0
-    if law.heights is not None:
-        touching = float(law.heights.cdf(law.heights.overlap + d[0]))
-    scale = law.asperity_density * touching
+    scale = law.asperity_density * touching(law, float(d[0]))
     Ce, Cp = scale * Ce, scale * Cp
     return Secant((Ce - Cp) @ d, Ce, Cp, float(shares[1]), float(shares[2]))
+
+
+def touching(law: JointLaw, closure: ArrayLike) -> Any:
+    """Share of the asperities in touch at a closure (m), P(r0 + delta_1); 1 without heights."""
+    if law.heights is None:
+        return np.ones_like(closure, float)[()]
+    return law.heights.cdf(law.heights.overlap + np.asarray(closure))
 
 
 def shear_factor(x: ArrayLike, eta: float, contact: str = "exact") -> Array:

@@ -1,0 +1,13 @@
+"""Scans of joint surfaces, in the order in which heights become a law.
+
+    scan_files      files of heights: CSV, NPY, profilometers
+    synthetic       surfaces whose asperities are known, to try a scan on
+    asperities      summits and facets of a surface
+    height_fit      a gamma distribution through summit depths
+    direction_fit   Eq. 14 through facet slopes
+    estimate        parameters with errors, and what the scan leaves open
+    report, plot    the same in words and as a picture
+    fit             from_surface and its result, which gives a law
+
+Each file imports from those above it only.
+"""

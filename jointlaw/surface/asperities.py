@@ -44,59 +44,74 @@ def extract(z: Array, spacing: float, samples: int) -> Asperities:
 
     Summits within `samples` and two of the rim are left out.
     """
-    m, dim = samples, z.ndim
-    z = _levelled(z)
+    z, length = _levelled(z), samples * spacing
+    summits = _summits(z, samples)
+    _enough(len(summits), length)
+    quadrants = 1 - 2 * np.array(list(np.ndindex(*(2,) * z.ndim)))  # (quadrants, dim) of +-1
+    gradient, misfit, moment = _planes(z, summits, quadrants, samples)
+    gradient = gradient / spacing
+    count = samples**z.ndim - z.ndim - 1
+    # the median of chi^2 with n degrees of freedom is n (1 - 2/(9n))^3
+    middle = count * (1 - 2 / (9 * count)) ** 3
+    noise = float(np.sqrt(np.median(misfit) / middle / moment)) / spacing
+    keep = misfit <= 9 * np.median(misfit)
+    fall = -np.einsum("qnd,qd->qn", gradient, quadrants) / np.sqrt(z.ndim)
+    kept = np.maximum(np.sum(keep, axis=0), 1)
+    hill = np.sum(fall * keep, axis=0) > 6 * noise * np.sqrt(kept)
+    _enough(int(hill.sum()), length)
+    for first, second in combinations(range(len(quadrants)), 2):
+        apart = np.max(np.abs(gradient[first] - gradient[second]), axis=-1)
+        keep[second] &= ~(keep[first] & (apart < 3 * np.sqrt(2) * noise))
+    keep &= hill
+    summit = np.broadcast_to(np.cumsum(hill) - 1, keep.shape)[keep]
+    height, summits = z[tuple(summits[hill].T)], summits[hill]
+    area = float(np.prod([(n - 2 * _rim(samples)) * spacing for n in z.shape]))
+    depth = height.max() - height
+    return Asperities(depth, gradient[keep], summit, noise, len(summits) / area, length, summits)
+
+
+def _rim(samples: int) -> int:
+    return samples + 2
+
+
+def _summits(z: Array, samples: int) -> NDArray[np.intp]:
+    """Grid indices (n, dim) of the summits, step 2 of `extract`."""
     smooth = ndimage.uniform_filter(z, 3, mode="nearest")
     ramp = np.arange(z.size).reshape(z.shape) * (1e-12 * float(np.std(z)) / z.size + 1e-300)
     ranked = smooth + ramp  # of equal points one is the summit
-    top = ranked == ndimage.maximum_filter(ranked, size=2 * m + 1, mode="nearest")
-    rim = m + 2
-    summits = np.argwhere(top[tuple(slice(rim, n - rim) for n in z.shape)]) + rim
-    summits = _highest_near(z, summits)
-    area = float(np.prod([(n - 2 * rim) * spacing for n in z.shape]))
-    height = z[tuple(summits.T)]
-    _enough(len(summits), m * spacing)
-    axis = np.arange(1, m + 1)
+    top = ranked == ndimage.maximum_filter(ranked, size=2 * samples + 1, mode="nearest")
+    rim = _rim(samples)
+    places = np.argwhere(top[tuple(slice(rim, n - rim) for n in z.shape)]) + rim
+    near = places[:, None, :] + np.array(list(np.ndindex(*(3,) * z.ndim))) - 1
+    best = np.argmax(z[tuple(np.moveaxis(near, -1, 0))], axis=1)
+    return np.asarray(near[np.arange(len(places)), best])
+
+
+def _planes(
+    z: Array, summits: NDArray[np.intp], quadrants: NDArray[np.intp], samples: int
+) -> tuple[Array, Array, float]:
+    """Planes through the squares in the quadrants beside the summits.
+
+    Gradients in m per point (quadrants, n, dim), sums of squared misfits (quadrants, n) in m2, and
+    the sum over a square of squared distances from its middle line, in points squared.
+    """
+    dim, axis = z.ndim, np.arange(1, samples + 1)
     centred = axis - axis.mean()
-    arms = m ** (dim - 1) * float(centred @ centred)
-    slopes, missed, falls = [], [], []
-    for signs in np.ndindex(*(2,) * dim):
-        steps = [axis if s == 0 else -axis for s in signs]
-        offsets = np.stack(np.meshgrid(*steps, indexing="ij"), -1)  # (m, .., dim)
+    moment = samples ** (dim - 1) * float(centred @ centred)
+    within = tuple(range(1, dim + 1))
+    gradients, misfits = [], []
+    for signs in quadrants:
+        offsets = np.stack(np.meshgrid(*np.outer(signs, axis), indexing="ij"), -1)
         index = summits.reshape(-1, *(1,) * dim, dim) + offsets
         patch = z[tuple(np.moveaxis(index, -1, 0))]
-        within = tuple(range(1, dim + 1))
-        flat = patch - patch.mean(axis=within, keepdims=True)
+        left = patch - patch.mean(axis=within, keepdims=True)
         gradient = []
-        for k in range(dim):
-            shape = [1] * (dim + 1)
-            shape[k + 1] = m
-            arm = centred.reshape(shape) * (1 if signs[k] == 0 else -1)
-            g = (flat * arm).sum(axis=within) / arms
-            gradient.append(g / spacing)
-            flat = flat - arm * g.reshape(-1, *(1,) * dim)
-        slopes.append(np.stack(gradient, -1))
-        falls.append(-slopes[-1] @ (1 - 2 * np.array(signs)) / np.sqrt(dim))
-        missed.append(np.sum(flat**2, axis=within))
-    left, count = np.concatenate(missed), m**dim - dim - 1
-    keep = left <= 9 * np.median(left)
-    # the median of chi^2 with n degrees of freedom is n (1 - 2/(9n))^3
-    middle = count * (1 - 2 / (9 * count)) ** 3
-    noise = float(np.sqrt(np.median(left) / middle / arms)) / spacing
-    sides, gradients = keep.reshape(2**dim, -1), np.stack(slopes)
-    fall, kept = np.sum(np.stack(falls) * sides, axis=0), np.sum(sides, axis=0)
-    hill = fall > 6 * noise * np.sqrt(np.maximum(kept, 1))
-    for first, second in combinations(range(2**dim), 2):
-        apart = np.max(np.abs(gradients[first] - gradients[second]), axis=-1)
-        sides[second] &= ~(sides[first] & (apart < 3 * np.sqrt(2) * noise))
-    keep = sides.ravel()
-    _enough(int(hill.sum()), m * spacing)
-    keep &= np.tile(hill, 2**dim)
-    number = np.cumsum(hill) - 1
-    of = np.tile(number, 2**dim)[keep]
-    depth = height[hill].max() - height[hill]
-    density, slope = int(hill.sum()) / area, np.concatenate(slopes)[keep]
-    return Asperities(depth, slope, of, noise, density, m * spacing, summits[hill])
+        for arm in np.meshgrid(*np.outer(signs, centred), indexing="ij", sparse=True):
+            gradient.append((left * arm).sum(axis=within) / moment)
+            left = left - arm * gradient[-1].reshape(-1, *(1,) * dim)
+        gradients.append(np.stack(gradient, -1))
+        misfits.append(np.sum(left**2, axis=within))
+    return np.stack(gradients), np.stack(misfits), moment
 
 
 def _enough(summits: int, length: float) -> None:
@@ -105,14 +120,6 @@ def _enough(summits: int, length: float) -> None:
             f"z has {summits} summits at a sampling length of {length:g} m: at least {FEWEST} are "
             "needed; scan a larger area or change sampling_length"
         )
-
-
-def _highest_near(z: Array, places: NDArray[np.intp]) -> NDArray[np.intp]:
-    """The highest point among the neighbours of each place (n, dim), itself included."""
-    steps = np.array(list(np.ndindex(*(3,) * z.ndim))) - 1
-    near = places[:, None, :] + steps
-    best = np.argmax(z[tuple(np.moveaxis(near, -1, 0))], axis=1)
-    return np.asarray(near[np.arange(len(places)), best])
 
 
 def _levelled(z: Array) -> Array:

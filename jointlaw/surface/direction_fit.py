@@ -31,14 +31,17 @@ _U, _WEIGHT = 0.5 * (_X + 1), 0.5 * _W
 
 
 class DirectionFit(NamedTuple):
-    """a, b, c, covariance (3, 3), largest difference of the cumulative curves of inclination."""
+    """a, b, c of Eq. 14, and the shares of facets by class of inclination."""
 
     a: float
     b: float
     c: float
-    covariance: Array
-    distance: float
+    covariance: Array  # (3, 3)
+    distance: float  # largest difference of the two cumulative curves
     at_bound: bool
+    inclination: Array  # (classes,) rad
+    measured: Array  # (classes,) shares of the facets
+    fitted: Array  # (classes,) the same of the fit, error of the slopes included
 
 
 class _Bins(NamedTuple):
@@ -73,18 +76,14 @@ def fit_directions(slope: Array, summit: NDArray[np.intp], noise: float) -> Dire
     x = np.array([a, b, c])
     covariance = _covariance(bins, x, summit)
     p = _density(bins, _components(bins, a), b, c).sum(axis=1)
-    model, seen = np.cumsum(p), np.cumsum(bins.counts.sum(axis=1)) / bins.counts.sum()
-    distance = float(np.max(np.abs(model - seen)))
+    counts = bins.counts.sum(axis=1)
+    distance = float(np.max(np.abs(np.cumsum(p) - np.cumsum(counts) / counts.sum())))
     bound = largest_c(b)
     at_bound = b < -0.98 or b > 1.98 or (abs(c) > 0.99 * bound and not bins.profile) or a < 1.001
-    return DirectionFit(a, b, c, covariance, distance, bool(at_bound))
-
-
-def model_inclination(fit: DirectionFit, slope: Array, noise: float) -> tuple[Array, Array, Array]:
-    """Inclination (rad), measured share per class and the share of the fit, for a picture."""
-    bins = _count(slope, noise)
-    p = _density(bins, _components(bins, fit.a), fit.b, fit.c).sum(axis=1)
-    return np.arctan(bins.radius), bins.counts.sum(axis=1) / bins.counts.sum(), p
+    inclination, measured = np.arctan(bins.radius), counts / counts.sum()
+    return DirectionFit(
+        a, b, c, covariance, distance, bool(at_bound), inclination, measured, p
+    )  # fmt: skip
 
 
 def _count(slope: Array, noise: float) -> _Bins:

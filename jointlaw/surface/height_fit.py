@@ -8,6 +8,7 @@ never unbounded.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -69,9 +70,8 @@ def fit_heights(depth: Array, reference: float | None = None) -> HeightFit:
     return HeightFit(shape - 1, beta * scale, start * scale, covariance, distance, at_bound)
 
 
-def _hessian(f: object, x: Array) -> Array:
+def _hessian(f: Callable[[Array], float], x: Array) -> Array:
     """Second derivatives by central differences."""
-    assert callable(f)
     n, h = x.size, 1e-3
     steps = h * np.eye(n)
     H = np.empty((n, n))

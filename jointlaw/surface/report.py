@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
-from .fit import SurfaceFit
+from .estimate import SurfaceEstimate
 
 UNITS = {"beta": "m", "overlap": "m", "asperity_density": "1/m2"}
 
 
-def report(fit: SurfaceFit) -> str:
-    """Parameters with errors, quality, what is not identifiable, dependence on sampling length."""
+def report(fit: SurfaceEstimate, at_lengths: Sequence[SurfaceEstimate]) -> str:
+    """Parameters with errors, quality, what is not identifiable, dependence on sampling length.
+
+    at_lengths: the same scan read at several sampling lengths.
+    """
     found = fit.asperities
     lines = [
         "# Asperities of a scanned surface",
@@ -52,7 +56,7 @@ def report(fit: SurfaceFit) -> str:
         "| beta (m) |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
-    for other in fit.at_lengths():
+    for other in at_lengths:
         p = other.parameters
         mean = math.degrees(other.orientation.mean)
         lines.append(

@@ -30,22 +30,23 @@ def read_scan(
     Raises ValueError naming the file and the remedy, ImportError when SurfaceTopography is needed.
     """
     path = Path(path)
-    unit = 1.0 if factor is None else factor
+    suffix = path.suffix.lower()
     if not path.is_file():
         raise ValueError(f"{path}: does not exist; give a file of heights")
-    if path.suffix.lower() == ".npy":
-        return np.squeeze(np.load(path)) * unit, _needed(path, spacing)
-    if path.suffix.lower() in _TEXT:
-        try:
-            return _text(path) * unit, _needed(path, spacing)
-        except UnicodeDecodeError:
-            pass  # some instruments give such names to files of their own
-    return _topography(path, spacing, factor)
+    try:
+        z = np.load(path) if suffix == ".npy" else _text(path) if suffix in _TEXT else None
+    except UnicodeDecodeError:
+        z = None  # some instruments give such names to files of their own
+    if z is None:
+        return _topography(path, spacing, factor)
+    if spacing is None:
+        raise ValueError(f"{path}: spacing is missing; give it in m, for example --spacing 20um")
+    return np.squeeze(z) * (1.0 if factor is None else factor), spacing
 
 
 def _text(path: Path) -> Array:
-    lines = [line for line in path.read_text(encoding="utf-8-sig").splitlines() if line.strip()]
-    lines = [line for line in lines if not line.lstrip().startswith("#")]
+    text = path.read_text(encoding="utf-8-sig").splitlines()
+    lines = [line for line in text if line.strip() and not line.lstrip().startswith("#")]
     if not lines:
         raise ValueError(f"{path}: holds no heights")
     delimiter = next((d for d in (";", "\t", ",") if d in lines[-1]), None)
@@ -54,15 +55,9 @@ def _text(path: Path) -> Array:
     except ValueError:
         lines = lines[1:]  # a row of names
     try:
-        return np.squeeze(np.loadtxt(lines, delimiter=delimiter))
+        return np.loadtxt(lines, delimiter=delimiter)
     except ValueError as error:
         raise ValueError(f"{path}: is not a matrix of heights ({error})") from None
-
-
-def _needed(path: Path, spacing: float | None) -> float:
-    if spacing is None:
-        raise ValueError(f"{path}: spacing is missing; give it in m, for example --spacing 20um")
-    return spacing
 
 
 def _topography(path: Path, spacing: float | None, factor: float | None) -> tuple[Array, float]:

@@ -2,35 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ..laboratory.plot import _pyplot
-
-if TYPE_CHECKING:
-    from .table import JointTable
+from ..support.checks import Array
+from ..support.pyplot import pyplot
 
 
-def plot_table(table: JointTable, path: str | Path | None = None) -> Any:
-    """Normal stress, stiffnesses, friction and dilation against closure, by azimuth."""
-    pyplot = _pyplot()
-    figure, axes = pyplot.subplots(2, 2, figsize=(9, 6.5), layout="constrained", sharex=True)
-    u = table.closure * 1e6
-    axes[0, 0].plot(u, table.normal_stress / 1e6, "o-", ms=2.5)
+def plot_table(columns: Mapping[str, Array], path: str | Path | None = None) -> Any:
+    """Normal stress, stiffnesses, friction and dilation of a table's columns against closure."""
+    figure, axes = pyplot().subplots(2, 2, figsize=(9, 6.5), layout="constrained", sharex=True)
+    u = columns["un"] * 1e6
+    axes[0, 0].plot(u, columns["sn"] / 1e6, "o-", ms=2.5)
     axes[0, 0].set_ylabel("normal stress (MPa)")
-    for name, values in (
-        ("normal, secant", table.kn_secant),
-        ("normal, tangent", table.kn_tangent),
-    ):
-        axes[0, 1].plot(u, values / 1e9, label=name)
-    places = [0, len(table.azimuth) // 4, len(table.azimuth) // 2]
-    for k in places:
-        label = f"{np.degrees(table.azimuth[k]):.0f}°"
-        axes[0, 1].plot(u, table.shear_stiffness[:, k] / 1e9, "--", label=f"shear, {label}")
-        axes[1, 0].plot(u, table.peak_friction[:, k], label=f"peak, {label}")
-        axes[1, 1].plot(u, np.degrees(np.arctan(table.dilation[:, k])), label=label)
+    for kind in ("secant", "tangent"):
+        axes[0, 1].plot(u, columns[f"kn_{kind}"] / 1e9, label=f"normal, {kind}")
+    azimuths = [name[3:] for name in columns if name.startswith("kt_")]
+    for k in (0, len(azimuths) // 4, len(azimuths) // 2):
+        azimuth, label = azimuths[k], f"{int(azimuths[k])}°"
+        axes[0, 1].plot(u, columns[f"kt_{azimuth}"] / 1e9, "--", label=f"shear, {label}")
+        axes[1, 0].plot(u, columns[f"mu_{azimuth}"], label=f"peak, {label}")
+        axes[1, 1].plot(u, np.degrees(np.arctan(columns[f"dil_{azimuth}"])), label=label)
     axes[0, 1].set_ylabel("stiffness (GPa/m)")
     axes[1, 0].set_ylabel("friction coefficient")
     axes[1, 1].set_ylabel("dilation angle (°)")
@@ -40,5 +35,5 @@ def plot_table(table: JointTable, path: str | Path | None = None) -> Any:
         axis.set_xlabel("closure (µm)")
     if path is not None:
         figure.savefig(path, dpi=150)
-        pyplot.close(figure)
+        pyplot().close(figure)
     return figure

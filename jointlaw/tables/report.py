@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ..law import JointLaw
 from ..support.checks import Array, whole
 
-if TYPE_CHECKING:
-    from ..law import JointLaw
-    from .table import JointTable
+Follow = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
@@ -55,16 +55,19 @@ class Report:
         return {r.name: {k: v for k, v in vars(r).items() if k != "name"} for r in self.rows}
 
 
-def report(table: JointTable, law: JointLaw, steps: int) -> Report:
-    """Follow the path suite with table and law; `steps` per leg."""
+def report(follow: Follow, law: JointLaw, end: float, shear_limit: float, steps: int) -> Report:
+    """Tractions of `follow` along the path suite, compared with those of the law.
+
+    follow: tractions (m, 3) in Pa of the table along a path (m, 3) in m; end: last closure and
+    shear_limit: largest shear of the suite, in m; steps: per leg of a path.
+    """
     steps = whole("steps", steps, 2)
-    limit = float(table.metadata["shear_limit"])
     rows = []
-    for name, corners in _suite(float(table.closure[-1]), limit).items():
+    for name, corners in _suite(end, shear_limit).items():
         path = _legs(corners, steps)
-        joint = law.joints(1)
-        exact = np.array([joint.update(d[None], tangent=False)[0][0] for d in _steps(path)])
-        rows.append(_error(name, table.follow(path), exact, corners))
+        increments, joint = np.diff(path, axis=0, prepend=np.zeros((1, 3))), law.joint()
+        exact = np.array([joint.update(d, tangent=False)[0] for d in increments])
+        rows.append(_error(name, follow(path), exact, corners))
     return Report(tuple(rows))
 
 
@@ -95,10 +98,6 @@ def _legs(corners: list[tuple[float, float, float]], steps: int) -> Array:
         start = points[-1]
         points += [start + (goal - start) * (k / steps) for k in range(1, steps + 1)]
     return np.array(points[1:])
-
-
-def _steps(path: Array) -> Array:
-    return np.diff(path, axis=0, prepend=np.zeros((1, 3)))
 
 
 def _error(

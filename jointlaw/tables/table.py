@@ -6,23 +6,23 @@ import io
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..law import JointLaw
 from ..support.checks import Array
 from ..support.files import replace_file
-
-if TYPE_CHECKING:
-    from ..law import JointLaw
-    from .report import Report
+from .plot import plot_table
+from .report import Report, report
+from .table_law import MARKER, VERSION, TableLaw, around, between, read_table
 
 _BY_CLOSURE = ("un", "sn", "kn_secant", "kn_tangent", "mu")
 _BY_AZIMUTH = ("kt", "mu", "mob", "dil")
-_MARKER = "# metadata: "
 
 
 class Row(NamedTuple):
@@ -71,36 +71,17 @@ class JointTable:
         u, psi = np.broadcast_arrays(np.asarray(closure, float), np.asarray(azimuth, float))
         if not (np.isfinite(u).all() and np.isfinite(psi).all()):
             raise ValueError("closure and azimuth must be finite (m, rad)")
-        row = np.clip(np.searchsorted(self.closure, u, "right") - 1, 0, len(self.closure) - 2)
-        low = self.closure[row]
-        w = np.clip((u - low) / (self.closure[row + 1] - low), 0.0, 1.0)
-
-        def between(values: Array) -> Any:
-            return values[row] + (values[row + 1] - values[row]) * w
-
-        touches, end = u > 0, self.closure[-1]
-        secant = between(self.kn_secant)
-        last = self.normal_stress[-1] + self.kn_tangent[-1] * (u - end)
-        secant = np.where(u > end, last / np.where(u > end, u, 1.0), secant)
-        stiffness = between(self._harmonics[0])
-        stiffness = stiffness + between(self._harmonics[1]) * np.cos(2 * psi)
-        stiffness = stiffness + between(self._harmonics[2]) * np.sin(2 * psi)
-        p = len(self.azimuth)
-        place = np.mod(psi, np.pi) * (p / np.pi)
-        a = np.floor(place).astype(int) % p
-        b, x = (a + 1) % p, place - np.floor(place)
-
-        def around(values: Array) -> Any:
-            first = values[row, a] * (1 - w) + values[row + 1, a] * w
-            second = values[row, b] * (1 - w) + values[row + 1, b] * w
-            return first * (1 - x) + second * x
-
-        columns = (
-            np.where(touches, secant * u, 0.0), np.where(touches, secant, 0.0),
-            np.where(touches, between(self.kn_tangent), 0.0), np.where(touches, stiffness, 0.0),
-            around(self.peak_friction), around(self.mobilised_friction), around(self.dilation),
-        )  # fmt: skip
-        return Row(*(value[()] for value in columns))
+        shape, u, psi = u.shape, u.ravel(), psi.ravel()
+        row, w, secant = self._law.at(u)
+        K22, K33, K23 = self._law.shear_stiffness(row, w)
+        mean, c = (K22 + K33) / 2, (K22 - K33) / 2
+        stiffness = mean + c * np.cos(2 * psi) + K23 * np.sin(2 * psi)
+        touches = u > 0
+        by_closure = (secant * u, secant, between(self.kn_tangent, row, w), stiffness)
+        by_azimuth = (self.peak_friction, self.mobilised_friction, self.dilation)
+        values = [np.where(touches, value, 0.0) for value in by_closure]
+        values += [around(value.T, psi, row, w) for value in by_azimuth]
+        return Row(*(value.reshape(shape)[()] for value in values))
 
     def follow(self, delta: ArrayLike) -> Array:
         """Traction (m, 3) in Pa that a host computes from the table along a path delta (m, 3) in m.
@@ -111,52 +92,36 @@ class JointTable:
         path = np.asarray(delta, float)
         if path.ndim != 2 or path.shape[1] != 3 or not np.isfinite(path).all():
             raise ValueError(f"delta has shape {path.shape}; expected finite values (m, 3) in m")
-        result, f = np.zeros_like(path), np.zeros(2)
-        here, K_old = np.zeros(3), self.stiffness_matrix(0.0)
-        for k, point in enumerate(path):
-            K = self.stiffness_matrix(float(point[0]))
-            if np.trace(K) < np.trace(K_old):
-                f = K @ np.linalg.solve(K_old, f)
-            f = f + K @ (point - here)[1:]
-            size = float(np.hypot(*f))
-            at = self.lookup(point[0], np.arctan2(f[1], f[0]))
-            cap = at.peak_friction * at.normal_stress
-            if size > cap:
-                f = f * (cap / size)
-            result[k] = at.normal_stress, *f
-            here, K_old = point, K
-        return result
+        law = TableLaw(self.columns)
+        law.add(np.zeros(1))
+        steps = np.diff(path, axis=0, prepend=np.zeros((1, 3)))
+        tractions = [law.step(d[:, None], x[:1]) for d, x in zip(steps, path, strict=True)]
+        return np.array(tractions).reshape(-1, 3)
 
     def stiffness_matrix(self, closure: float) -> Array:
         """Initial tangent shear stiffness (2, 2) in Pa/m, axes 2 and 3."""
-        if closure <= 0:
-            return np.zeros((2, 2))
-        mean, c, s = (np.interp(closure, self.closure, part) for part in self._harmonics)
-        return np.array([[mean + c, s], [s, mean - c]])
+        row, w, _ = self._law.at(np.array([closure]))
+        K22, K33, K23 = self._law.shear_stiffness(row, w)[:, 0] * (closure > 0)
+        return np.array([[K22, K23], [K23, K33]])
 
-    @property
-    def _harmonics(self) -> tuple[Array, Array, Array]:
-        k, psi = self.shear_stiffness, self.azimuth
-        c, s = 2 * np.cos(2 * psi), 2 * np.sin(2 * psi)
-        return k.mean(axis=1), (k * c).mean(axis=1), (k * s).mean(axis=1)
+    @cached_property
+    def _law(self) -> TableLaw:
+        return TableLaw(self.columns)
 
     def report(self, law: JointLaw, steps: int = 60) -> Report:
         """What the table drops: its error against the law on a suite of paths."""
-        from .report import report
-
-        return report(self, law, steps)
+        limit = float(self.metadata["shear_limit"])
+        return report(self.follow, law, float(self.closure[-1]), limit, steps)
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Draw the table (needs matplotlib); returns the figure, written to `path` if given."""
-        from .plot import plot_table
-
-        return plot_table(self, path)
+        return plot_table(self.columns, path)
 
     # ------------------------------------------------------------------ files
 
     @property
     def columns(self) -> dict[str, Array]:
-        """Columns as in the files: un sn kn_secant kn_tangent mu kt_000 ... mu_ ... mob_ ... dil_.
+        """Columns as in the files: `un sn kn_secant kn_tangent mu kt_000 ... mu_.. mob_.. dil_..`
 
         `mu` is the mean over azimuth of the peak friction, the numbers are azimuths in degrees.
         """
@@ -177,7 +142,8 @@ class JointTable:
     def save(self, path: str | Path) -> None:
         """Write `.npz`, or text that `numpy.genfromtxt(path, names=True)` reads: names first."""
         path, columns = Path(path), self.columns
-        data, meta = np.array(list(columns.values())).T, json.dumps(dict(self.metadata))
+        data = np.array(list(columns.values())).T
+        meta = json.dumps({"version": VERSION, **self.metadata})
         if path.suffix == ".npz":
             buffer = io.BytesIO()
             np.savez(buffer, names=list(columns), data=data, metadata=meta)
@@ -186,23 +152,16 @@ class JointTable:
         text = io.StringIO()
         np.savetxt(text, data, fmt="%.17g")
         notes = "".join(f"# {k}: {v}\n" for k, v in self.metadata.items() if k != "law")
-        head = "# " + " ".join(columns) + "\n" + notes + _MARKER + meta + "\n"
+        head = "# " + " ".join(columns) + "\n" + notes + MARKER + meta + "\n"
         replace_file(path, (head + text.getvalue()).encode())
 
 
 def load_table(path: str | Path) -> JointTable:
     """Read a table that `JointTable.save` wrote. Raises ValueError if the file is not one."""
-    path = Path(path)
     try:
-        if path.suffix == ".npz":
-            with np.load(path, allow_pickle=False) as file:
-                column = dict(zip(file["names"].tolist(), file["data"].T, strict=True))
-                metadata = json.loads(str(file["metadata"]))
-        else:
-            data = np.genfromtxt(path, names=True)
-            column = {name: data[name] for name in data.dtype.names or ()}
-            lines = path.read_text().splitlines()
-            metadata = json.loads(next(s for s in lines if s.startswith(_MARKER))[len(_MARKER) :])
+        column, metadata = read_table(path)
+        if not metadata.pop("version", None):
+            raise ValueError(f"it has no line {MARKER.strip()!r}")
         angles = sorted(int(name[3:]) for name in column if name.startswith("kt_"))
         if not (np.isfinite(list(column.values())).all() and (np.diff(column["un"]) > 0).all()):
             raise ValueError("column un must increase and all values must be finite")
@@ -213,5 +172,5 @@ def load_table(path: str | Path) -> JointTable:
             np.array([column[f"{name}_{a:03d}"] for a in angles]).T for name in _BY_AZIMUTH
         )
         return JointTable(un, sn, secant, tangent, np.radians(angles), kt, mu, mob, dil, metadata)
-    except (OSError, EOFError, KeyError, ValueError, TypeError, StopIteration, BadZipFile) as error:
+    except (OSError, EOFError, KeyError, ValueError, TypeError, IndexError, BadZipFile) as error:
         raise ValueError(f"{str(path)!r} is not a joint table: {error!r}") from None

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from ..laboratory.normal_control import closing_increments
 from ..law import JointLaw
 from ..support.checks import Array, above, whole
+from ..support.version import __version__
 from .table import JointTable
 
 FLOOR = 1e-4  # stresses below this share of the largest are held to an absolute tolerance
@@ -58,14 +61,9 @@ def tabulate(
     secant, tangent = _normal(law, u)
     kt = _shear_stiffness(law, u, psi)
     peak, mobilised, dilation = _friction(law, u, psi, limit, steps)
-    table = JointTable(
-        u, secant * u, secant, tangent, psi, kt, peak, mobilised, dilation, {}
-    )  # fmt: skip
+    table = JointTable(u, secant * u, secant, tangent, psi, kt, peak, mobilised, dilation, {})
     harmonic = np.abs(table.lookup(u[1:, None], psi).shear_stiffness / kt[1:] - 1).max()
-    object.__setattr__(
-        table, "metadata", _metadata(law, table, tolerance, worst, harmonic, limit, steps)
-    )
-    return table
+    return replace(table, metadata=_metadata(law, table, tolerance, worst, harmonic, limit, steps))
 
 
 def require_3d(law: JointLaw) -> None:
@@ -85,8 +83,6 @@ def _metadata(
     limit: float,
     steps: int,
 ) -> dict[str, Any]:
-    from .. import __version__
-
     kn, kt = float(table.kn_tangent.max()), float(table.shear_stiffness.max())
     return {
         "about": f"rock joint tabulated by jointlaw {__version__}, per unit area of joint",
@@ -178,7 +174,7 @@ def _friction(
     peak = ratio = dilation = zero
     for length in lengths:
         step = length * along
-        closing = _hold_stress(batch, step, goal)
+        closing = closing_increments(batch, step, goal)
         step[:, 0] = closing
         F, _ = batch.update(step, tangent=False)
         ratio = np.sum(F * along, axis=1) / goal
@@ -189,29 +185,3 @@ def _friction(
         for values in (peak, ratio, dilation)
     ]
     return result[0], result[1], result[2]
-
-
-def _hold_stress(batch: Any, step: Array, goal: Array) -> Array:
-    """Closure increments (n) at which a shear step leaves the normal stress: bracketed Newton."""
-    x, trial = np.zeros(len(goal)), step.copy()
-    low, high = np.full(len(x), -np.inf), np.full(len(x), np.inf)
-    reach = np.abs(step).max(axis=1)
-    for _ in range(100):
-        trial[:, 0] = x
-        F, C = batch.trial(trial)
-        miss = F[:, 0] - goal
-        if (np.abs(miss) <= 1e-9 * goal).all():
-            break
-        low, high = np.where(miss < 0, x, low), np.where(miss < 0, high, x)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            newton = x - miss / C[:, 0, 0]
-        open_ended = np.isinf(low) | np.isinf(high)
-        bound = x - np.sign(miss) * reach
-        reach = np.where(open_ended, 2 * reach, reach)
-        free = np.isfinite(newton) & (np.abs(newton - x) <= np.abs(bound - x))
-        inside = (newton > low) & (newton < high)
-        with np.errstate(invalid="ignore"):
-            half = np.where(open_ended, bound, (low + high) / 2)
-        better = np.where(open_ended, np.where(free, newton, bound), np.where(inside, newton, half))
-        x = np.where(np.abs(miss) <= 1e-9 * goal, x, better)
-    return x

@@ -11,22 +11,21 @@ import numpy as np
 import pytest
 
 import jointlaw
-from jointlaw.hosts import yade as host
+from jointlaw.hosts.yade.export import copy_adapter
 from jointlaw.tables.table import JointTable
 
 ROOT = Path(jointlaw.__file__).parents[1]
-FILES = Path(host.__file__).parent / "yade_files"
 MARK = "RESULT "
 
 PREAMBLE = f"""
-import sys, json
-sys.path.insert(0, {str(FILES)!r})
+import os, sys, json
+sys.path.insert(0, os.getcwd())
 import numpy as np
 from math import *
 def result(**values):
     def plain(v): return v.tolist() if hasattr(v, "tolist") else v
     print("\\n{MARK}" + json.dumps({{k: plain(v) for k, v in values.items()}}), flush=True)
-from yade_joint import Joints, Table, Live
+from yade_joint import Joints, TableLaw, LiveLaw
 import yade_joint
 
 def engines(kn=0.0, ks=0.0, mu=0.5, damping=0.0, ratchet=True, keep=False, gravity=(0, 0, 0)):
@@ -72,6 +71,7 @@ def yade(tmp_path):
         path = Path(folder) / name
         if script is not None:
             path.write_text((PREAMBLE if preamble else "") + script)
+            copy_adapter(Path(folder))
         env = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME")}
         env |= {"OMP_NUM_THREADS": "1", "MPLBACKEND": "Agg"}
         if live:  # two versions of numba in one cache throw each other's kernels away

@@ -1,5 +1,7 @@
 """The adapter's bookkeeping: contacts that come and go, large turns, refusals."""
 
+from pathlib import Path
+
 import numpy as np
 
 import jointlaw as jl
@@ -11,7 +13,7 @@ def turn(N):
     O.bodies.append([utils.sphere((0, 0, 0), 0.5), utils.sphere((.999, 0, 0), 0.4999)])
     for b in O.bodies: b.state.blockedDOFs = "xyzXYZ"
     engines()
-    joints = Joints(Table("joint.txt"))
+    joints = Joints(TableLaw("joint.txt"))
     joints.attach()
     O.dt = 1e-3
     O.step()
@@ -68,8 +70,8 @@ def scene(joints, keep, gone):
         O.bodies[1].state.pos = (0, 0, .5 + gone)
         O.step()
     return out
-result(table=scene(Joints(Table("joint.txt")), False, 1e-3),
-       live=scene(Joints(Live(law), forget=.1 * end), True, .3 * end))
+result(table=scene(Joints(TableLaw("joint.txt")), False, 1e-3),
+       live=scene(Joints(LiveLaw(law), forget=.1 * end), True, .3 * end))
 """
 )
 
@@ -100,19 +102,21 @@ def attempt(name, action):
     except Exception as error:
         messages[name] = str(error)
 def joints(**options):
-    return Joints(Table("joint.txt"), **options)
+    return Joints(TableLaw("joint.txt"), **options)
 slab_and_sphere()
 attempt("no loop", lambda: joints().attach())
 engines()
 O.engines = O.engines[:3] + [GlobalStiffnessTimeStepper()] + O.engines[3:]
 attempt("stepper", lambda: joints().attach())
 engines()
-class LiveStub:
-    live = True
+class LiveStub:  # no TableLaw
+    pass
 attempt("keep", lambda: Joints(LiveStub()).attach())
 attempt("lagged live", lambda: Joints(LiveStub(), lagged=True))
 attempt("name", lambda: joints(name="a b"))
 attempt("run", lambda: yade_joint.run("nobody"))
+np.savez("old.npz", ids=[])
+attempt("version", lambda: joints().load("old.npz"))
 O.periodic = True
 attempt("periodic", lambda: joints().attach())
 O.periodic = False
@@ -169,9 +173,9 @@ def test_refusals_name_the_remedy(yade, make_table, tmp_path):
     out = yade(REFUSALS)
     told = {
         "no loop": "set O.engines before attach", "stepper": "joints.time_step()",
-        "keep": "neverErase=True", "lagged live": "Table only", "name": "identifier",
+        "keep": "neverErase=True", "lagged live": "needs a TableLaw", "name": "identifier",
         "run": ".load(file)", "periodic": "O.periodic", "area": "area = -1", "phys": "select=",
-        "missed": "every step", "taken": "give another name=",
+        "version": "start the run anew", "missed": "every step", "taken": "give another name=",
     }  # fmt: skip
     for name, words in told.items():
         assert words in out["messages"][name], (name, out["messages"][name])
@@ -190,7 +194,7 @@ def steps(area):
     for k in (1, 2): O.bodies[k].state.blockedDOFs = "xyzXYZ"
     O.bodies[1].state.pos = (0, 0, .499)
     engines()
-    joints = Joints(Table("joint.txt"), area=area)
+    joints = Joints(TableLaw("joint.txt"), area=area)
     joints.attach()
     try:
         before = joints.time_step()
@@ -200,7 +204,7 @@ def steps(area):
     O.step()
     return before, joints.time_step()
 result(number=steps(10.0), array=steps(np.array(10.0)), function=steps(lambda i: 10.0),
-       circle=steps(None), k=Table("joint.txt").stiffness(), m=O.bodies[1].state.mass)
+       circle=steps(None), k=TableLaw("joint.txt").stiffness(), m=O.bodies[1].state.mass)
 """
 
 
@@ -219,3 +223,29 @@ def test_time_step_knows_the_area_however_it_is_given(yade, make_table, tmp_path
     assert "after the first step" in before
     assert np.isclose(float(after), expected, rtol=1e-12, atol=0)
     assert np.allclose(out["circle"], expected * np.sqrt(10.0 / (np.pi * 0.25)), rtol=1e-12, atol=0)
+
+
+SPECIMEN = """
+slab_and_sphere()
+engines()
+joints = Joints(TableLaw("joint.txt"))
+joints.attach()
+O.dt = 1e-4
+path = [(1e-3 * k, 2e-4 * k, 1e-4 * k) for k in range(10)]
+drive(path[:6])
+joints.save("now.npz")
+if specimen:
+    joints.load(specimen)
+result(force=drive(path[6:]))
+"""
+
+
+def test_a_saved_state_of_version_1_is_read(yade, make_table, tmp_path):
+    """The run goes on from the specimen as from the state in memory."""
+    make_table(tmp_path / "joint.txt", 1e8, 5e7, 0.4, eta=0.5, uneven=0.2)
+    there = Path(__file__).with_name("specimens") / "joints.npz"
+    unbroken, resumed = (
+        yade(f"specimen = {str(file)!r}\n" + SPECIMEN)["force"] for file in ("", there)
+    )
+    assert unbroken[-1, 1] < 0 < unbroken[-1, 0]
+    np.testing.assert_array_equal(resumed, unbroken)

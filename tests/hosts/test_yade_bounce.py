@@ -12,7 +12,7 @@ def bounce(lagged, share, cycles=50):
     slab_and_sphere(R)
     engines(mu=0.4)
     O.bodies[1].state.pos = (0, 0, R - 0.3 * u0)  # let go at 0.3 of the closure at rest
-    joints = Joints(Table("joint.txt"), lagged=lagged)
+    joints = Joints(TableLaw("joint.txt"), lagged=lagged)
     joints.attach()
     O.dt = share * sqrt(m / k)
     O.forces.setPermF(1, (0, 0, -load))

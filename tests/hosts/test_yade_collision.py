@@ -17,7 +17,7 @@ def go(joint, N, touch):
     engines(kn * area, ks * area, mu, ratchet=False)
     O.dt = T / N
     if joint:
-        Joints(Table("joint.txt")).attach()
+        Joints(TableLaw("joint.txt")).attach()
     def momenta():
         spins = [s.mass * s.pos.cross(s.vel) + s.inertia[0] * s.angVel for s in (a, b)]
         L = spins[0] + spins[1]
@@ -73,7 +73,7 @@ def go(N):
     (a.angVel, b.angVel), (a.vel, b.vel) = {spins}, {speeds}
     engines()
     O.dt = {T} / N
-    joints = Joints(Table("joint.txt"), azimuth=(.2, 1, .1))
+    joints = Joints(TableLaw("joint.txt"), azimuth=(.2, 1, .1))
     joints.attach()
     O.run(N + 1, True)   # the last step computes the force at time T
     f = joints.F[:, 0] * joints.c["area"][0]

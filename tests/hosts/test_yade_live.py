@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.hosts import export_yade
+from jointlaw.hosts.yade.export import export_yade
 
 LAW = (
     "from jointlaw import JointLaw\nlaw = JointLaw.from_toml('law.toml')\nend = law.closure_range\n"
@@ -55,7 +55,7 @@ STRESS = (
     + """
 slab_and_sphere()
 engines(keep=True, damping=0.5)
-joints = Joints(Live(law))
+joints = Joints(LiveLaw(law))
 joints.attach()
 O.dt = joints.time_step(safety=1, closure=0.4 * end)
 area, sphere = pi * 0.25, O.bodies[1].state
@@ -107,7 +107,7 @@ for k in range(n):
     O.bodies.append(utils.sphere((1, 3 * k, 0), 0.5))
 for b in O.bodies: b.state.blockedDOFs = "xyzXYZ"
 engines(keep=True)
-joints = Joints(Live(law), area=1.0, azimuth=(0, 1, 0))
+joints = Joints(LiveLaw(law), area=1.0, azimuth=(0, 1, 0))
 joints.attach()
 O.dt = 1e-3
 corners = rng.uniform(-1, 1, (legs, n, 3)) * end * [0.4, 0.5, 0.5] + [0.4 * end, 0, 0]
@@ -166,7 +166,7 @@ def build():
         O.bodies[-1].state.angVel = Vector3(*rng.uniform(-3, 3, 3).tolist())
     engines(keep=live, gravity=(0, 0, -200 if live else -30), damping=0.4 if live else 0.1)
 def adapter():
-    return Joints(Live(law), forget=0.1 * end) if live else Joints(Table("joint.txt"))
+    return Joints(LiveLaw(law), forget=0.1 * end) if live else Joints(TableLaw("joint.txt"))
 def picture():
     return [list(b.state.pos) + list(b.state.ori) + list(b.state.vel) + list(b.state.angVel)
             for b in O.bodies]

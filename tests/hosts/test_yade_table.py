@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.hosts import export_yade
+from jointlaw.hosts.yade.export import export_yade
 from jointlaw.tables.table import load_table
 
 R = 0.5
@@ -29,7 +29,7 @@ for name in ("joint.txt", "joint.npz"):
     for leg in legs:
         slab_and_sphere()
         engines()
-        Joints(Table(name)).attach()
+        Joints(TableLaw(name)).attach()
         O.dt = 1e-6
         out.append(drive(leg))
 result(force=np.array(out))

@@ -1,6 +1,7 @@
-"""`jointlaw fit` on files as laboratories write them."""
+"""`jointlaw fit` and `jointlaw scan` on files as laboratories write them."""
 
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -34,6 +35,7 @@ def test_a_cycle_that_begins_at_zero(tmp_path, cycle, capsys):
     assert main(["fit", "loop.csv", "--set", "alpha=3.8", "--out", "o"]) == 0
     out = capsys.readouterr().out
     summary = json.loads((tmp_path / "o" / "summary.json").read_text())
+    assert summary["version"] == 1
     assert summary["unloading"]["stress"] == pytest.approx(cycle[0][1])  # the first above zero
     assert "## Unloading" in out
     assert "(seating closure 0 um)" in out
@@ -63,3 +65,26 @@ def test_a_file_in_another_encoding_is_named(tmp_path, capsys):
     (tmp_path / "old.csv").write_bytes(b"stress,closure_\xb5m\n1,2\n")
     assert main(["fit", "old.csv", "--out", "o"]) == 2
     assert "old.csv: is no CSV file in UTF-8" in capsys.readouterr().err
+
+
+def test_a_scan_needs_only_the_contacts_to_be_a_law(tmp_path):
+    orientation, heights = jl.Orientation(3.0), jl.GammaHeights(4.0, 10e-6)
+    z = jl.synthetic_surface(orientation, heights, rows=8, columns=8, spacing=20e-6)
+    np.save(tmp_path / "z.npy", z)
+    assert main(["scan", "z.npy", "--spacing", "20um", "--out", "o"]) == 0
+    summary = json.loads((tmp_path / "o" / "summary.json").read_text())
+    contacts = "\n[asperity]\nK = 1e9\nlam = 1.2\neta = 0.5\nmu = 0.6\n"
+    law = jl.JointLaw.from_toml((tmp_path / "o" / "surface.toml").read_text() + contacts)
+    assert summary["version"] == 1
+    assert summary["parameters_SI"]["a"] == law.orientation.a
+    assert summary["parameters_SI"]["asperity_density"] == law.asperity_density
+
+
+def test_without_matplotlib_all_but_the_picture_is_written(tmp_path, cycle, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    write(tmp_path / "c.csv", *(x[:13] for x in cycle))
+    assert main(["fit", "c.csv", "--out", "o"]) == 0
+    captured = capsys.readouterr()
+    assert "no picture: pictures need matplotlib" in captured.err
+    assert "wrote law.toml, report.md, summary.json to o" in captured.out
+    assert not (tmp_path / "o" / "fit.png").exists()

@@ -187,7 +187,9 @@ def test_a_path_error_keeps_the_record_so_far(law, replays):
     record = error.value.record
     assert len(record) == 21
     assert record.shear[-1] == pytest.approx(-1e-7)
-    np.testing.assert_allclose(joint.F, [record.F1[-1], record.F2[-1], record.F3[-1]])
+    last = [record.F1[-1], record.F2[-1], record.F3[-1]]
+    # rounding: the record holds what the update returned, joint.F sums the state again
+    np.testing.assert_allclose(joint.F, last, rtol=0, atol=1e-14 * N)
     twin = pickle.loads(pickle.dumps(error.value))
     assert str(twin) == str(error.value)
     assert len(twin.record) == 21

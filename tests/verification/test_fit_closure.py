@@ -7,7 +7,7 @@ import pytest
 
 import jointlaw as jl
 from jointlaw import baselines, datasets, unloading
-from jointlaw.calibration.calibrate import fit_closure
+from jointlaw.calibration.fit import fit_closure
 from jointlaw.calibration.measured import first_loading
 
 ROCK = jl.Asperity.hertz_mindlin(G=20e9, nu=0.25, R=1e-3, mu=0.6)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.calibration.calibrate import fit_curves, fit_shear
+from jointlaw.calibration.fit import fit_curves, fit_shear
 from jointlaw.calibration.measured import ClosureCurve, ShearCurve
 
 SHEAR = np.linspace(0, 3e-5, 12)

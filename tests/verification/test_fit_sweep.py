@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from jointlaw import datasets
-from jointlaw.calibration.calibrate import fit_closure
+from jointlaw.calibration.fit import fit_closure, fit_many
 from jointlaw.calibration.measured import first_loading
-from jointlaw.calibration.sweep import fit_many
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import pytest
 
 import jointlaw as jl
 from jointlaw import closed_form, presets
-from jointlaw.paper.figures.total import total_closure, total_shear
+from jointlaw.paper.runs import total_closure, total_shear
 
 module = importlib.import_module("jointlaw.paper.secant")  # jl.secant may be the function
 secant = module.secant
@@ -41,7 +41,7 @@ def random_cases(count):
 @pytest.mark.parametrize(("a", "known"), [(2, 1.0081), (3, 0.7952), (6, 0.6451)])
 def test_known_shear_resistance(a, known):
     F = secant(law(a), [1.0, 2.0, 0.0]).F
-    assert F[1] / F[0] == pytest.approx(known, abs=6e-5)  # printed digits of law.md section 10
+    assert F[1] / F[0] == pytest.approx(known, abs=6e-5)  # digits of docs/paper.md, Fig. 14
 
 
 def test_stiffness_gives_the_force_and_shares_stay_shares():
@@ -83,7 +83,7 @@ def test_linear_asperities_give_both_tables():
 def test_full_slip_agrees_with_the_incremental_law():
     # where all asperities in touch slide both forms are f_s = mu f_n; what is left apart is the
     # direction of sliding, which on a path that bends lags behind that of the total displacement:
-    # law.md section 10 has 0.6959 against 0.6939 at delta_2 = 4 delta_1
+    # docs/paper.md, Fig. 14, has 0.696 against 0.694 at delta_2 = 4 delta_1
     found = law(6.0, eta=0.5, mu=0.3)
     fine = jl.JointLaw(
         orientation=found.orientation, asperity=found.asperity, asperity_density=1.0,

@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -119,6 +120,25 @@ def test_files_keep_every_digit(table, tmp_path, name):
     assert jl.JointLaw.from_toml(str(back.metadata["law"])) is not None
 
 
+@pytest.mark.parametrize("name", ["table.txt", "table.npz"])
+def test_a_table_of_version_1_is_read_and_of_another_refused(tmp_path, name):
+    """Of `linear-a3`; the law in its metadata tells what it must hold."""
+    specimen = Path(__file__).parents[1] / "unit" / "specimens" / name
+    table = load_table(specimen)
+    law = jl.JointLaw.from_toml(table.metadata["law"])
+    u = np.linspace(0, law.closure_range, 9)[1:]
+    assert np.allclose(table.lookup(u).normal_stress, law.normal_stress(u), rtol=1e-3)
+    other = tmp_path / name
+    if name.endswith("txt"):
+        other.write_text(specimen.read_text().replace('"version": 1', '"version": 9'))
+    else:
+        with np.load(specimen) as data:
+            meta = str(data["metadata"]).replace('"version": 1', '"version": 9')
+            np.savez(other, names=data["names"], data=data["data"], metadata=meta)
+    with pytest.raises(ValueError, match="version 9 of the table is not 1: tabulate the law again"):
+        load_table(other)
+
+
 def test_text_is_what_numpy_users_expect(table, tmp_path):
     """Column names in the first line; secant and tangent under their own names."""
     table.save(tmp_path / "joint.txt")
@@ -146,6 +166,33 @@ def test_report_says_what_is_dropped(law, table):
     lines = str(report).splitlines()
     assert len(lines) == 1 + len(report.rows)
     assert set(report.as_dict()) == {row.name for row in report.rows}
+
+
+def test_follow_is_the_elastic_frictional_law_written_out(table):
+    """Point by point from `lookup`, with matrices: closure, shear, reversal, opening, re-contact.
+
+    Rounding of some 400 steps: 1e-12 of the peak.
+    """
+    end = table.closure[-1]
+    corners = end * np.array([
+        [0.5, 0, 0], [0.5, 0.3, 0.2], [0.5, -0.3, 0.1], [0.1, -0.2, 0.1], [-0.1, 0, 0.3],
+        [0.6, 0.1, 0.3], [1.3, 0.4, 0.3],
+    ])  # fmt: skip
+    legs = zip(np.concatenate([np.zeros((1, 3)), corners]), corners, strict=False)
+    path = np.concatenate([np.linspace(a, b, 61)[1:] for a, b in legs])
+    f, here, old = np.zeros(2), np.zeros(3), np.zeros((2, 2))
+    exact = np.zeros_like(path)
+    for k, point in enumerate(path):
+        K = table.stiffness_matrix(point[0])
+        if np.trace(K) < np.trace(old):
+            f = K @ np.linalg.solve(old, f)
+        f = f + K @ (point - here)[1:]
+        at = table.lookup(point[0], np.arctan2(f[1], f[0]))
+        if np.hypot(*f) > at.peak_friction * at.normal_stress:
+            f = f / np.hypot(*f) * at.peak_friction * at.normal_stress
+        exact[k], here, old = (at.normal_stress, *f), point, K
+    assert np.abs(exact[:, 1:]).max() > 0.1 * exact.max()
+    assert np.abs(table.follow(path) - exact).max() < 1e-12 * exact.max()
 
 
 def test_follow_makes_no_energy(table):
@@ -185,7 +232,7 @@ def test_export_command(tmp_path, capsys):
     )
     assert options.run(options) == 0
     assert {p.name for p in (tmp_path / "x").iterdir()} == {
-        "joint.txt", "joint.npz", "law.toml", "yade_joint.py", "direct_shear.py",
+        "joint.txt", "joint.npz", "law.toml", "yade_joint.py", "table_law.py", "direct_shear.py",
         "settle_and_incline.py", "assembly.py", "summary.json",
     }  # fmt: skip
     assert "what the table drops" in capsys.readouterr().out
@@ -213,7 +260,7 @@ def test_a_file_that_is_no_table_is_refused_by_name(table, tmp_path):
     empty.write_bytes(b"")
     column = {k: v for k, v in table.columns.items() if not k.startswith("kt_")}
     data = np.array(list(column.values())).T
-    np.savez(bare, names=list(column), data=data, metadata=json.dumps(dict(table.metadata)))
+    np.savez(bare, names=list(column), data=data, metadata=json.dumps({"version": 1}))
     for path, words in ((empty, ""), (bare, "3 azimuths are the least")):
         with pytest.raises(ValueError, match=rf"{path.name}' is not a joint table: .*{words}"):
             load_table(path)

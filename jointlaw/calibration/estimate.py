@@ -1,0 +1,158 @@
+"""What a solution says: parameters, their covariance and intervals, stresses and their bands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..law import JointLaw
+from ..support.checks import Array
+from .forward import build, log_stress
+from .measured import ClosureCurve
+from .noise import Noise
+from .priors import transform_of
+from .problem import Problem
+from .solve import Solution, derivative
+
+# Standard error of ln(stress) per doubling of the stress beyond the data, from curves of other
+# laws: power laws of exponent 1.5 to 6 and Gaussian heights, lower half fitted, upper predicted
+MODEL_ERROR = 0.03
+# The same per unit of `Estimate.wander`, from hyperbolas and logarithms (benchmarks/held_out.py)
+WANDER_ERROR = 6.0
+WANDERS = 1.5  # of the expected scatter: from this `Estimate.wander` on the law is not the rock
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """A problem and its solution, in SI units; `Fit` adds words and pictures."""
+
+    problem: Problem
+    solution: Solution
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the fitted parameters, the seating closures last."""
+        return self.problem.free
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Every parameter in SI units, fitted or held, and the seating closures (m); read-only."""
+        return MappingProxyType(self._values)
+
+    @cached_property
+    def _values(self) -> dict[str, float]:
+        return self.problem.unpack(self.solution.x)  # a proxy of it could not be pickled
+
+    @cached_property
+    def law(self) -> JointLaw:
+        """The law of these parameters."""
+        settings = self.problem.settings
+        return build(self.parameters, settings, settings.plane)
+
+    @property
+    def noise(self) -> tuple[Noise, ...]:
+        """Noise of every curve: `share` of the stress and `absolute` of the closure (m)."""
+        return self.solution.noise
+
+    @property
+    def bends_otherwise(self) -> tuple[bool, ...]:
+        """Whether each closure curve shows that the rock does not close as the law does."""
+        pairs = zip(self.wander, self.problem.closures, strict=True)
+        return tuple(wander > WANDERS * curve.expected.share for wander, (_, curve) in pairs)
+
+    @cached_property
+    def wander(self) -> tuple[float, ...]:
+        """Misfit that neighbouring points of each closure curve share, as a part of the stress.
+
+        The root of the mean product of neighbouring residuals, 0 where that is negative: scatter
+        averages out of it, a curve that bends otherwise than the law does not.
+        """
+        v, found = self.parameters, []
+        for seating, curve in self.problem.closures:
+            r = curve.residuals(v, v[seating], self.problem.settings)
+            found.append(math.sqrt(max(float(np.mean(r[1:] * r[:-1])), 0.0)))
+        return tuple(found)
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance (p, p) of the fitted parameters in SI units, in the order of `free`."""
+        slope = [transform_of(name).slope(self.parameters[name]) for name in self.free]
+        result: Array = self.solution.covariance * np.outer(slope, slope)
+        return result
+
+    @property
+    def standard_error(self) -> dict[str, float]:
+        """Standard error of every fitted parameter in SI units."""
+        return dict(zip(self.free, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+
+    @property
+    def prior_share(self) -> dict[str, float]:
+        """Share of the variance of every fitted parameter that the priors contribute."""
+        return dict(zip(self.free, self.solution.prior_share.tolist(), strict=True))
+
+    def index(self, name: str) -> int:
+        """Number of a fitted parameter in `free`; raises ValueError for any other."""
+        if name not in self.free:
+            raise ValueError(f"{name!r} was not fitted; fitted are {', '.join(self.free)}")
+        return self.free.index(name)
+
+    def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
+        """Interval of a fitted parameter (SI units) that holds it with this probability."""
+        at, transform = self.index(name), transform_of(name)
+        reach = self.solution.quantile(level) * math.sqrt(self.solution.covariance[at, at])
+        x = float(self.solution.x[at])
+        return transform.back(x - reach), transform.back(x + reach)
+
+    def predict(self, closure: ArrayLike, curve: int = 1) -> Any:
+        """Normal stress (Pa) at closures (m) counted as in the closure curve number `curve`."""
+        seating = self.parameters[self.closure_curve(curve)[0]]
+        return self.law.normal_stress(np.asarray(closure, float) + seating)
+
+    def band(
+        self, closure: ArrayLike, level: float = 0.95, curve: int = 1, measured: bool = True
+    ) -> tuple[Array, Array]:
+        """Band (low, high) in Pa around `predict`.
+
+        closure: in m, as in `predict`; level: probability; measured: whether the band is for a
+        point yet to be measured, noise included, or for the curve itself. Beyond the largest
+        fitted stress it widens by 3 % (one standard error) per doubling of the stress, for the law
+        is not the rock, and by six times `wander`, where the points say so themselves.
+        """
+        name, data = self.closure_curve(curve)
+        u = np.atleast_1d(np.asarray(closure, float))
+
+        def model(x: Array, step: float = 0.0) -> Array:
+            v = self.problem.unpack(x)
+            return log_stress(v, v[name] + u + step, self.problem.settings)
+
+        centre = model(self.solution.x)
+        slope = derivative(model, self.solution.x, *self.problem.bounds())
+        variance = np.einsum("ip,pq,iq->i", slope, self.solution.covariance, slope)
+        if measured:
+            noise = self.noise[self.problem.curves.index(data)]
+            step = 1e-4 * float(np.ptp(data.closure))
+            rise = model(self.solution.x, step) - centre
+            variance = variance + noise.sigma(rise / step) ** 2
+        beyond = np.maximum(centre - np.log(data.stress.max()), 0.0)
+        wander = self.wander[curve - 1]
+        model_error = math.hypot(MODEL_ERROR, WANDER_ERROR * wander)
+        variance = variance + wander**2 + (model_error * beyond / math.log(2)) ** 2
+        reach = self.solution.quantile(level) * np.sqrt(variance)
+        return np.exp(centre - reach), np.exp(centre + reach)
+
+    def closure_curve(self, number: int) -> tuple[str, ClosureCurve]:
+        """A closure curve, counted from 1, with the name of its seating closure."""
+        closures = self.problem.closures
+        if not 1 <= number <= len(closures):
+            raise ValueError(
+                f"curve = {number!r} is out of bounds: this fit has {len(closures)} closure "
+                "curves, counted from 1"
+            )
+        return closures[number - 1]

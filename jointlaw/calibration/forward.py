@@ -1,0 +1,105 @@
+"""The forward model: parameters by name to a law and to its closure curve, and a law to them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from ..discretisation.facets import facet_sum, facets
+from ..discretisation.virgin_curve import exact_force
+from ..law import JointLaw
+from ..parameters.asperity import Asperity
+from ..parameters.heights import GammaHeights
+from ..parameters.orientation import Orientation
+from ..parameters.resolution import resolve
+from ..support.checks import Array
+from .priors import Values
+
+# Rock of shear modulus 20 GPa and Poisson's ratio 0.25 with asperities of 1 mm radius (Eq. 34),
+# friction 0.6 (Byerlee 1978), mean inclination 19 degrees as for the paper's rough granite.
+_ROCK = Asperity.hertz_mindlin(G=20e9, nu=0.25, R=1e-3, mu=0.6)
+DEFAULTS = {
+    "alpha": 3.7, "beta": 1e-5, "overlap": 0.0, "asperity_density": 1e6, "K": _ROCK.K,
+    "lam": _ROCK.lam, "eta": _ROCK.eta, "mu": _ROCK.mu, "a": 3.0, "b": 0.0, "c": 0.0,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What of a law is decided rather than fitted."""
+
+    formation: str = "individual"
+    resolution: Any = "balanced"
+    has_heights: bool = True
+    closure_range: Any = None  # m
+    critical_slip: float = math.inf  # m
+    plane: float | None = None  # of the law to be found; every shear curve has its own
+    closure_only: bool = False
+
+
+def parameters(law: JointLaw) -> tuple[dict[str, float], Settings]:
+    """Parameters of a law by name, those it does not have at their defaults, and its settings.
+
+    Raises ValueError for heights that are not gamma distributed.
+    """
+    o, p, h = law.orientation, law.asperity, law.heights
+    values = DEFAULTS | {"a": o.a, "b": o.b, "c": o.c, "K": p.K, "lam": p.lam, "eta": p.eta}
+    values |= {"mu": p.mu, "asperity_density": law.asperity_density}
+    kept = ("resolution", "closure_range", "critical_slip", "plane", "closure_only")
+    settings = Settings(has_heights=h is not None, **{name: getattr(law, name) for name in kept})
+    if h is None:
+        return values, settings
+    if not isinstance(h, GammaHeights):
+        raise ValueError(f"law: heights = {h!r} cannot be fitted; give it GammaHeights")
+    values |= {"alpha": h.alpha, "beta": h.beta, "overlap": h.overlap}
+    return values, replace(settings, formation=h.formation)
+
+
+def build(values: Values, settings: Settings, plane: float | None = None) -> JointLaw:
+    """The law of these parameters; `plane` restricts it to motion at that azimuth (rad)."""
+    v = values
+    return JointLaw(
+        orientation=Orientation(v["a"], v["b"], v["c"]),
+        asperity=Asperity(v["K"], v["lam"], v["eta"], v["mu"]),
+        heights=_heights(v, settings),
+        asperity_density=v["asperity_density"],
+        resolution=settings.resolution,
+        plane=plane,
+        closure_range=settings.closure_range,
+        critical_slip=settings.critical_slip,
+        closure_only=settings.closure_only,
+    )
+
+
+def log_stress(values: Values, closure: Array, settings: Settings) -> Array:
+    """Logarithm of the normal stress (Pa) at closures (m), as `JointLaw.normal_stress`.
+
+    Without the table of a law: a fit asks for a hundred sets of parameters at ten closures each.
+    """
+    heights = _heights(values, settings)
+    force, _ = exact_force(np.maximum(closure, 1e-15), values["eta"], heights)
+    names = ("a", "b", "c", "lam", "eta", "mu")
+    factor = _facet_factor(*(values[name] for name in names), settings.resolution)
+    scale = values["asperity_density"] * values["lam"] * values["K"] * factor
+    result: Array = math.log(scale) + np.log(np.maximum(force, 1e-300))
+    return result
+
+
+def _heights(v: Values, settings: Settings) -> GammaHeights | None:
+    if not settings.has_heights:
+        return None
+    return GammaHeights(v["alpha"], v["beta"], v["overlap"], settings.formation)
+
+
+@lru_cache(maxsize=256)
+def _facet_factor(
+    a: float, b: float, c: float, lam: float, eta: float, mu: float, resolution: Any
+) -> float:
+    """F1/(N lam K Phi) under pure closure, summed over the facets as `JointLaw` does."""
+    r = resolve(resolution)
+    nodes = facets(Orientation(a, b, c), r.u, r.phi)
+    return facet_sum(nodes.theta, nodes.weight * np.cos(nodes.theta) ** (1 + eta), lam, mu)

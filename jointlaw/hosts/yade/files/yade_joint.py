@@ -1,0 +1,628 @@
+"""Rock joints on the contacts of a YADE simulation. Needs YADE, numpy and `table_law.py`.
+
+    from yade_joint import Joints, TableLaw     # both files in the script's folder (on sys.path)
+    joints = Joints(TableLaw("joint.txt"))      # or Joints(LiveLaw(law)), law a jointlaw.JointLaw
+    joints.attach()                             # after O.engines is set
+    O.dt = joints.time_step()
+
+YADE finds the contacts. In every step, after `InteractionLoop`, the adapter computes the joint's
+traction on all of them at once and adds force and torque to the bodies; YADE's own contact force
+is switched off (kn = ks = 0) on these contacts, and taken back in the one step in which a contact
+is new. So the force on a body is that of the law at the positions of the same step.
+
+Frame of a contact: axis 1 is YADE's contact normal (from body id1 to id2), axis 2 the direction
+`azimuth`, which is fixed to body id1 and projected on the contact plane, axis 3 = axis 1 x axis 2.
+Displacement is that of body id1 against body id2, closure positive; the force on id1 is -area * F.
+SI units: m, Pa, N, s, kg.
+"""
+
+# ruff: noqa: B905 (runs on older Python too)
+
+import gc
+import warnings
+
+import numpy as np
+from table_law import TableLaw, between
+from yade import FrictPhys, O, PyRunner, Quaternion, ScGeom, Sphere, Vector3
+
+assert Quaternion((0, 0, 1), 0.0).__getinitargs__() == (1.0, 0.0, 0.0, 0.0)  # w first
+
+VERSION = 1  # of the files that `Joints.save` writes
+
+_running = {}  # name -> Joints: what the PyRunner of each adapter calls
+
+
+def run(name):
+    """One step of the adapter called `name`: the command of its PyRunner."""
+    if name not in _running:
+        raise RuntimeError(
+            f"no joints called {name!r} in this process: after O.load create Joints(..., "
+            f"name={name!r}) again and call .load(file)"
+        )
+    _running[name].step()
+
+
+# -------------------------------------------------------------- the live law
+
+
+class LiveLaw:
+    """The full path-dependent law: a pool of joints behind the contacts (`jointlaw` importable).
+
+    Memory belongs to a contact as long as YADE keeps it, so `Law2...(neverErase=True)` is needed:
+    a sheared joint dilates and carries stress at negative closure. A new contact counts the shear
+    made in touch only. The memory turns with body id1. `ledger` adds up the energy that friction
+    takes, for `batch.dissipated_energy`, at some cost.
+    """
+
+    def __init__(self, law, ledger=False):
+        if law.plane is not None:
+            raise ValueError("law.plane is set; contacts in YADE move in 3-D, give plane=None")
+        if law.closure_only:
+            raise ValueError("law.closure_only is set; contacts in YADE shear, set it to False")
+        from jointlaw import JointPool  # table mode does without
+
+        self.law, self.pool = law, JointPool(law, ledger)
+        self.came = 0  # contacts so far: numbered as they came, which are the keys of the pool
+
+    @property
+    def batch(self):
+        """The joints; `pool.places` are those of the contacts."""
+        return self.pool.batch
+
+    def stiffness(self, closure=None):
+        """Upper bound of the stiffness (Pa/m) up to `closure`, closure_range by default."""
+        return float(self.law.max_stiffness(self.law.closure_range if closure is None else closure))
+
+    def step(self, d, closure, spin):
+        """Tractions (3, n) after increments d (3, n)."""
+        return self.batch.update(d.T, where=self.where, tangent=False)[0].T
+
+    def add(self, closure):
+        """Contacts that came: virgin joints at this closure (m; negative before touch)."""
+        first, self.came = self.came, self.came + len(closure)
+        start = np.zeros((len(closure), 3))
+        start[:, 0] = closure
+        new = self.pool.add(range(first, self.came))
+        self.batch.update(start, where=new, tangent=False)
+        self.find()
+
+    def keep(self, mask):
+        """Forget the contacts where `mask` is False."""
+        self.pool.drop([key for key, kept in zip(self.pool.keys, mask) if not kept])
+        self.find()
+
+    def find(self):
+        """Find the places of all contacts; None if they are all of the batch, in order."""
+        places = self.pool.places
+        whole = len(places) == len(self.batch) and (places == np.arange(len(places))).all()
+        self.where = None if whole else places
+
+    def state(self):
+        """Arrays to save."""
+        state = self.pool.snapshot()
+        return {"fingerprint": state.fingerprint, "values": state.values}
+
+    def restore(self, data):
+        """State from such arrays."""
+        from jointlaw import JointState
+
+        self.came = data["values"].shape[1]
+        state = JointState(str(data["fingerprint"]), data["values"])
+        self.pool.restore(range(self.came), state)
+        self.find()
+
+
+# ---------------------------------------------------------------- the adapter
+
+# Numbers per contact, shape (n,): ids, step that made it, places of the bodies, radii, area
+PER_CONTACT = ["id1", "id2", "made", "b1", "b2", "R1", "R2", "area"]
+PER_CONTACT += ["ball", "zero", "closure"]  # two spheres?, overlap at zero closure
+VECTORS = ["n", "t2", "c1", "c2", "axis", "plane", "F"]  # shape (3, n)
+
+
+class Joints:
+    """A joint law on contacts of the simulation.
+
+    law: a `TableLaw` or a `LiveLaw`.
+    area: of one contact in m2: a number, a function of the interaction, or None for the circle of
+        the smaller sphere.
+    select: function of an interaction: is it a joint? Asked once, when the contact is new.
+    azimuth: direction of the law's axis 2 in the axes of body id1.
+    plane: None, or the joint's normal in the axes of body id1: contacts then act as pieces of one
+        flat joint (a "smooth joint") whatever the direction between the two spheres.
+    mated: closure counts from the position in which the contact is first seen, not from touch.
+    lagged: instead of adding forces, rewrite kn, ks and friction of YADE's own contact, which acts
+        one step late: isotropic, and it makes energy, so that NewtonIntegrator needs a
+        damping of 0.7 O.dt/sqrt(m/k) or more (TableLaw only; measured in docs/yade.md).
+    forget: with neverErase, contacts without force open by more than this (m) are given up.
+    """
+
+    def __init__(self, law, area=None, select=None, azimuth=(1, 0, 0), plane=None, mated=False,
+                 lagged=False, forget=np.inf, name="joints"):  # fmt: skip
+        if not name.isidentifier():
+            raise ValueError(f"name = {name!r} must be a Python identifier: it labels the engine")
+        if lagged and not isinstance(law, TableLaw):
+            raise ValueError("lagged = True needs a TableLaw: a live law has no kn and ks")
+        self.law, self.select, self.name = law, select, name
+        self.area = area if area is None or callable(area) else float(area)
+        self.azimuth = unit(np.array(azimuth, float))
+        self.plane = None if plane is None else unit(np.array(plane, float))
+        self.mated, self.lagged, self.forget = mated, lagged, forget
+        self.attached = False
+        self._clear()
+        _running[name] = self
+
+    def _clear(self):
+        self.c = {key: np.zeros(0, int if key in "id1 id2 made b1 b2" else float)
+                  for key in PER_CONTACT}  # fmt: skip
+        self.c.update({key: np.zeros((3, 0)) for key in VECTORS})
+        self.own, self.others = [], []  # interactions that are joints, and that are not
+        self.odd = []  # (place, geom) of joints that are not between two spheres
+        self.states, self.ids, self.index = [], [], {}  # bodies with joints
+        self.x, self.q = np.zeros((3, 0)), np.zeros((4, 0))
+        self.last, self.waiting = None, None
+        self.bodies = len(O.bodies)
+
+    @property
+    def F(self):
+        """Tractions (3, n) of the last step in the contacts' frames, Pa."""
+        return self.c["F"]
+
+    def __len__(self):
+        return len(self.c["made"])
+
+    # ------------------------------------------------------------------ set-up
+
+    def attach(self):
+        """Put the adapter into O.engines, right after InteractionLoop."""
+        engines = list(O.engines)
+        kinds = [type(engine).__name__ for engine in engines]
+        if "InteractionLoop" not in kinds:
+            raise ValueError("O.engines has no InteractionLoop; set O.engines before attach()")
+        if any(e.label == f"joint_{self.name}" for e in engines):
+            if self.attached or self.waiting is not None:
+                return
+            raise ValueError(
+                f"name = {self.name!r} is taken in O.engines: give another name=, or call "
+                ".load(file) instead of .attach() to continue a saved run"
+            )
+        if O.periodic:
+            raise ValueError("O.periodic = True: joints across a periodic boundary are not covered")
+        if any(k == "GlobalStiffnessTimeStepper" and not e.dead for k, e in zip(kinds, engines)):
+            raise ValueError(
+                "GlobalStiffnessTimeStepper sees kn = 0: remove it, set O.dt = joints.time_step()"
+            )
+        if self.lagged:
+            warnings.warn(
+                "lagged=True acts one step late and makes energy: amplitudes grow without "
+                "NewtonIntegrator(damping=...) of at least 0.7 O.dt/sqrt(m/k); k = area*kn_tangent",
+                stacklevel=2,
+            )
+        at, needs_all = kinds.index("InteractionLoop"), not isinstance(self.law, TableLaw)
+        for law2 in engines[at].lawDispatcher.functors:
+            if needs_all and not getattr(law2, "neverErase", True):
+                raise ValueError(
+                    f"{type(law2).__name__}.neverErase = False: YADE would drop joints that dilate;"
+                    " set neverErase=True (and forget= here, so that open contacts are given up)"
+                )
+        runner = PyRunner(
+            command=f"import yade_joint; yade_joint.run({self.name!r})",
+            iterPeriod=1, initRun=True, label=f"joint_{self.name}",
+        )  # fmt: skip
+        if hasattr(runner, "updateGlobals"):  # else YADE writes the caller's locals into globals
+            runner.updateGlobals = False
+        engines.insert(at + 1, runner)
+        O.engines = engines
+        self.attached = True
+
+    def time_step(self, safety=0.25, closure=None):
+        """A fixed step (s): `safety` of the shortest stable one over all free spheres.
+
+        closure: the largest expected (m); the end of the table or the closure range by default.
+        Every sphere is taken to carry the joints that it has, and six at least. Where `area` is a
+        function, only contacts tell the areas: ValueError before there are any.
+        """
+        k, shortest = self.law.stiffness(closure), np.inf
+        place = np.concatenate([self.c["id1"], self.c["id2"]])
+        areas = np.tile(self.c["area"], 2)
+        count = np.bincount(place, minlength=len(O.bodies))
+        if callable(self.area):
+            if not len(areas):
+                raise ValueError(
+                    "area is a function, and no contact tells its values yet: call time_step() "
+                    "after the first step, or give O.dt"
+                )
+            total = np.bincount(place, areas, minlength=len(count))
+            largest = np.zeros(len(count))
+            np.maximum.at(largest, place, areas)
+            largest[count == 0] = areas.max()
+        for body in O.bodies:
+            if body is None or not isinstance(body.shape, Sphere) or body.state.mass <= 0:
+                continue
+            if callable(self.area):
+                carried = max(6 * largest[body.id], total[body.id])
+            else:
+                one = np.pi * body.shape.radius**2 if self.area is None else self.area
+                carried = one * max(6, count[body.id])
+            # two bodies (2), rolling (1 + m R^2/I = 3.5 for a sphere)
+            stiffness = 2 * 3.5 * k * carried
+            shortest = min(shortest, 2 * np.sqrt(body.state.mass / stiffness))
+        if not np.isfinite(shortest):
+            raise ValueError("no free sphere in O.bodies: set O.dt by hand")
+        return safety * shortest
+
+    # -------------------------------------------------------------------- step
+
+    def step(self):
+        """Advance all joints; the PyRunner calls this once per step."""
+        now = O.iter
+        if self.waiting is not None:
+            self._resume()
+        if self.last is not None and now != self.last + 1:
+            raise RuntimeError(
+                f"joints {self.name!r}: O.iter went from {self.last} to {now}. The adapter must "
+                "run in every step (iterPeriod=1); after O.load call .load(file)"
+            )
+        collects = gc.isenabled()
+        gc.disable()  # thousands of small YADE handles are made and dropped: no cycles among them
+        try:
+            self._find(now)
+            if self.own:
+                self._rewrite() if self.lagged else self._act()
+            elif self.ids:
+                self.x, self.q = self._read()
+        finally:
+            if collects:
+                gc.enable()
+        self.last = now
+
+    def _act(self):
+        c, x0, q0 = self.c, self.x, self.q
+        x, q = self._read()
+        self.x, self.q = x, q
+        b1, b2 = c["b1"], c["b2"]
+        q1 = q.take(b1, axis=1)
+        n, un, c1, c2 = self._geometry(x, q1)
+        closure = un - c["zero"]
+        t2 = self._tangent(n, q1)
+        # Displacement of id1 against id2 at the contact, in the frame of mid-step: rigid motion of
+        # the pair, however large and about whatever axis, gives exactly none
+        turn, dx = turned(q, q0), x - x0
+        w1, w2 = turn.take(b1, axis=1), turn.take(b2, axis=1)
+        du = dx.take(b1, axis=1) - dx.take(b2, axis=1)
+        du += (cross(w1, c1 + c["c1"]) - cross(w2, c2 + c["c2"])) / 2
+        middle, across = unit(n + c["n"]), unit(t2 + c["t2"])
+        d = np.array([closure - c["closure"], dot(du, across), dot(du, cross(middle, across))])
+        spin = self._spin(n, t2, w1 + w2) if isinstance(self.law, TableLaw) else None
+        fresh = self.fresh
+        if fresh.size:
+            before = closure[fresh] - dot(du[:, fresh], n[:, fresh])
+            if self.mated:
+                before, d[:, fresh] = np.zeros(len(fresh)), 0.0
+            self.law.add(before)
+            d[0, fresh] = closure[fresh] - before
+        F = self.law.step(d, closure, spin)
+        force = (n * F[0] + t2 * F[1] + cross(n, t2) * F[2]) * -c["area"]
+        c.update(n=n, t2=t2, c1=c1, c2=c2, closure=closure, F=F)
+        if fresh.size:
+            force[:, fresh] -= self._take_back(fresh)
+        self._add(force, c1, c2)
+        if self.forget < np.inf:
+            for k in np.flatnonzero((closure < -self.forget) & ~F.any(axis=0)):
+                O.interactions.erase(int(c["id1"][k]), int(c["id2"][k]))
+
+    def _geometry(self, x, q1):
+        """Normal, overlap, and the contact point seen from either centre."""
+        c = self.c
+        r = x.take(c["b2"], axis=1) - x.take(c["b1"], axis=1)
+        R1, R2 = c["R1"], c["R2"]
+        if self.plane is not None:
+            n = rotate(q1, c["plane"])
+            c1 = r * (R1 / (R1 + R2))
+            return n, -dot(r, n), c1, c1 - r
+        length = np.sqrt(dot(r, r))
+        n = r / length
+        un = R1 + R2 - length
+        for k, geom in self.odd:
+            n[:, k], un[k] = geom.normal.__getinitargs__(), geom.penetrationDepth
+        c1 = n * (R1 - un / 2)
+        c2 = c1 - r
+        for k, geom in self.odd:
+            point = np.array(geom.contactPoint.__getinitargs__())
+            c1[:, k], c2[:, k] = point - x[:, c["b1"][k]], point - x[:, c["b2"][k]]
+        return n, un, c1, c2
+
+    def _tangent(self, n, q1):
+        """Axis 2: the reference carried by body id1, projected on the contact plane."""
+        c = self.c
+        a = rotate(q1, c["axis"])
+        t2 = a - n * dot(a, n)
+        size = np.sqrt(dot(t2, t2))
+        steep = np.flatnonzero(size < 0.5)
+        if steep.size:  # rolled far from where it touched: take the reference anew, unturned
+            old = c["t2"][:, steep] - n[:, steep] * dot(c["t2"][:, steep], n[:, steep])
+            t2[:, steep] = old
+            size[steep] = np.sqrt(dot(old, old))
+            c["axis"][:, steep] = rotate(conjugate(q1[:, steep]), old / size[steep])
+        return t2 / size
+
+    def _spin(self, n, t2, w):
+        """Angle by which shear forces turn in the frame: minimal turn of n, mean spin about it."""
+        n0, old = self.c["n"], self.c["t2"]
+        both, share = n + n0, 1 + dot(n, n0)
+        old = old - both * (dot(old, n) / share)
+        twist = 2 * np.arctan(dot(both, w) / (4 * share + dot(w, cross(n0, n))))
+        return twist + np.arctan2(dot(old, cross(n, t2)), dot(old, t2))
+
+    def _take_back(self, fresh):
+        """YADE's own force on id1 in the step that made the contact; off from now on."""
+        result = np.zeros((3, len(fresh)))
+        for column, k in enumerate(fresh):
+            phys = self.own[k].phys
+            result[:, column] = (-(phys.normalForce + phys.shearForce)).__getinitargs__()
+            phys.kn = phys.ks = phys.tangensOfFrictionAngle = 0.0
+            phys.shearForce = phys.normalForce = Vector3(0, 0, 0)
+        return result
+
+    def _add(self, force, c1, c2):
+        c, size = self.c, len(self.ids)
+        torque1, torque2 = cross(c1, force), cross(force, c2)
+        total = [np.bincount(c["b1"], f, size) - np.bincount(c["b2"], f, size) for f in force]
+        turn = [np.bincount(c["b1"], t1, size) + np.bincount(c["b2"], t2, size)
+                for t1, t2 in zip(torque1, torque2)]  # fmt: skip
+        forces = O.forces
+        for k, f, t in zip(self.ids, np.array(total).T.tolist(), np.array(turn).T.tolist()):
+            forces.addF(k, f)
+            forces.addT(k, t)
+
+    def _rewrite(self):
+        """The lagged option: what YADE's own law will use in the next step."""
+        c = self.c
+        x, q = self._read()
+        n, un, c1, c2 = self._geometry(x, q.take(c["b1"], axis=1))
+        closure = c["closure"] = un - c["zero"]
+        row, w, secant = self.law.at(np.maximum(closure, 0.0))
+        area, mu = c["area"], between(self.law.mu_mean, row, w)
+        kn, ks = area * secant, area * between(self.law.kt, row, w)
+        fresh = self.fresh
+        if fresh.size:  # made with the stiffness of YADE's material: this step is put right
+            force = np.zeros((3, len(self.own)))
+            force[:, fresh] = -n[:, fresh] * (kn * np.maximum(closure, 0.0))[fresh]
+            force[:, fresh] -= self._take_back(fresh)
+            self._add(force, c1, c2)
+        for i, a, b, m in zip(self.own, kn.tolist(), ks.tolist(), mu.tolist()):
+            phys = i.phys
+            phys.kn, phys.ks, phys.tangensOfFrictionAngle = a, b, m
+
+    # ---------------------------------------------------------------- contacts
+
+    def _find(self, now):
+        """Follow YADE's list of contacts: some went, some came."""
+        self.fresh = np.zeros(0, int)
+        if len(O.bodies) != self.bodies:
+            self._join(self._match())
+            return
+        real = [i.isReal for i in self.own]
+        if not all(real):
+            self._keep(np.array(real))
+        if self.others:
+            self.others = [i for i in self.others if i.isReal]
+        missing = O.interactions.countReal() - len(self.own) - len(self.others)
+        if missing:
+            new = [i for i in O.interactions.all(True) if i.iterMadeReal == now]
+            self._join(new if len(new) == missing else self._match())
+
+    def _match(self):
+        """The slow way: compare with what YADE has, by ids and by the step that made them."""
+        c = self.c
+        have = {key: k for k, key in enumerate(zip(c["id1"], c["id2"], c["made"]))}
+        place, others = {}, {(i.id1, i.id2, i.iterMadeReal) for i in self.others}
+        new, self.others = [], []
+        for i in O.interactions.all(True):
+            key = (i.id1, i.id2, i.iterMadeReal)
+            if key in have:
+                place[have[key]] = i
+            elif key in others:
+                self.others.append(i)
+            else:
+                new.append(i)
+        self._keep(np.isin(np.arange(len(c["made"])), list(place)))
+        self.own = [place[k] for k in sorted(place)]
+        self.odd = [(k, i.geom) for k, i in enumerate(self.own) if not self.c["ball"][k]]
+        self.bodies = len(O.bodies)
+        return new
+
+    def _keep(self, mask):
+        for key, value in self.c.items():
+            self.c[key] = value[..., mask]
+        self.own = [i for i, keep in zip(self.own, mask) if keep]
+        number = np.cumsum(mask) - 1
+        self.odd = [(int(number[k]), geom) for k, geom in self.odd if mask[k]]
+        if not self.lagged:
+            self.law.keep(mask)
+
+    def _join(self, contacts):
+        """New contacts: choose the joints among them and set up what stays constant."""
+        own, rows = [], []
+        for i in contacts:
+            if self.select is not None and not self.select(i):
+                self.others.append(i)
+                continue
+            if not isinstance(i.geom, ScGeom) or type(i.phys) is not FrictPhys:
+                raise TypeError(
+                    f"contact {i.id1}-{i.id2} has {type(i.geom).__name__} and "
+                    f"{type(i.phys).__name__}; joints need ScGeom and FrictPhys (Ip2_FrictMat_"
+                    "FrictMat_FrictPhys, Law2_ScGeom_FrictPhys_CundallStrack); select= excludes it"
+                )
+            own.append(i)
+            rows.append((i.id1, i.id2, i.iterMadeReal, *self._radii(i)))
+        if not own:
+            return
+        first, m = len(self.own), len(own)
+        self.own += own
+        new = dict(zip(("id1", "id2", "made", "R1", "R2", "ball", "area"), zip(*rows)))
+        new["b1"], new["b2"] = ([self._body(k) for k in new[key]] for key in ("id1", "id2"))
+        self._before()
+        self.odd += [(first + k, own[k].geom) for k in range(m) if not new["ball"][k]]
+        for key, value in self.c.items():
+            tail = np.zeros((*value.shape[:-1], m), value.dtype)
+            tail[...] = new.get(key, 0)
+            self.c[key] = np.concatenate([value, tail], axis=-1)
+        self.fresh = np.arange(first, first + m)
+        self._orient(self.fresh)
+
+    def _orient(self, fresh):
+        """Reference directions of new contacts in the axes of body id1, and their first frame."""
+        c = self.c
+        x, q = self._read()
+        q1 = q[:, c["b1"]]
+        if self.plane is not None:
+            r = x[:, c["b2"][fresh]] - x[:, c["b1"][fresh]]
+            local = np.repeat(self.plane[:, None], len(fresh), axis=1)
+            across = dot(rotate(q1[:, fresh], local), r)
+            c["plane"][:, fresh] = local * np.where(across < 0, -1.0, 1.0)
+        n, un, c1, c2 = self._geometry(x, q1)
+        n, q1 = n[:, fresh], q1[:, fresh]
+        a = rotate(q1, np.repeat(self.azimuth[:, None], len(fresh), axis=1))
+        t2 = a - n * dot(a, n)
+        bad = dot(t2, t2) < 0.01  # the reference is the normal itself: take the next body axis
+        a[:, bad] = rotate(q1[:, bad], np.repeat(np.roll(self.azimuth, 1)[:, None], bad.sum(), 1))
+        t2 = unit(a - n * dot(a, n))
+        c["axis"][:, fresh] = rotate(conjugate(q1), t2)
+        c["n"][:, fresh], c["t2"][:, fresh] = n, t2
+        c["c1"][:, fresh], c["c2"][:, fresh] = c1[:, fresh], c2[:, fresh]
+        if self.mated or self.plane is not None:
+            c["zero"][fresh] = un[fresh]
+
+    def _radii(self, i):
+        """Radii, whether both bodies are spheres, and the contact area."""
+        shapes = [O.bodies[k].shape for k in (i.id1, i.id2)]
+        R = [s.radius if isinstance(s, Sphere) else np.nan for s in shapes]
+        ball = not np.isnan(R).any()
+        if self.plane is not None and not ball:
+            raise TypeError(f"contact {i.id1}-{i.id2}: plane= needs two spheres; see select=")
+        if self.area is None:
+            area = np.pi * np.nanmin([*R, i.geom.refR1, i.geom.refR2]) ** 2
+        else:
+            area = float(self.area(i)) if callable(self.area) else self.area
+        if not 0 < area < np.inf:
+            raise ValueError(f"area = {area} m2 of contact {i.id1}-{i.id2} must be > 0 and finite")
+        return (*(R if ball else (i.geom.refR1, i.geom.refR2)), ball, area)
+
+    def _body(self, k):
+        """Place of body k among the bodies with joints."""
+        if k not in self.index:
+            self.index[k] = len(self.ids)
+            self.ids.append(k)
+            self.states.append(O.bodies[k].state)
+        return self.index[k]
+
+    def _before(self):
+        """Where new bodies were one step ago, as their velocities say (YADE's leapfrog)."""
+        x, q = [], []
+        for state in self.states[self.x.shape[1] :]:
+            angle = state.angVel.norm() * O.dt
+            axis = state.angVel.normalized() if angle > 0 else Vector3(0, 0, 1)
+            x.append((state.pos - state.vel * O.dt).__getinitargs__())
+            q.append((Quaternion(axis, -angle) * state.ori).__getinitargs__())
+        if x:
+            self.x = np.concatenate([self.x, np.array(x).T], axis=1)
+            self.q = np.concatenate([self.q, np.array(q).T], axis=1)
+
+    def _read(self):
+        """Positions (3, b) and orientations (4, b; w first) of the bodies with joints."""
+        x = np.array([s.pos.__getinitargs__() for s in self.states]).T
+        return x.copy(), np.array([s.ori.__getinitargs__() for s in self.states]).T.copy()
+
+    # ------------------------------------------------------------ save and show
+
+    def save(self, path):
+        """Write the adapter's state (NPZ): call it with every O.save, between two runs."""
+        if self.waiting is not None:
+            self._resume()
+        data = {f"contact_{key}": value for key, value in self.c.items()}
+        data.update({f"law_{key}": value for key, value in self.law.state().items()})
+        last = -1 if self.last is None else self.last
+        others = np.array([(i.id1, i.id2, i.iterMadeReal) for i in self.others], int)
+        with open(path, "wb") as file:
+            np.savez(file, version=VERSION, ids=self.ids, x=self.x, q=self.q, last=last,
+                     others=others, **data)  # fmt: skip
+
+    def load(self, path):
+        """Take up a state that `save` wrote: call it after O.load, before the next step."""
+        with np.load(path) as file:
+            data = {key: file[key] for key in file.files}
+        if data.get("version") != VERSION:
+            raise ValueError(
+                f"{path!r} has version {data.get('version')}, this adapter reads {VERSION}: start "
+                "the run anew, or go on with the yade_joint.py that saved it"
+            )
+        self.waiting, self.last = data, None
+
+    def _resume(self):
+        """Bind a loaded state to the contacts that YADE has now."""
+        data = self.waiting
+        self._clear()  # nothing waits any more
+        self.c = {key[8:]: value for key, value in data.items() if key.startswith("contact_")}
+        self.law.restore({key[4:]: value for key, value in data.items() if key.startswith("law_")})
+        self.ids, self.x, self.q = data["ids"].tolist(), data["x"], data["q"]
+        self.index = {k: place for place, k in enumerate(self.ids)}
+        self.states = [O.bodies[k].state for k in self.ids]
+        other = {tuple(row) for row in data["others"].reshape(-1, 3).tolist()}
+        contacts = O.interactions.all(True)
+        self.others = [i for i in contacts if (i.id1, i.id2, i.iterMadeReal) in other]
+        self.own, self.bodies = [], -1  # makes _find compare by ids
+        self.last = int(data["last"]) if data["last"] >= 0 else None
+
+    def contacts(self):
+        """Arrays: ids (n, 2), closure (n,), traction (n, 3) in Pa, normal (n, 3), area (n,)."""
+        c = self.c
+        return {
+            "ids": np.array([c["id1"], c["id2"]]).T, "closure": c["closure"].copy(),
+            "traction": c["F"].T.copy(), "normal": c["n"].T.copy(), "area": c["area"].copy(),
+        }  # fmt: skip
+
+    def write_back(self):
+        """Show the joint forces in i.phys, for utils.getStress and such, until the next step."""
+        c, F = self.c, self.c["F"]
+        normal = (c["n"] * F[0] * c["area"]).T.tolist()
+        shear = ((c["t2"] * F[1] + cross(c["n"], c["t2"]) * F[2]) * c["area"]).T.tolist()
+        for i, a, b in zip(self.own, normal, shear):
+            i.phys.normalForce, i.phys.shearForce = Vector3(*a), Vector3(*b)
+
+
+# ------------------------------------------------------- vectors and rotations
+
+
+def dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a, b):
+    return np.array(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    )
+
+
+def unit(a):
+    return a / np.sqrt(dot(a, a))
+
+
+def conjugate(q):
+    return np.array([q[0], -q[1], -q[2], -q[3]])
+
+
+def rotate(q, v):
+    """Vectors v (3, n) turned by the unit quaternions q (4, n)."""
+    u = q[1:]
+    t = 2 * cross(u, v)
+    return v + q[0] * t + cross(u, t)
+
+
+def turned(q, old):
+    """Rotations from the orientations `old` to `q` as vectors 2 tan(angle/2) axis (3, n).
+
+    With these a rigid turn moves a lever c0 to c1 by exactly turn x (c0 + c1)/2 (Cayley).
+    """
+    u = old[0] * q[1:] - q[0] * old[1:] + cross(old[1:], q[1:])
+    return 2 * u / (q[0] * old[0] + dot(q[1:], old[1:]))

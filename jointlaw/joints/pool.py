@@ -1,0 +1,89 @@
+"""Joints for contacts that come and go: every contact keeps its joint as long as it lasts."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .batch import JointBatch, Law
+from .state import JointState
+
+Places = NDArray[np.intp]
+
+
+class JointPool:
+    """Joints of one law, found by the key of their contact.
+
+    A key is whatever names a contact as long as it lasts, such as the pair of its body numbers.
+    The joints live in `batch`; `assign` or `add` tell their places there, for
+    `batch.update(d, where=places)`. A place that falls free goes to a later contact, whose joint
+    starts virgin.
+    """
+
+    def __init__(self, law: Law, ledger: bool = True) -> None:
+        self.batch = JointBatch(law, 0, ledger)
+        self._place: dict[Hashable, int] = {}
+        self._free: list[int] = []
+
+    def __len__(self) -> int:
+        return len(self._place)
+
+    @property
+    def keys(self) -> list[Hashable]:
+        """Keys of all contacts, in the order in which they came."""
+        return list(self._place)
+
+    @property
+    def places(self) -> Places:
+        """Places (n,) in the batch of the joints of all `keys`."""
+        return np.fromiter(self._place.values(), np.intp, len(self._place))
+
+    def assign(self, keys: Iterable[Hashable]) -> Places:
+        """Hold just these contacts: the others are dropped, new ones added; their places (n,)."""
+        wanted = list(keys)
+        self.drop(self._place.keys() - set(wanted))
+        return self.add(wanted)
+
+    def add(self, keys: Iterable[Hashable]) -> Places:
+        """Places (n,) of the joints of these contacts; those not held yet get virgin joints."""
+        wanted = list(keys)
+        new = [key for key in dict.fromkeys(wanted) if key not in self._place]
+        missing = len(new) - len(self._free)
+        if missing > 0:
+            first = len(self.batch)
+            self.batch.resize(first + missing)
+            self._free = [*range(first + missing - 1, first - 1, -1), *self._free]
+        for key in new:
+            self._place[key] = self._free.pop()
+        return np.array([self._place[key] for key in wanted], np.intp)
+
+    def drop(self, keys: Iterable[Hashable]) -> None:
+        """Forget these contacts and their history. Raises KeyError for a key that is not held."""
+        gone = list(dict.fromkeys(keys))
+        places = [self._place[key] for key in gone]
+        self.batch.reset(places)
+        for key in gone:
+            del self._place[key]
+        self._free = sorted([*self._free, *places], reverse=True)  # the lowest is taken first
+
+    def snapshot(self) -> JointState:
+        """A copy of the state of all contacts, in the order of `keys`: keep those beside it."""
+        state = self.batch.snapshot()
+        return JointState(state.fingerprint, state.values[:, self.places])
+
+    def restore(self, keys: Iterable[Hashable], state: JointState) -> None:
+        """Hold just these contacts, with the states of a snapshot, in a new `batch`.
+
+        Raises ValueError if another law wrote the state or the numbers of keys and states differ.
+        """
+        place = {key: k for k, key in enumerate(keys)}
+        if len(place) != len(state):
+            raise ValueError(
+                f"keys name {len(place)} contacts, state holds {len(state)} joints: give the keys "
+                "that the pool had when the snapshot was taken"
+            )
+        batch = JointBatch(self.batch.law, len(place), self.batch.ledger)
+        batch.restore(state)
+        self.batch, self._place, self._free = batch, place, []

@@ -76,6 +76,21 @@ def facets(
     return Facets(*frozen(arrays))
 
 
+def yield_sum(theta: Array, scale: Array, asperity: Asperity) -> tuple[Array, Array] | None:
+    """What yielding takes from F1 under first closure: share (2 M,) times Phi(closure - depth).
+
+    Springs stop to gain normal force at the yield interference, and shear force where they slip
+    under the normal force that they then have.
+    """
+    if math.isinf(asperity.yield_interference):
+        return None
+    shear = np.minimum(np.tan(theta) / asperity.lam, asperity.mu)
+    depth = asperity.yield_interference / np.cos(theta)
+    late = np.divide(asperity.mu, shear, out=np.full_like(shear, np.inf), where=shear > 0)
+    share = np.concatenate([scale * np.cos(theta), scale * np.sin(theta) * shear])
+    return share, np.concatenate([depth, depth * late])
+
+
 def facet_sum(theta: Array, scale: Array, lam: float, mu: float) -> float:
     """Sum of scale (cos theta + sin theta min(tan theta/lam, mu)): F1/Phi under pure closure."""
     shear = np.minimum(np.tan(theta) / lam, mu)

@@ -15,14 +15,19 @@ _SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
 
 
 class VirginClosure(NamedTuple):
-    """F1 = factor Phi(closure): the virgin curve summed over the facets, `facet_sum`."""
+    """First loading: F1 = factor Phi(closure), the virgin curve summed over the facets, less what
+    yielding takes away."""
 
     curve: VirginCurve
-    factor: float
+    factor: float  # `facet_sum`
+    yielding: tuple[Array, Array] | None = None  # `yield_sum`: F1 -= share Phi(closure - depth)
 
     def stress(self, closure: Array) -> Array:
         """Normal stress (Pa) at closures (m), infinite where it overflows."""
         stress: Array = self.factor * self.curve.force(closure)[0]
+        if self.yielding is not None:
+            share, depth = self.yielding
+            stress = stress - self.curve.force(closure[..., None] - depth)[0] @ share
         return stress
 
     def closure(self, stress: float, start: float) -> float:

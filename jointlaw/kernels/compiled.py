@@ -406,9 +406,7 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent):
         if law.wears is not None:  # back to the limit, that fell since
             strength = by_mu * pad[_MU + l]
             if law.yields is not None:
-                G0 -= _share_at(
-                    pad[_Z0 + l], pad[_FZ0 + l], zl, fl, sl, zh, fh, sh, ended
-                )
+                G0 -= _share_at(pad[_Z0 + l], pad[_FZ0 + l], zl, fl, sl, zh, fh, sh, ended)
                 h0 = k0 * (y0 - pad[_Z0 + l])
                 G0 = G0 if h0 > G0 else h0
                 G0 = G0 if G0 > 0.0 else 0.0
@@ -569,19 +567,9 @@ def _facet(work, s, L, law, f, ledger, tangent):
     beside = _places(law)[2]
     rf, rs = beside + f, beside + M + f
     for l in range(L):
-<<<<<<< ch2.py
-        pad[_F0 + l] = s[rf, l]
-    for l in range(L):
-        pad[_S0 + l] = s[rs, l]
+        pad[_F0 + l], pad[_S0 + l] = s[rf, l], s[rs, l]
     if law.yields is not None:
         _press(work, s, L, law, f)
-||||||| cb2.py
-        pad[_F0 + l] = s[rf, l]
-    for l in range(L):
-        pad[_S0 + l] = s[rs, l]
-=======
-        pad[_F0 + l], pad[_S0 + l] = s[rf, l], s[rs, l]
->>>>>>> cm.py
     _virgin(work, law, True, L)
     for l in range(L):
         s[rf, l], s[rs, l] = pad[_F1 + l], pad[_S1 + l]

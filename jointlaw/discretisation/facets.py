@@ -86,7 +86,7 @@ def yield_sum(theta: Array, scale: Array, asperity: Asperity) -> tuple[Array, Ar
         return None
     shear = np.minimum(np.tan(theta) / asperity.lam, asperity.mu)
     depth = asperity.yield_interference / np.cos(theta)
-    late = np.divide(asperity.mu, shear, out=np.full_like(shear, np.inf), where=shear > 0)
+    late = np.divide(asperity.mu, shear, out=np.ones_like(shear), where=shear > 0)
     share = np.concatenate([scale * np.cos(theta), scale * np.sin(theta) * shear])
     return share, np.concatenate([depth, depth * late])
 

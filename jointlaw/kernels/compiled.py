@@ -662,7 +662,7 @@ def _finish(pad, s, F, C, start, L, law, ledger, tangent):
                 pad[_LOST + l] += pad[_SLIP + l] * (pull if pull > 0.0 else 0.0) / limit
         for l in range(L):
             s[2 * dim - 1, l] += pad[_LOST + l]
-        first, slip, _ = _places(law)
+        slip = _places(law)[1]
         if law.yields is not None:
             for l in range(L):
                 s[slip - 1, l] += pad[_CRUSHED + l]

@@ -122,9 +122,10 @@ class NumbaEngine:
 
         self._kernel, self._sliders = compiled, tables.sliders
         self.rows = compiled.block_rows(tables)
-        self._law = law = compiled.pack(tables)  # wear takes the ledger, of which slip is made
-        self._with = {  # ledger, tangent: True or None, for which the compiler leaves the code out
-            (ledger, tangent): (*law, ledger or law.wears, tangent or None)
+        self._law: tuple[Any, ...] = compiled.pack(tables)
+        self._with: dict[tuple[bool, bool], tuple[Any, ...]] = {
+            # True or None, for which the compiler leaves the code out; slip is made of the ledger
+            (ledger, tangent): (*self._law, ledger or tables.wears or None, tangent or None)
             for ledger in (False, True)
             for tangent in (False, True)
         }

@@ -27,4 +27,5 @@ def within_limit(k: Tables, before: Cells, q: Array, strength: Array) -> tuple[A
 def slipped(k: Tables, before: Cells, after: Cells, mu: Array, lost: Array) -> Array:
     """Slip dL (B,) of the asperities: the energy lost to friction over the mean friction limit."""
     limit = 0.5 * mu * np.sum(k.area[:, None] * (before.force + after.force), axis=0)
-    return np.divide(lost, limit, out=np.zeros_like(limit), where=limit > 0)
+    slip: Array = np.divide(lost, limit, out=np.zeros_like(limit), where=limit > 0)
+    return slip

@@ -48,7 +48,7 @@ class Asperity:
             set_(self, name, value)
         if (self.mu_residual is None) != math.isinf(self.wear_slip):
             raise ValueError(
-                f"asperity.mu_residual = {self.mu_residual!r} and wear_slip = {self.wear_slip!r} m: "
+                f"asperity.mu_residual = {self.mu_residual!r}, wear_slip = {self.wear_slip!r} m: "
                 "wear needs both a residual friction and a finite slip; give both or neither"
             )
         if self.mu_residual is not None:

@@ -157,7 +157,7 @@ def _linear(law: jl.JointLaw, stress: Stress | None) -> jl.JointLaw:
 
 
 def _smooth(law: jl.JointLaw, stress: Stress | None) -> jl.JointLaw:
-    made = replace(law, asperity=replace(law.asperity, mu=0.0))
+    made = replace(law, asperity=replace(law.asperity, mu=0.0, mu_residual=None, wear_slip=np.inf))
     return _as_stiff(made, law, stress)
 
 

@@ -1,8 +1,9 @@
 """The law as a brute-force bed: fixed linear springs with sliders, no lumping, no shortcuts.
 
 Every orientation carries many linear unilateral springs that touch at closures z_j. Each has its
-own Coulomb slider, and yields on its own: squeezed beyond the yield interference it keeps a set, and
-touches that much later. Slow and obvious: it exists to judge the package and shares no code with it.
+own Coulomb slider, and yields on its own: squeezed beyond the yield interference it keeps a set,
+and touches that much later. Slow and obvious: it exists to judge the package and shares no code
+with it.
 """
 
 import numpy as np
@@ -101,7 +102,7 @@ class SlowBed:
         self._wear(np.sum(self.scale / (self.c1 * self.lam) * rubbed), pull)
 
     def _wear(self, rubbed, pull):
-        """Slip of the asperities: friction work, that of the offset too, over the limit; then mu."""
+        """Slip of the asperities: friction work, the offset's too, over the limit; then mu."""
         normal = self.facet_forces()[0]
         if pull > self.critical_slip:
             along = self.offset / self.critical_slip

@@ -92,8 +92,9 @@ class ClosureCurve:
         set_(self, "closure", closure)
         top = int(np.argmax(stress)) + 1 if self.cycle else stress.size
         branches = [part for part in (slice(0, top), slice(top, None)) if stress[part].size]
-        steep = [_steepness(closure[part], stress[part]) for part in branches]
-        set_(self, "steepness", np.concatenate(steep))
+        steep = np.concatenate([_steepness(closure[part], stress[part]) for part in branches])
+        share = stress / np.max(stress) if self.cycle else 1.0  # as `residuals` are
+        set_(self, "steepness", share * steep)
         if self.noise is None:
             if self.closure_noise != 0:
                 raise ValueError(
@@ -107,15 +108,14 @@ class ClosureCurve:
         set_(self, "expected", expected)
 
     def residuals(self, values: Values, seating: float, settings: Settings) -> Array:
-        """ln(model/measured), (n,); on a cycle of stresses a hundredth of the largest added.
+        """ln(model/measured), (n,); over cycles (model - measured)/largest measured.
 
         Unloading ends at zero stress, where a ratio says nothing.
         """
         model = log_stress(values, seating + self.closure, settings)
         if not self.cycle:
             return model - np.log(self.stress)
-        least = 0.01 * np.max(self.stress)
-        residual: Array = np.log((np.exp(model) + least) / (self.stress + least))
+        residual: Array = (np.exp(model) - self.stress) / np.max(self.stress)
         return residual
 
 

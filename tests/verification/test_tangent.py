@@ -30,13 +30,6 @@ OPTIONS = {
     "critical slip": {"critical_slip": 0.2},
     "at the critical slip, heights": {"critical_slip": 0.12, "formation": "population"},
     "concave stiffness": {"eta": 0.2},
-    "yielding": {"damage": {"yield_interference": 0.15}},
-    "yielding, held offset, heights": {
-        "damage": {"yield_interference": 0.1},
-        "critical_slip": 0.12,
-        "formation": "population",
-    },
-    "wear": {"damage": {"mu_residual": 0.1, "wear_slip": 0.3, "yield_interference": 0.3}},
 }
 
 

@@ -29,10 +29,10 @@ def sliders_within_friction(batch, mu):
 
 
 def elastic_force(batch):
-    """Sum of the normal forces (n,) in Pa that facets would bear if they had not yielded."""
+    """Forces (n,) in Pa that facets would bear, friction included, if they had not yielded."""
     k, now = batch.law.tables, kernel.parts(batch.law.tables, batch.snapshot().values)
     force, _ = k.curve.force(kernel.effective_closure(k, now.delta[0], now.offset))
-    return np.sum(k.area[:, None] * force, axis=0)
+    return (1.0 + k.mu) * np.sum(k.area[:, None] * force, axis=0)
 
 
 class Watch:

@@ -60,7 +60,7 @@ class ClosureCurve:
         if (stress < 0).any():
             raise ValueError(f"stress = {stress.min():g} Pa is out of bounds: it must be >= 0")
         top = int(np.argmax(stress))
-        closure = _without_rock(stress, closure, self.compliance)
+        closure = subtract_compliance(stress, closure, self.compliance)
         unloads = bool((stress[top:] < 0.8 * stress[top]).any())
         if self.cycle and not unloads:
             raise ValueError(
@@ -187,10 +187,13 @@ def first_loading(stress: ArrayLike, closure: ArrayLike) -> tuple[Array, Array, 
     return s[: top + 1], u[: top + 1], s[top:], u[top:]
 
 
-def _without_rock(
+def subtract_compliance(
     stress: Array, closure: Array, compliance: float | tuple[ArrayLike, ArrayLike]
 ) -> Array:
-    """The closure of the joint alone."""
+    """The closure (m) of the joint alone, without that of rock and machine, as in `ClosureCurve`.
+
+    Raises ValueError for a compliance larger than the curve, or measured up to a lower stress.
+    """
     if isinstance(compliance, tuple):
         load, rock = _pair("compliance stress", compliance[0], "compliance closure", compliance[1])
         if not (np.diff(load) > 0).all() or stress.max() > load.max():

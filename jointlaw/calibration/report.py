@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -28,7 +29,9 @@ def report(fit: Estimate, not_identifiable: Mapping[str, str]) -> str:
             f"{transform_of(name).unit} | {100 * share:.0f} % | "
             f"{'no' if name in not_identifiable else 'yes'} |"
         )
-    held = [name for name in fit.parameters if name not in fit.free]
+    finite = [name for name in fit.parameters if math.isfinite(fit.parameters[name])]
+    worn = "wear_slip" in finite
+    held = [n for n in finite if n not in fit.free and (worn or n != "mu_residual")]
     lines += ["", "Held: " + ", ".join(f"{n} = {fit.parameters[n]:.4g}" for n in held) + "."]
     lines += ["", "Not identifiable from these data:", ""]
     grouped: dict[str, list[str]] = {}

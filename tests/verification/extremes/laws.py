@@ -109,13 +109,13 @@ def random_changes(rng):
         if rng.random() < 0.3
         else np.inf,
     }
-    for key, least, most in (("yields at", -12.0, 3.0), ("wears over", -6.0, 3.0)):
-        if rng.random() < 0.3:
-            changes[key] = SCALE * unit * 10.0 ** rng.uniform(least, most)
     if rng.random() < 0.5:
         alpha = float(rng.choice([-0.9, -0.5, 0.0, 3.82, 20.0, rng.uniform(-0.9, 30.0)]))
         beta = SCALE * unit * 10.0 ** rng.choice([0.0, rng.uniform(-1.0, 3.0)]) / (alpha + 1.0)
         overlap = float(rng.choice([0.0, beta, 10.0 * beta, beta * 10.0 ** rng.uniform(-6, 2)]))
         formation = "population" if rng.random() < 0.3 else "individual"
         changes["heights"] = (alpha, float(beta), overlap, formation)
+    for key, least, most in (("yields at", -12.0, 3.0), ("wears over", -6.0, 3.0)):
+        if rng.random() < 0.3:
+            changes[key] = SCALE * unit * 10.0 ** rng.uniform(least, most)
     return changes, SCALE * unit

@@ -51,8 +51,8 @@ class Loop:
             f"and keeps {1e6 * self.law_closure:.2f} um; of friction coefficients from "
             f"{_FRICTIONS[0]} to {_FRICTIONS[-1]}, {self.worst_mu:g} loses most at these "
             f"inclinations, {100 * self.largest_friction:.1f} %. "
-            f"The rest is not in the law: {rest}. Use the fitted law for loading, and for small cycles below the largest stress "
-            "with care."
+            f"The rest is not in the law: {rest}. Use the fitted law for loading, and for small "
+            "cycles below the largest stress with care."
         )
 
 

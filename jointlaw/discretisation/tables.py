@@ -109,7 +109,7 @@ def tables(
     if asperity.yield_interference < math.inf:
         (yield_depth,) = frozen((asperity.yield_interference / c1,))
     # one depth for both sides of an asperity that critical_slip renews, or the offset makes energy
-    alone = np.arange(len(c1))
+    (alone,) = frozen((np.arange(len(c1)),))
     return Tables(
         curve, *frozen(arrays), asperity.lam, asperity.mu, critical_slip, yield_depth,
         alone if math.isinf(critical_slip) else facets.opposite,

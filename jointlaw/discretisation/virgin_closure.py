@@ -11,6 +11,7 @@ import numpy as np
 from ..support.checks import Array
 from .virgin_curve import VirginCurve
 
+_RESOLVED = 1e8  # yield interferences
 _SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
 
 
@@ -42,10 +43,13 @@ class VirginClosure(NamedTuple):
             return math.log(min(max(force, _SMALLEST), _LARGEST)) - math.log(stress)
 
         low = high = math.log(start)
+        farthest = 700.0
+        if self.yielding is not None:  # beyond, the difference of forces is lost in rounding
+            farthest = math.log(_RESOLVED) + math.log(float(np.max(self.yielding[1])))
         with np.errstate(over="ignore"):
             while misfit(high) < 0.0:
                 high += 1.0
-                if high > 700.0:
+                if high > farthest:
                     raise ValueError(f"normal_stress = {stress!r} Pa is beyond any closure")
             while misfit(low) > 0.0:
                 low -= 1.0

@@ -84,8 +84,7 @@ class Estimate:
     def covariance(self) -> Array:
         """Covariance (p, p) of the fitted parameters in SI units, in the order of `free`."""
         slope = [transform_of(name).slope(self.parameters[name]) for name in self.free]
-        result: Array = self.solution.covariance * np.outer(slope, slope)
-        return result
+        return self.solution.covariance * np.outer(slope, slope)
 
     @property
     def standard_error(self) -> dict[str, float]:

@@ -85,8 +85,7 @@ def log_stress(values: Values, closure: Array, settings: Settings) -> Array:
     names = ("a", "b", "c", "lam", "eta", "mu")
     factor = _facet_factor(*(values[name] for name in names), settings.resolution)
     scale = values["asperity_density"] * values["lam"] * values["K"] * factor
-    result: Array = math.log(scale) + np.log(np.maximum(force, 1e-300))
-    return result
+    return math.log(scale) + np.log(np.maximum(force, 1e-300))
 
 
 def _heights(v: Values, settings: Settings) -> GammaHeights | None:

@@ -90,8 +90,7 @@ class ClosureCurve:
 
     def residuals(self, values: Values, seating: float, settings: Settings) -> Array:
         """ln(model/measured), (n,)."""
-        residual: Array = log_stress(values, seating + self.closure, settings) - np.log(self.stress)
-        return residual
+        return log_stress(values, seating + self.closure, settings) - np.log(self.stress)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,8 +146,7 @@ class ShearCurve:
     def residuals(self, values: Values, settings: Settings) -> Array:
         """(model - measured)/largest measured, (n,)."""
         model = self.predict(build(values, settings, plane=self.azimuth))
-        residual: Array = (model - self.shear_stress) / np.max(np.abs(self.shear_stress))
-        return residual
+        return np.asarray((model - self.shear_stress) / np.max(np.abs(self.shear_stress)))
 
 
 def first_loading(stress: ArrayLike, closure: ArrayLike) -> tuple[Array, Array, Array, Array]:

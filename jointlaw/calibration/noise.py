@@ -28,8 +28,7 @@ class Noise(NamedTuple):
 
     def sigma(self, steepness: Array) -> Array:
         """Standard errors at points of this steepness."""
-        result: Array = np.hypot(self.share, self.absolute * steepness)
-        return result
+        return np.hypot(self.share, self.absolute * steepness)
 
 
 def estimate(expected: Noise, residual: Array, leverage: Array, steepness: Array) -> Noise:

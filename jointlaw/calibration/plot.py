@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..support.pyplot import pyplot
+from ..support.pyplot import pyplot, written
 from .estimate import Estimate
 from .forward import build
 from .measured import ClosureCurve
@@ -21,9 +21,8 @@ def plot_fit(fit: Estimate, path: str | Path | None = None, held_out: Points | N
 
     held_out: points of the first closure curve that were not fitted.
     """
-    plt = pyplot()
     curves = fit.problem.curves
-    figure, axes = plt.subplots(
+    figure, axes = pyplot().subplots(
         1, len(curves), figsize=(5.2 * len(curves) + 0.8, 4.4), layout="constrained", squeeze=False
     )
     closures = 0
@@ -38,19 +37,14 @@ def plot_fit(fit: Estimate, path: str | Path | None = None, held_out: Points | N
             label = f"shear stress (MPa) at {curve.normal / 1e6:.3g} MPa"
             axis.set(xlabel="shear displacement (µm)", ylabel=label)
             axis.legend()
-    if path is not None:
-        figure.savefig(path, dpi=150)
-        plt.close(figure)
-    return figure
+    return written(figure, path)
 
 
 def _draw_closure(
     axis: Any, fit: Estimate, curve: ClosureCurve, number: int, held_out: Points | None
 ) -> None:
-    top, points = (
-        float(curve.closure[-1]),
-        {"marker": "o", "ls": "none", "color": "C0", "zorder": 3},
-    )
+    top = float(curve.closure[-1])
+    points = {"marker": "o", "ls": "none", "color": "C0", "zorder": 3}
     if held_out is not None:
         stress, closure = (np.asarray(x, float) for x in held_out)
         top = float(closure[-1])

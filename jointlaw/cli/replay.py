@@ -11,16 +11,16 @@ from ..law import JointLaw
 from .command import add_command
 
 
-def add_replay_command(commands: Any) -> None:
+def add(commands: Any) -> None:
     """Add the subcommand to the command line."""
     parser = add_command(
         commands,
         "replay",
         "run the step again that a NonFiniteError left in a file",
         "jointlaw replay jointlaw-replay-4711-1.npz",
+        _replay,
     )
     parser.add_argument("file", help="the file that the error named")
-    parser.set_defaults(run=_replay)
 
 
 def _replay(options: argparse.Namespace) -> int:

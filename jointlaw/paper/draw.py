@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..support.pyplot import pyplot
 from .section import Figure
 
 TOTAL, LAW = "total form (as printed)", "incremental law (this package)"
@@ -23,12 +24,8 @@ _STYLE: dict[Any, Any] = {
 
 def rendered(figure: Figure) -> tuple[bytes, str]:
     """The figure as PNG, and its curves as CSV. Raises ImportError without matplotlib."""
-    try:
-        from matplotlib import rc_context
-    except ImportError as error:
-        raise ImportError("figures need matplotlib: pip install 'jointlaw[plot]'") from error
     out = io.BytesIO()
-    with rc_context(_STYLE):
+    with pyplot().rc_context(_STYLE):
         page = drawn(figure)
         page.savefig(out, format="png")
     return out.getvalue(), points(page)

@@ -50,8 +50,7 @@ def directions(
 def elastic(a: float, b: float, c: float, kn: float, ks: float) -> Array:
     """Eq. 26 with the stiffness of Eq. 24: the tensor C^e/N, shape (3, 3)."""
     n, s, t, weight = directions(a, b, c)
-    result: Array = np.einsum("ijab,ab->ij", _stiffness(n, s, t, kn, ks), weight)
-    return result
+    return np.asarray(np.einsum("ijab,ab->ij", _stiffness(n, s, t, kn, ks), weight))
 
 
 def inelastic(a: float, b: float, c: float, kn: float, ks: float, mu: float) -> Array:
@@ -64,8 +63,7 @@ def inelastic(a: float, b: float, c: float, kn: float, ks: float, mu: float) -> 
     q = s + mu * n
     M = 1 / np.einsum("ijab,jab,iab->ab", K, s, q)
     K_zeta, q_K = np.einsum("ikab,kab->iab", K, s), np.einsum("mjab,mab->jab", K, q)
-    result: Array = np.einsum("ab,iab,jab,ab->ij", M, K_zeta, q_K, weight)
-    return result
+    return np.asarray(np.einsum("ab,iab,jab,ab->ij", M, K_zeta, q_K, weight))
 
 
 def _stiffness(n: Array, s: Array, t: Array, kn: float, ks: float) -> Array:

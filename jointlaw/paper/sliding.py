@@ -74,8 +74,7 @@ def _brute_force(found: JointLaw, delta: Array, contact: str) -> Array:
     fn = p.lam * p.K * dn ** (1 + p.eta)
     x = ds / np.where(dn > 0, p.mu * p.lam * dn, np.inf)
     share = np.where(x < limit, x * shear_factor(np.minimum(x, limit), p.eta, contact), 1.0)
-    total: Array = (weight * (fn * n + p.mu * fn * share * slip / ds)).sum(axis=(1, 2))
-    return total
+    return np.asarray((weight * (fn * n + p.mu * fn * share * slip / ds)).sum(axis=(1, 2)))
 
 
 @SECTION.claim(

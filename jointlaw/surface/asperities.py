@@ -126,8 +126,7 @@ def _levelled(z: Array) -> Array:
     """Heights above the mean plane."""
     axes = [np.linspace(-1.0, 1.0, n) for n in z.shape]
     grid = np.meshgrid(*axes, indexing="ij")
-    level = z - z.mean()
+    level: Array = z - z.mean()
     for g in grid:
         level = level - g * (np.sum(g * level) / np.sum(g * g))
-    levelled: Array = level
-    return levelled
+    return level

@@ -133,8 +133,7 @@ def _components(bins: _Bins, a: float) -> Array:
 
 
 def _density(bins: _Bins, parts: Array, b: float, c: float) -> Array:
-    p: Array = np.maximum(parts[0] + b * parts[1] + c * parts[2], 1e-14)
-    return p
+    return np.asarray(np.maximum(parts[0] + b * parts[1] + c * parts[2], 1e-14))
 
 
 def _shape(bins: _Bins, parts: Array) -> tuple[float, float, float]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..support.pyplot import pyplot
+from ..support.pyplot import pyplot, written
 from .estimate import SurfaceEstimate
 
 CLASSES = 5  # of the fit's classes of inclination, drawn as one
@@ -15,8 +15,7 @@ CLASSES = 5  # of the fit's classes of inclination, drawn as one
 
 def plot_surface(fit: SurfaceEstimate, path: str | Path | None = None) -> Any:
     """The scan with its summits, heights and inclinations against their fits."""
-    plt = pyplot()
-    figure, (scan, heights, inclinations) = plt.subplots(
+    figure, (scan, heights, inclinations) = pyplot().subplots(
         1, 3, figsize=(12.5, 3.9), layout="constrained"
     )
     found, h, d, mm = fit.asperities, fit.heights, fit.directions, 1e3 * fit.spacing
@@ -62,7 +61,4 @@ def plot_surface(fit: SurfaceEstimate, path: str | Path | None = None) -> Any:
     )
     inclinations.legend(loc="upper left", fontsize="small")
     figure.suptitle(f"Sampling length {1e6 * fit.sampling_length:.3g} µm")
-    if path is not None:
-        figure.savefig(path, dpi=150)
-        plt.close(figure)
-    return figure
+    return written(figure, path)

@@ -70,5 +70,4 @@ def draw_directions(
 
 def _folded(phi: Array) -> Array:
     """The azimuth in the first quadrant that has the same cos 2 phi."""
-    folded: Array = np.arctan2(np.abs(np.sin(phi)), np.abs(np.cos(phi)))
-    return folded
+    return np.arctan2(np.abs(np.sin(phi)), np.abs(np.cos(phi)))

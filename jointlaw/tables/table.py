@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from ..law import JointLaw
 from ..support.checks import Array
 from ..support.files import replace_file
-from .plot import plot_table
+from ..support.pyplot import pyplot, written
 from .report import Report, report
 from .table_law import MARKER, VERSION, TableLaw, around, between, read_table
 
@@ -115,7 +115,26 @@ class JointTable:
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Draw the table (needs matplotlib); returns the figure, written to `path` if given."""
-        return plot_table(self.columns, path)
+        figure, axes = pyplot().subplots(2, 2, figsize=(9, 6.5), layout="constrained", sharex=True)
+        columns = self.columns
+        u = columns["un"] * 1e6
+        axes[0, 0].plot(u, columns["sn"] / 1e6, "o-", ms=2.5)
+        axes[0, 0].set_ylabel("normal stress (MPa)")
+        for kind in ("secant", "tangent"):
+            axes[0, 1].plot(u, columns[f"kn_{kind}"] / 1e9, label=f"normal, {kind}")
+        azimuths = [name[3:] for name in columns if name.startswith("kt_")]
+        for k in (0, len(azimuths) // 4, len(azimuths) // 2):
+            azimuth, label = azimuths[k], f"{int(azimuths[k])}°"
+            axes[0, 1].plot(u, columns[f"kt_{azimuth}"] / 1e9, "--", label=f"shear, {label}")
+            axes[1, 0].plot(u, columns[f"mu_{azimuth}"], label=f"peak, {label}")
+            axes[1, 1].plot(u, np.degrees(np.arctan(columns[f"dil_{azimuth}"])), label=label)
+        labels = ("stiffness (GPa/m)", "friction coefficient", "dilation angle (°)")
+        for axis, label in zip(axes.flat[1:], labels, strict=True):
+            axis.set_ylabel(label)
+            axis.legend(fontsize="small")
+        for axis in axes[1]:
+            axis.set_xlabel("closure (µm)")
+        return written(figure, path)
 
     # ------------------------------------------------------------------ files
 

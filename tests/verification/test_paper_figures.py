@@ -8,7 +8,7 @@ import json
 import numpy as np
 import pytest
 
-from jointlaw.cli.figures import add_figures_command
+from jointlaw.cli import figures
 from jointlaw.paper import draw
 from jointlaw.paper.contents import FIGURES, write_figures
 
@@ -72,19 +72,19 @@ def test_unknown_figure_is_refused_before_anything_is_written(tmp_path, number):
 
 def run(*arguments):
     parser = argparse.ArgumentParser()
-    add_figures_command(parser.add_subparsers())
+    figures.add(parser.add_subparsers())
     options = parser.parse_args(["figures", *arguments])
-    return options.run(options)
+    options.run(options)
 
 
 def test_command_draws(tmp_path, capsys):
-    assert run(*map(str, QUICK), "--out", str(tmp_path)) == 0
+    run(*map(str, QUICK), "--out", str(tmp_path))
     assert "9 files" in capsys.readouterr().out
     assert (tmp_path / "figure-08.png").exists()
 
 
 def test_command_prints_claims(capsys):
-    assert run("--claims", "hertz-mindlin-ratio", "frictionless-c11p") == 0
+    run("--claims", "hertz-mindlin-ratio", "frictionless-c11p")
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 4  # head, rule and two claims
     assert "0.8235" in lines[2]

@@ -13,8 +13,7 @@ from ..parameters.heights import FORMATIONS
 from ..parameters.orientation import largest_c
 from ..support.checks import Array, number, one_of
 from .forward import DEFAULTS, Settings, log_stress, parameters
-from .measured import ClosureCurve, ShearCurve
-from .noise import Noise
+from .measured import ClosureCurve, Noise, ShearCurve
 from .priors import TRANSFORMS, Ranges, Values, normal_priors, quantity, transform_of
 
 Curves = Sequence[ClosureCurve | ShearCurve]
@@ -119,12 +118,12 @@ def pose(
     if settings.closure_only and any(isinstance(curve, ShearCurve) for curve in curves):
         raise ValueError("law: closure_only = True cannot shear; set it False to fit a ShearCurve")
     fixed = fixed or {}
-    for name, value in fixed.items():
-        _known("fixed", name)
-        values[name] = _within_bounds(name, value)
     names = [name for name in free if name not in fixed]
-    for name in names:
-        _known("free", name)
+    for where, given in (("fixed", fixed), ("free", names)):
+        for name in given:
+            if name not in DEFAULTS:
+                raise ValueError(f"{where}: {name!r} is unknown; choose from {', '.join(DEFAULTS)}")
+    values |= {name: _within_bounds(name, value) for name, value in fixed.items()}
     if not settings.has_heights and {"alpha", "beta", "overlap"} & set(names):
         raise ValueError("free: this law has no heights to fit; give it GammaHeights or law=None")
     _require_eq_18(values, names)
@@ -188,8 +187,3 @@ def _require_eq_18(values: Values, names: Sequence[str]) -> None:
             f"c = {c:g} is out of bounds: |c| {'<' if free else '<='} 1/3 - b/6 = {bound:.9g} "
             f"(Eq. 18) for {what}; hold a smaller c or another b"
         )
-
-
-def _known(where: str, name: str) -> None:
-    if name not in DEFAULTS:
-        raise ValueError(f"{where}: {name!r} is unknown; choose from {', '.join(DEFAULTS)}")

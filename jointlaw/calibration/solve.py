@@ -2,7 +2,7 @@
 
 Minimised is sum (r/sigma)^2 + sum ((x - centre)/sd)^2 over the free parameters x (mostly
 logarithms), r being the residuals of the data. The noise sigma of every curve is estimated in turn
-with the parameters, see `noise`.
+with the parameters, see `measured.Noise`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from scipy import special
 from scipy.optimize import least_squares
 
 from ..support.checks import Array
-from .noise import Noise, estimate
+from .measured import Noise, estimate_noise
 from .problem import Problem
 
 ROUNDS = 12  # at most, of fitting and estimating the noise in turn
@@ -67,7 +67,7 @@ def solve(problem: Problem, starts: Sequence[Array]) -> Solution:
         if all(n.known for n in noise):
             break
         pieces = zip(expected, np.split(r, cuts), np.split(leverage, cuts), steepness, strict=True)
-        previous, noise = noise, tuple(estimate(*piece) for piece in pieces)
+        previous, noise = noise, tuple(estimate_noise(*piece) for piece in pieces)
         if noise == previous:
             break
         sigma = problem.sigma(noise)

@@ -14,10 +14,9 @@ from scipy.optimize import brentq
 
 from ..law import JointLaw
 from ..support.checks import Array
-from .draw import LAW, TOTAL
 from .runs import gamma_heights, law, total_closure
 from .secant import secant
-from .section import Bound, Numbers, Section
+from .section import LAW, TOTAL, Bound, Numbers, Section
 from .surface import WESTERLY
 
 SECTION = Section()

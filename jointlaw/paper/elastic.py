@@ -11,8 +11,7 @@ from scipy.optimize import brentq
 from ..support.checks import Array
 from . import quadrature
 from .closed_form import HasShape, Shape, elastic, hertz_mindlin_ratio, shear_stiffness
-from .draw import QUOTED
-from .section import Bound, Numbers, Section, largest, near, rounding
+from .section import QUOTED, Bound, Numbers, Section, largest, near, rounding
 
 SECTION = Section()
 
@@ -154,8 +153,10 @@ def ratio_above_one() -> Numbers:
     misprint=[rounding("none", 1.0), rounding("half", 2 / 3), rounding("quartz", 1.4 / 1.7)],
 )
 def hertz_mindlin() -> Numbers:
-    names = {"none": 0.0, "quartz": 0.3, "half": 0.5}
-    return {name: hertz_mindlin_ratio(nu) for name, nu in names.items()}
+    return {
+        name: hertz_mindlin_ratio(nu)
+        for name, nu in (("none", 0.0), ("quartz", 0.3), ("half", 0.5))
+    }
 
 
 @SECTION.claim(

@@ -69,9 +69,8 @@ def inelastic(a: float, b: float, c: float, kn: float, ks: float, mu: float) -> 
 def _stiffness(n: Array, s: Array, t: Array, kn: float, ks: float) -> Array:
     """K_ij of every direction, Eq. 24."""
     pair = "iab,jab->ijab"
-    result: Array = kn * np.einsum(pair, n, n)
-    result = result + ks * (np.einsum(pair, s, s) + np.einsum(pair, t, t))
-    return result
+    normal, shear = np.einsum(pair, n, n), np.einsum(pair, s, s) + np.einsum(pair, t, t)
+    return np.asarray(kn * normal + ks * shear)
 
 
 def random_shapes(count: int) -> list[Orientation]:

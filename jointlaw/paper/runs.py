@@ -78,10 +78,9 @@ def incremental(
     Keeps the normal stress `normal` (Pa), or, if a `closure` (m) is given, that closure.
     """
     found = law(name)
-    if closure:
-        stress = float(found.normal_stress(closure))
-        return direct_shear(found.joint(), to, stress, "closure", azimuth, steps=200)
-    return direct_shear(found.joint(), to, normal, "stress", azimuth, steps=200)
+    stress = float(found.normal_stress(closure)) if closure else normal
+    control = "closure" if closure else "stress"
+    return direct_shear(found.joint(), to, stress, control, azimuth, steps=200)
 
 
 @cache

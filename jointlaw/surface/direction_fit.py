@@ -75,7 +75,7 @@ def fit_directions(slope: Array, summit: NDArray[np.intp], noise: float) -> Dire
     _, b, c = _shape(bins, _components(bins, a))
     x = np.array([a, b, c])
     covariance = _covariance(bins, x, summit)
-    p = _density(bins, _components(bins, a), b, c).sum(axis=1)
+    p = _density(_components(bins, a), b, c).sum(axis=1)
     counts = bins.counts.sum(axis=1)
     distance = float(np.max(np.abs(np.cumsum(p) - np.cumsum(counts) / counts.sum())))
     bound = largest_c(b)
@@ -132,19 +132,17 @@ def _components(bins: _Bins, a: float) -> Array:
     )
 
 
-def _density(bins: _Bins, parts: Array, b: float, c: float) -> Array:
+def _density(parts: Array, b: float, c: float) -> Array:
     return np.asarray(np.maximum(parts[0] + b * parts[1] + c * parts[2], 1e-14))
 
 
 def _shape(bins: _Bins, parts: Array) -> tuple[float, float, float]:
     """Least negative log-likelihood at this a, with its b and c (within Eq. 18)."""
     full = bins.counts > 0
-    n, (p0, p1, p2) = bins.counts[full], parts[:, full]
-
+    n, parts = bins.counts[full], parts[:, full]
     b, c = 0.0, 0.0
     for _ in range(60):  # Newton on a concave likelihood
-        p = np.maximum(p0 + b * p1 + c * p2, 1e-14)
-        q1, q2 = p1 / p, p2 / p
+        q1, q2 = parts[1:] / _density(parts, b, c)
         g = np.array([n @ q1, n @ q2])
         H = np.array([[n @ q1**2, n @ (q1 * q2)], [n @ (q1 * q2), n @ q2**2]])
         step = np.array([g[0] / H[0, 0], 0.0]) if bins.profile else np.linalg.solve(H, g)
@@ -153,8 +151,7 @@ def _shape(bins: _Bins, parts: Array) -> tuple[float, float, float]:
         b, c = at
         if moved < 1e-7:
             break
-    p = np.maximum(p0 + b * p1 + c * p2, 1e-14)
-    return -float(n @ np.log(p)), b, c
+    return -float(n @ np.log(_density(parts, b, c))), b, c
 
 
 def _inside(b: float, c: float) -> tuple[float, float]:
@@ -166,13 +163,13 @@ def _inside(b: float, c: float) -> tuple[float, float]:
 
 def _covariance(bins: _Bins, x: Array, summit: NDArray[np.intp]) -> Array:
     """Sandwich covariance of a, b, c; c of a profile has none."""
-    p = _density(bins, _components(bins, x[0]), x[1], x[2])
+    p = _density(_components(bins, x[0]), x[1], x[2])
     scores = []
     for k, step in enumerate((1e-3 * x[0], 1e-3, 1e-3)):
         up, down = x.copy(), x.copy()
         up[k], down[k] = x[k] + step, x[k] - step
-        high = _density(bins, _components(bins, up[0]), up[1], up[2])
-        low = _density(bins, _components(bins, down[0]), down[1], down[2])
+        high = _density(_components(bins, up[0]), up[1], up[2])
+        low = _density(_components(bins, down[0]), down[1], down[2])
         scores.append((np.log(high) - np.log(low)) / (2 * step))
     score = np.stack(scores, -1)  # (bins, sectors, 3)
     free = 2 if bins.profile else 3

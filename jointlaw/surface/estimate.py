@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..calibration.identify import WIDEST
+from ..calibration.estimate import WIDEST
 from ..parameters.heights import GammaHeights
 from ..parameters.orientation import Orientation
 from ..support.checks import Array

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from jointlaw.cli import figures
-from jointlaw.paper import draw
-from jointlaw.paper.contents import FIGURES, write_figures
+from jointlaw.paper.contents import FIGURES, drawn, rendered, write_figures
 
 pytest.importorskip("matplotlib")
 
@@ -22,7 +21,7 @@ QUICK = [4, 5, 8, 9]
 def test_every_figure_has_finite_curves_units_and_a_caption(number):
     figure = FIGURES[number]
     assert len(figure.caption) > 80
-    png, curves = draw.rendered(figure)
+    png, curves = rendered(figure)
     assert png[:8] == b"\x89PNG\r\n\x1a\n"
     rows = list(csv.DictReader(io.StringIO(curves)))
     assert len(rows) > 30
@@ -41,14 +40,14 @@ def test_all_figures_of_the_paper_that_have_content_are_drawn():
 
 
 def test_figures_show_the_ranges_that_the_text_quotes():
-    _, right = draw.drawn(FIGURES[8]).axes
+    _, right = drawn(FIGURES[8]).axes
     measured, hertz = (patch.get_bbox() for patch in right.patches)
     assert (measured.y0, measured.y1) == (0.78, 1.1)
     assert (hertz.x0, hertz.x1) == (0.67, 1.0)
 
 
 def test_angles_are_written_in_degrees():
-    rows = list(csv.DictReader(io.StringIO(draw.rendered(FIGURES[9])[1])))
+    rows = list(csv.DictReader(io.StringIO(rendered(FIGURES[9])[1])))
     assert [float(row["x"]) for row in rows[:181]] == list(range(0, 361, 2))
 
 

@@ -154,8 +154,9 @@ def ratio_above_one() -> Numbers:
 )
 def hertz_mindlin() -> Numbers:
     return {
-        name: hertz_mindlin_ratio(nu)
-        for name, nu in (("none", 0.0), ("quartz", 0.3), ("half", 0.5))
+        "none": hertz_mindlin_ratio(0.0),
+        "quartz": hertz_mindlin_ratio(0.3),
+        "half": hertz_mindlin_ratio(0.5),
     }
 
 

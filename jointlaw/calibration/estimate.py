@@ -17,8 +17,7 @@ from ..support.checks import Array
 from .forward import build, log_stress
 from .measured import ClosureCurve, Noise
 from .priors import transform_of
-from .problem import Problem
-from .solve import Solution, derivative, minimise
+from .problem import Problem, Solution, derivative, minimise
 
 # Standard error of ln(stress) per doubling of the stress beyond the data, from curves of other
 # laws: power laws of exponent 1.5 to 6 and Gaussian heights, lower half fitted, upper predicted

@@ -20,8 +20,7 @@ from .estimate import Estimate
 from .forward import build
 from .measured import ClosureCurve, ShearCurve
 from .priors import Ranges, Values, transform_of
-from .problem import pose, starting_points
-from .solve import solve
+from .problem import pose, solve, starting_points
 
 Points = tuple[ArrayLike, ArrayLike]  # stress (Pa) and closure (m)
 

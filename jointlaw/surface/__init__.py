@@ -3,8 +3,7 @@
     scan_files      files of heights: CSV, NPY, profilometers
     synthetic       surfaces whose asperities are known, to try a scan on
     asperities      summits and facets of a surface
-    height_fit      a gamma distribution through summit depths
-    direction_fit   Eq. 14 through facet slopes
+    densities       gamma heights through summit depths, Eq. 14 through facet slopes
     estimate        parameters with errors, and what the scan leaves open
     fit             from_surface and its result: a law, words and a picture
 

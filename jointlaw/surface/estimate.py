@@ -12,8 +12,7 @@ from ..parameters.heights import GammaHeights
 from ..parameters.orientation import Orientation
 from ..support.checks import Array
 from .asperities import Asperities
-from .direction_fit import DirectionFit
-from .height_fit import HeightFit
+from .densities import DirectionFit, HeightFit
 
 NOISY = 0.04  # error of a gradient over the median gradient, from which summits get misplaced
 

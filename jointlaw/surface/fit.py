@@ -16,9 +16,8 @@ from ..parameters.asperity import Asperity
 from ..support.checks import above
 from ..support.pyplot import pyplot, written
 from .asperities import extract
-from .direction_fit import fit_directions
+from .densities import fit_directions, fit_heights
 from .estimate import SurfaceEstimate
-from .height_fit import fit_heights
 
 SAMPLES = 4  # points along the edge of a facet, by default
 UNITS = {"beta": "m", "overlap": "m", "asperity_density": "1/m2"}
@@ -194,7 +193,7 @@ def from_surface(
     Returns a `SurfaceFit`. Raises ValueError for a bad array or too few summits.
 
     Source: Misra 1999, sections 2.2.1, 2.2.2 and Eq. 12 to 18; summits, facets and estimators are
-    described in `asperities`, `height_fit` and `direction_fit`.
+    described in `asperities` and `densities`.
     """
     try:
         heights = np.asarray(z, float)

@@ -221,7 +221,8 @@ def _shape(bins: _Bins, parts: Array) -> tuple[float, float, float]:
     n, parts = bins.counts[full], parts[:, full]
     b, c = 0.0, 0.0
     for _ in range(60):  # Newton on a concave likelihood
-        q1, q2 = parts[1:] / _density(parts, b, c)
+        p = _density(parts, b, c)
+        q1, q2 = parts[1] / p, parts[2] / p
         g = np.array([n @ q1, n @ q2])
         H = np.array([[n @ q1**2, n @ (q1 * q2)], [n @ (q1 * q2), n @ q2**2]])
         step = np.array([g[0] / H[0, 0], 0.0]) if bins.profile else np.linalg.solve(H, g)

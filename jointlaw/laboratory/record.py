@@ -83,7 +83,7 @@ class Record:
 
     @property
     def dilation_angle(self) -> float:
-        """Largest dilation angle atan(-d closure/|d shear|) in degrees; 0 without dilation."""
+        """Largest dilation angle atan(opening/shear) of a step, in degrees; 0 without dilation."""
         slip = np.abs(np.diff(self.shear))
         opening = -np.diff(self.closure)
         moved = slip > 1e-9 * max(float(np.max(np.abs(self.shear))), 1e-300)

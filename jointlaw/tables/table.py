@@ -191,7 +191,7 @@ class JointTable:
 
     @property
     def columns(self) -> dict[str, Array]:
-        """Columns as in the files: un sn kn_secant kn_tangent mu kt_000 ... mu_ ... mob_ ... dil_.
+        """Columns as in the files: `un sn kn_secant kn_tangent mu kt_000 ... mu_.. mob_.. dil_..`
 
         `mu` is the mean over azimuth of the peak friction, the numbers are azimuths in degrees.
         """

@@ -1,7 +1,5 @@
 """The forward model: parameters by name to a law and to its closure curve, and a law to them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache

@@ -5,8 +5,6 @@ logarithms), r being the residuals of the data. The noise sigma of every curve i
 with the parameters, see `measured.Noise`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

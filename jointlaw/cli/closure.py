@@ -1,7 +1,5 @@
 """`jointlaw closure`: a closure test on one joint."""
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """What the subcommands of `jointlaw` share: help with a worked example, options, results."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """The command `jointlaw export`: a law as files for a host code."""
 
-from __future__ import annotations
-
 import argparse
 from typing import Any
 

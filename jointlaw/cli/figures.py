@@ -1,7 +1,5 @@
 """The command `jointlaw figures`: the paper's figures, and the table of its claims."""
 
-from __future__ import annotations
-
 import argparse
 from typing import Any
 

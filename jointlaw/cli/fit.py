@@ -1,7 +1,5 @@
 """`jointlaw fit`: measured closure curves to laws, with report, plot and held-out errors."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from functools import partial

@@ -1,7 +1,5 @@
 """The command line `jointlaw`."""
 
-from __future__ import annotations
-
 import argparse
 import re
 import sys

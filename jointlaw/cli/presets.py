@@ -1,7 +1,5 @@
 """`jointlaw presets`: the parameter sets of the paper."""
 
-from __future__ import annotations
-
 import argparse
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`jointlaw replay`: the step again that failed."""
 
-from __future__ import annotations
-
 import argparse
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`jointlaw scan`: a scanned surface to orientation and heights, with report and picture."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import Any

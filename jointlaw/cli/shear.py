@@ -1,7 +1,5 @@
 """`jointlaw shear`: a direct shear test on one joint."""
 
-from __future__ import annotations
-
 import argparse
 import math
 from functools import partial

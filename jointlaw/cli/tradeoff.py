@@ -1,7 +1,5 @@
 """The command `jointlaw tradeoff`: what resolutions of a law cost and how accurate they are."""
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Sections 4.1 and 4.2, closure and initial shear stiffness: Figures 11 to 13."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The paper as reproduced: its figures as files, and the table of its claims with our numbers."""
 
-from __future__ import annotations
-
 import csv
 import io
 import textwrap

@@ -1,7 +1,5 @@
 """Section 3.1, elastic stiffness: Table 1, Eq. 24 to 28, Figures 8 and 9."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

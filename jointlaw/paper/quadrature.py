@@ -4,8 +4,6 @@ Shares no code with `closed_form`: Gauss-Legendre in theta and equal azimuths ov
 Eq. 14, and the tensors of Eq. 24, 26 and 29 contracted as they stand.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """What a section of the paper holds: its figures, and its claims with the verdict on each."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field

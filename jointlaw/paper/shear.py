@@ -1,7 +1,5 @@
 """Section 4.3, shear at a kept closure of 1 um: Figures 14 to 16."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -3,8 +3,6 @@
 Then section 4, one asperity and its power law: Eq. 33 to 36, and the limits of Eq. 37b.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Sections 4.3 and 5, shear at a kept normal stress and friction angles: Figures 17 to 19."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Section 2, surface geometry: heights (Eq. 11-13) and orientations (Eq. 14-18), Figures 3 to 7."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """matplotlib, where it is installed (extra `plot`)."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

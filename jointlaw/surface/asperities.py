@@ -1,7 +1,5 @@
 """Asperities of a scanned surface: summits, and the facets that fall away from them."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from typing import NamedTuple
 

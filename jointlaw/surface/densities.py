@@ -22,8 +22,6 @@ with ih the exponentially scaled Bessel functions of r R_k/s^2. Facets of one su
 the errors are summed over summits first (sandwich).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Closure of an unsheared joint: its normal stress, and the inverse."""
 
-from __future__ import annotations
-
 import math
 import sys
 from typing import NamedTuple

@@ -13,8 +13,6 @@ closure lies beyond the table. With D = y d/dy = t (1 - t)/2 d/dt,
     Psi   = int Phi dy = y^(2+eta) T,     D T = S - (2 + eta) T
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import NamedTuple
 

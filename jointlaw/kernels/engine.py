@@ -5,8 +5,6 @@ Both engines keep states in blocks and offer the same `advance`: numba compiles 
 numba is taken where it can be imported. JOINTLAW_THREADS bounds the threads.
 """
 
-from __future__ import annotations
-
 import os
 import threading
 from collections.abc import Callable

@@ -8,8 +8,6 @@ joints last: facets (M, B), cells (M, D, B), sliders (2, M, D, B). State (rows, 
 where q is the shear force of a slider times lam, in the (s, t) basis of Eq. 25.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

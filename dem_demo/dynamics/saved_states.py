@@ -18,7 +18,7 @@ import numpy as np
 import jointlaw as jl
 from jointlaw.support.files import replace_file
 
-from ..contact import BatchState, Joints
+from ..contact import Joints, PoolState
 from ..scene import Run, Scene, parse
 from . import guards
 from .energy import COLUMNS, Ledger
@@ -26,7 +26,7 @@ from .state import Layout, Limit, Moment, State
 from .system import System
 
 SCENE, STATE = "scene.toml", "state.npz"
-VERSION = 2  # of state.npz; version 1 was several files
+VERSION = 3  # of state.npz
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class Saved:
     """A copy of everything that the future depends on: arrays by name, and the joints' states."""
 
     arrays: dict[str, np.ndarray]
-    joints: dict[str, BatchState]
+    joints: dict[str, PoolState]
 
 
 def pack(now: State, joints: Joints, motion: np.ndarray) -> Saved:
@@ -96,11 +96,10 @@ def save(scene: Scene, saved: Saved, folder: Path) -> None:
     Raises ValueError for a scene that `text_of` refuses.
     """
     text, buffer, tables = text_of(scene), io.BytesIO(), {}
-    for i, (law, slots, free) in enumerate(saved.joints.values()):
+    for i, (points, law) in enumerate(saved.joints.values()):
         # numbered: a law's name may be no array's name
         tables[f"law-{i}"], tables[f"fingerprint-{i}"] = law.values, np.array(law.fingerprint)
-        tables[f"slots-{i}"] = np.array([[*k, p, s] for (k, p), s in slots.items()], int)
-        tables[f"free-{i}"] = np.array(free, int)
+        tables[f"points-{i}"] = np.array([[*key, number] for key, number in points], int)
     about = {"version": VERSION, "scene": fingerprint(scene)}
     np.savez(buffer, **about, **saved.arrays, **tables)
     folder.mkdir(parents=True, exist_ok=True)
@@ -120,8 +119,8 @@ def load(folder: Path) -> tuple[Scene, Saved]:
     joints = {}
     for i, name in enumerate(scene.laws):
         law = jl.JointState(str(data.pop(f"fingerprint-{i}")), data.pop(f"law-{i}"))
-        slots = {(tuple(s[:4]), s[4]): s[5] for s in data.pop(f"slots-{i}").tolist()}
-        joints[name] = law, slots, data.pop(f"free-{i}").tolist()
+        points = data.pop(f"points-{i}").tolist()
+        joints[name] = [(tuple(key), number) for *key, number in points], law
     return scene, Saved(data, joints)
 
 

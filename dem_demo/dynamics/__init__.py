@@ -3,8 +3,7 @@
 world                everything that touches pymunk
 energy               the ledger of energies
 timestep             the largest stable step
-system               what stays the same during a run
-state                what changes
+state                what stays the same during a run, and what changes
 forces               forces at a state
 guards               what is refused
 transfer             joints whose length jumps

@@ -22,8 +22,7 @@ from ..contact import Joints, PoolState
 from ..scene import Run, Scene, parse
 from . import guards
 from .energy import COLUMNS, Ledger
-from .state import Layout, Limit, Moment, State
-from .system import System
+from .state import Layout, Limit, Moment, State, System
 
 SCENE, STATE = "scene.toml", "state.npz"
 VERSION = 3  # of state.npz

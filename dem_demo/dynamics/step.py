@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -9,8 +10,7 @@ from ..contact import Joints, LawPoints, Points, StiffnessCurve
 from . import guards
 from .energy import booked
 from .forces import forces
-from .state import Layout, Moment, State
-from .system import System
+from .state import Layout, Moment, State, System
 from .transfer import transferred
 
 NEAR = 0.4  # share of the step's limit below which no change of lever arms matters
@@ -53,16 +53,10 @@ def advance(
         now, n=n, motion=motion, law_points=law_points.reopened(points), points=points,
         traction=traction, ledger=ledger, limit=limit,
     )  # fmt: skip
-    if n % LOOKS or not system.drives.waiting(after.time, after.reversed_at):
+    if n % LOOKS:
         return after
-    return replace(
-        after,
-        reversed_at=system.drives.reverse(
-            after.time,
-            after.reversed_at,
-            lambda moving, base: after.slid(joints, moving, base),
-        ),
-    )
+    slid = partial(after.slid, joints)
+    return replace(after, reversed_at=system.drives.reverse(after.time, now.reversed_at, slid))
 
 
 def _followed(

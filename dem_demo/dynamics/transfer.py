@@ -32,9 +32,9 @@ def transferred(
         if ratio[i] > 1:
             point = now.layout.identities[i]
             curve, depth = joints.curve(point), law_points.closure(points)[i]
-            closure = min(curve.closure_at_work(held[i] / length), depth)
+            closure = min(np.interp(held[i] / length, curve.work, curve.closure), depth)
             offset[i] += depth - closure
-            kept = curve.work_at(closure)
+            kept = np.interp(closure, curve.closure, curve.work)
             joints.renew(point)
             lost[i] = 0.0
         ledger = ledger.dropping(max(float(held[i] - kept * length), 0.0) * thickness)

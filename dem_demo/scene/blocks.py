@@ -52,10 +52,7 @@ class Block:
     @property
     def width(self) -> float:
         """Smallest width (m) over the directions of its edges."""
-        edge = np.roll(self.corners, -1, axis=0) - self.corners
-        normal = np.stack([-edge[:, 1], edge[:, 0]]) / np.hypot(*edge.T)
-        across = self.corners @ normal
-        return float((across.max(axis=0) - across.min(axis=0)).min())
+        return smallest_width(self.corners)
 
     @property
     def reach(self) -> float:
@@ -72,6 +69,14 @@ def box(width: float, height: float, at=(0.0, 0.0), angle: float = 0.0) -> np.nd
     """Corners of a box centred at `at`, turned by `angle` (degrees)."""
     half = 0.5 * np.array([[-width, -height], [width, -height], [width, height], [-width, height]])
     return half @ turn(np.radians(angle)).T + np.asarray(at, float)
+
+
+def smallest_width(corners: np.ndarray) -> float:
+    """Smallest width (m) over the directions of the edges between corners (m, 2)."""
+    edge = np.roll(corners, -1, axis=0) - corners
+    edge = edge[np.hypot(*edge.T) > 0]
+    normal = np.stack([-edge[:, 1], edge[:, 0]]) / np.hypot(*edge.T)
+    return float(np.ptp(corners @ normal, axis=0).min())
 
 
 def turn(angle: float) -> np.ndarray:

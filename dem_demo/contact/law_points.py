@@ -27,7 +27,7 @@ class LawPoints:
     """The law points of a moment: k corners on edges, then the points along long overlaps.
 
     keys: of the k corners when found; numbers (k,): their names for life; closure_offset (k,): the
-    depth (m) that each had to give up (see `dynamics.transfer`); overlaps: edges on edges that
+    depth (m) that each had to give up (see `dynamics.step`); overlaps: edges on edges that
     have points along them; given: numbers given so far; renewed_at (3, blocks): motion when last
     renewed; urgent: must be renewed, whatever has moved.
     """

@@ -108,23 +108,7 @@ def save(scene: Scene, saved: Saved, folder: Path) -> None:
 
 def load(folder: Path) -> tuple[Scene, Saved]:
     """The scene and the state that `save` wrote. Raises ValueError if they are not whole."""
-    data = _read(folder / STATE)
-    scene = parse((folder / SCENE).read_text(encoding="utf-8"), SCENE)
-    if data.pop("scene") != fingerprint(scene):
-        raise ValueError(
-            f"{folder / SCENE} is not the scene of this state: only end, record, fraction, "
-            "step, title and watch may change; undo the rest, or run it as a scene of its own"
-        )
-    joints = {}
-    for i, name in enumerate(scene.laws):
-        law = jl.JointState(str(data.pop(f"fingerprint-{i}")), data.pop(f"law-{i}"))
-        points = data.pop(f"points-{i}").tolist()
-        joints[name] = [(tuple(key), number) for *key, number in points], law
-    return scene, Saved(data, joints)
-
-
-def _read(file: Path) -> dict[str, np.ndarray]:
-    """The arrays of a file of this version."""
+    file = folder / STATE
     if not file.is_file():
         raise ValueError(
             f"{str(file.parent)!r} holds no saved state ({STATE} is missing): run the scene"
@@ -140,7 +124,18 @@ def _read(file: Path) -> dict[str, np.ndarray]:
             f"{file} has version {version}, this demo reads {VERSION}: go on with the version of "
             "the demo that wrote it, or run the scene again"
         )
-    return data
+    scene = parse((folder / SCENE).read_text(encoding="utf-8"), SCENE)
+    if data.pop("scene") != fingerprint(scene):
+        raise ValueError(
+            f"{folder / SCENE} is not the scene of this state: only end, record, fraction, "
+            "step, title and watch may change; undo the rest, or run it as a scene of its own"
+        )
+    joints = {}
+    for i, name in enumerate(scene.laws):
+        law = jl.JointState(str(data.pop(f"fingerprint-{i}")), data.pop(f"law-{i}"))
+        points = data.pop(f"points-{i}").tolist()
+        joints[name] = [(tuple(key), number) for *key, number in points], law
+    return scene, Saved(data, joints)
 
 
 def text_of(scene: Scene) -> str:

@@ -86,9 +86,7 @@ def turn(angle: float) -> np.ndarray:
 
 
 def check_convex(corners: np.ndarray) -> str | None:
-    """What is wrong with a list of corners, or None."""
-    if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3:
-        return "must be a list of at least 3 corners [x, y] in m"
+    """What is wrong with corners (m, 2), three or more; None if nothing is."""
     if not np.isfinite(corners).all():
         return "must be finite numbers"
     edge = np.roll(corners, -1, axis=0) - corners

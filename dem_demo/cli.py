@@ -52,7 +52,7 @@ Words = list[str]
 def main(arguments: Words | None = None) -> int:
     """Entry point; returns the exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    verb = words.pop(0) if words and words[0] in COMMANDS else ""
+    verb = words.pop(0) if words and words[0] and words[0] in COMMANDS else ""
     command, *about = COMMANDS[verb]
     try:
         command(_parse(words, verb, *about))

@@ -1,7 +1,5 @@
 """From a law to its table: the graded grid, and the virgin loading paths that fill it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

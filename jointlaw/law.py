@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike
 
 from .discretisation.facets import Facets, facet_sum, facets, yield_sum
 from .discretisation.tables import UNDERFLOW, VERSION, Tables, largest_reach, tables
-from .discretisation.virgin_closure import VirginClosure
-from .discretisation.virgin_curve import VirginCurve, virgin_curve
+from .discretisation.virgin_curve import VirginClosure, VirginCurve, virgin_curve
 from .joints.batch import JointBatch
 from .joints.joint import Joint
 from .kernels import reference

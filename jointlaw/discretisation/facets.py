@@ -1,7 +1,5 @@
 """Facets: the few orientations that stand for the density of Eq. 14, and sums over them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

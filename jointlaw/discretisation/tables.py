@@ -1,7 +1,5 @@
 """The tables of a law: everything that a kernel reads, shared by all joints of the law."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

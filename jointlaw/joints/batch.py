@@ -304,7 +304,7 @@ class JointBatch:
         if (new > limit).any():
             row = int(np.argmax(new > limit))
             joint = row if index is None else int(index[row])
-            path = write_replay(self.law, old[:, [row]], d[[row]].T, step.C is not None)
+            path = write_replay(self.law.to_toml, old[:, [row]], d[[row]].T, step.C is not None)
             again = "no replay file could be written"
             if path is not None:
                 again = f"`jointlaw replay {path}` repeats it"

@@ -1,7 +1,5 @@
 """Depth cells of facets: how the virgin curve at one moment is shared among them."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

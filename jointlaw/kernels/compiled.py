@@ -8,8 +8,6 @@ turns each loop over l, the joint, into vector instructions. Branches in such lo
 Symbols are those of docs/theory-incremental.md and of the reference kernel.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numba

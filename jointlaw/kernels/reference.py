@@ -9,8 +9,6 @@ where q is the shear force of a slider times lam, in the (s, t) basis of Eq. 25.
 that yield follow flattened depth (M) | plastic work (1); with wear, slip of the asperities (1).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Friction that falls with the slip of the asperities, docs/theory-incremental.md, "Wear"."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..discretisation.tables import Tables

@@ -4,8 +4,6 @@ The springs of a facet that touch above its flattened depth z_p were pressed fla
 together at y = z_p. All that the bed then holds is what it held without, less its value at z_p.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..discretisation.tables import Tables

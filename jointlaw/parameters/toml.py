@@ -1,7 +1,5 @@
 """Laws as TOML files: the same keys as the constructors, unknown keys refused by their path."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math

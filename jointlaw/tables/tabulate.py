@@ -1,7 +1,5 @@
 """From a law to its table: the graded grid, and the virgin loading paths that fill it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any
@@ -141,9 +139,7 @@ def _grid(
 def _normal(law: JointLaw, u: Array) -> tuple[Array, Array]:
     """Secant and tangent normal stiffness (Pa/m) on the virgin curve; limits at zero closure."""
     x = np.where(u > 0, u, 1e-12 * law.closure_range)
-    steps = np.zeros((len(x), 3))
-    steps[:, 0] = x
-    _, C = law.joints(len(x)).update(steps)
+    _, C = law.joints(len(x)).update(np.stack([x, 0 * x, 0 * x], axis=1))
     assert C is not None
     return law.normal_stress(x) / x, C[:, 0, 0]
 

@@ -281,12 +281,8 @@ def _press(work, s, L, law, f):
     first, _, beside = _places(law)
     at, kept = first + f, beside + 2 * law.depth.shape[0] + f
     deep, o = facet[f, _YIELD], np.int64(facet[f, _OPPOSITE])
-    for l in range(L):  # one copy a loop, or the compiler makes no vectors of it
-        pad[_Z0 + l] = s[at, l]
     for l in range(L):
-        pad[_FZ0 + l] = s[kept, l]
-    for l in range(L):
-        pad[_Z1 + l] = pad[_Y1 + l]
+        pad[_Z0 + l], pad[_FZ0 + l], pad[_Z1 + l] = s[at, l], s[kept, l], pad[_Y1 + l]
     if o != f:
         m0, m1, m2 = facet[o, _M], facet[o, _M + 1], facet[o, _M + 2]
         for l in range(L):
@@ -310,9 +306,7 @@ def _press(work, s, L, law, f):
             pad[_Y1 + l] = pad[_SZ1 + l]
             pad[_FZ1 + l], pad[_SZ1 + l] = pad[_F1 + l], pad[_S1 + l]
         for l in range(L):
-            s[at, l] = pad[_Z1 + l]
-        for l in range(L):
-            s[kept, l] = pad[_FZ1 + l]
+            s[at, l], s[kept, l] = pad[_Z1 + l], pad[_FZ1 + l]
     for l in range(L):
         touches = pad[_Y0 + l] > pad[_Z0 + l]
         pad[_AT0 + l] = pad[_Y0 + l] if touches else pad[_Z0 + l]

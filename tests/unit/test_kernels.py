@@ -107,8 +107,9 @@ def test_same_numbers_on_random_laws_and_paths(both, make_law, seed):
         peak, peak_C = max(peak, np.abs(F).max()), max(peak_C, np.abs(C).max())
         off = max(off, np.abs(F - F2).max())
         off_C.append(np.abs(C - C2).max(axis=(1, 2)))
-    # what yielding leaves is a small difference of large forces, whose rounding it keeps
-    assert off < (10 * SAME if law.tables.yields else SAME) * peak
+    # yielding leaves small differences of large forces, and wear feeds the ledger back into q
+    damaged = law.tables.yields or law.tables.wears
+    assert off < (10 * SAME if damaged else SAME) * peak
     assert np.max(off_C) < SAME_C * peak_C
     assert np.quantile(off_C, 0.95) < USUAL_C * peak_C
     lost = slow.dissipated_energy

@@ -133,7 +133,8 @@ def staggered(orientation: jl.Orientation, u: int, phi: int, *scene: Any) -> Fac
     weight = made.weight * (1 + lean * np.cos(2 * P)) / (1 + lean * np.cos(2 * made.phi))
     ct, st, cp, sp = np.cos(made.theta), np.sin(made.theta), np.cos(P), np.sin(P)
     return Facets(made.theta, P, weight, np.array([ct, st * cp, st * sp]),
-                  np.array([-st, ct * cp, ct * sp]), np.array([0 * ct, -sp, cp]))  # fmt: skip
+                  np.array([-st, ct * cp, ct * sp]), np.array([0 * ct, -sp, cp]),
+                  made.opposite)  # fmt: skip
 
 
 # --------------------------------------------------------------------------------- depth cells

@@ -3,8 +3,6 @@
 The time step and the dashpots take the stiffness, the initial equilibrium how far a joint closes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +27,7 @@ class StiffnessCurve:
     work: np.ndarray
 
     @classmethod
-    def of(cls, law: jl.JointLaw) -> StiffnessCurve:
+    def of(cls, law: jl.JointLaw) -> "StiffnessCurve":
         """Tabulate a law from no closure to 2 GPa, more than any corner of rock stands."""
         top = float(law.closure(2e9))
         closure = np.concatenate([[0.0], np.geomspace(1e-8 * top, top, 600)])
@@ -50,14 +48,6 @@ class StiffnessCurve:
     def stress_at(self, closure: np.ndarray) -> np.ndarray:
         """Normal stress (Pa) of a virgin joint at a closure."""
         return np.interp(closure, self.closure, self.stress)
-
-    def work_at(self, closure: float) -> float:
-        """Work (J/m2) that a virgin joint takes up to a closure (m)."""
-        return float(np.interp(closure, self.closure, self.work))
-
-    def closure_at_work(self, work: float) -> float:
-        """Closure (m) at which a virgin joint has taken up `work` (J/m2)."""
-        return float(np.interp(work, self.work, self.closure))
 
 
 def _largest_stiffness(law: jl.JointLaw, closure: np.ndarray) -> np.ndarray:

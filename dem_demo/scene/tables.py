@@ -4,8 +4,6 @@ Written by hand: a validation library would word these errors itself, and would 
 its place in the file, the unit and the remedy.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Container, Iterator
 from difflib import get_close_matches
@@ -65,10 +63,6 @@ class Table:
         value = self.take(key, list, default)
         return default if value is default else self.two_numbers(key, value)
 
-    def vectors(self, key: str) -> list[tuple[float, float]]:
-        """A list, which may be missing, of two finite numbers each."""
-        return [self.two_numbers(key, value) for value in self.take(key, list, [])]
-
     def two_numbers(self, key: str, value: Any) -> tuple[float, float]:
         """A value that must be two finite numbers."""
         if not (isinstance(value, list) and len(value) == 2 and all(map(finite, value))):
@@ -90,7 +84,7 @@ class Table:
             raise SceneError(f"{self.path(key)} must be a list of at least 3 corners [x, y] in m")
         return np.array(value, float)
 
-    def tables(self, key: str, default=..., say: str = "") -> Iterator[Table]:
+    def tables(self, key: str, default=..., say: str = "") -> "Iterator[Table]":
         """The tables of a list of tables."""
         for i, data in enumerate(self.take(key, list, default, say=say)):
             yield Table(data, f"{self.path(key)}[{i}]")

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.integrate import trapezoid  # numpy renamed its own between versions
 
 from ..law import JointLaw
 from ..parameters.resolution import NAMED
@@ -34,20 +35,25 @@ class Loop:
     worst_mu: float
     open_closure: float
     law_closure: float
+    yields: bool = False
 
     def text(self) -> str:
         """The same in words."""
+        what = "Friction on the asperities, all that the law has, loses"
+        rest = "crushed and flattened asperities, seating of the halves, gouge"
+        if self.yields:
+            what = "Friction and yielding of the asperities, as the law has them, lose"
+            rest = "crushed asperities, seating of the halves, gouge"
         return (
             f"The measured cycle loses {100 * self.measured:.0f} % of the work of loading and "
             f"keeps {1e6 * self.open_closure:.1f} um of closure back at {self.stress / 1e6:.3g} "
             "MPa. "
-            f"Friction on the asperities, all that the law has, loses {100 * self.friction:.2g} % "
+            f"{what} {100 * self.friction:.2g} % "
             f"and keeps {1e6 * self.law_closure:.2f} um; of friction coefficients from "
             f"{_FRICTIONS[0]} to {_FRICTIONS[-1]}, {self.worst_mu:g} loses most at these "
             f"inclinations, {100 * self.largest_friction:.1f} %. "
-            "The rest is not in the law: crushed and flattened asperities, seating of the halves, "
-            "gouge. Use the fitted law for loading, and for small cycles below the largest stress "
-            "with care."
+            f"The rest is not in the law: {rest}. Use the fitted law for loading, and for small "
+            "cycles below the largest stress with care."
         )
 
 
@@ -68,11 +74,14 @@ def explain(law: JointLaw, stress: ArrayLike, closure: ArrayLike, steps: int = 1
     friction, law_closure = _loss(*_cycle(law, high, steps), low)
     largest, worst_mu = friction, law.asperity.mu
     for mu in track(_FRICTIONS, "friction", len(_FRICTIONS)):
-        other = replace(law, asperity=replace(law.asperity, mu=mu))
+        other = replace(
+            law, asperity=replace(law.asperity, mu=mu, mu_residual=None, wear_slip=np.inf)
+        )
         loss, _ = _loss(*_cycle(other, high, steps), low)
         if loss > largest:
             largest, worst_mu = loss, mu
-    return Loop(low, measured, friction, largest, worst_mu, open_closure, law_closure)
+    yields = law.asperity.yield_interference < np.inf
+    return Loop(low, measured, friction, largest, worst_mu, open_closure, law_closure, yields)
 
 
 def _cycle(law: JointLaw, high: float, steps: int) -> tuple[Array, Array]:
@@ -98,12 +107,7 @@ def _loss(stress: ArrayLike, closure: ArrayLike, low: float) -> tuple[float, flo
     """
     s_up, u_up, s_down, u_down = first_loading(stress, closure)
     up, down = _above(s_up, u_up, low), _above(s_down[::-1], u_down[::-1], low)
-    return 1 - _area(*down) / _area(*up), float(down[1][0] - up[1][0])
-
-
-def _area(stress: Array, closure: Array) -> float:
-    """Work per area, trapezoid rule (numpy renamed its own between versions)."""
-    return float(np.sum(0.5 * (stress[1:] + stress[:-1]) * np.diff(closure)))
+    return 1 - float(trapezoid(*down) / trapezoid(*up)), float(down[1][0] - up[1][0])
 
 
 def _above(stress: Array, closure: Array, low: float) -> tuple[Array, Array]:

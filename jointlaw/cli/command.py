@@ -1,7 +1,5 @@
 """What the subcommands of `jointlaw` share: help with a worked example, options, results."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Callable, Mapping
@@ -22,8 +20,17 @@ VERSION = 1  # of summary.json
 Written = Mapping[str, str | Callable[[Path], object]]
 
 
-def add_command(commands: Any, name: str, what: str, example: str) -> argparse.ArgumentParser:
-    """Add a subcommand with its one-line purpose and an example that runs as printed."""
+def add_command(
+    commands: Any,
+    name: str,
+    what: str,
+    example: str,
+    run: Callable[[argparse.Namespace], int | None],
+) -> argparse.ArgumentParser:
+    """Add a subcommand with its one-line purpose and an example that runs as printed.
+
+    run: what the command does with its options; returns the exit status, None for success.
+    """
     parser: argparse.ArgumentParser = commands.add_parser(
         name,
         help=what,
@@ -31,6 +38,7 @@ def add_command(commands: Any, name: str, what: str, example: str) -> argparse.A
         epilog=f"example:\n  {example}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.set_defaults(run=run)
     return parser
 
 
@@ -45,7 +53,13 @@ def read_law(options: argparse.Namespace) -> JointLaw:
     """The law that the options name."""
     law = presets.load_any(options.law)
     resolution = getattr(options, "resolution", None)
-    return law if resolution is None else replace(law, resolution=resolution)
+    if resolution is not None:
+        law = replace(law, resolution=resolution)
+    yields = getattr(options, "yield_interference", None)
+    if yields is not None:
+        value = quantity("--yield-interference", yields, "m", positive=True)
+        law = replace(law, asperity=replace(law.asperity, yield_interference=value))
+    return law
 
 
 def add_out(parser: argparse.ArgumentParser, *, required: bool = True) -> None:
@@ -88,25 +102,27 @@ def write_results(folder: Path, files: Written, summary: Mapping[str, Any]) -> N
 
 
 def add_test_options(parser: argparse.ArgumentParser, steps: int) -> None:
-    """Add what the laboratory tests take: law, steps and folder for the results."""
+    """Add what the laboratory tests take: law, yielding, steps and folder for the results."""
     add_law(parser)
+    parser.add_argument(
+        "--yield-interference",
+        metavar="LENGTH",
+        help="compression at which asperities yield, such as 0.1um, instead of the law's own",
+    )
     parser.add_argument(
         "--steps", metavar="N", type=int, default=steps, help=f"steps per leg (default {steps})"
     )
     add_out(parser)
 
 
-def run_test(
-    test: Callable[[], Record], law: JointLaw, options: argparse.Namespace
-) -> Record | None:
-    """Run a laboratory test and write its record; None if it stopped early."""
+def run_test(test: Callable[[], Record], law: JointLaw, options: argparse.Namespace) -> Record:
+    """Run a laboratory test and write its record, also that of a test that stopped early."""
     try:
         record = test()
     except PathError as error:
-        print(f"jointlaw {options.command}: {error}", file=sys.stderr)
         if len(error.record):
             _write(error.record, law, options)
-        return None
+        raise
     _write(record, law, options)
     return record
 

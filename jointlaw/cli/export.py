@@ -1,7 +1,5 @@
 """The command `jointlaw export`: a law as files for a host code."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import Any
@@ -12,13 +10,14 @@ from ..law import JointLaw
 from .command import add_command, add_law, add_out, quantity, read_law
 
 
-def add_export_command(commands: Any) -> None:
+def add(commands: Any) -> None:
     """Add `export` to the subparsers of the command line."""
     parser = add_command(
         commands,
         "export",
         "write a law for a host code: table, adapter and scripts in one folder",
         "jointlaw export yade jing-replica --out joint-for-yade",
+        _export,
     )
     parser.add_argument("host", choices=("yade", "c"), help="the host code; c: also C++")
     add_law(parser)
@@ -26,15 +25,17 @@ def add_export_command(commands: Any) -> None:
     parser.add_argument("--shear-limit", help="yade: shear at which friction is read, such as 5um")
     parser.add_argument("--tolerance", type=float, help="yade: of interpolation (0.001)")
     add_out(parser)
-    parser.set_defaults(run=_export)
 
 
-def _export(options: argparse.Namespace) -> int:
+def _export(options: argparse.Namespace) -> None:
     law = read_law(options)
-    return _export_c(law, options) if options.host == "c" else _export_yade(law, options)
+    if options.host == "c":
+        _export_c(law, options)
+    else:
+        _export_yade(law, options)
 
 
-def _export_c(law: JointLaw, options: argparse.Namespace) -> int:
+def _export_c(law: JointLaw, options: argparse.Namespace) -> None:
     for name in ("closure", "shear_limit", "tolerance"):
         if getattr(options, name) is not None:
             raise ValueError(
@@ -44,10 +45,9 @@ def _export_c(law: JointLaw, options: argparse.Namespace) -> int:
     files = export_c(law, options.out, identifier(Path(options.law).stem))
     print(f"wrote the joint for C and C++ to {options.out}: {', '.join(files)}")
     print(f"run: cd {options.out} && make && ./example")
-    return 0
 
 
-def _export_yade(law: JointLaw, options: argparse.Namespace) -> int:
+def _export_yade(law: JointLaw, options: argparse.Namespace) -> None:
     settings: dict[str, Any] = {
         "tolerance": 1e-3 if options.tolerance is None else options.tolerance
     }
@@ -59,4 +59,3 @@ def _export_yade(law: JointLaw, options: argparse.Namespace) -> int:
     print("what the table drops (error against the law, share of each path's largest traction):")
     print(table.report(law))
     print(f"run: cd {options.out} && yade -n -x direct_shear.py")
-    return 0

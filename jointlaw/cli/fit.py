@@ -1,7 +1,5 @@
 """`jointlaw fit`: measured closure curves to laws, with report, plot and held-out errors."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from functools import partial
@@ -13,17 +11,18 @@ import numpy as np
 from ..calibration import datasets
 from ..calibration.baselines import Comparison, compare
 from ..calibration.fit import Fit, fit_closure, fit_many
-from ..calibration.measured import first_loading
+from ..calibration.measured import first_loading, subtract_compliance
 from ..calibration.unloading import explain
 from ..support import units
-from .command import Written, add_command, add_out, write_results
+from ..support.checks import Array
+from .command import Written, add_command, add_out, quantity, write_results
 
 
-def add_fit_command(commands: Any) -> None:
+def add(commands: Any) -> None:
     """Add `fit` to the subparsers of the command line."""
     what = "fit the law to measured closure curves; write preset, report and plot"
     example = "jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out out"
-    parser = add_command(commands, "fit", what, example)
+    parser = add_command(commands, "fit", what, example, _run)
     parser.description = (
         f"{what}. Only the first loading is fitted; an unloading branch is compared with what "
         "friction explains."
@@ -43,19 +42,31 @@ def add_fit_command(commands: Any) -> None:
         metavar="NAME=VALUE",
         help="hold a parameter at a value in SI units, such as alpha=3.8; repeatable",
     )
+    parser.add_argument(
+        "--compliance",
+        metavar="LENGTH/STRESS",
+        help="of rock and machine, such as 4.2um/10MPa, or a file of stress and closure measured "
+        "without a joint: it is subtracted first",
+    )
+    parser.add_argument(
+        "--cycle",
+        action="store_true",
+        help="fit loading and unloading together, yield_interference among the parameters",
+    )
     parser.add_argument("--free", help="parameters to fit: asperity_density,alpha,beta")
     parser.add_argument("--formation", choices=("individual", "population"), default="individual")
     parser.add_argument("--noise", type=float, help="known error of the stress, such as 0.01")
     parser.add_argument("--workers", type=int, help="processes for several files")
     add_out(parser)
-    parser.set_defaults(run=_run)
 
 
-def _run(options: argparse.Namespace) -> int:
+def _run(options: argparse.Namespace) -> None:
     folders = _folders(options)
-    tests = [_read(options, item) for item in options.data]
+    tests = [_subtracted(options, *_read(options, item)) for item in options.data]
     keywords = _keywords(options)
-    loading = [first_loading(*test)[:2] for test in tests]
+    if options.cycle and options.up_to:
+        raise ValueError("--cycle fits all points: leave --up-to out")
+    loading = [test if options.cycle else first_loading(*test)[:2] for test in tests]
     limits = [_limit(options.up_to, stress) for stress, _ in loading]
     seen = [(s[s <= limit], u[s <= limit]) for (s, u), limit in zip(loading, limits, strict=True)]
     if len(seen) > 1:
@@ -65,8 +76,8 @@ def _run(options: argparse.Namespace) -> int:
     for k, fit in enumerate(fits):
         (stress, closure), limit = loading[k], limits[k]
         held = compare(stress, closure, limit, **keywords) if (stress > limit).any() else None
-        _write(folders[k], Path(options.data[k]).name, fit, tests[k], held)
-    return 0
+        name = Path(options.data[k]).name
+        _write(folders[k], name, fit, tests[k], held, options.compliance)
 
 
 def _folders(options: argparse.Namespace) -> list[Path]:
@@ -84,9 +95,20 @@ def _folders(options: argparse.Namespace) -> list[Path]:
 
 
 def _write(
-    folder: Path, name: str, fit: Fit, test: datasets.ClosureData, held: Comparison | None
+    folder: Path,
+    name: str,
+    fit: Fit,
+    test: datasets.ClosureData,
+    held: Comparison | None,
+    compliance: str | None,
 ) -> None:
-    text = fit.report()
+    about = f"Subtracted from the closure: that of rock and machine, {compliance}."
+    if compliance is None:
+        about = (
+            "No compliance of rock and machine was given: if the closure was measured across rock "
+            "too, the law holds its strain as well."
+        )
+    text = f"{fit.report()}\n{about}\n"
     summary: dict[str, Any] = {
         "data": name,
         "parameters_SI": fit.parameters,
@@ -133,6 +155,22 @@ def _read(options: argparse.Namespace, item: str) -> datasets.ClosureData:
     return datasets.read_closure(item, options.stress_column, options.closure_column)
 
 
+def _subtracted(options: argparse.Namespace, stress: Array, closure: Array) -> datasets.ClosureData:
+    """The test without the closure of rock and machine, if --compliance tells it."""
+    text = options.compliance
+    if text is None:
+        return datasets.ClosureData(stress, closure)
+    if "/" in text and not Path(text).exists():
+        length, _, load = text.partition("/")
+        slope = quantity("--compliance", length, "m") / quantity(
+            "--compliance", load, "Pa", positive=True
+        )
+        return datasets.ClosureData(stress, subtract_compliance(stress, closure, slope))
+    rock = datasets.read_closure(text, options.stress_column, options.closure_column)
+    pair = (rock.stress, rock.closure)
+    return datasets.ClosureData(stress, subtract_compliance(stress, closure, pair))
+
+
 def _limit(text: str | None, stress: Any) -> float:
     if text is None:
         return float("inf")
@@ -154,4 +192,8 @@ def _keywords(options: argparse.Namespace) -> dict[str, Any]:
         keywords["free"] = tuple(name.strip() for name in options.free.split(","))
     if options.noise is not None:
         keywords["noise"] = options.noise
+    if options.cycle:
+        keywords["cycle"] = True
+        free = ("asperity_density", "alpha", "beta", "yield_interference")
+        keywords.setdefault("free", free)
     return keywords

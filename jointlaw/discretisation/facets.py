@@ -1,11 +1,10 @@
 """Facets: the few orientations that stand for the density of Eq. 14, and sums over them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..parameters.asperity import Asperity
 from ..parameters.orientation import Orientation
@@ -19,7 +18,7 @@ class Facets:
 
     `n`, `s`, `t` (dim, M) are the facet normal and the two in-facet directions of Eq. 25; dim is 3,
     2 (closure, shear along the plane) for motion in one plane, or 1 for closure alone. `weight`
-    sums to 1.
+    sums to 1. `opposite` is the facet of the same inclination that faces the other way.
     """
 
     theta: Array
@@ -28,6 +27,7 @@ class Facets:
     n: Array
     s: Array
     t: Array
+    opposite: NDArray[np.intp]
 
     def scale(self, asperity: Asperity, asperity_density: float) -> Array:
         """A = N w lam K c1^(1+eta) of each facet (M,): its normal force is A Phi(y)."""
@@ -68,8 +68,25 @@ def facets(
     s = np.array([-st, ct * cp, ct * sp])
     t = np.array([zero, -sp, cp])
     dim = 1 if closure_only else 3 if plane is None else 2
-    arrays = (theta, P, np.maximum(weight, 0.0), n[:dim], s[:dim], t[:dim])
+    number = np.arange(U.size).reshape(-1, count)
+    opposite = np.roll(number, count // 2, axis=1) if plane is None else number[:, ::-1]
+    arrays = (theta, P, np.maximum(weight, 0.0), n[:dim], s[:dim], t[:dim], opposite.ravel())
     return Facets(*frozen(arrays))
+
+
+def yield_sum(theta: Array, scale: Array, asperity: Asperity) -> tuple[Array, Array] | None:
+    """What yielding takes from F1 under first closure: share (2 M,) times Phi(closure - depth).
+
+    Springs stop to gain normal force at the yield interference, and shear force where they slip
+    under the normal force that they then have.
+    """
+    if math.isinf(asperity.yield_interference):
+        return None
+    shear = np.minimum(np.tan(theta) / asperity.lam, asperity.mu)
+    depth = asperity.yield_interference / np.cos(theta)
+    late = np.divide(asperity.mu, shear, out=np.ones_like(shear), where=shear > 0)
+    share = np.concatenate([scale * np.cos(theta), scale * np.sin(theta) * shear])
+    return share, np.concatenate([depth, depth * late])
 
 
 def facet_sum(theta: Array, scale: Array, lam: float, mu: float) -> float:

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...kernels.reference import compliance, strength
+from ...kernels.cells import compliance
+from ...kernels.reference import strength
 from ...law import JointLaw
 from ...support.checks import Array
 from ...support.files import replace_file
@@ -144,7 +145,7 @@ def _arrays(law: JointLaw) -> dict[str, Array]:
     for first, rows in ((0, k.m), (3, k.s), (6, k.t), (9, k.n)):
         facet[:, first : first + k.dim] = rows.T
     rest = (
-        k.area, k.area / k.c1, strength(k).ravel(), compliance(k).ravel(),
+        k.area, k.area / k.c1, strength(k, np.asarray(k.mu)).ravel(), compliance(k).ravel(),
         np.full(M, 1.0 / k.lam), k.area * k.c1, k.weight / k.weight.sum(), _mirror(k.n),
     )  # fmt: skip
     facet[:, 12:] = np.stack(rest, axis=-1)

@@ -1,4 +1,13 @@
-"""Eq. 14 through measured facet slopes, the error of the slopes included.
+"""The densities of the law through a scan: heights through summits, directions through facets.
+
+Heights. A gamma distribution through the depths of summits below the highest one.
+
+The highest summit of a specimen is a draw like any other: the distribution begins some way above
+it, and that distance is fitted too (it becomes the overlap at first touch). Likelihood fails for
+an end point, so the product of spacings is maximised (Cheng & Amin 1983), which is as precise and
+never unbounded.
+
+Directions. Eq. 14 through measured facet slopes, the error of the slopes included.
 
 A density that ends at theta = pi/(2a) has no usual likelihood: one noisy facet beyond the end rules
 it out. So the density of gradients is the law's, ring by ring of equal inclination, blurred by the
@@ -13,8 +22,7 @@ with ih the exponentially scaled Bessel functions of r R_k/s^2. Facets of one su
 the errors are summed over summits first (sandwich).
 """
 
-from __future__ import annotations
-
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -24,10 +32,79 @@ from scipy import optimize, special
 from ..parameters.orientation import largest_c
 from ..support.checks import Array
 
+_LOW, _HIGH = np.log([0.05, 1e-3, 1e-6]), np.log([200.0, 1e3, 1e3])
 BLUR = 0.03
 _RADII, _SECTORS = 160, 9
 _X, _W = np.polynomial.legendre.leggauss(96)
 _U, _WEIGHT = 0.5 * (_X + 1), 0.5 * _W
+
+
+class HeightFit(NamedTuple):
+    """alpha, beta (m) and overlap (m), covariance of their logarithms (of alpha + 1), distance."""
+
+    alpha: float
+    beta: float
+    overlap: float
+    covariance: Array  # (3, 3)
+    distance: float  # largest difference of the two cumulative curves
+    at_bound: bool
+
+
+def fit_heights(depth: Array, reference: float | None = None) -> HeightFit:
+    """Fit the depths (n,) in m; `reference` is the known start of the distribution above the
+    highest summit (m), or None."""
+    x = np.sort(depth)
+    scale = float(np.mean(x))
+    x = x / scale
+    known = None if reference is None else np.log(max(reference / scale, 1e-9))
+
+    def loss(q: Array) -> float:
+        shape, beta = np.exp(q[0]), np.exp(q[1])
+        start = np.exp(q[2] if known is None else known)
+        below = np.concatenate([[0.0], special.gammainc(shape, (x + start) / beta)])
+        above = np.concatenate([special.gammaincc(shape, (x + start) / beta), [0.0]])
+        low = np.diff(below, append=1.0)
+        high = -np.diff(above, prepend=1.0)
+        spacing = np.where(below < 0.5, low, high)  # no cancellation in either tail
+        return -float(np.sum(np.log(np.maximum(spacing, 1e-14))))
+
+    free = 3 if known is None else 2
+    bounds = list(zip(_LOW[:free], _HIGH[:free], strict=True))
+    guesses = [
+        np.log([shape, (1 + start) / shape, start])[:free]
+        for shape, start in ((2.0, 0.05), (5.0, 0.2), (12.0, 0.5))
+    ]
+    best = optimize.minimize(
+        loss, min(guesses, key=loss), method="Nelder-Mead", bounds=bounds,
+        options={"xatol": 1e-4, "fatol": 1e-5, "maxiter": 2000, "adaptive": True},
+    )  # fmt: skip
+    q = best.x
+    covariance = np.zeros((3, 3))
+    covariance[:free, :free] = np.linalg.pinv(_hessian(loss, q), hermitian=True)
+    shape, beta = float(np.exp(q[0])), float(np.exp(q[1]))
+    start = float(np.exp(q[2] if known is None else known))
+    model = special.gammainc(shape, (x + start) / beta)
+    step = np.arange(x.size + 1) / x.size
+    distance = float(np.max(np.maximum(np.abs(model - step[1:]), np.abs(model - step[:-1]))))
+    at_bound = bool(np.any(np.minimum(q - _LOW[:free], _HIGH[:free] - q) < 0.05))
+    return HeightFit(shape - 1, beta * scale, start * scale, covariance, distance, at_bound)
+
+
+def _hessian(f: Callable[[Array], float], x: Array) -> Array:
+    """Second derivatives by central differences."""
+    n, h = x.size, 1e-3
+    steps = h * np.eye(n)
+    H = np.empty((n, n))
+    for i in range(n):
+        for j in range(i, n):
+            a, b = steps[i], steps[j]
+            H[i, j] = H[j, i] = (f(x + a + b) - f(x + a - b) - f(x - a + b) + f(x - a - b)) / (
+                4 * h * h
+            )
+    return H
+
+
+# ---------------------------------------------------------------------------- directions
 
 
 class DirectionFit(NamedTuple):
@@ -75,7 +152,7 @@ def fit_directions(slope: Array, summit: NDArray[np.intp], noise: float) -> Dire
     _, b, c = _shape(bins, _components(bins, a))
     x = np.array([a, b, c])
     covariance = _covariance(bins, x, summit)
-    p = _density(bins, _components(bins, a), b, c).sum(axis=1)
+    p = _density(_components(bins, a), b, c).sum(axis=1)
     counts = bins.counts.sum(axis=1)
     distance = float(np.max(np.abs(np.cumsum(p) - np.cumsum(counts) / counts.sum())))
     bound = largest_c(b)
@@ -132,20 +209,18 @@ def _components(bins: _Bins, a: float) -> Array:
     )
 
 
-def _density(bins: _Bins, parts: Array, b: float, c: float) -> Array:
-    p: Array = np.maximum(parts[0] + b * parts[1] + c * parts[2], 1e-14)
-    return p
+def _density(parts: Array, b: float, c: float) -> Array:
+    return np.asarray(np.maximum(parts[0] + b * parts[1] + c * parts[2], 1e-14))
 
 
 def _shape(bins: _Bins, parts: Array) -> tuple[float, float, float]:
     """Least negative log-likelihood at this a, with its b and c (within Eq. 18)."""
     full = bins.counts > 0
-    n, (p0, p1, p2) = bins.counts[full], parts[:, full]
-
+    n, parts = bins.counts[full], parts[:, full]
     b, c = 0.0, 0.0
     for _ in range(60):  # Newton on a concave likelihood
-        p = np.maximum(p0 + b * p1 + c * p2, 1e-14)
-        q1, q2 = p1 / p, p2 / p
+        p = _density(parts, b, c)
+        q1, q2 = parts[1] / p, parts[2] / p
         g = np.array([n @ q1, n @ q2])
         H = np.array([[n @ q1**2, n @ (q1 * q2)], [n @ (q1 * q2), n @ q2**2]])
         step = np.array([g[0] / H[0, 0], 0.0]) if bins.profile else np.linalg.solve(H, g)
@@ -154,8 +229,7 @@ def _shape(bins: _Bins, parts: Array) -> tuple[float, float, float]:
         b, c = at
         if moved < 1e-7:
             break
-    p = np.maximum(p0 + b * p1 + c * p2, 1e-14)
-    return -float(n @ np.log(p)), b, c
+    return -float(n @ np.log(_density(parts, b, c))), b, c
 
 
 def _inside(b: float, c: float) -> tuple[float, float]:
@@ -167,13 +241,13 @@ def _inside(b: float, c: float) -> tuple[float, float]:
 
 def _covariance(bins: _Bins, x: Array, summit: NDArray[np.intp]) -> Array:
     """Sandwich covariance of a, b, c; c of a profile has none."""
-    p = _density(bins, _components(bins, x[0]), x[1], x[2])
+    p = _density(_components(bins, x[0]), x[1], x[2])
     scores = []
     for k, step in enumerate((1e-3 * x[0], 1e-3, 1e-3)):
         up, down = x.copy(), x.copy()
         up[k], down[k] = x[k] + step, x[k] - step
-        high = _density(bins, _components(bins, up[0]), up[1], up[2])
-        low = _density(bins, _components(bins, down[0]), down[1], down[2])
+        high = _density(_components(bins, up[0]), up[1], up[2])
+        low = _density(_components(bins, down[0]), down[1], down[2])
         scores.append((np.log(high) - np.log(low)) / (2 * step))
     score = np.stack(scores, -1)  # (bins, sectors, 3)
     free = 2 if bins.profile else 3

@@ -3,6 +3,7 @@
 import ctypes
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -82,16 +83,32 @@ def fuzz(tmp_path_factory):
     )
 
 
+def extreme_law(rng):
+    """A random law that exists (heights may be too steep, or not convex), and a size of its steps;
+    elastic and unworn, as the header holds no others."""
+    while True:
+        changes, size = extreme_laws.random_changes(rng)
+        try:
+            elastic = changes | {"yields at": np.inf, "wears over": np.inf}
+            return extreme_laws.build(**elastic), size
+        except ValueError:
+            continue
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_steps_of_all_kinds_and_sizes(fuzz, tmp_path, seed):
     """Laws of the suite of extremes; the whole of it is in docs/native.md."""
-    changes, size = extreme_laws.random_changes(np.random.default_rng(20_000 + seed))
-    try:
-        made = extreme_laws.build(**changes)
-    except ValueError:
-        pytest.skip("this combination has no law: heights too steep or not convex")
+    made, size = extreme_law(np.random.default_rng(20_000 + seed))
     (tmp_path / "x.jlaw").write_text(table_text(made))
     assert "3000 steps" in run(fuzz, "steps", tmp_path / "x.jlaw", size, 3000, seed)
+
+
+def test_asperities_that_yield_or_wear_are_refused_by_name(law):
+    for name in ("yield_interference", "wear_slip"):
+        damage = {name: 1e-6} | ({"mu_residual": 0.1} if name == "wear_slip" else {})
+        other = replace(law, asperity=replace(law.asperity, **damage))
+        with pytest.raises(ValueError, match=f"asperity.{name} = 1e-06 m: jointlaw.h holds no"):
+            table_text(other)
 
 
 def test_damaged_and_hostile_files(fuzz, tmp_path, law):

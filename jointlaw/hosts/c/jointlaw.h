@@ -62,10 +62,11 @@ double jlaw_closure(const jlaw_law *law, double normal_stress);
 double jlaw_max_stiffness(const jlaw_law *law, double closure);
 
 /* The state in axes 2 and 3 that are turned by this angle (rad, from 2 to 3) about the normal. For a
- * host that cannot carry its axes with a body; for laws without a preferred direction (c = 0).
- * What
- * sliders lose by it counts as dissipated. Exact for whole azimuths of the facets, between them as
- * good as the azimuths are many; in a plane the axis keeps or changes its sense. */
+ * host that cannot carry its axes with a body, and laws without a preferred direction (c = 0).
+ * Shear and offset turn exactly. Sliders and flattened depths are read between the azimuths of
+ * their ring of facets: exact where the angle is a whole number of azimuths of every ring, else
+ * the better the more there are. Sliders gain no energy; what they lose counts as dissipated. In a
+ * plane the axis keeps or changes its sense. */
 void jlaw_rotate(const jlaw_law *law, double *s, double angle);
 /* The state after the bodies changed their roles: axis 1 turned round, axis 2 kept, axis 3 turned
  * round with it. Shear along 2 changes its sign, along 3 not. Exact. */
@@ -127,13 +128,16 @@ struct jlaw_law {
 #ifdef __cplusplus
 extern "C" {
 #endif
-#ifdef __clang__
+/* No fused operations here, whatever the flags */
+#if defined(__clang__)
 #pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__)
+#pragma GCC push_options
+#pragma GCC optimize("fp-contract=off")
 #endif
 
 /* Four facets side by side in one vector, or (JOINTLAW_PLAIN, other compilers) one after the
- * other with the same bits. AVX2 where the machine has it, found out at run time; without FMA, so
- * that no operations are fused. */
+ * other with the same bits. AVX2 or AVX-512 where the machine has it, found out at run time. */
 #if defined(__GNUC__)
 #define JLAW_INLINE static inline __attribute__((always_inline))
 #define JLAW_APART static __attribute__((noinline))
@@ -171,7 +175,7 @@ typedef int jlaw_mask_, jlaw_whole_;
 #define JLAW_W(column) JLAW_LOAD(w + (column) * JLAW_LANES) /* of the facets w */
 #if defined(__x86_64__) && defined(__gnu_linux__) && defined(__OPTIMIZE__) && !defined(__AVX2__) \
     && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && !defined(JOINTLAW_PLAIN)
-#define JLAW_CLONES __attribute__((target_clones("avx2", "default")))
+#define JLAW_CLONES __attribute__((target_clones("arch=x86-64-v4", "avx2", "default")))
 #else
 #define JLAW_CLONES
 #endif
@@ -231,7 +235,8 @@ JLAW_INLINE void jlaw_root_(jlaw_v_ *x)
 JLAW_INLINE void jlaw_at_least_(jlaw_v_ *x, const jlaw_v_ *y) { *x = JLAW_PICK(*x > *y, *x, *y); }
 JLAW_INLINE void jlaw_at_most_(jlaw_v_ *x, const jlaw_v_ *y) { *x = JLAW_PICK(*x < *y, *x, *y); }
 
-typedef struct { double y[JLAW_WIDE], power[JLAW_WIDE], S[JLAW_WIDE], DS[JLAW_WIDE], DDS[JLAW_WIDE]; } jlaw_lift_;
+typedef double jlaw_lanes_[JLAW_WIDE];
+typedef struct { jlaw_lanes_ y, power, S, DS, DDS; } jlaw_lift_;
 
 /* y^eta for any eta, and S that is tabulated over w^rise */
 JLAW_APART void jlaw_lift_up_(const jlaw_law *law, jlaw_lift_ *to)
@@ -513,6 +518,7 @@ JLAW_INLINE void jlaw_add_tangent_(const double *w, const jlaw_move_ *m, const j
 JLAW_INLINE void jlaw_take_(const double *from, const size_t at[JLAW_LANES], jlaw_v_ *x)
 {
   const jlaw_v_ all = JLAW_LIST(from[0], from[at[1]], from[at[2]], from[at[3]]);
+  (void) at; /* one lane does without */
   *x = all;
 }
 JLAW_INLINE void jlaw_put_(double *to, const size_t at[JLAW_LANES], const jlaw_v_ *x)
@@ -1147,7 +1153,7 @@ static const char *jlaw_parse_(const char *at, jlaw_law *law, size_t length)
   }
   for (int f = 0; f < law->facets;) {
     const double ring = jlaw_of_facet_(law, f, JLAW_RING);
-    if (!(ring >= 1.0 && ring <= JLAW_AZIMUTHS && ring <= facets - f))
+    if (!(ring >= 1.0 && ring <= (double) JLAW_AZIMUTHS && ring <= facets - f))
       return "a ring of facets is out of bounds";
     f += (int) ring;
   }
@@ -1204,6 +1210,9 @@ void jlaw_free(jlaw_law *law)
 
 #if defined(__GNUC__) && !defined(JOINTLAW_PLAIN)
 #pragma GCC diagnostic pop
+#endif
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC pop_options
 #endif
 #ifdef __cplusplus
 }

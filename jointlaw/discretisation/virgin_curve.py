@@ -84,8 +84,7 @@ class VirginCurve(NamedTuple):
         T = c[..., 0] + x * (c[..., 1] + x * (c[..., 2] + x * c[..., 3]))
         if self.rise:
             T = self._lift(y)[0] * T
-        energy: Array = np.maximum(y, 0.0) ** (2 + self.eta) * T
-        return energy
+        return np.maximum(y, 0.0) ** (2 + self.eta) * T
 
     def _cell(self, y: Array) -> tuple[Array, Array, Array, Array]:
         """Place within its cell, cell number, t and 1 - t of each y."""

@@ -190,14 +190,12 @@ class JointBatch:
 
     def max_stiffness(self) -> Array:
         """Upper bound (n,) of `|C|` in Pa/m at each joint's own reach, for explicit time steps."""
-        bound: Array = self.law.max_stiffness(self.measures().reach)
-        return bound
+        return self.law.max_stiffness(self.measures().reach)
 
     @property
     def delta(self) -> Array:
         """Displacement since the virgin state (n, dim): closure and shear, in m."""
-        delta: Array = rows_of(self._state[:, : self.law.tables.dim], self._n).T
-        return delta
+        return rows_of(self._state[:, : self.law.tables.dim], self._n).T
 
     @property
     def F(self) -> Array:
@@ -246,8 +244,7 @@ class JointBatch:
 
     def _part(self, name: str) -> Array:
         """A part of the states of all joints, by its name in `reference.State`."""
-        part: Array = getattr(reference.parts(self.law.tables, self._rows()), name)
-        return part
+        return getattr(reference.parts(self.law.tables, self._rows()), name)
 
     def _ledger(self, name: str, part: str) -> Array:
         """A part of the ledger, if it is kept."""
@@ -320,8 +317,7 @@ class JointBatch:
         """Bound of the reach of states (rows, n), from closure and offset."""
         now = reference.parts(self.law.tables, rows)
         far = np.maximum(np.abs(now.delta).max(axis=0), np.abs(now.offset).max(axis=0, initial=0.0))
-        bound: Array = self._stretch * far
-        return bound
+        return self._stretch * far
 
 
 def increments(d: ArrayLike, shape: tuple[int, ...]) -> Array:

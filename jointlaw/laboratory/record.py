@@ -47,8 +47,7 @@ class Record:
     def __getattr__(self, name: str) -> Array:
         columns = self.__dict__.get("columns", {})
         if name in columns:
-            column: Array = columns[name]
-            return column
+            return columns[name]
         raise AttributeError(f"record has no column {name!r}; columns: {', '.join(columns)}")
 
     def __len__(self) -> int:

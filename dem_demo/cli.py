@@ -129,7 +129,7 @@ def _compared(scene: Scene, given: argparse.Namespace):
     end = scene.run.end if given.until is None else given.until
     for row in compare.compare(*what, end, given.tilt):
         print(f"seed {row['seed']}, {row['law']:7s} {row['time_s']:6.2f} s  {sentence(row)}"
-              f", books to {row['largest_energy_error']:.1e}", flush=True)  # fmt: skip
+              f", energy balanced to {row['largest_energy_error']:.1e}", flush=True)  # fmt: skip
         if row["refused"]:
             print(f"    stopped: {row['refused']}")
         yield row
@@ -139,16 +139,14 @@ def _announce(sim: Simulation, until: float | None = None) -> None:
     steps, dt, limit = steps_to(sim, until), sim.now.dt, sim.now.limit.now
     free = sum(1 for block in sim.scene.blocks if not block.fixed)
     print(f"{sim.scene.title}: {free} moving blocks, {sim.joints.n} law points in reach")
-    print(
-        f"time step {dt:.3g} s, limit {limit:.3g} s (safety factor {limit / dt:.2f}), {steps} steps"
-    )
+    print(f"time step {dt:.3g} s, limit {limit:.3g} s (margin {limit / dt:.2f}), {steps} steps")
     for rock in sim.scene.rocks:
         print(
             f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
             f"{len(rock.blocks) - len(rock.free)} fixed; {rock.slivers}"
         )
     if not sim.balanced:
-        print("not all blocks can be held where they are drawn: those that cannot move from step 0")
+        print("some blocks have no static equilibrium and move from the first step")
 
 
 def _go(sim: Simulation, given: argparse.Namespace) -> None:
@@ -159,8 +157,8 @@ def _go(sim: Simulation, given: argparse.Namespace) -> None:
     for rock in summary["rocks"]:
         print(sentence(rock))
     print(
-        f"energy balanced to {summary['largest_energy_error']:.1e}, smallest safety factor "
-        f"{summary['safety_factor']:.2f}; results in {given.out}"
+        f"energy balanced to {summary['largest_energy_error']:.1e}, smallest margin of the time "
+        f"step {summary['time_step_margin']:.2f}; results in {given.out}"
     )
 
 

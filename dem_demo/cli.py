@@ -12,10 +12,11 @@ from .errors import Refused, SceneError
 from .output.outcome import sentence
 from .output.run import run, steps_to
 from .scene import TEMPLATE, Scene, load, names
-from .studies import ablate, compare
+from .studies import ablate, compare, strength
 
 DEFAULT = "tilt"
-VERSION = 1  # of the file that compare writes
+VERSION = 1  # of the files that compare and strength-reduction write
+FAILING = 3.0  # s: most that a failing rock is run for
 
 ABOUT = """\
 Rigid rock blocks in 2-D whose every contact force comes from a joint law.
@@ -27,6 +28,8 @@ Rigid rock blocks in 2-D whose every contact force comes from a joint law.
   python -m dem_demo check FILE            check a scene file without running it
   python -m dem_demo compare SCENE [--seeds 1 2 3] [--until T]
                                            every rock of a scene alone, with plain Coulomb as well
+  python -m dem_demo strength-reduction SCENE --out DIR
+                                           how much weaker its joints may be, and the critical tilt
   python -m dem_demo resume STATE --out DIR [--until T] [--step DT]
                                            go on from DIR/state or DIR/refused
 """
@@ -135,6 +138,25 @@ def _compared(scene: Scene, given: argparse.Namespace):
         yield row
 
 
+def _reduce(given: argparse.Namespace) -> None:
+    scene = load(given.scene)
+    given.out.mkdir(parents=True, exist_ok=True)
+    until = min(scene.run.end, FAILING) if given.until is None else given.until
+    print(
+        "factor F: with the friction of all asperities divided by F the joints just carry the rock"
+    )
+    print("critical tilt: gravity may turn by so much, towards +x, until they no longer do")
+    rows = []
+    for row in strength.strength_reduction(scene, str(given.scene), until, given.out):
+        factor, tilt = row["factor"], row["critical_tilt"]
+        told = "F beyond 64 or below 1/64" if factor is None else f"F = {factor:.3g}"
+        angle = "beyond 60 degrees" if tilt is None else f"{tilt:+.3g} degrees"
+        print(f"{row['rock']}: {told}, critical tilt {angle}", flush=True)
+        rows.append(row)
+    write_json(given.out / "strength.json", {"version": VERSION, "rows": rows})
+    print(f"strength.json and pictures of the failure in {given.out}")
+
+
 def _announce(sim: Simulation, until: float | None = None) -> None:
     steps, dt, limit = steps_to(sim, until), sim.now.dt, sim.now.limit.now
     free = sum(1 for block in sim.scene.blocks if not block.fixed)
@@ -198,6 +220,13 @@ COMMANDS = {  # what each does, and for its help: about, example, OPTIONS
         "Coulomb friction of its asperities. What moves 1 m has failed and stops.",
         "compare slope --seeds 1 2 3 --until 10",
         "scene", "--seeds", "--until", "--critical", "--tilt", "--out of numbers",
+    ),
+    "strength-reduction": (
+        _reduce,
+        "Find the factor F by which the friction of all asperities is to be divided for each rock "
+        "of a scene to just hold, and its critical tilt, each to 1 %, by its static equilibrium; "
+        "then run it with 2 % less friction and draw how it fails.",
+        "strength-reduction slope --out out/strength", "scene", "--out", "--until",
     ),
     "resume": (
         _resume,

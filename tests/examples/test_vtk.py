@@ -11,7 +11,7 @@ from dem_demo.cli import main
 def test_blocks_and_joints_of_the_last_frame(tmp_path):
     assert main(["slope", "--until", "0.04", "--no-pictures", "--vtk", "--out", str(tmp_path)]) == 0
     with (tmp_path / "joints.csv").open() as stream:
-        rows = [row for row in csv.DictReader(stream)]
+        rows = list(csv.DictReader(stream))
     last = [row for row in rows if row["time_s"] == rows[-1]["time_s"]]
     joints = meshio.read(sorted((tmp_path / "vtk").glob("joints_*.vtu"))[-1])
     assert len(joints.cells[0].data) == len(last)
@@ -21,7 +21,7 @@ def test_blocks_and_joints_of_the_last_frame(tmp_path):
     assert set(joints.cell_data["state"][0]) <= {0, 1, 2, 3}
 
     with (tmp_path / "blocks.csv").open() as stream:
-        rows = [row for row in csv.DictReader(stream)]
+        rows = list(csv.DictReader(stream))
     last = [row for row in rows if row["time_s"] == rows[-1]["time_s"]]
     blocks = meshio.read(sorted((tmp_path / "vtk").glob("blocks_*.vtu"))[-1])
     speed = np.concatenate(blocks.cell_data["velocity_m/s"])

@@ -3,7 +3,6 @@
 import ctypes
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -84,7 +83,7 @@ def fuzz(tmp_path_factory):
 
 
 def extreme_law(rng):
-    """A random law that exists (heights may be too steep, or not convex), and a size of its steps."""
+    """A random law that exists (heights may be too steep, or not convex), and the size of steps."""
     while True:
         changes, size = extreme_laws.random_changes(rng)
         try:

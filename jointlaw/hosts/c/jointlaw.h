@@ -867,7 +867,7 @@ static jlaw_measures_ jlaw_measure_(const jlaw_law *law, const double *s)
     double squeezed = jlaw_psi_(law, y);
     if (law->yields) squeezed -= jlaw_psi_(law, z) + fz * (y - z);
     if (y > z && squeezed > 0.0) all.squeezed += jlaw_of_facet_(law, f, JLAW_POTENTIAL) * squeezed;
-    if (force > 0.0) all.slipping += share * at_limit / force;
+    if (force > 0.0) all.slipping += share * fmin(at_limit / force, 1.0);
     if (y > z && whole) all.sliding += share;
     if (!(y > z)) all.separated += share;
   }

@@ -44,8 +44,8 @@ def random_law(seed):
         heights = jl.GammaHeights(-0.6, 3e-6, 0.0, "individual")
     kind = {"closure_only": True} if seed % 8 == 5 else {"plane": [None, 0.0, 0.7][seed // 2 % 3]}
     mu = [0.0, 0.3, 0.7][rng.integers(3)]
-    damage = {"yield_interference": 10.0 ** rng.uniform(-8.0, -6.0)} if seed // 3 % 2 else {}
-    if seed // 2 % 3 == 1:
+    damage = {"yield_interference": 10.0 ** rng.uniform(-8.0, -6.0)} if seed // 4 % 2 else {}
+    if seed // 5 % 3 == 1:
         damage |= {"mu_residual": mu * rng.uniform(), "wear_slip": 10.0 ** rng.uniform(-7.0, -5.0)}
     return jl.JointLaw(
         orientation=jl.Orientation(
@@ -149,7 +149,7 @@ def test_fused_operations_change_no_more_than_rounding(tmp_path):
     assert C < SAME_C
 
 
-@pytest.mark.parametrize("seed", [0, 1, 4])
+@pytest.mark.parametrize("seed", [0, 1, 4, 7])
 def test_c_and_python_continue_each_others_state(lib, tmp_path, seed):
     """Python, C, Python: the path of a joint that was in C all along, to the last digit."""
     law = random_law(seed)
@@ -169,7 +169,7 @@ def test_c_and_python_continue_each_others_state(lib, tmp_path, seed):
     assert part.step(d[10])[0] == pytest.approx(F_python, abs=SAME * np.abs(F_python).max() + 1e-9)
 
 
-@pytest.mark.parametrize("seed", [0, 1, 8, 10])
+@pytest.mark.parametrize("seed", [0, 1, 6, 8, 10, 13])
 def test_tangent_as_a_curve_of_differences(lib, tmp_path, seed):
     """C is the limit of central differences: the best of five increments, median of 20 states."""
     law = random_law(seed)

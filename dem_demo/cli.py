@@ -2,13 +2,16 @@
 
 import argparse
 import sys
+import time
 from pathlib import Path
 
 import jointlaw as jl
-from jointlaw.support.files import replace_file, write_json
+from jointlaw.support.files import replace_file, require_free, write_json
+from jointlaw.support.progress import explained
 
 from .dynamics.simulation import Simulation
 from .errors import Refused, SceneError
+from .output.interrupt import STATUS
 from .output.outcome import sentence
 from .output.run import run, steps_to
 from .scene import TEMPLATE, Scene, load, names
@@ -16,6 +19,9 @@ from .studies import ablate, compare
 
 DEFAULT = "tilt"
 VERSION = 1  # of the file that compare writes
+MANY = 1e6  # steps: minutes for a few blocks, hours for a rock
+SEATING = 1.9e-3  # s per moving block to the power 1.5, one core, blocks of two joint sets
+WAIT = "the first run after an installation also compiles the law, once"
 
 ABOUT = """\
 Rigid rock blocks in 2-D whose every contact force comes from a joint law.
@@ -36,6 +42,7 @@ OPTIONS = {  # the first word is what a user types
     "file": {"type": Path},
     "state": {"type": Path, "help": "folder that a run left: DIR/state, DIR/refused"},
     "--out": {"type": Path, "default": Path("out"), "help": "folder for the results"},
+    "--force": {"action": "store_true", "help": "replace another run in that folder"},
     "--out of numbers": {"type": Path, "help": "a JSON file for the numbers"},
     "--until": {"type": float, "help": "model time to stop at (s)"},
     "--step": {"type": float, "help": "another time step (s)"},
@@ -55,7 +62,14 @@ def main(arguments: Words | None = None) -> int:
     verb = words.pop(0) if words and words[0] and words[0] in COMMANDS else ""
     command, *about = COMMANDS[verb]
     try:
-        command(_parse(words, verb, *about))
+        given = _parse(words, verb, *about)
+        if getattr(given, "force", None) is False:
+            require_free(given.out)
+        with explained(f"dem_demo is at work; {WAIT}"):
+            command(given)
+    except KeyboardInterrupt as stop:
+        print(f"dem_demo: {stop or 'interrupted; nothing is written'}", file=sys.stderr)
+        return STATUS
     except (SceneError, Refused, jl.PathError, ValueError, OSError) as error:
         print(f"dem_demo: {error}", file=sys.stderr)
         return 2
@@ -78,7 +92,7 @@ def _parse(words: Words, verb: str, about: str, example: str, *options: str) -> 
 
 
 def _run(given: argparse.Namespace) -> None:
-    _go(Simulation(load(given.scene)), given)
+    _go(_seated(given.scene), given)
 
 
 def _resume(given: argparse.Namespace) -> None:
@@ -101,7 +115,7 @@ def _new(given: argparse.Namespace) -> None:
 
 
 def _check(given: argparse.Namespace) -> None:
-    _announce(Simulation(load(given.scene)))
+    _announce(_seated(given.scene))
     print("the scene is valid")
 
 
@@ -135,6 +149,18 @@ def _compared(scene: Scene, given: argparse.Namespace):
         yield row
 
 
+def _seated(name: str) -> Simulation:
+    """A scene at step 0; what of it is likely a slip, and long waits, are told before."""
+    scene = load(name)
+    for doubt in scene.doubts:
+        print(f"warning: {doubt}", file=sys.stderr)
+    free = sum(not block.fixed for block in scene.blocks)
+    wait = SEATING * free**1.5
+    if scene.run.seat and wait > 2:
+        print(f"{free} moving blocks: the initial equilibrium takes about {wait:.0f} s", flush=True)
+    return Simulation(scene)
+
+
 def _announce(sim: Simulation, until: float | None = None) -> None:
     steps, dt, limit = steps_to(sim, until), sim.now.dt, sim.now.limit.now
     free = sum(1 for block in sim.scene.blocks if not block.fixed)
@@ -142,6 +168,16 @@ def _announce(sim: Simulation, until: float | None = None) -> None:
     print(
         f"time step {dt:.3g} s, limit {limit:.3g} s (safety factor {limit / dt:.2f}), {steps} steps"
     )
+    if steps > MANY:
+        before, started = sim.state(), time.perf_counter()
+        for _ in range(5):
+            sim.step()
+        hours = (time.perf_counter() - started) / 5 * steps / 3600
+        sim.restore(before)
+        print(
+            f"warning: {steps:.2g} steps take about {hours:.2g} h; is run.end = "
+            f"{sim.scene.run.end:g} s meant?", file=sys.stderr,
+        )  # fmt: skip
     for rock in sim.scene.rocks:
         print(
             f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
@@ -177,7 +213,7 @@ def _slip(slip: dict) -> str:
 COMMANDS = {  # what each does, and for its help: about, example, OPTIONS
     "": (
         _run, ABOUT, "tilt --out out/tilt",
-        "scene or default", "--out", "--until", "--no-pictures",
+        "scene or default", "--out", "--force", "--until", "--no-pictures",
     ),
     "new": (
         _new, "Write a commented scene of a rock slope cut by joint sets, ready to run.",
@@ -187,7 +223,7 @@ COMMANDS = {  # what each does, and for its help: about, example, OPTIONS
         _ablate,
         "Run a scene without each of its ingredients in turn: what it changes in the outcome "
         "(differences against the whole scene) and in the time (ratios).",
-        "ablate shear-box --out out/ablation", "scene", "--out", "--until",
+        "ablate shear-box --out out/ablation", "scene", "--out", "--force", "--until",
     ),
     "check": (
         _check,
@@ -205,6 +241,6 @@ COMMANDS = {  # what each does, and for its help: about, example, OPTIONS
         _resume,
         "Go on from a saved state; without --step bit for bit as if never stopped.",
         "resume out/tilt/state --until 45 --out out/longer",
-        "state", "--out", "--until", "--no-pictures", "--step",
+        "state", "--out", "--force", "--until", "--no-pictures", "--step",
     ),
 }  # fmt: skip

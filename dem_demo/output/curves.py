@@ -12,7 +12,7 @@ from .record import Record
 
 
 def energy(record: Record, path: Path) -> None:
-    """Where the energy is and went, and how well the books balance."""
+    """Where the energy is, where it went, and how well it balances."""
     t, table = np.array(record.times), np.array(record.energy)
     figure = Figure(figsize=(8, 7.5), dpi=120, layout="constrained")
     top, middle, low = figure.subplots(3, sharex=True, height_ratios=[3, 3, 2])

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-MARKS = ("summary.json", "history.csv", "state", "refused")  # any of these: a folder holds a run
+# Any of these: a folder holds a run
+MARKS = ("summary.json", "history.csv", "strength.json", "state", "refused")
 LEFT = ("summary.json", "history.csv", "state/scene.toml", "state/state.npz",
         "refused/scene.toml", "refused/state.npz", "refused/why.txt")  # fmt: skip
 

@@ -3,6 +3,7 @@
 import argparse
 import sys
 import time
+from importlib.util import find_spec
 from pathlib import Path
 
 import jointlaw as jl
@@ -50,6 +51,7 @@ OPTIONS = {  # the first word is what a user types
     "--until": {"type": float, "help": "model time to stop at (s)"},
     "--step": {"type": float, "help": "another time step (s)"},
     "--no-pictures": {"action": "store_true", "help": "tables only"},
+    "--vtk": {"action": "store_true", "help": "also VTK files for ParaView, in DIR/vtk (meshio)"},
     "--seeds": {"type": int, "nargs": "+", "default": [1, 2, 3], "help": "default 1 2 3"},
     "--critical": {
         "action": "store_true", "help": "find the tilt that the rock just bears; run nothing",
@@ -208,8 +210,14 @@ def _announce(sim: Simulation, until: float | None = None) -> None:
 
 
 def _go(sim: Simulation, given: argparse.Namespace) -> None:
+    if given.vtk and not find_spec("meshio"):
+        raise ValueError("--vtk needs meshio: pip install meshio")
     _announce(sim, given.until)
-    _, summary = run(sim, given.out, given.until, not given.no_pictures)
+    record, summary = run(sim, given.out, given.until, not given.no_pictures)
+    if given.vtk:
+        from .output import vtk  # loads meshio
+
+        vtk.write(record, given.out / "vtk")
     for slip in summary["slip"]:
         print(_slip(slip))
     for rock in summary["rocks"]:
@@ -233,7 +241,7 @@ def _slip(slip: dict) -> str:
 COMMANDS = {  # what each does, and for its help: about, example, OPTIONS
     "": (
         _run, ABOUT, "tilt --out out/tilt",
-        "scene or default", "--out", "--force", "--until", "--no-pictures",
+        "scene or default", "--out", "--force", "--until", "--no-pictures", "--vtk",
     ),
     "new": (
         _new, "Write a commented scene of a rock slope cut by joint sets, ready to run.",
@@ -268,6 +276,6 @@ COMMANDS = {  # what each does, and for its help: about, example, OPTIONS
         _resume,
         "Go on from a saved state; without --step bit for bit as if never stopped.",
         "resume out/tilt/state --until 45 --out out/longer",
-        "state", "--out", "--force", "--until", "--no-pictures", "--step",
+        "state", "--out", "--force", "--until", "--no-pictures", "--vtk", "--step",
     ),
 }  # fmt: skip

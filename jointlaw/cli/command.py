@@ -132,9 +132,7 @@ def add_test_options(parser: argparse.ArgumentParser, steps: int) -> None:
 
 def run_test(test: Callable[[], Record], law: JointLaw, options: argparse.Namespace) -> Record:
     """Run a laboratory test and write its record, also that of a test that stopped early."""
-    length, _, stress = options.units.partition(",")
-    for unit, base in ((length, "m"), (stress, "Pa")):
-        quantity("--units", f"1{unit}", base)  # refused before the work
+    _csv_units(options)  # refused before the work
     try:
         record = test()
     except PathError as error:
@@ -147,7 +145,7 @@ def run_test(test: Callable[[], Record], law: JointLaw, options: argparse.Namesp
 
 def _write(record: Record, law: JointLaw, options: argparse.Namespace) -> None:
     """Curve (CSV, NPZ), picture, law and summary of a test."""
-    name, (length, stress) = options.command, options.units.split(",")
+    name, (length, stress) = options.command, _csv_units(options)
     files: Written = {
         f"{name}.csv": partial(record.to_csv, length=length, stress=stress),
         f"{name}.npz": record.to_npz,
@@ -157,3 +155,13 @@ def _write(record: Record, law: JointLaw, options: argparse.Namespace) -> None:
     settings = {k: v for k, v in vars(options).items() if k not in ("run", "out", "force")}
     summary = {"settings": settings, "result": record.summary(), "units": UNITS}
     write_results(options.out, files, summary)
+
+
+def _csv_units(options: argparse.Namespace) -> list[str]:
+    """Units of length and stress for the CSV."""
+    given: list[str] = options.units.split(",")
+    if len(given) != 2 or not all(given):
+        raise ValueError(f"--units = {options.units}: write a length and a stress: mm,MPa")
+    for unit, base in zip(given, ("m", "Pa"), strict=True):
+        quantity("--units", f"1{unit}", base)
+    return given

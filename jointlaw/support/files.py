@@ -40,14 +40,14 @@ def require_free(folder: Path) -> None:
 def clear_run(folder: Path) -> None:
     """Make a folder for results; of a run that it holds what that wrote is removed, and no more."""
     folder.mkdir(parents=True, exist_ok=True)
-    paths = [folder / name for name in LEFT]
+    paths = [*(folder / name for name in LEFT), *folder.glob("vtk/*.vtu")]
     with contextlib.suppress(OSError, ValueError):  # none, or damaged: of a run that broke off
         written = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["files"]
         paths += [folder / Path(name).name for name in written]
     for path in paths:
         if path.is_file():
             path.unlink()
-    for name in ("state", "refused"):
+    for name in ("state", "refused", "vtk"):
         with contextlib.suppress(OSError):  # it holds something else
             (folder / name).rmdir()
 

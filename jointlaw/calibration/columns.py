@@ -100,16 +100,19 @@ def read_columns(path: str | Path) -> list[Column]:
     ]
 
 
-def find(columns: Sequence[Column], asked: Asked, given: str | None, path: Path) -> list[Column]:
+def find(
+    columns: Sequence[Column], asked: Asked, given: str | None, path: Path, required: bool = True
+) -> list[Column]:
     """All columns of one quantity, in SI units. Raises ValueError with the option that helps.
 
-    given: name and unit from the command line, "Disp:mm", or None.
+    given: name and unit from the command line, "Disp:mm", or None; required: False to return no
+        column where there is none.
     """
     name, _, unit = (given or "").partition(":")
     wanted = asked.names if given is None else (_plain(name),)
     matches = ([c for c in columns if w in (_plain(c.name), _plain(c.title))] for w in wanted)
     found = next((match for match in matches if match), [])
-    if not found:
+    if required and not found:
         titles, example = ", ".join(c.title for c in columns), "NAME"
         if titles.replace(", ", "").isdigit():
             titles, example = f"no row of names over its {len(columns)} columns", "1"

@@ -23,7 +23,7 @@ CLOSURE = Asked(
     "--closure-column",
 )  # fmt: skip
 SHEAR = Asked(
-    "shear displacement", "m",
+    "shear displacement (a closure test goes before --shear)", "m",
     ("shear", "shear_displacement", "shear_disp", "us", "u_s", "ds", "horizontal_displacement",
      "displacement", "disp", "shear_2", "u"),
     "--shear-column",
@@ -100,7 +100,11 @@ def read_closure(
 
 
 def read_shear(
-    path: str | Path, shear: str | None = None, stress: str | None = None, normal: str | None = None
+    path: str | Path,
+    shear: str | None = None,
+    stress: str | None = None,
+    normal: str | None = None,
+    known: bool = False,
 ) -> list[ShearData]:
     """Direct shear curves from a CSV file, one for each column of shear stress or normal stress.
 
@@ -109,6 +113,7 @@ def read_shear(
     path: the file, as in `read_closure`.
     shear, stress, normal: names of the columns of shear displacement, shear stress and normal
         stress, with units if the file gives none ("tau:MPa", or "tau:-1MPa" to turn a sign).
+    known: whether the normal stress is known otherwise; the file is then not asked for it.
 
     The normal stress is that of a title "tau at 3 MPa [MPa]", or of a column; where this holds
     several levels there is a test for each. Raises ValueError as `read_closure`.
@@ -122,25 +127,21 @@ def read_shear(
             f"{path}: has {len(moved)} columns of shear displacement for {len(sheared)} of shear "
             "stress; give one for all or one for each"
         )
-    try:
-        pressed = find(columns, NORMAL, normal, path)[0]
-    except ValueError:
-        if normal is not None:
-            raise
-        pressed = None
+    pressed = [] if known else find(columns, NORMAL, normal, path, required=normal is not None)
     tests = []
     for u, tau in zip(moved * (len(sheared) // len(moved)), sheared, strict=True):
         name = path.name if len(sheared) == 1 else f"{path.name}, {tau.title}"
-        levels = [(np.ones(tau.values.size, bool), np.nan if tau.normal is None else tau.normal)]
-        if tau.normal is None and pressed is not None:
-            levels = _levels(pressed, path)
+        level = np.nan if tau.normal is None or known else tau.normal
+        levels = [(np.ones(tau.values.size, bool), level)]
+        if tau.normal is None and pressed:
+            levels = _levels(pressed[0], path)
         for here, level in levels:
             x, y = _pair(u.values[here], tau.values[here], path)
             x = x - x[0] if abs(y[0]) < STEADY * np.abs(y).max() else x
             work = float(np.sum(np.diff(x) * (y[1:] + y[:-1])))
             _require(work > 0, tau, SHEAR_STRESS, "opposes the displacement", path)
             span, largest = float(np.ptp(x)), float(np.abs(y).max())
-            require_rock({"shear displacement": span, "stress": largest}, f"{path}: ")
+            require_rock({"shear displacement": span, "shear stress": largest}, f"{path}: ")
             tests.append(ShearData(x, y, level, name))
     return tests
 

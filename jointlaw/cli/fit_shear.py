@@ -10,6 +10,7 @@ from .. import presets
 from ..calibration import datasets
 from ..calibration.fit import Fit, fit_curves
 from ..calibration.measured import ClosureCurve, ShearCurve
+from ..parameters.rock import require_rock
 from .command import quantity
 
 MOST = 60  # points of a curve that are fitted: a logger writes thousands, and each costs a step
@@ -63,10 +64,11 @@ def fit_with_shear(
 
 def _curves(options: argparse.Namespace) -> tuple[list[ClosureCurve | ShearCurve], str]:
     """The shear curves of all files, and what was read in words."""
-    named = (options.shear_column, options.shear_stress_column, options.normal_column)
+    known = options.normal_stress is not None
+    named = (options.shear_column, options.shear_stress_column, options.normal_column, known)
     tests = [test for path in options.shear for test in datasets.read_shear(path, *named)]
     normals = [test.normal for test in tests]
-    if options.normal_stress:
+    if known:
         given = options.normal_stress.split(",")
         if len(given) != len(tests):
             raise ValueError(
@@ -83,6 +85,8 @@ def _curves(options: argparse.Namespace) -> tuple[list[ClosureCurve | ShearCurve
                 f"{len(tests)} shear tests, for example --normal-stress "
                 + ",".join(f"{2 * k + 1}MPa" for k in range(len(tests)))
             )
+        peak = float(np.abs(test.shear_stress).max())
+        require_rock({"peak shear stress over normal stress": peak / normal}, f"{test.name}: ")
         n = test.shear.size
         kept = np.unique(np.linspace(0, n - 1, min(n, MOST)).round().astype(int))
         curves.append(ShearCurve(test.shear[kept], test.shear_stress[kept], normal))

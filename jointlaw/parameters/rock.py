@@ -17,6 +17,7 @@ class Range(NamedTuple):
     cause: str
 
 
+_OTHER = "is the column in another unit? Name it:"
 _SCALE = "are the columns in the units that were read or given?"
 # the steepest friction angle, 79 degrees, is beyond that of any rock
 _FRICTION = Range(0.0, 5.0, "", "it is a coefficient, tan(angle): tan(35 degrees) = 0.7")
@@ -32,10 +33,15 @@ RANGES = {
     "asperity_density": Range(1e-3, 1e14, " /m2", "heights and spacing in the same unit?"),
     # 90/a degrees is the steepest inclination
     "a": Range(1.05, 1e3, "", "are the heights and the spacing in the units that were given?"),
-    "closure": Range(1e-9, 0.02, " m", "is the column in another unit?"),
-    "shear displacement": Range(1e-8, 2.0, " m", "is the column in another unit?"),
+    "closure": Range(1e-9, 0.02, " m", f'{_OTHER} --closure-column "NAME:um"'),
+    "shear displacement": Range(1e-8, 2.0, " m", f'{_OTHER} --shear-column "NAME:mm"'),
     # beyond the strength of any rock, or below the weight of a sheet of paper on it
-    "stress": Range(10.0, 5e9, " Pa", "is the column in another unit?"),
+    "shear stress": Range(10.0, 5e9, " Pa", f'{_OTHER} --shear-stress-column "NAME:MPa"'),
+    "stress": Range(10.0, 5e9, " Pa", f'{_OTHER} --stress-column "NAME:MPa"'),
+    # joints at 10 kPa have reached 10
+    "peak shear stress over normal stress": Range(
+        0.02, 30.0, "", "are both in the units that were read or given?"
+    ),
     "plane": Range(-2 * math.pi, 2 * math.pi, " rad", "30 degrees is 0.5236 rad"),
 }
 

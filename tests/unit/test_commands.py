@@ -158,7 +158,10 @@ def test_options_of_closure(tmp_path):
         ("shear biegel-rough --to 1um --normal-stress -5MPa", "--normal-stress = -5MPa"),
         ("shear biegel-rough --to 1um --azimuth 30", "--azimuth = 30 has no unit: write for"),
         ("shear biegel-rough --to 1um --units mm,mm", "--units: '1mm' is not a quantity in Pa"),
-        ("shear biegel-rough --to 1um --units mm", "--units = mm: write a length and a stress: mm,MPa"),
+        (
+            "shear biegel-rough --to 1um --units mm",
+            "--units = mm: write a length and a stress: mm,MPa",
+        ),
         ("shear biegel-rough --to 1um --azimuth 3degrees", "--azimuth: '3degrees'"),
         ("shear biegel-rough --to 1um --normal-stiffness 5GPa/m", "go together"),
         ("shear biegel-rough --to 1um --control stiffness", "go together"),

@@ -73,7 +73,7 @@ def main(arguments: Words | None = None) -> int:
         with explained(f"dem_demo is at work; {WAIT}"):
             command(given)
     except KeyboardInterrupt as stop:
-        print(f"dem_demo: {stop or 'interrupted; nothing is written'}", file=sys.stderr)
+        print(f"dem_demo: {str(stop) or 'interrupted; nothing is written'}", file=sys.stderr)
         return STATUS
     except (SceneError, Refused, jl.PathError, ValueError, OSError) as error:
         print(f"dem_demo: {error}", file=sys.stderr)

@@ -15,7 +15,7 @@ from ..support import units
 from ..support.checks import Array
 
 UNIT = r"(?:[numkcMGµμ]?(?:Pa|m)|N/mm[2²]|[kM]N/m[2²]|bar|%|per ?cent)"
-_ROW_UNIT = re.compile(rf"[\[(].*[\])]|{UNIT}|-?")
+_ROW_UNIT = re.compile(rf"[\[(].*[\])]|/?\s*{UNIT}|-?")
 _NORMAL = re.compile(r"(?:\bat\b|@)?\s*(?:\w+\s*=\s*)?(\d+(?:[.,]\d+)?)\s*([kMG]?Pa)\b")
 _BRACKETS = re.compile(r"\s*[\[(]\s*([^\])]*?)\s*[\])]\s*")
 _ENDING = re.compile(rf"(.*?)(?:\s*/\s*|\s+in\s+|,\s*|_|\s+)({UNIT})")
@@ -79,7 +79,7 @@ def read_columns(path: str | Path) -> list[Column]:
         data.pop()  # "end of test"
     given: list[str] = []
     if first > 1 and all(_ROW_UNIT.fullmatch(cell) for cell in names):
-        given, names = [cell.strip("[]()- ") for cell in names], rows[first - 2]
+        given, names = [cell.strip("[]()/- ") for cell in names], rows[first - 2]
     width = max(len(row) for row in (names, *data))
     if first and len(names) < width:
         raise ValueError(

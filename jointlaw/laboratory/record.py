@@ -156,7 +156,7 @@ def _shear_figure(record: Record) -> Any:
     figure, axes = pyplot().subplots(2, 2, figsize=(9, 6.5), layout="constrained", sharex=True)
     stress, unit = _scaled(np.stack([record.shear_stress, record.F1]), _STRESSES)
     axes[0, 0].plot(shear, stress[0], label="shear stress")
-    axes[0, 0].plot(shear, stress[1], "--", color="0.5", label="normal stress")
+    axes[0, 0].plot(shear, stress[1], color="0.5", lw=1, label="normal stress")
     axes[0, 0].set_ylabel(f"stress ({unit})")
     axes[0, 0].legend()
     axes[0, 1].plot(shear, record.friction_angle, color="C3")

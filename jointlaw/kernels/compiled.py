@@ -56,8 +56,6 @@ class Packed(NamedTuple):
     curve: Array  # (4 cells,): coefficients of S
     scalars: Array  # lam, mu, critical slip, eta, scale and rise of the curve, mu residual, slip
     dim: int
-    yields: bool | None  # True or None, for which the compiler leaves the code out
-    wears: bool | None
 
 
 def pack(k: Tables) -> Packed:
@@ -76,7 +74,7 @@ def pack(k: Tables) -> Packed:
     residual = k.mu if k.mu_residual is None else k.mu_residual
     scalars = np.array([k.lam, k.mu, k.critical_slip, *virgin, residual, k.wear_slip])
     curve = k.curve.S.ravel().copy()
-    return Packed(facet, depth, curve, scalars, k.dim, k.yields or None, k.wears or None)
+    return Packed(facet, depth, curve, scalars, k.dim)
 
 
 def block_rows(k: Tables) -> int:
@@ -255,30 +253,30 @@ def _limit_offset(pad, L, limit, dim):
 
 
 @_jit
-def _places(law):
+def _places(law, yields, wears):
     """First rows of flattened depths, of the slip, and of Phi beside the state of a block."""
     M, D = law.depth.shape[0], law.depth.shape[1] - 1
     first = slip = beside = 2 * law.dim + 2 * M * D
-    if law.yields is not None:
+    if yields is not None:
         slip = beside = first + M + 1
-    if law.wears is not None:
+    if wears is not None:
         beside = slip + 1
     return first, slip, beside
 
 
 @_jit
-def _weaken(pad, s, L, law):
+def _weaken(pad, s, L, law, yields, wears):
     """Friction of the asperities of each joint, after their slip."""
-    slip, first, last = _places(law)[1], law.scalars[1], law.scalars[6]
+    slip, first, last = _places(law, yields, wears)[1], law.scalars[1], law.scalars[6]
     for l in range(L):
         pad[_MU + l] = last + (first - last) * np.exp(-s[slip, l] / law.scalars[7])
 
 
 @_jit
-def _press(work, s, L, law, f):
+def _press(work, s, L, law, f, yields, wears):
     """Flattened depths of a facet before and after the step, and Phi there; see `yielding`."""
     pad, facet = work.pad, law.facet
-    first, _, beside = _places(law)
+    first, _, beside = _places(law, yields, wears)
     at, kept = first + f, beside + 2 * law.depth.shape[0] + f
     deep, o = facet[f, _YIELD], np.int64(facet[f, _OPPOSITE])
     for l in range(L):
@@ -341,7 +339,7 @@ def _share_at(y, force, zl, fl, sl, zh, fh, sh, ended):
 
 
 @_jit
-def _slide(pad, qs, qt, L, law, f, i, ledger, tangent):
+def _slide(pad, qs, qt, L, law, f, i, ledger, tangent, yields, wears):
     """One depth cell of one facet: steps 3 and 4 of `reference.step`."""
     facet, depth = law.facet, law.depth
     A, a, compliance = facet[f, _REST], facet[f, _REST + 1], facet[f, _REST + 2]
@@ -353,7 +351,7 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent):
     for l in range(L):
         # the bed beyond the lower limit of the cell less that beyond the upper
         y0, y1, f0, f1 = pad[_Y0 + l], pad[_Y1 + l], pad[_F0 + l], pad[_F1 + l]
-        if law.yields is not None:  # from the flattened depth on, where y is above it
+        if yields is not None:  # from the flattened depth on, where y is above it
             y0, f0 = pad[_AT0 + l], pad[_FAT0 + l]
         from0, from1 = y0 - zl, y1 - zl
         G0, G1 = f0 - fl - sl * from0, f1 - fl - sl * from1
@@ -366,13 +364,13 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent):
         k0 = k0 if (from0 > 0.0) & (k0 > 0.0) else 0.0
         k1 = k1 if (from1 > 0.0) & (k1 > 0.0) else 0.0
         h0, h1 = k0 * from0, k1 * from1
-        if law.yields is not None:  # at the flattened depth the slope is not at hand
+        if yields is not None:  # at the flattened depth the slope is not at hand
             begun = G0 if from0 > 0.0 else 0.0
             h0 = h0 if y0 > pad[_Z0 + l] else begun
         G0, G1 = G0 if h0 > G0 else h0, G1 if h1 > G1 else h1
         G0, G1 = G0 if G0 > 0.0 else 0.0, G1 if G1 > 0.0 else 0.0
         reached = G1
-        if law.yields is not None:  # less what the bed holds at the flattened depth
+        if yields is not None:  # less what the bed holds at the flattened depth
             z1, touched = pad[_Z1 + l], y0 > pad[_Z0 + l]
             k0, k1 = k0 if touched else 0.0, k1 if y1 > z1 else 0.0
             y0 = pad[_Y0 + l]
@@ -384,7 +382,7 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent):
         grows = k1 > k0
         dy = y1 - y0
         near = abs(dy) <= NEAR * abs(y1)
-        if law.yields is not None:  # flattened springs touch at once: no mean where they do
+        if yields is not None:  # flattened springs touch at once: no mean where they do
             near = near & ((k0 > 0.0) | (k1 == 0.0))
         top = reached - G0 if grows else k1
         bottom = dy if grows else k0
@@ -395,9 +393,9 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent):
         kept = 1.0 if grows else ratio
         add = a * (chord if grows else k1)
         olds, oldt, des, det = qs[l], qt[l], pad[_DES + l], pad[_DET + l]
-        if law.wears is not None:  # back to the limit, that fell since
+        if wears is not None:  # back to the limit, that fell since
             strength = by_mu * pad[_MU + l]
-            if law.yields is not None:
+            if yields is not None:
                 G0 -= _share_at(pad[_Z0 + l], pad[_FZ0 + l], zl, fl, sl, zh, fh, sh, ended)
                 h0 = k0 * (y0 - pad[_Z0 + l])
                 G0 = G0 if h0 > G0 else h0
@@ -451,7 +449,7 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent):
             push = strength * k1
             pad[_VS + l] += share * (ws - us * dot) + push * us if limited else ws
             pad[_VT + l] += share * (wt - ut * dot) + push * ut if limited else wt
-            if law.yields is not None:
+            if yields is not None:
                 kz = pad[_SZ1 + l] - sl
                 kz = sh - sl if ended & (z1 > zh) else kz
                 kz = kz if (z1 > zl) & (kz > 0.0) & (k1 > 0.0) & limited else 0.0
@@ -535,7 +533,7 @@ def _soften(pad, L, law, f):
 
 
 @_jit
-def _facet(work, s, L, law, f, ledger, tangent):
+def _facet(work, s, L, law, f, ledger, tangent, yields, wears):
     """One facet of a block: closures, virgin curve, sliders, and its part of F and C."""
     pad, facet, dim = work.pad, law.facet, law.dim
     lam, limit = law.scalars[0], law.scalars[2]
@@ -559,12 +557,12 @@ def _facet(work, s, L, law, f, ledger, tangent):
             pad[_DET + l] += t2 * pad[_P2 + l]
     for l in range(L):
         pad[_Y0 + l] = pad[_Y0 + l] if abs(pad[_Y0 + l]) >= UNDERFLOW else 0.0
-    beside = _places(law)[2]
+    beside = _places(law, yields, wears)[2]
     rf, rs = beside + f, beside + M + f
     for l in range(L):
         pad[_F0 + l], pad[_S0 + l] = s[rf, l], s[rs, l]
-    if law.yields is not None:
-        _press(work, s, L, law, f)
+    if yields is not None:
+        _press(work, s, L, law, f, yields, wears)
     _virgin(work, law, True, L)
     for l in range(L):
         s[rf, l], s[rs, l] = pad[_F1 + l], pad[_S1 + l]
@@ -576,15 +574,15 @@ def _facet(work, s, L, law, f, ledger, tangent):
         for l in range(L):
             pad[_BSS + l] = pad[_BST + l] = pad[_BTT + l] = 0.0
             pad[_VS + l] = pad[_VT + l] = 0.0
-        if law.yields is not None:
+        if yields is not None:
             for l in range(L):
                 pad[_WS + l] = pad[_WT + l] = 0.0
     for i in range(D):
         rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
-        _slide(pad, s[rs], s[rt], L, law, f, i, ledger, tangent)
-    if law.yields is not None:
+        _slide(pad, s[rs], s[rt], L, law, f, i, ledger, tangent, yields, wears)
+    if yields is not None:
         _relieve(pad, L, law, f, ledger)
-    if law.wears is not None:
+    if wears is not None:
         for l in range(L):
             pad[_NORMAL + l] += A * (pad[_F0 + l] + pad[_F1 + l])
     soft = 1.0 / lam
@@ -602,12 +600,12 @@ def _facet(work, s, L, law, f, ledger, tangent):
             pad[_PULL2 + l] += n2 * A * pad[_F1 + l]
     if tangent is not None:
         _add_tangent(pad, L, law, f)
-        if law.yields is not None:
+        if yields is not None:
             _soften(pad, L, law, f)
 
 
 @_jit
-def _begin(pad, s, d, start, L, law, tangent):
+def _begin(pad, s, d, start, L, law, tangent, yields, wears):
     """Lay out the old and new place of each joint of a block, and move it."""
     limit, dim = law.scalars[2], law.dim
     if limit < np.inf or dim == 1:
@@ -615,10 +613,10 @@ def _begin(pad, s, d, start, L, law, tangent):
     pad[_PULL1:_C00] = 0.0
     if tangent is not None:
         pad[_C00:_NORMAL] = 0.0
-    if law.yields is not None or law.wears is not None:
+    if yields is not None or wears is not None:
         pad[_NORMAL:_MU] = 0.0
-    if law.wears is not None:
-        _weaken(pad, s, L, law)
+    if wears is not None:
+        _weaken(pad, s, L, law, yields, wears)
     for i in range(dim):
         row, origin = i * LANES, 0 if i == 0 else dim + i - 1
         for l in range(L):
@@ -639,7 +637,7 @@ def _begin(pad, s, d, start, L, law, tangent):
 
 
 @_jit
-def _finish(pad, s, F, C, start, L, law, ledger, tangent):
+def _finish(pad, s, F, C, start, L, law, ledger, tangent, yields, wears):
     """Hand out F and C, and add up the ledger."""
     limit, dim = law.scalars[2], law.dim
     for i in range(dim):
@@ -657,12 +655,12 @@ def _finish(pad, s, F, C, start, L, law, ledger, tangent):
                 pad[_LOST + l] += pad[_SLIP + l] * (pull if pull > 0.0 else 0.0) / limit
         for l in range(L):
             s[2 * dim - 1, l] += pad[_LOST + l]
-        slip = _places(law)[1]
-        if law.yields is not None:
+        slip = _places(law, yields, wears)[1]
+        if yields is not None:
             for l in range(L):
                 s[slip - 1, l] += pad[_CRUSHED + l]
                 s[2 * dim - 1, l] += pad[_CRUSHED + l]
-        if law.wears is not None:
+        if wears is not None:
             for l in range(L):
                 capacity = 0.5 * pad[_MU + l] * pad[_NORMAL + l]
                 rubbed = pad[_LOST + l] / (capacity if capacity > 0.0 else 1.0)
@@ -685,7 +683,7 @@ def advance(
     the code out.
     """
     work = Work(block, pad, place, piece)
-    law = Packed(facet, depth, curve, scalars, dim, yields, wears)
+    law = Packed(facet, depth, curve, scalars, dim)
     rows, W = state.shape[1], state.shape[2]
     listed = index.size > 0
     for start in range(first, last, W):
@@ -703,10 +701,10 @@ def advance(
                 for l in range(L):
                     block[r, l] = state[start // W, r, l]
             s = block
-        _begin(pad, s, d, start, L, law, tangent)
+        _begin(pad, s, d, start, L, law, tangent, yields, wears)
         for f in range(facet.shape[0]):
-            _facet(work, s, L, law, f, ledger, tangent)
-        _finish(pad, s, F, C, start, L, law, ledger, tangent)
+            _facet(work, s, L, law, f, ledger, tangent, yields, wears)
+        _finish(pad, s, F, C, start, L, law, ledger, tangent, yields, wears)
         if listed and keep:
             for l in range(L):
                 home, at = index[start + l] // W, index[start + l] % W
@@ -715,7 +713,7 @@ def advance(
 
 
 @_jit
-def _count(pad, qs, qt, L, law, f, i):
+def _count(pad, qs, qt, L, law, f, i, yields, wears):
     """One depth cell of one facet: is it at its friction limit, and what does it store."""
     facet, depth = law.facet, law.depth
     strength = law.scalars[1] * law.scalars[0] * facet[f, _REST]
@@ -730,12 +728,12 @@ def _count(pad, qs, qt, L, law, f, i):
         G = k * (y - reach) + (min(max(force, fl), fh) - fl - sl * (reach - zl))
         most = k * (y - zl if y > zl else 0.0)
         G = min(max(G, 0.0), most)
-        if law.yields is not None:
+        if yields is not None:
             z = pad[_Z0 + l]
             k = k if y > z else 0.0
             G -= _share_at(z, pad[_FZ0 + l], zl, fl, sl, zh, fh, sh, ended)
             G = max(min(G, k * (y - z)), 0.0)
-        if law.wears is not None:
+        if wears is not None:
             strength = pad[_MU + l] * law.scalars[0] * facet[f, _REST]
         q2 = qs[l] * qs[l] + qt[l] * qt[l]
         limit = np.sqrt(q2) >= strength * (G * (1.0 - LIMIT) - ROUNDED * force)
@@ -781,15 +779,15 @@ def _squeeze(work, law, L, energy, potential):
 
 
 @_jit
-def _measure_facet(work, s, L, law, f, energy):
+def _measure_facet(work, s, L, law, f, energy, yields, wears):
     """What one facet of a block adds to the measures."""
     pad, dim = work.pad, law.dim
     M, D = law.depth.shape[0], law.depth.shape[1] - 1
     potential, share = law.facet[f, _POTENTIAL], law.facet[f, _SHARE]
     for l in range(L):
         pad[_WHOLE + l], pad[_LIMIT + l], pad[_Z0 + l] = 1.0, 0.0, 0.0
-    if law.yields is not None:
-        at = _places(law)[0] + f
+    if yields is not None:
+        at = _places(law, yields, wears)[0] + f
         for l in range(L):
             pad[_Z0 + l] = pad[_Y0 + l] = s[at, l]
         _squeeze(work, law, L, energy, potential)
@@ -797,7 +795,7 @@ def _measure_facet(work, s, L, law, f, energy):
             pad[_FZ0 + l], pad[_FZ1 + l] = pad[_F0 + l], pad[_CURVING + l]
     _effective(pad, s, L, law, f)
     _squeeze(work, law, L, energy, potential)
-    if law.yields is not None:
+    if yields is not None:
         for l in range(L):
             y, z = pad[_Y0 + l], pad[_Z0 + l]
             squeezed = pad[_CURVING + l] - pad[_FZ1 + l]
@@ -805,10 +803,10 @@ def _measure_facet(work, s, L, law, f, energy):
             pad[_CURVING + l] = squeezed if (y > z) & (squeezed > 0.0) else 0.0
     for i in range(D):
         rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
-        _count(pad, s[rs], s[rt], L, law, f, i)
+        _count(pad, s[rs], s[rt], L, law, f, i, yields, wears)
     for l in range(L):
         y, force, z = pad[_Y0 + l], pad[_F0 + l], pad[_Z0 + l]
-        if law.yields is not None:
+        if yields is not None:
             force = force - pad[_FZ0 + l] if y > z else 0.0
         pad[_STORED + l] += pad[_CURVING + l]
         pad[_SLIDING + l] += share * pad[_WHOLE + l] if y > z else 0.0
@@ -824,17 +822,17 @@ def measures(
 ):  # fmt: skip
     """Measures (5, n) of joints first..last, as `reference.measures`; arguments as above."""
     work = Work(block, pad, place, piece)
-    law = Packed(facet, depth, curve, scalars, dim, yields, wears)
+    law = Packed(facet, depth, curve, scalars, dim)
     W = state.shape[2]
     for start in range(first, last, W):
         L = min(W, last - start)
         s = state[start // W]
         pad[_SLIDING:_REACH] = 0.0
-        if law.wears is not None:
-            _weaken(pad, s, L, law)
+        if wears is not None:
+            _weaken(pad, s, L, law, yields, wears)
         pad[_REACH : _REACH + LANES] = -np.inf
         for f in range(facet.shape[0]):
-            _measure_facet(work, s, L, law, f, energy)
+            _measure_facet(work, s, L, law, f, energy, yields, wears)
         for i in range(5):
             for l in range(L):
                 out[i, start + l] = pad[_SLIDING + i * LANES + l]
@@ -847,18 +845,18 @@ def refresh(
 ):  # fmt: skip
     """Phi and Phi' in the blocks of joints first..last, after their states were written."""
     work = Work(block, pad, place, piece)
-    law = Packed(facet, depth, curve, scalars, dim, yields, wears)
+    law = Packed(facet, depth, curve, scalars, dim)
     M, W = depth.shape[0], state.shape[2]
     for start in range(first, last, W):
         L = min(W, last - start)
         s = state[start // W]
         for f in range(M):
-            first_depth, _, beside = _places(law)
+            first_depth, _, beside = _places(law, yields, wears)
             _effective(pad, s, L, law, f)
             _virgin(work, law, None, L)
             for l in range(L):
                 s[beside + f, l], s[beside + M + f, l] = pad[_F0 + l], pad[_S0 + l]
-            if law.yields is not None:
+            if yields is not None:
                 for l in range(L):
                     pad[_Y0 + l] = s[first_depth + f, l]
                 _virgin(work, law, None, L)

@@ -35,8 +35,8 @@ _DES, _DET, _SUMS, _SUMT = _rows(7, 4)  # its sliders
 _CURVING, _BSS, _BST, _BTT, _VS, _VT, _G0, _G1, _G2 = _rows(11, 9)  # its tangent
 _P, _P1, _P2, _OLD, _OLD1, _OLD2, _NEW, _NEW1, _NEW2 = _rows(20, 9)  # a joint: step, y's origin
 _J00, _J01, _J10, _J11, _SLIP, _PULL1, _PULL2, _LOST, _F, _FS, _FT = _rows(29, 11)
-_C00, _C01, _C02, _C10, _C11, _C12, _C20, _C21, _C22 = _rows(40, 9)
-_NORMAL, _CRUSHED, _MU = _rows(49, 3)  # a joint whose asperities wear or yield
+_NORMAL, _CRUSHED = _rows(40, 2)  # a joint whose asperities wear or yield
+_C00, _C01, _C02, _C10, _C11, _C12, _C20, _C21, _C22, _MU = _rows(42, 10)
 _Z0, _Z1, _FZ0, _FZ1, _SZ1, _AT0, _FAT0, _MOVES, _WS, _WT = _rows(52, 10)  # its flattened facets
 _PAD = 62 * LANES
 
@@ -605,16 +605,18 @@ def _facet(work, s, L, law, f, ledger, tangent, yields, wears):
 
 
 @_jit
-def _begin(pad, s, d, start, L, law, tangent, yields, wears):
+def _clear(pad, first, last):
+    for l in range(first, last):
+        pad[l] = 0.0
+
+
+@_jit
+def _begin(pad, s, d, start, L, law, yields, wears):
     """Lay out the old and new place of each joint of a block, and move it."""
     limit, dim = law.scalars[2], law.dim
     if limit < np.inf or dim == 1:
-        pad[_P:_J00] = 0.0  # the offset has one component in a plane, none on closure
-    pad[_PULL1:_C00] = 0.0
-    if tangent is not None:
-        pad[_C00:_NORMAL] = 0.0
-    if yields is not None or wears is not None:
-        pad[_NORMAL:_MU] = 0.0
+        _clear(pad, _P, _J00)  # the offset has one component in a plane, none on closure
+    _clear(pad, _PULL1, _C00)
     if wears is not None:
         _weaken(pad, s, L, law, yields, wears)
     for i in range(dim):
@@ -701,7 +703,9 @@ def advance(
                 for l in range(L):
                     block[r, l] = state[start // W, r, l]
             s = block
-        _begin(pad, s, d, start, L, law, tangent, yields, wears)
+        _begin(pad, s, d, start, L, law, yields, wears)
+        if tangent is not None:
+            _clear(pad, _C00, _MU)
         for f in range(facet.shape[0]):
             _facet(work, s, L, law, f, ledger, tangent, yields, wears)
         _finish(pad, s, F, C, start, L, law, ledger, tangent, yields, wears)
@@ -827,7 +831,7 @@ def measures(
     for start in range(first, last, W):
         L = min(W, last - start)
         s = state[start // W]
-        pad[_SLIDING:_REACH] = 0.0
+        _clear(pad, _SLIDING, _REACH)
         if wears is not None:
             _weaken(pad, s, L, law, yields, wears)
         pad[_REACH : _REACH + LANES] = -np.inf

@@ -90,13 +90,13 @@ class Work(NamedTuple):
 
     block: Array  # (rows, LANES): copy of a block of states
     pad: Array
-    place: NDArray[np.int32]  # cell of the curve, per lane
+    place: NDArray[np.int32]  # cell of the curve, per lane; then the lanes that are pressed flat
     piece: Array  # its four coefficients, per lane
 
 
 def new_work(rows: int) -> Work:
     """Working space for blocks of this many rows."""
-    place, piece = np.zeros(LANES, np.int32), np.zeros(4 * LANES)
+    place, piece = np.zeros(2 * LANES, np.int32), np.zeros(4 * LANES)
     return Work(np.zeros((rows, LANES)), np.zeros(_PAD), place, piece)
 
 
@@ -319,7 +319,6 @@ def _relieve(pad, L, law, f, ledger):
         y1, z1, f1 = pad[_Y1 + l], pad[_Z1 + l], pad[_F1 + l] - pad[_FZ1 + l]
         pad[_F1 + l] = f1 if (y1 > z1) & (f1 > 0.0) else 0.0
         pad[_S1 + l] = pad[_S1 + l] if y1 > z1 else 0.0
-        pad[_F0 + l] = pad[_FAT0 + l] - pad[_FZ0 + l]
     if ledger is not None:
         for l in range(L):
             c0, c1 = pad[_Y0 + l] - pad[_Z0 + l], pad[_Y1 + l] - pad[_Z1 + l]
@@ -584,7 +583,8 @@ def _facet(work, s, L, law, f, ledger, tangent, yields, wears):
         _relieve(pad, L, law, f, ledger)
     if wears is not None:
         for l in range(L):
-            pad[_NORMAL + l] += A * (pad[_F0 + l] + pad[_F1 + l])
+            before = pad[_F0 + l] if yields is None else pad[_FAT0 + l] - pad[_FZ0 + l]
+            pad[_NORMAL + l] += A * (before + pad[_F1 + l])
     soft = 1.0 / lam
     for l in range(L):
         normal, q0, q1 = A * pad[_F1 + l], soft * pad[_SUMS + l], soft * pad[_SUMT + l]

@@ -37,8 +37,8 @@ _P, _P1, _P2, _OLD, _OLD1, _OLD2, _NEW, _NEW1, _NEW2 = _rows(20, 9)  # a joint: 
 _J00, _J01, _J10, _J11, _SLIP, _PULL1, _PULL2, _LOST, _F, _FS, _FT = _rows(29, 11)
 _NORMAL, _CRUSHED = _rows(40, 2)  # a joint whose asperities wear or yield
 _C00, _C01, _C02, _C10, _C11, _C12, _C20, _C21, _C22, _MU = _rows(42, 10)
-_Z0, _Z1, _FZ0, _FZ1, _SZ1, _AT0, _FAT0, _MOVES, _WS, _WT = _rows(52, 10)  # its flattened facets
-_PAD = 62 * LANES
+_Z0, _Z1, _FZ0, _FZ1, _SZ1, _AT0, _FAT0, _WS, _WT = _rows(52, 9)  # its flattened facets
+_PAD = 61 * LANES
 
 # The same rows while joints are measured
 _WHOLE, _LIMIT, _SLIDING, _SLIPPING, _APART, _STORED, _REACH = _rows(20, 7)
@@ -280,35 +280,27 @@ def _press(work, s, L, law, f, yields, wears):
     at, kept = first + f, beside + 2 * law.depth.shape[0] + f
     deep, o = facet[f, _YIELD], np.int64(facet[f, _OPPOSITE])
     for l in range(L):
-        pad[_Z0 + l], pad[_FZ0 + l], pad[_Z1 + l] = s[at, l], s[kept, l], pad[_Y1 + l]
+        pad[_Z1 + l] = pad[_Y1 + l]
     if o != f:
         m0, m1, m2 = facet[o, _M], facet[o, _M + 1], facet[o, _M + 2]
         for l in range(L):
             other = m0 * pad[_NEW + l] + m1 * pad[_NEW1 + l] + m2 * pad[_NEW2 + l]
             pad[_Z1 + l] = other if other > pad[_Y1 + l] else pad[_Y1 + l]
-    pressed = 0.0
     for l in range(L):
-        z0, y1, z1 = pad[_Z0 + l], pad[_Y1 + l], pad[_Z1 + l] - deep
-        moves = z1 > z0
-        z1 = z1 if moves else z0
-        own = 1.0 if z1 <= y1 - deep else 2.0
-        pad[_Z1 + l], pad[_FZ1 + l] = z1, pad[_FZ0 + l]
-        pad[_MOVES + l] = own if moves & (y1 > z1) else 0.0
-        pad[_SZ1 + l] = y1
-        pressed += 1.0 if moves else 0.0
-    if pressed > 0.0:
-        for l in range(L):
-            pad[_Y1 + l] = pad[_Z1 + l]
-        _virgin(work, law, True, L)
-        for l in range(L):
-            pad[_Y1 + l] = pad[_SZ1 + l]
-            pad[_FZ1 + l], pad[_SZ1 + l] = pad[_F1 + l], pad[_S1 + l]
-        for l in range(L):
-            s[at, l], s[kept, l] = pad[_Z1 + l], pad[_FZ1 + l]
+        z0, fz0, z1 = s[at, l], s[kept, l], pad[_Z1 + l] - deep
+        pad[_Z0 + l], pad[_FZ0 + l], pad[_FZ1 + l] = z0, fz0, fz0
+        pad[_Z1 + l] = z1 if z1 > z0 else z0
+    pressed = 0  # only where it moves is Phi looked up, packed into the rows of before the step
     for l in range(L):
-        touches = pad[_Y0 + l] > pad[_Z0 + l]
-        pad[_AT0 + l] = pad[_Y0 + l] if touches else pad[_Z0 + l]
-        pad[_FAT0 + l] = pad[_F0 + l] if touches else pad[_FZ0 + l]
+        work.place[LANES + pressed] = l
+        pad[_Y0 + pressed] = pad[_Z1 + l]
+        pressed += 1 if pad[_Z1 + l] > pad[_Z0 + l] else 0
+    if pressed > 0:
+        _virgin(work, law, None, pressed)
+    for i in range(pressed):
+        l = work.place[LANES + i]
+        pad[_FZ1 + l], pad[_SZ1 + l] = pad[_F0 + i], pad[_S0 + i]
+        s[at, l], s[kept, l] = pad[_Z1 + l], pad[_F0 + i]
 
 
 @_jit
@@ -330,11 +322,13 @@ def _relieve(pad, L, law, f, ledger):
 
 
 @_jit
-def _share_at(y, force, zl, fl, sl, zh, fh, sh, ended):
-    """G of a cell at y, where the virgin force is known."""
-    G = force - fl - sl * (y - zl)
-    G -= force - fh - sh * (y - zh) if ended & (y > zh) else 0.0
-    return G if (y > zl) & (G > 0.0) else 0.0
+def _between(z, fz, y, fy, zl, fl, sl, zh, fh, sh, ended):
+    """What a cell gains from z to y, where the virgin force is known; right for y >= z, zl."""
+    gain = fy - (fz if z > zl else fl) - sl * (y - (z if z > zl else zl))
+    if ended:
+        beyond = fy - (fz if z > zh else fh) - sh * (y - (z if z > zh else zh))
+        gain -= beyond if y > zh else 0.0
+    return gain
 
 
 @_jit
@@ -348,33 +342,30 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent, yields, wears):
     zh, fh, sh = depth[f, i + 1, 0], depth[f, i + 1, 1], depth[f, i + 1, 2]
     ended = i + 2 < depth.shape[1]
     for l in range(L):
-        # the bed beyond the lower limit of the cell less that beyond the upper
         y0, y1, f0, f1 = pad[_Y0 + l], pad[_Y1 + l], pad[_F0 + l], pad[_F1 + l]
-        if yields is not None:  # from the flattened depth on, where y is above it
-            y0, f0 = pad[_AT0 + l], pad[_FAT0 + l]
         from0, from1 = y0 - zl, y1 - zl
-        G0, G1 = f0 - fl - sl * from0, f1 - fl - sl * from1
         k0, k1 = pad[_S0 + l] - sl, pad[_S1 + l] - sl
         if ended:
-            G0 -= f0 - fh - sh * (y0 - zh) if y0 > zh else 0.0
-            G1 -= f1 - fh - sh * (y1 - zh) if y1 > zh else 0.0
             k0 = sh - sl if y0 > zh else k0
             k1 = sh - sl if y1 > zh else k1
         k0 = k0 if (from0 > 0.0) & (k0 > 0.0) else 0.0
         k1 = k1 if (from1 > 0.0) & (k1 > 0.0) else 0.0
-        h0, h1 = k0 * from0, k1 * from1
-        if yields is not None:  # at the flattened depth the slope is not at hand
-            begun = G0 if from0 > 0.0 else 0.0
-            h0 = h0 if y0 > pad[_Z0 + l] else begun
-        G0, G1 = G0 if h0 > G0 else h0, G1 if h1 > G1 else h1
-        G0, G1 = G0 if G0 > 0.0 else 0.0, G1 if G1 > 0.0 else 0.0
-        reached = G1
-        if yields is not None:  # less what the bed holds at the flattened depth
-            z1, touched = pad[_Z1 + l], y0 > pad[_Z0 + l]
-            k0, k1 = k0 if touched else 0.0, k1 if y1 > z1 else 0.0
-            y0 = pad[_Y0 + l]
-            G1 -= _share_at(z1, pad[_FZ1 + l], zl, fl, sl, zh, fh, sh, ended)
-            h1 = k1 * (y1 - z1)
+        if yields is None:
+            # the bed beyond the lower limit of the cell less that beyond the upper
+            G0, G1 = f0 - fl - sl * from0, f1 - fl - sl * from1
+            if ended:
+                G0 -= f0 - fh - sh * (y0 - zh) if y0 > zh else 0.0
+                G1 -= f1 - fh - sh * (y1 - zh) if y1 > zh else 0.0
+            h0, h1 = k0 * from0, k1 * from1
+            G0, G1 = G0 if h0 > G0 else h0, G1 if h1 > G1 else h1
+            G0, G1 = G0 if G0 > 0.0 else 0.0, G1 if G1 > 0.0 else 0.0
+            gained = G1 - G0
+        else:  # the bed less what it holds at the flattened depth
+            z0, z1, at0, fat0 = pad[_Z0 + l], pad[_Z1 + l], pad[_AT0 + l], pad[_FAT0 + l]
+            k0, k1 = k0 if y0 > z0 else 0.0, k1 if y1 > z1 else 0.0
+            gained = _between(at0, fat0, y1, f1, zl, fl, sl, zh, fh, sh, ended)
+            G1 = _between(z1, pad[_FZ1 + l], y1, f1, zl, fl, sl, zh, fh, sh, ended)
+            h1 = k1 * (y1 - (z1 if z1 > zl else zl))
             G1 = G1 if h1 > G1 else h1
             G1 = G1 if G1 > 0.0 else 0.0
         # trial force: by the chord where stiffness grows, scaled down where it falls
@@ -383,7 +374,7 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent, yields, wears):
         near = abs(dy) <= NEAR * abs(y1)
         if yields is not None:  # flattened springs touch at once: no mean where they do
             near = near & ((k0 > 0.0) | (k1 == 0.0))
-        top = reached - G0 if grows else k1
+        top = gained if grows else k1
         bottom = dy if grows else k0
         ratio = top / (bottom if bottom != 0.0 else 1.0)
         chord = 0.5 * (k0 + k1) if near else ratio
@@ -395,8 +386,8 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent, yields, wears):
         if wears is not None:  # back to the limit, that fell since
             strength = by_mu * pad[_MU + l]
             if yields is not None:
-                G0 -= _share_at(pad[_Z0 + l], pad[_FZ0 + l], zl, fl, sl, zh, fh, sh, ended)
-                h0 = k0 * (y0 - pad[_Z0 + l])
+                G0 = _between(z0, pad[_FZ0 + l], y0, f0, zl, fl, sl, zh, fh, sh, ended)
+                h0 = k0 * (y0 - (z0 if z0 > zl else zl))
                 G0 = G0 if h0 > G0 else h0
                 G0 = G0 if G0 > 0.0 else 0.0
             size0 = np.sqrt(olds * olds + oldt * oldt)
@@ -513,12 +504,13 @@ def _soften(pad, L, law, f):
     """C -= along g^T of a facet whose flattened depth moves, with the y that presses it."""
     facet, dim, o = law.facet, law.dim, np.int64(law.facet[f, _OPPOSITE])
     A, soft, limited = facet[f, _REST], 1.0 / law.scalars[0], law.scalars[2] < np.inf
-    m0, m1, m2 = facet[o, _M], facet[o, _M + 1], facet[o, _M + 2]
+    m0, m1, m2, deep = facet[o, _M], facet[o, _M + 1], facet[o, _M + 2], facet[f, _YIELD]
     for l in range(L):
-        if pad[_MOVES + l] == 0.0:
+        y1, z1 = pad[_Y1 + l], pad[_Z1 + l]
+        if z1 <= pad[_Z0 + l] or y1 <= z1:
             continue
         g0, g1, g2 = pad[_G0 + l], pad[_G1 + l], pad[_G2 + l]
-        if (pad[_MOVES + l] == 2.0) & limited:
+        if z1 > y1 - deep and limited:
             g0 = m0
             g1 = m1 * pad[_J00 + l] + m2 * pad[_J10 + l]
             g2 = m1 * pad[_J01 + l] + m2 * pad[_J11 + l]
@@ -543,17 +535,22 @@ def _facet(work, s, L, law, f, ledger, tangent, yields, wears):
     n0, n1, n2 = facet[f, _N], facet[f, _N + 1], facet[f, _N + 2]
     A = facet[f, _REST]
     for l in range(L):
-        pad[_Y0 + l] = m0 * pad[_OLD + l] + m1 * pad[_OLD1 + l]
         pad[_Y1 + l] = m0 * pad[_NEW + l] + m1 * pad[_NEW1 + l]
         pad[_DES + l] = s0 * pad[_P + l] + s1 * pad[_P1 + l]
         pad[_DET + l] = t1 * pad[_P1 + l]
         pad[_SUMS + l] = pad[_SUMT + l] = 0.0
     if dim == 3:
         for l in range(L):
-            pad[_Y0 + l] += m2 * pad[_OLD2 + l]
             pad[_Y1 + l] += m2 * pad[_NEW2 + l]
             pad[_DES + l] += s2 * pad[_P2 + l]
             pad[_DET + l] += t2 * pad[_P2 + l]
+    if yields is not None:
+        _press(work, s, L, law, f, yields, wears)
+    for l in range(L):
+        pad[_Y0 + l] = m0 * pad[_OLD + l] + m1 * pad[_OLD1 + l]
+    if dim == 3:
+        for l in range(L):
+            pad[_Y0 + l] += m2 * pad[_OLD2 + l]
     for l in range(L):
         pad[_Y0 + l] = pad[_Y0 + l] if abs(pad[_Y0 + l]) >= UNDERFLOW else 0.0
     beside = _places(law, yields, wears)[2]
@@ -561,7 +558,10 @@ def _facet(work, s, L, law, f, ledger, tangent, yields, wears):
     for l in range(L):
         pad[_F0 + l], pad[_S0 + l] = s[rf, l], s[rs, l]
     if yields is not None:
-        _press(work, s, L, law, f, yields, wears)
+        for l in range(L):
+            touches = pad[_Y0 + l] > pad[_Z0 + l]
+            pad[_AT0 + l] = pad[_Y0 + l] if touches else pad[_Z0 + l]
+            pad[_FAT0 + l] = pad[_F0 + l] if touches else pad[_FZ0 + l]
     _virgin(work, law, True, L)
     for l in range(L):
         s[rf, l], s[rs, l] = pad[_F1 + l], pad[_S1 + l]
@@ -730,13 +730,14 @@ def _count(pad, qs, qt, L, law, f, i, yields, wears):
         reach = min(max(y, zl), zh)
         k = min(max(slope, sl), sh) - sl
         G = k * (y - reach) + (min(max(force, fl), fh) - fl - sl * (reach - zl))
-        most = k * (y - zl if y > zl else 0.0)
-        G = min(max(G, 0.0), most)
+        z = zl
         if yields is not None:
             z = pad[_Z0 + l]
             k = k if y > z else 0.0
-            G -= _share_at(z, pad[_FZ0 + l], zl, fl, sl, zh, fh, sh, ended)
-            G = max(min(G, k * (y - z)), 0.0)
+            G = _between(z, pad[_FZ0 + l], y, force, zl, fl, sl, zh, fh, sh, ended)
+            z = z if z > zl else zl
+        most = k * (y - z if y > z else 0.0)
+        G = min(max(G, 0.0), most)
         if wears is not None:
             strength = pad[_MU + l] * law.scalars[0] * facet[f, _REST]
         q2 = qs[l] * qs[l] + qt[l] * qt[l]

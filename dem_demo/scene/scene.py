@@ -24,7 +24,7 @@ class Run:
     record: float = 0.05  # time between records
     dashpot_normal: float = 0.05  # shares of critical
     dashpot_shear: float = 0.05
-    law_steps: int = 1  # steps of the law per time step: 4 keeps the books within 0.5 % in impacts
+    law_steps: int = 1  # steps of the law per time step: 4 balances energy to 0.5 % in impacts
     largest_stress: float = 0.0  # Pa, expected in impacts: sets the step before anything touches
     skin: float | None = None  # reach of the search for contacts; default 0.02 of the least width
     point_spacing: float = np.inf  # largest distance of law points along a joint

@@ -53,7 +53,10 @@ class VirginCurve(NamedTuple):
         x, i, _, _ = self._cell(y)
         c = self.S[i]
         S = c[..., 0] + x * (c[..., 1] + x * (c[..., 2] + x * c[..., 3]))
-        DS = self._weight(y) * (c[..., 1] + x * (2 * c[..., 2] + x * (3 * c[..., 3])))
+        v = np.sqrt(np.fmin(np.fmax(y, 0.0), _FARTHEST))
+        # t (1 - t)/2 times the number of cells: D in units of the place within a cell
+        weight = 0.5 * len(self.S) * v * self.scale / (v + self.scale) ** 2
+        DS = weight * (c[..., 1] + x * (2 * c[..., 2] + x * (3 * c[..., 3])))
         if self.rise:
             lift, slope, _ = self._lift(y)
             S, DS = lift * S, lift * (DS + slope * S)
@@ -84,8 +87,7 @@ class VirginCurve(NamedTuple):
         T = c[..., 0] + x * (c[..., 1] + x * (c[..., 2] + x * c[..., 3]))
         if self.rise:
             T = self._lift(y)[0] * T
-        energy: Array = np.maximum(y, 0.0) ** (2 + self.eta) * T
-        return energy
+        return np.maximum(y, 0.0) ** (2 + self.eta) * T
 
     def _cell(self, y: Array) -> tuple[Array, Array, Array, Array]:
         """Place within its cell, cell number, t and 1 - t of each y."""
@@ -95,11 +97,6 @@ class VirginCurve(NamedTuple):
         cells = len(self.S)
         i = np.minimum((t * cells).astype(np.intp), cells - 1)
         return t * cells - i, i, t, s
-
-    def _weight(self, y: Array) -> Array:
-        """t (1 - t)/2 times the number of cells: D in units of the place within a cell."""
-        v = np.sqrt(np.fmin(np.fmax(y, 0.0), _FARTHEST))
-        return 0.5 * len(self.S) * v * self.scale / (v + self.scale) ** 2
 
     def _lift(self, y: Array) -> tuple[Array, Array, Array]:
         """w^p, and D w^p / w^p with its own D."""

@@ -47,8 +47,7 @@ class Record:
     def __getattr__(self, name: str) -> Array:
         columns = self.__dict__.get("columns", {})
         if name in columns:
-            column: Array = columns[name]
-            return column
+            return columns[name]
         raise AttributeError(f"record has no column {name!r}; columns: {', '.join(columns)}")
 
     def __len__(self) -> int:
@@ -147,7 +146,7 @@ def _shear_figure(record: Record) -> Any:
     figure, axes = pyplot().subplots(2, 2, figsize=(9, 6.5), layout="constrained", sharex=True)
     stress, unit = _scaled(np.stack([record.shear_stress, record.F1]), _STRESSES)
     axes[0, 0].plot(shear, stress[0], label="shear stress")
-    axes[0, 0].plot(shear, stress[1], "--", color="0.5", label="normal stress")
+    axes[0, 0].plot(shear, stress[1], color="0.5", lw=1, label="normal stress")
     axes[0, 0].set_ylabel(f"stress ({unit})")
     axes[0, 0].legend()
     axes[0, 1].plot(shear, record.friction_angle, color="C3")

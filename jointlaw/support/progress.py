@@ -12,5 +12,4 @@ def track(items: Iterable[T], label: str, total: int | None = None) -> Iterable[
         from tqdm import tqdm
     except ImportError:
         return items
-    bar: Iterable[T] = tqdm(items, desc=label, total=total, delay=2.0, disable=None, leave=False)
-    return bar
+    return tqdm(items, desc=label, total=total, delay=2.0, disable=None, leave=False)

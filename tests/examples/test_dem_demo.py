@@ -50,7 +50,7 @@ def test_run_writes_everything(tmp_path):
                  "final.png", "motion.gif", "energy.png", "curves.png", "state"):  # fmt: skip
         assert (out / name).exists(), name
     summary = json.loads((out / "summary.json").read_text())
-    assert summary["safety_factor"] > 2
+    assert summary["time_step_margin"] > 2
     assert summary["steps"] * summary["time_step_s"] == pytest.approx(0.12, rel=0.01)
     assert summary["slip"][0]["slip_angle"] is None
     assert 40 < summary["slip"][0]["predicted_angle"] < 50
@@ -66,7 +66,7 @@ def test_run_writes_everything(tmp_path):
 @pytest.mark.parametrize("name", names())
 def test_scenes_are_valid(name, capsys):
     assert main(["check", name]) == 0
-    assert "safety factor" in capsys.readouterr().out
+    assert "margin" in capsys.readouterr().out
 
 
 def test_resume_is_bit_identical(tmp_path):

@@ -163,8 +163,7 @@ def _mirror(n: Array) -> Array:
     """Number of the facet (M,) whose normal has the other sign along axis 2."""
     image = n * np.where(np.arange(len(n)) == 1, -1.0, 1.0)[:, None]
     away = np.sum((image[:, :, None] - n[:, None]) ** 2, axis=0)
-    number: Array = np.argmin(away, axis=1).astype(float)
-    return number
+    return np.argmin(away, axis=1).astype(float)
 
 
 def _toml(law: JointLaw) -> list[str]:

@@ -6,11 +6,11 @@ its own.
 """
 
 import dataclasses
+from itertools import pairwise
 
 import numpy as np
 
 from jointlaw.discretisation.virgin_curve import VirginCurve
-
 from jointlaw.kernels import reference as kernel
 
 _X, _W = np.polynomial.legendre.leggauss(16)
@@ -96,7 +96,7 @@ def stored(k, state):
 
 
 def _crossings(k, state, d):
-    """Times at which a closure, or a flattened depth that follows it, leaves a piece of the table."""
+    """Times at which a closure, or a flattened depth with it, leaves a piece of the table."""
     if len(k.curve.S) == 1:
         return []
     old = kernel.parts(k, state)
@@ -109,7 +109,7 @@ def _crossings(k, state, d):
     low, high, level, facet = [], [], [], []
     for f, row in enumerate(at):
         levels = np.append(nodes, nodes + k.yield_depth[f]) if k.yields else nodes
-        for j, (a, b) in enumerate(zip(row[:-1], row[1:], strict=True)):
+        for j, (a, b) in enumerate(pairwise(row)):
             crossed = levels[(levels > min(a, b)) & (levels < max(a, b))]
             low += [_STARTS[j]] * len(crossed)
             high += [_STARTS[j + 1]] * len(crossed)

@@ -12,6 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
 
+from jointlaw.support.progress import track
+
 from .drawing import CLOSURE, OPEN, SEPARATED, SLIDES, SLIPPING, STRESS, TAU, Scale, draw_blocks
 from .record import Record
 
@@ -114,7 +116,7 @@ def animation(record: Record, path: Path, draw_frame: Callable[..., Figure]) -> 
     wanted = np.linspace(record.times[0], record.times[-1], min(len(record.times), FRAMES))
     frames = np.unique(np.abs(np.subtract.outer(wanted, record.times)).argmin(axis=1))
     scale, images = Scale(record, frames), []
-    for i in frames:
+    for i in track(frames, "animation", len(frames)):
         figure = draw_frame(record, i, scale, 75)
         figure.canvas.draw()
         image = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3])

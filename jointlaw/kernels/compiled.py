@@ -16,6 +16,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from ..discretisation.nodes import UNUSED
 from ..discretisation.tables import UNDERFLOW, Tables
 from ..support.checks import Array
 from .reference import GRAZING, LIMIT, NEAR, ROUNDED, TINY, compliance
@@ -413,6 +414,8 @@ def _facet(work, s, L, law, f, ledger, tangent):
             pad[_BSS + l] = pad[_BST + l] = pad[_BTT + l] = 0.0
             pad[_VS + l] = pad[_VT + l] = 0.0
     for i in range(D):
+        if law.depth[f, i, 0] >= UNUSED:
+            break
         rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
         _slide(pad, s[rs], s[rt], L, law, f, i, ledger, tangent)
     soft = 1.0 / lam
@@ -587,6 +590,8 @@ def _measure_facet(work, s, L, law, f, energy):
         for l in range(L):
             pad[_CURVING + l] *= pad[_Y0 + l] ** eta if pad[_Y0 + l] > 0.0 else 0.0
     for i in range(D):
+        if law.depth[f, i, 0] >= UNUSED:
+            break
         rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
         _count(pad, s[rs], s[rt], L, law, f, i)
     for l in range(L):

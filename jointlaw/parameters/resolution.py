@@ -11,9 +11,11 @@ from ..support.checks import whole
 class Resolution:
     """Number of nodes that the law sums over.
 
-    u: inclinations (Gauss rule of the density in cos(a theta)), >= 1.
-    phi: azimuths on the half circle, >= 3; motion in 3-D uses twice as many.
-    depth: cells of touch depth per orientation, >= 1.
+    u: rings of one inclination each (Gauss rule of the density, crowded to the steepest), >= 1.
+    phi: intervals of azimuth on the half circle of the longest ring, >= 3; shorter rings have
+        fewer, and motion in 3-D takes both halves.
+    depth: cells of touch depth of a facet of the ring of most weight, >= 1; lighter ones have
+        fewer.
     """
 
     u: int
@@ -27,14 +29,14 @@ class Resolution:
 
     @property
     def sliders(self) -> int:
-        """Sliders per joint for motion in one plane; motion in 3-D has twice as many."""
-        return self.u * self.phi * self.depth
+        """Most sliders that a joint may have for motion in one plane; `law.tables.sliders` counts."""
+        return self.u * (self.phi + 1) * self.depth
 
 
 NAMED = {
-    "fast": Resolution(1, 3, 2),
-    "balanced": Resolution(2, 3, 4),
-    "fine": Resolution(4, 5, 10),
+    "fast": Resolution(2, 3, 2),
+    "balanced": Resolution(3, 5, 3),
+    "fine": Resolution(5, 6, 10),
     "reference": Resolution(16, 10, 24),
 }
 

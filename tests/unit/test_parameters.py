@@ -91,10 +91,10 @@ def test_whole_numbers_are_numbers():
 def test_names_of_resolutions(law, make_law):
     sizes = [make_law(resolution=name).resolution.sliders for name in ("fast", "balanced", "fine")]
     assert sizes == sorted(set(sizes))
-    assert make_law(resolution="balanced") == make_law(resolution=jl.Resolution(2, 3, 4))
+    assert make_law(resolution="balanced") == make_law(resolution=jl.Resolution(3, 5, 3))
     assert jl.JointLaw(
         orientation=law.orientation, asperity=law.asperity, asperity_density=1e10
-    ).resolution == jl.Resolution(2, 3, 4)
+    ).resolution == jl.Resolution(3, 5, 3)
 
 
 def test_default_closure_range_is_the_closure_at_20_MPa(make_law):

@@ -13,16 +13,20 @@ from ..support.checks import Array
 class Price:
     """One resolution: errors are shares of the largest traction (or tangent) of each path.
 
-    `error`, `rms` (paths,): of the traction. `tangent_rms`, `tangent_max`: of the tangent, over all
-    paths; it jumps between stick and slip, and the largest error is that of a jump that comes one
-    step early or late. `ns`, `ns_tangent`: nanoseconds per joint and update without and with
-    tangent, no ledger, least of several runs; NaN where nothing was timed. `bytes`: per joint.
+    `error`, `rms` (paths,): of the traction. `friction`, `dilation`: largest misses of the angles
+    (degrees) at constant normal stress, from 0.2 critical slips on. `tangent_rms`, `tangent_max`:
+    of the tangent, over all paths; it jumps between stick and slip, and the largest error is that
+    of a jump that comes one step early or late. `ns`, `ns_tangent`: nanoseconds per joint and
+    update without and with tangent, no ledger, least of several runs; NaN where nothing was timed.
+    `bytes`: per joint.
     """
 
     resolution: Resolution
     sliders: int
     error: Array
     rms: Array
+    friction: float
+    dilation: float
     tangent_rms: float
     tangent_max: float
     ns: float

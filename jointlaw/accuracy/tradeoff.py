@@ -23,7 +23,7 @@ from .suite import Law, Suite, errors, reference_resolution, scaled, standard_su
 
 SPREAD = tuple(
     Resolution(u, phi, depth)
-    for u, phi in ((1, 3), (2, 3), (2, 4), (3, 4), (4, 5), (6, 6))
+    for u, phi in ((1, 3), (2, 3), (3, 3), (3, 5), (5, 6), (8, 8))
     for depth in (1, 2, 3, 4, 6, 10, 16)
 )
 _MEMORY = 100_000_000  # bytes of state that a timing may use; very fine laws get a smaller batch
@@ -50,14 +50,16 @@ class Tradeoff:
     def __str__(self) -> str:
         lines = [
             f"{'u phi depth':>12s} {'sliders':>8s} {'bytes':>7s} {'max error':>10s} {'rms':>8s} "
-            f"{'tangent rms':>12s} {'ns':>8s} {'with tangent':>13s}  worst path"
+            f"{'friction':>9s} {'dilation':>9s} {'tangent rms':>12s} {'ns':>8s} "
+            f"{'with tangent':>13s}  worst path"
         ]
         for row in self.frontier():
             r = row.resolution
             name = next((f"  = {n}" for n, value in NAMED.items() if value == r), "")
             lines.append(
                 f"{f'{r.u} {r.phi} {r.depth}':>12s} {row.sliders:8d} {row.bytes:7d} "
-                f"{row.worst:10.2%} {row.rms.max():8.2%} {row.tangent_rms:12.2%} {_ns(row.ns):>8s} "
+                f"{row.worst:10.2%} {row.rms.max():8.2%} {row.friction:8.2f}° {row.dilation:8.2f}° "
+                f"{row.tangent_rms:12.2%} {_ns(row.ns):>8s} "
                 f"{_ns(row.ns_tangent):>13s}  {self.paths[int(row.error.argmax())]}{name}"
             )
         timed = f"ns per joint and update: {self.joints} joints, {self.how}"
@@ -80,6 +82,8 @@ class Tradeoff:
             "ns_tangent": [r.ns_tangent for r in rows],
             "error": [r.worst for r in rows],
             "rms": [float(r.rms.max()) for r in rows],
+            "friction_deg": [r.friction for r in rows],
+            "dilation_deg": [r.dilation for r in rows],
             "tangent_rms": [r.tangent_rms for r in rows],
             "tangent_max": [r.tangent_max for r in rows],
         }
@@ -89,7 +93,7 @@ class Tradeoff:
         return table
 
     def to_csv(self, path: str | Path) -> None:
-        """All prices as CSV; errors are shares (1), times ns, sizes bytes."""
+        """All prices as CSV; errors are shares (1), angles degrees, times ns, sizes bytes."""
         stream = io.StringIO(newline="")
         writer, table = csv.writer(stream), self.columns()
         writer.writerow(table)
@@ -125,13 +129,13 @@ def tradeoff(
 
 
 def _price(law: Law, suite: Suite, exact: Array, joints: int, seconds: float) -> Price:
-    error, rms = suite.errors(law)
+    miss = suite.miss(law)
     steps, paths = exact.shape[:2]
     C = tangents(law, suite.d).reshape(steps, paths, -1)
     tangent_max, tangent_rms = errors(C, exact.reshape(steps, paths, -1))
     ns = [_time(law, joints, tangent, seconds) for tangent in (False, True)]
     return Price(
-        law.resolution, law.tables.sliders, error, rms,
+        law.resolution, law.tables.sliders, *miss,
         float(np.sqrt(np.mean(tangent_rms**2))), float(tangent_max.max()), ns[0], ns[1],
         law.joints(0).bytes_per_joint,
     )  # fmt: skip

@@ -15,7 +15,7 @@ from ..law import JointLaw
 from ..parameters.asperity import Asperity
 from ..parameters.heights import GammaHeights
 from ..parameters.orientation import Orientation
-from ..parameters.resolution import resolve
+from ..parameters.resolution import Resolution, resolve
 from ..support.checks import Array
 from .priors import Values
 
@@ -26,6 +26,10 @@ DEFAULTS = {
     "alpha": 3.7, "beta": 1e-5, "overlap": 0.0, "asperity_density": 1e6, "K": _ROCK.K,
     "lam": _ROCK.lam, "eta": _ROCK.eta, "mu": _ROCK.mu, "a": 3.0, "b": 0.0, "c": 0.0,
 }  # fmt: skip
+
+
+# Shear stress within 0.2 % at some closure ranges of slip, where 1 % is little noise
+SHEAR = Resolution(8, 8, 6)
 
 
 @dataclass(frozen=True)
@@ -73,6 +77,16 @@ def build(values: Values, settings: Settings, plane: float | None = None) -> Joi
         critical_slip=settings.critical_slip,
         closure_only=settings.closure_only,
     )
+
+
+def build_for_shear(values: Values, settings: Settings, azimuth: float) -> JointLaw:
+    """The law that a shear curve along this azimuth (rad) is compared with.
+
+    At least at SHEAR: a parameter would take up the error of few nodes, degrees of friction, and
+    its interval would not show it.
+    """
+    resolution = max(resolve(settings.resolution), SHEAR, key=lambda r: r.sliders)
+    return build(values, replace(settings, resolution=resolution), plane=azimuth)
 
 
 def log_stress(values: Values, closure: Array, settings: Settings) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..laboratory.experiments import direct_shear
 from ..law import JointLaw
 from ..support.checks import Array, above, at_least, number
-from .forward import Settings, build, log_stress
+from .forward import Settings, build_for_shear, log_stress
 from .noise import Noise
 from .priors import Values
 
@@ -146,7 +146,7 @@ class ShearCurve:
 
     def residuals(self, values: Values, settings: Settings) -> Array:
         """(model - measured)/largest measured, (n,)."""
-        model = self.predict(build(values, settings, plane=self.azimuth))
+        model = self.predict(build_for_shear(values, settings, self.azimuth))
         residual: Array = (model - self.shear_stress) / np.max(np.abs(self.shear_stress))
         return residual
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..support.pyplot import pyplot
 from .estimate import Estimate
-from .forward import build
+from .forward import build_for_shear
 from .measured import ClosureCurve
 
 Points = tuple[ArrayLike, ArrayLike]  # stress (Pa) and closure (m)
@@ -32,7 +32,9 @@ def plot_fit(fit: Estimate, path: str | Path | None = None, held_out: Points | N
             closures += 1
             _draw_closure(axis, fit, curve, closures, held_out if closures == 1 else None)
         else:
-            model = curve.predict(build(fit.parameters, fit.problem.settings, curve.azimuth))
+            model = curve.predict(
+                build_for_shear(fit.parameters, fit.problem.settings, curve.azimuth)
+            )
             axis.plot(1e6 * curve.shear, curve.shear_stress / 1e6, "o", ms=4, label="measured")
             axis.plot(1e6 * curve.shear, model / 1e6, color="C1", label="law")
             label = f"shear stress (MPa) at {curve.normal / 1e6:.3g} MPa"

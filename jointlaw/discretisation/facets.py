@@ -84,11 +84,11 @@ def facets(
 
 def _ring(m: int, whole: bool) -> tuple[Array, Array]:
     """Azimuths and shares of a whole ring of 2 m facets, or of the m + 1 of its half circle."""
-    if whole:
-        return np.arange(2 * m) * (math.pi / m), np.full(2 * m, 0.5 / m)
-    even = np.full(m + 1, 1.0 / m)
-    even[[0, -1]] /= 2.0
-    return np.arange(m + 1) * (math.pi / m), even
+    azimuth: Array = np.arange(2.0 * m if whole else m + 1.0) * (math.pi / m)
+    even: Array = np.full_like(azimuth, (0.5 if whole else 1.0) / m)
+    if not whole:
+        even[[0, -1]] /= 2.0
+    return azimuth, even
 
 
 def facet_sum(theta: Array, scale: Array, lam: float, mu: float) -> float:

@@ -59,7 +59,7 @@ class Tables:
 
     @property
     def rows(self) -> int:
-        """State numbers per joint: delta, offset, dissipated energy, q of every cell, used or not."""
+        """State numbers per joint: delta, offset, dissipated energy, q of all cells, UNUSED too."""
         return 2 * self.dim + 2 * len(self.c1) * self.cells
 
 

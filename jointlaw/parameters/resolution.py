@@ -29,7 +29,7 @@ class Resolution:
 
     @property
     def sliders(self) -> int:
-        """Most sliders that a joint may have for motion in one plane; `law.tables.sliders` counts."""
+        """Most sliders a joint may have for motion in one plane; `law.tables.sliders` counts."""
         return self.u * (self.phi + 1) * self.depth
 
 

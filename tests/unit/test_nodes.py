@@ -7,13 +7,14 @@ import pytest
 
 import jointlaw as jl
 from jointlaw.discretisation.facets import facets
-from jointlaw.discretisation.facets import facets
 from jointlaw.discretisation.nodes import UNUSED, azimuths, depth_nodes, inclinations
 from jointlaw.discretisation.virgin_curve import virgin_curve
 
 
 @pytest.mark.parametrize("b", [-1.0, -0.3, 0.0, 0.5, 2.0])
-@pytest.mark.parametrize(("count", "root"), [(1, 1), (2, 3), (3, 3), (5, 2), (7, 2), (8, 1), (40, 1)])
+@pytest.mark.parametrize(
+    ("count", "root"), [(1, 1), (2, 3), (3, 3), (5, 2), (7, 2), (8, 1), (40, 1)]
+)
 def test_inclinations_integrate_the_density_exactly(b, count, root):
     u, share = inclinations(b, count)
     assert (np.diff(u) > 0).all()
@@ -45,7 +46,9 @@ def test_every_facet_has_its_opposite(plane):
     f = facets(jl.Orientation(2.0, -0.4, 0.3), 3, 5, plane)
     there = sorted(zip(f.n.T.round(12).tolist(), f.weight.round(12), strict=True))
     mirror = f.n * np.array([1.0, -1.0, -1.0])[: len(f.n), None]
-    assert there == sorted(zip((mirror.T + 0.0).round(12).tolist(), f.weight.round(12), strict=True))
+    assert there == sorted(
+        zip((mirror.T + 0.0).round(12).tolist(), f.weight.round(12), strict=True)
+    )
 
 
 def test_a_facet_stands_on_the_line_of_shear():

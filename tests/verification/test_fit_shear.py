@@ -7,6 +7,7 @@ import pytest
 
 import jointlaw as jl
 from jointlaw.calibration.fit import fit_curves, fit_shear
+from jointlaw.calibration.forward import SHEAR as FINE
 from jointlaw.calibration.measured import ClosureCurve, ShearCurve
 
 SHEAR = np.linspace(0, 3e-5, 12)
@@ -19,7 +20,7 @@ def law():
         asperity=jl.Asperity.hertz_mindlin(G=20e9, nu=0.25, R=1e-3, mu=0.5),
         heights=jl.GammaHeights(3.0, 2e-5, 0.0, "individual"),
         asperity_density=1e6,
-        resolution="fast",
+        resolution=FINE,  # that of fits: measured curves are made with the same nodes
     )
 
 

@@ -72,9 +72,9 @@ class Stopwatch:
 def measure(rows: int, columns: int, law: str, steps: int) -> dict[str, float]:
     """Microseconds per step and law point, and the law's part of it."""
     sim = Simulation(parse(wall(rows, columns, law)))
-    nudge = np.random.default_rng(1).normal(0.0, 1e-3, sim.motion[3:].shape)
-    sim.motion[3:] += nudge * sim.mobile.T
-    sim.world.place(sim.motion)
+    nudge = np.random.default_rng(1).normal(0.0, 1e-3, sim.now.motion[3:].shape)
+    sim.now.motion[3:] += nudge * sim.system.mobile.T
+    sim.world.place(sim.now.motion)
     for _ in range(20):
         sim.step()
     watch = Stopwatch(sim.joints, ["update", "read"])
@@ -82,7 +82,7 @@ def measure(rows: int, columns: int, law: str, steps: int) -> dict[str, float]:
     for _ in range(steps):
         sim.step()
     spent = time.process_time() - start
-    points = int((sim.traction[:, 0] > 0).sum())  # those in reach but open are not counted
+    points = int((sim.now.traction[:, 0] > 0).sum())  # those in reach but open are not counted
     return {
         "blocks": rows * columns,
         "law_points": points,

@@ -22,14 +22,16 @@ import numpy as np
 from tolerance import random_law
 
 import jointlaw as jl
+from jointlaw import law as laws
 from jointlaw.accuracy.suite import Suite, standard_suite
-from jointlaw.discretisation import nodes
-from jointlaw.parameters.orientation import Facets, Orientation
+from jointlaw.discretisation import facets as rings
+from jointlaw.discretisation import tables
+from jointlaw.discretisation.facets import Facets
 from jointlaw.parameters.resolution import NAMED
 from jointlaw.support.progress import track
 
 Rule = Callable[..., Any]
-KEPT, NOW = Orientation.facets, nodes.inclinations
+KEPT, NOW = rings.facets, rings.inclinations
 CELLS = (1, 2, 3, 4, 6, 10, 16)
 RULES = ((1, 3), (1, 4), (2, 3), (2, 4), (3, 4), (4, 6), (6, 8))
 GRID = [(u, phi, n) for u, phi in ((1, 3), (2, 3), (2, 4), (3, 4), (4, 5), (4, 6), (6, 6), (6, 8))
@@ -40,14 +42,14 @@ GRID = [(u, phi, n) for u, phi in ((1, 3), (2, 3), (2, 4), (3, 4), (4, 5), (4, 6
 def placed(inclinations: Rule | None = None, depths: Rule | None = None,
            facets: Rule | None = None) -> Iterator[None]:  # fmt: skip
     """Other rules while the block runs."""
-    kept = nodes.inclinations, nodes.depth_nodes, Orientation.facets
-    nodes.inclinations = inclinations or kept[0]
-    nodes.depth_nodes = depths or kept[1]
-    Orientation.facets = facets or kept[2]
+    kept = rings.inclinations, tables.depth_nodes, laws.facets
+    rings.inclinations = inclinations or kept[0]
+    tables.depth_nodes = depths or kept[1]
+    laws.facets = facets or kept[2]
     try:
         yield
     finally:
-        nodes.inclinations, nodes.depth_nodes, Orientation.facets = kept
+        rings.inclinations, tables.depth_nodes, laws.facets = kept
 
 
 # ------------------------------------------------------------------ inclinations: u and shares
@@ -120,14 +122,14 @@ INCLINATIONS: dict[str, Rule | None] = {
 }
 
 
-def staggered(self: Orientation, u: int, phi: int, *scene: Any) -> Facets:
+def staggered(orientation: jl.Orientation, u: int, phi: int, *scene: Any) -> Facets:
     """Every second ring of the whole circle turned by half a spacing."""
-    made = KEPT(self, u, phi, *scene)
+    made = KEPT(orientation, u, phi, *scene)
     count = 2 * phi
     shift = np.array([0.0, 0.5])[np.arange(u) % 2, None] * math.pi / phi
     turned = made.phi.reshape(u, count) - shift
-    P, U = turned.ravel(), np.cos(self.a * made.theta)
-    lean = 3 * self.c * (1 - U**2) / density(U, self.b)
+    P, U = turned.ravel(), np.cos(orientation.a * made.theta)
+    lean = 3 * orientation.c * (1 - U**2) / density(U, orientation.b)
     weight = made.weight * (1 + lean * np.cos(2 * P)) / (1 + lean * np.cos(2 * made.phi))
     ct, st, cp, sp = np.cos(made.theta), np.sin(made.theta), np.cos(P), np.sin(P)
     return Facets(made.theta, P, weight, np.array([ct, st * cp, st * sp]),

@@ -1,6 +1,7 @@
 """Rigid rock blocks in 2-D with a joint law: pymunk finds and moves, jointlaw pushes.
 
 The reference example of how to embed `jointlaw` in a block code; see docs/embed.md.
+Rooms, each using only those above it: scene, contact, dynamics, output, studies; then the commands.
 """
 
 from importlib import import_module
@@ -12,11 +13,9 @@ except ImportError as error:  # `python -m` tells it in one line if it is about 
     needs = f"the block demo lacks a package ({error}): pip install 'jointlaw[demo]'"
     raise ImportError(needs, name=__name__) from error
 
-from .coulomb import CoulombLaw
-from .interfaces import Refused
-from .run import run
-from .scene import Scene, load, parse
-from .simulation import Simulation
-from .tables import SceneError
+from .dynamics.simulation import Simulation
+from .errors import Refused, SceneError
+from .output.run import run
+from .scene import Scene, coulomb_law, load, parse
 
-__all__ = ["CoulombLaw", "Refused", "Scene", "SceneError", "Simulation", "load", "parse", "run"]
+__all__ = ["Refused", "Scene", "SceneError", "Simulation", "coulomb_law", "load", "parse", "run"]

@@ -1,8 +1,10 @@
-"""Tables in Markdown, and the places in the pages where they go."""
+"""Tables in the pages, the places where they go, and the CSV files in docs/data behind them."""
 
+import csv
 from pathlib import Path
 
 HERE = Path(__file__).parent
+DATA = HERE / "data"
 
 
 def table(head, rows):
@@ -25,6 +27,20 @@ def fill(page, key, text):
 def has(page, key):
     """Whether the page has these marks."""
     return f"<!-- {key} -->\n" in (HERE / page).read_text(encoding="utf-8")
+
+
+def load(path):
+    """Rows of a CSV file as dicts."""
+    with path.open(newline="", encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def save(path, rows):
+    """Write rows, dicts with the same keys, as CSV."""
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.DictWriter(stream, rows[0], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
 
 
 def _parts(page, key):

@@ -51,6 +51,7 @@ mathjax_path = MATHJAX.name
 html_show_sourcelink = False
 html_copy_source = False
 
+default_role = "code"  # single backticks in docstrings
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Index", "Out")}

@@ -174,7 +174,7 @@ class JointLaw:
     # ------------------------------------------------- stiffness and time step
 
     def max_stiffness(self, closure: ArrayLike) -> Any:
-        """Upper bound of |C| (Pa/m) while no facet's effective closure exceeds `closure` (m)."""
+        """Upper bound of `|C|` (Pa/m) while no facet's effective closure exceeds `closure` (m)."""
         k, p = self.tables, self.asperity
         _, slope = k.curve.force(self._within_reach(closure))
         per_facet = float(np.sum(k.area / k.c1))

@@ -8,6 +8,7 @@ displacement would compare their dilation, summed up over the slip, and not thei
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -57,16 +58,16 @@ def distance(critical_slip: float, closure_range: float) -> float:
     return _ENDLESS * closure_range
 
 
-def slip(law: Law, closure_range: float, stress: float) -> Slip:
-    """Shear at SHARES of the normal stress S/2 (Pa), in space along each of DIRECTIONS."""
+def slip(law: Law, closure_range: float, stress: float, shares: Sequence[float] = SHARES) -> Slip:
+    """Shear at `shares` of the normal stress S/2 (Pa), in space along each of DIRECTIONS."""
     dim, R, Dc = law.tables.dim, closure_range, law.tables.critical_slip
     unit, far = Dc if math.isfinite(Dc) else 10 * R, distance(Dc, R)
     places = np.geomspace(_FIRST * min(R, far), far, LEG)
     leg = np.diff(places, prepend=0.0)
     turn = np.radians(DIRECTIONS if dim == 3 else DIRECTIONS[:1])
     along = np.stack([np.cos(turn), np.sin(turn)], axis=-1)[:, : dim - 1]
-    along = np.tile(along, (len(SHARES), 1))
-    goal = stress * np.repeat(SHARES, len(turn))
+    along = np.tile(along, (len(shares), 1))
+    goal = stress * np.repeat(shares, len(turn))
     batch = law.joints(len(goal), ledger=False)
     seat = np.zeros((len(goal), dim))
     seat[:, 0] = law.closure(goal)

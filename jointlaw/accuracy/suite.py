@@ -24,8 +24,6 @@ constant stress are found once, at half the reference resolution, and are paths 
 then on, so that every resolution is asked the same.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """The coarsest law that is accurate enough."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 from typing import TypeVar

@@ -17,8 +17,7 @@ from ..parameters.resolution import NAMED, Resolution, resolve
 from ..support.checks import Array, whole
 from ..support.files import replace_file
 from ..support.progress import track
-from .plot import plot_prices
-from .price import Price, frontier
+from ..support.pyplot import pyplot, written
 from .suite import Law, Suite, errors, reference_resolution, scaled, standard_suite, tangents
 
 SPREAD = tuple(
@@ -27,6 +26,36 @@ SPREAD = tuple(
     for depth in (1, 2, 3, 4, 6, 10, 16)
 )
 _MEMORY = 100_000_000  # bytes of state that a timing may use; very fine laws get a smaller batch
+
+
+@dataclass(frozen=True)
+class Price:
+    """One resolution: errors are shares of the largest traction (or tangent) of each path.
+
+    `error`, `rms` (paths,): of the traction. `friction`, `dilation`: largest misses of the angles
+    (degrees) at constant normal stress, from 0.2 critical slips on. `tangent_rms`, `tangent_max`:
+    of the tangent, over all paths; it jumps between stick and slip, and the largest error is that
+    of a jump that comes one step early or late. `ns`, `ns_tangent`: nanoseconds per joint and
+    update without and with tangent, no ledger, least of several runs; NaN where nothing was timed.
+    `bytes`: per joint.
+    """
+
+    resolution: Resolution
+    sliders: int
+    error: Array
+    rms: Array
+    friction: float
+    dilation: float
+    tangent_rms: float
+    tangent_max: float
+    ns: float
+    ns_tangent: float
+    bytes: int
+
+    @property
+    def worst(self) -> float:
+        """Largest error of the traction on any path."""
+        return float(self.error.max())
 
 
 @dataclass(frozen=True)
@@ -45,7 +74,11 @@ class Tradeoff:
 
     def frontier(self) -> tuple[Price, ...]:
         """The prices that no other with as few sliders beats in its largest error."""
-        return frontier(self.rows)
+        best: list[Price] = []
+        for row in sorted(self.rows, key=lambda row: (row.sliders, row.worst)):
+            if not best or row.worst < best[-1].worst:
+                best.append(row)
+        return tuple(best)
 
     def __str__(self) -> str:
         lines = [
@@ -101,8 +134,48 @@ class Tradeoff:
         replace_file(Path(path), stream.getvalue().encode())
 
     def plot(self, path: str | Path | None = None) -> Any:
-        """The frontier as a matplotlib figure; with `path` it is written there and closed."""
-        return plot_prices(self.rows, self.uncertainty, self.joints, self.how, path)
+        """Largest error against sliders and, where it was timed, against time per update.
+
+        Needs matplotlib: extra `plot`. With `path` the figure is written there and closed.
+        """
+        timed = bool(self.joints)
+        size = (9.5, 4.6) if timed else (5.5, 4.6)
+        figure, axes = pyplot().subplots(
+            1, 1 + timed, figsize=size, layout="constrained", sharey=True, squeeze=False
+        )
+        best = self.frontier()
+        panels = [("sliders per joint", ["sliders"])]
+        if timed:
+            panels.append(("time per joint and update (ns)", ["ns", "ns_tangent"]))
+        for axis, (label, costs) in zip(axes[0], panels, strict=True):
+            for cost, color in zip(costs, ("C0", "C1"), strict=False):
+                x, y = [getattr(r, cost) for r in self.rows], [100 * r.worst for r in self.rows]
+                axis.loglog(x, y, ".", color=color, alpha=0.25, markeredgewidth=0)
+                x, y = [getattr(r, cost) for r in best], [100 * r.worst for r in best]
+                what = "traction and tangent" if cost == "ns_tangent" else "traction"
+                axis.loglog(x, y, "o-", color=color, ms=4, lw=1.2, label=what)
+            for name, resolution in NAMED.items():
+                for row in self.rows:
+                    if row.resolution == resolution:
+                        at = (getattr(row, costs[0]), 100 * row.worst)
+                        axis.plot(*at, "s", color="k", ms=6, mfc="none")
+                        axis.annotate(name, at, (0, 6), textcoords="offset points", fontsize=8,
+                                      ha="right" if name == "reference" else "left")  # fmt: skip
+            floor = 100 * float(self.uncertainty.max())
+            axis.axhline(floor, color="0.6", lw=1, ls=":")
+            axis.set_xlabel(label)
+            axis.grid(True, which="both", alpha=0.2)
+            for scale in (axis.xaxis, axis.yaxis):
+                scale.set_major_formatter(lambda value, _: f"{value:g}")
+        axes[0, 0].text(0.02, floor * 1.08, "uncertainty of the reference", fontsize=7, color="0.4",
+                        transform=axes[0, 0].get_yaxis_transform())  # fmt: skip
+        axes[0, 0].set_ylabel("largest error of the traction (% of the path's peak)")
+        low = min(floor, 100 * min(r.worst for r in self.rows))
+        axes[0, 0].set_ylim(0.7 * low, 150 * max(r.worst for r in self.rows))
+        if timed:
+            axes[0, 1].legend(title=f"{self.joints} joints, {self.how}", fontsize=8,
+                              title_fontsize=8)  # fmt: skip
+        return written(figure, path)
 
 
 def tradeoff(

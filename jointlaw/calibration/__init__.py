@@ -2,15 +2,12 @@
 
     datasets        closure tests in files: those of the package, in data/, and CSV files
     priors          what is known before: transforms, bounds, 95 % ranges
-    noise           how noisy a curve is, from its scatter
     forward         parameters to a law and its closure curve, and back
-    measured        closure and shear curves, and their misfit
-    problem         what is free, what is held, where to start
-    solve           least squares with priors and noise
-    estimate        parameters, intervals, predicted stresses and bands
-    identify        what the data fix and what they leave open
-    report, plot    the same in words, as a preset, and as a picture
-    fit             fit_closure, fit_shear, fit_curves, fit_many and their result
+    measured        closure and shear curves, their misfit, and their noise from its scatter
+    problem         what is free, what is held, where to start; least squares with priors
+    estimate        parameters, intervals, predicted stresses and bands; what the data leave open
+    fit             fit_closure, fit_shear, fit_curves, fit_many; their result in words,
+                    as a preset, and as a picture
     baselines       empirical closure laws to judge a fit by
     unloading       what friction explains of a measured loop
 

@@ -43,9 +43,8 @@ class Baseline:
 def fit_power_law(stress: ArrayLike, closure: ArrayLike) -> Baseline:
     """stress (Pa) = scale (closure + offset)^exponent through points (n,), n >= 4."""
 
-    def model(q: Array, x: Array) -> Array:
-        value: Array = np.exp(q[0] + np.exp(q[2]) * np.log(np.exp(q[1]) + x))
-        return value
+    def model(q: Array, x: Array) -> Any:
+        return np.exp(q[0] + np.exp(q[2]) * np.log(np.exp(q[1]) + x))
 
     starts = [(-n * np.log1p(o), np.log(o), np.log(n)) for o in (0.1, 0.5, 2.0) for n in (1.5, 4.0)]
     q, curve = _fitted(stress, closure, model, starts, [-60, -12, -4], [60, 8, 6])
@@ -58,12 +57,11 @@ def fit_power_law(stress: ArrayLike, closure: ArrayLike) -> Baseline:
 def fit_barton_bandis(stress: ArrayLike, closure: ArrayLike) -> Baseline:
     """The hyperbola of Barton and Bandis with a seating closure through points (n,), n >= 4."""
 
-    def model(q: Array, x: Array) -> Array:
+    def model(q: Array, x: Array) -> Any:
         offset = np.exp(q[1])
         largest = (1 + offset) * (1 + np.exp(q[2]))  # beyond the last point
         y = x + offset
-        value: Array = np.exp(q[0]) * y / (1 - y / largest)
-        return value
+        return np.exp(q[0]) * y / (1 - y / largest)
 
     starts = [(-2.0, np.log(o), np.log(v)) for o in (0.02, 0.2) for v in (0.05, 0.5, 5.0)]
     q, curve = _fitted(stress, closure, model, starts, [-60, -12, -12], [60, 8, 12])

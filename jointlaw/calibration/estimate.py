@@ -1,13 +1,13 @@
-"""What a solution says: parameters, their covariance and intervals, stresses and their bands."""
+"""What a solution says: parameters, intervals, bands, and what the data fix and leave open."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,11 +15,9 @@ from numpy.typing import ArrayLike
 from ..law import JointLaw
 from ..support.checks import Array
 from .forward import build, log_stress
-from .measured import ClosureCurve
-from .noise import Noise
+from .measured import ClosureCurve, Noise
 from .priors import transform_of
-from .problem import Problem
-from .solve import Solution, derivative
+from .problem import Problem, Solution, derivative, minimise
 
 # Standard error of ln(stress) per doubling of the stress beyond the data, from curves of other
 # laws: power laws of exponent 1.5 to 6 and Gaussian heights, lower half fitted, upper predicted
@@ -27,6 +25,29 @@ MODEL_ERROR = 0.03
 # The same per unit of `Estimate.wander`, from hyperbolas and logarithms (benchmarks/held_out.py)
 WANDER_ERROR = 6.0
 WANDERS = 1.5  # of the expected scatter: from this `Estimate.wander` on the law is not the rock
+PRIOR_SHARE = 0.05  # of the variance: up to here the data, not the priors, decide
+WIDEST = math.log(2) / 1.96  # standard error of a logarithm: a factor of 2 either way
+# What acts on a closure curve only as one factor: N lam K times a sum over the inclinations
+_ONE_FACTOR = ("asperity_density", "K", "lam", "mu", "a", "b", "c")
+
+
+class Profile(NamedTuple):
+    """Misfit against one parameter, all others free: closed where the data bound it.
+
+    `values` (n,) in SI units, `deviance` (n,) = rise of sum (r/sigma)^2 over its least value, `low`
+    and `high` the ends of the 95 % interval or None where it is open.
+    """
+
+    name: str
+    values: Array
+    deviance: Array
+    low: float | None
+    high: float | None
+
+    @property
+    def closed(self) -> bool:
+        """Whether the data bound the parameter on both sides."""
+        return self.low is not None and self.high is not None
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +105,7 @@ class Estimate:
     def covariance(self) -> Array:
         """Covariance (p, p) of the fitted parameters in SI units, in the order of `free`."""
         slope = [transform_of(name).slope(self.parameters[name]) for name in self.free]
-        result: Array = self.solution.covariance * np.outer(slope, slope)
-        return result
+        return self.solution.covariance * np.outer(slope, slope)
 
     @property
     def standard_error(self) -> dict[str, float]:
@@ -156,3 +176,84 @@ class Estimate:
                 "curves, counted from 1"
             )
         return closures[number - 1]
+
+    @property
+    def identifiable(self) -> tuple[str, ...]:
+        """Fitted parameters that the data fix: to a factor of 2, the priors all but silent."""
+        return tuple(name for name in self.free if name not in self.not_identifiable)
+
+    @cached_property
+    def not_identifiable(self) -> dict[str, str]:
+        """Parameters that these data do not fix, each with the reason."""
+        found: dict[str, str] = {}
+        errors = np.sqrt(np.diag(self.solution.covariance))
+        for (name, share), error in zip(self.prior_share.items(), errors, strict=True):
+            if share > PRIOR_SHARE:
+                found[name] = f"the priors supply {100 * share:.0f} % of its variance"
+            elif error > (WIDEST if transform_of(name).log else 0.5):
+                low, high = self.interval(name)
+                found[name] = f"the data leave it anywhere from {low:.3g} to {high:.3g}"
+        if len(self.problem.closures) == len(self.problem.curves):
+            stiff = next((n for n in ("asperity_density", "K") if n in self.free), None)
+            for name in _ONE_FACTOR:
+                if name not in self.free:
+                    other = f"the factor that {stiff} was fitted for" if stiff else "one factor"
+                    found[name] = f"held; acts on a closure curve only within {other}"
+            if "overlap" not in self.free:
+                found["overlap"] = (
+                    "held; a closure curve cannot tell it from alpha, beta and the seating closure"
+                )
+        for name in ("eta", "alpha", "beta", *_ONE_FACTOR, "overlap"):
+            if name not in self.free:
+                found.setdefault(name, "held, not fitted")
+        return found
+
+    def profile(self, name: str, points: int = 21, priors: bool = False) -> Profile:
+        """Profile likelihood of one fitted parameter.
+
+        With `priors` the priors of all parameters take part, as in the fit; without, the data
+        alone.
+        """
+        at, solution = self.index(name), self.solution
+        problem = self.problem if priors else replace(self.problem, priors={})
+        low, high = problem.bounds()
+        centre, sd = solution.x[at], float(np.sqrt(solution.covariance[at, at]))
+        reach = max(4 * sd, 0.5)
+        grid = np.linspace(max(low[at], centre - reach), min(high[at], centre + reach), points | 1)
+        misfit, sigma = np.empty(grid.size), problem.sigma(self.noise)
+        middle = int(np.argmin(np.abs(grid - centre)))
+        for side in (range(middle, grid.size), range(middle - 1, -1, -1)):
+            others = np.delete(solution.x, at)
+            for k in side:
+                misfit[k], others = _least_misfit(problem, sigma, at, float(grid[k]), others)
+        deviance = misfit - misfit.min()
+        best = int(np.argmin(deviance))
+        limit = solution.quantile(0.95) ** 2
+        back = transform_of(name).back
+
+        def crossing(side: range) -> float | None:
+            for i in side:
+                j = i + side.step
+                if deviance[j] > limit:
+                    part = (limit - deviance[i]) / (deviance[j] - deviance[i])
+                    return back(float(grid[i] + part * (grid[j] - grid[i])))
+            return None
+
+        values = np.array([back(float(x)) for x in grid])
+        down, up = crossing(range(best, 0, -1)), crossing(range(best, grid.size - 1))
+        return Profile(name, values, deviance, down, up)
+
+
+def _least_misfit(
+    problem: Problem, sigma: Array, at: int, value: float, others: Array
+) -> tuple[float, Array]:
+    """Least sum of squares with one parameter held at a value, and the others (p - 1,) there."""
+
+    def residuals(y: Array) -> Array:
+        return problem.residuals(np.insert(y, at, value), sigma)
+
+    if not others.size:
+        return float(np.sum(residuals(others) ** 2)), others
+    low, high = (np.delete(bound, at) for bound in problem.bounds())
+    found = minimise(residuals, others, low, high)
+    return 2 * float(found.cost), found.x

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,15 +13,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..law import JointLaw
+from ..support.files import replace_file
 from ..support.progress import track
+from ..support.pyplot import pyplot, written
 from .estimate import Estimate
-from .identify import Profile, profile, reasons
 from .measured import ClosureCurve, ShearCurve
-from .plot import Points, plot_fit
-from .priors import Ranges, Values
-from .problem import pose, starting_points
-from .report import preset, report
-from .solve import solve
+from .priors import Ranges, Values, transform_of
+from .problem import pose, solve, starting_points
+
+Points = tuple[ArrayLike, ArrayLike]  # stress (Pa) and closure (m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,23 +32,36 @@ class Fit(Estimate):
     in SI units.
     """
 
-    @cached_property
-    def identifiable(self) -> tuple[str, ...]:
-        """Fitted parameters that the data fix: to a factor of 2, the priors all but silent."""
-        return tuple(name for name in self.free if name not in self.not_identifiable)
-
-    @cached_property
-    def not_identifiable(self) -> dict[str, str]:
-        """Parameters that these data do not fix, each with the reason."""
-        return reasons(self)
-
-    def profile(self, name: str, points: int = 21, priors: bool = False) -> Profile:
-        """Profile likelihood of a fitted parameter: see `identify.Profile`."""
-        return profile(self, name, points, priors)
-
     def report(self) -> str:
         """The fit in words and a table (Markdown)."""
-        return report(self, self.not_identifiable)
+        lines = [
+            "# Fit of the joint law",
+            "",
+            "| parameter | value | 95 % interval | unit | from the priors | fixed by the data |",
+            "|---|---|---|---|---|---|",
+        ]
+        for name, share in self.prior_share.items():
+            low, high = self.interval(name)
+            lines.append(
+                f"| {name} | {self.parameters[name]:.4g} | {low:.3g} to {high:.3g} | "
+                f"{transform_of(name).unit} | {100 * share:.0f} % | "
+                f"{'no' if name in self.not_identifiable else 'yes'} |"
+            )
+        held = [name for name in self.parameters if name not in self.free]
+        lines += ["", "Held: " + ", ".join(f"{n} = {self.parameters[n]:.4g}" for n in held) + "."]
+        lines += ["", "Not identifiable from these data:", ""]
+        grouped: dict[str, list[str]] = {}
+        for name, reason in self.not_identifiable.items():
+            grouped.setdefault(reason, []).append(name)
+        lines += [f"- {', '.join(names)}: {reason}" for reason, names in grouped.items()]
+        for number, noise in enumerate(self.noise, 1):
+            text = f"Curve {number}: scatter {100 * noise.share:.2g} % of the stress"
+            if noise.absolute:
+                text += f" and {1e6 * noise.absolute:.2g} um of closure"
+            lines += ["", text + (" (given)." if noise.known else " (estimated).")]
+        for number, (seating, curve) in enumerate(self.problem.closures, 1):
+            lines += ["", *_curve(self, self.parameters[seating], curve, number)]
+        return "\n".join(lines) + "\n"
 
     def plot(self, path: str | Path | None = None, held_out: Points | None = None) -> Any:
         """Draw data, fit and bands (needs matplotlib: extra `plot`).
@@ -56,11 +69,40 @@ class Fit(Estimate):
         held_out: stress (Pa) and closure (m) of points of the first closure curve that were not
         fitted.
         """
-        return plot_fit(self, path, held_out)
+        curves = self.problem.curves
+        figure, axes = pyplot().subplots(
+            1, len(curves), figsize=(5.2 * len(curves) + 0.8, 4.4),
+            layout="constrained", squeeze=False,
+        )  # fmt: skip
+        closures = 0
+        for axis, curve in zip(axes[0], curves, strict=True):
+            if isinstance(curve, ClosureCurve):
+                closures += 1
+                _draw_closure(axis, self, curve, closures, held_out if closures == 1 else None)
+            else:
+                law = build_for_shear(self.parameters, self.problem.settings, curve.azimuth)
+                model = curve.predict(law)
+                axis.plot(1e6 * curve.shear, curve.shear_stress / 1e6, "o", ms=4, label="measured")
+                axis.plot(1e6 * curve.shear, model / 1e6, color="C1", label="law")
+                label = f"shear stress (MPa) at {curve.normal / 1e6:.3g} MPa"
+                axis.set(xlabel="shear displacement (µm)", ylabel=label)
+                axis.legend()
+        return written(figure, path)
 
     def to_toml(self, path: str | Path | None = None, title: str = "Fitted joint") -> str:
         """The law as a preset in TOML with what is known of its parameters; written to `path`."""
-        return preset(self, self.not_identifiable, title, path)
+        closures = len(self.problem.closures)
+        others = len(self.problem.curves) - closures
+        source = f"fitted by jointlaw to {closures} closure and {others} shear curves"
+        clean = title.replace("\\", "/").replace('"', "'")
+        left = ", ".join(self.not_identifiable)
+        text = self.law.to_toml() + (
+            f'\n[about]\ntitle = "{clean}"\nsource = "{source}"\n'
+            f'assumptions = "not identifiable from these data: {left}"\n'
+        )
+        if path is not None:
+            replace_file(Path(path), text.encode())
+        return text
 
 
 def fit_closure(
@@ -185,3 +227,51 @@ def fit_many(
     job = partial(fit_closure, **options)
     futures = [executor.submit(job, *curve) for curve in curves]
     return [future.result() for future in track(futures, "fits", len(futures))]
+
+
+def _curve(fit: Fit, seating: float, curve: ClosureCurve, number: int) -> list[str]:
+    """What a closure curve does fix: stress and stiffness along it."""
+    at = np.array([0.5, 1.0]) * curve.closure[-1]
+    low, high = fit.band(at, curve=number, measured=False)
+    lines = [
+        f"Closure curve {number} (seating closure {1e6 * seating:.3g} um):",
+        "",
+        "| closure (um) | stress (MPa) | 95 % band (MPa) | normal stiffness (GPa/m) |",
+        "|---|---|---|---|",
+    ]
+    for u, lo, hi in zip(at, low, high, strict=True):
+        stress = float(fit.predict(u, number))
+        step = 1e-4 * float(curve.closure[-1])
+        rise = float(fit.predict(u + step, number)) - float(fit.predict(u - step, number))
+        lines.append(
+            f"| {1e6 * u:.4g} | {stress / 1e6:.4g} | {lo / 1e6:.4g} to {hi / 1e6:.4g} | "
+            f"{rise / (2 * step) / 1e9:.4g} |"
+        )
+    if fit.bends_otherwise[number - 1]:
+        lines += [
+            "",
+            f"**This curve does not bend as the law does**: neighbouring points miss it together, "
+            f"by {100 * fit.wander[number - 1]:.2g} % of the stress. Between the points use it "
+            "with that error; beyond them trust neither the curve nor its band: a hyperbola (mated "
+            "joints) or a logarithm (unmated ones) may follow this rock better.",
+        ]
+    return lines
+
+
+def _draw_closure(
+    axis: Any, fit: Fit, curve: ClosureCurve, number: int, held_out: Points | None
+) -> None:
+    top = float(curve.closure[-1])
+    points = {"marker": "o", "ls": "none", "color": "C0", "zorder": 3}
+    if held_out is not None:
+        stress, closure = (np.asarray(x, float) for x in held_out)
+        top = float(closure[-1])
+        label = "measured, not fitted"
+        axis.plot(1e6 * closure, stress / 1e6, mfc="none", ms=5, label=label, **points)
+    u = np.linspace(float(curve.closure[0]), 1.03 * top, 120)
+    low, high = fit.band(u, curve=number)
+    axis.fill_between(1e6 * u, low / 1e6, high / 1e6, color="C1", alpha=0.25, label="95 % band")
+    axis.plot(1e6 * u, fit.predict(u, number) / 1e6, color="C1", label="law")
+    axis.plot(1e6 * curve.closure, curve.stress / 1e6, ms=4, label="measured", **points)
+    axis.set(xlabel="closure since the test began (µm)", ylabel="normal stress (MPa)")
+    axis.legend(loc="upper left")

@@ -1,7 +1,5 @@
 """The forward model: parameters by name to a law and to its closure curve, and a law to them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -99,8 +97,7 @@ def log_stress(values: Values, closure: Array, settings: Settings) -> Array:
     names = ("a", "b", "c", "lam", "eta", "mu")
     factor = _facet_factor(*(values[name] for name in names), settings.resolution)
     scale = values["asperity_density"] * values["lam"] * values["K"] * factor
-    result: Array = math.log(scale) + np.log(np.maximum(force, 1e-300))
-    return result
+    return math.log(scale) + np.log(np.maximum(force, 1e-300))
 
 
 def _heights(v: Values, settings: Settings) -> GammaHeights | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,12 +12,32 @@ from ..laboratory.experiments import direct_shear
 from ..law import JointLaw
 from ..support.checks import Array, above, at_least, number
 from .forward import Settings, build_for_shear, log_stress
-from .noise import Noise
 from .priors import Values
 
 STRESS_NOISE = 0.01  # of the stress: a load cell with the friction of its loading frame
 CLOSURE_NOISE = 0.005  # of the largest closure: linearity and repeatability of a transducer
 SHEAR_NOISE = 0.02  # of the largest shear stress
+FACTOR = 4.0  # 95 % range of a level about the expected one, either way
+_SD = np.log(FACTOR) / 1.96
+_GRID = np.linspace(-3.2, 3.2, 33)
+
+
+class Noise(NamedTuple):
+    """How noisy a measured curve is: two levels, estimated from the scatter about the fit.
+
+    The variance of a residual is share^2 + (absolute * steepness)^2. `share` is the error of the
+    measured stress relative to its scale, `absolute` that of the closure (m), which `steepness`
+    (1/m) turns into one of stress; a curve without a steepness has the first alone. Levels that
+    are `known` are not estimated.
+    """
+
+    share: float
+    absolute: float = 0.0
+    known: bool = False
+
+    def sigma(self, steepness: Array) -> Array:
+        """Standard errors at points of this steepness."""
+        return np.hypot(self.share, self.absolute * steepness)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,8 +110,7 @@ class ClosureCurve:
 
     def residuals(self, values: Values, seating: float, settings: Settings) -> Array:
         """ln(model/measured), (n,)."""
-        residual: Array = log_stress(values, seating + self.closure, settings) - np.log(self.stress)
-        return residual
+        return log_stress(values, seating + self.closure, settings) - np.log(self.stress)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,8 +166,7 @@ class ShearCurve:
     def residuals(self, values: Values, settings: Settings) -> Array:
         """(model - measured)/largest measured, (n,)."""
         model = self.predict(build_for_shear(values, settings, self.azimuth))
-        residual: Array = (model - self.shear_stress) / np.max(np.abs(self.shear_stress))
-        return residual
+        return np.asarray((model - self.shear_stress) / np.max(np.abs(self.shear_stress)))
 
 
 def first_loading(stress: ArrayLike, closure: ArrayLike) -> tuple[Array, Array, Array, Array]:
@@ -191,3 +209,23 @@ def _steepness(closure: Array, stress: Array) -> Array:
     at = int(np.argmin([float(f[1][0]) if f[1].size else np.inf for f in fits]))
     slope: Array = float(fits[at][0][0]) / ((x + shifts[at]) * span)
     return np.abs(slope)
+
+
+def estimate_noise(expected: Noise, residual: Array, leverage: Array, steepness: Array) -> Noise:
+    """Levels that the residuals (n,) of a fit with these leverages (n,) make most likely.
+
+    Both have wide priors from what instruments do, because eight points cannot tell two levels by
+    themselves. Restricted likelihood: a point of leverage h has the residual variance
+    (1 - h) sigma^2.
+    """
+    if expected.known:
+        return expected
+    free = np.clip(1 - leverage, 0.02, 1.0)
+    steps = _GRID * _SD
+    share = (expected.share * np.exp(steps))[:, None, None]
+    absolute = (expected.absolute * np.exp(steps))[None, :, None]
+    variance = share**2 + (absolute * steepness) ** 2
+    loss = np.sum(free * np.log(variance) + residual**2 / variance, axis=-1)
+    loss = loss + _GRID[:, None] ** 2 + _GRID[None, :] ** 2
+    i, j = np.unravel_index(int(np.argmin(loss)), loss.shape)
+    return Noise(float(share[i, 0, 0]), float(absolute[0, j, 0]))

@@ -6,8 +6,6 @@ A range is a normal distribution of the transformed parameter (mostly its logari
 between the two ends, with 95 % between them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import NamedTuple

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.integrate import trapezoid  # numpy renamed its own between versions
 
 from ..law import JointLaw
 from ..parameters.resolution import NAMED
@@ -98,12 +99,7 @@ def _loss(stress: ArrayLike, closure: ArrayLike, low: float) -> tuple[float, flo
     """
     s_up, u_up, s_down, u_down = first_loading(stress, closure)
     up, down = _above(s_up, u_up, low), _above(s_down[::-1], u_down[::-1], low)
-    return 1 - _area(*down) / _area(*up), float(down[1][0] - up[1][0])
-
-
-def _area(stress: Array, closure: Array) -> float:
-    """Work per area, trapezoid rule (numpy renamed its own between versions)."""
-    return float(np.sum(0.5 * (stress[1:] + stress[:-1]) * np.diff(closure)))
+    return 1 - float(trapezoid(*down) / trapezoid(*up)), float(down[1][0] - up[1][0])
 
 
 def _above(stress: Array, closure: Array, low: float) -> tuple[Array, Array]:

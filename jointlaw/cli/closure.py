@@ -1,7 +1,5 @@
 """`jointlaw closure`: a closure test on one joint."""
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import replace
 from functools import partial
@@ -13,13 +11,14 @@ from ..laboratory.experiments import closure_test
 from .command import add_command, add_test_options, quantity, read_law, run_test
 
 
-def add_closure_command(commands: Any) -> None:
+def add(commands: Any) -> None:
     """Add the subcommand to the command line."""
     parser = add_command(
         commands,
         "closure",
         "closure test: load the joint to a normal stress and unload it",
         "jointlaw closure westerly-smooth --normal-stress 20MPa --out out",
+        _closure,
     )
     parser.add_argument(
         "--normal-stress",
@@ -29,10 +28,9 @@ def add_closure_command(commands: Any) -> None:
     )
     parser.add_argument("--no-unload", action="store_true", help="stop at the largest stress")
     add_test_options(parser, steps=100)
-    parser.set_defaults(run=_closure)
 
 
-def _closure(options: argparse.Namespace) -> int:
+def _closure(options: argparse.Namespace) -> None:
     law = read_law(options)
     stresses = [
         quantity("--normal-stress", s, "Pa", positive=True)
@@ -41,11 +39,8 @@ def _closure(options: argparse.Namespace) -> int:
     joint = replace(law, plane=None, closure_only=True).joint()  # the same numbers, sooner
     test = partial(closure_test, joint, stresses, unload=not options.no_unload, steps=options.steps)
     record = run_test(test, law, options)
-    if record is None:
-        return 1
     at = int(np.argmax(record.F1))
     print(
         f"closure {record.closure[at]:.4g} m at {record.F1[at]:.4g} Pa, "
         f"{record.dissipated[-1]:.3g} J/m2 lost to friction"
     )
-    return 0

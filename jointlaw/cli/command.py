@@ -1,7 +1,5 @@
 """What the subcommands of `jointlaw` share: help with a worked example, options, results."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Callable, Mapping
@@ -22,8 +20,17 @@ VERSION = 1  # of summary.json
 Written = Mapping[str, str | Callable[[Path], object]]
 
 
-def add_command(commands: Any, name: str, what: str, example: str) -> argparse.ArgumentParser:
-    """Add a subcommand with its one-line purpose and an example that runs as printed."""
+def add_command(
+    commands: Any,
+    name: str,
+    what: str,
+    example: str,
+    run: Callable[[argparse.Namespace], int | None],
+) -> argparse.ArgumentParser:
+    """Add a subcommand with its one-line purpose and an example that runs as printed.
+
+    run: what the command does with its options; returns the exit status, None for success.
+    """
     parser: argparse.ArgumentParser = commands.add_parser(
         name,
         help=what,
@@ -31,6 +38,7 @@ def add_command(commands: Any, name: str, what: str, example: str) -> argparse.A
         epilog=f"example:\n  {example}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.set_defaults(run=run)
     return parser
 
 
@@ -96,17 +104,14 @@ def add_test_options(parser: argparse.ArgumentParser, steps: int) -> None:
     add_out(parser)
 
 
-def run_test(
-    test: Callable[[], Record], law: JointLaw, options: argparse.Namespace
-) -> Record | None:
-    """Run a laboratory test and write its record; None if it stopped early."""
+def run_test(test: Callable[[], Record], law: JointLaw, options: argparse.Namespace) -> Record:
+    """Run a laboratory test and write its record, also that of a test that stopped early."""
     try:
         record = test()
     except PathError as error:
-        print(f"jointlaw {options.command}: {error}", file=sys.stderr)
         if len(error.record):
             _write(error.record, law, options)
-        return None
+        raise
     _write(record, law, options)
     return record
 

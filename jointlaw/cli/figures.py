@@ -1,17 +1,15 @@
 """The command `jointlaw figures`: the paper's figures, and the table of its claims."""
 
-from __future__ import annotations
-
 import argparse
 from typing import Any
 
 from .command import add_command, add_out
 
 
-def add_figures_command(subparsers: Any) -> None:
+def add(subparsers: Any) -> None:
     """Add `figures` to the subcommands, with `run`, a function of the options, as its default."""
     what = "regenerate the figures of Misra 1999, or print the table of its claims with our numbers"
-    parser = add_command(subparsers, "figures", what, "jointlaw figures 14 15 --out out")
+    parser = add_command(subparsers, "figures", what, "jointlaw figures 14 15 --out out", _figures)
     parser.add_argument("numbers", metavar="N", nargs="*", type=int, help="figures (default: all)")
     add_out(parser, required=False)
     parser.add_argument(
@@ -20,19 +18,17 @@ def add_figures_command(subparsers: Any) -> None:
         nargs="*",
         help="print the claims table instead: all claims, or those of these keys",
     )
-    parser.set_defaults(run=_figures)
 
 
-def _figures(options: argparse.Namespace) -> int:
+def _figures(options: argparse.Namespace) -> None:
     from ..paper.contents import claims_table, write_figures  # numbers are computed on demand only
 
     if options.claims is not None:
         if options.numbers or options.out:
             raise ValueError("--claims prints a table: give neither figures nor --out with it")
         print(claims_table(options.claims))
-        return 0
-    if options.out is None:
+    elif options.out is None:
         raise ValueError("--out is missing: name the folder for the figures")
-    files = write_figures(options.out, options.numbers)
-    print(f"wrote {len(files)} files to {options.out}")
-    return 0
+    else:
+        files = write_figures(options.out, options.numbers)
+        print(f"wrote {len(files)} files to {options.out}")

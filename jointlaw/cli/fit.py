@@ -1,7 +1,5 @@
 """`jointlaw fit`: measured closure curves to laws, with report, plot and held-out errors."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from functools import partial
@@ -19,11 +17,11 @@ from ..support import units
 from .command import Written, add_command, add_out, write_results
 
 
-def add_fit_command(commands: Any) -> None:
+def add(commands: Any) -> None:
     """Add `fit` to the subparsers of the command line."""
     what = "fit the law to measured closure curves; write preset, report and plot"
     example = "jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out out"
-    parser = add_command(commands, "fit", what, example)
+    parser = add_command(commands, "fit", what, example, _run)
     parser.description = (
         f"{what}. Only the first loading is fitted; an unloading branch is compared with what "
         "friction explains."
@@ -48,10 +46,9 @@ def add_fit_command(commands: Any) -> None:
     parser.add_argument("--noise", type=float, help="known error of the stress, such as 0.01")
     parser.add_argument("--workers", type=int, help="processes for several files")
     add_out(parser)
-    parser.set_defaults(run=_run)
 
 
-def _run(options: argparse.Namespace) -> int:
+def _run(options: argparse.Namespace) -> None:
     folders = _folders(options)
     tests = [_read(options, item) for item in options.data]
     keywords = _keywords(options)
@@ -66,7 +63,6 @@ def _run(options: argparse.Namespace) -> int:
         (stress, closure), limit = loading[k], limits[k]
         held = compare(stress, closure, limit, **keywords) if (stress > limit).any() else None
         _write(folders[k], Path(options.data[k]).name, fit, tests[k], held)
-    return 0
 
 
 def _folders(options: argparse.Namespace) -> list[Path]:

@@ -1,34 +1,15 @@
 """The command line `jointlaw`."""
 
-from __future__ import annotations
-
 import argparse
 import re
 import sys
 from collections.abc import Sequence
 
+from ..laboratory.experiments import PathError
 from ..support.version import __version__
-from .closure import add_closure_command
-from .export import add_export_command
-from .figures import add_figures_command
-from .fit import add_fit_command
-from .presets import add_presets_command
-from .replay import add_replay_command
-from .scan import add_scan_command
-from .shear import add_shear_command
-from .tradeoff import add_tradeoff_command
+from . import closure, export, figures, fit, presets, replay, scan, shear, tradeoff
 
-COMMANDS = (
-    add_shear_command,
-    add_closure_command,
-    add_presets_command,
-    add_replay_command,
-    add_figures_command,
-    add_export_command,
-    add_fit_command,
-    add_scan_command,
-    add_tradeoff_command,
-)
+COMMANDS = (shear, closure, presets, replay, figures, export, fit, scan, tradeoff)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -40,14 +21,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--version", action="version", version=f"jointlaw {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for add in COMMANDS:
-        add(commands)
+    for command in COMMANDS:
+        command.add(commands)
     options = parser.parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
     try:
-        return int(options.run(options))
-    except (ValueError, ImportError, OSError) as error:
+        return int(options.run(options) or 0)
+    except (PathError, ValueError, ImportError, OSError) as error:
         print(f"jointlaw {options.command}: {error}", file=sys.stderr)
-        return 2
+        return 1 if isinstance(error, PathError) else 2
 
 
 def _joined(arguments: Sequence[str]) -> list[str]:

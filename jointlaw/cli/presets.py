@@ -1,7 +1,5 @@
 """`jointlaw presets`: the parameter sets of the paper."""
 
-from __future__ import annotations
-
 import argparse
 from typing import Any
 
@@ -9,22 +7,21 @@ from .. import presets
 from .command import add_command
 
 
-def add_presets_command(commands: Any) -> None:
+def add(commands: Any) -> None:
     """Add the subcommand to the command line."""
     parser = add_command(
         commands,
         "presets",
         "list the parameter sets of the paper, or print one as TOML to start a file of your own",
         "jointlaw presets biegel-rough > mine.toml",
+        _presets,
     )
     parser.add_argument("name", nargs="?", help="print this one")
-    parser.set_defaults(run=_presets)
 
 
-def _presets(options: argparse.Namespace) -> int:
+def _presets(options: argparse.Namespace) -> None:
     if options.name:
         print(presets.text(options.name), end="")
-        return 0
-    for name in presets.names():
-        print(f"{name:16s} {presets.about(name)['title']}")
-    return 0
+    else:
+        for name in presets.names():
+            print(f"{name:16s} {presets.about(name)['title']}")

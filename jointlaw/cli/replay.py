@@ -1,7 +1,5 @@
 """`jointlaw replay`: the step again that failed."""
 
-from __future__ import annotations
-
 import argparse
 from typing import Any
 
@@ -11,16 +9,16 @@ from ..law import JointLaw
 from .command import add_command
 
 
-def add_replay_command(commands: Any) -> None:
+def add(commands: Any) -> None:
     """Add the subcommand to the command line."""
     parser = add_command(
         commands,
         "replay",
         "run the step again that a NonFiniteError left in a file",
         "jointlaw replay jointlaw-replay-4711-1.npz",
+        _replay,
     )
     parser.add_argument("file", help="the file that the error named")
-    parser.set_defaults(run=_replay)
 
 
 def _replay(options: argparse.Namespace) -> int:

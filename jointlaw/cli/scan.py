@@ -1,7 +1,5 @@
 """`jointlaw scan`: a scanned surface to orientation and heights, with report and picture."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import Any
@@ -13,21 +11,20 @@ from ..surface.scan_files import read_scan
 from .command import Written, add_command, add_out, write_results
 
 
-def add_scan_command(commands: Any) -> None:
+def add(commands: Any) -> None:
     """Add `scan` to the subparsers of the command line."""
     what = "read heights, directions and number of asperities off a scanned surface"
     example = "jointlaw scan scan.csv --spacing 20um --height-unit um --out out"
-    parser = add_command(commands, "scan", what, example)
+    parser = add_command(commands, "scan", what, example, _run)
     parser.description = f"{what}. Give the composite surface of both sides, or a profile."
     parser.add_argument("file", help="CSV, NPY, or a format of SurfaceTopography (extra scan)")
     parser.add_argument("--spacing", help="of the points, such as 20um; needed for CSV and NPY")
     parser.add_argument("--height-unit", help="of CSV and NPY, such as um (default m)")
     parser.add_argument("--sampling-length", help="edge of a facet (default 4 spacings)")
     add_out(parser)
-    parser.set_defaults(run=_run)
 
 
-def _run(options: argparse.Namespace) -> int:
+def _run(options: argparse.Namespace) -> None:
     spacing = None if options.spacing is None else units.parse(options.spacing, "m")
     unit = options.height_unit
     factor = None if unit is None else units.parse(f"1{unit}", "m")
@@ -49,7 +46,6 @@ def _run(options: argparse.Namespace) -> int:
     toml = _toml(fit, Path(options.file).name)
     files: Written = {"scan.png": fit.plot, "surface.toml": toml, "report.md": text}
     write_results(options.out, files, summary)
-    return 0
 
 
 def _toml(fit: SurfaceFit, name: str) -> str:

@@ -1,7 +1,5 @@
 """`jointlaw shear`: a direct shear test on one joint."""
 
-from __future__ import annotations
-
 import argparse
 import math
 from functools import partial
@@ -11,13 +9,14 @@ from ..laboratory.experiments import CONTROLS, direct_shear
 from .command import add_command, add_test_options, quantity, read_law, run_test
 
 
-def add_shear_command(commands: Any) -> None:
+def add(commands: Any) -> None:
     """Add the subcommand to the command line."""
     parser = add_command(
         commands,
         "shear",
         "direct shear test: seat the joint at a normal stress, shear it, write curve and picture",
         "jointlaw shear biegel-rough --normal-stress 10MPa --to 2um --reverse -2um --out out",
+        _shear,
     )
     parser.add_argument(
         "--normal-stress", metavar="STRESS", default="10MPa", help="normal stress (default 10MPa)"
@@ -50,10 +49,9 @@ def add_shear_command(commands: Any) -> None:
         help="of the surroundings, for --control stiffness, such as 5GPa/m",
     )
     add_test_options(parser, steps=200)
-    parser.set_defaults(run=_shear)
 
 
-def _shear(options: argparse.Namespace) -> int:
+def _shear(options: argparse.Namespace) -> None:
     law = read_law(options)
     points = [quantity("--to", options.to, "m")]
     if options.reverse:
@@ -68,8 +66,6 @@ def _shear(options: argparse.Namespace) -> int:
     control, steps = options.control, options.steps
     test = partial(direct_shear, law.joint(), points, normal, control, azimuth, stiffness, steps)
     record = run_test(test, law, options)
-    if record is None:
-        return 1
     secant = record.secant_stiffness
     print(
         f"peak friction angle {record.peak_friction_angle:.2f} deg, at the end "
@@ -77,4 +73,3 @@ def _shear(options: argparse.Namespace) -> int:
         f"{record.dilation_angle:.2f} deg"
         + ("" if math.isnan(secant) else f", secant shear stiffness {secant:.4g} Pa/m")
     )
-    return 0

@@ -1,7 +1,5 @@
 """The command `jointlaw tradeoff`: what resolutions of a law cost and how accurate they are."""
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import replace
 from typing import Any
@@ -9,13 +7,14 @@ from typing import Any
 from .command import Written, add_command, add_law, add_out, quantity, read_law, write_results
 
 
-def add_tradeoff_command(commands: Any) -> None:
+def add(commands: Any) -> None:
     """Add `tradeoff` to the subparsers of the command line."""
     parser = add_command(
         commands,
         "tradeoff",
         "measure what resolutions of a law cost here and how accurate they are; table and picture",
         "jointlaw tradeoff westerly-smooth --plane 0 --out out",
+        _tradeoff,
     )
     add_law(parser, resolution=False)
     parser.add_argument(
@@ -32,10 +31,9 @@ def add_tradeoff_command(commands: Any) -> None:
         "--joints", type=int, default=10_000, help="of the batch that is timed; 0 times nothing"
     )
     add_out(parser)
-    parser.set_defaults(run=_tradeoff)
 
 
-def _tradeoff(options: argparse.Namespace) -> int:
+def _tradeoff(options: argparse.Namespace) -> None:
     law = read_law(options)
     if options.plane is not None:
         law = replace(law, plane=quantity("--plane", options.plane, "rad"))
@@ -67,4 +65,3 @@ def _tradeoff(options: argparse.Namespace) -> int:
         "tradeoff.png": found.plot,
     }
     write_results(options.out, files, summary)
-    return 0

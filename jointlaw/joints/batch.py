@@ -189,7 +189,7 @@ class JointBatch:
         return 8 * self._engine.rows
 
     def max_stiffness(self) -> Array:
-        """Upper bound (n,) of |C| in Pa/m at each joint's own reach, for explicit time steps."""
+        """Upper bound (n,) of `|C|` in Pa/m at each joint's own reach, for explicit time steps."""
         bound: Array = self.law.max_stiffness(self.measures().reach)
         return bound
 

@@ -1,7 +1,5 @@
 """The closure increment at which a normal condition holds: Newton's method kept in a bracket."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

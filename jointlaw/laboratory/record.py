@@ -14,7 +14,7 @@ import numpy as np
 
 from ..support.checks import Array
 from ..support.files import replace_file
-from .plot import plot_record
+from ..support.pyplot import pyplot, written
 
 UNITS = {
     "closure": "m",
@@ -28,6 +28,9 @@ UNITS = {
     "stored": "J/m2",
     "dissipated": "J/m2",
 }
+_LENGTHS = ((1e-9, "nm"), (1e-6, "µm"), (1e-3, "mm"), (1.0, "m"))
+_STRESSES = ((1.0, "Pa"), (1e3, "kPa"), (1e6, "MPa"), (1e9, "GPa"))
+_ENERGIES = ((1e-6, "µJ/m²"), (1e-3, "mJ/m²"), (1.0, "J/m²"), (1e3, "kJ/m²"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +83,7 @@ class Record:
 
     @property
     def dilation_angle(self) -> float:
-        """Largest dilation angle atan(-d closure/|d shear|) in degrees; 0 without dilation."""
+        """Largest dilation angle atan(opening/shear) of a step, in degrees; 0 without dilation."""
         slip = np.abs(np.diff(self.shear))
         opening = -np.diff(self.closure)
         moved = slip > 1e-9 * max(float(np.max(np.abs(self.shear))), 1e-300)
@@ -130,6 +133,53 @@ class Record:
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Draw the test (needs matplotlib: extra `plot`); returns the figure, saved to `path`."""
-        derived = ("shear", "shear_stress", "friction_angle")
-        curves = {**self.columns, **{name: getattr(self, name) for name in derived}}
-        return plot_record(curves, self.azimuth, path)
+        sheared = bool(np.any(self.shear != self.shear[0]))
+        return written(_shear_figure(self) if sheared else _closure_figure(self), path)
+
+
+def _scaled(values: Array, units: tuple[tuple[float, str], ...]) -> tuple[Array, str]:
+    """Values in the largest unit that leaves their peak at one or more."""
+    peak = float(np.max(np.abs(values)))
+    factor, name = next(((f, n) for f, n in reversed(units) if peak >= f), units[0])
+    return values / factor, name
+
+
+def _shear_figure(record: Record) -> Any:
+    shear, length = _scaled(record.shear, _LENGTHS)
+    figure, axes = pyplot().subplots(2, 2, figsize=(9, 6.5), layout="constrained", sharex=True)
+    stress, unit = _scaled(np.stack([record.shear_stress, record.F1]), _STRESSES)
+    axes[0, 0].plot(shear, stress[0], label="shear stress")
+    axes[0, 0].plot(shear, stress[1], "--", color="0.5", label="normal stress")
+    axes[0, 0].set_ylabel(f"stress ({unit})")
+    axes[0, 0].legend()
+    axes[0, 1].plot(shear, record.friction_angle, color="C3")
+    axes[0, 1].set_ylabel("mobilised friction angle (°)")
+    dilation, small = _scaled(record.closure[0] - record.closure, _LENGTHS)
+    axes[1, 0].plot(shear, dilation, color="C2")
+    axes[1, 0].set_ylabel(f"dilation ({small})")
+    axes[1, 1].plot(shear, 100 * record.sliding, label="sliding")
+    axes[1, 1].plot(shear, 100 * record.separated, label="separated")
+    axes[1, 1].set(ylabel="share of facet orientations (%)", ylim=(-3, 103))
+    axes[1, 1].legend(loc="upper center", bbox_to_anchor=(0.5, 1.12), ncols=2, frameon=False)
+    for axis in axes[1]:
+        axis.set_xlabel(f"shear displacement ({length})")
+    figure.suptitle(
+        f"Direct shear at azimuth {np.degrees(record.azimuth):.0f}°, "
+        f"peak friction angle {record.peak_friction_angle:.1f}°"
+    )
+    return figure
+
+
+def _closure_figure(record: Record) -> Any:
+    closure, length = _scaled(record.closure, _LENGTHS)
+    stress, unit = _scaled(record.F1, _STRESSES)
+    energy, joule = _scaled(np.stack([record.stored, record.dissipated]), _ENERGIES)
+    figure, axes = pyplot().subplots(1, 2, figsize=(9, 4), layout="constrained")
+    axes[0].plot(closure, stress)
+    axes[0].set(xlabel=f"closure ({length})", ylabel=f"normal stress ({unit})")
+    axes[1].plot(closure, energy[0], label="stored")
+    axes[1].plot(closure, energy[1], label="dissipated by friction")
+    axes[1].set(xlabel=f"closure ({length})", ylabel=f"energy ({joule})")
+    axes[1].legend()
+    figure.suptitle("Closure test")
+    return figure

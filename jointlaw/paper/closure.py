@@ -1,7 +1,5 @@
 """Sections 4.1 and 4.2, closure and initial shear stiffness: Figures 11 to 13."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -14,10 +12,9 @@ from scipy.optimize import brentq
 
 from ..law import JointLaw
 from ..support.checks import Array
-from .draw import LAW, TOTAL
 from .runs import gamma_heights, law, total_closure
 from .secant import secant
-from .section import Bound, Numbers, Section
+from .section import LAW, TOTAL, Bound, Numbers, Section
 from .surface import WESTERLY
 
 SECTION = Section()

@@ -1,7 +1,5 @@
 """Section 3.1, elastic stiffness: Table 1, Eq. 24 to 28, Figures 8 and 9."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -11,8 +9,7 @@ from scipy.optimize import brentq
 from ..support.checks import Array
 from . import quadrature
 from .closed_form import HasShape, Shape, elastic, hertz_mindlin_ratio, shear_stiffness
-from .draw import QUOTED
-from .section import Bound, Numbers, Section, largest, near, rounding
+from .section import QUOTED, Bound, Numbers, Section, largest, near, rounding
 
 SECTION = Section()
 
@@ -154,8 +151,11 @@ def ratio_above_one() -> Numbers:
     misprint=[rounding("none", 1.0), rounding("half", 2 / 3), rounding("quartz", 1.4 / 1.7)],
 )
 def hertz_mindlin() -> Numbers:
-    names = {"none": 0.0, "quartz": 0.3, "half": 0.5}
-    return {name: hertz_mindlin_ratio(nu) for name, nu in names.items()}
+    return {
+        "none": hertz_mindlin_ratio(0.0),
+        "quartz": hertz_mindlin_ratio(0.3),
+        "half": hertz_mindlin_ratio(0.5),
+    }
 
 
 @SECTION.claim(

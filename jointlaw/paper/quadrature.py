@@ -4,8 +4,6 @@ Shares no code with `closed_form`: Gauss-Legendre in theta and equal azimuths ov
 Eq. 14, and the tensors of Eq. 24, 26 and 29 contracted as they stand.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import NamedTuple
@@ -50,8 +48,7 @@ def directions(
 def elastic(a: float, b: float, c: float, kn: float, ks: float) -> Array:
     """Eq. 26 with the stiffness of Eq. 24: the tensor C^e/N, shape (3, 3)."""
     n, s, t, weight = directions(a, b, c)
-    result: Array = np.einsum("ijab,ab->ij", _stiffness(n, s, t, kn, ks), weight)
-    return result
+    return np.asarray(np.einsum("ijab,ab->ij", _stiffness(n, s, t, kn, ks), weight))
 
 
 def inelastic(a: float, b: float, c: float, kn: float, ks: float, mu: float) -> Array:
@@ -64,16 +61,14 @@ def inelastic(a: float, b: float, c: float, kn: float, ks: float, mu: float) -> 
     q = s + mu * n
     M = 1 / np.einsum("ijab,jab,iab->ab", K, s, q)
     K_zeta, q_K = np.einsum("ikab,kab->iab", K, s), np.einsum("mjab,mab->jab", K, q)
-    result: Array = np.einsum("ab,iab,jab,ab->ij", M, K_zeta, q_K, weight)
-    return result
+    return np.asarray(np.einsum("ab,iab,jab,ab->ij", M, K_zeta, q_K, weight))
 
 
 def _stiffness(n: Array, s: Array, t: Array, kn: float, ks: float) -> Array:
     """K_ij of every direction, Eq. 24."""
     pair = "iab,jab->ijab"
-    result: Array = kn * np.einsum(pair, n, n)
-    result = result + ks * (np.einsum(pair, s, s) + np.einsum(pair, t, t))
-    return result
+    normal, shear = np.einsum(pair, n, n), np.einsum(pair, s, s) + np.einsum(pair, t, t)
+    return np.asarray(kn * normal + ks * shear)
 
 
 def random_shapes(count: int) -> list[Orientation]:

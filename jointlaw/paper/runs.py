@@ -78,10 +78,9 @@ def incremental(
     Keeps the normal stress `normal` (Pa), or, if a `closure` (m) is given, that closure.
     """
     found = law(name)
-    if closure:
-        stress = float(found.normal_stress(closure))
-        return direct_shear(found.joint(), to, stress, "closure", azimuth, steps=200)
-    return direct_shear(found.joint(), to, normal, "stress", azimuth, steps=200)
+    stress = float(found.normal_stress(closure)) if closure else normal
+    control = "closure" if closure else "stress"
+    return direct_shear(found.joint(), to, stress, control, azimuth, steps=200)
 
 
 @cache
@@ -102,8 +101,7 @@ def total(
 
 def ratio(test: Record | TotalShear) -> Array:
     """Shear resistance over normal stress of a test (rows,)."""
-    result: Array = test.shear_stress / test.F1
-    return result
+    return test.shear_stress / test.F1
 
 
 def resistance(
@@ -177,8 +175,7 @@ def total_closure(law: JointLaw, closure: Sequence[float] | Array) -> Array:
     size = np.asarray(closure, float)
     unit = replace(law, heights=None, closure_range=1.0)
     f1 = secant(unit, (1.0, 0.0, 0.0)).F[0]
-    stress: Array = f1 * touching(law, size) * size ** (1 + law.asperity.eta)
-    return stress
+    return np.asarray(f1 * touching(law, size) * size ** (1 + law.asperity.eta))
 
 
 def _size(law: JointLaw, cos: float, f1: float, normal: float) -> float | None:

@@ -106,11 +106,9 @@ def shear_factor(x: ArrayLike, eta: float, contact: str = "exact") -> Array:
     """
     x = np.asarray(x, float)
     if contact == "series":
-        factor: Array = (1 + eta) * (1 - eta / 2 * x - eta * (1 - eta) / 6 * x**2)
-        return factor
+        return (1 + eta) * (1 - eta / 2 * x - eta * (1 - eta) / 6 * x**2)
     inside = np.clip(x, 1e-12, 1 - 1e-16)
-    exact: Array = -np.expm1((1 + eta) * np.log1p(-inside)) / inside
-    return exact
+    return np.asarray(-np.expm1((1 + eta) * np.log1p(-inside)) / inside)
 
 
 def series_limit(eta: float) -> float:

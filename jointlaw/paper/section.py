@@ -1,7 +1,5 @@
 """What a section of the paper holds: its figures, and its claims with the verdict on each."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -12,6 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 Numbers = dict[str, float]
+FORMS = ("total", "law")
+TOTAL, LAW = "total form (as printed)", "incremental law (this package)"
+QUOTED = {"alpha": 0.16, "lw": 0}  # style of a range that the paper's text quotes
 
 
 class Bound(NamedTuple):
@@ -28,8 +29,9 @@ class Bound(NamedTuple):
 
     def holds(self, numbers: Numbers) -> bool:
         """Whether the number is inside; NaN is not."""
-        ends = (self.least, self.most)
-        least, most = (numbers[end] if isinstance(end, str) else end for end in ends)
+        least, most = (
+            numbers[end] if isinstance(end, str) else end for end in (self.least, self.most)
+        )
         return least < numbers[self.number] < most
 
 

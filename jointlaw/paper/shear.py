@@ -1,23 +1,19 @@
 """Section 4.3, shear at a kept closure of 1 um: Figures 14 to 16."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
-from .draw import LAW, TOTAL
 from .runs import first_sliding, incremental, law, ratio, resistance, total
 from .secant import secant
-from .section import Bound, Numbers, Section, near, rounding
+from .section import FORMS, LAW, TOTAL, Bound, Numbers, Section, near, rounding
 
 SECTION = Section()
 CLOSURE, TO = 1e-6, 4e-6  # m; the closure is printed, the end of the axis is not
 AXIS = "shear displacement δ₂ (µm)"
 FRICTION = 0.6
-FORMS = ("total", "law")
 
 
 @SECTION.figure(

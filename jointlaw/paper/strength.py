@@ -1,7 +1,5 @@
 """Sections 4.3 and 5, shear at a kept normal stress and friction angles: Figures 17 to 19."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache
@@ -14,7 +12,6 @@ from ..parameters.heights import GammaHeights
 from ..parameters.resolution import Resolution
 from .closed_form import inclination
 from .closure import mirrored
-from .draw import LAW, QUOTED, TOTAL
 from .runs import (
     first_sliding,
     gamma_heights,
@@ -26,13 +23,12 @@ from .runs import (
     total,
     total_shear,
 )
-from .section import Bound, Numbers, Section
+from .section import FORMS, LAW, QUOTED, TOTAL, Bound, Numbers, Section
 
 SECTION = Section()
 BIEGEL = (("biegel-smooth", "smooth", "C0"), ("biegel-rough", "rough", "C1"))
 SMOOTH, ROUGH, REPLICA = "biegel-smooth", "biegel-rough", "jing-replica"
 NORMAL, TO = 10e6, 1.5e-6  # Pa, printed; m, not printed
-FORMS = ("total", "law")
 
 
 # ------------------------------------------------------------------------- granite at 10 MPa
@@ -60,8 +56,13 @@ def figure_17(left: Any, right: Any) -> None:
         circle = {"color": color, "label": f"{label}: all in touch slide"}
         right.plot(ours.shear[row : row + 1] * 1e6, ratio(ours)[row : row + 1], "o", **circle)
     for axes, title in ((left, TOTAL), (right, LAW)):
-        axes.set(title=title, xlabel="shear displacement δ₂ (µm)", ylabel="F₂/F₁")
-        axes.set(xlim=(0.0, TO * 1e6), ylim=(0.0, 0.85))
+        axes.set(
+            title=title,
+            xlabel="shear displacement δ₂ (µm)",
+            ylabel="F₂/F₁",
+            xlim=(0.0, TO * 1e6),
+            ylim=(0.0, 0.85),
+        )
 
 
 @SECTION.claim(
@@ -277,8 +278,13 @@ def figure_19(*panels: Any) -> None:
             axes.plot(x, fixed, "s--", color=color, label=f"slip of 1 mm, {degrees}°")
         label = "normal stress 0, any slip"
         axes.axhspan(limit - 0.3, limit + 0.3, color="C7", label=label, **QUOTED)
-        axes.set(title=kind, xlabel="normal stress (MPa)", ylabel="friction angle (°)")
-        axes.set(xscale="log", ylim=(0.0, 65.0))
+        axes.set(
+            title=kind,
+            xlabel="normal stress (MPa)",
+            ylabel="friction angle (°)",
+            xscale="log",
+            ylim=(0.0, 65.0),
+        )
         axes.set_xticks(x, [f"{stress:g}" for stress in x])
         axes.minorticks_off()
 

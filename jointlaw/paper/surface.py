@@ -1,7 +1,5 @@
 """Section 2, surface geometry: heights (Eq. 11-13) and orientations (Eq. 14-18), Figures 3 to 7."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -137,8 +135,11 @@ def figure_4(side: Any, plan: Any) -> None:
         (plan, (0.55, -0.3), "azimuth turns from 2 to 3", "0.2"),
     ):
         axes.text(*where, text, fontsize=8, color=color, ha="center")
-    side.set(title="section along the azimuth of the asperity", xlabel="along the interface")
-    side.set_ylabel("axis 1 (downwards)")
+    side.set(
+        title="section along the azimuth of the asperity",
+        xlabel="along the interface",
+        ylabel="axis 1 (downwards)",
+    )
     plan.set(title="plan of the interface, seen along axis 1", xlabel="axis 2", ylabel="axis 3")
     for axes in (side, plan):
         axes.set(xlim=(-1.8, 1.8), ylim=(-1.4, 1.4), aspect="equal")
@@ -303,11 +304,10 @@ def _boundary(scale: float = 1.0) -> list[tuple[float, float]]:
 )
 def smooth_limit() -> Numbers:
     mean, variance = inclination(Shape(1e4))
-    far, _ = inclination(Shape(math.inf))
     return {
         "mean": math.degrees(mean),
         "spread": math.degrees(math.sqrt(variance)),
-        "at_infinity": math.degrees(far),
+        "at_infinity": math.degrees(inclination(Shape(math.inf))[0]),
     }
 
 

@@ -43,7 +43,7 @@ class Orientation:
     ----------
     a: extent of the inclinations, theta <= pi/(2a); a >= 1 (dimensionless). Large a is smooth.
     b: shape within that extent, -1 <= b <= 2; b = 2 crowds the contacts towards the joint normal.
-    c: azimuthal anisotropy, |c| <= 1/3 - b/6; c > 0 makes axis 2 (azimuth 0) the stiffer direction.
+    c: azimuthal anisotropy, within +-(1/3 - b/6); c > 0 makes axis 2 (azimuth 0) the stiffer.
 
     Raises ValueError when a bound of Eq. 18 is broken.
     """

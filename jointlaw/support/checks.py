@@ -1,7 +1,5 @@
 """Checks on numbers that come from outside: each error names parameter, value, bound and remedy."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, TypeVar
 

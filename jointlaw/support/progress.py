@@ -1,7 +1,5 @@
 """A progress bar on a terminal for work longer than two seconds; silent in a pipe."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import TypeVar
 

@@ -1,7 +1,6 @@
 """matplotlib, where it is installed (extra `plot`)."""
 
-from __future__ import annotations
-
+from pathlib import Path
 from typing import Any
 
 
@@ -12,3 +11,11 @@ def pyplot() -> Any:
     except ImportError as error:
         raise ImportError("pictures need matplotlib: pip install 'jointlaw[plot]'") from error
     return pyplot
+
+
+def written(figure: Any, path: str | Path | None) -> Any:
+    """The figure; with `path` it is written there and closed."""
+    if path is not None:
+        figure.savefig(path, dpi=150)
+        pyplot().close(figure)
+    return figure

@@ -1,7 +1,5 @@
 """Quantities as people write them: 10MPa, 2um, 30deg, 5GPa/m; a bare number is SI."""
 
-from __future__ import annotations
-
 import math
 import re
 

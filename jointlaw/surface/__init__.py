@@ -3,11 +3,9 @@
     scan_files      files of heights: CSV, NPY, profilometers
     synthetic       surfaces whose asperities are known, to try a scan on
     asperities      summits and facets of a surface
-    height_fit      a gamma distribution through summit depths
-    direction_fit   Eq. 14 through facet slopes
+    densities       gamma heights through summit depths, Eq. 14 through facet slopes
     estimate        parameters with errors, and what the scan leaves open
-    report, plot    the same in words and as a picture
-    fit             from_surface and its result, which gives a law
+    fit             from_surface and its result: a law, words and a picture
 
 Each file imports from those above it only.
 """

@@ -1,7 +1,5 @@
 """Asperities of a scanned surface: summits, and the facets that fall away from them."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from typing import NamedTuple
 
@@ -126,8 +124,7 @@ def _levelled(z: Array) -> Array:
     """Heights above the mean plane."""
     axes = [np.linspace(-1.0, 1.0, n) for n in z.shape]
     grid = np.meshgrid(*axes, indexing="ij")
-    level = z - z.mean()
+    level: Array = z - z.mean()
     for g in grid:
         level = level - g * (np.sum(g * level) / np.sum(g * g))
-    levelled: Array = level
-    return levelled
+    return level

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..calibration.identify import WIDEST
+from ..calibration.estimate import WIDEST
 from ..parameters.heights import GammaHeights
 from ..parameters.orientation import Orientation
 from ..support.checks import Array
 from .asperities import Asperities
-from .direction_fit import DirectionFit
-from .height_fit import HeightFit
+from .densities import DirectionFit, HeightFit
 
 NOISY = 0.04  # error of a gradient over the median gradient, from which summits get misplaced
 

@@ -1,7 +1,5 @@
 """Scanned surfaces in files: CSV, NPY, and what the library SurfaceTopography reads."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from pathlib import Path
 from typing import Any

@@ -45,7 +45,9 @@ def synthetic_surface(
             y, x = np.meshgrid(place - off[0], place - off[1], indexing="ij")
             theta, phi = draw_directions(orientation, 4, rng)
             quadrant = (x < 0).astype(int) + 2 * (y < 0)
-            slope, azimuth = np.tan(theta)[quadrant], _folded(phi)[quadrant]
+            # the azimuth in the first quadrant that has the same cos 2 phi
+            folded = np.arctan2(np.abs(np.sin(phi)), np.abs(np.cos(phi)))
+            slope, azimuth = np.tan(theta)[quadrant], folded[quadrant]
             fall = slope * (np.abs(x) * np.cos(azimuth) + np.abs(y) * np.sin(azimuth))
             block = -depth[i, j] - spacing * fall
             z[i * samples : (i + 1) * samples, j * samples : (j + 1) * samples] = block
@@ -66,9 +68,3 @@ def draw_directions(
         keep = rng.uniform(size=ut.size) * highest < density
         u, phi = np.concatenate([u, ut[keep]]), np.concatenate([phi, pt[keep]])
     return np.arccos(u[:n]) / orientation.a, phi[:n]
-
-
-def _folded(phi: Array) -> Array:
-    """The azimuth in the first quadrant that has the same cos 2 phi."""
-    folded: Array = np.arctan2(np.abs(np.sin(phi)), np.abs(np.cos(phi)))
-    return folded

@@ -1,8 +1,6 @@
 """Joint tables: the virgin response of a law against closure, for hosts that take no law.
 
-table       the table, its interpolation and its files
+table       the table, its interpolation, its files and its picture, and what it drops of the law
 tabulate    from a law to its table
 table_law   the law that a host runs from a table; a file of its own that hosts copy
-report      what a table drops: its error against the law, by path
-plot        picture of a table
 """

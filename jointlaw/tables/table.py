@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..law import JointLaw
-from ..support.checks import Array
+from ..support.checks import Array, whole
 from ..support.files import replace_file
-from .plot import plot_table
-from .report import Report, report
+from ..support.pyplot import pyplot, written
 from .table_law import MARKER, VERSION, TableLaw, around, between, read_table
 
 _BY_CLOSURE = ("un", "sn", "kn_secant", "kn_tangent", "mu")
@@ -35,6 +34,47 @@ class Row(NamedTuple):
     peak_friction: Any
     mobilised_friction: Any
     dilation: Any
+
+
+@dataclass(frozen=True)
+class PathDifference:
+    """Error of the table on one path, as shares of the law's largest traction on that path.
+
+    `largest`, `rms`: over all components; `normal`, `along`, `across`: the largest in the normal
+    traction, in the shear traction along the motion and in that across it. The normal part is what
+    the table drops of normal-shear coupling, the part across of the off-diagonal shear terms.
+    """
+
+    name: str
+    largest: float
+    rms: float
+    normal: float
+    along: float
+    across: float
+
+
+@dataclass(frozen=True)
+class Report:
+    """Errors of a table against its law, one row per path; print it to read it."""
+
+    rows: tuple[PathDifference, ...]
+
+    def __str__(self) -> str:
+        head = (
+            f"{'path':34s} {'largest':>8s} {'rms':>8s} {'normal':>8s} {'along':>8s} {'across':>8s}"
+        )
+        lines = [head]
+        for r in self.rows:
+            values = (r.largest, r.rms, r.normal, r.along, r.across)
+            lines.append(f"{r.name:34s} " + " ".join(f"{100 * v:6.1f} %" for v in values))
+        return "\n".join(lines)
+
+    def __getitem__(self, name: str) -> PathDifference:
+        return next(row for row in self.rows if row.name == name)
+
+    def as_dict(self) -> dict[str, dict[str, Any]]:
+        """The same as nested mappings: path, then measure."""
+        return {r.name: {k: v for k, v in vars(r).items() if k != "name"} for r in self.rows}
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,19 +149,49 @@ class JointTable:
         return TableLaw(self.columns)
 
     def report(self, law: JointLaw, steps: int = 60) -> Report:
-        """What the table drops: its error against the law on a suite of paths."""
+        """What the table drops: its error against the law on a suite of paths.
+
+        steps: per leg of a path.
+        """
         limit = float(self.metadata["shear_limit"])
-        return report(self.follow, law, float(self.closure[-1]), limit, steps)
+        end = float(self.closure[-1])
+        steps = whole("steps", steps, 2)
+        rows = []
+        for name, corners in _suite(end, limit).items():
+            path = _legs(corners, steps)
+            increments, joint = np.diff(path, axis=0, prepend=np.zeros((1, 3))), law.joint()
+            exact = np.array([joint.update(d, tangent=False)[0] for d in increments])
+            rows.append(_error(name, self.follow(path), exact, corners))
+        return Report(tuple(rows))
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Draw the table (needs matplotlib); returns the figure, written to `path` if given."""
-        return plot_table(self.columns, path)
+        figure, axes = pyplot().subplots(2, 2, figsize=(9, 6.5), layout="constrained", sharex=True)
+        columns = self.columns
+        u = columns["un"] * 1e6
+        axes[0, 0].plot(u, columns["sn"] / 1e6, "o-", ms=2.5)
+        axes[0, 0].set_ylabel("normal stress (MPa)")
+        for kind in ("secant", "tangent"):
+            axes[0, 1].plot(u, columns[f"kn_{kind}"] / 1e9, label=f"normal, {kind}")
+        azimuths = [name[3:] for name in columns if name.startswith("kt_")]
+        for k in (0, len(azimuths) // 4, len(azimuths) // 2):
+            azimuth, label = azimuths[k], f"{int(azimuths[k])}°"
+            axes[0, 1].plot(u, columns[f"kt_{azimuth}"] / 1e9, "--", label=f"shear, {label}")
+            axes[1, 0].plot(u, columns[f"mu_{azimuth}"], label=f"peak, {label}")
+            axes[1, 1].plot(u, np.degrees(np.arctan(columns[f"dil_{azimuth}"])), label=label)
+        labels = ("stiffness (GPa/m)", "friction coefficient", "dilation angle (°)")
+        for axis, label in zip(axes.flat[1:], labels, strict=True):
+            axis.set_ylabel(label)
+            axis.legend(fontsize="small")
+        for axis in axes[1]:
+            axis.set_xlabel("closure (µm)")
+        return written(figure, path)
 
     # ------------------------------------------------------------------ files
 
     @property
     def columns(self) -> dict[str, Array]:
-        """Columns as in the files: un sn kn_secant kn_tangent mu kt_000 ... mu_ ... mob_ ... dil_.
+        """Columns as in the files: `un sn kn_secant kn_tangent mu kt_000 ... mu_.. mob_.. dil_..`
 
         `mu` is the mean over azimuth of the peak friction, the numbers are azimuths in degrees.
         """
@@ -174,3 +244,48 @@ def load_table(path: str | Path) -> JointTable:
         return JointTable(un, sn, secant, tangent, np.radians(angles), kt, mu, mob, dil, metadata)
     except (OSError, EOFError, KeyError, ValueError, TypeError, IndexError, BadZipFile) as error:
         raise ValueError(f"{str(path)!r} is not a joint table: {error!r}") from None
+
+
+# ------------------------------------------------------- what a table drops, path by path
+
+
+def _suite(end: float, limit: float) -> dict[str, list[tuple[float, float, float]]]:
+    """Corners (closure, shear, azimuth in degrees) of the paths, from the virgin state."""
+    u, s = end / 2, min(limit, end)
+    suite = {
+        "closure": [(end, 0.0, 0.0)],
+        "closure, unloading": [(end, 0.0, 0.0), (0.0, 0.0, 0.0)],
+    }
+    for azimuth in (0.0, 45.0, 90.0):
+        suite[f"shear at {azimuth:.0f} deg, closure held"] = [(u, 0.0, 0.0), (u, s, azimuth)]
+    return suite | {
+        "shear and reversal": [(u, 0, 0), (u, s, 0), (u, -s, 0)],
+        "shear, then closure": [(u, 0, 0), (u, s / 4, 0), (end, s / 4, 0)],
+        "closure and shear together": [(end, end / 2, 0)],
+        "shear, unloading": [(end, 0, 0), (end, s / 4, 0), (end / 4, s / 4, 0)],
+        "shear, opening, re-contact": [(u, 0, 0), (u, s / 2, 0), (-u / 4, s / 2, 0), (u, s / 2, 0)],
+    }
+
+
+def _legs(corners: list[tuple[float, float, float]], steps: int) -> Array:
+    """Points (m, 3) along straight legs between the corners."""
+    points = [np.zeros(3)]
+    for closure, shear, azimuth in corners:
+        psi = np.radians(azimuth)
+        goal = np.array([closure, shear * np.cos(psi), shear * np.sin(psi)])
+        start = points[-1]
+        points += [start + (goal - start) * (k / steps) for k in range(1, steps + 1)]
+    return np.array(points[1:])
+
+
+def _error(
+    name: str, got: Array, exact: Array, corners: list[tuple[float, float, float]]
+) -> PathDifference:
+    scale = float(np.sqrt(np.sum(exact**2, axis=1)).max())
+    psi = np.radians(corners[-1][2])
+    along = np.array([0.0, np.cos(psi), np.sin(psi)])
+    across = np.array([0.0, -np.sin(psi), np.cos(psi)])
+    off = (got - exact) / scale
+    size = np.sqrt(np.sum(off**2, axis=1))
+    parts = [float(np.abs(x).max()) for x in (off[:, 0], off @ along, off @ across)]
+    return PathDifference(name, float(size.max()), float(np.sqrt(np.mean(size**2))), *parts)

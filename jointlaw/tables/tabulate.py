@@ -138,9 +138,7 @@ def _grid(
 def _normal(law: JointLaw, u: Array) -> tuple[Array, Array]:
     """Secant and tangent normal stiffness (Pa/m) on the virgin curve; limits at zero closure."""
     x = np.where(u > 0, u, 1e-12 * law.closure_range)
-    steps = np.zeros((len(x), 3))
-    steps[:, 0] = x
-    _, C = law.joints(len(x)).update(steps)
+    _, C = law.joints(len(x)).update(np.stack([x, 0 * x, 0 * x], axis=1))
     assert C is not None
     return law.normal_stress(x) / x, C[:, 0, 0]
 

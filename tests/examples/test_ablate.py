@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from dem_demo import Refused, Simulation, parse
-from dem_demo.ablate import Row, _run, ablate, table
 from dem_demo.cli import main
-from dem_demo.ingredients import variants, working_stress
-from dem_demo.run import run
+from dem_demo.output.run import run
+from dem_demo.studies.ablate import Row, _run, _without, ablate, table
+from dem_demo.studies.ingredients import variants, working_stress
 
 # A smooth joint, atan(0.4) + 90/20 = 26.3 degrees at most, on a slope of 22 degrees.
 SLOPE = """
@@ -118,10 +118,22 @@ def test_table_and_csv_show_changes_against_the_whole(folder, rows):
 
 def test_a_variant_that_is_too_stiff_takes_half_the_step():
     scene = parse(SLOPE)
-    limit = Simulation(scene).step_limit
+    limit = Simulation(scene).now.limit.now
     row, _ = _run(replace(scene, run=replace(scene.run, step=1.5 * limit)), "stiff", 0.01)
     assert row.note == "time step / 2"
     assert row.time_step == pytest.approx(0.75 * limit)
+
+
+def test_a_time_step_that_is_refused_is_told_and_not_halved():
+    """Twice a step near the limit: halved it would be the step of the scene, a row of zeros."""
+    limit = Simulation(parse(SLOPE)).now.limit.now
+    scene = parse(SLOPE.replace("fraction = 0.4", f"step = {0.8 * limit}"))
+    record, _ = run(Simulation(scene), None, 0.004)
+    (twice,) = (v for v in variants(scene, working_stress(record)) if "twice" in v.name)
+    row = _without(twice, record, 0.004, "1/1")
+    assert row.note.startswith("refused: time step")
+    assert row.outcome == {}
+    assert "| twice the time step (1) | - |" in table([_run(scene, "whole", 0.004)[0], row, row])
 
 
 def test_what_cannot_run_is_a_row_with_its_reason():

@@ -12,11 +12,13 @@ import pytest
 from scene_text import PLAIN, ROCK
 
 import jointlaw as jl
-from dem_demo import CoulombLaw, SceneError, cli, load, parse, predict
-from dem_demo.ablate import _without
+from dem_demo import SceneError, coulomb_law, load, parse
 from dem_demo.cli import main
-from dem_demo.ingredients import Variant
+from dem_demo.output import law_alone
 from dem_demo.scene import build
+from dem_demo.studies import ablate, compare
+from dem_demo.studies.ablate import _without
+from dem_demo.studies.ingredients import Variant
 
 TEXT = f"""
 gravity = [0.0, -9.81]
@@ -114,16 +116,16 @@ def test_a_run_without_a_prediction_is_kept(old, new, tmp_path, capsys):
 
 def test_a_law_that_fails_on_its_path_predicts_nothing(monkeypatch):
     scene, none = parse(TEXT), {"predicted_angle": None, "normal_stress": None}
-    assert predict.slip_angle(scene, 1, 0, 1.0)["predicted_angle"] > 20
+    assert law_alone.slip_angle(scene, 1, 0, 1.0)["predicted_angle"] > 20
 
     def fails(*_args, **_keys):
         raise jl.PathError("no further", None)
 
     monkeypatch.setattr(jl, "direct_shear", fails)
-    assert predict.slip_angle(scene, 1, 0, 1.0) == none
-    assert predict.shear_curve(scene.laws["rock"], 1e4, np.array([0.0, 1e-3])) is None
+    assert law_alone.slip_angle(scene, 1, 0, 1.0) == none
+    assert law_alone.shear_curve(scene.laws["rock"], 1e4, np.array([0.0, 1e-3])) is None
     row = _without(
-        Variant("plain", lambda: predict.friction_angle(scene.laws["rock"], 1e4)), *3 * [None]
+        Variant("plain", lambda: law_alone.friction_angle(scene.laws["rock"], 1e4)), *3 * [None]
     )
     assert row.note == "cannot be built: no further"
 
@@ -131,15 +133,15 @@ def test_a_law_that_fails_on_its_path_predicts_nothing(monkeypatch):
 def test_an_angle_that_is_not_found_is_given_up(monkeypatch):
     """Two angles in turn, for ever: no fixed point to predict."""
     angles = iter(10 * [20.0, 40.0] + 10_000 * [20.0, 40.0])
-    monkeypatch.setattr(predict, "friction_angle", lambda law, stress: next(angles))
-    assert predict.slip_angle(parse(TEXT), 1, 0, 1.0)["predicted_angle"] is None
+    monkeypatch.setattr(law_alone, "friction_angle", lambda law, stress: next(angles))
+    assert law_alone.slip_angle(parse(TEXT), 1, 0, 1.0)["predicted_angle"] is None
 
 
 @pytest.mark.parametrize("verb", ["compare", "ablate"])
 def test_a_place_for_the_results_is_made_before_the_work(verb, tmp_path, monkeypatch, capsys):
     """One that cannot be is refused before anything runs, not after."""
     ran = []
-    where = {"compare": cli, "ablate": cli.ablate}[verb]
+    where = {"compare": compare, "ablate": ablate}[verb]
     monkeypatch.setattr(where, verb, lambda *_: ran.append(1) or [])
     (tmp_path / "file").touch()
     assert main([verb, "slope", "--out", str(tmp_path / "file" / "below" / "x.json")]) == 2
@@ -147,7 +149,7 @@ def test_a_place_for_the_results_is_made_before_the_work(verb, tmp_path, monkeyp
     if verb == "compare":
         out = tmp_path / "no" / "such" / "x.json"
         assert main([verb, "slope", "--out", str(out)]) == 0
-        assert json.loads(out.read_text()) == []
+        assert json.loads(out.read_text())["rows"] == []
 
 
 def test_a_missing_package_is_told_in_one_line(tmp_path):
@@ -164,10 +166,15 @@ def test_a_missing_package_is_told_in_one_line(tmp_path):
     assert len(done.stderr.splitlines()) == 1
 
 
-def test_tractions_of_coulomb_joints_are_copies():
-    """As those of the law: what a host does to them is not done to the joints."""
-    joints = CoulombLaw(1e9, 1e9, 0.3).joints(2)
-    F, _ = joints.update(np.full((2, 2), 1e-5))
-    kept = joints.F.copy()
-    F *= 0.1
-    assert np.array_equal(joints.F, kept)
+def test_plain_coulomb_is_what_its_numbers_say():
+    """Springs kn and ks, a cap of friction times normal stress: by hand, to rounding."""
+    kn, ks, mu = 1e9, 8e8, 0.3
+    joints = coulomb_law(kn, ks, mu).joints(1)
+    sums = np.cumsum([[2e-5, 0.0], [0.0, 4e-6], [0.0, 4e-5], [-1e-5, 0.0], [-2e-5, 0.0]], axis=0)
+    shear = [0.0, ks * 4e-6, mu * kn * 2e-5, mu * kn * 1e-5, 0.0]
+    for i, (closure, slid) in enumerate(sums):
+        F, _ = joints.update([[closure, slid]] - joints.delta, tangent=False)
+        assert F[0] == pytest.approx([kn * max(closure, 0.0), shear[i]], rel=1e-12, abs=1e-9)
+    never = coulomb_law(kn, ks, np.inf).joints(1)
+    F, _ = never.update([[1e-9, 1.0]], tangent=False)
+    assert F[0, 1] == pytest.approx(ks, rel=1e-12)

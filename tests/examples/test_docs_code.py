@@ -10,8 +10,8 @@ from pages import PAGES, blocks, text
 
 import jointlaw as jl
 
-# needs YADE's own Python: tests/hosts/test_yade_page.py runs it there
-ELSEWHERE = {"docs/yade.md"}
+# needs YADE's own Python: tests/hosts/test_yade_page.py runs it there; test_recipes.py
+ELSEWHERE = {"docs/yade.md", "docs/recipes.md"}
 # the first block of README.md is one line of a host's loop
 GIVEN = {"README.md": lambda: {"joint": jl.presets.load("linear-a3").joint(), "d": [1e-9, 0, 0]}}
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from dem_demo import SceneError, Simulation, load, parse, run
-from dem_demo.cli import TEMPLATE, main
-from dem_demo.compare import critical_tilts
-from dem_demo.outcome import displacement
+from dem_demo.cli import main
+from dem_demo.output.outcome import displacement
+from dem_demo.scene import TEMPLATE, names, read, read_tables
+from dem_demo.studies.compare import critical_tilts
 
 TEXT = TEMPLATE.read_text()
 PLAIN = """
@@ -32,7 +33,7 @@ def test_short_scenes_end_as_intended(name, until, failed):
     scene = load(name)
     assert sum(not block.fixed for block in scene.blocks) <= 60
     sim = Simulation(scene)
-    assert scene.run.end / sim.dt < 25_000
+    assert scene.run.end / sim.now.dt < 25_000
     _, summary = run(sim, until=until)
     stands, fails = summary["rocks"]
     assert stands["state"] == "stands"
@@ -91,6 +92,55 @@ def test_a_scene_of_ones_own_from_the_template(tmp_path, capsys):
     assert main([*words, "--out", str(tmp_path / "on")]) == 0
 
 
+def test_a_scene_is_added_as_one_file(tmp_path, monkeypatch, capsys):
+    """The recipe of CONTRIBUTING.md: one file among the scenes, `check`, a variant in it."""
+    monkeypatch.setattr(read, "SCENES", tmp_path)
+    assert main(["new", str(tmp_path / "mine.toml")]) == 0
+    assert main(["check", "mine"]) == 0
+    assert "the scene is valid" in capsys.readouterr().out
+    text = (tmp_path / "mine.toml").read_text() + VARIANT
+    (tmp_path / "mine.toml").write_text(text)
+    assert names() == ["mine", "mine-flat"]
+    assert main(["check", "mine-flat"]) == 0
+    assert main(["nobodys"]) == 2
+    assert "give a TOML file or one of mine, mine-flat" in capsys.readouterr().err
+
+
+VARIANT = """
+[variants.flat]
+title = "Flat"
+laws = { joint = { critical_slip = 1e-3 } }
+[[variants.flat.rock]]
+seed = 7
+set = [{ dip = 5.0 }]
+"""
+
+
+def test_a_variant_changes_what_it_names():
+    """Tables key by key, lists of tables in order, all else as it stands."""
+    scene, flat = read_tables(TEXT + VARIANT), read_tables('variant = "flat"\n' + TEXT + VARIANT)
+    assert flat["title"] == "Flat"
+    assert flat["laws"]["joint"] == {**scene["laws"]["joint"], "critical_slip": 1e-3}
+    (rock,) = flat["rock"]
+    assert [joints["dip"] for joints in rock["set"]] == [5.0, -60.0]
+    sets = [{**scene["rock"][0]["set"][0], "dip": 5.0}, scene["rock"][0]["set"][1]]
+    assert rock == {**scene["rock"][0], "seed": 7, "set": sets}
+    assert {key for key in scene if flat[key] != scene[key]} == {"title", "laws", "rock"}
+    with pytest.raises(SceneError, match=r"variant = 'flt': must be one of \[variants\]: flat"):
+        parse('variant = "flt"\n' + TEXT + VARIANT)
+    wrong = VARIANT.replace("seed", "sead")
+    with pytest.raises(SceneError, match="sead is unknown; did you mean 'seed'"):
+        parse('variant = "flat"\n' + TEXT + wrong)
+
+
+def test_full_scenes_are_larger():
+    for name in ("slope", "slope-azimuth", "arch"):
+        short, full = load(name), load(f"{name}-full")
+        assert len(full.blocks) > 1.5 * len(short.blocks)
+        assert full.title.endswith("(full)")
+        assert parse(full.text).title == full.title  # the text alone gives the variant
+
+
 def test_a_saved_rock_goes_on_bit_for_bit(tmp_path):
     text = TEXT.replace("a = 3.0", "a = 20.0")  # it slides
     whole, first = Simulation(parse(text)), Simulation(parse(text))
@@ -102,8 +152,8 @@ def test_a_saved_rock_goes_on_bit_for_bit(tmp_path):
     for _ in range(40):
         whole.step()
         again.step()
-    assert (again.motion == whole.motion).all()
-    assert (again.traction == whole.traction).all()
+    assert (again.now.motion == whole.now.motion).all()
+    assert (again.now.traction == whole.now.traction).all()
 
 
 def test_joints_have_the_law_of_their_set():

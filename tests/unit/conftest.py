@@ -45,7 +45,7 @@ KINDS = {
     "no heights": {"heights": None, "a": 1.0, "b": -1.0, "c": 0.5},
     "linear": {"heights": None, "eta": 0.0, "a": 1.0, "mu": 0.0},
     "plane": {"plane": 0.4},
-    "leash": {"critical_slip": 2e-6, "plane": math.pi},
+    "critical slip": {"critical_slip": 2e-6, "plane": math.pi},
     "closure only": {"closure_only": True, "critical_slip": 2e-6},
 }
 

@@ -10,7 +10,7 @@ ROUGH = {"alpha": 6.14, "beta": 3.52e-6, "overlap": 12e-6}
 
 @pytest.mark.parametrize(("heights", "least"), [(SMOOTH, 0.287), (ROUGH, 0.312)])
 def test_least_exponent_of_the_printed_heights(make_law, heights, least):
-    """law.md section 5 to its three printed digits."""
+    """Where `Phi` of Eq. 37 stops being convex, found by hand to three digits."""
     make_law(heights=jl.GammaHeights(**heights), eta=least)
     with pytest.raises(ValueError, match="not convex") as error:
         make_law(heights=jl.GammaHeights(**heights), eta=least - 0.001)

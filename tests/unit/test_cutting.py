@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from shapely import Polygon
 
-from dem_demo.cutting import JointSet, cut
-from dem_demo.shapes import check_convex
+from dem_demo.scene.blocks import check_convex
+from dem_demo.scene.cutting import JointSet, cut
 
 SQUARE = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
 SLOPE = np.array([[-12.0, 0], [6, 0], [6, 1], [2, 1], [-2, 9], [-12, 9]])

@@ -29,7 +29,10 @@ def case(request, make_law):
 
 
 def by_quadrature(h, eta, y):
-    """Phi and Phi' of law.md section 5, the integrals by QUADPACK piece by piece."""
+    """Phi and Phi', the integrals by QUADPACK piece by piece.
+
+    Source: docs/theory-incremental.md, "Heights, direction and Hertz become one curve".
+    """
     if h.formation == "population":
         P, H = h.cdf(h.overlap + y), h.pdf(h.overlap + y)
         return P * y ** (1 + eta), (1 + eta) * P * y**eta + H * y ** (1 + eta)

@@ -3,7 +3,7 @@
 
 def contact_forces(sim):
     """Forces and torques (n, 3) of the joints on the blocks, dashpots left out (N, N m)."""
-    stress, shear = sim.traction.T
+    stress, shear = sim.now.traction.T
     stored = sim.joints.now["stored"] * sim.scene.thickness  # what a change of length costs
-    sim.assembly.move(sim.motion)
-    return sim.assembly(sim.points, sim.area * stress, -sim.area * shear, stored)
+    push, shear = sim.now.area * stress, -sim.now.area * shear
+    return sim.now.layout.assembly(sim.now.motion, sim.now.points, push, shear, stored)

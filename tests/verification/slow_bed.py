@@ -71,7 +71,7 @@ class SlowBed:
         self.delta = self.delta + d
         self.offset = self.offset + d[1:]
         pull = np.hypot(*self.offset)
-        if pull > self.critical_slip:  # the leash is taut: drag its end, small step by small step
+        if pull > self.critical_slip:  # at the limit: turn the offset, small step by small step
             self.offset *= self.critical_slip / pull
         y0, self.y = self.y, self._closure()
         y1 = self.y

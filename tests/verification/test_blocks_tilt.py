@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from dem_demo import Simulation, load, parse
-from dem_demo.shapes import turn
-from dem_demo.watch import EVERY, Watch, base_angle
+from dem_demo.output.monitors import LOOKS, SlipMonitor, base_angle
+from dem_demo.scene.blocks import turn
 
 BLOCK = """
 gravity = {gravity}
@@ -71,14 +71,14 @@ def test_a_base_that_turns_with_gravity_ends_level():
     while sim.time < 0.7:
         sim.step()
     assert base_angle(sim, 1, 0) == pytest.approx(0.0, abs=1e-6)
-    normal, shear = sim.traction.T
-    assert abs(shear @ sim.area) < 0.01 * (normal @ sim.area)
+    normal, shear = sim.now.traction.T
+    assert abs(shear @ sim.now.area) < 0.01 * (normal @ sim.now.area)
 
 
 def test_a_base_drawn_beyond_the_friction_angle_slips_there():
     """atan 0.5 is 26.57 degrees; at 45 it slides from the start, and that is what is told."""
     sim = Simulation(block(drawn=45.0))
-    watch = Watch(sim)
+    watch = SlipMonitor(sim)
     while watch.waiting and sim.time < 0.7:
         sim.step()
         watch.look(sim)
@@ -92,12 +92,12 @@ def slips():
     """Measured and predicted slips of both slabs; the tables tilt at 0.05 degrees per second."""
     scene = load("tilt")
     sim = Simulation(scene)
-    watch = Watch(sim)
+    watch = SlipMonitor(sim)
     while watch.waiting and sim.time < scene.run.end:
-        for _ in range(EVERY):
+        for _ in range(LOOKS):
             sim.step()
         watch.look(sim)
-    assert abs(sim.ledger.error) < 1e-4
+    assert abs(sim.now.ledger.error) < 1e-4
     return watch.report()
 
 

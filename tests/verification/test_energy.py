@@ -12,7 +12,7 @@ PATHS, LAWS = 10, 20
 
 
 def random_law(seed):
-    """Any admissible parameters; every third law has a leash."""
+    """Any admissible parameters; every third law has a critical slip."""
     rng = np.random.default_rng(seed)
     a = float(rng.choice([1.0, rng.uniform(1.0, 1.6), rng.uniform(1.6, 5.0), 10.0]))
     b = rng.uniform(-1.0, 2.0)

@@ -1,8 +1,8 @@
 """Where the numbers end, the law says so when it is built; just inside, everything holds."""
 
 import pytest
-from extreme_checks import refused, run
-from extreme_laws import SCALE, build, name
+from extremes.checks import refused, run
+from extremes.laws import SCALE, build, name
 
 BEYOND = [
     {"K": 1e300}, {"density": 1e300}, {"K": 1e200, "density": 1e200}, {"mu": 1e300}, {"lam": 1e300},
@@ -30,7 +30,7 @@ def test_numbers_that_no_float_can_hold_are_refused(changes):
         build(**changes)
 
 
-def test_a_leash_shorter_than_nothing_is_refused():
+def test_a_critical_slip_below_the_smallest_length_is_refused():
     with pytest.raises(ValueError, match="critical_slip = 1e-300 m is out of bounds"):
         build(critical_slip=1e-300)
 

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from extreme_laws import SCALE, build
+from extremes.laws import SCALE, build
 
 import jointlaw as jl
 from jointlaw.cli.main import main

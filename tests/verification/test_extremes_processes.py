@@ -11,8 +11,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from extreme_checks import path
-from extreme_laws import COMPILED, SCALE, build
+from extremes.checks import path
+from extremes.laws import COMPILED, SCALE, build
 
 import jointlaw as jl
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from extreme_checks import Watch
-from extreme_laws import HEIGHTS, SCALE, build, name
+from extremes.checks import Watch
+from extremes.laws import HEIGHTS, SCALE, build, name
 
 HEIGHT = HEIGHTS["printed, individual"][1] * (1.0 + 3.82)  # m: a mean asperity
 SIZES = [5e-324, 1e-310, 1e-300, 1e-15, HEIGHT, 1e6 * HEIGHT]  # m; denormals first

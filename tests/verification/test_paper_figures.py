@@ -8,9 +8,8 @@ import json
 import numpy as np
 import pytest
 
-from jointlaw.cli.figures import add_figures_command
-from jointlaw.paper import draw
-from jointlaw.paper.contents import FIGURES, write_figures
+from jointlaw.cli import figures
+from jointlaw.paper.contents import FIGURES, drawn, rendered, write_figures
 
 pytest.importorskip("matplotlib")
 
@@ -22,7 +21,7 @@ QUICK = [4, 5, 8, 9]
 def test_every_figure_has_finite_curves_units_and_a_caption(number):
     figure = FIGURES[number]
     assert len(figure.caption) > 80
-    png, curves = draw.rendered(figure)
+    png, curves = rendered(figure)
     assert png[:8] == b"\x89PNG\r\n\x1a\n"
     rows = list(csv.DictReader(io.StringIO(curves)))
     assert len(rows) > 30
@@ -41,14 +40,14 @@ def test_all_figures_of_the_paper_that_have_content_are_drawn():
 
 
 def test_figures_show_the_ranges_that_the_text_quotes():
-    _, right = draw.drawn(FIGURES[8]).axes
+    _, right = drawn(FIGURES[8]).axes
     measured, hertz = (patch.get_bbox() for patch in right.patches)
     assert (measured.y0, measured.y1) == (0.78, 1.1)
     assert (hertz.x0, hertz.x1) == (0.67, 1.0)
 
 
 def test_angles_are_written_in_degrees():
-    rows = list(csv.DictReader(io.StringIO(draw.rendered(FIGURES[9])[1])))
+    rows = list(csv.DictReader(io.StringIO(rendered(FIGURES[9])[1])))
     assert [float(row["x"]) for row in rows[:181]] == list(range(0, 361, 2))
 
 
@@ -72,19 +71,19 @@ def test_unknown_figure_is_refused_before_anything_is_written(tmp_path, number):
 
 def run(*arguments):
     parser = argparse.ArgumentParser()
-    add_figures_command(parser.add_subparsers())
+    figures.add(parser.add_subparsers())
     options = parser.parse_args(["figures", *arguments])
-    return options.run(options)
+    options.run(options)
 
 
 def test_command_draws(tmp_path, capsys):
-    assert run(*map(str, QUICK), "--out", str(tmp_path)) == 0
+    run(*map(str, QUICK), "--out", str(tmp_path))
     assert "9 files" in capsys.readouterr().out
     assert (tmp_path / "figure-08.png").exists()
 
 
 def test_command_prints_claims(capsys):
-    assert run("--claims", "hertz-mindlin-ratio", "frictionless-c11p") == 0
+    run("--claims", "hertz-mindlin-ratio", "frictionless-c11p")
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 4  # head, rule and two claims
     assert "0.8235" in lines[2]

@@ -167,8 +167,8 @@ def test_linear_asperities_without_heights_need_one_depth_cell(plane):
         assert np.abs(lost - lost_many).max() <= EXACT * max(lost.max(), 1e-3)
 
 
-def test_without_a_critical_slip_nothing_changes_inside_the_leash():
-    """critical_slip = inf leaves the leash out: the same until an offset reaches its length."""
+def test_without_a_critical_slip_nothing_changes_below_it():
+    """critical_slip = inf leaves the limit out: the same until an offset reaches it."""
     free = random_law(3)
     held = replace(free, critical_slip=2.0)
     rng = np.random.default_rng(5)

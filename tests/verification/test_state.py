@@ -8,7 +8,7 @@ import jointlaw as jl
 
 KINDS = {
     "3-D": {"formation": "population"},
-    "leash": {"critical_slip": 0.3},
+    "critical slip": {"critical_slip": 0.3},
     "plane": {"plane": 0.4, "formation": "individual"},
 }
 

@@ -27,8 +27,8 @@ OPTIONS = {
     "plain": {},
     "population": {"formation": "population"},
     "individual": {"formation": "individual"},
-    "leash": {"critical_slip": 0.2},
-    "taut leash, heights": {"critical_slip": 0.12, "formation": "population"},
+    "critical slip": {"critical_slip": 0.2},
+    "at the critical slip, heights": {"critical_slip": 0.12, "formation": "population"},
     "concave stiffness": {"eta": 0.2},
 }
 

@@ -36,7 +36,9 @@ def test_reference_of_the_suite_agrees_with_the_slow_bed():
     suite = standard_suite(law)
     n, w = cap_quadrature(4.0, 0.5, 0.1, 6, 16)
     F = np.zeros_like(suite.F)
-    near = [i for i in range(F.shape[1]) if suite.names[i] != "far"]  # 30 R: too wide for 120 springs
+    near = [
+        i for i in range(F.shape[1]) if suite.names[i] != "far"
+    ]  # 30 R: too wide for 120 springs
     for i in near:
         path = np.cumsum(suite.d[:, i], axis=0)
         bed = SlowBed(n, w, reach_of(path, n), K=1.0, lam=1.2, eta=0.5, mu=0.5, density=1.0,

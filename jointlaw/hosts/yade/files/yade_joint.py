@@ -94,8 +94,7 @@ class LiveLaw:
     def find(self):
         """Find the places of all contacts; None if they are all of the batch, in order."""
         places = self.pool.places
-        whole = len(places) == len(self.batch) and (places == np.arange(len(places))).all()
-        self.where = None if whole else places
+        self.where = None if np.array_equal(places, np.arange(len(self.batch))) else places
 
     def state(self):
         """Arrays to save."""
@@ -107,16 +106,15 @@ class LiveLaw:
         from jointlaw import JointState
 
         self.came = data["values"].shape[1]
-        state = JointState(str(data["fingerprint"]), data["values"])
-        self.pool.restore(range(self.came), state)
+        self.pool.restore(range(self.came), JointState(str(data["fingerprint"]), data["values"]))
         self.find()
 
 
 # ---------------------------------------------------------------- the adapter
 
 # Numbers per contact, shape (n,): ids, step that made it, places of the bodies, radii, area
-PER_CONTACT = ["id1", "id2", "made", "b1", "b2", "R1", "R2", "area"]
-PER_CONTACT += ["ball", "zero", "closure"]  # two spheres?, overlap at zero closure
+# ball: two spheres?; zero: overlap at zero closure
+PER_CONTACT = ["id1", "id2", "made", "b1", "b2", "R1", "R2", "area", "ball", "zero", "closure"]
 VECTORS = ["n", "t2", "c1", "c2", "axis", "plane", "F"]  # shape (3, n)
 
 
@@ -245,8 +243,7 @@ class Joints:
                 one = np.pi * body.shape.radius**2 if self.area is None else self.area
                 carried = one * max(6, count[body.id])
             # two bodies (2), rolling (1 + m R^2/I = 3.5 for a sphere)
-            stiffness = 2 * 3.5 * k * carried
-            shortest = min(shortest, 2 * np.sqrt(body.state.mass / stiffness))
+            shortest = min(shortest, 2 * np.sqrt(body.state.mass / (2 * 3.5 * k * carried)))
         if not np.isfinite(shortest):
             raise ValueError("no free sphere in O.bodies: set O.dt by hand")
         return safety * shortest
@@ -278,8 +275,7 @@ class Joints:
 
     def _act(self):
         c, x0, q0 = self.c, self.x, self.q
-        x, q = self._read()
-        self.x, self.q = x, q
+        x, q = self.x, self.q = self._read()
         b1, b2 = c["b1"], c["b2"]
         q1 = q.take(b1, axis=1)
         n, un, c1, c2 = self._geometry(x, q1)
@@ -391,8 +387,7 @@ class Joints:
             force[:, fresh] -= self._take_back(fresh)
             self._add(force, c1, c2)
         for i, a, b, m in zip(self.own, kn.tolist(), ks.tolist(), mu.tolist()):
-            phys = i.phys
-            phys.kn, phys.ks, phys.tangensOfFrictionAngle = a, b, m
+            i.phys.kn, i.phys.ks, i.phys.tangensOfFrictionAngle = a, b, m
 
     # ---------------------------------------------------------------- contacts
 
@@ -405,8 +400,7 @@ class Joints:
         real = [i.isReal for i in self.own]
         if not all(real):
             self._keep(np.array(real))
-        if self.others:
-            self.others = [i for i in self.others if i.isReal]
+        self.others = [i for i in self.others if i.isReal]
         missing = O.interactions.countReal() - len(self.own) - len(self.others)
         if missing:
             new = [i for i in O.interactions.all(True) if i.iterMadeReal == now]
@@ -433,8 +427,7 @@ class Joints:
         return new
 
     def _keep(self, mask):
-        for key, value in self.c.items():
-            self.c[key] = value[..., mask]
+        self.c = {key: value[..., mask] for key, value in self.c.items()}
         self.own = [i for i, keep in zip(self.own, mask) if keep]
         number = np.cumsum(mask) - 1
         self.odd = [(int(number[k]), geom) for k, geom in self.odd if mask[k]]
@@ -525,9 +518,8 @@ class Joints:
             axis = state.angVel.normalized() if angle > 0 else Vector3(0, 0, 1)
             x.append((state.pos - state.vel * O.dt).__getinitargs__())
             q.append((Quaternion(axis, -angle) * state.ori).__getinitargs__())
-        if x:
-            self.x = np.concatenate([self.x, np.array(x).T], axis=1)
-            self.q = np.concatenate([self.q, np.array(q).T], axis=1)
+        self.x = np.concatenate([self.x, np.reshape(x, (-1, 3)).T], axis=1)
+        self.q = np.concatenate([self.q, np.reshape(q, (-1, 4)).T], axis=1)
 
     def _read(self):
         """Positions (3, b) and orientations (4, b; w first) of the bodies with joints."""
@@ -542,11 +534,10 @@ class Joints:
             self._resume()
         data = {f"contact_{key}": value for key, value in self.c.items()}
         data.update({f"law_{key}": value for key, value in self.law.state().items()})
-        last = -1 if self.last is None else self.last
-        others = np.array([(i.id1, i.id2, i.iterMadeReal) for i in self.others], int)
+        data["others"] = np.array([(i.id1, i.id2, i.iterMadeReal) for i in self.others], int)
+        data["last"] = -1 if self.last is None else self.last
         with open(path, "wb") as file:
-            np.savez(file, version=VERSION, ids=self.ids, x=self.x, q=self.q, last=last,
-                     others=others, **data)  # fmt: skip
+            np.savez(file, version=VERSION, ids=self.ids, x=self.x, q=self.q, **data)
 
     def load(self, path):
         """Take up a state that `save` wrote: call it after O.load, before the next step."""

@@ -1,0 +1,98 @@
+"""Monitors of a run: slip in a tilt test, stress and dilation in shear, points of a rock."""
+
+import numpy as np
+
+from ..dynamics.simulation import Simulation
+from ..scene import turn
+from .law_alone import slip_angle, slip_distance
+
+LOOKS = 8  # steps between two looks
+
+
+class SlipMonitor:
+    """Looks for the slip of the joints that the scene's [watch] table names."""
+
+    def __init__(self, sim: Simulation) -> None:
+        self.scene = scene = sim.scene
+        self.slips = {}
+        for moving, base in scene.monitors.slip:
+            law = scene.laws[scene.law_of((moving, 0, base, 0))]
+            self.slips[moving, base] = {
+                "block": scene.blocks[moving].name,
+                "base": scene.blocks[base].name,
+                "law": scene.law_of((moving, 0, base, 0)),
+                "slip_distance": slip_distance(law),
+                "slip_angle": None,
+                "slip_time": None,
+                "slipped_before": sim.now.slid(sim.joints, moving, base) > slip_distance(law),
+            }
+        self.lengths = {
+            pair: float(sim.now.points.length[sim.now.between(*pair)].sum()) for pair in self.slips
+        }
+
+    def look(self, sim: Simulation) -> None:
+        """Note the base angle at which a joint passes its slip distance."""
+        for (moving, base), entry in self.slips.items():
+            if _waits(entry) and sim.now.slid(sim.joints, moving, base) > entry["slip_distance"]:
+                entry["slip_angle"] = base_angle(sim, moving, base)
+                entry["slip_time"] = sim.time
+
+    @property
+    def waiting(self) -> bool:
+        """Is there a slip still to come?"""
+        return any(_waits(entry) for entry in self.slips.values())
+
+    def report(self) -> list[dict]:
+        """Measured and predicted slip angles (degrees)."""
+        out = []
+        for pair, entry in self.slips.items():
+            law = slip_angle(self.scene, *pair, self.lengths[pair])
+            out.append({**entry, **law})
+        return out
+
+
+def _waits(entry: dict) -> bool:
+    return entry["slip_angle"] is None and not entry["slipped_before"]
+
+
+def base_angle(sim: Simulation, moving: int, base: int) -> float:
+    """Angle (degrees, 0 to 90) of a base against the horizontal that gravity defines; 0 without it.
+
+    Of the base's face that `moving` lies on: the one that its centroid is farthest outside of.
+    """
+    x, y, angle = sim.now.motion[:3, base]
+    corners = sim.scene.blocks[base].local @ turn(angle).T + [x, y]
+    along = np.roll(corners, -1, axis=0) - corners
+    along /= np.hypot(*along.T)[:, None]
+    outward = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    face = ((sim.now.motion[:2, moving] - corners) * outward).sum(axis=1).argmax()
+    down = np.array(sim.scene.gravity)
+    return float(np.degrees(np.arctan2(abs(along[face] @ down), abs(outward[face] @ down))))
+
+
+def readings(sim: Simulation) -> dict[str, float]:
+    """What the scene's [watch] table asks for, now; the unit ends the name."""
+    row, blocks = {}, sim.scene.blocks
+    for moving, base in (*sim.scene.monitors.slip, *sim.scene.monitors.shear):
+        name = blocks[moving].name
+        row[f"{name}: base angle_deg"] = base_angle(sim, moving, base)
+        for key, value in _joint(sim, moving, base).items():
+            row[f"{name}: {key}"] = value
+    for i, (block, point) in enumerate(sim.scene.monitors.pins):
+        x, y, angle = sim.now.motion[:3, block]
+        arm = np.asarray(point) - blocks[block].centroid
+        row[f"pin {i + 1}: moved_m"] = float(np.hypot(*(turn(angle) @ arm + [x, y] - point)))
+    return row
+
+
+def _joint(sim: Simulation, moving: int, base: int) -> dict[str, float]:
+    """Mean over the joint between two blocks: stresses, closure, sliding, sliding share."""
+    here = sim.now.between(moving, base)
+    area = sim.now.area[here]
+    keys = "normal_Pa", "shear_Pa", "closure_m", "slid_m", "sliding_share"
+    if not area.any():
+        return dict.fromkeys(keys, 0.0)
+    F, delta = sim.now.traction[here], sim.joints.read("delta")[here]
+    columns = [*F.T, *delta.T, sim.joints.now["sliding"][here]]
+    share = area / area.sum()
+    return {key: float(share @ column) for key, column in zip(keys, columns, strict=True)}

@@ -1,0 +1,69 @@
+"""What became of each rock mass of a run: does it stand, and how far did its blocks move?"""
+
+import numpy as np
+
+from .record import Record
+
+FAILED = 0.1  # m: a block that has moved farther has failed
+CREEP = 1e-6  # m/s: faster is not at rest
+LOOK_BACK = 1.0  # s over which creep is measured
+
+
+def displacement(record: Record, i: int) -> np.ndarray:
+    """Displacement (n, 2) of the blocks in frame i since they were drawn, without weight (m)."""
+    drawn = np.array([block.centroid for block in record.scene.blocks])
+    return record.motion[i][:2].T - drawn
+
+
+def kinetic(record: Record, i: int) -> np.ndarray:
+    """Kinetic energy (n,) of the blocks in frame i (J)."""
+    blocks, thick = record.scene.blocks, record.scene.thickness
+    inertia = thick * np.array([[b.density * b.area] * 2 + [b.density * b.polar] for b in blocks])
+    return 0.5 * (inertia * record.motion[i][3:].T ** 2).sum(axis=1)
+
+
+def outcomes(record: Record) -> list[dict]:
+    """One entry for each `[[rock]]` of the scene.
+
+    settled_m: largest displacement from the drawing to step 0; moved_m: largest since
+    then; failed: blocks that moved more than FAILED; creep_m_per_s: largest mean speed over the
+    last second (or the whole run, if shorter).
+    """
+    out = []
+    first, last = displacement(record, 0), displacement(record, -1)
+    times = np.array(record.times)
+    before = int(np.searchsorted(times, times[-1] - LOOK_BACK + 1e-9)) if len(times) > 1 else 0
+    before = min(before, max(len(times) - 2, 0))
+    crept = np.hypot(*(last - displacement(record, before)).T)
+    crept /= max(times[-1] - times[before], 1e-300)
+    for rock in record.scene.rocks:
+        free = rock.free
+        moved = np.hypot(*(last - first)[free].T)
+        creep = float(crept[free].max())
+        failed = int((moved > FAILED).sum())
+        state = "fails" if failed else "stands" if creep < CREEP else "moves"
+        out.append(
+            {
+                "rock": rock.name,
+                "state": state,
+                "blocks": len(free),
+                "settled_m": float(np.hypot(*first[free].T).max()),
+                "moved_m": float(moved.max()),
+                "failed": failed,
+                "creep_m_per_s": creep,
+            }
+        )
+    return out
+
+
+def sentence(entry: dict) -> str:
+    """One line for a person."""
+    start = f"{entry['rock']}: {entry['state']}; "
+    if entry["failed"]:
+        many = f"{entry['failed']} of {entry['blocks']} blocks moved more than {FAILED:g} m"
+        return f"{start}{many}, the farthest {entry['moved_m']:.2f} m"
+    moved = max(1e3 * entry["moved_m"], 1e-3)
+    return (
+        f"{start}no block of {entry['blocks']} moved more than {moved:.2g} mm, "
+        f"creep {entry['creep_m_per_s']:.1e} m/s"
+    )

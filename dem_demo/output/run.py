@@ -1,0 +1,127 @@
+"""Run a scene to its end and write what a user wants to see."""
+
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from jointlaw.support.files import replace_file, write_json
+
+from ..dynamics.energy import COLUMNS
+from ..dynamics.saved_states import text_of
+from ..dynamics.simulation import Simulation
+from ..errors import Refused
+from . import curves, frames, rock_report
+from .monitors import LOOKS
+from .outcome import outcomes
+from .record import Record
+
+MOST_STEPS = 1e12  # of a run: years
+VERSION = 1  # of summary.json
+
+
+def run(sim: Simulation, folder: Path | None = None, until: float | None = None, pictures=True):
+    """Run to `until` (s, default the scene's end); writes into `folder` if given.
+
+    Returns (record, summary). A state that the method cannot carry raises Refused and leaves the
+    last good one in `folder`/refused, from where the run can be repeated or resumed. Raises
+    ValueError, before the first step, for an `until` that cannot be reached and for a scene that
+    cannot be saved.
+    """
+    steps_to(sim, until)
+    if folder:
+        text_of(sim.scene)
+        folder.mkdir(parents=True, exist_ok=True)
+    started, first_step, record = time.perf_counter(), sim.now.n, Record(sim)
+    try:
+        play(sim, record, until)
+    except Refused as trouble:
+        if not folder:
+            raise
+        refused = folder / "refused"
+        sim.save(refused, record.state)
+        replace_file(refused / "why.txt", f"{trouble}\n".encode())
+        write(record, {"version": VERSION, "refused": str(trouble)}, folder, False)
+        raise Refused(f"{trouble}\nThe last good state is in {refused}") from None
+    wall, now = time.perf_counter() - started, sim.now
+    summary = {
+        "version": VERSION,
+        "scene": sim.scene.title,
+        "model_time_s": sim.time,
+        "steps": now.n - first_step,
+        "time_step_s": now.dt,
+        "step_limit_s": now.limit.least,
+        "safety_factor": now.limit.least / now.dt,
+        "started_in_equilibrium": bool(sim.balanced),
+        "law_points": sim.joints.n,
+        "energy_J": {c: now.ledger.value[c] for c in COLUMNS},
+        "energy_error": now.ledger.error,
+        "largest_energy_error": record.largest_error,
+        "slip": record.slips.report(),
+        "rocks": outcomes(record),
+        "wall_time_s": wall,
+    }
+    if folder:
+        sim.save(folder / "state")
+        write(record, summary, folder, pictures)
+    return record, summary
+
+
+def play(
+    sim: Simulation,
+    record: Record,
+    until: float | None = None,
+    stop: Callable[[Record], bool] = lambda record: False,
+) -> None:
+    """Step to `until` (s), or to where `stop` says so, and record on the way. Raises Refused."""
+    steps = steps_to(sim, until)
+    every = max(round(min(sim.scene.run.record / sim.now.dt, steps + 1)), 1)
+    title, quiet = sim.scene.title, not sys.stderr.isatty()
+    for i in tqdm(range(1, steps + 1), desc=title, disable=quiet):
+        sim.step()
+        if i % LOOKS == 0:
+            record.slips.look(sim)
+        if i % every == 0 or i == steps:
+            record.take(sim)
+            if stop(record):
+                break
+
+
+def steps_to(sim: Simulation, until: float | None = None) -> int:
+    """Steps from now to a model time (s), by default the scene's end: none if that is past.
+
+    Raises ValueError for a time given that is past, not finite, or out of reach.
+    """
+    now, dt, end = sim.time, sim.now.dt, sim.scene.run.end if until is None else until
+    if until is not None and not now - 0.5 * dt <= until < np.inf:
+        raise ValueError(f"until = {until} s: must be finite and >= the time now, {now:.6g} s")
+    steps = max((end - now) / dt, 0.0)
+    if not steps <= MOST_STEPS:
+        raise ValueError(
+            f"end = {end:g} s: {steps:.3g} steps of {dt:.3g} s; must be <= {MOST_STEPS:g}"
+        )
+    return round(steps)
+
+
+def write(record: Record, summary: dict[str, Any], folder: Path, pictures: bool) -> None:
+    """All files of a run."""
+    folder.mkdir(parents=True, exist_ok=True)
+    record.write(folder)
+    write_json(folder / "summary.json", summary)
+    if not pictures:
+        return
+    curves.energy(record, folder / "energy.png")
+    if record.scene.monitors.shear:
+        curves.shear(record, folder / "curves.png")
+    elif record.scene.monitors.slip:
+        curves.tilt(record, folder / "curves.png", summary["slip"])
+    if record.scene.rocks:
+        rock_report.report(record, folder / "report.png")
+        frames.animation(record, folder / "motion.gif", rock_report.frame)
+    else:
+        frames.final(record, folder / "final.png", summary["slip"])
+        frames.animation(record, folder / "motion.gif", frames.frame)

@@ -1,0 +1,38 @@
+"""Scenes: blocks, laws, drives and joint sets, read from TOML and checked.
+
+tables     a TOML table that names what is wrong with it
+blocks     convex blocks
+laws       joint laws and plain Coulomb
+drives     prescribed motions
+cutting    an outline cut along joint sets
+rocks      the rock masses of a scene
+scene      a scene in memory
+read       a scene from its file
+"""
+
+from .blocks import Block, turn
+from .drives import Drive, Drives
+from .laws import build_law, coulomb_law, is_coulomb
+from .read import DENSITY, GRAVITY, TEMPLATE, build, load, names, parse, read_tables
+from .scene import Key, Run, Scene
+
+__all__ = [
+    "DENSITY",
+    "GRAVITY",
+    "TEMPLATE",
+    "Block",
+    "Drive",
+    "Drives",
+    "Key",
+    "Run",
+    "Scene",
+    "build",
+    "build_law",
+    "coulomb_law",
+    "is_coulomb",
+    "load",
+    "names",
+    "parse",
+    "read_tables",
+    "turn",
+]

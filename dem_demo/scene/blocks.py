@@ -1,0 +1,100 @@
+"""Convex blocks: corners, area, centroid, moment of inertia."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """A rigid convex block of the scene, in its place at time 0.
+
+    corners (m, 2) in m, counter-clockwise; density in kg/m3; load (2,) in N at the centroid;
+    velocity (2,) in m/s, spin in rad/s; `held` names the motions ("x", "y", "turn") that a drive
+    prescribes.
+    """
+
+    name: str
+    corners: np.ndarray
+    density: float
+    fixed: bool = False
+    velocity: tuple[float, float] = (0.0, 0.0)
+    spin: float = 0.0
+    load: tuple[float, float] = (0.0, 0.0)
+    held: tuple[str, ...] = ()
+
+    @property
+    def area(self) -> float:
+        """Area (m2) of the section."""
+        return float(_cross(self.corners, np.roll(self.corners, -1, axis=0)).sum() / 2)
+
+    @property
+    def centroid(self) -> np.ndarray:
+        """Centre of gravity (m), taken from corner 0 so that a far block loses no digits."""
+        p = self.corners - self.corners[0]
+        q = np.roll(p, -1, axis=0)
+        weight = _cross(p, q)
+        return self.corners[0] + ((p + q) * weight[:, None]).sum(axis=0) / (3 * weight.sum())
+
+    @property
+    def local(self) -> np.ndarray:
+        """Corners (m) measured from the centroid."""
+        return self.corners - self.centroid
+
+    @property
+    def polar(self) -> float:
+        """Polar moment of the section about its centroid (m4)."""
+        p = self.local
+        q = np.roll(p, -1, axis=0)
+        square = (p * p + p * q + q * q).sum(axis=1)
+        return float((_cross(p, q) * square).sum() / 12)
+
+    @property
+    def width(self) -> float:
+        """Smallest width (m) over the directions of its edges."""
+        edge = np.roll(self.corners, -1, axis=0) - self.corners
+        normal = np.stack([-edge[:, 1], edge[:, 0]]) / np.hypot(*edge.T)
+        across = self.corners @ normal
+        return float((across.max(axis=0) - across.min(axis=0)).min())
+
+    @property
+    def reach(self) -> float:
+        """Distance (m) from the centroid to the farthest corner."""
+        return float(np.hypot(*self.local.T).max())
+
+    def holds(self, point) -> bool:
+        """Is a point (m) inside the block?"""
+        edge = np.roll(self.corners, -1, axis=0) - self.corners
+        return bool((_cross(edge, np.asarray(point) - self.corners) > 0).all())
+
+
+def box(width: float, height: float, at=(0.0, 0.0), angle: float = 0.0) -> np.ndarray:
+    """Corners of a box centred at `at`, turned by `angle` (degrees)."""
+    half = 0.5 * np.array([[-width, -height], [width, -height], [width, height], [-width, height]])
+    return half @ turn(np.radians(angle)).T + np.asarray(at, float)
+
+
+def turn(angle: float) -> np.ndarray:
+    """Rotation matrix for an angle in rad."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s], [s, c]])
+
+
+def check_convex(corners: np.ndarray) -> str | None:
+    """What is wrong with a list of corners, or None."""
+    if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3:
+        return "must be a list of at least 3 corners [x, y] in m"
+    if not np.isfinite(corners).all():
+        return "must be finite numbers"
+    edge = np.roll(corners, -1, axis=0) - corners
+    length = np.hypot(*edge.T)
+    if length.min() < 1e-6 * length.max():
+        return "has two corners (almost) at the same place"
+    bend = _cross(edge, np.roll(edge, -1, axis=0)) / (length * np.roll(length, -1))
+    if (bend <= 1e-9).any():
+        return "must be convex and listed counter-clockwise, without three corners on a line"
+    return None
+
+
+def _cross(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    return p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]

@@ -1,0 +1,187 @@
+"""Cut a rock outline into convex blocks along joint sets. shapely clips; nothing here knows a law.
+
+A joint of a set is a straight line across the rock. In each block that it meets it either runs
+right through, with the probability `persistence`, or leaves a bridge of whole rock: a joint that
+would end inside a block does not weaken it. Sets cut in the order given, so the joints of a later
+set may end at those of an earlier one.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from shapely import LineString, Polygon
+from shapely.ops import split
+
+EXACT = 1e-7  # share of the rock's size below which a distance is zero
+
+
+@dataclass(frozen=True)
+class JointSet:
+    """Parallel joints. dip in degrees below the horizontal, positive down to the right.
+
+    spacing: mean distance (m) of neighbours; scatter: each distance is spacing (1 + scatter r)
+    with r evenly spread over -1..1; persistence: share of the length that is a joint; through: a
+    point (m) on one joint; law: name of its law.
+    """
+
+    dip: float
+    spacing: float
+    law: str
+    persistence: float = 1.0
+    scatter: float = 0.0
+    through: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def normal(self) -> np.ndarray:
+        """Unit normal, upwards."""
+        dip = np.radians(self.dip)
+        return np.array([np.sin(dip), np.cos(dip)])
+
+    def offsets(self, corners: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Distances n . x (m) of the joints that may cross a body with these corners."""
+        low, high = np.quantile(corners @ self.normal, [0.0, 1.0])
+        start = float(np.dot(self.normal, self.through))
+        sides = []
+        for way, end in ((1.0, high), (-1.0, low)):
+            most = int(np.ceil(max(way * (end - start), 0) / (1 - self.scatter) / self.spacing))
+            steps = self.spacing * (1 + self.scatter * rng.uniform(-1, 1, most + 1))
+            sides.append(start + way * np.cumsum(steps))
+        offsets = np.sort(np.concatenate([[start], *sides]))
+        return offsets[(offsets > low) & (offsets < high)]
+
+
+@dataclass(frozen=True, eq=False)
+class CutRock:
+    """Convex corners (m, 2) of the blocks, counter-clockwise; of every edge its set's number or -1.
+
+    joined: slivers that became part of a neighbour; dropped: areas (m2) of those that could not.
+    """
+
+    blocks: list[np.ndarray]
+    sets: list[np.ndarray]
+    joined: int
+    dropped: list[float]
+
+
+def cut(outline: np.ndarray, sets: Sequence[JointSet], seed: int, least_width: float) -> CutRock:
+    """Cut a simple outline (m, 2) into convex blocks no narrower than `least_width` (m).
+
+    A piece that is still not convex (the outline bends inwards) is cut along the first set that
+    runs through its inward corner. A sliver joins a neighbour with which it makes a convex block,
+    across a joint of the last set if it can, so that joints of the first sets stay whole; one
+    without such a neighbour is dropped.
+    """
+    tiny = EXACT * float(np.ptp(outline, axis=0).max())
+    pieces, lines = [Polygon(outline)], []
+    for number, joints in enumerate(sets):
+        rng = np.random.default_rng([seed, number])
+        for offset in joints.offsets(outline, rng):
+            lines.append((number, joints.normal, offset))
+            pieces = [
+                part
+                for piece in pieces
+                for part in _crossed(piece, joints.normal, offset, tiny, joints.persistence, rng)
+            ]
+    pieces = [part for piece in pieces for part in _convex_parts(piece, sets, lines, tiny)]
+    pieces, joined, dropped = _without_slivers(pieces, lines, least_width, tiny)
+    shapes = [_corners(piece, tiny) for piece in pieces]
+    shapes.sort(key=lambda c: tuple(np.round(c.mean(axis=0)[::-1], 6)))
+    return CutRock(shapes, [_sets_of(c, lines, tiny) for c in shapes], joined, dropped)
+
+
+def _crossed(piece, normal, offset, tiny, persistence, rng) -> list[Polygon]:
+    """The parts of a piece on both sides of a joint, if there is one here."""
+    away = np.array(piece.exterior.coords) @ normal - offset
+    if away.max() < tiny or away.min() > -tiny or rng.random() >= persistence:
+        return [piece]
+    return _split(piece, normal, offset)
+
+
+def _split(piece: Polygon, normal: np.ndarray, offset: float) -> list[Polygon]:
+    along = np.array([normal[1], -normal[0]])
+    middle = normal * offset + along * (along @ np.array(piece.centroid.coords[0]))
+    reach = 2 * piece.length
+    return list(split(piece, LineString([middle - reach * along, middle + reach * along])).geoms)
+
+
+def _convex_parts(piece: Polygon, sets, lines, tiny) -> list[Polygon]:
+    if _width(piece) < tiny:
+        return []
+    corners = _corners(piece, tiny)
+    inward = corners[_bends(corners) < 0]
+    if len(inward) == 0:
+        return [piece]
+    for number, joints in enumerate(sets):
+        offset = float(joints.normal @ inward[0])
+        parts = _split(piece, joints.normal, offset)
+        if len(parts) > 1:
+            lines.append((number, joints.normal, offset))
+            return [p for part in parts for p in _convex_parts(part, sets, lines, tiny)]
+    raise ValueError(f"no set runs through the inward corner {inward[0].round(3).tolist()} m")
+
+
+def _without_slivers(pieces: list[Polygon], lines, least: float, tiny: float):
+    """Join or drop what is narrower than `least`, the narrowest first."""
+    pieces, joined, dropped = list(pieces), 0, []
+    widths = [_width(piece) for piece in pieces]
+    while pieces and min(widths) < least:
+        i = int(np.argmin(widths))
+        sliver = pieces.pop(i)
+        widths.pop(i)
+        for j in _neighbours(sliver, pieces, lines, tiny):
+            whole = sliver.union(pieces[j]).convex_hull
+            if whole.area - sliver.area - pieces[j].area < tiny * whole.length:
+                pieces[j], widths[j] = whole, _width(whole)
+                joined += 1
+                break
+        else:
+            dropped.append(sliver.area)
+    return pieces, joined, dropped
+
+
+def _neighbours(sliver: Polygon, pieces: list[Polygon], lines, tiny: float) -> list[int]:
+    """Those across a joint of the last set first, then those that share most boundary."""
+    corners, found = _corners(sliver, tiny), []
+    sides = zip(corners, np.roll(corners, -1, axis=0), _sets_of(corners, lines, tiny), strict=True)
+    for start, end, number in sides:
+        side = LineString([start, end]).buffer(tiny)
+        shared = [side.intersection(piece.exterior).length for piece in pieces]
+        found += [(int(number), part, j) for j, part in enumerate(shared) if part > 10 * tiny]
+    return [j for *_, j in sorted(found, reverse=True)]
+
+
+def _width(piece: Polygon) -> float:
+    """Smallest width over the directions of the edges (m)."""
+    corners = np.array(piece.exterior.coords)[:-1]
+    edge = np.roll(corners, -1, axis=0) - corners
+    edge = edge[np.hypot(*edge.T) > 0]
+    normal = np.stack([-edge[:, 1], edge[:, 0]]) / np.hypot(*edge.T)
+    return float(np.ptp(corners @ normal, axis=0).min())
+
+
+def _corners(piece: Polygon, tiny: float) -> np.ndarray:
+    """Corners counter-clockwise, without those that bend nothing."""
+    corners = np.array(piece.exterior.coords)[:-1]
+    if not piece.exterior.is_ccw:
+        corners = corners[::-1]
+    corners = corners[np.hypot(*(corners - np.roll(corners, 1, axis=0)).T) > tiny]
+    while (flat := np.abs(_bends(corners)) < tiny).any():
+        corners = np.delete(corners, flat.argmax(), axis=0)
+    return corners
+
+
+def _bends(corners: np.ndarray) -> np.ndarray:
+    """How far (m) each corner stands out from the line of its neighbours; negative inwards."""
+    before, after = np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0)
+    chord, arm = after - before, corners - before
+    return (arm[:, 1] * -chord[:, 0] + arm[:, 0] * chord[:, 1]) / np.hypot(*chord.T)
+
+
+def _sets_of(corners: np.ndarray, lines, tiny: float) -> np.ndarray:
+    """Number of the set on whose joint each edge (corner, next corner) lies, or -1."""
+    out = np.full(len(corners), -1)
+    for number, normal, offset in reversed(lines):
+        on = np.abs(corners @ normal - offset) < 10 * tiny
+        out[on & np.roll(on, -1)] = number
+    return out

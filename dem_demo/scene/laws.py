@@ -1,0 +1,55 @@
+"""Laws of a scene, built from its TOML tables. All are `jointlaw.JointLaw`."""
+
+from typing import Any
+
+import jointlaw as jl
+
+from ..errors import SceneError
+from .tables import Table
+
+FLAT = 1e15  # orientation.a: no asperity is inclined by more than 2e-15 rad
+STICKS = 1e30  # friction of a joint that never slides
+
+
+def coulomb_law(normal_stiffness: float, shear_stiffness: float, friction: float) -> jl.JointLaw:
+    """Plain Coulomb friction with constant stiffness, for comparison: level, linear asperities.
+
+    normal_stiffness, shear_stiffness: per area, > 0 (Pa/m); friction: coefficient, >= 0, may be
+    infinite. Raises ValueError for others.
+    """
+    asperity = jl.Asperity.linear(normal_stiffness, shear_stiffness, min(friction, STICKS))
+    return jl.JointLaw(
+        orientation=jl.Orientation(FLAT),
+        asperity=asperity,
+        asperity_density=1.0,
+        resolution=jl.Resolution(1, 3, 1),
+        plane=0.0,
+    )
+
+
+def is_coulomb(law: jl.JointLaw) -> bool:
+    """Is it plain Coulomb friction, without asperity angles and heights?"""
+    return law.orientation.a >= FLAT and law.heights is None and law.asperity.eta == 0
+
+
+def build_law(data: dict[str, Any], where: str) -> jl.JointLaw:
+    """A law from a scene's `[laws.NAME]` table; `kind` is "joint" (default) or "coulomb".
+
+    Raises ValueError.
+    """
+    table = Table(data, where)
+    kind = table.take("kind", str, "joint")
+    if kind == "coulomb":
+        law = coulomb_law(
+            table.take("normal_stiffness", float, above=0, say="(Pa/m)"),
+            table.take("shear_stiffness", float, above=0, say="(Pa/m)"),
+            table.take("friction", float, least=0, infinite=True, say="(a coefficient, no angle)"),
+        )
+        table.finish()
+        return law
+    if kind != "joint":
+        raise table.error("kind", "must be 'joint' or 'coulomb'")
+    keys = {key: value for key, value in data.items() if key != "kind"}
+    if keys.get("closure_only"):
+        raise SceneError(f"{where}.closure_only = true: joints between blocks shear; leave it out")
+    return jl.JointLaw.from_dict({"plane": 0.0, **keys}, where)

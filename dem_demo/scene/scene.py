@@ -1,0 +1,74 @@
+"""A scene in memory: blocks, laws, drives and how to run them."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+import jointlaw as jl
+
+from .blocks import Block
+from .drives import Drive
+from .rocks import Rock
+
+Key = tuple[int, int, int, int]  # of an interface: block, edge, block, edge
+
+
+@dataclass(frozen=True)
+class Run:
+    """How to run a scene; times in s, lengths in m."""
+
+    end: float
+    fraction: float = 0.3  # time step as a share of the limit
+    step: float | None = None  # or the time step itself
+    seat: bool = True  # start at the gravity closure
+    record: float = 0.05  # time between records
+    dashpot_normal: float = 0.05  # shares of critical
+    dashpot_shear: float = 0.05
+    law_steps: int = 1  # steps of the law per time step: 4 keeps the books within 0.5 % in impacts
+    largest_stress: float = 0.0  # Pa, expected in impacts: sets the step before anything touches
+    skin: float | None = None  # reach of the search for contacts; default 0.02 of the least width
+    point_spacing: float = np.inf  # largest distance of law points along a joint
+    corner_length: float | None = None  # of a corner on an edge; default 0.1 of the least width
+    max_overlap: float = 0.03  # share of the smaller block's width
+
+
+@dataclass(frozen=True)
+class Monitors:
+    """What to report on: joints as (moving block, base), points as (block, place in m)."""
+
+    slip: tuple[tuple[int, int], ...] = ()
+    shear: tuple[tuple[int, int], ...] = ()
+    pins: tuple[tuple[int, tuple[float, float]], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything that a simulation needs. `text` is the file it came from."""
+
+    title: str
+    blocks: tuple[Block, ...]
+    laws: dict[str, jl.JointLaw]
+    run: Run
+    default_law: str
+    pairs: dict[frozenset, str] = field(default_factory=dict)
+    rocks: tuple[Rock, ...] = ()
+    edge_laws: dict[tuple[int, int], str] = field(default_factory=dict)
+    drives: tuple[Drive, ...] = ()
+    gravity: tuple[float, float] = (0.0, -9.81)
+    thickness: float = 1.0
+    monitors: Monitors = Monitors()
+    text: str = ""
+
+    def law_of(self, key: Key) -> str:
+        """Name of the law of an interface (block, edge, block, edge).
+
+        The law of a [[joint]] table if one names the blocks; else that of the joint set that cut
+        both edges; else the scene's.
+        """
+        one, other = key[0], key[2]
+        for blocks in ((one, other), (one,), (other,)):
+            if law := self.pairs.get(frozenset(blocks)):
+                return law
+        law = self.edge_laws.get((one, key[1]))
+        same = law is not None and law == self.edge_laws.get((other, key[3]))
+        return law if same else self.default_law

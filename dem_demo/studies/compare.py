@@ -1,0 +1,126 @@
+"""The rocks of a scene one by one: for several seeds, with their own laws and with plain Coulomb.
+
+Plain Coulomb has the friction of the asperities themselves, the same in all directions, and
+stiffnesses like those of the joint at half the height of the rock. What it lacks is dilation,
+hardening and direction: the difference between the two runs is what these do.
+"""
+
+import time
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..dynamics.simulation import Simulation
+from ..errors import Refused
+from ..output.outcome import outcomes
+from ..output.record import Record
+from ..output.run import play
+from ..scene import DENSITY, GRAVITY, build, build_law, read_tables, turn
+
+FAR = 1.0  # m: a rock whose blocks have moved farther has failed, and need not go on
+
+
+def compare(
+    text: str, where: str, seeds: Sequence[int], until: float, tilt: float = 0.0
+) -> Iterator[dict]:
+    """Run every rock of a scene's text for each seed and each kind of law; yields outcomes.
+
+    until: model time to stop at (s); tilt: angle by which gravity is turned towards +x (degrees).
+    """
+    for case, data in _cases(text, seeds):
+        yield {**case, **_run(_tilted(data, tilt), where, until)}
+
+
+def critical_tilts(text: str, where: str, seeds: Sequence[int]) -> Iterator[dict]:
+    """For the same cases the turn of gravity (degrees) beyond which no balance is found.
+
+    Found by bisection to 0.1 degrees on the initial equilibrium, without running the blocks; None
+    if it is beyond 60 degrees either way.
+    """
+    for case, data in _cases(text, seeds):
+        rock = data["rock"][0]["name"]
+        yield {**case, "rock": rock, "critical_tilt": _bisect(data, where)}
+
+
+def _bisect(data: dict[str, Any], where: str) -> float | None:
+    def holds(tilt: float) -> bool:
+        return Simulation(build(_tilted(data, tilt), where)).balanced
+
+    step, low, high = 8.0, 0.0, 0.0
+    sense = 1.0 if holds(0.0) else -1.0
+    while holds(high) == (sense > 0):
+        low, high = high, high + sense * step
+        if abs(high) > 60:
+            return None
+    while abs(high - low) > 0.1:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if holds(middle) == (sense > 0) else (low, middle)
+    return 0.5 * (low + high)
+
+
+def _cases(text: str, seeds: Sequence[int]) -> Iterator[tuple[dict, dict[str, Any]]]:
+    """Every rock alone, for each seed and kind of law: what it is, and the scene's tables."""
+    data = read_tables(text)
+    for rock in _whole(data["rock"]):
+        joints = [j for j in data.get("joint", []) if _belongs(j, rock)]
+        for seed in seeds:
+            alone = {**data, "rock": [{**rock, "seed": seed}], "watch": {}, "joint": joints}
+            yield {"law": "joint", "seed": seed}, alone
+            plain = {name: _plain(law, rock, data) for name, law in data["laws"].items()}
+            run = {**data["run"], "max_overlap": 0.1}  # constant springs are soft in impacts
+            yield {"law": "coulomb", "seed": seed}, {**alone, "laws": plain, "run": run}
+
+
+def _tilted(data: dict[str, Any], tilt: float) -> dict[str, Any]:
+    gravity = turn(np.radians(tilt)) @ data.get("gravity", GRAVITY)
+    return {**data, "gravity": gravity.tolist()}
+
+
+def _run(data: dict[str, Any], where: str, until: float) -> dict:
+    started = time.perf_counter()
+    sim, trouble = Simulation(build(data, where)), ""
+    record = Record(sim)
+    try:
+        play(sim, record, until, lambda record: record.moved.max() > FAR)
+    except Refused as error:
+        trouble = str(error)
+    (outcome,) = outcomes(record)
+    return {
+        **outcome,
+        "time_s": sim.time,
+        "steps": sim.now.n,
+        "largest_energy_error": record.largest_error,
+        "refused": trouble,
+        "wall_time_s": time.perf_counter() - started,
+    }
+
+
+def _whole(tables: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The [[rock]] tables with what they are `like` filled in."""
+    known: dict[str, dict[str, Any]] = {}
+    for table in tables:
+        known[table["name"]] = {**known.get(table.get("like", ""), {}), **table, "like": ""}
+    return list(known.values())
+
+
+def _belongs(joint: dict[str, Any], rock: dict[str, Any]) -> bool:
+    if "around" not in joint:
+        return False
+    low, high = np.quantile(np.add(rock["outline"], rock.get("at", [0, 0])), [0, 1], axis=0)
+    return bool((low < joint["around"]).all() and (joint["around"] < high).all())
+
+
+def _plain(table: dict[str, Any], rock: dict[str, Any], data: dict[str, Any]) -> dict[str, Any]:
+    if table.get("kind", "joint") == "coulomb":
+        return table
+    height = np.ptp(np.array(rock["outline"], float)[:, 1])
+    stress = 0.5 * data.get("density", DENSITY) * np.hypot(*data.get("gravity", GRAVITY)) * height
+    law = build_law(table, "law")
+    stiffness = float(stress / law.closure(stress))
+    return {
+        "kind": "coulomb",
+        "normal_stiffness": stiffness,
+        "shear_stiffness": stiffness / law.asperity.lam,
+        "friction": law.asperity.mu,
+    }

@@ -1,0 +1,33 @@
+"""Every extreme alone and every two together: what must hold does, after every step."""
+
+import pytest
+
+from extremes.checks import refused, run
+from extremes.laws import SCALE, alone, build
+
+# what has no virgin curve that can be tabulated, or none that is convex, is refused when built
+REFUSED = "cannot be tabulated|not convex"
+# chosen to be refused: a population of eta near 0
+NONE = [
+    {"eta": eta, "heights": heights}
+    for eta in (0.0, 1e-6)
+    for heights in ("printed, population", "alpha = -0.5, overlap 0")
+]
+
+
+def ends(changes):
+    """Whether the mathematics ends before this law."""
+    return any(item.items() <= changes.items() for item in NONE)
+
+
+LAWS = [changes for changes in alone() if not ends(changes)]
+
+
+def examine(changes, seed, n=8, steps=32):
+    """Faults of one law: None when it was refused at construction, as it must be."""
+    if ends(changes):
+        with pytest.raises(ValueError, match=REFUSED):
+            build(**changes)
+        return None
+    law = build(**changes)
+    return run(law, SCALE, seed, n, steps) + refused(law, SCALE)

@@ -1,0 +1,116 @@
+"""critical_slip: the end of the in-plane offset follows the exact tractrix."""
+
+import numpy as np
+import pytest
+from builders import law
+from scipy.integrate import solve_ivp
+from slow_bed import SlowBed, cap_quadrature
+
+import jointlaw as jl
+
+D = 0.3
+CORNERS = np.array([[0.1, 0.05], [0.9, 0.4], [0.5, 1.2], [-0.8, 0.9], [-0.7, 0.9], [0.4, -0.6]])
+
+
+def tractrix(corners, length):
+    """Offset after an in-plane path: below the limit it moves along, at the limit it turns."""
+    o = np.zeros(2)
+    for leg in np.diff(corners, axis=0, prepend=0.0):
+        e, way = leg / np.linalg.norm(leg), np.linalg.norm(leg)
+        # from inside, straight on until |o| = length
+        along = o @ e
+        free = min(way, -along + np.sqrt(max(along**2 + length**2 - o @ o, 0.0)))
+        o, rest = o + free * e, way - free
+        if rest > 1e-14:
+            solved = solve_ivp(
+                lambda s, x, e=e: e - (x @ e) * x / length**2, (0.0, rest), o, rtol=1e-12,
+                atol=1e-14, method="DOP853",
+            )  # fmt: skip
+            o = solved.y[:, -1]
+    return o
+
+
+@pytest.mark.parametrize("division", [1, 3, 50])
+@pytest.mark.parametrize("formation", [None, "population"])
+def test_the_offset_follows_the_tractrix_in_steps_of_any_size(formation, division):
+    """Without friction the traction tells the offset: compare with an unlimited joint put there."""
+    limited = law(mu=0.0, formation=formation, critical_slip=D).joint()
+    limited.update([0.8, 0.0, 0.0])
+    for k, leg in enumerate(np.diff(CORNERS, axis=0, prepend=0.0)):
+        for _ in range(division):
+            F = limited.update([0.0, *(leg / division)])[0]
+        free = law(mu=0.0, formation=formation).joint()
+        exact = free.update([0.8, *tractrix(CORNERS[: k + 1], D)])[0]
+        # the turning is solved in closed form: the integration's 1e-12 and rounding are left
+        assert np.allclose(F, exact, rtol=0.0, atol=1e-10)
+
+
+def test_below_the_limit_nothing_changes():
+    rng = np.random.default_rng(3)
+    inside = rng.normal(0.0, 1.0, (40, 2))
+    inside *= 0.99 * D * rng.random((40, 1)) / np.linalg.norm(inside, axis=1)[:, None]
+    limited, free = law(critical_slip=D).joint(), law().joint()
+    steps = np.column_stack([rng.uniform(-0.2, 0.3, 40), np.diff(inside, axis=0, prepend=0.0)])
+    for d in steps:
+        assert np.array_equal(limited.update(d)[0], free.update(d)[0])
+
+
+def test_friction_and_dilation_settle_beyond_the_limit():
+    joint = law(critical_slip=D).joint()
+    joint.update([1.0, 0.0, 0.0])
+    for _ in range(200):
+        F = joint.update([0.0, 0.05, 0.0])[0]
+    later = joint.update([0.0, 0.05, 0.0])[0]
+    assert np.allclose(later, F, rtol=1e-12)  # steady: the state repeats but for rounding
+    for _ in range(400):
+        back = joint.update([0.0, -0.05, 0.0])[0]
+    # a long way back is the mirror image of the way there
+    assert np.allclose(back, F * [1.0, -1.0, 1.0], rtol=1e-9, atol=1e-12)
+
+
+def test_motion_at_the_limit_with_friction_agrees_with_the_slow_bed():
+    n, w = cap_quadrature(3.0, 0.5, 0.1, 8, 24)
+    reach = 1.01 * (1.0 + D * np.hypot(n[:, 1], n[:, 2]) / n[:, 0])
+    bed = SlowBed(n, w, reach, K=1.0, lam=1.2, eta=0.5, mu=0.4, density=1.0, n_depth=200,
+                  max_step=0.004, critical_slip=D)  # fmt: skip
+    joint = law(critical_slip=D, resolution=jl.Resolution(6, 12, 24)).joint()
+    bed.update([0.9, 0.0, 0.0])
+    joint.update([0.9, 0.0, 0.0])
+    exact, F = [], []
+    for leg in np.diff(CORNERS, axis=0, prepend=0.0):
+        for _ in range(20):
+            exact.append(bed.update([0.0, *(leg / 20)]))
+            for _ in range(16):
+                joint.update([0.0, *(leg / 320)], tangent=False)
+            F.append(joint.F)
+    gap = np.linalg.norm(np.subtract(F, exact), axis=1).max()
+    # as without a limit; the bed's small radial returns of 1 % of D_c are converged to 0.05 %
+    assert gap < 3e-3 * np.linalg.norm(exact, axis=1).max()
+
+
+def test_dissipation_at_the_limit_is_never_negative():
+    rng = np.random.default_rng(8)
+    joints = law(mu=0.0, c=0.2, critical_slip=D).joints(200)  # no friction: no other loss
+    lost = np.zeros(200)
+    for _ in range(20):
+        d = rng.normal(0.0, 0.4, (200, 3)) * [0.3, 1.0, 1.0]
+        d[:, 0] += 0.5 - joints.delta[:, 0]
+        joints.update(d)
+        assert np.min(joints.dissipated_energy - lost) > -1e-15
+        lost = joints.dissipated_energy
+    assert np.min(lost) > 0.0
+
+
+def test_steady_friction_under_constant_stress_tends_to_the_steepest_contacts():
+    """atan(mu) + 90 deg/a for a critical slip far above the closure: the joint rides up its rim."""
+    gaps = []
+    for length in (100.0, 1000.0):
+        one = law(b=0.0, c=0.0, mu=0.3, plane=0.0, critical_slip=length,
+                  resolution=jl.Resolution(60, 60, 1))  # fmt: skip
+        stress = float(one.normal_stress(1.0))
+        record = jl.direct_shear(one.joint(), 6.0 * length, normal=stress, steps=60)
+        friction = np.degrees(np.arctan2(record.F2[-1], record.F1[-1]))
+        gaps.append(np.degrees(np.arctan(0.3)) + 30.0 - friction)
+    # the loaded rim narrows as the root of closure over length: sqrt(10) = 3.2 times a decade
+    assert gaps[0] > 2.0 * gaps[1] > 0.0
+    assert gaps[1] < 1.0

@@ -17,6 +17,7 @@ from ..support.files import replace_file
 from ..support.progress import track
 from ..support.pyplot import pyplot, written
 from .estimate import Estimate
+from .forward import build_for_shear
 from .measured import ClosureCurve, ShearCurve
 from .priors import Ranges, Values, transform_of
 from .problem import pose, solve, starting_points

@@ -4,8 +4,8 @@
 
 Largest error of the traction on the standard paths, in per cent: median over the laws, and the 90th
 percentile in brackets; then that of the named resolutions for each preset. Laws are drawn as in
-benchmarks/tolerance.py, a >= 1.4, with the presets, motion in one plane. Plain nodes are Gauss-Legendre inclinations, and depths
-(i/n)^1.5 of closure_range (1 + tan theta).
+benchmarks/tolerance.py, a >= 1.4, with the presets, motion in one plane. Plain nodes are
+Gauss-Legendre inclinations, and depths (i/n)^1.5 of closure_range (1 + tan theta).
 """
 
 from __future__ import annotations

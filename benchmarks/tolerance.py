@@ -130,7 +130,10 @@ def misses(law: jl.JointLaw, rng: np.random.Generator) -> list[dict[str, Any]]:
             continue
         took = time.perf_counter() - start
         mine = slip(made, law.closure_range, stress, shares)
-        both = errors(tractions(made, d), truth)[0], errors(mine.F, slid.F)[0]
+        both = (
+            errors(tractions(made, d), truth)[0],
+            errors(mine.F[slid.counts], slid.F[slid.counts])[0],
+        )
         ratio = np.concatenate(both) / tolerance
         r = made.resolution
         found.append({"ratio": ratio.tolist(), "sliders": made.tables.sliders, "seconds": took,

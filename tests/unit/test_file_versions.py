@@ -25,7 +25,7 @@ def law():
 
 def test_a_law_of_version_1(law):
     assert law.orientation == jl.Orientation(3.0, 0.5, 0.1)
-    assert law.resolution == jl.Resolution(1, 3, 2)
+    assert law.resolution == jl.Resolution(2, 3, 2)  # "fast"
     assert law.critical_slip == 1e-3
     assert "version = 1" in law.to_toml()
 

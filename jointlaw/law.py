@@ -206,7 +206,8 @@ class JointLaw:
 
         resolutions: those to measure; None takes a spread of 42 and the named ones. joints: of the
         batch that is timed; 0 times nothing. seconds: spent on each timing. Errors are those of the
-        standard paths within the closure range, as shares of each path's largest traction.
+        standard paths, as shares of each path's largest traction, and of the friction and dilation
+        angle under slip, in degrees.
         """
         from .accuracy.tradeoff import tradeoff  # loads scipy.interpolate, slow to import
 
@@ -217,9 +218,10 @@ class JointLaw:
 
         tolerance: largest error of the traction on a path, as a share of the path's largest
         traction, > 0: 0.01 is one per cent. Held with a margin on the standard paths and on 128
-        random ones within the law's closure range (`jointlaw.accuracy.suite`); nothing is timed, so
-        the answer is the same on every machine. Takes seconds, at 0.001 minutes for steep
-        facets, without the compiled kernel more. Raises ValueError where no resolution tried is
+        random ones within the law's closure range, and under slip to three critical slips, or 30
+        closure ranges, where friction is mobilised (`jointlaw.accuracy.suite`); nothing is timed,
+        so the answer is the same on every machine. Takes seconds to a minute, below 0.01 minutes,
+        without the compiled kernel more. Raises ValueError where no resolution tried is
         that accurate.
         """
         from .accuracy.tolerance import at_tolerance

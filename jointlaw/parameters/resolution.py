@@ -36,7 +36,7 @@ class Resolution:
 NAMED = {
     "fast": Resolution(2, 3, 2),
     "balanced": Resolution(3, 5, 3),
-    "fine": Resolution(5, 6, 10),
+    "fine": Resolution(5, 6, 8),
     "reference": Resolution(16, 10, 24),
 }
 

@@ -1,6 +1,7 @@
 """Every file that a program reads back carries a version; specimens of each are kept and read.
 
-`specimens/` holds what version 0.2 wrote, with states of the nodes of today: older ones are refused. A change of a format keeps them and adds new ones beside
+`specimens/` holds what version 0.2 wrote, with states of the nodes of today (older ones are
+refused). A change of a format keeps them and adds new ones beside
 them; a version that is no longer read is refused with the remedy.
 """
 

@@ -52,14 +52,10 @@ Words = list[str]
 def main(arguments: Words | None = None) -> int:
     """Entry point; returns the exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    verbs = {
-        "new": _new, "check": _check, "resume": _resume, "compare": _compare, "ablate": _ablate,
-    }  # fmt: skip
+    verb = words.pop(0) if words and words[0] and words[0] in COMMANDS else ""
+    command, *about = COMMANDS[verb]
     try:
-        if words and words[0] in verbs:
-            verbs[words[0]](words[1:])
-        else:
-            _run(words)
+        command(_parse(words, verb, *about))
     except (SceneError, Refused, jl.PathError, ValueError, OSError) as error:
         print(f"dem_demo: {error}", file=sys.stderr)
         return 2
@@ -81,27 +77,15 @@ def _parse(words: Words, verb: str, about: str, example: str, *options: str) -> 
     return parser.parse_args(words)
 
 
-def _run(words: Words) -> None:
-    options = "scene or default", "--out", "--until", "--no-pictures"
-    given = _parse(words, "", ABOUT, "tilt --out out/tilt", *options)
+def _run(given: argparse.Namespace) -> None:
     _go(Simulation(load(given.scene)), given)
 
 
-def _resume(words: Words) -> None:
-    about = "Go on from a saved state; without --step bit for bit as if never stopped."
-    example = "resume out/tilt/state --until 45 --out out/longer"
-    options = "state", "--out", "--until", "--no-pictures", "--step"
-    given = _parse(words, "resume", about, example, *options)
+def _resume(given: argparse.Namespace) -> None:
     _go(Simulation.load(given.state, given.step), given)
 
 
-def _ablate(words: Words) -> None:
-    about = (
-        "Run a scene without each of its ingredients in turn: what it changes in the outcome "
-        "(differences against the whole scene) and in the time (ratios)."
-    )
-    example = "ablate shear-box --out out/ablation"
-    given = _parse(words, "ablate", about, example, "scene", "--out", "--until")
+def _ablate(given: argparse.Namespace) -> None:
     given.out.mkdir(parents=True, exist_ok=True)  # a folder that cannot be is known before the work
     rows = ablate.ablate(load(given.scene), given.until)
     ablate.write(rows, given.out)
@@ -109,30 +93,19 @@ def _ablate(words: Words) -> None:
     print(f"results in {given.out}: ablation.csv, ablation.md, summary.json")
 
 
-def _new(words: Words) -> None:
-    about = "Write a commented scene of a rock slope cut by joint sets, ready to run."
-    file = _parse(words, "new", about, "new my-slope.toml", "file").file
-    if file.exists():
-        raise ValueError(f"{file} exists: give another name")
-    replace_file(file, TEMPLATE.read_bytes())
-    print(f"{file} written; next: python -m dem_demo check {file}")
+def _new(given: argparse.Namespace) -> None:
+    if given.file.exists():
+        raise ValueError(f"{given.file} exists: give another name")
+    replace_file(given.file, TEMPLATE.read_bytes())
+    print(f"{given.file} written; next: python -m dem_demo check {given.file}")
 
 
-def _check(words: Words) -> None:
-    about = "Read a scene file, find its initial equilibrium and its time step; run nothing."
-    given = _parse(words, "check", about, "check my-scene.toml", "scene")
+def _check(given: argparse.Namespace) -> None:
     _announce(Simulation(load(given.scene)))
     print("the scene is valid")
 
 
-def _compare(words: Words) -> None:
-    about = (
-        "Run every rock of a scene alone, cut with several seeds, with its own laws and with plain "
-        "Coulomb friction of its asperities. What moves 1 m has failed and stops."
-    )
-    example = "compare slope --seeds 1 2 3 --until 10"
-    options = "scene", "--seeds", "--until", "--critical", "--tilt", "--out of numbers"
-    given = _parse(words, "compare", about, example, *options)
+def _compare(given: argparse.Namespace) -> None:
     scene = load(given.scene)
     if not scene.rocks:
         raise ValueError(f"{given.scene} has no [[rock]] to compare")
@@ -199,3 +172,39 @@ def _slip(slip: dict) -> str:
     if angle is None:
         return f"{slip['block']}: no slip (the law alone says {alone})"
     return f"{slip['block']}: slipped at {angle:.2f} degrees, the law alone says {alone}"
+
+
+COMMANDS = {  # what each does, and for its help: about, example, OPTIONS
+    "": (
+        _run, ABOUT, "tilt --out out/tilt",
+        "scene or default", "--out", "--until", "--no-pictures",
+    ),
+    "new": (
+        _new, "Write a commented scene of a rock slope cut by joint sets, ready to run.",
+        "new my-slope.toml", "file",
+    ),
+    "ablate": (
+        _ablate,
+        "Run a scene without each of its ingredients in turn: what it changes in the outcome "
+        "(differences against the whole scene) and in the time (ratios).",
+        "ablate shear-box --out out/ablation", "scene", "--out", "--until",
+    ),
+    "check": (
+        _check,
+        "Read a scene file, find its initial equilibrium and its time step; run nothing.",
+        "check my-scene.toml", "scene",
+    ),
+    "compare": (
+        _compare,
+        "Run every rock of a scene alone, cut with several seeds, with its own laws and with plain "
+        "Coulomb friction of its asperities. What moves 1 m has failed and stops.",
+        "compare slope --seeds 1 2 3 --until 10",
+        "scene", "--seeds", "--until", "--critical", "--tilt", "--out of numbers",
+    ),
+    "resume": (
+        _resume,
+        "Go on from a saved state; without --step bit for bit as if never stopped.",
+        "resume out/tilt/state --until 45 --out out/longer",
+        "state", "--out", "--until", "--no-pictures", "--step",
+    ),
+}  # fmt: skip

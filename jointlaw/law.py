@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .discretisation.facets import Facets, facet_sum, facets
+from .discretisation.facets import Facets, facet_sum, facets, yield_sum
 from .discretisation.tables import UNDERFLOW, VERSION, Tables, largest_reach, tables
-from .discretisation.virgin_closure import VirginClosure
-from .discretisation.virgin_curve import VirginCurve, virgin_curve
+from .discretisation.virgin_curve import VirginClosure, VirginCurve, virgin_curve
 from .joints.batch import JointBatch
 from .joints.joint import Joint
 from .kernels import reference
@@ -44,7 +43,7 @@ class JointLaw:
     heights: distribution of asperity heights, or None when all asperities touch at zero closure.
     asperity_density: N, asperities per m2, > 0.
     closure_range: largest closure (m) that the depth cells are placed for, > 0; beyond it the
-        normal force stays exact. None takes the closure at 20 MPa.
+        normal force stays exact. None takes the closure at 20 MPa without yielding.
     resolution: "fast", "balanced", "fine", "reference" or a `Resolution`.
     plane: None for motion in 3-D, or the azimuth (rad) of the one plane in which the joint moves:
         vectors then have two components, closure and shear along the plane. The traction across
@@ -146,16 +145,25 @@ class JointLaw:
     # ----------------------------------------------------- virgin closure curve
 
     def normal_stress(self, closure: ArrayLike) -> Any:
-        """Normal stress (Pa) of a joint closed from zero to `closure` (m), unsheared."""
-        return self._virgin.stress(self._within_reach(closure))[()]
+        """Normal stress (Pa) of a joint closed from zero to `closure` (m), unsheared.
+
+        With a yield_interference that of the first loading, of infinitely many depth cells: a
+        joint's own few slip a little later.
+        """
+        return self._first_loading.stress(self._within_reach(closure))[()]
 
     def closure(self, normal_stress: ArrayLike) -> Any:
-        """Closure (m) at which the normal stress (Pa, >= 0) is reached: inverse of the above."""
+        """Closure (m) at which the normal stress (Pa, >= 0) is reached: inverse of the above.
+
+        Raises ValueError for a stress that yielding asperities never reach.
+        """
         stress = finite("normal_stress", normal_stress, "Pa")
         if not (stress >= 0).all():
             raise ValueError(f"normal_stress = {normal_stress!r} is out of bounds: it must be >= 0")
         start = self.closure_range
-        result = np.array([self._virgin.closure(float(one), start) for one in stress.ravel()])
+        result = np.array(
+            [self._first_loading.closure(float(one), start) for one in stress.ravel()]
+        )
         return result.reshape(stress.shape)[()]
 
     def contacts(self, closure: ArrayLike, direction: tuple[float, float] | None = None) -> Any:
@@ -269,12 +277,18 @@ class JointLaw:
 
     @cached_property
     def _virgin(self) -> VirginClosure:
-        """Closure without shear."""
+        """Closure without shear of elastic asperities."""
         p = self.asperity
         return VirginClosure(self.curve, facet_sum(self.facets.theta, self._scale, p.lam, p.mu))
 
+    @cached_property
+    def _first_loading(self) -> VirginClosure:
+        """Closure without shear of asperities that yield."""
+        yielding = yield_sum(self.facets.theta, self._scale, self.asperity)
+        return self._virgin._replace(yielding=yielding)
+
     def _default_range(self) -> float:
-        """The closure (m) at 20 MPa."""
+        """The closure (m) at 20 MPa of elastic asperities: those that yield may not bear it."""
         try:
             return self._virgin.closure(DEFAULT_STRESS, 1.0)
         except ValueError:

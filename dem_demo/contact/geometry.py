@@ -31,7 +31,8 @@ class Outlines:
     """Corners of all blocks in one list: edge i starts at corner i and ends at corner next[i].
 
     local (c,): corners from the centroids; way (c,): directions of the edges; length (c,) of the
-    edges; block, before, next (c,): numbers; start (blocks,): first corner of each block.
+    edges; block, before, next (c,): numbers; number (c,): of each edge in its block; start
+    (blocks,): first corner of each block.
     """
 
     def __init__(self, blocks: Sequence[Block]) -> None:
@@ -39,8 +40,8 @@ class Outlines:
         self.start = np.cumsum(sizes) - sizes
         self.block = np.repeat(np.arange(len(blocks)), sizes)
         first, size = self.start[self.block], sizes[self.block]
-        place = np.arange(len(first)) - first
-        self.next, self.before = first + (place + 1) % size, first + (place - 1) % size
+        self.number = np.arange(len(first)) - first
+        self.next, self.before = first + (self.number + 1) % size, first + (self.number - 1) % size
         self.local = np.concatenate([block.local for block in blocks]) @ [1, 1j]
         edge = self.local[self.next] - self.local
         self.length = np.abs(edge)
@@ -50,6 +51,15 @@ class Outlines:
         """Corners and directions of edges (c,) for a motion (6, n) of the blocks."""
         turn = np.exp(1j * motion[2])[self.block]
         return (motion[0] + 1j * motion[1])[self.block] + turn * self.local, turn * self.way
+
+    def flatter(self, corner: np.ndarray, rise: np.ndarray) -> np.ndarray:
+        """The edge at each corner (k,) that lies flatter; rise (2, k) as in `Points`."""
+        return np.where(rise[0] < rise[1], self.before[corner], corner)
+
+    def interfaces(self, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+        """Block, edge, block, edge (k, 4) of edges (k,) that meet, the first block first."""
+        edges = np.sort([one, other], axis=0)
+        return np.stack([self.block[edges], self.number[edges]], axis=1).reshape(4, -1).T
 
 
 class Contacts:

@@ -1,7 +1,7 @@
 """The law's side: one batch of joints per law, one call per law and step.
 
-Law points come and go; each keeps a slot of its law's batch for as long as its interface is in
-reach, so history is never given to the wrong joint.
+Law points come and go; each keeps its joint in the pool of its law for as long as its interface
+is in reach, so history is never given to the wrong joint.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,7 +16,7 @@ from .stiffness import StiffnessCurve
 
 MEASURED = ("sliding", "slipping", "separated", "stored", "lost")
 
-BatchState = tuple[jl.JointState, dict[Identity, int], list[int]]  # and slots taken, slots free
+PoolState = tuple[list[Identity], jl.JointState]  # law points, and their joints in that order
 
 
 class Joints:
@@ -27,10 +27,8 @@ class Joints:
 
     def __init__(self, laws: dict[str, jl.JointLaw], choose: Callable[[Key], str]) -> None:
         self.laws, self.choose = laws, choose
-        self.batches = {name: law.joints(0) for name, law in laws.items()}
+        self.pools = {name: jl.JointPool(law) for name, law in laws.items()}
         self.curves = {name: StiffnessCurve.of(law) for name, law in laws.items()}
-        self._slots: dict[str, dict[Identity, int]] = {name: {} for name in laws}
-        self._free: dict[str, list[int]] = {name: [] for name in laws}
         self.assign([])
 
     def assign(self, points: Sequence[Identity]) -> None:
@@ -40,28 +38,13 @@ class Joints:
             of_law[self.choose(key)].append(i)
         self.groups = []
         for name, rows in of_law.items():
-            slots = self._place(name, [points[i] for i in rows])
-            size = len(self.batches[name])
-            straight = len(slots) == size and (slots == np.arange(size)).all()
-            all_points = len(rows) == len(points)
+            pool = self.pools[name]
+            places = pool.assign(points[i] for i in rows)
             if rows:
-                where = None if straight else slots
-                self.groups.append((name, slice(None) if all_points else np.array(rows), where))
+                whole = np.array_equal(places, np.arange(len(pool.batch)))
+                self.groups.append((name, np.array(rows), None if whole else places))
         self.n = len(points)
         self.measure()
-
-    def _place(self, name: str, wanted: list[Identity]) -> np.ndarray:
-        taken, free, batch = self._slots[name], self._free[name], self.batches[name]
-        for gone in set(taken) - set(wanted):
-            free.append(taken.pop(gone))
-        free.sort(reverse=True)
-        for new in (p for p in wanted if p not in taken):
-            if not free:
-                free.append(len(batch))
-                batch.resize(len(batch) + 1)
-            taken[new] = free.pop()
-            batch.reset(np.array([taken[new]]))
-        return np.array([taken[p] for p in wanted], int)
 
     def increments(self, closure: np.ndarray, sliding: np.ndarray) -> np.ndarray:
         """(k, 2): closure is absolute, from geometry; sliding (m) is what this step added."""
@@ -73,34 +56,34 @@ class Joints:
         The law's friction work is first order in its step: parts sharpen the books in impacts.
         """
         F, d = np.empty((self.n, 2)), d / parts
-        for name, rows, where in self.groups:
+        for name, rows, places in self.groups:
             for _ in range(parts):
-                F[rows] = self.batches[name].update(d[rows], where=where, tangent=False)[0]
+                F[rows] = self.pools[name].batch.update(d[rows], where=places, tangent=False)[0]
         self.measure()
         return F
 
     def measure(self) -> None:
         """Take the shares and energies of now: sliding, slipping, separated, stored, lost."""
         self.now: dict[str, np.ndarray] = {what: np.zeros(self.n) for what in MEASURED}
-        for name, rows, where in self.groups:
-            batch = self.batches[name]
+        for name, rows, places in self.groups:
+            batch = self.pools[name].batch
             values = [*batch.measures()[:4], batch.dissipated_energy]
             for what, value in zip(MEASURED, values, strict=True):
-                self.now[what][rows] = value if where is None else value[where]
+                self.now[what][rows] = value if places is None else value[places]
 
     def trial(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Tractions (k, 2) and tangents (k, 2, 2) for d, leaving the state alone."""
         F, C = np.empty((self.n, 2)), np.empty((self.n, 2, 2))
-        for name, rows, where in self.groups:
-            F[rows], C[rows] = self.batches[name].trial(d[rows], where=where, tangent=True)
+        for name, rows, places in self.groups:
+            F[rows], C[rows] = self.pools[name].batch.trial(d[rows], where=places)
         return F, C
 
     def read(self, what: str) -> np.ndarray:
         """A property of all joints with two components: "delta" or "F"."""
         out = np.zeros((self.n, 2))
-        for name, rows, where in self.groups:
-            value = getattr(self.batches[name], what)
-            out[rows] = value if where is None else value[where]
+        for name, rows, places in self.groups:
+            value = getattr(self.pools[name].batch, what)
+            out[rows] = value if places is None else value[places]
         return out
 
     def virgin(
@@ -118,24 +101,19 @@ class Joints:
 
     def renew(self, point: Identity) -> None:
         """Make the joint of a law point virgin again."""
-        name = self.choose(point[0])
-        self.batches[name].reset(np.array([self._slots[name][point]]))
+        pool = self.pools[self.choose(point[0])]
+        pool.batch.reset(pool.add([point]))
         self.measure()
 
-    def snapshot(self) -> dict[str, BatchState]:
-        """A copy of all state, with the slots."""
-        return {
-            name: (batch.snapshot(), dict(self._slots[name]), list(self._free[name]))
-            for name, batch in self.batches.items()
-        }
+    def snapshot(self) -> dict[str, PoolState]:
+        """A copy of all state, by law."""
+        return {name: (pool.keys, pool.snapshot()) for name, pool in self.pools.items()}
 
-    def restore(self, state: dict[str, BatchState], points: Sequence[Identity]) -> None:
+    def restore(self, state: dict[str, PoolState], points: Sequence[Identity]) -> None:
         """Back to a snapshot whose law points were `points`. Raises ValueError for another's."""
-        held = {point for _, slots, _ in state.values() for point in slots}
-        if set(state) != set(self.batches) or held != set(points):
+        held = {point for keys, _ in state.values() for point in keys}
+        if set(state) != set(self.pools) or held != set(points):
             raise ValueError("the state's joints are not those of the scene's laws and law points")
-        for name, (values, slots, free) in state.items():
-            self.batches[name].resize(len(slots) + len(free))
-            self.batches[name].restore(values)
-            self._slots[name], self._free[name] = dict(slots), list(free)
+        for name, (keys, joints) in state.items():
+            self.pools[name].restore(keys, joints)
         self.assign(points)

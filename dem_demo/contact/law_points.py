@@ -27,7 +27,7 @@ class LawPoints:
     """The law points of a moment: k corners on edges, then the points along long overlaps.
 
     keys: of the k corners when found; numbers (k,): their names for life; closure_offset (k,): the
-    depth (m) that each had to give up (see `dynamics.transfer`); overlaps: edges on edges that
+    depth (m) that each had to give up (see `dynamics.step`); overlaps: edges on edges that
     have points along them; given: numbers given so far; renewed_at (3, blocks): motion when last
     renewed; urgent: must be renewed, whatever has moved.
     """
@@ -55,8 +55,6 @@ class LawPoints:
 
     def closure(self, points: Points) -> np.ndarray:
         """Closure (n,) that the joints see: the depth less the closure offset of its corner."""
-        if not self.closure_offset.any():
-            return points.closure
         k = len(self.closure_offset)
         offset = np.where(points.closure[:k] > 0, self.closure_offset, 0.0)
         return points.closure - np.pad(offset, (0, len(points.closure) - k))
@@ -159,13 +157,15 @@ class Tracker:
         """
         pairs = np.array(sorted(p for p in near if not self._fixed[list(p)].all()), int)
         found = self.narrow_phase(motion, pairs.reshape(-1, 2), law_points.contacts)
-        keys, known, fresh, stay = found.keys(self.outlines), {}, [], []
+        flat = self.outlines.flatter(found.corner, found.rise)
+        keys = list(map(tuple, self.outlines.interfaces(flat, found.edge).tolist()))
+        known, fresh, stay = {}, [], []
         for i, who in enumerate(law_points.contacts.pairs()):
             known.setdefault(who, i)
         for i, who in enumerate(zip(found.corner.tolist(), found.edge.tolist(), strict=True)):
             old = known.get(who)
             if old is not None and (
-                found.depth[i] > 0 or self._same(law_points.keys[old], keys[i])
+                found.depth[i] > 0 or self.law_of(law_points.keys[old]) == self.law_of(keys[i])
             ):
                 stay.append((old, i))
             elif found.depth[i] > -self.skin:
@@ -188,9 +188,6 @@ class Tracker:
         same = len(stay) == len(law_points.numbers) and not fresh
         return renewed, not (same and overlaps == law_points.overlaps)
 
-    def _same(self, one: Key, other: Key) -> bool:
-        return one == other or self.law_of(one) == self.law_of(other)
-
     def _long_overlaps(self, found: Found, chosen: list[int]) -> list[Key]:
         """Edges that lie on each other and are long enough for law points between the ends."""
         if not np.isfinite(self.spacing):
@@ -199,8 +196,7 @@ class Tracker:
         sides = np.stack([o.before[found.corner], found.corner])[:, chosen]
         lies = (np.abs(found.rise) < TILT) & (found.overlap > -self.skin)
         for s, i in np.argwhere(lies[:, chosen]).tolist():
-            pair = sorted((int(sides[s, i]), int(found.edge[chosen[i]])))
-            if spans(o.length[pair].min(), self.spacing) > 1:
-                one, other = (int(o.block[e]) for e in pair)
-                out.add((one, pair[0] - int(o.start[one]), other, pair[1] - int(o.start[other])))
+            pair = sides[s, i], found.edge[chosen[i]]
+            if spans(o.length[list(pair)].min(), self.spacing) > 1:
+                out.add(tuple(o.interfaces(*pair)[0].tolist()))
         return sorted(out)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import Refused
-from ..scene import Block, Key
+from ..scene import Block
 from .geometry import Contacts, Outlines, Points, evaluate
 from .smoothing import CORNER
 
@@ -28,14 +28,6 @@ class Found(NamedTuple):
     depth: np.ndarray
     rise: np.ndarray
     overlap: np.ndarray
-
-    def keys(self, outlines: Outlines) -> list[Key]:
-        """Blocks and edges that meet: of the two sides of a corner the one that lies flatter."""
-        o = outlines
-        side = np.where(self.rise[0] < self.rise[1], o.before[self.corner], self.corner)
-        ends = np.minimum(side, self.edge), np.maximum(side, self.edge)
-        first, second = (np.stack([o.block[e], e - o.start[o.block[e]]]) for e in ends)
-        return [tuple(key) for key in np.concatenate([first, second]).T.tolist()]
 
 
 class NarrowPhase:

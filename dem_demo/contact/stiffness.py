@@ -51,14 +51,6 @@ class StiffnessCurve:
         """Normal stress (Pa) of a virgin joint at a closure."""
         return np.interp(closure, self.closure, self.stress)
 
-    def work_at(self, closure: float) -> float:
-        """Work (J/m2) that a virgin joint takes up to a closure (m)."""
-        return float(np.interp(closure, self.closure, self.work))
-
-    def closure_at_work(self, work: float) -> float:
-        """Closure (m) at which a virgin joint has taken up `work` (J/m2)."""
-        return float(np.interp(work, self.work, self.closure))
-
 
 def _largest_stiffness(law: jl.JointLaw, closure: np.ndarray) -> np.ndarray:
     """Largest eigenvalue (Pa/m) of a joint's stiffness.

@@ -38,17 +38,14 @@ class Ledger:
     @property
     def total(self) -> float:
         """What the balance says is constant (J)."""
-        return _total(self.value)
+        v = self.value
+        held = v["kinetic"] + v["potential"] + v["stored"]
+        return held + v["friction"] + v["dashpots"] + v["dropped"] - v["work"]
 
     @property
     def error(self) -> float:
         """Imbalance as a share of the energy turned over."""
         return (self.total - self.start) / self.value["turned"] if self.value["turned"] else 0.0
-
-
-def _total(v: dict[str, float]) -> float:
-    held = v["kinetic"] + v["potential"] + v["stored"]
-    return held + v["friction"] + v["dashpots"] + v["dropped"] - v["work"]
 
 
 def opened(inertia, velocity, forces, dt: float, area, stored, lost) -> Ledger:
@@ -58,7 +55,7 @@ def opened(inertia, velocity, forces, dt: float, area, stored, lost) -> Ledger:
     v["kinetic"] = float((0.5 * inertia * (velocity**2 - kick**2)).sum())
     v["stored"] = float(area @ stored)
     v["turned"] = v["kinetic"] + v["stored"]
-    return Ledger(v, _total(v), forces, area, lost)
+    return Ledger(v, v["turned"], forces, area, lost)
 
 
 def booked(

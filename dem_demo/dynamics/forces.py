@@ -3,8 +3,7 @@
 import numpy as np
 
 from ..contact import Joints, Points
-from .state import Layout, Moment
-from .system import System
+from .state import Layout, Moment, System
 
 
 def damping(layout: Layout, stiffness: np.ndarray) -> np.ndarray:

@@ -5,8 +5,7 @@ import numpy as np
 from ..contact import Contacts, Joints, Points, StiffnessCurve
 from ..errors import Refused
 from .forces import damping
-from .state import Limit, Moment
-from .system import System
+from .state import Limit, Moment, System
 
 HEADROOM = 1.25  # most growth of a joint's stiffness between two checks of the time step
 SAFE = 0.98  # largest time step as a share of the limit
@@ -67,10 +66,9 @@ def require_slow(system: System, motion: np.ndarray, dt: float) -> None:
 
 def require_shallow(system: System, contacts: Contacts, points: Points) -> None:
     """Refuse overlaps beyond run.max_overlap."""
-    pressed, depth = points.closure * (points.length > 0), system.tracker.narrow_phase.depth_limit
-    if pressed.max(initial=0.0) > depth.min():
-        a, b = contacts.a, contacts.b
-        limit = np.minimum(depth[a], depth[b])
+    pressed, search = points.closure * (points.length > 0), system.tracker.narrow_phase
+    pairs = np.stack([contacts.a, contacts.b])
+    limit = search.depth_limit[pairs].min(axis=0)
+    if (pressed > limit).any():
         i = int((pressed - limit).argmax())
-        if pressed[i] > limit[i]:
-            system.tracker.narrow_phase.refuse_overlap((a[i], b[i]), pressed[i], limit[i])
+        search.refuse_overlap(pairs[:, i], pressed[i], limit[i])

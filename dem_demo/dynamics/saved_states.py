@@ -18,15 +18,14 @@ import numpy as np
 import jointlaw as jl
 from jointlaw.support.files import replace_file
 
-from ..contact import BatchState, Joints
+from ..contact import Joints, PoolState
 from ..scene import Run, Scene, parse
 from . import guards
 from .energy import COLUMNS, Ledger
-from .state import Layout, Limit, Moment, State
-from .system import System
+from .state import Layout, Limit, Moment, State, System
 
 SCENE, STATE = "scene.toml", "state.npz"
-VERSION = 2  # of state.npz; version 1 was several files
+VERSION = 3  # of state.npz
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +33,7 @@ class Saved:
     """A copy of everything that the future depends on: arrays by name, and the joints' states."""
 
     arrays: dict[str, np.ndarray]
-    joints: dict[str, BatchState]
+    joints: dict[str, PoolState]
 
 
 def pack(now: State, joints: Joints, motion: np.ndarray) -> Saved:
@@ -96,11 +95,10 @@ def save(scene: Scene, saved: Saved, folder: Path) -> None:
     Raises ValueError for a scene that `text_of` refuses.
     """
     text, buffer, tables = text_of(scene), io.BytesIO(), {}
-    for i, (law, slots, free) in enumerate(saved.joints.values()):
+    for i, (points, law) in enumerate(saved.joints.values()):
         # numbered: a law's name may be no array's name
         tables[f"law-{i}"], tables[f"fingerprint-{i}"] = law.values, np.array(law.fingerprint)
-        tables[f"slots-{i}"] = np.array([[*k, p, s] for (k, p), s in slots.items()], int)
-        tables[f"free-{i}"] = np.array(free, int)
+        tables[f"points-{i}"] = np.array([[*key, number] for key, number in points], int)
     about = {"version": VERSION, "scene": fingerprint(scene)}
     np.savez(buffer, **about, **saved.arrays, **tables)
     folder.mkdir(parents=True, exist_ok=True)
@@ -110,23 +108,7 @@ def save(scene: Scene, saved: Saved, folder: Path) -> None:
 
 def load(folder: Path) -> tuple[Scene, Saved]:
     """The scene and the state that `save` wrote. Raises ValueError if they are not whole."""
-    data = _read(folder / STATE)
-    scene = parse((folder / SCENE).read_text(encoding="utf-8"), SCENE)
-    if data.pop("scene") != fingerprint(scene):
-        raise ValueError(
-            f"{folder / SCENE} is not the scene of this state: only end, record, fraction, "
-            "step, title and watch may change; undo the rest, or run it as a scene of its own"
-        )
-    joints = {}
-    for i, name in enumerate(scene.laws):
-        law = jl.JointState(str(data.pop(f"fingerprint-{i}")), data.pop(f"law-{i}"))
-        slots = {(tuple(s[:4]), s[4]): s[5] for s in data.pop(f"slots-{i}").tolist()}
-        joints[name] = law, slots, data.pop(f"free-{i}").tolist()
-    return scene, Saved(data, joints)
-
-
-def _read(file: Path) -> dict[str, np.ndarray]:
-    """The arrays of a file of this version."""
+    file = folder / STATE
     if not file.is_file():
         raise ValueError(
             f"{str(file.parent)!r} holds no saved state ({STATE} is missing): run the scene"
@@ -142,7 +124,18 @@ def _read(file: Path) -> dict[str, np.ndarray]:
             f"{file} has version {version}, this demo reads {VERSION}: go on with the version of "
             "the demo that wrote it, or run the scene again"
         )
-    return data
+    scene = parse((folder / SCENE).read_text(encoding="utf-8"), SCENE)
+    if data.pop("scene") != fingerprint(scene):
+        raise ValueError(
+            f"{folder / SCENE} is not the scene of this state: only end, record, fraction, "
+            "step, title and watch may change; undo the rest, or run it as a scene of its own"
+        )
+    joints = {}
+    for i, name in enumerate(scene.laws):
+        law = jl.JointState(str(data.pop(f"fingerprint-{i}")), data.pop(f"law-{i}"))
+        points = data.pop(f"points-{i}").tolist()
+        joints[name] = [(tuple(key), number) for *key, number in points], law
+    return scene, Saved(data, joints)
 
 
 def text_of(scene: Scene) -> str:

@@ -10,9 +10,8 @@ from ..contact import Joints
 from ..scene import Scene
 from . import guards, saved_states
 from .start import begin
-from .state import State
+from .state import State, System
 from .step import advance
-from .system import System
 from .world import World
 
 Saved = saved_states.Saved

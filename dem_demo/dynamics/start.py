@@ -11,8 +11,7 @@ from . import guards, timestep
 from .energy import opened
 from .forces import forces
 from .initial_equilibrium import equilibrium
-from .state import Layout, Moment, State
-from .system import System
+from .state import Layout, Moment, State, System
 
 ATTEMPTS = 40  # most rounds of the initial equilibrium
 SETTLED = 1e-10  # movement of a round, as a share of the first, that ends them

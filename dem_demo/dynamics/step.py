@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -9,11 +10,10 @@ from ..contact import Joints, LawPoints, Points, StiffnessCurve
 from . import guards
 from .energy import booked
 from .forces import forces
-from .state import Layout, Moment, State
-from .system import System
-from .transfer import transferred
+from .state import Layout, Moment, State, System
 
 NEAR = 0.4  # share of the step's limit below which no change of lever arms matters
+MATCH = 1e-6  # relative: lengths that are equal but for rounding
 LOOKS = 16  # steps between two looks at the drives
 
 
@@ -53,16 +53,10 @@ def advance(
         now, n=n, motion=motion, law_points=law_points.reopened(points), points=points,
         traction=traction, ledger=ledger, limit=limit,
     )  # fmt: skip
-    if n % LOOKS or not system.drives.waiting(after.time, after.reversed_at):
+    if n % LOOKS:
         return after
-    return replace(
-        after,
-        reversed_at=system.drives.reverse(
-            after.time,
-            after.reversed_at,
-            lambda moving, base: after.slid(joints, moving, base),
-        ),
-    )
+    slid = partial(after.slid, joints)
+    return replace(after, reversed_at=system.drives.reverse(after.time, now.reversed_at, slid))
 
 
 def _followed(
@@ -72,7 +66,7 @@ def _followed(
     tracker = system.tracker
     law_points, points, before = tracker.evaluate(now.law_points, motion)
     if law_points is not now.law_points:
-        now = transferred(joints, now, law_points, points, before, system.scene.thickness)
+        now = _transferred(joints, now, law_points, points, before, system.scene.thickness)
     if not tracker.stale(now.law_points, motion):
         return now, points
     if now.dt > NEAR * now.limit.now:  # lever arms have changed
@@ -82,6 +76,39 @@ def _followed(
         now = _rearranged(system, joints, now, law_points)
     law_points, points, _ = tracker.evaluate(law_points, motion)
     return replace(now, law_points=law_points), points
+
+
+def _transferred(
+    joints: Joints, now: State, law_points: LawPoints, points: Points, before: np.ndarray,
+    thickness: float,
+) -> State:  # fmt: skip
+    """The state with joints and books for the lengths of `points`, `before` (n,) in m.
+
+    Lengths match wherever an edge that lies on another, or a corner that stands on an edge, goes
+    on to the same. Else a joint that became shorter drops what it stored on the rest. One that
+    became longer would make energy: it starts anew instead, at a closure at which it holds what
+    the shorter one held; the rest of the depth becomes its closure offset.
+    """
+    stored = joints.now["stored"]
+    held, ratio = stored * before, points.length / np.maximum(before, 1e-300)
+    changed = np.flatnonzero((np.abs(ratio - 1) > MATCH) & (held > 0)).tolist()
+    ledger = now.ledger
+    area, lost = ledger.area.copy(), ledger.lost.copy()
+    offset = law_points.closure_offset.copy()
+    for i in changed:
+        length, kept = points.length[i], stored[i]
+        if ratio[i] > 1:
+            point = now.layout.identities[i]
+            curve, depth = joints.curve(point), law_points.closure(points)[i]
+            closure = min(np.interp(held[i] / length, curve.work, curve.closure), depth)
+            offset[i] += depth - closure
+            kept = np.interp(closure, curve.closure, curve.work)
+            joints.renew(point)
+            lost[i] = 0.0
+        ledger = ledger.dropping(max(float(held[i] - kept * length), 0.0) * thickness)
+        area[i] = length * thickness
+    law_points = replace(law_points, closure_offset=offset)
+    return replace(now, law_points=law_points, ledger=replace(ledger, area=area, lost=lost))
 
 
 def _rearranged(system: System, joints: Joints, now: State, law_points: LawPoints) -> State:

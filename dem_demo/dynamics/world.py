@@ -20,7 +20,6 @@ MOTION = (
     | batch.BodyFields.ANGULAR_VELOCITY
 )
 FORCES = batch.BodyFields.FORCE | batch.BodyFields.TORQUE
-X, Y, ANGLE, VX, VY, SPIN = range(6)
 
 
 class World:
@@ -47,13 +46,16 @@ class World:
             self.bodies.append(body)
             self._number[shape] = i
         self.space.on_collision(1, 1, begin=self._begin, separate=self._separate)
-        mover = next(
-            body for body, block in zip(self.bodies, blocks, strict=True) if not block.fixed
-        )
+        mover = next(body for body in self.bodies if body.body_type == pymunk.Body.DYNAMIC)
         self._hook = pymunk.SimpleMotor(mover, self.space.static_body, 0.0)
         self._hook.max_force = 0.0
         self.space.add(self._hook)
-        self._map_batch_order()
+        self._read, self._write = batch.Buffer(), batch.Buffer()
+        batch.get_space_bodies(self.space, batch.BodyFields.BODY_ID, self._read)
+        order = np.frombuffer(self._read.int_buf(), dtype=np.uintp).tolist()
+        self._from_batch = np.array([order.index(body.id) for body in self.bodies])
+        self._forces = np.zeros((len(order), 3))
+        self._write.set_float_buf(self._forces)
         self._find_first_pairs()
 
     def step(self, dt: float, forces: Callable[[np.ndarray], np.ndarray]) -> None:
@@ -65,7 +67,8 @@ class World:
 
         def before_velocities(_constraint, _space) -> None:
             try:
-                self._push(forces(self.motion()))
+                self._forces[self._from_batch] = forces(self.motion())
+                batch.set_space_bodies(self.space, FORCES, self._write)
             except BaseException as error:
                 trouble.append(error)
 
@@ -83,29 +86,15 @@ class World:
 
     def place(self, motion: np.ndarray) -> None:
         """Put the blocks where `motion` (6, n) says, bit for bit."""
-        for body, state in zip(self.bodies, motion.T.tolist(), strict=True):
-            body.position = (state[X], state[Y])
-            body.angle = state[ANGLE]
+        for body, (x, y, angle, *_) in zip(self.bodies, motion.T.tolist(), strict=True):
+            body.position, body.angle = (x, y), angle
             if body.body_type == pymunk.Body.DYNAMIC:
                 body.velocity, body.angular_velocity = (0.0, 0.0), 0.0
         self.space.reindex_static()
         self._find_first_pairs()
-        for body, state in zip(self.bodies, motion.T.tolist(), strict=True):
+        for body, (u, v, spin) in zip(self.bodies, motion[3:].T.tolist(), strict=True):
             if body.body_type == pymunk.Body.DYNAMIC:
-                body.velocity = (state[VX], state[VY])
-                body.angular_velocity = state[SPIN]
-
-    def _push(self, forces: np.ndarray) -> None:
-        self._forces[self._from_batch] = forces
-        batch.set_space_bodies(self.space, FORCES, self._write)
-
-    def _map_batch_order(self) -> None:
-        self._read, self._write = batch.Buffer(), batch.Buffer()
-        batch.get_space_bodies(self.space, batch.BodyFields.BODY_ID, self._read)
-        order = np.frombuffer(self._read.int_buf(), dtype=np.uintp).tolist()
-        self._from_batch = np.array([order.index(body.id) for body in self.bodies])
-        self._forces = np.zeros((len(order), 3))
-        self._write.set_float_buf(self._forces)
+                body.velocity, body.angular_velocity = (u, v), spin
 
     def _find_first_pairs(self) -> None:
         """Let pymunk look for pairs while nothing moves."""

@@ -33,26 +33,17 @@ class SlipMonitor:
     def look(self, sim: Simulation) -> None:
         """Note the base angle at which a joint passes its slip distance."""
         for (moving, base), entry in self.slips.items():
-            if _waits(entry) and sim.now.slid(sim.joints, moving, base) > entry["slip_distance"]:
+            waits = entry["slip_angle"] is None and not entry["slipped_before"]
+            if waits and sim.now.slid(sim.joints, moving, base) > entry["slip_distance"]:
                 entry["slip_angle"] = base_angle(sim, moving, base)
                 entry["slip_time"] = sim.time
 
-    @property
-    def waiting(self) -> bool:
-        """Is there a slip still to come?"""
-        return any(_waits(entry) for entry in self.slips.values())
-
     def report(self) -> list[dict]:
         """Measured and predicted slip angles (degrees)."""
-        out = []
-        for pair, entry in self.slips.items():
-            law = slip_angle(self.scene, *pair, self.lengths[pair])
-            out.append({**entry, **law})
-        return out
-
-
-def _waits(entry: dict) -> bool:
-    return entry["slip_angle"] is None and not entry["slipped_before"]
+        return [
+            entry | slip_angle(self.scene, *pair, self.lengths[pair])
+            for pair, entry in self.slips.items()
+        ]
 
 
 def base_angle(sim: Simulation, moving: int, base: int) -> float:
@@ -76,8 +67,7 @@ def readings(sim: Simulation) -> dict[str, float]:
     for moving, base in (*sim.scene.monitors.slip, *sim.scene.monitors.shear):
         name = blocks[moving].name
         row[f"{name}: base angle_deg"] = base_angle(sim, moving, base)
-        for key, value in _joint(sim, moving, base).items():
-            row[f"{name}: {key}"] = value
+        row |= {f"{name}: {key}": value for key, value in _joint(sim, moving, base).items()}
     for i, (block, point) in enumerate(sim.scene.monitors.pins):
         x, y, angle = sim.now.motion[:3, block]
         arm = np.asarray(point) - blocks[block].centroid

@@ -62,7 +62,7 @@ class Record:
         """history.csv, blocks.csv, joints.csv and history.npz."""
         names = [block.name for block in self.scene.blocks]
         header = ["time_s", *(f"{c}_J" for c in COLUMNS), "energy_error", *self.monitored[0]]
-        _csv(
+        write_csv(
             folder / "history.csv",
             header,
             (
@@ -70,7 +70,7 @@ class Record:
                 for t, e, w in zip(self.times, self.energy, self.monitored, strict=True)
             ),
         )
-        _csv(
+        write_csv(
             folder / "blocks.csv",
             ["time_s", "block", "x_m", "y_m", "angle_rad", "vx_m/s", "vy_m/s", "spin_rad/s"],
             (
@@ -79,7 +79,7 @@ class Record:
                 for name, state in zip(names, motion.T.tolist(), strict=True)
             ),
         )
-        _csv(
+        write_csv(
             folder / "joints.csv",
             ["time_s", "block_a", "edge_a", "block_b", "edge_b", "point", *JOINT_COLUMNS],
             (
@@ -143,18 +143,16 @@ def _who(contacts: Contacts, points: Points, numbers: list[int]) -> np.ndarray:
 
     Of the two edges at a corner the flatter one counts. Points along an edge have numbers below 0.
     """
-    c, o = contacts, contacts.outlines
-    side = np.where(points.rise[0] < points.rise[1], *c.sides)
-    one, other = np.minimum(side, c.edge), np.maximum(side, c.edge)
-    if c.along is not None:
-        u = c.along
+    o, one, other = contacts.outlines, contacts.corner, contacts.edge
+    one = o.flatter(one, points.rise)
+    if (u := contacts.along) is not None:
         one = np.concatenate([one, u.first[u.of]])
         other = np.concatenate([other, u.second[u.of]])
-    first, second = o.block[one], o.block[other]
-    return np.stack([first, one - o.start[first], second, other - o.start[second], numbers], axis=1)
+    return np.column_stack([o.interfaces(one, other), numbers])
 
 
-def _csv(path: Path, header, rows) -> None:
+def write_csv(path: Path, header, rows) -> None:
+    """A table with the names of its columns."""
     with path.open("w", newline="") as stream:
         writer = csv.writer(stream)
         writer.writerow(header)

@@ -52,10 +52,7 @@ class Block:
     @property
     def width(self) -> float:
         """Smallest width (m) over the directions of its edges."""
-        edge = np.roll(self.corners, -1, axis=0) - self.corners
-        normal = np.stack([-edge[:, 1], edge[:, 0]]) / np.hypot(*edge.T)
-        across = self.corners @ normal
-        return float((across.max(axis=0) - across.min(axis=0)).min())
+        return smallest_width(self.corners)
 
     @property
     def reach(self) -> float:
@@ -74,6 +71,14 @@ def box(width: float, height: float, at=(0.0, 0.0), angle: float = 0.0) -> np.nd
     return half @ turn(np.radians(angle)).T + np.asarray(at, float)
 
 
+def smallest_width(corners: np.ndarray) -> float:
+    """Smallest width (m) over the directions of the edges between corners (m, 2)."""
+    edge = np.roll(corners, -1, axis=0) - corners
+    edge = edge[np.hypot(*edge.T) > 0]
+    normal = np.stack([-edge[:, 1], edge[:, 0]]) / np.hypot(*edge.T)
+    return float(np.ptp(corners @ normal, axis=0).min())
+
+
 def turn(angle: float) -> np.ndarray:
     """Rotation matrix for an angle in rad."""
     c, s = np.cos(angle), np.sin(angle)
@@ -81,9 +86,7 @@ def turn(angle: float) -> np.ndarray:
 
 
 def check_convex(corners: np.ndarray) -> str | None:
-    """What is wrong with a list of corners, or None."""
-    if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3:
-        return "must be a list of at least 3 corners [x, y] in m"
+    """What is wrong with corners (m, 2), three or more; None if nothing is."""
     if not np.isfinite(corners).all():
         return "must be finite numbers"
     edge = np.roll(corners, -1, axis=0) - corners

@@ -13,6 +13,8 @@ import numpy as np
 from shapely import LineString, Polygon
 from shapely.ops import split
 
+from .blocks import smallest_width
+
 EXACT = 1e-7  # share of the rock's size below which a distance is zero
 
 
@@ -152,12 +154,7 @@ def _neighbours(sliver: Polygon, pieces: list[Polygon], lines, tiny: float) -> l
 
 
 def _width(piece: Polygon) -> float:
-    """Smallest width over the directions of the edges (m)."""
-    corners = np.array(piece.exterior.coords)[:-1]
-    edge = np.roll(corners, -1, axis=0) - corners
-    edge = edge[np.hypot(*edge.T) > 0]
-    normal = np.stack([-edge[:, 1], edge[:, 0]]) / np.hypot(*edge.T)
-    return float(np.ptp(corners @ normal, axis=0).min())
+    return smallest_width(np.array(piece.exterior.coords)[:-1])
 
 
 def _corners(piece: Polygon, tiny: float) -> np.ndarray:

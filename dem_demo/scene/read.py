@@ -210,7 +210,7 @@ def _monitors(table: Table, number: dict[str, int], blocks: Sequence[Block]) -> 
             if not distinct(pair, number, 2):
                 raise SceneError(f"{table.path(kind)}: {pair!r} must be [moving block, its base]")
         joints[kind] = tuple((number[moving], number[base]) for moving, base in pairs)
-    points = table.vectors("pins")
+    points = [table.two_numbers("pins", value) for value in table.take("pins", list, [])]
     pins = tuple((_block_at(point, blocks, table, "pins"), point) for point in points)
     table.finish()
     return Monitors(**joints, pins=pins)

@@ -65,10 +65,6 @@ class Table:
         value = self.take(key, list, default)
         return default if value is default else self.two_numbers(key, value)
 
-    def vectors(self, key: str) -> list[tuple[float, float]]:
-        """A list, which may be missing, of two finite numbers each."""
-        return [self.two_numbers(key, value) for value in self.take(key, list, [])]
-
     def two_numbers(self, key: str, value: Any) -> tuple[float, float]:
         """A value that must be two finite numbers."""
         if not (isinstance(value, list) and len(value) == 2 and all(map(finite, value))):

@@ -1,6 +1,5 @@
 """Run a scene with each ingredient removed in turn: what it changes, and what it costs."""
 
-import csv
 import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,7 +12,7 @@ from jointlaw.support.files import replace_file, write_json
 
 from ..dynamics.simulation import Simulation
 from ..errors import Refused
-from ..output.record import Record
+from ..output.record import Record, write_csv
 from ..output.run import run
 from ..scene import Scene
 from .ingredients import Variant, variants, working_stress
@@ -177,14 +176,13 @@ def write(rows: list[Row], folder: Path) -> None:
     """ablation.csv (values, changes, times), ablation.md (the table) and summary.json."""
     folder.mkdir(parents=True, exist_ok=True)
     keys = list(dict.fromkeys(key for row in rows for key in row.outcome))
-    with (folder / "ablation.csv").open("w", newline="") as stream:
-        writer = csv.writer(stream)
-        columns = [column for key in keys for column in (key, f"change of {key}")]
-        cost = ["steps", "time_step_s", "cpu_s", "time_ratio", "note"]
-        writer.writerow(["without", *columns, *cost])
-        for row, change, ratio in zip(rows, changes(rows), time_ratios(rows), strict=True):
-            cells = [cell for key in keys for cell in (row.outcome.get(key), change.get(key))]
-            writer.writerow([row.name, *cells, row.steps, row.time_step, row.cpu, ratio, row.note])
+    columns = [column for key in keys for column in (key, f"change of {key}")]
+    cost = ["steps", "time_step_s", "cpu_s", "time_ratio", "note"]
+    lines = []
+    for row, change, ratio in zip(rows, changes(rows), time_ratios(rows), strict=True):
+        cells = [cell for key in keys for cell in (row.outcome.get(key), change.get(key))]
+        lines.append([row.name, *cells, row.steps, row.time_step, row.cpu, ratio, row.note])
+    write_csv(folder / "ablation.csv", ["without", *columns, *cost], lines)
     replace_file(folder / "ablation.md", (table(rows) + "\n").encode())
     summary = {
         "version": VERSION,

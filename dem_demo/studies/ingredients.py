@@ -58,33 +58,54 @@ def working_stress(record: Record) -> dict[str, Stress]:
 def variants(scene: Scene, stress: dict[str, Stress]) -> Iterator[Variant]:
     """The scene without each of its ingredients; `stress` as `working_stress` found it."""
     laws = [law for law in scene.laws.values() if not is_coulomb(law)]
-    change = partial(_laws, scene, stress)
-
-    def any_law(has: Callable[[jl.JointLaw], Any]) -> bool:
-        return any(map(has, laws))
-
-    if any_law(lambda law: law.heights):
-        yield Variant("no heights", partial(change, _no_heights))
-    if any_law(lambda law: law.heights and law.heights.formation == "population"):
-        yield Variant("heights counted one by one", partial(change, _individual))
-    if any_law(lambda law: law.asperity.eta):
-        yield Variant("linear asperities (eta = 0)", partial(change, _linear))
-    if any_law(lambda law: law.asperity.mu):
-        yield Variant("no friction on asperities", partial(change, _smooth))
-    for key in ("b", "c"):
-        if any_law(lambda law, key=key: getattr(law.orientation, key)):
-            yield Variant(f"{key} = 0", partial(change, partial(_no_shape, key)))
-    if any_law(lambda law: np.isfinite(law.critical_slip)):
-        yield Variant("no large shear", partial(change, _no_critical_slip))
-    for name, resolution in NAMED.items():
-        if any_law(lambda law, r=resolution: law.resolution != r):
-            yield Variant(f"resolution {name}", partial(change, partial(_resolved, name)))
-    if any_law(lambda law: law.resolution.depth > 1):
-        yield Variant("one depth cell", partial(change, _one_cell))
+    for name in dict.fromkeys(name for law in laws for name, *_ in _removals(law)):
+        yield Variant(name, partial(_laws, scene, stress, partial(_lacking, name)))
     if laws:
-        yield Variant("depth cells at its own stress", partial(change, _own_range))
-        yield Variant("plain Coulomb", partial(change, _coulomb))
+        yield Variant("depth cells at its own stress", partial(_laws, scene, stress, _own_range))
+        yield Variant("plain Coulomb", partial(_laws, scene, stress, _coulomb))
     yield from _runs(scene, max((s.largest for s in stress.values()), default=0.0))
+
+
+def _removals(law: jl.JointLaw) -> Iterator[tuple[str, bool, dict[str, Any]]]:
+    """Ingredients of a law: name, does the stiffness depend on it, parameters that lack it."""
+    heights, asperity, orientation = law.heights, law.asperity, law.orientation
+    # Population curves are not convex at eta = 0, so heights are then counted one by one.
+    one_by_one = heights and replace(heights, formation="individual")
+    if heights:
+        yield "no heights", True, {"heights": None}
+    if heights and heights.formation == "population":
+        yield "heights counted one by one", True, {"heights": one_by_one}
+    if asperity.eta:
+        linear = {"asperity": replace(asperity, eta=0.0), "heights": one_by_one}
+        yield "linear asperities (eta = 0)", True, linear
+    if asperity.mu:
+        smooth = replace(asperity, mu=0.0, mu_residual=None, wear_slip=np.inf)
+        yield "no friction on asperities", True, {"asperity": smooth}
+    if np.isfinite(asperity.yield_interference):
+        elastic = {"asperity": replace(asperity, yield_interference=np.inf)}
+        yield "elastic asperities", True, elastic
+    if np.isfinite(asperity.wear_slip):
+        kept = {"asperity": replace(asperity, mu_residual=None, wear_slip=np.inf)}
+        yield "no wear", False, kept
+    for key in ("b", "c"):
+        if getattr(orientation, key):
+            yield f"{key} = 0", True, {"orientation": replace(orientation, **{key: 0.0})}
+    if np.isfinite(law.critical_slip):
+        yield "no large shear", False, {"critical_slip": np.inf}
+    for name, resolution in NAMED.items():
+        if law.resolution != resolution:
+            yield f"resolution {name}", False, {"resolution": resolution}
+    if law.resolution.depth > 1:
+        yield "one depth cell", False, {"resolution": replace(law.resolution, depth=1)}
+
+
+def _lacking(name: str, law: jl.JointLaw, stress: Stress | None) -> jl.JointLaw:
+    """The law without an ingredient; as it is where it has none of this name."""
+    for ingredient, stiffens, parameters in _removals(law):
+        if ingredient == name:
+            made = replace(law, **parameters)
+            return _as_stiff(made, law, stress) if stiffens else made
+    return law
 
 
 def _runs(scene: Scene, stress: float) -> Iterator[Variant]:
@@ -136,46 +157,6 @@ def _as_stiff(law: jl.JointLaw, like: jl.JointLaw, stress: Stress | None) -> jl.
     pressed = _carried(stress).median
     K = law.asperity.K * pressed / float(law.normal_stress(like.closure(pressed)))
     return replace(law, asperity=replace(law.asperity, K=K))
-
-
-def _no_heights(law: jl.JointLaw, stress: Stress | None) -> jl.JointLaw:
-    return _as_stiff(replace(law, heights=None), law, stress) if law.heights else law
-
-
-def _individual(law: jl.JointLaw, stress: Stress | None) -> jl.JointLaw:
-    if law.heights is None or law.heights.formation == "individual":
-        return law
-    heights = replace(law.heights, formation="individual")
-    return _as_stiff(replace(law, heights=heights), law, stress)
-
-
-def _linear(law: jl.JointLaw, stress: Stress | None) -> jl.JointLaw:
-    """Population curves are not convex at eta = 0, so heights are then counted one by one."""
-    heights = law.heights and replace(law.heights, formation="individual")
-    asperity = replace(law.asperity, eta=0.0)
-    return _as_stiff(replace(law, asperity=asperity, heights=heights), law, stress)
-
-
-def _smooth(law: jl.JointLaw, stress: Stress | None) -> jl.JointLaw:
-    made = replace(law, asperity=replace(law.asperity, mu=0.0))
-    return _as_stiff(made, law, stress)
-
-
-def _no_shape(key: str, law: jl.JointLaw, stress: Stress | None) -> jl.JointLaw:
-    orientation = replace(law.orientation, **{key: 0.0})
-    return _as_stiff(replace(law, orientation=orientation), law, stress)
-
-
-def _no_critical_slip(law: jl.JointLaw, stress: Stress | None) -> jl.JointLaw:
-    return replace(law, critical_slip=np.inf)
-
-
-def _resolved(name: str, law: jl.JointLaw, stress: Stress | None) -> jl.JointLaw:
-    return replace(law, resolution=NAMED[name])
-
-
-def _one_cell(law: jl.JointLaw, stress: Stress | None) -> jl.JointLaw:
-    return replace(law, resolution=replace(law.resolution, depth=1))
 
 
 def _own_range(law: jl.JointLaw, stress: Stress | None) -> jl.JointLaw:

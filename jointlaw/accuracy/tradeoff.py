@@ -1,7 +1,5 @@
 """The price list of a law: what each resolution costs and how far its tractions are off."""
 
-from __future__ import annotations
-
 import csv
 import io
 import time

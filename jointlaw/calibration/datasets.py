@@ -1,7 +1,5 @@
 """Closure tests in files: those that come with the package, and CSV files of laboratories."""
 
-from __future__ import annotations
-
 import csv
 import re
 import tomllib

@@ -48,7 +48,9 @@ class Fit(Estimate):
                 f"{transform_of(name).unit} | {100 * share:.0f} % | "
                 f"{'no' if name in self.not_identifiable else 'yes'} |"
             )
-        held = [name for name in self.parameters if name not in self.free]
+        finite = [name for name, value in self.parameters.items() if np.isfinite(value)]
+        worn = "wear_slip" in finite
+        held = [n for n in finite if n not in self.free and (worn or n != "mu_residual")]
         lines += ["", "Held: " + ", ".join(f"{n} = {self.parameters[n]:.4g}" for n in held) + "."]
         lines += ["", "Not identifiable from these data:", ""]
         grouped: dict[str, list[str]] = {}
@@ -118,8 +120,10 @@ def fit_closure(
     seating: float | None = None,
     noise: float | None = None,
     closure_noise: float = 0.0,
+    cycle: bool = False,
+    compliance: float | tuple[ArrayLike, ArrayLike] = 0.0,
 ) -> Fit:
-    """Fit the law to one first loading in closure.
+    """Fit the law to one closure test.
 
     Parameters
     ----------
@@ -133,14 +137,17 @@ def fit_closure(
         `forward.DEFAULTS`.
     formation: "individual" (default, and the one that predicts best) or "population".
     priors: 95 % ranges (low, high) in physical units instead of the defaults, or None to drop one.
-    seating, noise, closure_noise: as in `ClosureCurve`.
+    seating, noise, closure_noise, cycle, compliance: as in `ClosureCurve`; cycles need
+        "yield_interference" among `free` or `fixed`, or a law that has one.
 
     Returns a `Fit`. Raises ValueError for curves or names that do not fit.
 
     Source: Misra 1999, Eq. 11, 12, 33, 37; docs/theory-incremental.md, "Heights, direction and
     Hertz become one curve", for the "individual" reading.
     """
-    curve = ClosureCurve(np.asarray(stress), np.asarray(closure), seating, noise, closure_noise)
+    curve = ClosureCurve(
+        np.asarray(stress), np.asarray(closure), seating, noise, closure_noise, cycle, compliance
+    )
     return fit_curves([curve], free=free, fixed=fixed, law=law, formation=formation, priors=priors)
 
 
@@ -188,7 +195,8 @@ def fit_curves(
     ----------
     curves: `ClosureCurve` and `ShearCurve`, at least one.
     free: parameters to fit, of alpha, beta (m), overlap (m), asperity_density (1/m2),
-        K (Pa m^(1-eta)), lam, eta, mu, a, b, c. Positive ones are fitted as logarithms. Every
+        K (Pa m^(1-eta)), lam, eta, mu, a, b, c, yield_interference (m), mu_residual,
+        wear_slip (m), critical_slip (m). Positive ones are fitted as logarithms. Every
         closure curve that does not begin at zero stress adds its seating closure (m).
     fixed: values of parameters that are known otherwise, in SI units.
     law: values of all parameters that are not free, `critical_slip` among them; None takes

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..discretisation.facets import facet_sum, facets
+from ..discretisation.facets import facet_sum, facets, yield_sum
 from ..discretisation.virgin_curve import exact_force
 from ..law import JointLaw
 from ..parameters.asperity import Asperity
@@ -23,6 +23,8 @@ _ROCK = Asperity.hertz_mindlin(G=20e9, nu=0.25, R=1e-3, mu=0.6)
 DEFAULTS = {
     "alpha": 3.7, "beta": 1e-5, "overlap": 0.0, "asperity_density": 1e6, "K": _ROCK.K,
     "lam": _ROCK.lam, "eta": _ROCK.eta, "mu": _ROCK.mu, "a": 3.0, "b": 0.0, "c": 0.0,
+    "yield_interference": math.inf, "mu_residual": _ROCK.mu, "wear_slip": math.inf,
+    "critical_slip": math.inf,
 }  # fmt: skip
 
 
@@ -38,7 +40,6 @@ class Settings:
     resolution: Any = "balanced"
     has_heights: bool = True
     closure_range: Any = None  # m
-    critical_slip: float = math.inf  # m
     plane: float | None = None  # of the law to be found; every shear curve has its own
     closure_only: bool = False
 
@@ -51,7 +52,10 @@ def parameters(law: JointLaw) -> tuple[dict[str, float], Settings]:
     o, p, h = law.orientation, law.asperity, law.heights
     values = DEFAULTS | {"a": o.a, "b": o.b, "c": o.c, "K": p.K, "lam": p.lam, "eta": p.eta}
     values |= {"mu": p.mu, "asperity_density": law.asperity_density}
-    kept = ("resolution", "closure_range", "critical_slip", "plane", "closure_only")
+    values |= {"yield_interference": p.yield_interference, "wear_slip": p.wear_slip}
+    values |= {"mu_residual": p.mu if p.mu_residual is None else p.mu_residual}
+    values["critical_slip"] = law.critical_slip
+    kept = ("resolution", "closure_range", "plane", "closure_only")
     settings = Settings(has_heights=h is not None, **{name: getattr(law, name) for name in kept})
     if h is None:
         return values, settings
@@ -66,13 +70,13 @@ def build(values: Values, settings: Settings, plane: float | None = None) -> Joi
     v = values
     return JointLaw(
         orientation=Orientation(v["a"], v["b"], v["c"]),
-        asperity=Asperity(v["K"], v["lam"], v["eta"], v["mu"]),
+        asperity=_asperity(v),
         heights=_heights(v, settings),
         asperity_density=v["asperity_density"],
         resolution=settings.resolution,
         plane=plane,
         closure_range=settings.closure_range,
-        critical_slip=settings.critical_slip,
+        critical_slip=v["critical_slip"],
         closure_only=settings.closure_only,
     )
 
@@ -88,16 +92,40 @@ def build_for_shear(values: Values, settings: Settings, azimuth: float) -> Joint
 
 
 def log_stress(values: Values, closure: Array, settings: Settings) -> Array:
-    """Logarithm of the normal stress (Pa) at closures (m), as `JointLaw.normal_stress`.
+    """Logarithm of the normal stress (Pa) along closures (m, n) that may fall and grow again.
 
+    As `JointLaw.normal_stress` while they grow; after that shear forces between the asperities
+    are taken to fall with the normal ones, which a joint's friction changes by a few per cent.
     Without the table of a law: a fit asks for a hundred sets of parameters at ten closures each.
     """
-    heights = _heights(values, settings)
-    force, _ = exact_force(np.maximum(closure, 1e-15), values["eta"], heights)
+    heights, eta = _heights(values, settings), values["eta"]
+    force, _ = exact_force(np.maximum(closure, 1e-15), eta, heights)
+    if values["yield_interference"] < math.inf:
+        force = force - _yielded(values, closure, force, settings)
     names = ("a", "b", "c", "lam", "eta", "mu")
     factor = _facet_factor(*(values[name] for name in names), settings.resolution)
     scale = values["asperity_density"] * values["lam"] * values["K"] * factor
     return math.log(scale) + np.log(np.maximum(force, 1e-300))
+
+
+def _yielded(values: Values, closure: Array, force: Array, settings: Settings) -> Array:
+    """The part (n,) that yielding takes from Phi along closures (n,), as a mean of the facets."""
+    r, p = resolve(settings.resolution), _asperity(values)
+    nodes = facets(Orientation(values["a"], values["b"], 0.0), r.u, r.phi, closure_only=True)
+    scale = nodes.weight * np.cos(nodes.theta) ** (1 + p.eta)
+    share, depth = yield_sum(nodes.theta, scale, p) or (np.zeros(1), np.zeros(1))
+    flat = np.maximum(np.maximum.accumulate(closure)[:, None] - depth, 0.0)
+    lost, _ = exact_force(np.maximum(flat.ravel(), 1e-15), p.eta, _heights(values, settings))
+    taken: Array = np.minimum(lost.reshape(flat.shape), force[:, None]) @ share
+    return taken / facet_sum(nodes.theta, scale, p.lam, p.mu)
+
+
+def _asperity(v: Values) -> Asperity:
+    wears = v["wear_slip"] < math.inf
+    return Asperity(
+        v["K"], v["lam"], v["eta"], v["mu"], v["yield_interference"],
+        min(v["mu_residual"], v["mu"]) if wears else None, v["wear_slip"],
+    )  # fmt: skip
 
 
 def _heights(v: Values, settings: Settings) -> GammaHeights | None:

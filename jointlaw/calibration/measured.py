@@ -42,20 +42,26 @@ class Noise(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ClosureCurve:
-    """First loading of a joint in closure: normal stress against closure.
+    """A closure test: normal stress against closure, in first loading or over whole cycles.
 
     Parameters
     ----------
     stress: normal stress in Pa, (n,), >= 0.
     closure: closure in m, (n,), measured from wherever the test began; unloading left out (see
-        `first_loading`).
+        `first_loading`) unless `cycle`.
     seating: closure (m) of the law at the closure zero of the test, or None to fit it. A test that
         begins at a non-zero stress is always fitted; one whose first row is (0, 0) begins at 0.
     noise: standard error of the stress as a share of it, taken as known. None expects 1 % of the
         stress and 0.5 % of the largest closure and estimates both from the scatter.
     closure_noise: standard error of the closure in m that goes with a given `noise`.
+    cycle: True for points of whole cycles, loading, unloading and reloading in their order. Only
+        a law with a yield_interference has a loop to fit to them.
+    compliance: of rock and machine, whose strain the test measured too: closure per stress (m/Pa),
+        or a pair of arrays (stress in Pa, closure in m) measured without a joint. It is
+        subtracted from `closure` first; 0 where the closure is that of the joint alone.
 
-    Raises ValueError for arrays that do not fit, fewer than four points or a branch that unloads.
+    Raises ValueError for arrays that do not fit, fewer than four points, a branch that unloads
+    without `cycle`, cycles that never unload, or a compliance larger than the curve.
     """
 
     stress: Array
@@ -63,6 +69,8 @@ class ClosureCurve:
     seating: float | None = None
     noise: float | None = None
     closure_noise: float = 0.0
+    cycle: bool = False
+    compliance: float | tuple[ArrayLike, ArrayLike] = 0.0
     expected: Noise = field(init=False, repr=False)
     steepness: Array = field(init=False, repr=False)
 
@@ -72,10 +80,17 @@ class ClosureCurve:
         if (stress < 0).any():
             raise ValueError(f"stress = {stress.min():g} Pa is out of bounds: it must be >= 0")
         top = int(np.argmax(stress))
-        if (stress[top:] < 0.8 * stress[top]).any():
+        closure = subtract_compliance(stress, closure, self.compliance)
+        unloads = bool((stress[top:] < 0.8 * stress[top]).any())
+        if self.cycle and not unloads:
+            raise ValueError(
+                f"cycle = True, but stress never falls below 80 % of its largest, {stress[top]:g} "
+                "Pa: give the unloading too, or cycle=False for a first loading"
+            )
+        if unloads and not self.cycle:
             raise ValueError(
                 f"stress falls from {stress[top]:g} Pa after point {top}: fit the first loading "
-                "only, jointlaw.first_loading(stress, closure) cuts it out"
+                "only, jointlaw.first_loading(stress, closure) cuts it out, or give cycle=True"
             )
         if self.seating is None and stress[0] == 0.0:
             set_(self, "seating", 0.0 - float(closure[0]))  # not -0.0
@@ -95,7 +110,11 @@ class ClosureCurve:
             )
         set_(self, "stress", stress)
         set_(self, "closure", closure)
-        set_(self, "steepness", _steepness(closure, stress))
+        top = int(np.argmax(stress)) + 1 if self.cycle else stress.size
+        branches = [part for part in (slice(0, top), slice(top, None)) if stress[part].size]
+        steep = np.concatenate([_steepness(closure[part], stress[part]) for part in branches])
+        share = stress / np.max(stress) if self.cycle else 1.0  # as `residuals` are
+        set_(self, "steepness", share * steep)
         if self.noise is None:
             if self.closure_noise != 0:
                 raise ValueError(
@@ -109,8 +128,15 @@ class ClosureCurve:
         set_(self, "expected", expected)
 
     def residuals(self, values: Values, seating: float, settings: Settings) -> Array:
-        """ln(model/measured), (n,)."""
-        return log_stress(values, seating + self.closure, settings) - np.log(self.stress)
+        """ln(model/measured), (n,); over cycles (model - measured)/largest measured.
+
+        Unloading ends at zero stress, where a ratio says nothing.
+        """
+        model = log_stress(values, seating + self.closure, settings)
+        if not self.cycle:
+            return model - np.log(self.stress)
+        residual: Array = (np.exp(model) - self.stress) / np.max(self.stress)
+        return residual
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,6 +204,33 @@ def first_loading(stress: ArrayLike, closure: ArrayLike) -> tuple[Array, Array, 
     s, u = _pair("stress", stress, "closure", closure)
     top = int(np.argmax(s))
     return s[: top + 1], u[: top + 1], s[top:], u[top:]
+
+
+def subtract_compliance(
+    stress: Array, closure: Array, compliance: float | tuple[ArrayLike, ArrayLike]
+) -> Array:
+    """The closure (m) of the joint alone, without that of rock and machine, as in `ClosureCurve`.
+
+    Raises ValueError for a compliance larger than the curve, or measured up to a lower stress.
+    """
+    if isinstance(compliance, tuple):
+        load, rock = _pair("compliance stress", compliance[0], "compliance closure", compliance[1])
+        if not (np.diff(load) > 0).all() or stress.max() > load.max():
+            raise ValueError(
+                f"compliance is measured up to {load.max():g} Pa: it must ascend and reach the "
+                f"largest stress, {stress.max():g} Pa"
+            )
+        strain = np.interp(stress, load, rock)
+    else:
+        strain = at_least("compliance", compliance, 0.0) * stress
+    top, first = int(np.argmax(stress)), int(np.argmin(stress[: np.argmax(stress) + 1]))
+    taken, total = strain[top] - strain[first], closure[top] - closure[first]
+    if np.any(strain) and taken >= total:
+        raise ValueError(
+            f"compliance takes {taken:g} m between {stress[first]:g} and {stress[top]:g} Pa, the "
+            f"whole closure is {total:g} m: nothing is left for the joint; check its unit, m/Pa"
+        )
+    return closure - strain
 
 
 def _pair(name: str, x: Any, other: str, y: Any) -> tuple[Array, Array]:

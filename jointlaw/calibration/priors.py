@@ -50,6 +50,10 @@ TRANSFORMS = {
     "a": Transform("1", 1.0, 100.0),
     "b": Transform("1", -1.0, 2.0, log=False),
     "c": Transform("1", -0.5, 0.5, log=False),
+    "yield_interference": Transform("m", 1e-12, 1.0),
+    "mu_residual": Transform("1", 1e-3, 5.0),
+    "wear_slip": Transform("m", 1e-12, 1e3),
+    "critical_slip": Transform("m", 1e-12, 1e3),
     "seating": Transform("m", 1e-12, 1.0),
     # combinations that priors are stated for, see `quantity`
     "overlap_share": Transform("1", 0.0, math.inf),

@@ -137,6 +137,14 @@ def pose(
     if not settings.has_heights and {"alpha", "beta", "overlap"} & set(names):
         raise ValueError("free: this law has no heights to fit; give it GammaHeights or law=None")
     _require_eq_18(values, names)
+    for name in names:  # a length that is infinite by default starts within the curves
+        if math.isinf(values[name]):
+            closure = name == "yield_interference"
+            values[name] = 0.5 * max(
+                float(np.ptp(one.closure if isinstance(one, ClosureCurve) else one.shear))
+                for one in curves
+                if isinstance(one, ClosureCurve) is closure or len(curves) == 1
+            )
     for name, curve in name_seatings(curves):
         values[name] = float(np.ptp(curve.closure)) if curve.seating is None else curve.seating
         if curve.seating is None:

@@ -35,20 +35,25 @@ class Loop:
     worst_mu: float
     open_closure: float
     law_closure: float
+    yields: bool = False
 
     def text(self) -> str:
         """The same in words."""
+        what = "Friction on the asperities, all that the law has, loses"
+        rest = "crushed and flattened asperities, seating of the halves, gouge"
+        if self.yields:
+            what = "Friction and yielding of the asperities, as the law has them, lose"
+            rest = "crushed asperities, seating of the halves, gouge"
         return (
             f"The measured cycle loses {100 * self.measured:.0f} % of the work of loading and "
             f"keeps {1e6 * self.open_closure:.1f} um of closure back at {self.stress / 1e6:.3g} "
             "MPa. "
-            f"Friction on the asperities, all that the law has, loses {100 * self.friction:.2g} % "
+            f"{what} {100 * self.friction:.2g} % "
             f"and keeps {1e6 * self.law_closure:.2f} um; of friction coefficients from "
             f"{_FRICTIONS[0]} to {_FRICTIONS[-1]}, {self.worst_mu:g} loses most at these "
             f"inclinations, {100 * self.largest_friction:.1f} %. "
-            "The rest is not in the law: crushed and flattened asperities, seating of the halves, "
-            "gouge. Use the fitted law for loading, and for small cycles below the largest stress "
-            "with care."
+            f"The rest is not in the law: {rest}. Use the fitted law for loading, and for small "
+            "cycles below the largest stress with care."
         )
 
 
@@ -69,11 +74,14 @@ def explain(law: JointLaw, stress: ArrayLike, closure: ArrayLike, steps: int = 1
     friction, law_closure = _loss(*_cycle(law, high, steps), low)
     largest, worst_mu = friction, law.asperity.mu
     for mu in track(_FRICTIONS, "friction", len(_FRICTIONS)):
-        other = replace(law, asperity=replace(law.asperity, mu=mu))
+        other = replace(
+            law, asperity=replace(law.asperity, mu=mu, mu_residual=None, wear_slip=np.inf)
+        )
         loss, _ = _loss(*_cycle(other, high, steps), low)
         if loss > largest:
             largest, worst_mu = loss, mu
-    return Loop(low, measured, friction, largest, worst_mu, open_closure, law_closure)
+    yields = law.asperity.yield_interference < np.inf
+    return Loop(low, measured, friction, largest, worst_mu, open_closure, law_closure, yields)
 
 
 def _cycle(law: JointLaw, high: float, steps: int) -> tuple[Array, Array]:

@@ -42,5 +42,5 @@ def _closure(options: argparse.Namespace) -> None:
     at = int(np.argmax(record.F1))
     print(
         f"closure {record.closure[at]:.4g} m at {record.F1[at]:.4g} Pa, "
-        f"{record.dissipated[-1]:.3g} J/m2 lost to friction"
+        f"{record.dissipated[-1]:.3g} J/m2 lost, {joint.plastic_work:.3g} of it to yielding"
     )

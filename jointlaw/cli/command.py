@@ -53,7 +53,13 @@ def read_law(options: argparse.Namespace) -> JointLaw:
     """The law that the options name."""
     law = presets.load_any(options.law)
     resolution = getattr(options, "resolution", None)
-    return law if resolution is None else replace(law, resolution=resolution)
+    if resolution is not None:
+        law = replace(law, resolution=resolution)
+    yields = getattr(options, "yield_interference", None)
+    if yields is not None:
+        value = quantity("--yield-interference", yields, "m", positive=True)
+        law = replace(law, asperity=replace(law.asperity, yield_interference=value))
+    return law
 
 
 def add_out(parser: argparse.ArgumentParser, *, required: bool = True) -> None:
@@ -96,8 +102,13 @@ def write_results(folder: Path, files: Written, summary: Mapping[str, Any]) -> N
 
 
 def add_test_options(parser: argparse.ArgumentParser, steps: int) -> None:
-    """Add what the laboratory tests take: law, steps and folder for the results."""
+    """Add what the laboratory tests take: law, yielding, steps and folder for the results."""
     add_law(parser)
+    parser.add_argument(
+        "--yield-interference",
+        metavar="LENGTH",
+        help="compression at which asperities yield, such as 0.1um, instead of the law's own",
+    )
     parser.add_argument(
         "--steps", metavar="N", type=int, default=steps, help=f"steps per leg (default {steps})"
     )

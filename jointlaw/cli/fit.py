@@ -11,10 +11,11 @@ import numpy as np
 from ..calibration import datasets
 from ..calibration.baselines import Comparison, compare
 from ..calibration.fit import Fit, fit_closure, fit_many
-from ..calibration.measured import first_loading
+from ..calibration.measured import first_loading, subtract_compliance
 from ..calibration.unloading import explain
 from ..support import units
-from .command import Written, add_command, add_out, write_results
+from ..support.checks import Array
+from .command import Written, add_command, add_out, quantity, write_results
 
 
 def add(commands: Any) -> None:
@@ -41,6 +42,17 @@ def add(commands: Any) -> None:
         metavar="NAME=VALUE",
         help="hold a parameter at a value in SI units, such as alpha=3.8; repeatable",
     )
+    parser.add_argument(
+        "--compliance",
+        metavar="LENGTH/STRESS",
+        help="of rock and machine, such as 4.2um/10MPa, or a file of stress and closure measured "
+        "without a joint: it is subtracted first",
+    )
+    parser.add_argument(
+        "--cycle",
+        action="store_true",
+        help="fit loading and unloading together, yield_interference among the parameters",
+    )
     parser.add_argument("--free", help="parameters to fit: asperity_density,alpha,beta")
     parser.add_argument("--formation", choices=("individual", "population"), default="individual")
     parser.add_argument("--noise", type=float, help="known error of the stress, such as 0.01")
@@ -50,9 +62,11 @@ def add(commands: Any) -> None:
 
 def _run(options: argparse.Namespace) -> None:
     folders = _folders(options)
-    tests = [_read(options, item) for item in options.data]
+    tests = [_subtracted(options, *_read(options, item)) for item in options.data]
     keywords = _keywords(options)
-    loading = [first_loading(*test)[:2] for test in tests]
+    if options.cycle and options.up_to:
+        raise ValueError("--cycle fits all points: leave --up-to out")
+    loading = [test if options.cycle else first_loading(*test)[:2] for test in tests]
     limits = [_limit(options.up_to, stress) for stress, _ in loading]
     seen = [(s[s <= limit], u[s <= limit]) for (s, u), limit in zip(loading, limits, strict=True)]
     if len(seen) > 1:
@@ -62,7 +76,8 @@ def _run(options: argparse.Namespace) -> None:
     for k, fit in enumerate(fits):
         (stress, closure), limit = loading[k], limits[k]
         held = compare(stress, closure, limit, **keywords) if (stress > limit).any() else None
-        _write(folders[k], Path(options.data[k]).name, fit, tests[k], held)
+        name = Path(options.data[k]).name
+        _write(folders[k], name, fit, tests[k], held, options.compliance)
 
 
 def _folders(options: argparse.Namespace) -> list[Path]:
@@ -80,9 +95,20 @@ def _folders(options: argparse.Namespace) -> list[Path]:
 
 
 def _write(
-    folder: Path, name: str, fit: Fit, test: datasets.ClosureData, held: Comparison | None
+    folder: Path,
+    name: str,
+    fit: Fit,
+    test: datasets.ClosureData,
+    held: Comparison | None,
+    compliance: str | None,
 ) -> None:
-    text = fit.report()
+    about = f"Subtracted from the closure: that of rock and machine, {compliance}."
+    if compliance is None:
+        about = (
+            "No compliance of rock and machine was given: if the closure was measured across rock "
+            "too, the law holds its strain as well."
+        )
+    text = f"{fit.report()}\n{about}\n"
     summary: dict[str, Any] = {
         "data": name,
         "parameters_SI": fit.parameters,
@@ -129,6 +155,22 @@ def _read(options: argparse.Namespace, item: str) -> datasets.ClosureData:
     return datasets.read_closure(item, options.stress_column, options.closure_column)
 
 
+def _subtracted(options: argparse.Namespace, stress: Array, closure: Array) -> datasets.ClosureData:
+    """The test without the closure of rock and machine, if --compliance tells it."""
+    text = options.compliance
+    if text is None:
+        return datasets.ClosureData(stress, closure)
+    if "/" in text and not Path(text).exists():
+        length, _, load = text.partition("/")
+        slope = quantity("--compliance", length, "m") / quantity(
+            "--compliance", load, "Pa", positive=True
+        )
+        return datasets.ClosureData(stress, subtract_compliance(stress, closure, slope))
+    rock = datasets.read_closure(text, options.stress_column, options.closure_column)
+    pair = (rock.stress, rock.closure)
+    return datasets.ClosureData(stress, subtract_compliance(stress, closure, pair))
+
+
 def _limit(text: str | None, stress: Any) -> float:
     if text is None:
         return float("inf")
@@ -150,4 +192,8 @@ def _keywords(options: argparse.Namespace) -> dict[str, Any]:
         keywords["free"] = tuple(name.strip() for name in options.free.split(","))
     if options.noise is not None:
         keywords["noise"] = options.noise
+    if options.cycle:
+        keywords["cycle"] = True
+        free = ("asperity_density", "alpha", "beta", "yield_interference")
+        keywords.setdefault("free", free)
     return keywords

@@ -1,11 +1,10 @@
 """Facets: the few orientations that stand for the density of Eq. 14, and sums over them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..parameters.asperity import Asperity
 from ..parameters.orientation import Orientation
@@ -21,6 +20,7 @@ class Facets:
     2 (closure, shear along the plane) for motion in one plane, or 1 for closure alone. `weight`
     sums to 1. `depth` (0 to 1) is the share of the depth cells that a facet needs: as the third
     root of its weight, for then a cell more lowers the error of every facet by as much.
+    `opposite` is the facet of the same inclination that faces the other way.
     """
 
     theta: Array
@@ -30,6 +30,7 @@ class Facets:
     s: Array
     t: Array
     depth: Array
+    opposite: NDArray[np.intp]
 
     def scale(self, asperity: Asperity, asperity_density: float) -> Array:
         """A = N w lam K c1^(1+eta) of each facet (M,): its normal force is A Phi(y)."""
@@ -78,7 +79,12 @@ def facets(
     dim = 1 if closure_only else 3 if plane is None else 2
     each = share / numbers
     depth = np.repeat(np.cbrt(each / each.max()), counts)
-    arrays = (theta, P, np.maximum(weight, 0.0), n[:dim], s[:dim], t[:dim], depth)
+    first = np.cumsum([0, *counts[:-1]])
+    turned = [
+        np.roll(np.arange(n), n // 2) if plane is None else np.arange(n)[::-1] for n in counts
+    ]
+    opposite = np.concatenate([k + ring for k, ring in zip(first, turned, strict=True)])
+    arrays = (theta, P, np.maximum(weight, 0.0), n[:dim], s[:dim], t[:dim], depth, opposite)
     return Facets(*frozen(arrays))
 
 
@@ -89,6 +95,21 @@ def _ring(m: int, whole: bool) -> tuple[Array, Array]:
     if not whole:
         even[[0, -1]] /= 2.0
     return azimuth, even
+
+
+def yield_sum(theta: Array, scale: Array, asperity: Asperity) -> tuple[Array, Array] | None:
+    """What yielding takes from F1 under first closure: share (2 M,) times Phi(closure - depth).
+
+    Springs stop to gain normal force at the yield interference, and shear force where they slip
+    under the normal force that they then have.
+    """
+    if math.isinf(asperity.yield_interference):
+        return None
+    shear = np.minimum(np.tan(theta) / asperity.lam, asperity.mu)
+    depth = asperity.yield_interference / np.cos(theta)
+    late = np.divide(asperity.mu, shear, out=np.ones_like(shear), where=shear > 0)
+    share = np.concatenate([scale * np.cos(theta), scale * np.sin(theta) * shear])
+    return share, np.concatenate([depth, depth * late])
 
 
 def facet_sum(theta: Array, scale: Array, lam: float, mu: float) -> float:

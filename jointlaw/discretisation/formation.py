@@ -1,7 +1,5 @@
 """Formation of contacts: the smooth factor S = Phi / y^(1+eta) of the virgin curve, exactly."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy import special
 

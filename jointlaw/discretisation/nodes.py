@@ -4,8 +4,6 @@ Both rules only choose places. What the law keeps exact (docs/how-accurate.md) h
 of nodes; `benchmarks/nodes.py` measures these rules against others.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

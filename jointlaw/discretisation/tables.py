@@ -1,10 +1,10 @@
 """The tables of a law: everything that a kernel reads, shared by all joints of the law."""
 
-from __future__ import annotations
-
+import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..parameters.asperity import Asperity
 from ..support.checks import Array, frozen
@@ -25,6 +25,8 @@ class Tables:
     (dim, M) are the in-facet directions, `area` is A = N w lam K c1^(1+eta), `depth` (M, D+1) the
     cell limits zeta with the virgin force and slope there (slope 0 at the first by definition).
     A facet of fewer cells has its limits first; cells that begin at UNUSED stay empty.
+    `yield_depth` (M,) is the yield interference along y, None where asperities do not yield;
+    `opposite` (M,) names the facet that shares its flattened depth, each itself if none does.
     """
 
     curve: VirginCurve
@@ -41,6 +43,20 @@ class Tables:
     lam: float
     mu: float
     critical_slip: float
+    yield_depth: Array | None = None
+    opposite: NDArray[np.intp] | None = None
+    mu_residual: float | None = None
+    wear_slip: float = math.inf
+
+    @property
+    def yields(self) -> bool:
+        """Whether asperities yield."""
+        return self.yield_depth is not None
+
+    @property
+    def wears(self) -> bool:
+        """Whether friction falls with slip."""
+        return self.mu_residual is not None
 
     @property
     def dim(self) -> int:
@@ -59,8 +75,13 @@ class Tables:
 
     @property
     def rows(self) -> int:
-        """State numbers per joint: delta, offset, dissipated energy, q of all cells, UNUSED too."""
-        return 2 * self.dim + 2 * len(self.c1) * self.cells
+        """State numbers per joint: delta, offset, dissipated energy, q of all cells, even UNUSED.
+
+        Then, with yielding, the flattened depth of every facet and the plastic work; with wear,
+        the slip of the asperities.
+        """
+        flattened = len(self.c1) + 1 if self.yields else 0
+        return 2 * self.dim + 2 * len(self.c1) * self.cells + flattened + self.wears
 
 
 def tables(
@@ -86,7 +107,16 @@ def tables(
         facets.n, facets.n / c1, facets.s, facets.t, c1,
         facets.scale(asperity, asperity_density), facets.weight, depth, force, slope,
     )  # fmt: skip
-    return Tables(curve, *frozen(arrays), asperity.lam, asperity.mu, critical_slip)
+    yield_depth = None
+    if asperity.yield_interference < math.inf:
+        (yield_depth,) = frozen((asperity.yield_interference / c1,))
+    # one depth for both sides of an asperity that critical_slip renews, or the offset makes energy
+    (alone,) = frozen((np.arange(len(c1)),))
+    return Tables(
+        curve, *frozen(arrays), asperity.lam, asperity.mu, critical_slip, yield_depth,
+        alone if math.isinf(critical_slip) else facets.opposite,
+        asperity.mu_residual, asperity.wear_slip,
+    )  # fmt: skip
 
 
 def largest_reach(curve: VirginCurve, scale: Array, theta: Array, asperity: Asperity) -> float:

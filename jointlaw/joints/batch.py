@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..discretisation.tables import Tables
-from ..kernels import reference
+from ..kernels import reference, wear
 from ..kernels.blocks import LANES, empty_blocks, rows_of, write_rows
 from ..kernels.engine import Step, engine
 from ..kernels.reference import Measures
@@ -226,14 +226,34 @@ class JointBatch:
 
     @property
     def dissipated_energy(self) -> Array:
-        """Energy (n,) in J/m2 lost to friction since the virgin state; never decreases."""
-        if not self.ledger:
-            raise ValueError("dissipated_energy is not added up: make the joints with ledger=True")
-        row = 2 * self.law.tables.dim - 1
-        lost: Array = rows_of(self._state[:, row : row + 1], self._n)[0]
-        return lost
+        """Energy (n,) in J/m2 lost since the virgin state, to friction and to yielding asperities;
+        never decreases."""
+        return self._ledger("dissipated_energy", "dissipated")
+
+    @property
+    def plastic_work(self) -> Array:
+        """The part (n,) of the dissipated energy, in J/m2, that yielding asperities took."""
+        lost = self._ledger("plastic_work", "plastic")
+        return lost if self.law.tables.yields else np.zeros(self._n)
+
+    @property
+    def friction(self) -> Array:
+        """Friction coefficient (n,) of the asperities, worn by their slip so far."""
+        k = self.law.tables
+        return wear.friction(k, self._part("slip")) if k.wears else np.full(self._n, k.mu)
 
     # --------------------------------------------------------------- internals
+
+    def _part(self, name: str) -> Array:
+        """A part of the states of all joints, by its name in `reference.State`."""
+        part: Array = getattr(reference.parts(self.law.tables, self._rows()), name)
+        return part
+
+    def _ledger(self, name: str, part: str) -> Array:
+        """A part of the ledger, if it is kept."""
+        if not self.ledger:
+            raise ValueError(f"{name} is not added up: make the joints with ledger=True")
+        return self._part(part)
 
     def _rows(self, index: NDArray[np.intp] | None = None) -> Array:
         """States (rows, n) of all joints or those of `index`, as a copy."""
@@ -284,7 +304,7 @@ class JointBatch:
         if (new > limit).any():
             row = int(np.argmax(new > limit))
             joint = row if index is None else int(index[row])
-            path = write_replay(self.law, old[:, [row]], d[[row]].T, step.C is not None)
+            path = write_replay(self.law.to_toml, old[:, [row]], d[[row]].T, step.C is not None)
             again = "no replay file could be written"
             if path is not None:
                 again = f"`jointlaw replay {path}` repeats it"

@@ -95,5 +95,16 @@ class Joint:
 
     @property
     def dissipated_energy(self) -> float:
-        """Energy in J/m2 lost to friction since the virgin state; never decreases."""
+        """Energy in J/m2 lost since the virgin state, to friction and to yielding asperities; never
+        decreases."""
         return float(self._batch.dissipated_energy[0])
+
+    @property
+    def plastic_work(self) -> float:
+        """The part of the dissipated energy, in J/m2, that yielding asperities took."""
+        return float(self._batch.plastic_work[0])
+
+    @property
+    def friction(self) -> float:
+        """Friction coefficient of the asperities, worn by their slip so far."""
+        return float(self._batch.friction[0])

@@ -1,7 +1,5 @@
 """Joints for contacts that come and go: every contact keeps its joint as long as it lasts."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Iterable
 
 import numpy as np

@@ -1,14 +1,13 @@
 """Snapshots of joints, and the replay file that a failed step leaves behind."""
 
-from __future__ import annotations
-
 import io
 import os
 import time
 import zipfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -59,21 +58,19 @@ def load_state(path: str | Path) -> JointState:
     return JointState(str(data["fingerprint"]), data["values"])
 
 
-class Written(Protocol):
-    """A law that can be written as text."""
-
-    def to_toml(self) -> str: ...
-
-
-def write_replay(law: Written, values: Array, d: Array, tangent: bool) -> Path | None:
+def write_replay(
+    law_text: Callable[[], str], values: Array, d: Array, tangent: bool
+) -> Path | None:
     """Write state and increment of a failed step; in JOINTLAW_REPLAY_DIR or the working folder.
+
+    law_text: gives the law as TOML; a ValueError says that it has no such form.
 
     Returns the file, or None where it could not be written: the failure of the step matters more.
     """
     folder = Path(os.environ.get("JOINTLAW_REPLAY_DIR", "."))
     path = folder / f"jointlaw-replay-{os.getpid()}-{time.time_ns()}.npz"
     try:
-        _save(path, law=law.to_toml(), values=values, d=d, tangent=tangent)
+        _save(path, law=law_text(), values=values, d=d, tangent=tangent)
     except (OSError, ValueError):  # ValueError: heights that have no form as TOML
         return None
     return path

@@ -1,7 +1,5 @@
 """States of many joints in blocks (blocks, rows, lanes): the joints of a block lie side by side."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

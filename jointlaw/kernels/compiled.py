@@ -8,8 +8,6 @@ turns each loop over l, the joint, into vector instructions. Branches in such lo
 Symbols are those of docs/theory-incremental.md and of the reference kernel.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numba
@@ -19,7 +17,8 @@ from numpy.typing import NDArray
 from ..discretisation.nodes import UNUSED
 from ..discretisation.tables import UNDERFLOW, Tables
 from ..support.checks import Array
-from .reference import GRAZING, LIMIT, NEAR, ROUNDED, TINY, compliance
+from .cells import TINY, compliance
+from .reference import GRAZING, LIMIT, NEAR, ROUNDED
 
 # Strict arithmetic: no fused or reordered operations, so results are the same on every machine
 _jit = numba.njit(error_model="numpy", nogil=True, cache=True)
@@ -38,43 +37,55 @@ _CURVING, _BSS, _BST, _BTT, _VS, _VT, _G0, _G1, _G2 = _rows(11, 9)  # its tangen
 _P, _P1, _P2, _OLD, _OLD1, _OLD2, _NEW, _NEW1, _NEW2 = _rows(20, 9)  # a joint: step, y's origin
 _J00, _J01, _J10, _J11, _SLIP, _PULL1, _PULL2, _LOST, _F, _FS, _FT = _rows(29, 11)
 _C00, _C01, _C02, _C10, _C11, _C12, _C20, _C21, _C22 = _rows(40, 9)
-_PAD = 49 * LANES
+_NORMAL, _CRUSHED, _MU = _rows(49, 3)  # a joint whose asperities wear or yield
+_Z0, _Z1, _FZ0, _FZ1, _SZ1, _AT0, _FAT0, _MOVES, _WS, _WT = _rows(52, 10)  # its flattened facets
+_PAD = 62 * LANES
 
 # The same rows while joints are measured
 _WHOLE, _LIMIT, _SLIDING, _SLIPPING, _APART, _STORED, _REACH = _rows(20, 7)
 
 _M, _S, _T, _N, _REST = 0, 3, 6, 9, 12  # columns of the facet table; then A, a, compliance,
 _POTENTIAL, _SHARE = 15, 16  # A c1 and the share of the facet orientation
+_YIELD, _OPPOSITE = 17, 18
 
 
 class Packed(NamedTuple):
     """The tables of a law as few plain arrays: fewer arguments make a cheaper call."""
 
-    facet: Array  # (M, 17): m, s, t, n (3 each, 0 where the plane drops one), then the above
+    facet: Array  # (M, 19): m, s, t, n (3 each, 0 where the plane drops one), then the above
     depth: Array  # (M, D + 1, 3): zeta, force and slope there, infinity as the largest float
     curve: Array  # (4 cells,): coefficients of S
-    scalars: Array  # lam, mu, critical slip, eta, scale and rise of the curve
+    scalars: Array  # lam, mu, critical slip, eta, scale and rise of the curve, mu residual, slip
     dim: int
+    yields: bool | None  # True or None, for which the compiler leaves the code out
+    wears: bool | None
 
 
 def pack(k: Tables) -> Packed:
     """Arrange the tables of a law for the compiled kernel."""
-    facet = np.zeros((len(k.c1), 17))
+    facet = np.zeros((len(k.c1), 19))
     for first, rows in ((_M, k.m), (_S, k.s), (_T, k.t), (_N, k.n)):
         facet[:, first : first + k.dim] = rows.T
     share = k.weight / k.weight.sum()
     rest = (k.area, k.area / k.c1, compliance(k).ravel(), k.area * k.c1, share)
-    facet[:, _REST:] = np.stack(rest, axis=-1)
+    facet[:, _REST:_YIELD] = np.stack(rest, axis=-1)
+    facet[:, _YIELD] = np.inf if k.yield_depth is None else k.yield_depth
+    facet[:, _OPPOSITE] = k.opposite
     largest = np.finfo(float).max
     depth = np.minimum(np.stack([k.depth, k.depth_force, k.depth_slope], axis=-1), largest)
     virgin = (k.curve.eta, k.curve.scale, k.curve.rise)
-    scalars = np.array([k.lam, k.mu, k.critical_slip, *virgin])
-    return Packed(facet, depth, k.curve.S.ravel().copy(), scalars, k.dim)
+    residual = k.mu if k.mu_residual is None else k.mu_residual
+    scalars = np.array([k.lam, k.mu, k.critical_slip, *virgin, residual, k.wear_slip])
+    curve = k.curve.S.ravel().copy()
+    return Packed(facet, depth, curve, scalars, k.dim, k.yields or None, k.wears or None)
 
 
 def block_rows(k: Tables) -> int:
-    """Rows of a block: the state, then Phi and Phi' of all facets, which save half the look-ups."""
-    return k.rows + 2 * len(k.c1)
+    """Rows of a block: the state, then Phi and Phi' of all facets, which save half the look-ups.
+
+    With flattened facets, Phi there too.
+    """
+    return k.rows + (3 if k.yields else 2) * len(k.c1)
 
 
 class Work(NamedTuple):
@@ -245,17 +256,112 @@ def _limit_offset(pad, L, limit, dim):
 
 
 @_jit
+def _places(law):
+    """First rows of flattened depths, of the slip, and of Phi beside the state of a block."""
+    M, D = law.depth.shape[0], law.depth.shape[1] - 1
+    first = slip = beside = 2 * law.dim + 2 * M * D
+    if law.yields is not None:
+        slip = beside = first + M + 1
+    if law.wears is not None:
+        beside = slip + 1
+    return first, slip, beside
+
+
+@_jit
+def _weaken(pad, s, L, law):
+    """Friction of the asperities of each joint, after their slip."""
+    slip, first, last = _places(law)[1], law.scalars[1], law.scalars[6]
+    for l in range(L):
+        pad[_MU + l] = last + (first - last) * np.exp(-s[slip, l] / law.scalars[7])
+
+
+@_jit
+def _press(work, s, L, law, f):
+    """Flattened depths of a facet before and after the step, and Phi there; see `yielding`."""
+    pad, facet = work.pad, law.facet
+    first, _, beside = _places(law)
+    at, kept = first + f, beside + 2 * law.depth.shape[0] + f
+    deep, o = facet[f, _YIELD], np.int64(facet[f, _OPPOSITE])
+    for l in range(L):  # one copy a loop, or the compiler makes no vectors of it
+        pad[_Z0 + l] = s[at, l]
+    for l in range(L):
+        pad[_FZ0 + l] = s[kept, l]
+    for l in range(L):
+        pad[_Z1 + l] = pad[_Y1 + l]
+    if o != f:
+        m0, m1, m2 = facet[o, _M], facet[o, _M + 1], facet[o, _M + 2]
+        for l in range(L):
+            other = m0 * pad[_NEW + l] + m1 * pad[_NEW1 + l] + m2 * pad[_NEW2 + l]
+            pad[_Z1 + l] = other if other > pad[_Y1 + l] else pad[_Y1 + l]
+    pressed = 0.0
+    for l in range(L):
+        z0, y1, z1 = pad[_Z0 + l], pad[_Y1 + l], pad[_Z1 + l] - deep
+        moves = z1 > z0
+        z1 = z1 if moves else z0
+        own = 1.0 if z1 <= y1 - deep else 2.0
+        pad[_Z1 + l], pad[_FZ1 + l] = z1, pad[_FZ0 + l]
+        pad[_MOVES + l] = own if moves & (y1 > z1) else 0.0
+        pad[_SZ1 + l] = y1
+        pressed += 1.0 if moves else 0.0
+    if pressed > 0.0:
+        for l in range(L):
+            pad[_Y1 + l] = pad[_Z1 + l]
+        _virgin(work, law, True, L)
+        for l in range(L):
+            pad[_Y1 + l] = pad[_SZ1 + l]
+            pad[_FZ1 + l], pad[_SZ1 + l] = pad[_F1 + l], pad[_S1 + l]
+        for l in range(L):
+            s[at, l] = pad[_Z1 + l]
+        for l in range(L):
+            s[kept, l] = pad[_FZ1 + l]
+    for l in range(L):
+        touches = pad[_Y0 + l] > pad[_Z0 + l]
+        pad[_AT0 + l] = pad[_Y0 + l] if touches else pad[_Z0 + l]
+        pad[_FAT0 + l] = pad[_F0 + l] if touches else pad[_FZ0 + l]
+
+
+@_jit
+def _relieve(pad, L, law, f, ledger):
+    """Take the part at the flattened depth off Phi and Phi', and add up what the springs lost."""
+    deep, potential = law.facet[f, _YIELD], law.facet[f, _POTENTIAL]
+    for l in range(L):
+        y1, z1, f1 = pad[_Y1 + l], pad[_Z1 + l], pad[_F1 + l] - pad[_FZ1 + l]
+        pad[_F1 + l] = f1 if (y1 > z1) & (f1 > 0.0) else 0.0
+        pad[_S1 + l] = pad[_S1 + l] if y1 > z1 else 0.0
+        pad[_F0 + l] = pad[_FAT0 + l] - pad[_FZ0 + l]
+    if ledger is not None:
+        for l in range(L):
+            c0, c1 = pad[_Y0 + l] - pad[_Z0 + l], pad[_Y1 + l] - pad[_Z1 + l]
+            own = pad[_Y1 + l] - deep >= pad[_Z1 + l]
+            c0, c1 = c0 if c0 > 0.0 else 0.0, c1 if c1 > 0.0 else 0.0
+            mean = 0.5 * ((c0 if c0 < deep else deep) + (c1 if c1 < deep else deep))
+            lost = pad[_FZ1 + l] - pad[_FZ0 + l]
+            pad[_CRUSHED + l] += potential * (deep if own else mean) * lost
+
+
+@_jit
+def _share_at(y, force, zl, fl, sl, zh, fh, sh, ended):
+    """G of a cell at y, where the virgin force is known."""
+    G = force - fl - sl * (y - zl)
+    G -= force - fh - sh * (y - zh) if ended & (y > zh) else 0.0
+    return G if (y > zl) & (G > 0.0) else 0.0
+
+
+@_jit
 def _slide(pad, qs, qt, L, law, f, i, ledger, tangent):
     """One depth cell of one facet: steps 3 and 4 of `reference.step`."""
     facet, depth = law.facet, law.depth
     A, a, compliance = facet[f, _REST], facet[f, _REST + 1], facet[f, _REST + 2]
     strength = law.scalars[0] * law.scalars[1] * A
+    by_mu = law.scalars[0] * A
     zl, fl, sl = depth[f, i, 0], depth[f, i, 1], depth[f, i, 2]
     zh, fh, sh = depth[f, i + 1, 0], depth[f, i + 1, 1], depth[f, i + 1, 2]
     ended = i + 2 < depth.shape[1]
     for l in range(L):
         # the bed beyond the lower limit of the cell less that beyond the upper
         y0, y1, f0, f1 = pad[_Y0 + l], pad[_Y1 + l], pad[_F0 + l], pad[_F1 + l]
+        if law.yields is not None:  # from the flattened depth on, where y is above it
+            y0, f0 = pad[_AT0 + l], pad[_FAT0 + l]
         from0, from1 = y0 - zl, y1 - zl
         G0, G1 = f0 - fl - sl * from0, f1 - fl - sl * from1
         k0, k1 = pad[_S0 + l] - sl, pad[_S1 + l] - sl
@@ -267,13 +373,27 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent):
         k0 = k0 if (from0 > 0.0) & (k0 > 0.0) else 0.0
         k1 = k1 if (from1 > 0.0) & (k1 > 0.0) else 0.0
         h0, h1 = k0 * from0, k1 * from1
+        if law.yields is not None:  # at the flattened depth the slope is not at hand
+            begun = G0 if from0 > 0.0 else 0.0
+            h0 = h0 if y0 > pad[_Z0 + l] else begun
         G0, G1 = G0 if h0 > G0 else h0, G1 if h1 > G1 else h1
         G0, G1 = G0 if G0 > 0.0 else 0.0, G1 if G1 > 0.0 else 0.0
+        reached = G1
+        if law.yields is not None:  # less what the bed holds at the flattened depth
+            z1, touched = pad[_Z1 + l], y0 > pad[_Z0 + l]
+            k0, k1 = k0 if touched else 0.0, k1 if y1 > z1 else 0.0
+            y0 = pad[_Y0 + l]
+            G1 -= _share_at(z1, pad[_FZ1 + l], zl, fl, sl, zh, fh, sh, ended)
+            h1 = k1 * (y1 - z1)
+            G1 = G1 if h1 > G1 else h1
+            G1 = G1 if G1 > 0.0 else 0.0
         # trial force: by the chord where stiffness grows, scaled down where it falls
         grows = k1 > k0
         dy = y1 - y0
         near = abs(dy) <= NEAR * abs(y1)
-        top = G1 - G0 if grows else k1
+        if law.yields is not None:  # flattened springs touch at once: no mean where they do
+            near = near & ((k0 > 0.0) | (k1 == 0.0))
+        top = reached - G0 if grows else k1
         bottom = dy if grows else k0
         ratio = top / (bottom if bottom != 0.0 else 1.0)
         chord = 0.5 * (k0 + k1) if near else ratio
@@ -282,6 +402,21 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent):
         kept = 1.0 if grows else ratio
         add = a * (chord if grows else k1)
         olds, oldt, des, det = qs[l], qt[l], pad[_DES + l], pad[_DET + l]
+        if law.wears is not None:  # back to the limit, that fell since
+            strength = by_mu * pad[_MU + l]
+            if law.yields is not None:
+                G0 -= _share_at(pad[_Z0 + l], pad[_FZ0 + l], zl, fl, sl, zh, fh, sh, ended)
+                h0 = k0 * (y0 - pad[_Z0 + l])
+                G0 = G0 if h0 > G0 else h0
+                G0 = G0 if G0 > 0.0 else 0.0
+            size0 = np.sqrt(olds * olds + oldt * oldt)
+            cap0 = strength * G0
+            back = cap0 / (size0 if size0 > cap0 else 1.0)
+            back = back if size0 > cap0 else 1.0
+            soft0 = 1.0 / (k0 if k0 > TINY else 1.0)
+            worn = (1.0 - back) * (1.0 + back) * size0 * size0 * soft0
+            pad[_LOST + l] += compliance * (worn if k0 > TINY else 0.0)
+            olds, oldt = back * olds, back * oldt
         ts, tt = olds * kept + add * des, oldt * kept + add * det
         new2 = ts * ts + tt * tt
         size = np.sqrt(new2)
@@ -320,6 +455,12 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent):
             push = strength * k1
             pad[_VS + l] += share * (ws - us * dot) + push * us if slips else ws
             pad[_VT + l] += share * (wt - ut * dot) + push * ut if slips else wt
+            if law.yields is not None:
+                kz = pad[_SZ1 + l] - sl
+                kz = sh - sl if ended & (z1 > zh) else kz
+                kz = kz if (z1 > zl) & (kz > 0.0) & (k1 > 0.0) & slips else 0.0
+                pad[_WS + l] += strength * kz * us
+                pad[_WT + l] += strength * kz * ut
             beta = share * add
             sliding = beta if slips else 0.0
             pad[_BSS + l] += beta - sliding * us * us
@@ -375,6 +516,29 @@ def _add_tangent(pad, L, law, f):
 
 
 @_jit
+def _soften(pad, L, law, f):
+    """C -= along g^T of a facet whose flattened depth moves, with the y that presses it."""
+    facet, dim, o = law.facet, law.dim, np.int64(law.facet[f, _OPPOSITE])
+    A, soft, limited = facet[f, _REST], 1.0 / law.scalars[0], law.scalars[2] < np.inf
+    m0, m1, m2 = facet[o, _M], facet[o, _M + 1], facet[o, _M + 2]
+    for l in range(L):
+        if pad[_MOVES + l] == 0.0:
+            continue
+        g0, g1, g2 = pad[_G0 + l], pad[_G1 + l], pad[_G2 + l]
+        if (pad[_MOVES + l] == 2.0) & limited:
+            g0 = m0
+            g1 = m1 * pad[_J00 + l] + m2 * pad[_J10 + l]
+            g2 = m1 * pad[_J01 + l] + m2 * pad[_J11 + l]
+        slope, ws, wt = A * pad[_SZ1 + l], soft * pad[_WS + l], soft * pad[_WT + l]
+        for i in range(dim):
+            along = facet[f, _N + i] * slope + facet[f, _S + i] * ws + facet[f, _T + i] * wt
+            row = _C00 + 3 * i * LANES + l
+            pad[row] -= along * g0
+            pad[row + LANES] -= along * g1
+            pad[row + 2 * LANES] -= along * g2
+
+
+@_jit
 def _facet(work, s, L, law, f, ledger, tangent):
     """One facet of a block: closures, virgin curve, sliders, and its part of F and C."""
     pad, facet, dim = work.pad, law.facet, law.dim
@@ -399,9 +563,12 @@ def _facet(work, s, L, law, f, ledger, tangent):
             pad[_DET + l] += t2 * pad[_P2 + l]
     for l in range(L):
         pad[_Y0 + l] = pad[_Y0 + l] if abs(pad[_Y0 + l]) >= UNDERFLOW else 0.0
-    rf, rs = 2 * dim + 2 * M * D + f, 2 * dim + 2 * M * D + M + f
+    beside = _places(law)[2]
+    rf, rs = beside + f, beside + M + f
     for l in range(L):
         pad[_F0 + l], pad[_S0 + l] = s[rf, l], s[rs, l]
+    if law.yields is not None:
+        _press(work, s, L, law, f)
     _virgin(work, law, True, L)
     for l in range(L):
         s[rf, l], s[rs, l] = pad[_F1 + l], pad[_S1 + l]
@@ -413,11 +580,19 @@ def _facet(work, s, L, law, f, ledger, tangent):
         for l in range(L):
             pad[_BSS + l] = pad[_BST + l] = pad[_BTT + l] = 0.0
             pad[_VS + l] = pad[_VT + l] = 0.0
+        if law.yields is not None:
+            for l in range(L):
+                pad[_WS + l] = pad[_WT + l] = 0.0
     for i in range(D):
         if law.depth[f, i, 0] >= UNUSED:
             break
         rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
         _slide(pad, s[rs], s[rt], L, law, f, i, ledger, tangent)
+    if law.yields is not None:
+        _relieve(pad, L, law, f, ledger)
+    if law.wears is not None:
+        for l in range(L):
+            pad[_NORMAL + l] += A * (pad[_F0 + l] + pad[_F1 + l])
     soft = 1.0 / lam
     for l in range(L):
         normal, q0, q1 = A * pad[_F1 + l], soft * pad[_SUMS + l], soft * pad[_SUMT + l]
@@ -433,6 +608,8 @@ def _facet(work, s, L, law, f, ledger, tangent):
             pad[_PULL2 + l] += n2 * A * pad[_F1 + l]
     if tangent is not None:
         _add_tangent(pad, L, law, f)
+        if law.yields is not None:
+            _soften(pad, L, law, f)
 
 
 @_jit
@@ -443,7 +620,11 @@ def _begin(pad, s, d, start, L, law, tangent):
         pad[_P:_J00] = 0.0  # the offset has one component in a plane, none on closure
     pad[_PULL1:_C00] = 0.0
     if tangent is not None:
-        pad[_C00:] = 0.0
+        pad[_C00:_NORMAL] = 0.0
+    if law.yields is not None or law.wears is not None:
+        pad[_NORMAL:_MU] = 0.0
+    if law.wears is not None:
+        _weaken(pad, s, L, law)
     for i in range(dim):
         row, origin = i * LANES, 0 if i == 0 else dim + i - 1
         for l in range(L):
@@ -482,12 +663,22 @@ def _finish(pad, s, F, C, start, L, law, ledger, tangent):
                 pad[_LOST + l] += pad[_SLIP + l] * (pull if pull > 0.0 else 0.0) / limit
         for l in range(L):
             s[2 * dim - 1, l] += pad[_LOST + l]
+        slip = _places(law)[1]
+        if law.yields is not None:
+            for l in range(L):
+                s[slip - 1, l] += pad[_CRUSHED + l]
+                s[2 * dim - 1, l] += pad[_CRUSHED + l]
+        if law.wears is not None:
+            for l in range(L):
+                capacity = 0.5 * pad[_MU + l] * pad[_NORMAL + l]
+                rubbed = pad[_LOST + l] / (capacity if capacity > 0.0 else 1.0)
+                s[slip, l] += rubbed if capacity > 0.0 else 0.0
 
 
 @_jit
 def advance(
     state, d, F, C, index, keep, first, last, block, pad, place, piece, facet, depth, curve,
-    scalars, dim, ledger, tangent,
+    scalars, dim, yields, wears, ledger, tangent,
 ):  # fmt: skip
     """Advance numbers first..last of the list `index` (of all joints if it is empty).
 
@@ -499,7 +690,8 @@ def advance(
     dissipated energy, `tangent` works out C; both are True or None, for which the compiler leaves
     the code out.
     """
-    work, law = Work(block, pad, place, piece), Packed(facet, depth, curve, scalars, dim)
+    work = Work(block, pad, place, piece)
+    law = Packed(facet, depth, curve, scalars, dim, yields, wears)
     rows, W = state.shape[1], state.shape[2]
     listed = index.size > 0
     for start in range(first, last, W):
@@ -536,6 +728,7 @@ def _count(pad, qs, qt, L, law, f, i):
     compliance = facet[f, _REST + 2]
     zl, fl, sl = depth[f, i, 0], depth[f, i, 1], depth[f, i, 2]
     zh, fh, sh = depth[f, i + 1, 0], depth[f, i + 1, 1], depth[f, i + 1, 2]
+    ended = i + 2 < depth.shape[1]
     for l in range(L):
         y, force, slope = pad[_Y0 + l], pad[_F0 + l], pad[_S0 + l]
         reach = min(max(y, zl), zh)
@@ -543,6 +736,13 @@ def _count(pad, qs, qt, L, law, f, i):
         G = k * (y - reach) + (min(max(force, fl), fh) - fl - sl * (reach - zl))
         most = k * (y - zl if y > zl else 0.0)
         G = min(max(G, 0.0), most)
+        if law.yields is not None:
+            z = pad[_Z0 + l]
+            k = k if y > z else 0.0
+            G -= _share_at(z, pad[_FZ0 + l], zl, fl, sl, zh, fh, sh, ended)
+            G = max(min(G, k * (y - z)), 0.0)
+        if law.wears is not None:
+            strength = pad[_MU + l] * law.scalars[0] * facet[f, _REST]
         q2 = qs[l] * qs[l] + qt[l] * qt[l]
         limit = np.sqrt(q2) >= strength * (G * (1.0 - LIMIT) - ROUNDED * force)
         pad[_WHOLE + l] = pad[_WHOLE + l] if limit else 0.0
@@ -565,15 +765,10 @@ def _effective(pad, s, L, law, f):
 
 
 @_jit
-def _measure_facet(work, s, L, law, f, energy):
-    """What one facet of a block adds to the measures."""
-    pad, piece, dim = work.pad, work.piece, law.dim
+def _squeeze(work, law, L, energy, potential):
+    """Energy of the normal springs at the row of y, from the table of T; Phi and Phi' beside."""
+    pad, piece = work.pad, work.piece
     eta, scale, rise = law.scalars[3], law.scalars[4], law.scalars[5]
-    M, D = law.depth.shape[0], law.depth.shape[1] - 1
-    potential, share = law.facet[f, _POTENTIAL], law.facet[f, _SHARE]
-    _effective(pad, s, L, law, f)
-    for l in range(L):
-        pad[_WHOLE + l], pad[_LIMIT + l] = 1.0, 0.0
     _virgin(work, law, None, L)
     _fetch(work.place, piece, L, energy)
     for l in range(L):
@@ -589,31 +784,62 @@ def _measure_facet(work, s, L, law, f, energy):
     if (eta != 0.5) & (eta != 0.0):
         for l in range(L):
             pad[_CURVING + l] *= pad[_Y0 + l] ** eta if pad[_Y0 + l] > 0.0 else 0.0
+
+
+@_jit
+def _measure_facet(work, s, L, law, f, energy):
+    """What one facet of a block adds to the measures."""
+    pad, dim = work.pad, law.dim
+    M, D = law.depth.shape[0], law.depth.shape[1] - 1
+    potential, share = law.facet[f, _POTENTIAL], law.facet[f, _SHARE]
+    for l in range(L):
+        pad[_WHOLE + l], pad[_LIMIT + l], pad[_Z0 + l] = 1.0, 0.0, 0.0
+    if law.yields is not None:
+        at = _places(law)[0] + f
+        for l in range(L):
+            pad[_Z0 + l] = pad[_Y0 + l] = s[at, l]
+        _squeeze(work, law, L, energy, potential)
+        for l in range(L):
+            pad[_FZ0 + l], pad[_FZ1 + l] = pad[_F0 + l], pad[_CURVING + l]
+    _effective(pad, s, L, law, f)
+    _squeeze(work, law, L, energy, potential)
+    if law.yields is not None:
+        for l in range(L):
+            y, z = pad[_Y0 + l], pad[_Z0 + l]
+            squeezed = pad[_CURVING + l] - pad[_FZ1 + l]
+            squeezed -= potential * pad[_FZ0 + l] * (y - z)
+            pad[_CURVING + l] = squeezed if (y > z) & (squeezed > 0.0) else 0.0
     for i in range(D):
         if law.depth[f, i, 0] >= UNUSED:
             break
         rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
         _count(pad, s[rs], s[rt], L, law, f, i)
     for l in range(L):
-        y, force = pad[_Y0 + l], pad[_F0 + l]
+        y, force, z = pad[_Y0 + l], pad[_F0 + l], pad[_Z0 + l]
+        if law.yields is not None:
+            force = force - pad[_FZ0 + l] if y > z else 0.0
         pad[_STORED + l] += pad[_CURVING + l]
-        pad[_SLIDING + l] += share * pad[_WHOLE + l] if y > 0.0 else 0.0
+        pad[_SLIDING + l] += share * pad[_WHOLE + l] if y > z else 0.0
         pad[_SLIPPING + l] += share * pad[_LIMIT + l] / (force if force > 0.0 else 1.0)
-        pad[_APART + l] += 0.0 if y > 0.0 else share
+        pad[_APART + l] += 0.0 if y > z else share
         pad[_REACH + l] = y if y > pad[_REACH + l] else pad[_REACH + l]
 
 
 @_jit
 def measures(
-    state, out, first, last, block, pad, place, piece, facet, depth, curve, scalars, dim, energy
-):
+    state, out, first, last, block, pad, place, piece, facet, depth, curve, scalars, dim,
+    yields, wears, energy,
+):  # fmt: skip
     """Measures (5, n) of joints first..last, as `reference.measures`; arguments as above."""
-    work, law = Work(block, pad, place, piece), Packed(facet, depth, curve, scalars, dim)
+    work = Work(block, pad, place, piece)
+    law = Packed(facet, depth, curve, scalars, dim, yields, wears)
     W = state.shape[2]
     for start in range(first, last, W):
         L = min(W, last - start)
         s = state[start // W]
         pad[_SLIDING:_REACH] = 0.0
+        if law.wears is not None:
+            _weaken(pad, s, L, law)
         pad[_REACH : _REACH + LANES] = -np.inf
         for f in range(facet.shape[0]):
             _measure_facet(work, s, L, law, f, energy)
@@ -623,16 +849,26 @@ def measures(
 
 
 @_jit
-def refresh(state, first, last, block, pad, place, piece, facet, depth, curve, scalars, dim):
+def refresh(
+    state, first, last, block, pad, place, piece, facet, depth, curve, scalars, dim, yields,
+    wears,
+):  # fmt: skip
     """Phi and Phi' in the blocks of joints first..last, after their states were written."""
-    work, law = Work(block, pad, place, piece), Packed(facet, depth, curve, scalars, dim)
-    M, D, W = depth.shape[0], depth.shape[1] - 1, state.shape[2]
+    work = Work(block, pad, place, piece)
+    law = Packed(facet, depth, curve, scalars, dim, yields, wears)
+    M, W = depth.shape[0], state.shape[2]
     for start in range(first, last, W):
         L = min(W, last - start)
         s = state[start // W]
         for f in range(M):
-            rf, rs = 2 * dim + 2 * M * D + f, 2 * dim + 2 * M * D + M + f
+            first_depth, _, beside = _places(law)
             _effective(pad, s, L, law, f)
             _virgin(work, law, None, L)
             for l in range(L):
-                s[rf, l], s[rs, l] = pad[_F0 + l], pad[_S0 + l]
+                s[beside + f, l], s[beside + M + f, l] = pad[_F0 + l], pad[_S0 + l]
+            if law.yields is not None:
+                for l in range(L):
+                    pad[_Y0 + l] = s[first_depth + f, l]
+                _virgin(work, law, None, L)
+                for l in range(L):
+                    s[beside + 2 * M + f, l] = pad[_F0 + l]

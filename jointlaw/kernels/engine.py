@@ -1,17 +1,15 @@
 """Which kernel advances a law's joints, and on how many threads.
 
-Both engines keep states in blocks and offer the same `advance`: numba compiles the inner loops
+Both engines keep states in blocks and offer the same methods: numba compiles the inner loops
 (extra `fast`), numpy is the readable reference. JOINTLAW_KERNEL=numpy or numba chooses; by default
 numba is taken where it can be imported. JOINTLAW_THREADS bounds the threads.
 """
-
-from __future__ import annotations
 
 import os
 import threading
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -37,23 +35,7 @@ class Step(NamedTuple):
     keep: bool  # whether the states advance, or stay as they were
 
 
-class Engine(Protocol):
-    """What a batch asks of a kernel."""
-
-    name: str
-    rows: int  # of a block: those of the state, then what the kernel keeps beside it
-
-    def advance(self, state: Array, step: Step, ledger: bool) -> None:
-        """Take a step; `ledger` adds up the dissipated energy."""
-
-    def refresh(self, state: Array, n: int) -> None:
-        """Bring what the kernel keeps beside the first n states up to date with them."""
-
-    def measures(self, state: Array, out: Array) -> None:
-        """Write the `Measures` of the first n joints into the rows of out (5, n)."""
-
-
-def engine(tables: Tables) -> Engine:
+def engine(tables: Tables) -> "NumpyEngine | NumbaEngine":
     """The engine of a law's tables, which all its joints share: it holds nothing of theirs."""
     choice = os.environ.get("JOINTLAW_KERNEL", "")
     if choice:
@@ -62,7 +44,7 @@ def engine(tables: Tables) -> Engine:
 
 
 @lru_cache(maxsize=64)
-def _engine(tables: Tables, choice: str) -> Engine:
+def _engine(tables: Tables, choice: str) -> "NumpyEngine | NumbaEngine":
     if choice != "numpy":
         try:
             return NumbaEngine(tables)
@@ -85,10 +67,10 @@ class NumpyEngine:
     name = "numpy"
 
     def __init__(self, tables: Tables) -> None:
-        self.tables, self.rows = tables, tables.rows
+        self.tables, self.rows = tables, tables.rows  # rows of a block
 
     def advance(self, state: Array, step: Step, ledger: bool) -> None:
-        """As `Engine.advance`; the ledger is always kept."""
+        """Take a step; the ledger, the sum of the dissipated energy, is always kept."""
         index = np.arange(len(step.d)) if step.where is None else step.where
         for first in range(0, len(step.d), CHUNK):
             part = slice(first, first + CHUNK)
@@ -101,10 +83,10 @@ class NumpyEngine:
                 write_rows(state, new, index[part])
 
     def refresh(self, state: Array, n: int) -> None:
-        """As `Engine.refresh`: nothing."""
+        """Nothing is kept beside the states."""
 
     def measures(self, state: Array, out: Array) -> None:
-        """As `Engine.measures`."""
+        """Write the `Measures` of the first n joints into the rows of out (5, n)."""
         n = out.shape[1]
         for first in range(0, n, CHUNK):
             index = np.arange(first, min(first + CHUNK, n))
@@ -122,9 +104,10 @@ class NumbaEngine:
 
         self._kernel, self._sliders = compiled, tables.sliders
         self.rows = compiled.block_rows(tables)
-        self._law = law = tuple(compiled.pack(tables))
-        self._with = {  # ledger, tangent: True or None, for which the compiler leaves the code out
-            (ledger, tangent): (*law, ledger or None, tangent or None)
+        self._law: tuple[Any, ...] = compiled.pack(tables)
+        self._with: dict[tuple[bool, bool], tuple[Any, ...]] = {
+            # True or None, for which the compiler leaves the code out; slip is made of the ledger
+            (ledger, tangent): (*self._law, ledger or tables.wears or None, tangent or None)
             for ledger in (False, True)
             for tangent in (False, True)
         }
@@ -133,18 +116,18 @@ class NumbaEngine:
         self._none = np.empty((0, tables.dim, tables.dim))
 
     def advance(self, state: Array, step: Step, ledger: bool) -> None:
-        """As `Engine.advance`."""
+        """Take a step; `ledger` adds up the dissipated energy."""
         d, F, C, where, keep = step
         given = (state, d, F, self._none if C is None else C,
                  self._all if where is None else where, keep)  # fmt: skip
         self._run(self._kernel.advance, len(d), given, self._with[ledger, C is not None])
 
     def refresh(self, state: Array, n: int) -> None:
-        """As `Engine.refresh`."""
+        """Bring Phi and Phi', kept beside the first n states, up to date with them."""
         self._run(self._kernel.refresh, n, (state,), self._law)
 
     def measures(self, state: Array, out: Array) -> None:
-        """As `Engine.measures`."""
+        """As `NumpyEngine.measures`."""
         given = (state, out)
         self._run(self._kernel.measures, out.shape[1], given, (*self._law, self._energy))
 

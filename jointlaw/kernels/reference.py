@@ -5,10 +5,9 @@ joints last: facets (M, B), cells (M, D, B), sliders (2, M, D, B). State (rows, 
 
     delta (dim) | in-plane offset (dim - 1) | dissipated energy (1) | q (2 M D)
 
-where q is the shear force of a slider times lam, in the (s, t) basis of Eq. 25.
+where q is the shear force of a slider times lam, in the (s, t) basis of Eq. 25. With asperities
+that yield follow flattened depth (M) | plastic work (1); with wear, slip of the asperities (1).
 """
-
-from __future__ import annotations
 
 from typing import NamedTuple
 
@@ -17,12 +16,14 @@ from numpy.typing import NDArray
 
 from ..discretisation.tables import UNDERFLOW, Tables
 from ..support.checks import Array
+from .cells import TINY, Cells, cells, compliance, reciprocal
+from .wear import friction, slipped, within_limit
+from .yielding import flattened, plastic_work, press, softening
 
 NEAR = 1e-5  # of y: below such a change of y the chord of G is lost in rounding, the mean is not
 GRAZING = 1e-12  # cosine at which the offset meets its limit: its derivative has a pole at 0
 LIMIT = 1e-9  # of the friction limit: a slider this close is at it, less the rounding of q
 ROUNDED = 1e-12  # of Phi: as much may be lost in a G next to a node
-TINY = 1e-290  # a stiffness whose reciprocal might overflow, or a square that underflows: zero
 
 
 Flags = NDArray[np.bool_]
@@ -35,16 +36,9 @@ class State(NamedTuple):
     offset: Array
     dissipated: Array
     q: Array
-
-
-class Cells(NamedTuple):
-    """The depth cells of all facets at one moment."""
-
-    y: Array  # effective closure (M, B)
-    force: Array  # Phi (M, B)
-    slope: Array  # Phi' (M, B)
-    G: Array  # share of Phi of each cell (M, D, B)
-    kappa: Array  # its slope dG/dy
+    depth: Array  # flattened depth of every facet (M, B), no rows where asperities do not yield
+    plastic: Array  # (B,) or no rows
+    slip: Array  # of the asperities (B,), or no rows
 
 
 class Sliders(NamedTuple):
@@ -52,11 +46,23 @@ class Sliders(NamedTuple):
 
     trial: Array  # q before the friction limit
     size: Array  # |trial|
+    strength: Array  # mu lam A: the friction limit of q over G
     cap: Array  # mu lam A G: the friction limit of q
     share: Array  # cap over size where the slider slips, 1 elsewhere
     chord: Array  # of G over the step: stiffness of springs that were added on the way
     grows: Flags  # whether the stiffness of the cell has grown
     near: Flags  # whether y has hardly changed
+
+    @property
+    def unit(self) -> Array:
+        """Direction of the trial force (2, M, D, B)."""
+        size = self.size
+        return np.divide(self.trial, size, out=np.zeros_like(self.trial), where=size > 0)
+
+    @property
+    def push(self) -> Array:
+        """Derivative (2, M, D, B) of q by G: mu lam A along a slider that slips, 0 elsewhere."""
+        return np.where(self.size > self.cap, self.strength * self.unit, 0.0)
 
 
 def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array, Array | None]:
@@ -70,6 +76,8 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
        q += A/c1 chord de; where it fell, the springs that part take their force along,
        q = q kappa1/kappa0 + A/c1 kappa1 de.
     4. Coulomb friction: |q| <= mu lam A G (Eq. 5, 6).
+       Asperities that yield have flattened springs, whose part at the flattened depth is taken off
+       all of these ("Yielding"); with wear mu has fallen, and q comes back to its limit ("Wear").
     5. Traction: F = sum of A Phi n + (1/lam) sum of q (Eq. 21).
     6. Dissipated energy, every term >= 0 ("No step can make energy").
     7. Tangent C = dF/dd ("The tangent"), not without `tangent`.
@@ -82,34 +90,57 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     new.offset[:] = offset
 
     before = cells(k, effective_closure(k, old.delta[0], old.offset))
-    after = cells(k, effective_closure(k, new.delta[0], offset))
+    reached = after = cells(k, effective_closure(k, new.delta[0], offset))
+    flat0 = flat1 = None
+    if k.yields:
+        new.depth[:] = press(k, old.depth, after.y)
+        flat0, flat1 = cells(k, old.depth), cells(k, new.depth)
+        new.plastic[:] = old.plastic + plastic_work(k, before.y, after.y, flat0, flat1)
+        before, reached = flattened(before, flat0), flattened(after, flat0)
+        after = flattened(after, flat1)
+    q, lost, mu = old.q, np.zeros(d.shape[1]), np.asarray(k.mu)
+    if k.wears:
+        mu = friction(k, old.slip)
+        q, lost = within_limit(k, before, q, strength(k, mu))
 
     basis = np.stack([k.s, k.t])  # (2, dim, M)
     de = np.einsum("edm,db->emb", basis, d)[:, :, None]  # facet-plane increment (2, M, 1, B)
-    sliders = load(k, before, after, old.q, de)
+    sliders = load(k, before, reached, after, strength(k, mu), q, de)
     whole = sliders.size**2 > TINY  # a size that underflows has no cap
     new.q[:] = np.where(whole, sliders.share, 0.0) * sliders.trial
 
     F = k.n @ (k.area[:, None] * after.force)
     F = F + np.einsum("edm,emb->db", basis, new.q.sum(axis=2)) / k.lam
 
-    lost = friction_loss(k, before, after, old.q, sliders)
+    lost = lost + friction_loss(k, before, after, q, sliders)
     new.dissipated[:] = old.dissipated + lost
     if slip.any():
         pull = k.n[1:] @ (k.area[:, None] * after.force)  # in-plane part of the normal forces
         # >= 0 by symmetry of the facets, but for rounding
         pulled = np.maximum(np.sum(pull * offset, axis=0), 0.0)
         new.dissipated[:] += slip * pulled / k.critical_slip
+    if k.wears:
+        rubbed = new.dissipated - old.dissipated
+        new.slip[:] = old.slip + slipped(k, before, after, mu, rubbed)
+    if k.yields:
+        new.dissipated[:] += new.plastic - old.plastic
     if not tangent:
         return new_state, F, None
-    return new_state, F, stiffness(k, before, after, sliders, de, J_offset)
+    g = gradient(k, J_offset)
+    C = stiffness(k, before, after, sliders, de, g)
+    if flat0 is not None and flat1 is not None:
+        C = C - softening(k, after, flat0, flat1, sliders.push, g)
+    return new_state, F, C
 
 
 def parts(k: Tables, state: Array) -> State:
-    """Views of delta, offset, dissipated energy and q (2, M, D, B) in a state array."""
-    dim = k.dim
-    q = state[2 * dim :].reshape(2, len(k.c1), k.cells, -1)
-    return State(state[:dim], state[dim : 2 * dim - 1], state[2 * dim - 1], q)
+    """Views of the parts of a state array, q as (2, M, D, B)."""
+    dim, M = k.dim, len(k.c1)
+    q, rest = np.split(state[2 * dim :], [2 * len(k.c1) * k.cells])
+    depth, plastic = (rest[:M], rest[M]) if k.yields else (rest[:0], rest[:0])
+    slip = rest[-1] if k.wears else rest[:0]
+    moved = state[:dim], state[dim : 2 * dim - 1], state[2 * dim - 1]
+    return State(*moved, q.reshape(2, M, k.cells, -1), depth, plastic, slip)
 
 
 def effective_closure(k: Tables, closure: Array, offset: Array) -> Array:
@@ -120,55 +151,34 @@ def effective_closure(k: Tables, closure: Array, offset: Array) -> Array:
     return np.where(np.abs(y) < UNDERFLOW, 0.0, y)
 
 
-def cells(k: Tables, y: Array) -> Cells:
-    """Virgin curve at y (M, B), and the share of every depth cell in it."""
-    force, slope = k.curve.force(y)
-    low, high = k.depth[:, :-1, None], k.depth[:, 1:, None]
-    low_force, high_force = k.depth_force[:, :-1, None], k.depth_force[:, 1:, None]
-    low_slope, high_slope = k.depth_slope[:, :-1, None], k.depth_slope[:, 1:, None]
-    at, at_force, at_slope = y[:, None], force[:, None], slope[:, None]
-    reach = np.clip(at, low, high)
-    # by place, not by size: beyond its last height a tabulated slope wavers by its rounding
-    kappa = np.where(at > high, high_slope, at_slope) - low_slope
-    kappa = np.where(at > low, np.maximum(kappa, 0.0), 0.0)
-    stored = np.clip(at_force, low_force, high_force) - low_force - low_slope * (reach - low)
-    G = kappa * (at - reach) + stored
-    G = np.clip(G, 0.0, kappa * np.maximum(at - low, 0.0))
-    return Cells(y, force, slope, G, kappa)
+def load(
+    k: Tables, before: Cells, reached: Cells, after: Cells, strength: Array, q: Array, de: Array
+) -> Sliders:
+    """Trial forces of all sliders and their friction limits: steps 3 and 4 of `step`.
 
-
-def load(k: Tables, before: Cells, after: Cells, q: Array, de: Array) -> Sliders:
-    """Trial forces of all sliders and their friction limits: steps 3 and 4 of `step`."""
+    reached: the cells at the new y before springs yield there, which they do at once.
+    """
     kappa0, kappa1 = before.kappa, after.kappa
     dy = (after.y - before.y)[:, None]
     near = np.abs(dy) <= NEAR * np.abs(after.y)[:, None]
+    if k.yields:  # flattened springs touch all at once: the mean is wrong where they do
+        near = near & ((kappa0 > 0) | (kappa1 == 0))
     with np.errstate(divide="ignore", invalid="ignore"):
-        chord = np.where(near, 0.5 * (kappa0 + kappa1), (after.G - before.G) / dy)
+        chord = np.where(near, 0.5 * (kappa0 + kappa1), (reached.G - before.G) / dy)
     chord = np.clip(chord, np.minimum(kappa0, kappa1), np.maximum(kappa0, kappa1))
     a = (k.area / k.c1)[:, None, None]
     grows = kappa1 > kappa0
     kept = np.divide(kappa1, kappa0, out=np.zeros_like(kappa0), where=kappa0 > 0)
     trial = np.where(grows, q + a * chord * de, q * kept + a * kappa1 * de)
-    cap = strength(k) * after.G
+    cap = strength * after.G
     size = np.sqrt(trial[0] ** 2 + trial[1] ** 2)
     share = np.divide(cap, size, out=np.ones_like(size), where=size > cap)
-    return Sliders(trial, size, cap, share, chord, grows, near)
+    return Sliders(trial, size, strength, cap, share, chord, grows, near)
 
 
-def strength(k: Tables) -> Array:
-    """mu lam A per facet (M, 1, 1): the friction limit of q over G."""
-    return k.mu * k.lam * k.area[:, None, None]
-
-
-def compliance(k: Tables) -> Array:
-    """c1/(2 A lam) per facet (M, 1, 1): turns |q|^2/kappa into energy; 0 for an empty facet."""
-    scale = 2 * k.area * k.lam
-    return np.divide(k.c1, scale, out=np.zeros_like(scale), where=scale > 0)[:, None, None]
-
-
-def reciprocal(kappa: Array) -> Array:
-    """1/kappa, 0 where there is no stiffness."""
-    return np.divide(1.0, kappa, out=np.zeros_like(kappa), where=kappa > TINY)
+def strength(k: Tables, mu: Array) -> Array:
+    """mu lam A per facet (M, 1, 1 or B): the friction limit of q over G."""
+    return mu * k.lam * k.area[:, None, None]
 
 
 def friction_loss(k: Tables, before: Cells, after: Cells, q: Array, sliders: Sliders) -> Array:
@@ -227,8 +237,15 @@ def limited_offset(k: Tables, offset: Array, p: Array) -> tuple[Array, Array, Ar
     return free, J, slip
 
 
+def gradient(k: Tables, J_offset: Array) -> Array:
+    """g = dy/dd of every facet (dim, M, B)."""
+    g = np.broadcast_to(k.m[:, :, None], (*k.m.shape, J_offset.shape[2])).copy()
+    g[1:] = np.einsum("om,opb->pmb", k.m[1:], J_offset)
+    return g
+
+
 def stiffness(
-    k: Tables, before: Cells, after: Cells, sliders: Sliders, de: Array, J_offset: Array
+    k: Tables, before: Cells, after: Cells, sliders: Sliders, de: Array, g: Array
 ) -> Array:
     """Tangent C = dF/dd (dim, dim, B): J_q = beta (I - s s^T) E + v g^T per cell, summed."""
     trial, size, share, chord, grows = (
@@ -242,15 +259,12 @@ def stiffness(
         chord_slope = np.where(sliders.near, p / 2, (kappa - chord) / (y - before.y)[:, None])
     v = np.where(grows, a * chord_slope * de, p * reciprocal(kappa) * trial)
     beta = np.where(kappa > 0, a * np.where(grows, chord, kappa), 0.0)
-    unit = np.divide(trial, size, out=np.zeros_like(trial), where=size > 0)
-    slips = size > sliders.cap
+    slips, unit = size > sliders.cap, sliders.unit
     v = np.where(slips, share * (v - unit * np.sum(unit * v, axis=0)), v)
-    v = v + np.where(slips, strength(k) * kappa * unit, 0.0)
+    v = v + np.where(slips, sliders.strength * kappa * unit, 0.0)
     beta = np.where(slips, share * beta, beta)
     outer = np.where(slips, unit[:, None] * unit[None], 0.0)
     inner = np.sum(beta * (np.eye(2)[:, :, None, None, None] - outer), axis=3)  # (2, 2, M, B)
-    g = np.broadcast_to(k.m[:, :, None], (k.dim, *y.shape)).copy()  # dy/dd
-    g[1:] = np.einsum("om,opb->pmb", k.m[1:], J_offset)
     basis = np.stack([k.s, k.t])
     along = k.n[:, :, None] * (k.area[:, None] * after.slope)
     along = along + np.einsum("edm,emb->dmb", basis, np.sum(v, axis=2)) / k.lam
@@ -262,7 +276,10 @@ def stiffness(
 def traction(k: Tables, state: Array) -> Array:
     """Traction F (dim, B) in Pa that a state carries."""
     now = parts(k, state)
-    force, _ = k.curve.force(effective_closure(k, now.delta[0], now.offset))
+    y = effective_closure(k, now.delta[0], now.offset)
+    force, _ = k.curve.force(y)
+    if k.yields:
+        force = np.where(y > now.depth, force - k.curve.force(now.depth)[0], 0.0)
     shear = np.einsum("edm,emb->db", np.stack([k.s, k.t]), now.q.sum(axis=2))
     F: Array = k.n @ (k.area[:, None] * force) + shear / k.lam
     return F
@@ -281,16 +298,24 @@ class Measures(NamedTuple):
 def measures(k: Tables, state: Array) -> Measures:
     """Shares, stored energy and reach of a batch of states (rows, B)."""
     state_now = parts(k, state)
-    now = cells(k, effective_closure(k, state_now.delta[0], state_now.offset))
+    virgin = cells(k, effective_closure(k, state_now.delta[0], state_now.offset))
+    now = flattened(virgin, cells(k, state_now.depth) if k.yields else None)
     y, force, G = now.y, now.force, now.G
+    mu = friction(k, state_now.slip) if k.wears else np.asarray(k.mu)
+    rounding = ROUNDED * virgin.force[:, None]
     q2 = state_now.q[0] ** 2 + state_now.q[1] ** 2
-    capped = np.sqrt(q2) >= strength(k) * (G * (1 - LIMIT) - ROUNDED * force[:, None])
+    capped = np.sqrt(q2) >= strength(k, mu) * (G * (1 - LIMIT) - rounding)
     weight = (k.weight / k.weight.sum())[:, None]
-    touches = y > 0
+    touches = y > (state_now.depth if k.yields else 0.0)
     sliding = np.sum(weight * (touches & np.all(capped, axis=1)), axis=0)
     total = np.where(force > 0, force, 1.0)
     slipping = np.sum(weight * np.sum(np.where(capped, G, 0.0), axis=1) / total, axis=0)
     separated = np.sum(weight * ~touches, axis=0)
-    stored = np.sum((k.area * k.c1)[:, None] * k.curve.energy(y), axis=0)
+    squeezed = k.curve.energy(y)
+    if k.yields:
+        depth = state_now.depth
+        squeezed = squeezed - k.curve.energy(depth) - k.curve.force(depth)[0] * (y - depth)
+        squeezed = np.where(touches, np.maximum(squeezed, 0.0), 0.0)
+    stored = np.sum((k.area * k.c1)[:, None] * squeezed, axis=0)
     stored = stored + np.sum(compliance(k) * q2 * reciprocal(now.kappa), axis=(0, 1))
     return Measures(sliding, slipping, separated, stored, np.max(y, axis=0))

@@ -1,7 +1,5 @@
 """The threads that share the work on a large batch."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait

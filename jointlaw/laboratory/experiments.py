@@ -1,7 +1,5 @@
 """Laboratory tests on one joint: closure and direct shear under normal control."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

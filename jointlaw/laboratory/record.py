@@ -1,7 +1,5 @@
 """What a laboratory test on a joint measured: named columns, units, summary figures."""
 
-from __future__ import annotations
-
 import io
 import json
 import math

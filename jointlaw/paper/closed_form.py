@@ -13,8 +13,6 @@ Stiffnesses are per asperity, C/N, in the unit of kn and ks (N/m). Where an `ori
 for, any object with a, b and c serves: `Shape` is one whose a may be infinite.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

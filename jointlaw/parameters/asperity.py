@@ -21,12 +21,21 @@ class Asperity:
     lam: normal over shear stiffness, > 0; (2-nu)/(2(1-nu)) for Hertz-Mindlin (Eq. 34).
     eta: exponent, >= 0; 1/2 for Hertz, 0 for constant stiffness.
     mu: friction coefficient of the asperity contact, >= 0.
+    yield_interference: largest elastic compression (m) of a spring of the contact, along the
+        asperity normal, > 0. Beyond it the spring yields at constant force and keeps a set.
+        Infinite (elastic) by default.
+    mu_residual: friction coefficient of worn asperities, 0..mu; None for no wear.
+    wear_slip: slip (m) of the asperities over which mu falls to mu_residual by a factor e, > 0:
+        mu(L) = mu_residual + (mu - mu_residual) exp(-L/wear_slip).
     """
 
     K: float
     lam: float
     eta: float
     mu: float
+    yield_interference: float = math.inf
+    mu_residual: float | None = None
+    wear_slip: float = math.inf
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
@@ -34,6 +43,22 @@ class Asperity:
         set_(self, "lam", above("asperity.lam", self.lam, 0.0))
         set_(self, "eta", at_least("asperity.eta", self.eta, 0.0))
         set_(self, "mu", at_least("asperity.mu", self.mu, 0.0))
+        for name in ("yield_interference", "wear_slip"):
+            value = above(f"asperity.{name}", getattr(self, name), 0.0, infinite=True)
+            set_(self, name, value)
+        if (self.mu_residual is None) != math.isinf(self.wear_slip):
+            raise ValueError(
+                f"asperity.mu_residual = {self.mu_residual!r}, wear_slip = {self.wear_slip!r} m: "
+                "wear needs both a residual friction and a finite slip; give both or neither"
+            )
+        if self.mu_residual is not None:
+            residual = at_least("asperity.mu_residual", self.mu_residual, 0.0)
+            if residual > self.mu:
+                raise ValueError(
+                    f"asperity.mu_residual = {residual!r} is out of bounds: it must be <= mu = "
+                    f"{self.mu!r}, for wear lowers friction"
+                )
+            set_(self, "mu_residual", residual)
 
     @classmethod
     def hertz_mindlin(cls, G: float, nu: float, R: float, mu: float) -> Asperity:

@@ -1,7 +1,5 @@
 """A hash of parameters, by which a state knows the law that wrote it."""
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import MISSING, fields, is_dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """How finely the law is discretised: orientations and depth cells."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..support.checks import whole

@@ -1,9 +1,8 @@
 """Laws as TOML files: the same keys as the constructors, unknown keys refused by their path."""
 
-from __future__ import annotations
-
 import csv
 import json
+import math
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields
@@ -47,6 +46,10 @@ def write_law(law: Mapping[str, Any], path: Path | None) -> str:
     lines += ["", "[orientation]", f"a = {_num(o.a)}", f"b = {_num(o.b)}", f"c = {_num(o.c)}"]
     lines += ["", "[asperity]", f"K = {_num(p.K)}  # Pa m^(1-eta)", f"lam = {_num(p.lam)}"]
     lines += [f"eta = {_num(p.eta)}", f"mu = {_num(p.mu)}"]
+    if p.yield_interference < math.inf:
+        lines.append(f"yield_interference = {_num(p.yield_interference)}  # m")
+    if p.mu_residual is not None:
+        lines += [f"mu_residual = {_num(p.mu_residual)}", f"wear_slip = {_num(p.wear_slip)}  # m"]
     if h is not None:
         lines += ["", "[heights]"]
         if isinstance(h, GammaHeights):

@@ -1,7 +1,5 @@
 """Parameter sets printed in the paper, in SI units, each with its source."""
 
-from __future__ import annotations
-
 import tomllib
 from importlib import resources
 from pathlib import Path

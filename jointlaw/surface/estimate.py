@@ -1,7 +1,5 @@
 """What a scan says of the parameters: values, errors, intervals, and what it leaves open."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Surfaces whose asperities are known: to try a scan on, and to test what is read from it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..parameters.heights import GammaHeights

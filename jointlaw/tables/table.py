@@ -58,6 +58,7 @@ class Report:
     """Errors of a table against its law, one row per path; print it to read it."""
 
     rows: tuple[PathDifference, ...]
+    note: str = ""
 
     def __str__(self) -> str:
         head = (
@@ -67,7 +68,7 @@ class Report:
         for r in self.rows:
             values = (r.largest, r.rms, r.normal, r.along, r.across)
             lines.append(f"{r.name:34s} " + " ".join(f"{100 * v:6.1f} %" for v in values))
-        return "\n".join(lines)
+        return "\n".join([*lines, self.note] if self.note else lines)
 
     def __getitem__(self, name: str) -> PathDifference:
         return next(row for row in self.rows if row.name == name)
@@ -162,7 +163,11 @@ class JointTable:
             increments, joint = np.diff(path, axis=0, prepend=np.zeros((1, 3))), law.joint()
             exact = np.array([joint.update(d, tangent=False)[0] for d in increments])
             rows.append(_error(name, self.follow(path), exact, corners))
-        return Report(tuple(rows))
+        k, damage = law.tables, []
+        damage += ["yield"] if k.yields else []
+        damage += ["wear"] if k.wears else []
+        note = f"asperities {' and '.join(damage)}: the table holds their first loading alone"
+        return Report(tuple(rows), note if damage else "")
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Draw the table (needs matplotlib); returns the figure, written to `path` if given."""

@@ -4,8 +4,6 @@ Normal stress follows the closure; shear is elastic, with the stiffness and the 
 direction. Arrays run over joints, last; SI units: m, Pa, Pa/m.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """From a law to its table: the graded grid, and the virgin loading paths that fill it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any
@@ -92,6 +90,9 @@ def _metadata(
         "azimuth": "degrees in the joint plane from axis 2 towards axis 3: digits of column names",
         "use": "kn_secant is for laws that take the total normal force kn*un; kt is the tangent "
         "for incremental shear, dFs = kt*dus",
+        "yielding": "first loading only: unloading keeps the closure that asperities yielded"
+        if law.tables.yields
+        else "none",
         "loading_path": "virgin joint; kn: pure closure; kt: first shear after pure closure; "
         f"mu, mob, dil: shear to {limit:.6g} m in {steps} steps at constant normal stress; "
         "mu is the largest ratio on the way, mob and dil (opening per shear) are those at the end",

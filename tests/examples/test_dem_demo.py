@@ -208,10 +208,11 @@ def test_overlap_and_speed_are_refused():
 def test_history_survives_a_gap():
     """A joint that opens for less than the reach of the search is the same joint afterwards."""
     sim = Simulation(parse(SHORT.replace("velocity = [0.0, 0.1]", "velocity = [0.0, 0.3]")))
-    slots = {name: dict(table) for name, table in sim.joints._slots.items()}
+    held = {name: (pool.keys, pool.places.tolist()) for name, pool in sim.joints.pools.items()}
     opened = False
     for _ in range(600):
         sim.step()
         opened |= bool((sim.now.traction[sim.now.between(1, 2), 0] == 0).all())
     assert opened
-    assert sim.joints._slots == slots
+    pools = sim.joints.pools.items()
+    assert {name: (pool.keys, pool.places.tolist()) for name, pool in pools} == held

@@ -15,14 +15,14 @@ hypothesis.settings.load_profile("jointlaw")
 
 
 def _make_law(
-    a=3.0, b=0.5, c=0.1, K=2.0e8, lam=1.2, eta=0.5, mu=0.3, heights="population", **more
+    a=3.0, b=0.5, c=0.1, K=2.0e8, lam=1.2, eta=0.5, mu=0.3, heights="population", damage=(), **more
 ) -> jl.JointLaw:
     if isinstance(heights, str):
         heights = jl.GammaHeights(alpha=3.82, beta=1.15e-6, overlap=2e-6, formation=heights)
     defaults = {"asperity_density": 1e10, "closure_range": 1e-6, "resolution": "fast"}
     return jl.JointLaw(
         orientation=jl.Orientation(a, b, c),
-        asperity=jl.Asperity(K=K, lam=lam, eta=eta, mu=mu),
+        asperity=jl.Asperity(K=K, lam=lam, eta=eta, mu=mu, **dict(damage)),
         heights=heights,
         **(defaults | more),
     )
@@ -46,6 +46,8 @@ KINDS = {
     "linear": {"heights": None, "eta": 0.0, "a": 1.0, "mu": 0.0},
     "plane": {"plane": 0.4},
     "critical slip": {"critical_slip": 2e-6, "plane": math.pi},
+    "yielding": {"critical_slip": 2e-6, "damage": {"yield_interference": 2e-7}},
+    "wear": {"plane": 0.4, "damage": {"mu_residual": 0.1, "wear_slip": 1e-6}},
     "closure only": {"closure_only": True, "critical_slip": 2e-6},
 }
 

@@ -233,3 +233,29 @@ def test_negative_normal_stress_has_no_closure(law):
 def test_arguments_of_the_time_step(law, mass_area_closure):
     with pytest.raises(ValueError, match=r"(mass|area|closure) = "):
         law.critical_time_step(*mass_area_closure)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"yield_interference": 0.0}, "asperity.yield_interference = 0.0 is out of bounds"),
+        ({"yield_interference": -1e-6}, "asperity.yield_interference = -1e-06 is out of bounds"),
+        ({"yield_interference": float("nan")}, "asperity.yield_interference = nan"),
+        ({"mu_residual": 0.1, "wear_slip": 0.0}, "asperity.wear_slip = 0.0 is out of bounds"),
+        ({"mu_residual": 0.1, "wear_slip": float("nan")}, "asperity.wear_slip = nan"),
+        ({"mu_residual": 0.4, "wear_slip": 1.0}, "asperity.mu_residual = 0.4 .* <= mu = 0.3"),
+        ({"mu_residual": -0.1, "wear_slip": 1.0}, "asperity.mu_residual = -0.1 is out of bounds"),
+        ({"mu_residual": 0.1}, "give both or neither"),
+        ({"wear_slip": 1.0}, "give both or neither"),
+    ],
+)
+def test_yielding_and_wear_out_of_bounds(changes, message):
+    with pytest.raises(ValueError, match=message):
+        jl.Asperity(**GOOD["asperity"], **changes)
+
+
+def test_a_stress_that_yielding_asperities_never_reach():
+    asperity = jl.Asperity(1e9, 1.0, 0.0, 0.3, yield_interference=1e-6)
+    law = jl.JointLaw(orientation=jl.Orientation(3.0), asperity=asperity, asperity_density=1e6)
+    with pytest.raises(ValueError, match="beyond any closure"):
+        law.closure(1e12)

@@ -96,7 +96,7 @@ def test_replay_example_names_a_file_of_the_kind_that_errors_leave(capsys):
 def test_replay_of_a_step_that_passes(law, tmp_path, capsys):
     from jointlaw.joints.state import write_replay
 
-    path = write_replay(law, law.joint().snapshot().values, np.full((3, 1), 1e-7), True)
+    path = write_replay(law.to_toml, law.joint().snapshot().values, np.full((3, 1), 1e-7), True)
     assert main(["replay", str(path)]) == 0
     assert "passes: F = " in capsys.readouterr().out
 

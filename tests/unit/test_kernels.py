@@ -33,12 +33,17 @@ def random_law(make_law, seed):
         eta = 0.8  # not convex
     if seed % 7 == 6:  # a density infinite at the point of contact
         heights = jl.GammaHeights(-0.6, 3e-6, 0.0, "individual")
+    mu = [0.0, 0.3, 0.7][rng.integers(3)]
+    damage = {"yield_interference": 3e-7} if seed % 4 > 1 else {}
+    if seed % 6 > 3:
+        damage |= {"mu_residual": 0.4 * mu, "wear_slip": 2e-6}
     return make_law(
         a=rng.uniform(1.0, 6.0),
         b=rng.uniform(-0.4, 0.8),
         c=rng.uniform(-0.15, 0.15),
         lam=rng.uniform(0.5, 2.0),
-        mu=[0.0, 0.3, 0.7][rng.integers(3)],
+        mu=mu,
+        damage=damage,
         eta=eta,
         heights=heights,
         plane=[None, 0.0, 0.7][rng.integers(3)],
@@ -102,7 +107,8 @@ def test_same_numbers_on_random_laws_and_paths(both, make_law, seed):
         peak, peak_C = max(peak, np.abs(F).max()), max(peak_C, np.abs(C).max())
         off = max(off, np.abs(F - F2).max())
         off_C.append(np.abs(C - C2).max(axis=(1, 2)))
-    assert off < SAME * peak
+    # what yielding leaves is a small difference of large forces, whose rounding it keeps
+    assert off < (10 * SAME if law.tables.yields else SAME) * peak
     assert np.max(off_C) < SAME_C * peak_C
     assert np.quantile(off_C, 0.95) < USUAL_C * peak_C
     lost = slow.dissipated_energy

@@ -8,13 +8,16 @@ import jointlaw as jl
 SMOOTH = {"alpha": 3.82, "beta": 1.15, "overlap": 2.0}  # Westerly granite, in um
 
 
-def law(a=3.0, b=0.5, c=0.1, K=1.0, lam=1.2, eta=0.5, mu=0.4, formation=None, **more):
-    """A joint law of unit closure range; `formation` switches the printed smooth heights on."""
+def law(a=3.0, b=0.5, c=0.1, K=1.0, lam=1.2, eta=0.5, mu=0.4, formation=None, damage=(), **more):
+    """A joint law of unit closure range; `formation` switches the printed smooth heights on.
+
+    damage: yield_interference, mu_residual and wear_slip of the asperities, as a mapping.
+    """
     heights = None if formation is None else jl.GammaHeights(**SMOOTH, formation=formation)
     more = {"asperity_density": 1.0, "closure_range": 1.0, "resolution": "fine"} | more
     return jl.JointLaw(
         orientation=jl.Orientation(a, b, c),
-        asperity=jl.Asperity(K=K, lam=lam, eta=eta, mu=mu),
+        asperity=jl.Asperity(K=K, lam=lam, eta=eta, mu=mu, **dict(damage)),
         heights=heights,
         **more,
     )

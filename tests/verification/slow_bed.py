@@ -1,7 +1,9 @@
 """The law as a brute-force bed: fixed linear springs with sliders, no lumping, no shortcuts.
 
-Every orientation carries many linear unilateral springs that touch at fixed closures z_j. Each has
-its own Coulomb slider. Slow and obvious: it exists to judge the package and shares no code with it.
+Every orientation carries many linear unilateral springs that touch at closures z_j. Each has its
+own Coulomb slider, and yields on its own: squeezed beyond the yield interference it keeps a set,
+and touches that much later. Slow and obvious: it exists to judge the package and shares no code
+with it.
 """
 
 import numpy as np
@@ -39,7 +41,8 @@ class SlowBed:
 
     def __init__(
         self, normals, weights, reach, *, K, lam, eta, mu, density, heights=None, n_depth=240,
-        max_step=np.inf, critical_slip=np.inf,
+        max_step=np.inf, critical_slip=np.inf, yield_interference=np.inf, mu_residual=None,
+        wear_slip=np.inf,
     ):  # fmt: skip
         self.n, self.c1 = normals, normals[:, 0]
         self.lam, self.mu = lam, mu
@@ -50,6 +53,13 @@ class SlowBed:
         self.z = np.array([p[0] for p in pairs])
         self.k = np.array([p[1] for p in pairs])
         self.max_step, self.critical_slip = max_step, critical_slip
+        self.yields_at = (yield_interference / self.c1)[:, None]  # largest y - z of a spring
+        self.wear = mu, mu if mu_residual is None else mu_residual, wear_slip
+        self.crushed = self.slip = 0.0  # plastic work, asperity slip
+        # with a critical slip the asperities of opposite orientations are flattened together
+        turned = normals * [1.0, -1.0, -1.0]
+        mirror = np.argmin(np.sum((normals[:, None] - turned) ** 2, axis=2), axis=0)
+        self.mirror = mirror if np.isfinite(critical_slip) else np.arange(len(normals))
         azimuth = np.arctan2(normals[:, 2], normals[:, 1])
         cos, sin, sin_theta = np.cos(azimuth), np.sin(azimuth), np.hypot(*normals[:, 1:].T)
         s = np.stack([-sin_theta, self.c1 * cos, self.c1 * sin], axis=1)  # Eq. 25
@@ -74,16 +84,33 @@ class SlowBed:
         if pull > self.critical_slip:  # at the limit: turn the offset, small step by small step
             self.offset *= self.critical_slip / pull
         y0, self.y = self.y, self._closure()
-        y1 = self.y
+        y1, z0 = self.y, self.z
+        top = y1[:, None] - self.yields_at
+        self.z = np.maximum(z0, np.maximum(top, top[self.mirror]))
+        held = np.clip(0.5 * (y0 + y1)[:, None] - 0.5 * (z0 + self.z), 0.0, self.yields_at)
+        self.crushed += np.sum((self.scale * self.c1)[:, None] * self.k * held * (self.z - z0))
         touching = y1[:, None] > self.z
         # a spring that touches inside the step has moved along the facet only since its touch
         rise = np.where(y1 > y0, y1 - y0, 1.0)[:, None]
-        part = np.where(y0[:, None] < self.z, (y1[:, None] - self.z) / rise, 1.0) * touching
+        part = np.where(y0[:, None] < z0, (y1[:, None] - z0) / rise, 1.0) * touching
         de = self.basis @ d  # (m, 2)
         free = self.e * touching + part * de.T[:, :, None]
         limit = self.mu * self.lam * self.c1[:, None] * np.clip(y1[:, None] - self.z, 0.0, None)
         size = np.sqrt(free[0] ** 2 + free[1] ** 2)
         self.e = free * (limit / np.maximum(size, np.maximum(limit, 1e-300)))
+        rubbed = np.sum(self.k * limit * np.clip(size - limit, 0.0, None), axis=1)
+        self._wear(np.sum(self.scale / (self.c1 * self.lam) * rubbed), pull)
+
+    def _wear(self, rubbed, pull):
+        """Slip of the asperities: friction work, the offset's too, over the limit; then mu."""
+        normal = self.facet_forces()[0]
+        if pull > self.critical_slip:
+            along = self.offset / self.critical_slip
+            rubbed += (pull - self.critical_slip) * (normal @ self.n[:, 1:]) @ along
+        first, last, length = self.wear
+        if self.mu * np.sum(normal) > 0.0:
+            self.slip += rubbed / (self.mu * np.sum(normal))
+        self.mu = last + (first - last) * np.exp(-self.slip / length)
 
     def _closure(self):
         return self.delta[0] + self.n[:, 1:] @ self.offset / self.c1

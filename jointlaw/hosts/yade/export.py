@@ -1,7 +1,5 @@
 """Export of a joint law to YADE: table, law, adapter and scripts, in one folder."""
 
-from __future__ import annotations
-
 import math
 from importlib import resources
 from pathlib import Path

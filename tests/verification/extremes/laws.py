@@ -11,6 +11,7 @@ SCALE = 2e-6  # m: closure range and asperity height of the ordinary law
 ORDINARY = {
     "a": 3.0, "b": 0.5, "c": 0.1, "K": 2e8, "lam": 1.2, "eta": 0.5, "mu": 0.4, "density": 1e10,
     "heights": None, "range": SCALE, "critical_slip": np.inf, "resolution": jl.Resolution(2, 4, 3),
+    "yields at": np.inf, "wears over": np.inf,
 }  # fmt: skip
 
 _ROUGH = (3.82, 1.15e-6, 2e-6)  # alpha, beta, overlap: Westerly granite
@@ -37,6 +38,8 @@ EXTREMES = {
     "range": [SCALE * 1e-6, SCALE * 1e6],
     "heights": list(HEIGHTS),
     "critical_slip": [SCALE * 1e-3, SCALE * 0.3],
+    "yields at": [SCALE * 1e-12, SCALE * 1e-3, SCALE * 0.1, SCALE * 1e3],
+    "wears over": [SCALE * 1e-6, SCALE],
 }
 
 
@@ -45,9 +48,12 @@ def build(**changes):
     p = ORDINARY | changes
     b, c = p.get("b, c", (p["b"], p["c"]))
     heights = HEIGHTS.get(p["heights"], p["heights"])
+    damage = {"yield_interference": p["yields at"], "wear_slip": p["wears over"]}
+    if p["wears over"] < np.inf:
+        damage["mu_residual"] = 0.3 * p["mu"]
     return jl.JointLaw(
         orientation=jl.Orientation(p["a"], b, c),
-        asperity=jl.Asperity(K=p["K"], lam=p["lam"], eta=p["eta"], mu=p["mu"]),
+        asperity=jl.Asperity(K=p["K"], lam=p["lam"], eta=p["eta"], mu=p["mu"], **damage),
         heights=heights and jl.GammaHeights(*heights),
         asperity_density=p["density"],
         closure_range=p["range"],
@@ -109,4 +115,7 @@ def random_changes(rng):
         overlap = float(rng.choice([0.0, beta, 10.0 * beta, beta * 10.0 ** rng.uniform(-6, 2)]))
         formation = "population" if rng.random() < 0.3 else "individual"
         changes["heights"] = (alpha, float(beta), overlap, formation)
+    for key, least, most in (("yields at", -12.0, 3.0), ("wears over", -6.0, 3.0)):
+        if rng.random() < 0.3:
+            changes[key] = SCALE * unit * 10.0 ** rng.uniform(least, most)
     return changes, SCALE * unit

@@ -1,0 +1,29 @@
+"""Friction that falls with the slip of the asperities, docs/theory-incremental.md, "Wear"."""
+
+import numpy as np
+
+from ..discretisation.tables import Tables
+from ..support.checks import Array
+from .cells import Cells, compliance, reciprocal
+
+
+def friction(k: Tables, slip: Array) -> Array:
+    """mu (B,) after the slip L (B,) of the asperities."""
+    assert k.mu_residual is not None
+    mu: Array = k.mu_residual + (k.mu - k.mu_residual) * np.exp(-slip / k.wear_slip)
+    return mu
+
+
+def within_limit(k: Tables, before: Cells, q: Array, strength: Array) -> tuple[Array, Array]:
+    """q brought back to the friction limit, that fell since, and the energy (B,) that it loses."""
+    size, cap = np.sqrt(q[0] ** 2 + q[1] ** 2), strength * before.G
+    share = np.divide(cap, size, out=np.ones_like(size), where=size > cap)
+    lost = (1 - share) * (1 + share) * size**2 * reciprocal(before.kappa)
+    return share * q, np.sum(compliance(k) * lost, axis=(0, 1))
+
+
+def slipped(k: Tables, before: Cells, after: Cells, mu: Array, lost: Array) -> Array:
+    """Slip dL (B,) of the asperities: the energy lost to friction over the mean friction limit."""
+    limit = 0.5 * mu * np.sum(k.area[:, None] * (before.force + after.force), axis=0)
+    slip: Array = np.divide(lost, limit, out=np.zeros_like(limit), where=limit > 0)
+    return slip

@@ -1,0 +1,61 @@
+"""Asperities that yield: one flattened depth per facet, docs/theory-incremental.md, "Yielding".
+
+The springs of a facet that touch above its flattened depth z_p were pressed flat: they touch again
+together at y = z_p. All that the bed then holds is what it held without, less its value at z_p.
+"""
+
+import numpy as np
+
+from ..discretisation.tables import Tables
+from ..support.checks import Array
+from .cells import Cells
+
+
+def press(k: Tables, depth: Array, y: Array) -> Array:
+    """Flattened depth (M, B) of every facet once the closures y (M, B) are reached."""
+    assert k.yield_depth is not None
+    own = np.maximum(depth, y - k.yield_depth[:, None])
+    both: Array = np.maximum(own, own[k.opposite])
+    return both
+
+
+def flattened(virgin: Cells, flat: Cells | None) -> Cells:
+    """The cells of the virgin curve less what they hold at the flattened depth."""
+    if flat is None:
+        return virgin
+    over = virgin.y - flat.y
+    touches = over > 0
+    force = np.where(touches, np.maximum(virgin.force - flat.force, 0.0), 0.0)
+    kappa = np.where(touches[:, None], virgin.kappa, 0.0)
+    G = np.clip(virgin.G - flat.G, 0.0, kappa * np.maximum(over, 0.0)[:, None])
+    return Cells(virgin.y, force, np.where(touches, virgin.slope, 0.0), G, kappa)
+
+
+def plastic_work(k: Tables, y0: Array, y1: Array, flat0: Cells, flat1: Cells) -> Array:
+    """Energy (B,) in J/m2 that springs lose where they are pressed flat.
+
+    Exact for springs that their own facet presses; for those that the opposite facet does, by the
+    mean of their compressions before and after the step.
+    """
+    assert k.yield_depth is not None
+    largest = k.yield_depth[:, None]
+    mean = 0.5 * (np.clip(y0 - flat0.y, 0.0, largest) + np.clip(y1 - flat1.y, 0.0, largest))
+    deep = np.where(y1 - largest >= flat1.y, largest, mean)
+    lost: Array = np.sum((k.area * k.c1)[:, None] * deep * (flat1.force - flat0.force), axis=0)
+    return lost
+
+
+def softening(k: Tables, after: Cells, flat0: Cells, flat1: Cells, push: Array, g: Array) -> Array:
+    """Part (dim, dim, B) by which yielding lowers the tangent: the flattened depth moves along.
+
+    push: derivative (2, M, D, B) of q by G in slipping sliders. g: dy/dd (dim, M, B).
+    """
+    assert k.yield_depth is not None
+    moves = (flat1.y > flat0.y) & (after.kappa > 0).any(axis=1)
+    own = flat1.y <= after.y - k.yield_depth[:, None]
+    shear = np.sum(push * np.where(after.kappa > 0, flat1.kappa, 0.0), axis=2)
+    along = k.n[:, :, None] * (k.area[:, None] * flat1.slope)
+    along = along + np.einsum("edm,emb->dmb", np.stack([k.s, k.t]), shear) / k.lam
+    pressing = np.where(own, g, g[:, k.opposite])
+    C: Array = np.einsum("imb,jmb->ijb", np.where(moves, along, 0.0), pressing)
+    return C

@@ -1,0 +1,140 @@
+"""Asperities that yield and wear: closed form in closure, and the slow bed in shear."""
+
+import numpy as np
+import pytest
+from builders import increments, law, random_corners, slow_heights
+from slow_bed import SlowBed, cap_quadrature, reach_of
+from test_tangent import STEPS, descent_slope, v_curve
+
+import jointlaw as jl
+
+
+@pytest.mark.parametrize("resolution", [jl.Resolution(1, 3, 1), jl.Resolution(2, 4, 3)])
+@pytest.mark.parametrize("interference", [1e-12, 1e-3, 0.05, 0.3, 2.0])
+@pytest.mark.parametrize(
+    ("formation", "eta"), [(None, 0.0), ("population", 0.5), ("individual", 1)]
+)
+def test_closure_has_a_closed_form(formation, eta, interference, resolution):
+    one = law(formation=formation, eta=eta, mu=0.0, resolution=resolution,
+              damage={"yield_interference": interference})  # fmt: skip
+    joint, k = one.joint(), one.tables
+
+    def phi(y):
+        return k.curve.force(np.asarray(y, float))[0]
+
+    deep, last, highest = interference / k.c1, 0.0, 0.0
+    for target in np.random.default_rng(0).uniform(-0.2, 1.2, 40):
+        F, C = joint.update([target - last, 0.0, 0.0])
+        last, highest = target, max(highest, target)
+        flat = np.maximum(highest - deep, 0.0)
+        stress = np.sum(k.area * k.c1 * np.where(target > flat, phi(target) - phi(flat), 0.0))
+        scale = np.sum(k.area * k.c1) * phi(highest)
+        # rounding of Phi, of which small differences are taken
+        assert abs(F[0] - stress) <= 1e-12 * scale
+        assert abs(joint.plastic_work - np.sum(k.area * k.c1 * deep * phi(flat))) <= 1e-12 * scale
+        assert joint.plastic_work <= joint.dissipated_energy
+        if target < highest:  # unloading and reloading are elastic
+            slope = k.curve.force(np.array(target))[1]
+            assert C[0, 0] == pytest.approx(
+                np.sum(k.area * k.c1 * np.where(target > flat, slope, 0.0)), rel=1e-12, abs=1e-300
+            )
+    assert joint.stored_energy >= 0.0
+
+
+def test_first_loading_in_closed_form_is_that_of_many_cells():
+    for mu in (0.0, 0.2, 0.8):
+        one = law(formation="population", mu=mu, resolution=jl.Resolution(4, 3, 60),
+                  damage={"yield_interference": 0.1})  # fmt: skip
+        joint, last = one.joint(), 0.0
+        for u in np.linspace(0.1, 1.2, 12):
+            stress = joint.update([u - last, 0.0, 0.0])[0][0]
+            last = u
+            # sixty cells slip nearly as the springs do, one by one: 2e-4 at worst seen
+            assert stress == pytest.approx(one.normal_stress(u), rel=1e-3)
+            assert one.closure(one.normal_stress(u)) == pytest.approx(u, rel=1e-9)
+
+
+@pytest.mark.parametrize("critical_slip", [np.inf, 0.3])
+@pytest.mark.parametrize("interference", [0.3, 0.1, 0.05])
+def test_tractions_agree_with_the_slow_bed(interference, critical_slip):
+    n_paths, steps = (4, 30) if np.isinf(critical_slip) else (3, 200)
+    seed = int(100 * interference)
+    corners = random_corners(np.random.default_rng(seed), n_paths)
+    d = increments(corners, steps)
+    p = {"a": 3.0, "b": 0.5, "c": 0.1, "mu": 0.4, "formation": ["population", None][seed % 2]}
+    n, w = cap_quadrature(p["a"], p["b"], p["c"], 16, 20)
+    F, crushed = np.zeros_like(d), np.zeros(n_paths)
+    for i in range(n_paths):
+        bed = SlowBed(
+            n, w, reach_of(corners[i], n), density=1.0, heights=slow_heights(p["formation"]),
+            n_depth=100, K=1.0, lam=1.2, eta=0.5, mu=p["mu"], critical_slip=critical_slip,
+            yield_interference=interference,
+        )  # fmt: skip
+        for k in range(d.shape[1]):
+            F[i, k] = bed.update(d[i, k])
+        crushed[i] = bed.crushed
+    peak = np.linalg.norm(F, axis=2).max(axis=1)
+    for resolution, bound in (("fine", 3e-2), ("reference", 5e-3)):
+        joints = law(**p, resolution=resolution, critical_slip=critical_slip,
+                     damage={"yield_interference": interference}).joints(n_paths)  # fmt: skip
+        G = np.array([joints.update(d[:, k], tangent=False)[0] for k in range(d.shape[1])])
+        error = np.linalg.norm(np.moveaxis(G, 0, 1) - F, axis=2).max(axis=1) / peak
+        assert error.max() < bound, (resolution, error)
+        # the bed takes the mean squeeze of a step: first order in the step
+        assert np.allclose(joints.plastic_work, crushed, rtol=0.01)
+
+
+@pytest.mark.parametrize("damage", [{}, {"yield_interference": 0.1}])
+def test_wear_agrees_with_the_slow_bed(damage):
+    damage = damage | {"mu_residual": 0.15, "wear_slip": 0.5}
+    corners = random_corners(np.random.default_rng(5), 2)
+    d = increments(corners, 100)
+    n, w = cap_quadrature(3.0, 0.5, 0.1, 16, 20)
+    joints = law(resolution="reference", damage=damage).joints(2)
+    for i in range(2):
+        bed = SlowBed(n, w, reach_of(corners[i], n), density=1.0, n_depth=100, K=1.0, lam=1.2,
+                      eta=0.5, mu=0.4, **damage)  # fmt: skip
+        F = np.array([bed.update(step) for step in d[i]])
+        G = np.array([joints.update(step[None], where=[i])[0][0] for step in d[i]])
+        # half a per cent of the peak, as without wear
+        assert np.linalg.norm(G - F, axis=1).max() < 5e-3 * np.linalg.norm(F, axis=1).max()
+        assert joints.friction[i] == pytest.approx(bed.mu, abs=0.002)
+
+
+STATES = {  # steps that lead to the state, and the one whose tangent is checked
+    "yielding": ([[0.5, 0.02, 0.01]], [0.21, 0.03, -0.02]),
+    "sheared while it yields": ([[0.6, 0.0, 0.0], [0.05, 0.1, 0.04]], [0.11, 0.15, 0.06]),
+    "unloading": ([[0.9, 0.1, 0.0], [0.0, 0.15, 0.1]], [-0.05, -0.02, -0.03]),
+    "reloading": ([[0.9, 0.1, 0.0], [-0.3, 0.15, 0.1]], [0.17, -0.08, -0.05]),
+}
+OPTIONS = {
+    "yielding": {"damage": {"yield_interference": 0.3}},
+    "both sides": {"damage": {"yield_interference": 0.2}, "critical_slip": 0.12},
+    "wear too": {
+        "damage": {"yield_interference": 0.3, "mu_residual": 0.1, "wear_slip": 0.3},
+        "formation": "population",
+    },
+}
+
+
+@pytest.mark.parametrize("plane", [None, 0.6])
+@pytest.mark.parametrize("option", OPTIONS)
+@pytest.mark.parametrize("state", STATES)
+def test_tangent(state, option, plane):
+    path, d = STATES[state]
+    dim = 3 if plane is None else 2
+    one = law(**OPTIONS[option], plane=plane, resolution=jl.Resolution(2, 4, 3))
+    joint, copies = one.joint(), one.joints(2 * dim * len(STEPS))
+    for step in path:
+        joint.update(step[:dim])
+        copies.update(np.tile(step[:dim], (len(copies), 1)), tangent=False)
+    d, before = np.array(d[:dim]), joint.plastic_work
+    curves = [v_curve(copies, (1.0 + 0.02 * k) * d) for k in range(3)]
+    # as without yielding: second order but for kinks, and exact to 1e-8
+    slope, least = min(
+        ((descent_slope(curve), curve.min()) for curve in curves), key=lambda v: abs(v[0] - 2.0)
+    )
+    assert slope == pytest.approx(2.0, abs=0.1)
+    assert least < 1e-8
+    joint.update(d)
+    assert (joint.plastic_work > before) is ("yield" in state)

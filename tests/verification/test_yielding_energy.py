@@ -1,0 +1,79 @@
+"""No step makes energy while asperities yield and wear: by the work along the path."""
+
+import numpy as np
+import pytest
+from builders import law, random_corners
+from exact_work import step_work
+
+import jointlaw as jl
+from jointlaw.kernels import reference as kernel
+
+
+def random_law(rng, held, wears):
+    """Any law without heights, of few facets, that yields; `held` has a critical slip."""
+    a = float(rng.choice([1.0, rng.uniform(1.0, 1.6), rng.uniform(1.6, 5.0), 10.0]))
+    b, mu = rng.uniform(-1.0, 2.0), rng.uniform(0.0, 1.2) * (rng.random() < 0.8)
+    damage = {"yield_interference": 10.0 ** rng.uniform(-2.5, 0.5)}
+    if wears:
+        damage |= {"mu_residual": mu * rng.random(), "wear_slip": 10.0 ** rng.uniform(-2.0, 0.5)}
+    return law(
+        a=a, b=b, c=rng.uniform(-1.0, 1.0) * (1 / 3 - b / 6), lam=rng.uniform(0.3, 2.0),
+        eta=float(rng.choice([0.0, 0.5, 1.0])), mu=mu, damage=damage,
+        resolution=jl.Resolution(int(rng.integers(1, 4)), int(rng.integers(3, 5)), 3),
+        critical_slip=rng.uniform(0.1, 0.6) if held else np.inf,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("wears", [False, True])
+@pytest.mark.parametrize("held", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_no_step_of_a_closed_path_makes_energy(seed, held, wears):
+    rng = np.random.default_rng(seed)
+    k = random_law(rng, held, wears).tables
+    corners = random_corners(rng, 1)[0]
+    corners[-1] = 0.0
+    state, gains, stored = np.zeros((k.rows, 1)), [], [0.0]
+    for leg in np.diff(corners, axis=0, prepend=0.0):
+        for share in rng.dirichlet(np.full(3, 0.5)):
+            work = step_work(k, state, leg * share)
+            state = kernel.step(k, state, leg[:, None] * share, False)[0]
+            stored.append(kernel.measures(k, state).stored[0])
+            gains.append(stored[-1] - stored[-2] - work)
+    # Gauss rules of 16 points between kinks: rounding of the path's largest energy is left
+    assert np.max(gains) <= 1e-12 * np.max(stored)
+    assert np.sum(gains) <= 1e-12 * np.max(stored)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+def test_the_drag_of_the_offset_never_returns_work(mu):
+    """T . o >= 0 for the in-plane resultant T of the normal forces, whatever was pressed flat."""
+    rng = np.random.default_rng(3)
+    k = law(mu=mu, critical_slip=0.3, a=2.0, damage={"yield_interference": 0.1}).tables
+    state = np.zeros((k.rows, 200))
+    for _ in range(40):
+        d = rng.normal(size=(3, 200)) * [[0.3], [0.4], [0.4]]
+        d[0] += 0.1 - 0.3 * kernel.parts(k, state).delta[0]
+        state = kernel.step(k, state, d, False)[0]
+        now = kernel.parts(k, state)
+        y = kernel.effective_closure(k, now.delta[0], now.offset)
+        force = kernel.flattened(kernel.cells(k, y), kernel.cells(k, now.depth)).force
+        pull = np.sum((k.n[1:] @ (k.area[:, None] * force)) * now.offset, axis=0)
+        assert pull.min() >= -1e-14 * np.max(force)
+
+
+@pytest.mark.parametrize("wear_slip", [0.5, 0.01])
+def test_wear_of_one_to_fifty_per_cent_in_a_step_makes_no_energy(wear_slip):
+    """Slide, then close while shearing slowly: sliders above their new limit would gain work."""
+    damage = {"mu_residual": 0.2, "wear_slip": wear_slip, "yield_interference": 0.3}
+    k = law(mu=0.4, eta=0.0, a=8.0, damage=damage, resolution=jl.Resolution(1, 3, 1)).tables
+    state = kernel.step(k, np.zeros((k.rows, 1)), np.array([[0.5], [0.0], [0.0]]), False)[0]
+    state = kernel.step(k, state, np.array([[0.0], [0.3], [0.0]]), False)[0]
+    fallen = 1.0 - kernel.friction(k, kernel.parts(k, state).slip)[0] / k.mu
+    assert 0.01 < fallen <= 0.5
+    for closing in (0.01, 0.1, 0.4):
+        for slow in (0.0, 0.01, 0.1):
+            d = np.array([closing, slow * closing, 0.0])
+            stored = kernel.measures(k, state).stored[0]
+            work = step_work(k, state, d)
+            after = kernel.step(k, state, d[:, None], False)[0]
+            assert kernel.measures(k, after).stored[0] - stored - work <= 1e-12 * stored

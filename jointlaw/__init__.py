@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from .calibration import baselines, datasets, unloading
     from .calibration.fit import Fit, fit_closure, fit_curves, fit_many, fit_shear
     from .calibration.measured import ClosureCurve, ShearCurve, first_loading
+    from .hosts.c.export import export_c, include_dir
     from .hosts.yade.export import export_yade
     from .surface.fit import SurfaceFit, from_surface
     from .surface.synthetic import synthetic_surface
@@ -58,6 +59,7 @@ __all__ = [
     "closure_test",
     "datasets",
     "direct_shear",
+    "export_c",
     "export_yade",
     "first_loading",
     "fit_closure",
@@ -65,6 +67,7 @@ __all__ = [
     "fit_many",
     "fit_shear",
     "from_surface",
+    "include_dir",
     "load_state",
     "load_table",
     "presets",
@@ -80,6 +83,7 @@ _LATER = {
     "Fit": "calibration.fit",
     "ShearCurve": "calibration.measured",
     "SurfaceFit": "surface.fit",
+    "export_c": "hosts.c.export",
     "export_yade": "hosts.yade.export",
     "first_loading": "calibration.measured",
     "fit_closure": "calibration.fit",
@@ -87,6 +91,7 @@ _LATER = {
     "fit_many": "calibration.fit",
     "fit_shear": "calibration.fit",
     "from_surface": "surface.fit",
+    "include_dir": "hosts.c.export",
     "synthetic_surface": "surface.synthetic",
     "tabulate": "tables.tabulate",
 }

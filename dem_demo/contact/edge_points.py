@@ -1,7 +1,5 @@
 """Law points along a long overlap of edge on edge, between its two ends: linear interpolation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +27,9 @@ class EdgePoints:
     weight: np.ndarray
 
     @classmethod
-    def on(cls, outlines, overlaps: list[tuple[int, int, int, int]], spacing: float) -> EdgePoints:
+    def on(
+        cls, outlines, overlaps: list[tuple[int, int, int, int]], spacing: float
+    ) -> "EdgePoints":
         """Points at most `spacing` (m) apart on overlaps (block, edge, block, edge)."""
         o = outlines
         a, i, b, j = np.array(overlaps, int).T

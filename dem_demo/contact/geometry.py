@@ -12,8 +12,6 @@ Vectors are complex numbers x + iy: conj(p) q holds their dot product and their 
 dividing by the direction of an edge takes all into its frame.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -103,7 +101,9 @@ class Contacts:
     def __len__(self) -> int:
         return len(self.a)
 
-    def at(self, corner: np.ndarray, edge: np.ndarray, along: EdgePoints | None = None) -> Contacts:
+    def at(
+        self, corner: np.ndarray, edge: np.ndarray, along: EdgePoints | None = None
+    ) -> "Contacts":
         """Law points on other corners and edges, all else the same."""
         rest = self.corner_length, self.soft, self.spacing, along
         return Contacts(self.outlines, corner, edge, *rest)

@@ -7,8 +7,6 @@ looked for only when something has moved far enough to matter; between such rene
 is plain arrays.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -59,7 +57,7 @@ class LawPoints:
         offset = np.where(points.closure[:k] > 0, self.closure_offset, 0.0)
         return points.closure - np.pad(offset, (0, len(points.closure) - k))
 
-    def reopened(self, points: Points) -> LawPoints:
+    def reopened(self, points: Points) -> "LawPoints":
         """Without the offset of corners that have opened: another part of them touches next."""
         opened = points.closure[: len(self.closure_offset)] <= 0
         if not self.closure_offset[opened].any():

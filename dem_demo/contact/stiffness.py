@@ -3,8 +3,6 @@
 The time step and the dashpots take the stiffness, the initial equilibrium how far a joint closes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +27,7 @@ class StiffnessCurve:
     work: np.ndarray
 
     @classmethod
-    def of(cls, law: jl.JointLaw) -> StiffnessCurve:
+    def of(cls, law: jl.JointLaw) -> "StiffnessCurve":
         """Tabulate a law from no closure to 2 GPa, more than any corner of rock stands."""
         top = float(law.closure(2e9))
         closure = np.concatenate([[0.0], np.geomspace(1e-8 * top, top, 600)])

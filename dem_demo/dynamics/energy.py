@@ -5,8 +5,6 @@ product of the velocities before and after it; its change over a step is then ex
 of forces times displacement, and that is how every other entry is summed.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,7 +29,7 @@ class Ledger:
     area: np.ndarray
     lost: np.ndarray
 
-    def dropping(self, energy: float) -> Ledger:
+    def dropping(self, energy: float) -> "Ledger":
         """With energy (J) given up by law points."""
         return replace(self, value=self.value | {"dropped": self.value["dropped"] + energy})
 

@@ -3,7 +3,7 @@
 from functools import partial
 
 import numpy as np
-from scipy.sparse import block_array, csr_array, diags
+from scipy.sparse import bmat, csr_array, diags
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
@@ -44,7 +44,7 @@ def equilibrium(joints: Joints, rows: csr_array, closure, slid, area, force, set
     def law(d):
         F, C = joints.trial(np.stack([d[:k], d[k:]], axis=1))
         blocks = [[diags(C[:, i, j]) for j in (0, 1)] for i in (0, 1)]
-        return F.T.ravel(), block_array(blocks, format="csr")
+        return F.T.ravel(), csr_array(bmat(blocks))
 
     touched = abs(rows[:k]) + abs(rows[k:])  # the law couples closure and shear
     _, island = connected_components(touched.T @ touched, directed=False)

@@ -1,7 +1,5 @@
 """A scene in motion, for a user: steps, and states to return to."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -78,7 +76,7 @@ class Simulation:
         saved_states.save(self.scene, saved or self.state(), Path(folder))
 
     @classmethod
-    def load(cls, folder: Path, step: float | None = None) -> Simulation:
+    def load(cls, folder: Path, step: float | None = None) -> "Simulation":
         """Continue from a folder that `save` wrote, with `step` as in `restore`.
 
         Raises ValueError if a file is missing, damaged or of another state, or the scene another.

@@ -6,8 +6,6 @@ Two things that change are not in here, because others own them: what pymunk hol
 the batches of joints (`Joints`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -67,7 +65,7 @@ class Layout:
     mass: np.ndarray
 
     @classmethod
-    def of(cls, system: System, law_points: LawPoints) -> Layout:
+    def of(cls, system: System, law_points: LawPoints) -> "Layout":
         """The layout of law points."""
         c = law_points.contacts
         light = system.lightness[c.a] + system.lightness[c.b]

@@ -4,8 +4,6 @@ Written by hand: a validation library would word these errors itself, and would 
 its place in the file, the unit and the remedy.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Container, Iterator
 from difflib import get_close_matches
@@ -86,7 +84,7 @@ class Table:
             raise SceneError(f"{self.path(key)} must be a list of at least 3 corners [x, y] in m")
         return np.array(value, float)
 
-    def tables(self, key: str, default=..., say: str = "") -> Iterator[Table]:
+    def tables(self, key: str, default=..., say: str = "") -> "Iterator[Table]":
         """The tables of a list of tables."""
         for i, data in enumerate(self.take(key, list, default, say=say)):
             yield Table(data, f"{self.path(key)}[{i}]")

@@ -84,9 +84,6 @@ def _removals(law: jl.JointLaw) -> Iterator[tuple[str, bool, dict[str, Any]]]:
     if np.isfinite(asperity.yield_interference):
         elastic = {"asperity": replace(asperity, yield_interference=np.inf)}
         yield "elastic asperities", True, elastic
-    if np.isfinite(asperity.wear_slip):
-        kept = {"asperity": replace(asperity, mu_residual=None, wear_slip=np.inf)}
-        yield "no wear", False, kept
     for key in ("b", "c"):
         if getattr(orientation, key):
             yield f"{key} = 0", True, {"orientation": replace(orientation, **{key: 0.0})}

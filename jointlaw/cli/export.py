@@ -1,9 +1,12 @@
 """The command `jointlaw export`: a law as files for a host code."""
 
 import argparse
+from pathlib import Path
 from typing import Any
 
+from ..hosts.c.export import export_c, identifier
 from ..hosts.yade.export import export_yade
+from ..law import JointLaw
 from .command import add_command, add_law, add_out, quantity, read_law
 
 
@@ -16,17 +19,38 @@ def add(commands: Any) -> None:
         "jointlaw export yade jing-replica --out joint-for-yade",
         _export,
     )
-    parser.add_argument("host", choices=("yade",), help="the host code")
+    parser.add_argument("host", choices=("yade", "c"), help="the host code; c: also C++")
     add_law(parser)
-    parser.add_argument("--closure", help="last closure of the table, such as 2um")
-    parser.add_argument("--shear-limit", help="shear at which friction is read, such as 5um")
-    parser.add_argument("--tolerance", type=float, default=1e-3, help="of interpolation (0.001)")
+    parser.add_argument("--closure", help="yade: last closure of the table, such as 2um")
+    parser.add_argument("--shear-limit", help="yade: shear at which friction is read, such as 5um")
+    parser.add_argument("--tolerance", type=float, help="yade: of interpolation (0.001)")
     add_out(parser)
 
 
 def _export(options: argparse.Namespace) -> None:
     law = read_law(options)
-    settings: dict[str, Any] = {"tolerance": options.tolerance}
+    if options.host == "c":
+        _export_c(law, options)
+    else:
+        _export_yade(law, options)
+
+
+def _export_c(law: JointLaw, options: argparse.Namespace) -> None:
+    for name in ("closure", "shear_limit", "tolerance"):
+        if getattr(options, name) is not None:
+            raise ValueError(
+                f"--{name.replace('_', '-')} shapes a table for YADE; C runs the law itself: leave "
+                "it out"
+            )
+    files = export_c(law, options.out, identifier(Path(options.law).stem))
+    print(f"wrote the joint for C and C++ to {options.out}: {', '.join(files)}")
+    print(f"run: cd {options.out} && make && ./example")
+
+
+def _export_yade(law: JointLaw, options: argparse.Namespace) -> None:
+    settings: dict[str, Any] = {
+        "tolerance": 1e-3 if options.tolerance is None else options.tolerance
+    }
     for name in ("closure", "shear_limit"):
         if (text := getattr(options, name)) is not None:
             settings[name] = quantity(f"--{name.replace('_', '-')}", text, "m")

@@ -282,12 +282,8 @@ def _press(work, s, L, law, f):
     first, _, beside = _places(law)
     at, kept = first + f, beside + 2 * law.depth.shape[0] + f
     deep, o = facet[f, _YIELD], np.int64(facet[f, _OPPOSITE])
-    for l in range(L):  # one copy a loop, or the compiler makes no vectors of it
-        pad[_Z0 + l] = s[at, l]
     for l in range(L):
-        pad[_FZ0 + l] = s[kept, l]
-    for l in range(L):
-        pad[_Z1 + l] = pad[_Y1 + l]
+        pad[_Z0 + l], pad[_FZ0 + l], pad[_Z1 + l] = s[at, l], s[kept, l], pad[_Y1 + l]
     if o != f:
         m0, m1, m2 = facet[o, _M], facet[o, _M + 1], facet[o, _M + 2]
         for l in range(L):
@@ -311,9 +307,7 @@ def _press(work, s, L, law, f):
             pad[_Y1 + l] = pad[_SZ1 + l]
             pad[_FZ1 + l], pad[_SZ1 + l] = pad[_F1 + l], pad[_S1 + l]
         for l in range(L):
-            s[at, l] = pad[_Z1 + l]
-        for l in range(L):
-            s[kept, l] = pad[_FZ1 + l]
+            s[at, l], s[kept, l] = pad[_Z1 + l], pad[_FZ1 + l]
     for l in range(L):
         touches = pad[_Y0 + l] > pad[_Z0 + l]
         pad[_AT0 + l] = pad[_Y0 + l] if touches else pad[_Z0 + l]
@@ -447,22 +441,25 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent):
             bend = a * (0.5 * c if near else bend)
             fade = c / (k1 if k1 > TINY else 1.0)
             fade = fade if k1 > TINY else 0.0
-            ws = bend * des if grows else fade * ts
-            wt = bend * det if grows else fade * tt
+            # exactly as in the reference where rounding would decide
+            stiffer = grows & (dy > ROUNDED * abs(y1))
+            limited = size >= strength * (G1 * (1.0 - LIMIT) - ROUNDED * f1)
+            ws = bend * des if stiffer else fade * ts
+            wt = bend * det if stiffer else fade * tt
             unit = 1.0 / (size if size > 0.0 else 1.0)
             us, ut = ts * unit, tt * unit
             dot = us * ws + ut * wt
             push = strength * k1
-            pad[_VS + l] += share * (ws - us * dot) + push * us if slips else ws
-            pad[_VT + l] += share * (wt - ut * dot) + push * ut if slips else wt
+            pad[_VS + l] += share * (ws - us * dot) + push * us if limited else ws
+            pad[_VT + l] += share * (wt - ut * dot) + push * ut if limited else wt
             if law.yields is not None:
                 kz = pad[_SZ1 + l] - sl
                 kz = sh - sl if ended & (z1 > zh) else kz
-                kz = kz if (z1 > zl) & (kz > 0.0) & (k1 > 0.0) & slips else 0.0
+                kz = kz if (z1 > zl) & (kz > 0.0) & (k1 > 0.0) & limited else 0.0
                 pad[_WS + l] += strength * kz * us
                 pad[_WT + l] += strength * kz * ut
-            beta = share * add
-            sliding = beta if slips else 0.0
+            beta = share * add if cap > 0.0 else 0.0
+            sliding = beta if limited else 0.0
             pad[_BSS + l] += beta - sliding * us * us
             pad[_BST + l] -= sliding * us * ut
             pad[_BTT + l] += beta - sliding * ut * ut

@@ -23,7 +23,7 @@ from .yielding import flattened, plastic_work, press, softening
 NEAR = 1e-5  # of y: below such a change of y the chord of G is lost in rounding, the mean is not
 GRAZING = 1e-12  # cosine at which the offset meets its limit: its derivative has a pole at 0
 LIMIT = 1e-9  # of the friction limit: a slider this close is at it, less the rounding of q
-ROUNDED = 1e-12  # of Phi: as much may be lost in a G next to a node
+ROUNDED = 1e-12  # of Phi and of y: as much may be lost in a G next to a node, and in dy
 
 
 Flags = NDArray[np.bool_]
@@ -52,6 +52,7 @@ class Sliders(NamedTuple):
     chord: Array  # of G over the step: stiffness of springs that were added on the way
     grows: Flags  # whether the stiffness of the cell has grown
     near: Flags  # whether y has hardly changed
+    slips: Flags  # whether the slider is at its friction limit, but for rounding
 
     @property
     def unit(self) -> Array:
@@ -62,7 +63,7 @@ class Sliders(NamedTuple):
     @property
     def push(self) -> Array:
         """Derivative (2, M, D, B) of q by G: mu lam A along a slider that slips, 0 elsewhere."""
-        return np.where(self.size > self.cap, self.strength * self.unit, 0.0)
+        return np.where(self.slips, self.strength * self.unit, 0.0)
 
 
 def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array, Array | None]:
@@ -173,12 +174,23 @@ def load(
     cap = strength * after.G
     size = np.sqrt(trial[0] ** 2 + trial[1] ** 2)
     share = np.divide(cap, size, out=np.ones_like(size), where=size > cap)
-    return Sliders(trial, size, strength, cap, share, chord, grows, near)
+    force = k.curve.force(after.y)[0] if k.yields else after.force
+    slips = at_limit(size, strength, after.G, force)
+    return Sliders(trial, size, strength, cap, share, chord, grows, near, slips)
 
 
 def strength(k: Tables, mu: Array) -> Array:
     """mu lam A per facet (M, 1, 1 or B): the friction limit of q over G."""
     return mu * k.lam * k.area[:, None, None]
+
+
+def at_limit(size: Array, strength: Array, G: Array, force: Array) -> Flags:
+    """Whether sliders whose |q| is `size` are at their friction limit, but for rounding.
+
+    force: Phi (M, B) of the virgin curve, whose rounding G has.
+    """
+    flags: Flags = size >= strength * (G * (1 - LIMIT) - ROUNDED * force[:, None])
+    return flags
 
 
 def friction_loss(k: Tables, before: Cells, after: Cells, q: Array, sliders: Sliders) -> Array:
@@ -248,18 +260,18 @@ def stiffness(
     k: Tables, before: Cells, after: Cells, sliders: Sliders, de: Array, g: Array
 ) -> Array:
     """Tangent C = dF/dd (dim, dim, B): J_q = beta (I - s s^T) E + v g^T per cell, summed."""
-    trial, size, share, chord, grows = (
-        sliders.trial, sliders.size, sliders.share, sliders.chord, sliders.grows,
-    )  # fmt: skip
+    trial, share, chord, grows = sliders.trial, sliders.share, sliders.chord, sliders.grows
     y, kappa = after.y, after.kappa
     a = (k.area / k.c1)[:, None, None]
     inside = (y[:, None] > k.depth[:, :-1, None]) & (y[:, None] < k.depth[:, 1:, None])
     p = np.where(inside, k.curve.curvature(y)[:, None], 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         chord_slope = np.where(sliders.near, p / 2, (kappa - chord) / (y - before.y)[:, None])
-    v = np.where(grows, a * chord_slope * de, p * reciprocal(kappa) * trial)
-    beta = np.where(kappa > 0, a * np.where(grows, chord, kappa), 0.0)
-    slips, unit = size > sliders.cap, sliders.unit
+    # where rounding would decide: what did not close has not grown, what is at its limit slips
+    stiffer = grows & ((y - before.y) > ROUNDED * np.abs(y))[:, None]
+    v = np.where(stiffer, a * chord_slope * de, p * reciprocal(kappa) * trial)
+    beta = np.where(sliders.cap > 0, a * np.where(grows, chord, kappa), 0.0)
+    slips, unit = sliders.slips, sliders.unit
     v = np.where(slips, share * (v - unit * np.sum(unit * v, axis=0)), v)
     v = v + np.where(slips, sliders.strength * kappa * unit, 0.0)
     beta = np.where(slips, share * beta, beta)
@@ -302,9 +314,8 @@ def measures(k: Tables, state: Array) -> Measures:
     now = flattened(virgin, cells(k, state_now.depth) if k.yields else None)
     y, force, G = now.y, now.force, now.G
     mu = friction(k, state_now.slip) if k.wears else np.asarray(k.mu)
-    rounding = ROUNDED * virgin.force[:, None]
     q2 = state_now.q[0] ** 2 + state_now.q[1] ** 2
-    capped = np.sqrt(q2) >= strength(k, mu) * (G * (1 - LIMIT) - rounding)
+    capped = at_limit(np.sqrt(q2), strength(k, mu), G, virgin.force)
     weight = (k.weight / k.weight.sum())[:, None]
     touches = y > (state_now.depth if k.yields else 0.0)
     sliding = np.sum(weight * (touches & np.all(capped, axis=1)), axis=0)

@@ -176,7 +176,7 @@ def _closure_figure(record: Record) -> Any:
     axes[0].plot(closure, stress)
     axes[0].set(xlabel=f"closure ({length})", ylabel=f"normal stress ({unit})")
     axes[1].plot(closure, energy[0], label="stored")
-    axes[1].plot(closure, energy[1], label="dissipated by friction")
+    axes[1].plot(closure, energy[1], label="dissipated")
     axes[1].set(xlabel=f"closure ({length})", ylabel=f"energy ({joule})")
     axes[1].legend()
     figure.suptitle("Closure test")

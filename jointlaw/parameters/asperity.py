@@ -1,7 +1,5 @@
 """One asperity contact: normal power law, Mindlin shear, Coulomb friction (Eq. 33-36)."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -61,7 +59,7 @@ class Asperity:
             set_(self, "mu_residual", residual)
 
     @classmethod
-    def hertz_mindlin(cls, G: float, nu: float, R: float, mu: float) -> Asperity:
+    def hertz_mindlin(cls, G: float, nu: float, R: float, mu: float) -> "Asperity":
         """Hertz-Mindlin contact of elastic spheres, Eq. 34.
 
         G: shear modulus (Pa); nu: Poisson's ratio, 0..0.5; R: asperity radius of curvature (m).
@@ -74,7 +72,7 @@ class Asperity:
         return cls(K=K, lam=(2 - nu) / (2 * (1 - nu)), eta=0.5, mu=mu)
 
     @classmethod
-    def linear(cls, kn: float, ks: float, mu: float) -> Asperity:
+    def linear(cls, kn: float, ks: float, mu: float) -> "Asperity":
         """Constant normal and shear stiffness kn, ks in N/m (section 3 of the paper)."""
         kn, ks = above("kn", kn, 0.0), above("ks", ks, 0.0)
         return cls(K=ks, lam=kn / ks, eta=0.0, mu=mu)

@@ -163,10 +163,9 @@ class JointTable:
             increments, joint = np.diff(path, axis=0, prepend=np.zeros((1, 3))), law.joint()
             exact = np.array([joint.update(d, tangent=False)[0] for d in increments])
             rows.append(_error(name, self.follow(path), exact, corners))
-        k, damage = law.tables, []
-        damage += ["yield"] if k.yields else []
-        damage += ["wear"] if k.wears else []
-        note = f"asperities {' and '.join(damage)}: the table holds their first loading alone"
+        k = law.tables
+        damage = " and ".join(name for name, on in (("yield", k.yields), ("wear", k.wears)) if on)
+        note = f"asperities {damage}: the table holds their first loading alone"
         return Report(tuple(rows), note if damage else "")
 
     def plot(self, path: str | Path | None = None) -> Any:

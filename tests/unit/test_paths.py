@@ -94,7 +94,8 @@ def test_closure_test_loads_and_unloads(any_law):
     assert (np.diff(record.closure[:31]) > 0).all()
     assert not record.shear.any()
     assert (np.diff(record.dissipated) >= 0).all()
-    np.testing.assert_allclose(joint.F[0], record.F1[-1])
+    # summed in another order, both round in the last digits of the largest stress
+    np.testing.assert_allclose(joint.F[0], record.F1[-1], atol=20e6 * 1e-14)
 
 
 def test_closure_test_without_unloading(law):

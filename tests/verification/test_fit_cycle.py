@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 import jointlaw as jl
 from jointlaw import datasets
@@ -15,8 +16,8 @@ FREE = ("asperity_density", "alpha", "beta", "yield_interference")
 def loss(stress, closure):
     """Work that a cycle loses, as a share of that of loading."""
     top = int(np.argmax(stress))
-    up = np.trapezoid(stress[: top + 1], closure[: top + 1])
-    return 1 + np.trapezoid(stress[top:], closure[top:]) / up
+    up = trapezoid(stress[: top + 1], closure[: top + 1])
+    return 1 + trapezoid(stress[top:], closure[top:]) / up
 
 
 @pytest.fixture(scope="module")

@@ -1,5 +1,6 @@
 """Every extreme alone and every two together: what must hold does, after every step."""
 
+import numpy as np
 import pytest
 
 from extremes.checks import refused, run
@@ -21,6 +22,16 @@ def ends(changes):
 
 
 LAWS = [changes for changes in alone() if not ends(changes)]
+
+
+def kept_digits(changes):
+    """Share of a closure that carries a force: beyond the yield interference springs give way, and
+    the force is the difference of two places on the virgin curve, so much closer to each other."""
+    return min(changes.get("yields at", np.inf) / SCALE, 1.0)
+
+
+# laws with digits left to compare: those of a millionth of a closure are tested by `examine` alone
+COMPARED = [changes for changes in LAWS if kept_digits(changes) > 1e-6]
 
 
 def examine(changes, seed, n=8, steps=32):

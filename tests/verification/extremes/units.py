@@ -21,6 +21,8 @@ def scaled(changes, length, force):
         "density": p["density"] / length**2,
         "range": p["range"] * length,
         "critical_slip": p["critical_slip"] * length,
+        "yields at": p["yields at"] * length,
+        "wears over": p["wears over"] * length,
     }
 
 

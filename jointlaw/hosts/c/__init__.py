@@ -1,0 +1,1 @@
+"""C and C++: the law as one header, and its export."""

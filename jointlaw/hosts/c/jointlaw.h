@@ -1,0 +1,951 @@
+/* jointlaw.h: the law of a rough rock joint, complete, in C99 (also C++11 and later). MIT licence.
+ *
+ *     #define JOINTLAW_IMPLEMENTATION                  in one source file, before this line:
+ *     #include "jointlaw.h"
+ *
+ *     char message[JLAW_MESSAGE];
+ *     jlaw_law *law = jlaw_read("granite.jlaw", message, sizeof message);
+ *     double state[102] = {0};                         jlaw_state_size(law) numbers; zeros: virgin
+ *     if (jlaw_update(law, state, state, d, F, NULL, message, sizeof message)) ... message tells
+ *
+ * Table files (.jlaw, or as constants NAME.h) are written by `jointlaw export c`.
+ *
+ * Axes: 1 is the normal of the joint, 2 and 3 span it. d is the displacement in this step (m) of
+ * one body into and along the other: closure first, then the jlaw_dim - 1 components of shear.
+ * F is the traction (Pa), compression first: the force on the body that moves by +d is -area F.
+ * C = dF/dd (Pa/m), row by row. Energies are per area (J/m2).
+ *
+ * A law does not change after reading: any number of threads may share it. States belong to the
+ * caller; two threads must not advance one state at a time. No function but jlaw_read and jlaw_free
+ * uses memory, files or the locale; none uses a global variable.
+ *
+ * Build with -ffp-contract=off: the same bits with every compiler and on every x86-64. For speed
+ * -O3 -fno-math-errno -fno-trapping-math, which change no result; never -ffast-math.
+ *
+ * Symbols and order of the step are those of the page "theory-incremental" of the documentation
+ * and of jointlaw/kernels/reference.py.
+ */
+#ifndef JOINTLAW_H
+#define JOINTLAW_H
+#include <stddef.h>
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define JLAW_MESSAGE 300 /* bytes that hold every message */
+
+typedef struct jlaw_law jlaw_law;
+
+/* Read a table file. NULL and a message if it cannot be read, is damaged or of another version. */
+jlaw_law *jlaw_read(const char *file, char *message, size_t size);
+void jlaw_free(jlaw_law *law);
+
+int jlaw_dim(const jlaw_law *law);        /* components of d: 3, 2 in a plane, 1 for closure only */
+int jlaw_state_size(const jlaw_law *law); /* numbers of state, as in a Python snapshot */
+
+/* One step from state s0 to s1 (may be the same) by d (dim): F (dim), and C (dim, dim) if not NULL.
+ * Returns 0; or -1 and a message where d or the state is not finite or forces would overflow:
+ * nothing is written then. */
+int jlaw_update(const jlaw_law *law, const double *s0, double *s1, const double *d, double *F,
+                double *C, char *message, size_t size);
+
+double jlaw_stored(const jlaw_law *law, const double *s);     /* elastic energy, J/m2 */
+double jlaw_dissipated(const jlaw_law *law, const double *s); /* lost since virgin, J/m2 */
+/* Shares from 0 to 1. sliding: of all facets, those at their friction limit; slipping: of the
+ * friction capacity, what is at its limit; separated: of all facets, those out of touch. */
+void jlaw_shares(const jlaw_law *law, const double *s, double shares[3]);
+
+/* Unsheared joint: normal stress (Pa) at a closure (m), and the inverse. NaN where there is none. */
+double jlaw_normal_stress(const jlaw_law *law, double closure);
+double jlaw_closure(const jlaw_law *law, double normal_stress);
+/* Bound of |C| (Pa/m) while no facet is closed further: dt < 2 sqrt(mass/(area * this)). */
+double jlaw_max_stiffness(const jlaw_law *law, double closure);
+
+/* The state in axes 2 and 3 that are turned by this angle (rad, from 2 to 3) about the normal. For a
+ * host that cannot carry its axes with a body; for laws without a preferred direction (c = 0).
+ * What
+ * sliders lose by it counts as dissipated. Exact for whole azimuths of the facets, between them as
+ * good as the azimuths are many; in a plane the axis keeps or changes its sense. */
+void jlaw_rotate(const jlaw_law *law, double *s, double angle);
+/* The state after the bodies changed their roles: axis 1 turned round, axis 2 kept, axis 3 turned
+ * round with it. Shear along 2 changes its sign, along 3 not. Exact. */
+void jlaw_swap_bodies(const jlaw_law *law, double *s);
+
+/* Of the law that the tables were made for: a Python state of another fingerprint does not fit. */
+const char *jlaw_fingerprint(const jlaw_law *law);
+
+/* The tables, for files NAME.h; not for the host. LANES facets lie side by side in a block. */
+#define JLAW_FORMAT 1 /* of table files */
+enum {
+  JLAW_LANES = 4,
+  JLAW_M = 0, JLAW_S = 3, JLAW_T = 6, JLAW_N = 9, /* m = n/c1, s, t, n: 3 columns each */
+  JLAW_A = 12, JLAW_STIFF = 13,    /* A; A/c1 */
+  JLAW_STRENGTH = 14,              /* mu lam A */
+  JLAW_COMPLIANCE = 15,            /* c1/(2 A lam): from |q|^2/kappa to energy */
+  JLAW_SOFT = 16,                  /* 1/lam */
+  JLAW_POTENTIAL = 17,             /* A c1 */
+  JLAW_SHARE = 18, JLAW_MIRROR = 19, /* of all orientations; the facet mirrored along axis 2 */
+  JLAW_COLUMNS = 20,
+  JLAW_AZIMUTHS = 512 /* most */
+};
+struct jlaw_law {
+  int dim, facets, cells, pieces, azimuths; /* pieces of the curve; azimuths of a ring of facets */
+  double critical_slip;                     /* infinite: the largest float */
+  double eta, scale, rise;                  /* of the virgin curve */
+  double closure_factor, stiffness_factor;  /* normal stress over Phi, bound of |C| over Phi' */
+  double largest_reach, stretch;            /* m; bound of |y| over that of the displacement */
+  const double *facet;  /* (blocks, JLAW_COLUMNS, LANES); zeros beyond the last facet */
+  const double *depth;  /* (blocks, cells + 1, 3, LANES): zeta, and Phi and Phi' there */
+  const double *curve;  /* (pieces, 4): S of the virgin curve */
+  const double *energy; /* (pieces, 4): T */
+  double *own;          /* what jlaw_free frees */
+  char fingerprint[80];
+};
+
+#ifdef __cplusplus
+}
+#endif
+#endif
+
+#if defined(JOINTLAW_IMPLEMENTATION) && !defined(JOINTLAW_IMPLEMENTED)
+#define JOINTLAW_IMPLEMENTED
+#ifdef __FAST_MATH__
+#error "jointlaw.h: -ffast-math breaks the tests for NaN; take -fno-math-errno -fno-trapping-math"
+#endif
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#ifdef __cplusplus
+extern "C" {
+#endif
+#ifdef __clang__
+#pragma STDC FP_CONTRACT OFF
+#endif
+
+/* Four facets side by side in one vector, or (JOINTLAW_PLAIN, other compilers) one after the
+ * other with the same bits. AVX2 where the machine has it, found out at run time; without FMA, so
+ * that no operations are fused. */
+#if defined(__GNUC__)
+#define JLAW_INLINE static inline __attribute__((always_inline))
+#else
+#define JLAW_INLINE static inline
+#endif
+#if defined(__GNUC__) && !defined(JOINTLAW_PLAIN)
+#pragma GCC diagnostic push /* all functions of vectors are inline */
+#pragma GCC diagnostic ignored "-Wpsabi"
+#define JLAW_WIDE 4
+typedef double jlaw_v_ __attribute__((vector_size(32)));
+typedef double jlaw_loose_ __attribute__((vector_size(32), aligned(8), may_alias));
+typedef long long jlaw_mask_ __attribute__((vector_size(32)));
+typedef int jlaw_whole_ __attribute__((vector_size(16)));
+#define JLAW_LOAD(p) ((jlaw_v_) *(const jlaw_loose_ *) (p))
+#define JLAW_AT(v, l) ((v)[l])
+#define JLAW_WHOLE(x) __builtin_convertvector(x, jlaw_whole_)
+#define JLAW_DOUBLE(i) __builtin_convertvector(i, jlaw_v_)
+#define JLAW_PICK(m, a, b) ((jlaw_v_) (((m) & (jlaw_mask_) (a)) | (~(m) & (jlaw_mask_) (b))))
+#else
+#define JLAW_WIDE 1
+typedef double jlaw_v_;
+typedef int jlaw_mask_, jlaw_whole_;
+#define JLAW_LOAD(p) (*(p))
+#define JLAW_AT(v, l) (v)
+#define JLAW_WHOLE(x) ((int) (x))
+#define JLAW_DOUBLE(i) ((double) (i))
+#define JLAW_PICK(m, a, b) ((m) ? (a) : (b))
+#endif
+#define JLAW_ABS(x) JLAW_PICK((x) < 0.0, -(x), x)
+#define JLAW_W(column) JLAW_LOAD(w + (column) * JLAW_LANES) /* of the facets w */
+#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__OPTIMIZE__) && !defined(__AVX2__) \
+    && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && !defined(JOINTLAW_PLAIN)
+#define JLAW_CLONES __attribute__((target_clones("avx2", "default")))
+#else
+#define JLAW_CLONES
+#endif
+
+/* The thresholds of kernels/reference.py */
+#define JLAW_UNDERFLOW 1e-140 /* m: counts as zero */
+#define JLAW_TINY 1e-290      /* a stiffness whose reciprocal might overflow: zero */
+#define JLAW_LEAST 1e-300     /* lost in any stiffness or force but 0: no division by 0 */
+#define JLAW_NEAR 1e-5        /* of y: below such a change the chord is lost in rounding */
+#define JLAW_GRAZING 1e-12    /* cosine at which the offset meets its limit */
+#define JLAW_LIMIT 1e-9       /* of the friction limit: a slider this close is at it */
+#define JLAW_ROUNDED 1e-12    /* of Phi, and of y: as much may be lost in rounding */
+
+/* ------------------------------------------------------------------ messages */
+
+typedef struct { char *to; size_t size, at; } jlaw_text_;
+
+static void jlaw_say_(jlaw_text_ *text, const char *words)
+{
+  for (; *words && text->at + 1 < text->size; words++) text->to[text->at++] = *words;
+  if (text->size) text->to[text->at] = 0;
+}
+
+/* A number to five digits, without stdio and its locale */
+static void jlaw_say_number_(jlaw_text_ *text, double x)
+{
+  char digits[24];
+  int exponent = 0, n = 0;
+  if (x != x) { jlaw_say_(text, "nan"); return; }
+  if (x < 0.0) { jlaw_say_(text, "-"); x = -x; }
+  if (x > DBL_MAX) { jlaw_say_(text, "inf"); return; }
+  while (x >= 10.0) { x /= 10.0; exponent++; }
+  while (x > 0.0 && x < 1.0) { x *= 10.0; exponent--; }
+  x += 0.00005;
+  if (x >= 10.0) { x /= 10.0; exponent++; }
+  for (int i = 0; i < 5; i++) {
+    const int digit = (int) x;
+    digits[n++] = (char) ('0' + digit);
+    if (i == 0) digits[n++] = '.';
+    x = 10.0 * (x - digit);
+  }
+  digits[n++] = 'e';
+  digits[n++] = exponent < 0 ? '-' : '+';
+  exponent = exponent < 0 ? -exponent : exponent;
+  for (int unit = exponent >= 100 ? 100 : 10; unit; unit /= 10)
+    digits[n++] = (char) ('0' + exponent / unit % 10);
+  digits[n] = 0;
+  jlaw_say_(text, digits);
+}
+
+/* -------------------------------------------------------------- virgin curve */
+
+JLAW_INLINE void jlaw_root_(jlaw_v_ *x)
+{
+  for (int l = 0; l < JLAW_WIDE; l++) JLAW_AT(*x, l) = sqrt(JLAW_AT(*x, l));
+}
+JLAW_INLINE void jlaw_power_(jlaw_v_ *x, double exponent) /* 0 where x is not above 0 */
+{
+  for (int l = 0; l < JLAW_WIDE; l++)
+    JLAW_AT(*x, l) = JLAW_AT(*x, l) > 0.0 ? pow(JLAW_AT(*x, l), exponent) : 0.0;
+}
+
+/* Phi and Phi' at y, and Phi'' if asked; zero where y <= 0. What counts as zero becomes zero. */
+JLAW_INLINE void jlaw_virgin_(const jlaw_law *law, jlaw_v_ *y, jlaw_v_ *force, jlaw_v_ *slope,
+                              jlaw_v_ *bend)
+{
+  const double pieces = law->pieces, top = pieces - 1.0, scale = law->scale, eta = law->eta;
+  const jlaw_v_ zero = {0.0};
+  *y = JLAW_PICK(JLAW_ABS(*y) >= JLAW_UNDERFLOW, *y, zero);
+  const jlaw_v_ here = JLAW_PICK(*y > 0.0, *y, zero);
+  jlaw_v_ v = here;
+  jlaw_root_(&v);
+  const jlaw_v_ r = 1.0 / (v + scale);
+  jlaw_v_ x = v * r * pieces, c0 = zero, c1 = zero, c2 = zero, c3 = zero;
+  const jlaw_v_ bound = JLAW_PICK(x < top, x, zero + top);
+  const jlaw_whole_ at = JLAW_WHOLE(bound);
+  x = x - JLAW_DOUBLE(at);
+  for (int l = 0; l < JLAW_WIDE; l++) {
+    const double *c = law->curve + 4 * JLAW_AT(at, l);
+    JLAW_AT(c0, l) = c[0], JLAW_AT(c1, l) = c[1], JLAW_AT(c2, l) = c[2], JLAW_AT(c3, l) = c[3];
+  }
+  const jlaw_v_ ts = v * r * r * scale; /* t (1 - t) */
+  jlaw_v_ S = c0 + x * (c1 + x * (c2 + x * c3)), DDS = zero;
+  jlaw_v_ DS = 0.5 * ts * (pieces * (c1 + x * (2.0 * c2 + x * (3.0 * c3))));
+  if (bend)
+    DDS = 0.25 * ts * ts * (pieces * pieces * (2.0 * c2 + x * (6.0 * c3)))
+          + 0.5 * (scale - v) * r * DS;
+  if (law->rise > 0.0) { /* S is tabulated over w^rise */
+    const double W = scale * scale;
+    const jlaw_v_ w = here / (here + W), more = law->rise * W / (here + W);
+    jlaw_v_ lift = w;
+    jlaw_power_(&lift, law->rise);
+    DDS = lift * (DDS + 2.0 * more * DS + (more * more - more * w) * S);
+    DS = lift * (DS + more * S);
+    S = lift * S;
+  }
+  jlaw_v_ power = eta == 0.5 ? v : here;
+  if (eta == 0.0) power = JLAW_PICK(v > 0.0, zero + 1.0, zero);
+  else if (eta != 0.5) jlaw_power_(&power, eta);
+  *force = power * here * S;
+  *slope = power * ((1.0 + eta) * S + DS);
+  if (bend)
+    *bend = power / JLAW_PICK(*y > 0.0, *y, zero + 1.0)
+            * (eta * (1.0 + eta) * S + (1.0 + 2.0 * eta) * DS + DDS);
+}
+
+/* Phi and Phi' at one y */
+static double jlaw_virgin_one_(const jlaw_law *law, double y, double *slope)
+{
+  const jlaw_v_ zero = {0.0};
+  jlaw_v_ at = zero + y, force, slopes;
+  jlaw_virgin_(law, &at, &force, &slopes, NULL);
+  *slope = JLAW_AT(slopes, 0);
+  return JLAW_AT(force, 0);
+}
+
+/* Psi, the integral of Phi, at one y */
+static double jlaw_psi_(const jlaw_law *law, double y)
+{
+  if (!(y >= JLAW_UNDERFLOW)) return 0.0;
+  const double v = sqrt(y), place = v / (v + law->scale) * law->pieces, top = law->pieces - 1.0;
+  const int at = (int) (place < top ? place : top);
+  const double x = place - at, *c = law->energy + 4 * at;
+  double T = c[0] + x * (c[1] + x * (c[2] + x * c[3]));
+  if (law->rise > 0.0) T *= pow(y / (y + law->scale * law->scale), law->rise);
+  return T * y * y * (law->eta == 0.5 ? v : pow(y, law->eta));
+}
+
+/* ------------------------------------------------------------------ one step */
+
+typedef struct {
+  double p[3], from[3], to[3]; /* increment; closure and in-plane offset before and after */
+  double J[4], slip;           /* d offset/d p; way along the offset at its limit */
+} jlaw_move_;
+
+typedef struct { /* what the blocks add up to, lane by lane */
+  jlaw_v_ F[3][JLAW_LANES / JLAW_WIDE], C[9][JLAW_LANES / JLAW_WIDE];
+  jlaw_v_ pull[2][JLAW_LANES / JLAW_WIDE], lost[JLAW_LANES / JLAW_WIDE];
+} jlaw_sum_;
+
+typedef struct { /* facets side by side */
+  jlaw_v_ y0, y1, f0, f1, k0, k1, es, et, bend; /* y, Phi, Phi'; de; Phi'' */
+  jlaw_v_ qs, qt, lost, vs, vt, bss, bst, btt;  /* sums over the cells: q, loss, v and B of C */
+} jlaw_facets_;
+
+/* Moves the offset by p, dragged along where it is at its limit: "Large shear" */
+static void jlaw_limit_offset_(const jlaw_law *law, jlaw_move_ *m)
+{
+  const double D = law->critical_slip, p0 = m->p[1], p1 = m->p[2];
+  double a0 = m->from[1], a1 = m->from[2];
+  m->to[1] = a0 + p0, m->to[2] = a1 + p1;
+  m->slip = m->J[1] = m->J[2] = 0.0;
+  m->J[0] = m->J[3] = 1.0;
+  if (D == DBL_MAX) return;
+  if (!(m->to[1] * m->to[1] + m->to[2] * m->to[2] > D * D)
+      || !(m->to[1] * p0 + m->to[2] * p1 > 0.0)) return;
+  const double length = hypot(p0, p1), e0 = p0 / length, e1 = p1 / length;
+  const double along = a0 * e0 + a1 * e1;
+  double inside = -along + sqrt(fmax(D * D - (a0 * a0 + a1 * a1) + along * along, 0.0));
+  inside = fmin(fmax(inside, 0.0), length);
+  a0 += inside * e0, a1 += inside * e1;
+  const double x = (length - inside) / D, decay = exp(-x), rest = -expm1(-x);
+  const double cosine = fmin(fmax((a0 * e0 + a1 * e1) / D, 0.0), 1.0);
+  const double sine = (a1 * e0 - a0 * e1) / D;
+  const double bottom = (1.0 + cosine) + (1.0 - cosine) * decay * decay;
+  const double cos1 = ((1.0 + cosine) - (1.0 - cosine) * decay * decay) / bottom;
+  const double sin1 = 2.0 * sine * decay / bottom;
+  m->to[1] = D * (cos1 * e0 - sin1 * e1), m->to[2] = D * (cos1 * e1 + sin1 * e0);
+  m->slip = D * (x + log(bottom / 2.0));
+  double turn = (rest * rest + cosine * rest * (1.0 + decay)) / bottom;
+  turn += inside / (D * fmax(cosine, JLAW_GRAZING)) * (2.0 * decay / bottom - sin1 * sine);
+  turn /= length;
+  const int turns = law->dim == 3; /* along one line the offset does not turn */
+  const double row0 = turns ? -turn * e1 - sin1 / D * e0 : 0.0;
+  const double row1 = turns ? turn * e0 - sin1 / D * e1 : 0.0;
+  m->J[0] = -m->to[2] * row0, m->J[1] = -m->to[2] * row1;
+  m->J[2] = m->to[1] * row0, m->J[3] = m->to[1] * row1;
+}
+
+/* Share of a depth cell in Phi, and its slope: the bed beyond its lower limit less that beyond its
+ * upper, which for the last cell is never reached. z: zeta, Phi, Phi' at both limits. */
+JLAW_INLINE void jlaw_cell_(const jlaw_v_ *y, const jlaw_v_ *force, const jlaw_v_ *slope,
+                            const jlaw_v_ z[6], jlaw_v_ *G, jlaw_v_ *kappa)
+{
+  const jlaw_v_ zero = {0.0}, low = *y - z[0], high = *y - z[3];
+  jlaw_v_ g = *force - z[1] - z[2] * low, k = *slope - z[2];
+  g = JLAW_PICK(high > 0.0, g - (*force - z[4] - z[5] * high), g);
+  k = JLAW_PICK(high > 0.0, z[5] - z[2], k);
+  k = JLAW_PICK((low > 0.0) & (k > 0.0), k, zero);
+  const jlaw_v_ most = k * low;
+  g = JLAW_PICK(g < most, g, most);
+  *G = JLAW_PICK(g > 0.0, g, zero);
+  *kappa = k;
+}
+
+/* One depth cell of facets: load, friction limit, loss, tangent; q: sliders before and after */
+JLAW_INLINE void jlaw_slide_(const double *w, const double *limits, jlaw_facets_ *f, jlaw_v_ q[2],
+                             int ledger, int tangent)
+{
+  const jlaw_v_ zero = {0.0}, one = zero + 1.0;
+  jlaw_v_ z[6], G0, G1, k0, k1;
+  for (int i = 0; i < 6; i++) z[i] = JLAW_LOAD(limits + i * JLAW_LANES);
+  jlaw_cell_(&f->y0, &f->f0, &f->k0, z, &G0, &k0);
+  jlaw_cell_(&f->y1, &f->f1, &f->k1, z, &G1, &k1);
+  /* trial force: by the chord where stiffness grows, scaled down where it falls */
+  const jlaw_v_ a = JLAW_W(JLAW_STIFF), dy = f->y1 - f->y0;
+  const jlaw_mask_ grows = k1 > k0, near = JLAW_ABS(dy) <= JLAW_NEAR * JLAW_ABS(f->y1);
+  const jlaw_v_ ratio = JLAW_PICK(grows, G1 - G0, k1) / JLAW_PICK(grows, dy, k0 + JLAW_LEAST);
+  jlaw_v_ chord = JLAW_PICK(near, 0.5 * (k0 + k1), ratio);
+  chord = JLAW_PICK(chord > k0, chord, k0);
+  chord = JLAW_PICK(chord < k1, chord, k1);
+  const jlaw_v_ kept = JLAW_PICK(grows, one, ratio), add = a * JLAW_PICK(grows, chord, k1);
+  const jlaw_v_ old2 = q[0] * q[0] + q[1] * q[1];
+  const jlaw_v_ ts = q[0] * kept + add * f->es, tt = q[1] * kept + add * f->et;
+  /* friction: |q| <= mu lam A G */
+  const jlaw_v_ new2 = ts * ts + tt * tt;
+  jlaw_v_ size = new2;
+  jlaw_root_(&size);
+  const jlaw_v_ strength = JLAW_W(JLAW_STRENGTH), cap = strength * G1;
+  const jlaw_mask_ beyond = size > cap;
+  const jlaw_v_ share = cap / (JLAW_PICK(beyond, size, cap) + JLAW_LEAST);
+  const jlaw_v_ part = JLAW_PICK(new2 > JLAW_TINY, share, zero);
+  q[0] = part * ts, q[1] = part * tt;
+  f->qs += q[0], f->qt += q[1];
+  if (ledger) { /* "No step can make energy": each factor is >= 0 as written */
+    const jlaw_v_ now = JLAW_PICK(grows, chord, k1), high = JLAW_PICK(grows, chord, k0);
+    const jlaw_v_ low = JLAW_PICK(grows, k0, k1), k01 = k0 * high, k11 = k1 * now;
+    const jlaw_v_ rub = k1 - now + 2.0 * share * (1.0 - share) * now;
+    f->lost += JLAW_PICK(k01 > JLAW_TINY, old2 * ((high - low) / k01), zero)
+               + JLAW_PICK(k11 > JLAW_TINY, new2 * (rub / k11), zero);
+  }
+  if (tangent) { /* "The tangent": J_q = beta (I - s s^T) E + v g^T */
+    const jlaw_v_ bend = JLAW_PICK((f->y1 > z[0]) & (f->y1 < z[3]), f->bend, zero);
+    const jlaw_v_ chord1 = JLAW_PICK(near, 0.5 * bend, (k1 - chord) / JLAW_PICK(near, one, dy));
+    const jlaw_v_ fade = JLAW_PICK(k1 > JLAW_TINY, bend / JLAW_PICK(k1 > JLAW_TINY, k1, one), zero);
+    /* where rounding would decide: what did not close has not grown, what is at its limit slips */
+    const jlaw_mask_ stiffer = grows & (dy > JLAW_ROUNDED * JLAW_ABS(f->y1));
+    const jlaw_mask_ slips = size >= strength * (G1 * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * f->f1);
+    const jlaw_v_ unit = 1.0 / JLAW_PICK(size > 0.0, size, one), us = ts * unit, ut = tt * unit;
+    const jlaw_v_ ws = JLAW_PICK(stiffer, a * chord1 * f->es, fade * ts);
+    const jlaw_v_ wt = JLAW_PICK(stiffer, a * chord1 * f->et, fade * tt);
+    const jlaw_v_ dot = us * ws + ut * wt, push = strength * k1;
+    const jlaw_v_ beta = JLAW_PICK(cap > 0.0, share * add, zero), along = JLAW_PICK(slips, beta, zero);
+    f->vs += JLAW_PICK(slips, share * (ws - us * dot) + push * us, ws);
+    f->vt += JLAW_PICK(slips, share * (wt - ut * dot) + push * ut, wt);
+    f->bss += beta - along * us * us;
+    f->bst -= along * us * ut;
+    f->btt += beta - along * ut * ut;
+  }
+}
+
+/* C += along g^T + E^T B E of facets */
+JLAW_INLINE void jlaw_add_tangent_(const double *w, const jlaw_move_ *m, const jlaw_facets_ *f,
+                                   jlaw_sum_ *sum, int at, int dim)
+{
+  const jlaw_v_ soft = JLAW_W(JLAW_SOFT), stiff = JLAW_W(JLAW_A) * f->k1;
+  for (int i = 0; i < dim; i++) {
+    const jlaw_v_ s = JLAW_W(JLAW_S + i), t = JLAW_W(JLAW_T + i);
+    const jlaw_v_ along = stiff * JLAW_W(JLAW_N + i) + soft * (s * f->vs + t * f->vt);
+    const jlaw_v_ left = soft * (s * f->bss + t * f->bst), right = soft * (s * f->bst + t * f->btt);
+    for (int j = 0; j < dim; j++) {
+      jlaw_v_ g = JLAW_W(JLAW_M); /* dy/dd */
+      if (j > 0) g = JLAW_W(JLAW_M + 1) * m->J[j - 1] + JLAW_W(JLAW_M + 2) * m->J[j + 1];
+      sum->C[3 * i + j][at] += along * g + left * JLAW_W(JLAW_S + j) + right * JLAW_W(JLAW_T + j);
+    }
+  }
+}
+
+/* Facets from number `first` on: y before and after, virgin curve, cells, and their part of F, C */
+JLAW_INLINE void jlaw_add_facets_(const jlaw_law *law, int first, const jlaw_move_ *m,
+                                  const double *q0, double *q1, jlaw_sum_ *sum, int dim, int ledger,
+                                  int tangent)
+{
+  const int D = law->cells, block = first / JLAW_LANES, lane = first % JLAW_LANES;
+  const int at = lane / JLAW_WIDE, real = law->facets - first;
+  const double *w = law->facet + (size_t) block * JLAW_COLUMNS * JLAW_LANES + lane;
+  const double *z = law->depth + (size_t) block * (size_t) (D + 1) * 3 * JLAW_LANES + lane;
+  const size_t other = (size_t) law->facets * (size_t) D; /* from q_s to q_t of a slider */
+  const jlaw_v_ zero = {0.0};
+  jlaw_facets_ f = {zero, zero, zero, zero, zero, zero, zero, zero, zero,
+                    zero, zero, zero, zero, zero, zero, zero, zero};
+  for (int i = 0; i < dim; i++) {
+    f.y0 += JLAW_W(JLAW_M + i) * m->from[i], f.y1 += JLAW_W(JLAW_M + i) * m->to[i];
+    f.es += JLAW_W(JLAW_S + i) * m->p[i];
+    if (i > 0) f.et += JLAW_W(JLAW_T + i) * m->p[i];
+  }
+  jlaw_virgin_(law, &f.y0, &f.f0, &f.k0, NULL);
+  jlaw_virgin_(law, &f.y1, &f.f1, &f.k1, tangent ? &f.bend : NULL);
+  q0 += (size_t) first * (size_t) D, q1 += (size_t) first * (size_t) D;
+  for (int i = 0; i < D; i++, q0++, q1++, z += 3 * JLAW_LANES) {
+    jlaw_v_ q[2] = {zero, zero};
+    for (int l = 0; l < JLAW_WIDE; l++)
+      if (l < real) JLAW_AT(q[0], l) = q0[l * D], JLAW_AT(q[1], l) = (q0 + other)[l * D];
+    jlaw_slide_(w, z, &f, q, ledger, tangent);
+    for (int l = 0; l < JLAW_WIDE; l++)
+      if (l < real) q1[l * D] = JLAW_AT(q[0], l), (q1 + other)[l * D] = JLAW_AT(q[1], l);
+  }
+  const jlaw_v_ normal = JLAW_W(JLAW_A) * f.f1, soft = JLAW_W(JLAW_SOFT);
+  for (int i = 0; i < dim; i++) {
+    const jlaw_v_ pull = JLAW_W(JLAW_N + i) * normal;
+    sum->F[i][at] += pull + soft * (JLAW_W(JLAW_S + i) * f.qs + JLAW_W(JLAW_T + i) * f.qt);
+    if (i > 0) sum->pull[i - 1][at] += pull;
+  }
+  if (ledger) sum->lost[at] += JLAW_W(JLAW_COMPLIANCE) * f.lost;
+  if (tangent) jlaw_add_tangent_(w, m, &f, sum, at, dim);
+}
+
+JLAW_INLINE double jlaw_total_(const jlaw_v_ *x)
+{
+  double lane[JLAW_LANES];
+  for (int l = 0; l < JLAW_LANES; l++) lane[l] = JLAW_AT(x[l / JLAW_WIDE], l);
+  return (lane[0] + lane[2]) + (lane[1] + lane[3]);
+}
+
+JLAW_INLINE void jlaw_step_(const jlaw_law *law, const jlaw_move_ *m, const double *s0, double *s1,
+                            double *F, double *C, int dim, int ledger, int tangent)
+{
+  const jlaw_v_ zero = {0.0};
+  jlaw_sum_ sum;
+  for (int at = 0; at < JLAW_LANES / JLAW_WIDE; at++) {
+    sum.lost[at] = sum.pull[0][at] = sum.pull[1][at] = zero;
+    for (int i = 0; i < dim; i++) sum.F[i][at] = zero;
+    for (int i = 0; tangent && i < 9; i++) sum.C[i][at] = zero;
+  }
+  for (int first = 0; first < law->facets; first += JLAW_WIDE)
+    jlaw_add_facets_(law, first, m, s0 + 2 * dim, s1 + 2 * dim, &sum, dim, ledger, tangent);
+  double lost = s0[2 * dim - 1] + jlaw_total_(sum.lost);
+  const double drag = jlaw_total_(sum.pull[0]) * m->to[1] + jlaw_total_(sum.pull[1]) * m->to[2];
+  if (ledger && m->slip > 0.0 && drag > 0.0) lost += m->slip * drag / law->critical_slip;
+  for (int i = 0; i < dim; i++) F[i] = jlaw_total_(sum.F[i]);
+  for (int i = 0; tangent && i < dim; i++)
+    for (int j = 0; j < dim; j++) C[dim * i + j] = jlaw_total_(sum.C[3 * i + j]);
+  for (int i = 0; i < dim; i++) s1[i] = s0[i] + m->p[i];
+  for (int i = 1; i < dim; i++) s1[dim + i - 1] = m->to[i];
+  s1[2 * dim - 1] = lost;
+}
+
+#ifdef JOINTLAW_NO_LEDGER
+enum { JLAW_LEDGER = 0 };
+#else
+enum { JLAW_LEDGER = 1 };
+#endif
+
+/* Constants for the compiler: a plane costs half of space, and what is not asked for nothing */
+JLAW_CLONES static void jlaw_advance_(const jlaw_law *law, const jlaw_move_ *m, const double *s0,
+                                      double *s1, double *F, double *C)
+{
+  if (law->dim == 3 && !C) jlaw_step_(law, m, s0, s1, F, C, 3, JLAW_LEDGER, 0);
+  else if (law->dim == 3) jlaw_step_(law, m, s0, s1, F, C, 3, JLAW_LEDGER, 1);
+  else if (law->dim == 2 && !C) jlaw_step_(law, m, s0, s1, F, C, 2, JLAW_LEDGER, 0);
+  else if (law->dim == 2) jlaw_step_(law, m, s0, s1, F, C, 2, JLAW_LEDGER, 1);
+  else jlaw_step_(law, m, s0, s1, F, C, 1, JLAW_LEDGER, C != NULL);
+}
+
+/* The largest of |closure|, |shear| and |offset| of a state: with `stretch` it bounds every |y| */
+static double jlaw_far_(const double *x, int n)
+{
+  double far = 0.0;
+  for (int i = 0; i < n; i++) /* NaN stays */
+    if (fabs(x[i]) > far || x[i] != x[i]) far = fabs(x[i]);
+  return far;
+}
+
+/* Whether all sliders hold forces that a law can have; not for NaN */
+static int jlaw_sound_(const double *q, int n)
+{
+  double sum[4] = {0.0, 0.0, 0.0, 0.0};
+  int i = 0;
+  for (; i + 4 <= n; i += 4)
+    for (int l = 0; l < 4; l++) sum[l] += q[i + l] * q[i + l];
+  for (; i < n; i++) sum[0] += q[i] * q[i];
+  return (sum[0] + sum[2]) + (sum[1] + sum[3]) < 1e300;
+}
+
+static int jlaw_refuse_(const jlaw_law *law, const double *s, const double *d, int damaged,
+                        char *message, size_t size)
+{
+  jlaw_text_ text = {message, size, 0};
+  if (damaged) {
+    jlaw_say_(&text, "the state holds numbers that are not finite or no forces of this law; nothing "
+                     "was moved. Start from zeros or from a state that this law wrote");
+    return -1;
+  }
+  jlaw_say_(&text, "the step d = (");
+  int finite = 1;
+  for (int i = 0; i < law->dim; i++) {
+    jlaw_say_(&text, i ? ", " : "");
+    jlaw_say_number_(&text, d[i]);
+    finite = finite && fabs(d[i]) <= DBL_MAX;
+  }
+  if (!finite) {
+    jlaw_say_(&text, ") m is not finite; nothing was moved. Look for the fault in the host's motion");
+    return -1;
+  }
+  jlaw_say_(&text, ") m leads from closure ");
+  jlaw_say_number_(&text, s[0]);
+  jlaw_say_(&text, " m beyond the reach of ");
+  jlaw_say_number_(&text, law->largest_reach);
+  jlaw_say_(&text, " m, where forces overflow; nothing was moved. Take a smaller step");
+  return -1;
+}
+
+int jlaw_update(const jlaw_law *law, const double *s0, double *s1, const double *d, double *F,
+                double *C, char *message, size_t size)
+{
+  const int dim = law->dim;
+  const double reach = law->stretch * (jlaw_far_(s0, 2 * dim - 1) + jlaw_far_(d, dim));
+  const int damaged = !(fabs(s0[2 * dim - 1]) <= DBL_MAX) || !(jlaw_far_(s0, 2 * dim - 1) <= DBL_MAX)
+                      || !jlaw_sound_(s0 + 2 * dim, 2 * law->facets * law->cells);
+  if (damaged || !(reach <= law->largest_reach))
+    return jlaw_refuse_(law, s0, d, damaged, message, size);
+  jlaw_move_ m = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}, 0.0};
+  for (int i = 0; i < dim; i++) m.p[i] = d[i];
+  m.from[0] = s0[0], m.to[0] = s0[0] + d[0];
+  for (int i = 1; i < dim; i++) m.from[i] = s0[dim + i - 1];
+  jlaw_limit_offset_(law, &m);
+  jlaw_advance_(law, &m, s0, s1, F, C);
+  return 0;
+}
+
+/* ------------------------------------------------------------ what a state is */
+
+int jlaw_dim(const jlaw_law *law) { return law->dim; }
+int jlaw_state_size(const jlaw_law *law) { return 2 * law->dim + 2 * law->facets * law->cells; }
+const char *jlaw_fingerprint(const jlaw_law *law) { return law->fingerprint; }
+double jlaw_dissipated(const jlaw_law *law, const double *s) { return s[2 * law->dim - 1]; }
+
+static double jlaw_of_facet_(const jlaw_law *law, int facet, int column)
+{
+  const int block = facet / JLAW_LANES, lane = facet % JLAW_LANES;
+  return law->facet[((size_t) block * JLAW_COLUMNS + (size_t) column) * JLAW_LANES + (size_t) lane];
+}
+
+/* zeta, Phi and Phi' at both limits of a cell of a facet */
+static void jlaw_limits_(const jlaw_law *law, int facet, int cell, jlaw_v_ limits[6])
+{
+  const jlaw_v_ zero = {0.0};
+  const int row = (facet / JLAW_LANES * (law->cells + 1) + cell) * 3;
+  for (int j = 0; j < 6; j++)
+    limits[j] = zero + law->depth[(size_t) (row + j) * JLAW_LANES + (size_t) (facet % JLAW_LANES)];
+}
+
+typedef struct { double stored, sliding, slipping, separated; } jlaw_measures_;
+
+static jlaw_measures_ jlaw_measure_(const jlaw_law *law, const double *s)
+{
+  jlaw_measures_ all = {0.0, 0.0, 0.0, 0.0};
+  const int dim = law->dim, D = law->cells;
+  const jlaw_v_ zero = {0.0};
+  for (int f = 0; f < law->facets; f++) {
+    const double *qs = s + 2 * dim + f * D, *qt = qs + law->facets * D;
+    const double share = jlaw_of_facet_(law, f, JLAW_SHARE);
+    double y = 0.0, slope, at_limit = 0.0;
+    int whole = 1;
+    for (int i = 0; i < dim; i++) y += jlaw_of_facet_(law, f, JLAW_M + i) * s[i ? dim + i - 1 : 0];
+    const double force = jlaw_virgin_one_(law, y, &slope);
+    const jlaw_v_ at = zero + y, forces = zero + force, slopes = zero + slope;
+    for (int i = 0; i < D; i++) {
+      jlaw_v_ limits[6], G, kappa;
+      jlaw_limits_(law, f, i, limits);
+      jlaw_cell_(&at, &forces, &slopes, limits, &G, &kappa);
+      const double part = JLAW_AT(G, 0), stiff = JLAW_AT(kappa, 0);
+      const double q2 = qs[i] * qs[i] + qt[i] * qt[i];
+      const double cap = part * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * force;
+      const int held = sqrt(q2) >= jlaw_of_facet_(law, f, JLAW_STRENGTH) * cap;
+      at_limit += held ? part : 0.0;
+      whole = whole && held;
+      if (stiff > JLAW_TINY) all.stored += jlaw_of_facet_(law, f, JLAW_COMPLIANCE) * q2 / stiff;
+    }
+    all.stored += jlaw_of_facet_(law, f, JLAW_POTENTIAL) * jlaw_psi_(law, y);
+    if (force > 0.0) all.slipping += share * at_limit / force;
+    if (y > 0.0 && whole) all.sliding += share;
+    if (!(y > 0.0)) all.separated += share;
+  }
+  return all;
+}
+
+double jlaw_stored(const jlaw_law *law, const double *s) { return jlaw_measure_(law, s).stored; }
+
+void jlaw_shares(const jlaw_law *law, const double *s, double shares[3])
+{
+  const jlaw_measures_ all = jlaw_measure_(law, s);
+  shares[0] = all.sliding, shares[1] = all.slipping, shares[2] = all.separated;
+}
+
+/* ------------------------------------------------------------ unsheared joint */
+
+double jlaw_normal_stress(const jlaw_law *law, double closure)
+{
+  double slope;
+  if (!(closure <= law->largest_reach)) return nan("");
+  return law->closure_factor * jlaw_virgin_one_(law, closure, &slope);
+}
+
+double jlaw_max_stiffness(const jlaw_law *law, double closure)
+{
+  double slope;
+  if (!(closure <= law->largest_reach)) return nan("");
+  jlaw_virgin_one_(law, closure, &slope);
+  return law->stiffness_factor * slope;
+}
+
+double jlaw_closure(const jlaw_law *law, double normal_stress)
+{
+  double low = 0.0, high = law->largest_reach;
+  if (!(normal_stress >= 0.0) || !(jlaw_normal_stress(law, high) >= normal_stress)) return nan("");
+  while (1) { /* the stress rises: halve the exponent first, then the number */
+    const double middle = high > 4.0 * low && high > 1e-300 ? sqrt(high * fmax(low, 1e-300))
+                                                            : 0.5 * (low + high);
+    if (!(middle > low && middle < high)) return low == 0.0 ? 0.0 : high;
+    if (jlaw_normal_stress(law, middle) < normal_stress) low = middle;
+    else high = middle;
+  }
+}
+
+/* --------------------------------------------------------------- turned axes */
+
+void jlaw_swap_bodies(const jlaw_law *law, double *s)
+{
+  const int dim = law->dim, D = law->cells, M = law->facets;
+  for (int i = 1; i < 2 * dim - 1; i += dim - 1) s[i] = -s[i]; /* shear and offset along axis 2 */
+  double *qs = s + 2 * dim, *qt = qs + M * D;
+  for (int f = 0; f < M; f++) {
+    const int other = (int) jlaw_of_facet_(law, f, JLAW_MIRROR);
+    for (int i = 0; i < D; i++) {
+      const double here = qs[f * D + i], turned = qt[f * D + i];
+      if (other > f) {
+        qs[f * D + i] = qs[other * D + i], qt[f * D + i] = -qt[other * D + i];
+        qs[other * D + i] = here, qt[other * D + i] = -turned;
+      } else if (other == f) qt[f * D + i] = -turned; /* t changes its sense in the mirror */
+    }
+  }
+}
+
+/* q of one cell over the azimuths of a ring of facets, read at azimuths turned by the angle: the
+ * trigonometric interpolation of n (even) places */
+static void jlaw_turn_(double *q, int n, int step, double angle)
+{
+  double old[JLAW_AZIMUTHS];
+  const double pi = 3.14159265358979323846;
+  for (int j = 0; j < n; j++) old[j] = q[j * step], q[j * step] = 0.0;
+  for (int j = 0; j < n; j++)
+    for (int k = 0; k < n; k++) {
+      const double x = angle + 2.0 * pi * (j - k) / n, half = sin(0.5 * x);
+      const double weight = fabs(half) < 1e-9 ? 1.0 : sin(0.5 * n * x) * cos(0.5 * x) / (n * half);
+      q[j * step] += weight * old[k];
+    }
+}
+
+/* Brings sliders beyond their friction limit back to it */
+static void jlaw_hold_(const jlaw_law *law, double *s)
+{
+  const int dim = law->dim, D = law->cells;
+  const jlaw_v_ zero = {0.0};
+  for (int f = 0; f < law->facets; f++) {
+    double *qs = s + 2 * dim + f * D, *qt = qs + law->facets * D, y = 0.0, slope;
+    for (int i = 0; i < dim; i++) y += jlaw_of_facet_(law, f, JLAW_M + i) * s[i ? dim + i - 1 : 0];
+    const jlaw_v_ force = zero + jlaw_virgin_one_(law, y, &slope), at = zero + y;
+    const jlaw_v_ slopes = zero + slope;
+    for (int i = 0; i < D; i++) {
+      jlaw_v_ limits[6], G, kappa;
+      jlaw_limits_(law, f, i, limits);
+      jlaw_cell_(&at, &force, &slopes, limits, &G, &kappa);
+      const double cap = jlaw_of_facet_(law, f, JLAW_STRENGTH) * JLAW_AT(G, 0);
+      const double size = sqrt(qs[i] * qs[i] + qt[i] * qt[i]);
+      const double share = size > cap ? cap / size : 1.0;
+      qs[i] *= share, qt[i] *= share;
+    }
+  }
+}
+
+void jlaw_rotate(const jlaw_law *law, double *s, double angle)
+{
+  const int dim = law->dim, D = law->cells, n = law->azimuths;
+  const double before = jlaw_stored(law, s), c = cos(angle), d = sin(angle);
+  if (dim == 2 && c < 0.0) jlaw_swap_bodies(law, s); /* the axis changes its sense */
+  if (dim != 3) return;
+  for (int i = 1; i <= 3; i += 2) { /* shear and offset */
+    const double along = s[i], across = s[i + 1];
+    s[i] = c * along + d * across, s[i + 1] = c * across - d * along;
+  }
+  for (int half = 0; half < 2; half++)
+    for (int ring = 0; ring < law->facets / n; ring++)
+      for (int i = 0; i < D; i++)
+        jlaw_turn_(s + 6 + ((half * law->facets + ring * n) * D + i), n, D, angle);
+  jlaw_hold_(law, s);
+  s[5] += fmax(before - jlaw_stored(law, s), 0.0);
+}
+
+/* ------------------------------------------------------------- table files */
+
+#define JLAW_LONGEST ((size_t) 1 << 28) /* bytes of a table file: those of a law have 1e5 to 1e7 */
+
+/* The bytes of a file and a zero; NULL if it cannot be read */
+static char *jlaw_load_(const char *file, size_t *length)
+{
+  FILE *stream = fopen(file, "rb");
+  char *bytes = NULL, *more;
+  size_t room = 0, n = 0;
+  if (!stream) return NULL;
+  for (int open = 1; open && n < JLAW_LONGEST;) {
+    if (n + 1 >= room) {
+      room = room ? 2 * room : (size_t) 1 << 17;
+      more = (char *) realloc(bytes, room);
+      if (!more) break;
+      bytes = more;
+    }
+    const size_t got = fread(bytes + n, 1, room - n - 1, stream);
+    open = got > 0;
+    n += got;
+  }
+  if (ferror(stream) || !bytes) { free(bytes); bytes = NULL; }
+  else bytes[n] = 0;
+  fclose(stream);
+  *length = n;
+  return bytes;
+}
+
+/* FNV-1a of 64 bits, without carriage returns: any other change of one byte changes it */
+static unsigned long long jlaw_sum_of_(const char *bytes, const char *end)
+{
+  unsigned long long sum = 0xCBF29CE484222325ULL;
+  for (; bytes < end; bytes++)
+    if (*bytes != '\r') sum = (sum ^ (unsigned char) *bytes) * 0x100000001B3ULL;
+  return sum;
+}
+
+static int jlaw_hex_(char c)
+{
+  return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
+}
+
+/* Past blanks and lines that begin with # */
+static const char *jlaw_skip_(const char *at)
+{
+  while (*at == ' ' || *at == '\n' || *at == '\r' || *at == '#')
+    if (*at++ == '#') while (*at && *at != '\n') at++;
+  return at;
+}
+
+/* Reads a word into `word`; empty if there is none or it is too long */
+static const char *jlaw_word_(const char *at, char *word, size_t room)
+{
+  size_t n = 0;
+  for (at = jlaw_skip_(at); *at > ' ' && n + 1 < room; at++) word[n++] = *at;
+  word[*at > ' ' ? 0 : n] = 0;
+  return at;
+}
+
+/* Reads a whole number, or a hexadecimal float as Python's float.hex writes it; NULL if neither.
+ * No locale, no rounding. */
+static const char *jlaw_number_(const char *at, double *number)
+{
+  at = jlaw_skip_(at);
+  const int negative = *at == '-';
+  at += negative;
+  const int hex = at[0] == '0' && at[1] == 'x';
+  unsigned long long digits = 0;
+  int count = 0, places = 0, point = 0, power = 0;
+  at += hex ? 2 : 0;
+  for (; jlaw_hex_(*at) >= 0 || (*at == '.' && hex && !point); at++) {
+    if (*at == '.') { point = 1; continue; }
+    const int digit = jlaw_hex_(*at);
+    if (++count > 15 || (!hex && digit > 9)) return NULL;
+    digits = digits * (hex ? 16u : 10u) + (unsigned) digit;
+    places += point;
+  }
+  if (hex && *at == 'p') {
+    const int down = *++at == '-';
+    int n = 0;
+    at += *at == '-' || *at == '+';
+    for (; *at >= '0' && *at <= '9' && n < 5; at++, n++) power = 10 * power + (*at - '0');
+    if (n == 0) return NULL;
+    power = down ? -power : power;
+  }
+  if (count == 0 || *at > ' ') return NULL;
+  *number = ldexp((double) digits, power - 4 * places);
+  if (negative) *number = -*number;
+  return fabs(*number) <= DBL_MAX ? at : NULL;
+}
+
+typedef struct { const char *word; double *to, least, most; } jlaw_key_;
+
+/* Reads all keywords into law; NULL or what is wrong */
+static const char *jlaw_parse_(const char *at, jlaw_law *law, size_t length)
+{
+  double dim = 0, facets = 0, cells = 0, pieces = 0, azimuths = 0;
+  const jlaw_key_ keys[] = {
+    {"dim", &dim, 1, 3}, {"facets", &facets, 1, 1e6}, {"cells", &cells, 1, 1e6},
+    {"pieces", &pieces, 1, 1e6}, {"azimuths", &azimuths, 1, JLAW_AZIMUTHS},
+    {"critical_slip", &law->critical_slip, JLAW_UNDERFLOW, DBL_MAX},
+    {"eta", &law->eta, 0, DBL_MAX}, {"scale", &law->scale, DBL_MIN, DBL_MAX},
+    {"rise", &law->rise, 0, DBL_MAX}, {"closure_factor", &law->closure_factor, 0, DBL_MAX},
+    {"stiffness_factor", &law->stiffness_factor, 0, DBL_MAX},
+    {"largest_reach", &law->largest_reach, 0, DBL_MAX}, {"stretch", &law->stretch, 1, DBL_MAX}};
+  enum { KEYS = sizeof keys / sizeof keys[0] };
+  char word[sizeof law->fingerprint];
+  at = jlaw_word_(at, word, sizeof word);
+  if (strcmp(word, "fingerprint")) return "it does not tell its fingerprint";
+  at = jlaw_word_(at, law->fingerprint, sizeof law->fingerprint);
+  for (int i = 0; i < KEYS; i++) {
+    at = jlaw_word_(at, word, sizeof word);
+    if (strcmp(word, keys[i].word)) return "a keyword is missing, unknown or not in its place";
+    at = jlaw_number_(at, keys[i].to);
+    if (!at || !(*keys[i].to >= keys[i].least && *keys[i].to <= keys[i].most))
+      return "a parameter is no number or out of its bounds";
+  }
+  law->dim = (int) dim, law->facets = (int) facets, law->cells = (int) cells;
+  law->pieces = (int) pieces, law->azimuths = (int) azimuths;
+  const size_t blocks = (size_t) (law->facets + JLAW_LANES - 1) / JLAW_LANES;
+  const char *words[4] = {"facet", "depth", "curve", "energy"};
+  const size_t sizes[4] = {blocks * JLAW_COLUMNS * JLAW_LANES,
+                           blocks * (size_t) (law->cells + 1) * 3 * JLAW_LANES,
+                           4 * (size_t) law->pieces, 4 * (size_t) law->pieces};
+  const size_t all = sizes[0] + sizes[1] + sizes[2] + sizes[3];
+  if (law->facets % law->azimuths || all > length / 2) return "its sizes do not fit one another";
+  double *to = law->own = (double *) malloc(all * sizeof *law->own);
+  if (!to) return "there is no memory for it";
+  for (int i = 0; i < 4; i++) {
+    at = jlaw_word_(at, word, sizeof word);
+    if (strcmp(word, words[i])) return "a table is missing, too short or too long";
+    for (size_t n = 0; n < sizes[i]; n++, to++)
+      if (!(at = jlaw_number_(at, to))) return "a table holds what is no number";
+  }
+  law->facet = law->own, law->depth = law->facet + sizes[0];
+  law->curve = law->depth + sizes[1], law->energy = law->curve + sizes[2];
+  for (size_t n = 0; n < sizes[0]; n++) { /* A and what follows it are no less than zero */
+    const size_t column = n / JLAW_LANES % JLAW_COLUMNS;
+    if ((column >= JLAW_A && !(law->facet[n] >= 0.0))
+        || (column == JLAW_MIRROR && !(law->facet[n] < facets))) return "a facet is out of bounds";
+  }
+  return *jlaw_skip_(at) ? "something follows the last table" : NULL;
+}
+
+static const char *jlaw_check_(char *bytes, size_t length, jlaw_law *law)
+{
+  static const char magic[] = "jointlaw tables ";
+  const char *at = bytes + sizeof magic - 1;
+  double version;
+  if (strncmp(bytes, magic, sizeof magic - 1)) return "it is no table file of jointlaw";
+  at = jlaw_number_(at, &version);
+  if (!at || version != JLAW_FORMAT)
+    return "it is of another version than this jointlaw.h; export law and header anew, together";
+  char *end = bytes + length, word[20];
+  while (end > bytes && end[-1] <= ' ' && end[-1] >= 0) end--;
+  while (end > bytes && end[-1] != '\n') end--; /* to the last line */
+  const char *sum = jlaw_word_(jlaw_word_(end, word, sizeof word), word, sizeof word);
+  unsigned long long told = 0;
+  for (int i = 0; i < 16; i++) {
+    if (jlaw_hex_(word[i]) < 0) return "it ends too early: copy it again, whole";
+    told = 16 * told + (unsigned) jlaw_hex_(word[i]);
+  }
+  if (strncmp(end, "sum ", 4) || word[16] || *jlaw_skip_(sum))
+    return "it ends too early: copy it again, whole";
+  if (told != jlaw_sum_of_(bytes, end)) return "it is damaged: its sum is wrong; export it again";
+  *end = 0;
+  return jlaw_parse_(at, law, length);
+}
+
+jlaw_law *jlaw_read(const char *file, char *message, size_t size)
+{
+  jlaw_text_ text = {message, size, 0};
+  size_t length = 0;
+  const char *wrong = "it cannot be read";
+  char *bytes = jlaw_load_(file, &length);
+  jlaw_law *law = (jlaw_law *) calloc(1, sizeof *law);
+  if (bytes && law) wrong = jlaw_check_(bytes, length, law);
+  free(bytes);
+  if (!wrong) return law;
+  jlaw_free(law);
+  jlaw_say_(&text, file);
+  jlaw_say_(&text, ": ");
+  jlaw_say_(&text, wrong);
+  return NULL;
+}
+
+void jlaw_free(jlaw_law *law)
+{
+  if (law) free(law->own);
+  free(law);
+}
+
+#if defined(__GNUC__) && !defined(JOINTLAW_PLAIN)
+#pragma GCC diagnostic pop
+#endif
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,99 @@
+"""Builds jointlaw.h with the system's compilers, and calls it from Python."""
+
+import ctypes
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from jointlaw.hosts.c.export import include_dir, table_text
+
+STRICT = ["-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror"]
+FAST = ["-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"]
+SOURCE = '#define JOINTLAW_IMPLEMENTATION\n#include "jointlaw.h"\n'
+HERE = Path(__file__).parent / "c"
+
+
+def compiler(name="cc"):
+    """The compiler's path; skips the test where there is none."""
+    found = shutil.which(name)
+    if found is None:
+        pytest.skip(f"no C compiler `{name}` on this machine (Debian: apt-get install gcc clang)")
+    return found
+
+
+def build(folder, source, *flags, cc="cc", name="program"):
+    """Compile a source file or text in the folder; the program's path."""
+    path = source
+    if not isinstance(source, Path):
+        path = folder / ("source.cpp" if cc.endswith("++") else "source.c")
+        path.write_text(source)
+    out = folder / name
+    command = [compiler(cc), *flags, f"-I{include_dir()}", str(path), "-o", str(out), "-lm"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, f"{' '.join(command)}\n{done.stderr}"
+    return out
+
+
+def run(program, *arguments):
+    """Run a program that must succeed; what it prints."""
+    done = subprocess.run(
+        [str(program), *map(str, arguments)], capture_output=True, text=True, timeout=500
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def library(folder, *flags, cc="cc", name="libjointlaw.so"):
+    """jointlaw.h as a shared library."""
+    path = build(folder, SOURCE, "-shared", "-fPIC", *flags, cc=cc, name=name)
+    lib, pointer = ctypes.CDLL(str(path)), ctypes.c_void_p
+    for function in ("normal_stress", "closure", "max_stiffness"):
+        getattr(lib, f"jlaw_{function}").argtypes = [pointer, ctypes.c_double]
+    lib.jlaw_rotate.argtypes = [pointer, pointer, ctypes.c_double]
+    for function in ("normal_stress", "closure", "max_stiffness", "stored", "dissipated"):
+        getattr(lib, f"jlaw_{function}").restype = ctypes.c_double
+    lib.jlaw_read.restype, lib.jlaw_fingerprint.restype = pointer, ctypes.c_char_p
+    return lib
+
+
+class CLaw:
+    """A law in C, with one joint's state."""
+
+    def __init__(self, lib, law, folder):
+        file = folder / "law.jlaw"
+        file.write_text(table_text(law))
+        self.lib, self.message = lib, ctypes.create_string_buffer(300)
+        self.law = ctypes.c_void_p(lib.jlaw_read(str(file).encode(), self.message, 300))
+        assert self.law, self.message.value.decode()
+        self.dim = lib.jlaw_dim(self.law)
+        self.state = np.zeros(lib.jlaw_state_size(self.law))
+
+    def __del__(self):
+        self.lib.jlaw_free(self.law)
+
+    def step(self, d, tangent=True, keep=True):
+        """F and C; raises ValueError with the message of a refusal."""
+        d = np.ascontiguousarray(d, float)
+        F, C = np.full(self.dim, 4711.0), np.full((self.dim, self.dim), 4711.0)
+        new = self.state if keep else self.state.copy()
+        if self.lib.jlaw_update(
+            self.law, at(self.state), at(new), at(d), at(F), at(C) if tangent else None,
+            self.message, 300,
+        ):  # fmt: skip
+            assert (F == 4711.0).all()
+            raise ValueError(self.message.value.decode())
+        return F, C
+
+    def shares(self):
+        """sliding, slipping, separated."""
+        shares = np.zeros(3)
+        self.lib.jlaw_shares(self.law, at(self.state), at(shares))
+        return shares
+
+
+def at(array):
+    """Pointer to an array's numbers."""
+    return ctypes.c_void_p(array.ctypes.data)

@@ -1,0 +1,284 @@
+"""jointlaw.h builds everywhere, bears hostile files and steps, and its examples run."""
+
+import ctypes
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+import jointlaw.cli.main
+from jointlaw.hosts.c.export import header_text, identifier, include_dir, table_text
+
+sys.path.insert(0, str(Path(__file__).parent))
+from c_host import FAST, HERE, SOURCE, STRICT, CLaw, build, compiler, library, run
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "verification"))
+from extremes import laws as extreme_laws
+
+FUZZ = HERE / "fuzz.c"
+SANE = ["-g", "-O1", "-fno-sanitize-recover=all"]
+
+
+@pytest.fixture(scope="module")
+def law():
+    return jl.presets.load("westerly-smooth")
+
+
+@pytest.fixture(scope="module")
+def lib(tmp_path_factory):
+    return library(tmp_path_factory.mktemp("c"), *FAST)
+
+
+@pytest.mark.parametrize(
+    ("cc", "standard", "level"),
+    [("gcc", "c99", "-O0"), ("gcc", "c99", "-O3"), ("clang", "c99", "-O0"), ("clang", "c99", "-O3"),
+     ("g++", "c++11", "-O3"), ("g++", "c++20", "-O0"), ("clang++", "c++11", "-O0"),
+     ("clang++", "c++20", "-O3")],
+)  # fmt: skip
+def test_builds_without_a_warning(tmp_path, law, cc, standard, level):
+    text = SOURCE + '#include "rock.h"\nint main(void) { return jlaw_dim(&rock) - 3; }\n'
+    (tmp_path / "rock.h").write_text(header_text(law, "rock"))
+    for extra in ([], ["-DJOINTLAW_PLAIN", "-DJOINTLAW_NO_LEDGER"]):
+        flags = [*STRICT, level, *extra, f"-I{tmp_path}"]
+        run(build(tmp_path, text, f"-std={standard}", *flags, cc=cc))
+
+
+@pytest.mark.parametrize("cc", ["gcc", "clang"])
+def test_fast_math_is_refused(tmp_path, cc):
+    path = tmp_path / "source.c"
+    path.write_text(SOURCE)
+    command = [compiler(cc), "-ffast-math", f"-I{include_dir()}", "-c", str(path), "-o", "x.o"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode != 0
+    assert "take -fno-math-errno -fno-trapping-math" in done.stderr
+
+
+def test_a_step_calls_nothing_of_memory_files_or_locale(tmp_path):
+    """Of the C library the object needs mathematics, and for jlaw_read files and memory."""
+    path = tmp_path / "source.c"
+    path.write_text(SOURCE)
+    subprocess.run(
+        [compiler("cc"), *FAST, f"-I{include_dir()}", "-ffunction-sections", "-c", str(path),
+         "-o", str(tmp_path / "x.o")], check=True,
+    )  # fmt: skip
+    listing = run(compiler("objdump"), "-r", tmp_path / "x.o")
+    for section in listing.split("RELOCATION RECORDS FOR ")[1:]:
+        name = section.partition("]")[0]
+        if "jlaw_update" in name or "jlaw_advance" in name or "jlaw_refuse" in name:
+            for word in ("malloc", "calloc", "free", "printf", "setlocale", "fopen"):
+                assert word not in section.partition("\n")[2], f"{name} calls {word}"
+
+
+# --------------------------------------------------------------- hostile input
+
+
+@pytest.fixture(scope="module")
+def fuzz(tmp_path_factory):
+    return build(
+        tmp_path_factory.mktemp("fuzz"), FUZZ, *SANE, "-fsanitize=address,undefined", "-lpthread"
+    )
+
+
+def extreme_law(rng):
+    """A random law that exists (heights may be too steep, or not convex), and a size of its steps;
+    elastic and unworn, as the header holds no others."""
+    while True:
+        changes, size = extreme_laws.random_changes(rng)
+        try:
+            elastic = changes | {"yields at": np.inf, "wears over": np.inf}
+            return extreme_laws.build(**elastic), size
+        except ValueError:
+            continue
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_steps_of_all_kinds_and_sizes(fuzz, tmp_path, seed):
+    """Laws of the suite of extremes; the whole of it is in docs/native.md."""
+    made, size = extreme_law(np.random.default_rng(20_000 + seed))
+    (tmp_path / "x.jlaw").write_text(table_text(made))
+    assert "3000 steps" in run(fuzz, "steps", tmp_path / "x.jlaw", size, 3000, seed)
+
+
+def test_asperities_that_yield_or_wear_are_refused_by_name(law):
+    for name in ("yield_interference", "wear_slip"):
+        damage = {name: 1e-6} | ({"mu_residual": 0.1} if name == "wear_slip" else {})
+        other = replace(law, asperity=replace(law.asperity, **damage))
+        with pytest.raises(ValueError, match=f"asperity.{name} = 1e-06 m: jointlaw.h holds no"):
+            table_text(other)
+
+
+def test_damaged_and_hostile_files(fuzz, tmp_path, law):
+    (tmp_path / "x.jlaw").write_text(table_text(law))
+    said = run(fuzz, "files", tmp_path / "x.jlaw", tmp_path / "y.jlaw", 500, 1)
+    assert said.startswith("500 files")
+
+
+def test_two_threads_on_one_law(tmp_path, law):
+    program = build(tmp_path, FUZZ, *SANE, "-fsanitize=thread", "-lpthread")
+    (tmp_path / "x.jlaw").write_text(table_text(law))
+    assert "the same states" in run(program, "threads", tmp_path / "x.jlaw")
+
+
+def resigned(text):
+    """The text with a sum that fits."""
+    from jointlaw.hosts.c.export import _sum
+
+    body = text[: text.rindex("\nsum ") + 1]
+    return f"{body}sum {_sum(body.encode()):016x}\n"
+
+
+BAD = {
+    "empty": (lambda text: "", "it is no table file of jointlaw"),
+    "other": (lambda text: "[law]\nlam = 1.2\n", "it is no table file of jointlaw"),
+    "version": (
+        lambda text: text.replace("tables 1", "tables 2", 1),
+        "of another version than this jointlaw.h; export law and header anew",
+    ),
+    "cut": (lambda text: text[: len(text) // 2], "it ends too early: copy it again, whole"),
+    "one digit": (
+        lambda text: text.replace("0x1.8", "0x1.9", 1),
+        "it is damaged: its sum is wrong",
+    ),
+    "unknown keyword": (
+        lambda text: resigned(text.replace("\nrise ", "\nfall ", 1)),
+        "a keyword is missing, unknown or not in its place",
+    ),
+    "negative": (
+        lambda text: resigned(text.replace("\nstretch 0x", "\nstretch -0x", 1)),
+        "a parameter is no number or out of its bounds",
+    ),
+    "huge": (
+        lambda text: resigned(text.replace("\ncells 4", "\ncells 999999", 1)),
+        "its sizes do not fit one another",
+    ),
+    "short table": (
+        lambda text: resigned(text.replace("\nenergy\n", "\n", 1)),
+        "a table is missing, too short or too long",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_file_is_told(lib, tmp_path, law, name):
+    change, words = BAD[name]
+    (tmp_path / "bad.jlaw").write_text(change(table_text(law)))
+    message = ctypes.create_string_buffer(300)
+    assert not lib.jlaw_read(str(tmp_path / "bad.jlaw").encode(), message, 300)
+    assert message.value.decode().startswith(f"{tmp_path}/bad.jlaw: ")
+    assert words in message.value.decode()
+    for missing in ("none.jlaw", "."):
+        assert not lib.jlaw_read(str(tmp_path / missing).encode(), message, 300)
+        assert b"it cannot be read" in message.value or b"no table file" in message.value
+    short = ctypes.create_string_buffer(b"x" * 9, 9)
+    assert not lib.jlaw_read(b"none.jlaw", short, 5)
+    assert short.raw == b"none\0xxxx"
+
+
+def test_line_ends_of_windows_are_read(lib, tmp_path, law):
+    text = table_text(law)
+    (tmp_path / "x.jlaw").write_bytes(text.replace("\n", "\r\n").encode())
+    message = ctypes.create_string_buffer(300)
+    read = lib.jlaw_read(str(tmp_path / "x.jlaw").encode(), message, 300)
+    assert read, message.value
+    lib.jlaw_free(ctypes.c_void_p(read))
+
+
+# ------------------------------------------------------------ what is exported
+
+
+def test_both_forms_of_the_tables_are_one_law(lib, tmp_path, law):
+    (tmp_path / "rock.h").write_text(header_text(law, "rock"))
+    compiled = tmp_path / "rock.so"
+    text = SOURCE + '#include "rock.h"\nconst jlaw_law *tables(void) { return &rock; }\n'
+    build(tmp_path, text, *FAST, "-shared", "-fPIC", f"-I{tmp_path}", name="rock.so")
+    one = CLaw(lib, law, tmp_path)
+    tables = ctypes.CDLL(str(compiled)).tables
+    tables.restype = ctypes.c_void_p
+    two = CLaw(lib, law, tmp_path)
+    lib.jlaw_free(two.law)
+    two.law = ctypes.c_void_p(tables())
+    rng = np.random.default_rng(0)
+    for d in rng.normal(2e-8, 1e-7, (30, 3)):
+        np.testing.assert_array_equal(one.step(d)[1], two.step(d)[1])
+    two.law = None  # constants are not freed
+
+
+def test_examples_build_as_written_and_run(tmp_path, capsys, monkeypatch):
+    """The lines of the folder's README, and what docs/native.md shows."""
+    for cc in ("cc", "c++"):
+        compiler(cc)
+    monkeypatch.chdir(tmp_path)
+    command = ["export", "c", "westerly-smooth", "--out", "out", "--resolution", "balanced"]
+    assert jointlaw.cli.main.main(command) == 0
+    assert "make && ./example" in capsys.readouterr().out
+    folder = tmp_path / "out"
+    lines = [
+        line.strip() for line in (folder / "README.md").read_text().splitlines()
+        if line.startswith("    ")
+    ]  # fmt: skip
+    assert len(lines) == 4
+    page = (Path(__file__).parents[2] / "docs/native.md").read_text()
+    for line in lines:
+        done = subprocess.run(line, shell=True, cwd=folder, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        if line in ("./example", "./spheres"):
+            shown = page.partition(f"$ {line}\n")[2].partition("```")[0].split("...\n")[0]
+            assert shown.strip()
+            assert done.stdout.startswith(shown)
+    # the direct shear test of the laboratory
+    table = np.genfromtxt(
+        subprocess.run("./example", cwd=folder, capture_output=True, text=True).stdout.splitlines(),
+        delimiter=",", names=True,
+    )  # fmt: skip
+    law = jl.presets.load("westerly-smooth")
+    test = jl.direct_shear(law.joint(), 2e-6, normal=2e6, steps=20)
+    assert table["shear_MPa"][19] == pytest.approx(1e-6 * test.F2[-1], abs=2e-4)  # as printed
+
+
+def test_ten_lines_to_a_first_force(tmp_path, law):
+    """The program that docs/native.md shows."""
+    page = (Path(__file__).parents[2] / "docs/native.md").read_text()
+    jl.export_c(law, tmp_path, "westerly_smooth")
+    build(tmp_path, page.partition("```c\n")[2].partition("```")[0], "-std=c99", *FAST)
+    done = subprocess.run("./program", cwd=tmp_path, capture_output=True, text=True)
+    F, _ = law.joint().update([1e-7, 5e-8, 0.0])
+    printed = [float(word) for word in done.stdout.split()[:3]]
+    assert printed == pytest.approx(F, abs=0.1)
+
+
+@pytest.mark.parametrize("plane", ["plane = 0.0", "closure_only = true"])
+def test_examples_of_fewer_components(tmp_path, law, plane):
+    jl.export_c(jl.JointLaw.from_toml(f"{plane}\n{law.to_toml()}"), tmp_path, "flat")
+    out = run(build(tmp_path, tmp_path / "example.c", *STRICT, "-std=c99", "-O2", name="e"),
+              tmp_path / "flat.jlaw")  # fmt: skip
+    assert len(out.splitlines()) == (2 if "only" in plane else 41)
+    out = run(build(tmp_path, tmp_path / "example.cpp", *STRICT, "-std=c++11", "-O2", cc="c++",
+                    name="s"))  # fmt: skip
+    assert "contacts begun" in out
+
+
+def test_names_and_options(tmp_path, law, capsys):
+    assert identifier("jing-replica") == "jing_replica"
+    assert identifier("3 mm rock") == "joint_3_mm_rock"
+    assert identifier("---") == "joint"
+    for name in ("3mm", "a-b", "", "x" * 60):
+        with pytest.raises(ValueError, match="is no identifier of C; take letters"):
+            jl.export_c(law, tmp_path / "new", name)
+    assert not (tmp_path / "new").exists()
+    options = ["export", "c", "linear-a3", "--out", str(tmp_path / "new"), "--closure", "2um"]
+    assert jointlaw.cli.main.main(options) == 2
+    assert "--closure shapes a table for YADE" in capsys.readouterr().err
+    assert not (tmp_path / "new").exists()
+
+
+def test_every_preset_is_exported(lib, tmp_path):
+    for name in jl.presets.names():
+        law = jl.presets.load(name)
+        joint = CLaw(lib, law, tmp_path)
+        d = np.full(joint.dim, 0.1 * law.closure_range)
+        F, _ = law.joint().update(d)
+        assert joint.step(d)[0] == pytest.approx(F, rel=1e-12, abs=1e-12 * np.abs(F).max())

@@ -1,0 +1,289 @@
+"""The law in C gives the numbers of the readable kernel, for laws and paths of every kind."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+from jointlaw.kernels import reference
+
+sys.path.insert(0, str(Path(__file__).parent))
+from c_host import FAST, CLaw, at, library
+
+SAME, SAME_C = 1e-12, 1e-9  # of the largest on the path, as promised in docs/native.md
+BUILDS = {
+    "gcc -O0": ("gcc", ["-O0", "-ffp-contract=off"]),
+    "gcc": ("gcc", FAST),
+    "gcc, this machine": ("gcc", [*FAST, "-march=native"]),
+    "gcc, no vectors": ("gcc", [*FAST, "-DJOINTLAW_PLAIN"]),
+    "clang -O0": ("clang", ["-O0", "-ffp-contract=off"]),
+    "clang": ("clang", FAST),
+    "clang, this machine": ("clang", [*FAST, "-march=native"]),
+    "C++": ("g++", FAST),
+}
+
+
+@pytest.fixture(scope="session")
+def lib(tmp_path_factory):
+    return library(tmp_path_factory.mktemp("c"), *FAST)
+
+
+def random_law(seed):
+    """A law of any kind: each choice comes up within every few seeds."""
+    rng = np.random.default_rng(seed)
+    formation = [None, "population", "individual"][seed % 3]
+    eta = [0.5, 0.0, 1.0, 0.37, 0.5][seed % 5]
+    if formation == "population" and eta == 0.0:
+        eta = 0.8  # not convex
+    heights = formation and jl.GammaHeights(3.82, 1.15e-6, 2e-6, formation)
+    if seed % 7 == 6:  # a density infinite at the point of contact
+        heights = jl.GammaHeights(-0.6, 3e-6, 0.0, "individual")
+    kind = {"closure_only": True} if seed % 8 == 5 else {"plane": [None, 0.0, 0.7][seed // 2 % 3]}
+    return jl.JointLaw(
+        orientation=jl.Orientation(
+            rng.uniform(1.0, 6.0), rng.uniform(-0.4, 0.8), rng.uniform(-0.15, 0.15)
+        ),
+        asperity=jl.Asperity(2e8, rng.uniform(0.5, 2.0), eta, [0.0, 0.3, 0.7][rng.integers(3)]),
+        heights=heights,
+        asperity_density=1e10,
+        closure_range=1e-6,
+        critical_slip=[np.inf, 8e-7][seed % 2],
+        resolution=jl.Resolution(int(rng.integers(1, 4)), int(rng.integers(3, 6)), 1 + seed % 6),
+        **kind,
+    )
+
+
+def random_path(dim, seed, steps=60):
+    """Increments (steps, dim) of all sizes, apart and shut again, some components exactly zero."""
+    rng = np.random.default_rng(1000 + seed)
+    d = rng.normal(size=(steps, dim)) * 10.0 ** rng.uniform(-9.0, -6.0, (steps, 1))
+    d[0, 0] = 5e-7
+    d[:, 0] += 3e-8
+    d[rng.integers(0, steps, 4), 0] = -1.5e-6
+    d[rng.integers(1, steps, 6)] = 0.0
+    for component in range(dim):
+        d[rng.integers(1, steps, 6), component] = 0.0
+    d[rng.integers(1, steps, 5), 1:] = 0.0
+    return d
+
+
+def follow(joint, law, d):
+    """Largest differences of F, C, sliders and energies along a path, as shares of the largest."""
+    k = law.tables
+    state = np.zeros((k.rows, 1))
+    off, peak = np.zeros(4), np.full(4, 1e-300)
+    for step in d:
+        state, F, C = reference.step(k, state, step[:, None], True)
+        F_c, C_c = joint.step(step)
+        m, shares = reference.measures(k, state), joint.shares()
+        pairs = [
+            (F[:, 0], F_c), (C[..., 0], C_c), (state[2 * k.dim :, 0], joint.state[2 * k.dim :]),
+            ([m.stored[0], state[2 * k.dim - 1, 0]],
+             [joint.lib.jlaw_stored(joint.law, at(joint.state)),
+              joint.lib.jlaw_dissipated(joint.law, at(joint.state))]),
+        ]  # fmt: skip
+        off = np.maximum(off, [np.abs(np.subtract(a, b)).max() for a, b in pairs])
+        peak = np.maximum(peak, [np.abs(a).max() for a, _ in pairs])
+        assert shares == pytest.approx([m.sliding[0], m.slipping[0], m.separated[0]], abs=1e-9)
+    assert (joint.state[: 2 * k.dim - 1] == state[: 2 * k.dim - 1, 0]).all() or np.isfinite(
+        k.critical_slip
+    )
+    return off / peak
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_same_numbers_on_random_laws_and_paths(lib, tmp_path, seed):
+    law = random_law(seed)
+    joint = CLaw(lib, law, tmp_path)
+    F, C, q, energy = follow(joint, law, random_path(joint.dim, seed))
+    assert F < SAME
+    assert C < SAME_C
+    assert q < SAME
+    assert energy < SAME
+
+
+@pytest.mark.parametrize("seed", range(0, 24, 3))
+def test_the_unsheared_joint(lib, tmp_path, seed):
+    law = random_law(seed)
+    joint = CLaw(lib, law, tmp_path)
+    for closure in (-1e-6, 0.0, 1e-9, 3e-7, 2e-6):
+        stress = lib.jlaw_normal_stress(joint.law, closure)
+        assert stress == pytest.approx(law.normal_stress(closure), rel=1e-13)
+        bound = lib.jlaw_max_stiffness(joint.law, closure)
+        assert bound == pytest.approx(law.max_stiffness(closure), rel=1e-12)
+    for stress in (0.0, 1e3, 5e6):
+        assert lib.jlaw_closure(joint.law, stress) == pytest.approx(law.closure(stress), rel=1e-12)
+    for bad in (np.nan, -1.0, np.inf):
+        assert np.isnan(lib.jlaw_closure(joint.law, bad))
+    assert np.isnan(lib.jlaw_normal_stress(joint.law, 2 * law.largest_reach))
+    assert lib.jlaw_fingerprint(joint.law).decode() == law.fingerprint
+
+
+@pytest.mark.parametrize("name", BUILDS)
+def test_every_build_gives_the_same_bits(lib, tmp_path, name):
+    cc, flags = BUILDS[name]
+    other = library(tmp_path, *flags, cc=cc)
+    for seed in (0, 3, 7, 13, 20):
+        law = random_law(seed)
+        one, two = CLaw(lib, law, tmp_path), CLaw(other, law, tmp_path)
+        for step in random_path(one.dim, seed, 30):
+            for a, b in zip(one.step(step), two.step(step), strict=True):
+                np.testing.assert_array_equal(a, b)
+            np.testing.assert_array_equal(one.state, two.state)
+
+
+def test_fused_operations_change_no_more_than_rounding(tmp_path):
+    law = random_law(0)
+    fused = library(tmp_path, "-O3", "-march=native", "-ffp-contract=fast", cc="gcc")
+    joint = CLaw(fused, law, tmp_path)
+    F, C, *_ = follow(joint, law, random_path(joint.dim, 0))
+    assert F < SAME
+    assert C < SAME_C
+
+
+@pytest.mark.parametrize("seed", [0, 1, 4])
+def test_c_and_python_continue_each_others_state(lib, tmp_path, seed):
+    """Python, C, Python: the path of a joint that was in C all along, to the last digit."""
+    law = random_law(seed)
+    d = random_path(law.tables.dim, seed, 30)
+    whole, part, joint = CLaw(lib, law, tmp_path), CLaw(lib, law, tmp_path), law.joint()
+    for step in d[:10]:
+        whole.step(step)
+    snapshot = joint.snapshot()
+    snapshot.values[:, 0] = whole.state
+    joint.restore(snapshot)
+    part.state[:] = joint.snapshot().values[:, 0]
+    for step in d[10:]:
+        np.testing.assert_array_equal(whole.step(step)[0], part.step(step)[0])
+    np.testing.assert_array_equal(whole.state, part.state)
+    F_python, _ = joint.trial(d[10])
+    part.state[:] = joint.snapshot().values[:, 0]
+    assert part.step(d[10])[0] == pytest.approx(F_python, abs=SAME * np.abs(F_python).max() + 1e-9)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 8, 10])
+def test_tangent_as_a_curve_of_differences(lib, tmp_path, seed):
+    """C is the limit of central differences: the best of five increments, median of 20 states."""
+    law = random_law(seed)
+    joint = CLaw(lib, law, tmp_path)
+    rng = np.random.default_rng(seed)
+    best = []
+    for _ in range(20):
+        joint.step(rng.normal(0.0, 1e-7, joint.dim) + np.eye(joint.dim)[0] * 5e-8)
+        d = rng.normal(0.0, 1e-7, joint.dim)
+        _, C = joint.step(d, keep=False)
+        if not C.any():
+            continue
+        errors = []
+        for h in 10.0 ** np.arange(-13.0, -8.0):
+            ends = [
+                [joint.step(d + s * h * e, tangent=False, keep=False)[0] for e in np.eye(joint.dim)]
+                for s in (1, -1)
+            ]
+            errors.append(np.abs(np.subtract(*ends).T / (2 * h) - C).max() / np.abs(C).max())
+        best.append(min(errors))
+    # a kink within h of d spoils a curve now and then
+    assert np.median(best) < 1e-6
+
+
+def test_a_refused_step_moves_nothing_and_tells_why(lib, tmp_path):
+    joint = CLaw(lib, random_law(0), tmp_path)
+    joint.step(np.full(joint.dim, 1e-7))
+    before = joint.state.copy()
+    cases = {
+        np.nan: "is not finite; nothing was moved",
+        -np.inf: "is not finite; nothing was moved",
+        1e200: "beyond the reach of .* m, where forces overflow; nothing was moved. Take a smaller",
+    }
+    for bad, words in cases.items():
+        for slot in range(joint.dim):
+            d = np.full(joint.dim, 1e-8)
+            d[slot] = bad
+            with pytest.raises(ValueError, match=words):
+                joint.step(d)
+            np.testing.assert_array_equal(joint.state, before)
+    for slot in range(len(before)):
+        joint.state[:] = before
+        joint.state[slot] = np.nan
+        with pytest.raises(ValueError, match="the state holds numbers that are not finite"):
+            joint.step(np.full(joint.dim, 1e-8))
+
+
+# ----------------------------------------------------------------- turned axes
+
+
+def turned(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]])
+
+
+def isotropic(phi, critical_slip=np.inf):
+    return jl.JointLaw(
+        orientation=jl.Orientation(3.0, 0.4),
+        asperity=jl.Asperity(2e8, 1.2, 0.5, 0.4),
+        asperity_density=1e10,
+        closure_range=1e-6,
+        critical_slip=critical_slip,
+        resolution=jl.Resolution(2, phi, 3),
+    )
+
+
+@pytest.mark.parametrize("critical_slip", [np.inf, 8e-7])
+def test_axes_turned_by_whole_azimuths(lib, tmp_path, critical_slip):
+    """Turning the axes in mid-path is the path in turned axes from the start."""
+    law = isotropic(4, critical_slip)
+    one, two = CLaw(lib, law, tmp_path), CLaw(lib, law, tmp_path)
+    d = random_path(3, 5, 30)
+    for places in (1, -3, 4):
+        one.state[:], two.state[:] = 0.0, 0.0
+        angle = places * np.pi / 4
+        R = turned(angle)
+        for step in d[:15]:
+            one.step(step)
+            two.step(R @ step)
+        lib.jlaw_rotate(one.law, at(one.state), angle)
+        scale = np.abs(two.state).max()
+        assert np.abs(one.state - two.state).max() < 1e-11 * scale
+        for step in d[15:]:
+            F, _ = one.step(R @ step)
+            F_two, _ = two.step(R @ step)
+            assert np.abs(F - F_two).max() <= 1e-11 * np.abs(F_two).max() + 1e-6
+
+
+def test_axes_turned_between_azimuths(lib, tmp_path):
+    """Traction in turned axes: the better, the more azimuths."""
+    errors = []
+    for phi in (3, 6, 12):
+        joint = CLaw(lib, isotropic(phi), tmp_path)
+        for _ in range(5):
+            F, _ = joint.step([1e-7, 5e-8, 2e-8])
+        energy = lib.jlaw_stored(joint.law, at(joint.state)) + joint.state[5]
+        lib.jlaw_rotate(joint.law, at(joint.state), 0.3)
+        F_turned, _ = joint.step(np.zeros(3))
+        errors.append(np.abs(F_turned - turned(0.3) @ F).max() / np.abs(F).max())
+        now = lib.jlaw_stored(joint.law, at(joint.state)) + joint.state[5]
+        assert now >= energy * (1 - 1e-12)
+    assert errors[2] < errors[1] < errors[0]
+    assert errors[2] < 2e-3
+
+
+@pytest.mark.parametrize("seed", [1, 2, 4, 7, 9])
+def test_bodies_that_change_their_roles(lib, tmp_path, seed):
+    """Exact for every law: shear along axis 2 changes its sign, along axis 3 not."""
+    law = random_law(seed)
+    one, two = CLaw(lib, law, tmp_path), CLaw(lib, law, tmp_path)
+    sign = np.array([1.0, -1.0, 1.0])[: one.dim]
+    d = random_path(one.dim, seed, 30)
+    for step in d[:15]:
+        one.step(step)
+        two.step(sign * step)
+    lib.jlaw_swap_bodies(one.law, at(one.state))
+    assert np.abs(one.state - two.state).max() <= 1e-11 * np.abs(two.state).max()
+    peak = 1e-300
+    for step in d[15:]:
+        F, _ = one.step(step)
+        F_two, _ = two.step(step)
+        peak = max(peak, np.abs(F_two).max())
+        assert np.abs(F - F_two).max() < 1e-11 * peak

@@ -38,7 +38,7 @@ def export_c(law: JointLaw, directory: str | Path, name: str = "joint") -> list[
     constants), `example.c`, `example.cpp`, `Makefile` and `README.md`. Returns the names. Raises
     ValueError for a name that C cannot have or too many azimuths, before anything is written.
     """
-    if len(law.facets.theta) > AZIMUTHS * law.resolution.u:
+    if 2 * law.resolution.phi > AZIMUTHS:
         raise ValueError(
             f"resolution.phi = {law.resolution.phi} is out of bounds: jointlaw.h takes at most "
             f"{AZIMUTHS} azimuths on the circle"
@@ -119,7 +119,7 @@ def _scalars(law: JointLaw) -> dict[str, int | float]:
         "facets": len(k.c1),
         "cells": k.cells,
         "pieces": len(k.curve.S),
-        "azimuths": len(k.c1) // law.resolution.u,
+        "azimuths": 2 * law.resolution.phi,
         "critical_slip": min(k.critical_slip, sys.float_info.max),
         "eta": k.curve.eta,
         "scale": k.curve.scale,

@@ -5,7 +5,7 @@
  *
  *     char message[JLAW_MESSAGE];
  *     jlaw_law *law = jlaw_read("granite.jlaw", message, sizeof message);
- *     double state[102] = {0};                         jlaw_state_size(law) numbers; zeros: virgin
+ *     double state[162] = {0};                         jlaw_state_size(law) numbers; zeros: virgin
  *     if (jlaw_update(law, state, state, d, F, NULL, message, sizeof message)) ... message tells
  *
  * Table files (.jlaw, or as constants NAME.h) are written by `jointlaw export c`.
@@ -63,9 +63,9 @@ double jlaw_max_stiffness(const jlaw_law *law, double closure);
 
 /* The state in axes 2 and 3 that are turned by this angle (rad, from 2 to 3) about the normal. For a
  * host that cannot carry its axes with a body; for laws without a preferred direction (c = 0).
- * What
- * sliders lose by it counts as dissipated. Exact for whole azimuths of the facets, between them as
- * good as the azimuths are many; in a plane the axis keeps or changes its sense. */
+ * What sliders lose by it counts as dissipated. Exact for angles that are whole azimuths of every
+ * ring of facets, between them as good as the azimuths are many; in a plane the axis keeps or
+ * changes its sense. */
 void jlaw_rotate(const jlaw_law *law, double *s, double angle);
 /* The state after the bodies changed their roles: axis 1 turned round, axis 2 kept, axis 3 turned
  * round with it. Shear along 2 changes its sign, along 3 not. Exact. */
@@ -89,7 +89,7 @@ enum {
   JLAW_AZIMUTHS = 512 /* most */
 };
 struct jlaw_law {
-  int dim, facets, cells, pieces, azimuths; /* pieces of the curve; azimuths of a ring of facets */
+  int dim, facets, cells, pieces, azimuths; /* pieces of the curve; azimuths of a ring, at most */
   double critical_slip;                     /* infinite: the largest float */
   double eta, scale, rise;                  /* of the virgin curve */
   double closure_factor, stiffness_factor;  /* normal stress over Phi, bound of |C| over Phi' */
@@ -694,6 +694,12 @@ void jlaw_swap_bodies(const jlaw_law *law, double *s)
   }
 }
 
+/* Facets of the ring that begins at f: azimuth 0, which the mirror takes to half the circle */
+static int jlaw_ring_(const jlaw_law *law, int f)
+{
+  return 2 * ((int) jlaw_of_facet_(law, f, JLAW_MIRROR) - f);
+}
+
 /* q of one cell over the azimuths of a ring of facets, read at azimuths turned by the angle: the
  * trigonometric interpolation of n (even) places */
 static void jlaw_turn_(double *q, int n, int step, double angle)
@@ -733,7 +739,7 @@ static void jlaw_hold_(const jlaw_law *law, double *s)
 
 void jlaw_rotate(const jlaw_law *law, double *s, double angle)
 {
-  const int dim = law->dim, D = law->cells, n = law->azimuths;
+  const int dim = law->dim, D = law->cells, M = law->facets;
   const double before = jlaw_stored(law, s), c = cos(angle), d = sin(angle);
   if (dim == 2 && c < 0.0) jlaw_swap_bodies(law, s); /* the axis changes its sense */
   if (dim != 3) return;
@@ -741,10 +747,13 @@ void jlaw_rotate(const jlaw_law *law, double *s, double angle)
     const double along = s[i], across = s[i + 1];
     s[i] = c * along + d * across, s[i + 1] = c * across - d * along;
   }
-  for (int half = 0; half < 2; half++)
-    for (int ring = 0; ring < law->facets / n; ring++)
-      for (int i = 0; i < D; i++)
-        jlaw_turn_(s + 6 + ((half * law->facets + ring * n) * D + i), n, D, angle);
+  for (int f = 0, n; f < M; f += n) {
+    n = jlaw_ring_(law, f);
+    for (int i = 0; i < D; i++) {
+      jlaw_turn_(s + 6 + f * D + i, n, D, angle);
+      jlaw_turn_(s + 6 + (M + f) * D + i, n, D, angle);
+    }
+  }
   jlaw_hold_(law, s);
   s[5] += fmax(before - jlaw_stored(law, s), 0.0);
 }
@@ -875,7 +884,7 @@ static const char *jlaw_parse_(const char *at, jlaw_law *law, size_t length)
                            blocks * (size_t) (law->cells + 1) * 3 * JLAW_LANES,
                            4 * (size_t) law->pieces, 4 * (size_t) law->pieces};
   const size_t all = sizes[0] + sizes[1] + sizes[2] + sizes[3];
-  if (law->facets % law->azimuths || all > length / 2) return "its sizes do not fit one another";
+  if (all > length / 2) return "its sizes do not fit one another";
   double *to = law->own = (double *) malloc(all * sizeof *law->own);
   if (!to) return "there is no memory for it";
   for (int i = 0; i < 4; i++) {
@@ -890,6 +899,10 @@ static const char *jlaw_parse_(const char *at, jlaw_law *law, size_t length)
     const size_t column = n / JLAW_LANES % JLAW_COLUMNS;
     if ((column >= JLAW_A && !(law->facet[n] >= 0.0))
         || (column == JLAW_MIRROR && !(law->facet[n] < facets))) return "a facet is out of bounds";
+  }
+  for (int f = 0, n; law->dim == 3 && f < law->facets; f += n) {
+    n = jlaw_ring_(law, f);
+    if (n < 1 || n > law->azimuths || f + n > law->facets) return "a ring is out of bounds";
   }
   return *jlaw_skip_(at) ? "something follows the last table" : NULL;
 }

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..kernels.threads import thread_count
-from ..parameters.resolution import NAMED, Resolution, resolve
+from ..parameters.resolution import Resolution, named, resolve
 from ..support.checks import Array, whole
 from ..support.files import replace_file
 from ..support.progress import track
@@ -61,7 +61,8 @@ class Tradeoff:
     """Prices by ascending sliders; print it to read its frontier.
 
     `uncertainty` (paths,) is that of the reference that errors are measured against; `joints` the
-    size of the batch that was timed, on the kernel and threads named in `how`.
+    size of the batch that was timed, on the kernel and threads named in `how`; `named` are the
+    resolutions of this law that have names.
     """
 
     paths: tuple[str, ...]
@@ -69,6 +70,7 @@ class Tradeoff:
     rows: tuple[Price, ...]
     joints: int
     how: str
+    named: dict[str, Resolution]
 
     def frontier(self) -> tuple[Price, ...]:
         """The prices that no other with as few sliders beats in its largest error."""
@@ -86,7 +88,7 @@ class Tradeoff:
         ]
         for row in self.frontier():
             r = row.resolution
-            name = next((f"  = {n}" for n, value in NAMED.items() if value == r), "")
+            name = next((f"  = {n}" for n, value in self.named.items() if value == r), "")
             lines.append(
                 f"{f'{r.u} {r.phi} {r.depth}':>12s} {row.sliders:8d} {row.bytes:7d} "
                 f"{row.worst:10.2%} {row.rms.max():8.2%} {row.friction:8.2f}° {row.dilation:8.2f}° "
@@ -152,7 +154,7 @@ class Tradeoff:
                 x, y = [getattr(r, cost) for r in best], [100 * r.worst for r in best]
                 what = "traction and tangent" if cost == "ns_tangent" else "traction"
                 axis.loglog(x, y, "o-", color=color, ms=4, lw=1.2, label=what)
-            for name, resolution in NAMED.items():
+            for name, resolution in self.named.items():
                 for row in self.rows:
                     if row.resolution == resolution:
                         at = (getattr(row, costs[0]), 100 * row.worst)
@@ -184,7 +186,10 @@ def tradeoff(
 ) -> Tradeoff:
     """See `JointLaw.tradeoff`."""
     joints = whole("joints", joints, 0)
-    chosen = (*SPREAD, *NAMED.values()) if resolutions is None else map(resolve, resolutions)
+    slip = law.tables.critical_slip / law.closure_range
+    if resolutions is None:
+        resolutions = (*SPREAD, *named(slip).values())
+    chosen = [resolve(r, slip) for r in resolutions]
     found = sorted(dict.fromkeys(chosen), key=lambda r: (r.sliders, r.u, r.phi))
     if not found:
         raise ValueError("resolutions is empty; give some, or None for the usual spread")
@@ -196,7 +201,7 @@ def tradeoff(
         for r in track(found, "resolutions", len(found))
     )
     how = f"{law.joints(0).kernel}, at most {thread_count()} threads"
-    return Tradeoff(suite.names, suite.uncertainty, rows, joints, how)
+    return Tradeoff(suite.names, suite.uncertainty, rows, joints, how, named(slip))
 
 
 def _price(law: Law, suite: Suite, exact: Array, joints: int, seconds: float) -> Price:

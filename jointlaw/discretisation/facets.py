@@ -59,7 +59,7 @@ def facets(
     b, c = orientation.b, orientation.c
     if plane is not None:
         c *= math.cos(2 * plane)
-    numbers = azimuths(cos_a, phi)
+    numbers = azimuths(u, phi)
     if closure_only:
         c, rings = 0.0, [(np.zeros(1), np.ones(1))] * u
     else:

@@ -26,11 +26,11 @@ def inclinations(b: float, count: int) -> tuple[Array, Array]:
 
     The Gauss rule of the density 1 + b/2 (3u^2 - 1) over v, u = v^p, by the three-term recurrence
     of its orthogonal polynomials (Golub & Welsch 1969): shares sum to 1 even for one node, which
-    then lies at the mean of u. Two and three nodes have p = 3, four to seven p = 2: so one of them
-    is near the steepest facets, which alone carry a joint that has slipped far. More come near
-    them with p = 1, and converge faster.
+    then lies at the mean of u. Two nodes have p = 2, three to seven p = 3: so one of them is near
+    the steepest facets, which alone carry a joint that has slipped far. More come near them with
+    p = 1, and converge faster.
     """
-    power = 3 if 2 <= count <= 3 else 2 if 4 <= count <= 7 else 1
+    power = 2 if count == 2 else 3 if 3 <= count <= 7 else 1
     x, w = np.polynomial.legendre.leggauss((power + 1) * (count + 1))
     x, w = 0.5 * (x + 1.0), 0.5 * w
     u = x**power
@@ -48,15 +48,15 @@ def inclinations(b: float, count: int) -> tuple[Array, Array]:
     return frozen((places, shares))
 
 
-def azimuths(u: Array, phi: int) -> list[int]:
-    """Azimuths on the half circle of the rings at u = cos(a theta): phi on the longest.
+def azimuths(rings: int, phi: int) -> list[int]:
+    """Azimuths on the half circle of each ring: phi on the steepest, half as many on the flattest.
 
-    The others have as many fewer as they are shorter, sin(a theta) times, but no fewer than three:
-    that many integrate cos 4 phi exactly, and with it c. All are odd or all even, as phi is, so
-    that a ring turned by a quarter is itself wherever phi is even.
+    They are no fewer than three: that many integrate cos 4 phi exactly, and with it c. Where phi
+    is a multiple of four all are even, so that rings turned by a quarter are themselves.
     """
-    fewer = np.floor((phi - phi * np.sqrt(1.0 - u**2)) / 2.0 + 0.5)
-    return [max(phi - 2 * int(k), 4 - phi % 2) for k in fewer]
+    step = 2 if phi % 4 == 0 else 1
+    numbers = np.ceil(np.linspace(phi, phi / 2, rings) / step - 0.5).astype(int) * step
+    return [int(n) for n in np.maximum(numbers, 2 + step)]
 
 
 def depth_nodes(

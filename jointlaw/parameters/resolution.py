@@ -1,5 +1,6 @@
 """How finely the law is discretised: orientations and depth cells."""
 
+import math
 from dataclasses import dataclass
 
 from ..support.checks import whole
@@ -10,7 +11,7 @@ class Resolution:
     """Number of nodes that the law sums over.
 
     u: rings of one inclination each (Gauss rule of the density, crowded to the steepest), >= 1.
-    phi: intervals of azimuth on the half circle of the longest ring, >= 3; shorter rings have
+    phi: intervals of azimuth on the half circle of the steepest ring, >= 3; flatter rings have
         fewer, and motion in 3-D takes both halves.
     depth: cells of touch depth of a facet of the ring of most weight, >= 1; lighter ones have
         fewer.
@@ -31,20 +32,29 @@ class Resolution:
         return self.u * (self.phi + 1) * self.depth
 
 
+# Slip far beyond the closure asks for facets, slip no longer than the closure for depth cells.
+# Chosen with benchmarks/slip.py and benchmarks/nodes.py.
+LONG = 2.5  # closure ranges: a critical slip from here on is long
 NAMED = {
-    "fast": Resolution(2, 3, 2),
-    "balanced": Resolution(3, 5, 3),
-    "fine": Resolution(5, 6, 8),
+    "fast": Resolution(3, 3, 2),
+    "balanced": Resolution(3, 6, 3),
+    "fine": Resolution(5, 7, 8),
     "reference": Resolution(16, 10, 24),
 }
+NAMED_SHORT = NAMED | {"fast": Resolution(2, 3, 3), "balanced": Resolution(2, 4, 4)}
 
 
-def resolve(value: str | Resolution) -> Resolution:
-    """A resolution from its name or itself."""
+def named(slip: float = math.inf) -> dict[str, Resolution]:
+    """The resolutions by name, for a law of this critical slip over closure range."""
+    return NAMED if slip >= LONG else NAMED_SHORT
+
+
+def resolve(value: str | Resolution, slip: float = math.inf) -> Resolution:
+    """A resolution from its name or itself; `slip` as in `named`."""
     if isinstance(value, Resolution):
         return value
     if isinstance(value, str) and value in NAMED:
-        return NAMED[value]
+        return named(slip)[value]
     raise ValueError(
         f"resolution = {value!r} is unknown; choose one of {', '.join(NAMED)} "
         "or give Resolution(u, phi, depth)"

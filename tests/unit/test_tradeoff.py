@@ -25,7 +25,7 @@ def found():
 
 
 def test_each_resolution_has_its_price(found):
-    assert [row.sliders for row in found.rows] == [4, 16, 30]
+    assert [row.sliders for row in found.rows] == [4, 20, 34]
     assert len(found.paths) == len(found.uncertainty) == 9
     for row in found.rows:
         assert row.error.shape == row.rms.shape == (9,)
@@ -54,7 +54,7 @@ def test_csv_holds_every_number(found, tmp_path):
     found.to_csv(tmp_path / "t.csv")
     with open(tmp_path / "t.csv", newline="") as stream:
         rows = list(csv.DictReader(stream))
-    assert [int(row["sliders"]) for row in rows] == [4, 16, 30]
+    assert [int(row["sliders"]) for row in rows] == [4, 20, 34]
     for row, price in zip(rows, found.rows, strict=True):
         each = [float(row[f"error {path}"]) for path in found.paths]
         assert each == price.error.tolist()
@@ -76,12 +76,13 @@ def test_the_usual_spread_holds_the_named_resolutions_too():
 
 def test_command_writes_table_law_and_summary(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("jointlaw.accuracy.tradeoff.SPREAD", (jl.Resolution(1, 3, 1),))
-    monkeypatch.setattr("jointlaw.accuracy.tradeoff.NAMED", {"fast": jl.Resolution(1, 3, 2)})
+    few = {"fast": jl.Resolution(1, 3, 2)}
+    monkeypatch.setattr("jointlaw.accuracy.tradeoff.named", lambda slip: few)
     out = tmp_path / "out"
     arguments = "tradeoff linear-a6 --plane 0 --joints 0 --tolerance 0.05 --out"
     assert main([*arguments.split(), str(out)]) == 0
     summary = json.loads((out / "summary.json").read_text())
-    assert summary["at tolerance"]["0.05"] == {"u": 7, "phi": 7, "depth": 1, "sliders": 48}
+    assert summary["at tolerance"]["0.05"] == {"u": 3, "phi": 5, "depth": 1, "sliders": 15}
     assert summary["frontier"][0]["ns"] is None
     assert (out / "tradeoff.csv").read_text().count("\n") == 3
     assert jl.JointLaw.from_toml(out / "law.toml").plane == 0.0

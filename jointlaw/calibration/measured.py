@@ -135,8 +135,7 @@ class ClosureCurve:
         model = log_stress(values, seating + self.closure, settings)
         if not self.cycle:
             return model - np.log(self.stress)
-        residual: Array = (np.exp(model) - self.stress) / np.max(self.stress)
-        return residual
+        return (np.exp(model) - self.stress) / np.max(self.stress)
 
 
 @dataclass(frozen=True, eq=False)

@@ -108,8 +108,7 @@ def _steps(y: Array, p: float, heights: HeightDistribution, beyond: Array) -> Ar
         # low^(p+1) - high^(p+1), without cancellation where both are close to 1
         drop = -np.expm1((p + 1) * np.log1p(-np.minimum(width / low, 1.0)))
     pieces = np.where(low > 0, low ** (p + 1) * drop, 0.0) / (p + 1)
-    result: Array = y * (pieces @ density)
-    return result
+    return y * (pieces @ density)
 
 
 def _panels(r0: float, beyond: Array) -> Array:

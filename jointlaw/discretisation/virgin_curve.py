@@ -53,7 +53,10 @@ class VirginCurve(NamedTuple):
         x, i, _, _ = self._cell(y)
         c = self.S[i]
         S = c[..., 0] + x * (c[..., 1] + x * (c[..., 2] + x * c[..., 3]))
-        DS = self._weight(y) * (c[..., 1] + x * (2 * c[..., 2] + x * (3 * c[..., 3])))
+        v = np.sqrt(np.fmin(np.fmax(y, 0.0), _FARTHEST))
+        # t (1 - t)/2 times the number of cells: D in units of the place within a cell
+        weight = 0.5 * len(self.S) * v * self.scale / (v + self.scale) ** 2
+        DS = weight * (c[..., 1] + x * (2 * c[..., 2] + x * (3 * c[..., 3])))
         if self.rise:
             lift, slope, _ = self._lift(y)
             S, DS = lift * S, lift * (DS + slope * S)
@@ -84,8 +87,7 @@ class VirginCurve(NamedTuple):
         T = c[..., 0] + x * (c[..., 1] + x * (c[..., 2] + x * c[..., 3]))
         if self.rise:
             T = self._lift(y)[0] * T
-        energy: Array = np.maximum(y, 0.0) ** (2 + self.eta) * T
-        return energy
+        return np.maximum(y, 0.0) ** (2 + self.eta) * T
 
     def _cell(self, y: Array) -> tuple[Array, Array, Array, Array]:
         """Place within its cell, cell number, t and 1 - t of each y."""
@@ -95,11 +97,6 @@ class VirginCurve(NamedTuple):
         cells = len(self.S)
         i = np.minimum((t * cells).astype(np.intp), cells - 1)
         return t * cells - i, i, t, s
-
-    def _weight(self, y: Array) -> Array:
-        """t (1 - t)/2 times the number of cells: D in units of the place within a cell."""
-        v = np.sqrt(np.fmin(np.fmax(y, 0.0), _FARTHEST))
-        return 0.5 * len(self.S) * v * self.scale / (v + self.scale) ** 2
 
     def _lift(self, y: Array) -> tuple[Array, Array, Array]:
         """w^p, and D w^p / w^p with its own D."""
@@ -129,6 +126,11 @@ class VirginClosure(NamedTuple):
             stress = stress - self.curve.force(closure[..., None] - depth)[0] @ share
         return stress
 
+    @property
+    def farthest(self) -> float:
+        """Closure (m) beyond which stresses, or their differences, are lost in rounding."""
+        return 1e304 if self.yielding is None else _RESOLVED * float(np.max(self.yielding[1]))
+
     def closure(self, stress: float, start: float) -> float:
         """Closure (m) at a normal stress (Pa), looked for from the closure `start` (m) on."""
         from scipy.optimize import brentq  # a third of the package's import time
@@ -141,9 +143,7 @@ class VirginClosure(NamedTuple):
             return math.log(min(max(force, _SMALLEST), _LARGEST)) - math.log(stress)
 
         low = high = math.log(start)
-        farthest = 700.0
-        if self.yielding is not None:  # beyond, the difference of forces is lost in rounding
-            farthest = math.log(_RESOLVED) + math.log(float(np.max(self.yielding[1])))
+        farthest = math.log(self.farthest)
         with np.errstate(over="ignore"):
             while misfit(high) < 0.0:
                 high += 1.0

@@ -60,14 +60,12 @@ class Joint:
     @property
     def delta(self) -> Array:
         """Displacement since the virgin state (dim,): closure and shear, in m."""
-        delta: Array = self._batch.delta[0]
-        return delta
+        return self._batch.delta[0]
 
     @property
     def F(self) -> Array:
         """Traction (dim,) in Pa."""
-        F: Array = self._batch.F[0]
-        return F
+        return self._batch.F[0]
 
     def measures(self) -> Measures:
         """Shares, stored energy and reach in one pass, as numbers."""

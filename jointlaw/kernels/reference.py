@@ -189,8 +189,7 @@ def at_limit(size: Array, strength: Array, G: Array, force: Array) -> Flags:
 
     force: Phi (M, B) of the virgin curve, whose rounding G has.
     """
-    flags: Flags = size >= strength * (G * (1 - LIMIT) - ROUNDED * force[:, None])
-    return flags
+    return size >= strength * (G * (1 - LIMIT) - ROUNDED * force[:, None])
 
 
 def friction_loss(k: Tables, before: Cells, after: Cells, q: Array, sliders: Sliders) -> Array:
@@ -205,8 +204,7 @@ def friction_loss(k: Tables, before: Cells, after: Cells, q: Array, sliders: Sli
     softening = (kappa0 - after.kappa) * r0 * (q2 * r0)
     lost = np.where(sliders.grows, np.where(chord > TINY, hardening, 0.0), softening)
     lost = lost + 2 * share * (1 - share) * (trial2 * r1)
-    total: Array = np.sum(compliance(k) * lost, axis=(0, 1))
-    return total
+    return np.sum(compliance(k) * lost, axis=(0, 1))
 
 
 def limited_offset(k: Tables, offset: Array, p: Array) -> tuple[Array, Array, Array]:
@@ -293,8 +291,7 @@ def traction(k: Tables, state: Array) -> Array:
     if k.yields:
         force = np.where(y > now.depth, force - k.curve.force(now.depth)[0], 0.0)
     shear = np.einsum("edm,emb->db", np.stack([k.s, k.t]), now.q.sum(axis=2))
-    F: Array = k.n @ (k.area[:, None] * force) + shear / k.lam
-    return F
+    return k.n @ (k.area[:, None] * force) + shear / k.lam
 
 
 class Measures(NamedTuple):

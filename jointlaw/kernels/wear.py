@@ -10,8 +10,7 @@ from .cells import Cells, compliance, reciprocal
 def friction(k: Tables, slip: Array) -> Array:
     """mu (B,) after the slip L (B,) of the asperities."""
     assert k.mu_residual is not None
-    mu: Array = k.mu_residual + (k.mu - k.mu_residual) * np.exp(-slip / k.wear_slip)
-    return mu
+    return k.mu_residual + (k.mu - k.mu_residual) * np.exp(-slip / k.wear_slip)
 
 
 def within_limit(k: Tables, before: Cells, q: Array, strength: Array) -> tuple[Array, Array]:
@@ -25,5 +24,4 @@ def within_limit(k: Tables, before: Cells, q: Array, strength: Array) -> tuple[A
 def slipped(k: Tables, before: Cells, after: Cells, mu: Array, lost: Array) -> Array:
     """Slip dL (B,) of the asperities: the energy lost to friction over the mean friction limit."""
     limit = 0.5 * mu * np.sum(k.area[:, None] * (before.force + after.force), axis=0)
-    slip: Array = np.divide(lost, limit, out=np.zeros_like(limit), where=limit > 0)
-    return slip
+    return np.divide(lost, limit, out=np.zeros_like(limit), where=limit > 0)

@@ -15,8 +15,7 @@ def press(k: Tables, depth: Array, y: Array) -> Array:
     """Flattened depth (M, B) of every facet once the closures y (M, B) are reached."""
     assert k.yield_depth is not None
     own = np.maximum(depth, y - k.yield_depth[:, None])
-    both: Array = np.maximum(own, own[k.opposite])
-    return both
+    return np.maximum(own, own[k.opposite])
 
 
 def flattened(virgin: Cells, flat: Cells | None) -> Cells:
@@ -41,8 +40,7 @@ def plastic_work(k: Tables, y0: Array, y1: Array, flat0: Cells, flat1: Cells) ->
     largest = k.yield_depth[:, None]
     mean = 0.5 * (np.clip(y0 - flat0.y, 0.0, largest) + np.clip(y1 - flat1.y, 0.0, largest))
     deep = np.where(y1 - largest >= flat1.y, largest, mean)
-    lost: Array = np.sum((k.area * k.c1)[:, None] * deep * (flat1.force - flat0.force), axis=0)
-    return lost
+    return np.sum((k.area * k.c1)[:, None] * deep * (flat1.force - flat0.force), axis=0)
 
 
 def softening(k: Tables, after: Cells, flat0: Cells, flat1: Cells, push: Array, g: Array) -> Array:
@@ -57,5 +55,4 @@ def softening(k: Tables, after: Cells, flat0: Cells, flat1: Cells, push: Array, 
     along = k.n[:, :, None] * (k.area[:, None] * flat1.slope)
     along = along + np.einsum("edm,emb->dmb", np.stack([k.s, k.t]), shear) / k.lam
     pressing = np.where(own, g, g[:, k.opposite])
-    C: Array = np.einsum("imb,jmb->ijb", np.where(moves, along, 0.0), pressing)
-    return C
+    return np.einsum("imb,jmb->ijb", np.where(moves, along, 0.0), pressing)

@@ -170,8 +170,7 @@ class Heights:
             return np.array(self.distribution[1])
         low, high = self._frozen.ppf(_TAILS), self._frozen.isf(_TAILS[::-1])
         points = np.unique(np.concatenate([low, high, self._frozen.support()]))
-        finite: Array = points[np.isfinite(points)]
-        return finite
+        return points[np.isfinite(points)]
 
 
 def _histogram(pair: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -73,9 +73,9 @@ def write_law(law: Mapping[str, Any], path: Path | None) -> str:
 
 def read_law(build: Callable[..., T], source: str | Path) -> T:
     """A law from a TOML file, or from TOML text (a line break, or "=" and no such file)."""
-    if isinstance(source, str) and _is_text(source):
-        return build_law(build, _parse(source, "TOML text"), "TOML text")
     path = Path(source)
+    if isinstance(source, str) and ("\n" in source or ("=" in source and not path.is_file())):
+        return build_law(build, _parse(source, "TOML text"), "TOML text")
     if not path.is_file():
         raise ValueError(f"law file {str(path)!r} does not exist; give a TOML file of parameters")
     try:
@@ -83,10 +83,6 @@ def read_law(build: Callable[..., T], source: str | Path) -> T:
     except UnicodeDecodeError as error:
         raise ValueError(f"{str(path)!r} is not a text file in UTF-8: {error}") from None
     return build_law(build, _parse(text, str(path)), str(path), path.parent)
-
-
-def _is_text(source: str) -> bool:
-    return "\n" in source or ("=" in source and not Path(source).is_file())
 
 
 def build_law(

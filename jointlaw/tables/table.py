@@ -61,10 +61,9 @@ class Report:
     note: str = ""
 
     def __str__(self) -> str:
-        head = (
+        lines = [
             f"{'path':34s} {'largest':>8s} {'rms':>8s} {'normal':>8s} {'along':>8s} {'across':>8s}"
-        )
-        lines = [head]
+        ]
         for r in self.rows:
             values = (r.largest, r.rms, r.normal, r.along, r.across)
             lines.append(f"{r.name:34s} " + " ".join(f"{100 * v:6.1f} %" for v in values))

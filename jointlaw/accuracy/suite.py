@@ -14,9 +14,9 @@ With R the law's closure range and S the normal stress there, the paths are
                        count where friction is mobilised (`Slip.counts`)
 
 Excursions are random: four to ten legs between corners with closures from -0.3 R to R (one of them
-at a stress of S/2 to S) and shears up to R, every second one rounded; in every eighth the shears go
-as far as `far`. They are drawn once and for all, so that they too are the same for every resolution.
-A law without critical slip takes 30 R for three of them.
+at a stress of S/2 to S) and shears up to R, every second one rounded; in every eighth the shears
+go as far as `far`. They are drawn once and for all, so that they too are the same for every
+resolution. A law without critical slip takes 30 R for three of them.
 
 Along 0, 45 and 90 degrees the rings of azimuths look alike; the other directions lie between, where
 a ring of few azimuths errs most. A law with a plane takes the paths along azimuth 0 and the others

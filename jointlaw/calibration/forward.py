@@ -13,7 +13,7 @@ from ..law import JointLaw
 from ..parameters.asperity import Asperity
 from ..parameters.heights import GammaHeights
 from ..parameters.orientation import Orientation
-from ..parameters.resolution import Resolution, resolve
+from ..parameters.resolution import SLIP, resolve
 from ..support.checks import Array
 from .priors import Values
 
@@ -26,10 +26,6 @@ DEFAULTS = {
     "yield_interference": math.inf, "mu_residual": _ROCK.mu, "wear_slip": math.inf,
     "critical_slip": math.inf,
 }  # fmt: skip
-
-
-# Shear stress within 0.2 % at some closure ranges of slip, where 1 % is little noise
-SHEAR = Resolution(8, 8, 6)
 
 
 @dataclass(frozen=True)
@@ -84,10 +80,10 @@ def build(values: Values, settings: Settings, plane: float | None = None) -> Joi
 def build_for_shear(values: Values, settings: Settings, azimuth: float) -> JointLaw:
     """The law that a shear curve along this azimuth (rad) is compared with.
 
-    At least at SHEAR: a parameter would take up the error of few nodes, degrees of friction, and
+    At least at SLIP: a parameter would take up the error of few nodes, degrees of friction, and
     its interval would not show it.
     """
-    resolution = max(resolve(settings.resolution), SHEAR, key=lambda r: r.sliders)
+    resolution = max(resolve(settings.resolution), SLIP, key=lambda r: r.sliders)
     return build(values, replace(settings, resolution=resolution), plane=azimuth)
 
 

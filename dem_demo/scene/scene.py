@@ -24,7 +24,7 @@ class Run:
     record: float = 0.05  # time between records
     dashpot_normal: float = 0.05  # shares of critical
     dashpot_shear: float = 0.05
-    law_steps: int = 1  # steps of the law per time step: 4 keeps the books within 0.5 % in impacts
+    law_steps: int = 1  # steps of the law per time step: 4 balances energy to 0.5 % in impacts
     largest_stress: float = 0.0  # Pa, expected in impacts: sets the step before anything touches
     skin: float | None = None  # reach of the search for contacts; default 0.02 of the least width
     point_spacing: float = np.inf  # largest distance of law points along a joint
@@ -58,6 +58,16 @@ class Scene:
     thickness: float = 1.0
     monitors: Monitors = Monitors()
     text: str = ""
+
+    @property
+    def doubts(self) -> list[str]:
+        """What of the scene is likely a slip, in words; it can be run all the same."""
+        found = []
+        if self.gravity[1] > 0:
+            found.append(f"gravity = {list(self.gravity)} points upwards: [0, -9.81] is down")
+        if any(self.gravity) and not any(block.fixed or block.held for block in self.blocks):
+            found.append("no block is fixed or held: all fall; give one `fixed = true`")
+        return found
 
     def law_of(self, key: Key) -> str:
         """Name of the law of an interface (block, edge, block, edge).

@@ -58,6 +58,11 @@ class Table:
             raise self.error(key, "must be a whole number", value)
         return int(value)
 
+    def density(self, default: float) -> float:
+        """The density of rock."""
+        say = "kg/m3; 2.6 g/cm3 is 2600 kg/m3"
+        return self.take("density", float, default, least=50.0, most=30000.0, say=say)
+
     def vector(self, key: str, default=...):
         """Two finite numbers."""
         value = self.take(key, list, default)

@@ -17,10 +17,7 @@ import jointlaw as jl
 # joint is upside down: motion of the block away from one is closure of the other.
 
 law = jl.presets.load("biegel-rough")
-lower, upper = law.joint(), law.joint()
-seat = law.closure(10e6)
-lower.update([seat, 0.0, 0.0])
-upper.update([seat, 0.0, 0.0])
+lower, upper = law.joint(normal_stress=10e6), law.joint(normal_stress=10e6)
 turn = np.diag([-1.0, 1.0, 1.0])
 
 

@@ -8,6 +8,7 @@ from ..hosts.c.export import export_c, identifier
 from ..hosts.lammps.export import export_lammps
 from ..hosts.yade.export import export_yade
 from ..law import JointLaw
+from ..support.files import clear_run
 from .command import add_command, add_law, add_out, quantity, read_law
 
 
@@ -30,6 +31,7 @@ def add(commands: Any) -> None:
 
 def _export(options: argparse.Namespace) -> None:
     law = read_law(options)
+    clear_run(options.out)
     if options.host == "yade":
         _export_yade(law, options)
     else:
@@ -44,7 +46,7 @@ def _export_live(law: JointLaw, options: argparse.Namespace) -> None:
     for name in ("closure", "shear_limit", "tolerance"):
         if getattr(options, name) is not None:
             raise ValueError(
-                f"--{name.replace('_', '-')} shapes a table for YADE; {host} run the law itself: "
+                f"--{name.replace('_', '-')} shapes a table for YADE; {host} runs the law itself: "
                 "leave it out"
             )
     files = export(law, options.out, identifier(Path(options.law).stem))

@@ -13,25 +13,28 @@ from ..calibration.baselines import Comparison, compare
 from ..calibration.fit import Fit, fit_closure, fit_many
 from ..calibration.measured import first_loading, subtract_compliance
 from ..calibration.unloading import explain
-from ..support import units
+from ..parameters.rock import require_rock
 from ..support.checks import Array
+from ..support.files import require_free
 from .command import Written, add_command, add_out, quantity, write_results
+from .fit_shear import add_options, fit_with_shear
 
 
 def add(commands: Any) -> None:
     """Add `fit` to the subparsers of the command line."""
-    what = "fit the law to measured closure curves; write preset, report and plot"
+    what = "fit the law to measured closure and shear curves; write preset, report and plot"
     example = "jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out out"
     parser = add_command(commands, "fit", what, example, _run)
     parser.description = (
         f"{what}. Only the first loading is fitted; an unloading branch is compared with what "
-        "friction explains."
+        "friction explains. Several closure files are fitted one by one; shear files together."
     )
     parser.add_argument(
-        "data", nargs="+", metavar="CSV", help="files of stress and closure, or a shipped data set"
+        "data", nargs="*", metavar="CSV", help="files of stress and closure, or a shipped data set"
     )
     parser.add_argument("--stress-column", help="name and unit of that column, such as sigmaZ:MPa")
     parser.add_argument("--closure-column", help="name and unit of that column, such as Disp:mm")
+    add_options(parser)
     parser.add_argument(
         "--up-to", help="fit up to this stress, predict the rest: 5.3MPa; or half, of the largest"
     )
@@ -61,12 +64,24 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
+    if (options.shear and len(options.data) > 1) or not (options.shear or options.data):
+        raise ValueError(
+            f"{len(options.data)} closure files: give one or more, or shear tests after --shear "
+            "with one closure file or none"
+        )
     folders = _folders(options)
     tests = [_subtracted(options, *_read(options, item)) for item in options.data]
     keywords = _keywords(options)
     if options.cycle and options.up_to:
         raise ValueError("--cycle fits all points: leave --up-to out")
     loading = [test if options.cycle else first_loading(*test)[:2] for test in tests]
+    if options.shear:
+        closed = datasets.ClosureData(*loading[0]) if loading else None
+        fit, about = fit_with_shear(options, closed, keywords)
+        names = ", ".join(Path(item).name for item in [*options.data, *options.shear])
+        about = f"{about}\n\n{_compliance(options)}" if tests else about
+        _write(options.out, names, fit, tests[0] if tests else None, None, about)
+        return
     limits = [_limit(options.up_to, stress) for stress, _ in loading]
     seen = [(s[s <= limit], u[s <= limit]) for (s, u), limit in zip(loading, limits, strict=True)]
     if len(seen) > 1:
@@ -77,7 +92,7 @@ def _run(options: argparse.Namespace) -> None:
         (stress, closure), limit = loading[k], limits[k]
         held = compare(stress, closure, limit, **keywords) if (stress > limit).any() else None
         name = Path(options.data[k]).name
-        _write(folders[k], name, fit, tests[k], held, options.compliance)
+        _write(folders[k], name, fit, tests[k], held, _compliance(options))
 
 
 def _folders(options: argparse.Namespace) -> list[Path]:
@@ -91,23 +106,32 @@ def _folders(options: argparse.Namespace) -> list[Path]:
                 f"{other} and {item} would both be written to {options.out / Path(item).stem}; "
                 "rename one, or fit them one at a time"
             )
-    return [options.out / stem for stem in items]
+    folders = [options.out / stem for stem in items]
+    for folder in folders:
+        if not options.force:
+            require_free(folder)
+    return folders
+
+
+def _compliance(options: argparse.Namespace) -> str:
+    """Whether the closure is that of the joint alone, in words."""
+    if options.compliance is None:
+        return (
+            "No compliance of rock and machine was given: if the closure was measured across rock "
+            "too, the law holds its strain as well."
+        )
+    return f"Subtracted from the closure: that of rock and machine, {options.compliance}."
 
 
 def _write(
     folder: Path,
     name: str,
     fit: Fit,
-    test: datasets.ClosureData,
+    test: datasets.ClosureData | None,
     held: Comparison | None,
-    compliance: str | None,
+    about: str,
 ) -> None:
-    about = f"Subtracted from the closure: that of rock and machine, {compliance}."
-    if compliance is None:
-        about = (
-            "No compliance of rock and machine was given: if the closure was measured across rock "
-            "too, the law holds its strain as well."
-        )
+    require_rock(fit.parameters, f"{name}: the fitted ")
     text = f"{fit.report()}\n{about}\n"
     summary: dict[str, Any] = {
         "data": name,
@@ -119,7 +143,7 @@ def _write(
     if held is not None:
         text += _held_out(held)
         summary["error_at_largest_stress"] = {n: float(e[-1]) for n, e in held.errors.items()}
-    if first_loading(*test)[2].size >= 3:
+    if test is not None and first_loading(*test)[2].size >= 3:
         try:
             loop = explain(fit.law, *test)
             text += f"\n## Unloading\n\n{loop.text()}\n"
@@ -174,7 +198,7 @@ def _subtracted(options: argparse.Namespace, stress: Array, closure: Array) -> d
 def _limit(text: str | None, stress: Any) -> float:
     if text is None:
         return float("inf")
-    return 0.5 * float(np.max(stress)) if text == "half" else units.parse(text, "Pa")
+    return 0.5 * float(np.max(stress)) if text == "half" else quantity("--up-to", text, "Pa")
 
 
 def _keywords(options: argparse.Namespace) -> dict[str, Any]:

@@ -134,23 +134,32 @@ class JointBatch:
 
     # ------------------------------------------------------------------ state
 
-    def snapshot(self) -> JointState:
-        """A copy of the state of all joints."""
-        return JointState(self.law.fingerprint, self._rows())
+    def snapshot(self, where: Index | None = None) -> JointState:
+        """A copy of the state of all joints, or of those that `where` names, in that order."""
+        index = None if where is None else self._index(where)
+        return JointState(self.law.fingerprint, self._rows(index))
 
-    def restore(self, state: JointState) -> None:
-        """Return to a snapshot. Raises ValueError if another law or batch size wrote it."""
+    def restore(self, state: JointState, where: Index | None = None) -> None:
+        """Return to a snapshot; with `where` these joints take its states, the others stay.
+
+        So joints move between batches: `other.restore(batch.snapshot(where), places)`. Raises
+        ValueError if another law wrote the state or it holds another number of joints.
+        """
+        index = np.arange(self._n) if where is None else self._index(where)
         if not isinstance(state, JointState):
             raise ValueError(f"state = {state!r} is not a snapshot; give one of snapshot()")
         state.require(self.law.fingerprint)
-        if state.values.shape != (self.law.tables.rows, self._n):
-            raise ValueError(f"state holds {len(state)} joints, this batch {self._n}: resize first")
+        if state.values.shape != (self.law.tables.rows, len(index)):
+            other = f"this batch {self._n}: resize first"
+            if where is not None:
+                other = f"where names {len(index)}"
+            raise ValueError(f"state holds {len(state)} joints, {other}")
         if not np.isfinite(state.values).all():
             raise ValueError("state holds values that are not finite; it is damaged")
         rows = self._state[:, : self.law.tables.rows]
-        write_rows(rows, state.values, np.arange(self._n))
+        write_rows(rows, state.values, index)
         self._engine.refresh(self._state, self._n)
-        self._reach = self._bound(state.values).max(initial=0.0)
+        self._reach = self._bound(self._rows()).max(initial=0.0)
 
     def reset(self, index: Index | None = None) -> None:
         """Return the joints at `index` (all if None) to the virgin state: new contacts."""

@@ -68,8 +68,7 @@ class JointPool:
 
     def snapshot(self) -> JointState:
         """A copy of the state of all contacts, in the order of `keys`: keep those beside it."""
-        state = self.batch.snapshot()
-        return JointState(state.fingerprint, state.values[:, self.places])
+        return self.batch.snapshot(self.places)
 
     def restore(self, keys: Iterable[Hashable], state: JointState) -> None:
         """Hold just these contacts, with the states of a snapshot, in a new `batch`.

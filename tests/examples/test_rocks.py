@@ -25,7 +25,7 @@ friction = 0.4
     ("name", "until", "failed"), [("slope", 0.7, 20), ("slope-azimuth", 0.9, 15), ("arch", 0.4, 3)]
 )
 def test_short_scenes_end_as_intended(name, until, failed):
-    """One rock stands beside one that fails, in one run that keeps its books.
+    """One rock stands beside one that fails, in one run whose energy balances.
 
     The rock that stands is seated to rounding: nanometres and 1e-9 m/s are far above what it does
     and far below the 1e-6 m/s that "stands" allows. Sliding with corners: 0.5 % of the energy.

@@ -41,11 +41,15 @@ def random_law(seed):
     if seed % 7 == 6:  # a density infinite at the point of contact
         heights = jl.GammaHeights(-0.6, 3e-6, 0.0, "individual")
     kind = {"closure_only": True} if seed % 8 == 5 else {"plane": [None, 0.0, 0.7][seed // 2 % 3]}
+    mu = [0.0, 0.3, 0.7][rng.integers(3)]
+    damage = {"yield_interference": 10.0 ** rng.uniform(-8.0, -6.0)} if seed // 3 % 2 else {}
+    if seed // 2 % 3 == 1:
+        damage |= {"mu_residual": mu * rng.uniform(), "wear_slip": 10.0 ** rng.uniform(-7.0, -5.0)}
     return jl.JointLaw(
         orientation=jl.Orientation(
             rng.uniform(1.0, 6.0), rng.uniform(-0.4, 0.8), rng.uniform(-0.15, 0.15)
         ),
-        asperity=jl.Asperity(2e8, rng.uniform(0.5, 2.0), eta, [0.0, 0.3, 0.7][rng.integers(3)]),
+        asperity=jl.Asperity(2e8, rng.uniform(0.5, 2.0), eta, mu, **damage),
         heights=heights,
         asperity_density=1e10,
         closure_range=1e-6,

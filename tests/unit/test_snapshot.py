@@ -158,3 +158,39 @@ def test_half_a_file_is_refused(law, tmp_path):
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(ValueError, match="not a saved joint state"):
         jl.load_state(path)
+
+
+def test_joints_start_closed_to_a_normal_stress(any_law):
+    stress = np.array([0.0, 2e6, 5e6])
+    batch = any_law.joints(3, normal_stress=stress)
+    np.testing.assert_allclose(batch.F[:, 0], stress, rtol=1e-12)
+    assert not batch.delta[:, 1:].any()
+    assert any_law.joint(normal_stress=2e6).F[0] == pytest.approx(2e6, rel=1e-12)
+    assert any_law.joints(2, normal_stress=2e6).F[1, 0] == pytest.approx(2e6, rel=1e-12)
+    with pytest.raises(ValueError, match=r"normal_stress has shape \(2,\): give one or \(3,\)"):
+        any_law.joints(3, normal_stress=[1e6, 2e6])
+    with pytest.raises(ValueError, match="normal_stress = -1"):
+        any_law.joint(normal_stress=-1.0)
+
+
+def test_joints_move_between_batches_and_go_on_as_before(any_law):
+    rng = np.random.default_rng(3)
+    here, there = any_law.joints(5), any_law.joints(4)
+    for batch in (here, there):
+        walk_batch(batch, rng)
+    stays = there.snapshot([0, 2])
+    there.restore(here.snapshot(where=[4, 1]), where=[3, 1])
+    np.testing.assert_array_equal(there.snapshot([0, 2]).values, stays.values)
+    d = rng.normal(0.0, 1e-7, (5, any_law.tables.dim))
+    F, _ = here.update(d)
+    moved, _ = there.update(d[[4, 1]], where=[3, 1])
+    np.testing.assert_array_equal(moved, F[[4, 1]])
+    with pytest.raises(ValueError, match="state holds 2 joints, where names 1"):
+        there.restore(here.snapshot([0, 1]), where=[0])
+
+
+def walk_batch(batch, rng):
+    for _ in range(20):
+        d = rng.normal(0.0, 1e-7, (len(batch), batch.law.tables.dim))
+        d[:, 0] += 2e-8
+        batch.update(d)

@@ -163,3 +163,5 @@ def test_stiffness_bound_and_time_step(any_law):
 
 def test_time_step_of_an_open_joint_is_unbounded(law):
     assert law.critical_time_step(1.0, 1.0, 0.0) == math.inf
+    steps = law.critical_time_step(1.0, [1.0, 2.0], [0.0, 1e-7])
+    assert steps.tolist() == [math.inf, law.critical_time_step(1.0, 2.0, 1e-7)]

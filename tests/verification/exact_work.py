@@ -1,11 +1,20 @@
-"""Work of a joint's own force along one step, split wherever a facet or a slider changes branch."""
+"""Work of a joint's own force along one step, split wherever a facet or a slider changes branch.
+
+Where the virgin curve is tabulated its pieces meet with a jump of the third derivative: the step is
+split there too, and the energy of the springs is integrated, for that of the table is a table of
+its own.
+"""
+
+import dataclasses
+from itertools import pairwise
 
 import numpy as np
 
+from jointlaw.discretisation.virgin_curve import VirginCurve
 from jointlaw.kernels import reference as kernel
 
 _X, _W = np.polynomial.legendre.leggauss(16)
-_X = 0.5 * (_X + 1.0)
+_X = 0.5 * (_X + 1.0)  # Gauss rule of 16 points on 0 to 1, with weights _W / 2
 # a cubic that is flat at both ends smooths the powers of y at touch
 _T, _TW = 3 * _X**2 - 2 * _X**3, 0.5 * _W * 6 * _X * (1 - _X)
 _STARTS = np.unique(
@@ -56,9 +65,71 @@ def _kinks(k, state, d):
     return np.unique(np.concatenate([[0.0, 1.0], *found]))
 
 
+class _Integrated(VirginCurve):
+    """A virgin curve whose energy is the integral of its own tabulated force."""
+
+    def energy(self, y):
+        if len(self.S) == 1:
+            return super().energy(y)
+        v = np.sqrt(np.maximum(y, 0.0)).ravel()
+        ends = np.sqrt(_nodes(self))
+        i = np.minimum(np.searchsorted(ends, v, "right") - 1, len(ends) - 1)
+        whole = np.append(0.0, np.cumsum(self._between(ends[:-1], ends[1:])))
+        return (whole[i] + self._between(ends[i], v)).reshape(np.shape(y))
+
+    def _between(self, low, high):
+        """int Phi dy with y = v^2, v from low to high (n,) within one piece of the table."""
+        v = low[:, None] + (high - low)[:, None] * _X
+        return (self.force(v**2)[0] * 2.0 * v) @ (0.5 * _W) * (high - low)
+
+
+def _nodes(curve):
+    """Closures (m) at which the pieces of the table meet, from 0 on."""
+    t = np.arange(len(curve.S)) / len(curve.S)
+    return (curve.scale * t / (1.0 - t)) ** 2
+
+
+def stored(k, state):
+    """Stored energy (B,) in J/m2 of a batch of states (rows, B), without the table of energies."""
+    own = dataclasses.replace(k, curve=_Integrated(*k.curve))
+    return kernel.measures(own, state).stored
+
+
+def _crossings(k, state, d):
+    """Times at which a closure, or a flattened depth with it, leaves a piece of the table."""
+    if len(k.curve.S) == 1:
+        return []
+    old = kernel.parts(k, state)
+
+    def y(t):
+        offset = kernel.limited_offset(k, np.repeat(old.offset, len(t), axis=1), d[1:, None] * t)[0]
+        return kernel.effective_closure(k, old.delta[0] + d[0] * t, offset)
+
+    nodes, at = _nodes(k.curve), y(_STARTS)
+    low, high, level, facet = [], [], [], []
+    for f, row in enumerate(at):
+        levels = np.append(nodes, nodes + k.yield_depth[f]) if k.yields else nodes
+        for j, (a, b) in enumerate(pairwise(row)):
+            crossed = levels[(levels > min(a, b)) & (levels < max(a, b))]
+            low += [_STARTS[j]] * len(crossed)
+            high += [_STARTS[j + 1]] * len(crossed)
+            facet += [f] * len(crossed)
+            level += list(crossed)
+    a, b, level = np.array(low), np.array(high), np.array(level)
+    if a.size == 0:
+        return []
+    pick = np.array(facet), np.arange(len(a))
+    rises = y(b)[pick] > level
+    for _ in range(46):
+        c = 0.5 * (a + b)
+        beyond = (y(c)[pick] > level) == rises
+        a, b = np.where(beyond, a, c), np.where(beyond, c, b)
+    return [b]
+
+
 def step_work(k, state, d):
     """int_0^1 F(trial(t d)) . d dt of one joint: state (rows, 1), d (dim,)."""
-    edges = _kinks(k, state, d)
+    edges = np.unique(np.concatenate([_kinks(k, state, d), *_crossings(k, state, d)]))
     span = np.diff(edges)[:, None]
     t, w = (edges[:-1, None] + span * _T).ravel(), (span * _TW).ravel()
     F = kernel.step(k, np.repeat(state, len(t), axis=1), d[:, None] * t, False)[1]

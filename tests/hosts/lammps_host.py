@@ -52,7 +52,7 @@ def build(folder, law, name="rock", change=None, flags=""):
     """Export a law and build its plug-in; `change` is made to the texts of the source first."""
     export_lammps(law, folder, name)
     for old, new in (change or {}).items():
-        files = [path for path in (*folder.glob("*.cpp"), *folder.glob("*.h"))]
+        files = (*folder.glob("*.cpp"), *folder.glob("*.h"))
         holding = [path for path in files if old in path.read_text()]
         assert len(holding) == 1, f"{old!r} stands in {holding}"
         holding[0].write_text(holding[0].read_text().replace(old, new))
@@ -67,12 +67,14 @@ def lammps(folder, script, processors=1, **variables):
     if "\n" in script:
         (folder / "in.test").write_text(script)
         script = "in.test"
-    command = [str(ENV / "bin/lmp"), "-in", script, "-log", f"log.{processors}"]
+    # without its wrapper in Python, which takes a second
+    program = next(ENV.glob("lib/python3*/site-packages/lammps/lmp"))
+    command = [str(program), "-in", script, "-log", f"log.{processors}"]
     for key, value in variables.items():
         command += ["-var", key, *map(str, value if isinstance(value, tuple) else (value,))]
     if processors > 1:
         command = [str(ENV / "bin/mpirun"), "-np", str(processors), *command]
-    env = {**os.environ, "OMP_NUM_THREADS": "1"}
+    env = {**os.environ, "OMP_NUM_THREADS": "1", "LD_LIBRARY_PATH": str(ENV / "lib")}
     env.pop("LAMMPS_PLUGIN_PATH", None)
     return subprocess.run(
         command, cwd=folder, env=env, capture_output=True, text=True, stdin=subprocess.DEVNULL,
@@ -110,10 +112,3 @@ def thermo(text):
             except ValueError:
                 continue  # a warning between two rows
     return tables
-
-
-@pytest.fixture(scope="session")
-def plugin(tmp_path_factory):
-    """A folder with the built plug-in and rock.jlaw, soft and balanced; others.jlaw beside it."""
-    need_lammps()
-    return build(tmp_path_factory.mktemp("lammps"), soft())

@@ -4,12 +4,12 @@ import sys
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
+from lammps_host import HEAD, run, soft, thermo
+
 import jointlaw as jl
 from jointlaw.hosts.c.export import table_text
-from lammps_host import HEAD, dumped, plugin, run, soft, thermo  # noqa: F401
 
 SPACING, AREA, DENSITY = 0.05, 0.0025, 2600.0
 COLUMNS, ROWS, LAYERS = 4, 4, 2
@@ -46,7 +46,7 @@ compute ke all ke
 )
 
 
-def rock(plugin, name="block.jlaw", **changes):  # noqa: F811
+def rock(plugin, name="block.jlaw", **changes):
     """A joint under the weight of a block: its law, and the tables in the folder."""
     law = soft(
         asperity_density=1e4,
@@ -69,7 +69,7 @@ def scene(law, pressure, more, share=0.05, damping=0.0, base=1, block=2):
     )  # fmt: skip
 
 
-def test_direct_shear(plugin):  # noqa: F811
+def test_direct_shear(plugin):
     """Shear stress and dilation at constant normal stress: 0.1 % of their largest."""
     law, pressure = rock(plugin), 5e3
     more = f"""group base type 1
@@ -94,7 +94,7 @@ run 20000"""
     assert np.abs(rise - closure).max() < 1e-3 * closure.max()
 
 
-def test_block_on_a_slope(plugin):  # noqa: F811
+def test_block_on_a_slope(plugin):
     """It sticks 0.1 degree below the law's angle and slides 0.1 degree above."""
     law = rock(plugin)
     weight = MASS * 9.81 / (POINTS * AREA)
@@ -125,7 +125,7 @@ run 18000"""
     assert fast > 1e-3
 
 
-def test_points_hand_their_state_on(plugin):  # noqa: F811
+def test_points_hand_their_state_on(plugin):
     """Slip over nearly two spacings, over the border of two processors, with a tilt of the base.
 
     The block's 16 points own the joints (lower molecule ID); the base slides below them, tilted by

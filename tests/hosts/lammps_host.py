@@ -78,7 +78,7 @@ def lammps(folder, script, processors=1, **variables):
     env.pop("LAMMPS_PLUGIN_PATH", None)
     return subprocess.run(
         command, cwd=folder, env=env, capture_output=True, text=True, stdin=subprocess.DEVNULL,
-        timeout=100,
+        timeout=200,
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from lammps_host import HEAD, build, dumped, run, soft
 
-R, DENSITY, DT, STEPS = 1e-2, 2600.0, 1e-7, 1500
+R, DENSITY, DT, STEPS = 1e-2, 2600.0, 4e-7, 400
 MASS = DENSITY * 4.0 / 3.0 * np.pi * R**3
 INERTIA = 0.4 * MASS * R * R
 APART = np.array([1.2e-2, 1.4e-2, 0.79e-2])
@@ -30,7 +30,7 @@ plugin load ./jointlawplugin.so
 pair_style jointlaw opening 1e-3 damping {damping}
 pair_coeff * * rock.jlaw
 neighbor 0.002 bin
-timestep 1e-7
+timestep 4e-7
 fix 1 all nve/sphere
 dump 1 all custom 1 {out} type x y z vx vy vz omegax omegay omegaz fx fy fz id proc
 dump_modify 1 sort id format float %.17g
@@ -113,7 +113,7 @@ def test_two_free_spinning_spheres(plugin, damping):
     assert differ(found, expected) < (1e-9 if damping else 1e-12)
     run(plugin, scene("swapped", swap=True, damping=damping))
     swapped = dumped(plugin / "swapped")[1:, ::-1, 1:13]
-    assert differ(swapped, found) < 1e-13
+    assert differ(swapped, found) < (1e-12 if damping else 1e-13)
     momentum, start = MASS * found[:, :, 3:6].sum(axis=1), MASS * V.sum(axis=0)
     assert np.abs(momentum - start).max() < 1e-12 * np.abs(MASS * V).max()
     spin = MASS * np.cross(found[..., :3], found[..., 3:6]) + INERTIA * found[..., 6:9]
@@ -161,7 +161,7 @@ comm_modify vel yes
 pair_style jointlaw opening 1e-3 damping 0.1
 pair_coeff * * rock.jlaw
 neighbor 0.002 bin
-timestep 1e-7
+timestep 4e-7
 fix 1 all nve/sphere
 dump 1 all custom 1 {out} type x y z vx vy vz omegax omegay omegaz fx fy fz id proc
 dump_modify 1 sort id format float %.17g

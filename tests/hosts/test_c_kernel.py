@@ -1,5 +1,6 @@
 """The law in C gives the numbers of the readable kernel, for laws and paths of every kind."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -97,7 +98,7 @@ def follow(joint, law, d):
     return off / peak
 
 
-@pytest.mark.parametrize("seed", range(24))
+@pytest.mark.parametrize("seed", range(200 if "JOINTLAW_LONG" in os.environ else 24))
 def test_same_numbers_on_random_laws_and_paths(lib, tmp_path, seed):
     law = random_law(seed)
     joint = CLaw(lib, law, tmp_path)

@@ -2,20 +2,28 @@
 
 import argparse
 import sys
+import time
+from importlib.util import find_spec
 from pathlib import Path
 
 import jointlaw as jl
-from jointlaw.support.files import replace_file, write_json
+from jointlaw.support.files import replace_file, require_free, write_json
+from jointlaw.support.progress import explained
 
 from .dynamics.simulation import Simulation
 from .errors import Refused, SceneError
+from .output.interrupt import STATUS
 from .output.outcome import sentence
 from .output.run import run, steps_to
 from .scene import TEMPLATE, Scene, load, names
-from .studies import ablate, compare
+from .studies import ablate, compare, strength
 
 DEFAULT = "tilt"
-VERSION = 1  # of the file that compare writes
+VERSION = 1  # of the files that compare and strength-reduction write
+FAILING = 3.0  # s: most that a failing rock is run for
+MANY = 1e6  # steps: minutes for a few blocks, hours for a rock
+SEATING = 1.9e-3  # s per moving block to the power 1.5, one core, blocks of two joint sets
+WAIT = "the first run after an installation also compiles the law, once"
 
 ABOUT = """\
 Rigid rock blocks in 2-D whose every contact force comes from a joint law.
@@ -27,6 +35,8 @@ Rigid rock blocks in 2-D whose every contact force comes from a joint law.
   python -m dem_demo check FILE            check a scene file without running it
   python -m dem_demo compare SCENE [--seeds 1 2 3] [--until T]
                                            every rock of a scene alone, with plain Coulomb as well
+  python -m dem_demo strength-reduction SCENE --out DIR
+                                           how much weaker its joints may be, and the critical tilt
   python -m dem_demo resume STATE --out DIR [--until T] [--step DT]
                                            go on from DIR/state or DIR/refused
 """
@@ -36,10 +46,12 @@ OPTIONS = {  # the first word is what a user types
     "file": {"type": Path},
     "state": {"type": Path, "help": "folder that a run left: DIR/state, DIR/refused"},
     "--out": {"type": Path, "default": Path("out"), "help": "folder for the results"},
+    "--force": {"action": "store_true", "help": "replace another run in that folder"},
     "--out of numbers": {"type": Path, "help": "a JSON file for the numbers"},
     "--until": {"type": float, "help": "model time to stop at (s)"},
     "--step": {"type": float, "help": "another time step (s)"},
     "--no-pictures": {"action": "store_true", "help": "tables only"},
+    "--vtk": {"action": "store_true", "help": "also VTK files for ParaView, in DIR/vtk (meshio)"},
     "--seeds": {"type": int, "nargs": "+", "default": [1, 2, 3], "help": "default 1 2 3"},
     "--critical": {
         "action": "store_true", "help": "find the tilt that the rock just bears; run nothing",
@@ -55,7 +67,14 @@ def main(arguments: Words | None = None) -> int:
     verb = words.pop(0) if words and words[0] and words[0] in COMMANDS else ""
     command, *about = COMMANDS[verb]
     try:
-        command(_parse(words, verb, *about))
+        given = _parse(words, verb, *about)
+        if getattr(given, "force", None) is False:
+            require_free(given.out)
+        with explained(f"dem_demo is at work; {WAIT}"):
+            command(given)
+    except KeyboardInterrupt as stop:
+        print(f"dem_demo: {str(stop) or 'interrupted; nothing is written'}", file=sys.stderr)
+        return STATUS
     except (SceneError, Refused, jl.PathError, ValueError, OSError) as error:
         print(f"dem_demo: {error}", file=sys.stderr)
         return 2
@@ -78,7 +97,7 @@ def _parse(words: Words, verb: str, about: str, example: str, *options: str) -> 
 
 
 def _run(given: argparse.Namespace) -> None:
-    _go(Simulation(load(given.scene)), given)
+    _go(_seated(given.scene), given)
 
 
 def _resume(given: argparse.Namespace) -> None:
@@ -101,7 +120,7 @@ def _new(given: argparse.Namespace) -> None:
 
 
 def _check(given: argparse.Namespace) -> None:
-    _announce(Simulation(load(given.scene)))
+    _announce(_seated(given.scene))
     print("the scene is valid")
 
 
@@ -135,11 +154,53 @@ def _compared(scene: Scene, given: argparse.Namespace):
         yield row
 
 
+def _seated(name: str) -> Simulation:
+    """A scene at step 0; what of it is likely a slip, and long waits, are told before."""
+    scene = load(name)
+    for doubt in scene.doubts:
+        print(f"warning: {doubt}", file=sys.stderr)
+    free = sum(not block.fixed for block in scene.blocks)
+    wait = SEATING * free**1.5
+    if scene.run.seat and wait > 2:
+        print(f"{free} moving blocks: the initial equilibrium takes about {wait:.0f} s", flush=True)
+    return Simulation(scene)
+
+
+def _reduce(given: argparse.Namespace) -> None:
+    scene = load(given.scene)
+    given.out.mkdir(parents=True, exist_ok=True)
+    until = min(scene.run.end, FAILING) if given.until is None else given.until
+    print(
+        "factor F: with the friction of all asperities divided by F the joints just carry the rock"
+    )
+    print("critical tilt: gravity may turn by so much, towards +x, until they no longer do")
+    rows = []
+    for row in strength.strength_reduction(scene, str(given.scene), until, given.out):
+        factor, tilt = row["factor"], row["critical_tilt"]
+        told = "F beyond 64 or below 1/64" if factor is None else f"F = {factor:.3g}"
+        angle = "beyond 60 degrees" if tilt is None else f"{tilt:+.3g} degrees"
+        print(f"{row['rock']}: {told}, critical tilt {angle}", flush=True)
+        rows.append(row)
+    write_json(given.out / "strength.json", {"version": VERSION, "rows": rows})
+    print(f"strength.json and pictures of the failure in {given.out}")
+
+
 def _announce(sim: Simulation, until: float | None = None) -> None:
     steps, dt, limit = steps_to(sim, until), sim.now.dt, sim.now.limit.now
     free = sum(1 for block in sim.scene.blocks if not block.fixed)
     print(f"{sim.scene.title}: {free} moving blocks, {sim.joints.n} law points in reach")
     print(f"time step {dt:.3g} s, limit {limit:.3g} s (margin {limit / dt:.2f}), {steps} steps")
+    if steps > MANY:
+        before, wall = sim.state(), []
+        for _ in range(5):
+            started = time.perf_counter()
+            sim.step()
+            wall.append(time.perf_counter() - started)
+        sim.restore(before)
+        print(
+            f"warning: {steps:.2g} steps take about {min(wall) * steps / 3600:.2g} h; is run.end = "
+            f"{sim.scene.run.end:g} s meant?", file=sys.stderr,
+        )  # fmt: skip
     for rock in sim.scene.rocks:
         print(
             f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
@@ -150,8 +211,14 @@ def _announce(sim: Simulation, until: float | None = None) -> None:
 
 
 def _go(sim: Simulation, given: argparse.Namespace) -> None:
+    if given.vtk and not find_spec("meshio"):
+        raise ValueError("--vtk needs meshio: pip install meshio")
     _announce(sim, given.until)
-    _, summary = run(sim, given.out, given.until, not given.no_pictures)
+    record, summary = run(sim, given.out, given.until, not given.no_pictures)
+    if given.vtk:
+        from .output import vtk  # loads meshio
+
+        vtk.write(record, given.out / "vtk")
     for slip in summary["slip"]:
         print(_slip(slip))
     for rock in summary["rocks"]:
@@ -175,7 +242,7 @@ def _slip(slip: dict) -> str:
 COMMANDS = {  # what each does, and for its help: about, example, OPTIONS
     "": (
         _run, ABOUT, "tilt --out out/tilt",
-        "scene or default", "--out", "--until", "--no-pictures",
+        "scene or default", "--out", "--force", "--until", "--no-pictures", "--vtk",
     ),
     "new": (
         _new, "Write a commented scene of a rock slope cut by joint sets, ready to run.",
@@ -185,7 +252,7 @@ COMMANDS = {  # what each does, and for its help: about, example, OPTIONS
         _ablate,
         "Run a scene without each of its ingredients in turn: what it changes in the outcome "
         "(differences against the whole scene) and in the time (ratios).",
-        "ablate shear-box --out out/ablation", "scene", "--out", "--until",
+        "ablate shear-box --out out/ablation", "scene", "--out", "--force", "--until",
     ),
     "check": (
         _check,
@@ -199,10 +266,17 @@ COMMANDS = {  # what each does, and for its help: about, example, OPTIONS
         "compare slope --seeds 1 2 3 --until 10",
         "scene", "--seeds", "--until", "--critical", "--tilt", "--out of numbers",
     ),
+    "strength-reduction": (
+        _reduce,
+        "Find the factor F by which the friction of all asperities is to be divided for each rock "
+        "of a scene to just hold, and its critical tilt, each to 1 %, by its static equilibrium; "
+        "then run it with 2 % less friction and draw how it fails.",
+        "strength-reduction slope --out out/strength", "scene", "--out", "--force", "--until",
+    ),
     "resume": (
         _resume,
         "Go on from a saved state; without --step bit for bit as if never stopped.",
         "resume out/tilt/state --until 45 --out out/longer",
-        "state", "--out", "--until", "--no-pictures", "--step",
+        "state", "--out", "--force", "--until", "--no-pictures", "--vtk", "--step",
     ),
 }  # fmt: skip

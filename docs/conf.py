@@ -30,6 +30,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx_gallery.gen_gallery",
     "sphinx.ext.mathjax",
+    "commands",
     "docstrings",
     "pages",
 ]

@@ -1,4 +1,4 @@
-"""Regenerate the pictures of README.md: `python docs/make_pictures.py`."""
+"""Regenerate the pictures of README.md and rock-masses.md: `python docs/make_pictures.py`."""
 
 import shutil
 import subprocess
@@ -14,6 +14,7 @@ RUNS = {
         "shear.png",
     ),
     "tilt.png": ("dem_demo tilt", "final.png"),
+    "strength.png": ("dem_demo strength-reduction slope", "failing-rough.png"),
 }
 
 if __name__ == "__main__":

@@ -8,5 +8,6 @@ drawing      what the pictures share
 frames       pictures of single blocks, animations
 rock_report  pictures of rock masses
 curves       energies, tilt and shear curves
+vtk          frames as VTK files
 run          a run from start to end, and its files
 """

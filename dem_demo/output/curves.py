@@ -10,6 +10,8 @@ from .drawing import positive
 from .law_alone import shear_curve
 from .record import Record
 
+LEAST = 0.01  # of the critical slip distance: what is less is not drawn on a logarithmic axis
+
 
 def energy(record: Record, path: Path) -> None:
     """Where the energy is, where it went, and how well it balances."""
@@ -23,17 +25,18 @@ def energy(record: Record, path: Path) -> None:
         "dashpots": "dashpots", "dropped": "given up",
     }  # fmt: skip
     for number, (name, label) in enumerate(labels.items()):
-        top.plot(t, of[name], label=label, color=f"C{number}")
+        top.plot(t, 1e-3 * of[name], label=label, color=f"C{number}")
         if name not in ("potential", "work"):
             middle.semilogy(t, positive(np.abs(of[name])), color=f"C{number}")
-    top.set_ylabel("energy (J)")
-    top.legend(fontsize=8, ncols=2)
+    top.set_ylabel("energy (kJ)")
+    figure.legend(fontsize=8, ncols=4, loc="outside lower center")
     top.set_title(f"{record.scene.title}: energy")
     middle.set_ylabel("size of energy (J)")
     peak = float(np.nanmax(np.abs(table[:, 2:6]), initial=1e-12))
     middle.set_ylim(max(1e-9 * peak, 1e-12), 3 * peak)
     low.plot(t, 1e6 * of["error"], color="k")
-    low.set_ylabel("imbalance /\nenergy turned over ($10^{-6}$)")
+    low.set_ylabel("imbalance (ppm)")
+    low.set_title("imbalance, as parts per million of the energy turned over", fontsize=8)
     low.set_xlabel("time (s)")
     for axes in (top, middle, low):
         axes.grid(alpha=0.3)
@@ -71,7 +74,9 @@ def tilt(record: Record, path: Path, slips: list[dict]) -> None:
         name, colour = entry["block"], f"C{number}"
         slid = 1e3 * np.abs(record.column(f"{name}: slid_m"))
         angle = record.column(f"{name}: base angle_deg")
-        axes.semilogx(np.maximum(slid, 1e-4), angle, color=colour, label=f"{name}, blocks")
+        still = np.flatnonzero(slid < LEAST * 1e3 * entry["slip_distance"])
+        start = int(still[-1]) if len(still) else 0  # before it the block shakes to and fro
+        axes.semilogx(slid[start:], angle[start:], color=colour, label=f"{name}, blocks")
         if entry["predicted_angle"] is not None:
             axes.axhline(
                 entry["predicted_angle"], color=colour, ls="--", lw=1,

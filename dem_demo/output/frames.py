@@ -12,6 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
 
+from jointlaw.support.progress import track
+
 from .drawing import CLOSURE, OPEN, SEPARATED, SLIDES, SLIPPING, STRESS, TAU, Scale, draw_blocks
 from .record import Record
 
@@ -110,15 +112,11 @@ def final(record: Record, path: Path, slips: list[dict]) -> None:
 
 
 def animation(record: Record, path: Path, draw_frame: Callable[..., Figure]) -> None:
-    """The whole run as GIF; more frames where more moves (the time stands in every frame)."""
-    places = np.array(record.motion)[:, :2]
-    moved = np.append(0.0, np.cumsum(np.abs(np.diff(places, axis=0)).max(axis=(1, 2))))
-    even = np.linspace(0.0, 1.0, len(moved))
-    progress = 0.5 * even + 0.5 * (moved / moved[-1] if moved[-1] > 0 else even)
-    wanted = np.linspace(0.0, 1.0, min(len(moved), FRAMES))
-    frames = np.unique(np.searchsorted(progress, wanted - 1e-12))
+    """The whole run as GIF, at a constant rate of model time."""
+    wanted = np.linspace(record.times[0], record.times[-1], min(len(record.times), FRAMES))
+    frames = np.unique(np.abs(np.subtract.outer(wanted, record.times)).argmin(axis=1))
     scale, images = Scale(record, frames), []
-    for i in frames:
+    for i in track(frames, "animation", len(frames)):
         figure = draw_frame(record, i, scale, 75)
         figure.canvas.draw()
         image = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3])

@@ -9,44 +9,54 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from jointlaw.support.files import replace_file, write_json
+from jointlaw.support.files import clear_run, replace_file, write_json
 
 from ..dynamics.energy import COLUMNS
 from ..dynamics.saved_states import text_of
 from ..dynamics.simulation import Simulation
 from ..errors import Refused
 from . import curves, frames, rock_report
+from .interrupt import interruptible
 from .monitors import LOOKS
 from .outcome import outcomes
 from .record import Record
 
 MOST_STEPS = 1e12  # of a run: years
 VERSION = 1  # of summary.json
+FILES = (
+    "history.csv", "blocks.csv", "joints.csv", "history.npz", "energy.png", "curves.png",
+    "report.png", "final.png", "motion.gif",
+)  # fmt: skip
 
 
 def run(sim: Simulation, folder: Path | None = None, until: float | None = None, pictures=True):
     """Run to `until` (s, default the scene's end); writes into `folder` if given.
 
     Returns (record, summary). A state that the method cannot carry raises Refused and leaves the
-    last good one in `folder`/refused, from where the run can be repeated or resumed. Raises
-    ValueError, before the first step, for an `until` that cannot be reached and for a scene that
-    cannot be saved.
+    last good one in `folder`/refused, from where the run can be repeated or resumed. Ctrl-C stops
+    it after a step, writes what there is and raises KeyboardInterrupt. Results of another run in
+    `folder` are replaced whole. Raises ValueError, before the first step, for an `until` that
+    cannot be reached and for a scene that cannot be saved.
     """
     steps_to(sim, until)
     if folder:
         text_of(sim.scene)
         folder.mkdir(parents=True, exist_ok=True)
     started, first_step, record = time.perf_counter(), sim.now.n, Record(sim)
+    interrupted = False
     try:
         play(sim, record, until)
     except Refused as trouble:
         if not folder:
             raise
         refused = folder / "refused"
+        clear_run(folder)
         sim.save(refused, record.state)
         replace_file(refused / "why.txt", f"{trouble}\n".encode())
         write(record, {"version": VERSION, "refused": str(trouble)}, folder, False)
         raise Refused(f"{trouble}\nThe last good state is in {refused}") from None
+    except KeyboardInterrupt:
+        interrupted = True
     wall, now = time.perf_counter() - started, sim.now
     summary = {
         "version": VERSION,
@@ -64,10 +74,15 @@ def run(sim: Simulation, folder: Path | None = None, until: float | None = None,
         "slip": record.slips.report(),
         "rocks": outcomes(record),
         "wall_time_s": wall,
+        "interrupted": interrupted,
     }
     if folder:
+        clear_run(folder)
         sim.save(folder / "state")
         write(record, summary, folder, pictures)
+    if interrupted:
+        where = f"; go on: python -m dem_demo resume {folder / 'state'} --out NEW" if folder else ""
+        raise KeyboardInterrupt(f"interrupted at {sim.time:.4g} s of model time{where}")
     return record, summary
 
 
@@ -77,18 +92,24 @@ def play(
     until: float | None = None,
     stop: Callable[[Record], bool] = lambda record: False,
 ) -> None:
-    """Step to `until` (s), or to where `stop` says so, and record on the way. Raises Refused."""
+    """Step to `until` (s), or to where `stop` says so, and record on the way. Raises Refused.
+
+    After Ctrl-C the present is the last frame and KeyboardInterrupt is raised.
+    """
     steps = steps_to(sim, until)
     every = max(round(min(sim.scene.run.record / sim.now.dt, steps + 1)), 1)
     title, quiet = sim.scene.title, not sys.stderr.isatty()
-    for i in tqdm(range(1, steps + 1), desc=title, disable=quiet):
-        sim.step()
-        if i % LOOKS == 0:
-            record.slips.look(sim)
-        if i % every == 0 or i == steps:
-            record.take(sim)
-            if stop(record):
-                break
+    with interruptible() as interrupted:
+        for i in tqdm(range(1, steps + 1), desc=title, disable=quiet):
+            sim.step()
+            if i % LOOKS == 0:
+                record.slips.look(sim)
+            if i % every == 0 or i == steps or interrupted():
+                record.take(sim)
+                if interrupted():
+                    raise KeyboardInterrupt
+                if stop(record):
+                    break
 
 
 def steps_to(sim: Simulation, until: float | None = None) -> int:
@@ -108,10 +129,10 @@ def steps_to(sim: Simulation, until: float | None = None) -> int:
 
 
 def write(record: Record, summary: dict[str, Any], folder: Path, pictures: bool) -> None:
-    """All files of a run."""
+    """All files of a run: numbers before pictures, which take longest."""
     folder.mkdir(parents=True, exist_ok=True)
+    write_json(folder / "summary.json", {**summary, "files": FILES})
     record.write(folder)
-    write_json(folder / "summary.json", summary)
     if not pictures:
         return
     curves.energy(record, folder / "energy.png")

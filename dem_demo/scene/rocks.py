@@ -64,7 +64,7 @@ def _rock(table: Table, name: str, density: float, first: int) -> tuple[list[Blo
     least = LEAST * min((s.spacing for s in sets), default=0.0)
     least = table.take("least_width", float, least, above=0, say="m")
     seed = table.whole("seed", 0, least=0)
-    density = table.take("density", float, density, above=0)
+    density = table.density(density)
     table.finish()
     if not all(isinstance(law, str) for law in other.values()):
         raise table.error("laws", "must name laws")

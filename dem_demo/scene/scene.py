@@ -59,6 +59,16 @@ class Scene:
     monitors: Monitors = Monitors()
     text: str = ""
 
+    @property
+    def doubts(self) -> list[str]:
+        """What of the scene is likely a slip, in words; it can be run all the same."""
+        found = []
+        if self.gravity[1] > 0:
+            found.append(f"gravity = {list(self.gravity)} points upwards: [0, -9.81] is down")
+        if any(self.gravity) and not any(block.fixed or block.held for block in self.blocks):
+            found.append("no block is fixed or held: all fall; give one `fixed = true`")
+        return found
+
     def law_of(self, key: Key) -> str:
         """Name of the law of an interface (block, edge, block, edge).
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import jointlaw as jl
-from jointlaw.support.files import replace_file, write_json
+from jointlaw.support.files import clear_run, replace_file, write_json
 
 from ..dynamics.simulation import Simulation
 from ..errors import Refused
@@ -174,7 +174,7 @@ def _shown(values: Outcome, change: Outcome, key: str, whole: bool) -> str:
 
 def write(rows: list[Row], folder: Path) -> None:
     """ablation.csv (values, changes, times), ablation.md (the table) and summary.json."""
-    folder.mkdir(parents=True, exist_ok=True)
+    clear_run(folder)
     keys = list(dict.fromkeys(key for row in rows for key in row.outcome))
     columns = [column for key in keys for column in (key, f"change of {key}")]
     cost = ["steps", "time_step_s", "cpu_s", "time_ratio", "note"]
@@ -186,6 +186,7 @@ def write(rows: list[Row], folder: Path) -> None:
     replace_file(folder / "ablation.md", (table(rows) + "\n").encode())
     summary = {
         "version": VERSION,
+        "files": ["ablation.csv", "ablation.md"],
         "runs": [row.__dict__ for row in rows],
         "time_ratio": time_ratios(rows),
     }

@@ -16,7 +16,8 @@ from ..errors import Refused
 from ..output.outcome import outcomes
 from ..output.record import Record
 from ..output.run import play
-from ..scene import DENSITY, GRAVITY, build, build_law, read_tables, turn
+from ..scene import DENSITY, GRAVITY, build, build_law, read_tables
+from .limit import critical_tilt, tilted
 
 FAR = 1.0  # m: a rock whose blocks have moved farther has failed, and need not go on
 
@@ -29,52 +30,38 @@ def compare(
     until: model time to stop at (s); tilt: angle by which gravity is turned towards +x (degrees).
     """
     for case, data in _cases(text, seeds):
-        yield {**case, **_run(_tilted(data, tilt), where, until)}
+        yield {**case, **_run(tilted(data, tilt), where, until)}
 
 
 def critical_tilts(text: str, where: str, seeds: Sequence[int]) -> Iterator[dict]:
     """For the same cases the turn of gravity (degrees) beyond which no balance is found.
 
-    Found by bisection to 0.1 degrees on the initial equilibrium, without running the blocks; None
-    if it is beyond 60 degrees either way.
+    None if it is beyond 60 degrees either way.
     """
     for case, data in _cases(text, seeds):
         rock = data["rock"][0]["name"]
-        yield {**case, "rock": rock, "critical_tilt": _bisect(data, where)}
-
-
-def _bisect(data: dict[str, Any], where: str) -> float | None:
-    def holds(tilt: float) -> bool:
-        return Simulation(build(_tilted(data, tilt), where)).balanced
-
-    step, low, high = 8.0, 0.0, 0.0
-    sense = 1.0 if holds(0.0) else -1.0
-    while holds(high) == (sense > 0):
-        low, high = high, high + sense * step
-        if abs(high) > 60:
-            return None
-    while abs(high - low) > 0.1:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if holds(middle) == (sense > 0) else (low, middle)
-    return 0.5 * (low + high)
+        yield {**case, "rock": rock, "critical_tilt": critical_tilt(data, where)}
 
 
 def _cases(text: str, seeds: Sequence[int]) -> Iterator[tuple[dict, dict[str, Any]]]:
     """Every rock alone, for each seed and kind of law: what it is, and the scene's tables."""
     data = read_tables(text)
-    for rock in _whole(data["rock"]):
-        joints = [j for j in data.get("joint", []) if _belongs(j, rock)]
+    for name in (table["name"] for table in data["rock"]):
+        own = alone(data, name)
+        (rock,) = own["rock"]
         for seed in seeds:
-            alone = {**data, "rock": [{**rock, "seed": seed}], "watch": {}, "joint": joints}
-            yield {"law": "joint", "seed": seed}, alone
+            cut = {**own, "rock": [{**rock, "seed": seed}]}
+            yield {"law": "joint", "seed": seed}, cut
             plain = {name: _plain(law, rock, data) for name, law in data["laws"].items()}
             run = {**data["run"], "max_overlap": 0.1}  # constant springs are soft in impacts
-            yield {"law": "coulomb", "seed": seed}, {**alone, "laws": plain, "run": run}
+            yield {"law": "coulomb", "seed": seed}, {**cut, "laws": plain, "run": run}
 
 
-def _tilted(data: dict[str, Any], tilt: float) -> dict[str, Any]:
-    gravity = turn(np.radians(tilt)) @ data.get("gravity", GRAVITY)
-    return {**data, "gravity": gravity.tolist()}
+def alone(data: dict[str, Any], name: str) -> dict[str, Any]:
+    """A scene's tables with one of its rocks, and nothing watched."""
+    rock = _whole(data["rock"])[name]
+    joints = [joint for joint in data.get("joint", []) if _belongs(joint, rock)]
+    return {**data, "rock": [rock], "watch": {}, "joint": joints}
 
 
 def _run(data: dict[str, Any], where: str, until: float) -> dict:
@@ -96,12 +83,12 @@ def _run(data: dict[str, Any], where: str, until: float) -> dict:
     }
 
 
-def _whole(tables: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The [[rock]] tables with what they are `like` filled in."""
+def _whole(tables: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    """The [[rock]] tables by name, with what they are `like` filled in."""
     known: dict[str, dict[str, Any]] = {}
     for table in tables:
         known[table["name"]] = {**known.get(table.get("like", ""), {}), **table, "like": ""}
-    return list(known.values())
+    return known
 
 
 def _belongs(joint: dict[str, Any], rock: dict[str, Any]) -> bool:

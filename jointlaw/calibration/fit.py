@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import signal
 from collections.abc import Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import dataclass
@@ -16,11 +18,13 @@ from ..law import JointLaw
 from ..support.files import replace_file
 from ..support.progress import track
 from ..support.pyplot import pyplot, written
+from . import shear_report
 from .estimate import Estimate
-from .forward import build, log_stress
+from .forward import log_stress
 from .measured import ClosureCurve, ShearCurve
 from .priors import Ranges, Values, transform_of
 from .problem import pose, solve, starting_points
+from .starts import staged
 
 Points = tuple[ArrayLike, ArrayLike]  # stress (Pa) and closure (m)
 
@@ -64,6 +68,7 @@ class Fit(Estimate):
             lines += ["", text + (" (given)." if noise.known else " (estimated).")]
         for number, (seating, curve) in enumerate(self.problem.closures, 1):
             lines += ["", *_curve(self, self.parameters[seating], curve, number)]
+        lines += shear_report.describe(self)
         return "\n".join(lines) + "\n"
 
     def plot(self, path: str | Path | None = None, held_out: Points | None = None) -> Any:
@@ -73,22 +78,21 @@ class Fit(Estimate):
         fitted.
         """
         curves = self.problem.curves
+        across = math.ceil(math.sqrt(len(curves)))
+        down = math.ceil(len(curves) / across)
         figure, axes = pyplot().subplots(
-            1, len(curves), figsize=(5.2 * len(curves) + 0.8, 4.4),
+            down, across, figsize=(5.2 * across + 0.8, 4.2 * down + 0.2),
             layout="constrained", squeeze=False,
         )  # fmt: skip
         closures = 0
-        for axis, curve in zip(axes[0], curves, strict=True):
+        for axis in axes.flat[len(curves) :]:
+            axis.remove()
+        for axis, curve in zip(axes.flat, curves, strict=False):
             if isinstance(curve, ClosureCurve):
                 closures += 1
                 _draw_closure(axis, self, curve, closures, held_out if closures == 1 else None)
             else:
-                model = curve.predict(build(self.parameters, self.problem.settings, curve.azimuth))
-                axis.plot(1e6 * curve.shear, curve.shear_stress / 1e6, "o", ms=4, label="measured")
-                axis.plot(1e6 * curve.shear, model / 1e6, color="C1", label="law")
-                label = f"shear stress (MPa) at {curve.normal / 1e6:.3g} MPa"
-                axis.set(xlabel="shear displacement (µm)", ylabel=label)
-                axis.legend()
+                shear_report.draw(axis, self, curve)
         return written(figure, path)
 
     def to_toml(self, path: str | Path | None = None, title: str = "Fitted joint") -> str:
@@ -207,7 +211,8 @@ def fit_curves(
     Returns a `Fit`. Raises ValueError naming the parameter when something does not fit.
     """
     problem = pose(curves, free, fixed, law, formation, priors)
-    return Fit(problem, solve(problem, starting_points(problem, near=law is not None)))
+    starts = staged(problem, starting_points(problem, near=law is not None))
+    return Fit(problem, solve(problem, starts))
 
 
 def fit_many(
@@ -230,7 +235,8 @@ def fit_many(
     depend on where it runs: every executor gives the same numbers.
     """
     if executor is None:
-        with ProcessPoolExecutor(workers) as pool:
+        quiet = signal.SIGINT, signal.SIG_DFL  # Ctrl-C ends a worker without a traceback
+        with ProcessPoolExecutor(workers, initializer=signal.signal, initargs=quiet) as pool:
             return fit_many(curves, pool, **options)
     job = partial(fit_closure, **options)
     futures = [executor.submit(job, *curve) for curve in curves]
@@ -291,5 +297,7 @@ def _draw_closure(
         stress = np.exp(log_stress(fit.parameters, seated, fit.problem.settings))
         axis.plot(1e6 * path, stress / 1e6, "--", color="C1", label="law, unloading")
     axis.plot(1e6 * curve.closure, curve.stress / 1e6, ms=4, label="measured", **points)
-    axis.set(xlabel="closure since the test began (µm)", ylabel="normal stress (MPa)")
+    axis.set(
+        xlabel="closure since the test began (µm)", ylabel="normal stress (MPa)", title="Closure"
+    )
     axis.legend(loc="upper left")

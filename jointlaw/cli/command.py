@@ -4,6 +4,7 @@ import argparse
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,10 @@ from ..laboratory.experiments import PathError
 from ..laboratory.record import UNITS, Record
 from ..law import JointLaw
 from ..parameters.resolution import NAMED
+from ..parameters.rock import require_rock
 from ..support import units
 from ..support.checks import number
-from ..support.files import replace_file, write_json
+from ..support.files import clear_run, replace_file, write_json
 
 VERSION = 1  # of summary.json
 Written = Mapping[str, str | Callable[[Path], object]]
@@ -52,6 +54,8 @@ def add_law(parser: argparse.ArgumentParser, *, resolution: bool = True) -> None
 def read_law(options: argparse.Namespace) -> JointLaw:
     """The law that the options name."""
     law = presets.load_any(options.law)
+    require_rock({"mu": law.asperity.mu}, f"{options.law}: asperity.")
+    require_rock({"plane": law.plane or 0.0}, f"{options.law}: ")
     resolution = getattr(options, "resolution", None)
     if resolution is not None:
         law = replace(law, resolution=resolution)
@@ -67,15 +71,23 @@ def add_out(parser: argparse.ArgumentParser, *, required: bool = True) -> None:
     parser.add_argument(
         "--out", metavar="DIR", type=Path, required=required, help="folder for the results"
     )
+    parser.add_argument(
+        "--force", action="store_true", help="replace the results of another run in that folder"
+    )
 
 
 def quantity(option: str, text: str, unit: str, *, positive: bool = False) -> float:
-    """The SI value of an option, which errors name."""
+    """The SI value of an option, which errors name; only zero needs no unit."""
     try:
         value = units.parse(text, unit)
     except ValueError as error:
         raise ValueError(f"{option}: {error}") from None
     number(option, value)
+    if value and text.strip()[-1] in "0123456789.":
+        raise ValueError(
+            f"{option} = {text} has no unit: write for example {text.strip()}"
+            f"{units.COMMON[unit]}, or {text.strip()}{unit}"
+        )
     if positive and value <= 0:
         raise ValueError(f"{option} = {text} is out of bounds: it must be > 0 {unit}")
     return value
@@ -83,7 +95,7 @@ def quantity(option: str, text: str, unit: str, *, positive: bool = False) -> fl
 
 def write_results(folder: Path, files: Written, summary: Mapping[str, Any]) -> None:
     """Write each file, its text or by its function, and summary.json; no PNG without matplotlib."""
-    folder.mkdir(parents=True, exist_ok=True)
+    clear_run(folder)
     names = []
     for name, content in files.items():
         try:
@@ -97,7 +109,7 @@ def write_results(folder: Path, files: Written, summary: Mapping[str, Any]) -> N
             print(f"no picture: {error}", file=sys.stderr)
             continue
         names.append(name)
-    write_json(folder / "summary.json", {"version": VERSION, **summary})
+    write_json(folder / "summary.json", {"version": VERSION, **summary, "files": names})
     print(f"wrote {', '.join([*names, 'summary.json'])} to {folder}")
 
 
@@ -112,11 +124,15 @@ def add_test_options(parser: argparse.ArgumentParser, steps: int) -> None:
     parser.add_argument(
         "--steps", metavar="N", type=int, default=steps, help=f"steps per leg (default {steps})"
     )
+    parser.add_argument(
+        "--units", metavar="LENGTH,STRESS", default="m,Pa", help="of the CSV: mm,MPa (default m,Pa)"
+    )
     add_out(parser)
 
 
 def run_test(test: Callable[[], Record], law: JointLaw, options: argparse.Namespace) -> Record:
     """Run a laboratory test and write its record, also that of a test that stopped early."""
+    _csv_units(options)  # refused before the work
     try:
         record = test()
     except PathError as error:
@@ -129,13 +145,23 @@ def run_test(test: Callable[[], Record], law: JointLaw, options: argparse.Namesp
 
 def _write(record: Record, law: JointLaw, options: argparse.Namespace) -> None:
     """Curve (CSV, NPZ), picture, law and summary of a test."""
-    name = options.command
+    name, (length, stress) = options.command, _csv_units(options)
     files: Written = {
-        f"{name}.csv": record.to_csv,
+        f"{name}.csv": partial(record.to_csv, length=length, stress=stress),
         f"{name}.npz": record.to_npz,
         "law.toml": law.to_toml,
         f"{name}.png": record.plot,
     }
-    settings = {k: v for k, v in vars(options).items() if k not in ("run", "out")}
+    settings = {k: v for k, v in vars(options).items() if k not in ("run", "out", "force")}
     summary = {"settings": settings, "result": record.summary(), "units": UNITS}
     write_results(options.out, files, summary)
+
+
+def _csv_units(options: argparse.Namespace) -> list[str]:
+    """Units of length and stress for the CSV."""
+    given: list[str] = options.units.split(",")
+    if len(given) != 2 or not all(given):
+        raise ValueError(f"--units = {options.units}: write a length and a stress: mm,MPa")
+    for unit, base in zip(given, ("m", "Pa"), strict=True):
+        quantity("--units", f"1{unit}", base)
+    return given

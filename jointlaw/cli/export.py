@@ -7,6 +7,7 @@ from typing import Any
 from ..hosts.c.export import export_c, identifier
 from ..hosts.yade.export import export_yade
 from ..law import JointLaw
+from ..support.files import clear_run
 from .command import add_command, add_law, add_out, quantity, read_law
 
 
@@ -29,6 +30,7 @@ def add(commands: Any) -> None:
 
 def _export(options: argparse.Namespace) -> None:
     law = read_law(options)
+    clear_run(options.out)
     if options.host == "c":
         _export_c(law, options)
     else:

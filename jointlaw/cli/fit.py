@@ -13,25 +13,29 @@ from ..calibration.baselines import Comparison, compare
 from ..calibration.fit import Fit, fit_closure, fit_many
 from ..calibration.measured import first_loading, subtract_compliance
 from ..calibration.unloading import explain_each, summed_up
-from ..support import units
+from ..parameters.rock import require_rock
 from ..support.checks import Array
+from ..support.files import require_free
 from .command import Written, add_command, add_out, quantity, write_results
+from .fit_shear import add_options, fit_with_shear
 
 
 def add(commands: Any) -> None:
     """Add `fit` to the subparsers of the command line."""
-    what = "fit the law to measured closure curves; write preset, report and plot"
+    what = "fit the law to measured closure and shear curves; write preset, report and plot"
     example = "jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out out"
     parser = add_command(commands, "fit", what, example, _run)
     parser.description = (
         f"{what}. Only the first loading is fitted, or whole cycles with --cycle; every cycle of a "
-        "file is compared with what the fitted law loses and keeps."
+        "file is compared with what the fitted law loses and keeps. Several closure files are "
+        "fitted one by one; shear files together."
     )
     parser.add_argument(
-        "data", nargs="+", metavar="CSV", help="files of stress and closure, or a shipped data set"
+        "data", nargs="*", metavar="CSV", help="files of stress and closure, or a shipped data set"
     )
     parser.add_argument("--stress-column", help="name and unit of that column, such as sigmaZ:MPa")
     parser.add_argument("--closure-column", help="name and unit of that column, such as Disp:mm")
+    add_options(parser)
     parser.add_argument(
         "--up-to", help="fit up to this stress, predict the rest: 5.3MPa; or half, of the largest"
     )
@@ -61,13 +65,28 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
+    if (options.shear and len(options.data) > 1) or not (options.shear or options.data):
+        raise ValueError(
+            f"{len(options.data)} closure files: give one or more, or shear tests after --shear "
+            "with one closure file or none"
+        )
     folders = _folders(options)
     tests = [_read(options, item) for item in options.data]
     keywords = _keywords(options)
     compliance = _compliance(options)
+    alone = [
+        datasets.ClosureData(stress, subtract_compliance(stress, closure, compliance))
+        for stress, closure in tests
+    ]
     if options.cycle and options.up_to:
         raise ValueError("--cycle fits all points: leave --up-to out")
     loading = [test if options.cycle else first_loading(*test)[:2] for test in tests]
+    if options.shear:
+        closed = datasets.ClosureData(*loading[0]) if loading else None
+        fit, about = fit_with_shear(options, closed, compliance, keywords)
+        names = ", ".join(Path(item).name for item in [*options.data, *options.shear])
+        _write(options.out, names, fit, alone[0] if alone else None, None, about)
+        return
     limits = [_limit(options.up_to, stress) for stress, _ in loading]
     seen = [(s[s <= limit], u[s <= limit]) for (s, u), limit in zip(loading, limits, strict=True)]
     if len(seen) > 1:
@@ -75,14 +94,11 @@ def _run(options: argparse.Namespace) -> None:
     else:
         fits = [fit_closure(*seen[0], compliance=compliance, **keywords)]
     for k, fit in enumerate(fits):
-        (stress, closure), limit = loading[k], limits[k]
-        held = None
-        if (stress > limit).any():
-            alone = subtract_compliance(stress, closure, compliance)
-            held = compare(stress, alone, limit, **keywords)
-        stress, closure = tests[k]
-        test = datasets.ClosureData(stress, subtract_compliance(stress, closure, compliance))
-        _write(folders[k], Path(options.data[k]).name, fit, test, held)
+        stress, closure = first_loading(*alone[k])[:2]
+        held = (
+            compare(stress, closure, limits[k], **keywords) if (stress > limits[k]).any() else None
+        )
+        _write(folders[k], Path(options.data[k]).name, fit, alone[k], held)
 
 
 def _folders(options: argparse.Namespace) -> list[Path]:
@@ -96,13 +112,23 @@ def _folders(options: argparse.Namespace) -> list[Path]:
                 f"{other} and {item} would both be written to {options.out / Path(item).stem}; "
                 "rename one, or fit them one at a time"
             )
-    return [options.out / stem for stem in items]
+    folders = [options.out / stem for stem in items]
+    for folder in folders:
+        if not options.force:
+            require_free(folder)
+    return folders
 
 
 def _write(
-    folder: Path, name: str, fit: Fit, test: datasets.ClosureData, held: Comparison | None
+    folder: Path,
+    name: str,
+    fit: Fit,
+    test: datasets.ClosureData | None,
+    held: Comparison | None,
+    about: str = "",
 ) -> None:
-    text = fit.report()
+    require_rock(fit.parameters, f"{name}: the fitted ")
+    text = f"{fit.report()}{about}\n"
     summary: dict[str, Any] = {
         "data": name,
         "parameters_SI": fit.parameters,
@@ -113,7 +139,7 @@ def _write(
     if held is not None:
         text += _held_out(held)
         summary["error_at_largest_stress"] = {n: float(e[-1]) for n, e in held.errors.items()}
-    if first_loading(*test)[2].size >= 3:
+    if test is not None and first_loading(*test)[2].size >= 3:
         try:
             loops = explain_each(fit.law, *test)
             text += f"\n## Unloading\n\n{summed_up(loops)}\n"
@@ -165,7 +191,7 @@ def _compliance(options: argparse.Namespace) -> float | tuple[Array, Array]:
 def _limit(text: str | None, stress: Any) -> float:
     if text is None:
         return float("inf")
-    return 0.5 * float(np.max(stress)) if text == "half" else units.parse(text, "Pa")
+    return 0.5 * float(np.max(stress)) if text == "half" else quantity("--up-to", text, "Pa")
 
 
 def _keywords(options: argparse.Namespace) -> dict[str, Any]:

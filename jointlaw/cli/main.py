@@ -6,9 +6,12 @@ import sys
 from collections.abc import Sequence
 
 from ..laboratory.experiments import PathError
+from ..support.files import require_free
+from ..support.progress import explained
 from ..support.version import __version__
 from . import closure, export, figures, fit, presets, replay, scan, shear, tradeoff
 
+WAIT = "the first run after an installation also compiles the law, once"
 COMMANDS = (shear, closure, presets, replay, figures, export, fit, scan, tradeoff)
 
 
@@ -25,7 +28,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         command.add(commands)
     options = parser.parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
     try:
-        return int(options.run(options) or 0)
+        if getattr(options, "out", None) and not options.force:
+            require_free(options.out)
+        with explained(f"jointlaw {options.command} is at work; {WAIT}"):
+            return int(options.run(options) or 0)
+    except KeyboardInterrupt:
+        print(f"jointlaw {options.command}: interrupted; nothing more is written", file=sys.stderr)
+        return 130
     except (PathError, ValueError, ImportError, OSError) as error:
         print(f"jointlaw {options.command}: {error}", file=sys.stderr)
         return 1 if isinstance(error, PathError) else 2

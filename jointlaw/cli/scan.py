@@ -4,11 +4,11 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from ..parameters.rock import require_rock
 from ..parameters.toml import VERSION
-from ..support import units
 from ..surface.fit import SurfaceFit, from_surface
 from ..surface.scan_files import read_scan
-from .command import Written, add_command, add_out, write_results
+from .command import Written, add_command, add_out, quantity, write_results
 
 
 def add(commands: Any) -> None:
@@ -19,18 +19,22 @@ def add(commands: Any) -> None:
     parser.description = f"{what}. Give the composite surface of both sides, or a profile."
     parser.add_argument("file", help="CSV, NPY, or a format of SurfaceTopography (extra scan)")
     parser.add_argument("--spacing", help="of the points, such as 20um; needed for CSV and NPY")
-    parser.add_argument("--height-unit", help="of CSV and NPY, such as um (default m)")
+    parser.add_argument("--height-unit", help="of CSV and NPY, such as um")
     parser.add_argument("--sampling-length", help="edge of a facet (default 4 spacings)")
     add_out(parser)
 
 
 def _run(options: argparse.Namespace) -> None:
-    spacing = None if options.spacing is None else units.parse(options.spacing, "m")
-    unit = options.height_unit
-    factor = None if unit is None else units.parse(f"1{unit}", "m")
-    z, spacing = read_scan(options.file, spacing, factor)
-    length = options.sampling_length
-    fit = from_surface(z, spacing, None if length is None else units.parse(length, "m"))
+    unit, lengths = options.height_unit, []
+    for option in ("spacing", "sampling_length"):
+        text = getattr(options, option)
+        lengths.append(
+            None if text is None else quantity(f"--{option.replace('_', '-')}", text, "m")
+        )
+    factor = None if unit is None else quantity("--height-unit", f"1{unit}", "m")
+    z, spacing = read_scan(options.file, lengths[0], factor)
+    fit = from_surface(z, spacing, lengths[1])
+    require_rock(fit.parameters, f"{Path(options.file).name}: the ")
     text = fit.report()
     print(text)
     summary = {

@@ -126,6 +126,11 @@ class VirginClosure(NamedTuple):
             stress = stress - self.curve.force(closure[..., None] - depth)[0] @ share
         return stress
 
+    @property
+    def farthest(self) -> float:
+        """Closure (m) beyond which stresses, or their differences, are lost in rounding."""
+        return 1e304 if self.yielding is None else _RESOLVED * float(np.max(self.yielding[1]))
+
     def closure(self, stress: float, start: float) -> float:
         """Closure (m) at a normal stress (Pa), looked for from the closure `start` (m) on."""
         from scipy.optimize import brentq  # a third of the package's import time
@@ -138,9 +143,7 @@ class VirginClosure(NamedTuple):
             return math.log(min(max(force, _SMALLEST), _LARGEST)) - math.log(stress)
 
         low = high = math.log(start)
-        farthest = 700.0
-        if self.yielding is not None:  # beyond, the difference of forces is lost in rounding
-            farthest = math.log(_RESOLVED) + math.log(float(np.max(self.yielding[1])))
+        farthest = math.log(self.farthest)
         with np.errstate(over="ignore"):
             while misfit(high) < 0.0:
                 high += 1.0

@@ -35,10 +35,10 @@ _DES, _DET, _SUMS, _SUMT = _rows(7, 4)  # its sliders
 _CURVING, _BSS, _BST, _BTT, _VS, _VT, _G0, _G1, _G2 = _rows(11, 9)  # its tangent
 _P, _P1, _P2, _OLD, _OLD1, _OLD2, _NEW, _NEW1, _NEW2 = _rows(20, 9)  # a joint: step, y's origin
 _J00, _J01, _J10, _J11, _SLIP, _PULL1, _PULL2, _LOST, _F, _FS, _FT = _rows(29, 11)
-_C00, _C01, _C02, _C10, _C11, _C12, _C20, _C21, _C22 = _rows(40, 9)
-_NORMAL, _CRUSHED, _MU = _rows(49, 3)  # a joint whose asperities wear or yield
-_Z0, _Z1, _FZ0, _FZ1, _SZ1, _AT0, _FAT0, _MOVES, _WS, _WT = _rows(52, 10)  # its flattened facets
-_PAD = 62 * LANES
+_NORMAL, _CRUSHED = _rows(40, 2)  # a joint whose asperities wear or yield
+_C00, _C01, _C02, _C10, _C11, _C12, _C20, _C21, _C22, _MU = _rows(42, 10)
+_Z0, _Z1, _FZ0, _FZ1, _SZ1, _AT0, _FAT0, _WS, _WT = _rows(52, 9)  # its flattened facets
+_PAD = 61 * LANES
 
 # The same rows while joints are measured
 _WHOLE, _LIMIT, _SLIDING, _SLIPPING, _APART, _STORED, _REACH = _rows(20, 7)
@@ -56,8 +56,6 @@ class Packed(NamedTuple):
     curve: Array  # (4 cells,): coefficients of S
     scalars: Array  # lam, mu, critical slip, eta, scale and rise of the curve, mu residual, slip
     dim: int
-    yields: bool | None  # True or None, for which the compiler leaves the code out
-    wears: bool | None
 
 
 def pack(k: Tables) -> Packed:
@@ -76,7 +74,7 @@ def pack(k: Tables) -> Packed:
     residual = k.mu if k.mu_residual is None else k.mu_residual
     scalars = np.array([k.lam, k.mu, k.critical_slip, *virgin, residual, k.wear_slip])
     curve = k.curve.S.ravel().copy()
-    return Packed(facet, depth, curve, scalars, k.dim, k.yields or None, k.wears or None)
+    return Packed(facet, depth, curve, scalars, k.dim)
 
 
 def block_rows(k: Tables) -> int:
@@ -92,13 +90,13 @@ class Work(NamedTuple):
 
     block: Array  # (rows, LANES): copy of a block of states
     pad: Array
-    place: NDArray[np.int32]  # cell of the curve, per lane
+    place: NDArray[np.int32]  # cell of the curve, per lane; then the lanes that are pressed flat
     piece: Array  # its four coefficients, per lane
 
 
 def new_work(rows: int) -> Work:
     """Working space for blocks of this many rows."""
-    place, piece = np.zeros(LANES, np.int32), np.zeros(4 * LANES)
+    place, piece = np.zeros(2 * LANES, np.int32), np.zeros(4 * LANES)
     return Work(np.zeros((rows, LANES)), np.zeros(_PAD), place, piece)
 
 
@@ -255,62 +253,54 @@ def _limit_offset(pad, L, limit, dim):
 
 
 @_jit
-def _places(law):
+def _places(law, yields, wears):
     """First rows of flattened depths, of the slip, and of Phi beside the state of a block."""
     M, D = law.depth.shape[0], law.depth.shape[1] - 1
     first = slip = beside = 2 * law.dim + 2 * M * D
-    if law.yields is not None:
+    if yields is not None:
         slip = beside = first + M + 1
-    if law.wears is not None:
+    if wears is not None:
         beside = slip + 1
     return first, slip, beside
 
 
 @_jit
-def _weaken(pad, s, L, law):
+def _weaken(pad, s, L, law, yields, wears):
     """Friction of the asperities of each joint, after their slip."""
-    slip, first, last = _places(law)[1], law.scalars[1], law.scalars[6]
+    slip, first, last = _places(law, yields, wears)[1], law.scalars[1], law.scalars[6]
     for l in range(L):
         pad[_MU + l] = last + (first - last) * np.exp(-s[slip, l] / law.scalars[7])
 
 
 @_jit
-def _press(work, s, L, law, f):
+def _press(work, s, L, law, f, yields, wears):
     """Flattened depths of a facet before and after the step, and Phi there; see `yielding`."""
     pad, facet = work.pad, law.facet
-    first, _, beside = _places(law)
+    first, _, beside = _places(law, yields, wears)
     at, kept = first + f, beside + 2 * law.depth.shape[0] + f
     deep, o = facet[f, _YIELD], np.int64(facet[f, _OPPOSITE])
     for l in range(L):
-        pad[_Z0 + l], pad[_FZ0 + l], pad[_Z1 + l] = s[at, l], s[kept, l], pad[_Y1 + l]
+        pad[_Z1 + l] = pad[_Y1 + l]
     if o != f:
         m0, m1, m2 = facet[o, _M], facet[o, _M + 1], facet[o, _M + 2]
         for l in range(L):
             other = m0 * pad[_NEW + l] + m1 * pad[_NEW1 + l] + m2 * pad[_NEW2 + l]
             pad[_Z1 + l] = other if other > pad[_Y1 + l] else pad[_Y1 + l]
-    pressed = 0.0
     for l in range(L):
-        z0, y1, z1 = pad[_Z0 + l], pad[_Y1 + l], pad[_Z1 + l] - deep
-        moves = z1 > z0
-        z1 = z1 if moves else z0
-        own = 1.0 if z1 <= y1 - deep else 2.0
-        pad[_Z1 + l], pad[_FZ1 + l] = z1, pad[_FZ0 + l]
-        pad[_MOVES + l] = own if moves & (y1 > z1) else 0.0
-        pad[_SZ1 + l] = y1
-        pressed += 1.0 if moves else 0.0
-    if pressed > 0.0:
-        for l in range(L):
-            pad[_Y1 + l] = pad[_Z1 + l]
-        _virgin(work, law, True, L)
-        for l in range(L):
-            pad[_Y1 + l] = pad[_SZ1 + l]
-            pad[_FZ1 + l], pad[_SZ1 + l] = pad[_F1 + l], pad[_S1 + l]
-        for l in range(L):
-            s[at, l], s[kept, l] = pad[_Z1 + l], pad[_FZ1 + l]
+        z0, fz0, z1 = s[at, l], s[kept, l], pad[_Z1 + l] - deep
+        pad[_Z0 + l], pad[_FZ0 + l], pad[_FZ1 + l] = z0, fz0, fz0
+        pad[_Z1 + l] = z1 if z1 > z0 else z0
+    pressed = 0  # only where it moves is Phi looked up, packed into the rows of before the step
     for l in range(L):
-        touches = pad[_Y0 + l] > pad[_Z0 + l]
-        pad[_AT0 + l] = pad[_Y0 + l] if touches else pad[_Z0 + l]
-        pad[_FAT0 + l] = pad[_F0 + l] if touches else pad[_FZ0 + l]
+        work.place[LANES + pressed] = l
+        pad[_Y0 + pressed] = pad[_Z1 + l]
+        pressed += 1 if pad[_Z1 + l] > pad[_Z0 + l] else 0
+    if pressed > 0:
+        _virgin(work, law, None, pressed)
+    for i in range(pressed):
+        l = work.place[LANES + i]
+        pad[_FZ1 + l], pad[_SZ1 + l] = pad[_F0 + i], pad[_S0 + i]
+        s[at, l], s[kept, l] = pad[_Z1 + l], pad[_F0 + i]
 
 
 @_jit
@@ -321,7 +311,6 @@ def _relieve(pad, L, law, f, ledger):
         y1, z1, f1 = pad[_Y1 + l], pad[_Z1 + l], pad[_F1 + l] - pad[_FZ1 + l]
         pad[_F1 + l] = f1 if (y1 > z1) & (f1 > 0.0) else 0.0
         pad[_S1 + l] = pad[_S1 + l] if y1 > z1 else 0.0
-        pad[_F0 + l] = pad[_FAT0 + l] - pad[_FZ0 + l]
     if ledger is not None:
         for l in range(L):
             c0, c1 = pad[_Y0 + l] - pad[_Z0 + l], pad[_Y1 + l] - pad[_Z1 + l]
@@ -333,15 +322,17 @@ def _relieve(pad, L, law, f, ledger):
 
 
 @_jit
-def _share_at(y, force, zl, fl, sl, zh, fh, sh, ended):
-    """G of a cell at y, where the virgin force is known."""
-    G = force - fl - sl * (y - zl)
-    G -= force - fh - sh * (y - zh) if ended & (y > zh) else 0.0
-    return G if (y > zl) & (G > 0.0) else 0.0
+def _between(z, fz, y, fy, zl, fl, sl, zh, fh, sh, ended):
+    """What a cell gains from z to y, where the virgin force is known; right for y >= z, zl."""
+    gain = fy - (fz if z > zl else fl) - sl * (y - (z if z > zl else zl))
+    if ended:
+        beyond = fy - (fz if z > zh else fh) - sh * (y - (z if z > zh else zh))
+        gain -= beyond if y > zh else 0.0
+    return gain
 
 
 @_jit
-def _slide(pad, qs, qt, L, law, f, i, ledger, tangent):
+def _slide(pad, qs, qt, L, law, f, i, ledger, tangent, yields, wears):
     """One depth cell of one facet: steps 3 and 4 of `reference.step`."""
     facet, depth = law.facet, law.depth
     A, a, compliance = facet[f, _REST], facet[f, _REST + 1], facet[f, _REST + 2]
@@ -351,42 +342,39 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent):
     zh, fh, sh = depth[f, i + 1, 0], depth[f, i + 1, 1], depth[f, i + 1, 2]
     ended = i + 2 < depth.shape[1]
     for l in range(L):
-        # the bed beyond the lower limit of the cell less that beyond the upper
         y0, y1, f0, f1 = pad[_Y0 + l], pad[_Y1 + l], pad[_F0 + l], pad[_F1 + l]
-        if law.yields is not None:  # from the flattened depth on, where y is above it
-            y0, f0 = pad[_AT0 + l], pad[_FAT0 + l]
         from0, from1 = y0 - zl, y1 - zl
-        G0, G1 = f0 - fl - sl * from0, f1 - fl - sl * from1
         k0, k1 = pad[_S0 + l] - sl, pad[_S1 + l] - sl
         if ended:
-            G0 -= f0 - fh - sh * (y0 - zh) if y0 > zh else 0.0
-            G1 -= f1 - fh - sh * (y1 - zh) if y1 > zh else 0.0
             k0 = sh - sl if y0 > zh else k0
             k1 = sh - sl if y1 > zh else k1
         k0 = k0 if (from0 > 0.0) & (k0 > 0.0) else 0.0
         k1 = k1 if (from1 > 0.0) & (k1 > 0.0) else 0.0
-        h0, h1 = k0 * from0, k1 * from1
-        if law.yields is not None:  # at the flattened depth the slope is not at hand
-            begun = G0 if from0 > 0.0 else 0.0
-            h0 = h0 if y0 > pad[_Z0 + l] else begun
-        G0, G1 = G0 if h0 > G0 else h0, G1 if h1 > G1 else h1
-        G0, G1 = G0 if G0 > 0.0 else 0.0, G1 if G1 > 0.0 else 0.0
-        reached = G1
-        if law.yields is not None:  # less what the bed holds at the flattened depth
-            z1, touched = pad[_Z1 + l], y0 > pad[_Z0 + l]
-            k0, k1 = k0 if touched else 0.0, k1 if y1 > z1 else 0.0
-            y0 = pad[_Y0 + l]
-            G1 -= _share_at(z1, pad[_FZ1 + l], zl, fl, sl, zh, fh, sh, ended)
-            h1 = k1 * (y1 - z1)
+        if yields is None:
+            # the bed beyond the lower limit of the cell less that beyond the upper
+            G0, G1 = f0 - fl - sl * from0, f1 - fl - sl * from1
+            if ended:
+                G0 -= f0 - fh - sh * (y0 - zh) if y0 > zh else 0.0
+                G1 -= f1 - fh - sh * (y1 - zh) if y1 > zh else 0.0
+            h0, h1 = k0 * from0, k1 * from1
+            G0, G1 = G0 if h0 > G0 else h0, G1 if h1 > G1 else h1
+            G0, G1 = G0 if G0 > 0.0 else 0.0, G1 if G1 > 0.0 else 0.0
+            gained = G1 - G0
+        else:  # the bed less what it holds at the flattened depth
+            z0, z1, at0, fat0 = pad[_Z0 + l], pad[_Z1 + l], pad[_AT0 + l], pad[_FAT0 + l]
+            k0, k1 = k0 if y0 > z0 else 0.0, k1 if y1 > z1 else 0.0
+            gained = _between(at0, fat0, y1, f1, zl, fl, sl, zh, fh, sh, ended)
+            G1 = _between(z1, pad[_FZ1 + l], y1, f1, zl, fl, sl, zh, fh, sh, ended)
+            h1 = k1 * (y1 - (z1 if z1 > zl else zl))
             G1 = G1 if h1 > G1 else h1
             G1 = G1 if G1 > 0.0 else 0.0
         # trial force: by the chord where stiffness grows, scaled down where it falls
         grows = k1 > k0
         dy = y1 - y0
         near = abs(dy) <= NEAR * abs(y1)
-        if law.yields is not None:  # flattened springs touch at once: no mean where they do
+        if yields is not None:  # flattened springs touch at once: no mean where they do
             near = near & ((k0 > 0.0) | (k1 == 0.0))
-        top = reached - G0 if grows else k1
+        top = gained if grows else k1
         bottom = dy if grows else k0
         ratio = top / (bottom if bottom != 0.0 else 1.0)
         chord = 0.5 * (k0 + k1) if near else ratio
@@ -395,11 +383,11 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent):
         kept = 1.0 if grows else ratio
         add = a * (chord if grows else k1)
         olds, oldt, des, det = qs[l], qt[l], pad[_DES + l], pad[_DET + l]
-        if law.wears is not None:  # back to the limit, that fell since
+        if wears is not None:  # back to the limit, that fell since
             strength = by_mu * pad[_MU + l]
-            if law.yields is not None:
-                G0 -= _share_at(pad[_Z0 + l], pad[_FZ0 + l], zl, fl, sl, zh, fh, sh, ended)
-                h0 = k0 * (y0 - pad[_Z0 + l])
+            if yields is not None:
+                G0 = _between(z0, pad[_FZ0 + l], y0, f0, zl, fl, sl, zh, fh, sh, ended)
+                h0 = k0 * (y0 - (z0 if z0 > zl else zl))
                 G0 = G0 if h0 > G0 else h0
                 G0 = G0 if G0 > 0.0 else 0.0
             size0 = np.sqrt(olds * olds + oldt * oldt)
@@ -451,7 +439,7 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent):
             push = strength * k1
             pad[_VS + l] += share * (ws - us * dot) + push * us if limited else ws
             pad[_VT + l] += share * (wt - ut * dot) + push * ut if limited else wt
-            if law.yields is not None:
+            if yields is not None:
                 kz = pad[_SZ1 + l] - sl
                 kz = sh - sl if ended & (z1 > zh) else kz
                 kz = kz if (z1 > zl) & (kz > 0.0) & (k1 > 0.0) & limited else 0.0
@@ -516,12 +504,13 @@ def _soften(pad, L, law, f):
     """C -= along g^T of a facet whose flattened depth moves, with the y that presses it."""
     facet, dim, o = law.facet, law.dim, np.int64(law.facet[f, _OPPOSITE])
     A, soft, limited = facet[f, _REST], 1.0 / law.scalars[0], law.scalars[2] < np.inf
-    m0, m1, m2 = facet[o, _M], facet[o, _M + 1], facet[o, _M + 2]
+    m0, m1, m2, deep = facet[o, _M], facet[o, _M + 1], facet[o, _M + 2], facet[f, _YIELD]
     for l in range(L):
-        if pad[_MOVES + l] == 0.0:
+        y1, z1 = pad[_Y1 + l], pad[_Z1 + l]
+        if z1 <= pad[_Z0 + l] or y1 <= z1:
             continue
         g0, g1, g2 = pad[_G0 + l], pad[_G1 + l], pad[_G2 + l]
-        if (pad[_MOVES + l] == 2.0) & limited:
+        if z1 > y1 - deep and limited:
             g0 = m0
             g1 = m1 * pad[_J00 + l] + m2 * pad[_J10 + l]
             g2 = m1 * pad[_J01 + l] + m2 * pad[_J11 + l]
@@ -535,7 +524,7 @@ def _soften(pad, L, law, f):
 
 
 @_jit
-def _facet(work, s, L, law, f, ledger, tangent):
+def _facet(work, s, L, law, f, ledger, tangent, yields, wears):
     """One facet of a block: closures, virgin curve, sliders, and its part of F and C."""
     pad, facet, dim = work.pad, law.facet, law.dim
     lam, limit = law.scalars[0], law.scalars[2]
@@ -546,25 +535,33 @@ def _facet(work, s, L, law, f, ledger, tangent):
     n0, n1, n2 = facet[f, _N], facet[f, _N + 1], facet[f, _N + 2]
     A = facet[f, _REST]
     for l in range(L):
-        pad[_Y0 + l] = m0 * pad[_OLD + l] + m1 * pad[_OLD1 + l]
         pad[_Y1 + l] = m0 * pad[_NEW + l] + m1 * pad[_NEW1 + l]
         pad[_DES + l] = s0 * pad[_P + l] + s1 * pad[_P1 + l]
         pad[_DET + l] = t1 * pad[_P1 + l]
         pad[_SUMS + l] = pad[_SUMT + l] = 0.0
     if dim == 3:
         for l in range(L):
-            pad[_Y0 + l] += m2 * pad[_OLD2 + l]
             pad[_Y1 + l] += m2 * pad[_NEW2 + l]
             pad[_DES + l] += s2 * pad[_P2 + l]
             pad[_DET + l] += t2 * pad[_P2 + l]
+    if yields is not None:
+        _press(work, s, L, law, f, yields, wears)
+    for l in range(L):
+        pad[_Y0 + l] = m0 * pad[_OLD + l] + m1 * pad[_OLD1 + l]
+    if dim == 3:
+        for l in range(L):
+            pad[_Y0 + l] += m2 * pad[_OLD2 + l]
     for l in range(L):
         pad[_Y0 + l] = pad[_Y0 + l] if abs(pad[_Y0 + l]) >= UNDERFLOW else 0.0
-    beside = _places(law)[2]
+    beside = _places(law, yields, wears)[2]
     rf, rs = beside + f, beside + M + f
     for l in range(L):
         pad[_F0 + l], pad[_S0 + l] = s[rf, l], s[rs, l]
-    if law.yields is not None:
-        _press(work, s, L, law, f)
+    if yields is not None:
+        for l in range(L):
+            touches = pad[_Y0 + l] > pad[_Z0 + l]
+            pad[_AT0 + l] = pad[_Y0 + l] if touches else pad[_Z0 + l]
+            pad[_FAT0 + l] = pad[_F0 + l] if touches else pad[_FZ0 + l]
     _virgin(work, law, True, L)
     for l in range(L):
         s[rf, l], s[rs, l] = pad[_F1 + l], pad[_S1 + l]
@@ -576,17 +573,18 @@ def _facet(work, s, L, law, f, ledger, tangent):
         for l in range(L):
             pad[_BSS + l] = pad[_BST + l] = pad[_BTT + l] = 0.0
             pad[_VS + l] = pad[_VT + l] = 0.0
-        if law.yields is not None:
+        if yields is not None:
             for l in range(L):
                 pad[_WS + l] = pad[_WT + l] = 0.0
     for i in range(D):
         rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
-        _slide(pad, s[rs], s[rt], L, law, f, i, ledger, tangent)
-    if law.yields is not None:
+        _slide(pad, s[rs], s[rt], L, law, f, i, ledger, tangent, yields, wears)
+    if yields is not None:
         _relieve(pad, L, law, f, ledger)
-    if law.wears is not None:
+    if wears is not None:
         for l in range(L):
-            pad[_NORMAL + l] += A * (pad[_F0 + l] + pad[_F1 + l])
+            before = pad[_F0 + l] if yields is None else pad[_FAT0 + l] - pad[_FZ0 + l]
+            pad[_NORMAL + l] += A * (before + pad[_F1 + l])
     soft = 1.0 / lam
     for l in range(L):
         normal, q0, q1 = A * pad[_F1 + l], soft * pad[_SUMS + l], soft * pad[_SUMT + l]
@@ -602,23 +600,25 @@ def _facet(work, s, L, law, f, ledger, tangent):
             pad[_PULL2 + l] += n2 * A * pad[_F1 + l]
     if tangent is not None:
         _add_tangent(pad, L, law, f)
-        if law.yields is not None:
+        if yields is not None:
             _soften(pad, L, law, f)
 
 
 @_jit
-def _begin(pad, s, d, start, L, law, tangent):
+def _clear(pad, first, last):
+    for l in range(first, last):
+        pad[l] = 0.0
+
+
+@_jit
+def _begin(pad, s, d, start, L, law, yields, wears):
     """Lay out the old and new place of each joint of a block, and move it."""
     limit, dim = law.scalars[2], law.dim
     if limit < np.inf or dim == 1:
-        pad[_P:_J00] = 0.0  # the offset has one component in a plane, none on closure
-    pad[_PULL1:_C00] = 0.0
-    if tangent is not None:
-        pad[_C00:_NORMAL] = 0.0
-    if law.yields is not None or law.wears is not None:
-        pad[_NORMAL:_MU] = 0.0
-    if law.wears is not None:
-        _weaken(pad, s, L, law)
+        _clear(pad, _P, _J00)  # the offset has one component in a plane, none on closure
+    _clear(pad, _PULL1, _C00)
+    if wears is not None:
+        _weaken(pad, s, L, law, yields, wears)
     for i in range(dim):
         row, origin = i * LANES, 0 if i == 0 else dim + i - 1
         for l in range(L):
@@ -639,7 +639,7 @@ def _begin(pad, s, d, start, L, law, tangent):
 
 
 @_jit
-def _finish(pad, s, F, C, start, L, law, ledger, tangent):
+def _finish(pad, s, F, C, start, L, law, ledger, tangent, yields, wears):
     """Hand out F and C, and add up the ledger."""
     limit, dim = law.scalars[2], law.dim
     for i in range(dim):
@@ -657,12 +657,12 @@ def _finish(pad, s, F, C, start, L, law, ledger, tangent):
                 pad[_LOST + l] += pad[_SLIP + l] * (pull if pull > 0.0 else 0.0) / limit
         for l in range(L):
             s[2 * dim - 1, l] += pad[_LOST + l]
-        slip = _places(law)[1]
-        if law.yields is not None:
+        slip = _places(law, yields, wears)[1]
+        if yields is not None:
             for l in range(L):
                 s[slip - 1, l] += pad[_CRUSHED + l]
                 s[2 * dim - 1, l] += pad[_CRUSHED + l]
-        if law.wears is not None:
+        if wears is not None:
             for l in range(L):
                 capacity = 0.5 * pad[_MU + l] * pad[_NORMAL + l]
                 rubbed = pad[_LOST + l] / (capacity if capacity > 0.0 else 1.0)
@@ -685,7 +685,7 @@ def advance(
     the code out.
     """
     work = Work(block, pad, place, piece)
-    law = Packed(facet, depth, curve, scalars, dim, yields, wears)
+    law = Packed(facet, depth, curve, scalars, dim)
     rows, W = state.shape[1], state.shape[2]
     listed = index.size > 0
     for start in range(first, last, W):
@@ -703,10 +703,12 @@ def advance(
                 for l in range(L):
                     block[r, l] = state[start // W, r, l]
             s = block
-        _begin(pad, s, d, start, L, law, tangent)
+        _begin(pad, s, d, start, L, law, yields, wears)
+        if tangent is not None:
+            _clear(pad, _C00, _MU)
         for f in range(facet.shape[0]):
-            _facet(work, s, L, law, f, ledger, tangent)
-        _finish(pad, s, F, C, start, L, law, ledger, tangent)
+            _facet(work, s, L, law, f, ledger, tangent, yields, wears)
+        _finish(pad, s, F, C, start, L, law, ledger, tangent, yields, wears)
         if listed and keep:
             for l in range(L):
                 home, at = index[start + l] // W, index[start + l] % W
@@ -715,7 +717,7 @@ def advance(
 
 
 @_jit
-def _count(pad, qs, qt, L, law, f, i):
+def _count(pad, qs, qt, L, law, f, i, yields, wears):
     """One depth cell of one facet: is it at its friction limit, and what does it store."""
     facet, depth = law.facet, law.depth
     strength = law.scalars[1] * law.scalars[0] * facet[f, _REST]
@@ -728,14 +730,15 @@ def _count(pad, qs, qt, L, law, f, i):
         reach = min(max(y, zl), zh)
         k = min(max(slope, sl), sh) - sl
         G = k * (y - reach) + (min(max(force, fl), fh) - fl - sl * (reach - zl))
-        most = k * (y - zl if y > zl else 0.0)
-        G = min(max(G, 0.0), most)
-        if law.yields is not None:
+        z = zl
+        if yields is not None:
             z = pad[_Z0 + l]
             k = k if y > z else 0.0
-            G -= _share_at(z, pad[_FZ0 + l], zl, fl, sl, zh, fh, sh, ended)
-            G = max(min(G, k * (y - z)), 0.0)
-        if law.wears is not None:
+            G = _between(z, pad[_FZ0 + l], y, force, zl, fl, sl, zh, fh, sh, ended)
+            z = z if z > zl else zl
+        most = k * (y - z if y > z else 0.0)
+        G = min(max(G, 0.0), most)
+        if wears is not None:
             strength = pad[_MU + l] * law.scalars[0] * facet[f, _REST]
         q2 = qs[l] * qs[l] + qt[l] * qt[l]
         limit = np.sqrt(q2) >= strength * (G * (1.0 - LIMIT) - ROUNDED * force)
@@ -781,15 +784,15 @@ def _squeeze(work, law, L, energy, potential):
 
 
 @_jit
-def _measure_facet(work, s, L, law, f, energy):
+def _measure_facet(work, s, L, law, f, energy, yields, wears):
     """What one facet of a block adds to the measures."""
     pad, dim = work.pad, law.dim
     M, D = law.depth.shape[0], law.depth.shape[1] - 1
     potential, share = law.facet[f, _POTENTIAL], law.facet[f, _SHARE]
     for l in range(L):
         pad[_WHOLE + l], pad[_LIMIT + l], pad[_Z0 + l] = 1.0, 0.0, 0.0
-    if law.yields is not None:
-        at = _places(law)[0] + f
+    if yields is not None:
+        at = _places(law, yields, wears)[0] + f
         for l in range(L):
             pad[_Z0 + l] = pad[_Y0 + l] = s[at, l]
         _squeeze(work, law, L, energy, potential)
@@ -797,7 +800,7 @@ def _measure_facet(work, s, L, law, f, energy):
             pad[_FZ0 + l], pad[_FZ1 + l] = pad[_F0 + l], pad[_CURVING + l]
     _effective(pad, s, L, law, f)
     _squeeze(work, law, L, energy, potential)
-    if law.yields is not None:
+    if yields is not None:
         for l in range(L):
             y, z = pad[_Y0 + l], pad[_Z0 + l]
             squeezed = pad[_CURVING + l] - pad[_FZ1 + l]
@@ -805,10 +808,10 @@ def _measure_facet(work, s, L, law, f, energy):
             pad[_CURVING + l] = squeezed if (y > z) & (squeezed > 0.0) else 0.0
     for i in range(D):
         rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
-        _count(pad, s[rs], s[rt], L, law, f, i)
+        _count(pad, s[rs], s[rt], L, law, f, i, yields, wears)
     for l in range(L):
         y, force, z = pad[_Y0 + l], pad[_F0 + l], pad[_Z0 + l]
-        if law.yields is not None:
+        if yields is not None:
             force = force - pad[_FZ0 + l] if y > z else 0.0
         pad[_STORED + l] += pad[_CURVING + l]
         pad[_SLIDING + l] += share * pad[_WHOLE + l] if y > z else 0.0
@@ -824,17 +827,17 @@ def measures(
 ):  # fmt: skip
     """Measures (5, n) of joints first..last, as `reference.measures`; arguments as above."""
     work = Work(block, pad, place, piece)
-    law = Packed(facet, depth, curve, scalars, dim, yields, wears)
+    law = Packed(facet, depth, curve, scalars, dim)
     W = state.shape[2]
     for start in range(first, last, W):
         L = min(W, last - start)
         s = state[start // W]
-        pad[_SLIDING:_REACH] = 0.0
-        if law.wears is not None:
-            _weaken(pad, s, L, law)
+        _clear(pad, _SLIDING, _REACH)
+        if wears is not None:
+            _weaken(pad, s, L, law, yields, wears)
         pad[_REACH : _REACH + LANES] = -np.inf
         for f in range(facet.shape[0]):
-            _measure_facet(work, s, L, law, f, energy)
+            _measure_facet(work, s, L, law, f, energy, yields, wears)
         for i in range(5):
             for l in range(L):
                 out[i, start + l] = pad[_SLIDING + i * LANES + l]
@@ -847,18 +850,18 @@ def refresh(
 ):  # fmt: skip
     """Phi and Phi' in the blocks of joints first..last, after their states were written."""
     work = Work(block, pad, place, piece)
-    law = Packed(facet, depth, curve, scalars, dim, yields, wears)
+    law = Packed(facet, depth, curve, scalars, dim)
     M, W = depth.shape[0], state.shape[2]
     for start in range(first, last, W):
         L = min(W, last - start)
         s = state[start // W]
         for f in range(M):
-            first_depth, _, beside = _places(law)
+            first_depth, _, beside = _places(law, yields, wears)
             _effective(pad, s, L, law, f)
             _virgin(work, law, None, L)
             for l in range(L):
                 s[beside + f, l], s[beside + M + f, l] = pad[_F0 + l], pad[_S0 + l]
-            if law.yields is not None:
+            if yields is not None:
                 for l in range(L):
                     pad[_Y0 + l] = s[first_depth + f, l]
                 _virgin(work, law, None, L)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..support import units
 from ..support.checks import Array
 from ..support.files import replace_file
 from ..support.pyplot import pyplot, written
@@ -113,11 +114,20 @@ class Record:
             }
         return figures
 
-    def to_csv(self, path: str | Path) -> None:
-        """Write the columns as CSV under their names; the units are those of `UNITS`."""
-        buffer = io.StringIO()
-        header = ",".join(self.columns)
-        table = np.column_stack(list(self.columns.values()))
+    def to_csv(self, path: str | Path, length: str = "m", stress: str = "Pa") -> None:
+        """Write the columns as CSV; titles end in the unit, "closure_m", and shares have none.
+
+        length, stress: units to write, such as "mm" and "MPa"; raises ValueError for others.
+        """
+        chosen = {"m": length, "Pa": stress}
+        factors = {unit: units.parse(f"1{chosen[unit]}", unit) for unit in chosen}
+        titles, columns = [], []
+        for name, column in self.columns.items():
+            unit = UNITS[name]
+            titles.append(name if unit == "1" else f"{name}_{chosen.get(unit, unit)}")
+            columns.append(column / factors.get(unit, 1.0))
+        buffer, table = io.StringIO(), np.column_stack(columns)
+        header = ",".join(titles)
         np.savetxt(buffer, table, fmt="%.12g", delimiter=",", header=header, comments="")
         replace_file(Path(path), buffer.getvalue().encode())
 
@@ -146,7 +156,7 @@ def _shear_figure(record: Record) -> Any:
     figure, axes = pyplot().subplots(2, 2, figsize=(9, 6.5), layout="constrained", sharex=True)
     stress, unit = _scaled(np.stack([record.shear_stress, record.F1]), _STRESSES)
     axes[0, 0].plot(shear, stress[0], label="shear stress")
-    axes[0, 0].plot(shear, stress[1], "--", color="0.5", label="normal stress")
+    axes[0, 0].plot(shear, stress[1], color="0.5", lw=1, label="normal stress")
     axes[0, 0].set_ylabel(f"stress ({unit})")
     axes[0, 0].legend()
     axes[0, 1].plot(shear, record.friction_angle, color="C3")

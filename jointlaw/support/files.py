@@ -1,5 +1,6 @@
 """Files that are written whole or not at all."""
 
+import contextlib
 import json
 import math
 import os
@@ -9,6 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+# Any of these: a folder holds a run
+MARKS = ("summary.json", "history.csv", "strength.json", "state", "refused")
+LEFT = ("summary.json", "history.csv", "state/scene.toml", "state/state.npz",
+        "refused/scene.toml", "refused/state.npz", "refused/why.txt")  # fmt: skip
 
 
 def replace_file(path: Path, data: bytes) -> None:
@@ -20,6 +26,30 @@ def replace_file(path: Path, data: bytes) -> None:
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def require_free(folder: Path) -> None:
+    """Refuse a folder that holds another run. Raises ValueError with the remedy."""
+    if held := [name for name in MARKS if (folder / name).exists()]:
+        raise ValueError(
+            f"{folder} holds another run ({', '.join(held)}): give another --out, or --force to "
+            "replace it"
+        )
+
+
+def clear_run(folder: Path) -> None:
+    """Make a folder for results; of a run that it holds what that wrote is removed, and no more."""
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = [*(folder / name for name in LEFT), *folder.glob("vtk/*.vtu")]
+    with contextlib.suppress(OSError, ValueError):  # none, or damaged: of a run that broke off
+        written = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["files"]
+        paths += [folder / Path(name).name for name in written]
+    for path in paths:
+        if path.is_file():
+            path.unlink()
+    for name in ("state", "refused", "vtk"):
+        with contextlib.suppress(OSError):  # it holds something else
+            (folder / name).rmdir()
 
 
 def write_json(path: Path, data: Any) -> None:

@@ -3,8 +3,18 @@
 import math
 import re
 
+COMMON = {"Pa": "MPa", "m": "mm", "Pa/m": "GPa/m", "rad": "deg"}  # what laboratories write
 _PREFIX = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2, "": 1.0,
            "k": 1e3, "M": 1e6, "G": 1e9}  # fmt: skip
+_STRESSES = {
+    "N/mm2": 1e6,
+    "N/mm²": 1e6,
+    "MN/m2": 1e6,
+    "MN/m²": 1e6,
+    "kN/m2": 1e3,
+    "kN/m²": 1e3,
+    "bar": 1e5,
+}
 _PATTERN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
 
 
@@ -30,6 +40,8 @@ def _factor(suffix: str, unit: str) -> float | None:
         top, _, bottom = suffix.partition("/")
         over, under = _factor(top, "Pa"), _factor(bottom, "m")
         return None if over is None or under is None else over / under
+    if unit == "Pa" and suffix in _STRESSES:
+        return _STRESSES[suffix]
     if not suffix.endswith(unit):
         return None
     return _PREFIX.get(suffix[: -len(unit)])

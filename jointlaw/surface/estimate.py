@@ -12,6 +12,7 @@ from ..support.checks import Array
 from .asperities import Asperities
 from .densities import DirectionFit, HeightFit
 
+VAGUE = 0.25  # standard error over the whole range of a parameter: beyond it says nothing
 NOISY = 0.04  # error of a gradient over the median gradient, from which summits get misplaced
 
 
@@ -102,6 +103,10 @@ class SurfaceEstimate:
             )
         if self.directions.at_bound:
             found["b"] = "at its bound of Eq. 18: the inclinations are not of the form of Eq. 14"
+        # a to a factor of 2, b and c against all that Eq. 18 allows
+        for name, reach in (("a", self.parameters["a"]), ("b", 3.0), ("c", 2 / 3)):
+            if self.standard_error[name] > VAGUE * reach:
+                found[name] = f"its standard error is {self.standard_error[name]:.2g}"
         h = np.sqrt(np.diag(self.heights_fit.covariance))
         for k, name in enumerate(("alpha", "beta", "overlap")):
             if h[k] > WIDEST or self.heights_fit.at_bound:

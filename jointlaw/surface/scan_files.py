@@ -22,8 +22,8 @@ def read_scan(
         or blanks), NPY, or any of the profilometer formats that SurfaceTopography reads (extra
         `scan`), which bring their own spacing and unit.
     spacing: of the points in m; needed for CSV and NPY.
-    factor: m per unit of the heights, such as 1e-6 for micrometres; None takes m for CSV and NPY.
-        Needed for files of instruments that give no unit, refused for those that do.
+    factor: m per unit of the heights, such as 1e-6 for micrometres; needed for CSV, NPY and files
+        of instruments that give no unit, refused for those that do.
 
     Raises ValueError naming the file and the remedy, ImportError when SurfaceTopography is needed.
     """
@@ -39,7 +39,9 @@ def read_scan(
         return _topography(path, spacing, factor)
     if spacing is None:
         raise ValueError(f"{path}: spacing is missing; give it in m, for example --spacing 20um")
-    return np.squeeze(z) * (1.0 if factor is None else factor), spacing
+    if factor is None:
+        raise ValueError(f"{path}: gives no unit of its heights; name it, such as --height-unit um")
+    return np.squeeze(z) * factor, spacing
 
 
 def _text(path: Path) -> Array:

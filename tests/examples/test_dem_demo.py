@@ -69,12 +69,17 @@ def test_scenes_are_valid(name, capsys):
     assert "margin" in capsys.readouterr().out
 
 
-def test_resume_is_bit_identical(tmp_path):
+DAMAGE = "yield_interference = 2e-4, mu_residual = 0.2, wear_slip = 5e-4"
+
+
+@pytest.mark.parametrize("damage", ["", f", {DAMAGE}"])
+def test_resume_is_bit_identical(tmp_path, damage):
     """Stop and go on from files, in the middle of impacts and renewed edge pairs."""
-    whole = Simulation(parse(SHORT))
+    scene = parse(SHORT.replace("mu = 0.4", f"mu = 0.4{damage}"))
+    whole = Simulation(scene)
     for _ in range(400):
         whole.step()
-    first = Simulation(parse(SHORT))
+    first = Simulation(scene)
     for _ in range(170):
         first.step()
     first.save(tmp_path / "state")
@@ -85,6 +90,9 @@ def test_resume_is_bit_identical(tmp_path):
     assert (again.now.motion == whole.now.motion).all()
     assert (again.now.traction == whole.now.traction).all()
     assert again.now.ledger.value == whole.now.ledger.value
+    batch = again.joints.pools["rock"].batch
+    assert bool(damage) == (batch.plastic_work.max() > 0.0)
+    assert bool(damage) == (batch.friction.min() < 0.4)
 
 
 def test_resume_of_a_tilt_test_by_command(tmp_path):

@@ -23,6 +23,7 @@ LONG = {
     "python -m dem_demo check my-slope.toml": "tests/examples/test_rocks.py",
     "python -m dem_demo my-slope.toml": "tests/examples/test_rocks.py",
     "python -m dem_demo compare": "tests/examples/test_rocks.py",
+    "python -m dem_demo strength-reduction": "tests/verification/test_strength_reduction.py",
     "python -m dem_demo check block.toml": "tests/examples/test_recipes.py",
     "python -m dem_demo block.toml": "tests/examples/test_recipes.py",
     "python -m dem_demo tilt": "tests/verification/test_blocks_tilt.py",

@@ -1,9 +1,9 @@
 """jointlaw.h builds everywhere, bears hostile files and steps, and its examples run."""
 
 import ctypes
+import os
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,8 @@ from extremes import laws as extreme_laws
 
 FUZZ = HERE / "fuzz.c"
 SANE = ["-g", "-O1", "-fno-sanitize-recover=all"]
+# JOINTLAW_LONG=1: 1e6 steps and 10 000 files, as docs/native.md tells; an hour on one core
+LAWS, STEPS, FILES = (200, 5000, 10_000) if "JOINTLAW_LONG" in os.environ else (12, 3000, 500)
 
 
 @pytest.fixture(scope="module")
@@ -79,42 +81,37 @@ def test_a_step_calls_nothing_of_memory_files_or_locale(tmp_path):
 @pytest.fixture(scope="module")
 def fuzz(tmp_path_factory):
     return build(
-        tmp_path_factory.mktemp("fuzz"), FUZZ, *SANE, "-fsanitize=address,undefined", "-lpthread"
+        tmp_path_factory.mktemp("fuzz"),
+        FUZZ,
+        *SANE,
+        "-fsanitize=address,undefined,float-cast-overflow",
+        "-lpthread",
     )
 
 
 def extreme_law(rng):
-    """A random law that exists (heights may be too steep, or not convex), and a size of its steps;
-    elastic and unworn, as the header holds no others."""
+    """A random law that exists (heights may be too steep, or not convex), and the size of steps."""
     while True:
         changes, size = extreme_laws.random_changes(rng)
         try:
-            elastic = changes | {"yields at": np.inf, "wears over": np.inf}
-            return extreme_laws.build(**elastic), size
+            return extreme_laws.build(**changes), size
         except ValueError:
             continue
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(LAWS))
 def test_steps_of_all_kinds_and_sizes(fuzz, tmp_path, seed):
-    """Laws of the suite of extremes; the whole of it is in docs/native.md."""
+    """Laws of the suite of extremes."""
     made, size = extreme_law(np.random.default_rng(20_000 + seed))
     (tmp_path / "x.jlaw").write_text(table_text(made))
-    assert "3000 steps" in run(fuzz, "steps", tmp_path / "x.jlaw", size, 3000, seed)
-
-
-def test_asperities_that_yield_or_wear_are_refused_by_name(law):
-    for name in ("yield_interference", "wear_slip"):
-        damage = {name: 1e-6} | ({"mu_residual": 0.1} if name == "wear_slip" else {})
-        other = replace(law, asperity=replace(law.asperity, **damage))
-        with pytest.raises(ValueError, match=f"asperity.{name} = 1e-06 m: jointlaw.h holds no"):
-            table_text(other)
+    said = run(fuzz, "steps", tmp_path / "x.jlaw", size, STEPS, seed)
+    assert said.startswith(f"{STEPS} steps")
 
 
 def test_damaged_and_hostile_files(fuzz, tmp_path, law):
     (tmp_path / "x.jlaw").write_text(table_text(law))
-    said = run(fuzz, "files", tmp_path / "x.jlaw", tmp_path / "y.jlaw", 500, 1)
-    assert said.startswith("500 files")
+    said = run(fuzz, "files", tmp_path / "x.jlaw", tmp_path / "y.jlaw", FILES, 1)
+    assert said.startswith(f"{FILES} files")
 
 
 def test_two_threads_on_one_law(tmp_path, law):
@@ -135,7 +132,7 @@ BAD = {
     "empty": (lambda text: "", "it is no table file of jointlaw"),
     "other": (lambda text: "[law]\nlam = 1.2\n", "it is no table file of jointlaw"),
     "version": (
-        lambda text: text.replace("tables 1", "tables 2", 1),
+        lambda text: text.replace("tables 2", "tables 1", 1),
         "of another version than this jointlaw.h; export law and header anew",
     ),
     "cut": (lambda text: text[: len(text) // 2], "it ends too early: copy it again, whole"),

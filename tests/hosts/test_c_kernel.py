@@ -1,5 +1,6 @@
 """The law in C gives the numbers of the readable kernel, for laws and paths of every kind."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -41,11 +42,15 @@ def random_law(seed):
     if seed % 7 == 6:  # a density infinite at the point of contact
         heights = jl.GammaHeights(-0.6, 3e-6, 0.0, "individual")
     kind = {"closure_only": True} if seed % 8 == 5 else {"plane": [None, 0.0, 0.7][seed // 2 % 3]}
+    mu = [0.0, 0.3, 0.7][rng.integers(3)]
+    damage = {"yield_interference": 10.0 ** rng.uniform(-8.0, -6.0)} if seed // 3 % 2 else {}
+    if seed // 2 % 3 == 1:
+        damage |= {"mu_residual": mu * rng.uniform(), "wear_slip": 10.0 ** rng.uniform(-7.0, -5.0)}
     return jl.JointLaw(
         orientation=jl.Orientation(
             rng.uniform(1.0, 6.0), rng.uniform(-0.4, 0.8), rng.uniform(-0.15, 0.15)
         ),
-        asperity=jl.Asperity(2e8, rng.uniform(0.5, 2.0), eta, [0.0, 0.3, 0.7][rng.integers(3)]),
+        asperity=jl.Asperity(2e8, rng.uniform(0.5, 2.0), eta, mu, **damage),
         heights=heights,
         asperity_density=1e10,
         closure_range=1e-6,
@@ -93,7 +98,7 @@ def follow(joint, law, d):
     return off / peak
 
 
-@pytest.mark.parametrize("seed", range(24))
+@pytest.mark.parametrize("seed", range(200 if "JOINTLAW_LONG" in os.environ else 24))
 def test_same_numbers_on_random_laws_and_paths(lib, tmp_path, seed):
     law = random_law(seed)
     joint = CLaw(lib, law, tmp_path)

@@ -1,5 +1,7 @@
 """Live mode: the full path-dependent law inside the real YADE."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -213,3 +215,58 @@ def test_save_reload_continue_equals_an_unbroken_run(yade, make_table, tmp_path,
     print(np.abs(out["again"] - out["whole"]).max() / moved, out["counts"])
     assert np.abs(out["again"] - out["whole"]).max() < 1e-9 * moved
     assert np.abs(out["F_again"] - out["F"]).max() < 1e-6 * np.abs(out["F"]).max()
+
+
+DAMAGED = (
+    LAW
+    + """
+O.reset()
+O.materials.append(FrictMat(young=1e9, poisson=.3, frictionAngle=.5, density=2600))
+for x in (0, 1): O.bodies.append(utils.sphere((x, 0, 0), 0.5))
+for b in O.bodies: b.state.blockedDOFs = "xyzXYZ"
+engines(keep=True)
+live = LiveLaw(law, ledger=True)
+add, step, began, taken = live.add, live.step, [], []
+def noted_add(closure):
+    began.extend(closure)
+    add(closure)
+def noted_step(d, closure, spin):
+    F = step(d, closure, spin)
+    taken.append(np.concatenate([d[:, 0], F[:, 0]]))
+    return F
+live.add, live.step = noted_add, noted_step
+joints = Joints(live, area=1.0)
+joints.attach()
+O.dt = 1e-3
+at = np.array([(0.01, 0), (0.6, 0), (0.6, 1.5), (0.2, 1.2), (0.8, 0.3), (-0.5, 0.3), (0.7, 0)])
+for a, b in zip(at[:-1], at[1:]):
+    for k in range(1, 31):
+        u, s = end * (a + (b - a) * (k / 30))
+        O.bodies[1].state.pos = (1 - u, s, 0)
+        O.step()
+result(began=began, taken=np.array(taken), friction=live.batch.friction,
+       plastic=live.batch.plastic_work, dissipated=live.batch.dissipated_energy)
+"""
+)
+
+
+def test_asperities_yield_and_wear_as_in_pure_python(yade, tmp_path, law):
+    """Closure, shear, unloading, opening and re-contact of one contact of two spheres."""
+    end = law.closure_range
+    damage = {"yield_interference": 0.1 * end, "mu_residual": 0.2, "wear_slip": end}
+    law = dataclasses.replace(law, asperity=dataclasses.replace(law.asperity, **damage))
+    law.to_toml(tmp_path / "law.toml")
+    out = yade(DAMAGED, live=True)
+    joint = law.joint()
+    joint.update([out["began"][0], 0.0, 0.0])
+    d, F = np.split(out["taken"], 2, axis=1)
+    exact = np.array([joint.update(step)[0] for step in d])
+    # one law, other versions of Python and numpy: rounding of differences of large forces
+    assert np.abs(F - exact).max() < 1e-11 * np.abs(exact).max()
+    assert (F[:, 0] == 0.0).any()
+    assert F[-1, 0] > 0.0
+    assert out["friction"][0] == pytest.approx(joint.friction, rel=1e-11)
+    assert out["friction"][0] < 0.9 * law.asperity.mu
+    assert out["plastic"][0] == pytest.approx(joint.plastic_work, rel=1e-11)
+    assert 0.0 < joint.plastic_work < joint.dissipated_energy
+    assert out["dissipated"][0] == pytest.approx(joint.dissipated_energy, rel=1e-9)

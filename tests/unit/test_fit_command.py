@@ -20,7 +20,7 @@ def _in_an_empty_folder(tmp_path, monkeypatch):
 def write(path, stress, closure):
     path.parent.mkdir(exist_ok=True)
     table = np.column_stack([stress, closure])
-    np.savetxt(path, table, delimiter=",", header="stress,closure", comments="")
+    np.savetxt(path, table, delimiter=",", header="stress_Pa,closure_m", comments="")
 
 
 @pytest.fixture
@@ -90,7 +90,7 @@ def test_a_scan_needs_only_the_contacts_to_be_a_law(tmp_path):
     orientation, heights = jl.Orientation(3.0), jl.GammaHeights(4.0, 10e-6)
     z = jl.synthetic_surface(orientation, heights, rows=8, columns=8, spacing=20e-6)
     np.save(tmp_path / "z.npy", z)
-    assert main(["scan", "z.npy", "--spacing", "20um", "--out", "o"]) == 0
+    assert main(["scan", "z.npy", "--spacing", "20um", "--height-unit", "m", "--out", "o"]) == 0
     summary = json.loads((tmp_path / "o" / "summary.json").read_text())
     contacts = "\n[asperity]\nK = 1e9\nlam = 1.2\neta = 0.5\nmu = 0.6\n"
     law = jl.JointLaw.from_toml((tmp_path / "o" / "surface.toml").read_text() + contacts)

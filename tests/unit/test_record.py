@@ -83,9 +83,12 @@ def test_csv_round_trip(tmp_path):
     record = analytic(0.3)
     record.to_csv(tmp_path / "r.csv")
     table = np.genfromtxt(tmp_path / "r.csv", delimiter=",", names=True)
-    assert table.dtype.names == COLUMNS
-    for name in COLUMNS:  # twelve digits are written
-        np.testing.assert_allclose(table[name], record.columns[name], rtol=1e-11)
+    assert table.dtype.names[-3:] == ("separated", "stored_Jm2", "dissipated_Jm2")
+    for title, name in zip(table.dtype.names, COLUMNS, strict=True):  # twelve digits are written
+        assert title.startswith(name)
+        np.testing.assert_allclose(table[title], record.columns[name], rtol=1e-11)
+    with pytest.raises(ValueError, match="'1furlong' is not a quantity in m"):
+        record.to_csv(tmp_path / "r.csv", length="furlong")
 
 
 def test_npz_round_trip(tmp_path):

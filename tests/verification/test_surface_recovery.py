@@ -93,12 +93,21 @@ def test_files_give_the_array_back(tmp_path):
     z = scan(4, rows=8, columns=6)
     np.savetxt(tmp_path / "z.csv", z * 1e6, delimiter=",", header="heights in um")
     np.save(tmp_path / "z.npy", z)
-    for name, factor in (("z.csv", 1e-6), ("z.npy", None)):
+    for name, factor in (("z.csv", 1e-6), ("z.npy", 1.0)):
         read, spacing = read_scan(tmp_path / name, SPACING, factor)
         assert read == pytest.approx(z, abs=1e-15)
         assert spacing == SPACING
     with pytest.raises(ValueError, match="spacing"):
         read_scan(tmp_path / "z.npy")
+    with pytest.raises(ValueError, match="no unit of its heights; name it, such as --height-unit"):
+        read_scan(tmp_path / "z.npy", SPACING)
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e6])
+def test_heights_in_another_unit_fix_no_direction(factor):
+    """Taken as m what is in mm or um: all facets stand on edge, and no direction is known."""
+    fit = from_surface(factor * scan(1, rows=8, columns=8), SPACING)
+    assert not {"a", "b", "c"} & set(fit.identifiable)
 
 
 def test_the_topography_library_is_read(tmp_path):

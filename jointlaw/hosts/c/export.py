@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 import sys
 from importlib import resources
@@ -10,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...discretisation.tables import Tables
 from ...kernels.cells import compliance
 from ...kernels.reference import strength
 from ...law import JointLaw
@@ -18,8 +18,10 @@ from ...support.files import replace_file
 
 LANES = 4  # facets side by side, as in jointlaw.h
 AZIMUTHS = 512  # of a ring of facets at most, as in jointlaw.h
-FORMAT = 1  # of table files: a change of their keywords or columns changes it
+FORMAT = 2  # of table files: a change of their keywords or columns changes it
 FILES = ("jointlaw.h", "example.c", "example.cpp", "Makefile", "README.md")
+UNUSED = 1e300  # m: cells that begin there hold nothing
+_LARGEST = sys.float_info.max
 _MODEL = "granite"  # the name of the tables in these files
 
 
@@ -38,7 +40,7 @@ def export_c(law: JointLaw, directory: str | Path, name: str = "joint") -> list[
     constants), `example.c`, `example.cpp`, `Makefile` and `README.md`. Returns the names. Raises
     ValueError for a name that C cannot have or too many azimuths, before anything is written.
     """
-    if len(law.facets.theta) > AZIMUTHS * law.resolution.u:
+    if max(_ring(law.facets.theta)) > AZIMUTHS:
         raise ValueError(
             f"resolution.phi = {law.resolution.phi} is out of bounds: jointlaw.h takes at most "
             f"{AZIMUTHS} azimuths on the circle"
@@ -106,21 +108,16 @@ def header_text(law: JointLaw, name: str) -> str:
 
 
 def _scalars(law: JointLaw) -> dict[str, int | float]:
-    """Keywords and numbers, in the order of `struct jlaw_law`; refuses what C does not hold."""
+    """Keywords and numbers, in the order of `struct jlaw_law`."""
     k, p = law.tables, law.asperity
-    for name in ("yield_interference", "wear_slip"):
-        if (value := getattr(p, name, math.inf)) != math.inf:
-            raise ValueError(
-                f"asperity.{name} = {value:g} m: jointlaw.h holds no asperities that yield or "
-                "wear; leave it out"
-            )
     return {
         "dim": k.dim,
         "facets": len(k.c1),
         "cells": k.cells,
         "pieces": len(k.curve.S),
-        "azimuths": len(k.c1) // law.resolution.u,
-        "critical_slip": min(k.critical_slip, sys.float_info.max),
+        "yields": int(k.yields),
+        "wears": int(k.wears),
+        "critical_slip": min(k.critical_slip, _LARGEST),
         "eta": k.curve.eta,
         "scale": k.curve.scale,
         "rise": float(k.curve.rise),
@@ -128,6 +125,10 @@ def _scalars(law: JointLaw) -> dict[str, int | float]:
         "stiffness_factor": (max(1.0, 1.0 / p.lam) + p.mu) * float(np.sum(k.area / k.c1)),
         "largest_reach": law.largest_reach,
         "stretch": 1.0 + 2.0 * float(np.max(np.abs(k.m))),
+        "farthest": min(law.largest_reach, law._first_loading.farthest),
+        "mu": k.mu,
+        "mu_residual": k.mu if k.mu_residual is None else k.mu_residual,
+        "wear_slip": min(k.wear_slip, _LARGEST),
     }
 
 
@@ -141,22 +142,39 @@ def _arrays(law: JointLaw) -> dict[str, Array]:
         full.reshape(-1, *columns.shape[1:])[:M] = columns
         return np.moveaxis(full, 1, -1)
 
-    facet = np.zeros((M, 20))
+    facet = np.zeros((M, 27))
     for first, rows in ((0, k.m), (3, k.s), (6, k.t), (9, k.n)):
         facet[:, first : first + k.dim] = rows.T
     rest = (
         k.area, k.area / k.c1, strength(k, np.asarray(k.mu)).ravel(), compliance(k).ravel(),
         np.full(M, 1.0 / k.lam), k.area * k.c1, k.weight / k.weight.sum(), _mirror(k.n),
+        _ring(law.facets.theta), _used(k.depth),
     )  # fmt: skip
-    facet[:, 12:] = np.stack(rest, axis=-1)
-    largest = sys.float_info.max
-    depth = np.minimum(np.stack([k.depth, k.depth_force, k.depth_slope], axis=-1), largest)
+    facet[:, 12:22] = np.stack(rest, axis=-1)
+    if k.yield_depth is not None:
+        late = np.stack(law._first_loading.yielding or (), axis=-1)  # (2 M, 2)
+        facet[:, 22:] = np.column_stack([k.yield_depth, late[:M], late[M:]])
     return {
         "facet": blocks(facet),
-        "depth": blocks(depth),
+        "depth": blocks(_depth(k)),
         "curve": k.curve.S,
         "energy": k.curve.T,
     }
+
+
+def _depth(k: Tables) -> Array:
+    """Depth cells (M, D, 6): zeta, Phi, Phi' at the begin; zeta at the end, G and kappa there."""
+    begin, end = (
+        np.stack([k.depth[:, rows], k.depth_force[:, rows], k.depth_slope[:, rows]])
+        for rows in (slice(-1), slice(1, None))
+    )
+    ends = end[0] < UNUSED  # others are open-ended
+    zeta, force, slope = np.where(ends, end, 0.0)
+    start, force0, slope0 = np.where(begin[0] < UNUSED, begin, 0.0)
+    G = np.where(ends, force - force0 - slope0 * (zeta - start), 0.0)
+    kappa = np.where(ends, slope - slope0, 0.0)
+    last = np.where(ends, zeta, _LARGEST)
+    return np.stack([np.minimum(begin[0], _LARGEST), force0, slope0, last, G, kappa], axis=-1)
 
 
 def _mirror(n: Array) -> Array:
@@ -164,6 +182,21 @@ def _mirror(n: Array) -> Array:
     image = n * np.where(np.arange(len(n)) == 1, -1.0, 1.0)[:, None]
     away = np.sum((image[:, :, None] - n[:, None]) ** 2, axis=0)
     return np.argmin(away, axis=1).astype(float)
+
+
+def _ring(theta: Array) -> Array:
+    """Number of the facets (M,) of the same inclination, which follow one another."""
+    _, first, count = np.unique(theta, return_index=True, return_counts=True)
+    several = count[np.argsort(first)]
+    return np.repeat(several, several).astype(float)
+
+
+def _used(depth: Array) -> Array:
+    """Cells (M,) in use, the most of each block of LANES facets."""
+    count = np.sum(depth[:, :-1] < UNUSED, axis=1)
+    first = np.arange(0, len(count), LANES)
+    most = np.maximum.reduceat(count, first)
+    return np.repeat(most, LANES)[: len(count)].astype(float)
 
 
 def _toml(law: JointLaw) -> list[str]:

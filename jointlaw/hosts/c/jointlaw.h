@@ -62,10 +62,11 @@ double jlaw_closure(const jlaw_law *law, double normal_stress);
 double jlaw_max_stiffness(const jlaw_law *law, double closure);
 
 /* The state in axes 2 and 3 that are turned by this angle (rad, from 2 to 3) about the normal. For a
- * host that cannot carry its axes with a body; for laws without a preferred direction (c = 0).
- * What
- * sliders lose by it counts as dissipated. Exact for whole azimuths of the facets, between them as
- * good as the azimuths are many; in a plane the axis keeps or changes its sense. */
+ * host that cannot carry its axes with a body, and laws without a preferred direction (c = 0).
+ * Shear and offset turn exactly. Sliders and flattened depths are read between the azimuths of
+ * their ring of facets: exact where the angle is a whole number of azimuths of every ring, else
+ * the better the more there are. Sliders gain no energy; what they lose counts as dissipated. In a
+ * plane the axis keeps or changes its sense. */
 void jlaw_rotate(const jlaw_law *law, double *s, double angle);
 /* The state after the bodies changed their roles: axis 1 turned round, axis 2 kept, axis 3 turned
  * round with it. Shear along 2 changes its sign, along 3 not. Exact. */
@@ -75,7 +76,7 @@ void jlaw_swap_bodies(const jlaw_law *law, double *s);
 const char *jlaw_fingerprint(const jlaw_law *law);
 
 /* The tables, for files NAME.h; not for the host. LANES facets lie side by side in a block. */
-#define JLAW_FORMAT 1 /* of table files */
+#define JLAW_FORMAT 2 /* of table files */
 enum {
   JLAW_LANES = 4,
   JLAW_M = 0, JLAW_S = 3, JLAW_T = 6, JLAW_N = 9, /* m = n/c1, s, t, n: 3 columns each */
@@ -85,17 +86,24 @@ enum {
   JLAW_SOFT = 16,                  /* 1/lam */
   JLAW_POTENTIAL = 17,             /* A c1 */
   JLAW_SHARE = 18, JLAW_MIRROR = 19, /* of all orientations; the facet mirrored along axis 2 */
-  JLAW_COLUMNS = 20,
+  JLAW_RING = 20,                  /* facets of this inclination, one after the other */
+  JLAW_USED = 21,                  /* cells that are not empty, most of the block */
+  JLAW_YIELD = 22,                 /* y_p = d_y/c1 */
+  JLAW_LATE = 23, /* unsheared joint: share, depth, share, depth of what yielding takes off */
+  JLAW_COLUMNS = 27,
+  JLAW_ROWS = 6, /* of a depth cell: zeta, Phi, Phi' at its begin; zeta at its end, G, kappa there */
   JLAW_AZIMUTHS = 512 /* most */
 };
 struct jlaw_law {
-  int dim, facets, cells, pieces, azimuths; /* pieces of the curve; azimuths of a ring of facets */
+  int dim, facets, cells, pieces, yields, wears; /* pieces of the curve; 0 or 1 */
   double critical_slip;                     /* infinite: the largest float */
   double eta, scale, rise;                  /* of the virgin curve */
   double closure_factor, stiffness_factor;  /* normal stress over Phi, bound of |C| over Phi' */
   double largest_reach, stretch;            /* m; bound of |y| over that of the displacement */
+  double farthest;                          /* m: largest closure that a stress is looked for in */
+  double mu, mu_residual, wear_slip;        /* of asperities that wear */
   const double *facet;  /* (blocks, JLAW_COLUMNS, LANES); zeros beyond the last facet */
-  const double *depth;  /* (blocks, cells + 1, 3, LANES): zeta, and Phi and Phi' there */
+  const double *depth;  /* (blocks, cells, JLAW_ROWS, LANES) */
   const double *curve;  /* (pieces, 4): S of the virgin curve */
   const double *energy; /* (pieces, 4): T */
   double *own;          /* what jlaw_free frees */
@@ -120,17 +128,22 @@ struct jlaw_law {
 #ifdef __cplusplus
 extern "C" {
 #endif
-#ifdef __clang__
+/* No fused operations here, whatever the flags */
+#if defined(__clang__)
 #pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__)
+#pragma GCC push_options
+#pragma GCC optimize("fp-contract=off")
 #endif
 
 /* Four facets side by side in one vector, or (JOINTLAW_PLAIN, other compilers) one after the
- * other with the same bits. AVX2 where the machine has it, found out at run time; without FMA, so
- * that no operations are fused. */
+ * other with the same bits. AVX2 or AVX-512 where the machine has it, found out at run time. */
 #if defined(__GNUC__)
 #define JLAW_INLINE static inline __attribute__((always_inline))
+#define JLAW_APART static __attribute__((noinline))
 #else
 #define JLAW_INLINE static inline
+#define JLAW_APART static
 #endif
 #if defined(__GNUC__) && !defined(JOINTLAW_PLAIN)
 #pragma GCC diagnostic push /* all functions of vectors are inline */
@@ -142,8 +155,10 @@ typedef long long jlaw_mask_ __attribute__((vector_size(32)));
 typedef int jlaw_whole_ __attribute__((vector_size(16)));
 #define JLAW_LOAD(p) ((jlaw_v_) *(const jlaw_loose_ *) (p))
 #define JLAW_AT(v, l) ((v)[l])
+#define JLAW_LIST(a, b, c, d) {a, b, c, d}
 #define JLAW_WHOLE(x) __builtin_convertvector(x, jlaw_whole_)
 #define JLAW_DOUBLE(i) __builtin_convertvector(i, jlaw_v_)
+#define JLAW_ABS(x) ((jlaw_v_) ((jlaw_mask_) (x) & 0x7FFFFFFFFFFFFFFFLL))
 #define JLAW_PICK(m, a, b) ((jlaw_v_) (((m) & (jlaw_mask_) (a)) | (~(m) & (jlaw_mask_) (b))))
 #else
 #define JLAW_WIDE 1
@@ -151,15 +166,16 @@ typedef double jlaw_v_;
 typedef int jlaw_mask_, jlaw_whole_;
 #define JLAW_LOAD(p) (*(p))
 #define JLAW_AT(v, l) (v)
+#define JLAW_LIST(a, b, c, d) a
 #define JLAW_WHOLE(x) ((int) (x))
 #define JLAW_DOUBLE(i) ((double) (i))
+#define JLAW_ABS(x) fabs(x)
 #define JLAW_PICK(m, a, b) ((m) ? (a) : (b))
 #endif
-#define JLAW_ABS(x) JLAW_PICK((x) < 0.0, -(x), x)
 #define JLAW_W(column) JLAW_LOAD(w + (column) * JLAW_LANES) /* of the facets w */
 #if defined(__x86_64__) && defined(__gnu_linux__) && defined(__OPTIMIZE__) && !defined(__AVX2__) \
     && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && !defined(JOINTLAW_PLAIN)
-#define JLAW_CLONES __attribute__((target_clones("avx2", "default")))
+#define JLAW_CLONES __attribute__((target_clones("arch=x86-64-v4", "avx2", "default")))
 #else
 #define JLAW_CLONES
 #endif
@@ -216,49 +232,66 @@ JLAW_INLINE void jlaw_root_(jlaw_v_ *x)
 {
   for (int l = 0; l < JLAW_WIDE; l++) JLAW_AT(*x, l) = sqrt(JLAW_AT(*x, l));
 }
-JLAW_INLINE void jlaw_power_(jlaw_v_ *x, double exponent) /* 0 where x is not above 0 */
+JLAW_INLINE void jlaw_at_least_(jlaw_v_ *x, const jlaw_v_ *y) { *x = JLAW_PICK(*x > *y, *x, *y); }
+JLAW_INLINE void jlaw_at_most_(jlaw_v_ *x, const jlaw_v_ *y) { *x = JLAW_PICK(*x < *y, *x, *y); }
+
+typedef double jlaw_lanes_[JLAW_WIDE];
+typedef struct { jlaw_lanes_ y, power, S, DS, DDS; } jlaw_lift_;
+
+/* y^eta for any eta, and S that is tabulated over w^rise */
+JLAW_APART void jlaw_lift_up_(const jlaw_law *law, jlaw_lift_ *to)
 {
-  for (int l = 0; l < JLAW_WIDE; l++)
-    JLAW_AT(*x, l) = JLAW_AT(*x, l) > 0.0 ? pow(JLAW_AT(*x, l), exponent) : 0.0;
+  const double W = law->scale * law->scale;
+  for (int l = 0; l < JLAW_WIDE; l++) {
+    const double y = to->y[l], w = y / (y + W), more = law->rise * W / (y + W);
+    const double S = to->S[l], DS = to->DS[l], up = y > 0.0 ? pow(w, law->rise) : 0.0;
+    if (law->rise > 0.0) {
+      to->DDS[l] = up * (to->DDS[l] + 2.0 * more * DS + (more * more - more * w) * S);
+      to->DS[l] = up * (DS + more * S);
+      to->S[l] = up * S;
+    }
+    if (law->eta == 0.0) to->power[l] = y > 0.0 ? 1.0 : 0.0;
+    else if (law->eta != 0.5) to->power[l] = y > 0.0 ? pow(y, law->eta) : 0.0;
+  }
 }
 
 /* Phi and Phi' at y, and Phi'' if asked; zero where y <= 0. What counts as zero becomes zero. */
 JLAW_INLINE void jlaw_virgin_(const jlaw_law *law, jlaw_v_ *y, jlaw_v_ *force, jlaw_v_ *slope,
                               jlaw_v_ *bend)
 {
-  const double pieces = law->pieces, top = pieces - 1.0, scale = law->scale, eta = law->eta;
-  const jlaw_v_ zero = {0.0};
+  const double pieces = law->pieces, scale = law->scale, eta = law->eta;
+  const double *curve = law->curve;
+  const jlaw_v_ zero = {0.0}, top = zero + (pieces - 1.0);
   *y = JLAW_PICK(JLAW_ABS(*y) >= JLAW_UNDERFLOW, *y, zero);
   const jlaw_v_ here = JLAW_PICK(*y > 0.0, *y, zero);
   jlaw_v_ v = here;
   jlaw_root_(&v);
   const jlaw_v_ r = 1.0 / (v + scale);
-  jlaw_v_ x = v * r * pieces, c0 = zero, c1 = zero, c2 = zero, c3 = zero;
-  const jlaw_v_ bound = JLAW_PICK(x < top, x, zero + top);
+  jlaw_v_ x = v * r * pieces, bound = x;
+  jlaw_at_most_(&bound, &top);
   const jlaw_whole_ at = JLAW_WHOLE(bound);
   x = x - JLAW_DOUBLE(at);
-  for (int l = 0; l < JLAW_WIDE; l++) {
-    const double *c = law->curve + 4 * JLAW_AT(at, l);
-    JLAW_AT(c0, l) = c[0], JLAW_AT(c1, l) = c[1], JLAW_AT(c2, l) = c[2], JLAW_AT(c3, l) = c[3];
-  }
+  const double *c[JLAW_LANES];
+  for (int l = 0; l < JLAW_WIDE; l++) c[l] = curve + 4 * JLAW_AT(at, l);
+  const jlaw_v_ c0 = JLAW_LIST(c[0][0], c[1][0], c[2][0], c[3][0]);
+  const jlaw_v_ c1 = JLAW_LIST(c[0][1], c[1][1], c[2][1], c[3][1]);
+  const jlaw_v_ c2 = JLAW_LIST(c[0][2], c[1][2], c[2][2], c[3][2]);
+  const jlaw_v_ c3 = JLAW_LIST(c[0][3], c[1][3], c[2][3], c[3][3]);
   const jlaw_v_ ts = v * r * r * scale; /* t (1 - t) */
-  jlaw_v_ S = c0 + x * (c1 + x * (c2 + x * c3)), DDS = zero;
+  jlaw_v_ S = c0 + x * (c1 + x * (c2 + x * c3)), DDS = zero, power = v;
   jlaw_v_ DS = 0.5 * ts * (pieces * (c1 + x * (2.0 * c2 + x * (3.0 * c3))));
   if (bend)
     DDS = 0.25 * ts * ts * (pieces * pieces * (2.0 * c2 + x * (6.0 * c3)))
           + 0.5 * (scale - v) * r * DS;
-  if (law->rise > 0.0) { /* S is tabulated over w^rise */
-    const double W = scale * scale;
-    const jlaw_v_ w = here / (here + W), more = law->rise * W / (here + W);
-    jlaw_v_ lift = w;
-    jlaw_power_(&lift, law->rise);
-    DDS = lift * (DDS + 2.0 * more * DS + (more * more - more * w) * S);
-    DS = lift * (DS + more * S);
-    S = lift * S;
+  if (eta != 0.5 || law->rise > 0.0) {
+    jlaw_lift_ to;
+    for (int l = 0; l < JLAW_WIDE; l++) {
+      to.y[l] = JLAW_AT(here, l), to.power[l] = JLAW_AT(v, l), to.S[l] = JLAW_AT(S, l);
+      to.DS[l] = JLAW_AT(DS, l), to.DDS[l] = JLAW_AT(DDS, l);
+    }
+    jlaw_lift_up_(law, &to);
+    power = JLAW_LOAD(to.power), S = JLAW_LOAD(to.S), DS = JLAW_LOAD(to.DS), DDS = JLAW_LOAD(to.DDS);
   }
-  jlaw_v_ power = eta == 0.5 ? v : here;
-  if (eta == 0.0) power = JLAW_PICK(v > 0.0, zero + 1.0, zero);
-  else if (eta != 0.5) jlaw_power_(&power, eta);
   *force = power * here * S;
   *slope = power * ((1.0 + eta) * S + DS);
   if (bend)
@@ -293,16 +326,20 @@ static double jlaw_psi_(const jlaw_law *law, double y)
 typedef struct {
   double p[3], from[3], to[3]; /* increment; closure and in-plane offset before and after */
   double J[4], slip;           /* d offset/d p; way along the offset at its limit */
+  double worn;                 /* friction now over that of unworn asperities */
 } jlaw_move_;
 
 typedef struct { /* what the blocks add up to, lane by lane */
   jlaw_v_ F[3][JLAW_LANES / JLAW_WIDE], C[9][JLAW_LANES / JLAW_WIDE];
   jlaw_v_ pull[2][JLAW_LANES / JLAW_WIDE], lost[JLAW_LANES / JLAW_WIDE];
+  jlaw_v_ crushed[JLAW_LANES / JLAW_WIDE], normal[JLAW_LANES / JLAW_WIDE]; /* plastic work; A Phi */
 } jlaw_sum_;
 
 typedef struct { /* facets side by side */
   jlaw_v_ y0, y1, f0, f1, k0, k1, es, et, bend; /* y, Phi, Phi'; de; Phi'' */
   jlaw_v_ qs, qt, lost, vs, vt, bss, bst, btt;  /* sums over the cells: q, loss, v and B of C */
+  jlaw_v_ z0, z1, fz0, fz1, kz0, kz1;           /* flattened depth, Phi and Phi' there */
+  jlaw_v_ ws, wt, open;                         /* sums of the softening by z1; any kappa */
 } jlaw_facets_;
 
 /* Moves the offset by p, dragged along where it is at its limit: "Large shear" */
@@ -339,54 +376,91 @@ static void jlaw_limit_offset_(const jlaw_law *law, jlaw_move_ *m)
   m->J[2] = m->to[1] * row0, m->J[3] = m->to[1] * row1;
 }
 
-/* Share of a depth cell in Phi, and its slope: the bed beyond its lower limit less that beyond its
- * upper, which for the last cell is never reached. z: zeta, Phi, Phi' at both limits. */
+/* Share of a depth cell in Phi, and its slope. z: zeta, Phi, Phi' at the lower limit; zeta at the
+ * upper, and G and kappa from there on. */
 JLAW_INLINE void jlaw_cell_(const jlaw_v_ *y, const jlaw_v_ *force, const jlaw_v_ *slope,
-                            const jlaw_v_ z[6], jlaw_v_ *G, jlaw_v_ *kappa)
+                            const jlaw_v_ z[JLAW_ROWS], jlaw_v_ *G, jlaw_v_ *kappa)
 {
   const jlaw_v_ zero = {0.0}, low = *y - z[0], high = *y - z[3];
-  jlaw_v_ g = *force - z[1] - z[2] * low, k = *slope - z[2];
-  g = JLAW_PICK(high > 0.0, g - (*force - z[4] - z[5] * high), g);
-  k = JLAW_PICK(high > 0.0, z[5] - z[2], k);
+  jlaw_v_ g = JLAW_PICK(high > 0.0, z[4] + z[5] * high, *force - z[1] - z[2] * low);
+  jlaw_v_ k = JLAW_PICK(high > 0.0, z[5], *slope - z[2]);
   k = JLAW_PICK((low > 0.0) & (k > 0.0), k, zero);
   const jlaw_v_ most = k * low;
-  g = JLAW_PICK(g < most, g, most);
-  *G = JLAW_PICK(g > 0.0, g, zero);
+  jlaw_at_most_(&g, &most);
+  jlaw_at_least_(&g, &zero);
+  *G = g;
+  *kappa = k;
+}
+
+/* The same less what the cell holds, H, at the flattened depth: "Yielding" */
+JLAW_INLINE void jlaw_flatten_(const jlaw_v_ *y, const jlaw_v_ *depth, const jlaw_v_ *H, jlaw_v_ *G,
+                               jlaw_v_ *kappa)
+{
+  const jlaw_v_ zero = {0.0}, over = *y - *depth, k = JLAW_PICK(over > 0.0, *kappa, zero);
+  const jlaw_v_ most = k * over;
+  jlaw_v_ g = *G - *H;
+  jlaw_at_most_(&g, &most);
+  jlaw_at_least_(&g, &zero);
+  *G = g;
   *kappa = k;
 }
 
 /* One depth cell of facets: load, friction limit, loss, tangent; q: sliders before and after */
-JLAW_INLINE void jlaw_slide_(const double *w, const double *limits, jlaw_facets_ *f, jlaw_v_ q[2],
-                             int ledger, int tangent)
+JLAW_INLINE void jlaw_slide_(const double *w, const double *limits, double worn, jlaw_facets_ *f,
+                             jlaw_v_ *qs, jlaw_v_ *qt, int yields, int wears, int ledger,
+                             int tangent)
 {
   const jlaw_v_ zero = {0.0}, one = zero + 1.0;
-  jlaw_v_ z[6], G0, G1, k0, k1;
-  for (int i = 0; i < 6; i++) z[i] = JLAW_LOAD(limits + i * JLAW_LANES);
+  jlaw_v_ z[JLAW_ROWS], G0, G1, k0, k1, H0, H1, h0, h1 = zero;
+  for (int i = 0; i < JLAW_ROWS; i++) z[i] = JLAW_LOAD(limits + i * JLAW_LANES);
   jlaw_cell_(&f->y0, &f->f0, &f->k0, z, &G0, &k0);
   jlaw_cell_(&f->y1, &f->f1, &f->k1, z, &G1, &k1);
+  jlaw_v_ reached = G1; /* before springs yield at the new y, which they do at once */
+  if (yields) {
+    jlaw_cell_(&f->z0, &f->fz0, &f->kz0, z, &H0, &h0);
+    jlaw_cell_(&f->z1, &f->fz1, &f->kz1, z, &H1, &h1);
+    jlaw_v_ k = k1;
+    jlaw_flatten_(&f->y0, &f->z0, &H0, &G0, &k0);
+    jlaw_flatten_(&f->y1, &f->z0, &H0, &reached, &k);
+    jlaw_flatten_(&f->y1, &f->z1, &H1, &G1, &k1);
+  }
+  jlaw_v_ strength = JLAW_W(JLAW_STRENGTH);
+  if (wears) { /* friction has fallen: back to its limit */
+    strength = strength * worn;
+    const jlaw_v_ size2 = *qs * *qs + *qt * *qt, cap = strength * G0;
+    jlaw_v_ size = size2;
+    jlaw_root_(&size);
+    const jlaw_mask_ beyond = size > cap;
+    const jlaw_v_ back = JLAW_PICK(beyond, cap / JLAW_PICK(beyond, size, one), one);
+    const jlaw_v_ gone = (1.0 - back) * (1.0 + back) * size2;
+    f->lost += JLAW_PICK(k0 > JLAW_TINY, gone / JLAW_PICK(k0 > JLAW_TINY, k0, one), zero);
+    *qs = back * *qs, *qt = back * *qt;
+  }
   /* trial force: by the chord where stiffness grows, scaled down where it falls */
   const jlaw_v_ a = JLAW_W(JLAW_STIFF), dy = f->y1 - f->y0;
-  const jlaw_mask_ grows = k1 > k0, near = JLAW_ABS(dy) <= JLAW_NEAR * JLAW_ABS(f->y1);
-  const jlaw_v_ ratio = JLAW_PICK(grows, G1 - G0, k1) / JLAW_PICK(grows, dy, k0 + JLAW_LEAST);
+  const jlaw_mask_ grows = k1 > k0;
+  jlaw_mask_ near = JLAW_ABS(dy) <= JLAW_NEAR * JLAW_ABS(f->y1);
+  if (yields) near = near & ((k0 > 0.0) | (k1 <= 0.0)); /* flattened springs touch all at once */
+  const jlaw_v_ ratio = JLAW_PICK(grows, reached - G0, k1) / JLAW_PICK(grows, dy, k0 + JLAW_LEAST);
   jlaw_v_ chord = JLAW_PICK(near, 0.5 * (k0 + k1), ratio);
-  chord = JLAW_PICK(chord > k0, chord, k0);
-  chord = JLAW_PICK(chord < k1, chord, k1);
-  const jlaw_v_ kept = JLAW_PICK(grows, one, ratio), add = a * JLAW_PICK(grows, chord, k1);
-  const jlaw_v_ old2 = q[0] * q[0] + q[1] * q[1];
-  const jlaw_v_ ts = q[0] * kept + add * f->es, tt = q[1] * kept + add * f->et;
+  jlaw_at_least_(&chord, &k0);
+  jlaw_at_most_(&chord, &k1);
+  const jlaw_v_ kept = JLAW_PICK(grows, one, ratio), now = JLAW_PICK(grows, chord, k1);
+  const jlaw_v_ old2 = *qs * *qs + *qt * *qt, add = a * now;
+  const jlaw_v_ ts = *qs * kept + add * f->es, tt = *qt * kept + add * f->et;
   /* friction: |q| <= mu lam A G */
-  const jlaw_v_ new2 = ts * ts + tt * tt;
+  const jlaw_v_ new2 = ts * ts + tt * tt, cap = strength * G1;
   jlaw_v_ size = new2;
   jlaw_root_(&size);
-  const jlaw_v_ strength = JLAW_W(JLAW_STRENGTH), cap = strength * G1;
-  const jlaw_mask_ beyond = size > cap;
-  const jlaw_v_ share = cap / (JLAW_PICK(beyond, size, cap) + JLAW_LEAST);
+  jlaw_v_ whole = size;
+  jlaw_at_least_(&whole, &cap);
+  const jlaw_v_ share = cap / (whole + JLAW_LEAST);
   const jlaw_v_ part = JLAW_PICK(new2 > JLAW_TINY, share, zero);
-  q[0] = part * ts, q[1] = part * tt;
-  f->qs += q[0], f->qt += q[1];
+  *qs = part * ts, *qt = part * tt;
+  f->qs += *qs, f->qt += *qt;
   if (ledger) { /* "No step can make energy": each factor is >= 0 as written */
-    const jlaw_v_ now = JLAW_PICK(grows, chord, k1), high = JLAW_PICK(grows, chord, k0);
-    const jlaw_v_ low = JLAW_PICK(grows, k0, k1), k01 = k0 * high, k11 = k1 * now;
+    const jlaw_v_ high = JLAW_PICK(grows, chord, k0), low = JLAW_PICK(grows, k0, k1);
+    const jlaw_v_ k01 = k0 * high, k11 = k1 * now;
     const jlaw_v_ rub = k1 - now + 2.0 * share * (1.0 - share) * now;
     f->lost += JLAW_PICK(k01 > JLAW_TINY, old2 * ((high - low) / k01), zero)
                + JLAW_PICK(k11 > JLAW_TINY, new2 * (rub / k11), zero);
@@ -399,48 +473,123 @@ JLAW_INLINE void jlaw_slide_(const double *w, const double *limits, jlaw_facets_
     const jlaw_mask_ stiffer = grows & (dy > JLAW_ROUNDED * JLAW_ABS(f->y1));
     const jlaw_mask_ slips = size >= strength * (G1 * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * f->f1);
     const jlaw_v_ unit = 1.0 / JLAW_PICK(size > 0.0, size, one), us = ts * unit, ut = tt * unit;
-    const jlaw_v_ ws = JLAW_PICK(stiffer, a * chord1 * f->es, fade * ts);
-    const jlaw_v_ wt = JLAW_PICK(stiffer, a * chord1 * f->et, fade * tt);
-    const jlaw_v_ dot = us * ws + ut * wt, push = strength * k1;
+    const jlaw_v_ vs = JLAW_PICK(stiffer, a * chord1 * f->es, fade * ts);
+    const jlaw_v_ vt = JLAW_PICK(stiffer, a * chord1 * f->et, fade * tt);
+    const jlaw_v_ dot = us * vs + ut * vt, push = strength * k1;
     const jlaw_v_ beta = JLAW_PICK(cap > 0.0, share * add, zero), along = JLAW_PICK(slips, beta, zero);
-    f->vs += JLAW_PICK(slips, share * (ws - us * dot) + push * us, ws);
-    f->vt += JLAW_PICK(slips, share * (wt - ut * dot) + push * ut, wt);
+    f->vs += JLAW_PICK(slips, share * (vs - us * dot) + push * us, vs);
+    f->vt += JLAW_PICK(slips, share * (vt - ut * dot) + push * ut, vt);
     f->bss += beta - along * us * us;
     f->bst -= along * us * ut;
     f->btt += beta - along * ut * ut;
-  }
-}
-
-/* C += along g^T + E^T B E of facets */
-JLAW_INLINE void jlaw_add_tangent_(const double *w, const jlaw_move_ *m, const jlaw_facets_ *f,
-                                   jlaw_sum_ *sum, int at, int dim)
-{
-  const jlaw_v_ soft = JLAW_W(JLAW_SOFT), stiff = JLAW_W(JLAW_A) * f->k1;
-  for (int i = 0; i < dim; i++) {
-    const jlaw_v_ s = JLAW_W(JLAW_S + i), t = JLAW_W(JLAW_T + i);
-    const jlaw_v_ along = stiff * JLAW_W(JLAW_N + i) + soft * (s * f->vs + t * f->vt);
-    const jlaw_v_ left = soft * (s * f->bss + t * f->bst), right = soft * (s * f->bst + t * f->btt);
-    for (int j = 0; j < dim; j++) {
-      jlaw_v_ g = JLAW_W(JLAW_M); /* dy/dd */
-      if (j > 0) g = JLAW_W(JLAW_M + 1) * m->J[j - 1] + JLAW_W(JLAW_M + 2) * m->J[j + 1];
-      sum->C[3 * i + j][at] += along * g + left * JLAW_W(JLAW_S + j) + right * JLAW_W(JLAW_T + j);
+    if (yields) {
+      const jlaw_v_ pull = strength * JLAW_PICK(slips & (k1 > 0.0), h1, zero);
+      f->ws += pull * us, f->wt += pull * ut;
+      f->open = f->open + k1;
     }
   }
 }
 
+/* C += along g^T + E^T B E of facets; where the flattened depth moves less softening g_z^T */
+JLAW_INLINE void jlaw_add_tangent_(const double *w, const jlaw_move_ *m, const jlaw_facets_ *f,
+                                   jlaw_sum_ *sum, int at, int dim, int yields)
+{
+  const jlaw_v_ zero = {0.0}, soft = JLAW_W(JLAW_SOFT), stiff = JLAW_W(JLAW_A) * f->k1;
+  const jlaw_mask_ moves = (f->z1 > f->z0) & (f->open > 0.0);
+  const jlaw_mask_ own = f->z1 <= f->y1 - JLAW_W(JLAW_YIELD); /* or the opposite facet presses */
+  for (int i = 0; i < dim; i++) {
+    const jlaw_v_ n = JLAW_W(JLAW_N + i), s = JLAW_W(JLAW_S + i), t = JLAW_W(JLAW_T + i);
+    const jlaw_v_ along = stiff * n + soft * (s * f->vs + t * f->vt);
+    const jlaw_v_ left = soft * (s * f->bss + t * f->bst), right = soft * (s * f->bst + t * f->btt);
+    jlaw_v_ less = zero;
+    if (yields)
+      less = JLAW_PICK(moves, JLAW_W(JLAW_A) * f->kz1 * n + soft * (s * f->ws + t * f->wt), zero);
+    for (int j = 0; j < dim; j++) {
+      jlaw_v_ g = JLAW_W(JLAW_M); /* dy/dd */
+      if (j > 0) g = JLAW_W(JLAW_M + 1) * m->J[j - 1] + JLAW_W(JLAW_M + 2) * m->J[j + 1];
+      sum->C[3 * i + j][at] += along * g + left * JLAW_W(JLAW_S + j) + right * JLAW_W(JLAW_T + j);
+      if (yields) sum->C[3 * i + j][at] -= j > 0 ? less * JLAW_PICK(own, g, -g) : less * g;
+    }
+  }
+}
+
+/* The lanes of a block in an array of numbers per facet. Lanes beyond the last facet have zeros
+ * in all tables; they read its number, and what they write is written over by it. */
+JLAW_INLINE void jlaw_take_(const double *from, const size_t at[JLAW_LANES], jlaw_v_ *x)
+{
+  const jlaw_v_ all = JLAW_LIST(from[0], from[at[1]], from[at[2]], from[at[3]]);
+  (void) at; /* one lane does without */
+  *x = all;
+}
+JLAW_INLINE void jlaw_put_(double *to, const size_t at[JLAW_LANES], const jlaw_v_ *x)
+{
+  for (int l = JLAW_WIDE - 1; l >= 0; l--) to[at[l]] = JLAW_AT(*x, l);
+}
+
+/* Flattened depths of facets, before and after the step, and the virgin curve there */
+JLAW_INLINE void jlaw_press_(const jlaw_law *law, const double *w, const jlaw_move_ *m,
+                             const size_t lanes[JLAW_LANES], const double *from, double *to,
+                             jlaw_facets_ *f)
+{
+  const jlaw_v_ zero = {0.0};
+  jlaw_v_ y = f->y1, deeper;
+  jlaw_take_(from, lanes, &f->z0);
+  if (law->critical_slip < DBL_MAX) { /* one depth for a facet and its opposite */
+    y = JLAW_W(JLAW_M) * m->to[0] - (JLAW_W(JLAW_M + 1) * m->to[1] + JLAW_W(JLAW_M + 2) * m->to[2]);
+    jlaw_at_least_(&y, &f->y1);
+  }
+  f->z1 = y - JLAW_W(JLAW_YIELD);
+  jlaw_at_least_(&f->z1, &f->z0);
+  jlaw_virgin_(law, &f->z0, &f->fz0, &f->kz0, NULL);
+  f->fz1 = f->fz0, f->kz1 = f->kz0;
+  deeper = JLAW_PICK(f->z1 > f->z0, zero + 1.0, zero);
+  int moves = 0;
+  for (int l = 0; l < JLAW_WIDE; l++) moves += JLAW_AT(deeper, l) > 0.0;
+  if (moves) jlaw_virgin_(law, &f->z1, &f->fz1, &f->kz1, NULL);
+  jlaw_put_(to, lanes, &f->z1);
+}
+
+/* Phi less its value at the flattened depth */
+JLAW_INLINE void jlaw_relieve_(const jlaw_v_ *y, const jlaw_v_ *depth, const jlaw_v_ *less,
+                               jlaw_v_ *force, jlaw_v_ *slope)
+{
+  const jlaw_v_ zero = {0.0};
+  jlaw_v_ left = *force - *less;
+  jlaw_at_least_(&left, &zero);
+  *force = JLAW_PICK(*y > *depth, left, zero);
+  *slope = JLAW_PICK(*y > *depth, *slope, zero);
+}
+
+/* Plastic work of facets, over A c1: exact where they press themselves flat */
+JLAW_INLINE void jlaw_crush_(const double *w, const jlaw_facets_ *f, jlaw_v_ *work)
+{
+  const jlaw_v_ zero = {0.0}, most = JLAW_W(JLAW_YIELD);
+  jlaw_v_ c0 = f->y0 - f->z0, c1 = f->y1 - f->z1;
+  jlaw_at_least_(&c0, &zero), jlaw_at_most_(&c0, &most);
+  jlaw_at_least_(&c1, &zero), jlaw_at_most_(&c1, &most);
+  *work = JLAW_PICK(f->y1 - most >= f->z1, most, 0.5 * (c0 + c1)) * (f->fz1 - f->fz0);
+}
+
 /* Facets from number `first` on: y before and after, virgin curve, cells, and their part of F, C */
 JLAW_INLINE void jlaw_add_facets_(const jlaw_law *law, int first, const jlaw_move_ *m,
-                                  const double *q0, double *q1, jlaw_sum_ *sum, int dim, int ledger,
-                                  int tangent)
+                                  const double *s0, double *s1, jlaw_sum_ *sum, int dim, int yields,
+                                  int wears, int ledger, int tangent)
 {
-  const int D = law->cells, block = first / JLAW_LANES, lane = first % JLAW_LANES;
-  const int at = lane / JLAW_WIDE, real = law->facets - first;
-  const double *w = law->facet + (size_t) block * JLAW_COLUMNS * JLAW_LANES + lane;
-  const double *z = law->depth + (size_t) block * (size_t) (D + 1) * 3 * JLAW_LANES + lane;
-  const size_t other = (size_t) law->facets * (size_t) D; /* from q_s to q_t of a slider */
+  const int D = law->cells, lane = first % JLAW_LANES, at = lane / JLAW_WIDE;
+  const size_t block = (size_t) first / JLAW_LANES, other = (size_t) law->facets * (size_t) D;
+  const size_t rest = 2 * (size_t) law->dim + 2 * other; /* other: from q_s to q_t of a slider */
+  const double *w = law->facet + block * JLAW_COLUMNS * JLAW_LANES + lane;
+  const double *z = law->depth + block * (size_t) D * JLAW_ROWS * JLAW_LANES + lane;
+  const double *qs0 = s0 + 2 * law->dim + (size_t) first * (size_t) D, *qt0 = qs0 + other;
+  double *qs1 = s1 + 2 * law->dim + (size_t) first * (size_t) D, *qt1 = qs1 + other;
   const jlaw_v_ zero = {0.0};
-  jlaw_facets_ f = {zero, zero, zero, zero, zero, zero, zero, zero, zero,
-                    zero, zero, zero, zero, zero, zero, zero, zero};
+  size_t lanes[JLAW_LANES], places[JLAW_LANES];
+  for (int l = 0; l < JLAW_LANES; l++) {
+    lanes[l] = (size_t) (first + l < law->facets ? l : law->facets - 1 - first);
+    places[l] = lanes[l] * (size_t) D;
+  }
+  jlaw_facets_ f = {zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero,
+                    zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero};
   for (int i = 0; i < dim; i++) {
     f.y0 += JLAW_W(JLAW_M + i) * m->from[i], f.y1 += JLAW_W(JLAW_M + i) * m->to[i];
     f.es += JLAW_W(JLAW_S + i) * m->p[i];
@@ -448,23 +597,31 @@ JLAW_INLINE void jlaw_add_facets_(const jlaw_law *law, int first, const jlaw_mov
   }
   jlaw_virgin_(law, &f.y0, &f.f0, &f.k0, NULL);
   jlaw_virgin_(law, &f.y1, &f.f1, &f.k1, tangent ? &f.bend : NULL);
-  q0 += (size_t) first * (size_t) D, q1 += (size_t) first * (size_t) D;
-  for (int i = 0; i < D; i++, q0++, q1++, z += 3 * JLAW_LANES) {
-    jlaw_v_ q[2] = {zero, zero};
-    for (int l = 0; l < JLAW_WIDE; l++)
-      if (l < real) JLAW_AT(q[0], l) = q0[l * D], JLAW_AT(q[1], l) = (q0 + other)[l * D];
-    jlaw_slide_(w, z, &f, q, ledger, tangent);
-    for (int l = 0; l < JLAW_WIDE; l++)
-      if (l < real) q1[l * D] = JLAW_AT(q[0], l), (q1 + other)[l * D] = JLAW_AT(q[1], l);
+  if (yields)
+    jlaw_press_(law, w, m, lanes, s0 + rest + first, s1 + rest + first, &f);
+  const int used = (int) w[JLAW_USED * JLAW_LANES];
+  for (int i = 0; i < D; i++, qs0++, qt0++, qs1++, qt1++, z += JLAW_ROWS * JLAW_LANES) {
+    jlaw_v_ qs = zero, qt = zero;
+    jlaw_take_(qs0, places, &qs), jlaw_take_(qt0, places, &qt);
+    if (i < used) jlaw_slide_(w, z, m->worn, &f, &qs, &qt, yields, wears, ledger, tangent);
+    jlaw_put_(qs1, places, &qs), jlaw_put_(qt1, places, &qt);
   }
+  if (yields) {
+    jlaw_v_ work;
+    jlaw_crush_(w, &f, &work);
+    sum->crushed[at] += JLAW_W(JLAW_POTENTIAL) * work;
+    jlaw_relieve_(&f.y0, &f.z0, &f.fz0, &f.f0, &f.k0);
+    jlaw_relieve_(&f.y1, &f.z1, &f.fz1, &f.f1, &f.k1);
+  }
+  if (wears) sum->normal[at] += JLAW_W(JLAW_A) * (f.f0 + f.f1);
   const jlaw_v_ normal = JLAW_W(JLAW_A) * f.f1, soft = JLAW_W(JLAW_SOFT);
   for (int i = 0; i < dim; i++) {
     const jlaw_v_ pull = JLAW_W(JLAW_N + i) * normal;
     sum->F[i][at] += pull + soft * (JLAW_W(JLAW_S + i) * f.qs + JLAW_W(JLAW_T + i) * f.qt);
-    if (i > 0) sum->pull[i - 1][at] += pull;
+    if (i > 0 && ledger) sum->pull[i - 1][at] += pull;
   }
   if (ledger) sum->lost[at] += JLAW_W(JLAW_COMPLIANCE) * f.lost;
-  if (tangent) jlaw_add_tangent_(w, m, &f, sum, at, dim);
+  if (tangent) jlaw_add_tangent_(w, m, &f, sum, at, dim, yields);
 }
 
 JLAW_INLINE double jlaw_total_(const jlaw_v_ *x)
@@ -474,27 +631,69 @@ JLAW_INLINE double jlaw_total_(const jlaw_v_ *x)
   return (lane[0] + lane[2]) + (lane[1] + lane[3]);
 }
 
-JLAW_INLINE void jlaw_step_(const jlaw_law *law, const jlaw_move_ *m, const double *s0, double *s1,
-                            double *F, double *C, int dim, int ledger, int tangent)
+/* Whether all sliders hold forces that a law can have; not for NaN */
+JLAW_INLINE int jlaw_sound_(const double *q, size_t n)
 {
   const jlaw_v_ zero = {0.0};
+  jlaw_v_ one = zero, two = zero;
+  double sum = 0.0;
+  size_t i = 0;
+  for (; i + 2 * JLAW_WIDE <= n; i += 2 * JLAW_WIDE) {
+    one += JLAW_LOAD(q + i) * JLAW_LOAD(q + i);
+    two += JLAW_LOAD(q + i + JLAW_WIDE) * JLAW_LOAD(q + i + JLAW_WIDE);
+  }
+  if (i + JLAW_WIDE <= n) {
+    one += JLAW_LOAD(q + i) * JLAW_LOAD(q + i);
+    i += JLAW_WIDE;
+  }
+  for (; i < n; i++) sum += q[i] * q[i];
+  one += two;
+  for (int l = 0; l < JLAW_WIDE; l++) sum += JLAW_AT(one, l);
+  return sum < 1e300;
+}
+
+/* The step; 0, or -1 where the sliders are damaged: nothing is written then */
+JLAW_INLINE int jlaw_step_(const jlaw_law *law, const jlaw_move_ *m, const double *s0, double *s1,
+                           double *F, double *C, int dim, int yields, int wears, int ledger,
+                           int tangent)
+{
+  const int parts = law->dim; /* components that there are; those up to dim are zeros */
+  const size_t M = (size_t) law->facets, sliders = 2 * M * (size_t) law->cells;
+  const jlaw_v_ zero = {0.0};
   jlaw_sum_ sum;
+  if (!jlaw_sound_(s0 + 2 * parts, sliders)) return -1;
   for (int at = 0; at < JLAW_LANES / JLAW_WIDE; at++) {
-    sum.lost[at] = sum.pull[0][at] = sum.pull[1][at] = zero;
+    sum.lost[at] = sum.pull[0][at] = sum.pull[1][at] = sum.crushed[at] = sum.normal[at] = zero;
     for (int i = 0; i < dim; i++) sum.F[i][at] = zero;
     for (int i = 0; tangent && i < 9; i++) sum.C[i][at] = zero;
   }
   for (int first = 0; first < law->facets; first += JLAW_WIDE)
-    jlaw_add_facets_(law, first, m, s0 + 2 * dim, s1 + 2 * dim, &sum, dim, ledger, tangent);
-  double lost = s0[2 * dim - 1] + jlaw_total_(sum.lost);
-  const double drag = jlaw_total_(sum.pull[0]) * m->to[1] + jlaw_total_(sum.pull[1]) * m->to[2];
-  if (ledger && m->slip > 0.0 && drag > 0.0) lost += m->slip * drag / law->critical_slip;
-  for (int i = 0; i < dim; i++) F[i] = jlaw_total_(sum.F[i]);
-  for (int i = 0; tangent && i < dim; i++)
-    for (int j = 0; j < dim; j++) C[dim * i + j] = jlaw_total_(sum.C[3 * i + j]);
-  for (int i = 0; i < dim; i++) s1[i] = s0[i] + m->p[i];
-  for (int i = 1; i < dim; i++) s1[dim + i - 1] = m->to[i];
-  s1[2 * dim - 1] = lost;
+    jlaw_add_facets_(law, first, m, s0, s1, &sum, dim, yields, wears, ledger, tangent);
+  double lost = jlaw_total_(sum.lost);
+  if (ledger && m->slip > 0.0) {
+    const double along = jlaw_total_(sum.pull[0]) * m->to[1] + jlaw_total_(sum.pull[1]) * m->to[2];
+    if (along > 0.0) lost += m->slip * along / law->critical_slip;
+  }
+  for (int i = 0; i < parts; i++) F[i] = jlaw_total_(sum.F[i]);
+  for (int i = 0; tangent && i < parts; i++)
+    for (int j = 0; j < parts; j++) C[parts * i + j] = jlaw_total_(sum.C[3 * i + j]);
+  const double *rest0 = s0 + 2 * parts + sliders;
+  double *rest1 = s1 + 2 * parts + sliders;
+  if (wears) { /* slip of the asperities: the loss over the mean friction limit */
+    const double limit = 0.5 * law->mu * m->worn * jlaw_total_(sum.normal);
+    const size_t last = yields ? M + 1 : 0;
+    rest1[last] = rest0[last] + (limit > 0.0 ? lost / limit : 0.0);
+  }
+  if (yields) {
+    rest1[M] = rest0[M] + jlaw_total_(sum.crushed);
+    lost += jlaw_total_(sum.crushed);
+  }
+  lost += s0[2 * parts - 1];
+  s1[2 * parts - 1] = lost;
+  s1[0] = m->to[0];
+  if (parts > 1) s1[1] = s0[1] + m->p[1], s1[parts] = m->to[1];
+  if (parts > 2) s1[2] = s0[2] + m->p[2], s1[4] = m->to[2];
+  return 0;
 }
 
 #ifdef JOINTLAW_NO_LEDGER
@@ -504,34 +703,42 @@ enum { JLAW_LEDGER = 1 };
 #endif
 
 /* Constants for the compiler: a plane costs half of space, and what is not asked for nothing */
-JLAW_CLONES static void jlaw_advance_(const jlaw_law *law, const jlaw_move_ *m, const double *s0,
-                                      double *s1, double *F, double *C)
+JLAW_CLONES static int jlaw_advance_(const jlaw_law *law, const jlaw_move_ *m, const double *s0,
+                                     double *s1, double *F, double *C)
 {
-  if (law->dim == 3 && !C) jlaw_step_(law, m, s0, s1, F, C, 3, JLAW_LEDGER, 0);
-  else if (law->dim == 3) jlaw_step_(law, m, s0, s1, F, C, 3, JLAW_LEDGER, 1);
-  else if (law->dim == 2 && !C) jlaw_step_(law, m, s0, s1, F, C, 2, JLAW_LEDGER, 0);
-  else if (law->dim == 2) jlaw_step_(law, m, s0, s1, F, C, 2, JLAW_LEDGER, 1);
-  else jlaw_step_(law, m, s0, s1, F, C, 1, JLAW_LEDGER, C != NULL);
+  const int y = law->yields, w = law->wears;
+  if (y || w) return jlaw_step_(law, m, s0, s1, F, C, 3, y, w, 1, C != NULL);
+  if (law->dim == 3 && !C) return jlaw_step_(law, m, s0, s1, F, C, 3, 0, 0, JLAW_LEDGER, 0);
+  if (law->dim == 3) return jlaw_step_(law, m, s0, s1, F, C, 3, 0, 0, JLAW_LEDGER, 1);
+  if (!C) return jlaw_step_(law, m, s0, s1, F, C, 2, 0, 0, JLAW_LEDGER, 0);
+  return jlaw_step_(law, m, s0, s1, F, C, 2, 0, 0, JLAW_LEDGER, 1);
 }
 
-/* The largest of |closure|, |shear| and |offset| of a state: with `stretch` it bounds every |y| */
-static double jlaw_far_(const double *x, int n)
+/* First number after the sliders: flattened depths, plastic work; then slip of the asperities */
+static size_t jlaw_rest_(const jlaw_law *law)
 {
-  double far = 0.0;
-  for (int i = 0; i < n; i++) /* NaN stays */
-    if (fabs(x[i]) > far || x[i] != x[i]) far = fabs(x[i]);
-  return far;
+  return 2 * (size_t) law->dim + 2 * (size_t) law->facets * (size_t) law->cells;
 }
 
-/* Whether all sliders hold forces that a law can have; not for NaN */
-static int jlaw_sound_(const double *q, int n)
+/* Whether energies, flattened depths and slip of a state are numbers that a law can have */
+static int jlaw_proper_(const jlaw_law *law, const double *s)
 {
-  double sum[4] = {0.0, 0.0, 0.0, 0.0};
-  int i = 0;
-  for (; i + 4 <= n; i += 4)
-    for (int l = 0; l < 4; l++) sum[l] += q[i + l] * q[i + l];
-  for (; i < n; i++) sum[0] += q[i] * q[i];
-  return (sum[0] + sum[2]) + (sum[1] + sum[3]) < 1e300;
+  const double *rest = s + jlaw_rest_(law), *slip = rest + (law->yields ? law->facets + 1 : 0);
+  int good = fabs(s[2 * law->dim - 1]) <= DBL_MAX;
+  for (int f = 0; law->yields && f < law->facets; f++)
+    good = good && rest[f] >= 0.0 && rest[f] <= law->largest_reach;
+  if (law->yields) good = good && fabs(rest[law->facets]) <= DBL_MAX;
+  if (law->wears) good = good && *slip >= 0.0 && *slip <= DBL_MAX;
+  return good;
+}
+
+/* Friction after the slip of the asperities, over that of unworn ones: "Wear" */
+static double jlaw_worn_(const jlaw_law *law, const double *s)
+{
+  const double *slip = s + jlaw_rest_(law) + (law->yields ? law->facets + 1 : 0);
+  if (!law->wears || !(law->mu > 0.0)) return 1.0;
+  const double mu = law->mu_residual + (law->mu - law->mu_residual) * exp(-*slip / law->wear_slip);
+  return mu / law->mu;
 }
 
 static int jlaw_refuse_(const jlaw_law *law, const double *s, const double *d, int damaged,
@@ -566,24 +773,29 @@ int jlaw_update(const jlaw_law *law, const double *s0, double *s1, const double 
                 double *C, char *message, size_t size)
 {
   const int dim = law->dim;
-  const double reach = law->stretch * (jlaw_far_(s0, 2 * dim - 1) + jlaw_far_(d, dim));
-  const int damaged = !(fabs(s0[2 * dim - 1]) <= DBL_MAX) || !(jlaw_far_(s0, 2 * dim - 1) <= DBL_MAX)
-                      || !jlaw_sound_(s0 + 2 * dim, 2 * law->facets * law->cells);
+  jlaw_move_ m;
+  m.p[0] = d[0], m.p[1] = dim > 1 ? d[1] : 0.0, m.p[2] = dim > 2 ? d[2] : 0.0;
+  m.from[0] = s0[0], m.from[1] = dim > 1 ? s0[dim] : 0.0, m.from[2] = dim > 2 ? s0[4] : 0.0;
+  m.to[0] = s0[0] + d[0];
+  m.worn = law->wears ? jlaw_worn_(law, s0) : 1.0;
+  const double shear = (dim > 1 ? fabs(s0[1]) : 0.0) + (dim > 2 ? fabs(s0[2]) : 0.0);
+  const double far = fabs(s0[0]) + fabs(m.from[1]) + fabs(m.from[2]) + shear;
+  const double reach = law->stretch * (far + fabs(m.p[0]) + fabs(m.p[1]) + fabs(m.p[2]));
+  const int damaged = !(far <= DBL_MAX) || !jlaw_proper_(law, s0); /* NaN stays in sums */
   if (damaged || !(reach <= law->largest_reach))
     return jlaw_refuse_(law, s0, d, damaged, message, size);
-  jlaw_move_ m = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0}, 0.0};
-  for (int i = 0; i < dim; i++) m.p[i] = d[i];
-  m.from[0] = s0[0], m.to[0] = s0[0] + d[0];
-  for (int i = 1; i < dim; i++) m.from[i] = s0[dim + i - 1];
   jlaw_limit_offset_(law, &m);
-  jlaw_advance_(law, &m, s0, s1, F, C);
+  if (jlaw_advance_(law, &m, s0, s1, F, C)) return jlaw_refuse_(law, s0, d, 1, message, size);
   return 0;
 }
 
 /* ------------------------------------------------------------ what a state is */
 
 int jlaw_dim(const jlaw_law *law) { return law->dim; }
-int jlaw_state_size(const jlaw_law *law) { return 2 * law->dim + 2 * law->facets * law->cells; }
+int jlaw_state_size(const jlaw_law *law)
+{
+  return (int) jlaw_rest_(law) + (law->yields ? law->facets + 1 : 0) + law->wears;
+}
 const char *jlaw_fingerprint(const jlaw_law *law) { return law->fingerprint; }
 double jlaw_dissipated(const jlaw_law *law, const double *s) { return s[2 * law->dim - 1]; }
 
@@ -593,51 +805,80 @@ static double jlaw_of_facet_(const jlaw_law *law, int facet, int column)
   return law->facet[((size_t) block * JLAW_COLUMNS + (size_t) column) * JLAW_LANES + (size_t) lane];
 }
 
-/* zeta, Phi and Phi' at both limits of a cell of a facet */
-static void jlaw_limits_(const jlaw_law *law, int facet, int cell, jlaw_v_ limits[6])
+typedef struct { /* a facet in a state: y, Phi, Phi'; flattened depth; strength */
+  jlaw_v_ y, force, slope, z, fz, kz;
+  double strength;
+} jlaw_now_;
+
+static void jlaw_facet_now_(const jlaw_law *law, const double *s, double worn, int f, jlaw_now_ *now)
 {
   const jlaw_v_ zero = {0.0};
-  const int row = (facet / JLAW_LANES * (law->cells + 1) + cell) * 3;
-  for (int j = 0; j < 6; j++)
-    limits[j] = zero + law->depth[(size_t) (row + j) * JLAW_LANES + (size_t) (facet % JLAW_LANES)];
+  double y = 0.0;
+  for (int i = 0; i < law->dim; i++)
+    y += jlaw_of_facet_(law, f, JLAW_M + i) * s[i ? law->dim + i - 1 : 0];
+  now->y = zero + y;
+  now->z = zero + (law->yields ? s[jlaw_rest_(law) + (size_t) f] : 0.0);
+  jlaw_virgin_(law, &now->y, &now->force, &now->slope, NULL);
+  jlaw_virgin_(law, &now->z, &now->fz, &now->kz, NULL);
+  now->strength = jlaw_of_facet_(law, f, JLAW_STRENGTH) * worn;
 }
 
-typedef struct { double stored, sliding, slipping, separated; } jlaw_measures_;
+/* G and kappa of a cell of a facet */
+static void jlaw_cell_now_(const jlaw_law *law, int f, int cell, const jlaw_now_ *now, double *G,
+                           double *kappa)
+{
+  const jlaw_v_ zero = {0.0};
+  const int row = (f / JLAW_LANES * law->cells + cell) * JLAW_ROWS;
+  jlaw_v_ z[JLAW_ROWS], part, stiff, H, h;
+  for (int j = 0; j < JLAW_ROWS; j++)
+    z[j] = zero + law->depth[(size_t) (row + j) * JLAW_LANES + (size_t) (f % JLAW_LANES)];
+  jlaw_cell_(&now->y, &now->force, &now->slope, z, &part, &stiff);
+  jlaw_cell_(&now->z, &now->fz, &now->kz, z, &H, &h);
+  if (law->yields) jlaw_flatten_(&now->y, &now->z, &H, &part, &stiff);
+  *G = JLAW_AT(part, 0);
+  *kappa = JLAW_AT(stiff, 0);
+}
 
+typedef struct { double squeezed, sheared, sliding, slipping, separated; } jlaw_measures_;
+
+/* Energies of normal and shear springs, and the shares */
 static jlaw_measures_ jlaw_measure_(const jlaw_law *law, const double *s)
 {
-  jlaw_measures_ all = {0.0, 0.0, 0.0, 0.0};
-  const int dim = law->dim, D = law->cells;
-  const jlaw_v_ zero = {0.0};
+  jlaw_measures_ all = {0.0, 0.0, 0.0, 0.0, 0.0};
+  const int D = law->cells;
+  const double worn = jlaw_worn_(law, s);
   for (int f = 0; f < law->facets; f++) {
-    const double *qs = s + 2 * dim + f * D, *qt = qs + law->facets * D;
+    const double *qs = s + 2 * law->dim + f * D, *qt = qs + law->facets * D;
     const double share = jlaw_of_facet_(law, f, JLAW_SHARE);
-    double y = 0.0, slope, at_limit = 0.0;
+    double at_limit = 0.0, G, kappa;
     int whole = 1;
-    for (int i = 0; i < dim; i++) y += jlaw_of_facet_(law, f, JLAW_M + i) * s[i ? dim + i - 1 : 0];
-    const double force = jlaw_virgin_one_(law, y, &slope);
-    const jlaw_v_ at = zero + y, forces = zero + force, slopes = zero + slope;
+    jlaw_now_ now;
+    jlaw_facet_now_(law, s, worn, f, &now);
+    const double y = JLAW_AT(now.y, 0), z = JLAW_AT(now.z, 0), fz = JLAW_AT(now.fz, 0);
+    const double virgin = JLAW_AT(now.force, 0), force = y > z ? virgin - fz : 0.0;
     for (int i = 0; i < D; i++) {
-      jlaw_v_ limits[6], G, kappa;
-      jlaw_limits_(law, f, i, limits);
-      jlaw_cell_(&at, &forces, &slopes, limits, &G, &kappa);
-      const double part = JLAW_AT(G, 0), stiff = JLAW_AT(kappa, 0);
+      jlaw_cell_now_(law, f, i, &now, &G, &kappa);
       const double q2 = qs[i] * qs[i] + qt[i] * qt[i];
-      const double cap = part * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * force;
-      const int held = sqrt(q2) >= jlaw_of_facet_(law, f, JLAW_STRENGTH) * cap;
-      at_limit += held ? part : 0.0;
+      const int held = sqrt(q2) >= now.strength * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * virgin);
+      at_limit += held ? G : 0.0;
       whole = whole && held;
-      if (stiff > JLAW_TINY) all.stored += jlaw_of_facet_(law, f, JLAW_COMPLIANCE) * q2 / stiff;
+      if (kappa > JLAW_TINY) all.sheared += jlaw_of_facet_(law, f, JLAW_COMPLIANCE) * q2 / kappa;
     }
-    all.stored += jlaw_of_facet_(law, f, JLAW_POTENTIAL) * jlaw_psi_(law, y);
+    double squeezed = jlaw_psi_(law, y);
+    if (law->yields) squeezed -= jlaw_psi_(law, z) + fz * (y - z);
+    if (y > z && squeezed > 0.0) all.squeezed += jlaw_of_facet_(law, f, JLAW_POTENTIAL) * squeezed;
     if (force > 0.0) all.slipping += share * at_limit / force;
-    if (y > 0.0 && whole) all.sliding += share;
-    if (!(y > 0.0)) all.separated += share;
+    if (y > z && whole) all.sliding += share;
+    if (!(y > z)) all.separated += share;
   }
   return all;
 }
 
-double jlaw_stored(const jlaw_law *law, const double *s) { return jlaw_measure_(law, s).stored; }
+double jlaw_stored(const jlaw_law *law, const double *s)
+{
+  const jlaw_measures_ all = jlaw_measure_(law, s);
+  return all.squeezed + all.sheared;
+}
 
 void jlaw_shares(const jlaw_law *law, const double *s, double shares[3])
 {
@@ -649,9 +890,14 @@ void jlaw_shares(const jlaw_law *law, const double *s, double shares[3])
 
 double jlaw_normal_stress(const jlaw_law *law, double closure)
 {
-  double slope;
+  double slope, late = 0.0;
   if (!(closure <= law->largest_reach)) return nan("");
-  return law->closure_factor * jlaw_virgin_one_(law, closure, &slope);
+  for (int f = 0; law->yields && f < law->facets; f++) /* what yielding takes off first loading */
+    for (int i = JLAW_LATE; i < JLAW_LATE + 4; i += 2) {
+      const double depth = jlaw_of_facet_(law, f, i + 1);
+      late += jlaw_of_facet_(law, f, i) * jlaw_virgin_one_(law, closure - depth, &slope);
+    }
+  return law->closure_factor * jlaw_virgin_one_(law, closure, &slope) - late;
 }
 
 double jlaw_max_stiffness(const jlaw_law *law, double closure)
@@ -664,7 +910,7 @@ double jlaw_max_stiffness(const jlaw_law *law, double closure)
 
 double jlaw_closure(const jlaw_law *law, double normal_stress)
 {
-  double low = 0.0, high = law->largest_reach;
+  double low = 0.0, high = law->farthest;
   if (!(normal_stress >= 0.0) || !(jlaw_normal_stress(law, high) >= normal_stress)) return nan("");
   while (1) { /* the stress rises: halve the exponent first, then the number */
     const double middle = high > 4.0 * low && high > 1e-300 ? sqrt(high * fmax(low, 1e-300))
@@ -681,7 +927,7 @@ void jlaw_swap_bodies(const jlaw_law *law, double *s)
 {
   const int dim = law->dim, D = law->cells, M = law->facets;
   for (int i = 1; i < 2 * dim - 1; i += dim - 1) s[i] = -s[i]; /* shear and offset along axis 2 */
-  double *qs = s + 2 * dim, *qt = qs + M * D;
+  double *qs = s + 2 * dim, *qt = qs + M * D, *depth = qt + M * D;
   for (int f = 0; f < M; f++) {
     const int other = (int) jlaw_of_facet_(law, f, JLAW_MIRROR);
     for (int i = 0; i < D; i++) {
@@ -691,40 +937,42 @@ void jlaw_swap_bodies(const jlaw_law *law, double *s)
         qs[other * D + i] = here, qt[other * D + i] = -turned;
       } else if (other == f) qt[f * D + i] = -turned; /* t changes its sense in the mirror */
     }
+    if (law->yields && other > f) {
+      const double here = depth[f];
+      depth[f] = depth[other], depth[other] = here;
+    }
   }
 }
 
-/* q of one cell over the azimuths of a ring of facets, read at azimuths turned by the angle: the
- * trigonometric interpolation of n (even) places */
-static void jlaw_turn_(double *q, int n, int step, double angle)
+/* Numbers of a ring of n facets, read at azimuths turned by the angle: the trigonometric
+ * interpolation of n (even) places, or the straight one, which makes no new extremes */
+static void jlaw_turn_(double *x, int n, int step, double angle, int straight)
 {
   double old[JLAW_AZIMUTHS];
   const double pi = 3.14159265358979323846;
-  for (int j = 0; j < n; j++) old[j] = q[j * step], q[j * step] = 0.0;
+  for (int j = 0; j < n; j++) old[j] = x[j * step], x[j * step] = 0.0;
   for (int j = 0; j < n; j++)
     for (int k = 0; k < n; k++) {
-      const double x = angle + 2.0 * pi * (j - k) / n, half = sin(0.5 * x);
-      const double weight = fabs(half) < 1e-9 ? 1.0 : sin(0.5 * n * x) * cos(0.5 * x) / (n * half);
-      q[j * step] += weight * old[k];
+      const double way = remainder(angle + 2.0 * pi * (j - k) / n, 2.0 * pi), half = sin(0.5 * way);
+      double weight = 1.0;
+      if (straight) weight = fmax(1.0 - fabs(way) * n / (2.0 * pi), 0.0);
+      else if (fabs(half) > 1e-9) weight = sin(0.5 * n * way) * cos(0.5 * way) / (n * half);
+      x[j * step] += weight * old[k];
     }
 }
 
 /* Brings sliders beyond their friction limit back to it */
 static void jlaw_hold_(const jlaw_law *law, double *s)
 {
-  const int dim = law->dim, D = law->cells;
-  const jlaw_v_ zero = {0.0};
+  const int D = law->cells;
+  const double worn = jlaw_worn_(law, s);
   for (int f = 0; f < law->facets; f++) {
-    double *qs = s + 2 * dim + f * D, *qt = qs + law->facets * D, y = 0.0, slope;
-    for (int i = 0; i < dim; i++) y += jlaw_of_facet_(law, f, JLAW_M + i) * s[i ? dim + i - 1 : 0];
-    const jlaw_v_ force = zero + jlaw_virgin_one_(law, y, &slope), at = zero + y;
-    const jlaw_v_ slopes = zero + slope;
+    double *qs = s + 2 * law->dim + f * D, *qt = qs + law->facets * D, G, kappa;
+    jlaw_now_ now;
+    jlaw_facet_now_(law, s, worn, f, &now);
     for (int i = 0; i < D; i++) {
-      jlaw_v_ limits[6], G, kappa;
-      jlaw_limits_(law, f, i, limits);
-      jlaw_cell_(&at, &force, &slopes, limits, &G, &kappa);
-      const double cap = jlaw_of_facet_(law, f, JLAW_STRENGTH) * JLAW_AT(G, 0);
-      const double size = sqrt(qs[i] * qs[i] + qt[i] * qt[i]);
+      jlaw_cell_now_(law, f, i, &now, &G, &kappa);
+      const double cap = now.strength * G, size = sqrt(qs[i] * qs[i] + qt[i] * qt[i]);
       const double share = size > cap ? cap / size : 1.0;
       qs[i] *= share, qt[i] *= share;
     }
@@ -733,20 +981,28 @@ static void jlaw_hold_(const jlaw_law *law, double *s)
 
 void jlaw_rotate(const jlaw_law *law, double *s, double angle)
 {
-  const int dim = law->dim, D = law->cells, n = law->azimuths;
-  const double before = jlaw_stored(law, s), c = cos(angle), d = sin(angle);
+  const int dim = law->dim, D = law->cells, M = law->facets;
+  const double before = jlaw_measure_(law, s).sheared, c = cos(angle), d = sin(angle);
+  double *q = s + 2 * dim, *depth = s + jlaw_rest_(law);
   if (dim == 2 && c < 0.0) jlaw_swap_bodies(law, s); /* the axis changes its sense */
   if (dim != 3) return;
   for (int i = 1; i <= 3; i += 2) { /* shear and offset */
     const double along = s[i], across = s[i + 1];
     s[i] = c * along + d * across, s[i + 1] = c * across - d * along;
   }
-  for (int half = 0; half < 2; half++)
-    for (int ring = 0; ring < law->facets / n; ring++)
-      for (int i = 0; i < D; i++)
-        jlaw_turn_(s + 6 + ((half * law->facets + ring * n) * D + i), n, D, angle);
+  for (int f = 0, n; f < M; f += n) { /* rings */
+    n = (int) jlaw_of_facet_(law, f, JLAW_RING);
+    for (int i = 0; i < D; i++) {
+      jlaw_turn_(q + f * D + i, n, D, angle, 0);
+      jlaw_turn_(q + (M + f) * D + i, n, D, angle, 0);
+    }
+    if (law->yields) jlaw_turn_(depth + f, n, 1, angle, 1);
+  }
   jlaw_hold_(law, s);
-  s[5] += fmax(before - jlaw_stored(law, s), 0.0);
+  const double after = jlaw_measure_(law, s).sheared;
+  if (after > before) /* sliders gain nothing */
+    for (int i = 0; i < 2 * M * D; i++) q[i] *= sqrt(before / after);
+  else s[5] += before - after;
 }
 
 /* ------------------------------------------------------------- table files */
@@ -846,15 +1102,18 @@ typedef struct { const char *word; double *to, least, most; } jlaw_key_;
 /* Reads all keywords into law; NULL or what is wrong */
 static const char *jlaw_parse_(const char *at, jlaw_law *law, size_t length)
 {
-  double dim = 0, facets = 0, cells = 0, pieces = 0, azimuths = 0;
+  double dim = 0, facets = 0, cells = 0, pieces = 0, yields = 0, wears = 0;
   const jlaw_key_ keys[] = {
     {"dim", &dim, 1, 3}, {"facets", &facets, 1, 1e6}, {"cells", &cells, 1, 1e6},
-    {"pieces", &pieces, 1, 1e6}, {"azimuths", &azimuths, 1, JLAW_AZIMUTHS},
+    {"pieces", &pieces, 1, 1e6}, {"yields", &yields, 0, 1}, {"wears", &wears, 0, 1},
     {"critical_slip", &law->critical_slip, JLAW_UNDERFLOW, DBL_MAX},
     {"eta", &law->eta, 0, DBL_MAX}, {"scale", &law->scale, DBL_MIN, DBL_MAX},
     {"rise", &law->rise, 0, DBL_MAX}, {"closure_factor", &law->closure_factor, 0, DBL_MAX},
     {"stiffness_factor", &law->stiffness_factor, 0, DBL_MAX},
-    {"largest_reach", &law->largest_reach, 0, DBL_MAX}, {"stretch", &law->stretch, 1, DBL_MAX}};
+    {"largest_reach", &law->largest_reach, 0, DBL_MAX}, {"stretch", &law->stretch, 1, DBL_MAX},
+    {"farthest", &law->farthest, 0, DBL_MAX}, {"mu", &law->mu, 0, DBL_MAX},
+    {"mu_residual", &law->mu_residual, 0, DBL_MAX},
+    {"wear_slip", &law->wear_slip, DBL_MIN, DBL_MAX}};
   enum { KEYS = sizeof keys / sizeof keys[0] };
   char word[sizeof law->fingerprint];
   at = jlaw_word_(at, word, sizeof word);
@@ -868,14 +1127,14 @@ static const char *jlaw_parse_(const char *at, jlaw_law *law, size_t length)
       return "a parameter is no number or out of its bounds";
   }
   law->dim = (int) dim, law->facets = (int) facets, law->cells = (int) cells;
-  law->pieces = (int) pieces, law->azimuths = (int) azimuths;
+  law->pieces = (int) pieces, law->yields = (int) yields, law->wears = (int) wears;
   const size_t blocks = (size_t) (law->facets + JLAW_LANES - 1) / JLAW_LANES;
   const char *words[4] = {"facet", "depth", "curve", "energy"};
   const size_t sizes[4] = {blocks * JLAW_COLUMNS * JLAW_LANES,
-                           blocks * (size_t) (law->cells + 1) * 3 * JLAW_LANES,
+                           blocks * (size_t) law->cells * JLAW_ROWS * JLAW_LANES,
                            4 * (size_t) law->pieces, 4 * (size_t) law->pieces};
   const size_t all = sizes[0] + sizes[1] + sizes[2] + sizes[3];
-  if (law->facets % law->azimuths || all > length / 2) return "its sizes do not fit one another";
+  if (all > length / 2) return "its sizes do not fit one another";
   double *to = law->own = (double *) malloc(all * sizeof *law->own);
   if (!to) return "there is no memory for it";
   for (int i = 0; i < 4; i++) {
@@ -889,7 +1148,14 @@ static const char *jlaw_parse_(const char *at, jlaw_law *law, size_t length)
   for (size_t n = 0; n < sizes[0]; n++) { /* A and what follows it are no less than zero */
     const size_t column = n / JLAW_LANES % JLAW_COLUMNS;
     if ((column >= JLAW_A && !(law->facet[n] >= 0.0))
-        || (column == JLAW_MIRROR && !(law->facet[n] < facets))) return "a facet is out of bounds";
+        || (column == JLAW_MIRROR && !(law->facet[n] < facets))
+        || (column == JLAW_USED && !(law->facet[n] <= cells))) return "a facet is out of bounds";
+  }
+  for (int f = 0; f < law->facets;) {
+    const double ring = jlaw_of_facet_(law, f, JLAW_RING);
+    if (!(ring >= 1.0 && ring <= (double) JLAW_AZIMUTHS && ring <= facets - f))
+      return "a ring of facets is out of bounds";
+    f += (int) ring;
   }
   return *jlaw_skip_(at) ? "something follows the last table" : NULL;
 }
@@ -944,6 +1210,9 @@ void jlaw_free(jlaw_law *law)
 
 #if defined(__GNUC__) && !defined(JOINTLAW_PLAIN)
 #pragma GCC diagnostic pop
+#endif
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC pop_options
 #endif
 #ifdef __cplusplus
 }

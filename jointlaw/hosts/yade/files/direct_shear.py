@@ -30,6 +30,10 @@ folder = os.path.dirname(os.path.abspath(sys.argv[0]))
 sys.path.insert(0, folder)
 from yade_joint import Joints, LiveLaw, TableLaw  # noqa: E402
 
+if unknown := set(sys.argv[1:]) - {"live"}:
+    sys.exit(
+        f"direct_shear.py: {' '.join(unknown)} is unknown; write live, or nothing for the table"
+    )
 live = "live" in sys.argv[1:]
 if live:
     from jointlaw import JointLaw

@@ -1,0 +1,59 @@
+"""Frames of a run as VTK files, for ParaView: blocks as polygons, joints as lines."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import meshio
+import numpy as np
+
+from jointlaw.support.progress import track
+
+from .drawing import Scale, outlines
+from .record import JOINT_COLUMNS, Record
+from .rock_report import STATES, states
+
+
+def write(record: Record, folder: Path) -> None:
+    """blocks_N.vtu and joints_N.vtu of every frame N, in SI units.
+
+    Blocks carry their number, displacement, velocity and spin. Joints carry what joints.csv has of
+    them, and `state`: 0 stuck, 1 partly sliding, 2 sliding, 3 open, as in report.png.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    frames = range(len(record.times))
+    scale = Scale(record, [0, frames[-1]])
+    for i in track(frames, "VTK files"):
+        _blocks(record, i).write(folder / f"blocks_{i:04d}.vtu")
+        _joints(record, i, scale).write(folder / f"joints_{i:04d}.vtu")
+
+
+def _blocks(record: Record, i: int) -> meshio.Mesh:
+    shapes, motion = outlines(record, i), record.motion[i]
+    first = np.cumsum([0, *map(len, shapes)])
+    cells = [("polygon", np.arange(a, b)[None]) for a, b in pairwise(first)]
+    moved = motion[:3].T - record.motion[0][:3].T
+    columns = {
+        "block": np.arange(len(shapes), dtype=float),
+        "displacement_m": np.column_stack([moved[:, :2], np.zeros(len(shapes))]),
+        "turn_rad": moved[:, 2],
+        "velocity_m/s": np.column_stack([motion[3:5].T, np.zeros(len(shapes))]),
+        "spin_rad/s": motion[5],
+    }
+    data = {name: [row[None] for row in values] for name, values in columns.items()}
+    return meshio.Mesh(_in_space(np.concatenate(shapes)), cells, cell_data=data)
+
+
+def _joints(record: Record, i: int, scale: Scale) -> meshio.Mesh:
+    joints = record.joints[i]
+    names = list(STATES)
+    columns = dict(zip(JOINT_COLUMNS, joints["values"].T, strict=True))
+    columns["state"] = np.array([names.index(s) for s in states(record, i, scale)], float)
+    ends = joints["ends"].reshape(-1, 2)
+    cells = [("line", np.arange(len(ends)).reshape(-1, 2))]
+    data = {name: [values] for name, values in columns.items()}
+    return meshio.Mesh(_in_space(ends), cells, cell_data=data)
+
+
+def _in_space(points: np.ndarray) -> np.ndarray:
+    """Points (n, 2) of the section as (n, 3)."""
+    return np.column_stack([points, np.zeros(len(points))])

@@ -1,0 +1,83 @@
+"""How far a scene is from failing: its critical tilt and its strength reduction factor.
+
+Both are found by bisection on the initial equilibrium, without running the blocks: a scene fails
+where no displacements are found with which the joints carry the loads.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from ..dynamics.simulation import Simulation
+from ..scene import GRAVITY, build, turn
+
+Tables = dict[str, Any]
+EXACT = 0.01  # share of the tilt and of the factor to which they are found
+STEP, STEEPEST, LEAST = 8.0, 60.0, 0.01  # degrees: first step, largest, closest told apart
+LARGEST = 64.0  # factor
+
+
+def critical_tilt(data: Tables, where: str) -> float | None:
+    """The turn of gravity (degrees, towards +x) at which a scene just holds; None beyond 60.
+
+    Below zero where it does not hold as drawn.
+    """
+    return _bisect(
+        lambda tilt: tilted(data, tilt), where, STEP, STEEPEST, lambda t: max(EXACT * abs(t), LEAST)
+    )
+
+
+def strength_factor(data: Tables, where: str) -> float | None:
+    """What all friction is to be divided by for a scene to just hold; None beyond 64 or 1/64."""
+    log = _bisect(
+        lambda log: reduced(data, np.exp(log)), where, np.log(2), np.log(LARGEST), lambda _: EXACT
+    )
+    return None if log is None else float(np.exp(log))
+
+
+def tilted(data: Tables, tilt: float) -> Tables:
+    """A scene's tables with gravity turned by a tilt (degrees) towards +x."""
+    gravity = turn(np.radians(tilt)) @ data.get("gravity", GRAVITY)
+    return {**data, "gravity": gravity.tolist()}
+
+
+def reduced(data: Tables, factor: float) -> Tables:
+    """A scene's tables with the friction of asperities and of plain Coulomb divided by a factor."""
+    laws = {name: dict(law) for name, law in data["laws"].items()}
+    for law in laws.values():
+        if "asperity" in law:
+            law["asperity"] = _divided(law["asperity"], factor)
+    return {**data, "laws": {name: _divided(law, factor) for name, law in laws.items()}}
+
+
+def _divided(table: Tables, factor: float) -> Tables:
+    frictions = {"mu", "mu_residual", "friction"} & table.keys()
+    return {**table, **{key: table[key] / factor for key in frictions}}
+
+
+def _bisect(
+    at: Callable[[float], Tables],
+    where: str,
+    step: float,
+    most: float,
+    exact: Callable[[float], float],
+) -> float | None:
+    """Where the scenes `at` begin to fail: looked for from 0 up if that one holds, else down."""
+    with tqdm(desc="equilibria", delay=2.0, disable=None, leave=False) as bar:
+
+        def holds(x: float) -> bool:
+            bar.update()
+            return Simulation(build(at(x), where)).balanced
+
+        sense = 1.0 if holds(0.0) else -1.0
+        low, high = 0.0, sense * step
+        while holds(high) == (sense > 0):
+            low, high = high, high + sense * step
+            if abs(high) > most:
+                return None
+        while abs(high - low) > exact(high):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if holds(middle) == (sense > 0) else (low, middle)
+    return 0.5 * (low + high)

@@ -1,0 +1,77 @@
+"""The strength reduction factor and critical tilt of one block are those of the law alone."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from scipy.optimize import brentq
+
+from dem_demo.cli import main
+from dem_demo.output.law_alone import friction_angle
+from dem_demo.scene import parse, read_tables
+from dem_demo.studies.limit import critical_tilt, reduced, strength_factor
+
+DIP = 32.0
+SCENE = f"""
+gravity = [{9.81 * math.sin(math.radians(DIP))}, {-9.81 * math.cos(math.radians(DIP))}]
+[laws.joint]
+asperity_density = 1e4
+critical_slip = 2e-3
+plane = 0.0
+resolution = {{ u = 4, phi = 10, depth = 1 }}
+orientation = {{ a = 4.0, b = 0.0, c = 0.3 }}
+asperity = {{ K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }}
+heights = {{ alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }}
+[[block]]
+name = "base"
+box = [9.0, 1.0]
+at = [0.0, -0.5]
+fixed = true
+[[block]]
+name = "slab"
+box = [5.0, 1.0]
+at = [-1.0, 0.5]
+[run]
+end = 0.2
+fraction = 0.7
+"""
+FOUND = 0.01  # share to which both are found
+
+
+def angle(factor, dip):
+    """Friction angle (degrees) of the scene's law with its mu divided, at the slab's weight."""
+    scene = parse(SCENE)
+    law = scene.laws["joint"]
+    weak = replace(law, asperity=replace(law.asperity, mu=law.asperity.mu / factor))
+    return friction_angle(weak, 2600.0 * 9.81 * math.cos(math.radians(dip)))
+
+
+def test_factor_of_a_block_is_that_of_the_law_alone():
+    alone = brentq(lambda f: angle(f, DIP) - DIP, 1.0, 3.0, xtol=1e-3)
+    assert strength_factor(read_tables(SCENE), "scene") == pytest.approx(alone, rel=FOUND)
+
+
+def test_critical_tilt_of_a_block_is_that_of_the_law_alone():
+    alone = brentq(lambda tilt: angle(1.0, DIP + tilt) - DIP - tilt, 0.0, 15.0, xtol=1e-3)
+    assert critical_tilt(read_tables(SCENE), "scene") == pytest.approx(alone, rel=FOUND)
+
+
+def test_all_frictions_are_divided_and_nothing_else():
+    data = read_tables(SCENE)
+    data["laws"]["plain"] = {"kind": "coulomb", "normal_stiffness": 1e9, "friction": 0.6}
+    data["laws"]["joint"]["asperity"] |= {"mu_residual": 0.2, "wear_slip": 1e-3}
+    laws = reduced(data, 2.0)["laws"]
+    assert laws["plain"] == data["laws"]["plain"] | {"friction": 0.3}
+    mine, given = laws["joint"].pop("asperity"), data["laws"]["joint"]["asperity"]
+    assert mine == given | {"mu": 0.2, "mu_residual": 0.1}
+    assert laws["joint"].items() <= data["laws"]["joint"].items()
+
+
+def test_command_tells_both_and_draws_the_failure(tmp_path, capsys):
+    scene = tmp_path / "slab.toml"
+    scene.write_text(SCENE)
+    assert main(["strength-reduction", str(scene), "--out", str(tmp_path / "out")]) == 0
+    told = capsys.readouterr().out
+    assert "scene: F = 1.61, critical tilt +8.03 degrees" in told
+    assert (tmp_path / "out" / "failing-scene.png").stat().st_size > 10_000
+    assert (tmp_path / "out" / "strength.json").exists()

@@ -49,7 +49,7 @@ def test_several_cycles_in_one_file(tmp_path, capsys):
     law = replace(law, asperity=asperity, closure_only=True)
     record = jl.closure_test(law.joint(), [5e6, 10e6], steps=12)
     write(tmp_path / "two.csv", record.F1, record.closure)
-    write(tmp_path / "rock.csv", [0.0, 11e6], [0.0, 1e-8])
+    write(tmp_path / "rock.csv", [0.0, 5e6, 11e6], [0.0, 5e-9, 1e-8])
     command = ["fit", "two.csv", "--set", "alpha=3.8", "--compliance", "rock.csv", "--out", "o"]
     assert main([*command, "--cycle"]) == 0
     out = capsys.readouterr().out

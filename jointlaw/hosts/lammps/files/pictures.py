@@ -36,7 +36,7 @@ def thermo(path):
             names, rows = words, []
         elif words[:3] == ["Loop", "time", "of"]:
             last = dict(zip(names, np.array(rows).T, strict=True))
-        elif len(words) == len(names) and words[0].isdigit():
+        elif words and len(words) == len(names) and words[0].isdigit():
             rows.append([float(word) for word in words])
     return last
 

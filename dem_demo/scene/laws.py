@@ -1,12 +1,13 @@
 """Laws of a scene, built from its TOML tables. All are `jointlaw.JointLaw`."""
 
+import tomllib
 from typing import Any
 
 import jointlaw as jl
 from jointlaw.parameters.rock import require_rock
 
 from ..errors import SceneError
-from .tables import Table
+from .tables import Table, overlay
 
 FLAT = 1e15  # orientation.a: no asperity is inclined by more than 2e-15 rad
 STICKS = 1e30  # friction of a joint that never slides
@@ -52,7 +53,13 @@ def build_law(data: dict[str, Any], where: str) -> jl.JointLaw:
         return law
     if kind != "joint":
         raise table.error("kind", "must be 'joint' or 'coulomb'")
-    keys = {key: value for key, value in data.items() if key != "kind"}
+    keys = {key: value for key, value in data.items() if key not in ("kind", "from")}
+    if "from" in data:
+        try:
+            whole = jl.presets.load_any(table.take("from", str))
+        except ValueError as error:
+            raise SceneError(f"{where}.from: {error}") from None
+        keys = overlay(tomllib.loads(whole.to_toml()), keys)
     if keys.get("closure_only"):
         raise SceneError(f"{where}.closure_only = true: joints between blocks shear; leave it out")
     law = jl.JointLaw.from_dict({"plane": 0.0, **keys}, where)

@@ -12,7 +12,7 @@ from .drives import AXES, read_drives
 from .laws import build_law
 from .rocks import read_rocks
 from .scene import Monitors, Run, Scene
-from .tables import Table, distinct
+from .tables import Table, distinct, overlay
 
 SCENES = Path(__file__).parent / "scenes"
 TEMPLATE = Path(__file__).parent / "template.toml"
@@ -65,17 +65,7 @@ def read_tables(text: str, where: str = "scene") -> dict[str, Any]:
         raise SceneError(
             f"{where}.variant = {variant!r}: must be one of [variants]: {', '.join(variants)}"
         )
-    return _overlay(data, variants[variant])
-
-
-def _overlay(below: Any, above: Any) -> Any:
-    """Tables are joined key by key, lists of tables table by table; all else is replaced."""
-    if isinstance(above, dict) and isinstance(below, dict):
-        return below | {key: _overlay(below.get(key), value) for key, value in above.items()}
-    if isinstance(below, list) and all(isinstance(table, dict) for table in (*below, *above)):
-        joined = [_overlay(*pair) for pair in zip(below, above, strict=False)]
-        return joined + below[len(joined) :] + above[len(joined) :]
-    return above
+    return overlay(data, variants[variant])
 
 
 def build(data: dict[str, Any], where: str = "scene", text: str = "") -> Scene:

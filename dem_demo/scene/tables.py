@@ -124,3 +124,13 @@ def distinct(values: Any, known: Container[str], count: int | None = None) -> bo
     if not (isinstance(values, list) and all(isinstance(v, str) and v in known for v in values)):
         return False
     return len(set(values)) == len(values) and count in (None, len(values))
+
+
+def overlay(below: Any, above: Any) -> Any:
+    """Tables are joined key by key, lists of tables table by table; all else is replaced."""
+    if isinstance(above, dict) and isinstance(below, dict):
+        return below | {key: overlay(below.get(key), value) for key, value in above.items()}
+    if isinstance(below, list) and all(isinstance(table, dict) for table in (*below, *above)):
+        joined = [overlay(*pair) for pair in zip(below, above, strict=False)]
+        return joined + below[len(joined) :] + above[len(joined) :]
+    return above

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -178,3 +179,18 @@ def test_plain_coulomb_is_what_its_numbers_say():
     never = coulomb_law(kn, ks, np.inf).joints(1)
     F, _ = never.update([[1e-9, 1.0]], tangent=False)
     assert F[0, 1] == pytest.approx(ks, rel=1e-12)
+
+
+def test_a_law_by_name_and_the_keys_that_replace_its_own(tmp_path, monkeypatch):
+    given = jl.presets.load("westerly-rough")
+    text = TEXT.replace(ROCK, 'from = "westerly-rough"\nasperity = { mu = 0.5 }\n')
+    assert text != TEXT
+    law = next(iter(parse(text).laws.values()))
+    assert law == replace(given, plane=0.0, asperity=replace(given.asperity, mu=0.5))
+
+    monkeypatch.chdir(tmp_path)
+    given.to_toml("mine.toml")
+    from_file = text.replace('"westerly-rough"', '"mine.toml"')
+    assert next(iter(parse(from_file).laws.values())) == law
+    with pytest.raises(SceneError, match=r"laws\.\w+\.from: 'no\.toml' is neither a preset"):
+        parse(text.replace('"westerly-rough"', '"no.toml"'))

@@ -178,6 +178,7 @@ PARTS = {
     "tolerances": tolerances,
     "named": lambda: laws().named(),
     "frontier": lambda: laws().frontier(str(PICTURES / "frontier.png")),
+    "slip-angles": lambda: run("benchmarks/slip.py"),
     "savings": savings,
     "slip": slip,
     "plane": plane,

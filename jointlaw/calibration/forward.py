@@ -14,7 +14,7 @@ from ..law import JointLaw
 from ..parameters.asperity import Asperity
 from ..parameters.heights import GammaHeights
 from ..parameters.orientation import Orientation
-from ..parameters.resolution import resolve
+from ..parameters.resolution import SLIP, resolve
 from ..support.checks import Array
 from .priors import Values
 
@@ -76,6 +76,16 @@ def build(values: Values, settings: Settings, plane: float | None = None) -> Joi
         critical_slip=v["critical_slip"],
         closure_only=settings.closure_only,
     )
+
+
+def build_for_shear(values: Values, settings: Settings, azimuth: float) -> JointLaw:
+    """The law that a shear curve along this azimuth (rad) is compared with.
+
+    At least at SLIP: a parameter would take up the error of few nodes, degrees of friction, and
+    its interval would not show it.
+    """
+    resolution = max(resolve(settings.resolution), SLIP, key=lambda r: r.sliders)
+    return build(values, replace(settings, resolution=resolution), plane=azimuth)
 
 
 def log_stress(values: Values, closure: Array, settings: Settings) -> Array:

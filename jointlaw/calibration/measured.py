@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..laboratory.experiments import direct_shear
 from ..law import JointLaw
 from ..support.checks import Array, above, at_least, number
-from .forward import Settings, build, log_stress
+from .forward import Settings, build_for_shear, log_stress
 from .priors import Values
 
 STRESS_NOISE = 0.01  # of the stress: a load cell with the friction of its loading frame
@@ -196,7 +196,7 @@ class ShearCurve:
 
     def residuals(self, values: Values, settings: Settings) -> Array:
         """(model - measured)/largest measured, (n,)."""
-        model = self.predict(build(values, settings, plane=self.azimuth))
+        model = self.predict(build_for_shear(values, settings, self.azimuth))
         return np.asarray((model - self.shear_stress) / np.max(np.abs(self.shear_stress)))
 
 

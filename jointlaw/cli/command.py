@@ -59,9 +59,8 @@ def read_law(options: argparse.Namespace) -> JointLaw:
     resolution = getattr(options, "resolution", None)
     if resolution is not None:
         law = replace(law, resolution=resolution)
-    yields = getattr(options, "yield_interference", None)
-    if yields is not None:
-        value = quantity("--yield-interference", yields, "m", positive=True)
+    value = given(options, "yield_interference", "m", positive=True)
+    if value is not None:
         law = replace(law, asperity=replace(law.asperity, yield_interference=value))
     return law
 
@@ -91,6 +90,13 @@ def quantity(option: str, text: str, unit: str, *, positive: bool = False) -> fl
     if positive and value <= 0:
         raise ValueError(f"{option} = {text} is out of bounds: it must be > 0 {unit}")
     return value
+
+
+def given(options: argparse.Namespace, name: str, unit: str, **more: bool) -> float | None:
+    """The SI value of an option by its name in `options`; None if it is left out."""
+    text = getattr(options, name, None)
+    option = f"--{name.replace('_', '-')}"
+    return None if text is None else quantity(option, text, unit, **more)
 
 
 def write_results(folder: Path, files: Written, summary: Mapping[str, Any]) -> None:

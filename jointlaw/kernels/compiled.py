@@ -14,6 +14,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from ..discretisation.nodes import UNUSED
 from ..discretisation.tables import UNDERFLOW, Tables
 from ..support.checks import Array
 from .cells import TINY, compliance
@@ -577,6 +578,8 @@ def _facet(work, s, L, law, f, ledger, tangent, yields, wears):
             for l in range(L):
                 pad[_WS + l] = pad[_WT + l] = 0.0
     for i in range(D):
+        if law.depth[f, i, 0] >= UNUSED:
+            break
         rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
         _slide(pad, s[rs], s[rt], L, law, f, i, ledger, tangent, yields, wears)
     if yields is not None:
@@ -807,6 +810,8 @@ def _measure_facet(work, s, L, law, f, energy, yields, wears):
             squeezed -= potential * pad[_FZ0 + l] * (y - z)
             pad[_CURVING + l] = squeezed if (y > z) & (squeezed > 0.0) else 0.0
     for i in range(D):
+        if law.depth[f, i, 0] >= UNUSED:
+            break
         rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
         _count(pad, s[rs], s[rt], L, law, f, i, yields, wears)
     for l in range(L):

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from .calibration.fit import Fit, fit_closure, fit_curves, fit_many, fit_shear
     from .calibration.measured import ClosureCurve, ShearCurve, first_loading
     from .hosts.c.export import export_c, include_dir
+    from .hosts.lammps.export import export_lammps
     from .hosts.yade.export import export_yade
     from .laboratory.flow import hydraulic_aperture, transmissivity
     from .surface.fit import SurfaceFit, from_surface
@@ -61,6 +62,7 @@ __all__ = [
     "datasets",
     "direct_shear",
     "export_c",
+    "export_lammps",
     "export_yade",
     "first_loading",
     "fit_closure",
@@ -87,6 +89,7 @@ _LATER = {
     "ShearCurve": "calibration.measured",
     "SurfaceFit": "surface.fit",
     "export_c": "hosts.c.export",
+    "export_lammps": "hosts.lammps.export",
     "export_yade": "hosts.yade.export",
     "first_loading": "calibration.measured",
     "fit_closure": "calibration.fit",

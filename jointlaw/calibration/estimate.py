@@ -155,14 +155,16 @@ class Estimate:
         centre = model(self.solution.x)
         slope = derivative(model, self.solution.x, *self.problem.bounds())
         variance = np.einsum("ip,pq,iq->i", slope, self.solution.covariance, slope)
+        # residuals of cycles are shares of the largest stress
+        scale = data.stress.max() / np.exp(centre) if data.cycle else 1.0
         if measured:
             noise = self.noise[self.problem.curves.index(data)]
             step = 1e-4 * float(np.ptp(data.closure))
             rise = model(self.solution.x, step) - centre
-            variance = variance + noise.sigma(rise / step) ** 2
+            variance = variance + (scale * noise.sigma(rise / step / scale)) ** 2
         beyond = np.maximum(centre - np.log(data.stress.max()), 0.0)
-        wander = self.wander[curve - 1]
-        model_error = math.hypot(MODEL_ERROR, WANDER_ERROR * wander)
+        wander = scale * self.wander[curve - 1]
+        model_error = np.hypot(MODEL_ERROR, WANDER_ERROR * wander)
         variance = variance + wander**2 + (model_error * beyond / math.log(2)) ** 2
         reach = self.solution.quantile(level) * np.sqrt(variance)
         return np.exp(centre - reach), np.exp(centre + reach)

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ..hosts.c.export import export_c, identifier
+from ..hosts.lammps.export import export_lammps
 from ..hosts.yade.export import export_yade
 from ..law import JointLaw
 from ..support.files import clear_run
@@ -20,7 +21,7 @@ def add(commands: Any) -> None:
         "jointlaw export yade jing-replica --out joint-for-yade",
         _export,
     )
-    parser.add_argument("host", choices=("yade", "c"), help="the host code; c: also C++")
+    parser.add_argument("host", choices=("yade", "c", "lammps"), help="the host code; c: also C++")
     add_law(parser)
     parser.add_argument("--closure", help="yade: last closure of the table, such as 2um")
     parser.add_argument("--shear-limit", help="yade: shear at which friction is read, such as 5um")
@@ -31,22 +32,26 @@ def add(commands: Any) -> None:
 def _export(options: argparse.Namespace) -> None:
     law = read_law(options)
     clear_run(options.out)
-    if options.host == "c":
-        _export_c(law, options)
-    else:
+    if options.host == "yade":
         _export_yade(law, options)
+    else:
+        _export_live(law, options)
 
 
-def _export_c(law: JointLaw, options: argparse.Namespace) -> None:
+def _export_live(law: JointLaw, options: argparse.Namespace) -> None:
+    export, host, start = {
+        "c": (export_c, "C and C++", "make && ./example"),
+        "lammps": (export_lammps, "LAMMPS", "./build.sh && lmp -in in.tower"),
+    }[options.host]
     for name in ("closure", "shear_limit", "tolerance"):
         if getattr(options, name) is not None:
             raise ValueError(
-                f"--{name.replace('_', '-')} shapes a table for YADE; C runs the law itself: leave "
-                "it out"
+                f"--{name.replace('_', '-')} shapes a table for YADE; {host} runs the law itself: "
+                "leave it out"
             )
-    files = export_c(law, options.out, identifier(Path(options.law).stem))
-    print(f"wrote the joint for C and C++ to {options.out}: {', '.join(files)}")
-    print(f"run: cd {options.out} && make && ./example")
+    files = export(law, options.out, identifier(Path(options.law).stem))
+    print(f"wrote the joint for {host} to {options.out}: {', '.join(files)}")
+    print(f"run: cd {options.out} && {start}")
 
 
 def _export_yade(law: JointLaw, options: argparse.Namespace) -> None:

@@ -4,11 +4,15 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from lammps_host import build, need_lammps, soft
 
 import jointlaw
 from jointlaw.hosts.yade.export import copy_adapter
@@ -113,3 +117,10 @@ def make_table():
         return table
 
     return make
+
+
+@pytest.fixture(scope="session")
+def plugin(tmp_path_factory):
+    """A folder with LAMMPS' plug-in, built, and rock.jlaw, a soft joint in space."""
+    need_lammps()
+    return build(tmp_path_factory.mktemp("lammps"), soft())

@@ -40,11 +40,6 @@ def export_c(law: JointLaw, directory: str | Path, name: str = "joint") -> list[
     constants), `example.c`, `example.cpp`, `Makefile` and `README.md`. Returns the names. Raises
     ValueError for a name that C cannot have or too many azimuths, before anything is written.
     """
-    if max(_ring(law.facets.theta)) > AZIMUTHS:
-        raise ValueError(
-            f"resolution.phi = {law.resolution.phi} is out of bounds: jointlaw.h takes at most "
-            f"{AZIMUTHS} azimuths on the circle"
-        )
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,40}", name):
         raise ValueError(
             f"name = {name!r} is no identifier of C; take letters, digits and underscores, a "
@@ -108,8 +103,13 @@ def header_text(law: JointLaw, name: str) -> str:
 
 
 def _scalars(law: JointLaw) -> dict[str, int | float]:
-    """Keywords and numbers, in the order of `struct jlaw_law`."""
+    """Keywords and numbers, in the order of `struct jlaw_law`; refuses what it does not hold."""
     k, p = law.tables, law.asperity
+    if max(_ring(law.facets.theta)) > AZIMUTHS:
+        raise ValueError(
+            f"resolution.phi = {law.resolution.phi} is out of bounds: jointlaw.h takes at most "
+            f"{AZIMUTHS} azimuths on the circle"
+        )
     return {
         "dim": k.dim,
         "facets": len(k.c1),

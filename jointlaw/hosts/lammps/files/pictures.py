@@ -1,4 +1,4 @@
-"""Pictures of what the input scripts wrote: python pictures.py [FOLDER]. Needs numpy and matplotlib.
+"""Pictures of what the input scripts wrote: python pictures.py [FOLDER], with numpy and matplotlib.
 
 tower.png from log.tower (lmp -in in.tower -log log.tower) and tower.dump, shear.png from
 shear.txt, slope.png from slope.dump, spheres.png from spheres.dump; what is missing is left out.

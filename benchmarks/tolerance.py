@@ -3,10 +3,13 @@
     python benchmarks/tolerance.py [--laws 100] [--seed 1] [--json tolerance.json]
 
 Laws: a from 1 to 10 (evenly in log a), b and c over their bounds, mu 0.05 to 1, eta 0 to 0.7,
-heights of either formation or none, in a plane or in space. Paths: twelve per law, six of five to
+heights of either formation or none, in a plane or in space, half of them with a critical slip of 1
+to 1000 R. Paths: twelve per law, six of five to
 eight legs between random corners, six smooth ones (sums of four waves), closures up to the law's
 closure range R and openings to -0.3 R, shear up to R; somewhere each is closed to between half the
-normal stress at R and all of it. The truth is twice the reference resolution in each direction.
+normal stress at R and all of it. Besides, slip to three critical slips, or 30 R, and back at two
+random normal stresses, which each resolution holds by itself. The truth is twice the reference
+resolution in each direction.
 
 `met` is the share of laws that keep the tolerance on all twelve paths (one that `at_tolerance`
 refuses does not), `paths` the share of paths that do, `worst` the largest error over the tolerance,
@@ -27,10 +30,11 @@ from typing import Any
 import numpy as np
 
 import jointlaw as jl
+from jointlaw.accuracy.slip import slip
 from jointlaw.accuracy.suite import errors, reference_resolution, scaled, tractions
 from jointlaw.support.progress import track
 
-TOLERANCES = (0.05, 0.025, 0.01, 0.003, 0.001)
+TOLERANCES = (0.05, 0.01, 0.003)
 PATHS, STEPS = 6, 160  # of each kind
 SMALL_A = 1.4
 
@@ -111,7 +115,11 @@ def misses(law: jl.JointLaw, rng: np.random.Generator) -> list[dict[str, Any]]:
     """Per tolerance: largest error of each random path over the tolerance, and the sliders."""
     d = random_paths(law, rng)
     best = reference_resolution(law)
-    truth = tractions(replace(law, resolution=scaled(best, 2.0)), d)
+    exact = replace(law, resolution=scaled(best, 2.0))
+    truth = tractions(exact, d)
+    stress = float(law.normal_stress(law.closure_range)) / 2
+    shares = rng.uniform(0.05, 1.0, 2)
+    slid = slip(exact, law.closure_range, stress, shares)
     found = []
     for tolerance in TOLERANCES:
         start = time.perf_counter()
@@ -121,9 +129,14 @@ def misses(law: jl.JointLaw, rng: np.random.Generator) -> list[dict[str, Any]]:
             found.append({"refused": str(error)})
             continue
         took = time.perf_counter() - start
-        ratio = errors(tractions(made, d), truth)[0] / tolerance
+        mine = slip(made, law.closure_range, stress, shares)
+        both = (
+            errors(tractions(made, d), truth)[0],
+            errors(mine.F[slid.counts], slid.F[slid.counts])[0],
+        )
+        ratio = np.concatenate(both) / tolerance
         r = made.resolution
-        found.append({"ratio": ratio.tolist(), "sliders": r.sliders, "seconds": took,
+        found.append({"ratio": ratio.tolist(), "sliders": made.tables.sliders, "seconds": took,
                       "resolution": [r.u, r.phi, r.depth]})  # fmt: skip
     return found
 
@@ -133,6 +146,8 @@ def draw(count: int, seed: int) -> list[Draw]:
     rng, found = np.random.default_rng(seed), []
     for _ in track(range(count), "random laws", count):
         law = random_law(rng)
+        if rng.random() < 0.5:
+            law = replace(law, critical_slip=law.closure_range * 10 ** rng.uniform(0.0, 3.0))
         found.append((law, misses(law, rng)))
     return found
 

@@ -59,8 +59,9 @@ autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Index", "
 python_use_unqualified_type_names = True
 
 ORDER = (
-    "first_curve", "closure_hysteresis", "direct_shear", "cyclic_shear", "anisotropy",
-    "large_shear", "fit_closure", "from_scan", "table", "batch", "blocks", "newton", "snapshot",
+    "first_curve", "closure_hysteresis", "closure_cycle", "direct_shear", "strength_envelope",
+    "cyclic_shear", "anisotropy", "large_shear", "fit_closure", "from_scan", "table", "batch",
+    "blocks", "newton", "snapshot",
 )  # fmt: skip
 sphinx_gallery_conf = {
     "examples_dirs": "gallery",

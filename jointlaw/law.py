@@ -44,7 +44,9 @@ class JointLaw:
     asperity_density: N, asperities per m2, > 0.
     closure_range: largest closure (m) that the depth cells are placed for, > 0; beyond it the
         normal force stays exact. None takes the closure at 20 MPa without yielding.
-    resolution: "fast", "balanced", "fine", "reference" or a `Resolution`.
+    resolution: "fast", "balanced", "fine", "reference" or a `Resolution`. A name becomes the
+        `Resolution` that suits critical_slip over closure_range (docs/how-accurate.md); where
+        `replace` changes these, give it the name again.
     plane: None for motion in 3-D, or the azimuth (rad) of the one plane in which the joint moves:
         vectors then have two components, closure and shear along the plane. The traction across
         the plane, which is zero only for c = 0 or on a symmetry axis, is dropped.
@@ -77,7 +79,9 @@ class JointLaw:
                 "with their overlap, formation, pdf, cdf and breakpoints"
             )
         set_(self, "asperity_density", above("asperity_density", self.asperity_density, 0.0))
-        set_(self, "resolution", resolve(self.resolution))
+        asked: str | Resolution = self.resolution
+        nodes = resolve(asked)
+        set_(self, "resolution", nodes)
         if self.plane is not None:
             set_(self, "plane", number("plane", self.plane))
         if not isinstance(self.closure_only, bool):
@@ -96,6 +100,10 @@ class JointLaw:
             if self.closure_range is None:
                 set_(self, "closure_range", self._default_range())
             set_(self, "closure_range", above("closure_range", self.closure_range, 0.0))
+            set_(self, "resolution", resolve(asked, self.critical_slip / self.closure_range))
+            if self.resolution != nodes:
+                for cached in ("facets", "_scale", "_virgin"):  # by the closure range
+                    self.__dict__.pop(cached, None)
             self._require_numbers(self.closure_range)  # and with it that the curve is valid
 
     # ----------------------------------------------------------------- joints
@@ -234,7 +242,8 @@ class JointLaw:
 
         resolutions: those to measure; None takes a spread of 42 and the named ones. joints: of the
         batch that is timed; 0 times nothing. seconds: spent on each timing. Errors are those of the
-        standard paths within the closure range, as shares of each path's largest traction.
+        standard paths, as shares of each path's largest traction, and of the friction and dilation
+        angle under slip, in degrees.
         """
         from .accuracy.tradeoff import tradeoff  # loads scipy.interpolate, slow to import
 
@@ -245,9 +254,10 @@ class JointLaw:
 
         tolerance: largest error of the traction on a path, as a share of the path's largest
         traction, > 0: 0.01 is one per cent. Held with a margin on the standard paths and on 128
-        random ones within the law's closure range (`jointlaw.accuracy.suite`); nothing is timed, so
-        the answer is the same on every machine. Takes seconds, at 0.001 minutes for steep
-        facets, without the compiled kernel more. Raises ValueError where no resolution tried is
+        random ones within the law's closure range, and under slip to three critical slips, or 30
+        closure ranges, where friction is mobilised (`jointlaw.accuracy.suite`); nothing is timed,
+        so the answer is the same on every machine. Takes seconds to a minute, below 0.01 minutes,
+        without the compiled kernel more. Raises ValueError where no resolution tried is
         that accurate.
         """
         from .accuracy.tolerance import at_tolerance

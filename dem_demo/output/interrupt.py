@@ -14,8 +14,9 @@ STATUS = 130  # exit code of a command that Ctrl-C ended, as shells have it
 def interruptible() -> Iterator[Callable[[], bool]]:
     """Gives a function that says whether Ctrl-C was pressed, instead of an exception anywhere.
 
-    pymunk swallows exceptions of its callbacks, so one could be lost, or leave half a step. In a
-    thread other than the main one, which gets no signals, Ctrl-C is left to the main one.
+    pymunk swallows exceptions of its callbacks, so one could be lost, or leave half a step. A
+    thread other than the main one gets no signals, and a process that was told to ignore Ctrl-C,
+    as one in the background of a script, goes on ignoring it.
     """
     asked = threading.Event()
 
@@ -26,7 +27,8 @@ def interruptible() -> Iterator[Callable[[], bool]]:
         asked.set()
         sys.stderr.write("\nCtrl-C: stopping after this step; once more quits at once\n")
 
-    if threading.current_thread() is not threading.main_thread():
+    ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    if ignored or threading.current_thread() is not threading.main_thread():
         yield asked.is_set
         return
     before = signal.signal(signal.SIGINT, take)

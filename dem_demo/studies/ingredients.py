@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import jointlaw as jl
-from jointlaw.parameters.resolution import NAMED
+from jointlaw.parameters.resolution import named
 
 from ..output.law_alone import friction_angle
 from ..output.record import JOINT_COLUMNS, Record
@@ -89,7 +89,7 @@ def _removals(law: jl.JointLaw) -> Iterator[tuple[str, bool, dict[str, Any]]]:
             yield f"{key} = 0", True, {"orientation": replace(orientation, **{key: 0.0})}
     if np.isfinite(law.critical_slip):
         yield "no large shear", False, {"critical_slip": np.inf}
-    for name, resolution in NAMED.items():
+    for name, resolution in named(law.critical_slip / law.closure_range).items():
         if law.resolution != resolution:
             yield f"resolution {name}", False, {"resolution": resolution}
     if law.resolution.depth > 1:

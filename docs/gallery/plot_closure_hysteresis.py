@@ -41,4 +41,5 @@ right.set_xticks(range(5))
 plt.show()
 
 # %%
-# Rock loses more than that: see *Unloading, honestly* on the page *From measurements to a law*.
+# Rock loses more than that: see *A loop and a set*, and *Unloading, honestly* on the page *From
+# measurements to a law*.

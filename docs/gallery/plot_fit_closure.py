@@ -49,7 +49,7 @@ axis.legend()
 plt.show()
 
 # %%
-# The law unloads almost along its loading curve; the rock does not. What friction explains of that
-# loop, and what it does not, is said on the page *From measurements to a law*.
+# Without yielding the law unloads almost along its loading curve; the rock does not. What friction
+# and yielding explain of that loop is said on the page *From measurements to a law*.
 
 error = float(comparison.errors["jointlaw"][-1])

@@ -9,10 +9,14 @@ With R the law's closure range and S the normal stress there, the paths are
     re-contact         closed and sheared, opened under shear until it separates, closed again
     walk               a smooth random walk in closure and both shears
     weave              closed five times while the shear crosses itself (in space)
+    far                R/2, shear along 20 degrees to three critical slips and back
+    slip               as far at the stresses S/2 and S/20, held by every resolution itself; errors
+                       count where friction is mobilised (`Slip.counts`)
 
 Excursions are random: four to ten legs between corners with closures from -0.3 R to R (one of them
 at a stress of S/2 to S) and shears up to R, every second one rounded. They are drawn once and for
-all, so that they too are the same for every resolution.
+all, so that they too are the same for every resolution. A law without critical slip takes 30 R for
+three of them.
 
 Along 0, 45 and 90 degrees the rings of azimuths look alike; the other directions lie between, where
 a ring of few azimuths errs most. A law with a plane takes the paths along azimuth 0 and the others
@@ -24,7 +28,7 @@ then on, so that every resolution is asked the same.
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,6 +40,7 @@ from ..parameters.orientation import Orientation
 from ..parameters.resolution import Resolution
 from ..support.checks import Array
 from ..support.progress import track
+from .slip import Slip, distance, names, slip
 
 STEPS = 120  # of each path
 
@@ -71,18 +76,47 @@ def scaled(r: Resolution, share: float) -> Resolution:
     return Resolution(max(u, 1), max(phi, 3), max(depth, 1))
 
 
+class Miss(NamedTuple):
+    """How far a resolution is off.
+
+    `largest`, `rms` (paths,): shares of the path's largest |F|. `friction`, `dilation`: largest
+    misses of the angles under slip, in degrees; 0 for a joint that does not shear.
+    """
+
+    largest: Array
+    rms: Array
+    friction: float
+    dilation: float
+
+
 @dataclass(frozen=True)
 class Suite:
-    """Paths of one law: increments d (steps, paths, dim) in m and reference tractions F in Pa."""
+    """Paths of one law: increments d (steps, paths, dim) in m and reference tractions F in Pa.
+
+    The paths of `slip`, which are no paths of displacement, come last in `names`.
+    """
 
     names: tuple[str, ...]
     d: Array
     F: Array
+    slip: Slip | None
+    stress: float  # Pa, S/2
     uncertainty: Array  # (paths,) of F: its difference from two thirds of the nodes
+
+    def miss(self, law: Law) -> Miss:
+        """How far another resolution is off."""
+        largest, rms = errors(tractions(law, self.d), self.F)
+        if self.slip is None:
+            return Miss(largest, rms, 0.0, 0.0)
+        mine = slip(law, law.closure_range, self.stress)
+        counts = self.slip.counts  # right after the turn, shear stress turns within a short way
+        more = errors(mine.F[counts], self.slip.F[counts])
+        largest, rms = np.append(largest, more[0]), np.append(rms, more[1])
+        return Miss(largest, rms, *mine.apart(self.slip))
 
     def errors(self, law: Law) -> tuple[Array, Array]:
         """Largest and rms error (paths,) of another resolution, as shares of the peak |F|."""
-        return errors(tractions(law, self.d), self.F)
+        return self.miss(law)[:2]
 
 
 def standard_suite(law: Law, best: Resolution | None = None, excursions: int = 0) -> Suite:
@@ -99,16 +133,20 @@ def _suite(law: Law, excursions: int) -> Suite:
     """The suite of a law at its reference resolution."""
     best = law.resolution
     stress = float(law.normal_stress(law.closure_range)) / 2
-    names, goal, held = _paths(law, stress)
+    called, goal, held = _paths(law, stress)
     if excursions:
         goal = np.concatenate([goal, _excursions(law, stress, excursions)], axis=1)
         held = np.append(held, np.zeros(excursions, bool))
-        names += tuple(f"excursion {i + 1}" for i in range(excursions))
+        called += tuple(f"excursion {i + 1}" for i in range(excursions))
     d = np.diff(goal, axis=0, prepend=0.0)
     d = _hold_stress(replace(law, resolution=scaled(best, 1 / 2)), d, held, stress)
     F = tractions(replace(law), d)  # a copy: the cache keeps this law, and would its working space
-    check = tractions(replace(law, resolution=scaled(best, 2 / 3)), d)
-    return Suite(names, d, F, errors(check, F)[0])
+    slid = None
+    if not law.closure_only:
+        slid, called = slip(law, law.closure_range, stress), called + names(law.tables.dim)
+    suite = Suite(called, d, F, slid, stress, np.zeros(len(called)))
+    check = suite.miss(replace(law, resolution=scaled(best, 2 / 3))).largest
+    return replace(suite, uncertainty=check)
 
 
 def tractions(law: Law, d: Array) -> Array:
@@ -154,6 +192,8 @@ def _paths(law: Law, stress: float) -> tuple[tuple[str, ...], Array, Array]:
     shear = legs([0, 0.1, 1], [0, seat, seat], [0, 0, 1])
     back = legs([0, 0.1, 0.35, 0.75, 1], [0, *4 * [seat]], [0, 0, 0.6, -0.6, 0])
     fixed = legs([0, 0.2, 1], [0, 1, 1], [0, 0, 1])
+    sheared = distance(law.tables.critical_slip, R) / R
+    far = legs([0, 0.1, 0.55, 1], [0, 0.5, 0.5, 0.5], [0, 0, sheared, 0])
     again = legs([0, 0.15, 0.35, 0.6, 0.7, 1], [0, 0.7, 0.7, -0.6, -0.6, 0.8],
                  [0, 0, 0.4, 0.7, 0.2, 0.5])  # fmt: skip
     turn = 2 * np.pi * s
@@ -176,13 +216,14 @@ def _paths(law: Law, stress: float) -> tuple[tuple[str, ...], Array, Array]:
         "constant closure": along(fixed, 20),
         "re-contact": along(again, 65),
         "walk": walk,
+        "far": along(far, 20),
         "weave": weave,
     }
     if law.closure_only:
         named = {name: named[name][:, :1] for name in ("closure", "re-contact", "walk", "weave")}
     elif law.plane is not None:
         turned = ("shear 45", "shear 90", "weave")
-        named |= {"reversal": back, "constant closure": fixed, "re-contact": again}
+        named |= {"reversal": back, "constant closure": fixed, "re-contact": again, "far": far}
         named = {name: path[:, :2] for name, path in named.items() if name not in turned}
     held = np.array([name.startswith(("shear", "reversal")) for name in named])
     return tuple(named), R * np.stack(list(named.values()), axis=1), held

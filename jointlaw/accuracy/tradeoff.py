@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..kernels.threads import thread_count
-from ..parameters.resolution import NAMED, Resolution, resolve
+from ..parameters.resolution import Resolution, named, resolve
 from ..support.checks import Array, whole
 from ..support.files import replace_file
 from ..support.progress import track
@@ -20,7 +20,7 @@ from .suite import Law, Suite, errors, reference_resolution, scaled, standard_su
 
 SPREAD = tuple(
     Resolution(u, phi, depth)
-    for u, phi in ((1, 3), (2, 3), (2, 4), (3, 4), (4, 5), (6, 6))
+    for u, phi in ((1, 3), (2, 3), (3, 3), (3, 5), (5, 6), (8, 8))
     for depth in (1, 2, 3, 4, 6, 10, 16)
 )
 _MEMORY = 100_000_000  # bytes of state that a timing may use; very fine laws get a smaller batch
@@ -30,16 +30,20 @@ _MEMORY = 100_000_000  # bytes of state that a timing may use; very fine laws ge
 class Price:
     """One resolution: errors are shares of the largest traction (or tangent) of each path.
 
-    `error`, `rms` (paths,): of the traction. `tangent_rms`, `tangent_max`: of the tangent, over all
-    paths; it jumps between stick and slip, and the largest error is that of a jump that comes one
-    step early or late. `ns`, `ns_tangent`: nanoseconds per joint and update without and with
-    tangent, no ledger, least of several runs; NaN where nothing was timed. `bytes`: per joint.
+    `error`, `rms` (paths,): of the traction. `friction`, `dilation`: largest misses of the angles
+    (degrees) at constant normal stress, from 0.2 critical slips on. `tangent_rms`, `tangent_max`:
+    of the tangent, over all paths; it jumps between stick and slip, and the largest error is that
+    of a jump that comes one step early or late. `ns`, `ns_tangent`: nanoseconds per joint and
+    update without and with tangent, no ledger, least of several runs; NaN where nothing was timed.
+    `bytes`: per joint.
     """
 
     resolution: Resolution
     sliders: int
     error: Array
     rms: Array
+    friction: float
+    dilation: float
     tangent_rms: float
     tangent_max: float
     ns: float
@@ -57,7 +61,8 @@ class Tradeoff:
     """Prices by ascending sliders; print it to read its frontier.
 
     `uncertainty` (paths,) is that of the reference that errors are measured against; `joints` the
-    size of the batch that was timed, on the kernel and threads named in `how`.
+    size of the batch that was timed, on the kernel and threads named in `how`; `named` are the
+    resolutions of this law that have names.
     """
 
     paths: tuple[str, ...]
@@ -65,6 +70,7 @@ class Tradeoff:
     rows: tuple[Price, ...]
     joints: int
     how: str
+    named: dict[str, Resolution]
 
     def frontier(self) -> tuple[Price, ...]:
         """The prices that no other with as few sliders beats in its largest error."""
@@ -77,14 +83,16 @@ class Tradeoff:
     def __str__(self) -> str:
         lines = [
             f"{'u phi depth':>12s} {'sliders':>8s} {'bytes':>7s} {'max error':>10s} {'rms':>8s} "
-            f"{'tangent rms':>12s} {'ns':>8s} {'with tangent':>13s}  worst path"
+            f"{'friction':>9s} {'dilation':>9s} {'tangent rms':>12s} {'ns':>8s} "
+            f"{'with tangent':>13s}  worst path"
         ]
         for row in self.frontier():
             r = row.resolution
-            name = next((f"  = {n}" for n, value in NAMED.items() if value == r), "")
+            name = next((f"  = {n}" for n, value in self.named.items() if value == r), "")
             lines.append(
                 f"{f'{r.u} {r.phi} {r.depth}':>12s} {row.sliders:8d} {row.bytes:7d} "
-                f"{row.worst:10.2%} {row.rms.max():8.2%} {row.tangent_rms:12.2%} {_ns(row.ns):>8s} "
+                f"{row.worst:10.2%} {row.rms.max():8.2%} {row.friction:8.2f}° {row.dilation:8.2f}° "
+                f"{row.tangent_rms:12.2%} {_ns(row.ns):>8s} "
                 f"{_ns(row.ns_tangent):>13s}  {self.paths[int(row.error.argmax())]}{name}"
             )
         timed = f"ns per joint and update: {self.joints} joints, {self.how}"
@@ -107,6 +115,8 @@ class Tradeoff:
             "ns_tangent": [r.ns_tangent for r in rows],
             "error": [r.worst for r in rows],
             "rms": [float(r.rms.max()) for r in rows],
+            "friction_deg": [r.friction for r in rows],
+            "dilation_deg": [r.dilation for r in rows],
             "tangent_rms": [r.tangent_rms for r in rows],
             "tangent_max": [r.tangent_max for r in rows],
         }
@@ -116,7 +126,7 @@ class Tradeoff:
         return table
 
     def to_csv(self, path: str | Path) -> None:
-        """All prices as CSV; errors are shares (1), times ns, sizes bytes."""
+        """All prices as CSV; errors are shares (1), angles degrees, times ns, sizes bytes."""
         stream = io.StringIO(newline="")
         writer, table = csv.writer(stream), self.columns()
         writer.writerow(table)
@@ -144,7 +154,7 @@ class Tradeoff:
                 x, y = [getattr(r, cost) for r in best], [100 * r.worst for r in best]
                 what = "traction and tangent" if cost == "ns_tangent" else "traction"
                 axis.loglog(x, y, "o-", color=color, ms=4, lw=1.2, label=what)
-            for name, resolution in NAMED.items():
+            for name, resolution in self.named.items():
                 for row in self.rows:
                     if row.resolution == resolution:
                         at = (getattr(row, costs[0]), 100 * row.worst)
@@ -176,7 +186,10 @@ def tradeoff(
 ) -> Tradeoff:
     """See `JointLaw.tradeoff`."""
     joints = whole("joints", joints, 0)
-    chosen = (*SPREAD, *NAMED.values()) if resolutions is None else map(resolve, resolutions)
+    slip = law.tables.critical_slip / law.closure_range
+    if resolutions is None:
+        resolutions = (*SPREAD, *named(slip).values())
+    chosen = [resolve(r, slip) for r in resolutions]
     found = sorted(dict.fromkeys(chosen), key=lambda r: (r.sliders, r.u, r.phi))
     if not found:
         raise ValueError("resolutions is empty; give some, or None for the usual spread")
@@ -188,17 +201,17 @@ def tradeoff(
         for r in track(found, "resolutions", len(found))
     )
     how = f"{law.joints(0).kernel}, at most {thread_count()} threads"
-    return Tradeoff(suite.names, suite.uncertainty, rows, joints, how)
+    return Tradeoff(suite.names, suite.uncertainty, rows, joints, how, named(slip))
 
 
 def _price(law: Law, suite: Suite, exact: Array, joints: int, seconds: float) -> Price:
-    error, rms = suite.errors(law)
+    miss = suite.miss(law)
     steps, paths = exact.shape[:2]
     C = tangents(law, suite.d).reshape(steps, paths, -1)
     tangent_max, tangent_rms = errors(C, exact.reshape(steps, paths, -1))
     ns = [_time(law, joints, tangent, seconds) for tangent in (False, True)]
     return Price(
-        law.resolution, law.tables.sliders, error, rms,
+        law.resolution, law.tables.sliders, *miss,
         float(np.sqrt(np.mean(tangent_rms**2))), float(tangent_max.max()), ns[0], ns[1],
         law.joints(0).bytes_per_joint,
     )  # fmt: skip

@@ -20,6 +20,7 @@ from ..support.progress import track
 from ..support.pyplot import pyplot, written
 from . import shear_report
 from .estimate import Estimate
+from .forward import log_stress
 from .measured import ClosureCurve, ShearCurve
 from .priors import Ranges, Values, transform_of
 from .problem import pose, solve, starting_points
@@ -244,7 +245,7 @@ def fit_many(
 
 def _curve(fit: Fit, seating: float, curve: ClosureCurve, number: int) -> list[str]:
     """What a closure curve does fix: stress and stiffness along it."""
-    at = np.array([0.5, 1.0]) * curve.closure[-1]
+    at = np.array([0.5, 1.0]) * curve.closure[np.argmax(curve.stress)]
     low, high = fit.band(at, curve=number, measured=False)
     lines = [
         f"Closure curve {number} (seating closure {1e6 * seating:.3g} um):",
@@ -254,27 +255,31 @@ def _curve(fit: Fit, seating: float, curve: ClosureCurve, number: int) -> list[s
     ]
     for u, lo, hi in zip(at, low, high, strict=True):
         stress = float(fit.predict(u, number))
-        step = 1e-4 * float(curve.closure[-1])
+        step = 1e-4 * float(at[-1])
         rise = float(fit.predict(u + step, number)) - float(fit.predict(u - step, number))
         lines.append(
             f"| {1e6 * u:.4g} | {stress / 1e6:.4g} | {lo / 1e6:.4g} to {hi / 1e6:.4g} | "
             f"{rise / (2 * step) / 1e9:.4g} |"
         )
     if fit.bends_otherwise[number - 1]:
+        of = "the largest stress" if curve.cycle else "the stress"
         lines += [
             "",
             f"**This curve does not bend as the law does**: neighbouring points miss it together, "
-            f"by {100 * fit.wander[number - 1]:.2g} % of the stress. Between the points use it "
-            "with that error; beyond them trust neither the curve nor its band: a hyperbola (mated "
-            "joints) or a logarithm (unmated ones) may follow this rock better.",
+            f"by {100 * fit.wander[number - 1]:.2g} % of {of}. Between the points use it with that "
+            "error; beyond them trust neither the curve nor its band: a hyperbola (mated joints) "
+            "or a logarithm (unmated ones) may follow the loading of this rock better.",
         ]
-    return lines
+    if curve.compliance != 0.0:
+        return [*lines, "", "The compliance of rock and machine that was given is subtracted."]
+    missing = "if the closure was measured across rock too, the law holds its strain as well."
+    return [*lines, "", f"No compliance of rock and machine was given: {missing}"]
 
 
 def _draw_closure(
     axis: Any, fit: Fit, curve: ClosureCurve, number: int, held_out: Points | None
 ) -> None:
-    top = float(curve.closure[-1])
+    top = float(curve.closure.max())
     points = {"marker": "o", "ls": "none", "color": "C0", "zorder": 3}
     if held_out is not None:
         stress, closure = (np.asarray(x, float) for x in held_out)
@@ -285,6 +290,12 @@ def _draw_closure(
     low, high = fit.band(u, curve=number)
     axis.fill_between(1e6 * u, low / 1e6, high / 1e6, color="C1", alpha=0.25, label="95 % band")
     axis.plot(1e6 * u, fit.predict(u, number) / 1e6, color="C1", label="law")
+    if curve.cycle:
+        rows = np.arange(curve.closure.size)
+        path = np.interp(np.linspace(0, rows[-1], 400), rows, curve.closure)
+        seated = path + fit.parameters[fit.closure_curve(number)[0]]
+        stress = np.exp(log_stress(fit.parameters, seated, fit.problem.settings))
+        axis.plot(1e6 * path, stress / 1e6, "--", color="C1", label="law, cycle")
     axis.plot(1e6 * curve.closure, curve.stress / 1e6, ms=4, label="measured", **points)
     axis.set(
         xlabel="closure since the test began (µm)", ylabel="normal stress (MPa)", title="Closure"

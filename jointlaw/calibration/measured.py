@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..laboratory.experiments import direct_shear
 from ..law import JointLaw
 from ..support.checks import Array, above, at_least, number
-from .forward import Settings, build, log_stress
+from .forward import Settings, build_for_shear, log_stress
 from .priors import Values
 
 STRESS_NOISE = 0.01  # of the stress: a load cell with the friction of its loading frame
@@ -20,6 +21,8 @@ SHEAR_NOISE = 0.02  # of the largest shear stress
 FACTOR = 4.0  # 95 % range of a level about the expected one, either way
 _SD = np.log(FACTOR) / 1.96
 _GRID = np.linspace(-3.2, 3.2, 33)
+_TURN = 0.2  # of the stress at a peak: what falls or rises less is scatter
+_FOOT = 0.05  # of the largest stress: likewise, where the stress is small
 
 
 class Noise(NamedTuple):
@@ -79,9 +82,9 @@ class ClosureCurve:
         stress, closure = _pair("stress", self.stress, "closure", self.closure)
         if (stress < 0).any():
             raise ValueError(f"stress = {stress.min():g} Pa is out of bounds: it must be >= 0")
-        top = int(np.argmax(stress))
         closure = subtract_compliance(stress, closure, self.compliance)
-        unloads = bool((stress[top:] < 0.8 * stress[top]).any())
+        _, top, last = cycles(stress)[0]
+        unloads = stress[top : last + 1].min() < (1 - _TURN) * stress[top]
         if self.cycle and not unloads:
             raise ValueError(
                 f"cycle = True, but stress never falls below 80 % of its largest, {stress[top]:g} "
@@ -90,7 +93,8 @@ class ClosureCurve:
         if unloads and not self.cycle:
             raise ValueError(
                 f"stress falls from {stress[top]:g} Pa after point {top}: fit the first loading "
-                "only, jointlaw.first_loading(stress, closure) cuts it out, or give cycle=True"
+                "only, jointlaw.first_loading(stress, closure) cuts it out, or give cycle=True "
+                "(jointlaw fit: --cycle)"
             )
         if self.seating is None and stress[0] == 0.0:
             set_(self, "seating", 0.0 - float(closure[0]))  # not -0.0
@@ -110,9 +114,11 @@ class ClosureCurve:
             )
         set_(self, "stress", stress)
         set_(self, "closure", closure)
-        top = int(np.argmax(stress)) + 1 if self.cycle else stress.size
-        branches = [part for part in (slice(0, top), slice(top, None)) if stress[part].size]
-        steep = np.concatenate([_steepness(closure[part], stress[part]) for part in branches])
+        steep = np.zeros(stress.size)
+        turns = sorted({0, stress.size - 1}.union(*cycles(stress) if self.cycle else ()))
+        for start, end in reversed(list(pairwise(turns))):
+            branch = slice(start, end + 1)
+            steep[branch] = _steepness(closure[branch], stress[branch])
         share = stress / np.max(stress) if self.cycle else 1.0  # as `residuals` are
         set_(self, "steepness", share * steep)
         if self.noise is None:
@@ -190,19 +196,41 @@ class ShearCurve:
 
     def residuals(self, values: Values, settings: Settings) -> Array:
         """(model - measured)/largest measured, (n,)."""
-        model = self.predict(build(values, settings, plane=self.azimuth))
+        model = self.predict(build_for_shear(values, settings, self.azimuth))
         return np.asarray((model - self.shear_stress) / np.max(np.abs(self.shear_stress)))
 
 
 def first_loading(stress: ArrayLike, closure: ArrayLike) -> tuple[Array, Array, Array, Array]:
-    """Cut one loading cycle at its largest stress.
+    """Cut the first loading cycle at its largest stress.
 
     Returns stress (Pa) and closure (m) of the loading branch, the peak included, then those of the
     unloading branch, the peak included again.
     """
     s, u = _pair("stress", stress, "closure", closure)
-    top = int(np.argmax(s))
-    return s[: top + 1], u[: top + 1], s[top:], u[top:]
+    _, top, last = cycles(s)[0]
+    return s[: top + 1], u[: top + 1], s[top : last + 1], u[top : last + 1]
+
+
+def cycles(stress: Array) -> list[tuple[int, int, int]]:
+    """Rows of every cycle of a test: its first, the one of its largest stress, its last.
+
+    The stress (Pa, (n,)) turns where it falls by a fifth of a peak, and where it rises again by as
+    much; the last row of a cycle is the first of the next one.
+    """
+    least = _FOOT * float(np.max(stress))
+    lows, tops = [0], [0]
+    for row, now in enumerate(stress):
+        peak, low = stress[tops[-1]], stress[lows[-1]]
+        if len(lows) == len(tops):  # loading
+            if now > peak:
+                tops[-1] = row
+            elif now < peak - max(_TURN * peak, least):
+                lows.append(row)
+        elif now < low:
+            lows[-1] = row
+        elif now > low + max(_TURN * peak, least):
+            tops.append(row)
+    return list(zip(lows, tops, [*lows[1 : len(tops)], len(stress) - 1], strict=False))
 
 
 def subtract_compliance(
@@ -255,6 +283,8 @@ def _steepness(closure: Array, stress: Array) -> Array:
     Differences of neighbouring points would carry the noise into the weights.
     """
     span = float(np.ptp(closure))
+    if not span > 0:
+        return np.zeros(closure.size)
     x = (closure - closure.min()) / span
     shifts = np.geomspace(0.02, 5.0, 25)
     fits = [np.polyfit(np.log(x + s), np.log(stress), 1, full=True) for s in shifts]

@@ -62,14 +62,16 @@ TRANSFORMS = {
 
 # Reason and 95 % range of each prior; "seating" has none: the data alone place it.
 PRIORS: dict[str, tuple[float, float]] = {
-    # Westerly granite, lapped and rough: 3.82 and 6.14 (Yoshioka & Scholz 1989a)
-    "alpha": (1.0, 10.0),
+    # Exponential heights (0) to nearly Gaussian ones (20); Westerly granite, lapped and rough: 3.82
+    # and 6.14 (Yoshioka & Scholz 1989a)
+    "alpha": (0.0, 20.0),
     # Six decades around 10 um: says nothing within any one laboratory
     "beta": (1e-8, 1e-2),
     # r0 over the mean height; 0.36 and 0.48 in the paper's two sets (Misra 1999, section 4.1)
     "overlap_share": (0.1, 1.6),
-    # N lam K sigma^(1+eta), see `quantity`: 0.63 GPa within a factor of 32
-    "full_contact_stress": (2e7, 2e10),
+    # N lam K sigma^(1+eta), see `quantity`: 0.63 GPa within a factor of 1000. A factor of 32 drove
+    # predictions beyond the data up by several per cent (benchmarks/held_out.py)
+    "full_contact_stress": (6.3e5, 6.3e11),
     # Hertz (Eq. 34): shear modulus of rock 10 to 30 GPa, radius of curvature 40 um to 4 cm
     "K": (1e8, 1e10),
     # (2 - nu)/(2 (1 - nu)) for any Poisson's ratio from 0 to 0.5 (Eq. 34)

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..support.checks import Array
 from .estimate import WANDERS, Estimate
-from .forward import build
+from .forward import build_for_shear
 from .measured import ShearCurve
 from .problem import derivative
 
@@ -17,7 +17,7 @@ WEAR = ("mu_residual", "wear_slip")
 
 def model(fit: Estimate, curve: ShearCurve) -> Array:
     """Shear stress (Pa) of the fitted law along the path of a shear curve, (n,)."""
-    return curve.predict(build(fit.parameters, fit.problem.settings, plane=curve.azimuth))
+    return curve.predict(build_for_shear(fit.parameters, fit.problem.settings, curve.azimuth))
 
 
 def band(fit: Estimate, curve: ShearCurve, level: float = 0.95) -> tuple[Array, Array]:

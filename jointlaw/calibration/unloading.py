@@ -1,7 +1,8 @@
-"""What of a measured hysteresis loop the law's friction explains, and what it does not."""
+"""What of measured hysteresis loops friction and yielding explain, and what they do not."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,20 +13,21 @@ from ..law import JointLaw
 from ..parameters.resolution import NAMED
 from ..support.checks import Array
 from ..support.progress import track
-from .measured import first_loading
+from .measured import cycles
 
+Result = tuple[float, float]  # share of the work lost, closure kept (m)
 _FRICTIONS = (0.1, 0.15, 0.2, 0.3, 0.45)
 
 
 @dataclass(frozen=True)
 class Loop:
-    """A loading cycle against the law above a stress, as shares of the work of loading.
+    """A cycle against the law above a stress, as shares of the work of its loading.
 
     stress (Pa): the lowest, above zero, that both branches of the test reach;
-    measured: loss of the measured cycle; friction: loss of the law; largest_friction: the largest
-    of several friction coefficients at these inclinations, that of `worst_mu`; open_closure
-    (m): closure the test did not recover on the way back to `stress`; law_closure (m): that of the
-    law.
+    measured: loss of the measured cycle; friction: loss of the law, that of yielding included;
+    largest_friction: the largest of several friction coefficients at these inclinations, that of
+    `worst_mu`; open_closure (m): closure the test did not recover on the way back to `stress`;
+    law_closure (m): that of the law; yields: whether the law yields; top (Pa): the largest stress.
     """
 
     stress: float
@@ -36,77 +38,126 @@ class Loop:
     open_closure: float
     law_closure: float
     yields: bool = False
+    top: float = 0.0
 
     def text(self) -> str:
         """The same in words."""
         what = "Friction on the asperities, all that the law has, loses"
-        rest = "crushed and flattened asperities, seating of the halves, gouge"
-        if self.yields:
-            what = "Friction and yielding of the asperities, as the law has them, lose"
-            rest = "crushed asperities, seating of the halves, gouge"
-        return (
-            f"The measured cycle loses {100 * self.measured:.0f} % of the work of loading and "
-            f"keeps {1e6 * self.open_closure:.1f} um of closure back at {self.stress / 1e6:.3g} "
-            "MPa. "
-            f"{what} {100 * self.friction:.2g} % "
-            f"and keeps {1e6 * self.law_closure:.2f} um; of friction coefficients from "
-            f"{_FRICTIONS[0]} to {_FRICTIONS[-1]}, {self.worst_mu:g} loses most at these "
-            f"inclinations, {100 * self.largest_friction:.1f} %. "
-            f"The rest is not in the law: {rest}. Use the fitted law for loading, and for small "
-            "cycles below the largest stress with care."
+        rest = (
+            "The rest is not in this law: flattened asperities (fit a yield_interference to whole "
+            "cycles), crushed ones, seating of the halves, gouge."
         )
+        if self.yields:
+            what = "Friction and yielding of the asperities together lose"
+            rest = (
+                "The loop fixes one length, the yield_interference. It cannot tell yielding from "
+                "friction, crushing, seating of the halves or gouge, which also lose work."
+            )
+        return (
+            f"Up to {self.top / 1e6:.4g} MPa the measured cycle loses {100 * self.measured:.0f} % "
+            f"of the work of loading and keeps {1e6 * self.open_closure:.1f} um of closure back at "
+            f"{self.stress / 1e6:.3g} MPa. {what} {100 * self.friction:.2g} %; the law keeps "
+            f"{1e6 * self.law_closure:.2f} um. Of friction coefficients from {_FRICTIONS[0]} to "
+            f"{_FRICTIONS[-1]}, {self.worst_mu:g} loses most at these inclinations, "
+            f"{100 * self.largest_friction:.1f} %. {rest} Use the fitted law for loading, and for "
+            "small cycles below the largest stress with care."
+        )
+
+
+def summed_up(loops: Sequence[Loop]) -> str:
+    """The cycles of a test in words: the largest one, and a table if there are several."""
+    text = max(loops, key=lambda loop: loop.top).text()
+    if len(loops) == 1:
+        return text
+    rows = [
+        f"| {k} | {loop.top / 1e6:.4g} | {100 * loop.measured:.0f} | {100 * loop.friction:.2g} | "
+        f"{1e6 * loop.open_closure:.1f} | {1e6 * loop.law_closure:.1f} |"
+        for k, loop in enumerate(loops, 1)
+    ]
+    head = "| cycle | up to (MPa) | work lost (%) | by the law | closure kept (um) | by the law |"
+    return "\n".join([head, "|---|---|---|---|---|---|", *rows, "", text])
 
 
 def explain(law: JointLaw, stress: ArrayLike, closure: ArrayLike, steps: int = 100) -> Loop:
-    """Compare one measured loading cycle with what a law does on it.
+    """Compare the first measured cycle with the law, as `explain_each` does."""
+    return explain_each(law, stress, closure, steps)[0]
+
+
+def explain_each(
+    law: JointLaw, stress: ArrayLike, closure: ArrayLike, steps: int = 100
+) -> list[Loop]:
+    """Compare every measured cycle that unloads with what a law does on all of them in turn.
 
     stress: Pa, (n,), loading and unloading; closure: m, (n,); law: such as that of a fit to the
-    loading branch; steps: of the law per branch.
+    first loading; steps: of the law per branch. The law unloads to zero stress each time.
 
-    Raises ValueError when the data do not load and unload above zero stress.
+    Raises ValueError when the data do not load and unload above zero stress, or when the law does
+    not reach their stress.
     """
-    s_up, _, s_down, _ = first_loading(stress, closure)
-    high = float(s_up[-1])
-    low = float(max(s_up[0], s_down.min(), s_up[s_up > 0].min(initial=high)))
-    if s_down.size < 3 or not low < high:
+    s, u = np.asarray(stress, float), np.asarray(closure, float)
+    parts = [slice(first, last + 1) for first, top, last in cycles(s) if last > top + 1]
+    tests = [(s[part], u[part], _lowest(s[part])) for part in parts]
+    if not tests or not all(low < part.max() for part, _, low in tests):
         raise ValueError("stress does not rise and fall above 0: give one cycle, both branches")
-    measured, open_closure = _loss(stress, closure, low)
-    friction, law_closure = _loss(*_cycle(law, high, steps), low)
-    largest, worst_mu = friction, law.asperity.mu
+    of_law = _of_law(law, tests, steps)
+    others = []
     for mu in track(_FRICTIONS, "friction", len(_FRICTIONS)):
-        other = replace(
-            law, asperity=replace(law.asperity, mu=mu, mu_residual=None, wear_slip=np.inf)
-        )
-        loss, _ = _loss(*_cycle(other, high, steps), low)
-        if loss > largest:
-            largest, worst_mu = loss, mu
-    yields = law.asperity.yield_interference < np.inf
-    return Loop(low, measured, friction, largest, worst_mu, open_closure, law_closure, yields)
+        other = replace(law.asperity, mu=mu, mu_residual=None, wear_slip=np.inf)
+        others.append(_of_law(replace(law, asperity=other), tests, steps))
+    loops = []
+    for k, (part, closures, low) in enumerate(tests):
+        measured, open_closure = _loss(part, closures, low)
+        friction, law_closure = of_law[k]
+        losses = [friction, *(other[k][0] for other in others)]
+        worst = int(np.argmax(losses))
+        loops.append(
+            Loop(
+                low, measured, friction, losses[worst], (law.asperity.mu, *_FRICTIONS)[worst],
+                open_closure, law_closure, law.asperity.yield_interference < np.inf,
+                float(part.max()),
+            )
+        )  # fmt: skip
+    return loops
 
 
-def _cycle(law: JointLaw, high: float, steps: int) -> tuple[Array, Array]:
-    """Stress (Pa) and closure (m), (n,), of a law loaded to a stress and unloaded.
+def _of_law(law: JointLaw, tests: list[tuple[Array, Array, float]], steps: int) -> list[Result]:
+    """Loss and closure kept of a law in every cycle.
 
     At the finest resolution: few depth cells lock whole contacts where the law locks their rims,
     and lose up to ten times too much when friction is high.
     """
     finest = replace(law, resolution=NAMED["reference"], plane=None, closure_only=True)
-    joint, step = finest.joint(), float(law.closure(high)) / steps
-    rows = [(float(joint.F[0]), float(joint.delta[0]))]
-    for increment in [step] * steps + [-step] * steps:
-        joint.update([increment], tangent=False)
-        rows.append((float(joint.F[0]), float(joint.delta[0])))
-    stress, closure = np.array(rows).T
-    return stress, closure
+    joint, found = finest.joint(), []
+    greatest, back = 0.0, np.zeros((2, 1))
+    shape = np.concatenate([np.arange(steps + 1), np.arange(steps)[::-1]]) / steps
+    for part, _, low in tests:
+        peak = float(part.max())
+        # below the largest stress so far a joint that has yielded reloads as it unloaded
+        to = law.closure(peak) if peak >= greatest else np.interp(peak, *back)
+        closure = float(to) * shape
+        moves = np.diff(closure)
+        stress = np.array([0.0, *(joint.update([d], tangent=False)[0][0] for d in moves)])
+        found.append(_loss(stress, closure, low))
+        if peak >= greatest:
+            greatest, back = peak, np.stack([stress, closure])[:, : steps - 1 : -1]
+    return found
 
 
-def _loss(stress: ArrayLike, closure: ArrayLike, low: float) -> tuple[float, float]:
+def _lowest(stress: Array) -> float:
+    """The lowest stress (Pa) above zero that both branches of a cycle reach."""
+    top = int(np.argmax(stress))
+    up = stress[: top + 1]
+    return float(max(up[0], stress[top:].min(), up[up > 0].min(initial=stress[top])))
+
+
+def _loss(stress: Array, closure: Array, low: float) -> Result:
     """What a cycle loses above the stress `low`, as a share of the work of loading.
 
     With it the closure (m) that it keeps back there.
     """
-    s_up, u_up, s_down, u_down = first_loading(stress, closure)
-    up, down = _above(s_up, u_up, low), _above(s_down[::-1], u_down[::-1], low)
+    top = int(np.argmax(stress))
+    up = _above(stress[: top + 1], closure[: top + 1], low)
+    down = _above(stress[top:][::-1], closure[top:][::-1], low)
     return 1 - float(trapezoid(*down) / trapezoid(*up)), float(down[1][0] - up[1][0])
 
 

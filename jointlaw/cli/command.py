@@ -59,9 +59,8 @@ def read_law(options: argparse.Namespace) -> JointLaw:
     resolution = getattr(options, "resolution", None)
     if resolution is not None:
         law = replace(law, resolution=resolution)
-    yields = getattr(options, "yield_interference", None)
-    if yields is not None:
-        value = quantity("--yield-interference", yields, "m", positive=True)
+    value = given(options, "yield_interference", "m", positive=True)
+    if value is not None:
         law = replace(law, asperity=replace(law.asperity, yield_interference=value))
     return law
 
@@ -91,6 +90,13 @@ def quantity(option: str, text: str, unit: str, *, positive: bool = False) -> fl
     if positive and value <= 0:
         raise ValueError(f"{option} = {text} is out of bounds: it must be > 0 {unit}")
     return value
+
+
+def given(options: argparse.Namespace, name: str, unit: str, **more: bool) -> float | None:
+    """The SI value of an option by its name in `options`; None if it is left out."""
+    text = getattr(options, name, None)
+    option = f"--{name.replace('_', '-')}"
+    return None if text is None else quantity(option, text, unit, **more)
 
 
 def write_results(folder: Path, files: Written, summary: Mapping[str, Any]) -> None:
@@ -125,14 +131,17 @@ def add_test_options(parser: argparse.ArgumentParser, steps: int) -> None:
         "--steps", metavar="N", type=int, default=steps, help=f"steps per leg (default {steps})"
     )
     parser.add_argument(
-        "--units", metavar="LENGTH,STRESS", default="m,Pa", help="of the CSV: mm,MPa (default m,Pa)"
+        "--units",
+        metavar="LENGTH,STRESS",
+        default="m,Pa",
+        help="of CSV and text: mm,MPa (default m,Pa)",
     )
     add_out(parser)
 
 
 def run_test(test: Callable[[], Record], law: JointLaw, options: argparse.Namespace) -> Record:
     """Run a laboratory test and write its record, also that of a test that stopped early."""
-    _csv_units(options)  # refused before the work
+    csv_units(options)  # refused before the work
     try:
         record = test()
     except PathError as error:
@@ -145,7 +154,7 @@ def run_test(test: Callable[[], Record], law: JointLaw, options: argparse.Namesp
 
 def _write(record: Record, law: JointLaw, options: argparse.Namespace) -> None:
     """Curve (CSV, NPZ), picture, law and summary of a test."""
-    name, (length, stress) = options.command, _csv_units(options)
+    name, (length, stress) = options.command, csv_units(options)
     files: Written = {
         f"{name}.csv": partial(record.to_csv, length=length, stress=stress),
         f"{name}.npz": record.to_npz,
@@ -157,7 +166,7 @@ def _write(record: Record, law: JointLaw, options: argparse.Namespace) -> None:
     write_results(options.out, files, summary)
 
 
-def _csv_units(options: argparse.Namespace) -> list[str]:
+def csv_units(options: argparse.Namespace) -> list[str]:
     """Units of length and stress for the CSV."""
     given: list[str] = options.units.split(",")
     if len(given) != 2 or not all(given):

@@ -3,6 +3,7 @@
 import argparse
 from typing import Any
 
+from ..support.files import clear_run
 from .command import add_command, add_out
 
 
@@ -30,5 +31,6 @@ def _figures(options: argparse.Namespace) -> None:
     elif options.out is None:
         raise ValueError("--out is missing: name the folder for the figures")
     else:
+        clear_run(options.out)
         files = write_figures(options.out, options.numbers)
         print(f"wrote {len(files)} files to {options.out}")

@@ -12,7 +12,7 @@ from ..calibration import datasets
 from ..calibration.baselines import Comparison, compare
 from ..calibration.fit import Fit, fit_closure, fit_many
 from ..calibration.measured import first_loading, subtract_compliance
-from ..calibration.unloading import explain
+from ..calibration.unloading import explain_each, summed_up
 from ..parameters.rock import require_rock
 from ..support.checks import Array
 from ..support.files import require_free
@@ -26,8 +26,9 @@ def add(commands: Any) -> None:
     example = "jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out out"
     parser = add_command(commands, "fit", what, example, _run)
     parser.description = (
-        f"{what}. Only the first loading is fitted; an unloading branch is compared with what "
-        "friction explains. Several closure files are fitted one by one; shear files together."
+        f"{what}. Only the first loading is fitted, or whole cycles with --cycle; every cycle of a "
+        "file is compared with what the fitted law loses and keeps. Several closure files are "
+        "fitted one by one; shear files together."
     )
     parser.add_argument(
         "data", nargs="*", metavar="CSV", help="files of stress and closure, or a shipped data set"
@@ -35,6 +36,7 @@ def add(commands: Any) -> None:
     parser.add_argument("--stress-column", help="name and unit of that column, such as sigmaZ:MPa")
     parser.add_argument("--closure-column", help="name and unit of that column, such as Disp:mm")
     add_options(parser)
+    parser.set_defaults(wait="with shear tests it takes half a minute to some minutes")
     parser.add_argument(
         "--up-to", help="fit up to this stress, predict the rest: 5.3MPa; or half, of the largest"
     )
@@ -54,7 +56,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--cycle",
         action="store_true",
-        help="fit loading and unloading together, yield_interference among the parameters",
+        help="fit all cycles of a file, unloading too, yield_interference among the parameters",
     )
     parser.add_argument("--free", help="parameters to fit: asperity_density,alpha,beta")
     parser.add_argument("--formation", choices=("individual", "population"), default="individual")
@@ -70,29 +72,34 @@ def _run(options: argparse.Namespace) -> None:
             "with one closure file or none"
         )
     folders = _folders(options)
-    tests = [_subtracted(options, *_read(options, item)) for item in options.data]
+    tests = [_read(options, item) for item in options.data]
     keywords = _keywords(options)
+    compliance = _compliance(options)
+    alone = [
+        datasets.ClosureData(stress, subtract_compliance(stress, closure, compliance))
+        for stress, closure in tests
+    ]
     if options.cycle and options.up_to:
         raise ValueError("--cycle fits all points: leave --up-to out")
     loading = [test if options.cycle else first_loading(*test)[:2] for test in tests]
     if options.shear:
         closed = datasets.ClosureData(*loading[0]) if loading else None
-        fit, about = fit_with_shear(options, closed, keywords)
+        fit, about = fit_with_shear(options, closed, compliance, keywords)
         names = ", ".join(Path(item).name for item in [*options.data, *options.shear])
-        about = f"{about}\n\n{_compliance(options)}" if tests else about
-        _write(options.out, names, fit, tests[0] if tests else None, None, about)
+        _write(options.out, names, fit, alone[0] if alone else None, None, about)
         return
     limits = [_limit(options.up_to, stress) for stress, _ in loading]
     seen = [(s[s <= limit], u[s <= limit]) for (s, u), limit in zip(loading, limits, strict=True)]
     if len(seen) > 1:
-        fits = fit_many(seen, workers=options.workers, **keywords)
+        fits = fit_many(seen, workers=options.workers, compliance=compliance, **keywords)
     else:
-        fits = [fit_closure(*seen[0], **keywords)]
+        fits = [fit_closure(*seen[0], compliance=compliance, **keywords)]
     for k, fit in enumerate(fits):
-        (stress, closure), limit = loading[k], limits[k]
-        held = compare(stress, closure, limit, **keywords) if (stress > limit).any() else None
-        name = Path(options.data[k]).name
-        _write(folders[k], name, fit, tests[k], held, _compliance(options))
+        stress, closure = first_loading(*alone[k])[:2]
+        held = (
+            compare(stress, closure, limits[k], **keywords) if (stress > limits[k]).any() else None
+        )
+        _write(folders[k], Path(options.data[k]).name, fit, alone[k], held)
 
 
 def _folders(options: argparse.Namespace) -> list[Path]:
@@ -113,26 +120,16 @@ def _folders(options: argparse.Namespace) -> list[Path]:
     return folders
 
 
-def _compliance(options: argparse.Namespace) -> str:
-    """Whether the closure is that of the joint alone, in words."""
-    if options.compliance is None:
-        return (
-            "No compliance of rock and machine was given: if the closure was measured across rock "
-            "too, the law holds its strain as well."
-        )
-    return f"Subtracted from the closure: that of rock and machine, {options.compliance}."
-
-
 def _write(
     folder: Path,
     name: str,
     fit: Fit,
     test: datasets.ClosureData | None,
     held: Comparison | None,
-    about: str,
+    about: str = "",
 ) -> None:
     require_rock(fit.parameters, f"{name}: the fitted ")
-    text = f"{fit.report()}\n{about}\n"
+    text = f"{fit.report()}{about}\n"
     summary: dict[str, Any] = {
         "data": name,
         "parameters_SI": fit.parameters,
@@ -145,9 +142,9 @@ def _write(
         summary["error_at_largest_stress"] = {n: float(e[-1]) for n, e in held.errors.items()}
     if test is not None and first_loading(*test)[2].size >= 3:
         try:
-            loop = explain(fit.law, *test)
-            text += f"\n## Unloading\n\n{loop.text()}\n"
-            summary["unloading"] = vars(loop)
+            loops = explain_each(fit.law, *test)
+            text += f"\n## Unloading\n\n{summed_up(loops)}\n"
+            summary |= {"unloading": vars(loops[0]), "cycles": [vars(loop) for loop in loops]}
         except ValueError as error:  # the fit is not lost for it
             text += f"\n## Unloading\n\nNot compared with the law: {error}.\n"
             print(f"unloading is not compared: {error}", file=sys.stderr)
@@ -179,20 +176,17 @@ def _read(options: argparse.Namespace, item: str) -> datasets.ClosureData:
     return datasets.read_closure(item, options.stress_column, options.closure_column)
 
 
-def _subtracted(options: argparse.Namespace, stress: Array, closure: Array) -> datasets.ClosureData:
-    """The test without the closure of rock and machine, if --compliance tells it."""
+def _compliance(options: argparse.Namespace) -> float | tuple[Array, Array]:
+    """That of rock and machine, as `ClosureCurve` takes it."""
     text = options.compliance
     if text is None:
-        return datasets.ClosureData(stress, closure)
+        return 0.0
     if "/" in text and not Path(text).exists():
         length, _, load = text.partition("/")
-        slope = quantity("--compliance", length, "m") / quantity(
-            "--compliance", load, "Pa", positive=True
-        )
-        return datasets.ClosureData(stress, subtract_compliance(stress, closure, slope))
+        pressed = quantity("--compliance", load, "Pa", positive=True)
+        return quantity("--compliance", length, "m") / pressed
     rock = datasets.read_closure(text, options.stress_column, options.closure_column)
-    pair = (rock.stress, rock.closure)
-    return datasets.ClosureData(stress, subtract_compliance(stress, closure, pair))
+    return rock.stress, rock.closure
 
 
 def _limit(text: str | None, stress: Any) -> float:

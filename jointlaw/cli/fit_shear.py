@@ -11,6 +11,7 @@ from ..calibration import datasets
 from ..calibration.fit import Fit, fit_curves
 from ..calibration.measured import ClosureCurve, ShearCurve
 from ..parameters.rock import require_rock
+from ..support.checks import Array
 from .command import quantity
 
 MOST = 60  # points of a curve that are fitted: a logger writes thousands, and each costs a step
@@ -44,11 +45,15 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def fit_with_shear(
-    options: argparse.Namespace, test: datasets.ClosureData | None, keywords: dict[str, Any]
+    options: argparse.Namespace,
+    test: datasets.ClosureData | None,
+    compliance: float | tuple[Array, Array],
+    keywords: dict[str, Any],
 ) -> tuple[Fit, str]:
     """One law for all shear tests and a first loading or cycle; with it, in words, what was read.
 
-    test: stress (Pa) and closure (m), or None; keywords: as for `fit_closure`.
+    test: stress (Pa) and closure (m), or None; compliance: of rock and machine, as in
+    `ClosureCurve`; keywords: as for `fit_closure`.
     """
     if options.up_to:
         raise ValueError("--up-to holds back a part of one closure test: leave it out with --shear")
@@ -57,7 +62,7 @@ def fit_with_shear(
     if options.law:
         keywords["law"] = presets.load_any(options.law)
     if test is not None:
-        curves.insert(0, ClosureCurve(*test, noise=noise, cycle=cycle))
+        curves.insert(0, ClosureCurve(*test, noise=noise, cycle=cycle, compliance=compliance))
     free = keywords.pop("free", WITH_CLOSURE if test is not None else ALONE)
     return fit_curves(curves, free=free, **keywords), about
 

@@ -8,7 +8,7 @@ from ..parameters.rock import require_rock
 from ..parameters.toml import VERSION
 from ..surface.fit import SurfaceFit, from_surface
 from ..surface.scan_files import read_scan
-from .command import Written, add_command, add_out, quantity, write_results
+from .command import Written, add_command, add_out, given, quantity, write_results
 
 
 def add(commands: Any) -> None:
@@ -25,15 +25,10 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    unit, lengths = options.height_unit, []
-    for option in ("spacing", "sampling_length"):
-        text = getattr(options, option)
-        lengths.append(
-            None if text is None else quantity(f"--{option.replace('_', '-')}", text, "m")
-        )
+    unit = options.height_unit
     factor = None if unit is None else quantity("--height-unit", f"1{unit}", "m")
-    z, spacing = read_scan(options.file, lengths[0], factor)
-    fit = from_surface(z, spacing, lengths[1])
+    z, spacing = read_scan(options.file, given(options, "spacing", "m"), factor)
+    fit = from_surface(z, spacing, given(options, "sampling_length", "m"))
     require_rock(fit.parameters, f"{Path(options.file).name}: the ")
     text = fit.report()
     print(text)

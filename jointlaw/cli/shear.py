@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any
 
 from ..laboratory.experiments import CONTROLS, direct_shear
-from .command import add_command, add_test_options, quantity, read_law, run_test
+from .command import add_command, add_test_options, given, quantity, read_law, run_test
 
 
 def add(commands: Any) -> None:
@@ -56,9 +56,7 @@ def _shear(options: argparse.Namespace) -> None:
     points = [quantity("--to", options.to, "m")]
     if options.reverse:
         points += [quantity("--reverse", p, "m") for p in options.reverse.split(",")]
-    stiffness = None
-    if options.normal_stiffness is not None:
-        stiffness = quantity("--normal-stiffness", options.normal_stiffness, "Pa/m")
+    stiffness = given(options, "normal_stiffness", "Pa/m")
     if (options.control == "stiffness") != (stiffness is not None):
         raise ValueError("--control stiffness and --normal-stiffness go together; give both")
     normal = quantity("--normal-stress", options.normal_stress, "Pa", positive=True)

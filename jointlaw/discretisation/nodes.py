@@ -7,27 +7,34 @@ of nodes; `benchmarks/nodes.py` measures these rules against others.
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..support.checks import Array, frozen
 from .virgin_curve import VirginCurve
 
 # Chosen on random laws with `benchmarks/nodes.py`
 _STEEPEST = 10.0  # largest tan(theta) that counts: at a = 1 it grows without bound
-_LOW = 0.1  # power of Phi that draws nodes towards small loads
+_LOW = 0.15  # power of Phi that draws nodes towards small loads
 _OPEN = 1.8  # shares of the grading left to the last cell: few cells then sit where most loads are
+UNUSED = 1e300  # m: no closure comes so far
 _GRID = 512  # panels on which the touch-depth density is summed
 
 
 @lru_cache(maxsize=256)
 def inclinations(b: float, count: int) -> tuple[Array, Array]:
-    """Places in u = cos(a theta) and shares (count,) of the density 1 + b/2 (3u^2 - 1) on 0..1.
+    """Places in u = cos(a theta), steepest first, and shares (count,) of the density on 0..1.
 
-    The Gauss rule of that very weight, by the three-term recurrence of its orthogonal polynomials
-    (Golub & Welsch 1969): shares sum to 1 even for one node, which then lies at the mean of u.
+    The Gauss rule of the density 1 + b/2 (3u^2 - 1) over v, u = v^p, by the three-term recurrence
+    of its orthogonal polynomials (Golub & Welsch 1969): shares sum to 1 even for one node, which
+    then lies at the mean of u. Two nodes have p = 2, three to seven p = 3: so one of them is near
+    the steepest facets, which alone carry a joint that has slipped far. More come near them with
+    p = 1, and converge faster.
     """
-    x, w = np.polynomial.legendre.leggauss(2 * count + 2)
+    power = 2 if count == 2 else 3 if 3 <= count <= 7 else 1
+    x, w = np.polynomial.legendre.leggauss((power + 1) * (count + 1))
     x, w = 0.5 * (x + 1.0), 0.5 * w
-    w = w * np.maximum(1.0 + 0.5 * b * (3.0 * x**2 - 1.0), 0.0)
+    u = x**power
+    w = w * power * x ** (power - 1) * np.maximum(1.0 + 0.5 * b * (3.0 * u**2 - 1.0), 0.0)
     middle, side = np.zeros(count), np.zeros(count)
     before, now = np.zeros_like(x), np.sqrt(w / w.sum())  # orthonormal polynomials times sqrt(w)
     for k in range(count):
@@ -37,12 +44,27 @@ def inclinations(b: float, count: int) -> tuple[Array, Array]:
         before, now = now, after / side[k]
     matrix = np.diag(middle) + np.diag(side[:-1], 1) + np.diag(side[:-1], -1)
     places, vectors = np.linalg.eigh(matrix)
-    places, shares = np.clip(places, 0.0, 1.0), vectors[0] ** 2
+    places, shares = np.clip(places, 0.0, 1.0) ** power, vectors[0] ** 2
     return frozen((places, shares))
 
 
-def depth_nodes(curve: VirginCurve, closure_range: float, slope: Array, cells: int) -> Array:
-    """Limits zeta (M, cells + 1) in m of the depth cells of facets of this tan(theta) (M,).
+def azimuths(rings: int, phi: int) -> list[int]:
+    """Azimuths on the half circle of each ring: phi on the steepest, half as many on the flattest.
+
+    They are no fewer than three: that many integrate cos 4 phi exactly, and with it c. Where phi
+    is a multiple of four all are even, so that rings turned by a quarter are themselves.
+    """
+    step = 2 if phi % 4 == 0 else 1
+    numbers = np.ceil(np.linspace(phi, phi / 2, rings) / step - 0.5).astype(int) * step
+    return [int(n) for n in np.maximum(numbers, 2 + step)]
+
+
+def depth_nodes(
+    curve: VirginCurve, closure_range: float, slope: Array, cells: NDArray[np.intp]
+) -> Array:
+    """Limits zeta (M, D + 1) in m of the depth cells of facets of this tan(theta) (M,).
+
+    Each facet has `cells` (M,) of them, D at most; limits that it has no use for lie at UNUSED.
 
     A cell of width h lumps springs of density Phi'' and by that errs by Phi'' h^2/8 at most: equal
     shares of int sqrt(Phi'') dz make the error of all cells the same. A small power of Phi shifts
@@ -62,7 +84,8 @@ def depth_nodes(curve: VirginCurve, closure_range: float, slope: Array, cells: i
     # a floor for curves without curvature, as of one linear spring, where any nodes will do
     share = share / max(share.sum(), 1e-300) + 1e-6 * np.diff(edges) / edges[-1]
     total = np.concatenate([[0.0], np.cumsum(share)])
-    wanted = np.interp(reach, edges, total)[:, None] * (np.arange(1, cells) / (cells - 1 + _OPEN))
-    inner = np.interp(wanted, total, edges)
+    several, count = np.arange(1, cells.max()), cells[:, None]
+    wanted = np.interp(reach, edges, total)[:, None] * (several / (count - 1 + _OPEN))
+    inner = np.where(several < count, np.interp(wanted, total, edges), UNUSED)
     zero, end = np.zeros((len(slope), 1)), np.full((len(slope), 1), np.inf)
     return np.concatenate([zero, inner, end], axis=1)

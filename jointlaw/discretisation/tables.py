@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from ..parameters.asperity import Asperity
 from ..support.checks import Array, frozen
 from .facets import Facets
-from .nodes import depth_nodes
+from .nodes import UNUSED, depth_nodes
 from .virgin_curve import VirginCurve
 
 UNDERFLOW = 1e-140  # m, and Pa/m: counts as zero, for powers and squares below it underflow
-VERSION = 1  # of the discretisation: a change of nodes or state changes it, old states are refused
+VERSION = 2  # of the discretisation: a change of nodes or state changes it, old states are refused
 _OVERFLOW = 1e140  # Pa and J/m2: squares beyond it overflow
 
 
@@ -24,6 +24,7 @@ class Tables:
     `m` (dim, M) maps closure and in-plane offset to the effective closure y of a facet, `s`, `t`
     (dim, M) are the in-facet directions, `area` is A = N w lam K c1^(1+eta), `depth` (M, D+1) the
     cell limits zeta with the virgin force and slope there (slope 0 at the first by definition).
+    A facet of fewer cells has its limits first; cells that begin at UNUSED stay empty.
     `yield_depth` (M,) is the yield interference along y, None where asperities do not yield;
     `opposite` (M,) names the facet that shares its flattened depth, each itself if none does.
     """
@@ -64,23 +65,23 @@ class Tables:
 
     @property
     def cells(self) -> int:
-        """Depth cells per facet."""
+        """Depth cells of the facet that has most of them."""
         return int(self.depth.shape[1]) - 1
 
     @property
     def sliders(self) -> int:
         """Sliders per joint: one for each cell of each facet."""
-        return len(self.c1) * self.cells
+        return int(np.count_nonzero(self.depth[:, :-1] < UNUSED))
 
     @property
     def rows(self) -> int:
-        """State numbers per joint: delta, offset, dissipated energy, and q of every slider.
+        """State numbers per joint: delta, offset, dissipated energy, q of all cells, even UNUSED.
 
         Then, with yielding, the flattened depth of every facet and the plastic work; with wear,
         the slip of the asperities.
         """
         flattened = len(self.c1) + 1 if self.yields else 0
-        return 2 * self.dim + 2 * self.sliders + flattened + self.wears
+        return 2 * self.dim + 2 * len(self.c1) * self.cells + flattened + self.wears
 
 
 def tables(
@@ -92,11 +93,14 @@ def tables(
     cells: int,
     critical_slip: float,
 ) -> Tables:
-    """Lay out the tables; `cells` per facet, one where the curve is linear."""
+    """Lay out the tables; `cells` for the facet of most weight, one where the curve is linear."""
     c1, slope = np.cos(facets.theta), np.tan(facets.theta)
-    depth = depth_nodes(curve, closure_range, slope, 1 if curve.linear else cells)
-    force, slope = curve.force(np.where(np.isfinite(depth), depth, 0.0))
-    force[:, -1] = slope[:, -1] = np.inf
+    share = np.zeros_like(facets.depth) if curve.linear else facets.depth
+    several = np.maximum(np.rint(cells * share), 1).astype(np.intp)
+    depth = depth_nodes(curve, closure_range, slope, several)
+    force, slope = curve.force(np.where(depth < UNUSED, depth, 0.0))
+    force = np.where(depth < UNUSED, force, depth)
+    slope = np.where(depth < UNUSED, slope, depth)
     slope[:, 0] = 0.0  # a spring that touches at once (eta = 0) belongs to the first cell
     slope = np.maximum.accumulate(slope, axis=1)  # but for the rounding of the table it rises
     arrays = (

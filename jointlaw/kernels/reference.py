@@ -137,7 +137,7 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
 def parts(k: Tables, state: Array) -> State:
     """Views of the parts of a state array, q as (2, M, D, B)."""
     dim, M = k.dim, len(k.c1)
-    q, rest = np.split(state[2 * dim :], [2 * k.sliders])
+    q, rest = np.split(state[2 * dim :], [2 * len(k.c1) * k.cells])
     depth, plastic = (rest[:M], rest[M]) if k.yields else (rest[:0], rest[:0])
     slip = rest[-1] if k.wears else rest[:0]
     moved = state[:dim], state[dim : 2 * dim - 1], state[2 * dim - 1]

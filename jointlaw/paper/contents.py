@@ -51,7 +51,8 @@ def write_figures(folder: str | Path, numbers: Sequence[int] = ()) -> list[Path]
             files.append(out / f"{figure.name}{ending}")
             replace_file(files[-1], data)
         captions[figure.name] = {"title": figure.title, "caption": figure.caption}
-    write_json(out / "summary.json", {"figures": captions})
+    names = [path.name for path in files]
+    write_json(out / "summary.json", {"figures": captions, "files": names})
     return [*files, out / "summary.json"]
 
 

@@ -1,5 +1,6 @@
 """How finely the law is discretised: orientations and depth cells."""
 
+import math
 from dataclasses import dataclass
 
 from ..support.checks import whole
@@ -9,9 +10,11 @@ from ..support.checks import whole
 class Resolution:
     """Number of nodes that the law sums over.
 
-    u: inclinations (Gauss rule of the density in cos(a theta)), >= 1.
-    phi: azimuths on the half circle, >= 3; motion in 3-D uses twice as many.
-    depth: cells of touch depth per orientation, >= 1.
+    u: rings of one inclination each (Gauss rule of the density, crowded to the steepest), >= 1.
+    phi: intervals of azimuth on the half circle of the steepest ring, >= 3; flatter rings have
+        fewer, and motion in 3-D takes both halves.
+    depth: cells of touch depth of a facet of the ring of most weight, >= 1; lighter ones have
+        fewer.
     """
 
     u: int
@@ -25,24 +28,35 @@ class Resolution:
 
     @property
     def sliders(self) -> int:
-        """Sliders per joint for motion in one plane; motion in 3-D has twice as many."""
-        return self.u * self.phi * self.depth
+        """Most sliders a joint may have for motion in one plane; `law.tables.sliders` counts."""
+        return self.u * (self.phi + 1) * self.depth
 
 
+# Slip far beyond the closure asks for facets, slip no longer than the closure for depth cells.
+# Chosen with benchmarks/slip.py and benchmarks/nodes.py.
+LONG = 2.5  # closure ranges: a critical slip from here on is long
 NAMED = {
-    "fast": Resolution(1, 3, 2),
-    "balanced": Resolution(2, 3, 4),
-    "fine": Resolution(4, 5, 10),
+    "fast": Resolution(3, 3, 2),
+    "balanced": Resolution(3, 6, 3),
+    "fine": Resolution(5, 7, 8),
     "reference": Resolution(16, 10, 24),
 }
+NAMED_SHORT = NAMED | {"fast": Resolution(2, 3, 3), "balanced": Resolution(2, 4, 4)}
+# Direct shear within 0.03 % of finer nodes over 26 closure ranges: for what is computed once
+SLIP = Resolution(10, 10, 6)
 
 
-def resolve(value: str | Resolution) -> Resolution:
-    """A resolution from its name or itself."""
+def named(slip: float = math.inf) -> dict[str, Resolution]:
+    """The resolutions by name, for a law of this critical slip over closure range."""
+    return NAMED if slip >= LONG else NAMED_SHORT
+
+
+def resolve(value: str | Resolution, slip: float = math.inf) -> Resolution:
+    """A resolution from its name or itself; `slip` as in `named`."""
     if isinstance(value, Resolution):
         return value
     if isinstance(value, str) and value in NAMED:
-        return NAMED[value]
+        return named(slip)[value]
     raise ValueError(
         f"resolution = {value!r} is unknown; choose one of {', '.join(NAMED)} "
         "or give Resolution(u, phi, depth)"

@@ -5,44 +5,37 @@ The law itself takes any number: it has no unit of its own.
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
-
-
-class Range(NamedTuple):
-    """Bounds of a quantity, its unit, and the likely cause of a number outside."""
-
-    low: float
-    high: float
-    unit: str
-    cause: str
-
 
 _OTHER = "is the column in another unit? Name it:"
 _SCALE = "are the columns in the units that were read or given?"
 # the steepest friction angle, 79 degrees, is beyond that of any rock
-_FRICTION = Range(0.0, 5.0, "", "it is a coefficient, tan(angle): tan(35 degrees) = 0.7")
+_FRICTION = (0.0, 5.0, "", "it is a coefficient, tan(angle): tan(35 degrees) = 0.7")
+# lowest, highest, unit, and the likely cause of a number outside
 RANGES = {
     "mu": _FRICTION,
     "friction": _FRICTION,
     # asperities of 1 nm are rougher than a polish; 5 cm is a step in the rock, no asperity
-    "beta": Range(1e-10, 0.05, " m", _SCALE),
-    "overlap": Range(0.0, 0.2, " m", _SCALE),
+    "beta": (1e-10, 0.05, " m", _SCALE),
+    "overlap": (0.0, 0.2, " m", _SCALE),
     # Hertz, Eq. 34: from soft rock and radii of 1 nm to corundum and radii of 1 km
-    "K": Range(1e3, 1e14, " Pa m^(1-eta)", _SCALE),
+    "K": (1e3, 1e14, " Pa m^(1-eta)", _SCALE),
     # one asperity in 30 m to one every 0.1 um
-    "asperity_density": Range(1e-3, 1e14, " /m2", "heights and spacing in the same unit?"),
+    "asperity_density": (1e-3, 1e14, " /m2", "heights and spacing in the same unit?"),
     # 90/a degrees is the steepest inclination
-    "a": Range(1.05, 1e3, "", "are the heights and the spacing in the units that were given?"),
-    "closure": Range(1e-9, 0.02, " m", f'{_OTHER} --closure-column "NAME:um"'),
-    "shear displacement": Range(1e-8, 2.0, " m", f'{_OTHER} --shear-column "NAME:mm"'),
+    "a": (1.05, 1e3, "", "are the heights and the spacing in the units that were given?"),
+    "closure": (1e-9, 0.02, " m", f'{_OTHER} --closure-column "NAME:um"'),
+    "shear displacement": (1e-8, 2.0, " m", f'{_OTHER} --shear-column "NAME:mm"'),
     # beyond the strength of any rock, or below the weight of a sheet of paper on it
-    "shear stress": Range(10.0, 5e9, " Pa", f'{_OTHER} --shear-stress-column "NAME:MPa"'),
-    "stress": Range(10.0, 5e9, " Pa", f'{_OTHER} --stress-column "NAME:MPa"'),
+    "shear stress": (10.0, 5e9, " Pa", f'{_OTHER} --shear-stress-column "NAME:MPa"'),
+    "stress": (10.0, 5e9, " Pa", f'{_OTHER} --stress-column "NAME:MPa"'),
     # joints at 10 kPa have reached 10
-    "peak shear stress over normal stress": Range(
-        0.02, 30.0, "", "are both in the units that were read or given?"
+    "peak shear stress over normal stress": (
+        0.02,
+        30.0,
+        "",
+        "are both in the units that were read or given?",
     ),
-    "plane": Range(-2 * math.pi, 2 * math.pi, " rad", "30 degrees is 0.5236 rad"),
+    "plane": (-2 * math.pi, 2 * math.pi, " rad", "30 degrees is 0.5236 rad"),
 }
 
 

@@ -15,7 +15,7 @@ from ..support.files import replace_file
 from .asperity import Asperity
 from .heights import GammaHeights, Heights
 from .orientation import Orientation
-from .resolution import NAMED, Resolution
+from .resolution import Resolution, named
 
 _LAW_KEYS = {
     "orientation", "asperity", "heights", "asperity_density", "closure_range", "resolution",
@@ -29,7 +29,8 @@ VERSION = 1  # of the keys; a file without one is of version 1
 def write_law(law: Mapping[str, Any], path: Path | None) -> str:
     """TOML text of a law's parameters; written to `path` too, a histogram then as CSV beside it."""
     r = law["resolution"]
-    name = next((n for n, value in NAMED.items() if value == r), None)
+    names = named(law["critical_slip"] / law["closure_range"])
+    name = next((n for n, value in names.items() if value == r), None)
     resolution = f'"{name}"' if name else f"{{ u = {r.u}, phi = {r.phi}, depth = {r.depth} }}"
     lines = [
         f"version = {VERSION}  # of this file's keys",

@@ -22,11 +22,7 @@ def track(items: Iterable[T], label: str, total: int | None = None) -> Iterable[
 @contextmanager
 def explained(text: str) -> Iterator[None]:
     """Says on a terminal what takes so long, once, if it does."""
-
-    def say() -> None:
-        sys.stderr.write(f"{text}\n")
-
-    timer = Timer(PATIENCE, say)
+    timer = Timer(PATIENCE, sys.stderr.write, [f"{text}\n"])
     timer.daemon = True
     if sys.stderr.isatty():
         timer.start()

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..laboratory.normal_control import closing_increments
 from ..law import JointLaw
+from ..parameters.resolution import SLIP
 from ..support.checks import Array, above, whole
 from ..support.version import __version__
 from .table import JointTable
@@ -61,7 +62,11 @@ def tabulate(
     peak, mobilised, dilation = _friction(law, u, psi, limit, steps)
     table = JointTable(u, secant * u, secant, tangent, psi, kt, peak, mobilised, dilation, {})
     harmonic = np.abs(table.lookup(u[1:, None], psi).shear_stiffness / kt[1:] - 1).max()
-    return replace(table, metadata=_metadata(law, table, tolerance, worst, harmonic, limit, steps))
+    # degrees by which few nodes miss the friction that a host will rely on
+    finer = _friction(replace(law, resolution=SLIP), u, psi[::4], limit, steps)[1]
+    missed = np.degrees(np.abs(np.arctan(mobilised[:, ::4]) - np.arctan(finer))).max()
+    metadata = _metadata(law, table, tolerance, worst, harmonic, limit, steps)
+    return replace(table, metadata=metadata | {"resolution_error_friction_angle": float(missed)})
 
 
 def require_3d(law: JointLaw) -> None:

@@ -136,7 +136,7 @@ def test_all_options_of_shear(tmp_path):
     asked = 5e6 + 5e12 * (table["closure"][0] - table["closure"])
     np.testing.assert_allclose(table["F1"], asked, rtol=1e-8)
     written = jl.JointLaw.from_toml(tmp_path / "a" / "b" / "law.toml")
-    assert written.resolution == jl.Resolution(1, 3, 2)
+    assert written.resolution == jl.Resolution(3, 3, 2)  # "fast"
 
 
 def test_options_of_closure(tmp_path):

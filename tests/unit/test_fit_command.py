@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -40,6 +41,24 @@ def test_a_cycle_that_begins_at_zero(tmp_path, cycle, capsys):
     assert "## Unloading" in out
     assert "(seating closure 0 um)" in out
     jl.JointLaw.from_toml(tmp_path / "o" / "law.toml")
+
+
+def test_several_cycles_in_one_file(tmp_path, capsys):
+    law = jl.presets.load("westerly-smooth")
+    asperity = replace(law.asperity, yield_interference=1e-7)
+    law = replace(law, asperity=asperity, closure_only=True)
+    record = jl.closure_test(law.joint(), [5e6, 10e6], steps=12)
+    write(tmp_path / "two.csv", record.F1, record.closure)
+    write(tmp_path / "rock.csv", [0.0, 5e6, 11e6], [0.0, 5e-9, 1e-8])
+    command = ["fit", "two.csv", "--set", "alpha=3.8", "--compliance", "rock.csv", "--out"]
+    assert main([*command, "o", "--cycle"]) == 0
+    out = capsys.readouterr().out
+    assert "| 2 | 10 |" in out
+    assert "compliance of rock and machine that was given is subtracted" in out
+    summary = json.loads((tmp_path / "o" / "summary.json").read_text())
+    assert len(summary["cycles"]) == 2
+    assert main([*command, "first"]) == 0  # the first loading alone is fitted
+    assert "| 2 | 10 |" in capsys.readouterr().out
 
 
 def test_an_unloading_branch_of_no_use_does_not_cost_the_fit(tmp_path, cycle, capsys):

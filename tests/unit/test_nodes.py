@@ -1,26 +1,61 @@
 """Places of the nodes: quadrature exact where it says so, cells where the curve asks for them."""
 
+import math
+
 import numpy as np
 import pytest
 
 import jointlaw as jl
 from jointlaw.discretisation.facets import facets
-from jointlaw.discretisation.nodes import depth_nodes, inclinations
+from jointlaw.discretisation.nodes import UNUSED, azimuths, depth_nodes, inclinations
 from jointlaw.discretisation.virgin_curve import virgin_curve
 
 
 @pytest.mark.parametrize("b", [-1.0, -0.3, 0.0, 0.5, 2.0])
-@pytest.mark.parametrize("count", [1, 2, 3, 7, 40])
-def test_inclinations_integrate_the_density_exactly(b, count):
+@pytest.mark.parametrize(
+    ("count", "root"), [(1, 1), (2, 2), (3, 3), (5, 3), (7, 3), (8, 1), (40, 1)]
+)
+def test_inclinations_integrate_the_density_exactly(b, count, root):
     u, share = inclinations(b, count)
     assert (np.diff(u) > 0).all()
     assert u[0] > 0
     assert u[-1] < 1
     assert (share > 0).all()
-    power = np.arange(min(2 * count, 12))  # a Gauss rule: exact to the degree 2 count - 1
+    # a Gauss rule in v, u = v^root: exact to the degree 2 count - 1 of v
+    power = np.arange(min(2 * count, 12)) / root
     exact = (1 - b / 2) / (power + 1) + 1.5 * b / (power + 3)
     found = (share[:, None] * u[:, None] ** power).sum(axis=0)
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-13)  # rounding of the recurrence
+
+
+@pytest.mark.parametrize("phi", [3, 4, 5, 6, 9])
+def test_azimuths_are_exact_for_the_harmonics_of_c(phi):
+    numbers = azimuths(6, phi)
+    assert numbers[0] == phi
+    assert numbers == sorted(numbers, reverse=True)
+    assert phi % 4 or {n % 2 for n in numbers} == {0}
+    for plane in (None, 0.0):
+        f = facets(jl.Orientation(3.0, 0.3, 0.0), 6, phi, plane)
+        for k in (1, 2, 3, 4):  # cos 2 phi of the density times cos 2 phi of the stiffness
+            assert np.sum(f.weight * np.cos(k * f.phi)) == pytest.approx(0.0, abs=1e-14)
+
+
+@pytest.mark.parametrize("plane", [None, 0.7])
+def test_every_facet_has_its_opposite(plane):
+    f = facets(jl.Orientation(2.0, -0.4, 0.3), 3, 5, plane)
+    there = sorted(zip(f.n.T.round(12).tolist(), f.weight.round(12), strict=True))
+    mirror = f.n * np.array([1.0, -1.0, -1.0])[: len(f.n), None]
+    assert there == sorted(
+        zip((mirror.T + 0.0).round(12).tolist(), f.weight.round(12), strict=True)
+    )
+
+
+def test_a_facet_stands_on_the_line_of_shear():
+    for plane in (0.0, 1.1):
+        f = facets(jl.Orientation(2.0, 0.0, 0.1), 3, 5, plane)
+        steepest = np.max(f.n[1] / f.n[0])
+        assert steepest == pytest.approx(np.tan(f.theta.max()), rel=1e-14)
+        assert math.degrees(f.theta.max()) > 45.0 - 1.0  # and near the rim of the cap, pi/(2a)
 
 
 @pytest.mark.parametrize("plane", [None, 0.0, 0.6])
@@ -31,18 +66,18 @@ def test_weights_add_up_at_any_number_of_nodes(plane):
 
 
 def test_cells_of_a_power_law_are_a_power_grading():
-    # sqrt(Phi'') Phi^-0.1 ~ y^-0.4 for Phi = y^1.5: its integral ~ y^0.6
-    nodes = depth_nodes(virgin_curve(0.5, None), 2.0, np.array([0.0, 1.0]), 6)
+    # sqrt(Phi'') Phi^-0.15 ~ y^-0.475 for Phi = y^1.5: its integral ~ y^0.525
+    nodes = depth_nodes(virgin_curve(0.5, None), 2.0, np.array([0.0, 1.0]), np.array([6, 6]))
     share = np.arange(1, 6) / (5 + 1.8)
     for zeta, reach in zip(nodes, (2.0, 4.0), strict=True):  # closure, and as much by shear
         assert zeta[0] == 0.0
         assert np.isinf(zeta[-1])
         # summed over 512 panels
-        np.testing.assert_allclose(zeta[1:-1], reach * share ** (1 / 0.6), rtol=2e-3)
+        np.testing.assert_allclose(zeta[1:-1], reach * share ** (1 / 0.525), rtol=2e-3)
 
 
 def test_cells_of_a_curve_without_curvature_are_even():
-    nodes = depth_nodes(virgin_curve(0.0, None), 1.0, np.zeros(1), 3)
+    nodes = depth_nodes(virgin_curve(0.0, None), 1.0, np.zeros(1), np.array([3]))
     np.testing.assert_allclose(nodes[0, 1:3], np.array([1, 2]) / 3.8, rtol=1e-3)
 
 
@@ -54,6 +89,21 @@ def test_cells_rise_and_scale_with_the_unit_of_length(formation):
         for unit in (1.0, 4.0):
             heights = jl.GammaHeights(3.82, 1.15e-6 * unit, 2e-6 * unit, formation)
             curve = virgin_curve(0.5, heights)
-            found.append(depth_nodes(curve, 1e-6 * unit, slope, cells))
+            found.append(depth_nodes(curve, 1e-6 * unit, slope, np.full(3, cells)))
         assert (np.diff(found[0], axis=1) > 0).all()
         np.testing.assert_array_equal(found[1][:, :-1], 4.0 * found[0][:, :-1])  # to the bit
+
+
+def test_facets_of_fewer_cells_have_those_first():
+    curve = virgin_curve(0.5, None)
+    zeta = depth_nodes(curve, 1.0, np.array([0.2, 0.2]), np.array([3, 1]))
+    np.testing.assert_array_equal(zeta[:1], depth_nodes(curve, 1.0, np.array([0.2]), np.array([3])))
+    assert zeta[1].tolist() == [0.0, UNUSED, UNUSED, np.inf]
+
+
+def test_light_facets_have_fewer_cells_and_all_are_counted():
+    k = jl.presets.load("westerly-smooth").tables
+    cells = np.count_nonzero(k.depth[:, :-1] < UNUSED, axis=1)
+    assert k.cells == cells.max() > cells.min() == 1
+    assert k.sliders == cells.sum() < len(cells) * k.cells
+    assert (np.diff(cells[np.argsort(k.weight)]) >= 0).all()  # c = 0: weights of a ring are equal

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
+from jointlaw.parameters.resolution import named
 
 NAMES = {name: getattr(jl, name) for name in jl.__all__} | {"inf": float("inf")}
 PARTS = [
@@ -91,10 +92,32 @@ def test_whole_numbers_are_numbers():
 def test_names_of_resolutions(law, make_law):
     sizes = [make_law(resolution=name).resolution.sliders for name in ("fast", "balanced", "fine")]
     assert sizes == sorted(set(sizes))
-    assert make_law(resolution="balanced") == make_law(resolution=jl.Resolution(2, 3, 4))
+    assert make_law(resolution="balanced") == make_law(resolution=jl.Resolution(3, 6, 3))
     assert jl.JointLaw(
         orientation=law.orientation, asperity=law.asperity, asperity_density=1e10
-    ).resolution == jl.Resolution(2, 3, 4)
+    ).resolution == jl.Resolution(3, 6, 3)
+
+
+@pytest.mark.parametrize("name", ["fast", "balanced", "fine", "reference"])
+def test_a_short_critical_slip_chooses_other_nodes(make_law, name):
+    """Its own depth cells and facets; a file holds the name, not the nodes."""
+    for ratio, chosen in ((2.4, named(2.4)), (2.6, named())):
+        law = make_law(resolution=name, closure_range=1e-6, critical_slip=ratio * 1e-6)
+        assert law.resolution == chosen[name]
+        assert len(law.facets.theta) == len(law.tables.c1)
+        assert f'resolution = "{name}"' in law.to_toml()
+        assert jl.JointLaw.from_toml(law.to_toml()) == law
+    assert (named(2.4)[name] != named()[name]) == (name in ("fast", "balanced"))
+
+
+def test_the_closure_range_does_not_hang_on_the_nodes_chosen_by_it(make_law):
+    law = make_law(closure_range=None, resolution="balanced")
+    short = make_law(closure_range=None, resolution="balanced", critical_slip=1e-7)
+    assert short.closure_range == law.closure_range
+    assert short.resolution != law.resolution
+    assert short == make_law(closure_range=short.closure_range, resolution=short.resolution,
+                             critical_slip=1e-7)  # fmt: skip
+    assert short.closure(20e6) == pytest.approx(law.closure_range, rel=0.02)
 
 
 def test_default_closure_range_is_the_closure_at_20_MPa(make_law):

@@ -80,6 +80,58 @@ def test_parameters_come_back_from_a_cycle_that_they_made():
     assert fit.parameters["yield_interference"] == pytest.approx(2e-5, rel=0.08)
 
 
+@pytest.fixture(scope="module")
+def cycles():
+    """Three cycles of a law that yields, the last one below the largest stress before it."""
+    law = jl.JointLaw(
+        orientation=jl.Orientation(3.0), heights=jl.GammaHeights(3.0, 2e-5, 0.0, "individual"),
+        asperity=jl.Asperity(1e9, 1.17, 0.5, 0.3, yield_interference=2e-5), asperity_density=1e6,
+    )  # fmt: skip
+    finest = replace(law, closure_only=True, resolution="reference")
+    record = jl.closure_test(finest.joint(), [5e6, 10e6, 7e6], steps=20)
+    return law, record.F1, record.closure
+
+
+def test_every_cycle_is_compared_with_the_law(cycles):
+    law, stress, closure = cycles
+    loops = jl.unloading.explain_each(law, stress, closure, steps=40)
+    assert [loop.top for loop in loops] == pytest.approx([5e6, 10e6, 7e6])
+    for loop in loops:  # the same law: only the steps differ, and the trapezoids over them
+        assert loop.friction == pytest.approx(loop.measured, abs=0.01)
+        assert loop.law_closure == pytest.approx(loop.open_closure, abs=2e-7)
+    assert loops[2].measured < 0.02 < loops[0].measured < loops[1].measured  # reloading is elastic
+    assert jl.unloading.explain(law, stress, closure, steps=40) == loops[0]
+    text = jl.unloading.summed_up(loops)
+    assert "| 3 | 7 |" in text
+    assert "cannot tell yielding from" in text
+
+
+def test_cycles_turn_where_the_stress_does_and_not_where_it_scatters(cycles):
+    _, stress, closure = cycles
+    wave = stress + 0.01 * stress * (-1) ** np.arange(stress.size)
+    up, _, down, _ = jl.first_loading(wave, closure)
+    assert (up.size, down.size) == (21, 21)
+    with pytest.raises(ValueError, match="after point 20"):
+        ClosureCurve(stress[:61], closure[:61])  # up to its largest stress, but not at first
+    ClosureCurve(stress[:61], closure[:61], cycle=True)
+
+
+def test_the_report_of_cycles_says_what_was_given_and_bounds_the_top(cycles):
+    law, stress, closure = cycles
+    rock = 1e-12
+    fit = jl.fit_closure(
+        stress, closure + rock * stress, law=law, cycle=True, compliance=rock, seating=0.0,
+        free=("asperity_density", "yield_interference"),
+    )  # fmt: skip
+    assert "that was given is subtracted" in fit.report()
+    assert f"| {1e6 * closure.max():.4g} |" in fit.report()  # the top, not the last row
+    # shares of the largest stress: at a small one the band is as wide in Pa, not in per cent
+    low, high = fit.band(np.array([0.3, 1.0]) * closure.max())
+    assert 0.2 * (high - low)[1] < (high - low)[0] < 2 * (high - low)[1]
+    without = jl.fit_closure(stress[:21], closure[:21], law=law)
+    assert "No compliance of rock and machine was given" in without.report()
+
+
 def test_compliance_is_subtracted_as_a_number_or_as_a_curve(grimsel):
     stress, closure = grimsel
     by_number = ClosureCurve(stress, closure, cycle=True, compliance=4e-12)

@@ -53,6 +53,17 @@ def test_shear_stiffness_is_that_of_a_small_shear(law, table):
     assert table.metadata["azimuth_fit_error"] < 1e-6  # stiffness over azimuth is a matrix
 
 
+def test_what_the_nodes_cost_in_friction_is_told(law, table):
+    limit = 2 * law.closure_range
+    few, many = (
+        tabulate(replace(law, resolution=jl.Resolution(*nodes)), shear_limit=limit)
+        for nodes in ((1, 3, 1), (10, 10, 6))
+    )
+    missed = [t.metadata["resolution_error_friction_angle"] for t in (few, table, many)]
+    assert missed[0] > missed[1] > 1e-3
+    assert missed[2] < 1e-9  # rounding
+
+
 def test_friction_is_that_of_a_shear_test(law, table):
     """Against `direct_shear` with twice the steps: peak within 0.5 % at three azimuths."""
     for azimuth in (0.0, math.pi / 3, math.pi / 2):

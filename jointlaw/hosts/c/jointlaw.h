@@ -5,7 +5,7 @@
  *
  *     char message[JLAW_MESSAGE];
  *     jlaw_law *law = jlaw_read("granite.jlaw", message, sizeof message);
- *     double state[102] = {0};                         jlaw_state_size(law) numbers; zeros: virgin
+ *     double state[162] = {0};                         jlaw_state_size(law) numbers; zeros: virgin
  *     if (jlaw_update(law, state, state, d, F, NULL, message, sizeof message)) ... message tells
  *
  * Table files (.jlaw, or as constants NAME.h) are written by `jointlaw export c`.
@@ -405,89 +405,125 @@ JLAW_INLINE void jlaw_flatten_(const jlaw_v_ *y, const jlaw_v_ *depth, const jla
   *kappa = k;
 }
 
+typedef struct { /* sliders of one depth cell of facets side by side */
+  jlaw_v_ G0, G1, k0, k1, reached;   /* G and kappa; G at the new y before springs yield there */
+  jlaw_v_ dy, chord, now, strength;  /* of y; of G; kappa of what was added; mu lam A */
+  jlaw_v_ ts, tt, size, cap, share;  /* trial force, friction limit, cap/size or 1 */
+  jlaw_v_ kz1;                       /* kappa at the flattened depth */
+  jlaw_mask_ grows, near;
+} jlaw_slider_;
+
+/* G and kappa of a cell before and after the step; springs yield at the new y at once */
+JLAW_INLINE void jlaw_cells_(const double *limits, const jlaw_facets_ *f, jlaw_slider_ *s,
+                             int yields)
+{
+  jlaw_v_ z[JLAW_ROWS], H0, H1, kz0, k;
+  for (int i = 0; i < JLAW_ROWS; i++) z[i] = JLAW_LOAD(limits + i * JLAW_LANES);
+  jlaw_cell_(&f->y0, &f->f0, &f->k0, z, &s->G0, &s->k0);
+  jlaw_cell_(&f->y1, &f->f1, &f->k1, z, &s->G1, &s->k1);
+  s->reached = s->G1, k = s->k1;
+  if (!yields) return;
+  jlaw_cell_(&f->z0, &f->fz0, &f->kz0, z, &H0, &kz0);
+  jlaw_cell_(&f->z1, &f->fz1, &f->kz1, z, &H1, &s->kz1);
+  jlaw_flatten_(&f->y0, &f->z0, &H0, &s->G0, &s->k0);
+  jlaw_flatten_(&f->y1, &f->z0, &H0, &s->reached, &k);
+  jlaw_flatten_(&f->y1, &f->z1, &H1, &s->G1, &s->k1);
+}
+
+/* Friction has fallen: sliders come back to their limit, and lose what they held beyond it */
+JLAW_INLINE void jlaw_wear_(const jlaw_slider_ *s, jlaw_v_ *qs, jlaw_v_ *qt, jlaw_v_ *lost)
+{
+  const jlaw_v_ zero = {0.0}, one = zero + 1.0, size2 = *qs * *qs + *qt * *qt;
+  const jlaw_v_ cap = s->strength * s->G0;
+  jlaw_v_ size = size2;
+  jlaw_root_(&size);
+  const jlaw_mask_ beyond = size > cap, stiff = s->k0 > JLAW_TINY;
+  const jlaw_v_ back = JLAW_PICK(beyond, cap / JLAW_PICK(beyond, size, one), one);
+  const jlaw_v_ gone = (1.0 - back) * (1.0 + back) * size2;
+  *lost += JLAW_PICK(stiff, gone / JLAW_PICK(stiff, s->k0, one), zero);
+  *qs = back * *qs, *qt = back * *qt;
+}
+
+/* "The tangent": J_q = beta (I - s s^T) E + v g^T of sliders */
+JLAW_INLINE void jlaw_slide_tangent_(const double *w, const double *limits, const jlaw_slider_ *s,
+                                     jlaw_facets_ *f, int yields)
+{
+  const jlaw_v_ zero = {0.0}, one = zero + 1.0, a = JLAW_W(JLAW_STIFF);
+  const jlaw_v_ begin = JLAW_LOAD(limits), end = JLAW_LOAD(limits + 3 * JLAW_LANES);
+  const jlaw_v_ bend = JLAW_PICK((f->y1 > begin) & (f->y1 < end), f->bend, zero);
+  const jlaw_v_ slope = (s->k1 - s->chord) / JLAW_PICK(s->near, one, s->dy);
+  const jlaw_v_ chord1 = JLAW_PICK(s->near, 0.5 * bend, slope);
+  const jlaw_mask_ stiff = s->k1 > JLAW_TINY;
+  const jlaw_v_ fade = JLAW_PICK(stiff, bend / JLAW_PICK(stiff, s->k1, one), zero);
+  /* where rounding would decide: what did not close has not grown, what is at its limit slips */
+  const jlaw_mask_ stiffer = s->grows & (s->dy > JLAW_ROUNDED * JLAW_ABS(f->y1));
+  const jlaw_v_ least = s->strength * (s->G1 * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * f->f1);
+  const jlaw_mask_ slips = s->size >= least;
+  const jlaw_v_ unit = 1.0 / JLAW_PICK(s->size > 0.0, s->size, one);
+  const jlaw_v_ us = s->ts * unit, ut = s->tt * unit;
+  const jlaw_v_ vs = JLAW_PICK(stiffer, a * chord1 * f->es, fade * s->ts);
+  const jlaw_v_ vt = JLAW_PICK(stiffer, a * chord1 * f->et, fade * s->tt);
+  const jlaw_v_ dot = us * vs + ut * vt, push = s->strength * s->k1;
+  const jlaw_v_ beta = JLAW_PICK(s->cap > 0.0, s->share * (a * s->now), zero);
+  const jlaw_v_ along = JLAW_PICK(slips, beta, zero);
+  f->vs += JLAW_PICK(slips, s->share * (vs - us * dot) + push * us, vs);
+  f->vt += JLAW_PICK(slips, s->share * (vt - ut * dot) + push * ut, vt);
+  f->bss += beta - along * us * us;
+  f->bst -= along * us * ut;
+  f->btt += beta - along * ut * ut;
+  if (yields) {
+    const jlaw_v_ pull = s->strength * JLAW_PICK(slips & (s->k1 > 0.0), s->kz1, zero);
+    f->ws += pull * us, f->wt += pull * ut;
+    f->open = f->open + s->k1;
+  }
+}
+
 /* One depth cell of facets: load, friction limit, loss, tangent; q: sliders before and after */
 JLAW_INLINE void jlaw_slide_(const double *w, const double *limits, double worn, jlaw_facets_ *f,
                              jlaw_v_ *qs, jlaw_v_ *qt, int yields, int wears, int ledger,
                              int tangent)
 {
-  const jlaw_v_ zero = {0.0}, one = zero + 1.0;
-  jlaw_v_ z[JLAW_ROWS], G0, G1, k0, k1, H0, H1, h0, h1 = zero;
-  for (int i = 0; i < JLAW_ROWS; i++) z[i] = JLAW_LOAD(limits + i * JLAW_LANES);
-  jlaw_cell_(&f->y0, &f->f0, &f->k0, z, &G0, &k0);
-  jlaw_cell_(&f->y1, &f->f1, &f->k1, z, &G1, &k1);
-  jlaw_v_ reached = G1; /* before springs yield at the new y, which they do at once */
-  if (yields) {
-    jlaw_cell_(&f->z0, &f->fz0, &f->kz0, z, &H0, &h0);
-    jlaw_cell_(&f->z1, &f->fz1, &f->kz1, z, &H1, &h1);
-    jlaw_v_ k = k1;
-    jlaw_flatten_(&f->y0, &f->z0, &H0, &G0, &k0);
-    jlaw_flatten_(&f->y1, &f->z0, &H0, &reached, &k);
-    jlaw_flatten_(&f->y1, &f->z1, &H1, &G1, &k1);
-  }
-  jlaw_v_ strength = JLAW_W(JLAW_STRENGTH);
-  if (wears) { /* friction has fallen: back to its limit */
-    strength = strength * worn;
-    const jlaw_v_ size2 = *qs * *qs + *qt * *qt, cap = strength * G0;
-    jlaw_v_ size = size2;
-    jlaw_root_(&size);
-    const jlaw_mask_ beyond = size > cap;
-    const jlaw_v_ back = JLAW_PICK(beyond, cap / JLAW_PICK(beyond, size, one), one);
-    const jlaw_v_ gone = (1.0 - back) * (1.0 + back) * size2;
-    f->lost += JLAW_PICK(k0 > JLAW_TINY, gone / JLAW_PICK(k0 > JLAW_TINY, k0, one), zero);
-    *qs = back * *qs, *qt = back * *qt;
+  const jlaw_v_ zero = {0.0}, one = zero + 1.0, a = JLAW_W(JLAW_STIFF);
+  jlaw_slider_ s;
+  jlaw_cells_(limits, f, &s, yields);
+  const jlaw_v_ k0 = s.k0, k1 = s.k1;
+  s.strength = JLAW_W(JLAW_STRENGTH);
+  if (wears) {
+    s.strength = s.strength * worn;
+    jlaw_wear_(&s, qs, qt, &f->lost);
   }
   /* trial force: by the chord where stiffness grows, scaled down where it falls */
-  const jlaw_v_ a = JLAW_W(JLAW_STIFF), dy = f->y1 - f->y0;
-  const jlaw_mask_ grows = k1 > k0;
-  jlaw_mask_ near = JLAW_ABS(dy) <= JLAW_NEAR * JLAW_ABS(f->y1);
-  if (yields) near = near & ((k0 > 0.0) | (k1 <= 0.0)); /* flattened springs touch all at once */
-  const jlaw_v_ ratio = JLAW_PICK(grows, reached - G0, k1) / JLAW_PICK(grows, dy, k0 + JLAW_LEAST);
-  jlaw_v_ chord = JLAW_PICK(near, 0.5 * (k0 + k1), ratio);
-  jlaw_at_least_(&chord, &k0);
-  jlaw_at_most_(&chord, &k1);
-  const jlaw_v_ kept = JLAW_PICK(grows, one, ratio), now = JLAW_PICK(grows, chord, k1);
-  const jlaw_v_ old2 = *qs * *qs + *qt * *qt, add = a * now;
-  const jlaw_v_ ts = *qs * kept + add * f->es, tt = *qt * kept + add * f->et;
+  s.dy = f->y1 - f->y0;
+  s.grows = k1 > k0;
+  s.near = JLAW_ABS(s.dy) <= JLAW_NEAR * JLAW_ABS(f->y1);
+  if (yields) s.near = s.near & ((k0 > 0.0) | (k1 <= 0.0)); /* flattened springs touch all at once */
+  const jlaw_v_ top = JLAW_PICK(s.grows, s.reached - s.G0, k1);
+  const jlaw_v_ ratio = top / JLAW_PICK(s.grows, s.dy, k0 + JLAW_LEAST);
+  s.chord = JLAW_PICK(s.near, 0.5 * (k0 + k1), ratio);
+  jlaw_at_least_(&s.chord, &k0);
+  jlaw_at_most_(&s.chord, &k1);
+  s.now = JLAW_PICK(s.grows, s.chord, k1);
+  const jlaw_v_ kept = JLAW_PICK(s.grows, one, ratio), add = a * s.now;
+  const jlaw_v_ old2 = *qs * *qs + *qt * *qt;
+  s.ts = *qs * kept + add * f->es, s.tt = *qt * kept + add * f->et;
   /* friction: |q| <= mu lam A G */
-  const jlaw_v_ new2 = ts * ts + tt * tt, cap = strength * G1;
-  jlaw_v_ size = new2;
-  jlaw_root_(&size);
-  jlaw_v_ whole = size;
-  jlaw_at_least_(&whole, &cap);
-  const jlaw_v_ share = cap / (whole + JLAW_LEAST);
-  const jlaw_v_ part = JLAW_PICK(new2 > JLAW_TINY, share, zero);
-  *qs = part * ts, *qt = part * tt;
+  const jlaw_v_ new2 = s.ts * s.ts + s.tt * s.tt;
+  s.size = new2, s.cap = s.strength * s.G1;
+  jlaw_root_(&s.size);
+  jlaw_v_ whole = s.size;
+  jlaw_at_least_(&whole, &s.cap);
+  s.share = s.cap / (whole + JLAW_LEAST);
+  const jlaw_v_ part = JLAW_PICK(new2 > JLAW_TINY, s.share, zero);
+  *qs = part * s.ts, *qt = part * s.tt;
   f->qs += *qs, f->qt += *qt;
   if (ledger) { /* "No step can make energy": each factor is >= 0 as written */
-    const jlaw_v_ high = JLAW_PICK(grows, chord, k0), low = JLAW_PICK(grows, k0, k1);
-    const jlaw_v_ k01 = k0 * high, k11 = k1 * now;
-    const jlaw_v_ rub = k1 - now + 2.0 * share * (1.0 - share) * now;
+    const jlaw_v_ high = JLAW_PICK(s.grows, s.chord, k0), low = JLAW_PICK(s.grows, k0, k1);
+    const jlaw_v_ k01 = k0 * high, k11 = k1 * s.now;
+    const jlaw_v_ rub = k1 - s.now + 2.0 * s.share * (1.0 - s.share) * s.now;
     f->lost += JLAW_PICK(k01 > JLAW_TINY, old2 * ((high - low) / k01), zero)
                + JLAW_PICK(k11 > JLAW_TINY, new2 * (rub / k11), zero);
   }
-  if (tangent) { /* "The tangent": J_q = beta (I - s s^T) E + v g^T */
-    const jlaw_v_ bend = JLAW_PICK((f->y1 > z[0]) & (f->y1 < z[3]), f->bend, zero);
-    const jlaw_v_ chord1 = JLAW_PICK(near, 0.5 * bend, (k1 - chord) / JLAW_PICK(near, one, dy));
-    const jlaw_v_ fade = JLAW_PICK(k1 > JLAW_TINY, bend / JLAW_PICK(k1 > JLAW_TINY, k1, one), zero);
-    /* where rounding would decide: what did not close has not grown, what is at its limit slips */
-    const jlaw_mask_ stiffer = grows & (dy > JLAW_ROUNDED * JLAW_ABS(f->y1));
-    const jlaw_mask_ slips = size >= strength * (G1 * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * f->f1);
-    const jlaw_v_ unit = 1.0 / JLAW_PICK(size > 0.0, size, one), us = ts * unit, ut = tt * unit;
-    const jlaw_v_ vs = JLAW_PICK(stiffer, a * chord1 * f->es, fade * ts);
-    const jlaw_v_ vt = JLAW_PICK(stiffer, a * chord1 * f->et, fade * tt);
-    const jlaw_v_ dot = us * vs + ut * vt, push = strength * k1;
-    const jlaw_v_ beta = JLAW_PICK(cap > 0.0, share * add, zero), along = JLAW_PICK(slips, beta, zero);
-    f->vs += JLAW_PICK(slips, share * (vs - us * dot) + push * us, vs);
-    f->vt += JLAW_PICK(slips, share * (vt - ut * dot) + push * ut, vt);
-    f->bss += beta - along * us * us;
-    f->bst -= along * us * ut;
-    f->btt += beta - along * ut * ut;
-    if (yields) {
-      const jlaw_v_ pull = strength * JLAW_PICK(slips & (k1 > 0.0), h1, zero);
-      f->ws += pull * us, f->wt += pull * ut;
-      f->open = f->open + k1;
-    }
-  }
+  if (tangent) jlaw_slide_tangent_(w, limits, &s, f, yields);
 }
 
 /* C += along g^T + E^T B E of facets; where the flattened depth moves less softening g_z^T */
@@ -867,7 +903,7 @@ static jlaw_measures_ jlaw_measure_(const jlaw_law *law, const double *s)
     double squeezed = jlaw_psi_(law, y);
     if (law->yields) squeezed -= jlaw_psi_(law, z) + fz * (y - z);
     if (y > z && squeezed > 0.0) all.squeezed += jlaw_of_facet_(law, f, JLAW_POTENTIAL) * squeezed;
-    if (force > 0.0) all.slipping += share * at_limit / force;
+    if (force > 0.0) all.slipping += share * fmin(at_limit / force, 1.0);
     if (y > z && whole) all.sliding += share;
     if (!(y > z)) all.separated += share;
   }

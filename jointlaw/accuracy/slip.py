@@ -1,0 +1,114 @@
+"""Slip far beyond the closure: friction and dilation angle at constant normal stress.
+
+The joint is seated and sheared to several critical slips (without one to 30 closure ranges), and
+back by as much. The normal stress is held for every resolution by itself: one and the same path of
+displacement would compare their dilation, summed up over the slip, and not their strength.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from ..joints import batch as joints
+from ..support.checks import Array
+
+LEG = 24  # steps each way
+SHARES = (1.0, 0.1)  # of the normal stress S/2 of the standard paths
+DIRECTIONS = (0.0, 25.0, 90.0)  # degrees, in space
+MOBILISED = 0.2  # of a critical slip, or without one of 10 closure ranges: friction from there on
+_FIRST = 0.1  # first step, in closure ranges
+_FAR, _ENDLESS = 3.0, 30.0  # critical slips; closure ranges without critical slip
+_HELD = 1e-5  # of the normal stress
+_TRIES = 60
+
+
+class Law(joints.Law, Protocol):
+    """What is read of a law whose joints slip."""
+
+    def joints(self, n: int, ledger: bool = True) -> joints.JointBatch: ...
+
+
+class Slip(NamedTuple):
+    """F (steps, paths, dim) in Pa, and friction and dilation angle (steps, paths) in degrees.
+
+    `counts` (steps,): whether friction is mobilised: beyond 0.2 critical slips, and on the way back
+    beyond its first fifth and two closure ranges, within which sliders still turn.
+    """
+
+    F: Array
+    friction: Array
+    dilation: Array
+    counts: Array
+
+    def apart(self, other: Slip) -> tuple[float, float]:
+        """Largest difference of the friction and of the dilation angle, in degrees."""
+        friction = np.abs(self.friction - other.friction)[self.counts]
+        dilation = np.abs(self.dilation - other.dilation)[self.counts]
+        return float(friction.max()), float(dilation.max())
+
+
+def distance(critical_slip: float, closure_range: float) -> float:
+    """How far (m) the paths that slip go."""
+    if math.isfinite(critical_slip):
+        return _FAR * critical_slip
+    return _ENDLESS * closure_range
+
+
+def slip(law: Law, closure_range: float, stress: float, shares: Sequence[float] = SHARES) -> Slip:
+    """Shear at `shares` of the normal stress S/2 (Pa), in space along each of DIRECTIONS."""
+    dim, R, Dc = law.tables.dim, closure_range, law.tables.critical_slip
+    unit, far = Dc if math.isfinite(Dc) else 10 * R, distance(Dc, R)
+    places = np.geomspace(_FIRST * min(R, far), far, LEG)
+    leg = np.diff(places, prepend=0.0)
+    turn = np.radians(DIRECTIONS if dim == 3 else DIRECTIONS[:1])
+    along = np.stack([np.cos(turn), np.sin(turn)], axis=-1)[:, : dim - 1]
+    along = np.tile(along, (len(shares), 1))
+    goal = stress * np.repeat(shares, len(turn))
+    batch = law.joints(len(goal), ledger=False)
+    seat = np.zeros((len(goal), dim))
+    seat[:, 0] = law.closure(goal)
+    batch.update(seat, tangent=False)
+    F = np.empty((2 * LEG, len(goal), dim))
+    rise, rate = np.empty(F.shape[:2]), np.zeros(len(goal))
+    for k, length in enumerate(np.concatenate([leg, -leg])):
+        step = np.column_stack([rate * length, length * along])
+        step[:, 0] = _held(batch, step, goal, abs(length) + R)
+        batch.update(step, tangent=False, out=(F[k], None))
+        rate = step[:, 0] / length
+        rise[k] = -step[:, 0] / abs(length)
+    sense = np.repeat([1.0, -1.0], LEG)[:, None]
+    shear = sense * np.sum(F[:, :, 1:] * along, axis=2)
+    counts = np.concatenate([places >= MOBILISED * unit, places >= max(MOBILISED * far, 2 * R)])
+    return Slip(F, np.degrees(np.arctan2(shear, F[:, :, 0])), np.degrees(np.arctan(rise)), counts)
+
+
+def names(dim: int) -> tuple[str, ...]:
+    """What the paths are called."""
+    ways = DIRECTIONS if dim == 3 else DIRECTIONS[:1]
+    return tuple(f"slip {way:g} at {share:g}" for share in SHARES for way in ways)
+
+
+def _held(batch: joints.JointBatch, step: Array, goal: Array, reach: float) -> Array:
+    """Closure increments (n,) that give the normal stresses `goal`: Newton within a bracket."""
+    step, u = step.copy(), step[:, 0].copy()
+    low, high = np.full_like(u, -np.inf), np.full_like(u, np.inf)
+    for _ in range(_TRIES):
+        step[:, 0] = u
+        F, C = batch.trial(step)
+        assert C is not None
+        off = F[:, 0] / goal - 1.0
+        if np.abs(off).max() < _HELD:
+            break
+        low, high = np.where(off <= 0, u, low), np.where(off > 0, u, high)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            new = u - off * goal / C[:, 0, 0]
+        new = np.where(np.isfinite(new), np.clip(new, u - reach, u + reach), u + reach)
+        with np.errstate(invalid="ignore"):
+            middle = 0.5 * (low + high)
+        inside = (new > low) & (new < high) | ~np.isfinite(middle)
+        u = np.where(np.abs(off) < 0.1 * _HELD, u, np.where(inside, new, middle))
+    return u

@@ -135,7 +135,9 @@ def main():
         "2 processors, pair | speed-up of the step | bytes a contact |\n" + "|---" * 8 + "|"
     )
     for name in styles:
-        (pair, loop, count), (pair2, loop2, _) = (best[name, n] for n in (1, options.processors[-1]))
+        (pair, loop, count), (pair2, loop2, _) = (
+            best[name, n] for n in (1, options.processors[-1])
+        )
         over = pair / best["granular, mindlin", 1][0]
         print(f"| {name} | {count:.0f} | {pair:.0f} | {over:.2f} | {loop:.0f} | {pair2:.0f} | "
               f"{loop / loop2:.2f} | {sizes.get(name, '')} |")  # fmt: skip

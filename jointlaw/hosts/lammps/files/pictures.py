@@ -107,9 +107,9 @@ def slope(folder):
     size = np.hypot(*moved.T)
     magnified = 10.0 ** np.floor(np.log10(1.5 / max(size.max(), 1e-12)))
     fig, axes = plt.subplots(figsize=(9, 6), layout="constrained")
-    axes.scatter(x, z, s=4, c="0.85")
+    axes.scatter(x, z, s=12, c="0.85")
     shown = np.stack([x, z], axis=1) + magnified * moved
-    points = axes.scatter(*shown.T, s=4, c=1e3 * size, cmap="magma_r")
+    points = axes.scatter(*shown.T, s=12, c=1e3 * size, cmap="magma_r")
     fig.colorbar(points, label="displacement (mm)")
     axes.set(xlabel="down the dip: to the left (m)", ylabel="across the base (m)")
     axes.set_title(f"after {steps[-1]} steps, displacement x {magnified:g}; grey: before")

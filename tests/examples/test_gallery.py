@@ -27,7 +27,7 @@ def closure_hysteresis(x):
 def closure_cycle(x):
     # measured 38 %; without yielding friction alone is left
     assert 0.3 < x["loss"]["yields"] < 0.46
-    assert 0 < x["loss"]["elastic"] < 0.02
+    assert 0 < x["loss"]["elastic"] < 0.04  # most of it from the few cells of `balanced`
     assert (np.diff(x["kept"]) > 0).all()  # a set that grows with the largest stress
 
 

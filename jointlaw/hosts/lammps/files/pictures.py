@@ -1,4 +1,4 @@
-"""Pictures of what the input scripts wrote: python pictures.py [FOLDER], with numpy and matplotlib.
+"""Pictures of what the input scripts wrote: python pictures.py [FOLDER]; needs matplotlib.
 
 tower.png from log.tower (lmp -in in.tower -log log.tower) and tower.dump, shear.png from
 shear.txt, slope.png from slope.dump, spheres.png from spheres.dump; what is missing is left out.
@@ -36,7 +36,7 @@ def thermo(path):
             names, rows = words, []
         elif words[:3] == ["Loop", "time", "of"]:
             last = dict(zip(names, np.array(rows).T, strict=True))
-        elif len(words) == len(names) and words[0].isdigit():
+        elif words and len(words) == len(names) and words[0].isdigit():
             rows.append([float(word) for word in words])
     return last
 

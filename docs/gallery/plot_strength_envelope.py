@@ -44,8 +44,8 @@ left.legend()
 plt.show()
 
 # %%
-# At low stress a yield interference of 0.2 µm changes nothing. At high stress even the elastic joint
-# loses some of its friction angle, since contacts are renewed before all of them slide. Yielding
+# At low stress a yield interference of 0.2 µm changes nothing. At high stress even the elastic
+# joint loses some of its friction angle, since contacts are renewed before all of them slide. Yielding
 # presses the steep ones flat.
 
 for label, found in angles.items():

@@ -45,8 +45,8 @@ plt.show()
 
 # %%
 # At low stress a yield interference of 0.2 µm changes nothing. At high stress even the elastic
-# joint loses some of its friction angle, since contacts are renewed before all of them slide. Yielding
-# presses the steep ones flat.
+# joint loses some of its friction angle, since contacts are renewed before all of them slide.
+# Yielding presses the steep ones flat.
 
 for label, found in angles.items():
     print(f"{label}: friction angle {found[0]:.1f}° at 0.1 MPa, {found[-1]:.1f}° at 50 MPa")

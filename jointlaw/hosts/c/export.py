@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...discretisation.nodes import UNUSED
 from ...discretisation.tables import Tables
 from ...kernels.cells import compliance
 from ...kernels.reference import strength
@@ -20,7 +21,6 @@ LANES = 4  # facets side by side, as in jointlaw.h
 AZIMUTHS = 512  # of a ring of facets at most, as in jointlaw.h
 FORMAT = 2  # of table files: a change of their keywords or columns changes it
 FILES = ("jointlaw.h", "example.c", "example.cpp", "Makefile", "README.md")
-UNUSED = 1e300  # m: cells that begin there hold nothing
 _LARGEST = sys.float_info.max
 _MODEL = "granite"  # the name of the tables in these files
 

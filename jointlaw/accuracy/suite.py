@@ -14,9 +14,9 @@ With R the law's closure range and S the normal stress there, the paths are
                        count where friction is mobilised (`Slip.counts`)
 
 Excursions are random: four to ten legs between corners with closures from -0.3 R to R (one of them
-at a stress of S/2 to S) and shears up to R, every second one rounded; in every eighth the shears
-go as far as `far`. They are drawn once and for all, so that they too are the same for every
-resolution. A law without critical slip takes 30 R for three of them.
+at a stress of S/2 to S) and shears up to R, every second one rounded. They are drawn once and for
+all, so that they too are the same for every resolution. A law without critical slip takes 30 R for
+three of them.
 
 Along 0, 45 and 90 degrees the rings of azimuths look alike; the other directions lie between, where
 a ring of few azimuths errs most. A law with a plane takes the paths along azimuth 0 and the others
@@ -232,13 +232,13 @@ def _paths(law: Law, stress: float) -> tuple[tuple[str, ...], Array, Array]:
 def _excursions(law: Law, stress: float, count: int) -> Array:
     """Random places (steps, count, dim) in m."""
     rng, R, s = np.random.default_rng(8), law.closure_range, np.arange(1, STEPS + 1) / STEPS
-    sheared, goal = distance(law.tables.critical_slip, R) / R, []
+    goal = []
     for i in range(count):
         legs = int(rng.integers(4, 11))
         closure = np.append(0.0, rng.uniform(-0.3, 1.0, legs))
         highest = float(law.closure(stress * rng.uniform(1.0, 2.0))) / R
         closure[rng.integers(1, legs + 1)] = highest
-        shear = np.append(0.0, np.sqrt(rng.random(legs))) * (1.0 if i % 8 else max(sheared, 1.0))
+        shear = np.append(0.0, np.sqrt(rng.random(legs)))
         turn = rng.uniform(0.0, 2.0 * np.pi, legs + 1)
         corners = np.stack([closure, shear * np.cos(turn), shear * np.sin(turn)], axis=-1)
         at = np.linspace(0.0, 1.0, legs + 1)

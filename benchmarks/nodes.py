@@ -25,7 +25,7 @@ from jointlaw.accuracy.suite import Suite, standard_suite
 from jointlaw.discretisation import facets as rings
 from jointlaw.discretisation import tables
 from jointlaw.discretisation.nodes import UNUSED
-from jointlaw.parameters.resolution import NAMED
+from jointlaw.parameters.resolution import named
 from jointlaw.support.progress import track
 
 Rule = Callable[..., Any]
@@ -294,9 +294,10 @@ class Laws:
 
     def named(self) -> str:
         lines = [head("named", ["sliders", *jl.presets.names()])]
-        for name, r in NAMED.items():
+        for name, r in named().items():
             errors = worst(self.presets, (r.u, r.phi, r.depth))
-            lines.append(f"| {name} | {r.sliders} | {' | '.join(f'{e:.2f}' for e in errors)} |")
+            sliders = max(replace(law, resolution=r).tables.sliders for law, _ in self.presets)
+            lines.append(f"| {name} | {sliders} | {' | '.join(f'{e:.2f}' for e in errors)} |")
         return "\n".join(lines)
 
     def _worst(self, rule: tuple[int, int, int]) -> np.ndarray:

@@ -31,10 +31,10 @@ import numpy as np
 
 import jointlaw as jl
 from jointlaw.accuracy.slip import slip
-from jointlaw.accuracy.suite import errors, reference_resolution, scaled, tractions
+from jointlaw.accuracy.suite import errors, reference_resolution, scaled, steepest, tractions
 from jointlaw.support.progress import track
 
-TOLERANCES = (0.05, 0.025, 0.01, 0.003, 0.001)
+TOLERANCES = (0.05, 0.01, 0.003)
 PATHS, STEPS = 6, 160  # of each kind
 SMALL_A = 1.4
 
@@ -119,7 +119,8 @@ def misses(law: jl.JointLaw, rng: np.random.Generator) -> list[dict[str, Any]]:
     truth = tractions(exact, d)
     stress = float(law.normal_stress(law.closure_range)) / 2
     shares = rng.uniform(0.05, 1.0, 2)
-    slid = slip(exact, law.closure_range, stress, shares)
+    slips = steepest(law) < 88.0  # else it jams
+    slid = slip(exact, law.closure_range, stress, shares) if slips else None
     found = []
     for tolerance in TOLERANCES:
         start = time.perf_counter()
@@ -129,12 +130,11 @@ def misses(law: jl.JointLaw, rng: np.random.Generator) -> list[dict[str, Any]]:
             found.append({"refused": str(error)})
             continue
         took = time.perf_counter() - start
-        mine = slip(made, law.closure_range, stress, shares)
-        both = (
-            errors(tractions(made, d), truth)[0],
-            errors(mine.F[slid.counts], slid.F[slid.counts])[0],
-        )
-        ratio = np.concatenate(both) / tolerance
+        ratio = errors(tractions(made, d), truth)[0] / tolerance
+        if slid is not None:
+            mine = slip(made, law.closure_range, stress, shares)
+            more = errors(mine.F[slid.counts], slid.F[slid.counts])[0]
+            ratio = np.append(ratio, more / tolerance)
         r = made.resolution
         found.append({"ratio": ratio.tolist(), "sliders": made.tables.sliders, "seconds": took,
                       "resolution": [r.u, r.phi, r.depth]})  # fmt: skip

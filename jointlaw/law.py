@@ -100,7 +100,8 @@ class JointLaw:
             if self.closure_range is None:
                 set_(self, "closure_range", self._default_range())
             set_(self, "closure_range", above("closure_range", self.closure_range, 0.0))
-            set_(self, "resolution", resolve(asked, self.critical_slip / self.closure_range))
+            lengths = np.array([self.critical_slip, self.asperity.yield_interference])
+            set_(self, "resolution", resolve(asked, *(lengths / self.closure_range)))
             if self.resolution != nodes:
                 for cached in ("facets", "_scale", "_virgin"):  # by the closure range
                     self.__dict__.pop(cached, None)

@@ -9,5 +9,6 @@ frames       pictures of single blocks, animations
 rock_report  pictures of rock masses
 curves       energies, tilt and shear curves
 vtk          frames as VTK files
+interrupt    what Ctrl-C does to a run
 run          a run from start to end, and its files
 """

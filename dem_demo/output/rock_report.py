@@ -106,9 +106,7 @@ def report(record: Record, path: Path) -> None:
         part[name].set_title(f"{name}: t = {record.times[i]:.2f} s", fontsize=10, loc="left")
         part[name].legend(handles=_key(scale), **ABOVE)
     draw_vectors(part["vectors"], record, last, scale)
-    part["vectors"].set_title(
-        "displacement since the drawing, settling included", fontsize=10, loc="left"
-    )
+    part["vectors"].set_title("displacement since the drawing", fontsize=10, loc="left")
     _histories(part["energy"], part["moved"], record)
     said = "\n".join(sentence(entry) for entry in outcomes(record))
     figure.suptitle(f"{record.scene.title}\n{said}", fontsize=10)

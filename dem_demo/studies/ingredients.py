@@ -89,7 +89,8 @@ def _removals(law: jl.JointLaw) -> Iterator[tuple[str, bool, dict[str, Any]]]:
             yield f"{key} = 0", True, {"orientation": replace(orientation, **{key: 0.0})}
     if np.isfinite(law.critical_slip):
         yield "no large shear", False, {"critical_slip": np.inf}
-    for name, resolution in named(law.critical_slip / law.closure_range).items():
+    lengths = law.critical_slip / law.closure_range, asperity.yield_interference / law.closure_range
+    for name, resolution in named(*lengths).items():
         if law.resolution != resolution:
             yield f"resolution {name}", False, {"resolution": resolution}
     if law.resolution.depth > 1:

@@ -19,14 +19,14 @@ import jointlaw as jl
 
 law = jl.JointLaw(
     orientation=jl.Orientation(3.0),
-    asperity=jl.Asperity(K=9.637e8, lam=1.167, eta=0.5, mu=0.6, yield_interference=79e-6),
-    heights=jl.GammaHeights(2.12, 96e-6, 0.0, "individual"),
-    asperity_density=3.85e4,
+    asperity=jl.Asperity(K=9.637e8, lam=1.167, eta=0.5, mu=0.6, yield_interference=78.5e-6),
+    heights=jl.GammaHeights(2.048, 53.3e-6, 0.0, "individual"),
+    asperity_density=1.658e4,
     closure_only=True,
 )
 elastic = replace(law, asperity=replace(law.asperity, yield_interference=np.inf))
 stress, closure = jl.datasets.load("grimsel_vd1_closure")
-seating = 88e-6  # m, closure of the law where the test began
+seating = 70.4e-6  # m, closure of the law where the test began
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
 left.plot(closure * 1e6, stress / 1e6, "ko", ms=4, label="measured")

@@ -9,14 +9,15 @@ With R the law's closure range and S the normal stress there, the paths are
     re-contact         closed and sheared, opened under shear until it separates, closed again
     walk               a smooth random walk in closure and both shears
     weave              closed five times while the shear crosses itself (in space)
-    far                R/2, shear along 20 degrees to three critical slips and back
+    far                R/2, shear along 20 degrees to three critical slips, 3 R at most, and back
     slip               as far at the stresses S/2 and S/20, held by every resolution itself; errors
                        count where friction is mobilised (`Slip.counts`)
 
 Excursions are random: four to ten legs between corners with closures from -0.3 R to R (one of them
-at a stress of S/2 to S) and shears up to R, every second one rounded; in every eighth the shears
-go as far as `far`. They are drawn once and for all, so that they too are the same for every
-resolution. A law without critical slip takes 30 R for three of them.
+at a stress of S/2 to S) and shears up to R, every second one rounded. They are drawn once and for
+all, so that they too are the same for every resolution. A law without critical slip takes 30 R for
+three of them. At a given closure a longer slip would end at many times the stress S; at a given
+stress a law that jams, atan(mu) + 90 deg/a above 88 degrees, has no end, and leaves `slip` out.
 
 Along 0, 45 and 90 degrees the rings of azimuths look alike; the other directions lie between, where
 a ring of few azimuths errs most. A law with a plane takes the paths along azimuth 0 and the others
@@ -43,6 +44,8 @@ from ..support.progress import track
 from .slip import Slip, distance, names, slip
 
 STEPS = 120  # of each path
+_FAR = 3.0  # R: the longest slip at a given closure
+_JAMS = 88.0  # degrees: the steepest friction angle of a law that slips at a given stress
 
 
 class Law(joints.Law, Protocol):
@@ -70,6 +73,11 @@ def reference_resolution(law: Law) -> Resolution:
     return Resolution(math.ceil(6 + 32 / law.orientation.a), 16, 36)
 
 
+def steepest(law: Law) -> float:
+    """Limit of the friction angle under long slip at small stress: atan(mu) + 90 deg/a."""
+    return math.degrees(math.atan(law.asperity.mu)) + 90.0 / law.orientation.a
+
+
 def scaled(r: Resolution, share: float) -> Resolution:
     """That many times the nodes in each direction."""
     u, phi, depth = (round(share * n) for n in (r.u, r.phi, r.depth))
@@ -80,7 +88,7 @@ class Miss(NamedTuple):
     """How far a resolution is off.
 
     `largest`, `rms` (paths,): shares of the path's largest |F|. `friction`, `dilation`: largest
-    misses of the angles under slip, in degrees; 0 for a joint that does not shear.
+    misses of the angles under slip, in degrees; NaN for a joint that does not shear, or jams.
     """
 
     largest: Array
@@ -107,7 +115,7 @@ class Suite:
         """How far another resolution is off."""
         largest, rms = errors(tractions(law, self.d), self.F)
         if self.slip is None:
-            return Miss(largest, rms, 0.0, 0.0)
+            return Miss(largest, rms, math.nan, math.nan)
         mine = slip(law, law.closure_range, self.stress)
         counts = self.slip.counts  # right after the turn, shear stress turns within a short way
         more = errors(mine.F[counts], self.slip.F[counts])
@@ -142,7 +150,7 @@ def _suite(law: Law, excursions: int) -> Suite:
     d = _hold_stress(replace(law, resolution=scaled(best, 1 / 2)), d, held, stress)
     F = tractions(replace(law), d)  # a copy: the cache keeps this law, and would its working space
     slid = None
-    if not law.closure_only:
+    if not law.closure_only and steepest(law) < _JAMS:
         slid, called = slip(law, law.closure_range, stress), called + names(law.tables.dim)
     suite = Suite(called, d, F, slid, stress, np.zeros(len(called)))
     check = suite.miss(replace(law, resolution=scaled(best, 2 / 3))).largest
@@ -192,7 +200,7 @@ def _paths(law: Law, stress: float) -> tuple[tuple[str, ...], Array, Array]:
     shear = legs([0, 0.1, 1], [0, seat, seat], [0, 0, 1])
     back = legs([0, 0.1, 0.35, 0.75, 1], [0, *4 * [seat]], [0, 0, 0.6, -0.6, 0])
     fixed = legs([0, 0.2, 1], [0, 1, 1], [0, 0, 1])
-    sheared = distance(law.tables.critical_slip, R) / R
+    sheared = min(distance(law.tables.critical_slip, R) / R, _FAR)
     far = legs([0, 0.1, 0.55, 1], [0, 0.5, 0.5, 0.5], [0, 0, sheared, 0])
     again = legs([0, 0.15, 0.35, 0.6, 0.7, 1], [0, 0.7, 0.7, -0.6, -0.6, 0.8],
                  [0, 0, 0.4, 0.7, 0.2, 0.5])  # fmt: skip
@@ -232,13 +240,13 @@ def _paths(law: Law, stress: float) -> tuple[tuple[str, ...], Array, Array]:
 def _excursions(law: Law, stress: float, count: int) -> Array:
     """Random places (steps, count, dim) in m."""
     rng, R, s = np.random.default_rng(8), law.closure_range, np.arange(1, STEPS + 1) / STEPS
-    sheared, goal = distance(law.tables.critical_slip, R) / R, []
+    goal = []
     for i in range(count):
         legs = int(rng.integers(4, 11))
         closure = np.append(0.0, rng.uniform(-0.3, 1.0, legs))
         highest = float(law.closure(stress * rng.uniform(1.0, 2.0))) / R
         closure[rng.integers(1, legs + 1)] = highest
-        shear = np.append(0.0, np.sqrt(rng.random(legs))) * (1.0 if i % 8 else max(sheared, 1.0))
+        shear = np.append(0.0, np.sqrt(rng.random(legs)))
         turn = rng.uniform(0.0, 2.0 * np.pi, legs + 1)
         corners = np.stack([closure, shear * np.cos(turn), shear * np.sin(turn)], axis=-1)
         at = np.linspace(0.0, 1.0, legs + 1)

@@ -186,10 +186,11 @@ def tradeoff(
 ) -> Tradeoff:
     """See `JointLaw.tradeoff`."""
     joints = whole("joints", joints, 0)
-    slip = law.tables.critical_slip / law.closure_range
+    lengths = np.array([law.tables.critical_slip, law.asperity.yield_interference])
+    names = named(*(lengths / law.closure_range))
     if resolutions is None:
-        resolutions = (*SPREAD, *named(slip).values())
-    chosen = [resolve(r, slip) for r in resolutions]
+        resolutions = (*SPREAD, *names.values())
+    chosen = [resolve(r, *(lengths / law.closure_range)) for r in resolutions]
     found = sorted(dict.fromkeys(chosen), key=lambda r: (r.sliders, r.u, r.phi))
     if not found:
         raise ValueError("resolutions is empty; give some, or None for the usual spread")
@@ -201,7 +202,7 @@ def tradeoff(
         for r in track(found, "resolutions", len(found))
     )
     how = f"{law.joints(0).kernel}, at most {thread_count()} threads"
-    return Tradeoff(suite.names, suite.uncertainty, rows, joints, how, named(slip))
+    return Tradeoff(suite.names, suite.uncertainty, rows, joints, how, names)
 
 
 def _price(law: Law, suite: Suite, exact: Array, joints: int, seconds: float) -> Price:

@@ -143,7 +143,8 @@ class Estimate:
         closure: in m, as in `predict`; level: probability; measured: whether the band is for a
         point yet to be measured, noise included, or for the curve itself. Beyond the largest
         fitted stress it widens by 3 % (one standard error) per doubling of the stress, for the law
-        is not the rock, and by six times `wander`, where the points say so themselves.
+        is not the rock, and by six times `wander`, where the points say so themselves. For cycles
+        it is that of a first loading, in shares of the largest stress as their residuals are.
         """
         name, data = self.closure_curve(curve)
         u = np.atleast_1d(np.asarray(closure, float))
@@ -167,6 +168,8 @@ class Estimate:
         model_error = np.hypot(MODEL_ERROR, WANDER_ERROR * wander)
         variance = variance + wander**2 + (model_error * beyond / math.log(2)) ** 2
         reach = self.solution.quantile(level) * np.sqrt(variance)
+        if data.cycle:
+            return np.exp(centre) * np.maximum(1 - reach, 0.0), np.exp(centre) * (1 + reach)
         return np.exp(centre - reach), np.exp(centre + reach)
 
     def closure_curve(self, number: int) -> tuple[str, ClosureCurve]:

@@ -295,7 +295,7 @@ def _draw_closure(
         path = np.interp(np.linspace(0, rows[-1], 400), rows, curve.closure)
         seated = path + fit.parameters[fit.closure_curve(number)[0]]
         stress = np.exp(log_stress(fit.parameters, seated, fit.problem.settings))
-        axis.plot(1e6 * path, stress / 1e6, "--", color="C1", label="law, unloading")
+        axis.plot(1e6 * path, stress / 1e6, "--", color="C1", label="law, cycle")
     axis.plot(1e6 * curve.closure, curve.stress / 1e6, ms=4, label="measured", **points)
     axis.set(
         xlabel="closure since the test began (µm)", ylabel="normal stress (MPa)", title="Closure"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..laboratory.experiments import closure_test
-from .command import add_command, add_test_options, quantity, read_law, run_test
+from .command import add_command, add_test_options, csv_units, quantity, read_law, run_test
 
 
 def add(commands: Any) -> None:
@@ -40,7 +40,10 @@ def _closure(options: argparse.Namespace) -> None:
     test = partial(closure_test, joint, stresses, unload=not options.no_unload, steps=options.steps)
     record = run_test(test, law, options)
     at = int(np.argmax(record.F1))
+    length, stress = csv_units(options)
+    closed = record.closure[at] / quantity("--units", f"1{length}", "m")
+    pressed = record.F1[at] / quantity("--units", f"1{stress}", "Pa")
     print(
-        f"closure {record.closure[at]:.4g} m at {record.F1[at]:.4g} Pa, "
+        f"closure {closed:.4g} {length} at {pressed:.4g} {stress}, "
         f"{record.dissipated[-1]:.3g} J/m2 lost, {joint.plastic_work:.3g} of it to yielding"
     )

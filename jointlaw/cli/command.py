@@ -131,14 +131,17 @@ def add_test_options(parser: argparse.ArgumentParser, steps: int) -> None:
         "--steps", metavar="N", type=int, default=steps, help=f"steps per leg (default {steps})"
     )
     parser.add_argument(
-        "--units", metavar="LENGTH,STRESS", default="m,Pa", help="of the CSV: mm,MPa (default m,Pa)"
+        "--units",
+        metavar="LENGTH,STRESS",
+        default="m,Pa",
+        help="of CSV and text: mm,MPa (default m,Pa)",
     )
     add_out(parser)
 
 
 def run_test(test: Callable[[], Record], law: JointLaw, options: argparse.Namespace) -> Record:
     """Run a laboratory test and write its record, also that of a test that stopped early."""
-    _csv_units(options)  # refused before the work
+    csv_units(options)  # refused before the work
     try:
         record = test()
     except PathError as error:
@@ -151,7 +154,7 @@ def run_test(test: Callable[[], Record], law: JointLaw, options: argparse.Namesp
 
 def _write(record: Record, law: JointLaw, options: argparse.Namespace) -> None:
     """Curve (CSV, NPZ), picture, law and summary of a test."""
-    name, (length, stress) = options.command, _csv_units(options)
+    name, (length, stress) = options.command, csv_units(options)
     files: Written = {
         f"{name}.csv": partial(record.to_csv, length=length, stress=stress),
         f"{name}.npz": record.to_npz,
@@ -163,7 +166,7 @@ def _write(record: Record, law: JointLaw, options: argparse.Namespace) -> None:
     write_results(options.out, files, summary)
 
 
-def _csv_units(options: argparse.Namespace) -> list[str]:
+def csv_units(options: argparse.Namespace) -> list[str]:
     """Units of length and stress for the CSV."""
     given: list[str] = options.units.split(",")
     if len(given) != 2 or not all(given):

@@ -31,7 +31,6 @@ def add(commands: Any) -> None:
 
 def _export(options: argparse.Namespace) -> None:
     law = read_law(options)
-    clear_run(options.out)
     if options.host == "yade":
         _export_yade(law, options)
     else:
@@ -49,6 +48,7 @@ def _export_live(law: JointLaw, options: argparse.Namespace) -> None:
                 f"--{name.replace('_', '-')} shapes a table for YADE; {host} runs the law itself: "
                 "leave it out"
             )
+    clear_run(options.out)
     files = export(law, options.out, identifier(Path(options.law).stem))
     print(f"wrote the joint for {host} to {options.out}: {', '.join(files)}")
     print(f"run: cd {options.out} && {start}")
@@ -61,6 +61,7 @@ def _export_yade(law: JointLaw, options: argparse.Namespace) -> None:
     for name in ("closure", "shear_limit"):
         if (value := given(options, name, "m")) is not None:
             settings[name] = value
+    clear_run(options.out)
     table = export_yade(law, options.out, **settings)
     print(f"wrote the joint for YADE to {options.out}: {len(table.closure)} rows")
     missed = table.metadata["resolution_error_friction_angle"]

@@ -36,6 +36,7 @@ def add(commands: Any) -> None:
     parser.add_argument("--stress-column", help="name and unit of that column, such as sigmaZ:MPa")
     parser.add_argument("--closure-column", help="name and unit of that column, such as Disp:mm")
     add_options(parser)
+    parser.set_defaults(wait="with shear tests it takes half a minute to some minutes")
     parser.add_argument(
         "--up-to", help="fit up to this stress, predict the rest: 5.3MPa; or half, of the largest"
     )

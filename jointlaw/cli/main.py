@@ -30,7 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if getattr(options, "out", None) and not options.force:
             require_free(options.out)
-        with explained(f"jointlaw {options.command} is at work; {WAIT}"):
+        with explained(f"jointlaw {options.command} is at work; {getattr(options, 'wait', WAIT)}"):
             return int(options.run(options) or 0)
     except KeyboardInterrupt:
         print(f"jointlaw {options.command}: interrupted; nothing more is written", file=sys.stderr)

@@ -280,13 +280,17 @@ def _press(work, s, L, law, f, yields, wears):
     first, _, beside = _places(law, yields, wears)
     at, kept = first + f, beside + 2 * law.depth.shape[0] + f
     deep, o = facet[f, _YIELD], np.int64(facet[f, _OPPOSITE])
+    m0, m1, m2 = facet[f, _M], facet[f, _M + 1], facet[f, _M + 2]
     for l in range(L):
-        pad[_Z1 + l] = pad[_Y1 + l]
+        pad[_Z1 + l] = m0 * pad[_NEW + l] + m1 * pad[_NEW1 + l]
+    if law.dim == 3:
+        for l in range(L):
+            pad[_Z1 + l] += m2 * pad[_NEW2 + l]
     if o != f:
         m0, m1, m2 = facet[o, _M], facet[o, _M + 1], facet[o, _M + 2]
         for l in range(L):
             other = m0 * pad[_NEW + l] + m1 * pad[_NEW1 + l] + m2 * pad[_NEW2 + l]
-            pad[_Z1 + l] = other if other > pad[_Y1 + l] else pad[_Y1 + l]
+            pad[_Z1 + l] = other if other > pad[_Z1 + l] else pad[_Z1 + l]
     for l in range(L):
         z0, fz0, z1 = s[at, l], s[kept, l], pad[_Z1 + l] - deep
         pad[_Z0 + l], pad[_FZ0 + l], pad[_FZ1 + l] = z0, fz0, fz0
@@ -535,28 +539,24 @@ def _facet(work, s, L, law, f, ledger, tangent, yields, wears):
     t1, t2 = facet[f, _T + 1], facet[f, _T + 2]
     n0, n1, n2 = facet[f, _N], facet[f, _N + 1], facet[f, _N + 2]
     A = facet[f, _REST]
+    if yields is not None:
+        _press(work, s, L, law, f, yields, wears)
     for l in range(L):
+        pad[_Y0 + l] = m0 * pad[_OLD + l] + m1 * pad[_OLD1 + l]
         pad[_Y1 + l] = m0 * pad[_NEW + l] + m1 * pad[_NEW1 + l]
         pad[_DES + l] = s0 * pad[_P + l] + s1 * pad[_P1 + l]
         pad[_DET + l] = t1 * pad[_P1 + l]
         pad[_SUMS + l] = pad[_SUMT + l] = 0.0
     if dim == 3:
         for l in range(L):
+            pad[_Y0 + l] += m2 * pad[_OLD2 + l]
             pad[_Y1 + l] += m2 * pad[_NEW2 + l]
             pad[_DES + l] += s2 * pad[_P2 + l]
             pad[_DET + l] += t2 * pad[_P2 + l]
-    if yields is not None:
-        _press(work, s, L, law, f, yields, wears)
-    for l in range(L):
-        pad[_Y0 + l] = m0 * pad[_OLD + l] + m1 * pad[_OLD1 + l]
-    if dim == 3:
-        for l in range(L):
-            pad[_Y0 + l] += m2 * pad[_OLD2 + l]
-    for l in range(L):
-        pad[_Y0 + l] = pad[_Y0 + l] if abs(pad[_Y0 + l]) >= UNDERFLOW else 0.0
     beside = _places(law, yields, wears)[2]
     rf, rs = beside + f, beside + M + f
     for l in range(L):
+        pad[_Y0 + l] = pad[_Y0 + l] if abs(pad[_Y0 + l]) >= UNDERFLOW else 0.0
         pad[_F0 + l], pad[_S0 + l] = s[rf, l], s[rs, l]
     if yields is not None:
         for l in range(L):

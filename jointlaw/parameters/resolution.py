@@ -42,21 +42,27 @@ NAMED = {
     "reference": Resolution(16, 10, 24),
 }
 NAMED_SHORT = NAMED | {"fast": Resolution(2, 3, 3), "balanced": Resolution(2, 4, 4)}
+# What was pressed flat touches all at once, orientation by orientation: more of these, fewer cells
+FLAT = 0.5  # closure ranges: a yield interference below presses many facets flat
+NAMED_FLAT = {"fine": Resolution(8, 9, 6), "reference": Resolution(16, 20, 10)}
 # Direct shear within 0.03 % of finer nodes over 26 closure ranges: for what is computed once
 SLIP = Resolution(10, 10, 6)
 
 
-def named(slip: float = math.inf) -> dict[str, Resolution]:
-    """The resolutions by name, for a law of this critical slip over closure range."""
-    return NAMED if slip >= LONG else NAMED_SHORT
+def named(slip: float = math.inf, interference: float = math.inf) -> dict[str, Resolution]:
+    """The resolutions by name, for critical slip and yield interference over closure range."""
+    names = NAMED if slip >= LONG else NAMED_SHORT
+    return names | NAMED_FLAT if interference < FLAT else names
 
 
-def resolve(value: str | Resolution, slip: float = math.inf) -> Resolution:
-    """A resolution from its name or itself; `slip` as in `named`."""
+def resolve(
+    value: str | Resolution, slip: float = math.inf, interference: float = math.inf
+) -> Resolution:
+    """A resolution from its name or itself; `slip` and `interference` as in `named`."""
     if isinstance(value, Resolution):
         return value
     if isinstance(value, str) and value in NAMED:
-        return named(slip)[value]
+        return named(slip, interference)[value]
     raise ValueError(
         f"resolution = {value!r} is unknown; choose one of {', '.join(NAMED)} "
         "or give Resolution(u, phi, depth)"

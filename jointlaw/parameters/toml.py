@@ -29,7 +29,8 @@ VERSION = 1  # of the keys; a file without one is of version 1
 def write_law(law: Mapping[str, Any], path: Path | None) -> str:
     """TOML text of a law's parameters; written to `path` too, a histogram then as CSV beside it."""
     r = law["resolution"]
-    names = named(law["critical_slip"] / law["closure_range"])
+    lengths = law["critical_slip"], law["asperity"].yield_interference
+    names = named(*(length / law["closure_range"] for length in lengths))
     name = next((n for n, value in names.items() if value == r), None)
     resolution = f'"{name}"' if name else f"{{ u = {r.u}, phi = {r.phi}, depth = {r.depth} }}"
     lines = [

@@ -84,8 +84,8 @@ def test_rules_for_nodes_are_measured_against_each_other(made):
     law = made.jl.presets.load("westerly-rough")
     cases, nodes = [(law, made.nodes.standard_suite(law))], made.nodes
     now = {rule: nodes.worst(cases, (*rule, 16))[0] for rule in nodes.RULES}
-    with nodes.placed(facets=nodes.staggered):
+    with nodes.placed(ring=nodes.midway):
         turned = {rule: nodes.worst(cases, (*rule, 16))[0] for rule in nodes.RULES}
-    assert all(now[rule] == turned[rule] for rule in now if rule[0] == 1)  # one ring: no other
-    assert any(now[rule] != turned[rule] for rule in now)
-    assert all(turned[rule] < 1.6 * now[rule] for rule in now)
+    for found in (now, turned):  # per cent: six rings are far better than one, wherever they stand
+        assert 0.0 < found[6, 8] < 0.1 * found[1, 3]
+    assert all(now[rule] != turned[rule] for rule in now)

@@ -16,6 +16,8 @@ LONG = {
     "jointlaw figures --out": "tests/verification/test_paper_figures.py",
     "jointlaw figures 14 15": "tests/verification/test_paper_figures.py",
     "jointlaw figures --claims": "tests/verification/test_paper_docs.py",
+    "jointlaw fit closure.csv --shear": "tests/verification/test_fit_shear_files.py",
+    "jointlaw shear out/specimen/law.toml": "tests/verification/test_fit_shear_files.py",
     "jointlaw fit grimsel_vd1_closure --out": "the fit with --up-to, which does more",
     "jointlaw fit grimsel_vd1_closure --set": "the fit with --up-to, which does more",
     "python -m dem_demo ablate SCENE": "tests/examples/test_ablate.py",

@@ -27,7 +27,7 @@ def closure_hysteresis(x):
 def closure_cycle(x):
     # measured 38 %; without yielding friction alone is left
     assert 0.3 < x["loss"]["yields"] < 0.46
-    assert 0 < x["loss"]["elastic"] < 0.02
+    assert 0 < x["loss"]["elastic"] < 0.04  # most of it from the few cells of `balanced`
     assert (np.diff(x["kept"]) > 0).all()  # a set that grows with the largest stress
 
 
@@ -36,7 +36,7 @@ def strength_envelope(x):
     for harder, softer in pairwise([elastic, *yielding]):
         assert (softer <= harder + 0.1).all()
         assert softer[-1] < harder[-1]
-    assert yielding[-1][0] == pytest.approx(elastic[0], abs=0.1)  # low stress is left alone
+    assert yielding[0][0] == pytest.approx(elastic[0], abs=0.1)  # low stress is left alone
     assert x["dilation"]["yields beyond 0.05 µm"][-1] < 0.5 * x["dilation"]["elastic"][-1]
 
 

@@ -89,7 +89,7 @@ def yade(tmp_path):
         text = done.stdout + done.stderr
         if script is None:
             assert "Traceback" not in text, text
-            return done.stdout
+            return text
         found = [line for line in done.stdout.splitlines() if line.startswith(MARK)]
         assert found, f"the scene gave no result:\n{text}"
         values = json.loads(found[-1][len(MARK) :])

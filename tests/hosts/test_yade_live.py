@@ -52,6 +52,14 @@ def test_direct_shear_of_two_blocks_equals_pure_python(yade, tmp_path, law):
     assert F1[-1] > 0.1 * peak
 
 
+def test_a_mistyped_mode_is_an_error(yade, tmp_path, law):
+    """`lvie` for `live` ran the table."""
+    export_yade(law, tmp_path, azimuths=3, steps=10, shear_limit=law.closure_range)
+    text = yade(None, args=["lvie"], folder=tmp_path, name="direct_shear.py")
+    assert "lvie is unknown; write live, or nothing for the table" in text
+    assert not (tmp_path / "direct_shear.csv").exists()
+
+
 STRESS = (
     LAW
     + """

@@ -50,14 +50,14 @@ def test_several_cycles_in_one_file(tmp_path, capsys):
     record = jl.closure_test(law.joint(), [5e6, 10e6], steps=12)
     write(tmp_path / "two.csv", record.F1, record.closure)
     write(tmp_path / "rock.csv", [0.0, 5e6, 11e6], [0.0, 5e-9, 1e-8])
-    command = ["fit", "two.csv", "--set", "alpha=3.8", "--compliance", "rock.csv", "--out", "o"]
-    assert main([*command, "--cycle"]) == 0
+    command = ["fit", "two.csv", "--set", "alpha=3.8", "--compliance", "rock.csv", "--out"]
+    assert main([*command, "o", "--cycle"]) == 0
     out = capsys.readouterr().out
     assert "| 2 | 10 |" in out
     assert "compliance of rock and machine that was given is subtracted" in out
     summary = json.loads((tmp_path / "o" / "summary.json").read_text())
     assert len(summary["cycles"]) == 2
-    assert main(command) == 0  # the first loading alone is fitted
+    assert main([*command, "first"]) == 0  # the first loading alone is fitted
     assert "| 2 | 10 |" in capsys.readouterr().out
 
 

@@ -82,7 +82,7 @@ def test_command_writes_table_law_and_summary(tmp_path, capsys, monkeypatch):
     arguments = "tradeoff linear-a6 --plane 0 --joints 0 --tolerance 0.05 --out"
     assert main([*arguments.split(), str(out)]) == 0
     summary = json.loads((out / "summary.json").read_text())
-    assert summary["at tolerance"]["0.05"] == {"u": 3, "phi": 5, "depth": 1, "sliders": 15}
+    assert summary["at tolerance"]["0.05"] == {"u": 2, "phi": 4, "depth": 1, "sliders": 10}
     assert summary["frontier"][0]["ns"] is None
     assert (out / "tradeoff.csv").read_text().count("\n") == 3
     assert jl.JointLaw.from_toml(out / "law.toml").plane == 0.0

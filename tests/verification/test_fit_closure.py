@@ -8,7 +8,9 @@ import pytest
 import jointlaw as jl
 from jointlaw import baselines, datasets, unloading
 from jointlaw.calibration.fit import fit_closure
+from jointlaw.calibration.forward import DEFAULTS, Settings, log_stress
 from jointlaw.calibration.measured import first_loading
+from jointlaw.discretisation.virgin_curve import exact_force
 
 ROCK = jl.Asperity.hertz_mindlin(G=20e9, nu=0.25, R=1e-3, mu=0.6)
 
@@ -100,6 +102,18 @@ def test_without_noise_the_parameters_come_back(law):
     assert fit.parameters["asperity_density"] == pytest.approx(1e6, rel=1e-3)
     # the forward model of a fit and the law agree: facets, curve and factor are the same
     assert fit.predict(y - y[0]) == pytest.approx(stress, rel=1e-5)
+
+
+@pytest.mark.parametrize("alpha", [-0.5, 0.0, 3.7, 29.0, 60.0])
+def test_the_closed_form_of_a_fit_is_the_virgin_curve(alpha):
+    values = DEFAULTS | {"alpha": alpha, "beta": 1e-5}
+    closure = 1e-5 * np.geomspace(1e-2, 290.0, 30)
+    heights = jl.GammaHeights(alpha, 1e-5, 0.0, "individual")
+    force, _ = exact_force(closure, values["eta"], heights)
+    ratio = np.exp(log_stress(values, closure, Settings())) / force
+    seen = force > 1e-250  # the rest is below the least stress of `log_stress`
+    # sums of some hundred positive terms, and gamma functions of arguments up to 62
+    assert ratio[seen] == pytest.approx(ratio[-1], rel=1e-10)
 
 
 def test_a_test_from_zero_stress_needs_no_seating(law):

@@ -19,17 +19,18 @@ MEASURED = {
 
 
 def law():
-    """Least squares on 1, 3 and 5 MPa: peaks, residuals, and with less weight displacements.
+    """That of benchmarks/peak_residual.py: least squares on 1, 3 and 5 MPa.
 
-    Six numbers for nine: mu, mu_residual and a trade against one another within 1 % of the curves.
+    Six numbers for nine figures: mu_residual, wear_slip and critical_slip trade against one another
+    within 1 % of the curves.
     """
     return jl.JointLaw(
-        orientation=jl.Orientation(2.5017),
+        orientation=jl.Orientation(3.198),
         asperity=jl.Asperity(
-            K=2.3642e6, lam=1.17, eta=0.5, mu=0.45038, mu_residual=0.16275, wear_slip=9.3446e-3
+            K=4.437e6, lam=1.17, eta=0.5, mu=0.5587, mu_residual=0.2168, wear_slip=8.477e-3
         ),
         asperity_density=1e6, closure_range=1e-3, resolution=jl.Resolution(5, 3, 2), plane=0.0,
-        critical_slip=4.6697e-3,
+        critical_slip=5.175e-3,
     )  # fmt: skip
 
 
@@ -39,7 +40,7 @@ def test_peak_and_residual(normal):
     record = jl.direct_shear(law().joint(), [10e-3], normal * 1e6, steps=120)
     stress = record.shear_stress
     top = int(np.argmax(stress))
-    # 2 and 4 MPa were not fitted: peaks +3.5 and +3.0 %, residuals -2.2 and -1.7 %
+    # 2 and 4 MPa were not fitted: peaks +4.4 and +2.7 %, residuals -2.7 and -1.8 %
     assert stress[top] == pytest.approx(peak * 1e6, rel=0.05)
     assert stress[-1] == pytest.approx(residual * 1e6, rel=0.05)
     assert record.shear[top] == pytest.approx(at * 1e-3, rel=1 / 3)

@@ -60,7 +60,8 @@ def test_what_the_nodes_cost_in_friction_is_told(law, table):
         for nodes in ((1, 3, 1), (10, 10, 6))
     )
     missed = [t.metadata["resolution_error_friction_angle"] for t in (few, table, many)]
-    assert missed[0] > missed[1] > missed[2] == 0.0
+    assert missed[0] > missed[1] > 1e-3
+    assert missed[2] < 1e-9  # rounding
 
 
 def test_friction_is_that_of_a_shear_test(law, table):

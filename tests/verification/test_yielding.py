@@ -59,27 +59,26 @@ def test_first_loading_in_closed_form_is_that_of_many_cells():
     [(0.3, np.inf), (0.1, np.inf), (0.05, np.inf), (0.1, 0.3)],
 )
 def test_tractions_agree_with_the_slow_bed(interference, critical_slip):
-    n_paths, steps = (4, 30) if np.isinf(critical_slip) else (3, 200)
+    n_paths, steps = (2, 30) if np.isinf(critical_slip) else (1, 200)
     seed = int(100 * interference)
     corners = random_corners(np.random.default_rng(seed), n_paths)
     d = increments(corners, steps)
     p = {"a": 3.0, "b": 0.5, "c": 0.1, "mu": 0.4, "formation": ["population", None][seed % 2]}
-    n, w = cap_quadrature(p["a"], p["b"], p["c"], 16, 20)
+    # facets that were pressed flat touch all at once: a coarser bed misses more than `reference`
+    n, w = cap_quadrature(p["a"], p["b"], p["c"], 24, 60)
     F, crushed = np.zeros_like(d), np.zeros(n_paths)
     for i in range(n_paths):
         bed = SlowBed(
             n, w, reach_of(corners[i], n), density=1.0, heights=slow_heights(p["formation"]),
-            n_depth=100, K=1.0, lam=1.2, eta=0.5, mu=p["mu"], critical_slip=critical_slip,
+            n_depth=60, K=1.0, lam=1.2, eta=0.5, mu=p["mu"], critical_slip=critical_slip,
             yield_interference=interference,
         )  # fmt: skip
         for k in range(d.shape[1]):
             F[i, k] = bed.update(d[i, k])
         crushed[i] = bed.crushed
     peak = np.linalg.norm(F, axis=2).max(axis=1)
-    # facets that were pressed flat touch all at once: few azimuths tell, those of the bed too. A
-    # bed of 24 x 60 orientations is missed by 0.6, 3.2, 5.2 % and 0.2, 0.6, 1.8 % at worst
-    fine, reference = {0.3: (1e-2, 5e-3), 0.1: (5e-2, 2e-2), 0.05: (6e-2, 3e-2)}[interference]
-    for resolution, bound in (("fine", fine), ("reference", reference)):
+    # on 20 paths of 0.05 and of 0.1 ranges: 2.1 and 1.4 %, 0.5 and 0.8 %
+    for resolution, bound in (("fine", 3e-2), ("reference", 1e-2)):
         joints = law(**p, resolution=resolution, critical_slip=critical_slip,
                      damage={"yield_interference": interference}).joints(n_paths)  # fmt: skip
         G = np.array([joints.update(d[:, k], tangent=False)[0] for k in range(d.shape[1])])

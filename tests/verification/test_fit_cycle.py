@@ -99,7 +99,7 @@ def test_every_cycle_is_compared_with_the_law(cycles):
     for loop in loops:  # the same law: only the steps differ, and the trapezoids over them
         assert loop.friction == pytest.approx(loop.measured, abs=0.01)
         assert loop.law_closure == pytest.approx(loop.open_closure, abs=2e-7)
-    assert loops[2].measured < 0.02 < loops[0].measured < loops[1].measured  # reloading is elastic
+    assert loops[2].measured < 0.03 < loops[0].measured < loops[1].measured  # reloading is elastic
     assert jl.unloading.explain(law, stress, closure, steps=40) == loops[0]
     text = jl.unloading.summed_up(loops)
     assert "| 3 | 7 |" in text

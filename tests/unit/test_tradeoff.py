@@ -77,7 +77,7 @@ def test_the_usual_spread_holds_the_named_resolutions_too():
 def test_command_writes_table_law_and_summary(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("jointlaw.accuracy.tradeoff.SPREAD", (jl.Resolution(1, 3, 1),))
     few = {"fast": jl.Resolution(1, 3, 2)}
-    monkeypatch.setattr("jointlaw.accuracy.tradeoff.named", lambda slip: few)
+    monkeypatch.setattr("jointlaw.accuracy.tradeoff.named", lambda *_: few)
     out = tmp_path / "out"
     arguments = "tradeoff linear-a6 --plane 0 --joints 0 --tolerance 0.05 --out"
     assert main([*arguments.split(), str(out)]) == 0

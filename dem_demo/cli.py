@@ -8,6 +8,7 @@ from pathlib import Path
 import jointlaw as jl
 from jointlaw.support.files import replace_file, require_free, write_json
 from jointlaw.support.progress import explained
+from jointlaw.support.pyplot import FORMATS
 
 from .dynamics.simulation import Simulation
 from .errors import Refused, SceneError
@@ -52,6 +53,7 @@ OPTIONS = {  # the first word is what a user types
     "--until": {"type": float, "help": "model time to stop at (s)"},
     "--step": {"type": float, "help": "another time step (s)"},
     "--no-pictures": {"action": "store_true", "help": "tables only"},
+    "--format": {"choices": FORMATS, "default": FORMATS[0], "help": "of pictures (default png)"},
     "--vtk": {"action": "store_true", "help": "also VTK files for ParaView, in DIR/vtk (meshio)"},
     "--seeds": {"type": int, "nargs": "+", "default": [1, 2, 3], "help": "default 1 2 3"},
     "--critical": {
@@ -176,7 +178,7 @@ def _reduce(given: argparse.Namespace) -> None:
     )
     print("critical tilt: gravity may turn by so much, towards +x, until they no longer do")
     rows = []
-    for row in strength.strength_reduction(scene, str(given.scene), until, given.out):
+    for row in strength.strength_reduction(scene, str(given.scene), until, given.out, given.format):
         factor, tilt = row["factor"], row["critical_tilt"]
         told = "F beyond 64 or below 1/64" if factor is None else f"F = {factor:.3g}"
         angle = "beyond 60 degrees" if tilt is None else f"{tilt:+.3g} degrees"
@@ -210,7 +212,7 @@ def _go(sim: Simulation, given: argparse.Namespace) -> None:
     if given.vtk and not find_spec("meshio"):
         raise ValueError("--vtk needs meshio: pip install meshio")
     _announce(sim, given.until)
-    record, summary = run(sim, given.out, given.until, not given.no_pictures)
+    record, summary = run(sim, given.out, given.until, not given.no_pictures, given.format)
     if given.vtk:
         from .output import vtk  # loads meshio
 
@@ -238,7 +240,7 @@ def _slip(slip: dict) -> str:
 COMMANDS = {  # what each does, and for its help: about, example, OPTIONS
     "": (
         _run, ABOUT, "tilt --out out/tilt",
-        "scene or default", "--out", "--force", "--until", "--no-pictures", "--vtk",
+        "scene or default", "--out", "--force", "--until", "--no-pictures", "--format", "--vtk",
     ),
     "new": (
         _new, "Write a commented scene of a rock slope cut by joint sets, ready to run.",
@@ -268,11 +270,12 @@ COMMANDS = {  # what each does, and for its help: about, example, OPTIONS
         "of a scene to just hold, and its critical tilt, each to 1 %, by its static equilibrium; "
         "then run it with 2 % less friction and draw how it fails.",
         "strength-reduction slope --out out/strength", "scene", "--out", "--force", "--until",
+        "--format",
     ),
     "resume": (
         _resume,
         "Go on from a saved state; without --step bit for bit as if never stopped.",
         "resume out/tilt/state --until 45 --out out/longer",
-        "state", "--out", "--force", "--until", "--no-pictures", "--vtk", "--step",
+        "state", "--out", "--force", "--until", "--no-pictures", "--format", "--vtk", "--step",
     ),
 }  # fmt: skip

@@ -44,7 +44,7 @@ NAMED = {
 NAMED_SHORT = NAMED | {"fast": Resolution(2, 3, 3), "balanced": Resolution(2, 4, 4)}
 # What was pressed flat touches all at once, orientation by orientation: more of these, fewer cells
 FLAT = 0.5  # closure ranges: a yield interference below presses many facets flat
-NAMED_FLAT = {"fine": Resolution(8, 9, 6), "reference": Resolution(16, 20, 10)}
+NAMED_FLAT = {"fine": Resolution(8, 9, 6), "reference": Resolution(16, 20, 20)}
 # Direct shear within 0.03 % of finer nodes over 26 closure ranges: for what is computed once
 SLIP = Resolution(10, 10, 6)
 

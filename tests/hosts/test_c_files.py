@@ -21,7 +21,7 @@ from extremes import laws as extreme_laws
 
 FUZZ = HERE / "fuzz.c"
 SANE = ["-g", "-O1", "-fno-sanitize-recover=all"]
-# JOINTLAW_LONG=1: 1e6 steps and 10 000 files, as docs/native.md tells; an hour on one core
+# JOINTLAW_LONG=1: 1e6 steps and 10 000 files, as docs/native.md tells; twenty minutes on one core
 LAWS, STEPS, FILES = (200, 5000, 10_000) if "JOINTLAW_LONG" in os.environ else (12, 3000, 500)
 
 

@@ -77,8 +77,8 @@ def test_tractions_agree_with_the_slow_bed(interference, critical_slip):
             F[i, k] = bed.update(d[i, k])
         crushed[i] = bed.crushed
     peak = np.linalg.norm(F, axis=2).max(axis=1)
-    # on 20 paths of 0.05 and of 0.1 ranges: 2.1 and 1.4 %, 0.5 and 0.8 %
-    for resolution, bound in (("fine", 3e-2), ("reference", 1e-2)):
+    # on 20 paths of 0.05, of 0.1 and of 0.3 ranges: 2.7, 1.4 and 1.3 %, 0.41, 0.27 and 0.18 %
+    for resolution, bound in (("fine", 3e-2), ("reference", 5e-3)):
         joints = law(**p, resolution=resolution, critical_slip=critical_slip,
                      damage={"yield_interference": interference}).joints(n_paths)  # fmt: skip
         G = np.array([joints.update(d[:, k], tangent=False)[0] for k in range(d.shape[1])])

@@ -25,6 +25,8 @@ MANY = 1e6  # steps: minutes for a few blocks, hours for a rock
 # Times on one core of a common computer, in s: of the initial equilibrium per moving block to the
 # power 1.5 (blocks of two joint sets), of a step, and of a step per law point
 SEATING, STEP, STEP_PER_POINT = 1.9e-3, 6e-4, 2.5e-6
+LONG = 2.0  # s: waits that are told before
+EQUILIBRIA, VARIANTS = 10, 20  # of a bisection; runs of an ablation
 WAIT = "the first run after an installation also compiles the law, once"
 
 ABOUT = """\
@@ -109,6 +111,8 @@ def _resume(given: argparse.Namespace) -> None:
 
 def _ablate(given: argparse.Namespace) -> None:
     given.out.mkdir(parents=True, exist_ok=True)  # a folder that cannot be is known before the work
+    seconds = _seconds(_seated(given.scene), given.until)
+    print(f"about {VARIANTS} runs, each of about {_duration(seconds)}", flush=True)
     rows = ablate.ablate(load(given.scene), given.until)
     ablate.write(rows, given.out)
     print(ablate.table(rows))
@@ -133,6 +137,12 @@ def _compare(given: argparse.Namespace) -> None:
         raise ValueError(f"{given.scene} has no [[rock]] to compare")
     if given.out:
         given.out.parent.mkdir(parents=True, exist_ok=True)
+    cases = 2 * len(given.seeds) * len(scene.rocks)
+    if given.critical:
+        print(f"{cases} cases, each of about {EQUILIBRIA} equilibria", flush=True)
+    else:
+        seconds = _seconds(_seated(given.scene), given.until) / len(scene.rocks)
+        print(f"{cases} runs, each of at most about {_duration(seconds)}", flush=True)
     rows = list(_compared(scene, given))
     if given.out:
         write_json(given.out, {"version": VERSION, "rows": rows})
@@ -164,9 +174,21 @@ def _seated(name: str) -> Simulation:
         print(f"warning: {doubt}", file=sys.stderr)
     free = sum(not block.fixed for block in scene.blocks)
     wait = SEATING * free**1.5
-    if scene.run.seat and wait > 2:
+    if scene.run.seat and wait > LONG:
         print(f"{free} moving blocks: the initial equilibrium takes about {wait:.0f} s", flush=True)
     return Simulation(scene)
+
+
+def _seconds(sim: Simulation, until: float | None) -> float:
+    """Time (s) that a run takes, without its pictures."""
+    return steps_to(sim, until) * (STEP + STEP_PER_POINT * sim.joints.n)
+
+
+def _duration(seconds: float) -> str:
+    """A time to wait, on a core of its own."""
+    if seconds < 100:
+        return f"{seconds:.2g} s"
+    return f"{seconds / 60:.2g} min" if seconds < 6000 else f"{seconds / 3600:.2g} h"
 
 
 def _reduce(given: argparse.Namespace) -> None:
@@ -177,6 +199,9 @@ def _reduce(given: argparse.Namespace) -> None:
         "factor F: with the friction of all asperities divided by F the joints just carry the rock"
     )
     print("critical tilt: gravity may turn by so much, towards +x, until they no longer do")
+    free = [len(rock.free) for rock in scene.rocks] or [sum(not b.fixed for b in scene.blocks)]
+    wait = EQUILIBRIA * 2 * SEATING * sum(n**1.5 for n in free)
+    print(f"about {_duration(wait)}, and for each picture a run of up to {until:g} s", flush=True)
     rows = []
     for row in strength.strength_reduction(scene, str(given.scene), until, given.out, given.format):
         factor, tilt = row["factor"], row["critical_tilt"]
@@ -194,11 +219,12 @@ def _announce(sim: Simulation, until: float | None = None) -> None:
     print(f"{sim.scene.title}: {free} moving blocks, {sim.joints.n} law points in reach")
     print(f"time step {dt:.3g} s, limit {limit:.3g} s (margin {limit / dt:.2f}), {steps} steps")
     if steps > MANY:
-        hours = steps * (STEP + STEP_PER_POINT * sim.joints.n) / 3600
         print(
-            f"warning: {steps:.2g} steps take about {hours:.2g} h; is run.end = "
-            f"{sim.scene.run.end:g} s meant?", file=sys.stderr,
+            f"warning: {steps:.2g} steps take about {_duration(_seconds(sim, until))}; is run.end "
+            f"= {sim.scene.run.end:g} s meant?", file=sys.stderr,
         )  # fmt: skip
+    elif (seconds := _seconds(sim, until)) > LONG:
+        print(f"the steps take about {_duration(seconds)}", flush=True)
     for rock in sim.scene.rocks:
         print(
             f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "

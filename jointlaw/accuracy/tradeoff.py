@@ -24,6 +24,7 @@ SPREAD = tuple(
     for u, phi in ((1, 3), (2, 3), (3, 3), (3, 5), (5, 6), (8, 8))
     for depth in (1, 2, 3, 4, 6, 10, 16)
 )
+CLEAR = {"color": "white", "alpha": 0.8, "pad": 0.5}  # behind names
 _MEMORY = 100_000_000  # bytes of state that a timing may use; very fine laws get a smaller batch
 
 
@@ -78,10 +79,13 @@ class Tradeoff:
     how: str
     named: dict[str, Resolution]
 
-    def frontier(self) -> tuple[Price, ...]:
-        """The prices that no other with as few sliders beats in its largest error."""
+    def frontier(self, cost: str = "sliders") -> tuple[Price, ...]:
+        """The prices that no other with as few sliders beats in its largest error.
+
+        cost: another attribute of the prices instead, such as "ns".
+        """
         best: list[Price] = []
-        for row in sorted(self.rows, key=lambda row: (row.sliders, row.worst)):
+        for row in sorted(self.rows, key=lambda row: (getattr(row, cost), row.worst)):
             if not best or row.worst < best[-1].worst:
                 best.append(row)
         return tuple(best)
@@ -154,7 +158,6 @@ class Tradeoff:
         figure, axes = pyplot().subplots(
             1, 1 + timed, figsize=size, layout="constrained", sharey=True, squeeze=False
         )
-        best = self.frontier()
         panels = [("sliders per joint", ["sliders"])]
         if timed:
             panels.append(("time per joint and update (ns)", ["ns", "ns_tangent"]))
@@ -162,6 +165,7 @@ class Tradeoff:
             for cost, color in zip(costs, ("C0", "C1"), strict=False):
                 x, y = [getattr(r, cost) for r in self.rows], [100 * r.worst for r in self.rows]
                 axis.loglog(x, y, ".", color=color, alpha=0.25, markeredgewidth=0)
+                best = self.frontier(cost)
                 x, y = [getattr(r, cost) for r in best], [100 * r.worst for r in best]
                 what = "traction and tangent" if cost == "ns_tangent" else "traction"
                 axis.loglog(x, y, "o-", color=color, ms=4, lw=1.2, label=what)
@@ -171,7 +175,8 @@ class Tradeoff:
                         at = (getattr(row, costs[0]), 100 * row.worst)
                         axis.plot(*at, "s", color="k", ms=6, mfc="none")
                         axis.annotate(name, at, (0, 6), textcoords="offset points", fontsize=8,
-                                      ha="right" if name == "reference" else "left")  # fmt: skip
+                                      ha="right" if name == "reference" else "left",
+                                      bbox=CLEAR)  # fmt: skip
             floor = 100 * float(self.uncertainty.max())
             axis.axhline(floor, color="0.6", lw=1, ls=":")
             axis.set_xlabel(label)
@@ -185,7 +190,7 @@ class Tradeoff:
         axes[0, 0].set_ylim(0.7 * low, 150 * max(r.worst for r in self.rows))
         if timed:
             axes[0, 1].legend(title=f"{self.joints} joints, {self.how}", fontsize=8,
-                              title_fontsize=8)  # fmt: skip
+                              title_fontsize=8, loc="upper right")  # fmt: skip
         return written(figure, path)
 
 
@@ -213,7 +218,8 @@ def tradeoff(
         _price(replace(law, resolution=r), suite, exact, loops, joints, seconds)
         for r in track(found, "resolutions", len(found))
     )
-    how = f"{law.joints(0).kernel}, at most {thread_count()} threads"
+    threads = thread_count()
+    how = f"{law.joints(0).kernel}, up to {threads} thread{'s' * (threads > 1)}"
     return Tradeoff(suite.names, suite.uncertainty, rows, joints, how, names)
 
 

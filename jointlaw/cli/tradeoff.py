@@ -76,4 +76,4 @@ def _tradeoff(options: argparse.Namespace) -> None:
         "law.toml": law.to_toml,
         "tradeoff.png": found.plot,
     }
-    write_results(options.out, files, summary)
+    write_results(options.out, files, summary, options.format)

@@ -35,7 +35,7 @@ class Drive:
     Straight lines between (times, values), averaged over the last `ease` seconds so that the
     machine does not strike the rock at a corner; before and after them the block rests.
     With `order` 1 or 2 the values are velocities or accelerations (m/s, m/s2), and after the last
-    the block keeps its velocity, so that nothing strikes it.
+    the block keeps its velocity, so that nothing strikes it. `period` (s) is that of a sine.
     """
 
     block: int
@@ -45,6 +45,7 @@ class Drive:
     ease: float = 0.0
     back: Reversal | None = None
     order: int = 0
+    period: float = 0.0
 
     @cached_property
     def path(self) -> BSpline:
@@ -118,9 +119,8 @@ def read_drives(top: Table, number: dict[str, int], blocks: Sequence[Block]) -> 
         if kinds and motion == "turn":
             raise table.error(kinds[0], "shakes along x or y; for a turn give times and values")
         if kinds:
-            order, times, values = (_read_record if kinds[0] == "file" else _sine)(table)
-            shaken = tuple(times.tolist()), tuple(values.tolist())
-            out.append(Drive(number[block], AXES[motion], *shaken, order=order))
+            make = _record if kinds[0] == "file" else _sine
+            out.append(make(table, number[block], AXES[motion]))
         else:
             out.append(_lines(table, number, number[block], motion))
         table.finish()
@@ -141,19 +141,21 @@ def _lines(table: Table, number: dict[str, int], block: int, motion: str) -> Dri
     return Drive(block, AXES[motion], *line, ease, _reversal(table, number, unit))
 
 
-def _sine(drive: Table) -> tuple[int, np.ndarray, np.ndarray]:
-    """Order, times and accelerations of a sine that rises over a cycle before, and falls after."""
+def _sine(drive: Table, block: int, axis: int) -> Drive:
+    """A drive whose acceleration is a sine; it rises over a cycle before, and falls after."""
     table = Table(drive.take("sine", dict), drive.path("sine"))
     size, frequency = (table.take(key, float, above=0) for key in ("acceleration", "frequency"))
     cycles = table.whole("cycles", 10, least=1)
     table.finish()
     phase = np.arange((cycles + 2) * SAMPLES + 1) / SAMPLES  # in cycles
     envelope = np.clip(np.minimum(phase, cycles + 2 - phase), 0.0, 1.0)
-    return 2, phase / frequency, size * envelope * np.sin(2 * np.pi * phase)
+    values = size * envelope * np.sin(2 * np.pi * phase)
+    line = tuple((phase / frequency).tolist()), tuple(values.tolist())
+    return Drive(block, axis, *line, order=2, period=1 / frequency)
 
 
-def _read_record(drive: Table) -> tuple[int, np.ndarray, np.ndarray]:
-    """Order, times and values of a CSV file: velocities or accelerations of a shaken base.
+def _record(drive: Table, block: int, axis: int) -> Drive:
+    """A drive from a CSV file of velocities or accelerations.
 
     Raises SceneError naming the line that is wrong.
     """
@@ -181,8 +183,8 @@ def _read_record(drive: Table) -> tuple[int, np.ndarray, np.ndarray]:
         rows.append((time, value))
     if len(rows) < 2:
         raise SceneError(f"{where}: must have two rows of numbers or more under its first line")
-    times, values = np.array(rows).T
-    return order, times, scale * values
+    times, values = zip(*rows, strict=True)
+    return Drive(block, axis, times, tuple(scale * v for v in values), order=order)
 
 
 def _reversal(drive: Table, number: dict[str, int], unit: float) -> Reversal | None:

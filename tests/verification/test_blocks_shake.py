@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from dem_demo import coulomb_law
+from dem_demo import Simulation, coulomb_law, run
 from dem_demo.scene import turn
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
@@ -69,3 +69,13 @@ def test_no_creep_below_yield(block, resolution, most):
     given = shake.scene(0.5 * block.yields_at(), CYCLES, resolution=resolution)
     assert predicted(block, given) == 0.0
     assert abs(measured(given)) < most * above
+
+
+def test_summary_holds_the_slip_per_cycle():
+    given = shake.scene(4.0, 2)
+    record, summary = run(Simulation(given), until=1.01)
+    (slips,) = summary["slip_per_cycle_m"].values()
+    assert len(slips) == 4  # it rises, twice all of it, it falls
+    assert slips[0] < slips[1] < slips[2]
+    slid = record.column("slab: slid_m")
+    assert sum(slips) == pytest.approx(slid[-1] - slid[0], rel=1e-3)  # the base rests from 1 s on

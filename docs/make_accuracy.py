@@ -67,7 +67,7 @@ def million():
 
 def tolerances():
     """Whether tolerances are kept on random laws and paths."""
-    return tolerance.table(tolerance.draw(LAWS, SEED)) + "\n"
+    return tolerance.table(tolerance.draw(LAWS, SEED, plane=True)) + "\n"
 
 
 @cache

@@ -8,6 +8,7 @@ from pathlib import Path
 import jointlaw as jl
 from jointlaw.support.files import replace_file, require_free, write_json
 from jointlaw.support.progress import explained
+from jointlaw.support.pyplot import FORMATS
 
 from .dynamics.simulation import Simulation
 from .errors import Refused, SceneError
@@ -24,6 +25,8 @@ MANY = 1e6  # steps: minutes for a few blocks, hours for a rock
 # Times on one core of a common computer, in s: of the initial equilibrium per moving block to the
 # power 1.5 (blocks of two joint sets), of a step, and of a step per law point
 SEATING, STEP, STEP_PER_POINT = 1.9e-3, 6e-4, 2.5e-6
+LONG = 2.0  # s: waits that are told before
+EQUILIBRIA, VARIANTS = 10, 20  # of a bisection; runs of an ablation
 WAIT = "the first run after an installation also compiles the law, once"
 
 ABOUT = """\
@@ -52,6 +55,7 @@ OPTIONS = {  # the first word is what a user types
     "--until": {"type": float, "help": "model time to stop at (s)"},
     "--step": {"type": float, "help": "another time step (s)"},
     "--no-pictures": {"action": "store_true", "help": "tables only"},
+    "--format": {"choices": FORMATS, "default": FORMATS[0], "help": "of pictures (default png)"},
     "--vtk": {"action": "store_true", "help": "also VTK files for ParaView, in DIR/vtk (meshio)"},
     "--seeds": {"type": int, "nargs": "+", "default": [1, 2, 3], "help": "default 1 2 3"},
     "--critical": {
@@ -107,6 +111,8 @@ def _resume(given: argparse.Namespace) -> None:
 
 def _ablate(given: argparse.Namespace) -> None:
     given.out.mkdir(parents=True, exist_ok=True)  # a folder that cannot be is known before the work
+    seconds = _seconds(_seated(given.scene), given.until)
+    print(f"about {VARIANTS} runs, each of about {_duration(seconds)}", flush=True)
     rows = ablate.ablate(load(given.scene), given.until)
     ablate.write(rows, given.out)
     print(ablate.table(rows))
@@ -131,6 +137,12 @@ def _compare(given: argparse.Namespace) -> None:
         raise ValueError(f"{given.scene} has no [[rock]] to compare")
     if given.out:
         given.out.parent.mkdir(parents=True, exist_ok=True)
+    cases = 2 * len(given.seeds) * len(scene.rocks)
+    if given.critical:
+        print(f"{cases} cases, each of about {EQUILIBRIA} equilibria", flush=True)
+    else:
+        seconds = _seconds(_seated(given.scene), given.until) / len(scene.rocks)
+        print(f"{cases} runs, each of at most about {_duration(seconds)}", flush=True)
     rows = list(_compared(scene, given))
     if given.out:
         write_json(given.out, {"version": VERSION, "rows": rows})
@@ -162,9 +174,21 @@ def _seated(name: str) -> Simulation:
         print(f"warning: {doubt}", file=sys.stderr)
     free = sum(not block.fixed for block in scene.blocks)
     wait = SEATING * free**1.5
-    if scene.run.seat and wait > 2:
+    if scene.run.seat and wait > LONG:
         print(f"{free} moving blocks: the initial equilibrium takes about {wait:.0f} s", flush=True)
     return Simulation(scene)
+
+
+def _seconds(sim: Simulation, until: float | None) -> float:
+    """Time (s) that a run takes, without its pictures."""
+    return steps_to(sim, until) * (STEP + STEP_PER_POINT * sim.joints.n)
+
+
+def _duration(seconds: float) -> str:
+    """A time to wait, on a core of its own."""
+    if seconds < 100:
+        return f"{seconds:.2g} s"
+    return f"{seconds / 60:.2g} min" if seconds < 6000 else f"{seconds / 3600:.2g} h"
 
 
 def _reduce(given: argparse.Namespace) -> None:
@@ -175,8 +199,11 @@ def _reduce(given: argparse.Namespace) -> None:
         "factor F: with the friction of all asperities divided by F the joints just carry the rock"
     )
     print("critical tilt: gravity may turn by so much, towards +x, until they no longer do")
+    free = [len(rock.free) for rock in scene.rocks] or [sum(not b.fixed for b in scene.blocks)]
+    wait = EQUILIBRIA * 2 * SEATING * sum(n**1.5 for n in free)
+    print(f"about {_duration(wait)}, and for each picture a run of up to {until:g} s", flush=True)
     rows = []
-    for row in strength.strength_reduction(scene, str(given.scene), until, given.out):
+    for row in strength.strength_reduction(scene, str(given.scene), until, given.out, given.format):
         factor, tilt = row["factor"], row["critical_tilt"]
         told = "F beyond 64 or below 1/64" if factor is None else f"F = {factor:.3g}"
         angle = "beyond 60 degrees" if tilt is None else f"{tilt:+.3g} degrees"
@@ -192,11 +219,12 @@ def _announce(sim: Simulation, until: float | None = None) -> None:
     print(f"{sim.scene.title}: {free} moving blocks, {sim.joints.n} law points in reach")
     print(f"time step {dt:.3g} s, limit {limit:.3g} s (margin {limit / dt:.2f}), {steps} steps")
     if steps > MANY:
-        hours = steps * (STEP + STEP_PER_POINT * sim.joints.n) / 3600
         print(
-            f"warning: {steps:.2g} steps take about {hours:.2g} h; is run.end = "
-            f"{sim.scene.run.end:g} s meant?", file=sys.stderr,
+            f"warning: {steps:.2g} steps take about {_duration(_seconds(sim, until))}; is run.end "
+            f"= {sim.scene.run.end:g} s meant?", file=sys.stderr,
         )  # fmt: skip
+    elif (seconds := _seconds(sim, until)) > LONG:
+        print(f"the steps take about {_duration(seconds)}", flush=True)
     for rock in sim.scene.rocks:
         print(
             f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
@@ -210,7 +238,7 @@ def _go(sim: Simulation, given: argparse.Namespace) -> None:
     if given.vtk and not find_spec("meshio"):
         raise ValueError("--vtk needs meshio: pip install meshio")
     _announce(sim, given.until)
-    record, summary = run(sim, given.out, given.until, not given.no_pictures)
+    record, summary = run(sim, given.out, given.until, not given.no_pictures, given.format)
     if given.vtk:
         from .output import vtk  # loads meshio
 
@@ -238,7 +266,7 @@ def _slip(slip: dict) -> str:
 COMMANDS = {  # what each does, and for its help: about, example, OPTIONS
     "": (
         _run, ABOUT, "tilt --out out/tilt",
-        "scene or default", "--out", "--force", "--until", "--no-pictures", "--vtk",
+        "scene or default", "--out", "--force", "--until", "--no-pictures", "--format", "--vtk",
     ),
     "new": (
         _new, "Write a commented scene of a rock slope cut by joint sets, ready to run.",
@@ -268,11 +296,12 @@ COMMANDS = {  # what each does, and for its help: about, example, OPTIONS
         "of a scene to just hold, and its critical tilt, each to 1 %, by its static equilibrium; "
         "then run it with 2 % less friction and draw how it fails.",
         "strength-reduction slope --out out/strength", "scene", "--out", "--force", "--until",
+        "--format",
     ),
     "resume": (
         _resume,
         "Go on from a saved state; without --step bit for bit as if never stopped.",
         "resume out/tilt/state --until 45 --out out/longer",
-        "state", "--out", "--force", "--until", "--no-pictures", "--vtk", "--step",
+        "state", "--out", "--force", "--until", "--no-pictures", "--format", "--vtk", "--step",
     ),
 }  # fmt: skip

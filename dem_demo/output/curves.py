@@ -22,7 +22,7 @@ def energy(record: Record, path: Path) -> None:
     labels = {
         "potential": "potential (gravity)", "work": "work of drives and loads",
         "kinetic": "kinetic", "stored": "stored in joints", "friction": "friction in joints",
-        "dashpots": "dashpots", "dropped": "given up",
+        "dashpots": "dashpots", "dropped": "lost with contacts that end",
     }  # fmt: skip
     for number, (name, label) in enumerate(labels.items()):
         top.plot(t, 1e-3 * of[name], label=label, color=f"C{number}")
@@ -30,7 +30,7 @@ def energy(record: Record, path: Path) -> None:
             middle.semilogy(t, positive(np.abs(of[name])), color=f"C{number}")
     top.set_ylabel("energy (kJ)")
     figure.legend(fontsize=8, ncols=4, loc="outside lower center")
-    top.set_title(f"{record.scene.title}: energy")
+    top.set_title(record.scene.title)
     middle.set_ylabel("size of energy (J)")
     peak = float(np.nanmax(np.abs(table[:, 2:6]), initial=1e-12))
     middle.set_ylim(max(1e-9 * peak, 1e-12), 3 * peak)

@@ -17,7 +17,6 @@ from .drawing import (
     STRESS,
     Scale,
     draw_blocks,
-    positive,
 )
 from .outcome import CREEP, displacement, kinetic, outcomes, sentence
 from .record import Record
@@ -28,6 +27,7 @@ ABOVE = {
     "frameon": False, "handlelength": 1.6, "columnspacing": 1.2,
 }  # fmt: skip
 FINE = {"line": 0.5, "edge": "0.45", "start": "0.75", "margin": 0.02}
+LEAST = 1e-9  # J or m: what is less is rounding, and drawn as this
 DASHED = (0, (2, 1.5))
 PARTIAL, FULL = 0.05, 0.9  # shares of the shear capacity in sliding that divide the states
 
@@ -106,7 +106,8 @@ def report(record: Record, path: Path) -> None:
         part[name].set_title(f"{name}: t = {record.times[i]:.2f} s", fontsize=10, loc="left")
         part[name].legend(handles=_key(scale), **ABOVE)
     draw_vectors(part["vectors"], record, last, scale)
-    part["vectors"].set_title("displacement since the drawing", fontsize=10, loc="left")
+    title = "displacement since drawn, settling included"
+    part["vectors"].set_title(title, fontsize=10, loc="left")
     _histories(part["energy"], part["moved"], record)
     said = "\n".join(sentence(entry) for entry in outcomes(record))
     figure.suptitle(f"{record.scene.title}\n{said}", fontsize=10)
@@ -121,10 +122,11 @@ def _histories(energy_axes, moved_axes, record: Record) -> None:
     moved = np.hypot(*np.moveaxis(moved - moved[0], 2, 0))
     for number, rock in enumerate(record.scene.rocks):
         style = {"color": f"C{number}", "label": rock.name}
-        energy_axes.semilogy(times, positive(energy[:, rock.free].sum(axis=1)), **style)
-        moved_axes.semilogy(times, positive(moved[:, rock.free].max(axis=1)), **style)
-    energy_axes.set_ylabel("kinetic energy (J)")
-    moved_axes.set_ylabel("largest displacement\nsince step 0 (m)")
+        total, largest = energy[:, rock.free].sum(axis=1), moved[:, rock.free].max(axis=1)
+        energy_axes.semilogy(times, np.maximum(total, LEAST), **style)
+        moved_axes.semilogy(times, np.maximum(largest, LEAST), **style)
+    energy_axes.set_ylabel("kinetic energy (J)\n(1 nJ and less: at 1 nJ)")
+    moved_axes.set_ylabel("largest displacement since step 0 (m)\n(1 nm and less: at 1 nm)")
     for axes in (energy_axes, moved_axes):
         axes.set_xlabel("time (s)")
         axes.grid(alpha=0.3)
@@ -145,7 +147,10 @@ def _key(scale: Scale) -> list[Line2D]:
     for name, colour in STATES.items():
         style = {"lw": 1.1, "ls": DASHED} if name == "open" else {"lw": 2.5}
         marks.append(Line2D([], [], color=colour, label=name, **style))
-    return [*marks, *scale.marks(0.5)]
+    widths = scale.marks(0.5)
+    for mark in widths:
+        mark.set_label(f"stress {mark.get_label()}")
+    return [*marks, *widths]
 
 
 def _metres(length: float) -> str:

@@ -3,6 +3,7 @@
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from tqdm import tqdm
 
 from jointlaw.support.files import clear_run, replace_file, write_json
+from jointlaw.support.pyplot import FORMATS
 
 from ..dynamics.energy import COLUMNS
 from ..dynamics.saved_states import text_of
@@ -23,13 +25,13 @@ from .record import Record
 
 MOST_STEPS = 1e12  # of a run: years
 VERSION = 1  # of summary.json
-FILES = (
-    "history.csv", "blocks.csv", "joints.csv", "history.npz", "energy.png", "curves.png",
-    "report.png", "final.png", "motion.gif",
-)  # fmt: skip
+TABLES = ("history.csv", "blocks.csv", "joints.csv", "history.npz")
 
 
-def run(sim: Simulation, folder: Path | None = None, until: float | None = None, pictures=True):
+def run(
+    sim: Simulation, folder: Path | None = None, until: float | None = None,
+    pictures: bool = True, picture_format: str = FORMATS[0],
+):  # fmt: skip
     """Run to `until` (s, default the scene's end); writes into `folder` if given.
 
     Returns (record, summary). A state that the method cannot carry raises Refused and leaves the
@@ -53,7 +55,7 @@ def run(sim: Simulation, folder: Path | None = None, until: float | None = None,
         clear_run(folder)
         sim.save(refused, record.state)
         replace_file(refused / "why.txt", f"{trouble}\n".encode())
-        write(record, {"version": VERSION, "refused": str(trouble)}, folder, False)
+        write(record, {"version": VERSION, "refused": str(trouble)}, folder, None)
         raise Refused(f"{trouble}\nThe last good state is in {refused}") from None
     except KeyboardInterrupt:
         interrupted = True
@@ -79,7 +81,7 @@ def run(sim: Simulation, folder: Path | None = None, until: float | None = None,
     if folder:
         clear_run(folder)
         sim.save(folder / "state")
-        write(record, summary, folder, pictures)
+        write(record, summary, folder, picture_format if pictures else None)
     if interrupted:
         where = f"; go on: python -m dem_demo resume {folder / 'state'} --out NEW" if folder else ""
         raise KeyboardInterrupt(f"interrupted at {sim.time:.4g} s of model time{where}")
@@ -128,21 +130,30 @@ def steps_to(sim: Simulation, until: float | None = None) -> int:
     return round(steps)
 
 
-def write(record: Record, summary: dict[str, Any], folder: Path, pictures: bool) -> None:
-    """All files of a run: numbers before pictures, which take longest."""
+def write(
+    record: Record, summary: dict[str, Any], folder: Path, picture_format: str | None
+) -> None:
+    """All files of a run: numbers before pictures, which take longest; None: no pictures."""
     folder.mkdir(parents=True, exist_ok=True)
-    write_json(folder / "summary.json", {**summary, "files": FILES})
+    pictures = _pictures(record, summary, picture_format) if picture_format else {}
+    write_json(folder / "summary.json", {**summary, "files": [*TABLES, *pictures]})
     record.write(folder)
-    if not pictures:
-        return
-    curves.energy(record, folder / "energy.png")
+    for name, draw in pictures.items():
+        draw(folder / name)
+
+
+def _pictures(
+    record: Record, summary: dict[str, Any], picture_format: str
+) -> dict[str, Callable[[Path], None]]:
+    """The pictures of a run: what draws each to a path."""
+    drawn = {"energy": partial(curves.energy, record)}
     if record.scene.monitors.shear:
-        curves.shear(record, folder / "curves.png")
+        drawn["curves"] = partial(curves.shear, record)
     elif record.scene.monitors.slip:
-        curves.tilt(record, folder / "curves.png", summary["slip"])
+        drawn["curves"] = partial(curves.tilt, record, slips=summary["slip"])
     if record.scene.rocks:
-        rock_report.report(record, folder / "report.png")
-        frames.animation(record, folder / "motion.gif", rock_report.frame)
+        drawn["report"], frame = partial(rock_report.report, record), rock_report.frame
     else:
-        frames.final(record, folder / "final.png", summary["slip"])
-        frames.animation(record, folder / "motion.gif", frames.frame)
+        drawn["final"], frame = partial(frames.final, record, slips=summary["slip"]), frames.frame
+    named = {f"{name}.{picture_format}": draw for name, draw in drawn.items()}
+    return {**named, "motion.gif": partial(frames.animation, record, draw_frame=frame)}

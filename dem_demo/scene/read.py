@@ -6,6 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from jointlaw.support.checks import remedy
+
 from ..errors import SceneError
 from .blocks import Block, box, check_convex
 from .drives import AXES, read_drives
@@ -38,7 +40,7 @@ def load(source: str | Path) -> Scene:
             path, chosen = SCENES / f"{stem}.toml", f'variant = "{variant}"\n'
     if not path.is_file():
         raise SceneError(
-            f"no scene {str(source)!r}: give a TOML file or one of {', '.join(names())}"
+            f"no scene {str(source)!r}: {remedy(source, names(), 'give a TOML file or one of')}"
         )
     try:
         return parse(chosen + path.read_text(encoding="utf-8"), path.name)
@@ -63,7 +65,7 @@ def read_tables(text: str, where: str = "scene") -> dict[str, Any]:
     variant = data.pop("variant")
     if not (isinstance(variants, dict) and isinstance(variant, str) and variant in variants):
         raise SceneError(
-            f"{where}.variant = {variant!r}: must be one of [variants]: {', '.join(variants)}"
+            f"{where}.variant = {variant!r} is none of [variants]: {remedy(variant, variants)}"
         )
     return overlay(data, variants[variant])
 
@@ -112,7 +114,7 @@ def build(data: dict[str, Any], where: str = "scene", text: str = "") -> Scene:
     top.finish()
     for law in [scene.default_law, *scene.pairs.values(), *scene.edge_laws.values()]:
         if law not in laws:
-            raise SceneError(f"{where}: law {law!r} is not among [laws]: {', '.join(laws)}")
+            raise SceneError(f"{where}: law {law!r} is not among [laws]; {remedy(law, laws)}")
     return scene
 
 

@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from shapely import Point, Polygon
 
+from jointlaw.support.checks import remedy
+
 from ..errors import SceneError
 from .blocks import Block
 from .cutting import JointSet, cut
@@ -42,7 +44,7 @@ def read_rocks(top: Table, density: float, first: int) -> tuple[list[Block], lis
         if name in known:
             raise table.error("name", "two rocks have this name; names must differ")
         if like and like not in known:
-            raise table.error("like", "must be the name of a rock further up")
+            raise table.error("like", f"no rock further up; {remedy(like, known)}")
         known[name] = {**known.get(like, {}), **table.data}
         whole = Table(known[name], f"{top.path('rock')}[{name!r}]")
         whole.known |= {"name", "like"}

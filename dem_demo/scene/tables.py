@@ -6,10 +6,11 @@ its place in the file, the unit and the remedy.
 
 import sys
 from collections.abc import Container, Iterator
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
+
+from jointlaw.support.checks import remedy
 
 from ..errors import SceneError
 
@@ -107,9 +108,7 @@ class Table:
         """Refuse keys that nobody asked for."""
         for key in self.data:
             if key not in self.known:
-                near = get_close_matches(key, self.known, 1)
-                known = ", ".join(sorted(self.known))
-                hint = f"did you mean {near[0]!r}?" if near else f"known: {known}"
+                hint = remedy(key, sorted(self.known), "known:")
                 raise SceneError(f"{self.path(key)} is unknown; {hint}")
 
 

@@ -4,6 +4,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from jointlaw.support.pyplot import FORMATS
+
 from ..dynamics.simulation import Simulation
 from ..output import frames, rock_report
 from ..output.record import Record
@@ -15,7 +17,9 @@ from .limit import critical_tilt, reduced, strength_factor
 SHOWN = 1.02  # times the factor: what the friction of the failing run is divided by
 
 
-def strength_reduction(scene: Scene, where: str, until: float, folder: Path) -> Iterator[dict]:
+def strength_reduction(
+    scene: Scene, where: str, until: float, folder: Path, picture_format: str = FORMATS[0]
+) -> Iterator[dict]:
     """Factor and critical tilt of every rock alone, or of a scene without rocks; and a picture.
 
     The picture is of a run with friction divided by 1.02 times the factor, which ends at `until`
@@ -28,8 +32,8 @@ def strength_reduction(scene: Scene, where: str, until: float, folder: Path) -> 
         name = "scene" if table is None else table["name"]
         factor, picture = strength_factor(one, where), None
         if factor is not None:
-            picture = folder / f"failing-{name}.png"
-            title = f"{scene.title}: {name}, friction divided by {SHOWN * factor:.3g}"
+            picture = folder / f"failing-{name}.{picture_format}"
+            title = f"{scene.title}; {name}, friction divided by {SHOWN * factor:.3g}"
             _show({**reduced(one, SHOWN * factor), "title": title}, where, until, picture)
         yield {
             "rock": name,

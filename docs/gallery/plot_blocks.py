@@ -68,7 +68,7 @@ left.plot(slid * 1e3, alone.shear_stress / 1e3, "k:", label="shear, the law alon
 left.plot(slid * 1e3, normal / 1e3, "--", color="0.5", label="normal")
 left.set_xlabel("shear displacement (mm)")
 left.set_ylabel("stress on the joint (kPa)")
-left.legend(loc="center left")
+figure.legend(loc="outside upper center", ncols=3)
 right.plot(slid * 1e3, (closure[0] - closure) * 1e3, color="C2")
 right.plot(slid * 1e3, (alone.closure[0] - alone.closure) * 1e3, "k:")
 right.set_xlabel("shear displacement (mm)")

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..parameters.rock import require_rock
-from ..support.checks import Array
+from ..support.checks import Array, remedy
 from .columns import Asked, Column, find, read_columns
 
 _FOLDER = resources.files(__package__) / "data"
@@ -182,4 +182,4 @@ def _require(right: bool, column: Column, asked: Asked, what: str, path: Path) -
 
 def _known(name: str) -> None:
     if name not in names():
-        raise ValueError(f"data set {name!r} is unknown; choose one of {', '.join(names())}")
+        raise ValueError(f"data set {name!r} is unknown; {remedy(name, names())}")

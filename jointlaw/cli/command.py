@@ -17,6 +17,7 @@ from ..parameters.rock import require_rock
 from ..support import units
 from ..support.checks import number
 from ..support.files import clear_run, replace_file, write_json
+from ..support.pyplot import FORMATS
 
 VERSION = 1  # of summary.json
 Written = Mapping[str, str | Callable[[Path], object]]
@@ -65,14 +66,20 @@ def read_law(options: argparse.Namespace) -> JointLaw:
     return law
 
 
-def add_out(parser: argparse.ArgumentParser, *, required: bool = True) -> None:
-    """Add the folder for the results."""
+def add_out(
+    parser: argparse.ArgumentParser, *, required: bool = True, pictures: bool = True
+) -> None:
+    """Add the folder for the results and, of a command that draws, the format of its pictures."""
     parser.add_argument(
         "--out", metavar="DIR", type=Path, required=required, help="folder for the results"
     )
     parser.add_argument(
         "--force", action="store_true", help="replace the results of another run in that folder"
     )
+    if pictures:
+        parser.add_argument(
+            "--format", choices=FORMATS, default=FORMATS[0], help="of pictures (default png)"
+        )
 
 
 def quantity(option: str, text: str, unit: str, *, positive: bool = False) -> float:
@@ -99,18 +106,26 @@ def given(options: argparse.Namespace, name: str, unit: str, **more: bool) -> fl
     return None if text is None else quantity(option, text, unit, **more)
 
 
-def write_results(folder: Path, files: Written, summary: Mapping[str, Any]) -> None:
-    """Write each file, its text or by its function, and summary.json; no PNG without matplotlib."""
+def write_results(
+    folder: Path, files: Written, summary: Mapping[str, Any], picture_format: str
+) -> None:
+    """Write each file, its text or by its function, and summary.json.
+
+    A picture is named as PNG and written in its format; without matplotlib it is left out.
+    """
     clear_run(folder)
     names = []
     for name, content in files.items():
+        picture = name.endswith(".png")
+        if picture:
+            name = name.removesuffix("png") + picture_format
         try:
             if isinstance(content, str):
                 replace_file(folder / name, content.encode())
             else:
                 content(folder / name)
         except ImportError as error:
-            if not name.endswith(".png"):
+            if not picture:
                 raise
             print(f"no picture: {error}", file=sys.stderr)
             continue
@@ -163,7 +178,7 @@ def _write(record: Record, law: JointLaw, options: argparse.Namespace) -> None:
     }
     settings = {k: v for k, v in vars(options).items() if k not in ("run", "out", "force")}
     summary = {"settings": settings, "result": record.summary(), "units": UNITS}
-    write_results(options.out, files, summary)
+    write_results(options.out, files, summary, options.format)
 
 
 def csv_units(options: argparse.Namespace) -> list[str]:

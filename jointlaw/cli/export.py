@@ -26,7 +26,7 @@ def add(commands: Any) -> None:
     parser.add_argument("--closure", help="yade: last closure of the table, such as 2um")
     parser.add_argument("--shear-limit", help="yade: shear at which friction is read, such as 5um")
     parser.add_argument("--tolerance", type=float, help="yade: of interpolation (0.001)")
-    add_out(parser)
+    add_out(parser, pictures=False)
 
 
 def _export(options: argparse.Namespace) -> None:

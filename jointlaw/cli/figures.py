@@ -32,5 +32,5 @@ def _figures(options: argparse.Namespace) -> None:
         raise ValueError("--out is missing: name the folder for the figures")
     else:
         clear_run(options.out)
-        files = write_figures(options.out, options.numbers)
+        files = write_figures(options.out, options.numbers, options.format)
         print(f"wrote {len(files)} files to {options.out}")

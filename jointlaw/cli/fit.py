@@ -86,7 +86,7 @@ def _run(options: argparse.Namespace) -> None:
         closed = datasets.ClosureData(*loading[0]) if loading else None
         fit, about = fit_with_shear(options, closed, compliance, keywords)
         names = ", ".join(Path(item).name for item in [*options.data, *options.shear])
-        _write(options.out, names, fit, alone[0] if alone else None, None, about)
+        _write(options.out, options.format, names, fit, alone[0] if alone else None, None, about)
         return
     limits = [_limit(options.up_to, stress) for stress, _ in loading]
     seen = [(s[s <= limit], u[s <= limit]) for (s, u), limit in zip(loading, limits, strict=True)]
@@ -99,7 +99,8 @@ def _run(options: argparse.Namespace) -> None:
         held = (
             compare(stress, closure, limits[k], **keywords) if (stress > limits[k]).any() else None
         )
-        _write(folders[k], Path(options.data[k]).name, fit, alone[k], held)
+        name = Path(options.data[k]).name
+        _write(folders[k], options.format, name, fit, alone[k], held)
 
 
 def _folders(options: argparse.Namespace) -> list[Path]:
@@ -122,6 +123,7 @@ def _folders(options: argparse.Namespace) -> list[Path]:
 
 def _write(
     folder: Path,
+    picture_format: str,
     name: str,
     fit: Fit,
     test: datasets.ClosureData | None,
@@ -155,7 +157,7 @@ def _write(
         "law.toml": partial(fit.to_toml, title=f"Fit to {name}"),
         "report.md": text,
     }
-    write_results(folder, files, summary)
+    write_results(folder, files, summary, picture_format)
 
 
 def _held_out(held: Comparison) -> str:

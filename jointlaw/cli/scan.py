@@ -44,7 +44,7 @@ def _run(options: argparse.Namespace) -> None:
     }
     toml = _toml(fit, Path(options.file).name)
     files: Written = {"scan.png": fit.plot, "surface.toml": toml, "report.md": text}
-    write_results(options.out, files, summary)
+    write_results(options.out, files, summary, options.format)
 
 
 def _toml(fit: SurfaceFit, name: str) -> str:

@@ -27,6 +27,7 @@ UNITS = {
     "stored": "J/m2",
     "dissipated": "J/m2",
 }
+ROUNDING = 1e-9  # of shares
 _LENGTHS = ((1e-9, "nm"), (1e-6, "µm"), (1e-3, "mm"), (1.0, "m"))
 _STRESSES = ((1.0, "Pa"), (1e3, "kPa"), (1e6, "MPa"), (1e9, "GPa"))
 _ENERGIES = ((1e-6, "µJ/m²"), (1e-3, "mJ/m²"), (1.0, "J/m²"), (1e3, "kJ/m²"))
@@ -144,6 +145,24 @@ class Record:
         return written(_shear_figure(self) if sheared else _closure_figure(self), path)
 
 
+def without_steps(x: Array, share: Array) -> tuple[Array, Array]:
+    """Points (x, share) of a share of discrete facets (rows,), which changes in steps.
+
+    A step between a lower and a higher one is replaced by its middle. Ends, turning points of x
+    and largest and smallest shares stay as they are.
+    """
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(x)))) + 1
+    jumps = np.flatnonzero(np.abs(np.diff(share)) > ROUNDING) + 1
+    first = np.unique([0, *turns, *jumps])
+    last = np.append(first[1:], len(share)) - 1
+    level = share[first]
+    between = np.zeros(len(level), bool)
+    between[1:-1] = np.diff(level)[:-1] * np.diff(level)[1:] > 0
+    ends = np.stack([x[first], x[last]], axis=1)
+    ends[between] = ends[between].mean(axis=1, keepdims=True)
+    return ends.ravel(), np.repeat(level, 2)
+
+
 def _scaled(values: Array, units: tuple[tuple[float, str], ...]) -> tuple[Array, str]:
     """Values in the largest unit that leaves their peak at one or more."""
     peak = float(np.max(np.abs(values)))
@@ -164,8 +183,8 @@ def _shear_figure(record: Record) -> Any:
     dilation, small = _scaled(record.closure[0] - record.closure, _LENGTHS)
     axes[1, 0].plot(shear, dilation, color="C2")
     axes[1, 0].set_ylabel(f"dilation ({small})")
-    axes[1, 1].plot(shear, 100 * record.sliding, label="sliding")
-    axes[1, 1].plot(shear, 100 * record.separated, label="separated")
+    for label, share in (("sliding", record.sliding), ("separated", record.separated)):
+        axes[1, 1].plot(*without_steps(shear, 100 * share), label=label)
     axes[1, 1].set(ylabel="share of facet orientations (%)", ylim=(-3, 103))
     axes[1, 1].legend(loc="upper center", bbox_to_anchor=(0.5, 1.12), ncols=2, frameon=False)
     for axis in axes[1]:

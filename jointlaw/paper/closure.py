@@ -157,7 +157,7 @@ def initial_shear_stiffness(
     12,
     title="initial shear stiffness against normal stress",
     caption=(
-        "dF_2/d delta_2 at zero shear and kept closure, after closing to the normal stress. (a) "
+        "dF₂/dδ₂ at zero shear and constant closure, after closing to the normal stress. (a) "
         "Parameters of section 4.1, friction 0.3 as in section 4.3. (b) Parameters of section 4.2; "
         "the paper prints no contact density for the replica, so its stiffness is drawn over one "
         "value of its own, and the stress axis shifts with the density that is assumed. The "
@@ -167,7 +167,8 @@ def initial_shear_stiffness(
     panels=4,
 )
 def figure_12(*panels: Any) -> None:
-    granite, replica = np.linspace(0.5e6, TOP_STRESS, 34), np.linspace(0.1e6, 10e6, 34)
+    granite = np.linspace(0.5e6**0.5, TOP_STRESS**0.5, 34) ** 2  # dense where the curves bend
+    replica = np.linspace(0.1e6**0.5, 10e6**0.5, 34) ** 2
     unit = initial_shear_stiffness(law(REPLICA), 10e6)[1]
     for part, kind in enumerate((TOTAL, LAW)):
         upper, lower = panels[part], panels[2 + part]
@@ -273,11 +274,11 @@ def slowing_reason() -> Numbers:
     13,
     title="directional initial shear stiffness, concrete replica",
     caption=(
-        "Parameters of section 4.2 (a = 3, b = -1, c = -0.3, lambda = 0.33), stiffness along the "
-        "motion over its mean over all azimuths: the contact density is not printed. The three "
-        "stresses fall on one curve. Direction 2 (0 degrees) is the stiffer one although c < 0, "
-        "because lambda < 1 makes asperities stiffer in shear than in closure. Measured points are "
-        "not printed."
+        "Parameters of section 4.2 (a = 3, b = −1, c = −0.3, λ = 0.33), stiffness along the "
+        "motion divided by its mean over all azimuths, since the contact density is not printed. "
+        "The three stresses fall on one curve. Direction 2 (0 degrees) is the stiffer one although "
+        "c < 0, because λ < 1 makes asperities stiffer in shear than in closure. Measured points "
+        "are not printed."
     ),
     panels=2,
     polar=True,
@@ -285,11 +286,11 @@ def slowing_reason() -> Numbers:
 def figure_13(*panels: Any) -> None:
     azimuth = np.radians(np.arange(0.0, 361.0, 7.5))
     for part, (axes, kind) in enumerate(zip(panels, (TOTAL, LAW), strict=True)):
-        for stress, style in ((0.5e6, "-"), (2e6, "--"), (10e6, ":")):
+        for stress, style, every in ((0.5e6, "-", 1), (2e6, "s", (0, 4)), (10e6, "o", (2, 4))):
             quarter = [initial_shear_stiffness(law(REPLICA), stress, x)[part] for x in azimuth[:13]]
             values = mirrored(quarter)
             label = f"{stress * 1e-6:g} MPa"
-            axes.plot(azimuth, values / values[:-1].mean(), style, label=label)
+            axes.plot(azimuth, values / values[:-1].mean(), style, markevery=every, label=label)
         axes.set(title=kind, xlabel="azimuth φ (°)", ylabel="stiffness/mean", ylim=(0.0, 1.4))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..support.files import replace_file, write_json
 from ..support.progress import track
-from ..support.pyplot import pyplot
+from ..support.pyplot import FORMATS, pyplot
 from . import closure, elastic, shear, sliding, strength, surface
 from .section import Figure
 
@@ -24,15 +24,18 @@ FIGURES = {
 }
 CLAIMS = {claim.key: claim for section in _SECTIONS for claim in section.claims}
 _STYLE: dict[Any, Any] = {
-    "font.size": 9, "font.family": "sans-serif", "figure.titlesize": 11, "axes.titlesize": 9,
-    "axes.labelsize": 9, "xtick.labelsize": 8, "ytick.labelsize": 8, "legend.fontsize": 7,
+    "font.size": 9, "font.family": "sans-serif", "figure.titlesize": 9, "axes.titlesize": 9,
+    "axes.labelsize": 9, "xtick.labelsize": 9, "ytick.labelsize": 9, "legend.fontsize": 9,
     "legend.framealpha": 0.85, "lines.linewidth": 1.4, "lines.markersize": 3.5, "savefig.dpi": 130,
+    "figure.titleweight": "bold",
     "axes.grid": True, "grid.alpha": 0.3, "grid.linewidth": 0.5, "axes.xmargin": 0,
 }  # fmt: skip
 
 
-def write_figures(folder: str | Path, numbers: Sequence[int] = ()) -> list[Path]:
-    """Write figures (all if none are named) as PNG and CSV, and `summary.json` with the captions.
+def write_figures(
+    folder: str | Path, numbers: Sequence[int] = (), picture_format: str = FORMATS[0]
+) -> list[Path]:
+    """Write figures (all if none are named) and their CSV, and `summary.json` with the captions.
 
     Returns the files. Raises ValueError for a number that is no figure of the paper or one without
     content to compute (1 and 2), and ImportError without matplotlib.
@@ -45,9 +48,9 @@ def write_figures(folder: str | Path, numbers: Sequence[int] = ()) -> list[Path]
     out, files, captions = Path(folder), [], {}
     for number in track(wanted, "figures", len(wanted)):
         figure = FIGURES[number]
-        png, curves = rendered(figure)
+        picture, curves = rendered(figure, picture_format)
         out.mkdir(parents=True, exist_ok=True)
-        for ending, data in ((".png", png), (".csv", curves.encode())):
+        for ending, data in ((f".{picture_format}", picture), (".csv", curves.encode())):
             files.append(out / f"{figure.name}{ending}")
             replace_file(files[-1], data)
         captions[figure.name] = {"title": figure.title, "caption": figure.caption}
@@ -71,24 +74,25 @@ def claims_table(keys: Sequence[str] = ()) -> str:
     return "\n".join([head, *(CLAIMS[key].row() for key in track(chosen, "claims", len(chosen)))])
 
 
-def rendered(figure: Figure) -> tuple[bytes, str]:
-    """The figure as PNG, and its curves as CSV (needs matplotlib: extra `plot`)."""
+def rendered(figure: Figure, picture_format: str = FORMATS[0]) -> tuple[bytes, str]:
+    """The figure as a file, and its curves as CSV (needs matplotlib: extra `plot`)."""
     out = io.BytesIO()
     with pyplot().rc_context(_STYLE):
         page = drawn(figure)
-        page.savefig(out, format="png")
+        page.savefig(out, format=picture_format)
     return out.getvalue(), points(page)
 
 
 def drawn(figure: Figure) -> Any:
     """The matplotlib figure with its panels, legends and, below, its caption."""
     from matplotlib.figure import Figure as Page
+    from matplotlib.ticker import MaxNLocator
 
     columns = min(figure.panels, 3 if figure.panels != 4 else 2)
     rows = -(-figure.panels // columns)
     width = 5.2 * columns if columns > 1 else 7.0
-    caption = textwrap.fill(figure.caption, int(width * 16.5))
-    below = 0.18 * (caption.count("\n") + 1) + 0.2
+    caption = textwrap.fill(figure.caption, int(width * 15))
+    below = 0.19 * (caption.count("\n") + 1) + 0.2
     height = 4.3 * rows + below + 0.4
     page: Any = Page(figsize=(width, height), layout="constrained")
     page.get_layout_engine().set(rect=(0, below / height, 1, 1 - below / height))
@@ -100,11 +104,14 @@ def drawn(figure: Figure) -> Any:
         if figure.polar:
             panel.set_thetagrids(range(0, 360, 30))
             panel.yaxis.labelpad = 32
+            panel.yaxis.set_major_locator(MaxNLocator(4))
+            for label in panel.get_yticklabels():
+                label.set_bbox({"color": "white", "alpha": 0.8, "pad": 0.5})
         if panel.get_legend_handles_labels()[1]:
             panel.legend(**place)
     shown = "Figure " if len(figure.numbers) == 1 else "Figures "
     page.suptitle(f"{shown}{' and '.join(map(str, figure.numbers))}: {figure.title}")
-    page.text(0.02, 0.1 / height, caption, fontsize=8, va="bottom")
+    page.text(0.02, 0.1 / height, caption, va="bottom")
     return page
 
 

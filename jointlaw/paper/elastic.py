@@ -67,7 +67,7 @@ def stiffness_ratio(shape: HasShape, kappa: float) -> float:
     8,
     title="elastic stiffness ratio of the interface",
     caption=(
-        "Closed forms of Table 1 (here for every a and b), c = 0. (a) K_s/K_n = 0.5. (b) The bands "
+        "Closed forms of Table 1 (here for every a and b), c = 0. (a) Kₛ/Kₙ = 0.5. (b) The bands "
         "are the ranges quoted in the text: 0.78 to 1.1 measured, 0.67 to 1 of Hertz-Mindlin "
         "contacts. The paper does not print which a and b it draws in (b); ours are in the legend."
     ),
@@ -76,10 +76,11 @@ def stiffness_ratio(shape: HasShape, kappa: float) -> float:
 def figure_8(left: Any, right: Any) -> None:
     a = np.geomspace(1.0, 30.0, 200)
     for b in (-1, 0, 2):
-        left.plot(a, [stiffness_ratio(Shape(x, b), 0.5) for x in a], label=f"b = {b}")
-    left.plot(a, np.full(a.shape, 0.5), ":", color="0.4", label="a = ∞: K_s/K_n")
+        label = f"b = {b}".replace("-", "−")
+        left.plot(a, [stiffness_ratio(Shape(x, b), 0.5) for x in a], label=label)
+    left.plot(a, np.full(a.shape, 0.5), ":", color="0.4", label="a = ∞: Kₛ/Kₙ")
     ticks = (1, 2, 3, 6, 10, 20, 30)
-    left.set(title="(a) K_s/K_n = 0.5", xlabel="a", ylabel="C22/C11", xscale="log")
+    left.set(title="(a) Kₛ/Kₙ = 0.5", xlabel="a", ylabel="C₂₂/C₁₁", xscale="log")
     left.set_xticks(ticks, ticks)
     left.minorticks_off()
     kappa = np.linspace(0.3, 1.2, 91)
@@ -94,7 +95,7 @@ def figure_8(left: Any, right: Any) -> None:
         right.plot(kappa, [stiffness_ratio(Shape(a_, b), k) for k in kappa], label=label)
     right.axhspan(0.78, 1.1, color="C7", label="measured, Krolikowski and Szczepek", **QUOTED)
     right.axvspan(0.67, 1.0, color="C9", label="Hertz-Mindlin, ν = 0.5 to 0", **QUOTED)
-    right.set(title="(b)", xlabel="asperity stiffness ratio K_s/K_n", ylabel="C22/C11")
+    right.set(title="(b)", xlabel="asperity stiffness ratio Kₛ/Kₙ", ylabel="C₂₂/C₁₁", ylim=(0, 1.4))
 
 
 @SECTION.claim(
@@ -202,7 +203,7 @@ def _range(kappas: tuple[float, ...], twist: float) -> tuple[float, float]:
     9,
     title="directional elastic shear stiffness",
     caption=(
-        "Resultant C_s of Eq. 28 over C11 for a = 1, b = 0, K_s/K_n = 0.5. All parameters are "
+        "Resultant Cₛ of Eq. 28 over C₁₁ for a = 1, b = 0, Kₛ/Kₙ = 0.5. All parameters are "
         "printed. Direction 2 is at 0 degrees."
     ),
     polar=True,
@@ -213,7 +214,7 @@ def figure_9(axes: Any) -> None:
         shape = Shape(1.0, 0.0, c)
         c11 = elastic(shape, 1.0, 0.5)[0]
         axes.plot(phi, [shear_stiffness(shape, 1.0, 0.5, x) / c11 for x in phi], label=label)
-    axes.set(title="C_s/C11", xlabel="azimuth φ (°)", ylabel="C_s/C11", ylim=(0.0, 1.2))
+    axes.set(xlabel="azimuth φ (°)", ylabel="Cₛ/C₁₁", ylim=(0.0, 1.2))
 
 
 @SECTION.claim(

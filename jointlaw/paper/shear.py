@@ -1,4 +1,4 @@
-"""Section 4.3, shear at a kept closure of 1 um: Figures 14 to 16."""
+"""Section 4.3, shear at a constant closure of 1 um: Figures 14 to 16."""
 
 import math
 from typing import Any
@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
+from ..laboratory.record import without_steps
 from .runs import first_sliding, incremental, law, ratio, resistance, total
 from .secant import secant
 from .section import FORMS, LAW, TOTAL, Bound, Numbers, Section, near, rounding
@@ -20,9 +21,9 @@ FRICTION = 0.6
     14,
     title="effect of the orientation parameter a on shear resistance",
     caption=(
-        "F_2/F_1 at a kept closure of 1 um for linear asperities, lambda = 1, mu = 0.6, b = c = 0. "
-        "Neither K nor the contact density enters. In the right panel thin dots repeat the total "
-        "form. The paper does not print the end of its axis."
+        "F₂/F₁ at a constant closure of 1 µm for linear asperities, λ = 1, μ = 0.6, b = c = 0. "
+        "Neither K nor the contact density enters. In the right panel dotted lines repeat the "
+        "total form. The paper does not print the end of its axis."
     ),
     panels=2,
 )
@@ -67,9 +68,9 @@ def friction_tends_to_mu() -> Numbers:
     15,
     title="effect of asperity nonlinearity on shear resistance",
     caption=(
-        "F_2/F_1 at a kept closure of 1 um for linear (eta = 0) and nonlinear (eta = 1/2) "
-        "asperities, lambda = 1, mu = 0.6. In the right panel thin dots repeat the total form. At "
-        "small shear the total form is softer for eta = 1/2: it sees asperities that the closure "
+        "F₂/F₁ at a constant closure of 1 µm for linear (η = 0) and nonlinear (η = 1/2) "
+        "asperities, λ = 1, μ = 0.6. In the right panel dotted lines repeat the total form. At "
+        "small shear the total form is softer for η = 1/2: it sees asperities that the closure "
         "has loaded in shear further along Eq. 35, while the incremental law gives new shear its "
         "full initial stiffness."
     ),
@@ -85,7 +86,7 @@ def figure_15(left: Any, right: Any) -> None:
 
 
 def _side_by_side(left: Any, right: Any, names: list[tuple[str, str, str]]) -> None:
-    """Total form left; incremental law right, with the total form thin behind it."""
+    """Total form left; incremental law right, with the total form dotted behind it."""
     for name, label, color in names:
         printed = total(name, TO, closure=CLOSURE)
         ours = incremental(name, TO, closure=CLOSURE)
@@ -142,10 +143,10 @@ def nonlinear_above_linear() -> Numbers:
     16,
     title="sliding and separated asperities during shear",
     caption=(
-        "Linear asperities at a kept closure of 1 um, lambda = 1, mu = 0.6. Dotted ticks: "
-        "separation begins at delta_2 = delta_1 cot(pi/2a). Sliding begins earlier for a = 3 but "
-        "is complete earlier for a = 6. The small steps of the incremental law are its discrete "
-        "orientations."
+        "Linear asperities at a constant closure of 1 µm, λ = 1, μ = 0.6. Dotted ticks: "
+        "separation begins at δ₂ = δ₁ cot(π/2a). Sliding begins earlier for a = 3 but "
+        "is complete earlier for a = 6. The shares of the incremental law change in "
+        "steps, one for each of its orientations; its lines join the middles of the steps."
     ),
     panels=2,
 )
@@ -155,8 +156,11 @@ def figure_16(*panels: Any) -> None:
             run: Any = total if kind == TOTAL else incremental
             test = run(f"linear-a{a}", TO, closure=CLOSURE)
             x, onset = test.shear * 1e6, CLOSURE * 1e6 / math.tan(0.5 * math.pi / a)
-            axes.plot(x, test.sliding, color=color, label=f"sliding, a = {a}")
-            axes.plot(x, test.separated, "--", color=color, label=f"separated, a = {a}")
+            for name, style, share in (
+                ("sliding", "-", test.sliding), ("separated", "--", test.separated),
+            ):  # fmt: skip
+                line = (x, share) if kind == TOTAL else without_steps(x, share)
+                axes.plot(*line, style, color=color, label=f"{name}, a = {a}")
             label = f"_onset cot(pi/2a), a = {a}"
             axes.plot([onset, onset], [0.0, 0.08], ":", color=color, label=label)
         axes.set(title=kind, xlabel=AXIS, ylabel="share of asperities", ylim=(-0.02, 1.05))

@@ -102,10 +102,10 @@ def sliding_angle_claim() -> Numbers:
     10,
     title="asperities that slide in closure",
     caption=(
-        "Left: count of asperities per degree of inclination for a = 2, b = c = 0, and those "
-        "beyond theta_s = arctan(mu K_n/K_s), Eq. 30, at mu = 0.6 and K_s = K_n (the paper's "
-        "sketch prints no values). Right: their share against mu. Lines: total form; dots: "
-        "incremental law, whose orientations are discrete (12 inclinations)."
+        "Left: share of asperities per degree of inclination for a = 2, b = c = 0, and those "
+        "beyond θₛ = arctan(μ Kₙ/Kₛ), Eq. 30, at μ = 0.6 and Kₛ = Kₙ (the paper's "
+        "sketch prints no values). Right: share of those that slide against μ. Lines: total form; "
+        "dots: incremental law, whose orientations are discrete (96 inclinations)."
     ),
     panels=2,
 )
@@ -116,21 +116,25 @@ def figure_10(left: Any, right: Any) -> None:
     slides = theta >= start
     edge = [0.0, count[slides][0]]
     left.plot(theta, count, label="all asperities")
-    left.plot(theta[slides], count[slides], color="C3", label="sliding, θ ≥ θ_s")
-    left.plot([start, start], edge, ":", color="C3", label=f"θ_s = {start:.1f}°")
-    left.set(title="count", xlabel="inclination θ (°)", ylabel="share per degree (1/°)")
+    left.plot(theta[slides], count[slides], color="C3", label="sliding, θ ≥ θₛ")
+    left.plot([start, start], edge, ":", color="C3", label=f"θₛ = {start:.1f}°")
+    left.set(
+        title="all asperities by inclination",
+        xlabel="inclination θ (°)",
+        ylabel="share per degree (1/°)",
+    )
     friction = np.linspace(0.0, 1.2, 25)
     for color, wide in (("C0", 1.0), ("C1", 2.0), ("C2", 3.0)):
         total, ours = np.transpose([_sliding_shares(wide, float(mu)) for mu in friction])
         right.plot(friction, total, color=color, label=f"a = {wide:g}, total")
         right.plot(friction, ours, "o", color=color, label=f"a = {wide:g}, incremental")
-    title = "share that slides, K_s = K_n"
+    title = "share that slides, Kₛ = Kₙ"
     right.set(title=title, xlabel="asperity friction μ", ylabel="sliding share")
 
 
 def _sliding_shares(a: float, mu: float) -> tuple[float, float]:
-    """Sliding share in closure, total form and incremental law, K_s = K_n."""
-    found = simple(a, mu, resolution=Resolution(12, 3, 1))
+    """Sliding share in closure, total form and incremental law, Kₛ = Kₙ."""
+    found = simple(a, mu, resolution=Resolution(96, 3, 1))
     joint = found.joint()
     joint.update([1.0, 0.0, 0.0])
     return secant(found, (1.0, 0.0, 0.0)).sliding, float(joint.sliding)

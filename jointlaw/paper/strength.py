@@ -39,10 +39,10 @@ NORMAL, TO = 10e6, 1.5e-6  # Pa, printed; m, not printed
     title="shear resistance of Westerly granite at a normal stress of 10 MPa",
     caption=(
         "Parameters of section 4.3; the contact density is that of section 4.1. In the right panel "
-        "thin dots repeat the total form; circles mark where all asperities in touch slide. In the "
-        "total form the rough interface is stiffer at first and the smooth one stronger later; in "
-        "the incremental law the smooth one is above from the start. Measured points and the end "
-        "of the axis are not printed."
+        "dotted lines repeat the total form; circles mark where all asperities in touch slide. In "
+        "the total form the rough interface is stiffer at first and the smooth one stronger later; "
+        "in the incremental law the smooth one is above from the start. Measured points and the "
+        "end of the axis are not printed."
     ),
     panels=2,
 )
@@ -212,9 +212,9 @@ def _steepest() -> float:
     18,
     title="directional friction angle, concrete replica",
     caption=(
-        "arctan(shear resistance/normal stress) when all asperities in touch first slide, mu = "
+        "arctan(shear resistance/normal stress) when all asperities in touch first slide, μ = "
         "0.47 and the parameters of section 4.2. In the total form it does not depend on the "
-        "normal stress at all. Grey: arctan(mu) + pi/2a, reached when the slip is far above the "
+        "normal stress at all. Grey: arctan(μ) + π/2a, reached when the slip is far above the "
         "closure, hence at any slip when the normal stress is zero. Measured points are not "
         "printed."
     ),
@@ -222,8 +222,8 @@ def _steepest() -> float:
     polar=True,
 )
 def figure_18(left: Any, right: Any) -> None:
-    whole = np.radians(np.arange(0.0, 361.0, 15.0))
-    quarter = whole[:7].tolist()
+    whole = np.radians(np.arange(0.0, 361.0, 7.5))
+    quarter = whole[:13].tolist()
     left.plot(whole, mirrored([total_yield(x) for x in quarter]), label="every normal stress")
     for stress, style, label in (
         (NEARLY_ZERO, "--", "normal stress to 0"),
@@ -232,9 +232,10 @@ def figure_18(left: Any, right: Any) -> None:
     ):
         angles = mirrored([law_yield(stress, x)[0] for x in quarter])
         right.plot(whole, angles, style, label=label)
-    limit = np.full(whole.shape, slip_limit())
+    circle = np.radians(np.arange(0.0, 361.0, 2.0))
+    limit = np.full(circle.shape, slip_limit())
     for axes, title in ((left, TOTAL), (right, LAW)):
-        axes.plot(whole, limit, "-.", color="0.4", label="slip far above closure")
+        axes.plot(circle, limit, "-.", color="0.4", label="slip far above closure")
         axes.set(title=title, xlabel="azimuth φ (°)", ylabel="friction angle (°)", ylim=(0.0, 60.0))
 
 
@@ -261,7 +262,7 @@ def friction_anisotropy() -> Numbers:
     caption=(
         "The same interface by two definitions of yield: all asperities in touch slide (nearly "
         "independent of normal stress), and a slip of 1 mm (falls with normal stress). Grey line: "
-        "arctan(mu) + pi/2a, at zero normal stress for any slip. The contact density is not "
+        "arctan(μ) + π/2a, at zero normal stress for any slip. The contact density is not "
         "printed: with another one the dashed curves shift along the stress axis. Measured points "
         "are not printed."
     ),

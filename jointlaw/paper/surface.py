@@ -24,9 +24,9 @@ WESTERLY = (("westerly-smooth", "smooth", "C0"), ("westerly-rough", "rough", "C1
     3,
     title="asperity height distributions, Westerly granite",
     caption=(
-        "Gamma densities of Eq. 12 with the printed parameters (smooth: alpha = 3.82, beta = 1.15 "
-        "um; rough: alpha = 6.14, beta = 3.52 um) and, right, the share of asperities in touch, "
-        "Eq. 11 over N. Dots: the overlap r0 at zero closure. The measured heights of the paper's "
+        "Gamma densities of Eq. 12 with the printed parameters (smooth: α = 3.82, β = 1.15 "
+        "µm; rough: α = 6.14, β = 3.52 µm) and, right, the share of asperities in touch, "
+        "Eq. 11 over N. Dots: the overlap r₀ at zero closure. The measured heights of the paper's "
         "figure are not printed as numbers."
     ),
     panels=2,
@@ -41,8 +41,8 @@ def figure_3(density: Any, in_touch: Any) -> None:
             axes.plot(r * 1e6, share(r) * scale, color=color, label=text)
             dot = {"color": color, "label": f"_{label} at r0"}
             axes.plot(at * 1e6, share(at) * scale, "o", **dot)
-    density.set(title="density", xlabel="overlap r (µm)", ylabel="H(r) (1/µm)")
-    in_touch.set(title="in touch", xlabel="overlap r (µm)", ylabel="N_r/N (share)")
+    density.set(title="height density", xlabel="overlap r (µm)", ylabel="H(r) (1/µm)")
+    in_touch.set(title="asperities in touch", xlabel="overlap r (µm)", ylabel="Nᵣ/N (share)")
 
 
 @SECTION.claim(
@@ -91,9 +91,9 @@ def height_moments() -> Numbers:
     title="axes and signs",
     caption=(
         "In place of the paper's sketches. Axis 1 is the interface normal, along the closing "
-        "motion; n = (cos theta, sin theta cos phi, sin theta sin phi) is the facet normal, s and "
-        "t span the facet (Eq. 25). delta_1 > 0 closes, F_1 > 0 presses; F is the resistance in "
-        "the sense of delta. A facet that leans towards the shear is loaded by it; one that leans "
+        "motion; n = (cos θ, sin θ cos φ, sin θ sin φ) is the facet normal, s and "
+        "t span the facet (Eq. 25). δ₁ > 0 closes, F₁ > 0 presses; F is the resistance in "
+        "the sense of δ. A facet that leans towards the shear is loaded by it; one that leans "
         "away unloads and may separate."
     ),
     panels=2,
@@ -134,7 +134,7 @@ def figure_4(side: Any, plan: Any) -> None:
         (plan, (0.56, 0.2), "φ", "0.2"),
         (plan, (0.55, -0.3), "azimuth turns from 2 to 3", "0.2"),
     ):
-        axes.text(*where, text, fontsize=8, color=color, ha="center")
+        axes.text(*where, text, color=color, ha="center")
     side.set(
         title="section along the azimuth of the asperity",
         xlabel="along the interface",
@@ -173,8 +173,8 @@ def figure_5(axes: Any) -> None:
     7,
     title="dependence of the orientation density on a, b and c",
     caption=(
-        "Eq. 14 per solid angle, 0 <= theta <= pi/2a. All parameters are printed. For b = 0 the "
-        "density is constant at a = 1 only; at a = 2 it is constant in cos(a theta), not per solid "
+        "Eq. 14 per solid angle, 0 ≤ θ ≤ π/2a. All parameters are printed. For b = 0 the "
+        "density is constant at a = 1 only; at a = 2 it is constant in cos(a θ), not per solid "
         "angle."
     ),
     panels=3,
@@ -182,7 +182,7 @@ def figure_5(axes: Any) -> None:
 def figure_7(*panels: Any) -> None:
     for axes, letter, a in zip(panels, "ab", (1.0, 2.0), strict=False):
         for b in (-1, 0, 2):
-            _plot_density(axes, Orientation(a, b), f"b = {b:g}", 90 / a)
+            _plot_density(axes, Orientation(a, b), f"b = {b:g}".replace("-", "−"), 90 / a)
         axes.set_title(f"({letter}) a = {a:g}, c = 0")
     for phi in (0, 45, 90):
         _plot_density(panels[2], Orientation(1.0, 0.0, 1 / 3), f"φ = {phi}°", 90.0, phi)

@@ -11,6 +11,7 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
+from ..support.checks import remedy
 from ..support.files import replace_file
 from .asperity import Asperity
 from .heights import GammaHeights, Heights
@@ -148,7 +149,8 @@ def _known(data: dict[str, Any], allowed: set[str], where: str, prefix: str) -> 
     for key in data:
         if key not in allowed:
             raise ValueError(
-                f"{where}: key '{prefix}{key}' is unknown; known here: {', '.join(sorted(allowed))}"
+                f"{where}: key '{prefix}{key}' is unknown; "
+                f"{remedy(key, sorted(allowed), 'known here:')}"
             )
 
 

@@ -5,6 +5,7 @@ from importlib import resources
 from pathlib import Path
 
 from ..law import JointLaw
+from ..support.checks import remedy
 
 
 def names() -> list[str]:
@@ -16,7 +17,7 @@ def names() -> list[str]:
 def text(name: str) -> str:
     """TOML text of a preset. Raises ValueError for an unknown name."""
     if name not in names():
-        raise ValueError(f"preset {name!r} is unknown; choose one of {', '.join(names())}")
+        raise ValueError(f"preset {name!r} is unknown; {remedy(name, names())}")
     return (resources.files(__package__) / f"{name}.toml").read_text(encoding="utf-8")
 
 
@@ -37,5 +38,6 @@ def load_any(name_or_file: str) -> JointLaw:
     if Path(name_or_file).is_file():
         return JointLaw.from_toml(Path(name_or_file))
     raise ValueError(
-        f"{name_or_file!r} is neither a preset ({', '.join(names())}) nor an existing TOML file"
+        f"{name_or_file!r} is neither a preset nor an existing TOML file: "
+        f"{remedy(name_or_file, names(), 'the presets are')}"
     )

@@ -1,6 +1,8 @@
 """Checks on numbers that come from outside: each error names parameter, value, bound and remedy."""
 
 import math
+from collections.abc import Iterable
+from difflib import get_close_matches
 from typing import Any, TypeVar
 
 import numpy as np
@@ -42,10 +44,17 @@ def at_least(name: str, value: Any, bound: float, *, infinite: bool = False) -> 
     return result
 
 
+def remedy(given: Any, known: Iterable[str], otherwise: str = "choose one of") -> str:
+    """What to write for an unknown name: the nearest known one, or any of all."""
+    names = list(known)
+    near = get_close_matches(str(given), names, 1)
+    return f"did you mean {near[0]!r}?" if near else f"{otherwise} {', '.join(names)}"
+
+
 def one_of(name: str, value: Any, choices: tuple[str, ...]) -> str:
     """Return `value` if it is one of the named choices."""
     if value not in choices:
-        raise ValueError(f"{name} = {value!r} is unknown; choose one of {', '.join(choices)}")
+        raise ValueError(f"{name} = {value!r} is unknown; {remedy(value, choices)}")
     return str(value)
 
 

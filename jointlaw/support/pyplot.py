@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import Any
 
+FORMATS = ("png", "svg", "pdf")  # of pictures; the first one unless another is asked for
+
 
 def pyplot() -> Any:
     """The module matplotlib.pyplot. Raises ImportError with the remedy where it is missing."""

@@ -65,7 +65,8 @@ def test_shear_example_runs(tmp_path, capsys):
 
 
 def test_closure_example_runs(tmp_path, capsys):
-    assert main(example("closure", capsys)) == 0
+    assert main([*example("closure", capsys), "--format", "svg"]) == 0
+    assert (tmp_path / "out" / "closure.svg").read_text().startswith("<?xml")
     table, summary = read(tmp_path / "out", "closure")
     assert table["F1"].max() == pytest.approx(20e6, rel=1e-9)
     assert table["F1"][-1] == pytest.approx(0.0, abs=0.02)
@@ -148,7 +149,8 @@ def test_options_of_closure(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        ("shear granite --to 2um", "'granite' is neither a preset (biegel-rough"),
+        ("shear granite --to 2um", "'granite' is neither a preset nor an existing TOML file: the"),
+        ("shear westerly-ruogh --to 2um", "did you mean 'westerly-rough'?"),
         ("shear biegel-rough --to 2umm", "--to: '2umm' is not a quantity in m"),
         ("shear biegel-rough --to 2MPa", "--to: '2MPa' is not a quantity in m"),
         ("shear biegel-rough --to 1e400", "--to = inf"),

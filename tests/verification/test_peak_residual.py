@@ -12,7 +12,7 @@ import pytest
 import jointlaw as jl
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-from peak_residual import MEASURED  # noqa: E402
+from peak_residual import MEASURED
 
 
 def law():

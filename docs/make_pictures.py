@@ -1,4 +1,4 @@
-"""Regenerate the pictures of README.md and rock-masses.md: `python docs/make_pictures.py`."""
+"""Regenerate pictures of README.md and rock-masses.md: `python docs/make_pictures.py [NAME ...]`."""
 
 import shutil
 import subprocess
@@ -19,7 +19,8 @@ RUNS = {
 
 if __name__ == "__main__":
     PICTURES.mkdir(exist_ok=True)
-    for name, (command, made) in RUNS.items():
+    for name in sys.argv[1:] or RUNS:
+        command, made = RUNS[name]
         with tempfile.TemporaryDirectory() as folder:
             subprocess.run([sys.executable, "-m", *command.split(), "--out", folder], check=True)
             shutil.copy(Path(folder) / made, PICTURES / name)

@@ -1,4 +1,7 @@
-"""Regenerate pictures of README.md and rock-masses.md: `python docs/make_pictures.py [NAME ...]`."""
+"""Regenerate the pictures of README.md and rock-masses.md.
+
+`python docs/make_pictures.py [NAME ...]`: all of them, or these.
+"""
 
 import shutil
 import subprocess

@@ -81,8 +81,9 @@ def _density(law: jl.JointLaw, u: np.ndarray, phi: np.ndarray) -> np.ndarray:
 
 
 def _reach(law: jl.JointLaw, theta: np.ndarray) -> np.ndarray:
-    """Deepest closure (M, 1) of each orientation on the standard paths, and some more."""
-    deepest: np.ndarray = 1.2 * law.closure_range * (1 + np.tan(theta))
+    """Deepest closure (M, 1) of each orientation on the standard paths, "far" among them."""
+    slope = np.tan(theta)
+    deepest: np.ndarray = law.closure_range * np.maximum(1.2 * (1 + slope), 0.5 + 3.0 * slope)
     return deepest[:, None]
 
 

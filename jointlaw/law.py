@@ -250,7 +250,7 @@ class JointLaw:
 
         return tradeoff(self, resolutions, joints, seconds)
 
-    def at_tolerance(self, tolerance: float) -> JointLaw:
+    def at_tolerance(self, tolerance: float, loss: float | None = None) -> JointLaw:
         """This law at the resolution with the fewest sliders that is this accurate.
 
         tolerance: largest error of the traction on a path, as a share of the path's largest
@@ -258,12 +258,16 @@ class JointLaw:
         random ones within the law's closure range, and under slip to three critical slips, or 30
         closure ranges, where friction is mobilised (`jointlaw.accuracy.suite`); nothing is timed,
         so the answer is the same on every machine. Takes seconds to a minute, below 0.01 minutes,
-        without the compiled kernel more. Raises ValueError where no resolution tried is
-        that accurate.
+        without the compiled kernel more.
+        loss: if given, small cycles keep their damping as well: the work lost in a cycle of shear
+        at constant closure misses the exact one by at most this share, at every amplitude from
+        0.001 to 1 closure range (`jointlaw.accuracy.cycles`). That takes many depth cells: 0.25
+        asks for some hundred times the sliders of "balanced".
+        Raises ValueError where no resolution tried is that accurate.
         """
         from .accuracy.tolerance import at_tolerance
 
-        return at_tolerance(self, tolerance)
+        return at_tolerance(self, tolerance, loss)
 
     # ---------------------------------------------------------------- tables
 

@@ -1,5 +1,6 @@
 """The coarsest law that is accurate enough."""
 
+import math
 from dataclasses import replace
 from itertools import product
 from typing import TypeVar
@@ -7,6 +8,7 @@ from typing import TypeVar
 from ..parameters.resolution import Resolution
 from ..support.checks import above
 from ..support.progress import track
+from .cycles import cycles, exact_cycles
 from .suite import Law, Suite, reference_resolution, scaled, standard_suite
 
 AnyLaw = TypeVar("AnyLaw", bound=Law)
@@ -19,9 +21,12 @@ _PHI = (3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 32, 40, 48)
 _SHARES = (0.5, 0.75, 1.0)  # of the reference, for the directions that are not being tried
 
 
-def at_tolerance(law: AnyLaw, tolerance: float) -> AnyLaw:
+def at_tolerance(law: AnyLaw, tolerance: float, loss: float | None = None) -> AnyLaw:
     """See `JointLaw.at_tolerance`."""
     bound = above("tolerance", tolerance, 0.0) / MARGIN
+    if loss is not None and law.closure_only:
+        raise ValueError(f"loss = {loss!r}: a joint with closure_only does not shear; leave it out")
+    loss = None if loss is None else above("loss", loss, 0.0)
     found, reached = coarsest(law, bound, EXCURSIONS)
     if found is None:
         raise ValueError(
@@ -29,7 +34,41 @@ def at_tolerance(law: AnyLaw, tolerance: float) -> AnyLaw:
             f"{reached:.2g} was reached on the standard paths, where {bound:.2g} "
             "is needed to keep it on others; ask for less, or give a Resolution of your own"
         )
+    if loss is not None:
+        found = _keeping_loss(law, found, loss, bound)
     return replace(law, resolution=found)
+
+
+def _keeping_loss(law: Law, found: Resolution, loss: float, bound: float) -> Resolution:
+    """`found` or, in this order, more facets and more depth cells, until small cycles lose right.
+
+    Half of `loss` is left to the facets, which hardly matter unless asperities are linear. The
+    miss wavers with the depth cells: the first that are good enough are taken.
+    """
+    suite, best = _reference(law, bound, EXCURSIONS)
+    exact, least, at = exact_cycles(law), math.inf, found
+    several = [
+        replace(found, u=u, phi=phi)
+        for u in sorted({found.u, *_U})
+        for phi in sorted({found.phi, *_PHI})
+        if found.u <= u <= max(best.u, found.u) and found.phi <= phi <= max(best.phi, found.phi)
+    ]
+    for facets in track(sorted(several, key=lambda r: (r.sliders, r.u)), "facets", len(several)):
+        if exact_cycles(law, facets).missed(exact)[0].max() <= loss / 2:
+            break
+    while facets.sliders <= _LARGEST * best.sliders:
+        made = replace(law, resolution=facets)
+        miss = float(cycles(made, law.closure_range).missed(exact)[0].max())
+        if miss <= loss and suite.errors(made)[0].max() <= bound:
+            return facets
+        if miss < least:
+            least, at = miss, facets
+        facets = replace(facets, depth=math.ceil(1.2 * facets.depth))
+    raise ValueError(
+        f"loss = {loss:g} cannot be kept together with the tolerance: the best tried is {at}, "
+        f"which misses the loss of a cycle by {least:.2g} of it; ask for less, or give a "
+        "Resolution of your own"
+    )
 
 
 def coarsest(law: Law, bound: float, excursions: int = 0) -> tuple[Resolution | None, float]:

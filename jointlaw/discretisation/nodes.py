@@ -16,6 +16,7 @@ from .virgin_curve import VirginCurve
 _STEEPEST = 10.0  # largest tan(theta) that counts: at a = 1 it grows without bound
 _LOW = 0.15  # power of Phi that draws nodes towards small loads
 _OPEN = 1.8  # shares of the grading left to the last cell: few cells then sit where most loads are
+_MANY = 8  # cells: more of them also reach further, to twice the shear at twice as many
 UNUSED = 1e300  # m: no closure comes so far
 _GRID = 512  # panels on which the touch-depth density is summed
 
@@ -69,9 +70,11 @@ def depth_nodes(
     A cell of width h lumps springs of density Phi'' and by that errs by Phi'' h^2/8 at most: equal
     shares of int sqrt(Phi'') dz make the error of all cells the same. A small power of Phi shifts
     nodes towards small loads. They span the effective closure y = closure + tan(theta) shear, not
-    the closure; the last cell is open-ended.
+    the closure; the last cell is open-ended. It is all there is for what touches beyond, whose
+    error no number of cells before it lowers: so many cells reach to twice the shear.
     """
-    reach = closure_range * (1.0 + np.minimum(slope, _STEEPEST))
+    shear = np.clip(cells.max() / _MANY, 1.0, 2.0)
+    reach = closure_range * (1.0 + shear * np.minimum(slope, _STEEPEST))
     # graded: Phi'' may be singular at touch
     edges = reach.max() * (np.arange(_GRID + 1) / _GRID) ** 4
     middle = 0.5 * (edges[1:] + edges[:-1])

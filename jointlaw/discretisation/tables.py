@@ -1,7 +1,7 @@
 """The tables of a law: everything that a kernel reads, shared by all joints of the law."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,14 +98,9 @@ def tables(
     share = np.zeros_like(facets.depth) if curve.linear else facets.depth
     several = np.maximum(np.rint(cells * share), 1).astype(np.intp)
     depth = depth_nodes(curve, closure_range, slope, several)
-    force, slope = curve.force(np.where(depth < UNUSED, depth, 0.0))
-    force = np.where(depth < UNUSED, force, depth)
-    slope = np.where(depth < UNUSED, slope, depth)
-    slope[:, 0] = 0.0  # a spring that touches at once (eta = 0) belongs to the first cell
-    slope = np.maximum.accumulate(slope, axis=1)  # but for the rounding of the table it rises
     arrays = (
         facets.n, facets.n / c1, facets.s, facets.t, c1,
-        facets.scale(asperity, asperity_density), facets.weight, depth, force, slope,
+        facets.scale(asperity, asperity_density), facets.weight, *_at_limits(curve, depth),
     )  # fmt: skip
     yield_depth = None
     if asperity.yield_interference < math.inf:
@@ -117,6 +112,21 @@ def tables(
         alone if math.isinf(critical_slip) else facets.opposite,
         asperity.mu_residual, asperity.wear_slip,
     )  # fmt: skip
+
+
+def with_depths(k: Tables, depth: Array) -> Tables:
+    """The tables with other cell limits (M, D + 1): from 0, which may repeat, to infinity."""
+    limits, force, slope = frozen(_at_limits(k.curve, depth))
+    return replace(k, depth=limits, depth_force=force, depth_slope=slope)
+
+
+def _at_limits(curve: VirginCurve, depth: Array) -> tuple[Array, Array, Array]:
+    """Cell limits (M, D + 1) with the virgin force and slope there."""
+    force, slope = curve.force(np.where(depth < UNUSED, depth, 0.0))
+    force = np.where(depth < UNUSED, force, depth)
+    slope = np.where(depth < UNUSED, slope, depth)
+    slope[:, 0] = 0.0  # a spring that touches at once (eta = 0) belongs to the first cell
+    return depth, force, np.maximum.accumulate(slope, axis=1)  # it rises, but for rounding
 
 
 def largest_reach(curve: VirginCurve, scale: Array, theta: Array, asperity: Asperity) -> float:

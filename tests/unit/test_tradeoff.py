@@ -32,6 +32,11 @@ def test_each_resolution_has_its_price(found):
         assert (row.rms <= row.error).all()
         assert row.bytes >= 8 * (2 * row.sliders + 4)
         assert np.isnan(row.ns)
+        # coarse cells miss the smallest cycles, and hardly the largest
+        assert row.loss.max() == row.loss[:8].max() > 0.5
+        assert row.loss[-1] < 0.1
+        assert 0.0 < row.secant.max() < 0.5
+        assert 0.0 < row.kept.max() < 1.0
         # each is coarser than the reference by far
         assert row.worst > found.uncertainty.max()
     # more of everything, less error
@@ -47,6 +52,7 @@ def test_the_frontier_falls(found):
     assert frontier[0].sliders == 4
     text = str(found)
     assert "= fast" in text
+    assert "loss error" in text
     assert "nothing was timed" in text
 
 
@@ -59,6 +65,8 @@ def test_csv_holds_every_number(found, tmp_path):
         each = [float(row[f"error {path}"]) for path in found.paths]
         assert each == price.error.tolist()
         assert float(row["error"]) == max(each)
+        assert float(row["loss"]) == price.loss.max()
+        assert float(row["loss 0.01"]) == price.loss[8]
 
 
 def test_picture_has_units(found, tmp_path):
@@ -80,6 +88,8 @@ def test_command_writes_table_law_and_summary(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("jointlaw.accuracy.tradeoff.named", lambda *_: few)
     out = tmp_path / "out"
     arguments = "tradeoff linear-a6 --plane 0 --joints 0 --tolerance 0.05 --out"
+    assert main([*arguments.replace("--tolerance 0.05", "--loss 0.5").split(), str(out)]) == 2
+    assert "--loss = 0.5 goes with --tolerance" in capsys.readouterr().err
     assert main([*arguments.split(), str(out)]) == 0
     summary = json.loads((out / "summary.json").read_text())
     assert summary["at tolerance"]["0.05"] == {"u": 2, "phi": 4, "depth": 1, "sliders": 10}
@@ -87,6 +97,17 @@ def test_command_writes_table_law_and_summary(tmp_path, capsys, monkeypatch):
     assert (out / "tradeoff.csv").read_text().count("\n") == 3
     assert jl.JointLaw.from_toml(out / "law.toml").plane == 0.0
     assert "at_tolerance(0.05)" in capsys.readouterr().out
+
+
+def test_a_joint_that_does_not_shear_has_no_loss():
+    law = jl.JointLaw(
+        orientation=jl.Orientation(6.0),
+        asperity=jl.Asperity(K=2.0e8, lam=1.2, eta=0.5, mu=0.3),
+        asperity_density=1e10,
+        closure_only=True,
+    )
+    (row,) = law.tradeoff(["fast"], joints=0).rows
+    assert np.isnan([*row.loss, *row.secant, *row.kept]).all()
 
 
 def test_bad_arguments_are_named():

@@ -22,7 +22,8 @@ def test_tuned_springs_are_those_of_the_slow_bed():
     rule = (2, 6, 30)
     springs = tuned(one, rule)
     normals, weights = cap_quadrature(3.0, 0.5, 0.1, *rule[:2])
-    reach = 1.2 * (1.0 + np.tan(np.arccos(normals[:, 0])))
+    slope = np.tan(np.arccos(normals[:, 0]))
+    reach = np.maximum(1.2 * (1.0 + slope), 0.5 + 3.0 * slope)
     slow = SlowBed(normals, weights, reach, K=1.0, lam=1.2, eta=0.5, mu=0.4, density=1.0,
                    heights=slow_heights("population"), n_depth=rule[2])  # fmt: skip
     plain = PlainBed(one, springs, 3)
@@ -31,7 +32,7 @@ def test_tuned_springs_are_those_of_the_slow_bed():
         np.testing.assert_allclose(G, np.tile(F[:2, None], 3), rtol=1e-7, atol=1e-9)
 
 
-@pytest.mark.parametrize(("place", "coarse", "fine"), [(even, 0.06, 0.006), (tuned, 0.03, 0.002)])
+@pytest.mark.parametrize(("place", "coarse", "fine"), [(even, 0.06, 0.006), (tuned, 0.04, 0.002)])
 def test_springs_converge_on_the_law(place, coarse, fine):
     one = law(a=3.0, b=0.5, c=0.1, formation="population", plane=0.0)
     suite = standard_suite(one)
@@ -41,8 +42,4 @@ def test_springs_converge_on_the_law(place, coarse, fine):
         F = np.stack([bed.update(step.T).T for step in suite.d])
         found.append(errors(F, suite.F)[0])
     assert found[0].max() < coarse
-    # Beyond the closure range the law has no depth cells of its own: on "far" the reference itself
-    # is 0.7 % from the springs and from a law whose closure range is four times as long.
-    far = suite.names.index("far")
-    assert np.delete(found[1], far).max() < fine
-    assert found[1][far] < 1e-2
+    assert found[1].max() < fine

@@ -36,21 +36,33 @@ def test_reference_of_the_suite_agrees_with_the_slow_bed():
     suite = standard_suite(law)
     n, w = cap_quadrature(4.0, 0.5, 0.1, 6, 16)
     F = np.zeros_like(suite.F)
-    near = [
-        i for i in range(F.shape[1]) if suite.names[i] != "far"
-    ]  # 30 R: too wide for 120 springs
-    for i in near:
+    moved = range(F.shape[1])  # the others hold a stress
+    for i in moved:
         path = np.cumsum(suite.d[:, i], axis=0)
         bed = SlowBed(n, w, reach_of(path, n), K=1.0, lam=1.2, eta=0.5, mu=0.5, density=1.0,
                       n_depth=120)  # fmt: skip
         F[:, i] = [bed.update(d) for d in suite.d[:, i]]
     # the bed's own orientations (0.12 % here) and springs, and the reference's uncertainty
-    assert errors(F, suite.F)[0][near].max() < 2.5e-3
-    assert suite.uncertainty[near].max() < 5e-4
+    assert errors(F, suite.F)[0].max() < 2.5e-3
+    assert suite.uncertainty[moved].max() < 5e-4
     # and the paths do what they say: the normal stress is kept while sheared
     held = [i for i, name in enumerate(suite.names) if name.startswith(("shear", "reversal"))]
     stress = float(law.normal_stress(1.0)) / 2
     np.testing.assert_allclose(suite.F[15:, held, 0], stress, rtol=2e-2)
+
+
+def test_depth_cells_converge_beyond_the_closure_range():
+    """Cells that end with the range leave an error that no number of them takes away."""
+    law = replace(jl.presets.load("biegel-rough"), plane=0.0)
+    suite = standard_suite(law)
+    far = suite.d[:, [suite.names.index("far")]]
+    found = [
+        tractions(replace(law, resolution=jl.Resolution(8, 7, depth)), far)
+        for depth in (16, 32, 128)
+    ]
+    coarse, fine = (errors(F, found[-1])[0][0] for F in found[:2])
+    assert fine < 6e-4
+    assert coarse > 2.8 * fine  # second order: 4; it is 2 where the cells end with the range
 
 
 @pytest.mark.parametrize("seed", range(4))

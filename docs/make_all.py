@@ -17,6 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import make_accuracy
+import make_pictures
 from _pages import HERE, fill
 
 ROOT = HERE.parent
@@ -25,7 +26,7 @@ LAST = ("ingredients",)  # of what other tasks write
 ACCURACY = (*make_accuracy.SCENES, *make_accuracy.PARTS)
 EXTREMES = ("matrix", "fuzz", "drift", "dynamics", "impact", "exact", "control", "steps",
             "forgetting")  # fmt: skip
-PICTURES = "tilt.png", "shear.png", "strength.png"
+PICTURES = tuple(make_pictures.RUNS)
 PRINTED = {
     "intervals": ("measurements.md", "benchmarks/intervals.py --draws 50 --workers 1"),
     "held-out": ("measurements.md", "benchmarks/held_out.py --draws 20 --workers 1"),

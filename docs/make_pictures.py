@@ -1,13 +1,12 @@
-"""Regenerate the pictures of README.md and rock-masses.md.
-
-`python docs/make_pictures.py [NAME ...]`: all of them, or these.
-"""
+"""Regenerate the pictures of the pages: `python docs/make_pictures.py`, or some by their names."""
 
 import shutil
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+import jointlaw as jl
 
 PICTURES = Path(__file__).parent / "pictures"
 RUNS = {
@@ -17,7 +16,12 @@ RUNS = {
         "shear.png",
     ),
     "tilt.png": ("dem_demo tilt", "final.png"),
+    "slope.png": ("dem_demo slope", "final.png"),
+    "shear-box.png": ("dem_demo shear-box", "curves.png"),
     "strength.png": ("dem_demo strength-reduction slope", "failing-rough.png"),
+    "fit.png": ("jointlaw fit grimsel_vd1_closure --up-to 5.3MPa", "fit.png"),
+    "axes.png": ("jointlaw figures 4", "figure-04-06.png"),
+    "table.png": ("jointlaw export yade jing-replica", "joint.npz"),
 }
 
 if __name__ == "__main__":
@@ -26,4 +30,7 @@ if __name__ == "__main__":
         command, made = RUNS[name]
         with tempfile.TemporaryDirectory() as folder:
             subprocess.run([sys.executable, "-m", *command.split(), "--out", folder], check=True)
-            shutil.copy(Path(folder) / made, PICTURES / name)
+            if made == "joint.npz":
+                jl.load_table(Path(folder) / made).plot(PICTURES / name)
+            else:
+                shutil.copy(Path(folder) / made, PICTURES / name)

@@ -90,6 +90,12 @@ def frame(record: Record, i: int, scale: Scale, dpi: int) -> Figure:
     return figure
 
 
+def final(record: Record, path: Path) -> None:
+    """The last frame."""
+    last = len(record.times) - 1
+    frame(record, last, Scale(record, [0, last]), 130).savefig(path)
+
+
 def report(record: Record, path: Path) -> None:
     """Before and after, displacement vectors, kinetic energy and displacement in time."""
     last = len(record.times) - 1
@@ -125,8 +131,10 @@ def _histories(energy_axes, moved_axes, record: Record) -> None:
         total, largest = energy[:, rock.free].sum(axis=1), moved[:, rock.free].max(axis=1)
         energy_axes.semilogy(times, np.maximum(total, LEAST), **style)
         moved_axes.semilogy(times, np.maximum(largest, LEAST), **style)
-    energy_axes.set_ylabel("kinetic energy (J)\n(1 nJ and less: at 1 nJ)")
-    moved_axes.set_ylabel("largest displacement since step 0 (m)\n(1 nm and less: at 1 nm)")
+    energy_axes.set_ylabel("kinetic energy (J)")
+    energy_axes.set_title("1 nJ and less drawn at 1 nJ", fontsize=8)
+    moved_axes.set_ylabel("largest displacement\nsince step 0 (m)")
+    moved_axes.set_title("1 nm and less drawn at 1 nm", fontsize=8)
     for axes in (energy_axes, moved_axes):
         axes.set_xlabel("time (s)")
         axes.grid(alpha=0.3)

@@ -153,6 +153,7 @@ def _pictures(
         drawn["curves"] = partial(curves.tilt, record, slips=summary["slip"])
     if record.scene.rocks:
         drawn["report"], frame = partial(rock_report.report, record), rock_report.frame
+        drawn["final"] = partial(rock_report.final, record)
     else:
         drawn["final"], frame = partial(frames.final, record, slips=summary["slip"]), frames.frame
     named = {f"{name}.{picture_format}": draw for name, draw in drawn.items()}

@@ -1,6 +1,7 @@
 """The commands, as a newcomer types them."""
 
 import json
+from pathlib import Path
 import re
 import shlex
 import subprocess
@@ -225,6 +226,8 @@ def test_version(capsys):
         main(["--version"])
     assert stop.value.code == 0
     assert jl.__version__ in capsys.readouterr().out
+    citation = Path(__file__).parents[2] / "CITATION.cff"
+    assert f"\nversion: {jl.__version__}\n" in citation.read_text()
 
 
 def test_without_matplotlib_the_numbers_are_written(tmp_path, monkeypatch, capsys):

@@ -1,11 +1,11 @@
 """The commands, as a newcomer types them."""
 
 import json
-from pathlib import Path
 import re
 import shlex
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest

@@ -19,6 +19,7 @@ from functools import partial
 import numpy as np
 
 import jointlaw as jl
+from jointlaw.parameters.resolution import SLIP
 from jointlaw.support.progress import track
 
 NOISE = 0.01
@@ -30,7 +31,7 @@ NORMAL = 5e6  # Pa
 
 
 def law(**change: float) -> jl.JointLaw:
-    """The law of these parameters, with the depth cells of the truth."""
+    """The law of these parameters, with the nodes of fits."""
     v = TRUTH | change
     return jl.JointLaw(
         orientation=jl.Orientation(v["a"], v["b"], v["c"]),
@@ -38,6 +39,7 @@ def law(**change: float) -> jl.JointLaw:
         heights=jl.GammaHeights(ALPHA, v["beta"], 0.0, "individual"),
         asperity_density=v["asperity_density"],
         closure_range=1.5e-4,
+        resolution=SLIP,
     )
 
 

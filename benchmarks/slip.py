@@ -46,14 +46,15 @@ def misses(law: jl.JointLaw) -> np.ndarray:
     """Degrees (tried, ratios, 4): friction there and back, median of friction there, dilation."""
     R = law.closure_range
     stress = float(law.normal_stress(R)) / 2
-    shares, found = (1.0, 2e6 / stress), np.empty((len(TRIED), len(RATIOS), 4))
+    ways = np.array([(1.0, 0.0, 1.0), (2e6 / stress, 0.0, 1.0)])
+    found = np.empty((len(TRIED), len(RATIOS), 4))
     for j, ratio in enumerate(RATIOS):
         own = replace(law, critical_slip=ratio * R)
-        truth = slip(replace(own, resolution=BEST), R, stress, shares)
-        there = truth.counts & (np.arange(2 * LEG) < LEG)
+        truth = slip(replace(own, resolution=BEST), R, stress, ways)
+        there = truth.counts & (np.arange(2 * LEG) < LEG)[:, None]
         back = truth.counts & ~there
         for i, name in enumerate(TRIED):
-            mine = slip(replace(own, resolution=name), R, stress, shares)
+            mine = slip(replace(own, resolution=name), R, stress, ways)
             friction = np.abs(mine.friction - truth.friction)
             dilation = np.abs(mine.dilation - truth.dilation)[there]
             found[i, j] = (friction[there].max(), friction[back].max(),

@@ -127,11 +127,12 @@ def main() -> int:
         return 1
     result = json.loads(lines[-1][len("RESULT ") :])
     result["resolution"] = str(law.resolution)
-    print(f"{'ns per contact and step':26s} {'loop':>8s} {'adapter':>8s} {'of it law':>10s}")
+    print("| | whole law and geometry in YADE | added by the adapter | of it the law |")
+    print("|---|---:|---:|---:|")
     for name, row in result.items():
         if isinstance(row, dict):
             cells = [f"{row[k]:.0f}" if k in row else "" for k in ("loop", "adapter", "law")]
-            print(f"{name:26s} {cells[0]:>8s} {cells[1]:>8s} {cells[2]:>10s}")
+            print(f"| {name} | {' | '.join(cells)} |")
     print(json.dumps(result))
     return 0
 

@@ -53,6 +53,8 @@ OPTIONS = {  # the first word is what a user types
     "--force": {"action": "store_true", "help": "replace another run in that folder"},
     "--out of numbers": {"type": Path, "help": "a JSON file for the numbers"},
     "--until": {"type": float, "help": "model time to stop at (s)"},
+    "--leave-out": {"nargs": "+", "default": [], "metavar": "NAME",
+                    "help": "variants not to run, as \"resolution reference\""},
     "--step": {"type": float, "help": "another time step (s)"},
     "--no-pictures": {"action": "store_true", "help": "tables only"},
     "--format": {"choices": FORMATS, "default": FORMATS[0], "help": "of pictures (default png)"},
@@ -113,7 +115,7 @@ def _ablate(given: argparse.Namespace) -> None:
     given.out.mkdir(parents=True, exist_ok=True)  # a folder that cannot be is known before the work
     seconds = _seconds(_seated(given.scene), given.until)
     print(f"about {VARIANTS} runs, each of about {_duration(seconds)}", flush=True)
-    rows = ablate.ablate(load(given.scene), given.until)
+    rows = ablate.ablate(load(given.scene), given.until, given.leave_out)
     ablate.write(rows, given.out)
     print(ablate.table(rows))
     print(f"results in {given.out}: ablation.csv, ablation.md, summary.json")
@@ -277,6 +279,7 @@ COMMANDS = {  # what each does, and for its help: about, example, OPTIONS
         "Run a scene without each of its ingredients in turn: what it changes in the outcome "
         "(differences against the whole scene) and in the time (ratios).",
         "ablate shear-box --out out/ablation", "scene", "--out", "--force", "--until",
+        "--leave-out",
     ),
     "check": (
         _check,

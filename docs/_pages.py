@@ -1,6 +1,7 @@
 """Tables in the pages, the places where they go, and the CSV files in docs/data behind them."""
 
 import csv
+import fcntl
 from pathlib import Path
 
 HERE = Path(__file__).parent
@@ -20,8 +21,10 @@ def read(page, key):
 
 def fill(page, key, text):
     """Put text between the marks `key` and `end of key` of the page."""
-    before, _, after = _parts(page, key)
-    (HERE / page).write_text(before + text.rstrip() + "\n" + after, encoding="utf-8")
+    with (HERE / page).open() as stream:
+        fcntl.flock(stream, fcntl.LOCK_EX)  # others may fill other places
+        before, _, after = _parts(page, key)
+        (HERE / page).write_text(before + text.rstrip() + "\n" + after, encoding="utf-8")
 
 
 def has(page, key):

@@ -1,6 +1,7 @@
 """Run a scene with each ingredient removed in turn: what it changes, and what it costs."""
 
 import time
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -36,9 +37,10 @@ class Row:
     note: str = ""
 
 
-def ablate(scene: Scene, until: float | None = None) -> list[Row]:
+def ablate(scene: Scene, until: float | None = None, leave_out: Collection[str] = ()) -> list[Row]:
     """The scene as it is, without each ingredient in turn, and as it is once more.
 
+    until: model time to stop at (s); leave_out: names of variants that are not run.
     Two rows of the whole scene, the first and the last, tell how steady the times are. A variant
     that cannot be built or run is a row whose note says why.
     """
@@ -48,7 +50,7 @@ def ablate(scene: Scene, until: float | None = None) -> list[Row]:
     base, record = _run(replace(scene, title="whole scene"), "whole scene", until)
     if record is None:
         raise Refused(base.note)
-    todo = list(variants(scene, working_stress(record)))
+    todo = [v for v in variants(scene, working_stress(record)) if v.name not in leave_out]
     rows = [base]
     for i, variant in enumerate(todo):
         rows.append(_without(variant, record, until, f"{i + 1}/{len(todo)}"))

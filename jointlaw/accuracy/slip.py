@@ -8,10 +8,10 @@ displacement would compare their dilation, summed up over the slip, and not thei
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..joints.batch import JointBatch, Law
 from ..support.checks import Array
@@ -29,14 +29,21 @@ _TRIES = 60
 class Slip(NamedTuple):
     """F (steps, paths, dim) in Pa, and friction and dilation angle (steps, paths) in degrees.
 
-    `counts` (steps,): whether friction is mobilised: beyond 0.2 critical slips, and on the way back
-    beyond its first fifth and two closure ranges, within which sliders still turn.
+    `counts` (steps, paths): whether friction is mobilised: beyond 0.2 critical slips, and on the
+    way back beyond its first fifth and two closure ranges, within which sliders still turn.
     """
 
     F: Array
     friction: Array
     dilation: Array
-    counts: Array
+    counts: NDArray[np.bool_]
+
+    def errors(self, other: Slip) -> tuple[Array, Array]:
+        """Largest and rms |F - other F| (paths,) over the path's largest, where friction counts."""
+        peak = np.linalg.norm(other.F, axis=2).max(axis=0, where=other.counts, initial=0.0)
+        off = np.linalg.norm(self.F - other.F, axis=2)
+        mean = np.mean(off**2, axis=0, where=other.counts)
+        return off.max(axis=0, where=other.counts, initial=0.0) / peak, np.sqrt(mean) / peak
 
     def apart(self, other: Slip) -> tuple[float, float]:
         """Largest difference of the friction and of the dilation angle, in degrees."""
@@ -52,41 +59,53 @@ def distance(critical_slip: float, closure_range: float) -> float:
     return _ENDLESS * closure_range
 
 
-def slip(law: Law, closure_range: float, stress: float, shares: Sequence[float] = SHARES) -> Slip:
-    """Shear at `shares` of the normal stress S/2 (Pa), in space along each of DIRECTIONS."""
+def standard_ways(dim: int) -> Array:
+    """Ways (paths, 3) to slip: share of the stress S/2, azimuth in degrees, share of `distance`."""
+    azimuths = DIRECTIONS if dim == 3 else DIRECTIONS[:1]
+    return np.array([(share, azimuth, 1.0) for share in SHARES for azimuth in azimuths])
+
+
+def random_ways(rng: np.random.Generator, count: int, dim: int) -> Array:
+    """As `standard_ways`, anywhere: at stresses from a twentieth of S/2 on."""
+    share, azimuth = rng.uniform(0.05, 1.0, count), rng.uniform(0.0, 360.0, count)
+    return np.column_stack([share, azimuth * (dim == 3), rng.uniform(0.3, 1.0, count)])
+
+
+def slip(law: Law, closure_range: float, stress: float, ways: Array) -> Slip:
+    """Shear there and back along `ways` (paths, 3), of which the stress S/2 is in Pa."""
+    share, azimuth, length = ways.T
     dim, R, Dc = law.tables.dim, closure_range, law.tables.critical_slip
     unit, far = Dc if math.isfinite(Dc) else 10 * R, distance(Dc, R)
-    places = np.geomspace(_FIRST * min(R, far), far, LEG)
-    leg = np.diff(places, prepend=0.0)
-    turn = np.radians(DIRECTIONS if dim == 3 else DIRECTIONS[:1])
+    places = np.geomspace(_FIRST * min(R, far), far, LEG)[:, None] * length
+    leg = np.diff(places, axis=0, prepend=0.0)
+    turn = np.radians(azimuth)
     along = np.stack([np.cos(turn), np.sin(turn)], axis=-1)[:, : dim - 1]
-    along = np.tile(along, (len(shares), 1))
-    goal = stress * np.repeat(shares, len(turn))
+    goal = stress * share
     batch = law.joints(len(goal), ledger=False)
     seat = np.zeros((len(goal), dim))
     seat[:, 0] = law.closure(goal)
     batch.update(seat, tangent=False)
     F = np.empty((2 * LEG, len(goal), dim))
     rise, rate = np.empty(F.shape[:2]), np.zeros(len(goal))
-    for k, length in enumerate(np.concatenate([leg, -leg])):
-        step = np.column_stack([rate * length, length * along])
-        step[:, 0] = _held(batch, step, goal, abs(length) + R)
+    for k, steps in enumerate(np.concatenate([leg, -leg])):
+        step = np.column_stack([rate * steps, steps[:, None] * along])
+        step[:, 0] = _held(batch, step, goal, np.abs(steps) + R)
         batch.update(step, tangent=False, out=(F[k], None))
-        rate = step[:, 0] / length
-        rise[k] = -step[:, 0] / abs(length)
+        rate = step[:, 0] / steps
+        rise[k] = -step[:, 0] / np.abs(steps)
     sense = np.repeat([1.0, -1.0], LEG)[:, None]
     shear = sense * np.sum(F[:, :, 1:] * along, axis=2)
-    counts = np.concatenate([places >= MOBILISED * unit, places >= max(MOBILISED * far, 2 * R)])
+    turned = places >= np.maximum(MOBILISED * far * length, 2 * R)
+    counts = np.concatenate([places >= MOBILISED * unit, turned])
     return Slip(F, np.degrees(np.arctan2(shear, F[:, :, 0])), np.degrees(np.arctan(rise)), counts)
 
 
 def names(dim: int) -> tuple[str, ...]:
     """What the paths are called."""
-    ways = DIRECTIONS if dim == 3 else DIRECTIONS[:1]
-    return tuple(f"slip {way:g} at {share:g}" for share in SHARES for way in ways)
+    return tuple(f"slip {way:g} at {share:g}" for share, way, _ in standard_ways(dim))
 
 
-def _held(batch: JointBatch, step: Array, goal: Array, reach: float) -> Array:
+def _held(batch: JointBatch, step: Array, goal: Array, reach: Array) -> Array:
     """Closure increments (n,) that give the normal stresses `goal`: Newton within a bracket."""
     step, u = step.copy(), step[:, 0].copy()
     low, high = np.full_like(u, -np.inf), np.full_like(u, np.inf)

@@ -14,10 +14,12 @@ With R the law's closure range and S the normal stress there, the paths are
                        count where friction is mobilised (`Slip.counts`)
 
 Excursions are random: four to ten legs between corners with closures from -0.3 R to R (one of them
-at a stress of S/2 to S) and shears up to R, every second one rounded. They are drawn once and for
-all, so that they too are the same for every resolution. A law without critical slip takes 30 R for
-three of them. At a given closure a longer slip would end at many times the stress S; at a given
-stress a law that jams, atan(mu) + 90 deg/a above 88 degrees, has no end, and leaves `slip` out.
+at a stress of S/2 to S) and shears up to R, every second one rounded. One of eight slips as `far`
+does, at another closure, and one of sixteen as `slip` does, along other ways. They are drawn once
+and for all, so that they too are the same for every resolution. A law without critical slip takes
+30 R for three of them. At a given closure a longer slip would end at many times the stress S; at a
+given stress a law that jams, atan(mu) + 90 deg/a above 88 degrees, has no end, and leaves `slip`
+out.
 
 Along 0, 45 and 90 degrees the rings of azimuths look alike; the other directions lie between, where
 a ring of few azimuths errs most. A law with a plane takes the paths along azimuth 0 and the others
@@ -41,10 +43,10 @@ from ..parameters.orientation import Orientation
 from ..parameters.resolution import Resolution
 from ..support.checks import Array
 from ..support.progress import track
-from .slip import Slip, distance, names, slip
+from .slip import Slip, distance, names, random_ways, slip, standard_ways
 
 STEPS = 120  # of each path
-_FAR = 3.0  # R: the longest slip at a given closure
+FAR = 3.0  # R: the longest slip at a given closure
 _JAMS = 88.0  # degrees: the steepest friction angle of a law that slips at a given stress
 
 
@@ -107,6 +109,7 @@ class Suite:
     d: Array
     F: Array
     slip: Slip | None
+    ways: Array  # of `slip`
     stress: float  # Pa, S/2
     uncertainty: Array  # (paths,) of F: its difference from two thirds of the nodes
 
@@ -115,9 +118,8 @@ class Suite:
         largest, rms = errors(tractions(law, self.d), self.F)
         if self.slip is None:
             return Miss(largest, rms, math.nan, math.nan)
-        mine = slip(law, law.closure_range, self.stress)
-        counts = self.slip.counts  # right after the turn, shear stress turns within a short way
-        more = errors(mine.F[counts], self.slip.F[counts])
+        mine = slip(law, law.closure_range, self.stress, self.ways)
+        more = mine.errors(self.slip)
         largest, rms = np.append(largest, more[0]), np.append(rms, more[1])
         return Miss(largest, rms, *mine.apart(self.slip))
 
@@ -148,10 +150,13 @@ def _suite(law: Law, excursions: int) -> Suite:
     d = np.diff(goal, axis=0, prepend=0.0)
     d = _hold_stress(replace(law, resolution=scaled(best, 1 / 2)), d, held, stress)
     F = tractions(replace(law), d)  # a copy: the cache keeps this law, and would its working space
-    slid = None
+    slid, ways = None, standard_ways(law.tables.dim)
     if not law.closure_only and steepest(law) < _JAMS:
-        slid, called = slip(law, law.closure_range, stress), called + names(law.tables.dim)
-    suite = Suite(called, d, F, slid, stress, np.zeros(len(called)))
+        more = random_ways(np.random.default_rng(18), excursions // 16, law.tables.dim)
+        called += names(law.tables.dim) + tuple(f"slip {i + 1}" for i in range(len(more)))
+        ways = np.concatenate([ways, more])
+        slid = slip(law, law.closure_range, stress, ways)
+    suite = Suite(called, d, F, slid, ways, stress, np.zeros(len(called)))
     check = suite.miss(replace(law, resolution=scaled(best, 2 / 3))).largest
     return replace(suite, uncertainty=check)
 
@@ -199,7 +204,7 @@ def _paths(law: Law, stress: float) -> tuple[tuple[str, ...], Array, Array]:
     shear = legs([0, 0.1, 1], [0, seat, seat], [0, 0, 1])
     back = legs([0, 0.1, 0.35, 0.75, 1], [0, *4 * [seat]], [0, 0, 0.6, -0.6, 0])
     fixed = legs([0, 0.2, 1], [0, 1, 1], [0, 0, 1])
-    sheared = min(distance(law.tables.critical_slip, R) / R, _FAR)
+    sheared = min(distance(law.tables.critical_slip, R) / R, FAR)
     far = legs([0, 0.1, 0.55, 1], [0, 0.5, 0.5, 0.5], [0, 0, sheared, 0])
     again = legs([0, 0.15, 0.35, 0.6, 0.7, 1], [0, 0.7, 0.7, -0.6, -0.6, 0.8],
                  [0, 0, 0.4, 0.7, 0.2, 0.5])  # fmt: skip
@@ -239,8 +244,11 @@ def _paths(law: Law, stress: float) -> tuple[tuple[str, ...], Array, Array]:
 def _excursions(law: Law, stress: float, count: int) -> Array:
     """Random places (steps, count, dim) in m."""
     rng, R, s = np.random.default_rng(8), law.closure_range, np.arange(1, STEPS + 1) / STEPS
-    goal = []
+    goal, farthest = [], min(distance(law.tables.critical_slip, R) / R, FAR)
     for i in range(count):
+        if i % 8 == 7:
+            goal.append(far_path(rng, farthest, s))
+            continue
         legs = int(rng.integers(4, 11))
         closure = np.append(0.0, rng.uniform(-0.3, 1.0, legs))
         highest = float(law.closure(stress * rng.uniform(1.0, 2.0))) / R
@@ -253,6 +261,16 @@ def _excursions(law: Law, stress: float, count: int) -> Array:
         straight = np.stack([np.interp(s, at, x) for x in corners.T], axis=-1)
         goal.append(rounded if i % 2 else straight)
     return R * np.stack(goal, axis=1)[:, :, : law.tables.dim]
+
+
+def far_path(rng: np.random.Generator, farthest: float, s: Array) -> Array:
+    """Random places (steps, 3) in closure ranges: slip at one closure, back, and forth again."""
+    closure, way = rng.uniform(0.1, 0.7), farthest * rng.uniform(0.3, 1.0)
+    back, turn = way * rng.uniform(-1.0, 0.5), rng.uniform(0.0, 2.0 * np.pi)
+    at = [0.0, 0.1, 0.4, 0.8, 1.0]
+    shear = np.interp(s, at, [0.0, 0.0, way, back, way])
+    shut = np.interp(s, at, [0.0, *4 * [closure]])
+    return np.stack([shut, np.cos(turn) * shear, np.sin(turn) * shear], axis=-1)
 
 
 def _hold_stress(law: Law, d: Array, held: Array, stress: float) -> Array:

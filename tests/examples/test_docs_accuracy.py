@@ -38,6 +38,14 @@ def test_each_part_has_its_place_and_each_place_its_part(made):
     assert sorted(marks) == sorted(made.PARTS)
 
 
+def test_each_printed_table_has_its_place(made):
+    import make_all
+
+    for key, (page, _) in (make_all.PRINTED | make_all.PRINTED_TIMES).items():
+        assert made.has(page, key)
+    assert set(make_all.TIMES) | set(make_all.LAST) < set(make_all.ACCURACY)
+
+
 def test_all_shipped_scenes_are_ablated(made):
     assert set(made.SCENES) == {name for name in names() if not name.endswith("-full")}
 

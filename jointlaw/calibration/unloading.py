@@ -58,8 +58,8 @@ class Loop:
             f"of the work of loading; {1e6 * self.open_closure:.1f} um of closure remain at "
             f"{self.stress / 1e6:.3g} MPa. {what} {100 * self.friction:.2g} %; by the law "
             f"{1e6 * self.law_closure:.2f} um remain. Of friction coefficients from "
-            f"{_FRICTIONS[0]} to {_FRICTIONS[-1]}, {self.worst_mu:g} loses most at these inclinations, "
-            f"{100 * self.largest_friction:.1f} %. {rest} Use the fitted law for loading, and for "
+            f"{_FRICTIONS[0]} to {_FRICTIONS[-1]}, {self.worst_mu:g} loses most at these "
+            f"inclinations, {100 * self.largest_friction:.1f} %. {rest} Use the fitted law for loading, and for "
             "small cycles below the largest stress with care."
         )
 

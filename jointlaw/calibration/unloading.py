@@ -59,8 +59,8 @@ class Loop:
             f"{self.stress / 1e6:.3g} MPa. {what} {100 * self.friction:.2g} %; by the law "
             f"{1e6 * self.law_closure:.2f} um remain. Of friction coefficients from "
             f"{_FRICTIONS[0]} to {_FRICTIONS[-1]}, {self.worst_mu:g} loses most at these "
-            f"inclinations, {100 * self.largest_friction:.1f} %. {rest} Use the fitted law for loading, and for "
-            "small cycles below the largest stress with care."
+            f"inclinations, {100 * self.largest_friction:.1f} %. {rest} Use the "
+            "fitted law for loading, and for small cycles below the largest stress with care."
         )
 
 

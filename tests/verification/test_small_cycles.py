@@ -103,6 +103,7 @@ def test_cells_as_thin_as_the_cycle_keep_its_loss():
 
 
 def test_loss_is_kept_at_amplitudes_between(monkeypatch):
+    monkeypatch.setattr("jointlaw.accuracy.tolerance.EXCURSIONS", 4)  # for the time it takes
     one = law(a=6.0, b=0.0, c=0.0, plane=0.0, resolution="balanced")
     made = one.at_tolerance(0.05, loss=0.25)
     assert made.tables.sliders > 10 * one.tables.sliders
@@ -115,6 +116,7 @@ def test_loss_is_kept_at_amplitudes_between(monkeypatch):
 
 
 def test_a_loss_that_cannot_be_kept_is_refused_with_the_best(monkeypatch):
+    monkeypatch.setattr("jointlaw.accuracy.tolerance.EXCURSIONS", 4)
     monkeypatch.setattr("jointlaw.accuracy.tolerance._LARGEST", 1)
     with pytest.raises(ValueError, match=r"loss = 0\.04 cannot .* Resolution\(u=.*by 0\.\d"):
         law(a=6.0, b=0.0, c=0.0, plane=0.0).at_tolerance(0.05, loss=0.04)

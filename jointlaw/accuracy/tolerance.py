@@ -54,6 +54,9 @@ def _keeping_loss(law: Law, found: Resolution, loss: float, bound: float) -> Res
         if found.u <= u <= max(best.u, found.u) and found.phi <= phi <= max(best.phi, found.phi)
     ]
     for facets in track(sorted(several, key=lambda r: (r.sliders, r.u)), "facets", len(several)):
+        deep = replace(law, resolution=replace(facets, depth=max(best.depth, found.depth)))
+        if suite.errors(deep)[0].max() > bound:  # few cells may have made up for few facets
+            continue
         if exact_cycles(law, facets).missed(exact)[0].max() <= loss / 2:
             break
     while facets.sliders <= _LARGEST * best.sliders:

@@ -152,18 +152,20 @@ def text_of(scene: Scene) -> str:
 def fingerprint(scene: Scene) -> str:
     """Hash of what the motion depends on, but not when a run ends, records, or at which step.
 
-    Keys of [run] at their defaults are left out, so that a key that is added later leaves the
-    hashes of scenes without it as they were.
+    Keys of [run] at their defaults are left out, and order and period of drives that have none, so
+    that what is added later leaves the hashes of scenes without it as they were.
     """
     run = asdict(replace(scene.run, end=0.0, record=Run.record, fraction=Run.fraction, step=None))
     given = {key: value for key, value in run.items() if value != getattr(Run, key, None)}
+    drives = [asdict(drive) for drive in scene.drives]
+    drives = [{k: v for k, v in d.items() if v or k not in ("order", "period")} for d in drives]
     pairs = sorted((sorted(blocks), law) for blocks, law in scene.pairs.items())
     whole = [
         [block.__dict__ | {"corners": block.corners.tolist()} for block in scene.blocks],
         # the parameters alone: another discretisation is refused with its own remedy
         {name: law.fingerprint.rpartition(":")[2] for name, law in scene.laws.items()},
         scene.default_law, pairs, sorted(scene.edge_laws.items()), given,
-        [asdict(drive) for drive in scene.drives], [float(g) for g in scene.gravity],
+        drives, [float(g) for g in scene.gravity],
         float(scene.thickness),
     ]  # fmt: skip
     return hashlib.sha256(json.dumps(whole).encode()).hexdigest()

@@ -86,7 +86,7 @@ def _transferred(
 
     Lengths match wherever an edge that lies on another, or a corner that stands on an edge, goes
     on to the same. Else a joint that became shorter drops what it stored on the rest. One that
-    became longer would make energy: it starts anew instead, at a closure at which it holds what
+    became longer would create energy: it starts anew instead, at a closure at which it holds what
     the shorter one held; the rest of the depth becomes its closure offset.
     """
     stored = joints.now["stored"]

@@ -56,6 +56,21 @@ def outcomes(record: Record) -> list[dict]:
     return out
 
 
+def slip_per_cycle(record: Record) -> dict[str, list[float]]:
+    """Slip (m) of each watched joint in each whole cycle of the sine that shakes the scene.
+
+    By the name of the moving block; empty without a sine. Between frames slip is interpolated.
+    """
+    period = next((drive.period for drive in record.scene.drives if drive.period), None)
+    if period is None:
+        return {}
+    t, watched = np.array(record.times), record.scene.monitors
+    ends = period * np.arange(np.ceil(t[0] / period), np.floor(t[-1] / period) + 1)
+    names = [record.scene.blocks[moving].name for moving, _ in (*watched.slip, *watched.shear)]
+    slid = {name: np.interp(ends, t, record.column(f"{name}: slid_m")) for name in names}
+    return {name: np.diff(there).tolist() for name, there in slid.items()}
+
+
 def sentence(entry: dict) -> str:
     """One line for a person."""
     start = f"{entry['rock']}: {entry['state']}; "

@@ -20,7 +20,7 @@ from ..errors import Refused
 from . import curves, frames, rock_report
 from .interrupt import interruptible
 from .monitors import LOOKS
-from .outcome import outcomes
+from .outcome import outcomes, slip_per_cycle
 from .record import Record
 
 MOST_STEPS = 1e12  # of a run: years
@@ -74,6 +74,7 @@ def run(
         "energy_error": now.ledger.error,
         "largest_energy_error": record.largest_error,
         "slip": record.slips.report(),
+        "slip_per_cycle_m": slip_per_cycle(record),
         "rocks": outcomes(record),
         "wall_time_s": wall,
         "interrupted": interrupted,

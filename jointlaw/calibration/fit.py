@@ -265,14 +265,14 @@ def _curve(fit: Fit, seating: float, curve: ClosureCurve, number: int) -> list[s
         of = "the largest stress" if curve.cycle else "the stress"
         lines += [
             "",
-            f"**This curve does not bend as the law does**: neighbouring points miss it together, "
-            f"by {100 * fit.wander[number - 1]:.2g} % of {of}. Between the points use it with that "
-            "error; beyond them trust neither the curve nor its band: a hyperbola (mated joints) "
-            "or a logarithm (unmated ones) may follow the loading of this rock better.",
+            "**This curve does not bend as the law does**: neighbouring points deviate to the same "
+            f"side, by {100 * fit.wander[number - 1]:.2g} % of {of}. Between the points use it "
+            "with this error; beyond them use neither the curve nor its band. A hyperbola (mated "
+            "joints) or a logarithm (unmated ones) may follow the loading of this rock better.",
         ]
     if curve.compliance != 0.0:
         return [*lines, "", "The compliance of rock and machine that was given is subtracted."]
-    missing = "if the closure was measured across rock too, the law holds its strain as well."
+    missing = "if the closure was measured across rock too, the law includes its strain."
     return [*lines, "", f"No compliance of rock and machine was given: {missing}"]
 
 

@@ -254,7 +254,7 @@ def subtract_compliance(
     taken, total = strain[top] - strain[first], closure[top] - closure[first]
     if np.any(strain) and taken >= total:
         raise ValueError(
-            f"compliance takes {taken:g} m between {stress[first]:g} and {stress[top]:g} Pa, the "
+            f"compliance gives {taken:g} m between {stress[first]:g} and {stress[top]:g} Pa, the "
             f"whole closure is {total:g} m: nothing is left for the joint; check its unit, m/Pa"
         )
     return closure - strain

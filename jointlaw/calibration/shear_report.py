@@ -65,15 +65,15 @@ def describe(fit: Estimate) -> list[str]:
     if softer:
         free = ",".join([n for n in fit.free if not n.startswith("seating")] + list(WEAR))
         lines += ["", f"**These curves soften after their peak**, {', '.join(softer)}: " + (
-            "more than the law, although it wears."
+            "more than the law with its wear."
             if set(WEAR) & set(fit.free)
-            else f"a law without wear does not. Fit its wear as well: --free {free}"
+            else f"but a law without wear does not soften. Fit the wear too: --free {free}"
         )]  # fmt: skip
     if otherwise:
         lines += [
             "",
-            "**These curves do not bend as the law does**: neighbouring points miss it together, "
-            f"{', '.join(otherwise)}. Use the law with that error, and not beyond the points.",
+            "**These curves do not bend as the law does**: neighbouring points deviate to the same "
+            f"side, {', '.join(otherwise)}. Use the law with this error, and only between points.",
         ]
     return lines
 

@@ -42,25 +42,25 @@ class Loop:
 
     def text(self) -> str:
         """The same in words."""
-        what = "Friction on the asperities, all that the law has, loses"
+        what = "Friction on the asperities, the only loss in this law, takes"
         rest = (
-            "The rest is not in this law: flattened asperities (fit a yield_interference to whole "
-            "cycles), crushed ones, seating of the halves, gouge."
+            "Other causes of the rest are flattened asperities (fit a yield_interference to whole "
+            "cycles), crushed ones, seating of the halves and gouge."
         )
         if self.yields:
-            what = "Friction and yielding of the asperities together lose"
+            what = "Friction and yielding of the asperities together take"
             rest = (
                 "The loop fixes one length, the yield_interference. It cannot tell yielding from "
-                "friction, crushing, seating of the halves or gouge, which also lose work."
+                "friction, crushing, seating of the halves or gouge, which also take work."
             )
         return (
             f"Up to {self.top / 1e6:.4g} MPa the measured cycle loses {100 * self.measured:.0f} % "
-            f"of the work of loading and keeps {1e6 * self.open_closure:.1f} um of closure back at "
-            f"{self.stress / 1e6:.3g} MPa. {what} {100 * self.friction:.2g} %; the law keeps "
-            f"{1e6 * self.law_closure:.2f} um. Of friction coefficients from {_FRICTIONS[0]} to "
-            f"{_FRICTIONS[-1]}, {self.worst_mu:g} loses most at these inclinations, "
-            f"{100 * self.largest_friction:.1f} %. {rest} Use the fitted law for loading, and for "
-            "small cycles below the largest stress with care."
+            f"of the work of loading; {1e6 * self.open_closure:.1f} um of closure remain at "
+            f"{self.stress / 1e6:.3g} MPa. {what} {100 * self.friction:.2g} %; by the law "
+            f"{1e6 * self.law_closure:.2f} um remain. Of friction coefficients from "
+            f"{_FRICTIONS[0]} to {_FRICTIONS[-1]}, {self.worst_mu:g} loses most at these "
+            f"inclinations, {100 * self.largest_friction:.1f} %. {rest} Use the "
+            "fitted law for loading, and for small cycles below the largest stress with care."
         )
 
 

@@ -105,7 +105,7 @@ def tables(
     yield_depth = None
     if asperity.yield_interference < math.inf:
         (yield_depth,) = frozen((asperity.yield_interference / c1,))
-    # one depth for both sides of an asperity that critical_slip renews, or the offset makes energy
+    # one depth for both sides of an asperity that critical_slip renews, else it creates energy
     (alone,) = frozen((np.arange(len(c1)),))
     return Tables(
         curve, *frozen(arrays), asperity.lam, asperity.mu, critical_slip, yield_depth,

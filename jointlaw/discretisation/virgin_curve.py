@@ -280,6 +280,6 @@ def _require_convex(eta: float, heights: HeightDistribution, far: float) -> None
         raise ValueError(
             f'heights with formation = "population" and asperity.eta = {eta:g} give a virgin curve '
             f"that is not convex near y = {at:.3g} m, so contacts would lose stiffness on closure "
-            'and make energy; use formation = "individual" (always convex), a broader height '
+            'and create energy; use formation = "individual" (always convex), a broader height '
             "distribution, a larger overlap or a larger eta"
         )

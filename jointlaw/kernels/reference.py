@@ -80,7 +80,7 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
        Asperities that yield have flattened springs, whose part at the flattened depth is taken off
        all of these ("Yielding"); with wear mu has fallen, and q comes back to its limit ("Wear").
     5. Traction: F = sum of A Phi n + (1/lam) sum of q (Eq. 21).
-    6. Dissipated energy, every term >= 0 ("No step can make energy").
+    6. Dissipated energy, every term >= 0 ("No step creates energy").
     7. Tangent C = dF/dd ("The tangent"), not without `tangent`.
     """
     old = parts(k, state)

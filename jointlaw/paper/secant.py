@@ -1,6 +1,6 @@
 """The paper's total form: F = (C^e - C^p) delta, loaded monotonically from zero (Eq. 19-23, 37).
 
-Stateless, and no incremental law: driven around a loop it makes energy. It is here to reproduce the
+Stateless, and no incremental law: on a closed path it creates energy. It is here to reproduce the
 paper; joints with memory are `law.joint()`.
 
 For a displacement delta every asperity of normal n carries d_n = n . delta and slides by the rest,

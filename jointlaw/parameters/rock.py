@@ -50,6 +50,6 @@ def require_rock(values: Mapping[str, float], where: str = "") -> None:
         low, high, unit, cause = RANGES[name]
         if not low <= value <= high:
             raise ValueError(
-                f"{where}{name} = {value:.6g}{unit} lies outside what rock joints can be "
+                f"{where}{name} = {value:.6g}{unit} is outside the range of rock joints "
                 f"({low:.4g} to {high:.4g}{unit}): {cause}"
             )

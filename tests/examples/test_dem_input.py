@@ -84,6 +84,69 @@ def test_nonsense_is_named(old, new, message):
         parse(TEXT.replace(old, new, 1))
 
 
+def shaken(by):
+    """The scene with another motion of its drive."""
+    return TEXT.replace("times = [0.0, 0.1]\nvalues = [0.0, 1e-3]", by)
+
+
+MOTION = "time_s,acceleration_m/s2\n0.0,1.0\n0.1,1.0\n0.2,-1.0\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (MOTION.replace("m/s2", "g"), r"line 1: must be 'time_s,velocity_m/s' or 'time_s,accel"),
+        ("", "line 1: must be"),
+        (MOTION.replace("0.1,1.0", "0.1;1.0"), "line 3: '0.1;1.0' must be two numbers"),
+        (MOTION.replace("0.1,1.0", "0.1,1.0,2.0"), "line 3: .* must be two numbers"),
+        (MOTION.replace("0.1,1.0", "0.1,nan"), "line 3: '0.1,nan' must be two numbers"),
+        (MOTION.replace("0.1,1.0", ""), "line 3: '' must be two numbers"),
+        (MOTION.replace("0.2,", "0.1,"), r"line 4: time 0\.1 s must be >= 0 and increase"),
+        (MOTION.replace("0.0,", "-1,"), "line 2: time -1 s must be >= 0"),
+        (MOTION.replace("acceleration_m/s2", "velocity_m/s"), "line 2: velocity 1 m/s must be 0"),
+        (MOTION[:33], "must have two rows of numbers or more"),
+        (None, "cannot be read"),
+    ],
+)
+def test_a_bad_record_is_refused_by_its_line(tmp_path, text, message):
+    file = tmp_path / "motion.csv"
+    if text is not None:
+        file.write_text(text)
+    with pytest.raises(SceneError, match=r"drive\[0\]\.file: .*motion\.csv.*" + message):
+        parse(shaken(f'file = "{file}"\nscale = 2.0'))
+
+
+@pytest.mark.parametrize("title", ["acceleration_m/s2", "velocity_m/s"])
+def test_a_record_moves_its_block(tmp_path, title):
+    """Straight lines between accelerations, or velocities, by hand; then at constant velocity."""
+    file = tmp_path / "motion.csv"
+    file.write_text(f"time_s, {title}\n0.1,0.0\n0.3,0.5\n0.5,0.5\n")
+    (drive,) = (d for d in parse(shaken(f'file = "{file}"\nscale = 2.0')).drives if d.order)
+    once = np.array([0.0, 0.0, 0.025, 0.1, 0.2, 0.3, 0.4])  # doubled by `scale`
+    t = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    found = [drive(at) for at in t]
+    if title.startswith("velocity"):
+        np.testing.assert_allclose(found, once, atol=1e-15)
+        return
+    # integrals of `once`: 5 s**3/6 while it rises, then a parabola, then a line
+    twice = [0.0, 0.0, 5e-3 / 6, 0.04 / 6, 0.04 / 6 + 0.01 + 0.005, 0.04 / 6 + 0.02 + 0.02]
+    np.testing.assert_allclose(found, [*twice, twice[-1] + 0.03], atol=1e-15)
+
+
+def test_a_sine_rises_and_falls_and_ends_at_rest():
+    text = shaken("sine = { acceleration = 3.0, frequency = 5.0, cycles = 4 }")
+    (drive,) = (d for d in parse(text).drives if d.order)
+    assert drive.times[-1] == pytest.approx(6 / 5)
+    assert max(drive.values) == pytest.approx(3.0)
+    assert drive.path(drive.times[-1], nu=1) == pytest.approx(0.0, abs=1e-12)
+    with pytest.raises(SceneError, match=r"sine\.cycles = 0.*must be >= 1"):
+        parse(text.replace("cycles = 4", "cycles = 0"))
+    with pytest.raises(SceneError, match="shakes along x or y"):
+        parse(text.replace('motion = "x"', 'motion = "turn"'))
+    with pytest.raises(SceneError, match="times is unknown"):
+        parse(text.replace("sine =", "times = [0.0, 1.0]\nsine ="))
+
+
 @pytest.mark.parametrize("table", ["joint", "block", "drive", "rock"])
 def test_lists_of_tables_hold_tables(table):
     with pytest.raises(SceneError, match=rf"scene\.{table}\[0\] = 1: must be a table"):

@@ -56,6 +56,18 @@ def cyclic_shear(x):
     assert (np.diff(worn) < 0).all()
 
 
+def damping(x):
+    few, some, many = x["damping"].values()  # from low to high normal stress
+    partly = few < 0.3  # beyond, most asperities slide, and all joints damp about alike
+    assert (many < some)[partly].all()
+    assert (some < few)[partly].all()
+    assert (np.diff(x["stiffness"][10e6]) < 0).all()
+    # Mindlin's limit: damping grows with the amplitude itself. 300 cells miss it by some per cent.
+    assert np.log(some[8] / some[0]) == pytest.approx(np.log(x["amplitudes"][8] / 2e-9), rel=0.2)
+    assert (x["coarse"][:8] < 0.5 * some[:8]).all()
+    assert x["coarse"][-1] == pytest.approx(some[-1], rel=0.1)
+
+
 def anisotropy(x):
     assert (x["friction"][0] > x["friction"][6]).all()
     # half a turn is the same joint
@@ -113,7 +125,7 @@ CHECKS = {
     f.__name__: f
     for f in (
         first_curve, closure_hysteresis, closure_cycle, direct_shear, strength_envelope,
-        cyclic_shear, anisotropy, large_shear, fit_closure, from_scan, table,
+        cyclic_shear, damping, anisotropy, large_shear, fit_closure, from_scan, table,
         batch, blocks, newton, snapshot,
     )
 }  # fmt: skip

@@ -123,5 +123,5 @@ def test_a_thread_leaves_ctrl_c_to_the_main_one():
 
 
 def test_scenes_of_the_package_raise_no_doubt():
-    for name in ("tilt", "shear-box", "stack", "slope", "slope-azimuth", "arch"):
+    for name in ("tilt", "shear-box", "stack", "slope", "slope-azimuth", "arch", "shake"):
         assert load(name).doubts == []

@@ -5,6 +5,7 @@ import re
 import shlex
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -225,6 +226,8 @@ def test_version(capsys):
         main(["--version"])
     assert stop.value.code == 0
     assert jl.__version__ in capsys.readouterr().out
+    citation = Path(__file__).parents[2] / "CITATION.cff"
+    assert f"\nversion: {jl.__version__}\n" in citation.read_text()
 
 
 def test_without_matplotlib_the_numbers_are_written(tmp_path, monkeypatch, capsys):

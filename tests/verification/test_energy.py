@@ -1,4 +1,4 @@
-"""No path makes energy. Which measures of work have a sign at finite step: the law's own force
+"""No path creates energy. Which measures of work have a sign at finite step: the law's own force
 integrated along the step does, the trapezoid of end forces does not."""
 
 import numpy as np

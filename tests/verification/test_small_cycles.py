@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders import law
+from scipy.integrate import trapezoid
 from slow_bed import SlowBed, cap_quadrature, reach_of
 
 import jointlaw as jl
@@ -69,7 +70,7 @@ def test_exact_bed_agrees_with_the_slow_bed(critical_slip):
         path = np.column_stack([np.full(len(shear), CLOSURE), shear])
         F = slow(one, path, 6, 16, 300, critical_slip=critical_slip)
         last = slice(-len(loop) - 1, None)
-        loss = np.trapezoid(F[last, 1], shear[last])
+        loss = trapezoid(F[last, 1], shear[last])
         top, low = F[-1, 1], F[-1 - len(loop) // 2, 1]
         # 300 springs, orientations and the trapezoids of 40 steps a quarter, each below 1 %
         assert found.loss[i] == pytest.approx(loss, rel=2e-2)

@@ -1,4 +1,4 @@
-"""No step makes energy while asperities yield and wear: by the work along the path.
+"""No step creates energy while asperities yield and wear: by the work along the path.
 
 JOINTLAW_PATHS=50 in the environment takes as many paths of each kind, an hour or so.
 """

@@ -516,7 +516,7 @@ JLAW_INLINE void jlaw_slide_(const double *w, const double *limits, double worn,
   const jlaw_v_ part = JLAW_PICK(new2 > JLAW_TINY, s.share, zero);
   *qs = part * s.ts, *qt = part * s.tt;
   f->qs += *qs, f->qt += *qt;
-  if (ledger) { /* "No step can make energy": each factor is >= 0 as written */
+  if (ledger) { /* "No step creates energy": each factor is >= 0 as written */
     const jlaw_v_ high = JLAW_PICK(s.grows, s.chord, k0), low = JLAW_PICK(s.grows, k0, k1);
     const jlaw_v_ k01 = k0 * high, k11 = k1 * s.now;
     const jlaw_v_ rub = k1 - s.now + 2.0 * s.share * (1.0 - s.share) * s.now;

@@ -130,7 +130,7 @@ class Joints:
         flat joint (a "smooth joint") whatever the direction between the two spheres.
     mated: closure counts from the position in which the contact is first seen, not from touch.
     lagged: instead of adding forces, rewrite kn, ks and friction of YADE's own contact, which acts
-        one step late: isotropic, and it makes energy, so that NewtonIntegrator needs a
+        one step late: isotropic, and it creates energy, so that NewtonIntegrator needs a
         damping of 0.7 O.dt/sqrt(m/k) or more (TableLaw only; measured in docs/yade.md).
     forget: with neverErase, contacts without force open by more than this (m) are given up.
     """
@@ -192,7 +192,7 @@ class Joints:
             )
         if self.lagged:
             warnings.warn(
-                "lagged=True acts one step late and makes energy: amplitudes grow without "
+                "lagged=True acts one step late and creates energy: amplitudes grow without "
                 "NewtonIntegrator(damping=...) of at least 0.7 O.dt/sqrt(m/k); k = area*kn_tangent",
                 stacklevel=2,
             )

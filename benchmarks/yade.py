@@ -127,12 +127,16 @@ def main() -> int:
         return 1
     result = json.loads(lines[-1][len("RESULT ") :])
     result["resolution"] = str(law.resolution)
+    r = law.resolution
+    live = f"live mode, {r.u} x {r.phi} x {r.depth} in space, numba"
+    names = {"cundall": "Cundall-Strack", "hertz": "Hertz-Mindlin", "table": "table mode",
+             "live": live}  # fmt: skip
     print("| | whole law and geometry in YADE | added by the adapter | of it the law |")
     print("|---|---:|---:|---:|")
     for name, row in result.items():
         if isinstance(row, dict):
             cells = [f"{row[k]:.0f}" if k in row else "" for k in ("loop", "adapter", "law")]
-            print(f"| {name} | {' | '.join(cells)} |")
+            print(f"| {names[name]} | {' | '.join(cells)} |")
     print(json.dumps(result))
     return 0
 

@@ -57,7 +57,12 @@ def shear(record: Record, path: Path) -> None:
         stress = float(record.column(f"{name}: normal_Pa")[0])
         if alone := shear_curve(law, stress, 1e-3 * slid):
             x, style = 1e3 * alone["slid"], {"color": "k", "ls": ":", "lw": 1.5}
-            upper.plot(x, 1e-3 * alone["shear"], label="law alone, direct shear", **style)
+            upper.plot(
+                x,
+                1e-3 * alone["shear"],
+                label="law alone, at the normal stress of the start",
+                **style,
+            )
             lower.plot(x, 1e3 * alone["dilation"], **style)
     upper.set_ylabel("shear stress (kPa)")
     lower.set_ylabel("dilation since seating (mm)")
@@ -92,6 +97,6 @@ def tilt(record: Record, path: Path, slips: list[dict]) -> None:
 
 def _finish(figure: Figure, axes, record: Record, path: Path) -> None:
     axes.set_title(record.scene.title)
-    axes.legend(fontsize=8)
+    figure.legend(fontsize=8, ncols=2, loc="outside lower center")
     axes.grid(alpha=0.3)
     figure.savefig(path)

@@ -156,7 +156,12 @@ class SurfaceFit(SurfaceEstimate):
         width = np.gradient(middle)
         label = "density of Eq. 14, error of the slopes included"
         inclinations.bar(
-            middle, seen.sum(axis=1) / width, width=width, color="0.8", label="measured"
+            middle,
+            seen.sum(axis=1) / width,
+            width=width,
+            color="0.8",
+            edgecolor="0.8",
+            label="measured",
         )
         inclinations.plot(middle, model.sum(axis=1) / width, color="C1", label=label)
         inclinations.set(

@@ -40,37 +40,40 @@ def at_tolerance(law: AnyLaw, tolerance: float, loss: float | None = None) -> An
 
 
 def _keeping_loss(law: Law, found: Resolution, loss: float, bound: float) -> Resolution:
-    """`found` or, in this order, more facets and more depth cells, until small cycles lose right.
+    """`found`, or as many more depth cells, and then facets, as keep the loss of small cycles.
 
-    Half of `loss` is left to the facets, which hardly matter unless asperities are linear. The
-    miss wavers with the depth cells: the first that are good enough are taken.
+    The loss wavers with the depth cells: the first that are good enough are taken. Facets hardly
+    matter to it, unless asperities are linear, but errors of the traction may have cancelled with
+    those of the few cells of `found`.
     """
     suite, best = _reference(law, bound, EXCURSIONS)
-    exact, least, at = exact_cycles(law), math.inf, found
-    several = [
-        replace(found, u=u, phi=phi)
-        for u in sorted({found.u, *_U})
-        for phi in sorted({found.phi, *_PHI})
-        if found.u <= u <= max(best.u, found.u) and found.phi <= phi <= max(best.phi, found.phi)
-    ]
-    for facets in track(sorted(several, key=lambda r: (r.sliders, r.u)), "facets", len(several)):
-        deep = replace(law, resolution=replace(facets, depth=max(best.depth, found.depth)))
-        if suite.errors(deep)[0].max() > bound:  # few cells may have made up for few facets
-            continue
-        if exact_cycles(law, facets).missed(exact)[0].max() <= loss / 2:
+    exact, most, depth = exact_cycles(law), _LARGEST * best.sliders, found.depth
+    rings = [found.u, *(n for n in _U if found.u < n <= best.u)]
+    azimuths = [found.phi, *(n for n in _PHI if found.phi < n <= best.phi)]
+    tried: dict[Resolution, float] = {}
+    for k in track(range(count := max(len(rings), len(azimuths))), "facets", count):
+        facets = replace(found, u=rings[min(k, len(rings) - 1)],
+                         phi=azimuths[min(k, len(azimuths) - 1)])  # fmt: skip
+        if replace(facets, depth=depth).sliders > most:
             break
-    while facets.sliders <= _LARGEST * best.sliders:
-        made = replace(law, resolution=facets)
-        miss = float(cycles(made, law.closure_range).missed(exact)[0].max())
-        if miss <= loss and suite.errors(made)[0].max() <= bound:
-            return facets
-        if miss < least:
-            least, at = miss, facets
-        facets = replace(facets, depth=math.ceil(1.2 * facets.depth))
+        if exact_cycles(law, facets).missed(exact)[0].max() > loss / 2:
+            continue
+        while (r := replace(facets, depth=depth)).sliders <= most:
+            made = replace(law, resolution=r)
+            miss = float(cycles(made, law.closure_range).missed(exact)[0].max())
+            if miss <= loss:
+                if suite.errors(made)[0].max() <= bound:
+                    return r
+                break
+            tried[r] = miss
+            depth = math.ceil(1.2 * depth)
+    reached = "no facets tried keep it, nor the tolerance with so many cells"
+    if tried:
+        nearest = min(tried, key=tried.__getitem__)
+        reached = f"the nearest tried, {nearest}, misses it by {tried[nearest]:.2g}"
     raise ValueError(
-        f"loss = {loss:g} cannot be kept together with the tolerance: the best tried is {at}, "
-        f"which misses the loss of a cycle by {least:.2g} of it; ask for less, or give a "
-        "Resolution of your own"
+        f"loss = {loss:g} cannot be kept within {most} sliders together with the tolerance: "
+        f"{reached}; ask for less, or give a Resolution of your own"
     )
 
 

@@ -103,11 +103,12 @@ def test_cells_as_thin_as_the_cycle_keep_its_loss():
 
 
 def test_loss_is_kept_at_amplitudes_between(monkeypatch):
+    monkeypatch.setattr("jointlaw.accuracy.tolerance.EXCURSIONS", 4)  # for the time it takes
     one = law(a=6.0, b=0.0, c=0.0, plane=0.0, resolution="balanced")
-    made = one.at_tolerance(0.02, loss=0.25)
-    assert made.tables.sliders > one.at_tolerance(0.02).tables.sliders
+    made = one.at_tolerance(0.05, loss=0.25)
+    assert made.tables.sliders > 10 * one.tables.sliders
     assert replace(made, resolution=one.resolution) == one
-    monkeypatch.setattr(small, "AMPLITUDES", 10.0 ** np.linspace(-2.97, 0.0, 61))
+    monkeypatch.setattr(small, "AMPLITUDES", 10.0 ** np.linspace(-2.95, 0.0, 37))
     small._exact.cache_clear()
     # between the amplitudes that were looked at, cells begin to slip a little earlier or later
     assert cycles(made, 1.0).missed(exact_cycles(one))[0].max() < 0.35
@@ -115,11 +116,10 @@ def test_loss_is_kept_at_amplitudes_between(monkeypatch):
 
 
 def test_a_loss_that_cannot_be_kept_is_refused_with_the_best(monkeypatch):
+    monkeypatch.setattr("jointlaw.accuracy.tolerance.EXCURSIONS", 4)
     monkeypatch.setattr("jointlaw.accuracy.tolerance._LARGEST", 1)
-    with pytest.raises(
-        ValueError, match=r"loss = 0\.01 cannot be kept .* Resolution\(u=.* by 0\.\d"
-    ):
-        law(a=6.0, b=0.0, c=0.0, plane=0.0).at_tolerance(0.05, loss=0.01)
+    with pytest.raises(ValueError, match=r"loss = 0\.04 cannot .* Resolution\(u=.*by 0\.\d"):
+        law(a=6.0, b=0.0, c=0.0, plane=0.0).at_tolerance(0.05, loss=0.04)
 
 
 def test_bad_losses_are_named():

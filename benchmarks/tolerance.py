@@ -6,10 +6,10 @@ Laws: a from 1 to 10 (evenly in log a), b and c over their bounds, mu 0.05 to 1,
 heights of either formation or none, in a plane or in space, half of them with a critical slip of 1
 to 1000 R. Paths: 15 per law, six of five to eight legs between random corners, six smooth ones
 (sums of four waves), closures up to the law's closure range R and openings to -0.3 R, shear up to
-R; somewhere each is closed to between half the normal stress at R and all of it; and three of slip
-at a random closure, to three critical slips but 3 R at most, back and forth again. Besides, four of
-slip to three critical slips, or 30 R, and back at random normal stresses, which each resolution
-holds by itself. The truth is twice the reference resolution in each direction.
+R; somewhere each is closed to between half the normal stress S at R and all of it; and three of
+slip at the closure of S/20 to S/2, to three critical slips but 3 R at most, back and forth again.
+Besides, four of slip to three critical slips, or 30 R, and back at random normal stresses, which
+each resolution holds by itself. The truth is twice the reference resolution in each direction.
 
 `met` is the share of laws that keep the tolerance on all of them (one that `at_tolerance`
 refuses does not), `paths` the share of paths that do, `worst` the largest error over the tolerance,
@@ -30,9 +30,8 @@ from typing import Any
 import numpy as np
 
 import jointlaw as jl
-from jointlaw.accuracy.slip import distance, random_ways, slip
+from jointlaw.accuracy.slip import random_ways, slip
 from jointlaw.accuracy.suite import (
-    FAR,
     errors,
     far_path,
     reference_resolution,
@@ -79,8 +78,8 @@ def random_law(
 def random_paths(law: jl.JointLaw, rng: np.random.Generator) -> np.ndarray:
     """Increments (STEPS, 2 PATHS + FARS, dim) in m."""
     R, s = law.closure_range, np.arange(1, STEPS + 1) / STEPS
-    farthest = min(distance(law.tables.critical_slip, R) / R, FAR)
-    far = np.stack([far_path(rng, farthest, s) for _ in range(FARS)], axis=1)
+    stress = float(law.normal_stress(R)) / 2
+    far = np.stack([far_path(law, rng, stress, s) for _ in range(FARS)], axis=1)
     place = np.concatenate([legs(law, rng), waves(law, rng), far], axis=1)[:, :, : law.tables.dim]
     return np.diff(R * place, axis=0, prepend=0.0)
 

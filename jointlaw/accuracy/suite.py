@@ -15,11 +15,11 @@ With R the law's closure range and S the normal stress there, the paths are
 
 Excursions are random: four to ten legs between corners with closures from -0.3 R to R (one of them
 at a stress of S/2 to S) and shears up to R, every second one rounded. One of eight slips as `far`
-does, at another closure, and one of sixteen as `slip` does, along other ways. They are drawn once
-and for all, so that they too are the same for every resolution. A law without critical slip takes
-30 R for three of them. At a given closure a longer slip would end at many times the stress S; at a
-given stress a law that jams, atan(mu) + 90 deg/a above 88 degrees, has no end, and leaves `slip`
-out.
+does, at the closure of S/20 to S/2, and one of sixteen as `slip` does, along other ways. They are
+drawn once and for all, so that they too are the same for every resolution. A law without critical
+slip takes 30 R for three of them. At a given closure a longer slip would end at many times the
+stress S; at a given stress a law that jams, atan(mu) + 90 deg/a above 88 degrees, has no end, and
+leaves `slip` out.
 
 Along 0, 45 and 90 degrees the rings of azimuths look alike; the other directions lie between, where
 a ring of few azimuths errs most. A law with a plane takes the paths along azimuth 0 and the others
@@ -244,10 +244,10 @@ def _paths(law: Law, stress: float) -> tuple[tuple[str, ...], Array, Array]:
 def _excursions(law: Law, stress: float, count: int) -> Array:
     """Random places (steps, count, dim) in m."""
     rng, R, s = np.random.default_rng(8), law.closure_range, np.arange(1, STEPS + 1) / STEPS
-    goal, farthest = [], min(distance(law.tables.critical_slip, R) / R, FAR)
+    goal = []
     for i in range(count):
         if i % 8 == 7:
-            goal.append(far_path(rng, farthest, s))
+            goal.append(far_path(law, rng, stress, s))
             continue
         legs = int(rng.integers(4, 11))
         closure = np.append(0.0, rng.uniform(-0.3, 1.0, legs))
@@ -263,9 +263,14 @@ def _excursions(law: Law, stress: float, count: int) -> Array:
     return R * np.stack(goal, axis=1)[:, :, : law.tables.dim]
 
 
-def far_path(rng: np.random.Generator, farthest: float, s: Array) -> Array:
-    """Random places (steps, 3) in closure ranges: slip at one closure, back, and forth again."""
-    closure, way = rng.uniform(0.1, 0.7), farthest * rng.uniform(0.3, 1.0)
+def far_path(law: Law, rng: np.random.Generator, stress: float, s: Array) -> Array:
+    """Random places (steps, 3) in closure ranges: slip at one closure, back, and forth again.
+
+    The closure is that at a normal stress between a tenth of `stress` and all of it.
+    """
+    R = law.closure_range
+    closure = float(law.closure(stress * rng.uniform(0.1, 1.0))) / R
+    way = min(distance(law.tables.critical_slip, R) / R, FAR) * rng.uniform(0.3, 1.0)
     back, turn = way * rng.uniform(-1.0, 0.5), rng.uniform(0.0, 2.0 * np.pi)
     at = [0.0, 0.1, 0.4, 0.8, 1.0]
     shear = np.interp(s, at, [0.0, 0.0, way, back, way])

@@ -13,6 +13,9 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.ticker import EngFormatter
+
+METRES = EngFormatter("m")  # um, mm or m, whatever the law needs
 
 
 def dump(path):
@@ -44,6 +47,9 @@ def thermo(path):
 def tower(folder):
     """The slabs before and after, their slip, and where the energy went."""
     table = thermo(folder / "log.tower")
+    if not table:
+        print(f"{folder / 'log.tower'} holds no finished run: no tower.png")
+        return None
     _, _, frames = dump(folder / "tower.dump")
     fig, (left, middle, right) = plt.subplots(1, 3, figsize=(13, 4), layout="constrained")
     start = frames[0, :, 2:]
@@ -57,30 +63,31 @@ def tower(folder):
     left.scatter(shown[:, 0], shown[:, 2], s=40, c=colours[front], cmap="viridis", marker="s")
     left.set(title=f"at the end, displacement x {magnified:g}", xlabel="x (m)", ylabel="z (m)")
     left.set_aspect("equal")
-    middle.plot(table["v_t"], 1e3 * table["v_top"], label="slip of the top slab")
-    middle.plot(table["v_t"], 1e3 * (table["v_rise"] - table["v_rise"][0]), label="its rise")
-    middle.plot(table["v_t"], 1e3 * table["v_bx"], ":", c="0.5", label="motion of the base")
-    middle.set(xlabel="time (s)", ylabel="mm", title="against the base")
+    middle.plot(table["v_t"], table["v_top"], label="slip of the top slab")
+    middle.plot(table["v_t"], table["v_rise"] - table["v_rise"][0], label="its rise")
+    middle.plot(table["v_t"], table["v_bx"], ":", c="0.5", label="motion of the base")
+    middle.set(xlabel="time (s)", ylabel="displacement", title="against the base")
+    middle.yaxis.set_major_formatter(METRES)
     middle.legend()
     parts = {
-        "friction": "c_joint[2]",
-        "damping": "c_joint[3]",
-        "stored": "PotEng",
-        "motion": "c_ke",
+        "friction": table["c_joint[2]"],
+        "damping": table["c_joint[3]"],
+        "stored": table["PotEng"],
+        "motion": table["c_ke"] + table["c_spin"],
     }
-    right.stackplot(table["v_t"], [table[c] - table[c][0] for c in parts.values()], labels=parts)
+    right.stackplot(table["v_t"], [part - part[0] for part in parts.values()], labels=parts)
     right.plot(table["v_t"], table["v_work"] + table["v_fallen"], "k--", label="work done on it")
     right.set(xlabel="time (s)", ylabel="J", title="energy")
     right.legend()
-    fig.savefig(folder / "tower.png", dpi=110)
+    return fig
 
 
 def shear(folder):
     """Shear stress and rise over slip, with the direct shear test of jointlaw."""
     slip, rise, normal, stress = np.loadtxt(folder / "shear.txt", skiprows=1).T
     fig, (top, bottom) = plt.subplots(2, 1, figsize=(6, 6), sharex=True, layout="constrained")
-    top.plot(1e3 * slip, stress / normal[0], lw=3, c="tab:orange", label="LAMMPS, 16 joints")
-    bottom.plot(1e3 * slip, 1e3 * rise, lw=3, c="tab:orange")
+    top.plot(slip, stress / normal[0], lw=3, c="tab:orange", label="LAMMPS, 16 joints")
+    bottom.plot(slip, rise, lw=3, c="tab:orange")
     try:
         import jointlaw as jl
     except ImportError:
@@ -88,14 +95,16 @@ def shear(folder):
     else:
         law = jl.JointLaw.from_toml(folder / "law.toml")
         test = jl.direct_shear(law.joint(), slip[-1], normal[0], steps=800)
-        top.plot(1e3 * test.shear, test.shear_stress / normal[0], "k", lw=1, label="jointlaw")
-        bottom.plot(1e3 * test.shear, 1e3 * (test.closure[0] - test.closure), "k", lw=1)
+        top.plot(test.shear, test.shear_stress / normal[0], "k", lw=1, label="jointlaw")
+        bottom.plot(test.shear, test.closure[0] - test.closure, "k", lw=1)
         away = np.abs(stress - np.interp(slip, test.shear, test.shear_stress)).max()
         print(f"shear stress: {away / stress.max():.2e} of the largest between LAMMPS and jointlaw")
     top.set(ylabel="shear stress / normal stress")
     top.legend()
-    bottom.set(xlabel="slip (mm)", ylabel="rise (mm)")
-    fig.savefig(folder / "shear.png", dpi=110)
+    bottom.set(xlabel="slip", ylabel="rise")
+    for axis in (bottom.xaxis, bottom.yaxis):
+        axis.set_major_formatter(METRES)
+    return fig
 
 
 def slope(folder):
@@ -109,12 +118,12 @@ def slope(folder):
     fig, axes = plt.subplots(figsize=(9, 6), layout="constrained")
     axes.scatter(x, z, s=12, c="0.85")
     shown = np.stack([x, z], axis=1) + magnified * moved
-    points = axes.scatter(*shown.T, s=12, c=1e3 * size, cmap="magma_r")
-    fig.colorbar(points, label="displacement (mm)")
+    points = axes.scatter(*shown.T, s=12, c=size, cmap="magma_r")
+    fig.colorbar(points, label="displacement", format=METRES)
     axes.set(xlabel="down the dip: to the left (m)", ylabel="across the base (m)")
     axes.set_title(f"after {steps[-1]} steps, displacement x {magnified:g}; grey: before")
     axes.set_aspect("equal")
-    fig.savefig(folder / "slope.png", dpi=110)
+    return fig
 
 
 def spheres(folder):
@@ -123,8 +132,9 @@ def spheres(folder):
     value = {name: frames[:, :, k] for k, name in enumerate(names)}
     closure = 0.02 - (value["x"][:, 1] - value["x"][:, 0])
     fig, axes = plt.subplots(3, 1, figsize=(6, 6), sharex=True, layout="constrained")
-    axes[0].plot(steps, 1e6 * closure)
-    axes[0].set(ylabel="closure (um)")
+    axes[0].plot(steps, closure)
+    axes[0].set(ylabel="closure")
+    axes[0].yaxis.set_major_formatter(METRES)
     axes[1].plot(steps, value["omegaz"], label=["left sphere", "right sphere"])
     axes[1].set(ylabel="spin (rad/s)")
     axes[1].legend()
@@ -132,7 +142,7 @@ def spheres(folder):
     axes[2].plot(steps, value["fy"][:, 1], label="shear")
     axes[2].set(xlabel="step", ylabel="force (N)")
     axes[2].legend()
-    fig.savefig(folder / "spheres.png", dpi=110)
+    return fig
 
 
 def main():
@@ -140,8 +150,10 @@ def main():
     needs = {tower: "log.tower", shear: "shear.txt", slope: "slope.dump", spheres: "spheres.dump"}
     for picture, file in needs.items():
         if (folder / file).exists():
-            picture(folder)
-            print(f"wrote {folder / picture.__name__}.png")
+            fig = picture(folder)
+            if fig:
+                fig.savefig(folder / f"{picture.__name__}.png", dpi=110)
+                print(f"wrote {folder / picture.__name__}.png")
 
 
 if __name__ == "__main__":

@@ -846,22 +846,26 @@ typedef struct { /* a facet in a state: y, Phi, Phi'; flattened depth; strength 
   double strength;
 } jlaw_now_;
 
-static void jlaw_facet_now_(const jlaw_law *law, const double *s, double worn, int f, jlaw_now_ *now)
+JLAW_INLINE void jlaw_facet_now_(const jlaw_law *law, const double *s, double worn, int f,
+                                 jlaw_now_ *now)
 {
   const jlaw_v_ zero = {0.0};
   double y = 0.0;
   for (int i = 0; i < law->dim; i++)
     y += jlaw_of_facet_(law, f, JLAW_M + i) * s[i ? law->dim + i - 1 : 0];
   now->y = zero + y;
-  now->z = zero + (law->yields ? s[jlaw_rest_(law) + (size_t) f] : 0.0);
+  now->z = now->fz = now->kz = zero;
   jlaw_virgin_(law, &now->y, &now->force, &now->slope, NULL);
-  jlaw_virgin_(law, &now->z, &now->fz, &now->kz, NULL);
+  if (law->yields) {
+    now->z = zero + s[jlaw_rest_(law) + (size_t) f];
+    jlaw_virgin_(law, &now->z, &now->fz, &now->kz, NULL);
+  }
   now->strength = jlaw_of_facet_(law, f, JLAW_STRENGTH) * worn;
 }
 
 /* G and kappa of a cell of a facet */
-static void jlaw_cell_now_(const jlaw_law *law, int f, int cell, const jlaw_now_ *now, double *G,
-                           double *kappa)
+JLAW_INLINE void jlaw_cell_now_(const jlaw_law *law, int f, int cell, const jlaw_now_ *now, double *G,
+                                double *kappa)
 {
   const jlaw_v_ zero = {0.0};
   const int row = (f / JLAW_LANES * law->cells + cell) * JLAW_ROWS;
@@ -869,8 +873,10 @@ static void jlaw_cell_now_(const jlaw_law *law, int f, int cell, const jlaw_now_
   for (int j = 0; j < JLAW_ROWS; j++)
     z[j] = zero + law->depth[(size_t) (row + j) * JLAW_LANES + (size_t) (f % JLAW_LANES)];
   jlaw_cell_(&now->y, &now->force, &now->slope, z, &part, &stiff);
-  jlaw_cell_(&now->z, &now->fz, &now->kz, z, &H, &h);
-  if (law->yields) jlaw_flatten_(&now->y, &now->z, &H, &part, &stiff);
+  if (law->yields) {
+    jlaw_cell_(&now->z, &now->fz, &now->kz, z, &H, &h);
+    jlaw_flatten_(&now->y, &now->z, &H, &part, &stiff);
+  }
   *G = JLAW_AT(part, 0);
   *kappa = JLAW_AT(stiff, 0);
 }
@@ -878,7 +884,7 @@ static void jlaw_cell_now_(const jlaw_law *law, int f, int cell, const jlaw_now_
 typedef struct { double squeezed, sheared, sliding, slipping, separated; } jlaw_measures_;
 
 /* Energies of normal and shear springs, and the shares */
-static jlaw_measures_ jlaw_measure_(const jlaw_law *law, const double *s)
+JLAW_CLONES static jlaw_measures_ jlaw_measure_(const jlaw_law *law, const double *s)
 {
   jlaw_measures_ all = {0.0, 0.0, 0.0, 0.0, 0.0};
   const int D = law->cells;
@@ -891,7 +897,11 @@ static jlaw_measures_ jlaw_measure_(const jlaw_law *law, const double *s)
     jlaw_now_ now;
     jlaw_facet_now_(law, s, worn, f, &now);
     const double y = JLAW_AT(now.y, 0), z = JLAW_AT(now.z, 0), fz = JLAW_AT(now.fz, 0);
-    const double virgin = JLAW_AT(now.force, 0), force = y > z ? virgin - fz : 0.0;
+    const double virgin = JLAW_AT(now.force, 0), force = virgin - fz;
+    if (!(y > z)) {
+      all.separated += share;
+      continue;
+    }
     for (int i = 0; i < D; i++) {
       jlaw_cell_now_(law, f, i, &now, &G, &kappa);
       const double q2 = qs[i] * qs[i] + qt[i] * qt[i];
@@ -902,10 +912,9 @@ static jlaw_measures_ jlaw_measure_(const jlaw_law *law, const double *s)
     }
     double squeezed = jlaw_psi_(law, y);
     if (law->yields) squeezed -= jlaw_psi_(law, z) + fz * (y - z);
-    if (y > z && squeezed > 0.0) all.squeezed += jlaw_of_facet_(law, f, JLAW_POTENTIAL) * squeezed;
+    if (squeezed > 0.0) all.squeezed += jlaw_of_facet_(law, f, JLAW_POTENTIAL) * squeezed;
     if (force > 0.0) all.slipping += share * fmin(at_limit / force, 1.0);
-    if (y > z && whole) all.sliding += share;
-    if (!(y > z)) all.separated += share;
+    if (whole) all.sliding += share;
   }
   return all;
 }

@@ -92,7 +92,7 @@ def test_command_writes_table_law_and_summary(tmp_path, capsys, monkeypatch):
     assert "--loss = 0.5 goes with --tolerance" in capsys.readouterr().err
     assert main([*arguments.split(), str(out)]) == 0
     summary = json.loads((out / "summary.json").read_text())
-    assert summary["at tolerance"]["0.05"] == {"u": 2, "phi": 4, "depth": 1, "sliders": 10}
+    assert summary["at tolerance"]["0.05"] == {"u": 2, "phi": 8, "depth": 1, "sliders": 14}
     assert summary["frontier"][0]["ns"] is None
     assert (out / "tradeoff.csv").read_text().count("\n") == 3
     assert jl.JointLaw.from_toml(out / "law.toml").plane == 0.0

@@ -849,44 +849,51 @@ static double jlaw_of_facet_(const jlaw_law *law, int facet, int column)
   return law->facet[((size_t) block * JLAW_COLUMNS + (size_t) column) * JLAW_LANES + (size_t) lane];
 }
 
-typedef struct { /* a facet in a state: y, Phi, Phi'; flattened depth; strength */
-  jlaw_v_ y, force, slope, z, fz, kz;
-  double strength;
+typedef struct { /* facets side by side in a state: y, Phi, Phi'; flattened depth; strength */
+  jlaw_v_ y, force, slope, z, fz, kz, strength;
+  const double *w;             /* their tables */
+  size_t places[JLAW_LANES];   /* of their sliders */
 } jlaw_now_;
 
-JLAW_INLINE void jlaw_facet_now_(const jlaw_law *law, const double *s, double worn, int f,
-                                 jlaw_now_ *now)
+JLAW_INLINE void jlaw_facets_now_(const jlaw_law *law, const double *s, double worn, int first,
+                                  jlaw_now_ *now)
 {
   const jlaw_v_ zero = {0.0};
-  double y = 0.0;
+  const int lane = first % JLAW_LANES;
+  const double *w = law->facet + (size_t) (first - lane) * JLAW_COLUMNS + lane;
+  size_t lanes[JLAW_LANES];
+  for (int l = 0; l < JLAW_LANES; l++) {
+    lanes[l] = (size_t) (first + l < law->facets ? l : law->facets - 1 - first);
+    now->places[l] = lanes[l] * (size_t) law->cells;
+  }
+  now->w = w;
+  now->y = now->z = now->fz = now->kz = zero;
   for (int i = 0; i < law->dim; i++)
-    y += jlaw_of_facet_(law, f, JLAW_M + i) * s[i ? law->dim + i - 1 : 0];
-  now->y = zero + y;
-  now->z = now->fz = now->kz = zero;
+    now->y += JLAW_W(JLAW_M + i) * s[i ? law->dim + i - 1 : 0];
   jlaw_virgin_(law, &now->y, &now->force, &now->slope, NULL);
   if (law->yields) {
-    now->z = zero + s[jlaw_rest_(law) + (size_t) f];
+    jlaw_take_(s + jlaw_rest_(law) + first, lanes, &now->z);
     jlaw_virgin_(law, &now->z, &now->fz, &now->kz, NULL);
   }
-  now->strength = jlaw_of_facet_(law, f, JLAW_STRENGTH) * worn;
+  now->strength = JLAW_W(JLAW_STRENGTH) * worn;
 }
 
-/* G and kappa of a cell of a facet */
-JLAW_INLINE void jlaw_cell_now_(const jlaw_law *law, int f, int cell, const jlaw_now_ *now, double *G,
-                                double *kappa)
+/* G, kappa and slider of a cell of these facets */
+JLAW_INLINE void jlaw_cell_now_(const jlaw_law *law, const double *s, int first, int cell,
+                                const jlaw_now_ *now, jlaw_v_ *G, jlaw_v_ *kappa, jlaw_v_ *qs,
+                                jlaw_v_ *qt)
 {
-  const jlaw_v_ zero = {0.0};
-  const int row = (f / JLAW_LANES * law->cells + cell) * JLAW_ROWS;
-  jlaw_v_ z[JLAW_ROWS], part, stiff, H, h;
+  const size_t row = ((size_t) (first / JLAW_LANES) * (size_t) law->cells + (size_t) cell) * JLAW_ROWS;
+  const double *q = s + 2 * law->dim + first * law->cells + cell;
+  jlaw_v_ z[JLAW_ROWS], H, h;
   for (int j = 0; j < JLAW_ROWS; j++)
-    z[j] = zero + law->depth[(size_t) (row + j) * JLAW_LANES + (size_t) (f % JLAW_LANES)];
-  jlaw_cell_(&now->y, &now->force, &now->slope, z, &part, &stiff);
+    z[j] = JLAW_LOAD(law->depth + (row + (size_t) j) * JLAW_LANES + first % JLAW_LANES);
+  jlaw_cell_(&now->y, &now->force, &now->slope, z, G, kappa);
   if (law->yields) {
     jlaw_cell_(&now->z, &now->fz, &now->kz, z, &H, &h);
-    jlaw_flatten_(&now->y, &now->z, &H, &part, &stiff);
+    jlaw_flatten_(&now->y, &now->z, &H, G, kappa);
   }
-  *G = JLAW_AT(part, 0);
-  *kappa = JLAW_AT(stiff, 0);
+  jlaw_take_(q, now->places, qs), jlaw_take_(q + law->facets * law->cells, now->places, qt);
 }
 
 typedef struct { double squeezed, sheared, sliding, slipping, separated; } jlaw_measures_;
@@ -895,34 +902,38 @@ typedef struct { double squeezed, sheared, sliding, slipping, separated; } jlaw_
 JLAW_CLONES static jlaw_measures_ jlaw_measure_(const jlaw_law *law, const double *s)
 {
   jlaw_measures_ all = {0.0, 0.0, 0.0, 0.0, 0.0};
-  const int D = law->cells;
+  const jlaw_v_ zero = {0.0}, one = zero + 1.0;
   const double worn = jlaw_worn_(law, s);
-  for (int f = 0; f < law->facets; f++) {
-    const double *qs = s + 2 * law->dim + f * D, *qt = qs + law->facets * D;
-    const double share = jlaw_of_facet_(law, f, JLAW_SHARE);
-    double at_limit = 0.0, G, kappa;
-    int whole = 1;
+  for (int first = 0; first < law->facets; first += JLAW_WIDE) {
     jlaw_now_ now;
-    jlaw_facet_now_(law, s, worn, f, &now);
-    const double y = JLAW_AT(now.y, 0), z = JLAW_AT(now.z, 0), fz = JLAW_AT(now.fz, 0);
-    const double virgin = JLAW_AT(now.force, 0), force = virgin - fz;
-    if (!(y > z)) {
-      all.separated += share;
-      continue;
+    jlaw_facets_now_(law, s, worn, first, &now);
+    const double *w = now.w;
+    jlaw_v_ sheared = zero, at_limit = zero, whole = one, G, kappa, qs = zero, qt = zero;
+    for (int i = 0; i < law->cells; i++) {
+      jlaw_cell_now_(law, s, first, i, &now, &G, &kappa, &qs, &qt);
+      const jlaw_v_ q2 = qs * qs + qt * qt;
+      jlaw_v_ size = q2;
+      jlaw_root_(&size);
+      const jlaw_v_ least = now.strength * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * now.force);
+      const jlaw_mask_ held = size >= least, stiff = kappa > JLAW_TINY;
+      at_limit += JLAW_PICK(held, G, zero);
+      whole = JLAW_PICK(held, whole, zero);
+      sheared += JLAW_PICK(stiff, JLAW_W(JLAW_COMPLIANCE) * q2 / JLAW_PICK(stiff, kappa, one), zero);
     }
-    for (int i = 0; i < D; i++) {
-      jlaw_cell_now_(law, f, i, &now, &G, &kappa);
-      const double q2 = qs[i] * qs[i] + qt[i] * qt[i];
-      const int held = sqrt(q2) >= now.strength * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * virgin);
-      at_limit += held ? G : 0.0;
-      whole = whole && held;
-      if (kappa > JLAW_TINY) all.sheared += jlaw_of_facet_(law, f, JLAW_COMPLIANCE) * q2 / kappa;
+    for (int l = 0; l < JLAW_WIDE && first + l < law->facets; l++) {
+      const double y = JLAW_AT(now.y, l), z = JLAW_AT(now.z, l), fz = JLAW_AT(now.fz, l);
+      const double force = JLAW_AT(now.force, l) - fz, share = w[JLAW_SHARE * JLAW_LANES + l];
+      if (!(y > z)) {
+        all.separated += share;
+        continue;
+      }
+      double squeezed = jlaw_psi_(law, y);
+      if (law->yields) squeezed -= jlaw_psi_(law, z) + fz * (y - z);
+      if (squeezed > 0.0) all.squeezed += w[JLAW_POTENTIAL * JLAW_LANES + l] * squeezed;
+      all.sheared += JLAW_AT(sheared, l);
+      if (force > 0.0) all.slipping += share * fmin(JLAW_AT(at_limit, l) / force, 1.0);
+      if (JLAW_AT(whole, l) > 0.0) all.sliding += share;
     }
-    double squeezed = jlaw_psi_(law, y);
-    if (law->yields) squeezed -= jlaw_psi_(law, z) + fz * (y - z);
-    if (squeezed > 0.0) all.squeezed += jlaw_of_facet_(law, f, JLAW_POTENTIAL) * squeezed;
-    if (force > 0.0) all.slipping += share * fmin(at_limit / force, 1.0);
-    if (whole) all.sliding += share;
   }
   return all;
 }
@@ -1017,17 +1028,22 @@ static void jlaw_turn_(double *x, int n, int step, double angle, int straight)
 /* Brings sliders beyond their friction limit back to it */
 static void jlaw_hold_(const jlaw_law *law, double *s)
 {
-  const int D = law->cells;
+  const jlaw_v_ zero = {0.0}, one = zero + 1.0;
   const double worn = jlaw_worn_(law, s);
-  for (int f = 0; f < law->facets; f++) {
-    double *qs = s + 2 * law->dim + f * D, *qt = qs + law->facets * D, G, kappa;
+  for (int first = 0; first < law->facets; first += JLAW_WIDE) {
+    double *q = s + 2 * law->dim + first * law->cells;
     jlaw_now_ now;
-    jlaw_facet_now_(law, s, worn, f, &now);
-    for (int i = 0; i < D; i++) {
-      jlaw_cell_now_(law, f, i, &now, &G, &kappa);
-      const double cap = now.strength * G, size = sqrt(qs[i] * qs[i] + qt[i] * qt[i]);
-      const double share = size > cap ? cap / size : 1.0;
-      qs[i] *= share, qt[i] *= share;
+    jlaw_facets_now_(law, s, worn, first, &now);
+    for (int i = 0; i < law->cells; i++) {
+      jlaw_v_ G, kappa, qs = zero, qt = zero;
+      jlaw_cell_now_(law, s, first, i, &now, &G, &kappa, &qs, &qt);
+      const jlaw_v_ cap = now.strength * G;
+      jlaw_v_ size = qs * qs + qt * qt;
+      jlaw_root_(&size);
+      const jlaw_mask_ beyond = size > cap;
+      const jlaw_v_ share = JLAW_PICK(beyond, cap / JLAW_PICK(beyond, size, one), one);
+      qs = qs * share, qt = qt * share;
+      jlaw_put_(q + i, now.places, &qs), jlaw_put_(q + law->facets * law->cells + i, now.places, &qt);
     }
   }
 }

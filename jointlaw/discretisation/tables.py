@@ -78,10 +78,10 @@ class Tables:
         """State numbers per joint: delta, offset, dissipated energy, q of all cells, even UNUSED.
 
         Then, with yielding, the flattened depth of every facet and the plastic work; with wear,
-        the slip of the asperities.
+        the slip of the asperities, and by how much mu had fallen in the last step.
         """
         flattened = len(self.c1) + 1 if self.yields else 0
-        return 2 * self.dim + 2 * len(self.c1) * self.cells + flattened + self.wears
+        return 2 * self.dim + 2 * len(self.c1) * self.cells + flattened + 2 * self.wears
 
 
 def tables(

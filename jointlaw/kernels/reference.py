@@ -6,7 +6,8 @@ joints last: facets (M, B), cells (M, D, B), sliders (2, M, D, B). State (rows, 
     delta (dim) | in-plane offset (dim - 1) | dissipated energy (1) | q (2 M D)
 
 where q is the shear force of a slider times lam, in the (s, t) basis of Eq. 25. With asperities
-that yield follow flattened depth (M) | plastic work (1); with wear, slip of the asperities (1).
+that yield follow flattened depth (M) | plastic work (1); with wear, slip of the asperities (1)
+and by how much mu had fallen in the last step (1).
 """
 
 from typing import NamedTuple
@@ -39,6 +40,7 @@ class State(NamedTuple):
     depth: Array  # flattened depth of every facet (M, B), no rows where asperities do not yield
     plastic: Array  # (B,) or no rows
     slip: Array  # of the asperities (B,), or no rows
+    fallen: Array  # by how much mu had fallen in the last step (B,), or no rows
 
 
 class Sliders(NamedTuple):
@@ -102,7 +104,8 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     q, lost, mu = old.q, np.zeros(d.shape[1]), np.asarray(k.mu)
     if k.wears:
         mu = friction(k, old.slip)
-        q, lost = within_limit(k, before, q, strength(k, mu))
+        q, lost = within_limit(k, before, q, strength(k, mu), old.fallen, mu)
+        new.fallen[:] = k.mu - mu
 
     basis = np.stack([k.s, k.t])  # (2, dim, M)
     de = np.einsum("edm,db->emb", basis, d)[:, :, None]  # facet-plane increment (2, M, 1, B)
@@ -139,9 +142,9 @@ def parts(k: Tables, state: Array) -> State:
     dim, M = k.dim, len(k.c1)
     q, rest = np.split(state[2 * dim :], [2 * len(k.c1) * k.cells])
     depth, plastic = (rest[:M], rest[M]) if k.yields else (rest[:0], rest[:0])
-    slip = rest[-1] if k.wears else rest[:0]
+    slip, fallen = rest[-2:] if k.wears else (rest[:0], rest[:0])
     moved = state[:dim], state[dim : 2 * dim - 1], state[2 * dim - 1]
-    return State(*moved, q.reshape(2, M, k.cells, -1), depth, plastic, slip)
+    return State(*moved, q.reshape(2, M, k.cells, -1), depth, plastic, slip, fallen)
 
 
 def effective_closure(k: Tables, closure: Array, offset: Array) -> Array:

@@ -47,6 +47,7 @@ class Tables:
     opposite: NDArray[np.intp] | None = None
     mu_residual: float | None = None
     wear_slip: float = math.inf
+    front: bool = False
 
     @property
     def yields(self) -> bool:
@@ -69,9 +70,14 @@ class Tables:
         return int(self.depth.shape[1]) - 1
 
     @property
+    def several(self) -> int:
+        """Sliders of the facet that has most: its cells, and its front."""
+        return self.cells + self.front
+
+    @property
     def sliders(self) -> int:
-        """Sliders per joint: one for each cell of each facet."""
-        return int(np.count_nonzero(self.depth[:, :-1] < UNUSED))
+        """Sliders per joint: one for each cell of each facet, and one for its front."""
+        return int(np.count_nonzero(self.depth[:, :-1] < UNUSED)) + len(self.c1) * self.front
 
     @property
     def rows(self) -> int:
@@ -81,7 +87,8 @@ class Tables:
         the slip of the asperities.
         """
         flattened = len(self.c1) + 1 if self.yields else 0
-        return 2 * self.dim + 2 * len(self.c1) * self.cells + flattened + self.wears
+        fronts = len(self.c1) if self.front else 0
+        return 2 * self.dim + 2 * len(self.c1) * self.several + fronts + flattened + self.wears
 
 
 def tables(
@@ -92,6 +99,7 @@ def tables(
     closure_range: float,
     cells: int,
     critical_slip: float,
+    front: bool = False,
 ) -> Tables:
     """Lay out the tables; `cells` for the facet of most weight, one where the curve is linear."""
     c1, slope = np.cos(facets.theta), np.tan(facets.theta)
@@ -110,7 +118,7 @@ def tables(
     return Tables(
         curve, *frozen(arrays), asperity.lam, asperity.mu, critical_slip, yield_depth,
         alone if math.isinf(critical_slip) else facets.opposite,
-        asperity.mu_residual, asperity.wear_slip,
+        asperity.mu_residual, asperity.wear_slip, front,
     )  # fmt: skip
 
 

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from ..discretisation.tables import UNDERFLOW, Tables
 from ..support.checks import Array
-from .cells import TINY, Cells, cells, compliance, reciprocal
+from .cells import TINY, Cells, Limits, cells, compliance, limits, reciprocal
+from .front import cut, moved
 from .wear import friction, slipped, within_limit
 from .yielding import flattened, plastic_work, press, softening
 
@@ -39,6 +40,7 @@ class State(NamedTuple):
     depth: Array  # flattened depth of every facet (M, B), no rows where asperities do not yield
     plastic: Array  # (B,) or no rows
     slip: Array  # of the asperities (B,), or no rows
+    front: Array  # depth at which the front of every facet begins (M, B), or no rows
 
 
 class Sliders(NamedTuple):
@@ -90,12 +92,13 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     offset, J_offset, slip = limited_offset(k, old.offset, d[1:])
     new.offset[:] = offset
 
-    before = cells(k, effective_closure(k, old.delta[0], old.offset))
-    after = cells(k, effective_closure(k, new.delta[0], offset))
+    at = cut(k, old.front) if k.front else limits(k)
+    before = cells(k, effective_closure(k, old.delta[0], old.offset), at)
+    after = cells(k, effective_closure(k, new.delta[0], offset), at)
     gained, flat0, flat1 = after.G - before.G, None, None
     if k.yields:
         new.depth[:] = press(k, old.depth, after.y)
-        flat0, flat1 = cells(k, old.depth), cells(k, new.depth)
+        flat0, flat1 = cells(k, old.depth, at), cells(k, new.depth, at)
         new.plastic[:] = old.plastic + plastic_work(k, before.y, after.y, flat0, flat1)
         gained = after.G - np.maximum(before.G, flat0.G)
         before, after = flattened(before, flat0), flattened(after, flat1)
@@ -114,6 +117,9 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     F = F + np.einsum("edm,emb->db", basis, new.q.sum(axis=2)) / k.lam
 
     lost = lost + friction_loss(k, before, after, q, sliders)
+    if k.front:
+        new.front[:], new.q[:], joined = moved(k, old.front, at, before.y, after, new.q)
+        lost = lost + joined
     new.dissipated[:] = old.dissipated + lost
     if slip.any():
         pull = k.n[1:] @ (k.area[:, None] * after.force)  # in-plane part of the normal forces
@@ -128,7 +134,7 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     if not tangent:
         return new_state, F, None
     g = gradient(k, J_offset)
-    C = stiffness(k, before, after, sliders, de, g)
+    C = stiffness(k, at, before, after, sliders, de, g)
     if flat0 is not None and flat1 is not None:
         C = C - softening(k, after, flat0, flat1, sliders.push, g)
     return new_state, F, C
@@ -137,11 +143,12 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
 def parts(k: Tables, state: Array) -> State:
     """Views of the parts of a state array, q as (2, M, D, B)."""
     dim, M = k.dim, len(k.c1)
-    q, rest = np.split(state[2 * dim :], [2 * len(k.c1) * k.cells])
+    q, rest = np.split(state[2 * dim :], [2 * M * k.several])
+    front, rest = np.split(rest, [M if k.front else 0])
     depth, plastic = (rest[:M], rest[M]) if k.yields else (rest[:0], rest[:0])
     slip = rest[-1] if k.wears else rest[:0]
-    moved = state[:dim], state[dim : 2 * dim - 1], state[2 * dim - 1]
-    return State(*moved, q.reshape(2, M, k.cells, -1), depth, plastic, slip)
+    place = state[:dim], state[dim : 2 * dim - 1], state[2 * dim - 1]
+    return State(*place, q.reshape(2, M, k.several, -1), depth, plastic, slip, front)
 
 
 def effective_closure(k: Tables, closure: Array, offset: Array) -> Array:
@@ -255,13 +262,13 @@ def gradient(k: Tables, J_offset: Array) -> Array:
 
 
 def stiffness(
-    k: Tables, before: Cells, after: Cells, sliders: Sliders, de: Array, g: Array
+    k: Tables, at: Limits, before: Cells, after: Cells, sliders: Sliders, de: Array, g: Array
 ) -> Array:
     """Tangent C = dF/dd (dim, dim, B): J_q = beta (I - s s^T) E + v g^T per cell, summed."""
     trial, share, chord, grows = sliders.trial, sliders.share, sliders.chord, sliders.grows
     y, kappa = after.y, after.kappa
     a = (k.area / k.c1)[:, None, None]
-    inside = (y[:, None] > k.depth[:, :-1, None]) & (y[:, None] < k.depth[:, 1:, None])
+    inside = (y[:, None] > at.low) & (y[:, None] < at.high)
     p = np.where(inside, k.curve.curvature(y)[:, None], 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         chord_slope = np.where(sliders.near, p / 2, (kappa - chord) / (y - before.y)[:, None])
@@ -307,8 +314,9 @@ class Measures(NamedTuple):
 def measures(k: Tables, state: Array) -> Measures:
     """Shares, stored energy and reach of a batch of states (rows, B)."""
     state_now = parts(k, state)
-    virgin = cells(k, effective_closure(k, state_now.delta[0], state_now.offset))
-    now = flattened(virgin, cells(k, state_now.depth) if k.yields else None)
+    at = cut(k, state_now.front) if k.front else limits(k)
+    virgin = cells(k, effective_closure(k, state_now.delta[0], state_now.offset), at)
+    now = flattened(virgin, cells(k, state_now.depth, at) if k.yields else None)
     y, force, G = now.y, now.force, now.G
     mu = friction(k, state_now.slip) if k.wears else np.asarray(k.mu)
     q2 = state_now.q[0] ** 2 + state_now.q[1] ** 2

@@ -17,8 +17,9 @@ def sliders_within_friction(batch, mu):
     k, values = batch.law.tables, batch.snapshot().values
     now = kernel.parts(k, values)
     y = kernel.effective_closure(k, now.delta[0], now.offset)
-    virgin = kernel.cells(k, y)
-    cells = kernel.flattened(virgin, kernel.cells(k, now.depth) if k.yields else None)
+    at = kernel.cut(k, now.front) if k.front else None
+    virgin = kernel.cells(k, y, at)
+    cells = kernel.flattened(virgin, kernel.cells(k, now.depth, at) if k.yields else None)
     strength = mu * k.lam * k.area[:, None]
     size = np.hypot(now.q[0], now.q[1])
     excess = size - strength[:, None] * cells.G

@@ -102,7 +102,10 @@ def main() -> None:
     args = parser.parse_args()
     given = (text.partition("=") for text in args.prior)
     priors = {name: tuple(map(float, ends.split(","))) for name, _, ends in given}
-    print("| rock | jointlaw | largest | power law | Barton-Bandis | covered | warned |")
+    print(
+        "| curve made by | jointlaw, median | jointlaw, largest | power law, median "
+        "| Barton-Bandis, median | inside the band | report warns |"
+    )
     print("|---|---:|---:|---:|---:|---:|---:|")
     with ProcessPoolExecutor(args.workers) as pool:
         for rock in args.rocks:

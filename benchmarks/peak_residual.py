@@ -75,7 +75,10 @@ def main() -> None:
     start = np.log(list(START.values()))
     found = least_squares(misfit, start, bounds=(start - 3, start + 3), diff_step=1e-3, xtol=1e-6)
     print(", ".join(f"{n} = {v:.4g}" for n, v in zip(START, np.exp(found.x), strict=True)))
-    print("\n| normal (MPa) | peak | displacement at the peak | residual | half the step |")
+    print(
+        "\n| normal stress (MPa) | error of the peak | displacement at the peak, law / measured "
+        "| error of the residual | change if the step is halved |"
+    )
     print("|---|---:|---:|---:|---:|")
     for normal, measured in MEASURED.items():
         stress = shear(found.x, normal)

@@ -65,7 +65,10 @@ def misses(law: jl.JointLaw) -> np.ndarray:
 def table(found: np.ndarray) -> str:
     """Markdown of misses (laws, tried, ratios, 4)."""
     names = [f"{ratio:g}" if math.isfinite(ratio) else "none" for ratio in RATIOS]
-    lines = [f"| resolution | miss of | {' | '.join(names)} |", f"|---|---|{'---:|' * len(names)}"]
+    lines = [
+        f"| resolution | error (degrees) of | {' | '.join(names)} |",
+        f"|---|---|{'---:|' * len(names)}",
+    ]
     kinds = ("friction, largest", "friction, on the way back", "friction, median", "dilation")
     for i, name in enumerate(TRIED):
         for k, kind in enumerate(kinds):

@@ -190,7 +190,7 @@ def damping():
             for name, one in found.items()]  # fmt: skip
     rows.append(["exact bed, damping ratio", *(f"{exact.damping[i]:.2%}" for i in shown), "",
                  *(f"{share:.1%}" for share in exact.kept)])  # fmt: skip
-    head = ["loss over that of the exact bed at", *(f"{AMPLITUDES[i]:.2g}" for i in shown),
+    head = ["loss / exact loss at amplitude", *(f"{AMPLITUDES[i]:.2g}" for i in shown),
             "stiffness", *(f"kept, {opening:g}" for opening in OPENINGS)]  # fmt: skip
     return table(head, rows)
 
@@ -233,7 +233,13 @@ def all_presets():
                 cells.append(f"{loss.max():.0%}, {kept.max():.0%}")
         rows.append([name, *cells])
     where = ("plane", "space")
-    return table(["misses of loss, kept", *(f"{n}, {w}" for w in where for n in NAMED)], rows)
+    return table(
+        [
+            "error of the loss, error of the share kept",
+            *(f"{n}, {w}" for w in where for n in NAMED),
+        ],
+        rows,
+    )
 
 
 PARTS = {

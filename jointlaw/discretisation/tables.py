@@ -27,6 +27,7 @@ class Tables:
     A facet of fewer cells has its limits first; cells that begin at UNUSED stay empty.
     `yield_depth` (M,) is the yield interference along y, None where asperities do not yield;
     `opposite` (M,) names the facet that shares its flattened depth, each itself if none does.
+    `front`: whether each facet has a front, one more slider.
     """
 
     curve: VirginCurve
@@ -83,12 +84,14 @@ class Tables:
     def rows(self) -> int:
         """State numbers per joint: delta, offset, dissipated energy, q of all cells, even UNUSED.
 
-        Then, with yielding, the flattened depth of every facet and the plastic work; with wear,
-        the slip of the asperities.
+        Then, with fronts, the depth at which that of every facet begins; with yielding, the
+        flattened depth of every facet and the plastic work; with wear, the slip of the asperities,
+        and by how much mu had fallen in the last step.
         """
         flattened = len(self.c1) + 1 if self.yields else 0
         fronts = len(self.c1) if self.front else 0
-        return 2 * self.dim + 2 * len(self.c1) * self.several + fronts + flattened + self.wears
+        sliders = 2 * len(self.c1) * self.several
+        return 2 * self.dim + sliders + fronts + flattened + 2 * self.wears
 
 
 def tables(

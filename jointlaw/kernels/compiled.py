@@ -40,10 +40,11 @@ _J00, _J01, _J10, _J11, _SLIP, _PULL1, _PULL2, _LOST, _F, _FS, _FT = _rows(29, 1
 _NORMAL, _CRUSHED = _rows(40, 2)  # a joint whose asperities wear or yield
 _C00, _C01, _C02, _C10, _C11, _C12, _C20, _C21, _C22, _MU = _rows(42, 10)
 _Z0, _Z1, _FZ0, _FZ1, _SZ1, _AT0, _FAT0, _WS, _WT = _rows(52, 9)  # its flattened facets
-_LOW, _FLOW, _SLOW, _HIGH, _FHIGH, _SHIGH = _rows(61, 6)  # limits of a slider, beside a front
-_FRONT, _FFRONT, _SFRONT, _END, _FEND, _SEND = _rows(67, 6)  # those of the front
-_CELL, _KCELL, _QSCELL, _QTCELL, _KFRONT, _STAKE, _QS, _QT = _rows(73, 8)
-_PAD = 81 * LANES
+(_SINCE,) = _rows(61, 1)  # friction over that of the last step
+_LOW, _FLOW, _SLOW, _HIGH, _FHIGH, _SHIGH = _rows(62, 6)  # limits of a slider, beside a front
+_FRONT, _FFRONT, _SFRONT, _END, _FEND, _SEND = _rows(68, 6)  # those of the front
+_CELL, _KCELL, _QSCELL, _QTCELL, _KFRONT, _STAKE, _QS, _QT = _rows(74, 8)
+_PAD = 82 * LANES
 
 # The same rows while joints are measured
 _WHOLE, _LIMIT, _SLIDING, _SLIPPING, _APART, _STORED, _REACH = _rows(20, 7)
@@ -268,7 +269,7 @@ def _places(law, yields, wears, front):
     if yields is not None:
         slip = beside = first + M + 1
     if wears is not None:
-        beside = slip + 1
+        beside = slip + 2
     theirs = beside + 2 * M
     if yields is not None:
         theirs += M
@@ -286,10 +287,14 @@ def _several(law, front):
 
 @_jit
 def _weaken(pad, s, L, law, yields, wears, front):
-    """Friction of the asperities of each joint, after their slip."""
+    """Friction of the asperities of each joint after their slip, and over that of the last step."""
     slip, first, last = _places(law, yields, wears, front)[1], law.scalars[1], law.scalars[6]
     for l in range(L):
         pad[_MU + l] = last + (first - last) * np.exp(-s[slip, l] / law.scalars[7])
+    for l in range(L):
+        before = first - s[slip + 1, l]
+        since = pad[_MU + l] / (before if before > 0.0 else 1.0)
+        pad[_SINCE + l] = since if (since < 1.0) & (before > 0.0) else 1.0
 
 
 @_jit
@@ -514,19 +519,17 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent, yields, wears, front):
         kept = 1.0 if grows else ratio
         add = a * (chord if grows else k1)
         olds, oldt, des, det = qs[l], qt[l], pad[_DES + l], pad[_DET + l]
-        if wears is not None:  # back to the limit, that fell since
+        if wears is not None:  # back within the limit, that fell since
             strength = by_mu * pad[_MU + l]
             if yields is not None:
                 G0 = _between(z0, pad[_FZ0 + l], y0, f0, zl, fl, sl, zh, fh, sh, ended)
                 h0 = k0 * (y0 - (z0 if z0 > zl else zl))
                 G0 = G0 if h0 > G0 else h0
                 G0 = G0 if G0 > 0.0 else 0.0
-            size0 = np.sqrt(olds * olds + oldt * oldt)
-            cap0 = strength * G0
-            back = cap0 / (size0 if size0 > cap0 else 1.0)
-            back = back if size0 > cap0 else 1.0
+            cap0, before2 = strength * G0, olds * olds + oldt * oldt
+            back = pad[_SINCE + l] if before2 > cap0 * cap0 else 1.0
             soft0 = 1.0 / (k0 if k0 > TINY else 1.0)
-            worn = (1.0 - back) * (1.0 + back) * size0 * size0 * soft0
+            worn = (1.0 - back) * (1.0 + back) * before2 * soft0
             pad[_LOST + l] += compliance * (worn if k0 > TINY else 0.0)
             olds, oldt = back * olds, back * oldt
         ts, tt = olds * kept + add * des, oldt * kept + add * det
@@ -814,6 +817,7 @@ def _finish(pad, s, F, C, start, L, law, ledger, tangent, yields, wears, front):
                 capacity = 0.5 * pad[_MU + l] * pad[_NORMAL + l]
                 rubbed = pad[_LOST + l] / (capacity if capacity > 0.0 else 1.0)
                 s[slip, l] += rubbed if capacity > 0.0 else 0.0
+                s[slip + 1, l] = law.scalars[1] - pad[_MU + l]
 
 
 @_jit

@@ -5,8 +5,10 @@ joints last: facets (M, B), cells (M, D, B), sliders (2, M, D, B). State (rows, 
 
     delta (dim) | in-plane offset (dim - 1) | dissipated energy (1) | q (2 M D)
 
-where q is the shear force of a slider times lam, in the (s, t) basis of Eq. 25. With asperities
-that yield follow flattened depth (M) | plastic work (1); with wear, slip of the asperities (1).
+where q is the shear force of a slider times lam, in the (s, t) basis of Eq. 25. With fronts D is
+one more, and their depth (M) follows, docs/theory-incremental.md, "A front that moves". With
+asperities that yield follow flattened depth (M) | plastic work (1); with wear, slip of the
+asperities (1) and by how much mu had fallen in the last step (1).
 """
 
 from typing import NamedTuple
@@ -40,6 +42,7 @@ class State(NamedTuple):
     depth: Array  # flattened depth of every facet (M, B), no rows where asperities do not yield
     plastic: Array  # (B,) or no rows
     slip: Array  # of the asperities (B,), or no rows
+    fallen: Array  # by how much mu had fallen in the last step (B,), or no rows
     front: Array  # depth at which the front of every facet begins (M, B), or no rows
 
 
@@ -84,6 +87,8 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     5. Traction: F = sum of A Phi n + (1/lam) sum of q (Eq. 21).
     6. Dissipated energy, every term >= 0 ("No step creates energy").
     7. Tangent C = dF/dd ("The tangent"), not without `tangent`.
+
+    With fronts each of them may join its cell at the end ("A front that moves").
     """
     old = parts(k, state)
     new_state = np.empty_like(state)
@@ -105,7 +110,8 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     q, lost, mu = old.q, np.zeros(d.shape[1]), np.asarray(k.mu)
     if k.wears:
         mu = friction(k, old.slip)
-        q, lost = within_limit(k, before, q, strength(k, mu))
+        q, lost = within_limit(k, before, q, strength(k, mu), old.fallen, mu)
+        new.fallen[:] = k.mu - mu
 
     basis = np.stack([k.s, k.t])  # (2, dim, M)
     de = np.einsum("edm,db->emb", basis, d)[:, :, None]  # facet-plane increment (2, M, 1, B)
@@ -146,9 +152,9 @@ def parts(k: Tables, state: Array) -> State:
     q, rest = np.split(state[2 * dim :], [2 * M * k.several])
     front, rest = np.split(rest, [M if k.front else 0])
     depth, plastic = (rest[:M], rest[M]) if k.yields else (rest[:0], rest[:0])
-    slip = rest[-1] if k.wears else rest[:0]
+    slip, fallen = rest[-2:] if k.wears else (rest[:0], rest[:0])
     place = state[:dim], state[dim : 2 * dim - 1], state[2 * dim - 1]
-    return State(*place, q.reshape(2, M, k.several, -1), depth, plastic, slip, front)
+    return State(*place, q.reshape(2, M, k.several, -1), depth, plastic, slip, fallen, front)
 
 
 def effective_closure(k: Tables, closure: Array, offset: Array) -> Array:

@@ -13,11 +13,19 @@ def friction(k: Tables, slip: Array) -> Array:
     return k.mu_residual + (k.mu - k.mu_residual) * np.exp(-slip / k.wear_slip)
 
 
-def within_limit(k: Tables, before: Cells, q: Array, strength: Array) -> tuple[Array, Array]:
-    """q brought back to the friction limit, that fell since, and the energy (B,) that it loses."""
-    size, cap = np.sqrt(q[0] ** 2 + q[1] ** 2), strength * before.G
-    share = np.divide(cap, size, out=np.ones_like(size), where=size > cap)
-    lost = (1 - share) * (1 + share) * size**2 * reciprocal(before.kappa)
+def within_limit(
+    k: Tables, before: Cells, q: Array, strength: Array, fallen: Array, mu: Array
+) -> tuple[Array, Array]:
+    """q brought back within the friction limit of mu (B,), and the energy (B,) that it loses.
+
+    fallen (B,): what mu had lost in the last step, whose friction limits q is within. So a slider
+    above its limit of now is within it once it has lost the share that mu has lost since.
+    """
+    last = k.mu - fallen
+    since = np.minimum(np.divide(mu, last, out=np.ones_like(last), where=last > 0), 1.0)
+    q2 = q[0] ** 2 + q[1] ** 2
+    share = np.where(q2 > (strength * before.G) ** 2, since, 1.0)
+    lost = (1 - share) * (1 + share) * q2 * reciprocal(before.kappa)
     return share * q, np.sum(compliance(k) * lost, axis=(0, 1))
 
 

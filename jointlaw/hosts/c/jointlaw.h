@@ -326,7 +326,7 @@ static double jlaw_psi_(const jlaw_law *law, double y)
 typedef struct {
   double p[3], from[3], to[3]; /* increment; closure and in-plane offset before and after */
   double J[4], slip;           /* d offset/d p; way along the offset at its limit */
-  double worn;                 /* friction now over that of unworn asperities */
+  double worn, since;          /* friction now over that of unworn asperities, of the last step */
 } jlaw_move_;
 
 typedef struct { /* what the blocks add up to, lane by lane */
@@ -431,14 +431,13 @@ JLAW_INLINE void jlaw_cells_(const double *limits, const jlaw_facets_ *f, jlaw_s
 }
 
 /* Friction has fallen: sliders come back to their limit, and lose what they held beyond it */
-JLAW_INLINE void jlaw_wear_(const jlaw_slider_ *s, jlaw_v_ *qs, jlaw_v_ *qt, jlaw_v_ *lost)
+JLAW_INLINE void jlaw_wear_(const jlaw_slider_ *s, double since, jlaw_v_ *qs, jlaw_v_ *qt,
+                            jlaw_v_ *lost)
 {
   const jlaw_v_ zero = {0.0}, one = zero + 1.0, size2 = *qs * *qs + *qt * *qt;
   const jlaw_v_ cap = s->strength * s->G0;
-  jlaw_v_ size = size2;
-  jlaw_root_(&size);
-  const jlaw_mask_ beyond = size > cap, stiff = s->k0 > JLAW_TINY;
-  const jlaw_v_ back = JLAW_PICK(beyond, cap / JLAW_PICK(beyond, size, one), one);
+  const jlaw_mask_ stiff = s->k0 > JLAW_TINY;
+  const jlaw_v_ back = JLAW_PICK(size2 > cap * cap, zero + since, one);
   const jlaw_v_ gone = (1.0 - back) * (1.0 + back) * size2;
   *lost += JLAW_PICK(stiff, gone / JLAW_PICK(stiff, s->k0, one), zero);
   *qs = back * *qs, *qt = back * *qt;
@@ -479,9 +478,9 @@ JLAW_INLINE void jlaw_slide_tangent_(const double *w, const double *limits, cons
 }
 
 /* One depth cell of facets: load, friction limit, loss, tangent; q: sliders before and after */
-JLAW_INLINE void jlaw_slide_(const double *w, const double *limits, double worn, jlaw_facets_ *f,
-                             jlaw_v_ *qs, jlaw_v_ *qt, int yields, int wears, int ledger,
-                             int tangent)
+JLAW_INLINE void jlaw_slide_(const double *w, const double *limits, const jlaw_move_ *m,
+                             jlaw_facets_ *f, jlaw_v_ *qs, jlaw_v_ *qt, int yields, int wears,
+                             int ledger, int tangent)
 {
   const jlaw_v_ zero = {0.0}, one = zero + 1.0, a = JLAW_W(JLAW_STIFF);
   jlaw_slider_ s;
@@ -489,8 +488,8 @@ JLAW_INLINE void jlaw_slide_(const double *w, const double *limits, double worn,
   const jlaw_v_ k0 = s.k0, k1 = s.k1;
   s.strength = JLAW_W(JLAW_STRENGTH);
   if (wears) {
-    s.strength = s.strength * worn;
-    jlaw_wear_(&s, qs, qt, &f->lost);
+    s.strength = s.strength * m->worn;
+    jlaw_wear_(&s, m->since, qs, qt, &f->lost);
   }
   /* trial force: by the chord where stiffness grows, scaled down where it falls */
   s.dy = f->y1 - f->y0;
@@ -639,7 +638,7 @@ JLAW_INLINE void jlaw_add_facets_(const jlaw_law *law, int first, const jlaw_mov
   for (int i = 0; i < D; i++, qs0++, qt0++, qs1++, qt1++, z += JLAW_ROWS * JLAW_LANES) {
     jlaw_v_ qs = zero, qt = zero;
     jlaw_take_(qs0, places, &qs), jlaw_take_(qt0, places, &qt);
-    if (i < used) jlaw_slide_(w, z, m->worn, &f, &qs, &qt, yields, wears, ledger, tangent);
+    if (i < used) jlaw_slide_(w, z, m, &f, &qs, &qt, yields, wears, ledger, tangent);
     jlaw_put_(qs1, places, &qs), jlaw_put_(qt1, places, &qt);
   }
   if (yields) {
@@ -719,6 +718,7 @@ JLAW_INLINE int jlaw_step_(const jlaw_law *law, const jlaw_move_ *m, const doubl
     const double limit = 0.5 * law->mu * m->worn * jlaw_total_(sum.normal);
     const size_t last = yields ? M + 1 : 0;
     rest1[last] = rest0[last] + (limit > 0.0 ? lost / limit : 0.0);
+    rest1[last + 1] = law->mu - law->mu * m->worn;
   }
   if (yields) {
     rest1[M] = rest0[M] + jlaw_total_(sum.crushed);
@@ -750,31 +750,44 @@ JLAW_CLONES static int jlaw_advance_(const jlaw_law *law, const jlaw_move_ *m, c
   return jlaw_step_(law, m, s0, s1, F, C, 2, 0, 0, JLAW_LEDGER, 1);
 }
 
-/* First number after the sliders: flattened depths, plastic work; then slip of the asperities */
+/* First number after the sliders: flattened depths, plastic work; then slip of the asperities, and
+   by how much their friction had fallen in the last step */
 static size_t jlaw_rest_(const jlaw_law *law)
 {
   return 2 * (size_t) law->dim + 2 * (size_t) law->facets * (size_t) law->cells;
 }
 
+static const double *jlaw_slip_(const jlaw_law *law, const double *s)
+{
+  return s + jlaw_rest_(law) + (law->yields ? law->facets + 1 : 0);
+}
+
 /* Whether energies, flattened depths and slip of a state are numbers that a law can have */
 static int jlaw_proper_(const jlaw_law *law, const double *s)
 {
-  const double *rest = s + jlaw_rest_(law), *slip = rest + (law->yields ? law->facets + 1 : 0);
+  const double *rest = s + jlaw_rest_(law), *slip = jlaw_slip_(law, s);
   int good = fabs(s[2 * law->dim - 1]) <= DBL_MAX;
   for (int f = 0; law->yields && f < law->facets; f++)
     good = good && rest[f] >= 0.0 && rest[f] <= law->largest_reach;
   if (law->yields) good = good && fabs(rest[law->facets]) <= DBL_MAX;
-  if (law->wears) good = good && *slip >= 0.0 && *slip <= DBL_MAX;
+  if (law->wears) good = good && slip[0] >= 0.0 && slip[0] <= DBL_MAX;
+  if (law->wears) good = good && slip[1] >= 0.0 && slip[1] <= law->mu;
   return good;
 }
 
 /* Friction after the slip of the asperities, over that of unworn ones: "Wear" */
 static double jlaw_worn_(const jlaw_law *law, const double *s)
 {
-  const double *slip = s + jlaw_rest_(law) + (law->yields ? law->facets + 1 : 0);
   if (!law->wears || !(law->mu > 0.0)) return 1.0;
-  const double mu = law->mu_residual + (law->mu - law->mu_residual) * exp(-*slip / law->wear_slip);
+  const double mu = law->mu_residual + (law->mu - law->mu_residual) * exp(-*jlaw_slip_(law, s) / law->wear_slip);
   return mu / law->mu;
+}
+
+/* Friction over that of the last step, whose friction limits a state is within */
+static double jlaw_since_(const jlaw_law *law, const double *s, double worn)
+{
+  const double last = law->wears ? law->mu - jlaw_slip_(law, s)[1] : 0.0, mu = law->mu * worn;
+  return mu < last ? mu / last : 1.0;
 }
 
 static int jlaw_refuse_(const jlaw_law *law, const double *s, const double *d, int damaged,
@@ -814,6 +827,7 @@ int jlaw_update(const jlaw_law *law, const double *s0, double *s1, const double 
   m.from[0] = s0[0], m.from[1] = dim > 1 ? s0[dim] : 0.0, m.from[2] = dim > 2 ? s0[4] : 0.0;
   m.to[0] = s0[0] + d[0];
   m.worn = law->wears ? jlaw_worn_(law, s0) : 1.0;
+  m.since = jlaw_since_(law, s0, m.worn);
   const double shear = (dim > 1 ? fabs(s0[1]) : 0.0) + (dim > 2 ? fabs(s0[2]) : 0.0);
   const double far = fabs(s0[0]) + fabs(m.from[1]) + fabs(m.from[2]) + shear;
   const double reach = law->stretch * (far + fabs(m.p[0]) + fabs(m.p[1]) + fabs(m.p[2]));
@@ -830,7 +844,7 @@ int jlaw_update(const jlaw_law *law, const double *s0, double *s1, const double 
 int jlaw_dim(const jlaw_law *law) { return law->dim; }
 int jlaw_state_size(const jlaw_law *law)
 {
-  return (int) jlaw_rest_(law) + (law->yields ? law->facets + 1 : 0) + law->wears;
+  return (int) jlaw_rest_(law) + (law->yields ? law->facets + 1 : 0) + 2 * law->wears;
 }
 const char *jlaw_fingerprint(const jlaw_law *law) { return law->fingerprint; }
 double jlaw_dissipated(const jlaw_law *law, const double *s) { return s[2 * law->dim - 1]; }

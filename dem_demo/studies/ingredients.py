@@ -66,43 +66,54 @@ def variants(scene: Scene, stress: dict[str, Stress]) -> Iterator[Variant]:
     yield from _runs(scene, max((s.largest for s in stress.values()), default=0.0))
 
 
-def _removals(law: jl.JointLaw) -> Iterator[tuple[str, bool, dict[str, Any]]]:
-    """Ingredients of a law: name, does the stiffness depend on it, parameters that lack it."""
-    heights, asperity, orientation = law.heights, law.asperity, law.orientation
+def _removals(law: jl.JointLaw) -> Iterator[tuple[str, bool, Callable[[], jl.JointLaw]]]:
+    """Ingredients of a law: name, does the stiffness depend on it, what makes the law without it.
+
+    That raises ValueError where there is no such law.
+    """
+    heights, asperity = law.heights, law.asperity
+
+    def without(**parameters: Any) -> Callable[[], jl.JointLaw]:
+        return partial(replace, law, **parameters)
+
     # Population curves are not convex at eta = 0, so heights are then counted one by one.
     one_by_one = heights and replace(heights, formation="individual")
     if heights:
-        yield "no heights", True, {"heights": None}
+        yield "no heights", True, without(heights=None)
     if heights and heights.formation == "population":
-        yield "heights counted one by one", True, {"heights": one_by_one}
+        yield "heights counted one by one", True, without(heights=one_by_one)
     if asperity.eta:
-        linear = {"asperity": replace(asperity, eta=0.0), "heights": one_by_one}
+        linear = without(asperity=replace(asperity, eta=0.0), heights=one_by_one)
         yield "linear asperities (eta = 0)", True, linear
     if asperity.mu:
         smooth = replace(asperity, mu=0.0, mu_residual=None, wear_slip=np.inf)
-        yield "no friction on asperities", True, {"asperity": smooth}
+        yield "no friction on asperities", True, without(asperity=smooth)
     if np.isfinite(asperity.yield_interference):
-        elastic = {"asperity": replace(asperity, yield_interference=np.inf)}
-        yield "elastic asperities", True, elastic
+        elastic = replace(asperity, yield_interference=np.inf)
+        yield "elastic asperities", True, without(asperity=elastic)
     for key in ("b", "c"):
-        if getattr(orientation, key):
-            yield f"{key} = 0", True, {"orientation": replace(orientation, **{key: 0.0})}
+        if getattr(law.orientation, key):
+            yield f"{key} = 0", True, partial(_with_part_zero, law, key)
     if np.isfinite(law.critical_slip):
-        yield "no large shear", False, {"critical_slip": np.inf}
+        yield "no large shear", False, without(critical_slip=np.inf)
     lengths = law.critical_slip / law.closure_range, asperity.yield_interference / law.closure_range
     for name, resolution in named(*lengths).items():
         if law.resolution != resolution:
-            yield f"resolution {name}", False, {"resolution": resolution}
+            yield f"resolution {name}", False, without(resolution=resolution)
     if law.resolution.depth > 1:
-        yield "one depth cell", False, {"resolution": replace(law.resolution, depth=1)}
+        yield "one depth cell", False, without(resolution=replace(law.resolution, depth=1))
+
+
+def _with_part_zero(law: jl.JointLaw, key: str) -> jl.JointLaw:
+    """The law with the parameter b or c of its orientation 0, which c or b may not allow."""
+    return replace(law, orientation=replace(law.orientation, **{key: 0.0}))
 
 
 def _lacking(name: str, law: jl.JointLaw, stress: Stress | None) -> jl.JointLaw:
     """The law without an ingredient; as it is where it has none of this name."""
-    for ingredient, stiffens, parameters in _removals(law):
+    for ingredient, stiffens, make in _removals(law):
         if ingredient == name:
-            made = replace(law, **parameters)
-            return _as_stiff(made, law, stress) if stiffens else made
+            return _as_stiff(make(), law, stress) if stiffens else make()
     return law
 
 

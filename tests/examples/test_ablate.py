@@ -64,6 +64,13 @@ def rows(folder):
     return {row["name"]: Row(**row) for row in found}
 
 
+def test_a_law_that_does_not_exist_without_a_parameter_is_a_row_that_says_why():
+    """c = 0.5 needs b of -1 or less (Eq. 18)."""
+    scene = parse(SLOPE.replace("b = 0.2, c = 0.2", "b = -1.0, c = 0.5"))
+    variant = next(v for v in variants(scene, {}) if v.name == "b = 0")
+    assert _without(variant, None, None, "1/1").note.startswith("cannot be built: orientation.c")
+
+
 def test_each_ingredient_has_a_row(rows):
     assert set(rows) >= NAMES
     assert not any(row.note for row in rows.values())

@@ -342,8 +342,14 @@ typedef struct { /* facets side by side */
   jlaw_v_ ws, wt, open;                         /* sums of the softening by z1; any kappa */
 } jlaw_facets_;
 
-/* Moves the offset by p, dragged along where it is at its limit: "Large shear" */
-static void jlaw_limit_offset_(const jlaw_law *law, jlaw_move_ *m)
+/* x between bounds: fmin and fmax are calls, and treat a NaN that cannot be here */
+JLAW_INLINE double jlaw_within_(double x, double least, double most)
+{
+  return x > least ? (x < most ? x : most) : least;
+}
+
+/* Moves the offset by p, dragged along where it is at its limit: "Large shear". J for a tangent */
+JLAW_INLINE void jlaw_limit_offset_(const jlaw_law *law, jlaw_move_ *m, int tangent)
 {
   const double D = law->critical_slip, p0 = m->p[1], p1 = m->p[2];
   double a0 = m->from[1], a1 = m->from[2];
@@ -355,17 +361,19 @@ static void jlaw_limit_offset_(const jlaw_law *law, jlaw_move_ *m)
       || !(m->to[1] * p0 + m->to[2] * p1 > 0.0)) return;
   const double length = hypot(p0, p1), e0 = p0 / length, e1 = p1 / length;
   const double along = a0 * e0 + a1 * e1;
-  double inside = -along + sqrt(fmax(D * D - (a0 * a0 + a1 * a1) + along * along, 0.0));
-  inside = fmin(fmax(inside, 0.0), length);
+  const double before = D * D - (a0 * a0 + a1 * a1) + along * along;
+  const double inside = jlaw_within_(sqrt(before > 0.0 ? before : 0.0) - along, 0.0, length);
   a0 += inside * e0, a1 += inside * e1;
-  const double x = (length - inside) / D, decay = exp(-x), rest = -expm1(-x);
-  const double cosine = fmin(fmax((a0 * e0 + a1 * e1) / D, 0.0), 1.0);
+  const double x = (length - inside) / D, decay = exp(-x);
+  const double cosine = jlaw_within_((a0 * e0 + a1 * e1) / D, 0.0, 1.0);
   const double sine = (a1 * e0 - a0 * e1) / D;
   const double bottom = (1.0 + cosine) + (1.0 - cosine) * decay * decay;
   const double cos1 = ((1.0 + cosine) - (1.0 - cosine) * decay * decay) / bottom;
   const double sin1 = 2.0 * sine * decay / bottom;
   m->to[1] = D * (cos1 * e0 - sin1 * e1), m->to[2] = D * (cos1 * e1 + sin1 * e0);
   m->slip = D * (x + log(bottom / 2.0));
+  if (!tangent) return;
+  const double rest = -expm1(-x);
   double turn = (rest * rest + cosine * rest * (1.0 + decay)) / bottom;
   turn += inside / (D * fmax(cosine, JLAW_GRAZING)) * (2.0 * decay / bottom - sin1 * sine);
   turn /= length;
@@ -834,7 +842,7 @@ int jlaw_update(const jlaw_law *law, const double *s0, double *s1, const double 
   const int damaged = !(far <= DBL_MAX) || !jlaw_proper_(law, s0); /* NaN stays in sums */
   if (damaged || !(reach <= law->largest_reach))
     return jlaw_refuse_(law, s0, d, damaged, message, size);
-  jlaw_limit_offset_(law, &m);
+  jlaw_limit_offset_(law, &m, C != NULL);
   if (jlaw_advance_(law, &m, s0, s1, F, C)) return jlaw_refuse_(law, s0, d, 1, message, size);
   return 0;
 }

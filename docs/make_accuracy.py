@@ -181,6 +181,10 @@ def damping():
     exact, R = exact_cycles(law), law.closure_range
     found = {name: cycles(replace(law, resolution=name), R) for name in NAMED}
     save_damping(found | {"exact bed": exact})
+    for name in ("fast", "balanced", "fine"):
+        found[f"{name}, fronts"] = cycles(
+            replace(law, resolution=replace(NAMED[name], front=True)), R
+        )
     shown = range(0, len(AMPLITUDES), 4)
     rows = [[name, *(f"{one.loss[i] / exact.loss[i]:.2f}" for i in shown),
              f"{np.abs(one.secant / exact.secant - 1).max():.1%}",

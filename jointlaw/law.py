@@ -285,9 +285,10 @@ class JointLaw:
     @cached_property
     def tables(self) -> Tables:
         """Tables that the kernels read."""
+        r = self.resolution
         return tables(
             self.facets, self.curve, self.asperity, self.asperity_density,
-            self.closure_range, self.resolution.depth, self.critical_slip,
+            self.closure_range, r.depth, self.critical_slip, r.front,
         )  # fmt: skip
 
     @cached_property

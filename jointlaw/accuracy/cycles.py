@@ -85,7 +85,7 @@ def exact_cycles(law: Law, facets: Resolution | None = None) -> Cycles:
     Half the rings and azimuths of the reference are enough for facets, and are the default.
     """
     facets = facets or scaled(reference_resolution(law), 0.5)
-    return _exact(replace(law, resolution=replace(facets, depth=1)))
+    return _exact(replace(law, resolution=replace(facets, depth=1, front=False)))
 
 
 @lru_cache(maxsize=64)

@@ -111,7 +111,8 @@ def coarsest(law: Law, bound: float, excursions: int = 0) -> tuple[Resolution | 
         if meets is None:
             return None, min(alone)
         needs.append(tried[meets:])  # finer ones too, for errors add up
-    several = [Resolution(*nodes) for nodes in product(*needs)]
+    front = law.resolution.front
+    several = [Resolution(u, phi, depth, front) for u, phi, depth in product(*needs)]
     for r in sorted(several, key=lambda r: (r.sliders, r.u, r.phi)):
         if error(r) <= bound:
             return r, error(r)

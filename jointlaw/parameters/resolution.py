@@ -15,21 +15,26 @@ class Resolution:
         fewer, and motion in 3-D takes both halves.
     depth: cells of touch depth of a facet of the ring of most weight, >= 1; lighter ones have
         fewer.
+    front: one more slider per facet, which moves with the closure: small cycles of closure then
+        leave locked-in shear as it is (docs/theory-incremental.md, "A front that moves").
     """
 
     u: int
     phi: int
     depth: int
+    front: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "u", whole("resolution.u", self.u, 1))
         object.__setattr__(self, "phi", whole("resolution.phi", self.phi, 3))
         object.__setattr__(self, "depth", whole("resolution.depth", self.depth, 1))
+        if not isinstance(self.front, bool):
+            raise ValueError(f"resolution.front = {self.front!r} must be True or False")
 
     @property
     def sliders(self) -> int:
         """Most sliders a joint may have for motion in one plane; `law.tables.sliders` counts."""
-        return self.u * (self.phi + 1) * self.depth
+        return self.u * (self.phi + 1) * (self.depth + self.front)
 
 
 # Slip far beyond the closure asks for facets, slip no longer than the closure for depth cells.

@@ -33,7 +33,9 @@ def write_law(law: Mapping[str, Any], path: Path | None) -> str:
     lengths = law["critical_slip"], law["asperity"].yield_interference
     names = named(*(length / law["closure_range"] for length in lengths))
     name = next((n for n, value in names.items() if value == r), None)
-    resolution = f'"{name}"' if name else f"{{ u = {r.u}, phi = {r.phi}, depth = {r.depth} }}"
+    front = ", front = true" if r.front else ""
+    own = f"{{ u = {r.u}, phi = {r.phi}, depth = {r.depth}{front} }}"
+    resolution = f'"{name}"' if name else own
     lines = [
         f"version = {VERSION}  # of this file's keys",
         f"asperity_density = {_num(law['asperity_density'])}  # 1/m2",

@@ -31,6 +31,10 @@ class Resolution:
         if not isinstance(self.front, bool):
             raise ValueError(f"resolution.front = {self.front!r} must be True or False")
 
+    def __repr__(self) -> str:
+        front = ", front=True" if self.front else ""
+        return f"Resolution(u={self.u}, phi={self.phi}, depth={self.depth}{front})"
+
     @property
     def sliders(self) -> int:
         """Most sliders a joint may have for motion in one plane; `law.tables.sliders` counts."""

@@ -82,7 +82,7 @@ def laws():
 def ablation(scene):
     """The file of a scene without each of its ingredients in turn, to four digits."""
     with tempfile.TemporaryDirectory() as folder:
-        until = ("--until", f"{UNTIL[scene]}") if scene in UNTIL else ()
+        until = ("--until", str(UNTIL[scene])) if scene in UNTIL else ()
         run("-m", "dem_demo", "ablate", scene, *until, "--out", folder, "--leave-out", *LEFT_OUT)
         rows = load(Path(folder) / "ablation.csv")
     save(data_of(scene), [{k: four(v) for k, v in row.items() if k not in MACHINE} for row in rows])

@@ -105,7 +105,7 @@ def _removals(law: jl.JointLaw) -> Iterator[tuple[str, bool, Callable[[], jl.Joi
 
 
 def _with_part_zero(law: jl.JointLaw, key: str) -> jl.JointLaw:
-    """The law with the parameter b or c of its orientation 0, which c or b may not allow."""
+    """The law with b or c of its orientation 0; the other may not allow it (Eq. 18)."""
     return replace(law, orientation=replace(law.orientation, **{key: 0.0}))
 
 

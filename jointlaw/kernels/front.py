@@ -1,8 +1,8 @@
 """A front cell per facet, docs/theory-incremental.md, "A front that moves".
 
-The depth cell in which y last turned from falling to rising is cut in two there: what lies above
-is the front, one more slider, the last of its facet. So what parts when y falls again is what
-touched since, and takes no force along that was there before.
+The depth cell in which y last turned from falling to rising is cut in two there: the springs above
+are the front, one more slider, the last of its facet. When y falls again, the springs that part are
+those that touched since, and they carry nothing of the force that was there before.
 """
 
 import numpy as np
@@ -43,9 +43,9 @@ def moved(
 
     at: limits of the sliders in the step. y0: effective closure before it. after, q: at its end.
 
-    Where y has fallen, the front joins its cell, and what touches from now on is the next front.
-    But if this loses more energy than there is in the slider that springs part from, the front
-    stays. Only then is a cycle of many steps, or one that trembles, none that forgets.
+    Where y has fallen, the front joins its cell, and the springs that touch from now on are the
+    next front. If joining loses more energy than there is in the slider that springs part from, the
+    front stays: else a cycle of many steps, or one that trembles, would lose locked-in shear.
     """
     y, kappa, soft = np.maximum(after.y, 0.0), after.kappa, reciprocal(after.kappa)
     inside = holds(limits(k), front)

@@ -18,8 +18,8 @@ def within_limit(
 ) -> tuple[Array, Array]:
     """q brought back within the friction limit of mu (B,), and the energy (B,) that it loses.
 
-    fallen (B,): what mu had lost in the last step, whose friction limits q is within. So a slider
-    above its limit of now is within it once it has lost the share that mu has lost since.
+    fallen (B,): by how much mu had fallen in the last step. q is within the limits of that step; a
+    slider above its present limit is within it after losing the share that mu has lost since.
     """
     last = k.mu - fallen
     since = np.minimum(np.divide(mu, last, out=np.ones_like(last), where=last > 0), 1.0)

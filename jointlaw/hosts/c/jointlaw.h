@@ -342,7 +342,7 @@ typedef struct { /* facets side by side */
   jlaw_v_ ws, wt, open;                         /* sums of the softening by z1; any kappa */
 } jlaw_facets_;
 
-/* x between bounds: fmin and fmax are calls, and treat a NaN that cannot be here */
+/* x between bounds; fmin and fmax would be calls of a library, for the sake of NaN */
 JLAW_INLINE double jlaw_within_(double x, double least, double most)
 {
   return x > least ? (x < most ? x : most) : least;

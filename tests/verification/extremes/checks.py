@@ -6,10 +6,9 @@ import jointlaw as jl
 from jointlaw.kernels import reference as kernel
 
 ROUNDING = 1e-12  # of the facet's normal force: a cell's G is a difference of numbers of that size
-WAVERING = (
-    2e-10  # the same with fronts, whose limits lie anywhere: beyond the last height the slope
-)
-# of a table wavers by 1e-10, and the parts of a cell that is cut there add up no better
+# the same with fronts: beyond the last height the slope of a table wavers by 1e-10, and the two
+# parts of a cell that is cut there add up no better
+WAVERING = 2e-10
 KERNELS = 1e-11  # of the largest traction: rounding of y, 1e-16, over a step of NEAR y, 1e-5
 
 

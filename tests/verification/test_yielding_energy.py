@@ -122,9 +122,10 @@ def test_the_drag_of_the_offset_never_returns_work(mu):
 
 
 @pytest.mark.parametrize("wear_slip", [0.5, 0.01])
-def test_wear_of_one_to_fifty_per_cent_in_a_step_makes_no_energy(wear_slip):
+@pytest.mark.parametrize("interference", [np.inf, 0.3])  # pressed flat, a limit does not grow
+def test_wear_of_one_to_fifty_per_cent_in_a_step_makes_no_energy(wear_slip, interference):
     """Slide, then close while shearing slowly: sliders above their new limit would gain work."""
-    damage = {"mu_residual": 0.2, "wear_slip": wear_slip, "yield_interference": 0.3}
+    damage = {"mu_residual": 0.2, "wear_slip": wear_slip, "yield_interference": interference}
     k = law(mu=0.4, eta=0.0, a=8.0, damage=damage, resolution=jl.Resolution(1, 3, 1)).tables
     state = kernel.step(k, np.zeros((k.rows, 1)), np.array([[0.5], [0.0], [0.0]]), False)[0]
     state = kernel.step(k, state, np.array([[0.0], [0.3], [0.0]]), False)[0]

@@ -110,7 +110,8 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=None, help="processes (all cores)")
     parser.add_argument("--case", choices=list(CASES), action="append", help="only this one")
     args = parser.parse_args()
-    print("| curves | seed | parameter | truth held | identifiable |\n|---|---:|---|---:|---:|")
+    print("| curves | seed | parameter | interval contains the true value | called identifiable |")
+    print("|---|---:|---|---:|---:|")
     with ProcessPoolExecutor(args.workers) as pool:
         for case in args.case or CASES:
             for seed in range(args.seeds):

@@ -77,7 +77,7 @@ def main() -> None:
     print(", ".join(f"{n} = {v:.4g}" for n, v in zip(START, np.exp(found.x), strict=True)))
     print(
         "\n| normal stress (MPa) | error of the peak | displacement at the peak, law / measured "
-        "| error of the residual | change if the step is halved |"
+        "| error of the residual | largest change if the step is halved, share of the peak |"
     )
     print("|---|---:|---:|---:|---:|")
     for normal, measured in MEASURED.items():

@@ -69,7 +69,12 @@ def table(found: np.ndarray) -> str:
         f"| resolution | error (degrees) of | {' | '.join(names)} |",
         f"|---|---|{'---:|' * len(names)}",
     ]
-    kinds = ("friction, largest", "friction, on the way back", "friction, median", "dilation")
+    kinds = (
+        "friction, before reversal",
+        "friction, after reversal",
+        "friction, median",
+        "dilation",
+    )
     for i, name in enumerate(TRIED):
         for k, kind in enumerate(kinds):
             some = found[:, i, :, k]

@@ -107,8 +107,9 @@ class Tradeoff:
             )
         timed = f"ns per joint and update: {self.joints} joints, {self.how}"
         lines.append(
-            f"the frontier of {len(self.rows)} resolutions; reference uncertain by "
-            f"{self.uncertainty.max():.2%}; {timed if self.joints else 'nothing was timed'}"
+            f"of {len(self.rows)} resolutions, those with the least max error for their sliders; "
+            f"uncertainty of the reference {self.uncertainty.max():.2%}; "
+            f"{timed if self.joints else 'nothing was timed'}"
         )
         return "\n".join(lines)
 

@@ -1,7 +1,7 @@
 """Where the law puts its nodes: inclinations against the density, touch depths against the curve.
 
-Both rules only choose places. What the law keeps exact (docs/how-accurate.md) holds at any number
-of nodes; `benchmarks/nodes.py` measures these rules against others.
+Both rules only choose places. What the law keeps exact (docs/accuracy-measured.md) holds at any
+number of nodes; `benchmarks/nodes.py` measures these rules against others.
 """
 
 from functools import lru_cache

@@ -179,7 +179,7 @@ def damping():
     law = replace(jl.presets.load("westerly-rough"), plane=0.0)
     exact, R = exact_cycles(law), law.closure_range
     found = {name: cycles(replace(law, resolution=name), R) for name in NAMED}
-    save_damping(found | {"exact bed": exact})
+    save_damping(found | {"exact law": exact})
     for name in ("fast", "balanced", "fine"):
         found[f"{name}, fronts"] = cycles(
             replace(law, resolution=replace(NAMED[name], front=True)), R
@@ -189,7 +189,7 @@ def damping():
              f"{np.abs(one.secant / exact.secant - 1).max():.1%}",
              *(f"{share:.1%}" for share in one.kept)]
             for name, one in found.items()]  # fmt: skip
-    rows.append(["exact bed, damping ratio", *(f"{exact.damping[i]:.2%}" for i in shown), "",
+    rows.append(["exact law: damping ratio, kept", *(f"{exact.damping[i]:.2%}" for i in shown), "",
                  *(f"{share:.1%}" for share in exact.kept)])  # fmt: skip
     head = ["loss / exact loss at amplitude", *(f"{AMPLITUDES[i]:.2g}" for i in shown),
             "stiffness", *(f"kept, {opening:g}" for opening in OPENINGS)]  # fmt: skip
@@ -199,9 +199,9 @@ def damping():
 def save_damping(found):
     """Damping ratio and reduction of the secant stiffness against amplitude."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(9.5, 4.2), layout="constrained")
-    stiffest = found["exact bed"].secant[0]
+    stiffest = found["exact law"].secant[0]
     for name, one in found.items():
-        style = {"color": "k", "lw": 2, "zorder": 1} if name == "exact bed" else {"lw": 1.2}
+        style = {"color": "k", "lw": 2, "zorder": 1} if name == "exact law" else {"lw": 1.2}
         left.plot(AMPLITUDES, 100 * one.damping, label=name, **style)
         right.plot(AMPLITUDES, one.secant / stiffest, label=name, **style)
     left.set_ylabel("damping ratio (%)")

@@ -293,7 +293,7 @@ class Laws:
         return "\n".join([head("sliders", ["plain nodes", "our nodes"]), *rows])
 
     def named(self) -> str:
-        lines = [head("resolution", ["sliders, at most", *jl.presets.names()])]
+        lines = [head("name", ["sliders, at most", *jl.presets.names()])]
         for name, r in named().items():
             errors = worst(self.presets, (r.u, r.phi, r.depth))
             sliders = max(replace(law, resolution=r).tables.sliders for law, _ in self.presets)

@@ -93,7 +93,7 @@ class Tradeoff:
     def __str__(self) -> str:
         lines = [
             f"{'u phi depth':>12s} {'sliders':>8s} {'bytes':>7s} {'max error':>10s} {'rms':>8s} "
-            f"{'friction':>9s} {'dilation':>9s} {'tangent rms':>12s} {'loss error':>10s} "
+            f"{'friction':>9s} {'dilation':>9s} {'tangent rms':>12s} {'loss error':>11s} "
             f"{'ns':>8s} {'with tangent':>13s}  worst path"
         ]
         for row in self.frontier():
@@ -102,7 +102,7 @@ class Tradeoff:
             lines.append(
                 f"{f'{r.u} {r.phi} {r.depth}':>12s} {row.sliders:8d} {row.bytes:7d} "
                 f"{row.worst:10.2%} {row.rms.max():8.2%} {row.friction:8.2f}° {row.dilation:8.2f}° "
-                f"{row.tangent_rms:12.2%} {row.loss.max():10.0%} {_ns(row.ns):>8s} "
+                f"{row.tangent_rms:12.2%} {row.loss.max():11.0%} {_ns(row.ns):>8s} "
                 f"{_ns(row.ns_tangent):>13s}  {self.paths[int(row.error.argmax())]}{name}"
             )
         timed = f"ns per joint and update: {self.joints} joints, {self.how}"

@@ -132,8 +132,9 @@ def main():
                 old = best.get((name, processors), (1e99, 1e99, 0))
                 best[name, processors] = (min(old[0], pair * each), min(old[1], loop * each), count)
     print(
-        "| pair style | contacts | pair, ns per contact and step | over mindlin | whole step | "
-        "2 processors, pair | speed-up of the step | bytes a contact |\n" + "|---" * 8 + "|"
+        "| pair style, `Resolution` | contacts | pair style, ns per contact and step "
+        "| the same / mindlin | whole step, ns | 2 processors: pair style, ns "
+        "| speed-up of the step | bytes per contact |\n" + "|---" * 8 + "|"
     )
     for name in styles:
         (pair, loop, count), (pair2, loop2, _) = (

@@ -142,7 +142,7 @@ def main() -> None:
     options = parser.parse_args()
     preset = jl.presets.load("westerly-smooth")
     print("| sliders | bytes of state | limit | C F | C F, no ledger | C FC | numba F | "
-          "numba F + ledger | numba FC + ledger | C / numba, F, both with ledger | both without |"
+          "numba F + ledger | numba FC + ledger | C / numba, with ledger | without |"
     )  # fmt: skip
     print("|---" * 11 + "|")
     with tempfile.TemporaryDirectory() as name:

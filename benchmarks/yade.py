@@ -131,7 +131,7 @@ def main() -> int:
     live = f"live mode, {r.u} x {r.phi} x {r.depth} in space, numba"
     names = {"cundall": "Cundall-Strack", "hertz": "Hertz-Mindlin", "table": "table mode",
              "live": live}  # fmt: skip
-    print("| | whole law and geometry in YADE | added by the adapter | of it the law |")
+    print("| | law and geometry of YADE | time that the adapter adds | part of it in our law |")
     print("|---|---:|---:|---:|")
     for name, row in result.items():
         if isinstance(row, dict):

@@ -2,8 +2,8 @@
 
 from collections import defaultdict
 
-HEAD = ["without", "scenes", "slip or peak angle (deg)", "work of friction", "ends apart (mm)",
-        "end otherwise", "time"]  # fmt: skip
+HEAD = ["change", "scenes", "slip or peak angle (deg)", "work of friction",
+        "distance of the ends (mm)", "other results", "time"]  # fmt: skip
 
 
 def by_ingredient(scenes):

@@ -125,7 +125,15 @@ def slip():
         work /= float(law.curve.force(np.array(top))[0])
         lost = joint.dissipated_energy / work
         rows.append([name, f"{(shut > 0).mean():.0%}", f"{(opened > 0).mean():.0%}", f"{lost:.2%}"])
-    return table(["resolution", "closing steps with slip", "opening", "work lost"], rows)
+    return table(
+        [
+            "resolution",
+            "closing steps with slip",
+            "opening steps with slip",
+            "loss / work of closing",
+        ],
+        rows,
+    )
 
 
 def plane():

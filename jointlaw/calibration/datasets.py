@@ -158,7 +158,7 @@ def _levels(pressed: Column, path: Path) -> list[tuple[Array, float]]:
         raise ValueError(
             f"{path}: the normal stress of column {pressed.title!r} runs from {levels[0]:.4g} to "
             f"{levels[-1]:.4g} Pa, but only tests at constant normal stress are fitted; cut the "
-            "file, or give the one to take: --normal-stress 3MPa"
+            f"file, or give the one to take, for example --normal-stress {mean / 1e6:.3g}MPa"
         )
     return [(values == level, float(level)) for level in levels]
 

@@ -29,7 +29,7 @@ def _run(options: argparse.Namespace) -> None:
     factor = None if unit is None else quantity("--height-unit", f"1{unit}", "m")
     z, spacing = read_scan(options.file, given(options, "spacing", "m"), factor)
     fit = from_surface(z, spacing, given(options, "sampling_length", "m"))
-    require_rock(fit.parameters, f"{Path(options.file).name}: the ")
+    require_rock(fit.parameters, f"{Path(options.file).name}: the fitted ")
     text = fit.report()
     print(text)
     summary = {

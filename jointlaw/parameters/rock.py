@@ -35,7 +35,7 @@ RANGES = {
         "",
         "are both in the units that were read or given?",
     ),
-    "plane": (-2 * math.pi, 2 * math.pi, " rad", "30 degrees is 0.5236 rad"),
+    "plane": (-2 * math.pi, 2 * math.pi, " rad", "90 degrees is 1.571 rad"),
 }
 
 

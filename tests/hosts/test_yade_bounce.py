@@ -35,7 +35,7 @@ def growth(top):
 
 
 def test_same_step_correction_keeps_the_amplitude(yade, make_table, tmp_path):
-    """50 cycles at dt = 0.02, 0.1, 0.3 sqrt(m/k); the bounds are those of the issue.
+    """50 cycles at dt = 0.02, 0.1, 0.3 sqrt(m/k).
 
     Leapfrog with a force that depends on position alone conserves a nearby energy: what is left is
     the reading of the peak between steps.

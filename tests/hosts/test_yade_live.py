@@ -23,7 +23,7 @@ def law(tmp_path):
 def test_direct_shear_of_two_blocks_equals_pure_python(yade, tmp_path, law):
     """The exported script: closure, shear, reversal, opening, re-contact on 36 contacts.
 
-    Against `direct_shear` at the same resolution and steps (the bound of the issue is 0.1 %), and
+    Against `direct_shear` at the same resolution and steps (within 0.1 %), and
     against the law driven by the same displacements (rounding of positions: 1e-16 m of 1e-3 m).
     """
     export_yade(law, tmp_path, shear_limit=law.closure_range)

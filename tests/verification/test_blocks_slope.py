@@ -47,7 +47,7 @@ def test_base_shear_at_20_degrees():
         shear.append(contact_forces(sim)[0, 0])
     expected = 2 * RHO * G * np.sin(np.radians(20.0))
     assert expected == pytest.approx(17447.132, abs=5e-4)
-    # At rest from step 0; the issue asks for 1e-6.
+    # At rest from step 0
     assert np.array(shear) == pytest.approx(expected, rel=1e-9)
 
 

@@ -1,4 +1,4 @@
-"""Steps of every size and kind that the issue of a host may bring, on laws of every kind."""
+"""Steps of every size and kind that a host may make, on laws of every kind."""
 
 import numpy as np
 import pytest

@@ -122,7 +122,7 @@ def without(lines: Any) -> types.ModuleType:
             raise RuntimeError(f"the kernel has changed: it no longer holds {old!r} once")
         text = text.replace(old, new)
     made = types.ModuleType("jointlaw.kernels.reduced")
-    made.__package__, made.__file__ = "jointlaw", str(path)
+    made.__package__, made.__file__ = kernel.__package__, str(path)
     exec(compile(text, str(path), "exec"), made.__dict__)
     return made
 

@@ -128,7 +128,7 @@ def main() -> int:
     result = json.loads(lines[-1][len("RESULT ") :])
     result["resolution"] = str(law.resolution)
     r = law.resolution
-    live = f"live mode, {r.u} x {r.phi} x {r.depth} in space, numba"
+    live = f"live mode, `{r}` in space, numba"
     names = {"cundall": "Cundall-Strack", "hertz": "Hertz-Mindlin", "table": "table mode",
              "live": live}  # fmt: skip
     print("| | law and geometry of YADE | time that the adapter adds | part of it in our law |")

@@ -40,8 +40,7 @@ PRINTED = {
     "claims-yielding": ("paper.md", "benchmarks/claims_yielding.py"),
 }
 PRINTED_TIMES = {
-    "update": ("speed.md", "benchmarks/update.py --short --rounds 30 --seconds 0.05"),
-    "update-large": ("speed.md", "benchmarks/update.py --rounds 2 --seconds 0.05"),
+    "update": ("speed.md", "benchmarks/update.py --rounds 4 --seconds 0.05"),
     "native": ("native.md", "benchmarks/native.py"),
     "yade": ("yade.md", "benchmarks/yade.py"),
     "lammps": ("lammps.md", "benchmarks/lammps.py FOLDER --rounds 2 --steps 60 --settle 60"),

@@ -6,6 +6,7 @@ docs/data/ablation-SCENE.csv. Times in the tables are those of this machine: let
 beside it. `docs/make_all.py` runs these parts and all others, two at a time where no time is kept.
 """
 
+import os
 import shutil
 import subprocess
 import sys
@@ -42,9 +43,10 @@ LAWS, SEED = 4, 31  # of the tolerances
 DRAWN = 8  # random laws of the placing of nodes
 
 
-def run(*command):
+def run(*command, **env):
     """What a command of this project prints."""
-    done = subprocess.run([sys.executable, *command], cwd=ROOT, check=True, stdout=subprocess.PIPE)
+    done = subprocess.run([sys.executable, *command], cwd=ROOT, env=os.environ | env, check=True,
+                          stdout=subprocess.PIPE)  # fmt: skip
     return done.stdout.decode()
 
 
@@ -52,7 +54,7 @@ def price_list():
     """The picture and the frontier of one preset."""
     command = ["-m", "jointlaw", "tradeoff", "westerly-smooth", "--plane", "0", "--out"]
     with tempfile.TemporaryDirectory() as folder:
-        printed = run(*command, folder)
+        printed = run(*command, folder, JOINTLAW_THREADS="1")
         shutil.copy(Path(folder) / "tradeoff.png", PICTURES / "tradeoff.png")
     return f"```\n{printed.split('wrote ')[0]}```\n"
 

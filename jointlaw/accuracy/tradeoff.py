@@ -107,8 +107,8 @@ class Tradeoff:
             )
         timed = f"ns per joint and update: {self.joints} joints, {self.how}"
         lines.append(
-            f"of {len(self.rows)} resolutions, those that none with as few sliders beats in max "
-            f"error; uncertainty of what they are compared with {self.uncertainty.max():.2%}; "
+            f"{len(self.rows)} resolutions tried; listed if none with as few sliders has a smaller "
+            f"max error; uncertainty of the comparison solution {self.uncertainty.max():.2%}; "
             f"{timed if self.joints else 'nothing was timed'}"
         )
         return "\n".join(lines)

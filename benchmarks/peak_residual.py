@@ -77,8 +77,8 @@ def main() -> None:
     print(", ".join(f"{n} = {v:.4g}" for n, v in zip(START, np.exp(found.x), strict=True)))
     print(
         "\n| normal stress (MPa) | error of the peak | displacement at the peak, law / measured "
-        "| error of the residual | largest change of the shear stress with half the displacement "
-        "step, in % of the peak stress |"
+        "| error of the residual | largest change of the computed shear stress when the "
+        "displacement step is halved, in % of the peak stress |"
     )
     print("|---|---:|---:|---:|---:|")
     for normal, measured in MEASURED.items():

@@ -107,8 +107,9 @@ class Tradeoff:
             )
         timed = f"ns per joint and update: {self.joints} joints, {self.how}"
         lines.append(
-            f"{len(self.rows)} resolutions tried; listed if none with as few sliders has a smaller "
-            f"max error; uncertainty of the comparison solution {self.uncertainty.max():.2%}; "
+            f"{len(self.rows)} resolutions tried; one is left out if another with no more sliders "
+            "has a smaller max error; uncertainty of the comparison solution "
+            f"{self.uncertainty.max():.2%}; "
             f"{timed if self.joints else 'nothing was timed'}"
         )
         return "\n".join(lines)

@@ -107,8 +107,8 @@ class Tradeoff:
             )
         timed = f"ns per joint and update: {self.joints} joints, {self.how}"
         lines.append(
-            f"{len(self.rows)} resolutions tried; one is left out if another with no more sliders "
-            "has a smaller max error; uncertainty of the comparison solution "
+            f"{len(self.rows)} resolutions tried; a resolution is not listed if one with as many "
+            "or fewer sliders has a smaller max error; uncertainty of the comparison solution "
             f"{self.uncertainty.max():.2%}; "
             f"{timed if self.joints else 'nothing was timed'}"
         )

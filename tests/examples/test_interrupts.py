@@ -16,6 +16,14 @@ from dem_demo.output.interrupt import interruptible
 from jointlaw.cli.main import main as jointlaw_main
 
 
+@pytest.fixture(autouse=True)
+def _as_in_a_terminal():
+    """A shell that runs the tests in the background has them, and their children, ignore Ctrl-C."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.fixture
 def _scene(tmp_path):
     wrong_files.make(tmp_path)

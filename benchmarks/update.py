@@ -1,7 +1,6 @@
 """Time of one joint update, as a table and as JSON.
 
     python benchmarks/update.py                      every case, a few minutes
-    python benchmarks/update.py --short              the main cases, under a minute
     python benchmarks/update.py --json update.json   also the numbers, for other programs
 
 Each figure is the least of several rounds, spread over the whole run, in nanoseconds per joint and
@@ -163,12 +162,12 @@ class Case:
             self.best, k = min(self.best, took), k + calls
 
 
-def cases(names: tuple[str, ...], sizes: tuple[int, ...], args: argparse.Namespace) -> list[Case]:
+def cases(args: argparse.Namespace) -> list[Case]:
     """Cases that fit in memory."""
     made, rng = [], np.random.default_rng(0)
-    for name in names:
+    for name in NAMES:
         one = law(name, not args.space)
-        for n in sizes:
+        for n in SIZES:
             if n * (state_bytes(one) + 400) > args.memory * 1e9:
                 continue
             for column, (kernel, threads, _, ledger) in COLUMNS.items():
@@ -223,17 +222,17 @@ def summary(found: list[Case]) -> dict[str, Any]:
     return result
 
 
-def table(found: list[Case], names: tuple[str, ...], sizes: tuple[int, ...]) -> str:
+def table(found: list[Case]) -> str:
     """Markdown: one line per resolution and batch size."""
     lines = [
         f"| resolution | sliders | bytes | joints | {' | '.join(COLUMNS)} |",
         "|---|" + "---:|" * (3 + len(COLUMNS)),
     ]
     best = {(c.law.resolution, c.n, c.column): c.best * 1e9 for c in found}
-    for name in names:
+    for name in NAMES:
         one = next(c.law for c in found if c.law.resolution == NAMED[name])
         sliders, size = one.tables.sliders, state_bytes(one)
-        for n in sizes:
+        for n in SIZES:
             cells = [best.get((one.resolution, n, column)) for column in COLUMNS]
             if any(cells):
                 text = " | ".join("-" if v is None else f"{v:.0f}" for v in cells)
@@ -245,20 +244,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--short", action="store_true", help="fewer cases and rounds")
     parser.add_argument("--space", action="store_true", help="motion in 3-D, not in one plane")
-    parser.add_argument("--rounds", type=int, help="rounds over all cases (default 6, short 3)")
+    parser.add_argument("--rounds", type=int, default=6, help="rounds over all cases (6)")
     parser.add_argument("--seconds", type=float, default=0.1, help="per case and round")
     parser.add_argument("--longest", type=float, default=1.0, help="seconds that one run may take")
     parser.add_argument("--memory", type=float, default=1.0, help="GB that one batch may take")
     parser.add_argument("--json", help="file to write the numbers to")
     args = parser.parse_args()
-    names, sizes = (NAMES[:2], SIZES[:3]) if args.short else (NAMES, SIZES)
-    rounds = args.rounds or (3 if args.short else 6)
-
     first, cached = compile_times()
-    todo, left = cases(names, sizes, args), []
-    for turn in range(rounds):
+    todo, left = cases(args), []
+    for turn in range(args.rounds):
         for case in todo:
             if case not in left:
                 smaller = [c.best for c in todo if c.law is case.law and c.column == case.column]
@@ -267,7 +262,7 @@ def main() -> None:
                     left.append(case)
                     continue
                 case.run(args.seconds)
-        print(f"round {turn + 1} of {rounds}", file=sys.stderr)
+        print(f"round {turn + 1} of {args.rounds}", file=sys.stderr)
     found = [case for case in todo if np.isfinite(case.best)]
 
     about = {
@@ -280,7 +275,7 @@ def main() -> None:
         "first updates, from the cache (s)": cached,
         **limits(),
     }
-    print(table(found, names, sizes))
+    print(table(found))
     print()
     for key, value in (about | summary(found)).items():
         print(f"{key}: {value:.3g}" if isinstance(value, float) else f"{key}: {value}")

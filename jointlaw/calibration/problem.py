@@ -267,7 +267,9 @@ def minimise(residuals: Function, start: Array, low: Array, high: Array) -> Any:
     """One least squares problem, from one start; the result of `least_squares`."""
     margin = 1e-9 * (high - low)
     inside = np.clip(start, low + margin, high - margin)
-    return least_squares(residuals, inside, bounds=(low, high), x_scale="jac", xtol=1e-9)
+    return least_squares(
+        residuals, inside, bounds=(low, high), method="dogbox", x_scale="jac", xtol=1e-9
+    )
 
 
 def derivative(f: Function, x: Array, low: Array, high: Array) -> Array:

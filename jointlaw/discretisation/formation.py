@@ -1,5 +1,7 @@
 """Formation of contacts: the smooth factor S = Phi / y^(1+eta) of the virgin curve, exactly."""
 
+from functools import lru_cache
+
 import numpy as np
 from scipy import special
 
@@ -83,8 +85,7 @@ def _individual(
     results = []
     for p, bed in ((1 + eta, power * ratio), (eta, power)):
         far = bed @ mass.ravel()
-        xj, wj = special.roots_jacobi(40, p, 0.0)
-        xj, wj = 0.5 * (xj + 1), wj / 2 ** (p + 1)
+        xj, wj = _jacobi(p)
         span = np.maximum(y - start, 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
             share = np.where(y > 0, span / y, 0.0)
@@ -96,6 +97,13 @@ def _individual(
             far[near] = heights.cdf(r0 + y[near]) * rising * special.beta(rising, p + 1)
         results.append(far)
     return results[0], results[1]
+
+
+@lru_cache(maxsize=16)  # a fit asks for the same rule at every step
+def _jacobi(p: float) -> tuple[Array, Array]:
+    """The rule for int_0^1 f(x) (1 - x)^p dx."""
+    x, w = special.roots_jacobi(40, p, 0.0)
+    return 0.5 * (x + 1), w / 2 ** (p + 1)
 
 
 def _steps(y: Array, p: float, heights: HeightDistribution, beyond: Array) -> Array:

@@ -5,6 +5,7 @@ from slow_bed import SlowBed, cap_quadrature
 
 import jointlaw as jl
 from extremes.laws import SCALE, build
+from jointlaw.kernels.engine import Step
 
 ONE = jl.Resolution(2, 3, 1)
 LAWS = {
@@ -35,11 +36,12 @@ def drift(changes, cycles, amplitudes=AMPLITUDES, shakedown=SHAKEDOWN):
     u, v = (np.tile(w, (len(amplitudes), 1)) * size for w in (u, v))
     joints.update(np.tile([0.7 * SCALE, 0.0, 0.0], (n, 1)))
     F, corners = np.empty((n, 3)), (u, v, -u, -v)
+    steps = [Step(d, F, None, None, keep=True) for d in corners]
 
     def turn(times):
         for _ in range(times):
-            for d in corners:
-                joints.update(d, tangent=False, out=(F, None))
+            for step in steps:
+                joints.take(step)
 
     def look():
         forces, energies, lost = [], [], joints.dissipated_energy

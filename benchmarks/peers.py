@@ -29,6 +29,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -151,12 +152,20 @@ def compare(law: jl.JointLaw, rounds: int) -> dict[str, Any]:
     suite = standard_suite(law)
     rows: dict[str, dict[str, Any]] = {}
     cases: dict[str, Any] = {}
+    places = (even, ""), (tuned, ", tuned")
+    with ProcessPoolExecutor(2) as pool:  # nothing is timed yet
+        safe = {t: pool.submit(law.at_tolerance, t) for t in TOLERANCES}
+        beds = {
+            (t, place): pool.submit(smallest, law, suite, t, place)
+            for t in TOLERANCES[::-1]
+            for place, _ in places
+        }
     for tolerance in TOLERANCES:
         least, _ = coarsest(law, tolerance)
         if least is None:
             raise SystemExit(f"no resolution meets {tolerance:.2g} on the standard paths")
-        safe = law.at_tolerance(tolerance).resolution
-        kinds = [("ours", least, False), ("at_tolerance", safe, False)]
+        kept = safe[tolerance].result().resolution
+        kinds = [("ours", least, False), ("at_tolerance", kept, False)]
         if tolerance == 0.01:
             kinds.insert(1, ("ours with tangent", least, True))
         for what, r, tangent in kinds:
@@ -165,8 +174,8 @@ def compare(law: jl.JointLaw, rounds: int) -> dict[str, Any]:
             rows[name] = {"tolerance": tolerance, "error": error, "sliders": made.tables.sliders,
                           "resolution": f"{r.u}, {r.phi}, {r.depth}"}  # fmt: skip
             cases[name] = ours(made, JOINTS, tangent)
-        for place, form in ((even, ""), (tuned, ", tuned")):
-            rule, error = smallest(law, suite, tolerance, place)
+        for place, form in places:
+            rule, error = beds[tolerance, place].result()
             count, springs = int(np.prod(rule)), place(law, rule)
             about = {"tolerance": tolerance, "error": error, "sliders": count,
                      "resolution": ", ".join(map(str, rule))}  # fmt: skip

@@ -28,8 +28,7 @@ EXTREMES = ("matrix", "fuzz", "drift", "dynamics", "impact", "exact", "control",
             "forgetting")  # fmt: skip
 PICTURES = tuple(make_pictures.RUNS)
 PRINTED = {
-    "intervals": ("measurements.md", "benchmarks/intervals.py --draws 50 --workers 1"),
-    "held-out": ("measurements.md", "benchmarks/held_out.py --draws 20 --workers 1"),
+    "intervals": ("measurements.md", "benchmarks/intervals.py --draws 30 --workers 1"),
     "held-out-few": ("measurements.md", "benchmarks/held_out.py --draws 20 --few --workers 1"),
     "held-out-narrow": (
         "measurements.md",
@@ -40,7 +39,7 @@ PRINTED = {
     "claims-yielding": ("paper.md", "benchmarks/claims_yielding.py"),
 }
 PRINTED_TIMES = {
-    "update": ("speed.md", "benchmarks/update.py --rounds 4 --seconds 0.05"),
+    "update": ("speed.md", "benchmarks/update.py --rounds 3 --seconds 0.05"),
     "native": ("native.md", "benchmarks/native.py"),
     "yade": ("yade.md", "benchmarks/yade.py"),
     "lammps": ("lammps.md", "benchmarks/lammps.py FOLDER --rounds 2 --steps 60 --settle 60"),

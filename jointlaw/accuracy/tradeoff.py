@@ -107,9 +107,9 @@ class Tradeoff:
             )
         timed = f"ns per joint and update: {self.joints} joints, {self.how}"
         lines.append(
-            f"{len(self.rows)} resolutions tried; a resolution is not listed if one with as many "
-            "or fewer sliders has a smaller max error; uncertainty of the comparison solution "
-            f"{self.uncertainty.max():.2%}; "
+            f"{len(self.rows)} resolutions tried; listed are those for which no other with the "
+            "same number of sliders or fewer has a smaller max error; uncertainty of the "
+            f"comparison solution {self.uncertainty.max():.2%}; "
             f"{timed if self.joints else 'nothing was timed'}"
         )
         return "\n".join(lines)

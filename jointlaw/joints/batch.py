@@ -64,6 +64,8 @@ class JointBatch:
         self._n = whole("n", n, 0)
         self._state = empty_blocks(self._engine.rows, self._n)
         self._reach = 0.0  # no facet's effective closure exceeds it, in either sense
+        numbers = np.arange(law.tables.rows, dtype=np.float64)[:, None]
+        self._number = reference.parts(law.tables, numbers)  # of the rows of each part
         self._stretch = 1.0 + 2.0 * float(np.max(np.abs(law.tables.m)))  # of y over that of d
 
     def __getstate__(self) -> dict[str, Any]:
@@ -241,8 +243,7 @@ class JointBatch:
     @property
     def plastic_work(self) -> Array:
         """The part (n,) of the dissipated energy, in J/m2, that yielding asperities took."""
-        lost = self._ledger("plastic_work", "plastic")
-        return lost if self.law.tables.yields else np.zeros(self._n)
+        return self._ledger("plastic_work", "plastic")
 
     @property
     def friction(self) -> Array:
@@ -253,8 +254,9 @@ class JointBatch:
     # --------------------------------------------------------------- internals
 
     def _part(self, name: str) -> Array:
-        """A part of the states of all joints, by its name in `reference.State`."""
-        return getattr(reference.parts(self.law.tables, self._rows()), name)
+        """A part of one row, or of none, of the states of all joints, by name in `State`."""
+        row = getattr(self._number, name).astype(int)
+        return np.sum(rows_of(self._state[:, row], self._n), axis=0)
 
     def _ledger(self, name: str, part: str) -> Array:
         """A part of the ledger, if it is kept."""

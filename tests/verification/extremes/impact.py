@@ -8,6 +8,7 @@ import numpy as np
 
 import jointlaw as jl
 from extremes.laws import build
+from jointlaw.kernels.engine import Step
 
 
 class PowerLaw:
@@ -35,13 +36,13 @@ class Flat:
             resolution=jl.Resolution(1, 3, 1),
         )  # fmt: skip
         self.law, self.joints, self.d = law, law.joints(n), np.zeros((n, 3))
-        self.F = np.empty((n, 3))
+        self.step = Step(self.d, np.empty((n, 3)), None, None, keep=True)
 
     def move(self, d):
         """As `PowerLaw.move`."""
         self.d[:, 0] = d
-        self.joints.update(self.d, tangent=False, out=(self.F, None))
-        return self.F[:, 0].copy()
+        self.joints.take(self.step)
+        return self.step.F[:, 0].copy()
 
     def stored(self):
         """As `PowerLaw.stored`."""

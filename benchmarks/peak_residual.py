@@ -77,8 +77,7 @@ def main() -> None:
     print(", ".join(f"{n} = {v:.4g}" for n, v in zip(START, np.exp(found.x), strict=True)))
     print(
         "\n| normal stress (MPa) | error of the peak | displacement at the peak, law / measured "
-        "| error of the residual | largest change of the computed shear stress when the "
-        "displacement step is halved, in % of the peak stress |"
+        "| error of the residual | effect of the step size (% of the peak) |"
     )
     print("|---|---:|---:|---:|---:|")
     for normal, measured in MEASURED.items():
@@ -88,7 +87,7 @@ def main() -> None:
         note = "" if normal in FITTED else ", predicted"
         print(
             f"| {normal:g}{note} | {100 * (peak - 1):+.1f} % | x {at:.2f} | "
-            f"{100 * (residual - 1):+.1f} % | {100 * halved:.2f} % |"
+            f"{100 * (residual - 1):+.1f} % | {100 * halved:.2f} |"
         )
     _, sizes, directions = np.linalg.svd(found.jac)
     print(f"\nTogether, with no figure moved by more than about {100 * MOVED:g} %:")

@@ -1,6 +1,6 @@
 """The law beside its peers, in one run on one core: contacts of a DEM code, and the obvious numpy.
 
-    python benchmarks/peers.py [--preset westerly-smooth] [--rounds 5] [--json peers.json]
+    python benchmarks/peers.py [--preset westerly-smooth] [--rounds 4] [--json peers.json]
     python benchmarks/peers.py --million       a million joints at the 1 % setting: memory, time
 
 Nanoseconds per joint (or contact) and step, the least of rounds in which all take turns; ratios are
@@ -250,7 +250,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--preset", default="westerly-smooth")
-    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--rounds", type=int, default=4)
     parser.add_argument("--million", action="store_true", help="only a million joints at 1 %%")
     parser.add_argument("--json", help="file to write the numbers to")
     options = parser.parse_args()

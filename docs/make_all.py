@@ -28,7 +28,7 @@ EXTREMES = ("matrix", "fuzz", "drift", "dynamics", "impact", "exact", "control",
             "forgetting")  # fmt: skip
 PICTURES = tuple(make_pictures.RUNS)
 PRINTED = {
-    "intervals": ("measurements.md", "benchmarks/intervals.py --draws 30 --workers 1"),
+    "intervals": ("measurements.md", "benchmarks/intervals.py --draws 25 --workers 1"),
     "held-out-few": ("measurements.md", "benchmarks/held_out.py --draws 20 --few --workers 1"),
     "held-out-narrow": (
         "measurements.md",

@@ -107,9 +107,9 @@ class Tradeoff:
             )
         timed = f"ns per joint and update: {self.joints} joints, {self.how}"
         lines.append(
-            f"{len(self.rows)} resolutions tried; listed are those for which no other with the "
-            "same number of sliders or fewer has a smaller max error; uncertainty of the "
-            f"comparison solution {self.uncertainty.max():.2%}; "
+            f"{len(self.rows)} resolutions tried; each listed one has the smallest max error of "
+            "all with at most as many sliders.\n"
+            f"Uncertainty of the comparison solution {self.uncertainty.max():.2%}; "
             f"{timed if self.joints else 'nothing was timed'}"
         )
         return "\n".join(lines)

@@ -203,7 +203,7 @@ def damping():
     rows.append(["exact law (amplitude columns: damping ratio)",
                  *(f"{exact.damping[i]:.2%}" for i in shown), "",
                  *(f"{share:.1%}" for share in exact.kept)])  # fmt: skip
-    head = ["loss / exact loss at amplitude", *(f"{AMPLITUDES[i]:.2g}" for i in shown),
+    head = ["resolution", *(f"{AMPLITUDES[i]:.2g}" for i in shown),
             "stiffness", *(f"kept, {opening:g}" for opening in OPENINGS)]  # fmt: skip
     return table(head, rows)
 

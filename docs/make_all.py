@@ -73,9 +73,9 @@ def _run(command, alone):
 
 TASKS = {  # short ones last, so that both processors have work to the end
     **{key: partial(printed, key) for key in (*PRINTED, *PRINTED_TIMES)},
-    **{key: partial(script, "make_accuracy.py", key) for key in ACCURACY},
-    **{key: partial(script, "make_extremes.py", key) for key in EXTREMES},
     **{key: partial(script, "make_pictures.py", key) for key in PICTURES},
+    **{key: partial(script, "make_extremes.py", key) for key in EXTREMES},
+    **{key: partial(script, "make_accuracy.py", key) for key in ACCURACY},
 }
 
 

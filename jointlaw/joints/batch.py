@@ -255,7 +255,7 @@ class JointBatch:
 
     def _part(self, name: str) -> Array:
         """A part of one row, or of none, of the states of all joints, by name in `State`."""
-        row = getattr(self._number, name).astype(int)
+        row = getattr(self._number, name).astype(int).ravel()
         return np.sum(rows_of(self._state[:, row], self._n), axis=0)
 
     def _ledger(self, name: str, part: str) -> Array:

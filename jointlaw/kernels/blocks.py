@@ -19,8 +19,9 @@ def empty_blocks(rows: int, n: int) -> Array:
 def rows_of(state: Array, n: int, index: Index | None = None) -> Array:
     """State of n joints, or those of `index`, as a copy (rows, n) with joints last."""
     if index is None:
-        blocks = -(-n // state.shape[2])
-        part = state[:blocks].transpose(1, 0, 2).reshape(state.shape[1], -1)[:, :n]
+        _, rows, lanes = state.shape
+        blocks = -(-n // lanes)
+        part = state[:blocks].transpose(1, 0, 2).reshape(rows, blocks * lanes)[:, :n]
         return np.array(part, order="C")  # never a view
     lanes = state.shape[2]
     return np.ascontiguousarray(state[index // lanes, :, index % lanes].T)

@@ -107,8 +107,8 @@ class Tradeoff:
             )
         timed = f"ns per joint and update: {self.joints} joints, {self.how}"
         lines.append(
-            f"{len(self.rows)} resolutions tried; each listed one has the smallest max error of "
-            "all with at most as many sliders.\n"
+            f"{len(self.rows)} resolutions tried. A resolution is left out if another one has "
+            "fewer or equally many sliders and a smaller max error.\n"
             f"Uncertainty of the comparison solution {self.uncertainty.max():.2%}; "
             f"{timed if self.joints else 'nothing was timed'}"
         )

@@ -94,16 +94,17 @@ class Tradeoff:
         lines = [
             f"{'u phi depth':>12s} {'sliders':>8s} {'bytes':>7s} {'max error':>10s} {'rms':>8s} "
             f"{'friction':>9s} {'dilation':>9s} {'tangent rms':>12s} {'loss error':>11s} "
-            f"{'ns':>8s} {'with tangent':>13s}  worst path"
+            f"{'ns':>8s} {'with tangent':>13s}  {'worst path':16s}name"
         ]
         for row in self.frontier():
             r = row.resolution
-            name = next((f"  = {n}" for n, value in self.named.items() if value == r), "")
+            name = next((n for n, value in self.named.items() if value == r), "")
+            path = self.paths[int(row.error.argmax())]
             lines.append(
                 f"{f'{r.u} {r.phi} {r.depth}':>12s} {row.sliders:8d} {row.bytes:7d} "
                 f"{row.worst:10.2%} {row.rms.max():8.2%} {row.friction:8.2f}° {row.dilation:8.2f}° "
                 f"{row.tangent_rms:12.2%} {row.loss.max():11.0%} {_ns(row.ns):>8s} "
-                f"{_ns(row.ns_tangent):>13s}  {self.paths[int(row.error.argmax())]}{name}"
+                f"{_ns(row.ns_tangent):>13s}  {path:16s}{name}".rstrip()
             )
         timed = f"ns per joint and update: {self.joints} joints, {self.how}"
         lines.append(

@@ -65,7 +65,7 @@ class Price:
 
 @dataclass(frozen=True)
 class Tradeoff:
-    """Prices by ascending sliders; print it to read its frontier.
+    """Prices by ascending sliders; print it to read its frontier and the named ones.
 
     `uncertainty` (paths,) is that of the reference that errors are measured against; `joints` the
     size of the batch that was timed, on the kernel and threads named in `how`; `named` are the
@@ -96,20 +96,21 @@ class Tradeoff:
             f"{'friction':>9s} {'dilation':>9s} {'tangent rms':>12s} {'loss error':>11s} "
             f"{'ns':>8s} {'with tangent':>13s}  {'worst path':16s}name"
         ]
-        for row in self.frontier():
+        names = {r: name for name, r in self.named.items()}
+        shown = {row.resolution for row in self.frontier()} | set(names)
+        for row in (row for row in self.rows if row.resolution in shown):
             r = row.resolution
-            name = next((n for n, value in self.named.items() if value == r), "")
             path = self.paths[int(row.error.argmax())]
             lines.append(
                 f"{f'{r.u} {r.phi} {r.depth}':>12s} {row.sliders:8d} {row.bytes:7d} "
                 f"{row.worst:10.2%} {row.rms.max():8.2%} {row.friction:8.2f}° {row.dilation:8.2f}° "
                 f"{row.tangent_rms:12.2%} {row.loss.max():11.0%} {_ns(row.ns):>8s} "
-                f"{_ns(row.ns_tangent):>13s}  {path:16s}{name}".rstrip()
+                f"{_ns(row.ns_tangent):>13s}  {path:16s}{names.get(r, '')}".rstrip()
             )
         timed = f"ns per joint and update: {self.joints} joints, {self.how}"
         lines.append(
-            f"{len(self.rows)} resolutions tried. A resolution is left out if another one has "
-            "fewer or equally many sliders and a smaller max error.\n"
+            f"{len(self.rows)} resolutions tried. A resolution without a name is left out if "
+            "another one has fewer or equally many sliders and a smaller max error.\n"
             f"Uncertainty of the comparison solution {self.uncertainty.max():.2%}; "
             f"{timed if self.joints else 'nothing was timed'}"
         )

@@ -98,8 +98,10 @@ class Tradeoff:
         ]
         names = {r: name for name, r in self.named.items()}
         shown = {row.resolution for row in self.frontier()} | set(names)
-        for row in (row for row in self.rows if row.resolution in shown):
+        for row in sorted(self.rows, key=lambda row: row.sliders):
             r = row.resolution
+            if r not in shown:
+                continue
             path = self.paths[int(row.error.argmax())]
             lines.append(
                 f"{f'{r.u} {r.phi} {r.depth}':>12s} {row.sliders:8d} {row.bytes:7d} "

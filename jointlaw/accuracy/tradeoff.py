@@ -111,8 +111,8 @@ class Tradeoff:
             )
         timed = f"ns per joint and update: {self.joints} joints, {self.how}"
         lines.append(
-            f"{len(self.rows)} resolutions tried. A resolution without a name is left out if "
-            "another one has fewer or equally many sliders and a smaller max error.\n"
+            f"{len(self.rows)} resolutions tried; listed are the named ones and the Pareto front "
+            "of sliders and max error.\n"
             f"Uncertainty of the comparison solution {self.uncertainty.max():.2%}; "
             f"{timed if self.joints else 'nothing was timed'}"
         )

@@ -105,7 +105,7 @@ class Tradeoff:
             path = self.paths[int(row.error.argmax())]
             lines.append(
                 f"{f'{r.u} {r.phi} {r.depth}':>12s} {row.sliders:8d} {row.bytes:7d} "
-                f"{row.worst:10.2%} {row.rms.max():8.2%} {row.friction:8.2f}° {row.dilation:8.2f}° "
+                f"{row.worst:10.3%} {row.rms.max():8.2%} {row.friction:8.2f}° {row.dilation:8.2f}° "
                 f"{row.tangent_rms:12.2%} {row.loss.max():11.0%} {_ns(row.ns):>8s} "
                 f"{_ns(row.ns_tangent):>13s}  {path:16s}{names.get(r, '')}".rstrip()
             )

@@ -25,6 +25,7 @@ SPREAD = tuple(
     for depth in (1, 2, 3, 4, 6, 10, 16)
 )
 CLEAR = {"color": "white", "alpha": 0.8, "pad": 0.5}  # behind names
+ROUNDING = 1e-6  # a smaller share by which errors differ is none
 _MEMORY = 100_000_000  # bytes of state that a timing may use; very fine laws get a smaller batch
 
 
@@ -80,13 +81,13 @@ class Tradeoff:
     named: dict[str, Resolution]
 
     def frontier(self, cost: str = "sliders") -> tuple[Price, ...]:
-        """The prices that no other with as few sliders beats in its largest error.
+        """The prices that no other with as few sliders beats or equals in its largest error.
 
         cost: another attribute of the prices instead, such as "ns".
         """
         best: list[Price] = []
         for row in sorted(self.rows, key=lambda row: (getattr(row, cost), row.worst)):
-            if not best or row.worst < best[-1].worst:
+            if not best or row.worst < (1.0 - ROUNDING) * best[-1].worst:
                 best.append(row)
         return tuple(best)
 

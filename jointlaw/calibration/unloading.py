@@ -124,7 +124,7 @@ def _of_law(law: JointLaw, tests: list[tuple[Array, Array, float]], steps: int) 
     """Loss and closure kept of a law in every cycle.
 
     At the finest resolution: few depth cells lock whole contacts where the law locks their rims,
-    and lose up to ten times too much when friction is high.
+    and lose too much, also where friction is so high that no asperity slides.
     """
     finest = replace(law, resolution=NAMED["reference"], plane=None, closure_only=True)
     joint, found = finest.joint(), []

@@ -19,7 +19,6 @@ LONG = {
     "jointlaw fit closure.csv --shear": "tests/verification/test_fit_shear_files.py",
     "jointlaw shear out/specimen/law.toml": "tests/verification/test_fit_shear_files.py",
     "jointlaw fit grimsel_vd1_closure --out": "the fit with --up-to, which does more",
-    "jointlaw fit grimsel_vd1_closure --set": "the fit with --up-to, which does more",
     "python -m dem_demo ablate SCENE": "tests/examples/test_ablate.py",
     "python -m dem_demo new my-slope.toml": "tests/examples/test_rocks.py",
     "python -m dem_demo check my-slope.toml": "tests/examples/test_rocks.py",

@@ -102,7 +102,7 @@ def slip(law: Law, closure_range: float, stress: float, ways: Array) -> Slip:
 
 def names(dim: int) -> tuple[str, ...]:
     """What the paths are called."""
-    return tuple(f"slip {way:g} at {share:g}" for share, way, _ in standard_ways(dim))
+    return tuple(f"slip {way:g} at S/{2 / share:g}" for share, way, _ in standard_ways(dim))
 
 
 def _held(batch: JointBatch, step: Array, goal: Array, reach: Array) -> Array:

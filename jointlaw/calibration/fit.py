@@ -138,7 +138,8 @@ def fit_closure(
     fixed: values of parameters that are known otherwise, such as alpha from a scan.
     law: values of all parameters that are not free; None takes rock asperities, see
         `forward.DEFAULTS`.
-    formation: "individual" (default, and the one that predicts best) or "population".
+    formation: "individual" or "population"; None takes that of `law`, or "individual", which
+        predicts best.
     priors: 95 % ranges (low, high) in physical units instead of the defaults, or None to drop one.
     seating, noise, closure_noise, cycle, compliance: as in `ClosureCurve`; cycles need
         "yield_interference" among `free` or `fixed`, or a law that has one.

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import presets
 from ..calibration import datasets
 from ..calibration.baselines import Comparison, compare
 from ..calibration.fit import Fit, fit_closure, fit_many
@@ -18,6 +19,9 @@ from ..support.checks import Array
 from ..support.files import require_free
 from .command import Written, add_command, add_out, quantity, write_results
 from .fit_shear import add_options, fit_with_shear
+
+OF_CLOSURE = "stress_column", "closure_column", "cycle", "noise", "compliance"
+OF_SHEAR = "shear_column", "shear_stress_column", "normal_column", "normal_stress"
 
 
 def add(commands: Any) -> None:
@@ -58,8 +62,20 @@ def add(commands: Any) -> None:
         action="store_true",
         help="fit all cycles of a file, unloading too, yield_interference among the parameters",
     )
-    parser.add_argument("--free", help="parameters to fit: asperity_density,alpha,beta")
-    parser.add_argument("--formation", choices=("individual", "population"), default="individual")
+    parser.add_argument(
+        "--free",
+        metavar="NAMES",
+        help="parameters to fit, with commas between; default asperity_density, of closure tests "
+        "alpha and beta, with --cycle yield_interference, of shear tests mu, a and critical_slip",
+    )
+    parser.add_argument(
+        "--law", metavar="PRESET_OR_FILE", help="the values of parameters that are not fitted"
+    )
+    parser.add_argument(
+        "--formation",
+        choices=("individual", "population"),
+        help="default: that of --law, or individual",
+    )
     parser.add_argument("--noise", type=float, help="known error of the stress, such as 0.01")
     parser.add_argument("--workers", type=int, help="processes for several files")
     add_out(parser)
@@ -71,6 +87,7 @@ def _run(options: argparse.Namespace) -> None:
             f"{len(options.data)} closure files: give one or more, or shear tests after --shear "
             "with one closure file or none"
         )
+    _require_used(options)
     folders = _folders(options)
     tests = [_read(options, item) for item in options.data]
     keywords = _keywords(options)
@@ -101,6 +118,17 @@ def _run(options: argparse.Namespace) -> None:
         )
         name = Path(options.data[k]).name
         _write(folders[k], options.format, name, fit, alone[k], held)
+
+
+def _require_used(options: argparse.Namespace) -> None:
+    """Refuse options about tests that are not given."""
+    for tests, place, names in (
+        (options.data, "a closure test: name its file before --shear", OF_CLOSURE),
+        (options.shear, "direct shear tests: name their files after --shear", OF_SHEAR),
+    ):
+        for name in names:
+            if not tests and getattr(options, name) not in (None, False):
+                raise ValueError(f"--{name.replace('_', '-')} is about {place}, or leave it out")
 
 
 def _folders(options: argparse.Namespace) -> list[Path]:
@@ -208,12 +236,18 @@ def _keywords(options: argparse.Namespace) -> dict[str, Any]:
                 f"--set {item!r}: write a name and a number, such as alpha=3.8"
             ) from None
     keywords: dict[str, Any] = {"fixed": fixed, "formation": options.formation}
-    if options.free:
-        keywords["free"] = tuple(name.strip() for name in options.free.split(","))
+    keywords["free"] = (
+        tuple(name.strip() for name in options.free.split(","))
+        if options.free
+        else ("asperity_density",)
+        + (("alpha", "beta") if options.data else ())
+        + (("yield_interference",) if options.cycle else ())
+        + (("mu", "a", "critical_slip") if options.shear else ())
+    )
+    if options.law:
+        keywords["law"] = presets.load_any(options.law)
     if options.noise is not None:
         keywords["noise"] = options.noise
     if options.cycle:
         keywords["cycle"] = True
-        free = ("asperity_density", "alpha", "beta", "yield_interference")
-        keywords.setdefault("free", free)
     return keywords

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from .. import presets
 from ..calibration import datasets
 from ..calibration.fit import Fit, fit_curves
 from ..calibration.measured import ClosureCurve, ShearCurve
@@ -15,8 +14,6 @@ from ..support.checks import Array
 from .command import quantity
 
 MOST = 60  # points of a curve that are fitted: a logger writes thousands, and each costs a step
-ALONE = ("asperity_density", "mu", "a", "critical_slip")
-WITH_CLOSURE = (*ALONE[:1], "alpha", "beta", *ALONE[1:])
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -37,11 +34,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--normal-stress", metavar="STRESSES", help="of the shear tests in their order: 1MPa,3MPa"
     )
-    parser.add_argument(
-        "--law",
-        metavar="PRESET_OR_FILE",
-        help="with --shear: the values of parameters that are not fitted",
-    )
 
 
 def fit_with_shear(
@@ -59,12 +51,9 @@ def fit_with_shear(
         raise ValueError("--up-to holds back a part of one closure test: leave it out with --shear")
     curves, about = _curves(options)
     noise, cycle = keywords.pop("noise", None), keywords.pop("cycle", False)
-    if options.law:
-        keywords["law"] = presets.load_any(options.law)
     if test is not None:
         curves.insert(0, ClosureCurve(*test, noise=noise, cycle=cycle, compliance=compliance))
-    free = keywords.pop("free", WITH_CLOSURE if test is not None else ALONE)
-    return fit_curves(curves, free=free, **keywords), about
+    return fit_curves(curves, **keywords), about
 
 
 def _curves(options: argparse.Namespace) -> tuple[list[ClosureCurve | ShearCurve], str]:

@@ -61,6 +61,29 @@ def test_several_cycles_in_one_file(tmp_path, capsys):
     assert "| 2 | 10 |" in capsys.readouterr().out
 
 
+def test_law_gives_what_is_not_fitted(tmp_path, cycle):
+    """All of it, the formation of contacts too, which is "individual" without a law."""
+    law = jl.presets.load("westerly-smooth")
+    assert law.heights.formation == "population"
+    write(tmp_path / "loop.csv", *cycle)
+    command = "fit loop.csv --set alpha=3.8 --law westerly-smooth --out"
+    assert main([*command.split(), "o"]) == 0
+    found = jl.JointLaw.from_toml(tmp_path / "o" / "law.toml")
+    assert found.asperity == law.asperity
+    assert found.heights.formation == "population"
+    assert found.heights.overlap == law.heights.overlap
+    assert main([*command.split(), "p", "--formation", "individual"]) == 0
+    found = jl.JointLaw.from_toml(tmp_path / "p" / "law.toml")
+    assert found.heights.formation == "individual"
+
+
+def test_options_of_tests_that_are_not_given_are_refused(tmp_path, cycle, capsys):
+    write(tmp_path / "loop.csv", *cycle)
+    assert main(["fit", "loop.csv", "--normal-stress", "1MPa", "--out", "o"]) == 2
+    assert "--normal-stress is about direct shear tests" in capsys.readouterr().err
+    assert not (tmp_path / "o").exists()
+
+
 def test_an_unloading_branch_of_no_use_does_not_cost_the_fit(tmp_path, cycle, capsys):
     stress, closure = (x[:13] for x in cycle)
     held = np.full(3, stress[-1]), np.full(3, closure[-1])  # the machine rests at its peak

@@ -86,6 +86,21 @@ def test_three_shear_files_and_a_closure_file_predict_a_fourth(specimen, tmp_pat
     np.testing.assert_allclose(found[6:], truth[6:], rtol=0.02)
 
 
+def test_a_cycle_and_shear_files_are_fitted_together(tmp_path, law, capsys):
+    yielding = replace(law, asperity=replace(law.asperity, yield_interference=2e-5))
+    write_shear(tmp_path / "s.csv", yielding, [3], np.random.default_rng(6))
+    record = jl.closure_test(replace(yielding, closure_only=True).joint(), 8e6, steps=12)
+    table = np.column_stack([record.F1, record.closure])
+    header = "stress [Pa],closure [m]"
+    np.savetxt(tmp_path / "c.csv", table, delimiter=",", header=header, comments="")
+    held = "--set alpha=3.8 --set beta=3e-5 --set asperity_density=3e5 --set critical_slip=0.4e-3"
+    assert main(f"fit c.csv --cycle --shear s.csv {held} --out o".split()) == 0
+    summary = json.loads((tmp_path / "o" / "summary.json").read_text())
+    assert {"mu", "a", "yield_interference"} <= set(summary["identifiable"])
+    assert summary["parameters_SI"]["yield_interference"] == pytest.approx(2e-5, rel=0.1)
+    assert summary["parameters_SI"]["mu"] == pytest.approx(0.55, rel=0.05)
+
+
 def test_a_curve_that_softens_is_told_and_its_wear_can_be_fitted(tmp_path, law, capsys):
     """Peak and residual: the law without wear says that it has none, and which names to free."""
     worn = replace(law.asperity, mu_residual=0.35, wear_slip=0.6e-3)
@@ -110,6 +125,8 @@ def test_a_curve_that_softens_is_told_and_its_wear_can_be_fitted(tmp_path, law, 
     [
         ("--up-to half", "--up-to holds back a part of one closure test"),
         ("--law nothing", "'nothing' is neither a preset"),
+        ("--cycle", "--cycle is about a closure test: name its file before --shear"),
+        ("--noise 0.01", "--noise is about a closure test"),
         ("--normal-stress 1", "--normal-stress = 1 has no unit"),
         ("--normal-column sn:MPa", "which column is the normal stress, and in which unit?"),
     ],

@@ -137,6 +137,8 @@ def _compare(given: argparse.Namespace) -> None:
     scene = load(given.scene)
     if not scene.rocks:
         raise ValueError(f"{given.scene} has no [[rock]] to compare")
+    if given.critical and (given.until is not None or given.tilt):
+        raise ValueError("--critical runs no scene: leave out --until and --tilt")
     if given.out:
         given.out.parent.mkdir(parents=True, exist_ok=True)
     cases = 2 * len(given.seeds) * len(scene.rocks)
@@ -240,11 +242,8 @@ def _go(sim: Simulation, given: argparse.Namespace) -> None:
     if given.vtk and not find_spec("meshio"):
         raise ValueError("--vtk needs meshio: pip install meshio")
     _announce(sim, given.until)
-    record, summary = run(sim, given.out, given.until, not given.no_pictures, given.format)
-    if given.vtk:
-        from .output import vtk  # loads meshio
-
-        vtk.write(record, given.out / "vtk")
+    pictures = None if given.no_pictures else given.format
+    _, summary = run(sim, given.out, given.until, pictures, given.vtk)
     for slip in summary["slip"]:
         print(_slip(slip))
     for rock in summary["rocks"]:

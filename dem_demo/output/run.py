@@ -30,9 +30,11 @@ TABLES = ("history.csv", "blocks.csv", "joints.csv", "history.npz")
 
 def run(
     sim: Simulation, folder: Path | None = None, until: float | None = None,
-    pictures: bool = True, picture_format: str = FORMATS[0],
+    picture_format: str | None = FORMATS[0], vtk: bool = False,
 ):  # fmt: skip
     """Run to `until` (s, default the scene's end); writes into `folder` if given.
+
+    picture_format: None draws no pictures; vtk: write VTK files too, which needs meshio.
 
     Returns (record, summary). A state that the method cannot carry raises Refused and leaves the
     last good one in `folder`/refused, from where the run can be repeated or resumed. Ctrl-C stops
@@ -55,7 +57,7 @@ def run(
         clear_run(folder)
         sim.save(refused, record.state)
         replace_file(refused / "why.txt", f"{trouble}\n".encode())
-        write(record, {"version": VERSION, "refused": str(trouble)}, folder, None)
+        write(record, {"version": VERSION, "refused": str(trouble)}, folder, None, vtk)
         raise Refused(f"{trouble}\nThe last good state is in {refused}") from None
     except KeyboardInterrupt:
         interrupted = True
@@ -82,7 +84,7 @@ def run(
     if folder:
         clear_run(folder)
         sim.save(folder / "state")
-        write(record, summary, folder, picture_format if pictures else None)
+        write(record, summary, folder, picture_format, vtk)
     if interrupted:
         where = f"; go on: python -m dem_demo resume {folder / 'state'} --out NEW" if folder else ""
         raise KeyboardInterrupt(f"interrupted at {sim.time:.4g} s of model time{where}")
@@ -132,7 +134,7 @@ def steps_to(sim: Simulation, until: float | None = None) -> int:
 
 
 def write(
-    record: Record, summary: dict[str, Any], folder: Path, picture_format: str | None
+    record: Record, summary: dict[str, Any], folder: Path, picture_format: str | None, vtk: bool
 ) -> None:
     """All files of a run: numbers before pictures, which take longest; None: no pictures."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -141,6 +143,10 @@ def write(
     record.write(folder)
     for name, draw in pictures.items():
         draw(folder / name)
+    if vtk:
+        from .vtk import write as write_vtk  # loads meshio
+
+        write_vtk(record, folder / "vtk")
 
 
 def _pictures(

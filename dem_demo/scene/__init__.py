@@ -12,7 +12,7 @@ read       a scene from its file
 
 from .blocks import Block, turn
 from .drives import Drive, Drives
-from .laws import build_law, coulomb_law, is_coulomb
+from .laws import build_law, coulomb_law, is_coulomb, law_table
 from .read import DENSITY, GRAVITY, TEMPLATE, build, load, names, parse, read_tables
 from .scene import Key, Run, Scene
 
@@ -30,6 +30,7 @@ __all__ = [
     "build_law",
     "coulomb_law",
     "is_coulomb",
+    "law_table",
     "load",
     "names",
     "parse",

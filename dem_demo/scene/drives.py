@@ -70,7 +70,9 @@ class Drive:
     def _line(self, t: np.ndarray, reversed_at: float) -> np.ndarray:
         values = np.interp(np.minimum(t, reversed_at), self.times, self.values)
         if self.back and np.isfinite(reversed_at):
-            values = values - np.clip(self.back.rate * (t - reversed_at), 0.0, self.back.by)
+            gone = np.clip(self.back.rate * (t - reversed_at), 0.0, self.back.by)
+            forward = np.interp(reversed_at, self.times, self.values) >= self.values[0]
+            values = values - gone if forward else values + gone
         return values
 
 

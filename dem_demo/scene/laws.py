@@ -34,6 +34,18 @@ def is_coulomb(law: jl.JointLaw) -> bool:
     return law.orientation.a >= FLAT and law.heights is None and law.asperity.eta == 0
 
 
+def law_table(data: dict[str, Any], where: str) -> dict[str, Any]:
+    """A law's table with the keys of the law that it is `from`. Raises SceneError."""
+    if "from" not in data:
+        return data
+    try:
+        law = jl.presets.load_any(Table(data, where).take("from", str))
+    except ValueError as error:
+        raise SceneError(f"{where}.from: {error}") from None
+    own = {key: value for key, value in data.items() if key != "from"}
+    return overlay(tomllib.loads(law.to_toml()), own)
+
+
 def build_law(data: dict[str, Any], where: str) -> jl.JointLaw:
     """A law from a scene's `[laws.NAME]` table; `kind` is "joint" (default) or "coulomb".
 
@@ -53,13 +65,7 @@ def build_law(data: dict[str, Any], where: str) -> jl.JointLaw:
         return law
     if kind != "joint":
         raise table.error("kind", "must be 'joint' or 'coulomb'")
-    keys = {key: value for key, value in data.items() if key not in ("kind", "from")}
-    if "from" in data:
-        try:
-            whole = jl.presets.load_any(table.take("from", str))
-        except ValueError as error:
-            raise SceneError(f"{where}.from: {error}") from None
-        keys = overlay(tomllib.loads(whole.to_toml()), keys)
+    keys = {key: value for key, value in law_table(data, where).items() if key != "kind"}
     if keys.get("closure_only"):
         raise SceneError(f"{where}.closure_only = true: joints between blocks shear; leave it out")
     law = jl.JointLaw.from_dict({"plane": 0.0, **keys}, where)

@@ -158,7 +158,9 @@ def _pairs(top: Table, number: dict[str, int], blocks: Sequence[Block]) -> dict[
             if not distinct(named, number, 2):
                 raise table.error("between", "must name two blocks")
             meant = [number[name] for name in named]
-        pairs[frozenset(meant)] = table.take("law", str)
+        law = table.take("law", str)
+        if pairs.setdefault(frozenset(meant), law) != law:
+            raise table.error("law", "another [[joint]] gives these blocks another law")
         table.finish()
     return pairs
 
@@ -202,6 +204,9 @@ def _monitors(table: Table, number: dict[str, int], blocks: Sequence[Block]) -> 
             if not distinct(pair, number, 2):
                 raise SceneError(f"{table.path(kind)}: {pair!r} must be [moving block, its base]")
         joints[kind] = tuple((number[moving], number[base]) for moving, base in pairs)
+    watched = {*joints["slip"], *joints["shear"]}
+    if len({moving for moving, _ in watched}) < len(watched):
+        raise SceneError(f"{table.where}: a moving block can be watched on one base only")
     points = [table.two_numbers("pins", value) for value in table.take("pins", list, [])]
     pins = tuple((_block_at(point, blocks, table, "pins"), point) for point in points)
     table.finish()

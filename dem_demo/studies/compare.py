@@ -51,6 +51,8 @@ def _cases(text: str, seeds: Sequence[int]) -> Iterator[tuple[dict, dict[str, An
         (rock,) = own["rock"]
         for seed in seeds:
             cut = {**own, "rock": [{**rock, "seed": seed}]}
+            if seed != rock.get("seed", 0):  # other blocks, to which the names do not belong
+                cut["joint"] = [joint for joint in own["joint"] if "around" in joint]
             yield {"law": "joint", "seed": seed}, cut
             plain = {name: _plain(law, rock, data) for name, law in data["laws"].items()}
             run = {**data["run"], "max_overlap": 0.1}  # constant springs are soft in impacts
@@ -93,7 +95,7 @@ def _whole(tables: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
 
 def _belongs(joint: dict[str, Any], rock: dict[str, Any]) -> bool:
     if "around" not in joint:
-        return False
+        return all(name.rpartition(" ")[0] == rock["name"] for name in joint["between"])
     low, high = np.quantile(np.add(rock["outline"], rock.get("at", [0, 0])), [0, 1], axis=0)
     return bool((low < joint["around"]).all() and (joint["around"] < high).all())
 

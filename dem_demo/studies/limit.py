@@ -4,14 +4,17 @@ Both are found by bisection on the initial equilibrium, without running the bloc
 where no displacements are found with which the joints carry the loads.
 """
 
+import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from tqdm import tqdm
 
+from jointlaw.parameters.rock import RANGES
+
 from ..dynamics.simulation import Simulation
-from ..scene import GRAVITY, build, turn
+from ..scene import GRAVITY, build, law_table, turn
 
 Tables = dict[str, Any]
 EXACT = 0.01  # share of the tilt and of the factor to which they are found
@@ -45,7 +48,7 @@ def tilted(data: Tables, tilt: float) -> Tables:
 
 def reduced(data: Tables, factor: float) -> Tables:
     """A scene's tables with the friction of asperities and of plain Coulomb divided by a factor."""
-    laws = {name: dict(law) for name, law in data["laws"].items()}
+    laws = {name: dict(law_table(law, f"laws.{name}")) for name, law in data["laws"].items()}
     for law in laws.values():
         if "asperity" in law:
             law["asperity"] = _divided(law["asperity"], factor)
@@ -53,8 +56,13 @@ def reduced(data: Tables, factor: float) -> Tables:
 
 
 def _divided(table: Tables, factor: float) -> Tables:
-    frictions = {"mu", "mu_residual", "friction"} & table.keys()
-    return {**table, **{key: table[key] / factor for key in frictions}}
+    highest = RANGES["mu"][1]  # that a scene may have; what fails with it has no factor
+    return {
+        key: min(value / factor, highest)
+        if key in ("mu", "mu_residual", "friction") and math.isfinite(value)
+        else value
+        for key, value in table.items()
+    }
 
 
 def _bisect(
@@ -69,7 +77,8 @@ def _bisect(
 
         def holds(x: float) -> bool:
             bar.update()
-            return Simulation(build(at(x), where)).balanced
+            data = at(x)
+            return Simulation(build({**data, "run": {**data["run"], "seat": True}}, where)).balanced
 
         sense = 1.0 if holds(0.0) else -1.0
         low, high = 0.0, sense * step

@@ -16,7 +16,9 @@ import jointlaw as jl
 from dem_demo import SceneError, coulomb_law, load, parse
 from dem_demo.cli import main
 from dem_demo.output import law_alone
-from dem_demo.scene import build
+from dem_demo.scene import Drive, build
+from dem_demo.scene.drives import Reversal
+from dem_demo.scene.read import SCENES
 from dem_demo.studies import ablate, compare
 from dem_demo.studies.ablate import _without
 from dem_demo.studies.ingredients import Variant
@@ -67,6 +69,11 @@ law_steps = 2
         ('slip = [["top", "base"]]', 'slip = [["top", "top"]]', r"slip.*\[moving block, its base"),
         ('between = ["top", "base"]', 'between = [["top"], "base"]', "between.*must name two bloc"),
         ('between = ["top", "base"]', 'between = ["top", "top"]', "between.*must name two blocks"),
+        (
+            "[watch]",
+            '[[joint]]\nbetween = ["base", "top"]\nlaw = "plain"\n[watch]',
+            r"joint\[1\]\.law = 'plain': another \[\[joint\]\] gives these blocks another law",
+        ),
         ("law_steps = 2", "law_steps = 2.9", "law_steps = 2.9: must be a whole number"),
         ("values = [0.0, 1e-3]", "values = [0.0, nan]", "values = .*: must be finite numbers"),
         ("times = [0.0, 0.1]", "times = [0.0, nan]", "times = .*: must be finite numbers"),
@@ -131,6 +138,33 @@ def test_a_record_moves_its_block(tmp_path, title):
     # integrals of `once`: 5 s**3/6 while it rises, then a parabola, then a line
     twice = [0.0, 0.0, 5e-3 / 6, 0.04 / 6, 0.04 / 6 + 0.01 + 0.005, 0.04 / 6 + 0.02 + 0.02]
     np.testing.assert_allclose(found, [*twice, twice[-1] + 0.03], atol=1e-15)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_drive_goes_back_the_way_it_came(sign):
+    back = Reversal(block=0, slid=0.1, by=3.0, rate=2.0)
+    drive = Drive(1, 0, (0.0, 1.0), (0.0, sign * 2.0), back=back)
+    assert drive(0.5, 0.5) == pytest.approx(sign)
+    assert drive(1.5, 0.5) == pytest.approx(sign * (1.0 - 2.0))
+    assert drive(9.0, 0.5) == pytest.approx(sign * (1.0 - 3.0))
+
+
+def test_a_moving_block_is_watched_on_one_base():
+    third = '[[block]]\nname = "third"\nbox = [1.0, 1.0]\nat = [9.0, 9.0]\n[[joint]]'
+    text = TEXT.replace("[[joint]]", third).replace('shear = [["top", "base"]]',
+                                                    'shear = [["top", "third"]]')  # fmt: skip
+    with pytest.raises(SceneError, match="can be watched on one base only"):
+        parse(text)
+
+
+def test_joints_by_block_names_stay_with_their_rock():
+    data = tomllib.loads((SCENES / "slope.toml").read_text())
+    data.pop("variants")
+    name = data["rock"][0]["name"]
+    mine = {"between": [f"{name} 1", f"{name} 2"], "law": next(iter(data["laws"]))}
+    other = {"between": ["x 1", "x 2"], "law": next(iter(data["laws"]))}
+    data["joint"] = [mine, other]
+    assert compare.alone(data, name)["joint"] == [mine]
 
 
 def test_a_sine_rises_and_falls_and_ends_at_rest():

@@ -57,12 +57,12 @@ def read_law(options: argparse.Namespace) -> JointLaw:
     law = presets.load_any(options.law)
     require_rock({"mu": law.asperity.mu}, f"{options.law}: asperity.")
     require_rock({"plane": law.plane or 0.0}, f"{options.law}: ")
-    resolution = getattr(options, "resolution", None)
-    if resolution is not None:
-        law = replace(law, resolution=resolution)
     value = given(options, "yield_interference", "m", positive=True)
     if value is not None:
         law = replace(law, asperity=replace(law.asperity, yield_interference=value))
+    resolution = getattr(options, "resolution", None)  # last: a name chooses by the whole law
+    if resolution is not None:
+        law = replace(law, resolution=resolution)
     return law
 
 

@@ -113,6 +113,8 @@ class LiveStub:  # no TableLaw
     pass
 attempt("keep", lambda: Joints(LiveStub()).attach())
 attempt("lagged live", lambda: Joints(LiveStub(), lagged=True))
+attempt("lagged plane", lambda: joints(lagged=True, plane=(0, 0, 1)))
+attempt("lagged forces", lambda: joints(lagged=True).write_back())
 attempt("name", lambda: joints(name="a b"))
 attempt("run", lambda: yade_joint.run("nobody"))
 np.savez("old.npz", ids=[])
@@ -174,6 +176,7 @@ def test_refusals_name_the_remedy(yade, make_table, tmp_path):
     told = {
         "no loop": "set O.engines before attach", "stepper": "joints.time_step()",
         "keep": "neverErase=True", "lagged live": "needs a TableLaw", "name": "identifier",
+        "lagged plane": "or lagged", "lagged forces": "read i.phys",
         "run": ".load(file)", "periodic": "O.periodic", "area": "area = -1", "phys": "select=",
         "version": "start the run anew", "missed": "every step", "taken": "give another name=",
     }  # fmt: skip

@@ -200,12 +200,19 @@ except Exception as error:
     refused = str(error)
 O.load("half.yade.bin")
 joints = adapter()
+try:
+    O.step()
+    unloaded = ""
+except Exception as error:
+    unloaded = str(error)
+O.load("half.yade.bin")
+joints = adapter()
 joints.load("half.npz")
 O.run(700, True)
 again = joints.contacts()
 a, b = np.lexsort(last["ids"].T), np.lexsort(again["ids"].T)
 counts += [len(joints), len(last["ids"])]
-result(whole=whole, again=picture(), refused=refused, counts=counts,
+result(whole=whole, again=picture(), refused=refused, unloaded=unloaded, counts=counts,
        F=last["traction"][a], F_again=again["traction"][b])
 """
 )
@@ -217,6 +224,7 @@ def test_save_reload_continue_equals_an_unbroken_run(yade, make_table, tmp_path,
     make_table(tmp_path / "joint.txt", 1e8, 5e7, 0.4, eta=0.5, uneven=0.2)
     out = yade(RELOAD.format(live=live), live=True)
     assert "load(file)" in out["refused"]  # a reloaded scene without the adapter's state is refused
+    assert "neither attached nor loaded" in out["unloaded"]
     assert out["counts"][0] > 5
     assert out["counts"][1] == out["counts"][2]
     moved = np.abs(out["whole"]).max()

@@ -5,6 +5,7 @@ import re
 import shlex
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -145,6 +146,13 @@ def test_options_of_closure(tmp_path):
     assert run("closure linear-a3 --normal-stress 1MPa,2MPa --no-unload --steps 4 --out o") == 0
     table, _ = read(tmp_path / "o", "closure")
     assert table["F1"][[4, 8]] == pytest.approx([1e6, 2e6], rel=1e-9)
+
+
+def test_a_resolution_by_name_is_that_of_the_law_that_yields(tmp_path):
+    options = "--yield-interference 1nm --resolution fine --normal-stress 1MPa --steps 1 --out o"
+    assert run(f"closure biegel-smooth {options}") == 0
+    law = jl.JointLaw.from_toml(tmp_path / "o" / "law.toml")
+    assert law.resolution == replace(law, resolution="fine").resolution == jl.Resolution(8, 9, 6)
 
 
 @pytest.mark.parametrize(

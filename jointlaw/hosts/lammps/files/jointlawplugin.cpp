@@ -181,7 +181,7 @@ void PairJointlaw::settings(int narg, char **arg)
   opening = -1.0;
   area = gap = damping = closure0 = 0.0;
   planar = false;
-  bool seated = false;
+  bool seated = false, sized = false;
   for (int at = 0; at < narg; at++) {
     const std::string keyword = arg[at];
     if (keyword == "opening") opening = number(at, narg, arg, "opening");
@@ -192,8 +192,10 @@ void PairJointlaw::settings(int narg, char **arg)
       seated = true;
     } else if (keyword == "area" && at + 1 < narg && !strcmp(arg[at + 1], "radius")) {
       area = 0.0;
+      sized = true;
       at++;
     } else if (keyword == "area") {
+      sized = true;
       area = number(at, narg, arg, "area");
       if (!(area > 0.0))
         error->all(FLERR, "pair_style jointlaw: area {} must be > 0 m2, or the word radius", area);
@@ -214,6 +216,9 @@ void PairJointlaw::settings(int narg, char **arg)
     error->all(FLERR, "pair_style jointlaw: give opening R, R >= 0: how far (m) a joint may open "
                "before it is given up");
   if (!(damping >= 0.0)) error->all(FLERR, "pair_style jointlaw: damping {} must be >= 0", damping);
+  if (planar && !sized)
+    error->all(FLERR, "pair_style jointlaw: plane needs area A, the area of joint (m2) that belongs "
+               "to one point");
   if (seated && !planar) error->all(FLERR, "pair_style jointlaw: closure0 belongs to plane X Y Z");
   for (auto &law : laws) jlaw_free(law.law);
   laws.clear();

@@ -141,6 +141,11 @@ class Joints:
             raise ValueError(f"name = {name!r} must be a Python identifier: it labels the engine")
         if lagged and not isinstance(law, TableLaw):
             raise ValueError("lagged = True needs a TableLaw: a live law has no kn and ks")
+        if lagged and (plane is not None or mated or forget < np.inf):
+            raise ValueError(
+                "lagged = True leaves the force to YADE's own contact, which knows no plane, mated "
+                "or forget: leave them out, or lagged"
+            )
         self.law, self.select, self.name = law, select, name
         self.area = area if area is None or callable(area) else float(area)
         self.azimuth = unit(np.array(azimuth, float))
@@ -255,6 +260,11 @@ class Joints:
         now = O.iter
         if self.waiting is not None:
             self._resume()
+        elif self.last is None and not self.attached:
+            raise RuntimeError(
+                f"joints {self.name!r}: neither attached nor loaded. Call .load(file) to continue "
+                "a saved run: without it all joints would start anew"
+            )
         if self.last is not None and now != self.last + 1:
             raise RuntimeError(
                 f"joints {self.name!r}: O.iter went from {self.last} to {now}. The adapter must "
@@ -567,7 +577,7 @@ class Joints:
 
     def contacts(self):
         """Arrays: ids (n, 2), closure (n,), traction (n, 3) in Pa, normal (n, 3), area (n,)."""
-        c = self.c
+        c = self._own_forces()
         return {
             "ids": np.array([c["id1"], c["id2"]]).T, "closure": c["closure"].copy(),
             "traction": c["F"].T.copy(), "normal": c["n"].T.copy(), "area": c["area"].copy(),
@@ -575,11 +585,18 @@ class Joints:
 
     def write_back(self):
         """Show the joint forces in i.phys, for utils.getStress and such, until the next step."""
-        c, F = self.c, self.c["F"]
+        c = self._own_forces()
+        F = c["F"]
         normal = (c["n"] * F[0] * c["area"]).T.tolist()
         shear = ((c["t2"] * F[1] + cross(c["n"], c["t2"]) * F[2]) * c["area"]).T.tolist()
         for i, a, b in zip(self.own, normal, shear):
             i.phys.normalForce, i.phys.shearForce = Vector3(*a), Vector3(*b)
+
+    def _own_forces(self):
+        """The contacts; with lagged=True YADE holds their forces."""
+        if self.lagged:
+            raise RuntimeError("lagged = True: YADE's own contacts hold the forces; read i.phys")
+        return self.c
 
 
 # ------------------------------------------------------- vectors and rotations

@@ -209,7 +209,7 @@ def _reduce(given: argparse.Namespace) -> None:
     rows = []
     for row in strength.strength_reduction(scene, str(given.scene), until, given.out, given.format):
         factor, tilt = row["factor"], row["critical_tilt"]
-        told = "F beyond 64 or below 1/64" if factor is None else f"F = {factor:.3g}"
+        told = "no F between 1/64 and 64" if factor is None else f"F = {factor:.3g}"
         angle = "beyond 60 degrees" if tilt is None else f"{tilt:+.3g} degrees"
         print(f"{row['rock']}: {told}, critical tilt {angle}", flush=True)
         rows.append(row)

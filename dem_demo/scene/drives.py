@@ -71,8 +71,9 @@ class Drive:
         values = np.interp(np.minimum(t, reversed_at), self.times, self.values)
         if self.back and np.isfinite(reversed_at):
             gone = np.clip(self.back.rate * (t - reversed_at), 0.0, self.back.by)
-            forward = np.interp(reversed_at, self.times, self.values) >= self.values[0]
-            values = values - gone if forward else values + gone
+            ways = np.sign(np.diff(self.values))[np.array(self.times[:-1]) < reversed_at]
+            came = ways[ways != 0][-1:]
+            values = values - gone * (came[0] if came.size else 1.0)
         return values
 
 

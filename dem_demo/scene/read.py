@@ -206,7 +206,7 @@ def _monitors(table: Table, number: dict[str, int], blocks: Sequence[Block]) -> 
         joints[kind] = tuple((number[moving], number[base]) for moving, base in pairs)
     watched = {*joints["slip"], *joints["shear"]}
     if len({moving for moving, _ in watched}) < len(watched):
-        raise SceneError(f"{table.where}: a moving block can be watched on one base only")
+        raise SceneError(f"{table.where}: slip and shear watch one block on two bases; name one")
     points = [table.two_numbers("pins", value) for value in table.take("pins", list, [])]
     pins = tuple((_block_at(point, blocks, table, "pins"), point) for point in points)
     table.finish()

@@ -52,7 +52,8 @@ def _cases(text: str, seeds: Sequence[int]) -> Iterator[tuple[dict, dict[str, An
         for seed in seeds:
             cut = {**own, "rock": [{**rock, "seed": seed}]}
             if seed != rock.get("seed", 0):  # other blocks, to which the names do not belong
-                cut["joint"] = [joint for joint in own["joint"] if "around" in joint]
+                blocks = {block["name"] for block in data.get("block", [])}
+                cut["joint"] = [j for j in own["joint"] if blocks.issuperset(j.get("between", ()))]
             yield {"law": "joint", "seed": seed}, cut
             plain = {name: _plain(law, rock, data) for name, law in data["laws"].items()}
             run = {**data["run"], "max_overlap": 0.1}  # constant springs are soft in impacts
@@ -62,7 +63,8 @@ def _cases(text: str, seeds: Sequence[int]) -> Iterator[tuple[dict, dict[str, An
 def alone(data: dict[str, Any], name: str) -> dict[str, Any]:
     """A scene's tables with one of its rocks, and nothing watched."""
     rock = _whole(data["rock"])[name]
-    joints = [joint for joint in data.get("joint", []) if _belongs(joint, rock)]
+    blocks = {block["name"] for block in data.get("block", [])}
+    joints = [joint for joint in data.get("joint", []) if _belongs(joint, rock, blocks)]
     return {**data, "rock": [rock], "watch": {}, "joint": joints}
 
 
@@ -93,9 +95,11 @@ def _whole(tables: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
     return known
 
 
-def _belongs(joint: dict[str, Any], rock: dict[str, Any]) -> bool:
+def _belongs(joint: dict[str, Any], rock: dict[str, Any], blocks: set[str]) -> bool:
+    """Is a [[joint]] one of this rock, or between `blocks` that no rock holds?"""
     if "around" not in joint:
-        return all(name.rpartition(" ")[0] == rock["name"] for name in joint["between"])
+        names = set(joint["between"]) - blocks
+        return all(name.rpartition(" ")[0] == rock["name"] for name in names)
     low, high = np.quantile(np.add(rock["outline"], rock.get("at", [0, 0])), [0, 1], axis=0)
     return bool((low < joint["around"]).all() and (joint["around"] < high).all())
 

@@ -33,7 +33,11 @@ def critical_tilt(data: Tables, where: str) -> float | None:
 
 
 def strength_factor(data: Tables, where: str) -> float | None:
-    """What all friction is to be divided by for a scene to just hold; None beyond 64 or 1/64."""
+    """What all friction is to be divided by for a scene to just hold.
+
+    None if it holds with 1/64 of it, or fails with 64 times of it. No friction is made larger than
+    a scene may have, 5.
+    """
     log = _bisect(
         lambda log: reduced(data, np.exp(log)), where, np.log(2), np.log(LARGEST), lambda _: EXACT
     )

@@ -127,7 +127,8 @@ def _require_used(options: argparse.Namespace) -> None:
         (options.shear, "direct shear tests: name their files after --shear", OF_SHEAR),
     ):
         for name in names:
-            if not tests and getattr(options, name) not in (None, False):
+            value = getattr(options, name)
+            if not tests and value is not None and value is not False:
                 raise ValueError(f"--{name.replace('_', '-')} is about {place}, or leave it out")
 
 
@@ -245,7 +246,8 @@ def _keywords(options: argparse.Namespace) -> dict[str, Any]:
         + (("mu", "a", "critical_slip") if options.shear else ())
     )
     if options.law:
-        keywords["law"] = presets.load_any(options.law)
+        keywords["law"] = law = presets.load_any(options.law)
+        require_rock({"mu": law.asperity.mu}, f"{options.law}: asperity.")
     if options.noise is not None:
         keywords["noise"] = options.noise
     if options.cycle:

@@ -147,13 +147,15 @@ def test_a_drive_goes_back_the_way_it_came(sign):
     assert drive(0.5, 0.5) == pytest.approx(sign)
     assert drive(1.5, 0.5) == pytest.approx(sign * (1.0 - 2.0))
     assert drive(9.0, 0.5) == pytest.approx(sign * (1.0 - 3.0))
+    falls = replace(drive, times=(0.0, 1.0, 2.0), values=(0.0, sign * 2.0, 0.0))
+    assert falls(2.0, 1.5) == pytest.approx(sign * (1.0 + 1.0))
 
 
 def test_a_moving_block_is_watched_on_one_base():
     third = '[[block]]\nname = "third"\nbox = [1.0, 1.0]\nat = [9.0, 9.0]\n[[joint]]'
     text = TEXT.replace("[[joint]]", third).replace('shear = [["top", "base"]]',
                                                     'shear = [["top", "third"]]')  # fmt: skip
-    with pytest.raises(SceneError, match="can be watched on one base only"):
+    with pytest.raises(SceneError, match="watch one block on two bases"):
         parse(text)
 
 
@@ -163,8 +165,10 @@ def test_joints_by_block_names_stay_with_their_rock():
     name = data["rock"][0]["name"]
     mine = {"between": [f"{name} 1", f"{name} 2"], "law": next(iter(data["laws"]))}
     other = {"between": ["x 1", "x 2"], "law": next(iter(data["laws"]))}
-    data["joint"] = [mine, other]
-    assert compare.alone(data, name)["joint"] == [mine]
+    data["block"] = [{"name": "wall"}]
+    beside = {"between": ["wall", f"{name} 1"], "law": next(iter(data["laws"]))}
+    data["joint"] = [mine, other, beside]
+    assert compare.alone(data, name)["joint"] == [mine, beside]
 
 
 def test_a_sine_rises_and_falls_and_ends_at_rest():

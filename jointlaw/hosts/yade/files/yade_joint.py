@@ -169,7 +169,7 @@ class Joints:
     @property
     def F(self):
         """Tractions (3, n) of the last step in the contacts' frames, Pa."""
-        return self.c["F"]
+        return self._own_forces()["F"]
 
     def __len__(self):
         return len(self.c["made"])
@@ -263,7 +263,8 @@ class Joints:
         elif self.last is None and not self.attached:
             raise RuntimeError(
                 f"joints {self.name!r}: neither attached nor loaded. Call .load(file) to continue "
-                "a saved run: without it all joints would start anew"
+                "a saved run. For new joints remove the engine joint_" + self.name + " from "
+                "O.engines and call .attach()"
             )
         if self.last is not None and now != self.last + 1:
             raise RuntimeError(
@@ -558,7 +559,7 @@ class Joints:
                 f"{path!r} has version {data.get('version')}, this adapter reads {VERSION}: start "
                 "the run anew, or go on with the yade_joint.py that saved it"
             )
-        self.waiting, self.last = data, None
+        self.waiting, self.last, self.attached = data, None, True
 
     def _resume(self):
         """Bind a loaded state to the contacts that YADE has now."""

@@ -110,7 +110,7 @@ class Tradeoff:
                 f"{row.tangent_rms:12.2%} {row.loss.max():11.0%} {_ns(row.ns):>8s} "
                 f"{_ns(row.ns_tangent):>13s}  {path:16s}{names.get(r, '')}".rstrip()
             )
-        timed = f"ns per joint and update: {self.joints} joints, {self.how}"
+        timed = f"ns per joint and update: up to {self.joints} joints, {self.how}"
         lines.append(
             f"{len(self.rows)} resolutions tried; listed are the named ones and the Pareto front "
             "of sliders and max error.\n"

@@ -204,8 +204,7 @@ def fit_curves(
         closure curve that does not begin at zero stress adds its seating closure (m).
     fixed: values of parameters that are known otherwise, in SI units.
     law: values of all parameters that are not free, `critical_slip` among them; None takes
-        `forward.DEFAULTS`. A law of one plane or of closure alone stays one. Its closure range
-        is replaced by the default one where heights or stiffness are fitted or fixed.
+        `forward.DEFAULTS`. A law of one plane or of closure alone stays one.
     formation: "individual" or "population"; None takes that of `law`, or "individual".
     priors: 95 % ranges (low, high) in physical units instead of the defaults of `priors.PRIORS`,
         or None to drop one. Besides the parameters: "overlap_share", "full_contact_stress".

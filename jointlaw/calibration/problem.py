@@ -25,8 +25,6 @@ from .priors import TRANSFORMS, Ranges, Values, normal_priors, quantity, transfo
 
 Curves = Sequence[ClosureCurve | ShearCurve]
 ROUNDS = 12  # at most, of fitting and estimating the noise in turn
-# parameters that decide at which closure a stress is reached
-_OF_CURVE = {"asperity_density", "alpha", "beta", "overlap", "K", "lam", "eta"}
 NOISE_WEIGHT = 4.0  # degrees of freedom that the expectation of the noise is worth
 Function = Callable[[Array], Array]
 
@@ -139,8 +137,6 @@ def pose(
     if not settings.has_heights and {"alpha", "beta", "overlap"} & set(names):
         raise ValueError("free: this law has no heights to fit; give it GammaHeights or law=None")
     _require_eq_18(values, names)
-    if _OF_CURVE & {*names, *fixed}:  # the cells of `law` end at the closure of another joint
-        settings = replace(settings, closure_range=None)
     for name in names:  # a length that is infinite by default starts within the curves
         if math.isinf(values[name]):
             closure = name == "yield_interference"

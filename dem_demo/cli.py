@@ -242,8 +242,8 @@ def _go(sim: Simulation, given: argparse.Namespace) -> None:
     if given.vtk and not find_spec("meshio"):
         raise ValueError("--vtk needs meshio: pip install meshio")
     _announce(sim, given.until)
-    pictures = None if given.no_pictures else given.format
-    _, summary = run(sim, given.out, given.until, pictures, given.vtk)
+    pictures = not given.no_pictures
+    _, summary = run(sim, given.out, given.until, pictures, given.format, given.vtk)
     for slip in summary["slip"]:
         print(_slip(slip))
     for rock in summary["rocks"]:

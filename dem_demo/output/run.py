@@ -30,12 +30,11 @@ TABLES = ("history.csv", "blocks.csv", "joints.csv", "history.npz")
 
 def run(
     sim: Simulation, folder: Path | None = None, until: float | None = None,
-    picture_format: str | None = FORMATS[0], vtk: bool = False,
+    pictures: bool = True, picture_format: str = FORMATS[0], vtk: bool = False,
 ):  # fmt: skip
     """Run to `until` (s, default the scene's end); writes into `folder` if given.
 
-    picture_format: None draws no pictures; vtk: write VTK files too, which needs meshio.
-
+    vtk: VTK files too, which needs meshio.
     Returns (record, summary). A state that the method cannot carry raises Refused and leaves the
     last good one in `folder`/refused, from where the run can be repeated or resumed. Ctrl-C stops
     it after a step, writes what there is and raises KeyboardInterrupt. Results of another run in
@@ -84,7 +83,7 @@ def run(
     if folder:
         clear_run(folder)
         sim.save(folder / "state")
-        write(record, summary, folder, picture_format, vtk)
+        write(record, summary, folder, picture_format if pictures else None, vtk)
     if interrupted:
         where = f"; go on: python -m dem_demo resume {folder / 'state'} --out NEW" if folder else ""
         raise KeyboardInterrupt(f"interrupted at {sim.time:.4g} s of model time{where}")

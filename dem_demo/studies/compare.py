@@ -52,8 +52,7 @@ def _cases(text: str, seeds: Sequence[int]) -> Iterator[tuple[dict, dict[str, An
         for seed in seeds:
             cut = {**own, "rock": [{**rock, "seed": seed}]}
             if seed != rock.get("seed", 0):  # other blocks, to which the names do not belong
-                blocks = {block["name"] for block in data.get("block", [])}
-                cut["joint"] = [j for j in own["joint"] if blocks.issuperset(j.get("between", ()))]
+                cut["joint"] = [joint for joint in own["joint"] if not _named(joint, rock)]
             yield {"law": "joint", "seed": seed}, cut
             plain = {name: _plain(law, rock, data) for name, law in data["laws"].items()}
             run = {**data["run"], "max_overlap": 0.1}  # constant springs are soft in impacts
@@ -95,11 +94,15 @@ def _whole(tables: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
     return known
 
 
+def _named(joint: dict[str, Any], rock: dict[str, Any]) -> list[str]:
+    """The blocks of a rock that a [[joint]] names."""
+    return [n for n in joint.get("between", ()) if n.rpartition(" ")[0] == rock["name"]]
+
+
 def _belongs(joint: dict[str, Any], rock: dict[str, Any], blocks: set[str]) -> bool:
     """Is a [[joint]] one of this rock, or between `blocks` that no rock holds?"""
     if "around" not in joint:
-        names = set(joint["between"]) - blocks
-        return all(name.rpartition(" ")[0] == rock["name"] for name in names)
+        return blocks.union(_named(joint, rock)).issuperset(joint["between"])
     low, high = np.quantile(np.add(rock["outline"], rock.get("at", [0, 0])), [0, 1], axis=0)
     return bool((low < joint["around"]).all() and (joint["around"] < high).all())
 

@@ -143,7 +143,7 @@ def test_refusals_leave_a_state_that_goes_on_with_a_smaller_step(tmp_path):
         "record = 0.02", "record = 0.002"
     )
     with pytest.raises(Refused, match="smaller step"):
-        run(Simulation(parse(text)), tmp_path, picture_format=None)
+        run(Simulation(parse(text)), tmp_path, pictures=False)
     assert "smaller step" in (tmp_path / "refused/why.txt").read_text()
     sim = Simulation.load(tmp_path / "refused", step=5e-5)
     record, _ = run(sim, None)

@@ -171,6 +171,20 @@ def test_joints_by_block_names_stay_with_their_rock():
     assert compare.alone(data, name)["joint"] == [mine, beside]
 
 
+def test_joints_by_block_names_are_of_the_seed_of_the_file():
+    text = (SCENES / "slope.toml").read_text().split("[variants")[0]
+    name, law = "rough", "rough"
+    near = f'[[joint]]\nbetween = ["{name} 1", "{name} 2"]\nlaw = "{law}"\n'
+    cases = compare._cases(f"{text}\n{near}", [1, 2])
+    kept = {(case["seed"], data["rock"][0]["name"]): len(data["joint"]) for case, data in cases}
+    assert kept[1, name] == kept[2, name] + 1
+
+
+def test_a_critical_tilt_takes_no_tilt(capsys):
+    assert main(["compare", "slope", "--critical", "--tilt", "3"]) == 2
+    assert "leave out --until and --tilt" in capsys.readouterr().err
+
+
 def test_a_sine_rises_and_falls_and_ends_at_rest():
     text = shaken("sine = { acceleration = 3.0, frequency = 5.0, cycles = 4 }")
     (drive,) = (d for d in parse(text).drives if d.order)

@@ -192,19 +192,15 @@ O.run(700, True)
 whole, last = picture(), joints.contacts()
 joints.save("whole.npz")
 O.reset()
-O.load("half.yade.bin")
-try:
-    O.step()
-    refused = ""
-except Exception as error:
-    refused = str(error)
-O.load("half.yade.bin")
+def refusal():
+    O.load("half.yade.bin")
+    try:
+        O.step()
+    except Exception as error:
+        return str(error)
+refused = refusal()
 joints = adapter()
-try:
-    O.step()
-    unloaded = ""
-except Exception as error:
-    unloaded = str(error)
+unloaded = refusal()
 O.load("half.yade.bin")
 joints = adapter()
 joints.load("half.npz")

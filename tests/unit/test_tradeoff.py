@@ -50,6 +50,8 @@ def test_the_frontier_falls(found):
     assert [row.sliders for row in frontier] == sorted({row.sliders for row in frontier})
     assert (np.diff([row.worst for row in frontier]) < 0).all()
     assert frontier[0].sliders == 4
+    same = replace(frontier[0], sliders=5, error=(1 - 1e-9) * frontier[0].error)
+    assert replace(found, rows=(*found.rows, same)).frontier() == frontier
     text = str(found)
     assert any(line.endswith(" fast") for line in text.splitlines())
     assert "loss error" in text

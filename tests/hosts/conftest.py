@@ -64,6 +64,14 @@ def drive(path, closed=0.0, R=0.5):
 """
 
 
+def pytest_collection_modifyitems(items):
+    """Every test with a host is slow: hosts are installed apart, and start slowly."""
+    here = Path(__file__).parent
+    for item in items:
+        if here in item.path.parents:
+            item.add_marker(pytest.mark.slow)
+
+
 @pytest.fixture
 def yade(tmp_path):
     """Run a script in YADE after the preamble; returns what it passed to `result(...)`."""

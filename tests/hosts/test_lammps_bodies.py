@@ -1,15 +1,15 @@
-"""Joints between bodies of points in LAMMPS: direct shear, a block on a slope, points handed on."""
+"""Joints between bodies of points in LAMMPS: direct shear, a block on a slope, two joint sets,
+points handed on; in.tower as exported."""
 
-import sys
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parent))
-from lammps_host import HEAD, run, soft, thermo
+import pytest
+from lammps_host import HEAD, dumped, run, soft, thermo
 
 import jointlaw as jl
 from jointlaw.hosts.c.export import table_text
+from jointlaw.hosts.lammps.export import export_lammps
 
 SPACING, AREA, DENSITY = 0.05, 0.0025, 2600.0
 COLUMNS, ROWS, LAYERS = 4, 4, 2
@@ -158,3 +158,49 @@ run {steps}"""
             assert away.max() < 1e-7 * np.abs(expected).max()  # theta**2, and rounding of places
         assert (table["c_joint[1]"] == POINTS).all()
         assert (table["c_joint[5]"] == 0).all()
+
+
+def test_two_joint_sets(plugin):
+    """A block in a corner: hybrid/overlay of two jointlaw with different normals and closures."""
+    law, deep, wide, sides = rock(plugin), 3e-5, 5e-5, ROWS * LAYERS
+    one = "jointlaw opening 0.01 area 0.0025 plane {} closure0 {!r}"
+    more = f"""region wall block -0.05 0 0 0.2 0 0.1 units box
+create_atoms 1 region wall
+set type 1 diameter 0.05 density 2600
+set type 1 mol 1
+uncompute joint
+pair_style hybrid/overlay {one.format("0 0 1", deep)} {one.format("1 0 0", wide)}
+pair_coeff * * jointlaw 1 block.jlaw
+pair_coeff * * jointlaw 2 block.jlaw
+compute floor all pair jointlaw 1
+compute wall all pair jointlaw 2
+variable F1 equal fcm(block,z)
+variable F2 equal fcm(block,x)
+thermo_style custom step v_F1 v_F2 c_floor[1] c_wall[1]
+thermo_modify format float %.15g
+run 0"""
+    found = thermo(run(plugin, scene(law, 5e3, more), 2))[0]
+    assert (found["c_floor[1]"][0], found["c_wall[1]"][0]) == (POINTS, sides)
+    for force, joints, closure in (("v_F1", POINTS, deep), ("v_F2", sides, wide)):
+        expected = joints * AREA * float(law.normal_stress(closure))
+        assert found[force][0] == pytest.approx(expected, rel=1e-9), force
+
+
+def test_tower(plugin):
+    """in.tower as exported, with a short and hard shake, on one processor and on two."""
+    law = replace(jl.presets.load("jing-replica"), resolution="fast")
+    export_lammps(law, plugin, "tower")
+    tables, centres = [], []
+    for processors in (1, 2):
+        text = run(plugin, "in.tower", processors, steps=4000, settle=1000, peak=4.0)
+        tables.append(thermo(text)[-1])
+        dump = dumped(plugin / "tower.dump")  # LAMMPS numbers atoms by processor: compare bodies
+        bodies = [dump[:, dump[0, :, 1] == body, 2:] for body in range(1, 6)]
+        centres.append(np.array([body.mean(axis=1) for body in bodies]))
+    table, (one, two) = tables[0], centres
+    fed = np.abs(table["v_work"]).max() + np.abs(table["v_fallen"]).max()
+    assert np.abs(table["v_balance"]).max() < 5e-3 * fed  # against what is kept and lost
+    assert table["c_joint[2]"][-1] > 0.2 * fed  # it has slipped
+    assert np.abs(table["v_top"]).max() > 1e-5
+    assert np.ptp(one, axis=1).max() > 1e-5
+    assert np.abs(one - two).max() < 1e-10  # m, up to the end

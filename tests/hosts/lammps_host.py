@@ -3,14 +3,13 @@
 import os
 import subprocess
 import sys
-from importlib import metadata
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.hosts.lammps.export import LAMMPS, export_lammps
+from jointlaw.hosts.lammps.export import export_lammps
 
 ENV = Path(os.environ.get("ENV", sys.prefix))  # as build.sh
 
@@ -20,14 +19,6 @@ atom_modify map array
 comm_modify vel yes
 newton on
 """
-
-
-def need_lammps():
-    """Skips the test where the pinned LAMMPS is not installed."""
-    packages = [str(path) for path in ENV.glob("lib/python3*/site-packages")]
-    found = {d.version for d in metadata.distributions(path=packages) if d.name == "lammps"}
-    if LAMMPS not in found:
-        pytest.skip(f"no LAMMPS {LAMMPS} in {ENV} (pip install 'jointlaw[lammps]')")
 
 
 def soft(resolution="balanced", **changes):
@@ -46,10 +37,12 @@ def soft(resolution="balanced", **changes):
 
 
 def build(folder, law, flags=""):
-    """Export a law as rock.jlaw and build its plug-in."""
+    """Export a law as rock.jlaw and build its plug-in; skips where LAMMPS is not installed."""
     export_lammps(law, folder, "rock")
     env = {**os.environ, "ENV": str(ENV), "CXXFLAGS": flags}
     done = subprocess.run(["./build.sh"], cwd=folder, env=env, capture_output=True, text=True)
+    if "is needed" in done.stdout:
+        pytest.skip(done.stdout)
     assert done.returncode == 0, done.stdout + done.stderr
     return folder
 

@@ -36,10 +36,10 @@ STYLE, COEFF = "pair_style jointlaw opening 1e-3", "pair_coeff * * rock.jlaw"
 # what is changed in the good script; a part of the one line that says so
 CASES = {
     "file missing": (COEFF, "pair_coeff * * none.jlaw", "none.jlaw: it cannot be read"),
-    "file damaged": (COEFF, "pair_coeff * * damaged.jlaw", "its sum is wrong; export it again"),
+    "another LAMMPS": ("load .", "load ./other", "was built for LAMMPS 20240829, this is 20250722"),
     "law of a plane": (COEFF, "pair_coeff * * plane.jlaw", "a law for motion in a plane"),
     "law with a direction": (COEFF, "pair_coeff * * directed.jlaw", "has a preferred direction"),
-    "two laws": (COEFF, COEFF + "\npair_coeff 1 2 other.jlaw", "types 1 2 have a law already"),
+    "two laws": (COEFF, COEFF + "\npair_coeff 1 2 other/rock.jlaw", "types 1 2 have a law already"),
     "no law for a pair": (COEFF, "pair_coeff 1 1 rock.jlaw\npair_coeff 2 2 rock.jlaw",
                           "types 1 2 have no pair_coeff; give a law or NULL"),
     "too many words": (COEFF, COEFF + " 3", "pair_coeff for jointlaw: I J FILE.jlaw"),
@@ -71,28 +71,19 @@ CASES = {
     "rerun": ("run 2", "dump 1 all custom 1 seen id x y z\nrun 2\nrerun seen dump x y z",
               "rerun cannot follow a joint"),
     "suffix": ("units si", "package omp 1\nsuffix omp\nunits si", "no version for the suffix omp"),
-    "law changed": ("run 2", "run 2\npair_style jointlaw opening 1e-3\npair_coeff * * other.jlaw\n"
-                    "run 2", "there are joints of other laws"),
+    "law changed": ("run 2", f"run 2\n{STYLE}\npair_coeff * * other/rock.jlaw\nrun 2",
+                    "there are joints of other laws"),
 }  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def folder(plugin):
-    text = (plugin / "rock.jlaw").read_text()
-    (plugin / "damaged.jlaw").write_text(text.replace("0x1.9", "0x1.8", 1))
+    """With laws that are refused, and a plug-in that was built for another LAMMPS."""
     (plugin / "plane.jlaw").write_text(table_text(soft(plane=0.0)))
     directed = soft("fast", orientation=jl.Orientation(4.0, c=0.1))
     (plugin / "directed.jlaw").write_text(table_text(directed))
-    (plugin / "other.jlaw").write_text(table_text(soft("fast")))
+    build(plugin / "other", soft("fast"), flags="-O0 -DJOINTLAW_LAMMPS=20240829")
     return plugin
-
-
-def the_error(done):
-    """The one line of a run that was refused."""
-    errors = [line for line in done.stdout.splitlines() if line.startswith("ERROR")]
-    assert done.returncode == 1, done.stdout[-2000:]
-    assert len(errors) == 1, errors
-    return errors[0]
 
 
 def test_the_good_script_runs(folder):
@@ -106,20 +97,21 @@ def test_one_line_and_exit_1(folder, case):
     old, new, line = CASES[case]
     script = GOOD.replace(old, new) if old else ATOMIC
     assert script != GOOD
-    assert line in the_error(lammps(folder, script, 2))
+    done = lammps(folder, script, 2)
+    errors = [line for line in done.stdout.splitlines() if line.startswith("ERROR")]
+    assert done.returncode == 1, done.stdout[-2000:]
+    assert len(errors) == 1, errors
+    assert line in errors[0]
 
 
-def test_another_lammps(plugin, tmp_path):
-    """Built for another release: refused as it is loaded, and by build.sh before."""
-    other = build(tmp_path / "other", soft("fast"), flags="-O0 -DJOINTLAW_LAMMPS=20240829")
-    told = the_error(lammps(other, GOOD, 2))
-    assert "was built for LAMMPS 20240829, this is 20250722; run build.sh" in told
-    program = tmp_path / "venv" / "bin" / "python"
-    program.parent.mkdir(parents=True)
-    program.write_text("#!/bin/sh\necho 2024.8.29\n")
-    program.chmod(0o755)
+def test_build_needs_the_pinned_lammps(plugin, tmp_path):
+    """build.sh in an environment with another release."""
+    python = tmp_path / "bin" / "python"
+    python.parent.mkdir()
+    python.write_text("#!/bin/sh\necho 2024.8.29\n")
+    python.chmod(0o755)
     done = subprocess.run(
-        ["./build.sh"], cwd=other, env={"ENV": str(tmp_path / "venv"), "PATH": "/usr/bin:/bin"},
+        ["./build.sh"], cwd=plugin, env={"ENV": str(tmp_path), "PATH": "/usr/bin:/bin"},
         capture_output=True, text=True,
     )  # fmt: skip
     assert done.returncode == 1

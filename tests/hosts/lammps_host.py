@@ -74,9 +74,9 @@ def run(folder, script, processors=1, **options):
 
 def dumped(path):
     """Frames of a dump: (steps, atoms, columns)."""
-    text = Path(path).read_text().split("ITEM: TIMESTEP\n")[1:]
-    frames = [frame.split("ITEM: ATOMS")[1].split("\n", 1)[1] for frame in text]
-    return np.array([np.array(f.split(), float).reshape(len(f.splitlines()), -1) for f in frames])
+    frames = Path(path).read_text().split("ITEM: TIMESTEP\n")[1:]
+    rows = [frame.splitlines()[8:] for frame in frames]  # behind the head of the frame
+    return np.array([[row.split() for row in frame] for frame in rows], float)
 
 
 def thermo(text):

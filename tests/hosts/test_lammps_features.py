@@ -149,26 +149,22 @@ lattice sc 0.04 origin 0.5 0.5 0.3125
 create_atoms 1 region above
 set group all diameter 0.02 density 2600
 plugin load ./jointlawplugin.so
-{STYLE}
+{STYLE.replace("opening", "damping 0.2 opening")}
 {lines}
 velocity rock set 0 0 -0.5 units box
 """
     more = """variable high equal 9.81*mass(rock)*xcm(rock,z)
-variable moved equal ke(wall)
-thermo_style custom step pe c_ke c_spin c_joint[1] c_joint[2] c_joint[3] c_joint[4] c_joint[6] &
-             v_high v_moved
+variable whole equal pe+c_ke+c_spin+v_high+c_joint[2]+c_joint[3]+c_joint[4]
+thermo_style custom step pe c_ke v_whole c_joint[1] c_joint[2] c_joint[3] c_joint[6]
 run 2000"""
     text = run(plugin, HEAD + start + MOTION + more, 2)
     table, law = thermo(text)[0], soft()
     assert "nothing touches yet" in text
     step = law.critical_time_step(MASS / 7, AREA, law.closure(1e6))
     assert table["c_joint[6]"][0] == pytest.approx(step, rel=1e-9)
-    assert table["c_joint[1]"][0] == 0 < table["c_joint[1]"].max() <= 16
-    assert table["c_joint[2]"][-1] > 0
-    assert (table["v_moved"] == 0).all()
-    whole = sum(table[name] for name in ("PotEng", "c_ke", "c_spin", "v_high"))
-    whole = whole + table["c_joint[2]"] + table["c_joint[3]"] + table["c_joint[4]"]
-    assert np.abs(whole - whole[0]).max() < 5e-3 * table["c_ke"][0]
+    assert table["c_joint[1]"][0] == 0 < table["c_joint[1]"].max() <= 16  # none within the wall
+    assert min(table["c_joint[2]"][-1], table["c_joint[3]"][-1]) > 0.01 * table["c_ke"][0]
+    assert np.ptp(table["v_whole"]) < 5e-3 * table["c_ke"][0]
 
 
 def test_changes_between_runs(plugin):

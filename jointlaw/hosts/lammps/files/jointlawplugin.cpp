@@ -22,6 +22,7 @@
 #include "output.h"
 #include "pair.h"
 #include "update.h"
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>
@@ -359,6 +360,7 @@ void PairJointlaw::init_style()
     fix = modify->add_fix(fmt::format("{} all jointlaw/memory {}", memory_id, size));
     joints_of = dynamic_cast<FixJointlawMemory *>(fix);
     if (!joints_of->laws) joints_of->laws = given;
+    lost_warned = joints_of->given_up();    // those of a restart file were told of before
   }
   if (joints_of->laws != given)
     error->all(FLERR, "pair_style jointlaw: there are joints of other laws than pair_coeff names "
@@ -412,7 +414,7 @@ void PairJointlaw::list_candidates()
     first[ii] = static_cast<int>(candidates.size());
     for (int jj = 0; jj < list->numneigh[i]; jj++) {
       const int j = jlist[jj] & NEIGHMASK;
-      if (key_of(j) > key && force->special_lj[sbmask(jlist[jj])] != 0.0 
+      if (key_of(j) > key && force->special_lj[sbmask(jlist[jj])] != 0.0
           && law_between(atom->type[i], atom->type[j]))
         candidates.push_back(j);
     }
@@ -664,8 +666,8 @@ double PairJointlaw::foreseen() const
 // Bound of the time step from the stiffness of all joints, and what was given up under load
 void PairJointlaw::check_joints()
 {
-  double mine = 0.0, all = 0.0;
   if (!ending) {
+    double mine = 0.0, all = 0.0;
     comm->reverse_comm(this);
     for (int i = 0; i < atom->nlocal; i++)
       mine = std::max(mine, frequency_squared(stiffness[i], atom->rmass[i]));
@@ -678,19 +680,18 @@ void PairJointlaw::check_joints()
     bound = all > 0.0 ? 2.0 / sqrt(all) : 0.0;
     if (comm->me == 0 && bound > 0.0) tell_bound(touching);
   }
-  mine = joints_of->sums[FixJointlawMemory::COUNT];
-  MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_SUM, world);
-  if (all > lost_warned && comm->me == 0)
+  const double lost = joints_of->given_up();
+  if (lost > lost_warned && comm->me == 0)
     error->warning(FLERR, "pair_style jointlaw: {} joints under load were given up (opened by more "
-                   "than {} m, slid off or lost their partner)", all - lost_warned, opening);
-  lost_warned = all;
+                   "than {} m, slid off or lost their partner)", lost - lost_warned, opening);
+  lost_warned = lost;
 }
 
 void PairJointlaw::tell_bound(bool touching)
 {
   if (update->setupflag && fabs(bound - bound_told) > 0.1 * bound_told) {
     const std::string where =
-        touching ? "" : fmt::format(" of an atom with one joint under {:g} Pa; nothing touches yet", FORESEEN);
+        touching ? "" : fmt::format(" once an atom bears {:g} Pa on one joint; nothing touches yet", FORESEEN);
     utils::logmesg(lmp, "pair_style jointlaw: time step {:.4g} s, largest stable one {:.4g} s{} "
                    "(take a tenth of it where bodies hit each other)\n", update->dt, bound, where);
     bound_told = bound;
@@ -759,7 +760,7 @@ void PairJointlaw::unpack_forward_comm(int n, int first_ghost, double *buf)
 
 int PairJointlaw::pack_reverse_comm(int n, int first_ghost, double *buf)
 {
-  std::copy(&stiffness[first_ghost], &stiffness[first_ghost] + n, buf);
+  std::copy_n(stiffness.data() + first_ghost, n, buf);    // n may be 0, and there be no atoms
   return n;
 }
 

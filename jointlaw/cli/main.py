@@ -4,6 +4,7 @@ import argparse
 import re
 import sys
 from collections.abc import Sequence
+from typing import NoReturn
 
 from ..laboratory.experiments import PathError
 from ..support.files import require_free
@@ -14,19 +15,32 @@ from . import closure, export, figures, fit, presets, replay, scan, shear, trade
 WAIT = "the first run after an installation also compiles the law, once"
 COMMANDS = (shear, closure, presets, replay, figures, export, fit, scan, tradeoff)
 
+# Commands ("replay") and options ("tradeoff --loss") that were removed: what to use instead
+REMOVED = {
+    "closure --yield-interference": "write yield_interference into [asperity] of a law file; "
+    "jointlaw presets NAME > mine.toml starts one",
+    "shear --yield-interference": "write yield_interference into [asperity] of a law file; "
+    "jointlaw presets NAME > mine.toml starts one",
+    "tradeoff --loss": "small cycles need more depth cells: write resolution = { u = 3, phi = 6, "
+    "depth = 300 } into the law's file; docs/how-accurate.md says how many",
+}
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line each, as those of the commands are."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise ValueError with the name of the command."""
+        raise ValueError(f"{self.prog}: {message.removeprefix('argument ')}")
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status."""
-    parser = argparse.ArgumentParser(
-        prog="jointlaw",
-        description="A micromechanical, anisotropic, path-dependent rock joint.",
-        epilog="each command has its own help with an example: jointlaw shear --help",
-    )
-    parser.add_argument("--version", action="version", version=f"jointlaw {__version__}")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for command in COMMANDS:
-        command.add(commands)
-    options = parser.parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
+    try:
+        options = _read(sys.argv[1:] if arguments is None else arguments)
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 2
     try:
         if getattr(options, "out", None) and not options.force:
             require_free(options.out)
@@ -40,8 +54,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1 if isinstance(error, PathError) else 2
 
 
-def _joined(arguments: Sequence[str]) -> list[str]:
-    """Arguments with "--reverse -2um" joined to "--reverse=-2um", lest -2um pass for an option."""
+def _read(arguments: Sequence[str]) -> argparse.Namespace:
+    """The options of the command line. Raises ValueError with one line for the user."""
+    command = arguments[0] if arguments else ""
+    for word in ("", *arguments[1:]):
+        given = f"{command} {word.partition('=')[0]}".strip()
+        if given in REMOVED:
+            raise ValueError(f"jointlaw {given} was removed: {REMOVED[given]}")
+    parser = Parser(
+        prog="jointlaw",
+        description="A micromechanical, anisotropic, path-dependent rock joint.",
+        epilog="each command has its own help with an example: jointlaw shear --help",
+    )
+    parser.add_argument("--version", action="version", version=f"jointlaw {__version__}")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for one in COMMANDS:
+        one.add(commands)
+    return parser.parse_args(_with_negative_values(arguments))
+
+
+def _with_negative_values(arguments: Sequence[str]) -> list[str]:
+    """Arguments with "--reverse -2um" written as "--reverse=-2um".
+
+    argparse takes a word that begins with a minus, and is not a plain number, for an option.
+    """
     joined: list[str] = []
     for argument in arguments:
         if joined and re.match(r"--[a-z-]+$", joined[-1]) and re.match(r"-[.\d]", argument):

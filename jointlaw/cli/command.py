@@ -4,13 +4,10 @@ import argparse
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from .. import presets
-from ..laboratory.experiments import PathError
-from ..laboratory.record import UNITS, Record
 from ..law import JointLaw
 from ..parameters.resolution import NAMED
 from ..parameters.rock import require_rock
@@ -44,9 +41,6 @@ def add_command(
     return parser
 
 
-# ------------------------------------------------------------------ types of options
-
-
 def in_unit(unit: str, *, positive: bool = False) -> Callable[[str], float]:
     """Type of an option such as 10MPa: a function that reads its SI value.
 
@@ -62,36 +56,12 @@ def in_unit(unit: str, *, positive: bool = False) -> Callable[[str], float]:
     return read
 
 
-def several(read: Callable[[str], float]) -> Callable[[str], list[float]]:
-    """Type of an option such as 5MPa,20MPa: a function that reads each part by `read`."""
-    return lambda text: [read(part) for part in text.split(",")]
-
-
-def csv_units(text: str) -> list[str]:
-    """Type of the option --units: names of a length and of a stress, as in mm,MPa."""
-    given = text.split(",")
-    if len(given) != 2:
-        raise argparse.ArgumentTypeError(f"{text}: write a length and a stress, mm,MPa")
-    for name, unit in zip(given, ("m", "Pa"), strict=True):
-        in_unit(unit)(f"1{name}")
-    return given
-
-
 def quantity(option: str, text: str, unit: str, *, positive: bool = False) -> float:
     """The SI value of a part of what was given for an option. Raises ValueError naming it."""
     try:
         return units.typed(text, unit, positive=positive)
     except ValueError as error:
         raise ValueError(f"{option}: {error}") from None
-
-
-def given(options: argparse.Namespace, name: str, unit: str) -> float | None:
-    """The SI value of an option by its name in `options`; None if it is left out."""
-    text = getattr(options, name)
-    return None if text is None else quantity(f"--{name.replace('_', '-')}", text, unit)
-
-
-# ------------------------------------------------------------------ the law
 
 
 def add_law(parser: argparse.ArgumentParser, *, resolution: bool = True) -> None:
@@ -108,9 +78,6 @@ def read_law(options: argparse.Namespace) -> JointLaw:
     require_rock({"plane": law.plane or 0.0}, f"{options.law}: ")
     resolution = getattr(options, "resolution", None)
     return law if resolution is None else replace(law, resolution=resolution)
-
-
-# ------------------------------------------------------------------ results
 
 
 def add_out(
@@ -139,61 +106,15 @@ def write_results(
     clear_run(folder)
     names = []
     for name, content in files.items():
-        path = folder / name
+        path = folder / name.replace(".png", f".{picture_format}")
         try:
             if isinstance(content, str):
                 replace_file(path, content.encode())
             else:
-                path = path.with_suffix(f".{picture_format}") if path.suffix == ".png" else path
                 content(path)
         except ImportError as error:
-            print(f"{path.name} is not written: {error}", file=sys.stderr)
+            print(f"no picture: {error}", file=sys.stderr)
         else:
             names.append(path.name)
     write_json(folder / "summary.json", {"version": VERSION, **summary, "files": names})
     print(f"wrote {', '.join([*names, 'summary.json'])} to {folder}")
-
-
-# ------------------------------------------------------------------ laboratory tests
-
-
-def add_test_options(parser: argparse.ArgumentParser, steps: int) -> None:
-    """Add what the laboratory tests take: law, steps and folder for the results."""
-    add_law(parser)
-    parser.add_argument(
-        "--steps", metavar="N", type=int, default=steps, help=f"steps per leg (default {steps})"
-    )
-    parser.add_argument(
-        "--units",
-        metavar="LENGTH,STRESS",
-        type=csv_units,
-        default="m,Pa",
-        help="of CSV and text: mm,MPa (default m,Pa)",
-    )
-    add_out(parser)
-
-
-def run_test(test: Callable[[], Record], law: JointLaw, options: argparse.Namespace) -> Record:
-    """Run a laboratory test and write its record, also that of a test that stopped early."""
-    try:
-        record = test()
-    except PathError as error:
-        if len(error.record):
-            _write(error.record, law, options)
-        raise
-    _write(record, law, options)
-    return record
-
-
-def _write(record: Record, law: JointLaw, options: argparse.Namespace) -> None:
-    """Curve (CSV, NPZ), picture, law and summary of a test."""
-    name, (length, stress) = options.command, options.units
-    files: Written = {
-        f"{name}.csv": partial(record.to_csv, length=length, stress=stress),
-        f"{name}.npz": record.to_npz,
-        "law.toml": law.to_toml,
-        f"{name}.png": record.plot,
-    }
-    settings = {k: v for k, v in vars(options).items() if k not in ("run", "out", "force")}
-    summary = {"settings_SI": settings, "result": record.summary(), "units": UNITS}
-    write_results(options.out, files, summary, options.format)

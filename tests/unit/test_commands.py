@@ -86,7 +86,7 @@ def test_every_command_has_an_example(capsys):
     with pytest.raises(SystemExit):
         main(["--help"])
     commands = re.findall(r"^    (\w+) ", capsys.readouterr().out, re.MULTILINE)
-    assert len(commands) == len(COMMANDS)
+    assert len(commands) == len(COMMANDS) + 1  # one module adds shear and closure
     for command in commands:
         assert example(command, capsys)[0] == command
 
@@ -95,8 +95,8 @@ def test_every_command_has_an_example(capsys):
 def test_what_was_removed_is_told_with_its_remedy(capsys, removed):
     command, *option = removed.split()
     assert main([command, "biegel-rough", *(f"{word}=1" for word in option)]) == 2
-    error = capsys.readouterr().err
-    assert error == f"jointlaw {removed} was removed: {REMOVED[removed]}\n"
+    told = f"jointlaw {command}: {removed} was removed: {REMOVED[removed]}\n"
+    assert capsys.readouterr().err == told
 
 
 def test_all_options_of_shear(tmp_path):
@@ -133,12 +133,12 @@ def test_options_of_closure(tmp_path):
         ("shear biegel-rough --to 2MPa", "--to: '2MPa' is not a quantity in m"),
         ("shear biegel-rough --to 1um --reverse 1um,,2um", "--reverse: ''"),
         ("shear biegel-rough --to 1um --units mm", "--units: mm: write a length and a stress"),
-        ("shear biegel-rough --to 1um --units mm,mm", "--units: '1mm' is not a quantity in Pa"),
+        ("shear biegel-rough --to 1um --units mm,mm", "'1mm' is not a quantity in Pa"),
         ("shear biegel-rough --to 1um --control stiffness", "go together"),
         ("shear biegel-rough --to 1um --steps 0", "steps = 0"),
         ("shear biegel-rough", "the following arguments are required: --to"),
         ("shear biegel-rough --to 1um --out", "--out: expected one argument"),
-        ("export c biegel-rough --tolerance 0.1", "--tolerance shapes a table for YADE"),
+        ("export c biegel-rough --shear-limit 5um", "--shear-limit shapes a table for YADE"),
     ],
 )
 def test_a_refusal_is_one_line_and_leaves_nothing(tmp_path, capsys, arguments, told):

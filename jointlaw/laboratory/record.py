@@ -101,7 +101,7 @@ class Record:
         moved = slip > 1e-9 * max(float(np.max(np.abs(self.shear))), 1e-300)
         if not moved.any():
             return 0.0
-        return float(np.degrees(np.arctan(max(np.max(opening[moved] / slip[moved]), 0.0))))
+        return float(np.degrees(np.arctan(max(0.0, np.max(opening[moved] / slip[moved])))))
 
     @property
     def secant_stiffness(self) -> float:

@@ -1,15 +1,19 @@
-"""Every example of the gallery runs, and one number of each is what physics asks."""
+"""Every example of the gallery runs as the site runs it, and gives what physics asks.
+
+The site runs an example cell by cell (`# %%`), takes the pictures after each cell and closes them.
+"""
 
 import re
-import runpy
 import warnings
 from itertools import pairwise
 
-import matplotlib
 import numpy as np
 import pytest
-from matplotlib import pyplot
 from pages import ROOT
+
+from jointlaw.support.pyplot import style
+
+pytestmark = pytest.mark.slow  # a minute and a half in all
 
 GALLERY = {path.stem.removeprefix("plot_"): path for path in ROOT.glob("docs/gallery/plot_*.py")}
 
@@ -119,8 +123,6 @@ def snapshot(x):
     assert first[4] > 2 * other[4]  # shear after closure meets friction, before it hardly any
 
 
-COUNTS = ("iteration", "branch: up, down to 10 MPa; up, down to 20 MPa")  # axes without a unit
-
 CHECKS = {
     f.__name__: f
     for f in (
@@ -131,18 +133,62 @@ CHECKS = {
 }  # fmt: skip
 
 
+WITHOUT_UNIT = re.compile(r"iteration|branch: .*|.+ over .+")  # counts and ratios
+
+
+def run(path):
+    """Names after all cells, and each picture as it was after the cell that drew it."""
+    space, shown = {"__name__": "__main__"}, []
+    for number, cell in enumerate(re.split(r"^# %%.*$", path.read_text(), flags=re.MULTILINE)):
+        exec(compile(cell, f"{path.name}, cell {number + 1}", "exec"), space)
+        shown += [(axes, len(axes.get_children())) for axes in close_pictures()]
+    return space, shown
+
+
+def close_pictures():
+    """Close all pictures, as the site does, and return their axes."""
+    from matplotlib import pyplot
+
+    axes = [one for number in pyplot.get_fignums() for one in pyplot.figure(number).axes]
+    pyplot.close("all")
+    return axes
+
+
+def faults(axes, parts):
+    """What a reader of the picture would miss.
+
+    Data; labels with units, or those of the axes that it shares; what was drawn too late to be
+    seen, when the picture had been taken with so many `parts`.
+    """
+    if len(axes.get_children()) != parts:
+        yield "something is drawn after the picture was taken"
+    if not axes.has_data():
+        yield "no data"
+    if axes.name == "polar":
+        labels = [axes.get_title()]
+    elif axes.get_label() == "<colorbar>":
+        labels = [axes.get_ylabel() or axes.get_xlabel()]
+    else:
+        labels = [
+            next(filter(None, (getattr(one, f"get_{way}label")() for one in group)), "")
+            for way, group in (
+                ("x", axes.get_shared_x_axes().get_siblings(axes)), ("y", [axes]),
+            )
+        ]  # fmt: skip
+    for label in labels:
+        if "(1)" in label or not (re.search(r"\(.+\)", label) or WITHOUT_UNIT.fullmatch(label)):
+            yield f"label {label!r} without a unit"
+
+
 @pytest.mark.parametrize("name", sorted(GALLERY))
 def test_example_runs(name):
-    assert matplotlib.get_backend().lower() == "agg"
-    with warnings.catch_warnings():
+    with style() as plt, warnings.catch_warnings():
+        plt.switch_backend("Agg")
         warnings.filterwarnings("ignore", message=".*non-interactive.*")  # plt.show()
-        space = runpy.run_path(str(GALLERY[name]))
+        space, shown = run(GALLERY[name])
+    assert shown
+    assert [fault for one in shown for fault in faults(*one)] == []
     CHECKS[name](space)
-    assert pyplot.get_fignums()
-    for number in pyplot.get_fignums():
-        for axes in pyplot.figure(number).axes:
-            labels = {axes.get_xlabel(), axes.get_ylabel()} - {"", *COUNTS}
-            assert all(re.search(r"\(.+\)", label) for label in labels), labels  # a unit
 
 
 def test_gallery_is_in_order_and_complete():

@@ -66,19 +66,3 @@ def test_the_page_on_extremes_has_the_worst_of_its_file(made):
 
     text = table(["check", "worst", "at"], make_extremes.worst_rows())
     assert read("extremes.md", "matrix") == text
-
-
-def test_changes_are_gathered_over_scenes(made):
-    def scene(slips, friction, *others):
-        whole = {"without": "whole scene", "slab, slips at_deg": slips, "friction_kJ": friction,
-                 "change of friction_kJ": "0", "change of slab, slips at_deg": "0",
-                 "end, apart_mm": "", "time_ratio": "1"}  # fmt: skip
-        keys = "without", "slab, slips at_deg", "change of slab, slips at_deg", \
-            "change of friction_kJ", "end, apart_mm", "time_ratio"  # fmt: skip
-        return [whole, *(whole | dict(zip(keys, row, strict=True)) for row in others), whole]
-
-    first = scene("40", "200", ("c = 0", "38.5", "-1.5", "20", "3", "0.90"))
-    other = scene("30", "100", ("c = 0", "", "", "-40", "700.4", "1.10"))  # it never slips
-    third = scene("30", "100", ("c = 0", "", "", "", "", "nan"))  # refused
-    found = made.by_ingredient([first, other, third])
-    assert found == [["c = 0", "3, refused in 1", "1.50", "40%", "3 to 700", "1", "0.90 to 1.10"]]

@@ -49,26 +49,13 @@ def test_shear_example_runs(tmp_path, capsys):
     out = tmp_path / "out"
     names = {"law.toml", "summary.json", "shear.csv", "shear.npz", "shear.png"}
     assert {path.name for path in out.iterdir()} == names
-    printed = capsys.readouterr().out
-    assert all(name in printed for name in names)
-    assert "no peak: largest friction angle" in printed  # the contacts are kept: it still rises
+    # the contacts are kept: friction still rises at both turning points
+    assert "no peak: largest friction angle" in capsys.readouterr().out
     table, summary = read(out, "shear")
     assert len(table) == summary["result"]["rows"] == 401
-    assert summary["result"]["has_peak"] is False
-    np.testing.assert_allclose(table["F1"], 10e6, rtol=1e-9)
     assert table["shear_2"][[200, 400]] == pytest.approx([2e-6, -2e-6])
     assert summary["settings_SI"]["reverse"] == pytest.approx([-2e-6])
     assert jl.JointLaw.from_toml(out / "law.toml") == jl.presets.load("biegel-rough")
-    assert (out / "shear.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_closure_example_runs(tmp_path, capsys):
-    assert main([*example("closure", capsys), "--format", "svg"]) == 0
-    assert (tmp_path / "out" / "closure.svg").read_text().startswith("<?xml")
-    table, summary = read(tmp_path / "out", "closure")
-    assert table["F1"].max() == pytest.approx(20e6, rel=1e-9)
-    assert table["F1"][-1] == pytest.approx(0.0, abs=0.02)
-    assert summary["result"]["largest_normal_stress_Pa"] == pytest.approx(20e6, rel=1e-9)
 
 
 def test_presets_are_listed_and_start_a_file(tmp_path, capsys):
@@ -105,9 +92,7 @@ def test_all_options_of_shear(tmp_path):
         "--control stiffness --normal-stiffness 5GPa/mm --resolution fast --steps 10 --out a/b"
     ) == 0  # fmt: skip
     table, _ = read(tmp_path / "a" / "b", "shear")
-    assert len(table) == 31
     assert table["shear_3"][10] == pytest.approx(-0.25e-6)
-    assert table["shear_2"][30] == pytest.approx(0.0, abs=1e-18)
     asked = 5e6 + 5e12 * (table["closure"][0] - table["closure"])
     np.testing.assert_allclose(table["F1"], asked, rtol=1e-8)
     written = jl.JointLaw.from_toml(tmp_path / "a" / "b" / "law.toml")
@@ -115,15 +100,14 @@ def test_all_options_of_shear(tmp_path):
 
 
 def test_options_of_closure(tmp_path):
-    """Two cycles without unloading; the same numbers in SI and in laboratory units."""
-    line = "closure linear-a3 --normal-stress 1MPa,2MPa --no-unload --steps 4"
-    assert run(f"{line} --out si") == run(f"{line} --units mm,MPa --out lab") == 0
-    table, _ = read(tmp_path / "si", "closure")
-    assert table["F1"][[4, 8]] == pytest.approx([1e6, 2e6], rel=1e-9)
-    lab = np.genfromtxt(tmp_path / "lab" / "closure.csv", delimiter=",", names=True)
-    assert lab.dtype.names[:5] == ("closure_mm", "shear_2_mm", "shear_3_mm", "F1_MPa", "F2_MPa")
-    np.testing.assert_allclose(lab["closure_mm"], 1e3 * table["closure"], rtol=1e-11)
-    np.testing.assert_allclose(lab["F1_MPa"], 1e-6 * table["F1"], rtol=1e-11)
+    """Two cycles without unloading, in laboratory units."""
+    line = "closure linear-a3 --normal-stress 1MPa,2MPa --no-unload --steps 4 --units mm,MPa"
+    assert run(f"{line} --format svg --out o") == 0
+    lab = np.genfromtxt(tmp_path / "o" / "closure.csv", delimiter=",", names=True)
+    assert lab["F1_MPa"][[4, 8]] == pytest.approx([1.0, 2.0], rel=1e-9)
+    law = jl.presets.load("linear-a3")
+    assert lab["closure_mm"][8] == pytest.approx(1e3 * law.closure(2e6), rel=1e-9)
+    assert (tmp_path / "o" / "closure.svg").read_text().startswith("<?xml")
 
 
 @pytest.mark.parametrize(
@@ -151,19 +135,7 @@ def test_a_refusal_is_one_line_and_leaves_nothing(tmp_path, capsys, arguments, t
     assert not (tmp_path / "o").exists()
 
 
-def test_a_bad_file_is_told_by_its_key(tmp_path, capsys):
-    (tmp_path / "mine.toml").write_text(jl.presets.text("biegel-rough").replace("mu =", "nu ="))
-    assert main(["shear", "mine.toml", "--to", "1um", "--out", "o"]) == 2
-    assert "mine.toml: key 'asperity.nu' is unknown" in capsys.readouterr().err
-
-
-def test_a_folder_that_is_a_file(tmp_path, capsys):
-    (tmp_path / "o").write_text("")
-    assert run("shear linear-a2 --to 1um --steps 2 --out o") == 2
-    assert "exists" in capsys.readouterr().err
-
-
-def test_a_test_that_stops_writes_what_it_has(tmp_path, capsys, replays):
+def test_a_test_that_stops_writes_what_it_has(tmp_path, capsys):
     assert run("shear linear-a2 --to 1um --reverse 1e301m --steps 5 --out o") == 1
     assert "direct shear stopped after 6 rows" in capsys.readouterr().err
     table, summary = read(tmp_path / "o", "shear")

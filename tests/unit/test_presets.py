@@ -57,16 +57,13 @@ def test_numbers_of_the_paper(name):
         assert law.heights.formation == "population"
 
 
-@pytest.mark.parametrize("name", ["westerly-smooth", "westerly-rough"])
-def test_density_of_section_4_1(name):
-    assert jl.presets.load(name).asperity_density == 1e-2 * PER_UM2
-
-
 @pytest.mark.parametrize("name", ["westerly-smooth", "westerly-rough", "biegel-smooth"])
 def test_printed_stiffness_is_near_that_of_the_printed_granite(name):
     """Section 4.1: G = 20 GPa, nu = 0.3, R = 40 um give K = 200 and lam = 1.2 to two digits."""
     hertz = jl.Asperity.hertz_mindlin(G=20 * GPA, nu=0.3, R=40 * UM, mu=0.3)
     law = jl.presets.load(name)
+    if name.startswith("westerly"):
+        assert law.asperity_density == 1e-2 * PER_UM2
     assert abs(law.asperity.K / hertz.K - 1) < 0.01
     assert abs(law.asperity.lam - hertz.lam) < 0.05
 

@@ -23,7 +23,13 @@ TOTAL, LAW = "total form (as printed)", "incremental law (this package)"
 WESTERLY = (("westerly-smooth", "smooth"), ("westerly-rough", "rough"))
 SHEAR = "shear displacement δ₂ (µm)"
 COARSE = jl.Resolution(8, 12, 16)  # cells: yield is read where the last of them slides
-STYLE = {"axes.grid": True, "grid.alpha": 0.3, "axes.xmargin": 0, "lines.markersize": 4}
+STYLE = {
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "axes.xmargin": 0,
+    "lines.markersize": 4,
+    "legend.fontsize": 8,
+}
 BELOW = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16)}
 RANGES = {  # closure (m) at 20 MPa, for which the depth cells are placed
     "westerly-smooth": 2.678206790222333e-07,
@@ -171,7 +177,7 @@ def draw(panels, styles, polar=False, columns=3, **labels):
     columns = min(len(panels), columns)
     rows = -(-len(panels) // columns)
     with plt.rc_context(STYLE):
-        size = (4.2 * columns if columns > 1 else 6.0, (4.8 if polar else 3.9) * rows)
+        size = (4.2 * columns if columns > 1 else 6.0, (5.8 if polar else 3.9) * rows)
         figure = plt.figure(figsize=size, layout="constrained")
         kind = {"polar": polar}
         all_axes = figure.subplots(rows, columns, squeeze=False, subplot_kw=kind).ravel()

@@ -11,7 +11,7 @@ a and b it draws in (b); ours are in the legend.
 import math
 
 import numpy as np
-from _common import beside, draw
+from _common import BELOW, beside, draw
 
 import jointlaw as jl
 
@@ -38,10 +38,10 @@ first, second = draw(panels, ("C0", "C1", "C2", "C3", "C4", "C5"), ylabel="C₂�
 ticks = (1, 2, 3, 6, 10, 20, 30)
 first.set(xlabel="a (1)", xscale="log", xticks=ticks, xticklabels=ticks)
 first.minorticks_off()
-second.set(xlabel="asperity stiffness ratio Kₛ/Kₙ (1)", ylim=(-0.4, 1.4))
+second.set(xlabel="asperity stiffness ratio Kₛ/Kₙ (1)", ylim=(0, 1.4))
 second.axhspan(0.78, 1.1, color="C7", alpha=0.16, lw=0, label="measured")
 second.axvspan(0.67, 1.0, color="C9", alpha=0.16, lw=0, label="Hertz-Mindlin, ν = 0.5 to 0")
-second.legend(fontsize=7, ncols=2, loc="lower center")
+second.legend(**BELOW, fontsize=7, ncols=2)
 
 quartz = jl.closed_form.hertz_mindlin_ratio(0.3)
 beside(

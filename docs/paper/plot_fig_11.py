@@ -36,7 +36,8 @@ for name, label in WESTERLY:
     both[label] = low * 1e6, found.normal_stress(low) * 1e-6
 
 styles = [("C0", "C1"), ("C0", "C0:", "C1", "C1:"), ("C0--", "C0", "C1--", "C1")]
-draw(panels, styles, xlabel="closure δ₁ (µm)", ylabel="normal stress F₁ (MPa)")
+axes = draw(panels, styles, xlabel="closure δ₁ (µm)", ylabel="normal stress F₁ (MPa)")
+axes[1].set_ylim(0.0, 75.0)  # room for the legend
 
 smooth, rough = (law(name) for name, _ in WESTERLY)
 for stress in (1e6, 50e6):

@@ -35,40 +35,32 @@ def test_heights(name, mean):
 
 
 def test_density_and_its_moments():
-    """Eq. 15: the density of orientations integrates to 1
+    """Eq. 14: the sentence before it says 0 <= theta <= 2pi/a, the equation pi/(2a)
+    Misprint: over 2pi/a the density sums to 0 (b = c = 0), over pi/(2a) to 1
+
+    Eq. 15: the density of orientations integrates to 1
     Holds: to rounding, at 100 random a, b, c
 
     Eq. 17: mean and variance of the inclination
     Holds: to rounding, at 100 random a, b, c
     """
+    assert quad(lambda x: 2 * math.sin(2 * x), 0.0, math.pi)[0] == pytest.approx(0.0, abs=1e-12)
     for o in shapes(100):
         n, _, _, weight = directions(o.a, o.b, o.c)
         theta = np.arccos(n[0])
         mean = (theta * weight).sum()
-        exact = mean, ((theta - mean) ** 2 * weight).sum()
-        assert weight.sum() == pytest.approx(1.0, abs=ROUNDING)
-        assert inclination(o) == pytest.approx(exact, abs=ROUNDING)
-        assert (o.mean, o.variance) == pytest.approx(exact, abs=ROUNDING)
-
-
-def test_domain_of_the_density():
-    """Eq. 14: the sentence before it says 0 <= theta <= 2pi/a, the equation pi/(2a)
-    Misprint: over 2pi/a the density sums to 0 (b = c = 0), over pi/(2a) to 1
-    """
-    for end, total in ((math.pi, 0.0), (math.pi / 4, 1.0)):  # a = 2
-        assert quad(lambda x: 2 * math.sin(2 * x), 0.0, end)[0] == pytest.approx(total, abs=1e-12)
+        exact = 1.0, mean, ((theta - mean) ** 2 * weight).sum()
+        assert (weight.sum(), *inclination(o)) == pytest.approx(exact, abs=ROUNDING)
+        assert (o.mean, o.variance) == pytest.approx(exact[1:], abs=ROUNDING)
 
 
 def test_contacts_by_direction():
     """Eq. 16: N_Omega = N_r xi(Omega) dOmega
-    Holds: counts by direction sum to N_r, to rounding
+    Holds: `law.contacts` of a direction is N_r times the density, which integrates to 1
     """
-    law, (n, _, _, _) = jl.presets.load("jing-replica"), directions(3.0, -1.0, -0.3)
-    w = np.polynomial.legendre.leggauss(64)[1]
-    theta, phi = np.arccos(n[0]), np.arctan2(n[2], n[1])
-    by_direction = law.contacts(3e-4, (theta, phi)) * np.sin(theta) * w[:, None] * math.pi / 12
-    total = by_direction.sum() * 2 * math.pi / 32
-    assert total == pytest.approx(law.contacts(3e-4), rel=ROUNDING)
+    law, direction = jl.presets.load("jing-replica"), (0.3, 0.7)
+    xi = law.orientation.density(*direction)
+    assert law.contacts(3e-4, direction) == pytest.approx(law.contacts(3e-4) * xi, rel=ROUNDING)
 
 
 @pytest.mark.parametrize(("b", "c"), [(-1, 0), (-1, 0.5), (0, -1 / 3), (1, 1 / 6), (2, 0)])
@@ -97,41 +89,28 @@ def test_smooth_interface():
     assert inclination(Shape(1e4))[1] < 1e-8  # all inclinations are below pi/(2a)
 
 
-def test_extent_of_the_inclinations():
+def test_shape_parameters():
     """Fig. 7a, b: extent pi/2 at a = 1 and pi/4 at a = 2
     Holds: no asperity leans more
-    """
-    for a in (1.0, 2.0):
-        inside, beyond = jl.Orientation(a).density(math.pi / (2 * a) * np.array([1 - 1e-9, 1.001]))
-        assert inside > 0 == beyond
 
-
-def test_b_shifts_the_inclinations():
-    """Fig. 7a: b = -1 crowds contacts towards the horizon, b = 2 towards the normal
+    Fig. 7a: b = -1 crowds contacts towards the horizon, b = 2 towards the normal
     Holds: share inclined above 45° at a = 1: 0.884 (b = -1), 0.707 (b = 0), 0.354 (b = 2)
-    """
-    shares = [directions(1.0, b, 0.0, math.pi / 4)[-1].sum() for b in (-1, 0, 2)]
-    u = math.sqrt(0.5)  # by hand: u + b (u^3 - u)/2 at u = cos 45 deg
-    assert shares == pytest.approx([u + b * (u**3 - u) / 2 for b in (-1, 0, 2)], abs=ROUNDING)
-    assert shares == pytest.approx([0.884, 0.707, 0.354], abs=5e-4)
 
-
-def test_b_zero():
-    """Section 2.2.2: for b = 0 contacts are equally distributed in theta
+    Section 2.2.2: for b = 0 contacts are equally distributed in theta
     One reading: per solid angle at a = 1 only; density at the axis over that at the edge is 1.000
     (a = 1), 1.414 (a = 2), 1.500 (a = 3); uniform in cos aθ for every a
-    """
-    o = [jl.Orientation(a) for a in (1, 2, 3)]
-    ratios = [one.density(0.0) / one.density(math.pi / (2 * one.a)) for one in o]
-    assert ratios == pytest.approx([1.0, math.sqrt(2), 1.5], rel=ROUNDING)
 
-
-def test_c_turns_with_the_azimuth():
-    """Fig. 7c: c = 1/3 makes the density anisotropic in azimuth, c = 0 isotropic
+    Fig. 7c: c = 1/3 makes the density anisotropic in azimuth, c = 0 isotropic
     Holds: at θ = 90°, a = 1: 0.318/sr along axis 2, 0 along axis 3; the same for c = 0
     """
-    edge = math.pi / 2
-    density = [jl.Orientation(1.0, 0.0, c).density(edge, p) for c in (1 / 3, 0) for p in (0, edge)]
-    # (1 + 3c cos 2 phi)/(2 pi)
-    exact = [1 / math.pi, 0.0, 0.5 / math.pi, 0.5 / math.pi]
-    assert density == pytest.approx(exact, abs=ROUNDING)
+    for a, over_edge in ((1, 1.0), (2, math.sqrt(2)), (3, 1.5)):
+        axis, edge, beyond = jl.Orientation(a).density(math.pi / 2 / a * np.array([0, 1, 1.001]))
+        assert (axis / edge, beyond) == pytest.approx((over_edge, 0.0), rel=ROUNDING)
+    u = math.sqrt(0.5)  # by hand: u + b (u^3 - u)/2 at u = cos 45 deg
+    for b, share in ((-1, 0.884), (0, 0.707), (2, 0.354)):
+        found = directions(1.0, b, 0.0, math.pi / 4)[-1].sum()
+        assert found == pytest.approx(u + b * (u**3 - u) / 2, abs=ROUNDING)
+        assert found == pytest.approx(share, abs=5e-4)
+    for c, known in ((1 / 3, [1 / math.pi, 0.0]), (0.0, [0.5 / math.pi] * 2)):
+        found = jl.Orientation(1.0, 0.0, c).density(math.pi / 2, np.array([0.0, math.pi / 2]))
+        assert found == pytest.approx(known, abs=ROUNDING)  # (1 + 3c cos 2 phi)/(2 pi)

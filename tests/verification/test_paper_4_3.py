@@ -11,25 +11,23 @@ import numpy as np
 import pytest
 from builders import law
 from paper_integrals import preset
-from scipy.optimize import bisect, brentq
+from scipy.optimize import brentq
 
 import jointlaw as jl
 from jointlaw.paper.secant import secant
 
 
-def total(found, shear, closure=None, normal=None, axis=1):
-    """F/F1 of the total form along an axis at each shear (m), at a kept closure or stress (Pa)."""
-    delta, ratios = np.zeros(3), []
-    for delta[axis] in np.atleast_1d(shear):
-
-        def excess(u):
-            delta[0] = u
-            return secant(found, delta).F[0] - normal
-
-        # between no contact left and twice the closure of an unsheared joint
-        delta[0] = closure or brentq(excess, -found.heights.overlap, 2 * found.closure(normal))
-        F = secant(found, delta).F
-        ratios.append(F[axis] / F[0])
+def total(found, shear, closure=None, normal=None, azimuth=0.0):
+    """Shear over normal stress of the total form at each shear (m), closure or stress (Pa) kept."""
+    along, ratios = np.array([0.0, math.cos(azimuth), math.sin(azimuth)]), []
+    for x in np.atleast_1d(shear):
+        at = [closure or 0.0, 0.0, 0.0] + x * along
+        if normal:  # between no contact left and twice the closure of an unsheared joint
+            ends = -found.heights.overlap, 2 * found.closure(normal)
+            misfit = lambda u, at=at: secant(found, [u, *at[1:]]).F[0] - normal  # noqa: E731
+            at[0] = brentq(misfit, *ends)
+        F = secant(found, at).F
+        ratios.append(F @ along / F[0])
     return np.array(ratios)
 
 
@@ -79,22 +77,18 @@ def test_shear_resistance_tends_to_that_of_the_asperities(a, printed, ours):
 def test_nonlinear_asperities_resist_more():
     """Fig. 15: nonlinear asperities give the higher resistance, more so for a = 3 than a = 6
     In part: the excess at 4 µm is 0.067 (a = 3) and 0.031 (a = 6) in the total form, 0.069 and
-    0.031 in the incremental law; a = 3 is ahead only from 0.5 µm (total) and 0.3 µm on
+    0.031 in the incremental law; at 0.2 µm it is larger for a = 6
     """
-    x = np.linspace(0.1e-6, 4e-6, 40)
-
-    def excess(a):
-        names = f"linear-a{a}", f"nonlinear-a{a}"
-        first = np.subtract(*(total(preset(name), x, closure=1e-6) for name in names))
-        second = np.subtract(*(ratio(sheared(name, 4e-6, closure=1e-6), x) for name in names))
-        return -np.array([first, second])
-
-    three, six = excess(3), excess(6)
-    assert three.min() > 0 < six.min()
-    assert three[:, -1] == pytest.approx([0.067, 0.069], abs=1e-3)
-    assert six[:, -1] == pytest.approx([0.031, 0.031], abs=1e-3)
-    ahead = [x[row][-1] for row in three < six]  # the last shear at which a = 6 leads
-    assert ahead == pytest.approx([0.5e-6, 0.3e-6], abs=1.1e-7)  # one point of x
+    at, found = np.array([0.2e-6, 4e-6]), {}
+    for a in (3, 6):
+        names = f"nonlinear-a{a}", f"linear-a{a}"
+        totals = np.subtract(*(total(preset(name), at, closure=1e-6) for name in names))
+        ours = np.subtract(*(ratio(sheared(name, 4e-6, closure=1e-6), at) for name in names))
+        found[a] = np.array([totals, ours])
+    assert (found[3][:, 0] > 0).all()
+    assert (found[3][:, 0] < found[6][:, 0]).all()
+    assert found[3][:, 1] == pytest.approx([0.067, 0.069], abs=1e-3)
+    assert found[6][:, 1] == pytest.approx([0.031, 0.031], abs=1e-3)
 
 
 def test_sliding_is_complete_earlier_on_smooth_interfaces():
@@ -129,24 +123,19 @@ def test_separation_begins(a):
     """
     onset = 1 / math.tan(math.pi / (2 * a))
     linear = law(a, 0.0, 0.0, eta=0.0, plane=0.0, resolution=jl.Resolution(200, 200, 1))
-    before, after = (secant(linear, (1.0, onset * x, 0.0)) for x in (1 - 1e-9, 1 + 1e-3))
-    assert before.separated < 1e-12 < after.separated
-    joint = linear.joint()
-    start = joint.update([1.0, 0.0]) and joint.snapshot()
-
-    def parted(shear):
-        joint.restore(start)
-        joint.update([0.0, shear], tangent=False)
-        return 1.0 if joint.separated > 0.0 else -1.0
-
-    # the outermost node lies 4e-5 in u and half an azimuth, 3e-5, inside the rim
-    assert bisect(parted, 0.5 * onset, 2 * onset, xtol=1e-7) == pytest.approx(onset, rel=1e-4)
+    # of the incremental law the outermost node lies within 1e-4 of the rim
+    for x, parted in ((1 - 1e-6, False), (1 + 1e-3, True)):
+        joint = linear.joint()
+        joint.update([1.0, 0.0])
+        joint.update([0.0, onset * x])
+        assert (joint.separated > 0) == parted
+        assert (secant(linear, (1.0, onset * x, 0.0)).separated > 1e-12) == parted
 
 
 def test_smooth_interface_is_stronger():
     """Fig. 17: at 10 MPa the smooth interface has the higher shear resistance
     In part: F₂/F₁ smooth/rough at 0.1, 0.5, 1.5 µm is 0.338/0.322, 0.566/0.489, 0.770/0.661 in the
-    incremental law, 0.287/0.295, 0.518/0.477, 0.676/0.635 in the total form: there beyond 0.12 µm
+    incremental law, 0.287/0.295, 0.518/0.477, 0.676/0.635 in the total form
 
     Fig. 17: and the higher deformation hardening
     Holds: F₂/F₁ over 1 µm after yield grows by 0.324 (smooth) and 0.250 (rough) in the incremental
@@ -164,18 +153,11 @@ def test_smooth_interface_is_stronger():
         after = record.shear[all_slide(record)] + np.array([0.0, 1e-6])
         assert np.ptp(total(found, after, normal=10e6)) == pytest.approx(printed_rise, abs=5e-3)
         assert np.ptp(ratio(record, after)) == pytest.approx(our_rise, abs=5e-3)
-    smooth, rough = (sheared(f"biegel-{kind}", 1.5e-6, 10e6) for kind in values)
-    x = smooth.shear[3:]  # from 0.02 um on
-    assert (ratio(smooth, x) > ratio(rough, x)).all()
-    both = [total(preset(f"biegel-{kind}"), [0.11e-6, 0.13e-6], normal=10e6) for kind in values]
-    assert (np.sign(both[0] - both[1]) == [-1.0, 1.0]).all()
 
 
 def test_contact_area_is_not_the_reason():
     """Section 4.3: because its initial contact area is larger at the same stress
-    Fails: at 10 MPa the smooth interface has 2.1 % fewer contacts and 0.9 % less contact area. In
-    the incremental law at 1 µm the rough one (0.596) gains from the heights of the smooth one
-    (0.636: contacts form where facets lean into the shear) and from its orientations (0.655)
+    Fails: at 10 MPa the smooth interface has 2.1 % fewer contacts and 0.9 % less contact area
     """
     smooth, rough = preset("biegel-smooth"), preset("biegel-rough")
     closed = [found.closure(10e6) for found in (smooth, rough)]
@@ -183,10 +165,6 @@ def test_contact_area_is_not_the_reason():
     lean = [f.weight @ np.cos(f.theta) for f in (smooth.facets, rough.facets)]
     area = count * closed[0] / closed[1] * lean[0] / lean[1]  # Hertz: goes with the closure
     assert (count - 1, area - 1) == pytest.approx((-0.021, -0.009), abs=2e-3)
-    changed = replace(rough, heights=smooth.heights), replace(rough, orientation=smooth.orientation)
-    for found, known in zip((rough, *changed), (0.596, 0.636, 0.655), strict=True):
-        record = jl.direct_shear(found.joint(), 1e-6, 10e6, steps=60)
-        assert ratio(record, 1e-6) == pytest.approx(known, abs=2e-3)
 
 
 MEDIUM = jl.Resolution(8, 12, 16)  # cells: yield is read where the last of them slides
@@ -201,15 +179,11 @@ def yield_angle(stress, azimuth):
     return record.friction_angle[all_slide(record)]
 
 
-def total_angle(tilt, azimuth):
-    """Friction angle (degrees) of the replica at a tilt arctan(shear/closure), total form."""
-    along = np.array([0.0, math.cos(azimuth), math.sin(azimuth)])
-    found = replace(preset("jing-replica"), heights=None)  # their count cancels
-    F = secant(found, 1e-3 * (math.sin(tilt) * along + [math.cos(tilt), 0.0, 0.0])).F
-    return math.degrees(math.atan2(F @ along, F[0]))
-
-
-ALL_SLIDE = math.pi / 6 + math.atan(0.47 * 0.33)  # tilt: off the steepest facet by arctan mu lam
+def total_angle(shear, closure, azimuth=0.0):
+    """Friction angle (degrees) of the replica at a shear and a closure (m), total form."""
+    return math.degrees(
+        math.atan(total(preset("jing-replica"), shear, closure, azimuth=azimuth)[0])
+    )
 
 
 def test_friction_angle_depends_on_direction():
@@ -218,7 +192,9 @@ def test_friction_angle_depends_on_direction():
     27.6°, 28.3°, 29.1° in the incremental law (1 MPa). c < 0 makes axis 3 the stronger
     """
     turns = np.radians([0, 45, 90])
-    assert [total_angle(ALL_SLIDE, x) for x in turns] == pytest.approx([26.8, 28.7, 30.6], abs=0.05)
+    all_slide_at = math.tan(math.pi / 6 + math.atan(0.47 * 0.33))  # shear over closure
+    printed = [total_angle(1e-4 * all_slide_at, 1e-4, azimuth) for azimuth in turns]
+    assert printed == pytest.approx([26.8, 28.7, 30.6], abs=0.05)
     # the first row at which all slide is found to a step, 0.015 closures: about 0.3 deg
     assert [yield_angle(1e6, x) for x in turns] == pytest.approx([27.6, 28.3, 29.1], abs=0.3)
 
@@ -241,11 +217,12 @@ def test_friction_angle_against_normal_stress():
         record = jl.direct_shear(replica.joint(), 1e-3, stress, steps=40)
         assert record.friction_angle[-1] == pytest.approx(ours, abs=0.1)
         angle = math.degrees(math.atan(total(replica, 1e-3, normal=stress)[0]))
-        assert angle == pytest.approx(printed, abs=0.15)
+        assert angle == pytest.approx(printed, abs=0.15)  # read between the rows of a walk
     # at 0.98 of the largest dilation all but the steepest 2 % are separated
     limit = math.degrees(math.atan(0.47)) + 30.0
     assert limit == pytest.approx(55.2, abs=0.05)
-    assert total_angle(math.pi / 2 + 0.98 * math.pi / 6, 0.0) == pytest.approx(limit, abs=0.6)
+    opening = 1e-3 * math.tan(0.98 * math.pi / 6)
+    assert total_angle(1e-3, -opening) == pytest.approx(limit, abs=0.6)
 
 
 def test_averages_do_not_determine_the_behavior():

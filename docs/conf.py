@@ -30,11 +30,12 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx_gallery.gen_gallery",
     "sphinx.ext.mathjax",
+    "claims",
     "commands",
     "docstrings",
     "pages",
 ]
-exclude_patterns = ["_build", "gallery", "_ext"]
+exclude_patterns = ["_build", "gallery", "paper", "_ext"]
 suppress_warnings = [
     "config.cache",  # the settings of the gallery hold objects
 ]
@@ -64,9 +65,10 @@ ORDER = (
     "batch", "blocks", "newton", "snapshot",
 )  # fmt: skip
 sphinx_gallery_conf = {
-    "examples_dirs": "gallery",
-    "gallery_dirs": "examples",
-    "within_subsection_order": ExplicitOrder([f"plot_{name}.py" for name in ORDER]),
+    "examples_dirs": ["gallery", "paper"],
+    "gallery_dirs": ["examples", "figures"],
+    "ignore_pattern": "^_",  # what scripts share
+    "within_subsection_order": ExplicitOrder([f"plot_{name}.py" for name in ORDER] + ["*"]),
     "remove_config_comments": True,
     "download_all_examples": False,
     "show_memory": False,

@@ -34,7 +34,7 @@ one = {"a = ∞: Kₛ/Kₙ": (a, np.full(a.shape, 0.5))}
 all_alike = {"a = ∞": (kappa, [stiffness_ratio(math.inf, 0, k) for k in kappa])}
 panels = {"(a) Kₛ/Kₙ = 0.5": left | one, "(b)": right | all_alike}
 
-first, second = draw(panels, ("C0", "C1", "C2", "C3", "C4", "C5"), ylabel="C₂₂/C₁₁")
+first, second = draw(panels, ("C0", "C1", "C2", "C3", "C4", "C5"), ylabel="C₂₂/C₁₁ (1)")
 ticks = (1, 2, 3, 6, 10, 20, 30)
 first.set(xlabel="a (1)", xscale="log", xticks=ticks, xticklabels=ticks)
 first.minorticks_off()

@@ -88,6 +88,16 @@ def test_limits_of_the_sliding_domain():
     assert inelastic(Shape(1.0), 1.0, 1.0, 0.0)[0] == pytest.approx(2 / 3, rel=1e-14)
 
 
+def test_heights_scale_the_total_form_by_their_count():
+    """Eq. 37: N is counted up to r = r0 + delta_1 (printed: delta_i)
+    Misprint: only the closure changes the overlap; Eq. 21 to 23 are scaled by P(r0 + δ₁)
+    """
+    plain, counted = law(), law(formation="population")
+    ratio = secant(counted, [0.4, 0.3, 0.1]).F / secant(plain, [0.4, 0.3, 0.1]).F
+    np.testing.assert_allclose(ratio, counted.heights.cdf(2.4), rtol=1e-13)
+    assert not secant(counted, [-2.5, 3.0, 0.0]).F.any()  # r0 + delta_1 < 0: no contact
+
+
 @pytest.mark.parametrize("resolution", RESOLUTIONS, ids=str)
 @pytest.mark.parametrize("formation", FORMATIONS)
 def test_oblique_loading_does_not_slip(resolution, formation):

@@ -31,16 +31,6 @@ def test_quadrature_error_is_as_claimed(monkeypatch):
         assert -1e-12 < found.sliding < found.sliding + found.separated + 1e-9 < 1 + 1e-8
 
 
-def test_heights_scale_the_total_form_by_their_count():
-    """Eq. 37: N is counted up to r = r0 + delta_1 (printed: delta_i)
-    Misprint: only the closure changes the overlap; Eq. 21 to 23 are scaled by P(r0 + δ₁)
-    """
-    plain, counted = law(), law(formation="population")
-    ratio = secant(counted, [0.4, 0.3, 0.1]).F / secant(plain, [0.4, 0.3, 0.1]).F
-    np.testing.assert_allclose(ratio, counted.heights.cdf(2.4), rtol=1e-13)
-    assert not secant(counted, [-2.5, 3.0, 0.0]).F.any()  # r0 + delta_1 < 0: no contact
-
-
 @pytest.mark.parametrize("eta", [0.0, 0.5])
 def test_no_displacement_no_force(eta):
     result = secant(law(eta=eta), [0.0, 0.0, 0.0])

@@ -179,9 +179,8 @@ def draw(panels, styles, polar=False, columns=3, **labels):
     with plt.rc_context(STYLE):
         size = (4.2 * columns if columns > 1 else 6.0, (5.8 if polar else 3.9) * rows)
         figure = plt.figure(figsize=size, layout="constrained")
-        kind = {"polar": polar}
-        all_axes = figure.subplots(rows, columns, squeeze=False, subplot_kw=kind).ravel()
-        for axes, own, (title, lines) in zip(all_axes, styles, panels.items(), strict=True):
+        grid = figure.subplots(rows, columns, squeeze=False, subplot_kw={"polar": polar})
+        for axes, own, (title, lines) in zip(grid.ravel(), styles, panels.items(), strict=True):
             for style, (label, (x, y)) in zip(cycle(own), lines.items(), strict=False):
                 axes.plot(np.radians(x) if polar else x, y, style, label=label)
             axes.set(title=title, **labels)
@@ -189,7 +188,7 @@ def draw(panels, styles, polar=False, columns=3, **labels):
                 **({"loc": "upper center", "bbox_to_anchor": (0.5, -0.16)} if polar else {})
             )
             axes.yaxis.labelpad = 28 if polar else 4
-    return all_axes
+    return grid.ravel()
 
 
 def beside(*rows):

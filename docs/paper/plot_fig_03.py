@@ -22,9 +22,8 @@ for name, label in WESTERLY:
     for lines, share, scale in ((density, heights.pdf, 1e-6), (touch, heights.cdf, 1.0)):
         lines[text] = r * 1e6, share(r) * scale
         lines[f"_{label} at r0"] = at * 1e6, share(at) * scale
-    mean = f"mean height of the {label} interface, β (α + 1) of Eq. 13 (µm)"
     printed = {"smooth": "1.15 × 4.82 = 5.54", "rough": "3.52 × 7.14 = 25.13"}[label]
-    beside((mean, printed, f"{heights.mean * 1e6:.2f}"))
+    beside((f"mean height β (α + 1) (µm), {label}", printed, f"{heights.mean * 1e6:.2f}"))
 
 left, right = draw(panels, ("C0", "C0o", "C1", "C1o"), xlabel="overlap r (µm)")
 left.set_ylabel("H(r) (1/µm)")

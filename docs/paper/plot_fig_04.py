@@ -33,9 +33,7 @@ for axes, (title, lines) in zip((side, plan), panels.items(), strict=True):
     axes.set(title=title, xlim=(-1.8, 1.8), ylim=(-1.4, 1.4), aspect="equal")
     axes.set_axis_off()
 
-# %%
-# Arrows, each with its text beyond the head; then the other texts.
-
+# arrows, each with its text beyond the head; then the other texts
 for axes, tail, head, text, color in (
     (side, (0.0, 0.0), (0.0, -1.0), "1", "0.4"),
     (side, (0.0, 0.0), n, "n", "C0"),

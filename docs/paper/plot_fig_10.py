@@ -49,5 +49,4 @@ left, right = draw(panels, [("C0", "C3", "C3:"), ("C0", "C0o", "C1", "C1o", "C2"
 left.set(xlabel="inclination θ (°)", ylabel="share per degree (1/°)")
 right.set(xlabel="asperity friction μ (1)", ylabel="sliding share (1)", ylim=(-0.03, 1.5))
 right.legend(ncols=2, loc="upper center", fontsize=8)
-slid = math.cos(2 * math.radians(start))
-beside(("sliding share at a = 2, μ = 0.6", f"cos 2θₛ = {slid:.4f}", f"{sliding(2, 0.6)[0]:.4f}"))
+beside(("sliding share at a = 2, μ = 0.6", "cos 2θₛ = 0.4706", f"{sliding(2, 0.6)[0]:.4f}"))

@@ -39,7 +39,6 @@ for panel in axes[2:]:
     panel.set(ylabel="stiffness/(incremental, 0°, 10 MPa) (1)", ylim=(0.0, 1.05))
 
 for stress in (1e6, 50e6):
-    pairs = zip(*(initial_stiffness(law(name), stress) for name, _ in WESTERLY), strict=True)
-    total, ours = (smooth / rough for smooth, rough in pairs)
+    total, ours = np.divide(*(initial_stiffness(law(name), stress) for name, _ in WESTERLY))
     text = f"{total:.2f} (total form), {ours:.2f} (incremental law)"
     beside((f"smooth over rough at {stress * 1e-6:g} MPa", "above 1", text))

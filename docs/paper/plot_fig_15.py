@@ -33,4 +33,5 @@ styles = [
     ("C0", "C3", "C2", "C1", "k:"),
     ("C0", "C0:", "C3", "C3:", "C2", "C2:", "C1", "C1:", "k:"),
 ]
-draw(panels, styles, xlabel=SHEAR, ylabel="F₂/F₁ (1)", ylim=(0.0, 1.15))
+for axes in draw(panels, styles, xlabel=SHEAR, ylabel="F₂/F₁ (1)", ylim=(0.0, 1.15)):
+    axes.legend(loc="lower right", fontsize=8)

@@ -3,13 +3,12 @@
 import math
 
 import numpy as np
-import paper_integrals
 import pytest
 from builders import law
-from paper_integrals import directions, shapes
+from paper_laws import directions, shapes
 
 import jointlaw as jl
-from jointlaw.paper.closed_form import Shape, closure_stiffness, elastic, inelastic, sliding_angle
+from jointlaw.paper.closed_form import Shape, closure_stiffness, inelastic, sliding_angle
 from jointlaw.paper.secant import secant, series_limit, shear_factor
 
 ROUNDING = 1e-12  # of sums of some hundred terms of order one
@@ -50,7 +49,7 @@ def test_total_force(delta, eta, contact):
     Holds: to 3e-6 against the sum over 80 000 asperities, which is what the sum errs by
     """
     a, b, c, lam, mu = 2.0, 0.5, 0.1, 1.2, 0.6
-    n, _, _, weight = directions(a, b, c, order=240, azimuths=320)
+    n, weight = directions(a, b, c, order=240, azimuths=320)
     normal = np.tensordot(delta, n, 1)
     dn, slip = np.maximum(normal, 0.0), np.reshape(delta, (3, 1, 1)) - normal * n
     ds = np.sqrt((slip**2).sum(0))
@@ -99,19 +98,14 @@ def test_table_2_as_printed(mu):
 
 def test_inelastic_stiffness_of_any_shape():
     """Section 3.2: C12p = C13p = C23p = 0 in closure
-    Holds: to rounding, at 200 random a, b, c
+    Holds: to rounding, at 40 random a, b, c
 
     Eq. 29: C^p as an integral over the sliding orientations
-    Holds: the closed form for every a, b, c agrees to rounding, and so does the total form
+    Holds: the closed form for every a, b, c agrees to rounding
     """
-    mus = np.random.default_rng(29).uniform(0.0, 0.5, 200)
-    for i, (o, mu) in enumerate(zip(shapes(200), mus, strict=True)):
-        exact = np.diag(inelastic(o, KN, KS, mu))
-        assert paper_integrals.inelastic(o, KN, KS, mu) == pytest.approx(exact, abs=ROUNDING)
-        if i % 20 == 0:
-            found = secant(linear(o.a, mu, o.b, o.c), [0.7, 0.0, 0.0])
-            assert found.Cp == pytest.approx(exact, abs=ROUNDING)
-            assert found.Ce == pytest.approx(np.diag(elastic(o, KN, KS)), abs=ROUNDING)
+    for o, mu in zip(shapes(40), np.linspace(0.0, 0.5, 40), strict=True):
+        Cp = secant(linear(o.a, mu, o.b, o.c), [0.7, 0.0, 0.0]).Cp
+        assert pytest.approx(np.diag(inelastic(o, KN, KS, mu)), abs=ROUNDING) == Cp
 
 
 @pytest.mark.parametrize("a", [1.0, 2.0, 3.3])

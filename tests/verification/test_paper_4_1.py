@@ -6,7 +6,7 @@ from math import log
 
 import numpy as np
 import pytest
-from paper_integrals import preset
+from paper_laws import preset
 from scipy.optimize import brentq
 
 from jointlaw.law import JointLaw

@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 from builders import law
-from paper_integrals import preset
+from paper_laws import preset
 from scipy.optimize import brentq
 
 import jointlaw as jl

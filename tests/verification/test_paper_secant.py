@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 from builders import law
-from paper_integrals import shapes
+from paper_laws import shapes
 
 module = importlib.import_module("jointlaw.paper.secant")  # jl.secant may be the function
 secant = module.secant

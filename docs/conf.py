@@ -70,6 +70,7 @@ sphinx_gallery_conf = {
     "ignore_pattern": "^_",  # what scripts share
     "within_subsection_order": ExplicitOrder([f"plot_{name}.py" for name in ORDER] + ["*"]),
     "remove_config_comments": True,
+    "capture_repr": (),  # what is printed, not what a last line returns
     "download_all_examples": False,
     "show_memory": False,
     "write_computation_times": False,

@@ -13,10 +13,8 @@ to, closure = 4e-6, 1e-6  # m
 panels = {TOTAL: {}, LAW: {}}
 printed, ours = panels.values()
 for a in (2, 3, 6, 9):
-    label, tests = (
-        f"a = {a}",
-        [run(f"linear-a{a}", to, closure=closure) for run in (total, incremental)],
-    )
+    label = f"a = {a}"
+    tests = [run(f"linear-a{a}", to, closure=closure) for run in (total, incremental)]
     printed[label], ours[label] = ((test.shear * 1e6, ratio(test)) for test in tests)
     ours[f"_{label}, total"] = printed[label]
     ends = f"{ratio(tests[0])[-1]:.3f} (total form), {ratio(tests[1])[-1]:.3f} (incremental law)"

@@ -8,6 +8,8 @@ import pytest
 from matplotlib import pyplot
 from pages import ROOT
 
+from jointlaw.cli.main import main
+
 pytestmark = pytest.mark.slow
 FIGURES = {int(path.stem[-2:]): path for path in ROOT.glob("docs/paper/plot_fig_*.py")}
 TOTAL, LAW = "total form (as printed)", "incremental law (this package)"
@@ -45,3 +47,8 @@ def test_figure(number, monkeypatch, capsys):
 
 def test_every_figure_with_something_to_compute_is_drawn():
     assert sorted(FIGURES) == [3, 4, 5, *range(7, 20)]  # 1 and 2 are sketches; 6 is with 4
+
+
+def test_removed_command_names_the_scripts(capsys):
+    assert main(["figures", "--out", "figures"]) == 2
+    assert "docs/paper/plot_fig_NN.py" in capsys.readouterr().err

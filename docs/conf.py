@@ -64,11 +64,12 @@ ORDER = (
     "cyclic_shear", "damping", "anisotropy", "large_shear", "fit_closure", "from_scan", "table",
     "batch", "blocks", "newton", "snapshot",
 )  # fmt: skip
+FIGURES = sorted(path.name for path in HERE.glob("paper/plot_*.py"))
 sphinx_gallery_conf = {
     "examples_dirs": ["gallery", "paper"],
     "gallery_dirs": ["examples", "figures"],
     "ignore_pattern": "^_",  # what scripts share
-    "within_subsection_order": ExplicitOrder([f"plot_{name}.py" for name in ORDER] + ["*"]),
+    "within_subsection_order": ExplicitOrder([f"plot_{name}.py" for name in ORDER] + FIGURES),
     "remove_config_comments": True,
     "capture_repr": (),  # what is printed, not what a last line returns
     "download_all_examples": False,

@@ -35,8 +35,6 @@ PRINTED = {
         "benchmarks/held_out.py --draws 20 --few --prior full_contact_stress=2e7,2e10 --workers 1",
     ),
     "peak-residual": ("fits-measured.md", "benchmarks/peak_residual.py"),
-    "claims": ("paper.md", "-m jointlaw figures --claims"),
-    "claims-yielding": ("paper.md", "benchmarks/claims_yielding.py"),
 }
 PRINTED_TIMES = {
     "update": ("speed.md", "benchmarks/update.py --rounds 3 --seconds 0.05"),

@@ -10,10 +10,10 @@ from ..laboratory.experiments import PathError
 from ..support.files import require_free
 from ..support.progress import explained
 from ..support.version import __version__
-from . import export, figures, fit, laboratory, presets, replay, scan, tradeoff
+from . import export, fit, laboratory, presets, replay, scan, tradeoff
 
 WAIT = "the first run after an installation also compiles the law, once"
-COMMANDS = (laboratory, presets, replay, figures, export, fit, scan, tradeoff)
+COMMANDS = (laboratory, presets, replay, export, fit, scan, tradeoff)
 
 _YIELDING = "write yield_interference into [asperity] of a law file; it starts with \
 jointlaw presets NAME > mine.toml"
@@ -21,6 +21,8 @@ _TABLE = "call jointlaw.hosts.yade.export.export_yade(law, folder, closure=..., 
 
 # Commands ("replay") and options ("tradeoff --loss") that were removed: what to use instead
 REMOVED = {
+    "figures": "run the scripts docs/paper/plot_fig_NN.py; the claims are on docs/paper.md and in "
+    "tests/verification/test_paper_*.py",
     "closure --yield-interference": _YIELDING,
     "shear --yield-interference": _YIELDING,
     "export --closure": _TABLE,

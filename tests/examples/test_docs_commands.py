@@ -15,9 +15,6 @@ from jointlaw.cli.main import main as jointlaw_main
 
 # by what they begin with: too long for here, and what runs the same instead
 LONG = {
-    "jointlaw figures --out": "tests/verification/test_paper_figures.py",
-    "jointlaw figures 14 15": "tests/verification/test_paper_figures.py",
-    "jointlaw figures --claims": "tests/verification/test_paper_docs.py",
     "jointlaw fit closure.csv --shear": "tests/verification/test_fit_shear_files.py",
     "jointlaw shear out/specimen/law.toml": "tests/verification/test_fit_shear_files.py",
     "jointlaw fit grimsel_vd1_closure --out": "the fit with --up-to, which does more",

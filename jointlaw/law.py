@@ -17,6 +17,7 @@ from .discretisation.tables import UNDERFLOW, VERSION, Tables, largest_reach, ta
 from .discretisation.virgin_curve import VirginClosure, VirginCurve, virgin_curve
 from .joints.batch import JointBatch
 from .joints.joint import Joint
+from .joints.time_step import stable_step, stiffness_per_facet
 from .kernels import reference
 from .parameters import toml
 from .parameters.asperity import Asperity
@@ -204,32 +205,43 @@ class JointLaw:
 
     # ------------------------------------------------- stiffness and time step
 
-    def max_stiffness(self, closure: ArrayLike) -> Any:
-        """Upper bound of `|C|` (Pa/m) while no facet's effective closure exceeds `closure` (m)."""
-        k, p = self.tables, self.asperity
-        _, slope = k.curve.force(self._within_reach(closure))
-        per_facet = float(np.sum(k.area / k.c1))
-        return ((max(1.0, 1.0 / p.lam) + p.mu) * per_facet * slope)[()]
+    def max_stiffness(self, closure: ArrayLike, shear: ArrayLike = 0.0) -> Any:
+        """Upper bound of `|C|` (Pa/m) up to this closure (m) and this shear displacement (m, >= 0).
 
-    def critical_time_step(self, mass: ArrayLike, area: ArrayLike, closure: ArrayLike) -> Any:
+        The shear may have any direction, and counts up to critical_slip. Yielded and worn joints
+        are less stiff.
+        """
+        y, way = self._within_reach(closure), finite("shear", shear, "m")
+        if not (way >= 0).all():
+            raise ValueError(f"shear = {shear!r} m is out of bounds: it must be >= 0")
+        k = self.tables
+        per_facet = stiffness_per_facet(k)
+        stiffness = np.sum(per_facet) * k.curve.force(y)[1]
+        if way.any():
+            # of two opposite facets one closes by the shear, and the other opens
+            rise = np.minimum(way, self.critical_slip)[..., None] * np.linalg.norm(k.m[1:], axis=0)
+            steep = k.curve.force(self._within_reach(y[..., None] + rise))[1]
+            stiffness = 0.5 * (stiffness + steep @ per_facet)
+        return stiffness[()]
+
+    def critical_time_step(
+        self, mass: ArrayLike, area: ArrayLike, closure: ArrayLike, shear: ArrayLike = 0.0
+    ) -> Any:
         """Largest stable explicit step (s) of one translating mass on one joint.
 
         mass: reduced mass m1 m2/(m1 + m2) in kg; area: of the joint in m2; closure: the largest
-        reached, in m; numbers or arrays of one shape. 2 sqrt(m/(K area)), infinite where nothing
-        touches; a block code adds rotation.
+        reached, in m; shear: the largest shear displacement reached, in m, in any direction;
+        numbers or arrays of one shape. 2 sqrt(m/(K area)), infinite where nothing touches; a block
+        code adds rotation. Shear presses one side of the asperities together: a step for closure
+        alone is several times too long for a joint that was sheared far at constant closure.
+        `JointBatch.critical_time_step` takes joints as they are now.
 
         Safe to 0.95 in lasting contact, and where friction takes from every impact. Impacts that
         lose nothing need 0.2 or less: they last but 2/share steps (docs/sharp-bits.md).
         """
-        m, a = finite("mass", mass, "kg"), finite("area", area, "m2")
-        y = finite("closure", closure, "m")
-        if not ((m > 0).all() and (a > 0).all() and (y >= 0).all()):
-            raise ValueError(
-                f"mass = {m} kg, area = {a} m2, closure = {y} m are out of bounds: mass and area "
-                "must be > 0, closure >= 0"
-            )
-        with np.errstate(divide="ignore"):
-            return 2 * np.sqrt(m / (self.max_stiffness(y) * a))
+        if not (finite("closure", closure, "m") >= 0).all():
+            raise ValueError(f"closure = {closure!r} m is out of bounds: it must be >= 0")
+        return stable_step(mass, area, self.max_stiffness(closure, shear))[()]
 
     # -------------------------------------------------------------- accuracy
 

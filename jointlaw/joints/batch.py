@@ -11,11 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from ..discretisation.tables import Tables
 from ..kernels import reference, wear
 from ..kernels.blocks import LANES, empty_blocks, rows_of, write_rows
-from ..kernels.engine import Step, engine
+from ..kernels.engine import CHUNK, Step, engine
 from ..kernels.reference import Measures
 from ..parameters.asperity import Asperity
 from ..support.checks import Array, numbers, whole
 from .state import JointState, NonFiniteError, write_replay
+from .time_step import stable_step, stiffness_per_facet
 
 Index = Sequence[int] | NDArray[np.integer[Any]] | NDArray[np.bool_]
 Out = tuple[Array, Array | None]
@@ -201,8 +202,27 @@ class JointBatch:
         return 8 * self._engine.rows
 
     def max_stiffness(self) -> Array:
-        """Upper bound (n,) of `|C|` in Pa/m at each joint's own reach, for explicit time steps."""
-        return self.law.max_stiffness(self.measures().reach)
+        """Upper bound (n,) of `|C|` in Pa/m at each joint's present displacement."""
+        k, bound = self.law.tables, np.empty(self._n)
+        per_facet = stiffness_per_facet(k)
+        for first in range(0, self._n, CHUNK):
+            index = np.arange(first, min(first + CHUNK, self._n))
+            now = reference.parts(k, self._rows(index))
+            y = reference.effective_closure(k, now.delta[0], now.offset)
+            bound[index] = per_facet @ k.curve.force(y)[1]
+        return bound
+
+    def critical_time_step(self, mass: ArrayLike, area: ArrayLike) -> Array:
+        """Largest stable explicit step (n,) in s of one translating mass on each joint as it is.
+
+        mass: reduced mass m1 m2/(m1 + m2) in kg; area: in m2; numbers or (n,). Infinite where
+        nothing touches. Joints that close or shear further grow stiffer: ask again, or take a
+        margin. As for `JointLaw.critical_time_step`, rotation is not counted.
+        """
+        step = stable_step(mass, area, self.max_stiffness())
+        if step.shape != (self._n,):
+            raise ValueError(f"mass and area must be numbers or have shape ({self._n},)")
+        return step
 
     @property
     def delta(self) -> Array:

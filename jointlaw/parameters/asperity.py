@@ -26,8 +26,8 @@ class Asperity:
         Infinite (elastic) by default.
     mu_residual: friction coefficient of worn asperities, > 0 and <= mu; None for no wear.
     wear_slip: slip (m) of the asperities over which mu falls to mu_residual by a factor e, > 0:
-        mu(L) = mu_residual + (mu - mu_residual) exp(-L/wear_slip). L is an energy over a force: with
-        a finite critical_slip it is longer than the distance slid (docs/theory-incremental.md).
+        mu(L) = mu_residual + (mu - mu_residual) exp(-L/wear_slip). L is an energy over a force:
+        with critical_slip it is longer than the distance slid (docs/theory-incremental.md).
     """
 
     K: float

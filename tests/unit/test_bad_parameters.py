@@ -229,12 +229,6 @@ def test_negative_normal_stress_has_no_closure(law):
         law.closure(-1.0)
 
 
-@pytest.mark.parametrize("mass_area_closure", [(0, 1, 1e-6), (1, -1, 1e-6), (1, 1, np.nan)])
-def test_arguments_of_the_time_step(law, mass_area_closure):
-    with pytest.raises(ValueError, match=r"(mass|area|closure) = "):
-        law.critical_time_step(*mass_area_closure)
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

@@ -45,7 +45,7 @@ def random_law(seed):
     kind = {"closure_only": True} if seed % 8 == 5 else {"plane": [None, 0.0, 0.7][seed // 2 % 3]}
     mu = [0.0, 0.3, 0.7][rng.integers(3)]
     damage = {"yield_interference": 10.0 ** rng.uniform(-8.0, -6.0)} if seed // 4 % 2 else {}
-    if seed // 5 % 3 == 1:
+    if mu and seed // 5 % 3 == 1:
         damage |= {"mu_residual": mu * rng.uniform(), "wear_slip": 10.0 ** rng.uniform(-7.0, -5.0)}
     return jl.JointLaw(
         orientation=jl.Orientation(

@@ -24,7 +24,7 @@ from .parameters.asperity import Asperity
 from .parameters.fingerprint import fingerprint
 from .parameters.heights import HeightDistribution
 from .parameters.orientation import Orientation
-from .parameters.resolution import Resolution, resolve
+from .parameters.resolution import NAMED, Resolution, resolve
 from .support.checks import Array, above, finite, number
 
 if TYPE_CHECKING:
@@ -44,7 +44,8 @@ class JointLaw:
     heights: distribution of asperity heights, or None when all asperities touch at zero closure.
     asperity_density: N, asperities per m2, > 0.
     closure_range: largest closure (m) that the depth cells are placed for, > 0; beyond it the
-        normal force stays exact. None takes the closure at 20 MPa without yielding.
+        normal force stays exact. None takes the closure at 20 MPa without yielding, by the
+        orientations of "balanced" whatever the resolution.
     resolution: "fast", "balanced", "fine", "reference" or a `Resolution`. A name becomes the
         `Resolution` that suits critical_slip over closure_range (docs/how-accurate.md); where
         `replace` changes these, give it the name again.
@@ -81,8 +82,7 @@ class JointLaw:
             )
         set_(self, "asperity_density", above("asperity_density", self.asperity_density, 0.0))
         asked: str | Resolution = self.resolution
-        nodes = resolve(asked)
-        set_(self, "resolution", nodes)
+        set_(self, "resolution", resolve(asked))
         if self.plane is not None:
             set_(self, "plane", number("plane", self.plane))
         if not isinstance(self.closure_only, bool):
@@ -103,9 +103,6 @@ class JointLaw:
             set_(self, "closure_range", above("closure_range", self.closure_range, 0.0))
             lengths = np.array([self.critical_slip, self.asperity.yield_interference])
             set_(self, "resolution", resolve(asked, *(lengths / self.closure_range)))
-            if self.resolution != nodes:
-                for cached in ("facets", "_scale", "_virgin"):  # by the closure range
-                    self.__dict__.pop(cached, None)
             self._require_numbers(self.closure_range)  # and with it that the curve is valid
 
     # ----------------------------------------------------------------- joints
@@ -322,21 +319,19 @@ class JointLaw:
         return self.facets.scale(self.asperity, self.asperity_density)
 
     @cached_property
-    def _virgin(self) -> VirginClosure:
-        """Closure without shear of elastic asperities."""
-        p = self.asperity
-        return VirginClosure(self.curve, facet_sum(self.facets.theta, self._scale, p.lam, p.mu))
-
-    @cached_property
     def _first_loading(self) -> VirginClosure:
         """Closure without shear of asperities that yield."""
-        yielding = yield_sum(self.facets.theta, self._scale, self.asperity)
-        return self._virgin._replace(yielding=yielding)
+        p, theta = self.asperity, self.facets.theta
+        elastic = facet_sum(theta, self._scale, p.lam, p.mu)
+        return VirginClosure(self.curve, elastic, yield_sum(theta, self._scale, p))
 
     def _default_range(self) -> float:
         """The closure (m) at 20 MPa of elastic asperities: those that yield may not bear it."""
+        p, r = self.asperity, NAMED["balanced"]  # the same for laws that differ in resolution
+        fixed = facets(self.orientation, r.u, r.phi, self.plane, self.closure_only)
+        elastic = facet_sum(fixed.theta, fixed.scale(p, self.asperity_density), p.lam, p.mu)
         try:
-            return self._virgin.closure(DEFAULT_STRESS, 1.0)
+            return VirginClosure(self.curve, elastic).closure(DEFAULT_STRESS, 1.0)
         except ValueError:
             self._require_numbers(1.0)  # the likely reason
             raise

@@ -9,14 +9,23 @@ from ..laboratory.experiments import PathError
 from ..support.files import require_free
 from ..support.progress import explained
 from ..support.version import __version__
-from . import closure, export, figures, fit, presets, replay, scan, shear, tradeoff
+from . import closure, export, figures, fit, presets, scan, shear, tradeoff
 
 WAIT = "the first run after an installation also compiles the law, once"
-COMMANDS = (shear, closure, presets, replay, figures, export, fit, scan, tradeoff)
+COMMANDS = (shear, closure, presets, figures, export, fit, scan, tradeoff)
+# commands that are gone, and what to use
+REMOVED = {
+    "replay": "removed: a NonFiniteError carries `state` and `d`; joint.restore(error.state) and "
+    "joint.update(error.d) repeat the step",
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    if given and given[0] in REMOVED:
+        print(f"jointlaw {given[0]}: {REMOVED[given[0]]}", file=sys.stderr)
+        return 2
     parser = argparse.ArgumentParser(
         prog="jointlaw",
         description="A micromechanical, anisotropic, path-dependent rock joint.",
@@ -26,7 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for command in COMMANDS:
         command.add(commands)
-    options = parser.parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
+    options = parser.parse_args(_joined(given))
     try:
         if getattr(options, "out", None) and not options.force:
             require_free(options.out)

@@ -15,7 +15,7 @@ from ..kernels.engine import CHUNK, Step, engine
 from ..kernels.reference import Measures
 from ..parameters.asperity import Asperity
 from ..support.checks import Array, numbers, whole
-from .state import JointState, NonFiniteError, write_replay
+from .state import JointState, NonFiniteError
 from .time_step import stable_step, stiffness_per_facet
 
 Index = Sequence[int] | NDArray[np.integer[Any]] | NDArray[np.bool_]
@@ -46,7 +46,6 @@ class Law(Protocol):
     def joints(self, n: int, ledger: bool = True) -> JointBatch: ...
     def closure(self, normal_stress: ArrayLike) -> Any: ...
     def max_stiffness(self, closure: ArrayLike) -> Any: ...
-    def to_toml(self) -> str: ...
 
 
 class JointBatch:
@@ -333,15 +332,13 @@ class JointBatch:
         if (new > limit).any():
             row = int(np.argmax(new > limit))
             joint = row if index is None else int(index[row])
-            path = write_replay(self.law.to_toml, old[:, [row]], d[[row]].T, step.C is not None)
-            again = "no replay file could be written"
-            if path is not None:
-                again = f"`jointlaw replay {path}` repeats it"
-            raise NonFiniteError(
+            error = NonFiniteError(
                 f"joint {joint}: the step d = {d[row]} m gives a result that is not finite; "
-                f"nothing was moved. Take a smaller step; {again}",
-                path,
+                "nothing was moved. Take a smaller step (state and d of this error repeat it)"
             )
+            error.joint, error.d = joint, d[row].copy()
+            error.state = JointState(self.law.fingerprint, old[:, [row]])
+            raise error
         rest = self._bound(self._rows()).max(initial=0.0)
         return max(float(rest), float(new.max(initial=0.0)))
 

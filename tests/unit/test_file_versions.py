@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.cli.main import main
 from jointlaw.joints.state import JointState
 
 SPECIMENS = Path(__file__).with_name("specimens")
@@ -36,11 +35,6 @@ def test_a_state_of_version_1(law):
     joint.restore(jl.load_state(SPECIMENS / "state.npz"))
     assert joint.delta == pytest.approx([5e-7, 3e-7, 1e-7])
     assert pytest.approx(TRACTION, rel=1e-9) == joint.F
-
-
-def test_a_replay_of_version_1(capsys):
-    assert main(["replay", str(SPECIMENS / "replay.npz")]) == 0
-    assert "passes: F = " in capsys.readouterr().out
 
 
 def test_a_record_of_version_1():

@@ -303,7 +303,7 @@ def test_what_is_not_finite_is_refused(both, law, monkeypatch, bad, threads):
         assert not joint.snapshot().values.any()
 
 
-def test_an_overflow_is_refused(both, law, replays):
+def test_an_overflow_is_refused(both, law):
     for joint in both(law.joint):
         with pytest.raises(jl.NonFiniteError):
             joint.update([1e200, 0.0, 0.0])

@@ -180,7 +180,7 @@ def test_bad_arguments_of_closure_test(law, arguments, told):
     assert not joint.snapshot().values.any()
 
 
-def test_a_path_error_keeps_the_record_so_far(law, replays):
+def test_a_path_error_keeps_the_record_so_far(law):
     """The third turning point is so far away that the tractions overflow."""
     joint = law.joint()
     with pytest.raises(jl.PathError, match="stopped after 21 rows") as error:
@@ -197,7 +197,7 @@ def test_a_path_error_keeps_the_record_so_far(law, replays):
 
 
 @pytest.mark.parametrize("stress", [1e200, 1e300])
-def test_a_stress_beyond_numbers_is_a_path_error(law, replays, stress):
+def test_a_stress_beyond_numbers_is_a_path_error(law, stress):
     with pytest.raises(jl.PathError) as error:
         jl.closure_test(law.joint(), [1e6, stress], steps=5)
     assert len(error.value.record) >= 6

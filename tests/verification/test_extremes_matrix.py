@@ -7,11 +7,6 @@ from extremes.laws import EXTREMES, SCALE, alone, build, name, pairs
 from extremes.matrix import ends, examine
 
 
-@pytest.fixture(autouse=True)
-def replays(tmp_path, monkeypatch):
-    monkeypatch.setenv("JOINTLAW_REPLAY_DIR", str(tmp_path))
-
-
 @pytest.mark.parametrize("changes", alone(), ids=name)
 def test_alone(changes):
     assert not examine(changes, 1)

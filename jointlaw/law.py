@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -75,9 +75,12 @@ class JointLaw:
         for name, kind in (("orientation", Orientation), ("asperity", Asperity)):
             if not isinstance(value := getattr(self, name), kind):
                 raise ValueError(f"{name} = {value!r} must be of type {kind.__name__}")
-        if not (self.heights is None or isinstance(self.heights, HeightDistribution)):
+        heights: Any = self.heights
+        # states know their law by the values of its fields; other objects have none
+        known = is_dataclass(heights) and isinstance(heights, HeightDistribution)
+        if not (heights is None or known):
             raise ValueError(
-                f"heights = {self.heights!r} must be GammaHeights, Heights, None, or an object "
+                f"heights = {heights!r} must be GammaHeights, Heights, None, or a frozen dataclass "
                 "with their overlap, formation, pdf, cdf and breakpoints"
             )
         set_(self, "asperity_density", above("asperity_density", self.asperity_density, 0.0))

@@ -136,3 +136,14 @@ def test_a_histogram_takes_no_parameters():
 def test_bad_parameters_of_a_distribution(parameters, told):
     with pytest.raises(ValueError, match=rf"heights\.parameters{told}"):
         jl.Heights("chi2", 2e-6, parameters=parameters)
+
+
+def test_heights_without_fields_are_refused(make_law):
+    """They hash by their address: in the next process their states would belong to no law."""
+
+    class Own:
+        overlap, formation = 0.0, "individual"
+        pdf = cdf = breakpoints = lambda *_: None
+
+    with pytest.raises(ValueError, match="frozen dataclass"):
+        make_law(heights=Own())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cached_property
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from .accuracy.tradeoff import Tradeoff
 
 DEFAULT_STRESS = 20e6  # Pa; its closure is the default closure_range
+CRUSHED = 0.9999  # share of the asperities in touch beyond which a joint that yields is closed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,6 +121,7 @@ class JointLaw:
         joint = Joint(self)
         if normal_stress != 0.0:
             joint.update(np.eye(self.tables.dim)[0] * self.closure(normal_stress), tangent=False)
+            self.warn_if_crushed(joint.delta[0])
         return joint
 
     def joints(self, n: int, ledger: bool = True, normal_stress: ArrayLike = 0.0) -> JointBatch:
@@ -133,6 +136,7 @@ class JointLaw:
             if closure.shape not in ((), (n,)):
                 raise ValueError(f"normal_stress has shape {closure.shape}: give one or ({n},)")
             batch.update(np.outer(closure * np.ones(n), np.eye(self.tables.dim)[0]), tangent=False)
+            self.warn_if_crushed(closure)
         return batch
 
     def step(
@@ -189,6 +193,25 @@ class JointLaw:
             [self._first_loading.closure(float(one), start) for one in stress.ravel()]
         )
         return result.reshape(stress.shape)[()]
+
+    def warn_if_crushed(self, closure: ArrayLike) -> None:
+        """Warn of closures (m) at which asperities that yield touch nearly all, and bear no more.
+
+        Nothing in the law stops such a joint from closing: rock between the asperities would. At
+        laboratory tests and joints that start under a normal stress this is looked at; a host that
+        closes joints itself may ask.
+        """
+        if self.heights is None or math.isinf(self.asperity.yield_interference):
+            return
+        highest = float(np.max(closure, initial=0.0))
+        share = self.contacts(highest) / self.asperity_density
+        if share > CRUSHED:
+            warnings.warn(
+                f"closure = {highest:.3g} m: {100 * share:.2f} % of the asperities touch, and they "
+                "yield: here the law ends (docs/not-modelled.md). Lower the normal stress, or give "
+                "a larger asperity.yield_interference or heights that reach farther",
+                stacklevel=3,
+            )
 
     def contacts(self, closure: ArrayLike, direction: tuple[float, float] | None = None) -> Any:
         """Asperities in touch per m2 at this closure (m), Eq. 11.

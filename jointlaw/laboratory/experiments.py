@@ -164,4 +164,5 @@ class _Log:
     def record(self) -> Record:
         """The rows so far."""
         table = np.array(self.rows).reshape(-1, len(UNITS))
+        self.joint.law.warn_if_crushed(table[:, 0])
         return Record(dict(zip(UNITS, table.T, strict=True)), self.azimuth, self.name)

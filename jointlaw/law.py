@@ -188,11 +188,11 @@ class JointLaw:
         stress = finite("normal_stress", normal_stress, "Pa")
         if not (stress >= 0).all():
             raise ValueError(f"normal_stress = {normal_stress!r} is out of bounds: it must be >= 0")
-        start = self.closure_range
-        result = np.array(
-            [self._first_loading.closure(float(one), start) for one in stress.ravel()]
+        if stress.ndim == 0:
+            return np.float64(self._first_loading.closure(float(stress), self.closure_range))
+        return self._first_loading.closures(stress.ravel(), self.closure_range).reshape(
+            stress.shape
         )
-        return result.reshape(stress.shape)[()]
 
     def warn_if_crushed(self, closure: ArrayLike) -> None:
         """Warn of closures (m) at which asperities that yield touch nearly all, and bear no more.

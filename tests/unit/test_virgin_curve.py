@@ -148,3 +148,11 @@ def test_contact_numbers_by_direction_are_eq_16(law):
 def test_without_heights_all_asperities_touch_at_once(make_law):
     law = make_law(heights=None)
     assert law.contacts([-1e-9, 0.0, 1e-9]).tolist() == [0.0, 0.0, 1e10]
+
+
+def test_closures_at_many_stresses_are_those_at_each(any_law):
+    stress = np.concatenate([[0.0, 1e-320], np.geomspace(1e-6, 1e8, 30)]).reshape(4, 8)
+    each = [any_law.closure(float(one)) for one in stress.ravel()]
+    # both solve to rounding, in the logarithm of the closure: of -60 and less
+    np.testing.assert_allclose(any_law.closure(stress).ravel(), each, rtol=2e-14)
+    assert any_law.closure(np.zeros((0, 2))).shape == (0, 2)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cached_property
@@ -17,8 +16,9 @@ from .discretisation.facets import Facets, facet_sum, facets, yield_sum
 from .discretisation.tables import UNDERFLOW, VERSION, Tables, largest_reach, tables
 from .discretisation.virgin_curve import VirginClosure, VirginCurve, virgin_curve
 from .joints.batch import JointBatch
+from .joints.crushed import warn_if_crushed
 from .joints.joint import Joint
-from .joints.time_step import stable_step, stiffness_per_facet
+from .joints.time_step import largest_stiffness, stable_step
 from .kernels import reference
 from .parameters import toml
 from .parameters.asperity import Asperity
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from .accuracy.tradeoff import Tradeoff
 
 DEFAULT_STRESS = 20e6  # Pa; its closure is the default closure_range
-CRUSHED = 0.9999  # share of the asperities in touch beyond which a joint that yields is closed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,8 +119,8 @@ class JointLaw:
         """
         joint = Joint(self)
         if normal_stress != 0.0:
-            joint.update(np.eye(self.tables.dim)[0] * self.closure(normal_stress), tangent=False)
-            self.warn_if_crushed(joint.delta[0])
+            joint.update(np.eye(self.dim)[0] * self.closure(normal_stress), tangent=False)
+            warn_if_crushed(self, joint.delta[0])
         return joint
 
     def joints(self, n: int, ledger: bool = True, normal_stress: ArrayLike = 0.0) -> JointBatch:
@@ -135,35 +134,38 @@ class JointLaw:
             closure = np.asarray(self.closure(normal_stress))
             if closure.shape not in ((), (n,)):
                 raise ValueError(f"normal_stress has shape {closure.shape}: give one or ({n},)")
-            batch.update(np.outer(closure * np.ones(n), np.eye(self.tables.dim)[0]), tangent=False)
-            self.warn_if_crushed(closure)
+            batch.update(np.outer(closure * np.ones(n), np.eye(self.dim)[0]), tangent=False)
+            warn_if_crushed(self, closure)
         return batch
 
     def step(
-        self, state: ArrayLike, d: ArrayLike, tangent: bool = True
+        self, states: ArrayLike, d: ArrayLike, tangent: bool = True
     ) -> tuple[Array, Array, Array | None]:
         """One step as a pure function, for a host that keeps the states itself.
 
-        state: (state_size,), or (state_size, n) for n joints; zeros are the virgin state.
-        d: displacement increment in m, (dim,) or (dim, n).
-        Returns the new state, F in Pa (dim,) or (dim, n), and C in Pa/m (dim, dim) or
-        (dim, dim, n), None without `tangent`; what was given stays as it was. The algorithm and its
+        states: (n, state_size), or (state_size,) for one joint; zeros are the virgin state.
+        d: displacement increments in m, (n, dim) or (dim,).
+        Returns the new states, F in Pa (n, dim) or (dim,), and C in Pa/m (n, dim, dim) or
+        (dim, dim), None without `tangent`; what was given stays as it was. The algorithm and its
         equations: `jointlaw.kernels.reference.step`, which this calls. Raises ValueError for a
         wrong shape or a number that is not finite.
         """
-        old, move = finite("state", state, "numbers of state"), finite("d", d, "m")
-        k, several = self.tables, old.ndim == 2
-        rest = old.shape[1:]
-        if old.shape not in ((k.rows,), (k.rows, *rest)) or move.shape != (k.dim, *rest):
+        old, move = finite("states", states, "numbers of state"), finite("d", d, "m")
+        rows, dim, joints = self.state_size, self.dim, old.shape[:-1]
+        if old.ndim not in (1, 2) or old.shape[-1] != rows or move.shape != (*joints, dim):
             raise ValueError(
-                f"state has shape {old.shape} and d {move.shape}; expected ({k.rows},) and "
-                f"({k.dim},), or ({k.rows}, n) and ({k.dim}, n) for n joints"
+                f"states have shape {old.shape} and d {move.shape}; expected (n, {rows}) and "
+                f"(n, {dim}), or ({rows},) and ({dim},) for one joint"
             )
-        columns = old.reshape(k.rows, -1), move.reshape(k.dim, -1)
-        new, F, C = reference.step(k, *columns, tangent)
-        if several:
-            return new, F, C
-        return new[:, 0], F[:, 0], None if C is None else C[..., 0]
+        columns = old.reshape(-1, rows).T, move.reshape(-1, dim).T
+        new, F, C = reference.step(self.tables, *columns, tangent)
+        C = None if C is None else np.moveaxis(C, 2, 0).reshape(*joints, dim, dim)
+        return new.T.reshape(*joints, rows), F.T.reshape(*joints, dim), C
+
+    @property
+    def dim(self) -> int:
+        """Components of a displacement: 3, or 2 with a plane, or 1 with closure_only."""
+        return self.tables.dim
 
     @property
     def state_size(self) -> int:
@@ -194,25 +196,6 @@ class JointLaw:
             stress.shape
         )
 
-    def warn_if_crushed(self, closure: ArrayLike) -> None:
-        """Warn of closures (m) at which asperities that yield touch nearly all, and bear no more.
-
-        Nothing in the law stops such a joint from closing: rock between the asperities would. At
-        laboratory tests and joints that start under a normal stress this is looked at; a host that
-        closes joints itself may ask.
-        """
-        if self.heights is None or math.isinf(self.asperity.yield_interference):
-            return
-        highest = float(np.max(closure, initial=0.0))
-        share = self.contacts(highest) / self.asperity_density
-        if share > CRUSHED:
-            warnings.warn(
-                f"closure = {highest:.3g} m: {100 * share:.2f} % of the asperities touch, and they "
-                "yield: here the law ends (docs/not-modelled.md). Lower the normal stress, or give "
-                "a larger asperity.yield_interference or heights that reach farther",
-                stacklevel=3,
-            )
-
     def contacts(self, closure: ArrayLike, direction: tuple[float, float] | None = None) -> Any:
         """Asperities in touch per m2 at this closure (m), Eq. 11.
 
@@ -237,15 +220,11 @@ class JointLaw:
         y, way = self._within_reach(closure), finite("shear", shear, "m")
         if not (way >= 0).all():
             raise ValueError(f"shear = {shear!r} m is out of bounds: it must be >= 0")
-        k = self.tables
-        per_facet = stiffness_per_facet(k)
-        stiffness = np.sum(per_facet) * k.curve.force(y)[1]
-        if way.any():
-            # of two opposite facets one closes by the shear, and the other opens
-            rise = np.minimum(way, self.critical_slip)[..., None] * np.linalg.norm(k.m[1:], axis=0)
-            steep = k.curve.force(self._within_reach(y[..., None] + rise))[1]
-            stiffness = 0.5 * (stiffness + steep @ per_facet)
-        return stiffness[()]
+        rise = np.minimum(way, self.critical_slip)[..., None] * np.linalg.norm(
+            self.tables.m[1:], axis=0
+        )
+        self._within_reach(y + np.max(rise, axis=-1))
+        return largest_stiffness(self.tables, y, rise)[()]
 
     def critical_time_step(
         self, mass: ArrayLike, area: ArrayLike, closure: ArrayLike, shear: ArrayLike = 0.0

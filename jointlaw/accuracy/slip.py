@@ -8,13 +8,16 @@ displacement would compare their dilation, summed up over the slip, and not thei
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..joints.batch import JointBatch, Law
+from ..joints.batch import JointBatch
 from ..support.checks import Array
+
+if TYPE_CHECKING:
+    from ..law import JointLaw as Law
 
 LEG = 24  # steps each way
 SHARES = (1.0, 0.1)  # of the normal stress S/2 of the standard paths

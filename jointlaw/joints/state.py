@@ -10,18 +10,22 @@ import numpy as np
 from ..support.checks import Array
 from ..support.files import replace_file
 
-_VERSION = 1
+_VERSION = 1  # of the file, which holds the values with joints last
 
 
 @dataclass(frozen=True, eq=False)
 class JointState:
-    """State of one joint or a batch, as `snapshot()` returns it; opaque but for its size."""
+    """State of one joint or a batch, as `snapshot()` returns it.
+
+    fingerprint: of the law that wrote it. values: (n, state_size), a row a joint, in the order of
+    `jointlaw.kernels.reference`; `law.step` takes them.
+    """
 
     fingerprint: str
     values: Array
 
     def __len__(self) -> int:
-        return int(self.values.shape[1])
+        return len(self.values)
 
     def require(self, fingerprint: str) -> None:
         """Raise ValueError if the law of this fingerprint did not write the state."""
@@ -38,7 +42,7 @@ class JointState:
     def save(self, path: str | Path) -> None:
         """Write the state to an NPZ file, whole or not at all."""
         buffer = io.BytesIO()
-        np.savez(buffer, version=_VERSION, fingerprint=self.fingerprint, values=self.values)
+        np.savez(buffer, version=_VERSION, fingerprint=self.fingerprint, values=self.values.T)
         replace_file(Path(path), buffer.getvalue())
 
 
@@ -70,4 +74,4 @@ def load_state(path: str | Path) -> JointState:
             raise ValueError("values is no table of numbers")
     except (OSError, KeyError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
         raise ValueError(f"{str(path)!r} is not a saved joint state: {error}") from None
-    return JointState(fingerprint, np.array(values, float))
+    return JointState(fingerprint, np.array(values.T, float, order="C"))

@@ -16,6 +16,20 @@ def stiffness_per_facet(k: Tables) -> Array:
     return per_facet
 
 
+def largest_stiffness(k: Tables, y: Array, rise: Array) -> Array:
+    """Upper bound (...) of `|C|` in Pa/m at closures y (...) in m, under shear in any direction.
+
+    rise: by how much the shear closes each facet at most (..., M), in m. Of two opposite facets,
+    which are alike, one closes by that much, and the other opens.
+    """
+    per_facet = stiffness_per_facet(k)
+    stiffness: Array = np.sum(per_facet) * k.curve.force(y)[1]
+    if rise.any():
+        steep = k.curve.force(y[..., None] + rise)[1] @ per_facet
+        stiffness = 0.5 * (stiffness + steep)
+    return stiffness
+
+
 def stable_step(mass: ArrayLike, area: ArrayLike, stiffness: Array) -> Array:
     """2 sqrt(m/(K area)) in s, infinite where nothing touches.
 

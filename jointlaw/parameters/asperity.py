@@ -24,7 +24,7 @@ class Asperity:
     yield_interference: largest elastic compression (m) of a spring of the contact, along the
         asperity normal, > 0. Beyond it the spring yields at constant force and keeps a set.
         Infinite (elastic) by default. Yielding has no end: where nearly all asperities touch
-        (`JointLaw.warn_if_crushed`) the rock between them, which the law leaves out, would bear.
+        (`jointlaw.joints.crushed`) the rock between them, which the law leaves out, would bear.
     mu_residual: friction coefficient of worn asperities, > 0 and <= mu; None for no wear.
     wear_slip: slip (m) of the asperities over which mu falls to mu_residual by a factor e, > 0:
         mu(L) = mu_residual + (mu - mu_residual) exp(-L/wear_slip). L is an energy over a force:

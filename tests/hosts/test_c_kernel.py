@@ -158,14 +158,14 @@ def test_c_and_python_continue_each_others_state(lib, tmp_path, seed):
     for step in d[:10]:
         whole.step(step)
     snapshot = joint.snapshot()
-    snapshot.values[:, 0] = whole.state
+    snapshot.values[0] = whole.state
     joint.restore(snapshot)
-    part.state[:] = joint.snapshot().values[:, 0]
+    part.state[:] = joint.snapshot().values[0]
     for step in d[10:]:
         np.testing.assert_array_equal(whole.step(step)[0], part.step(step)[0])
     np.testing.assert_array_equal(whole.state, part.state)
     F_python, _ = joint.trial(d[10])
-    part.state[:] = joint.snapshot().values[:, 0]
+    part.state[:] = joint.snapshot().values[0]
     assert part.step(d[10])[0] == pytest.approx(F_python, abs=SAME * np.abs(F_python).max() + 1e-9)
 
 

@@ -28,6 +28,7 @@ def test_trial_leaves_no_trace(any_law):
     np.testing.assert_array_equal(F, F2)
     np.testing.assert_array_equal(C, C2)
     np.testing.assert_allclose(joint.F, F2, rtol=1e-14, atol=1e-14 * np.abs(F2).max())
+    np.testing.assert_allclose(joint.delta, before[0, : any_law.dim] + d, rtol=1e-14)
 
 
 def test_restore_then_the_same_steps_bit_for_bit(any_law, tmp_path):
@@ -126,7 +127,7 @@ def test_what_is_no_snapshot_is_refused(moved, state):
 
 def test_a_damaged_state_is_refused(law):
     values = law.joint().snapshot().values
-    values[3] = np.nan
+    values[0, 3] = np.nan
     with pytest.raises(ValueError, match="damaged"):
         law.joint().restore(jl.JointState(law.fingerprint, values))
 

@@ -15,7 +15,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-import jointlaw as jl
+from jointlaw.joints.state import JointState
 from jointlaw.support.files import replace_file
 
 from ..contact import Joints, PoolState
@@ -132,7 +132,7 @@ def load(folder: Path) -> tuple[Scene, Saved]:
         )
     joints = {}
     for i, name in enumerate(scene.laws):
-        law = jl.JointState(str(data.pop(f"fingerprint-{i}")), data.pop(f"law-{i}").T)
+        law = JointState(str(data.pop(f"fingerprint-{i}")), data.pop(f"law-{i}").T)
         points = data.pop(f"points-{i}").tolist()
         joints[name] = [(tuple(key), number) for *key, number in points], law
     return scene, Saved(data, joints)

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import jointlaw as jl
+from jointlaw.joints.state import JointState
 
 COLUMNS = ("delta", "F", "sliding", "slipping", "separated", "stored_energy", "dissipated_energy")
 
@@ -56,7 +57,7 @@ def test_where_moves_the_named_joints_only(law, moved, mask):
     d = np.array([[1e-7, 2e-8, 0.0], [2e-7, 0.0, 1e-8]])
     singles = [law.joint() for _ in index]
     for joint, i in zip(singles, index, strict=True):
-        joint.restore(jl.JointState(law.fingerprint, before[i : i + 1]))
+        joint.restore(JointState(law.fingerprint, before[i : i + 1]))
     expected = np.array([j.update(x)[0] for j, x in zip(singles, d, strict=True)])
     if mask:  # a mask names the joints in ascending order
         F, _ = moved.update(d[::-1], where=[False, True, False, True, False])
@@ -237,7 +238,7 @@ def test_repr_says_what_it_is(law):
 def test_energies_that_are_not_added_up(law):
     batch = law.joints(2, ledger=False)
     assert not hasattr(batch, "dissipated_energy")
-    with pytest.raises(ValueError, match="plastic_work is not .* ledger=True"):
+    with pytest.raises(ValueError, match=r"plastic_work is not .* ledger=True"):
         _ = batch.plastic_work
 
 

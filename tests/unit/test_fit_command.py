@@ -9,6 +9,7 @@ import pytest
 
 import jointlaw as jl
 from jointlaw.cli.main import main
+from jointlaw.surface.synthetic import synthetic_surface
 
 
 @pytest.fixture(autouse=True)
@@ -111,7 +112,7 @@ def test_a_file_in_another_encoding_is_named(tmp_path, capsys):
 
 def test_a_scan_needs_only_the_contacts_to_be_a_law(tmp_path):
     orientation, heights = jl.Orientation(3.0), jl.GammaHeights(4.0, 10e-6)
-    z = jl.synthetic_surface(orientation, heights, rows=8, columns=8, spacing=20e-6)
+    z = synthetic_surface(orientation, heights, rows=8, columns=8, spacing=20e-6)
     np.save(tmp_path / "z.npy", z)
     assert main(["scan", "z.npy", "--spacing", "20um", "--height-unit", "m", "--out", "o"]) == 0
     summary = json.loads((tmp_path / "o" / "summary.json").read_text())

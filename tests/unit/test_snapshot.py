@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
+from jointlaw.joints.state import JointState
 
 
 def walk(joint, rng, steps=30):
@@ -129,7 +130,7 @@ def test_a_damaged_state_is_refused(law):
     values = law.joint().snapshot().values
     values[0, 3] = np.nan
     with pytest.raises(ValueError, match="damaged"):
-        law.joint().restore(jl.JointState(law.fingerprint, values))
+        law.joint().restore(JointState(law.fingerprint, values))
 
 
 @pytest.mark.parametrize(

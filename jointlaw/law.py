@@ -20,7 +20,7 @@ from .joints.crushed import warn_if_crushed
 from .joints.joint import Joint
 from .joints.time_step import largest_stiffness, stable_step
 from .kernels import reference
-from .parameters import toml
+from .parameters import keys, toml
 from .parameters.asperity import Asperity
 from .parameters.fingerprint import fingerprint
 from .parameters.heights import HeightDistribution
@@ -371,9 +371,14 @@ class JointLaw:
         return toml.write_law(values, None if path is None else Path(path))
 
     @classmethod
-    def from_toml(cls, source: str | Path) -> JointLaw:
-        """A law from a TOML file or from TOML text; the keys are the parameters above."""
-        return toml.read_law(cls, source)
+    def from_toml(cls, path: str | Path) -> JointLaw:
+        """A law from a TOML file; the keys are the parameters above."""
+        return toml.read_law(cls, path)
+
+    @classmethod
+    def from_text(cls, text: str) -> JointLaw:
+        """A law from TOML text, as `to_toml` returns it."""
+        return toml.build_law(cls, keys.parse(text, "TOML text"), "TOML text")
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], where: str = "law") -> JointLaw:

@@ -1,29 +1,32 @@
-"""Laws as TOML files: the same keys as the constructors, unknown keys refused by their path."""
+"""Laws as TOML files, with the same keys as the constructors."""
 
 import csv
 import json
 import math
-import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 import numpy as np
 
-from ..support.checks import remedy
 from ..support.files import replace_file
 from .asperity import Asperity
 from .heights import GammaHeights, Heights
+from .keys import Removed, as_given, checked, keys_of, read
 from .orientation import Orientation
 from .resolution import Resolution, named
 
-_LAW_KEYS = {
-    "orientation", "asperity", "heights", "asperity_density", "closure_range", "resolution",
-    "plane", "closure_only", "critical_slip",
+_RESOLUTION = keys_of(Resolution) | {
+    "front": Removed("take more depth cells instead, such as depth = 12", neutral=False)
+}
+_LAW = {
+    "orientation!": keys_of(Orientation), "asperity!": keys_of(Asperity), "heights": as_given,
+    "asperity_density!": as_given, "closure_range": as_given, "resolution": as_given,
+    "plane": as_given, "closure_only": as_given, "critical_slip": as_given,
+    "about": as_given,  # free table for title, source and notes
+    "version": as_given,
 }  # fmt: skip
 T = TypeVar("T")
-_ABOUT = "about"  # free table for title, source and notes
 VERSION = 1  # of the keys; a file without one is of version 1
 
 
@@ -33,8 +36,7 @@ def write_law(law: Mapping[str, Any], path: Path | None) -> str:
     lengths = law["critical_slip"], law["asperity"].yield_interference
     names = named(*(length / law["closure_range"] for length in lengths))
     name = next((n for n, value in names.items() if value == r), None)
-    front = ", front = true" if r.front else ""
-    own = f"{{ u = {r.u}, phi = {r.phi}, depth = {r.depth}{front} }}"
+    own = f"{{ u = {r.u}, phi = {r.phi}, depth = {r.depth} }}"
     resolution = f'"{name}"' if name else own
     lines = [
         f"version = {VERSION}  # of this file's keys",
@@ -75,18 +77,13 @@ def write_law(law: Mapping[str, Any], path: Path | None) -> str:
     return text
 
 
-def read_law(build: Callable[..., T], source: str | Path) -> T:
-    """A law from a TOML file, or from TOML text (a line break, or "=" and no such file)."""
-    path = Path(source)
-    if isinstance(source, str) and ("\n" in source or ("=" in source and not path.is_file())):
-        return build_law(build, _parse(source, "TOML text"), "TOML text")
-    if not path.is_file():
-        raise ValueError(f"law file {str(path)!r} does not exist; give a TOML file of parameters")
-    try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{str(path)!r} is not a text file in UTF-8: {error}") from None
-    return build_law(build, _parse(text, str(path)), str(path), path.parent)
+def read_law(build: Callable[..., T], path: str | Path) -> T:
+    """A law from a TOML file."""
+    if "\n" in str(path):
+        raise ValueError("this is TOML text, not the path of a law file: use JointLaw.from_text")
+    path = Path(path)
+    data = read(path, "law file")
+    return build_law(build, data, str(path), path.parent)
 
 
 def build_law(
@@ -99,68 +96,33 @@ def build_law(
             f"{where}: key 'version' = {version!r}: this jointlaw reads version {VERSION}; write "
             "the law again with this version, or install the one that wrote it"
         )
-    _known(data, _LAW_KEYS | {_ABOUT, "version"}, where, "")
-    for key in ("orientation", "asperity", "asperity_density"):
-        if key not in data:
-            raise ValueError(f"{where}: key {key!r} is missing; a law needs it")
-    values = {key: value for key, value in data.items() if key in _LAW_KEYS}
-    values["orientation"] = _part(Orientation, data["orientation"], where, "orientation")
-    values["asperity"] = _part(Asperity, data["asperity"], where, "asperity")
-    if "heights" in data:
-        values["heights"] = _heights(data["heights"], where, folder)
-    if isinstance(data.get("resolution"), dict):
-        values["resolution"] = _part(Resolution, data["resolution"], where, "resolution")
+    values = checked(data, _LAW, where)
+    values.pop("version", None)
+    values.pop("about", None)
     try:
+        values["orientation"] = Orientation(**values["orientation"])
+        values["asperity"] = Asperity(**values["asperity"])
+        if "heights" in values:
+            values["heights"] = _heights(values["heights"], where, folder)
+        if isinstance(values.get("resolution"), dict):
+            nodes = checked(values["resolution"], _RESOLUTION, where, "resolution")
+            values["resolution"] = Resolution(**nodes)
         return build(**values)
     except ValueError as error:
-        raise ValueError(f"{where}: {error}") from None
+        text = str(error)
+        raise ValueError(text if text.startswith(f"{where}: ") else f"{where}: {text}") from None
 
 
 def _heights(data: Any, where: str, folder: Path | None) -> GammaHeights | Heights:
-    if not isinstance(data, dict):
-        raise ValueError(f"{where}: key 'heights' must be a table")
-    if "alpha" in data or "beta" in data:
-        return _part(GammaHeights, data, where, "heights")
-    if "histogram" in data:
-        data = dict(data)
-        data["distribution"] = _read_histogram(
-            Path(folder or ".") / str(data.pop("histogram")), where
-        )
-    elif "counts" in data:
-        data = dict(data)
-        data["distribution"] = (data.pop("counts"), data.pop("edges", ()))
-    return _part(Heights, data, where, "heights")
-
-
-def _part(kind: type[T], data: Any, where: str, path: str) -> T:
-    """One of the parameter classes from its table."""
-    if not isinstance(data, dict):
-        raise ValueError(f"{where}: key {path!r} must be a table")
-    allowed = {f.name: f.default is MISSING for f in fields(cast(Any, kind)) if f.init}
-    _known(data, set(allowed), where, path + ".")
-    missing = [name for name, required in allowed.items() if required and name not in data]
-    if missing:
-        raise ValueError(f"{where}: key '{path}.{missing[0]}' is missing; table {path!r} needs it")
-    try:
-        return kind(**data)
-    except ValueError as error:
-        raise ValueError(f"{where}: {error}") from None
-
-
-def _known(data: dict[str, Any], allowed: set[str], where: str, prefix: str) -> None:
-    for key in data:
-        if key not in allowed:
-            raise ValueError(
-                f"{where}: key '{prefix}{key}' is unknown; "
-                f"{remedy(key, sorted(allowed), 'known here:')}"
-            )
-
-
-def _parse(text: str, where: str) -> dict[str, Any]:
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{where} is not valid TOML: {error}") from None
+    table = dict(data) if isinstance(data, dict) else {}
+    if "alpha" in table or "beta" in table:
+        return GammaHeights(**checked(data, keys_of(GammaHeights), where, "heights"))
+    if "histogram" in table:
+        path = Path(folder or ".") / str(table.pop("histogram"))
+        table["distribution"] = _read_histogram(path, where)
+    elif "counts" in table:
+        table["distribution"] = (table.pop("counts"), table.pop("edges", ()))
+    return Heights(**checked(table or data, keys_of(Heights), where, "heights"))
 
 
 def _num(value: float) -> str:

@@ -106,7 +106,7 @@ def test_a_short_critical_slip_chooses_other_nodes(make_law, name):
         assert law.resolution == chosen[name]
         assert len(law.facets.theta) == len(law.tables.c1)
         assert f'resolution = "{name}"' in law.to_toml()
-        assert jl.JointLaw.from_toml(law.to_toml()) == law
+        assert jl.JointLaw.from_text(law.to_toml()) == law
     assert (named(2.4)[name] != named()[name]) == (name in ("fast", "balanced"))
 
 

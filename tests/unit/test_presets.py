@@ -87,7 +87,7 @@ def test_the_replica_says_that_its_density_is_not_printed():
 @pytest.mark.parametrize("name", PRINTED)
 def test_text_is_the_law(name):
     text = jl.presets.text(name)
-    assert jl.JointLaw.from_toml(text) == jl.presets.load(name)
+    assert jl.JointLaw.from_text(text) == jl.presets.load(name)
     assert "about" in tomllib.loads(text)
 
 

@@ -100,7 +100,7 @@ def test_trials_of_two_threads_do_not_meet(law):
 def test_a_law_read_from_its_file_takes_the_state(law, tmp_path):
     joint = law.joint()
     joint.update([3e-7, 1e-7, 0.0])
-    twin = jl.JointLaw.from_toml(law.to_toml(tmp_path / "law.toml")).joint()
+    twin = jl.JointLaw.from_text(law.to_toml(tmp_path / "law.toml")).joint()
     twin.restore(joint.snapshot())
     np.testing.assert_array_equal(twin.F, joint.F)
 

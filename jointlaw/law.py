@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +23,7 @@ from .kernels import reference
 from .parameters import keys, toml
 from .parameters.asperity import Asperity
 from .parameters.fingerprint import fingerprint
-from .parameters.heights import HeightDistribution
+from .parameters.heights import GammaHeights, HeightDistribution, Heights
 from .parameters.orientation import Orientation
 from .parameters.resolution import NAMED, Resolution, resolve
 from .support.checks import Array, above, finite, number
@@ -76,13 +76,10 @@ class JointLaw:
         for name, kind in (("orientation", Orientation), ("asperity", Asperity)):
             if not isinstance(value := getattr(self, name), kind):
                 raise ValueError(f"{name} = {value!r} must be of type {kind.__name__}")
-        heights: Any = self.heights
-        # states know their law by the values of its fields; other objects have none
-        known = is_dataclass(heights) and isinstance(heights, HeightDistribution)
-        if not (heights is None or known):
+        if not isinstance(self.heights, GammaHeights | Heights | None):
             raise ValueError(
-                f"heights = {heights!r} must be GammaHeights, Heights, None, or a frozen dataclass "
-                "with their overlap, formation, pdf, cdf and breakpoints"
+                f"heights = {self.heights!r} must be GammaHeights, Heights or None; a histogram in "
+                "Heights stands for any other distribution"
             )
         set_(self, "asperity_density", above("asperity_density", self.asperity_density, 0.0))
         asked: str | Resolution = self.resolution

@@ -93,7 +93,7 @@ def slip(law: Law, closure_range: float, stress: float, ways: Array) -> Slip:
     for k, steps in enumerate(np.concatenate([leg, -leg])):
         step = np.column_stack([rate * steps, steps[:, None] * along])
         step[:, 0] = _held(batch, step, goal, np.abs(steps) + R)
-        batch.update(step, tangent=False, out=(F[k], None))
+        F[k], _ = batch.update(step, tangent=False)
         rate = step[:, 0] / steps
         rise[k] = -step[:, 0] / np.abs(steps)
     sense = np.repeat([1.0, -1.0], LEG)[:, None]

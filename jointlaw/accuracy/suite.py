@@ -153,16 +153,16 @@ def tractions(law: Law, d: Array) -> Array:
     """F (steps, paths, dim) in Pa along increments d of the same shape, from the virgin state."""
     batch, F = law.joints(d.shape[1], ledger=False), np.empty_like(d)
     for k, step in enumerate(track(d, "steps of the paths", len(d))):
-        batch.update(step, tangent=False, out=(F[k], None))
+        F[k], _ = batch.update(step, tangent=False)
     return F
 
 
 def tangents(law: Law, d: Array) -> Array:
     """C (steps, paths, dim, dim) in Pa/m along increments d, from the virgin state."""
     batch, dim = law.joints(d.shape[1], ledger=False), d.shape[2]
-    F, C = np.empty(d.shape[1:]), np.empty((*d.shape, dim))
+    C = np.empty((*d.shape, dim))
     for k, step in enumerate(d):
-        batch.update(step, out=(F, C[k]))
+        _, C[k] = batch.update(step)
     return C
 
 

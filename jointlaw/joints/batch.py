@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..law import JointLaw
 
 Index = Sequence[int] | NDArray[np.integer[Any]] | NDArray[np.bool_]
-Out = tuple[Array, Array | None]
+Result = tuple[Array, Array | None]
 COMPONENTS = {  # of a displacement, by their number, and how to have more
     1: "closure; for shear take a law without closure_only",
     2: "closure and shear along the plane; for motion in 3-D take a law with plane=None",
@@ -74,43 +74,25 @@ class JointBatch:
 
     # ------------------------------------------------------------------ steps
 
-    def update(
-        self,
-        d: ArrayLike,
-        where: Index | None = None,
-        tangent: bool = True,
-        out: Out | None = None,
-    ) -> Out:
+    def update(self, d: ArrayLike, where: Index | None = None, tangent: bool = True) -> Result:
         """Advance by the displacement increments d and keep the new state.
 
         d: (n, dim) in m; with `where`, an index or mask of m joints, (m, dim).
-        out: arrays F and C (or None) to write into instead of new ones.
         Returns F (n or m, dim) in Pa and C = dF/dd (n or m, dim, dim) in Pa/m, None without
         `tangent`. Raises ValueError for a wrong shape, index or a non-finite increment, and
         NonFiniteError when the result would overflow; the state is then as it was.
         """
-        return self._step(d, where, tangent, out, keep=True)
+        return self._step(d, where, tangent, keep=True)
 
-    def trial(
-        self,
-        d: ArrayLike,
-        where: Index | None = None,
-        tangent: bool = True,
-        out: Out | None = None,
-    ) -> Out:
+    def trial(self, d: ArrayLike, where: Index | None = None, tangent: bool = True) -> Result:
         """As `update`, but the state is left untouched."""
-        return self._step(d, where, tangent, out, keep=False)
+        return self._step(d, where, tangent, keep=False)
 
-    def _step(
-        self, d: ArrayLike, where: Index | None, tangent: bool, out: Out | None, keep: bool
-    ) -> Out:
+    def _step(self, d: ArrayLike, where: Index | None, tangent: bool, keep: bool) -> Result:
         index = None if where is None else self._index(where)
         m, dim = self._n if index is None else len(index), self.law.dim
         values = increments(d, (m, dim))
-        if out is None:
-            F, C = np.empty((m, dim)), np.empty((m, dim, dim)) if tangent else None
-        else:
-            F, C = _require_out(out, m, dim, tangent)
+        F, C = np.empty((m, dim)), np.empty((m, dim, dim)) if tangent else None
         self.take(Step(np.ascontiguousarray(values), F, C, index, keep))
         return F, C
 
@@ -345,15 +327,3 @@ def increments(d: ArrayLike, shape: tuple[int, ...]) -> Array:
             f"d has shape {values.shape}; expected {shape}: {joints}{COMPONENTS[shape[-1]]}"
         )
     return values
-
-
-def _require_out(out: Out, m: int, dim: int, tangent: bool) -> Out:
-    """Arrays that the caller gave for the results, checked."""
-    for name, array, shape in (("F", out[0], (m, dim)), ("C", out[1], (m, dim, dim))):
-        if name == "C" and not tangent:
-            continue
-        if array is None or array.shape != shape or array.dtype != np.float64:
-            raise ValueError(f"out: {name} must be a float64 array of shape {shape}")
-        if not (array.flags.c_contiguous and array.flags.writeable):
-            raise ValueError(f"out: {name} must be C-contiguous and writeable")
-    return out[0], out[1] if tangent else None

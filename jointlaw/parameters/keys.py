@@ -66,9 +66,6 @@ def checked(data: Any, rules: Mapping[str, Any], where: str, path: str = "") -> 
     allowed = [key for key, rule in rule_of.items() if not isinstance(rule, Removed)]
     known({key: None for key in data if not isinstance(rule_of.get(key), Removed)}, allowed,
           where, prefix)  # fmt: skip
-    for key in rules:
-        if key.endswith("!") and key[:-1] not in data:
-            raise ValueError(f"{where}: key '{prefix}{key[:-1]}' is missing; give it a value")
     found: Table = {}
     for key, value in data.items():
         rule, name = rule_of[key], prefix + key
@@ -81,6 +78,9 @@ def checked(data: Any, rules: Mapping[str, Any], where: str, path: str = "") -> 
             found[key] = _checked_list(value, rule[0], where, name)
         else:
             found[key] = rule(name, value)
+    for key in rules:
+        if key.endswith("!") and key[:-1] not in data:
+            raise ValueError(f"{where}: key '{prefix}{key[:-1]}' is missing; give it a value")
     return found
 
 

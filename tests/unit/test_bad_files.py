@@ -82,6 +82,10 @@ def test_a_neutral_value_of_a_removed_key_is_skipped():
         ("[heights]\n", "key 'heights.distribution' is missing"),
         ('[heights]\ndistribution = "chi2"\nparameters = { dff = 3 }', "dff"),
         ('[heights]\ndistribution = "chi2"\nparameters = 3', "heights.parameters = 3"),
+        (
+            '[heights]\nhistogram = "h.csv"',
+            "key 'heights.histogram' is removed: write its `counts`",
+        ),
     ],
 )
 def test_heights(tmp_path, heights, message):
@@ -98,25 +102,6 @@ def test_a_file_that_cannot_be_read(tmp_path):
         jl.JointLaw.from_toml(tmp_path / "missing.toml")
     with pytest.raises(ValueError, match=r"TOML text.* use JointLaw\.from_text"):
         jl.JointLaw.from_toml(GOOD)
-
-
-@pytest.mark.parametrize(
-    ("csv", "told"),
-    [
-        (None, "lower_m, upper_m, count"),
-        ("lower_m,upper_m,count\n0,one,3\n", "one"),
-        ("lower_m,upper_m,count\n0,1e-6,3\n2e-6,3e-6,1\n", "adjoin"),
-        ("lower_m,upper_m,count\n0,1e-6,-3\n", "counts must be"),
-    ],
-)
-def test_bad_histogram_file(tmp_path, csv, told):
-    text = GOOD.split("[heights]")[0] + '[heights]\nhistogram = "h.csv"\nformation = "individual"'
-    (tmp_path / "law.toml").write_text(text)
-    if csv is not None:
-        (tmp_path / "h.csv").write_text(csv)
-    with pytest.raises(ValueError, match=r"law\.toml: .*heights") as error:
-        jl.JointLaw.from_toml(tmp_path / "law.toml")
-    assert told in str(error.value)
 
 
 def test_a_mapping_is_checked_alike_and_left_alone():

@@ -5,7 +5,6 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import stats
 
 import jointlaw as jl
 
@@ -15,7 +14,6 @@ KINDS = {
     "individual": {"heights": "individual"},
     "no heights": {"heights": None},
     "chi2": {"heights": jl.Heights("chi2", 2e-6, parameters={"df": 9.6, "scale": 1 / 3e6})},
-    "frozen": {"heights": jl.Heights(stats.lognorm(0.9, scale=3e-6), 2e-6, "individual")},
     "no parameters": {"heights": jl.Heights("expon", 1e-6, "individual", {})},
     "histogram": {"heights": jl.Heights(HISTOGRAM, 1e-6, "individual")},
     "plane": {"plane": -1 / 3, "critical_slip": 1 / 3e4},
@@ -48,15 +46,6 @@ def test_file_round_trip(kind, tmp_path):
 def test_every_number_is_kept_to_the_last_bit(make_law, a, b, share, K, mu, plane, slip):
     law = make_law(a=a, b=b, c=share * (1 / 3 - b / 6), K=K, mu=mu, plane=plane, critical_slip=slip)
     assert jl.JointLaw.from_text(law.to_toml()) == law
-
-
-def test_histogram_goes_to_a_csv_beside_the_law(make_law, tmp_path):
-    law = make_law(**KINDS["histogram"])
-    law.to_toml(tmp_path / 'my "law".toml')
-    lines = (tmp_path / 'my "law"-heights.csv').read_text().splitlines()
-    assert lines[0] == "lower_m,upper_m,count"
-    assert [float(x) for x in lines[2].split(",")] == [2e-6, 4e-6, 2.5]
-    assert jl.JointLaw.from_toml(tmp_path / 'my "law".toml') == law
 
 
 def test_a_note_about_the_law_is_allowed(law):

@@ -5,7 +5,7 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
-import jointlaw as jl
+from jointlaw.laboratory.experiments import PathError
 from jointlaw.support.files import replace_file, require_free, write_json
 from jointlaw.support.progress import explained
 from jointlaw.support.pyplot import FORMATS
@@ -82,7 +82,7 @@ def main(arguments: Words | None = None) -> int:
     except KeyboardInterrupt as stop:
         print(f"dem_demo: {str(stop) or 'interrupted; nothing is written'}", file=sys.stderr)
         return STATUS
-    except (SceneError, Refused, jl.PathError, ValueError, OSError) as error:
+    except (SceneError, Refused, PathError, ValueError, OSError) as error:
         print(f"dem_demo: {error}", file=sys.stderr)
         return 2
     return 0

@@ -16,14 +16,16 @@ from .discretisation.facets import Facets, facet_sum, facets, yield_sum
 from .discretisation.tables import UNDERFLOW, VERSION, Tables, largest_reach, tables
 from .discretisation.virgin_curve import VirginClosure, VirginCurve, virgin_curve
 from .joints.batch import JointBatch
+from .joints.crushed import warn_if_crushed
 from .joints.joint import Joint
+from .joints.time_step import largest_stiffness, stable_step
 from .kernels import reference
-from .parameters import toml
+from .parameters import keys, toml
 from .parameters.asperity import Asperity
 from .parameters.fingerprint import fingerprint
-from .parameters.heights import HeightDistribution
+from .parameters.heights import GammaHeights, HeightDistribution, Heights
 from .parameters.orientation import Orientation
-from .parameters.resolution import Resolution, resolve
+from .parameters.resolution import NAMED, Resolution, resolve
 from .support.checks import Array, above, finite, number
 
 if TYPE_CHECKING:
@@ -43,7 +45,8 @@ class JointLaw:
     heights: distribution of asperity heights, or None when all asperities touch at zero closure.
     asperity_density: N, asperities per m2, > 0.
     closure_range: largest closure (m) that the depth cells are placed for, > 0; beyond it the
-        normal force stays exact. None takes the closure at 20 MPa without yielding.
+        normal force stays exact. None takes the closure at 20 MPa without yielding, by the
+        orientations of "balanced" whatever the resolution.
     resolution: "fast", "balanced", "fine", "reference" or a `Resolution`. A name becomes the
         `Resolution` that suits critical_slip over closure_range (docs/how-accurate.md); where
         `replace` changes these, give it the name again.
@@ -73,15 +76,14 @@ class JointLaw:
         for name, kind in (("orientation", Orientation), ("asperity", Asperity)):
             if not isinstance(value := getattr(self, name), kind):
                 raise ValueError(f"{name} = {value!r} must be of type {kind.__name__}")
-        if not (self.heights is None or isinstance(self.heights, HeightDistribution)):
+        if not isinstance(self.heights, GammaHeights | Heights | None):
             raise ValueError(
-                f"heights = {self.heights!r} must be GammaHeights, Heights, None, or an object "
-                "with their overlap, formation, pdf, cdf and breakpoints"
+                f"heights = {self.heights!r} must be GammaHeights, Heights or None; a histogram in "
+                "Heights stands for any other distribution"
             )
         set_(self, "asperity_density", above("asperity_density", self.asperity_density, 0.0))
         asked: str | Resolution = self.resolution
-        nodes = resolve(asked)
-        set_(self, "resolution", nodes)
+        set_(self, "resolution", resolve(asked))
         if self.plane is not None:
             set_(self, "plane", number("plane", self.plane))
         if not isinstance(self.closure_only, bool):
@@ -102,9 +104,6 @@ class JointLaw:
             set_(self, "closure_range", above("closure_range", self.closure_range, 0.0))
             lengths = np.array([self.critical_slip, self.asperity.yield_interference])
             set_(self, "resolution", resolve(asked, *(lengths / self.closure_range)))
-            if self.resolution != nodes:
-                for cached in ("facets", "_scale", "_virgin"):  # by the closure range
-                    self.__dict__.pop(cached, None)
             self._require_numbers(self.closure_range)  # and with it that the curve is valid
 
     # ----------------------------------------------------------------- joints
@@ -117,7 +116,8 @@ class JointLaw:
         """
         joint = Joint(self)
         if normal_stress != 0.0:
-            joint.update(np.eye(self.tables.dim)[0] * self.closure(normal_stress), tangent=False)
+            joint.update(np.eye(self.dim)[0] * self.closure(normal_stress), tangent=False)
+            warn_if_crushed(self, joint.delta[0])
         return joint
 
     def joints(self, n: int, ledger: bool = True, normal_stress: ArrayLike = 0.0) -> JointBatch:
@@ -131,34 +131,38 @@ class JointLaw:
             closure = np.asarray(self.closure(normal_stress))
             if closure.shape not in ((), (n,)):
                 raise ValueError(f"normal_stress has shape {closure.shape}: give one or ({n},)")
-            batch.update(np.outer(closure * np.ones(n), np.eye(self.tables.dim)[0]), tangent=False)
+            batch.update(np.outer(closure * np.ones(n), np.eye(self.dim)[0]), tangent=False)
+            warn_if_crushed(self, closure)
         return batch
 
     def step(
-        self, state: ArrayLike, d: ArrayLike, tangent: bool = True
+        self, states: ArrayLike, d: ArrayLike, tangent: bool = True
     ) -> tuple[Array, Array, Array | None]:
         """One step as a pure function, for a host that keeps the states itself.
 
-        state: (state_size,), or (state_size, n) for n joints; zeros are the virgin state.
-        d: displacement increment in m, (dim,) or (dim, n).
-        Returns the new state, F in Pa (dim,) or (dim, n), and C in Pa/m (dim, dim) or
-        (dim, dim, n), None without `tangent`; what was given stays as it was. The algorithm and its
+        states: (n, state_size), or (state_size,) for one joint; zeros are the virgin state.
+        d: displacement increments in m, (n, dim) or (dim,).
+        Returns the new states, F in Pa (n, dim) or (dim,), and C in Pa/m (n, dim, dim) or
+        (dim, dim), None without `tangent`; what was given stays as it was. The algorithm and its
         equations: `jointlaw.kernels.reference.step`, which this calls. Raises ValueError for a
         wrong shape or a number that is not finite.
         """
-        old, move = finite("state", state, "numbers of state"), finite("d", d, "m")
-        k, several = self.tables, old.ndim == 2
-        rest = old.shape[1:]
-        if old.shape not in ((k.rows,), (k.rows, *rest)) or move.shape != (k.dim, *rest):
+        old, move = finite("states", states, "numbers of state"), finite("d", d, "m")
+        rows, dim, joints = self.state_size, self.dim, old.shape[:-1]
+        if old.ndim not in (1, 2) or old.shape[-1] != rows or move.shape != (*joints, dim):
             raise ValueError(
-                f"state has shape {old.shape} and d {move.shape}; expected ({k.rows},) and "
-                f"({k.dim},), or ({k.rows}, n) and ({k.dim}, n) for n joints"
+                f"states have shape {old.shape} and d {move.shape}; expected (n, {rows}) and "
+                f"(n, {dim}), or ({rows},) and ({dim},) for one joint"
             )
-        columns = old.reshape(k.rows, -1), move.reshape(k.dim, -1)
-        new, F, C = reference.step(k, *columns, tangent)
-        if several:
-            return new, F, C
-        return new[:, 0], F[:, 0], None if C is None else C[..., 0]
+        columns = old.reshape(-1, rows).T, move.reshape(-1, dim).T
+        new, F, C = reference.step(self.tables, *columns, tangent)
+        C = None if C is None else np.moveaxis(C, 2, 0).reshape(*joints, dim, dim)
+        return new.T.reshape(*joints, rows), F.T.reshape(*joints, dim), C
+
+    @property
+    def dim(self) -> int:
+        """Components of a displacement: 3, or 2 with a plane, or 1 with closure_only."""
+        return self.tables.dim
 
     @property
     def state_size(self) -> int:
@@ -183,11 +187,11 @@ class JointLaw:
         stress = finite("normal_stress", normal_stress, "Pa")
         if not (stress >= 0).all():
             raise ValueError(f"normal_stress = {normal_stress!r} is out of bounds: it must be >= 0")
-        start = self.closure_range
-        result = np.array(
-            [self._first_loading.closure(float(one), start) for one in stress.ravel()]
+        if stress.ndim == 0:
+            return np.float64(self._first_loading.closure(float(stress), self.closure_range))
+        return self._first_loading.closures(stress.ravel(), self.closure_range).reshape(
+            stress.shape
         )
-        return result.reshape(stress.shape)[()]
 
     def contacts(self, closure: ArrayLike, direction: tuple[float, float] | None = None) -> Any:
         """Asperities in touch per m2 at this closure (m), Eq. 11.
@@ -204,32 +208,39 @@ class JointLaw:
 
     # ------------------------------------------------- stiffness and time step
 
-    def max_stiffness(self, closure: ArrayLike) -> Any:
-        """Upper bound of `|C|` (Pa/m) while no facet's effective closure exceeds `closure` (m)."""
-        k, p = self.tables, self.asperity
-        _, slope = k.curve.force(self._within_reach(closure))
-        per_facet = float(np.sum(k.area / k.c1))
-        return ((max(1.0, 1.0 / p.lam) + p.mu) * per_facet * slope)[()]
+    def max_stiffness(self, closure: ArrayLike, shear: ArrayLike = 0.0) -> Any:
+        """Upper bound of `|C|` (Pa/m) up to this closure (m) and this shear displacement (m, >= 0).
 
-    def critical_time_step(self, mass: ArrayLike, area: ArrayLike, closure: ArrayLike) -> Any:
+        The shear may have any direction, and counts up to critical_slip. Yielded and worn joints
+        are less stiff.
+        """
+        y, way = self._within_reach(closure), finite("shear", shear, "m")
+        if not (way >= 0).all():
+            raise ValueError(f"shear = {shear!r} m is out of bounds: it must be >= 0")
+        rise = np.minimum(way, self.critical_slip)[..., None] * np.linalg.norm(
+            self.tables.m[1:], axis=0
+        )
+        self._within_reach(y + np.max(rise, axis=-1))
+        return largest_stiffness(self.tables, y, rise)[()]
+
+    def critical_time_step(
+        self, mass: ArrayLike, area: ArrayLike, closure: ArrayLike, shear: ArrayLike = 0.0
+    ) -> Any:
         """Largest stable explicit step (s) of one translating mass on one joint.
 
         mass: reduced mass m1 m2/(m1 + m2) in kg; area: of the joint in m2; closure: the largest
-        reached, in m; numbers or arrays of one shape. 2 sqrt(m/(K area)), infinite where nothing
-        touches; a block code adds rotation.
+        reached, in m; shear: the largest shear displacement reached, in m, in any direction;
+        numbers or arrays of one shape. 2 sqrt(m/(K area)), infinite where nothing touches; a block
+        code adds rotation. Shear presses one side of the asperities together: a step for closure
+        alone is several times too long for a joint that was sheared far at constant closure.
+        `JointBatch.critical_time_step` takes joints as they are now.
 
         Safe to 0.95 in lasting contact, and where friction takes from every impact. Impacts that
         lose nothing need 0.2 or less: they last but 2/share steps (docs/sharp-bits.md).
         """
-        m, a = finite("mass", mass, "kg"), finite("area", area, "m2")
-        y = finite("closure", closure, "m")
-        if not ((m > 0).all() and (a > 0).all() and (y >= 0).all()):
-            raise ValueError(
-                f"mass = {m} kg, area = {a} m2, closure = {y} m are out of bounds: mass and area "
-                "must be > 0, closure >= 0"
-            )
-        with np.errstate(divide="ignore"):
-            return 2 * np.sqrt(m / (self.max_stiffness(y) * a))
+        if not (finite("closure", closure, "m") >= 0).all():
+            raise ValueError(f"closure = {closure!r} m is out of bounds: it must be >= 0")
+        return stable_step(mass, area, self.max_stiffness(closure, shear))[()]
 
     # -------------------------------------------------------------- accuracy
 
@@ -310,21 +321,19 @@ class JointLaw:
         return self.facets.scale(self.asperity, self.asperity_density)
 
     @cached_property
-    def _virgin(self) -> VirginClosure:
-        """Closure without shear of elastic asperities."""
-        p = self.asperity
-        return VirginClosure(self.curve, facet_sum(self.facets.theta, self._scale, p.lam, p.mu))
-
-    @cached_property
     def _first_loading(self) -> VirginClosure:
         """Closure without shear of asperities that yield."""
-        yielding = yield_sum(self.facets.theta, self._scale, self.asperity)
-        return self._virgin._replace(yielding=yielding)
+        p, theta = self.asperity, self.facets.theta
+        elastic = facet_sum(theta, self._scale, p.lam, p.mu)
+        return VirginClosure(self.curve, elastic, yield_sum(theta, self._scale, p))
 
     def _default_range(self) -> float:
         """The closure (m) at 20 MPa of elastic asperities: those that yield may not bear it."""
+        p, r = self.asperity, NAMED["balanced"]  # the same for laws that differ in resolution
+        fixed = facets(self.orientation, r.u, r.phi, self.plane, self.closure_only)
+        elastic = facet_sum(fixed.theta, fixed.scale(p, self.asperity_density), p.lam, p.mu)
         try:
-            return self._virgin.closure(DEFAULT_STRESS, 1.0)
+            return VirginClosure(self.curve, elastic).closure(DEFAULT_STRESS, 1.0)
         except ValueError:
             self._require_numbers(1.0)  # the likely reason
             raise
@@ -359,9 +368,14 @@ class JointLaw:
         return toml.write_law(values, None if path is None else Path(path))
 
     @classmethod
-    def from_toml(cls, source: str | Path) -> JointLaw:
-        """A law from a TOML file or from TOML text; the keys are the parameters above."""
-        return toml.read_law(cls, source)
+    def from_toml(cls, path: str | Path) -> JointLaw:
+        """A law from a TOML file; the keys are the parameters above."""
+        return toml.read_law(cls, path)
+
+    @classmethod
+    def from_text(cls, text: str) -> JointLaw:
+        """A law from TOML text, as `to_toml` returns it."""
+        return toml.build_law(cls, keys.parse(text, "TOML text"), "TOML text")
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], where: str = "law") -> JointLaw:

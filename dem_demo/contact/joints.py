@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 import jointlaw as jl
+from jointlaw.joints.state import JointState
 
 from ..scene import Key
 from .law_points import Identity
@@ -16,7 +17,7 @@ from .stiffness import StiffnessCurve
 
 MEASURED = ("sliding", "slipping", "separated", "stored", "lost")
 
-PoolState = tuple[list[Identity], jl.JointState]  # law points, and their joints in that order
+PoolState = tuple[list[Identity], JointState]  # law points, and their joints in that order
 
 
 class Joints:

@@ -15,7 +15,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-import jointlaw as jl
+from jointlaw.joints.state import JointState
 from jointlaw.support.files import replace_file
 
 from ..contact import Joints, PoolState
@@ -97,7 +97,7 @@ def save(scene: Scene, saved: Saved, folder: Path) -> None:
     text, buffer, tables = text_of(scene), io.BytesIO(), {}
     for i, (points, law) in enumerate(saved.joints.values()):
         # numbered: a law's name may be no array's name
-        tables[f"law-{i}"], tables[f"fingerprint-{i}"] = law.values, np.array(law.fingerprint)
+        tables[f"law-{i}"], tables[f"fingerprint-{i}"] = law.values.T, np.array(law.fingerprint)
         tables[f"points-{i}"] = np.array([[*key, number] for key, number in points], int)
     about = {"version": VERSION, "scene": fingerprint(scene)}
     np.savez(buffer, **about, **saved.arrays, **tables)
@@ -132,7 +132,7 @@ def load(folder: Path) -> tuple[Scene, Saved]:
         )
     joints = {}
     for i, name in enumerate(scene.laws):
-        law = jl.JointState(str(data.pop(f"fingerprint-{i}")), data.pop(f"law-{i}"))
+        law = JointState(str(data.pop(f"fingerprint-{i}")), data.pop(f"law-{i}").T)
         points = data.pop(f"points-{i}").tolist()
         joints[name] = [(tuple(key), number) for *key, number in points], law
     return scene, Saved(data, joints)

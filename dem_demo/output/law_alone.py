@@ -3,6 +3,7 @@
 import numpy as np
 
 import jointlaw as jl
+from jointlaw.laboratory.experiments import PathError
 
 from ..scene import Scene, is_coulomb
 
@@ -37,7 +38,7 @@ def slip_angle(scene: Scene, moving: int, base: int, length: float) -> dict:
         before, stress = angle, float(weight / length * np.cos(np.radians(angle)))
         try:
             angle = friction_angle(law, stress)
-        except (ValueError, jl.PathError):
+        except (ValueError, PathError):
             break
         if abs(angle - before) <= 5e-3:
             return {"predicted_angle": angle, "normal_stress": stress}
@@ -56,7 +57,7 @@ def shear_curve(law: jl.JointLaw, stress: float, slid: np.ndarray) -> dict[str, 
     turns = [float(u) for u in [*slid[inner], slid[-1]]]
     try:
         test = jl.direct_shear(law.joint(), to=turns, normal=stress, steps=400)
-    except (ValueError, jl.PathError):
+    except (ValueError, PathError):
         return None
     return {
         "slid": test.shear_2,

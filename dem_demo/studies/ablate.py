@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-import jointlaw as jl
+from jointlaw.laboratory.experiments import PathError
 from jointlaw.support.files import clear_run, replace_file, write_json
 
 from ..dynamics.simulation import Simulation
@@ -61,7 +61,7 @@ def ablate(scene: Scene, until: float | None = None, leave_out: Collection[str] 
 def _without(variant: Variant, record: Record, until: float | None, count: str) -> Row:
     try:
         scene = variant.make()
-    except (ValueError, jl.PathError) as error:
+    except (ValueError, PathError) as error:
         return Row(variant.name, note=f"cannot be built: {error}")
     scene = replace(scene, title=f"{count} {variant.name}")
     row, other = _run(scene, variant.name, until, 0 if variant.own_step else HALVINGS)

@@ -32,11 +32,10 @@ def place(share):
 # %%
 # The loop: increments in, tractions out; a contact that is lost starts anew.
 
-F = np.empty((n, 3))
 pressure, friction, touching = [], [], []
 for step in range(1, steps + 1):
     new = place(step / steps)
-    joints.update(new - position, tangent=False, out=(F, None))
+    F, _ = joints.update(new - position, tangent=False)
     position = new
     touching.append(np.mean(F[:, 0] > 0))
     pressure.append(F[:, 0].mean())

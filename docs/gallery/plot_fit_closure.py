@@ -10,13 +10,15 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import jointlaw as jl
+from jointlaw.calibration import baselines, datasets
+from jointlaw.calibration.measured import first_loading
 
 # %%
 # The curve comes with the package (Vogler et al. 2018). Only the loading up to 5.3 MPa is fitted,
 # and the fit says what eight points leave open.
 
-stress, closure, stress_back, closure_back = jl.first_loading(
-    *jl.datasets.load("grimsel_vd1_closure")
+stress, closure, stress_back, closure_back = first_loading(
+    *datasets.load("grimsel_vd1_closure")
 )
 seen = stress <= 5.3e6
 fit = jl.fit_closure(stress[seen], closure[seen])
@@ -27,7 +29,7 @@ for name in fit.parameters:
 # %%
 # Held out: everything above. The empirical laws are fitted to the same points.
 
-comparison = jl.baselines.compare(stress, closure, limit=5.3e6)
+comparison = baselines.compare(stress, closure, limit=5.3e6)
 print(comparison.table())
 
 # %%
@@ -36,7 +38,7 @@ low, high = fit.band(u)
 figure, axis = plt.subplots(layout="constrained")
 axis.fill_between(u * 1e6, low / 1e6, high / 1e6, alpha=0.25, label="95 % band")
 axis.plot(u * 1e6, fit.predict(u) / 1e6, label="joint law")
-for baseline in (jl.baselines.fit_power_law, jl.baselines.fit_barton_bandis):
+for baseline in (baselines.fit_power_law, baselines.fit_barton_bandis):
     other = baseline(stress[seen], closure[seen])
     axis.plot(u * 1e6, other.predict(u) / 1e6, "--", lw=1, label=other.name)
 axis.plot(closure[seen] * 1e6, stress[seen] / 1e6, "ko", label="measured, fitted")

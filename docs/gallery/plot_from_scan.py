@@ -9,12 +9,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import jointlaw as jl
+from jointlaw.surface.synthetic import synthetic_surface
 
 # %%
 # A made-up scan with known asperities stands for yours: composite heights in m, 20 µm apart.
 
 true = jl.Orientation(3.0, 0.5, 0.1)
-z = jl.synthetic_surface(true, jl.GammaHeights(4.0, 10e-6), spacing=20e-6, noise=0.3e-6)
+z = synthetic_surface(true, jl.GammaHeights(4.0, 10e-6), spacing=20e-6, noise=0.3e-6)
 scan = jl.from_surface(z, spacing=20e-6)
 for name in ("a", "b", "c", "alpha", "beta"):
     low, high = scan.interval(name)

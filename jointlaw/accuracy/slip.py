@@ -8,13 +8,16 @@ displacement would compare their dilation, summed up over the slip, and not thei
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..joints.batch import JointBatch, Law
+from ..joints.batch import JointBatch
 from ..support.checks import Array
+
+if TYPE_CHECKING:
+    from ..law import JointLaw as Law
 
 LEG = 24  # steps each way
 SHARES = (1.0, 0.1)  # of the normal stress S/2 of the standard paths
@@ -90,7 +93,7 @@ def slip(law: Law, closure_range: float, stress: float, ways: Array) -> Slip:
     for k, steps in enumerate(np.concatenate([leg, -leg])):
         step = np.column_stack([rate * steps, steps[:, None] * along])
         step[:, 0] = _held(batch, step, goal, np.abs(steps) + R)
-        batch.update(step, tangent=False, out=(F[k], None))
+        F[k], _ = batch.update(step, tangent=False)
         rate = step[:, 0] / steps
         rise[k] = -step[:, 0] / np.abs(steps)
     sense = np.repeat([1.0, -1.0], LEG)[:, None]

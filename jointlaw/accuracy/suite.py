@@ -28,43 +28,31 @@ constant stress are found once, at half the reference resolution, and are paths 
 then on, so that every resolution is asked the same.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
-from ..joints import batch as joints
-from ..parameters.heights import HeightDistribution
-from ..parameters.orientation import Orientation
 from ..parameters.resolution import Resolution
 from ..support.checks import Array
 from ..support.progress import track
 from .slip import Slip, distance, names, random_ways, slip, standard_ways
 
+if TYPE_CHECKING:
+    from ..law import JointLaw
+
+    Law = JointLaw
+else:
+    Law = object  # law.py imports this file
+
 STEPS = 120  # of each path
 FAR = 3.0  # R: the longest slip at a given closure
 _JAMS = 88.0  # degrees: the steepest friction angle of a law that slips at a given stress
-
-
-class Law(joints.Law, Protocol):
-    """What is read of a law whose accuracy is measured; `replace` gives it other resolutions."""
-
-    __dataclass_fields__: ClassVar[dict[str, Any]]
-
-    def __hash__(self) -> int: ...
-    @property
-    def orientation(self) -> Orientation: ...
-    @property
-    def heights(self) -> HeightDistribution | None: ...
-    @property
-    def closure_range(self) -> float: ...
-    @property
-    def resolution(self) -> Resolution: ...
-    def normal_stress(self, closure: ArrayLike) -> Any: ...
 
 
 def reference_resolution(law: Law) -> Resolution:
@@ -165,16 +153,16 @@ def tractions(law: Law, d: Array) -> Array:
     """F (steps, paths, dim) in Pa along increments d of the same shape, from the virgin state."""
     batch, F = law.joints(d.shape[1], ledger=False), np.empty_like(d)
     for k, step in enumerate(track(d, "steps of the paths", len(d))):
-        batch.update(step, tangent=False, out=(F[k], None))
+        F[k], _ = batch.update(step, tangent=False)
     return F
 
 
 def tangents(law: Law, d: Array) -> Array:
     """C (steps, paths, dim, dim) in Pa/m along increments d, from the virgin state."""
     batch, dim = law.joints(d.shape[1], ledger=False), d.shape[2]
-    F, C = np.empty(d.shape[1:]), np.empty((*d.shape, dim))
+    C = np.empty((*d.shape, dim))
     for k, step in enumerate(d):
-        batch.update(step, out=(F, C[k]))
+        _, C[k] = batch.update(step)
     return C
 
 

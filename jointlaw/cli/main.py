@@ -10,10 +10,10 @@ from ..laboratory.experiments import PathError
 from ..support.files import require_free
 from ..support.progress import explained
 from ..support.version import __version__
-from . import export, fit, laboratory, presets, replay, scan, tradeoff
+from . import export, fit, laboratory, presets, scan, tradeoff
 
 WAIT = "the first run after an installation also compiles the law, once"
-COMMANDS = (laboratory, presets, replay, export, fit, scan, tradeoff)
+COMMANDS = (laboratory, presets, export, fit, scan, tradeoff)
 
 _YIELDING = "write yield_interference into [asperity] of a law file; it starts with \
 jointlaw presets NAME > mine.toml"
@@ -21,6 +21,8 @@ _TABLE = "call jointlaw.hosts.yade.export.export_yade(law, folder, closure=..., 
 
 # Commands ("replay") and options ("tradeoff --loss") that were removed: what to use instead
 REMOVED = {
+    "replay": "a NonFiniteError carries `state` and `d`; joint.restore(error.state) and "
+    "joint.update(error.d) repeat the step",
     "figures": "run the scripts docs/paper/plot_fig_NN.py; the claims are on docs/paper.md and in "
     "tests/verification/test_paper_*.py",
     "closure --yield-interference": _YIELDING,

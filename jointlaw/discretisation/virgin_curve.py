@@ -19,6 +19,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..parameters.heights import HeightDistribution
 from ..support.checks import Array, frozen
@@ -30,6 +31,8 @@ _RESOLVED = 1e8  # yield interferences: Phi less its value one earlier has 8 dig
 _FARTHEST = 1e300  # m; S is 1 long before
 _NEARLY = 1e-20  # of the first cell: where the limit at y = 0 is taken
 _SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
+_HALVINGS = 52  # of 1 in log closure: to rounding
+_BEYOND = "normal_stress = {!r} Pa is beyond any closure"
 _CELLS = (128, 256, 512, 1024, 2048, 4096, 8192)
 
 
@@ -148,12 +151,37 @@ class VirginClosure(NamedTuple):
             while misfit(high) < 0.0:
                 high += 1.0
                 if high > farthest:
-                    raise ValueError(f"normal_stress = {stress!r} Pa is beyond any closure")
+                    raise ValueError(_BEYOND.format(stress))
             while misfit(low) > 0.0:
                 low -= 1.0
             if low == high:
                 return start
             return math.exp(brentq(misfit, low, high, xtol=1e-15, rtol=1e-15, maxiter=500))
+
+    def closures(self, stress: Array, start: float) -> Array:
+        """As `closure`, for many stresses (n,) together: bisection of log closure, to rounding."""
+        found = np.zeros_like(stress)
+        wanted = stress[stress >= _SMALLEST]
+
+        def too_open(log_y: Array) -> NDArray[np.bool_]:
+            return self.stress(np.exp(log_y)) < wanted
+
+        high = np.full(wanted.shape, math.log(start))
+        with np.errstate(over="ignore"):
+            while (short := too_open(high)).any():
+                high = high + short
+                if (far := high > math.log(self.farthest)).any():
+                    raise ValueError(_BEYOND.format(wanted[far].min()))
+            low = high - 1.0
+            while not (short := too_open(low)).all():
+                low = low - ~short
+            high = np.minimum(high, low + 1.0)
+            for _ in range(_HALVINGS):
+                middle = 0.5 * (low + high)
+                short = too_open(middle)
+                low, high = np.where(short, middle, low), np.where(short, high, middle)
+        found[stress >= _SMALLEST] = np.exp(high)
+        return found
 
 
 @lru_cache(maxsize=256)

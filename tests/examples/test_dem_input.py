@@ -22,6 +22,7 @@ from dem_demo.scene.read import SCENES
 from dem_demo.studies import ablate, compare
 from dem_demo.studies.ablate import _without
 from dem_demo.studies.ingredients import Variant
+from jointlaw.laboratory.experiments import PathError
 
 TEXT = f"""
 gravity = [0.0, -9.81]
@@ -235,7 +236,7 @@ def test_a_law_that_fails_on_its_path_predicts_nothing(monkeypatch):
     assert law_alone.slip_angle(scene, 1, 0, 1.0)["predicted_angle"] > 20
 
     def fails(*_args, **_keys):
-        raise jl.PathError("no further", None)
+        raise PathError("no further", None)
 
     monkeypatch.setattr(jl, "direct_shear", fails)
     assert law_alone.slip_angle(scene, 1, 0, 1.0) == none

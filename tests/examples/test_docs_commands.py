@@ -12,6 +12,7 @@ from pages import PAGES, ROOT, blocks, commands, text
 import dem_demo.cli
 import jointlaw as jl
 from jointlaw.cli.main import main as jointlaw_main
+from jointlaw.surface.synthetic import synthetic_surface
 
 # by what they begin with: too long for here, and what runs the same instead
 LONG = {
@@ -44,7 +45,7 @@ def cases():
 
 @pytest.fixture
 def _files_that_the_reader_has():
-    z = jl.synthetic_surface(jl.Orientation(3.0), jl.GammaHeights(4.0, 10e-6), spacing=20e-6)
+    z = synthetic_surface(jl.Orientation(3.0), jl.GammaHeights(4.0, 10e-6), spacing=20e-6)
     np.savetxt("scan.csv", z * 1e6, delimiter=",")
     Path("block.toml").write_text(blocks("docs/recipes.md", "toml")[0])
 

@@ -4,6 +4,7 @@ import numpy as np
 from scene_text import PLAIN, ROCK
 
 import jointlaw as jl
+from jointlaw.surface.synthetic import synthetic_surface
 
 SHEAR = {  # rows below the title: displacement and shear stress
     "no-names.csv": "",
@@ -80,7 +81,7 @@ def make(folder):
     (folder / "done").mkdir()
     (folder / "done" / "summary.json").write_text('{"files": ["shear.csv"]}')
     (folder / "done" / "shear.csv").write_text("of an earlier run")
-    z = jl.synthetic_surface(
+    z = synthetic_surface(
         jl.Orientation(3.0), jl.GammaHeights(4.0, 10e-6), rows=8, columns=8, spacing=20e-6
     )
     np.savetxt(folder / "scan.csv", 1e6 * z, delimiter=",")

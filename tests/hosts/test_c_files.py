@@ -251,7 +251,7 @@ def test_ten_lines_to_a_first_force(tmp_path, law):
 
 @pytest.mark.parametrize("plane", ["plane = 0.0", "closure_only = true"])
 def test_examples_of_fewer_components(tmp_path, law, plane):
-    jl.export_c(jl.JointLaw.from_toml(f"{plane}\n{law.to_toml()}"), tmp_path, "flat")
+    jl.export_c(jl.JointLaw.from_text(f"{plane}\n{law.to_toml()}"), tmp_path, "flat")
     out = run(build(tmp_path, tmp_path / "example.c", *STRICT, "-std=c99", "-O2", name="e"),
               tmp_path / "flat.jlaw")  # fmt: skip
     assert len(out.splitlines()) == (2 if "only" in plane else 41)

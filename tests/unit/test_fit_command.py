@@ -116,7 +116,7 @@ def test_a_scan_needs_only_the_contacts_to_be_a_law(tmp_path):
     assert main(["scan", "z.npy", "--spacing", "20um", "--height-unit", "m", "--out", "o"]) == 0
     summary = json.loads((tmp_path / "o" / "summary.json").read_text())
     contacts = "\n[asperity]\nK = 1e9\nlam = 1.2\neta = 0.5\nmu = 0.6\n"
-    law = jl.JointLaw.from_toml((tmp_path / "o" / "surface.toml").read_text() + contacts)
+    law = jl.JointLaw.from_text((tmp_path / "o" / "surface.toml").read_text() + contacts)
     assert summary["version"] == 2
     assert summary["parameters_SI"]["a"] == law.orientation.a
     assert summary["parameters_SI"]["asperity_density"] == law.asperity_density

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
+from jointlaw.laboratory.experiments import PathError
 
 N = 10e6  # Pa
 
@@ -180,10 +181,10 @@ def test_bad_arguments_of_closure_test(law, arguments, told):
     assert not joint.snapshot().values.any()
 
 
-def test_a_path_error_keeps_the_record_so_far(law, replays):
+def test_a_path_error_keeps_the_record_so_far(law):
     """The third turning point is so far away that the tractions overflow."""
     joint = law.joint()
-    with pytest.raises(jl.PathError, match="stopped after 21 rows") as error:
+    with pytest.raises(PathError, match="stopped after 21 rows") as error:
         jl.direct_shear(joint, [1e-7, -1e-7, 1e301], N, steps=10)
     record = error.value.record
     assert len(record) == 21
@@ -197,8 +198,8 @@ def test_a_path_error_keeps_the_record_so_far(law, replays):
 
 
 @pytest.mark.parametrize("stress", [1e200, 1e300])
-def test_a_stress_beyond_numbers_is_a_path_error(law, replays, stress):
-    with pytest.raises(jl.PathError) as error:
+def test_a_stress_beyond_numbers_is_a_path_error(law, stress):
+    with pytest.raises(PathError) as error:
         jl.closure_test(law.joint(), [1e6, stress], steps=5)
     assert len(error.value.record) >= 6
     assert np.isfinite(error.value.record.F1).all()

@@ -71,7 +71,7 @@ def test_printed_stiffness_is_near_that_of_the_printed_granite(name):
 @pytest.mark.parametrize("name", PRINTED)
 def test_each_is_a_file_with_its_source_and_closes_and_shears(name):
     law = jl.presets.load(name)
-    assert jl.JointLaw.from_toml(jl.presets.text(name)) == law
+    assert jl.JointLaw.from_text(jl.presets.text(name)) == law
     assert re.match(r"Misra 1999, .*section 4\.", jl.presets.about(name)["source"])
     F, C = law.joint().update([law.closure_range, 0.1 * law.closure_range, 0.0])
     assert (F[:2] > 0).all()

@@ -5,11 +5,6 @@ from extremes.fuzz import FOUND, fuzz
 from extremes.laws import COMPILED
 
 
-@pytest.fixture(autouse=True)
-def replays(tmp_path, monkeypatch):
-    monkeypatch.setenv("JOINTLAW_REPLAY_DIR", str(tmp_path))
-
-
 @pytest.mark.parametrize("seed", FOUND)
 def test_what_was_found_stays_mended(seed):
     assert fuzz(seed) == []

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw import baselines, datasets, unloading
+from jointlaw.calibration import baselines, datasets, unloading
 from jointlaw.calibration.fit import fit_closure
 from jointlaw.calibration.forward import DEFAULTS, Settings, log_stress
 from jointlaw.calibration.measured import first_loading

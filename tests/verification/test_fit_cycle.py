@@ -7,8 +7,8 @@ import pytest
 from scipy.integrate import trapezoid
 
 import jointlaw as jl
-from jointlaw import datasets
-from jointlaw.calibration.measured import ClosureCurve
+from jointlaw.calibration import datasets, unloading
+from jointlaw.calibration.measured import ClosureCurve, first_loading
 
 FREE = ("asperity_density", "alpha", "beta", "yield_interference")
 
@@ -94,14 +94,14 @@ def cycles():
 
 def test_every_cycle_is_compared_with_the_law(cycles):
     law, stress, closure = cycles
-    loops = jl.unloading.explain_each(law, stress, closure, steps=40)
+    loops = unloading.explain_each(law, stress, closure, steps=40)
     assert [loop.top for loop in loops] == pytest.approx([5e6, 10e6, 7e6])
     for loop in loops:  # the same law: only the steps differ, and the trapezoids over them
         assert loop.friction == pytest.approx(loop.measured, abs=0.01)
         assert loop.law_closure == pytest.approx(loop.open_closure, abs=2e-7)
     assert loops[2].measured < 0.03 < loops[0].measured < loops[1].measured  # reloading is elastic
-    assert jl.unloading.explain(law, stress, closure, steps=40) == loops[0]
-    text = jl.unloading.summed_up(loops)
+    assert unloading.explain(law, stress, closure, steps=40) == loops[0]
+    text = unloading.summed_up(loops)
     assert "| 3 | 7 |" in text
     assert "cannot tell yielding from" in text
 
@@ -109,7 +109,7 @@ def test_every_cycle_is_compared_with_the_law(cycles):
 def test_cycles_turn_where_the_stress_does_and_not_where_it_scatters(cycles):
     _, stress, closure = cycles
     wave = stress + 0.01 * stress * (-1) ** np.arange(stress.size)
-    up, _, down, _ = jl.first_loading(wave, closure)
+    up, _, down, _ = first_loading(wave, closure)
     assert (up.size, down.size) == (21, 21)
     with pytest.raises(ValueError, match="after point 20"):
         ClosureCurve(stress[:61], closure[:61])  # up to its largest stress, but not at first

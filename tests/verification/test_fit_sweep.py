@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jointlaw import datasets
+from jointlaw.calibration import datasets
 from jointlaw.calibration.fit import fit_closure, fit_many
 from jointlaw.calibration.measured import first_loading
 

@@ -127,7 +127,7 @@ def test_closure_only_is_refused_where_joints_shear(tmp_path):
 
 def test_closure_only_in_files_snapshots_and_tests():
     law = random_law(4, closure_only=True)
-    assert jl.JointLaw.from_toml(law.to_toml()) == law
+    assert jl.JointLaw.from_text(law.to_toml()) == law
     joint, full = law.joint(), replace(law, closure_only=False).joint()
     mine, theirs = (jl.closure_test(j, 0.3, steps=10) for j in (joint, full))
     assert np.abs(mine.F1 - theirs.F1).max() < EXACT

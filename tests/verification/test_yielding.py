@@ -1,5 +1,8 @@
 """Asperities that yield and wear: closed form in closure, and the slow bed in shear."""
 
+import dataclasses
+import warnings
+
 import numpy as np
 import pytest
 from builders import increments, law, random_corners, slow_heights
@@ -143,3 +146,19 @@ def test_tangent(state, option, plane):
     assert least < 1e-8
     joint.update(d)
     assert (joint.plastic_work > before) is ("yield" in state)
+
+
+def test_a_joint_closed_beyond_its_highest_asperity_gives_a_warning():
+    """99.99 % of the heights of this preset end at a closure of 17.1 mm."""
+    stiff = jl.presets.load("jing-replica")
+    asperity = dataclasses.replace(stiff.asperity, yield_interference=0.1 * stiff.closure_range)
+    weak = dataclasses.replace(stiff, asperity=asperity)
+    assert weak.closure(30e6) == pytest.approx(17.6e-3, rel=1e-3)
+    with pytest.warns(UserWarning, match="closure = 0.0176 m: 99.99 % .* law ends"):
+        joint = weak.joint(30e6)
+    with pytest.warns(UserWarning, match="law ends"):
+        jl.direct_shear(joint, 1e-3, normal=30e6, steps=5)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        weak.joint(10e6)
+        stiff.joint(30e6)

@@ -25,7 +25,7 @@ def random_law(rng, held, wears, front=False):
     # the printed heights are convex as a population from eta = 0.287
     eta = rng.uniform(0.3, 1.0) if formation == "population" else rng.choice([0.0, 0.5, 1.0])
     damage = {"yield_interference": 10.0 ** rng.uniform(-2.5, 0.5)}
-    if wears:
+    if wears and mu > 0.0:
         damage |= {"mu_residual": mu * rng.random(), "wear_slip": 10.0 ** rng.uniform(-2.0, 0.5)}
     return law(
         a=a, b=b, c=rng.uniform(-1.0, 1.0) * (1 / 3 - b / 6), lam=rng.uniform(0.3, 2.0),

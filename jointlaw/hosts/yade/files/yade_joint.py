@@ -99,14 +99,14 @@ class LiveLaw:
     def state(self):
         """Arrays to save."""
         state = self.pool.snapshot()
-        return {"fingerprint": state.fingerprint, "values": state.values}
+        return {"fingerprint": state.fingerprint, "values": state.values.T}
 
     def restore(self, data):
         """State from such arrays."""
-        from jointlaw import JointState
+        from jointlaw.joints.state import JointState
 
         self.came = data["values"].shape[1]
-        self.pool.restore(range(self.came), JointState(str(data["fingerprint"]), data["values"]))
+        self.pool.restore(range(self.came), JointState(str(data["fingerprint"]), data["values"].T))
         self.find()
 
 

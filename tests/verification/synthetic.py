@@ -1,10 +1,8 @@
-"""Surfaces whose asperities are known: to try a scan on, and to test what is read from it."""
+"""Surfaces whose asperities are known, to test what is read from a scan."""
 
 import numpy as np
 
-from ..parameters.heights import GammaHeights
-from ..parameters.orientation import Orientation
-from ..support.checks import Array, above, at_least, whole
+from jointlaw import GammaHeights, Orientation
 
 
 def synthetic_surface(
@@ -17,7 +15,7 @@ def synthetic_surface(
     samples: int = 20,
     noise: float = 0.0,
     seed: int = 0,
-) -> Array:
+) -> np.ndarray:
     """Heights (rows*samples, columns*samples) in m of a surface drawn from the law's densities.
 
     Every square of `samples` x `samples` points carries one asperity at a random place near its
@@ -31,8 +29,6 @@ def synthetic_surface(
         asperity along either axis, >= 14; noise: standard deviation of a height in m.
     seed: of the random numbers.
     """
-    samples = whole("samples", samples, 14)
-    spacing, noise = above("spacing", spacing, 0.0), at_least("noise", noise, 0.0)
     rng = np.random.default_rng(seed)
     z = np.empty((rows * samples, columns * samples))
     depth = rng.gamma(heights.alpha + 1, heights.beta, (rows, columns))
@@ -55,7 +51,7 @@ def synthetic_surface(
 
 def draw_directions(
     orientation: Orientation, n: int, rng: np.random.Generator
-) -> tuple[Array, Array]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Inclinations and azimuths (n,) in rad drawn from Eq. 14, by rejection in u = cos(a theta)."""
     b, c = orientation.b, orientation.c
     highest = 1 + max(b, -b / 2) + 3 * abs(c)

@@ -212,9 +212,17 @@ class Fit:
                 x, measured, what = curve.closure, curve.stress, "closure since the test began"
                 u = np.linspace(x.min(), x.max() if held_out is None else held_out[1].max(), 100)
                 low, high = self.band(u)
-                axis.fill_between(1e6 * u, low / 1e6, high / 1e6, color="C1", alpha=0.25)
+                axis.fill_between(
+                    1e6 * u,
+                    low / 1e6,
+                    high / 1e6,
+                    color="C1",
+                    alpha=0.25,
+                    label="95 % band of the law",
+                )
                 if held_out is not None:
-                    axis.plot(1e6 * held_out[1], held_out[0] / 1e6, "oC0", mfc="w", ms=4)
+                    held = 1e6 * held_out[1], held_out[0] / 1e6
+                    axis.plot(*held, "oC0", mfc="w", ms=4, label="measured, not fitted")
                 u = x if curve.cycle else u
                 law = np.exp(log_stress(values, values["seating"] + u, settings))
             else:

@@ -45,6 +45,7 @@ def extract(z: Array, spacing: float, samples: int) -> Asperities:
     """
     z, length = _levelled(z), samples * spacing
     summits = _summits(z, samples)
+    _require_several(len(summits), length)
     quadrants = np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)])
     gradient, misfit, moment = _planes(z, summits, quadrants, samples)
     gradient = gradient / spacing
@@ -56,11 +57,7 @@ def extract(z: Array, spacing: float, samples: int) -> Asperities:
     fall = -np.einsum("qnd,qd->qn", gradient, quadrants) / np.sqrt(2)
     kept = np.maximum(np.sum(keep, axis=0), 1)
     hill = np.sum(fall * keep, axis=0) > 6 * noise * np.sqrt(kept)
-    if hill.sum() < FEWEST:
-        raise ValueError(
-            f"z has {hill.sum()} summits at a sampling length of {length:g} m: at least {FEWEST} "
-            "are needed; scan a larger area or change sampling_length"
-        )
+    _require_several(int(hill.sum()), length)
     for first, second in combinations(range(4), 2):
         apart = np.max(np.abs(gradient[first] - gradient[second]), axis=-1)
         keep[second] &= ~(keep[first] & (apart < 3 * np.sqrt(2) * noise))
@@ -72,6 +69,14 @@ def extract(z: Array, spacing: float, samples: int) -> Asperities:
     return Asperities(
         height.max() - height, gradient[keep], summit, noise, len(summits) / area, length, summits
     )
+
+
+def _require_several(summits: int, length: float) -> None:
+    if summits < FEWEST:
+        raise ValueError(
+            f"z has {summits} summits at a sampling length of {length:g} m: at least {FEWEST} are "
+            "needed; scan a larger area or change sampling_length"
+        )
 
 
 def _summits(z: Array, samples: int) -> NDArray[np.intp]:

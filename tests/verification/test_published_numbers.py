@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from builders import law
-from scipy.integrate import quad
 from scipy.optimize import bisect
 
 import jointlaw as jl
@@ -51,28 +50,6 @@ def test_first_separation(a):
     exact = 1.0 / np.tan(np.pi / (2.0 * a))
     # the outermost node lies 4e-5 in u and half an azimuth, 3e-5, inside the rim
     assert bisect(parted, 0.5 * exact, 2.0 * exact, xtol=1e-7) == pytest.approx(exact, rel=1e-4)
-
-
-@pytest.mark.parametrize(("a", "degrees"), [(3.0, 19.1), (6.0, 9.5)])
-def test_mean_inclination(a, degrees):
-    for b in (-1.0, 0.0, 1.3):
-        o = jl.Orientation(a, b, 0.1)
-
-        def moment(power, o=o):
-            def ring(theta):  # cos 2 phi averages out over 8 azimuths
-                azimuths = np.arange(8) * np.pi / 4
-                density = np.mean([o.density(theta, phi) for phi in azimuths])
-                return 2 * np.pi * np.sin(theta) * theta**power * density
-
-            return quad(ring, 0.0, np.pi / (2 * a), epsabs=1e-13)[0]
-
-        mean = (6.0 - b) / (6.0 * a)  # Eq. 17
-        variance = (36 * np.pi - 108 + 20 * b - 6 * b * np.pi - b * b) / (36 * a**2)
-        assert moment(0) == pytest.approx(1.0, abs=1e-11)  # Eq. 15
-        assert moment(1) == pytest.approx(mean, abs=1e-11)
-        assert moment(2) - mean**2 == pytest.approx(variance, abs=1e-11)
-        assert (o.mean, o.variance) == pytest.approx((mean, variance), abs=1e-14)
-    assert np.degrees(jl.Orientation(a, 0.0, 0.0).mean) == pytest.approx(degrees, abs=0.05)
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.2, 0.5])

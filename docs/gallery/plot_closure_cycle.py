@@ -12,6 +12,7 @@ import numpy as np
 from scipy.integrate import trapezoid
 
 import jointlaw as jl
+from jointlaw.calibration import datasets
 
 # %%
 # The law is that of ``jointlaw fit grimsel_vd1_closure --cycle``: one length, the yield
@@ -25,7 +26,7 @@ law = jl.JointLaw(
     closure_only=True,
 )
 elastic = replace(law, asperity=replace(law.asperity, yield_interference=np.inf))
-stress, closure = jl.datasets.load("grimsel_vd1_closure")
+stress, closure = datasets.load("grimsel_vd1_closure")
 seating = 70.4e-6  # m, closure of the law where the test began
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")

@@ -85,7 +85,7 @@ SHEAR_STRESS = Asked(
     "shear stress", "Pa", ("shear_stress", "tau", "τ", "f2"), "--shear-stress-column"
 )
 NORMAL = Asked(
-    "normal stress (of a test without that column: --normal-stress)", "Pa",
+    "normal stress (or give it: --normal-stress 1MPa)", "Pa",
     ("normal_stress", "sigma_n", "σn", "σ_n", "sigma", "sn", "f1"),
     "--normal-column",
 )  # fmt: skip

@@ -19,12 +19,16 @@ def add(commands: Any) -> None:
     parser.description = f"{what}. Give the composite surface of both sides."
     parser.add_argument("file", help="a matrix of heights, CSV or NPY")
     parser.add_argument("--spacing", required=True, help="of the points, such as 20um")
-    parser.add_argument("--height-unit", required=True, help="of the heights, such as um")
+    parser.add_argument("--height-unit", help="of the heights, such as um")
     parser.add_argument("--sampling-length", help="edge of a facet (default 4 spacings)")
     add_out(parser, pictures=False)
 
 
 def _run(options: argparse.Namespace) -> None:
+    if options.height_unit is None:
+        raise ValueError(
+            f"{options.file}: gives no unit of its heights; name it, such as --height-unit um"
+        )
     z = read_scan(options.file, quantity("--height-unit", f"1{options.height_unit}", "m"))
     spacing = quantity("--spacing", options.spacing, "m")
     fit = from_surface(z, spacing, given(options, "sampling_length", "m"))

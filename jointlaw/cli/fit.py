@@ -125,8 +125,11 @@ def _run(options: argparse.Namespace) -> None:
             f"{100 * np.sqrt(np.mean(error**2)):.1f} % (rms) over all of them.\n"
         )
     print(text)
-    picture = partial(fit.plot, held_out=held)
-    files: Written = {"fit.png": picture, "law.toml": fit.law.to_toml, "report.md": text}
+    files: Written = {
+        "fit.png": partial(fit.plot, held_out=held),
+        "law.toml": fit.law.to_toml,
+        "report.md": text,
+    }
     write_results(options.out, files, summary, options.format)
 
 
@@ -162,8 +165,10 @@ def _shear_curves(options: argparse.Namespace) -> list[ShearCurve]:
     """The shear curves of all files, thinned to `MOST` points each."""
     normals: list[float | None] = [None] * len(options.shear)
     if options.normal_stress:
-        texts = options.normal_stress.split(",")
-        normals = [quantity("--normal-stress", text, "Pa", positive=True) for text in texts]
+        normals = [
+            quantity("--normal-stress", text, "Pa", positive=True)
+            for text in options.normal_stress.split(",")
+        ]
     if len(normals) != len(options.shear):
         raise ValueError(
             f"--normal-stress gives {len(normals)} stresses for {len(options.shear)} shear tests: "

@@ -13,10 +13,9 @@ from .command import Written, add_command, add_out, given, quantity, write_resul
 
 def add(commands: Any) -> None:
     """Add `scan` to the subparsers of the command line."""
-    what = "read heights, directions and number of asperities off a scanned surface"
+    what = "read heights, directions and number of asperities off a composite surface"
     example = "jointlaw scan scan.csv --spacing 20um --height-unit um --out out"
     parser = add_command(commands, "scan", what, example, _run)
-    parser.description = f"{what}. Give the composite surface of both sides."
     parser.add_argument("file", help="a matrix of heights, CSV or NPY")
     parser.add_argument("--spacing", required=True, help="of the points, such as 20um")
     parser.add_argument("--height-unit", help="of the heights, such as um")
@@ -30,11 +29,11 @@ def _run(options: argparse.Namespace) -> None:
             f"{options.file}: gives no unit of its heights; name it, such as --height-unit um"
         )
     z = read_scan(options.file, quantity("--height-unit", f"1{options.height_unit}", "m"))
-    spacing = quantity("--spacing", options.spacing, "m")
-    fit = from_surface(z, spacing, given(options, "sampling_length", "m"))
+    fit = from_surface(
+        z, quantity("--spacing", options.spacing, "m"), given(options, "sampling_length", "m")
+    )
     require_rock(fit.parameters, f"{Path(options.file).name}: the fitted ")
-    text = fit.report()
-    print(text)
+    print(fit.report())
     summary = {
         "parameters_SI": fit.parameters,
         "standard_error_SI": fit.standard_error,
@@ -42,7 +41,10 @@ def _run(options: argparse.Namespace) -> None:
         "identifiable": list(fit.identifiable),
         "not_identifiable": fit.not_identifiable,
     }
-    files: Written = {"surface.toml": _toml(fit, Path(options.file).name), "report.md": text}
+    files: Written = {
+        "surface.toml": _toml(fit, Path(options.file).name),
+        "report.md": fit.report(),
+    }
     write_results(options.out, files, summary, "")
 
 

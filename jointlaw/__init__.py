@@ -82,15 +82,18 @@ _MOVED = {
     "Secant": "jointlaw.paper.secant.Secant",
     "ShearCurve": "jointlaw.calibration.measured.ShearCurve",
     "SurfaceFit": "jointlaw.surface.fit.SurfaceFit",
-    "baselines": "jointlaw.calibration.baselines",
     "datasets": "jointlaw.calibration.datasets",
     "first_loading": "jointlaw.calibration.measured.first_loading",
-    "fit_many": "jointlaw.calibration.fit.fit_many",
     "hydraulic_aperture": "jointlaw.laboratory.flow.hydraulic_aperture",
     "include_dir": "jointlaw.hosts.c.export.include_dir",
-    "synthetic_surface": "jointlaw.surface.synthetic.synthetic_surface",
     "transmissivity": "jointlaw.laboratory.flow.transmissivity",
-    "unloading": "jointlaw.calibration.unloading",
+}
+# Names that were removed, and what to use
+_REMOVED = {
+    "baselines": "docs/measure/held_out.py fits a power law and Barton-Bandis",
+    "fit_many": "map jl.fit_closure over the curves with any concurrent.futures.Executor",
+    "synthetic_surface": "docs/gallery/plot_from_scan.py makes a surface in ten lines",
+    "unloading": "jl.fit_closure(stress, closure, cycle=True) fits and reports unloading",
 }
 
 
@@ -99,6 +102,8 @@ def __getattr__(name: str) -> Any:
         return getattr(import_module(f".{_LATER[name]}", __name__), name)
     if name in _MOVED:
         raise AttributeError(f"jointlaw.{name} is no public name any more: use {_MOVED[name]}")
+    if name in _REMOVED:
+        raise AttributeError(f"jointlaw.{name} was removed: {_REMOVED[name]}")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

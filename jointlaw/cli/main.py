@@ -27,6 +27,8 @@ REMOVED = {
     "tests/verification/test_paper_*.py",
     "closure --yield-interference": _YIELDING,
     "shear --yield-interference": _YIELDING,
+    "fit --workers": "fit one closure file a command",
+    "fit --formation": "give a law of that formation, such as --law westerly-smooth",
     "export --closure": _TABLE,
     "export --tolerance": _TABLE,
     "tradeoff --loss": "small cycles need more depth cells: write resolution = { u = 3, phi = 6, "

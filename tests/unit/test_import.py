@@ -62,3 +62,9 @@ def test_a_name_of_former_versions_says_what_to_use(name):
     assert "\n" not in str(error.value)
     assert not hasattr(jl, name)
     pkgutil.resolve_name(jl._MOVED[name])  # and that is true
+
+
+@pytest.mark.parametrize("name", jl._REMOVED)
+def test_a_name_that_was_removed_says_what_to_use(name):
+    with pytest.raises(AttributeError, match=f"{name} was removed: "):
+        getattr(jl, name)

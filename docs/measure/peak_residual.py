@@ -1,6 +1,6 @@
 """Peak and residual shear stress of sandstone joints: a law with wear fitted to three tests.
 
-    python benchmarks/peak_residual.py
+    python docs/measure/peak_residual.py
 
 Direct shear to 10 mm of profile JA, dry (Mendeley Data, doi 10.17632/g5pf6k9n2w, as parsed by
 ybfo/RockJointNet). Fitted are the tests at 1, 3 and 5 MPa, predicted those at 2 and 4 MPa: peak,

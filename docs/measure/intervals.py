@@ -1,6 +1,6 @@
 """How often the 95 % intervals of a fit hold the truth: synthetic tests with noise, fitted again.
 
-    python benchmarks/intervals.py --draws 50 --seeds 2
+    python docs/measure/intervals.py --draws 50 --seeds 2
 
 For closure alone, shear alone, shear along two directions, and closure with shear: in how many
 draws the interval of each parameter held the value that made the curve, and in how many the report
@@ -19,6 +19,8 @@ from functools import partial
 import numpy as np
 
 import jointlaw as jl
+from jointlaw.calibration.fit import Fit
+from jointlaw.calibration.measured import ClosureCurve, ShearCurve
 from jointlaw.parameters.resolution import SLIP
 from jointlaw.support.progress import track
 
@@ -43,39 +45,39 @@ def law(**change: float) -> jl.JointLaw:
     )
 
 
-def closure_curve(rng: np.random.Generator) -> jl.ClosureCurve:
+def closure_curve(rng: np.random.Generator) -> ClosureCurve:
     """A closure test of the truth, from 0.25 MPa."""
     y = law().closure(STRESS)
-    return jl.ClosureCurve(STRESS * (1 + NOISE * rng.standard_normal(y.size)), y - y[0])
+    return ClosureCurve(STRESS * (1 + NOISE * rng.standard_normal(y.size)), y - y[0])
 
 
-def shear_curve(rng: np.random.Generator, azimuth: float = 0.0) -> jl.ShearCurve:
+def shear_curve(rng: np.random.Generator, azimuth: float = 0.0) -> ShearCurve:
     """A shear test of the truth at constant normal stress."""
-    clean = jl.ShearCurve(SHEAR, np.ones(SHEAR.size), NORMAL, azimuth)
+    clean = ShearCurve(SHEAR, np.ones(SHEAR.size), NORMAL, azimuth)
     tau = clean.predict(replace(law(), plane=azimuth))
-    return jl.ShearCurve(
+    return ShearCurve(
         SHEAR, tau + NOISE * tau.max() * rng.standard_normal(tau.size), NORMAL, azimuth
     )
 
 
-def closure(rng: np.random.Generator) -> jl.Fit:
+def closure(rng: np.random.Generator) -> Fit:
     """Closure alone, alpha known from a scan."""
     curve = closure_curve(rng)
     return jl.fit_curves([curve], fixed={"alpha": ALPHA}, free=("asperity_density", "beta"))
 
 
-def shear(rng: np.random.Generator) -> jl.Fit:
+def shear(rng: np.random.Generator) -> Fit:
     """One direction of shear."""
     return jl.fit_curves([shear_curve(rng)], law=law(mu=0.6, a=2.6), free=("mu", "a"))
 
 
-def two_shears(rng: np.random.Generator) -> jl.Fit:
+def two_shears(rng: np.random.Generator) -> Fit:
     """Shear along the rough direction and across it."""
     curves = [shear_curve(rng), shear_curve(rng, np.pi / 2)]
     return jl.fit_curves(curves, law=law(mu=0.6, a=2.6, c=0.0), free=("mu", "a", "c"))
 
 
-def closure_and_shear(rng: np.random.Generator) -> jl.Fit:
+def closure_and_shear(rng: np.random.Generator) -> Fit:
     """Both tests of one joint, alpha known from a scan."""
     return jl.fit_curves(
         [closure_curve(rng), shear_curve(rng)],
@@ -84,7 +86,7 @@ def closure_and_shear(rng: np.random.Generator) -> jl.Fit:
     )
 
 
-CASES: dict[str, Callable[[np.random.Generator], jl.Fit]] = {
+CASES: dict[str, Callable[[np.random.Generator], Fit]] = {
     "closure": closure,
     "shear": shear,
     "two shears": two_shears,

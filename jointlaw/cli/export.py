@@ -68,4 +68,4 @@ def _export_yade(law: JointLaw, options: argparse.Namespace) -> None:
     print(f"its friction angle at the shear limit is {missed:.2g} degrees off that of finer nodes")
     print("what the table drops (error against the law, share of each path's largest traction):")
     print(table.report(law))
-    print(f"run: cd {options.out} && yade -n -x direct_shear.py")
+    print(f"run: cd {options.out} && yade -n -x settle_and_incline.py")

@@ -1,4 +1,4 @@
-"""Rock joints on the contacts of a YADE simulation. Needs YADE, numpy and `table_law.py`.
+"""Rock joints on the contacts of a YADE simulation. Needs YADE, numpy and `joint_table.py`.
 
     from yade_joint import Joints, TableLaw     # both files in the script's folder (on sys.path)
     joints = Joints(TableLaw("joint.txt"))      # or Joints(LiveLaw(law)), law a jointlaw.JointLaw
@@ -18,11 +18,8 @@ SI units: m, Pa, N, s, kg.
 
 # ruff: noqa: B905 (runs on older Python too)
 
-import gc
-import warnings
-
 import numpy as np
-from table_law import TableLaw, between
+from joint_table import load_table
 from yade import FrictPhys, O, PyRunner, Quaternion, ScGeom, Sphere, Vector3
 
 assert Quaternion((0, 0, 1), 0.0).__getinitargs__() == (1.0, 0.0, 0.0, 0.0)  # w first
@@ -42,7 +39,47 @@ def run(name):
     _running[name].step()
 
 
-# -------------------------------------------------------------- the live law
+# ------------------------------------------------------- the law behind the contacts
+
+
+class TableLaw:
+    """The law's table, a text file: normal stress by closure, elastic-frictional shear."""
+
+    mode = "table"
+
+    def __init__(self, path):
+        self.table = load_table(path)
+        self.f = np.zeros((2, 0))  # shear traction in the frames of the contacts
+        self.K = np.zeros((3, 0))  # shear stiffness K22, K33, K23 of the last step
+
+    def stiffness(self, closure=None):
+        """Largest stiffness (Pa/m) of the table."""
+        t = self.table
+        return float(max(t.kn_tangent.max(), t.kn_secant.max(), t.shear_stiffness.max()))
+
+    def step(self, d, closure, spin):
+        """Tractions (3, n) after increments d (3, n); spin (n,) turns the old shear traction."""
+        F, self.K = self.table.step(self.f, self.K, d, closure, spin)
+        self.f = F[1:]
+        return F
+
+    def add(self, closure):
+        """Contacts that came: unsheared joints at this closure (m)."""
+        row, w, _ = self.table.at(closure)
+        self.f = np.concatenate([self.f, np.zeros((2, len(closure)))], axis=1)
+        self.K = np.concatenate([self.K, self.table.shear_matrix(row, w)], axis=1)
+
+    def keep(self, mask):
+        """Forget the contacts where `mask` is False."""
+        self.f, self.K = self.f[:, mask], self.K[:, mask]
+
+    def state(self):
+        """Arrays to save."""
+        return {"f": self.f, "K": self.K}
+
+    def restore(self, data):
+        """Take up such arrays."""
+        self.f, self.K = data["f"], data["K"]
 
 
 class LiveLaw:
@@ -53,6 +90,8 @@ class LiveLaw:
     made in touch only. The memory turns with body id1. `ledger` adds up the energy that friction
     takes, for `batch.dissipated_energy`, at some cost.
     """
+
+    mode = "live"
 
     def __init__(self, law, ledger=False):
         if law.plane is not None:
@@ -102,11 +141,12 @@ class LiveLaw:
         return {"fingerprint": state.fingerprint, "values": state.values}
 
     def restore(self, data):
-        """State from such arrays."""
+        """Take up such arrays. Raises ValueError if another law wrote them."""
         from jointlaw import JointState
 
-        self.came = data["values"].shape[1]
-        self.pool.restore(range(self.came), JointState(str(data["fingerprint"]), data["values"]))
+        state = JointState(str(data["fingerprint"]), data["values"])
+        self.pool.restore(range(len(state)), state)
+        self.came = len(state)
         self.find()
 
 
@@ -129,28 +169,20 @@ class Joints:
     plane: None, or the joint's normal in the axes of body id1: contacts then act as pieces of one
         flat joint (a "smooth joint") whatever the direction between the two spheres.
     mated: closure counts from the position in which the contact is first seen, not from touch.
-    lagged: instead of adding forces, rewrite kn, ks and friction of YADE's own contact, which acts
-        one step late: isotropic, and it creates energy, so that NewtonIntegrator needs a
-        damping of 0.7 O.dt/sqrt(m/k) or more (TableLaw only; measured in docs/yade.md).
     forget: with neverErase, contacts without force open by more than this (m) are given up.
     """
 
     def __init__(self, law, area=None, select=None, azimuth=(1, 0, 0), plane=None, mated=False,
-                 lagged=False, forget=np.inf, name="joints"):  # fmt: skip
+                 forget=np.inf, name="joints", lagged=False):  # fmt: skip
         if not name.isidentifier():
             raise ValueError(f"name = {name!r} must be a Python identifier: it labels the engine")
-        if lagged and not isinstance(law, TableLaw):
-            raise ValueError("lagged = True needs a TableLaw: a live law has no kn and ks")
-        if lagged and (plane is not None or mated or forget < np.inf):
-            raise ValueError(
-                "lagged = True leaves the force to YADE's own contact, which knows no plane, mated "
-                "or forget: leave them out, or lagged"
-            )
+        if lagged:
+            raise ValueError("lagged = True is gone, because it created energy: leave it out")
         self.law, self.select, self.name = law, select, name
         self.area = area if area is None or callable(area) else float(area)
         self.azimuth = unit(np.array(azimuth, float))
         self.plane = None if plane is None else unit(np.array(plane, float))
-        self.mated, self.lagged, self.forget = mated, lagged, forget
+        self.mated, self.forget = mated, forget
         self.attached = False
         self._clear()
         _running[name] = self
@@ -160,16 +192,16 @@ class Joints:
                   for key in PER_CONTACT}  # fmt: skip
         self.c.update({key: np.zeros((3, 0)) for key in VECTORS})
         self.own, self.others = [], []  # interactions that are joints, and that are not
-        self.odd = []  # (place, geom) of joints that are not between two spheres
         self.states, self.ids, self.index = [], [], {}  # bodies with joints
         self.x, self.q = np.zeros((3, 0)), np.zeros((4, 0))
-        self.last, self.waiting = None, None
+        self.last = None  # O.iter of the last step
+        self.loaded = None  # contacts that are no joints, of a state that waits for its scene
         self.bodies = len(O.bodies)
 
     @property
     def F(self):
         """Tractions (3, n) of the last step in the contacts' frames, Pa."""
-        return self._own_forces()["F"]
+        return self.c["F"]
 
     def __len__(self):
         return len(self.c["made"])
@@ -183,8 +215,6 @@ class Joints:
         if "InteractionLoop" not in kinds:
             raise ValueError("O.engines has no InteractionLoop; set O.engines before attach()")
         if any(e.label == f"joint_{self.name}" for e in engines):
-            if self.attached or self.waiting is not None:
-                return
             raise ValueError(
                 f"name = {self.name!r} is taken in O.engines: give another name=, or call "
                 ".load(file) instead of .attach() to continue a saved run"
@@ -195,15 +225,9 @@ class Joints:
             raise ValueError(
                 "GlobalStiffnessTimeStepper sees kn = 0: remove it, set O.dt = joints.time_step()"
             )
-        if self.lagged:
-            warnings.warn(
-                "lagged=True acts one step late and creates energy: amplitudes grow without "
-                "NewtonIntegrator(damping=...) of at least 0.7 O.dt/sqrt(m/k); k = area*kn_tangent",
-                stacklevel=2,
-            )
-        at, needs_all = kinds.index("InteractionLoop"), not isinstance(self.law, TableLaw)
+        at = kinds.index("InteractionLoop")
         for law2 in engines[at].lawDispatcher.functors:
-            if needs_all and not getattr(law2, "neverErase", True):
+            if self.law.mode == "live" and not getattr(law2, "neverErase", True):
                 raise ValueError(
                     f"{type(law2).__name__}.neverErase = False: YADE would drop joints that dilate;"
                     " set neverErase=True (and forget= here, so that open contacts are given up)"
@@ -226,24 +250,21 @@ class Joints:
         function, only contacts tell the areas: ValueError before there are any.
         """
         k, shortest = self.law.stiffness(closure), np.inf
-        place = np.concatenate([self.c["id1"], self.c["id2"]])
-        areas = np.tile(self.c["area"], 2)
+        if callable(self.area) and not len(self):
+            raise ValueError(
+                "area is a function, and no contact tells its values yet: call time_step() after "
+                "the first step, or give O.dt"
+            )
+        place, areas = np.concatenate([self.c["id1"], self.c["id2"]]), np.tile(self.c["area"], 2)
         count = np.bincount(place, minlength=len(O.bodies))
-        if callable(self.area):
-            if not len(areas):
-                raise ValueError(
-                    "area is a function, and no contact tells its values yet: call time_step() "
-                    "after the first step, or give O.dt"
-                )
-            total = np.bincount(place, areas, minlength=len(count))
-            largest = np.zeros(len(count))
-            np.maximum.at(largest, place, areas)
-            largest[count == 0] = areas.max()
+        total = np.bincount(place, areas, minlength=len(O.bodies))
+        largest = np.zeros(len(O.bodies))
+        np.maximum.at(largest, place, areas)
         for body in O.bodies:
             if body is None or not isinstance(body.shape, Sphere) or body.state.mass <= 0:
                 continue
             if callable(self.area):
-                carried = max(6 * largest[body.id], total[body.id])
+                carried = max(6 * (largest[body.id] or areas.max()), total[body.id])
             else:
                 one = np.pi * body.shape.radius**2 if self.area is None else self.area
                 carried = one * max(6, count[body.id])
@@ -258,9 +279,7 @@ class Joints:
     def step(self):
         """Advance all joints; the PyRunner calls this once per step."""
         now = O.iter
-        if self.waiting is not None:
-            self._resume()
-        elif self.last is None and not self.attached:
+        if self.last is None and not self.attached:
             raise RuntimeError(
                 f"joints {self.name!r}: neither attached nor loaded. Call .load(file) to continue "
                 "a saved run. For new joints remove the engine joint_" + self.name + " from "
@@ -271,17 +290,13 @@ class Joints:
                 f"joints {self.name!r}: O.iter went from {self.last} to {now}. The adapter must "
                 "run in every step (iterPeriod=1); after O.load call .load(file)"
             )
-        collects = gc.isenabled()
-        gc.disable()  # thousands of small YADE handles are made and dropped: no cycles among them
-        try:
-            self._find(now)
-            if self.own:
-                self._rewrite() if self.lagged else self._act()
-            elif self.ids:
-                self.x, self.q = self._read()
-        finally:
-            if collects:
-                gc.enable()
+        if self.loaded is not None:
+            self._bind()
+        self._find(now)
+        if self.own:
+            self._act()
+        elif self.ids:
+            self.x, self.q = self._read()
         self.last = now
 
     def _act(self):
@@ -300,7 +315,7 @@ class Joints:
         du += (cross(w1, c1 + c["c1"]) - cross(w2, c2 + c["c2"])) / 2
         middle, across = unit(n + c["n"]), unit(t2 + c["t2"])
         d = np.array([closure - c["closure"], dot(du, across), dot(du, cross(middle, across))])
-        spin = self._spin(n, t2, w1 + w2) if isinstance(self.law, TableLaw) else None
+        spin = self._spin(n, t2, w1 + w2) if self.law.mode == "table" else None
         fresh = self.fresh
         if fresh.size:
             before = closure[fresh] - dot(du[:, fresh], n[:, fresh])
@@ -330,11 +345,12 @@ class Joints:
         length = np.sqrt(dot(r, r))
         n = r / length
         un = R1 + R2 - length
-        for k, geom in self.odd:
+        faces = [(k, self.own[k].geom) for k in np.flatnonzero(c["ball"] == 0).tolist()]
+        for k, geom in faces:
             n[:, k], un[k] = geom.normal.__getinitargs__(), geom.penetrationDepth
         c1 = n * (R1 - un / 2)
         c2 = c1 - r
-        for k, geom in self.odd:
+        for k, geom in faces:
             point = np.array(geom.contactPoint.__getinitargs__())
             c1[:, k], c2[:, k] = point - x[:, c["b1"][k]], point - x[:, c["b2"][k]]
         return n, un, c1, c2
@@ -382,24 +398,6 @@ class Joints:
             forces.addF(k, f)
             forces.addT(k, t)
 
-    def _rewrite(self):
-        """The lagged option: what YADE's own law will use in the next step."""
-        c = self.c
-        x, q = self._read()
-        n, un, c1, c2 = self._geometry(x, q.take(c["b1"], axis=1))
-        closure = c["closure"] = un - c["zero"]
-        row, w, secant = self.law.at(np.maximum(closure, 0.0))
-        area, mu = c["area"], between(self.law.mu_mean, row, w)
-        kn, ks = area * secant, area * between(self.law.kt, row, w)
-        fresh = self.fresh
-        if fresh.size:  # made with the stiffness of YADE's material: this step is put right
-            force = np.zeros((3, len(self.own)))
-            force[:, fresh] = -n[:, fresh] * (kn * np.maximum(closure, 0.0))[fresh]
-            force[:, fresh] -= self._take_back(fresh)
-            self._add(force, c1, c2)
-        for i, a, b, m in zip(self.own, kn.tolist(), ks.tolist(), mu.tolist()):
-            i.phys.kn, i.phys.ks, i.phys.tangensOfFrictionAngle = a, b, m
-
     # ---------------------------------------------------------------- contacts
 
     def _find(self, now):
@@ -433,17 +431,13 @@ class Joints:
                 new.append(i)
         self._keep(np.isin(np.arange(len(c["made"])), list(place)))
         self.own = [place[k] for k in sorted(place)]
-        self.odd = [(k, i.geom) for k, i in enumerate(self.own) if not self.c["ball"][k]]
         self.bodies = len(O.bodies)
         return new
 
     def _keep(self, mask):
         self.c = {key: value[..., mask] for key, value in self.c.items()}
         self.own = [i for i, keep in zip(self.own, mask) if keep]
-        number = np.cumsum(mask) - 1
-        self.odd = [(int(number[k]), geom) for k, geom in self.odd if mask[k]]
-        if not self.lagged:
-            self.law.keep(mask)
+        self.law.keep(mask)
 
     def _join(self, contacts):
         """New contacts: choose the joints among them and set up what stays constant."""
@@ -467,7 +461,6 @@ class Joints:
         new = dict(zip(("id1", "id2", "made", "R1", "R2", "ball", "area"), zip(*rows)))
         new["b1"], new["b2"] = ([self._body(k) for k in new[key]] for key in ("id1", "id2"))
         self._before()
-        self.odd += [(first + k, own[k].geom) for k in range(m) if not new["ball"][k]]
         for key, value in self.c.items():
             tail = np.zeros((*value.shape[:-1], m), value.dtype)
             tail[...] = new.get(key, 0)
@@ -541,8 +534,8 @@ class Joints:
 
     def save(self, path):
         """Write the adapter's state (NPZ): call it with every O.save, between two runs."""
-        if self.waiting is not None:
-            self._resume()
+        if self.loaded is not None:
+            self._bind()
         data = {f"contact_{key}": value for key, value in self.c.items()}
         data.update({f"law_{key}": value for key, value in self.law.state().items()})
         data["others"] = np.array([(i.id1, i.id2, i.iterMadeReal) for i in self.others], int)
@@ -551,7 +544,11 @@ class Joints:
             np.savez(file, version=VERSION, ids=self.ids, x=self.x, q=self.q, **data)
 
     def load(self, path):
-        """Take up a state that `save` wrote: call it after O.load, before the next step."""
+        """Take up a state that `save` wrote: call it after O.load, before the next step.
+
+        Raises ValueError for another version, for a state of live mode loaded into table mode or
+        the other way round, and for another live law; nothing is changed then.
+        """
         with np.load(path) as file:
             data = {key: file[key] for key in file.files}
         if data.get("version") != VERSION:
@@ -559,26 +556,32 @@ class Joints:
                 f"{path!r} has version {data.get('version')}, this adapter reads {VERSION}: start "
                 "the run anew, or go on with the yade_joint.py that saved it"
             )
-        self.waiting, self.last, self.attached = data, None, True
-
-    def _resume(self):
-        """Bind a loaded state to the contacts that YADE has now."""
-        data = self.waiting
-        self._clear()  # nothing waits any more
-        self.c = {key[8:]: value for key, value in data.items() if key.startswith("contact_")}
+        mode = "live" if "law_fingerprint" in data else "table"
+        if mode != self.law.mode:
+            law = {"live": "LiveLaw(law)", "table": 'TableLaw("joint.txt")'}[mode]
+            raise ValueError(
+                f"{path!r} was saved in {mode} mode, and these joints are in {self.law.mode} mode: "
+                f"create Joints({law}, ...) and load the file into them"
+            )
         self.law.restore({key[4:]: value for key, value in data.items() if key.startswith("law_")})
+        self._clear()
+        self.c = {key[8:]: value for key, value in data.items() if key.startswith("contact_")}
         self.ids, self.x, self.q = data["ids"].tolist(), data["x"], data["q"]
         self.index = {k: place for place, k in enumerate(self.ids)}
+        self.last = int(data["last"]) if data["last"] >= 0 else None
+        self.loaded, self.attached = data["others"], True
+
+    def _bind(self):
+        """Find the bodies of a loaded state and the contacts that are no joints, in this scene."""
+        other = {tuple(row) for row in self.loaded.reshape(-1, 3).tolist()}
         self.states = [O.bodies[k].state for k in self.ids]
-        other = {tuple(row) for row in data["others"].reshape(-1, 3).tolist()}
         contacts = O.interactions.all(True)
         self.others = [i for i in contacts if (i.id1, i.id2, i.iterMadeReal) in other]
-        self.own, self.bodies = [], -1  # makes _find compare by ids
-        self.last = int(data["last"]) if data["last"] >= 0 else None
+        self.loaded, self.bodies = None, -1  # _find then finds the joints by their ids
 
     def contacts(self):
         """Arrays: ids (n, 2), closure (n,), traction (n, 3) in Pa, normal (n, 3), area (n,)."""
-        c = self._own_forces()
+        c = self.c
         return {
             "ids": np.array([c["id1"], c["id2"]]).T, "closure": c["closure"].copy(),
             "traction": c["F"].T.copy(), "normal": c["n"].T.copy(), "area": c["area"].copy(),
@@ -586,18 +589,12 @@ class Joints:
 
     def write_back(self):
         """Show the joint forces in i.phys, for utils.getStress and such, until the next step."""
-        c = self._own_forces()
+        c = self.c
         F = c["F"]
         normal = (c["n"] * F[0] * c["area"]).T.tolist()
         shear = ((c["t2"] * F[1] + cross(c["n"], c["t2"]) * F[2]) * c["area"]).T.tolist()
         for i, a, b in zip(self.own, normal, shear):
             i.phys.normalForce, i.phys.shearForce = Vector3(*a), Vector3(*b)
-
-    def _own_forces(self):
-        """The contacts; with lagged=True YADE holds their forces."""
-        if self.lagged:
-            raise RuntimeError("lagged = True: YADE's own contacts hold the forces; read i.phys")
-        return self.c
 
 
 # ------------------------------------------------------- vectors and rotations

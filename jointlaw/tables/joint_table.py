@@ -131,6 +131,9 @@ class JointTable:
             tractions[k] = F[:, 0]
         return tractions
 
+    def plot(self, path: Any = None) -> None:
+        raise AttributeError("plot is gone: docs/gallery/plot_table.py draws a table by its arrays")
+
     # ---------------------------------------------- what a host calls in every step
 
     def step(
@@ -170,8 +173,8 @@ class JointTable:
         secant = between(self.kn_secant, row, w)
         past = closure > end
         if past.any():
-            stress = self.normal_stress[-1] + self.kn_tangent[-1] * (closure[past] - end)
-            secant[past] = stress / closure[past]
+            more = self.kn_tangent[-1] * (closure[past] - end)
+            secant[past] = (self.normal_stress[-1] + more) / closure[past]
         return row, w, secant
 
     def shear_matrix(self, row: NDArray[np.intp], w: Array) -> Array:
@@ -249,14 +252,12 @@ def load_table(path: str | Path) -> JointTable:
             )
         data = np.genfromtxt(path, names=True)
         angles = sorted(int(name[3:]) for name in data.dtype.names or () if name.startswith("kt_"))
-        held = {attribute: data[name].copy() for name, attribute in BY_CLOSURE.items()}
-        held |= {
+        held = {attribute: data[name].copy() for name, attribute in BY_CLOSURE.items()} | {
             attribute: np.array([data[f"{name}_{a:03d}"] for a in angles]).T
             for name, attribute in BY_AZIMUTH.items()
         }
         even = len(angles) > 2 and angles == [k * 180 // len(angles) for k in range(len(angles))]
-        finite = all(np.isfinite(values).all() for values in held.values())
-        if not (even and finite and (np.diff(data["un"]) > 0).all()):
+        if not (even and np.isfinite(data.tolist()).all() and (np.diff(data["un"]) > 0).all()):
             raise ValueError(
                 "un must increase, azimuths be three or more, evenly spaced over 180 degrees, and "
                 "all values finite"

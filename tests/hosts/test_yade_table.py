@@ -219,13 +219,6 @@ def test_a_saved_state_of_version_1_is_read(scenes):
     np.testing.assert_array_equal(resumed, unbroken)
 
 
-def test_a_mated_joint_begins_at_zero_closure(scenes):
-    """Where it is first seen, at an overlap of 1 mm; then 0.2 mm closer, on a linear table."""
-    first, second = scenes["mated"]
-    assert first == 0.0
-    assert second == pytest.approx(AREA * 1e8 * 0.2e-3, rel=1e-9)
-
-
 def test_refusals_name_the_remedy(scenes):
     """Set-ups that would give wrong forces are refused, each with what to do instead."""
     words = {
@@ -240,11 +233,15 @@ def test_refusals_name_the_remedy(scenes):
 
 
 def test_only_selected_contacts_are_joints(scenes):
-    """The other keeps YADE's own linear force; a body that is erased takes its joint along."""
+    """The other keeps YADE's own linear force; a body that is erased takes its joint along.
+
+    A mated joint begins at zero closure where it is first seen, here at an overlap of 1 mm.
+    """
     out, law = scenes["selected"], AREA * 1e8 * 1e-3
     assert out["forces"] == pytest.approx([law, 1e3 * 1e-3], rel=1e-6)
     assert out["shown"] == pytest.approx(out["forces"][0], rel=1e-9)
     assert out["left"] == [1, 0]
+    assert scenes["mated"] == pytest.approx([0.0, 0.2 * law], rel=1e-9)
 
 
 def test_exported_script_runs_without_jointlaw(jing):
@@ -257,12 +254,9 @@ def test_exported_script_runs_without_jointlaw(jing):
     assert float(settled.rsplit(" ", 1)[1]) < 1e-5
     lines = [line for line in text.splitlines() if line.startswith("azimuth")]
     assert [line.split(" deg: ")[2].split(" ")[0] for line in lines] == ["sticks", "slides"] * 3
-
-
-def test_a_mistyped_mode_is_an_error(jing):
-    text = run_yade(jing[0], "settle_and_incline.py", "lvie")
-    assert "lvie is unknown; write live, or nothing for the table" in text
-    assert "settled" not in text
+    mistyped = run_yade(jing[0], "settle_and_incline.py", "lvie")
+    assert "lvie is unknown; write live, or nothing for the table" in mistyped
+    assert "settled" not in mistyped
 
 
 ASK = """

@@ -22,8 +22,6 @@ import numpy as np
 from joint_table import load_table
 from yade import FrictPhys, O, PyRunner, Quaternion, ScGeom, Sphere, Vector3
 
-assert Quaternion((0, 0, 1), 0.0).__getinitargs__() == (1.0, 0.0, 0.0, 0.0)  # w first
-
 VERSION = 1  # of the files that `Joints.save` writes
 
 _running = {}  # name -> Joints: what the PyRunner of each adapter calls
@@ -94,14 +92,14 @@ class LiveLaw:
     mode = "live"
 
     def __init__(self, law, ledger=False):
-        if law.plane is not None:
-            raise ValueError("law.plane is set; contacts in YADE move in 3-D, give plane=None")
-        if law.closure_only:
-            raise ValueError("law.closure_only is set; contacts in YADE shear, set it to False")
+        if law.plane is not None or law.closure_only:
+            raise ValueError(
+                "contacts in YADE shear in 3-D: set law.plane=None, closure_only=False"
+            )
         from jointlaw import JointPool  # table mode does without
 
         self.law, self.pool = law, JointPool(law, ledger)
-        self.came = 0  # contacts so far: numbered as they came, which are the keys of the pool
+        self.numbered = 0  # contacts so far: the keys of the pool are their numbers
 
     @property
     def batch(self):
@@ -118,10 +116,10 @@ class LiveLaw:
 
     def add(self, closure):
         """Contacts that came: virgin joints at this closure (m; negative before touch)."""
-        first, self.came = self.came, self.came + len(closure)
+        first, self.numbered = self.numbered, self.numbered + len(closure)
         start = np.zeros((len(closure), 3))
         start[:, 0] = closure
-        new = self.pool.add(range(first, self.came))
+        new = self.pool.add(range(first, self.numbered))
         self.batch.update(start, where=new, tangent=False)
         self.find()
 
@@ -146,7 +144,7 @@ class LiveLaw:
 
         state = JointState(str(data["fingerprint"]), data["values"])
         self.pool.restore(range(len(state)), state)
-        self.came = len(state)
+        self.numbered = len(state)
         self.find()
 
 
@@ -235,9 +233,8 @@ class Joints:
         runner = PyRunner(
             command=f"import yade_joint; yade_joint.run({self.name!r})",
             iterPeriod=1, initRun=True, label=f"joint_{self.name}",
+            updateGlobals=False,  # else YADE writes the caller's local variables into the globals
         )  # fmt: skip
-        if hasattr(runner, "updateGlobals"):  # else YADE writes the caller's locals into globals
-            runner.updateGlobals = False
         engines.insert(at + 1, runner)
         O.engines = engines
         self.attached = True
@@ -294,12 +291,13 @@ class Joints:
             self._bind()
         self._find(now)
         if self.own:
-            self._act()
+            self._advance()
         elif self.ids:
             self.x, self.q = self._read()
         self.last = now
 
-    def _act(self):
+    def _advance(self):
+        """Displacements since the last step, the law's tractions, forces on the bodies."""
         c, x0, q0 = self.c, self.x, self.q
         x, q = self.x, self.q = self._read()
         b1, b2 = c["b1"], c["b2"]
@@ -327,8 +325,8 @@ class Joints:
         force = (n * F[0] + t2 * F[1] + cross(n, t2) * F[2]) * -c["area"]
         c.update(n=n, t2=t2, c1=c1, c2=c2, closure=closure, F=F)
         if fresh.size:
-            force[:, fresh] -= self._take_back(fresh)
-        self._add(force, c1, c2)
+            force[:, fresh] -= self._switch_off(fresh)
+        self._apply(force, c1, c2)
         if self.forget < np.inf:
             for k in np.flatnonzero((closure < -self.forget) & ~F.any(axis=0)):
                 O.interactions.erase(int(c["id1"][k]), int(c["id2"][k]))
@@ -362,7 +360,7 @@ class Joints:
         t2 = a - n * dot(a, n)
         size = np.sqrt(dot(t2, t2))
         steep = np.flatnonzero(size < 0.5)
-        if steep.size:  # rolled far from where it touched: take the reference anew, unturned
+        if steep.size:  # rolled so far that the reference nears the normal: go on with the last
             old = c["t2"][:, steep] - n[:, steep] * dot(c["t2"][:, steep], n[:, steep])
             t2[:, steep] = old
             size[steep] = np.sqrt(dot(old, old))
@@ -377,8 +375,8 @@ class Joints:
         twist = 2 * np.arctan(dot(both, w) / (4 * share + dot(w, cross(n0, n))))
         return twist + np.arctan2(dot(old, cross(n, t2)), dot(old, t2))
 
-    def _take_back(self, fresh):
-        """YADE's own force on id1 in the step that made the contact; off from now on."""
+    def _switch_off(self, fresh):
+        """Switch YADE's own force off; what it is on id1 in this step, which made the contact."""
         result = np.zeros((3, len(fresh)))
         for column, k in enumerate(fresh):
             phys = self.own[k].phys
@@ -387,7 +385,8 @@ class Joints:
             phys.shearForce = phys.normalForce = Vector3(0, 0, 0)
         return result
 
-    def _add(self, force, c1, c2):
+    def _apply(self, force, c1, c2):
+        """Add the forces on id1, their opposites on id2, and their torques to the bodies."""
         c, size = self.c, len(self.ids)
         torque1, torque2 = cross(c1, force), cross(force, c2)
         total = [np.bincount(c["b1"], f, size) - np.bincount(c["b2"], f, size) for f in force]
@@ -435,6 +434,7 @@ class Joints:
         return new
 
     def _keep(self, mask):
+        """Forget the contacts where `mask` is False."""
         self.c = {key: value[..., mask] for key, value in self.c.items()}
         self.own = [i for i, keep in zip(self.own, mask) if keep]
         self.law.keep(mask)
@@ -460,7 +460,7 @@ class Joints:
         self.own += own
         new = dict(zip(("id1", "id2", "made", "R1", "R2", "ball", "area"), zip(*rows)))
         new["b1"], new["b2"] = ([self._body(k) for k in new[key]] for key in ("id1", "id2"))
-        self._before()
+        self._add_bodies()
         for key, value in self.c.items():
             tail = np.zeros((*value.shape[:-1], m), value.dtype)
             tail[...] = new.get(key, 0)
@@ -514,8 +514,8 @@ class Joints:
             self.states.append(O.bodies[k].state)
         return self.index[k]
 
-    def _before(self):
-        """Where new bodies were one step ago, as their velocities say (YADE's leapfrog)."""
+    def _add_bodies(self):
+        """Positions of new bodies one step ago, from their velocities (YADE's leapfrog)."""
         x, q = [], []
         for state in self.states[self.x.shape[1] :]:
             angle = state.angVel.norm() * O.dt

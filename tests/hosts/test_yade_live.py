@@ -149,6 +149,7 @@ table, live, other = Joints(TableLaw("joint.txt")), Joints(LiveLaw(law)), Joints
 attempt("live into table", lambda: table.load("half-True.npz"))
 attempt("table into live", lambda: live.load("half-False.npz"))
 attempt("another law", lambda: other.load("half-True.npz"))
+attempt("another table", lambda: Joints(TableLaw("short.txt")).load("half-False.npz"))
 untouched = [len(joints) for joints in (table, live, other)]
 live = attached(LiveLaw(law), name="mine")
 O.bodies[1].state.blockedDOFs = "xyzXYZ"
@@ -264,6 +265,7 @@ def test_a_state_of_the_other_mode_or_law_is_refused_and_changes_nothing(scenes)
         "table into live": "saved in table mode, and these joints are in live mode: create "
         'Joints(TableLaw("joint.txt"), ...) and load',
         "another law": "state belongs to a joint law with other parameters",
+        "another table": "the state was saved with another table",
         "while it runs": "saved in table mode",
     }
     assert {name: part for name, part in words.items() if part not in scenes["told"][name]} == {}

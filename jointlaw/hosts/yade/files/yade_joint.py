@@ -73,10 +73,13 @@ class TableLaw:
 
     def state(self):
         """Arrays to save."""
-        return {"f": self.f, "K": self.K}
+        return {"f": self.f, "K": self.K, "stress": self.table.normal_stress}
 
     def restore(self, data):
-        """Take up such arrays."""
+        """Take up such arrays. Raises ValueError if they belong to another table."""
+        mine = self.table.normal_stress
+        if not np.array_equal(data.get("stress", mine), mine):  # older files hold no stress
+            raise ValueError("the state was saved with another table: give TableLaw that one")
         self.f, self.K = data["f"], data["K"]
 
 
@@ -547,7 +550,7 @@ class Joints:
         """Take up a state that `save` wrote: call it after O.load, before the next step.
 
         Raises ValueError for another version, for a state of live mode loaded into table mode or
-        the other way round, and for another live law; nothing is changed then.
+        the other way round, and for another law or table; nothing is changed then.
         """
         with np.load(path) as file:
             data = {key: file[key] for key in file.files}

@@ -22,7 +22,7 @@ from .parameters.heights import GammaHeights, Heights
 from .parameters.orientation import Orientation
 from .parameters.resolution import Resolution
 from .support.version import __version__ as __version__
-from .tables.table import JointTable, load_table
+from .tables.joint_table import JointTable, load_table
 
 if TYPE_CHECKING:
     from .calibration.fit import fit_closure, fit_curves, fit_shear

@@ -12,7 +12,7 @@ from ..support.files import clear_run
 from .command import add_command, add_law, add_out, in_unit, read_law
 
 START = {
-    "yade": "yade -n -x direct_shear.py",
+    "yade": "yade -n -x settle_and_incline.py",
     "c": "make && ./example",
     "lammps": "./build.sh && lmp -in in.tower",
 }

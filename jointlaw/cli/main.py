@@ -41,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _joined(arguments: Sequence[str]) -> list[str]:
-    """Arguments with "--reverse -2um" joined to "--reverse=-2um", lest -2um pass for an option."""
+    """Arguments with "--reverse -2um" joined to "--reverse=-2um": argparse reads -2um as an option."""
     joined: list[str] = []
     for argument in arguments:
         if joined and re.match(r"--[a-z-]+$", joined[-1]) and re.match(r"-[.\d]", argument):

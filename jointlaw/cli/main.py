@@ -41,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _joined(arguments: Sequence[str]) -> list[str]:
-    """Arguments with "--reverse -2um" joined to "--reverse=-2um": argparse reads -2um as an option."""
+    """Arguments, "--reverse -2um" as "--reverse=-2um": argparse takes a lone -2um for an option."""
     joined: list[str] = []
     for argument in arguments:
         if joined and re.match(r"--[a-z-]+$", joined[-1]) and re.match(r"-[.\d]", argument):

@@ -52,11 +52,11 @@ print(f"lost to friction {joints.dissipated_energy.mean():.2f} J/m² per contact
 
 time = np.arange(1, steps + 1) / steps
 figure, (top, bottom) = plt.subplots(2, 1, figsize=(7, 5.5), layout="constrained", sharex=True)
-top.plot(time, np.array(pressure) / 1e6, label="normal")
-top.plot(time, np.array(friction) / 1e6, label="shear")
+top.plot(100 * time, np.array(pressure) / 1e6, label="normal")
+top.plot(100 * time, np.array(friction) / 1e6, label="shear")
 top.set_ylabel("mean stress (MPa)")
 top.legend()
-bottom.plot(time, 100 * np.array(touching), color="C2")
+bottom.plot(100 * time, 100 * np.array(touching), color="C2")
 bottom.set_ylabel("contacts that carry (%)")
-bottom.set_xlabel("share of the run (1)")
+bottom.set_xlabel("share of the run (%)")
 plt.show()

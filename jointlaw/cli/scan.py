@@ -8,7 +8,7 @@ from ..parameters.rock import require_rock
 from ..parameters.toml import VERSION
 from ..surface.fit import SurfaceFit, from_surface
 from ..surface.scan_files import read_scan
-from .command import Written, add_command, add_out, given, quantity, write_results
+from .command import Written, add_command, add_out, in_unit, quantity, write_results
 
 
 def add(commands: Any) -> None:
@@ -18,17 +18,22 @@ def add(commands: Any) -> None:
     parser = add_command(commands, "scan", what, example, _run)
     parser.description = f"{what}. Give the composite surface of both sides, or a profile."
     parser.add_argument("file", help="CSV, NPY, or a format of SurfaceTopography (extra scan)")
-    parser.add_argument("--spacing", help="of the points, such as 20um; needed for CSV and NPY")
+    length = in_unit("m", positive=True)
+    parser.add_argument(
+        "--spacing", type=length, help="of the points, such as 20um; needed for CSV and NPY"
+    )
     parser.add_argument("--height-unit", help="of CSV and NPY, such as um")
-    parser.add_argument("--sampling-length", help="edge of a facet (default 4 spacings)")
+    parser.add_argument(
+        "--sampling-length", type=length, help="edge of a facet (default 4 spacings)"
+    )
     add_out(parser)
 
 
 def _run(options: argparse.Namespace) -> None:
     unit = options.height_unit
     factor = None if unit is None else quantity("--height-unit", f"1{unit}", "m")
-    z, spacing = read_scan(options.file, given(options, "spacing", "m"), factor)
-    fit = from_surface(z, spacing, given(options, "sampling_length", "m"))
+    z, spacing = read_scan(options.file, options.spacing, factor)
+    fit = from_surface(z, spacing, options.sampling_length)
     require_rock(fit.parameters, f"{Path(options.file).name}: the fitted ")
     text = fit.report()
     print(text)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from lammps_host import build, need_lammps, soft
+from lammps_host import build, soft
 
 import jointlaw
 from jointlaw.hosts.yade.export import copy_adapter
@@ -130,5 +130,4 @@ def make_table():
 @pytest.fixture(scope="session")
 def plugin(tmp_path_factory):
     """A folder with LAMMPS' plug-in, built, and rock.jlaw, a soft joint in space."""
-    need_lammps()
     return build(tmp_path_factory.mktemp("lammps"), soft())

@@ -37,7 +37,7 @@ def test_a_cycle_that_begins_at_zero(tmp_path, cycle, capsys):
     assert main(["fit", "loop.csv", "--set", "alpha=3.8", "--out", "o"]) == 0
     out = capsys.readouterr().out
     summary = json.loads((tmp_path / "o" / "summary.json").read_text())
-    assert summary["version"] == 1
+    assert summary["version"] == 2
     assert summary["unloading"]["stress"] == pytest.approx(cycle[0][1])  # the first above zero
     assert "## Unloading" in out
     assert "(seating closure 0 um)" in out
@@ -118,7 +118,7 @@ def test_a_scan_needs_only_the_contacts_to_be_a_law(tmp_path):
     summary = json.loads((tmp_path / "o" / "summary.json").read_text())
     contacts = "\n[asperity]\nK = 1e9\nlam = 1.2\neta = 0.5\nmu = 0.6\n"
     law = jl.JointLaw.from_text((tmp_path / "o" / "surface.toml").read_text() + contacts)
-    assert summary["version"] == 1
+    assert summary["version"] == 2
     assert summary["parameters_SI"]["a"] == law.orientation.a
     assert summary["parameters_SI"]["asperity_density"] == law.asperity_density
 

@@ -104,7 +104,7 @@ class JointLaw:
             set_(self, "closure_range", above("closure_range", self.closure_range, 0.0))
             lengths = np.array([self.critical_slip, self.asperity.yield_interference])
             set_(self, "resolution", resolve(asked, *(lengths / self.closure_range)))
-            self._require_numbers(self.closure_range)  # makes the virgin curve, which is checked too
+            self._require_numbers(self.closure_range)  # and check the virgin curve
 
     # ----------------------------------------------------------------- joints
 
@@ -329,7 +329,7 @@ class JointLaw:
 
     def _default_range(self) -> float:
         """The closure (m) at 20 MPa of elastic asperities: those that yield may not bear it."""
-        p, r = self.asperity, NAMED["balanced"]  # so that it does not depend on the law's resolution
+        p, r = self.asperity, NAMED["balanced"]  # whatever the law's resolution
         fixed = facets(self.orientation, r.u, r.phi, self.plane, self.closure_only)
         elastic = facet_sum(fixed.theta, fixed.scale(p, self.asperity_density), p.lam, p.mu)
         try:

@@ -17,9 +17,7 @@ from jointlaw.calibration.measured import first_loading
 # The curve comes with the package (Vogler et al. 2018). Only the loading up to 5.3 MPa is fitted,
 # and the fit says what eight points leave open.
 
-stress, closure, stress_back, closure_back = first_loading(
-    *datasets.load("grimsel_vd1_closure")
-)
+stress, closure, stress_back, closure_back = first_loading(*datasets.load("grimsel_vd1_closure"))
 seen = stress <= 5.3e6
 fit = jl.fit_closure(stress[seen], closure[seen])
 for name in fit.parameters:

@@ -41,7 +41,7 @@ def clear_run(folder: Path) -> None:
     """Make a folder for results; of a run that it holds what that wrote is removed, and no more."""
     folder.mkdir(parents=True, exist_ok=True)
     paths = [*(folder / name for name in LEFT), *folder.glob("vtk/*.vtu")]
-    with contextlib.suppress(OSError, ValueError):  # a run that was interrupted has no summary, or half of one
+    with contextlib.suppress(OSError, ValueError):  # an interrupted run has no summary
         written = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["files"]
         paths += [folder / Path(name).name for name in written]
     for path in paths:

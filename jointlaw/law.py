@@ -98,13 +98,13 @@ class JointLaw:
                 f"critical_slip = {self.critical_slip!r} m is out of bounds: it must be >= "
                 f"{UNDERFLOW:g}"
             )
-        with np.errstate(all="ignore"):  # what is no number in the end is refused
+        with np.errstate(all="ignore"):  # a result that is not finite is refused below
             if self.closure_range is None:
                 set_(self, "closure_range", self._default_range())
             set_(self, "closure_range", above("closure_range", self.closure_range, 0.0))
             lengths = np.array([self.critical_slip, self.asperity.yield_interference])
             set_(self, "resolution", resolve(asked, *(lengths / self.closure_range)))
-            self._require_numbers(self.closure_range)  # and with it that the curve is valid
+            self._require_numbers(self.closure_range)  # and check the virgin curve
 
     # ----------------------------------------------------------------- joints
 
@@ -329,13 +329,13 @@ class JointLaw:
 
     def _default_range(self) -> float:
         """The closure (m) at 20 MPa of elastic asperities: those that yield may not bear it."""
-        p, r = self.asperity, NAMED["balanced"]  # the same for laws that differ in resolution
+        p, r = self.asperity, NAMED["balanced"]  # whatever the law's resolution
         fixed = facets(self.orientation, r.u, r.phi, self.plane, self.closure_only)
         elastic = facet_sum(fixed.theta, fixed.scale(p, self.asperity_density), p.lam, p.mu)
         try:
             return VirginClosure(self.curve, elastic).closure(DEFAULT_STRESS, 1.0)
         except ValueError:
-            self._require_numbers(1.0)  # the likely reason
+            self._require_numbers(1.0)  # most often the units are wrong
             raise
 
     def _require_numbers(self, closure_range: float) -> None:
@@ -383,5 +383,5 @@ class JointLaw:
         return toml.build_law(cls, data, where)
 
     def __getstate__(self) -> dict[str, Any]:
-        names = {one.name for one in fields(self)}  # what is cached is made anew
+        names = {one.name for one in fields(self)}  # cached values are computed again when needed
         return {name: value for name, value in self.__dict__.items() if name in names}

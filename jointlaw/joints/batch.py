@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
 Index = Sequence[int] | NDArray[np.integer[Any]] | NDArray[np.bool_]
 Result = tuple[Array, Array | None]
-COMPONENTS = {  # of a displacement, by their number, and how to have more
+COMPONENTS = {  # what the 1, 2 or 3 components of a displacement are
     1: "closure; for shear take a law without closure_only",
     2: "closure and shear along the plane; for motion in 3-D take a law with plane=None",
     3: "closure and shear along axes 2 and 3",
 }
-FEW = 8  # numbers of an increment up to which Python looks at them faster than numpy
+FEW = 8  # numbers: the largest of so few is found faster by Python than by numpy
 
 
 class NoLedgerError(AttributeError, ValueError):
@@ -280,10 +280,10 @@ class JointBatch:
         joint looked at.
         """
         d, limit = step.d, self.law.largest_reach
-        if d.size <= FEW:  # the sum is no less than the largest, and NaN if one is
+        if d.size <= FEW:  # the sum of sizes is a bound too; it is NaN if one number is
             largest = sum(map(abs, d.ravel().tolist()))
         else:
-            largest = max(float(d.max()), -float(d.min()))  # both NaN if one is
+            largest = max(float(d.max()), -float(d.min()))  # NaN if one number is
         reach = self._largest_reach + self._steepness * largest
         return reach if reach <= limit else self._reach_by_joint(step, limit)
 

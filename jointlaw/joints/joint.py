@@ -59,7 +59,7 @@ class Joint:
 
     def _step(self, d: ArrayLike, tangent: bool, keep: bool) -> tuple[Array, Array | None]:
         dim = self.law.dim
-        values = increments(d, (dim,))[None].copy()  # the caller's may be strided
+        values = increments(d, (dim,))[None].copy()  # the kernel needs numbers without gaps
         F, C = np.empty((1, dim)), np.empty((1, dim, dim)) if tangent else None
         self._batch.take(Step(values, F, C, None, keep))
         return F[0], None if C is None else C[0]

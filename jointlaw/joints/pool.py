@@ -70,7 +70,7 @@ class JointPool:
         self.batch.reset(places)
         for key in gone:
             del self._place[key]
-        self._free = sorted([*self._free, *places], reverse=True)  # the lowest is taken first
+        self._free = sorted([*self._free, *places], reverse=True)  # pop() takes the lowest place
 
     def snapshot(self) -> JointState:
         """A copy of the state of all contacts, in the order of `keys`: keep those beside it."""

@@ -13,7 +13,7 @@ from ..support.checks import Array, above, at_least, number, one_of
 
 FORMATIONS = ("population", "individual")
 
-# Probabilities, from both ends, whose quantiles frame a distribution for quadrature
+# Probabilities at both ends of a distribution; integrals are split at these quantiles
 _TAILS = np.array([1e-15, 1e-12, 1e-9, 1e-6, 1e-4, 1e-2, 0.1, 0.3, 0.5])
 
 
@@ -134,7 +134,7 @@ class Heights:
             counts, edges = (np.array(v) for v in self.distribution)
             density = np.concatenate([[0.0], counts / (counts.sum() * np.diff(edges)), [0.0]])
             return density[np.searchsorted(edges, np.asarray(r), side="right")]
-        with np.errstate(divide="ignore"):  # a density may be infinite where it begins
+        with np.errstate(divide="ignore"):  # a density may be infinite at its lower end
             return self._frozen.pdf(r)
 
     def cdf(self, r: ArrayLike) -> Any:

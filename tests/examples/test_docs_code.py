@@ -3,7 +3,6 @@
 import contextlib
 import io
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -72,12 +71,7 @@ def only_what_is_needed(space, printed):
 
 
 def recipes(space, printed):
-    """Even heights as scipy has them, and columns for a host."""
-    same = jl.Heights("uniform", 0.0, parameters={"scale": 10e-6}, formation="individual")
-    law, y = space["law"], np.array([1e-6, 5e-6, 9e-6])
-    expected = replace(law, heights=same).normal_stress(y)
-    np.testing.assert_allclose(law.normal_stress(y), expected, rtol=1e-9)  # of the tabulated curve
-    assert law == replace(law, heights=space["EvenHeights"](10e-6))
+    """Columns for a host."""
     closure, stress, _ = np.loadtxt("joint-for-my-host/joint.txt").T
     expected = jl.presets.load("linear-a3").normal_stress(closure)
     np.testing.assert_allclose(stress, expected, rtol=1e-9)  # 18 digits in text

@@ -288,7 +288,7 @@ class JointLaw:
         r = self.resolution
         return tables(
             self.facets, self.curve, self.asperity, self.asperity_density,
-            self.closure_range, r.depth, self.critical_slip, r.front,
+            self.closure_range, r.depth, self.critical_slip,
         )  # fmt: skip
 
     @cached_property

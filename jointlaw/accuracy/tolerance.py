@@ -111,8 +111,7 @@ def coarsest(law: Law, bound: float, excursions: int = 0) -> tuple[Resolution | 
         if meets is None:
             return None, min(alone)
         needs.append(tried[meets:])  # finer ones too, for errors add up
-    front = law.resolution.front
-    several = [Resolution(u, phi, depth, front) for u, phi, depth in product(*needs)]
+    several = [Resolution(u, phi, depth) for u, phi, depth in product(*needs)]
     for r in sorted(several, key=lambda r: (r.sliders, r.u, r.phi)):
         if error(r) <= bound:
             return r, error(r)

@@ -5,10 +5,9 @@ joints last: facets (M, B), cells (M, D, B), sliders (2, M, D, B). State (rows, 
 
     delta (dim) | in-plane offset (dim - 1) | dissipated energy (1) | q (2 M D)
 
-where q is the shear force of a slider times lam, in the (s, t) basis of Eq. 25. With fronts D is
-one more, and their depth (M) follows, docs/theory-incremental.md, "A front that moves". With
-asperities that yield follow flattened depth (M) | plastic work (1); with wear, slip of the
-asperities (1) and by how much mu had fallen in the last step (1).
+where q is the shear force of a slider times lam, in the (s, t) basis of Eq. 25. With asperities
+that yield follow flattened depth (M) | plastic work (1); with wear, slip of the asperities (1) and
+by how much mu had fallen in the last step (1).
 """
 
 from typing import NamedTuple
@@ -18,8 +17,7 @@ from numpy.typing import NDArray
 
 from ..discretisation.tables import UNDERFLOW, Tables
 from ..support.checks import Array
-from .cells import TINY, Cells, Limits, cells, compliance, limits, reciprocal
-from .front import cut, moved
+from .cells import TINY, Cells, cells, compliance, reciprocal
 from .wear import friction, slipped, within_limit
 from .yielding import flattened, plastic_work, press, softening
 
@@ -43,7 +41,6 @@ class State(NamedTuple):
     plastic: Array  # (B,) or no rows
     slip: Array  # of the asperities (B,), or no rows
     fallen: Array  # by how much mu had fallen in the last step (B,), or no rows
-    front: Array  # depth at which the front of every facet begins (M, B), or no rows
 
 
 class Sliders(NamedTuple):
@@ -87,8 +84,6 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     5. Traction: F = sum of A Phi n + (1/lam) sum of q (Eq. 21).
     6. Dissipated energy, every term >= 0 ("No step creates energy").
     7. Tangent C = dF/dd ("The tangent"), not without `tangent`.
-
-    With fronts each of them may join its cell at the end ("A front that moves").
     """
     old = parts(k, state)
     new_state = np.empty_like(state)
@@ -97,13 +92,12 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     offset, J_offset, slip = limited_offset(k, old.offset, d[1:])
     new.offset[:] = offset
 
-    at = cut(k, old.front) if k.front else limits(k)
-    before = cells(k, effective_closure(k, old.delta[0], old.offset), at)
-    after = cells(k, effective_closure(k, new.delta[0], offset), at)
+    before = cells(k, effective_closure(k, old.delta[0], old.offset))
+    after = cells(k, effective_closure(k, new.delta[0], offset))
     gained, flat0, flat1 = after.G - before.G, None, None
     if k.yields:
         new.depth[:] = press(k, old.depth, after.y)
-        flat0, flat1 = cells(k, old.depth, at), cells(k, new.depth, at)
+        flat0, flat1 = cells(k, old.depth), cells(k, new.depth)
         new.plastic[:] = old.plastic + plastic_work(k, before.y, after.y, flat0, flat1)
         gained = after.G - np.maximum(before.G, flat0.G)
         before, after = flattened(before, flat0), flattened(after, flat1)
@@ -123,9 +117,6 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     F = F + np.einsum("edm,emb->db", basis, new.q.sum(axis=2)) / k.lam
 
     lost = lost + friction_loss(k, before, after, q, sliders)
-    if k.front:
-        new.front[:], new.q[:], joined = moved(k, old.front, at, before.y, after, new.q)
-        lost = lost + joined
     new.dissipated[:] = old.dissipated + lost
     if slip.any():
         pull = k.n[1:] @ (k.area[:, None] * after.force)  # in-plane part of the normal forces
@@ -140,7 +131,7 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     if not tangent:
         return new_state, F, None
     g = gradient(k, J_offset)
-    C = stiffness(k, at, before, after, sliders, de, g)
+    C = stiffness(k, before, after, sliders, de, g)
     if flat0 is not None and flat1 is not None:
         C = C - softening(k, after, flat0, flat1, sliders.push, g)
     return new_state, F, C
@@ -149,12 +140,11 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
 def parts(k: Tables, state: Array) -> State:
     """Views of the parts of a state array, q as (2, M, D, B)."""
     dim, M = k.dim, len(k.c1)
-    q, rest = np.split(state[2 * dim :], [2 * M * k.several])
-    front, rest = np.split(rest, [M if k.front else 0])
+    q, rest = np.split(state[2 * dim :], [2 * M * k.cells])
     depth, plastic = (rest[:M], rest[M]) if k.yields else (rest[:0], rest[:0])
     slip, fallen = rest[-2:] if k.wears else (rest[:0], rest[:0])
     place = state[:dim], state[dim : 2 * dim - 1], state[2 * dim - 1]
-    return State(*place, q.reshape(2, M, k.several, -1), depth, plastic, slip, fallen, front)
+    return State(*place, q.reshape(2, M, k.cells, -1), depth, plastic, slip, fallen)
 
 
 def effective_closure(k: Tables, closure: Array, offset: Array) -> Array:
@@ -268,13 +258,14 @@ def gradient(k: Tables, J_offset: Array) -> Array:
 
 
 def stiffness(
-    k: Tables, at: Limits, before: Cells, after: Cells, sliders: Sliders, de: Array, g: Array
+    k: Tables, before: Cells, after: Cells, sliders: Sliders, de: Array, g: Array
 ) -> Array:
     """Tangent C = dF/dd (dim, dim, B): J_q = beta (I - s s^T) E + v g^T per cell, summed."""
     trial, share, chord, grows = sliders.trial, sliders.share, sliders.chord, sliders.grows
     y, kappa = after.y, after.kappa
     a = (k.area / k.c1)[:, None, None]
-    inside = (y[:, None] > at.low) & (y[:, None] < at.high)
+    depth = k.depth[:, :, None]
+    inside = (y[:, None] > depth[:, :-1]) & (y[:, None] < depth[:, 1:])
     p = np.where(inside, k.curve.curvature(y)[:, None], 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         chord_slope = np.where(sliders.near, p / 2, (kappa - chord) / (y - before.y)[:, None])
@@ -320,9 +311,8 @@ class Measures(NamedTuple):
 def measures(k: Tables, state: Array) -> Measures:
     """Shares, stored energy and reach of a batch of states (rows, B)."""
     state_now = parts(k, state)
-    at = cut(k, state_now.front) if k.front else limits(k)
-    virgin = cells(k, effective_closure(k, state_now.delta[0], state_now.offset), at)
-    now = flattened(virgin, cells(k, state_now.depth, at) if k.yields else None)
+    virgin = cells(k, effective_closure(k, state_now.delta[0], state_now.offset))
+    now = flattened(virgin, cells(k, state_now.depth) if k.yields else None)
     y, force, G = now.y, now.force, now.G
     mu = friction(k, state_now.slip) if k.wears else np.asarray(k.mu)
     q2 = state_now.q[0] ** 2 + state_now.q[1] ** 2

@@ -16,7 +16,7 @@ from ..support.files import replace_file
 from .asperity import Asperity
 from .heights import GammaHeights, Heights
 from .orientation import Orientation
-from .resolution import Resolution, named
+from .resolution import FRONT_REMOVED, Resolution, named
 
 _LAW_KEYS = {
     "orientation", "asperity", "heights", "asperity_density", "closure_range", "resolution",
@@ -33,8 +33,7 @@ def write_law(law: Mapping[str, Any], path: Path | None) -> str:
     lengths = law["critical_slip"], law["asperity"].yield_interference
     names = named(*(length / law["closure_range"] for length in lengths))
     name = next((n for n, value in names.items() if value == r), None)
-    front = ", front = true" if r.front else ""
-    own = f"{{ u = {r.u}, phi = {r.phi}, depth = {r.depth}{front} }}"
+    own = f"{{ u = {r.u}, phi = {r.phi}, depth = {r.depth} }}"
     resolution = f'"{name}"' if name else own
     lines = [
         f"version = {VERSION}  # of this file's keys",
@@ -109,7 +108,10 @@ def build_law(
     if "heights" in data:
         values["heights"] = _heights(data["heights"], where, folder)
     if isinstance(data.get("resolution"), dict):
-        values["resolution"] = _part(Resolution, data["resolution"], where, "resolution")
+        nodes = dict(data["resolution"])
+        if nodes.pop("front", False):  # of former versions
+            raise ValueError(f"{where}: {FRONT_REMOVED}")
+        values["resolution"] = _part(Resolution, nodes, where, "resolution")
     try:
         return build(**values)
     except ValueError as error:

@@ -23,7 +23,7 @@ from .parameters.asperity import Asperity
 from .parameters.fingerprint import fingerprint
 from .parameters.heights import HeightDistribution
 from .parameters.orientation import Orientation
-from .parameters.resolution import Resolution, resolve
+from .parameters.resolution import LOSS_REMOVED, Resolution, resolve
 from .support.checks import Array, above, finite, number
 
 if TYPE_CHECKING:
@@ -250,7 +250,7 @@ class JointLaw:
 
         return tradeoff(self, resolutions, joints, seconds)
 
-    def at_tolerance(self, tolerance: float, loss: float | None = None) -> JointLaw:
+    def at_tolerance(self, tolerance: float, loss: None = None) -> JointLaw:
         """This law at the resolution with the fewest sliders that is this accurate.
 
         tolerance: largest error of the traction on a path, as a share of the path's largest
@@ -259,15 +259,14 @@ class JointLaw:
         closure ranges, where friction is mobilised (`jointlaw.accuracy.suite`); nothing is timed,
         so the answer is the same on every machine. Takes seconds to a minute, below 0.01 minutes,
         without the compiled kernel more.
-        loss: if given, small cycles keep their damping as well: the work lost in a cycle of shear
-        at constant closure misses the exact one by at most this share, at every amplitude from
-        0.001 to 1 closure range (`jointlaw.accuracy.cycles`). That takes many depth cells: 0.25
-        asks for some hundred times the sliders of "balanced".
+        loss: of former versions, refused; small cycles need more depth cells (docs/sharp-bits.md).
         Raises ValueError where no resolution tried is that accurate.
         """
         from .accuracy.tolerance import at_tolerance
 
-        return at_tolerance(self, tolerance, loss)
+        if loss is not None:
+            raise ValueError(LOSS_REMOVED)
+        return at_tolerance(self, tolerance)
 
     # ---------------------------------------------------------------- tables
 

@@ -4,6 +4,7 @@ import argparse
 from dataclasses import replace
 from typing import Any
 
+from ..parameters.resolution import LOSS_REMOVED
 from .command import Written, add_command, add_law, add_out, quantity, read_law, write_results
 
 
@@ -27,12 +28,7 @@ def add(commands: Any) -> None:
         action="append",
         help="also find the coarsest law that keeps it: 0.01 (may be repeated)",
     )
-    parser.add_argument(
-        "--loss",
-        metavar="SHARE",
-        type=float,
-        help="with --tolerance: also keep the loss of small shear cycles within this share: 0.25",
-    )
+    parser.add_argument("--loss", help=argparse.SUPPRESS)  # of former versions
     parser.add_argument(
         "--joints", type=int, default=10_000, help="of the batch that is timed; 0 times nothing"
     )
@@ -43,13 +39,11 @@ def _tradeoff(options: argparse.Namespace) -> None:
     law = read_law(options)
     if options.plane is not None:
         law = replace(law, plane=quantity("--plane", options.plane, "rad"))
-    if options.loss is not None and not options.tolerance:
-        raise ValueError(
-            f"--loss = {options.loss:g} goes with --tolerance, such as 0.01; give both"
-        )
+    if options.loss is not None:
+        raise ValueError(f"--{LOSS_REMOVED}")
     chosen = {}
     for tolerance in options.tolerance or ():  # before the long work: a bad one is refused at once
-        made = law.at_tolerance(tolerance, options.loss)
+        made = law.at_tolerance(tolerance)
         r, sliders = made.resolution, made.tables.sliders
         chosen[f"{tolerance:g}"] = {"u": r.u, "phi": r.phi, "depth": r.depth, "sliders": sliders}
     found = law.tradeoff(joints=options.joints)
@@ -63,14 +57,12 @@ def _tradeoff(options: argparse.Namespace) -> None:
         "reference uncertainty": dict(zip(found.paths, found.uncertainty.tolist(), strict=True)),
         "frontier": [r for r in rows if (r["u"], r["phi"], r["depth"]) in frontier],
         "at tolerance": chosen,
-        "loss": options.loss,
         "units": {"error": "share of the path's largest traction", "ns": "ns per joint and update"},
     }
     print(found)
     for text, nodes in chosen.items():
         given = ", ".join(f"{k}={nodes[k]}" for k in ("u", "phi", "depth"))
-        more = "" if options.loss is None else f", loss={options.loss:g}"
-        print(f"at_tolerance({text}{more}): Resolution({given}), {nodes['sliders']} sliders")
+        print(f"at_tolerance({text}): Resolution({given}), {nodes['sliders']} sliders")
     files: Written = {
         "tradeoff.csv": found.to_csv,
         "law.toml": law.to_toml,

@@ -5,8 +5,9 @@ from dataclasses import InitVar, dataclass
 
 from ..support.checks import whole
 
-
+# What those read who ask for options of former versions
 FRONT_REMOVED = "resolution.front is removed: take more depth cells instead, such as depth = 12"
+LOSS_REMOVED = "loss is removed: take more depth cells instead, such as Resolution(3, 6, 48)"
 
 
 @dataclass(frozen=True)

@@ -38,12 +38,13 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
 from ..joints import batch as joints
+from ..laboratory.normal_control import NormalCondition, closing_increments
 from ..parameters.heights import HeightDistribution
 from ..parameters.orientation import Orientation
 from ..parameters.resolution import Resolution
 from ..support.checks import Array
 from ..support.progress import track
-from .slip import Slip, distance, names, random_ways, slip, standard_ways
+from .slip import HELD, Slip, distance, names, random_ways, slip, standard_ways
 
 STEPS = 120  # of each path
 FAR = 3.0  # R: the longest slip at a given closure
@@ -279,19 +280,13 @@ def far_path(law: Law, rng: np.random.Generator, stress: float, s: Array) -> Arr
 
 
 def _hold_stress(law: Law, d: Array, held: Array, stress: float) -> Array:
-    """Increments with the closures of the paths `held` mended to keep the normal stress.
-
-    Two Newton steps per increment keep it to some 1e-3, and what is left is mended in the next:
-    enough, for what is compared are tractions along one and the same path.
-    """
-    d, which = d.copy(), np.flatnonzero(held)
-    batch, least = law.joints(len(which), ledger=False), 1e-3 * stress / law.closure_range
+    """Increments whose closures keep the normal stress on the paths `held`."""
+    d, which, condition = d.copy(), np.flatnonzero(held), NormalCondition(stress, stress)
+    batch = law.joints(len(which), ledger=False)
     for k in range(len(d)):
         step = d[k, which]
-        for _ in range(2 if k >= STEPS // 10 else 0):
-            F, C = batch.trial(step)
-            assert C is not None
-            step[:, 0] -= (F[:, 0] - stress) / np.maximum(C[:, 0, 0], least)
+        if k >= STEPS // 10:
+            step[:, 0] = closing_increments(batch, step, condition, HELD)
         batch.update(step, tangent=False)
         d[k, which] = step
     return d

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..laboratory.normal_control import closing_increments
+from ..laboratory.normal_control import NormalCondition, closing_increments
 from ..law import JointLaw
 from ..parameters.resolution import SLIP
 from ..support.checks import Array, above, whole
@@ -15,6 +15,7 @@ from .table import JointTable
 
 FLOOR = 1e-4  # stresses below this share of the largest are held to an absolute tolerance
 ROWS = 30  # closures at which friction and dilation are computed
+HELD = 1e-9  # of the normal stress
 PROBE = 1e-7  # shear probe over closure: small against any curvature, large against rounding
 
 
@@ -178,7 +179,7 @@ def _friction(
     peak = ratio = dilation = zero
     for length in lengths:
         step = length * along
-        closing = closing_increments(batch, step, goal)
+        closing = closing_increments(batch, step, NormalCondition(goal, goal), HELD)
         step[:, 0] = closing
         F, _ = batch.update(step, tangent=False)
         ratio = np.sum(F * along, axis=1) / goal

@@ -172,9 +172,6 @@ def forgetting_rows():
     counts, amplitude, rows = (1, 10, 100, 1000, 10_000), 1e-2, []
     for depth in (1, 2, 3, 10, 24):
         rows.append([depth, *drift.forgetting(counts, depth, amplitude)])
-    for depth in (1, 3):
-        fronted = drift.forgetting(counts, depth, amplitude, front=True)
-        rows.append([f"{depth} and a front", *fronted])
     left = drift.in_the_bed(counts[:4], amplitude)
     rows.append(["4000 springs", *left, left[-1]])  # for it forgets once
     return [[name, *(f"{share:.4f}" for share in shares)] for name, *shares in rows]

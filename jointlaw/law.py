@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .discretisation.facets import Facets, facet_sum, facets, yield_sum
+from .discretisation.facets import Facets, facets
+from .discretisation.first_loading import FirstLoading
 from .discretisation.tables import UNDERFLOW, VERSION, Tables, largest_reach, tables
-from .discretisation.virgin_curve import VirginClosure, VirginCurve, virgin_curve
+from .discretisation.virgin_curve import VirginCurve, virgin_curve
 from .joints.batch import JointBatch
 from .joints.joint import Joint
 from .kernels import reference
@@ -100,10 +101,10 @@ class JointLaw:
             if self.closure_range is None:
                 set_(self, "closure_range", self._default_range())
             set_(self, "closure_range", above("closure_range", self.closure_range, 0.0))
-            lengths = np.array([self.critical_slip, self.asperity.yield_interference])
-            set_(self, "resolution", resolve(asked, *(lengths / self.closure_range)))
+            lengths = self.critical_slip, self.asperity.yield_interference, self.closure_range
+            set_(self, "resolution", resolve(asked, *lengths))
             if self.resolution != nodes:
-                for cached in ("facets", "_scale", "_virgin"):  # by the closure range
+                for cached in ("facets", "_scale", "_first_loading"):  # by the closure range
                     self.__dict__.pop(cached, None)
             self._require_numbers(self.closure_range)  # and with it that the curve is valid
 
@@ -309,21 +310,14 @@ class JointLaw:
         return self.facets.scale(self.asperity, self.asperity_density)
 
     @cached_property
-    def _virgin(self) -> VirginClosure:
-        """Closure without shear of elastic asperities."""
-        p = self.asperity
-        return VirginClosure(self.curve, facet_sum(self.facets.theta, self._scale, p.lam, p.mu))
-
-    @cached_property
-    def _first_loading(self) -> VirginClosure:
-        """Closure without shear of asperities that yield."""
-        yielding = yield_sum(self.facets.theta, self._scale, self.asperity)
-        return self._virgin._replace(yielding=yielding)
+    def _first_loading(self) -> FirstLoading:
+        """Closure without shear."""
+        return FirstLoading.of(self.curve, self.facets.theta, self._scale, self.asperity)
 
     def _default_range(self) -> float:
         """The closure (m) at 20 MPa of elastic asperities: those that yield may not bear it."""
         try:
-            return self._virgin.closure(DEFAULT_STRESS, 1.0)
+            return self._first_loading._replace(yielding=None).closure(DEFAULT_STRESS, 1.0)
         except ValueError:
             self._require_numbers(1.0)  # the likely reason
             raise

@@ -49,8 +49,8 @@ for stress in (5e6, 10e6, 20e6):
 
 # %%
 # With the few cells of `balanced` the stiffness is about right, and so is the damping of large
-# cycles. Small cycles have next to none. `law.at_tolerance(0.02, loss=0.25)` finds how many cells
-# it takes; see *How accurate do I need to be?*
+# cycles. Small cycles have next to none. More depth cells cure it; see *How accurate do I need to
+# be?*
 
 coarse, softer = cycles(law, 10e6, amplitudes)
 left.loglog(amplitudes * 1e9, 100 * coarse, "C1--", label="10 MPa, balanced")

@@ -47,10 +47,10 @@ def coarsest(law: Law, bound: float, excursions: int = 0) -> tuple[Resolution | 
             known[r] = float(suite.errors(replace(law, resolution=r))[0].max())
         return known[r]
 
-    # What each direction needs by itself, the others being fine: a resolution with less of it can
-    # meet the suite by luck alone, when errors of two directions cancel. Orientations, whose error
-    # wavers as contacts slip and part one by one, must meet it with the next finer choice as well,
-    # or have as many as the reference.
+    # What each of u, phi and depth needs while the other two are fine: with less of it a resolution
+    # meets the suite only by chance, where two errors cancel. The errors of u and phi rise and fall
+    # as contacts slip and part one by one: so the next finer choice must meet the suite too, unless
+    # there are as many as in the reference.
     share = next((s for s in _SHARES if _left_out(suite, s) < bound / 3), _SHARES[-1])
     rest = scaled(best, share)
     needs = []

@@ -1,7 +1,7 @@
 """The tables of a law: everything that a kernel reads, shared by all joints of the law."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,12 +112,6 @@ def tables(
         alone if math.isinf(critical_slip) else facets.opposite,
         asperity.mu_residual, asperity.wear_slip,
     )  # fmt: skip
-
-
-def with_depths(k: Tables, depth: Array) -> Tables:
-    """The tables with other cell limits (M, D + 1): from 0, which may repeat, to infinity."""
-    limits, force, slope = frozen(_at_limits(k.curve, depth))
-    return replace(k, depth=limits, depth_force=force, depth_slope=slope)
 
 
 def _at_limits(curve: VirginCurve, depth: Array) -> tuple[Array, Array, Array]:

@@ -36,14 +36,14 @@ _DES, _DET, _SUMS, _SUMT = _rows(7, 4)  # its sliders
 _CURVING, _BSS, _BST, _BTT, _VS, _VT, _G0, _G1, _G2 = _rows(11, 9)  # its tangent
 _P, _P1, _P2, _OLD, _OLD1, _OLD2, _NEW, _NEW1, _NEW2 = _rows(20, 9)  # a joint: step, y's origin
 _J00, _J01, _J10, _J11, _SLIP, _PULL1, _PULL2, _LOST, _F, _FS, _FT = _rows(29, 11)
-_NORMAL, _CRUSHED = _rows(40, 2)  # a joint whose asperities wear or yield
+_NORMAL, _PLASTIC = _rows(40, 2)  # a joint whose asperities wear or yield
 _C00, _C01, _C02, _C10, _C11, _C12, _C20, _C21, _C22, _MU = _rows(42, 10)
 _Z0, _Z1, _FZ0, _FZ1, _SZ1, _AT0, _FAT0, _WS, _WT = _rows(52, 9)  # its flattened facets
 (_SINCE,) = _rows(61, 1)  # friction over that of the last step
 _PAD = 62 * LANES
 
 # The same rows while joints are measured
-_WHOLE, _LIMIT, _SLIDING, _SLIPPING, _APART, _STORED, _REACH = _rows(20, 7)
+_ALL_SLIP, _LIMIT, _SLIDING, _SLIPPING, _APART, _STORED, _REACH = _rows(20, 7)
 
 _M, _S, _T, _N, _REST = 0, 3, 6, 9, 12  # columns of the facet table; then A, a, compliance,
 _POTENTIAL, _SHARE = 15, 16  # A c1 and the share of the facet orientation
@@ -92,7 +92,7 @@ class Work(NamedTuple):
 
     block: Array  # (rows, LANES): copy of a block of states
     pad: Array
-    place: NDArray[np.int32]  # cell of the curve, per lane; then the lanes that are pressed flat
+    place: NDArray[np.int32]  # cell of the curve, per lane; then lanes whose flattened depth moves
     piece: Array  # its four coefficients, per lane
 
 
@@ -268,7 +268,7 @@ def _places(law, yields, wears):
 
 
 @_jit
-def _weaken(pad, s, L, law, yields, wears):
+def _worn_friction(pad, s, L, law, yields, wears):
     """Friction of the asperities of each joint after their slip, and over that of the last step."""
     slip, first, last = _places(law, yields, wears)[1], law.scalars[1], law.scalars[6]
     for l in range(L):
@@ -280,7 +280,7 @@ def _weaken(pad, s, L, law, yields, wears):
 
 
 @_jit
-def _press(work, s, L, law, f, yields, wears):
+def _flatten(work, s, L, law, f, yields, wears):
     """Flattened depths of a facet before and after the step, and Phi there; see `yielding`."""
     pad, facet = work.pad, law.facet
     first, _, beside = _places(law, yields, wears)
@@ -301,22 +301,24 @@ def _press(work, s, L, law, f, yields, wears):
         z0, fz0, z1 = s[at, l], s[kept, l], pad[_Z1 + l] - deep
         pad[_Z0 + l], pad[_FZ0 + l], pad[_FZ1 + l] = z0, fz0, fz0
         pad[_Z1 + l] = z1 if z1 > z0 else z0
-    pressed = 0  # only where it moves is Phi looked up, packed into the rows of before the step
+    count = (
+        0  # Phi is looked up only in lanes where it moves, packed into the rows of before the step
+    )
     for l in range(L):
-        work.place[LANES + pressed] = l
-        pad[_Y0 + pressed] = pad[_Z1 + l]
-        pressed += 1 if pad[_Z1 + l] > pad[_Z0 + l] else 0
-    if pressed > 0:
-        _virgin(work, law, None, pressed)
-    for i in range(pressed):
+        work.place[LANES + count] = l
+        pad[_Y0 + count] = pad[_Z1 + l]
+        count += 1 if pad[_Z1 + l] > pad[_Z0 + l] else 0
+    if count > 0:
+        _virgin(work, law, None, count)
+    for i in range(count):
         l = work.place[LANES + i]
         pad[_FZ1 + l], pad[_SZ1 + l] = pad[_F0 + i], pad[_S0 + i]
         s[at, l], s[kept, l] = pad[_Z1 + l], pad[_F0 + i]
 
 
 @_jit
-def _relieve(pad, L, law, f, ledger):
-    """Take the part at the flattened depth off Phi and Phi', and add up what the springs lost."""
+def _subtract_flattened(pad, L, law, f, ledger):
+    """Phi and Phi' less their values at the flattened depth, and what flattened springs lost."""
     deep, potential = law.facet[f, _YIELD], law.facet[f, _POTENTIAL]
     for l in range(L):
         y1, z1, f1 = pad[_Y1 + l], pad[_Z1 + l], pad[_F1 + l] - pad[_FZ1 + l]
@@ -329,11 +331,11 @@ def _relieve(pad, L, law, f, ledger):
             c0, c1 = c0 if c0 > 0.0 else 0.0, c1 if c1 > 0.0 else 0.0
             mean = 0.5 * ((c0 if c0 < deep else deep) + (c1 if c1 < deep else deep))
             lost = pad[_FZ1 + l] - pad[_FZ0 + l]
-            pad[_CRUSHED + l] += potential * (deep if own else mean) * lost
+            pad[_PLASTIC + l] += potential * (deep if own else mean) * lost
 
 
 @_jit
-def _between(z, fz, y, fy, zl, fl, sl, zh, fh, sh, ended):
+def _gain(z, fz, y, fy, zl, fl, sl, zh, fh, sh, ended):
     """What a cell gains from z to y, where the virgin force is known; right for y >= z, zl."""
     gain = fy - (fz if z > zl else fl) - sl * (y - (z if z > zl else zl))
     if ended:
@@ -374,8 +376,8 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent, yields, wears):
         else:  # the bed less what it holds at the flattened depth
             z0, z1, at0, fat0 = pad[_Z0 + l], pad[_Z1 + l], pad[_AT0 + l], pad[_FAT0 + l]
             k0, k1 = k0 if y0 > z0 else 0.0, k1 if y1 > z1 else 0.0
-            gained = _between(at0, fat0, y1, f1, zl, fl, sl, zh, fh, sh, ended)
-            G1 = _between(z1, pad[_FZ1 + l], y1, f1, zl, fl, sl, zh, fh, sh, ended)
+            gained = _gain(at0, fat0, y1, f1, zl, fl, sl, zh, fh, sh, ended)
+            G1 = _gain(z1, pad[_FZ1 + l], y1, f1, zl, fl, sl, zh, fh, sh, ended)
             h1 = k1 * (y1 - (z1 if z1 > zl else zl))
             G1 = G1 if h1 > G1 else h1
             G1 = G1 if G1 > 0.0 else 0.0
@@ -383,7 +385,7 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent, yields, wears):
         grows = k1 > k0
         dy = y1 - y0
         near = abs(dy) <= NEAR * abs(y1)
-        if yields is not None:  # flattened springs touch at once: no mean where they do
+        if yields is not None:  # as in `reference.load`
             near = near & ((k0 > 0.0) | (k1 == 0.0))
         top = gained if grows else k1
         bottom = dy if grows else k0
@@ -394,10 +396,10 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent, yields, wears):
         kept = 1.0 if grows else ratio
         add = a * (chord if grows else k1)
         olds, oldt, des, det = qs[l], qt[l], pad[_DES + l], pad[_DET + l]
-        if wears is not None:  # back within the limit, that fell since
+        if wears is not None:  # reduced to the new limit, as in `wear.within_limit`
             strength = by_mu * pad[_MU + l]
             if yields is not None:
-                G0 = _between(z0, pad[_FZ0 + l], y0, f0, zl, fl, sl, zh, fh, sh, ended)
+                G0 = _gain(z0, pad[_FZ0 + l], y0, f0, zl, fl, sl, zh, fh, sh, ended)
                 h0 = k0 * (y0 - (z0 if z0 > zl else zl))
                 G0 = G0 if h0 > G0 else h0
                 G0 = G0 if G0 > 0.0 else 0.0
@@ -414,7 +416,7 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent, yields, wears):
         slips = size > cap
         share = cap / (size if slips else 1.0)
         share = share if slips else 1.0
-        part = share if new2 > TINY else 0.0  # a size that underflows has no cap
+        part = share if new2 > TINY else 0.0  # squares of smaller forces underflow
         qs[l], qt[l] = part * ts, part * tt
         pad[_SUMS + l] += part * ts
         pad[_SUMT + l] += part * tt
@@ -509,7 +511,7 @@ def _add_tangent(pad, L, law, f):
 
 
 @_jit
-def _soften(pad, L, law, f):
+def _yield_tangent(pad, L, law, f):
     """C -= along g^T of a facet whose flattened depth moves, with the y that presses it."""
     facet, dim, o = law.facet, law.dim, np.int64(law.facet[f, _OPPOSITE])
     A, soft, limited = facet[f, _REST], 1.0 / law.scalars[0], law.scalars[2] < np.inf
@@ -544,7 +546,7 @@ def _facet(work, s, L, law, f, ledger, tangent, yields, wears):
     n0, n1, n2 = facet[f, _N], facet[f, _N + 1], facet[f, _N + 2]
     A = facet[f, _REST]
     if yields is not None:
-        _press(work, s, L, law, f, yields, wears)
+        _flatten(work, s, L, law, f, yields, wears)
     for l in range(L):
         pad[_Y0 + l] = m0 * pad[_OLD + l] + m1 * pad[_OLD1 + l]
         pad[_Y1 + l] = m0 * pad[_NEW + l] + m1 * pad[_NEW1 + l]
@@ -587,7 +589,7 @@ def _facet(work, s, L, law, f, ledger, tangent, yields, wears):
         rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
         _slide(pad, s[rs], s[rt], L, law, f, i, ledger, tangent, yields, wears)
     if yields is not None:
-        _relieve(pad, L, law, f, ledger)
+        _subtract_flattened(pad, L, law, f, ledger)
     if wears is not None:
         for l in range(L):
             before = pad[_F0 + l] if yields is None else pad[_FAT0 + l] - pad[_FZ0 + l]
@@ -608,7 +610,7 @@ def _facet(work, s, L, law, f, ledger, tangent, yields, wears):
     if tangent is not None:
         _add_tangent(pad, L, law, f)
         if yields is not None:
-            _soften(pad, L, law, f)
+            _yield_tangent(pad, L, law, f)
 
 
 @_jit
@@ -625,7 +627,7 @@ def _begin(pad, s, d, start, L, law, yields, wears):
         _clear(pad, _P, _J00)  # the offset has one component in a plane, none on closure
     _clear(pad, _PULL1, _C00)
     if wears is not None:
-        _weaken(pad, s, L, law, yields, wears)
+        _worn_friction(pad, s, L, law, yields, wears)
     for i in range(dim):
         row, origin = i * LANES, 0 if i == 0 else dim + i - 1
         for l in range(L):
@@ -667,8 +669,8 @@ def _finish(pad, s, F, C, start, L, law, ledger, tangent, yields, wears):
         slip = _places(law, yields, wears)[1]
         if yields is not None:
             for l in range(L):
-                s[slip - 1, l] += pad[_CRUSHED + l]
-                s[2 * dim - 1, l] += pad[_CRUSHED + l]
+                s[slip - 1, l] += pad[_PLASTIC + l]
+                s[2 * dim - 1, l] += pad[_PLASTIC + l]
         if wears is not None:
             for l in range(L):
                 capacity = 0.5 * pad[_MU + l] * pad[_NORMAL + l]
@@ -742,7 +744,7 @@ def _count(pad, qs, qt, L, law, f, i, yields, wears):
         if yields is not None:
             z = pad[_Z0 + l]
             k = k if y > z else 0.0
-            G = _between(z, pad[_FZ0 + l], y, force, zl, fl, sl, zh, fh, sh, ended)
+            G = _gain(z, pad[_FZ0 + l], y, force, zl, fl, sl, zh, fh, sh, ended)
             z = z if z > zl else zl
         most = k * (y - z if y > z else 0.0)
         G = min(max(G, 0.0), most)
@@ -750,7 +752,7 @@ def _count(pad, qs, qt, L, law, f, i, yields, wears):
             strength = pad[_MU + l] * law.scalars[0] * facet[f, _REST]
         q2 = qs[l] * qs[l] + qt[l] * qt[l]
         limit = np.sqrt(q2) >= strength * (G * (1.0 - LIMIT) - ROUNDED * force)
-        pad[_WHOLE + l] = pad[_WHOLE + l] if limit else 0.0
+        pad[_ALL_SLIP + l] = pad[_ALL_SLIP + l] if limit else 0.0
         pad[_LIMIT + l] += G if limit else 0.0
         soft = 1.0 / (k if k > TINY else 1.0)
         pad[_STORED + l] += compliance * q2 * (soft if k > TINY else 0.0)
@@ -770,7 +772,7 @@ def _effective(pad, s, L, law, f):
 
 
 @_jit
-def _squeeze(work, law, L, energy, potential):
+def _normal_energy(work, law, L, energy, potential):
     """Energy of the normal springs at the row of y, from the table of T; Phi and Phi' beside."""
     pad, piece = work.pad, work.piece
     eta, scale, rise = law.scalars[3], law.scalars[4], law.scalars[5]
@@ -798,22 +800,22 @@ def _measure_facet(work, s, L, law, f, energy, yields, wears):
     M, D = law.depth.shape[0], law.depth.shape[1] - 1
     potential, share = law.facet[f, _POTENTIAL], law.facet[f, _SHARE]
     for l in range(L):
-        pad[_WHOLE + l], pad[_LIMIT + l], pad[_Z0 + l] = 1.0, 0.0, 0.0
+        pad[_ALL_SLIP + l], pad[_LIMIT + l], pad[_Z0 + l] = 1.0, 0.0, 0.0
     if yields is not None:
         at = _places(law, yields, wears)[0] + f
         for l in range(L):
             pad[_Z0 + l] = pad[_Y0 + l] = s[at, l]
-        _squeeze(work, law, L, energy, potential)
+        _normal_energy(work, law, L, energy, potential)
         for l in range(L):
             pad[_FZ0 + l], pad[_FZ1 + l] = pad[_F0 + l], pad[_CURVING + l]
     _effective(pad, s, L, law, f)
-    _squeeze(work, law, L, energy, potential)
+    _normal_energy(work, law, L, energy, potential)
     if yields is not None:
         for l in range(L):
             y, z = pad[_Y0 + l], pad[_Z0 + l]
-            squeezed = pad[_CURVING + l] - pad[_FZ1 + l]
-            squeezed -= potential * pad[_FZ0 + l] * (y - z)
-            pad[_CURVING + l] = squeezed if (y > z) & (squeezed > 0.0) else 0.0
+            normal = pad[_CURVING + l] - pad[_FZ1 + l]
+            normal -= potential * pad[_FZ0 + l] * (y - z)
+            pad[_CURVING + l] = normal if (y > z) & (normal > 0.0) else 0.0
     for i in range(D):
         if law.depth[f, i, 0] >= UNUSED:
             break
@@ -824,7 +826,7 @@ def _measure_facet(work, s, L, law, f, energy, yields, wears):
         if yields is not None:
             force = force - pad[_FZ0 + l] if y > z else 0.0
         pad[_STORED + l] += pad[_CURVING + l]
-        pad[_SLIDING + l] += share * pad[_WHOLE + l] if y > z else 0.0
+        pad[_SLIDING + l] += share * pad[_ALL_SLIP + l] if y > z else 0.0
         pad[_SLIPPING + l] += share * pad[_LIMIT + l] / (force if force > 0.0 else 1.0)
         pad[_APART + l] += 0.0 if y > z else share
         pad[_REACH + l] = y if y > pad[_REACH + l] else pad[_REACH + l]
@@ -844,7 +846,7 @@ def measures(
         s = state[start // W]
         _clear(pad, _SLIDING, _REACH)
         if wears is not None:
-            _weaken(pad, s, L, law, yields, wears)
+            _worn_friction(pad, s, L, law, yields, wears)
         pad[_REACH : _REACH + LANES] = -np.inf
         for f in range(facet.shape[0]):
             _measure_facet(work, s, L, law, f, energy, yields, wears)

@@ -19,7 +19,7 @@ from ..discretisation.tables import UNDERFLOW, Tables
 from ..support.checks import Array
 from .cells import TINY, Cells, cells, compliance, reciprocal
 from .wear import friction, slipped, within_limit
-from .yielding import flattened, plastic_work, press, softening
+from .yielding import flatten, flattened, plastic_work, softening
 
 NEAR = 1e-5  # of y: below such a change of y the chord of G is lost in rounding, the mean is not
 GRAZING = 1e-12  # cosine at which the offset meets its limit: its derivative has a pole at 0
@@ -79,8 +79,8 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
        q += A/c1 chord de; where it fell, the springs that part take their force along,
        q = q kappa1/kappa0 + A/c1 kappa1 de.
     4. Coulomb friction: |q| <= mu lam A G (Eq. 5, 6).
-       Asperities that yield have flattened springs, whose part at the flattened depth is taken off
-       all of these ("Yielding"); with wear mu has fallen, and q comes back to its limit ("Wear").
+       Where asperities yield, Phi, G and kappa are less their values at the flattened depth
+       ("Yielding"). With wear mu has fallen, and q is reduced to its new limit ("Wear").
     5. Traction: F = sum of A Phi n + (1/lam) sum of q (Eq. 21).
     6. Dissipated energy, every term >= 0 ("No step creates energy").
     7. Tangent C = dF/dd ("The tangent"), not without `tangent`.
@@ -96,7 +96,7 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     after = cells(k, effective_closure(k, new.delta[0], offset))
     gained, flat0, flat1 = after.G - before.G, None, None
     if k.yields:
-        new.depth[:] = press(k, old.depth, after.y)
+        new.depth[:] = flatten(k, old.depth, after.y)
         flat0, flat1 = cells(k, old.depth), cells(k, new.depth)
         new.plastic[:] = old.plastic + plastic_work(k, before.y, after.y, flat0, flat1)
         gained = after.G - np.maximum(before.G, flat0.G)
@@ -110,8 +110,8 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     basis = np.stack([k.s, k.t])  # (2, dim, M)
     de = np.einsum("edm,db->emb", basis, d)[:, :, None]  # facet-plane increment (2, M, 1, B)
     sliders = load(k, before, gained, after, strength(k, mu), q, de)
-    whole = sliders.size**2 > TINY  # a size that underflows has no cap
-    new.q[:] = np.where(whole, sliders.share, 0.0) * sliders.trial
+    resolved = sliders.size**2 > TINY  # squares of smaller forces underflow: they count as zero
+    new.q[:] = np.where(resolved, sliders.share, 0.0) * sliders.trial
 
     F = k.n @ (k.area[:, None] * after.force)
     F = F + np.einsum("edm,emb->db", basis, new.q.sum(axis=2)) / k.lam
@@ -165,7 +165,7 @@ def load(
     kappa0, kappa1 = before.kappa, after.kappa
     dy = (after.y - before.y)[:, None]
     near = np.abs(dy) <= NEAR * np.abs(after.y)[:, None]
-    if k.yields:  # flattened springs touch all at once: the mean is wrong where they do
+    if k.yields:  # all flattened springs touch at one closure: the mean is wrong in that step
         near = near & ((kappa0 > 0) | (kappa1 == 0))
     with np.errstate(divide="ignore", invalid="ignore"):
         chord = np.where(near, 0.5 * (kappa0 + kappa1), gained / dy)
@@ -221,7 +221,7 @@ def limited_offset(k: Tables, offset: Array, p: Array) -> tuple[Array, Array, Ar
     J = np.broadcast_to(np.eye(size)[:, :, None], (size, *free.shape)).copy()
     slip = np.zeros(free.shape[1])
     D = k.critical_slip
-    # outside by rounding and on the way in is not at the limit
+    # an offset that is outside by rounding and moves inwards is not at the limit
     held = np.flatnonzero((np.sum(free**2, axis=0) > D * D) & (np.sum(free * p, axis=0) > 0))
     if held.size == 0:
         return free, J, slip
@@ -269,7 +269,7 @@ def stiffness(
     p = np.where(inside, k.curve.curvature(y)[:, None], 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         chord_slope = np.where(sliders.near, p / 2, (kappa - chord) / (y - before.y)[:, None])
-    # where rounding would decide: what did not close has not grown, what is at its limit slips
+    # rounding must not decide: a facet that did not close has not grown; q at its limit slips
     stiffer = grows & ((y - before.y) > ROUNDED * np.abs(y))[:, None]
     v = np.where(stiffer, a * chord_slope * de, p * reciprocal(kappa) * trial)
     beta = np.where(sliders.cap > 0, a * np.where(grows, chord, kappa), 0.0)
@@ -323,11 +323,11 @@ def measures(k: Tables, state: Array) -> Measures:
     total = np.where(force > 0, force, 1.0)
     slipping = np.sum(weight * np.sum(np.where(capped, G, 0.0), axis=1) / total, axis=0)
     separated = np.sum(weight * ~touches, axis=0)
-    squeezed = k.curve.energy(y)
+    normal = k.curve.energy(y)
     if k.yields:
         depth = state_now.depth
-        squeezed = squeezed - k.curve.energy(depth) - k.curve.force(depth)[0] * (y - depth)
-        squeezed = np.where(touches, np.maximum(squeezed, 0.0), 0.0)
-    stored = np.sum((k.area * k.c1)[:, None] * squeezed, axis=0)
+        normal = normal - k.curve.energy(depth) - k.curve.force(depth)[0] * (y - depth)
+        normal = np.where(touches, np.maximum(normal, 0.0), 0.0)
+    stored = np.sum((k.area * k.c1)[:, None] * normal, axis=0)
     stored = stored + np.sum(compliance(k) * q2 * reciprocal(now.kappa), axis=(0, 1))
     return Measures(sliding, slipping, separated, stored, np.max(y, axis=0))

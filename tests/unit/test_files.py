@@ -22,7 +22,6 @@ KINDS = {
     "plane": {"plane": -1 / 3, "critical_slip": 1 / 3e4},
     "closure only": {"closure_only": True},
     "own resolution": {"resolution": jl.Resolution(3, 5, 7)},
-    "front": {"resolution": jl.Resolution(3, 5, 7, front=True)},
     "named resolution": {"resolution": "fine"},
     "default range": {"closure_range": None},
 }

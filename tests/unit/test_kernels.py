@@ -49,9 +49,7 @@ def random_law(make_law, seed):
         heights=heights,
         plane=[None, 0.0, 0.7][rng.integers(3)],
         critical_slip=[np.inf, 8e-7][seed % 2],
-        resolution=jl.Resolution(
-            int(rng.integers(1, 4)), int(rng.integers(3, 6)), 1 + seed % 6, front=seed % 9 > 6
-        ),
+        resolution=jl.Resolution(int(rng.integers(1, 4)), int(rng.integers(3, 6)), 1 + seed % 6),
     )
 
 

@@ -27,9 +27,7 @@ def random_law(seed):
         eta=float(eta),
         mu=rng.uniform(0.05, 1.2),
         formation=formation,
-        resolution=jl.Resolution(
-            *(int(rng.integers(*r)) for r in ((1, 4), (3, 6), (1, 6))), front=seed % 5 > 2
-        ),
+        resolution=jl.Resolution(*(int(rng.integers(*r)) for r in ((1, 4), (3, 6), (1, 6)))),
         critical_slip=rng.uniform(0.1, 0.6) if seed % 3 == 2 else np.inf,
     )
 

@@ -48,10 +48,6 @@ def test_the_bed_of_many_springs_forgets_once(eta):
     assert 1.0 - 1.1 * (1.0 - (1.0 - amplitude) ** eta) < once < (1.0 - amplitude) ** eta + 0.01
     # one cell, over the same cycles, forgets twenty times as much; a cell as thin as the cycle none
     assert forgetting((20,), 1, amplitude, eta)[0] < 1.0 - 10.0 * (1.0 - once)
-    # one cell with a front forgets once, too: at first what all of the cell holds, as above
-    fronted = forgetting((1, 20), 1, amplitude, eta, front=True)
-    assert fronted[0] == pytest.approx((1.0 - amplitude) ** eta, abs=1e-5)
-    assert fronted[1] == pytest.approx(fronted[0], abs=1e-5)
 
 
 def test_many_tiny_steps_are_one_large_step():

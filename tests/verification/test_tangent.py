@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 from builders import law
 
-import jointlaw as jl
-
 STEPS = np.geomspace(3e-3, 3e-7, 30)  # in closure ranges
 
 # name: law, steps that lead to the state, the step whose tangent is checked
@@ -32,7 +30,6 @@ OPTIONS = {
     "critical slip": {"critical_slip": 0.2},
     "at the critical slip, heights": {"critical_slip": 0.12, "formation": "population"},
     "concave stiffness": {"eta": 0.2},
-    "front": {"resolution": jl.Resolution(5, 7, 8, front=True)},
 }
 
 

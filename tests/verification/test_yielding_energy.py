@@ -17,8 +17,8 @@ from jointlaw.kernels import reference as kernel
 PATHS = int(os.environ.get("JOINTLAW_PATHS", 2))
 
 
-def random_law(rng, held, wears, front=False):
-    """Any law of few facets that yields; `held` has a critical slip, `front` a front per facet."""
+def random_law(rng, held, wears):
+    """Any law of few facets that yields; `held` has a critical slip."""
     a = float(rng.choice([1.0, rng.uniform(1.0, 1.6), rng.uniform(1.6, 5.0), 10.0]))
     b, mu = rng.uniform(-1.0, 2.0), rng.uniform(0.0, 1.2) * (rng.random() < 0.8)
     formation = [None, "population", "individual"][rng.integers(3)]
@@ -30,7 +30,7 @@ def random_law(rng, held, wears, front=False):
     return law(
         a=a, b=b, c=rng.uniform(-1.0, 1.0) * (1 / 3 - b / 6), lam=rng.uniform(0.3, 2.0),
         eta=float(eta), mu=mu, damage=damage, formation=formation,
-        resolution=jl.Resolution(int(rng.integers(1, 4)), int(rng.integers(3, 5)), 3, front),
+        resolution=jl.Resolution(int(rng.integers(1, 4)), int(rng.integers(3, 5)), 3),
         critical_slip=rng.uniform(0.1, 0.6) if held else np.inf,
     )  # fmt: skip
 
@@ -54,7 +54,7 @@ def scale(k, state):
 @pytest.mark.parametrize("seed", range(PATHS))
 def test_no_step_of_a_closed_path_makes_energy(seed, held, wears):
     rng = np.random.default_rng(seed)
-    k = random_law(rng, held, wears, seed % 2 > 0).tables
+    k = random_law(rng, held, wears).tables
     corners = random_corners(rng, 1)[0]
     corners[-1] = 0.0
     state, gains, peak = np.zeros((k.rows, 1)), [], 0.0
@@ -73,7 +73,7 @@ def test_no_step_of_a_closed_path_makes_energy(seed, held, wears):
 def test_no_cycle_that_is_searched_for_returns_work(seed):
     """An adversary: of many triangles from one state that with the least loss, and its children."""
     rng = np.random.default_rng(seed)
-    one = random_law(rng, bool(seed % 2), bool(seed // 2 % 2), seed % 2 > 0)
+    one = random_law(rng, bool(seed % 2), bool(seed // 2 % 2))
     first = random_corners(rng, 1, legs=3)[0]
     first[-1, 0] = rng.uniform(0.2, 0.8)  # in touch
     d = np.diff(first, axis=0, prepend=0.0)

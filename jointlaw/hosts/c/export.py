@@ -121,7 +121,7 @@ def _scalars(law: JointLaw) -> dict[str, int | float]:
         "eta": k.curve.eta,
         "scale": k.curve.scale,
         "rise": float(k.curve.rise),
-        "closure_factor": law._virgin.factor,
+        "closure_factor": law._first_loading.factor,
         "stiffness_factor": (max(1.0, 1.0 / p.lam) + p.mu) * float(np.sum(k.area / k.c1)),
         "largest_reach": law.largest_reach,
         "stretch": 1.0 + 2.0 * float(np.max(np.abs(k.m))),

@@ -72,14 +72,14 @@ def drift(changes, cycles, amplitudes=AMPLITUDES, shakedown=SHAKEDOWN):
     return settled, worst(moved), worst(np.abs(mean - loss) / energy)
 
 
-def sticky(depth, eta=0.5, front=False):
+def sticky(depth, eta=0.5):
     """A law of flat faces that hardly slip."""
-    return build(resolution=jl.Resolution(1, 3, depth, front), a=1e6, mu=10.0, eta=eta)
+    return build(resolution=jl.Resolution(1, 3, depth), a=1e6, mu=10.0, eta=eta)
 
 
-def forgetting(counts, depth, amplitude, eta=0.5, front=False):
+def forgetting(counts, depth, amplitude, eta=0.5):
     """Share of a locked-in shear force that so many small normal cycles (amplitude of y) leave."""
-    joint = sticky(depth, eta, front).joints(1)
+    joint = sticky(depth, eta).joints(1)
     joint.update([[SCALE, 0.0, 0.0]])
     F = joint.update([[0.0, 0.1 * SCALE, 0.0]], tangent=False)[0]
     locked, d, left = F[0, 1], np.array([[amplitude * SCALE, 0.0, 0.0]]), []

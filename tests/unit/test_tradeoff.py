@@ -15,13 +15,18 @@ CHOSEN = ["fast", "balanced", jl.Resolution(1, 3, 1), "fast"]
 
 @pytest.fixture(scope="module")
 def found():
+    """Against a reference of fewer nodes than usual, for the time it takes."""
     law = jl.JointLaw(
         orientation=jl.Orientation(6.0),
         asperity=jl.Asperity(K=2.0e8, lam=1.2, eta=0.5, mu=0.3),
         asperity_density=1e10,
         plane=0.0,
     )
-    return law.tradeoff(CHOSEN, joints=0)
+    with pytest.MonkeyPatch.context() as patch:
+        for module in ("suite", "tradeoff"):
+            name = f"jointlaw.accuracy.{module}.reference_resolution"
+            patch.setattr(name, lambda law: jl.Resolution(8, 12, 24))
+        return law.tradeoff(CHOSEN, joints=0)
 
 
 def test_each_resolution_has_its_price(found):

@@ -145,11 +145,6 @@ def test_contact_numbers_by_direction_are_eq_16(law):
     assert law.contacts([0.0, 1e-6]).shape == (2,)
 
 
-def test_without_heights_all_asperities_touch_at_once(make_law):
-    law = make_law(heights=None)
-    assert law.contacts([-1e-9, 0.0, 1e-9]).tolist() == [0.0, 0.0, 1e10]
-
-
 def test_stiffness_bound_and_time_step(any_law):
     joint = any_law.joint()
     dim = any_law.tables.dim
@@ -159,9 +154,3 @@ def test_stiffness_bound_and_time_step(any_law):
     assert np.linalg.norm(C, 2) <= bound
     step = any_law.critical_time_step(mass=2.0, area=0.5, closure=y)
     assert step == pytest.approx(2 * math.sqrt(2.0 / (0.5 * bound)), rel=1e-14)
-
-
-def test_time_step_of_an_open_joint_is_unbounded(law):
-    assert law.critical_time_step(1.0, 1.0, 0.0) == math.inf
-    steps = law.critical_time_step(1.0, [1.0, 2.0], [0.0, 1e-7])
-    assert steps.tolist() == [math.inf, law.critical_time_step(1.0, 2.0, 1e-7)]

@@ -6,6 +6,8 @@ from extremes.control import STRESSES, close, shear
 
 import jointlaw as jl
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("preset", jl.presets.names())
 @pytest.mark.parametrize("test", [close, shear])

@@ -1,4 +1,4 @@
-"""Snapshots and replay files whose writing is killed, fails, or happens twice at once."""
+"""Snapshots whose writing is killed, fails, or happens twice at once."""
 
 import multiprocessing
 import time
@@ -9,7 +9,8 @@ import pytest
 from extremes.laws import SCALE, build
 
 import jointlaw as jl
-from jointlaw.cli.main import main
+
+pytestmark = pytest.mark.slow
 
 FAST = jl.Resolution(1, 3, 1)
 
@@ -58,38 +59,3 @@ def test_threads_that_write_one_file_at_once_leave_a_whole_file(tmp_path):
                 done.result()
             assert whole(path)
     assert [p.name for p in tmp_path.iterdir()] == ["state.npz"]
-
-
-@pytest.mark.parametrize("broken", ["write_bytes", "replace"])
-def test_a_replay_file_that_cannot_be_written_hides_no_error(tmp_path, monkeypatch, broken):
-    """The step is refused, nothing moves, and no half a file is left."""
-    monkeypatch.setenv("JOINTLAW_REPLAY_DIR", str(tmp_path))
-    joint = build().joint()
-    joint.update([0.3 * SCALE, 0.0, 0.0])
-    before = joint.snapshot().values
-
-    def fail(*_, **__):
-        raise OSError("disk full")
-
-    if broken == "replace":
-        monkeypatch.setattr("os.replace", fail)
-    else:
-        real = type(tmp_path).write_bytes
-        monkeypatch.setattr(
-            type(tmp_path), "write_bytes", lambda path, data: (real(path, data[:9]), fail())
-        )
-    with pytest.raises(jl.NonFiniteError, match="no replay file could be written") as error:
-        joint.update([1e300, 0.0, 0.0])
-    assert error.value.replay is None
-    np.testing.assert_array_equal(joint.snapshot().values, before)
-    assert not list(tmp_path.iterdir())
-
-
-def test_half_a_replay_file_is_refused(tmp_path, monkeypatch, capsys):
-    monkeypatch.setenv("JOINTLAW_REPLAY_DIR", str(tmp_path))
-    with pytest.raises(jl.NonFiniteError) as error:
-        build().joint().update([1e300, 0.0, 0.0])
-    path = error.value.replay
-    path.write_bytes(path.read_bytes()[:-50])
-    assert main(["replay", str(path)]) == 2
-    assert "is not a replay file" in capsys.readouterr().err

@@ -4,6 +4,8 @@ import pytest
 from extremes.fuzz import FOUND, fuzz
 from extremes.laws import COMPILED
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(autouse=True)
 def replays(tmp_path, monkeypatch):

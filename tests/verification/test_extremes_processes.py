@@ -16,6 +16,8 @@ from extremes.laws import COMPILED, SCALE, build
 
 import jointlaw as jl
 
+pytestmark = pytest.mark.slow
+
 FAST = jl.Resolution(1, 3, 1)
 LAWS = ({"mu": 0.3}, {"a": 1.0, "eta": 0.0}, {"heights": "printed, individual"}, {"lam": 10.0})
 
@@ -37,21 +39,6 @@ def test_threads_with_laws_and_joints_of_their_own():
         together = list(pool.map(walk, TASKS))
     for task, F in zip(TASKS, together, strict=True):
         np.testing.assert_array_equal(F, walk(task))
-
-
-def test_threads_with_joints_of_one_law():
-    law = build(resolution=FAST)
-
-    def one(seed):
-        joints = law.joints(100)
-        for d in path(np.random.default_rng(seed), 100, 20, SCALE)[0]:
-            F, _ = joints.update(d)
-        return F
-
-    with ThreadPoolExecutor(8) as pool:
-        together = list(pool.map(one, range(8)))
-    for seed, F in enumerate(together):
-        np.testing.assert_array_equal(F, one(seed))
 
 
 def go_on(batch):

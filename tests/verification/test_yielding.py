@@ -52,6 +52,7 @@ def test_first_loading_in_closed_form_is_that_of_many_cells():
             assert one.closure(one.normal_stress(u)) == pytest.approx(u, rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("interference", "critical_slip"),
     [(0.3, np.inf), (0.1, np.inf), (0.05, np.inf), (0.1, 0.3)],
@@ -86,6 +87,7 @@ def test_tractions_agree_with_the_slow_bed(interference, critical_slip):
         assert np.allclose(joints.plastic_work, crushed, rtol=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", [{}, {"yield_interference": 0.1}])
 def test_wear_agrees_with_the_slow_bed(damage):
     damage = damage | {"mu_residual": 0.15, "wear_slip": 0.5}

@@ -106,18 +106,3 @@ def in_the_bed(counts, amplitude, eta=0.5, springs=4000):
             F = bed.update([amplitude, 0.0, 0.0])
         left.append(F[1] / locked)
     return left
-
-
-def small_steps(counts, n=32, seed=2):
-    """Largest change of F, of |F|, of elastic loading in n steps against one step, per count."""
-    law = build(mu=1e6, resolution=jl.Resolution(2, 3, 3))
-    rng = np.random.default_rng(seed)
-    d = rng.normal(size=(n, 3)) * SCALE * [0.0, 0.01, 0.01] + [SCALE, 0.0, 0.0]
-    whole = law.joints(n).update(d, tangent=False)[0]
-    gaps = []
-    for count in counts:
-        joints = law.joints(n)
-        for _ in range(count):
-            F = joints.update(d / count, tangent=False)[0]
-        gaps.append(float(np.max(np.abs(F - whole) / np.linalg.norm(whole, axis=1)[:, None])))
-    return gaps

@@ -245,12 +245,3 @@ def test_names_and_options(tmp_path, law, capsys):
     assert jointlaw.cli.main.main(options) == 2
     assert "--closure shapes a table for YADE" in capsys.readouterr().err
     assert not (tmp_path / "new").exists()
-
-
-def test_every_preset_is_exported(lib, tmp_path):
-    for name in jl.presets.names():
-        law = jl.presets.load(name)
-        joint = CLaw(lib, law, tmp_path)
-        d = np.full(joint.dim, 0.1 * law.closure_range)
-        F, _ = law.joint().update(d)
-        assert joint.step(d)[0] == pytest.approx(F, rel=1e-12, abs=1e-12 * np.abs(F).max())

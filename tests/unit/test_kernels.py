@@ -237,17 +237,6 @@ def test_threads_change_no_bit(make_law, monkeypatch, seed):
             np.testing.assert_array_equal(a, b)
 
 
-def test_a_joint_takes_any_numbers(both, law):
-    for joint in both(law.joint):
-        expected, _ = joint.trial([2.0, 1.0, 0.0])
-        for d in ([2, 1, 0], (2.0, 1, 0), np.array([2, 1, 0], ">f8"), np.arange(6.0)[::-1][3::1]):
-            np.testing.assert_array_equal(joint.trial(d)[0], expected)
-        with pytest.raises(ValueError, match="shape"):
-            joint.update([1e-6])
-        with pytest.raises(ValueError, match="not an array of numbers"):
-            joint.update(["1", "0", "0"])
-
-
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [

@@ -38,13 +38,6 @@ class Slip(NamedTuple):
     dilation: Array
     counts: NDArray[np.bool_]
 
-    def errors(self, other: Slip) -> tuple[Array, Array]:
-        """Largest and rms |F - other F| (paths,) over the path's largest, where friction counts."""
-        peak = np.linalg.norm(other.F, axis=2).max(axis=0, where=other.counts, initial=0.0)
-        off = np.linalg.norm(self.F - other.F, axis=2)
-        mean = np.mean(off**2, axis=0, where=other.counts)
-        return off.max(axis=0, where=other.counts, initial=0.0) / peak, np.sqrt(mean) / peak
-
     def apart(self, other: Slip) -> tuple[float, float]:
         """Largest difference of the friction and of the dilation angle, in degrees."""
         friction = np.abs(self.friction - other.friction)[self.counts]

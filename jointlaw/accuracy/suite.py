@@ -120,7 +120,7 @@ class Suite:
         if self.slip is None:
             return Miss(largest, rms, math.nan, math.nan)
         mine = slip(law, law.closure_range, self.stress, self.ways)
-        more = mine.errors(self.slip)
+        more = errors(mine.F, self.slip.F, self.slip.counts)
         largest, rms = np.append(largest, more[0]), np.append(rms, more[1])
         return Miss(largest, rms, *mine.apart(self.slip))
 
@@ -179,11 +179,15 @@ def tangents(law: Law, d: Array) -> Array:
     return C
 
 
-def errors(F: Array, reference: Array) -> tuple[Array, Array]:
-    """Largest and rms |F - reference| (steps, paths, dim) over the path's largest |reference|."""
-    peak = np.linalg.norm(reference, axis=2).max(axis=0)
+def errors(F: Array, reference: Array, counts: Any = True) -> tuple[Array, Array]:
+    """Largest and rms |F - reference| (steps, paths, dim) over the path's largest |reference|.
+
+    counts: (steps, paths), which steps count; all by default.
+    """
+    peak = np.linalg.norm(reference, axis=2).max(axis=0, where=counts, initial=0.0)
     off = np.linalg.norm(F - reference, axis=2)
-    return off.max(axis=0) / peak, np.sqrt(np.mean(off**2, axis=0)) / peak
+    mean = np.mean(off**2, axis=0, where=counts)
+    return off.max(axis=0, where=counts, initial=0.0) / peak, np.sqrt(mean) / peak
 
 
 def _paths(law: Law, stress: float) -> tuple[tuple[str, ...], Array, Array]:

@@ -23,7 +23,6 @@ SPREAD = tuple(
     for u, phi in ((1, 3), (2, 3), (3, 3), (3, 5), (5, 6), (8, 8))
     for depth in (1, 2, 3, 4, 6, 10, 16)
 )
-CLEAR = {"color": "white", "alpha": 0.8, "pad": 0.5}  # behind names
 ROUNDING = 1e-6  # a smaller share by which errors differ is none
 _MEMORY = 100_000_000  # bytes of state that a timing may use; very fine laws get a smaller batch
 
@@ -171,22 +170,14 @@ class Tradeoff:
                         at = (getattr(row, costs[0]), 100 * row.worst)
                         axis.plot(*at, "s", color="k", ms=6, mfc="none")
                         axis.annotate(name, at, (0, 6), textcoords="offset points", fontsize=8,
-                                      ha="right" if name == "reference" else "left",
-                                      bbox=CLEAR)  # fmt: skip
+                                      ha="right" if name == "reference" else "left")  # fmt: skip
             floor = 100 * float(self.uncertainty.max())
-            axis.axhline(floor, color="0.6", lw=1, ls=":")
+            axis.axhline(floor, color="0.6", lw=1, ls=":", label="uncertainty of the reference")
             axis.set_xlabel(label)
             axis.grid(True, which="both", alpha=0.2)
-            for scale in (axis.xaxis, axis.yaxis):
-                scale.set_major_formatter(lambda value, _: f"{value:g}")
-        axes[0, 0].text(0.02, floor * 1.08, "uncertainty of the reference", fontsize=7, color="0.4",
-                        transform=axes[0, 0].get_yaxis_transform())  # fmt: skip
         axes[0, 0].set_ylabel("largest error of the traction (% of the path's peak)")
-        low = min(floor, 100 * min(r.worst for r in self.rows))
-        axes[0, 0].set_ylim(0.7 * low, 150 * max(r.worst for r in self.rows))
-        if timed:
-            axes[0, 1].legend(title=f"{self.joints} joints, {self.how}", fontsize=8,
-                              title_fontsize=8, loc="upper right")  # fmt: skip
+        title = f"{self.joints} joints, {self.how}" if timed else None
+        axes[0, -1].legend(title=title, fontsize=8, title_fontsize=8, loc="upper right")
         return written(figure, path)
 
 

@@ -86,3 +86,13 @@ def test_light_facets_have_fewer_cells_and_all_are_counted():
     assert k.cells == cells.max() > cells.min() == 1
     assert k.sliders == cells.sum() < len(cells) * k.cells
     assert (np.diff(cells[np.argsort(k.weight)]) >= 0).all()  # c = 0: weights of a ring are equal
+
+
+def test_a_front_is_refused_with_what_to_take_instead(make_law):
+    with pytest.raises(ValueError, match=r"resolution\.front is removed: take more depth cells"):
+        jl.Resolution(3, 6, 3, front=True)
+    law = make_law(resolution=jl.Resolution(3, 5, 7))
+    text = law.to_toml()
+    assert jl.JointLaw.from_toml(text.replace("depth = 7", "depth = 7, front = false")) == law
+    with pytest.raises(ValueError, match=r"TOML text: resolution\.front is removed"):
+        jl.JointLaw.from_toml(text.replace("depth = 7", "depth = 7, front = true"))

@@ -19,7 +19,6 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
 
-import matplotlib.pyplot as plt  # noqa: E402
 import nodes  # noqa: E402
 import numpy as np  # noqa: E402
 import reductions  # noqa: E402
@@ -29,7 +28,6 @@ from _pages import DATA, HERE, fill, has, load, save, table  # noqa: E402
 
 import dem_demo  # noqa: E402
 import jointlaw as jl  # noqa: E402
-from jointlaw.accuracy.cycles import AMPLITUDES, OPENINGS, cycles, exact_cycles  # noqa: E402
 from jointlaw.parameters.resolution import NAMED  # noqa: E402
 
 PAGES = "how-accurate.md", "accuracy-measured.md", "only-what-is-needed.md"
@@ -185,76 +183,6 @@ def angles():
     return table(head, rows)
 
 
-def damping():
-    """Loss and stiffness of small cycles by amplitude and resolution; their picture."""
-    law = replace(jl.presets.load("westerly-rough"), plane=0.0)
-    exact, R = exact_cycles(law), law.closure_range
-    found = {name: cycles(replace(law, resolution=name), R) for name in NAMED}
-    save_damping(found | {"exact law": exact})
-    for name in ("fast", "balanced", "fine"):
-        found[f"{name}, fronts"] = cycles(
-            replace(law, resolution=replace(NAMED[name], front=True)), R
-        )
-    shown = range(0, len(AMPLITUDES), 4)
-    rows = [[name, *(f"{one.loss[i] / exact.loss[i]:.2f}" for i in shown),
-             f"{np.abs(one.secant / exact.secant - 1).max():.1%}",
-             *(f"{share:.1%}" for share in one.kept)]
-            for name, one in found.items()]  # fmt: skip
-    rows.append(["exact law (amplitude columns: damping ratio)",
-                 *(f"{exact.damping[i]:.2%}" for i in shown), "",
-                 *(f"{share:.1%}" for share in exact.kept)])  # fmt: skip
-    head = ["resolution", *(f"{AMPLITUDES[i]:.2g}" for i in shown),
-            "stiffness", *(f"kept, {opening:g}" for opening in OPENINGS)]  # fmt: skip
-    return table(head, rows)
-
-
-def save_damping(found):
-    """Damping ratio and reduction of the secant stiffness against amplitude."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9.5, 4.2), layout="constrained")
-    stiffest = found["exact law"].secant[0]
-    for name, one in found.items():
-        style = {"color": "k", "lw": 2, "zorder": 1} if name == "exact law" else {"lw": 1.2}
-        left.plot(AMPLITUDES, 100 * one.damping, label=name, **style)
-        right.plot(AMPLITUDES, one.secant / stiffest, label=name, **style)
-    left.set_ylabel("damping ratio (%)")
-    left.set_yscale("log")
-    left.set_ylim(0.01, 60)
-    left.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    right.set_ylabel("secant stiffness over its largest (1)")
-    right.set_ylim(0, 1.05)
-    for axis in (left, right):
-        axis.set_xscale("log")
-        axis.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
-        axis.set_xlabel("amplitude over closure range (1)")
-        axis.grid(True, which="both", alpha=0.2)
-    left.legend(fontsize=8)
-    figure.savefig(PICTURES / "damping.png", dpi=120)
-    plt.close(figure)
-
-
-def all_presets():
-    """Largest misses of small cycles over all presets, in one plane and in space."""
-    rows = []
-    for name in jl.presets.names():
-        cells = []
-        for plane in (0.0, None):
-            law = replace(jl.presets.load(name), plane=plane)
-            exact = exact_cycles(law)
-            for resolution in NAMED:
-                made = replace(law, resolution=resolution)
-                loss, _, kept = cycles(made, law.closure_range).missed(exact)
-                cells.append(f"{loss.max():.0%}, {kept.max():.0%}")
-        rows.append([name, *cells])
-    where = ("plane", "space")
-    return table(
-        [
-            "error of the loss, error of the share kept",
-            *(f"{n}, {w}" for w in where for n in NAMED),
-        ],
-        rows,
-    )
-
-
 PARTS = {
     "price-list": price_list,
     "peers-smooth": peers,
@@ -268,8 +196,6 @@ PARTS = {
     "slip": slip,
     "plane": plane,
     "angles": angles,
-    "damping": damping,
-    "damping-presets": all_presets,
     "ingredients": ingredients,
 }
 

@@ -24,7 +24,7 @@ ROOT = HERE.parent
 TIMES = "price-list", "peers-smooth", "peers-rough", "million", "savings"
 LAST = ("ingredients",)  # of what other tasks write
 ACCURACY = (*make_accuracy.SCENES, *make_accuracy.PARTS)
-EXTREMES = ("matrix", "fuzz", "drift", "dynamics", "impact", "exact", "control", "steps",
+EXTREMES = ("matrix", "fuzz", "drift", "dynamics", "impact", "exact", "control",
             "forgetting")  # fmt: skip
 PICTURES = tuple(make_pictures.RUNS)
 PRINTED = {

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .discretisation.facets import Facets, facet_sum, facets, yield_sum
+from .discretisation.facets import Facets, facets
+from .discretisation.first_loading import FirstLoading, facet_sum
 from .discretisation.tables import UNDERFLOW, VERSION, Tables, largest_reach, tables
-from .discretisation.virgin_curve import VirginClosure, VirginCurve, virgin_curve
+from .discretisation.virgin_curve import VirginCurve, virgin_curve
 from .joints.batch import JointBatch
 from .joints.crushed import warn_if_crushed
 from .joints.joint import Joint
@@ -25,7 +26,7 @@ from .parameters.asperity import Asperity
 from .parameters.fingerprint import fingerprint
 from .parameters.heights import GammaHeights, HeightDistribution, Heights
 from .parameters.orientation import Orientation
-from .parameters.resolution import NAMED, Resolution, resolve
+from .parameters.resolution import LOSS_REMOVED, NAMED, Resolution, resolve
 from .support.checks import Array, above, finite, number
 
 if TYPE_CHECKING:
@@ -102,8 +103,8 @@ class JointLaw:
             if self.closure_range is None:
                 set_(self, "closure_range", self._default_range())
             set_(self, "closure_range", above("closure_range", self.closure_range, 0.0))
-            lengths = np.array([self.critical_slip, self.asperity.yield_interference])
-            set_(self, "resolution", resolve(asked, *(lengths / self.closure_range)))
+            lengths = self.critical_slip, self.asperity.yield_interference, self.closure_range
+            set_(self, "resolution", resolve(asked, *lengths))
             self._require_numbers(self.closure_range)  # and check the virgin curve
 
     # ----------------------------------------------------------------- joints
@@ -261,7 +262,7 @@ class JointLaw:
 
         return tradeoff(self, resolutions, joints, seconds)
 
-    def at_tolerance(self, tolerance: float, loss: float | None = None) -> JointLaw:
+    def at_tolerance(self, tolerance: float, loss: None = None) -> JointLaw:
         """This law at the resolution with the fewest sliders that is this accurate.
 
         tolerance: largest error of the traction on a path, as a share of the path's largest
@@ -270,15 +271,14 @@ class JointLaw:
         closure ranges, where friction is mobilised (`jointlaw.accuracy.suite`); nothing is timed,
         so the answer is the same on every machine. Takes seconds to a minute, below 0.01 minutes,
         without the compiled kernel more.
-        loss: if given, small cycles keep their damping as well: the work lost in a cycle of shear
-        at constant closure misses the exact one by at most this share, at every amplitude from
-        0.001 to 1 closure range (`jointlaw.accuracy.cycles`). That takes many depth cells: 0.25
-        asks for some hundred times the sliders of "balanced".
+        loss: of former versions, refused; small cycles need more depth cells (docs/sharp-bits.md).
         Raises ValueError where no resolution tried is that accurate.
         """
         from .accuracy.tolerance import at_tolerance
 
-        return at_tolerance(self, tolerance, loss)
+        if loss is not None:
+            raise ValueError(LOSS_REMOVED)
+        return at_tolerance(self, tolerance)
 
     # ---------------------------------------------------------------- tables
 
@@ -299,7 +299,7 @@ class JointLaw:
         r = self.resolution
         return tables(
             self.facets, self.curve, self.asperity, self.asperity_density,
-            self.closure_range, r.depth, self.critical_slip, r.front,
+            self.closure_range, r.depth, self.critical_slip,
         )  # fmt: skip
 
     @cached_property
@@ -321,11 +321,9 @@ class JointLaw:
         return self.facets.scale(self.asperity, self.asperity_density)
 
     @cached_property
-    def _first_loading(self) -> VirginClosure:
-        """Closure without shear of asperities that yield."""
-        p, theta = self.asperity, self.facets.theta
-        elastic = facet_sum(theta, self._scale, p.lam, p.mu)
-        return VirginClosure(self.curve, elastic, yield_sum(theta, self._scale, p))
+    def _first_loading(self) -> FirstLoading:
+        """Closure without shear."""
+        return FirstLoading.of(self.curve, self.facets.theta, self._scale, self.asperity)
 
     def _default_range(self) -> float:
         """The closure (m) at 20 MPa of elastic asperities: those that yield may not bear it."""
@@ -333,7 +331,7 @@ class JointLaw:
         fixed = facets(self.orientation, r.u, r.phi, self.plane, self.closure_only)
         elastic = facet_sum(fixed.theta, fixed.scale(p, self.asperity_density), p.lam, p.mu)
         try:
-            return VirginClosure(self.curve, elastic).closure(DEFAULT_STRESS, 1.0)
+            return FirstLoading(self.curve, elastic).closure(DEFAULT_STRESS, 1.0)
         except ValueError:
             self._require_numbers(1.0)  # most often the units are wrong
             raise

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..joints.batch import JointBatch
+from ..laboratory.normal_control import NormalCondition, closing_increments
 from ..support.checks import Array
 
 if TYPE_CHECKING:
@@ -25,8 +25,7 @@ DIRECTIONS = (0.0, 25.0, 90.0)  # degrees, in space
 MOBILISED = 0.2  # of a critical slip, or without one of 10 closure ranges: friction from there on
 _FIRST = 0.1  # first step, in closure ranges
 _FAR, _ENDLESS = 3.0, 30.0  # critical slips; closure ranges without critical slip
-_HELD = 1e-5  # of the normal stress
-_TRIES = 60
+HELD = 1e-5  # of the normal stress
 
 
 class Slip(NamedTuple):
@@ -40,13 +39,6 @@ class Slip(NamedTuple):
     friction: Array
     dilation: Array
     counts: NDArray[np.bool_]
-
-    def errors(self, other: Slip) -> tuple[Array, Array]:
-        """Largest and rms |F - other F| (paths,) over the path's largest, where friction counts."""
-        peak = np.linalg.norm(other.F, axis=2).max(axis=0, where=other.counts, initial=0.0)
-        off = np.linalg.norm(self.F - other.F, axis=2)
-        mean = np.mean(off**2, axis=0, where=other.counts)
-        return off.max(axis=0, where=other.counts, initial=0.0) / peak, np.sqrt(mean) / peak
 
     def apart(self, other: Slip) -> tuple[float, float]:
         """Largest difference of the friction and of the dilation angle, in degrees."""
@@ -92,7 +84,7 @@ def slip(law: Law, closure_range: float, stress: float, ways: Array) -> Slip:
     rise, rate = np.empty(F.shape[:2]), np.zeros(len(goal))
     for k, steps in enumerate(np.concatenate([leg, -leg])):
         step = np.column_stack([rate * steps, steps[:, None] * along])
-        step[:, 0] = _held(batch, step, goal, np.abs(steps) + R)
+        step[:, 0] = closing_increments(batch, step, NormalCondition(goal, goal), HELD)
         F[k], _ = batch.update(step, tangent=False)
         rate = step[:, 0] / steps
         rise[k] = -step[:, 0] / np.abs(steps)
@@ -106,25 +98,3 @@ def slip(law: Law, closure_range: float, stress: float, ways: Array) -> Slip:
 def names(dim: int) -> tuple[str, ...]:
     """What the paths are called."""
     return tuple(f"slip {way:g} at S/{2 / share:g}" for share, way, _ in standard_ways(dim))
-
-
-def _held(batch: JointBatch, step: Array, goal: Array, reach: Array) -> Array:
-    """Closure increments (n,) that give the normal stresses `goal`: Newton within a bracket."""
-    step, u = step.copy(), step[:, 0].copy()
-    low, high = np.full_like(u, -np.inf), np.full_like(u, np.inf)
-    for _ in range(_TRIES):
-        step[:, 0] = u
-        F, C = batch.trial(step)
-        assert C is not None
-        off = F[:, 0] / goal - 1.0
-        if np.abs(off).max() < _HELD:
-            break
-        low, high = np.where(off <= 0, u, low), np.where(off > 0, u, high)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            new = u - off * goal / C[:, 0, 0]
-        new = np.where(np.isfinite(new), np.clip(new, u - reach, u + reach), u + reach)
-        with np.errstate(invalid="ignore"):
-            middle = 0.5 * (low + high)
-        inside = (new > low) & (new < high) | ~np.isfinite(middle)
-        u = np.where(np.abs(off) < 0.1 * _HELD, u, np.where(inside, new, middle))
-    return u

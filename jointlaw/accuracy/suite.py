@@ -33,15 +33,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from ..laboratory.normal_control import NormalCondition, closing_increments
 from ..parameters.resolution import Resolution
 from ..support.checks import Array
 from ..support.progress import track
-from .slip import Slip, distance, names, random_ways, slip, standard_ways
+from .slip import HELD, Slip, distance, names, random_ways, slip, standard_ways
 
 if TYPE_CHECKING:
     from ..law import JointLaw
@@ -107,7 +108,7 @@ class Suite:
         if self.slip is None:
             return Miss(largest, rms, math.nan, math.nan)
         mine = slip(law, law.closure_range, self.stress, self.ways)
-        more = mine.errors(self.slip)
+        more = errors(mine.F, self.slip.F, self.slip.counts)
         largest, rms = np.append(largest, more[0]), np.append(rms, more[1])
         return Miss(largest, rms, *mine.apart(self.slip))
 
@@ -166,11 +167,15 @@ def tangents(law: Law, d: Array) -> Array:
     return C
 
 
-def errors(F: Array, reference: Array) -> tuple[Array, Array]:
-    """Largest and rms |F - reference| (steps, paths, dim) over the path's largest |reference|."""
-    peak = np.linalg.norm(reference, axis=2).max(axis=0)
+def errors(F: Array, reference: Array, counts: Any = True) -> tuple[Array, Array]:
+    """Largest and rms |F - reference| (steps, paths, dim) over the path's largest |reference|.
+
+    counts: (steps, paths), which steps count; all by default.
+    """
+    peak = np.linalg.norm(reference, axis=2).max(axis=0, where=counts, initial=0.0)
     off = np.linalg.norm(F - reference, axis=2)
-    return off.max(axis=0) / peak, np.sqrt(np.mean(off**2, axis=0)) / peak
+    mean = np.mean(off**2, axis=0, where=counts)
+    return off.max(axis=0, where=counts, initial=0.0) / peak, np.sqrt(mean) / peak
 
 
 def _paths(law: Law, stress: float) -> tuple[tuple[str, ...], Array, Array]:
@@ -267,19 +272,13 @@ def far_path(law: Law, rng: np.random.Generator, stress: float, s: Array) -> Arr
 
 
 def _hold_stress(law: Law, d: Array, held: Array, stress: float) -> Array:
-    """Increments with the closures of the paths `held` mended to keep the normal stress.
-
-    Two Newton steps per increment keep it to some 1e-3, and what is left is mended in the next:
-    enough, for what is compared are tractions along one and the same path.
-    """
-    d, which = d.copy(), np.flatnonzero(held)
-    batch, least = law.joints(len(which), ledger=False), 1e-3 * stress / law.closure_range
+    """Increments whose closures keep the normal stress on the paths `held`."""
+    d, which, condition = d.copy(), np.flatnonzero(held), NormalCondition(stress, stress)
+    batch = law.joints(len(which), ledger=False)
     for k in range(len(d)):
         step = d[k, which]
-        for _ in range(2 if k >= STEPS // 10 else 0):
-            F, C = batch.trial(step)
-            assert C is not None
-            step[:, 0] -= (F[:, 0] - stress) / np.maximum(C[:, 0, 0], least)
+        if k >= STEPS // 10:
+            step[:, 0] = closing_increments(batch, step, condition, HELD)
         batch.update(step, tangent=False)
         d[k, which] = step
     return d

@@ -1,6 +1,5 @@
 """The coarsest law that is accurate enough."""
 
-import math
 from dataclasses import replace
 from itertools import product
 from typing import TypeVar
@@ -8,7 +7,6 @@ from typing import TypeVar
 from ..parameters.resolution import Resolution
 from ..support.checks import above
 from ..support.progress import track
-from .cycles import cycles, exact_cycles
 from .suite import Law, Suite, reference_resolution, scaled, standard_suite
 
 AnyLaw = TypeVar("AnyLaw", bound=Law)
@@ -21,12 +19,9 @@ _PHI = (3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 32, 40, 48)
 _SHARES = (0.5, 0.75, 1.0)  # of the reference, for the directions that are not being tried
 
 
-def at_tolerance(law: AnyLaw, tolerance: float, loss: float | None = None) -> AnyLaw:
+def at_tolerance(law: AnyLaw, tolerance: float) -> AnyLaw:
     """See `JointLaw.at_tolerance`."""
     bound = above("tolerance", tolerance, 0.0) / MARGIN
-    if loss is not None and law.closure_only:
-        raise ValueError(f"loss = {loss!r}: a joint with closure_only does not shear; leave it out")
-    loss = None if loss is None else above("loss", loss, 0.0)
     found, reached = coarsest(law, bound, EXCURSIONS)
     if found is None:
         raise ValueError(
@@ -34,47 +29,7 @@ def at_tolerance(law: AnyLaw, tolerance: float, loss: float | None = None) -> An
             f"{reached:.2g} was reached on the standard paths, where {bound:.2g} "
             "is needed to keep it on others; ask for less, or give a Resolution of your own"
         )
-    if loss is not None:
-        found = _keeping_loss(law, found, loss, bound)
     return replace(law, resolution=found)
-
-
-def _keeping_loss(law: Law, found: Resolution, loss: float, bound: float) -> Resolution:
-    """`found`, or as many more depth cells, and then facets, as keep the loss of small cycles.
-
-    The loss wavers with the depth cells: the first that are good enough are taken. Facets hardly
-    matter to it, unless asperities are linear, but errors of the traction may have cancelled with
-    those of the few cells of `found`.
-    """
-    suite, best = _reference(law, bound, EXCURSIONS)
-    exact, most, depth = exact_cycles(law), _LARGEST * best.sliders, found.depth
-    rings = [found.u, *(n for n in _U if found.u < n <= best.u)]
-    azimuths = [found.phi, *(n for n in _PHI if found.phi < n <= best.phi)]
-    tried: dict[Resolution, float] = {}
-    for k in track(range(count := max(len(rings), len(azimuths))), "facets", count):
-        facets = replace(found, u=rings[min(k, len(rings) - 1)],
-                         phi=azimuths[min(k, len(azimuths) - 1)])  # fmt: skip
-        if replace(facets, depth=depth).sliders > most:
-            break
-        if exact_cycles(law, facets).missed(exact)[0].max() > loss / 2:
-            continue
-        while (r := replace(facets, depth=depth)).sliders <= most:
-            made = replace(law, resolution=r)
-            miss = float(cycles(made, law.closure_range).missed(exact)[0].max())
-            if miss <= loss:
-                if suite.errors(made)[0].max() <= bound:
-                    return r
-                break
-            tried[r] = miss
-            depth = math.ceil(1.2 * depth)
-    reached = "no facets tried keep it, nor the tolerance with so many cells"
-    if tried:
-        nearest = min(tried, key=tried.__getitem__)
-        reached = f"the nearest tried, {nearest}, misses it by {tried[nearest]:.2g}"
-    raise ValueError(
-        f"loss = {loss:g} cannot be kept within {most} sliders together with the tolerance: "
-        f"{reached}; ask for less, or give a Resolution of your own"
-    )
 
 
 def coarsest(law: Law, bound: float, excursions: int = 0) -> tuple[Resolution | None, float]:
@@ -92,10 +47,10 @@ def coarsest(law: Law, bound: float, excursions: int = 0) -> tuple[Resolution | 
             known[r] = float(suite.errors(replace(law, resolution=r))[0].max())
         return known[r]
 
-    # What each direction needs by itself, the others being fine: a resolution with less of it can
-    # meet the suite by luck alone, when errors of two directions cancel. Orientations, whose error
-    # wavers as contacts slip and part one by one, must meet it with the next finer choice as well,
-    # or have as many as the reference.
+    # What each of u, phi and depth needs while the other two are fine: with less of it a resolution
+    # meets the suite only by chance, where two errors cancel. The errors of u and phi rise and fall
+    # as contacts slip and part one by one: so the next finer choice must meet the suite too, unless
+    # there are as many as in the reference.
     share = next((s for s in _SHARES if _left_out(suite, s) < bound / 3), _SHARES[-1])
     rest = scaled(best, share)
     needs = []
@@ -111,8 +66,7 @@ def coarsest(law: Law, bound: float, excursions: int = 0) -> tuple[Resolution | 
         if meets is None:
             return None, min(alone)
         needs.append(tried[meets:])  # finer ones too, for errors add up
-    front = law.resolution.front
-    several = [Resolution(u, phi, depth, front) for u, phi, depth in product(*needs)]
+    several = [Resolution(u, phi, depth) for u, phi, depth in product(*needs)]
     for r in sorted(several, key=lambda r: (r.sliders, r.u, r.phi)):
         if error(r) <= bound:
             return r, error(r)

@@ -16,7 +16,6 @@ from ..support.checks import Array, whole
 from ..support.files import replace_file
 from ..support.progress import track
 from ..support.pyplot import pyplot, written
-from .cycles import AMPLITUDES, OPENINGS, Cycles, cycles, exact_cycles
 from .suite import Law, Suite, errors, reference_resolution, scaled, standard_suite, tangents
 
 SPREAD = tuple(
@@ -24,7 +23,6 @@ SPREAD = tuple(
     for u, phi in ((1, 3), (2, 3), (3, 3), (3, 5), (5, 6), (8, 8))
     for depth in (1, 2, 3, 4, 6, 10, 16)
 )
-CLEAR = {"color": "white", "alpha": 0.8, "pad": 0.5}  # behind names
 ROUNDING = 1e-6  # a smaller share by which errors differ is none
 _MEMORY = 100_000_000  # bytes of state that a timing may use; very fine laws get a smaller batch
 
@@ -36,11 +34,9 @@ class Price:
     `error`, `rms` (paths,): of the traction. `friction`, `dilation`: largest misses of the angles
     (degrees) at constant normal stress, from 0.2 critical slips on. `tangent_rms`, `tangent_max`:
     of the tangent, over all paths; it jumps between stick and slip, and the largest error is that
-    of a jump that comes one step early or late. `loss`, `secant` (amplitudes,), `kept` (openings,):
-    misses of the loss and secant stiffness of small cycles, as shares, and of locked-in shear
-    (`jointlaw.accuracy.cycles`); NaN for a joint that does not shear. `ns`, `ns_tangent`:
-    nanoseconds per joint and update without and with tangent, no ledger, least of several runs;
-    NaN where nothing was timed. `bytes`: per joint.
+    of a jump that comes one step early or late. `ns`, `ns_tangent`: nanoseconds per joint and
+    update without and with tangent, no ledger, least of several runs; NaN where nothing was timed.
+    `bytes`: per joint.
     """
 
     resolution: Resolution
@@ -51,9 +47,6 @@ class Price:
     dilation: float
     tangent_rms: float
     tangent_max: float
-    loss: Array
-    secant: Array
-    kept: Array
     ns: float
     ns_tangent: float
     bytes: int
@@ -94,7 +87,7 @@ class Tradeoff:
     def __str__(self) -> str:
         lines = [
             f"{'u phi depth':>12s} {'sliders':>8s} {'bytes':>7s} {'max error':>10s} {'rms':>8s} "
-            f"{'friction':>9s} {'dilation':>9s} {'tangent rms':>12s} {'loss error':>11s} "
+            f"{'friction':>9s} {'dilation':>9s} {'tangent rms':>12s} "
             f"{'ns':>8s} {'with tangent':>13s}  {'worst path':16s}name"
         ]
         names = {r: name for name, r in self.named.items()}
@@ -107,7 +100,7 @@ class Tradeoff:
             lines.append(
                 f"{f'{r.u} {r.phi} {r.depth}':>12s} {row.sliders:8d} {row.bytes:7d} "
                 f"{row.worst:10.3%} {row.rms.max():8.2%} {row.friction:8.2f}° {row.dilation:8.2f}° "
-                f"{row.tangent_rms:12.2%} {row.loss.max():11.0%} {_ns(row.ns):>8s} "
+                f"{row.tangent_rms:12.2%} {_ns(row.ns):>8s} "
                 f"{_ns(row.ns_tangent):>13s}  {path:16s}{names.get(r, '')}".rstrip()
             )
         timed = f"ns per joint and update: up to {self.joints} joints, {self.how}"
@@ -136,12 +129,7 @@ class Tradeoff:
             "dilation_deg": [r.dilation for r in rows],
             "tangent_rms": [r.tangent_rms for r in rows],
             "tangent_max": [r.tangent_max for r in rows],
-            "loss": [float(r.loss.max()) for r in rows],
-            "secant": [float(r.secant.max()) for r in rows],
-            "kept": [float(r.kept.max()) for r in rows],
         }
-        for i, amplitude in enumerate(AMPLITUDES):
-            table[f"loss {amplitude:.3g}"] = [float(r.loss[i]) for r in rows]
         for i, path in enumerate(self.paths):
             table[f"error {path}"] = [float(r.error[i]) for r in rows]
             table[f"rms {path}"] = [float(r.rms[i]) for r in rows]
@@ -182,22 +170,14 @@ class Tradeoff:
                         at = (getattr(row, costs[0]), 100 * row.worst)
                         axis.plot(*at, "s", color="k", ms=6, mfc="none")
                         axis.annotate(name, at, (0, 6), textcoords="offset points", fontsize=8,
-                                      ha="right" if name == "reference" else "left",
-                                      bbox=CLEAR)  # fmt: skip
+                                      ha="right" if name == "reference" else "left")  # fmt: skip
             floor = 100 * float(self.uncertainty.max())
-            axis.axhline(floor, color="0.6", lw=1, ls=":")
+            axis.axhline(floor, color="0.6", lw=1, ls=":", label="uncertainty of the reference")
             axis.set_xlabel(label)
             axis.grid(True, which="both", alpha=0.2)
-            for scale in (axis.xaxis, axis.yaxis):
-                scale.set_major_formatter(lambda value, _: f"{value:g}")
-        axes[0, 0].text(0.02, floor * 1.08, "uncertainty of the reference", fontsize=7, color="0.4",
-                        transform=axes[0, 0].get_yaxis_transform())  # fmt: skip
         axes[0, 0].set_ylabel("largest error of the traction (% of the path's peak)")
-        low = min(floor, 100 * min(r.worst for r in self.rows))
-        axes[0, 0].set_ylim(0.7 * low, 150 * max(r.worst for r in self.rows))
-        if timed:
-            axes[0, 1].legend(title=f"{self.joints} joints, {self.how}", fontsize=8,
-                              title_fontsize=8, loc="upper right")  # fmt: skip
+        title = f"{self.joints} joints, {self.how}" if timed else None
+        axes[0, -1].legend(title=title, fontsize=8, title_fontsize=8, loc="upper right")
         return written(figure, path)
 
 
@@ -209,20 +189,19 @@ def tradeoff(
 ) -> Tradeoff:
     """See `JointLaw.tradeoff`."""
     joints = whole("joints", joints, 0)
-    lengths = np.array([law.tables.critical_slip, law.asperity.yield_interference])
-    names = named(*(lengths / law.closure_range))
+    lengths = law.tables.critical_slip, law.asperity.yield_interference, law.closure_range
+    names = named(*lengths)
     if resolutions is None:
         resolutions = (*SPREAD, *names.values())
-    chosen = [resolve(r, *(lengths / law.closure_range)) for r in resolutions]
+    chosen = [resolve(r, *lengths) for r in resolutions]
     found = sorted(dict.fromkeys(chosen), key=lambda r: (r.sliders, r.u, r.phi))
     if not found:
         raise ValueError("resolutions is empty; give some, or None for the usual spread")
     suite = standard_suite(law)
     fine = replace(law, resolution=scaled(reference_resolution(law), 0.5))
     exact = tangents(fine, suite.d)
-    loops = None if law.closure_only else exact_cycles(law)
     rows = tuple(
-        _price(replace(law, resolution=r), suite, exact, loops, joints, seconds)
+        _price(replace(law, resolution=r), suite, exact, joints, seconds)
         for r in track(found, "resolutions", len(found))
     )
     threads = thread_count()
@@ -230,21 +209,15 @@ def tradeoff(
     return Tradeoff(suite.names, suite.uncertainty, rows, joints, how, names)
 
 
-def _price(
-    law: Law, suite: Suite, exact: Array, loops: Cycles | None, joints: int, seconds: float
-) -> Price:
+def _price(law: Law, suite: Suite, exact: Array, joints: int, seconds: float) -> Price:
     miss = suite.miss(law)
-    loss, secant, kept = (np.full(len(x), np.nan) for x in (AMPLITUDES, AMPLITUDES, OPENINGS))
-    if loops is not None:
-        loss, secant, kept = cycles(law, law.closure_range).missed(loops)
     steps, paths = exact.shape[:2]
     C = tangents(law, suite.d).reshape(steps, paths, -1)
     tangent_max, tangent_rms = errors(C, exact.reshape(steps, paths, -1))
     ns = [_time(law, joints, tangent, seconds) for tangent in (False, True)]
     return Price(
         law.resolution, law.tables.sliders, *miss,
-        float(np.sqrt(np.mean(tangent_rms**2))), float(tangent_max.max()), loss, secant, kept,
-        ns[0], ns[1],
+        float(np.sqrt(np.mean(tangent_rms**2))), float(tangent_max.max()), ns[0], ns[1],
         law.joints(0).bytes_per_joint,
     )  # fmt: skip
 

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from ..discretisation.facets import facet_sum, facets, yield_sum
+from ..discretisation.facets import facets
+from ..discretisation.first_loading import facet_sum, yield_sum
 from ..discretisation.virgin_curve import exact_force
 from ..law import JointLaw
 from ..parameters.asperity import Asperity

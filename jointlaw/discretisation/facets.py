@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..parameters.asperity import Asperity
-from ..parameters.orientation import Orientation
+from ..parameters.orientation import Orientation, shape
 from ..support.checks import Array, frozen
 from .nodes import azimuths, inclinations
 
@@ -63,12 +63,12 @@ def facets(
     if closure_only:
         c, rings = 0.0, [(np.zeros(1), np.ones(1))] * u
     else:
-        rings = [_ring(m, whole=plane is None) for m in numbers]
+        rings = [_ring(m, full=plane is None) for m in numbers]
     P, even = (np.concatenate(part) for part in zip(*rings, strict=True))
     counts = [len(azimuth) for azimuth, _ in rings]
     U = np.repeat(cos_a, counts)
     # no more than 1 by Eq. 18, but for rounding where the density is zero
-    lean = np.clip(3 * c * (1 - U**2) / (1 + b / 2 * (3 * U**2 - 1)), -1.0, 1.0)
+    lean = np.clip(3 * c * (1 - U**2) / shape(U, b), -1.0, 1.0)
     weight = np.repeat(share, counts) * even * (1 + lean * np.cos(2 * P))
     theta = np.arccos(U) / orientation.a
     ct, st, cp, sp = np.cos(theta), np.sin(theta), np.cos(P), np.sin(P)
@@ -88,31 +88,10 @@ def facets(
     return Facets(*frozen(arrays))
 
 
-def _ring(m: int, whole: bool) -> tuple[Array, Array]:
-    """Azimuths and shares of a whole ring of 2 m facets, or of the m + 1 of its half circle."""
-    azimuth: Array = np.arange(2.0 * m if whole else m + 1.0) * (math.pi / m)
-    even: Array = np.full_like(azimuth, (0.5 if whole else 1.0) / m)
-    if not whole:
+def _ring(m: int, full: bool) -> tuple[Array, Array]:
+    """Azimuths and shares of a full ring of 2 m facets, or of the m + 1 of its half circle."""
+    azimuth: Array = np.arange(2.0 * m if full else m + 1.0) * (math.pi / m)
+    even: Array = np.full_like(azimuth, (0.5 if full else 1.0) / m)
+    if not full:
         even[[0, -1]] /= 2.0
     return azimuth, even
-
-
-def yield_sum(theta: Array, scale: Array, asperity: Asperity) -> tuple[Array, Array] | None:
-    """What yielding takes from F1 under first closure: share (2 M,) times Phi(closure - depth).
-
-    Springs stop to gain normal force at the yield interference, and shear force where they slip
-    under the normal force that they then have.
-    """
-    if math.isinf(asperity.yield_interference):
-        return None
-    shear = np.minimum(np.tan(theta) / asperity.lam, asperity.mu)
-    depth = asperity.yield_interference / np.cos(theta)
-    late = np.divide(asperity.mu, shear, out=np.ones_like(shear), where=shear > 0)
-    share = np.concatenate([scale * np.cos(theta), scale * np.sin(theta) * shear])
-    return share, np.concatenate([depth, depth * late])
-
-
-def facet_sum(theta: Array, scale: Array, lam: float, mu: float) -> float:
-    """Sum of scale (cos theta + sin theta min(tan theta/lam, mu)): F1/Phi under pure closure."""
-    shear = np.minimum(np.tan(theta) / lam, mu)
-    return float(np.sum(scale * (np.cos(theta) + np.sin(theta) * shear)))

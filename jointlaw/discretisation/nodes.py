@@ -9,14 +9,15 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..parameters.orientation import shape
 from ..support.checks import Array, frozen
 from .virgin_curve import VirginCurve
 
 # Chosen on random laws with `benchmarks/nodes.py`
 _STEEPEST = 10.0  # largest tan(theta) that counts: at a = 1 it grows without bound
 _LOW = 0.15  # power of Phi that draws nodes towards small loads
-_OPEN = 1.8  # shares of the grading left to the last cell: few cells then sit where most loads are
-_MANY = 8  # cells: more of them also reach further, to twice the shear at twice as many
+_OPEN = 1.8  # shares of the grading for the last cell: few cells then lie where most loads are
+_MANY = 8  # cells: more of them also reach farther, to twice the shear at twice as many
 UNUSED = 1e300  # m: no closure comes so far
 _GRID = 512  # panels on which the touch-depth density is summed
 
@@ -35,7 +36,7 @@ def inclinations(b: float, count: int) -> tuple[Array, Array]:
     x, w = np.polynomial.legendre.leggauss((power + 1) * (count + 1))
     x, w = 0.5 * (x + 1.0), 0.5 * w
     u = x**power
-    w = w * power * x ** (power - 1) * np.maximum(1.0 + 0.5 * b * (3.0 * u**2 - 1.0), 0.0)
+    w = w * power * x ** (power - 1) * np.maximum(shape(u, b), 0.0)
     middle, side = np.zeros(count), np.zeros(count)
     before, now = np.zeros_like(x), np.sqrt(w / w.sum())  # orthonormal polynomials times sqrt(w)
     for k in range(count):
@@ -70,21 +71,22 @@ def depth_nodes(
     A cell of width h lumps springs of density Phi'' and by that errs by Phi'' h^2/8 at most: equal
     shares of int sqrt(Phi'') dz make the error of all cells the same. A small power of Phi shifts
     nodes towards small loads. They span the effective closure y = closure + tan(theta) shear, not
-    the closure; the last cell is open-ended. It is all there is for what touches beyond, whose
-    error no number of cells before it lowers: so many cells reach to twice the shear.
+    the closure. The last cell has no end: it holds all springs that touch at greater depths, and
+    more cells before it do not lower its error. So where there are many cells, they reach farther,
+    to twice the shear.
     """
     shear = np.clip(cells.max() / _MANY, 1.0, 2.0)
     reach = closure_range * (1.0 + shear * np.minimum(slope, _STEEPEST))
     # graded: Phi'' may be singular at touch
     edges = reach.max() * (np.arange(_GRID + 1) / _GRID) ** 4
     middle = 0.5 * (edges[1:] + edges[:-1])
-    # ratios throughout, so that the same joint in other units has the same nodes to the bit
+    # ratios only: the same joint in other units then has the same nodes to the bit
     with np.errstate(all="ignore"):
         force, bend = curve.force(middle)[0], np.maximum(curve.curvature(middle), 0.0)
         density = np.sqrt(bend / bend.max()) * (force / force[-1]) ** -_LOW
     density = np.where(np.isfinite(density), density, 0.0)
     share = density * np.diff(edges)
-    # a floor for curves without curvature, as of one linear spring, where any nodes will do
+    # a least density: a curve without curvature, one linear spring, has none, and any nodes will do
     share = share / max(share.sum(), 1e-300) + 1e-6 * np.diff(edges) / edges[-1]
     total = np.concatenate([[0.0], np.cumsum(share)])
     several, count = np.arange(1, cells.max()), cells[:, None]

@@ -1,7 +1,7 @@
 """The tables of a law: everything that a kernel reads, shared by all joints of the law."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,6 @@ class Tables:
     A facet of fewer cells has its limits first; cells that begin at UNUSED stay empty.
     `yield_depth` (M,) is the yield interference along y, None where asperities do not yield;
     `opposite` (M,) names the facet that shares its flattened depth, each itself if none does.
-    `front`: whether each facet has a front, one more slider.
     """
 
     curve: VirginCurve
@@ -48,7 +47,6 @@ class Tables:
     opposite: NDArray[np.intp] | None = None
     mu_residual: float | None = None
     wear_slip: float = math.inf
-    front: bool = False
 
     @property
     def yields(self) -> bool:
@@ -71,27 +69,19 @@ class Tables:
         return int(self.depth.shape[1]) - 1
 
     @property
-    def several(self) -> int:
-        """Sliders of the facet that has most: its cells, and its front."""
-        return self.cells + self.front
-
-    @property
     def sliders(self) -> int:
-        """Sliders per joint: one for each cell of each facet, and one for its front."""
-        return int(np.count_nonzero(self.depth[:, :-1] < UNUSED)) + len(self.c1) * self.front
+        """Sliders per joint: one for each cell of each facet."""
+        return int(np.count_nonzero(self.depth[:, :-1] < UNUSED))
 
     @property
     def rows(self) -> int:
         """State numbers per joint: delta, offset, dissipated energy, q of all cells, even UNUSED.
 
-        Then, with fronts, the depth at which that of every facet begins; with yielding, the
-        flattened depth of every facet and the plastic work; with wear, the slip of the asperities,
-        and by how much mu had fallen in the last step.
+        Then, with yielding, the flattened depth of every facet and the plastic work; with wear, the
+        slip of the asperities, and by how much mu had fallen in the last step.
         """
         flattened = len(self.c1) + 1 if self.yields else 0
-        fronts = len(self.c1) if self.front else 0
-        sliders = 2 * len(self.c1) * self.several
-        return 2 * self.dim + sliders + fronts + flattened + 2 * self.wears
+        return 2 * self.dim + 2 * len(self.c1) * self.cells + flattened + 2 * self.wears
 
 
 def tables(
@@ -102,7 +92,6 @@ def tables(
     closure_range: float,
     cells: int,
     critical_slip: float,
-    front: bool = False,
 ) -> Tables:
     """Lay out the tables; `cells` for the facet of most weight, one where the curve is linear."""
     c1, slope = np.cos(facets.theta), np.tan(facets.theta)
@@ -121,14 +110,8 @@ def tables(
     return Tables(
         curve, *frozen(arrays), asperity.lam, asperity.mu, critical_slip, yield_depth,
         alone if math.isinf(critical_slip) else facets.opposite,
-        asperity.mu_residual, asperity.wear_slip, front,
+        asperity.mu_residual, asperity.wear_slip,
     )  # fmt: skip
-
-
-def with_depths(k: Tables, depth: Array) -> Tables:
-    """The tables with other cell limits (M, D + 1): from 0, which may repeat, to infinity."""
-    limits, force, slope = frozen(_at_limits(k.curve, depth))
-    return replace(k, depth=limits, depth_force=force, depth_slope=slope)
 
 
 def _at_limits(curve: VirginCurve, depth: Array) -> tuple[Array, Array, Array]:

@@ -13,13 +13,10 @@ closure lies beyond the table. With D = y d/dy = t (1 - t)/2 d/dt,
     Psi   = int Phi dy = y^(2+eta) T,     D T = S - (2 + eta) T
 """
 
-import math
-import sys
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..parameters.heights import HeightDistribution
 from ..support.checks import Array, frozen
@@ -27,12 +24,8 @@ from .formation import factor, rise
 
 TABLE_ERROR = 1e-10  # asked of S, relative to its largest value
 WORST_ERROR = 1e-6  # refused beyond
-_RESOLVED = 1e8  # yield interferences: Phi less its value one earlier has 8 digits
 _FARTHEST = 1e300  # m; S is 1 long before
 _NEARLY = 1e-20  # of the first cell: where the limit at y = 0 is taken
-_SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
-_HALVINGS = 52  # of 1 in log closure: to rounding
-_BEYOND = "normal_stress = {!r} Pa is beyond any closure"
 _CELLS = (128, 256, 512, 1024, 2048, 4096, 8192)
 
 
@@ -112,76 +105,6 @@ def shares(y: Array, scale: float) -> tuple[Array, Array]:
     """w = y/(y + V^2) and 1 - w of each y."""
     y, W = np.fmin(np.fmax(y, 0.0), _FARTHEST), scale * scale
     return y / (y + W), W / (y + W)
-
-
-class VirginClosure(NamedTuple):
-    """First closure of an unsheared joint: F1 = factor Phi, less what yielding takes away."""
-
-    curve: VirginCurve
-    factor: float  # `facets.facet_sum`
-    yielding: tuple[Array, Array] | None = None  # `yield_sum`: F1 -= share Phi(closure - depth)
-
-    def stress(self, closure: Array) -> Array:
-        """Normal stress (Pa) at closures (m), infinite where it overflows."""
-        stress: Array = self.factor * self.curve.force(closure)[0]
-        if self.yielding is not None:
-            share, depth = self.yielding
-            stress = stress - self.curve.force(closure[..., None] - depth)[0] @ share
-        return stress
-
-    @property
-    def farthest(self) -> float:
-        """Closure (m) beyond which stresses, or their differences, are lost in rounding."""
-        return 1e304 if self.yielding is None else _RESOLVED * float(np.max(self.yielding[1]))
-
-    def closure(self, stress: float, start: float) -> float:
-        """Closure (m) at a normal stress (Pa), looked for from the closure `start` (m) on."""
-        from scipy.optimize import brentq  # a third of the package's import time
-
-        if stress < _SMALLEST:
-            return 0.0
-
-        def misfit(log_y: float) -> float:  # finite where the force is zero or overflows
-            force = float(self.stress(np.array(math.exp(log_y))))
-            return math.log(min(max(force, _SMALLEST), _LARGEST)) - math.log(stress)
-
-        low = high = math.log(start)
-        farthest = math.log(self.farthest)
-        with np.errstate(over="ignore"):
-            while misfit(high) < 0.0:
-                high += 1.0
-                if high > farthest:
-                    raise ValueError(_BEYOND.format(stress))
-            while misfit(low) > 0.0:
-                low -= 1.0
-            if low == high:
-                return start
-            return math.exp(brentq(misfit, low, high, xtol=1e-15, rtol=1e-15, maxiter=500))
-
-    def closures(self, stress: Array, start: float) -> Array:
-        """As `closure`, for many stresses (n,) together: bisection of log closure, to rounding."""
-        found = np.zeros_like(stress)
-        wanted = stress[stress >= _SMALLEST]
-
-        def too_open(log_y: Array) -> NDArray[np.bool_]:
-            return self.stress(np.exp(log_y)) < wanted
-
-        high = np.full(wanted.shape, math.log(start))
-        with np.errstate(over="ignore"):
-            while (short := too_open(high)).any():
-                high = high + short
-                if (far := high > math.log(self.farthest)).any():
-                    raise ValueError(_BEYOND.format(wanted[far].min()))
-            low = high - 1.0
-            while not (short := too_open(low)).all():
-                low = low - ~short
-            high = np.minimum(high, low + 1.0)
-            for _ in range(_HALVINGS):
-                middle = 0.5 * (low + high)
-                short = too_open(middle)
-                low, high = np.where(short, middle, low), np.where(short, high, middle)
-        found[stress >= _SMALLEST] = np.exp(high)
-        return found
 
 
 @lru_cache(maxsize=256)

@@ -10,17 +10,6 @@ from ..support.checks import Array
 TINY = 1e-290  # a stiffness whose reciprocal might overflow, or a square that underflows: zero
 
 
-class Limits(NamedTuple):
-    """Touch depth, Phi and Phi' at both limits of every slider, each (M, sliders, 1 or B)."""
-
-    low: Array
-    low_force: Array
-    low_slope: Array
-    high: Array
-    high_force: Array
-    high_slope: Array
-
-
 class Cells(NamedTuple):
     """The depth cells of all facets at one moment."""
 
@@ -31,21 +20,15 @@ class Cells(NamedTuple):
     kappa: Array  # its slope dG/dy
 
 
-def limits(k: Tables) -> Limits:
-    """The limits of the depth cells, the same for all joints."""
-    depth, force, slope = (x[:, :, None] for x in (k.depth, k.depth_force, k.depth_slope))
-    return Limits(
-        depth[:, :-1], force[:, :-1], slope[:, :-1], depth[:, 1:], force[:, 1:], slope[:, 1:]
-    )
-
-
-def cells(k: Tables, y: Array, at: Limits | None = None) -> Cells:
-    """Virgin curve at y (M, B), and the share in it of every slider, by default the depth cells."""
+def cells(k: Tables, y: Array) -> Cells:
+    """Virgin curve at y (M, B), and the share of every depth cell in it."""
     force, slope = k.curve.force(y)
-    low, low_force, low_slope, high, high_force, high_slope = at or limits(k)
+    limits = [x[:, :, None] for x in (k.depth, k.depth_force, k.depth_slope)]
+    low, low_force, low_slope = (x[:, :-1] for x in limits)
+    high, high_force, high_slope = (x[:, 1:] for x in limits)
     y_, force_, slope_ = y[:, None], force[:, None], slope[:, None]
     reach = np.clip(y_, low, high)
-    # by place, not by size: beyond its last height a tabulated slope wavers by its rounding
+    # y tells which slope holds: beyond the last height a tabulated slope is not quite constant
     kappa = np.where(y_ > high, high_slope, slope_) - low_slope
     kappa = np.where(y_ > low, np.maximum(kappa, 0.0), 0.0)
     stored = np.clip(force_, low_force, high_force) - low_force - low_slope * (reach - low)

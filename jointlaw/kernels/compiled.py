@@ -18,7 +18,6 @@ from ..discretisation.nodes import UNUSED
 from ..discretisation.tables import UNDERFLOW, Tables
 from ..support.checks import Array
 from .cells import TINY, compliance
-from .front import STILL
 from .reference import GRAZING, LIMIT, NEAR, ROUNDED
 
 # Strict arithmetic: no fused or reordered operations, so results are the same on every machine
@@ -37,17 +36,14 @@ _DES, _DET, _SUMS, _SUMT = _rows(7, 4)  # its sliders
 _CURVING, _BSS, _BST, _BTT, _VS, _VT, _G0, _G1, _G2 = _rows(11, 9)  # its tangent
 _P, _P1, _P2, _OLD, _OLD1, _OLD2, _NEW, _NEW1, _NEW2 = _rows(20, 9)  # a joint: step, y's origin
 _J00, _J01, _J10, _J11, _SLIP, _PULL1, _PULL2, _LOST, _F, _FS, _FT = _rows(29, 11)
-_NORMAL, _CRUSHED = _rows(40, 2)  # a joint whose asperities wear or yield
+_NORMAL, _PLASTIC = _rows(40, 2)  # a joint whose asperities wear or yield
 _C00, _C01, _C02, _C10, _C11, _C12, _C20, _C21, _C22, _MU = _rows(42, 10)
 _Z0, _Z1, _FZ0, _FZ1, _SZ1, _AT0, _FAT0, _WS, _WT = _rows(52, 9)  # its flattened facets
 (_SINCE,) = _rows(61, 1)  # friction over that of the last step
-_LOW, _FLOW, _SLOW, _HIGH, _FHIGH, _SHIGH = _rows(62, 6)  # limits of a slider, beside a front
-_FRONT, _FFRONT, _SFRONT, _END, _FEND, _SEND = _rows(68, 6)  # those of the front
-_CELL, _KCELL, _QSCELL, _QTCELL, _KFRONT, _STAKE, _QS, _QT = _rows(74, 8)
-_PAD = 82 * LANES
+_PAD = 62 * LANES
 
 # The same rows while joints are measured
-_WHOLE, _LIMIT, _SLIDING, _SLIPPING, _APART, _STORED, _REACH = _rows(20, 7)
+_ALL_SLIP, _LIMIT, _SLIDING, _SLIPPING, _APART, _STORED, _REACH = _rows(20, 7)
 
 _M, _S, _T, _N, _REST = 0, 3, 6, 9, 12  # columns of the facet table; then A, a, compliance,
 _POTENTIAL, _SHARE = 15, 16  # A c1 and the share of the facet orientation
@@ -86,9 +82,9 @@ def pack(k: Tables) -> Packed:
 def block_rows(k: Tables) -> int:
     """Rows of a block: the state, then Phi and Phi' of all facets, which save half the look-ups.
 
-    With flattened facets, Phi there too; with fronts, Phi and Phi' where they begin.
+    With flattened facets, Phi there too.
     """
-    return k.rows + (2 + k.yields + 2 * k.front) * len(k.c1)
+    return k.rows + (2 + k.yields) * len(k.c1)
 
 
 class Work(NamedTuple):
@@ -96,7 +92,7 @@ class Work(NamedTuple):
 
     block: Array  # (rows, LANES): copy of a block of states
     pad: Array
-    place: NDArray[np.int32]  # cell of the curve, per lane; then the lanes that are pressed flat
+    place: NDArray[np.int32]  # cell of the curve, per lane; then lanes whose flattened depth moves
     piece: Array  # its four coefficients, per lane
 
 
@@ -259,36 +255,22 @@ def _limit_offset(pad, L, limit, dim):
 
 
 @_jit
-def _places(law, yields, wears, front):
-    """First rows of flattened depths, slip, Phi beside the state, fronts, and Phi beside these."""
+def _places(law, yields, wears):
+    """First rows of flattened depths, of the slip, and of Phi beside the state."""
     M = law.depth.shape[0]
-    first = fronts = 2 * law.dim + 2 * M * _several(law, front)
-    if front is not None:
-        first = fronts + M
+    first = 2 * law.dim + 2 * M * (law.depth.shape[1] - 1)
     slip = beside = first
     if yields is not None:
         slip = beside = first + M + 1
     if wears is not None:
         beside = slip + 2
-    theirs = beside + 2 * M
-    if yields is not None:
-        theirs += M
-    return first, slip, beside, fronts, theirs
+    return first, slip, beside
 
 
 @_jit
-def _several(law, front):
-    """Sliders of the facet that has most."""
-    D = law.depth.shape[1] - 1
-    if front is not None:
-        D += 1
-    return D
-
-
-@_jit
-def _weaken(pad, s, L, law, yields, wears, front):
+def _worn_friction(pad, s, L, law, yields, wears):
     """Friction of the asperities of each joint after their slip, and over that of the last step."""
-    slip, first, last = _places(law, yields, wears, front)[1], law.scalars[1], law.scalars[6]
+    slip, first, last = _places(law, yields, wears)[1], law.scalars[1], law.scalars[6]
     for l in range(L):
         pad[_MU + l] = last + (first - last) * np.exp(-s[slip, l] / law.scalars[7])
     for l in range(L):
@@ -298,10 +280,10 @@ def _weaken(pad, s, L, law, yields, wears, front):
 
 
 @_jit
-def _press(work, s, L, law, f, yields, wears, front):
+def _flatten(work, s, L, law, f, yields, wears):
     """Flattened depths of a facet before and after the step, and Phi there; see `yielding`."""
     pad, facet = work.pad, law.facet
-    first, _, beside, _, _ = _places(law, yields, wears, front)
+    first, _, beside = _places(law, yields, wears)
     at, kept = first + f, beside + 2 * law.depth.shape[0] + f
     deep, o = facet[f, _YIELD], np.int64(facet[f, _OPPOSITE])
     m0, m1, m2 = facet[f, _M], facet[f, _M + 1], facet[f, _M + 2]
@@ -319,22 +301,24 @@ def _press(work, s, L, law, f, yields, wears, front):
         z0, fz0, z1 = s[at, l], s[kept, l], pad[_Z1 + l] - deep
         pad[_Z0 + l], pad[_FZ0 + l], pad[_FZ1 + l] = z0, fz0, fz0
         pad[_Z1 + l] = z1 if z1 > z0 else z0
-    pressed = 0  # only where it moves is Phi looked up, packed into the rows of before the step
+    count = (
+        0  # Phi is looked up only in lanes where it moves, packed into the rows of before the step
+    )
     for l in range(L):
-        work.place[LANES + pressed] = l
-        pad[_Y0 + pressed] = pad[_Z1 + l]
-        pressed += 1 if pad[_Z1 + l] > pad[_Z0 + l] else 0
-    if pressed > 0:
-        _virgin(work, law, None, pressed)
-    for i in range(pressed):
+        work.place[LANES + count] = l
+        pad[_Y0 + count] = pad[_Z1 + l]
+        count += 1 if pad[_Z1 + l] > pad[_Z0 + l] else 0
+    if count > 0:
+        _virgin(work, law, None, count)
+    for i in range(count):
         l = work.place[LANES + i]
         pad[_FZ1 + l], pad[_SZ1 + l] = pad[_F0 + i], pad[_S0 + i]
         s[at, l], s[kept, l] = pad[_Z1 + l], pad[_F0 + i]
 
 
 @_jit
-def _relieve(pad, L, law, f, ledger):
-    """Take the part at the flattened depth off Phi and Phi', and add up what the springs lost."""
+def _subtract_flattened(pad, L, law, f, ledger):
+    """Phi and Phi' less their values at the flattened depth, and what flattened springs lost."""
     deep, potential = law.facet[f, _YIELD], law.facet[f, _POTENTIAL]
     for l in range(L):
         y1, z1, f1 = pad[_Y1 + l], pad[_Z1 + l], pad[_F1 + l] - pad[_FZ1 + l]
@@ -347,11 +331,11 @@ def _relieve(pad, L, law, f, ledger):
             c0, c1 = c0 if c0 > 0.0 else 0.0, c1 if c1 > 0.0 else 0.0
             mean = 0.5 * ((c0 if c0 < deep else deep) + (c1 if c1 < deep else deep))
             lost = pad[_FZ1 + l] - pad[_FZ0 + l]
-            pad[_CRUSHED + l] += potential * (deep if own else mean) * lost
+            pad[_PLASTIC + l] += potential * (deep if own else mean) * lost
 
 
 @_jit
-def _between(z, fz, y, fy, zl, fl, sl, zh, fh, sh, ended):
+def _gain(z, fz, y, fy, zl, fl, sl, zh, fh, sh, ended):
     """What a cell gains from z to y, where the virgin force is known; right for y >= z, zl."""
     gain = fy - (fz if z > zl else fl) - sl * (y - (z if z > zl else zl))
     if ended:
@@ -361,123 +345,16 @@ def _between(z, fz, y, fy, zl, fl, sl, zh, fh, sh, ended):
 
 
 @_jit
-def _cut(pad, L, law, f, i):
-    """Limits of a depth cell, above which the front begins in some joints."""
-    depth = law.depth
-    zl, fl, sl = depth[f, i, 0], depth[f, i, 1], depth[f, i, 2]
-    zh, fh, sh = depth[f, i + 1, 0], depth[f, i + 1, 1], depth[f, i + 1, 2]
-    for l in range(L):
-        w = pad[_FRONT + l]
-        here = (zl <= w) & (w < zh)
-        fw = fl if w <= zl else pad[_FFRONT + l]
-        sw = sl if w <= zl else pad[_SFRONT + l]
-        pad[_LOW + l], pad[_FLOW + l], pad[_SLOW + l] = zl, fl, sl
-        pad[_HIGH + l] = w if here else zh
-        pad[_FHIGH + l] = fw if here else fh
-        pad[_SHIGH + l] = sw if here else sh
-        pad[_FFRONT + l] = fw if here else pad[_FFRONT + l]
-        pad[_SFRONT + l] = sw if here else pad[_SFRONT + l]
-        pad[_END + l] = zh if here else pad[_END + l]
-        pad[_FEND + l] = fh if here else pad[_FEND + l]
-        pad[_SEND + l] = sh if here else pad[_SEND + l]
-        pad[_CELL + l] = i if here else pad[_CELL + l]
-
-
-@_jit
-def _beyond(pad, L):
-    """Limits of the front."""
-    for l in range(L):
-        pad[_LOW + l], pad[_HIGH + l] = pad[_FRONT + l], pad[_END + l]
-        pad[_FLOW + l], pad[_FHIGH + l] = pad[_FFRONT + l], pad[_FEND + l]
-        pad[_SLOW + l], pad[_SHIGH + l] = pad[_SFRONT + l], pad[_SEND + l]
-
-
-@_jit
-def _fronts(pad, s, L, law, f, yields, wears, front):
-    """Where the front of a facet begins, with Phi and Phi' there."""
-    _, _, _, first, beside = _places(law, yields, wears, front)
-    M = law.depth.shape[0]
-    for l in range(L):
-        pad[_FRONT + l] = s[first + f, l]
-    for l in range(L):
-        pad[_FFRONT + l] = s[beside + f, l]
-    for l in range(L):
-        pad[_SFRONT + l] = s[beside + M + f, l]
-    for l in range(L):
-        pad[_STAKE + l] = pad[_CELL + l] = 0.0
-
-
-@_jit
-def _move(pad, s, L, law, f, ledger, yields, wears, front):
-    """Where the front of a facet begins next; see `front.moved`."""
-    _, _, _, first, beside = _places(law, yields, wears, front)
-    M, D, dim = law.depth.shape[0], law.depth.shape[1] - 1, law.dim
-    compliance = law.facet[f, _REST + 2]
-    for l in range(L):
-        y0, y1, w = pad[_Y0 + l], pad[_Y1 + l], pad[_FRONT + l]
-        k0, k1 = pad[_KCELL + l], pad[_KFRONT + l]
-        qs, qt = pad[_QS + l], pad[_QT + l]
-        r0 = 1.0 / (k0 if k0 > TINY else 1.0)
-        r1 = 1.0 / (k1 if k1 > TINY else 1.0)
-        both = 1.0 / (k0 + k1 if k0 + k1 > TINY else 1.0)
-        r0, r1 = r0 if k0 > TINY else 0.0, r1 if k1 > TINY else 0.0
-        both = both if k0 + k1 > TINY else 0.0
-        gaps, gapt = pad[_QSCELL + l] * r0 - qs * r1, pad[_QTCELL + l] * r0 - qt * r1
-        loss = k0 * (k1 * both) * (gaps * gaps + gapt * gapt)
-        at = y1 if y1 > 0.0 else 0.0
-        falls = y1 < y0 * (1.0 - STILL)
-        joins = (falls & (loss <= pad[_STAKE + l])) | (at < w)
-        pad[_FRONT + l] = at if joins else w
-        pad[_FFRONT + l] = pad[_F1 + l] if joins else pad[_FFRONT + l]
-        pad[_SFRONT + l] = pad[_S1 + l] if joins else pad[_SFRONT + l]
-        pad[_QS + l], pad[_QT + l] = 0.0 if joins else qs, 0.0 if joins else qt
-        pad[_QSCELL + l], pad[_QTCELL + l] = qs if joins else 0.0, qt if joins else 0.0
-        if ledger is not None:
-            pad[_LOST + l] += compliance * (loss if joins else 0.0)
-    for i in range(D):
-        if law.depth[f, i, 0] >= UNUSED:
-            break
-        rs, rt = 2 * dim + f * (D + 1) + i, 2 * dim + (M + f) * (D + 1) + i
-        _join(pad, s[rs], s[rt], L, np.float64(i))
-    rs, rt = 2 * dim + f * (D + 1) + D, 2 * dim + (M + f) * (D + 1) + D
-    for l in range(L):
-        s[rs, l] = pad[_QS + l]
-    for l in range(L):
-        s[rt, l] = pad[_QT + l]
-    for l in range(L):
-        s[first + f, l] = pad[_FRONT + l]
-    for l in range(L):
-        s[beside + f, l] = pad[_FFRONT + l]
-    for l in range(L):
-        s[beside + M + f, l] = pad[_SFRONT + l]
-
-
-@_jit
-def _join(pad, qs, qt, L, cell):
-    """Add the force of fronts that join to that of their cell."""
-    for l in range(L):
-        here = pad[_CELL + l] == cell
-        qs[l] += pad[_QSCELL + l] if here else 0.0
-        qt[l] += pad[_QTCELL + l] if here else 0.0
-
-
-@_jit
-def _slide(pad, qs, qt, L, law, f, i, ledger, tangent, yields, wears, front):
+def _slide(pad, qs, qt, L, law, f, i, ledger, tangent, yields, wears):
     """One depth cell of one facet: steps 3 and 4 of `reference.step`."""
     facet, depth = law.facet, law.depth
     A, a, compliance = facet[f, _REST], facet[f, _REST + 1], facet[f, _REST + 2]
     strength = law.scalars[0] * law.scalars[1] * A
     by_mu = law.scalars[0] * A
-    if front is None:
-        zl, fl, sl = depth[f, i, 0], depth[f, i, 1], depth[f, i, 2]
-        zh, fh, sh = depth[f, i + 1, 0], depth[f, i + 1, 1], depth[f, i + 1, 2]
-        ended = i + 2 < depth.shape[1]
-    else:
-        ended, cell = True, np.float64(i)
+    zl, fl, sl = depth[f, i, 0], depth[f, i, 1], depth[f, i, 2]
+    zh, fh, sh = depth[f, i + 1, 0], depth[f, i + 1, 1], depth[f, i + 1, 2]
+    ended = i + 2 < depth.shape[1]
     for l in range(L):
-        if front is not None:
-            zl, fl, sl = pad[_LOW + l], pad[_FLOW + l], pad[_SLOW + l]
-            zh, fh, sh = pad[_HIGH + l], pad[_FHIGH + l], pad[_SHIGH + l]
         y0, y1, f0, f1 = pad[_Y0 + l], pad[_Y1 + l], pad[_F0 + l], pad[_F1 + l]
         from0, from1 = y0 - zl, y1 - zl
         k0, k1 = pad[_S0 + l] - sl, pad[_S1 + l] - sl
@@ -499,8 +376,8 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent, yields, wears, front):
         else:  # the bed less what it holds at the flattened depth
             z0, z1, at0, fat0 = pad[_Z0 + l], pad[_Z1 + l], pad[_AT0 + l], pad[_FAT0 + l]
             k0, k1 = k0 if y0 > z0 else 0.0, k1 if y1 > z1 else 0.0
-            gained = _between(at0, fat0, y1, f1, zl, fl, sl, zh, fh, sh, ended)
-            G1 = _between(z1, pad[_FZ1 + l], y1, f1, zl, fl, sl, zh, fh, sh, ended)
+            gained = _gain(at0, fat0, y1, f1, zl, fl, sl, zh, fh, sh, ended)
+            G1 = _gain(z1, pad[_FZ1 + l], y1, f1, zl, fl, sl, zh, fh, sh, ended)
             h1 = k1 * (y1 - (z1 if z1 > zl else zl))
             G1 = G1 if h1 > G1 else h1
             G1 = G1 if G1 > 0.0 else 0.0
@@ -508,7 +385,7 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent, yields, wears, front):
         grows = k1 > k0
         dy = y1 - y0
         near = abs(dy) <= NEAR * abs(y1)
-        if yields is not None:  # flattened springs touch at once: no mean where they do
+        if yields is not None:  # as in `reference.load`
             near = near & ((k0 > 0.0) | (k1 == 0.0))
         top = gained if grows else k1
         bottom = dy if grows else k0
@@ -519,10 +396,10 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent, yields, wears, front):
         kept = 1.0 if grows else ratio
         add = a * (chord if grows else k1)
         olds, oldt, des, det = qs[l], qt[l], pad[_DES + l], pad[_DET + l]
-        if wears is not None:  # back within the limit, that fell since
+        if wears is not None:  # reduced to the new limit, as in `wear.within_limit`
             strength = by_mu * pad[_MU + l]
             if yields is not None:
-                G0 = _between(z0, pad[_FZ0 + l], y0, f0, zl, fl, sl, zh, fh, sh, ended)
+                G0 = _gain(z0, pad[_FZ0 + l], y0, f0, zl, fl, sl, zh, fh, sh, ended)
                 h0 = k0 * (y0 - (z0 if z0 > zl else zl))
                 G0 = G0 if h0 > G0 else h0
                 G0 = G0 if G0 > 0.0 else 0.0
@@ -539,19 +416,10 @@ def _slide(pad, qs, qt, L, law, f, i, ledger, tangent, yields, wears, front):
         slips = size > cap
         share = cap / (size if slips else 1.0)
         share = share if slips else 1.0
-        part = share if new2 > TINY else 0.0  # a size that underflows has no cap
+        part = share if new2 > TINY else 0.0  # squares of smaller forces underflow
         qs[l], qt[l] = part * ts, part * tt
         pad[_SUMS + l] += part * ts
         pad[_SUMT + l] += part * tt
-        if front is not None:  # what `_move` asks for
-            r1 = 1.0 / (k1 if k1 > TINY else 1.0)
-            stake = part * part * new2 * (r1 if k1 > TINY else 0.0)
-            pad[_STAKE + l] = stake if (zl < y1) & (y1 <= zh) else pad[_STAKE + l]
-            here = pad[_CELL + l] == cell
-            pad[_KCELL + l] = k1 if here else pad[_KCELL + l]
-            pad[_QSCELL + l] = part * ts if here else pad[_QSCELL + l]
-            pad[_QTCELL + l] = part * tt if here else pad[_QTCELL + l]
-            pad[_KFRONT + l], pad[_QS + l], pad[_QT + l] = k1, part * ts, part * tt
         if ledger is not None:  # each term is >= 0 as written
             r0 = 1.0 / (k0 if k0 > TINY else 1.0)
             r1 = 1.0 / (k1 if k1 > TINY else 1.0)
@@ -643,7 +511,7 @@ def _add_tangent(pad, L, law, f):
 
 
 @_jit
-def _soften(pad, L, law, f):
+def _yield_tangent(pad, L, law, f):
     """C -= along g^T of a facet whose flattened depth moves, with the y that presses it."""
     facet, dim, o = law.facet, law.dim, np.int64(law.facet[f, _OPPOSITE])
     A, soft, limited = facet[f, _REST], 1.0 / law.scalars[0], law.scalars[2] < np.inf
@@ -667,7 +535,7 @@ def _soften(pad, L, law, f):
 
 
 @_jit
-def _facet(work, s, L, law, f, ledger, tangent, yields, wears, front):
+def _facet(work, s, L, law, f, ledger, tangent, yields, wears):
     """One facet of a block: closures, virgin curve, sliders, and its part of F and C."""
     pad, facet, dim = work.pad, law.facet, law.dim
     lam, limit = law.scalars[0], law.scalars[2]
@@ -676,11 +544,9 @@ def _facet(work, s, L, law, f, ledger, tangent, yields, wears, front):
     s0, s1, s2 = facet[f, _S], facet[f, _S + 1], facet[f, _S + 2]
     t1, t2 = facet[f, _T + 1], facet[f, _T + 2]
     n0, n1, n2 = facet[f, _N], facet[f, _N + 1], facet[f, _N + 2]
-    A, several = facet[f, _REST], _several(law, front)
-    if front is not None:
-        _fronts(pad, s, L, law, f, yields, wears, front)
+    A = facet[f, _REST]
     if yields is not None:
-        _press(work, s, L, law, f, yields, wears, front)
+        _flatten(work, s, L, law, f, yields, wears)
     for l in range(L):
         pad[_Y0 + l] = m0 * pad[_OLD + l] + m1 * pad[_OLD1 + l]
         pad[_Y1 + l] = m0 * pad[_NEW + l] + m1 * pad[_NEW1 + l]
@@ -693,7 +559,7 @@ def _facet(work, s, L, law, f, ledger, tangent, yields, wears, front):
             pad[_Y1 + l] += m2 * pad[_NEW2 + l]
             pad[_DES + l] += s2 * pad[_P2 + l]
             pad[_DET + l] += t2 * pad[_P2 + l]
-    beside = _places(law, yields, wears, front)[2]
+    beside = _places(law, yields, wears)[2]
     rf, rs = beside + f, beside + M + f
     for l in range(L):
         pad[_Y0 + l] = pad[_Y0 + l] if abs(pad[_Y0 + l]) >= UNDERFLOW else 0.0
@@ -720,17 +586,10 @@ def _facet(work, s, L, law, f, ledger, tangent, yields, wears, front):
     for i in range(D):
         if law.depth[f, i, 0] >= UNUSED:
             break
-        rs, rt = 2 * dim + f * several + i, 2 * dim + (M + f) * several + i
-        if front is not None:
-            _cut(pad, L, law, f, i)
-        _slide(pad, s[rs], s[rt], L, law, f, i, ledger, tangent, yields, wears, front)
-    if front is not None:
-        _beyond(pad, L)
-        rs, rt = 2 * dim + f * several + D, 2 * dim + (M + f) * several + D
-        _slide(pad, s[rs], s[rt], L, law, f, D, ledger, tangent, yields, wears, front)
-        _move(pad, s, L, law, f, ledger, yields, wears, front)
+        rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
+        _slide(pad, s[rs], s[rt], L, law, f, i, ledger, tangent, yields, wears)
     if yields is not None:
-        _relieve(pad, L, law, f, ledger)
+        _subtract_flattened(pad, L, law, f, ledger)
     if wears is not None:
         for l in range(L):
             before = pad[_F0 + l] if yields is None else pad[_FAT0 + l] - pad[_FZ0 + l]
@@ -751,7 +610,7 @@ def _facet(work, s, L, law, f, ledger, tangent, yields, wears, front):
     if tangent is not None:
         _add_tangent(pad, L, law, f)
         if yields is not None:
-            _soften(pad, L, law, f)
+            _yield_tangent(pad, L, law, f)
 
 
 @_jit
@@ -761,14 +620,14 @@ def _clear(pad, first, last):
 
 
 @_jit
-def _begin(pad, s, d, start, L, law, yields, wears, front):
+def _begin(pad, s, d, start, L, law, yields, wears):
     """Lay out the old and new place of each joint of a block, and move it."""
     limit, dim = law.scalars[2], law.dim
     if limit < np.inf or dim == 1:
         _clear(pad, _P, _J00)  # the offset has one component in a plane, none on closure
     _clear(pad, _PULL1, _C00)
     if wears is not None:
-        _weaken(pad, s, L, law, yields, wears, front)
+        _worn_friction(pad, s, L, law, yields, wears)
     for i in range(dim):
         row, origin = i * LANES, 0 if i == 0 else dim + i - 1
         for l in range(L):
@@ -789,7 +648,7 @@ def _begin(pad, s, d, start, L, law, yields, wears, front):
 
 
 @_jit
-def _finish(pad, s, F, C, start, L, law, ledger, tangent, yields, wears, front):
+def _finish(pad, s, F, C, start, L, law, ledger, tangent, yields, wears):
     """Hand out F and C, and add up the ledger."""
     limit, dim = law.scalars[2], law.dim
     for i in range(dim):
@@ -807,11 +666,11 @@ def _finish(pad, s, F, C, start, L, law, ledger, tangent, yields, wears, front):
                 pad[_LOST + l] += pad[_SLIP + l] * (pull if pull > 0.0 else 0.0) / limit
         for l in range(L):
             s[2 * dim - 1, l] += pad[_LOST + l]
-        slip = _places(law, yields, wears, front)[1]
+        slip = _places(law, yields, wears)[1]
         if yields is not None:
             for l in range(L):
-                s[slip - 1, l] += pad[_CRUSHED + l]
-                s[2 * dim - 1, l] += pad[_CRUSHED + l]
+                s[slip - 1, l] += pad[_PLASTIC + l]
+                s[2 * dim - 1, l] += pad[_PLASTIC + l]
         if wears is not None:
             for l in range(L):
                 capacity = 0.5 * pad[_MU + l] * pad[_NORMAL + l]
@@ -823,7 +682,7 @@ def _finish(pad, s, F, C, start, L, law, ledger, tangent, yields, wears, front):
 @_jit
 def advance(
     state, d, F, C, index, keep, first, last, block, pad, place, piece, facet, depth, curve,
-    scalars, dim, yields, wears, front, ledger, tangent,
+    scalars, dim, yields, wears, ledger, tangent,
 ):  # fmt: skip
     """Advance numbers first..last of the list `index` (of all joints if it is empty).
 
@@ -854,12 +713,12 @@ def advance(
                 for l in range(L):
                     block[r, l] = state[start // W, r, l]
             s = block
-        _begin(pad, s, d, start, L, law, yields, wears, front)
+        _begin(pad, s, d, start, L, law, yields, wears)
         if tangent is not None:
             _clear(pad, _C00, _MU)
         for f in range(facet.shape[0]):
-            _facet(work, s, L, law, f, ledger, tangent, yields, wears, front)
-        _finish(pad, s, F, C, start, L, law, ledger, tangent, yields, wears, front)
+            _facet(work, s, L, law, f, ledger, tangent, yields, wears)
+        _finish(pad, s, F, C, start, L, law, ledger, tangent, yields, wears)
         if listed and keep:
             for l in range(L):
                 home, at = index[start + l] // W, index[start + l] % W
@@ -868,21 +727,15 @@ def advance(
 
 
 @_jit
-def _count(pad, qs, qt, L, law, f, i, yields, wears, front):
+def _count(pad, qs, qt, L, law, f, i, yields, wears):
     """One depth cell of one facet: is it at its friction limit, and what does it store."""
     facet, depth = law.facet, law.depth
     strength = law.scalars[1] * law.scalars[0] * facet[f, _REST]
     compliance = facet[f, _REST + 2]
-    if front is None:
-        zl, fl, sl = depth[f, i, 0], depth[f, i, 1], depth[f, i, 2]
-        zh, fh, sh = depth[f, i + 1, 0], depth[f, i + 1, 1], depth[f, i + 1, 2]
-        ended = i + 2 < depth.shape[1]
-    else:
-        ended = True
+    zl, fl, sl = depth[f, i, 0], depth[f, i, 1], depth[f, i, 2]
+    zh, fh, sh = depth[f, i + 1, 0], depth[f, i + 1, 1], depth[f, i + 1, 2]
+    ended = i + 2 < depth.shape[1]
     for l in range(L):
-        if front is not None:
-            zl, fl, sl = pad[_LOW + l], pad[_FLOW + l], pad[_SLOW + l]
-            zh, fh, sh = pad[_HIGH + l], pad[_FHIGH + l], pad[_SHIGH + l]
         y, force, slope = pad[_Y0 + l], pad[_F0 + l], pad[_S0 + l]
         reach = min(max(y, zl), zh)
         k = min(max(slope, sl), sh) - sl
@@ -891,7 +744,7 @@ def _count(pad, qs, qt, L, law, f, i, yields, wears, front):
         if yields is not None:
             z = pad[_Z0 + l]
             k = k if y > z else 0.0
-            G = _between(z, pad[_FZ0 + l], y, force, zl, fl, sl, zh, fh, sh, ended)
+            G = _gain(z, pad[_FZ0 + l], y, force, zl, fl, sl, zh, fh, sh, ended)
             z = z if z > zl else zl
         most = k * (y - z if y > z else 0.0)
         G = min(max(G, 0.0), most)
@@ -899,7 +752,7 @@ def _count(pad, qs, qt, L, law, f, i, yields, wears, front):
             strength = pad[_MU + l] * law.scalars[0] * facet[f, _REST]
         q2 = qs[l] * qs[l] + qt[l] * qt[l]
         limit = np.sqrt(q2) >= strength * (G * (1.0 - LIMIT) - ROUNDED * force)
-        pad[_WHOLE + l] = pad[_WHOLE + l] if limit else 0.0
+        pad[_ALL_SLIP + l] = pad[_ALL_SLIP + l] if limit else 0.0
         pad[_LIMIT + l] += G if limit else 0.0
         soft = 1.0 / (k if k > TINY else 1.0)
         pad[_STORED + l] += compliance * q2 * (soft if k > TINY else 0.0)
@@ -919,7 +772,7 @@ def _effective(pad, s, L, law, f):
 
 
 @_jit
-def _squeeze(work, law, L, energy, potential):
+def _normal_energy(work, law, L, energy, potential):
     """Energy of the normal springs at the row of y, from the table of T; Phi and Phi' beside."""
     pad, piece = work.pad, work.piece
     eta, scale, rise = law.scalars[3], law.scalars[4], law.scalars[5]
@@ -941,48 +794,39 @@ def _squeeze(work, law, L, energy, potential):
 
 
 @_jit
-def _measure_facet(work, s, L, law, f, energy, yields, wears, front):
+def _measure_facet(work, s, L, law, f, energy, yields, wears):
     """What one facet of a block adds to the measures."""
     pad, dim = work.pad, law.dim
     M, D = law.depth.shape[0], law.depth.shape[1] - 1
     potential, share = law.facet[f, _POTENTIAL], law.facet[f, _SHARE]
-    several = _several(law, front)
-    if front is not None:
-        _fronts(pad, s, L, law, f, yields, wears, front)
     for l in range(L):
-        pad[_WHOLE + l], pad[_LIMIT + l], pad[_Z0 + l] = 1.0, 0.0, 0.0
+        pad[_ALL_SLIP + l], pad[_LIMIT + l], pad[_Z0 + l] = 1.0, 0.0, 0.0
     if yields is not None:
-        at = _places(law, yields, wears, front)[0] + f
+        at = _places(law, yields, wears)[0] + f
         for l in range(L):
             pad[_Z0 + l] = pad[_Y0 + l] = s[at, l]
-        _squeeze(work, law, L, energy, potential)
+        _normal_energy(work, law, L, energy, potential)
         for l in range(L):
             pad[_FZ0 + l], pad[_FZ1 + l] = pad[_F0 + l], pad[_CURVING + l]
     _effective(pad, s, L, law, f)
-    _squeeze(work, law, L, energy, potential)
+    _normal_energy(work, law, L, energy, potential)
     if yields is not None:
         for l in range(L):
             y, z = pad[_Y0 + l], pad[_Z0 + l]
-            squeezed = pad[_CURVING + l] - pad[_FZ1 + l]
-            squeezed -= potential * pad[_FZ0 + l] * (y - z)
-            pad[_CURVING + l] = squeezed if (y > z) & (squeezed > 0.0) else 0.0
+            normal = pad[_CURVING + l] - pad[_FZ1 + l]
+            normal -= potential * pad[_FZ0 + l] * (y - z)
+            pad[_CURVING + l] = normal if (y > z) & (normal > 0.0) else 0.0
     for i in range(D):
         if law.depth[f, i, 0] >= UNUSED:
             break
-        rs, rt = 2 * dim + f * several + i, 2 * dim + (M + f) * several + i
-        if front is not None:
-            _cut(pad, L, law, f, i)
-        _count(pad, s[rs], s[rt], L, law, f, i, yields, wears, front)
-    if front is not None:
-        _beyond(pad, L)
-        rs, rt = 2 * dim + f * several + D, 2 * dim + (M + f) * several + D
-        _count(pad, s[rs], s[rt], L, law, f, D, yields, wears, front)
+        rs, rt = 2 * dim + f * D + i, 2 * dim + (M + f) * D + i
+        _count(pad, s[rs], s[rt], L, law, f, i, yields, wears)
     for l in range(L):
         y, force, z = pad[_Y0 + l], pad[_F0 + l], pad[_Z0 + l]
         if yields is not None:
             force = force - pad[_FZ0 + l] if y > z else 0.0
         pad[_STORED + l] += pad[_CURVING + l]
-        pad[_SLIDING + l] += share * pad[_WHOLE + l] if y > z else 0.0
+        pad[_SLIDING + l] += share * pad[_ALL_SLIP + l] if y > z else 0.0
         pad[_SLIPPING + l] += share * pad[_LIMIT + l] / (force if force > 0.0 else 1.0)
         pad[_APART + l] += 0.0 if y > z else share
         pad[_REACH + l] = y if y > pad[_REACH + l] else pad[_REACH + l]
@@ -991,7 +835,7 @@ def _measure_facet(work, s, L, law, f, energy, yields, wears, front):
 @_jit
 def measures(
     state, out, first, last, block, pad, place, piece, facet, depth, curve, scalars, dim,
-    yields, wears, front, energy,
+    yields, wears, energy,
 ):  # fmt: skip
     """Measures (5, n) of joints first..last, as `reference.measures`; arguments as above."""
     work = Work(block, pad, place, piece)
@@ -1002,10 +846,10 @@ def measures(
         s = state[start // W]
         _clear(pad, _SLIDING, _REACH)
         if wears is not None:
-            _weaken(pad, s, L, law, yields, wears, front)
+            _worn_friction(pad, s, L, law, yields, wears)
         pad[_REACH : _REACH + LANES] = -np.inf
         for f in range(facet.shape[0]):
-            _measure_facet(work, s, L, law, f, energy, yields, wears, front)
+            _measure_facet(work, s, L, law, f, energy, yields, wears)
         for i in range(5):
             for l in range(L):
                 out[i, start + l] = pad[_SLIDING + i * LANES + l]
@@ -1014,7 +858,7 @@ def measures(
 @_jit
 def refresh(
     state, first, last, block, pad, place, piece, facet, depth, curve, scalars, dim, yields,
-    wears, front,
+    wears,
 ):  # fmt: skip
     """Phi and Phi' in the blocks of joints first..last, after their states were written."""
     work = Work(block, pad, place, piece)
@@ -1024,7 +868,7 @@ def refresh(
         L = min(W, last - start)
         s = state[start // W]
         for f in range(M):
-            first_depth, _, beside, fronts, theirs = _places(law, yields, wears, front)
+            first_depth, _, beside = _places(law, yields, wears)
             _effective(pad, s, L, law, f)
             _virgin(work, law, None, L)
             for l in range(L):
@@ -1035,9 +879,3 @@ def refresh(
                 _virgin(work, law, None, L)
                 for l in range(L):
                     s[beside + 2 * M + f, l] = pad[_F0 + l]
-            if front is not None:
-                for l in range(L):
-                    pad[_Y0 + l] = s[fronts + f, l]
-                _virgin(work, law, None, L)
-                for l in range(L):
-                    s[theirs + f, l], s[theirs + M + f, l] = pad[_F0 + l], pad[_S0 + l]

@@ -104,7 +104,7 @@ class NumbaEngine:
 
         self._kernel, self._sliders = compiled, tables.sliders
         self.rows = compiled.block_rows(tables)
-        options = tables.yields or None, tables.wears or None, tables.front or None
+        options = tables.yields or None, tables.wears or None
         self._law: tuple[Any, ...] = (*compiled.pack(tables), *options)
         self._with: dict[tuple[bool, bool], tuple[Any, ...]] = {
             # True or None, for which the compiler leaves the code out; slip is made of the ledger

@@ -5,10 +5,9 @@ joints last: facets (M, B), cells (M, D, B), sliders (2, M, D, B). State (rows, 
 
     delta (dim) | in-plane offset (dim - 1) | dissipated energy (1) | q (2 M D)
 
-where q is the shear force of a slider times lam, in the (s, t) basis of Eq. 25. With fronts D is
-one more, and their depth (M) follows, docs/theory-incremental.md, "A front that moves". With
-asperities that yield follow flattened depth (M) | plastic work (1); with wear, slip of the
-asperities (1) and by how much mu had fallen in the last step (1).
+where q is the shear force of a slider times lam, in the (s, t) basis of Eq. 25. With asperities
+that yield follow flattened depth (M) | plastic work (1); with wear, slip of the asperities (1) and
+by how much mu had fallen in the last step (1).
 """
 
 from typing import NamedTuple
@@ -18,10 +17,9 @@ from numpy.typing import NDArray
 
 from ..discretisation.tables import UNDERFLOW, Tables
 from ..support.checks import Array
-from .cells import TINY, Cells, Limits, cells, compliance, limits, reciprocal
-from .front import cut, moved
+from .cells import TINY, Cells, cells, compliance, reciprocal
 from .wear import friction, slipped, within_limit
-from .yielding import flattened, plastic_work, press, softening
+from .yielding import flatten, flattened, plastic_work, softening
 
 NEAR = 1e-5  # of y: below such a change of y the chord of G is lost in rounding, the mean is not
 GRAZING = 1e-12  # cosine at which the offset meets its limit: its derivative has a pole at 0
@@ -43,7 +41,6 @@ class State(NamedTuple):
     plastic: Array  # (B,) or no rows
     slip: Array  # of the asperities (B,), or no rows
     fallen: Array  # by how much mu had fallen in the last step (B,), or no rows
-    front: Array  # depth at which the front of every facet begins (M, B), or no rows
 
 
 class Sliders(NamedTuple):
@@ -82,13 +79,11 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
        q += A/c1 chord de; where it fell, the springs that part take their force along,
        q = q kappa1/kappa0 + A/c1 kappa1 de.
     4. Coulomb friction: |q| <= mu lam A G (Eq. 5, 6).
-       Asperities that yield have flattened springs, whose part at the flattened depth is taken off
-       all of these ("Yielding"); with wear mu has fallen, and q comes back to its limit ("Wear").
+       Where asperities yield, Phi, G and kappa are less their values at the flattened depth
+       ("Yielding"). With wear mu has fallen, and q is reduced to its new limit ("Wear").
     5. Traction: F = sum of A Phi n + (1/lam) sum of q (Eq. 21).
     6. Dissipated energy, every term >= 0 ("No step creates energy").
     7. Tangent C = dF/dd ("The tangent"), not without `tangent`.
-
-    With fronts each of them may join its cell at the end ("A front that moves").
     """
     old = parts(k, state)
     new_state = np.empty_like(state)
@@ -97,13 +92,12 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     offset, J_offset, slip = limited_offset(k, old.offset, d[1:])
     new.offset[:] = offset
 
-    at = cut(k, old.front) if k.front else limits(k)
-    before = cells(k, effective_closure(k, old.delta[0], old.offset), at)
-    after = cells(k, effective_closure(k, new.delta[0], offset), at)
+    before = cells(k, effective_closure(k, old.delta[0], old.offset))
+    after = cells(k, effective_closure(k, new.delta[0], offset))
     gained, flat0, flat1 = after.G - before.G, None, None
     if k.yields:
-        new.depth[:] = press(k, old.depth, after.y)
-        flat0, flat1 = cells(k, old.depth, at), cells(k, new.depth, at)
+        new.depth[:] = flatten(k, old.depth, after.y)
+        flat0, flat1 = cells(k, old.depth), cells(k, new.depth)
         new.plastic[:] = old.plastic + plastic_work(k, before.y, after.y, flat0, flat1)
         gained = after.G - np.maximum(before.G, flat0.G)
         before, after = flattened(before, flat0), flattened(after, flat1)
@@ -116,16 +110,13 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     basis = np.stack([k.s, k.t])  # (2, dim, M)
     de = np.einsum("edm,db->emb", basis, d)[:, :, None]  # facet-plane increment (2, M, 1, B)
     sliders = load(k, before, gained, after, strength(k, mu), q, de)
-    whole = sliders.size**2 > TINY  # a size that underflows has no cap
-    new.q[:] = np.where(whole, sliders.share, 0.0) * sliders.trial
+    resolved = sliders.size**2 > TINY  # squares of smaller forces underflow: they count as zero
+    new.q[:] = np.where(resolved, sliders.share, 0.0) * sliders.trial
 
     F = k.n @ (k.area[:, None] * after.force)
     F = F + np.einsum("edm,emb->db", basis, new.q.sum(axis=2)) / k.lam
 
     lost = lost + friction_loss(k, before, after, q, sliders)
-    if k.front:
-        new.front[:], new.q[:], joined = moved(k, old.front, at, before.y, after, new.q)
-        lost = lost + joined
     new.dissipated[:] = old.dissipated + lost
     if slip.any():
         pull = k.n[1:] @ (k.area[:, None] * after.force)  # in-plane part of the normal forces
@@ -140,7 +131,7 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     if not tangent:
         return new_state, F, None
     g = gradient(k, J_offset)
-    C = stiffness(k, at, before, after, sliders, de, g)
+    C = stiffness(k, before, after, sliders, de, g)
     if flat0 is not None and flat1 is not None:
         C = C - softening(k, after, flat0, flat1, sliders.push, g)
     return new_state, F, C
@@ -149,12 +140,11 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
 def parts(k: Tables, state: Array) -> State:
     """Views of the parts of a state array, q as (2, M, D, B)."""
     dim, M = k.dim, len(k.c1)
-    q, rest = np.split(state[2 * dim :], [2 * M * k.several])
-    front, rest = np.split(rest, [M if k.front else 0])
+    q, rest = np.split(state[2 * dim :], [2 * M * k.cells])
     depth, plastic = (rest[:M], rest[M]) if k.yields else (rest[:0], rest[:0])
     slip, fallen = rest[-2:] if k.wears else (rest[:0], rest[:0])
     place = state[:dim], state[dim : 2 * dim - 1], state[2 * dim - 1]
-    return State(*place, q.reshape(2, M, k.several, -1), depth, plastic, slip, fallen, front)
+    return State(*place, q.reshape(2, M, k.cells, -1), depth, plastic, slip, fallen)
 
 
 def effective_closure(k: Tables, closure: Array, offset: Array) -> Array:
@@ -175,7 +165,7 @@ def load(
     kappa0, kappa1 = before.kappa, after.kappa
     dy = (after.y - before.y)[:, None]
     near = np.abs(dy) <= NEAR * np.abs(after.y)[:, None]
-    if k.yields:  # flattened springs touch all at once: the mean is wrong where they do
+    if k.yields:  # all flattened springs touch at one closure: the mean is wrong in that step
         near = near & ((kappa0 > 0) | (kappa1 == 0))
     with np.errstate(divide="ignore", invalid="ignore"):
         chord = np.where(near, 0.5 * (kappa0 + kappa1), gained / dy)
@@ -231,7 +221,7 @@ def limited_offset(k: Tables, offset: Array, p: Array) -> tuple[Array, Array, Ar
     J = np.broadcast_to(np.eye(size)[:, :, None], (size, *free.shape)).copy()
     slip = np.zeros(free.shape[1])
     D = k.critical_slip
-    # outside by rounding and on the way in is not at the limit
+    # an offset that is outside by rounding and moves inwards is not at the limit
     held = np.flatnonzero((np.sum(free**2, axis=0) > D * D) & (np.sum(free * p, axis=0) > 0))
     if held.size == 0:
         return free, J, slip
@@ -268,17 +258,18 @@ def gradient(k: Tables, J_offset: Array) -> Array:
 
 
 def stiffness(
-    k: Tables, at: Limits, before: Cells, after: Cells, sliders: Sliders, de: Array, g: Array
+    k: Tables, before: Cells, after: Cells, sliders: Sliders, de: Array, g: Array
 ) -> Array:
     """Tangent C = dF/dd (dim, dim, B): J_q = beta (I - s s^T) E + v g^T per cell, summed."""
     trial, share, chord, grows = sliders.trial, sliders.share, sliders.chord, sliders.grows
     y, kappa = after.y, after.kappa
     a = (k.area / k.c1)[:, None, None]
-    inside = (y[:, None] > at.low) & (y[:, None] < at.high)
+    depth = k.depth[:, :, None]
+    inside = (y[:, None] > depth[:, :-1]) & (y[:, None] < depth[:, 1:])
     p = np.where(inside, k.curve.curvature(y)[:, None], 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         chord_slope = np.where(sliders.near, p / 2, (kappa - chord) / (y - before.y)[:, None])
-    # where rounding would decide: what did not close has not grown, what is at its limit slips
+    # rounding must not decide: a facet that did not close has not grown; q at its limit slips
     stiffer = grows & ((y - before.y) > ROUNDED * np.abs(y))[:, None]
     v = np.where(stiffer, a * chord_slope * de, p * reciprocal(kappa) * trial)
     beta = np.where(sliders.cap > 0, a * np.where(grows, chord, kappa), 0.0)
@@ -320,9 +311,8 @@ class Measures(NamedTuple):
 def measures(k: Tables, state: Array) -> Measures:
     """Shares, stored energy and reach of a batch of states (rows, B)."""
     state_now = parts(k, state)
-    at = cut(k, state_now.front) if k.front else limits(k)
-    virgin = cells(k, effective_closure(k, state_now.delta[0], state_now.offset), at)
-    now = flattened(virgin, cells(k, state_now.depth, at) if k.yields else None)
+    virgin = cells(k, effective_closure(k, state_now.delta[0], state_now.offset))
+    now = flattened(virgin, cells(k, state_now.depth) if k.yields else None)
     y, force, G = now.y, now.force, now.G
     mu = friction(k, state_now.slip) if k.wears else np.asarray(k.mu)
     q2 = state_now.q[0] ** 2 + state_now.q[1] ** 2
@@ -333,11 +323,11 @@ def measures(k: Tables, state: Array) -> Measures:
     total = np.where(force > 0, force, 1.0)
     slipping = np.sum(weight * np.sum(np.where(capped, G, 0.0), axis=1) / total, axis=0)
     separated = np.sum(weight * ~touches, axis=0)
-    squeezed = k.curve.energy(y)
+    normal = k.curve.energy(y)
     if k.yields:
         depth = state_now.depth
-        squeezed = squeezed - k.curve.energy(depth) - k.curve.force(depth)[0] * (y - depth)
-        squeezed = np.where(touches, np.maximum(squeezed, 0.0), 0.0)
-    stored = np.sum((k.area * k.c1)[:, None] * squeezed, axis=0)
+        normal = normal - k.curve.energy(depth) - k.curve.force(depth)[0] * (y - depth)
+        normal = np.where(touches, np.maximum(normal, 0.0), 0.0)
+    stored = np.sum((k.area * k.c1)[:, None] * normal, axis=0)
     stored = stored + np.sum(compliance(k) * q2 * reciprocal(now.kappa), axis=(0, 1))
     return Measures(sliding, slipping, separated, stored, np.max(y, axis=0))

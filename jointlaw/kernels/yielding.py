@@ -1,7 +1,8 @@
 """Asperities that yield: one flattened depth per facet, docs/theory-incremental.md, "Yielding".
 
-The springs of a facet that touch above its flattened depth z_p were pressed flat: they touch again
-together at y = z_p. All that the bed then holds is what it held without, less its value at z_p.
+Springs of a facet whose touch depth is less than its flattened depth z_p are flattened: all of them
+touch again at the same effective closure, y = z_p. Normal force and friction limit of the facet are
+therefore those of elastic springs at y less those at z_p.
 """
 
 import numpy as np
@@ -11,7 +12,7 @@ from ..support.checks import Array
 from .cells import Cells
 
 
-def press(k: Tables, depth: Array, y: Array) -> Array:
+def flatten(k: Tables, depth: Array, y: Array) -> Array:
     """Flattened depth (M, B) of every facet once the closures y (M, B) are reached."""
     assert k.yield_depth is not None
     own = np.maximum(depth, y - k.yield_depth[:, None])
@@ -19,7 +20,7 @@ def press(k: Tables, depth: Array, y: Array) -> Array:
 
 
 def flattened(virgin: Cells, flat: Cells | None) -> Cells:
-    """The cells of the virgin curve less what they hold at the flattened depth."""
+    """The cells of the virgin curve less their values at the flattened depth."""
     if flat is None:
         return virgin
     over = virgin.y - flat.y
@@ -31,10 +32,10 @@ def flattened(virgin: Cells, flat: Cells | None) -> Cells:
 
 
 def plastic_work(k: Tables, y0: Array, y1: Array, flat0: Cells, flat1: Cells) -> Array:
-    """Energy (B,) in J/m2 that springs lose where they are pressed flat.
+    """Energy (B,) in J/m2 that springs lose while they are flattened.
 
-    Exact for springs that their own facet presses; for those that the opposite facet does, by the
-    mean of their compressions before and after the step.
+    Exact for springs that the closure of their own facet flattens; for those that the opposite
+    facet flattens it is the mean of their compressions before and after the step.
     """
     assert k.yield_depth is not None
     largest = k.yield_depth[:, None]

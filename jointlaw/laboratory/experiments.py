@@ -11,7 +11,7 @@ from ..joints.joint import Joint
 from ..joints.state import NonFiniteError
 from ..support.checks import Array, above, at_least, number, numbers, one_of, whole
 from ..support.progress import track
-from .normal_control import NormalCondition, closing_increment
+from .normal_control import NormalCondition, closing_increments
 from .record import UNITS, Record
 
 CONTROLS = ("stress", "stiffness", "closure")
@@ -136,10 +136,10 @@ class _Log:
     def advance(self, shear: Array, condition: NormalCondition | None) -> None:
         """One step with the in-plane increment `shear` that meets the normal condition."""
         try:
-            closing = 0.0
+            step = np.concatenate([[0.0], shear])
             if condition is not None:
-                closing = closing_increment(self.joint, shear, condition)
-            F, _ = self.joint.update(np.concatenate([[closing], shear]), tangent=False)
+                (step[0],) = closing_increments(self.joint._batch, step[None], condition)
+            F, _ = self.joint.update(step, tangent=False)
         except (NonFiniteError, ArithmeticError) as error:
             raise PathError(
                 f"{self.name} stopped after {len(self.rows)} rows: {error}", self.record()

@@ -1,94 +1,87 @@
 """The closure increment at which a normal condition holds: Newton's method kept in a bracket."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from ..joints.batch import JointBatch
-from ..joints.joint import Joint
 from ..support.checks import Array
 
-TOLERANCE = 1e-11  # of the normal stress scale, for one joint
-TOLERANCE_OF_MANY = 1e-9  # of the normal stress, for a batch
+TOLERANCE = 1e-11  # of the normal stress scale
+_TRIES = 200
+_ROUNDING = 4e-16  # of the closure: what rounding leaves of it
 
 
 class NormalCondition(NamedTuple):
-    """Normal condition F1 = stress + spring (seat - closure), met to a share of `scale` (Pa)."""
+    """Normal condition F1 = stress + spring (seat - closure), met to a share of `scale` (Pa).
 
-    stress: float
-    scale: float
+    Each is one number, or (n,) for n joints.
+    """
+
+    stress: float | Array
+    scale: float | Array
     spring: float = 0.0
     seat: float = 0.0
 
-    def misfit(self, F1: float, closure: float) -> float:
-        """How far F1 (Pa) lies above what the condition asks at this closure (m)."""
-        return F1 - self.stress - self.spring * (self.seat - closure)
+    def misfit(self, F1: Array, closure: Array) -> Array:
+        """How far F1 (n,) in Pa lies above what the condition asks at these closures (n,) in m."""
+        miss: Array = F1 - self.stress - self.spring * (self.seat - closure)
+        return miss
 
 
-def closing_increment(joint: Joint, shear: Array, condition: NormalCondition) -> float:
-    """Closure increment (m) that meets the condition in a step with the shear increment `shear`.
+def closing_increments(
+    batch: JointBatch, step: Array, condition: NormalCondition, tolerance: float = TOLERANCE
+) -> Array:
+    """Closure increments (n,) in m that meet the condition in a step with the shear of `step`.
 
-    shear: (dim - 1,) in m. The joint is left as it was. Raises ArithmeticError where no closure
-    meets the condition, and NonFiniteError where the law gives no finite traction on the way.
+    step: (n, dim) in m; its closures are a first guess. The batch is left as it was. Raises
+    ArithmeticError where no closure meets the condition, and NonFiniteError where the law gives no
+    finite traction on the way.
     """
-    here = float(joint.delta[0])
-    size = max(abs(here), float(np.max(np.abs(shear), initial=0.0)))
-    length = reach = size or float(joint.law.closure(condition.scale))
-    u, low, high = 0.0, -math.inf, math.inf
-    for _ in range(200):
-        F, C = joint.trial(np.concatenate([[u], shear]))
-        value = condition.misfit(float(F[0]), here + u)
-        if abs(value) <= TOLERANCE * condition.scale and not (F[0] == 0.0 and value == 0.0):
-            return u
-        low, high = (u, high) if value <= 0 else (low, u)
-        finest = 4e-16 * max(abs(here + u), length)  # what rounding of the closure leaves
-        if high - low <= finest:
-            return high
-        slope = condition.spring + (float(C[0, 0]) if C is not None else 0.0)
-        newton = u - value / slope if slope > 0 else math.nan
-        if math.isinf(low) or math.isinf(high):
-            bound = u + reach if math.isinf(high) else u - reach
-            if not (math.isfinite(newton) and abs(newton - u) < abs(bound - u)):
-                newton = bound
-            if abs(newton - u) < finest:  # there but for rounding: step across, to bracket it
-                newton = u + math.copysign(finest, bound - u)
-            reach *= 2.0
-            u = newton
-            continue
-        u = newton if low < newton < high else 0.5 * (low + high)
-    raise ArithmeticError(
-        f"no closure between {here + low:g} and {here + high:g} m gives a normal stress of "
-        f"{condition.stress:g} Pa (spring {condition.spring:g} Pa/m)"
-    )
-
-
-def closing_increments(batch: JointBatch, step: Array, stress: Array) -> Array:
-    """Closure increments (n,) in m at which the shear of `step` leaves these normal stresses.
-
-    step: (n, dim) in m, of which the shear counts; stress: (n,) in Pa, > 0. The batch is left as
-    it was. The same method as for one joint, for all joints at once and to fewer digits. Raises
-    ArithmeticError where the stress of a joint is not met.
-    """
-    x, trial = np.zeros(len(stress)), step.copy()
-    low, high = np.full(len(x), -np.inf), np.full(len(x), np.inf)
-    reach = np.abs(step).max(axis=1)
-    for _ in range(100):
-        trial[:, 0] = x
+    here, trial = batch.delta[:, 0], step.copy()
+    u = trial[:, 0]
+    size = np.maximum(np.abs(here), np.abs(step[:, 1:]).max(axis=1, initial=0.0))
+    if not size.all():
+        size = np.where(size > 0, size, batch.law.closure(condition.scale))
+    reach, low, high = size, np.full_like(u, -np.inf), np.full_like(u, np.inf)
+    for _ in range(_TRIES):
         F, C = batch.trial(trial)
         assert C is not None
-        miss = F[:, 0] - stress
-        met = np.abs(miss) <= TOLERANCE_OF_MANY * stress
-        if met.all():
-            return x
-        low, high = np.where(miss < 0, x, low), np.where(miss < 0, high, x)
-        slope = np.maximum(C[:, 0, 0], 1e-3 * stress / reach)  # an open joint has none
-        newton = x - np.clip(miss / slope, -reach, reach)
-        inside = (low < newton) & (newton < high)
-        half = low / 2 + high / 2  # finite wherever it is taken: both ends are known then
-        x, reach = np.where(met, x, np.where(inside, newton, half)), 2 * reach
-    joint = int(np.argmin(met))
+        miss = condition.misfit(F[:, 0], here + u)
+        # an open joint meets a stress of zero anywhere: look for the point of contact
+        met = (np.abs(miss) <= tolerance * np.asarray(condition.scale)) & (
+            (F[:, 0] != 0) | (miss != 0)
+        )
+        low, high = np.where(miss <= 0, u, low), np.where(miss <= 0, high, u)
+        finest = _ROUNDING * np.maximum(np.abs(here + u), size)
+        closed = high - low <= finest
+        guess = _next_guess(u, miss, condition.spring + C[:, 0, 0], (low, high), reach, finest)
+        u[:] = np.where(met, u, np.where(closed, high, guess))
+        if (met | closed).all():
+            return u
+        reach = np.where(np.isinf(high - low), 2.0 * reach, reach)
+    joint = int(np.argmin(met | closed))
+    stress = np.broadcast_to(condition.stress, u.shape)[joint]
     raise ArithmeticError(
-        f"joint {joint}: no closure between {low[joint]:g} and {high[joint]:g} m from here gives "
-        f"a normal stress of {stress[joint]:g} Pa"
+        f"joint {joint}: no closure between {here[joint] + low[joint]:g} and "
+        f"{here[joint] + high[joint]:g} m gives a normal stress of {stress:g} Pa (spring "
+        f"{condition.spring:g} Pa/m)"
     )
+
+
+def _next_guess(
+    u: Array, miss: Array, slope: Array, bracket: tuple[Array, Array], reach: Array, finest: Array
+) -> Array:
+    """Newton's guess (n,) where it stays in the bracket, else its middle, or `reach` farther."""
+    low, high = bracket
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        newton = np.where(slope > 0, u - miss / slope, np.nan)
+        middle = 0.5 * (low + high)
+        inside = np.where((low < newton) & (newton < high), newton, middle)
+        bound = np.where(np.isinf(high), u + reach, u - reach)
+        near = np.abs(newton - u) < np.abs(bound - u)  # not where newton is NaN
+        outside = np.where(near, newton, bound)
+        # there but for rounding: step across, to bracket it
+        across = u + np.copysign(finest, bound - u)
+        outside = np.where(np.abs(outside - u) < finest, across, outside)
+    return np.where(np.isinf(high - low), outside, inside)

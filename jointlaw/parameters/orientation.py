@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..support.checks import above, at_least, finite, number
+from ..support.checks import Array, above, at_least, finite, number
 
 
 def largest_c(b: float) -> float:
@@ -33,6 +33,12 @@ def bounded(a: Any, b: Any, c: Any, *, smooth: bool = False) -> tuple[float, flo
             "(Eq. 18), or the density turns negative"
         )
     return a, b, c
+
+
+def shape(u: Array, b: float) -> Array:
+    """Density of Eq. 14 over u = cos(a theta), mean of all azimuths: 1 for b = 0."""
+    density: Array = 1.0 + 0.5 * b * (3.0 * u**2 - 1.0)
+    return density
 
 
 @dataclass(frozen=True)

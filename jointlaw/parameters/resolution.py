@@ -1,9 +1,13 @@
 """How finely the law is discretised: orientations and depth cells."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
 
 from ..support.checks import whole
+
+# What those read who ask for options of former versions
+FRONT_REMOVED = "resolution.front is removed: take more depth cells instead, such as depth = 12"
+LOSS_REMOVED = "loss is removed: take more depth cells instead, such as Resolution(3, 6, 48)"
 
 
 @dataclass(frozen=True)
@@ -15,30 +19,24 @@ class Resolution:
         fewer, and motion in 3-D takes both halves.
     depth: cells of touch depth of a facet of the ring of most weight, >= 1; lighter ones have
         fewer.
-    front: one more slider per facet, which moves with the closure: small cycles of closure then
-        leave locked-in shear as it is (docs/theory-incremental.md, "A front that moves").
     """
 
     u: int
     phi: int
     depth: int
-    front: bool = False
+    front: InitVar[bool] = False  # of former versions
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, front: bool) -> None:
         object.__setattr__(self, "u", whole("resolution.u", self.u, 1))
         object.__setattr__(self, "phi", whole("resolution.phi", self.phi, 3))
         object.__setattr__(self, "depth", whole("resolution.depth", self.depth, 1))
-        if not isinstance(self.front, bool):
-            raise ValueError(f"resolution.front = {self.front!r} must be True or False")
-
-    def __repr__(self) -> str:
-        front = ", front=True" if self.front else ""
-        return f"Resolution(u={self.u}, phi={self.phi}, depth={self.depth}{front})"
+        if front:
+            raise ValueError(FRONT_REMOVED)
 
     @property
     def sliders(self) -> int:
         """Most sliders a joint may have for motion in one plane; `law.tables.sliders` counts."""
-        return self.u * (self.phi + 1) * (self.depth + self.front)
+        return self.u * (self.phi + 1) * self.depth
 
 
 # Slip far beyond the closure asks for facets, slip no longer than the closure for depth cells.
@@ -51,27 +49,35 @@ NAMED = {
     "reference": Resolution(16, 10, 24),
 }
 NAMED_SHORT = NAMED | {"fast": Resolution(2, 3, 3), "balanced": Resolution(2, 4, 4)}
-# What was pressed flat touches all at once, orientation by orientation: more of these, fewer cells
-FLAT = 0.5  # closure ranges: a yield interference below presses many facets flat
+# The flattened springs of a facet all touch at the same closure, so that more depth cells help
+# less than more orientations
+FLAT = 0.5  # closure ranges: with a smaller yield interference many facets are flattened
 NAMED_FLAT = {"fine": Resolution(8, 9, 6), "reference": Resolution(16, 20, 20)}
 # Direct shear within 0.03 % of finer nodes over 26 closure ranges: for what is computed once
 SLIP = Resolution(10, 10, 6)
 
 
-def named(slip: float = math.inf, interference: float = math.inf) -> dict[str, Resolution]:
-    """The resolutions by name, for critical slip and yield interference over closure range."""
-    names = NAMED if slip >= LONG else NAMED_SHORT
-    return names | NAMED_FLAT if interference < FLAT else names
+def named(
+    critical_slip: float = math.inf,
+    yield_interference: float = math.inf,
+    closure_range: float = 1.0,
+) -> dict[str, Resolution]:
+    """The resolutions by name of a law with these lengths (m)."""
+    names = NAMED if critical_slip / closure_range >= LONG else NAMED_SHORT
+    return names | NAMED_FLAT if yield_interference / closure_range < FLAT else names
 
 
 def resolve(
-    value: str | Resolution, slip: float = math.inf, interference: float = math.inf
+    value: str | Resolution,
+    critical_slip: float = math.inf,
+    yield_interference: float = math.inf,
+    closure_range: float = 1.0,
 ) -> Resolution:
-    """A resolution from its name or itself; `slip` and `interference` as in `named`."""
+    """A resolution from its name or itself; the lengths (m) as in `named`."""
     if isinstance(value, Resolution):
         return value
     if isinstance(value, str) and value in NAMED:
-        return named(slip, interference)[value]
+        return named(critical_slip, yield_interference, closure_range)[value]
     raise ValueError(
         f"resolution = {value!r} is unknown; choose one of {', '.join(NAMED)} "
         "or give Resolution(u, phi, depth)"

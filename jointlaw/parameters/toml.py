@@ -38,8 +38,8 @@ VERSION = 1  # of the keys; a file without one is of version 1
 def write_law(law: Mapping[str, Any], path: Path | None) -> str:
     """TOML text of a law's parameters, also written to `path` if given."""
     r = law["resolution"]
-    lengths = law["critical_slip"], law["asperity"].yield_interference
-    names = named(*(length / law["closure_range"] for length in lengths))
+    lengths = law["critical_slip"], law["asperity"].yield_interference, law["closure_range"]
+    names = named(*lengths)
     name = next((n for n, value in names.items() if value == r), None)
     own = f"{{ u = {r.u}, phi = {r.phi}, depth = {r.depth} }}"
     lines = [

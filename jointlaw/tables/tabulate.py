@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..joints.batch import JointBatch
-from ..laboratory.normal_control import closing_increments
+from ..laboratory.normal_control import NormalCondition, closing_increments
 from ..law import JointLaw
 from ..parameters.resolution import SLIP
 from ..support.checks import Array, above, whole
@@ -17,6 +17,7 @@ from .joint_table import JointTable
 FLOOR = 1e-4  # stresses below this share of the largest are held to an absolute tolerance
 ROWS = 30  # closures at which friction and dilation are computed
 LONG = 10.0  # shear limit over closure range, where the law has no critical slip
+HELD = 1e-9  # of the normal stress
 PROBE = 1e-7  # shear probe over closure: small against any curvature, large against rounding
 
 
@@ -173,7 +174,7 @@ def _friction(law: JointLaw, u: Array, psi: Array, limit: float, steps: int) -> 
     peak = ratio = dilation = np.zeros(len(along))
     for length in np.diff(limit * (np.arange(steps + 1) / steps) ** 2):
         step = length * along
-        closing = closing_increments(batch, step, goal)
+        closing = closing_increments(batch, step, NormalCondition(goal, goal), HELD)
         step[:, 0] = closing
         F, _ = batch.update(step, tangent=False)
         ratio = np.sum(F * along, axis=1) / goal

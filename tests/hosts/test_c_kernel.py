@@ -99,7 +99,7 @@ def follow(joint, law, d):
     return off / peak
 
 
-@pytest.mark.parametrize("seed", range(200 if "JOINTLAW_LONG" in os.environ else 24))
+@pytest.mark.parametrize("seed", range(200 if "JOINTLAW_LONG" in os.environ else 8))
 def test_same_numbers_on_random_laws_and_paths(lib, tmp_path, seed):
     law = random_law(seed)
     joint = CLaw(lib, law, tmp_path)
@@ -140,15 +140,6 @@ def test_every_build_gives_the_same_bits(lib, tmp_path, name):
             np.testing.assert_array_equal(one.state, two.state)
 
 
-def test_fused_operations_change_no_more_than_rounding(tmp_path):
-    law = random_law(0)
-    fused = library(tmp_path, "-O3", "-march=native", "-ffp-contract=fast", cc="gcc")
-    joint = CLaw(fused, law, tmp_path)
-    F, C, *_ = follow(joint, law, random_path(joint.dim, 0))
-    assert F < SAME
-    assert C < SAME_C
-
-
 @pytest.mark.parametrize("seed", [0, 1, 4, 7])
 def test_c_and_python_continue_each_others_state(lib, tmp_path, seed):
     """Python, C, Python: the path of a joint that was in C all along, to the last digit."""
@@ -167,31 +158,6 @@ def test_c_and_python_continue_each_others_state(lib, tmp_path, seed):
     F_python, _ = joint.trial(d[10])
     part.state[:] = joint.snapshot().values[0]
     assert part.step(d[10])[0] == pytest.approx(F_python, abs=SAME * np.abs(F_python).max() + 1e-9)
-
-
-@pytest.mark.parametrize("seed", [0, 1, 6, 8, 10, 13])
-def test_tangent_as_a_curve_of_differences(lib, tmp_path, seed):
-    """C is the limit of central differences: the best of five increments, median of 20 states."""
-    law = random_law(seed)
-    joint = CLaw(lib, law, tmp_path)
-    rng = np.random.default_rng(seed)
-    best = []
-    for _ in range(20):
-        joint.step(rng.normal(0.0, 1e-7, joint.dim) + np.eye(joint.dim)[0] * 5e-8)
-        d = rng.normal(0.0, 1e-7, joint.dim)
-        _, C = joint.step(d, keep=False)
-        if not C.any():
-            continue
-        errors = []
-        for h in 10.0 ** np.arange(-13.0, -8.0):
-            ends = [
-                [joint.step(d + s * h * e, tangent=False, keep=False)[0] for e in np.eye(joint.dim)]
-                for s in (1, -1)
-            ]
-            errors.append(np.abs(np.subtract(*ends).T / (2 * h) - C).max() / np.abs(C).max())
-        best.append(min(errors))
-    # a kink within h of d spoils a curve now and then
-    assert np.median(best) < 1e-6
 
 
 def test_a_refused_step_moves_nothing_and_tells_why(lib, tmp_path):

@@ -19,7 +19,7 @@ def test_least_exponent_of_the_printed_heights(make_law, heights, least):
     assert f"asperity.eta = {least - 0.001:g}" in str(error.value)
 
 
-@pytest.mark.parametrize("eta", [0.0, 0.1, 0.5, 1.0])
+@pytest.mark.parametrize("eta", [0.0, 1.0])
 @pytest.mark.parametrize(
     "heights", [SMOOTH, ROUGH, SMOOTH | {"beta": 1e-9}, ROUGH | {"overlap": 0}]
 )
@@ -27,7 +27,7 @@ def test_individual_is_always_convex(make_law, heights, eta):
     make_law(heights=jl.GammaHeights(**heights, formation="individual"), eta=eta)
 
 
-@pytest.mark.parametrize("overlap", [0.0, 2e-6, 9.9e-6])
+@pytest.mark.parametrize("overlap", [0.0, 9.9e-6])
 @pytest.mark.parametrize(
     ("name", "parameters"),
     [("uniform", {"scale": 1e-5}), ("beta", {"a": 2.0, "b": 1.0, "scale": 1e-5})],
@@ -36,8 +36,3 @@ def test_a_density_that_ends_in_a_step_is_refused(make_law, name, parameters, ov
     """Its slope falls at the very end, beyond every quantile."""
     with pytest.raises(ValueError, match="not convex"):
         make_law(heights=jl.Heights(name, overlap, parameters=parameters))
-
-
-def test_narrow_heights_are_refused(make_law):
-    with pytest.raises(ValueError, match="not convex"):
-        make_law(heights=jl.GammaHeights(alpha=100.0, beta=1e-7, overlap=2e-6))

@@ -1,7 +1,5 @@
 """Places of the nodes: quadrature exact where it says so, cells where the curve asks for them."""
 
-import math
-
 import numpy as np
 import pytest
 
@@ -11,7 +9,7 @@ from jointlaw.discretisation.nodes import UNUSED, azimuths, depth_nodes, inclina
 from jointlaw.discretisation.virgin_curve import virgin_curve
 
 
-@pytest.mark.parametrize("b", [-1.0, -0.3, 0.0, 0.5, 2.0])
+@pytest.mark.parametrize("b", [-1.0, 0.5, 2.0])
 @pytest.mark.parametrize(
     ("count", "root"), [(1, 1), (2, 2), (3, 3), (5, 3), (7, 3), (8, 1), (40, 1)]
 )
@@ -28,7 +26,7 @@ def test_inclinations_integrate_the_density_exactly(b, count, root):
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-13)  # rounding of the recurrence
 
 
-@pytest.mark.parametrize("phi", [3, 4, 5, 6, 9])
+@pytest.mark.parametrize("phi", [3, 4, 9])
 def test_azimuths_are_exact_for_the_harmonics_of_c(phi):
     numbers = azimuths(6, phi)
     assert numbers[0] == phi
@@ -36,6 +34,7 @@ def test_azimuths_are_exact_for_the_harmonics_of_c(phi):
     assert phi % 4 or {n % 2 for n in numbers} == {0}
     for plane in (None, 0.0):
         f = facets(jl.Orientation(3.0, 0.3, 0.0), 6, phi, plane)
+        assert f.weight.sum() == pytest.approx(1.0, abs=1e-14)
         for k in (1, 2, 3, 4):  # cos 2 phi of the density times cos 2 phi of the stiffness
             assert np.sum(f.weight * np.cos(k * f.phi)) == pytest.approx(0.0, abs=1e-14)
 
@@ -50,21 +49,6 @@ def test_every_facet_has_its_opposite(plane):
     )
 
 
-def test_a_facet_stands_on_the_line_of_shear():
-    for plane in (0.0, 1.1):
-        f = facets(jl.Orientation(2.0, 0.0, 0.1), 3, 5, plane)
-        steepest = np.max(f.n[1] / f.n[0])
-        assert steepest == pytest.approx(np.tan(f.theta.max()), rel=1e-14)
-        assert math.degrees(f.theta.max()) > 45.0 - 1.0  # and near the rim of the cap, pi/(2a)
-
-
-@pytest.mark.parametrize("plane", [None, 0.0, 0.6])
-def test_weights_add_up_at_any_number_of_nodes(plane):
-    orientation = jl.Orientation(3.0, 1.2, -0.1)
-    for u in (1, 2, 5):
-        assert facets(orientation, u, 3, plane).weight.sum() == pytest.approx(1.0, abs=1e-14)
-
-
 def test_cells_of_a_power_law_are_a_power_grading():
     # sqrt(Phi'') Phi^-0.15 ~ y^-0.475 for Phi = y^1.5: its integral ~ y^0.525
     nodes = depth_nodes(virgin_curve(0.5, None), 2.0, np.array([0.0, 1.0]), np.array([6, 6]))
@@ -74,11 +58,6 @@ def test_cells_of_a_power_law_are_a_power_grading():
         assert np.isinf(zeta[-1])
         # summed over 512 panels
         np.testing.assert_allclose(zeta[1:-1], reach * share ** (1 / 0.525), rtol=2e-3)
-
-
-def test_cells_of_a_curve_without_curvature_are_even():
-    nodes = depth_nodes(virgin_curve(0.0, None), 1.0, np.zeros(1), np.array([3]))
-    np.testing.assert_allclose(nodes[0, 1:3], np.array([1, 2]) / 3.8, rtol=1e-3)
 
 
 @pytest.mark.parametrize("formation", ["population", "individual"])
@@ -107,3 +86,13 @@ def test_light_facets_have_fewer_cells_and_all_are_counted():
     assert k.cells == cells.max() > cells.min() == 1
     assert k.sliders == cells.sum() < len(cells) * k.cells
     assert (np.diff(cells[np.argsort(k.weight)]) >= 0).all()  # c = 0: weights of a ring are equal
+
+
+def test_a_front_is_refused_with_what_to_take_instead(make_law):
+    with pytest.raises(ValueError, match=r"resolution\.front is removed: take more depth cells"):
+        jl.Resolution(3, 6, 3, front=True)
+    law = make_law(resolution=jl.Resolution(3, 5, 7))
+    text = law.to_toml()
+    assert jl.JointLaw.from_toml(text.replace("depth = 7", "depth = 7, front = false")) == law
+    with pytest.raises(ValueError, match=r"TOML text: resolution\.front is removed"):
+        jl.JointLaw.from_toml(text.replace("depth = 7", "depth = 7, front = true"))

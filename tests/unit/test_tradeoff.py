@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.accuracy.tradeoff import SPREAD
 from jointlaw.cli.main import main
 
 CHOSEN = ["fast", "balanced", jl.Resolution(1, 3, 1), "fast"]
@@ -16,13 +15,18 @@ CHOSEN = ["fast", "balanced", jl.Resolution(1, 3, 1), "fast"]
 
 @pytest.fixture(scope="module")
 def found():
+    """Against a reference of fewer nodes than usual, for the time it takes."""
     law = jl.JointLaw(
         orientation=jl.Orientation(6.0),
         asperity=jl.Asperity(K=2.0e8, lam=1.2, eta=0.5, mu=0.3),
         asperity_density=1e10,
         plane=0.0,
     )
-    return law.tradeoff(CHOSEN, joints=0)
+    with pytest.MonkeyPatch.context() as patch:
+        for module in ("suite", "tradeoff"):
+            name = f"jointlaw.accuracy.{module}.reference_resolution"
+            patch.setattr(name, lambda law: jl.Resolution(8, 12, 24))
+        return law.tradeoff(CHOSEN, joints=0)
 
 
 def test_each_resolution_has_its_price(found):
@@ -33,11 +37,6 @@ def test_each_resolution_has_its_price(found):
         assert (row.rms <= row.error).all()
         assert row.bytes >= 8 * (2 * row.sliders + 4)
         assert np.isnan(row.ns)
-        # coarse cells miss the smallest cycles, and hardly the largest
-        assert row.loss.max() == row.loss[:8].max() > 0.5
-        assert row.loss[-1] < 0.1
-        assert 0.0 < row.secant.max() < 0.5
-        assert 0.0 < row.kept.max() < 1.0
         # each is coarser than the reference by far
         assert row.worst > found.uncertainty.max()
     # more of everything, less error
@@ -55,7 +54,6 @@ def test_the_frontier_falls(found):
     assert replace(found, rows=(*found.rows, same)).frontier() == frontier
     text = str(found)
     assert any(line.endswith(" fast") for line in text.splitlines())
-    assert "loss error" in text
     assert "nothing was timed" in text
 
 
@@ -68,8 +66,6 @@ def test_csv_holds_every_number(found, tmp_path):
         each = [float(row[f"error {path}"]) for path in found.paths]
         assert each == price.error.tolist()
         assert float(row["error"]) == max(each)
-        assert float(row["loss"]) == price.loss.max()
-        assert float(row["loss 0.01"]) == price.loss[8]
 
 
 def test_picture_has_units(found, tmp_path):
@@ -79,10 +75,6 @@ def test_picture_has_units(found, tmp_path):
     assert "%" in axis.get_ylabel()
     found.plot(tmp_path / "t.png")
     assert (tmp_path / "t.png").stat().st_size > 10_000
-
-
-def test_the_usual_spread_holds_the_named_resolutions_too():
-    assert len(set(SPREAD)) == 42
 
 
 def test_command_writes_table_law_and_summary(tmp_path, capsys, monkeypatch):
@@ -100,25 +92,15 @@ def test_command_writes_table_law_and_summary(tmp_path, capsys, monkeypatch):
     assert "at_tolerance(0.05)" in capsys.readouterr().out
 
 
-def test_a_joint_that_does_not_shear_has_no_loss():
-    law = jl.JointLaw(
-        orientation=jl.Orientation(6.0),
-        asperity=jl.Asperity(K=2.0e8, lam=1.2, eta=0.5, mu=0.3),
-        asperity_density=1e10,
-        closure_only=True,
-    )
-    (row,) = law.tradeoff(["fast"], joints=0).rows
-    assert np.isnan([*row.loss, *row.secant, *row.kept]).all()
-
-
-def test_bad_arguments_are_named():
-    law = jl.presets.load("linear-a6")
-    with pytest.raises(ValueError, match="resolutions is empty"):
-        law.tradeoff([])
-    with pytest.raises(ValueError, match="rough"):
-        law.tradeoff(["rough"])
-    with pytest.raises(ValueError, match="joints = -1"):
-        law.tradeoff(joints=-1)
-    for value in (0.0, -0.1, float("nan")):
-        with pytest.raises(ValueError, match="tolerance"):
-            law.at_tolerance(value)
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (lambda law: law.tradeoff([]), "resolutions is empty"),
+        (lambda law: law.tradeoff(joints=-1), "joints = -1"),
+        (lambda law: law.at_tolerance(-0.1), "tolerance"),
+        (lambda law: law.at_tolerance(0.01, loss=0.25), "loss is removed: take more depth cells"),
+    ],
+)
+def test_bad_arguments_are_named(call, told):
+    with pytest.raises(ValueError, match=told):
+        call(jl.presets.load("linear-a6"))

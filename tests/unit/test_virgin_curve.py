@@ -99,11 +99,6 @@ def test_closure_is_the_inverse_of_normal_stress(case):
     inverse(case)
 
 
-@pytest.mark.parametrize("eta", [0.0, 0.5])
-def test_closure_is_the_inverse_of_normal_stress_without_heights(make_law, eta):
-    inverse(make_law(heights=None, eta=eta))
-
-
 def inverse(law):
     stress = np.geomspace(1.0, 1e10, 21)
     closure = law.closure(stress)
@@ -134,20 +129,6 @@ def test_contact_numbers_are_eq_11(law):
     for closure in (0.0, 1e-6, 1e-4, -1e-6, -1.0):
         count = N * integrate.quad(h.pdf, 0.0, max(r0 + closure, 0.0), epsabs=0, epsrel=1e-12)[0]
         assert law.contacts(closure) == pytest.approx(count, rel=1e-10)
-
-
-def test_contact_numbers_by_direction_are_eq_16(law):
-    direction = (0.2, 0.7)
-    assert law.contacts(1e-6, direction) == pytest.approx(
-        law.contacts(1e-6) * law.orientation.density(*direction), rel=1e-14
-    )
-    assert law.contacts(1e-6, (1.0, 0.0)) == 0.0  # beyond pi/(2a)
-    assert law.contacts([0.0, 1e-6]).shape == (2,)
-
-
-def test_without_heights_all_asperities_touch_at_once(make_law):
-    law = make_law(heights=None)
-    assert law.contacts([-1e-9, 0.0, 1e-9]).tolist() == [0.0, 0.0, 1e10]
 
 
 def test_closures_at_many_stresses_are_those_at_each(any_law):

@@ -8,11 +8,8 @@ import dataclasses
 
 import numpy as np
 
-from jointlaw.discretisation.nodes import UNUSED
-from jointlaw.discretisation.tables import with_depths
 from jointlaw.discretisation.virgin_curve import VirginCurve
 from jointlaw.kernels import reference as kernel
-from jointlaw.kernels.front import holds
 
 _X, _W = np.polynomial.legendre.leggauss(16)
 _X = 0.5 * (_X + 1.0)  # Gauss rule of 16 points on 0 to 1, with weights _W / 2
@@ -96,32 +93,8 @@ def stored(k, state):
     return kernel.measures(own, state).stored
 
 
-def as_cells(k, state):
-    """Tables without fronts and a state (rows, 1) whose step is that of one joint with fronts.
-
-    A front is the upper part of a cell: one more cell limit, where the front begins.
-    """
-    old, whole = kernel.parts(k, state), kernel.limits(k)
-    inside = holds(whole, old.front)[..., 0]
-    depth, forces = [], np.zeros((2, len(k.c1), k.cells + 1, 1))
-    for f, w in enumerate(old.front[:, 0]):
-        i = int(np.argmax(inside[f]))
-        begins = w <= k.depth[f, i]  # all of the cell is front
-        depth.append(np.insert(k.depth[f], i + 1, min(k.depth[f, i + 1], UNUSED) if begins else w))
-        own = np.insert(old.q[:, f, :-1], i + 1, old.q[:, f, -1], axis=1)
-        if begins:
-            own[:, [i, i + 1]] = own[:, [i + 1, i]]
-        forces[:, f] = own
-    made = dataclasses.replace(with_depths(k, np.array(depth)), front=False)
-    dim, sliders = k.dim, 2 * len(k.c1) * k.several
-    rest = state[2 * dim + sliders + len(k.c1) :]
-    return made, np.concatenate([state[: 2 * dim], forces.reshape(-1, 1), rest])
-
-
 def step_work(k, state, d):
     """int_0^1 F(trial(t d)) . d dt of one joint: state (rows, 1), d (dim,)."""
-    if k.front:
-        k, state = as_cells(k, state)
     edges = _kinks(k, state, d)
     # the pieces of a tabulated virgin curve meet smoothly enough for four rules between kinks
     edges = np.interp(np.arange(0, 4 * len(edges) - 3) / 4, np.arange(len(edges)), edges)

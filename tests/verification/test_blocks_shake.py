@@ -64,7 +64,6 @@ def test_joint_slides_as_newmark_says(block):
     ("resolution", "most"),
     [
         ("balanced", 1e-5),
-        (shake.nodes("fine, fronts"), 1e-6),
         (jl.Resolution(2, 4, 24), 1e-6),
     ],
 )

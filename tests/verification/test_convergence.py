@@ -21,8 +21,7 @@ def end_forces(one, steps):
     return F
 
 
-@pytest.mark.parametrize("critical_slip", [np.inf, 0.4])
-@pytest.mark.parametrize("formation", [None, "population", "individual"])
+@pytest.mark.parametrize(("formation", "critical_slip"), [(None, np.inf), ("population", 0.4)])
 def test_error_falls_in_proportion_to_the_step(formation, critical_slip):
     one = law(a=2.0, formation=formation, critical_slip=critical_slip, resolution="balanced")
     exact = 2.0 * end_forces(one, 1024) - end_forces(one, 512)

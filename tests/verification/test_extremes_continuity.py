@@ -11,6 +11,7 @@ def test_force_is_lipschitz(changes):
     assert steepest(changes) <= 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("changes", COMPARED, ids=name)
 def test_smaller_steps_converge(changes):
     """First order in the step: two halvings or three leave less than half of the first change."""

@@ -7,6 +7,8 @@ from extremes.control import STRESSES, close, shear
 import jointlaw as jl
 from jointlaw.laboratory.experiments import PathError
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("preset", jl.presets.names())
 @pytest.mark.parametrize("test", [close, shear])

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
-from extremes.drift import AMPLITUDES, LAWS, drift, forgetting, in_the_bed, small_steps, sticky
+from extremes.drift import AMPLITUDES, LAWS, drift, forgetting, in_the_bed, sticky
 from extremes.laws import COMPILED, SCALE
+
+pytestmark = pytest.mark.slow
 
 
 @pytest.mark.parametrize("kind", LAWS)
@@ -48,14 +50,3 @@ def test_the_bed_of_many_springs_forgets_once(eta):
     assert 1.0 - 1.1 * (1.0 - (1.0 - amplitude) ** eta) < once < (1.0 - amplitude) ** eta + 0.01
     # one cell, over the same cycles, forgets twenty times as much; a cell as thin as the cycle none
     assert forgetting((20,), 1, amplitude, eta)[0] < 1.0 - 10.0 * (1.0 - once)
-    # one cell with a front forgets once, too: at first what all of the cell holds, as above
-    fronted = forgetting((1, 20), 1, amplitude, eta, front=True)
-    assert fronted[0] == pytest.approx((1.0 - amplitude) ** eta, abs=1e-5)
-    assert fronted[1] == pytest.approx(fronted[0], abs=1e-5)
-
-
-def test_many_tiny_steps_are_one_large_step():
-    """Rounding of n sums, worst case n 1e-16; and 1e-11 of the mean stiffness of tiny steps."""
-    counts = (10, 1000, 20_000) if COMPILED else (10, 1000)
-    for count, gap in zip(counts, small_steps(counts), strict=True):
-        assert gap < 1e-16 * count + 1e-13

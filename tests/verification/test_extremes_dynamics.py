@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from extremes.dynamics import AREA, CASES, LOSSLESS, LOSSLESS_IMPACTS, MASS, SHORT, Mass, swing
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("case", [c for c in CASES if c not in (*LOSSLESS, *LOSSLESS_IMPACTS)])
 def test_with_friction_energy_never_rises_above_the_first(case):

@@ -4,6 +4,8 @@ import pytest
 from extremes.checks import refused, run
 from extremes.laws import SCALE, build, name
 
+pytestmark = pytest.mark.slow
+
 BEYOND = [
     {"K": 1e300}, {"density": 1e300}, {"K": 1e200, "density": 1e200}, {"mu": 1e300}, {"lam": 1e300},
     {"K": 1e-300}, {"K": 5e-324}, {"lam": 1e-300}, {"range": 1e300}, {"eta": 1e300},

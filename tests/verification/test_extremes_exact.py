@@ -7,6 +7,8 @@ import pytest
 from extremes.exact import CASES, gap
 from extremes.laws import name
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("changes", CASES, ids=name)
 def test_force_agrees_with_50_digits(changes):

@@ -2,12 +2,14 @@
 
 import multiprocessing
 import time
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+import pytest
 from extremes.laws import SCALE, build
 
 import jointlaw as jl
+
+pytestmark = pytest.mark.slow
 
 FAST = jl.Resolution(1, 3, 1)
 
@@ -45,14 +47,3 @@ def test_a_process_killed_while_it_writes_leaves_a_whole_file(tmp_path):
         writer.kill()
         writer.join()
         assert whole(path)
-
-
-def test_threads_that_write_one_file_at_once_leave_a_whole_file(tmp_path):
-    path = tmp_path / "state.npz"
-    states = [one_of_two(k) for k in range(8)]
-    with ThreadPoolExecutor(8) as pool:
-        for _ in range(20):
-            for done in [pool.submit(state.save, path) for state in states]:
-                done.result()
-            assert whole(path)
-    assert [p.name for p in tmp_path.iterdir()] == ["state.npz"]

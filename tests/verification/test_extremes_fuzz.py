@@ -4,6 +4,8 @@ import pytest
 from extremes.fuzz import FOUND, fuzz
 from extremes.laws import COMPILED
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("seed", FOUND)
 def test_what_was_found_stays_mended(seed):

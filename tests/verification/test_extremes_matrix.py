@@ -12,6 +12,7 @@ def test_alone(changes):
     assert not examine(changes, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", list(EXTREMES)[:-1])
 def test_in_pairs(key):
     faults = {

@@ -7,7 +7,6 @@ concurrent writes: test_extremes_files.py.
 
 import multiprocessing
 import pickle
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -16,22 +15,9 @@ from extremes.laws import COMPILED, SCALE, build
 
 import jointlaw as jl
 
+pytestmark = pytest.mark.slow
+
 FAST = jl.Resolution(1, 3, 1)
-
-
-def test_threads_with_joints_of_one_law():
-    law = build(resolution=FAST)
-
-    def one(seed):
-        joints = law.joints(100)
-        for d in path(np.random.default_rng(seed), 100, 20, SCALE)[0]:
-            F, _ = joints.update(d)
-        return F
-
-    with ThreadPoolExecutor(8) as pool:
-        together = list(pool.map(one, range(8)))
-    for seed, F in enumerate(together):
-        np.testing.assert_array_equal(F, one(seed))
 
 
 def go_on(batch):

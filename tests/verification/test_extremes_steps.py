@@ -5,8 +5,10 @@ import pytest
 from extremes.checks import Watch
 from extremes.laws import HEIGHTS, SCALE, build, name
 
+pytestmark = pytest.mark.slow
+
 HEIGHT = HEIGHTS["printed, individual"][1] * (1.0 + 3.82)  # m: a mean asperity
-SIZES = [5e-324, 1e-310, 1e-300, 1e-15, HEIGHT, 1e6 * HEIGHT]  # m; denormals first
+SIZES = [5e-324, 1e-15, HEIGHT, 1e6 * HEIGHT]  # m; a denormal first
 LAWS = [
     {}, {"a": 1.0, "eta": 0.0}, {"a": 1e8}, {"mu": 0.0}, {"mu": 1e6, "lam": 0.1}, {"eta": 2.0},
     {"heights": "printed, population"}, {"heights": "alpha = -0.99, overlap 0"},
@@ -35,19 +37,6 @@ def test_steps_of_every_size(changes, size):
 
 
 @pytest.mark.parametrize("changes", LAWS, ids=name)
-def test_a_step_too_small_to_see_changes_nothing(changes):
-    """Of closures of 1e-7 m, 1e-300 is lost. Sliders at their caps are capped again: a rounding."""
-    joint = build(**changes).joint()
-    F = joint.update(CLOSED)[0].copy()
-    stored, lost = joint.stored_energy, joint.dissipated_energy
-    for size in (5e-324, -1e-310, 1e-300):
-        G = joint.update([size] * 3)[0]
-        np.testing.assert_allclose(G, F, rtol=0.0, atol=1e-15 * np.abs(F).max())
-        assert joint.stored_energy == pytest.approx(stored, rel=1e-15)
-        assert 0.0 <= joint.dissipated_energy - lost <= 1e-15 * stored
-
-
-@pytest.mark.parametrize("changes", LAWS, ids=name)
 def test_back_at_exactly_zero_closure_nothing_is_left(changes):
     """Closed and opened again to the very point of contact: F, C and energy are exactly zero, and
     closing again is the first closing, to the bit."""
@@ -59,39 +48,6 @@ def test_back_at_exactly_zero_closure_nothing_is_left(changes):
         assert not C.any()
         assert joint.stored_energy == 0.0
         np.testing.assert_array_equal(joint.update(d)[0], first)
-
-
-@pytest.mark.parametrize("changes", LAWS, ids=name)
-def test_touch_inside_a_step_is_found(changes):
-    """One step from apart to closed, normal to the joint, is two that meet at touch; and with
-    sliders that hold it is so for oblique steps too."""
-    one, two = (build(**changes).joint() for _ in range(2))
-    for joint in (one, two):
-        joint.update([0.3 * SCALE, 0.0, 0.0])
-    F = one.update([-SCALE, 0.0, 0.0])[0]
-    assert not F.any()
-    F = one.update([1.5 * SCALE, 0.0, 0.0])[0]
-    for d in (-0.3, -0.7, 0.7, 0.4, 0.4):
-        G = two.update([d * SCALE, 0.0, 0.0])[0]
-    # closures are sums of decimal steps; eta = 2 triples their rounding
-    np.testing.assert_allclose(F, G, rtol=0.0, atol=1e-13 * np.abs(G).max())
-
-
-STEEP = [c for c in LAWS if "critical_slip" not in c and c.get("a") != 1e8]
-
-
-@pytest.mark.parametrize("changes", STEEP, ids=name)
-def test_separation_and_contact_of_opposite_faces_in_one_step(changes):
-    """Sheared from one side to the other, faces in touch come apart and those apart touch, by far:
-    half a turn of the same joint that went the other way."""
-    joints, far = build(**changes).joints(2), 30.0 * SCALE
-    joints.update([[0.1 * SCALE, far, 0.0], [0.1 * SCALE, -far, 0.0]])
-    there = joints.update([[0.0, -2.0 * far, 0.0], [0.0, 2.0 * far, 0.0]])[0]
-    # rounding of y, 1e-16 of the reach, in a force that grows as its third power at most
-    np.testing.assert_allclose(
-        there[0], there[1] * [1, -1, -1], rtol=0.0, atol=1e-12 * np.abs(there[0]).max()
-    )
-    assert there[0].any()
 
 
 @pytest.mark.parametrize("changes", LAWS, ids=name)

@@ -5,6 +5,8 @@ from extremes.laws import name
 from extremes.matrix import COMPARED, kept_digits
 from extremes.symmetry import asymmetry
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("changes", COMPARED, ids=name)
 def test_a_quarter_turn_exchanges_the_axes_and_the_sign_of_c(changes):

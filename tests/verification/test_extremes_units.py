@@ -5,6 +5,8 @@ from extremes.laws import SCALE, name
 from extremes.matrix import COMPARED, kept_digits
 from extremes.units import BINARY, DECIMAL, compare
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("changes", COMPARED, ids=name)
 def test_results_scale(changes):

@@ -71,7 +71,7 @@ def followed(law, d):
     return batch, np.array(rows)
 
 
-@pytest.mark.parametrize("seed", range(24))
+@pytest.mark.parametrize("seed", range(4))
 def test_closure_only_is_the_whole_law_on_a_path_of_closure(with_kernel, seed):
     """Traction, tangent, energies and shares, against the law in 3-D and in a plane."""
     d = closures(seed, 7)
@@ -97,20 +97,6 @@ def test_closure_only_has_one_facet_per_inclination():
     assert law.normal_stress(0.7) == pytest.approx(whole.normal_stress(0.7), rel=EXACT)
 
 
-@pytest.mark.parametrize("single", [False, True])
-def test_closure_only_refuses_shear_and_keeps_its_state(single):
-    law = random_law(2, closure_only=True)
-    joint = law.joint() if single else law.joints(1)
-    F, C = joint.update([0.3] if single else [[0.3]])
-    assert F.shape[-1:] == (1,)
-    assert C.shape[-2:] == (1, 1)
-    before = joint.snapshot().values
-    for d in ([0.1, 0.0], [0.1, 0.0, 0.0]):
-        with pytest.raises(ValueError, match="for shear take a law without closure_only"):
-            joint.update(d if single else [d])
-    assert (joint.snapshot().values == before).all()
-
-
 def test_closure_only_is_refused_where_joints_shear(tmp_path):
     law = random_law(2, closure_only=True)
     for use in (
@@ -125,26 +111,9 @@ def test_closure_only_is_refused_where_joints_shear(tmp_path):
         replace(law, closure_only=1)
 
 
-def test_closure_only_in_files_snapshots_and_tests():
-    law = random_law(4, closure_only=True)
-    assert jl.JointLaw.from_text(law.to_toml()) == law
-    joint, full = law.joint(), replace(law, closure_only=False).joint()
-    mine, theirs = (jl.closure_test(j, 0.3, steps=10) for j in (joint, full))
-    assert np.abs(mine.F1 - theirs.F1).max() < EXACT
-    # The stress is met to 1e-11 of its peak, so closure and losses to the same.
-    assert mine.dissipated == pytest.approx(theirs.dissipated, abs=1e-10)
-    assert (mine.F2 == 0).all()
-    kept = joint.snapshot()
-    one, _ = joint.update([0.2])
-    joint.restore(kept)
-    again, _ = joint.update([0.2])
-    assert (one == again).all()
-
-
-@pytest.mark.parametrize("plane", [None, 0.0])
-def test_linear_asperities_without_heights_need_one_depth_cell(plane):
+def test_linear_asperities_without_heights_need_one_depth_cell():
     """One spring touches at once: deeper cells, here added by hand, hold nothing."""
-    law = replace(random_law(9, plane=plane), asperity=jl.Asperity.linear(1.0, 0.7, 0.3))
+    law = replace(random_law(9), asperity=jl.Asperity.linear(1.0, 0.7, 0.3))
     assert law.heights is None
     assert law.resolution.depth > 1
     few = law.tables
@@ -165,33 +134,3 @@ def test_linear_asperities_without_heights_need_one_depth_cell(plane):
             assert np.abs(one - other).max() <= EXACT * max(np.abs(other).max(), 1e-3)
         lost, lost_many = (s[2 * few.dim - 1] for s in states)
         assert np.abs(lost - lost_many).max() <= EXACT * max(lost.max(), 1e-3)
-
-
-def test_without_a_critical_slip_nothing_changes_below_it():
-    """critical_slip = inf leaves the limit out: the same until an offset reaches it."""
-    free = random_law(3)
-    held = replace(free, critical_slip=2.0)
-    rng = np.random.default_rng(5)
-    batches = [law.joints(20) for law in (free, held)]
-    apart = []
-    for k in range(40):
-        d = np.column_stack(
-            [0.5 * (k == 0) * np.ones(20), np.full(20, 0.1), rng.normal(0, 0.01, 20)]
-        )
-        one, other = (batch.update(d, tangent=False)[0] for batch in batches)
-        apart.append(np.abs(one - other).max() / np.abs(one).max())
-    taut = np.linalg.norm(batches[0].delta[:, 1:], axis=1).min()
-    assert taut > 2.0
-    assert max(apart[:15]) == 0.0
-    assert apart[-1] > 1e-3
-
-
-def test_normal_stress_is_closure_that_never_opens():
-    """No state at all is needed while a virgin joint only closes: in any steps, slip or none."""
-    for seed in range(6):
-        law = random_law(seed, closure_only=True)
-        way = np.sort(np.random.default_rng(seed).uniform(0.0, 2.0, 30))
-        joint = law.joint()
-        for before, after in zip([0.0, *way[:-1]], way, strict=True):
-            F, _ = joint.update([after - before], tangent=False)
-            assert F[0] == pytest.approx(law.normal_stress(joint.delta[0]), rel=1e-11)

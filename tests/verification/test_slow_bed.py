@@ -5,6 +5,8 @@ import pytest
 from builders import increments, law, random_corners, slow_heights
 from slow_bed import SlowBed, cap_quadrature, reach_of
 
+pytestmark = pytest.mark.slow
+
 PATHS, STEPS = 5, 30
 LAWS = {
     "population": {"a": 3.0, "b": 0.5, "c": 0.1, "mu": 0.3, "formation": "population"},

@@ -5,8 +5,9 @@ import pytest
 from slow_bed import SlowBed, cap_quadrature, reach_of
 from slow_virgin import SlowGamma, virgin
 
+pytestmark = pytest.mark.slow
+
 NORMAL, ONE = np.array([[1.0, 0.0, 0.0]]), np.array([1.0])
-TILTED = np.array([[np.cos(0.4), np.sin(0.4) * np.cos(0.7), np.sin(0.4) * np.sin(0.7)]])
 RULE = {"K": 3.0, "lam": 1.2, "eta": 0.5, "mu": 0.4, "density": 2.0}
 HEIGHTS = {
     None: None,
@@ -51,46 +52,6 @@ def test_constant_closure_follows_equation_35():
         exact = RULE["mu"] * normal * (1.0 - (1.0 - min(x, 1.0)) ** 1.5)
         # Phi'' in 400 bins: second order in the bin, (1/400)^2 and room for the singular end
         assert shear == pytest.approx(exact, abs=2e-5 * normal)
-
-
-@pytest.mark.parametrize("share", [0.3, 0.99])
-def test_oblique_loading_of_a_tilted_facet_never_slips(share):
-    n = TILTED[0]
-    s = np.cross(n, [0.0, 0.0, 1.0])
-    ratio = share * RULE["mu"] * RULE["lam"]
-    d = n + ratio * s / np.linalg.norm(s)
-    path = np.array([3.0 * d])
-    bed = SlowBed(TILTED, ONE, 2.0 * np.abs(reach_of(path, TILTED)), n_depth=200, **RULE)
-    for step in (0.7, 0.01, 2.0):
-        bed.update(step * d)
-        normal, shear = bed.facet_forces()
-        # every spring keeps the same ratio from its own touch on: exact up to rounding
-        assert np.linalg.norm(shear) == pytest.approx(ratio / RULE["lam"] * normal[0], rel=1e-12)
-
-
-def test_full_slip_turns_to_the_direction_of_motion():
-    bed = SlowBed(NORMAL, ONE, np.array([1.0]), n_depth=200, max_step=0.02, **RULE)
-    bed.update([1.0, 0.0, 0.0])
-    bed.update([0.0, 2.0, 0.0])
-    normal, f2, f3 = bed.update([0.0, 0.0, 6.0])
-    assert f3 == pytest.approx(RULE["mu"] * normal, rel=1e-9)  # sliders at their caps: rounding
-    assert abs(f2) < 1e-4 * f3  # the turn decays as exp(-slip / (mu lam)), here below 1e-5
-
-
-def test_opening_forgets_and_energy_comes_back_without_slip():
-    bed = SlowBed(TILTED, ONE, np.array([5.0]), n_depth=200, **RULE)
-    bed.update([1.0, 0.05, 0.1])
-    work_free = bed.stored()
-    assert work_free > 0.0
-    assert np.array_equal(bed.update([-3.0, 0.0, 0.0]), np.zeros(3))
-    assert bed.stored() == 0.0
-    bed.update([3.0, 0.0, 0.0])
-    other = SlowBed(TILTED, ONE, np.array([5.0]), n_depth=200, **RULE)
-    other.delta, other.offset = np.array([-2.0, 0.05, 0.1]), np.array([0.05, 0.1])
-    other.y = other._closure()
-    other.update([3.0, 0.0, 0.0])
-    # a joint that was opened is a joint that never touched
-    assert np.allclose(other.traction(), bed.traction(), rtol=1e-12)
 
 
 def test_work_never_falls_below_the_stored_energy():

@@ -25,13 +25,12 @@ def paths(seed, n=4, steps=8):
     return increments(random_corners(np.random.default_rng(seed), n), steps)
 
 
-@pytest.mark.parametrize("critical_slip", [np.inf, 0.3])
-def test_an_isotropic_joint_has_no_direction(critical_slip):
+def test_an_isotropic_joint_has_no_direction():
     d = paths(1)
     azimuths, errors = np.array([3, 6, 12, 24]), []
     for phi in azimuths:
         one = law(c=0.0, a=2.0, resolution=jl.Resolution(3, int(phi), 4),
-                  critical_slip=critical_slip)  # fmt: skip
+                  critical_slip=0.3)  # fmt: skip
         F = run(one, d)
         peak = np.linalg.norm(F, axis=2).max()
         angles = np.linspace(0.1, 1.4, 3)
@@ -43,10 +42,9 @@ def test_an_isotropic_joint_has_no_direction(critical_slip):
     assert errors[-1] < 2e-3
 
 
-@pytest.mark.parametrize("resolution", ["fast", "balanced", "fine"])
 @pytest.mark.parametrize("formation", FORMATIONS)
-def test_half_a_turn_changes_nothing(formation, resolution):
-    one = law(c=0.2, formation=formation, resolution=resolution, critical_slip=0.8)
+def test_half_a_turn_changes_nothing(formation):
+    one = law(c=0.2, formation=formation, resolution="balanced", critical_slip=0.8)
     d = paths(2)
     F = run(one, d)
     back = run(one, d * [1.0, -1.0, -1.0])
@@ -85,6 +83,7 @@ def test_motion_in_the_plane_of_an_axis_is_the_half_circle(critical_slip):
     assert np.allclose(whole[..., 2], 0.0, rtol=0.0, atol=1e-12 * scale)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("azimuth", [0.5, 2.0])
 def test_motion_in_any_plane_is_the_half_circle_with_c_cos_2psi(azimuth):
     d = paths(6) * [1.0, 1.0, 0.0]

@@ -1,29 +1,17 @@
 """Accuracy that is promised is kept: the reference against the slow bed, tolerances elsewhere."""
 
-import importlib.util
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from builders import increments, random_corners
 from slow_bed import SlowBed, cap_quadrature, reach_of
 
 import jointlaw as jl
 from jointlaw.accuracy.suite import errors, reference_resolution, standard_suite, tractions
 from jointlaw.accuracy.tolerance import coarsest
 
-pytest.importorskip("numba")  # the same numbers without it, in minutes
-
-ROOT = Path(__file__).parents[2]
-
-
-@pytest.fixture(scope="module")
-def benchmark():
-    """benchmarks/tolerance.py, of which this is the short form."""
-    spec = importlib.util.spec_from_file_location("tolerance", ROOT / "benchmarks" / "tolerance.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+pytestmark = pytest.mark.slow
 
 
 def test_reference_of_the_suite_agrees_with_the_slow_bed():
@@ -65,51 +53,6 @@ def test_depth_cells_converge_beyond_the_closure_range():
     assert coarse > 2.8 * fine  # second order: 4; it is 2 where the cells end with the range
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_tolerances_are_kept_on_paths_never_seen(benchmark, seed):
-    rng = np.random.default_rng(seed)
-    law = benchmark.random_law(rng)
-    while law.orientation.a < benchmark.SMALL_A:
-        law = benchmark.random_law(rng)
-    law = replace(law, plane=0.0)
-    d = benchmark.random_paths(law, rng)
-    truth = tractions(replace(law, resolution=reference_resolution(law)), d)
-    sliders = []
-    for tolerance in (0.05, 0.02):
-        made = law.at_tolerance(tolerance)
-        sliders.append(made.resolution.sliders)
-        ratio = errors(tractions(made, d), truth)[0] / tolerance
-        # never twice the tolerance, and on these six paths the tolerance but for one at most
-        assert ratio.max() < 2.0
-        assert np.sort(ratio)[-2] <= 1.0
-    assert sliders == sorted(sliders)
-
-
-def test_answer_is_the_same_again_and_keeps_the_law():
-    law = jl.presets.load("westerly-smooth")
-    made = law.at_tolerance(0.02)
-    assert made == law.at_tolerance(0.02)
-    assert replace(made, resolution=law.resolution) == law
-
-
-def test_errors_that_add_up_ask_for_more_than_each_direction_alone(benchmark):
-    law = jl.JointLaw(
-        orientation=jl.Orientation(1.9186658847280933, 1.49203355976077, 0.008761543460804024),
-        asperity=jl.Asperity(
-            K=6023934.454440096, lam=0.989442676702933, eta=0.24647504034315013, mu=0.52448474274427
-        ),
-        asperity_density=1e10,
-        heights=jl.GammaHeights(
-            7.187562116553808, 1.1144834507488927e-06, 1.6284759080927048e-06,
-            formation="individual",
-        ),
-        plane=0.0,
-    )  # fmt: skip
-    d = benchmark.random_paths(law, np.random.default_rng(5))
-    truth = tractions(replace(law, resolution=reference_resolution(law)), d)
-    assert errors(tractions(law.at_tolerance(0.01), d), truth)[0].max() < 0.01
-
-
 def test_reference_is_refined_in_the_direction_that_errs():
     law = jl.JointLaw(  # nearly linear: all slip begins at once, and azimuths decide
         orientation=jl.Orientation(2.0, -0.4, -0.35),
@@ -134,20 +77,27 @@ def test_what_cannot_be_met_is_refused_with_what_was_reached():
         law.at_tolerance(1e-7)
 
 
-def test_example_of_the_docs_prints_what_it_says(capsys):
-    page = (ROOT / "docs" / "how-accurate.md").read_text()
-    block = page.split("```python\n")[1].split("```")[0]
-    exec(block, {})
-    printed = block.split("print(")[1].split("# ")[1].strip()
-    assert capsys.readouterr().out.strip() == printed
-
-
-def test_closure_only_takes_closures_alone(benchmark):
-    law = replace(jl.presets.load("westerly-rough"), closure_only=True)
-    d = benchmark.random_paths(law, np.random.default_rng(3))
-    truth = tractions(replace(law, resolution="reference"), d)
-    for tolerance in (0.03, 0.003):
+@pytest.mark.parametrize("name", ["westerly-smooth", "biegel-rough", "nonlinear-a6"])
+def test_tolerances_are_kept_on_paths_never_seen(name):
+    law = replace(jl.presets.load(name), plane=0.0)
+    corners = random_corners(np.random.default_rng(2), 6)[:, :, :2]
+    d = np.ascontiguousarray(np.moveaxis(increments(law.closure_range * corners, 20), 1, 0))
+    truth = tractions(replace(law, resolution=reference_resolution(law)), d)
+    sliders = []
+    for tolerance in (0.05, 0.02):
         made = law.at_tolerance(tolerance)
-        assert made.closure_only
-        assert errors(tractions(made, d), truth)[0].max() < tolerance
+        assert replace(made, resolution=law.resolution) == law
+        sliders.append(made.resolution.sliders)
+        ratio = errors(tractions(made, d), truth)[0] / tolerance
+        # never twice the tolerance, and on these six paths the tolerance but for one at most
+        assert ratio.max() < 2.0
+        assert np.sort(ratio)[-2] <= 1.0
+    assert sliders == sorted(sliders)
+
+
+def test_closure_only_takes_closures_alone():
+    law = replace(jl.presets.load("westerly-rough"), closure_only=True)
+    made = law.at_tolerance(0.01)
+    assert made.closure_only
+    assert made == law.at_tolerance(0.01)
     assert [p.error.shape for p in law.tradeoff(["fast"], joints=0).rows] == [(4,)]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from builders import law, slow_heights
 from slow_bed import cap_quadrature
-from slow_virgin import SlowGamma, virgin
+from slow_virgin import virgin
 
 import jointlaw as jl
 from jointlaw.discretisation.virgin_curve import exact_force, virgin_curve
@@ -35,52 +35,6 @@ def test_closure_from_tiny_to_huge(formation, eta):
         assert one.closure(exact) == pytest.approx(y, rel=1e-8)
 
 
-@pytest.mark.parametrize("formation", FORMATIONS)
-def test_normal_force_far_beyond_the_closure_range_under_shear(formation):
-    n, w = cap_quadrature(2.0, 0.0, 0.0, 80, 160)
-    one = law(a=2.0, b=0.0, c=0.0, mu=0.0, formation=formation, resolution="reference")
-    delta = np.array([40.0, 15.0, -9.0])
-    y = n @ delta / n[:, 0]
-    grid = np.linspace(0.0, 60.0, 400)
-    phi = [virgin(g, 0.5, slow_heights(formation))[0] for g in grid]
-    phi = np.interp(y, grid, phi)
-    exact = (w * 1.2 * n[:, 0] ** 1.5 * phi) @ n
-    F = one.joint().update(delta)[0]
-    # interpolated on 400 points, (60/400)^2 Phi''/8 = 1e-5 of F1
-    assert np.allclose(F, exact, rtol=0.0, atol=1e-4 * exact[0])
-
-
-def build(eta, alpha, beta, overlap, formation="population"):
-    """A law with these gamma heights."""
-    return jl.JointLaw(
-        orientation=jl.Orientation(3.0, 0.0, 0.0),
-        asperity=jl.Asperity(K=1.0, lam=1.0, eta=eta, mu=0.4),
-        heights=jl.GammaHeights(alpha=alpha, beta=beta, overlap=overlap, formation=formation),
-        asperity_density=1.0,
-        closure_range=1.0,
-    )
-
-
-@pytest.mark.parametrize(
-    ("heights", "least"), [((3.82, 1.15, 2.0), 0.287), ((6.14, 3.52, 12.0), 0.312)]
-)
-def test_printed_heights_are_convex_from_a_known_exponent(heights, least):
-    # the two exponents are known to three digits
-    with pytest.raises(ValueError, match=r"convex.*individual"):
-        build(least - 0.001, *heights)
-    build(least + 0.001, *heights)
-
-
-def test_narrow_heights_need_individual_formation():
-    for narrow in ((20.0, 0.2, 0.1), (50.0, 0.05, 0.1), (8.0, 0.5, 0.5)):
-        y = np.linspace(0.01, 2.0 * narrow[1] * (narrow[0] + 1.0), 400)
-        slope = [virgin(v, 0.5, SlowGamma(*narrow, "population"))[1] for v in y]
-        assert np.diff(slope).min() < 0.0  # the slope does fall
-        with pytest.raises(ValueError, match=r"convex.*individual"):
-            build(0.5, *narrow)
-        build(0.5, *narrow, formation="individual")
-
-
 @pytest.mark.parametrize("eta", [0.0, 0.5, 2.0])
 @pytest.mark.parametrize("alpha", [-1.0 + 1e-9, -0.99, -0.5, -0.1])
 def test_a_density_infinite_at_the_point_of_contact(alpha, eta):
@@ -100,12 +54,3 @@ def test_a_density_infinite_at_the_point_of_contact(alpha, eta):
             # a derivative of the table is one order lower
             assert slope[k] / y[k] ** eta == pytest.approx(float((1 + eta) * S + DS), rel=1e-6)
             assert exact_force(y[k : k + 1], eta, heights)[0] == pytest.approx(force[k], rel=1e-9)
-
-
-def test_chi_square_heights_of_one_degree_of_freedom_are_gamma_heights():
-    """The density that the paper names, infinite at zero height."""
-    chi = virgin_curve(0.5, jl.Heights("chi2", 0.0, "individual", {"df": 1.0, "scale": 0.5}))
-    gamma = virgin_curve(0.5, jl.GammaHeights(-0.5, 1.0, 0.0, "individual"))
-    y = np.geomspace(1e-12, 1e3, 60)
-    # both tables are good to 1e-10 of S, which is 1e-6 at the smallest y
-    np.testing.assert_allclose(chi.force(y)[0], gamma.force(y)[0], rtol=1e-9)

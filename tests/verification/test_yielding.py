@@ -7,18 +7,16 @@ import numpy as np
 import pytest
 from builders import increments, law, random_corners, slow_heights
 from slow_bed import SlowBed, cap_quadrature, reach_of
-from test_tangent import STEPS, descent_slope, v_curve
 
 import jointlaw as jl
 
 
-@pytest.mark.parametrize("resolution", [jl.Resolution(1, 3, 1), jl.Resolution(2, 4, 3)])
-@pytest.mark.parametrize("interference", [1e-12, 1e-3, 0.05, 0.3, 2.0])
+@pytest.mark.parametrize("interference", [1e-12, 0.05, 0.3])
 @pytest.mark.parametrize(
     ("formation", "eta"), [(None, 0.0), ("population", 0.5), ("individual", 1)]
 )
-def test_closure_has_a_closed_form(formation, eta, interference, resolution):
-    one = law(formation=formation, eta=eta, mu=0.0, resolution=resolution,
+def test_closure_has_a_closed_form(formation, eta, interference):
+    one = law(formation=formation, eta=eta, mu=0.0, resolution=jl.Resolution(2, 4, 3),
               damage={"yield_interference": interference})  # fmt: skip
     joint, k = one.joint(), one.tables
 
@@ -57,6 +55,7 @@ def test_first_loading_in_closed_form_is_that_of_many_cells():
             assert one.closure(one.normal_stress(u)) == pytest.approx(u, rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("interference", "critical_slip"),
     [(0.3, np.inf), (0.1, np.inf), (0.05, np.inf), (0.1, 0.3)],
@@ -91,6 +90,7 @@ def test_tractions_agree_with_the_slow_bed(interference, critical_slip):
         assert np.allclose(joints.plastic_work, crushed, rtol=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", [{}, {"yield_interference": 0.1}])
 def test_wear_agrees_with_the_slow_bed(damage):
     damage = damage | {"mu_residual": 0.15, "wear_slip": 0.5}
@@ -107,45 +107,6 @@ def test_wear_agrees_with_the_slow_bed(damage):
         bound = 5e-3 if "yield_interference" not in damage else 2e-2
         assert np.linalg.norm(G - F, axis=1).max() < bound * np.linalg.norm(F, axis=1).max()
         assert joints.friction[i] == pytest.approx(bed.mu, abs=0.002)
-
-
-STATES = {  # steps that lead to the state, and the one whose tangent is checked
-    "yielding": ([[0.5, 0.02, 0.01]], [0.21, 0.03, -0.02]),
-    "sheared while it yields": ([[0.6, 0.0, 0.0], [0.05, 0.1, 0.04]], [0.11, 0.15, 0.06]),
-    "unloading": ([[0.9, 0.1, 0.0], [0.0, 0.15, 0.1]], [-0.05, -0.02, -0.03]),
-    "reloading": ([[0.9, 0.1, 0.0], [-0.3, 0.15, 0.1]], [0.17, -0.08, -0.05]),
-}
-OPTIONS = {
-    "yielding": {"damage": {"yield_interference": 0.3}},
-    "both sides": {"damage": {"yield_interference": 0.2}, "critical_slip": 0.12},
-    "wear too": {
-        "damage": {"yield_interference": 0.3, "mu_residual": 0.1, "wear_slip": 0.3},
-        "formation": "population",
-    },
-}
-
-
-@pytest.mark.parametrize("plane", [None, 0.6])
-@pytest.mark.parametrize("option", OPTIONS)
-@pytest.mark.parametrize("state", STATES)
-def test_tangent(state, option, plane):
-    path, d = STATES[state]
-    dim = 3 if plane is None else 2
-    one = law(**OPTIONS[option], plane=plane, resolution=jl.Resolution(2, 4, 3))
-    joint, copies = one.joint(), one.joints(2 * dim * len(STEPS))
-    for step in path:
-        joint.update(step[:dim])
-        copies.update(np.tile(step[:dim], (len(copies), 1)), tangent=False)
-    d, before = np.array(d[:dim]), joint.plastic_work
-    curves = [v_curve(copies, (1.0 + 0.02 * k) * d) for k in range(3)]
-    # as without yielding: second order but for kinks, and exact to 1e-8
-    slope, least = min(
-        ((descent_slope(curve), curve.min()) for curve in curves), key=lambda v: abs(v[0] - 2.0)
-    )
-    assert slope == pytest.approx(2.0, abs=0.1)
-    assert least < 1e-8
-    joint.update(d)
-    assert (joint.plastic_work > before) is ("yield" in state)
 
 
 def test_a_joint_closed_beyond_its_highest_asperity_gives_a_warning():

@@ -103,13 +103,8 @@ def header_text(law: JointLaw, name: str) -> str:
 
 
 def _scalars(law: JointLaw) -> dict[str, int | float]:
-    """Keywords and numbers, in the order of `struct jlaw_law`; refuses what it does not hold."""
+    """Keywords and numbers, in the order of `struct jlaw_law`; refuses too many azimuths."""
     k, p = law.tables, law.asperity
-    if k.front:
-        raise ValueError(
-            "resolution.front = True: jointlaw.h has no fronts; export the law with "
-            "replace(law, resolution=replace(law.resolution, front=False))"
-        )
     if max(_ring(law.facets.theta)) > AZIMUTHS:
         raise ValueError(
             f"resolution.phi = {law.resolution.phi} is out of bounds: jointlaw.h takes at most "

@@ -593,7 +593,7 @@ JLAW_INLINE void jlaw_press_(const jlaw_law *law, const double *w, const jlaw_mo
 }
 
 /* Phi less its value at the flattened depth */
-JLAW_INLINE void jlaw_relieve_(const jlaw_v_ *y, const jlaw_v_ *depth, const jlaw_v_ *less,
+JLAW_INLINE void jlaw_less_flat_(const jlaw_v_ *y, const jlaw_v_ *depth, const jlaw_v_ *less,
                                jlaw_v_ *force, jlaw_v_ *slope)
 {
   const jlaw_v_ zero = {0.0};
@@ -653,8 +653,8 @@ JLAW_INLINE void jlaw_add_facets_(const jlaw_law *law, int first, const jlaw_mov
     jlaw_v_ work;
     jlaw_crush_(w, &f, &work);
     sum->crushed[at] += JLAW_W(JLAW_POTENTIAL) * work;
-    jlaw_relieve_(&f.y0, &f.z0, &f.fz0, &f.f0, &f.k0);
-    jlaw_relieve_(&f.y1, &f.z1, &f.fz1, &f.f1, &f.k1);
+    jlaw_less_flat_(&f.y0, &f.z0, &f.fz0, &f.f0, &f.k0);
+    jlaw_less_flat_(&f.y1, &f.z1, &f.fz1, &f.f1, &f.k1);
   }
   if (wears) sum->normal[at] += JLAW_W(JLAW_A) * (f.f0 + f.f1);
   const jlaw_v_ normal = JLAW_W(JLAW_A) * f.f1, soft = JLAW_W(JLAW_SOFT);
@@ -910,7 +910,7 @@ JLAW_INLINE void jlaw_cell_now_(const jlaw_law *law, const double *s, int first,
   jlaw_take_(q, now->places, qs), jlaw_take_(q + law->facets * law->cells, now->places, qt);
 }
 
-typedef struct { double squeezed, sheared, sliding, slipping, separated; } jlaw_measures_;
+typedef struct { double normal, sheared, sliding, slipping, separated; } jlaw_measures_;
 
 /* Energies of normal and shear springs, and the shares */
 JLAW_CLONES static jlaw_measures_ jlaw_measure_(const jlaw_law *law, const double *s)
@@ -941,9 +941,9 @@ JLAW_CLONES static jlaw_measures_ jlaw_measure_(const jlaw_law *law, const doubl
         all.separated += share;
         continue;
       }
-      double squeezed = jlaw_psi_(law, y);
-      if (law->yields) squeezed -= jlaw_psi_(law, z) + fz * (y - z);
-      if (squeezed > 0.0) all.squeezed += w[JLAW_POTENTIAL * JLAW_LANES + l] * squeezed;
+      double normal = jlaw_psi_(law, y);
+      if (law->yields) normal -= jlaw_psi_(law, z) + fz * (y - z);
+      if (normal > 0.0) all.normal += w[JLAW_POTENTIAL * JLAW_LANES + l] * normal;
       all.sheared += JLAW_AT(sheared, l);
       if (force > 0.0) all.slipping += share * fmin(JLAW_AT(at_limit, l) / force, 1.0);
       if (JLAW_AT(whole, l) > 0.0) all.sliding += share;
@@ -955,7 +955,7 @@ JLAW_CLONES static jlaw_measures_ jlaw_measure_(const jlaw_law *law, const doubl
 double jlaw_stored(const jlaw_law *law, const double *s)
 {
   const jlaw_measures_ all = jlaw_measure_(law, s);
-  return all.squeezed + all.sheared;
+  return all.normal + all.sheared;
 }
 
 void jlaw_shares(const jlaw_law *law, const double *s, double shares[3])

@@ -6,9 +6,6 @@ import jointlaw as jl
 from jointlaw.kernels import reference as kernel
 
 ROUNDING = 1e-12  # of the facet's normal force: a cell's G is a difference of numbers of that size
-# the same with fronts: beyond the last height the slope of a table wavers by 1e-10, and the two
-# parts of a cell that is cut there add up no better
-WAVERING = 2e-10
 KERNELS = 1e-11  # of the largest traction: rounding of y, 1e-16, over a step of NEAR y, 1e-5
 
 
@@ -20,9 +17,8 @@ def sliders_within_friction(batch, mu):
     k, values = batch.law.tables, batch.snapshot().values.T
     now = kernel.parts(k, values)
     y = kernel.effective_closure(k, now.delta[0], now.offset)
-    at = kernel.cut(k, now.front) if k.front else None
-    virgin = kernel.cells(k, y, at)
-    cells = kernel.flattened(virgin, kernel.cells(k, now.depth, at) if k.yields else None)
+    virgin = kernel.cells(k, y)
+    cells = kernel.flattened(virgin, kernel.cells(k, now.depth) if k.yields else None)
     strength = mu * k.lam * k.area[:, None]
     size = np.hypot(now.q[0], now.q[1])
     excess = size - strength[:, None] * cells.G
@@ -63,8 +59,7 @@ class Watch:
             faults.append(f"dissipation {np.min(lost - self.lost):.1e} of {np.max(self.peak):.1e}")
         if not (np.isfinite(stored) & (stored >= 0.0)).all():
             faults.append(f"stored energy {np.min(stored):.1e}")
-        bound = WAVERING if self.batch.law.tables.front else ROUNDING
-        if not (excess := sliders_within_friction(self.batch, mu)) <= bound:
+        if not (excess := sliders_within_friction(self.batch, mu)) <= ROUNDING:
             faults.append(f"a slider exceeds friction by {excess:.1e}")
         if not np.isfinite(self.batch.snapshot().values).all():
             faults.append("the state is not finite")

@@ -72,14 +72,14 @@ def drift(changes, cycles, amplitudes=AMPLITUDES, shakedown=SHAKEDOWN):
     return settled, worst(moved), worst(np.abs(mean - loss) / energy)
 
 
-def sticky(depth, eta=0.5, front=False):
+def sticky(depth, eta=0.5):
     """A law of flat faces that hardly slip."""
-    return build(resolution=jl.Resolution(1, 3, depth, front), a=1e6, mu=10.0, eta=eta)
+    return build(resolution=jl.Resolution(1, 3, depth), a=1e6, mu=10.0, eta=eta)
 
 
-def forgetting(counts, depth, amplitude, eta=0.5, front=False):
+def forgetting(counts, depth, amplitude, eta=0.5):
     """Share of a locked-in shear force that so many small normal cycles (amplitude of y) leave."""
-    joint = sticky(depth, eta, front).joints(1)
+    joint = sticky(depth, eta).joints(1)
     joint.update([[SCALE, 0.0, 0.0]])
     F = joint.update([[0.0, 0.1 * SCALE, 0.0]], tangent=False)[0]
     locked, d, left = F[0, 1], np.array([[amplitude * SCALE, 0.0, 0.0]]), []
@@ -106,18 +106,3 @@ def in_the_bed(counts, amplitude, eta=0.5, springs=4000):
             F = bed.update([amplitude, 0.0, 0.0])
         left.append(F[1] / locked)
     return left
-
-
-def small_steps(counts, n=32, seed=2):
-    """Largest change of F, of |F|, of elastic loading in n steps against one step, per count."""
-    law = build(mu=1e6, resolution=jl.Resolution(2, 3, 3))
-    rng = np.random.default_rng(seed)
-    d = rng.normal(size=(n, 3)) * SCALE * [0.0, 0.01, 0.01] + [SCALE, 0.0, 0.0]
-    whole = law.joints(n).update(d, tangent=False)[0]
-    gaps = []
-    for count in counts:
-        joints = law.joints(n)
-        for _ in range(count):
-            F = joints.update(d / count, tangent=False)[0]
-        gaps.append(float(np.max(np.abs(F - whole) / np.linalg.norm(whole, axis=1)[:, None])))
-    return gaps

@@ -5,9 +5,8 @@ import numpy as np
 from extremes.checks import refused, run
 from extremes.laws import build, random_changes
 
-# what this very suite found: caps of sizes whose squares underflow (56, 61), and cells beyond the
-# last height, where the slope of the table wavers by its rounding (238, 594)
-FOUND = [56, 61, 238, 594]
+# what this very suite found: friction limits of sizes whose squares underflow
+FOUND = [56, 61]
 
 
 def fuzz(seed, n=8, steps=32):

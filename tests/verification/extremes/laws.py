@@ -1,6 +1,5 @@
 """Laws at the ends of what the parameters allow: one extreme at a time, in pairs, at random."""
 
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -119,6 +118,4 @@ def random_changes(rng):
     for key, least, most in (("yields at", -12.0, 3.0), ("wears over", -6.0, 3.0)):
         if rng.random() < 0.3:
             changes[key] = SCALE * unit * 10.0 ** rng.uniform(least, most)
-    if rng.random() < 0.3:  # drawn last, so that seeds keep their laws
-        changes["resolution"] = replace(changes["resolution"], front=True)
     return changes, SCALE * unit

@@ -1,0 +1,116 @@
+"""First loading: the normal stress of a joint that is closed for the first time, unsheared."""
+
+import math
+import sys
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..parameters.asperity import Asperity
+from ..support.checks import Array
+from .virgin_curve import VirginCurve
+
+_RESOLVED = 1e8  # yield interferences: Phi less its value one earlier has 8 digits
+_SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
+_HALVINGS = 52  # of 1 in log closure: to rounding
+_TOO_LARGE = "normal_stress = {!r} Pa is beyond any closure"
+
+
+class FirstLoading(NamedTuple):
+    """First closure of an unsheared joint: F1 = factor Phi, less what yielding takes away."""
+
+    curve: VirginCurve
+    factor: float  # `facet_sum`
+    yielding: tuple[Array, Array] | None = None  # `yield_sum`: F1 -= share Phi(closure - depth)
+
+    @classmethod
+    def of(
+        cls, curve: VirginCurve, theta: Array, scale: Array, asperity: Asperity
+    ) -> "FirstLoading":
+        """That of facets of inclination theta (M,) in rad with the normal forces scale Phi."""
+        factor = facet_sum(theta, scale, asperity.lam, asperity.mu)
+        return cls(curve, factor, yield_sum(theta, scale, asperity))
+
+    def stress(self, closure: Array) -> Array:
+        """Normal stress (Pa) at closures (m), infinite where it overflows."""
+        stress: Array = self.factor * self.curve.force(closure)[0]
+        if self.yielding is not None:
+            share, depth = self.yielding
+            stress = stress - self.curve.force(closure[..., None] - depth)[0] @ share
+        return stress
+
+    @property
+    def farthest(self) -> float:
+        """Closure (m) beyond which stresses, or their differences, are lost in rounding."""
+        return 1e304 if self.yielding is None else _RESOLVED * float(np.max(self.yielding[1]))
+
+    def closure(self, stress: float, start: float) -> float:
+        """Closure (m) at a normal stress (Pa), looked for from the closure `start` (m) on."""
+        from scipy.optimize import brentq  # a third of the package's import time
+
+        if stress < _SMALLEST:
+            return 0.0
+
+        def misfit(log_y: float) -> float:  # finite where the force is zero or overflows
+            force = float(self.stress(np.array(math.exp(log_y))))
+            return math.log(min(max(force, _SMALLEST), _LARGEST)) - math.log(stress)
+
+        low = high = math.log(start)
+        farthest = math.log(self.farthest)
+        with np.errstate(over="ignore"):
+            while misfit(high) < 0.0:
+                high += 1.0
+                if high > farthest:
+                    raise ValueError(_TOO_LARGE.format(stress))
+            while misfit(low) > 0.0:
+                low -= 1.0
+            if low == high:
+                return start
+            return math.exp(brentq(misfit, low, high, xtol=1e-15, rtol=1e-15, maxiter=500))
+
+    def closures(self, stress: Array, start: float) -> Array:
+        """As `closure`, for many stresses (n,) together: bisection of log closure, to rounding."""
+        found = np.zeros_like(stress)
+        wanted = stress[stress >= _SMALLEST]
+
+        def too_open(log_y: Array) -> NDArray[np.bool_]:
+            return self.stress(np.exp(log_y)) < wanted
+
+        high = np.full(wanted.shape, math.log(start))
+        with np.errstate(over="ignore"):
+            while (short := too_open(high)).any():
+                high = high + short
+                if (far := high > math.log(self.farthest)).any():
+                    raise ValueError(_TOO_LARGE.format(wanted[far].min()))
+            low = high - 1.0
+            while not (short := too_open(low)).all():
+                low = low - ~short
+            high = np.minimum(high, low + 1.0)
+            for _ in range(_HALVINGS):
+                middle = 0.5 * (low + high)
+                short = too_open(middle)
+                low, high = np.where(short, middle, low), np.where(short, high, middle)
+        found[stress >= _SMALLEST] = np.exp(high)
+        return found
+
+
+def yield_sum(theta: Array, scale: Array, asperity: Asperity) -> tuple[Array, Array] | None:
+    """What yielding takes from F1 under first closure: share (2 M,) times Phi(closure - depth).
+
+    Springs stop to gain normal force at the yield interference, and shear force where they slip
+    under the normal force that they then have.
+    """
+    if math.isinf(asperity.yield_interference):
+        return None
+    shear = np.minimum(np.tan(theta) / asperity.lam, asperity.mu)
+    depth = asperity.yield_interference / np.cos(theta)
+    late = np.divide(asperity.mu, shear, out=np.ones_like(shear), where=shear > 0)
+    share = np.concatenate([scale * np.cos(theta), scale * np.sin(theta) * shear])
+    return share, np.concatenate([depth, depth * late])
+
+
+def facet_sum(theta: Array, scale: Array, lam: float, mu: float) -> float:
+    """Sum of scale (cos theta + sin theta min(tan theta/lam, mu)): F1/Phi under pure closure."""
+    shear = np.minimum(np.tan(theta) / lam, mu)
+    return float(np.sum(scale * (np.cos(theta) + np.sin(theta) * shear)))

@@ -93,6 +93,6 @@ def test_a_front_is_refused_with_what_to_take_instead(make_law):
         jl.Resolution(3, 6, 3, front=True)
     law = make_law(resolution=jl.Resolution(3, 5, 7))
     text = law.to_toml()
-    assert jl.JointLaw.from_toml(text.replace("depth = 7", "depth = 7, front = false")) == law
-    with pytest.raises(ValueError, match=r"TOML text: resolution\.front is removed"):
-        jl.JointLaw.from_toml(text.replace("depth = 7", "depth = 7, front = true"))
+    assert jl.JointLaw.from_text(text.replace("depth = 7", "depth = 7, front = false")) == law
+    with pytest.raises(ValueError, match=r"resolution\.front.*more depth cells"):
+        jl.JointLaw.from_text(text.replace("depth = 7", "depth = 7, front = true"))

@@ -1,6 +1,6 @@
 """Cost per contact and step in the real YADE: its own laws, a joint table, the live joint law.
 
-    python benchmarks/yade.py [--contacts 20000] [--runs 60] [--preset jing-replica]
+    python docs/measure/yade.py [--contacts 20000] [--runs 60] [--preset jing-replica]
 
 One thread; minima of several runs; prints a table and JSON. `loop` is the whole step of YADE's
 InteractionLoop with its own law and the geometry; `adapter` is what a joint adds to it, torque

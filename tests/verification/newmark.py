@@ -1,12 +1,4 @@
-"""The scene `shake` against Newmark's sliding block: slip per cycle, above and below yield.
-
-    python benchmarks/shake.py
-
-The base of the scene is shaken by sines of several sizes, with three resolutions of the law.
-Newmark's block (Newmark 1965) is rigid and has the steady friction of the law. The first column is
-the largest acceleration over that at which Newmark's block begins to slide; the others are the slip
-in mm per cycle, the mean over the last five full cycles.
-"""
+"""The scene `shake`, and Newmark's rigid sliding block with the steady friction of a law (1965)."""
 
 from dataclasses import replace
 
@@ -21,8 +13,6 @@ from dem_demo.scene.read import SCENES
 BASE, SLAB = 0, 1
 DIP, FREQUENCY, LOAD = np.radians(20.0), 4.0, 2600 * 0.6  # rad, 1/s, kg/m2: of the scene
 GRAVITY = 9.81  # m/s2
-RESOLUTIONS = "balanced", "balanced, fronts", "fine", "fine, fronts", "reference"
-SIZES = 0.5, 0.9, 1.2, 1.5, 2.0
 CYCLES, LAST = 10, 5
 GRID = 1e-5  # s, of the quadrature
 
@@ -33,13 +23,6 @@ def scene(acceleration, cycles=CYCLES, **law):
     text = text.replace("acceleration = 5.0", f"acceleration = {float(acceleration)}")
     given = dem_demo.parse(text.replace("cycles = 10", f"cycles = {cycles}"))
     return replace(given, laws={"joint": replace(given.laws["joint"], **law)})
-
-
-def nodes(name):
-    """Nodes of the scene's law by the name of a resolution; with fronts "balanced, fronts"."""
-    name, _, fronts = name.partition(", ")
-    found = scene(1.0, resolution=name).laws["joint"].resolution
-    return replace(found, front=bool(fronts))
 
 
 def sine(given):
@@ -100,20 +83,3 @@ def per_cycle(t, slid, cycles=CYCLES, last=LAST):
     """Mean slip (m) in the last of the full cycles."""
     ends = np.array([cycles + 1 - last, cycles + 1]) / FREQUENCY
     return float(np.diff(np.interp(ends, t, slid))[0] / last)
-
-
-def main():
-    law = scene(1.0, resolution="reference").laws["joint"]
-    block = Newmark.of(law)
-    print(f"Newmark's block begins to slide at {block.yields_at():.3f} m/s2\n")
-    print(f"| size | {' | '.join(RESOLUTIONS)} | Newmark |")
-    print("|---|" + (len(RESOLUTIONS) + 1) * "---:|")
-    for size in SIZES:
-        scenes = [scene(size * block.yields_at(), resolution=nodes(r)) for r in RESOLUTIONS]
-        slips = [per_cycle(*slip(given)) for given in scenes]
-        slips.append(per_cycle(*block.slip(sine(scenes[0]))))
-        print(f"| {size:g} | {' | '.join(f'{1e3 * s:.3g}' for s in slips)} |", flush=True)
-
-
-if __name__ == "__main__":
-    main()

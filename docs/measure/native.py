@@ -1,7 +1,7 @@
 """Time of one update in C, beside the compiled batch of Python.
 
-    python benchmarks/native.py              the table of docs/native.md, two minutes
-    python benchmarks/native.py --cc clang   with another compiler
+    python docs/measure/native.py              the table of docs/native.md, two minutes
+    python docs/measure/native.py --cc clang   with another compiler
 
 Each figure is the least of many short rounds, taken in turn, in nanoseconds of one thread's own
 time per joint and update, so that other programs count little. C: `jlaw_update`, one joint at a

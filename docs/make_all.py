@@ -21,30 +21,22 @@ from threading import Lock
 
 HERE = Path(__file__).parent
 SCENES = tuple(sorted(path.stem.partition("-")[2] for path in HERE.glob("data/ablation-*.csv")))
-# key: page, command; what it prints goes to the page, in a block of text for those of FENCED
+# key: page, command; the first table that it prints goes to the page
 TABLES = {
     "intervals": ("validation.md", "docs/measure/intervals.py --draws 25 --workers 1"),
     "held-out-few": ("validation.md", "docs/measure/held_out.py --draws 20 --few --workers 1"),
-    "held-out-narrow": (
-        "validation.md",
-        "docs/measure/held_out.py --draws 20 --few --prior full_contact_stress=2e7,2e10 "
-        "--workers 1",
-    ),
     "peak-residual": ("validation.md", "docs/measure/peak_residual.py"),
     "baselines": ("validation.md", "docs/measure/baselines.py"),
     "friction-angles": ("validation.md", "docs/measure/angles.py"),
     "tolerances": ("validation.md", "docs/measure/tolerance.py --laws 3 --seed 31 --plane"),
     "matrix": ("validation.md", "docs/measure/recorded.py matrix"),
-    "fuzz": ("validation.md", "docs/measure/recorded.py fuzz"),
     "exact": ("validation.md", "docs/measure/recorded.py exact"),
-    "control": ("validation.md", "docs/measure/recorded.py control"),
     "drift": ("validation.md", "docs/measure/recorded.py drift"),
     "forgetting": ("limits.md", "docs/measure/recorded.py forgetting"),
     "dynamics": ("validation.md", "docs/measure/recorded.py dynamics"),
     "impact": ("validation.md", "docs/measure/recorded.py impact"),
     "named": ("accuracy.md", "docs/measure/named.py"),
     "plane": ("accuracy.md", "docs/measure/plane.py"),
-    "tilt-angles": ("accuracy.md", "docs/measure/tilt_angles.py"),
     "ingredients": ("accuracy.md", "docs/measure/ablations.py"),
     "shake": ("scenes.md", "docs/measure/recorded.py shake"),
 }
@@ -54,12 +46,10 @@ TIMED = {
     "update": ("accuracy.md", "docs/measure/cost.py --rounds 3 --seconds 0.05"),
     "peers-smooth": ("validation.md", "docs/measure/peers.py"),
     "peers-rough": ("validation.md", "docs/measure/peers.py --preset westerly-rough"),
-    "million": ("validation.md", "docs/measure/peers.py --million"),
     "native": ("native.md", "docs/measure/native.py"),
     "yade": ("yade.md", "docs/measure/yade.py"),
     "lammps": ("lammps.md", "docs/measure/lammps.py FOLDER --rounds 2 --steps 60 --settle 60"),
 }
-FENCED = ("million",)
 # picture: command that writes into FOLDER, and the file there
 PICTURES = {
     "shear.png": (
@@ -89,7 +79,7 @@ def make(key):
             run(f"docs/measure/ablations.py {key}", folder, key)
         else:
             page, command = tables[key]
-            fill(page, key, printed(run(command, folder, key), key))
+            fill(page, key, first_table(run(command, folder, key)))
 
 
 def run(command, folder, key):
@@ -103,12 +93,12 @@ def run(command, folder, key):
     return done.stdout
 
 
-def printed(text, key):
-    """What goes to the page: the first table, or all if there is none."""
-    if key in FENCED:
-        return f"```text\n{text.strip()}\n```"
+def first_table(text):
+    """What goes to the page."""
     table = re.search(r"^\|.*?(?=^[^|]|\Z)", text, re.DOTALL | re.MULTILINE)
-    return (table[0] if table else text).strip()
+    if table is None:
+        raise ValueError(f"no table was printed: {text}")
+    return table[0].strip()
 
 
 def fill(page, key, text):

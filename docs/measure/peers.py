@@ -17,56 +17,25 @@ from __future__ import annotations
 import argparse
 import os
 import resource
-import shutil
-import subprocess
-import sys
-import tempfile
 import time
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 os.environ["JOINTLAW_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"
 
 import numpy as np
 from tables import table
+from yade import measure
 
 import jointlaw as jl
 from jointlaw.accuracy.suite import standard_suite
 from jointlaw.accuracy.tolerance import coarsest
+from jointlaw.support.progress import track
 
 TOLERANCES = (0.01, 0.001)
 HERTZ = "Hertz-Mindlin, YADE"
 HEAD = ["what", "u, phi, depth", "sliders", "error", "ns", "time / Hertz-Mindlin"]
 JOINTS = 10_000
-
-YADE = """
-import sys
-import numpy as np
-contacts = {contacts}
-N = round((contacts / 3) ** (1 / 3)) + 1
-R = 0.5
-O.materials.append(FrictMat(young=1e7, poisson=.3, frictionAngle=.5, density=2600))
-rng = np.random.default_rng(1)
-for k in range(N**3):
-    x = (2 * R - 1e-3) * np.array([k % N, k // N % N, k // N**2])
-    O.bodies.append(utils.sphere(x.tolist(), R))
-    O.bodies[-1].state.vel = Vector3(*(1e-3 * rng.uniform(-1, 1, 3)).tolist())
-O.engines = [ForceResetter(), InsertionSortCollider([Bo1_Sphere_Aabb()], verletDist=.01),
-             InteractionLoop([Ig2_Sphere_Sphere_ScGeom()], [Ip2_FrictMat_FrictMat_MindlinPhys()],
-                             [Law2_ScGeom_MindlinPhys_Mindlin()]),
-             NewtonIntegrator(damping=.2)]
-O.dt = 1e-8
-O.timingEnabled = True
-for _ in range(3): O.step()
-while sys.stdin.readline().strip() == "go":
-    best = 1e18
-    for _ in range(10):
-        O.engines[2].execTime = 0
-        O.step()
-        best = min(best, O.engines[2].execTime / O.interactions.countReal())
-    print("RESULT", best, flush=True)
-"""
 
 
 def steps_of(law: jl.JointLaw, n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -81,46 +50,16 @@ def ours(law: jl.JointLaw, n: int, tangent: bool) -> Any:
     """A function that takes one timed step and returns its seconds per joint."""
     batch = law.joints(n, ledger=False)
     first, steps = steps_of(law, n)
-    F, C = np.empty((n, 2)), np.empty((n, 2, 2)) if tangent else None
-    batch.update(first, tangent=tangent, out=(F, C))
+    batch.update(first, tangent=tangent)
     count = [0]
 
     def once() -> float:
         count[0] += 1
         start = time.perf_counter()
-        batch.update(steps[count[0] % 6], tangent=tangent, out=(F, C))
+        batch.update(steps[count[0] % 6], tangent=tangent)
         return (time.perf_counter() - start) / n
 
     return once
-
-
-class Yade:
-    """YADE in a process of its own that takes ten steps whenever it is told to."""
-
-    def __init__(self, folder: str, contacts: int = 20_000) -> None:
-        program = shutil.which("yade")
-        if program is None:
-            raise SystemExit("YADE is not installed (Debian: apt-get install yade)")
-        (Path(folder) / "scene.py").write_text(YADE.format(contacts=contacts))
-        self.process = subprocess.Popen(
-            [program, "-n", "-x", "-j1", "scene.py"], cwd=folder, text=True,
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
-
-    def once(self) -> float:
-        """Least seconds per contact of ten steps of its InteractionLoop."""
-        assert self.process.stdin is not None
-        assert self.process.stdout is not None
-        self.process.stdin.write("go\n")
-        self.process.stdin.flush()
-        for line in self.process.stdout:
-            if line.startswith("RESULT"):
-                return float(line.split()[1]) * 1e-9
-        raise SystemExit("YADE ended without a result")
-
-    def close(self) -> None:
-        """End it."""
-        self.process.communicate("stop\n", timeout=60)
 
 
 def compare(law: jl.JointLaw, rounds: int) -> list[list[Any]]:
@@ -139,15 +78,11 @@ def compare(law: jl.JointLaw, rounds: int) -> list[list[Any]]:
             error = float(suite.errors(made)[0].max())
             about[name] = [f"{r.u}, {r.phi}, {r.depth}", made.tables.sliders, f"{error:.2%}"]
             cases[name] = ours(made, JOINTS, tangent)
-    with tempfile.TemporaryDirectory() as folder:
-        yade = Yade(folder)
-        best = dict.fromkeys([*cases, HERTZ], float("inf"))
-        for turn in range(rounds):
-            best[HERTZ] = min(best[HERTZ], yade.once())
-            for name, once in cases.items():
-                best[name] = min(best[name], *(once() for _ in range(30)))
-            print(f"round {turn + 1} of {rounds}", file=sys.stderr)
-        yade.close()
+    best = dict.fromkeys([*cases, HERTZ], float("inf"))
+    for _ in track(range(rounds), "rounds", rounds):
+        best[HERTZ] = min(best[HERTZ], 1e-9 * measure(law, ["hertz"], runs=10)["hertz"]["loop"])
+        for name, once in cases.items():
+            best[name] = min(best[name], *(once() for _ in range(30)))
     return [
         [name, *about.get(name, ["", "", ""]), f"{1e9 * value:.0f}", f"{value / best[HERTZ]:.2f}"]
         for name, value in best.items()

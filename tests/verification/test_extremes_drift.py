@@ -25,7 +25,8 @@ def test_cycles_repeat_after_shakedown(kind, record):
 
 
 @pytest.mark.parametrize(
-    ("depth", "eta"), [(1, 0.0), (3, 0.0), (1, 1.0), (3, 1.0), *((n, 0.5) for n in (1, 2, 3, 10))]
+    ("depth", "eta"),
+    [(1, 0.0), (3, 0.0), (1, 1.0), (3, 1.0), *((n, 0.5) for n in (1, 2, 3, 10, 24))],
 )
 def test_small_normal_cycles_forget_locked_in_shear_at_a_known_rate(eta, depth, record):
     """A cell is one slider: unloading takes a share of all it holds, not of what touched last.

@@ -1,4 +1,4 @@
-"""Files with a slip in each, that docs/wrong-inputs.md names, as people make them."""
+"""Files with a slip in each, that docs/limits.md and wrong_inputs.txt name, as people make them."""
 
 import numpy as np
 from scene_text import PLAIN, ROCK

@@ -23,13 +23,7 @@ TOTAL, LAW = "total form (as printed)", "incremental law (this package)"
 WESTERLY = (("westerly-smooth", "smooth"), ("westerly-rough", "rough"))
 SHEAR = "shear displacement δ₂ (µm)"
 COARSE = jl.Resolution(8, 12, 16)  # cells: yield is read where the last of them slides
-STYLE = {
-    "axes.grid": True,
-    "grid.alpha": 0.3,
-    "axes.xmargin": 0,
-    "lines.markersize": 4,
-    "legend.fontsize": 8,
-}
+STYLE = {"axes.grid": True, "grid.alpha": 0.3, "axes.xmargin": 0}  # beside that of all pictures
 BELOW = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16)}
 RANGES = {  # closure (m) at 20 MPa, for which the depth cells are placed
     "westerly-smooth": 2.678206790222333e-07,

@@ -17,7 +17,7 @@ from ..parameters.resolution import Resolution, named, resolve
 from ..support.checks import Array, whole
 from ..support.files import replace_file
 from ..support.progress import track
-from ..support.pyplot import pyplot, written
+from ..support.pyplot import pyplot, style, written
 from .suite import Suite, errors, reference_resolution, scaled, standard_suite, tangents
 
 if TYPE_CHECKING:
@@ -148,6 +148,7 @@ class Tradeoff:
         writer.writerows(zip(*table.values(), strict=True))
         replace_file(Path(path), stream.getvalue().encode())
 
+    @style()
     def plot(self, path: str | Path | None = None) -> Any:
         """Largest error against sliders and, where it was timed, against time per update.
 

@@ -178,9 +178,7 @@ def draw(panels, styles, polar=False, columns=3, **labels):
             for style, (label, (x, y)) in zip(cycle(own), lines.items(), strict=False):
                 axes.plot(np.radians(x) if polar else x, y, style, label=label)
             axes.set(title=title, **labels)
-            axes.legend(
-                **({"loc": "upper center", "bbox_to_anchor": (0.5, -0.16)} if polar else {})
-            )
+            axes.legend(**(BELOW if polar else {}))
             axes.yaxis.labelpad = 28 if polar else 4
     return grid.ravel()
 

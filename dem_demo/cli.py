@@ -154,7 +154,7 @@ def _compare(given: argparse.Namespace) -> None:
 
 def _compared(scene: Scene, given: argparse.Namespace):
     """Rows of a comparison, each told when it is known."""
-    what = scene.text, str(given.scene), given.seeds
+    what = scene, given.seeds
     if given.critical:
         for row in compare.critical_tilts(*what):
             angle = row["critical_tilt"]
@@ -207,7 +207,7 @@ def _reduce(given: argparse.Namespace) -> None:
     wait = EQUILIBRIA * 2 * SEATING * sum(n**1.5 for n in free)
     print(f"about {_duration(wait)}, and for each picture a run of up to {until:g} s", flush=True)
     rows = []
-    for row in strength.strength_reduction(scene, str(given.scene), until, given.out, given.format):
+    for row in strength.strength_reduction(scene, until, given.out, given.format):
         factor, tilt = row["factor"], row["critical_tilt"]
         told = "no F between 1/64 and 64" if factor is None else f"F = {factor:.3g}"
         angle = "beyond 60 degrees" if tilt is None else f"{tilt:+.3g} degrees"
@@ -288,7 +288,8 @@ COMMANDS = {  # what each does, and for its help: about, example, OPTIONS
     "compare": (
         _compare,
         "Run every rock of a scene alone, cut with several seeds, with its own laws and with plain "
-        "Coulomb friction of its asperities. What moves 1 m has failed and stops.",
+        "Coulomb friction of its asperities. A rock stops, as failed, "
+        "once a block has moved by the usual size of its blocks.",
         "compare slope --seeds 1 2 3 --until 10",
         "scene", "--seeds", "--until", "--critical", "--tilt", "--out of numbers",
     ),
@@ -302,7 +303,7 @@ COMMANDS = {  # what each does, and for its help: about, example, OPTIONS
     ),
     "resume": (
         _resume,
-        "Go on from a saved state; without --step bit for bit as if never stopped.",
+        "Go on from a saved state; without --step the blocks move as if never stopped.",
         "resume out/tilt/state --until 45 --out out/longer",
         "state", "--out", "--force", "--until", "--no-pictures", "--format", "--vtk", "--step",
     ),

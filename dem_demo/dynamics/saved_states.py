@@ -1,15 +1,13 @@
-"""States of a simulation, in memory and in a folder: restart is exact to the last bit.
+"""States of a simulation, in memory and in a file.
 
-A folder holds the scene's text and `state.npz`: its version, the hash of the scene that it belongs
-to, and arrays.
+`state.npz` holds its version, the text of the scene and of the files that this names, and arrays.
 
 The velocities stored are those that will carry the blocks on, half a step ahead of the places.
 """
 
-import hashlib
 import io
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from zipfile import BadZipFile
 
@@ -19,13 +17,17 @@ import jointlaw as jl
 from jointlaw.support.files import replace_file
 
 from ..contact import Joints, PoolState
-from ..scene import Run, Scene, parse
+from ..scene import Files, Scene, parse
 from . import guards
 from .energy import COLUMNS, Ledger
 from .state import Layout, Limit, Moment, State, System
 
-SCENE, STATE = "scene.toml", "state.npz"
-VERSION = 3  # of state.npz
+STATE = "state.npz"
+VERSION = 4  # of state.npz
+ARRAYS = (
+    "motion", "renewed_at", "corners", "keys", "closure_offset", "overlaps", "given", "forces",
+    "area", "lost", "ledger", "reversed_at", "clock", "checked",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +55,7 @@ def pack(now: State, joints: Joints, motion: np.ndarray) -> Saved:
         "ledger": np.array([*(ledger.value[c] for c in COLUMNS), ledger.start]),
         "reversed_at": now.reversed_at.copy(),
         "clock": np.array([now.t0, now.n, now.dt, now.limit.now, now.limit.least]),
+        "checked": now.limit.checked.copy(),
     }
     return Saved(arrays, joints.snapshot())
 
@@ -78,7 +81,7 @@ def unpack(system: System, joints: Joints, saved: Saved, step: float | None = No
     now = State(
         t0, int(n), dt, motion, law_points, points, layout, joints.read("F"),
         a["reversed_at"], Ledger(value, float(a["ledger"][-1]), a["forces"], a["area"], a["lost"]),
-        Limit(limit, least, np.zeros(joints.n)),
+        Limit(limit, least, a["checked"]),
     )  # fmt: skip
     if not step:
         return now
@@ -90,19 +93,19 @@ def unpack(system: System, joints: Joints, saved: Saved, step: float | None = No
 
 
 def save(scene: Scene, saved: Saved, folder: Path) -> None:
-    """Write a state and its scene to a folder; a state that is there is kept until all is written.
+    """Write a state with its scene to a folder; a state that is there is kept until all is written.
 
-    Raises ValueError for a scene that `text_of` refuses.
+    Raises ValueError for a scene that was made or changed in memory.
     """
-    text, buffer, tables = text_of(scene), io.BytesIO(), {}
+    require_text(scene)
+    buffer, tables = io.BytesIO(), {}
     for i, (points, law) in enumerate(saved.joints.values()):
         # numbered: a law's name may be no array's name
         tables[f"law-{i}"], tables[f"fingerprint-{i}"] = law.values, np.array(law.fingerprint)
         tables[f"points-{i}"] = np.array([[*key, number] for key, number in points], int)
-    about = {"version": VERSION, "scene": fingerprint(scene)}
+    about = {"version": VERSION, "scene": scene.text, "files": json.dumps(scene.files)}
     np.savez(buffer, **about, **saved.arrays, **tables)
     folder.mkdir(parents=True, exist_ok=True)
-    replace_file(folder / SCENE, text.encode())
     replace_file(folder / STATE, buffer.getvalue())
 
 
@@ -111,61 +114,36 @@ def load(folder: Path) -> tuple[Scene, Saved]:
     file = folder / STATE
     if not file.is_file():
         raise ValueError(
-            f"{str(file.parent)!r} holds no saved state ({STATE} is missing): run the scene"
+            f"{str(folder)!r} holds no saved state ({STATE} is missing): run the scene"
         )
     try:
         with np.load(file, allow_pickle=False) as stored:  # a ZIP file: it checks its sums
             data = {name: stored[name] for name in stored.files}
-        version = int(data.pop("version"))
+        if (version := int(data["version"])) == VERSION:
+            files = Files(known=json.loads(str(data["files"])).items())
+            scene = parse(str(data["scene"]), str(file), files)
+            return scene, Saved({name: data[name] for name in ARRAYS}, _joints(data, scene))
     except (OSError, EOFError, LookupError, ValueError, AttributeError, BadZipFile) as error:
         raise ValueError(f"{file} is damaged ({error}): run the scene again") from None
-    if version != VERSION:
-        raise ValueError(
-            f"{file} has version {version}, this demo reads {VERSION}: go on with the version of "
-            "the demo that wrote it, or run the scene again"
-        )
-    scene = parse((folder / SCENE).read_text(encoding="utf-8"), SCENE)
-    if data.pop("scene") != fingerprint(scene):
-        raise ValueError(
-            f"{folder / SCENE} is not the scene of this state: only end, record, fraction, "
-            "step, title and watch may change; undo the rest, or run it as a scene of its own"
-        )
+    raise ValueError(
+        f"{file} has version {version}, this demo reads {VERSION}: go on with the version of the "
+        "demo that wrote it, or run the scene again"
+    )
+
+
+def _joints(data: dict[str, np.ndarray], scene: Scene) -> dict[str, PoolState]:
     joints = {}
     for i, name in enumerate(scene.laws):
-        law = jl.JointState(str(data.pop(f"fingerprint-{i}")), data.pop(f"law-{i}"))
-        points = data.pop(f"points-{i}").tolist()
+        points = data[f"points-{i}"].tolist()
+        law = jl.JointState(str(data[f"fingerprint-{i}"]), data[f"law-{i}"])
         joints[name] = [(tuple(key), number) for *key, number in points], law
-    return scene, Saved(data, joints)
+    return joints
 
 
-def text_of(scene: Scene) -> str:
-    """The text of a scene. Raises ValueError where it is not what the scene was read from."""
-    if not scene.text or fingerprint(parse(scene.text)) != fingerprint(scene):
+def require_text(scene: Scene) -> None:
+    """Refuse a scene without a text. Raises ValueError."""
+    if not scene.text:
         raise ValueError(
-            "the scene was made or changed in memory, so its text would go on with another one: "
-            "write the change into the TOML text and parse that, or keep the state with "
-            "Simulation.state()"
+            "the scene was made or changed in memory, so it has no text to go on from: write the "
+            "change into the TOML text and parse that, or keep the state with Simulation.state()"
         )
-    return scene.text
-
-
-def fingerprint(scene: Scene) -> str:
-    """Hash of what the motion depends on, but not when a run ends, records, or at which step.
-
-    Keys of [run] at their defaults are left out, and order and period of drives that have none, so
-    that what is added later leaves the hashes of scenes without it as they were.
-    """
-    run = asdict(replace(scene.run, end=0.0, record=Run.record, fraction=Run.fraction, step=None))
-    given = {key: value for key, value in run.items() if value != getattr(Run, key, None)}
-    drives = [asdict(drive) for drive in scene.drives]
-    drives = [{k: v for k, v in d.items() if v or k not in ("order", "period")} for d in drives]
-    pairs = sorted((sorted(blocks), law) for blocks, law in scene.pairs.items())
-    whole = [
-        [block.__dict__ | {"corners": block.corners.tolist()} for block in scene.blocks],
-        # the parameters alone: another discretisation is refused with its own remedy
-        {name: law.fingerprint.rpartition(":")[2] for name, law in scene.laws.items()},
-        scene.default_law, pairs, sorted(scene.edge_laws.items()), given,
-        drives, [float(g) for g in scene.gravity],
-        float(scene.thickness),
-    ]  # fmt: skip
-    return hashlib.sha256(json.dumps(whole).encode()).hexdigest()

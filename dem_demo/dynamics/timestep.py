@@ -5,10 +5,12 @@ dt^2 K + 2 dt C against the mass matrix stays below 4. For one oscillator that i
 dt < (2/omega)(sqrt(1 + zeta^2) - zeta). Rocking is in K because every law point is, at its place.
 """
 
+from contextlib import suppress
+
 import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse import csc_array, csr_array, diags
-from scipy.sparse.linalg import eigsh
+from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
 from ..contact import Contacts, Points
 
@@ -67,10 +69,15 @@ class StepLimit:
     def _top(self, matrix: csc_array) -> np.ndarray:
         """Eigenvector (unit length) of the largest eigenvalue."""
         if self.size <= DENSE:
-            last = [self.size - 1] * 2
-            return eigh(matrix.toarray(), subset_by_index=last)[1][:, 0]
+            return self._exactly(matrix)
         start = np.random.default_rng(0).standard_normal(self.size)
-        return eigsh(matrix, k=1, v0=start, tol=1e-4)[1][:, 0]
+        with suppress(ArpackNoConvergence):
+            return eigsh(matrix, k=1, v0=start, tol=1e-4)[1][:, 0]
+        return self._exactly(matrix)
+
+    def _exactly(self, matrix: csc_array) -> np.ndarray:
+        last = [self.size - 1] * 2
+        return eigh(matrix.toarray(), subset_by_index=last)[1][:, 0]
 
 
 def impact_limit(blocks, thickness, inertia, free, stiffness, corner_length) -> float:

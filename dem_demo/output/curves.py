@@ -53,7 +53,7 @@ def shear(record: Record, path: Path) -> None:
         upper.plot(slid, 1e-3 * record.column(f"{name}: shear_Pa"), label=f"{name} (blocks)")
         closure = record.column(f"{name}: closure_m")
         lower.plot(slid, 1e3 * (closure[0] - closure))
-        law = record.scene.laws[record.scene.law_of((moving, 0, base, 0))]
+        law = record.scene.laws[record.laws[moving, base]]
         stress = float(record.column(f"{name}: normal_Pa")[0])
         if alone := shear_curve(law, stress, 1e-3 * slid):
             x, style = 1e3 * alone["slid"], {"color": "k", "ls": ":", "lw": 1.5}

@@ -24,14 +24,13 @@ def friction_angle(law: jl.JointLaw, stress: float) -> float:
     return float(record.peak_friction_angle)
 
 
-def slip_angle(scene: Scene, moving: int, base: int, length: float) -> dict:
-    """Base angle (degrees) at which a block of contact `length` (m) should slip, and the stress.
+def slip_angle(scene: Scene, law_name: str, moving: int, length: float) -> dict:
+    """Base angle (degrees) at which a block on a joint of `length` (m) should slip, and the stress.
 
     The normal stress falls as the base tilts, so angle and stress are found together. Both are None
     where the law says nothing: no contact, no gravity, a stress that it cannot carry.
     """
-    law = scene.laws[scene.law_of((moving, 0, base, 0))]
-    block = scene.blocks[moving]
+    law, block = scene.laws[law_name], scene.blocks[moving]
     weight, angle = block.density * block.area * np.hypot(*scene.gravity), 35.0
     for _ in range(ROUNDS if length > 0 else 0):
         before, stress = angle, float(weight / length * np.cos(np.radians(angle)))

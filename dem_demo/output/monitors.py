@@ -16,11 +16,12 @@ class SlipMonitor:
         self.scene = scene = sim.scene
         self.slips = {}
         for moving, base in scene.monitors.slip:
-            law = scene.laws[scene.law_of((moving, 0, base, 0))]
+            name = law_between(sim, moving, base)
+            law = scene.laws[name]
             self.slips[moving, base] = {
                 "block": scene.blocks[moving].name,
                 "base": scene.blocks[base].name,
-                "law": scene.law_of((moving, 0, base, 0)),
+                "law": name,
                 "slip_distance": slip_distance(law),
                 "slip_angle": None,
                 "slip_time": None,
@@ -41,7 +42,7 @@ class SlipMonitor:
     def report(self) -> list[dict]:
         """Measured and predicted slip angles (degrees)."""
         return [
-            entry | slip_angle(self.scene, *pair, self.lengths[pair])
+            entry | slip_angle(self.scene, entry["law"], pair[0], self.lengths[pair])
             for pair, entry in self.slips.items()
         ]
 
@@ -51,14 +52,25 @@ def base_angle(sim: Simulation, moving: int, base: int) -> float:
 
     Of the base's face that `moving` lies on: the one that its centroid is farthest outside of.
     """
-    x, y, angle = sim.now.motion[:3, base]
-    corners = sim.scene.blocks[base].local @ turn(angle).T + [x, y]
+    _, outward = _face(sim, base, moving)
+    across, down = np.array([-outward[1], outward[0]]), np.array(sim.scene.gravity)
+    return float(np.degrees(np.arctan2(abs(across @ down), abs(outward @ down))))
+
+
+def law_between(sim: Simulation, moving: int, base: int) -> str:
+    """Name of the law of the joint between the faces with which two blocks face each other."""
+    faces = _face(sim, moving, base)[0], _face(sim, base, moving)[0]
+    return sim.scene.law_of((moving, faces[0], base, faces[1]))
+
+
+def _face(sim: Simulation, block: int, other: int) -> tuple[int, np.ndarray]:
+    """Number and outward normal of a block's face that another's centroid is farthest outside."""
+    x, y, angle = sim.now.motion[:3, block]
+    corners = sim.scene.blocks[block].local @ turn(angle).T + [x, y]
     along = np.roll(corners, -1, axis=0) - corners
-    along /= np.hypot(*along.T)[:, None]
-    outward = np.stack([along[:, 1], -along[:, 0]], axis=1)
-    face = ((sim.now.motion[:2, moving] - corners) * outward).sum(axis=1).argmax()
-    down = np.array(sim.scene.gravity)
-    return float(np.degrees(np.arctan2(abs(along[face] @ down), abs(outward[face] @ down))))
+    outward = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
+    face = int(((sim.now.motion[:2, other] - corners) * outward).sum(axis=1).argmax())
+    return face, outward[face]
 
 
 def readings(sim: Simulation) -> dict[str, float]:

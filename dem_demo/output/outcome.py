@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from ..scene import usual_size
 from .record import Record
 
-FAILED = 0.1  # m: a block that has moved farther has failed
+FAILED = 0.1  # of the usual size of a rock's blocks: one that has moved farther has failed
 CREEP = 1e-6  # m/s: faster is not at rest
 LOOK_BACK = 1.0  # s over which creep is measured
 
@@ -26,8 +27,8 @@ def outcomes(record: Record) -> list[dict]:
     """One entry for each `[[rock]]` of the scene.
 
     settled_m: largest displacement from the drawing to step 0; moved_m: largest since
-    then; failed: blocks that moved more than FAILED; creep_m_per_s: largest mean speed over the
-    last second (or the whole run, if shorter).
+    then; failed: blocks that moved more than failed_beyond_m; creep_m_per_s: largest mean speed
+    over the last second (or the whole run, if shorter).
     """
     out = []
     first, last = displacement(record, 0), displacement(record, -1)
@@ -40,7 +41,8 @@ def outcomes(record: Record) -> list[dict]:
         free = rock.free
         moved = np.hypot(*(last - first)[free].T)
         creep = float(crept[free].max())
-        failed = int((moved > FAILED).sum())
+        limit = FAILED * usual_size(record.scene.blocks[i] for i in free)
+        failed = int((moved > limit).sum())
         state = "fails" if failed else "stands" if creep < CREEP else "moves"
         out.append(
             {
@@ -50,10 +52,17 @@ def outcomes(record: Record) -> list[dict]:
                 "settled_m": float(np.hypot(*first[free].T).max()),
                 "moved_m": float(moved.max()),
                 "failed": failed,
+                "failed_beyond_m": limit,
                 "creep_m_per_s": creep,
             }
         )
     return out
+
+
+def far(record: Record) -> bool:
+    """Has a block moved by more than the usual size of a block?"""
+    size = usual_size(block for block in record.scene.blocks if not block.fixed)
+    return bool(record.moved.max() > size)
 
 
 def slip_per_cycle(record: Record) -> dict[str, list[float]]:
@@ -75,8 +84,10 @@ def sentence(entry: dict) -> str:
     """One line for a person."""
     start = f"{entry['rock']}: {entry['state']}; "
     if entry["failed"]:
-        many = f"{entry['failed']} of {entry['blocks']} blocks moved more than {FAILED:g} m"
-        return f"{start}{many}, the farthest {entry['moved_m']:.2f} m"
+        many = f"{entry['failed']} of {entry['blocks']} blocks moved more than "
+        return (
+            f"{start}{many}{entry['failed_beyond_m']:.2g} m, the farthest {entry['moved_m']:.2f} m"
+        )
     moved = max(1e3 * entry["moved_m"], 1e-3)
     return (
         f"{start}no block of {entry['blocks']} moved more than {moved:.2g} mm, "

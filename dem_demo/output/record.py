@@ -8,7 +8,7 @@ import numpy as np
 from ..contact import Contacts, Points, raised
 from ..dynamics.energy import COLUMNS
 from ..dynamics.simulation import Simulation
-from .monitors import SlipMonitor, readings
+from .monitors import SlipMonitor, law_between, readings
 
 JOINT_COLUMNS = (
     "closure_m", "shear_m", "normal_stress_Pa", "shear_stress_Pa",
@@ -22,11 +22,13 @@ class Record:
 
     joints[f]: "who" (k, 5) block, edge, block, edge, point; "ends" (k, 2, 2) the segment of joint
     that a law point carries; "values" (k, 9) as JOINT_COLUMNS. monitored[f]: what the scene's
-    [watch] asks for; slips: its slip angles; state: that of the last frame, to return to.
+    [watch] asks for; slips: its slip angles; laws: of the sheared joints; state: that of the last
+    frame, to return to.
     """
 
     def __init__(self, sim: Simulation) -> None:
         self.scene, self.slips = sim.scene, SlipMonitor(sim)
+        self.laws = {pair: law_between(sim, *pair) for pair in sim.scene.monitors.shear}
         self.times: list[float] = []
         self.motion: list[np.ndarray] = []
         self.energy: list[list[float]] = []

@@ -14,7 +14,7 @@ from jointlaw.support.files import clear_run, replace_file, write_json
 from jointlaw.support.pyplot import FORMATS
 
 from ..dynamics.energy import COLUMNS
-from ..dynamics.saved_states import text_of
+from ..dynamics.saved_states import require_text
 from ..dynamics.simulation import Simulation
 from ..errors import Refused
 from . import curves, frames, rock_report
@@ -43,7 +43,7 @@ def run(
     """
     steps_to(sim, until)
     if folder:
-        text_of(sim.scene)
+        require_text(sim.scene)
         folder.mkdir(parents=True, exist_ok=True)
     started, first_step, record = time.perf_counter(), sim.now.n, Record(sim)
     interrupted = False

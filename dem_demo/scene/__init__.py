@@ -10,8 +10,9 @@ scene      a scene in memory
 read       a scene from its file
 """
 
-from .blocks import Block, turn
+from .blocks import Block, turn, usual_size
 from .drives import Drive, Drives
+from .files import Files
 from .laws import build_law, coulomb_law, is_coulomb, law_table
 from .read import DENSITY, GRAVITY, TEMPLATE, build, load, names, parse, read_tables
 from .scene import Key, Run, Scene
@@ -23,6 +24,7 @@ __all__ = [
     "Block",
     "Drive",
     "Drives",
+    "Files",
     "Key",
     "Run",
     "Scene",
@@ -36,4 +38,5 @@ __all__ = [
     "parse",
     "read_tables",
     "turn",
+    "usual_size",
 ]

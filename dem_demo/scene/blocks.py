@@ -1,5 +1,6 @@
 """Convex blocks: corners, area, centroid, moment of inertia."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,6 +64,11 @@ class Block:
         """Is a point (m) inside the block?"""
         edge = np.roll(self.corners, -1, axis=0) - self.corners
         return bool((_cross(edge, np.asarray(point) - self.corners) > 0).all())
+
+
+def usual_size(blocks: Iterable[Block]) -> float:
+    """Side (m) of the square with the median area of some blocks."""
+    return float(np.sqrt(np.median([block.area for block in blocks])))
 
 
 def box(width: float, height: float, at=(0.0, 0.0), angle: float = 0.0) -> np.ndarray:

@@ -3,13 +3,13 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
 from ..errors import SceneError
 from .blocks import Block
+from .files import Files
 from .tables import Table
 
 AXES = {"x": 0, "y": 1, "turn": 2}
@@ -104,7 +104,9 @@ class Drives:
         return out
 
 
-def read_drives(top: Table, number: dict[str, int], blocks: Sequence[Block]) -> tuple[Drive, ...]:
+def read_drives(
+    top: Table, number: dict[str, int], blocks: Sequence[Block], files: Files
+) -> tuple[Drive, ...]:
     """The drives of a scene's `[[drive]]` tables and of its blocks' `held` motions.
 
     number: of each block by name. Raises SceneError.
@@ -122,8 +124,8 @@ def read_drives(top: Table, number: dict[str, int], blocks: Sequence[Block]) -> 
         if kinds and motion == "turn":
             raise table.error(kinds[0], "shakes along x or y; for a turn give times and values")
         if kinds:
-            make = _record if kinds[0] == "file" else _sine
-            out.append(make(table, number[block], AXES[motion]))
+            what = table, number[block], AXES[motion]
+            out.append(_record(*what, files) if kinds[0] == "file" else _sine(*what))
         else:
             out.append(_lines(table, number, number[block], motion))
         table.finish()
@@ -157,15 +159,15 @@ def _sine(drive: Table, block: int, axis: int) -> Drive:
     return Drive(block, axis, *line, order=2, period=1 / frequency)
 
 
-def _record(drive: Table, block: int, axis: int) -> Drive:
+def _record(drive: Table, block: int, axis: int, files: Files) -> Drive:
     """A drive from a CSV file of velocities or accelerations.
 
     Raises SceneError naming the line that is wrong.
     """
-    path, scale = Path(drive.take("file", str)), drive.take("scale", float, 1.0)
-    where = f"{drive.path('file')}: {path}"
+    name, scale = drive.take("file", str), drive.take("scale", float, 1.0)
+    where = f"{drive.path('file')}: {files.folder / name}"
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        lines = files[name].splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise SceneError(f"{where} cannot be read ({error}); give a CSV file in UTF-8") from None
     order = TITLES.get("".join(lines[0].split())) if lines else None

@@ -7,6 +7,7 @@ import jointlaw as jl
 from jointlaw.parameters.rock import require_rock
 
 from ..errors import SceneError
+from .files import Files
 from .tables import Table, overlay
 
 FLAT = 1e15  # orientation.a: no asperity is inclined by more than 2e-15 rad
@@ -34,19 +35,25 @@ def is_coulomb(law: jl.JointLaw) -> bool:
     return law.orientation.a >= FLAT and law.heights is None and law.asperity.eta == 0
 
 
-def law_table(data: dict[str, Any], where: str) -> dict[str, Any]:
-    """A law's table with the keys of the law that it is `from`. Raises SceneError."""
+def law_table(data: dict[str, Any], where: str, files: Files) -> dict[str, Any]:
+    """A law's table with the keys of the law that it is `from`, by name or from a file.
+
+    Raises SceneError.
+    """
     if "from" not in data:
         return data
+    name = Table(data, where).take("from", str)
     try:
-        law = jl.presets.load_any(Table(data, where).take("from", str))
+        if name not in files:
+            path = files.folder / name
+            files[name] = jl.presets.load_any(str(path) if path.is_file() else name).to_toml()
     except ValueError as error:
         raise SceneError(f"{where}.from: {error}") from None
     own = {key: value for key, value in data.items() if key != "from"}
-    return overlay(tomllib.loads(law.to_toml()), own)
+    return overlay(tomllib.loads(files[name]), own)
 
 
-def build_law(data: dict[str, Any], where: str) -> jl.JointLaw:
+def build_law(data: dict[str, Any], where: str, files: Files | None = None) -> jl.JointLaw:
     """A law from a scene's `[laws.NAME]` table; `kind` is "joint" (default) or "coulomb".
 
     Raises ValueError.
@@ -65,7 +72,8 @@ def build_law(data: dict[str, Any], where: str) -> jl.JointLaw:
         return law
     if kind != "joint":
         raise table.error("kind", "must be 'joint' or 'coulomb'")
-    keys = {key: value for key, value in law_table(data, where).items() if key != "kind"}
+    whole = law_table(data, where, Files() if files is None else files)
+    keys = {key: value for key, value in whole.items() if key != "kind"}
     if keys.get("closure_only"):
         raise SceneError(f"{where}.closure_only = true: joints between blocks shear; leave it out")
     law = jl.JointLaw.from_dict({"plane": 0.0, **keys}, where)

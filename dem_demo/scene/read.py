@@ -11,6 +11,7 @@ from jointlaw.support.checks import remedy
 from ..errors import SceneError
 from .blocks import Block, box, check_convex
 from .drives import AXES, read_drives
+from .files import Files
 from .laws import build_law
 from .rocks import read_rocks
 from .scene import Monitors, Run, Scene
@@ -43,14 +44,19 @@ def load(source: str | Path) -> Scene:
             f"no scene {str(source)!r}: {remedy(source, names(), 'give a TOML file or one of')}"
         )
     try:
-        return parse(chosen + path.read_text(encoding="utf-8"), path.name)
+        return parse(chosen + path.read_text(encoding="utf-8"), path.name, Files(path.parent))
     except UnicodeDecodeError as error:
         raise SceneError(f"{path} is not UTF-8 text: {error}") from None
 
 
-def parse(text: str, where: str = "scene") -> Scene:
-    """A scene from TOML text; `where` is named in error messages. Raises SceneError."""
-    return build(read_tables(text, where), where, text)
+def parse(text: str, where: str = "scene", files: Files | None = None) -> Scene:
+    """A scene from TOML text; `where` is named in error messages. Raises SceneError.
+
+    files: those that it names, by default read from the working folder.
+    """
+    scene = build(read_tables(text, where), where, files)
+    object.__setattr__(scene, "text", text)
+    return scene
 
 
 def read_tables(text: str, where: str = "scene") -> dict[str, Any]:
@@ -70,13 +76,13 @@ def read_tables(text: str, where: str = "scene") -> dict[str, Any]:
     return overlay(data, variants[variant])
 
 
-def build(data: dict[str, Any], where: str = "scene", text: str = "") -> Scene:
-    """A scene from the tables of its file; `text` is kept for states saved to files."""
-    top = Table(data, where)
+def build(data: dict[str, Any], where: str = "scene", files: Files | None = None) -> Scene:
+    """A scene from the tables of its file and the files that it names. Raises SceneError."""
+    top, files = Table(data, where), Files() if files is None else files
     laws = {}
     for name, table in top.take("laws", dict, say="give at least one [laws.NAME] table").items():
         try:
-            laws[name] = build_law(table, f"{where}.laws.{name}")
+            laws[name] = build_law(table, f"{where}.laws.{name}", files)
         except (ValueError, TypeError, AttributeError, OverflowError) as error:
             raise SceneError(str(error)) from None
     density = top.density(DENSITY)
@@ -90,7 +96,7 @@ def build(data: dict[str, Any], where: str = "scene", text: str = "") -> Scene:
         raise SceneError(f"{where}.block: two blocks have the same name; names must differ")
     if all(block.fixed for block in blocks):
         raise SceneError(f"{where}.block: all blocks are fixed; at least one must be free to move")
-    drives = read_drives(top, number, blocks)
+    drives = read_drives(top, number, blocks, files)
     name = dict(zip(AXES.values(), AXES, strict=True))
     for drive in drives:
         block = blocks[drive.block]
@@ -109,12 +115,12 @@ def build(data: dict[str, Any], where: str = "scene", text: str = "") -> Scene:
         gravity=top.vector("gravity", GRAVITY),
         thickness=top.take("thickness", float, 1.0, above=0),
         monitors=_monitors(Table(top.take("watch", dict, {}), f"{where}.watch"), number, blocks),
-        text=text,
     )
     top.finish()
     for law in [scene.default_law, *scene.pairs.values(), *scene.edge_laws.values()]:
         if law not in laws:
             raise SceneError(f"{where}: law {law!r} is not among [laws]; {remedy(law, laws)}")
+    object.__setattr__(scene, "files", files)
     return scene
 
 

@@ -8,6 +8,7 @@ import jointlaw as jl
 
 from .blocks import Block
 from .drives import Drive
+from .files import Files
 from .rocks import Rock
 
 Key = tuple[int, int, int, int]  # of an interface: block, edge, block, edge
@@ -43,7 +44,11 @@ class Monitors:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Everything that a simulation needs. `text` is the file it came from."""
+    """Everything that a simulation needs.
+
+    text: of the file that it was read from, empty for a scene made or changed in memory; files:
+    what that file names.
+    """
 
     title: str
     blocks: tuple[Block, ...]
@@ -57,7 +62,8 @@ class Scene:
     gravity: tuple[float, float] = (0.0, -9.81)
     thickness: float = 1.0
     monitors: Monitors = Monitors()
-    text: str = ""
+    text: str = field(default="", init=False)  # `replace` leaves both out
+    files: Files = field(default_factory=Files, init=False)
 
     @property
     def doubts(self) -> list[str]:

@@ -13,39 +13,35 @@ import numpy as np
 
 from ..dynamics.simulation import Simulation
 from ..errors import Refused
-from ..output.outcome import outcomes
+from ..output.outcome import far, outcomes
 from ..output.record import Record
 from ..output.run import play
-from ..scene import DENSITY, GRAVITY, build, build_law, read_tables
+from ..scene import DENSITY, GRAVITY, Files, Scene, build, build_law, read_tables
 from .limit import critical_tilt, tilted
 
-FAR = 1.0  # m: a rock whose blocks have moved farther has failed, and need not go on
 
-
-def compare(
-    text: str, where: str, seeds: Sequence[int], until: float, tilt: float = 0.0
-) -> Iterator[dict]:
-    """Run every rock of a scene's text for each seed and each kind of law; yields outcomes.
+def compare(scene: Scene, seeds: Sequence[int], until: float, tilt: float = 0.0) -> Iterator[dict]:
+    """Run every rock of a scene for each seed and each kind of law; yields outcomes.
 
     until: model time to stop at (s); tilt: angle by which gravity is turned towards +x (degrees).
     """
-    for case, data in _cases(text, seeds):
-        yield {**case, **_run(tilted(data, tilt), where, until)}
+    for case, data in _cases(scene, seeds):
+        yield {**case, **_run(build(tilted(data, tilt), files=scene.files), until)}
 
 
-def critical_tilts(text: str, where: str, seeds: Sequence[int]) -> Iterator[dict]:
+def critical_tilts(scene: Scene, seeds: Sequence[int]) -> Iterator[dict]:
     """For the same cases the turn of gravity (degrees) beyond which no balance is found.
 
     None if it is beyond 60 degrees either way.
     """
-    for case, data in _cases(text, seeds):
+    for case, data in _cases(scene, seeds):
         rock = data["rock"][0]["name"]
-        yield {**case, "rock": rock, "critical_tilt": critical_tilt(data, where)}
+        yield {**case, "rock": rock, "critical_tilt": critical_tilt(data, scene.files)}
 
 
-def _cases(text: str, seeds: Sequence[int]) -> Iterator[tuple[dict, dict[str, Any]]]:
+def _cases(scene: Scene, seeds: Sequence[int]) -> Iterator[tuple[dict, dict[str, Any]]]:
     """Every rock alone, for each seed and kind of law: what it is, and the scene's tables."""
-    data = read_tables(text)
+    data = read_tables(scene.text)
     for name in (table["name"] for table in data["rock"]):
         own = alone(data, name)
         (rock,) = own["rock"]
@@ -54,7 +50,9 @@ def _cases(text: str, seeds: Sequence[int]) -> Iterator[tuple[dict, dict[str, An
             if seed != rock.get("seed", 0):  # other blocks, to which the names do not belong
                 cut["joint"] = [joint for joint in own["joint"] if not _named(joint, rock)]
             yield {"law": "joint", "seed": seed}, cut
-            plain = {name: _plain(law, rock, data) for name, law in data["laws"].items()}
+            plain = {
+                name: _plain(law, rock, data, scene.files) for name, law in data["laws"].items()
+            }
             run = {**data["run"], "max_overlap": 0.1}  # constant springs are soft in impacts
             yield {"law": "coulomb", "seed": seed}, {**cut, "laws": plain, "run": run}
 
@@ -67,12 +65,12 @@ def alone(data: dict[str, Any], name: str) -> dict[str, Any]:
     return {**data, "rock": [rock], "watch": {}, "joint": joints}
 
 
-def _run(data: dict[str, Any], where: str, until: float) -> dict:
+def _run(scene: Scene, until: float) -> dict:
     started = time.perf_counter()
-    sim, trouble = Simulation(build(data, where)), ""
+    sim, trouble = Simulation(scene), ""
     record = Record(sim)
     try:
-        play(sim, record, until, lambda record: record.moved.max() > FAR)
+        play(sim, record, until, far)
     except Refused as error:
         trouble = str(error)
     (outcome,) = outcomes(record)
@@ -107,12 +105,14 @@ def _belongs(joint: dict[str, Any], rock: dict[str, Any], blocks: set[str]) -> b
     return bool((low < joint["around"]).all() and (joint["around"] < high).all())
 
 
-def _plain(table: dict[str, Any], rock: dict[str, Any], data: dict[str, Any]) -> dict[str, Any]:
+def _plain(
+    table: dict[str, Any], rock: dict[str, Any], data: dict[str, Any], files: Files
+) -> dict[str, Any]:
     if table.get("kind", "joint") == "coulomb":
         return table
     height = np.ptp(np.array(rock["outline"], float)[:, 1])
     stress = 0.5 * data.get("density", DENSITY) * np.hypot(*data.get("gravity", GRAVITY)) * height
-    law = build_law(table, "law")
+    law = build_law(table, "law", files)
     stiffness = float(stress / law.closure(stress))
     return {
         "kind": "coulomb",

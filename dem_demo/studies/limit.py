@@ -14,7 +14,7 @@ from tqdm import tqdm
 from jointlaw.parameters.rock import RANGES
 
 from ..dynamics.simulation import Simulation
-from ..scene import GRAVITY, build, law_table, turn
+from ..scene import GRAVITY, Files, build, law_table, turn
 
 Tables = dict[str, Any]
 EXACT = 0.01  # share of the tilt and of the factor to which they are found
@@ -22,24 +22,28 @@ STEP, STEEPEST, LEAST = 8.0, 60.0, 0.01  # degrees: first step, largest, closest
 LARGEST = 64.0  # factor
 
 
-def critical_tilt(data: Tables, where: str) -> float | None:
+def critical_tilt(data: Tables, files: Files) -> float | None:
     """The turn of gravity (degrees, towards +x) at which a scene just holds; None beyond 60.
 
     Below zero where it does not hold as drawn.
     """
     return _bisect(
-        lambda tilt: tilted(data, tilt), where, STEP, STEEPEST, lambda t: max(EXACT * abs(t), LEAST)
+        lambda tilt: tilted(data, tilt), files, STEP, STEEPEST, lambda t: max(EXACT * abs(t), LEAST)
     )
 
 
-def strength_factor(data: Tables, where: str) -> float | None:
+def strength_factor(data: Tables, files: Files) -> float | None:
     """What all friction is to be divided by for a scene to just hold.
 
     None if it holds with 1/64 of it, or fails with 64 times of it. No friction is made larger than
     a scene may have, 5.
     """
     log = _bisect(
-        lambda log: reduced(data, np.exp(log)), where, np.log(2), np.log(LARGEST), lambda _: EXACT
+        lambda log: reduced(data, np.exp(log), files),
+        files,
+        np.log(2),
+        np.log(LARGEST),
+        lambda _: EXACT,
     )
     return None if log is None else float(np.exp(log))
 
@@ -50,9 +54,9 @@ def tilted(data: Tables, tilt: float) -> Tables:
     return {**data, "gravity": gravity.tolist()}
 
 
-def reduced(data: Tables, factor: float) -> Tables:
+def reduced(data: Tables, factor: float, files: Files) -> Tables:
     """A scene's tables with the friction of asperities and of plain Coulomb divided by a factor."""
-    laws = {name: dict(law_table(law, f"laws.{name}")) for name, law in data["laws"].items()}
+    laws = {name: dict(law_table(law, f"laws.{name}", files)) for name, law in data["laws"].items()}
     for law in laws.values():
         if "asperity" in law:
             law["asperity"] = _divided(law["asperity"], factor)
@@ -71,7 +75,7 @@ def _divided(table: Tables, factor: float) -> Tables:
 
 def _bisect(
     at: Callable[[float], Tables],
-    where: str,
+    files: Files,
     step: float,
     most: float,
     exact: Callable[[float], float],
@@ -82,14 +86,15 @@ def _bisect(
         def holds(x: float) -> bool:
             bar.update()
             data = at(x)
-            return Simulation(build({**data, "run": {**data["run"], "seat": True}}, where)).balanced
+            scene = build({**data, "run": {**data["run"], "seat": True}}, files=files)
+            return Simulation(scene).balanced
 
         sense = 1.0 if holds(0.0) else -1.0
         low, high = 0.0, sense * step
         while holds(high) == (sense > 0):
-            low, high = high, high + sense * step
-            if abs(high) > most:
+            if abs(high) == most:
                 return None
+            low, high = high, sense * min(abs(high) + step, most)
         while abs(high - low) > exact(high):
             middle = 0.5 * (low + high)
             low, high = (middle, high) if holds(middle) == (sense > 0) else (low, middle)

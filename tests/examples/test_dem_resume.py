@@ -1,0 +1,190 @@
+"""Saved states: whole, of one scene, resumed anywhere, and only as the method can carry it."""
+
+import tomllib
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scene_text import PLAIN, ROCK
+from scipy.sparse.linalg import ArpackNoConvergence
+
+from dem_demo import Simulation, load, parse
+from dem_demo.dynamics import timestep
+from dem_demo.output.outcome import outcomes
+from dem_demo.output.record import Record
+from dem_demo.scene import Files
+from dem_demo.studies.limit import critical_tilt
+
+TEXT = f"""
+gravity = [3.0, -9.0]
+[laws."rock/rough"]
+{ROCK}[laws."../../escaped"]
+{PLAIN}[[block]]
+name = "base"
+box = [4.0, 1.0]
+at = [0.5, -0.5]
+fixed = true
+[[block]]
+name = "one"
+box = [1.0, 0.5]
+at = [0.0, 0.25]
+[[block]]
+name = "two"
+box = [0.5, 0.3]
+at = [0.0, 0.65]
+velocity = [0.1, -0.05]
+[[joint]]
+between = ["two", "one"]
+law = "../../escaped"
+[run]
+end = 0.02
+record = 0.002
+"""
+
+
+def begun(steps, text=TEXT):
+    """A simulation some steps after its start."""
+    sim = Simulation(parse(text))
+    for _ in range(steps):
+        sim.step()
+    return sim
+
+
+def test_a_resumed_run_keeps_its_time_step_margin(tmp_path):
+    """Looked at again for no reason, the limit would be another one than in a whole run."""
+    for steps in (10, 20, 40):
+        begun(steps).save(tmp_path)
+        again, whole = Simulation.load(tmp_path), begun(steps + 15)
+        for _ in range(15):
+            again.step()
+        assert again.now.limit.least == whole.now.limit.least
+
+
+def test_a_state_that_lacks_a_part_is_damaged(tmp_path):
+    begun(3).save(tmp_path)
+    file = tmp_path / "state.npz"
+    with np.load(file) as data:
+        whole = dict(data)
+    for name in whole:
+        np.savez(file, **{key: value for key, value in whole.items() if key != name})
+        with pytest.raises(ValueError, match=r"state\.npz is damaged .*run the scene again"):
+            Simulation.load(tmp_path)
+
+
+DRIVE = """
+[[drive]]
+block = "one"
+motion = "x"
+file = "motion.csv"
+[run]
+"""
+
+
+def test_files_are_found_beside_their_scene_and_kept_in_the_state(tmp_path, monkeypatch):
+    """A record and a law, relative to the scene; a state goes on without them, from anywhere."""
+    home, other = tmp_path / "home", tmp_path / "other"
+    home.mkdir()
+    other.mkdir()
+    monkeypatch.chdir(other)
+    (home / "motion.csv").write_text("time_s,acceleration_m/s2\n0.0,0.0\n0.1,1.0\n")
+    parse(TEXT).laws["rock/rough"].to_toml(home / "mine.toml")
+    text = TEXT.replace(ROCK, 'from = "mine.toml"\n').replace("[run]\n", DRIVE)
+    (home / "scene.toml").write_text(text)
+    scene = load(home / "scene.toml")
+    assert scene.laws["rock/rough"].heights is not None
+    assert scene.drives[0].times == (0.0, 0.1)
+    sim = Simulation(scene)
+    sim.save(tmp_path / "state")
+    for file in home.iterdir():
+        file.unlink()
+    again = Simulation.load(tmp_path / "state")
+    for _ in range(20):
+        sim.step()
+        again.step()
+    assert (again.now.motion == sim.now.motion).all()
+
+
+def test_a_scene_changed_in_memory_is_not_saved(tmp_path):
+    scene = replace(parse(TEXT), gravity=(0.0, -1.0))
+    with pytest.raises(ValueError, match=r"changed in memory.*write the change into the TOML text"):
+        Simulation(scene).save(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+CUT = f"""
+[laws.bedding]
+{PLAIN}[laws.cross]
+{PLAIN.replace("0.3", "0.8")}[[rock]]
+name = "r"
+least_width = 0.1
+outline = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]]
+[[rock.set]]
+dip = 0.0
+spacing = 5.0
+through = [0.0, 0.5]
+law = "bedding"
+[[rock.set]]
+dip = 90.0
+spacing = 5.0
+through = [1.0, 0.0]
+law = "cross"
+[[rock.fixed]]
+corners = [[0.0, 0.0], [2.0, 0.0], [2.0, 0.4], [0.0, 0.4]]
+[watch]
+slip = [["r 3", "r 1"]]
+shear = [["r 4", "r 3"]]
+[run]
+end = 0.1
+"""
+
+
+def test_a_watched_joint_has_the_law_of_the_faces_that_meet():
+    """Blocks with a set on each side: edge 0 of both, their bottoms, would give "bedding" twice."""
+    record = Record(Simulation(parse(CUT)))
+    (slip,) = record.slips.report()
+    assert slip["law"] == "bedding"
+    assert slip["predicted_angle"] == pytest.approx(np.degrees(np.arctan(0.3)))
+    assert list(record.laws.values()) == ["cross"]
+
+
+@pytest.mark.parametrize("degrees", [58.0, 62.0])
+def test_a_tilt_near_the_steepest_is_found(degrees):
+    """A flat slab slides at its friction angle, also where the last step of the search is short."""
+    text = TEXT.replace("gravity = [3.0, -9.0]", "gravity = [0.0, -9.81]\nlaw = 'rock/rough'")
+    data = tomllib.loads(text.split('[[block]]\nname = "two"')[0] + "[run]\nend = 1.0")
+    data["block"][1]["box"] = [3.0, 0.1]
+    data["block"][1]["at"] = [0.0, 0.05]
+    plain = {"kind": "coulomb", "normal_stiffness": 1e9, "shear_stiffness": 1e9}
+    data["laws"]["rock/rough"] = plain | {"friction": float(np.tan(np.radians(degrees)))}
+    found = critical_tilt(data, Files())
+    assert found is None if degrees > 60 else found == pytest.approx(degrees, rel=0.01)
+
+
+@pytest.mark.parametrize("size", [0.01, 1.0, 100.0])
+def test_failure_is_counted_by_the_size_of_the_blocks(size):
+    """A tenth of a block, in a model of centimetres as in one of a hundred metres."""
+    scene = load("slope")
+    blocks = tuple(replace(block, corners=size * block.corners) for block in scene.blocks)
+    scene = replace(scene, blocks=blocks)
+    start = np.zeros((6, len(blocks)))
+    start[:2] = np.transpose([block.centroid for block in blocks])
+    end, rock = start.copy(), scene.rocks[0]
+    end[0, rock.free[0]] += 0.2 * size  # of blocks of about 1 m2 times size**2
+    end[0, rock.free[1]] += 0.05 * size
+    record = SimpleNamespace(scene=scene, times=[0.0, 1.0], motion=[start, end])
+    assert [entry["failed"] for entry in outcomes(record)] == [1, 0]
+
+
+def test_an_eigenvalue_that_does_not_converge_is_computed_exactly(monkeypatch):
+    scene = load("slope")
+    whole = Simulation(scene).now.limit.now
+    asked = []
+
+    def never(*_args, **_keys):
+        asked.append(1)
+        raise ArpackNoConvergence("no convergence", np.zeros(0), np.zeros((0, 0)))
+
+    monkeypatch.setattr(timestep, "eigsh", never)
+    assert Simulation(scene).now.limit.now == pytest.approx(whole, rel=1e-6)
+    assert asked

@@ -5,29 +5,16 @@ takes over, or the next edge. So of the corners of two blocks that overlap the l
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import Refused
 from ..scene import Block
-from .geometry import Contacts, Outlines, Points, evaluate
-from .smoothing import CORNER
+from .geometry import CORNER, Contacts, Outlines, contacts_at
 
 TILT = np.sin(np.radians(CORNER + 1.5))  # how far a side of a corner may dip below the edge
 CARRIED = 0.5  # share of an overlap that some joint must see
 ROUNDING = 1e-10  # m: corners stay until their depth is wrong by this, so that none chatters
-
-
-class Found(NamedTuple):
-    """Corners on edges (k,), their depth (m), and of their sides (2, k) the sine of the angle to
-    the edge and the overlap with it (m)."""
-
-    corner: np.ndarray
-    edge: np.ndarray
-    depth: np.ndarray
-    rise: np.ndarray
-    overlap: np.ndarray
 
 
 class NarrowPhase:
@@ -46,8 +33,8 @@ class NarrowPhase:
         self._corners = np.where(place < sizes[:, None], outlines.start[:, None] + place, -1)
         self.depth_limit = max_overlap * np.array([b.width for b in blocks])
 
-    def __call__(self, motion: np.ndarray, pairs: np.ndarray, known: Contacts) -> Found:
-        """Corners between pairs (p, 2) of blocks; where two are equal, the known one is meant.
+    def __call__(self, motion: np.ndarray, pairs: np.ndarray, known: set) -> Contacts:
+        """The contacts between pairs (p, 2) of blocks; where two are equal, the known one is meant.
 
         Raises Refused for an overlap that is too deep, or that no corner sees.
         """
@@ -63,22 +50,27 @@ class NarrowPhase:
         near = (height < 1.5 * self.skin) & (height > -1.5 * limit[:, None, None])
         near &= (corner >= 0) & (edge >= 0)
         which = np.nonzero(near)[0]
-        corner, edge = corner[near], edge[near]
-        contacts = known.at(corner, edge)
-        points = evaluate(contacts, motion)
-        ok = (points.rise > -TILT).all(axis=0) & (points.inside >= -ROUNDING).all(axis=0)
-        _choose(contacts, points, ok, set(known.pairs()))
+        all_near = contacts_at(self.outlines, corner[near], edge[near], motion)
+        ok = _in_range(all_near, known)
         n = len(pairs)
         seen = np.full(2 * n, -np.inf)
-        np.maximum.at(seen, which[ok], points.closure[ok])
+        np.maximum.at(seen, which[ok], all_near.closure[ok])
         true = -np.maximum(apart[:n], apart[n:])
         self._require_carried(pairs, true, np.maximum(seen[:n], seen[n:]), limit[:n])
-        sides = points.rise[:, ok], points.overlap[:, ok]
-        return Found(corner[ok], edge[ok], points.closure[ok], *sides)
+        return contacts_at(self.outlines, all_near.corner[ok], all_near.edge[ok], motion)
+
+    def require_shallow(self, contacts: Contacts) -> None:
+        """Refuse overlaps beyond run.max_overlap."""
+        pressed, pairs = contacts.closure * (contacts.length > 0), [contacts.a, contacts.b]
+        limit = self.depth_limit[pairs].min(axis=0)
+        if (pressed > limit).any():
+            i = int((pressed - limit).argmax())
+            self._refuse_overlap((contacts.a[i], contacts.b[i]), pressed[i], limit[i])
 
     def _require_carried(self, pairs, true, seen, limit) -> None:
         if (deep := true > limit).any():
-            self.refuse_overlap(pairs[deep.argmax()], true[deep.argmax()], limit[deep.argmax()])
+            i = int(deep.argmax())
+            self._refuse_overlap(pairs[i], true[i], limit[i])
         lost = (true > 0.25 * self.skin) & (seen < CARRIED * true)
         if lost.any():
             p = int(lost.argmax())
@@ -88,8 +80,7 @@ class NarrowPhase:
                 "an edge that faces it: start the blocks apart, or resume with a smaller step"
             )
 
-    def refuse_overlap(self, pair, depth: float, limit: float) -> None:
-        """Raise for an overlap beyond the limit."""
+    def _refuse_overlap(self, pair, depth: float, limit: float) -> None:
         one, other = (self.blocks[n].name for n in pair)
         raise Refused(
             f"blocks {one!r} and {other!r} overlap by {depth:.3g} m: must stay below {limit:.3g} m "
@@ -98,25 +89,18 @@ class NarrowPhase:
         )
 
 
-def _choose(contacts: Contacts, points: Points, ok: np.ndarray, known: set) -> None:
-    """Of two corners at the limit between them only one is meant: the one that was there."""
-    edge = ok & (points.inside.min(axis=0) <= ROUNDING)
-    if not edge.any():
-        return
-    here = contacts.pairs()
-    corner, beyond, _ = what_is_next(contacts, points)
-    rows = {here[i]: i for i in np.flatnonzero(edge).tolist()}
+def _in_range(contacts: Contacts, known: set) -> np.ndarray:
+    """Which corners are in the range of their edge.
+
+    Of two corners at the limit between them only one is meant: the one that was there.
+    """
+    ok = (contacts.rise > -TILT).all(axis=0) & (contacts.inside >= -ROUNDING).all(axis=0)
+    at_limit = ok & (contacts.inside.min(axis=0) <= ROUNDING)
+    here = contacts.pairs
+    corner, beyond, _ = contacts.following()
+    rows = {here[i]: i for i in np.flatnonzero(at_limit).tolist()}
     for i in sorted(rows.values(), key=lambda i: here[i] not in known):
         other = rows.get((int(corner[i]), int(beyond[i])))
         if other is not None and ok[i]:
             ok[other] = False
-
-
-def what_is_next(c: Contacts, points: Points):
-    """Corner and edge that come next at the nearer limit of each corner's range, and whether the
-    corner at the end of the edge takes over there."""
-    side, k = points.inside.argmin(axis=0), np.arange(len(c.corner))
-    trade = points.own[side, k]
-    corner_there = np.where(side == 0, c.edge, c.outlines.next[c.edge])
-    corner, edge = np.where(trade, corner_there, c.corner), c.behind[side, k]
-    return corner, np.where(trade, c.sides[side, k], edge), trade
+    return ok

@@ -30,12 +30,11 @@ def slip_angle(scene: Scene, law_name: str, moving: int, length: float) -> dict:
     The normal stress falls as the base tilts, so angle and stress are found together. Both are None
     where the law says nothing: no contact, no gravity, a stress that it cannot carry.
     """
-    law, block = scene.laws[law_name], scene.blocks[moving]
-    weight, angle = block.density * block.area * np.hypot(*scene.gravity), 35.0
+    weight, angle = scene.blocks[moving].mass * np.hypot(*scene.gravity), 35.0
     for _ in range(ROUNDS if length > 0 else 0):
         before, stress = angle, float(weight / length * np.cos(np.radians(angle)))
         try:
-            angle = friction_angle(law, stress)
+            angle = friction_angle(scene.laws[law_name], stress)
         except (ValueError, jl.PathError):
             break
         if abs(angle - before) <= 5e-3:
@@ -43,22 +42,17 @@ def slip_angle(scene: Scene, law_name: str, moving: int, length: float) -> dict:
     return {"predicted_angle": None, "normal_stress": None}
 
 
-def shear_curve(law: jl.JointLaw, stress: float, slid: np.ndarray) -> dict[str, np.ndarray] | None:
+def shear_curve(law: jl.JointLaw, stress: float, slid: np.ndarray) -> jl.Record | None:
     """Direct shear of the law alone along the turning points of `slid` (m), at a normal stress.
 
-    Returns slid (m), shear stress (Pa) and dilation (m), or None for plain Coulomb and where the
-    law cannot be sheared like this: no normal stress, no motion.
+    None for plain Coulomb and where the law cannot be sheared like this: no normal stress, no
+    motion.
     """
-    if is_coulomb(law):
-        return None
     inner = np.flatnonzero(np.diff(np.sign(np.diff(slid)))) + 1
     turns = [float(u) for u in [*slid[inner], slid[-1]]]
     try:
-        test = jl.direct_shear(law.joint(), to=turns, normal=stress, steps=400)
+        if not is_coulomb(law):
+            return jl.direct_shear(law.joint(), to=turns, normal=stress, steps=400)
     except (ValueError, jl.PathError):
-        return None
-    return {
-        "slid": test.shear_2,
-        "shear": test.F2,
-        "dilation": test.closure[0] - test.closure,
-    }
+        pass
+    return None

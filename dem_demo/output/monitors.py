@@ -6,36 +6,32 @@ from ..dynamics.simulation import Simulation
 from ..scene import turn
 from .law_alone import slip_angle, slip_distance
 
-LOOKS = 8  # steps between two looks
-
 
 class SlipMonitor:
     """Looks for the slip of the joints that the scene's [watch] table names."""
 
     def __init__(self, sim: Simulation) -> None:
-        self.scene = scene = sim.scene
-        self.slips = {}
-        for moving, base in scene.monitors.slip:
+        self.scene, self.slips, self.lengths = sim.scene, {}, {}
+        for moving, base in self.scene.monitors.slip:
             name = law_between(sim, moving, base)
-            law = scene.laws[name]
+            distance = slip_distance(self.scene.laws[name])
             self.slips[moving, base] = {
-                "block": scene.blocks[moving].name,
-                "base": scene.blocks[base].name,
+                "block": self.scene.blocks[moving].name,
+                "base": self.scene.blocks[base].name,
                 "law": name,
-                "slip_distance": slip_distance(law),
+                "slip_distance": distance,
                 "slip_angle": None,
                 "slip_time": None,
-                "slipped_before": sim.now.slid(sim.joints, moving, base) > slip_distance(law),
+                "slipped_before": sim.slid(moving, base) > distance,
             }
-        self.lengths = {
-            pair: float(sim.now.points.length[sim.now.between(*pair)].sum()) for pair in self.slips
-        }
+            here = sim.tracker.between(moving, base)
+            self.lengths[moving, base] = float(sim.contacts.length[here].sum())
 
     def look(self, sim: Simulation) -> None:
         """Note the base angle at which a joint passes its slip distance."""
         for (moving, base), entry in self.slips.items():
             waits = entry["slip_angle"] is None and not entry["slipped_before"]
-            if waits and sim.now.slid(sim.joints, moving, base) > entry["slip_distance"]:
+            if waits and sim.slid(moving, base) > entry["slip_distance"]:
                 entry["slip_angle"] = base_angle(sim, moving, base)
                 entry["slip_time"] = sim.time
 
@@ -65,11 +61,11 @@ def law_between(sim: Simulation, moving: int, base: int) -> str:
 
 def _face(sim: Simulation, block: int, other: int) -> tuple[int, np.ndarray]:
     """Number and outward normal of a block's face that another's centroid is farthest outside."""
-    x, y, angle = sim.now.motion[:3, block]
+    x, y, angle = sim.blocks.motion[:3, block]
     corners = sim.scene.blocks[block].local @ turn(angle).T + [x, y]
     along = np.roll(corners, -1, axis=0) - corners
     outward = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
-    face = int(((sim.now.motion[:2, other] - corners) * outward).sum(axis=1).argmax())
+    face = int(((sim.blocks.motion[:2, other] - corners) * outward).sum(axis=1).argmax())
     return face, outward[face]
 
 
@@ -81,7 +77,7 @@ def readings(sim: Simulation) -> dict[str, float]:
         row[f"{name}: base angle_deg"] = base_angle(sim, moving, base)
         row |= {f"{name}: {key}": value for key, value in _joint(sim, moving, base).items()}
     for i, (block, point) in enumerate(sim.scene.monitors.pins):
-        x, y, angle = sim.now.motion[:3, block]
+        x, y, angle = sim.blocks.motion[:3, block]
         arm = np.asarray(point) - blocks[block].centroid
         row[f"pin {i + 1}: moved_m"] = float(np.hypot(*(turn(angle) @ arm + [x, y] - point)))
     return row
@@ -89,12 +85,9 @@ def readings(sim: Simulation) -> dict[str, float]:
 
 def _joint(sim: Simulation, moving: int, base: int) -> dict[str, float]:
     """Mean over the joint between two blocks: stresses, closure, sliding, sliding share."""
-    here = sim.now.between(moving, base)
-    area = sim.now.area[here]
+    here, joints = sim.tracker.between(moving, base), sim.joints
+    area = sim.ledger.area[here]
+    columns = [*joints.traction[here].T, *joints.delta[here].T, joints.sliding[here]]
     keys = "normal_Pa", "shear_Pa", "closure_m", "slid_m", "sliding_share"
-    if not area.any():
-        return dict.fromkeys(keys, 0.0)
-    F, delta = sim.now.traction[here], sim.joints.read("delta")[here]
-    columns = [*F.T, *delta.T, sim.joints.now["sliding"][here]]
-    share = area / area.sum()
+    share = area / area.sum() if area.any() else 0.0 * area
     return {key: float(share @ column) for key, column in zip(keys, columns, strict=True)}

@@ -16,13 +16,6 @@ def displacement(record: Record, i: int) -> np.ndarray:
     return record.motion[i][:2].T - drawn
 
 
-def kinetic(record: Record, i: int) -> np.ndarray:
-    """Kinetic energy (n,) of the blocks in frame i (J)."""
-    blocks, thick = record.scene.blocks, record.scene.thickness
-    inertia = thick * np.array([[b.density * b.area] * 2 + [b.density * b.polar] for b in blocks])
-    return 0.5 * (inertia * record.motion[i][3:].T ** 2).sum(axis=1)
-
-
 def outcomes(record: Record) -> list[dict]:
     """One entry for each `[[rock]]` of the scene.
 
@@ -39,15 +32,13 @@ def outcomes(record: Record) -> list[dict]:
     crept /= max(times[-1] - times[before], 1e-300)
     for rock in record.scene.rocks:
         free = rock.free
-        moved = np.hypot(*(last - first)[free].T)
-        creep = float(crept[free].max())
+        moved, creep = np.hypot(*(last - first)[free].T), float(crept[free].max())
         limit = FAILED * usual_size(record.scene.blocks[i] for i in free)
         failed = int((moved > limit).sum())
-        state = "fails" if failed else "stands" if creep < CREEP else "moves"
         out.append(
             {
                 "rock": rock.name,
-                "state": state,
+                "state": "fails" if failed else "stands" if creep < CREEP else "moves",
                 "blocks": len(free),
                 "settled_m": float(np.hypot(*first[free].T).max()),
                 "moved_m": float(moved.max()),
@@ -85,9 +76,8 @@ def sentence(entry: dict) -> str:
     start = f"{entry['rock']}: {entry['state']}; "
     if entry["failed"]:
         many = f"{entry['failed']} of {entry['blocks']} blocks moved more than "
-        return (
-            f"{start}{many}{entry['failed_beyond_m']:.2g} m, the farthest {entry['moved_m']:.2f} m"
-        )
+        many += f"{entry['failed_beyond_m']:.2g} m"
+        return f"{start}{many}, the farthest {entry['moved_m']:.2f} m"
     moved = max(1e3 * entry["moved_m"], 1e-3)
     return (
         f"{start}no block of {entry['blocks']} moved more than {moved:.2g} mm, "

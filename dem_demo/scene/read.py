@@ -192,9 +192,6 @@ def _run(table: Table) -> Run:
         law_steps=table.whole("law_steps", Run.law_steps, least=1),
         largest_stress=table.take("largest_stress", float, Run.largest_stress, least=0, say="Pa"),
         skin=table.take("skin", float, None, above=0, say="m"),
-        point_spacing=table.take(
-            "point_spacing", float, Run.point_spacing, above=0, infinite=True, say="m"
-        ),
         corner_length=table.take("corner_length", float, None, above=0, say="m"),
         max_overlap=table.take("max_overlap", float, Run.max_overlap, above=0),
     )

@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass, field
 
-import numpy as np
-
 import jointlaw as jl
 
 from .blocks import Block
 from .drives import Drive
 from .files import Files
 from .rocks import Rock
+
+SKIN, CORNER = 0.02, 0.1  # of the least width of a block
 
 Key = tuple[int, int, int, int]  # of an interface: block, edge, block, edge
 
@@ -27,9 +27,8 @@ class Run:
     dashpot_shear: float = 0.05
     law_steps: int = 1  # steps of the law per time step: 4 balances energy to 0.5 % in impacts
     largest_stress: float = 0.0  # Pa, expected in impacts: sets the step before anything touches
-    skin: float | None = None  # reach of the search for contacts; default 0.02 of the least width
-    point_spacing: float = np.inf  # largest distance of law points along a joint
-    corner_length: float | None = None  # of a corner on an edge; default 0.1 of the least width
+    skin: float | None = None  # reach of the search for contacts; default SKIN
+    corner_length: float | None = None  # of a corner on an edge; default CORNER
     max_overlap: float = 0.03  # share of the smaller block's width
 
 
@@ -64,6 +63,16 @@ class Scene:
     monitors: Monitors = Monitors()
     text: str = field(default="", init=False)  # `replace` leaves both out
     files: Files = field(default_factory=Files, init=False)
+
+    @property
+    def skin(self) -> float:
+        """Reach (m) of the search for contacts."""
+        return self.run.skin or SKIN * min(block.width for block in self.blocks)
+
+    @property
+    def corner_length(self) -> float:
+        """Contact length (m) of a corner that stands on an edge."""
+        return self.run.corner_length or CORNER * min(block.width for block in self.blocks)
 
     @property
     def doubts(self) -> list[str]:

@@ -1,104 +1,223 @@
-"""Run a scene with each ingredient removed in turn: what it changes, and what it costs."""
+"""A scene without each of its ingredients in turn: what that changes, and what it costs.
+
+An ingredient is removed from all laws of a scene at once, or from its run. Where that changes how
+stiff the joints are, the stiffness K of an asperity is scaled so that each law closes as far as
+before at the normal stress that its joints carried: what is left is the change of form.
+"""
 
 import time
-from collections.abc import Collection
-from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 import jointlaw as jl
-from jointlaw.support.files import clear_run, replace_file, write_json
+from jointlaw.parameters.resolution import named
 
 from ..dynamics.simulation import Simulation
 from ..errors import Refused
-from ..output.record import Record, write_csv
+from ..output.law_alone import friction_angle
+from ..output.record import Record
 from ..output.run import run
-from ..scene import Scene
-from .ingredients import Variant, variants, working_stress
+from ..scene import Scene, coulomb_law, is_coulomb
 
+SHALLOW = 1e-3  # step of closure, as a share, over which a stiffness is read
+LONGEST = 0.95  # of the stability limit
+CELLS = 4  # depth cells at least, where they are placed for the scene
 WARM = 20  # steps before the first run, which else would pay for compiled code
-VERSION = 1  # of summary.json
 HALVINGS = 3  # of the time step, where a variant is too stiff for that of the scene
+COST = ("steps", "time_step_s", "cpu_s", "time_ratio", "note")
+VERSION = 1  # of summary.json
 
-Outcome = dict[str, float | str | None]
-
-
-@dataclass
-class Row:
-    """One run: outcome by name, unit last in the name; time in s of this process."""
-
-    name: str
-    outcome: Outcome = field(default_factory=dict)
-    steps: int = 0
-    time_step: float = np.nan
-    cpu: float = np.nan
-    note: str = ""
+Law, Change = jl.JointLaw, Callable[[jl.JointLaw], jl.JointLaw]
 
 
-def ablate(scene: Scene, until: float | None = None, leave_out: Collection[str] = ()) -> list[Row]:
-    """The scene as it is, without each ingredient in turn, and as it is once more.
+def ablate(scene: Scene, until: float | None = None, leave_out: Collection[str] = ()) -> list[dict]:
+    """Rows: the scene as it is, without each ingredient in turn, and as it is once more.
 
-    until: model time to stop at (s); leave_out: names of variants that are not run.
-    Two rows of the whole scene, the first and the last, tell how steady the times are. A variant
-    that cannot be built or run is a row whose note says why.
+    until: model time to stop at (s); leave_out: names of variants that are not run. A row holds
+    outcomes and "change of ..." against the first row, unit last in the name, and COST. Two rows of
+    the whole scene tell how steady the times are. A variant that cannot be built or run is a row
+    whose note says why.
     """
     warm = Simulation(scene)
     for _ in range(WARM):
         warm.step()
-    base, record = _run(replace(scene, title="whole scene"), "whole scene", until)
+    whole, record = _run("whole scene", lambda: scene, until)
     if record is None:
-        raise Refused(base.note)
-    todo = [v for v in variants(scene, working_stress(record)) if v.name not in leave_out]
-    rows = [base]
-    for i, variant in enumerate(todo):
-        rows.append(_without(variant, record, until, f"{i + 1}/{len(todo)}"))
-    rows.append(_run(replace(scene, title="whole scene again"), "whole scene again", until)[0])
+        raise Refused(whole["note"])
+    rows = [whole]
+    for name, make in variants(scene, record):
+        if name not in leave_out:
+            row, other = _run(name, make, until)
+            if other is not None:
+                apart = np.hypot(*(other.motion[-1] - record.motion[-1])[:2])
+                row["end, apart_mm"] = 1e3 * float(apart.max())
+            rows.append(row)
+    rows.append(_run("whole scene again", lambda: scene, until)[0])
+    least = min(whole["cpu_s"], rows[-1]["cpu_s"])
+    for row in rows:
+        row["time_ratio"] = row["cpu_s"] / least
+        numbers = {k: v for k, v in row.items() if isinstance(v, float) and k not in COST}
+        for key in whole.keys() & numbers.keys():
+            if isinstance(whole[key], float):
+                row[f"change of {key}"] = numbers[key] - whole[key]
     return rows
 
 
-def _without(variant: Variant, record: Record, until: float | None, count: str) -> Row:
+def variants(scene: Scene, record: Record) -> Iterator[tuple[str, Callable[[], Scene]]]:
+    """Names, and what makes the scene without an ingredient; that may raise ValueError.
+
+    record: of the whole scene, for the normal stress that the joints of each law carried.
+    """
+    pressed: dict[str, list[float]] = {name: [] for name in scene.laws}
+    for i, frame in enumerate(record.joints):
+        for who, stress in zip(frame["who"].tolist(), record.joint(i, "normal_stress_Pa"), strict=True):  # fmt: skip
+            if stress > 0:
+                pressed[scene.law_of(tuple(who[:4]))].append(stress)
+    joints = {name: law for name, law in scene.laws.items() if not is_coulomb(law)}
+
+    def changed(change: Callable[[Law, list[float]], Law]) -> Scene:
+        laws = {name: change(law, pressed[name]) for name, law in joints.items()}
+        return replace(scene, laws={**scene.laws, **laws})
+
+    lacking: dict[str, Callable[[Law, list[float]], Law]] = {}
+    for law in joints.values():
+        lacking |= {name: partial(_lacking, name) for name in _ingredients(law)}
+    if joints:
+        lacking |= {"depth cells at its own stress": _own_range, "plain Coulomb": _coulomb}
+    for name, change in lacking.items():
+        yield name, partial(changed, change)
+    largest = max((max(stresses) for stresses in pressed.values() if stresses), default=0.0)
+    for name, keys in _runs(scene, largest).items():
+        yield name, partial(replace, scene, run=replace(scene.run, **keys))
+
+
+def _ingredients(law: Law) -> dict[str, tuple[bool, Change]]:
+    """By name: does the stiffness depend on it, and what makes a law that has it without it."""
+    # Population curves are not convex at eta = 0, so heights are then counted one by one.
+    single = law.heights and replace(law.heights, formation="individual")
+
+    def asperity(**keys) -> Change:
+        return lambda law: replace(law, asperity=replace(law.asperity, **keys))
+
+    def angles(**keys) -> Change:
+        return lambda law: replace(law, orientation=replace(law.orientation, **keys))
+
+    smooth = asperity(mu=0.0, mu_residual=None, wear_slip=np.inf)
+    found: dict[str, tuple[bool, Change]] = {
+        "no heights": (True, lambda law: replace(law, heights=None)),
+        "heights counted one by one": (True, lambda law: replace(law, heights=single)),
+        "linear asperities (eta = 0)": (
+            True, lambda law: replace(law, heights=single, asperity=replace(law.asperity, eta=0.0)),
+        ),
+        "no friction on asperities": (True, smooth),
+        "elastic asperities": (True, asperity(yield_interference=np.inf)),
+        "b = 0": (True, angles(b=0.0)),
+        "c = 0": (True, angles(c=0.0)),
+        "no large shear": (False, lambda law: replace(law, critical_slip=np.inf)),
+    }  # fmt: skip
+    has = {
+        "no heights": law.heights, "linear asperities (eta = 0)": law.asperity.eta,
+        "heights counted one by one": law.heights and law.heights != single,
+        "no friction on asperities": law.asperity.mu, "b = 0": law.orientation.b,
+        "elastic asperities": np.isfinite(law.asperity.yield_interference),
+        "c = 0": law.orientation.c, "no large shear": np.isfinite(law.critical_slip),
+    }  # fmt: skip
+    found = {name: change for name, change in found.items() if has[name]}
+    lengths = law.critical_slip / law.closure_range, law.asperity.yield_interference / law.closure_range
+    others = {f"resolution {name}": r for name, r in named(*lengths).items()}
+    others["one depth cell"] = replace(law.resolution, depth=1)
+    for name, resolution in others.items():
+        if resolution != law.resolution:
+            found[name] = False, partial(replace, resolution=resolution)
+    return found
+
+
+def _lacking(name: str, law: Law, pressed: list[float]) -> Law:
+    stiffens, change = _ingredients(law).get(name, (False, lambda law: law))
+    without = change(law)
+    if not stiffens:
+        return without
+    stress = np.median(_carried(pressed))
+    K = law.asperity.K * stress / float(without.normal_stress(law.closure(stress)))
+    return replace(without, asperity=replace(without.asperity, K=K))
+
+
+def _own_range(law: Law, pressed: list[float]) -> Law:
+    """Cells placed for the scene; by default they are for 20 MPa, and all but one lie idle."""
+    closure = float(law.closure(max(_carried(pressed))))
+    resolution = replace(law.resolution, depth=max(law.resolution.depth, CELLS))
+    return replace(law, closure_range=closure, resolution=resolution)
+
+
+def _coulomb(law: Law, pressed: list[float]) -> Law:
+    """Constant stiffness and friction: those of the law at the normal stress of its joints."""
+    stress = float(np.median(_carried(pressed)))
+    closure = float(law.closure(stress))
+    joints = law.joints(1)
+    joints.update([[closure, 0.0]], tangent=False)
+    _, C = joints.trial([[SHALLOW * closure, 0.0]])
+    angle = np.radians(friction_angle(law, stress))
+    return coulomb_law(float(C[0, 0, 0]), float(C[0, 1, 1]), float(np.tan(angle)))
+
+
+def _carried(pressed: list[float]) -> list[float]:
+    if not pressed:
+        raise ValueError("no joint of this law carried any load, so there is no stress to match")
+    return pressed
+
+
+def _runs(scene: Scene, stress: float) -> dict[str, dict]:
+    """Other keys of [run], by what they leave out or change."""
+    run, found = scene.run, {}
+    if run.dashpot_normal or run.dashpot_shear:
+        found["no dashpots"] = {"dashpot_normal": 0.0, "dashpot_shear": 0.0}
+    steps = 1 if run.law_steps > 1 else 4
+    found[f"law_steps = {steps}"] = {"law_steps": steps}
+    if run.seat:  # a load put down at once reaches its double
+        fall = max(run.largest_stress, 2.0 * stress)
+        found["not seated"] = {"seat": False, "largest_stress": fall}
+    for name, times in (("half the time step", 0.5), ("twice the time step", 2.0)):
+        if run.step:
+            found[name] = {"step": times * run.step}
+        elif times * run.fraction < LONGEST:
+            found[name] = {"fraction": times * run.fraction}
+    return found
+
+
+def _run(name: str, make: Callable[[], Scene], until: float | None) -> tuple[dict, Record | None]:
+    """A row, and the record of its run.
+
+    Where a run is refused for its step it is tried with half of it, unless the step is what it is
+    about.
+    """
+    row = {"without": name, "steps": 0, "time_step_s": np.nan, "cpu_s": np.nan, "note": ""}
     try:
-        scene = variant.make()
+        scene = make()
     except (ValueError, jl.PathError) as error:
-        return Row(variant.name, note=f"cannot be built: {error}")
-    scene = replace(scene, title=f"{count} {variant.name}")
-    row, other = _run(scene, variant.name, until, 0 if variant.own_step else HALVINGS)
-    if other is not None:
-        apart = np.hypot(*(other.motion[-1] - record.motion[-1])[:2])
-        row.outcome["end, apart_mm"] = 1e3 * float(apart.max())
-    return row
-
-
-def _run(
-    scene: Scene, name: str, until: float | None, halvings: int = HALVINGS
-) -> tuple[Row, Record | None]:
-    """A run, with half the time step for as often as given where it is refused for its step."""
-    step, note = scene.run.step, ""
-    for halved in range(halvings + 1):
+        return row | {"note": f"cannot be built: {error}"}, None
+    step = scene.run.step
+    for halved in range(1 if "time step" in name else HALVINGS + 1):
         started, sim = time.process_time(), None
         try:
-            sim = Simulation(replace(scene, run=replace(scene.run, step=step)))
+            sim = Simulation(replace(scene, title=name), step)
             record, summary = run(sim, None, until)
         except Refused as trouble:
-            note = f"refused: {trouble}"
-            used = step or (sim and sim.now.dt)  # none if the start itself is refused
-            if "smaller step" not in str(trouble) or not used:
-                break
-            step = 0.5 * used
-            continue
-        cpu, dt = time.process_time() - started, sim.now.dt
-        note = f"time step / {2**halved}" if halved else ""
-        return Row(name, outcome(record, summary), summary["steps"], dt, cpu, note), record
-    return Row(name, note=note), None
+            row["note"], step = f"refused: {trouble}", 0.5 * (step or (sim.dt if sim else 0.0))
+            if "smaller step" in str(trouble) and step:
+                continue
+            break
+        row |= {"steps": summary["steps"], "time_step_s": sim.dt, **_outcome(record, summary)}
+        row["cpu_s"] = time.process_time() - started
+        return row | {"note": f"time step / {2**halved}" if halved else ""}, record
+    return row, None
 
 
-def outcome(record: Record, summary: dict[str, Any]) -> Outcome:
+def _outcome(record: Record, summary: dict) -> dict:
     """What a scene monitors, and what every scene has: the unit ends the name."""
-    found: Outcome = {}
-    for slip in summary["slip"]:
-        found[f"{slip['block']}, slips at_deg"] = slip["slip_angle"]
+    found = {f"{slip['block']}, slips at_deg": slip["slip_angle"] for slip in summary["slip"]}
     for moving, _ in record.scene.monitors.shear:
         name = record.scene.blocks[moving].name
         normal, shear = (record.column(f"{name}: {key}_Pa") for key in ("normal", "shear"))
@@ -114,82 +233,3 @@ def outcome(record: Record, summary: dict[str, Any]) -> Outcome:
     found["friction_kJ"] = 1e-3 * summary["energy_J"]["friction"]
     found["energy error_1"] = summary["largest_energy_error"]
     return found
-
-
-def changes(rows: list[Row]) -> list[Outcome]:
-    """Outcome of each run less that of the first; None where there is none to compare."""
-    base = rows[0].outcome
-
-    def less(key: str, value: float | str | None) -> float | None:
-        was = base.get(key)
-        numeric = isinstance(value, float) and isinstance(was, float)
-        return value - was if numeric else None
-
-    return [{key: less(key, value) for key, value in row.outcome.items()} for row in rows]
-
-
-def time_ratios(rows: list[Row]) -> list[float]:
-    """Time of each run over the smaller of the two of the whole scene."""
-    least = min(rows[0].cpu, rows[-1].cpu)
-    return [row.cpu / least for row in rows]
-
-
-def table(rows: list[Row]) -> str:
-    """Markdown: a line for each run, a column for each outcome and one for the time."""
-    keys = list(dict.fromkeys(key for row in rows[1:] for key in row.outcome))
-    shift = "end, apart_mm"
-    keys = [k for k in keys if k != shift] + [shift] * (shift in keys)
-    head = ["without", *(_title(key) for key in keys), "steps", "time"]
-    lines, notes = [head, ["---", *["---:"] * (len(head) - 1)]], []
-    for row, change, ratio in zip(rows, changes(rows), time_ratios(rows), strict=True):
-        name = row.name
-        if row.note:
-            notes.append(f"({len(notes) + 1}) {row.note}")
-            name += f" ({len(notes)})"
-        shown = [_shown(row.outcome, change, key, row is rows[0]) for key in keys]
-        cost = [str(row.steps), f"{ratio:.2f}"] if row.outcome else ["-", "-"]
-        lines.append([name, *shown, *cost])
-    text = "\n".join("| " + " | ".join(line) + " |" for line in lines)
-    return "\n\n".join([text, *notes])
-
-
-def _title(key: str) -> str:
-    what, has_unit, unit = key.rpartition("_")
-    if not has_unit:
-        return key
-    return what if unit == "1" else f"{what} ({unit})"
-
-
-def _shown(values: Outcome, change: Outcome, key: str, whole: bool) -> str:
-    """A value, or its change against the whole scene."""
-    if key not in values:
-        return "-"
-    value, by = values[key], change.get(key)
-    if value is None or isinstance(value, str):
-        return "none" if value is None else value
-    if key.startswith("energy error"):
-        return f"{value:.1e}"
-    if whole or by is None:
-        return f"{value:.4g}"
-    return f"{by:+.3g}" if abs(by) > 1e-12 else "0"
-
-
-def write(rows: list[Row], folder: Path) -> None:
-    """ablation.csv (values, changes, times), ablation.md (the table) and summary.json."""
-    clear_run(folder)
-    keys = list(dict.fromkeys(key for row in rows for key in row.outcome))
-    columns = [column for key in keys for column in (key, f"change of {key}")]
-    cost = ["steps", "time_step_s", "cpu_s", "time_ratio", "note"]
-    lines = []
-    for row, change, ratio in zip(rows, changes(rows), time_ratios(rows), strict=True):
-        cells = [cell for key in keys for cell in (row.outcome.get(key), change.get(key))]
-        lines.append([row.name, *cells, row.steps, row.time_step, row.cpu, ratio, row.note])
-    write_csv(folder / "ablation.csv", ["without", *columns, *cost], lines)
-    replace_file(folder / "ablation.md", (table(rows) + "\n").encode())
-    summary = {
-        "version": VERSION,
-        "files": ["ablation.csv", "ablation.md"],
-        "runs": [row.__dict__ for row in rows],
-        "time_ratio": time_ratios(rows),
-    }
-    write_json(folder / "summary.json", summary)

@@ -1,4 +1,9 @@
-"""The initial equilibrium: displacements with which the joints carry gravity and loads."""
+"""The initial equilibrium: displacements with which the joints carry gravity and loads.
+
+First with joints that cannot slide; then with the law itself. Blocks that the law cannot hold are
+placed with joints that neither slide nor open, which always has an answer. Blocks that no joint
+connects, such as two slopes side by side, find their answers apart.
+"""
 
 from functools import partial
 
@@ -7,27 +12,73 @@ from scipy.sparse import bmat, csr_array, diags
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
-from ..contact import Joints, StiffnessCurve
+from ..contact import Joints, StiffnessCurve, Tracker
+from ..scene import Scene
+from .blocks import Blocks
+from .timestep import rates
 
+ATTEMPTS = 40  # most rounds of the initial equilibrium
+SETTLED = 1e-10  # movement of a round, as a share of the first, that ends them
 TIGHT = 1e-11  # residual force as a share of the applied one
 
 
-def equilibrium(joints: Joints, rows: csr_array, closure, slid, area, force, settle, near):
-    """Displacements of the free motions that balance `force`; rows as in `StepLimit.rows`.
+def seat(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> tuple[np.ndarray, bool]:
+    """Move the blocks to where their joints carry them.
 
-    closure, slid (k,): where the joints are without these displacements (m), reached in one step
-    from the virgin state. settle (free motions,): those that are asked for; near: they are almost
-    in balance.
-
-    First with joints that cannot slide; then with the law itself. Blocks that the law cannot hold
-    are placed with joints that neither slide nor open, which always has an answer. Blocks that no
-    joint connects, such as two slopes side by side, find their answers apart. Returns
-    (displacement, balanced), both (free motions,): balanced is False where the law cannot hold:
-    those blocks will move from step 0.
+    Returns the first sliding (k,) of the joints (m), and whether the law can hold all blocks: those
+    that it cannot hold will move from step 0.
     """
-    k = len(closure)
+    slid, free = np.zeros(joints.n), blocks.free.ravel()
+    still = np.ones(int(free.sum()), bool)
+    all_balanced, first = True, 0.0
+    for attempt in range(ATTEMPTS):  # each at the places just found: joints turn with the blocks
+        tracker.follow(blocks.motion)
+        before = tracker.identities
+        if tracker.renew(blocks.motion, blocks.near):
+            known = dict(zip(before, slid.tolist(), strict=True))
+            joints.assign(tracker.identities)
+            slid = np.array([known.get(who, 0.0) for who in tracker.identities])
+        force = blocks.gravity + blocks.loads
+        if attempt:
+            force = force + _length_forces(scene, blocks, tracker, joints, slid)
+        force = (force * blocks.root).ravel()[free]
+        rows = rates(blocks, tracker.contacts)
+        area = tracker.contacts.length * scene.thickness
+        start = np.concatenate([tracker.contacts.closure, slid])
+        moved, balanced = _equilibrium(joints, rows, start, area, force, still, attempt > 0)
+        if attempt == 0:
+            all_balanced, first = bool(balanced.all()), np.abs(moved).max()
+        else:  # what was found before is balanced but for the turning of the joints
+            moved = np.where(balanced & still, moved, 0.0)
+        slid = slid + (rows @ moved)[len(slid) :]
+        shift = np.zeros(blocks.free.size)
+        shift[free] = moved * blocks.root.ravel()[free]
+        blocks.motion[:3] += shift.reshape(-1, 3).T
+        still &= balanced
+        if not still.any() or np.abs(moved).max() < SETTLED * first:
+            break
+    tracker.renewed_at = blocks.motion[:3].copy()
+    return slid, all_balanced
+
+
+def _length_forces(scene, blocks, tracker, joints, slid) -> np.ndarray:
+    """Forces (n, 3) of joints whose length changes as the blocks move, after their first step."""
+    before, none = joints.snapshot(), np.zeros(joints.n)
+    joints.update(tracker.contacts.closure, slid)
+    stored = joints.stored * scene.thickness
+    joints.restore(before, tracker.identities)
+    return tracker.contacts.assemble(blocks.motion, none, none, stored) * blocks.mobile
+
+
+def _equilibrium(joints: Joints, rows: csr_array, start, area, force, settle, near):
+    """Displacements of the free motions that balance `force`; rows as `rates` gives them.
+
+    start (2 k,): closures, then slidings, without these displacements (m), reached in one step
+    from the virgin state. settle (free motions,): those that are asked for; near: they are almost
+    in balance. Returns (displacement, balanced), both (free motions,).
+    """
+    k = len(area)
     rows = diags(np.concatenate([-np.ones(k), np.ones(k)])) @ rows  # to (closure, shear)
-    start = np.concatenate([closure, slid])
     weight = np.concatenate([area, area])
 
     def bonded(d, pull=0.0):

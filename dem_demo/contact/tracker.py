@@ -1,0 +1,138 @@
+"""The contacts within reach, and the identity of each through time.
+
+A contact is a number given when its corner came within reach of an edge. It keeps its number, and
+with it its joint, while the corner slides along the edge, turns on it from one side of the block to
+the next, or trades roles with another corner at the end of an edge. New contacts are looked for
+only when something has moved far enough to matter; between such renewals the geometry is plain
+arrays.
+"""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from ..scene import Key, Scene
+from .geometry import Contacts, Outlines, contacts_at
+from .narrow_phase import ROUNDING, NarrowPhase
+
+Identity = tuple[Key, int]
+
+
+class Tracker:
+    """Follows the contacts of a scene.
+
+    contacts: at the motion followed to; keys: of each when found; numbers (k,): their names for
+    life; offset (k,): closure offset, the depth (m) that each had to give up (see
+    `Simulation._transfer`); given: numbers given so far; renewed_at (3, blocks): motion when last
+    renewed; urgent: must be renewed, whatever has moved. skin: pymunk reports pairs within 2 skins;
+    a corner counts from a gap of 1 skin and is forgotten beyond 1.5 (m).
+    """
+
+    def __init__(self, scene: Scene, motion: np.ndarray) -> None:
+        run, blocks = scene.run, scene.blocks
+        self.law_of, self.skin = scene.law_of, scene.skin
+        self.outlines = Outlines(blocks, scene.corner_length, 0.25 * self.skin)
+        self.narrow_phase = NarrowPhase(blocks, self.outlines, self.skin, run.max_overlap)
+        self._reach = np.array([block.reach for block in blocks])
+        self._fixed = np.array([block.fixed for block in blocks])
+        none = np.zeros(0, int)
+        self.contacts: Contacts = contacts_at(self.outlines, none, none, motion)
+        self.keys: list[Key] = []
+        self.numbers, self.offset = none, np.zeros(0)
+        self.given, self.renewed_at, self.urgent = 0, motion[:3].copy(), False
+
+    @property
+    def identities(self) -> list[Identity]:
+        """Key and number of every contact."""
+        return list(zip(self.keys, self.numbers.tolist(), strict=True))
+
+    @property
+    def closure(self) -> np.ndarray:
+        """Closure (k,) that the joints see: the depth less the closure offset."""
+        return self.contacts.closure - np.where(self.contacts.closure > 0, self.offset, 0.0)
+
+    def reopen(self) -> None:
+        """Drop the offset of corners that have opened: another part of them touches next."""
+        self.offset = np.where(self.contacts.closure <= 0, 0.0, self.offset)
+
+    def stale(self, motion: np.ndarray) -> bool:
+        """Has a block moved or turned so far that a corner could be missing?"""
+        x, y, turned = motion[:3] - self.renewed_at
+        moved = np.hypot(x, y) + np.abs(turned) * self._reach
+        return self.urgent or bool(moved.max() > 0.25 * self.skin)
+
+    def follow(self, motion: np.ndarray) -> np.ndarray | None:
+        """Bring the contacts to a motion (6, n), each to the corner and edge where it is by then.
+
+        Corners that have left the range of their edge go on to what is next there. Returns the
+        length (k,) of joint that each stood for before (m), or None if all stayed.
+        """
+        c = contacts_at(self.outlines, self.contacts.corner, self.contacts.edge, motion)
+        before = c.length if (c.inside < -ROUNDING).any() else None
+        for _ in range(8):
+            out = (c.inside < -ROUNDING).any(axis=0)
+            if not out.any():
+                break
+            corner, edge, trade = c.following()
+            there = np.where(out, corner, c.corner), np.where(out, edge, c.edge)
+            c = contacts_at(self.outlines, *there, motion)
+            if len(set(c.pairs)) < len(self.numbers) or not trade[out].all():
+                self.urgent = True  # there may be something new next to it
+        self.contacts = c
+        return before
+
+    def renew(
+        self, motion: np.ndarray, near: Iterable[tuple[int, int]], pressed: bool = True
+    ) -> bool:
+        """Look again at pymunk's pairs: has the list of contacts changed?
+
+        Of new contacts that are pressed already, the closure counts (`pressed`, at the start of a
+        run) or becomes their closure offset, so that they make no energy.
+        """
+        pairs = np.array(sorted(p for p in near if not self._fixed[list(p)].all()), int)
+        known: dict[tuple[int, int], int] = {}
+        for i, who in enumerate(self.contacts.pairs):
+            known.setdefault(who, i)
+        found = self.narrow_phase(motion, pairs.reshape(-1, 2), set(known))
+        keys, fresh, stay = list(map(tuple, found.interfaces.tolist())), [], []
+        for i, who in enumerate(found.pairs):
+            old = known.get(who)
+            if old is not None and (
+                found.closure[i] > 0 or self.law_of(self.keys[old]) == self.law_of(keys[i])
+            ):
+                stay.append((old, i))
+            elif found.closure[i] > -self.skin:
+                fresh.append(i)
+        stay.sort()
+        old, changed = [o for o, _ in stay], len(stay) < len(self.numbers) or bool(fresh)
+        chosen = [i for _, i in stay] + fresh
+        lost = np.maximum(found.closure[fresh], 0.0) * (not pressed)
+        new = self.given + np.arange(len(fresh))
+        self.keys = [self.keys[o] for o in old] + [keys[i] for i in fresh]
+        self.numbers = np.concatenate([self.numbers[old], new]).astype(int)
+        self.offset = np.concatenate([self.offset[old], lost])
+        self.contacts = contacts_at(self.outlines, found.corner[chosen], found.edge[chosen], motion)
+        self.given, self.renewed_at, self.urgent = self.given + len(fresh), motion[:3].copy(), False
+        return changed
+
+    def between(self, one: int, other: int) -> np.ndarray:
+        """Mask (k,) of the contacts between two blocks."""
+        return (self.contacts.a == min(one, other)) & (self.contacts.b == max(one, other))
+
+    def pack(self) -> dict[str, np.ndarray]:
+        """What `unpack` needs."""
+        return {
+            "corners": np.stack([self.contacts.corner, self.contacts.edge, self.numbers]),
+            "keys": np.array(self.keys, int).reshape(-1, 4),
+            "offset": self.offset.copy(),
+            "renewed_at": self.renewed_at.copy(),
+            "given": np.array([self.given, self.urgent]),
+        }
+
+    def unpack(self, a: dict[str, np.ndarray], motion: np.ndarray) -> None:
+        """Back to what `pack` gave, at a motion (6, n)."""
+        corner, edge, self.numbers = a["corners"]
+        self.keys, self.offset = list(map(tuple, a["keys"].tolist())), a["offset"].copy()
+        self.given, self.urgent = int(a["given"][0]), bool(a["given"][1])
+        self.renewed_at = a["renewed_at"].copy()
+        self.contacts = contacts_at(self.outlines, corner, edge, motion)

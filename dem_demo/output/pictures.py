@@ -1,0 +1,215 @@
+"""Pictures of a run: the blocks, and the state of their joints; a report; an animation."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from PIL import Image
+
+from jointlaw.support.progress import track
+
+from ..scene import turn
+from .outcome import CREEP, displacement, outcomes, sentence
+from .record import Record
+
+FIXED, DRIVEN, FREE = "#8d8d8d", "#b9b4a7", "#efe9dc"
+STATES = {"stuck": "#3a3a3a", "partly sliding": "#e69f00", "sliding": "#d81b1b", "open": "#1f9ed1"}
+DASHED = (0, (2, 1.5))
+PARTIAL, FULL = 0.05, 0.9  # shares of the shear capacity in sliding that divide the states
+FRAMES = 60  # most frames of an animation
+FEW = 12  # blocks: most that bear their names
+LEAST = 1e-9  # m: what is less is rounding, and drawn as this
+
+
+def outlines(record: Record, i: int) -> list[np.ndarray]:
+    """Corners (m, 2) of all blocks in frame i (m)."""
+    return [
+        block.local @ turn(angle).T + [x, y]
+        for block, (x, y, angle) in zip(record.scene.blocks, record.motion[i][:3].T, strict=True)
+    ]
+
+
+class Pictures:
+    """Draws a run, all frames to one scale: low, high (2,) in m; widths by `stress` (Pa).
+
+    That is the stress of the start, or of all frames where nothing touches then: those of impacts
+    would make all others hair lines.
+    """
+
+    def __init__(self, record: Record) -> None:
+        self.record = record
+        n = len(record.times)
+        corners = np.concatenate([c for i in (0, n - 1) for c in outlines(record, i)])
+        self.low, self.high = corners.min(axis=0), corners.max(axis=0)
+        self.size = float(max(self.high - self.low))
+        start = record.joint(0, "normal_stress_Pa")
+        whole = [record.joint(i, "normal_stress_Pa") for i in range(n)]
+        pressed = start[start > 0] if (start > 0).any() else np.concatenate(whole)
+        pressed = pressed[pressed > 0]
+        self.stress = float(np.quantile(pressed, 0.9)) if len(pressed) else 1.0
+
+    def states(self, i: int) -> np.ndarray:
+        """State (k,) of the joints of frame i, as one of the names in STATES.
+
+        A joint that moves along itself slower than CREEP is stuck, whatever part of its asperities
+        waits at the friction limit.
+        """
+        shares = self.record.joint(i, "slipping")
+        shares = shares / np.maximum(1 - self.record.joint(i, "separated"), 1e-12)
+        moves = np.abs(self.record.joint(i, "sliding_m/s")) > CREEP
+        names = np.where(moves & (shares > PARTIAL), "partly sliding", "stuck")
+        names = np.where(moves & (shares > FULL), "sliding", names)
+        closed = self.record.joint(i, "normal_stress_Pa") > 1e-3 * self.stress
+        return np.where(closed, names, "open")
+
+    def draw(self, axes: Axes, i: int) -> None:
+        """Blocks of frame i, dotted where they were at the start, and joints: colour by state,
+        width by normal stress."""
+        blocks, shapes = self.record.scene.blocks, outlines(self.record, i)
+        drawn = zip(blocks, outlines(self.record, 0), strict=True)
+        start = [shape for block, shape in drawn if not block.fixed]
+        style = {"facecolors": "none", "edgecolors": "0.7", "linestyles": ":", "linewidths": 0.7}
+        axes.add_collection(PolyCollection(start, **style))
+        colours = [FIXED if b.fixed else DRIVEN if len(b.held) > 1 else FREE for b in blocks]
+        style = {"facecolors": colours, "edgecolors": "0.45", "linewidths": 0.6}
+        axes.add_collection(PolyCollection(shapes, **style))
+        if len(blocks) <= FEW:
+            for block, shape in zip(blocks, shapes, strict=True):
+                axes.text(*shape.mean(axis=0), block.name, fontsize=8, ha="center", va="center")
+        ends, state = self.record.joints[i]["ends"], self.states(i)
+        stress = self.record.joint(i, "normal_stress_Pa")
+        for name, colour in STATES.items():
+            here = state == name
+            style = {"linestyles": DASHED, "linewidths": 1.3}
+            if name != "open":
+                style = {"linewidths": self._width(stress[here])}
+            axes.add_collection(LineCollection(ends[here], colors=colour, zorder=3, **style))
+        margin = 0.03 * self.size
+        axes.set(xlim=(self.low[0] - margin, self.high[0] + margin), xlabel="x (m)", aspect="equal")
+        axes.set(ylim=(self.low[1] - margin, self.high[1] + margin), ylabel="y (m)")
+
+    def frame(self, i: int, dpi: int = 130, note: str = "") -> Figure:
+        """One frame, laid out in inches so that the frames of an animation do not jump."""
+        wide, high = self.high - self.low + 0.06 * self.size
+        across = min(8.2, 6.0 * wide / high)
+        tall = across * high / wide
+        size = max(across + 1.0, 7.5), tall + 1.9
+        figure = Figure(figsize=size, dpi=dpi)
+        FigureCanvasAgg(figure)
+        left = 0.5 * (size[0] - across) + 0.2
+        place = left / size[0], 1.1 / size[1], across / size[0], tall / size[1]
+        self.draw(figure.add_axes(place), i)
+        figure.legend(handles=self.key(), loc="lower center", ncols=4, fontsize=8, frameon=False)
+        title = f"{self.record.scene.title}\n{caption(self.record, i)}{note}"
+        figure.suptitle(title, fontsize=9, y=1 - 0.08 / size[1], va="top")
+        return figure
+
+    def final(self, path: Path) -> None:
+        """The last frame, with the slip angles of a tilt test."""
+        parts = []
+        for slip in self.record.slips.report():
+            if slip["slip_angle"] is not None:
+                predicted = slip["predicted_angle"]
+                alone = f" (law alone {predicted:.2f}°)" if predicted is not None else ""
+                parts.append(f"{slip['block']} slipped at {slip['slip_angle']:.2f}°{alone}")
+        note = "\n" + "; ".join(parts) if parts else ""
+        self.frame(len(self.record.times) - 1, note=note).savefig(path)
+
+    def report(self, path: Path) -> None:
+        """Before and after; arrows that say how far each block has moved; displacement in time."""
+        last, record = len(self.record.times) - 1, self.record
+        wide, high = self.high - self.low
+        tall = float(np.clip(9.0 * high / wide, 2.0, 9.0))
+        figure = Figure(figsize=(9.6, 2 * tall + 4.6), dpi=120, layout="constrained")
+        before, after, moved = figure.subplots(3, height_ratios=[tall, tall, 2.6])
+        for axes, i in ((before, 0), (after, last)):
+            self.draw(axes, i)
+            axes.set_title(f"t = {record.times[i]:.2f} s", fontsize=10, loc="left")
+        self._arrows(before)
+        path_of = np.array([m[:2] - record.motion[0][:2] for m in record.motion])
+        length = np.hypot(path_of[:, 0], path_of[:, 1])
+        for number, (name, free) in enumerate(self._groups()):
+            largest = np.maximum(length[:, free].max(axis=1), LEAST)
+            moved.semilogy(record.times, largest, color=f"C{number}", label=name)
+        moved.set_title("1 nm and less drawn at 1 nm", fontsize=8)
+        moved.set(xlabel="time (s)", ylabel="largest displacement\nsince step 0 (m)")
+        moved.grid(alpha=0.3)
+        moved.legend(fontsize=8)
+        figure.legend(handles=self.key(), loc="outside lower center", ncols=4, fontsize=8)
+        said = "\n".join(sentence(entry) for entry in outcomes(record))
+        figure.suptitle(f"{record.scene.title}\n{said}", fontsize=10)
+        figure.savefig(path)
+
+    def animation(self, path: Path) -> None:
+        """The whole run as GIF, at a constant rate of model time."""
+        times = self.record.times
+        wanted = np.linspace(times[0], times[-1], min(len(times), FRAMES))
+        frames = np.unique(np.abs(np.subtract.outer(wanted, times)).argmin(axis=1))
+        images = []
+        for i in track(frames, "animation", len(frames)):
+            figure = self.frame(i, 75)
+            figure.canvas.draw()
+            image = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3])
+            images.append(image.quantize(256, dither=Image.Dither.NONE))
+        pause = [90] * (len(images) - 1) + [2000]
+        images[0].save(path, save_all=True, append_images=images[1:], duration=pause, loop=0)
+
+    def key(self) -> list[Line2D]:
+        """What the lines mean: states, two round stresses, the dots of the start."""
+        marks = []
+        for name, colour in STATES.items():
+            style = {"lw": 1.3, "ls": DASHED} if name == "open" else {"lw": 2.5}
+            marks.append(Line2D([], [], color=colour, label=f"joint {name}", **style))
+        power = 10.0 ** np.floor(np.log10(self.stress))
+        leading = max(digit for digit in (1, 2, 5) if digit * power <= self.stress * (1 + 1e-9))
+        for stress in (0.25 * leading * power, leading * power):
+            label, width = f"normal stress {1e-3 * stress:.3g} kPa", self._width(stress)
+            marks.append(Line2D([], [], color=STATES["stuck"], lw=width, label=label))
+        return [*marks, Line2D([], [], color="0.6", ls=":", lw=0.9, label="place at the start")]
+
+    def _width(self, stress):
+        """Line width (points) of a normal stress (Pa)."""
+        return 0.4 + 4.0 * np.clip(np.asarray(stress) / self.stress, 0, 1.2)
+
+    def _groups(self) -> list[tuple[str, list[int]]]:
+        """Names and blocks of the rocks, or of all blocks that can move."""
+        scene = self.record.scene
+        free = [i for i, block in enumerate(scene.blocks) if not block.fixed]
+        return [(rock.name, rock.free) for rock in scene.rocks] or [("blocks", free)]
+
+    def _arrows(self, axes: Axes) -> None:
+        """Displacement of the blocks since they were drawn; small ones enlarged, group by group."""
+        last = len(self.record.times) - 1
+        moved, places = displacement(self.record, last), self.record.motion[0][:2].T
+        for number, (name, free) in enumerate(self._groups()):
+            most = max(float(np.hypot(*moved[free].T).max()), LEAST)
+            true = most > 0.02 * self.size
+            arrows = moved[free] * (1.0 if true else 0.06 * self.size / most)
+            longest = f"{most:.2f} m" if most >= 0.1 else f"{1e3 * most:.2g} mm"
+            axes.quiver(
+                *places[free].T, *arrows.T, color=f"C{number}", zorder=4, angles="xy",
+                scale_units="xy", scale=1, width=0.0022,
+                label=f"{name}: displacement to the end, settling included, at most {longest}"
+                f"{'' if true else ' (enlarged)'}",
+            )  # fmt: skip
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize=8, frameon=False)
+
+
+def caption(record: Record, i: int) -> str:
+    """Time and what is monitored, for the title of a frame."""
+    parts, watched = [f"t = {record.times[i]:.2f} s"], record.scene.monitors
+    row = record.monitored[i]
+    for kind in ("slip", "shear"):
+        for moving, _ in getattr(watched, kind):
+            name = record.scene.blocks[moving].name
+            text = f"{name}: slid {1e3 * row[f'{name}: slid_m'] + 0.0:.2f} mm"
+            if kind == "slip":
+                text += f", base at {row[f'{name}: base angle_deg']:.2f}°"
+            else:
+                text += f", shear stress {1e-3 * row[f'{name}: shear_Pa']:.1f} kPa"
+            parts.append(text)
+    return "; ".join(parts)

@@ -1,4 +1,4 @@
-"""The blocks in motion. pymunk finds colliding pairs and integrates rigid bodies; all of it is here.
+"""The blocks in motion. pymunk finds colliding pairs and integrates rigid bodies, all of it here.
 
 Shapes are sensors with a skin, so pymunk reports which blocks come near each other and never
 pushes them. Forces go in from the `pre_solve` of a constraint that does nothing, which runs once

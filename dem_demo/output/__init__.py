@@ -1,9 +1,7 @@
 """Output: what a run records, writes and draws.
 
-law_alone    what the law says without blocks
-monitors     what a scene's [watch] table asks for
-record       the history of a run
-outcome      what became of each rock mass
+monitors     what a scene's [watch] table asks for, and what the law alone says of it
+record       the history of a run, and what became of each rock mass
 pictures     of blocks and joints, and animations
 curves       energies, tilt and shear curves
 vtk          frames as VTK files

@@ -6,10 +6,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..dynamics.energy import COLUMNS
-from .law_alone import shear_curve
+from .monitors import shear_curve
 from .record import Record
 
-LEAST = 0.01  # of the critical slip distance: what is less is not drawn on a logarithmic axis
 LABELS = {
     "potential": "potential (gravity)", "work": "work of drives and loads",
     "kinetic": "kinetic", "stored": "stored in joints", "friction": "friction in joints",
@@ -35,18 +34,20 @@ def energy(record: Record, path: Path) -> None:
     _finish(figure, top, record, path)
 
 
-def shear(record: Record, path: Path) -> None:
-    """Stress and dilation of the monitored joints against sliding, and of the law alone."""
+def joints(record: Record, path: Path) -> None:
+    """Stress and dilation of the watched joints against sliding; of those in shear, which keep
+    their normal stress, also by the law alone."""
     figure, (upper, lower) = _figure(7, 2)
-    for moving, base in record.scene.monitors.shear:
+    watched = record.scene.monitors
+    for moving, base in (*watched.slip, *watched.shear):
         name = record.scene.blocks[moving].name
-        slid, closure, stress, tau = (
-            record.column(f"{name}: {key}") for key in ("slid_m", "closure_m", "normal_Pa", "shear_Pa")
-        )  # fmt: skip
+        keys = ("slid_m", "closure_m", "normal_Pa", "shear_Pa")
+        slid, closure, stress, tau = (record.column(f"{name}: {key}") for key in keys)
         upper.plot(1e3 * slid, 1e-3 * tau, label=f"{name} (blocks)")
         lower.plot(1e3 * slid, 1e3 * (closure[0] - closure))
         law = record.scene.laws[record.laws[moving, base]]
-        if alone := shear_curve(law, float(stress[0]), slid):
+        alone = (moving, base) in watched.shear and shear_curve(law, float(stress[0]), slid)
+        if alone:
             style = {"color": "k", "ls": ":", "lw": 1.5}
             label = "law alone, at the normal stress of the start"
             upper.plot(1e3 * alone.shear_2, 1e-3 * alone.F2, label=label, **style)
@@ -54,28 +55,6 @@ def shear(record: Record, path: Path) -> None:
     upper.set_ylabel("shear stress (kPa)")
     lower.set(ylabel="dilation since seating (mm)", xlabel="shear displacement (mm)")
     _finish(figure, upper, record, path)
-
-
-def tilt(record: Record, path: Path) -> None:
-    """Angle of the monitored bases against sliding, and the peak of the law alone."""
-    figure, (axes,) = _figure(4.8, 1)
-    slips = record.slips.report()
-    for number, entry in enumerate(slips):
-        name, style = entry["block"], {"color": f"C{number}"}
-        slid = np.abs(record.column(f"{name}: slid_m"))
-        angle = record.column(f"{name}: base angle_deg")
-        still = np.flatnonzero(slid < LEAST * entry["slip_distance"])
-        start = int(still[-1]) if len(still) else 0  # before it the block shakes to and fro
-        axes.semilogx(1e3 * slid[start:], angle[start:], label=f"{name}, blocks", **style)
-        if entry["predicted_angle"] is not None:
-            label = f"{name}, peak of the law alone: {entry['predicted_angle']:.2f}°"
-            axes.axhline(entry["predicted_angle"], ls="--", lw=1, label=label, **style)
-        if entry["slip_angle"] is not None:
-            axes.plot(1e3 * entry["slip_distance"], entry["slip_angle"], "o", **style)
-    axes.axvline(1e3 * slips[0]["slip_distance"], color="0.5", lw=1, ls=":")
-    axes.set_xlabel("shear displacement (mm); dotted: critical slip distance")
-    axes.set_ylabel("angle of the base (degrees)")
-    _finish(figure, axes, record, path)
 
 
 def _figure(high: float, rows: int):

@@ -1,4 +1,4 @@
-"""Pictures of a run: the blocks, and the state of their joints; a report; an animation."""
+"""Pictures of a run: the blocks, and the state of their joints; one frame, or all as a GIF."""
 
 from pathlib import Path
 
@@ -13,8 +13,7 @@ from PIL import Image
 from jointlaw.support.progress import track
 
 from ..scene import turn
-from .outcome import CREEP, displacement, outcomes, sentence
-from .record import Record
+from .record import CREEP, Record, outcomes, sentence
 
 FIXED, DRIVEN, FREE = "#8d8d8d", "#b9b4a7", "#efe9dc"
 STATES = {"stuck": "#3a3a3a", "partly sliding": "#e69f00", "sliding": "#d81b1b", "open": "#1f9ed1"}
@@ -22,7 +21,6 @@ DASHED = (0, (2, 1.5))
 PARTIAL, FULL = 0.05, 0.9  # shares of the shear capacity in sliding that divide the states
 FRAMES = 60  # most frames of an animation
 FEW = 12  # blocks: most that bear their names
-LEAST = 1e-9  # m: what is less is rounding, and drawn as this
 
 
 def outlines(record: Record, i: int) -> list[np.ndarray]:
@@ -92,12 +90,12 @@ class Pictures:
         axes.set(xlim=(self.low[0] - margin, self.high[0] + margin), xlabel="x (m)", aspect="equal")
         axes.set(ylim=(self.low[1] - margin, self.high[1] + margin), ylabel="y (m)")
 
-    def frame(self, i: int, dpi: int = 130, note: str = "") -> Figure:
+    def frame(self, i: int, dpi: int, note: str = "") -> Figure:
         """One frame, laid out in inches so that the frames of an animation do not jump."""
         wide, high = self.high - self.low + 0.06 * self.size
         across = min(8.2, 6.0 * wide / high)
         tall = across * high / wide
-        size = max(across + 1.0, 7.5), tall + 1.9
+        size = max(across + 1.0, 7.5), tall + 1.65 + 0.17 * note.count("\n")
         figure = Figure(figsize=size, dpi=dpi)
         FigureCanvasAgg(figure)
         left = 0.5 * (size[0] - across) + 0.2
@@ -109,40 +107,15 @@ class Pictures:
         return figure
 
     def final(self, path: Path) -> None:
-        """The last frame, with the slip angles of a tilt test."""
-        parts = []
+        """The last frame, with slip angles and what became of each rock."""
+        parts = [sentence(entry) for entry in outcomes(self.record)]
         for slip in self.record.slips.report():
             if slip["slip_angle"] is not None:
-                predicted = slip["predicted_angle"]
-                alone = f" (law alone {predicted:.2f}°)" if predicted is not None else ""
-                parts.append(f"{slip['block']} slipped at {slip['slip_angle']:.2f}°{alone}")
-        note = "\n" + "; ".join(parts) if parts else ""
-        self.frame(len(self.record.times) - 1, note=note).savefig(path)
-
-    def report(self, path: Path) -> None:
-        """Before and after; arrows that say how far each block has moved; displacement in time."""
-        last, record = len(self.record.times) - 1, self.record
-        wide, high = self.high - self.low
-        tall = float(np.clip(9.0 * high / wide, 2.0, 9.0))
-        figure = Figure(figsize=(9.6, 2 * tall + 4.6), dpi=120, layout="constrained")
-        before, after, moved = figure.subplots(3, height_ratios=[tall, tall, 2.6])
-        for axes, i in ((before, 0), (after, last)):
-            self.draw(axes, i)
-            axes.set_title(f"t = {record.times[i]:.2f} s", fontsize=10, loc="left")
-        self._arrows(before)
-        path_of = np.array([m[:2] - record.motion[0][:2] for m in record.motion])
-        length = np.hypot(path_of[:, 0], path_of[:, 1])
-        for number, (name, free) in enumerate(self._groups()):
-            largest = np.maximum(length[:, free].max(axis=1), LEAST)
-            moved.semilogy(record.times, largest, color=f"C{number}", label=name)
-        moved.set_title("1 nm and less drawn at 1 nm", fontsize=8)
-        moved.set(xlabel="time (s)", ylabel="largest displacement\nsince step 0 (m)")
-        moved.grid(alpha=0.3)
-        moved.legend(fontsize=8)
-        figure.legend(handles=self.key(), loc="outside lower center", ncols=4, fontsize=8)
-        said = "\n".join(sentence(entry) for entry in outcomes(record))
-        figure.suptitle(f"{record.scene.title}\n{said}", fontsize=10)
-        figure.savefig(path)
+                parts.append(f"{slip['block']} slipped at {slip['slip_angle']:.2f}°")
+                if slip["predicted_angle"] is not None:
+                    parts[-1] += f", the law alone says {slip['predicted_angle']:.2f}°"
+        note = "".join(f"\n{part}" for part in parts)
+        self.frame(len(self.record.times) - 1, 130, note).savefig(path)
 
     def animation(self, path: Path) -> None:
         """The whole run as GIF, at a constant rate of model time."""
@@ -174,29 +147,6 @@ class Pictures:
     def _width(self, stress):
         """Line width (points) of a normal stress (Pa)."""
         return 0.4 + 4.0 * np.clip(np.asarray(stress) / self.stress, 0, 1.2)
-
-    def _groups(self) -> list[tuple[str, list[int]]]:
-        """Names and blocks of the rocks, or of all blocks that can move."""
-        scene = self.record.scene
-        free = [i for i, block in enumerate(scene.blocks) if not block.fixed]
-        return [(rock.name, rock.free) for rock in scene.rocks] or [("blocks", free)]
-
-    def _arrows(self, axes: Axes) -> None:
-        """Displacement of the blocks since they were drawn; small ones enlarged, group by group."""
-        last = len(self.record.times) - 1
-        moved, places = displacement(self.record, last), self.record.motion[0][:2].T
-        for number, (name, free) in enumerate(self._groups()):
-            most = max(float(np.hypot(*moved[free].T).max()), LEAST)
-            true = most > 0.02 * self.size
-            arrows = moved[free] * (1.0 if true else 0.06 * self.size / most)
-            longest = f"{most:.2f} m" if most >= 0.1 else f"{1e3 * most:.2g} mm"
-            axes.quiver(
-                *places[free].T, *arrows.T, color=f"C{number}", zorder=4, angles="xy",
-                scale_units="xy", scale=1, width=0.0022,
-                label=f"{name}: displacement to the end, settling included, at most {longest}"
-                f"{'' if true else ' (enlarged)'}",
-            )  # fmt: skip
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize=8, frameon=False)
 
 
 def caption(record: Record, i: int) -> str:

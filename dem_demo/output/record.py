@@ -1,4 +1,4 @@
-"""The history of a run, in memory and as files."""
+"""The history of a run, in memory and as files; and what became of each rock mass."""
 
 import csv
 from pathlib import Path
@@ -7,13 +7,16 @@ import numpy as np
 
 from ..dynamics.energy import COLUMNS
 from ..dynamics.simulation import Simulation
+from ..scene import usual_size
 from .monitors import SlipMonitor, law_between, readings
 
 JOINT_COLUMNS = (
     "closure_m", "shear_m", "normal_stress_Pa", "shear_stress_Pa",
     "sliding", "slipping", "separated", "length_m", "sliding_m/s",
 )  # fmt: skip
-VERSION = 1  # of history.npz
+FAILED = 0.1  # of the usual size of a rock's blocks: one that has moved farther has failed
+CREEP = 1e-6  # m/s: faster is not at rest
+LOOK_BACK = 1.0  # s over which creep is measured
 
 
 class Record:
@@ -21,13 +24,14 @@ class Record:
 
     joints[f]: "who" (k, 5) block, edge, block, edge, contact; "ends" (k, 2, 2) the segment of joint
     that a contact carries; "values" (k, 9) as JOINT_COLUMNS. monitored[f]: what the scene's
-    [watch] asks for; slips: its slip angles; laws: of the sheared joints; state: that of the last
+    [watch] asks for; slips: its slip angles; laws: of the watched joints; state: that of the last
     frame, to return to.
     """
 
     def __init__(self, sim: Simulation) -> None:
         self.scene, self.slips = sim.scene, SlipMonitor(sim)
-        self.laws = {pair: law_between(sim, *pair) for pair in sim.scene.monitors.shear}
+        watched = (*sim.scene.monitors.slip, *sim.scene.monitors.shear)
+        self.laws = {pair: law_between(sim, *pair) for pair in watched}
         self.times: list[float] = []
         self.motion: list[np.ndarray] = []
         self.energy: list[list[float]] = []
@@ -64,7 +68,7 @@ class Record:
         return self.joints[i]["values"][:, JOINT_COLUMNS.index(name)]
 
     def write(self, folder: Path) -> None:
-        """history.csv, blocks.csv, joints.csv and history.npz."""
+        """history.csv, blocks.csv and joints.csv."""
         names = [block.name for block in self.scene.blocks]
         header = ["time_s", *(f"{c}_J" for c in COLUMNS), "energy_error", *self.monitored[0]]
         rows = zip(self.times, self.energy, self.monitored, strict=True)
@@ -81,19 +85,6 @@ class Record:
             for (a, edge_a, b, *rest), numbers in zip(who, values, strict=True):
                 rows.append([t, names[a], edge_a, names[b], *rest, *numbers])
         write_csv(folder / "joints.csv", header, rows)
-        counts, keys = [len(frame["who"]) for frame in self.joints], ("who", "ends", "values")
-        np.savez_compressed(
-            folder / "history.npz",
-            version=VERSION,
-            time=self.times,
-            motion=np.array(self.motion),
-            energy=np.array(self.energy),
-            energy_columns=[*COLUMNS, "error"],
-            block_names=names,
-            joint_frame=np.repeat(np.arange(len(counts)), counts),
-            joint_columns=JOINT_COLUMNS,
-            **{f"joint_{key}": np.concatenate([f[key] for f in self.joints]) for key in keys},
-        )
 
 
 def _joints(sim: Simulation) -> dict[str, np.ndarray]:
@@ -120,3 +111,63 @@ def write_csv(path: Path, header, rows) -> None:
         writer = csv.writer(stream)
         writer.writerow(header)
         writer.writerows(rows)
+
+
+def displacement(record: Record, i: int) -> np.ndarray:
+    """Displacement (n, 2) of the blocks in frame i since they were drawn, without weight (m)."""
+    drawn = np.array([block.centroid for block in record.scene.blocks])
+    return record.motion[i][:2].T - drawn
+
+
+def outcomes(record: Record) -> list[dict]:
+    """One entry for each `[[rock]]` of the scene.
+
+    settled_m: largest displacement from the drawing to step 0; moved_m: largest since
+    then; failed: blocks that moved more than failed_beyond_m; creep_m_per_s: largest mean speed
+    over the last second (or the whole run, if shorter).
+    """
+    out = []
+    first, last = displacement(record, 0), displacement(record, -1)
+    times = np.array(record.times)
+    before = int(np.searchsorted(times, times[-1] - LOOK_BACK + 1e-9)) if len(times) > 1 else 0
+    before = min(before, max(len(times) - 2, 0))
+    crept = np.hypot(*(last - displacement(record, before)).T)
+    crept /= max(times[-1] - times[before], 1e-300)
+    for rock in record.scene.rocks:
+        free = rock.free
+        moved, creep = np.hypot(*(last - first)[free].T), float(crept[free].max())
+        limit = FAILED * usual_size(record.scene.blocks[i] for i in free)
+        failed = int((moved > limit).sum())
+        out.append(
+            {
+                "rock": rock.name,
+                "state": "fails" if failed else "stands" if creep < CREEP else "moves",
+                "blocks": len(free),
+                "settled_m": float(np.hypot(*first[free].T).max()),
+                "moved_m": float(moved.max()),
+                "failed": failed,
+                "failed_beyond_m": limit,
+                "creep_m_per_s": creep,
+            }
+        )
+    return out
+
+
+def far(record: Record) -> bool:
+    """Has a block moved by more than the usual size of a block?"""
+    size = usual_size(block for block in record.scene.blocks if not block.fixed)
+    return bool(record.moved.max() > size)
+
+
+def sentence(entry: dict) -> str:
+    """One line for a person."""
+    start = f"{entry['rock']}: {entry['state']}; "
+    if entry["failed"]:
+        many = f"{entry['failed']} of {entry['blocks']} blocks moved more than "
+        many += f"{entry['failed_beyond_m']:.2g} m"
+        return f"{start}{many}, the farthest {entry['moved_m']:.2f} m"
+    moved = max(1e3 * entry["moved_m"], 1e-3)
+    return (
+        f"{start}no block of {entry['blocks']} moved more than {moved:.2g} mm, "
+        f"creep {entry['creep_m_per_s']:.1e} m/s"
+    )

@@ -20,14 +20,13 @@ from ..dynamics.saved_states import require_text
 from ..dynamics.simulation import Simulation
 from ..errors import Refused
 from . import curves
-from .outcome import outcomes, slip_per_cycle
 from .pictures import Pictures
-from .record import Record
+from .record import Record, outcomes
 
 MOST_STEPS = 1e12  # of a run: years
 LOOKS = 8  # steps between two looks for slip
 VERSION = 1  # of summary.json
-TABLES = ("history.csv", "blocks.csv", "joints.csv", "history.npz")
+TABLES = ("history.csv", "blocks.csv", "joints.csv")
 
 
 def run(
@@ -77,7 +76,6 @@ def run(
         "energy_error": sim.ledger.error,
         "largest_energy_error": record.largest_error,
         "slip": record.slips.report(),
-        "slip_per_cycle_m": slip_per_cycle(record),
         "rocks": outcomes(record),
         "wall_time_s": time.perf_counter() - started,
         "interrupted": interrupted,
@@ -162,10 +160,7 @@ def write(record: Record, summary: dict, folder: Path, drawn: str | None, vtk: b
     if drawn:
         of, watched = Pictures(record), record.scene.monitors
         if watched.shear or watched.slip:
-            curve = curves.shear if watched.shear else curves.tilt
-            pictures[f"curves.{drawn}"] = partial(curve, record)
-        if record.scene.rocks:
-            pictures[f"report.{drawn}"] = of.report
+            pictures[f"curves.{drawn}"] = partial(curves.joints, record)
         pictures[f"energy.{drawn}"] = partial(curves.energy, record)
         pictures |= {f"final.{drawn}": of.final, "motion.gif": of.animation}
     write_json(folder / "summary.json", {**summary, "files": [*TABLES, *pictures]})

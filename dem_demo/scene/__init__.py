@@ -1,6 +1,6 @@
 """Scenes: blocks, laws, drives and joint sets, read from TOML and checked.
 
-tables     a TOML table that names what is wrong with it
+keys       the keys of all tables, and what each may be
 blocks     convex blocks
 laws       joint laws and plain Coulomb
 drives     prescribed motions
@@ -12,8 +12,8 @@ read       a scene from its file
 
 from .blocks import Block, turn, usual_size
 from .drives import Drive, Drives
-from .files import Files
-from .laws import build_law, coulomb_law, is_coulomb, law_table
+from .keys import Tables
+from .laws import Files, build_law, coulomb_law, is_coulomb, law_table
 from .read import DENSITY, GRAVITY, TEMPLATE, build, load, names, parse, read_tables
 from .scene import Key, Run, Scene
 
@@ -28,6 +28,7 @@ __all__ = [
     "Key",
     "Run",
     "Scene",
+    "Tables",
     "build",
     "build_law",
     "coulomb_law",

@@ -101,8 +101,6 @@ def turn(angle: float) -> np.ndarray:
 
 def check_convex(corners: np.ndarray) -> str | None:
     """What is wrong with corners (m, 2), three or more; None if nothing is."""
-    if not np.isfinite(corners).all():
-        return "must be finite numbers"
     edge = np.roll(corners, -1, axis=0) - corners
     length = np.hypot(*edge.T)
     if length.min() < 1e-6 * length.max():

@@ -6,7 +6,7 @@ import jointlaw as jl
 
 from .blocks import Block
 from .drives import Drive
-from .files import Files
+from .laws import Files
 from .rocks import Rock
 
 SKIN, CORNER = 0.02, 0.1  # of the least width of a block

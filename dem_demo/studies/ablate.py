@@ -9,28 +9,45 @@ import time
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 import jointlaw as jl
 from jointlaw.parameters.resolution import named
+from jointlaw.support.files import clear_run, write_json
 
 from ..dynamics.simulation import Simulation
 from ..errors import Refused
-from ..output.law_alone import friction_angle
-from ..output.record import Record
+from ..output.monitors import friction_angle
+from ..output.record import Record, write_csv
 from ..output.run import run
 from ..scene import Scene, coulomb_law, is_coulomb
 
 SHALLOW = 1e-3  # step of closure, as a share, over which a stiffness is read
 LONGEST = 0.95  # of the stability limit
 CELLS = 4  # depth cells at least, where they are placed for the scene
-WARM = 20  # steps before the first run, which else would pay for compiled code
-HALVINGS = 3  # of the time step, where a variant is too stiff for that of the scene
 COST = ("steps", "time_step_s", "cpu_s", "time_ratio", "note")
-VERSION = 1  # of summary.json
+VERSION = 2  # of summary.json
 
-Law, Change = jl.JointLaw, Callable[[jl.JointLaw], jl.JointLaw]
+SINGLE = {"formation": "individual"}  # population curves are not convex at eta = 0
+STIFFENS = {"orientation", "asperity", "heights"}  # parts that the stiffness depends on
+INGREDIENTS: dict[str, dict[str, Any]] = {  # by name: the keys of a law without it
+    "no heights": {"heights": None},
+    "heights counted one by one": {"heights": SINGLE},
+    "linear asperities (eta = 0)": {"asperity": {"eta": 0.0}, "heights": SINGLE},
+    "no friction on asperities": {
+        "asperity": {"mu": 0.0, "mu_residual": None, "wear_slip": np.inf},
+    },
+    "elastic asperities": {"asperity": {"yield_interference": np.inf}},
+    "b = 0": {"orientation": {"b": 0.0}},
+    "c = 0": {"orientation": {"c": 0.0}},
+    "no large shear": {"critical_slip": np.inf},
+    "one depth cell": {"resolution": {"depth": 1}},
+}
+
+Change = Callable[[jl.JointLaw, list[float]], jl.JointLaw]
 
 
 def ablate(scene: Scene, until: float | None = None, leave_out: Collection[str] = ()) -> list[dict]:
@@ -38,12 +55,9 @@ def ablate(scene: Scene, until: float | None = None, leave_out: Collection[str] 
 
     until: model time to stop at (s); leave_out: names of variants that are not run. A row holds
     outcomes and "change of ..." against the first row, unit last in the name, and COST. Two rows of
-    the whole scene tell how steady the times are. A variant that cannot be built or run is a row
-    whose note says why.
+    the whole scene tell how steady the times are; the first also waits for compiled code. A variant
+    that cannot be built or run is a row whose note says why.
     """
-    warm = Simulation(scene)
-    for _ in range(WARM):
-        warm.step()
     whole, record = _run("whole scene", lambda: scene, until)
     if record is None:
         raise Refused(whole["note"])
@@ -57,12 +71,12 @@ def ablate(scene: Scene, until: float | None = None, leave_out: Collection[str] 
             rows.append(row)
     rows.append(_run("whole scene again", lambda: scene, until)[0])
     least = min(whole["cpu_s"], rows[-1]["cpu_s"])
+    numbers = {key: v for key, v in whole.items() if isinstance(v, float) and key not in COST}
     for row in rows:
         row["time_ratio"] = row["cpu_s"] / least
-        numbers = {k: v for k, v in row.items() if isinstance(v, float) and k not in COST}
-        for key in whole.keys() & numbers.keys():
-            if isinstance(whole[key], float):
-                row[f"change of {key}"] = numbers[key] - whole[key]
+        for key in numbers.keys() & row.keys():
+            if row[key] is not None:
+                row[f"change of {key}"] = row[key] - whole[key]
     return rows
 
 
@@ -73,86 +87,82 @@ def variants(scene: Scene, record: Record) -> Iterator[tuple[str, Callable[[], S
     """
     pressed: dict[str, list[float]] = {name: [] for name in scene.laws}
     for i, frame in enumerate(record.joints):
-        for who, stress in zip(frame["who"].tolist(), record.joint(i, "normal_stress_Pa"), strict=True):  # fmt: skip
-            if stress > 0:
-                pressed[scene.law_of(tuple(who[:4]))].append(stress)
+        stresses = record.joint(i, "normal_stress_Pa").tolist()
+        for who, stress in zip(frame["who"].tolist(), stresses, strict=True):
+            pressed[scene.law_of(tuple(who[:4]))] += [stress] * (stress > 0)
     joints = {name: law for name, law in scene.laws.items() if not is_coulomb(law)}
 
-    def changed(change: Callable[[Law, list[float]], Law]) -> Scene:
+    def changed(change: Change) -> Scene:
         laws = {name: change(law, pressed[name]) for name, law in joints.items()}
         return replace(scene, laws={**scene.laws, **laws})
 
-    lacking: dict[str, Callable[[Law, list[float]], Law]] = {}
+    lacking: dict[str, Change] = {}
     for law in joints.values():
-        lacking |= {name: partial(_lacking, name) for name in _ingredients(law)}
+        lengths = np.array([law.critical_slip, law.asperity.yield_interference])
+        others = named(*(lengths / law.closure_range).tolist())
+        given = INGREDIENTS | {f"resolution {n}": {"resolution": r} for n, r in others.items()}
+        lacking |= {n: partial(_without, keys) for n, keys in given.items() if _has(law, keys)}
     if joints:
         lacking |= {"depth cells at its own stress": _own_range, "plain Coulomb": _coulomb}
     for name, change in lacking.items():
         yield name, partial(changed, change)
     largest = max((max(stresses) for stresses in pressed.values() if stresses), default=0.0)
     for name, keys in _runs(scene, largest).items():
-        yield name, partial(replace, scene, run=replace(scene.run, **keys))
+        if (other := replace(scene.run, **keys)) != scene.run:
+            yield name, partial(replace, scene, run=other)
 
 
-def _ingredients(law: Law) -> dict[str, tuple[bool, Change]]:
-    """By name: does the stiffness depend on it, and what makes a law that has it without it."""
-    # Population curves are not convex at eta = 0, so heights are then counted one by one.
-    single = law.heights and replace(law.heights, formation="individual")
-
-    def asperity(**keys) -> Change:
-        return lambda law: replace(law, asperity=replace(law.asperity, **keys))
-
-    def angles(**keys) -> Change:
-        return lambda law: replace(law, orientation=replace(law.orientation, **keys))
-
-    smooth = asperity(mu=0.0, mu_residual=None, wear_slip=np.inf)
-    found: dict[str, tuple[bool, Change]] = {
-        "no heights": (True, lambda law: replace(law, heights=None)),
-        "heights counted one by one": (True, lambda law: replace(law, heights=single)),
-        "linear asperities (eta = 0)": (
-            True, lambda law: replace(law, heights=single, asperity=replace(law.asperity, eta=0.0)),
-        ),
-        "no friction on asperities": (True, smooth),
-        "elastic asperities": (True, asperity(yield_interference=np.inf)),
-        "b = 0": (True, angles(b=0.0)),
-        "c = 0": (True, angles(c=0.0)),
-        "no large shear": (False, lambda law: replace(law, critical_slip=np.inf)),
-    }  # fmt: skip
-    has = {
-        "no heights": law.heights, "linear asperities (eta = 0)": law.asperity.eta,
-        "heights counted one by one": law.heights and law.heights != single,
-        "no friction on asperities": law.asperity.mu, "b = 0": law.orientation.b,
-        "elastic asperities": np.isfinite(law.asperity.yield_interference),
-        "c = 0": law.orientation.c, "no large shear": np.isfinite(law.critical_slip),
-    }  # fmt: skip
-    found = {name: change for name, change in found.items() if has[name]}
-    lengths = law.critical_slip / law.closure_range, law.asperity.yield_interference / law.closure_range
-    others = {f"resolution {name}": r for name, r in named(*lengths).items()}
-    others["one depth cell"] = replace(law.resolution, depth=1)
-    for name, resolution in others.items():
-        if resolution != law.resolution:
-            found[name] = False, partial(replace, resolution=resolution)
+def _runs(scene: Scene, stress: float) -> dict[str, dict[str, Any]]:
+    run = scene.run
+    fall = max(run.largest_stress, 2.0 * stress)  # a load put down at once reaches its double
+    steps = 1 if run.law_steps > 1 else 4
+    found: dict[str, dict[str, Any]] = {
+        "no dashpots": {"dashpot_normal": 0.0, "dashpot_shear": 0.0},
+        f"law_steps = {steps}": {"law_steps": steps},
+        "not seated": {"seat": False, "largest_stress": fall if run.seat else run.largest_stress},
+    }
+    for name, times in (("half the time step", 0.5), ("twice the time step", 2.0)):
+        if run.step:
+            found[name] = {"step": times * run.step}
+        elif times * run.fraction < LONGEST:
+            found[name] = {"fraction": times * run.fraction}
     return found
 
 
-def _lacking(name: str, law: Law, pressed: list[float]) -> Law:
-    stiffens, change = _ingredients(law).get(name, (False, lambda law: law))
-    without = change(law)
-    if not stiffens:
-        return without
+def _has(part: Any, keys: dict[str, Any]) -> bool:
+    """Has a law, or a part of it, what these keys take away?"""
+    for key, value in keys.items():
+        own = getattr(part, key)
+        if own is not None and (_has(own, value) if isinstance(value, dict) else own != value):
+            return True
+    return False
+
+
+def _changed(part: Any, keys: dict[str, Any]) -> Any:
+    """A law, or a part of it, with these keys."""
+    nested = {key: getattr(part, key) for key, value in keys.items() if isinstance(value, dict)}
+    return replace(part, **keys | {k: own and _changed(own, keys[k]) for k, own in nested.items()})
+
+
+def _without(keys: dict[str, Any], law: jl.JointLaw, pressed: list[float]) -> jl.JointLaw:
+    if not _has(law, keys):
+        return law
+    other = _changed(law, keys)
+    if not STIFFENS & set(keys):
+        return other
     stress = np.median(_carried(pressed))
-    K = law.asperity.K * stress / float(without.normal_stress(law.closure(stress)))
-    return replace(without, asperity=replace(without.asperity, K=K))
+    K = law.asperity.K * stress / float(other.normal_stress(law.closure(stress)))
+    return _changed(other, {"asperity": {"K": K}})
 
 
-def _own_range(law: Law, pressed: list[float]) -> Law:
+def _own_range(law: jl.JointLaw, pressed: list[float]) -> jl.JointLaw:
     """Cells placed for the scene; by default they are for 20 MPa, and all but one lie idle."""
     closure = float(law.closure(max(_carried(pressed))))
     resolution = replace(law.resolution, depth=max(law.resolution.depth, CELLS))
     return replace(law, closure_range=closure, resolution=resolution)
 
 
-def _coulomb(law: Law, pressed: list[float]) -> Law:
+def _coulomb(law: jl.JointLaw, pressed: list[float]) -> jl.JointLaw:
     """Constant stiffness and friction: those of the law at the normal stress of its joints."""
     stress = float(np.median(_carried(pressed)))
     closure = float(law.closure(stress))
@@ -169,53 +179,22 @@ def _carried(pressed: list[float]) -> list[float]:
     return pressed
 
 
-def _runs(scene: Scene, stress: float) -> dict[str, dict]:
-    """Other keys of [run], by what they leave out or change."""
-    run, found = scene.run, {}
-    if run.dashpot_normal or run.dashpot_shear:
-        found["no dashpots"] = {"dashpot_normal": 0.0, "dashpot_shear": 0.0}
-    steps = 1 if run.law_steps > 1 else 4
-    found[f"law_steps = {steps}"] = {"law_steps": steps}
-    if run.seat:  # a load put down at once reaches its double
-        fall = max(run.largest_stress, 2.0 * stress)
-        found["not seated"] = {"seat": False, "largest_stress": fall}
-    for name, times in (("half the time step", 0.5), ("twice the time step", 2.0)):
-        if run.step:
-            found[name] = {"step": times * run.step}
-        elif times * run.fraction < LONGEST:
-            found[name] = {"fraction": times * run.fraction}
-    return found
-
-
 def _run(name: str, make: Callable[[], Scene], until: float | None) -> tuple[dict, Record | None]:
-    """A row, and the record of its run.
-
-    Where a run is refused for its step it is tried with half of it, unless the step is what it is
-    about.
-    """
+    """A row, and the record of its run if there was one."""
     row = {"without": name, "steps": 0, "time_step_s": np.nan, "cpu_s": np.nan, "note": ""}
+    started = time.process_time()
     try:
-        scene = make()
+        sim = Simulation(replace(make(), title=name))
+        record, summary = run(sim, None, until)
+    except Refused as trouble:
+        return row | {"note": f"refused: {trouble}"}, None
     except (ValueError, jl.PathError) as error:
         return row | {"note": f"cannot be built: {error}"}, None
-    step = scene.run.step
-    for halved in range(1 if "time step" in name else HALVINGS + 1):
-        started, sim = time.process_time(), None
-        try:
-            sim = Simulation(replace(scene, title=name), step)
-            record, summary = run(sim, None, until)
-        except Refused as trouble:
-            row["note"], step = f"refused: {trouble}", 0.5 * (step or (sim.dt if sim else 0.0))
-            if "smaller step" in str(trouble) and step:
-                continue
-            break
-        row |= {"steps": summary["steps"], "time_step_s": sim.dt, **_outcome(record, summary)}
-        row["cpu_s"] = time.process_time() - started
-        return row | {"note": f"time step / {2**halved}" if halved else ""}, record
-    return row, None
+    row |= {"steps": summary["steps"], "time_step_s": sim.dt}
+    return row | {"cpu_s": time.process_time() - started, **_outcome(record, summary)}, record
 
 
-def _outcome(record: Record, summary: dict) -> dict:
+def _outcome(record: Record, summary: dict) -> dict[str, Any]:
     """What a scene monitors, and what every scene has: the unit ends the name."""
     found = {f"{slip['block']}, slips at_deg": slip["slip_angle"] for slip in summary["slip"]}
     for moving, _ in record.scene.monitors.shear:
@@ -227,9 +206,24 @@ def _outcome(record: Record, summary: dict) -> dict:
         found[f"{name}, last shear_kPa"] = 1e-3 * float(shear[-1])
         found[f"{name}, dilation_mm"] = 1e3 * float(closure[0] - closure.min())
     for rock in summary["rocks"]:
-        found[f"{rock['rock']}, state"] = rock["state"]
-        found[f"{rock['rock']}, moved_m"] = rock["moved_m"]
+        found |= {f"{rock['rock']}, {key}": rock[key] for key in ("state", "moved_m")}
     found["largest displacement_m"] = float(record.moved.max())
     found["friction_kJ"] = 1e-3 * summary["energy_J"]["friction"]
     found["energy error_1"] = summary["largest_energy_error"]
     return found
+
+
+def write(rows: list[dict], folder: Path) -> str:
+    """ablation.csv and summary.json of some rows; returns what each changed, a line a row."""
+    clear_run(folder)
+    header = [key for key in dict.fromkeys(key for row in rows for key in row) if key not in COST]
+    columns = [*header, *COST]
+    write_csv(folder / "ablation.csv", columns, ([row.get(c) for c in columns] for row in rows))
+    about = {"version": VERSION, "files": ["ablation.csv"], "runs": rows}
+    write_json(folder / "summary.json", about)
+    lines = []
+    for row in rows:
+        changes = [f"{k} {v:+.3g}" for k, v in row.items() if k.startswith("change of ")]
+        told = row["note"] or f"time x {row['time_ratio']:.2f}, {', '.join(changes)}"
+        lines.append(f"{row['without']}: {told}")
+    return "\n".join(lines)

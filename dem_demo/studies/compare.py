@@ -12,12 +12,10 @@ import numpy as np
 
 from ..dynamics.simulation import Simulation
 from ..errors import Refused
-from ..output.outcome import far, outcomes
-from ..output.record import Record
+from ..output.record import Record, far, outcomes
 from ..output.run import play
-from ..scene import DENSITY, GRAVITY, Files, Scene, build, build_law, read_tables
-from .alone import Tables, alone
-from .strength import critical_tilt
+from ..scene import DENSITY, GRAVITY, Files, Scene, Tables, build, build_law, read_tables
+from .strength import alone, critical_tilt
 
 
 def compare(scene: Scene, seeds: Sequence[int], until: float | None) -> Iterator[dict]:

@@ -15,12 +15,10 @@ from jointlaw.parameters.rock import RANGES
 from jointlaw.support.pyplot import FORMATS
 
 from ..dynamics.simulation import Simulation
-from ..output.outcome import far
 from ..output.pictures import Pictures
-from ..output.record import Record
+from ..output.record import Record, far
 from ..output.run import play
-from ..scene import GRAVITY, Files, Scene, build, law_table, read_tables, turn
-from .alone import Tables, alone
+from ..scene import GRAVITY, Files, Scene, Tables, build, law_table, read_tables, turn
 
 EXACT = 0.01  # share of the tilt and of the factor to which they are found
 STEP, STEEPEST, LEAST = 8.0, 60.0, 0.01  # degrees: first step, largest, closest told apart
@@ -50,7 +48,7 @@ def strength_reduction(
             sim = Simulation(build({**reduced(one, factor, files), "title": title}, files=files))
             record = Record(sim)
             play(sim, record, until, far)
-            Pictures(record).report(folder / row["picture"])
+            Pictures(record).final(folder / row["picture"])
         yield row
 
 
@@ -92,7 +90,7 @@ def reduced(data: Tables, factor: float, files: Files) -> Tables:
 
     laws = {}
     for name, table in data["laws"].items():
-        law = law_table(table, f"laws.{name}", files)
+        law = law_table(table, files)
         laws[name] = divided(law) | {k: divided(law[k]) for k in ("asperity",) if k in law}
     return {**data, "laws": laws}
 
@@ -120,3 +118,28 @@ def _bisect(
             middle = 0.5 * (low + high)
             low, high = (middle, high) if holds(middle) == (sense > 0) else (low, middle)
     return 0.5 * (low + high)
+
+
+def alone(data: Tables, name: str, seed: int | None = None) -> Tables:
+    """A scene's tables with one of its rocks, cut with a seed (default its own), nothing watched.
+
+    Of the [[joint]] tables those of this rock stay; those that name its blocks only with its own
+    seed, for with another there are other blocks.
+    """
+    known: dict[str, Tables] = {}
+    for table in data["rock"]:
+        known[table["name"]] = {**known.get(table.get("like", ""), {}), **table, "like": ""}
+    rock = known[name]
+    same = seed is None or seed == rock.get("seed", 0)
+    blocks = {block["name"] for block in data.get("block", [])}
+    low, high = np.quantile(np.add(rock["outline"], rock.get("at", [0, 0])), [0, 1], axis=0)
+
+    def belongs(joint: Tables) -> bool:
+        if around := joint.get("around"):
+            return bool((low < around).all() and (around < high).all())
+        others = set(joint["between"]) - blocks
+        return all(other.rpartition(" ")[0] == name for other in others) and (same or not others)
+
+    joints = [joint for joint in data.get("joint", []) if belongs(joint)]
+    rock = rock if same else {**rock, "seed": seed}
+    return {**data, "rock": [rock], "watch": {}, "joint": joints}

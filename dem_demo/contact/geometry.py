@@ -13,7 +13,6 @@ dividing by the direction of an edge takes all into its frame.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -53,16 +52,7 @@ class Outlines:
         turn = np.exp(1j * motion[2])[self.block]
         return (motion[0] + 1j * motion[1])[self.block] + turn * self.local, turn * self.way
 
-    def sides(self, corner: np.ndarray) -> np.ndarray:
-        """The two edges (2, k) that meet at corners (k,)."""
-        return np.stack([self.before[corner], corner])
 
-    def behind(self, edge: np.ndarray) -> np.ndarray:
-        """The edges (2, k) before and after edges (k,) of the same block."""
-        return np.stack([self.before[edge], self.next[edge]])
-
-
-@dataclass(frozen=True, eq=False)
 class Contacts:
     """k corners on edges at a motion of the blocks; SI units, vectors complex.
 
@@ -71,29 +61,46 @@ class Contacts:
     together; length (k,): of the joint that the contact stands for; pull (k,) vector and twist
     (k,): derivatives of the length by displacement (at the contact) and rotation of b relative to
     a; opening, sliding (k,): velocity of b relative to a along the normal and a quarter turn
-    clockwise from it. Of the sides (2, k): rise, sine of the angle to the edge; carried, length of
-    joint of a side that lies on the edge (m); inside (m), what the corner is away from the limit
-    behind it in terms of its depth; beyond it the next corner takes over if `own`, else the next
-    edge.
+    clockwise from it. Of the sides (2, k), the edges that meet at the corner: rise, sine of the
+    angle to the edge; carried, length of joint of a side that lies on the edge (m); inside (m),
+    what the corner is away from the limit behind it in terms of its depth; beyond it the next
+    corner takes over if `own`, else the next edge.
     """
 
-    outlines: Outlines
-    corner: np.ndarray
-    edge: np.ndarray
-    a: np.ndarray
-    b: np.ndarray
-    at: np.ndarray
-    normal: np.ndarray
-    closure: np.ndarray
-    length: np.ndarray
-    pull: np.ndarray
-    twist: np.ndarray
-    opening: np.ndarray
-    sliding: np.ndarray
-    rise: np.ndarray
-    carried: np.ndarray
-    inside: np.ndarray
-    own: np.ndarray
+    def __init__(
+        self, outlines: Outlines, corner: np.ndarray, edge: np.ndarray, motion: np.ndarray
+    ) -> None:
+        """Corners (k,) on edges (k,) for a motion (6, n) of the blocks."""
+        self.outlines, self.corner, self.edge, o = outlines, corner, edge, outlines
+        place, ways = o.place(motion)
+        x, y = o.block[corner], o.block[edge]
+        self.a, self.b = np.minimum(x, y), np.maximum(x, y)
+        sign = np.where(x > y, 1.0, -1.0)
+        self.sides = np.stack([o.before[corner], corner])
+        self.behind = np.stack([o.before[edge], o.next[edge]])
+        self.at, way = place[corner], ways[edge]
+        frame = way.conj()
+        here = (self.at - place[edge]) * frame  # in the frame of the edge: its block is on the left
+        side = ways[self.sides] * (-_AHEAD * frame)
+        rest = o.length[edge] * _END - here
+        both = _AHEAD + side
+        mean = both / np.maximum(np.abs(both), 1e-9)
+        self.rise, level = -side.imag, _AHEAD * side.real
+        overlap, pull, twist = _overlaps(rest, o.length[self.sides] * side, mean, o.soft)
+        self.length, self.carried, pull, twist = _lengths(o, self.rise, level, overlap, pull, twist)
+        self.pull, self.twist = sign * pull * way, sign * twist
+        # Behind a corner its edge ends at another corner. Of what follows there, a side of this
+        # corner or the next edge of the other block, the one that is turned less is next; the limit
+        # is where both are equally deep. The raised end of an edge on an edge has its side next.
+        beyond = _AHEAD * o.way[self.behind] / o.way[edge]
+        self.own = (_AHEAD * (side.conj() * beyond).imag <= 0) | (self.rise[::-1] < 0)
+        toward = np.where(self.own, both, _AHEAD + beyond)
+        self.inside = -(rest[::-1] * toward.conj()).real
+        self.inside *= np.where(self.own, np.abs(self.rise) + LEVEL, 1.0)
+        self.normal, self.closure = sign * (-1j * way), here.imag
+        v = _velocity(motion, self.b, self.at) - _velocity(motion, self.a, self.at)
+        v *= self.normal.conj()
+        self.opening, self.sliding = v.real, -v.imag
 
     @property
     def pairs(self) -> list[tuple[int, int]]:
@@ -117,7 +124,7 @@ class Contacts:
         o, side, k = self.outlines, self.inside.argmin(axis=0), np.arange(len(self.corner))
         trade = self.own[side, k]
         there = np.where(side == 0, self.edge, o.next[self.edge])
-        edge = np.where(trade, o.sides(self.corner)[side, k], o.behind(self.edge)[side, k])
+        edge = np.where(trade, self.sides[side, k], self.behind[side, k])
         return np.where(trade, there, self.corner), edge, trade
 
     def assemble(self, motion: np.ndarray, push, shear, energy=None) -> np.ndarray:
@@ -137,40 +144,6 @@ class Contacts:
         row = 3 * np.concatenate([self.a, self.b])
         place = np.concatenate([row, row + 1, row + 2])
         return np.bincount(place, parts, 3 * motion.shape[1]).reshape(-1, 3)
-
-
-def contacts_at(
-    outlines: Outlines, corner: np.ndarray, edge: np.ndarray, motion: np.ndarray
-) -> Contacts:
-    """Corners (k,) on edges (k,) for a motion (6, n) of the blocks."""
-    o, (place, ways) = outlines, outlines.place(motion)
-    x, y = o.block[corner], o.block[edge]
-    a, b, sign = np.minimum(x, y), np.maximum(x, y), np.where(x > y, 1.0, -1.0)
-    sides, behind = o.sides(corner), o.behind(edge)
-    at, way = place[corner], ways[edge]
-    frame = way.conj()
-    here = (at - place[edge]) * frame  # in the frame of the edge: its block is on the left
-    side = ways[sides] * (-_AHEAD * frame)
-    rest = o.length[edge] * _END - here
-    both = _AHEAD + side
-    mean = both / np.maximum(np.abs(both), 1e-9)
-    rise, level = -side.imag, _AHEAD * side.real
-    overlap, pull, twist = _overlaps(rest, o.length[sides] * side, mean, o.soft)
-    length, carried, pull, twist = _lengths(o, rise, level, overlap, pull, twist)
-    # Behind a corner its edge ends at another corner. Of what follows there, a side of this corner
-    # or the next edge of the other block, the one that is turned less is next; the limit is where
-    # both are equally deep. The raised end of an edge on an edge has its side next.
-    beyond = _AHEAD * o.way[behind] / o.way[edge]
-    own = (_AHEAD * (side.conj() * beyond).imag <= 0) | (rise[::-1] < 0)
-    toward = np.where(own, both, _AHEAD + beyond)
-    inside = -(rest[::-1] * toward.conj()).real
-    inside *= np.where(own, np.abs(rise) + LEVEL, 1.0)
-    normal = sign * (-1j * way)
-    v = (_velocity(motion, b, at) - _velocity(motion, a, at)) * normal.conj()
-    return Contacts(
-        o, corner, edge, a, b, at, normal, here.imag, length, sign * pull * way, sign * twist,
-        v.real, -v.imag, rise, carried, inside, own,
-    )  # fmt: skip
 
 
 def _overlaps(rest, whole, mean, soft):

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import Refused
 from ..scene import Block
-from .geometry import CORNER, Contacts, Outlines, contacts_at
+from .geometry import CORNER, Contacts, Outlines
 
 TILT = np.sin(np.radians(CORNER + 1.5))  # how far a side of a corner may dip below the edge
 CARRIED = 0.5  # share of an overlap that some joint must see
@@ -50,14 +50,14 @@ class NarrowPhase:
         near = (height < 1.5 * self.skin) & (height > -1.5 * limit[:, None, None])
         near &= (corner >= 0) & (edge >= 0)
         which = np.nonzero(near)[0]
-        all_near = contacts_at(self.outlines, corner[near], edge[near], motion)
+        all_near = Contacts(self.outlines, corner[near], edge[near], motion)
         ok = _in_range(all_near, known)
         n = len(pairs)
         seen = np.full(2 * n, -np.inf)
         np.maximum.at(seen, which[ok], all_near.closure[ok])
         true = -np.maximum(apart[:n], apart[n:])
         self._require_carried(pairs, true, np.maximum(seen[:n], seen[n:]), limit[:n])
-        return contacts_at(self.outlines, all_near.corner[ok], all_near.edge[ok], motion)
+        return Contacts(self.outlines, all_near.corner[ok], all_near.edge[ok], motion)
 
     def require_shallow(self, contacts: Contacts) -> None:
         """Refuse overlaps beyond run.max_overlap."""

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..scene import Key, Scene
-from .geometry import Contacts, Outlines, contacts_at
+from .geometry import Contacts, Outlines
 from .narrow_phase import ROUNDING, NarrowPhase
 
 Identity = tuple[Key, int]
@@ -21,11 +21,6 @@ Identity = tuple[Key, int]
 class Tracker:
     """Follows the contacts of a scene.
 
-    contacts: at the motion followed to; keys: of each when found; numbers (k,): their names for
-    life; offset (k,): closure offset, the depth (m) that each had to give up (see
-    `Simulation._transfer`); given: numbers given so far; renewed_at (3, blocks): motion when last
-    renewed; urgent: must be renewed, whatever has moved. skin: pymunk reports pairs within 2 skins;
-    a corner counts from a gap of 1 skin and is forgotten beyond 1.5 (m).
     """
 
     def __init__(self, scene: Scene, motion: np.ndarray) -> None:
@@ -36,15 +31,15 @@ class Tracker:
         self._reach = np.array([block.reach for block in blocks])
         self._fixed = np.array([block.fixed for block in blocks])
         none = np.zeros(0, int)
-        self.contacts: Contacts = contacts_at(self.outlines, none, none, motion)
-        self.keys: list[Key] = []
-        self.numbers, self.offset = none, np.zeros(0)
+        self.corner, self.edge, self.numbers, self.keys = none, none, none, none.reshape(0, 4)
+        self.offset = np.zeros(0)
         self.given, self.renewed_at, self.urgent = 0, motion[:3].copy(), False
+        self.place(motion)
 
     @property
     def identities(self) -> list[Identity]:
         """Key and number of every contact."""
-        return list(zip(self.keys, self.numbers.tolist(), strict=True))
+        return list(zip(map(tuple, self.keys.tolist()), self.numbers.tolist(), strict=True))
 
     @property
     def closure(self) -> np.ndarray:
@@ -61,13 +56,17 @@ class Tracker:
         moved = np.hypot(x, y) + np.abs(turned) * self._reach
         return self.urgent or bool(moved.max() > 0.25 * self.skin)
 
+    def place(self, motion: np.ndarray) -> None:
+        """The contacts at a motion (6, n), all on the same edges."""
+        self.contacts = Contacts(self.outlines, self.corner, self.edge, motion)
+
     def follow(self, motion: np.ndarray) -> np.ndarray | None:
         """Bring the contacts to a motion (6, n), each to the corner and edge where it is by then.
 
         Corners that have left the range of their edge go on to what is next there. Returns the
         length (k,) of joint that each stood for before (m), or None if all stayed.
         """
-        c = contacts_at(self.outlines, self.contacts.corner, self.contacts.edge, motion)
+        c = Contacts(self.outlines, self.corner, self.edge, motion)
         before = c.length if (c.inside < -ROUNDING).any() else None
         for _ in range(8):
             out = (c.inside < -ROUNDING).any(axis=0)
@@ -75,10 +74,10 @@ class Tracker:
                 break
             corner, edge, trade = c.following()
             there = np.where(out, corner, c.corner), np.where(out, edge, c.edge)
-            c = contacts_at(self.outlines, *there, motion)
+            c = Contacts(self.outlines, *there, motion)
             if len(set(c.pairs)) < len(self.numbers) or not trade[out].all():
                 self.urgent = True  # there may be something new next to it
-        self.contacts = c
+        self.contacts, self.corner, self.edge = c, c.corner, c.edge
         return before
 
     def renew(
@@ -94,12 +93,11 @@ class Tracker:
         for i, who in enumerate(self.contacts.pairs):
             known.setdefault(who, i)
         found = self.narrow_phase(motion, pairs.reshape(-1, 2), set(known))
-        keys, fresh, stay = list(map(tuple, found.interfaces.tolist())), [], []
+        laws = [self.law_of(key) for key in found.interfaces.tolist()]
+        mine, fresh, stay = [self.law_of(key) for key in self.keys.tolist()], [], []
         for i, who in enumerate(found.pairs):
             old = known.get(who)
-            if old is not None and (
-                found.closure[i] > 0 or self.law_of(self.keys[old]) == self.law_of(keys[i])
-            ):
+            if old is not None and (found.closure[i] > 0 or mine[old] == laws[i]):
                 stay.append((old, i))
             elif found.closure[i] > -self.skin:
                 fresh.append(i)
@@ -108,31 +106,14 @@ class Tracker:
         chosen = [i for _, i in stay] + fresh
         lost = np.maximum(found.closure[fresh], 0.0) * (not pressed)
         new = self.given + np.arange(len(fresh))
-        self.keys = [self.keys[o] for o in old] + [keys[i] for i in fresh]
+        self.keys = np.concatenate([self.keys[old], found.interfaces[fresh]]).astype(int)
         self.numbers = np.concatenate([self.numbers[old], new]).astype(int)
         self.offset = np.concatenate([self.offset[old], lost])
-        self.contacts = contacts_at(self.outlines, found.corner[chosen], found.edge[chosen], motion)
+        self.corner, self.edge = found.corner[chosen], found.edge[chosen]
+        self.place(motion)
         self.given, self.renewed_at, self.urgent = self.given + len(fresh), motion[:3].copy(), False
         return changed
 
     def between(self, one: int, other: int) -> np.ndarray:
         """Mask (k,) of the contacts between two blocks."""
         return (self.contacts.a == min(one, other)) & (self.contacts.b == max(one, other))
-
-    def pack(self) -> dict[str, np.ndarray]:
-        """What `unpack` needs."""
-        return {
-            "corners": np.stack([self.contacts.corner, self.contacts.edge, self.numbers]),
-            "keys": np.array(self.keys, int).reshape(-1, 4),
-            "offset": self.offset.copy(),
-            "renewed_at": self.renewed_at.copy(),
-            "given": np.array([self.given, self.urgent]),
-        }
-
-    def unpack(self, a: dict[str, np.ndarray], motion: np.ndarray) -> None:
-        """Back to what `pack` gave, at a motion (6, n)."""
-        corner, edge, self.numbers = a["corners"]
-        self.keys, self.offset = list(map(tuple, a["keys"].tolist())), a["offset"].copy()
-        self.given, self.urgent = int(a["given"][0]), bool(a["given"][1])
-        self.renewed_at = a["renewed_at"].copy()
-        self.contacts = contacts_at(self.outlines, corner, edge, motion)

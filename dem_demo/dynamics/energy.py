@@ -5,8 +5,6 @@ product of the velocities before and after it; its change over a step is then ex
 of forces times displacement, and that is how every other entry is summed.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..contact import Joints
@@ -15,7 +13,6 @@ from .blocks import Blocks
 COLUMNS = ("kinetic", "potential", "stored", "friction", "dashpots", "dropped", "work", "turned")
 
 
-@dataclass(eq=False)
 class Ledger:
     """Energies in J: kinetic + potential + stored + friction + dashpots + dropped = start + work.
 
@@ -26,21 +23,17 @@ class Ledger:
     dashpots, drives; area (k,) in m2 and dissipated energy `lost` (k,) in J/m2 of the joints.
     """
 
-    value: dict[str, float]
-    start: float
-    forces: np.ndarray
-    area: np.ndarray
-    lost: np.ndarray
+    def __init__(self) -> None:
+        self.value, self.start = dict.fromkeys(COLUMNS, 0.0), 0.0
+        self.forces, self.area, self.lost = np.zeros((3, 0, 3)), np.zeros(0), np.zeros(0)
 
-    @classmethod
-    def opened(cls, blocks: Blocks, joints: Joints, forces, dt: float, area) -> "Ledger":
-        """The ledger at time 0, when the velocities of the blocks' motion hold."""
-        v = dict.fromkeys(COLUMNS, 0.0)
-        kick = 0.5 * dt * forces[0] / blocks.inertia
+    def open(self, blocks: Blocks, joints: Joints, forces, dt: float, area) -> None:
+        """Begin at time 0, when the velocities of the blocks' motion hold."""
+        v, kick = self.value, 0.5 * dt * forces[0] / blocks.inertia
         v["kinetic"] = float((0.5 * blocks.inertia * (blocks.motion[3:].T ** 2 - kick**2)).sum())
         v["stored"] = float(area @ joints.stored)
-        v["turned"] = v["kinetic"] + v["stored"]
-        return cls(v, v["turned"], forces, area, joints.lost)
+        self.start = v["turned"] = v["kinetic"] + v["stored"]
+        self.forces, self.area, self.lost = forces, area, joints.lost
 
     def book(self, blocks: Blocks, joints: Joints, forces, dt: float, area) -> None:
         """Add a step in which the blocks moved with the velocities of their motion."""

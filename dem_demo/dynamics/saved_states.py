@@ -17,17 +17,19 @@ from jointlaw.support.files import replace_file
 from ..contact import PoolState
 from ..scene import Files, Scene, parse
 
-STATE = "state.npz"
+FILE = "state.npz"
 VERSION = 4  # of state.npz
-ARRAYS = (
-    "motion", "velocity", "corners", "keys", "offset", "renewed_at", "given", "forces", "area",
-    "lost", "ledger", "reversed_at", "clock", "checked",
+STATE = (  # what changes in a run, but for the joints and the velocities to go on with
+    "t0", "n", "dt", "reversed_at", "limit.now", "limit.least", "limit.checked", "blocks.motion",
+    "tracker.corner", "tracker.edge", "tracker.keys", "tracker.numbers", "tracker.offset",
+    "tracker.renewed_at", "tracker.given", "tracker.urgent", "ledger.value", "ledger.start",
+    "ledger.forces", "ledger.area", "ledger.lost",
 )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class Saved:
-    """A copy of everything that the future depends on: ARRAYS by name, and the joints' states."""
+    """A copy of everything that the future depends on: arrays by name, and the joints' states."""
 
     arrays: dict[str, np.ndarray]
     joints: dict[str, PoolState]
@@ -47,21 +49,21 @@ def save(scene: Scene, saved: Saved, folder: Path) -> None:
     about = {"version": VERSION, "scene": scene.text, "files": json.dumps(scene.files)}
     np.savez(buffer, **about, **saved.arrays, **tables)
     folder.mkdir(parents=True, exist_ok=True)
-    replace_file(folder / STATE, buffer.getvalue())
+    replace_file(folder / FILE, buffer.getvalue())
 
 
 def load(folder: Path) -> tuple[Scene, Saved]:
     """The scene and the state that `save` wrote. Raises ValueError if they are not whole."""
-    file = folder / STATE
+    file = folder / FILE
     if not file.is_file():
-        raise ValueError(f"{str(folder)!r} holds no saved state: {STATE} is missing")
+        raise ValueError(f"{str(folder)!r} holds no saved state: {FILE} is missing")
     try:
         with np.load(file, allow_pickle=False) as stored:  # a ZIP file: it checks its sums
             data = {name: stored[name] for name in stored.files}
         if (version := int(data["version"])) == VERSION:
             files = Files(known=json.loads(str(data["files"])).items())
             scene = parse(str(data["scene"]), str(file), files)
-            return scene, Saved({name: data[name] for name in ARRAYS}, _joints(data, scene))
+            return scene, Saved({k: data[k] for k in (*STATE, "velocity")}, _joints(data, scene))
     except (OSError, EOFError, LookupError, ValueError, AttributeError, BadZipFile) as error:
         raise ValueError(f"{file} is damaged ({error}): run the scene again") from None
     raise ValueError(

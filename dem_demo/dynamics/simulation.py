@@ -1,5 +1,6 @@
 """A scene in motion: blocks, contacts and joints, one step after another."""
 
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from . import saved_states
 from .blocks import Blocks
 from .energy import COLUMNS, Ledger
 from .forces import forces
-from .saved_states import Saved
+from .saved_states import STATE, Saved
 from .seating import seat
 from .timestep import StepLimit, impact_limit
 
@@ -34,8 +35,7 @@ class Simulation:
         self.scene, self.blocks = scene, Blocks(scene)
         self.tracker, self.joints = Tracker(scene, self.blocks.motion), Joints(scene)
         self.limit, self.balanced, self.t0, self.n = StepLimit(), True, 0.0, 0
-        self.reversed_at = np.full(len(scene.drives), np.inf)
-        self.ledger: Ledger
+        self.reversed_at, self.ledger = np.full(len(scene.drives), np.inf), Ledger()
         if saved:
             self._unpack(saved, step)
         else:
@@ -75,8 +75,7 @@ class Simulation:
         blocks.motion[3:][blocks.drives.axes, blocks.drives.rows] = velocity
         tracker.follow(blocks.motion)
         force = forces(scene, blocks, self.contacts, joints, velocity, 0.5 * self.dt)
-        area = self.contacts.length * scene.thickness
-        self.ledger = Ledger.opened(blocks, joints, force, self.dt, area)
+        self.ledger.open(blocks, joints, force, self.dt, self.contacts.length * scene.thickness)
         blocks.motion[3:] += (0.5 * self.dt * force[0] / blocks.inertia * blocks.free).T
         blocks.place(blocks.motion, blocks.motion[3:])
 
@@ -102,13 +101,11 @@ class Simulation:
         3. Tractions, dashpots, weight and drives make forces.
         4. Check the time step if a joint has stiffened, send back drives, book the energies.
         """
-        scene, blocks, tracker, joints, dt = (
-            self.scene, self.blocks, self.tracker, self.joints, self.dt,
-        )  # fmt: skip
+        scene, blocks, joints, dt = self.scene, self.blocks, self.joints, self.dt
         blocks.require_slow(dt)
         self._follow()
-        tracker.narrow_phase.require_shallow(self.contacts)
-        joints.update(tracker.closure, self.contacts.sliding * dt, scene.run.law_steps)
+        self.tracker.narrow_phase.require_shallow(self.contacts)
+        joints.update(self.tracker.closure, self.contacts.sliding * dt, scene.run.law_steps)
         self.n += 1
         velocity = blocks.drives.velocity(self.time, dt, self.reversed_at)
         force = forces(scene, blocks, self.contacts, joints, velocity, dt)
@@ -117,7 +114,7 @@ class Simulation:
             self.limit.look(scene, blocks, self.contacts, joints)
             self.limit.require(dt)
         self.ledger.book(blocks, joints, force, dt, area)
-        tracker.reopen()
+        self.tracker.reopen()
         if self.n % LOOKS == 0:
             self.reversed_at = blocks.drives.reverse(self.time, self.reversed_at, self.slid)
         return force[0]
@@ -185,19 +182,9 @@ class Simulation:
 
     def state(self) -> Saved:
         """A copy of everything that the future depends on."""
-        ledger, limit = self.ledger, self.limit
-        arrays = {
-            "motion": self.blocks.motion.copy(),
-            "velocity": self.blocks.read()[3:],  # that will carry the blocks on
-            **self.tracker.pack(),
-            "forces": ledger.forces.copy(),
-            "area": ledger.area.copy(),
-            "lost": ledger.lost.copy(),
-            "ledger": np.array([*(ledger.value[c] for c in COLUMNS), ledger.start]),
-            "reversed_at": self.reversed_at.copy(),
-            "clock": np.array([self.t0, self.n, self.dt, limit.now, limit.least]),
-            "checked": limit.checked.copy(),
-        }
+        arrays = {path: np.array(attrgetter(path)(self)) for path in STATE}
+        arrays["ledger.value"] = np.array([*self.ledger.value.values()])
+        arrays["velocity"] = self.blocks.read()[3:]  # that will carry the blocks on
         return Saved(arrays, self.joints.snapshot())
 
     def restore(self, saved: Saved, step: float | None = None) -> None:
@@ -216,22 +203,21 @@ class Simulation:
 
     def _unpack(self, saved: Saved, step: float | None) -> None:
         a = {name: array.copy() for name, array in saved.arrays.items()}
-        self.tracker.unpack(a, a["motion"])
+        for path in STATE:
+            holder, _, name = path.rpartition(".")
+            value = a[path] if a[path].ndim else a[path].item()
+            setattr(attrgetter(holder)(self) if holder else self, name, value)
+        self.ledger.value = dict(zip(COLUMNS, a["ledger.value"].tolist(), strict=True))
+        self.tracker.place(self.blocks.motion)
         self.joints.restore(saved.joints, self.tracker.identities)
-        self.reversed_at, velocity = a["reversed_at"], a["velocity"]
-        *values, start = a["ledger"].tolist()
-        value = dict(zip(COLUMNS, values, strict=True))
-        self.ledger = Ledger(value, start, a["forces"], a["area"], a["lost"])
-        self.t0, self.n, self.dt, self.limit.now, self.limit.least = a["clock"].tolist()
-        self.n, self.limit.checked = int(self.n), a["checked"]
+        velocity = a["velocity"]
         if step:  # velocities are half a step ahead of the places: of the new step
             change = 0.5 * (step - self.dt) * self.ledger.forces[0] / self.blocks.inertia
             velocity += (change * self.blocks.free).T
             self.t0, self.n, self.dt = self.time, 0, step
-        self.blocks.place(a["motion"], velocity)
-        if step:
             self.limit.look(self.scene, self.blocks, self.contacts, self.joints)
             self.limit.require(step)
+        self.blocks.place(self.blocks.motion, velocity)
 
     def save(self, folder: Path, saved: Saved | None = None) -> None:
         """Write a state (default: now) and its scene to a folder; what else is there stays.

@@ -38,15 +38,15 @@ def joints(record: Record, path: Path) -> None:
     """Stress and dilation of the watched joints against sliding; of those in shear, which keep
     their normal stress, also by the law alone."""
     figure, (upper, lower) = _figure(7, 2)
-    watched = record.scene.monitors
-    for moving, base in (*watched.slip, *watched.shear):
+    for (moving, base), law in record.laws.items():
         name = record.scene.blocks[moving].name
         keys = ("slid_m", "closure_m", "normal_Pa", "shear_Pa")
         slid, closure, stress, tau = (record.column(f"{name}: {key}") for key in keys)
         upper.plot(1e3 * slid, 1e-3 * tau, label=f"{name} (blocks)")
         lower.plot(1e3 * slid, 1e3 * (closure[0] - closure))
-        law = record.scene.laws[record.laws[moving, base]]
-        alone = (moving, base) in watched.shear and shear_curve(law, float(stress[0]), slid)
+        alone = None
+        if (moving, base) in record.scene.monitors.shear:
+            alone = shear_curve(record.scene.laws[law], float(stress[0]), slid)
         if alone:
             style = {"color": "k", "ls": ":", "lw": 1.5}
             label = "law alone, at the normal stress of the start"

@@ -137,10 +137,9 @@ class Pictures:
         for name, colour in STATES.items():
             style = {"lw": 1.3, "ls": DASHED} if name == "open" else {"lw": 2.5}
             marks.append(Line2D([], [], color=colour, label=f"joint {name}", **style))
-        power = 10.0 ** np.floor(np.log10(self.stress))
-        leading = max(digit for digit in (1, 2, 5) if digit * power <= self.stress * (1 + 1e-9))
-        for stress in (0.25 * leading * power, leading * power):
-            label, width = f"normal stress {1e-3 * stress:.3g} kPa", self._width(stress)
+        for share in (0.25, 1.0):
+            stress = float(f"{share * self.stress:.1g}")
+            label, width = f"normal stress {1e-3 * stress:g} kPa", self._width(stress)
             marks.append(Line2D([], [], color=STATES["stuck"], lw=width, label=label))
         return [*marks, Line2D([], [], color="0.6", ls=":", lw=0.9, label="place at the start")]
 
@@ -151,15 +150,10 @@ class Pictures:
 
 def caption(record: Record, i: int) -> str:
     """Time and what is monitored, for the title of a frame."""
-    parts, watched = [f"t = {record.times[i]:.2f} s"], record.scene.monitors
-    row = record.monitored[i]
-    for kind in ("slip", "shear"):
-        for moving, _ in getattr(watched, kind):
-            name = record.scene.blocks[moving].name
-            text = f"{name}: slid {1e3 * row[f'{name}: slid_m'] + 0.0:.2f} mm"
-            if kind == "slip":
-                text += f", base at {row[f'{name}: base angle_deg']:.2f}°"
-            else:
-                text += f", shear stress {1e-3 * row[f'{name}: shear_Pa']:.1f} kPa"
-            parts.append(text)
+    parts, row = [f"t = {record.times[i]:.2f} s"], record.monitored[i]
+    for moving, _ in record.laws:
+        name = record.scene.blocks[moving].name
+        slid, tau = 1e3 * row[f"{name}: slid_m"] + 0.0, 1e-3 * row[f"{name}: shear_Pa"]
+        angle = row[f"{name}: base angle_deg"]
+        parts.append(f"{name}: slid {slid:.2f} mm at {tau:.1f} kPa, base at {angle:.2f}°")
     return "; ".join(parts)

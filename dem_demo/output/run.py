@@ -4,8 +4,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -102,9 +101,15 @@ def play(
     """
     steps = steps_to(sim, until)
     every = max(round(min(sim.scene.run.record / sim.dt, steps + 1)), 1)
-    title, quiet = sim.scene.title, not sys.stderr.isatty()
-    with _ctrl_c() as pressed:
-        for i in tqdm(range(1, steps + 1), desc=title, disable=quiet):
+    pressed, main = threading.Event(), threading.current_thread() is threading.main_thread()
+
+    def note(_signal, _frame) -> None:  # pymunk's callbacks would swallow a KeyboardInterrupt
+        pressed.set()
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # a second one quits at once
+
+    before = signal.signal(signal.SIGINT, note) if main else None
+    try:
+        for i in tqdm(range(1, steps + 1), desc=sim.scene.title, disable=not sys.stderr.isatty()):
             sim.step()
             if i % LOOKS == 0:
                 record.slips.look(sim)
@@ -114,28 +119,9 @@ def play(
                     raise KeyboardInterrupt
                 if stop(record):
                     break
-
-
-@contextmanager
-def _ctrl_c() -> Iterator[threading.Event]:
-    """Is set by the first Ctrl-C, which pymunk's callbacks would swallow; a second one interrupts.
-
-    A process that was told to ignore Ctrl-C goes on ignoring it; other threads get no signals.
-    """
-    pressed, before = threading.Event(), signal.getsignal(signal.SIGINT)
-
-    def note(_signal, _frame) -> None:
-        pressed.set()
-        signal.signal(signal.SIGINT, before)
-
-    if before is signal.SIG_IGN or threading.current_thread() is not threading.main_thread():
-        yield pressed
-        return
-    signal.signal(signal.SIGINT, note)
-    try:
-        yield pressed
     finally:
-        signal.signal(signal.SIGINT, before)
+        if main:
+            signal.signal(signal.SIGINT, before)
 
 
 def steps_to(sim: Simulation, until: float | None = None) -> int:
@@ -158,8 +144,8 @@ def write(record: Record, summary: dict, folder: Path, drawn: str | None, vtk: b
     """All files of a run: numbers before pictures, which take longest; drawn: their format."""
     pictures: dict[str, Callable[[Path], None]] = {}
     if drawn:
-        of, watched = Pictures(record), record.scene.monitors
-        if watched.shear or watched.slip:
+        of = Pictures(record)
+        if record.laws:
             pictures[f"curves.{drawn}"] = partial(curves.joints, record)
         pictures[f"energy.{drawn}"] = partial(curves.energy, record)
         pictures |= {f"final.{drawn}": of.final, "motion.gif": of.animation}

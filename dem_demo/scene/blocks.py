@@ -70,8 +70,7 @@ class Block:
 
     def holds(self, point) -> bool:
         """Is a point (m) inside the block?"""
-        edge = np.roll(self.corners, -1, axis=0) - self.corners
-        return bool((_cross(edge, np.asarray(point) - self.corners) > 0).all())
+        return bool(self._shape.point_query(tuple(point - self.corners[0])).distance < 0)
 
 
 def usual_size(blocks: Iterable[Block]) -> float:

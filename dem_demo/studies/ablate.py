@@ -113,20 +113,16 @@ def variants(scene: Scene, record: Record) -> Iterator[tuple[str, Callable[[], S
 
 
 def _runs(scene: Scene, stress: float) -> dict[str, dict[str, Any]]:
-    run = scene.run
+    run, steps = scene.run, 1 if scene.run.law_steps > 1 else 4
     fall = max(run.largest_stress, 2.0 * stress)  # a load put down at once reaches its double
-    steps = 1 if run.law_steps > 1 else 4
-    found: dict[str, dict[str, Any]] = {
+    key, most = ("step", np.inf) if run.step else ("fraction", LONGEST)
+    return {
         "no dashpots": {"dashpot_normal": 0.0, "dashpot_shear": 0.0},
         f"law_steps = {steps}": {"law_steps": steps},
         "not seated": {"seat": False, "largest_stress": fall if run.seat else run.largest_stress},
+        "half the time step": {key: 0.5 * getattr(run, key)},
+        "twice the time step": {key: min(2.0 * getattr(run, key), most)},
     }
-    for name, times in (("half the time step", 0.5), ("twice the time step", 2.0)):
-        if run.step:
-            found[name] = {"step": times * run.step}
-        elif times * run.fraction < LONGEST:
-            found[name] = {"fraction": times * run.fraction}
-    return found
 
 
 def _has(part: Any, keys: dict[str, Any]) -> bool:
@@ -197,20 +193,19 @@ def _run(name: str, make: Callable[[], Scene], until: float | None) -> tuple[dic
 def _outcome(record: Record, summary: dict) -> dict[str, Any]:
     """What a scene monitors, and what every scene has: the unit ends the name."""
     found = {f"{slip['block']}, slips at_deg": slip["slip_angle"] for slip in summary["slip"]}
+    found |= {f"last {key}": value for key, value in record.monitored[-1].items()}
     for moving, _ in record.scene.monitors.shear:
         name = record.scene.blocks[moving].name
         normal, shear = (record.column(f"{name}: {key}_Pa") for key in ("normal", "shear"))
-        closure = record.column(f"{name}: closure_m")
         angle = np.degrees(np.arctan2(np.abs(shear), normal))
         found[f"{name}, peak friction_deg"] = float(angle.max())
-        found[f"{name}, last shear_kPa"] = 1e-3 * float(shear[-1])
-        found[f"{name}, dilation_mm"] = 1e3 * float(closure[0] - closure.min())
     for rock in summary["rocks"]:
         found |= {f"{rock['rock']}, {key}": rock[key] for key in ("state", "moved_m")}
-    found["largest displacement_m"] = float(record.moved.max())
-    found["friction_kJ"] = 1e-3 * summary["energy_J"]["friction"]
-    found["energy error_1"] = summary["largest_energy_error"]
-    return found
+    return found | {
+        "largest displacement_m": float(record.moved.max()),
+        "friction_kJ": 1e-3 * summary["energy_J"]["friction"],
+        "energy error_1": summary["largest_energy_error"],
+    }
 
 
 def write(rows: list[dict], folder: Path) -> str:
@@ -223,7 +218,7 @@ def write(rows: list[dict], folder: Path) -> str:
     write_json(folder / "summary.json", about)
     lines = []
     for row in rows:
-        changes = [f"{k} {v:+.3g}" for k, v in row.items() if k.startswith("change of ")]
-        told = row["note"] or f"time x {row['time_ratio']:.2f}, {', '.join(changes)}"
+        apart = row.get("end, apart_mm", 0.0)
+        told = row["note"] or f"ends {apart:.3g} mm apart, time x {row['time_ratio']:.2f}"
         lines.append(f"{row['without']}: {told}")
     return "\n".join(lines)

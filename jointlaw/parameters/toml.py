@@ -99,7 +99,7 @@ def build_law(
             f"{where}: key 'version' = {version!r}: this jointlaw reads version {VERSION}; write "
             "the law again with this version, or install the one that wrote it"
         )
-    _known(data, _LAW_KEYS | {_ABOUT, "version"}, where, "")
+    known(data, _LAW_KEYS | {_ABOUT, "version"}, where, "")
     for key in ("orientation", "asperity", "asperity_density"):
         if key not in data:
             raise ValueError(f"{where}: key {key!r} is missing; a law needs it")
@@ -137,7 +137,7 @@ def _part(kind: type[T], data: Any, where: str, path: str) -> T:
     if not isinstance(data, dict):
         raise ValueError(f"{where}: key {path!r} must be a table")
     allowed = {f.name: f.default is MISSING for f in fields(cast(Any, kind)) if f.init}
-    _known(data, set(allowed), where, path + ".")
+    known(data, set(allowed), where, path + ".")
     missing = [name for name, required in allowed.items() if required and name not in data]
     if missing:
         raise ValueError(f"{where}: key '{path}.{missing[0]}' is missing; table {path!r} needs it")
@@ -147,7 +147,8 @@ def _part(kind: type[T], data: Any, where: str, path: str) -> T:
         raise ValueError(f"{where}: {error}") from None
 
 
-def _known(data: dict[str, Any], allowed: set[str], where: str, prefix: str) -> None:
+def known(data: dict[str, Any], allowed: set[str], where: str, prefix: str) -> None:
+    """Refuse keys that a table does not have. Raises ValueError naming key and remedy."""
     for key in data:
         if key not in allowed:
             raise ValueError(

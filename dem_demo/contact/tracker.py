@@ -21,6 +21,12 @@ Identity = tuple[Key, int]
 class Tracker:
     """Follows the contacts of a scene.
 
+    contacts: at the motion followed to, on corner and edge (k,); keys (k, 4): block, edge, block,
+    edge of each when found; numbers (k,): their names for life; offset (k,): closure offset, the
+    depth (m) that each had to give up (see `Simulation._transfer`); given: numbers given so far;
+    renewed_at (3, blocks): motion when last renewed; urgent: must be renewed, whatever has moved.
+    skin: pymunk reports pairs within 2 skins; a corner counts from a gap of 1 skin and is forgotten
+    beyond 1.5 (m).
     """
 
     def __init__(self, scene: Scene, motion: np.ndarray) -> None:

@@ -70,7 +70,8 @@ class Block:
 
     def holds(self, point) -> bool:
         """Is a point (m) inside the block?"""
-        return bool(self._shape.point_query(tuple(point - self.corners[0])).distance < 0)
+        edge = np.roll(self.corners, -1, axis=0) - self.corners
+        return bool((_cross(edge, np.asarray(point) - self.corners) > 0).all())
 
 
 def usual_size(blocks: Iterable[Block]) -> float:

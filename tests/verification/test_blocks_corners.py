@@ -1,14 +1,11 @@
 """Corners on edges: energy of rocking and tumbling blocks, continuity, one joint all along."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from block_forces import contact_forces
 
 import jointlaw as jl
 from dem_demo import Simulation, parse
-from dem_demo.dynamics.state import Layout
 
 ELASTIC = """
 kind = "coulomb"
@@ -65,11 +62,11 @@ def play(sim, tilt, end):
     tilts, total, potential, numbers = [], [], [], []
     while sim.time < end:
         sim.step()
-        tilts.append(tilt - np.degrees(sim.now.motion[2, 1]))
-        total.append(sim.now.ledger.total - sim.now.ledger.start)
-        potential.append(sim.now.ledger.value["potential"])
-        pressed = sim.now.traction[: len(sim.now.law_points.numbers), 0] > 0
-        numbers.append(set(sim.now.law_points.numbers[pressed].tolist()))
+        tilts.append(tilt - np.degrees(sim.blocks.motion[2, 1]))
+        total.append(sim.ledger.total - sim.ledger.start)
+        potential.append(sim.ledger.value["potential"])
+        pressed = sim.joints.traction[:, 0] > 0
+        numbers.append(set(sim.tracker.numbers[pressed].tolist()))
     return np.array(tilts), np.array(total), np.ptp(potential), numbers
 
 
@@ -90,9 +87,9 @@ def test_rocking_block_keeps_its_energy(law, end, within):
     assert tilts.min() < 0.1
     assert np.abs(total[:transition]).max() < 5e-5 * in_play
     assert np.abs(total).max() < within * in_play
-    assert sim.now.ledger.value["dropped"] == 0
+    assert sim.ledger.value["dropped"] == 0
     if law == ELASTIC:  # the law books a loss in a step of touch, second order in the step
-        assert sim.now.ledger.value["friction"] < 2e-4 * in_play
+        assert sim.ledger.value["friction"] < 2e-4 * in_play
         assert np.ptp(tilts[len(tilts) // 2 :]) > 2  # degrees: it still rocks, as nothing is lost
 
 
@@ -123,21 +120,15 @@ def held(law, at, angle, more=""):
     sim = Simulation(scene(law, 1.0, 1.0, at, angle, run="step = 1e-6\nmax_overlap = 0.2"))
 
     def place(x, y, tilt):
-        motion, tracker = sim.now.motion.copy(), sim.system.tracker
+        motion, tracker = sim.blocks.motion, sim.tracker
         motion[:3, 1] = x, y, np.radians(tilt - angle)
-        law_points, _, _ = tracker.evaluate(sim.now.law_points, motion)
-        if tracker.stale(law_points, motion):
-            law_points, _ = tracker.renew(law_points, motion, {(0, 1)})
-        law_points, points, _ = tracker.evaluate(law_points, motion)
-        layout = Layout.of(sim.system, law_points)
-        sim.joints.assign(layout.identities)
-        slid = np.zeros(sim.joints.n)
-        sim.now = replace(
-            sim.now, motion=motion, law_points=law_points, points=points, layout=layout,
-            ledger=replace(sim.now.ledger, area=points.length * sim.scene.thickness),
-            traction=sim.joints.update(sim.joints.increments(points.closure, slid)),
-        )  # fmt: skip
-        return sim.now.area @ sim.joints.now["stored"], contact_forces(sim)[1]
+        tracker.follow(motion)
+        if tracker.stale(motion):
+            tracker.renew(motion, {(0, 1)})
+        sim.joints.assign(tracker.identities)
+        sim.joints.update(sim.contacts.closure, np.zeros(sim.joints.n))
+        sim.ledger.area = sim.contacts.length * sim.scene.thickness
+        return sim.ledger.area @ sim.joints.stored, contact_forces(sim)[1]
 
     return place
 
@@ -218,9 +209,9 @@ values = [0.0, 3.0]
     while sim.time < 3.0:
         sim.step()
         friction.append(-contact_forces(sim)[1, 0] / contact_forces(sim)[1, 1])
-        closure.append(sim.now.points.closure.mean())
-    assert sim.now.law_points.numbers.tolist() == [0, 1]
-    slid = sim.joints.read("delta")[:, 1]
+        closure.append(sim.contacts.closure.mean())
+    assert sim.tracker.numbers.tolist() == [0, 1]
+    slid = sim.joints.delta[:, 1]
     assert slid == pytest.approx(3.0, abs=0.06)  # the drive eases in and out
     stress = 2600 * 9.81 * 0.4
     law = sim.scene.laws["rock"]
@@ -230,7 +221,7 @@ values = [0.0, 3.0]
     assert np.mean(friction[last:-800]) == pytest.approx(steady, rel=0.01)
     assert np.ptp(closure[last:-800]) < 0.02 * np.ptp(closure)  # dilation has ended
     # At 1 m/s a step of the law is 0.02 of the critical slip distance, and its error of that order.
-    assert abs(sim.now.ledger.error) < 5e-4
+    assert abs(sim.ledger.error) < 5e-4
 
 
 def test_another_step_keeps_the_energy():
@@ -241,9 +232,9 @@ def test_another_step_keeps_the_energy():
     sim = Simulation(on_corner(ELASTIC, 0.5, 1.0, 30.0, 0.0, "step = 1e-3"))
     for _ in range(200):
         sim.step()
-    start, state = sim.now.ledger.total, sim.state()
+    start, state = sim.ledger.total, sim.state()
     sim.restore(state, step=1e-5)
     sim.step()
-    speed = abs(sim.now.motion[4, 1])
+    speed = abs(sim.blocks.motion[4, 1])
     assert speed > 0.1
-    assert abs(sim.now.ledger.total - start) < 5e-6 * 1300 * 9.81 * speed
+    assert abs(sim.ledger.total - start) < 5e-6 * 1300 * 9.81 * speed

@@ -40,7 +40,7 @@ def motion(sim, order, turned=0.0):
     for _ in range(1200):
         sim.step()
     c, s = np.cos(np.radians(turned)), np.sin(np.radians(turned))
-    x, y, angle = sim.now.motion[:3]
+    x, y, angle = sim.blocks.motion[:3]
     back = np.array([c * x + s * y, c * y - s * x, angle])
     return np.array([back[:, order.index(name)] for name in PILE])
 
@@ -90,16 +90,16 @@ step = 5e-5
     )
 
     def momentum(motion):
-        m, _, moment = sim.system.inertia.T
+        m, _, moment = sim.blocks.inertia.T
         x, y, _, vx, vy, spin = motion
         return np.array([m @ vx, m @ vy, m @ (x * vy - y * vx) + moment @ spin])
 
-    start, pushed = momentum(sim.now.motion), 0
+    start, pushed = momentum(sim.blocks.motion), 0
     for _ in range(1500):
         sim.step()
-        pushed += bool((sim.now.traction[:, 0] > 0).any())
+        pushed += bool((sim.joints.traction[:, 0] > 0).any())
     assert 20 < pushed < 1400  # met and parted
-    scale = (sim.system.inertia[:, 0] * np.hypot(*sim.now.motion[3:5])).sum()
+    scale = (sim.blocks.inertia[:, 0] * np.hypot(*sim.blocks.motion[3:5])).sum()
     # Angular momentum is exact at equal times; the half step between place and velocity shows as
     # dt times the force couple, which is zero again once they have parted.
-    assert momentum(sim.now.motion) == pytest.approx(start, abs=1e-11 * scale)
+    assert momentum(sim.blocks.motion) == pytest.approx(start, abs=1e-11 * scale)

@@ -248,16 +248,3 @@ def test_a_state_that_is_refused_changes_nothing():
     sim.step()
     whole = begun(6)
     assert (sim.blocks.motion == whole.blocks.motion).all()
-
-
-def test_a_save_that_fails_keeps_the_state_that_was_there(tmp_path, monkeypatch):
-    begun(3).save(tmp_path)
-    before, sim = (tmp_path / "state.npz").read_bytes(), begun(5)
-
-    def full(*_args, **_arrays):
-        raise OSError("no space left on device")
-
-    monkeypatch.setattr(np, "savez", full)
-    with pytest.raises(OSError, match="no space"):
-        sim.save(tmp_path)
-    assert (tmp_path / "state.npz").read_bytes() == before

@@ -51,19 +51,13 @@ def reference():
     return motion(pile(order), order)
 
 
-def test_order_of_blocks(reference):
-    """Impacts amplify round-off (1e-16 m) by the number of steps and the stiffness: 1e-11 m."""
-    order = ["top", "base", "right", "left"]
-    assert motion(pile(order), order) == pytest.approx(reference, abs=1e-11)
-    assert abs(reference[3, 1] - 0.705) > 4e-3  # the top block did fall
-
-
 def test_turning_the_scene_by_37_degrees(reference):
     order = list(PILE)
     turned = motion(pile(order, 37.0), order, 37.0)
     assert turned == pytest.approx(reference, abs=1e-11)
 
 
+@pytest.mark.slow
 def test_momentum_of_two_free_blocks():
     """Two blocks meet in space, off centre: linear and angular momentum stay to round-off."""
     sim = Simulation(

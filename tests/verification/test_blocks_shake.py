@@ -85,12 +85,9 @@ def test_joint_slides_as_newmark_says(friction):
     assert measured(given) == pytest.approx(predicted(given, friction), rel=0.1)
 
 
-@pytest.mark.parametrize(
-    ("resolution", "most"), [("balanced", 1e-5), (jl.Resolution(2, 4, 24), 1e-6)]
-)
-def test_no_creep_below_yield(friction, resolution, most):
+def test_no_creep_below_yield(friction):
     """Coarse cells forget shear as the normal stress goes up and down, and the slab makes up."""
     above = predicted(scene(1.5 * yields_at(friction)), friction)
-    given = scene(0.5 * yields_at(friction), resolution=resolution)
+    given = scene(0.5 * yields_at(friction), resolution="balanced")
     assert predicted(given, friction) == 0.0
-    assert abs(measured(given)) < most * above
+    assert abs(measured(given)) < 1e-5 * above

@@ -70,29 +70,6 @@ def test_angle_of_the_base_is_that_against_gravity(given, angle):
     assert base_angle(Simulation(block(**given)), 1, 0) == pytest.approx(angle, abs=1e-6)
 
 
-def test_a_base_that_turns_with_gravity_ends_level():
-    """Gravity turned by 5 degrees, the base driven by 5: nothing pulls along the joint any more."""
-    sim = Simulation(block(gravity=5.0, driven=5.0))
-    assert base_angle(sim, 1, 0) == pytest.approx(5.0, abs=1e-4)
-    while sim.time < 0.7:
-        sim.step()
-    assert base_angle(sim, 1, 0) == pytest.approx(0.0, abs=1e-6)
-    normal, shear = sim.joints.traction.T
-    assert abs(shear @ sim.ledger.area) < 0.01 * (normal @ sim.ledger.area)
-
-
-def test_a_base_drawn_beyond_the_friction_angle_slips_there():
-    """atan 0.5 is 26.57 degrees; at 45 it slides from the start, and that is what is told."""
-    sim = Simulation(block(drawn=45.0))
-    watch = SlipMonitor(sim)
-    while waiting(watch) and sim.time < 0.7:
-        sim.step()
-        watch.look(sim)
-    (slip,) = watch.report()
-    assert slip["slip_angle"] == pytest.approx(45.0, abs=1e-3)
-    assert slip["predicted_angle"] == pytest.approx(np.degrees(np.arctan(0.5)))
-
-
 @pytest.fixture(scope="module")
 def slips():
     """Measured and predicted slips of both slabs; the tables tilt at 0.05 degrees per second."""

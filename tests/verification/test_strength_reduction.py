@@ -7,10 +7,9 @@ from dataclasses import replace
 import pytest
 from scipy.optimize import brentq
 
-import jointlaw as jl
 from dem_demo.cli import main
 from dem_demo.output.monitors import friction_angle
-from dem_demo.scene import Files, build, parse, read_tables
+from dem_demo.scene import Files, parse, read_tables
 from dem_demo.studies.strength import critical_tilt, reduced, strength_factor
 
 DIP = 32.0
@@ -67,15 +66,6 @@ def test_all_frictions_are_divided_and_nothing_else():
     mine, given = laws["joint"].pop("asperity"), data["laws"]["joint"]["asperity"]
     assert mine == given | {"mu": 0.2, "mu_residual": 0.1}
     assert laws["joint"].items() <= data["laws"]["joint"].items()
-
-
-def test_friction_of_a_law_by_name_is_divided_too():
-    data = read_tables(SCENE)
-    data["laws"]["named"] = {"from": "westerly-rough", "critical_slip": 1e-3}
-    named = build(reduced(data, 2.0, Files())).laws["named"]
-    given = jl.presets.load("westerly-rough").asperity
-    assert named.asperity == replace(given, mu=given.mu / 2)
-    assert named.critical_slip == 1e-3
 
 
 def test_friction_ends_at_that_which_a_scene_may_have():

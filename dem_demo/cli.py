@@ -55,9 +55,11 @@ OPTIONS = {
     "--format": {"choices": FORMATS, "default": FORMATS[0], "help": "of pictures (default png)"},
     "--vtk": {"action": "store_true", "help": "also VTK files for ParaView, in DIR/vtk (meshio)"},
     "--seeds": {"type": int, "nargs": "+", "default": [1, 2, 3], "help": "default 1 2 3"},
-    "--critical": {"action": "store_true", "help": "the critical tilt of each rock; run nothing"},
 }
-REMOVED = {"--tilt": "turn `gravity` in the scene file"}
+REMOVED = {
+    "--tilt": "turn `gravity` in the scene file",
+    "--critical": "strength-reduction finds the critical tilt",
+}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -156,15 +158,11 @@ def _compare(given: argparse.Namespace) -> None:
     scene, rows = load(given.scene), []
     if not scene.rocks:
         raise ValueError(f"{given.scene} has no [[rock]] to compare")
-    if given.critical and given.until is not None:
-        raise ValueError("--critical runs no scene: leave out --until")
     if given.out:
         given.out.parent.mkdir(parents=True, exist_ok=True)
-    until = None if given.critical else given.until or scene.run.end
-    for row in compare.compare(scene, given.seeds, until):
-        said = f"{row['rock']}: critical tilt {_degrees(row)}" if given.critical else sentence(row)
-        print(f"seed {row['seed']}, {row['law']:7s} {said}", flush=True)
-        if row.get("refused"):
+    for row in compare.compare(scene, given.seeds, given.until or scene.run.end):
+        print(f"seed {row['seed']}, {row['law']:7s} {sentence(row)}", flush=True)
+        if row["refused"]:
             print(f"    stopped: {row['refused']}")
         rows.append(row)
     if given.out:
@@ -176,17 +174,13 @@ def _reduce(given: argparse.Namespace) -> None:
     given.out.mkdir(parents=True, exist_ok=True)
     until = min(scene.run.end, FAILING) if given.until is None else given.until
     for row in strength.strength_reduction(scene, until, given.out, given.format):
-        factor = row["factor"]
+        factor, tilt = row["factor"], row["critical_tilt"]
         told = "no F between 1/64 and 64" if factor is None else f"F = {factor:.3g}"
-        print(f"{row['rock']}: {told}, critical tilt {_degrees(row)}", flush=True)
+        angle = "beyond 60 degrees" if tilt is None else f"{tilt:+.3g} degrees"
+        print(f"{row['rock']}: {told}, critical tilt {angle}", flush=True)
         rows.append(row)
     write_json(given.out / "strength.json", {"version": VERSION, "rows": rows})
     print(f"strength.json and pictures of the failure in {given.out}")
-
-
-def _degrees(row: dict) -> str:
-    tilt = row["critical_tilt"]
-    return "beyond 60 degrees" if tilt is None else f"{tilt:+.3g} degrees"
 
 
 RUN = "--out", "--force", "--until", "--no-pictures", "--format", "--vtk"
@@ -196,6 +190,6 @@ COMMANDS = {
     "new": (_new, "file"),
     "check": (_check, "scene"),
     "ablate": (_ablate, "scene", "--out", "--force", "--until", "--leave-out"),
-    "compare": (_compare, "scene", "--seeds", "--until", "--critical", "--out FILE"),
+    "compare": (_compare, "scene", "--seeds", "--until", "--out FILE"),
     "strength-reduction": (_reduce, "scene", "--out", "--force", "--until", "--format"),
 }

@@ -7,7 +7,7 @@ joints         one pool of joints for each law, and its virgin curve
 """
 
 from .geometry import Contacts
-from .joints import Joints, PoolState, StiffnessCurve
+from .joints import Joints, PoolState, virgin_curve
 from .tracker import Tracker
 
-__all__ = ["Contacts", "Joints", "PoolState", "StiffnessCurve", "Tracker"]
+__all__ = ["Contacts", "Joints", "PoolState", "Tracker", "virgin_curve"]

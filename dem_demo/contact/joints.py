@@ -4,8 +4,7 @@ Contacts come and go; each keeps its joint in the pool of its law for as long as
 reach, so history is never given to the wrong joint.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,57 +16,25 @@ from .tracker import Identity
 PoolState = tuple[list[Identity], jl.JointState]  # contacts, and their joints in that order
 
 
-@dataclass(frozen=True)
-class StiffnessCurve:
-    """Upper bound of a law's stiffness (Pa/m) against normal stress (Pa) and closure (m), and the
-    work (J/m2) that a virgin joint takes up to a closure.
+def virgin_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
+    """Closure (m), stress (Pa) and work (J/m2) of a virgin joint from no closure to 2 GPa, more
+    than any corner of rock stands, and an upper bound of its stiffness (Pa/m) there.
 
     At a given normal stress the unsheared joint is the stiffest one (Phi' is a concave function of
     Phi), so the virgin curve bounds the sheared joint as well.
     """
-
-    closure: np.ndarray
-    stress: np.ndarray
-    stiffness: np.ndarray
-    work: np.ndarray
-
-    @classmethod
-    def of(cls, law: jl.JointLaw) -> "StiffnessCurve":
-        """Tabulate a law from no closure to 2 GPa, more than any corner of rock stands."""
-        top = float(law.closure(2e9))
-        closure = np.concatenate([[0.0], np.geomspace(1e-8 * top, top, 600)])
-        stress = law.normal_stress(closure)
-        work = np.concatenate(
-            [[0.0], np.cumsum(0.5 * (stress[1:] + stress[:-1]) * np.diff(closure))]
-        )
-        return cls(closure, stress, _largest_stiffness(law, closure), work)
-
-    def at_stress(self, stress: np.ndarray) -> np.ndarray:
-        """Stiffness (Pa/m) at a normal stress; 0 for an open joint."""
-        return np.interp(stress, self.stress, self.stiffness) * (stress > 0)
-
-    def at_closure(self, closure: np.ndarray) -> np.ndarray:
-        """Stiffness (Pa/m) of a virgin joint at a closure."""
-        return np.interp(closure, self.closure, self.stiffness)
-
-    def stress_at(self, closure: np.ndarray) -> np.ndarray:
-        """Normal stress (Pa) of a virgin joint at a closure."""
-        return np.interp(closure, self.closure, self.stress)
-
-
-def _largest_stiffness(law: jl.JointLaw, closure: np.ndarray) -> np.ndarray:
-    """Largest eigenvalue (Pa/m) of a joint's stiffness.
-
-    The law's bound adds mu for the coupling of shear to closure. That of level asperities has no
-    eigenvalue of its own: (kn, 0; mu kn, 0) has kn and 0.
-    """
-    if not is_coulomb(law):
-        return law.max_stiffness(closure)
-    p = law.asperity  # K is the shear stiffness, lam K the normal one
-    return np.full(len(closure), max(1.0, p.lam) * p.K * law.asperity_density)
-
-
-Curve = Callable[[StiffnessCurve, np.ndarray], np.ndarray]
+    top = float(law.closure(2e9))
+    closure = np.concatenate([[0.0], np.geomspace(1e-8 * top, top, 600)])
+    stress = law.normal_stress(closure)
+    work = np.cumsum(0.5 * (stress[1:] + stress[:-1]) * np.diff(closure))
+    stiffness = law.max_stiffness(closure)
+    if is_coulomb(law):
+        # The law's bound adds mu for the coupling of shear to closure. That of level asperities has
+        # no eigenvalue of its own: (kn, 0; mu kn, 0) has kn and 0. K is ks, lam K is kn.
+        p = law.asperity
+        stiffness = np.full(len(closure), max(1.0, p.lam) * p.K * law.asperity_density)
+    work = np.concatenate([[0.0], work])
+    return {"closure": closure, "stress": stress, "stiffness": stiffness, "work": work}
 
 
 class Joints:
@@ -80,7 +47,7 @@ class Joints:
     def __init__(self, scene: Scene) -> None:
         self.choose = scene.law_of
         self.pools = {name: jl.JointPool(law) for name, law in scene.laws.items()}
-        self.curves = {name: StiffnessCurve.of(law) for name, law in scene.laws.items()}
+        self.curves = {name: virgin_curve(law) for name, law in scene.laws.items()}
         self.assign([])
 
     def assign(self, contacts: Sequence[Identity]) -> None:
@@ -129,19 +96,20 @@ class Joints:
                 share[rows] = value[here]
         self.sliding, self.slipping, self.separated, self.stored, self.lost = shares
 
-    def virgin(self, of: Curve, x: np.ndarray) -> np.ndarray:
-        """A function of the virgin curves, such as `StiffnessCurve.at_stress`, for each joint."""
+    def virgin(self, of: str, by: str, x: np.ndarray) -> np.ndarray:
+        """A column of the virgin curves, such as "stress", where another one is x (k,)."""
         out = np.empty(self.n)
         for name, rows, _ in self.groups:
-            out[rows] = of(self.curves[name], x[rows])
+            out[rows] = np.interp(x[rows], self.curves[name][by], self.curves[name][of])
         return out
 
     @property
     def stiffness(self) -> np.ndarray:
         """Upper bound (k,) of the stiffness at the normal stress of now (Pa/m)."""
-        return self.virgin(StiffnessCurve.at_stress, self.traction[:, 0])
+        stress = self.traction[:, 0]
+        return self.virgin("stiffness", "stress", stress) * (stress > 0)
 
-    def curve(self, contact: Identity) -> StiffnessCurve:
+    def curve(self, contact: Identity) -> dict[str, np.ndarray]:
         """The virgin curve of a contact's joint."""
         return self.curves[self.choose(contact[0])]
 

@@ -86,5 +86,6 @@ def require_text(scene: Scene) -> None:
     if not scene.text:
         raise ValueError(
             "the scene was made or changed in memory, so it has no text to go on from: write the "
-            "change into the TOML text and parse that, or keep the state with Simulation.state()"
+            "change into the TOML text and parse that, or go on in memory with "
+            "Simulation(scene, saved=state)"
         )

@@ -12,7 +12,7 @@ from scipy.sparse import bmat, csr_array, diags
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
-from ..contact import Joints, StiffnessCurve, Tracker
+from ..contact import Joints, Tracker
 from ..scene import Scene
 from .blocks import Blocks
 from .timestep import rates
@@ -83,9 +83,9 @@ def _equilibrium(joints: Joints, rows: csr_array, start, area, force, settle, ne
 
     def bonded(d, pull=0.0):
         c = np.maximum(np.abs(d[:k]), 1e-9)
-        shear = joints.virgin(StiffnessCurve.at_closure, c)
+        shear = joints.virgin("stiffness", "closure", c)
         stress, above, below = (
-            joints.virgin(StiffnessCurve.stress_at, part * c) for part in (1.0, 1.01, 0.99)
+            joints.virgin("stress", "closure", part * c) for part in (1.0, 1.01, 0.99)
         )
         slope = (above - below) / (0.02 * c)
         acts = np.where(d[:k] > 0, 1.0, pull)

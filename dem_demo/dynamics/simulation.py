@@ -22,12 +22,13 @@ LOOKS = 16  # steps between two looks at the drives
 
 
 class Simulation:
-    """A scene in motion. `step()` advances it; `state()` and `restore()` are bit-exact.
+    """A scene in motion. `step()` advances it; from a `state()` it goes on bit for bit.
 
-    step: time step (s), instead of the scene's. blocks: where they are; tracker: their contacts;
-    joints: the law; ledger: the energies; limit: of the time step dt (s); balanced: were the blocks
+    step: time step (s), instead of the scene's; saved: a state to go on from. blocks: where they
+    are; tracker: their contacts; joints: the law; ledger: the energies; limit: of the time step dt (s); balanced: were the blocks
     in equilibrium at the start? reversed_at (drives,): when each drive was sent back, else inf (s).
-    Raises Refused for a start that the method cannot carry.
+    Raises ValueError for a step that is no finite number > 0 and for a state of another scene,
+    Refused for a start that the method cannot carry.
     """
 
     def __init__(self, scene: Scene, step: float | None = None, saved: Saved | None = None) -> None:
@@ -81,9 +82,9 @@ class Simulation:
 
     def _chosen_step(self) -> float:
         scene, limit = self.scene, self.limit.now
-        largest = np.array([scene.run.largest_stress])
-        stiffness = max(float(c.at_stress(largest)[0]) for c in self.joints.curves.values())
-        if stiffness:
+        if largest := scene.run.largest_stress:
+            curves = self.joints.curves.values()
+            stiffness = max(float(np.interp(largest, c["stress"], c["stiffness"])) for c in curves)
             limit = min(limit, impact_limit(scene, self.blocks, stiffness))
         if not np.isfinite(limit):
             raise Refused(
@@ -152,9 +153,10 @@ class Simulation:
             if ratio[i] > 1:
                 who = tracker.identities[i]
                 curve = joints.curve(who)
-                anew = min(np.interp(held[i] / length[i], curve.work, curve.closure), closure[i])
+                anew = np.interp(held[i] / length[i], curve["work"], curve["closure"])
+                anew = min(anew, closure[i])
                 tracker.offset[i] += closure[i] - anew
-                kept = np.interp(anew, curve.closure, curve.work)
+                kept = np.interp(anew, curve["closure"], curve["work"])
                 joints.renew(who)
                 ledger.lost[i] = 0.0
             dropped = max(float(held[i] - kept * length[i]), 0.0) * thickness
@@ -187,20 +189,6 @@ class Simulation:
         arrays["velocity"] = self.blocks.read()[3:]  # that will carry the blocks on
         return Saved(arrays, self.joints.snapshot())
 
-    def restore(self, saved: Saved, step: float | None = None) -> None:
-        """Return to a state; with `step`, go on from there with another time step (s).
-
-        Raises ValueError for a step that is no finite number > 0 and for joints of another scene,
-        Refused for a step beyond the limit; all is then as it was.
-        """
-        _require_positive(step)
-        now = self.state()
-        try:
-            self._unpack(saved, step)
-        except Exception:
-            self._unpack(now, None)
-            raise
-
     def _unpack(self, saved: Saved, step: float | None) -> None:
         a = {name: array.copy() for name, array in saved.arrays.items()}
         for path in STATE:
@@ -222,14 +210,14 @@ class Simulation:
     def save(self, folder: Path, saved: Saved | None = None) -> None:
         """Write a state (default: now) and its scene to a folder; what else is there stays.
 
-        Raises ValueError for a scene that was changed or made in memory. `state` and `restore` need
-        no text.
+        Raises ValueError for a scene that was changed or made in memory. A state in
+        memory needs no text: `Simulation(scene, saved=sim.state())`.
         """
         saved_states.save(self.scene, saved or self.state(), Path(folder))
 
     @classmethod
     def load(cls, folder: Path, step: float | None = None) -> "Simulation":
-        """Continue from a folder that `save` wrote, with `step` as in `restore`.
+        """Continue from a folder that `save` wrote; with `step`, with another time step (s).
 
         Raises ValueError if the file is missing, damaged or of another version.
         """

@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 from scipy.sparse import csc_array, csr_array, diags
 from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
-from ..contact import Contacts, Joints, StiffnessCurve
+from ..contact import Contacts, Joints
 from ..errors import Refused
 from ..scene import Scene
 from .blocks import Blocks
@@ -35,9 +35,8 @@ class StepLimit:
 
     def look(self, scene: Scene, blocks: Blocks, contacts: Contacts, joints: Joints) -> None:
         """Find the limit of a moment from stiffness, dashpots and lever arms."""
-        stiffness = np.maximum(
-            joints.stiffness, joints.virgin(StiffnessCurve.at_closure, contacts.closure)
-        )
+        at_closure = joints.virgin("stiffness", "closure", contacts.closure)
+        stiffness = np.maximum(joints.stiffness, at_closure)
         # Joints that barely touch count as touching well, or each touch would ask again.
         area = contacts.length * scene.thickness
         stiffness = np.maximum(stiffness, 0.2 * stiffness.max(initial=0.0))

@@ -19,17 +19,11 @@ LABELS = {
 def energy(record: Record, path: Path) -> None:
     """Where the energy is, where it went, and how well it balances."""
     t, of = np.array(record.times), dict(zip([*COLUMNS, "error"], zip(*record.energy), strict=True))  # noqa: B905
-    figure, (top, middle, low) = _figure(7.5, 3)
-    for number, (name, label) in enumerate(LABELS.items()):
-        top.plot(t, 1e-3 * np.array(of[name]), label=label, color=f"C{number}")
-        if name not in ("potential", "work"):
-            size = np.abs(of[name])
-            middle.semilogy(t, np.where(size > 0, size, np.nan), color=f"C{number}")
-    peak = max(np.abs(of[name]).max() for name in ("stored", "friction", "dashpots"))
-    middle.set(ylabel="size of energy (J)", ylim=(max(1e-9 * peak, 1e-12), max(3 * peak, 1e-11)))
+    figure, (top, low) = _figure(6.5, 2)
+    for name, label in LABELS.items():
+        top.plot(t, 1e-3 * np.array(of[name]), label=label)
     low.plot(t, 1e6 * np.array(of["error"]), color="k")
-    low.set(ylabel="imbalance (ppm)", xlabel="time (s)")
-    low.set_title("imbalance, as parts per million of the energy turned over", fontsize=8)
+    low.set(ylabel="imbalance (ppm of the\nenergy turned over)", xlabel="time (s)")
     top.set_ylabel("energy (kJ)")
     _finish(figure, top, record, path)
 

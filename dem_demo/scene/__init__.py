@@ -12,7 +12,7 @@ read       a scene from its file
 
 from .blocks import Block, turn, usual_size
 from .drives import Drive, Drives
-from .keys import Tables
+from .keys import Tables, overlay
 from .laws import Files, build_law, coulomb_law, is_coulomb, law_table
 from .read import DENSITY, GRAVITY, TEMPLATE, build, load, names, parse, read_tables
 from .scene import Key, Run, Scene
@@ -36,6 +36,7 @@ __all__ = [
     "law_table",
     "load",
     "names",
+    "overlay",
     "parse",
     "read_tables",
     "turn",

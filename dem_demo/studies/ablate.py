@@ -7,7 +7,7 @@ before at the normal stress that its joints carried: what is left is the change 
 
 import time
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,7 @@ from ..errors import Refused
 from ..output.monitors import friction_angle
 from ..output.record import Record, write_csv
 from ..output.run import run
-from ..scene import Scene, coulomb_law, is_coulomb
+from ..scene import Scene, coulomb_law, is_coulomb, overlay
 
 SHALLOW = 1e-3  # step of closure, as a share, over which a stiffness is read
 LONGEST = 0.95  # of the stability limit
@@ -89,7 +89,7 @@ def variants(scene: Scene, record: Record) -> Iterator[tuple[str, Callable[[], S
     for i, frame in enumerate(record.joints):
         stresses = record.joint(i, "normal_stress_Pa").tolist()
         for who, stress in zip(frame["who"].tolist(), stresses, strict=True):
-            pressed[scene.law_of(tuple(who[:4]))] += [stress] * (stress > 0)
+            pressed[scene.law_of(who)] += [stress] * (stress > 0)
     joints = {name: law for name, law in scene.laws.items() if not is_coulomb(law)}
 
     def changed(change: Change) -> Scene:
@@ -100,8 +100,11 @@ def variants(scene: Scene, record: Record) -> Iterator[tuple[str, Callable[[], S
     for law in joints.values():
         lengths = np.array([law.critical_slip, law.asperity.yield_interference])
         others = named(*(lengths / law.closure_range).tolist())
-        given = INGREDIENTS | {f"resolution {n}": {"resolution": r} for n, r in others.items()}
-        lacking |= {n: partial(_without, keys) for n, keys in given.items() if _has(law, keys)}
+        given = INGREDIENTS | {
+            f"resolution {n}": {"resolution": asdict(r)} for n, r in others.items()
+        }
+        own = {"heights": SINGLE} | {k: v for k, v in asdict(law).items() if v is not None}
+        lacking |= {n: partial(_without, keys) for n, keys in given.items() if _differ(own, keys)}
     if joints:
         lacking |= {"depth cells at its own stress": _own_range, "plain Coulomb": _coulomb}
     for name, change in lacking.items():
@@ -125,13 +128,9 @@ def _runs(scene: Scene, stress: float) -> dict[str, dict[str, Any]]:
     }
 
 
-def _has(part: Any, keys: dict[str, Any]) -> bool:
-    """Has a law, or a part of it, what these keys take away?"""
-    for key, value in keys.items():
-        own = getattr(part, key)
-        if own is not None and (_has(own, value) if isinstance(value, dict) else own != value):
-            return True
-    return False
+def _differ(own: dict[str, Any], keys: dict[str, Any]) -> bool:
+    """Has a law, as nested tables, what these keys take away?"""
+    return own["heights"] != SINGLE if keys == {"heights": None} else overlay(own, keys) != own
 
 
 def _changed(part: Any, keys: dict[str, Any]) -> Any:
@@ -141,10 +140,8 @@ def _changed(part: Any, keys: dict[str, Any]) -> Any:
 
 
 def _without(keys: dict[str, Any], law: jl.JointLaw, pressed: list[float]) -> jl.JointLaw:
-    if not _has(law, keys):
-        return law
     other = _changed(law, keys)
-    if not STIFFENS & set(keys):
+    if other == law or not STIFFENS & set(keys):
         return other
     stress = np.median(_carried(pressed))
     K = law.asperity.K * stress / float(other.normal_stress(law.closure(stress)))

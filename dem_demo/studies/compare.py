@@ -15,14 +15,13 @@ from ..errors import Refused
 from ..output.record import Record, far, outcomes
 from ..output.run import play
 from ..scene import DENSITY, GRAVITY, Files, Scene, Tables, build, build_law, read_tables
-from .strength import alone, critical_tilt
+from .strength import alone
 
 
-def compare(scene: Scene, seeds: Sequence[int], until: float | None) -> Iterator[dict]:
+def compare(scene: Scene, seeds: Sequence[int], until: float) -> Iterator[dict]:
     """Every rock of a scene, for each seed and each kind of law; yields outcomes.
 
-    until: model time to stop at (s); None for the turn of gravity (degrees) beyond which no balance
-    is found, instead of a run.
+    until: model time to stop at (s).
     """
     data, files = read_tables(scene.text), scene.files
     for name in (table["name"] for table in data["rock"]):
@@ -32,11 +31,7 @@ def compare(scene: Scene, seeds: Sequence[int], until: float | None) -> Iterator
             plain = {law: _plain(table, own, files) for law, table in laws}
             run = {**data["run"], "max_overlap": 0.1}  # constant springs are soft in impacts
             for kind, case in (("joint", own), ("coulomb", {**own, "laws": plain, "run": run})):
-                row = {"law": kind, "seed": seed, "rock": name}
-                if until is None:
-                    yield {**row, "critical_tilt": critical_tilt(case, files)}
-                else:
-                    yield {**row, **_run(build(case, files=files), until)}
+                yield {"law": kind, "seed": seed, **_run(build(case, files=files), until)}
 
 
 def _run(scene: Scene, until: float) -> dict:

@@ -235,16 +235,15 @@ def test_a_damaged_file_or_another_version_is_refused(tmp_path):
 def test_a_state_that_is_refused_changes_nothing():
     """A joint that the state lacks would be virgin again, without a word; so would a bad step."""
     sim = begun(5)
-    motion, state, limit = sim.blocks.motion.copy(), sim.state(), sim.limit.now
+    state, limit = sim.state(), sim.limit.now
     state.joints["rock/rough"][0].pop()
     with pytest.raises(ValueError, match="not those of the scene's laws and contacts"):
-        sim.restore(state)
+        Simulation(sim.scene, saved=state)
     for step in (0.0, np.inf, np.nan):
         with pytest.raises(ValueError, match=r"step = .* s: must be a finite number > 0"):
-            sim.restore(sim.state(), step)
+            Simulation(sim.scene, step, sim.state())
     with pytest.raises(Refused, match=r"must stay below 0\.98 of the limit"):
-        sim.restore(sim.state(), 1.01 * limit)
-    assert (sim.blocks.motion == motion).all()
+        Simulation(sim.scene, 1.01 * limit, sim.state())
     sim.step()
     whole = begun(6)
     assert (sim.blocks.motion == whole.blocks.motion).all()

@@ -7,8 +7,9 @@ import pytest
 
 from dem_demo import SceneError, Simulation, load, parse, run
 from dem_demo.cli import main
-from dem_demo.scene import TEMPLATE, read_tables
-from dem_demo.studies.compare import compare
+from dem_demo.scene import TEMPLATE, Files, read_tables
+from dem_demo.studies.compare import _plain
+from dem_demo.studies.strength import alone, critical_tilt
 
 TEXT = TEMPLATE.read_text()
 PLAIN = """
@@ -50,12 +51,12 @@ def test_dilation_is_what_holds_the_rough_slope():
     Half a degree for blocks that the cutting leaves interlocked or loose; the rough joints bear
     20 degrees more.
     """
-    text = load("slope").text
-    alone = text[: text.index('[[rock]]\nname = "smooth"')] + text[text.index("[run]") :]
-    rough, plain = compare(parse(alone), [2], None)
-    assert (rough["law"], plain["law"]) == ("joint", "coulomb")
-    assert 36 + plain["critical_tilt"] == pytest.approx(21.8, abs=0.5)
-    assert rough["critical_tilt"] - plain["critical_tilt"] > 20
+    data, files = read_tables(load("slope").text), Files()
+    own = alone(data, "rough", 2)
+    laws = {name: _plain(table, own, files) for name, table in own["laws"].items()}
+    rough, plain = critical_tilt(own, files), critical_tilt({**own, "laws": laws}, files)
+    assert 36 + plain == pytest.approx(21.8, abs=0.5)
+    assert rough - plain > 20
 
 
 def test_a_scene_of_ones_own_from_the_template(tmp_path, capsys):

@@ -63,6 +63,9 @@ class Joints:
                 whole = np.array_equal(places, np.arange(len(pool.batch)))
                 self.groups.append((name, np.array(rows), None if whole else places))
         self.n = len(contacts)
+        self.traction = np.zeros((self.n, 2))
+        for name, rows, places in self.groups:
+            self.traction[rows] = self.pools[name].batch.F[... if places is None else places]
         self.measure()
 
     def update(self, closure: np.ndarray, sliding: np.ndarray, parts: int = 1) -> None:
@@ -73,7 +76,8 @@ class Joints:
         d = np.stack([closure - self.delta[:, 0], sliding], axis=1) / parts
         for name, rows, places in self.groups:
             for _ in range(parts):
-                self.pools[name].batch.update(d[rows], where=places, tangent=False)
+                F, _ = self.pools[name].batch.update(d[rows], where=places, tangent=False)
+            self.traction[rows] = F
         self.measure()
 
     def trial(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -85,11 +89,11 @@ class Joints:
 
     def measure(self) -> None:
         """Read what the batches hold by now."""
-        self.delta, self.traction = np.zeros((self.n, 2)), np.zeros((self.n, 2))
+        self.delta = np.zeros((self.n, 2))
         shares = np.zeros((5, self.n))
         for name, rows, places in self.groups:
             batch, here = self.pools[name].batch, slice(None) if places is None else places
-            self.delta[rows], self.traction[rows] = batch.delta[here], batch.F[here]
+            self.delta[rows] = batch.delta[here]
             for share, value in zip(
                 shares, [*batch.measures()[:4], batch.dissipated_energy], strict=True
             ):

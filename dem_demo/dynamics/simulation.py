@@ -25,8 +25,9 @@ class Simulation:
     """A scene in motion. `step()` advances it; from a `state()` it goes on bit for bit.
 
     step: time step (s), instead of the scene's; saved: a state to go on from. blocks: where they
-    are; tracker: their contacts; joints: the law; ledger: the energies; limit: of the time step dt (s); balanced: were the blocks
-    in equilibrium at the start? reversed_at (drives,): when each drive was sent back, else inf (s).
+    are; tracker: their contacts; joints: the law; ledger: the energies; limit: of the time step dt
+    (s); balanced: were the blocks in equilibrium at the start? reversed_at (drives,): when each
+    drive was sent back, else inf (s).
     Raises ValueError for a step that is no finite number > 0 and for a state of another scene,
     Refused for a start that the method cannot carry.
     """

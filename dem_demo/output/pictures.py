@@ -95,10 +95,10 @@ class Pictures:
         wide, high = self.high - self.low + 0.06 * self.size
         across = min(8.2, 6.0 * wide / high)
         tall = across * high / wide
-        size = max(across + 1.0, 7.5), tall + 1.65 + 0.17 * note.count("\n")
+        size = max(across + 1.4, 7.5), tall + 1.65 + 0.17 * note.count("\n")
         figure = Figure(figsize=size, dpi=dpi)
         FigureCanvasAgg(figure)
-        left = 0.5 * (size[0] - across) + 0.2
+        left = 0.5 * (size[0] - across) + 0.3
         place = left / size[0], 1.1 / size[1], across / size[0], tall / size[1]
         self.draw(figure.add_axes(place), i)
         figure.legend(handles=self.key(), loc="lower center", ncols=4, fontsize=8, frameon=False)
@@ -153,7 +153,7 @@ def caption(record: Record, i: int) -> str:
     parts, row = [f"t = {record.times[i]:.2f} s"], record.monitored[i]
     for moving, _ in record.laws:
         name = record.scene.blocks[moving].name
-        slid, tau = 1e3 * row[f"{name}: slid_m"] + 0.0, 1e-3 * row[f"{name}: shear_Pa"]
-        angle = row[f"{name}: base angle_deg"]
-        parts.append(f"{name}: slid {slid:.2f} mm at {tau:.1f} kPa, base at {angle:.2f}°")
+        slid, angle = round(1e3 * row[f"{name}: slid_m"], 2) + 0.0, row[f"{name}: base angle_deg"]
+        tau = 1e-3 * row[f"{name}: shear_Pa"]
+        parts.append(f"{name}: slid {slid:.2f} mm, shear {tau:.1f} kPa, base at {angle:.2f}°")
     return "; ".join(parts)

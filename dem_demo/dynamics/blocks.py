@@ -66,7 +66,12 @@ class Blocks:
             self.space.add(body, shape)
             self.bodies.append(body)
             self._number[shape] = i
-        self.space.on_collision(1, 1, begin=self._begin, separate=self._separate)
+
+        def heard(note: Callable[[tuple[int, int]], None]) -> Callable[..., None]:
+            return lambda arbiter, *_: note(tuple(sorted(self._number[s] for s in arbiter.shapes)))
+
+        begin, separate = heard(self.near.add), heard(self.near.discard)
+        self.space.on_collision(1, 1, begin=begin, separate=separate)
         mover = next(body for body in self.bodies if body.body_type == pymunk.Body.DYNAMIC)
         self._hook = pymunk.SimpleMotor(mover, self.space.static_body, 0.0)
         self._hook.max_force = 0.0
@@ -139,13 +144,3 @@ class Blocks:
         """Let pymunk look for pairs while nothing moves."""
         self._hook.pre_solve = lambda _constraint, _space: None
         self.space.step(1e-9)
-
-    def _pair(self, arbiter: pymunk.Arbiter) -> tuple[int, int]:
-        one, other = (self._number[shape] for shape in arbiter.shapes)
-        return min(one, other), max(one, other)
-
-    def _begin(self, arbiter, _space, _data) -> None:
-        self.near.add(self._pair(arbiter))
-
-    def _separate(self, arbiter, _space, _data) -> None:
-        self.near.discard(self._pair(arbiter))

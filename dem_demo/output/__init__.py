@@ -2,8 +2,7 @@
 
 monitors     what a scene's [watch] table asks for, and what the law alone says of it
 record       the history of a run, and what became of each rock mass
-pictures     of blocks and joints, and animations
-curves       energies, tilt and shear curves
+pictures     of blocks and joints, animations, curves
 vtk          frames as VTK files
 run          a run from start to end, and its files
 """

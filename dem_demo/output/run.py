@@ -18,8 +18,7 @@ from ..dynamics.energy import COLUMNS
 from ..dynamics.saved_states import require_text
 from ..dynamics.simulation import Simulation
 from ..errors import Refused
-from . import curves
-from .pictures import Pictures
+from .pictures import Pictures, energy, joints
 from .record import Record, outcomes
 
 MOST_STEPS = 1e12  # of a run: years
@@ -146,8 +145,8 @@ def write(record: Record, summary: dict, folder: Path, drawn: str | None, vtk: b
     if drawn:
         of = Pictures(record)
         if record.laws:
-            pictures[f"curves.{drawn}"] = partial(curves.joints, record)
-        pictures[f"energy.{drawn}"] = partial(curves.energy, record)
+            pictures[f"curves.{drawn}"] = partial(joints, record)
+        pictures[f"energy.{drawn}"] = partial(energy, record)
         pictures |= {f"final.{drawn}": of.final, "motion.gif": of.animation}
     write_json(folder / "summary.json", {**summary, "files": [*TABLES, *pictures]})
     record.write(folder)

@@ -14,8 +14,7 @@ from scene_text import PLAIN, ROCK
 import jointlaw as jl
 from dem_demo import SceneError, coulomb_law, load, parse
 from dem_demo.output import monitors
-from dem_demo.scene import Drive, Files, build, build_law
-from dem_demo.scene.drives import Reversal
+from dem_demo.scene import Files, build, build_law
 from dem_demo.scene.read import SCENES
 from dem_demo.studies.strength import alone
 
@@ -159,16 +158,6 @@ def test_a_sine_rises_and_falls_and_ends_at_rest():
     assert drive.times[-1] == pytest.approx(6 / 5)
     assert max(drive.values) == pytest.approx(3.0)
     assert drive.path(drive.times[-1], nu=1) == pytest.approx(0.0, abs=1e-12)
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_drive_goes_back_the_way_it_came(sign):
-    back = Reversal(block=0, slid=0.1, by=3.0, rate=2.0)
-    drive = Drive(1, 0, (0.0, 1.0), (0.0, sign * 2.0), back=back)
-    assert drive(0.5, 0.5) == pytest.approx(sign)
-    assert drive(1.5, 0.5) == pytest.approx(sign * (1.0 - 2.0))
-    falls = replace(drive, times=(0.0, 1.0, 2.0), values=(0.0, sign * 2.0, 0.0))
-    assert falls(2.0, 1.5) == pytest.approx(sign * (1.0 + 1.0))
 
 
 def test_plain_coulomb_is_what_its_numbers_say():

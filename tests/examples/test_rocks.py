@@ -2,7 +2,6 @@
 
 import json
 
-import numpy as np
 import pytest
 
 from dem_demo import SceneError, Simulation, load, parse, run
@@ -138,18 +137,6 @@ def test_joints_have_the_law_of_their_set():
                 expected = law if law == another else "joint"
                 assert scene.law_of((one, i, other, j)) == expected
     assert {law for _, law in edges} == {"joint", "plain"}
-
-
-def test_a_copy_is_the_same_rock_elsewhere():
-    more = '[[rock]]\nname = "copy"\nlike = "slope"\nat = [20.0, 1.0]\nlaws = { joint = "plain" }\n'
-    scene = parse(TEXT.replace("[watch]", more + PLAIN + "[watch]"))
-    one, copy = scene.rocks
-    assert len(one.blocks) == len(copy.blocks)
-    for a, b in zip(one.blocks, copy.blocks, strict=True):
-        shift = scene.blocks[b].corners - scene.blocks[a].corners
-        assert shift == pytest.approx(np.tile([20.0, 1.0], (len(shift), 1)), abs=1e-12)  # rounding
-        assert scene.blocks[a].fixed == scene.blocks[b].fixed
-    assert set(copy.laws.values()) == {"plain"}
 
 
 @pytest.mark.parametrize(

@@ -82,14 +82,3 @@ def test_a_sliver_joins_its_neighbour_or_is_left_out():
     rock = cut(SQUARE, [*sets, beds], seed=6, least_width=0.2)
     assert (len(rock.blocks), rock.joined) == (2, 0)
     assert rock.dropped == pytest.approx([0.1 * 10.0], abs=1e-9)
-
-
-def test_an_opening_is_cut_round_by_the_first_set():
-    """A roof whose corners bend inwards: convex blocks, the opening stays open."""
-    outline = np.array([[-5.0, 0], [-2, 0], [-2, 4], [2, 4], [2, 0], [5, 0], [5, 7], [-5, 7]])
-    rock = cut(outline, [JointSet(10.0, 1.5, "a")], seed=0, least_width=0.1)
-    opening = Polygon([[-2, 0], [2, 0], [2, 4], [-2, 4]])
-    assert all(check_convex(block) is None for block in rock.blocks)
-    assert max(Polygon(b).intersection(opening).area for b in rock.blocks) < 1e-5
-    area = sum(Polygon(b).area for b in rock.blocks)
-    assert area + sum(rock.dropped) == pytest.approx(Polygon(outline).area, abs=1e-4)

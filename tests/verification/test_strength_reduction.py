@@ -68,14 +68,6 @@ def test_all_frictions_are_divided_and_nothing_else():
     assert laws["joint"].items() <= data["laws"]["joint"].items()
 
 
-def test_friction_ends_at_that_which_a_scene_may_have():
-    data = read_tables(SCENE)
-    data["laws"]["glued"] = {"kind": "coulomb", "normal_stiffness": 1e9, "friction": math.inf}
-    laws = reduced(data, 1 / 64, Files())["laws"]
-    assert laws["joint"]["asperity"]["mu"] == 5.0
-    assert laws["glued"]["friction"] == math.inf
-
-
 def test_command_tells_both_and_draws_the_failure(tmp_path, capsys):
     scene = tmp_path / "slab.toml"
     scene.write_text(SCENE)

@@ -13,12 +13,11 @@ from jointlaw.support.pyplot import FORMATS
 from .dynamics.simulation import Simulation
 from .errors import Refused
 from .output.record import sentence
-from .output.run import run, steps_to
+from .output.run import INTERRUPTED, run, steps_to
 from .scene import TEMPLATE, load, names
 from .studies import ablate, compare, strength
 
 VERSION = 1  # of the files that compare and strength-reduction write
-INTERRUPTED = 130  # exit code of a command that Ctrl-C ended, as shells have it
 FAILING = 3.0  # s: most that a failing rock is run for
 MANY = 1e6  # steps: minutes for a few blocks, hours for a rock
 WAIT = "the first run after an installation also compiles the law, once"

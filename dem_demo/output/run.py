@@ -1,5 +1,6 @@
 """Run a scene to its end and write what a user wants to see."""
 
+import os
 import signal
 import sys
 import threading
@@ -22,6 +23,7 @@ from .pictures import Pictures, energy, joints
 from .record import Record, outcomes
 
 MOST_STEPS = 1e12  # of a run: years
+INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 LOOKS = 8  # steps between two looks for slip
 VERSION = 1  # of summary.json
 TABLES = ("history.csv", "blocks.csv", "joints.csv")
@@ -96,15 +98,17 @@ def play(
 ) -> None:
     """Step to `until` (s), or to where `stop` says so, and record on the way. Raises Refused.
 
-    After Ctrl-C the present is the last frame and KeyboardInterrupt is raised.
+    After Ctrl-C the present is the last frame and KeyboardInterrupt is raised; a second Ctrl-C ends
+    the process at once.
     """
     steps = steps_to(sim, until)
     every = max(round(min(sim.scene.run.record / sim.dt, steps + 1)), 1)
     pressed, main = threading.Event(), threading.current_thread() is threading.main_thread()
 
     def note(_signal, _frame) -> None:  # pymunk's callbacks would swallow a KeyboardInterrupt
+        if pressed.is_set():
+            os._exit(INTERRUPTED)  # at once, and nothing more is written
         pressed.set()
-        signal.signal(signal.SIGINT, signal.default_int_handler)  # a second one quits at once
 
     before = signal.signal(signal.SIGINT, note) if main else None
     try:

@@ -77,7 +77,7 @@ def main(arguments: list[str] | None = None) -> int:
     if verb == "run" and (not words or words[0].startswith("-")) and "-h" not in words:
         words.insert(0, "tilt")
     try:
-        for word in REMOVED.keys() & set(words):
+        for word in REMOVED.keys() & {word.partition("=")[0] for word in words}:
             raise ValueError(f"{word} is removed: {REMOVED[word]}")
         given = parser.parse_args(words)
         if getattr(given, "force", None) is False:

@@ -1,8 +1,7 @@
 """Contact: corners on edges, the identity of contacts, the joints between blocks.
 
 geometry       closure, sliding and length of joint at corners on edges
-narrow_phase   which corners are over which edges
-tracker        the identity of every contact through time
+tracker        which corners are over which edges, and the identity of each through time
 joints         one pool of joints for each law, and its virgin curve
 """
 

@@ -5,7 +5,6 @@ blocks     convex blocks
 laws       joint laws and plain Coulomb
 drives     prescribed motions
 cutting    an outline cut along joint sets
-rocks      the rock masses of a scene
 scene      a scene in memory
 read       a scene from its file
 """

@@ -2,22 +2,27 @@
 
 import tomllib
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from shapely import Point, Polygon
 
 from jointlaw.support.checks import one_of, remedy
 
 from ..errors import SceneError
 from .blocks import Block, box, check_convex
+from .cutting import JointSet, cut
 from .drives import read_drives
-from .keys import SCENE, Tables, checked, overlay, some_of, vector
+from .keys import ROCK, SCENE, Tables, checked, overlay, some_of, vector
 from .laws import Files, build_law
-from .rocks import read_rocks
-from .scene import Monitors, Run, Scene
+from .scene import Monitors, Rock, Run, Scene
 
 SCENES = Path(__file__).parent / "scenes"
 TEMPLATE = Path(__file__).parent / "template.toml"
 GRAVITY, DENSITY = (0.0, -9.81), 2600.0  # m/s2, kg/m3
+LEAST = 0.2  # narrowest block of a rock as a share of the smallest spacing
 
 
 def names() -> list[str]:
@@ -78,7 +83,7 @@ def build(data: Tables, where: str = "scene", files: Files | None = None) -> Sce
             raise SceneError(str(error)) from None
     density = top.get("density", DENSITY)
     blocks = [_block(table, density, where) for table in top.get("block", ())]
-    rocks = read_rocks(top.get("rock", ()), blocks, density, where)
+    rocks = _rocks(top.get("rock", ()), blocks, density, where)
     number = {block.name: i for i, block in enumerate(blocks)}
     if len(number) < len(blocks):
         raise SceneError(f"{where}: two blocks have the same name; names must differ")
@@ -153,3 +158,48 @@ def _monitors(
     points = [vector(f"{where}.pins", point) for point in table.get("pins", ())]
     pins = tuple((_block_at(f"{where}.pins", point, blocks), point) for point in points)
     return Monitors(**watched, pins=pins)
+
+
+def _rocks(tables: list[Tables], blocks: list[Block], density: float, where: str) -> list[Rock]:
+    """Cut the rocks of a scene's `[[rock]]` tables, and add their blocks. Raises SceneError."""
+    rocks: list[Rock] = []
+    known: dict[str, Tables] = {}
+    for i, table in enumerate(tables):
+        place = f"{where}.rock[{i}]"
+        like = table.get("like", "") if isinstance(table, dict) else ""
+        if like and like not in known:
+            raise SceneError(f"{place}.like = {like!r}: no rock further up; {remedy(like, known)}")
+        whole = checked({**known[like], **table} if like else table, ROCK, place)
+        if whole["name"] in known:
+            raise SceneError(f"{place}.name = {whole['name']!r}: names of rocks must differ")
+        known[whole["name"]] = {**known.get(like, {}), **table}
+        rocks.append(_rock(whole, blocks, density, f"{where}.rock[{whole['name']!r}]"))
+    return rocks
+
+
+def _rock(table: Tables, blocks: list[Block], density: float, where: str) -> Rock:
+    sets = [JointSet(**part) for part in table["set"]]
+    shift, other = np.array(table.get("at", (0.0, 0.0))), table.get("laws", {})
+    fixed = [Polygon(part["corners"]) for part in table.get("fixed", ())]
+    least = table.get("least_width", LEAST * min((s.spacing for s in sets), default=0.0))
+    if unknown := set(other) - {s.law for s in sets}:
+        raise SceneError(f"{where}.laws: no set of this rock has the law {unknown.pop()!r}")
+    try:
+        parts = cut(table["outline"], sets, table.get("seed", 0), least)
+    except ValueError as error:
+        raise SceneError(f"{where}.outline: {error}") from None
+    first, name, laws = len(blocks), table["name"], {}
+    for i, (shape, of) in enumerate(zip(parts.blocks, parts.sets, strict=True)):
+        block = Block(f"{name} {i + 1}", shape + shift, table.get("density", density))
+        stays = any(region.contains(Point(block.centroid - shift)) for region in fixed)
+        blocks.append(replace(block, fixed=stays))
+        for edge, number in enumerate(of.tolist()):
+            if number >= 0:
+                laws[first + i, edge] = other.get(sets[number].law, sets[number].law)
+    slivers = f"{parts.joined} slivers joined to neighbours"
+    if parts.dropped:
+        slivers += f", {len(parts.dropped)} left out ({sum(parts.dropped):.2g} m2)"
+    free = [i for i in range(first, len(blocks)) if not blocks[i].fixed]
+    if not free:
+        raise SceneError(f"{where}.fixed: all blocks of the rock are fixed")
+    return Rock(name, range(first, len(blocks)), free, laws, slivers)

@@ -7,7 +7,6 @@ import jointlaw as jl
 from .blocks import Block
 from .drives import Drive
 from .laws import Files
-from .rocks import Rock
 
 SKIN, CORNER = 0.02, 0.1  # of the least width of a block
 
@@ -30,6 +29,21 @@ class Run:
     skin: float | None = None  # reach of the search for contacts; default SKIN
     corner_length: float | None = None  # of a corner on an edge; default CORNER
     max_overlap: float = 0.03  # share of the smaller block's width
+
+
+@dataclass(frozen=True, eq=False)
+class Rock:
+    """A rock mass of a scene, cut into blocks.
+
+    blocks: their numbers in the scene; free: those that can move; laws: of each (block, edge) that
+    lies on a joint, the law of its set; slivers: what became of them, for a person.
+    """
+
+    name: str
+    blocks: range
+    free: list[int]
+    laws: dict[tuple[int, int], str]
+    slivers: str
 
 
 @dataclass(frozen=True)

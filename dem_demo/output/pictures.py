@@ -169,7 +169,7 @@ def caption(record: Record, i: int) -> str:
 def energy(record: Record, path: Path) -> None:
     """Where the energy is, where it went, and how well it balances."""
     t, of = np.array(record.times), dict(zip([*COLUMNS, "error"], zip(*record.energy), strict=True))  # noqa: B905
-    figure, (top, low) = _figure(6.5, 2)
+    figure, top, low = _figure()
     for name, label in LABELS.items():
         top.plot(t, 1e-3 * np.array(of[name]), label=label)
     low.plot(t, 1e6 * np.array(of["error"]), color="k")
@@ -179,19 +179,16 @@ def energy(record: Record, path: Path) -> None:
 
 
 def joints(record: Record, path: Path) -> None:
-    """Stress and dilation of the watched joints against sliding; of those in shear, which keep
-    their normal stress, also by the law alone."""
-    figure, (upper, lower) = _figure(7, 2)
-    for (moving, base), law in record.laws.items():
+    """Stress and dilation of the sheared joints against sliding, and of the law alone."""
+    figure, upper, lower = _figure()
+    for moving, base in record.scene.monitors.shear:
         name = record.scene.blocks[moving].name
         keys = ("slid_m", "closure_m", "normal_Pa", "shear_Pa")
         slid, closure, stress, tau = (record.column(f"{name}: {key}") for key in keys)
         upper.plot(1e3 * slid, 1e-3 * tau, label=f"{name} (blocks)")
         lower.plot(1e3 * slid, 1e3 * (closure[0] - closure))
-        alone = None
-        if (moving, base) in record.scene.monitors.shear:
-            alone = shear_curve(record.scene.laws[law], float(stress[0]), slid)
-        if alone:
+        law = record.scene.laws[record.laws[moving, base]]
+        if alone := shear_curve(law, float(stress[0]), slid):
             style = {"color": "k", "ls": ":", "lw": 1.5}
             label = "law alone, at the normal stress of the start"
             upper.plot(1e3 * alone.shear_2, 1e-3 * alone.F2, label=label, **style)
@@ -201,9 +198,9 @@ def joints(record: Record, path: Path) -> None:
     _finish(figure, upper, record, path)
 
 
-def _figure(high: float, rows: int):
-    figure = Figure(figsize=(8, high), dpi=120, layout="constrained")
-    return figure, figure.subplots(rows, sharex=True, squeeze=False)[:, 0]
+def _figure():
+    figure = Figure(figsize=(8, 7), dpi=120, layout="constrained")
+    return figure, *figure.subplots(2, sharex=True)
 
 
 def _finish(figure: Figure, first, record: Record, path: Path) -> None:

@@ -148,7 +148,7 @@ def write(record: Record, summary: dict, folder: Path, drawn: str | None, vtk: b
     pictures: dict[str, Callable[[Path], None]] = {}
     if drawn:
         of = Pictures(record)
-        if record.laws:
+        if record.scene.monitors.shear:
             pictures[f"curves.{drawn}"] = partial(joints, record)
         pictures[f"energy.{drawn}"] = partial(energy, record)
         pictures |= {f"final.{drawn}": of.final, "motion.gif": of.animation}

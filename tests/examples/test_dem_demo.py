@@ -37,6 +37,7 @@ between = ["two", "one"]
 law = "plain"
 [watch]
 slip = [["one", "base"]]
+shear = [["two", "one"]]
 [run]
 end = 0.12
 record = 0.02

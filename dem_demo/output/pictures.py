@@ -168,11 +168,12 @@ def caption(record: Record, i: int) -> str:
 
 def energy(record: Record, path: Path) -> None:
     """Where the energy is, where it went, and how well it balances."""
-    t, of = np.array(record.times), dict(zip([*COLUMNS, "error"], zip(*record.energy), strict=True))  # noqa: B905
+    t, columns = record.times, [*COLUMNS, "error"]
+    of = dict(zip(columns, np.transpose(record.energy), strict=True))
     figure, top, low = _figure()
     for name, label in LABELS.items():
-        top.plot(t, 1e-3 * np.array(of[name]), label=label)
-    low.plot(t, 1e6 * np.array(of["error"]), color="k")
+        top.plot(t, 1e-3 * of[name], label=label)
+    low.plot(t, 1e6 * of["error"], color="k")
     low.set(ylabel="imbalance (ppm of the\nenergy turned over)", xlabel="time (s)")
     top.set_ylabel("energy (kJ)")
     _finish(figure, top, record, path)

@@ -2,7 +2,8 @@
 
 An ingredient is removed from all laws of a scene at once, or from its run. Where that changes how
 stiff the joints are, the stiffness K of an asperity is scaled so that each law closes as far as
-before at the normal stress that its joints carried: what is left is the change of form.
+before at the normal stress that its joints carried: what is left is the change of form. A law whose
+joints carried nothing stays as it is.
 """
 
 import time
@@ -26,7 +27,6 @@ from ..output.run import run
 from ..scene import Scene, coulomb_law, is_coulomb, overlay
 
 SHALLOW = 1e-3  # step of closure, as a share, over which a stiffness is read
-LONGEST = 0.95  # of the stability limit
 CELLS = 4  # depth cells at least, where they are placed for the scene
 COST = ("steps", "time_step_s", "cpu_s", "time_ratio", "note")
 VERSION = 2  # of summary.json
@@ -93,15 +93,15 @@ def variants(scene: Scene, record: Record) -> Iterator[tuple[str, Callable[[], S
     joints = {name: law for name, law in scene.laws.items() if not is_coulomb(law)}
 
     def changed(change: Change) -> Scene:
-        laws = {name: change(law, pressed[name]) for name, law in joints.items()}
+        laws = {name: change(law, pressed[name]) for name, law in joints.items() if pressed[name]}
         return replace(scene, laws={**scene.laws, **laws})
 
     lacking: dict[str, Change] = {}
     for law in joints.values():
         lengths = np.array([law.critical_slip, law.asperity.yield_interference])
-        others = named(*(lengths / law.closure_range).tolist())
+        names = named(*(lengths / law.closure_range).tolist())
         given = INGREDIENTS | {
-            f"resolution {n}": {"resolution": asdict(r)} for n, r in others.items()
+            f"resolution {n}": {"resolution": asdict(r)} for n, r in names.items()
         }
         own = {"heights": SINGLE} | {k: v for k, v in asdict(law).items() if v is not None}
         lacking |= {n: partial(_without, keys) for n, keys in given.items() if _differ(own, keys)}
@@ -110,22 +110,19 @@ def variants(scene: Scene, record: Record) -> Iterator[tuple[str, Callable[[], S
     for name, change in lacking.items():
         yield name, partial(changed, change)
     largest = max((max(stresses) for stresses in pressed.values() if stresses), default=0.0)
-    for name, keys in _runs(scene, largest).items():
-        if (other := replace(scene.run, **keys)) != scene.run:
-            yield name, partial(replace, scene, run=other)
-
-
-def _runs(scene: Scene, stress: float) -> dict[str, dict[str, Any]]:
     run, steps = scene.run, 1 if scene.run.law_steps > 1 else 4
-    fall = max(run.largest_stress, 2.0 * stress)  # a load put down at once reaches its double
-    key, most = ("step", np.inf) if run.step else ("fraction", LONGEST)
-    return {
+    fall = max(run.largest_stress, 2.0 * largest)  # a load put down at once reaches its double
+    key = "step" if run.step else "fraction"
+    others = {
         "no dashpots": {"dashpot_normal": 0.0, "dashpot_shear": 0.0},
         f"law_steps = {steps}": {"law_steps": steps},
         "not seated": {"seat": False, "largest_stress": fall if run.seat else run.largest_stress},
         "half the time step": {key: 0.5 * getattr(run, key)},
-        "twice the time step": {key: min(2.0 * getattr(run, key), most)},
+        "twice the time step": {key: 2.0 * getattr(run, key)},
     }
+    for name, keys in others.items():
+        if (other := replace(run, **keys)) != run:
+            yield name, partial(replace, scene, run=other)
 
 
 def _differ(own: dict[str, Any], keys: dict[str, Any]) -> bool:
@@ -143,33 +140,27 @@ def _without(keys: dict[str, Any], law: jl.JointLaw, pressed: list[float]) -> jl
     other = _changed(law, keys)
     if other == law or not STIFFENS & set(keys):
         return other
-    stress = np.median(_carried(pressed))
+    stress = np.median(pressed)
     K = law.asperity.K * stress / float(other.normal_stress(law.closure(stress)))
     return _changed(other, {"asperity": {"K": K}})
 
 
 def _own_range(law: jl.JointLaw, pressed: list[float]) -> jl.JointLaw:
     """Cells placed for the scene; by default they are for 20 MPa, and all but one lie idle."""
-    closure = float(law.closure(max(_carried(pressed))))
+    closure = float(law.closure(max(pressed)))
     resolution = replace(law.resolution, depth=max(law.resolution.depth, CELLS))
     return replace(law, closure_range=closure, resolution=resolution)
 
 
 def _coulomb(law: jl.JointLaw, pressed: list[float]) -> jl.JointLaw:
     """Constant stiffness and friction: those of the law at the normal stress of its joints."""
-    stress = float(np.median(_carried(pressed)))
+    stress = float(np.median(pressed))
     closure = float(law.closure(stress))
     joints = law.joints(1)
     joints.update([[closure, 0.0]], tangent=False)
     _, C = joints.trial([[SHALLOW * closure, 0.0]])
     angle = np.radians(friction_angle(law, stress))
     return coulomb_law(float(C[0, 0, 0]), float(C[0, 1, 1]), float(np.tan(angle)))
-
-
-def _carried(pressed: list[float]) -> list[float]:
-    if not pressed:
-        raise ValueError("no joint of this law carried any load, so there is no stress to match")
-    return pressed
 
 
 def _run(name: str, make: Callable[[], Scene], until: float | None) -> tuple[dict, Record | None]:
@@ -190,7 +181,8 @@ def _run(name: str, make: Callable[[], Scene], until: float | None) -> tuple[dic
 def _outcome(record: Record, summary: dict) -> dict[str, Any]:
     """What a scene monitors, and what every scene has: the unit ends the name."""
     found = {f"{slip['block']}, slips at_deg": slip["slip_angle"] for slip in summary["slip"]}
-    found |= {f"last {key}": value for key, value in record.monitored[-1].items()}
+    last = record.monitored[-1].items()
+    found |= {f"last {key}": value for key, value in last if not key.endswith("_deg")}
     for moving, _ in record.scene.monitors.shear:
         name = record.scene.blocks[moving].name
         normal, shear = (record.column(f"{name}: {key}_Pa") for key in ("normal", "shear"))

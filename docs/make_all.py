@@ -38,7 +38,7 @@ TABLES = {
     "named": ("accuracy.md", "docs/measure/named.py"),
     "plane": ("accuracy.md", "docs/measure/plane.py"),
     "ingredients": ("accuracy.md", "docs/measure/ablations.py"),
-    "shake": ("scenes.md", "docs/measure/recorded.py shake"),
+    "shake": ("blocks.md", "docs/measure/shake.py"),
 }
 TIMED = {
     "price-list": ("accuracy.md", "docs/measure/price_list.py"),

@@ -1,7 +1,7 @@
 """Tables of figures that tests record: `python docs/measure/recorded.py TABLE`.
 
 The tests run at full length (JOINTLAW_FULL=1) and write each figure as a property of their report,
-a list in JSON. They also assert what the tables show. `drift`, `dynamics` and `shake` take minutes,
+a list in JSON. They also assert what the tables show. `drift`, `dynamics` and `fuzz` take minutes,
 the others about one at most.
 """
 
@@ -97,14 +97,6 @@ def impact(found):
     return table(["of the critical step", "samples of an impact", "change of energy"], rows)
 
 
-def shake(found):
-    slips = {(size, name): slip for size, name, slip in found["shake"]}
-    names = list(dict.fromkeys(name for _, name in slips))
-    rows = [[f"{size:g}", *(f"{1e3 * slips[size, name]:.3g}" for name in names)]
-            for size in sorted({size for size, _ in slips})]  # fmt: skip
-    return table(["size", *names], rows)
-
-
 DRIFT = "test_cycles_repeat_after_shakedown"
 FORGETTING = "test_small_normal_cycles_forget_locked_in_shear_at_a_known_rate"
 # name: what makes it of the figures, tests that record them
@@ -117,7 +109,6 @@ TABLES = {
     "forgetting": (forgetting, [f"extremes_drift.py::{FORGETTING}"]),
     "dynamics": (dynamics, ["extremes_dynamics.py"]),
     "impact": (impact, ["extremes_impact.py"]),
-    "shake": (shake, ["blocks_shake.py"]),
 }  # fmt: skip
 
 if __name__ == "__main__":

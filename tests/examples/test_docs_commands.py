@@ -71,7 +71,7 @@ def test_long_commands_are_still_printed():
 
 @pytest.mark.parametrize("page", PAGES)
 def test_what_commands_name_exists(page, capsys):
-    for name in re.findall(r"(?:python|pytest) ((?:docs|tests)/?[\w/.]*)", text(page)):
+    for name in re.findall(r"(?:python|pytest) ((?:docs|benchmarks|tests)/?[\w/.]*)", text(page)):
         assert (ROOT / name).exists(), f"{page} names {name}"
     with pytest.raises(SystemExit):
         jointlaw_main(["--help"])

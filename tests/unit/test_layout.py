@@ -129,7 +129,7 @@ def test_only_pages_of_this_project_are_cited():
     # names of files that tests and commands write or make up
     made = {"ablation.md", "report.md", "comparison.md"}
     wrong = {}
-    for folder in (*PACKAGES, "tests", "docs"):
+    for folder in (*PACKAGES, "tests", "docs", "benchmarks"):
         for path in (ROOT / folder).rglob("*"):
             if path.suffix in (".py", ".md", ".toml") and "_build" not in path.parts:
                 cited = re.findall(r"[\w-]+\.md\b", path.read_text(encoding="utf-8"))

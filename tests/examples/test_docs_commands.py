@@ -1,6 +1,5 @@
 """The commands of the docs: short ones run, all of them exist."""
 
-import json
 import re
 import shlex
 from pathlib import Path
@@ -58,10 +57,6 @@ def test_short_commands_run(line):
     assert main(words[1:]) == 0
     if "--out" in words:
         assert any(Path(words[words.index("--out") + 1]).iterdir())
-    if "out/block" in words:  # 25 degrees are below atan(0.4) + 30 degrees, all that it can have
-        summary = json.loads(Path("out/block/summary.json").read_text())
-        assert summary["slip"][0]["slip_angle"] is None
-        assert summary["largest_energy_error"] < 1e-3  # as docs/scenes.md says of rest
 
 
 def test_long_commands_are_still_printed():

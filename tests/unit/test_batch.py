@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import jointlaw as jl
-from jointlaw.joints.state import JointState
 
 COLUMNS = ("delta", "F", "sliding", "slipping", "separated", "stored_energy", "dissipated_energy")
 
@@ -41,49 +40,6 @@ def test_shapes(any_law):
     for name in COLUMNS[2:]:
         assert getattr(batch, name).shape == (4,)
         assert isinstance(getattr(joint, name), float)
-
-
-@pytest.mark.parametrize("mask", [False, True])
-def test_where_moves_the_named_joints_only(law, moved, mask):
-    index = np.array([3, 1])
-    before = moved.snapshot().values
-    d = np.array([[1e-7, 2e-8, 0.0], [2e-7, 0.0, 1e-8]])
-    singles = [law.joint() for _ in index]
-    for joint, i in zip(singles, index, strict=True):
-        joint.restore(JointState(law.fingerprint, before[i : i + 1]))
-    expected = np.array([j.update(x)[0] for j, x in zip(singles, d, strict=True)])
-    if mask:  # a mask names the joints in ascending order
-        F, _ = moved.update(d[::-1], where=[False, True, False, True, False])
-        F = F[::-1]
-    else:
-        F, _ = moved.update(d, where=index)
-    np.testing.assert_allclose(F, expected, rtol=1e-12)
-    after = moved.snapshot().values
-    np.testing.assert_array_equal(after[[0, 2, 4]], before[[0, 2, 4]])
-    assert (after[index, 0] != before[index, 0]).all()
-
-
-@pytest.mark.parametrize("where", [[], np.zeros(0, int), np.zeros(5, bool), [False] * 5])
-def test_an_empty_selection_moves_nothing(moved, where):
-    before = moved.snapshot().values
-    F, C = moved.update(np.zeros((0, 3)), where=where)
-    assert (F.shape, C.shape) == ((0, 3), (0, 3, 3))
-    moved.reset(where)
-    np.testing.assert_array_equal(moved.snapshot().values, before)
-
-
-def test_an_empty_batch(any_law):
-    batch = any_law.joints(0)
-    dim = any_law.dim
-    F, C = batch.update(np.zeros((0, dim)))
-    assert (F.shape, C.shape) == ((0, dim), (0, dim, dim))
-    assert len(batch) == 0
-    for name in COLUMNS:
-        assert len(getattr(batch, name)) == 0
-    batch.restore(batch.snapshot())
-    batch.reset()
-    batch.resize(2)
-    assert batch.F.tolist() == [[0.0] * dim] * 2
 
 
 @given(data=st.data())

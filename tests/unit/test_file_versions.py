@@ -23,13 +23,6 @@ def law():
     return jl.JointLaw.from_toml(SPECIMENS / "law.toml")
 
 
-def test_a_law_of_version_1(law):
-    assert law.orientation == jl.Orientation(3.0, 0.5, 0.1)
-    assert law.resolution == jl.Resolution(3, 3, 2)  # "fast"
-    assert law.critical_slip == 1e-3
-    assert "version = 1" in law.to_toml()
-
-
 def test_a_state_of_version_1(law):
     joint = law.joint()
     joint.restore(jl.load_state(SPECIMENS / "state.npz"))

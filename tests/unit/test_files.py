@@ -48,11 +48,6 @@ def test_every_number_is_kept_to_the_last_bit(make_law, a, b, share, K, mu, plan
     assert jl.JointLaw.from_text(law.to_toml()) == law
 
 
-def test_a_note_about_the_law_is_allowed(law):
-    text = law.to_toml() + '[about]\ntitle = "mine"\nanything = 3\n'
-    assert jl.JointLaw.from_text(text) == law
-
-
 @pytest.mark.parametrize("broken", ["write_bytes", "replace"])
 def test_an_interrupted_write_leaves_the_old_file(law, make_law, tmp_path, monkeypatch, broken):
     path = tmp_path / "law.toml"

@@ -73,26 +73,9 @@ def test_cells_rise_and_scale_with_the_unit_of_length(formation):
         np.testing.assert_array_equal(found[1][:, :-1], 4.0 * found[0][:, :-1])  # to the bit
 
 
-def test_facets_of_fewer_cells_have_those_first():
-    curve = virgin_curve(0.5, None)
-    zeta = depth_nodes(curve, 1.0, np.array([0.2, 0.2]), np.array([3, 1]))
-    np.testing.assert_array_equal(zeta[:1], depth_nodes(curve, 1.0, np.array([0.2]), np.array([3])))
-    assert zeta[1].tolist() == [0.0, UNUSED, UNUSED, np.inf]
-
-
 def test_light_facets_have_fewer_cells_and_all_are_counted():
     k = jl.presets.load("westerly-smooth").tables
     cells = np.count_nonzero(k.depth[:, :-1] < UNUSED, axis=1)
     assert k.cells == cells.max() > cells.min() == 1
     assert k.sliders == cells.sum() < len(cells) * k.cells
     assert (np.diff(cells[np.argsort(k.weight)]) >= 0).all()  # c = 0: weights of a ring are equal
-
-
-def test_a_front_is_refused_with_what_to_take_instead(make_law):
-    with pytest.raises(ValueError, match=r"resolution\.front is removed: take more depth cells"):
-        jl.Resolution(3, 6, 3, front=True)
-    law = make_law(resolution=jl.Resolution(3, 5, 7))
-    text = law.to_toml()
-    assert jl.JointLaw.from_text(text.replace("depth = 7", "depth = 7, front = false")) == law
-    with pytest.raises(ValueError, match=r"resolution\.front.*more depth cells"):
-        jl.JointLaw.from_text(text.replace("depth = 7", "depth = 7, front = true"))

@@ -76,9 +76,3 @@ def test_each_is_a_file_with_its_source_and_closes_and_shears(name):
     F, C = law.joint().update([law.closure_range, 0.1 * law.closure_range, 0.0])
     assert (F[:2] > 0).all()
     assert np.isfinite(C).all()
-
-
-def test_an_unknown_preset():
-    for read in (jl.presets.load, jl.presets.text, jl.presets.about):
-        with pytest.raises(ValueError, match="'granite' is unknown; choose one of biegel-rough"):
-            read("granite")

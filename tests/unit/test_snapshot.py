@@ -62,29 +62,6 @@ def test_a_copy_of_a_joint_moves_alone(any_law, twin_of):
     np.testing.assert_array_equal(twin.snapshot().values, joint.snapshot().values)
 
 
-class Interrupted:
-    """An engine that is interrupted by another trial of the joint before it reads its increment."""
-
-    def __init__(self, engine, first):
-        self.engine, self.first = engine, first
-
-    def advance(self, *given):
-        first, self.first = self.first, lambda: None
-        first()
-        self.engine.advance(*given)
-
-
-def test_trials_of_two_threads_do_not_meet(law):
-    """A trial writes nothing that another trial of the joint reads."""
-    joint = law.joint()
-    alone, C_alone = joint.trial([3e-7, 1e-7, 0.0])
-    batch = joint._batch
-    batch._engine = Interrupted(batch._engine, lambda: joint.trial([9e-7, 0.0, 0.0]))
-    F, C = joint.trial([3e-7, 1e-7, 0.0])
-    np.testing.assert_array_equal(F, alone)
-    np.testing.assert_array_equal(C, C_alone)
-
-
 def test_another_law_is_refused(law, make_law):
     for other in (make_law(mu=0.31), make_law(resolution="fine"), make_law(plane=0.0)):
         joint = other.joint()

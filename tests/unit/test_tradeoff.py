@@ -68,15 +68,6 @@ def test_csv_holds_every_number(found, tmp_path):
         assert float(row["error"]) == max(each)
 
 
-def test_picture_has_units(found, tmp_path):
-    pytest.importorskip("matplotlib")
-    figure = found.plot()
-    (axis,) = figure.axes
-    assert "%" in axis.get_ylabel()
-    found.plot(tmp_path / "t.png")
-    assert (tmp_path / "t.png").stat().st_size > 10_000
-
-
 def test_command_writes_table_law_and_summary(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("jointlaw.accuracy.tradeoff.SPREAD", (jl.Resolution(1, 3, 1),))
     few = {"fast": jl.Resolution(1, 3, 2)}
@@ -90,17 +81,3 @@ def test_command_writes_table_law_and_summary(tmp_path, capsys, monkeypatch):
     assert (out / "tradeoff.csv").read_text().count("\n") == 3
     assert jl.JointLaw.from_toml(out / "law.toml").plane == 0.0
     assert "at_tolerance(0.05)" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("call", "told"),
-    [
-        (lambda law: law.tradeoff([]), "resolutions is empty"),
-        (lambda law: law.tradeoff(joints=-1), "joints = -1"),
-        (lambda law: law.at_tolerance(-0.1), "tolerance"),
-        (lambda law: law.at_tolerance(0.01, loss=0.25), "loss is removed: take more depth cells"),
-    ],
-)
-def test_bad_arguments_are_named(call, told):
-    with pytest.raises(ValueError, match=told):
-        call(jl.presets.load("linear-a6"))

@@ -56,20 +56,6 @@ def test_exact_data_of_the_finest_nodes_give_the_truth(law):
     assert fit.parameters["a"] == pytest.approx(4.0, abs=0.05)
 
 
-def test_a_law_is_found_again_with_all_that_is_not_fitted(law):
-    """The other parameters are the law's own, so mu and a come back: 2 % is left to the priors."""
-    own = replace(
-        law, orientation=jl.Orientation(6.0, 0.3), critical_slip=2e-6, plane=0.0, closure_range=5e-5
-    )
-    measured = ShearCurve(SHEAR, np.ones(12), 5e6).predict(own)
-    start = replace(own, asperity=replace(own.asperity, mu=0.6), orientation=jl.Orientation(5, 0.3))
-    fit = jl.fit_shear(SHEAR, measured, 5e6, law=start, noise=1e-3)
-    found = fit.parameters
-    assert [found["mu"], found["a"]] == pytest.approx([0.5, 6.0], rel=0.02)
-    asperity = replace(own.asperity, mu=found["mu"])
-    assert fit.law == replace(own, asperity=asperity, orientation=jl.Orientation(found["a"], 0.3))
-
-
 def test_closure_alone_stays_closure_alone(law):
     own = replace(law, closure_only=True, critical_slip=1e-6)
     stress = np.geomspace(0.25e6, 10e6, 12)

@@ -7,7 +7,6 @@ import pytest
 
 import jointlaw as jl
 from jointlaw.kernels import engine
-from jointlaw.kernels import reference as kernel
 
 # The full law sums the same terms over all azimuths, a reduced one over one of them: what differs
 # is the rounding of a few hundred sums, carried along the path.
@@ -109,28 +108,3 @@ def test_closure_only_is_refused_where_joints_shear(tmp_path):
             use()
     with pytest.raises(ValueError, match="closure_only = 1 must be True or False"):
         replace(law, closure_only=1)
-
-
-def test_linear_asperities_without_heights_need_one_depth_cell():
-    """One spring touches at once: deeper cells, here added by hand, hold nothing."""
-    law = replace(random_law(9), asperity=jl.Asperity.linear(1.0, 0.7, 0.3))
-    assert law.heights is None
-    assert law.resolution.depth > 1
-    few = law.tables
-    assert few.cells == 1
-    inner = np.tile([0.0, 0.1, 0.3, 0.6, 1.0, 1.5, np.inf], (len(law.facets.theta), 1))
-    depth = law.closure_range * inner
-    force, slope = law.curve.force(np.where(np.isfinite(depth), depth, 0.0))
-    force[:, -1] = slope[:, -1] = np.inf
-    slope[:, 0] = 0.0
-    many = replace(few, depth=depth, depth_force=force, depth_slope=slope)
-    rng = np.random.default_rng(3)
-    states = [np.zeros((k.rows, 9)) for k in (few, many)]
-    for step in range(30):
-        d = rng.normal(0.2 if step == 0 else 0.0, 0.3, (few.dim, 9))
-        results = [kernel.step(k, s, d, True) for k, s in zip((few, many), states, strict=True)]
-        states = [result[0] for result in results]
-        for one, other in zip(results[0][1:], results[1][1:], strict=True):
-            assert np.abs(one - other).max() <= EXACT * max(np.abs(other).max(), 1e-3)
-        lost, lost_many = (s[2 * few.dim - 1] for s in states)
-        assert np.abs(lost - lost_many).max() <= EXACT * max(lost.max(), 1e-3)

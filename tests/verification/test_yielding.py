@@ -123,3 +123,24 @@ def test_a_joint_closed_beyond_its_highest_asperity_gives_a_warning():
         warnings.simplefilter("error")
         weak.joint(10e6)
         stiff.joint(30e6)
+
+
+def test_friction_falls_with_the_slip_of_the_asperities():
+    """One linear spring at a closure of 1 slips by the shear and by what its extension mu lam y
+    shrinks; mu = mu_r + (mu_0 - mu_r) exp(-slip/wear_slip)."""
+    damage = {"mu_residual": 0.1, "wear_slip": 0.5}
+    joint = law(
+        a=1e9, b=0.0, c=0.0, eta=0.0, damage=damage, resolution=jl.Resolution(1, 3, 1)
+    ).joint()
+    joint.update([1.0, 0.0, 0.0])
+
+    def sheared(steps):
+        for _ in range(steps):
+            F, _ = joint.update([0.0, 0.001, 0.0], tangent=False)
+        return joint.friction, -0.5 * np.log((joint.friction - 0.1) / 0.3), F[1] / F[0]
+
+    mu, slip, _ = sheared(600)  # all slips from 0.4 lam = 0.48 on
+    mu_later, slip_later, ratio = sheared(500)
+    # friction lags by a step of 1/500 of the wear slip
+    assert slip_later - slip == pytest.approx(0.5 + 1.2 * (mu - mu_later), rel=5e-3)
+    assert ratio == pytest.approx(mu_later, rel=5e-3)

@@ -52,9 +52,7 @@ def test_the_frontier_falls(found):
     assert frontier[0].sliders == 4
     same = replace(frontier[0], sliders=5, error=(1 - 1e-9) * frontier[0].error)
     assert replace(found, rows=(*found.rows, same)).frontier() == frontier
-    text = str(found)
-    assert any(line.endswith(" fast") for line in text.splitlines())
-    assert "nothing was timed" in text
+    assert any(line.endswith(" fast") for line in str(found).splitlines())
 
 
 def test_csv_holds_every_number(found, tmp_path):

@@ -8,7 +8,9 @@ from pages import PAGES, blocks, text
 
 import jointlaw as jl
 
-ELSEWHERE = {"docs/yade.md"}  # needs YADE's own Python: tests/hosts/test_yade_page.py runs it there
+ELSEWHERE = {"docs/yade.md"}  # runs in YADE's own Python: tests/hosts/test_yade_table.py
+    "docs/yade.md"
+}  # needs YADE's own Python: tests/hosts/test_yade_table.py runs it there
 # the first block of README.md is one line of a host's loop
 GIVEN = {"README.md": lambda: {"joint": jl.presets.load("linear-a3").joint(), "d": [1e-9, 0, 0]}}
 
@@ -57,7 +59,15 @@ CHECKS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("page", [p for p in PAGES if blocks(p, "python") and p not in ELSEWHERE])
+QUICK = ("README.md", "docs/start.md", "docs/embed.md")
+RUN = [
+    pytest.param(page, marks=[pytest.mark.slow] * (page not in QUICK))
+    for page in PAGES
+    if blocks(page, "python") and page not in ELSEWHERE
+]
+
+
+@pytest.mark.parametrize("page", RUN)
 def test_blocks_run_as_printed(page):
     found = run(page)
     if page in CHECKS:

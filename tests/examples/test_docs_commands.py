@@ -33,14 +33,6 @@ def is_long(line):
     return any(line.startswith(beginning) for beginning in LONG)
 
 
-def cases():
-    """The commands to run, the one of a whole slope marked slow."""
-    for line in FOUND:
-        if not is_long(line):
-            slow = [pytest.mark.slow] if line.startswith("python -m dem_demo slope") else []
-            yield pytest.param(line, marks=slow)
-
-
 @pytest.fixture
 def _files_that_the_reader_has():
     z = gaussian_filter(np.random.default_rng(0).standard_normal((400, 400)), 5)
@@ -48,8 +40,9 @@ def _files_that_the_reader_has():
     Path("block.toml").write_text(blocks("docs/recipes.md", "toml")[0])
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_files_that_the_reader_has")
-@pytest.mark.parametrize("line", list(cases()))
+@pytest.mark.parametrize("line", [line for line in FOUND if not is_long(line)])
 def test_short_commands_run(line):
     words = shlex.split(line)
     words = words[words.index("-m") + 1 :] if "-m" in words else words

@@ -22,7 +22,6 @@ alpha = 3.82
 beta = 1.15e-6
 overlap = 2e-6
 """
-NAMED = GOOD.split("[heights]")[0] + '[heights]\ndistribution = "chi2"\noverlap = 2e-6\n'
 
 
 def told(text, tmp_path):

@@ -95,12 +95,6 @@ def test_parameters_of_the_law(law, name, value, message):
         jl.JointLaw(**({"asperity_density": 1e10} | values | {name: value}))
 
 
-@pytest.mark.parametrize("u_phi_depth", [(0, 4, 2), (2, 2, 2), (2, 4, 0), (2, 4, True)])
-def test_resolution_numbers(u_phi_depth):
-    with pytest.raises(ValueError, match=r"resolution\.(u|phi|depth) = .*whole number >= \d"):
-        jl.Resolution(*u_phi_depth)
-
-
 @pytest.mark.parametrize(
     ("build_it", "name"),
     [

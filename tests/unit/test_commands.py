@@ -136,15 +136,6 @@ def test_version(capsys):
     assert f"\nversion: {jl.__version__}\n" in citation.read_text()
 
 
-def test_without_matplotlib_the_numbers_are_written(tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    assert run("shear linear-a2 --to 0 --steps 3 --out o") == 0
-    assert "pip install 'jointlaw[plot]'" in capsys.readouterr().err
-    assert {p.name for p in (tmp_path / "o").iterdir()} == {
-        "shear.csv", "shear.npz", "law.toml", "summary.json",
-    }  # fmt: skip
-
-
 def test_as_a_module(tmp_path):
     """An exit status and no progress bar in a pipe; a refusal without a traceback."""
     command = shlex.split(f"{sys.executable} -m jointlaw shear biegel-smooth --to 1um --steps 5")

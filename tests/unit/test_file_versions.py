@@ -43,25 +43,3 @@ def test_a_state_of_another_discretisation_is_refused(law):
     other = JointState(f"{int(version) + 1}:{parameters}", state.values)
     with pytest.raises(ValueError, match="run the path again, or install the version"):
         law.joint().restore(other)
-
-
-def test_a_parameter_at_its_default_leaves_the_fingerprint_as_it_was(law):
-    """So that states outlive the parameters that later versions add."""
-    import dataclasses
-
-    from jointlaw.parameters.fingerprint import fingerprint
-
-    @dataclasses.dataclass(frozen=True)
-    class Asperity:
-        K: float
-        new: float = 0.0
-
-    @dataclasses.dataclass(frozen=True)
-    class Before:
-        K: float
-
-    Before.__name__ = "Asperity"
-    assert fingerprint(Asperity(1.0)) == fingerprint(Before(1.0))
-    assert fingerprint(Asperity(1.0, 2.0)) != fingerprint(Before(1.0))
-    for name, value in {"critical_slip": 2e-3, "plane": 0.0, "closure_range": 2e-6}.items():
-        assert dataclasses.replace(law, **{name: value}).fingerprint != law.fingerprint

@@ -72,15 +72,6 @@ def test_a_curve_without_a_peak_is_told(shear, stress, peak):
     assert record.has_peak is peak
 
 
-def test_figures_of_a_record_without_shear():
-    columns = {name: np.zeros(3) for name in COLUMNS}
-    record = jl.Record(columns)
-    assert record.peak_friction_angle == record.residual_friction_angle == 0.0
-    assert record.dilation_angle == 0.0
-    assert math.isnan(record.secant_stiffness)
-    assert "peak_friction_angle_deg" not in record.summary()
-
-
 def test_csv_round_trip(tmp_path):
     record = analytic(0.3)
     record.to_csv(tmp_path / "r.csv")

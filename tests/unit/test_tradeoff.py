@@ -1,6 +1,5 @@
 """The price list: its table, files, picture and command. Nothing is timed here."""
 
-import csv
 import json
 from dataclasses import replace
 
@@ -55,17 +54,7 @@ def test_the_frontier_falls(found):
     assert any(line.endswith(" fast") for line in str(found).splitlines())
 
 
-def test_csv_holds_every_number(found, tmp_path):
-    found.to_csv(tmp_path / "t.csv")
-    with open(tmp_path / "t.csv", newline="") as stream:
-        rows = list(csv.DictReader(stream))
-    assert [int(row["sliders"]) for row in rows] == [4, 20, 34]
-    for row, price in zip(rows, found.rows, strict=True):
-        each = [float(row[f"error {path}"]) for path in found.paths]
-        assert each == price.error.tolist()
-        assert float(row["error"]) == max(each)
-
-
+@pytest.mark.slow
 def test_command_writes_table_law_and_summary(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("jointlaw.accuracy.tradeoff.SPREAD", (jl.Resolution(1, 3, 1),))
     few = {"fast": jl.Resolution(1, 3, 2)}

@@ -54,6 +54,7 @@ def test_a_rock_of_another_curve_is_called_so(law):
     assert jl.fit_closure(stress * scatter, y - y[0]).shape_differs == (False,)
 
 
+@pytest.mark.slow
 def test_known_parameters_are_covered_by_their_intervals(law):
     """1 % noise, alpha known from a scan: 95 % intervals hold the truth in 45 to 49 of 50 draws."""
     stress = np.geomspace(0.25e6, 10e6, 30)

@@ -28,6 +28,7 @@ def strength(law):
     return ShearCurve(SHEAR, np.ones(12), 5e6).predict(replace(law, plane=0.0))
 
 
+@pytest.mark.slow
 def test_friction_and_inclination_are_covered_by_their_intervals(law, strength):
     """Both are fixed by one shear test: 8 draws x 2, of which 95 % should hold the truth."""
     start = replace(law, orientation=jl.Orientation(2.6, 0.3))
@@ -43,6 +44,7 @@ def test_friction_and_inclination_are_covered_by_their_intervals(law, strength):
     assert hits >= 13  # fewer has a probability of 0.7 % when the intervals are right
 
 
+@pytest.mark.slow
 def test_exact_data_of_the_finest_nodes_give_the_truth(law):
     """A millimetre at 3 MPa, 26 closure ranges, where few nodes would shift mu by 0.03."""
     heights = jl.GammaHeights(3.7, 1e-5, 0.0, "individual")

@@ -6,8 +6,6 @@ from builders import increments, law, random_corners
 
 import jointlaw as jl
 
-FORMATIONS = [None, "population", "individual"]
-
 
 def run(one, d):
     """Tractions (n, steps, dim) along increments d (n, steps, dim)."""

@@ -98,7 +98,7 @@ def test_the_file_keeps_every_digit_and_is_what_numpy_users_expect(table, tmp_pa
 def test_a_table_of_version_1_is_read():
     """Of `linear-a3`; the law in its metadata tells what it must hold."""
     table = jl.load_table(SPECIMEN)
-    law = jl.JointLaw.from_toml(table.metadata["law"])
+    law = jl.JointLaw.from_text(table.metadata["law"])
     u = np.linspace(0, law.closure_range, 9)[1:]
     assert np.allclose(table.lookup(u).normal_stress, law.normal_stress(u), rtol=1e-3)
 

@@ -70,7 +70,8 @@ def test_no_step_of_a_closed_path_makes_energy(seed, held, wears):
     assert sum(gains) <= 1e-12 * peak
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(PATHS))
 def test_no_cycle_that_is_searched_for_returns_work(seed):
     """An adversary: of many triangles from one state that with the least loss, and its children."""
     rng = np.random.default_rng(seed)

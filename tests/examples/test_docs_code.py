@@ -9,8 +9,6 @@ from pages import PAGES, blocks, text
 import jointlaw as jl
 
 ELSEWHERE = {"docs/yade.md"}  # runs in YADE's own Python: tests/hosts/test_yade_table.py
-    "docs/yade.md"
-}  # needs YADE's own Python: tests/hosts/test_yade_table.py runs it there
 # the first block of README.md is one line of a host's loop
 GIVEN = {"README.md": lambda: {"joint": jl.presets.load("linear-a3").joint(), "d": [1e-9, 0, 0]}}
 

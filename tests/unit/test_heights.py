@@ -12,7 +12,6 @@ import jointlaw as jl
 
 SMOOTH = jl.GammaHeights(alpha=3.82, beta=1.15e-6, overlap=2e-6)
 CHI2 = {"df": 2 * (SMOOTH.alpha + 1), "scale": SMOOTH.beta / 2}  # the same distribution
-EDGES = [1e-6, 2e-6, 4e-6, 5e-6]
 R = np.linspace(0.0, 2e-5, 101)
 
 
@@ -55,14 +54,6 @@ def test_histogram_as_numpy_gives_it():
     heights = jl.Heights(np.histogram(sample, bins=50), 0.0, "individual")
     # 1.63/sqrt(n) is the 1 % bound of Kolmogorov for a sample of n
     assert np.abs(heights.cdf(R) - stats.gamma.cdf(R, 4.0, scale=1e-6)).max() < 1.63 / 20000**0.5
-
-
-@pytest.mark.parametrize("counts", [[1, 2, 1], [5, 0, 1], [1, 1, 1]])
-@pytest.mark.parametrize("overlap", [0.0, 1.5e-6, 4.9e-6])
-def test_histogram_needs_the_individual_reading(make_law, counts, overlap):
-    with pytest.raises(ValueError, match=r'not convex .*use formation = "individual"'):
-        make_law(heights=jl.Heights((counts, EDGES), overlap))
-    make_law(heights=jl.Heights((counts, EDGES), overlap, "individual"))
 
 
 @pytest.mark.parametrize(

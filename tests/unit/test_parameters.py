@@ -51,13 +51,6 @@ def test_equal_laws_have_one_fingerprint(make_law):
     one.joint().restore(other.joint().snapshot())
 
 
-def test_a_pickled_law_gives_the_same_joint(any_law):
-    twin = pickle.loads(pickle.dumps(any_law))
-    d = np.array([2e-7, 1e-7, 5e-8])[: any_law.tables.dim]
-    for mine, other in zip(any_law.joint().update(d), twin.joint().update(d), strict=True):
-        np.testing.assert_array_equal(mine, other)
-
-
 @pytest.mark.parametrize("name", ["fast", "balanced", "fine", "reference"])
 def test_a_short_critical_slip_chooses_other_nodes(make_law, name):
     """Its own depth cells and facets; a file holds the name, not the nodes."""

@@ -58,20 +58,6 @@ def test_exact_data_of_the_finest_nodes_give_the_truth(law):
     assert fit.parameters["a"] == pytest.approx(4.0, abs=0.05)
 
 
-def test_closure_alone_stays_closure_alone(law):
-    own = replace(law, closure_only=True, critical_slip=1e-6)
-    stress = np.geomspace(0.25e6, 10e6, 12)
-    y = own.closure(stress)
-    fit = jl.fit_closure(stress, y - y[0], noise=0.01, law=own, free=("asperity_density",))
-    density = fit.parameters["asperity_density"]
-    assert fit.law == replace(own, asperity_density=density)
-    assert density == pytest.approx(1e6, rel=1e-2)
-    with pytest.raises(ValueError, match="closure_only"):
-        jl.fit_shear(SHEAR, np.ones(12), 5e6, law=own)
-    with pytest.raises(ValueError, match="shear_stress is zero"):
-        jl.fit_shear(SHEAR, np.zeros(12), 5e6, law=law)
-
-
 def test_shear_fixes_what_closure_cannot(law, strength):
     stress = np.geomspace(0.2e6, 10e6, 10)
     y = law.closure(stress)

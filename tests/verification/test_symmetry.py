@@ -49,16 +49,6 @@ def test_mirror_images_across_the_principal_axes(mirror):
     assert np.allclose(run(one, d * mirror), F * mirror, rtol=0.0, atol=1e-12 * np.abs(F).max())
 
 
-def test_a_quarter_turn_exchanges_the_axes():
-    d = paths(4)
-    rule = jl.Resolution(3, 8, 4)  # a multiple of four: turned by a quarter onto themselves
-    F = run(law(c=0.2, resolution=rule), d)
-    other = run(law(c=-0.2, resolution=rule), turned(d, np.pi / 2))
-    assert np.allclose(other, turned(F, np.pi / 2), rtol=0.0, atol=1e-12 * np.abs(F).max())
-    unturned = run(law(c=-0.2, resolution=rule), d)
-    assert np.abs(unturned - F).max() > 0.01 * np.abs(F).max()  # c does matter
-
-
 @pytest.mark.parametrize("critical_slip", [np.inf, 0.3])
 def test_motion_in_the_plane_of_an_axis_is_the_half_circle(critical_slip):
     more = {"formation": "population", "critical_slip": critical_slip}

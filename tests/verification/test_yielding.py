@@ -114,11 +114,8 @@ def test_a_joint_closed_beyond_its_highest_asperity_gives_a_warning():
     stiff = jl.presets.load("jing-replica")
     asperity = dataclasses.replace(stiff.asperity, yield_interference=0.1 * stiff.closure_range)
     weak = dataclasses.replace(stiff, asperity=asperity)
-    assert weak.closure(30e6) == pytest.approx(17.6e-3, rel=1e-3)
     with pytest.warns(UserWarning, match="closure = 0.0176 m: 99.99 % .* law ends"):
-        joint = weak.joint(30e6)
-    with pytest.warns(UserWarning, match="law ends"):
-        jl.direct_shear(joint, 1e-3, normal=30e6, steps=5)
+        weak.joint(30e6)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         weak.joint(10e6)

@@ -106,22 +106,6 @@ def test_no_cycle_that_is_searched_for_returns_work(seed):
     assert sum(made[3:]) <= 1e-12 * peak
 
 
-def test_the_drag_of_the_offset_never_returns_work():
-    """T . o >= 0 for the in-plane resultant T of the normal forces, whatever was flattened."""
-    rng = np.random.default_rng(3)
-    k = law(mu=0.3, critical_slip=0.3, a=2.0, damage={"yield_interference": 0.1}).tables
-    state = np.zeros((k.rows, 200))
-    for _ in range(40):
-        d = rng.normal(size=(3, 200)) * [[0.3], [0.4], [0.4]]
-        d[0] += 0.1 - 0.3 * kernel.parts(k, state).delta[0]
-        state = kernel.step(k, state, d, False)[0]
-        now = kernel.parts(k, state)
-        y = kernel.effective_closure(k, now.delta[0], now.offset)
-        force = kernel.flattened(kernel.cells(k, y), kernel.cells(k, now.depth)).force
-        pull = np.sum((k.n[1:] @ (k.area[:, None] * force)) * now.offset, axis=0)
-        assert pull.min() >= -1e-14 * np.max(force)
-
-
 # flattened springs keep the friction limit from growing
 @pytest.mark.parametrize(("wear_slip", "interference"), [(0.5, np.inf), (0.01, 0.3)])
 def test_wear_of_one_to_fifty_per_cent_in_a_step_makes_no_energy(wear_slip, interference):

@@ -61,7 +61,6 @@ def test_motion_in_the_plane_of_an_axis_is_the_half_circle(critical_slip):
     assert np.allclose(whole[..., 2], 0.0, rtol=0.0, atol=1e-12 * scale)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("azimuth", [0.5, 2.0])
 def test_motion_in_any_plane_is_the_half_circle_with_c_cos_2psi(azimuth):
     d = paths(6) * [1.0, 1.0, 0.0]

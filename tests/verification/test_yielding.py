@@ -9,6 +9,7 @@ from builders import increments, law, random_corners, slow_heights
 from slow_bed import SlowBed, cap_quadrature, reach_of
 
 import jointlaw as jl
+from jointlaw.kernels import reference as kernel
 
 
 @pytest.mark.parametrize("interference", [1e-12, 0.05, 0.3])
@@ -107,6 +108,17 @@ def test_wear_agrees_with_the_slow_bed(damage):
         bound = 5e-3 if "yield_interference" not in damage else 2e-2
         assert np.linalg.norm(G - F, axis=1).max() < bound * np.linalg.norm(F, axis=1).max()
         assert joints.friction[i] == pytest.approx(bed.mu, abs=0.002)
+
+
+def test_both_sides_of_an_asperity_are_flattened_where_the_offset_is_dragged():
+    """Else a joint that slides back would meet springs that the other side has lost."""
+    k = law(critical_slip=0.3, damage={"yield_interference": 0.1}).tables
+    state = kernel.step(k, np.zeros((k.rows, 1)), np.array([[0.5], [0.8], [0.3]]), False)[0]
+    depth = kernel.parts(k, state).depth[:, 0]
+    turned = k.n * [[1.0], [-1.0], [-1.0]]
+    opposite = np.argmax(turned.T @ k.n, axis=1)
+    assert np.ptp(depth) > 0.1
+    np.testing.assert_array_equal(depth, depth[opposite])
 
 
 def test_a_joint_closed_beyond_its_highest_asperity_gives_a_warning():

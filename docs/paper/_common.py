@@ -23,13 +23,7 @@ TOTAL, LAW = "total form (as printed)", "incremental law (this package)"
 WESTERLY = (("westerly-smooth", "smooth"), ("westerly-rough", "rough"))
 SHEAR = "shear displacement δ₂ (µm)"
 COARSE = jl.Resolution(8, 12, 16)  # cells: yield is read where the last of them slides
-STYLE = {
-    "axes.grid": True,
-    "grid.alpha": 0.3,
-    "axes.xmargin": 0,
-    "lines.markersize": 4,
-    "legend.fontsize": 8,
-}
+STYLE = {"axes.grid": True, "grid.alpha": 0.3, "axes.xmargin": 0}  # beside that of all pictures
 BELOW = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16)}
 RANGES = {  # closure (m) at 20 MPa, for which the depth cells are placed
     "westerly-smooth": 2.678206790222333e-07,
@@ -184,9 +178,7 @@ def draw(panels, styles, polar=False, columns=3, **labels):
             for style, (label, (x, y)) in zip(cycle(own), lines.items(), strict=False):
                 axes.plot(np.radians(x) if polar else x, y, style, label=label)
             axes.set(title=title, **labels)
-            axes.legend(
-                **({"loc": "upper center", "bbox_to_anchor": (0.5, -0.16)} if polar else {})
-            )
+            axes.legend(**(BELOW if polar else {}))
             axes.yaxis.labelpad = 28 if polar else 4
     return grid.ravel()
 

@@ -17,7 +17,7 @@ from ..laboratory.normal_control import NormalCondition, closing_increments
 from ..support.checks import Array
 
 if TYPE_CHECKING:
-    from ..law import JointLaw as Law
+    from ..law import JointLaw
 
 LEG = 24  # steps each way
 SHARES = (1.0, 0.1)  # of the normal stress S/2 of the standard paths
@@ -66,7 +66,7 @@ def random_ways(rng: np.random.Generator, count: int, dim: int) -> Array:
     return np.column_stack([share, azimuth * (dim == 3), rng.uniform(0.3, 1.0, count)])
 
 
-def slip(law: Law, closure_range: float, stress: float, ways: Array) -> Slip:
+def slip(law: JointLaw, closure_range: float, stress: float, ways: Array) -> Slip:
     """Shear there and back along `ways` (paths, 3), of which the stress S/2 is in Pa."""
     share, azimuth, length = ways.T
     dim, R, Dc = law.tables.dim, closure_range, law.tables.critical_slip

@@ -47,23 +47,19 @@ from .slip import HELD, Slip, distance, names, random_ways, slip, standard_ways
 if TYPE_CHECKING:
     from ..law import JointLaw
 
-    Law = JointLaw
-else:
-    Law = object  # law.py imports this file
-
 STEPS = 120  # of each path
 FAR = 3.0  # R: the longest slip at a given closure
 _JAMS = 88.0  # degrees: the steepest friction angle of a law that slips at a given stress
 
 
-def reference_resolution(law: Law) -> Resolution:
+def reference_resolution(law: JointLaw) -> Resolution:
     """The resolution whose tractions count as exact: steep facets (small a) need the most of it."""
     if law.heights is None and law.asperity.eta == 0.0:  # one spring, whose slip has a sharp onset
         return Resolution(64, 48, 1)
     return Resolution(math.ceil(6 + 32 / law.orientation.a), 16, 36)
 
 
-def steepest(law: Law) -> float:
+def steepest(law: JointLaw) -> float:
     """Limit of the friction angle under long slip at small stress: atan(mu) + 90 deg/a."""
     return math.degrees(math.atan(law.asperity.mu)) + 90.0 / law.orientation.a
 
@@ -102,7 +98,7 @@ class Suite:
     stress: float  # Pa, S/2
     uncertainty: Array  # (paths,) of F: its difference from two thirds of the nodes
 
-    def miss(self, law: Law) -> Miss:
+    def miss(self, law: JointLaw) -> Miss:
         """How far another resolution is off."""
         largest, rms = errors(tractions(law, self.d), self.F)
         if self.slip is None:
@@ -112,12 +108,12 @@ class Suite:
         largest, rms = np.append(largest, more[0]), np.append(rms, more[1])
         return Miss(largest, rms, *mine.apart(self.slip))
 
-    def errors(self, law: Law) -> tuple[Array, Array]:
+    def errors(self, law: JointLaw) -> tuple[Array, Array]:
         """Largest and rms error (paths,) of another resolution, as shares of the peak |F|."""
         return self.miss(law)[:2]
 
 
-def standard_suite(law: Law, best: Resolution | None = None, excursions: int = 0) -> Suite:
+def standard_suite(law: JointLaw, best: Resolution | None = None, excursions: int = 0) -> Suite:
     """The standard paths of a law, with tractions at `best`, by default the reference resolution.
 
     `excursions` random paths come after them. Second-order convergence makes the reference's own
@@ -127,7 +123,7 @@ def standard_suite(law: Law, best: Resolution | None = None, excursions: int = 0
 
 
 @lru_cache(maxsize=16)
-def _suite(law: Law, excursions: int) -> Suite:
+def _suite(law: JointLaw, excursions: int) -> Suite:
     """The suite of a law at its reference resolution."""
     best = law.resolution
     stress = float(law.normal_stress(law.closure_range)) / 2
@@ -150,7 +146,7 @@ def _suite(law: Law, excursions: int) -> Suite:
     return replace(suite, uncertainty=check)
 
 
-def tractions(law: Law, d: Array) -> Array:
+def tractions(law: JointLaw, d: Array) -> Array:
     """F (steps, paths, dim) in Pa along increments d of the same shape, from the virgin state."""
     batch, F = law.joints(d.shape[1], ledger=False), np.empty_like(d)
     for k, step in enumerate(track(d, "steps of the paths", len(d))):
@@ -158,7 +154,7 @@ def tractions(law: Law, d: Array) -> Array:
     return F
 
 
-def tangents(law: Law, d: Array) -> Array:
+def tangents(law: JointLaw, d: Array) -> Array:
     """C (steps, paths, dim, dim) in Pa/m along increments d, from the virgin state."""
     batch, dim = law.joints(d.shape[1], ledger=False), d.shape[2]
     C = np.empty((*d.shape, dim))
@@ -178,7 +174,7 @@ def errors(F: Array, reference: Array, counts: Any = True) -> tuple[Array, Array
     return off.max(axis=0, where=counts, initial=0.0) / peak, np.sqrt(mean) / peak
 
 
-def _paths(law: Law, stress: float) -> tuple[tuple[str, ...], Array, Array]:
+def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]:
     """Names, places (steps, paths, dim) in m, and which paths hold the normal stress from STEPS/10.
 
     The closures of those that hold it are first guesses.
@@ -234,7 +230,7 @@ def _paths(law: Law, stress: float) -> tuple[tuple[str, ...], Array, Array]:
     return tuple(named), R * np.stack(list(named.values()), axis=1), held
 
 
-def _excursions(law: Law, stress: float, count: int) -> Array:
+def _excursions(law: JointLaw, stress: float, count: int) -> Array:
     """Random places (steps, count, dim) in m."""
     rng, R, s = np.random.default_rng(8), law.closure_range, np.arange(1, STEPS + 1) / STEPS
     goal = []
@@ -256,7 +252,7 @@ def _excursions(law: Law, stress: float, count: int) -> Array:
     return R * np.stack(goal, axis=1)[:, :, : law.tables.dim]
 
 
-def far_path(law: Law, rng: np.random.Generator, stress: float, s: Array) -> Array:
+def far_path(law: JointLaw, rng: np.random.Generator, stress: float, s: Array) -> Array:
     """Random places (steps, 3) in closure ranges: slip at one closure, back, and forth again.
 
     The closure is that at a normal stress between a tenth of `stress` and all of it.
@@ -271,7 +267,7 @@ def far_path(law: Law, rng: np.random.Generator, stress: float, s: Array) -> Arr
     return np.stack([shut, np.cos(turn) * shear, np.sin(turn) * shear], axis=-1)
 
 
-def _hold_stress(law: Law, d: Array, held: Array, stress: float) -> Array:
+def _hold_stress(law: JointLaw, d: Array, held: Array, stress: float) -> Array:
     """Increments whose closures keep the normal stress on the paths `held`."""
     d, which, condition = d.copy(), np.flatnonzero(held), NormalCondition(stress, stress)
     batch = law.joints(len(which), ledger=False)

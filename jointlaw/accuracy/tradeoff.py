@@ -1,12 +1,14 @@
 """The price list of a law: what each resolution costs and how far its tractions are off."""
 
+from __future__ import annotations
+
 import csv
 import io
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,8 +17,11 @@ from ..parameters.resolution import Resolution, named, resolve
 from ..support.checks import Array, whole
 from ..support.files import replace_file
 from ..support.progress import track
-from ..support.pyplot import pyplot, written
-from .suite import Law, Suite, errors, reference_resolution, scaled, standard_suite, tangents
+from ..support.pyplot import pyplot, style, written
+from .suite import Suite, errors, reference_resolution, scaled, standard_suite, tangents
+
+if TYPE_CHECKING:
+    from ..law import JointLaw
 
 SPREAD = tuple(
     Resolution(u, phi, depth)
@@ -143,6 +148,7 @@ class Tradeoff:
         writer.writerows(zip(*table.values(), strict=True))
         replace_file(Path(path), stream.getvalue().encode())
 
+    @style()
     def plot(self, path: str | Path | None = None) -> Any:
         """Largest error against sliders and, where it was timed, against time per update.
 
@@ -182,7 +188,7 @@ class Tradeoff:
 
 
 def tradeoff(
-    law: Law,
+    law: JointLaw,
     resolutions: Sequence[str | Resolution] | None = None,
     joints: int = 10_000,
     seconds: float = 0.2,
@@ -209,7 +215,7 @@ def tradeoff(
     return Tradeoff(suite.names, suite.uncertainty, rows, joints, how, names)
 
 
-def _price(law: Law, suite: Suite, exact: Array, joints: int, seconds: float) -> Price:
+def _price(law: JointLaw, suite: Suite, exact: Array, joints: int, seconds: float) -> Price:
     miss = suite.miss(law)
     steps, paths = exact.shape[:2]
     C = tangents(law, suite.d).reshape(steps, paths, -1)
@@ -222,7 +228,7 @@ def _price(law: Law, suite: Suite, exact: Array, joints: int, seconds: float) ->
     )  # fmt: skip
 
 
-def _time(law: Law, n: int, tangent: bool, seconds: float) -> float:
+def _time(law: JointLaw, n: int, tangent: bool, seconds: float) -> float:
     """Least time of an update in ns per joint, of runs that take this long together."""
     if n == 0:
         return float("nan")

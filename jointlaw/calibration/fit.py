@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ..law import JointLaw
 from ..support.checks import Array
-from ..support.pyplot import pyplot, written
+from ..support.pyplot import pyplot, style, written
 from .forward import build, build_for_shear, log_stress
 from .measured import ClosureCurve, ShearCurve
 from .priors import TRANSFORMS, Ranges, Values
@@ -195,6 +195,7 @@ class Fit:
             lines += ["", NO_COMPLIANCE]
         return "\n".join(lines) + "\n"
 
+    @style()
     def plot(
         self, path: str | Path | None = None, held_out: tuple[Array, Array] | None = None
     ) -> Any:

@@ -37,6 +37,8 @@ def pyplot() -> Any:
 def style() -> Iterator[Any]:
     """matplotlib.pyplot with `STYLE`, as in `with style() as plt:`; the user's own style returns.
 
+    As `@style()` it gives a function that draws this style.
+
     Raises ImportError with the remedy where matplotlib is missing.
     """
     plt = pyplot()

@@ -1,6 +1,6 @@
 """Where the law puts its nodes: inclinations against the density, touch depths against the curve.
 
-Both rules only choose places. What the law keeps exact (docs/accuracy-measured.md) holds at any
+Both rules only choose places. What the law keeps exact (docs/validation.md) holds at any
 number of nodes; `benchmarks/nodes.py` measures these rules against others.
 """
 

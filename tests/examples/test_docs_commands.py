@@ -46,7 +46,7 @@ def cases():
 def _files_that_the_reader_has():
     z = gaussian_filter(np.random.default_rng(0).standard_normal((400, 400)), 5)
     np.savetxt("scan.csv", 400 * z, delimiter=",")
-    Path("block.toml").write_text(blocks("docs/recipes.md", "toml")[0])
+    Path("block.toml").write_text(blocks("docs/blocks.md", "toml")[0])
 
 
 @pytest.mark.usefixtures("_files_that_the_reader_has")
@@ -61,7 +61,7 @@ def test_short_commands_run(line):
     if "out/block" in words:  # 25 degrees are below atan(0.4) + 30 degrees, all that it can have
         summary = json.loads(Path("out/block/summary.json").read_text())
         assert summary["slip"][0]["slip_angle"] is None
-        assert summary["largest_energy_error"] < 1e-3  # as docs/scenes.md says of rest
+        assert summary["largest_energy_error"] < 1e-3  # as docs/blocks.md says of rest
 
 
 def test_long_commands_are_still_printed():

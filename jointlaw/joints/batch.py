@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..discretisation.tables import Tables
 from ..kernels import reference, wear
-from ..kernels.blocks import LANES, empty_blocks, rows_of, write_rows
+from ..kernels.blocks import LANES, empty_blocks, rows_of, write_rows, zeros
 from ..kernels.engine import Step, engine
 from ..kernels.reference import Measures
 from ..parameters.asperity import Asperity
@@ -76,7 +76,7 @@ class JointBatch:
         self.__dict__.update(state)
         self._engine, rows = engine(self.law.tables), state["_state"]
         blocks, kept, lanes = rows.shape
-        self._state = np.zeros((blocks, self._engine.rows, lanes))
+        self._state = zeros(blocks, self._engine.rows, lanes)
         self._state[:, :kept] = rows
         self._engine.refresh(self._state, self._n)
 
@@ -177,7 +177,7 @@ class JointBatch:
         if n < self._n:
             self.reset(np.arange(n, self._n))
         elif n > blocks * lanes:  # grow by doubling, so that steady growth copies rarely
-            grown = np.zeros((max(-(-n // LANES), 2 * blocks), rows, LANES))
+            grown = zeros(max(-(-n // LANES), 2 * blocks), rows, LANES)
             write_rows(grown, rows_of(self._state, self._n), np.arange(self._n))
             self._state = grown
         self._n = n
@@ -192,7 +192,7 @@ class JointBatch:
 
     @property
     def kernel(self) -> str:
-        """Which kernel advances these joints: "numba" or "numpy"."""
+        """Which kernel advances these joints: "native" or "numpy"."""
         return self._engine.name
 
     @property

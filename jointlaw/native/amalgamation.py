@@ -1,0 +1,5 @@
+"""placeholder"""
+
+
+def amalgamation(texts):
+    return ""

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from .discretisation.facets import Facets, facets
 from .discretisation.first_loading import FirstLoading
-from .discretisation.tables import UNDERFLOW, VERSION, Tables, largest_reach, tables
+from .discretisation.tables import VERSION, Tables, largest_reach, tables
 from .discretisation.virgin_curve import VirginCurve, virgin_curve
 from .joints.batch import JointBatch
 from .joints.joint import Joint
@@ -26,6 +26,7 @@ from .parameters.heights import HeightDistribution
 from .parameters.orientation import Orientation
 from .parameters.resolution import LOSS_REMOVED, Resolution, resolve
 from .support.checks import Array, above, finite, number
+from .support.thresholds import UNDERFLOW
 
 if TYPE_CHECKING:
     from .accuracy.tradeoff import Tradeoff

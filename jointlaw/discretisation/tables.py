@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from ..parameters.asperity import Asperity
 from ..support.checks import Array, frozen
-from ..support.thresholds import UNDERFLOW
 from .facets import Facets
 from .nodes import UNUSED, depth_nodes
 from .virgin_curve import VirginCurve

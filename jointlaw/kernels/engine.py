@@ -24,7 +24,7 @@ CHUNK = 4096  # joints per call of the numpy kernel: keeps its temporaries in ca
 SERIAL = 20_000  # sliders below which a second thread costs more than it saves
 MISSING = (
     "the compiled law was not built, and numpy's kernel is about forty times slower: install a C "
-    "compiler or `pip install ziglang`, then run `python -m jointlaw.native.build`"
+    "compiler or `pip install ziglang`, then run `python -m jointlaw.native`"
 )
 
 

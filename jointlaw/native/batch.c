@@ -17,13 +17,6 @@
 #define BLOCK JLAW_BLOCK /* joints of a block */
 #endif
 
-/* Rows of a state, and with them those that are kept beside it */
-static int state_rows(const jlaw_law *law)
-{
-  const int flattened = law->yields ? law->facets + 1 : 0;
-  return 2 * law->dim + 2 * law->facets * law->cells + flattened + 2 * law->wears;
-}
-
 /* Advance the joints of a block: d, F and C of the first of them */
 static void advance_block(const jlaw_batch *b, double *block, size_t ahead, long first, int count)
 {
@@ -105,9 +98,9 @@ int NAME(jlaw_refresh)(const jlaw_batch *b, long first, long last)
   for (long joint = first; joint < last; joint += JOINTS) {
     const numbers n = {joint_of(b, joint), BLOCK, 0};
     for (int at = 0; at < M && b->rows > kept; at += TOGETHER) {
-      const int some = M - at < TOGETHER ? M - at : TOGETHER, lane = at % JLAW_LANES;
+      const int some = M - at < TOGETHER ? M - at : TOGETHER;
       facets o;
-      facets_now(law, law->facet + (at - lane) * JLAW_COLUMNS + lane, n, at, some, &o);
+      facets_now(law, n, at, &o);
       put(n, kept + at, 1, some, o.f1);
       put(n, kept + M + at, 1, some, o.k1);
       if (!law->yields) continue;

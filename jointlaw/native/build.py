@@ -1,13 +1,9 @@
 """Builds the library of the compiled law, with the standard library of Python alone.
 
-    python -m jointlaw.native.build         into this folder, for this machine
-    python -m jointlaw.native.build --target all --out FOLDER
-
 Compilers are taken in the order clang, g++, gcc, zig: as fast as they make the law. A compiler that
 is there may still be a stub, so a trial file is compiled first.
 """
 
-import argparse
 import hashlib
 import platform
 import shutil
@@ -134,7 +130,7 @@ def library_name(system: str) -> str:
 
 
 def build(compiler: Compiler, folder: Path = HERE) -> Path:
-    """Build the library into the folder; its path. Raises RuntimeError with the compiler's words."""
+    """Build the library into the folder; its path. RuntimeError tells the compiler's words."""
     processor, system = compiler.machine
     levels = LEVELS if processor == "x86_64" else (2,)
     folder.mkdir(parents=True, exist_ok=True)
@@ -180,23 +176,3 @@ def _run(compiler: Compiler, *arguments: object) -> None:
         compiler.run(*arguments)
     except subprocess.CalledProcessError as error:
         raise RuntimeError(f"{' '.join(map(str, error.cmd))}\n{error.stderr}") from None
-
-
-def main() -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(prog="python -m jointlaw.native.build", description=__doc__)
-    parser.add_argument("--target", choices=[*TARGETS, "all"], help="another machine, by zig")
-    parser.add_argument("--out", type=Path, default=HERE, help="folder; of each target one within")
-    given = parser.parse_args()
-    if given.target is None:
-        compiler = find_compiler()
-        if compiler is None:
-            sys.exit("no C compiler works here: install gcc or clang, or `pip install ziglang`")
-        sys.stdout.write(f"{build(compiler, given.out)} by {' '.join(compiler.command)}\n")
-        return
-    for target in TARGETS if given.target == "all" else [given.target]:
-        sys.stdout.write(f"{build(zig(target), given.out / target)}\n")
-
-
-if __name__ == "__main__":
-    main()

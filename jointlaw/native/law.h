@@ -41,6 +41,26 @@ typedef struct { /* what facets add up to */
   real crushed, normal; /* plastic work; A Phi before and after */
 } sums;
 
+/* Rows of a state: the first after the sliders, that of the slip of the asperities, and how many */
+IN int rest_row(const jlaw_law *law) { return 2 * law->dim + 2 * law->facets * law->cells; }
+IN int slip_row(const jlaw_law *law)
+{
+  return rest_row(law) + (law->yields ? law->facets + 1 : 0);
+}
+IN int state_rows(const jlaw_law *law) { return slip_row(law) + 2 * law->wears; }
+
+/* Tables of facets from number `at` on, and of their first depth cell */
+IN const double *facet_of(const jlaw_law *law, int at)
+{
+  const int lane = at % JLAW_LANES;
+  return law->facet + (size_t) (at - lane) * JLAW_COLUMNS + lane;
+}
+IN const double *cell_of(const jlaw_law *law, int at)
+{
+  const int lane = at % JLAW_LANES;
+  return law->depth + (size_t) (at - lane) * (size_t) law->cells * JLAW_ROWS + lane;
+}
+
 /* ------------------------------------------------------------------- the virgin curve */
 
 /* Effective closures below it count as zero: powers and squares of them underflow */
@@ -152,10 +172,10 @@ IN void flatten_facets(real y, real z, real less, real *force, real *slope)
 }
 
 /* Flattened depths of facets, before and after the step, and the virgin curve there */
-IN void press(const jlaw_law *law, const double *f, numbers n, int depth, int kept, int at,
-              int some, const motion *m, facets *o)
+IN void press(const jlaw_law *law, const double *f, numbers n, int kept, int at, int some,
+              const motion *m, facets *o)
 {
-  const int M = law->facets;
+  const int M = law->facets, depth = rest_row(law);
   real y = o->y1;
   if (law->critical_slip < DBL_MAX) /* one depth for a facet and its opposite */
     y = larger(y, 2.0 * column(f, JLAW_M) * m->to[0] - y);
@@ -342,7 +362,8 @@ IN real friction_loss(const sliders *c)
 IN void slide_tangent(const double *f, const double *cell, const sliders *c, facets *o, kind k)
 {
   const of_facet a = column(f, JLAW_STIFF);
-  const yes inside = (o->y1 > column(cell, JLAW_LOW)) & (o->y1 < column(cell, JLAW_HIGH));
+  const of_facet begin = column(cell, JLAW_LOW), end = column(cell, JLAW_HIGH);
+  const yes inside = (o->y1 > begin) & (o->y1 < end);
   const real bend = only(inside, o->bend);
   yes near = o->near;
   if (k.yields) near = near & ((c->k0 > 0.0) | (c->k1 <= 0.0));
@@ -364,7 +385,8 @@ IN void slide_tangent(const double *f, const double *cell, const sliders *c, fac
   o->bst -= along * us * ut;
   o->btt += beta - along * ut * ut;
   if (k.yields) {
-    const real pull = c->strength * only(limited & (c->k1 > 0.0), c->kz1);
+    const yes pulls = limited & (c->k1 > 0.0);
+    const real pull = c->strength * only(pulls, c->kz1);
     o->ws += pull * us;
     o->wt += pull * ut;
     o->open += c->k1;
@@ -396,7 +418,7 @@ IN void add_tangent(const jlaw_law *law, const double *f, const motion *m, const
                     sums *sum, kind k)
 {
   const int drags = law->critical_slip < DBL_MAX;
-  const real open = only((o->z1 > o->z0) & (o->open > 0.0), each(1.0));
+  const yes moves = (o->z1 > o->z0) & (o->open > 0.0);
   const yes own = o->z1 <= o->y1 - column(f, JLAW_YIELD); /* or the opposite facet presses */
   for (int i = 0; i < k.dim; i++) {
     const of_facet n = column(f, JLAW_N + i) * column(f, JLAW_A);
@@ -411,7 +433,7 @@ IN void add_tangent(const jlaw_law *law, const double *f, const motion *m, const
       }
       real to = along * g + left * column(f, JLAW_S + j) + right * column(f, JLAW_T + j);
       if (k.yields) {
-        const real less = open * (n * o->kz1 + s * o->ws + t * o->wt);
+        const real less = only(moves, n * o->kz1 + s * o->ws + t * o->wt);
         to -= j > 0 ? less * pick(own, g, -g) : less * g;
       }
       sum->C[3 * i + j] += to;
@@ -422,12 +444,9 @@ IN void add_tangent(const jlaw_law *law, const double *f, const motion *m, const
 /* Facets from number `at` on: closures, virgin curve, sliders, and their part of F and C */
 IN void step_facets(const jlaw_law *law, int at, const motion *m, numbers n, sums *sum, kind k)
 {
-  const int M = law->facets, D = law->cells, lane = at % JLAW_LANES;
-  const int q = 2 * k.dim, depth = q + 2 * M * D, some = M - at < TOGETHER ? M - at : TOGETHER;
-  const int kept = k.kept ? depth + (k.yields ? M + 1 : 0) + 2 * k.wears : 0;
-  const size_t block = (size_t) (at / JLAW_LANES) * JLAW_LANES;
-  const double *f = law->facet + block * JLAW_COLUMNS + lane;
-  const double *cell = law->depth + block * (size_t) D * JLAW_ROWS + lane;
+  const int M = law->facets, D = law->cells, some = M - at < TOGETHER ? M - at : TOGETHER;
+  const int kept = k.kept ? state_rows(law) : 0;
+  const double *f = facet_of(law, at), *cell = cell_of(law, at);
   facets o;
   o.y0 = o.y1 = o.es = o.et = o.bend = each(0.0);
   for (int i = 0; i < k.dim; i++) {
@@ -452,12 +471,12 @@ IN void step_facets(const jlaw_law *law, int at, const motion *m, numbers n, sum
     put(n, kept + at, 1, some, o.f1);
     put(n, kept + M + at, 1, some, o.k1);
   }
-  o.z0 = o.z1 = o.kz1 = each(0.0);
-  if (k.yields) press(law, f, n, depth, kept, at, some, m, &o);
+  o.z0 = o.z1 = o.fz0 = o.fz1 = o.kz0 = o.kz1 = each(0.0);
+  if (k.yields) press(law, f, n, kept, at, some, m, &o);
   for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_LANES) {
     const of_facet low = column(cell, JLAW_LOW);
     if (!any((o.y0 > low) | (o.y1 > low))) break; /* nor does what is deeper */
-    const int row = q + at * D + i;
+    const int row = 2 * k.dim + at * D + i;
     real qs = take(n, row, D, some), qt = take(n, row + M * D, D, some);
     slide(f, cell, m, &o, &qs, &qt, k);
     put(n, row, D, some, qs);
@@ -483,8 +502,7 @@ IN void step_facets(const jlaw_law *law, int at, const motion *m, numbers n, sum
 IN void step(const jlaw_law *law, numbers n, const of_joint d[3], of_joint F[3], of_joint C[9],
              kind k)
 {
-  const int dim = k.dim, M = law->facets;
-  const int rest = 2 * dim + 2 * M * law->cells, slip = rest + (k.yields ? M + 1 : 0);
+  const int dim = k.dim, M = law->facets, rest = rest_row(law), slip = slip_row(law);
   motion m;
   sums sum[SUMS];
   for (int i = 0; i < dim; i++) {
@@ -530,16 +548,17 @@ IN void step(const jlaw_law *law, numbers n, const of_joint d[3], of_joint F[3],
 /* ------------------------------------------------------------------ what a state is */
 
 /* Facets from number `at` on in a state: y and z with the virgin curve there, as y1 and z1 */
-IN void facets_now(const jlaw_law *law, const double *f, numbers n, int at, int some, facets *o)
+IN void facets_now(const jlaw_law *law, numbers n, int at, facets *o)
 {
-  const int dim = law->dim, depth = 2 * dim + 2 * law->facets * law->cells;
+  const int dim = law->dim, some = law->facets - at < TOGETHER ? law->facets - at : TOGETHER;
+  const double *f = facet_of(law, at);
   o->y1 = o->z1 = o->fz1 = o->kz1 = each(0.0);
   for (int i = 0; i < dim; i++)
     o->y1 += column(f, JLAW_M + i) * take_joint(n, i ? dim + i - 1 : 0);
   o->y1 = resolved(o->y1);
   virgin_curve(law, o->y1, &o->f1, &o->k1, (real *) 0);
   if (!law->yields) return;
-  o->z1 = take(n, depth + at, 1, some);
+  o->z1 = take(n, rest_row(law) + at, 1, some);
   virgin_curve(law, o->z1, &o->fz1, &o->kz1, (real *) 0);
 }
 
@@ -556,8 +575,7 @@ IN void cell_now(const double *cell, const facets *o, int yields, real *G, real 
 /* Friction now over that of unworn asperities */
 IN of_joint worn_now(const jlaw_law *law, numbers n)
 {
-  const int rest = 2 * law->dim + 2 * law->facets * law->cells;
-  const int slip = rest + (law->yields ? law->facets + 1 : 0);
+  const int slip = slip_row(law);
   motion m;
   m.worn = each_joint(1.0);
   if (law->wears) wear_friction(law, take_joint(n, slip), take_joint(n, slip + 1), &m);
@@ -575,18 +593,15 @@ typedef struct {
 IN void measure_facets(const jlaw_law *law, numbers n, int at, of_joint worn, amount_sums *sum,
                        of_joint *reach)
 {
-  const int M = law->facets, D = law->cells, lane = at % JLAW_LANES;
-  const int q = 2 * law->dim, some = M - at < TOGETHER ? M - at : TOGETHER;
-  const size_t block = (size_t) (at / JLAW_LANES) * JLAW_LANES;
-  const double *f = law->facet + block * JLAW_COLUMNS + lane;
-  const double *cell = law->depth + block * (size_t) D * JLAW_ROWS + lane;
+  const int M = law->facets, D = law->cells, some = M - at < TOGETHER ? M - at : TOGETHER;
+  const double *f = facet_of(law, at), *cell = cell_of(law, at);
   const real strength = column(f, JLAW_STRENGTH) * worn, one = each(1.0);
   real held = each(0.0), sheared = each(0.0), whole_slips = one;
   facets o;
-  facets_now(law, f, n, at, some, &o);
+  facets_now(law, n, at, &o);
   for (int i = 0; i < D && any(o.y1 > column(cell, JLAW_LOW)); i++) {
     real G, kappa;
-    const int row = q + at * D + i;
+    const int row = 2 * law->dim + at * D + i;
     const real qs = take(n, row, D, some), qt = take(n, row + M * D, D, some);
     cell_now(cell, &o, law->yields, &G, &kappa);
     const real q2 = qs * qs + qt * qt;

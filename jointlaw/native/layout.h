@@ -1,4 +1,4 @@
-/* Made from layout.py by `python -m jointlaw.native.layout`; change it there. */
+/* Made from layout.py by `python -m jointlaw.native`; change it there. */
 #define JLAW_FORMAT 3 /* of table files */
 enum {
   JLAW_LANES = 4, /* facets side by side in a block of the tables */

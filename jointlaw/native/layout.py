@@ -1,6 +1,6 @@
 """Layout of a law's tables in C, written once: here, from where `layout.h` is made.
 
-    python -m jointlaw.native.layout        writes layout.h and jointlaw.h anew
+`python -m jointlaw.native` writes `layout.h` and `jointlaw.h` anew and builds the library.
 
 A new number of a law or of its facets gets a line below, and is there in C, in table files and in
 what `pack` gives to the library.
@@ -15,9 +15,9 @@ import numpy as np
 
 from ..discretisation.nodes import UNUSED
 from ..discretisation.tables import Tables
-from ..support import thresholds
 from ..kernels.cells import compliance
 from ..kernels.reference import strength
+from ..support import thresholds
 from ..support.checks import Array
 from .amalgamation import amalgamation
 
@@ -94,7 +94,7 @@ ROWS = {  # of a depth cell
 class Law(ctypes.Structure):
     """`struct jlaw_law`."""
 
-    _fields_ = [  # noqa: RUF012
+    _fields_ = [
         *((name, ctypes.c_int) for name in WHOLE),
         *((name, ctypes.c_double) for name in NUMBERS),
         *((name, ctypes.c_void_p) for name in TABLES),
@@ -179,7 +179,7 @@ def _depth(k: Tables) -> Array:
 
 def layout_h() -> str:
     """The text of layout.h."""
-    lines = ["/* Made from layout.py by `python -m jointlaw.native.layout`; change it there. */"]
+    lines = ["/* Made from layout.py by `python -m jointlaw.native`; change it there. */"]
     lines += [f"#define JLAW_FORMAT {FORMAT} /* of table files */", "enum {"]
     lines += [f"  JLAW_LANES = {LANES}, /* facets side by side in a block of the tables */"]
     lines += [f"  JLAW_AZIMUTHS = {AZIMUTHS}, /* most */"]
@@ -211,8 +211,3 @@ def made() -> dict[str, str]:
     texts = {path.name: path.read_text(encoding="utf-8") for path in HERE.glob("*.h")}
     texts["layout.h"] = layout_h()
     return {"layout.h": texts["layout.h"], "jointlaw.h": amalgamation(texts)}
-
-
-if __name__ == "__main__":
-    for name, text in made().items():
-        (HERE / name).write_text(text, encoding="utf-8")

@@ -23,7 +23,7 @@ class StaleLibraryError(ImportError):
 class BatchCall(ctypes.Structure):
     """`jlaw_batch` of batch.h."""
 
-    _fields_ = [  # noqa: RUF012
+    _fields_ = [
         *((name, ctypes.c_void_p) for name in ("law", "state", "d", "F", "C", "index")),
         ("n", ctypes.c_longlong),
         *((name, ctypes.c_int) for name in ("rows", "ledger", "keep")),
@@ -32,7 +32,7 @@ class BatchCall(ctypes.Structure):
 
 @lru_cache(maxsize=1)
 def load() -> ctypes.CDLL | None:
-    """The library, None if there is none; raises StaleLibraryError if it is not of these sources."""
+    """The library, None if there is none; raises StaleLibraryError if it is of other sources."""
     system = {"Darwin": "macos", "Windows": "windows"}.get(platform.system(), "linux")
     path = Path(__file__).parent / build.library_name(system)
     if not path.exists():
@@ -49,7 +49,7 @@ def load_file(path: Path) -> ctypes.CDLL:
     if library.jlaw_sources().decode() != build.sources():
         raise StaleLibraryError(
             f"{path} was built from other sources than lie beside it: build it anew with "
-            "`python -m jointlaw.native.build`, or set JOINTLAW_KERNEL=numpy to do without it"
+            "`python -m jointlaw.native`, or set JOINTLAW_KERNEL=numpy to do without it"
         )
     return library
 

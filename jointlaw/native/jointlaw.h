@@ -253,6 +253,7 @@ extern "C" {
 typedef double jl_real_;
 typedef int jl_yes_, jl_whole_;
 #define JL_LANE_(x, l) (x)
+#define JL_LIST_(of) of(0) /* a vector of of(0), of(1) and so on */
 #define jl_each_(x) (x) /* the number x in all lanes */
 #define jl_pick_(m, a, b) ((m) ? (a) : (b))
 #define jl_only_(m, a) ((m) ? (a) : 0.0)
@@ -267,6 +268,13 @@ typedef double jl_loose_ __attribute__((vector_size(8 * JL_W_), aligned(8), may_
 typedef long long jl_yes_ __attribute__((vector_size(8 * JL_W_)));
 typedef int jl_whole_ __attribute__((vector_size(4 * JL_W_)));
 #define JL_LANE_(x, l) ((x)[l])
+#if JL_W_ == 2
+#define JL_LIST_(of) {of(0), of(1)}
+#elif JL_W_ == 4
+#define JL_LIST_(of) {of(0), of(1), of(2), of(3)}
+#else
+#define JL_LIST_(of) {of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7)}
+#endif
 #define jl_to_whole_(x) __builtin_convertvector(x, jl_whole_)
 #define jl_to_real_(i) __builtin_convertvector(i, jl_real_)
 #ifdef __cplusplus /* "less zero" costs nothing: the compiler leaves it out */
@@ -298,9 +306,19 @@ JL_IN_ jl_real_ jl_root_(jl_real_ x)
 }
 JL_IN_ int jl_any_(jl_yes_ m)
 {
-  long long all = 0;
-  for (int l = 0; l < JL_W_; l++) all |= m[l];
-  return all != 0;
+#if JL_W_ > 2 /* halves first */
+  typedef long long half __attribute__((vector_size(4 * JL_W_)));
+  const union {
+    jl_yes_ m;
+    half h[2];
+  } two = {m};
+  const half all = two.h[0] | two.h[1];
+  long long some = 0;
+  for (int l = 0; l < JL_W_ / 2; l++) some |= all[l];
+  return some != 0;
+#else
+  return (m[0] | m[1]) != 0;
+#endif
 }
 #endif
 #endif
@@ -339,8 +357,9 @@ JL_IN_ void jl_fetch_(const double *table, jl_whole_ i, jl_real_ c[4])
   c[3] = (jl_real_) _mm256_permute2f128_pd(odd, odd2, 0x31);
 #else
   for (int j = 0; j < 4; j++) {
-    jl_real_ of_lanes = jl_each_(0.0);
-    for (int l = 0; l < JL_W_; l++) JL_LANE_(of_lanes, l) = table[4 * JL_LANE_(i, l) + j];
+#define JL_OF_(l) table[4 * JL_LANE_(i, l) + j]
+    const jl_real_ of_lanes = JL_LIST_(JL_OF_);
+#undef JL_OF_
     c[j] = of_lanes;
   }
 #endif
@@ -358,6 +377,7 @@ typedef struct {
 #ifdef JLAW_ABREAST
 typedef jl_real_ jl_of_facet_;
 typedef double jl_of_joint_;
+#define jl_somewhere_(m) 1 /* worth working out for some lanes: to ask costs more here */
 #define JL_TOGETHER_ JL_W_ /* facets that are worked out together */
 #define JL_JOINTS_ 1
 #define JL_JOINT_(x, l) (x)
@@ -371,9 +391,10 @@ JL_IN_ jl_of_facet_ jl_column_(const double *block, int c)
  * lanes beyond them, which have zeros in all tables, read the last one and write nothing. */
 JL_IN_ jl_real_ jl_take_(jl_numbers_ n, int row, int apart, int some)
 {
-  jl_real_ x = {0};
-  for (int l = 0; l < JL_W_; l++)
-    x[l] = n.s[(size_t) (row + (l < some ? l : some - 1) * apart) * n.stride];
+  const int last = (some - 1) * apart;
+#define JL_OF_(l) n.s[(size_t) (row + ((l) < some ? (l) * apart : last)) * n.stride]
+  const jl_real_ x = JL_LIST_(JL_OF_);
+#undef JL_OF_
   return x;
 }
 JL_IN_ void jl_put_(jl_numbers_ n, int row, int apart, int some, jl_real_ x)
@@ -385,6 +406,7 @@ JL_IN_ void jl_put_joint_(jl_numbers_ n, int row, double x) { n.s[(size_t) row *
 #else
 typedef double jl_of_facet_;
 typedef jl_real_ jl_of_joint_;
+#define jl_somewhere_(m) jl_any_(m)
 #define JL_TOGETHER_ 1
 #define JL_JOINTS_ JL_W_
 #define JL_JOINT_(x, l) JL_LANE_(x, l)
@@ -759,7 +781,7 @@ JL_IN_ void jl_load_(const double *f, const jl_facets_ *o, jl_sliders_ *c, jl_re
   c->chord = jl_smaller_(jl_larger_(mean, c->k0), c->k1); /* k1 where it falls */
   c->old2 = *qs * *qs + *qt * *qt;
   const jl_yes_ falls = c->k1 < c->k0;
-  if (jl_any_(falls)) {
+  if (jl_somewhere_(falls)) {
     const jl_real_ kept = jl_pick_(falls, c->k1 / jl_pick_(falls, c->k0, 1.0), 1.0);
     *qs = *qs * kept;
     *qt = *qt * kept;
@@ -772,12 +794,13 @@ JL_IN_ void jl_load_(const double *f, const jl_facets_ *o, jl_sliders_ *c, jl_re
   c->slips = c->new2 > c->cap * c->cap;
   c->unit = jl_each_(0.0);
   c->share = jl_each_(1.0);
-  if (k.tangent || jl_any_(c->slips)) {
+  if (k.tangent || jl_somewhere_(c->slips)) {
     c->unit = jl_only_(c->new2 > JLAW_TINY, 1.0 / jl_root_(c->new2));
     c->share = jl_pick_(c->slips, jl_smaller_(c->cap * c->unit, jl_each_(1.0)), 1.0);
   }
-  *qs = c->share * c->ts;
-  *qt = c->share * c->tt;
+  const jl_real_ part = jl_only_(c->new2 > JLAW_TINY, c->share); /* squares of smaller forces underflow */
+  *qs = part * c->ts;
+  *qt = part * c->tt;
 }
 
 /* What sliders, and springs that part under shear, lose: every term is >= 0 as written */
@@ -839,8 +862,6 @@ JL_IN_ void jl_slide_(const double *f, const double *cell, const jl_motion_ *m, 
     jl_wear_sliders_(&c, m->since, qs, qt, &o->lost);
   }
   jl_load_(f, o, &c, qs, qt, k);
-  *qs = jl_only_(c.new2 > JLAW_TINY, *qs); /* squares of smaller forces underflow */
-  *qt = jl_only_(c.new2 > JLAW_TINY, *qt);
   o->qs += *qs;
   o->qt += *qt;
   if (k.ledger) o->lost += jl_friction_loss_(&c);

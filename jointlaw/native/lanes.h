@@ -28,6 +28,7 @@
 typedef double real;
 typedef int yes, whole;
 #define LANE(x, l) (x)
+#define LIST(of) of(0) /* a vector of of(0), of(1) and so on */
 #define each(x) (x) /* the number x in all lanes */
 #define pick(m, a, b) ((m) ? (a) : (b))
 #define only(m, a) ((m) ? (a) : 0.0)
@@ -42,6 +43,13 @@ typedef double loose __attribute__((vector_size(8 * W), aligned(8), may_alias));
 typedef long long yes __attribute__((vector_size(8 * W)));
 typedef int whole __attribute__((vector_size(4 * W)));
 #define LANE(x, l) ((x)[l])
+#if W == 2
+#define LIST(of) {of(0), of(1)}
+#elif W == 4
+#define LIST(of) {of(0), of(1), of(2), of(3)}
+#else
+#define LIST(of) {of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7)}
+#endif
 #define to_whole(x) __builtin_convertvector(x, whole)
 #define to_real(i) __builtin_convertvector(i, real)
 #ifdef __cplusplus /* "less zero" costs nothing: the compiler leaves it out */
@@ -73,9 +81,19 @@ IN real root(real x)
 }
 IN int any(yes m)
 {
-  long long all = 0;
-  for (int l = 0; l < W; l++) all |= m[l];
-  return all != 0;
+#if W > 2 /* halves first */
+  typedef long long half __attribute__((vector_size(4 * W)));
+  const union {
+    yes m;
+    half h[2];
+  } two = {m};
+  const half all = two.h[0] | two.h[1];
+  long long some = 0;
+  for (int l = 0; l < W / 2; l++) some |= all[l];
+  return some != 0;
+#else
+  return (m[0] | m[1]) != 0;
+#endif
 }
 #endif
 #endif
@@ -114,8 +132,9 @@ IN void fetch(const double *table, whole i, real c[4])
   c[3] = (real) _mm256_permute2f128_pd(odd, odd2, 0x31);
 #else
   for (int j = 0; j < 4; j++) {
-    real of_lanes = each(0.0);
-    for (int l = 0; l < W; l++) LANE(of_lanes, l) = table[4 * LANE(i, l) + j];
+#define OF(l) table[4 * LANE(i, l) + j]
+    const real of_lanes = LIST(OF);
+#undef OF
     c[j] = of_lanes;
   }
 #endif
@@ -133,6 +152,7 @@ typedef struct {
 #ifdef JLAW_ABREAST
 typedef real of_facet;
 typedef double of_joint;
+#define somewhere(m) 1 /* worth working out for some lanes: to ask costs more here */
 #define TOGETHER W /* facets that are worked out together */
 #define JOINTS 1
 #define JOINT(x, l) (x)
@@ -146,9 +166,10 @@ IN of_facet column(const double *block, int c)
  * lanes beyond them, which have zeros in all tables, read the last one and write nothing. */
 IN real take(numbers n, int row, int apart, int some)
 {
-  real x = {0};
-  for (int l = 0; l < W; l++)
-    x[l] = n.s[(size_t) (row + (l < some ? l : some - 1) * apart) * n.stride];
+  const int last = (some - 1) * apart;
+#define OF(l) n.s[(size_t) (row + ((l) < some ? (l) * apart : last)) * n.stride]
+  const real x = LIST(OF);
+#undef OF
   return x;
 }
 IN void put(numbers n, int row, int apart, int some, real x)
@@ -160,6 +181,7 @@ IN void put_joint(numbers n, int row, double x) { n.s[(size_t) row * n.stride] =
 #else
 typedef double of_facet;
 typedef real of_joint;
+#define somewhere(m) any(m)
 #define TOGETHER 1
 #define JOINTS W
 #define JOINT(x, l) LANE(x, l)

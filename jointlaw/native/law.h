@@ -325,7 +325,7 @@ IN void load(const double *f, const facets *o, sliders *c, real *qs, real *qt, k
   c->chord = smaller(larger(mean, c->k0), c->k1); /* k1 where it falls */
   c->old2 = *qs * *qs + *qt * *qt;
   const yes falls = c->k1 < c->k0;
-  if (any(falls)) {
+  if (somewhere(falls)) {
     const real kept = pick(falls, c->k1 / pick(falls, c->k0, 1.0), 1.0);
     *qs = *qs * kept;
     *qt = *qt * kept;
@@ -338,12 +338,13 @@ IN void load(const double *f, const facets *o, sliders *c, real *qs, real *qt, k
   c->slips = c->new2 > c->cap * c->cap;
   c->unit = each(0.0);
   c->share = each(1.0);
-  if (k.tangent || any(c->slips)) {
+  if (k.tangent || somewhere(c->slips)) {
     c->unit = only(c->new2 > JLAW_TINY, 1.0 / root(c->new2));
     c->share = pick(c->slips, smaller(c->cap * c->unit, each(1.0)), 1.0);
   }
-  *qs = c->share * c->ts;
-  *qt = c->share * c->tt;
+  const real part = only(c->new2 > JLAW_TINY, c->share); /* squares of smaller forces underflow */
+  *qs = part * c->ts;
+  *qt = part * c->tt;
 }
 
 /* What sliders, and springs that part under shear, lose: every term is >= 0 as written */
@@ -405,8 +406,6 @@ IN void slide(const double *f, const double *cell, const motion *m, facets *o, r
     wear_sliders(&c, m->since, qs, qt, &o->lost);
   }
   load(f, o, &c, qs, qt, k);
-  *qs = only(c.new2 > JLAW_TINY, *qs); /* squares of smaller forces underflow */
-  *qt = only(c.new2 > JLAW_TINY, *qt);
   o->qs += *qs;
   o->qt += *qt;
   if (k.ledger) o->lost += friction_loss(&c);

@@ -9,12 +9,13 @@ import ctypes
 import os
 import warnings
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..discretisation.tables import Tables
 from ..native import library
+from ..native.library import address
 from ..support.checks import Array, one_of
 from . import reference
 from .blocks import LANES, Index, rows_of, write_rows
@@ -110,22 +111,37 @@ class NativeEngine:
 
     def advance(self, state: Array, step: Step, ledger: bool) -> None:
         """Take a step; `ledger` adds up the dissipated energy."""
-        given = step.d, step.F, step.C, step.where
-        self._call(library.ADVANCE, state, len(step.d), given, ledger, step.keep)
+        d, F, C, where, keep = step
+        pointers = address(d), address(F), None if C is None else address(C)
+        index = None if where is None else address(where)
+        self._call(library.ADVANCE, state, len(d), *pointers, index, ledger, keep)
 
     def refresh(self, state: Array, n: int) -> None:
         """Bring Phi and Phi', kept beside the first n states, up to date with them."""
-        self._call(library.REFRESH, state, n, (None,) * 4)
+        self._call(library.REFRESH, state, n)
 
     def measures(self, state: Array, out: Array) -> None:
         """As `NumpyEngine.measures`."""
-        self._call(library.MEASURE, state, out.shape[1], (None, out, None, None))
+        self._call(library.MEASURE, state, out.shape[1], None, address(out))
 
-    def _call(self, what: int, state: Array, n: int, arrays: tuple[Any, ...], *how: bool) -> None:
+    def _call(
+        self,
+        what: int,
+        state: Array,
+        n: int,
+        d: int | None = None,
+        F: int | None = None,
+        C: int | None = None,
+        index: int | None = None,
+        ledger: bool = True,
+        keep: bool = True,
+    ) -> None:
         """A call of the library for n joints, on one thread or several."""
-        pointers = map(library.address, (state, *arrays))
-        batch = library.BatchCall(self._law.address, *pointers, n, state.shape[1], *how)
-        where, alone = ctypes.addressof(batch), state.shape[2] == 1
+        _, rows, lanes = state.shape
+        batch = library.BatchCall(
+            self._law.address, address(state), d, F, C, index, n, rows, ledger, keep
+        )
+        where, alone = ctypes.addressof(batch), lanes == 1
         if n * self._sliders <= SERIAL or (threads := min(thread_count(), -(-n // LANES))) == 1:
             library.check(self._run(where, 0, n, what, alone, self.lanes))
             return

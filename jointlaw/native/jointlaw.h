@@ -357,9 +357,8 @@ JL_IN_ void jl_fetch_(const double *table, jl_whole_ i, jl_real_ c[4])
   c[3] = (jl_real_) _mm256_permute2f128_pd(odd, odd2, 0x31);
 #else
   for (int j = 0; j < 4; j++) {
-#define JL_OF_(l) table[4 * JL_LANE_(i, l) + j]
-    const jl_real_ of_lanes = JL_LIST_(JL_OF_);
-#undef JL_OF_
+    jl_real_ of_lanes = jl_each_(0.0);
+    for (int l = 0; l < JL_W_; l++) JL_LANE_(of_lanes, l) = table[4 * JL_LANE_(i, l) + j];
     c[j] = of_lanes;
   }
 #endif
@@ -960,9 +959,9 @@ JL_IN_ void jl_step_(const jlaw_law *law, jl_numbers_ n, const jl_of_joint_ d[3]
   const int dim = k.dim, M = law->facets, rest = jl_rest_row_(law), slip = jl_slip_row_(law);
   jl_motion_ m;
   jl_sums_ sum[JL_SUMS_];
-  for (int i = 0; i < dim; i++) {
-    m.p[i] = d[i];
-    m.from[i] = jl_take_joint_(n, i ? dim + i - 1 : 0);
+  for (int i = 0; i < 3; i++) {
+    m.p[i] = i < dim ? d[i] : jl_each_joint_(0.0);
+    m.from[i] = i < dim ? jl_take_joint_(n, i ? dim + i - 1 : 0) : jl_each_joint_(0.0);
     m.to[i] = m.from[i] + m.p[i];
   }
   jl_limit_offset_(law, dim, &m);

@@ -132,9 +132,8 @@ IN void fetch(const double *table, whole i, real c[4])
   c[3] = (real) _mm256_permute2f128_pd(odd, odd2, 0x31);
 #else
   for (int j = 0; j < 4; j++) {
-#define OF(l) table[4 * LANE(i, l) + j]
-    const real of_lanes = LIST(OF);
-#undef OF
+    real of_lanes = each(0.0);
+    for (int l = 0; l < W; l++) LANE(of_lanes, l) = table[4 * LANE(i, l) + j];
     c[j] = of_lanes;
   }
 #endif

@@ -504,9 +504,9 @@ IN void step(const jlaw_law *law, numbers n, const of_joint d[3], of_joint F[3],
   const int dim = k.dim, M = law->facets, rest = rest_row(law), slip = slip_row(law);
   motion m;
   sums sum[SUMS];
-  for (int i = 0; i < dim; i++) {
-    m.p[i] = d[i];
-    m.from[i] = take_joint(n, i ? dim + i - 1 : 0);
+  for (int i = 0; i < 3; i++) {
+    m.p[i] = i < dim ? d[i] : each_joint(0.0);
+    m.from[i] = i < dim ? take_joint(n, i ? dim + i - 1 : 0) : each_joint(0.0);
     m.to[i] = m.from[i] + m.p[i];
   }
   limit_offset(law, dim, &m);

@@ -4,11 +4,11 @@ import ctypes
 import platform
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..discretisation.tables import Tables
-from ..support.checks import Array
 from . import build
 from .layout import Law, in_blocks, pack
 
@@ -68,9 +68,12 @@ class NativeLaw:
         self.address = ctypes.addressof(self._law)
 
 
-def address(array: Array | None) -> int | None:
-    """Where the numbers of an array begin."""
-    return None if array is None else array.__array_interface__["data"][0]
+def address(array: Any) -> int:
+    """Where the numbers of a contiguous array begin."""
+    try:  # four times as fast as numpy's own
+        return ctypes.addressof(ctypes.c_char.from_buffer(array))
+    except (TypeError, ValueError):  # it is empty, or may only be read
+        return int(array.ctypes.data)
 
 
 def check(result: int) -> None:

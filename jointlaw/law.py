@@ -18,7 +18,7 @@ from .discretisation.tables import VERSION, Tables, largest_reach, tables
 from .discretisation.virgin_curve import VirginCurve, virgin_curve
 from .joints.batch import JointBatch
 from .joints.joint import Joint
-from .kernels import reference
+from .kernels.engine import step_states
 from .parameters import toml
 from .parameters.asperity import Asperity
 from .parameters.fingerprint import fingerprint
@@ -137,30 +137,27 @@ class JointLaw:
         return batch
 
     def step(
-        self, state: ArrayLike, d: ArrayLike, tangent: bool = True
+        self, states: ArrayLike, d: ArrayLike, tangent: bool = True
     ) -> tuple[Array, Array, Array | None]:
         """One step as a pure function, for a host that keeps the states itself.
 
-        state: (state_size,), or (state_size, n) for n joints; zeros are the virgin state.
-        d: displacement increment in m, (dim,) or (dim, n).
-        Returns the new state, F in Pa (dim,) or (dim, n), and C in Pa/m (dim, dim) or
-        (dim, dim, n), None without `tangent`; what was given stays as it was. The algorithm and its
-        equations: `jointlaw.kernels.reference.step`, which this calls. Raises ValueError for a
-        wrong shape or a number that is not finite.
+        states: (n, state_size), or (state_size,) for one joint; zeros are the virgin state.
+        d: displacement increments in m, (n, dim) or (dim,).
+        Returns the new states, F in Pa (n, dim) or (dim,), and C in Pa/m (n, dim, dim) or
+        (dim, dim), None without `tangent`; what was given stays as it was. The algorithm and its
+        equations: `jointlaw.kernels.reference.step`; it runs compiled, on all threads. Raises
+        ValueError for a wrong shape or a number that is not finite.
         """
-        old, move = finite("state", state, "numbers of state"), finite("d", d, "m")
-        k, several = self.tables, old.ndim == 2
-        rest = old.shape[1:]
-        if old.shape not in ((k.rows,), (k.rows, *rest)) or move.shape != (k.dim, *rest):
+        old, move = finite("states", states, "numbers of state"), finite("d", d, "m")
+        rows, dim, joints = self.state_size, self.tables.dim, old.shape[:-1]
+        if old.ndim not in (1, 2) or old.shape[-1] != rows or move.shape != (*joints, dim):
             raise ValueError(
-                f"state has shape {old.shape} and d {move.shape}; expected ({k.rows},) and "
-                f"({k.dim},), or ({k.rows}, n) and ({k.dim}, n) for n joints"
+                f"states have shape {old.shape} and d {move.shape}; expected (n, {rows}) and "
+                f"(n, {dim}), or ({rows},) and ({dim},) for one joint"
             )
-        columns = old.reshape(k.rows, -1), move.reshape(k.dim, -1)
-        new, F, C = reference.step(k, *columns, tangent)
-        if several:
-            return new, F, C
-        return new[:, 0], F[:, 0], None if C is None else C[..., 0]
+        new, F, C = step_states(self.tables, old.reshape(-1, rows), move.reshape(-1, dim), tangent)
+        C = None if C is None else C.reshape(*joints, dim, dim)
+        return new.reshape(*joints, rows), F.reshape(*joints, dim), C
 
     @property
     def state_size(self) -> int:

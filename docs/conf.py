@@ -16,6 +16,7 @@ sys.path[:0] = [str(HERE / "_ext"), str(HERE.parent)]
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 import jointlaw  # noqa: E402
+from jointlaw.support.pyplot import STYLE, pyplot  # noqa: E402
 
 # One script within the site that draws letters as outlines: formulas need neither network nor fonts
 MATHJAX = Path(find_spec("sphinx-mathjax-offline").origin).parent / "static/mathjax/tex-svg-full.js"
@@ -30,11 +31,12 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx_gallery.gen_gallery",
     "sphinx.ext.mathjax",
+    "claims",
     "commands",
     "docstrings",
     "pages",
 ]
-exclude_patterns = ["_build", "gallery", "_ext"]
+exclude_patterns = ["_build", "gallery", "paper", "_ext"]
 suppress_warnings = [
     "config.cache",  # the settings of the gallery hold objects
 ]
@@ -63,11 +65,22 @@ ORDER = (
     "cyclic_shear", "damping", "anisotropy", "large_shear", "fit_closure", "from_scan", "table",
     "batch", "blocks", "newton", "snapshot",
 )  # fmt: skip
+
+
+def set_style(settings, name):
+    """Give an example the style of all pictures, after the gallery has reset matplotlib."""
+    pyplot().rcParams.update(STYLE)
+
+
+FIGURES = sorted(path.name for path in HERE.glob("paper/plot_*.py"))
 sphinx_gallery_conf = {
-    "examples_dirs": "gallery",
-    "gallery_dirs": "examples",
-    "within_subsection_order": ExplicitOrder([f"plot_{name}.py" for name in ORDER]),
+    "examples_dirs": ["gallery", "paper"],
+    "gallery_dirs": ["examples", "figures"],
+    "ignore_pattern": "^_",  # what scripts share
+    "within_subsection_order": ExplicitOrder([f"plot_{name}.py" for name in ORDER] + FIGURES),
+    "reset_modules": ("matplotlib", set_style),
     "remove_config_comments": True,
+    "capture_repr": (),  # what is printed, not what a last line returns
     "download_all_examples": False,
     "show_memory": False,
     "write_computation_times": False,

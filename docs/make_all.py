@@ -28,15 +28,14 @@ EXTREMES = ("matrix", "fuzz", "drift", "dynamics", "impact", "exact", "control",
             "forgetting")  # fmt: skip
 PICTURES = tuple(make_pictures.RUNS)
 PRINTED = {
-    "intervals": ("fits-measured.md", "benchmarks/intervals.py --draws 25 --workers 1"),
-    "held-out-few": ("fits-measured.md", "benchmarks/held_out.py --draws 20 --few --workers 1"),
+    "intervals": ("fits-measured.md", "docs/measure/intervals.py --draws 25 --workers 1"),
+    "held-out-few": ("fits-measured.md", "docs/measure/held_out.py --draws 20 --few --workers 1"),
     "held-out-narrow": (
         "fits-measured.md",
-        "benchmarks/held_out.py --draws 20 --few --prior full_contact_stress=2e7,2e10 --workers 1",
+        "docs/measure/held_out.py --draws 20 --few --prior full_contact_stress=2e7,2e10 "
+        "--workers 1",
     ),
-    "peak-residual": ("fits-measured.md", "benchmarks/peak_residual.py"),
-    "claims": ("paper.md", "-m jointlaw figures --claims"),
-    "claims-yielding": ("paper.md", "benchmarks/claims_yielding.py"),
+    "peak-residual": ("fits-measured.md", "docs/measure/peak_residual.py"),
 }
 PRINTED_TIMES = {
     "update": ("speed.md", "benchmarks/update.py --rounds 3 --seconds 0.05"),

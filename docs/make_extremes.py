@@ -12,9 +12,7 @@ from pathlib import Path
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent / "tests" / "verification"))
 
-import os  # noqa: E402
 import re  # noqa: E402
-import tempfile  # noqa: E402
 import time  # noqa: E402
 
 import numpy as np  # noqa: E402
@@ -200,6 +198,4 @@ def main():
 
 if __name__ == "__main__":
     np.seterr(all="raise", under="ignore")
-    with tempfile.TemporaryDirectory() as folder:
-        os.environ["JOINTLAW_REPLAY_DIR"] = folder
-        main()
+    main()

@@ -11,106 +11,99 @@ from . import presets
 from .joints.batch import JointBatch
 from .joints.joint import Joint
 from .joints.pool import JointPool
-from .joints.state import JointState, NonFiniteError, load_state
-from .laboratory.experiments import PathError, closure_test, direct_shear
+from .joints.state import NonFiniteError, load_state
+from .laboratory.experiments import closure_test, direct_shear
 from .laboratory.record import Record
 from .law import JointLaw
 from .paper import closed_form
-from .paper.secant import Secant, secant
+from .paper.secant import secant
 from .parameters.asperity import Asperity
 from .parameters.heights import GammaHeights, Heights
 from .parameters.orientation import Orientation
 from .parameters.resolution import Resolution
 from .support.version import __version__ as __version__
-from .tables.table import JointTable, load_table
+from .tables.joint_table import JointTable, load_table
 
 if TYPE_CHECKING:
-    from .calibration import baselines, datasets, unloading
-    from .calibration.fit import Fit, fit_closure, fit_curves, fit_many, fit_shear
-    from .calibration.measured import ClosureCurve, ShearCurve, first_loading
-    from .hosts.c.export import export_c, include_dir
+    from .calibration.fit import fit_closure, fit_curves, fit_shear
+    from .hosts.c.export import export_c
     from .hosts.lammps.export import export_lammps
     from .hosts.yade.export import export_yade
-    from .laboratory.flow import hydraulic_aperture, transmissivity
-    from .surface.fit import SurfaceFit, from_surface
-    from .surface.synthetic import synthetic_surface
+    from .surface.fit import from_surface
     from .tables.tabulate import tabulate
 
 __all__ = [
     "Asperity",
-    "ClosureCurve",
-    "Fit",
     "GammaHeights",
     "Heights",
     "Joint",
     "JointBatch",
     "JointLaw",
     "JointPool",
-    "JointState",
     "JointTable",
     "NonFiniteError",
     "Orientation",
-    "PathError",
     "Record",
     "Resolution",
-    "Secant",
-    "ShearCurve",
-    "SurfaceFit",
-    "baselines",
     "closed_form",
     "closure_test",
-    "datasets",
     "direct_shear",
     "export_c",
     "export_lammps",
     "export_yade",
-    "first_loading",
     "fit_closure",
     "fit_curves",
-    "fit_many",
     "fit_shear",
     "from_surface",
-    "hydraulic_aperture",
-    "include_dir",
     "load_state",
     "load_table",
     "presets",
     "secant",
-    "synthetic_surface",
     "tabulate",
-    "transmissivity",
-    "unloading",
 ]
 
 # Tools for measurements and hosts load on first use: a DEM code that embeds the law needs none
 _LATER = {
-    "ClosureCurve": "calibration.measured",
-    "Fit": "calibration.fit",
-    "ShearCurve": "calibration.measured",
-    "SurfaceFit": "surface.fit",
     "export_c": "hosts.c.export",
     "export_lammps": "hosts.lammps.export",
     "export_yade": "hosts.yade.export",
-    "first_loading": "calibration.measured",
     "fit_closure": "calibration.fit",
     "fit_curves": "calibration.fit",
-    "fit_many": "calibration.fit",
     "fit_shear": "calibration.fit",
     "from_surface": "surface.fit",
-    "hydraulic_aperture": "laboratory.flow",
-    "include_dir": "hosts.c.export",
-    "synthetic_surface": "surface.synthetic",
     "tabulate": "tables.tabulate",
-    "transmissivity": "laboratory.flow",
 }
-_LATER_MODULES = {name: f"calibration.{name}" for name in ("baselines", "datasets", "unloading")}
+# Names of former versions, and what to use
+_MOVED = {
+    "ClosureCurve": "jointlaw.calibration.measured.ClosureCurve",
+    "Fit": "jointlaw.calibration.fit.Fit",
+    "JointState": "jointlaw.joints.state.JointState",
+    "PathError": "jointlaw.laboratory.experiments.PathError",
+    "Secant": "jointlaw.paper.secant.Secant",
+    "ShearCurve": "jointlaw.calibration.measured.ShearCurve",
+    "SurfaceFit": "jointlaw.surface.fit.SurfaceFit",
+    "datasets": "jointlaw.calibration.datasets",
+    "first_loading": "jointlaw.calibration.measured.first_loading",
+    "hydraulic_aperture": "jointlaw.laboratory.flow.hydraulic_aperture",
+    "include_dir": "jointlaw.hosts.c.export.include_dir",
+    "transmissivity": "jointlaw.laboratory.flow.transmissivity",
+}
+# Names that were removed, and what to use
+_REMOVED = {
+    "baselines": "docs/measure/held_out.py fits a power law and Barton-Bandis",
+    "fit_many": "map jl.fit_closure over the curves with any concurrent.futures.Executor",
+    "synthetic_surface": "docs/gallery/plot_from_scan.py makes a surface in ten lines",
+    "unloading": "jl.fit_closure(stress, closure, cycle=True) fits and reports unloading",
+}
 
 
 def __getattr__(name: str) -> Any:
-    if name in _LATER_MODULES:
-        return import_module(f".{_LATER_MODULES[name]}", __name__)
     if name in _LATER:
         return getattr(import_module(f".{_LATER[name]}", __name__), name)
+    if name in _MOVED:
+        raise AttributeError(f"jointlaw.{name} is no public name any more: use {_MOVED[name]}")
+    if name in _REMOVED:
+        raise AttributeError(f"jointlaw.{name} was removed: {_REMOVED[name]}")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -13,18 +13,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .discretisation.facets import Facets, facets
-from .discretisation.first_loading import FirstLoading
+from .discretisation.first_loading import FirstLoading, facet_sum
 from .discretisation.tables import VERSION, Tables, largest_reach, tables
 from .discretisation.virgin_curve import VirginCurve, virgin_curve
 from .joints.batch import JointBatch
+from .joints.crushed import warn_if_crushed
 from .joints.joint import Joint
+from .joints.time_step import largest_stiffness, stable_step
 from .kernels.engine import step_states
-from .parameters import toml
+from .parameters import keys, toml
 from .parameters.asperity import Asperity
 from .parameters.fingerprint import fingerprint
-from .parameters.heights import HeightDistribution
+from .parameters.heights import GammaHeights, HeightDistribution, Heights
 from .parameters.orientation import Orientation
-from .parameters.resolution import LOSS_REMOVED, Resolution, resolve
+from .parameters.resolution import LOSS_REMOVED, NAMED, Resolution, resolve
 from .support.checks import Array, above, finite, number
 from .support.thresholds import UNDERFLOW
 
@@ -45,7 +47,8 @@ class JointLaw:
     heights: distribution of asperity heights, or None when all asperities touch at zero closure.
     asperity_density: N, asperities per m2, > 0.
     closure_range: largest closure (m) that the depth cells are placed for, > 0; beyond it the
-        normal force stays exact. None takes the closure at 20 MPa without yielding.
+        normal force stays exact. None takes the closure at 20 MPa without yielding, by the
+        orientations of "balanced" whatever the resolution.
     resolution: "fast", "balanced", "fine", "reference" or a `Resolution`. A name becomes the
         `Resolution` that suits critical_slip over closure_range (docs/how-accurate.md); where
         `replace` changes these, give it the name again.
@@ -75,15 +78,14 @@ class JointLaw:
         for name, kind in (("orientation", Orientation), ("asperity", Asperity)):
             if not isinstance(value := getattr(self, name), kind):
                 raise ValueError(f"{name} = {value!r} must be of type {kind.__name__}")
-        if not (self.heights is None or isinstance(self.heights, HeightDistribution)):
+        if not isinstance(self.heights, GammaHeights | Heights | None):
             raise ValueError(
-                f"heights = {self.heights!r} must be GammaHeights, Heights, None, or an object "
-                "with their overlap, formation, pdf, cdf and breakpoints"
+                f"heights = {self.heights!r} must be GammaHeights, Heights or None; a histogram in "
+                "Heights stands for any other distribution"
             )
         set_(self, "asperity_density", above("asperity_density", self.asperity_density, 0.0))
         asked: str | Resolution = self.resolution
-        nodes = resolve(asked)
-        set_(self, "resolution", nodes)
+        set_(self, "resolution", resolve(asked))
         if self.plane is not None:
             set_(self, "plane", number("plane", self.plane))
         if not isinstance(self.closure_only, bool):
@@ -98,16 +100,13 @@ class JointLaw:
                 f"critical_slip = {self.critical_slip!r} m is out of bounds: it must be >= "
                 f"{UNDERFLOW:g}"
             )
-        with np.errstate(all="ignore"):  # what is no number in the end is refused
+        with np.errstate(all="ignore"):  # a result that is not finite is refused below
             if self.closure_range is None:
                 set_(self, "closure_range", self._default_range())
             set_(self, "closure_range", above("closure_range", self.closure_range, 0.0))
             lengths = self.critical_slip, self.asperity.yield_interference, self.closure_range
             set_(self, "resolution", resolve(asked, *lengths))
-            if self.resolution != nodes:
-                for cached in ("facets", "_scale", "_first_loading"):  # by the closure range
-                    self.__dict__.pop(cached, None)
-            self._require_numbers(self.closure_range)  # and with it that the curve is valid
+            self._require_numbers(self.closure_range)  # and check the virgin curve
 
     # ----------------------------------------------------------------- joints
 
@@ -119,7 +118,8 @@ class JointLaw:
         """
         joint = Joint(self)
         if normal_stress != 0.0:
-            joint.update(np.eye(self.tables.dim)[0] * self.closure(normal_stress), tangent=False)
+            joint.update(np.eye(self.dim)[0] * self.closure(normal_stress), tangent=False)
+            warn_if_crushed(self, joint.delta[0])
         return joint
 
     def joints(self, n: int, ledger: bool = True, normal_stress: ArrayLike = 0.0) -> JointBatch:
@@ -133,7 +133,8 @@ class JointLaw:
             closure = np.asarray(self.closure(normal_stress))
             if closure.shape not in ((), (n,)):
                 raise ValueError(f"normal_stress has shape {closure.shape}: give one or ({n},)")
-            batch.update(np.outer(closure * np.ones(n), np.eye(self.tables.dim)[0]), tangent=False)
+            batch.update(np.outer(closure * np.ones(n), np.eye(self.dim)[0]), tangent=False)
+            warn_if_crushed(self, closure)
         return batch
 
     def step(
@@ -149,7 +150,7 @@ class JointLaw:
         ValueError for a wrong shape or a number that is not finite.
         """
         old, move = finite("states", states, "numbers of state"), finite("d", d, "m")
-        rows, dim, joints = self.state_size, self.tables.dim, old.shape[:-1]
+        rows, dim, joints = self.state_size, self.dim, old.shape[:-1]
         if old.ndim not in (1, 2) or old.shape[-1] != rows or move.shape != (*joints, dim):
             raise ValueError(
                 f"states have shape {old.shape} and d {move.shape}; expected (n, {rows}) and "
@@ -158,6 +159,11 @@ class JointLaw:
         new, F, C = step_states(self.tables, old.reshape(-1, rows), move.reshape(-1, dim), tangent)
         C = None if C is None else C.reshape(*joints, dim, dim)
         return new.reshape(*joints, rows), F.reshape(*joints, dim), C
+
+    @property
+    def dim(self) -> int:
+        """Components of a displacement: 3, or 2 with a plane, or 1 with closure_only."""
+        return self.tables.dim
 
     @property
     def state_size(self) -> int:
@@ -182,11 +188,11 @@ class JointLaw:
         stress = finite("normal_stress", normal_stress, "Pa")
         if not (stress >= 0).all():
             raise ValueError(f"normal_stress = {normal_stress!r} is out of bounds: it must be >= 0")
-        start = self.closure_range
-        result = np.array(
-            [self._first_loading.closure(float(one), start) for one in stress.ravel()]
+        if stress.ndim == 0:
+            return np.float64(self._first_loading.closure(float(stress), self.closure_range))
+        return self._first_loading.closures(stress.ravel(), self.closure_range).reshape(
+            stress.shape
         )
-        return result.reshape(stress.shape)[()]
 
     def contacts(self, closure: ArrayLike, direction: tuple[float, float] | None = None) -> Any:
         """Asperities in touch per m2 at this closure (m), Eq. 11.
@@ -203,32 +209,39 @@ class JointLaw:
 
     # ------------------------------------------------- stiffness and time step
 
-    def max_stiffness(self, closure: ArrayLike) -> Any:
-        """Upper bound of `|C|` (Pa/m) while no facet's effective closure exceeds `closure` (m)."""
-        k, p = self.tables, self.asperity
-        _, slope = k.curve.force(self._within_reach(closure))
-        per_facet = float(np.sum(k.area / k.c1))
-        return ((max(1.0, 1.0 / p.lam) + p.mu) * per_facet * slope)[()]
+    def max_stiffness(self, closure: ArrayLike, shear: ArrayLike = 0.0) -> Any:
+        """Upper bound of `|C|` (Pa/m) up to this closure (m) and this shear displacement (m, >= 0).
 
-    def critical_time_step(self, mass: ArrayLike, area: ArrayLike, closure: ArrayLike) -> Any:
+        The shear may have any direction, and counts up to critical_slip. Yielded and worn joints
+        are less stiff.
+        """
+        y, way = self._within_reach(closure), finite("shear", shear, "m")
+        if not (way >= 0).all():
+            raise ValueError(f"shear = {shear!r} m is out of bounds: it must be >= 0")
+        rise = np.minimum(way, self.critical_slip)[..., None] * np.linalg.norm(
+            self.tables.m[1:], axis=0
+        )
+        self._within_reach(y + np.max(rise, axis=-1))
+        return largest_stiffness(self.tables, y, rise)[()]
+
+    def critical_time_step(
+        self, mass: ArrayLike, area: ArrayLike, closure: ArrayLike, shear: ArrayLike = 0.0
+    ) -> Any:
         """Largest stable explicit step (s) of one translating mass on one joint.
 
         mass: reduced mass m1 m2/(m1 + m2) in kg; area: of the joint in m2; closure: the largest
-        reached, in m; numbers or arrays of one shape. 2 sqrt(m/(K area)), infinite where nothing
-        touches; a block code adds rotation.
+        reached, in m; shear: the largest shear displacement reached, in m, in any direction;
+        numbers or arrays of one shape. 2 sqrt(m/(K area)), infinite where nothing touches; a block
+        code adds rotation. Shear presses one side of the asperities together: a step for closure
+        alone is several times too long for a joint that was sheared far at constant closure.
+        `JointBatch.critical_time_step` takes joints as they are now.
 
         Safe to 0.95 in lasting contact, and where friction takes from every impact. Impacts that
         lose nothing need 0.2 or less: they last but 2/share steps (docs/sharp-bits.md).
         """
-        m, a = finite("mass", mass, "kg"), finite("area", area, "m2")
-        y = finite("closure", closure, "m")
-        if not ((m > 0).all() and (a > 0).all() and (y >= 0).all()):
-            raise ValueError(
-                f"mass = {m} kg, area = {a} m2, closure = {y} m are out of bounds: mass and area "
-                "must be > 0, closure >= 0"
-            )
-        with np.errstate(divide="ignore"):
-            return 2 * np.sqrt(m / (self.max_stiffness(y) * a))
+        if not (finite("closure", closure, "m") >= 0).all():
+            raise ValueError(f"closure = {closure!r} m is out of bounds: it must be >= 0")
+        return stable_step(mass, area, self.max_stiffness(closure, shear))[()]
 
     # -------------------------------------------------------------- accuracy
 
@@ -314,10 +327,13 @@ class JointLaw:
 
     def _default_range(self) -> float:
         """The closure (m) at 20 MPa of elastic asperities: those that yield may not bear it."""
+        p, r = self.asperity, NAMED["balanced"]  # whatever the law's resolution
+        fixed = facets(self.orientation, r.u, r.phi, self.plane, self.closure_only)
+        elastic = facet_sum(fixed.theta, fixed.scale(p, self.asperity_density), p.lam, p.mu)
         try:
-            return self._first_loading._replace(yielding=None).closure(DEFAULT_STRESS, 1.0)
+            return FirstLoading(self.curve, elastic).closure(DEFAULT_STRESS, 1.0)
         except ValueError:
-            self._require_numbers(1.0)  # the likely reason
+            self._require_numbers(1.0)  # most often the units are wrong
             raise
 
     def _require_numbers(self, closure_range: float) -> None:
@@ -350,9 +366,14 @@ class JointLaw:
         return toml.write_law(values, None if path is None else Path(path))
 
     @classmethod
-    def from_toml(cls, source: str | Path) -> JointLaw:
-        """A law from a TOML file or from TOML text; the keys are the parameters above."""
-        return toml.read_law(cls, source)
+    def from_toml(cls, path: str | Path) -> JointLaw:
+        """A law from a TOML file; the keys are the parameters above."""
+        return toml.read_law(cls, path)
+
+    @classmethod
+    def from_text(cls, text: str) -> JointLaw:
+        """A law from TOML text, as `to_toml` returns it."""
+        return toml.build_law(cls, keys.parse(text, "TOML text"), "TOML text")
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], where: str = "law") -> JointLaw:
@@ -360,5 +381,5 @@ class JointLaw:
         return toml.build_law(cls, data, where)
 
     def __getstate__(self) -> dict[str, Any]:
-        names = {one.name for one in fields(self)}  # what is cached is made anew
+        names = {one.name for one in fields(self)}  # cached values are computed again when needed
         return {name: value for name, value in self.__dict__.items() if name in names}

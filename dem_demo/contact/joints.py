@@ -1,75 +1,85 @@
 """The law's side: one batch of joints per law, one call per law and step.
 
-Law points come and go; each keeps its joint in the pool of its law for as long as its interface
-is in reach, so history is never given to the wrong joint.
+Contacts come and go; each keeps its joint in the pool of its law for as long as its interface is in
+reach, so history is never given to the wrong joint.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 import jointlaw as jl
+from jointlaw.joints.state import JointState
 
-from ..scene import Key
-from .law_points import Identity
-from .stiffness import StiffnessCurve
+from ..scene import Scene, is_coulomb
+from .tracker import Identity
 
-MEASURED = ("sliding", "slipping", "separated", "stored", "lost")
+PoolState = tuple[list[Identity], JointState]  # contacts, and their joints in that order
 
-PoolState = tuple[list[Identity], jl.JointState]  # law points, and their joints in that order
+
+def virgin_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
+    """Closure (m), stress (Pa) and work (J/m2) of a virgin joint from no closure to 2 GPa, more
+    than any corner of rock stands, and an upper bound of its stiffness (Pa/m) there.
+
+    At a given normal stress the unsheared joint is the stiffest one (Phi' is a concave function of
+    Phi), so the virgin curve bounds the sheared joint as well.
+    """
+    top = float(law.closure(2e9))
+    closure = np.concatenate([[0.0], np.geomspace(1e-8 * top, top, 600)])
+    stress = law.normal_stress(closure)
+    work = np.cumsum(0.5 * (stress[1:] + stress[:-1]) * np.diff(closure))
+    stiffness = law.max_stiffness(closure)
+    if is_coulomb(law):
+        # The law's bound adds mu for the coupling of shear to closure. That of level asperities has
+        # no eigenvalue of its own: (kn, 0; mu kn, 0) has kn and 0. K is ks, lam K is kn.
+        p = law.asperity
+        stiffness = np.full(len(closure), max(1.0, p.lam) * p.K * law.asperity_density)
+    work = np.concatenate([[0.0], work])
+    return {"closure": closure, "stress": stress, "stiffness": stiffness, "work": work}
 
 
 class Joints:
-    """All joints of a scene. After `assign`, arrays run over the law points given.
+    """All joints of a scene. After `assign`, arrays run over the k contacts given.
 
-    laws: by name; choose: names the law of a key (block, edge, block, edge).
+    delta (k, 2) in m: closure and sliding; traction (k, 2) in Pa; sliding, slipping, separated
+    (k,): shares of their shear capacity; stored, lost (k,) in J/m2.
     """
 
-    def __init__(self, laws: dict[str, jl.JointLaw], choose: Callable[[Key], str]) -> None:
-        self.laws, self.choose = laws, choose
-        self.pools = {name: jl.JointPool(law) for name, law in laws.items()}
-        self.curves = {name: StiffnessCurve.of(law) for name, law in laws.items()}
+    def __init__(self, scene: Scene) -> None:
+        self.choose = scene.law_of
+        self.pools = {name: jl.JointPool(law) for name, law in scene.laws.items()}
+        self.curves = {name: virgin_curve(law) for name, law in scene.laws.items()}
         self.assign([])
 
-    def assign(self, points: Sequence[Identity]) -> None:
-        """Keep the joints of these law points, forget the others, make new ones virgin."""
-        of_law: dict[str, list[int]] = {name: [] for name in self.laws}
-        for i, (key, _) in enumerate(points):
+    def assign(self, contacts: Sequence[Identity]) -> None:
+        """Keep the joints of these contacts, forget the others, make new ones virgin."""
+        of_law: dict[str, list[int]] = {name: [] for name in self.pools}
+        for i, (key, _) in enumerate(contacts):
             of_law[self.choose(key)].append(i)
         self.groups = []
         for name, rows in of_law.items():
             pool = self.pools[name]
-            places = pool.assign(points[i] for i in rows)
+            places = pool.assign(contacts[i] for i in rows)
             if rows:
                 whole = np.array_equal(places, np.arange(len(pool.batch)))
                 self.groups.append((name, np.array(rows), None if whole else places))
-        self.n = len(points)
+        self.n = len(contacts)
+        self.traction = np.zeros((self.n, 2))
+        for name, rows, places in self.groups:
+            self.traction[rows] = self.pools[name].batch.F[... if places is None else places]
         self.measure()
 
-    def increments(self, closure: np.ndarray, sliding: np.ndarray) -> np.ndarray:
-        """(k, 2): closure is absolute, from geometry; sliding (m) is what this step added."""
-        return np.stack([closure - self.read("delta")[:, 0], sliding], axis=1)
-
-    def update(self, d: np.ndarray, parts: int = 1) -> np.ndarray:
-        """Advance every joint by d (k, 2), in equal parts; tractions (k, 2) in Pa.
+    def update(self, closure: np.ndarray, sliding: np.ndarray, parts: int = 1) -> None:
+        """Advance every joint to a closure (m), and by a sliding (m), in equal parts.
 
         The law's friction work is first order in its step: more parts balance energy better.
         """
-        F, d = np.empty((self.n, 2)), d / parts
+        d = np.stack([closure - self.delta[:, 0], sliding], axis=1) / parts
         for name, rows, places in self.groups:
             for _ in range(parts):
-                F[rows] = self.pools[name].batch.update(d[rows], where=places, tangent=False)[0]
+                F, _ = self.pools[name].batch.update(d[rows], where=places, tangent=False)
+            self.traction[rows] = F
         self.measure()
-        return F
-
-    def measure(self) -> None:
-        """Take the shares and energies of now: sliding, slipping, separated, stored, lost."""
-        self.now: dict[str, np.ndarray] = {what: np.zeros(self.n) for what in MEASURED}
-        for name, rows, places in self.groups:
-            batch = self.pools[name].batch
-            values = [*batch.measures()[:4], batch.dissipated_energy]
-            for what, value in zip(MEASURED, values, strict=True):
-                self.now[what][rows] = value if places is None else value[places]
 
     def trial(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Tractions (k, 2) and tangents (k, 2, 2) for d, leaving the state alone."""
@@ -78,42 +88,51 @@ class Joints:
             F[rows], C[rows] = self.pools[name].batch.trial(d[rows], where=places)
         return F, C
 
-    def read(self, what: str) -> np.ndarray:
-        """A property of all joints with two components: "delta" or "F"."""
-        out = np.zeros((self.n, 2))
+    def measure(self) -> None:
+        """Read what the batches hold by now."""
+        self.delta = np.zeros((self.n, 2))
+        shares = np.zeros((5, self.n))
         for name, rows, places in self.groups:
-            value = getattr(self.pools[name].batch, what)
-            out[rows] = value if places is None else value[places]
-        return out
+            batch, here = self.pools[name].batch, slice(None) if places is None else places
+            self.delta[rows] = batch.delta[here]
+            for share, value in zip(
+                shares, [*batch.measures()[:4], batch.dissipated_energy], strict=True
+            ):
+                share[rows] = value[here]
+        self.sliding, self.slipping, self.separated, self.stored, self.lost = shares
 
-    def virgin(
-        self, of: Callable[[StiffnessCurve, np.ndarray], np.ndarray], x: np.ndarray
-    ) -> np.ndarray:
-        """A function of the virgin curves, such as `StiffnessCurve.at_stress`, for each joint."""
+    def virgin(self, of: str, by: str, x: np.ndarray) -> np.ndarray:
+        """A column of the virgin curves, such as "stress", where another one is x (k,)."""
         out = np.empty(self.n)
         for name, rows, _ in self.groups:
-            out[rows] = of(self.curves[name], x[rows])
+            out[rows] = np.interp(x[rows], self.curves[name][by], self.curves[name][of])
         return out
 
-    def curve(self, point: Identity) -> StiffnessCurve:
-        """The virgin curve of a law point's joint."""
-        return self.curves[self.choose(point[0])]
+    @property
+    def stiffness(self) -> np.ndarray:
+        """Upper bound (k,) of the stiffness at the normal stress of now (Pa/m)."""
+        stress = self.traction[:, 0]
+        return self.virgin("stiffness", "stress", stress) * (stress > 0)
 
-    def renew(self, point: Identity) -> None:
-        """Make the joint of a law point virgin again."""
-        pool = self.pools[self.choose(point[0])]
-        pool.batch.reset(pool.add([point]))
+    def curve(self, contact: Identity) -> dict[str, np.ndarray]:
+        """The virgin curve of a contact's joint."""
+        return self.curves[self.choose(contact[0])]
+
+    def renew(self, contact: Identity) -> None:
+        """Make the joint of a contact virgin again."""
+        pool = self.pools[self.choose(contact[0])]
+        pool.batch.reset(pool.add([contact]))
         self.measure()
 
     def snapshot(self) -> dict[str, PoolState]:
         """A copy of all state, by law."""
         return {name: (pool.keys, pool.snapshot()) for name, pool in self.pools.items()}
 
-    def restore(self, state: dict[str, PoolState], points: Sequence[Identity]) -> None:
-        """Back to a snapshot whose law points were `points`. Raises ValueError for another's."""
-        held = {point for keys, _ in state.values() for point in keys}
-        if set(state) != set(self.pools) or held != set(points):
-            raise ValueError("the state's joints are not those of the scene's laws and law points")
+    def restore(self, state: dict[str, PoolState], contacts: Sequence[Identity]) -> None:
+        """Back to a snapshot whose contacts were these. Raises ValueError for another's."""
+        held = {contact for keys, _ in state.values() for contact in keys}
+        if set(state) != set(self.pools) or held != set(contacts):
+            raise ValueError("the state's joints are not those of the scene's laws and contacts")
         for name, (keys, joints) in state.items():
             self.pools[name].restore(keys, joints)
-        self.assign(points)
+        self.assign(contacts)

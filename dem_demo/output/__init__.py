@@ -1,14 +1,8 @@
 """Output: what a run records, writes and draws.
 
-law_alone    what the law says without blocks
-monitors     what a scene's [watch] table asks for
-record       the history of a run
-outcome      what became of each rock mass
-drawing      what the pictures share
-frames       pictures of single blocks, animations
-rock_report  pictures of rock masses
-curves       energies, tilt and shear curves
+monitors     what a scene's [watch] table asks for, and what the law alone says of it
+record       the history of a run, and what became of each rock mass
+pictures     of blocks and joints, animations, curves
 vtk          frames as VTK files
-interrupt    what Ctrl-C does to a run
 run          a run from start to end, and its files
 """

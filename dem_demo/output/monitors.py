@@ -1,47 +1,49 @@
-"""Monitors of a run: slip in a tilt test, stress and dilation in shear, points of a rock."""
+"""Monitors of a run: slip, shear, points of a rock; and what the law alone says of them."""
 
 import numpy as np
 
-from ..dynamics.simulation import Simulation
-from ..scene import turn
-from .law_alone import slip_angle, slip_distance
+import jointlaw as jl
+from jointlaw.laboratory.experiments import PathError
 
-LOOKS = 8  # steps between two looks
+from ..dynamics.simulation import Simulation
+from ..scene import Scene, is_coulomb, turn
+
+SLIP_DISTANCE = 2e-3  # m, for laws without a critical slip distance
+ROUNDS = 50  # most trials of an angle; a handful is enough where there is one
 
 
 class SlipMonitor:
     """Looks for the slip of the joints that the scene's [watch] table names."""
 
     def __init__(self, sim: Simulation) -> None:
-        self.scene = scene = sim.scene
-        self.slips = {}
-        for moving, base in scene.monitors.slip:
-            law = scene.laws[scene.law_of((moving, 0, base, 0))]
+        self.scene, self.slips, self.lengths = sim.scene, {}, {}
+        for moving, base in self.scene.monitors.slip:
+            name = law_between(sim, moving, base)
+            distance = slip_distance(self.scene.laws[name])
             self.slips[moving, base] = {
-                "block": scene.blocks[moving].name,
-                "base": scene.blocks[base].name,
-                "law": scene.law_of((moving, 0, base, 0)),
-                "slip_distance": slip_distance(law),
+                "block": self.scene.blocks[moving].name,
+                "base": self.scene.blocks[base].name,
+                "law": name,
+                "slip_distance": distance,
                 "slip_angle": None,
                 "slip_time": None,
-                "slipped_before": sim.now.slid(sim.joints, moving, base) > slip_distance(law),
+                "slipped_before": sim.slid(moving, base) > distance,
             }
-        self.lengths = {
-            pair: float(sim.now.points.length[sim.now.between(*pair)].sum()) for pair in self.slips
-        }
+            here = sim.tracker.between(moving, base)
+            self.lengths[moving, base] = float(sim.contacts.length[here].sum())
 
     def look(self, sim: Simulation) -> None:
         """Note the base angle at which a joint passes its slip distance."""
         for (moving, base), entry in self.slips.items():
             waits = entry["slip_angle"] is None and not entry["slipped_before"]
-            if waits and sim.now.slid(sim.joints, moving, base) > entry["slip_distance"]:
+            if waits and sim.slid(moving, base) > entry["slip_distance"]:
                 entry["slip_angle"] = base_angle(sim, moving, base)
                 entry["slip_time"] = sim.time
 
     def report(self) -> list[dict]:
         """Measured and predicted slip angles (degrees)."""
         return [
-            entry | slip_angle(self.scene, *pair, self.lengths[pair])
+            entry | slip_angle(self.scene, entry["law"], pair[0], self.lengths[pair])
             for pair, entry in self.slips.items()
         ]
 
@@ -51,14 +53,25 @@ def base_angle(sim: Simulation, moving: int, base: int) -> float:
 
     Of the base's face that `moving` lies on: the one that its centroid is farthest outside of.
     """
-    x, y, angle = sim.now.motion[:3, base]
-    corners = sim.scene.blocks[base].local @ turn(angle).T + [x, y]
+    _, outward = _face(sim, base, moving)
+    across, down = np.array([-outward[1], outward[0]]), np.array(sim.scene.gravity)
+    return float(np.degrees(np.arctan2(abs(across @ down), abs(outward @ down))))
+
+
+def law_between(sim: Simulation, moving: int, base: int) -> str:
+    """Name of the law of the joint between the faces with which two blocks face each other."""
+    faces = _face(sim, moving, base)[0], _face(sim, base, moving)[0]
+    return sim.scene.law_of((moving, faces[0], base, faces[1]))
+
+
+def _face(sim: Simulation, block: int, other: int) -> tuple[int, np.ndarray]:
+    """Number and outward normal of a block's face that another's centroid is farthest outside."""
+    x, y, angle = sim.blocks.motion[:3, block]
+    corners = sim.scene.blocks[block].local @ turn(angle).T + [x, y]
     along = np.roll(corners, -1, axis=0) - corners
-    along /= np.hypot(*along.T)[:, None]
-    outward = np.stack([along[:, 1], -along[:, 0]], axis=1)
-    face = ((sim.now.motion[:2, moving] - corners) * outward).sum(axis=1).argmax()
-    down = np.array(sim.scene.gravity)
-    return float(np.degrees(np.arctan2(abs(along[face] @ down), abs(outward[face] @ down))))
+    outward = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
+    face = int(((sim.blocks.motion[:2, other] - corners) * outward).sum(axis=1).argmax())
+    return face, outward[face]
 
 
 def readings(sim: Simulation) -> dict[str, float]:
@@ -69,7 +82,7 @@ def readings(sim: Simulation) -> dict[str, float]:
         row[f"{name}: base angle_deg"] = base_angle(sim, moving, base)
         row |= {f"{name}: {key}": value for key, value in _joint(sim, moving, base).items()}
     for i, (block, point) in enumerate(sim.scene.monitors.pins):
-        x, y, angle = sim.now.motion[:3, block]
+        x, y, angle = sim.blocks.motion[:3, block]
         arm = np.asarray(point) - blocks[block].centroid
         row[f"pin {i + 1}: moved_m"] = float(np.hypot(*(turn(angle) @ arm + [x, y] - point)))
     return row
@@ -77,12 +90,57 @@ def readings(sim: Simulation) -> dict[str, float]:
 
 def _joint(sim: Simulation, moving: int, base: int) -> dict[str, float]:
     """Mean over the joint between two blocks: stresses, closure, sliding, sliding share."""
-    here = sim.now.between(moving, base)
-    area = sim.now.area[here]
+    here, joints = sim.tracker.between(moving, base), sim.joints
+    area = sim.ledger.area[here]
+    columns = [*joints.traction[here].T, *joints.delta[here].T, joints.sliding[here]]
     keys = "normal_Pa", "shear_Pa", "closure_m", "slid_m", "sliding_share"
-    if not area.any():
-        return dict.fromkeys(keys, 0.0)
-    F, delta = sim.now.traction[here], sim.joints.read("delta")[here]
-    columns = [*F.T, *delta.T, sim.joints.now["sliding"][here]]
-    share = area / area.sum()
+    share = area / area.sum() if area.any() else 0.0 * area
     return {key: float(share @ column) for key, column in zip(keys, columns, strict=True)}
+
+
+def slip_distance(law: jl.JointLaw) -> float:
+    """Sliding (m) that counts as slip: the law's critical slip distance."""
+    return law.critical_slip if np.isfinite(law.critical_slip) else SLIP_DISTANCE
+
+
+def friction_angle(law: jl.JointLaw, stress: float) -> float:
+    """Peak of F2/F1 (degrees) of the law in direct shear at a constant normal stress (Pa)."""
+    if is_coulomb(law):
+        return float(np.degrees(np.arctan(law.asperity.mu)))
+    to = [1.2 * slip_distance(law)]  # friction peaks where the contacts begin to be renewed
+    record = jl.direct_shear(law.joint(), to=to, normal=stress, steps=120)
+    return float(record.peak_friction_angle)
+
+
+def slip_angle(scene: Scene, law_name: str, moving: int, length: float) -> dict:
+    """Base angle (degrees) at which a block on a joint of `length` (m) should slip, and the stress.
+
+    The normal stress falls as the base tilts, so angle and stress are found together. Both are None
+    where the law says nothing: no contact, no gravity, a stress that it cannot carry.
+    """
+    weight, angle = scene.blocks[moving].mass * np.hypot(*scene.gravity), 35.0
+    for _ in range(ROUNDS if length > 0 else 0):
+        before, stress = angle, float(weight / length * np.cos(np.radians(angle)))
+        try:
+            angle = friction_angle(scene.laws[law_name], stress)
+        except (ValueError, PathError):
+            break
+        if abs(angle - before) <= 5e-3:
+            return {"predicted_angle": angle, "normal_stress": stress}
+    return {"predicted_angle": None, "normal_stress": None}
+
+
+def shear_curve(law: jl.JointLaw, stress: float, slid: np.ndarray) -> jl.Record | None:
+    """Direct shear of the law alone along the turning points of `slid` (m), at a normal stress.
+
+    None for plain Coulomb and where the law cannot be sheared like this: no normal stress, no
+    motion.
+    """
+    inner = np.flatnonzero(np.diff(np.sign(np.diff(slid)))) + 1
+    turns = [float(u) for u in [*slid[inner], slid[-1]]]
+    try:
+        if not is_coulomb(law):
+            return jl.direct_shear(law.joint(), to=turns, normal=stress, steps=400)
+    except (ValueError, PathError):
+        pass
+    return None

@@ -1,32 +1,37 @@
-"""The history of a run, in memory and as files."""
+"""The history of a run, in memory and as files; and what became of each rock mass."""
 
 import csv
 from pathlib import Path
 
 import numpy as np
 
-from ..contact import Contacts, Points, raised
 from ..dynamics.energy import COLUMNS
 from ..dynamics.simulation import Simulation
-from .monitors import SlipMonitor, readings
+from ..scene import usual_size
+from .monitors import SlipMonitor, law_between, readings
 
 JOINT_COLUMNS = (
     "closure_m", "shear_m", "normal_stress_Pa", "shear_stress_Pa",
     "sliding", "slipping", "separated", "length_m", "sliding_m/s",
 )  # fmt: skip
-VERSION = 1  # of history.npz
+FAILED = 0.1  # of the usual size of a rock's blocks: one that has moved farther has failed
+CREEP = 1e-6  # m/s: faster is not at rest
+LOOK_BACK = 1.0  # s over which creep is measured
 
 
 class Record:
     """Frames of a run: times (f,), motion (f, 6, n), energies (f, 9), joints as lists of arrays.
 
-    joints[f]: "who" (k, 5) block, edge, block, edge, point; "ends" (k, 2, 2) the segment of joint
-    that a law point carries; "values" (k, 9) as JOINT_COLUMNS. monitored[f]: what the scene's
-    [watch] asks for; slips: its slip angles; state: that of the last frame, to return to.
+    joints[f]: "who" (k, 5) block, edge, block, edge, contact; "ends" (k, 2, 2) the segment of joint
+    that a contact carries; "values" (k, 9) as JOINT_COLUMNS. monitored[f]: what the scene's
+    [watch] asks for; slips: its slip angles; laws: of the watched joints; state: that of the last
+    frame, to return to.
     """
 
     def __init__(self, sim: Simulation) -> None:
         self.scene, self.slips = sim.scene, SlipMonitor(sim)
+        watched = (*sim.scene.monitors.slip, *sim.scene.monitors.shear)
+        self.laws = {pair: law_between(sim, *pair) for pair in watched}
         self.times: list[float] = []
         self.motion: list[np.ndarray] = []
         self.energy: list[list[float]] = []
@@ -36,9 +41,9 @@ class Record:
 
     def take(self, sim: Simulation) -> None:
         """Add the present as a frame."""
-        ledger = sim.now.ledger
+        ledger = sim.ledger
         self.times.append(sim.time)
-        self.motion.append(sim.now.motion.copy())
+        self.motion.append(sim.blocks.motion.copy())
         self.energy.append([*(ledger.value[c] for c in COLUMNS), ledger.error])
         self.joints.append(_joints(sim))
         self.monitored.append(readings(sim))
@@ -58,97 +63,46 @@ class Record:
         """A monitored quantity over all frames."""
         return np.array([row[name] for row in self.monitored])
 
+    def joint(self, i: int, name: str) -> np.ndarray:
+        """One of JOINT_COLUMNS of the joints of frame i."""
+        return self.joints[i]["values"][:, JOINT_COLUMNS.index(name)]
+
     def write(self, folder: Path) -> None:
-        """history.csv, blocks.csv, joints.csv and history.npz."""
+        """history.csv, blocks.csv and joints.csv."""
         names = [block.name for block in self.scene.blocks]
         header = ["time_s", *(f"{c}_J" for c in COLUMNS), "energy_error", *self.monitored[0]]
-        write_csv(
-            folder / "history.csv",
-            header,
-            (
-                [t, *e, *w.values()]
-                for t, e, w in zip(self.times, self.energy, self.monitored, strict=True)
-            ),
-        )
-        write_csv(
-            folder / "blocks.csv",
-            ["time_s", "block", "x_m", "y_m", "angle_rad", "vx_m/s", "vy_m/s", "spin_rad/s"],
-            (
-                [t, name, *state]
-                for t, motion in zip(self.times, self.motion, strict=True)
-                for name, state in zip(names, motion.T.tolist(), strict=True)
-            ),
-        )
-        write_csv(
-            folder / "joints.csv",
-            ["time_s", "block_a", "edge_a", "block_b", "edge_b", "point", *JOINT_COLUMNS],
-            (
-                [t, names[who[0]], who[1], names[who[2]], who[3], who[4], *values]
-                for t, frame in zip(self.times, self.joints, strict=True)
-                for who, values in zip(frame["who"].tolist(), frame["values"].tolist(), strict=True)
-            ),
-        )
-        counts = [len(frame["who"]) for frame in self.joints]
-        np.savez_compressed(
-            folder / "history.npz",
-            version=VERSION,
-            time=self.times,
-            motion=np.array(self.motion),
-            energy=np.array(self.energy),
-            energy_columns=[*COLUMNS, "error"],
-            block_names=names,
-            joint_frame=np.repeat(np.arange(len(counts)), counts),
-            joint_columns=JOINT_COLUMNS,
-            **{
-                f"joint_{key}": np.concatenate([frame[key] for frame in self.joints])
-                for key in ("who", "ends", "values")
-            },
-        )
+        rows = zip(self.times, self.energy, self.monitored, strict=True)
+        write_csv(folder / "history.csv", header, ([t, *e, *w.values()] for t, e, w in rows))
+        header = ["time_s", "block", "x_m", "y_m", "angle_rad", "vx_m/s", "vy_m/s", "spin_rad/s"]
+        rows = []
+        for t, motion in zip(self.times, self.motion, strict=True):
+            rows += [[t, name, *b] for name, b in zip(names, motion.T.tolist(), strict=True)]
+        write_csv(folder / "blocks.csv", header, rows)
+        header = ["time_s", "block_a", "edge_a", "block_b", "edge_b", "point", *JOINT_COLUMNS]
+        rows = []
+        for t, frame in zip(self.times, self.joints, strict=True):
+            who, values = frame["who"].tolist(), frame["values"].tolist()
+            for (a, edge_a, b, *rest), numbers in zip(who, values, strict=True):
+                rows.append([t, names[a], edge_a, names[b], *rest, *numbers])
+        write_csv(folder / "joints.csv", header, rows)
 
 
 def _joints(sim: Simulation) -> dict[str, np.ndarray]:
     """Joints that touch or almost touch."""
-    now, measured = sim.now, sim.joints.now
-    points, contacts = now.points, now.law_points.contacts
-    keep = points.length > 0
-    who = _who(contacts, points, [number for _, number in now.layout.identities])
-    values = np.column_stack(
-        [points.closure, sim.joints.read("delta")[:, 1], *now.traction.T, measured["sliding"],
-         measured["slipping"], measured["separated"], points.length, points.sliding]
-    )  # fmt: skip
-    return {
-        "who": who[keep],
-        "ends": _segments(contacts, points, now.motion)[keep],
-        "values": values[keep],
-    }
-
-
-def _segments(contacts: Contacts, points: Points, motion: np.ndarray) -> np.ndarray:
-    """Ends (n, 2, 2) of the segment of joint that each law point stands for: [point, end, x y]."""
-    c, k = contacts, len(contacts.corner)
-    lies = 1 - raised(points.rise, np.ones_like(points.rise))[0]
-    part = c.share * lies * np.maximum(points.overlap, 0.0)
-    part += 0.5 * (points.length[:k] - part.sum(axis=0))
-    way = c.outlines.place(motion)[1][c.edge]
-    ahead = np.full(len(c), 0.5)
-    ahead[:k] = part[0] / np.maximum(part.sum(axis=0), 1e-300)
-    if c.along is not None:
-        way = np.concatenate([way, 1j * points.normal[k:]])
-    ends = points.at + np.stack([ahead, ahead - 1], axis=0) * points.length * way
-    return np.stack([ends.real, ends.imag], axis=-1).swapaxes(0, 1)
-
-
-def _who(contacts: Contacts, points: Points, numbers: list[int]) -> np.ndarray:
-    """Who meets at every law point: (n, 5) block, edge, block, edge and the point's number.
-
-    Of the two edges at a corner the flatter one counts. Points along an edge have numbers below 0.
-    """
-    o, one, other = contacts.outlines, contacts.corner, contacts.edge
-    one = o.flatter(one, points.rise)
-    if (u := contacts.along) is not None:
-        one = np.concatenate([one, u.first[u.of]])
-        other = np.concatenate([other, u.second[u.of]])
-    return np.column_stack([o.interfaces(one, other), numbers])
+    c, joints = sim.contacts, sim.joints
+    keep = c.length > 0
+    values = [
+        c.closure, joints.delta[:, 1], *joints.traction.T, joints.sliding, joints.slipping,
+        joints.separated, c.length, c.sliding,
+    ]  # fmt: skip
+    # The segment: what each side of the corner carries of it, the rest half and half.
+    part = c.carried + 0.5 * (c.length - c.carried.sum(axis=0))
+    ahead = part[0] / np.maximum(part.sum(axis=0), 1e-300)
+    along = np.where(c.outlines.block[c.edge] == c.a, 1j, -1j) * c.normal
+    ends = c.at + np.stack([ahead, ahead - 1], axis=0) * c.length * along
+    ends = np.stack([ends.real, ends.imag], axis=-1).swapaxes(0, 1)
+    who = np.column_stack([c.interfaces, sim.tracker.numbers])
+    return {"who": who[keep], "ends": ends[keep], "values": np.column_stack(values)[keep]}
 
 
 def write_csv(path: Path, header, rows) -> None:
@@ -157,3 +111,63 @@ def write_csv(path: Path, header, rows) -> None:
         writer = csv.writer(stream)
         writer.writerow(header)
         writer.writerows(rows)
+
+
+def displacement(record: Record, i: int) -> np.ndarray:
+    """Displacement (n, 2) of the blocks in frame i since they were drawn, without weight (m)."""
+    drawn = np.array([block.centroid for block in record.scene.blocks])
+    return record.motion[i][:2].T - drawn
+
+
+def outcomes(record: Record) -> list[dict]:
+    """One entry for each `[[rock]]` of the scene.
+
+    settled_m: largest displacement from the drawing to step 0; moved_m: largest since
+    then; failed: blocks that moved more than failed_beyond_m; creep_m_per_s: largest mean speed
+    over the last second (or the whole run, if shorter).
+    """
+    out = []
+    first, last = displacement(record, 0), displacement(record, -1)
+    times = np.array(record.times)
+    before = int(np.searchsorted(times, times[-1] - LOOK_BACK + 1e-9)) if len(times) > 1 else 0
+    before = min(before, max(len(times) - 2, 0))
+    crept = np.hypot(*(last - displacement(record, before)).T)
+    crept /= max(times[-1] - times[before], 1e-300)
+    for rock in record.scene.rocks:
+        free = rock.free
+        moved, creep = np.hypot(*(last - first)[free].T), float(crept[free].max())
+        limit = FAILED * usual_size(record.scene.blocks[i] for i in free)
+        failed = int((moved > limit).sum())
+        out.append(
+            {
+                "rock": rock.name,
+                "state": "fails" if failed else "stands" if creep < CREEP else "moves",
+                "blocks": len(free),
+                "settled_m": float(np.hypot(*first[free].T).max()),
+                "moved_m": float(moved.max()),
+                "failed": failed,
+                "failed_beyond_m": limit,
+                "creep_m_per_s": creep,
+            }
+        )
+    return out
+
+
+def far(record: Record) -> bool:
+    """Has a block moved by more than the usual size of a block?"""
+    size = usual_size(block for block in record.scene.blocks if not block.fixed)
+    return bool(record.moved.max() > size)
+
+
+def sentence(entry: dict) -> str:
+    """One line for a person."""
+    start = f"{entry['rock']}: {entry['state']}; "
+    if entry["failed"]:
+        many = f"{entry['failed']} of {entry['blocks']} blocks moved more than "
+        many += f"{entry['failed_beyond_m']:.2g} m"
+        return f"{start}{many}, the farthest {entry['moved_m']:.2f} m"
+    moved = max(1e3 * entry["moved_m"], 1e-3)
+    return (
+        f"{start}no block of {entry['blocks']} moved more than {moved:.2g} mm, "
+        f"creep {entry['creep_m_per_s']:.1e} m/s"
+    )

@@ -1,11 +1,13 @@
 """Run a scene to its end and write what a user wants to see."""
 
+import os
+import signal
 import sys
+import threading
 import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from tqdm import tqdm
@@ -14,18 +16,17 @@ from jointlaw.support.files import clear_run, replace_file, write_json
 from jointlaw.support.pyplot import FORMATS
 
 from ..dynamics.energy import COLUMNS
-from ..dynamics.saved_states import text_of
+from ..dynamics.saved_states import require_text
 from ..dynamics.simulation import Simulation
 from ..errors import Refused
-from . import curves, frames, rock_report
-from .interrupt import interruptible
-from .monitors import LOOKS
-from .outcome import outcomes, slip_per_cycle
-from .record import Record
+from .pictures import Pictures, energy, joints
+from .record import Record, outcomes
 
 MOST_STEPS = 1e12  # of a run: years
+INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
+LOOKS = 8  # steps between two looks for slip
 VERSION = 1  # of summary.json
-TABLES = ("history.csv", "blocks.csv", "joints.csv", "history.npz")
+TABLES = ("history.csv", "blocks.csv", "joints.csv")
 
 
 def run(
@@ -43,47 +44,46 @@ def run(
     """
     steps_to(sim, until)
     if folder:
-        text_of(sim.scene)
+        require_text(sim.scene)
         folder.mkdir(parents=True, exist_ok=True)
-    started, first_step, record = time.perf_counter(), sim.now.n, Record(sim)
-    interrupted = False
+    started, first_step, record = time.perf_counter(), sim.n, Record(sim)
+    drawn, interrupted, trouble = picture_format if pictures else None, False, None
     try:
         play(sim, record, until)
-    except Refused as trouble:
-        if not folder:
-            raise
-        refused = folder / "refused"
-        clear_run(folder)
-        sim.save(refused, record.state)
-        replace_file(refused / "why.txt", f"{trouble}\n".encode())
-        write(record, {"version": VERSION, "refused": str(trouble)}, folder, None, vtk)
-        raise Refused(f"{trouble}\nThe last good state is in {refused}") from None
+    except Refused as error:
+        trouble = error
     except KeyboardInterrupt:
         interrupted = True
-    wall, now = time.perf_counter() - started, sim.now
+    if trouble and folder:
+        clear_run(folder)
+        sim.save(folder / "refused", record.state)
+        replace_file(folder / "refused" / "why.txt", f"{trouble}\n".encode())
+        write(record, {"version": VERSION, "refused": str(trouble)}, folder, None, vtk)
+        trouble = Refused(f"{trouble}\nThe last good state is in {folder / 'refused'}")
+    if trouble:
+        raise trouble
     summary = {
         "version": VERSION,
         "scene": sim.scene.title,
         "model_time_s": sim.time,
-        "steps": now.n - first_step,
-        "time_step_s": now.dt,
-        "step_limit_s": now.limit.least,
-        "time_step_margin": now.limit.least / now.dt,
+        "steps": sim.n - first_step,
+        "time_step_s": sim.dt,
+        "step_limit_s": sim.limit.least,
+        "time_step_margin": sim.limit.least / sim.dt,
         "started_in_equilibrium": bool(sim.balanced),
         "law_points": sim.joints.n,
-        "energy_J": {c: now.ledger.value[c] for c in COLUMNS},
-        "energy_error": now.ledger.error,
+        "energy_J": {c: sim.ledger.value[c] for c in COLUMNS},
+        "energy_error": sim.ledger.error,
         "largest_energy_error": record.largest_error,
         "slip": record.slips.report(),
-        "slip_per_cycle_m": slip_per_cycle(record),
         "rocks": outcomes(record),
-        "wall_time_s": wall,
+        "wall_time_s": time.perf_counter() - started,
         "interrupted": interrupted,
     }
     if folder:
         clear_run(folder)
         sim.save(folder / "state")
-        write(record, summary, folder, picture_format if pictures else None, vtk)
+        write(record, summary, folder, drawn, vtk)
     if interrupted:
         where = f"; go on: python -m dem_demo resume {folder / 'state'} --out NEW" if folder else ""
         raise KeyboardInterrupt(f"interrupted at {sim.time:.4g} s of model time{where}")
@@ -98,22 +98,33 @@ def play(
 ) -> None:
     """Step to `until` (s), or to where `stop` says so, and record on the way. Raises Refused.
 
-    After Ctrl-C the present is the last frame and KeyboardInterrupt is raised.
+    After Ctrl-C the present is the last frame and KeyboardInterrupt is raised; a second Ctrl-C ends
+    the process at once.
     """
     steps = steps_to(sim, until)
-    every = max(round(min(sim.scene.run.record / sim.now.dt, steps + 1)), 1)
-    title, quiet = sim.scene.title, not sys.stderr.isatty()
-    with interruptible() as interrupted:
-        for i in tqdm(range(1, steps + 1), desc=title, disable=quiet):
+    every = max(round(min(sim.scene.run.record / sim.dt, steps + 1)), 1)
+    pressed, main = threading.Event(), threading.current_thread() is threading.main_thread()
+
+    def note(_signal, _frame) -> None:  # pymunk's callbacks would swallow a KeyboardInterrupt
+        if pressed.is_set():
+            os._exit(INTERRUPTED)  # at once, and nothing more is written
+        pressed.set()
+
+    before = signal.signal(signal.SIGINT, note) if main else None
+    try:
+        for i in tqdm(range(1, steps + 1), desc=sim.scene.title, disable=not sys.stderr.isatty()):
             sim.step()
             if i % LOOKS == 0:
                 record.slips.look(sim)
-            if i % every == 0 or i == steps or interrupted():
+            if i % every == 0 or i == steps or pressed.is_set():
                 record.take(sim)
-                if interrupted():
+                if pressed.is_set():
                     raise KeyboardInterrupt
                 if stop(record):
                     break
+    finally:
+        if main:
+            signal.signal(signal.SIGINT, before)
 
 
 def steps_to(sim: Simulation, until: float | None = None) -> int:
@@ -121,7 +132,7 @@ def steps_to(sim: Simulation, until: float | None = None) -> int:
 
     Raises ValueError for a time given that is past, not finite, or out of reach.
     """
-    now, dt, end = sim.time, sim.now.dt, sim.scene.run.end if until is None else until
+    now, dt, end = sim.time, sim.dt, sim.scene.run.end if until is None else until
     if until is not None and not now - 0.5 * dt <= until < np.inf:
         raise ValueError(f"until = {until} s: must be finite and >= the time now, {now:.6g} s")
     steps = max((end - now) / dt, 0.0)
@@ -132,12 +143,15 @@ def steps_to(sim: Simulation, until: float | None = None) -> int:
     return round(steps)
 
 
-def write(
-    record: Record, summary: dict[str, Any], folder: Path, picture_format: str | None, vtk: bool
-) -> None:
-    """All files of a run: numbers before pictures, which take longest; None: no pictures."""
-    folder.mkdir(parents=True, exist_ok=True)
-    pictures = _pictures(record, summary, picture_format) if picture_format else {}
+def write(record: Record, summary: dict, folder: Path, drawn: str | None, vtk: bool) -> None:
+    """All files of a run: numbers before pictures, which take longest; drawn: their format."""
+    pictures: dict[str, Callable[[Path], None]] = {}
+    if drawn:
+        of = Pictures(record)
+        if record.scene.monitors.shear:
+            pictures[f"curves.{drawn}"] = partial(joints, record)
+        pictures[f"energy.{drawn}"] = partial(energy, record)
+        pictures |= {f"final.{drawn}": of.final, "motion.gif": of.animation}
     write_json(folder / "summary.json", {**summary, "files": [*TABLES, *pictures]})
     record.write(folder)
     for name, draw in pictures.items():
@@ -146,21 +160,3 @@ def write(
         from .vtk import write as write_vtk  # loads meshio
 
         write_vtk(record, folder / "vtk")
-
-
-def _pictures(
-    record: Record, summary: dict[str, Any], picture_format: str
-) -> dict[str, Callable[[Path], None]]:
-    """The pictures of a run: what draws each to a path."""
-    drawn = {"energy": partial(curves.energy, record)}
-    if record.scene.monitors.shear:
-        drawn["curves"] = partial(curves.shear, record)
-    elif record.scene.monitors.slip:
-        drawn["curves"] = partial(curves.tilt, record, slips=summary["slip"])
-    if record.scene.rocks:
-        drawn["report"], frame = partial(rock_report.report, record), rock_report.frame
-        drawn["final"] = partial(rock_report.final, record)
-    else:
-        drawn["final"], frame = partial(frames.final, record, slips=summary["slip"]), frames.frame
-    named = {f"{name}.{picture_format}": draw for name, draw in drawn.items()}
-    return {**named, "motion.gif": partial(frames.animation, record, draw_frame=frame)}

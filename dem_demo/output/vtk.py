@@ -8,9 +8,8 @@ import numpy as np
 
 from jointlaw.support.progress import track
 
-from .drawing import Scale, outlines
+from .pictures import STATES, Pictures, outlines
 from .record import JOINT_COLUMNS, Record
-from .rock_report import STATES, states
 
 
 def write(record: Record, folder: Path) -> None:
@@ -20,11 +19,11 @@ def write(record: Record, folder: Path) -> None:
     them, and `state`: 0 stuck, 1 partly sliding, 2 sliding, 3 open, as in report.png.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    frames = range(len(record.times))
-    scale = Scale(record, [0, frames[-1]])
-    for i in track(frames, "VTK files"):
+    pictures, names = Pictures(record), list(STATES)
+    for i in track(range(len(record.times)), "VTK files"):
         _blocks(record, i).write(folder / f"blocks_{i:04d}.vtu")
-        _joints(record, i, scale).write(folder / f"joints_{i:04d}.vtu")
+        state = np.array([names.index(name) for name in pictures.states(i)], float)
+        _joints(record.joints[i], state).write(folder / f"joints_{i:04d}.vtu")
 
 
 def _blocks(record: Record, i: int) -> meshio.Mesh:
@@ -34,20 +33,17 @@ def _blocks(record: Record, i: int) -> meshio.Mesh:
     moved = motion[:3].T - record.motion[0][:3].T
     columns = {
         "block": np.arange(len(shapes), dtype=float),
-        "displacement_m": np.column_stack([moved[:, :2], np.zeros(len(shapes))]),
+        "displacement_m": _in_space(moved[:, :2]),
         "turn_rad": moved[:, 2],
-        "velocity_m/s": np.column_stack([motion[3:5].T, np.zeros(len(shapes))]),
+        "velocity_m/s": _in_space(motion[3:5].T),
         "spin_rad/s": motion[5],
     }
     data = {name: [row[None] for row in values] for name, values in columns.items()}
     return meshio.Mesh(_in_space(np.concatenate(shapes)), cells, cell_data=data)
 
 
-def _joints(record: Record, i: int, scale: Scale) -> meshio.Mesh:
-    joints = record.joints[i]
-    names = list(STATES)
-    columns = dict(zip(JOINT_COLUMNS, joints["values"].T, strict=True))
-    columns["state"] = np.array([names.index(s) for s in states(record, i, scale)], float)
+def _joints(joints: dict[str, np.ndarray], state: np.ndarray) -> meshio.Mesh:
+    columns = dict(zip(JOINT_COLUMNS, joints["values"].T, strict=True)) | {"state": state}
     ends = joints["ends"].reshape(-1, 2)
     cells = [("line", np.arange(len(ends)).reshape(-1, 2))]
     data = {name: [values] for name, values in columns.items()}

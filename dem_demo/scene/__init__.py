@@ -1,18 +1,18 @@
 """Scenes: blocks, laws, drives and joint sets, read from TOML and checked.
 
-tables     a TOML table that names what is wrong with it
+keys       the keys of all tables, and what each may be
 blocks     convex blocks
 laws       joint laws and plain Coulomb
 drives     prescribed motions
 cutting    an outline cut along joint sets
-rocks      the rock masses of a scene
 scene      a scene in memory
 read       a scene from its file
 """
 
-from .blocks import Block, turn
+from .blocks import Block, turn, usual_size
 from .drives import Drive, Drives
-from .laws import build_law, coulomb_law, is_coulomb, law_table
+from .keys import Tables, overlay
+from .laws import Files, build_law, coulomb_law, is_coulomb, law_table
 from .read import DENSITY, GRAVITY, TEMPLATE, build, load, names, parse, read_tables
 from .scene import Key, Run, Scene
 
@@ -23,9 +23,11 @@ __all__ = [
     "Block",
     "Drive",
     "Drives",
+    "Files",
     "Key",
     "Run",
     "Scene",
+    "Tables",
     "build",
     "build_law",
     "coulomb_law",
@@ -33,7 +35,9 @@ __all__ = [
     "law_table",
     "load",
     "names",
+    "overlay",
     "parse",
     "read_tables",
     "turn",
+    "usual_size",
 ]

@@ -1,18 +1,18 @@
 """Prescribed motions: a base that tilts, a machine that shears, an earthquake that shakes."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
-from ..errors import SceneError
-from .blocks import Block
-from .tables import Table
+from jointlaw.support.checks import finite, one_of
 
-AXES = {"x": 0, "y": 1, "turn": 2}
+from .blocks import Block
+from .keys import AXES, Tables
+from .laws import Files
+
 # first row of a CSV file: of which time derivative of the motion its second column is
 TITLES = {"time_s,velocity_m/s": 1, "time_s,acceleration_m/s2": 2}
 SAMPLES = 40  # of a sine, per cycle
@@ -35,7 +35,7 @@ class Drive:
     Straight lines between (times, values), averaged over the last `ease` seconds so that the
     machine does not strike the rock at a corner; before and after them the block rests.
     With `order` 1 or 2 the values are velocities or accelerations (m/s, m/s2), and after the last
-    the block keeps its velocity, so that nothing strikes it. `period` (s) is that of a sine.
+    the block keeps its velocity, so that nothing strikes it.
     """
 
     block: int
@@ -45,7 +45,6 @@ class Drive:
     ease: float = 0.0
     back: Reversal | None = None
     order: int = 0
-    period: float = 0.0
 
     @cached_property
     def path(self) -> BSpline:
@@ -87,11 +86,9 @@ class Drives:
 
     def velocity(self, t: float, dt: float, reversed_at: np.ndarray) -> np.ndarray:
         """Velocities that carry the drives exactly from t to t + dt."""
-        out = np.zeros(len(self.drives))
-        for i, (d, at) in enumerate(zip(self.drives, reversed_at, strict=True)):
-            if len(d.times) > 1:
-                out[i] = (d(t + dt, at) - d(t, at)) / dt
-        return out
+        pairs = zip(self.drives, reversed_at, strict=True)
+        moved = [d(t + dt, at) - d(t, at) if len(d.times) > 1 else 0.0 for d, at in pairs]
+        return np.array(moved, float) / dt
 
     def reverse(
         self, t: float, reversed_at: np.ndarray, slid: Callable[[int, int], float]
@@ -104,101 +101,76 @@ class Drives:
         return out
 
 
-def read_drives(top: Table, number: dict[str, int], blocks: Sequence[Block]) -> tuple[Drive, ...]:
-    """The drives of a scene's `[[drive]]` tables and of its blocks' `held` motions.
+def read_drives(
+    tables: list[Tables], number: dict[str, int], blocks: list[Block], files: Files, where: str
+) -> tuple[Drive, ...]:
+    """The drives of `[[drive]]` tables and of the blocks' `held` motions; these blocks are held.
 
-    number: of each block by name. Raises SceneError.
+    number: of each block by name. Raises ValueError.
     """
-    out = [
-        Drive(i, AXES[axis], (0.0,), (0.0,), 0.0) for i, b in enumerate(blocks) for axis in b.held
-    ]
-    for table in top.tables("drive", []):
-        block, motion = table.take("block", str), table.take("motion", str)
-        if block not in number or blocks[number[block]].fixed:
-            raise table.error("block", "must be a block that is not fixed")
-        if motion not in AXES:
-            raise table.error("motion", "must be x, y or turn")
-        kinds = [key for key in ("file", "sine") if key in table.data]
-        if kinds and motion == "turn":
-            raise table.error(kinds[0], "shakes along x or y; for a turn give times and values")
-        if kinds:
-            make = _record if kinds[0] == "file" else _sine
-            out.append(make(table, number[block], AXES[motion]))
+    out = [Drive(i, AXES[axis], (0.0,), (0.0,)) for i, b in enumerate(blocks) for axis in b.held]
+    movable = tuple(block.name for block in blocks if not block.fixed)
+    for i, table in enumerate(tables):
+        name, motion = f"{where}.drive[{i}]", table["motion"]
+        block = number[one_of(f"{name}.block", table["block"], movable)]
+        if motion == "turn" and {"file", "sine"} & set(table):
+            raise ValueError(f"{name}: file and sine shake along x or y; for a turn give times")
+        if "file" in table:
+            line = _record(files, f"{name}.file", table["file"], table.get("scale", 1.0))
+        elif "sine" in table:
+            line = _sine(**table["sine"])
         else:
-            out.append(_lines(table, number, number[block], motion))
-        table.finish()
+            line = _lines(table, number, np.pi / 180 if motion == "turn" else 1.0, name)
+        out.append(Drive(block, AXES[motion], **line))
+        blocks[block] = replace(blocks[block], held=(*blocks[block].held, motion))
     moved = [(d.block, d.axis) for d in out]
     if len(set(moved)) < len(moved):
-        raise SceneError(f"{top.path('drive')}: a motion of a block is prescribed twice")
+        raise ValueError(f"{where}.drive: a motion of a block is prescribed twice")
     return tuple(out)
 
 
-def _lines(table: Table, number: dict[str, int], block: int, motion: str) -> Drive:
-    """A drive along straight lines between displacements."""
-    times, values = table.numbers("times"), table.numbers("values")
-    if len(times) != len(values) or len(times) < 1 or (np.diff(times) <= 0).any():
-        raise SceneError(f"{table.path('times')}: must increase, one for each of `values`")
-    unit = np.pi / 180 if motion == "turn" else 1.0
-    ease = table.take("ease", float, 0.1, least=0)
-    line = tuple(times), tuple(unit * values)
-    return Drive(block, AXES[motion], *line, ease, _reversal(table, number, unit))
+def _lines(table: Tables, number: dict[str, int], unit: float, where: str) -> dict:
+    """Straight lines between displacements."""
+    times, values = (np.asarray(table.get(key, ())) for key in ("times", "values"))
+    same = times.ndim == 1 and times.size and times.shape == values.shape
+    if not same or (np.diff(times) <= 0).any():
+        raise ValueError(f"{where}.times: must increase, one for each of `values`")
+    line = {"times": tuple(times), "values": tuple(unit * values), "ease": table.get("ease", 0.1)}
+    if back := table.get("back"):
+        block = number[one_of(f"{where}.back.block", back["block"], tuple(number))]
+        line["back"] = Reversal(block, back["slid"], unit * back["by"], unit * back["rate"])
+    return line
 
 
-def _sine(drive: Table, block: int, axis: int) -> Drive:
-    """A drive whose acceleration is a sine; it rises over a cycle before, and falls after."""
-    table = Table(drive.take("sine", dict), drive.path("sine"))
-    size, frequency = (table.take(key, float, above=0) for key in ("acceleration", "frequency"))
-    cycles = table.whole("cycles", 10, least=1)
-    table.finish()
+def _sine(acceleration: float, frequency: float, cycles: int = 10) -> dict:
+    """Acceleration as a sine; it rises over a cycle before, and falls after."""
     phase = np.arange((cycles + 2) * SAMPLES + 1) / SAMPLES  # in cycles
     envelope = np.clip(np.minimum(phase, cycles + 2 - phase), 0.0, 1.0)
-    values = size * envelope * np.sin(2 * np.pi * phase)
-    line = tuple((phase / frequency).tolist()), tuple(values.tolist())
-    return Drive(block, axis, *line, order=2, period=1 / frequency)
+    values = acceleration * envelope * np.sin(2 * np.pi * phase)
+    times = tuple((phase / frequency).tolist())
+    return {"times": times, "values": tuple(values.tolist()), "order": 2}
 
 
-def _record(drive: Table, block: int, axis: int) -> Drive:
-    """A drive from a CSV file of velocities or accelerations.
-
-    Raises SceneError naming the line that is wrong.
-    """
-    path, scale = Path(drive.take("file", str)), drive.take("scale", float, 1.0)
-    where = f"{drive.path('file')}: {path}"
+def _record(files: Files, name: str, file: str, scale: float) -> dict:
+    """Velocities or accelerations of a CSV file. Raises ValueError naming a line that is wrong."""
+    where = f"{name}: {file}"
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        lines = files[file].splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise SceneError(f"{where} cannot be read ({error}); give a CSV file in UTF-8") from None
+        raise ValueError(f"{where} cannot be read ({error}); give a CSV file in UTF-8") from None
     order = TITLES.get("".join(lines[0].split())) if lines else None
-    if order is None:
-        raise SceneError(f"{where}, line 1: must be {' or '.join(map(repr, TITLES))}")
-    rows: list[tuple[float, float]] = []
+    if order is None or len(lines) < 3:
+        raise ValueError(f"{where}: must be a line {' or '.join(map(repr, TITLES))}, then numbers")
+    times, values = [], []
     for n, line in enumerate(lines[1:], 2):
         try:
-            time, value = map(float, line.split(","))
+            time, value = finite("line", [float(part) for part in line.split(",")], "SI units")
         except ValueError:
-            time = value = np.nan
-        if not (np.isfinite(time) and np.isfinite(value)):
-            raise SceneError(f"{where}, line {n}: {line!r} must be two numbers, time and value")
-        if time < 0 or (rows and time <= rows[-1][0]):
-            raise SceneError(f"{where}, line {n}: time {time:g} s must be >= 0 and increase")
-        if not rows and order == 1 and value:
-            raise SceneError(f"{where}, line {n}: velocity {value:g} m/s must be 0: blocks rest")
-        rows.append((time, value))
-    if len(rows) < 2:
-        raise SceneError(f"{where}: must have two rows of numbers or more under its first line")
-    times, values = zip(*rows, strict=True)
-    return Drive(block, axis, times, tuple(scale * v for v in values), order=order)
-
-
-def _reversal(drive: Table, number: dict[str, int], unit: float) -> Reversal | None:
-    data = drive.take("back", dict, {})
-    if not data:
-        return None
-    table = Table(data, drive.path("back"))
-    block = table.take("block", str)
-    if block not in number:
-        raise table.error("block", "no such block")
-    slid = table.take("slid", float, above=0, say="m")
-    by, rate = (table.take(key, float, above=0) * unit for key in ("by", "rate"))
-    table.finish()
-    return Reversal(number[block], slid, by, rate)
+            raise ValueError(f"{where}, line {n}: {line!r} must be two numbers") from None
+        if time < 0 or (times and time <= times[-1]):
+            raise ValueError(f"{where}, line {n}: time {time:g} s must be >= 0 and increase")
+        times.append(time)
+        values.append(scale * value)
+    if order == 1 and values[0]:
+        raise ValueError(f"{where}, line 2: the first velocity must be 0, because the blocks rest")
+    return {"times": tuple(times), "values": tuple(values), "order": order}

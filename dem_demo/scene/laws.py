@@ -1,16 +1,32 @@
 """Laws of a scene, built from its TOML tables. All are `jointlaw.JointLaw`."""
 
 import tomllib
-from typing import Any
+from collections.abc import Iterable
+from pathlib import Path
 
 import jointlaw as jl
 from jointlaw.parameters.rock import require_rock
 
 from ..errors import SceneError
-from .tables import Table, overlay
+from .keys import COULOMB, Tables, checked, overlay
 
 FLAT = 1e15  # orientation.a: no asperity is inclined by more than 2e-15 rad
 STICKS = 1e30  # friction of a joint that never slides
+
+
+class Files(dict[str, str]):
+    """Texts of the files that a scene names, by their names; read from `folder` when first used.
+
+    A name is a path relative to the scene's file.
+    """
+
+    def __init__(self, folder: str | Path = "", known: Iterable[tuple[str, str]] = ()) -> None:
+        super().__init__(known)
+        self.folder = Path(folder)
+
+    def __missing__(self, name: str) -> str:
+        self[name] = (self.folder / name).read_text(encoding="utf-8-sig")
+        return self[name]
 
 
 def coulomb_law(normal_stiffness: float, shear_stiffness: float, friction: float) -> jl.JointLaw:
@@ -34,40 +50,38 @@ def is_coulomb(law: jl.JointLaw) -> bool:
     return law.orientation.a >= FLAT and law.heights is None and law.asperity.eta == 0
 
 
-def law_table(data: dict[str, Any], where: str) -> dict[str, Any]:
-    """A law's table with the keys of the law that it is `from`. Raises SceneError."""
+def law_table(data: Tables, files: Files) -> Tables:
+    """A law's table with the keys of the law that it is `from`, by name or from a file.
+
+    Raises ValueError.
+    """
     if "from" not in data:
         return data
-    try:
-        law = jl.presets.load_any(Table(data, where).take("from", str))
-    except ValueError as error:
-        raise SceneError(f"{where}.from: {error}") from None
+    name = str(data["from"])
+    if name not in files:
+        path = files.folder / name
+        files[name] = jl.presets.load_any(str(path) if path.is_file() else name).to_toml()
     own = {key: value for key, value in data.items() if key != "from"}
-    return overlay(tomllib.loads(law.to_toml()), own)
+    return overlay(tomllib.loads(files[name]), own)
 
 
-def build_law(data: dict[str, Any], where: str) -> jl.JointLaw:
+def build_law(data: Tables, where: str, files: Files) -> jl.JointLaw:
     """A law from a scene's `[laws.NAME]` table; `kind` is "joint" (default) or "coulomb".
 
     Raises ValueError.
     """
-    table = Table(data, where)
-    kind = table.take("kind", str, "joint")
+    if not isinstance(data, dict):
+        raise SceneError(f"{where} = {data!r}: must be a table")
+    kind = data.get("kind", "joint")
     if kind == "coulomb":
-        friction = table.take("friction", float, least=0, infinite=True)
-        require_rock({"friction": friction}, f"{where}.")
-        law = coulomb_law(
-            table.take("normal_stiffness", float, above=0, say="(Pa/m)"),
-            table.take("shear_stiffness", float, above=0, say="(Pa/m)"),
-            friction,
-        )
-        table.finish()
-        return law
+        keys = checked(data, COULOMB, where)
+        require_rock({"friction": keys["friction"]}, f"{where}.")
+        return coulomb_law(keys["normal_stiffness"], keys["shear_stiffness"], keys["friction"])
     if kind != "joint":
-        raise table.error("kind", "must be 'joint' or 'coulomb'")
-    keys = {key: value for key, value in law_table(data, where).items() if key != "kind"}
-    if keys.get("closure_only"):
+        raise SceneError(f"{where}.kind = {kind!r}: must be 'joint' or 'coulomb'")
+    if data.get("closure_only"):
         raise SceneError(f"{where}.closure_only = true: joints between blocks shear; leave it out")
+    keys = {key: value for key, value in law_table(data, files).items() if key != "kind"}
     law = jl.JointLaw.from_dict({"plane": 0.0, **keys}, where)
     require_rock({"mu": law.asperity.mu}, f"{where}.asperity.")
     require_rock({"plane": law.plane or 0.0}, f"{where}.")

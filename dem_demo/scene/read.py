@@ -6,19 +6,23 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from jointlaw.support.checks import remedy
+import numpy as np
+from shapely import Point, Polygon
+
+from jointlaw.support.checks import one_of, remedy
 
 from ..errors import SceneError
 from .blocks import Block, box, check_convex
-from .drives import AXES, read_drives
-from .laws import build_law
-from .rocks import read_rocks
-from .scene import Monitors, Run, Scene
-from .tables import Table, distinct, overlay
+from .cutting import JointSet, cut
+from .drives import read_drives
+from .keys import ROCK, SCENE, Tables, checked, overlay, some_of, vector
+from .laws import Files, build_law
+from .scene import Monitors, Rock, Run, Scene
 
 SCENES = Path(__file__).parent / "scenes"
 TEMPLATE = Path(__file__).parent / "template.toml"
 GRAVITY, DENSITY = (0.0, -9.81), 2600.0  # m/s2, kg/m3
+LEAST = 0.2  # narrowest block of a rock as a share of the smallest spacing
 
 
 def names() -> list[str]:
@@ -39,175 +43,163 @@ def load(source: str | Path) -> Scene:
             stem, _, variant = source.rpartition("-")
             path, chosen = SCENES / f"{stem}.toml", f'variant = "{variant}"\n'
     if not path.is_file():
-        raise SceneError(
-            f"no scene {str(source)!r}: {remedy(source, names(), 'give a TOML file or one of')}"
-        )
+        known = remedy(source, names(), "give a TOML file or one of")
+        raise SceneError(f"no scene {str(source)!r}: {known}")
     try:
-        return parse(chosen + path.read_text(encoding="utf-8"), path.name)
+        return parse(chosen + path.read_text(encoding="utf-8"), path.name, Files(path.parent))
     except UnicodeDecodeError as error:
         raise SceneError(f"{path} is not UTF-8 text: {error}") from None
 
 
-def parse(text: str, where: str = "scene") -> Scene:
-    """A scene from TOML text; `where` is named in error messages. Raises SceneError."""
-    return build(read_tables(text, where), where, text)
+def parse(text: str, where: str = "scene", files: Files | None = None) -> Scene:
+    """A scene from TOML text; `where` is named in error messages. Raises SceneError.
 
-
-def read_tables(text: str, where: str = "scene") -> dict[str, Any]:
-    """The tables of a scene's text, those of its `variant` laid over the others."""
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"{where} is not valid TOML: {error}") from None
-    variants = data.pop("variants", {})
-    if "variant" not in data:
-        return data
-    variant = data.pop("variant")
-    if not (isinstance(variants, dict) and isinstance(variant, str) and variant in variants):
-        raise SceneError(
-            f"{where}.variant = {variant!r} is none of [variants]: {remedy(variant, variants)}"
-        )
-    return overlay(data, variants[variant])
-
-
-def build(data: dict[str, Any], where: str = "scene", text: str = "") -> Scene:
-    """A scene from the tables of its file; `text` is kept for states saved to files."""
-    top = Table(data, where)
-    laws = {}
-    for name, table in top.take("laws", dict, say="give at least one [laws.NAME] table").items():
-        try:
-            laws[name] = build_law(table, f"{where}.laws.{name}")
-        except (ValueError, TypeError, AttributeError, OverflowError) as error:
-            raise SceneError(str(error)) from None
-    density = top.density(DENSITY)
-    blocks = [_block(table, density) for table in top.tables("block", [])]
-    cut, rocks = read_rocks(top, density, len(blocks))
-    blocks += cut
-    if not blocks:
-        raise SceneError(f"{where}: no blocks; give [[block]] or [[rock]] tables")
-    number = {block.name: i for i, block in enumerate(blocks)}
-    if len(number) < len(blocks):
-        raise SceneError(f"{where}.block: two blocks have the same name; names must differ")
-    if all(block.fixed for block in blocks):
-        raise SceneError(f"{where}.block: all blocks are fixed; at least one must be free to move")
-    drives = read_drives(top, number, blocks)
-    name = dict(zip(AXES.values(), AXES, strict=True))
-    for drive in drives:
-        block = blocks[drive.block]
-        held = tuple(name[d.axis] for d in drives if d.block == drive.block)
-        blocks[drive.block] = replace(block, held=held)
-    scene = Scene(
-        title=top.take("title", str, where),
-        blocks=tuple(blocks),
-        laws=laws,
-        run=_run(Table(top.take("run", dict, say="give a [run] table with `end`"), f"{where}.run")),
-        default_law=top.take("law", str, next(iter(laws), "")),
-        pairs=_pairs(top, number, blocks),
-        rocks=tuple(rocks),
-        edge_laws={edge: law for rock in rocks for edge, law in rock.laws.items()},
-        drives=drives,
-        gravity=top.vector("gravity", GRAVITY),
-        thickness=top.take("thickness", float, 1.0, above=0),
-        monitors=_monitors(Table(top.take("watch", dict, {}), f"{where}.watch"), number, blocks),
-        text=text,
-    )
-    top.finish()
-    for law in [scene.default_law, *scene.pairs.values(), *scene.edge_laws.values()]:
-        if law not in laws:
-            raise SceneError(f"{where}: law {law!r} is not among [laws]; {remedy(law, laws)}")
+    files: those that it names, by default read from the working folder.
+    """
+    scene = build(read_tables(text, where), where, files)
+    object.__setattr__(scene, "text", text)
     return scene
 
 
-def _block(table: Table, density: float) -> Block:
-    name = table.take("name", str)
-    table.where = f"{table.where.rsplit('[', 1)[0]}[{name!r}]"
-    if "box" in table.data:
-        size = table.vector("box")
-        if min(size) <= 0:
-            raise table.error("box", "width and height must be > 0")
-        corners = box(*size, table.vector("at", (0.0, 0.0)), table.take("angle", float, 0.0))
-    else:
-        corners = table.corners("corners", "give `corners`, or `box` with `at` and `angle`")
-    if trouble := check_convex(corners):
-        raise SceneError(f"{table.path('corners')} {trouble}")
-    held = table.take("held", list, [])
-    if not distinct(held, AXES):
-        raise table.error("held", "must be some of x, y, turn, each once")
-    block = Block(
-        name=name,
-        corners=corners,
-        density=table.density(density),
-        fixed=table.take("fixed", bool, False),
-        velocity=table.vector("velocity", (0.0, 0.0)),
-        spin=table.take("spin", float, 0.0),
-        load=table.vector("load", (0.0, 0.0)),
-        held=tuple(held),
-    )
-    table.finish()
-    return block
+def read_tables(text: str, where: str = "scene") -> Tables:
+    """The tables of a scene's text, those of its `variant` laid over the others."""
+    try:
+        data = tomllib.loads(text)
+        variants, chosen = data.pop("variants", {}), data.pop("variant", None)
+        if chosen is None:
+            return data
+        return overlay(data, variants[one_of(f"{where}.variant", chosen, tuple(variants))])
+    except ValueError as error:
+        raise SceneError(f"{where}: {error}") from None
 
 
-def _pairs(top: Table, number: dict[str, int], blocks: Sequence[Block]) -> dict[frozenset, str]:
+def build(data: Tables, where: str = "scene", files: Files | None = None) -> Scene:
+    """A scene from the tables of its file and the files that it names. Raises SceneError."""
+    top, laws, files = checked(data, SCENE, where), {}, Files() if files is None else files
+    for name, table in top["laws"].items():
+        try:
+            laws[name] = build_law(table, f"{where}.laws.{name}", files)
+        except (ValueError, TypeError, AttributeError, OverflowError) as error:
+            raise SceneError(str(error)) from None
+    density = top.get("density", DENSITY)
+    blocks = [_block(table, density, where) for table in top.get("block", ())]
+    rocks = _rocks(top.get("rock", ()), blocks, density, where)
+    number = {block.name: i for i, block in enumerate(blocks)}
+    if len(number) < len(blocks):
+        raise SceneError(f"{where}: two blocks have the same name; names must differ")
+    if all(block.fixed for block in blocks):
+        raise SceneError(f"{where}: no block can move; give [[block]] or [[rock]], not all fixed")
+    try:
+        drives = read_drives(top.get("drive", ()), number, blocks, files, where)
+        pairs = _pairs(top.get("joint", ()), number, blocks, where)
+        monitors = _monitors(top.get("watch", {}), number, blocks, f"{where}.watch")
+    except ValueError as error:
+        raise SceneError(str(error)) from None
+    edge_laws = {edge: law for rock in rocks for edge, law in rock.laws.items()}
+    default = top.get("law", next(iter(laws), ""))
+    for law in [default, *pairs.values(), *edge_laws.values()]:
+        if law not in list(laws):
+            raise SceneError(f"{where}: law {law!r} is not among [laws]; {remedy(law, laws)}")
+    scene = Scene(
+        top.get("title", where), tuple(blocks), laws, Run(**top["run"]), default, pairs,
+        tuple(rocks), edge_laws, drives, top.get("gravity", GRAVITY), top.get("thickness", 1.0),
+        monitors,
+    )  # fmt: skip
+    object.__setattr__(scene, "files", files)
+    return scene
+
+
+def _block(table: Tables, density: float, where: str) -> Block:
+    shape, at = table.pop("corners", None), table.pop("at", (0.0, 0.0))
+    if "box" in table:
+        shape = box(*table.pop("box"), at, table.pop("angle", 0.0))
+    if shape is None:
+        raise SceneError(f"{where}.block[{table['name']!r}]: give `corners`, or `box` and `at`")
+    if trouble := check_convex(shape):
+        raise SceneError(f"{where}.block[{table['name']!r}].corners (or box) {trouble}")
+    held = tuple(table.pop("held", ()))
+    return Block(**{"corners": shape, "density": density, "held": held, **table})
+
+
+def _pairs(
+    tables: list[Tables], number: dict[str, int], blocks: Sequence[Block], where: str
+) -> dict[frozenset, str]:
     """Laws named by [[joint]] tables, for two blocks or for all joints of one."""
-    pairs = {}
-    for table in top.tables("joint", []):
-        if "around" in table.data:
-            meant = [_block_at(table.vector("around"), blocks, table, "around")]
+    pairs: dict[frozenset, str] = {}
+    for i, table in enumerate(tables):
+        name = f"{where}.joint[{i}]"
+        if "around" in table:
+            meant = [_block_at(f"{name}.around", table["around"], blocks)]
         else:
-            named = table.take("between", list, say="or give `around`, a point of one block")
-            if not distinct(named, number, 2):
-                raise table.error("between", "must name two blocks")
-            meant = [number[name] for name in named]
-        law = table.take("law", str)
-        if pairs.setdefault(frozenset(meant), law) != law:
-            raise table.error("law", "another [[joint]] gives these blocks another law")
-        table.finish()
+            two = some_of(f"{name}.between", table.get("between"), number, 2)
+            meant = [number[block] for block in two]
+        if pairs.setdefault(frozenset(meant), table["law"]) != table["law"]:
+            raise ValueError(f"{name}: another [[joint]] gives these blocks another law")
     return pairs
 
 
-def _block_at(point, blocks: Sequence[Block], table: Table, key: str) -> int:
+def _block_at(name: str, point: tuple[float, float], blocks: Sequence[Block]) -> int:
     for i, block in enumerate(blocks):
         if not block.fixed and block.holds(point):
             return i
-    raise table.error(key, "must lie inside a block that can move", list(point))
+    raise ValueError(f"{name} = {list(point)}: must lie inside a block that can move")
 
 
-def _run(table: Table) -> Run:
-    run = Run(
-        end=table.take("end", float, above=0, say="s"),
-        fraction=table.take(
-            "fraction", float, Run.fraction, above=0, most=0.95, say="of the limit"
-        ),
-        step=table.take("step", float, None, above=0, say="s"),
-        seat=table.take("seat", bool, Run.seat),
-        record=table.take("record", float, Run.record, above=0, say="s"),
-        dashpot_normal=table.take("dashpot_normal", float, Run.dashpot_normal, least=0),
-        dashpot_shear=table.take("dashpot_shear", float, Run.dashpot_shear, least=0),
-        law_steps=table.whole("law_steps", Run.law_steps, least=1),
-        largest_stress=table.take("largest_stress", float, Run.largest_stress, least=0, say="Pa"),
-        skin=table.take("skin", float, None, above=0, say="m"),
-        point_spacing=table.take(
-            "point_spacing", float, Run.point_spacing, above=0, infinite=True, say="m"
-        ),
-        corner_length=table.take("corner_length", float, None, above=0, say="m"),
-        max_overlap=table.take("max_overlap", float, Run.max_overlap, above=0),
-    )
-    table.finish()
-    return run
-
-
-def _monitors(table: Table, number: dict[str, int], blocks: Sequence[Block]) -> Monitors:
-    joints = {}
+def _monitors(
+    table: Tables, number: dict[str, int], blocks: Sequence[Block], where: str
+) -> Monitors:
+    watched: dict[str, tuple[Any, ...]] = {}
     for kind in ("slip", "shear"):
-        pairs = table.take(kind, list, [])
-        for pair in pairs:
-            if not distinct(pair, number, 2):
-                raise SceneError(f"{table.path(kind)}: {pair!r} must be [moving block, its base]")
-        joints[kind] = tuple((number[moving], number[base]) for moving, base in pairs)
-    watched = {*joints["slip"], *joints["shear"]}
-    if len({moving for moving, _ in watched}) < len(watched):
-        raise SceneError(f"{table.where}: slip and shear watch one block on two bases; name one")
-    points = [table.two_numbers("pins", value) for value in table.take("pins", list, [])]
-    pins = tuple((_block_at(point, blocks, table, "pins"), point) for point in points)
-    table.finish()
-    return Monitors(**joints, pins=pins)
+        pairs = [some_of(f"{where}.{kind}", pair, number, 2) for pair in table.get(kind, ())]
+        watched[kind] = tuple((number[moving], number[base]) for moving, base in pairs)
+    joints = {*watched["slip"], *watched["shear"]}
+    if len({moving for moving, _ in joints}) < len(joints):
+        raise ValueError(f"{where}: slip and shear watch one block on two bases; name one")
+    points = [vector(f"{where}.pins", point) for point in table.get("pins", ())]
+    pins = tuple((_block_at(f"{where}.pins", point, blocks), point) for point in points)
+    return Monitors(**watched, pins=pins)
+
+
+def _rocks(tables: list[Tables], blocks: list[Block], density: float, where: str) -> list[Rock]:
+    """Cut the rocks of a scene's `[[rock]]` tables, and add their blocks. Raises SceneError."""
+    rocks: list[Rock] = []
+    known: dict[str, Tables] = {}
+    for i, table in enumerate(tables):
+        place = f"{where}.rock[{i}]"
+        like = table.get("like", "") if isinstance(table, dict) else ""
+        if like and like not in known:
+            raise SceneError(f"{place}.like = {like!r}: no rock further up; {remedy(like, known)}")
+        whole = checked({**known[like], **table} if like else table, ROCK, place)
+        if whole["name"] in known:
+            raise SceneError(f"{place}.name = {whole['name']!r}: names of rocks must differ")
+        known[whole["name"]] = {**known.get(like, {}), **table}
+        rocks.append(_rock(whole, blocks, density, f"{where}.rock[{whole['name']!r}]"))
+    return rocks
+
+
+def _rock(table: Tables, blocks: list[Block], density: float, where: str) -> Rock:
+    sets = [JointSet(**part) for part in table["set"]]
+    shift, other = np.array(table.get("at", (0.0, 0.0))), table.get("laws", {})
+    fixed = [Polygon(part["corners"]) for part in table.get("fixed", ())]
+    least = table.get("least_width", LEAST * min((s.spacing for s in sets), default=0.0))
+    if unknown := set(other) - {s.law for s in sets}:
+        raise SceneError(f"{where}.laws: no set of this rock has the law {unknown.pop()!r}")
+    try:
+        parts = cut(table["outline"], sets, table.get("seed", 0), least)
+    except ValueError as error:
+        raise SceneError(f"{where}.outline: {error}") from None
+    first, name, laws = len(blocks), table["name"], {}
+    for i, (shape, of) in enumerate(zip(parts.blocks, parts.sets, strict=True)):
+        block = Block(f"{name} {i + 1}", shape + shift, table.get("density", density))
+        stays = any(region.contains(Point(block.centroid - shift)) for region in fixed)
+        blocks.append(replace(block, fixed=stays))
+        for edge, number in enumerate(of.tolist()):
+            if number >= 0:
+                laws[first + i, edge] = other.get(sets[number].law, sets[number].law)
+    slivers = f"{parts.joined} slivers joined to neighbours"
+    if parts.dropped:
+        slivers += f", {len(parts.dropped)} left out ({sum(parts.dropped):.2g} m2)"
+    free = [i for i in range(first, len(blocks)) if not blocks[i].fixed]
+    if not free:
+        raise SceneError(f"{where}.fixed: all blocks of the rock are fixed")
+    return Rock(name, range(first, len(blocks)), free, laws, slivers)

@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass, field
 
-import numpy as np
-
 import jointlaw as jl
 
 from .blocks import Block
 from .drives import Drive
-from .rocks import Rock
+from .laws import Files
+
+SKIN, CORNER = 0.02, 0.1  # of the least width of a block
 
 Key = tuple[int, int, int, int]  # of an interface: block, edge, block, edge
 
@@ -26,10 +26,24 @@ class Run:
     dashpot_shear: float = 0.05
     law_steps: int = 1  # steps of the law per time step: 4 balances energy to 0.5 % in impacts
     largest_stress: float = 0.0  # Pa, expected in impacts: sets the step before anything touches
-    skin: float | None = None  # reach of the search for contacts; default 0.02 of the least width
-    point_spacing: float = np.inf  # largest distance of law points along a joint
-    corner_length: float | None = None  # of a corner on an edge; default 0.1 of the least width
+    skin: float | None = None  # reach of the search for contacts; default SKIN
+    corner_length: float | None = None  # of a corner on an edge; default CORNER
     max_overlap: float = 0.03  # share of the smaller block's width
+
+
+@dataclass(frozen=True, eq=False)
+class Rock:
+    """A rock mass of a scene, cut into blocks.
+
+    blocks: their numbers in the scene; free: those that can move; laws: of each (block, edge) that
+    lies on a joint, the law of its set; slivers: what became of them, for a person.
+    """
+
+    name: str
+    blocks: range
+    free: list[int]
+    laws: dict[tuple[int, int], str]
+    slivers: str
 
 
 @dataclass(frozen=True)
@@ -43,7 +57,11 @@ class Monitors:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Everything that a simulation needs. `text` is the file it came from."""
+    """Everything that a simulation needs.
+
+    text: of the file that it was read from, empty for a scene made or changed in memory; files:
+    what that file names.
+    """
 
     title: str
     blocks: tuple[Block, ...]
@@ -57,7 +75,18 @@ class Scene:
     gravity: tuple[float, float] = (0.0, -9.81)
     thickness: float = 1.0
     monitors: Monitors = Monitors()
-    text: str = ""
+    text: str = field(default="", init=False)  # `replace` leaves both out
+    files: Files = field(default_factory=Files, init=False)
+
+    @property
+    def skin(self) -> float:
+        """Reach (m) of the search for contacts."""
+        return self.run.skin or SKIN * min(block.width for block in self.blocks)
+
+    @property
+    def corner_length(self) -> float:
+        """Contact length (m) of a corner that stands on an edge."""
+        return self.run.corner_length or CORNER * min(block.width for block in self.blocks)
 
     @property
     def doubts(self) -> list[str]:

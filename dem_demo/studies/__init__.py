@@ -1,8 +1,6 @@
 """Studies: many runs of one scene.
 
-compare      every rock alone, for several seeds, with plain Coulomb as well
-limit        the critical tilt and the strength reduction factor of a scene
-strength     these for every rock alone, and how it then fails
-ingredients  a scene without each of its ingredients
-ablate       runs of these, and what each changes
+compare    every rock alone, for several seeds, with plain Coulomb as well
+strength   how much weaker the joints may be, and the critical tilt
+ablate     a scene without each of its ingredients: what that changes
 """

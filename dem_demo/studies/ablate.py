@@ -1,195 +1,213 @@
-"""Run a scene with each ingredient removed in turn: what it changes, and what it costs."""
+"""A scene without each of its ingredients in turn: what that changes, and what it costs.
+
+An ingredient is removed from all laws of a scene at once, or from its run. Where that changes how
+stiff the joints are, the stiffness K of an asperity is scaled so that each law closes as far as
+before at the normal stress that its joints carried: what is left is the change of form. A law whose
+joints carried nothing stays as it is.
+"""
 
 import time
-from collections.abc import Collection
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import jointlaw as jl
-from jointlaw.support.files import clear_run, replace_file, write_json
+from jointlaw.laboratory.experiments import PathError
+from jointlaw.parameters.resolution import named
+from jointlaw.support.files import clear_run, write_json
 
 from ..dynamics.simulation import Simulation
 from ..errors import Refused
+from ..output.monitors import friction_angle
 from ..output.record import Record, write_csv
 from ..output.run import run
-from ..scene import Scene
-from .ingredients import Variant, variants, working_stress
+from ..scene import Scene, coulomb_law, is_coulomb, overlay
 
-WARM = 20  # steps before the first run, which else would pay for compiled code
-VERSION = 1  # of summary.json
-HALVINGS = 3  # of the time step, where a variant is too stiff for that of the scene
+SHALLOW = 1e-3  # step of closure, as a share, over which a stiffness is read
+CELLS = 4  # depth cells at least, where they are placed for the scene
+COST = ("steps", "time_step_s", "cpu_s", "time_ratio", "note")
+VERSION = 2  # of summary.json
 
-Outcome = dict[str, float | str | None]
+SINGLE = {"formation": "individual"}  # population curves are not convex at eta = 0
+STIFFENS = {"orientation", "asperity", "heights"}  # parts that the stiffness depends on
+INGREDIENTS: dict[str, dict[str, Any]] = {  # by name: the keys of a law without it
+    "no heights": {"heights": None},
+    "heights counted one by one": {"heights": SINGLE},
+    "linear asperities (eta = 0)": {"asperity": {"eta": 0.0}, "heights": SINGLE},
+    "no friction on asperities": {
+        "asperity": {"mu": 0.0, "mu_residual": None, "wear_slip": np.inf},
+    },
+    "elastic asperities": {"asperity": {"yield_interference": np.inf}},
+    "b = 0": {"orientation": {"b": 0.0}},
+    "c = 0": {"orientation": {"c": 0.0}},
+    "no large shear": {"critical_slip": np.inf},
+    "one depth cell": {"resolution": {"depth": 1}},
+}
+
+Change = Callable[[jl.JointLaw, list[float]], jl.JointLaw]
 
 
-@dataclass
-class Row:
-    """One run: outcome by name, unit last in the name; time in s of this process."""
+def ablate(scene: Scene, until: float | None = None, leave_out: Collection[str] = ()) -> list[dict]:
+    """Rows: the scene as it is, without each ingredient in turn, and as it is once more.
 
-    name: str
-    outcome: Outcome = field(default_factory=dict)
-    steps: int = 0
-    time_step: float = np.nan
-    cpu: float = np.nan
-    note: str = ""
-
-
-def ablate(scene: Scene, until: float | None = None, leave_out: Collection[str] = ()) -> list[Row]:
-    """The scene as it is, without each ingredient in turn, and as it is once more.
-
-    until: model time to stop at (s); leave_out: names of variants that are not run.
-    Two rows of the whole scene, the first and the last, tell how steady the times are. A variant
+    until: model time to stop at (s); leave_out: names of variants that are not run. A row holds
+    outcomes and "change of ..." against the first row, unit last in the name, and COST. Two rows of
+    the whole scene tell how steady the times are; the first also waits for compiled code. A variant
     that cannot be built or run is a row whose note says why.
     """
-    warm = Simulation(scene)
-    for _ in range(WARM):
-        warm.step()
-    base, record = _run(replace(scene, title="whole scene"), "whole scene", until)
+    whole, record = _run("whole scene", lambda: scene, until)
     if record is None:
-        raise Refused(base.note)
-    todo = [v for v in variants(scene, working_stress(record)) if v.name not in leave_out]
-    rows = [base]
-    for i, variant in enumerate(todo):
-        rows.append(_without(variant, record, until, f"{i + 1}/{len(todo)}"))
-    rows.append(_run(replace(scene, title="whole scene again"), "whole scene again", until)[0])
+        raise Refused(whole["note"])
+    rows = [whole]
+    for name, make in variants(scene, record):
+        if name not in leave_out:
+            row, other = _run(name, make, until)
+            if other is not None:
+                apart = np.hypot(*(other.motion[-1] - record.motion[-1])[:2])
+                row["end, apart_mm"] = 1e3 * float(apart.max())
+            rows.append(row)
+    rows.append(_run("whole scene again", lambda: scene, until)[0])
+    least = min(whole["cpu_s"], rows[-1]["cpu_s"])
+    numbers = {key: v for key, v in whole.items() if isinstance(v, float) and key not in COST}
+    for row in rows:
+        row["time_ratio"] = row["cpu_s"] / least
+        for key in numbers.keys() & row.keys():
+            if row[key] is not None:
+                row[f"change of {key}"] = row[key] - whole[key]
     return rows
 
 
-def _without(variant: Variant, record: Record, until: float | None, count: str) -> Row:
+def variants(scene: Scene, record: Record) -> Iterator[tuple[str, Callable[[], Scene]]]:
+    """Names, and what makes the scene without an ingredient; that may raise ValueError.
+
+    record: of the whole scene, for the normal stress that the joints of each law carried.
+    """
+    pressed: dict[str, list[float]] = {name: [] for name in scene.laws}
+    for i, frame in enumerate(record.joints):
+        stresses = record.joint(i, "normal_stress_Pa").tolist()
+        for who, stress in zip(frame["who"].tolist(), stresses, strict=True):
+            pressed[scene.law_of(who)] += [stress] * (stress > 0)
+    joints = {name: law for name, law in scene.laws.items() if not is_coulomb(law)}
+
+    def changed(change: Change) -> Scene:
+        laws = {name: change(law, pressed[name]) for name, law in joints.items() if pressed[name]}
+        return replace(scene, laws={**scene.laws, **laws})
+
+    lacking: dict[str, Change] = {}
+    for law in joints.values():
+        names = named(law.critical_slip, law.asperity.yield_interference, law.closure_range)
+        given = INGREDIENTS | {
+            f"resolution {n}": {"resolution": asdict(r)} for n, r in names.items()
+        }
+        own = {"heights": SINGLE} | {k: v for k, v in asdict(law).items() if v is not None}
+        lacking |= {n: partial(_without, keys) for n, keys in given.items() if _differ(own, keys)}
+    if joints:
+        lacking |= {"depth cells at its own stress": _own_range, "plain Coulomb": _coulomb}
+    for name, change in lacking.items():
+        yield name, partial(changed, change)
+    largest = max((max(stresses) for stresses in pressed.values() if stresses), default=0.0)
+    run, steps = scene.run, 1 if scene.run.law_steps > 1 else 4
+    fall = max(run.largest_stress, 2.0 * largest)  # a load put down at once reaches its double
+    key = "step" if run.step else "fraction"
+    others = {
+        "no dashpots": {"dashpot_normal": 0.0, "dashpot_shear": 0.0},
+        f"law_steps = {steps}": {"law_steps": steps},
+        "not seated": {"seat": False, "largest_stress": fall if run.seat else run.largest_stress},
+        "half the time step": {key: 0.5 * getattr(run, key)},
+        "twice the time step": {key: 2.0 * getattr(run, key)},
+    }
+    for name, keys in others.items():
+        if (other := replace(run, **keys)) != run:
+            yield name, partial(replace, scene, run=other)
+
+
+def _differ(own: dict[str, Any], keys: dict[str, Any]) -> bool:
+    """Has a law, as nested tables, what these keys take away?"""
+    return own["heights"] != SINGLE if keys == {"heights": None} else overlay(own, keys) != own
+
+
+def _changed(part: Any, keys: dict[str, Any]) -> Any:
+    """A law, or a part of it, with these keys."""
+    nested = {key: getattr(part, key) for key, value in keys.items() if isinstance(value, dict)}
+    return replace(part, **keys | {k: own and _changed(own, keys[k]) for k, own in nested.items()})
+
+
+def _without(keys: dict[str, Any], law: jl.JointLaw, pressed: list[float]) -> jl.JointLaw:
+    other = _changed(law, keys)
+    if other == law or not STIFFENS & set(keys):
+        return other
+    stress = np.median(pressed)
+    K = law.asperity.K * stress / float(other.normal_stress(law.closure(stress)))
+    return _changed(other, {"asperity": {"K": K}})
+
+
+def _own_range(law: jl.JointLaw, pressed: list[float]) -> jl.JointLaw:
+    """Cells placed for the scene; by default they are for 20 MPa, and all but one lie idle."""
+    closure = float(law.closure(max(pressed)))
+    resolution = replace(law.resolution, depth=max(law.resolution.depth, CELLS))
+    return replace(law, closure_range=closure, resolution=resolution)
+
+
+def _coulomb(law: jl.JointLaw, pressed: list[float]) -> jl.JointLaw:
+    """Constant stiffness and friction: those of the law at the normal stress of its joints."""
+    stress = float(np.median(pressed))
+    closure = float(law.closure(stress))
+    joints = law.joints(1)
+    joints.update([[closure, 0.0]], tangent=False)
+    _, C = joints.trial([[SHALLOW * closure, 0.0]])
+    angle = np.radians(friction_angle(law, stress))
+    return coulomb_law(float(C[0, 0, 0]), float(C[0, 1, 1]), float(np.tan(angle)))
+
+
+def _run(name: str, make: Callable[[], Scene], until: float | None) -> tuple[dict, Record | None]:
+    """A row, and the record of its run if there was one."""
+    row = {"without": name, "steps": 0, "time_step_s": np.nan, "cpu_s": np.nan, "note": ""}
+    started = time.process_time()
     try:
-        scene = variant.make()
-    except (ValueError, jl.PathError) as error:
-        return Row(variant.name, note=f"cannot be built: {error}")
-    scene = replace(scene, title=f"{count} {variant.name}")
-    row, other = _run(scene, variant.name, until, 0 if variant.own_step else HALVINGS)
-    if other is not None:
-        apart = np.hypot(*(other.motion[-1] - record.motion[-1])[:2])
-        row.outcome["end, apart_mm"] = 1e3 * float(apart.max())
-    return row
+        sim = Simulation(replace(make(), title=name))
+        record, summary = run(sim, None, until)
+    except Refused as trouble:
+        return row | {"note": f"refused: {trouble}"}, None
+    except (ValueError, PathError) as error:
+        return row | {"note": f"cannot be built: {error}"}, None
+    row |= {"steps": summary["steps"], "time_step_s": sim.dt}
+    return row | {"cpu_s": time.process_time() - started, **_outcome(record, summary)}, record
 
 
-def _run(
-    scene: Scene, name: str, until: float | None, halvings: int = HALVINGS
-) -> tuple[Row, Record | None]:
-    """A run, with half the time step for as often as given where it is refused for its step."""
-    step, note = scene.run.step, ""
-    for halved in range(halvings + 1):
-        started, sim = time.process_time(), None
-        try:
-            sim = Simulation(replace(scene, run=replace(scene.run, step=step)))
-            record, summary = run(sim, None, until)
-        except Refused as trouble:
-            note = f"refused: {trouble}"
-            used = step or (sim and sim.now.dt)  # none if the start itself is refused
-            if "smaller step" not in str(trouble) or not used:
-                break
-            step = 0.5 * used
-            continue
-        cpu, dt = time.process_time() - started, sim.now.dt
-        note = f"time step / {2**halved}" if halved else ""
-        return Row(name, outcome(record, summary), summary["steps"], dt, cpu, note), record
-    return Row(name, note=note), None
-
-
-def outcome(record: Record, summary: dict[str, Any]) -> Outcome:
+def _outcome(record: Record, summary: dict) -> dict[str, Any]:
     """What a scene monitors, and what every scene has: the unit ends the name."""
-    found: Outcome = {}
-    for slip in summary["slip"]:
-        found[f"{slip['block']}, slips at_deg"] = slip["slip_angle"]
+    found = {f"{slip['block']}, slips at_deg": slip["slip_angle"] for slip in summary["slip"]}
+    last = record.monitored[-1].items()
+    found |= {f"last {key}": value for key, value in last if not key.endswith("_deg")}
     for moving, _ in record.scene.monitors.shear:
         name = record.scene.blocks[moving].name
         normal, shear = (record.column(f"{name}: {key}_Pa") for key in ("normal", "shear"))
-        closure = record.column(f"{name}: closure_m")
         angle = np.degrees(np.arctan2(np.abs(shear), normal))
         found[f"{name}, peak friction_deg"] = float(angle.max())
-        found[f"{name}, last shear_kPa"] = 1e-3 * float(shear[-1])
-        found[f"{name}, dilation_mm"] = 1e3 * float(closure[0] - closure.min())
     for rock in summary["rocks"]:
-        found[f"{rock['rock']}, state"] = rock["state"]
-        found[f"{rock['rock']}, moved_m"] = rock["moved_m"]
-    found["largest displacement_m"] = float(record.moved.max())
-    found["friction_kJ"] = 1e-3 * summary["energy_J"]["friction"]
-    found["energy error_1"] = summary["largest_energy_error"]
-    return found
-
-
-def changes(rows: list[Row]) -> list[Outcome]:
-    """Outcome of each run less that of the first; None where there is none to compare."""
-    base = rows[0].outcome
-
-    def less(key: str, value: float | str | None) -> float | None:
-        was = base.get(key)
-        numeric = isinstance(value, float) and isinstance(was, float)
-        return value - was if numeric else None
-
-    return [{key: less(key, value) for key, value in row.outcome.items()} for row in rows]
-
-
-def time_ratios(rows: list[Row]) -> list[float]:
-    """Time of each run over the smaller of the two of the whole scene."""
-    least = min(rows[0].cpu, rows[-1].cpu)
-    return [row.cpu / least for row in rows]
-
-
-def table(rows: list[Row]) -> str:
-    """Markdown: a line for each run, a column for each outcome and one for the time."""
-    keys = list(dict.fromkeys(key for row in rows[1:] for key in row.outcome))
-    shift = "end, apart_mm"
-    keys = [k for k in keys if k != shift] + [shift] * (shift in keys)
-    head = ["without", *(_title(key) for key in keys), "steps", "time"]
-    lines, notes = [head, ["---", *["---:"] * (len(head) - 1)]], []
-    for row, change, ratio in zip(rows, changes(rows), time_ratios(rows), strict=True):
-        name = row.name
-        if row.note:
-            notes.append(f"({len(notes) + 1}) {row.note}")
-            name += f" ({len(notes)})"
-        shown = [_shown(row.outcome, change, key, row is rows[0]) for key in keys]
-        cost = [str(row.steps), f"{ratio:.2f}"] if row.outcome else ["-", "-"]
-        lines.append([name, *shown, *cost])
-    text = "\n".join("| " + " | ".join(line) + " |" for line in lines)
-    return "\n\n".join([text, *notes])
-
-
-def _title(key: str) -> str:
-    what, has_unit, unit = key.rpartition("_")
-    if not has_unit:
-        return key
-    return what if unit == "1" else f"{what} ({unit})"
-
-
-def _shown(values: Outcome, change: Outcome, key: str, whole: bool) -> str:
-    """A value, or its change against the whole scene."""
-    if key not in values:
-        return "-"
-    value, by = values[key], change.get(key)
-    if value is None or isinstance(value, str):
-        return "none" if value is None else value
-    if key.startswith("energy error"):
-        return f"{value:.1e}"
-    if whole or by is None:
-        return f"{value:.4g}"
-    return f"{by:+.3g}" if abs(by) > 1e-12 else "0"
-
-
-def write(rows: list[Row], folder: Path) -> None:
-    """ablation.csv (values, changes, times), ablation.md (the table) and summary.json."""
-    clear_run(folder)
-    keys = list(dict.fromkeys(key for row in rows for key in row.outcome))
-    columns = [column for key in keys for column in (key, f"change of {key}")]
-    cost = ["steps", "time_step_s", "cpu_s", "time_ratio", "note"]
-    lines = []
-    for row, change, ratio in zip(rows, changes(rows), time_ratios(rows), strict=True):
-        cells = [cell for key in keys for cell in (row.outcome.get(key), change.get(key))]
-        lines.append([row.name, *cells, row.steps, row.time_step, row.cpu, ratio, row.note])
-    write_csv(folder / "ablation.csv", ["without", *columns, *cost], lines)
-    replace_file(folder / "ablation.md", (table(rows) + "\n").encode())
-    summary = {
-        "version": VERSION,
-        "files": ["ablation.csv", "ablation.md"],
-        "runs": [row.__dict__ for row in rows],
-        "time_ratio": time_ratios(rows),
+        found |= {f"{rock['rock']}, {key}": rock[key] for key in ("state", "moved_m")}
+    return found | {
+        "largest displacement_m": float(record.moved.max()),
+        "friction_kJ": 1e-3 * summary["energy_J"]["friction"],
+        "energy error_1": summary["largest_energy_error"],
     }
-    write_json(folder / "summary.json", summary)
+
+
+def write(rows: list[dict], folder: Path) -> str:
+    """ablation.csv and summary.json of some rows; returns what each changed, a line a row."""
+    clear_run(folder)
+    header = [key for key in dict.fromkeys(key for row in rows for key in row) if key not in COST]
+    columns = [*header, *COST]
+    write_csv(folder / "ablation.csv", columns, ([row.get(c) for c in columns] for row in rows))
+    about = {"version": VERSION, "files": ["ablation.csv"], "runs": rows}
+    write_json(folder / "summary.json", about)
+    lines = []
+    for row in rows:
+        apart = row.get("end, apart_mm", 0.0)
+        told = row["note"] or f"ends {apart:.3g} mm apart, time x {row['time_ratio']:.2f}"
+        lines.append(f"{row['without']}: {told}")
+    return "\n".join(lines)

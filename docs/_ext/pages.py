@@ -4,8 +4,9 @@ import re
 
 
 def read(app, name, source):
-    """Links to gallery scripts lead to their pages."""
+    """Links to scripts of the gallery and of the paper's figures lead to their pages."""
     source[0] = re.sub(r"\]\(gallery/(plot_\w+)\.py\)", r"](examples/\1.rst)", source[0])
+    source[0] = re.sub(r"\]\(paper/(plot_\w+)\.py\)", r"](figures/\1.rst)", source[0])
 
 
 def setup(app):

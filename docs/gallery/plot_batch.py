@@ -32,11 +32,10 @@ def place(share):
 # %%
 # The loop: increments in, tractions out; a contact that is lost starts anew.
 
-F = np.empty((n, 3))
 pressure, friction, touching = [], [], []
 for step in range(1, steps + 1):
     new = place(step / steps)
-    joints.update(new - position, tangent=False, out=(F, None))
+    F, _ = joints.update(new - position, tangent=False)
     position = new
     touching.append(np.mean(F[:, 0] > 0))
     pressure.append(F[:, 0].mean())
@@ -53,11 +52,11 @@ print(f"lost to friction {joints.dissipated_energy.mean():.2f} J/m² per contact
 
 time = np.arange(1, steps + 1) / steps
 figure, (top, bottom) = plt.subplots(2, 1, figsize=(7, 5.5), layout="constrained", sharex=True)
-top.plot(time, np.array(pressure) / 1e6, label="normal")
-top.plot(time, np.array(friction) / 1e6, label="shear")
+top.plot(100 * time, np.array(pressure) / 1e6, label="normal")
+top.plot(100 * time, np.array(friction) / 1e6, label="shear")
 top.set_ylabel("mean stress (MPa)")
 top.legend()
-bottom.plot(time, 100 * np.array(touching), color="C2")
+bottom.plot(100 * time, 100 * np.array(touching), color="C2")
 bottom.set_ylabel("contacts that carry (%)")
-bottom.set_xlabel("share of the run (1)")
+bottom.set_xlabel("share of the run (%)")
 plt.show()

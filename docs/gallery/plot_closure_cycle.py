@@ -12,6 +12,7 @@ import numpy as np
 from scipy.integrate import trapezoid
 
 import jointlaw as jl
+from jointlaw.calibration import datasets
 
 # %%
 # The law is that of ``jointlaw fit grimsel_vd1_closure --cycle``: one length, the yield
@@ -25,22 +26,23 @@ law = jl.JointLaw(
     closure_only=True,
 )
 elastic = replace(law, asperity=replace(law.asperity, yield_interference=np.inf))
-stress, closure = jl.datasets.load("grimsel_vd1_closure")
+stress, closure = datasets.load("grimsel_vd1_closure")
 seating = 70.4e-6  # m, closure of the law where the test began
 
-figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
-left.plot(closure * 1e6, stress / 1e6, "ko", ms=4, label="measured")
+figure, axis = plt.subplots(layout="constrained")
+axis.plot(closure * 1e6, stress / 1e6, "ko", ms=4, label="measured")
 loss = {}
 for label, one in (("yields", law), ("elastic", elastic)):
     record = jl.closure_test(one.joint(), stress.max(), steps=80)
     top = len(record) // 2
     up = trapezoid(record.F1[: top + 1], record.closure[: top + 1])
     loss[label] = 1 + trapezoid(record.F1[top:], record.closure[top:]) / up
-    left.plot((record.closure - seating) * 1e6, record.F1 / 1e6, label=label)
+    axis.plot((record.closure - seating) * 1e6, record.F1 / 1e6, label=label)
     print(f"{label}: the cycle loses {100 * loss[label]:.1f} % of its work of loading")
-left.set_xlabel("closure since the test began (µm)")
-left.set_ylabel("normal stress (MPa)")
-left.legend()
+axis.set_xlabel("closure since the test began (µm)")
+axis.set_ylabel("normal stress (MPa)")
+axis.legend()
+plt.show()
 
 # %%
 # Cycles of growing stress. Each begins where the last one ended and is elastic up to the largest
@@ -48,11 +50,12 @@ left.legend()
 
 record = jl.closure_test(law.joint(), [3e6, 6e6, 10e6], steps=60)
 kept = record.closure[120::120]
+figure, axis = plt.subplots(layout="constrained")
 for k in range(3):
     rows = slice(120 * k, 120 * (k + 1) + 1)
     label = f"cycle {k + 1}, keeps {kept[k] * 1e6:.0f} µm in all"
-    right.plot(record.closure[rows] * 1e6, record.F1[rows] / 1e6, label=label)
-right.set_xlabel("closure from first touch (µm)")
-right.set_ylabel("normal stress (MPa)")
-right.legend(loc="upper left")
+    axis.plot(record.closure[rows] * 1e6, record.F1[rows] / 1e6, label=label)
+axis.set_xlabel("closure from first touch (µm)")
+axis.set_ylabel("normal stress (MPa)")
+axis.legend(loc="upper left")
 plt.show()

@@ -83,7 +83,7 @@ for label, kind in kinds.items():
     right.plot(travel * 1e6, (cycles.closure - cycles.closure[0]) * 1e6, label=label, **style)
     print(f"{label}: largest F2/F1 of each cycle {np.round(peaks[label], 3)}")
 left.set_xlabel("shear displacement (µm)")
-left.set_ylabel("shear over normal stress (1)")
+left.set_ylabel("shear over normal stress")
 right.set_xlabel("distance sheared (µm)")
 right.set_ylabel("closure since seating (µm)")
 right.legend(fontsize=8, loc="center right")

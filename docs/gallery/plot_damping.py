@@ -39,13 +39,9 @@ def cycles(law, stress, amplitudes, count=3, steps=20):
 law = replace(jl.presets.load("westerly-smooth"), plane=0.0)
 fine = replace(law, resolution=jl.Resolution(3, 6, 300))
 amplitudes = np.geomspace(2e-9, 500e-9, 25)
-figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
 damping, stiffness = {}, {}
 for stress in (5e6, 10e6, 20e6):
     damping[stress], stiffness[stress] = cycles(fine, stress, amplitudes)
-    label = f"{stress / 1e6:g} MPa"
-    left.loglog(amplitudes * 1e9, 100 * damping[stress], label=label)
-    right.semilogx(amplitudes * 1e9, stiffness[stress] / stiffness[stress][0], label=label)
 
 # %%
 # With the few cells of `balanced` the stiffness is about right, and so is the damping of large
@@ -53,11 +49,16 @@ for stress in (5e6, 10e6, 20e6):
 # be?*
 
 coarse, softer = cycles(law, 10e6, amplitudes)
+figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
+for stress in damping:
+    label = f"{stress / 1e6:g} MPa"
+    left.loglog(amplitudes * 1e9, 100 * damping[stress], label=label)
+    right.semilogx(amplitudes * 1e9, 100 * stiffness[stress] / stiffness[stress][0], label=label)
 left.loglog(amplitudes * 1e9, 100 * coarse, "C1--", label="10 MPa, balanced")
-right.semilogx(amplitudes * 1e9, softer / stiffness[10e6][0], "C1--", label="10 MPa, balanced")
+right.semilogx(amplitudes * 1e9, 100 * softer / stiffness[10e6][0], "C1--")
 left.set_ylim(0.01, 100)
 left.set_ylabel("damping ratio (%)")
-right.set_ylabel("secant stiffness over its largest (1)")
+right.set_ylabel("secant stiffness (% of its largest)")
 for axes in (left, right):
     axes.set_xlabel("shear amplitude (nm)")
     axes.grid(alpha=0.3)

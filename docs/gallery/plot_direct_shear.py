@@ -45,7 +45,7 @@ plt.show()
 # %%
 for label, record in records.items():
     print(
-        f"{label:24s} peak friction {record.peak_friction_angle:.1f}°, "
+        f"{label:24s} largest friction angle {record.peak_friction_angle:.1f}°, "
         f"dilation angle {record.dilation_angle:.1f}°, "
         f"shear stress {record.shear_stress[-1] / 1e6:.1f} MPa"
     )

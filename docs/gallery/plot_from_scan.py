@@ -11,10 +11,22 @@ import numpy as np
 import jointlaw as jl
 
 # %%
-# A made-up scan with known asperities stands for yours: composite heights in m, 20 µm apart.
+# A made-up scan stands for yours: composite heights in m, 20 µm apart, of 24 x 24 asperities. Their
+# depths follow Eq. 12 with alpha = 4 and beta = 10 µm; each falls away by one plane in each
+# quadrant, of directions by Eq. 14 with a = 3 and b = c = 0.
 
-true = jl.Orientation(3.0, 0.5, 0.1)
-z = jl.synthetic_surface(true, jl.GammaHeights(4.0, 10e-6), spacing=20e-6, noise=0.3e-6)
+true = jl.Orientation(3.0)
+rng = np.random.default_rng(0)
+x = np.arange(20) - 10  # points of one asperity
+quadrant = (x >= 0).astype(int)
+depth = rng.gamma(4.0 + 1, 10e-6, (24, 24, 1, 1))
+slope = np.tan(np.arccos(rng.uniform(size=(24, 24, 2, 2))) / true.a)
+azimuth = rng.uniform(0, np.pi / 2, (24, 24, 2, 2))
+along, across = (
+    (slope * part)[:, :, quadrant][..., quadrant] for part in (np.cos(azimuth), np.sin(azimuth))
+)
+z = -depth - 20e-6 * (along * abs(x) + across * abs(x)[:, None])
+z = z.swapaxes(1, 2).reshape(480, 480) + 0.3e-6 * rng.standard_normal((480, 480))
 scan = jl.from_surface(z, spacing=20e-6)
 for name in ("a", "b", "c", "alpha", "beta"):
     low, high = scan.interval(name)

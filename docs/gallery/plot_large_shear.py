@@ -29,10 +29,10 @@ for label, law in (
     record = records[label] = jl.direct_shear(law.joint(), turns, normal=10e6, steps=150)
     top.plot(record.shear * 1e6, record.shear_stress / record.F1, label=label)
     bottom.plot(record.shear * 1e6, (record.closure[0] - record.closure) * 1e6, label=label)
-top.set_ylabel("shear over normal stress (1)")
+top.set_ylabel("shear over normal stress")
 bottom.set_ylabel("dilation (µm)")
 bottom.set_xlabel("shear displacement (µm)")
-top.legend(loc="center")
+top.legend(loc="lower left")
 plt.show()
 
 # %%

@@ -36,7 +36,7 @@ for length in (np.inf, 0.2e-6, 0.1e-6, 0.05e-6):
     middle.semilogx(normal / 1e6, angles[label], "o-", ms=3, label=label)
     right.semilogx(normal / 1e6, dilation[label], "o-", ms=3, label=label)
 left.set_ylabel("shear strength (MPa)")
-middle.set_ylabel("peak friction angle (°)")
+middle.set_ylabel("largest friction angle (°)")
 right.set_ylabel("largest dilation angle (°)")
 for axis in (left, middle, right):
     axis.set_xlabel("normal stress (MPa)")

@@ -8,14 +8,16 @@ displacement would compare their dilation, summed up over the slip, and not thei
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..joints.batch import Law
 from ..laboratory.normal_control import NormalCondition, closing_increments
 from ..support.checks import Array
+
+if TYPE_CHECKING:
+    from ..law import JointLaw
 
 LEG = 24  # steps each way
 SHARES = (1.0, 0.1)  # of the normal stress S/2 of the standard paths
@@ -37,13 +39,6 @@ class Slip(NamedTuple):
     friction: Array
     dilation: Array
     counts: NDArray[np.bool_]
-
-    def errors(self, other: Slip) -> tuple[Array, Array]:
-        """Largest and rms |F - other F| (paths,) over the path's largest, where friction counts."""
-        peak = np.linalg.norm(other.F, axis=2).max(axis=0, where=other.counts, initial=0.0)
-        off = np.linalg.norm(self.F - other.F, axis=2)
-        mean = np.mean(off**2, axis=0, where=other.counts)
-        return off.max(axis=0, where=other.counts, initial=0.0) / peak, np.sqrt(mean) / peak
 
     def apart(self, other: Slip) -> tuple[float, float]:
         """Largest difference of the friction and of the dilation angle, in degrees."""
@@ -71,7 +66,7 @@ def random_ways(rng: np.random.Generator, count: int, dim: int) -> Array:
     return np.column_stack([share, azimuth * (dim == 3), rng.uniform(0.3, 1.0, count)])
 
 
-def slip(law: Law, closure_range: float, stress: float, ways: Array) -> Slip:
+def slip(law: JointLaw, closure_range: float, stress: float, ways: Array) -> Slip:
     """Shear there and back along `ways` (paths, 3), of which the stress S/2 is in Pa."""
     share, azimuth, length = ways.T
     dim, R, Dc = law.tables.dim, closure_range, law.tables.critical_slip
@@ -90,7 +85,7 @@ def slip(law: Law, closure_range: float, stress: float, ways: Array) -> Slip:
     for k, steps in enumerate(np.concatenate([leg, -leg])):
         step = np.column_stack([rate * steps, steps[:, None] * along])
         step[:, 0] = closing_increments(batch, step, NormalCondition(goal, goal), HELD)
-        batch.update(step, tangent=False, out=(F[k], None))
+        F[k], _ = batch.update(step, tangent=False)
         rate = step[:, 0] / steps
         rise[k] = -step[:, 0] / np.abs(steps)
     sense = np.repeat([1.0, -1.0], LEG)[:, None]

@@ -28,54 +28,38 @@ constant stress are found once, at half the reference resolution, and are paths 
 then on, so that every resolution is asked the same.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
-from ..joints import batch as joints
 from ..laboratory.normal_control import NormalCondition, closing_increments
-from ..parameters.heights import HeightDistribution
-from ..parameters.orientation import Orientation
 from ..parameters.resolution import Resolution
 from ..support.checks import Array
 from ..support.progress import track
 from .slip import HELD, Slip, distance, names, random_ways, slip, standard_ways
+
+if TYPE_CHECKING:
+    from ..law import JointLaw
 
 STEPS = 120  # of each path
 FAR = 3.0  # R: the longest slip at a given closure
 _JAMS = 88.0  # degrees: the steepest friction angle of a law that slips at a given stress
 
 
-class Law(joints.Law, Protocol):
-    """What is read of a law whose accuracy is measured; `replace` gives it other resolutions."""
-
-    __dataclass_fields__: ClassVar[dict[str, Any]]
-
-    def __hash__(self) -> int: ...
-    @property
-    def orientation(self) -> Orientation: ...
-    @property
-    def heights(self) -> HeightDistribution | None: ...
-    @property
-    def closure_range(self) -> float: ...
-    @property
-    def resolution(self) -> Resolution: ...
-    def normal_stress(self, closure: ArrayLike) -> Any: ...
-
-
-def reference_resolution(law: Law) -> Resolution:
+def reference_resolution(law: JointLaw) -> Resolution:
     """The resolution whose tractions count as exact: steep facets (small a) need the most of it."""
     if law.heights is None and law.asperity.eta == 0.0:  # one spring, whose slip has a sharp onset
         return Resolution(64, 48, 1)
     return Resolution(math.ceil(6 + 32 / law.orientation.a), 16, 36)
 
 
-def steepest(law: Law) -> float:
+def steepest(law: JointLaw) -> float:
     """Limit of the friction angle under long slip at small stress: atan(mu) + 90 deg/a."""
     return math.degrees(math.atan(law.asperity.mu)) + 90.0 / law.orientation.a
 
@@ -114,22 +98,22 @@ class Suite:
     stress: float  # Pa, S/2
     uncertainty: Array  # (paths,) of F: its difference from two thirds of the nodes
 
-    def miss(self, law: Law) -> Miss:
+    def miss(self, law: JointLaw) -> Miss:
         """How far another resolution is off."""
         largest, rms = errors(tractions(law, self.d), self.F)
         if self.slip is None:
             return Miss(largest, rms, math.nan, math.nan)
         mine = slip(law, law.closure_range, self.stress, self.ways)
-        more = mine.errors(self.slip)
+        more = errors(mine.F, self.slip.F, self.slip.counts)
         largest, rms = np.append(largest, more[0]), np.append(rms, more[1])
         return Miss(largest, rms, *mine.apart(self.slip))
 
-    def errors(self, law: Law) -> tuple[Array, Array]:
+    def errors(self, law: JointLaw) -> tuple[Array, Array]:
         """Largest and rms error (paths,) of another resolution, as shares of the peak |F|."""
         return self.miss(law)[:2]
 
 
-def standard_suite(law: Law, best: Resolution | None = None, excursions: int = 0) -> Suite:
+def standard_suite(law: JointLaw, best: Resolution | None = None, excursions: int = 0) -> Suite:
     """The standard paths of a law, with tractions at `best`, by default the reference resolution.
 
     `excursions` random paths come after them. Second-order convergence makes the reference's own
@@ -139,7 +123,7 @@ def standard_suite(law: Law, best: Resolution | None = None, excursions: int = 0
 
 
 @lru_cache(maxsize=16)
-def _suite(law: Law, excursions: int) -> Suite:
+def _suite(law: JointLaw, excursions: int) -> Suite:
     """The suite of a law at its reference resolution."""
     best = law.resolution
     stress = float(law.normal_stress(law.closure_range)) / 2
@@ -162,31 +146,35 @@ def _suite(law: Law, excursions: int) -> Suite:
     return replace(suite, uncertainty=check)
 
 
-def tractions(law: Law, d: Array) -> Array:
+def tractions(law: JointLaw, d: Array) -> Array:
     """F (steps, paths, dim) in Pa along increments d of the same shape, from the virgin state."""
     batch, F = law.joints(d.shape[1], ledger=False), np.empty_like(d)
     for k, step in enumerate(track(d, "steps of the paths", len(d))):
-        batch.update(step, tangent=False, out=(F[k], None))
+        F[k], _ = batch.update(step, tangent=False)
     return F
 
 
-def tangents(law: Law, d: Array) -> Array:
+def tangents(law: JointLaw, d: Array) -> Array:
     """C (steps, paths, dim, dim) in Pa/m along increments d, from the virgin state."""
     batch, dim = law.joints(d.shape[1], ledger=False), d.shape[2]
-    F, C = np.empty(d.shape[1:]), np.empty((*d.shape, dim))
+    C = np.empty((*d.shape, dim))
     for k, step in enumerate(d):
-        batch.update(step, out=(F, C[k]))
+        _, C[k] = batch.update(step)
     return C
 
 
-def errors(F: Array, reference: Array) -> tuple[Array, Array]:
-    """Largest and rms |F - reference| (steps, paths, dim) over the path's largest |reference|."""
-    peak = np.linalg.norm(reference, axis=2).max(axis=0)
+def errors(F: Array, reference: Array, counts: Any = True) -> tuple[Array, Array]:
+    """Largest and rms |F - reference| (steps, paths, dim) over the path's largest |reference|.
+
+    counts: (steps, paths), which steps count; all by default.
+    """
+    peak = np.linalg.norm(reference, axis=2).max(axis=0, where=counts, initial=0.0)
     off = np.linalg.norm(F - reference, axis=2)
-    return off.max(axis=0) / peak, np.sqrt(np.mean(off**2, axis=0)) / peak
+    mean = np.mean(off**2, axis=0, where=counts)
+    return off.max(axis=0, where=counts, initial=0.0) / peak, np.sqrt(mean) / peak
 
 
-def _paths(law: Law, stress: float) -> tuple[tuple[str, ...], Array, Array]:
+def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]:
     """Names, places (steps, paths, dim) in m, and which paths hold the normal stress from STEPS/10.
 
     The closures of those that hold it are first guesses.
@@ -242,7 +230,7 @@ def _paths(law: Law, stress: float) -> tuple[tuple[str, ...], Array, Array]:
     return tuple(named), R * np.stack(list(named.values()), axis=1), held
 
 
-def _excursions(law: Law, stress: float, count: int) -> Array:
+def _excursions(law: JointLaw, stress: float, count: int) -> Array:
     """Random places (steps, count, dim) in m."""
     rng, R, s = np.random.default_rng(8), law.closure_range, np.arange(1, STEPS + 1) / STEPS
     goal = []
@@ -264,7 +252,7 @@ def _excursions(law: Law, stress: float, count: int) -> Array:
     return R * np.stack(goal, axis=1)[:, :, : law.tables.dim]
 
 
-def far_path(law: Law, rng: np.random.Generator, stress: float, s: Array) -> Array:
+def far_path(law: JointLaw, rng: np.random.Generator, stress: float, s: Array) -> Array:
     """Random places (steps, 3) in closure ranges: slip at one closure, back, and forth again.
 
     The closure is that at a normal stress between a tenth of `stress` and all of it.
@@ -279,7 +267,7 @@ def far_path(law: Law, rng: np.random.Generator, stress: float, s: Array) -> Arr
     return np.stack([shut, np.cos(turn) * shear, np.sin(turn) * shear], axis=-1)
 
 
-def _hold_stress(law: Law, d: Array, held: Array, stress: float) -> Array:
+def _hold_stress(law: JointLaw, d: Array, held: Array, stress: float) -> Array:
     """Increments whose closures keep the normal stress on the paths `held`."""
     d, which, condition = d.copy(), np.flatnonzero(held), NormalCondition(stress, stress)
     batch = law.joints(len(which), ledger=False)

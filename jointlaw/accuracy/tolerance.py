@@ -1,15 +1,18 @@
 """The coarsest law that is accurate enough."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from itertools import product
-from typing import TypeVar
+from typing import TYPE_CHECKING
 
 from ..parameters.resolution import Resolution
 from ..support.checks import above
 from ..support.progress import track
-from .suite import Law, Suite, reference_resolution, scaled, standard_suite
+from .suite import Suite, reference_resolution, scaled, standard_suite
 
-AnyLaw = TypeVar("AnyLaw", bound=Law)
+if TYPE_CHECKING:
+    from ..law import JointLaw
 
 MARGIN = 1.75  # how many times better than the tolerance, calibrated by `benchmarks/tolerance.py`
 EXCURSIONS = 128  # random paths beside the standard ones: what others ask shows in few of them
@@ -19,7 +22,7 @@ _PHI = (3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 32, 40, 48)
 _SHARES = (0.5, 0.75, 1.0)  # of the reference, for the directions that are not being tried
 
 
-def at_tolerance(law: AnyLaw, tolerance: float) -> AnyLaw:
+def at_tolerance(law: JointLaw, tolerance: float) -> JointLaw:
     """See `JointLaw.at_tolerance`."""
     bound = above("tolerance", tolerance, 0.0) / MARGIN
     found, reached = coarsest(law, bound, EXCURSIONS)
@@ -32,7 +35,7 @@ def at_tolerance(law: AnyLaw, tolerance: float) -> AnyLaw:
     return replace(law, resolution=found)
 
 
-def coarsest(law: Law, bound: float, excursions: int = 0) -> tuple[Resolution | None, float]:
+def coarsest(law: JointLaw, bound: float, excursions: int = 0) -> tuple[Resolution | None, float]:
     """The fewest sliders whose error on the suite is at most `bound`, and the least error reached.
 
     None where no resolution within the reference's meets it.
@@ -73,7 +76,7 @@ def coarsest(law: Law, bound: float, excursions: int = 0) -> tuple[Resolution | 
     return None, min(map(error, several))
 
 
-def _reference(law: Law, bound: float, excursions: int) -> tuple[Suite, Resolution]:
+def _reference(law: JointLaw, bound: float, excursions: int) -> tuple[Suite, Resolution]:
     """The suite with a reference that errs by half of `bound` at most, or the finest, and which."""
     best = finer = reference_resolution(law)
     most = _LARGEST * best.sliders
@@ -86,7 +89,7 @@ def _reference(law: Law, bound: float, excursions: int) -> tuple[Suite, Resoluti
     return suite, best
 
 
-def _refined(law: Law, suite: Suite, best: Resolution) -> Resolution:
+def _refined(law: JointLaw, suite: Suite, best: Resolution) -> Resolution:
     """1.5 times the nodes in the direction that errs most with two thirds of them."""
 
     def lost(name: str) -> float:

@@ -1,12 +1,14 @@
 """The price list of a law: what each resolution costs and how far its tractions are off."""
 
+from __future__ import annotations
+
 import csv
 import io
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,15 +17,17 @@ from ..parameters.resolution import Resolution, named, resolve
 from ..support.checks import Array, whole
 from ..support.files import replace_file
 from ..support.progress import track
-from ..support.pyplot import pyplot, written
-from .suite import Law, Suite, errors, reference_resolution, scaled, standard_suite, tangents
+from ..support.pyplot import pyplot, style, written
+from .suite import Suite, errors, reference_resolution, scaled, standard_suite, tangents
+
+if TYPE_CHECKING:
+    from ..law import JointLaw
 
 SPREAD = tuple(
     Resolution(u, phi, depth)
     for u, phi in ((1, 3), (2, 3), (3, 3), (3, 5), (5, 6), (8, 8))
     for depth in (1, 2, 3, 4, 6, 10, 16)
 )
-CLEAR = {"color": "white", "alpha": 0.8, "pad": 0.5}  # behind names
 ROUNDING = 1e-6  # a smaller share by which errors differ is none
 _MEMORY = 100_000_000  # bytes of state that a timing may use; very fine laws get a smaller batch
 
@@ -144,6 +148,7 @@ class Tradeoff:
         writer.writerows(zip(*table.values(), strict=True))
         replace_file(Path(path), stream.getvalue().encode())
 
+    @style()
     def plot(self, path: str | Path | None = None) -> Any:
         """Largest error against sliders and, where it was timed, against time per update.
 
@@ -171,27 +176,19 @@ class Tradeoff:
                         at = (getattr(row, costs[0]), 100 * row.worst)
                         axis.plot(*at, "s", color="k", ms=6, mfc="none")
                         axis.annotate(name, at, (0, 6), textcoords="offset points", fontsize=8,
-                                      ha="right" if name == "reference" else "left",
-                                      bbox=CLEAR)  # fmt: skip
+                                      ha="right" if name == "reference" else "left")  # fmt: skip
             floor = 100 * float(self.uncertainty.max())
-            axis.axhline(floor, color="0.6", lw=1, ls=":")
+            axis.axhline(floor, color="0.6", lw=1, ls=":", label="uncertainty of the reference")
             axis.set_xlabel(label)
             axis.grid(True, which="both", alpha=0.2)
-            for scale in (axis.xaxis, axis.yaxis):
-                scale.set_major_formatter(lambda value, _: f"{value:g}")
-        axes[0, 0].text(0.02, floor * 1.08, "uncertainty of the reference", fontsize=7, color="0.4",
-                        transform=axes[0, 0].get_yaxis_transform())  # fmt: skip
         axes[0, 0].set_ylabel("largest error of the traction (% of the path's peak)")
-        low = min(floor, 100 * min(r.worst for r in self.rows))
-        axes[0, 0].set_ylim(0.7 * low, 150 * max(r.worst for r in self.rows))
-        if timed:
-            axes[0, 1].legend(title=f"{self.joints} joints, {self.how}", fontsize=8,
-                              title_fontsize=8, loc="upper right")  # fmt: skip
+        title = f"{self.joints} joints, {self.how}" if timed else None
+        axes[0, -1].legend(title=title, fontsize=8, title_fontsize=8, loc="upper right")
         return written(figure, path)
 
 
 def tradeoff(
-    law: Law,
+    law: JointLaw,
     resolutions: Sequence[str | Resolution] | None = None,
     joints: int = 10_000,
     seconds: float = 0.2,
@@ -218,7 +215,7 @@ def tradeoff(
     return Tradeoff(suite.names, suite.uncertainty, rows, joints, how, names)
 
 
-def _price(law: Law, suite: Suite, exact: Array, joints: int, seconds: float) -> Price:
+def _price(law: JointLaw, suite: Suite, exact: Array, joints: int, seconds: float) -> Price:
     miss = suite.miss(law)
     steps, paths = exact.shape[:2]
     C = tangents(law, suite.d).reshape(steps, paths, -1)
@@ -231,7 +228,7 @@ def _price(law: Law, suite: Suite, exact: Array, joints: int, seconds: float) ->
     )  # fmt: skip
 
 
-def _time(law: Law, n: int, tangent: bool, seconds: float) -> float:
+def _time(law: JointLaw, n: int, tangent: bool, seconds: float) -> float:
     """Least time of an update in ns per joint, of runs that take this long together."""
     if n == 0:
         return float("nan")
@@ -242,12 +239,11 @@ def _time(law: Law, n: int, tangent: bool, seconds: float) -> float:
     steps = np.concatenate([steps, -steps])
     first = np.zeros((n, dim))
     first[:, 0] = law.closure_range * rng.uniform(0.3, 0.8, n)
-    out = np.empty((n, dim)), np.empty((n, dim, dim)) if tangent else None
-    batch.update(first, tangent=tangent, out=out)
+    batch.update(first, tangent=tangent)
     best, k, end = float("inf"), 0, time.perf_counter() + seconds
     while k < 3 or time.perf_counter() < end:
         start = time.perf_counter()
-        batch.update(steps[k % len(steps)], tangent=tangent, out=out)
+        batch.update(steps[k % len(steps)], tangent=tangent)
         best, k = min(best, time.perf_counter() - start), k + 1
     return best / n * 1e9
 

@@ -1,15 +1,68 @@
-"""Tests on joints in files: those that come with the package, and CSV files of laboratories."""
+"""Tests on joints in text files, those of the package and those of laboratories, by these rules.
 
-import tomllib
+lines          that are empty or begin with # are skipped
+names          stand in the first line, units in it or in the second one: "tau [kPa]",
+               "tau (kPa)", "tau /kPa", "tau in kPa", "tau_kPa"; a column without a unit is
+               asked for, never guessed
+separator      semicolon, tab or comma: the first of these in the line of names; else blanks
+decimal mark   a point; or a comma if a number shows it: 0,25 does, but 1,201 may be 1201.
+               Marks between thousands are refused
+"""
+
+import csv
+import re
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..parameters.rock import require_rock
-from ..support.checks import Array, remedy
-from .columns import Asked, Column, find, read_columns
+from ..support import units
+from ..support.checks import Array, one_of
+from .measured import ShearCurve
+
+_UNIT = r"(?:[numkcMGµμ]?(?:Pa|m)|N/mm[2²]|[kM]N/m[2²]|bar)"
+_ROW_UNIT = re.compile(rf"[\[(].*[\])]|/?\s*{_UNIT}|-?")
+_TITLE = re.compile(
+    rf"(.*?)(?:\s*[\[(]\s*([^\])]*?)\s*[\])]|(?:\s*/\s*|\s+in\s+|,\s*|_|\s+)({_UNIT}))\s*"
+)
+# a number whose comma cannot stand between thousands
+_DECIMAL_COMMA = re.compile(r"[-+−]?(?:0?,\d+|\d{4,},\d+|\d+,(?:\d\d?|\d{4,}))(?:[eE][-+]?\d+)?")
+_GROUPED = re.compile(r"[-+−]?\d+([,.]\d{3})+([,.]\d*)?")  # a mark between thousands, perhaps
+_THOUSANDS = (
+    "may have a mark between its thousands: remove such marks from the file, or give "
+    "--decimal-comma if its commas are decimal marks"
+)
+_SWAPPED = str.maketrans(",.", ".,")
+
+
+class Column(NamedTuple):
+    """A column: its title as written, its name and unit ("" if it gives none).
+
+    values: (n,), NaN where a cell is empty; wrong: what is wrong with the first cell that is
+    neither empty nor a number, with its line.
+    """
+
+    title: str
+    name: str
+    unit: str
+    values: Array
+    wrong: str
+
+
+class Asked(NamedTuple):
+    """A quantity to look for: what it is, its SI unit, names it goes by, the option that names it.
+
+    The names are tried in their order, in small letters with _ for all that is no letter or digit.
+    """
+
+    what: str
+    base: str
+    names: tuple[str, ...]
+    option: str
+
 
 _FOLDER = resources.files(__package__) / "data"
 STRESS = Asked(
@@ -32,29 +85,11 @@ SHEAR_STRESS = Asked(
     "shear stress", "Pa", ("shear_stress", "tau", "τ", "f2"), "--shear-stress-column"
 )
 NORMAL = Asked(
-    "normal stress", "Pa", ("normal_stress", "sigma_n", "σn", "σ_n", "sigma", "sn", "f1"),
+    "normal stress (or give it: --normal-stress 1MPa)", "Pa",
+    ("normal_stress", "sigma_n", "σn", "σ_n", "sigma", "sn", "f1"),
     "--normal-column",
 )  # fmt: skip
-STEADY = 0.05  # largest change of a normal stress that is one level of a test, as a share of it
-
-
-class ClosureData(NamedTuple):
-    """Stress (Pa) and closure (m), (n,), in the order measured."""
-
-    stress: Array
-    closure: Array
-
-
-class ShearData(NamedTuple):
-    """Shear displacement (m) and stress (Pa), (n,), in the order measured, at a normal stress (Pa).
-
-    normal: NaN where the file does not say; name: of the file, and of the column if it has several.
-    """
-
-    shear: Array
-    shear_stress: Array
-    normal: float
-    name: str
+STEADY = 0.05  # largest change of a normal stress that counts as constant, as a share of it
 
 
 def names() -> list[str]:
@@ -62,41 +97,39 @@ def names() -> list[str]:
     return sorted(entry.name[:-4] for entry in _FOLDER.iterdir() if entry.name.endswith(".csv"))
 
 
-def about(name: str) -> dict[str, Any]:
-    """Title, source and remarks of a data set."""
-    _known(name)
-    return tomllib.loads((_FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
-
-
-def load(name: str) -> ClosureData:
+def load(name: str) -> tuple[Array, Array]:
     """Stress (Pa) and closure (m) of a data set, loading and unloading in the order measured."""
-    _known(name)
+    one_of("data set", name, tuple(names()))
     with resources.as_file(_FOLDER / f"{name}.csv") as path:
         return read_closure(path)
 
 
 def read_closure(
-    path: str | Path, stress: str | None = None, closure: str | None = None
-) -> ClosureData:
-    """A closure curve from a CSV file.
+    path: str | Path,
+    stress: str | None = None,
+    closure: str | None = None,
+    decimal_comma: bool = False,
+) -> tuple[Array, Array]:
+    """A closure test from a text file.
 
     Parameters
     ----------
-    path: the file; its first row names the columns, with their units ("closure_mm",
-        "closure [mm]", "closure (mm)", "closure /mm", or in a row of their own).
+    path: the file.
     stress, closure: names of the two columns, with a unit if the file gives none ("Disp:mm", or
         "Disp:-1mm" where closing counts negative); None finds those of the usual names.
+    decimal_comma: True where the decimal mark is a comma, but no number of the file shows it.
 
-    Raises ValueError naming file, column or row, and the option of the command that helps.
+    Raises ValueError naming file, column or line, and the option of the command that helps.
     """
-    path, columns = Path(path), read_columns(path)
-    s, u = find(columns, STRESS, stress, path)[0], find(columns, CLOSURE, closure, path)[0]
-    pressed, closed = _pair(s.values, u.values, path)
+    path = Path(path)
+    columns = read_columns(path, decimal_comma)
+    s, u = find(columns, STRESS, stress, path), find(columns, CLOSURE, closure, path)
+    pressed, closed = _complete_rows(path, s, u)
     top = int(np.argmax(np.abs(pressed)))
-    _require(pressed[top] > 0, s, STRESS, "has compression negative", path)
-    _require(closed[top] >= closed[0], u, CLOSURE, "falls while the stress rises", path)
+    _require_sign(pressed[top] > 0, s, STRESS, "has compression negative", path)
+    _require_sign(closed[top] >= closed[0], u, CLOSURE, "falls while the stress rises", path)
     require_rock({"stress": pressed[top], "closure": float(np.ptp(closed))}, f"{path}: ")
-    return ClosureData(pressed, closed)
+    return pressed, closed
 
 
 def read_shear(
@@ -104,74 +137,60 @@ def read_shear(
     shear: str | None = None,
     stress: str | None = None,
     normal: str | None = None,
-    known: bool = False,
-) -> list[ShearData]:
-    """Direct shear curves from a CSV file, one for each column of shear stress or normal stress.
+    normal_stress: float | None = None,
+    decimal_comma: bool = False,
+) -> ShearCurve:
+    """A direct shear test at constant normal stress from a text file.
 
     Parameters
     ----------
-    path: the file, as in `read_closure`.
+    path: the file, which holds this one test.
     shear, stress, normal: names of the columns of shear displacement, shear stress and normal
         stress, with units if the file gives none ("tau:MPa", or "tau:-1MPa" to turn a sign).
-    known: whether the normal stress is known otherwise; the file is then not asked for it.
+    normal_stress: Pa; None takes the mean of the column.
+    decimal_comma: as in `read_closure`.
 
-    The normal stress is that of a title "tau at 3 MPa [MPa]", or of a column; where this holds
-    several levels there is a test for each. Raises ValueError as `read_closure`.
+    Raises ValueError as `read_closure`.
     """
-    path, columns = Path(path), read_columns(path)
-    moved, sheared = (
-        find(columns, SHEAR, shear, path), find(columns, SHEAR_STRESS, stress, path)
-    )  # fmt: skip
-    if len(moved) not in (1, len(sheared)):
+    path = Path(path)
+    columns = read_columns(path, decimal_comma)
+    u, tau = find(columns, SHEAR, shear, path), find(columns, SHEAR_STRESS, stress, path)
+    if normal_stress is None:
+        pressed = find(columns, NORMAL, normal, path)
+        normal_stress = _constant(pressed, path)
+    x, y = _complete_rows(path, u, tau)
+    largest = float(np.abs(y).max())
+    if abs(y[0]) < STEADY * largest:  # the gauge need not begin at zero
+        x = x - x[0]
+    work = float(np.sum(np.diff(x) * (y[1:] + y[:-1])))
+    _require_sign(work > 0, tau, SHEAR_STRESS, "opposes the displacement", path)
+    require_rock({"shear displacement": float(np.ptp(x)), "shear stress": largest}, f"{path}: ")
+    require_rock({"peak shear stress over normal stress": largest / normal_stress}, f"{path}: ")
+    return ShearCurve(x, y, normal_stress)
+
+
+def _constant(pressed: Column, path: Path) -> float:
+    """The mean (Pa) of a column of normal stress, which may change by `STEADY` at most."""
+    low, mean, high = (float(f(pressed.values)) for f in (np.nanmin, np.nanmean, np.nanmax))
+    _require_sign(mean > 0, pressed, NORMAL, "has compression negative", path)
+    if high - low > STEADY * mean:
         raise ValueError(
-            f"{path}: has {len(moved)} columns of shear displacement for {len(sheared)} of shear "
-            "stress; give one for all or one for each"
+            f"{path}: the normal stress of column {pressed.title!r} runs from {low:.4g} to "
+            f"{high:.4g} Pa, but a file is one test at constant normal stress; cut the file, or "
+            f"give the stress to take, for example --normal-stress {mean / 1e6:.3g}MPa"
         )
-    pressed = [] if known else find(columns, NORMAL, normal, path, required=normal is not None)
-    tests = []
-    for u, tau in zip(moved * (len(sheared) // len(moved)), sheared, strict=True):
-        name = path.name if len(sheared) == 1 else f"{path.name}, {tau.title}"
-        level = np.nan if tau.normal is None or known else tau.normal
-        levels = [(np.ones(tau.values.size, bool), level)]
-        if tau.normal is None and pressed:
-            levels = _levels(pressed[0], path)
-        for here, level in levels:
-            x, y = _pair(u.values[here], tau.values[here], path)
-            x = x - x[0] if abs(y[0]) < STEADY * np.abs(y).max() else x
-            work = float(np.sum(np.diff(x) * (y[1:] + y[:-1])))
-            _require(work > 0, tau, SHEAR_STRESS, "opposes the displacement", path)
-            span, largest = float(np.ptp(x)), float(np.abs(y).max())
-            require_rock({"shear displacement": span, "shear stress": largest}, f"{path}: ")
-            tests.append(ShearData(x, y, level, name))
-    return tests
+    return mean
 
 
-def _levels(pressed: Column, path: Path) -> list[tuple[Array, float]]:
-    """Rows of each level of normal stress in a column, with the level (Pa)."""
-    values = pressed.values
-    mean = float(np.nanmean(values))
-    _require(mean > 0, pressed, NORMAL, "has compression negative", path)
-    if np.nanmax(values) - np.nanmin(values) <= STEADY * mean:
-        return [(np.isfinite(values), mean)]
-    levels = np.unique(values[np.isfinite(values)])
-    if 3 * levels.size > values.size:
-        raise ValueError(
-            f"{path}: the normal stress of column {pressed.title!r} runs from {levels[0]:.4g} to "
-            f"{levels[-1]:.4g} Pa, but only tests at constant normal stress are fitted; cut the "
-            f"file, or give the one to take, for example --normal-stress {mean / 1e6:.3g}MPa"
-        )
-    return [(values == level, float(level)) for level in levels]
-
-
-def _pair(x: Array, y: Array, path: Path) -> tuple[Array, Array]:
+def _complete_rows(path: Path, first: Column, second: Column) -> tuple[Array, Array]:
     """The rows in which both columns hold a number."""
-    both = np.isfinite(x) & np.isfinite(y)
+    both = np.isfinite(first.values) & np.isfinite(second.values)
     if both.sum() < 3:
         raise ValueError(f"{path}: has {int(both.sum())} rows with both numbers; give 3 or more")
-    return x[both], y[both]
+    return first.values[both], second.values[both]
 
 
-def _require(right: bool, column: Column, asked: Asked, what: str, path: Path) -> None:
+def _require_sign(right: bool, column: Column, asked: Asked, what: str, path: Path) -> None:
     """Refuse a column whose sign is not ours, with the option that turns it."""
     if not right:
         raise ValueError(
@@ -180,6 +199,106 @@ def _require(right: bool, column: Column, asked: Asked, what: str, path: Path) -
         )
 
 
-def _known(name: str) -> None:
-    if name not in names():
-        raise ValueError(f"data set {name!r} is unknown; {remedy(name, names())}")
+def read_columns(path: Path, decimal_comma: bool = False) -> list[Column]:
+    """The columns of a text file in UTF-8, by the rules above.
+
+    decimal_comma: True where the decimal mark is a comma but no number shows it. Raises ValueError
+    naming file, line and remedy.
+    """
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: cannot be read ({error}); give a CSV file in UTF-8") from None
+    numbered = [
+        (number, line)
+        for number, line in enumerate(text.replace("\0", "").splitlines(), 1)
+        if line.strip(" \t,;") and not line.lstrip().startswith("#")
+    ]
+    (names, *rows), at = _cells([line for _, line in numbered]), [number for number, _ in numbered]
+    if len(rows) < 2 or any(np.isfinite(_number(cell, ".")) for cell in names):
+        raise ValueError(
+            f"{path}: must hold a line of names with units, such as us [mm],tau [MPa], and numbers "
+            "in the lines below it"
+        )
+    units_below = all(_ROW_UNIT.fullmatch(cell) for cell in rows[0])
+    given = [cell.strip("[]()/- ") for cell in rows.pop(0)] if units_below else []
+    at = at[-len(rows) :]
+    given += [""] * (len(names) - len(given))
+    shown = any(_DECIMAL_COMMA.fullmatch(cell) for row in rows for cell in row)
+    decimal = "," if decimal_comma or shown else "."
+    values, wrong = np.full((len(names), len(rows)), np.nan), [""] * len(names)
+    for k, row in enumerate(rows):
+        if len(row) > len(names):
+            raise ValueError(
+                f"{path}: line {at[k]} has {len(row)} cells under {len(names)} names; is the "
+                "decimal mark a comma? Then separate the columns by semicolons"
+            )
+        for column, cell in enumerate(row):
+            values[column, k] = _number(cell, decimal)
+            if cell and not np.isfinite(values[column, k]) and not wrong[column]:
+                why = _THOUSANDS if _GROUPED.fullmatch(cell) else "is no number"
+                wrong[column] = f"line {at[k]} holds {cell!r}, which {why}"
+    return [
+        Column(title, *_read_title(title, given[k]), values[k], wrong[k])
+        for k, title in enumerate(names)
+    ]
+
+
+def find(columns: Sequence[Column], asked: Asked, given: str | None, path: Path) -> Column:
+    """The column of a quantity, in SI units. Raises ValueError with the option that helps.
+
+    given: name and unit from the command line, "Disp:mm", or None.
+    """
+    name, _, unit = (given or "").partition(":")
+    wanted = asked.names if given is None else (_plain(name),)
+    matches = ([c for c in columns if w in (_plain(c.name), _plain(c.title))] for w in wanted)
+    found = next((match for match in matches if match), [])
+    example = f'{asked.option} "NAME:{units.COMMON[asked.base]}"'
+    if len(found) != 1:
+        many = f"{len(found)} columns of one name: " if found else ""
+        raise ValueError(
+            f"{path}: which column is the {asked.what}, and in which unit? The file has {many}"
+            f"{', '.join(c.title for c in columns)}; write for example {example}"
+        )
+    column = found[0]
+    if column.wrong:
+        raise ValueError(f"{path}: column {column.title!r}, {column.wrong}")
+    unit, example = unit or column.unit, example.replace("NAME", column.name)
+    try:  # a quantity, -1mm, turns a sign
+        factor = units.parse(unit if re.match(r"[-+.\d]", unit) else f"1{unit or '?'}", asked.base)
+    except ValueError:
+        trouble = f"has the unit {unit!r}, none of {asked.base}" if unit else "gives no unit"
+        raise ValueError(
+            f"{path}: column {column.title!r} {trouble}; name it, for example {example}"
+        ) from None
+    return column._replace(values=column.values * factor)
+
+
+def _cells(lines: Sequence[str]) -> list[list[str]]:
+    """Cells of all lines, without empty ones at the end."""
+    mark = next((mark for mark in ";\t," if lines and mark in lines[0]), None)
+    if mark is None:
+        return [re.split(r"\s+(?![\[(/])", line.strip()) for line in lines or [""]]
+    rows = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=mark)]
+    return [row[: max((k + 1 for k, cell in enumerate(row) if cell), default=0)] for row in rows]
+
+
+def _number(cell: str, decimal: str) -> float:
+    """The number in a cell with this decimal mark; NaN for any other text."""
+    text = cell.replace("−", "-")
+    try:
+        return float(text.translate(_SWAPPED) if decimal == "," else text)
+    except ValueError:
+        return np.nan
+
+
+def _read_title(title: str, unit: str) -> tuple[str, str]:
+    """Name and unit of a title, which goes before the row of units: "tau [kPa]", "closure_mm"."""
+    match = _TITLE.fullmatch(title)
+    if match is None:
+        return title, unit
+    return match[1].strip(" _,") or title, (match[2] or match[3] or "").strip("-") or unit
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"\W+", "_", name.strip().lower()).strip("_")

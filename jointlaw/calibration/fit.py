@@ -1,13 +1,11 @@
-"""From tests to a law: fits of closure and shear curves, alone, together, or many at once."""
+"""From tests to a law: fits of closure and shear curves, alone or together, and their result."""
 
 from __future__ import annotations
 
 import math
-import signal
 from collections.abc import Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -15,30 +13,151 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..law import JointLaw
-from ..support.files import replace_file
-from ..support.progress import track
-from ..support.pyplot import pyplot, written
-from . import shear_report
-from .estimate import Estimate
-from .forward import log_stress
+from ..support.checks import Array
+from ..support.pyplot import pyplot, style, written
+from .forward import build, build_for_shear, log_stress
 from .measured import ClosureCurve, ShearCurve
-from .priors import Ranges, Values, transform_of
-from .problem import pose, solve, starting_points
-from .starts import staged
+from .priors import TRANSFORMS, Ranges, Values
+from .problem import Problem, Solution, derivative, pose, solve, staged, starting_points
 
-Points = tuple[ArrayLike, ArrayLike]  # stress (Pa) and closure (m)
+MISFITS = 1.5  # of the expected scatter: from this systematic misfit on the law is not the rock
+PRIOR_SHARE = 0.05  # of the variance: up to here the data, not the priors, decide
+WIDEST = math.log(2) / 1.96  # standard error of a logarithm: a factor of 2 either way
+# What acts on a closure curve only as one factor: N lam K times a sum over the inclinations
+_ONE_FACTOR = ("asperity_density", "K", "lam", "mu", "a", "b", "c")
+
+OTHER = (
+    "Neighbouring points deviate to the same side. Use the law with this error between the points, "
+    "and not beyond them. A shear curve that falls after its peak needs wear: let mu_residual and "
+    "wear_slip be free too. Closure of mated joints may follow a hyperbola better."
+)
+NO_COMPLIANCE = (
+    "No compliance of rock and machine was given: if the closure was measured across rock too, the "
+    "law includes its strain."
+)
 
 
 @dataclass(frozen=True, eq=False)
-class Fit(Estimate):
-    """Outcome of `fit_closure`, `fit_shear` and `fit_curves`.
+class Fit:
+    """Outcome of `fit_closure`, `fit_shear` and `fit_curves`, in SI units.
 
-    `free` names the fitted parameters in the order of `covariance`; `parameters` holds all values
-    in SI units.
+    `free` names the fitted parameters in the order of `covariance`, the seating closure last;
+    `parameters` holds all values; `noise` and `systematic_misfit` have an entry for each curve.
     """
 
+    problem: Problem
+    solution: Solution
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the fitted parameters, the seating closure last."""
+        return self.problem.free
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Every parameter, fitted or held, and the seating closure (m)."""
+        return self.problem.unpack(self.solution.x)
+
+    @cached_property
+    def law(self) -> JointLaw:
+        """The law of these parameters."""
+        return build(self.parameters, self.problem.settings, self.problem.settings.plane)
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance (p, p) of the fitted parameters, in the order of `free`."""
+        slope = [TRANSFORMS[name].slope(self.parameters[name]) for name in self.free]
+        return self.solution.covariance * np.outer(slope, slope)
+
+    @property
+    def standard_error(self) -> dict[str, float]:
+        """Standard error of every fitted parameter."""
+        return dict(zip(self.free, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+
+    @property
+    def prior_share(self) -> dict[str, float]:
+        """Share of the variance of every fitted parameter that the priors contribute."""
+        return dict(zip(self.free, self.solution.prior_share.tolist(), strict=True))
+
+    def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
+        """Interval of a fitted parameter that holds it with this probability."""
+        if name not in self.free:
+            raise ValueError(f"{name!r} was not fitted; fitted are {', '.join(self.free)}")
+        at, transform = self.free.index(name), TRANSFORMS[name]
+        reach = self.solution.quantile(level) * math.sqrt(self.solution.covariance[at, at])
+        x = float(self.solution.x[at])
+        return transform.back(x - reach), transform.back(x + reach)
+
+    @cached_property
+    def not_identifiable(self) -> dict[str, str]:
+        """Parameters that these data do not fix, each with the reason."""
+        found: dict[str, str] = {}
+        errors = np.sqrt(np.diag(self.solution.covariance))
+        for (name, share), error in zip(self.prior_share.items(), errors, strict=True):
+            if share > PRIOR_SHARE:
+                found[name] = f"the priors supply {100 * share:.0f} % of its variance"
+            elif error > (WIDEST if TRANSFORMS[name].log else 0.5):
+                low, high = self.interval(name)
+                found[name] = f"the data leave it anywhere from {low:.3g} to {high:.3g}"
+        sheared = any(isinstance(curve, ShearCurve) for curve in self.problem.curves)
+        for name in ("eta", "alpha", "beta", "overlap", *_ONE_FACTOR):
+            if name not in self.free:
+                factor = name in _ONE_FACTOR and not sheared
+                found[name] = "held" + (
+                    "; acts on a closure curve only as a factor" if factor else ", not fitted"
+                )
+        return found
+
+    @property
+    def identifiable(self) -> tuple[str, ...]:
+        """Fitted parameters that the data fix: to a factor of 2, the priors all but silent."""
+        return tuple(name for name in self.free if name not in self.not_identifiable)
+
+    @cached_property
+    def systematic_misfit(self) -> tuple[float, ...]:
+        """Misfit that neighbouring points of each curve share, as residuals are.
+
+        The root of the mean product of neighbouring residuals, 0 where that is negative: scatter
+        averages out of it, the misfit of a curve of another shape does not.
+        """
+        curves = self.problem.split(self.problem.data(self.solution.x))
+        return tuple(math.sqrt(max(float(np.mean(r[1:] * r[:-1])), 0.0)) for r in curves)
+
+    @property
+    def shape_differs(self) -> tuple[bool, ...]:
+        """Whether each curve shows that the rock deforms along another curve than the law."""
+        pairs = zip(self.systematic_misfit, self.problem.curves, strict=True)
+        return tuple(misfit > MISFITS * curve.expected.share for misfit, curve in pairs)
+
+    def predict(self, closure: ArrayLike) -> Any:
+        """Normal stress (Pa) at closures (m) counted as in the closure test."""
+        seating = self.parameters["seating"]
+        return self.law.normal_stress(np.asarray(closure, float) + seating)
+
+    def band(
+        self,
+        closure: ArrayLike,
+        level: float = 0.95,
+    ) -> tuple[Array, Array]:
+        """Band (low, high) in Pa that holds the curve `predict` with this probability.
+
+        By the covariance of the parameters alone: the noise of a further point is not in it, nor
+        that rock is not this law, which counts most beyond the largest fitted stress.
+        """
+        settings, u = self.problem.settings, np.atleast_1d(np.asarray(closure, float))
+
+        def model(x: Array) -> Array:
+            values = self.problem.unpack(x)
+            return log_stress(values, values["seating"] + u, settings)
+
+        slope = derivative(model, self.solution.x, *self.problem.bounds())
+        variance = np.einsum("ip,pq,iq->i", slope, self.solution.covariance, slope)
+        centre, reach = model(self.solution.x), self.solution.quantile(level) * np.sqrt(variance)
+        return np.exp(centre - reach), np.exp(centre + reach)
+
     def report(self) -> str:
-        """The fit in words and a table (Markdown)."""
+        """The fit in words and tables (Markdown)."""
+        values, left = self.parameters, self.not_identifiable
         lines = [
             "# Fit of the joint law",
             "",
@@ -48,67 +167,74 @@ class Fit(Estimate):
         for name, share in self.prior_share.items():
             low, high = self.interval(name)
             lines.append(
-                f"| {name} | {self.parameters[name]:.4g} | {low:.3g} to {high:.3g} | "
-                f"{transform_of(name).unit} | {100 * share:.0f} % | "
-                f"{'no' if name in self.not_identifiable else 'yes'} |"
+                f"| {name} | {values[name]:.4g} | {low:.3g} to {high:.3g} | "
+                f"{TRANSFORMS[name].unit} | {100 * share:.0f} % | "
+                f"{'no' if name in left else 'yes'} |"
             )
-        finite = [name for name, value in self.parameters.items() if np.isfinite(value)]
-        worn = "wear_slip" in finite
-        held = [n for n in finite if n not in self.free and (worn or n != "mu_residual")]
-        lines += ["", "Held: " + ", ".join(f"{n} = {self.parameters[n]:.4g}" for n in held) + "."]
+        unworn = {"mu_residual"} if np.isinf(values["wear_slip"]) else set()
+        held = [n for n in values if n not in {*self.free, *unworn} and np.isfinite(values[n])]
+        lines += ["", "Held: " + ", ".join(f"{n} = {values[n]:.4g}" for n in held) + "."]
         lines += ["", "Not identifiable from these data:", ""]
-        grouped: dict[str, list[str]] = {}
-        for name, reason in self.not_identifiable.items():
-            grouped.setdefault(reason, []).append(name)
-        lines += [f"- {', '.join(names)}: {reason}" for reason, names in grouped.items()]
-        for number, noise in enumerate(self.noise, 1):
-            text = f"Curve {number}: scatter {100 * noise.share:.2g} % of the stress"
-            if noise.absolute:
-                text += f" and {1e6 * noise.absolute:.2g} um of closure"
-            lines += ["", text + (" (given)." if noise.known else " (estimated).")]
-        for number, (seating, curve) in enumerate(self.problem.closures, 1):
-            lines += ["", *_curve(self, self.parameters[seating], curve, number)]
-        lines += shear_report.describe(self)
+        for reason in dict.fromkeys(left.values()):
+            lines.append(f"- {', '.join(n for n in left if left[n] == reason)}: {reason}")
+        lines += [
+            "",
+            "| curve | points | scatter of the stress | of the closure (um) | systematic misfit |",
+            "|---|---|---|---|---|",
+        ]
+        rows = zip(self.problem.curves, self.solution.noise, self.systematic_misfit, strict=True)
+        for k, (curve, noise, misfit) in enumerate(rows, 1):
+            lines.append(
+                f"| {k} | {curve.steepness.size} | {100 * noise.share:.2g} % | "
+                f"{1e6 * noise.absolute:.2g} | {100 * misfit:.2g} % |"
+            )
+        differ = [str(k) for k, differs in enumerate(self.shape_differs, 1) if differs]
+        if differ:
+            lines += ["", f"**Curve {', '.join(differ)} has another shape than the law.** {OTHER}"]
+        if self.problem.closure is not None and self.problem.closure.compliance == 0.0:
+            lines += ["", NO_COMPLIANCE]
         return "\n".join(lines) + "\n"
 
-    def plot(self, path: str | Path | None = None, held_out: Points | None = None) -> Any:
-        """Draw data, fit and bands (needs matplotlib: extra `plot`).
+    @style()
+    def plot(
+        self, path: str | Path | None = None, held_out: tuple[Array, Array] | None = None
+    ) -> Any:
+        """Draw the points and the law, a closure curve with its band (extra `plot`).
 
-        held_out: stress (Pa) and closure (m) of points of the first closure curve that were not
-        fitted.
+        held_out: stress (Pa) and closure (m) of points of the closure test that were not fitted;
+        they are drawn as open circles.
         """
-        curves = self.problem.curves
-        across = math.ceil(math.sqrt(len(curves)))
-        down = math.ceil(len(curves) / across)
+        curves, values, settings = self.problem.curves, self.parameters, self.problem.settings
         figure, axes = pyplot().subplots(
-            down, across, figsize=(5.2 * across + 0.8, 4.2 * down + 0.2),
-            layout="constrained", squeeze=False,
-        )  # fmt: skip
-        closures = 0
-        for axis in axes.flat[len(curves) :]:
-            axis.remove()
-        for axis, curve in zip(axes.flat, curves, strict=False):
-            if isinstance(curve, ClosureCurve):
-                closures += 1
-                _draw_closure(axis, self, curve, closures, held_out if closures == 1 else None)
-            else:
-                shear_report.draw(axis, self, curve)
-        return written(figure, path)
-
-    def to_toml(self, path: str | Path | None = None, title: str = "Fitted joint") -> str:
-        """The law as a preset in TOML with what is known of its parameters; written to `path`."""
-        closures = len(self.problem.closures)
-        others = len(self.problem.curves) - closures
-        source = f"fitted by jointlaw to {closures} closure and {others} shear curves"
-        clean = title.replace("\\", "/").replace('"', "'")
-        left = ", ".join(self.not_identifiable)
-        text = self.law.to_toml() + (
-            f'\n[about]\ntitle = "{clean}"\nsource = "{source}"\n'
-            f'assumptions = "not identifiable from these data: {left}"\n'
+            1, len(curves), figsize=(5 * len(curves) + 1, 4.4), layout="constrained", squeeze=False
         )
-        if path is not None:
-            replace_file(Path(path), text.encode())
-        return text
+        for axis, curve in zip(axes.flat, curves, strict=True):
+            if isinstance(curve, ClosureCurve):
+                x, measured, what = curve.closure, curve.stress, "closure since the test began"
+                u = np.linspace(x.min(), x.max() if held_out is None else held_out[1].max(), 100)
+                low, high = self.band(u)
+                axis.fill_between(
+                    1e6 * u,
+                    low / 1e6,
+                    high / 1e6,
+                    color="C1",
+                    alpha=0.25,
+                    label="95 % band of the law",
+                )
+                if held_out is not None:
+                    held = 1e6 * held_out[1], held_out[0] / 1e6
+                    axis.plot(*held, "oC0", mfc="w", ms=4, label="measured, not fitted")
+                u = x if curve.cycle else u
+                law = np.exp(log_stress(values, values["seating"] + u, settings))
+            else:
+                u = x = curve.shear
+                measured, what = curve.shear_stress, f"shear at {curve.normal / 1e6:.3g} MPa"
+                law = curve.predict(build_for_shear(values, settings, curve.azimuth))
+            axis.plot(1e6 * u, law / 1e6, color="C1", label="law")
+            axis.plot(1e6 * x, measured / 1e6, "oC0", ms=4, label="measured")
+            axis.set(xlabel=f"{what} (µm)", ylabel="stress (MPa)")
+            axis.legend()
+        return written(figure, path)
 
 
 def fit_closure(
@@ -118,13 +244,10 @@ def fit_closure(
     free: Sequence[str] = ("asperity_density", "alpha", "beta"),
     fixed: Values | None = None,
     law: JointLaw | None = None,
-    formation: str | None = None,
     priors: Ranges | None = None,
-    seating: float | None = None,
     noise: float | None = None,
-    closure_noise: float = 0.0,
     cycle: bool = False,
-    compliance: float | tuple[ArrayLike, ArrayLike] = 0.0,
+    compliance: float = 0.0,
 ) -> Fit:
     """Fit the law to one closure test.
 
@@ -135,24 +258,17 @@ def fit_closure(
     free: names of the parameters to fit; see `fit_curves`. `overlap` is held at 0 by default: the
         law's closure then counts from the first touch of the highest asperity, and the seating
         closure, which is fitted, already says how far the test began beyond it.
-    fixed: values of parameters that are known otherwise, such as alpha from a scan.
-    law: values of all parameters that are not free; None takes rock asperities, see
-        `forward.DEFAULTS`.
-    formation: "individual" or "population"; None takes that of `law`, or "individual", which
-        predicts best.
-    priors: 95 % ranges (low, high) in physical units instead of the defaults, or None to drop one.
-    seating, noise, closure_noise, cycle, compliance: as in `ClosureCurve`; cycles need
-        "yield_interference" among `free` or `fixed`, or a law that has one.
+    fixed, law, priors: as in `fit_curves`.
+    noise, cycle, compliance: as in `ClosureCurve`; cycles need "yield_interference" among
+        `free` or `fixed`, or a law that has one.
 
     Returns a `Fit`. Raises ValueError for curves or names that do not fit.
 
     Source: Misra 1999, Eq. 11, 12, 33, 37; docs/theory-incremental.md, "Heights, direction and
     Hertz become one curve", for the "individual" reading.
     """
-    curve = ClosureCurve(
-        np.asarray(stress), np.asarray(closure), seating, noise, closure_noise, cycle, compliance
-    )
-    return fit_curves([curve], free=free, fixed=fixed, law=law, formation=formation, priors=priors)
+    curve = ClosureCurve(np.asarray(stress), np.asarray(closure), noise, cycle, compliance)
+    return fit_curves([curve], free=free, fixed=fixed, law=law, priors=priors)
 
 
 def fit_shear(
@@ -190,115 +306,26 @@ def fit_curves(
     free: Sequence[str] = ("asperity_density", "alpha", "beta", "mu", "a"),
     fixed: Values | None = None,
     law: JointLaw | None = None,
-    formation: str | None = None,
     priors: Ranges | None = None,
 ) -> Fit:
     """Fit one law to several measured curves at once.
 
     Parameters
     ----------
-    curves: `ClosureCurve` and `ShearCurve`, at least one.
+    curves: at least one, `ShearCurve` and at most one `ClosureCurve`.
     free: parameters to fit, of alpha, beta (m), overlap (m), asperity_density (1/m2),
         K (Pa m^(1-eta)), lam, eta, mu, a, b, c, yield_interference (m), mu_residual,
-        wear_slip (m), critical_slip (m). Positive ones are fitted as logarithms. Every
+        wear_slip (m), critical_slip (m). Positive ones are fitted as logarithms. A
         closure curve that does not begin at zero stress adds its seating closure (m).
-    fixed: values of parameters that are known otherwise, in SI units.
-    law: values of all parameters that are not free, `critical_slip` among them; None takes
-        `forward.DEFAULTS`. A law of one plane or of closure alone stays one.
-    formation: "individual" or "population"; None takes that of `law`, or "individual".
+    fixed: values of parameters that are known otherwise, such as alpha from a scan, in SI units.
+    law: values of all parameters that are not free, `critical_slip` among them; None takes rock
+        asperities, `forward.DEFAULTS`, of "individual" formation. A law of one plane or of closure
+        alone stays one.
     priors: 95 % ranges (low, high) in physical units instead of the defaults of `priors.PRIORS`,
         or None to drop one. Besides the parameters: "overlap_share", "full_contact_stress".
 
     Returns a `Fit`. Raises ValueError naming the parameter when something does not fit.
     """
-    problem = pose(curves, free, fixed, law, formation, priors)
+    problem = pose(curves, free, fixed, law, priors)
     starts = staged(problem, starting_points(problem, near=law is not None))
     return Fit(problem, solve(problem, starts))
-
-
-def fit_many(
-    curves: Sequence[tuple[ArrayLike, ArrayLike]],
-    executor: Executor | None = None,
-    workers: int | None = None,
-    **options: Any,
-) -> list[Fit]:
-    """Fit many closure curves; the results stand in the order of the curves.
-
-    Parameters
-    ----------
-    curves: pairs (stress in Pa, closure in m), each as `fit_closure` takes them.
-    executor: any `concurrent.futures.Executor`, left open; None makes a process pool of `workers`
-        (as many as there are cores by default). For more than one machine:
-        `dask.distributed.Client(address).get_executor()`, extra `sweep`.
-    options: keywords of `fit_closure`.
-
-    Raises what `fit_closure` raises for the first curve that cannot be fitted. A fit does not
-    depend on where it runs: every executor gives the same numbers.
-    """
-    if executor is None:
-        quiet = signal.SIGINT, signal.SIG_DFL  # Ctrl-C ends a worker without a traceback
-        with ProcessPoolExecutor(workers, initializer=signal.signal, initargs=quiet) as pool:
-            return fit_many(curves, pool, **options)
-    job = partial(fit_closure, **options)
-    futures = [executor.submit(job, *curve) for curve in curves]
-    return [future.result() for future in track(futures, "fits", len(futures))]
-
-
-def _curve(fit: Fit, seating: float, curve: ClosureCurve, number: int) -> list[str]:
-    """What a closure curve does fix: stress and stiffness along it."""
-    at = np.array([0.5, 1.0]) * curve.closure[np.argmax(curve.stress)]
-    low, high = fit.band(at, curve=number, measured=False)
-    lines = [
-        f"Closure curve {number} (seating closure {1e6 * seating:.3g} um):",
-        "",
-        "| closure (um) | stress (MPa) | 95 % band (MPa) | normal stiffness (GPa/m) |",
-        "|---|---|---|---|",
-    ]
-    for u, lo, hi in zip(at, low, high, strict=True):
-        stress = float(fit.predict(u, number))
-        step = 1e-4 * float(at[-1])
-        rise = float(fit.predict(u + step, number)) - float(fit.predict(u - step, number))
-        lines.append(
-            f"| {1e6 * u:.4g} | {stress / 1e6:.4g} | {lo / 1e6:.4g} to {hi / 1e6:.4g} | "
-            f"{rise / (2 * step) / 1e9:.4g} |"
-        )
-    if fit.bends_otherwise[number - 1]:
-        of = "the largest stress" if curve.cycle else "the stress"
-        lines += [
-            "",
-            "**This curve does not bend as the law does**: neighbouring points deviate to the same "
-            f"side, by {100 * fit.wander[number - 1]:.2g} % of {of}. Between the points use it "
-            "with this error; beyond them use neither the curve nor its band. A hyperbola (mated "
-            "joints) or a logarithm (unmated ones) may follow the loading of this rock better.",
-        ]
-    if curve.compliance != 0.0:
-        return [*lines, "", "The compliance of rock and machine that was given is subtracted."]
-    missing = "if the closure was measured across rock too, the law includes its strain."
-    return [*lines, "", f"No compliance of rock and machine was given: {missing}"]
-
-
-def _draw_closure(
-    axis: Any, fit: Fit, curve: ClosureCurve, number: int, held_out: Points | None
-) -> None:
-    top = float(curve.closure.max())
-    points = {"marker": "o", "ls": "none", "color": "C0", "zorder": 3}
-    if held_out is not None:
-        stress, closure = (np.asarray(x, float) for x in held_out)
-        top = float(closure[-1])
-        label = "measured, not fitted"
-        axis.plot(1e6 * closure, stress / 1e6, mfc="none", ms=5, label=label, **points)
-    u = np.linspace(float(curve.closure[0]), 1.03 * top, 120)
-    low, high = fit.band(u, curve=number)
-    axis.fill_between(1e6 * u, low / 1e6, high / 1e6, color="C1", alpha=0.25, label="95 % band")
-    axis.plot(1e6 * u, fit.predict(u, number) / 1e6, color="C1", label="law")
-    if curve.cycle:
-        rows = np.arange(curve.closure.size)
-        path = np.interp(np.linspace(0, rows[-1], 400), rows, curve.closure)
-        seated = path + fit.parameters[fit.closure_curve(number)[0]]
-        stress = np.exp(log_stress(fit.parameters, seated, fit.problem.settings))
-        axis.plot(1e6 * path, stress / 1e6, "--", color="C1", label="law, cycle")
-    axis.plot(1e6 * curve.closure, curve.stress / 1e6, ms=4, label="measured", **points)
-    axis.set(
-        xlabel="closure since the test began (µm)", ylabel="normal stress (MPa)", title="Closure"
-    )
-    axis.legend(loc="upper left")

@@ -48,11 +48,12 @@ def parameters(law: JointLaw) -> tuple[dict[str, float], Settings]:
     Raises ValueError for heights that are not gamma distributed.
     """
     o, p, h = law.orientation, law.asperity, law.heights
-    values = DEFAULTS | {"a": o.a, "b": o.b, "c": o.c, "K": p.K, "lam": p.lam, "eta": p.eta}
-    values |= {"mu": p.mu, "asperity_density": law.asperity_density}
-    values |= {"yield_interference": p.yield_interference, "wear_slip": p.wear_slip}
-    values |= {"mu_residual": p.mu if p.mu_residual is None else p.mu_residual}
-    values["critical_slip"] = law.critical_slip
+    values = DEFAULTS | {
+        "asperity_density": law.asperity_density, "K": p.K, "lam": p.lam, "eta": p.eta, "mu": p.mu,
+        "a": o.a, "b": o.b, "c": o.c, "yield_interference": p.yield_interference,
+        "mu_residual": p.mu if p.mu_residual is None else p.mu_residual,
+        "wear_slip": p.wear_slip, "critical_slip": law.critical_slip,
+    }  # fmt: skip
     kept = ("resolution", "closure_range", "plane", "closure_only")
     settings = Settings(has_heights=h is not None, **{name: getattr(law, name) for name in kept})
     if h is None:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..laboratory.experiments import direct_shear
 from ..law import JointLaw
-from ..support.checks import Array, above, at_least, number
+from ..support.checks import Array, above, at_least, finite, number
 from .forward import Settings, build_for_shear, log_stress
 from .priors import Values
 
@@ -52,16 +52,16 @@ class ClosureCurve:
     stress: normal stress in Pa, (n,), >= 0.
     closure: closure in m, (n,), measured from wherever the test began; unloading left out (see
         `first_loading`) unless `cycle`.
-    seating: closure (m) of the law at the closure zero of the test, or None to fit it. A test that
-        begins at a non-zero stress is always fitted; one whose first row is (0, 0) begins at 0.
-    noise: standard error of the stress as a share of it, taken as known. None expects 1 % of the
-        stress and 0.5 % of the largest closure and estimates both from the scatter.
-    closure_noise: standard error of the closure in m that goes with a given `noise`.
+    noise: standard error of the stress as a share of it, taken as known, the closure as exact.
+        None expects 1 % of the stress and 0.5 % of the largest closure and estimates both from the
+        scatter.
     cycle: True for points of whole cycles, loading, unloading and reloading in their order. Only
         a law with a yield_interference has a loop to fit to them.
-    compliance: of rock and machine, whose strain the test measured too: closure per stress (m/Pa),
-        or a pair of arrays (stress in Pa, closure in m) measured without a joint. It is
-        subtracted from `closure` first; 0 where the closure is that of the joint alone.
+    compliance: of rock and machine, whose strain the test measured too: closure per stress (m/Pa).
+        It is subtracted from `closure` first; 0 where the closure is that of the joint alone.
+
+    `seating`, the closure (m) of the law where that of the test is zero, is known of a test that
+    begins at zero stress; it is None of any other, and fitted.
 
     Raises ValueError for arrays that do not fit, fewer than four points, a branch that unloads
     without `cycle`, cycles that never unload, or a compliance larger than the curve.
@@ -69,37 +69,36 @@ class ClosureCurve:
 
     stress: Array
     closure: Array
-    seating: float | None = None
     noise: float | None = None
-    closure_noise: float = 0.0
     cycle: bool = False
-    compliance: float | tuple[ArrayLike, ArrayLike] = 0.0
+    compliance: float = 0.0
+    seating: float | None = field(init=False)
     expected: Noise = field(init=False, repr=False)
     steepness: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
-        stress, closure = _pair("stress", self.stress, "closure", self.closure)
+        stress, closure = _pair(stress=self.stress, closure=self.closure)
         if (stress < 0).any():
             raise ValueError(f"stress = {stress.min():g} Pa is out of bounds: it must be >= 0")
-        closure = subtract_compliance(stress, closure, self.compliance)
-        _, top, last = cycles(stress)[0]
-        unloads = stress[top : last + 1].min() < (1 - _TURN) * stress[top]
-        if self.cycle and not unloads:
+        turns = turning_points(stress)
+        top = turns[1]
+        strain = at_least("compliance", self.compliance, 0.0) * stress
+        if strain[top] - strain[0] > 0 and strain[top] - strain[0] >= closure[top] - closure[0]:
             raise ValueError(
-                f"cycle = True, but stress never falls below 80 % of its largest, {stress[top]:g} "
-                "Pa: give the unloading too, or cycle=False for a first loading"
+                f"compliance = {self.compliance:g} m/Pa gives {strain[top] - strain[0]:g} m up to "
+                f"{stress[top]:g} Pa, the whole closure is {closure[top] - closure[0]:g} m: "
+                "nothing is left for the joint; check its unit, m/Pa"
             )
-        if unloads and not self.cycle:
+        closure = closure - strain
+        if self.cycle != (len(turns) > 2):
             raise ValueError(
-                f"stress falls from {stress[top]:g} Pa after point {top}: fit the first loading "
-                "only, jointlaw.first_loading(stress, closure) cuts it out, or give cycle=True "
-                "(jointlaw fit: --cycle)"
+                f"cycle = {self.cycle}, but stress {'never falls' if self.cycle else 'falls'} by a "
+                f"fifth from {stress[top]:g} Pa after point {top}: give cycle=True with loading "
+                "and unloading, or the first loading alone (calibration.measured.first_loading)"
             )
-        if self.seating is None and stress[0] == 0.0:
-            set_(self, "seating", 0.0 - float(closure[0]))  # not -0.0
-        elif self.seating is not None:
-            set_(self, "seating", number("seating", self.seating))
+        # not -0.0
+        set_(self, "seating", 0.0 - float(closure[0]) if stress[0] == 0.0 else None)
         keep = stress > 0  # a point at zero stress only says where the closure is zero
         stress, closure = stress[keep], closure[keep]
         if stress.size < 4 or not np.ptp(closure) > 0:
@@ -107,38 +106,26 @@ class ClosureCurve:
                 f"stress has {stress.size} points above zero over a closure of "
                 f"{np.ptp(closure) if closure.size else 0:g} m: at least 4 are needed"
             )
-        if self.seating is not None and closure.min() + self.seating <= 0:
-            raise ValueError(
-                f"seating = {self.seating:g} m: the law would be open at closure = "
-                f"{closure.min():g} m where a stress was measured; give a larger seating or None"
-            )
         set_(self, "stress", stress)
         set_(self, "closure", closure)
         steep = np.zeros(stress.size)
-        turns = sorted({0, stress.size - 1}.union(*cycles(stress) if self.cycle else ()))
-        for start, end in reversed(list(pairwise(turns))):
+        ends = [0, *turning_points(stress)[1:-1], stress.size - 1]
+        for start, end in reversed(list(pairwise(ends))):
             branch = slice(start, end + 1)
             steep[branch] = _steepness(closure[branch], stress[branch])
         share = stress / np.max(stress) if self.cycle else 1.0  # as `residuals` are
         set_(self, "steepness", share * steep)
-        if self.noise is None:
-            if self.closure_noise != 0:
-                raise ValueError(
-                    f"closure_noise = {self.closure_noise!r} goes with a known noise; give noise "
-                    "too, or leave both out to have them estimated"
-                )
-            expected = Noise(STRESS_NOISE, CLOSURE_NOISE * float(np.ptp(closure)))
-        else:
-            share = above("noise", self.noise, 0.0)
-            expected = Noise(share, at_least("closure_noise", self.closure_noise, 0.0), True)
+        expected = Noise(STRESS_NOISE, CLOSURE_NOISE * float(np.ptp(closure)))
+        if self.noise is not None:
+            expected = Noise(above("noise", self.noise, 0.0), 0.0, known=True)
         set_(self, "expected", expected)
 
-    def residuals(self, values: Values, seating: float, settings: Settings) -> Array:
+    def residuals(self, values: Values, settings: Settings) -> Array:
         """ln(model/measured), (n,); over cycles (model - measured)/largest measured.
 
         Unloading ends at zero stress, where a ratio says nothing.
         """
-        model = log_stress(values, seating + self.closure, settings)
+        model = log_stress(values, values["seating"] + self.closure, settings)
         if not self.cycle:
             return model - np.log(self.stress)
         return (np.exp(model) - self.stress) / np.max(self.stress)
@@ -164,10 +151,11 @@ class ShearCurve:
     azimuth: float = 0.0
     noise: float | None = None
     expected: Noise = field(init=False, repr=False)
+    steepness: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
-        shear, stress = _pair("shear", self.shear, "shear_stress", self.shear_stress)
+        shear, stress = _pair(shear=self.shear, shear_stress=self.shear_stress)
         if shear.size < 3 or not np.ptp(shear) > 0:
             raise ValueError(f"shear has {shear.size} points: at least 3 that move are needed")
         if not stress.any():
@@ -179,11 +167,7 @@ class ShearCurve:
         known = self.noise is not None
         share = above("noise", self.noise, 0.0) if known else SHEAR_NOISE
         set_(self, "expected", Noise(share, 0.0, known))
-
-    @property
-    def steepness(self) -> Array:
-        """Zeros (n,): the displacement is taken as exact."""
-        return np.zeros(self.shear.size)
+        set_(self, "steepness", np.zeros(shear.size))  # the displacement is taken as exact
 
     def predict(self, law: JointLaw, substeps: int = 1) -> Array:
         """Shear stress (Pa) of a law along the path of this test, (n,)."""
@@ -200,81 +184,39 @@ class ShearCurve:
         return np.asarray((model - self.shear_stress) / np.max(np.abs(self.shear_stress)))
 
 
-def first_loading(stress: ArrayLike, closure: ArrayLike) -> tuple[Array, Array, Array, Array]:
-    """Cut the first loading cycle at its largest stress.
+def first_loading(stress: ArrayLike, closure: ArrayLike) -> tuple[Array, Array]:
+    """Stress (Pa) and closure (m) of a test, (n,) each, up to where the stress first turns."""
+    s, u = _pair(stress=stress, closure=closure)
+    top = turning_points(s)[1]
+    return s[: top + 1], u[: top + 1]
 
-    Returns stress (Pa) and closure (m) of the loading branch, the peak included, then those of the
-    unloading branch, the peak included again.
+
+def turning_points(stress: Array) -> list[int]:
+    """Rows where the stress (Pa, (n,)) turns: the first, peaks and lows in turn, the last extreme.
+
+    It turns where it falls by a fifth of a peak, and where it rises again by as much.
     """
-    s, u = _pair("stress", stress, "closure", closure)
-    _, top, last = cycles(s)[0]
-    return s[: top + 1], u[: top + 1], s[top : last + 1], u[top : last + 1]
-
-
-def cycles(stress: Array) -> list[tuple[int, int, int]]:
-    """Rows of every cycle of a test: its first, the one of its largest stress, its last.
-
-    The stress (Pa, (n,)) turns where it falls by a fifth of a peak, and where it rises again by as
-    much; the last row of a cycle is the first of the next one.
-    """
+    turns, extreme, sense = [0], 0, 1
     least = _FOOT * float(np.max(stress))
-    lows, tops = [0], [0]
     for row, now in enumerate(stress):
-        peak, low = stress[tops[-1]], stress[lows[-1]]
-        if len(lows) == len(tops):  # loading
-            if now > peak:
-                tops[-1] = row
-            elif now < peak - max(_TURN * peak, least):
-                lows.append(row)
-        elif now < low:
-            lows[-1] = row
-        elif now > low + max(_TURN * peak, least):
-            tops.append(row)
-    return list(zip(lows, tops, [*lows[1 : len(tops)], len(stress) - 1], strict=False))
+        peak = max(stress[extreme], stress[turns[-1]])
+        if sense * (now - stress[extreme]) > 0:
+            extreme = row
+        elif sense * (stress[extreme] - now) > max(_TURN * peak, least):
+            turns.append(extreme)
+            extreme, sense = row, -sense
+    return [*turns, extreme]
 
 
-def subtract_compliance(
-    stress: Array, closure: Array, compliance: float | tuple[ArrayLike, ArrayLike]
-) -> Array:
-    """The closure (m) of the joint alone, without that of rock and machine, as in `ClosureCurve`.
-
-    Raises ValueError for a compliance larger than the curve, or measured up to a lower stress.
-    """
-    if isinstance(compliance, tuple):
-        load, rock = _pair("compliance stress", compliance[0], "compliance closure", compliance[1])
-        if not (np.diff(load) > 0).all() or stress.max() > load.max():
-            raise ValueError(
-                f"compliance is measured up to {load.max():g} Pa: it must ascend and reach the "
-                f"largest stress, {stress.max():g} Pa"
-            )
-        strain = np.interp(stress, load, rock)
-    else:
-        strain = at_least("compliance", compliance, 0.0) * stress
-    top, first = int(np.argmax(stress)), int(np.argmin(stress[: np.argmax(stress) + 1]))
-    taken, total = strain[top] - strain[first], closure[top] - closure[first]
-    if np.any(strain) and taken >= total:
+def _pair(**given: ArrayLike) -> list[Array]:
+    """Two arrays (n,) of finite numbers."""
+    arrays = [finite(name, x, "m, Pa; leave such points out") for name, x in given.items()]
+    if arrays[0].ndim != 1 or arrays[0].size == 0 or arrays[0].shape != arrays[1].shape:
         raise ValueError(
-            f"compliance gives {taken:g} m between {stress[first]:g} and {stress[top]:g} Pa, the "
-            f"whole closure is {total:g} m: nothing is left for the joint; check its unit, m/Pa"
+            f"{' and '.join(given)} have shapes {arrays[0].shape} and {arrays[1].shape}: give two "
+            "arrays of one dimension and the same length"
         )
-    return closure - strain
-
-
-def _pair(name: str, x: Any, other: str, y: Any) -> tuple[Array, Array]:
-    try:
-        first, second = np.asarray(x, float), np.asarray(y, float)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} and {other} must be arrays of numbers") from None
-    if first.ndim != 1 or first.shape != second.shape or first.size == 0:
-        raise ValueError(
-            f"{name} has shape {first.shape}, {other} {second.shape}: "
-            "give two arrays of one dimension and the same length"
-        )
-    for label, array in ((name, first), (other, second)):
-        if not np.isfinite(array).all():
-            at = int(np.argmin(np.isfinite(array)))
-            raise ValueError(f"{label}[{at}] = {array[at]} is not finite; leave such points out")
-    return first, second
+    return arrays
 
 
 def _steepness(closure: Array, stress: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The command `jointlaw export`: a law as files for a host code."""
+"""`jointlaw export`: a law as files for a host code."""
 
 import argparse
 from pathlib import Path
@@ -9,63 +9,52 @@ from ..hosts.lammps.export import export_lammps
 from ..hosts.yade.export import export_yade
 from ..law import JointLaw
 from ..support.files import clear_run
-from .command import add_command, add_law, add_out, given, read_law
+from .command import add_command, add_law, add_out, in_unit, read_law
+
+START = {
+    "yade": "yade -n -x settle_and_incline.py",
+    "c": "make && ./example",
+    "lammps": "./build.sh && lmp -in in.tower",
+}
 
 
 def add(commands: Any) -> None:
-    """Add `export` to the subparsers of the command line."""
-    parser = add_command(
-        commands,
-        "export",
-        "write a law for a host code: table, adapter and scripts in one folder",
-        "jointlaw export yade jing-replica --out joint-for-yade",
-        _export,
-    )
-    parser.add_argument("host", choices=("yade", "c", "lammps"), help="the host code; c: also C++")
+    """Add the subcommand to the command line."""
+    what = "write a law for a host code: table, adapter and scripts in one folder"
+    example = "jointlaw export yade jing-replica --out joint-for-yade"
+    parser = add_command(commands, "export", what, example, _export)
+    parser.add_argument("host", choices=tuple(START), help="the host code; c: also C++")
     add_law(parser)
-    parser.add_argument("--closure", help="yade: last closure of the table, such as 2um")
-    parser.add_argument("--shear-limit", help="yade: shear at which friction is read, such as 5um")
-    parser.add_argument("--tolerance", type=float, help="yade: of interpolation (0.001)")
+    parser.add_argument(
+        "--shear-limit",
+        metavar="LENGTH",
+        type=in_unit("m", positive=True),
+        help="yade: shear at which the friction of the table is read, such as 5um",
+    )
     add_out(parser, pictures=False)
 
 
 def _export(options: argparse.Namespace) -> None:
-    law = read_law(options)
-    if options.host == "yade":
-        _export_yade(law, options)
+    law, host, folder = read_law(options), options.host, options.out
+    if options.shear_limit and host != "yade":
+        raise ValueError(
+            f"--shear-limit shapes a table for YADE; {host} runs the law itself: leave it out"
+        )
+    clear_run(folder)
+    if host == "yade":
+        _export_table(law, folder, options.shear_limit)
     else:
-        _export_live(law, options)
+        export = export_c if host == "c" else export_lammps
+        print(f"wrote {', '.join(export(law, folder, identifier(Path(options.law).stem)))}")
+    print(f"run: cd {folder} && {START[host]}")
 
 
-def _export_live(law: JointLaw, options: argparse.Namespace) -> None:
-    export, host, start = {
-        "c": (export_c, "C and C++", "make && ./example"),
-        "lammps": (export_lammps, "LAMMPS", "./build.sh && lmp -in in.tower"),
-    }[options.host]
-    for name in ("closure", "shear_limit", "tolerance"):
-        if getattr(options, name) is not None:
-            raise ValueError(
-                f"--{name.replace('_', '-')} shapes a table for YADE; {host} runs the law itself: "
-                "leave it out"
-            )
-    clear_run(options.out)
-    files = export(law, options.out, identifier(Path(options.law).stem))
-    print(f"wrote the joint for {host} to {options.out}: {', '.join(files)}")
-    print(f"run: cd {options.out} && {start}")
-
-
-def _export_yade(law: JointLaw, options: argparse.Namespace) -> None:
-    settings: dict[str, Any] = {
-        "tolerance": 1e-3 if options.tolerance is None else options.tolerance
-    }
-    for name in ("closure", "shear_limit"):
-        if (value := given(options, name, "m")) is not None:
-            settings[name] = value
-    clear_run(options.out)
-    table = export_yade(law, options.out, **settings)
-    print(f"wrote the joint for YADE to {options.out}: {len(table.closure)} rows")
+def _export_table(law: JointLaw, folder: Path, shear_limit: float | None) -> None:
+    """Write the joint for YADE, and print what its table drops."""
+    more: dict[str, Any] = {} if shear_limit is None else {"shear_limit": shear_limit}
+    table = export_yade(law, folder, tolerance=1e-3, **more)
+    print(f"wrote the joint for YADE to {folder}: {len(table.closure)} rows")
     missed = table.metadata["resolution_error_friction_angle"]
     print(f"its friction angle at the shear limit is {missed:.2g} degrees off that of finer nodes")
     print("what the table drops (error against the law, share of each path's largest traction):")
     print(table.report(law))
-    print(f"run: cd {options.out} && yade -n -x direct_shear.py")

@@ -1,7 +1,6 @@
-"""`jointlaw fit`: measured closure curves to laws, with report, plot and held-out errors."""
+"""`jointlaw fit`: measured closure and shear tests to one law, with report and picture."""
 
 import argparse
-import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -10,18 +9,23 @@ import numpy as np
 
 from .. import presets
 from ..calibration import datasets
-from ..calibration.baselines import Comparison, compare
-from ..calibration.fit import Fit, fit_closure, fit_many
-from ..calibration.measured import first_loading, subtract_compliance
-from ..calibration.unloading import explain_each, summed_up
+from ..calibration.fit import fit_curves
+from ..calibration.measured import ClosureCurve, ShearCurve, first_loading
 from ..parameters.rock import require_rock
 from ..support.checks import Array
-from ..support.files import require_free
 from .command import Written, add_command, add_out, quantity, write_results
-from .fit_shear import add_options, fit_with_shear
 
-OF_CLOSURE = "stress_column", "closure_column", "cycle", "noise", "compliance"
-OF_SHEAR = "shear_column", "shear_stress_column", "normal_column", "normal_stress"
+MOST = 60  # points of a shear test that are fitted: a logger writes thousands, each costs a step
+NEEDS = {  # what an option is about, where no such test is given
+    "data": (
+        "a closure test: name its file before --shear",
+        ("stress_column", "closure_column", "cycle", "noise", "compliance", "up_to"),
+    ),
+    "shear": (
+        "direct shear tests: name their files after --shear",
+        ("shear_column", "shear_stress_column", "normal_column", "normal_stress"),
+    ),
+}
 
 
 def add(commands: Any) -> None:
@@ -29,138 +33,73 @@ def add(commands: Any) -> None:
     what = "fit the law to measured closure and shear curves; write preset, report and plot"
     example = "jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out out"
     parser = add_command(commands, "fit", what, example, _run)
-    parser.description = (
-        f"{what}. Only the first loading is fitted, or whole cycles with --cycle; every cycle of a "
-        "file is compared with what the fitted law loses and keeps. Several closure files are "
-        "fitted one by one; shear files together."
-    )
-    parser.add_argument(
-        "data", nargs="*", metavar="CSV", help="files of stress and closure, or a shipped data set"
-    )
-    parser.add_argument("--stress-column", help="name and unit of that column, such as sigmaZ:MPa")
-    parser.add_argument("--closure-column", help="name and unit of that column, such as Disp:mm")
-    add_options(parser)
     parser.set_defaults(wait="with shear tests it takes half a minute to some minutes")
-    parser.add_argument(
-        "--up-to", help="fit up to this stress, predict the rest: 5.3MPa; or half, of the largest"
+    add = parser.add_argument
+    add("data", nargs="*", metavar="CSV", help="file of stress and closure, or shipped data set")
+    add("--stress-column", help="name and unit of that column, such as sigmaZ:MPa")
+    add("--closure-column", help="name and unit of that column, such as Disp:mm")
+    add(
+        "--shear",
+        nargs="+",
+        metavar="CSV",
+        default=[],
+        help="direct shear tests, one a file, at a constant normal stress that is in a column of "
+        "the file or after --normal-stress. One law is fitted to all of them and to the closure "
+        "test, if one is given before",
     )
-    parser.add_argument(
+    add("--shear-column", help="name and unit of that column, such as us:mm")
+    add("--shear-stress-column", help="name and unit of that column: tau:MPa")
+    add("--normal-column", help="name and unit of that column: sn:MPa")
+    add("--normal-stress", metavar="STRESSES", help="of the shear tests in their order: 1MPa,3MPa")
+    add(
+        "--decimal-comma",
+        action="store_true",
+        help="read 1,201 as 1.201 in files whose numbers do not show that the comma is decimal",
+    )
+    add("--up-to", help="fit up to this stress, predict the rest: 5.3MPa; or half, of the largest")
+    add("--cycle", action="store_true", help="fit unloading too, and with it yield_interference")
+    add(
+        "--compliance",
+        metavar="LENGTH/STRESS",
+        help="of rock and machine, such as 4.2um/10MPa: it is subtracted first",
+    )
+    add("--noise", type=float, help="known error of the closure test's stress, such as 0.01")
+    add(
         "--set",
         action="append",
         default=[],
         metavar="NAME=VALUE",
         help="hold a parameter at a value in SI units, such as alpha=3.8; repeatable",
     )
-    parser.add_argument(
-        "--compliance",
-        metavar="LENGTH/STRESS",
-        help="of rock and machine, such as 4.2um/10MPa, or a file of stress and closure measured "
-        "without a joint: it is subtracted first",
-    )
-    parser.add_argument(
-        "--cycle",
-        action="store_true",
-        help="fit all cycles of a file, unloading too, yield_interference among the parameters",
-    )
-    parser.add_argument(
+    add(
         "--free",
         metavar="NAMES",
         help="parameters to fit, with commas between; default asperity_density, of closure tests "
         "alpha and beta, with --cycle yield_interference, of shear tests mu, a and critical_slip",
     )
-    parser.add_argument(
-        "--law", metavar="PRESET_OR_FILE", help="the values of parameters that are not fitted"
-    )
-    parser.add_argument(
-        "--formation",
-        choices=("individual", "population"),
-        help="default: that of --law, or individual",
-    )
-    parser.add_argument("--noise", type=float, help="known error of the stress, such as 0.01")
-    parser.add_argument("--workers", type=int, help="processes for several files")
+    add("--law", metavar="PRESET_OR_FILE", help="the values of parameters that are not fitted")
     add_out(parser)
 
 
 def _run(options: argparse.Namespace) -> None:
-    if (options.shear and len(options.data) > 1) or not (options.shear or options.data):
+    if len(options.data) > 1 or not (options.data or options.shear):
         raise ValueError(
-            f"{len(options.data)} closure files: give one or more, or shear tests after --shear "
-            "with one closure file or none"
+            f"{len(options.data)} closure files: give one, or none and shear tests after --shear"
         )
-    _require_used(options)
-    folders = _folders(options)
-    tests = [_read(options, item) for item in options.data]
-    keywords = _keywords(options)
-    compliance = _compliance(options)
-    alone = [
-        datasets.ClosureData(stress, subtract_compliance(stress, closure, compliance))
-        for stress, closure in tests
-    ]
-    if options.cycle and options.up_to:
-        raise ValueError("--cycle fits all points: leave --up-to out")
-    loading = [test if options.cycle else first_loading(*test)[:2] for test in tests]
-    if options.shear:
-        closed = datasets.ClosureData(*loading[0]) if loading else None
-        fit, about = fit_with_shear(options, closed, compliance, keywords)
-        names = ", ".join(Path(item).name for item in [*options.data, *options.shear])
-        _write(options.out, options.format, names, fit, alone[0] if alone else None, None, about)
-        return
-    limits = [_limit(options.up_to, stress) for stress, _ in loading]
-    seen = [(s[s <= limit], u[s <= limit]) for (s, u), limit in zip(loading, limits, strict=True)]
-    if len(seen) > 1:
-        fits = fit_many(seen, workers=options.workers, compliance=compliance, **keywords)
-    else:
-        fits = [fit_closure(*seen[0], compliance=compliance, **keywords)]
-    for k, fit in enumerate(fits):
-        stress, closure = first_loading(*alone[k])[:2]
-        held = (
-            compare(stress, closure, limits[k], **keywords) if (stress > limits[k]).any() else None
-        )
-        name = Path(options.data[k]).name
-        _write(folders[k], options.format, name, fit, alone[k], held)
-
-
-def _require_used(options: argparse.Namespace) -> None:
-    """Refuse options about tests that are not given."""
-    for tests, place, names in (
-        (options.data, "a closure test: name its file before --shear", OF_CLOSURE),
-        (options.shear, "direct shear tests: name their files after --shear", OF_SHEAR),
-    ):
+    for tests, (about, names) in NEEDS.items():
         for name in names:
-            value = getattr(options, name)
-            if not tests and value is not None and value is not False:
-                raise ValueError(f"--{name.replace('_', '-')} is about {place}, or leave it out")
-
-
-def _folders(options: argparse.Namespace) -> list[Path]:
-    """One folder for the results of each file, named after it when there are several."""
-    if len(options.data) == 1:
-        return [options.out]
-    items: dict[str, str] = {}
-    for item in options.data:
-        if (other := items.setdefault(Path(item).stem, item)) is not item:
-            raise ValueError(
-                f"{other} and {item} would both be written to {options.out / Path(item).stem}; "
-                "rename one, or fit them one at a time"
-            )
-    folders = [options.out / stem for stem in items]
-    for folder in folders:
-        if not options.force:
-            require_free(folder)
-    return folders
-
-
-def _write(
-    folder: Path,
-    picture_format: str,
-    name: str,
-    fit: Fit,
-    test: datasets.ClosureData | None,
-    held: Comparison | None,
-    about: str = "",
-) -> None:
+            if getattr(options, name) and not getattr(options, tests):
+                raise ValueError(f"--{name.replace('_', '-')} is about {about}, or leave it out")
+    keywords = _keywords(options)
+    curves: list[ClosureCurve | ShearCurve] = []
+    held: tuple[Array, Array] | None = None
+    if options.data:
+        curve, held = _closure_curve(options)
+        curves.append(curve)
+    fit = fit_curves([*curves, *_shear_curves(options)], **keywords)
+    name = ", ".join(Path(item).name for item in [*options.data, *options.shear])
     require_rock(fit.parameters, f"{name}: the fitted ")
-    text = f"{fit.report()}{about}\n"
+    text = fit.report()
     summary: dict[str, Any] = {
         "data": name,
         "parameters_SI": fit.parameters,
@@ -169,87 +108,89 @@ def _write(
         "not_identifiable": fit.not_identifiable,
     }
     if held is not None:
-        text += _held_out(held)
-        summary["error_at_largest_stress"] = {n: float(e[-1]) for n, e in held.errors.items()}
-    if test is not None and first_loading(*test)[2].size >= 3:
-        try:
-            loops = explain_each(fit.law, *test)
-            text += f"\n## Unloading\n\n{summed_up(loops)}\n"
-            summary |= {"unloading": vars(loops[0]), "cycles": [vars(loop) for loop in loops]}
-        except ValueError as error:  # the fit is not lost for it
-            text += f"\n## Unloading\n\nNot compared with the law: {error}.\n"
-            print(f"unloading is not compared: {error}", file=sys.stderr)
+        error = fit.predict(held[1]) / held[0] - 1
+        summary["error_at_largest_stress"] = float(error[-1])
+        text += (
+            f"\nHeld out: {error.size} points. The predicted stress is off by "
+            f"{100 * error[-1]:+.1f} % at the largest, {held[0][-1] / 1e6:.4g} MPa, and by "
+            f"{100 * np.sqrt(np.mean(error**2)):.1f} % (rms) over all of them.\n"
+        )
     print(text)
-    points = None if held is None else (held.stress, held.closure)
     files: Written = {
-        "fit.png": partial(fit.plot, held_out=points),
-        "law.toml": partial(fit.to_toml, title=f"Fit to {name}"),
+        "fit.png": partial(fit.plot, held_out=held),
+        "law.toml": fit.law.to_toml,
         "report.md": text,
     }
-    write_results(folder, files, summary, picture_format)
+    write_results(options.out, files, summary, options.format)
 
 
-def _held_out(held: Comparison) -> str:
-    low, high = held.band
-    inside = (low <= held.stress) & (held.stress <= high)
-    return (
-        f"\n## Held out: {held.stress.size} points above {held.limit / 1e6:.4g} MPa\n\n"
-        f"{held.table()}\n\nThe 95 % band of the law covers {int(inside.sum())} of "
-        f"{inside.size} of them, at the largest stress from "
-        f"{100 * (low[-1] / held.stress[-1] - 1):+.1f} to "
-        f"{100 * (high[-1] / held.stress[-1] - 1):+.1f} % of it.\n"
-    )
-
-
-def _read(options: argparse.Namespace, item: str) -> datasets.ClosureData:
+def _closure_curve(
+    options: argparse.Namespace,
+) -> tuple[ClosureCurve, tuple[Array, Array] | None]:
+    """The closure curve to fit; with it stress (Pa) and closure (m) of points held out, or None."""
+    item, compliance, limit = options.data[0], 0.0, np.inf
     if item in datasets.names() and not Path(item).exists():
-        return datasets.load(item)
-    return datasets.read_closure(item, options.stress_column, options.closure_column)
-
-
-def _compliance(options: argparse.Namespace) -> float | tuple[Array, Array]:
-    """That of rock and machine, as `ClosureCurve` takes it."""
-    text = options.compliance
-    if text is None:
-        return 0.0
-    if "/" in text and not Path(text).exists():
-        length, _, load = text.partition("/")
+        stress, closure = datasets.load(item)
+    else:
+        columns = options.stress_column, options.closure_column
+        stress, closure = datasets.read_closure(item, *columns, options.decimal_comma)
+    if options.compliance:
+        length, _, load = options.compliance.partition("/")
         pressed = quantity("--compliance", load, "Pa", positive=True)
-        return quantity("--compliance", length, "m") / pressed
-    rock = datasets.read_closure(text, options.stress_column, options.closure_column)
-    return rock.stress, rock.closure
+        compliance = quantity("--compliance", length, "m") / pressed
+    if not options.cycle:
+        stress, closure = first_loading(stress, closure)
+    if options.up_to and options.cycle:
+        raise ValueError("--cycle fits all points: leave --up-to out")
+    if options.up_to == "half":
+        limit = 0.5 * float(stress.max())
+    elif options.up_to:
+        limit = quantity("--up-to", options.up_to, "Pa")
+    seen = stress <= limit
+    curve = ClosureCurve(stress[seen], closure[seen], options.noise, options.cycle, compliance)
+    held = stress[~seen], closure[~seen] - compliance * stress[~seen]
+    return curve, None if seen.all() else held
 
 
-def _limit(text: str | None, stress: Any) -> float:
-    if text is None:
-        return float("inf")
-    return 0.5 * float(np.max(stress)) if text == "half" else quantity("--up-to", text, "Pa")
+def _shear_curves(options: argparse.Namespace) -> list[ShearCurve]:
+    """The shear curves of all files, thinned to `MOST` points each."""
+    normals: list[float | None] = [None] * len(options.shear)
+    if options.normal_stress:
+        normals = [
+            quantity("--normal-stress", text, "Pa", positive=True)
+            for text in options.normal_stress.split(",")
+        ]
+    if len(normals) != len(options.shear):
+        raise ValueError(
+            f"--normal-stress gives {len(normals)} stresses for {len(options.shear)} shear tests: "
+            "give one for each"
+        )
+    columns = options.shear_column, options.shear_stress_column, options.normal_column
+    curves = []
+    for path, normal in zip(options.shear, normals, strict=True):
+        test = datasets.read_shear(path, *columns, normal, options.decimal_comma)
+        n = test.shear.size
+        kept = np.unique(np.linspace(0, n - 1, min(n, MOST)).round().astype(int))
+        curves.append(ShearCurve(test.shear[kept], test.shear_stress[kept], test.normal))
+    return curves
 
 
 def _keywords(options: argparse.Namespace) -> dict[str, Any]:
-    fixed = {}
-    for item in options.set:
-        name, _, value = item.partition("=")
-        try:
-            fixed[name.strip()] = float(value)
-        except ValueError:
-            raise ValueError(
-                f"--set {item!r}: write a name and a number, such as alpha=3.8"
-            ) from None
-    keywords: dict[str, Any] = {"fixed": fixed, "formation": options.formation}
-    keywords["free"] = (
-        tuple(name.strip() for name in options.free.split(","))
-        if options.free
-        else ("asperity_density",)
-        + (("alpha", "beta") if options.data else ())
-        + (("yield_interference",) if options.cycle else ())
-        + (("mu", "a", "critical_slip") if options.shear else ())
-    )
+    """What `fit_curves` takes besides the curves."""
+    free, law = ["asperity_density"], None
+    free += ["alpha", "beta"] if options.data else []
+    free += ["yield_interference"] if options.cycle else []
+    free += ["mu", "a", "critical_slip"] if options.shear else []
+    if options.free:
+        free = [name.strip() for name in options.free.split(",")]
+    pairs = (item.partition("=") for item in options.set)
+    try:
+        fixed = {name.strip(): float(value) for name, _, value in pairs}
+    except ValueError:
+        raise ValueError(
+            f"--set {options.set}: write a name and a number each, such as alpha=3.8"
+        ) from None
     if options.law:
-        keywords["law"] = law = presets.load_any(options.law)
+        law = presets.load_any(options.law)
         require_rock({"mu": law.asperity.mu}, f"{options.law}: asperity.")
-    if options.noise is not None:
-        keywords["noise"] = options.noise
-    if options.cycle:
-        keywords["cycle"] = True
-    return keywords
+    return {"fixed": fixed, "free": free, "law": law}

@@ -4,48 +4,82 @@ import argparse
 import re
 import sys
 from collections.abc import Sequence
+from typing import Any, NoReturn
 
 from ..laboratory.experiments import PathError
 from ..support.files import require_free
 from ..support.progress import explained
 from ..support.version import __version__
-from . import closure, export, figures, fit, presets, replay, scan, shear, tradeoff
+from . import export, fit, laboratory, presets, scan, tradeoff
 
 WAIT = "the first run after an installation also compiles the law, once"
-COMMANDS = (shear, closure, presets, replay, figures, export, fit, scan, tradeoff)
+COMMANDS = (laboratory, presets, export, fit, scan, tradeoff)
+
+_YIELDING = "write yield_interference into [asperity] of a law file; it starts with \
+jointlaw presets NAME > mine.toml"
+_TABLE = "call jointlaw.hosts.yade.export.export_yade(law, folder, closure=..., tolerance=...)"
+
+# Commands ("replay") and options ("tradeoff --loss") that were removed: what to use instead
+REMOVED = {
+    "replay": "a NonFiniteError carries `state` and `d`; joint.restore(error.state) and "
+    "joint.update(error.d) repeat the step",
+    "figures": "run the scripts docs/paper/plot_fig_NN.py; the claims are on docs/paper.md and in "
+    "tests/verification/test_paper_*.py",
+    "closure --yield-interference": _YIELDING,
+    "shear --yield-interference": _YIELDING,
+    "fit --workers": "fit one closure file a command",
+    "fit --formation": "give a law of that formation, such as --law westerly-smooth",
+    "export --closure": _TABLE,
+    "export --tolerance": _TABLE,
+    "tradeoff --loss": "small cycles need more depth cells: write resolution = { u = 3, phi = 6, "
+    "depth = 300 } into the law's file; docs/how-accurate.md says how many",
+}
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line each, as those of the commands are."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        # "-2um" after an option is its value, as from Python 3.14 on; before, only "-2" is
+        self._negative_number_matcher = re.compile(r"-\.?\d")
+
+    def error(self, message: str) -> NoReturn:
+        """Raise ValueError; `main` prints it."""
+        raise ValueError(message.removeprefix("argument "))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status."""
-    parser = argparse.ArgumentParser(
+    words = sys.argv[1:] if arguments is None else arguments
+    name = " ".join(["jointlaw", *words[:1]])
+    try:
+        options = _read(words)
+        if getattr(options, "out", None) and not options.force:
+            require_free(options.out)
+        with explained(f"{name} is at work; {getattr(options, 'wait', WAIT)}"):
+            return int(options.run(options) or 0)
+    except KeyboardInterrupt:
+        print(f"{name}: interrupted; nothing more is written", file=sys.stderr)
+        return 130
+    except (PathError, ValueError, ImportError, OSError) as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        return 1 if isinstance(error, PathError) else 2
+
+
+def _read(words: Sequence[str]) -> argparse.Namespace:
+    """The options of the command line. Raises ValueError with one line for the user."""
+    for word in words:
+        for removed in (words[0], f"{words[0]} {word.partition('=')[0]}"):
+            if removed in REMOVED:
+                raise ValueError(f"{removed} was removed: {REMOVED[removed]}")
+    parser = Parser(
         prog="jointlaw",
         description="A micromechanical, anisotropic, path-dependent rock joint.",
         epilog="each command has its own help with an example: jointlaw shear --help",
     )
     parser.add_argument("--version", action="version", version=f"jointlaw {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for command in COMMANDS:
-        command.add(commands)
-    options = parser.parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
-    try:
-        if getattr(options, "out", None) and not options.force:
-            require_free(options.out)
-        with explained(f"jointlaw {options.command} is at work; {getattr(options, 'wait', WAIT)}"):
-            return int(options.run(options) or 0)
-    except KeyboardInterrupt:
-        print(f"jointlaw {options.command}: interrupted; nothing more is written", file=sys.stderr)
-        return 130
-    except (PathError, ValueError, ImportError, OSError) as error:
-        print(f"jointlaw {options.command}: {error}", file=sys.stderr)
-        return 1 if isinstance(error, PathError) else 2
-
-
-def _joined(arguments: Sequence[str]) -> list[str]:
-    """Arguments with "--reverse -2um" joined to "--reverse=-2um", lest -2um pass for an option."""
-    joined: list[str] = []
-    for argument in arguments:
-        if joined and re.match(r"--[a-z-]+$", joined[-1]) and re.match(r"-[.\d]", argument):
-            joined[-1] += "=" + argument
-        else:
-            joined.append(argument)
-    return joined
+    for module in COMMANDS:
+        module.add(commands)
+    return parser.parse_args(words)

@@ -9,13 +9,9 @@ from .command import add_command
 
 def add(commands: Any) -> None:
     """Add the subcommand to the command line."""
-    parser = add_command(
-        commands,
-        "presets",
-        "list the parameter sets of the paper, or print one as TOML to start a file of your own",
-        "jointlaw presets biegel-rough > mine.toml",
-        _presets,
-    )
+    what = "list the parameter sets of the paper, or print one as TOML to start a file of your own"
+    example = "jointlaw presets biegel-rough > mine.toml"
+    parser = add_command(commands, "presets", what, example, _presets)
     parser.add_argument("name", nargs="?", help="print this one")
 
 

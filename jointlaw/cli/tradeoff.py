@@ -1,34 +1,32 @@
-"""The command `jointlaw tradeoff`: what resolutions of a law cost and how accurate they are."""
+"""`jointlaw tradeoff`: what resolutions of a law cost and how accurate they are."""
 
 import argparse
 from dataclasses import replace
 from typing import Any
 
-from ..parameters.resolution import LOSS_REMOVED
-from .command import Written, add_command, add_law, add_out, quantity, read_law, write_results
+from .command import Written, add_command, add_law, add_out, in_unit, read_law, write_results
 
 
 def add(commands: Any) -> None:
-    """Add `tradeoff` to the subparsers of the command line."""
-    parser = add_command(
-        commands,
-        "tradeoff",
-        "measure what resolutions of a law cost here and how accurate they are; table and picture",
-        "jointlaw tradeoff westerly-smooth --plane 0 --out out",
-        _tradeoff,
-    )
+    """Add the subcommand to the command line."""
+    what = "measure what resolutions of a law cost and how accurate they are; table and picture"
+    example = "jointlaw tradeoff westerly-smooth --plane 0 --out out"
+    parser = add_command(commands, "tradeoff", what, example, _tradeoff)
     add_law(parser, resolution=False)
     parser.add_argument(
-        "--plane", metavar="ANGLE", help="motion in one plane at this azimuth, such as 30deg"
+        "--plane",
+        metavar="ANGLE",
+        type=in_unit("rad"),
+        help="motion in one plane at this azimuth, such as 30deg",
     )
     parser.add_argument(
         "--tolerance",
         metavar="SHARE",
         type=float,
         action="append",
+        default=[],
         help="also find the coarsest law that keeps it: 0.01 (may be repeated)",
     )
-    parser.add_argument("--loss", help=argparse.SUPPRESS)  # of former versions
     parser.add_argument(
         "--joints", type=int, default=10_000, help="of the batch that is timed; 0 times nothing"
     )
@@ -38,31 +36,22 @@ def add(commands: Any) -> None:
 def _tradeoff(options: argparse.Namespace) -> None:
     law = read_law(options)
     if options.plane is not None:
-        law = replace(law, plane=quantity("--plane", options.plane, "rad"))
-    if options.loss is not None:
-        raise ValueError(f"--{LOSS_REMOVED}")
-    chosen = {}
-    for tolerance in options.tolerance or ():  # before the long work: a bad one is refused at once
-        made = law.at_tolerance(tolerance)
-        r, sliders = made.resolution, made.tables.sliders
-        chosen[f"{tolerance:g}"] = {"u": r.u, "phi": r.phi, "depth": r.depth, "sliders": sliders}
+        law = replace(law, plane=options.plane)
+    # Before the long work: a bad tolerance is refused at once
+    chosen = {f"{share:g}": law.at_tolerance(share) for share in options.tolerance}
     found = law.tradeoff(joints=options.joints)
-    rows = [dict(zip(found.columns(), row, strict=True))
-            for row in zip(*found.columns().values(), strict=True)]  # fmt: skip
-    frontier = {(p.resolution.u, p.resolution.phi, p.resolution.depth) for p in found.frontier()}
     summary = {
         "law": options.law,
         "joints": found.joints,
         "timed on": found.how,
         "reference uncertainty": dict(zip(found.paths, found.uncertainty.tolist(), strict=True)),
-        "frontier": [r for r in rows if (r["u"], r["phi"], r["depth"]) in frontier],
-        "at tolerance": chosen,
+        "frontier": [str(price.resolution) for price in found.frontier()],
+        "at tolerance": {share: str(made.resolution) for share, made in chosen.items()},
         "units": {"error": "share of the path's largest traction", "ns": "ns per joint and update"},
     }
     print(found)
-    for text, nodes in chosen.items():
-        given = ", ".join(f"{k}={nodes[k]}" for k in ("u", "phi", "depth"))
-        print(f"at_tolerance({text}): Resolution({given}), {nodes['sliders']} sliders")
+    for share, made in chosen.items():
+        print(f"at_tolerance({share}): {made.resolution}, {made.tables.sliders} sliders")
     files: Written = {
         "tradeoff.csv": found.to_csv,
         "law.toml": law.to_toml,

@@ -5,6 +5,7 @@ import sys
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..parameters.asperity import Asperity
 from ..support.checks import Array
@@ -12,6 +13,8 @@ from .virgin_curve import VirginCurve
 
 _RESOLVED = 1e8  # yield interferences: Phi less its value one earlier has 8 digits
 _SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
+_HALVINGS = 52  # of 1 in log closure: to rounding
+_TOO_LARGE = "normal_stress = {!r} Pa is beyond any closure"
 
 
 class FirstLoading(NamedTuple):
@@ -59,12 +62,37 @@ class FirstLoading(NamedTuple):
             while misfit(high) < 0.0:
                 high += 1.0
                 if high > farthest:
-                    raise ValueError(f"normal_stress = {stress!r} Pa is beyond any closure")
+                    raise ValueError(_TOO_LARGE.format(stress))
             while misfit(low) > 0.0:
                 low -= 1.0
             if low == high:
                 return start
             return math.exp(brentq(misfit, low, high, xtol=1e-15, rtol=1e-15, maxiter=500))
+
+    def closures(self, stress: Array, start: float) -> Array:
+        """As `closure`, for many stresses (n,) together: bisection of log closure, to rounding."""
+        found = np.zeros_like(stress)
+        wanted = stress[stress >= _SMALLEST]
+
+        def too_open(log_y: Array) -> NDArray[np.bool_]:
+            return self.stress(np.exp(log_y)) < wanted
+
+        high = np.full(wanted.shape, math.log(start))
+        with np.errstate(over="ignore"):
+            while (short := too_open(high)).any():
+                high = high + short
+                if (far := high > math.log(self.farthest)).any():
+                    raise ValueError(_TOO_LARGE.format(wanted[far].min()))
+            low = high - 1.0
+            while not (short := too_open(low)).all():
+                low = low - ~short
+            high = np.minimum(high, low + 1.0)
+            for _ in range(_HALVINGS):
+                middle = 0.5 * (low + high)
+                short = too_open(middle)
+                low, high = np.where(short, middle, low), np.where(short, high, middle)
+        found[stress >= _SMALLEST] = np.exp(high)
+        return found
 
 
 def yield_sum(theta: Array, scale: Array, asperity: Asperity) -> tuple[Array, Array] | None:

@@ -3,49 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..discretisation.tables import Tables
 from ..kernels import reference, wear
 from ..kernels.blocks import LANES, empty_blocks, rows_of, write_rows, zeros
-from ..kernels.engine import Step, engine
+from ..kernels.engine import CHUNK, Step, engine
 from ..kernels.reference import Measures
-from ..parameters.asperity import Asperity
 from ..support.checks import Array, numbers, whole
-from .state import JointState, NonFiniteError, write_replay
+from .state import JointState, NonFiniteError
+from .time_step import stable_step, stiffness_per_facet
+
+if TYPE_CHECKING:
+    from ..law import JointLaw
 
 Index = Sequence[int] | NDArray[np.integer[Any]] | NDArray[np.bool_]
-Out = tuple[Array, Array | None]
-COMPONENTS = {  # of a displacement, by their number, and how to have more
+Result = tuple[Array, Array | None]
+COMPONENTS = {  # what the 1, 2 or 3 components of a displacement are
     1: "closure; for shear take a law without closure_only",
     2: "closure and shear along the plane; for motion in 3-D take a law with plane=None",
     3: "closure and shear along axes 2 and 3",
 }
-FEW = 8  # numbers of an increment up to which Python looks at them faster than numpy
+FEW = 8  # numbers: the largest of so few is found faster by Python than by numpy
 
 
-class Law(Protocol):
-    """What joints, and tests on them, read of a law."""
-
-    @property
-    def tables(self) -> Tables: ...
-    @property
-    def asperity(self) -> Asperity: ...
-    @property
-    def plane(self) -> float | None: ...
-    @property
-    def closure_only(self) -> bool: ...
-    @property
-    def largest_reach(self) -> float: ...
-    @property
-    def fingerprint(self) -> str: ...
-    def joints(self, n: int, ledger: bool = True) -> JointBatch: ...
-    def closure(self, normal_stress: ArrayLike) -> Any: ...
-    def max_stiffness(self, closure: ArrayLike) -> Any: ...
-    def to_toml(self) -> str: ...
+class NoLedgerError(AttributeError, ValueError):
+    """Energies that are not added up were asked for."""
 
 
 class JointBatch:
@@ -58,19 +43,20 @@ class JointBatch:
     faster with the compiled kernel.
     """
 
-    def __init__(self, law: Law, n: int, ledger: bool = True) -> None:
+    def __init__(self, law: JointLaw, n: int, ledger: bool = True) -> None:
         self.law, self.ledger = law, ledger
         self._engine = engine(law.tables)
         self._n = whole("n", n, 0)
         self._state = empty_blocks(self._engine.rows, self._n)
-        self._reach = 0.0  # no facet's effective closure exceeds it, in either sense
-        numbers = np.arange(law.tables.rows, dtype=np.float64)[:, None]
-        self._number = reference.parts(law.tables, numbers)  # of the rows of each part
-        self._stretch = 1.0 + 2.0 * float(np.max(np.abs(law.tables.m)))  # of y over that of d
+        self._largest_reach = 0.0  # bound of |y| of all facets of all joints
+        numbers = np.arange(law.state_size, dtype=np.float64)[:, None]
+        self._row_numbers = reference.parts(law.tables, numbers)  # of each part of a state
+        # a step changes the y of a facet by no more than this times its largest component
+        self._steepness = 1.0 + 2.0 * float(np.max(np.abs(law.tables.m)))
 
     def __getstate__(self) -> dict[str, Any]:
         kept = {k: v for k, v in self.__dict__.items() if k != "_engine"}  # holds compiled code
-        return kept | {"_state": self._state[:, : self.law.tables.rows]}
+        return kept | {"_state": self._state[:, : self.law.state_size]}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -84,63 +70,45 @@ class JointBatch:
         return self._n
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} of {self._n} joints, {self.law.tables.dim}-D>"
+        return f"<{type(self).__name__} of {self._n} joints, {self.law.dim}-D>"
 
     # ------------------------------------------------------------------ steps
 
-    def update(
-        self,
-        d: ArrayLike,
-        where: Index | None = None,
-        tangent: bool = True,
-        out: Out | None = None,
-    ) -> Out:
+    def update(self, d: ArrayLike, where: Index | None = None, tangent: bool = True) -> Result:
         """Advance by the displacement increments d and keep the new state.
 
         d: (n, dim) in m; with `where`, an index or mask of m joints, (m, dim).
-        out: arrays F and C (or None) to write into instead of new ones.
         Returns F (n or m, dim) in Pa and C = dF/dd (n or m, dim, dim) in Pa/m, None without
         `tangent`. Raises ValueError for a wrong shape, index or a non-finite increment, and
         NonFiniteError when the result would overflow; the state is then as it was.
         """
-        return self._step(d, where, tangent, out, keep=True)
+        return self._step(d, where, tangent, keep=True)
 
-    def trial(
-        self,
-        d: ArrayLike,
-        where: Index | None = None,
-        tangent: bool = True,
-        out: Out | None = None,
-    ) -> Out:
+    def trial(self, d: ArrayLike, where: Index | None = None, tangent: bool = True) -> Result:
         """As `update`, but the state is left untouched."""
-        return self._step(d, where, tangent, out, keep=False)
+        return self._step(d, where, tangent, keep=False)
 
-    def _step(
-        self, d: ArrayLike, where: Index | None, tangent: bool, out: Out | None, keep: bool
-    ) -> Out:
+    def _step(self, d: ArrayLike, where: Index | None, tangent: bool, keep: bool) -> Result:
         index = None if where is None else self._index(where)
-        m, dim = self._n if index is None else len(index), self.law.tables.dim
+        m, dim = self._n if index is None else len(index), self.law.dim
         values = increments(d, (m, dim))
-        if out is None:
-            F, C = np.empty((m, dim)), np.empty((m, dim, dim)) if tangent else None
-        else:
-            F, C = _require_out(out, m, dim, tangent)
+        F, C = np.empty((m, dim)), np.empty((m, dim, dim)) if tangent else None
         self.take(Step(np.ascontiguousarray(values), F, C, index, keep))
         return F, C
 
     def take(self, step: Step) -> None:
         """Take a step whose arrays have the right shapes: check its numbers, then the kernel."""
-        reach = self._admit(step)
+        reach = self._reach_after(step)
         self._engine.advance(self._state, step, self.ledger)
         if step.keep:
-            self._reach = reach
+            self._largest_reach = reach
 
     # ------------------------------------------------------------------ state
 
     def snapshot(self, where: Index | None = None) -> JointState:
         """A copy of the state of all joints, or of those that `where` names, in that order."""
         index = None if where is None else self._index(where)
-        return JointState(self.law.fingerprint, self._rows(index))
+        return JointState(self.law.fingerprint, np.ascontiguousarray(self._rows(index).T))
 
     def restore(self, state: JointState, where: Index | None = None) -> None:
         """Return to a snapshot; with `where` these joints take its states, the others stay.
@@ -152,17 +120,17 @@ class JointBatch:
         if not isinstance(state, JointState):
             raise ValueError(f"state = {state!r} is not a snapshot; give one of snapshot()")
         state.require(self.law.fingerprint)
-        if state.values.shape != (self.law.tables.rows, len(index)):
+        if state.values.shape != (len(index), self.law.state_size):
             other = f"this batch {self._n}: resize first"
             if where is not None:
                 other = f"where names {len(index)}"
             raise ValueError(f"state holds {len(state)} joints, {other}")
         if not np.isfinite(state.values).all():
             raise ValueError("state holds values that are not finite; it is damaged")
-        rows = self._state[:, : self.law.tables.rows]
-        write_rows(rows, state.values, index)
+        rows = self._state[:, : self.law.state_size]
+        write_rows(rows, state.values.T, index)
         self._engine.refresh(self._state, self._n)
-        self._reach = self._bound(self._rows()).max(initial=0.0)
+        self._largest_reach = self._reach_of(self._rows()).max(initial=0.0)
 
     def reset(self, index: Index | None = None) -> None:
         """Return the joints at `index` (all if None) to the virgin state: new contacts."""
@@ -201,13 +169,32 @@ class JointBatch:
         return 8 * self._engine.rows
 
     def max_stiffness(self) -> Array:
-        """Upper bound (n,) of `|C|` in Pa/m at each joint's own reach, for explicit time steps."""
-        return self.law.max_stiffness(self.measures().reach)
+        """Upper bound (n,) of `|C|` in Pa/m at each joint's present displacement."""
+        k, bound = self.law.tables, np.empty(self._n)
+        per_facet = stiffness_per_facet(k)
+        for first in range(0, self._n, CHUNK):
+            index = np.arange(first, min(first + CHUNK, self._n))
+            now = reference.parts(k, self._rows(index))
+            y = reference.effective_closure(k, now.delta[0], now.offset)
+            bound[index] = per_facet @ k.curve.force(y)[1]
+        return bound
+
+    def critical_time_step(self, mass: ArrayLike, area: ArrayLike) -> Array:
+        """Largest stable explicit step (n,) in s of one translating mass on each joint as it is.
+
+        mass: reduced mass m1 m2/(m1 + m2) in kg; area: in m2; numbers or (n,). Infinite where
+        nothing touches. Joints that close or shear further grow stiffer: ask again, or take a
+        margin. As for `JointLaw.critical_time_step`, rotation is not counted.
+        """
+        step = stable_step(mass, area, self.max_stiffness())
+        if step.shape != (self._n,):
+            raise ValueError(f"mass and area must be numbers or have shape ({self._n},)")
+        return step
 
     @property
     def delta(self) -> Array:
         """Displacement since the virgin state (n, dim): closure and shear, in m."""
-        return rows_of(self._state[:, : self.law.tables.dim], self._n).T
+        return rows_of(self._state[:, : self.law.dim], self._n).T
 
     @property
     def F(self) -> Array:
@@ -255,18 +242,18 @@ class JointBatch:
 
     def _part(self, name: str) -> Array:
         """A part of one row, or of none, of the states of all joints, by name in `State`."""
-        row = getattr(self._number, name).astype(int).ravel()
+        row = getattr(self._row_numbers, name).astype(int).ravel()
         return np.sum(rows_of(self._state[:, row], self._n), axis=0)
 
     def _ledger(self, name: str, part: str) -> Array:
         """A part of the ledger, if it is kept."""
         if not self.ledger:
-            raise ValueError(f"{name} is not added up: make the joints with ledger=True")
+            raise NoLedgerError(f"{name} is not added up: make the joints with ledger=True")
         return self._part(part)
 
     def _rows(self, index: NDArray[np.intp] | None = None) -> Array:
         """States (rows, n) of all joints or those of `index`, as a copy."""
-        return rows_of(self._state[:, : self.law.tables.rows], self._n, index)
+        return rows_of(self._state[:, : self.law.state_size], self._n, index)
 
     def _index(self, where: Index) -> NDArray[np.intp]:
         index = np.asarray(where)
@@ -286,21 +273,22 @@ class JointBatch:
             raise ValueError("where names a joint twice; each joint takes one increment per step")
         return index.astype(np.intp)
 
-    def _admit(self, step: Step) -> float:
-        """New bound of the reach; raises for increments that are not finite or would overflow.
+    def _reach_after(self, step: Step) -> float:
+        """Bound of |y| after a step; raises if it is not finite, or its forces would overflow.
 
-        The bound of the whole batch costs one pass over d; joints are looked at only beyond it.
+        One pass over d gives a bound for the whole batch; only where that is too large is each
+        joint looked at.
         """
         d, limit = step.d, self.law.largest_reach
-        if d.size <= FEW:  # the sum is no less than the largest, and NaN if one is
+        if d.size <= FEW:  # the sum of sizes is a bound too; it is NaN if one number is
             largest = sum(map(abs, d.ravel().tolist()))
         else:
-            largest = max(float(d.max()), -float(d.min()))  # both NaN if one is
-        reach = self._reach + self._stretch * largest
-        return reach if reach <= limit else self._admit_each(step, limit)
+            largest = max(float(d.max()), -float(d.min()))  # NaN if one number is
+        reach = self._largest_reach + self._steepness * largest
+        return reach if reach <= limit else self._reach_by_joint(step, limit)
 
-    def _admit_each(self, step: Step, limit: float) -> float:
-        """As `_admit`, joint by joint."""
+    def _reach_by_joint(self, step: Step, limit: float) -> float:
+        """As `_reach_after`, joint by joint."""
         d, index = step.d, step.where
         finite = np.isfinite(d).all(axis=1)
         if not finite.all():
@@ -309,27 +297,25 @@ class JointBatch:
             raise ValueError(f"d of joint {joint} = {d[row]} is not finite; nothing was moved")
         old = self._rows(index)
         with np.errstate(over="ignore"):
-            new = self._bound(old) + self._stretch * np.abs(d).max(axis=1)
+            new = self._reach_of(old) + self._steepness * np.abs(d).max(axis=1)
         if (new > limit).any():
             row = int(np.argmax(new > limit))
             joint = row if index is None else int(index[row])
-            path = write_replay(self.law.to_toml, old[:, [row]], d[[row]].T, step.C is not None)
-            again = "no replay file could be written"
-            if path is not None:
-                again = f"`jointlaw replay {path}` repeats it"
-            raise NonFiniteError(
+            error = NonFiniteError(
                 f"joint {joint}: the step d = {d[row]} m gives a result that is not finite; "
-                f"nothing was moved. Take a smaller step; {again}",
-                path,
+                "nothing was moved. Take a smaller step (state and d of this error repeat it)"
             )
-        rest = self._bound(self._rows()).max(initial=0.0)
+            error.joint, error.d = joint, d[row].copy()
+            error.state = JointState(self.law.fingerprint, old[:, [row]].T.copy())
+            raise error
+        rest = self._reach_of(self._rows()).max(initial=0.0)
         return max(float(rest), float(new.max(initial=0.0)))
 
-    def _bound(self, rows: Array) -> Array:
-        """Bound of the reach of states (rows, n), from closure and offset."""
+    def _reach_of(self, rows: Array) -> Array:
+        """Bound (n,) of |y| of all facets of states (rows, n), from closure and offset."""
         now = reference.parts(self.law.tables, rows)
         far = np.maximum(np.abs(now.delta).max(axis=0), np.abs(now.offset).max(axis=0, initial=0.0))
-        return self._stretch * far
+        return self._steepness * far
 
 
 def increments(d: ArrayLike, shape: tuple[int, ...]) -> Array:
@@ -341,15 +327,3 @@ def increments(d: ArrayLike, shape: tuple[int, ...]) -> Array:
             f"d has shape {values.shape}; expected {shape}: {joints}{COMPONENTS[shape[-1]]}"
         )
     return values
-
-
-def _require_out(out: Out, m: int, dim: int, tangent: bool) -> Out:
-    """Arrays that the caller gave for the results, checked."""
-    for name, array, shape in (("F", out[0], (m, dim)), ("C", out[1], (m, dim, dim))):
-        if name == "C" and not tangent:
-            continue
-        if array is None or array.shape != shape or array.dtype != np.float64:
-            raise ValueError(f"out: {name} must be a float64 array of shape {shape}")
-        if not (array.flags.c_contiguous and array.flags.writeable):
-            raise ValueError(f"out: {name} must be C-contiguous and writeable")
-    return out[0], out[1] if tangent else None

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import copy
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,18 +12,34 @@ from numpy.typing import ArrayLike
 from ..kernels.engine import Step
 from ..kernels.reference import Measures
 from ..support.checks import Array
-from .batch import JointBatch, Law, increments
+from .batch import JointBatch, increments
 from .state import JointState
+
+if TYPE_CHECKING:
+    from ..law import JointLaw
+
+T = TypeVar("T")
+
+
+class _OfOne(Generic[T]):
+    """A property of `JointBatch`, read of a batch of one joint, without the axis over joints."""
+
+    def __init__(self, of_batch: Any, kind: Callable[[Any], T]) -> None:
+        self.of_batch, self.kind = of_batch, kind
+        self.__doc__ = of_batch.__doc__.replace("(n, dim)", "(dim,)").replace(" (n,)", "")
+
+    def __get__(self, joint: Joint | None, owner: type) -> T:
+        if joint is None:
+            return self  # type: ignore[return-value]  # asked of the class, for its documentation
+        return self.kind(self.of_batch.fget(joint._batch)[0])
 
 
 class Joint:
     """One joint: as `JointBatch`, with vectors (dim,) and a matrix (dim, dim)."""
 
-    def __init__(self, law: Law) -> None:
+    def __init__(self, law: JointLaw) -> None:
         self.law = law
         self._batch = JointBatch(law, 1)
-        dim = law.tables.dim
-        self._shape, self._shape_F, self._shape_C = (dim,), (1, dim), (1, dim, dim)
 
     def __copy__(self) -> Joint:
         twin = Joint(self.law)
@@ -40,8 +58,9 @@ class Joint:
         return self._step(d, tangent, keep=False)
 
     def _step(self, d: ArrayLike, tangent: bool, keep: bool) -> tuple[Array, Array | None]:
-        values = increments(d, self._shape)[None].copy()  # the caller's may be strided
-        F, C = np.empty(self._shape_F), np.empty(self._shape_C) if tangent else None
+        dim = self.law.dim
+        values = increments(d, (dim,))[None].copy()  # the kernel needs numbers without gaps
+        F, C = np.empty((1, dim)), np.empty((1, dim, dim)) if tangent else None
         self._batch.take(Step(values, F, C, None, keep))
         return F[0], None if C is None else C[0]
 
@@ -57,52 +76,21 @@ class Joint:
         """Return to the virgin state."""
         self._batch.reset()
 
-    @property
-    def delta(self) -> Array:
-        """Displacement since the virgin state (dim,): closure and shear, in m."""
-        return self._batch.delta[0]
-
-    @property
-    def F(self) -> Array:
-        """Traction (dim,) in Pa."""
-        return self._batch.F[0]
-
     def measures(self) -> Measures:
         """Shares, stored energy and reach in one pass, as numbers."""
         return Measures(*(values[0] for values in self._batch.measures()))
 
     @property
-    def sliding(self) -> float:
-        """Share of all facet orientations: in touch, and every cell at its friction limit."""
-        return float(self._batch.sliding[0])
+    def kernel(self) -> str:
+        """Which kernel advances the joint: "native" or "numpy"."""
+        return self._batch.kernel
 
-    @property
-    def slipping(self) -> float:
-        """Share of friction capacity that is at its limit: partial slip."""
-        return float(self._batch.slipping[0])
-
-    @property
-    def separated(self) -> float:
-        """Share of all facet orientations: out of touch."""
-        return float(self._batch.separated[0])
-
-    @property
-    def stored_energy(self) -> float:
-        """Elastic energy in J/m2."""
-        return float(self._batch.stored_energy[0])
-
-    @property
-    def dissipated_energy(self) -> float:
-        """Energy in J/m2 lost since the virgin state, to friction and to yielding asperities; never
-        decreases."""
-        return float(self._batch.dissipated_energy[0])
-
-    @property
-    def plastic_work(self) -> float:
-        """The part of the dissipated energy, in J/m2, that yielding asperities took."""
-        return float(self._batch.plastic_work[0])
-
-    @property
-    def friction(self) -> float:
-        """Friction coefficient of the asperities, worn by their slip so far."""
-        return float(self._batch.friction[0])
+    delta = _OfOne(JointBatch.delta, np.asarray)
+    F = _OfOne(JointBatch.F, np.asarray)
+    sliding = _OfOne(JointBatch.sliding, float)
+    slipping = _OfOne(JointBatch.slipping, float)
+    separated = _OfOne(JointBatch.separated, float)
+    stored_energy = _OfOne(JointBatch.stored_energy, float)
+    dissipated_energy = _OfOne(JointBatch.dissipated_energy, float)
+    plastic_work = _OfOne(JointBatch.plastic_work, float)
+    friction = _OfOne(JointBatch.friction, float)

@@ -1,12 +1,18 @@
 """Joints for contacts that come and go: every contact keeps its joint as long as it lasts."""
 
+from __future__ import annotations
+
 from collections.abc import Hashable, Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .batch import JointBatch, Law
+from .batch import JointBatch
 from .state import JointState
+
+if TYPE_CHECKING:
+    from ..law import JointLaw
 
 Places = NDArray[np.intp]
 
@@ -20,7 +26,7 @@ class JointPool:
     starts virgin.
     """
 
-    def __init__(self, law: Law, ledger: bool = True) -> None:
+    def __init__(self, law: JointLaw, ledger: bool = True) -> None:
         self.batch = JointBatch(law, 0, ledger)
         self._place: dict[Hashable, int] = {}
         self._free: list[int] = []
@@ -64,7 +70,7 @@ class JointPool:
         self.batch.reset(places)
         for key in gone:
             del self._place[key]
-        self._free = sorted([*self._free, *places], reverse=True)  # the lowest is taken first
+        self._free = sorted([*self._free, *places], reverse=True)  # pop() takes the lowest place
 
     def snapshot(self) -> JointState:
         """A copy of the state of all contacts, in the order of `keys`: keep those beside it."""

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..joints.crushed import warn_if_crushed
 from ..joints.joint import Joint
 from ..joints.state import NonFiniteError
 from ..support.checks import Array, above, at_least, number, numbers, one_of, whole
@@ -164,4 +165,5 @@ class _Log:
     def record(self) -> Record:
         """The rows so far."""
         table = np.array(self.rows).reshape(-1, len(UNITS))
+        warn_if_crushed(self.joint.law, table[:, 0])
         return Record(dict(zip(UNITS, table.T, strict=True)), self.azimuth, self.name)

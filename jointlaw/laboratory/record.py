@@ -13,7 +13,7 @@ import numpy as np
 from ..support import units
 from ..support.checks import Array
 from ..support.files import replace_file
-from ..support.pyplot import pyplot, written
+from ..support.pyplot import style, written
 
 UNITS = {
     "closure": "m",
@@ -72,8 +72,21 @@ class Record:
 
     @property
     def peak_friction_angle(self) -> float:
-        """Largest mobilised friction angle, either sense, in degrees."""
+        """Largest mobilised friction angle, either sense, in degrees; see `has_peak`."""
         return float(np.max(np.abs(self.friction_angle)))
+
+    @property
+    def has_peak(self) -> bool:
+        """Whether the friction angle falls, by 0.1 % or more, from its largest value.
+
+        A curve that rises until shear ends or turns has no peak, only a largest value.
+        """
+        angle = np.abs(self.friction_angle)
+        top = int(np.argmax(angle))
+        way = np.sign(np.diff(self.shear))
+        turned = way[top:] != way[max(top - 1, 0)]
+        leg = angle[top:][: 1 + (int(np.argmax(turned)) if turned.any() else len(turned))]
+        return bool(leg.min() < (1 - 1e-3) * leg[0])
 
     @property
     def residual_friction_angle(self) -> float:
@@ -88,7 +101,7 @@ class Record:
         moved = slip > 1e-9 * max(float(np.max(np.abs(self.shear))), 1e-300)
         if not moved.any():
             return 0.0
-        return float(np.degrees(np.arctan(max(np.max(opening[moved] / slip[moved]), 0.0))))
+        return float(np.degrees(np.arctan(max(0.0, np.max(opening[moved] / slip[moved])))))
 
     @property
     def secant_stiffness(self) -> float:
@@ -109,6 +122,7 @@ class Record:
         if np.any(self.shear != self.shear[0]):
             figures |= {
                 "peak_friction_angle_deg": self.peak_friction_angle,
+                "has_peak": self.has_peak,
                 "residual_friction_angle_deg": self.residual_friction_angle,
                 "dilation_angle_deg": self.dilation_angle,
                 "secant_shear_stiffness_Pa_per_m": self.secant_stiffness,
@@ -141,8 +155,9 @@ class Record:
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Draw the test (needs matplotlib: extra `plot`); returns the figure, saved to `path`."""
-        sheared = bool(np.any(self.shear != self.shear[0]))
-        return written(_shear_figure(self) if sheared else _closure_figure(self), path)
+        draw = _shear_figure if np.any(self.shear != self.shear[0]) else _closure_figure
+        with style() as plt:
+            return written(draw(self, plt), path)
 
 
 def without_steps(x: Array, share: Array) -> tuple[Array, Array]:
@@ -170,9 +185,9 @@ def _scaled(values: Array, units: tuple[tuple[float, str], ...]) -> tuple[Array,
     return values / factor, name
 
 
-def _shear_figure(record: Record) -> Any:
+def _shear_figure(record: Record, plt: Any) -> Any:
     shear, length = _scaled(record.shear, _LENGTHS)
-    figure, axes = pyplot().subplots(2, 2, figsize=(9, 6.5), layout="constrained", sharex=True)
+    figure, axes = plt.subplots(2, 2, figsize=(9, 6.5), sharex=True)
     stress, unit = _scaled(np.stack([record.shear_stress, record.F1]), _STRESSES)
     axes[0, 0].plot(shear, stress[0], label="shear stress")
     axes[0, 0].plot(shear, stress[1], color="0.5", lw=1, label="normal stress")
@@ -186,21 +201,22 @@ def _shear_figure(record: Record) -> Any:
     for label, share in (("sliding", record.sliding), ("separated", record.separated)):
         axes[1, 1].plot(*without_steps(shear, 100 * share), label=label)
     axes[1, 1].set(ylabel="share of facet orientations (%)", ylim=(-3, 103))
-    axes[1, 1].legend(loc="upper center", bbox_to_anchor=(0.5, 1.12), ncols=2, frameon=False)
+    axes[1, 1].legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False)
     for axis in axes[1]:
         axis.set_xlabel(f"shear displacement ({length})")
+    largest = "peak" if record.has_peak else "largest"
     figure.suptitle(
         f"Direct shear at azimuth {np.degrees(record.azimuth):.0f}°, "
-        f"peak friction angle {record.peak_friction_angle:.1f}°"
+        f"{largest} friction angle {record.peak_friction_angle:.1f}°"
     )
     return figure
 
 
-def _closure_figure(record: Record) -> Any:
+def _closure_figure(record: Record, plt: Any) -> Any:
     closure, length = _scaled(record.closure, _LENGTHS)
     stress, unit = _scaled(record.F1, _STRESSES)
     energy, joule = _scaled(np.stack([record.stored, record.dissipated]), _ENERGIES)
-    figure, axes = pyplot().subplots(1, 2, figsize=(9, 4), layout="constrained")
+    figure, axes = plt.subplots(1, 2, figsize=(9, 4))
     axes[0].plot(closure, stress)
     axes[0].set(xlabel=f"closure ({length})", ylabel=f"normal stress ({unit})")
     axes[1].plot(closure, energy[0], label="stored")

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 from ..support.checks import above, at_least, number
 
+LEAST_RESIDUAL = 1e-6  # of mu_residual: no rock is smoother
+
 
 @dataclass(frozen=True)
 class Asperity:
@@ -21,10 +23,12 @@ class Asperity:
     mu: friction coefficient of the asperity contact, >= 0.
     yield_interference: largest elastic compression (m) of a spring of the contact, along the
         asperity normal, > 0. Beyond it the spring yields at constant force and keeps a set.
-        Infinite (elastic) by default.
-    mu_residual: friction coefficient of worn asperities, 0..mu; None for no wear.
+        Infinite (elastic) by default. Yielding has no end: where nearly all asperities touch
+        (`jointlaw.joints.crushed`) the rock between them, which the law leaves out, would bear.
+    mu_residual: friction coefficient of worn asperities, > 0 and <= mu; None for no wear.
     wear_slip: slip (m) of the asperities over which mu falls to mu_residual by a factor e, > 0:
-        mu(L) = mu_residual + (mu - mu_residual) exp(-L/wear_slip).
+        mu(L) = mu_residual + (mu - mu_residual) exp(-L/wear_slip). L is an energy over a force:
+        with critical_slip it is longer than the distance slid (docs/theory-incremental.md).
     """
 
     K: float
@@ -50,7 +54,12 @@ class Asperity:
                 "wear needs both a residual friction and a finite slip; give both or neither"
             )
         if self.mu_residual is not None:
-            residual = at_least("asperity.mu_residual", self.mu_residual, 0.0)
+            residual = number("asperity.mu_residual", self.mu_residual)
+            if residual < LEAST_RESIDUAL:  # the slip is the energy lost, divided by mu
+                raise ValueError(
+                    f"asperity.mu_residual = {residual!r} is out of bounds: it must be >= "
+                    f"{LEAST_RESIDUAL:g}, for without friction the slip that wears has no measure"
+                )
             if residual > self.mu:
                 raise ValueError(
                     f"asperity.mu_residual = {residual!r} is out of bounds: it must be <= mu = "

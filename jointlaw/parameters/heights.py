@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,22 +13,8 @@ from ..support.checks import Array, above, at_least, number, one_of
 
 FORMATIONS = ("population", "individual")
 
-# Probabilities, from both ends, whose quantiles frame a distribution for quadrature
+# Probabilities at both ends of a distribution; integrals are split at these quantiles
 _TAILS = np.array([1e-15, 1e-12, 1e-9, 1e-6, 1e-4, 1e-2, 0.1, 0.3, 0.5])
-
-
-@runtime_checkable
-class HeightDistribution(Protocol):
-    """What the law asks of a distribution of heights (m), measured from the highest peak."""
-
-    @property
-    def overlap(self) -> float: ...
-    @property
-    def formation(self) -> str: ...
-    def pdf(self, r: ArrayLike) -> Any: ...
-    def cdf(self, r: ArrayLike) -> Any: ...
-    def breakpoints(self) -> Array: ...
-    def __hash__(self) -> int: ...
 
 
 @dataclass(frozen=True)
@@ -98,8 +84,7 @@ class Heights:
 
     Parameters
     ----------
-    distribution: name of a continuous distribution of scipy.stats ("chi2", "lognorm", ...), or such
-        a distribution with its parameters frozen (`scipy.stats.chi2(df=9.6, scale=5e-7)`), or a
+    distribution: name of a continuous distribution of scipy.stats ("chi2", "lognorm", ...), or a
         measured histogram as `numpy.histogram` returns it: (counts, edges in m).
     overlap: r0, overlap at zero closure, in m, >= 0.
     formation: as in `GammaHeights`. A histogram has steps, so it needs "individual".
@@ -134,10 +119,9 @@ class Heights:
             set_(self, "distribution", _histogram(self.distribution))
             set_(self, "parameters", ())
             return
-        name, parameters = _name_and_parameters(self.distribution, given)
-        set_(self, "distribution", name)
-        set_(self, "parameters", tuple(sorted(parameters.items())))
-        set_(self, "_frozen", _freeze(name, parameters))
+        values = {k: number(f"heights.parameters.{k}", v) for k, v in given.items()}
+        set_(self, "parameters", tuple(sorted(values.items())))
+        set_(self, "_frozen", _freeze(self.distribution, values))
 
     @property
     def is_histogram(self) -> bool:
@@ -150,7 +134,7 @@ class Heights:
             counts, edges = (np.array(v) for v in self.distribution)
             density = np.concatenate([[0.0], counts / (counts.sum() * np.diff(edges)), [0.0]])
             return density[np.searchsorted(edges, np.asarray(r), side="right")]
-        with np.errstate(divide="ignore"):  # a density may be infinite where it begins
+        with np.errstate(divide="ignore"):  # a density may be infinite at its lower end
             return self._frozen.pdf(r)
 
     def cdf(self, r: ArrayLike) -> Any:
@@ -173,6 +157,9 @@ class Heights:
         return points[np.isfinite(points)]
 
 
+HeightDistribution: TypeAlias = GammaHeights | Heights
+
+
 def _histogram(pair: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Counts and edges as hashable tuples, checked."""
     try:
@@ -193,34 +180,15 @@ def _histogram(pair: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
     return tuple(map(float, counts)), tuple(map(float, edges))
 
 
-def _name_and_parameters(distribution: Any, parameters: dict[str, Any]) -> tuple[str, Any]:
-    """Name and parameters of a distribution given by name or as a frozen scipy distribution."""
-    if isinstance(distribution, str):
-        return distribution, {
-            k: number(f"heights.parameters.{k}", v) for k, v in parameters.items()
-        }
-    try:
-        generator, values, named = distribution.dist, distribution.args, distribution.kwds
-        names = [n.strip() for n in (generator.shapes or "").split(",") if n.strip()]
-        names += ["loc", "scale"]
-        parameters = dict(zip(names, values, strict=False)) | named
-        return str(generator.name), {k: float(v) for k, v in parameters.items()}
-    except (AttributeError, TypeError, ValueError):
-        raise ValueError(
-            f"heights.distribution = {distribution!r} is unknown; give the name of a "
-            "scipy.stats distribution with its parameters, a frozen one, or (counts, edges)"
-        ) from None
-
-
-def _freeze(name: str, parameters: dict[str, float]) -> Any:
+def _freeze(name: Any, parameters: dict[str, float]) -> Any:
     """The scipy distribution of this name and parameters."""
     from scipy import stats  # slow to import, and few laws need it
 
-    generator = getattr(stats, name, None)
+    generator = getattr(stats, name, None) if isinstance(name, str) else None
     if not isinstance(generator, stats.rv_continuous):
         raise ValueError(
             f"heights.distribution = {name!r} is unknown; give the name of a continuous "
-            "distribution of scipy.stats"
+            "distribution of scipy.stats with its parameters, or (counts, edges)"
         )
     try:
         frozen = generator(**parameters)

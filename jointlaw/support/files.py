@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-# Any of these: a folder holds a run
+# A folder that has one of these holds a run
 MARKS = ("summary.json", "history.csv", "strength.json", "state", "refused")
 LEFT = ("summary.json", "history.csv", "state/scene.toml", "state/state.npz",
         "refused/scene.toml", "refused/state.npz", "refused/why.txt")  # fmt: skip
@@ -41,14 +41,14 @@ def clear_run(folder: Path) -> None:
     """Make a folder for results; of a run that it holds what that wrote is removed, and no more."""
     folder.mkdir(parents=True, exist_ok=True)
     paths = [*(folder / name for name in LEFT), *folder.glob("vtk/*.vtu")]
-    with contextlib.suppress(OSError, ValueError):  # none, or damaged: of a run that broke off
+    with contextlib.suppress(OSError, ValueError):  # an interrupted run has no summary
         written = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["files"]
         paths += [folder / Path(name).name for name in written]
     for path in paths:
         if path.is_file():
             path.unlink()
     for name in ("state", "refused", "vtk"):
-        with contextlib.suppress(OSError):  # it holds something else
+        with contextlib.suppress(OSError):  # it is not empty: other files are in it
             (folder / name).rmdir()
 
 

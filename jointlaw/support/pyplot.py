@@ -1,9 +1,27 @@
-"""matplotlib, where it is installed (extra `plot`)."""
+"""matplotlib, where it is installed (extra `plot`), and the one style of all pictures."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 FORMATS = ("png", "svg", "pdf")  # of pictures; the first one unless another is asked for
+
+# Settings of matplotlib for every picture of the project. Each axis has a label with its unit in
+# brackets; a ratio is in % or is named as "... over ..." without a unit.
+STYLE: dict[str, Any] = {
+    "figure.constrained_layout.use": True,
+    "figure.titlesize": 10,
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "axes.linewidth": 0.6,
+    "legend.fontsize": 8,
+    "legend.title_fontsize": 8,
+    "legend.framealpha": 0.9,
+    "lines.linewidth": 1.2,
+    "lines.markersize": 4,
+    "savefig.dpi": 150,
+}
 
 
 def pyplot() -> Any:
@@ -15,9 +33,22 @@ def pyplot() -> Any:
     return pyplot
 
 
+@contextmanager
+def style() -> Iterator[Any]:
+    """matplotlib.pyplot with `STYLE`, as in `with style() as plt:`; the user's own style returns.
+
+    As `@style()` it gives a function that draws this style.
+
+    Raises ImportError with the remedy where matplotlib is missing.
+    """
+    plt = pyplot()
+    with plt.rc_context(STYLE):
+        yield plt
+
+
 def written(figure: Any, path: str | Path | None) -> Any:
     """The figure; with `path` it is written there and closed."""
     if path is not None:
-        figure.savefig(path, dpi=150)
+        figure.savefig(path, dpi=STYLE["savefig.dpi"])
         pyplot().close(figure)
     return figure

@@ -33,6 +33,25 @@ def parse(text: str, unit: str) -> float:
     raise ValueError(f"{text!r} is not a quantity in {unit}; write a number in {unit} or {example}")
 
 
+def typed(text: str, unit: str, *, positive: bool = False) -> float:
+    """The SI value of what a person typed for an option: only zero needs no unit.
+
+    Raises ValueError for text that `parse` refuses, a number without its unit, a number beyond
+    those of a computer and, if it must be positive, any other.
+    """
+    value = parse(text, unit)
+    if math.isinf(value):
+        raise ValueError(f"{text} is not finite; give a finite number")
+    if value and text.strip()[-1] in "0123456789.":
+        short = text.strip()
+        raise ValueError(
+            f"{short} has no unit: write for example {short}{COMMON[unit]}, or {short}{unit}"
+        )
+    if positive and value <= 0:
+        raise ValueError(f"{text} is out of bounds: it must be > 0 {unit}")
+    return value
+
+
 def _factor(suffix: str, unit: str) -> float | None:
     if unit == "rad":
         return {"rad": 1.0, "deg": math.pi / 180, "°": math.pi / 180}.get(suffix)

@@ -10,29 +10,30 @@ from scipy import ndimage
 from ..support.checks import Array
 
 FEWEST = 8  # summits that a fit can stand on
+RIM = 2  # points beyond a sampling length from the rim in which no summit is looked for
 
 
 class Asperities(NamedTuple):
-    """What is measured on n asperities of a surface (or profile, which has one direction only)."""
+    """What is measured on n asperities of a surface."""
 
     depth: Array  # (n,) m below the highest summit
-    slope: Array  # (facets, dim) gradients
+    slope: Array  # (facets, 2) gradients along the columns and along the rows
     summit: NDArray[np.intp]  # (facets,) the summit that each belongs to
     slope_noise: float  # standard error of one component of a gradient
-    density: float  # per m2, or per m of a profile
+    density: float  # per m2
     size: float  # edge of a facet in m
-    places: NDArray[np.intp]  # (n, dim) grid indices of the summits
+    places: NDArray[np.intp]  # (n, 2) grid indices of the summits
 
 
 def extract(z: Array, spacing: float, samples: int) -> Asperities:
-    """Summits and facets of a surface (ny, nx) or profile (nx,) of heights in m.
+    """Summits and facets of a surface (ny, nx) of heights in m.
 
     1. The mean plane is taken away.
     2. A summit is the highest point within `samples` along either axis, of heights averaged over
        3 x 3 points (noise makes summits of its own on gentle facets), and the highest measured
        point of those nine.
     3. The facets of a summit are the squares of `samples` x `samples` points in the four quadrants
-       beside it (in a profile the stretches on its two sides): a plane is fitted to each.
+       beside it: a plane is fitted to each.
     4. Facets that miss their plane by more than three times the median lie across an edge and are
        left out; the median of the others gives the error of a gradient.
     5. Facets of one summit whose gradients agree within three standard errors are one facet: noise
@@ -44,32 +45,38 @@ def extract(z: Array, spacing: float, samples: int) -> Asperities:
     """
     z, length = _levelled(z), samples * spacing
     summits = _summits(z, samples)
-    _enough(len(summits), length)
-    quadrants = 1 - 2 * np.array(list(np.ndindex(*(2,) * z.ndim)))  # (quadrants, dim) of +-1
+    _require_several(len(summits), length)
+    quadrants = np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)])
     gradient, misfit, moment = _planes(z, summits, quadrants, samples)
     gradient = gradient / spacing
-    count = samples**z.ndim - z.ndim - 1
+    count = samples**2 - 3
     # the median of chi^2 with n degrees of freedom is n (1 - 2/(9n))^3
     middle = count * (1 - 2 / (9 * count)) ** 3
     noise = float(np.sqrt(np.median(misfit) / middle / moment)) / spacing
     keep = misfit <= 9 * np.median(misfit)
-    fall = -np.einsum("qnd,qd->qn", gradient, quadrants) / np.sqrt(z.ndim)
+    fall = -np.einsum("qnd,qd->qn", gradient, quadrants) / np.sqrt(2)
     kept = np.maximum(np.sum(keep, axis=0), 1)
     hill = np.sum(fall * keep, axis=0) > 6 * noise * np.sqrt(kept)
-    _enough(int(hill.sum()), length)
-    for first, second in combinations(range(len(quadrants)), 2):
+    _require_several(int(hill.sum()), length)
+    for first, second in combinations(range(4), 2):
         apart = np.max(np.abs(gradient[first] - gradient[second]), axis=-1)
         keep[second] &= ~(keep[first] & (apart < 3 * np.sqrt(2) * noise))
     keep &= hill
     summit = np.broadcast_to(np.cumsum(hill) - 1, keep.shape)[keep]
-    height, summits = z[tuple(summits[hill].T)], summits[hill]
-    area = float(np.prod([(n - 2 * _rim(samples)) * spacing for n in z.shape]))
-    depth = height.max() - height
-    return Asperities(depth, gradient[keep], summit, noise, len(summits) / area, length, summits)
+    summits = summits[hill]
+    height = z[tuple(summits.T)]
+    area = float(np.prod([(n - 2 * (samples + RIM)) * spacing for n in z.shape]))
+    return Asperities(
+        height.max() - height, gradient[keep], summit, noise, len(summits) / area, length, summits
+    )
 
 
-def _rim(samples: int) -> int:
-    return samples + 2
+def _require_several(summits: int, length: float) -> None:
+    if summits < FEWEST:
+        raise ValueError(
+            f"z has {summits} summits at a sampling length of {length:g} m: at least {FEWEST} are "
+            "needed; scan a larger area or change sampling_length"
+        )
 
 
 def _summits(z: Array, samples: int) -> NDArray[np.intp]:
@@ -78,7 +85,7 @@ def _summits(z: Array, samples: int) -> NDArray[np.intp]:
     ramp = np.arange(z.size).reshape(z.shape) * (1e-12 * float(np.std(z)) / z.size + 1e-300)
     ranked = smooth + ramp  # of equal points one is the summit
     top = ranked == ndimage.maximum_filter(ranked, size=2 * samples + 1, mode="nearest")
-    rim = _rim(samples)
+    rim = samples + RIM
     places = np.argwhere(top[tuple(slice(rim, n - rim) for n in z.shape)]) + rim
     near = places[:, None, :] + np.array(list(np.ndindex(*(3,) * z.ndim))) - 1
     best = np.argmax(z[tuple(np.moveaxis(near, -1, 0))], axis=1)
@@ -112,19 +119,9 @@ def _planes(
     return np.stack(gradients), np.stack(misfits), moment
 
 
-def _enough(summits: int, length: float) -> None:
-    if summits < FEWEST:
-        raise ValueError(
-            f"z has {summits} summits at a sampling length of {length:g} m: at least {FEWEST} are "
-            "needed; scan a larger area or change sampling_length"
-        )
-
-
 def _levelled(z: Array) -> Array:
     """Heights above the mean plane."""
-    axes = [np.linspace(-1.0, 1.0, n) for n in z.shape]
-    grid = np.meshgrid(*axes, indexing="ij")
+    y, x = (np.linspace(-1.0, 1.0, n) for n in z.shape)
     level: Array = z - z.mean()
-    for g in grid:
-        level = level - g * (np.sum(g * level) / np.sum(g * g))
-    return level
+    level = level - np.outer(y, np.ones(x.size)) * (y @ level.sum(1) / (y @ y) / x.size)
+    return level - x * (level.sum(0) @ x / (x @ x) / y.size)

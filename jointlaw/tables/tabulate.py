@@ -6,15 +6,17 @@ from typing import Any
 
 import numpy as np
 
+from ..joints.batch import JointBatch
 from ..laboratory.normal_control import NormalCondition, closing_increments
 from ..law import JointLaw
 from ..parameters.resolution import SLIP
 from ..support.checks import Array, above, whole
 from ..support.version import __version__
-from .table import JointTable
+from .joint_table import JointTable
 
 FLOOR = 1e-4  # stresses below this share of the largest are held to an absolute tolerance
 ROWS = 30  # closures at which friction and dilation are computed
+LONG = 10.0  # shear limit over closure range, where the law has no critical slip
 HELD = 1e-9  # of the normal stress
 PROBE = 1e-7  # shear probe over closure: small against any curvature, large against rounding
 
@@ -33,8 +35,8 @@ def tabulate(
     ----------
     law: a law in 3-D (`plane=None`).
     closure: last closure of the table in m; `law.closure_range` by default.
-    shear_limit: shear displacement in m at which friction and dilation are read; the critical
-        slip distance by default, and required where that is infinite.
+    shear_limit: shear displacement in m at which friction and dilation are read; by default the
+        critical slip distance, or ten closure ranges where that is infinite.
     tolerance: interpolation error allowed between rows, as a share of the value (for values below
         1e-4 of the largest: of that floor), for normal stress and for shear stiffness.
     azimuths: number of azimuths, evenly spaced over the half circle, 3 or more; a divisor of 180.
@@ -48,14 +50,8 @@ def tabulate(
     steps = whole("steps", steps, 2)
     if whole("azimuths", azimuths, 3) > 180 or 180 % azimuths:
         raise ValueError(f"azimuths = {azimuths} must divide 180: columns are named by degree")
-    if shear_limit is None:
-        if math.isinf(law.critical_slip):
-            raise ValueError(
-                "shear_limit is missing: law.critical_slip is infinite, so friction has no end "
-                "value; state the shear displacement (m) at which it is to be read"
-            )
-        shear_limit = law.critical_slip
-    limit = above("shear_limit", shear_limit, 0.0)
+    default = law.critical_slip if math.isfinite(law.critical_slip) else LONG * law.closure_range
+    limit = above("shear_limit", default if shear_limit is None else shear_limit, 0.0)
     psi: Array = np.radians(np.arange(azimuths) * (180 // azimuths), dtype=np.float64)
     u, worst = _grid(law, end, psi, tolerance)
     secant, tangent = _normal(law, u)
@@ -65,9 +61,9 @@ def tabulate(
     harmonic = np.abs(table.lookup(u[1:, None], psi).shear_stiffness / kt[1:] - 1).max()
     # degrees by which few nodes miss the friction that a host will rely on
     finer = _friction(replace(law, resolution=SLIP), u, psi[::4], limit, steps)[1]
-    missed = np.degrees(np.abs(np.arctan(mobilised[:, ::4]) - np.arctan(finer))).max()
-    metadata = _metadata(law, table, tolerance, worst, harmonic, limit, steps)
-    return replace(table, metadata=metadata | {"resolution_error_friction_angle": float(missed)})
+    missed = np.degrees(np.abs(np.arctan(mobilised[:, ::4]) - np.arctan(finer)))
+    errors = (*worst, float(harmonic), float(missed.max()))
+    return replace(table, metadata=_metadata(law, table, tolerance, errors, limit, steps))
 
 
 def require_3d(law: JointLaw) -> None:
@@ -82,8 +78,7 @@ def _metadata(
     law: JointLaw,
     table: JointTable,
     tolerance: float,
-    worst: tuple[float, float],
-    harmonic: float,
+    errors: tuple[float, float, float, float],
     limit: float,
     steps: int,
 ) -> dict[str, Any]:
@@ -104,15 +99,16 @@ def _metadata(
         "mu is the largest ratio on the way, mob and dil (opening per shear) are those at the end",
         "shear_limit": limit,
         "tolerance": tolerance,
-        "interpolation_error_normal_stress": worst[0],
-        "interpolation_error_shear_stiffness": worst[1],
-        "azimuth_fit_error": float(harmonic),
+        "interpolation_error_normal_stress": errors[0],
+        "interpolation_error_shear_stiffness": errors[1],
+        "azimuth_fit_error": errors[2],
         "largest_kn_tangent": kn,
         "largest_kt": kt,
         "critical_time_step": 2 / math.sqrt(max(kn, kt)),
         "critical_time_step_is": "s for 1 kg per m2 of joint: multiply by sqrt(reduced mass/area); "
         "translation of one contact only, see docs/yade.md",
         "law": law.to_toml(),
+        "resolution_error_friction_angle": errors[3],
     }
 
 
@@ -125,11 +121,11 @@ def _grid(
     top = law.normal_stress(end), _shear_stiffness(law, np.array([end]), axes).max()
     for _ in range(40):
         middle = (u[1:] + u[:-1]) / 2
-        secant = _normal(law, u)[0]
+        secant, _ = _normal(law, u)
         kt, kt_middle = _shear_stiffness(law, u, axes), _shear_stiffness(law, middle, axes)
         stress = law.normal_stress(middle)
-        error = np.abs((secant[1:] + secant[:-1]) / 2 * middle - stress)
-        error = error / np.maximum(stress, FLOOR * top[0])
+        between = (secant[1:] + secant[:-1]) / 2 * middle
+        error = np.abs(between - stress) / np.maximum(stress, FLOOR * top[0])
         off = np.abs((kt[1:] + kt[:-1]) / 2 - kt_middle).max(axis=1)
         # shear stiffness counts by the stress that it makes: weighted with its share of closure
         off = off * middle / np.maximum(kt_middle.min(axis=1) * middle, FLOOR * top[1] * end)
@@ -150,34 +146,33 @@ def _normal(law: JointLaw, u: Array) -> tuple[Array, Array]:
     return law.normal_stress(x) / x, C[:, 0, 0]
 
 
+def _closed(law: JointLaw, u: Array, psi: Array) -> tuple[JointBatch, Array]:
+    """Virgin joints closed to every u, one for each psi, and their unit vectors of shear (m, 3)."""
+    x, angle = np.repeat(u, len(psi)), np.tile(psi, len(u))
+    batch = law.joints(len(x))
+    batch.update(np.stack([x, 0 * x, 0 * x], axis=1), tangent=False)
+    return batch, np.stack([0 * x, np.cos(angle), np.sin(angle)], axis=1)
+
+
 def _shear_stiffness(law: JointLaw, u: Array, psi: Array) -> Array:
     """Initial tangent shear stiffness (n, p) in Pa/m of joints closed to u, along psi."""
     x = np.where(u > 0, u, 1e-12 * law.closure_range)
-    x, angle = np.repeat(x, len(psi)), np.tile(psi, len(u))
-    zero = np.zeros_like(x)
-    batch = law.joints(len(x))
-    batch.update(np.stack([x, zero, zero], axis=1), tangent=False)
-    along = np.stack([zero, np.cos(angle), np.sin(angle)], axis=1)
-    probe = (PROBE * x)[:, None] * along
-    ahead, back = (batch.trial(sign * probe, tangent=False)[0] for sign in (1, -1))
-    slope = np.sum((ahead - back) * along, axis=1) / (2 * PROBE * x)
-    return np.asarray(slope.reshape(len(u), len(psi)), float)
+    batch, along = _closed(law, x, psi)
+    length = PROBE * np.repeat(x, len(psi))
+    ahead, back = (
+        batch.trial(probe[:, None] * along, tangent=False)[0] for probe in (length, -length)
+    )
+    slope: Array = np.sum((ahead - back) * along, axis=1) / (2 * length)
+    return slope.reshape(len(u), len(psi))
 
 
-def _friction(
-    law: JointLaw, u: Array, psi: Array, limit: float, steps: int
-) -> tuple[Array, Array, Array]:
-    """Peak and final shear-to-normal ratio and final dilation (n, p), at constant stress."""
+def _friction(law: JointLaw, u: Array, psi: Array, limit: float, steps: int) -> Array:
+    """Peak and final shear-to-normal ratio and final dilation (3, n, p), at constant stress."""
     few = np.geomspace(u[1], u[-1], ROWS)  # friction varies slowly with closure
-    x, angle = np.repeat(few, len(psi)), np.tile(psi, len(few))
-    zero = np.zeros_like(x)
-    batch = law.joints(len(x))
-    batch.update(np.stack([x, zero, zero], axis=1), tangent=False)
+    batch, along = _closed(law, few, psi)
     goal = batch.F[:, 0]
-    along = np.stack([zero, np.cos(angle), np.sin(angle)], axis=1)
-    lengths = np.diff(limit * (np.arange(steps + 1) / steps) ** 2)
-    peak = ratio = dilation = zero
-    for length in lengths:
+    peak = ratio = dilation = np.zeros(len(along))
+    for length in np.diff(limit * (np.arange(steps + 1) / steps) ** 2):
         step = length * along
         closing = closing_increments(batch, step, NormalCondition(goal, goal), HELD)
         step[:, 0] = closing
@@ -185,8 +180,6 @@ def _friction(
         ratio = np.sum(F * along, axis=1) / goal
         peak, dilation = np.maximum(peak, ratio), -closing / length
     at = np.log(np.maximum(u, few[0]))
-    result = [
-        np.array([np.interp(at, np.log(few), column) for column in values.reshape(ROWS, -1).T]).T
-        for values in (peak, ratio, dilation)
-    ]
-    return result[0], result[1], result[2]
+    columns = np.concatenate([values.reshape(ROWS, -1).T for values in (peak, ratio, dilation)])
+    found = [np.interp(at, np.log(few), column) for column in columns]
+    return np.reshape(found, (3, len(psi), len(u))).transpose(0, 2, 1)

@@ -2,14 +2,13 @@
 
 import json
 
-import numpy as np
 import pytest
 
 from dem_demo import SceneError, Simulation, load, parse, run
 from dem_demo.cli import main
-from dem_demo.output.outcome import displacement
-from dem_demo.scene import TEMPLATE, names, read, read_tables
-from dem_demo.studies.compare import critical_tilts
+from dem_demo.scene import TEMPLATE, Files, read_tables
+from dem_demo.studies.compare import _plain
+from dem_demo.studies.strength import alone, critical_tilt
 
 TEXT = TEMPLATE.read_text()
 PLAIN = """
@@ -21,6 +20,7 @@ friction = 0.4
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "until", "failed"), [("slope", 0.7, 20), ("slope-azimuth", 0.9, 15), ("arch", 0.4, 3)]
 )
@@ -33,7 +33,6 @@ def test_short_scenes_end_as_intended(name, until, failed):
     scene = load(name)
     assert sum(not block.fixed for block in scene.blocks) <= 60
     sim = Simulation(scene)
-    assert scene.run.end / sim.now.dt < 25_000
     _, summary = run(sim, until=until)
     stands, fails = summary["rocks"]
     assert stands["state"] == "stands"
@@ -44,18 +43,19 @@ def test_short_scenes_end_as_intended(name, until, failed):
     assert summary["largest_energy_error"] < 5e-3
 
 
+@pytest.mark.slow
 def test_dilation_is_what_holds_the_rough_slope():
     """Plain Coulomb bears the dip of its friction angle, no more: atan 0.4 = 21.8 degrees.
 
     Half a degree for blocks that the cutting leaves interlocked or loose; the rough joints bear
     20 degrees more.
     """
-    text = load("slope").text
-    alone = text[: text.index('[[rock]]\nname = "smooth"')] + text[text.index("[run]") :]
-    rough, plain = critical_tilts(alone, "slope", [2])
-    assert (rough["law"], plain["law"]) == ("joint", "coulomb")
-    assert 36 + plain["critical_tilt"] == pytest.approx(21.8, abs=0.5)
-    assert rough["critical_tilt"] - plain["critical_tilt"] > 20
+    data, files = read_tables(load("slope").text), Files()
+    own = alone(data, "rough", 2)
+    laws = {name: _plain(table, own, files) for name, table in own["laws"].items()}
+    rough, plain = critical_tilt(own, files), critical_tilt({**own, "laws": laws}, files)
+    assert 36 + plain == pytest.approx(21.8, abs=0.5)
+    assert rough - plain > 20
 
 
 def test_a_scene_of_ones_own_from_the_template(tmp_path, capsys):
@@ -80,7 +80,7 @@ def test_a_scene_of_ones_own_from_the_template(tmp_path, capsys):
     out = tmp_path / "out"
     assert main([str(file), "--out", str(out)]) == 0
     assert "slope: stands" in capsys.readouterr().out
-    for name in ("report.png", "motion.gif", "energy.png", "history.csv", "joints.csv", "state"):
+    for name in ("final.png", "motion.gif", "energy.png", "history.csv", "joints.csv", "state"):
         assert (out / name).exists(), name
     summary = json.loads((out / "summary.json").read_text())
     assert summary["rocks"][0]["state"] == "stands"
@@ -90,20 +90,6 @@ def test_a_scene_of_ones_own_from_the_template(tmp_path, capsys):
     assert 1e-5 < moved < 1e-2  # the settlement of the pin's block, m
     words = ["resume", str(out / "state"), "--until", "0.12", "--no-pictures"]
     assert main([*words, "--out", str(tmp_path / "on")]) == 0
-
-
-def test_a_scene_is_added_as_one_file(tmp_path, monkeypatch, capsys):
-    """The recipe of CONTRIBUTING.md: one file among the scenes, `check`, a variant in it."""
-    monkeypatch.setattr(read, "SCENES", tmp_path)
-    assert main(["new", str(tmp_path / "mine.toml")]) == 0
-    assert main(["check", "mine"]) == 0
-    assert "the scene is valid" in capsys.readouterr().out
-    text = (tmp_path / "mine.toml").read_text() + VARIANT
-    (tmp_path / "mine.toml").write_text(text)
-    assert names() == ["mine", "mine-flat"]
-    assert main(["check", "mine-flat"]) == 0
-    assert main(["nobodys"]) == 2
-    assert "give a TOML file or one of mine, mine-flat" in capsys.readouterr().err
 
 
 VARIANT = """
@@ -126,34 +112,11 @@ def test_a_variant_changes_what_it_names():
     sets = [{**scene["rock"][0]["set"][0], "dip": 5.0}, scene["rock"][0]["set"][1]]
     assert rock == {**scene["rock"][0], "seed": 7, "set": sets}
     assert {key for key in scene if flat[key] != scene[key]} == {"title", "laws", "rock"}
-    with pytest.raises(SceneError, match=r"variant = 'flt' is none of .*: did you mean 'flat'"):
+    with pytest.raises(SceneError, match=r"variant = 'flt' is unknown; did you mean 'flat'"):
         parse('variant = "flt"\n' + TEXT + VARIANT)
     wrong = VARIANT.replace("seed", "sead")
-    with pytest.raises(SceneError, match="sead is unknown; did you mean 'seed'"):
+    with pytest.raises(SceneError, match="sead' is unknown; did you mean 'seed'"):
         parse('variant = "flat"\n' + TEXT + wrong)
-
-
-def test_full_scenes_are_larger():
-    for name in ("slope", "slope-azimuth", "arch"):
-        short, full = load(name), load(f"{name}-full")
-        assert len(full.blocks) > 1.5 * len(short.blocks)
-        assert full.title.endswith("(full)")
-        assert parse(full.text).title == full.title  # the text alone gives the variant
-
-
-def test_a_saved_rock_goes_on_bit_for_bit(tmp_path):
-    text = TEXT.replace("a = 3.0", "a = 20.0")  # it slides
-    whole, first = Simulation(parse(text)), Simulation(parse(text))
-    for _ in range(60):
-        whole.step()
-        first.step()
-    first.save(tmp_path)
-    again = Simulation.load(tmp_path)
-    for _ in range(40):
-        whole.step()
-        again.step()
-    assert (again.now.motion == whole.now.motion).all()
-    assert (again.now.traction == whole.now.traction).all()
 
 
 def test_joints_have_the_law_of_their_set():
@@ -176,48 +139,17 @@ def test_joints_have_the_law_of_their_set():
     assert {law for _, law in edges} == {"joint", "plain"}
 
 
-def test_a_copy_is_the_same_rock_elsewhere():
-    more = '[[rock]]\nname = "copy"\nlike = "slope"\nat = [20.0, 1.0]\nlaws = { joint = "plain" }\n'
-    scene = parse(TEXT.replace("[watch]", more + PLAIN + "[watch]"))
-    one, copy = scene.rocks
-    assert len(one.blocks) == len(copy.blocks)
-    for a, b in zip(one.blocks, copy.blocks, strict=True):
-        shift = scene.blocks[b].corners - scene.blocks[a].corners
-        assert shift == pytest.approx(np.tile([20.0, 1.0], (len(shift), 1)), abs=1e-12)  # rounding
-        assert scene.blocks[a].fixed == scene.blocks[b].fixed
-    assert set(copy.laws.values()) == {"plain"}
-
-
-def test_what_fails_moves_down_the_joint():
-    """A smooth slope slides along its set: displacements dip at 36 degrees.
-
-    Three degrees: blocks of the upper layers also ride on each other's joints, and settle.
-    """
-    record, summary = run(Simulation(parse(TEXT.replace("a = 3.0", "a = 20.0"))), until=0.4)
-    assert summary["rocks"][0]["state"] == "fails"
-    moved = displacement(record, -1)[record.scene.rocks[0].free]
-    down = np.degrees(np.arctan2(-moved[:, 1], moved[:, 0]))
-    assert np.median(down) == pytest.approx(36.0, abs=3.0)
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("dip = 36.0", "dip = 96.0", r"rock\['slope'\].set\[0\].dip = 96.0: must be within -90"),
+        ("dip = 36.0", "dip = 96.0", r"rock\[0\].set\[0\].dip = 96.0: must be from -90"),
         ("dip = 36.0", "dipp = 36.0", "dip is missing"),
-        ("spacing = 1.3", "spacing = 0.0", r"set\[0\].spacing = 0.0: must be > 0"),
-        ("scatter = 0.2", "scatter = 1.0", r"set\[0\].scatter = 1.0: must be < 1"),
-        ("persistence = 0.7", "persistence = 1.7", r"set\[1\].persistence = 1.7: must be <= 1"),
+        ("spacing = 1.3", "spacing = 0.0", r"set\[0\].spacing = 0.0 .* must be > 0"),
+        ("scatter = 0.2", "scatter = 1.0", r"scatter = 1.0: must be from 0 to 0.999"),
         ("persistence = 0.7", "persistance = 0.7", "did you mean 'persistence'"),
-        ("seed = 1", "seed = 1.5", "seed = 1.5: must be a whole number"),
-        ("seed = 1", "sead = 1", "did you mean 'seed'"),
-        ("[4.0, 1.0], [1.5, 1.0]", "[-9.0, 9.0], [1.5, 1.0]", "outline: must not cross"),
-        ("corners = [[-11.0", "corners = [[9.0, 9.0], [-11.0", "fixed.*corners: must not cross"),
-        (
-            'name = "slope"',
-            'name = "slope"\nlike = "hill"',
-            "like = 'hill': no rock further up; choose one of",
-        ),
+        ("seed = 1", "seed = 1.5", "seed = 1.5 .* whole number"),
+        ("[4.0, 1.0], [1.5, 1.0]", "[-9.0, 9.0], [1.5, 1.0]", "outline: .* do not cross"),
+        ('name = "slope"', 'name = "slope"\nlike = "hill"', "like = 'hill': no rock further up"),
         ('name = "slope"', 'name = "slope"\nlaws = { rough = "joint" }', "no set .* law 'rough'"),
         ("pins = [[-2.0, 7.5]", "pins = [[-2.0, 17.5]", r"pins = \[-2.0, 17.5\]: must lie inside"),
         ("[watch]", "[[joint]]\naround = [50.0, 0.0]\nlaw = 'joint'\n[watch]", "around = .*inside"),
@@ -228,7 +160,7 @@ def test_what_fails_moves_down_the_joint():
         ),
     ],
 )
-def test_errors_name_key_value_bound_and_remedy(old, new, message):
+def test_nonsense_is_named(old, new, message):
     assert old in TEXT
     with pytest.raises(SceneError, match=message):
         parse(TEXT.replace(old, new, 1), "scene.toml")

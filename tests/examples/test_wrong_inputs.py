@@ -32,15 +32,6 @@ def test_no_row_is_missed():
     assert len(ROWS) == page.count("\n| ") - 1 >= 40
 
 
-def test_a_long_start_is_told_before_it_begins(tmp_path, capsys, monkeypatch):
-    wrong_files.make(tmp_path)
-    monkeypatch.setattr(dem_demo.cli, "SEATING", 60.0)  # as if a block took a minute
-    monkeypatch.setattr(dem_demo.cli, "Simulation", lambda scene: 1 / 0)  # it has not begun
-    with pytest.raises(ZeroDivisionError):
-        dem_demo.cli.main(["check", "good.toml"])
-    assert "1 moving blocks: the initial equilibrium takes about 60 s" in capsys.readouterr().out
-
-
 @pytest.mark.parametrize("folder", ["done", "new"])
 def test_force_replaces_a_run_whole(tmp_path, folder):
     """What the other run wrote is gone, what the user put there stays."""

@@ -2,13 +2,13 @@
 
 import numpy as np
 from scene_text import PLAIN, ROCK
+from scipy.ndimage import gaussian_filter
 
 import jointlaw as jl
 
 SHEAR = {  # rows below the title: displacement and shear stress
     "no-names.csv": "",
     "no-unit.csv": "us [mm],tau",
-    "per-cent.csv": "us [mm],tau [% of peak],sigma_n [MPa]",
     "Mpa.csv": "us [mm],tau [Mpa]",
     "no-normal.csv": "us [mm],tau [MPa]",
     "not-shear.csv": "time [s],force [kN]",
@@ -80,7 +80,6 @@ def make(folder):
     (folder / "done").mkdir()
     (folder / "done" / "summary.json").write_text('{"files": ["shear.csv"]}')
     (folder / "done" / "shear.csv").write_text("of an earlier run")
-    z = jl.synthetic_surface(
-        jl.Orientation(3.0), jl.GammaHeights(4.0, 10e-6), rows=8, columns=8, spacing=20e-6
-    )
-    np.savetxt(folder / "scan.csv", 1e6 * z, delimiter=",")
+    (folder / "thousands.csv").write_text("us [mm]\ttau [kPa]\n0.0\t0\n0.1\t900\n0.2\t1,201\n")
+    z = gaussian_filter(np.random.default_rng(0).standard_normal((160, 160)), 6)
+    np.savetxt(folder / "scan.csv", 500 * z, delimiter=",")

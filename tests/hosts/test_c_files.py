@@ -224,7 +224,7 @@ def test_examples_build_as_written_and_run(tmp_path, capsys, monkeypatch):
 
 @pytest.mark.parametrize("plane", ["plane = 0.0", "closure_only = true"])
 def test_examples_of_fewer_components(tmp_path, law, plane):
-    jl.export_c(jl.JointLaw.from_toml(f"{plane}\n{law.to_toml()}"), tmp_path, "flat")
+    jl.export_c(jl.JointLaw.from_text(f"{plane}\n{law.to_toml()}"), tmp_path, "flat")
     out = run(build(tmp_path, tmp_path / "example.c", *STRICT, "-std=c99", "-O2", name="e"),
               tmp_path / "flat.jlaw")  # fmt: skip
     assert len(out.splitlines()) == (2 if "only" in plane else 41)
@@ -245,12 +245,3 @@ def test_names_and_options(tmp_path, law, capsys):
     assert jointlaw.cli.main.main(options) == 2
     assert "--closure shapes a table for YADE" in capsys.readouterr().err
     assert not (tmp_path / "new").exists()
-
-
-def test_every_preset_is_exported(lib, tmp_path):
-    for name in jl.presets.names():
-        law = jl.presets.load(name)
-        joint = CLaw(lib, law, tmp_path)
-        d = np.full(joint.dim, 0.1 * law.closure_range)
-        F, _ = law.joint().update(d)
-        assert joint.step(d)[0] == pytest.approx(F, rel=1e-12, abs=1e-12 * np.abs(F).max())

@@ -1,15 +1,14 @@
-"""Joints between bodies of points in LAMMPS: direct shear, a block on a slope, points handed on."""
+"""Bodies of points in LAMMPS: direct shear, two joint sets, points handed on, in.tower."""
 
-import sys
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parent))
+import pytest
 from lammps_host import HEAD, run, soft, thermo
 
 import jointlaw as jl
 from jointlaw.hosts.c.export import table_text
+from jointlaw.hosts.lammps.export import export_lammps
 
 SPACING, AREA, DENSITY = 0.05, 0.0025, 2600.0
 COLUMNS, ROWS, LAYERS = 4, 4, 2
@@ -94,37 +93,6 @@ run 20000"""
     assert np.abs(rise - closure).max() < 1e-3 * closure.max()
 
 
-def test_block_on_a_slope(plugin):
-    """It sticks 0.1 degree below the law's angle and slides 0.1 degree above."""
-    law = rock(plugin)
-    weight = MASS * 9.81 / (POINTS * AREA)
-    angle = 30.0
-    for _ in range(4):  # the angle depends on the normal stress, and that on the angle
-        pressure = weight * np.cos(np.radians(angle))
-        test = jl.direct_shear(law.joint(), 2e-3, pressure)
-        angle = test.peak_friction_angle
-    moved = []
-    for tilt in (angle - 0.1, angle + 0.1):
-        more = f"""variable a equal {float(np.radians(tilt))!r}*(1-0.1*(step<12000)*(1-step/12000))
-variable gx equal sin(v_a)
-variable gz equal -cos(v_a)
-fix weight block gravity 9.81 vector v_gx 0 v_gz
-fix block block rigid single torque * off off off
-variable x equal f_block[1][1]
-variable v equal f_block[1][4]
-thermo_style custom step v_x v_v c_joint[1] c_joint[5]
-thermo_modify format float %.15g
-thermo 3000
-run 18000"""
-        table = thermo(run(plugin, scene(law, float(pressure), more, share=0.2, damping=0.3)))[0]
-        moved.append((table["v_x"][-1] - table["v_x"][-2], table["v_v"][-1]))
-    (stuck, slow), (slid, fast) = moved
-    assert abs(stuck) < 1e-6
-    assert abs(slow) < 1e-6
-    assert slid > 1e-3
-    assert fast > 1e-3
-
-
 def test_points_hand_their_state_on(plugin):
     """Slip over nearly two spacings, over the border of two processors, with a tilt of the base.
 
@@ -158,3 +126,42 @@ run {steps}"""
             assert away.max() < 1e-7 * np.abs(expected).max()  # theta**2, and rounding of places
         assert (table["c_joint[1]"] == POINTS).all()
         assert (table["c_joint[5]"] == 0).all()
+
+
+def test_two_joint_sets(plugin):
+    """A block in a corner: hybrid/overlay of two jointlaw with different normals and closures."""
+    law, deep, wide, sides = rock(plugin), 3e-5, 5e-5, ROWS * LAYERS
+    one = "jointlaw opening 0.01 area 0.0025 plane {} closure0 {!r}"
+    more = f"""region wall block -0.05 0 0 0.2 0 0.1 units box
+create_atoms 1 region wall
+set type 1 diameter 0.05 density 2600
+set type 1 mol 1
+uncompute joint
+pair_style hybrid/overlay {one.format("0 0 1", deep)} {one.format("1 0 0", wide)}
+pair_coeff * * jointlaw 1 block.jlaw
+pair_coeff * * jointlaw 2 block.jlaw
+compute floor all pair jointlaw 1
+compute wall all pair jointlaw 2
+variable F1 equal fcm(block,z)
+variable F2 equal fcm(block,x)
+thermo_style custom step v_F1 v_F2 c_floor[1] c_wall[1]
+thermo_modify format float %.15g
+run 0"""
+    found = thermo(run(plugin, scene(law, 5e3, more), 2))[0]
+    assert (found["c_floor[1]"][0], found["c_wall[1]"][0]) == (POINTS, sides)
+    for force, joints, closure in (("v_F1", POINTS, deep), ("v_F2", sides, wide)):
+        expected = joints * AREA * float(law.normal_stress(closure))
+        assert found[force][0] == pytest.approx(expected, rel=1e-9), force
+
+
+def test_tower(plugin):
+    """in.tower as exported, with a short and hard shake, on one processor and on two."""
+    law = replace(jl.presets.load("jing-replica"), resolution="fast")
+    export_lammps(law, plugin, "tower")
+    shake = {"steps": 4000, "settle": 1000, "peak": 4.0}
+    one, two = (thermo(run(plugin, "in.tower", n, **shake))[-1] for n in (1, 2))
+    fed = np.abs(one["v_work"]).max() + np.abs(one["v_fallen"]).max()
+    assert np.abs(one["v_balance"]).max() < 5e-3 * fed  # against what is kept and lost
+    assert one["c_joint[2]"][-1] > 0.2 * fed  # it has slipped
+    for place in ("v_top", "v_rise"):
+        assert np.abs(one[place] - two[place]).max() < 1e-10  # m, up to the end

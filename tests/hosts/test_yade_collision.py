@@ -1,113 +1,142 @@
-"""Free spinning spheres: momentum, moments and the frame of a contact that turns."""
+"""Spheres that collide, spin and bounce: shear, frame, momentum and energy of a contact."""
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from yade_host import make_table, run_scene
 
-COLLISION = """
-kn, ks, mu, R = {kn}, {ks}, {mu}, 0.5
+FRICTION = (0.4, 5.0)
+SHARES = (0.02, 0.1, 0.3)  # time step over sqrt(m/k)
+SPINS = ((40.0, 12.0, -6.0), (30.0, -20.0, 12.0))
+SPEEDS = ((0.5, 0.0, 0.1), (-0.5, 0.1, 0.0))
+T = 0.06
+
+SCENES = f"""
+R = 0.5
 area, m = pi * R**2, 2600 * 4 / 3 * pi * R**3
-T = pi * sqrt(m / 2 / (kn * area))
-def go(joint, N, touch):
-    O.reset()
-    O.materials.append(FrictMat(young=1e9, poisson=.3, frictionAngle=.5, density=2600))
+
+def collide(joint, mu, touch, N=2000):
+    kn, ks = 1e11, 5e10
+    length = pi * sqrt(m / 2 / (kn * area))
+    material()
     O.bodies.append([utils.sphere((0, 0, 0), R), utils.sphere((touch, 0, 0), R)])
     a, b = [body.state for body in O.bodies]
     a.angVel, b.angVel, a.vel, b.vel = (3, .5, 2), (-1, 2, 1.2), (.1, .02, .01), (-.1, -.03, .02)
     engines(kn * area, ks * area, mu, ratchet=False)
-    O.dt = T / N
+    O.dt = length / N
     if joint:
-        Joints(TableLaw("joint.txt")).attach()
+        attached(TableLaw(f"linear-{{mu}}.txt"))
     def momenta():
         spins = [s.mass * s.pos.cross(s.vel) + s.inertia[0] * s.angVel for s in (a, b)]
-        L = spins[0] + spins[1]
-        return list(a.mass * a.vel + b.mass * b.vel) + list(L)
-    a, b = [body.state for body in O.bodies]
+        return list(a.mass * a.vel + b.mass * b.vel) + list(spins[0] + spins[1])
     before = momenta()
     O.run(int(1.5 * N + (touch - 1) / .2 / O.dt), True)
     assert O.interactions.countReal() == 0
     return [list(s.vel) + list(s.angVel) for s in (a, b)], before, momenta()
-out = dict(N=2000)
-for touch in (1.0, 1.00003):
-    native, joint = go(False, 2000, touch), go(True, 2000, touch)
-    out.setdefault("native", []).append(native[0])
-    out.setdefault("joint", []).append(joint[0])
-    out.setdefault("before", []).append(joint[1])
-    out.setdefault("after", []).append(joint[2])
-result(**out)
+
+def turning(N):
+    material()
+    O.bodies.append([utils.sphere((0, 0, 0), R), utils.sphere((1.0, 0, 0), R)])
+    a, b = [body.state for body in O.bodies]
+    (a.angVel, b.angVel), (a.vel, b.vel) = {SPINS}, {SPEEDS}
+    engines()
+    O.dt = {T} / N
+    joints = attached(TableLaw("uneven.txt"), azimuth=(.2, 1, .1))
+    O.run(N + 1, True)   # the last step computes the force at time T
+    f = joints.F[:, 0] * joints.c["area"][0]
+    turned = [2 * acos(min(1, abs(s.ori[3]))) for s in (a, b)]
+    n, t2 = joints.c["n"][:, 0], joints.c["t2"][:, 0]
+    return dict(x=joints.x.T, force=f[0] * n + f[1] * t2 + f[2] * np.cross(n, t2), turned=turned)
+
+def bounce(share, cycles=50, kn=1e8, eta=0.5, u0=1e-3):
+    k = (1 + eta) * area * kn * u0**eta           # stiffness at rest, at the closure u0
+    slab_and_sphere(R)
+    engines(mu=0.4)
+    O.bodies[1].state.pos = (0, 0, R - 0.3 * u0)  # let go at 0.3 of the closure at rest
+    attached(TableLaw("grown.txt"))
+    O.dt = share * sqrt(m / k)
+    O.forces.setPermF(1, (0, 0, -area * kn * u0 ** (1 + eta)))
+    z, state = [], O.bodies[1].state
+    for _ in range(int(cycles * 2 * pi / share * 1.05)):
+        O.step()
+        z.append(state.pos[2])
+    z = np.array(z) - (R - u0)
+    v = np.diff(z)
+    turns = np.flatnonzero((v[1:] < 0) & (v[:-1] > 0)) + 1     # highest points
+    a, b, c = z[turns - 1], z[turns], z[turns + 1]             # parabola through three
+    return b + (a - c) ** 2 / (16 * b - 8 * a - 8 * c)
+
+touches = (1.0, 1.00003)
+result(
+    native=[[collide(False, mu, touch)[0] for touch in touches] for mu in {FRICTION}],
+    joint=[[collide(True, mu, touch) for touch in touches] for mu in {FRICTION}],
+    turning=[turning(2000), turning(4000)],
+    tops=[bounce(share) for share in {SHARES}],
+)
 """
 
 
-@pytest.mark.parametrize("mu", [0.4, 5.0])
-def test_oblique_collision_equals_yades_own_linear_law(yade, make_table, tmp_path, mu):
+@pytest.fixture(scope="module")
+def scenes(tmp_path_factory):
+    """All scenes of this file, in one YADE."""
+    folder = tmp_path_factory.mktemp("collision")
+    for mu in FRICTION:
+        make_table(folder / f"linear-{mu}.txt", 1e11, 5e10, mu)
+    make_table(folder / "uneven.txt", 1e5, 5e4, mu=1e9, uneven=0.5, end=0.2)
+    make_table(folder / "grown.txt", eta=0.5)
+    return run_scene(folder, SCENES)
+
+
+@pytest.mark.parametrize("case", range(len(FRICTION)), ids=FRICTION)
+def test_oblique_collision_equals_yades_own_linear_law(scenes, case):
     """At mu = 0.4 the contact slides throughout, at 5 it sticks and slides.
 
     The contact point of both is half-way in the overlap and shear is the true motion there
     (avoidGranularRatcheting off). YADE takes the frame at the end of a step, we the one at its
     middle, a difference of first order in the step: 2000 steps per collision put it below 1e-6.
     """
-    kn, ks = 1e11, 5e10
-    make_table(tmp_path / "joint.txt", kn, ks, mu)
-    out = yade(COLLISION.format(kn=kn, ks=ks, mu=mu))
+    native = np.array(scenes["native"][case])
+    joint, before, after = (np.array(part) for part in zip(*scenes["joint"][case], strict=True))
     speed, spin = 0.1, 3.0
-    off = np.abs(out["joint"] - out["native"])
-    assert np.abs(out["native"][..., 3:] - [[3, 0.5, 2], [-1, 2, 1.2]]).max() > 0.3 * min(mu, 1)
-    print(off[..., :3].max() / speed, off[..., 3:].max() / spin)
+    off = np.abs(joint - native)
+    turned = np.abs(native[..., 3:] - [[3, 0.5, 2], [-1, 2, 1.2]])
+    assert turned.max() > 0.3 * min(FRICTION[case], 1)
     assert off[..., :3].max() < 1e-6 * speed
     assert off[..., 3:].max() < 1e-6 * spin
     # linear and angular momentum: sums of equal and opposite forces at one point, to rounding
     # (of position times momentum, and leapfrog holds them at half steps)
-    change = np.abs(out["after"] - out["before"])
-    print(change.max(axis=0) / np.abs(out["before"]).max())
-    assert change[:, :3].max() < 1e-12 * np.abs(out["before"]).max()
-    assert change[:, 3:].max() < 1e-9 * np.abs(out["before"]).max()
+    change = np.abs(after - before)
+    assert change[:, :3].max() < 1e-12 * np.abs(before).max()
+    assert change[:, 3:].max() < 1e-9 * np.abs(before).max()
 
 
-TURNING = """
-R = 0.5
-def go(N):
-    O.reset()
-    O.materials.append(FrictMat(young=1e9, poisson=.3, frictionAngle=.5, density=2600))
-    O.bodies.append([utils.sphere((0, 0, 0), R), utils.sphere((1.0, 0, 0), R)])
-    a, b = [body.state for body in O.bodies]
-    (a.angVel, b.angVel), (a.vel, b.vel) = {spins}, {speeds}
-    engines()
-    O.dt = {T} / N
-    joints = Joints(TableLaw("joint.txt"), azimuth=(.2, 1, .1))
-    joints.attach()
-    O.run(N + 1, True)   # the last step computes the force at time T
-    f = joints.F[:, 0] * joints.c["area"][0]
-    turned = [2 * acos(min(1, abs(s.ori[3]))) for s in (a, b)]
-    n, t2 = joints.c["n"][:, 0], joints.c["t2"][:, 0]
-    force = f[0] * n + f[1] * t2 + f[2] * np.cross(n, t2)
-    x = joints.x
-    return dict(x=x.T.tolist(), force=force.tolist(), turned=turned, n=n.tolist())
-result(coarse=go(2000), fine=go(4000))
-"""
+@pytest.mark.parametrize(("case", "bound"), [(0, 1e-4), (1, 1e-4), (2, 5e-4)], ids=SHARES)
+def test_an_undamped_bounce_keeps_its_amplitude(scenes, case, bound):
+    """50 cycles: change of the amplitude per cycle, slope of a line through its logarithm.
+
+    Leapfrog with a force that depends on position alone conserves a nearby energy: what is left is
+    the reading of the peak between steps.
+    """
+    top = scenes["tops"][case]
+    assert len(top) >= 50
+    assert abs(np.expm1(np.polyfit(np.arange(len(top)), np.log(top), 1)[0])) < bound
 
 
-def test_anisotropic_joint_on_turning_bodies(yade, make_table, tmp_path):
+def test_anisotropic_joint_on_turning_bodies(scenes):
     """Against scipy's integration of the continuous equations, written in global vectors.
 
     Both bodies turn by more than 90 degrees about oblique axes while in touch; shear stiffness
     differs by a factor 3 between the azimuths, which body id1 carries. The step error is that of
     YADE's leapfrog, second order: halving the step quarters it, and the extrapolated value agrees.
     """
-    kn, ks, R, T = 1e5, 5e4, 0.5, 0.06
-    table = make_table(tmp_path / "joint.txt", kn, ks, mu=1e9, uneven=0.5, end=0.2)
-    spins = ((40.0, 12.0, -6.0), (30.0, -20.0, 12.0))
-    speeds = ((0.5, 0.0, 0.1), (-0.5, 0.1, 0.0))
-    out = yade(TURNING.format(spins=spins, speeds=speeds, T=T))
-    coarse, fine = out["coarse"], out["fine"]
+    kn, ks, R = 1e5, 5e4, 0.5
+    coarse, fine = scenes["turning"]
     assert min(fine["turned"]) > np.pi / 2
 
     mass = 2600 * 4 / 3 * np.pi * R**3
     inertia, area = 0.4 * mass * R * R, np.pi * R * R
     K2, K3 = ks * 1.5, ks * 0.5
-    assert np.isclose(table.lookup(0.1, 0.0).shear_stiffness, K2)
-    reference = np.array([0.2, 1, 0.1]) / np.linalg.norm([0.2, 1, 0.1])
-    reference = reference - np.array([reference[0], 0, 0])  # projected when the contact is new
-    reference /= np.linalg.norm(reference)
+    reference = np.array([0, 1, 0.1]) / np.linalg.norm([1, 0.1])  # projected when it is new
 
     def rate(t, y):
         x1, x2, v1, v2, w1, w2, a, f = y.reshape(8, 3)
@@ -130,7 +159,7 @@ def test_anisotropic_joint_on_turning_bodies(yade, make_table, tmp_path):
              np.cross(w1, a), f_rate]
         )  # fmt: skip
 
-    start = np.concatenate([[0, 0, 0, 1.0, 0, 0], *speeds, *spins, reference, [0, 0, 0]])
+    start = np.concatenate([[0, 0, 0, 1.0, 0, 0], *SPEEDS, *SPINS, reference, [0, 0, 0]])
     end = solve_ivp(rate, (0, T), start, method="DOP853", rtol=1e-12, atol=1e-12).y[:, -1]
     end = end.reshape(8, 3)
     r = end[1] - end[0]
@@ -138,7 +167,6 @@ def test_anisotropic_joint_on_turning_bodies(yade, make_table, tmp_path):
     exact = area * kn * (2 * R - np.linalg.norm(r)) * n + end[7]
     shear = np.linalg.norm(end[7])
     error = [np.abs(np.array(run["force"]) - exact).max() / shear for run in (coarse, fine)]
-    print(error)
     assert error[1] < 1e-4
     assert 3.0 < error[0] / error[1] < 5.0
     extrapolated = (4 * np.array(fine["force"]) - np.array(coarse["force"])) / 3

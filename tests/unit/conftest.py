@@ -70,12 +70,3 @@ def moved(law):
     batch = law.joints(5)
     batch.update([[1e-7 * (i + 1), 5e-8 * i, -2e-8 * i] for i in range(5)])
     return batch
-
-
-@pytest.fixture
-def replays(tmp_path, monkeypatch):
-    """Folder to which replay files go during a test."""
-    folder = tmp_path / "replays"
-    folder.mkdir()
-    monkeypatch.setenv("JOINTLAW_REPLAY_DIR", str(folder))
-    return folder

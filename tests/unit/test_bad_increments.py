@@ -22,16 +22,6 @@ def test_not_finite_in_any_slot(law, d, joint, slot, bad, keep):
     np.testing.assert_array_equal(batch.snapshot().values, before)
 
 
-@given(slot=st.integers(0, 2), bad=not_finite)
-def test_not_finite_in_a_selection_names_the_joint_of_the_batch(law, slot, bad):
-    batch = law.joints(5)
-    d = np.zeros((2, 3))
-    d[1, slot] = bad
-    with pytest.raises(ValueError, match="d of joint 1 "):
-        batch.update(d, where=[4, 1])
-    assert not batch.snapshot().values.any()
-
-
 @given(shape=hnp.array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=6), keep=st.booleans())
 def test_wrong_shape(law, shape, keep):
     joint, batch = law.joint(), law.joints(5)
@@ -75,12 +65,6 @@ def test_wrong_type(law, d):
     with pytest.raises(ValueError, match=r"^d "):
         joint.trial(d)
     np.testing.assert_array_equal(joint.snapshot().values, before)
-
-
-def test_a_law_with_a_plane_takes_two_components(make_law):
-    joint = make_law(plane=0.3).joint()
-    with pytest.raises(ValueError, match=r"d has shape \(3,\); expected \(2,\)"):
-        joint.update(np.zeros(3))
 
 
 @pytest.mark.parametrize(

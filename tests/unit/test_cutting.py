@@ -61,12 +61,6 @@ def test_edges_know_their_joint_set():
     assert seen == {-1, 0, 1}
 
 
-def test_the_seed_decides():
-    one, again, other = (cut(SLOPE, [FLAT, STEEP], s, 0.25).blocks for s in (1, 1, 2))
-    assert all((a == b).all() for a, b in zip(one, again, strict=True))
-    assert len(one) != len(other) or any((a != b).any() for a, b in zip(one, other, strict=True))
-
-
 def test_persistence_is_the_share_of_length_that_is_a_joint():
     """Vertical joints between 40 beds: 40 x 79 pieces of equal length, each there or not."""
     outline = SQUARE * [8.0, 4.0]
@@ -75,18 +69,6 @@ def test_persistence_is_the_share_of_length_that_is_a_joint():
     share = (len(rock.blocks) - 40) / (40 * 79)
     assert share == pytest.approx(0.3, abs=3 * np.sqrt(0.3 * 0.7 / (40 * 79)))  # three sigma
     assert len(cut(outline, [sets[0]], 5, 0.1).blocks) == 40
-
-
-def test_spacing_scatters_about_its_mean():
-    joints = JointSet(90.0, 1.0, "a", scatter=0.5, through=(5.0, 0.0))
-    offsets = joints.offsets(SQUARE * 100, np.random.default_rng(0))
-    steps = np.diff(offsets)
-    assert steps.min() >= 0.5
-    assert steps.max() <= 1.5
-    assert steps.std() == pytest.approx(0.5 / np.sqrt(3), rel=0.05)  # flat over 0.5..1.5
-    # The mean of 1000 of them, three sigma.
-    assert steps.mean() == pytest.approx(1.0, abs=3 * 0.5 / np.sqrt(3 * 1000))
-    assert np.abs(offsets - 5.0).min() == 0.0
 
 
 def test_a_sliver_joins_its_neighbour_or_is_left_out():
@@ -100,14 +82,3 @@ def test_a_sliver_joins_its_neighbour_or_is_left_out():
     rock = cut(SQUARE, [*sets, beds], seed=6, least_width=0.2)
     assert (len(rock.blocks), rock.joined) == (2, 0)
     assert rock.dropped == pytest.approx([0.1 * 10.0], abs=1e-9)
-
-
-def test_an_opening_is_cut_round_by_the_first_set():
-    """A roof whose corners bend inwards: convex blocks, the opening stays open."""
-    outline = np.array([[-5.0, 0], [-2, 0], [-2, 4], [2, 4], [2, 0], [5, 0], [5, 7], [-5, 7]])
-    rock = cut(outline, [JointSet(10.0, 1.5, "a")], seed=0, least_width=0.1)
-    opening = Polygon([[-2, 0], [2, 0], [2, 4], [-2, 4]])
-    assert all(check_convex(block) is None for block in rock.blocks)
-    assert max(Polygon(b).intersection(opening).area for b in rock.blocks) < 1e-5
-    area = sum(Polygon(b).area for b in rock.blocks)
-    assert area + sum(rock.dropped) == pytest.approx(Polygon(outline).area, abs=1e-4)

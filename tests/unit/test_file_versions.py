@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.cli.main import main
 from jointlaw.joints.state import JointState
 
 SPECIMENS = Path(__file__).with_name("specimens")
@@ -38,22 +37,11 @@ def test_a_state_of_version_1(law):
     assert pytest.approx(TRACTION, rel=1e-9) == joint.F
 
 
-def test_a_replay_of_version_1(capsys):
-    assert main(["replay", str(SPECIMENS / "replay.npz")]) == 0
-    assert "passes: F = " in capsys.readouterr().out
-
-
 def test_a_record_of_version_1():
     with np.load(SPECIMENS / "record.npz") as data:
         assert int(data["version"]) == 1
         assert json.loads(str(data["units"]))["F1"] == "Pa"
         assert data["F1"].max() == pytest.approx(5e6)
-
-
-def test_a_law_of_another_version_is_refused(law):
-    text = law.to_toml().replace("version = 1", "version = 99")
-    with pytest.raises(ValueError, match="'version' = 99: this jointlaw reads version 1; write"):
-        jl.JointLaw.from_toml(text)
 
 
 def test_a_state_of_another_discretisation_is_refused(law):

@@ -1,7 +1,14 @@
 """`import jointlaw` needs numpy and scipy alone, and leaves the slow parts until they are asked."""
 
+import pkgutil
+import re
 import subprocess
 import sys
+from pathlib import Path
+
+import pytest
+
+import jointlaw as jl
 
 HEAVY = ("matplotlib", "pymunk", "numba", "tqdm", "dask", "pandas", "scipy.stats")
 
@@ -33,23 +40,31 @@ def test_presets_and_gamma_heights_need_no_scipy_stats():
     assert "scipy.stats" not in modules_after(code)
 
 
-def test_promised_names():
-    import jointlaw as jl
-
-    names = (
-        "JointLaw Orientation Asperity GammaHeights Heights Resolution Joint JointBatch JointState "
-        "NonFiniteError PathError Record closure_test direct_shear load_state presets"
+def test_every_public_name_loads_and_stands_on_the_api_page():
+    page = Path(jl.__file__).parents[1].joinpath("docs/api.md").read_text(encoding="utf-8")
+    own = re.split(r"currentmodule:: (\w+)", page)[1:]
+    named = "".join(
+        text for name, text in zip(own[::2], own[1::2], strict=True) if name == "jointlaw"
     )
-    for name in names.split():
-        assert hasattr(jl, name)
-        assert name in jl.__all__
-
-
-def test_every_public_name_loads_and_is_what_it_is_called():
-    import jointlaw as jl
-
+    shown = set(re.findall(r"auto(?:class|function|exception):: (\w+)\n", named))
+    assert shown | {"presets", "closed_form"} == set(jl.__all__)
+    assert len(jl.__all__) <= 27
     for name in jl.__all__:
-        found = getattr(jl, name)
-        if name not in ("closed_form", "presets", "baselines", "datasets", "unloading"):
-            assert callable(found), name
-        assert found.__name__.rpartition(".")[2] == name
+        assert getattr(jl, name).__name__.rpartition(".")[2] == name
+    for module in ("presets", "closed_form"):
+        assert f"automodule:: jointlaw.{module}" in page
+
+
+@pytest.mark.parametrize("name", jl._MOVED)
+def test_a_name_of_former_versions_says_what_to_use(name):
+    with pytest.raises(AttributeError, match=re.escape(jl._MOVED[name])) as error:
+        getattr(jl, name)
+    assert "\n" not in str(error.value)
+    assert not hasattr(jl, name)
+    pkgutil.resolve_name(jl._MOVED[name])  # and that is true
+
+
+@pytest.mark.parametrize("name", jl._REMOVED)
+def test_a_name_that_was_removed_says_what_to_use(name):
+    with pytest.raises(AttributeError, match=f"{name} was removed: "):
+        getattr(jl, name)

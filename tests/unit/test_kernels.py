@@ -36,7 +36,7 @@ def random_law(make_law, seed):
         heights = jl.GammaHeights(-0.6, 3e-6, 0.0, "individual")
     mu = [0.0, 0.3, 0.7][rng.integers(3)]
     damage = {"yield_interference": 3e-7} if seed % 4 > 1 else {}
-    if seed % 6 > 3:
+    if mu and seed % 6 > 3:
         damage |= {"mu_residual": 0.4 * mu, "wear_slip": 2e-6}
     return make_law(
         a=rng.uniform(1.0, 6.0),
@@ -125,8 +125,6 @@ def test_same_measures_of_the_same_state(both, make_law, seed):
         fast.restore(slow.snapshot())
         for one, other in zip(slow.measures(), fast.measures(), strict=True):
             assert worst(one, other, max(np.abs(one).max(), 1e-300)) < SAME
-    stiffness = law.max_stiffness(slow.measures().reach)
-    np.testing.assert_allclose(fast.max_stiffness(), stiffness, rtol=SAME)
 
 
 @pytest.mark.parametrize(("seed", "ledger"), [(3, True), (5, False)])
@@ -152,12 +150,8 @@ def test_same_numbers_while_contacts_come_and_go(both, make_law, seed, ledger):
         note(batch.trial(d[5, mask], where=mask))
         batch.resize(30)
         batch.resize(150)
-        out = np.empty((150, dim)), np.empty((150, dim, dim))
         for step in d[6:]:
-            F, C = batch.update(step[:150], out=out)
-            assert F is out[0]
-            assert C is out[1]
-            note((F, C))
+            note(batch.update(step[:150]))
         note(batch.update(np.empty((0, dim)), where=[]))
         note((batch.F, None))
         results.append(given)
@@ -237,17 +231,6 @@ def test_threads_change_no_bit(make_law, monkeypatch, seed):
             np.testing.assert_array_equal(a, b)
 
 
-def test_a_joint_takes_any_numbers(both, law):
-    for joint in both(law.joint):
-        expected, _ = joint.trial([2.0, 1.0, 0.0])
-        for d in ([2, 1, 0], (2.0, 1, 0), np.array([2, 1, 0], ">f8"), np.arange(6.0)[::-1][3::1]):
-            np.testing.assert_array_equal(joint.trial(d)[0], expected)
-        with pytest.raises(ValueError, match="shape"):
-            joint.update([1e-6])
-        with pytest.raises(ValueError, match="not an array of numbers"):
-            joint.update(["1", "0", "0"])
-
-
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
@@ -298,13 +281,16 @@ def test_a_host_that_keeps_the_states_itself(make_law, plane):
         state, (F_joint, C_joint) = new, joint.update(d)
         assert worst(F, F_joint, np.abs(F_joint).max() + 1.0) < 1e-12
         assert worst(C, C_joint, np.abs(C_joint).max() + 1.0) < 1e-9
-    assert worst(state, joint.snapshot().values[:, 0], np.abs(state).max()) < 1e-12
-    two, F_two, _ = law.step(np.stack([state, state], axis=1), np.stack([d, d], axis=1))
-    assert two.shape == (law.state_size, 2)
-    assert (F_two[:, 0] == F_two[:, 1]).all()
+    assert worst(state, joint.snapshot().values[0], np.abs(state).max()) < 1e-12
+    two, F_two, C_two = law.step(joint_and_new := np.stack([given, 0 * given]), np.stack([d, d]))
+    assert two.shape == joint_and_new.shape == (2, law.state_size)
+    for k, single in enumerate(joint_and_new):
+        alone, F, C = law.step(single, d)
+        for both_, one in ((two[k], alone), (F_two[k], F), (C_two[k], C)):
+            assert worst(both_, one, np.abs(one).max() + 1e-300) < SAME_C
 
 
-@pytest.mark.parametrize(("state", "d"), [((3,), (3,)), ((0, 2), (3,))])
+@pytest.mark.parametrize(("state", "d"), [((3,), (3,)), ((2, 0), (3,))])
 def test_a_step_of_other_shapes_is_refused(law, state, d):
     size = tuple(law.state_size if n == 0 else n for n in state)
     with pytest.raises(ValueError, match="expected"):

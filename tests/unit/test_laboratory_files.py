@@ -1,135 +1,59 @@
-"""CSV files as laboratories write them: read right, or refused with the option that cures it."""
-
-import re
-from pathlib import Path
+"""Text files of laboratories: read right, or refused with the option that cures it."""
 
 import numpy as np
 import pytest
 
-from jointlaw.calibration.datasets import read_closure, read_shear
+from jointlaw.calibration.datasets import load, names, read_closure, read_shear
 
 U = np.array([0.0, 0.05, 0.1, 0.2, 0.5, 1.0])  # mm
-TAU = np.array([0.0, 0.8, 1.25, 1.5, 1.625, 1.5])  # MPa
-CURVE = list(zip(U, TAU, strict=True))
-NAN = float("nan")
+TAU = np.array([0.0, 0.875, 1.25, 1.75, 1.625, 1.5])  # MPa
+NORMAL = {"normal_stress": 2e6}
 
 
 def rows(*columns, mark=",", decimal="."):
-    """Lines of a file; an empty cell for NaN."""
-
-    def cell(x):
-        return "" if isinstance(x, float) and np.isnan(x) else str(x).replace(".", decimal)
-
+    """Lines of a file."""
     table = zip(*(np.asarray(c).tolist() for c in columns), strict=True)
-    return "\n".join(mark.join(map(cell, row)) for row in table)
+    return "\n".join(mark.join(str(x).replace(".", decimal) for x in row) for row in table)
 
 
-READ = {  # the file, and the normal stress (MPa) of each curve in it
-    "commas and brackets": ("us [mm],tau [kPa]\n" + rows(U, 1e3 * TAU), [NAN]),
-    "semicolons and decimal commas": (
-        "Shear displacement (mm);Shear stress (MPa)\n" + rows(U, TAU, mark=";", decimal=","),
-        [NAN],
+READ = {  # the file, and what `read_shear` is told of it
+    "commas and brackets": ("us [mm],tau (kPa)\n" + rows(U, 1e3 * TAU), NORMAL),
+    "semicolons, decimal commas, a sign that is typeset": (
+        "us (mm);tau in MPa\n" + rows(-U, -TAU, mark=";", decimal=",").replace("-", "−"), NORMAL
     ),
-    "tabs, units after a stroke": ("us /mm\ttau /MPa\n" + rows(U, TAU, mark="\t"), [NAN]),
-    "a row of units": ("us;tau;sn\nmm;MPa;kPa\n" + rows(U, TAU, 0 * U + 2e3, mark=";"), [2.0]),
-    "a row of units in brackets": (
-        "No,us,tau\n[-],[mm],[N/mm2]\n" + rows(range(6), U, TAU),
-        [NAN],
+    "tabs and strokes": ("# A 7\n\nus /mm\ttau /MPa\n" + rows(U, TAU, mark="\t"), NORMAL),
+    "blanks and decimal commas": (
+        "us_mm tau_MPa\n" + rows(U, TAU, mark="  ", decimal=","), NORMAL
     ),
-    "lines above the names": (
-        "Project;A 7\nDate;2021-03-04\n\nus [mm];tau [MPa]\n" + rows(U, TAU, mark=";"),
-        [NAN],
+    "a row of units, Windows": (
+        "\ufeffNo;us;tau;sn\r\n[-];[mm];[N/mm2];[kPa]\r\n"
+        + rows(range(6), U, TAU, 0 * U + 2e3, mark=";").replace("\n", "\r\n"), {},
     ),
-    "blanks, empty rows and a last word": (
-        "us [mm] ; tau [MPa] ;;\n" + rows(U, TAU, mark=" ; ") + "  ;;\n\n ;;;\nend of test\n",
-        [NAN],
-    ),
-    "stress in the titles, columns of two lengths": (
-        "us [mm],tau at 1 MPa [MPa],tau at 3 MPa [MPa]\n"
-        + rows(np.append(U, 2.0), np.append(TAU, NAN), np.append(TAU, 1.5)),
-        [1.0, 3.0],
-    ),
-    "stress in the titles, in kPa, with a decimal comma": (
-        "us_mm;tau_MPa sn = 0,5 MPa\n" + rows(U, TAU, mark=";", decimal=","),
-        [0.5],
-    ),
-    "a normal stress that is measured": (
+    "a normal stress that is measured, a gauge that does not begin at zero": (
         "us [mm],tau [bar],normal stress [bar]\n"
-        + rows(U, 10 * TAU, 20 + np.array([0.1, -0.1, 0.2, 0.0, -0.2, 0.0])),
-        [2.0],
+        + rows(U + 12.5, 10 * TAU, 20 + np.array([0.1, -0.1, 0.2, 0.0, -0.2, 0.0])), {},
     ),
-    "three tests under each other": (
-        "us [mm],tau [MPa],sigma_n [MPa]\n"
-        + "\n".join(rows(U, TAU, 0 * U + level) for level in (1, 3, 5)),
-        [1.0, 3.0, 5.0],
+    "other columns, empty cells": (
+        '"time","us, mm","tau in MPa"\n"12:03",,\n'
+        + "\n".join(f'"12:0{k}","{u}","{t}"' for k, (u, t) in enumerate(zip(U, TAU, strict=1))),
+        NORMAL,
     ),
-    "a column pair for each test": (
-        "u1 [mm],u [mm],tau at 1 MPa [MPa],u [mm],tau at 3 MPa [MPa]\n"
-        + rows(0 * U, U, TAU, U, TAU),
-        [1.0, 3.0],
+    "names and signs of its own": (
+        "way,resistance [MPa]\n" + rows(U, -TAU),
+        NORMAL | {"shear": "way:mm", "stress": "resistance:-1MPa"},
     ),
-    "other columns, quotes, times": (
-        '"time","remark","us, mm","tau in MPa"\n'
-        + "\n".join(
-            f'"12:0{k}","ok","{u}","{t}"' for k, (u, t) in enumerate(zip(U, TAU, strict=1))
-        ),
-        [NAN],
-    ),
-    "blanks and decimal commas": ("us_mm tau_MPa\n" + rows(U, TAU, mark="  ", decimal=","), [NAN]),
-    "Windows": ("\ufeffus [mm],tau [MPa]\r\n" + rows(U, TAU).replace("\n", "\r\n"), [NAN]),
-    "sheared backwards": ("us [mm],tau [MPa]\n" + rows(-U, -TAU), [NAN]),
-    "a gauge that does not begin at zero": ("us [mm],tau [MPa]\n" + rows(12.5 + U, TAU), [NAN]),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", READ)
 def test_read_right(name, tmp_path):
-    text, normals = READ[name]
+    text, told = READ[name]
     (tmp_path / "lab.csv").write_text(text, encoding="utf-8", newline="")
-    found = read_shear(tmp_path / "lab.csv")
-    stated = [test.normal for test in found]
-    assert stated == pytest.approx([1e6 * n for n in normals], nan_ok=True)
-    for test in found:
-        sense = np.sign(test.shear[-1])
-        np.testing.assert_allclose(sense * test.shear[: U.size], 1e-3 * U, atol=1e-15)
-        np.testing.assert_allclose(sense * test.shear_stress[: U.size], 1e6 * TAU, atol=1e-9)
-
-
-REFUSED = {  # the file, and by which numbers its stress is written
-    "no names": rows(U, TAU),
-    "no unit of the displacement": "us,tau [MPa]\n" + rows(U, TAU),
-    "no unit of the stress": "us [mm],tau at 3 MPa\n" + rows(U, TAU),
-    "per cent of the peak": "us [mm],tau (% of peak)\n" + rows(U, 100 * TAU / 3.2),
-    "reversed sign": "us [mm],tau [MPa]\n" + rows(U, -TAU),
-    "a unit in small letters": "us [mm],tau [mpa]\n" + rows(U, TAU),
-    "names of its own": "way [mm],resistance [MPa]\n" + rows(U, TAU),
-    "decimal commas between commas": "us [mm],tau [MPa]\n" + rows(U, 1 + TAU, decimal=","),
-}
-OWN = {"NAME:mm": "way:mm", "NAME:MPa": "resistance:MPa"}
-
-
-@pytest.mark.parametrize("name", REFUSED)
-def test_refused_with_the_cure(name, tmp_path):
-    """The options that the messages name, taken one after the other, read the file."""
-    path, given, message = tmp_path / "lab.csv", {}, ""
-    path.write_text(REFUSED[name])
-    for _ in range(3):
-        try:
-            (test,) = read_shear(path, **given)
-            break
-        except ValueError as error:
-            message = str(error)
-        assert str(path) in message
-        if "separate the columns by semicolons" in message:
-            path.write_text("us [mm];tau [MPa]\n" + rows(U, TAU, mark=";", decimal=","))
-            continue
-        what, cure = re.search(r'--(shear|shear-stress)-column "(.*?)"', message).groups()
-        if name == "no names" and what == "shear-stress":
-            cure = "2:MPa"  # which of the columns it is, only the reader knows
-        given[what.removeprefix("shear-")] = OWN.get(cure, cure)
-    assert message
-    np.testing.assert_allclose(test.shear, 1e-3 * U, atol=1e-15)
-    np.testing.assert_allclose(test.shear_stress, 1e6 * TAU, atol=1e-9)
+    found = read_shear(tmp_path / "lab.csv", **told)
+    assert found.normal == pytest.approx(2e6)
+    sense = np.sign(found.shear[-1])
+    np.testing.assert_allclose(sense * found.shear, 1e-3 * U, atol=1e-15)
+    np.testing.assert_allclose(sense * found.shear_stress, 1e6 * TAU, atol=1e-9)
 
 
 def test_closure_is_read_alike(tmp_path):
@@ -137,24 +61,56 @@ def test_closure_is_read_alike(tmp_path):
     stress, closure = read_closure(tmp_path / "c.csv")
     np.testing.assert_allclose(closure, 1e-3 * U)
     np.testing.assert_allclose(stress, 1e6 * U)
+    assert all(load(name)[0].max() > 1e6 for name in names())
+
+
+THOUSANDS = "us [mm]\ttau [kPa]\n0.0\t0\n0.1\t875\n0.2\t1,201\n0.3\t1,305\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        THOUSANDS,
+        THOUSANDS.replace("\t", ";"),
+        THOUSANDS.replace("1,201", "1,201.5"),
+        THOUSANDS.replace("0.", "0,").replace("1,", "1."),  # decimal commas, points for thousands
+        'us [mm],tau [kPa]\n0.0,0\n0.1,875\n0.2,"1,201"\n',
+    ],
+)
+def test_what_may_be_thousands_is_refused(text, tmp_path):
+    """1,201 kPa is 1.2 MPa or 1.2 kPa: a factor of 1000 that no later check may see."""
+    (tmp_path / "lab.csv").write_text(text)
+    with pytest.raises(ValueError, match=r"may have a mark between its thousands.*--decimal-comma"):
+        read_shear(tmp_path / "lab.csv", **NORMAL)
+
+
+def test_decimal_commas_are_read_where_a_number_or_the_caller_shows_them(tmp_path):
+    path, text = tmp_path / "lab.csv", "us [mm];tau [MPa]\n0;0\n1,1;1,125\n2,2;1,201\n"
+    path.write_text(text)
+    assert read_shear(path, **NORMAL).shear_stress[2] == 1.201e6
+    path.write_text(text.replace("1,1;", "1;").replace("2,2;", "2;"))
+    assert read_shear(path, **NORMAL, decimal_comma=True).shear_stress[2] == 1.201e6
+    with pytest.raises(ValueError, match="line 3 holds '1,125'"):
+        read_shear(path, **NORMAL)
 
 
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("", "has no row of two numbers or more"),
-        ("us [mm],tau [MPa]\n", "has no row of two numbers or more"),
-        ("us [mm],tau [MPa]\n1,2\n", "has 1 rows with both numbers; give 3 or more"),
-        ("us [mm],u [mm],us [mm],tau [MPa]\n1,1,2,3\n2,2,3,4\n3,3,4,5\n", "2 columns of shear"),
+        (None, r"lab\.csv: cannot be read .*; give a CSV file"),
+        ("", "must hold a line of names with units"),
+        (rows(U, TAU), "must hold a line of names with units"),
+        ("us [mm],tau [MPa]\n1,2\n2,\n3,\n", "has 1 rows with both numbers; give 3 or more"),
+        ("us [mm],us [mm],tau [MPa]\n1,2,3\n2,3,4\n3,4,5\n", "has 2 columns of one name"),
         ("us [mm],tau [MPa]\n0,0\n1,2\n2,inf\n", "line 4 holds 'inf', which is no number"),
+        ("us [mm],tau\n" + rows(U, TAU), 'gives no unit; name it, .* "tau:MPa"'),
+        ("us [mm],tau [mpa]\n" + rows(U, TAU), "has the unit 'mpa', none of Pa"),
+        ("us [mm],tau [MPa]\n" + rows(U, TAU, decimal=","), "has 4 cells under 2 names"),
+        ("us [mm],tau [MPa]\n" + rows(U, -TAU), 'turn its sign: .* "tau:-1MPa"'),
     ],
 )
 def test_what_cannot_be_read(text, told, tmp_path):
-    (tmp_path / "lab.csv").write_text(text)
+    if text is not None:
+        (tmp_path / "lab.csv").write_text(text)
     with pytest.raises(ValueError, match=told):
-        read_shear(tmp_path / "lab.csv")
-
-
-def test_no_file():
-    with pytest.raises(ValueError, match=r"nowhere\.csv: cannot be read .*; give a CSV file"):
-        read_shear(Path("nowhere.csv"))
+        read_shear(tmp_path / "lab.csv", **NORMAL)

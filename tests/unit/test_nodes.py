@@ -34,6 +34,7 @@ def test_azimuths_are_exact_for_the_harmonics_of_c(phi):
     assert phi % 4 or {n % 2 for n in numbers} == {0}
     for plane in (None, 0.0):
         f = facets(jl.Orientation(3.0, 0.3, 0.0), 6, phi, plane)
+        assert f.weight.sum() == pytest.approx(1.0, abs=1e-14)
         for k in (1, 2, 3, 4):  # cos 2 phi of the density times cos 2 phi of the stiffness
             assert np.sum(f.weight * np.cos(k * f.phi)) == pytest.approx(0.0, abs=1e-14)
 
@@ -46,13 +47,6 @@ def test_every_facet_has_its_opposite(plane):
     assert there == sorted(
         zip((mirror.T + 0.0).round(12).tolist(), f.weight.round(12), strict=True)
     )
-
-
-@pytest.mark.parametrize("plane", [None, 0.0, 0.6])
-def test_weights_add_up_at_any_number_of_nodes(plane):
-    orientation = jl.Orientation(3.0, 1.2, -0.1)
-    for u in (1, 2, 5):
-        assert facets(orientation, u, 3, plane).weight.sum() == pytest.approx(1.0, abs=1e-14)
 
 
 def test_cells_of_a_power_law_are_a_power_grading():
@@ -92,3 +86,13 @@ def test_light_facets_have_fewer_cells_and_all_are_counted():
     assert k.cells == cells.max() > cells.min() == 1
     assert k.sliders == cells.sum() < len(cells) * k.cells
     assert (np.diff(cells[np.argsort(k.weight)]) >= 0).all()  # c = 0: weights of a ring are equal
+
+
+def test_a_front_is_refused_with_what_to_take_instead(make_law):
+    with pytest.raises(ValueError, match=r"resolution\.front is removed: take more depth cells"):
+        jl.Resolution(3, 6, 3, front=True)
+    law = make_law(resolution=jl.Resolution(3, 5, 7))
+    text = law.to_toml()
+    assert jl.JointLaw.from_text(text.replace("depth = 7", "depth = 7, front = false")) == law
+    with pytest.raises(ValueError, match=r"resolution\.front.*more depth cells"):
+        jl.JointLaw.from_text(text.replace("depth = 7", "depth = 7, front = true"))

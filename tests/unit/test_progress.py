@@ -1,25 +1,11 @@
 """What is said of long work: on a terminal once, in a pipe nothing."""
 
 import io
+from unittest.mock import MagicMock
 
 import pytest
 
 from jointlaw.support import progress
-
-
-class Elapsed:
-    """A timer whose time is over at once."""
-
-    def __init__(self, seconds, function, words):
-        assert seconds == 2.0
-        self.say = lambda: function(*words)
-        self.cancelled = False
-
-    def start(self):
-        self.say()
-
-    def cancel(self):
-        self.cancelled = True
 
 
 class Terminal(io.StringIO):
@@ -29,17 +15,15 @@ class Terminal(io.StringIO):
 
 @pytest.mark.parametrize(("stream", "told"), [(Terminal(), "compiling\n"), (io.StringIO(), "")])
 def test_a_silent_wait_is_explained_on_a_terminal(monkeypatch, stream, told):
-    monkeypatch.setattr(progress, "Timer", Elapsed)
+    """The time is over at once here; the timer is stopped with the work, also where that fails."""
+    timer = MagicMock()
     monkeypatch.setattr("sys.stderr", stream)
-    with progress.explained("compiling"):
-        pass
-    assert stream.getvalue() == told
-
-
-def test_short_work_is_not(monkeypatch):
-    """The timer is stopped with the work, also where that fails."""
-    made = []
-    monkeypatch.setattr(progress, "Timer", lambda *words: made.append(Elapsed(*words)) or made[-1])
+    monkeypatch.setattr(progress, "Timer", timer)
     with pytest.raises(ValueError, match="no"), progress.explained("compiling"):
         raise ValueError("no")
-    assert made[0].cancelled
+    seconds, say, words = timer.call_args.args
+    assert seconds == progress.PATIENCE
+    for _ in timer.return_value.start.call_args_list:
+        say(*words)
+    assert stream.getvalue() == told
+    assert timer.return_value.cancel.called

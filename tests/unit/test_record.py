@@ -56,10 +56,29 @@ def test_summary_figures(azimuth, sense):
         "stored_J_per_m2": 2.0,
         "dissipated_J_per_m2": 3.0,
         "peak_friction_angle_deg": record.peak_friction_angle,
+        "has_peak": True,
         "residual_friction_angle_deg": record.residual_friction_angle,
         "dilation_angle_deg": record.dilation_angle,
         "secant_shear_stiffness_Pa_per_m": record.secant_stiffness,
     }
+
+
+@pytest.mark.parametrize(
+    ("shear", "stress", "peak"),
+    [
+        ([0, 1, 2, 3], [0, 2, 3, 3], False),  # still rises, or stays, where the test ends
+        ([0, 1, 2, 3], [0, 3, 2, 2], True),
+        ([0, 1, 2, 1, 0], [0, 2, 3, 1, 0], False),  # falls only because shear turns
+        ([0, 1, 2, 1, 0], [0, 3, 2.5, 1, 0], True),
+        ([0, -1, -2, -1], [0, -3, -2.9, -1], True),
+        ([0, 1, 2, 3], [0, 3, 2.999, 2.999], False),  # less than 0.1 % is rounding
+    ],
+)
+def test_a_curve_without_a_peak_is_told(shear, stress, peak):
+    columns = {name: np.zeros(len(shear)) for name in COLUMNS}
+    columns |= {"shear_2": np.array(shear, float), "F2": np.array(stress, float)}
+    record = jl.Record(columns | {"F1": np.full(len(shear), 10.0)})
+    assert record.has_peak is peak
 
 
 def test_figures_of_a_record_without_shear():

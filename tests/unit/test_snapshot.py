@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
+from jointlaw.joints.state import JointState
 
 
 def walk(joint, rng, steps=30):
@@ -28,6 +29,7 @@ def test_trial_leaves_no_trace(any_law):
     np.testing.assert_array_equal(F, F2)
     np.testing.assert_array_equal(C, C2)
     np.testing.assert_allclose(joint.F, F2, rtol=1e-14, atol=1e-14 * np.abs(F2).max())
+    np.testing.assert_allclose(joint.delta, before[0, : any_law.dim] + d, rtol=1e-14)
 
 
 def test_restore_then_the_same_steps_bit_for_bit(any_law, tmp_path):
@@ -44,18 +46,6 @@ def test_restore_then_the_same_steps_bit_for_bit(any_law, tmp_path):
     other.restore(jl.load_state(tmp_path / "state.npz"))
     walk(other, np.random.default_rng(2), 300)
     np.testing.assert_array_equal(other.snapshot().values, end)
-
-
-def test_a_snapshot_is_a_copy(law):
-    joint = law.joint()
-    state = joint.snapshot()
-    joint.update([1e-7, 0.0, 0.0])
-    assert not state.values.any()
-    joint.restore(state)
-    joint.update([1e-7, 0.0, 0.0])
-    assert not state.values.any()
-    assert len(state) == 1
-    assert len(law.joints(7).snapshot()) == 7
 
 
 @pytest.mark.parametrize(
@@ -95,14 +85,6 @@ def test_trials_of_two_threads_do_not_meet(law):
     np.testing.assert_array_equal(C, C_alone)
 
 
-def test_a_law_read_from_its_file_takes_the_state(law, tmp_path):
-    joint = law.joint()
-    joint.update([3e-7, 1e-7, 0.0])
-    twin = jl.JointLaw.from_toml(law.to_toml(tmp_path / "law.toml")).joint()
-    twin.restore(joint.snapshot())
-    np.testing.assert_array_equal(twin.F, joint.F)
-
-
 def test_another_law_is_refused(law, make_law):
     for other in (make_law(mu=0.31), make_law(resolution="fine"), make_law(plane=0.0)):
         joint = other.joint()
@@ -126,9 +108,9 @@ def test_what_is_no_snapshot_is_refused(moved, state):
 
 def test_a_damaged_state_is_refused(law):
     values = law.joint().snapshot().values
-    values[3] = np.nan
+    values[0, 3] = np.nan
     with pytest.raises(ValueError, match="damaged"):
-        law.joint().restore(jl.JointState(law.fingerprint, values))
+        law.joint().restore(JointState(law.fingerprint, values))
 
 
 @pytest.mark.parametrize(
@@ -149,14 +131,6 @@ def test_a_file_that_is_no_state(tmp_path, content):
     path = tmp_path / "state.npz"
     content(path)
     with pytest.raises(ValueError, match=r"state\.npz.* is not a saved joint state"):
-        jl.load_state(path)
-
-
-def test_half_a_file_is_refused(law, tmp_path):
-    path = tmp_path / "state.npz"
-    law.joint().snapshot().save(path)
-    path.write_bytes(path.read_bytes()[:-100])
-    with pytest.raises(ValueError, match="not a saved joint state"):
         jl.load_state(path)
 
 

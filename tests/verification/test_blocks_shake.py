@@ -1,85 +1,57 @@
-"""The scene `shake`: slip per cycle against Newmark's sliding block, and none below yield."""
+"""The scene `shake` with plain friction slips per cycle as Newmark's sliding block (1965)."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_trapezoid
 
-import jointlaw as jl
-from dem_demo import Simulation, coulomb_law, run
-from dem_demo.scene import turn
+from dem_demo import Simulation, coulomb_law, parse
+from dem_demo.scene.read import SCENES
 
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
-import shake
+pytestmark = pytest.mark.slow
+DIP, FREQUENCY, MU = np.radians(20.0), 4.0, 0.6  # rad, 1/s
+G, CYCLES = 9.81, 5
 
-CYCLES, LAST = 5, 2
+
+def scene(acceleration):
+    """The scene with a sine of this size (m/s2), and plain friction."""
+    text = (SCENES / "shake.toml").read_text(encoding="utf-8")
+    text = text.replace("acceleration = 5.0", f"acceleration = {float(acceleration)}")
+    given = parse(text.replace("cycles = 10", f"cycles = {CYCLES}"))
+    return replace(given, laws={"joint": coulomb_law(2e8, 1.6e8, MU)})
+
+
+def per_cycle(t, slid):
+    """Mean slip (m) in the last two full cycles."""
+    ends = np.array([CYCLES - 1, CYCLES + 1]) / FREQUENCY
+    return float(np.diff(np.interp(ends, t, slid))[0] / 2)
 
 
 def measured(given):
-    """Slip per cycle (m) of a scene."""
-    return shake.per_cycle(*shake.slip(given), CYCLES, LAST)
+    sim, rows = Simulation(given), []
+    while sim.time < (CYCLES + 1) / FREQUENCY:
+        sim.step()
+        rows.append([sim.time, sim.slid(1, 0)])
+    return per_cycle(*np.transpose(rows))
 
 
-def predicted(block, given):
-    """Newmark's."""
-    return shake.per_cycle(*block.slip(shake.sine(given)), CYCLES, LAST)
+def gain(a):
+    """Acceleration (m/s2) down the joint while the block slides, for one of the base (m/s2)."""
+    normal = G * np.cos(DIP) + a * np.sin(DIP)
+    return G * np.sin(DIP) - a * np.cos(DIP) - MU * normal
 
 
-@pytest.fixture(scope="module")
-def block():
-    return shake.Newmark.of(shake.scene(1.0).laws["joint"])
-
-
-def test_scene_is_what_the_quadrature_takes_it_for():
-    given = shake.scene(2.0)
-    base, slab = given.blocks
-    side = base.corners[1] - base.corners[0]
-    assert np.arctan2(-side[1], side[0]) == pytest.approx(shake.DIP)
-    height = np.linalg.norm(slab.corners[3] - slab.corners[0])
-    assert slab.density * height == pytest.approx(shake.LOAD)
-    # drawn to touch: the closure under its weight is 1e-4 m
-    gap = (turn(shake.DIP) @ (slab.centroid - base.centroid))[1] - 0.5 - 0.5 * height
-    assert abs(gap) < 2e-5
-    assert shake.sine(given).times[-1] * shake.FREQUENCY == pytest.approx(shake.CYCLES + 2)
+def predicted(given):
+    """Newmark's slip per cycle (m) by quadrature: it is rigid and never slides up."""
+    (drive,) = (drive for drive in given.drives if drive.order)
+    t = np.arange(0.0, (CYCLES + 1) / FREQUENCY, 1e-5)
+    gained = cumulative_trapezoid(gain(drive.path(t, nu=2)), t, initial=0.0)
+    velocity = gained - np.minimum.accumulate(gained)  # what was gained since it last stuck
+    return per_cycle(t, cumulative_trapezoid(velocity, t, initial=0.0))
 
 
 def test_plain_friction_slides_as_newmark_says():
     """Springs of 2e8 Pa/m: they come back by less than 1e-4 m, the same in every cycle."""
-    given = shake.scene(3.0, CYCLES)
-    given = replace(given, laws={"joint": coulomb_law(2e8, 1.6e8, 0.6)})
-    plain = shake.Newmark([0.0, 1e6], [0.6, 0.6])
-    assert plain.yields_at() == pytest.approx(9.81 * np.tan(np.arctan(0.6) - shake.DIP))
-    assert measured(given) == pytest.approx(predicted(plain, given), rel=2e-3)
-
-
-def test_joint_slides_as_newmark_says(block):
-    """Its critical slip, over which friction follows the stress, is 7 % of the slip per cycle."""
-    given = shake.scene(1.5 * block.yields_at(), CYCLES)
-    assert measured(given) == pytest.approx(predicted(block, given), rel=0.1)
-
-
-@pytest.mark.parametrize(
-    ("resolution", "most"),
-    [
-        ("balanced", 1e-5),
-        (jl.Resolution(2, 4, 24), 1e-6),
-    ],
-)
-def test_no_creep_below_yield(block, resolution, most):
-    """Coarse cells forget shear as the normal stress goes up and down, and the slab makes up."""
-    above = predicted(block, shake.scene(1.5 * block.yields_at(), CYCLES))
-    given = shake.scene(0.5 * block.yields_at(), CYCLES, resolution=resolution)
-    assert predicted(block, given) == 0.0
-    assert abs(measured(given)) < most * above
-
-
-def test_summary_holds_the_slip_per_cycle():
-    given = shake.scene(4.0, 2)
-    record, summary = run(Simulation(given), until=1.01)
-    (slips,) = summary["slip_per_cycle_m"].values()
-    assert len(slips) == 4  # it rises, twice all of it, it falls
-    assert slips[0] < slips[1] < slips[2]
-    slid = record.column("slab: slid_m")
-    assert sum(slips) == pytest.approx(slid[-1] - slid[0], rel=1e-3)  # the base rests from 1 s on
+    given = scene(3.0)
+    assert measured(given) == pytest.approx(predicted(given), rel=2e-3)

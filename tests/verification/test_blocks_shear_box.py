@@ -22,8 +22,8 @@ def box():
 
 
 def _row(sim):
-    delta = sim.joints.read("delta")
-    return [delta[:, 1].mean(), *sim.now.traction.mean(axis=0), delta[:, 0].mean()]
+    delta = sim.joints.delta
+    return [delta[:, 1].mean(), *sim.joints.traction.mean(axis=0), delta[:, 0].mean()]
 
 
 def test_stress_and_dilation_against_direct_shear(box):
@@ -55,4 +55,4 @@ def test_normal_stress_stays(box):
 
 def test_energy(box):
     _, sim, _ = box
-    assert abs(sim.now.ledger.error) < 1e-4
+    assert abs(sim.ledger.error) < 1e-4

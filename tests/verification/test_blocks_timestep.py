@@ -1,14 +1,13 @@
 """The predicted critical time step is sharp: bounded at 0.95 of it, diverging at 1.05."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from dem_demo import Refused, Simulation, parse
-from dem_demo.scene.laws import build_law
+from dem_demo.contact import virgin_curve
+from dem_demo.scene import Files, build_law
 
-STEPS = 20_000
+STEPS = 3000
 
 
 def column(blocks, zeta):
@@ -39,17 +38,18 @@ dashpot_shear = {zeta}
 def ring(scene, share, steps):
     """Largest velocity after small pushes, per step, at a share of the predicted limit."""
     sim = Simulation(scene, step=1e-9)
-    unchecked = np.full(sim.joints.n, np.inf)  # the guard would refuse the very thing tested here
-    limit = replace(sim.now.limit, checked=unchecked)
-    sim.now = replace(sim.now, dt=share * limit.now, limit=limit)
+    sim.limit.checked = np.full(sim.joints.n, np.inf)  # it would refuse what is tested here
+    sim.dt = share * sim.limit.now
     rng = np.random.default_rng(3)
-    sim.now.motion[3:] = 1e-7 * rng.standard_normal(sim.now.motion[3:].shape) * sim.system.mobile.T
-    sim.world.place(sim.now.motion)
+    sim.blocks.motion[3:] = (
+        1e-7 * rng.standard_normal(sim.blocks.motion[3:].shape) * sim.blocks.mobile.T
+    )
+    sim.blocks.place(sim.blocks.motion, sim.blocks.motion[3:])
     size = []
     try:
         for _ in range(steps):
             sim.step()
-            size.append(np.abs(sim.now.motion[3:]).max())
+            size.append(np.abs(sim.blocks.motion[3:]).max())
     except Refused:  # overlap or speed: it has diverged as far as it can
         pass
     return np.array(size)
@@ -58,7 +58,7 @@ def ring(scene, share, steps):
 @pytest.mark.parametrize("zeta", [0.0, 0.1])
 @pytest.mark.parametrize("blocks", [1, 10])
 def test_bounded_below_the_limit(blocks, zeta):
-    steps = STEPS if zeta == 0 else STEPS // 5
+    steps = STEPS
     size = ring(column(blocks, zeta), 0.95, steps)
     assert len(size) == steps
     # Energy of the leapfrog at 0.95 of the limit lets velocities grow by 1/sqrt(1 - 0.95^2) = 3.2
@@ -76,41 +76,9 @@ def test_diverges_above_the_limit(blocks, zeta):
     assert size.max() > 1e4 * size[0]
 
 
-def corner():
-    """A block that stands on its corner, in balance for as long as this test takes."""
-    text = column(1, 0.0).text.replace("stiffness = 1e8", "stiffness = 1e11")
-    high = 0.5 * np.hypot(1.0, 0.6)
-    tilt = np.degrees(np.arctan2(1.0, 0.6))
-    text = text.replace("at = [0.0, 0.3]", f"at = [0.0, {high}]\nangle = {tilt}")
-    return parse(text.replace("end = 1.0", "end = 1.0\ncorner_length = 0.05"))
-
-
-@pytest.mark.parametrize(("share", "bounded"), [(0.95, True), (1.05, False)])
-def test_a_corner_is_in_the_limit(share, bounded):
-    """One law point of 0.05 m at a lever arm of half the diagonal."""
-    size = ring(corner(), share, 400)
-    lever = 0.25 * (1.0 + 0.36) / ((1.0 + 0.36) / 12)
-    sim = Simulation(corner(), step=1e-9)
-    expected = 2 / np.sqrt(1e11 * 0.05 / 1560 * (1 + lever))
-    assert sim.now.limit.now == pytest.approx(expected, rel=1e-6)
-    if bounded:
-        assert len(size) == 400
-        assert size.max() < 10 * size[:50].max()
-    else:
-        assert size.max() > 1e4 * size[0]
-
-
 def test_refused_when_the_step_is_too_long():
     with pytest.raises(Refused, match="smaller step"):
         Simulation(column(1, 0.0), step=1.0)
-
-
-def test_rocking_is_in_the_limit():
-    """One block on two end points: omega = 1.74 to 1.79 sqrt(kA/m), more than translation."""
-    sim = Simulation(column(1, 0.0))
-    k, m = 1e8 * 1.0, 2600 * 0.6
-    translation = 2 / np.sqrt(k / m)
-    assert translation / sim.now.limit.now == pytest.approx(1.77, abs=0.2)
 
 
 def test_stiffness_at_stress_bounds_a_sheared_joint():
@@ -124,10 +92,10 @@ def test_stiffness_at_stress_bounds_a_sheared_joint():
             "heights": {"alpha": 3.82, "beta": 1.15e-3, "overlap": 3e-3},
         },
         "law",
+        Files(),
     )
-    from dem_demo.contact.stiffness import StiffnessCurve
 
-    curve, rng = StiffnessCurve.of(law), np.random.default_rng(5)
+    curve, rng = virgin_curve(law), np.random.default_rng(5)
     batch, closure = law.joints(40), law.closure(np.geomspace(5e3, 3e5, 40))
     batch.update(np.column_stack([closure, np.zeros(40)]), tangent=False)
     worst = 0.0
@@ -135,6 +103,7 @@ def test_stiffness_at_stress_bounds_a_sheared_joint():
         d = np.column_stack([rng.normal(0, 0.02, 40) * closure, rng.normal(2e-5, 1e-4, 40)])
         d[:, 0] = np.maximum(d[:, 0], 0.05 * closure - batch.delta[:, 0])
         F, C = batch.update(d, tangent=True)
-        size = np.linalg.norm(C, ord=2, axis=(1, 2))
-        worst = max(worst, float((size / curve.at_stress(F[:, 0]))[F[:, 0] > 1e3].max()))
+        bound = np.interp(F[:, 0], curve["stress"], curve["stiffness"])
+        share = np.linalg.norm(C, ord=2, axis=(1, 2)) / bound
+        worst = max(worst, float(share[F[:, 0] > 1e3].max()))
     assert 0.3 < worst < 1.0

@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 from builders import law
+from exact_work import step_work
 from scipy.integrate import solve_ivp
 from slow_bed import SlowBed, cap_quadrature
 
 import jointlaw as jl
+from jointlaw.kernels import reference as kernel
 
 D = 0.3
 CORNERS = np.array([[0.1, 0.05], [0.9, 0.4], [0.5, 1.2], [-0.8, 0.9], [-0.7, 0.9], [0.4, -0.6]])
@@ -102,3 +104,24 @@ def test_steady_friction_under_constant_stress_tends_to_the_steepest_contacts():
     # the loaded rim narrows as the root of closure over length: sqrt(10) = 3.2 times a decade
     assert gaps[0] > 2.0 * gaps[1] > 0.0
     assert gaps[1] < 1.0
+
+
+@pytest.mark.parametrize(("mu", "work"), [(4.0, -8.864), (0.6, None)])
+def test_a_known_fault_a_closed_cycle_creates_energy_if_mu_is_large(mu, work):
+    """docs/theory-incremental.md, "Large shear": the offset bends y within a step."""
+    R = 1e-6
+    asperity = jl.Asperity(K=1e5, lam=1.2, eta=0.0, mu=mu)
+    one = jl.JointLaw(
+        orientation=jl.Orientation(1.0), asperity=asperity, asperity_density=1e10,
+        closure_range=R, resolution=jl.Resolution(1, 3, 1), plane=0.0, critical_slip=0.3 * R,
+    )  # fmt: skip
+    cycle = [(1, 0.484), (-1.428, -0.503), (-3, 0), (0, -0.281), (0, 0.3), (3.428, 0)]
+    state, found, k = np.zeros((one.tables.rows, 1)), 0.0, one.tables
+    for d in R * np.array(cycle):
+        found += step_work(k, state, d)
+        state = kernel.step(k, state, d[:, None], False)[0]
+    assert kernel.measures(k, state).stored[0] == 0.0  # nothing is left to give back
+    if work is None:
+        assert found > 0.0
+    else:
+        assert found == pytest.approx(work, abs=5e-4)  # the digits that are given

@@ -46,8 +46,7 @@ def test_a_density_that_is_infinite_just_short_of_the_point_of_contact_is_refuse
 
 
 @pytest.mark.parametrize("changes", INSIDE, ids=name)
-def test_just_inside_everything_holds(changes, tmp_path, monkeypatch):
-    monkeypatch.setenv("JOINTLAW_REPLAY_DIR", str(tmp_path))
+def test_just_inside_everything_holds(changes):
     law = build(**changes)
     size = min(SCALE, 1e-6 * law.largest_reach)
     assert not run(law, size, 1, n=6, steps=12) + refused(law, size)

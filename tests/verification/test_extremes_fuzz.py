@@ -7,11 +7,6 @@ from extremes.laws import COMPILED
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(autouse=True)
-def replays(tmp_path, monkeypatch):
-    monkeypatch.setenv("JOINTLAW_REPLAY_DIR", str(tmp_path))
-
-
 @pytest.mark.parametrize("seed", FOUND)
 def test_what_was_found_stays_mended(seed):
     assert fuzz(seed) == []

@@ -7,7 +7,6 @@ concurrent writes: test_extremes_files.py.
 
 import multiprocessing
 import pickle
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -19,26 +18,6 @@ import jointlaw as jl
 pytestmark = pytest.mark.slow
 
 FAST = jl.Resolution(1, 3, 1)
-LAWS = ({"mu": 0.3}, {"a": 1.0, "eta": 0.0}, {"heights": "printed, individual"}, {"lam": 10.0})
-
-
-def walk(task):
-    """Tractions at the end of a path of its own, of 200 joints of a law of its own."""
-    which, seed = task
-    joints = build(resolution=FAST, **LAWS[which]).joints(200)
-    for d in path(np.random.default_rng(seed), 200, 20, SCALE)[0]:
-        F, _ = joints.update(d)
-    return F
-
-
-TASKS = [(k % len(LAWS), k) for k in range(8)]
-
-
-def test_threads_with_laws_and_joints_of_their_own():
-    with ThreadPoolExecutor(8) as pool:
-        together = list(pool.map(walk, TASKS))
-    for task, F in zip(TASKS, together, strict=True):
-        np.testing.assert_array_equal(F, walk(task))
 
 
 def go_on(batch):
@@ -46,6 +25,7 @@ def go_on(batch):
     return batch.update(np.full((len(batch), 3), 0.01 * SCALE), tangent=False)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["fork", "spawn"])
 def test_a_batch_goes_on_in_another_process(method):
     """After the parent has used its threads, which a fork does not take along."""
@@ -57,6 +37,7 @@ def test_a_batch_goes_on_in_another_process(method):
     np.testing.assert_array_equal(elsewhere, go_on(pickle.loads(pickle.dumps(batch))))
 
 
+@pytest.mark.slow
 def test_a_million_joints_are_a_million_single_joints():
     n = 1_000_000 if COMPILED else 100_000
     law = build(resolution=FAST)

@@ -7,11 +7,10 @@ from dataclasses import replace
 import pytest
 from scipy.optimize import brentq
 
-import jointlaw as jl
 from dem_demo.cli import main
-from dem_demo.output.law_alone import friction_angle
-from dem_demo.scene import build, parse, read_tables
-from dem_demo.studies.limit import critical_tilt, reduced, strength_factor
+from dem_demo.output.monitors import friction_angle
+from dem_demo.scene import Files, parse, read_tables
+from dem_demo.studies.strength import critical_tilt, reduced, strength_factor
 
 DIP = 32.0
 SCENE = f"""
@@ -50,46 +49,23 @@ def angle(factor, dip):
 
 def test_factor_of_a_block_is_that_of_the_law_alone():
     alone = brentq(lambda f: angle(f, DIP) - DIP, 1.0, 3.0, xtol=1e-3)
-    assert strength_factor(read_tables(SCENE), "scene") == pytest.approx(alone, rel=FOUND)
+    assert strength_factor(read_tables(SCENE), Files()) == pytest.approx(alone, rel=FOUND)
 
 
 def test_critical_tilt_of_a_block_is_that_of_the_law_alone():
     alone = brentq(lambda tilt: angle(1.0, DIP + tilt) - DIP - tilt, 0.0, 15.0, xtol=1e-3)
-    assert critical_tilt(read_tables(SCENE), "scene") == pytest.approx(alone, rel=FOUND)
+    assert critical_tilt(read_tables(SCENE), Files()) == pytest.approx(alone, rel=FOUND)
 
 
 def test_all_frictions_are_divided_and_nothing_else():
     data = read_tables(SCENE)
     data["laws"]["plain"] = {"kind": "coulomb", "normal_stiffness": 1e9, "friction": 0.6}
     data["laws"]["joint"]["asperity"] |= {"mu_residual": 0.2, "wear_slip": 1e-3}
-    laws = reduced(data, 2.0)["laws"]
+    laws = reduced(data, 2.0, Files())["laws"]
     assert laws["plain"] == data["laws"]["plain"] | {"friction": 0.3}
     mine, given = laws["joint"].pop("asperity"), data["laws"]["joint"]["asperity"]
     assert mine == given | {"mu": 0.2, "mu_residual": 0.1}
     assert laws["joint"].items() <= data["laws"]["joint"].items()
-
-
-def test_friction_of_a_law_by_name_is_divided_too():
-    data = read_tables(SCENE)
-    data["laws"]["named"] = {"from": "westerly-rough", "critical_slip": 1e-3}
-    named = build(reduced(data, 2.0), "scene").laws["named"]
-    given = jl.presets.load("westerly-rough").asperity
-    assert named.asperity == replace(given, mu=given.mu / 2)
-    assert named.critical_slip == 1e-3
-
-
-def test_a_scene_that_starts_unseated_has_the_same_factor():
-    data = read_tables(SCENE)
-    unseated = data | {"run": data["run"] | {"seat": False}}
-    assert strength_factor(unseated, "scene") == strength_factor(data, "scene")
-
-
-def test_friction_ends_at_that_which_a_scene_may_have():
-    data = read_tables(SCENE)
-    data["laws"]["glued"] = {"kind": "coulomb", "normal_stiffness": 1e9, "friction": math.inf}
-    laws = reduced(data, 1 / 64)["laws"]
-    assert laws["joint"]["asperity"]["mu"] == 5.0
-    assert laws["glued"]["friction"] == math.inf
 
 
 def test_command_tells_both_and_draws_the_failure(tmp_path, capsys):

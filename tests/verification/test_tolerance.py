@@ -81,7 +81,7 @@ def test_what_cannot_be_met_is_refused_with_what_was_reached():
 def test_tolerances_are_kept_on_paths_never_seen(name):
     law = replace(jl.presets.load(name), plane=0.0)
     corners = random_corners(np.random.default_rng(2), 6)[:, :, :2]
-    d = np.moveaxis(increments(law.closure_range * corners, 20), 1, 0)
+    d = np.ascontiguousarray(np.moveaxis(increments(law.closure_range * corners, 20), 1, 0))
     truth = tractions(replace(law, resolution=reference_resolution(law)), d)
     sliders = []
     for tolerance in (0.05, 0.02):

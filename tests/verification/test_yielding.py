@@ -1,5 +1,8 @@
 """Asperities that yield and wear: closed form in closure, and the slow bed in shear."""
 
+import dataclasses
+import warnings
+
 import numpy as np
 import pytest
 from builders import increments, law, random_corners, slow_heights
@@ -104,3 +107,40 @@ def test_wear_agrees_with_the_slow_bed(damage):
         bound = 5e-3 if "yield_interference" not in damage else 2e-2
         assert np.linalg.norm(G - F, axis=1).max() < bound * np.linalg.norm(F, axis=1).max()
         assert joints.friction[i] == pytest.approx(bed.mu, abs=0.002)
+
+
+def test_a_joint_closed_beyond_its_highest_asperity_gives_a_warning():
+    """99.99 % of the heights of this preset end at a closure of 17.1 mm."""
+    stiff = jl.presets.load("jing-replica")
+    asperity = dataclasses.replace(stiff.asperity, yield_interference=0.1 * stiff.closure_range)
+    weak = dataclasses.replace(stiff, asperity=asperity)
+    assert weak.closure(30e6) == pytest.approx(17.6e-3, rel=1e-3)
+    with pytest.warns(UserWarning, match="closure = 0.0176 m: 99.99 % .* law ends"):
+        joint = weak.joint(30e6)
+    with pytest.warns(UserWarning, match="law ends"):
+        jl.direct_shear(joint, 1e-3, normal=30e6, steps=5)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        weak.joint(10e6)
+        stiff.joint(30e6)
+
+
+def test_friction_falls_with_the_slip_of_the_asperities():
+    """One linear spring at a closure of 1 slips by the shear and by what its extension mu lam y
+    shrinks; mu = mu_r + (mu_0 - mu_r) exp(-slip/wear_slip)."""
+    damage = {"mu_residual": 0.1, "wear_slip": 0.5}
+    joint = law(
+        a=1e9, b=0.0, c=0.0, eta=0.0, damage=damage, resolution=jl.Resolution(1, 3, 1)
+    ).joint()
+    joint.update([1.0, 0.0, 0.0])
+
+    def sheared(steps):
+        for _ in range(steps):
+            F, _ = joint.update([0.0, 0.001, 0.0], tangent=False)
+        return joint.friction, -0.5 * np.log((joint.friction - 0.1) / 0.3), F[1] / F[0]
+
+    mu, slip, _ = sheared(600)  # all slips from 0.4 lam = 0.48 on
+    mu_later, slip_later, ratio = sheared(500)
+    # friction lags by a step of 1/500 of the wear slip
+    assert slip_later - slip == pytest.approx(0.5 + 1.2 * (mu - mu_later), rel=5e-3)
+    assert ratio == pytest.approx(mu_later, rel=5e-3)

@@ -15,6 +15,7 @@ import jointlaw as jl
 from jointlaw.kernels import reference as kernel
 
 PATHS = int(os.environ.get("JOINTLAW_PATHS", 2))
+SEEDS = [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, PATHS))]
 
 
 def random_law(rng, held, wears):
@@ -25,7 +26,7 @@ def random_law(rng, held, wears):
     # the printed heights are convex as a population from eta = 0.287
     eta = rng.uniform(0.3, 1.0) if formation == "population" else rng.choice([0.0, 0.5, 1.0])
     damage = {"yield_interference": 10.0 ** rng.uniform(-2.5, 0.5)}
-    if wears:
+    if wears and mu > 0.0:
         damage |= {"mu_residual": mu * rng.random(), "wear_slip": 10.0 ** rng.uniform(-2.0, 0.5)}
     return law(
         a=a, b=b, c=rng.uniform(-1.0, 1.0) * (1 / 3 - b / 6), lam=rng.uniform(0.3, 2.0),
@@ -51,7 +52,7 @@ def scale(k, state):
 
 @pytest.mark.parametrize("wears", [False, True])
 @pytest.mark.parametrize("held", [False, True])
-@pytest.mark.parametrize("seed", range(PATHS))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_no_step_of_a_closed_path_makes_energy(seed, held, wears):
     rng = np.random.default_rng(seed)
     k = random_law(rng, held, wears).tables
@@ -69,7 +70,7 @@ def test_no_step_of_a_closed_path_makes_energy(seed, held, wears):
     assert sum(gains) <= 1e-12 * peak
 
 
-@pytest.mark.parametrize("seed", range(PATHS))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_no_cycle_that_is_searched_for_returns_work(seed):
     """An adversary: of many triangles from one state that with the least loss, and its children."""
     rng = np.random.default_rng(seed)
@@ -104,11 +105,10 @@ def test_no_cycle_that_is_searched_for_returns_work(seed):
     assert sum(made[3:]) <= 1e-12 * peak
 
 
-@pytest.mark.parametrize("mu", [0.0, 0.3])
-def test_the_drag_of_the_offset_never_returns_work(mu):
-    """T . o >= 0 for the in-plane resultant T of the normal forces, whatever was pressed flat."""
+def test_the_drag_of_the_offset_never_returns_work():
+    """T . o >= 0 for the in-plane resultant T of the normal forces, whatever was flattened."""
     rng = np.random.default_rng(3)
-    k = law(mu=mu, critical_slip=0.3, a=2.0, damage={"yield_interference": 0.1}).tables
+    k = law(mu=0.3, critical_slip=0.3, a=2.0, damage={"yield_interference": 0.1}).tables
     state = np.zeros((k.rows, 200))
     for _ in range(40):
         d = rng.normal(size=(3, 200)) * [[0.3], [0.4], [0.4]]
@@ -121,8 +121,8 @@ def test_the_drag_of_the_offset_never_returns_work(mu):
         assert pull.min() >= -1e-14 * np.max(force)
 
 
-@pytest.mark.parametrize("wear_slip", [0.5, 0.01])
-@pytest.mark.parametrize("interference", [np.inf, 0.3])  # pressed flat, a limit does not grow
+# flattened springs keep the friction limit from growing
+@pytest.mark.parametrize(("wear_slip", "interference"), [(0.5, np.inf), (0.01, 0.3)])
 def test_wear_of_one_to_fifty_per_cent_in_a_step_makes_no_energy(wear_slip, interference):
     """Slide, then close while shearing slowly: sliders above their new limit would gain work."""
     damage = {"mu_residual": 0.2, "wear_slip": wear_slip, "yield_interference": interference}

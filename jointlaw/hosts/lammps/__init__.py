@@ -1,6 +1,6 @@
 """LAMMPS: the export of a law with its plug-in, and the folder where LAMMPS finds the plug-in.
 
-export      tables, plug-in source, build script and input scripts in one folder
+export      tables, plug-in source, build script and an input script in one folder
 files       those files, as they are copied
 """
 

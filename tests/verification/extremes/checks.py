@@ -14,7 +14,7 @@ def sliders_within_friction(batch, mu):
 
     mu: friction at the beginning of the step; f_n of the facet without what yielding took.
     """
-    k, values = batch.law.tables, batch.snapshot().values
+    k, values = batch.law.tables, batch.snapshot().values.T
     now = kernel.parts(k, values)
     y = kernel.effective_closure(k, now.delta[0], now.offset)
     virgin = kernel.cells(k, y)
@@ -30,7 +30,7 @@ def sliders_within_friction(batch, mu):
 
 def elastic_force(batch):
     """Forces (n,) in Pa that facets would bear, friction included, if they had not yielded."""
-    k, now = batch.law.tables, kernel.parts(batch.law.tables, batch.snapshot().values)
+    k, now = batch.law.tables, kernel.parts(batch.law.tables, batch.snapshot().values.T)
     force, _ = k.curve.force(kernel.effective_closure(k, now.delta[0], now.offset))
     return (1.0 + k.mu) * np.sum(k.area[:, None] * force, axis=0)
 
@@ -73,7 +73,7 @@ class Watch:
 
     def _other_kernel(self, before, d, F):
         """How far the reference kernel is from F, as a share of the largest traction so far."""
-        _, reference, _ = kernel.step(self.batch.law.tables, before, d.T, False)
+        _, reference, _ = kernel.step(self.batch.law.tables, before.T, d.T, False)
         peak = np.where(self.forces > 0, self.forces, 1.0)
         return float(np.max(np.abs(reference.T - F) / peak[:, None], initial=0.0))
 

@@ -4,6 +4,7 @@ import numpy as np
 
 import jointlaw as jl
 from extremes.laws import COMPILED
+from jointlaw.laboratory.experiments import PathError
 
 STRESSES = 10.0 ** np.arange(0, 11, 1 if COMPILED else 5)
 
@@ -13,7 +14,7 @@ def close(law, stress):
     joint = law.joint()
     try:
         record = jl.closure_test(joint, stress, steps=6)
-    except jl.PathError as error:
+    except PathError as error:
         return None, str(error)
     levels = (np.arange(1, 7) / 6) ** (1 + law.asperity.eta) * stress
     asked = np.concatenate([[0.0], levels, levels[-2::-1], [0.0]])
@@ -26,6 +27,6 @@ def shear(law, stress, turns=(1.0, -1.0), steps=12):
     far = np.array(turns) * float(law.closure(stress))
     try:
         record = jl.direct_shear(joint, far, normal=stress, steps=steps)
-    except jl.PathError as error:
+    except PathError as error:
         return None, str(error)
     return float(np.max(np.abs(record.F1 - stress))) / stress, ""

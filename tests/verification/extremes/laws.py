@@ -48,9 +48,9 @@ def build(**changes):
     p = ORDINARY | changes
     b, c = p.get("b, c", (p["b"], p["c"]))
     heights = HEIGHTS.get(p["heights"], p["heights"])
-    damage = {"yield_interference": p["yields at"], "wear_slip": p["wears over"]}
-    if p["wears over"] < np.inf:
-        damage["mu_residual"] = 0.3 * p["mu"]
+    damage = {"yield_interference": p["yields at"]}
+    if p["wears over"] < np.inf and p["mu"] > 1e-5:  # next to no friction cannot wear
+        damage |= {"wear_slip": p["wears over"], "mu_residual": 0.3 * p["mu"]}
     return jl.JointLaw(
         orientation=jl.Orientation(p["a"], b, c),
         asperity=jl.Asperity(K=p["K"], lam=p["lam"], eta=p["eta"], mu=p["mu"], **damage),

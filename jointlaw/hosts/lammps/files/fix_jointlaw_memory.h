@@ -104,6 +104,13 @@ class FixJointlawMemory : public Fix {
     return all;
   }
 
+  double given_up() const    // how many, on all processors
+  {
+    double all = 0.0;
+    MPI_Allreduce(&sums[COUNT], &all, 1, MPI_DOUBLE, MPI_SUM, world);
+    return all;
+  }
+
   // maxexchange must hold at any moment: atoms also move between runs, as write_restart begins
   void longest(int joints) { maxexchange = std::max(maxexchange, 2 + joints * size); }
 

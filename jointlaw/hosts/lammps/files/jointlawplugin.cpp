@@ -14,6 +14,7 @@
 #include "domain.h"
 #include "fix_jointlaw_memory.h"
 #include "force.h"
+#include "input.h"
 #include "memory.h"
 #include "modify.h"
 #include "neigh_list.h"
@@ -21,6 +22,7 @@
 #include "output.h"
 #include "pair.h"
 #include "update.h"
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>
@@ -96,6 +98,7 @@ class PairJointlaw : public Pair {
   // force of damping
   enum { KEY, PARTNER, TYPE, OF_AREA, AXIS, DAMPED = AXIS + 3, HEAD };
   enum { UNSET = -2, NONE = -1 };                          // no law given for a pair of types; NULL
+  static constexpr double FORESEEN = 1e6;    // Pa, for a time step before anything touches
   enum { CLOSURE, SLIP, NORMAL, SHEAR, SLIDING, STORED, DISSIPATED, AREA, SHOWN };
 
   std::vector<Law> laws;
@@ -136,6 +139,9 @@ class PairJointlaw : public Pair {
   bool height(const Opposite &, double, double &) const;
   void advance(const Contact &);
   void end(int, int, bool);
+  void refuse_other_commands() const;
+  double foreseen() const;
+  void tell_bound(bool);
   void check_joints();
   void show_joints();
   std::array<double, 1 + SHOWN> show(const double *, const jlaw_law *) const;
@@ -293,6 +299,26 @@ uint64_t PairJointlaw::laws_sum() const    // FNV-1a of the fingerprints by pair
   return planar ? ~value : value;
 }
 
+// Commands of LAMMPS that would run with this style and give wrong numbers
+void PairJointlaw::refuse_other_commands() const
+{
+  // they ask for a central force; a joint also bears shear, and twists its atoms
+  for (const char *style : {"^group/group", "^stress/mop", "^stress/c", "^stress/sph", "/tally$"})
+    for (const auto &compute : modify->get_compute_by_style(style))
+      error->all(FLERR, "pair_style jointlaw: compute {} knows central forces only and would leave "
+                 "out the shear of joints; use compute pair/local, fcm(group) or compute stress/atom",
+                 compute->style);
+  if (utils::strmatch(force->pair_style, "^hybrid/scaled"))
+    error->all(FLERR, "pair_style jointlaw: hybrid/scaled would scale the force of a joint, but not "
+               "what it dissipates; use hybrid/overlay and scale the area");
+  if (lmp->input->command && strcmp(lmp->input->command, "rerun") == 0)
+    error->all(FLERR, "pair_style jointlaw: rerun cannot follow a joint, whose force depends on every "
+               "step before; repeat the run, or start from a restart file");
+  if (lmp->suffix_enable)
+    error->all(FLERR, "pair_style jointlaw has no version for the suffix {}; give `suffix off` before "
+               "pair_style, and use more cores by mpirun", lmp->suffix ? lmp->suffix : "given");
+}
+
 void PairJointlaw::init_style()
 {
   if (strcmp(update->unit_style, "si") != 0)
@@ -307,6 +333,7 @@ void PairJointlaw::init_style()
                "the bodies with damping, fix viscous or fix nve/limit instead");
   if (update->whichflag == 1 && utils::strmatch(update->integrate_style, "^respa"))
     error->all(FLERR, "pair_style jointlaw needs run_style verlet");
+  refuse_other_commands();
   if (planar) {
     bool ghosts = atom->molecular != Atom::ATOMIC;
     for (const auto &fix : modify->get_fix_by_style("^property/atom"))
@@ -333,6 +360,7 @@ void PairJointlaw::init_style()
     fix = modify->add_fix(fmt::format("{} all jointlaw/memory {}", memory_id, size));
     joints_of = dynamic_cast<FixJointlawMemory *>(fix);
     if (!joints_of->laws) joints_of->laws = given;
+    lost_warned = joints_of->given_up();    // those of a restart file were told of before
   }
   if (joints_of->laws != given)
     error->all(FLERR, "pair_style jointlaw: there are joints of other laws than pair_coeff names "
@@ -386,7 +414,7 @@ void PairJointlaw::list_candidates()
     first[ii] = static_cast<int>(candidates.size());
     for (int jj = 0; jj < list->numneigh[i]; jj++) {
       const int j = jlist[jj] & NEIGHMASK;
-      if (key_of(j) > key && force->special_lj[sbmask(jlist[jj])] != 0.0 
+      if (key_of(j) > key && force->special_lj[sbmask(jlist[jj])] != 0.0
           && law_between(atom->type[i], atom->type[j]))
         candidates.push_back(j);
     }
@@ -420,7 +448,7 @@ void PairJointlaw::compute(int eflag, int vflag)
       if (!seen[k]) end(i, k, true);
     joints_of->longest(own.n);
   }
-  if (!stiffness.empty()) check_joints();
+  if (check) check_joints();    // on all processors, those without atoms too
   if (eflag_either) {
     const double *sums = joints_of->sums;
     pvector[1] += sums[FixJointlawMemory::ENDED];
@@ -546,7 +574,7 @@ void PairJointlaw::advance(const Contact &c)
   std::copy(axis2.begin(), axis2.end(), head + AXIS);
 
   const double d[3] = {c.closure - state[0], dt * dot(slide, axis2), dt * dot(slide, axis3)};
-  const bool damps = damping > 0.0 && !update->setupflag;    // a setup keeps the last step's force
+  const bool damps = damping > 0.0;
   double F[3], C[9];
   char message[JLAW_MESSAGE];
   if (jlaw_update(law, state, state, d, F, damps ? C : nullptr, message, sizeof message))
@@ -556,16 +584,17 @@ void PairJointlaw::advance(const Contact &c)
     end(i, which, false);    // parted; virgin when they meet again
     return;
   }
+  double push = 0.0;    // in a setup too: from the velocities and the words that hold now
   if (damps) {
     const double reduced = atom->rmass[i] * atom->rmass[j] / (atom->rmass[i] + atom->rmass[j]);
     const double opens = dot(slide, c.n), k = c.area * std::max(C[0], 0.0);
-    const double push = -2.0 * damping * sqrt(k * reduced) * opens;
-    const double old = head[DAMPED];    // this velocity lies between the old force and the new
-    head[DAMPED] = std::max(push, -c.area * F[0]);    // never pulls
-    joints_of->sums[FixJointlawMemory::DAMPING] -= 0.5 * (old + head[DAMPED]) * opens * dt;
+    push = std::max(-2.0 * damping * sqrt(k * reduced) * opens, -c.area * F[0]);    // never pulls
+    // this velocity lies between the force of the last step and this one
+    joints_of->sums[FixJointlawMemory::DAMPING] -= 0.5 * (head[DAMPED] + push) * opens * dt;
   }
+  head[DAMPED] = push;
   const Vector shear = sum(times(F[1], axis2), F[2], axis3);
-  const Vector g = sum(times(c.area * F[0] + head[DAMPED], c.n), -c.area, shear);    // on j
+  const Vector g = sum(times(c.area * F[0] + push, c.n), -c.area, shear);    // on j
   const Vector ti = cross(c.arm_i, g), tj = cross(c.arm_j, g);
   for (int k = 0; k < 3; k++) {
     atom->f[j][k] += g[k];
@@ -614,35 +643,64 @@ void PairJointlaw::end(int i, int which, bool given_up)
   seen.pop_back();
 }
 
+// A body of mass m on springs k: |v + w x r|^2 <= (1 + r^2 m/I)(v^2 + w^2 I/m), 3.5 (...) for spheres,
+// and twice for two bodies
+static double frequency_squared(double k, double m) { return 7.0 * k / m; }
+
+// That of an atom of this processor with one joint under FORESEEN, for runs that begin without touch
+double PairJointlaw::foreseen() const
+{
+  double most = 0.0;
+  for (int type = 1; type <= atom->ntypes; type++) {
+    double stiff = 0.0;
+    for (int other = 1; other <= atom->ntypes; other++)
+      if (const jlaw_law *law = law_between(type, other))
+        stiff = std::max(stiff, jlaw_max_stiffness(law, jlaw_closure(law, FORESEEN)));
+    for (int i = 0; i < atom->nlocal; i++)
+      if (atom->type[i] == type)
+        most = std::max(most, frequency_squared(area_of(i, i) * stiff, atom->rmass[i]));
+  }
+  return most;
+}
+
 // Bound of the time step from the stiffness of all joints, and what was given up under load
 void PairJointlaw::check_joints()
 {
-  double mine[2] = {0.0, joints_of->sums[FixJointlawMemory::COUNT]}, all[2];
   if (!ending) {
+    double mine = 0.0, all = 0.0;
     comm->reverse_comm(this);
-    // spheres: |v + w x r|^2 <= (1 + r^2 m/I)(v^2 + w^2 I/m) = 3.5 (...), and twice for two bodies
     for (int i = 0; i < atom->nlocal; i++)
-      mine[0] = std::max(mine[0], 7.0 * stiffness[i] / atom->rmass[i]);
-    MPI_Allreduce(mine, all, 1, MPI_DOUBLE, MPI_MAX, world);
-    bound = all[0] > 0.0 ? 2.0 / sqrt(all[0]) : 0.0;
-    if (comm->me == 0 && bound > 0.0) {
-      if (update->setupflag && fabs(bound - bound_told) > 0.1 * bound_told) {
-        utils::logmesg(lmp, "pair_style jointlaw: time step {:.4g} s, largest stable one {:.4g} s "
-                       "(take a tenth of it where bodies hit each other)\n", update->dt, bound);
-        bound_told = bound;
-      }
-      if (update->dt > bound && !(bound_warned > 0.0 && bound > 0.5 * bound_warned)) {
-        error->warning(FLERR, "pair_style jointlaw: the time step {:.4g} s is above the largest "
-                       "stable one {:.4g} s", update->dt, bound);
-        bound_warned = bound;
-      }
+      mine = std::max(mine, frequency_squared(stiffness[i], atom->rmass[i]));
+    MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_MAX, world);
+    const bool touching = all > 0.0;
+    if (!touching) {
+      mine = foreseen();
+      MPI_Allreduce(&mine, &all, 1, MPI_DOUBLE, MPI_MAX, world);
     }
+    bound = all > 0.0 ? 2.0 / sqrt(all) : 0.0;
+    if (comm->me == 0 && bound > 0.0) tell_bound(touching);
   }
-  MPI_Allreduce(mine + 1, all + 1, 1, MPI_DOUBLE, MPI_SUM, world);
-  if (all[1] > lost_warned && comm->me == 0)
+  const double lost = joints_of->given_up();
+  if (lost > lost_warned && comm->me == 0)
     error->warning(FLERR, "pair_style jointlaw: {} joints under load were given up (opened by more "
-                   "than {} m, slid off or lost their partner)", all[1] - lost_warned, opening);
-  lost_warned = all[1];
+                   "than {} m, slid off or lost their partner)", lost - lost_warned, opening);
+  lost_warned = lost;
+}
+
+void PairJointlaw::tell_bound(bool touching)
+{
+  if (update->setupflag && fabs(bound - bound_told) > 0.1 * bound_told) {
+    const std::string where =
+        touching ? "" : fmt::format(" once an atom bears {:g} Pa on one joint; nothing touches yet", FORESEEN);
+    utils::logmesg(lmp, "pair_style jointlaw: time step {:.4g} s, largest stable one {:.4g} s{} "
+                   "(take a tenth of it where bodies hit each other)\n", update->dt, bound, where);
+    bound_told = bound;
+  }
+  if (touching && update->dt > bound && !(bound_warned > 0.0 && bound > 0.5 * bound_warned)) {
+    error->warning(FLERR, "pair_style jointlaw: the time step {:.4g} s is above the largest "
+                   "stable one {:.4g} s", update->dt, bound);
+    bound_warned = bound;
+  }
 }
 
 // ---------------------------------------------------------------- what the user asks for
@@ -702,7 +760,7 @@ void PairJointlaw::unpack_forward_comm(int n, int first_ghost, double *buf)
 
 int PairJointlaw::pack_reverse_comm(int n, int first_ghost, double *buf)
 {
-  std::copy(&stiffness[first_ghost], &stiffness[first_ghost] + n, buf);
+  std::copy_n(stiffness.data() + first_ghost, n, buf);    // n may be 0, and there be no atoms
   return n;
 }
 
@@ -718,8 +776,8 @@ double PairJointlaw::single(int i, int j, int, int, double rsq, double, double, 
   fforce = 0.0;
   std::fill(svector, svector + SHOWN, 0.0);
   if (shown_at != update->ntimestep)
-    error->one(FLERR, "pair_style jointlaw: compute pair/local has values at steps of thermo "
-               "output, dumps and restarts only");
+    error->one(FLERR, "pair_style jointlaw: what one joint bears depends on its past; compute "
+               "pair/local alone can show it, at steps of thermo output, dumps and restarts");
   const bool owns = key_of(i) < key_of(j);
   const int partner = atom->tag[owns ? j : i];
   for (const auto &values : shown[owns ? i : j])

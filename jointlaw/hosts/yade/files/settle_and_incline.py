@@ -1,10 +1,13 @@
-"""A sphere settles on a joint; then the joint is tilted until it slides.
+"""A sphere settles on a joint; then the joint is tilted.
 
-    yade -n -x settle_and_incline.py
+    yade -n -x settle_and_incline.py          # the table
+    yade -n -x settle_and_incline.py live     # the law itself (package `jointlaw` on PYTHONPATH)
 
-A sphere (rotation blocked, so that it is a slider) lies on a fixed box. Its weight closes the joint
-to a tenth of the table; the closure is compared with the table's inverse. Then the weight is tilted
-to 0.1 degree below and above the friction angle of that normal stress.
+A sphere (rotation blocked, so that it is a slider) lies on a fixed box and is pressed on it. When
+it is at rest, the normal stress that the joint has at its closure is compared with the load. Then
+the load is tilted. With the table the sphere sticks 0.1 degree below the friction angle, and slides
+0.1 degree above. The law itself slips at every tilt: slip and rise are compared with those of a
+shear test on one joint.
 """
 
 import os
@@ -28,15 +31,29 @@ from yade import (
 
 folder = os.path.dirname(os.path.abspath(sys.argv[0]))
 sys.path.insert(0, folder)
-from yade_joint import Joints, TableLaw  # noqa: E402
+from yade_joint import Joints, LiveLaw, TableLaw  # noqa: E402
 
 R = 0.1
+AREA = np.pi * R**2
+
+if unknown := set(sys.argv[1:]) - {"live"}:
+    sys.exit(
+        f"settle_and_incline.py: {' '.join(unknown)} is unknown; write live, or nothing for the "
+        "table"
+    )
+live = "live" in sys.argv[1:]
+STEPS = 4000 if live else 1000  # of a change of load: shear makes the law itself soft, so slow
+table = TableLaw(os.path.join(folder, "joint.txt")).table
+stress = 0.1 * table.normal_stress[-1]
+if live:
+    from jointlaw import JointLaw, direct_shear
+
+    law = JointLaw.from_toml(os.path.join(folder, "law.toml"))
 
 
-def scene():
-    """Sphere on a box, joined by the table."""
+def settle():
+    """A sphere on a box, pressed slowly; returns the closure at rest."""
     O.reset()
-    law = TableLaw(os.path.join(folder, "joint.txt"))
     O.materials.append(FrictMat(young=1e9, poisson=0.3, frictionAngle=0.5, density=2600))
     O.bodies.append(utils.box((0, 0, -0.1), (10, 10, 0.1), fixed=True))
     O.bodies.append(utils.sphere((0, 0, R), R))
@@ -47,59 +64,61 @@ def scene():
         InteractionLoop(
             [Ig2_Box_Sphere_ScGeom()],
             [Ip2_FrictMat_FrictMat_FrictPhys()],
-            [Law2_ScGeom_FrictPhys_CundallStrack()],
+            [Law2_ScGeom_FrictPhys_CundallStrack(neverErase=live)],
         ),
         NewtonIntegrator(damping=0.4),
     ]
-    joints = Joints(law)
+    joints = Joints(LiveLaw(law) if live else TableLaw(os.path.join(folder, "joint.txt")))
     joints.attach()
     O.dt = joints.time_step(safety=1)  # made for rolling and six contacts: here there is one
-    return law, joints
+    pull((0, 0, 0), (0, 0, -stress * AREA))
+    return R - O.bodies[1].state.pos[2]
 
 
-def inverse(law, stress):
-    """Closure (m) at which the table gives this normal stress."""
-    low, high = 0.0, law.un[-1]
-    for _ in range(200):
-        middle = (low + high) / 2
-        if middle * law.at(np.array([middle]))[2][0] < stress:
-            low = middle
-        else:
-            high = middle
-    return middle
+def tilt(angle, azimuth):
+    """Settle, tilt the load slowly (degrees; the normal force stays), and wait.
+
+    The box is sheared along azimuth. Returns how far the sphere slides while it waits, how far it
+    has slid in all, and how far it has risen.
+    """
+    z = R - settle()
+    shear, psi = stress * AREA * np.tan(np.radians(angle)), np.radians(azimuth)
+    x, y = -shear * np.cos(psi), -shear * np.sin(psi)
+    pull((0, 0, -stress * AREA), (x, y, -stress * AREA))
+    before = O.bodies[1].state.pos
+    O.run(500, True)
+    at = O.bodies[1].state.pos
+    return (at - before).norm(), np.hypot(at[0], at[1]), at[2] - z
 
 
-area = np.pi * R**2
-law, joints = scene()
-stress = 0.1 * law.sn[-1]
-closure = inverse(law, stress)
-O.forces.setPermF(1, (0, 0, -stress * area))
-O.run(2000, True)
-found = R - O.bodies[1].state.pos[2]
-print(f"settled: closure {found:.12g} m, table's inverse {closure:.12g} m, "
-      f"relative difference {abs(found / closure - 1):.1e}")  # fmt: skip
+def pull(start, end):
+    """Change the force on the sphere from start to end, without a jerk, and let it come to rest."""
+    for time in np.linspace(0, np.pi, STEPS + 1):
+        share = (1 - np.cos(time)) / 2
+        force = (1 - share) * np.array(start) + share * np.array(end)
+        O.forces.setPermF(1, force.tolist())
+        O.step()
+    O.run(500, True)
 
-for azimuth in (0.0, 45.0, 90.0):
-    direction = np.array([np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth))])
-    row, w, _ = law.at(np.array([closure]))
-    # the sphere's side is id2 of box and sphere: it moves against the box by the same azimuth
-    angle = np.degrees(np.arctan(law.friction(-direction[:, None], row, w)[0]))
-    for off in (-0.1, 0.1):
-        law, joints = scene()
-        pull = stress * area * np.tan(np.radians(angle + off))
-        O.forces.setPermF(1, (0, 0, -stress * area))
-        O.run(500, True)
-        for k in range(1, 101):  # tilt slowly: the normal force stays, the shear force grows
-            share = min(1.0, k / 80)
-            fx, fy = (pull * share * direction).tolist()
-            O.forces.setPermF(1, (fx, fy, -stress * area))
-            for _ in range(8):  # O.run(..., True) polls: slow for a few steps
-                O.step()
-        x, y, _ = O.bodies[1].state.pos
-        before = np.hypot(x, y)
-        O.run(500, True)
-        x, y, _ = O.bodies[1].state.pos
-        moved = np.hypot(x, y) - before
-        says = "slides" if moved > 1e-3 * closure else "sticks"
-        print(f"azimuth {azimuth:.0f} deg: friction angle {angle:.4f} deg, {off:+.1f} deg: {says} "
-              f"({moved / closure:.1e} closures)")  # fmt: skip
+
+closure = settle()
+there = law.normal_stress(closure) if live else table.lookup(closure).normal_stress
+name, off = "law" if live else "table", abs(there / stress - 1)
+print(f"settled: closure {closure:.12g} m, where the {name}'s normal stress is {there:.12g} Pa; "
+      f"relative difference to the load {off:.1e}")  # fmt: skip
+if live:
+    test = direct_shear(law.joint(), law.closure_range, normal=stress, steps=1000)
+    for angle in (15.0, 30.0):
+        _, slip, rise = tilt(angle, 0.0)
+        expected = np.interp(np.tan(np.radians(angle)), test.shear_stress / stress, test.shear)
+        up = test.closure[0] - np.interp(expected, test.shear, test.closure)
+        print(f"tilt {angle:.0f} deg: slip {slip:.5g} m, rise {rise:.5g} m; "
+              f"shear test: {expected:.5g} m, {up:.5g} m")  # fmt: skip
+else:
+    for azimuth in (0.0, 45.0, 90.0):
+        friction = table.lookup(closure, np.radians(azimuth)).peak_friction
+        angle = np.degrees(np.arctan(friction))
+        for off in (-0.1, 0.1):
+            moved = tilt(angle + off, azimuth)[0] / closure
+            print(f"azimuth {azimuth:.0f} deg: friction angle {angle:.4f} deg, {off:+.1f} deg: "
+                  f"{'slides' if moved > 1e-3 else 'sticks'} ({moved:.1e} closures)")  # fmt: skip

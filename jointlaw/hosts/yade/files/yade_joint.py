@@ -1,4 +1,4 @@
-"""Rock joints on the contacts of a YADE simulation. Needs YADE, numpy and `table_law.py`.
+"""Rock joints on the contacts of a YADE simulation. Needs YADE, numpy and `joint_table.py`.
 
     from yade_joint import Joints, TableLaw     # both files in the script's folder (on sys.path)
     joints = Joints(TableLaw("joint.txt"))      # or Joints(LiveLaw(law)), law a jointlaw.JointLaw
@@ -18,14 +18,9 @@ SI units: m, Pa, N, s, kg.
 
 # ruff: noqa: B905 (runs on older Python too)
 
-import gc
-import warnings
-
 import numpy as np
-from table_law import TableLaw, between
+from joint_table import load_table
 from yade import FrictPhys, O, PyRunner, Quaternion, ScGeom, Sphere, Vector3
-
-assert Quaternion((0, 0, 1), 0.0).__getinitargs__() == (1.0, 0.0, 0.0, 0.0)  # w first
 
 VERSION = 1  # of the files that `Joints.save` writes
 
@@ -42,7 +37,50 @@ def run(name):
     _running[name].step()
 
 
-# -------------------------------------------------------------- the live law
+# ------------------------------------------------------- the law behind the contacts
+
+
+class TableLaw:
+    """The law's table, a text file: normal stress by closure, elastic-frictional shear."""
+
+    mode = "table"
+
+    def __init__(self, path):
+        self.table = load_table(path)
+        self.f = np.zeros((2, 0))  # shear traction in the frames of the contacts
+        self.K = np.zeros((3, 0))  # shear stiffness K22, K33, K23 of the last step
+
+    def stiffness(self, closure=None):
+        """Largest stiffness (Pa/m) of the table."""
+        t = self.table
+        return float(max(t.kn_tangent.max(), t.kn_secant.max(), t.shear_stiffness.max()))
+
+    def step(self, d, closure, spin):
+        """Tractions (3, n) after increments d (3, n); spin (n,) turns the old shear traction."""
+        F, self.K = self.table.step(self.f, self.K, d, closure, spin)
+        self.f = F[1:]
+        return F
+
+    def add(self, closure):
+        """Contacts that came: unsheared joints at this closure (m)."""
+        row, w, _ = self.table.at(closure)
+        self.f = np.concatenate([self.f, np.zeros((2, len(closure)))], axis=1)
+        self.K = np.concatenate([self.K, self.table.shear_matrix(row, w)], axis=1)
+
+    def keep(self, mask):
+        """Forget the contacts where `mask` is False."""
+        self.f, self.K = self.f[:, mask], self.K[:, mask]
+
+    def state(self):
+        """Arrays to save."""
+        return {"f": self.f, "K": self.K, "stress": self.table.normal_stress}
+
+    def restore(self, data):
+        """Take up such arrays. Raises ValueError if they belong to another table."""
+        mine = self.table.normal_stress
+        if not np.array_equal(data.get("stress", mine), mine):  # older files hold no stress
+            raise ValueError("the state was saved with another table: give TableLaw that one")
+        self.f, self.K = data["f"], data["K"]
 
 
 class LiveLaw:
@@ -54,15 +92,17 @@ class LiveLaw:
     takes, for `batch.dissipated_energy`, at some cost.
     """
 
+    mode = "live"
+
     def __init__(self, law, ledger=False):
-        if law.plane is not None:
-            raise ValueError("law.plane is set; contacts in YADE move in 3-D, give plane=None")
-        if law.closure_only:
-            raise ValueError("law.closure_only is set; contacts in YADE shear, set it to False")
+        if law.plane is not None or law.closure_only:
+            raise ValueError(
+                "contacts in YADE shear in 3-D: set law.plane=None, closure_only=False"
+            )
         from jointlaw import JointPool  # table mode does without
 
         self.law, self.pool = law, JointPool(law, ledger)
-        self.came = 0  # contacts so far: numbered as they came, which are the keys of the pool
+        self.numbered = 0  # contacts so far: the keys of the pool are their numbers
 
     @property
     def batch(self):
@@ -79,10 +119,10 @@ class LiveLaw:
 
     def add(self, closure):
         """Contacts that came: virgin joints at this closure (m; negative before touch)."""
-        first, self.came = self.came, self.came + len(closure)
+        first, self.numbered = self.numbered, self.numbered + len(closure)
         start = np.zeros((len(closure), 3))
         start[:, 0] = closure
-        new = self.pool.add(range(first, self.came))
+        new = self.pool.add(range(first, self.numbered))
         self.batch.update(start, where=new, tangent=False)
         self.find()
 
@@ -99,14 +139,15 @@ class LiveLaw:
     def state(self):
         """Arrays to save."""
         state = self.pool.snapshot()
-        return {"fingerprint": state.fingerprint, "values": state.values}
+        return {"fingerprint": state.fingerprint, "values": state.values.T}
 
     def restore(self, data):
-        """State from such arrays."""
-        from jointlaw import JointState
+        """Take up such arrays. Raises ValueError if another law wrote them."""
+        from jointlaw.joints.state import JointState
 
-        self.came = data["values"].shape[1]
-        self.pool.restore(range(self.came), JointState(str(data["fingerprint"]), data["values"]))
+        state = JointState(str(data["fingerprint"]), data["values"].T)
+        self.pool.restore(range(len(state)), state)
+        self.numbered = len(state)
         self.find()
 
 
@@ -129,28 +170,20 @@ class Joints:
     plane: None, or the joint's normal in the axes of body id1: contacts then act as pieces of one
         flat joint (a "smooth joint") whatever the direction between the two spheres.
     mated: closure counts from the position in which the contact is first seen, not from touch.
-    lagged: instead of adding forces, rewrite kn, ks and friction of YADE's own contact, which acts
-        one step late: isotropic, and it creates energy, so that NewtonIntegrator needs a
-        damping of 0.7 O.dt/sqrt(m/k) or more (TableLaw only; measured in docs/yade.md).
     forget: with neverErase, contacts without force open by more than this (m) are given up.
     """
 
     def __init__(self, law, area=None, select=None, azimuth=(1, 0, 0), plane=None, mated=False,
-                 lagged=False, forget=np.inf, name="joints"):  # fmt: skip
+                 forget=np.inf, name="joints", lagged=False):  # fmt: skip
         if not name.isidentifier():
             raise ValueError(f"name = {name!r} must be a Python identifier: it labels the engine")
-        if lagged and not isinstance(law, TableLaw):
-            raise ValueError("lagged = True needs a TableLaw: a live law has no kn and ks")
-        if lagged and (plane is not None or mated or forget < np.inf):
-            raise ValueError(
-                "lagged = True leaves the force to YADE's own contact, which knows no plane, mated "
-                "or forget: leave them out, or lagged"
-            )
+        if lagged:
+            raise ValueError("lagged = True is gone, because it created energy: leave it out")
         self.law, self.select, self.name = law, select, name
         self.area = area if area is None or callable(area) else float(area)
         self.azimuth = unit(np.array(azimuth, float))
         self.plane = None if plane is None else unit(np.array(plane, float))
-        self.mated, self.lagged, self.forget = mated, lagged, forget
+        self.mated, self.forget = mated, forget
         self.attached = False
         self._clear()
         _running[name] = self
@@ -160,16 +193,16 @@ class Joints:
                   for key in PER_CONTACT}  # fmt: skip
         self.c.update({key: np.zeros((3, 0)) for key in VECTORS})
         self.own, self.others = [], []  # interactions that are joints, and that are not
-        self.odd = []  # (place, geom) of joints that are not between two spheres
         self.states, self.ids, self.index = [], [], {}  # bodies with joints
         self.x, self.q = np.zeros((3, 0)), np.zeros((4, 0))
-        self.last, self.waiting = None, None
+        self.last = None  # O.iter of the last step
+        self.loaded = None  # contacts that are no joints, of a state that waits for its scene
         self.bodies = len(O.bodies)
 
     @property
     def F(self):
         """Tractions (3, n) of the last step in the contacts' frames, Pa."""
-        return self._own_forces()["F"]
+        return self.c["F"]
 
     def __len__(self):
         return len(self.c["made"])
@@ -183,8 +216,6 @@ class Joints:
         if "InteractionLoop" not in kinds:
             raise ValueError("O.engines has no InteractionLoop; set O.engines before attach()")
         if any(e.label == f"joint_{self.name}" for e in engines):
-            if self.attached or self.waiting is not None:
-                return
             raise ValueError(
                 f"name = {self.name!r} is taken in O.engines: give another name=, or call "
                 ".load(file) instead of .attach() to continue a saved run"
@@ -195,15 +226,9 @@ class Joints:
             raise ValueError(
                 "GlobalStiffnessTimeStepper sees kn = 0: remove it, set O.dt = joints.time_step()"
             )
-        if self.lagged:
-            warnings.warn(
-                "lagged=True acts one step late and creates energy: amplitudes grow without "
-                "NewtonIntegrator(damping=...) of at least 0.7 O.dt/sqrt(m/k); k = area*kn_tangent",
-                stacklevel=2,
-            )
-        at, needs_all = kinds.index("InteractionLoop"), not isinstance(self.law, TableLaw)
+        at = kinds.index("InteractionLoop")
         for law2 in engines[at].lawDispatcher.functors:
-            if needs_all and not getattr(law2, "neverErase", True):
+            if self.law.mode == "live" and not getattr(law2, "neverErase", True):
                 raise ValueError(
                     f"{type(law2).__name__}.neverErase = False: YADE would drop joints that dilate;"
                     " set neverErase=True (and forget= here, so that open contacts are given up)"
@@ -211,9 +236,8 @@ class Joints:
         runner = PyRunner(
             command=f"import yade_joint; yade_joint.run({self.name!r})",
             iterPeriod=1, initRun=True, label=f"joint_{self.name}",
+            updateGlobals=False,  # else YADE writes the caller's local variables into the globals
         )  # fmt: skip
-        if hasattr(runner, "updateGlobals"):  # else YADE writes the caller's locals into globals
-            runner.updateGlobals = False
         engines.insert(at + 1, runner)
         O.engines = engines
         self.attached = True
@@ -226,24 +250,21 @@ class Joints:
         function, only contacts tell the areas: ValueError before there are any.
         """
         k, shortest = self.law.stiffness(closure), np.inf
-        place = np.concatenate([self.c["id1"], self.c["id2"]])
-        areas = np.tile(self.c["area"], 2)
+        if callable(self.area) and not len(self):
+            raise ValueError(
+                "area is a function, and no contact tells its values yet: call time_step() after "
+                "the first step, or give O.dt"
+            )
+        place, areas = np.concatenate([self.c["id1"], self.c["id2"]]), np.tile(self.c["area"], 2)
         count = np.bincount(place, minlength=len(O.bodies))
-        if callable(self.area):
-            if not len(areas):
-                raise ValueError(
-                    "area is a function, and no contact tells its values yet: call time_step() "
-                    "after the first step, or give O.dt"
-                )
-            total = np.bincount(place, areas, minlength=len(count))
-            largest = np.zeros(len(count))
-            np.maximum.at(largest, place, areas)
-            largest[count == 0] = areas.max()
+        total = np.bincount(place, areas, minlength=len(O.bodies))
+        largest = np.zeros(len(O.bodies))
+        np.maximum.at(largest, place, areas)
         for body in O.bodies:
             if body is None or not isinstance(body.shape, Sphere) or body.state.mass <= 0:
                 continue
             if callable(self.area):
-                carried = max(6 * largest[body.id], total[body.id])
+                carried = max(6 * (largest[body.id] or areas.max()), total[body.id])
             else:
                 one = np.pi * body.shape.radius**2 if self.area is None else self.area
                 carried = one * max(6, count[body.id])
@@ -258,9 +279,7 @@ class Joints:
     def step(self):
         """Advance all joints; the PyRunner calls this once per step."""
         now = O.iter
-        if self.waiting is not None:
-            self._resume()
-        elif self.last is None and not self.attached:
+        if self.last is None and not self.attached:
             raise RuntimeError(
                 f"joints {self.name!r}: neither attached nor loaded. Call .load(file) to continue "
                 "a saved run. For new joints remove the engine joint_" + self.name + " from "
@@ -271,20 +290,17 @@ class Joints:
                 f"joints {self.name!r}: O.iter went from {self.last} to {now}. The adapter must "
                 "run in every step (iterPeriod=1); after O.load call .load(file)"
             )
-        collects = gc.isenabled()
-        gc.disable()  # thousands of small YADE handles are made and dropped: no cycles among them
-        try:
-            self._find(now)
-            if self.own:
-                self._rewrite() if self.lagged else self._act()
-            elif self.ids:
-                self.x, self.q = self._read()
-        finally:
-            if collects:
-                gc.enable()
+        if self.loaded is not None:
+            self._bind()
+        self._find(now)
+        if self.own:
+            self._advance()
+        elif self.ids:
+            self.x, self.q = self._read()
         self.last = now
 
-    def _act(self):
+    def _advance(self):
+        """Displacements since the last step, the law's tractions, forces on the bodies."""
         c, x0, q0 = self.c, self.x, self.q
         x, q = self.x, self.q = self._read()
         b1, b2 = c["b1"], c["b2"]
@@ -300,7 +316,7 @@ class Joints:
         du += (cross(w1, c1 + c["c1"]) - cross(w2, c2 + c["c2"])) / 2
         middle, across = unit(n + c["n"]), unit(t2 + c["t2"])
         d = np.array([closure - c["closure"], dot(du, across), dot(du, cross(middle, across))])
-        spin = self._spin(n, t2, w1 + w2) if isinstance(self.law, TableLaw) else None
+        spin = self._spin(n, t2, w1 + w2) if self.law.mode == "table" else None
         fresh = self.fresh
         if fresh.size:
             before = closure[fresh] - dot(du[:, fresh], n[:, fresh])
@@ -312,8 +328,8 @@ class Joints:
         force = (n * F[0] + t2 * F[1] + cross(n, t2) * F[2]) * -c["area"]
         c.update(n=n, t2=t2, c1=c1, c2=c2, closure=closure, F=F)
         if fresh.size:
-            force[:, fresh] -= self._take_back(fresh)
-        self._add(force, c1, c2)
+            force[:, fresh] -= self._switch_off(fresh)
+        self._apply(force, c1, c2)
         if self.forget < np.inf:
             for k in np.flatnonzero((closure < -self.forget) & ~F.any(axis=0)):
                 O.interactions.erase(int(c["id1"][k]), int(c["id2"][k]))
@@ -330,11 +346,12 @@ class Joints:
         length = np.sqrt(dot(r, r))
         n = r / length
         un = R1 + R2 - length
-        for k, geom in self.odd:
+        faces = [(k, self.own[k].geom) for k in np.flatnonzero(c["ball"] == 0).tolist()]
+        for k, geom in faces:
             n[:, k], un[k] = geom.normal.__getinitargs__(), geom.penetrationDepth
         c1 = n * (R1 - un / 2)
         c2 = c1 - r
-        for k, geom in self.odd:
+        for k, geom in faces:
             point = np.array(geom.contactPoint.__getinitargs__())
             c1[:, k], c2[:, k] = point - x[:, c["b1"][k]], point - x[:, c["b2"][k]]
         return n, un, c1, c2
@@ -346,7 +363,7 @@ class Joints:
         t2 = a - n * dot(a, n)
         size = np.sqrt(dot(t2, t2))
         steep = np.flatnonzero(size < 0.5)
-        if steep.size:  # rolled far from where it touched: take the reference anew, unturned
+        if steep.size:  # rolled so far that the reference nears the normal: go on with the last
             old = c["t2"][:, steep] - n[:, steep] * dot(c["t2"][:, steep], n[:, steep])
             t2[:, steep] = old
             size[steep] = np.sqrt(dot(old, old))
@@ -361,8 +378,8 @@ class Joints:
         twist = 2 * np.arctan(dot(both, w) / (4 * share + dot(w, cross(n0, n))))
         return twist + np.arctan2(dot(old, cross(n, t2)), dot(old, t2))
 
-    def _take_back(self, fresh):
-        """YADE's own force on id1 in the step that made the contact; off from now on."""
+    def _switch_off(self, fresh):
+        """Switch YADE's own force off; what it is on id1 in this step, which made the contact."""
         result = np.zeros((3, len(fresh)))
         for column, k in enumerate(fresh):
             phys = self.own[k].phys
@@ -371,7 +388,8 @@ class Joints:
             phys.shearForce = phys.normalForce = Vector3(0, 0, 0)
         return result
 
-    def _add(self, force, c1, c2):
+    def _apply(self, force, c1, c2):
+        """Add the forces on id1, their opposites on id2, and their torques to the bodies."""
         c, size = self.c, len(self.ids)
         torque1, torque2 = cross(c1, force), cross(force, c2)
         total = [np.bincount(c["b1"], f, size) - np.bincount(c["b2"], f, size) for f in force]
@@ -381,24 +399,6 @@ class Joints:
         for k, f, t in zip(self.ids, np.array(total).T.tolist(), np.array(turn).T.tolist()):
             forces.addF(k, f)
             forces.addT(k, t)
-
-    def _rewrite(self):
-        """The lagged option: what YADE's own law will use in the next step."""
-        c = self.c
-        x, q = self._read()
-        n, un, c1, c2 = self._geometry(x, q.take(c["b1"], axis=1))
-        closure = c["closure"] = un - c["zero"]
-        row, w, secant = self.law.at(np.maximum(closure, 0.0))
-        area, mu = c["area"], between(self.law.mu_mean, row, w)
-        kn, ks = area * secant, area * between(self.law.kt, row, w)
-        fresh = self.fresh
-        if fresh.size:  # made with the stiffness of YADE's material: this step is put right
-            force = np.zeros((3, len(self.own)))
-            force[:, fresh] = -n[:, fresh] * (kn * np.maximum(closure, 0.0))[fresh]
-            force[:, fresh] -= self._take_back(fresh)
-            self._add(force, c1, c2)
-        for i, a, b, m in zip(self.own, kn.tolist(), ks.tolist(), mu.tolist()):
-            i.phys.kn, i.phys.ks, i.phys.tangensOfFrictionAngle = a, b, m
 
     # ---------------------------------------------------------------- contacts
 
@@ -433,17 +433,14 @@ class Joints:
                 new.append(i)
         self._keep(np.isin(np.arange(len(c["made"])), list(place)))
         self.own = [place[k] for k in sorted(place)]
-        self.odd = [(k, i.geom) for k, i in enumerate(self.own) if not self.c["ball"][k]]
         self.bodies = len(O.bodies)
         return new
 
     def _keep(self, mask):
+        """Forget the contacts where `mask` is False."""
         self.c = {key: value[..., mask] for key, value in self.c.items()}
         self.own = [i for i, keep in zip(self.own, mask) if keep]
-        number = np.cumsum(mask) - 1
-        self.odd = [(int(number[k]), geom) for k, geom in self.odd if mask[k]]
-        if not self.lagged:
-            self.law.keep(mask)
+        self.law.keep(mask)
 
     def _join(self, contacts):
         """New contacts: choose the joints among them and set up what stays constant."""
@@ -466,8 +463,7 @@ class Joints:
         self.own += own
         new = dict(zip(("id1", "id2", "made", "R1", "R2", "ball", "area"), zip(*rows)))
         new["b1"], new["b2"] = ([self._body(k) for k in new[key]] for key in ("id1", "id2"))
-        self._before()
-        self.odd += [(first + k, own[k].geom) for k in range(m) if not new["ball"][k]]
+        self._add_bodies()
         for key, value in self.c.items():
             tail = np.zeros((*value.shape[:-1], m), value.dtype)
             tail[...] = new.get(key, 0)
@@ -521,8 +517,8 @@ class Joints:
             self.states.append(O.bodies[k].state)
         return self.index[k]
 
-    def _before(self):
-        """Where new bodies were one step ago, as their velocities say (YADE's leapfrog)."""
+    def _add_bodies(self):
+        """Positions of new bodies one step ago, from their velocities (YADE's leapfrog)."""
         x, q = [], []
         for state in self.states[self.x.shape[1] :]:
             angle = state.angVel.norm() * O.dt
@@ -541,8 +537,8 @@ class Joints:
 
     def save(self, path):
         """Write the adapter's state (NPZ): call it with every O.save, between two runs."""
-        if self.waiting is not None:
-            self._resume()
+        if self.loaded is not None:
+            self._bind()
         data = {f"contact_{key}": value for key, value in self.c.items()}
         data.update({f"law_{key}": value for key, value in self.law.state().items()})
         data["others"] = np.array([(i.id1, i.id2, i.iterMadeReal) for i in self.others], int)
@@ -551,7 +547,11 @@ class Joints:
             np.savez(file, version=VERSION, ids=self.ids, x=self.x, q=self.q, **data)
 
     def load(self, path):
-        """Take up a state that `save` wrote: call it after O.load, before the next step."""
+        """Take up a state that `save` wrote: call it after O.load, before the next step.
+
+        Raises ValueError for another version, for a state of live mode loaded into table mode or
+        the other way round, and for another law or table; nothing is changed then.
+        """
         with np.load(path) as file:
             data = {key: file[key] for key in file.files}
         if data.get("version") != VERSION:
@@ -559,26 +559,32 @@ class Joints:
                 f"{path!r} has version {data.get('version')}, this adapter reads {VERSION}: start "
                 "the run anew, or go on with the yade_joint.py that saved it"
             )
-        self.waiting, self.last, self.attached = data, None, True
-
-    def _resume(self):
-        """Bind a loaded state to the contacts that YADE has now."""
-        data = self.waiting
-        self._clear()  # nothing waits any more
-        self.c = {key[8:]: value for key, value in data.items() if key.startswith("contact_")}
+        mode = "live" if "law_fingerprint" in data else "table"
+        if mode != self.law.mode:
+            law = {"live": "LiveLaw(law)", "table": 'TableLaw("joint.txt")'}[mode]
+            raise ValueError(
+                f"{path!r} was saved in {mode} mode, and these joints are in {self.law.mode} mode: "
+                f"create Joints({law}, ...) and load the file into them"
+            )
         self.law.restore({key[4:]: value for key, value in data.items() if key.startswith("law_")})
+        self._clear()
+        self.c = {key[8:]: value for key, value in data.items() if key.startswith("contact_")}
         self.ids, self.x, self.q = data["ids"].tolist(), data["x"], data["q"]
         self.index = {k: place for place, k in enumerate(self.ids)}
+        self.last = int(data["last"]) if data["last"] >= 0 else None
+        self.loaded, self.attached = data["others"], True
+
+    def _bind(self):
+        """Find the bodies of a loaded state and the contacts that are no joints, in this scene."""
+        other = {tuple(row) for row in self.loaded.reshape(-1, 3).tolist()}
         self.states = [O.bodies[k].state for k in self.ids]
-        other = {tuple(row) for row in data["others"].reshape(-1, 3).tolist()}
         contacts = O.interactions.all(True)
         self.others = [i for i in contacts if (i.id1, i.id2, i.iterMadeReal) in other]
-        self.own, self.bodies = [], -1  # makes _find compare by ids
-        self.last = int(data["last"]) if data["last"] >= 0 else None
+        self.loaded, self.bodies = None, -1  # _find then finds the joints by their ids
 
     def contacts(self):
         """Arrays: ids (n, 2), closure (n,), traction (n, 3) in Pa, normal (n, 3), area (n,)."""
-        c = self._own_forces()
+        c = self.c
         return {
             "ids": np.array([c["id1"], c["id2"]]).T, "closure": c["closure"].copy(),
             "traction": c["F"].T.copy(), "normal": c["n"].T.copy(), "area": c["area"].copy(),
@@ -586,18 +592,12 @@ class Joints:
 
     def write_back(self):
         """Show the joint forces in i.phys, for utils.getStress and such, until the next step."""
-        c = self._own_forces()
+        c = self.c
         F = c["F"]
         normal = (c["n"] * F[0] * c["area"]).T.tolist()
         shear = ((c["t2"] * F[1] + cross(c["n"], c["t2"]) * F[2]) * c["area"]).T.tolist()
         for i, a, b in zip(self.own, normal, shear):
             i.phys.normalForce, i.phys.shearForce = Vector3(*a), Vector3(*b)
-
-    def _own_forces(self):
-        """The contacts; with lagged=True YADE holds their forces."""
-        if self.lagged:
-            raise RuntimeError("lagged = True: YADE's own contacts hold the forces; read i.phys")
-        return self.c
 
 
 # ------------------------------------------------------- vectors and rotations

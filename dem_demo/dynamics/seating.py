@@ -1,0 +1,154 @@
+"""The initial equilibrium: displacements with which the joints carry gravity and loads.
+
+First with joints that cannot slide; then with the law itself. Blocks that the law cannot hold are
+placed with joints that neither slide nor open, which always has an answer. Blocks that no joint
+connects, such as two slopes side by side, find their answers apart.
+"""
+
+from functools import partial
+
+import numpy as np
+from scipy.sparse import bmat, csr_array, diags
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import spsolve
+
+from ..contact import Joints, Tracker
+from ..scene import Scene
+from .blocks import Blocks
+from .timestep import rates
+
+ATTEMPTS = 40  # most rounds of the initial equilibrium
+SETTLED = 1e-10  # movement of a round, as a share of the first, that ends them
+TIGHT = 1e-11  # residual force as a share of the applied one
+
+
+def seat(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> tuple[np.ndarray, bool]:
+    """Move the blocks to where their joints carry them.
+
+    Returns the first sliding (k,) of the joints (m), and whether the law can hold all blocks: those
+    that it cannot hold will move from step 0.
+    """
+    slid, free = np.zeros(joints.n), blocks.free.ravel()
+    still = np.ones(int(free.sum()), bool)
+    all_balanced, first = True, 0.0
+    for attempt in range(ATTEMPTS):  # each at the places just found: joints turn with the blocks
+        tracker.follow(blocks.motion)
+        before = tracker.identities
+        if tracker.renew(blocks.motion, blocks.near):
+            known = dict(zip(before, slid.tolist(), strict=True))
+            joints.assign(tracker.identities)
+            slid = np.array([known.get(who, 0.0) for who in tracker.identities])
+        force = blocks.gravity + blocks.loads
+        if attempt:
+            force = force + _length_forces(scene, blocks, tracker, joints, slid)
+        force = (force * blocks.root).ravel()[free]
+        rows = rates(blocks, tracker.contacts)
+        area = tracker.contacts.length * scene.thickness
+        start = np.concatenate([tracker.contacts.closure, slid])
+        moved, balanced = _equilibrium(joints, rows, start, area, force, still, attempt > 0)
+        if attempt == 0:
+            all_balanced, first = bool(balanced.all()), np.abs(moved).max()
+        else:  # what was found before is balanced but for the turning of the joints
+            moved = np.where(balanced & still, moved, 0.0)
+        slid = slid + (rows @ moved)[len(slid) :]
+        shift = np.zeros(blocks.free.size)
+        shift[free] = moved * blocks.root.ravel()[free]
+        blocks.motion[:3] += shift.reshape(-1, 3).T
+        still &= balanced
+        if not still.any() or np.abs(moved).max() < SETTLED * first:
+            break
+    tracker.renewed_at = blocks.motion[:3].copy()
+    return slid, all_balanced
+
+
+def _length_forces(scene, blocks, tracker, joints, slid) -> np.ndarray:
+    """Forces (n, 3) of joints whose length changes as the blocks move, after their first step."""
+    before, none = joints.snapshot(), np.zeros(joints.n)
+    joints.update(tracker.contacts.closure, slid)
+    stored = joints.stored * scene.thickness
+    joints.restore(before, tracker.identities)
+    return tracker.contacts.assemble(blocks.motion, none, none, stored) * blocks.mobile
+
+
+def _equilibrium(joints: Joints, rows: csr_array, start, area, force, settle, near):
+    """Displacements of the free motions that balance `force`; rows as `rates` gives them.
+
+    start (2 k,): closures, then slidings, without these displacements (m), reached in one step
+    from the virgin state. settle (free motions,): those that are asked for; near: they are almost
+    in balance. Returns (displacement, balanced), both (free motions,).
+    """
+    k = len(area)
+    rows = diags(np.concatenate([-np.ones(k), np.ones(k)])) @ rows  # to (closure, shear)
+    weight = np.concatenate([area, area])
+
+    def bonded(d, pull=0.0):
+        c = np.maximum(np.abs(d[:k]), 1e-9)
+        shear = joints.virgin("stiffness", "closure", c)
+        stress, above, below = (
+            joints.virgin("stress", "closure", part * c) for part in (1.0, 1.01, 0.99)
+        )
+        slope = (above - below) / (0.02 * c)
+        acts = np.where(d[:k] > 0, 1.0, pull)
+        F = np.concatenate([stress * acts * np.sign(d[:k]), shear * d[k:]])
+        return F, diags(np.concatenate([slope * acts, shear]))
+
+    def law(d):
+        F, C = joints.trial(np.stack([d[:k], d[k:]], axis=1))
+        blocks = [[diags(C[:, i, j]) for j in (0, 1)] for i in (0, 1)]
+        return F.T.ravel(), csr_array(bmat(blocks))
+
+    touched = abs(rows[:k]) + abs(rows[k:])  # the law couples closure and shear
+    _, island = connected_components(touched.T @ touched, directed=False)
+    idle, nothing = np.bincount(island, settle) == 0, np.zeros(len(force))
+    guess = nothing
+    if not near:
+        guess, _ = _newton(bonded, rows, start, weight, force, nothing, 300, island, idle)
+    best, balanced = _newton(law, rows, start, weight, force, guess, 100, island, idle)
+    if not (near or balanced.all()):
+        glue = partial(bonded, pull=1.0)
+        glued, _ = _newton(glue, rows, start, weight, force, nothing, 300, island, balanced)
+        best = np.where(balanced[island], best, glued)
+    return best, balanced[island]
+
+
+def _newton(law, rows, start, weight, force, y, most, island, idle):
+    """Levenberg's damped Newton steps on the unbalanced force, each island with its damping.
+
+    island (free motions,): number of the group of connected blocks; idle: islands to leave alone.
+    Returns y and whether each island found its balance.
+    """
+
+    def unbalanced(y):
+        F, C = law(start + rows @ y)
+        return force - rows.T @ (weight * F), C
+
+    def norm(r):
+        return np.sqrt(np.bincount(island, r * r))
+
+    r, C = unbalanced(y)
+    size, target = norm(r), TIGHT * norm(force)
+    damp = None
+    stuck = idle.copy()  # no damping makes a better step
+    for _ in range(most):
+        active = (size > target) & ~stuck
+        if not active.any():
+            break
+        K = (rows.T @ diags(weight) @ C @ rows).tocsc()
+        if damp is None:
+            damp = np.full(len(size), max(1e-3 * abs(K).max(), 1.0))
+        waits = active.copy()
+        step = np.zeros(len(y))
+        for _ in range(40):
+            trial = spsolve((K + diags(damp[island])).tocsc(), r)
+            step = np.where(waits[island], trial, step)
+            r_new, C_new = unbalanced(y + step * active[island])
+            waits = active & ~(norm(r_new) < size)
+            if not waits.any():
+                break
+            damp = np.where(waits, 4 * damp, damp)
+        stuck |= waits
+        y = y + step * (active & ~waits)[island]
+        r, C = (r_new, C_new) if not waits.any() else unbalanced(y)
+        size = norm(r)
+        damp = np.where(active & ~waits, damp / 10, damp)
+    return y, size <= 1e3 * target

@@ -1,0 +1,152 @@
+"""The keys of a scene's tables, each with what it may be; checked as all TOML of the project."""
+
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from shapely import Polygon
+
+from jointlaw.parameters.keys import known
+from jointlaw.support.checks import above, at_least, finite, number, one_of, whole
+
+from ..errors import SceneError
+
+Tables = dict[str, Any]
+
+
+def checked(data: Any, rules: Tables, where: str) -> Tables:
+    """A table whose keys are those of `rules` and whose values pass them. Raises SceneError.
+
+    A rule is a function (name, value) that returns the value or raises ValueError; {...} for a
+    table; [{...}] for a list of tables. A key that ends in "!" is needed.
+    """
+    if not isinstance(data, dict):
+        raise SceneError(f"{where} = {data!r}: must be a table")
+    rule_of = {key.rstrip("!"): rule for key, rule in rules.items()}
+    for key in rules:
+        if key.endswith("!") and key[:-1] not in data:
+            raise SceneError(f"{where}.{key[:-1]} is missing")
+    try:
+        known(data, set(rule_of), where, "")
+        return {key: _value(f"{where}.{key}", data[key], rule_of[key]) for key in data}
+    except (ValueError, TypeError, OverflowError) as error:
+        raise SceneError(str(error)) from None
+
+
+def _value(name: str, value: Any, rule: Any) -> Any:
+    if isinstance(rule, dict):
+        return checked(value, rule, name)
+    if isinstance(rule, list):
+        return [checked(v, rule[0], f"{name}[{i}]") for i, v in enumerate(a(list)(name, value))]
+    return rule(name, value)
+
+
+def a(kind: type) -> Callable[[str, Any], Any]:
+    """A rule: of this kind."""
+
+    def check(name: str, value: Any) -> Any:
+        if not isinstance(value, kind):
+            kinds = {str: "a text", bool: "true or false", list: "a list", dict: "a table"}
+            raise ValueError(f"{name} = {value!r}: must be {kinds[kind]}")
+        return value
+
+    return check
+
+
+def within(low: float, high: float, unit: str) -> Callable[[str, Any], float]:
+    """A rule: a number from `low` to `high`."""
+
+    def check(name: str, value: Any) -> float:
+        if not low <= number(name, value) <= high:
+            raise ValueError(f"{name} = {value!r}: must be from {low:g} to {high:g} {unit}")
+        return float(value)
+
+    return check
+
+
+def vector(name: str, value: Any) -> tuple[float, float]:
+    """A rule: two finite numbers."""
+    if not isinstance(value, list) or len(value) != 2:
+        raise ValueError(f"{name} = {value!r}: must be two numbers [x, y]")
+    return number(name, value[0]), number(name, value[1])
+
+
+def corners(name: str, value: Any) -> np.ndarray:
+    """A rule: the corners (k, 2) of a polygon that does not cross itself, in m."""
+    points = np.array([vector(name, point) for point in a(list)(name, value)])
+    if len(points) < 3 or not Polygon(points).is_valid:
+        raise ValueError(f"{name}: must be 3 corners [x, y] or more that do not cross or touch")
+    return points
+
+
+def some_of(name: str, value: Any, names: Iterable[str], count: int | None = None) -> list[str]:
+    """A rule: a list of different known names, `count` of them."""
+    ok = isinstance(value, list) and all(isinstance(v, str) and v in names for v in value)
+    if not ok or len(set(value)) < len(value) or count not in (None, len(value)):
+        many = f"{count} of" if count else "some of"
+        raise ValueError(f"{name} = {value!r}: must be {many} {', '.join(names)}, each once")
+    return value
+
+
+def _removed(name: str, value: Any) -> None:
+    raise ValueError(
+        f"{name} is removed: joints carry at their two ends; cut a long block in two instead"
+    )
+
+
+AXES = {"x": 0, "y": 1, "turn": 2}
+TEXT, LIST = a(str), a(list)
+POSITIVE, NOT_NEGATIVE = partial(above, bound=0), partial(at_least, bound=0)
+DENSITY = within(50.0, 30000.0, "kg/m3; 2.6 g/cm3 is 2600 kg/m3")
+
+BLOCK = {
+    "name!": TEXT, "box": vector, "at": vector, "angle": number, "corners": corners,
+    "density": DENSITY, "fixed": a(bool), "velocity": vector, "spin": number, "load": vector,
+    "held": partial(some_of, names=AXES),
+}  # fmt: skip
+SET = {
+    "dip!": within(-90, 90, "degrees"), "spacing!": POSITIVE, "law!": TEXT, "through": vector,
+    "persistence": within(0, 1, ""), "scatter": within(0, 0.999, "(two joints could meet)"),
+}  # fmt: skip
+ROCK = {
+    "name!": TEXT, "like": TEXT, "outline!": corners, "set!": [SET], "at": vector,
+    "fixed": [{"corners!": corners}], "seed": partial(whole, bound=0), "least_width": POSITIVE,
+    "density": DENSITY, "laws": a(dict),
+}  # fmt: skip
+DRIVE = {
+    "block!": TEXT, "motion!": partial(one_of, choices=tuple(AXES)), "ease": NOT_NEGATIVE,
+    "times": partial(finite, unit="s"), "values": partial(finite, unit="m or degrees"),
+    "back": {"block!": TEXT, "slid!": POSITIVE, "by!": POSITIVE, "rate!": POSITIVE},
+    "sine": {
+        "acceleration!": POSITIVE, "frequency!": POSITIVE, "cycles": partial(whole, bound=1),
+    },
+    "file": TEXT, "scale": number,
+}  # fmt: skip
+RUN = {
+    "end!": POSITIVE, "fraction": within(1e-6, 0.95, "of the limit"), "step": POSITIVE,
+    "seat": a(bool), "record": POSITIVE, "dashpot_normal": NOT_NEGATIVE,
+    "dashpot_shear": NOT_NEGATIVE, "law_steps": partial(whole, bound=1),
+    "largest_stress": NOT_NEGATIVE, "skin": POSITIVE, "corner_length": POSITIVE,
+    "max_overlap": POSITIVE, "point_spacing": _removed,
+}  # fmt: skip
+SCENE = {
+    "title": TEXT, "gravity": vector, "density": DENSITY, "thickness": POSITIVE, "law": TEXT,
+    "laws!": a(dict), "block": [BLOCK], "rock": LIST, "drive": [DRIVE], "run!": RUN,
+    "joint": [{"between": LIST, "around": vector, "law!": TEXT}],
+    "watch": {"slip": LIST, "shear": LIST, "pins": LIST},
+}  # fmt: skip
+COULOMB = {
+    "kind!": TEXT, "normal_stiffness!": POSITIVE, "shear_stiffness!": POSITIVE,
+    "friction!": partial(at_least, bound=0, infinite=True),
+}  # fmt: skip
+
+
+def overlay(below: Any, above: Any) -> Any:
+    """Tables are joined key by key, lists of tables table by table; all else is replaced."""
+    if isinstance(above, dict) and isinstance(below, dict):
+        return below | {key: overlay(below.get(key), value) for key, value in above.items()}
+    if isinstance(below, list) and all(isinstance(table, dict) for table in (*below, *above)):
+        joined = [overlay(*pair) for pair in zip(below, above, strict=False)]
+        return joined + below[len(joined) :] + above[len(joined) :]
+    return above

@@ -1,0 +1,44 @@
+"""
+Figure 12: initial shear stiffness against normal stress
+========================================================
+
+dF₂/dδ₂ at zero shear and constant closure, after closing to the normal stress. The smooth interface
+is the stiffer one, and the stiffness grows ever more slowly with stress. (a) Parameters of
+section 4.1, friction 0.3 as in section 4.3. (b) Parameters of section 4.2; the paper prints no
+contact density for the replica, so its stiffness is drawn over one value of its own, and the stress
+axis shifts with the density that is assumed. The incremental law is stiffer, since asperities that
+slid in closure stick when the shear begins. Measured points and axis ranges are not printed.
+"""
+
+import numpy as np
+from _common import LAW, TOTAL, WESTERLY, beside, draw, initial_stiffness, law
+
+granite = np.linspace(0.5e6**0.5, 50e6**0.5, 34) ** 2  # Pa, dense where the curves bend
+concrete = np.linspace(0.1e6**0.5, 10e6**0.5, 34) ** 2
+replica = law("jing-replica")
+unit = initial_stiffness(replica, 10e6)[1]
+panels = {
+    f"{letter}, {kind}": {} for letter in ("(a) granite", "(b) replica") for kind in (TOTAL, LAW)
+}
+for (title, lines), form in zip(panels.items(), (0, 1, 0, 1), strict=True):
+    if "granite" in title:
+        for name, label in WESTERLY:
+            values = [initial_stiffness(law(name), float(s))[form] * 1e-12 for s in granite]
+            lines[label] = granite * 1e-6, np.array(values)
+    else:
+        for azimuth in (0, 45, 90):
+            turn = np.radians(azimuth)
+            values = [initial_stiffness(replica, float(s), turn)[form] / unit for s in concrete]
+            lines[f"azimuth {azimuth}°"] = concrete * 1e-6, np.array(values)
+
+styles = [("C0", "C1"), ("C0", "C1"), ("C2", "C2--", "C2:"), ("C2", "C2--", "C2:")]
+axes = draw(panels, styles, columns=2, xlabel="normal stress (MPa)")
+for panel in axes[:2]:
+    panel.set(ylabel="initial shear stiffness (MPa/µm)", ylim=(0.0, 210.0))
+for panel in axes[2:]:
+    panel.set(ylabel="stiffness/(incremental, 0°, 10 MPa)", ylim=(0.0, 1.05))
+
+for stress in (1e6, 50e6):
+    total, ours = np.divide(*(initial_stiffness(law(name), stress) for name, _ in WESTERLY))
+    text = f"{total:.2f} (total form), {ours:.2f} (incremental law)"
+    beside((f"smooth over rough at {stress * 1e-6:g} MPa", "above 1", text))

@@ -1,0 +1,175 @@
+"""`jointlaw shear` and `jointlaw closure`: laboratory tests on one joint."""
+
+import argparse
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ..laboratory.experiments import CONTROLS, PathError, closure_test, direct_shear
+from ..laboratory.record import UNITS, Record
+from ..law import JointLaw
+from ..support.units import typed
+from .command import Written, add_command, add_law, add_out, in_unit, read_law, write_results
+
+
+def several(unit: str, *, positive: bool = False) -> Callable[[str], list[float]]:
+    """Type of an option such as 5MPa,20MPa: one quantity or several with commas between."""
+    return lambda text: [in_unit(unit, positive=positive)(part) for part in text.split(",")]
+
+
+def csv_units(text: str) -> list[str]:
+    """Type of the option --units: names of a length and of a stress, mm,MPa."""
+    names = text.split(",")
+    try:
+        for name, unit in zip(names, ("m", "Pa"), strict=True):
+            typed(f"1{name}", unit)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(
+            f"{text}: write a length and a stress, mm,MPa ({error})"
+        ) from None
+    return names
+
+
+def add(commands: Any) -> None:
+    """Add both subcommands to the command line."""
+    what = "direct shear test: seat the joint at a normal stress, shear it, write curve and picture"
+    example = "jointlaw shear biegel-rough --normal-stress 10MPa --to 2um --reverse -2um --out out"
+    parser = add_command(commands, "shear", what, example, _shear)
+    parser.add_argument(
+        "--normal-stress",
+        metavar="STRESS",
+        type=in_unit("Pa", positive=True),
+        default="10MPa",
+        help="normal stress (default 10MPa)",
+    )
+    parser.add_argument(
+        "--to",
+        metavar="LENGTH",
+        type=in_unit("m"),
+        required=True,
+        help="shear displacement, such as 2um",
+    )
+    parser.add_argument(
+        "--reverse",
+        metavar="LENGTHS",
+        type=several("m"),
+        default=[],
+        help="further turning points, separated by commas: --reverse -2um,0",
+    )
+    parser.add_argument(
+        "--azimuth",
+        metavar="ANGLE",
+        type=in_unit("rad"),
+        default="0",
+        help="direction of shear from axis 2 towards axis 3, such as 30deg (default 0)",
+    )
+    parser.add_argument(
+        "--control",
+        choices=CONTROLS,
+        default="stress",
+        help="keep the normal stress (default), let it grow with dilation by --normal-stiffness, "
+        "or keep the closure",
+    )
+    parser.add_argument(
+        "--normal-stiffness",
+        metavar="STIFFNESS",
+        type=in_unit("Pa/m"),
+        help="of the surroundings, for --control stiffness, such as 5GPa/m",
+    )
+    _add_common(parser, steps=200)
+
+    what = "closure test: load the joint to a normal stress and unload it"
+    example = "jointlaw closure westerly-smooth --normal-stress 20MPa --out out"
+    parser = add_command(commands, "closure", what, example, _closure)
+    parser.add_argument(
+        "--normal-stress",
+        metavar="STRESSES",
+        type=several("Pa", positive=True),
+        default="20MPa",
+        help="largest normal stress (default 20MPa), or one per cycle: 5MPa,20MPa",
+    )
+    parser.add_argument("--no-unload", action="store_true", help="stop at the largest stress")
+    _add_common(parser, steps=100)
+
+
+def _add_common(parser: argparse.ArgumentParser, steps: int) -> None:
+    add_law(parser)
+    parser.add_argument(
+        "--steps", metavar="N", type=int, default=steps, help=f"steps per leg (default {steps})"
+    )
+    parser.add_argument(
+        "--units",
+        metavar="LENGTH,STRESS",
+        type=csv_units,
+        default="m,Pa",
+        help="of the CSV: mm,MPa (default m,Pa)",
+    )
+    add_out(parser)
+
+
+def _shear(options: argparse.Namespace) -> None:
+    law = read_law(options)
+    if (options.control == "stiffness") != (options.normal_stiffness is not None):
+        raise ValueError("--control stiffness and --normal-stiffness go together; give both")
+    test = partial(
+        direct_shear,
+        law.joint(),
+        [options.to, *options.reverse],
+        options.normal_stress,
+        options.control,
+        options.azimuth,
+        options.normal_stiffness,
+        options.steps,
+    )
+    record = _run(test, law, options)
+    peak = "peak friction angle" if record.has_peak else "no peak: largest friction angle"
+    secant = record.secant_stiffness
+    print(
+        f"{peak} {record.peak_friction_angle:.2f} deg, at the end "
+        f"{record.residual_friction_angle:.2f} deg, largest dilation angle "
+        f"{record.dilation_angle:.2f} deg"
+        + ("" if math.isnan(secant) else f", secant shear stiffness {secant:.4g} Pa/m")
+    )
+
+
+def _closure(options: argparse.Namespace) -> None:
+    law = read_law(options)
+    joint = replace(law, plane=None, closure_only=True).joint()  # the same numbers, sooner
+    unload, steps = not options.no_unload, options.steps
+    test = partial(closure_test, joint, options.normal_stress, unload=unload, steps=steps)
+    record = _run(test, law, options)
+    at = int(np.argmax(record.F1))
+    print(
+        f"closure {1e6 * record.closure[at]:.4g} um at {1e-6 * record.F1[at]:.4g} MPa, "
+        f"{record.dissipated[-1]:.3g} J/m2 lost, {joint.plastic_work:.3g} of it to yielding"
+    )
+
+
+def _run(test: Callable[[], Record], law: JointLaw, options: argparse.Namespace) -> Record:
+    """Run a test and write its record, also that of a test that stopped early."""
+    try:
+        record = test()
+    except PathError as error:
+        if len(error.record):
+            _write(error.record, law, options)
+        raise
+    _write(record, law, options)
+    return record
+
+
+def _write(record: Record, law: JointLaw, options: argparse.Namespace) -> None:
+    """Curve (CSV, NPZ), picture, law and summary of a test."""
+    name, (length, stress) = options.command, options.units
+    files: Written = {
+        f"{name}.csv": partial(record.to_csv, length=length, stress=stress),
+        f"{name}.npz": record.to_npz,
+        "law.toml": law.to_toml,
+        f"{name}.png": record.plot,
+    }
+    settings = {k: v for k, v in vars(options).items() if k not in ("run", "out", "force")}
+    summary = {"settings_SI": settings, "result": record.summary(), "units": UNITS}
+    write_results(options.out, files, summary, options.format)

@@ -1,0 +1,101 @@
+"""Tables of TOML files, checked: which keys there are, which are needed, what each may be.
+
+Every TOML file of the project is read here. Errors name the file, the key by its path, and what to
+write instead. A rule for the value of a key is one of
+
+    a function (name, value)    returns the value, or raises ValueError
+    a mapping of rules          for a table
+    [a mapping of rules]        for a list of tables
+    Removed(use, neutral)       for a key of former versions
+"""
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import MISSING, fields
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ..support.checks import remedy
+
+Table = dict[str, Any]
+
+
+class Removed(NamedTuple):
+    """A key that is gone: a neutral value, which asked for nothing, is skipped."""
+
+    use: str  # what to write instead
+    neutral: Any
+
+
+def read(path: Path, what: str = "TOML file") -> Table:
+    """The table of a file. Raises ValueError if there is none, or it is not TOML in UTF-8."""
+    if not path.is_file():
+        raise ValueError(f"{what} {str(path)!r} does not exist")
+    try:
+        return parse(path.read_text(encoding="utf-8"), str(path))
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{str(path)!r} is not a text file in UTF-8: {error}") from None
+
+
+def parse(text: str, where: str) -> Table:
+    """The table of TOML text; `where` is named in errors."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"{where} is not valid TOML: {error}") from None
+
+
+def known(data: Mapping[str, Any], allowed: Iterable[str], where: str, prefix: str = "") -> None:
+    """Refuse keys that a table does not have. Raises ValueError naming key and remedy."""
+    for key in data:
+        if key not in allowed:
+            hint = remedy(key, sorted(allowed), "known here:")
+            raise ValueError(f"{where}: key '{prefix}{key}' is unknown; {hint}")
+
+
+def checked(data: Any, rules: Mapping[str, Any], where: str, path: str = "") -> Table:
+    """A table whose keys are those of `rules`, and whose values pass them.
+
+    rules: rule by key; a key that ends in "!" is needed. where: file, and path: of the table in
+    it, as errors name them.
+    """
+    if not isinstance(data, dict):
+        raise ValueError(f"{where}: key {path!r} must be a table")
+    prefix = f"{path}." if path else ""
+    rule_of = {key.rstrip("!"): rule for key, rule in rules.items()}
+    allowed = [key for key, rule in rule_of.items() if not isinstance(rule, Removed)]
+    known({key: None for key in data if not isinstance(rule_of.get(key), Removed)}, allowed,
+          where, prefix)  # fmt: skip
+    found: Table = {}
+    for key, value in data.items():
+        rule, name = rule_of[key], prefix + key
+        if isinstance(rule, Removed):
+            if value != rule.neutral:
+                raise ValueError(f"{where}: key '{name}' is removed: {rule.use}")
+        elif isinstance(rule, Mapping):
+            found[key] = checked(value, rule, where, name)
+        elif isinstance(rule, list):
+            found[key] = _checked_list(value, rule[0], where, name)
+        else:
+            found[key] = rule(name, value)
+    for key in rules:
+        if key.endswith("!") and key[:-1] not in data:
+            raise ValueError(f"{where}: key '{prefix}{key[:-1]}' is missing; give it a value")
+    return found
+
+
+def _checked_list(value: Any, rules: Mapping[str, Any], where: str, path: str) -> list[Table]:
+    if not isinstance(value, list):
+        raise ValueError(f"{where}: key {path!r} must be a list of tables")
+    return [checked(one, rules, where, f"{path}[{i}]") for i, one in enumerate(value)]
+
+
+def as_given(name: str, value: Any) -> Any:
+    """A rule: any value; the constructor that takes it checks it."""
+    return value
+
+
+def keys_of(kind: Any) -> dict[str, Any]:
+    """Rules for a table with the fields of a dataclass, which checks their values itself."""
+    own = [one for one in fields(kind) if one.init]
+    return {one.name + ("!" if one.default is MISSING else ""): as_given for one in own}

@@ -1,0 +1,93 @@
+"""The bound of |C| and the explicit time step that follows from it: in touch, open, sheared far."""
+
+import math
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+
+R = 1e-6  # closure range, m
+
+
+def random_law(rng):
+    """Any admissible law, of one in three asperities that yield, of one in three with wear."""
+    b, mu, damage = rng.uniform(-1.0, 2.0), float(rng.choice([0.0, 0.3, 1.2, 3.0])), {}
+    if rng.random() < 0.3:
+        damage["yield_interference"] = R * 10.0 ** rng.uniform(-1.0, 0.5)
+    if mu and rng.random() < 0.3:
+        damage |= {"mu_residual": mu * rng.uniform(0.05, 1.0), "wear_slip": R}
+    eta = float(rng.choice([0.0, 0.2, 0.5, 1.0]))
+    heights = jl.GammaHeights(
+        rng.uniform(0.0, 8.0), 1e-6, 10.0 ** rng.uniform(-7, -5), "individual"
+    )
+    return jl.JointLaw(
+        orientation=jl.Orientation(
+            rng.choice([1.0, 1.5, 3.0, 6.0]), b, rng.uniform(-1, 1) * (1 / 3 - b / 6)
+        ),
+        asperity=jl.Asperity(1e7, rng.uniform(0.3, 3.0), eta, mu, **damage),
+        heights=rng.choice([None, heights]),
+        asperity_density=1e10,
+        closure_range=R,
+        resolution=jl.Resolution(*(int(rng.integers(*r)) for r in ((1, 4), (3, 7), (1, 5)))),
+        plane=rng.choice([None, 0.3]),
+        critical_slip=float(rng.choice([np.inf, 0.3 * R, 30.0 * R])),
+    )
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_tangent_stays_below_both_bounds(seed):
+    rng = np.random.default_rng(seed)
+    law = random_law(rng)
+    joints, far, closest = law.joints(20), rng.choice([1.0, 100.0]), 0.0
+    closed, sheared = np.zeros(20), np.zeros(20)
+    for k in range(16):
+        d = R * rng.normal(0.0, 0.3, (20, law.tables.dim))
+        d[:, 1:] *= far
+        if k % 3:
+            d[:, 0] = R * rng.uniform(0.05, 1.0, 20) - joints.delta[:, 0]
+        C = joints.update(d)[1]
+        closed = np.maximum(closed, joints.delta[:, 0])
+        sheared = np.maximum(sheared, np.linalg.norm(joints.delta[:, 1:], axis=1))
+        now, most = joints.max_stiffness(), law.max_stiffness(closed, sheared)
+        size = np.linalg.norm(C, 2, axis=(1, 2))
+        assert np.all(size <= now * (1.0 + 1e-12))  # equal for one facet without friction
+        assert np.all(now <= most * (1.0 + 1e-12))
+        closest = max(closest, np.max(size[now > 0] / now[now > 0], initial=0.0))
+    assert closest > 0.3  # a bound, but not an empty one
+
+
+def test_confined_shear_needs_a_shorter_step_than_closure():
+    """After 100 closure ranges of shear at constant closure one side carries everything."""
+    law = jl.presets.load("westerly-rough")
+    joint = law.joint()
+    joint.update([law.closure_range, 0.0, 0.0])
+    for _ in range(100):
+        C = joint.update([0.0, law.closure_range, 0.0])[1]
+    size = np.linalg.norm(C, 2)
+    unsheared = law.max_stiffness(law.closure_range)
+    assert size > 15.0 * unsheared  # a step for closure alone is 4 times too long
+    step = law.critical_time_step(2.0, 0.5, law.closure_range, shear=100 * law.closure_range)
+    assert step < 2.0 * math.sqrt(2.0 / (0.5 * size))
+    assert step > 0.5 * 2.0 * math.sqrt(2.0 / (0.5 * size))  # and not much shorter than it need be
+
+
+def test_the_step_of_a_batch_is_that_of_each_joint_as_it_is():
+    law = jl.presets.load("westerly-smooth")
+    joints = law.joints(3)
+    joints.update([[1e-6, 0.0, 0.0], [2e-6, 1e-6, 0.0], [-1e-6, 0.0, 0.0]])
+    steps = joints.critical_time_step([2.0, 4.0, 1.0], 0.5)
+    assert steps[0] == pytest.approx(law.critical_time_step(2.0, 0.5, 1e-6), rel=1e-14)
+    assert steps[1] >= law.critical_time_step(4.0, 0.5, 2e-6, 1e-6)
+    assert steps[2] == math.inf  # open
+    stiffness = joints.max_stiffness()
+    assert steps[:2] == pytest.approx(2 * np.sqrt([4.0, 8.0] / stiffness[:2]), rel=1e-14)
+
+
+@pytest.mark.parametrize("given", [(0, 1, 1e-6), (1, -1, 1e-6), (1, 1, np.nan), (1, 1, 1e-6, -1)])
+def test_arguments_out_of_bounds(given):
+    law = jl.presets.load("linear-a3")
+    with pytest.raises(ValueError, match=r"(mass|area|closure|shear) = "):
+        law.critical_time_step(*given)
+    with pytest.raises(ValueError, match="mass and area must be numbers or have shape"):
+        law.joints(3).critical_time_step(1.0, np.ones((2, 3)))

@@ -12,14 +12,12 @@ from jointlaw.kernels import reference as kernel
 # The full law sums the same terms over all azimuths, a reduced one over one of them: what differs
 # is the rounding of a few hundred sums, carried along the path.
 EXACT = 1e-12
-ENGINES = {"numpy": engine.NumpyEngine, "numba": engine.NumbaEngine}
+ENGINES = {"numpy": engine.NumpyEngine, "native": engine.NativeEngine}
 
 
 @pytest.fixture(params=ENGINES)
 def with_kernel(request, monkeypatch):
-    """Each kernel in turn; skipped where numba is missing."""
-    if request.param == "numba":
-        pytest.importorskip("numba")
+    """Each kernel in turn."""
     monkeypatch.setenv("JOINTLAW_KERNEL", request.param)
     return ENGINES[request.param]
 

@@ -104,6 +104,9 @@ JLAW_FUNCTION const char *jlaw_fingerprint(const jlaw_law *law);
 #endif
 #ifdef __CUDACC_RTC__
 #define DBL_MAX 1.7976931348623157e308
+#ifndef NULL
+#define NULL 0
+#endif
 #else
 #include <float.h>
 #include <math.h>
@@ -182,6 +185,13 @@ static JLAW_FUNCTION void jlaw_say_number_(jlaw_text_ *text, double x)
 }
 
 /* ------------------------------------------------------------------------ the step */
+
+/* NaN, where the C library may have none */
+static JLAW_FUNCTION double jlaw_none_(void)
+{
+  const double zero = 0.0;
+  return zero / zero;
+}
 
 /* Phi and Phi' at one y */
 static JLAW_FUNCTION double jlaw_virgin_one_(const jlaw_law *law, double y, double *slope)
@@ -317,7 +327,7 @@ JLAW_FUNCTION void jlaw_shares(const jlaw_law *law, const double *s, double shar
 JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure)
 {
   double slope, late = 0.0;
-  if (!(closure <= law->largest_reach)) return (double) NAN;
+  if (!(closure <= law->largest_reach)) return jlaw_none_();
   for (int f = 0; law->yields && f < law->facets; f++) /* what yielding takes off first loading */
     for (int i = JLAW_LATE; i < JLAW_LATE + 4; i += 2) {
       const double depth = jlaw_of_facet_(law, f, i + 1);
@@ -329,7 +339,7 @@ JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure)
 JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure)
 {
   double slope;
-  if (!(closure <= law->largest_reach)) return (double) NAN;
+  if (!(closure <= law->largest_reach)) return jlaw_none_();
   jlaw_virgin_one_(law, closure, &slope);
   return law->stiffness_factor * slope;
 }
@@ -337,7 +347,7 @@ JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure)
 JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
 {
   double low = 0.0, high = law->farthest;
-  if (!(normal_stress >= 0.0) || !(jlaw_normal_stress(law, high) >= normal_stress)) return (double) NAN;
+  if (!(normal_stress >= 0.0) || !(jlaw_normal_stress(law, high) >= normal_stress)) return jlaw_none_();
   while (1) { /* the stress rises: halve the exponent first, then the number */
     const double middle = high > 4.0 * low && high > 1e-300 ? sqrt(high * fmax(low, 1e-300))
                                                             : 0.5 * (low + high);

@@ -186,6 +186,9 @@ struct jlaw_law {
 #endif
 #ifdef __CUDACC_RTC__
 #define DBL_MAX 1.7976931348623157e308
+#ifndef NULL
+#define NULL 0
+#endif
 #else
 #include <float.h>
 #include <math.h>
@@ -460,6 +463,9 @@ JL_IN_ void jl_put_(jl_numbers_ n, int row, int apart, int some, jl_real_ x)
  * q times lam; where asperities yield flattened depth (M) | plastic work; with wear slip of the
  * asperities | by how much mu had fallen in the last step. A batch keeps beside them Phi and Phi'
  * of every facet (M each), which saves half the look-ups, and with yielding the same at z.
+ *
+ * Of the functions of the C library that round differently, only expm1, log1p, pow and hypot are
+ * called: zig links exp and log of its own.
  */
 
 typedef struct { /* what the compiler knows of a step: it leaves out the rest */
@@ -667,8 +673,8 @@ JL_IN_ void jl_wear_friction_(const jlaw_law *law, jl_of_joint_ slip, jl_of_join
   m->worn = m->since = jl_each_joint_(1.0);
   if (!(law->mu > 0.0)) return;
   for (int l = 0; l < JL_JOINTS_; l++) {
-    const double gone = exp(-JL_JOINT_(slip, l) / law->wear_slip);
-    const double now = law->mu_residual + (law->mu - law->mu_residual) * gone;
+    const double left = 1.0 + expm1(-JL_JOINT_(slip, l) / law->wear_slip);
+    const double now = law->mu_residual + (law->mu - law->mu_residual) * left;
     const double last = law->mu - JL_JOINT_(fallen, l);
     JL_JOINT_(m->worn, l) = now / law->mu;
     JL_JOINT_(m->since, l) = now < last ? now / last : 1.0;
@@ -699,7 +705,7 @@ JL_IN_ void jl_drag_(double D, int dim, double a0, double a1, double p0, double 
   inside = inside > 0.0 ? (inside < length ? inside : length) : 0.0;
   a0 += inside * e0;
   a1 += inside * e1;
-  const double x = (length - inside) / D, decay = exp(-x), rest = -expm1(-x);
+  const double x = (length - inside) / D, rest = -expm1(-x), decay = 1.0 - rest;
   double cosine = (a0 * e0 + a1 * e1) / D;
   cosine = cosine > 0.0 ? (cosine < 1.0 ? cosine : 1.0) : 0.0;
   const double sine = (a1 * e0 - a0 * e1) / D;
@@ -708,7 +714,7 @@ JL_IN_ void jl_drag_(double D, int dim, double a0, double a1, double p0, double 
   const double sin1 = 2.0 * sine * decay / bottom;
   to[0] = D * (cos1 * e0 - sin1 * e1);
   to[1] = D * (cos1 * e1 + sin1 * e0);
-  to[2] = D * (x + log(bottom / 2.0));
+  to[2] = D * (x + log1p(0.5 * bottom - 1.0));
   const double grazing = cosine > JLAW_GRAZING ? cosine : JLAW_GRAZING;
   double turn = (rest * rest + cosine * rest * (1.0 + decay)) / bottom;
   turn += inside / (D * grazing) * (2.0 * decay / bottom - sin1 * sine);
@@ -1168,6 +1174,13 @@ static JLAW_FUNCTION void jlaw_say_number_(jlaw_text_ *text, double x)
 
 /* ------------------------------------------------------------------------ the step */
 
+/* NaN, where the C library may have none */
+static JLAW_FUNCTION double jlaw_none_(void)
+{
+  const double zero = 0.0;
+  return zero / zero;
+}
+
 /* Phi and Phi' at one y */
 static JLAW_FUNCTION double jlaw_virgin_one_(const jlaw_law *law, double y, double *slope)
 {
@@ -1302,7 +1315,7 @@ JLAW_FUNCTION void jlaw_shares(const jlaw_law *law, const double *s, double shar
 JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure)
 {
   double slope, late = 0.0;
-  if (!(closure <= law->largest_reach)) return (double) NAN;
+  if (!(closure <= law->largest_reach)) return jlaw_none_();
   for (int f = 0; law->yields && f < law->facets; f++) /* what yielding takes off first loading */
     for (int i = JLAW_LATE; i < JLAW_LATE + 4; i += 2) {
       const double depth = jlaw_of_facet_(law, f, i + 1);
@@ -1314,7 +1327,7 @@ JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure)
 JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure)
 {
   double slope;
-  if (!(closure <= law->largest_reach)) return (double) NAN;
+  if (!(closure <= law->largest_reach)) return jlaw_none_();
   jlaw_virgin_one_(law, closure, &slope);
   return law->stiffness_factor * slope;
 }
@@ -1322,7 +1335,7 @@ JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure)
 JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
 {
   double low = 0.0, high = law->farthest;
-  if (!(normal_stress >= 0.0) || !(jlaw_normal_stress(law, high) >= normal_stress)) return (double) NAN;
+  if (!(normal_stress >= 0.0) || !(jlaw_normal_stress(law, high) >= normal_stress)) return jlaw_none_();
   while (1) { /* the stress rises: halve the exponent first, then the number */
     const double middle = high > 4.0 * low && high > 1e-300 ? sqrt(high * fmax(low, 1e-300))
                                                             : 0.5 * (low + high);

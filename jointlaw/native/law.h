@@ -5,6 +5,9 @@
  * q times lam; where asperities yield flattened depth (M) | plastic work; with wear slip of the
  * asperities | by how much mu had fallen in the last step. A batch keeps beside them Phi and Phi'
  * of every facet (M each), which saves half the look-ups, and with yielding the same at z.
+ *
+ * Of the functions of the C library that round differently, only expm1, log1p, pow and hypot are
+ * called: zig links exp and log of its own.
  */
 
 typedef struct { /* what the compiler knows of a step: it leaves out the rest */
@@ -212,8 +215,8 @@ IN void wear_friction(const jlaw_law *law, of_joint slip, of_joint fallen, motio
   m->worn = m->since = each_joint(1.0);
   if (!(law->mu > 0.0)) return;
   for (int l = 0; l < JOINTS; l++) {
-    const double gone = exp(-JOINT(slip, l) / law->wear_slip);
-    const double now = law->mu_residual + (law->mu - law->mu_residual) * gone;
+    const double left = 1.0 + expm1(-JOINT(slip, l) / law->wear_slip);
+    const double now = law->mu_residual + (law->mu - law->mu_residual) * left;
     const double last = law->mu - JOINT(fallen, l);
     JOINT(m->worn, l) = now / law->mu;
     JOINT(m->since, l) = now < last ? now / last : 1.0;
@@ -244,7 +247,7 @@ IN void drag(double D, int dim, double a0, double a1, double p0, double p1, doub
   inside = inside > 0.0 ? (inside < length ? inside : length) : 0.0;
   a0 += inside * e0;
   a1 += inside * e1;
-  const double x = (length - inside) / D, decay = exp(-x), rest = -expm1(-x);
+  const double x = (length - inside) / D, rest = -expm1(-x), decay = 1.0 - rest;
   double cosine = (a0 * e0 + a1 * e1) / D;
   cosine = cosine > 0.0 ? (cosine < 1.0 ? cosine : 1.0) : 0.0;
   const double sine = (a1 * e0 - a0 * e1) / D;
@@ -253,7 +256,7 @@ IN void drag(double D, int dim, double a0, double a1, double p0, double p1, doub
   const double sin1 = 2.0 * sine * decay / bottom;
   to[0] = D * (cos1 * e0 - sin1 * e1);
   to[1] = D * (cos1 * e1 + sin1 * e0);
-  to[2] = D * (x + log(bottom / 2.0));
+  to[2] = D * (x + log1p(0.5 * bottom - 1.0));
   const double grazing = cosine > JLAW_GRAZING ? cosine : JLAW_GRAZING;
   double turn = (rest * rest + cosine * rest * (1.0 + decay)) / bottom;
   turn += inside / (D * grazing) * (2.0 * decay / bottom - sin1 * sine);

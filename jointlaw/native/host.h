@@ -149,7 +149,10 @@ extern "C" {
 
 /* ------------------------------------------------------------------ messages */
 
-typedef struct { char *to; size_t size, at; } jlaw_text_;
+typedef struct {
+  char *to;
+  size_t size, at;
+} jlaw_text_;
 
 static JLAW_FUNCTION void jlaw_say_(jlaw_text_ *text, const char *words)
 {
@@ -162,13 +165,31 @@ static JLAW_FUNCTION void jlaw_say_number_(jlaw_text_ *text, double x)
 {
   char digits[24];
   int exponent = 0, n = 0;
-  if (x != x) { jlaw_say_(text, "nan"); return; }
-  if (x < 0.0) { jlaw_say_(text, "-"); x = -x; }
-  if (x > DBL_MAX) { jlaw_say_(text, "inf"); return; }
-  while (x >= 10.0) { x /= 10.0; exponent++; }
-  while (x > 0.0 && x < 1.0) { x *= 10.0; exponent--; }
+  if (x != x) {
+    jlaw_say_(text, "nan");
+    return;
+  }
+  if (x < 0.0) {
+    jlaw_say_(text, "-");
+    x = -x;
+  }
+  if (x > DBL_MAX) {
+    jlaw_say_(text, "inf");
+    return;
+  }
+  while (x >= 10.0) {
+    x /= 10.0;
+    exponent++;
+  }
+  while (x > 0.0 && x < 1.0) {
+    x *= 10.0;
+    exponent--;
+  }
   x += 0.00005;
-  if (x >= 10.0) { x /= 10.0; exponent++; }
+  if (x >= 10.0) {
+    x /= 10.0;
+    exponent++;
+  }
   for (int i = 0; i < 5; i++) {
     const int digit = (int) x;
     digits[n++] = (char) ('0' + digit);
@@ -247,13 +268,14 @@ static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
   return good && jlaw_sound_(s + 2 * law->dim, rest_row(law) - 2 * law->dim);
 }
 
-static JLAW_FUNCTION int jlaw_refuse_(const jlaw_law *law, const double *s, const double *d, int damaged,
-                        char *message, size_t size)
+static JLAW_FUNCTION int jlaw_refuse_(const jlaw_law *law, const double *s, const double *d,
+                                      int damaged, char *message, size_t size)
 {
   jlaw_text_ text = {message, size, 0};
   if (damaged) {
-    jlaw_say_(&text, "the state holds numbers that are not finite or no forces of this law; nothing "
-                     "was moved. Start from zeros or from a state that this law wrote");
+    jlaw_say_(&text,
+              "the state holds numbers that are not finite or no forces of this law; nothing "
+              "was moved. Start from zeros or from a state that this law wrote");
     return -1;
   }
   jlaw_say_(&text, "the step d = (");
@@ -264,7 +286,8 @@ static JLAW_FUNCTION int jlaw_refuse_(const jlaw_law *law, const double *s, cons
     finite = finite && fabs(d[i]) <= DBL_MAX;
   }
   if (!finite) {
-    jlaw_say_(&text, ") m is not finite; nothing was moved. Look for the fault in the host's motion");
+    jlaw_say_(&text,
+              ") m is not finite; nothing was moved. Look for the fault in the host's motion");
     return -1;
   }
   jlaw_say_(&text, ") m leads from closure ");
@@ -347,10 +370,11 @@ JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure)
 JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
 {
   double low = 0.0, high = law->farthest;
-  if (!(normal_stress >= 0.0) || !(jlaw_normal_stress(law, high) >= normal_stress)) return jlaw_none_();
+  if (!(normal_stress >= 0.0) || !(jlaw_normal_stress(law, high) >= normal_stress))
+    return jlaw_none_();
   while (1) { /* the stress rises: halve the exponent first, then the number */
-    const double middle = high > 4.0 * low && high > 1e-300 ? sqrt(high * fmax(low, 1e-300))
-                                                            : 0.5 * (low + high);
+    const double middle =
+        high > 4.0 * low && high > 1e-300 ? sqrt(high * fmax(low, 1e-300)) : 0.5 * (low + high);
     if (!(middle > low && middle < high)) return low == 0.0 ? 0.0 : high;
     if (jlaw_normal_stress(law, middle) < normal_stress) low = middle;
     else high = middle;
@@ -471,8 +495,10 @@ static char *jlaw_load_(const char *file, size_t *length)
     open = got > 0;
     n += got;
   }
-  if (ferror(stream) || !bytes) { free(bytes); bytes = NULL; }
-  else bytes[n] = 0;
+  if (ferror(stream) || !bytes) {
+    free(bytes);
+    bytes = NULL;
+  } else bytes[n] = 0;
   fclose(stream);
   *length = n;
   return bytes;
@@ -496,7 +522,8 @@ static int jlaw_hex_(char c)
 static const char *jlaw_skip_(const char *at)
 {
   while (*at == ' ' || *at == '\n' || *at == '\r' || *at == '#')
-    if (*at++ == '#') while (*at && *at != '\n') at++;
+    if (*at++ == '#')
+      while (*at && *at != '\n') at++;
   return at;
 }
 
@@ -521,7 +548,10 @@ static const char *jlaw_number_(const char *at, double *number)
   int count = 0, places = 0, point = 0, power = 0;
   at += hex ? 2 : 0;
   for (; jlaw_hex_(*at) >= 0 || (*at == '.' && hex && !point); at++) {
-    if (*at == '.') { point = 1; continue; }
+    if (*at == '.') {
+      point = 1;
+      continue;
+    }
     const int digit = jlaw_hex_(*at);
     if (++count > 15 || (!hex && digit > 9)) return NULL;
     digits = digits * (hex ? 16u : 10u) + (unsigned) digit;
@@ -557,8 +587,7 @@ static const char *jlaw_parse_numbers_(const char **at, jlaw_law *law)
     double number;
     char *to = (char *) law + keys[i].place;
     *at = jlaw_word_(*at, word, sizeof word);
-    if (strcmp(word, keys[i].name))
-      return "a keyword is missing, unknown or not in its place";
+    if (strcmp(word, keys[i].name)) return "a keyword is missing, unknown or not in its place";
     *at = jlaw_number_(*at, &number);
     if (!*at || !(number >= keys[i].least && number <= keys[i].most))
       return "a parameter is no number or out of its bounds";

@@ -257,7 +257,7 @@ typedef double jl_real_;
 typedef int jl_yes_, jl_whole_;
 #define JL_LANE_(x, l) (x)
 #define JL_LIST_(of) of(0) /* a vector of of(0), of(1) and so on */
-#define jl_each_(x) (x) /* the number x in all lanes */
+#define jl_each_(x) (x)    /* the number x in all lanes */
 #define jl_pick_(m, a, b) ((m) ? (a) : (b))
 #define jl_only_(m, a) ((m) ? (a) : 0.0)
 #define jl_any_(m) (m)
@@ -380,14 +380,14 @@ typedef struct {
 typedef jl_real_ jl_of_facet_;
 typedef double jl_of_joint_;
 #define jl_somewhere_(m) 1 /* worth working out for some lanes: to ask costs more here */
-#define JL_TOGETHER_ JL_W_ /* facets that are worked out together */
+#define JL_TOGETHER_ JL_W_     /* facets that are worked out together */
 #define JL_JOINTS_ 1
 #define JL_JOINT_(x, l) (x)
 #define jl_each_joint_(x) (x)
 /* A column of the tables of a block of facets, which lie side by side in it */
 JL_IN_ jl_of_facet_ jl_column_(const double *block, int c)
 {
-  return (jl_real_) *(const jl_loose_ *) (block + c * JLAW_LANES);
+  return (jl_real_) * (const jl_loose_ *) (block + c * JLAW_LANES);
 }
 /* A row of the state for each of these facets, `apart` from one another. There are `some` facets:
  * lanes beyond them, which have zeros in all tables, read the last one and write nothing. */
@@ -421,7 +421,7 @@ JL_IN_ jl_real_ jl_take_joint_(jl_numbers_ n, int row)
 #else
   const double *from = n.s + (size_t) row * n.stride;
   __builtin_prefetch(from + n.ahead, 1);
-  return (jl_real_) *(const jl_loose_ *) from;
+  return (jl_real_) * (const jl_loose_ *) from;
 #endif
 }
 JL_IN_ void jl_put_joint_(jl_numbers_ n, int row, jl_real_ x)
@@ -450,8 +450,7 @@ JL_IN_ void jl_put_(jl_numbers_ n, int row, int apart, int some, jl_real_ x)
 #define jl_total_(sum, of) ((sum)[0].of)
 #elif defined(JLAW_ABREAST)
 #define JL_SUMS_ 1
-#define jl_total_(sum, of) \
-  (((sum)[0].of[0] + (sum)[0].of[2]) + ((sum)[0].of[1] + (sum)[0].of[3]))
+#define jl_total_(sum, of) (((sum)[0].of[0] + (sum)[0].of[2]) + ((sum)[0].of[1] + (sum)[0].of[3]))
 #else
 #define JL_SUMS_ 4
 #define jl_total_(sum, of) (((sum)[0].of + (sum)[2].of) + ((sum)[1].of + (sum)[3].of))
@@ -473,7 +472,7 @@ typedef struct { /* what the compiler knows of a step: it leaves out the rest */
   int kept; /* whether Phi and Phi' lie beside the state */
 } jl_kind_;
 
-typedef struct { /* a joint in a step */
+typedef struct {                 /* a joint in a step */
   jl_of_joint_ p[3], from[3], to[3]; /* increment; closure and in-plane offset before and after */
   jl_of_joint_ J[4], slip;           /* d offset/d p; way along the offset at its limit */
   jl_of_joint_ worn, since;          /* mu over that of unworn asperities; over that of the last step */
@@ -481,14 +480,14 @@ typedef struct { /* a joint in a step */
 
 typedef struct { /* facets in a step: y, Phi, Phi', Phi'' before and after; de */
   jl_real_ y0, y1, f0, f1, k0, k1, bend, es, et;
-  jl_real_ dy, rdy; /* y1 - y0, and 1 over it */
-  jl_yes_ near;     /* y has hardly changed */
-  jl_real_ z0, z1, fz0, fz1, kz0, kz1;             /* flattened depth; Phi and Phi' there */
-  jl_real_ qs, qt, lost, vs, vt, bss, bst, btt;    /* sums over the cells: q, loss, v and B of C */
-  jl_real_ ws, wt, open;                           /* the same of the softening by z1; any kappa */
+  jl_real_ dy, rdy;                             /* y1 - y0, and 1 over it */
+  jl_yes_ near;                                 /* y has hardly changed */
+  jl_real_ z0, z1, fz0, fz1, kz0, kz1;          /* flattened depth; Phi and Phi' there */
+  jl_real_ qs, qt, lost, vs, vt, bss, bst, btt; /* sums over the cells: q, loss, v and B of C */
+  jl_real_ ws, wt, open;                        /* the same of the softening by z1; any kappa */
 } jl_facets_;
 
-typedef struct { /* the sliders of one depth cell of facets */
+typedef struct {             /* the sliders of one depth cell of facets */
   jl_real_ G0, G1, k0, k1, kz1;  /* G and kappa before and after; kappa at z1 */
   jl_real_ reached;              /* G at the new y before springs yield there */
   jl_real_ strength, cap, chord; /* mu lam A; friction limit; of G over the step */
@@ -504,10 +503,7 @@ typedef struct { /* what facets add up to */
 
 /* Rows of a state: the first after the sliders, that of the slip of the asperities, and how many */
 JL_IN_ int jl_rest_row_(const jlaw_law *law) { return 2 * law->dim + 2 * law->facets * law->cells; }
-JL_IN_ int jl_slip_row_(const jlaw_law *law)
-{
-  return jl_rest_row_(law) + (law->yields ? law->facets + 1 : 0);
-}
+JL_IN_ int jl_slip_row_(const jlaw_law *law) { return jl_rest_row_(law) + (law->yields ? law->facets + 1 : 0); }
 JL_IN_ int jl_state_rows_(const jlaw_law *law) { return jl_slip_row_(law) + 2 * law->wears; }
 
 /* Tables of facets from number `at` on, and of their first depth cell */
@@ -588,8 +584,7 @@ JL_IN_ void jl_virgin_curve_(const jlaw_law *law, jl_real_ y, jl_real_ *force, j
   *force = power * at.y * S;
   *slope = power * ((1.0 + eta) * S + DS);
   if (bend)
-    *bend = power / jl_pick_(y > 0.0, y, 1.0)
-            * (eta * (1.0 + eta) * S + (1.0 + 2.0 * eta) * DS + DDS);
+    *bend = power / jl_pick_(y > 0.0, y, 1.0) * (eta * (1.0 + eta) * S + (1.0 + 2.0 * eta) * DS + DDS);
 }
 
 /* Psi, the integral of Phi, at y */
@@ -1013,8 +1008,7 @@ JL_IN_ void jl_facets_now_(const jlaw_law *law, jl_numbers_ n, int at, jl_facets
   const int dim = law->dim, some = law->facets - at < JL_TOGETHER_ ? law->facets - at : JL_TOGETHER_;
   const double *f = jl_facet_of_(law, at);
   o->y1 = o->z1 = o->fz1 = o->kz1 = jl_each_(0.0);
-  for (int i = 0; i < dim; i++)
-    o->y1 += jl_column_(f, JLAW_M + i) * jl_take_joint_(n, i ? dim + i - 1 : 0);
+  for (int i = 0; i < dim; i++) o->y1 += jl_column_(f, JLAW_M + i) * jl_take_joint_(n, i ? dim + i - 1 : 0);
   o->y1 = jl_resolved_(o->y1);
   jl_virgin_curve_(law, o->y1, &o->f1, &o->k1, (jl_real_ *) 0);
   if (!law->yields) return;
@@ -1073,7 +1067,8 @@ JL_IN_ void jl_measure_facets_(const jlaw_law *law, jl_numbers_ n, int at, jl_of
     cell += JLAW_ROWS * JLAW_LANES;
   }
   const jl_yes_ touches = o.y1 > o.z1;
-  const jl_real_ force = jl_only_(touches, jl_larger_(o.f1 - o.fz1, jl_each_(0.0))), share = jl_each_(jl_column_(f, JLAW_SHARE));
+  const jl_real_ force = jl_only_(touches, jl_larger_(o.f1 - o.fz1, jl_each_(0.0))),
+             share = jl_each_(jl_column_(f, JLAW_SHARE));
   jl_real_ normal = jl_psi_(law, o.y1);
   if (law->yields) normal = normal - jl_psi_(law, o.z1) - o.fz1 * (o.y1 - o.z1);
   sum->sliding += share * jl_only_(touches, whole_slips);
@@ -1096,7 +1091,7 @@ JL_IN_ jl_amounts_ jl_measure_(const jlaw_law *law, jl_numbers_ n)
   all.reach = jl_each_joint_(-DBL_MAX);
   for (int i = 0; i < JL_SUMS_; i++)
     sum[i].sliding = sum[i].slipping = sum[i].separated = sum[i].normal = sum[i].sheared =
-      jl_each_(0.0);
+        jl_each_(0.0);
   for (int at = 0; at < law->facets; at += JL_TOGETHER_)
     jl_measure_facets_(law, n, at, worn, sum + at / JL_TOGETHER_ % JL_SUMS_, &all.reach);
   all.sliding = jl_total_(sum, sliding);
@@ -1137,7 +1132,10 @@ JL_IN_ void jl_step_of_kind_(const jlaw_law *law, jl_numbers_ n, const jl_of_joi
 
 /* ------------------------------------------------------------------ messages */
 
-typedef struct { char *to; size_t size, at; } jlaw_text_;
+typedef struct {
+  char *to;
+  size_t size, at;
+} jlaw_text_;
 
 static JLAW_FUNCTION void jlaw_say_(jlaw_text_ *text, const char *words)
 {
@@ -1150,13 +1148,31 @@ static JLAW_FUNCTION void jlaw_say_number_(jlaw_text_ *text, double x)
 {
   char digits[24];
   int exponent = 0, n = 0;
-  if (x != x) { jlaw_say_(text, "nan"); return; }
-  if (x < 0.0) { jlaw_say_(text, "-"); x = -x; }
-  if (x > DBL_MAX) { jlaw_say_(text, "inf"); return; }
-  while (x >= 10.0) { x /= 10.0; exponent++; }
-  while (x > 0.0 && x < 1.0) { x *= 10.0; exponent--; }
+  if (x != x) {
+    jlaw_say_(text, "nan");
+    return;
+  }
+  if (x < 0.0) {
+    jlaw_say_(text, "-");
+    x = -x;
+  }
+  if (x > DBL_MAX) {
+    jlaw_say_(text, "inf");
+    return;
+  }
+  while (x >= 10.0) {
+    x /= 10.0;
+    exponent++;
+  }
+  while (x > 0.0 && x < 1.0) {
+    x *= 10.0;
+    exponent--;
+  }
   x += 0.00005;
-  if (x >= 10.0) { x /= 10.0; exponent++; }
+  if (x >= 10.0) {
+    x /= 10.0;
+    exponent++;
+  }
   for (int i = 0; i < 5; i++) {
     const int digit = (int) x;
     digits[n++] = (char) ('0' + digit);
@@ -1235,13 +1251,14 @@ static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
   return good && jlaw_sound_(s + 2 * law->dim, jl_rest_row_(law) - 2 * law->dim);
 }
 
-static JLAW_FUNCTION int jlaw_refuse_(const jlaw_law *law, const double *s, const double *d, int damaged,
-                        char *message, size_t size)
+static JLAW_FUNCTION int jlaw_refuse_(const jlaw_law *law, const double *s, const double *d,
+                                      int damaged, char *message, size_t size)
 {
   jlaw_text_ text = {message, size, 0};
   if (damaged) {
-    jlaw_say_(&text, "the state holds numbers that are not finite or no forces of this law; nothing "
-                     "was moved. Start from zeros or from a state that this law wrote");
+    jlaw_say_(&text,
+              "the state holds numbers that are not finite or no forces of this law; nothing "
+              "was moved. Start from zeros or from a state that this law wrote");
     return -1;
   }
   jlaw_say_(&text, "the step d = (");
@@ -1252,7 +1269,8 @@ static JLAW_FUNCTION int jlaw_refuse_(const jlaw_law *law, const double *s, cons
     finite = finite && fabs(d[i]) <= DBL_MAX;
   }
   if (!finite) {
-    jlaw_say_(&text, ") m is not finite; nothing was moved. Look for the fault in the host's motion");
+    jlaw_say_(&text,
+              ") m is not finite; nothing was moved. Look for the fault in the host's motion");
     return -1;
   }
   jlaw_say_(&text, ") m leads from closure ");
@@ -1335,10 +1353,11 @@ JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure)
 JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
 {
   double low = 0.0, high = law->farthest;
-  if (!(normal_stress >= 0.0) || !(jlaw_normal_stress(law, high) >= normal_stress)) return jlaw_none_();
+  if (!(normal_stress >= 0.0) || !(jlaw_normal_stress(law, high) >= normal_stress))
+    return jlaw_none_();
   while (1) { /* the stress rises: halve the exponent first, then the number */
-    const double middle = high > 4.0 * low && high > 1e-300 ? sqrt(high * fmax(low, 1e-300))
-                                                            : 0.5 * (low + high);
+    const double middle =
+        high > 4.0 * low && high > 1e-300 ? sqrt(high * fmax(low, 1e-300)) : 0.5 * (low + high);
     if (!(middle > low && middle < high)) return low == 0.0 ? 0.0 : high;
     if (jlaw_normal_stress(law, middle) < normal_stress) low = middle;
     else high = middle;
@@ -1459,8 +1478,10 @@ static char *jlaw_load_(const char *file, size_t *length)
     open = got > 0;
     n += got;
   }
-  if (ferror(stream) || !bytes) { free(bytes); bytes = NULL; }
-  else bytes[n] = 0;
+  if (ferror(stream) || !bytes) {
+    free(bytes);
+    bytes = NULL;
+  } else bytes[n] = 0;
   fclose(stream);
   *length = n;
   return bytes;
@@ -1484,7 +1505,8 @@ static int jlaw_hex_(char c)
 static const char *jlaw_skip_(const char *at)
 {
   while (*at == ' ' || *at == '\n' || *at == '\r' || *at == '#')
-    if (*at++ == '#') while (*at && *at != '\n') at++;
+    if (*at++ == '#')
+      while (*at && *at != '\n') at++;
   return at;
 }
 
@@ -1509,7 +1531,10 @@ static const char *jlaw_number_(const char *at, double *number)
   int count = 0, places = 0, point = 0, power = 0;
   at += hex ? 2 : 0;
   for (; jlaw_hex_(*at) >= 0 || (*at == '.' && hex && !point); at++) {
-    if (*at == '.') { point = 1; continue; }
+    if (*at == '.') {
+      point = 1;
+      continue;
+    }
     const int digit = jlaw_hex_(*at);
     if (++count > 15 || (!hex && digit > 9)) return NULL;
     digits = digits * (hex ? 16u : 10u) + (unsigned) digit;
@@ -1545,8 +1570,7 @@ static const char *jlaw_parse_numbers_(const char **at, jlaw_law *law)
     double number;
     char *to = (char *) law + keys[i].place;
     *at = jlaw_word_(*at, word, sizeof word);
-    if (strcmp(word, keys[i].name))
-      return "a keyword is missing, unknown or not in its place";
+    if (strcmp(word, keys[i].name)) return "a keyword is missing, unknown or not in its place";
     *at = jlaw_number_(*at, &number);
     if (!*at || !(number >= keys[i].least && number <= keys[i].most))
       return "a parameter is no number or out of its bounds";

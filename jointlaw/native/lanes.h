@@ -29,7 +29,7 @@ typedef double real;
 typedef int yes, whole;
 #define LANE(x, l) (x)
 #define LIST(of) of(0) /* a vector of of(0), of(1) and so on */
-#define each(x) (x) /* the number x in all lanes */
+#define each(x) (x)    /* the number x in all lanes */
 #define pick(m, a, b) ((m) ? (a) : (b))
 #define only(m, a) ((m) ? (a) : 0.0)
 #define any(m) (m)
@@ -152,14 +152,14 @@ typedef struct {
 typedef real of_facet;
 typedef double of_joint;
 #define somewhere(m) 1 /* worth working out for some lanes: to ask costs more here */
-#define TOGETHER W /* facets that are worked out together */
+#define TOGETHER W     /* facets that are worked out together */
 #define JOINTS 1
 #define JOINT(x, l) (x)
 #define each_joint(x) (x)
 /* A column of the tables of a block of facets, which lie side by side in it */
 IN of_facet column(const double *block, int c)
 {
-  return (real) *(const loose *) (block + c * JLAW_LANES);
+  return (real) * (const loose *) (block + c * JLAW_LANES);
 }
 /* A row of the state for each of these facets, `apart` from one another. There are `some` facets:
  * lanes beyond them, which have zeros in all tables, read the last one and write nothing. */
@@ -193,7 +193,7 @@ IN real take_joint(numbers n, int row)
 #else
   const double *from = n.s + (size_t) row * n.stride;
   __builtin_prefetch(from + n.ahead, 1);
-  return (real) *(const loose *) from;
+  return (real) * (const loose *) from;
 #endif
 }
 IN void put_joint(numbers n, int row, real x)
@@ -222,8 +222,7 @@ IN void put(numbers n, int row, int apart, int some, real x)
 #define total(sum, of) ((sum)[0].of)
 #elif defined(JLAW_ABREAST)
 #define SUMS 1
-#define total(sum, of) \
-  (((sum)[0].of[0] + (sum)[0].of[2]) + ((sum)[0].of[1] + (sum)[0].of[3]))
+#define total(sum, of) (((sum)[0].of[0] + (sum)[0].of[2]) + ((sum)[0].of[1] + (sum)[0].of[3]))
 #else
 #define SUMS 4
 #define total(sum, of) (((sum)[0].of + (sum)[2].of) + ((sum)[1].of + (sum)[3].of))

@@ -15,7 +15,7 @@ typedef struct { /* what the compiler knows of a step: it leaves out the rest */
   int kept; /* whether Phi and Phi' lie beside the state */
 } kind;
 
-typedef struct { /* a joint in a step */
+typedef struct {                 /* a joint in a step */
   of_joint p[3], from[3], to[3]; /* increment; closure and in-plane offset before and after */
   of_joint J[4], slip;           /* d offset/d p; way along the offset at its limit */
   of_joint worn, since;          /* mu over that of unworn asperities; over that of the last step */
@@ -23,14 +23,14 @@ typedef struct { /* a joint in a step */
 
 typedef struct { /* facets in a step: y, Phi, Phi', Phi'' before and after; de */
   real y0, y1, f0, f1, k0, k1, bend, es, et;
-  real dy, rdy; /* y1 - y0, and 1 over it */
-  yes near;     /* y has hardly changed */
-  real z0, z1, fz0, fz1, kz0, kz1;             /* flattened depth; Phi and Phi' there */
-  real qs, qt, lost, vs, vt, bss, bst, btt;    /* sums over the cells: q, loss, v and B of C */
-  real ws, wt, open;                           /* the same of the softening by z1; any kappa */
+  real dy, rdy;                             /* y1 - y0, and 1 over it */
+  yes near;                                 /* y has hardly changed */
+  real z0, z1, fz0, fz1, kz0, kz1;          /* flattened depth; Phi and Phi' there */
+  real qs, qt, lost, vs, vt, bss, bst, btt; /* sums over the cells: q, loss, v and B of C */
+  real ws, wt, open;                        /* the same of the softening by z1; any kappa */
 } facets;
 
-typedef struct { /* the sliders of one depth cell of facets */
+typedef struct {             /* the sliders of one depth cell of facets */
   real G0, G1, k0, k1, kz1;  /* G and kappa before and after; kappa at z1 */
   real reached;              /* G at the new y before springs yield there */
   real strength, cap, chord; /* mu lam A; friction limit; of G over the step */
@@ -46,10 +46,7 @@ typedef struct { /* what facets add up to */
 
 /* Rows of a state: the first after the sliders, that of the slip of the asperities, and how many */
 IN int rest_row(const jlaw_law *law) { return 2 * law->dim + 2 * law->facets * law->cells; }
-IN int slip_row(const jlaw_law *law)
-{
-  return rest_row(law) + (law->yields ? law->facets + 1 : 0);
-}
+IN int slip_row(const jlaw_law *law) { return rest_row(law) + (law->yields ? law->facets + 1 : 0); }
 IN int state_rows(const jlaw_law *law) { return slip_row(law) + 2 * law->wears; }
 
 /* Tables of facets from number `at` on, and of their first depth cell */
@@ -130,8 +127,7 @@ IN void virgin_curve(const jlaw_law *law, real y, real *force, real *slope, real
   *force = power * at.y * S;
   *slope = power * ((1.0 + eta) * S + DS);
   if (bend)
-    *bend = power / pick(y > 0.0, y, 1.0)
-            * (eta * (1.0 + eta) * S + (1.0 + 2.0 * eta) * DS + DDS);
+    *bend = power / pick(y > 0.0, y, 1.0) * (eta * (1.0 + eta) * S + (1.0 + 2.0 * eta) * DS + DDS);
 }
 
 /* Psi, the integral of Phi, at y */
@@ -555,8 +551,7 @@ IN void facets_now(const jlaw_law *law, numbers n, int at, facets *o)
   const int dim = law->dim, some = law->facets - at < TOGETHER ? law->facets - at : TOGETHER;
   const double *f = facet_of(law, at);
   o->y1 = o->z1 = o->fz1 = o->kz1 = each(0.0);
-  for (int i = 0; i < dim; i++)
-    o->y1 += column(f, JLAW_M + i) * take_joint(n, i ? dim + i - 1 : 0);
+  for (int i = 0; i < dim; i++) o->y1 += column(f, JLAW_M + i) * take_joint(n, i ? dim + i - 1 : 0);
   o->y1 = resolved(o->y1);
   virgin_curve(law, o->y1, &o->f1, &o->k1, (real *) 0);
   if (!law->yields) return;
@@ -615,7 +610,8 @@ IN void measure_facets(const jlaw_law *law, numbers n, int at, of_joint worn, am
     cell += JLAW_ROWS * JLAW_LANES;
   }
   const yes touches = o.y1 > o.z1;
-  const real force = only(touches, larger(o.f1 - o.fz1, each(0.0))), share = each(column(f, JLAW_SHARE));
+  const real force = only(touches, larger(o.f1 - o.fz1, each(0.0))),
+             share = each(column(f, JLAW_SHARE));
   real normal = psi(law, o.y1);
   if (law->yields) normal = normal - psi(law, o.z1) - o.fz1 * (o.y1 - o.z1);
   sum->sliding += share * only(touches, whole_slips);
@@ -638,7 +634,7 @@ IN amounts measure(const jlaw_law *law, numbers n)
   all.reach = each_joint(-DBL_MAX);
   for (int i = 0; i < SUMS; i++)
     sum[i].sliding = sum[i].slipping = sum[i].separated = sum[i].normal = sum[i].sheared =
-      each(0.0);
+        each(0.0);
   for (int at = 0; at < law->facets; at += TOGETHER)
     measure_facets(law, n, at, worn, sum + at / TOGETHER % SUMS, &all.reach);
   all.sliding = total(sum, sliding);

@@ -41,9 +41,9 @@ OUT int jlaw_run(const jlaw_batch *b, long long first, long long last, int what,
                  int lanes)
 {
   static jlaw_call *const calls[][3] = {
-    {KINDS(, _2)}, {KINDS(, _2_alone)},
+      {KINDS(, _2)}, {KINDS(, _2_alone)},
 #if defined(__x86_64__)
-    {KINDS(, _4)}, {KINDS(, _4_alone)}, {KINDS(, _8)}, {KINDS(, _8_alone)},
+      {KINDS(, _4)}, {KINDS(, _4_alone)}, {KINDS(, _8)}, {KINDS(, _8_alone)},
 #endif
   };
   const int level = lanes == 8 ? 2 : lanes == 4;

@@ -10,7 +10,7 @@ import pytest
 
 import jointlaw as jl
 
-HEAVY = ("matplotlib", "pymunk", "numba", "tqdm", "pandas", "scipy.stats")
+HEAVY = ("matplotlib", "pymunk", "tqdm", "pandas", "scipy.stats")
 
 
 def modules_after(code):

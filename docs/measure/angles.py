@@ -9,8 +9,6 @@ third with c at its bound, none that jams (atan(mu) + 90 deg/a < 90 deg). Motion
 fifth (and 2 R) on.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 from dataclasses import replace

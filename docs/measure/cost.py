@@ -98,24 +98,6 @@ class Case:
         return 1, once
 
 
-class Stress:
-    """`law.normal_stress` of 10 000 closures: no joints at all."""
-
-    bytes, n, column = 0, 10_000, None
-
-    def __init__(self, law):
-        self.law, self.best = law, np.inf
-        self.u = np.random.default_rng(0).uniform(5e-7, 1.5e-6, 10_000)
-
-    def run(self, seconds):
-        """As `Case.run`."""
-        end = time.perf_counter() + seconds
-        while time.perf_counter() < end:
-            start = time.perf_counter()
-            self.law.normal_stress(self.u)
-            self.best = min(self.best, (time.perf_counter() - start) / self.u.size)
-
-
 def possible(n, column):
     """Whether a column has this size."""
     kernel, threads, _, ledger = COLUMNS[column]
@@ -151,7 +133,6 @@ def savings(rounds, seconds):
         "motion in one plane, of 3-D": (space, plane),
         "closure only, of 3-D": (space, closure),
         "closure only, of one plane": (plane, closure),
-        "closure that never opens: `law.normal_stress`": (closure, Stress(SPACE)),
         "no heights": (plane, Case(replace(PLANE, heights=None))),
         "no heights, linear asperities: one depth cell": (
             Case(linear), Case(replace(linear, heights=None)),

@@ -10,8 +10,6 @@ the power law and of Barton-Bandis, the draws whose 95 % band of the joint law c
 there, and those whose report says that the curve has another shape than the law.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor

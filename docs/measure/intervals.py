@@ -8,8 +8,6 @@ called the parameter identifiable. 1 % noise on the stress (closure) or on the l
 the noise is not told to the fit, which estimates it.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor

@@ -11,8 +11,6 @@ divisions and square roots of C F alone, four side by side, at the rate at which
 them: no arrangement of the same arithmetic is faster.
 """
 
-from __future__ import annotations
-
 import argparse
 import ctypes
 import os

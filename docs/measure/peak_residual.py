@@ -8,8 +8,6 @@ its displacement, and the stress at 10 mm, taken as residual. Printed are the la
 its measured one, what halving the step changes, and how far parameters can move together.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.optimize import least_squares
 from tables import table

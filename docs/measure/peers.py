@@ -1,7 +1,6 @@
 """The law beside the Hertz-Mindlin contact of YADE, in one run on one core.
 
     python docs/measure/peers.py [--preset westerly-smooth] [--rounds 4]
-    python docs/measure/peers.py --million     a million joints at the 1 % setting: memory, time
 
 Nanoseconds per joint (or contact) and step, the least of rounds in which all take turns.
 
@@ -12,11 +11,8 @@ Nanoseconds per joint (or contact) and step, the least of rounds in which all ta
   on one thread (`yade -n -x`).
 """
 
-from __future__ import annotations
-
 import argparse
 import os
-import resource
 import time
 from dataclasses import replace
 from typing import Any
@@ -89,33 +85,15 @@ def compare(law: jl.JointLaw, rounds: int) -> list[list[Any]]:
     ]
 
 
-def million(law: jl.JointLaw, n: int = 1_000_000) -> str:
-    """A million joints at 1 %: bytes, memory of the process, and the time of steps."""
-    made = law.at_tolerance(0.01)
-    base = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-    once = ours(made, n, False)
-    best = min(once() for _ in range(7))
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-    state = made.joints(0).bytes_per_joint * n
-    steps = 8 * n * 2 * 8  # six steps, the first and the result
-    return (
-        f"{n} joints at 1 % ({made.resolution!r}, {made.tables.sliders} sliders):\n"
-        f"state {state / 1e6:.0f} MB, increments and tractions {steps / 1e6:.0f} MB,\n"
-        f"process {peak / 1e6:.0f} MB, of which {base / 1e6:.0f} MB before the joints were made,\n"
-        f"{best * 1e9:.0f} ns per joint, {best * 1e3 * n:.0f} ms per step"
-    )
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--preset", default="westerly-smooth")
     parser.add_argument("--rounds", type=int, default=4)
-    parser.add_argument("--million", action="store_true", help="only a million joints at 1 %%")
     options = parser.parse_args()
     law = replace(jl.presets.load(options.preset), plane=0.0)
-    print(million(law) if options.million else table(HEAD, compare(law, options.rounds)))
+    print(table(HEAD, compare(law, options.rounds)))
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """Tables of figures that tests record: `python docs/measure/recorded.py TABLE`.
 
 The tests run at full length (JOINTLAW_FULL=1) and write each figure as a property of their report,
-a list in JSON. They also assert what the tables show. `drift`, `dynamics` and `fuzz` take minutes,
-the others about one at most.
+a list in JSON. They also assert what the tables show. `drift` and `dynamics` take minutes, the
+others about one at most.
 """
 
 import json
@@ -46,14 +46,6 @@ def matrix(found):
         rows.append([check, f"{worst:.3f}" if check == CHECKS[0] else f"{worst:.0e}", at])
     rows.append(["pairs that hold", f"{held} of {count}, {refused} refused when built", ""])
     return table(["check", "worst", "at"], rows)
-
-
-def fuzz(found):
-    held, refused = (sum(row[k] for row in found["fuzz"]) for k in (0, 1))
-    return (
-        f"{held * found['fuzz'][0][2]} updates of {held} random laws ({refused} more were refused "
-        "when built, as narrow populations or too steep for a table): no violation."
-    )
 
 
 def exact(found):
@@ -103,7 +95,6 @@ FORGETTING = "test_small_normal_cycles_forget_locked_in_shear_at_a_known_rate"
 TABLES = {
     "matrix": (matrix, [f"extremes_{name}.py" for name in
                         ("matrix", "continuity", "units", "symmetry")]),
-    "fuzz": (fuzz, ["extremes_fuzz.py"]),
     "exact": (exact, ["extremes_exact.py"]),
     "drift": (drift, [f"extremes_drift.py::{DRIFT}"]),
     "forgetting": (forgetting, [f"extremes_drift.py::{FORGETTING}"]),

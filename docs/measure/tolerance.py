@@ -17,8 +17,6 @@ refuses does not), `paths` the share of paths that do, `worst` the largest error
 reported apart.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import time

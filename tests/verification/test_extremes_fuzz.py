@@ -16,11 +16,9 @@ def test_what_was_found_stays_mended(seed):
 
 
 @pytest.mark.parametrize("part", range(5))
-def test_random_laws_on_random_paths(part, record):
+def test_random_laws_on_random_paths(part):
     found = {seed: fuzz(seed, JOINTS, STEPS) for seed in SEEDS[part::5]}
-    held = sum(faults == [] for faults in found.values())
     refused = sum(faults is None for faults in found.values())
-    record("fuzz", held, refused, JOINTS * STEPS)
     assert not {seed: faults for seed, faults in found.items() if faults}
     # one law in eight is refused: heights too narrow for a population, or too steep for a table
     assert refused < len(found) / 2

@@ -14,13 +14,13 @@ from numpy.typing import ArrayLike
 
 from .discretisation.facets import Facets, facets
 from .discretisation.first_loading import FirstLoading, facet_sum
-from .discretisation.tables import UNDERFLOW, VERSION, Tables, largest_reach, tables
+from .discretisation.tables import VERSION, Tables, largest_reach, tables
 from .discretisation.virgin_curve import VirginCurve, virgin_curve
 from .joints.batch import JointBatch
 from .joints.crushed import warn_if_crushed
 from .joints.joint import Joint
 from .joints.time_step import largest_stiffness, stable_step
-from .kernels import reference
+from .kernels.engine import step_states
 from .parameters import keys, toml
 from .parameters.asperity import Asperity
 from .parameters.fingerprint import fingerprint
@@ -28,6 +28,7 @@ from .parameters.heights import GammaHeights, HeightDistribution, Heights
 from .parameters.orientation import Orientation
 from .parameters.resolution import LOSS_REMOVED, NAMED, Resolution, resolve
 from .support.checks import Array, above, finite, number
+from .support.thresholds import UNDERFLOW
 
 if TYPE_CHECKING:
     from .accuracy.tradeoff import Tradeoff
@@ -145,8 +146,8 @@ class JointLaw:
         d: displacement increments in m, (n, dim) or (dim,).
         Returns the new states, F in Pa (n, dim) or (dim,), and C in Pa/m (n, dim, dim) or
         (dim, dim), None without `tangent`; what was given stays as it was. The algorithm and its
-        equations: `jointlaw.kernels.reference.step`, which this calls. Raises ValueError for a
-        wrong shape or a number that is not finite.
+        equations: `jointlaw.kernels.reference.step`; it runs compiled, on all threads. Raises
+        ValueError for a wrong shape or a number that is not finite.
         """
         old, move = finite("states", states, "numbers of state"), finite("d", d, "m")
         rows, dim, joints = self.state_size, self.dim, old.shape[:-1]
@@ -155,10 +156,9 @@ class JointLaw:
                 f"states have shape {old.shape} and d {move.shape}; expected (n, {rows}) and "
                 f"(n, {dim}), or ({rows},) and ({dim},) for one joint"
             )
-        columns = old.reshape(-1, rows).T, move.reshape(-1, dim).T
-        new, F, C = reference.step(self.tables, *columns, tangent)
-        C = None if C is None else np.moveaxis(C, 2, 0).reshape(*joints, dim, dim)
-        return new.T.reshape(*joints, rows), F.T.reshape(*joints, dim), C
+        new, F, C = step_states(self.tables, old.reshape(-1, rows), move.reshape(-1, dim), tangent)
+        C = None if C is None else C.reshape(*joints, dim, dim)
+        return new.reshape(*joints, rows), F.reshape(*joints, dim), C
 
     @property
     def dim(self) -> int:

@@ -23,13 +23,13 @@ from jointlaw.support.progress import track
 SIZES = (1, 10_000)
 # column: kernel, threads, tangent, ledger
 COLUMNS = {
-    "F": ("numba", 1, False, False),
-    "F+L": ("numba", 1, False, True),
-    "FC": ("numba", 1, True, False),
-    "FC+L": ("numba", 1, True, True),
-    "F x2": ("numba", 2, False, False),
-    "FC x2": ("numba", 2, True, False),
-    "measures": ("numba", 1, False, False),
+    "F": ("native", 1, False, False),
+    "F+L": ("native", 1, False, True),
+    "FC": ("native", 1, True, False),
+    "FC+L": ("native", 1, True, True),
+    "F x2": ("native", 2, False, False),
+    "FC x2": ("native", 2, True, False),
+    "measures": ("native", 1, False, False),
     "numpy F": ("numpy", 1, False, False),
 }
 STEPS = 4  # different increments, so that no branch is learnt by heart

@@ -5,7 +5,7 @@
 
 Each figure is the least of many short rounds, taken in turn, in nanoseconds of one thread's own
 time per joint and update, so that other programs count little. C: `jlaw_update`, one joint at a
-time as in a pair loop, built with the flags of the Makefile. numba: `JointBatch.update` of all
+time as in a pair loop, built with the flags of the Makefile. batch: `JointBatch.update` of all
 joints. F: traction alone, FC: with tangent. Steps are random around a closure of 1 um. limit: the
 divisions and square roots of C F alone, four side by side, at the rate at which the machine does
 them: no arrangement of the same arithmetic is faster.
@@ -100,14 +100,14 @@ def measure(law: jl.JointLaw, libs: dict[str, ctypes.CDLL], folder: Path, n: int
     d[1::2] = -d[::2]
     start = np.zeros((n, dim))
     start[:, 0] = 1e-6
-    batches = {"numba": law.joints(n, ledger=False), "numba + ledger": law.joints(n)}
+    batches = {"batch": law.joints(n, ledger=False), "batch + ledger": law.joints(n)}
     for batch in batches.values():
         batch.update(start, tangent=False)
     file = folder / "law.jlaw"
     file.write_text(table_text(law))
     laws = {name: ctypes.c_void_p(lib.jlaw_read(str(file).encode(), None, 0))
             for name, lib in libs.items()}  # fmt: skip
-    states = {name: batches["numba"].snapshot().values.T.copy() for name in libs}
+    states = {name: batches["batch"].snapshot().values.T.copy() for name in libs}
     best: dict[str, float] = {}
 
     def note(name: str, ns: float) -> None:
@@ -139,8 +139,8 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=60, help="of which the least counts")
     options = parser.parse_args()
     preset = jl.presets.load("westerly-smooth")
-    print("| sliders | bytes of state | limit | C F | C F, no ledger | C FC | numba F | "
-          "numba F + ledger | numba FC + ledger | C / numba, with ledger | without |"
+    print("| sliders | bytes of state | limit | C F | C F, no ledger | C FC | batch F | "
+          "batch F + ledger | batch FC + ledger | C / batch, with ledger | without |"
     )  # fmt: skip
     print("|---" * 11 + "|")
     with tempfile.TemporaryDirectory() as name:
@@ -156,13 +156,13 @@ def main() -> None:
                 "C F",
                 "bare F",
                 "C FC",
-                "numba F",
-                "numba + ledger F",
-                "numba + ledger FC",
+                "batch F",
+                "batch + ledger F",
+                "batch + ledger FC",
             )
             cells = [f"{t[key]:.0f}" for key in columns]
-            with_ledger = t["C F"] / t["numba + ledger F"]
-            cells += [f"{with_ledger:.2f}", f"{t['bare F'] / t['numba F']:.2f}"]
+            with_ledger = t["C F"] / t["batch + ledger F"]
+            cells += [f"{with_ledger:.2f}", f"{t['bare F'] / t['batch F']:.2f}"]
             print(
                 f"| {law.tables.sliders} ({where}) | {8 * law.state_size} | {' | '.join(cells)} |"
             )

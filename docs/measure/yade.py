@@ -109,7 +109,6 @@ def measure(law, kinds, contacts=20_000, runs=60):
         env = os.environ | {
             "OMP_NUM_THREADS": "1",
             "JOINTLAW_THREADS": "1",
-            "NUMBA_CACHE_DIR": str(Path(tempfile.gettempdir()) / "jointlaw-yade-numba"),
             "PYTHONPATH": str(Path(jl.__file__).parents[1]),
         }
         done = subprocess.run(
@@ -131,7 +130,7 @@ def main():
     options = parser.parse_args()
     law = jl.presets.load(options.preset)
     names = {"cundall": "Cundall-Strack", "hertz": "Hertz-Mindlin", "table": "table mode",
-             "live": f"live mode, `{law.resolution}` in space, numba"}  # fmt: skip
+             "live": f"live mode, `{law.resolution}` in space"}  # fmt: skip
     found = measure(law, list(names), options.contacts, options.runs)
     rows = [
         [name, *(f"{found[kind][k]:.0f}" if k in found[kind] else "" for k in COLUMNS)]

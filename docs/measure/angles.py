@@ -64,7 +64,7 @@ def table(found: np.ndarray) -> str:
     """Markdown of misses (laws, tried, ratios, 4)."""
     names = [f"{ratio:g}" if math.isfinite(ratio) else "none" for ratio in RATIOS]
     lines = [
-        f"| resolution | error (degrees) of | {' | '.join(names)} |",
+        f"| resolution | error of | {' | '.join(names)} |",
         f"|---|---|{'---:|' * len(names)}",
     ]
     kinds = (

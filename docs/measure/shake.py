@@ -79,5 +79,7 @@ rows = []
 for size in SIZES:
     scenes = [scene(size * yields_at, name) for name in NAMES]
     found = [slip(given) for given in scenes]
-    rows.append([size, *(per_cycle(*one) for one in (*found, newmark(scenes[0], frictions)))])
+    rows.append(
+        [f"{size:g}", *(per_cycle(*one) for one in (*found, newmark(scenes[0], frictions)))]
+    )
 print(table(["size", *NAMES, "Newmark"], rows))

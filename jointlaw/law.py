@@ -49,7 +49,7 @@ class JointLaw:
         normal force stays exact. None takes the closure at 20 MPa without yielding, by the
         orientations of "balanced" whatever the resolution.
     resolution: "fast", "balanced", "fine", "reference" or a `Resolution`. A name becomes the
-        `Resolution` that suits critical_slip over closure_range (docs/how-accurate.md); where
+        `Resolution` that suits critical_slip over closure_range (docs/accuracy.md); where
         `replace` changes these, give it the name again.
     plane: None for motion in 3-D, or the azimuth (rad) of the one plane in which the joint moves:
         vectors then have two components, closure and shear along the plane. The traction across
@@ -237,7 +237,7 @@ class JointLaw:
         `JointBatch.critical_time_step` takes joints as they are now.
 
         Safe to 0.95 in lasting contact, and where friction takes from every impact. Impacts that
-        lose nothing need 0.2 or less: they last but 2/share steps (docs/sharp-bits.md).
+        lose nothing need 0.2 or less: they last but 2/share steps (docs/limits.md).
         """
         if not (finite("closure", closure, "m") >= 0).all():
             raise ValueError(f"closure = {closure!r} m is out of bounds: it must be >= 0")
@@ -271,7 +271,7 @@ class JointLaw:
         closure ranges, where friction is mobilised (`jointlaw.accuracy.suite`); nothing is timed,
         so the answer is the same on every machine. Takes seconds to a minute, below 0.01 minutes,
         without the compiled kernel more.
-        loss: of former versions, refused; small cycles need more depth cells (docs/sharp-bits.md).
+        loss: of former versions, refused; small cycles need more depth cells (docs/limits.md).
         Raises ValueError where no resolution tried is that accurate.
         """
         from .accuracy.tolerance import at_tolerance

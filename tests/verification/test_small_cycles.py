@@ -1,8 +1,13 @@
 """Small cycles: many depth cells against a closed form, and what the named resolutions miss."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from builders import law
+from scipy.integrate import trapezoid
+from slow_bed import SlowBed, cap_quadrature, reach_of
+from slow_virgin import SlowGamma
 
 import jointlaw as jl
 
@@ -42,7 +47,7 @@ def masing(normal, amplitude):
 
 
 def test_cells_as_thin_as_the_cycle_keep_its_loss():
-    """Hertz contacts of one orientation; sharp-bits.md asks for more depth cells."""
+    """Hertz contacts of one orientation; docs/limits.md asks for more depth cells."""
     coarse, fine, finest = [], [], []
     for found, depth in ((coarse, 8), (fine, 100), (finest, 1000)):
         nodes = jl.Resolution(1, 3, depth)
@@ -55,3 +60,48 @@ def test_cells_as_thin_as_the_cycle_keep_its_loss():
     assert np.abs(fine[0][AMPLITUDES > 0.02]).max() < 0.1
     assert np.abs(finest[0]).max() < 0.25
     assert np.abs(finest[1]).max() < 1e-3
+
+
+def slow_bed(one, path, springs):
+    """Normal and shear stress (steps, 2) of many springs along a path in the plane."""
+    o, p, h = one.orientation, one.asperity, one.heights
+    normals, weights = cap_quadrature(o.a, o.b, o.c, 6, 16)
+    flat = np.column_stack([path, np.zeros(len(path))])
+    bed = SlowBed(
+        normals, weights, reach_of(flat, normals), K=p.K, lam=p.lam, eta=p.eta, mu=p.mu,
+        density=one.asperity_density, n_depth=springs,
+        heights=SlowGamma(h.alpha, h.beta, h.overlap, h.formation),
+    )  # fmt: skip
+    return np.array([bed.update(d)[:2] for d in np.diff(flat, axis=0, prepend=0.0)])
+
+
+PAGE = {  # loss at amplitudes 0.1 and 0.32, shear kept after 100 openings by 0.01 and 0.1
+    "balanced": ((1.20, 1.05), (0.848, 0.786)),
+    "fine": ((1.11, 1.01), (0.952, 0.883)),
+}
+
+
+def test_named_resolutions_miss_what_the_page_says():
+    """The rows of docs/limits.md, "Small cycles", against the slow bed."""
+    one = replace(jl.presets.load("westerly-rough"), plane=0.0)
+    R, exact = one.closure_range, []
+    amplitudes = AMPLITUDES[[16, 20]] * R
+    for amplitude in amplitudes:
+        quarter = np.linspace(0.0, amplitude, 41)[1:]
+        back = np.concatenate([quarter[::-1][1:], [0.0], -quarter])
+        shear = np.concatenate([[0.0], quarter, np.tile([*back, *-back], CYCLES)])
+        F = slow_bed(one, np.column_stack([np.full(len(shear), CLOSURE * R), shear]), 300)
+        last = slice(-2 * len(back) - 1, None)
+        exact.append(trapezoid(F[last, 1], shear[last]))
+    for name, (ratios, kept) in PAGE.items():
+        made = replace(one, resolution=name)
+        # 300 springs, orientations and the trapezoids of 40 steps a quarter, each below 1 %
+        np.testing.assert_allclose(loops(made, amplitudes)[0] / exact, ratios, rtol=2e-2)
+        joints = made.joints(2)
+        joints.update(np.tile([CLOSURE * R, 0.0], (2, 1)))
+        locked, _ = joints.update(np.tile([0.0, 0.1 * R], (2, 1)))
+        opening = CLOSURE * R * np.array([[0.01, 0.0], [0.1, 0.0]])
+        for _ in range(100):
+            joints.update(-opening, tangent=False)
+            left, _ = joints.update(opening, tangent=False)
+        np.testing.assert_allclose(left[:, 1] / locked[:, 1], kept, atol=1e-3)

@@ -1,8 +1,8 @@
 """Friction and dilation angle under slip far beyond the closure: how far a resolution misses them.
 
-    python benchmarks/slip.py [--laws 30] [--seed 18]
+    python docs/measure/angles.py [--laws 30] [--seed 18]
 
-Laws: all presets and random ones as in benchmarks/tolerance.py, but with a from 1.5 to 9, every
+Laws: all presets and random ones as in docs/measure/tolerance.py, but with a from 1.5 to 9, every
 third with c at its bound, none that jams (atan(mu) + 90 deg/a < 90 deg). Motion in one plane, at
 2 MPa and at half the normal stress of the closure range R, to three critical slips (without one to
 30 R) and back. Misses count from 0.2 critical slips (2 R) on, and on the way back from its first

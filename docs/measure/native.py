@@ -1,7 +1,7 @@
 """Time of one update in C, beside the compiled batch of Python.
 
-    python benchmarks/native.py              the table of docs/native.md, two minutes
-    python benchmarks/native.py --cc clang   with another compiler
+    python docs/measure/native.py              the table of docs/native.md, two minutes
+    python docs/measure/native.py --cc clang   with another compiler
 
 Each figure is the least of many short rounds, taken in turn, in nanoseconds of one thread's own
 time per joint and update, so that other programs count little. C: `jlaw_update`, one joint at a
@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 
 import jointlaw as jl
-from jointlaw.hosts.c.export import _used, table_text
+from jointlaw.hosts.c.export import _used, include_dir, table_text
 
 os.environ["JOINTLAW_THREADS"] = "1"
 FLAGS = ["-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"]
@@ -86,7 +86,7 @@ def library(folder: Path, cc: str, *flags: str) -> ctypes.CDLL:
     name = "-".join(["loop", *flags]).replace("/", "")
     source, target = folder / "loop.c", folder / f"{name}.so"
     source.write_text(LOOP)
-    command = [cc, "-std=c99", *FLAGS, *flags, "-shared", "-fPIC", f"-I{jl.include_dir()}"]
+    command = [cc, "-std=c99", *FLAGS, *flags, "-shared", "-fPIC", f"-I{include_dir()}"]
     subprocess.run([*command, str(source), "-o", str(target), "-lm"], check=True)
     lib = ctypes.CDLL(str(target))
     lib.loop.restype = lib.rate.restype = ctypes.c_double

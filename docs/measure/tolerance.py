@@ -1,6 +1,6 @@
 """Does `law.at_tolerance(t)` keep its word? Random laws, on random paths that it has never seen.
 
-    python benchmarks/tolerance.py [--laws 100] [--seed 1] [--plane] [--json tolerance.json]
+    python docs/measure/tolerance.py [--laws 100] [--seed 1] [--plane]
 
 Laws: a from 1 to 10 (evenly in log a), b and c over their bounds, mu 0.05 to 1, eta 0 to 0.7,
 heights of either formation or none, in a plane or in space, half of them with a critical slip of 1
@@ -20,7 +20,6 @@ reported apart.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import time
 from dataclasses import replace
@@ -28,6 +27,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from tables import table
 
 import jointlaw as jl
 from jointlaw.accuracy.slip import random_ways, slip
@@ -45,6 +45,7 @@ TOLERANCES = (0.05, 0.01, 0.003)
 PATHS, STEPS = 6, 160  # of each kind
 FARS, SLIPS = 3, 4  # paths that slip at a given closure, and at a given normal stress
 SMALL_A = 1.4
+HEAD = ["laws", "tolerance", "met", "paths", "worst", "sliders", "refused", "seconds"]
 
 Draw = tuple[jl.JointLaw, list[dict[str, Any]]]
 
@@ -80,7 +81,7 @@ def random_paths(law: jl.JointLaw, rng: np.random.Generator) -> np.ndarray:
     R, s = law.closure_range, np.arange(1, STEPS + 1) / STEPS
     stress = float(law.normal_stress(R)) / 2
     far = np.stack([far_path(law, rng, stress, s) for _ in range(FARS)], axis=1)
-    place = np.concatenate([legs(law, rng), waves(law, rng), far], axis=1)[:, :, : law.tables.dim]
+    place = np.concatenate([legs(law, rng), waves(law, rng), far], axis=1)[:, :, : law.dim]
     return np.diff(R * place, axis=0, prepend=0.0)
 
 
@@ -129,7 +130,7 @@ def misses(law: jl.JointLaw, rng: np.random.Generator) -> list[dict[str, Any]]:
     exact = replace(law, resolution=scaled(best, 2.0))
     truth = tractions(exact, d)
     stress = float(law.normal_stress(law.closure_range)) / 2
-    ways = random_ways(rng, SLIPS, law.tables.dim)
+    ways = random_ways(rng, SLIPS, law.dim)
     slips = steepest(law) < 88.0  # else it jams
     slid = slip(exact, law.closure_range, stress, ways) if slips else None
     found = []
@@ -145,9 +146,7 @@ def misses(law: jl.JointLaw, rng: np.random.Generator) -> list[dict[str, Any]]:
         if slid is not None:
             mine = slip(made, law.closure_range, stress, ways)
             ratio = np.append(ratio, mine.errors(slid)[0] / tolerance)
-        r = made.resolution
-        found.append({"ratio": ratio.tolist(), "sliders": made.tables.sliders, "seconds": took,
-                      "resolution": [r.u, r.phi, r.depth]})  # fmt: skip
+        found.append({"ratio": ratio.tolist(), "sliders": made.tables.sliders, "seconds": took})
     return found
 
 
@@ -163,27 +162,24 @@ def draw(count: int, seed: int, plane: bool = False) -> list[Draw]:
     return found
 
 
-def table(draws: list[Draw]) -> str:
-    """Markdown: how often the tolerances were kept; a below and above SMALL_A apart."""
-    lines = ["| laws | tolerance | met | paths | worst | sliders | refused | seconds |",
-             "|---|---:|---:|---:|---:|---:|---:|---:|"]  # fmt: skip
+def rows(draws: list[Draw]) -> list[list[Any]]:
+    """How often the tolerances were kept; a below and above SMALL_A apart."""
+    found = []
     steep = [one for one in draws if one[0].orientation.a < SMALL_A]
     usual = [one for one in draws if one[0].orientation.a >= SMALL_A]
     for some, name in ((usual, f"a >= {SMALL_A}"), (steep, f"a < {SMALL_A}")):
         for k, tolerance in enumerate(TOLERANCES):
-            kept = [found[k] for _, found in some if "ratio" in found[k]]
+            kept = [one[k] for _, one in some if "ratio" in one[k]]
             if not kept:
                 continue
             met = sum(max(one["ratio"]) <= 1.0 for one in kept) / len(some)
             ratio = np.concatenate([one["ratio"] for one in kept])  # fewer of laws that jam
-            paths = np.mean(ratio <= 1.0)
             sliders = np.median([one["sliders"] for one in kept])
             seconds = max(one["seconds"] for one in kept)
-            lines.append(
-                f"| {len(some)} with {name} | {tolerance:.1%} | {met:.1%} | {paths:.1%} "
-                f"| {ratio.max():.2f} | {sliders:.0f} | {len(some) - len(kept)} | {seconds:.1f} |"
-            )
-    return "\n".join(lines)
+            found.append([f"{len(some)} with {name}", f"{tolerance:.1%}", f"{met:.1%}",
+                          f"{np.mean(ratio <= 1.0):.1%}", f"{ratio.max():.2f}", f"{sliders:.0f}",
+                          len(some) - len(kept), f"{seconds:.1f}"])  # fmt: skip
+    return found
 
 
 def main() -> None:
@@ -193,14 +189,8 @@ def main() -> None:
     parser.add_argument("--laws", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--plane", action="store_true", help="none in space: ten times as fast")
-    parser.add_argument("--json", help="file to write laws, resolutions and errors to")
     options = parser.parse_args()
-    draws = draw(options.laws, options.seed, options.plane)
-    print(table(draws))
-    if options.json:
-        rows = [{"law": law.to_toml(), "found": found} for law, found in draws]
-        with open(options.json, "w") as stream:
-            json.dump(rows, stream, indent=1)
+    print(table(HEAD, rows(draw(options.laws, options.seed, options.plane))))
 
 
 if __name__ == "__main__":

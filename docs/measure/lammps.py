@@ -1,6 +1,6 @@
 """ns per contact and step of pair_style jointlaw in a packing, beside LAMMPS' own styles.
 
-    python benchmarks/lammps.py FOLDER [--rounds 3] [--steps 100] [--repeat 2]
+    python docs/measure/lammps.py FOLDER [--rounds 3] [--steps 100] [--repeat 2]
 
 Packs 2744 spheres, repeats the box (2: 21 952 spheres), and times the pair styles one after
 another in every round; the least of all rounds counts. Times of one processor are those that it

@@ -1,8 +1,8 @@
 """Cost per contact and step in the real YADE: its own laws, a joint table, the live joint law.
 
-    python benchmarks/yade.py [--contacts 20000] [--runs 60] [--preset jing-replica]
+    python docs/measure/yade.py [--contacts 20000] [--runs 60] [--preset jing-replica]
 
-One thread; minima of several runs; prints a table and JSON. `loop` is the whole step of YADE's
+One thread; minima of several runs; prints a table. `loop` is the whole step of YADE's
 InteractionLoop with its own law and the geometry; `adapter` is what a joint adds to it, torque
 included; `law` is the share of the law inside.
 """
@@ -12,13 +12,16 @@ import json
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
+
+from tables import table
 
 import jointlaw as jl
 from jointlaw.hosts.yade.export import export_yade
 
+COLUMNS = {"loop": "law and geometry of YADE", "adapter": "time that the adapter adds",
+           "law": "part of it in our law"}  # fmt: skip
 SCENE = """
 import json, sys, time
 sys.path.insert(0, ".")
@@ -73,7 +76,7 @@ def adapter(joints):
     return whole, inner
 
 out = {{}}
-for law in ("cundall", "hertz", "table", "live"):
+for law in {kinds}:
     build(law)
     if law in ("table", "live"):
         if law == "table": joints = Joints(TableLaw("joint.txt"))
@@ -93,23 +96,15 @@ print("RESULT " + json.dumps(out), flush=True)
 """
 
 
-def main() -> int:
-    """Run the scene and print the figures."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--contacts", type=int, default=20000)
-    parser.add_argument("--runs", type=int, default=60, help="single steps; the minimum counts")
-    parser.add_argument("--preset", default="jing-replica")
-    options = parser.parse_args()
-    yade = shutil.which("yade")
-    if yade is None:
-        print("YADE is not installed (Debian: apt-get install yade)", file=sys.stderr)
-        return 1
-    law = jl.presets.load(options.preset)
+def measure(law, kinds, contacts=20_000, runs=60):
+    """By kind of contact: how many contacts, and nanoseconds per contact and step."""
+    program = shutil.which("yade")
+    if program is None:
+        raise SystemExit("YADE is not installed (Debian: apt-get install yade)")
     with tempfile.TemporaryDirectory() as folder:
         export_yade(law, folder)
-        scene = SCENE.format(
-            contacts=options.contacts, runs=options.runs, overlap=0.2 * law.closure_range
-        )
+        overlap = 0.2 * law.closure_range
+        scene = SCENE.format(contacts=contacts, runs=runs, overlap=overlap, kinds=kinds)
         (Path(folder) / "scene.py").write_text(scene)
         env = os.environ | {
             "OMP_NUM_THREADS": "1",
@@ -118,28 +113,32 @@ def main() -> int:
             "PYTHONPATH": str(Path(jl.__file__).parents[1]),
         }
         done = subprocess.run(
-            [yade, "-n", "-x", "scene.py"], cwd=folder, env=env, text=True, capture_output=True,
-            stdin=subprocess.DEVNULL,
+            [program, "-n", "-x", "scene.py"], cwd=folder, env=env, text=True,
+            capture_output=True, stdin=subprocess.DEVNULL,
         )  # fmt: skip
-    lines = [line for line in done.stdout.splitlines() if line.startswith("RESULT ")]
-    if not lines:
-        print(done.stdout + done.stderr, file=sys.stderr)
-        return 1
-    result = json.loads(lines[-1][len("RESULT ") :])
-    result["resolution"] = str(law.resolution)
-    r = law.resolution
-    live = f"live mode, `{r}` in space, numba"
+    for line in done.stdout.splitlines():
+        if line.startswith("RESULT "):
+            return json.loads(line.removeprefix("RESULT "))
+    raise SystemExit(done.stdout + done.stderr)
+
+
+def main():
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--contacts", type=int, default=20_000)
+    parser.add_argument("--runs", type=int, default=60, help="single steps; the minimum counts")
+    parser.add_argument("--preset", default="jing-replica")
+    options = parser.parse_args()
+    law = jl.presets.load(options.preset)
     names = {"cundall": "Cundall-Strack", "hertz": "Hertz-Mindlin", "table": "table mode",
-             "live": live}  # fmt: skip
-    print("| | law and geometry of YADE | time that the adapter adds | part of it in our law |")
-    print("|---|---:|---:|---:|")
-    for name, row in result.items():
-        if isinstance(row, dict):
-            cells = [f"{row[k]:.0f}" if k in row else "" for k in ("loop", "adapter", "law")]
-            print(f"| {names[name]} | {' | '.join(cells)} |")
-    print(json.dumps(result))
-    return 0
+             "live": f"live mode, `{law.resolution}` in space, numba"}  # fmt: skip
+    found = measure(law, list(names), options.contacts, options.runs)
+    rows = [
+        [name, *(f"{found[kind][k]:.0f}" if k in found[kind] else "" for k in COLUMNS)]
+        for kind, name in names.items()
+    ]
+    print(table(["", *COLUMNS.values()], rows))
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    main()

@@ -11,10 +11,10 @@ TOP = Block("top", np.array([[0.0, 0.0], [0.6, 0.0], [0.6, 0.4], [0.0, 0.4]]), 2
 STEP = 1e-6  # m and rad: central differences of smooth lengths of 0.1 to 1 m leave 1e-8
 
 
-def contacts(place, turn, speed=(0.0, 0.0, 0.0)):
+def contacts(place, turn, speed=(0.0, 0.0, 0.0), base_speed=(0.0, 0.0, 0.0)):
     """The lower corners of the top block on the base, its centroid at a place, turned (rad)."""
     motion = np.zeros((6, 2))
-    motion[:2, 0] = BASE.centroid
+    motion[:, 0] = [*BASE.centroid, 0.0, *base_speed]
     motion[:, 1] = [*place, turn, *speed]
     outlines = Outlines([BASE, TOP], corner_length=0.05, soft=0.01)
     corner, edge = np.array([4, 5]), np.array([2, 2])  # of the top, on the upper edge of the base
@@ -47,3 +47,10 @@ def test_opening_and_sliding_are_rates_at_the_contact():
     np.testing.assert_allclose(now.opening, rate.imag, atol=1e-5)
     np.testing.assert_allclose(now.sliding, rate.real, atol=1e-5)
     np.testing.assert_allclose(now.opening, -(later.closure - now.closure) / dt, atol=1e-5)
+
+
+def test_two_blocks_that_turn_as_one_neither_open_nor_slide():
+    place, spin = np.array([0.2, 0.2]), 0.7
+    arm = place - BASE.centroid
+    now = contacts(place, 0.05, (-spin * arm[1], spin * arm[0], spin), (0.0, 0.0, spin))
+    np.testing.assert_allclose([now.opening, now.sliding], 0.0, atol=1e-15)  # rounding

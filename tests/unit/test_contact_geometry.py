@@ -1,4 +1,4 @@
-"""Contacts of blocks: what energy and forces need of their geometry, against finite differences."""
+"""Contacts of two blocks against finite differences of their own geometry."""
 
 import numpy as np
 import pytest
@@ -8,49 +8,48 @@ from dem_demo.scene import Block
 
 BASE = Block("base", np.array([[-1.0, -0.5], [1.0, -0.5], [1.0, 0.0], [-1.0, 0.0]]), 2600.0)
 TOP = Block("top", np.array([[0.0, 0.0], [0.6, 0.0], [0.6, 0.4], [0.0, 0.4]]), 2600.0)
-STEP = 1e-6  # m and rad: central differences of smooth lengths of 0.1 to 1 m leave 1e-8
+STILL, STEP = np.zeros((3, 2)), 1e-6  # m, rad, s
 
 
-def contacts(place, turn, speed=(0.0, 0.0, 0.0), base_speed=(0.0, 0.0, 0.0)):
-    """The lower corners of the top block on the base, its centroid at a place, turned (rad)."""
-    motion = np.zeros((6, 2))
-    motion[:, 0] = [*BASE.centroid, 0.0, *base_speed]
-    motion[:, 1] = [*place, turn, *speed]
+def contacts(place, velocity=STILL):
+    """The lower corners of the top on the upper edge of the base; place (3, 2): x, y, turn."""
     outlines = Outlines([BASE, TOP], corner_length=0.05, soft=0.01)
-    corner, edge = np.array([4, 5]), np.array([2, 2])  # of the top, on the upper edge of the base
-    return Contacts(outlines, corner, edge, motion)
+    corner, edge = np.array([4, 5]), np.array([2, 2])
+    return Contacts(outlines, corner, edge, np.concatenate([place, velocity]))
 
 
-# flat, in the smooth ends of both blocks, turned by what raises an edge in part
+def places(x, turn):
+    """Base and top, whose centroid is 0.2 m above the base."""
+    return np.array([[0.0, x], [-0.25, 0.2], [0.0, turn]])
+
+
+# flat, next to the end of the base, beyond it; turned by what raises an edge in part
 @pytest.mark.parametrize("x", [0.2, 0.704, 0.9])
 @pytest.mark.parametrize("turn", [0.01, 0.05, -0.06, 0.08])
-def test_pull_and_twist_are_derivatives_of_the_length(x, turn):
-    place = np.array([x, 0.2])
-    now = contacts(place, turn)
+def test_a_changing_length_pushes_by_the_derivative_of_its_energy(x, turn):
+    place, energy = places(x, turn), np.array([1.0, 2.0])  # J/m per length
+    now, none = contacts(place), np.zeros(2)
     assert now.length.max() > 0.01
-    for way in (0, 1):
-        nudge = STEP * np.eye(2)[way]
-        slope = contacts(place + nudge, turn).length - contacts(place - nudge, turn).length
-        along = (now.pull.conj() * (1, 1j)[way]).real
-        np.testing.assert_allclose(slope / (2 * STEP), along, atol=1e-6)
-    slope = contacts(place, turn + STEP).length - contacts(place, turn - STEP).length
-    carried = (now.pull.conj() * 1j * (now.at - complex(*place))).real
-    np.testing.assert_allclose(slope / (2 * STEP), carried + now.twist, atol=1e-6)
+    forces = now.assemble(np.concatenate([place, STILL]), none, none, energy)
+    for block in (0, 1):
+        for way in (0, 1, 2):
+            nudge = np.zeros((3, 2))
+            nudge[way, block] = STEP
+            gain = energy @ (contacts(place + nudge).length - contacts(place - nudge).length)
+            # central differences of smooth lengths of 0.1 to 1 m: 1e-8, and their rounding
+            assert forces[block, way] == pytest.approx(-gain / (2 * STEP), abs=1e-6)
 
 
 def test_opening_and_sliding_are_rates_at_the_contact():
-    """Of the top against the base, whose upper edge is along x: the corner's own velocity."""
-    place, speed, dt = np.array([0.2, 0.2]), np.array([0.3, -0.1, 0.7]), 1e-6
-    now = contacts(place, 0.05, speed)
-    later = contacts(place + dt * speed[:2], 0.05 + dt * speed[2])
-    rate = (later.at - now.at) / dt
+    place, velocity = places(0.2, 0.05), np.array([[0.0, 0.3], [0.0, -0.1], [0.0, 0.7]])
+    now, later = contacts(place, velocity), contacts(place + STEP * velocity)
+    rate = (later.at - now.at) / STEP  # of the corner of the top, while the base is at rest
     np.testing.assert_allclose(now.opening, rate.imag, atol=1e-5)
     np.testing.assert_allclose(now.sliding, rate.real, atol=1e-5)
-    np.testing.assert_allclose(now.opening, -(later.closure - now.closure) / dt, atol=1e-5)
+    np.testing.assert_allclose(now.opening, (now.closure - later.closure) / STEP, atol=1e-5)
 
 
 def test_two_blocks_that_turn_as_one_neither_open_nor_slide():
-    place, spin = np.array([0.2, 0.2]), 0.7
-    arm = place - BASE.centroid
-    now = contacts(place, 0.05, (-spin * arm[1], spin * arm[0], spin), (0.0, 0.0, spin))
+    place, spin = places(0.2, 0.05), 0.7
+    now = contacts(place, spin * np.array([-place[1], place[0], [1.0, 1.0]]))
     np.testing.assert_allclose([now.opening, now.sliding], 0.0, atol=1e-15)  # rounding

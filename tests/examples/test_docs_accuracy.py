@@ -14,7 +14,6 @@ DOCS = Path(__file__).parents[2] / "docs"
 @pytest.fixture(scope="module")
 def made():
     """docs/make_accuracy.py, and with it the other modules of that folder."""
-    pytest.importorskip("numba")  # the benchmarks time the compiled kernel
     sys.path.insert(0, str(DOCS))
     try:
         import make_accuracy

@@ -12,14 +12,14 @@ from jointlaw.support.pyplot import FORMATS
 
 from .dynamics.simulation import Simulation
 from .errors import Refused
-from .output.record import sentence
-from .output.run import INTERRUPTED, run, steps_to
+from .output.record import sentence, sentences
+from .output.run import run, steps_to
 from .scene import TEMPLATE, load, names
 from .studies import ablate, compare, strength
 
 VERSION = 1  # of the files that compare and strength-reduction write
 FAILING = 3.0  # s: most that a failing rock is run for
-MANY = 1e6  # steps: minutes for a few blocks, hours for a rock
+INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 WAIT = "the first run after an installation also compiles the law, once"
 
 ABOUT = """\
@@ -50,7 +50,13 @@ OPTIONS = {
     "--until": {"type": float, "help": "model time to stop at (s)"},
     "--leave-out": {"nargs": "+", "default": [], "metavar": "NAME", "help": "variants not to run"},
     "--step": {"type": float, "help": "another time step (s)"},
-    "--no-pictures": {"action": "store_true", "help": "tables only"},
+    "--no-pictures": {
+        "action": "store_const",
+        "const": None,
+        "dest": "format",
+        "default": FORMATS[0],
+        "help": "tables only",
+    },
     "--format": {"choices": FORMATS, "default": FORMATS[0], "help": "of pictures (default png)"},
     "--vtk": {"action": "store_true", "help": "also VTK files for ParaView, in DIR/vtk (meshio)"},
     "--seeds": {"type": int, "nargs": "+", "default": [1, 2, 3], "help": "default 1 2 3"},
@@ -102,15 +108,9 @@ def _run(given: argparse.Namespace) -> None:
     else:
         sim = Simulation(load(given.scene))
     _announce(sim, given.until)
-    _, summary = run(sim, given.out, given.until, not given.no_pictures, given.format, given.vtk)
-    for slip in summary["slip"]:
-        angle, alone = slip["slip_angle"], slip["predicted_angle"]
-        said = f"slipped at {angle:.2f} degrees" if angle is not None else "no slip"
-        said = "had slipped before this run" if slip["slipped_before"] else said
-        law = "nothing" if alone is None else f"{alone:.2f} degrees"
-        print(f"{slip['block']}: {said}, the law alone says {law}")
-    for rock in summary["rocks"]:
-        print(sentence(rock))
+    record, summary = run(sim, given.out, given.until, given.format, given.vtk)
+    for line in sentences(record):
+        print(line)
     print(
         f"energy balanced to {summary['largest_energy_error']:.1e}, smallest margin of the time "
         f"step {summary['time_step_margin']:.2f}; results in {given.out}"
@@ -119,11 +119,6 @@ def _run(given: argparse.Namespace) -> None:
 
 def _announce(sim: Simulation, until: float | None = None) -> None:
     steps, dt, limit = steps_to(sim, until), sim.dt, sim.limit.now
-    doubts = sim.scene.doubts
-    if steps > MANY:
-        doubts = [*doubts, f"{steps:.2g} steps: is run.end = {sim.scene.run.end:g} s meant?"]
-    for doubt in doubts:
-        print(f"warning: {doubt}", file=sys.stderr)
     free = sum(not block.fixed for block in sim.scene.blocks)
     print(f"{sim.scene.title}: {free} moving blocks, {sim.joints.n} law points in reach")
     print(f"time step {dt:.3g} s, limit {limit:.3g} s (margin {limit / dt:.2f}), {steps} steps")

@@ -1,5 +1,7 @@
 """Monitors of a run: slip, shear, points of a rock; and what the law alone says of them."""
 
+from contextlib import suppress
+
 import numpy as np
 
 import jointlaw as jl
@@ -12,40 +14,35 @@ SLIP_DISTANCE = 2e-3  # m, for laws without a critical slip distance
 ROUNDS = 50  # most trials of an angle; a handful is enough where there is one
 
 
-class SlipMonitor:
-    """Looks for the slip of the joints that the scene's [watch] table names."""
+Slips = dict[tuple[int, int], dict]  # by the moving block and its base
 
-    def __init__(self, sim: Simulation) -> None:
-        self.scene, self.slips, self.lengths = sim.scene, {}, {}
-        for moving, base in self.scene.monitors.slip:
-            name = law_between(sim, moving, base)
-            distance = slip_distance(self.scene.laws[name])
-            self.slips[moving, base] = {
-                "block": self.scene.blocks[moving].name,
-                "base": self.scene.blocks[base].name,
-                "law": name,
-                "slip_distance": distance,
-                "slip_angle": None,
-                "slip_time": None,
-                "slipped_before": sim.slid(moving, base) > distance,
-            }
-            here = sim.tracker.between(moving, base)
-            self.lengths[moving, base] = float(sim.contacts.length[here].sum())
 
-    def look(self, sim: Simulation) -> None:
-        """Note the base angle at which a joint passes its slip distance."""
-        for (moving, base), entry in self.slips.items():
-            waits = entry["slip_angle"] is None and not entry["slipped_before"]
-            if waits and sim.slid(moving, base) > entry["slip_distance"]:
-                entry["slip_angle"] = base_angle(sim, moving, base)
-                entry["slip_time"] = sim.time
+def watched_slips(sim: Simulation) -> Slips:
+    """What is known at the start of the slips that the scene's [watch] table names."""
+    slips, scene = {}, sim.scene
+    for moving, base in scene.monitors.slip:
+        name = law_between(sim, moving, base)
+        distance = slip_distance(scene.laws[name])
+        length = float(sim.contacts.length[sim.tracker.between(moving, base)].sum())
+        slips[moving, base] = {
+            "block": scene.blocks[moving].name,
+            "base": scene.blocks[base].name,
+            "law": name,
+            "slip_distance": distance,
+            "slip_angle": None,
+            "slip_time": None,
+            "slipped_before": sim.slid(moving, base) > distance,
+            **slip_angle(scene, name, moving, length),
+        }
+    return slips
 
-    def report(self) -> list[dict]:
-        """Measured and predicted slip angles (degrees)."""
-        return [
-            entry | slip_angle(self.scene, entry["law"], pair[0], self.lengths[pair])
-            for pair, entry in self.slips.items()
-        ]
+
+def look(slips: Slips, sim: Simulation) -> None:
+    """Note the base angle (degrees) at which a joint passes its slip distance."""
+    for (moving, base), entry in slips.items():
+        waits = entry["slip_angle"] is None and not entry["slipped_before"]
+        if waits and sim.slid(moving, base) > entry["slip_distance"]:
+            entry |= {"slip_angle": base_angle(sim, moving, base), "slip_time": sim.time}
 
 
 def base_angle(sim: Simulation, moving: int, base: int) -> float:
@@ -137,10 +134,8 @@ def shear_curve(law: jl.JointLaw, stress: float, slid: np.ndarray) -> jl.Record 
     motion.
     """
     inner = np.flatnonzero(np.diff(np.sign(np.diff(slid)))) + 1
-    turns = [float(u) for u in [*slid[inner], slid[-1]]]
-    try:
+    with suppress(ValueError, PathError):
         if not is_coulomb(law):
+            turns = [*slid[inner].tolist(), float(slid[-1])]
             return jl.direct_shear(law.joint(), to=turns, normal=stress, steps=400)
-    except (ValueError, PathError):
-        pass
     return None

@@ -8,7 +8,7 @@ import numpy as np
 from ..dynamics.energy import COLUMNS
 from ..dynamics.simulation import Simulation
 from ..scene import usual_size
-from .monitors import SlipMonitor, law_between, readings
+from .monitors import law_between, readings, watched_slips
 
 JOINT_COLUMNS = (
     "closure_m", "shear_m", "normal_stress_Pa", "shear_stress_Pa",
@@ -24,12 +24,12 @@ class Record:
 
     joints[f]: "who" (k, 5) block, edge, block, edge, contact; "ends" (k, 2, 2) the segment of joint
     that a contact carries; "values" (k, 9) as JOINT_COLUMNS. monitored[f]: what the scene's
-    [watch] asks for; slips: its slip angles; laws: of the watched joints; state: that of the last
+    [watch] asks for; slips: of its joints; laws: of the watched joints; state: that of the last
     frame, to return to.
     """
 
     def __init__(self, sim: Simulation) -> None:
-        self.scene, self.slips = sim.scene, SlipMonitor(sim)
+        self.scene, self.slips = sim.scene, watched_slips(sim)
         watched = (*sim.scene.monitors.slip, *sim.scene.monitors.shear)
         self.laws = {pair: law_between(sim, *pair) for pair in watched}
         self.times: list[float] = []
@@ -113,12 +113,6 @@ def write_csv(path: Path, header, rows) -> None:
         writer.writerows(rows)
 
 
-def displacement(record: Record, i: int) -> np.ndarray:
-    """Displacement (n, 2) of the blocks in frame i since they were drawn, without weight (m)."""
-    drawn = np.array([block.centroid for block in record.scene.blocks])
-    return record.motion[i][:2].T - drawn
-
-
 def outcomes(record: Record) -> list[dict]:
     """One entry for each `[[rock]]` of the scene.
 
@@ -127,12 +121,12 @@ def outcomes(record: Record) -> list[dict]:
     over the last second (or the whole run, if shorter).
     """
     out = []
-    first, last = displacement(record, 0), displacement(record, -1)
     times = np.array(record.times)
-    before = int(np.searchsorted(times, times[-1] - LOOK_BACK + 1e-9)) if len(times) > 1 else 0
-    before = min(before, max(len(times) - 2, 0))
-    crept = np.hypot(*(last - displacement(record, before)).T)
-    crept /= max(times[-1] - times[before], 1e-300)
+    before = int(np.searchsorted(times, times[-1] - LOOK_BACK + 1e-9))
+    before = max(min(before, len(times) - 2), 0)
+    drawn = np.array([block.centroid for block in record.scene.blocks])
+    first, then, last = (record.motion[i][:2].T - drawn for i in (0, before, -1))
+    crept = np.hypot(*(last - then).T) / max(times[-1] - times[before], 1e-300)
     for rock in record.scene.rocks:
         free = rock.free
         moved, creep = np.hypot(*(last - first)[free].T), float(crept[free].max())
@@ -157,6 +151,18 @@ def far(record: Record) -> bool:
     """Has a block moved by more than the usual size of a block?"""
     size = usual_size(block for block in record.scene.blocks if not block.fixed)
     return bool(record.moved.max() > size)
+
+
+def sentences(record: Record) -> list[str]:
+    """What a person wants to know at the end: a line for each watched slip and each rock."""
+    found = []
+    for slip in record.slips.values():
+        angle, alone = slip["slip_angle"], slip["predicted_angle"]
+        said = f"slipped at {angle:.2f} degrees" if angle is not None else "no slip"
+        said = "had slipped before this run" if slip["slipped_before"] else said
+        law = "nothing" if alone is None else f"{alone:.2f} degrees"
+        found.append(f"{slip['block']}: {said}, the law alone says {law}")
+    return [*found, *map(sentence, outcomes(record))]
 
 
 def sentence(entry: dict) -> str:

@@ -1,6 +1,5 @@
 """Run a scene to its end and write what a user wants to see."""
 
-import os
 import signal
 import sys
 import threading
@@ -19,11 +18,11 @@ from ..dynamics.energy import COLUMNS
 from ..dynamics.saved_states import require_text
 from ..dynamics.simulation import Simulation
 from ..errors import Refused
-from .pictures import Pictures, energy, joints
+from .monitors import look
+from .pictures import Pictures, curves
 from .record import Record, outcomes
 
 MOST_STEPS = 1e12  # of a run: years
-INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 LOOKS = 8  # steps between two looks for slip
 VERSION = 1  # of summary.json
 TABLES = ("history.csv", "blocks.csv", "joints.csv")
@@ -31,11 +30,11 @@ TABLES = ("history.csv", "blocks.csv", "joints.csv")
 
 def run(
     sim: Simulation, folder: Path | None = None, until: float | None = None,
-    pictures: bool = True, picture_format: str = FORMATS[0], vtk: bool = False,
+    pictures: str | None = FORMATS[0], vtk: bool = False,
 ):  # fmt: skip
     """Run to `until` (s, default the scene's end); writes into `folder` if given.
 
-    vtk: VTK files too, which needs meshio.
+    pictures: their format, None for none; vtk: VTK files too, which needs meshio.
     Returns (record, summary). A state that the method cannot carry raises Refused and leaves the
     last good one in `folder`/refused, from where the run can be repeated or resumed. Ctrl-C stops
     it after a step, writes what there is and raises KeyboardInterrupt. Results of another run in
@@ -47,21 +46,20 @@ def run(
         require_text(sim.scene)
         folder.mkdir(parents=True, exist_ok=True)
     started, first_step, record = time.perf_counter(), sim.n, Record(sim)
-    drawn, interrupted, trouble = picture_format if pictures else None, False, None
+    interrupted = False
     try:
         play(sim, record, until)
-    except Refused as error:
-        trouble = error
     except KeyboardInterrupt:
         interrupted = True
-    if trouble and folder:
+    except Refused as trouble:
+        if not folder:
+            raise
         clear_run(folder)
         sim.save(folder / "refused", record.state)
         replace_file(folder / "refused" / "why.txt", f"{trouble}\n".encode())
         write(record, {"version": VERSION, "refused": str(trouble)}, folder, None, vtk)
-        trouble = Refused(f"{trouble}\nThe last good state is in {folder / 'refused'}")
-    if trouble:
-        raise trouble
+        told = f"{trouble}\nThe last good state is in {folder / 'refused'}"
+        raise Refused(told) from None
     summary = {
         "version": VERSION,
         "scene": sim.scene.title,
@@ -75,7 +73,7 @@ def run(
         "energy_J": {c: sim.ledger.value[c] for c in COLUMNS},
         "energy_error": sim.ledger.error,
         "largest_energy_error": record.largest_error,
-        "slip": record.slips.report(),
+        "slip": list(record.slips.values()),
         "rocks": outcomes(record),
         "wall_time_s": time.perf_counter() - started,
         "interrupted": interrupted,
@@ -83,7 +81,7 @@ def run(
     if folder:
         clear_run(folder)
         sim.save(folder / "state")
-        write(record, summary, folder, drawn, vtk)
+        write(record, summary, folder, pictures, vtk)
     if interrupted:
         where = f"; go on: python -m dem_demo resume {folder / 'state'} --out NEW" if folder else ""
         raise KeyboardInterrupt(f"interrupted at {sim.time:.4g} s of model time{where}")
@@ -103,22 +101,21 @@ def play(
     """
     steps = steps_to(sim, until)
     every = max(round(min(sim.scene.run.record / sim.dt, steps + 1)), 1)
-    pressed, main = threading.Event(), threading.current_thread() is threading.main_thread()
+    main, pressed = threading.current_thread() is threading.main_thread(), []
 
-    def note(_signal, _frame) -> None:  # pymunk's callbacks would swallow a KeyboardInterrupt
-        if pressed.is_set():
-            os._exit(INTERRUPTED)  # at once, and nothing more is written
-        pressed.set()
+    def note(number, _frame) -> None:  # pymunk's callbacks would swallow a KeyboardInterrupt
+        signal.signal(number, signal.SIG_DFL)
+        pressed.append(number)
 
     before = signal.signal(signal.SIGINT, note) if main else None
     try:
         for i in tqdm(range(1, steps + 1), desc=sim.scene.title, disable=not sys.stderr.isatty()):
             sim.step()
             if i % LOOKS == 0:
-                record.slips.look(sim)
-            if i % every == 0 or i == steps or pressed.is_set():
+                look(record.slips, sim)
+            if i % every == 0 or i == steps or pressed:
                 record.take(sim)
-                if pressed.is_set():
+                if pressed:
                     raise KeyboardInterrupt
                 if stop(record):
                     break
@@ -148,10 +145,9 @@ def write(record: Record, summary: dict, folder: Path, drawn: str | None, vtk: b
     pictures: dict[str, Callable[[Path], None]] = {}
     if drawn:
         of = Pictures(record)
+        pictures = {f"final.{drawn}": of.final, "motion.gif": of.animation}
         if record.scene.monitors.shear:
-            pictures[f"curves.{drawn}"] = partial(joints, record)
-        pictures[f"energy.{drawn}"] = partial(energy, record)
-        pictures |= {f"final.{drawn}": of.final, "motion.gif": of.animation}
+            pictures[f"curves.{drawn}"] = partial(curves, record)
     write_json(folder / "summary.json", {**summary, "files": [*TABLES, *pictures]})
     record.write(folder)
     for name, draw in pictures.items():

@@ -16,7 +16,7 @@ def write(record: Record, folder: Path) -> None:
     """blocks_N.vtu and joints_N.vtu of every frame N, in SI units.
 
     Blocks carry their number, displacement, velocity and spin. Joints carry what joints.csv has of
-    them, and `state`: 0 stuck, 1 partly sliding, 2 sliding, 3 open, as in report.png.
+    them, and `state`: 0 stuck, 1 partly sliding, 2 sliding, 3 open, as in the pictures.
     """
     folder.mkdir(parents=True, exist_ok=True)
     pictures, names = Pictures(record), list(STATES)

@@ -53,21 +53,12 @@ class JointSet:
         return offsets[(offsets > low) & (offsets < high)]
 
 
-@dataclass(frozen=True, eq=False)
-class CutRock:
-    """Convex corners (m, 2) of the blocks, counter-clockwise; of every edge its set's number or -1.
-
-    joined: slivers that became part of a neighbour; dropped: areas (m2) of those that could not.
-    """
-
-    blocks: list[np.ndarray]
-    sets: list[np.ndarray]
-    joined: int
-    dropped: list[float]
-
-
-def cut(outline: np.ndarray, sets: Sequence[JointSet], seed: int, least_width: float) -> CutRock:
+def cut(outline: np.ndarray, sets: Sequence[JointSet], seed: int, least_width: float):
     """Cut a simple outline (m, 2) into convex blocks no narrower than `least_width` (m).
+
+    Returns the corners (m, 2) of each block, counter-clockwise; for each block the numbers (m,) of
+    the sets of its edges, or -1; how many slivers became part of a neighbour; and the areas (m2) of
+    those that could not. Raises ValueError.
 
     A piece that is still not convex (the outline bends inwards) is cut along the first set that
     runs through its inward corner. A sliver joins a neighbour with which it makes a convex block,
@@ -89,7 +80,7 @@ def cut(outline: np.ndarray, sets: Sequence[JointSet], seed: int, least_width: f
     pieces, joined, dropped = _without_slivers(pieces, lines, least_width, tiny)
     shapes = [_corners(piece, tiny) for piece in pieces]
     shapes.sort(key=lambda c: tuple(np.round(c.mean(axis=0)[::-1], 6)))
-    return CutRock(shapes, [_sets_of(c, lines, tiny) for c in shapes], joined, dropped)
+    return shapes, [_sets_of(c, lines, tiny) for c in shapes], joined, dropped
 
 
 def _crossed(piece, normal, offset, tiny, persistence, rng) -> list[Polygon]:

@@ -111,7 +111,7 @@ def read_drives(
     out = [Drive(i, AXES[axis], (0.0,), (0.0,)) for i, b in enumerate(blocks) for axis in b.held]
     movable = tuple(block.name for block in blocks if not block.fixed)
     for i, table in enumerate(tables):
-        name, motion = f"{where}.drive[{i}]", table["motion"]
+        name, motion = f"{where}: drive[{i}]", table["motion"]
         block = number[one_of(f"{name}.block", table["block"], movable)]
         if motion == "turn" and {"file", "sine"} & set(table):
             raise ValueError(f"{name}: file and sine shake along x or y; for a turn give times")
@@ -125,7 +125,7 @@ def read_drives(
         blocks[block] = replace(blocks[block], held=(*blocks[block].held, motion))
     moved = [(d.block, d.axis) for d in out]
     if len(set(moved)) < len(moved):
-        raise ValueError(f"{where}.drive: a motion of a block is prescribed twice")
+        raise ValueError(f"{where}: drive: a motion of a block is prescribed twice")
     return tuple(out)
 
 

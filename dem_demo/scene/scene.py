@@ -88,16 +88,6 @@ class Scene:
         """Contact length (m) of a corner that stands on an edge."""
         return self.run.corner_length or CORNER * min(block.width for block in self.blocks)
 
-    @property
-    def doubts(self) -> list[str]:
-        """What of the scene is likely a slip, in words; it can be run all the same."""
-        found = []
-        if self.gravity[1] > 0:
-            found.append(f"gravity = {list(self.gravity)} points upwards: [0, -9.81] is down")
-        if any(self.gravity) and not any(block.fixed or block.held for block in self.blocks):
-            found.append("no block is fixed or held: all fall; give one `fixed = true`")
-        return found
-
     def law_of(self, key: Key) -> str:
         """Name of the law of an interface (block, edge, block, edge).
 

@@ -36,7 +36,7 @@ def strength_reduction(
     (degrees), each None where none is found, and the `picture` in `folder`, None without a factor.
     """
     data, files = read_tables(scene.text), scene.files
-    for table in data.get("rock", [None]):
+    for table in data["rock"] or [None]:
         name, one = "scene", data
         if table is not None:
             name, one = table["name"], alone(data, table["name"])
@@ -126,10 +126,7 @@ def alone(data: Tables, name: str, seed: int | None = None) -> Tables:
     Of the [[joint]] tables those of this rock stay; those that name its blocks only with its own
     seed, for with another there are other blocks.
     """
-    known: dict[str, Tables] = {}
-    for table in data["rock"]:
-        known[table["name"]] = {**known.get(table.get("like", ""), {}), **table, "like": ""}
-    rock = known[name]
+    rock = next(table for table in data["rock"] if table["name"] == name)
     same = seed is None or seed == rock.get("seed", 0)
     blocks = {block["name"] for block in data.get("block", [])}
     low, high = np.quantile(np.add(rock["outline"], rock.get("at", [0, 0])), [0, 1], axis=0)

@@ -141,7 +141,7 @@ end = 0.1
 def test_a_watched_joint_has_the_law_of_the_faces_that_meet():
     """Blocks with a set on each side: edge 0 of both, their bottoms, would give "bedding" twice."""
     record = Record(Simulation(parse(CUT)))
-    (slip,) = record.slips.report()
+    (slip,) = record.slips.values()
     assert slip["law"] == "bedding"
     assert slip["predicted_angle"] == pytest.approx(np.degrees(np.arctan(0.3)))
     assert list(record.laws.values()) == ["bedding", "cross"]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dem_demo import Simulation, load, parse
-from dem_demo.output.monitors import SlipMonitor, base_angle
+from dem_demo.output.monitors import base_angle, look, watched_slips
 from dem_demo.output.run import LOOKS
 from dem_demo.scene.blocks import turn
 
@@ -40,7 +40,7 @@ end = 0.7
 
 def waiting(watch):
     """Is there a slip still to come?"""
-    return any(slip["slip_angle"] is None for slip in watch.slips.values())
+    return any(slip["slip_angle"] is None for slip in watch.values())
 
 
 def block(gravity=0.0, drawn=0.0, driven=0.0, gap=0.0, weight=9.81):
@@ -75,13 +75,13 @@ def slips():
     """Measured and predicted slips of both slabs; the tables tilt at 0.05 degrees per second."""
     scene = load("tilt")
     sim = Simulation(scene)
-    watch = SlipMonitor(sim)
+    watch = watched_slips(sim)
     while waiting(watch) and sim.time < scene.run.end:
         for _ in range(LOOKS):
             sim.step()
-        watch.look(sim)
+        look(watch, sim)
     assert abs(sim.ledger.error) < 1e-4
-    return watch.report()
+    return list(watch.values())
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from jointlaw.joints.state import JointState
 from ..scene import Scene, is_coulomb
 from .tracker import Identity
 
-PoolState = tuple[list[Identity], JointState]  # contacts, and their joints in that order
+PARTS = "contacts", "law", "fingerprint"  # of a snapshot of the joints of a law
 
 
 def virgin_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
@@ -124,15 +124,24 @@ class Joints:
         pool.batch.reset(pool.add([contact]))
         self.measure()
 
-    def snapshot(self) -> dict[str, PoolState]:
-        """A copy of all state, by law."""
-        return {name: (pool.keys, pool.snapshot()) for name, pool in self.pools.items()}
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """A copy of all state; the laws are numbered, their names may be no names of arrays."""
+        arrays = {}
+        for i, pool in enumerate(self.pools.values()):
+            state, contacts = pool.snapshot(), [[*key, number] for key, number in pool.keys]
+            parts = np.array(contacts, int), state.values.T, np.array(state.fingerprint)
+            arrays |= {f"{part}-{i}": array for part, array in zip(PARTS, parts, strict=True)}
+        return arrays
 
-    def restore(self, state: dict[str, PoolState], contacts: Sequence[Identity]) -> None:
+    def restore(self, state: dict[str, np.ndarray], contacts: Sequence[Identity]) -> None:
         """Back to a snapshot whose contacts were these. Raises ValueError for another's."""
-        held = {contact for keys, _ in state.values() for contact in keys}
-        if set(state) != set(self.pools) or held != set(contacts):
+        held = []
+        for i in range(len(self.pools)):
+            rows, values, fingerprint = (state[f"{part}-{i}"] for part in PARTS)
+            keys = [(tuple(key), number) for *key, number in rows.tolist()]
+            held.append((keys, JointState(str(fingerprint), values.T)))
+        if {contact for keys, _ in held for contact in keys} != set(contacts):
             raise ValueError("the state's joints are not those of the scene's laws and contacts")
-        for name, (keys, joints) in state.items():
-            self.pools[name].restore(keys, joints)
+        for pool, (keys, joints) in zip(self.pools.values(), held, strict=True):
+            pool.restore(keys, joints)
         self.assign(contacts)

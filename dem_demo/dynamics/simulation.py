@@ -33,7 +33,8 @@ class Simulation:
     """
 
     def __init__(self, scene: Scene, step: float | None = None, saved: Saved | None = None) -> None:
-        _require_positive(step)
+        if step is not None and not 0 < step < np.inf:
+            raise ValueError(f"step = {step} s: must be a finite number > 0")
         self.scene, self.blocks = scene, Blocks(scene)
         self.tracker, self.joints = Tracker(scene, self.blocks.motion), Joints(scene)
         self.limit, self.balanced, self.t0, self.n = StepLimit(), True, 0.0, 0
@@ -106,7 +107,7 @@ class Simulation:
         scene, blocks, joints, dt = self.scene, self.blocks, self.joints, self.dt
         blocks.require_slow(dt)
         self._follow()
-        self.tracker.narrow_phase.require_shallow(self.contacts)
+        self.tracker.require_shallow()
         joints.update(self.tracker.closure, self.contacts.sliding * dt, scene.run.law_steps)
         self.n += 1
         velocity = blocks.drives.velocity(self.time, dt, self.reversed_at)
@@ -188,17 +189,17 @@ class Simulation:
         arrays = {path: np.array(attrgetter(path)(self)) for path in STATE}
         arrays["ledger.value"] = np.array([*self.ledger.value.values()])
         arrays["velocity"] = self.blocks.read()[3:]  # that will carry the blocks on
-        return Saved(arrays, self.joints.snapshot())
+        return arrays | self.joints.snapshot()
 
     def _unpack(self, saved: Saved, step: float | None) -> None:
-        a = {name: array.copy() for name, array in saved.arrays.items()}
+        a = {name: array.copy() for name, array in saved.items()}
         for path in STATE:
             holder, _, name = path.rpartition(".")
             value = a[path] if a[path].ndim else a[path].item()
             setattr(attrgetter(holder)(self) if holder else self, name, value)
         self.ledger.value = dict(zip(COLUMNS, a["ledger.value"].tolist(), strict=True))
         self.tracker.place(self.blocks.motion)
-        self.joints.restore(saved.joints, self.tracker.identities)
+        self.joints.restore(a, self.tracker.identities)
         velocity = a["velocity"]
         if step:  # velocities are half a step ahead of the places: of the new step
             change = 0.5 * (step - self.dt) * self.ledger.forces[0] / self.blocks.inertia
@@ -224,9 +225,3 @@ class Simulation:
         """
         scene, saved = saved_states.load(Path(folder))
         return cls(scene, step, saved)
-
-
-def _require_positive(step: float | None) -> None:
-    """Refuse a time step (s) that is none; None leaves the choice to others."""
-    if step is not None and not 0 < step < np.inf:
-        raise ValueError(f"step = {step} s: must be a finite number > 0")

@@ -1,6 +1,6 @@
 """Prescribed motions: a base that tilts, a machine that shears, an earthquake that shakes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -19,23 +19,14 @@ SAMPLES = 40  # of a sine, per cycle
 
 
 @dataclass(frozen=True)
-class Reversal:
-    """What a drive does once `block` has slid `slid` (m) along it: go back `by` at `rate` (1/s)."""
-
-    block: int
-    slid: float
-    by: float
-    rate: float
-
-
-@dataclass(frozen=True)
 class Drive:
     """Motion of one block along "x" or "y" (m) or "turn" (rad) about its centroid.
 
     Straight lines between (times, values), averaged over the last `ease` seconds so that the
     machine does not strike the rock at a corner; before and after them the block rests.
     With `order` 1 or 2 the values are velocities or accelerations (m/s, m/s2), and after the last
-    the block keeps its velocity, so that nothing strikes it.
+    the block keeps its velocity, so that nothing strikes it. `back`: once `block` has slid `slid`
+    (m) along the driven block, that goes back `by` at `rate` (1/s).
     """
 
     block: int
@@ -43,7 +34,7 @@ class Drive:
     times: tuple[float, ...]
     values: tuple[float, ...]
     ease: float = 0.0
-    back: Reversal | None = None
+    back: dict[str, float] | None = None
     order: int = 0
 
     @cached_property
@@ -56,24 +47,24 @@ class Drive:
         if self.order:
             at = np.clip(t, self.times[0], self.times[-1])
             return float(self.path(at) + max(t - at, 0.0) * self.path(at, nu=1))
+        times, values = self._line(reversed_at)
         if self.ease == 0:
-            return float(self._line(np.array([t]), reversed_at)[0])
-        low, corners = t - self.ease, [*self.times]
-        if self.back and np.isfinite(reversed_at):
-            end = reversed_at + self.back.by / self.back.rate
-            corners = sorted([*corners, reversed_at, end])
-        knots = np.array([low, *(s for s in corners if low < s < t), t])
-        values = self._line(knots, reversed_at)
-        return float(np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(knots)) / self.ease)
+            return float(np.interp(t, times, values))
+        low = t - self.ease
+        knots = np.array([low, *(s for s in times if low < s < t), t])
+        return float(np.trapezoid(np.interp(knots, times, values), knots) / self.ease)
 
-    def _line(self, t: np.ndarray, reversed_at: float) -> np.ndarray:
-        values = np.interp(np.minimum(t, reversed_at), self.times, self.values)
-        if self.back and np.isfinite(reversed_at):
-            gone = np.clip(self.back.rate * (t - reversed_at), 0.0, self.back.by)
-            ways = np.sign(np.diff(self.values))[np.array(self.times[:-1]) < reversed_at]
-            came = ways[ways != 0][-1:]
-            values = values - gone * (came[0] if came.size else 1.0)
-        return values
+    def _line(self, reversed_at: float) -> tuple[Sequence[float], Sequence[float]]:
+        """Times (s) and displacements, straight between them."""
+        if self.back is None or np.isinf(reversed_at):
+            return self.times, self.values
+        n = int(np.searchsorted(self.times, reversed_at))
+        ways = np.sign(np.diff(self.values[: n + 1]))
+        way = ways[ways != 0][-1] if ways.any() else 1.0
+        here = float(np.interp(reversed_at, self.times, self.values))
+        by, rate = self.back["by"], self.back["rate"]
+        times = *self.times[:n], reversed_at, reversed_at + by / rate
+        return times, (*self.values[:n], here, here - way * by)
 
 
 class Drives:
@@ -96,7 +87,7 @@ class Drives:
         """Send back those drives whose block has slid far enough; slid(block, base) in m."""
         out = reversed_at.copy()
         for i, d in enumerate(self.drives):
-            if d.back and t < out[i] and slid(d.back.block, d.block) > d.back.slid:
+            if d.back and t < out[i] and slid(d.back["block"], d.block) > d.back["slid"]:
                 out[i] = t
         return out
 
@@ -138,7 +129,8 @@ def _lines(table: Tables, number: dict[str, int], unit: float, where: str) -> di
     line = {"times": tuple(times), "values": tuple(unit * values), "ease": table.get("ease", 0.1)}
     if back := table.get("back"):
         block = number[one_of(f"{where}.back.block", back["block"], tuple(number))]
-        line["back"] = Reversal(block, back["slid"], unit * back["by"], unit * back["rate"])
+        line["back"] = {key: unit * back[key] for key in ("by", "rate")}
+        line["back"] |= {"block": block, "slid": back["slid"]}
     return line
 
 

@@ -14,10 +14,10 @@ from .dynamics.simulation import Simulation
 from .errors import Refused
 from .output.record import sentence, sentences
 from .output.run import run, steps_to
-from .scene import TEMPLATE, load, names
+from .scene import TEMPLATE, load, shipped
 from .studies import ablate, compare, strength
 
-VERSION = 1  # of the files that compare and strength-reduction write
+VERSION = 1  # of strength.json
 FAILING = 3.0  # s: most that a failing rock is run for
 INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 WAIT = "the first run after an installation also compiles the law, once"
@@ -46,7 +46,6 @@ OPTIONS = {
     "state": {"type": Path, "help": "folder that a run left: DIR/state, DIR/refused"},
     "--out": {"type": Path, "default": Path("out"), "help": "folder for the results"},
     "--force": {"action": "store_true", "help": "replace another run in that folder"},
-    "--out FILE": {"type": Path, "help": "a JSON file for the numbers"},
     "--until": {"type": float, "help": "model time to stop at (s)"},
     "--leave-out": {"nargs": "+", "default": [], "metavar": "NAME", "help": "variants not to run"},
     "--step": {"type": float, "help": "another time step (s)"},
@@ -62,8 +61,9 @@ OPTIONS = {
     "--seeds": {"type": int, "nargs": "+", "default": [1, 2, 3], "help": "default 1 2 3"},
 }
 REMOVED = {
-    "--tilt": "turn `gravity` in the scene file",
-    "--critical": "strength-reduction finds the critical tilt",
+    "compare --tilt": "turn `gravity` in the scene file",
+    "compare --critical": "strength-reduction finds the critical tilt",
+    "compare --out": "it prints; write `> FILE`",
 }
 
 
@@ -75,15 +75,15 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         f"python -m dem_demo {verb}".removesuffix(" run"),
         description=ABOUT,
-        epilog=f"scenes: {', '.join(names())}",
+        epilog=f"scenes: {', '.join(shipped())}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     for option in options:
-        parser.add_argument(option.split()[0], **OPTIONS[option])
+        parser.add_argument(option, **OPTIONS[option])
     if verb == "run" and (not words or words[0].startswith("-")) and "-h" not in words:
         words.insert(0, "tilt")
     try:
-        for word in REMOVED.keys() & {word.partition("=")[0] for word in words}:
+        for word in REMOVED.keys() & {f"{verb} {word.partition('=')[0]}" for word in words}:
             raise ValueError(f"{word} is removed: {REMOVED[word]}")
         given = parser.parse_args(words)
         if getattr(given, "force", None) is False:
@@ -91,7 +91,7 @@ def main(arguments: list[str] | None = None) -> int:
         with explained(f"dem_demo is at work; {WAIT}"):
             command(given)
     except KeyboardInterrupt as stop:
-        print(f"dem_demo: {str(stop) or 'interrupted; nothing is written'}", file=sys.stderr)
+        print(f"dem_demo: {str(stop) or 'interrupted'}", file=sys.stderr)
         return INTERRUPTED
     except (Refused, PathError, ValueError, OSError) as error:
         print(f"dem_demo: {error}", file=sys.stderr)
@@ -149,18 +149,13 @@ def _ablate(given: argparse.Namespace) -> None:
 
 
 def _compare(given: argparse.Namespace) -> None:
-    scene, rows = load(given.scene), []
+    scene = load(given.scene)
     if not scene.rocks:
         raise ValueError(f"{given.scene} has no [[rock]] to compare")
-    if given.out:
-        given.out.parent.mkdir(parents=True, exist_ok=True)
     for row in compare.compare(scene, given.seeds, given.until or scene.run.end):
         print(f"seed {row['seed']}, {row['law']:7s} {sentence(row)}", flush=True)
         if row["refused"]:
             print(f"    stopped: {row['refused']}")
-        rows.append(row)
-    if given.out:
-        write_json(given.out, {"version": VERSION, "rows": rows})
 
 
 def _reduce(given: argparse.Namespace) -> None:
@@ -184,6 +179,6 @@ COMMANDS = {
     "new": (_new, "file"),
     "check": (_check, "scene"),
     "ablate": (_ablate, "scene", "--out", "--force", "--until", "--leave-out"),
-    "compare": (_compare, "scene", "--seeds", "--until", "--out FILE"),
+    "compare": (_compare, "scene", "--seeds", "--until"),
     "strength-reduction": (_reduce, "scene", "--out", "--force", "--until", "--format"),
 }

@@ -114,10 +114,6 @@ class Joints:
         stress = self.traction[:, 0]
         return self.virgin("stiffness", "stress", stress) * (stress > 0)
 
-    def curve(self, contact: Identity) -> dict[str, np.ndarray]:
-        """The virgin curve of a contact's joint."""
-        return self.curves[self.choose(contact[0])]
-
     def renew(self, contact: Identity) -> None:
         """Make the joint of a contact virgin again."""
         pool = self.pools[self.choose(contact[0])]

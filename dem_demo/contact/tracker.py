@@ -55,8 +55,8 @@ class Tracker:
 
     def __init__(self, scene: Scene, motion: np.ndarray) -> None:
         blocks = scene.blocks
-        self.law_of, self.skin = scene.law_of, scene.skin
-        self.outlines = Outlines(blocks, scene.corner_length, 0.25 * self.skin)
+        self.law_of, self.skin = scene.law_of, scene.run.skin
+        self.outlines = Outlines(blocks, scene.run.corner_length, 0.25 * self.skin)
         sizes = np.array([len(block.corners) for block in blocks])
         place = np.arange(sizes.max())
         self._corners = np.where(place < sizes[:, None], self.outlines.start[:, None] + place, -1)
@@ -79,10 +79,6 @@ class Tracker:
     def closure(self) -> np.ndarray:
         """Closure (k,) that the joints see: the depth less the closure offset."""
         return self.contacts.closure - np.where(self.contacts.closure > 0, self.offset, 0.0)
-
-    def reopen(self) -> None:
-        """Drop the offset of corners that have opened: another part of them touches next."""
-        self.offset = np.where(self.contacts.closure <= 0, 0.0, self.offset)
 
     def stale(self, motion: np.ndarray) -> bool:
         """Has a block moved or turned so far that a corner could be missing?"""

@@ -35,9 +35,9 @@ class Blocks:
 
     def __init__(self, scene: Scene) -> None:
         blocks = scene.blocks
-        self.names, self.skin = [block.name for block in blocks], scene.skin
-        mass = np.array([scene.thickness * block.mass for block in blocks])
-        moment = np.array([scene.thickness * block.moment for block in blocks])
+        self.names, self.skin = [block.name for block in blocks], scene.run.skin
+        mass = np.array([scene.thickness * block.section.mass for block in blocks])
+        moment = np.array([scene.thickness * block.section.moment for block in blocks])
         self.inertia = np.stack([mass, mass, moment], axis=1)
         self.mobile = np.array([[not block.fixed] * 3 for block in blocks])
         self.drives = Drives(scene.drives)
@@ -124,10 +124,11 @@ class Blocks:
             if body.body_type == pymunk.Body.DYNAMIC:
                 body.velocity, body.angular_velocity = (u, v), spin
 
-    def reduced_mass(self, contacts: Contacts) -> np.ndarray:
-        """Reduced mass (k,) of the two blocks of every contact, which carries half of a joint."""
+    def damping(self, contacts: Contacts, stiffness: np.ndarray) -> np.ndarray:
+        """Critical damping (k,) in N s/m: 2 sqrt(stiffness times reduced mass of the two blocks);
+        stiffness in N/m. Each block carries half of a joint."""
         light = self._lightness[contacts.a] + self._lightness[contacts.b]
-        return 0.5 / np.where(light > 0, light, np.inf)
+        return 2.0 * np.sqrt(stiffness * (0.5 / np.where(light > 0, light, np.inf)))
 
     def require_slow(self, dt: float) -> None:
         """Refuse blocks that move too far in a step of dt (s) to find their contacts."""

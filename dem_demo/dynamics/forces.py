@@ -7,11 +7,6 @@ from ..scene import Scene
 from .blocks import Blocks
 
 
-def damping(blocks: Blocks, contacts: Contacts, stiffness: np.ndarray) -> np.ndarray:
-    """Critical damping (k,) in N s/m: 2 sqrt(stiffness times reduced mass); stiffness in N/m."""
-    return 2.0 * np.sqrt(stiffness * blocks.reduced_mass(contacts))
-
-
 def forces(
     scene: Scene, blocks: Blocks, contacts: Contacts, joints: Joints, velocity, dt: float
 ) -> np.ndarray:
@@ -42,7 +37,7 @@ def forces(
 def _dashpots(scene, blocks, contacts, joints, area, pressed) -> tuple[np.ndarray, np.ndarray]:
     """Forces (k,) of the dashpots along normal and tangent (N); never a pull."""
     run = scene.run
-    critical = damping(blocks, contacts, joints.stiffness * area)
+    critical = blocks.damping(contacts, joints.stiffness * area)
     push = np.maximum(-run.dashpot_normal * critical * contacts.opening, -pressed)
     if not run.dashpot_shear:
         return push, np.zeros(len(push))

@@ -104,11 +104,12 @@ class Simulation:
         3. Tractions, dashpots, weight and drives make forces.
         4. Check the time step if a joint has stiffened, send back drives, book the energies.
         """
-        scene, blocks, joints, dt = self.scene, self.blocks, self.joints, self.dt
+        scene, blocks, tracker, joints = self.scene, self.blocks, self.tracker, self.joints
+        dt = self.dt
         blocks.require_slow(dt)
         self._follow()
-        self.tracker.require_shallow()
-        joints.update(self.tracker.closure, self.contacts.sliding * dt, scene.run.law_steps)
+        tracker.require_shallow()
+        joints.update(tracker.closure, self.contacts.sliding * dt, scene.run.law_steps)
         self.n += 1
         velocity = blocks.drives.velocity(self.time, dt, self.reversed_at)
         force = forces(scene, blocks, self.contacts, joints, velocity, dt)
@@ -117,7 +118,8 @@ class Simulation:
             self.limit.look(scene, blocks, self.contacts, joints)
             self.limit.require(dt)
         self.ledger.book(blocks, joints, force, dt, area)
-        self.tracker.reopen()
+        # Where a corner has opened another part of it touches next, with its whole depth.
+        tracker.offset = np.where(self.contacts.closure <= 0, 0.0, tracker.offset)
         if self.n % LOOKS == 0:
             self.reversed_at = blocks.drives.reverse(self.time, self.reversed_at, self.slid)
         return force[0]
@@ -154,7 +156,7 @@ class Simulation:
             kept = stored[i]
             if ratio[i] > 1:
                 who = tracker.identities[i]
-                curve = joints.curve(who)
+                curve = joints.curves[joints.choose(who[0])]
                 anew = np.interp(held[i] / length[i], curve["work"], curve["closure"])
                 anew = min(anew, closure[i])
                 tracker.offset[i] += closure[i] - anew

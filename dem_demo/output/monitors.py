@@ -20,7 +20,7 @@ Slips = dict[tuple[int, int], dict]  # by the moving block and its base
 def watched_slips(sim: Simulation) -> Slips:
     """What is known at the start of the slips that the scene's [watch] table names."""
     slips, scene = {}, sim.scene
-    for moving, base in scene.monitors.slip:
+    for moving, base in scene.slip:
         name = law_between(sim, moving, base)
         distance = slip_distance(scene.laws[name])
         length = float(sim.contacts.length[sim.tracker.between(moving, base)].sum())
@@ -74,11 +74,11 @@ def _face(sim: Simulation, block: int, other: int) -> tuple[int, np.ndarray]:
 def readings(sim: Simulation) -> dict[str, float]:
     """What the scene's [watch] table asks for, now; the unit ends the name."""
     row, blocks = {}, sim.scene.blocks
-    for moving, base in (*sim.scene.monitors.slip, *sim.scene.monitors.shear):
+    for moving, base in (*sim.scene.slip, *sim.scene.shear):
         name = blocks[moving].name
         row[f"{name}: base angle_deg"] = base_angle(sim, moving, base)
         row |= {f"{name}: {key}": value for key, value in _joint(sim, moving, base).items()}
-    for i, (block, point) in enumerate(sim.scene.monitors.pins):
+    for i, (block, point) in enumerate(sim.scene.pins):
         x, y, angle = sim.blocks.motion[:3, block]
         arm = np.asarray(point) - blocks[block].centroid
         row[f"pin {i + 1}: moved_m"] = float(np.hypot(*(turn(angle) @ arm + [x, y] - point)))
@@ -115,7 +115,7 @@ def slip_angle(scene: Scene, law_name: str, moving: int, length: float) -> dict:
     The normal stress falls as the base tilts, so angle and stress are found together. Both are None
     where the law says nothing: no contact, no gravity, a stress that it cannot carry.
     """
-    weight, angle = scene.blocks[moving].mass * np.hypot(*scene.gravity), 35.0
+    weight, angle = scene.blocks[moving].section.mass * np.hypot(*scene.gravity), 35.0
     for _ in range(ROUNDS if length > 0 else 0):
         before, stress = angle, float(weight / length * np.cos(np.radians(angle)))
         try:

@@ -17,7 +17,10 @@ from .monitors import shear_curve
 from .record import CREEP, Record, sentences
 
 FIXED, DRIVEN, FREE = "#8d8d8d", "#b9b4a7", "#efe9dc"
-STATES = {"stuck": "#3a3a3a", "partly sliding": "#e69f00", "sliding": "#d81b1b", "open": "#1f9ed1"}
+STATES = {  # of a joint: colour and line
+    "stuck": ("#3a3a3a", "-"), "partly sliding": ("#e69f00", "-"), "sliding": ("#d81b1b", "-"),
+    "open": ("#1f9ed1", "--"),
+}  # fmt: skip
 PARTIAL, FULL = 0.05, 0.9  # shares of the shear capacity in sliding that divide the states
 FRAMES, RATE, DPI = 60, 11, 75  # of an animation: most frames, frames per second
 FEW = 12  # blocks: most that bear their names
@@ -69,12 +72,12 @@ class Pictures:
         wide, high = self.high - self.low
         across = min(8.2, 6.0 * wide / high)
         figure = Figure(figsize=(max(across + 1.0, 8.5), across * high / wide + 1.8))
-        marks = [Line2D([], [], color=colour, ls=_line(name), label=f"joint {name}", lw=2.0)
-                 for name, colour in STATES.items()]  # fmt: skip
+        marks = [Line2D([], [], color=colour, ls=line, label=f"joint {name}", lw=2.0)
+                 for name, (colour, line) in STATES.items()]  # fmt: skip
         for share in (0.25, 1.0):
             stress = float(f"{share * self.stress:.1g}")
             label, width = f"normal stress {1e-3 * stress:g} kPa", self._width(stress)
-            marks.append(Line2D([], [], color=STATES["stuck"], lw=width, label=label))
+            marks.append(Line2D([], [], color=STATES["stuck"][0], lw=width, label=label))
         marks.append(Line2D([], [], color="0.6", ls=":", lw=0.9, label="place at the start"))
         figure.legend(handles=marks, loc="outside lower center", ncols=4, frameon=False)
         return figure, figure.add_subplot()
@@ -95,13 +98,13 @@ class Pictures:
                 axes.text(*shape.mean(axis=0), block.name, ha="center", va="center")
         ends, state = record.joints[i]["ends"], self.states(i)
         widths = self._width(record.joint(i, "normal_stress_Pa"))
-        for name, colour in STATES.items():
+        for name, (colour, line) in STATES.items():
             here = state == name
-            lines = {"colors": colour, "linewidths": widths[here], "linestyles": _line(name)}
+            lines = {"colors": colour, "linewidths": widths[here], "linestyles": line}
             axes.add_collection(LineCollection(ends[here], zorder=3, **lines))
         axes.set(xlim=(self.low[0], self.high[0]), xlabel="x (m)", aspect="equal")
         axes.set(ylim=(self.low[1], self.high[1]), ylabel="y (m)")
-        axes.figure.suptitle(f"{record.scene.title}\n{caption(record, i)}{note}")
+        axes.figure.suptitle(f"{record.scene.title}\nt = {record.times[i]:.2f} s{note}")
 
     @style()
     def final(self, path: Path) -> None:
@@ -129,27 +132,12 @@ class Pictures:
         return 0.9 + 3.5 * np.clip(np.asarray(stress) / self.stress, 0, 1.2)
 
 
-def _line(state: str) -> str:
-    return "--" if state == "open" else "-"
-
-
-def caption(record: Record, i: int) -> str:
-    """Time and what is monitored, for the title of a frame."""
-    parts, row = [f"t = {record.times[i]:.2f} s"], record.monitored[i]
-    for moving, _ in record.laws:
-        name = record.scene.blocks[moving].name
-        slid, angle = round(1e3 * row[f"{name}: slid_m"], 2) + 0.0, row[f"{name}: base angle_deg"]
-        tau = 1e-3 * row[f"{name}: shear_Pa"]
-        parts.append(f"{name}: slid {slid:.2f} mm, shear {tau:.1f} kPa, base at {angle:.2f}°")
-    return "; ".join(parts)
-
-
 @style()
 def curves(record: Record, path: Path) -> None:
     """Stress and dilation of the sheared joints against sliding, and of the law alone."""
     figure = Figure(figsize=(8, 7))
     upper, lower = figure.subplots(2, sharex=True)
-    for moving, base in record.scene.monitors.shear:
+    for moving, base in record.scene.shear:
         name = record.scene.blocks[moving].name
         keys = ("slid_m", "closure_m", "normal_Pa", "shear_Pa")
         slid, closure, stress, tau = (record.column(f"{name}: {key}") for key in keys)

@@ -30,7 +30,7 @@ class Record:
 
     def __init__(self, sim: Simulation) -> None:
         self.scene, self.slips = sim.scene, watched_slips(sim)
-        watched = (*sim.scene.monitors.slip, *sim.scene.monitors.shear)
+        watched = (*sim.scene.slip, *sim.scene.shear)
         self.laws = {pair: law_between(sim, *pair) for pair in watched}
         self.times: list[float] = []
         self.motion: list[np.ndarray] = []
@@ -167,13 +167,8 @@ def sentences(record: Record) -> list[str]:
 
 def sentence(entry: dict) -> str:
     """One line for a person."""
-    start = f"{entry['rock']}: {entry['state']}; "
-    if entry["failed"]:
-        many = f"{entry['failed']} of {entry['blocks']} blocks moved more than "
-        many += f"{entry['failed_beyond_m']:.2g} m"
-        return f"{start}{many}, the farthest {entry['moved_m']:.2f} m"
-    moved = max(1e3 * entry["moved_m"], 1e-3)
     return (
-        f"{start}no block of {entry['blocks']} moved more than {moved:.2g} mm, "
+        f"{entry['rock']}: {entry['state']}; {entry['failed']} of {entry['blocks']} blocks moved "
+        f"more than {entry['failed_beyond_m']:.2g} m, the farthest {entry['moved_m']:.2g} m; "
         f"creep {entry['creep_m_per_s']:.1e} m/s"
     )

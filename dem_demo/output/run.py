@@ -1,8 +1,6 @@
 """Run a scene to its end and write what a user wants to see."""
 
-import signal
 import sys
-import threading
 import time
 from collections.abc import Callable
 from functools import partial
@@ -11,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from jointlaw.support.files import clear_run, replace_file, write_json
+from jointlaw.support.files import clear_run, write_json
 from jointlaw.support.pyplot import FORMATS
 
 from ..dynamics.energy import COLUMNS
@@ -35,9 +33,9 @@ def run(
     """Run to `until` (s, default the scene's end); writes into `folder` if given.
 
     pictures: their format, None for none; vtk: VTK files too, which needs meshio.
-    Returns (record, summary). A state that the method cannot carry raises Refused and leaves the
-    last good one in `folder`/refused, from where the run can be repeated or resumed. Ctrl-C stops
-    it after a step, writes what there is and raises KeyboardInterrupt. Results of another run in
+    Returns (record, summary). A state that the method cannot carry raises Refused, Ctrl-C raises
+    KeyboardInterrupt; before, all is written up to the last frame, and the state of then into
+    `folder`/refused or `folder`/state, from where the run can be resumed. Results of another run in
     `folder` are replaced whole. Raises ValueError, before the first step, for an `until` that
     cannot be reached and for a scene that cannot be saved.
     """
@@ -46,45 +44,41 @@ def run(
         require_text(sim.scene)
         folder.mkdir(parents=True, exist_ok=True)
     started, first_step, record = time.perf_counter(), sim.n, Record(sim)
-    interrupted = False
+    stopped: BaseException | None = None
     try:
         play(sim, record, until)
-    except KeyboardInterrupt:
-        interrupted = True
-    except Refused as trouble:
-        if not folder:
-            raise
-        clear_run(folder)
-        sim.save(folder / "refused", record.state)
-        replace_file(folder / "refused" / "why.txt", f"{trouble}\n".encode())
-        write(record, {"version": VERSION, "refused": str(trouble)}, folder, None, vtk)
-        told = f"{trouble}\nThe last good state is in {folder / 'refused'}"
-        raise Refused(told) from None
+    except (Refused, KeyboardInterrupt) as error:
+        stopped = error
     summary = {
         "version": VERSION,
         "scene": sim.scene.title,
-        "model_time_s": sim.time,
-        "steps": sim.n - first_step,
+        "model_time_s": record.times[-1],
+        "steps": int(record.state["n"]) - first_step,
         "time_step_s": sim.dt,
         "step_limit_s": sim.limit.least,
         "time_step_margin": sim.limit.least / sim.dt,
         "started_in_equilibrium": bool(sim.balanced),
         "law_points": sim.joints.n,
-        "energy_J": {c: sim.ledger.value[c] for c in COLUMNS},
-        "energy_error": sim.ledger.error,
+        "energy_J": dict(zip(COLUMNS, record.energy[-1][:-1], strict=True)),
+        "energy_error": record.energy[-1][-1],
         "largest_energy_error": record.largest_error,
         "slip": list(record.slips.values()),
         "rocks": outcomes(record),
         "wall_time_s": time.perf_counter() - started,
-        "interrupted": interrupted,
+        "stopped": stopped and (str(stopped) or "interrupted"),
     }
+    told = summary["stopped"]
     if folder:
+        place = folder / ("refused" if isinstance(stopped, Refused) else "state")
         clear_run(folder)
-        sim.save(folder / "state")
+        sim.save(place, record.state)
         write(record, summary, folder, pictures, vtk)
-    if interrupted:
-        where = f"; go on: python -m dem_demo resume {folder / 'state'} --out NEW" if folder else ""
-        raise KeyboardInterrupt(f"interrupted at {sim.time:.4g} s of model time{where}")
+        told = (
+            f"{summary['stopped']}; go on from {record.times[-1]:.4g} s of model time: "
+            f"python -m dem_demo resume {place} --out NEW"
+        )
+    if stopped:
+        raise type(stopped)(told) from None
     return record, summary
 
 
@@ -94,34 +88,17 @@ def play(
     until: float | None = None,
     stop: Callable[[Record], bool] = lambda record: False,
 ) -> None:
-    """Step to `until` (s), or to where `stop` says so, and record on the way. Raises Refused.
-
-    After Ctrl-C the present is the last frame and KeyboardInterrupt is raised; a second Ctrl-C ends
-    the process at once.
-    """
+    """Step to `until` (s), or to where `stop` says so, and record on the way. Raises Refused."""
     steps = steps_to(sim, until)
     every = max(round(min(sim.scene.run.record / sim.dt, steps + 1)), 1)
-    main, pressed = threading.current_thread() is threading.main_thread(), []
-
-    def note(number, _frame) -> None:  # pymunk's callbacks would swallow a KeyboardInterrupt
-        signal.signal(number, signal.SIG_DFL)
-        pressed.append(number)
-
-    before = signal.signal(signal.SIGINT, note) if main else None
-    try:
-        for i in tqdm(range(1, steps + 1), desc=sim.scene.title, disable=not sys.stderr.isatty()):
-            sim.step()
-            if i % LOOKS == 0:
-                look(record.slips, sim)
-            if i % every == 0 or i == steps or pressed:
-                record.take(sim)
-                if pressed:
-                    raise KeyboardInterrupt
-                if stop(record):
-                    break
-    finally:
-        if main:
-            signal.signal(signal.SIGINT, before)
+    for i in tqdm(range(1, steps + 1), desc=sim.scene.title, disable=not sys.stderr.isatty()):
+        sim.step()
+        if i % LOOKS == 0:
+            look(record.slips, sim)
+        if i % every == 0 or i == steps:
+            record.take(sim)
+            if stop(record):
+                break
 
 
 def steps_to(sim: Simulation, until: float | None = None) -> int:
@@ -146,7 +123,7 @@ def write(record: Record, summary: dict, folder: Path, drawn: str | None, vtk: b
     if drawn:
         of = Pictures(record)
         pictures = {f"final.{drawn}": of.final, "motion.gif": of.animation}
-        if record.scene.monitors.shear:
+        if record.scene.shear:
             pictures[f"curves.{drawn}"] = partial(curves, record)
     write_json(folder / "summary.json", {**summary, "files": [*TABLES, *pictures]})
     record.write(folder)

@@ -99,7 +99,7 @@ def _split(piece: Polygon, normal: np.ndarray, offset: float) -> list[Polygon]:
 
 
 def _convex_parts(piece: Polygon, sets, lines, tiny) -> list[Polygon]:
-    if _width(piece) < tiny:
+    if smallest_width(np.array(piece.exterior.coords)) < tiny:
         return []
     corners = _corners(piece, tiny)
     inward = corners[_bends(corners) < 0]
@@ -117,7 +117,7 @@ def _convex_parts(piece: Polygon, sets, lines, tiny) -> list[Polygon]:
 def _without_slivers(pieces: list[Polygon], lines, least: float, tiny: float):
     """Join or drop what is narrower than `least`, the narrowest first."""
     pieces, joined, dropped = list(pieces), 0, []
-    widths = [_width(piece) for piece in pieces]
+    widths = [smallest_width(np.array(piece.exterior.coords)) for piece in pieces]
     while pieces and min(widths) < least:
         i = int(np.argmin(widths))
         sliver = pieces.pop(i)
@@ -125,7 +125,7 @@ def _without_slivers(pieces: list[Polygon], lines, least: float, tiny: float):
         for j in _neighbours(sliver, pieces, lines, tiny):
             whole = sliver.union(pieces[j]).convex_hull
             if whole.area - sliver.area - pieces[j].area < tiny * whole.length:
-                pieces[j], widths[j] = whole, _width(whole)
+                pieces[j], widths[j] = whole, smallest_width(np.array(whole.exterior.coords))
                 joined += 1
                 break
         else:
@@ -142,10 +142,6 @@ def _neighbours(sliver: Polygon, pieces: list[Polygon], lines, tiny: float) -> l
         shared = [side.intersection(piece.exterior).length for piece in pieces]
         found += [(int(number), part, j) for j, part in enumerate(shared) if part > 10 * tiny]
     return [j for *_, j in sorted(found, reverse=True)]
-
-
-def _width(piece: Polygon) -> float:
-    return smallest_width(np.array(piece.exterior.coords)[:-1])
 
 
 def _corners(piece: Polygon, tiny: float) -> np.ndarray:

@@ -1,8 +1,8 @@
 """Prescribed motions: a base that tilts, a machine that shears, an earthquake that shakes."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
@@ -18,7 +18,7 @@ TITLES = {"time_s,velocity_m/s": 1, "time_s,acceleration_m/s2": 2}
 SAMPLES = 40  # of a sine, per cycle
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Drive:
     """Motion of one block along "x" or "y" (m) or "turn" (rad) about its centroid.
 
@@ -39,32 +39,33 @@ class Drive:
 
     @cached_property
     def path(self) -> BSpline:
-        """Displacement (m) over the time (s), where `order` is 1 or 2."""
-        return make_interp_spline(self.times, self.values, k=1).antiderivative(self.order)
+        """Displacement (m or rad) over the time (s)."""
+        if not self.ease:
+            return make_interp_spline(self.times, self.values, k=1).antiderivative(self.order)
+        corners = np.union1d(self.times, np.add(self.times, self.ease))
+        now, before = (np.interp(corners - s, self.times, self.values) for s in (0.0, self.ease))
+        return make_interp_spline(corners, (now - before) / self.ease, k=1).antiderivative()
 
     def __call__(self, t: float, reversed_at: float = np.inf) -> float:
         """Prescribed displacement at time t, when it was sent back at `reversed_at`."""
-        if self.order:
-            at = np.clip(t, self.times[0], self.times[-1])
-            return float(self.path(at) + max(t - at, 0.0) * self.path(at, nu=1))
-        times, values = self._line(reversed_at)
-        if self.ease == 0:
-            return float(np.interp(t, times, values))
-        low = t - self.ease
-        knots = np.array([low, *(s for s in times if low < s < t), t])
-        return float(np.trapezoid(np.interp(knots, times, values), knots) / self.ease)
+        if np.isfinite(reversed_at):
+            return _sent_back(self, reversed_at)(t)
+        path = self.path
+        at = np.clip(t, path.t[0], path.t[-1])
+        goes_on = (t - at) * path(at, nu=1) if self.order else 0.0
+        return float(path(at) + goes_on)
 
-    def _line(self, reversed_at: float) -> tuple[Sequence[float], Sequence[float]]:
-        """Times (s) and displacements, straight between them."""
-        if self.back is None or np.isinf(reversed_at):
-            return self.times, self.values
-        n = int(np.searchsorted(self.times, reversed_at))
-        ways = np.sign(np.diff(self.values[: n + 1]))
-        way = ways[ways != 0][-1] if ways.any() else 1.0
-        here = float(np.interp(reversed_at, self.times, self.values))
-        by, rate = self.back["by"], self.back["rate"]
-        times = *self.times[:n], reversed_at, reversed_at + by / rate
-        return times, (*self.values[:n], here, here - way * by)
+
+@cache
+def _sent_back(drive: Drive, at: float) -> Drive:
+    """A drive that was told at time `at` to go back."""
+    n = int(np.searchsorted(drive.times, at))
+    ways = np.sign(np.diff(drive.values[: n + 1]))
+    way = ways[ways != 0][-1] if ways.any() else 1.0
+    here = float(np.interp(at, drive.times, drive.values))
+    by, rate = drive.back["by"], drive.back["rate"]
+    values = *drive.values[:n], here, here - way * by
+    return replace(drive, times=(*drive.times[:n], at, at + by / rate), values=values)
 
 
 class Drives:

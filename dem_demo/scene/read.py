@@ -1,6 +1,5 @@
 """Reads scenes: TOML files, or their text, checked."""
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -17,33 +16,33 @@ from .cutting import JointSet, cut
 from .drives import read_drives
 from .keys import LIST, SCENE, TABLE, Tables, overlay, some_of, vector
 from .laws import Files, build_law
-from .scene import Monitors, Rock, Run, Scene
+from .scene import Rock, Run, Scene
 
 SCENES = Path(__file__).parent / "scenes"
 TEMPLATE = Path(__file__).parent / "template.toml"
 GRAVITY, DENSITY = (0.0, -9.81), 2600.0  # m/s2, kg/m3
+SKIN, CORNER = 0.02, 0.1  # of the least width of a block
 LEAST = 0.2  # narrowest block of a rock as a share of the smallest spacing
 
 
-def names() -> list[str]:
-    """Scenes that come with the package: SCENE, and SCENE-VARIANT for each of its variants."""
-    found = []
-    for path in SCENES.glob("*.toml"):
-        variants = tomllib.loads(path.read_text(encoding="utf-8")).get("variants", {})
-        found += [path.stem, *(f"{path.stem}-{variant}" for variant in variants)]
-    return sorted(found)
+def shipped() -> dict[str, tuple[Path, str]]:
+    """Scenes that come with the package: SCENE, and SCENE-VARIANT for each of its variants.
+
+    By name: the file, and the line that chooses the variant.
+    """
+    found = {}
+    for path in sorted(SCENES.glob("*.toml")):
+        found[path.stem] = path, ""
+        for variant in keys.read(path).get("variants", {}):
+            found[f"{path.stem}-{variant}"] = path, f'variant = "{variant}"\n'
+    return found
 
 
 def load(source: str | Path) -> Scene:
     """A scene by name, or from a TOML file. Raises ValueError."""
-    path, chosen = Path(source), ""
-    if isinstance(source, str) and source in names():
-        path = SCENES / f"{source}.toml"
-        if not path.is_file():
-            stem, _, variant = source.rpartition("-")
-            path, chosen = SCENES / f"{stem}.toml", f'variant = "{variant}"\n'
+    path, chosen = shipped().get(source, (Path(source), ""))
     if not path.is_file():
-        known = remedy(source, names(), "give a TOML file or one of")
+        known = remedy(source, shipped(), "give a TOML file or one of")
         raise ValueError(f"no scene {str(source)!r}: {known}")
     try:
         return parse(chosen + path.read_text(encoding="utf-8"), path.name, Files(path.parent))
@@ -95,7 +94,8 @@ def build(data: Tables, where: str = "scene", files: Files | None = None) -> Sce
             for name, table in top["laws"].items()}  # fmt: skip
     density = top.get("density", DENSITY)
     blocks = [_block(table, density, where) for table in top.get("block", ())]
-    rocks = [_rock(table, blocks, density, where) for table in top.get("rock", ())]
+    edge_laws: dict[tuple[int, int], str] = {}
+    rocks = [_rock(table, blocks, edge_laws, density, where) for table in top.get("rock", ())]
     number = {block.name: i for i, block in enumerate(blocks)}
     if len(number) < len(blocks):
         raise ValueError(f"{where}: two blocks have the same name; names must differ")
@@ -103,15 +103,16 @@ def build(data: Tables, where: str = "scene", files: Files | None = None) -> Sce
         raise ValueError(f"{where}: no block can move; give [[block]] or [[rock]], not all fixed")
     drives = read_drives(top.get("drive", ()), number, blocks, files, where)
     pairs = _pairs(top.get("joint", ()), number, blocks, where)
-    monitors = _monitors(top.get("watch", {}), number, blocks, f"{where}: watch")
-    edge_laws = {edge: law for rock in rocks for edge, law in rock.laws.items()}
+    watched = _watched(top.get("watch", {}), number, blocks, f"{where}: watch")
+    least = min(block.width for block in blocks)
+    run = Run(**{"skin": SKIN * least, "corner_length": CORNER * least, **top["run"]})
     default = top.get("law", next(iter(laws), ""))
     for law in [default, *pairs.values(), *edge_laws.values()]:
         one_of(f"{where}: law", law, tuple(laws))
     scene = Scene(
-        top.get("title", where), tuple(blocks), laws, Run(**top["run"]), default, pairs,
+        top.get("title", where), tuple(blocks), laws, run, default, pairs,
         tuple(rocks), edge_laws, drives, top.get("gravity", GRAVITY), top.get("thickness", 1.0),
-        monitors,
+        **watched,
     )  # fmt: skip
     object.__setattr__(scene, "files", files)
     return scene
@@ -153,9 +154,9 @@ def _block_at(name: str, point: tuple[float, float], blocks: Sequence[Block]) ->
     raise ValueError(f"{name} = {list(point)}: must lie inside a block that can move")
 
 
-def _monitors(
+def _watched(
     table: Tables, number: dict[str, int], blocks: Sequence[Block], where: str
-) -> Monitors:
+) -> dict[str, tuple[Any, ...]]:
     watched: dict[str, tuple[Any, ...]] = {}
     for kind in ("slip", "shear"):
         pairs = [some_of(f"{where}.{kind}", pair, number, 2) for pair in table.get(kind, ())]
@@ -165,11 +166,13 @@ def _monitors(
         raise ValueError(f"{where}: slip and shear watch one block on two bases; name one")
     points = [vector(f"{where}.pins", point) for point in table.get("pins", ())]
     pins = tuple((_block_at(f"{where}.pins", point, blocks), point) for point in points)
-    return Monitors(**watched, pins=pins)
+    return watched | {"pins": pins}
 
 
-def _rock(table: Tables, blocks: list[Block], density: float, where: str) -> Rock:
-    """Cut a rock, and add its blocks to those of the scene."""
+def _rock(
+    table: Tables, blocks: list[Block], laws: dict[tuple[int, int], str], density: float, where: str
+) -> Rock:
+    """Cut a rock, and add its blocks and the laws of their edges to those of the scene."""
     name = table["name"]
     where = f"{where}: rock[{name!r}]"
     sets = [JointSet(**part) for part in table["set"]]
@@ -182,7 +185,7 @@ def _rock(table: Tables, blocks: list[Block], density: float, where: str) -> Roc
         shapes, numbers, joined, dropped = cut(table["outline"], sets, table.get("seed", 0), least)
     except ValueError as error:
         raise ValueError(f"{where}.outline: {error}") from None
-    first, laws = len(blocks), {}
+    first = len(blocks)
     for i, (shape, of) in enumerate(zip(shapes, numbers, strict=True)):
         block = Block(f"{name} {i + 1}", shape + shift, table.get("density", density))
         stays = any(region.contains(Point(block.centroid - shift)) for region in fixed)
@@ -196,4 +199,4 @@ def _rock(table: Tables, blocks: list[Block], density: float, where: str) -> Roc
     free = [i for i in range(first, len(blocks)) if not blocks[i].fixed]
     if not free:
         raise ValueError(f"{where}.fixed: all blocks of the rock are fixed")
-    return Rock(name, range(first, len(blocks)), free, laws, slivers)
+    return Rock(name, range(first, len(blocks)), free, slivers)

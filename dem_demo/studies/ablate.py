@@ -155,7 +155,7 @@ def _outcome(record: Record, summary: dict) -> dict[str, Any]:
     found = {f"{slip['block']}, slips at_deg": slip["slip_angle"] for slip in summary["slip"]}
     last = record.monitored[-1].items()
     found |= {f"last {key}": value for key, value in last if not key.endswith("_deg")}
-    for moving, _ in record.scene.monitors.shear:
+    for moving, _ in record.scene.shear:
         name = record.scene.blocks[moving].name
         normal, shear = (record.column(f"{name}: {key}_Pa") for key in ("normal", "shear"))
         angle = np.degrees(np.arctan2(np.abs(shear), normal))

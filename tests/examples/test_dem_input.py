@@ -68,7 +68,11 @@ TWICE = '[[joint]]\nbetween = ["base", "top"]\nlaw = "plain"\n[watch]'
         ("[laws.plain]", "[laws]\nx = 1\n[laws.plain]", "laws.x = 1: must be a table"),
         ("mu = 0.4", "mu = -0.4", "mu"),
         ("critical_slip = 2e-3", "closure_only = true", "closure_only = true: .* leave it out"),
-        ('kind = "coulomb"', 'kind = "glue"', "kind = 'glue' is unknown; choose one of joint, coulomb"),
+        (
+            'kind = "coulomb"',
+            'kind = "glue"',
+            "kind = 'glue' is unknown; choose one of joint, coulomb",
+        ),
         ("friction = 0.3", "friction = -0.3", "friction = -0.3 .* must be >= 0"),
         ("friction = 0.3", "friction = true", "friction = True is not a number"),
         ('law = "rock"', 'law = "rocks"', "law = 'rocks' is unknown; did you mean 'rock'"),
@@ -199,15 +203,13 @@ def test_an_angle_that_is_not_found_is_given_up(monkeypatch):
 
 def test_a_rock_alone_keeps_its_joints():
     """Those that name its blocks only with its own seed: with another there are other blocks."""
-    data = tomllib.loads((SCENES / "slope.toml").read_text())
-    name, law = data["rock"][0]["name"], "rough"
-    mine = {"between": [f"{name} 1", f"{name} 2"], "law": law}
-    beside = {"between": ["wall", f"{name} 1"], "law": law}
-    data["block"] = [{"name": "wall"}]
-    data["joint"] = [mine, {"between": ["x 1", "x 2"], "law": law}, beside]
-    assert alone(data, name)["joint"] == [mine, beside]
-    assert alone(data, name, 1)["joint"] == [mine, beside]
-    assert alone(data, name, 2)["joint"] == []
+    joint = '[[joint]]\nlaw = "rough"\nbetween = ["{}", "{}"]\n'
+    pairs = [("rough 1", "rough 2"), ("smooth 1", "smooth 2"), ("wall", "rough 1")]
+    wall = '[[block]]\nname = "wall"\nbox = [1.0, 1.0]\nat = [-50.0, 0.0]\n'
+    text = (SCENES / "slope.toml").read_text()
+    scene = parse(text + wall + "".join(joint.format(*pair) for pair in pairs))
+    for seed, kept in ((None, {(1, 2), (0, 1)}), (2, set())):
+        assert {tuple(sorted(pair)) for pair in alone(scene, "rough", seed).pairs} == kept
 
 
 def test_a_missing_package_is_told_in_one_line(tmp_path):

@@ -1,12 +1,13 @@
 """Rock masses: the scenes end as intended, the template runs, wrong tables are refused."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
 from dem_demo import Simulation, load, parse, run
 from dem_demo.cli import main
-from dem_demo.scene import TEMPLATE, Files, read_tables
+from dem_demo.scene import TEMPLATE, read_tables
 from dem_demo.studies.compare import _plain
 from dem_demo.studies.strength import alone, critical_tilt
 
@@ -50,10 +51,9 @@ def test_dilation_is_what_holds_the_rough_slope():
     Half a degree for blocks that the cutting leaves interlocked or loose; the rough joints bear
     20 degrees more.
     """
-    data, files = read_tables(load("slope").text), Files()
-    own = alone(data, "rough", 2)
-    laws = {name: _plain(table, own, files) for name, table in own["laws"].items()}
-    rough, plain = critical_tilt(own, files), critical_tilt({**own, "laws": laws}, files)
+    own = alone(load("slope"), "rough", 2)
+    laws = {name: _plain(own, law) for name, law in own.laws.items()}
+    rough, plain = critical_tilt(own), critical_tilt(replace(own, laws=laws))
     assert 36 + plain == pytest.approx(21.8, abs=0.5)
     assert rough - plain > 20
 
@@ -129,8 +129,7 @@ def test_joints_have_the_law_of_their_set():
     assert (
         scene.law_of((0, 0, block, 0)) == scene.law_of((block, 1, len(scene.blocks), 0)) == "plain"
     )
-    (rock,) = scene.rocks
-    edges = list(rock.laws.items())
+    edges = list(scene.edge_laws.items())
     for (one, i), law in edges:
         for (other, j), another in edges:
             if block not in (one, other):

@@ -32,7 +32,7 @@ def test_a_regular_grid_is_exact():
 @pytest.mark.parametrize("seed", range(6))
 def test_blocks_are_convex_wide_enough_and_fill_the_rock(seed):
     """Nothing is lost but what is reported, nothing overlaps; the toe bends inwards."""
-    blocks, sets_of, joined, dropped = cut(SLOPE, [FLAT, STEEP], seed, least_width=0.25)
+    blocks, _sets_of, _joined, dropped = cut(SLOPE, [FLAT, STEEP], seed, least_width=0.25)
     shapes = [Polygon(block) for block in blocks]
     assert all(check_convex(block) is None for block in blocks)
     lost = sum(dropped)
@@ -48,7 +48,7 @@ def test_blocks_are_convex_wide_enough_and_fill_the_rock(seed):
 
 
 def test_edges_know_their_joint_set():
-    blocks, sets_of, joined, dropped = cut(SLOPE, [FLAT, STEEP], seed=3, least_width=0.25)
+    blocks, sets_of, _joined, _dropped = cut(SLOPE, [FLAT, STEEP], seed=3, least_width=0.25)
     seen = set()
     for block, of in zip(blocks, sets_of, strict=True):
         edge = np.roll(block, -1, axis=0) - block
@@ -65,7 +65,7 @@ def test_persistence_is_the_share_of_length_that_is_a_joint():
     """Vertical joints between 40 beds: 40 x 79 pieces of equal length, each there or not."""
     outline = SQUARE * [8.0, 4.0]
     sets = [JointSet(0.0, 1.0, "bed"), JointSet(90.0, 1.0, "cross", persistence=0.3)]
-    blocks, sets_of, joined, dropped = cut(outline, sets, seed=5, least_width=0.1)
+    blocks, _sets_of, _joined, _dropped = cut(outline, sets, seed=5, least_width=0.1)
     share = (len(blocks) - 40) / (40 * 79)
     assert share == pytest.approx(0.3, abs=3 * np.sqrt(0.3 * 0.7 / (40 * 79)))  # three sigma
     assert len(cut(outline, [sets[0]], 5, 0.1)[0]) == 40
@@ -79,6 +79,6 @@ def test_a_sliver_joins_its_neighbour_or_is_left_out():
     assert Polygon(blocks[0]).area == pytest.approx(100.0, abs=1e-9)
     # Two beds meet a strip that is whole (by the seed): joined to either it would not be convex.
     beds = JointSet(0.0, 6.0, "b", through=(0.0, 5.0), persistence=0.5)
-    blocks, sets_of, joined, dropped = cut(SQUARE, [*sets, beds], seed=6, least_width=0.2)
+    blocks, _sets_of, joined, dropped = cut(SQUARE, [*sets, beds], seed=6, least_width=0.2)
     assert (len(blocks), joined) == (2, 0)
     assert dropped == pytest.approx([0.1 * 10.0], abs=1e-9)

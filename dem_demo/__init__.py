@@ -19,8 +19,3 @@ from .output.run import run
 from .scene import Scene, coulomb_law, load, parse
 
 __all__ = ["Refused", "Scene", "Simulation", "coulomb_law", "load", "parse", "run"]
-
-
-def __getattr__(name: str):
-    use = "; a wrong scene raises ValueError: catch that" if name == "SceneError" else ""
-    raise AttributeError(f"module 'dem_demo' has no attribute {name!r}{use}")

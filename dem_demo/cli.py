@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from jointlaw.laboratory.experiments import PathError
-from jointlaw.support.files import replace_file, require_free, write_json
+from jointlaw.support.files import require_free, write_json
 from jointlaw.support.progress import explained
 from jointlaw.support.pyplot import FORMATS
 
@@ -41,13 +41,12 @@ Rigid rock blocks in 2-D whose every contact force comes from a joint law.
                                            go on from DIR/state or DIR/refused
 """
 OPTIONS = {
-    "scene": {"help": "a name or a TOML file"},
+    "scene": {"nargs": "?", "default": "tilt", "help": "a name or a TOML file (default tilt)"},
     "file": {"type": Path},
     "state": {"type": Path, "help": "folder that a run left: DIR/state, DIR/refused"},
     "--out": {"type": Path, "default": Path("out"), "help": "folder for the results"},
     "--force": {"action": "store_true", "help": "replace another run in that folder"},
     "--until": {"type": float, "help": "model time to stop at (s)"},
-    "--leave-out": {"nargs": "+", "default": [], "metavar": "NAME", "help": "variants not to run"},
     "--step": {"type": float, "help": "another time step (s)"},
     "--no-pictures": {
         "action": "store_const",
@@ -63,6 +62,7 @@ OPTIONS = {
 REMOVED = {
     "compare --tilt": "turn `gravity` in the scene file",
     "compare --critical": "strength-reduction finds the critical tilt",
+    "ablate --leave-out": "all variants run",
     "compare --out": "it prints; write `> FILE`",
 }
 
@@ -80,8 +80,6 @@ def main(arguments: list[str] | None = None) -> int:
     )
     for option in options:
         parser.add_argument(option, **OPTIONS[option])
-    if verb == "run" and (not words or words[0].startswith("-")) and "-h" not in words:
-        words.insert(0, "tilt")
     try:
         for word in REMOVED.keys() & {f"{verb} {word.partition('=')[0]}" for word in words}:
             raise ValueError(f"{word} is removed: {REMOVED[word]}")
@@ -103,10 +101,8 @@ def _run(given: argparse.Namespace) -> None:
     """Run a scene, or a saved state, to its end."""
     if given.vtk and not find_spec("meshio"):
         raise ValueError("--vtk needs meshio: pip install meshio")
-    if "state" in given:
-        sim = Simulation.load(given.state, given.step)
-    else:
-        sim = Simulation(load(given.scene))
+    resumed = "state" in given
+    sim = Simulation.load(given.state, given.step) if resumed else Simulation(load(given.scene))
     _announce(sim, given.until)
     record, summary = run(sim, given.out, given.until, given.format, given.vtk)
     for line in sentences(record):
@@ -119,21 +115,21 @@ def _run(given: argparse.Namespace) -> None:
 
 def _announce(sim: Simulation, until: float | None = None) -> None:
     steps, dt, limit = steps_to(sim, until), sim.dt, sim.limit.now
-    free = sum(not block.fixed for block in sim.scene.blocks)
-    print(f"{sim.scene.title}: {free} moving blocks, {sim.joints.n} law points in reach")
+    print(
+        f"{sim.scene.title}: {sum(not block.fixed for block in sim.scene.blocks)} moving blocks, "
+        f"{sim.joints.n} law points in reach"
+    )
     print(f"time step {dt:.3g} s, limit {limit:.3g} s (margin {limit / dt:.2f}), {steps} steps")
     for rock in sim.scene.rocks:
-        fixed = len(rock.blocks) - len(rock.free)
-        print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, {fixed} fixed; "
-              f"{rock.slivers}")  # fmt: skip
+        print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
+              f"{len(rock.blocks) - len(rock.free)} fixed; {rock.slivers}")  # fmt: skip
     if not sim.balanced:
         print("some blocks have no static equilibrium and move from the first step")
 
 
 def _new(given: argparse.Namespace) -> None:
-    if given.file.exists():
-        raise ValueError(f"{given.file} exists: give another name")
-    replace_file(given.file, TEMPLATE.read_bytes())
+    with given.file.open("xb") as file:  # OSError where it exists
+        file.write(TEMPLATE.read_bytes())
     print(f"{given.file} written; next: python -m dem_demo check {given.file}")
 
 
@@ -144,8 +140,8 @@ def _check(given: argparse.Namespace) -> None:
 
 def _ablate(given: argparse.Namespace) -> None:
     given.out.mkdir(parents=True, exist_ok=True)  # a folder that cannot be is known before the work
-    print(ablate.write(ablate.ablate(load(given.scene), given.until, given.leave_out), given.out))
-    print(f"results in {given.out}: ablation.csv, summary.json")
+    print(ablate.write(ablate.ablate(load(given.scene), given.until), given.out))
+    print(f"results in {given.out}: {ablate.TABLE}")
 
 
 def _compare(given: argparse.Namespace) -> None:
@@ -153,9 +149,8 @@ def _compare(given: argparse.Namespace) -> None:
     if not scene.rocks:
         raise ValueError(f"{given.scene} has no [[rock]] to compare")
     for row in compare.compare(scene, given.seeds, given.until or scene.run.end):
-        print(f"seed {row['seed']}, {row['law']:7s} {sentence(row)}", flush=True)
-        if row["refused"]:
-            print(f"    stopped: {row['refused']}")
+        when = f"seed {row['seed']}, {row['law']:7s} after {row['time_s']:.3g} s"
+        print(f"{when}, {sentence(row)} {row['refused']}", flush=True)
 
 
 def _reduce(given: argparse.Namespace) -> None:
@@ -178,7 +173,7 @@ COMMANDS = {
     "resume": (_run, "state", *RUN, "--step"),
     "new": (_new, "file"),
     "check": (_check, "scene"),
-    "ablate": (_ablate, "scene", "--out", "--force", "--until", "--leave-out"),
+    "ablate": (_ablate, "scene", "--out", "--force", "--until"),
     "compare": (_compare, "scene", "--seeds", "--until"),
     "strength-reduction": (_reduce, "scene", "--out", "--force", "--until", "--format"),
 }

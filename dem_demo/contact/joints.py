@@ -7,6 +7,7 @@ reach, so history is never given to the wrong joint.
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 import jointlaw as jl
 from jointlaw.joints.state import JointState
@@ -27,14 +28,13 @@ def virgin_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
     top = float(law.closure(2e9))
     closure = np.concatenate([[0.0], np.geomspace(1e-8 * top, top, 600)])
     stress = law.normal_stress(closure)
-    work = np.cumsum(0.5 * (stress[1:] + stress[:-1]) * np.diff(closure))
+    work = cumulative_trapezoid(stress, closure, initial=0.0)
     stiffness = law.max_stiffness(closure)
     if is_coulomb(law):
         # The law's bound adds mu for the coupling of shear to closure. That of level asperities has
         # no eigenvalue of its own: (kn, 0; mu kn, 0) has kn and 0. K is ks, lam K is kn.
         p = law.asperity
         stiffness = np.full(len(closure), max(1.0, p.lam) * p.K * law.asperity_density)
-    work = np.concatenate([[0.0], work])
     return {"closure": closure, "stress": stress, "stiffness": stiffness, "work": work}
 
 
@@ -95,10 +95,7 @@ class Joints:
         for name, rows, places in self.groups:
             batch, here = self.pools[name].batch, slice(None) if places is None else places
             self.delta[rows] = batch.delta[here]
-            for share, value in zip(
-                shares, [*batch.measures()[:4], batch.dissipated_energy], strict=True
-            ):
-                share[rows] = value[here]
+            shares[:, rows] = np.array([*batch.measures()[:4], batch.dissipated_energy])[:, here]
         self.sliding, self.slipping, self.separated, self.stored, self.lost = shares
 
     def virgin(self, of: str, by: str, x: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..errors import Refused
-from ..scene import Key, Scene
+from ..scene import Key, Scene, smallest_width
 from .geometry import CORNER, Contacts, Outlines
 
 TILT = np.sin(np.radians(CORNER + 1.5))  # how far a side of a corner may dip below the edge
@@ -54,16 +54,16 @@ class Tracker:
     """
 
     def __init__(self, scene: Scene, motion: np.ndarray) -> None:
-        blocks = scene.blocks
+        self.blocks = blocks = scene.blocks
         self.law_of, self.skin = scene.law_of, scene.run.skin
         self.outlines = Outlines(blocks, scene.run.corner_length, 0.25 * self.skin)
         sizes = np.array([len(block.corners) for block in blocks])
         place = np.arange(sizes.max())
         self._corners = np.where(place < sizes[:, None], self.outlines.start[:, None] + place, -1)
-        self._deepest = scene.run.max_overlap * np.array([block.width for block in blocks])
-        self._names = [block.name for block in blocks]
+        self._deepest = scene.run.max_overlap * np.array(
+            [smallest_width(b.corners) for b in blocks]
+        )
         self._reach = np.array([block.reach for block in blocks])
-        self._fixed = np.array([block.fixed for block in blocks])
         none = np.zeros(0, int)
         self.corner, self.edge, self.numbers, self.keys = none, none, none, none.reshape(0, 4)
         self.offset = np.zeros(0)
@@ -118,7 +118,7 @@ class Tracker:
         Of new contacts that are pressed already, the closure counts (`pressed`, at the start of a
         run) or becomes their closure offset, so that they make no energy.
         """
-        pairs = np.array(sorted(p for p in near if not self._fixed[list(p)].all()), int)
+        pairs = np.array(sorted(p for p in near if not all(self.blocks[n].fixed for n in p)), int)
         known: dict[tuple[int, int], int] = {}
         for i, who in enumerate(self.contacts.pairs):
             known.setdefault(who, i)
@@ -185,7 +185,7 @@ class Tracker:
         lost = (true > 0.25 * self.skin) & (seen < CARRIED * true)
         if lost.any():
             p = int(lost.argmax())
-            one, other = (self._names[n] for n in pairs[p])
+            one, other = (self.blocks[n].name for n in pairs[p])
             raise Refused(
                 f"blocks {one!r} and {other!r} overlap by {true[p]:.3g} m where no corner is over "
                 "an edge that faces it: start the blocks apart, or resume with a smaller step"
@@ -194,7 +194,7 @@ class Tracker:
     def _require_depth(self, pairs, depth, limit) -> None:
         if (depth > limit).any():
             i = int((depth - limit).argmax())
-            one, other = (self._names[n] for n in pairs[i])
+            one, other = (self.blocks[n].name for n in pairs[i])
             raise Refused(
                 f"blocks {one!r} and {other!r} overlap by {depth[i]:.3g} m: must stay below "
                 f"{limit[i]:.3g} m (a share of the smaller block's width); resume with a smaller "

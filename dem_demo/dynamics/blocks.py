@@ -9,19 +9,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pymunk
-from pymunk import batch
 
 from ..contact import Contacts
 from ..errors import Refused
 from ..scene import Drives, Scene
-
-MOTION = (
-    batch.BodyFields.POSITION
-    | batch.BodyFields.ANGLE
-    | batch.BodyFields.VELOCITY
-    | batch.BodyFields.ANGULAR_VELOCITY
-)
-FORCES = batch.BodyFields.FORCE | batch.BodyFields.TORQUE
 
 
 class Blocks:
@@ -51,9 +42,11 @@ class Blocks:
         self.near: set[tuple[int, int]] = set()
         self._build(scene)
         self.motion = self.read()
+        velocity = np.array([[*block.velocity, block.spin] for block in blocks])
+        self.motion[3:] = (velocity * self.mobile).T
 
     def _build(self, scene: Scene) -> None:
-        """pymunk's bodies, its callbacks and its buffers."""
+        """pymunk's bodies, and its callbacks."""
         self.space, self.bodies, self._number = pymunk.Space(), [], {}
         for i, block in enumerate(scene.blocks):
             if block.fixed:
@@ -76,12 +69,6 @@ class Blocks:
         self._hook = pymunk.SimpleMotor(mover, self.space.static_body, 0.0)
         self._hook.max_force = 0.0
         self.space.add(self._hook)
-        self._read, self._write = batch.Buffer(), batch.Buffer()
-        batch.get_space_bodies(self.space, batch.BodyFields.BODY_ID, self._read)
-        order = np.frombuffer(self._read.int_buf(), dtype=np.uintp).tolist()
-        self._from_batch = np.array([order.index(body.id) for body in self.bodies])
-        self._forces = np.zeros((len(order), 3))
-        self._write.set_float_buf(self._forces)
         self._find_first_pairs()
 
     def step(self, dt: float, forces: Callable[[], np.ndarray]) -> None:
@@ -94,8 +81,8 @@ class Blocks:
         def before_velocities(_constraint, _space) -> None:
             try:
                 self.motion = self.read()
-                self._forces[self._from_batch] = forces()
-                batch.set_space_bodies(self.space, FORCES, self._write)
+                for body, (x, y, torque) in zip(self.bodies, forces().tolist(), strict=True):
+                    body.force, body.torque = (x, y), torque
             except BaseException as error:
                 trouble.append(error)
 
@@ -106,10 +93,8 @@ class Blocks:
 
     def read(self) -> np.ndarray:
         """Positions, angles, velocities, spins (6, n) as pymunk has them by now."""
-        self._read.clear()
-        batch.get_space_bodies(self.space, MOTION, self._read)
-        rows = np.frombuffer(self._read.float_buf()).reshape(-1, 6)
-        return np.ascontiguousarray(rows[self._from_batch].T)
+        rows = [(*b.position, b.angle, *b.velocity, b.angular_velocity) for b in self.bodies]
+        return np.array(rows).T.copy()
 
     def place(self, motion: np.ndarray, velocity: np.ndarray) -> None:
         """Put the blocks where `motion` (6, n) says, to go on with a velocity (3, n)."""

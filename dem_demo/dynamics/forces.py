@@ -18,10 +18,8 @@ def forces(
     stress, shear = (area * part for part in joints.traction.T)
     energy = joints.stored * scene.thickness  # J/m: what a change of the length costs
     out = np.zeros((3, *blocks.mobile.shape))
-    damped = 0.0
-    if scene.run.dashpot_normal or scene.run.dashpot_shear:
-        push, resist = _dashpots(scene, blocks, contacts, joints, area, stress)
-        damped = contacts.assemble(motion, push, resist)
+    push, resist = _dashpots(scene, blocks, contacts, joints, area, stress)
+    damped = contacts.assemble(motion, push, resist)
     out[1] = damped * blocks.mobile
     out[0] = contacts.assemble(motion, stress, -shear, energy) + damped
     out[0] = (out[0] + (blocks.gravity + blocks.loads)) * blocks.mobile
@@ -39,7 +37,5 @@ def _dashpots(scene, blocks, contacts, joints, area, pressed) -> tuple[np.ndarra
     run = scene.run
     critical = blocks.damping(contacts, joints.stiffness * area)
     push = np.maximum(-run.dashpot_normal * critical * contacts.opening, -pressed)
-    if not run.dashpot_shear:
-        return push, np.zeros(len(push))
     stick = 1.0 - joints.separated - joints.slipping
     return push, -run.dashpot_shear * critical * np.maximum(stick, 0.0) * contacts.sliding

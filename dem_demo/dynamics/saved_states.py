@@ -16,9 +16,10 @@ from ..contact import PARTS
 from ..scene import Files, Scene, parse
 
 FILE = "state.npz"
-VERSION = 4  # of state.npz
+VERSION = 5  # of state.npz
 STATE = (  # what changes in a run, but for the joints and the velocities to go on with
-    "t0", "n", "dt", "reversed_at", "limit.now", "limit.least", "limit.checked", "blocks.motion",
+    "t0", "n", "dt", "limit.now", "limit.least", "limit.checked", "blocks.motion",
+    "blocks.drives.reversed_at",
     "tracker.corner", "tracker.edge", "tracker.keys", "tracker.numbers", "tracker.offset",
     "tracker.renewed_at", "tracker.given", "tracker.urgent", "ledger.value", "ledger.start",
     "ledger.forces", "ledger.area", "ledger.lost",

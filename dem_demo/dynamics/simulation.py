@@ -26,8 +26,7 @@ class Simulation:
 
     step: time step (s), instead of the scene's; saved: a state to go on from. blocks: where they
     are; tracker: their contacts; joints: the law; ledger: the energies; limit: of the time step dt
-    (s); balanced: were the blocks in equilibrium at the start? reversed_at (drives,): when each
-    drive was sent back, else inf (s).
+    (s); balanced: were the blocks in equilibrium at the start?
     Raises ValueError for a step that is no finite number > 0 and for a state of another scene,
     Refused for a start that the method cannot carry.
     """
@@ -38,7 +37,7 @@ class Simulation:
         self.scene, self.blocks = scene, Blocks(scene)
         self.tracker, self.joints = Tracker(scene, self.blocks.motion), Joints(scene)
         self.limit, self.balanced, self.t0, self.n = StepLimit(), True, 0.0, 0
-        self.reversed_at, self.ledger = np.full(len(scene.drives), np.inf), Ledger()
+        self.ledger = Ledger()
         if saved:
             self._unpack(saved, step)
         else:
@@ -66,15 +65,12 @@ class Simulation:
         slid = np.zeros(joints.n)
         if scene.run.seat and joints.n:
             slid, self.balanced = seat(scene, blocks, tracker, joints)
-        for i, block in enumerate(scene.blocks):
-            if not block.fixed:
-                blocks.motion[3:, i] = [*block.velocity, block.spin]
         tracker.follow(blocks.motion)
         joints.update(self.contacts.closure, slid)
         self.limit.look(scene, blocks, self.contacts, joints)
         self.dt = step or scene.run.step or self._chosen_step()
         self.limit.require(self.dt)
-        velocity = blocks.drives.velocity(0.0, self.dt, self.reversed_at)
+        velocity = blocks.drives.velocity(0.0, self.dt)
         blocks.motion[3:][blocks.drives.axes, blocks.drives.rows] = velocity
         tracker.follow(blocks.motion)
         force = forces(scene, blocks, self.contacts, joints, velocity, 0.5 * self.dt)
@@ -111,7 +107,7 @@ class Simulation:
         tracker.require_shallow()
         joints.update(tracker.closure, self.contacts.sliding * dt, scene.run.law_steps)
         self.n += 1
-        velocity = blocks.drives.velocity(self.time, dt, self.reversed_at)
+        velocity = blocks.drives.velocity(self.time, dt)
         force = forces(scene, blocks, self.contacts, joints, velocity, dt)
         area = self.contacts.length * scene.thickness
         if (joints.stiffness * area > self.limit.checked).any():
@@ -121,7 +117,7 @@ class Simulation:
         # Where a corner has opened another part of it touches next, with its whole depth.
         tracker.offset = np.where(self.contacts.closure <= 0, 0.0, tracker.offset)
         if self.n % LOOKS == 0:
-            self.reversed_at = blocks.drives.reverse(self.time, self.reversed_at, self.slid)
+            blocks.drives.reverse(self.time, self.slid)
         return force[0]
 
     def _follow(self) -> None:
@@ -163,8 +159,7 @@ class Simulation:
                 kept = np.interp(anew, curve["closure"], curve["work"])
                 joints.renew(who)
                 ledger.lost[i] = 0.0
-            dropped = max(float(held[i] - kept * length[i]), 0.0) * thickness
-            ledger.value["dropped"] += dropped
+            ledger.value["dropped"] += max(float(held[i] - kept * length[i]), 0.0) * thickness
             ledger.area[i] = length[i] * thickness
 
     def _rearrange(self, known: list) -> None:

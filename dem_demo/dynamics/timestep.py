@@ -124,9 +124,8 @@ def impact_limit(scene: Scene, blocks: Blocks, stiffness: float) -> float:
         length = np.maximum(np.hypot(*(q - p).T), scene.run.corner_length)
         half = np.tile(0.5 * length * scene.thickness * stiffness, 2)
         x, y = np.concatenate([p, q]).T
-        one, none = np.ones_like(x), np.zeros_like(x)
-        ways = np.array([one, none, -y]), np.array([none, one, x])
-        K = sum((way * half) @ way.T for way in ways)
+        k, kx, ky, turning = half.sum(), half @ x, half @ y, half @ (x * x + y * y)
+        K = np.array([[k, 0.0, -ky], [0.0, k, kx], [-ky, kx, turning]])
         root = 1 / np.sqrt(mass[moves])
         largest = np.linalg.eigvalsh(K[np.ix_(moves, moves)] * np.outer(root, root))[-1]
         top = max(top, 2 * float(largest))

@@ -104,8 +104,8 @@ def friction_angle(law: jl.JointLaw, stress: float) -> float:
     """Peak of F2/F1 (degrees) of the law in direct shear at a constant normal stress (Pa)."""
     if is_coulomb(law):
         return float(np.degrees(np.arctan(law.asperity.mu)))
-    to = [1.2 * slip_distance(law)]  # friction peaks where the contacts begin to be renewed
-    record = jl.direct_shear(law.joint(), to=to, normal=stress, steps=120)
+    far = 1.2 * slip_distance(law)  # friction peaks where the contacts begin to be renewed
+    record = jl.direct_shear(law.joint(), to=[far], normal=stress, steps=120)
     return float(record.peak_friction_angle)
 
 

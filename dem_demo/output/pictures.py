@@ -47,8 +47,8 @@ class Pictures:
         corners = np.concatenate([c for i in (0, n - 1) for c in outlines(record, i)])
         margin = 0.03 * np.ptp(corners, axis=0).max()
         self.low, self.high = corners.min(axis=0) - margin, corners.max(axis=0) + margin
-        start = record.joint(0, "normal_stress_Pa")
-        whole = [record.joint(i, "normal_stress_Pa") for i in range(n)]
+        start = record.joints[0]["normal_stress_Pa"]
+        whole = [record.joints[i]["normal_stress_Pa"] for i in range(n)]
         pressed = start[start > 0] if (start > 0).any() else np.concatenate(whole)
         pressed = pressed[pressed > 0]
         self.stress = float(np.quantile(pressed, 0.9)) if len(pressed) else 1.0
@@ -59,25 +59,24 @@ class Pictures:
         A joint that moves along itself slower than CREEP is stuck, whatever part of its asperities
         waits at the friction limit.
         """
-        shares = self.record.joint(i, "slipping")
-        shares = shares / np.maximum(1 - self.record.joint(i, "separated"), 1e-12)
-        moves = np.abs(self.record.joint(i, "sliding_m/s")) > CREEP
+        now = self.record.joints[i]
+        shares = now["slipping"] / np.maximum(1 - now["separated"], 1e-12)
+        moves = np.abs(now["sliding_m/s"]) > CREEP
         names = np.where(moves & (shares > PARTIAL), "partly sliding", "stuck")
         names = np.where(moves & (shares > FULL), "sliding", names)
-        closed = self.record.joint(i, "normal_stress_Pa") > 1e-3 * self.stress
+        closed = now["normal_stress_Pa"] > 1e-3 * self.stress
         return np.where(closed, names, "open")
 
     def figure(self) -> tuple[Figure, Axes]:
-        """An empty frame with its legend: states, two round stresses, the dots of the start."""
+        """An empty frame with its legend: states, a round stress, the dots of the start."""
         wide, high = self.high - self.low
         across = min(8.2, 6.0 * wide / high)
         figure = Figure(figsize=(max(across + 1.0, 8.5), across * high / wide + 1.8))
         marks = [Line2D([], [], color=colour, ls=line, label=f"joint {name}", lw=2.0)
                  for name, (colour, line) in STATES.items()]  # fmt: skip
-        for share in (0.25, 1.0):
-            stress = float(f"{share * self.stress:.1g}")
-            label, width = f"normal stress {1e-3 * stress:g} kPa", self._width(stress)
-            marks.append(Line2D([], [], color=STATES["stuck"][0], lw=width, label=label))
+        stress = float(f"{self.stress:.1g}")
+        label, width = f"normal stress {1e-3 * stress:g} kPa", self._width(stress)
+        marks.append(Line2D([], [], color=STATES["stuck"][0], lw=width, label=label))
         marks.append(Line2D([], [], color="0.6", ls=":", lw=0.9, label="place at the start"))
         figure.legend(handles=marks, loc="outside lower center", ncols=4, frameon=False)
         return figure, figure.add_subplot()
@@ -88,20 +87,27 @@ class Pictures:
         record, blocks, shapes = self.record, self.record.scene.blocks, outlines(self.record, i)
         drawn = zip(blocks, outlines(record, 0), strict=True)
         start = [shape for block, shape in drawn if not block.fixed]
-        dots = {"facecolors": "none", "edgecolors": "0.7", "linestyles": ":", "linewidths": 0.7}
-        axes.add_collection(PolyCollection(start, **dots))
+        axes.add_collection(
+            PolyCollection(
+                start, facecolors="none", edgecolors="0.7", linestyles=":", linewidths=0.7
+            )
+        )
         colours = [FIXED if b.fixed else DRIVEN if len(b.held) > 1 else FREE for b in blocks]
-        faces = {"facecolors": colours, "edgecolors": "0.45", "linewidths": 0.6}
-        axes.add_collection(PolyCollection(shapes, **faces))
+        axes.add_collection(
+            PolyCollection(shapes, facecolors=colours, edgecolors="0.45", linewidths=0.6)
+        )
         if len(blocks) <= FEW:
             for block, shape in zip(blocks, shapes, strict=True):
                 axes.text(*shape.mean(axis=0), block.name, ha="center", va="center")
         ends, state = record.joints[i]["ends"], self.states(i)
-        widths = self._width(record.joint(i, "normal_stress_Pa"))
+        widths = self._width(record.joints[i]["normal_stress_Pa"])
         for name, (colour, line) in STATES.items():
             here = state == name
-            lines = {"colors": colour, "linewidths": widths[here], "linestyles": line}
-            axes.add_collection(LineCollection(ends[here], zorder=3, **lines))
+            axes.add_collection(
+                LineCollection(
+                    ends[here], linewidths=widths[here], colors=colour, ls=line, zorder=3
+                )
+            )
         axes.set(xlim=(self.low[0], self.high[0]), xlabel="x (m)", aspect="equal")
         axes.set(ylim=(self.low[1], self.high[1]), ylabel="y (m)")
         axes.figure.suptitle(f"{record.scene.title}\nt = {record.times[i]:.2f} s{note}")
@@ -110,16 +116,14 @@ class Pictures:
     def final(self, path: Path) -> None:
         """The last frame, with slip angles and what became of each rock."""
         figure, axes = self.figure()
-        note = "".join(f"\n{line}" for line in sentences(self.record))
-        self.draw(axes, len(self.record.times) - 1, note)
+        self.draw(axes, len(self.record.times) - 1, "\n".join(["", *sentences(self.record)]))
         written(figure, path)
 
     @style()
     def animation(self, path: Path) -> None:
         """The whole run as GIF, at a constant rate of model time."""
-        times = self.record.times
-        wanted = np.linspace(times[0], times[-1], min(len(times), FRAMES))
-        frames = np.unique(np.abs(np.subtract.outer(wanted, times)).argmin(axis=1))
+        n = len(self.record.times)
+        frames = np.linspace(0, n - 1, min(n, FRAMES)).round().astype(int).tolist()
         (figure, axes), writer = self.figure(), PillowWriter(RATE)
         with writer.saving(figure, path, DPI):
             for i in track(frames, "animation", len(frames)):

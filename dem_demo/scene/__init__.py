@@ -9,7 +9,7 @@ scene      a scene in memory
 read       a scene from its file
 """
 
-from .blocks import Block, turn, usual_size
+from .blocks import Block, smallest_width, turn, usual_size
 from .drives import Drive, Drives
 from .keys import Tables, overlay
 from .laws import STICKS, Files, build_law, coulomb_law, is_coulomb
@@ -36,6 +36,7 @@ __all__ = [
     "parse",
     "read_tables",
     "shipped",
+    "smallest_width",
     "turn",
     "usual_size",
 ]

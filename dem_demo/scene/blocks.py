@@ -46,11 +46,6 @@ class Block:
         return self.corners - self.centroid
 
     @property
-    def width(self) -> float:
-        """Smallest width (m) over the directions of its edges."""
-        return smallest_width(self.corners)
-
-    @property
     def reach(self) -> float:
         """Distance (m) from the centroid to the farthest corner."""
         return float(np.hypot(*self.local.T).max())

@@ -117,15 +117,15 @@ def _convex_parts(piece: Polygon, sets, lines, tiny) -> list[Polygon]:
 def _without_slivers(pieces: list[Polygon], lines, least: float, tiny: float):
     """Join or drop what is narrower than `least`, the narrowest first."""
     pieces, joined, dropped = list(pieces), 0, []
-    widths = [smallest_width(np.array(piece.exterior.coords)) for piece in pieces]
-    while pieces and min(widths) < least:
-        i = int(np.argmin(widths))
-        sliver = pieces.pop(i)
-        widths.pop(i)
+    while pieces:
+        widths = [smallest_width(np.array(piece.exterior.coords)) for piece in pieces]
+        if min(widths) >= least:
+            break
+        sliver = pieces.pop(int(np.argmin(widths)))
         for j in _neighbours(sliver, pieces, lines, tiny):
             whole = sliver.union(pieces[j]).convex_hull
             if whole.area - sliver.area - pieces[j].area < tiny * whole.length:
-                pieces[j], widths[j] = whole, smallest_width(np.array(whole.exterior.coords))
+                pieces[j] = whole
                 joined += 1
                 break
         else:

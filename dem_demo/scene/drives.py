@@ -75,22 +75,23 @@ class Drives:
         self.drives = drives
         self.rows = np.array([d.block for d in drives], int)
         self.axes = np.array([d.axis for d in drives], int)
+        self.reversed_at = np.full(len(drives), np.inf)
 
-    def velocity(self, t: float, dt: float, reversed_at: np.ndarray) -> np.ndarray:
+    def velocity(self, t: float, dt: float) -> np.ndarray:
         """Velocities that carry the drives exactly from t to t + dt."""
-        pairs = zip(self.drives, reversed_at, strict=True)
+        pairs = zip(self.drives, self.reversed_at, strict=True)
         moved = [d(t + dt, at) - d(t, at) if len(d.times) > 1 else 0.0 for d, at in pairs]
         return np.array(moved, float) / dt
 
-    def reverse(
-        self, t: float, reversed_at: np.ndarray, slid: Callable[[int, int], float]
-    ) -> np.ndarray:
+    def reverse(self, t: float, slid: Callable[[int, int], float]) -> None:
         """Send back those drives whose block has slid far enough; slid(block, base) in m."""
-        out = reversed_at.copy()
         for i, d in enumerate(self.drives):
-            if d.back and t < out[i] and slid(d.back["block"], d.block) > d.back["slid"]:
-                out[i] = t
-        return out
+            if (
+                d.back
+                and t < self.reversed_at[i]
+                and slid(d.back["block"], d.block) > d.back["slid"]
+            ):
+                self.reversed_at[i] = t
 
 
 def read_drives(

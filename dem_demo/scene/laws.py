@@ -26,8 +26,7 @@ class Files(dict[str, str]):
         self.folder = Path(folder)
 
     def __missing__(self, name: str) -> str:
-        self[name] = (self.folder / name).read_text(encoding="utf-8-sig")
-        return self[name]
+        return self.setdefault(name, (self.folder / name).read_text(encoding="utf-8-sig"))
 
 
 def coulomb_law(normal_stiffness: float, shear_stiffness: float, friction: float) -> jl.JointLaw:
@@ -36,10 +35,9 @@ def coulomb_law(normal_stiffness: float, shear_stiffness: float, friction: float
     normal_stiffness, shear_stiffness: per area, > 0 (Pa/m); friction: coefficient, >= 0, may be
     infinite. Raises ValueError for others.
     """
-    asperity = jl.Asperity.linear(normal_stiffness, shear_stiffness, min(friction, STICKS))
     return jl.JointLaw(
         orientation=jl.Orientation(FLAT),
-        asperity=asperity,
+        asperity=jl.Asperity.linear(normal_stiffness, shear_stiffness, min(friction, STICKS)),
         asperity_density=1.0,
         resolution=jl.Resolution(1, 3, 1),
         plane=0.0,

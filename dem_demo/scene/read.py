@@ -11,7 +11,7 @@ from shapely import Point, Polygon
 from jointlaw.parameters import keys
 from jointlaw.support.checks import one_of, remedy
 
-from .blocks import Block, box, check_convex
+from .blocks import Block, box, check_convex, smallest_width
 from .cutting import JointSet, cut
 from .drives import read_drives
 from .keys import LIST, SCENE, TABLE, Tables, overlay, some_of, vector
@@ -55,9 +55,7 @@ def parse(text: str, where: str = "scene", files: Files | None = None) -> Scene:
 
     files: those that it names, by default read from the working folder.
     """
-    scene = build(read_tables(text, where), where, files)
-    object.__setattr__(scene, "text", text)
-    return scene
+    return build(read_tables(text, where), where, files, text)
 
 
 def read_tables(text: str, where: str = "scene") -> Tables:
@@ -72,7 +70,7 @@ def read_tables(text: str, where: str = "scene") -> Tables:
 
 def _copied(rocks: Any, where: str) -> list[Tables]:
     """Tables of rocks, each with the keys of the rock that it is `like`."""
-    known: dict[str, Tables] = {}
+    known, whole = {}, []
     for i, table in enumerate(LIST(f"{where}: rock", rocks)):
         place = f"{where}: rock[{i}]"
         own, name = {**TABLE(place, table)}, str(table.get("name"))
@@ -81,13 +79,12 @@ def _copied(rocks: Any, where: str) -> list[Tables]:
                 raise ValueError(f"{place}.like = {like!r}: no rock further up; "
                                  f"{remedy(like, known)}")  # fmt: skip
             own = {**known[like], **own}
-        if name in known:
-            raise ValueError(f"{place}.name = {name!r}: names of rocks must differ")
         known[name] = own
-    return list(known.values())
+        whole.append(own)
+    return whole
 
 
-def build(data: Tables, where: str = "scene", files: Files | None = None) -> Scene:
+def build(data: Tables, where: str = "scene", files: Files | None = None, text: str = "") -> Scene:
     """A scene from the tables of its file and the files that it names. Raises ValueError."""
     top, files = keys.checked(data, SCENE, where), Files() if files is None else files
     laws = {name: build_law(table, f"{where}: laws.{name}", files)
@@ -104,7 +101,7 @@ def build(data: Tables, where: str = "scene", files: Files | None = None) -> Sce
     drives = read_drives(top.get("drive", ()), number, blocks, files, where)
     pairs = _pairs(top.get("joint", ()), number, blocks, where)
     watched = _watched(top.get("watch", {}), number, blocks, f"{where}: watch")
-    least = min(block.width for block in blocks)
+    least = min(smallest_width(block.corners) for block in blocks)
     run = Run(**{"skin": SKIN * least, "corner_length": CORNER * least, **top["run"]})
     default = top.get("law", next(iter(laws), ""))
     for law in [default, *pairs.values(), *edge_laws.values()]:
@@ -114,7 +111,8 @@ def build(data: Tables, where: str = "scene", files: Files | None = None) -> Sce
         tuple(rocks), edge_laws, drives, top.get("gravity", GRAVITY), top.get("thickness", 1.0),
         **watched,
     )  # fmt: skip
-    object.__setattr__(scene, "files", files)
+    for name, value in (("files", files), ("text", text)):  # `replace` leaves both out
+        object.__setattr__(scene, name, value)
     return scene
 
 

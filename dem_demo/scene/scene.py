@@ -83,5 +83,4 @@ class Scene:
             if law := self.pairs.get(frozenset(blocks)):
                 return law
         law = self.edge_laws.get((one, key[1]))
-        same = law is not None and law == self.edge_laws.get((other, key[3]))
-        return law if same else self.default_law
+        return law if law and law == self.edge_laws.get((other, key[3])) else self.default_law

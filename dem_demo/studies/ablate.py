@@ -7,7 +7,7 @@ joints carried nothing stays as it is.
 """
 
 import time
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
@@ -17,7 +17,7 @@ import numpy as np
 
 from jointlaw.laboratory.experiments import PathError
 from jointlaw.parameters.resolution import named
-from jointlaw.support.files import clear_run, write_json
+from jointlaw.support.files import clear_run
 
 from ..dynamics.simulation import Simulation
 from ..errors import Refused
@@ -26,7 +26,7 @@ from ..output.run import run
 from ..scene import Scene, is_coulomb, overlay
 
 COST = ("steps", "time_step_s", "cpu_s", "time_ratio", "note")
-VERSION = 2  # of summary.json
+TABLE = "ablation.csv"
 
 SINGLE = {"formation": "individual"}  # population curves are not convex at eta = 0
 STIFFENS = {"orientation", "asperity", "heights"}  # parts that the stiffness depends on
@@ -45,10 +45,10 @@ INGREDIENTS: dict[str, dict[str, Any]] = {  # by name: the keys of a law without
 }
 
 
-def ablate(scene: Scene, until: float | None = None, leave_out: Collection[str] = ()) -> list[dict]:
+def ablate(scene: Scene, until: float | None = None) -> list[dict]:
     """Rows: the scene as it is, without each ingredient in turn, and as it is once more.
 
-    until: model time to stop at (s); leave_out: names of variants that are not run. A row holds
+    until: model time to stop at (s). A row holds
     outcomes and "change of ..." against the first row, unit last in the name, and COST. Two rows of
     the whole scene tell how steady the times are; the first also waits for compiled code. A variant
     that cannot be built or run is a row whose note says why.
@@ -58,20 +58,18 @@ def ablate(scene: Scene, until: float | None = None, leave_out: Collection[str] 
         raise Refused(whole["note"])
     rows = [whole]
     for name, make in variants(scene, record):
-        if name not in leave_out:
-            row, other = _run(name, make, until)
-            if other is not None:
-                apart = np.hypot(*(other.motion[-1] - record.motion[-1])[:2])
-                row["end, apart_mm"] = 1e3 * float(apart.max())
-            rows.append(row)
+        row, other = _run(name, make, until)
+        if other is not None:
+            apart = np.hypot(*(other.motion[-1] - record.motion[-1])[:2])
+            row["end, apart_mm"] = 1e3 * float(apart.max())
+        rows.append(row)
     rows.append(_run("whole scene again", lambda: scene, until)[0])
     least = min(whole["cpu_s"], rows[-1]["cpu_s"])
-    numbers = {key: v for key, v in whole.items() if isinstance(v, float) and key not in COST}
+    numbers = [key for key, v in whole.items() if isinstance(v, float) and key not in COST]
     for row in rows:
+        both = [key for key in numbers if row.get(key) is not None]
+        row |= {f"change of {key}": row[key] - whole[key] for key in both}
         row["time_ratio"] = row["cpu_s"] / least
-        for key in numbers.keys() & row.keys():
-            if row[key] is not None:
-                row[f"change of {key}"] = row[key] - whole[key]
     return rows
 
 
@@ -82,7 +80,7 @@ def variants(scene: Scene, record: Record) -> Iterator[tuple[str, Callable[[], S
     """
     carried: dict[str, list[float]] = {name: [] for name in scene.laws}
     for i, frame in enumerate(record.joints):
-        stresses = record.joint(i, "normal_stress_Pa").tolist()
+        stresses = record.joints[i]["normal_stress_Pa"].tolist()
         for who, stress in zip(frame["who"].tolist(), stresses, strict=True):
             carried[scene.law_of(who)] += [stress] * (stress > 0)
     pressed = {name: np.median(of) for name, of in carried.items()
@@ -91,20 +89,17 @@ def variants(scene: Scene, record: Record) -> Iterator[tuple[str, Callable[[], S
     for law in (scene.laws[name] for name in pressed):
         names = named(law.critical_slip, law.asperity.yield_interference, law.closure_range)
         given = INGREDIENTS | {
-            f"resolution {n}": {"resolution": asdict(r)} for n, r in names.items()
+            f"resolution {n}": {"resolution": asdict(names[n])} for n in ("fast", "fine")
         }
         own = {"heights": SINGLE} | {k: v for k, v in asdict(law).items() if v is not None}
         lacking |= {name: keys for name, keys in given.items() if _differ(own, keys)}
     for name, keys in lacking.items():
         yield name, partial(_without, scene, keys, pressed)
     run, steps = scene.run, 1 if scene.run.law_steps > 1 else 4
-    largest = max((max(stresses) for stresses in carried.values() if stresses), default=0.0)
-    fall = max(run.largest_stress, 2.0 * largest)  # a load put down at once reaches its double
     key = "step" if run.step else "fraction"
     others = {
         "no dashpots": {"dashpot_normal": 0.0, "dashpot_shear": 0.0},
         f"law_steps = {steps}": {"law_steps": steps},
-        "not seated": {"seat": False, "largest_stress": fall if run.seat else run.largest_stress},
         "half the time step": {key: 0.5 * getattr(run, key)},
         "twice the time step": {key: 2.0 * getattr(run, key)},
     }
@@ -153,8 +148,6 @@ def _run(name: str, make: Callable[[], Scene], until: float | None) -> tuple[dic
 def _outcome(record: Record, summary: dict) -> dict[str, Any]:
     """What a scene monitors, and what every scene has: the unit ends the name."""
     found = {f"{slip['block']}, slips at_deg": slip["slip_angle"] for slip in summary["slip"]}
-    last = record.monitored[-1].items()
-    found |= {f"last {key}": value for key, value in last if not key.endswith("_deg")}
     for moving, _ in record.scene.shear:
         name = record.scene.blocks[moving].name
         normal, shear = (record.column(f"{name}: {key}_Pa") for key in ("normal", "shear"))
@@ -170,13 +163,10 @@ def _outcome(record: Record, summary: dict) -> dict[str, Any]:
 
 
 def write(rows: list[dict], folder: Path) -> str:
-    """ablation.csv and summary.json of some rows; returns what each changed, a line a row."""
+    """ablation.csv of some rows; returns what each changed, a line a row."""
     clear_run(folder)
-    header = [key for key in dict.fromkeys(key for row in rows for key in row) if key not in COST]
-    columns = [*header, *COST]
-    write_csv(folder / "ablation.csv", columns, ([row.get(c) for c in columns] for row in rows))
-    about = {"version": VERSION, "files": ["ablation.csv"], "runs": rows}
-    write_json(folder / "summary.json", about)
+    columns = [*dict.fromkeys(key for row in rows for key in row if key not in COST), *COST]
+    write_csv(folder / TABLE, columns, ([row.get(c) for c in columns] for row in rows))
     return "\n".join(
         f"{row['without']}: " + (row["note"] or f"ends {row.get('end, apart_mm', 0.0):.3g} mm "
                                  f"apart, time x {row['time_ratio']:.2f}")

@@ -55,10 +55,10 @@ def critical_tilt(scene: Scene) -> float | None:
     Below zero where it does not hold as drawn.
     """
 
-    def tilted(tilt: float) -> Scene:
-        return replace(scene, gravity=tuple(turn(np.radians(tilt)) @ scene.gravity))
-
-    return _bisect(tilted, STEP, STEEPEST, lambda t: max(EXACT * abs(t), LEAST))
+    return _bisect(
+        lambda tilt: replace(scene, gravity=tuple(turn(np.radians(tilt)) @ scene.gravity)),
+        STEP, STEEPEST, lambda tilt: max(EXACT * abs(tilt), LEAST),
+    )  # fmt: skip
 
 
 def strength_factor(scene: Scene) -> float | None:
@@ -68,10 +68,9 @@ def strength_factor(scene: Scene) -> float | None:
     a scene may have, 5.
     """
 
-    def weakened(log: float) -> Scene:
-        return reduced(scene, float(np.exp(log)))
-
-    log = _bisect(weakened, np.log(2), np.log(LARGEST), lambda _: EXACT)
+    log = _bisect(
+        lambda log: reduced(scene, float(np.exp(log))), np.log(2), np.log(LARGEST), lambda _: EXACT
+    )
     return None if log is None else float(np.exp(log))
 
 
@@ -117,7 +116,8 @@ def alone(scene: Scene, name: str, seed: int | None = None) -> Scene:
     """
     data = read_tables(scene.text)
     rock = next(table for table in data["rock"] if table["name"] == name)
-    same = seed is None or seed == rock.get("seed", 0)
+    own = {"seed": 0, **rock} | ({} if seed is None else {"seed": seed})
+    same = own["seed"] == rock.get("seed", 0)
     blocks = {block["name"] for block in data.get("block", [])}
     low, high = np.quantile(np.add(rock["outline"], rock.get("at", [0, 0])), [0, 1], axis=0)
 
@@ -128,6 +128,4 @@ def alone(scene: Scene, name: str, seed: int | None = None) -> Scene:
         return all(other.rpartition(" ")[0] == name for other in others) and (same or not others)
 
     joints = [joint for joint in data.get("joint", []) if belongs(joint)]
-    rock = rock if same else {**rock, "seed": seed}
-    own = {**data, "rock": [rock], "watch": {}, "joint": joints}
-    return build(own, files=scene.files)
+    return build({**data, "rock": [own], "watch": {}, "joint": joints}, files=scene.files)

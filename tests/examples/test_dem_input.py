@@ -157,14 +157,6 @@ def test_a_record_moves_its_block(tmp_path, title):
     np.testing.assert_allclose(found, [*twice, twice[-1] + 0.03], atol=1e-15)
 
 
-def test_a_sine_rises_and_falls_and_ends_at_rest():
-    sine = "sine = { acceleration = 3.0, frequency = 5.0, cycles = 4 }"
-    (drive,) = (d for d in parse(TEXT.replace(LINES, sine)).drives if d.order)
-    assert drive.times[-1] == pytest.approx(6 / 5)
-    assert max(drive.values) == pytest.approx(3.0)
-    assert drive.path(drive.times[-1], nu=1) == pytest.approx(0.0, abs=1e-12)
-
-
 def test_plain_coulomb_is_what_its_numbers_say():
     """Springs kn and ks, a cap of friction times normal stress: by hand, to rounding."""
     kn, ks, mu = 1e9, 8e8, 0.3

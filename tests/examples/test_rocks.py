@@ -80,7 +80,7 @@ def test_a_scene_of_ones_own_from_the_template(tmp_path, capsys):
     out = tmp_path / "out"
     assert main([str(file), "--out", str(out)]) == 0
     assert "slope: stands" in capsys.readouterr().out
-    for name in ("final.png", "motion.gif", "history.csv", "joints.csv", "state"):
+    for name in ("final.png", "motion.gif", "history.csv", "state"):
         assert (out / name).exists(), name
     summary = json.loads((out / "summary.json").read_text())
     assert summary["rocks"][0]["state"] == "stands"

@@ -14,8 +14,8 @@ except ImportError as error:  # `python -m` tells it in one line if it is about 
     raise ImportError(needs, name=__name__) from error
 
 from .dynamics.simulation import Simulation
-from .errors import Refused, SceneError
+from .errors import Refused
 from .output.run import run
 from .scene import Scene, coulomb_law, load, parse
 
-__all__ = ["Refused", "Scene", "SceneError", "Simulation", "coulomb_law", "load", "parse", "run"]
+__all__ = ["Refused", "Scene", "Simulation", "coulomb_law", "load", "parse", "run"]

@@ -6,20 +6,20 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from jointlaw.laboratory.experiments import PathError
-from jointlaw.support.files import replace_file, require_free, write_json
+from jointlaw.support.files import require_free, write_json
 from jointlaw.support.progress import explained
 from jointlaw.support.pyplot import FORMATS
 
 from .dynamics.simulation import Simulation
 from .errors import Refused
-from .output.record import sentence
-from .output.run import INTERRUPTED, run, steps_to
-from .scene import TEMPLATE, load, names
+from .output.record import sentence, sentences
+from .output.run import run, steps_to
+from .scene import TEMPLATE, load, shipped
 from .studies import ablate, compare, strength
 
-VERSION = 1  # of the files that compare and strength-reduction write
+VERSION = 1  # of strength.json
 FAILING = 3.0  # s: most that a failing rock is run for
-MANY = 1e6  # steps: minutes for a few blocks, hours for a rock
+INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 WAIT = "the first run after an installation also compiles the law, once"
 
 ABOUT = """\
@@ -41,23 +41,29 @@ Rigid rock blocks in 2-D whose every contact force comes from a joint law.
                                            go on from DIR/state or DIR/refused
 """
 OPTIONS = {
-    "scene": {"help": "a name or a TOML file"},
+    "scene": {"nargs": "?", "default": "tilt", "help": "a name or a TOML file (default tilt)"},
     "file": {"type": Path},
     "state": {"type": Path, "help": "folder that a run left: DIR/state, DIR/refused"},
     "--out": {"type": Path, "default": Path("out"), "help": "folder for the results"},
     "--force": {"action": "store_true", "help": "replace another run in that folder"},
-    "--out FILE": {"type": Path, "help": "a JSON file for the numbers"},
     "--until": {"type": float, "help": "model time to stop at (s)"},
-    "--leave-out": {"nargs": "+", "default": [], "metavar": "NAME", "help": "variants not to run"},
     "--step": {"type": float, "help": "another time step (s)"},
-    "--no-pictures": {"action": "store_true", "help": "tables only"},
+    "--no-pictures": {
+        "action": "store_const",
+        "const": None,
+        "dest": "format",
+        "default": FORMATS[0],
+        "help": "tables only",
+    },
     "--format": {"choices": FORMATS, "default": FORMATS[0], "help": "of pictures (default png)"},
     "--vtk": {"action": "store_true", "help": "also VTK files for ParaView, in DIR/vtk (meshio)"},
     "--seeds": {"type": int, "nargs": "+", "default": [1, 2, 3], "help": "default 1 2 3"},
 }
 REMOVED = {
-    "--tilt": "turn `gravity` in the scene file",
-    "--critical": "strength-reduction finds the critical tilt",
+    "compare --tilt": "turn `gravity` in the scene file",
+    "compare --critical": "strength-reduction finds the critical tilt",
+    "ablate --leave-out": "all variants run",
+    "compare --out": "it prints; write `> FILE`",
 }
 
 
@@ -69,15 +75,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         f"python -m dem_demo {verb}".removesuffix(" run"),
         description=ABOUT,
-        epilog=f"scenes: {', '.join(names())}",
+        epilog=f"scenes: {', '.join(shipped())}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     for option in options:
-        parser.add_argument(option.split()[0], **OPTIONS[option])
-    if verb == "run" and (not words or words[0].startswith("-")) and "-h" not in words:
-        words.insert(0, "tilt")
+        parser.add_argument(option, **OPTIONS[option])
     try:
-        for word in REMOVED.keys() & {word.partition("=")[0] for word in words}:
+        for word in REMOVED.keys() & {f"{verb} {word.partition('=')[0]}" for word in words}:
             raise ValueError(f"{word} is removed: {REMOVED[word]}")
         given = parser.parse_args(words)
         if getattr(given, "force", None) is False:
@@ -85,7 +89,7 @@ def main(arguments: list[str] | None = None) -> int:
         with explained(f"dem_demo is at work; {WAIT}"):
             command(given)
     except KeyboardInterrupt as stop:
-        print(f"dem_demo: {str(stop) or 'interrupted; nothing is written'}", file=sys.stderr)
+        print(f"dem_demo: {str(stop) or 'interrupted'}", file=sys.stderr)
         return INTERRUPTED
     except (Refused, PathError, ValueError, OSError) as error:
         print(f"dem_demo: {error}", file=sys.stderr)
@@ -97,20 +101,12 @@ def _run(given: argparse.Namespace) -> None:
     """Run a scene, or a saved state, to its end."""
     if given.vtk and not find_spec("meshio"):
         raise ValueError("--vtk needs meshio: pip install meshio")
-    if "state" in given:
-        sim = Simulation.load(given.state, given.step)
-    else:
-        sim = Simulation(load(given.scene))
+    resumed = "state" in given
+    sim = Simulation.load(given.state, given.step) if resumed else Simulation(load(given.scene))
     _announce(sim, given.until)
-    _, summary = run(sim, given.out, given.until, not given.no_pictures, given.format, given.vtk)
-    for slip in summary["slip"]:
-        angle, alone = slip["slip_angle"], slip["predicted_angle"]
-        said = f"slipped at {angle:.2f} degrees" if angle is not None else "no slip"
-        said = "had slipped before this run" if slip["slipped_before"] else said
-        law = "nothing" if alone is None else f"{alone:.2f} degrees"
-        print(f"{slip['block']}: {said}, the law alone says {law}")
-    for rock in summary["rocks"]:
-        print(sentence(rock))
+    record, summary = run(sim, given.out, given.until, given.format, given.vtk)
+    for line in sentences(record):
+        print(line)
     print(
         f"energy balanced to {summary['largest_energy_error']:.1e}, smallest margin of the time "
         f"step {summary['time_step_margin']:.2f}; results in {given.out}"
@@ -119,26 +115,21 @@ def _run(given: argparse.Namespace) -> None:
 
 def _announce(sim: Simulation, until: float | None = None) -> None:
     steps, dt, limit = steps_to(sim, until), sim.dt, sim.limit.now
-    doubts = sim.scene.doubts
-    if steps > MANY:
-        doubts = [*doubts, f"{steps:.2g} steps: is run.end = {sim.scene.run.end:g} s meant?"]
-    for doubt in doubts:
-        print(f"warning: {doubt}", file=sys.stderr)
-    free = sum(not block.fixed for block in sim.scene.blocks)
-    print(f"{sim.scene.title}: {free} moving blocks, {sim.joints.n} law points in reach")
+    print(
+        f"{sim.scene.title}: {sum(not block.fixed for block in sim.scene.blocks)} moving blocks, "
+        f"{sim.joints.n} law points in reach"
+    )
     print(f"time step {dt:.3g} s, limit {limit:.3g} s (margin {limit / dt:.2f}), {steps} steps")
     for rock in sim.scene.rocks:
-        fixed = len(rock.blocks) - len(rock.free)
-        print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, {fixed} fixed; "
-              f"{rock.slivers}")  # fmt: skip
+        print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
+              f"{len(rock.blocks) - len(rock.free)} fixed; {rock.slivers}")  # fmt: skip
     if not sim.balanced:
         print("some blocks have no static equilibrium and move from the first step")
 
 
 def _new(given: argparse.Namespace) -> None:
-    if given.file.exists():
-        raise ValueError(f"{given.file} exists: give another name")
-    replace_file(given.file, TEMPLATE.read_bytes())
+    with given.file.open("xb") as file:  # OSError where it exists
+        file.write(TEMPLATE.read_bytes())
     print(f"{given.file} written; next: python -m dem_demo check {given.file}")
 
 
@@ -149,23 +140,17 @@ def _check(given: argparse.Namespace) -> None:
 
 def _ablate(given: argparse.Namespace) -> None:
     given.out.mkdir(parents=True, exist_ok=True)  # a folder that cannot be is known before the work
-    print(ablate.write(ablate.ablate(load(given.scene), given.until, given.leave_out), given.out))
-    print(f"results in {given.out}: ablation.csv, summary.json")
+    print(ablate.write(ablate.ablate(load(given.scene), given.until), given.out))
+    print(f"results in {given.out}: {ablate.TABLE}")
 
 
 def _compare(given: argparse.Namespace) -> None:
-    scene, rows = load(given.scene), []
+    scene = load(given.scene)
     if not scene.rocks:
         raise ValueError(f"{given.scene} has no [[rock]] to compare")
-    if given.out:
-        given.out.parent.mkdir(parents=True, exist_ok=True)
     for row in compare.compare(scene, given.seeds, given.until or scene.run.end):
-        print(f"seed {row['seed']}, {row['law']:7s} {sentence(row)}", flush=True)
-        if row["refused"]:
-            print(f"    stopped: {row['refused']}")
-        rows.append(row)
-    if given.out:
-        write_json(given.out, {"version": VERSION, "rows": rows})
+        when = f"seed {row['seed']}, {row['law']:7s} after {row['time_s']:.3g} s"
+        print(f"{when}, {sentence(row)} {row['refused']}", flush=True)
 
 
 def _reduce(given: argparse.Namespace) -> None:
@@ -188,7 +173,7 @@ COMMANDS = {
     "resume": (_run, "state", *RUN, "--step"),
     "new": (_new, "file"),
     "check": (_check, "scene"),
-    "ablate": (_ablate, "scene", "--out", "--force", "--until", "--leave-out"),
-    "compare": (_compare, "scene", "--seeds", "--until", "--out FILE"),
+    "ablate": (_ablate, "scene", "--out", "--force", "--until"),
+    "compare": (_compare, "scene", "--seeds", "--until"),
     "strength-reduction": (_reduce, "scene", "--out", "--force", "--until", "--format"),
 }

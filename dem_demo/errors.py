@@ -1,8 +1,4 @@
-"""What the demo refuses: a scene file, or a state that the method cannot carry."""
-
-
-class SceneError(ValueError):
-    """A scene file that cannot be run: says which key, its value, the bound and the remedy."""
+"""What the demo refuses."""
 
 
 class Refused(RuntimeError):

@@ -6,7 +6,7 @@ joints         one pool of joints for each law, and its virgin curve
 """
 
 from .geometry import Contacts
-from .joints import Joints, PoolState, virgin_curve
+from .joints import PARTS, Joints, virgin_curve
 from .tracker import Tracker
 
-__all__ = ["Contacts", "Joints", "PoolState", "Tracker", "virgin_curve"]
+__all__ = ["PARTS", "Contacts", "Joints", "Tracker", "virgin_curve"]

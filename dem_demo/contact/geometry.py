@@ -127,16 +127,14 @@ class Contacts:
         edge = np.where(trade, self.sides[side, k], self.behind[side, k])
         return np.where(trade, there, self.corner), edge, trade
 
-    def assemble(self, motion: np.ndarray, push, shear, energy=None) -> np.ndarray:
+    def assemble(self, motion: np.ndarray, push, shear, energy=0.0) -> np.ndarray:
         """Forces and torques (blocks, 3) at a motion (6, blocks).
 
         Block b is pushed by `push` (N) along the normal and by `shear` (N) in the sense of sliding,
         block a by the opposite at the same place; energy (J/m): stored per length.
         """
-        force, couple = (push - 1j * shear) * self.normal, 0.0
-        if energy is not None:
-            force -= energy * self.pull
-            couple = energy * self.twist
+        force = (push - 1j * shear) * self.normal - energy * self.pull
+        couple = energy * self.twist
         centre = motion[0] + 1j * motion[1]
         on_a, on_b = (((self.at - centre[x]).conj() * force).imag for x in (self.a, self.b))
         x, y = force.real, force.imag

@@ -7,6 +7,7 @@ reach, so history is never given to the wrong joint.
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 import jointlaw as jl
 from jointlaw.joints.state import JointState
@@ -14,7 +15,7 @@ from jointlaw.joints.state import JointState
 from ..scene import Scene, is_coulomb
 from .tracker import Identity
 
-PoolState = tuple[list[Identity], JointState]  # contacts, and their joints in that order
+PARTS = "contacts", "law", "fingerprint"  # of a snapshot of the joints of a law
 
 
 def virgin_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
@@ -27,14 +28,13 @@ def virgin_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
     top = float(law.closure(2e9))
     closure = np.concatenate([[0.0], np.geomspace(1e-8 * top, top, 600)])
     stress = law.normal_stress(closure)
-    work = np.cumsum(0.5 * (stress[1:] + stress[:-1]) * np.diff(closure))
+    work = cumulative_trapezoid(stress, closure, initial=0.0)
     stiffness = law.max_stiffness(closure)
     if is_coulomb(law):
         # The law's bound adds mu for the coupling of shear to closure. That of level asperities has
         # no eigenvalue of its own: (kn, 0; mu kn, 0) has kn and 0. K is ks, lam K is kn.
         p = law.asperity
         stiffness = np.full(len(closure), max(1.0, p.lam) * p.K * law.asperity_density)
-    work = np.concatenate([[0.0], work])
     return {"closure": closure, "stress": stress, "stiffness": stiffness, "work": work}
 
 
@@ -95,10 +95,7 @@ class Joints:
         for name, rows, places in self.groups:
             batch, here = self.pools[name].batch, slice(None) if places is None else places
             self.delta[rows] = batch.delta[here]
-            for share, value in zip(
-                shares, [*batch.measures()[:4], batch.dissipated_energy], strict=True
-            ):
-                share[rows] = value[here]
+            shares[:, rows] = np.array([*batch.measures()[:4], batch.dissipated_energy])[:, here]
         self.sliding, self.slipping, self.separated, self.stored, self.lost = shares
 
     def virgin(self, of: str, by: str, x: np.ndarray) -> np.ndarray:
@@ -114,25 +111,30 @@ class Joints:
         stress = self.traction[:, 0]
         return self.virgin("stiffness", "stress", stress) * (stress > 0)
 
-    def curve(self, contact: Identity) -> dict[str, np.ndarray]:
-        """The virgin curve of a contact's joint."""
-        return self.curves[self.choose(contact[0])]
-
     def renew(self, contact: Identity) -> None:
         """Make the joint of a contact virgin again."""
         pool = self.pools[self.choose(contact[0])]
         pool.batch.reset(pool.add([contact]))
         self.measure()
 
-    def snapshot(self) -> dict[str, PoolState]:
-        """A copy of all state, by law."""
-        return {name: (pool.keys, pool.snapshot()) for name, pool in self.pools.items()}
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """A copy of all state; the laws are numbered, their names may be no names of arrays."""
+        arrays = {}
+        for i, pool in enumerate(self.pools.values()):
+            state, contacts = pool.snapshot(), [[*key, number] for key, number in pool.keys]
+            parts = np.array(contacts, int), state.values.T, np.array(state.fingerprint)
+            arrays |= {f"{part}-{i}": array for part, array in zip(PARTS, parts, strict=True)}
+        return arrays
 
-    def restore(self, state: dict[str, PoolState], contacts: Sequence[Identity]) -> None:
+    def restore(self, state: dict[str, np.ndarray], contacts: Sequence[Identity]) -> None:
         """Back to a snapshot whose contacts were these. Raises ValueError for another's."""
-        held = {contact for keys, _ in state.values() for contact in keys}
-        if set(state) != set(self.pools) or held != set(contacts):
+        held = []
+        for i in range(len(self.pools)):
+            rows, values, fingerprint = (state[f"{part}-{i}"] for part in PARTS)
+            keys = [(tuple(key), number) for *key, number in rows.tolist()]
+            held.append((keys, JointState(str(fingerprint), values.T)))
+        if {contact for keys, _ in held for contact in keys} != set(contacts):
             raise ValueError("the state's joints are not those of the scene's laws and contacts")
-        for name, (keys, joints) in state.items():
-            self.pools[name].restore(keys, joints)
+        for pool, (keys, joints) in zip(self.pools.values(), held, strict=True):
+            pool.restore(keys, joints)
         self.assign(contacts)

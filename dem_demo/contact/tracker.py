@@ -10,12 +10,12 @@ only when something has moved far enough to matter; between such renewals the ge
 arrays.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 
 from ..errors import Refused
-from ..scene import Block, Key, Scene
+from ..scene import Key, Scene, smallest_width
 from .geometry import CORNER, Contacts, Outlines
 
 TILT = np.sin(np.radians(CORNER + 1.5))  # how far a side of a corner may dip below the edge
@@ -23,78 +23,6 @@ CARRIED = 0.5  # share of an overlap that some joint must see
 ROUNDING = 1e-10  # m: corners stay until their depth is wrong by this, so that none chatters
 
 Identity = tuple[Key, int]
-
-
-class NarrowPhase:
-    """Finds the corners over edges of pairs of blocks that are near each other.
-
-    skin: largest gap, times 1.5 (m); max_overlap: largest depth as a share of the smaller block's
-    width.
-    """
-
-    def __init__(
-        self, blocks: Sequence[Block], outlines: Outlines, skin: float, max_overlap: float
-    ) -> None:
-        self.blocks, self.outlines, self.skin = blocks, outlines, skin
-        sizes = np.array([len(block.corners) for block in blocks])
-        place = np.arange(sizes.max())
-        self._corners = np.where(place < sizes[:, None], outlines.start[:, None] + place, -1)
-        self.depth_limit = max_overlap * np.array([b.width for b in blocks])
-
-    def __call__(self, motion: np.ndarray, pairs: np.ndarray, known: set) -> Contacts:
-        """The contacts between pairs (p, 2) of blocks; where two are equal, the known one is meant.
-
-        Raises Refused for an overlap that is too deep, or that no corner sees.
-        """
-        x, y = np.concatenate([pairs, pairs[:, ::-1]]).T
-        corner, edge = np.broadcast_arrays(
-            self._corners[x][:, :, None], self._corners[y][:, None, :]
-        )
-        place, ways = self.outlines.place(motion)
-        depth = ((place[corner] - place[edge]) * ways[edge].conj()).imag
-        height = np.where(corner < 0, np.inf, -depth)
-        apart = np.where(edge[:, 0] < 0, -np.inf, height.min(axis=1)).max(axis=1)
-        limit = np.minimum(self.depth_limit[x], self.depth_limit[y])
-        near = (height < 1.5 * self.skin) & (height > -1.5 * limit[:, None, None])
-        near &= (corner >= 0) & (edge >= 0)
-        which = np.nonzero(near)[0]
-        all_near = Contacts(self.outlines, corner[near], edge[near], motion)
-        ok = _in_range(all_near, known)
-        n = len(pairs)
-        seen = np.full(2 * n, -np.inf)
-        np.maximum.at(seen, which[ok], all_near.closure[ok])
-        true = -np.maximum(apart[:n], apart[n:])
-        self._require_carried(pairs, true, np.maximum(seen[:n], seen[n:]), limit[:n])
-        return Contacts(self.outlines, all_near.corner[ok], all_near.edge[ok], motion)
-
-    def require_shallow(self, contacts: Contacts) -> None:
-        """Refuse overlaps beyond run.max_overlap."""
-        pressed, pairs = contacts.closure * (contacts.length > 0), [contacts.a, contacts.b]
-        limit = self.depth_limit[pairs].min(axis=0)
-        if (pressed > limit).any():
-            i = int((pressed - limit).argmax())
-            self._refuse_overlap((contacts.a[i], contacts.b[i]), pressed[i], limit[i])
-
-    def _require_carried(self, pairs, true, seen, limit) -> None:
-        if (deep := true > limit).any():
-            i = int(deep.argmax())
-            self._refuse_overlap(pairs[i], true[i], limit[i])
-        lost = (true > 0.25 * self.skin) & (seen < CARRIED * true)
-        if lost.any():
-            p = int(lost.argmax())
-            one, other = (self.blocks[n].name for n in pairs[p])
-            raise Refused(
-                f"blocks {one!r} and {other!r} overlap by {true[p]:.3g} m where no corner is over "
-                "an edge that faces it: start the blocks apart, or resume with a smaller step"
-            )
-
-    def _refuse_overlap(self, pair, depth: float, limit: float) -> None:
-        one, other = (self.blocks[n].name for n in pair)
-        raise Refused(
-            f"blocks {one!r} and {other!r} overlap by {depth:.3g} m: must stay below {limit:.3g} m "
-            "(a share of the smaller block's width); resume with a smaller step, or use stiffer "
-            "joints, lower loads or speeds, a larger run.corner_length or run.max_overlap"
-        )
 
 
 def _in_range(contacts: Contacts, known: set) -> np.ndarray:
@@ -126,12 +54,16 @@ class Tracker:
     """
 
     def __init__(self, scene: Scene, motion: np.ndarray) -> None:
-        run, blocks = scene.run, scene.blocks
-        self.law_of, self.skin = scene.law_of, scene.skin
-        self.outlines = Outlines(blocks, scene.corner_length, 0.25 * self.skin)
-        self.narrow_phase = NarrowPhase(blocks, self.outlines, self.skin, run.max_overlap)
+        self.blocks = blocks = scene.blocks
+        self.law_of, self.skin = scene.law_of, scene.run.skin
+        self.outlines = Outlines(blocks, scene.run.corner_length, 0.25 * self.skin)
+        sizes = np.array([len(block.corners) for block in blocks])
+        place = np.arange(sizes.max())
+        self._corners = np.where(place < sizes[:, None], self.outlines.start[:, None] + place, -1)
+        self._deepest = scene.run.max_overlap * np.array(
+            [smallest_width(b.corners) for b in blocks]
+        )
         self._reach = np.array([block.reach for block in blocks])
-        self._fixed = np.array([block.fixed for block in blocks])
         none = np.zeros(0, int)
         self.corner, self.edge, self.numbers, self.keys = none, none, none, none.reshape(0, 4)
         self.offset = np.zeros(0)
@@ -147,10 +79,6 @@ class Tracker:
     def closure(self) -> np.ndarray:
         """Closure (k,) that the joints see: the depth less the closure offset."""
         return self.contacts.closure - np.where(self.contacts.closure > 0, self.offset, 0.0)
-
-    def reopen(self) -> None:
-        """Drop the offset of corners that have opened: another part of them touches next."""
-        self.offset = np.where(self.contacts.closure <= 0, 0.0, self.offset)
 
     def stale(self, motion: np.ndarray) -> bool:
         """Has a block moved or turned so far that a corner could be missing?"""
@@ -190,11 +118,11 @@ class Tracker:
         Of new contacts that are pressed already, the closure counts (`pressed`, at the start of a
         run) or becomes their closure offset, so that they make no energy.
         """
-        pairs = np.array(sorted(p for p in near if not self._fixed[list(p)].all()), int)
+        pairs = np.array(sorted(p for p in near if not all(self.blocks[n].fixed for n in p)), int)
         known: dict[tuple[int, int], int] = {}
         for i, who in enumerate(self.contacts.pairs):
             known.setdefault(who, i)
-        found = self.narrow_phase(motion, pairs.reshape(-1, 2), set(known))
+        found = self._found(motion, pairs.reshape(-1, 2), set(known))
         laws = [self.law_of(key) for key in found.interfaces.tolist()]
         mine, fresh, stay = [self.law_of(key) for key in self.keys.tolist()], [], []
         for i, who in enumerate(found.pairs):
@@ -219,3 +147,57 @@ class Tracker:
     def between(self, one: int, other: int) -> np.ndarray:
         """Mask (k,) of the contacts between two blocks."""
         return (self.contacts.a == min(one, other)) & (self.contacts.b == max(one, other))
+
+    def _found(self, motion: np.ndarray, pairs: np.ndarray, known: set) -> Contacts:
+        """The contacts between pairs (p, 2) of blocks; where two are equal, the known one is meant.
+
+        Raises Refused for an overlap that is too deep, or that no corner sees.
+        """
+        x, y = np.concatenate([pairs, pairs[:, ::-1]]).T
+        corner, edge = np.broadcast_arrays(
+            self._corners[x][:, :, None], self._corners[y][:, None, :]
+        )
+        place, ways = self.outlines.place(motion)
+        depth = ((place[corner] - place[edge]) * ways[edge].conj()).imag
+        height = np.where(corner < 0, np.inf, -depth)
+        apart = np.where(edge[:, 0] < 0, -np.inf, height.min(axis=1)).max(axis=1)
+        limit = np.minimum(self._deepest[x], self._deepest[y])
+        near = (height < 1.5 * self.skin) & (height > -1.5 * limit[:, None, None])
+        near &= (corner >= 0) & (edge >= 0)
+        which = np.nonzero(near)[0]
+        all_near = Contacts(self.outlines, corner[near], edge[near], motion)
+        ok = _in_range(all_near, known)
+        n = len(pairs)
+        seen = np.full(2 * n, -np.inf)
+        np.maximum.at(seen, which[ok], all_near.closure[ok])
+        true = -np.maximum(apart[:n], apart[n:])
+        self._require_carried(pairs, true, np.maximum(seen[:n], seen[n:]), limit[:n])
+        return Contacts(self.outlines, all_near.corner[ok], all_near.edge[ok], motion)
+
+    def require_shallow(self) -> None:
+        """Refuse overlaps beyond run.max_overlap."""
+        c = self.contacts
+        pairs = np.stack([c.a, c.b], axis=1)
+        self._require_depth(pairs, c.closure * (c.length > 0), self._deepest[pairs].min(axis=1))
+
+    def _require_carried(self, pairs, true, seen, limit) -> None:
+        self._require_depth(pairs, true, limit)
+        lost = (true > 0.25 * self.skin) & (seen < CARRIED * true)
+        if lost.any():
+            p = int(lost.argmax())
+            one, other = (self.blocks[n].name for n in pairs[p])
+            raise Refused(
+                f"blocks {one!r} and {other!r} overlap by {true[p]:.3g} m where no corner is over "
+                "an edge that faces it: start the blocks apart, or resume with a smaller step"
+            )
+
+    def _require_depth(self, pairs, depth, limit) -> None:
+        if (depth > limit).any():
+            i = int((depth - limit).argmax())
+            one, other = (self.blocks[n].name for n in pairs[i])
+            raise Refused(
+                f"blocks {one!r} and {other!r} overlap by {depth[i]:.3g} m: must stay below "
+                f"{limit[i]:.3g} m (a share of the smaller block's width); resume with a smaller "
+                "step, or use stiffer joints, lower loads or speeds, a larger run.corner_length or "
+                "run.max_overlap"
+            )

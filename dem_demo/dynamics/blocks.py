@@ -9,19 +9,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pymunk
-from pymunk import batch
 
 from ..contact import Contacts
 from ..errors import Refused
 from ..scene import Drives, Scene
-
-MOTION = (
-    batch.BodyFields.POSITION
-    | batch.BodyFields.ANGLE
-    | batch.BodyFields.VELOCITY
-    | batch.BodyFields.ANGULAR_VELOCITY
-)
-FORCES = batch.BodyFields.FORCE | batch.BodyFields.TORQUE
 
 
 class Blocks:
@@ -35,9 +26,9 @@ class Blocks:
 
     def __init__(self, scene: Scene) -> None:
         blocks = scene.blocks
-        self.names, self.skin = [block.name for block in blocks], scene.skin
-        mass = np.array([scene.thickness * block.mass for block in blocks])
-        moment = np.array([scene.thickness * block.moment for block in blocks])
+        self.names, self.skin = [block.name for block in blocks], scene.run.skin
+        mass = np.array([scene.thickness * block.section.mass for block in blocks])
+        moment = np.array([scene.thickness * block.section.moment for block in blocks])
         self.inertia = np.stack([mass, mass, moment], axis=1)
         self.mobile = np.array([[not block.fixed] * 3 for block in blocks])
         self.drives = Drives(scene.drives)
@@ -51,9 +42,11 @@ class Blocks:
         self.near: set[tuple[int, int]] = set()
         self._build(scene)
         self.motion = self.read()
+        velocity = np.array([[*block.velocity, block.spin] for block in blocks])
+        self.motion[3:] = (velocity * self.mobile).T
 
     def _build(self, scene: Scene) -> None:
-        """pymunk's bodies, its callbacks and its buffers."""
+        """pymunk's bodies, and its callbacks."""
         self.space, self.bodies, self._number = pymunk.Space(), [], {}
         for i, block in enumerate(scene.blocks):
             if block.fixed:
@@ -76,12 +69,6 @@ class Blocks:
         self._hook = pymunk.SimpleMotor(mover, self.space.static_body, 0.0)
         self._hook.max_force = 0.0
         self.space.add(self._hook)
-        self._read, self._write = batch.Buffer(), batch.Buffer()
-        batch.get_space_bodies(self.space, batch.BodyFields.BODY_ID, self._read)
-        order = np.frombuffer(self._read.int_buf(), dtype=np.uintp).tolist()
-        self._from_batch = np.array([order.index(body.id) for body in self.bodies])
-        self._forces = np.zeros((len(order), 3))
-        self._write.set_float_buf(self._forces)
         self._find_first_pairs()
 
     def step(self, dt: float, forces: Callable[[], np.ndarray]) -> None:
@@ -94,8 +81,8 @@ class Blocks:
         def before_velocities(_constraint, _space) -> None:
             try:
                 self.motion = self.read()
-                self._forces[self._from_batch] = forces()
-                batch.set_space_bodies(self.space, FORCES, self._write)
+                for body, (x, y, torque) in zip(self.bodies, forces().tolist(), strict=True):
+                    body.force, body.torque = (x, y), torque
             except BaseException as error:
                 trouble.append(error)
 
@@ -106,10 +93,8 @@ class Blocks:
 
     def read(self) -> np.ndarray:
         """Positions, angles, velocities, spins (6, n) as pymunk has them by now."""
-        self._read.clear()
-        batch.get_space_bodies(self.space, MOTION, self._read)
-        rows = np.frombuffer(self._read.float_buf()).reshape(-1, 6)
-        return np.ascontiguousarray(rows[self._from_batch].T)
+        rows = [(*b.position, b.angle, *b.velocity, b.angular_velocity) for b in self.bodies]
+        return np.array(rows).T.copy()
 
     def place(self, motion: np.ndarray, velocity: np.ndarray) -> None:
         """Put the blocks where `motion` (6, n) says, to go on with a velocity (3, n)."""
@@ -124,10 +109,11 @@ class Blocks:
             if body.body_type == pymunk.Body.DYNAMIC:
                 body.velocity, body.angular_velocity = (u, v), spin
 
-    def reduced_mass(self, contacts: Contacts) -> np.ndarray:
-        """Reduced mass (k,) of the two blocks of every contact, which carries half of a joint."""
+    def damping(self, contacts: Contacts, stiffness: np.ndarray) -> np.ndarray:
+        """Critical damping (k,) in N s/m: 2 sqrt(stiffness times reduced mass of the two blocks);
+        stiffness in N/m. Each block carries half of a joint."""
         light = self._lightness[contacts.a] + self._lightness[contacts.b]
-        return 0.5 / np.where(light > 0, light, np.inf)
+        return 2.0 * np.sqrt(stiffness * (0.5 / np.where(light > 0, light, np.inf)))
 
     def require_slow(self, dt: float) -> None:
         """Refuse blocks that move too far in a step of dt (s) to find their contacts."""

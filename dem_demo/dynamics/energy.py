@@ -45,10 +45,9 @@ class Ledger:
         v["dashpots"] -= float(damped)
         v["work"] += float(driven)
         v["turned"] += float(np.abs(fall).sum() + abs(driven))
-        if blocks.loads.any():
-            push = dt * (blocks.loads * velocity).sum(axis=1)
-            v["work"] += float(push.sum())
-            v["turned"] += float(np.abs(push).sum())
+        push = dt * (blocks.loads * velocity).sum(axis=1)
+        v["work"] += float(push.sum())
+        v["turned"] += float(np.abs(push).sum())
         v["stored"] = float(area @ joints.stored)
         v["friction"] += float(0.5 * (area + self.area) @ (joints.lost - self.lost))
         self.forces, self.area, self.lost = forces, area, joints.lost
@@ -57,8 +56,7 @@ class Ledger:
     def total(self) -> float:
         """What the balance says is constant (J)."""
         v = self.value
-        held = v["kinetic"] + v["potential"] + v["stored"]
-        return held + v["friction"] + v["dashpots"] + v["dropped"] - v["work"]
+        return sum(v[name] for name in COLUMNS[:6]) - v["work"]
 
     @property
     def error(self) -> float:

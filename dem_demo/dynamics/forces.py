@@ -7,11 +7,6 @@ from ..scene import Scene
 from .blocks import Blocks
 
 
-def damping(blocks: Blocks, contacts: Contacts, stiffness: np.ndarray) -> np.ndarray:
-    """Critical damping (k,) in N s/m: 2 sqrt(stiffness times reduced mass); stiffness in N/m."""
-    return 2.0 * np.sqrt(stiffness * blocks.reduced_mass(contacts))
-
-
 def forces(
     scene: Scene, blocks: Blocks, contacts: Contacts, joints: Joints, velocity, dt: float
 ) -> np.ndarray:
@@ -23,10 +18,8 @@ def forces(
     stress, shear = (area * part for part in joints.traction.T)
     energy = joints.stored * scene.thickness  # J/m: what a change of the length costs
     out = np.zeros((3, *blocks.mobile.shape))
-    damped = 0.0
-    if scene.run.dashpot_normal or scene.run.dashpot_shear:
-        push, resist = _dashpots(scene, blocks, contacts, joints, area, stress)
-        damped = contacts.assemble(motion, push, resist)
+    push, resist = _dashpots(scene, blocks, contacts, joints, area, stress)
+    damped = contacts.assemble(motion, push, resist)
     out[1] = damped * blocks.mobile
     out[0] = contacts.assemble(motion, stress, -shear, energy) + damped
     out[0] = (out[0] + (blocks.gravity + blocks.loads)) * blocks.mobile
@@ -42,9 +35,7 @@ def forces(
 def _dashpots(scene, blocks, contacts, joints, area, pressed) -> tuple[np.ndarray, np.ndarray]:
     """Forces (k,) of the dashpots along normal and tangent (N); never a pull."""
     run = scene.run
-    critical = damping(blocks, contacts, joints.stiffness * area)
+    critical = blocks.damping(contacts, joints.stiffness * area)
     push = np.maximum(-run.dashpot_normal * critical * contacts.opening, -pressed)
-    if not run.dashpot_shear:
-        return push, np.zeros(len(push))
     stick = 1.0 - joints.separated - joints.slipping
     return push, -run.dashpot_shear * critical * np.maximum(stick, 0.0) * contacts.sliding

@@ -5,34 +5,28 @@
 
 import io
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from zipfile import BadZipFile
 
 import numpy as np
 
-from jointlaw.joints.state import JointState
 from jointlaw.support.files import replace_file
 
-from ..contact import PoolState
+from ..contact import PARTS
 from ..scene import Files, Scene, parse
 
 FILE = "state.npz"
-VERSION = 4  # of state.npz
+VERSION = 5  # of state.npz
 STATE = (  # what changes in a run, but for the joints and the velocities to go on with
-    "t0", "n", "dt", "reversed_at", "limit.now", "limit.least", "limit.checked", "blocks.motion",
+    "t0", "n", "dt", "limit.now", "limit.least", "limit.checked", "blocks.motion",
+    "blocks.drives.reversed_at",
     "tracker.corner", "tracker.edge", "tracker.keys", "tracker.numbers", "tracker.offset",
     "tracker.renewed_at", "tracker.given", "tracker.urgent", "ledger.value", "ledger.start",
     "ledger.forces", "ledger.area", "ledger.lost",
 )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class Saved:
-    """A copy of everything that the future depends on: arrays by name, and the joints' states."""
-
-    arrays: dict[str, np.ndarray]
-    joints: dict[str, PoolState]
+Saved = dict[str, np.ndarray]  # a copy of everything that the future depends on
 
 
 def save(scene: Scene, saved: Saved, folder: Path) -> None:
@@ -41,13 +35,8 @@ def save(scene: Scene, saved: Saved, folder: Path) -> None:
     Raises ValueError for a scene that was made or changed in memory.
     """
     require_text(scene)
-    buffer, tables = io.BytesIO(), {}
-    for i, (contacts, law) in enumerate(saved.joints.values()):
-        # numbered: a law's name may be no array's name
-        tables[f"law-{i}"], tables[f"fingerprint-{i}"] = law.values.T, np.array(law.fingerprint)
-        tables[f"contacts-{i}"] = np.array([[*key, number] for key, number in contacts], int)
-    about = {"version": VERSION, "scene": scene.text, "files": json.dumps(scene.files)}
-    np.savez(buffer, **about, **saved.arrays, **tables)
+    buffer, files = io.BytesIO(), json.dumps(scene.files)
+    np.savez(buffer, version=VERSION, scene=scene.text, files=files, **saved)
     folder.mkdir(parents=True, exist_ok=True)
     replace_file(folder / FILE, buffer.getvalue())
 
@@ -63,22 +52,14 @@ def load(folder: Path) -> tuple[Scene, Saved]:
         if (version := int(data["version"])) == VERSION:
             files = Files(known=json.loads(str(data["files"])).items())
             scene = parse(str(data["scene"]), str(file), files)
-            return scene, Saved({k: data[k] for k in (*STATE, "velocity")}, _joints(data, scene))
+            joints = [f"{part}-{i}" for part in PARTS for i in range(len(scene.laws))]
+            return scene, {name: data[name] for name in (*STATE, "velocity", *joints)}
     except (OSError, EOFError, LookupError, ValueError, AttributeError, BadZipFile) as error:
         raise ValueError(f"{file} is damaged ({error}): run the scene again") from None
     raise ValueError(
         f"{file} has version {version}, this demo reads {VERSION}: go on with the version of the "
         "demo that wrote it, or run the scene again"
     )
-
-
-def _joints(data: dict[str, np.ndarray], scene: Scene) -> dict[str, PoolState]:
-    joints = {}
-    for i, name in enumerate(scene.laws):
-        contacts = data[f"contacts-{i}"].tolist()
-        law = JointState(str(data[f"fingerprint-{i}"]), data[f"law-{i}"].T)
-        joints[name] = [(tuple(key), number) for *key, number in contacts], law
-    return joints
 
 
 def require_text(scene: Scene) -> None:

@@ -26,18 +26,18 @@ class Simulation:
 
     step: time step (s), instead of the scene's; saved: a state to go on from. blocks: where they
     are; tracker: their contacts; joints: the law; ledger: the energies; limit: of the time step dt
-    (s); balanced: were the blocks in equilibrium at the start? reversed_at (drives,): when each
-    drive was sent back, else inf (s).
+    (s); balanced: were the blocks in equilibrium at the start?
     Raises ValueError for a step that is no finite number > 0 and for a state of another scene,
     Refused for a start that the method cannot carry.
     """
 
     def __init__(self, scene: Scene, step: float | None = None, saved: Saved | None = None) -> None:
-        _require_positive(step)
+        if step is not None and not 0 < step < np.inf:
+            raise ValueError(f"step = {step} s: must be a finite number > 0")
         self.scene, self.blocks = scene, Blocks(scene)
         self.tracker, self.joints = Tracker(scene, self.blocks.motion), Joints(scene)
         self.limit, self.balanced, self.t0, self.n = StepLimit(), True, 0.0, 0
-        self.reversed_at, self.ledger = np.full(len(scene.drives), np.inf), Ledger()
+        self.ledger = Ledger()
         if saved:
             self._unpack(saved, step)
         else:
@@ -65,15 +65,12 @@ class Simulation:
         slid = np.zeros(joints.n)
         if scene.run.seat and joints.n:
             slid, self.balanced = seat(scene, blocks, tracker, joints)
-        for i, block in enumerate(scene.blocks):
-            if not block.fixed:
-                blocks.motion[3:, i] = [*block.velocity, block.spin]
         tracker.follow(blocks.motion)
         joints.update(self.contacts.closure, slid)
         self.limit.look(scene, blocks, self.contacts, joints)
         self.dt = step or scene.run.step or self._chosen_step()
         self.limit.require(self.dt)
-        velocity = blocks.drives.velocity(0.0, self.dt, self.reversed_at)
+        velocity = blocks.drives.velocity(0.0, self.dt)
         blocks.motion[3:][blocks.drives.axes, blocks.drives.rows] = velocity
         tracker.follow(blocks.motion)
         force = forces(scene, blocks, self.contacts, joints, velocity, 0.5 * self.dt)
@@ -103,22 +100,24 @@ class Simulation:
         3. Tractions, dashpots, weight and drives make forces.
         4. Check the time step if a joint has stiffened, send back drives, book the energies.
         """
-        scene, blocks, joints, dt = self.scene, self.blocks, self.joints, self.dt
+        scene, blocks, tracker, joints = self.scene, self.blocks, self.tracker, self.joints
+        dt = self.dt
         blocks.require_slow(dt)
         self._follow()
-        self.tracker.narrow_phase.require_shallow(self.contacts)
-        joints.update(self.tracker.closure, self.contacts.sliding * dt, scene.run.law_steps)
+        tracker.require_shallow()
+        joints.update(tracker.closure, self.contacts.sliding * dt, scene.run.law_steps)
         self.n += 1
-        velocity = blocks.drives.velocity(self.time, dt, self.reversed_at)
+        velocity = blocks.drives.velocity(self.time, dt)
         force = forces(scene, blocks, self.contacts, joints, velocity, dt)
         area = self.contacts.length * scene.thickness
         if (joints.stiffness * area > self.limit.checked).any():
             self.limit.look(scene, blocks, self.contacts, joints)
             self.limit.require(dt)
         self.ledger.book(blocks, joints, force, dt, area)
-        self.tracker.reopen()
+        # Where a corner has opened another part of it touches next, with its whole depth.
+        tracker.offset = np.where(self.contacts.closure <= 0, 0.0, tracker.offset)
         if self.n % LOOKS == 0:
-            self.reversed_at = blocks.drives.reverse(self.time, self.reversed_at, self.slid)
+            blocks.drives.reverse(self.time, self.slid)
         return force[0]
 
     def _follow(self) -> None:
@@ -153,15 +152,14 @@ class Simulation:
             kept = stored[i]
             if ratio[i] > 1:
                 who = tracker.identities[i]
-                curve = joints.curve(who)
+                curve = joints.curves[joints.choose(who[0])]
                 anew = np.interp(held[i] / length[i], curve["work"], curve["closure"])
                 anew = min(anew, closure[i])
                 tracker.offset[i] += closure[i] - anew
                 kept = np.interp(anew, curve["closure"], curve["work"])
                 joints.renew(who)
                 ledger.lost[i] = 0.0
-            dropped = max(float(held[i] - kept * length[i]), 0.0) * thickness
-            ledger.value["dropped"] += dropped
+            ledger.value["dropped"] += max(float(held[i] - kept * length[i]), 0.0) * thickness
             ledger.area[i] = length[i] * thickness
 
     def _rearrange(self, known: list) -> None:
@@ -188,17 +186,17 @@ class Simulation:
         arrays = {path: np.array(attrgetter(path)(self)) for path in STATE}
         arrays["ledger.value"] = np.array([*self.ledger.value.values()])
         arrays["velocity"] = self.blocks.read()[3:]  # that will carry the blocks on
-        return Saved(arrays, self.joints.snapshot())
+        return arrays | self.joints.snapshot()
 
     def _unpack(self, saved: Saved, step: float | None) -> None:
-        a = {name: array.copy() for name, array in saved.arrays.items()}
+        a = {name: array.copy() for name, array in saved.items()}
         for path in STATE:
             holder, _, name = path.rpartition(".")
             value = a[path] if a[path].ndim else a[path].item()
             setattr(attrgetter(holder)(self) if holder else self, name, value)
         self.ledger.value = dict(zip(COLUMNS, a["ledger.value"].tolist(), strict=True))
         self.tracker.place(self.blocks.motion)
-        self.joints.restore(saved.joints, self.tracker.identities)
+        self.joints.restore(a, self.tracker.identities)
         velocity = a["velocity"]
         if step:  # velocities are half a step ahead of the places: of the new step
             change = 0.5 * (step - self.dt) * self.ledger.forces[0] / self.blocks.inertia
@@ -224,9 +222,3 @@ class Simulation:
         """
         scene, saved = saved_states.load(Path(folder))
         return cls(scene, step, saved)
-
-
-def _require_positive(step: float | None) -> None:
-    """Refuse a time step (s) that is none; None leaves the choice to others."""
-    if step is not None and not 0 < step < np.inf:
-        raise ValueError(f"step = {step} s: must be a finite number > 0")

@@ -16,7 +16,6 @@ from ..contact import Contacts, Joints
 from ..errors import Refused
 from ..scene import Scene
 from .blocks import Blocks
-from .forces import damping
 
 DENSE = 24  # degrees of freedom up to which a dense eigenproblem is the faster one
 HEADROOM = 1.25  # most growth of a joint's stiffness between two checks of the time step
@@ -41,7 +40,7 @@ class StepLimit:
         area = contacts.length * scene.thickness
         stiffness = np.maximum(stiffness, 0.2 * stiffness.max(initial=0.0))
         stiffness = stiffness * np.maximum(area, 0.02 * area.max(initial=0.0))
-        run, critical = scene.run, damping(blocks, contacts, stiffness)
+        run, critical = scene.run, blocks.damping(contacts, stiffness)
         dashpots = np.concatenate([run.dashpot_normal * critical, run.dashpot_shear * critical])
         self.now = largest_step(rates(blocks, contacts), np.tile(stiffness, 2), dashpots)
         self.least, self.checked = min(self.least, self.now), stiffness
@@ -122,15 +121,11 @@ def impact_limit(scene: Scene, blocks: Blocks, stiffness: float) -> float:
         if not moves.any():
             continue
         p, q = block.local, np.roll(block.local, -1, axis=0)
-        length = np.maximum(np.hypot(*(q - p).T), scene.corner_length)
-        half = 0.5 * length * scene.thickness * stiffness
-        K = np.zeros((3, 3))
-        for arm in (p, q):
-            for way in (np.array([1.0, 0.0]), np.array([0.0, 1.0])):
-                j = np.stack(
-                    [*np.tile(way, (len(arm), 1)).T, arm[:, 0] * way[1] - arm[:, 1] * way[0]]
-                )
-                K += (j * half) @ j.T
+        length = np.maximum(np.hypot(*(q - p).T), scene.run.corner_length)
+        half = np.tile(0.5 * length * scene.thickness * stiffness, 2)
+        x, y = np.concatenate([p, q]).T
+        k, kx, ky, turning = half.sum(), half @ x, half @ y, half @ (x * x + y * y)
+        K = np.array([[k, 0.0, -ky], [0.0, k, kx], [-ky, kx, turning]])
         root = 1 / np.sqrt(mass[moves])
         largest = np.linalg.eigvalsh(K[np.ix_(moves, moves)] * np.outer(root, root))[-1]
         top = max(top, 2 * float(largest))

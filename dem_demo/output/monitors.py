@@ -1,5 +1,7 @@
 """Monitors of a run: slip, shear, points of a rock; and what the law alone says of them."""
 
+from contextlib import suppress
+
 import numpy as np
 
 import jointlaw as jl
@@ -12,40 +14,35 @@ SLIP_DISTANCE = 2e-3  # m, for laws without a critical slip distance
 ROUNDS = 50  # most trials of an angle; a handful is enough where there is one
 
 
-class SlipMonitor:
-    """Looks for the slip of the joints that the scene's [watch] table names."""
+Slips = dict[tuple[int, int], dict]  # by the moving block and its base
 
-    def __init__(self, sim: Simulation) -> None:
-        self.scene, self.slips, self.lengths = sim.scene, {}, {}
-        for moving, base in self.scene.monitors.slip:
-            name = law_between(sim, moving, base)
-            distance = slip_distance(self.scene.laws[name])
-            self.slips[moving, base] = {
-                "block": self.scene.blocks[moving].name,
-                "base": self.scene.blocks[base].name,
-                "law": name,
-                "slip_distance": distance,
-                "slip_angle": None,
-                "slip_time": None,
-                "slipped_before": sim.slid(moving, base) > distance,
-            }
-            here = sim.tracker.between(moving, base)
-            self.lengths[moving, base] = float(sim.contacts.length[here].sum())
 
-    def look(self, sim: Simulation) -> None:
-        """Note the base angle at which a joint passes its slip distance."""
-        for (moving, base), entry in self.slips.items():
-            waits = entry["slip_angle"] is None and not entry["slipped_before"]
-            if waits and sim.slid(moving, base) > entry["slip_distance"]:
-                entry["slip_angle"] = base_angle(sim, moving, base)
-                entry["slip_time"] = sim.time
+def watched_slips(sim: Simulation) -> Slips:
+    """What is known at the start of the slips that the scene's [watch] table names."""
+    slips, scene = {}, sim.scene
+    for moving, base in scene.slip:
+        name = law_between(sim, moving, base)
+        distance = slip_distance(scene.laws[name])
+        length = float(sim.contacts.length[sim.tracker.between(moving, base)].sum())
+        slips[moving, base] = {
+            "block": scene.blocks[moving].name,
+            "base": scene.blocks[base].name,
+            "law": name,
+            "slip_distance": distance,
+            "slip_angle": None,
+            "slip_time": None,
+            "slipped_before": sim.slid(moving, base) > distance,
+            **slip_angle(scene, name, moving, length),
+        }
+    return slips
 
-    def report(self) -> list[dict]:
-        """Measured and predicted slip angles (degrees)."""
-        return [
-            entry | slip_angle(self.scene, entry["law"], pair[0], self.lengths[pair])
-            for pair, entry in self.slips.items()
-        ]
+
+def look(slips: Slips, sim: Simulation) -> None:
+    """Note the base angle (degrees) at which a joint passes its slip distance."""
+    for (moving, base), entry in slips.items():
+        waits = entry["slip_angle"] is None and not entry["slipped_before"]
+        if waits and sim.slid(moving, base) > entry["slip_distance"]:
+            entry |= {"slip_angle": base_angle(sim, moving, base), "slip_time": sim.time}
 
 
 def base_angle(sim: Simulation, moving: int, base: int) -> float:
@@ -77,11 +74,11 @@ def _face(sim: Simulation, block: int, other: int) -> tuple[int, np.ndarray]:
 def readings(sim: Simulation) -> dict[str, float]:
     """What the scene's [watch] table asks for, now; the unit ends the name."""
     row, blocks = {}, sim.scene.blocks
-    for moving, base in (*sim.scene.monitors.slip, *sim.scene.monitors.shear):
+    for moving, base in (*sim.scene.slip, *sim.scene.shear):
         name = blocks[moving].name
         row[f"{name}: base angle_deg"] = base_angle(sim, moving, base)
         row |= {f"{name}: {key}": value for key, value in _joint(sim, moving, base).items()}
-    for i, (block, point) in enumerate(sim.scene.monitors.pins):
+    for i, (block, point) in enumerate(sim.scene.pins):
         x, y, angle = sim.blocks.motion[:3, block]
         arm = np.asarray(point) - blocks[block].centroid
         row[f"pin {i + 1}: moved_m"] = float(np.hypot(*(turn(angle) @ arm + [x, y] - point)))
@@ -107,8 +104,8 @@ def friction_angle(law: jl.JointLaw, stress: float) -> float:
     """Peak of F2/F1 (degrees) of the law in direct shear at a constant normal stress (Pa)."""
     if is_coulomb(law):
         return float(np.degrees(np.arctan(law.asperity.mu)))
-    to = [1.2 * slip_distance(law)]  # friction peaks where the contacts begin to be renewed
-    record = jl.direct_shear(law.joint(), to=to, normal=stress, steps=120)
+    far = 1.2 * slip_distance(law)  # friction peaks where the contacts begin to be renewed
+    record = jl.direct_shear(law.joint(), to=[far], normal=stress, steps=120)
     return float(record.peak_friction_angle)
 
 
@@ -118,7 +115,7 @@ def slip_angle(scene: Scene, law_name: str, moving: int, length: float) -> dict:
     The normal stress falls as the base tilts, so angle and stress are found together. Both are None
     where the law says nothing: no contact, no gravity, a stress that it cannot carry.
     """
-    weight, angle = scene.blocks[moving].mass * np.hypot(*scene.gravity), 35.0
+    weight, angle = scene.blocks[moving].section.mass * np.hypot(*scene.gravity), 35.0
     for _ in range(ROUNDS if length > 0 else 0):
         before, stress = angle, float(weight / length * np.cos(np.radians(angle)))
         try:
@@ -137,10 +134,8 @@ def shear_curve(law: jl.JointLaw, stress: float, slid: np.ndarray) -> jl.Record 
     motion.
     """
     inner = np.flatnonzero(np.diff(np.sign(np.diff(slid)))) + 1
-    turns = [float(u) for u in [*slid[inner], slid[-1]]]
-    try:
+    with suppress(ValueError, PathError):
         if not is_coulomb(law):
+            turns = [*slid[inner].tolist(), float(slid[-1])]
             return jl.direct_shear(law.joint(), to=turns, normal=stress, steps=400)
-    except (ValueError, PathError):
-        pass
     return None

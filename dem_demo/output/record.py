@@ -8,29 +8,25 @@ import numpy as np
 from ..dynamics.energy import COLUMNS
 from ..dynamics.simulation import Simulation
 from ..scene import usual_size
-from .monitors import SlipMonitor, law_between, readings
+from .monitors import law_between, readings, watched_slips
 
-JOINT_COLUMNS = (
-    "closure_m", "shear_m", "normal_stress_Pa", "shear_stress_Pa",
-    "sliding", "slipping", "separated", "length_m", "sliding_m/s",
-)  # fmt: skip
 FAILED = 0.1  # of the usual size of a rock's blocks: one that has moved farther has failed
 CREEP = 1e-6  # m/s: faster is not at rest
 LOOK_BACK = 1.0  # s over which creep is measured
 
 
 class Record:
-    """Frames of a run: times (f,), motion (f, 6, n), energies (f, 9), joints as lists of arrays.
+    """Frames of a run: times (f,), motion (f, 6, n), energies (f, 9), joints.
 
-    joints[f]: "who" (k, 5) block, edge, block, edge, contact; "ends" (k, 2, 2) the segment of joint
-    that a contact carries; "values" (k, 9) as JOINT_COLUMNS. monitored[f]: what the scene's
-    [watch] asks for; slips: its slip angles; laws: of the watched joints; state: that of the last
-    frame, to return to.
+    joints[f]: by name, "who" (k, 5) block, edge, block, edge, contact; "ends" (k, 2, 2) the segment
+    of joint that a contact carries; and numbers (k,) with their unit in the name. monitored[f]:
+    what the scene's [watch] asks for; slips: of its joints; laws: of the watched joints; state:
+    that of the last frame, to return to.
     """
 
     def __init__(self, sim: Simulation) -> None:
-        self.scene, self.slips = sim.scene, SlipMonitor(sim)
-        watched = (*sim.scene.monitors.slip, *sim.scene.monitors.shear)
+        self.scene, self.slips = sim.scene, watched_slips(sim)
+        watched = (*sim.scene.slip, *sim.scene.shear)
         self.laws = {pair: law_between(sim, *pair) for pair in watched}
         self.times: list[float] = []
         self.motion: list[np.ndarray] = []
@@ -50,11 +46,6 @@ class Record:
         self.state = sim.state()
 
     @property
-    def largest_error(self) -> float:
-        """Largest imbalance of the energies since the first frame."""
-        return max((abs(row[-1]) for row in self.energy[1:]), default=0.0)
-
-    @property
     def moved(self) -> np.ndarray:
         """Distance (n,) that the blocks have moved since the first frame (m)."""
         return np.hypot(*(self.motion[-1] - self.motion[0])[:2])
@@ -63,46 +54,30 @@ class Record:
         """A monitored quantity over all frames."""
         return np.array([row[name] for row in self.monitored])
 
-    def joint(self, i: int, name: str) -> np.ndarray:
-        """One of JOINT_COLUMNS of the joints of frame i."""
-        return self.joints[i]["values"][:, JOINT_COLUMNS.index(name)]
-
-    def write(self, folder: Path) -> None:
-        """history.csv, blocks.csv and joints.csv."""
-        names = [block.name for block in self.scene.blocks]
+    def write(self, path: Path) -> None:
+        """history.csv: times, energies and what the scene's [watch] asks for."""
         header = ["time_s", *(f"{c}_J" for c in COLUMNS), "energy_error", *self.monitored[0]]
         rows = zip(self.times, self.energy, self.monitored, strict=True)
-        write_csv(folder / "history.csv", header, ([t, *e, *w.values()] for t, e, w in rows))
-        header = ["time_s", "block", "x_m", "y_m", "angle_rad", "vx_m/s", "vy_m/s", "spin_rad/s"]
-        rows = []
-        for t, motion in zip(self.times, self.motion, strict=True):
-            rows += [[t, name, *b] for name, b in zip(names, motion.T.tolist(), strict=True)]
-        write_csv(folder / "blocks.csv", header, rows)
-        header = ["time_s", "block_a", "edge_a", "block_b", "edge_b", "point", *JOINT_COLUMNS]
-        rows = []
-        for t, frame in zip(self.times, self.joints, strict=True):
-            who, values = frame["who"].tolist(), frame["values"].tolist()
-            for (a, edge_a, b, *rest), numbers in zip(who, values, strict=True):
-                rows.append([t, names[a], edge_a, names[b], *rest, *numbers])
-        write_csv(folder / "joints.csv", header, rows)
+        write_csv(path, header, ([t, *e, *w.values()] for t, e, w in rows))
 
 
 def _joints(sim: Simulation) -> dict[str, np.ndarray]:
     """Joints that touch or almost touch."""
     c, joints = sim.contacts, sim.joints
-    keep = c.length > 0
-    values = [
-        c.closure, joints.delta[:, 1], *joints.traction.T, joints.sliding, joints.slipping,
-        joints.separated, c.length, c.sliding,
-    ]  # fmt: skip
     # The segment: what each side of the corner carries of it, the rest half and half.
     part = c.carried + 0.5 * (c.length - c.carried.sum(axis=0))
     ahead = part[0] / np.maximum(part.sum(axis=0), 1e-300)
     along = np.where(c.outlines.block[c.edge] == c.a, 1j, -1j) * c.normal
     ends = c.at + np.stack([ahead, ahead - 1], axis=0) * c.length * along
     ends = np.stack([ends.real, ends.imag], axis=-1).swapaxes(0, 1)
-    who = np.column_stack([c.interfaces, sim.tracker.numbers])
-    return {"who": who[keep], "ends": ends[keep], "values": np.column_stack(values)[keep]}
+    columns = {
+        "who": np.column_stack([c.interfaces, sim.tracker.numbers]), "ends": ends,
+        "closure_m": c.closure, "shear_m": joints.delta[:, 1],
+        "normal_stress_Pa": joints.traction[:, 0], "shear_stress_Pa": joints.traction[:, 1],
+        "sliding": joints.sliding, "slipping": joints.slipping, "separated": joints.separated,
+        "length_m": c.length, "sliding_m/s": c.sliding,
+    }  # fmt: skip
+    return {name: column[c.length > 0] for name, column in columns.items()}
 
 
 def write_csv(path: Path, header, rows) -> None:
@@ -113,12 +88,6 @@ def write_csv(path: Path, header, rows) -> None:
         writer.writerows(rows)
 
 
-def displacement(record: Record, i: int) -> np.ndarray:
-    """Displacement (n, 2) of the blocks in frame i since they were drawn, without weight (m)."""
-    drawn = np.array([block.centroid for block in record.scene.blocks])
-    return record.motion[i][:2].T - drawn
-
-
 def outcomes(record: Record) -> list[dict]:
     """One entry for each `[[rock]]` of the scene.
 
@@ -127,23 +96,22 @@ def outcomes(record: Record) -> list[dict]:
     over the last second (or the whole run, if shorter).
     """
     out = []
-    first, last = displacement(record, 0), displacement(record, -1)
     times = np.array(record.times)
-    before = int(np.searchsorted(times, times[-1] - LOOK_BACK + 1e-9)) if len(times) > 1 else 0
-    before = min(before, max(len(times) - 2, 0))
-    crept = np.hypot(*(last - displacement(record, before)).T)
-    crept /= max(times[-1] - times[before], 1e-300)
+    before = int(np.searchsorted(times, times[-1] - LOOK_BACK + 1e-9))
+    before = max(min(before, len(times) - 2), 0)
+    drawn = np.array([block.centroid for block in record.scene.blocks])
+    first, then, last = (record.motion[i][:2].T - drawn for i in (0, before, -1))
+    crept = np.hypot(*(last - then).T) / max(times[-1] - times[before], 1e-300)
     for rock in record.scene.rocks:
-        free = rock.free
-        moved, creep = np.hypot(*(last - first)[free].T), float(crept[free].max())
-        limit = FAILED * usual_size(record.scene.blocks[i] for i in free)
+        moved, creep = np.hypot(*(last - first)[rock.free].T), float(crept[rock.free].max())
+        limit = FAILED * usual_size(record.scene.blocks[i] for i in rock.free)
         failed = int((moved > limit).sum())
         out.append(
             {
                 "rock": rock.name,
                 "state": "fails" if failed else "stands" if creep < CREEP else "moves",
-                "blocks": len(free),
-                "settled_m": float(np.hypot(*first[free].T).max()),
+                "blocks": len(rock.free),
+                "settled_m": float(np.hypot(*first[rock.free].T).max()),
                 "moved_m": float(moved.max()),
                 "failed": failed,
                 "failed_beyond_m": limit,
@@ -155,19 +123,26 @@ def outcomes(record: Record) -> list[dict]:
 
 def far(record: Record) -> bool:
     """Has a block moved by more than the usual size of a block?"""
-    size = usual_size(block for block in record.scene.blocks if not block.fixed)
-    return bool(record.moved.max() > size)
+    free = (block for block in record.scene.blocks if not block.fixed)
+    return bool(record.moved.max() > usual_size(free))
+
+
+def sentences(record: Record) -> list[str]:
+    """What a person wants to know at the end: a line for each watched slip and each rock."""
+    found = []
+    for slip in record.slips.values():
+        angle, alone = slip["slip_angle"], slip["predicted_angle"]
+        said = f"slipped at {angle:.2f} degrees" if angle is not None else "no slip"
+        said = "had slipped before this run" if slip["slipped_before"] else said
+        law = "nothing" if alone is None else f"{alone:.2f} degrees"
+        found.append(f"{slip['block']}: {said}, the law alone says {law}")
+    return [*found, *map(sentence, outcomes(record))]
 
 
 def sentence(entry: dict) -> str:
     """One line for a person."""
-    start = f"{entry['rock']}: {entry['state']}; "
-    if entry["failed"]:
-        many = f"{entry['failed']} of {entry['blocks']} blocks moved more than "
-        many += f"{entry['failed_beyond_m']:.2g} m"
-        return f"{start}{many}, the farthest {entry['moved_m']:.2f} m"
-    moved = max(1e3 * entry["moved_m"], 1e-3)
     return (
-        f"{start}no block of {entry['blocks']} moved more than {moved:.2g} mm, "
+        f"{entry['rock']}: {entry['state']}; {entry['failed']} of {entry['blocks']} blocks moved "
+        f"more than {entry['failed_beyond_m']:.2g} m, the farthest {entry['moved_m']:.2g} m; "
         f"creep {entry['creep_m_per_s']:.1e} m/s"
     )

@@ -1,44 +1,40 @@
 """Run a scene to its end and write what a user wants to see."""
 
-import os
-import signal
 import sys
-import threading
 import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-import numpy as np
 from tqdm import tqdm
 
-from jointlaw.support.files import clear_run, replace_file, write_json
+from jointlaw.support.files import clear_run, write_json
 from jointlaw.support.pyplot import FORMATS
 
 from ..dynamics.energy import COLUMNS
 from ..dynamics.saved_states import require_text
 from ..dynamics.simulation import Simulation
 from ..errors import Refused
-from .pictures import Pictures, energy, joints
+from .monitors import look
+from .pictures import Pictures, curves
 from .record import Record, outcomes
 
 MOST_STEPS = 1e12  # of a run: years
-INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 LOOKS = 8  # steps between two looks for slip
 VERSION = 1  # of summary.json
-TABLES = ("history.csv", "blocks.csv", "joints.csv")
+HISTORY = "history.csv"
 
 
 def run(
     sim: Simulation, folder: Path | None = None, until: float | None = None,
-    pictures: bool = True, picture_format: str = FORMATS[0], vtk: bool = False,
+    pictures: str | None = FORMATS[0], vtk: bool = False,
 ):  # fmt: skip
     """Run to `until` (s, default the scene's end); writes into `folder` if given.
 
-    vtk: VTK files too, which needs meshio.
-    Returns (record, summary). A state that the method cannot carry raises Refused and leaves the
-    last good one in `folder`/refused, from where the run can be repeated or resumed. Ctrl-C stops
-    it after a step, writes what there is and raises KeyboardInterrupt. Results of another run in
+    pictures: their format, None for none; vtk: VTK files too, which needs meshio.
+    Returns (record, summary). A state that the method cannot carry raises Refused, Ctrl-C raises
+    KeyboardInterrupt; before, all is written up to the last frame, and the state of then into
+    `folder`/refused or `folder`/state, from where the run can be resumed. Results of another run in
     `folder` are replaced whole. Raises ValueError, before the first step, for an `until` that
     cannot be reached and for a scene that cannot be saved.
     """
@@ -47,46 +43,41 @@ def run(
         require_text(sim.scene)
         folder.mkdir(parents=True, exist_ok=True)
     started, first_step, record = time.perf_counter(), sim.n, Record(sim)
-    drawn, interrupted, trouble = picture_format if pictures else None, False, None
+    stopped: BaseException | None = None
     try:
         play(sim, record, until)
-    except Refused as error:
-        trouble = error
-    except KeyboardInterrupt:
-        interrupted = True
-    if trouble and folder:
-        clear_run(folder)
-        sim.save(folder / "refused", record.state)
-        replace_file(folder / "refused" / "why.txt", f"{trouble}\n".encode())
-        write(record, {"version": VERSION, "refused": str(trouble)}, folder, None, vtk)
-        trouble = Refused(f"{trouble}\nThe last good state is in {folder / 'refused'}")
-    if trouble:
-        raise trouble
+    except (Refused, KeyboardInterrupt) as error:
+        stopped = error
     summary = {
         "version": VERSION,
         "scene": sim.scene.title,
-        "model_time_s": sim.time,
-        "steps": sim.n - first_step,
+        "model_time_s": record.times[-1],
+        "steps": int(record.state["n"]) - first_step,
         "time_step_s": sim.dt,
         "step_limit_s": sim.limit.least,
         "time_step_margin": sim.limit.least / sim.dt,
         "started_in_equilibrium": bool(sim.balanced),
         "law_points": sim.joints.n,
-        "energy_J": {c: sim.ledger.value[c] for c in COLUMNS},
-        "energy_error": sim.ledger.error,
-        "largest_energy_error": record.largest_error,
-        "slip": record.slips.report(),
+        "energy_J": dict(zip(COLUMNS, record.energy[-1][:-1], strict=True)),
+        "energy_error": record.energy[-1][-1],
+        "largest_energy_error": max((abs(row[-1]) for row in record.energy[1:]), default=0.0),
+        "slip": list(record.slips.values()),
         "rocks": outcomes(record),
         "wall_time_s": time.perf_counter() - started,
-        "interrupted": interrupted,
+        "stopped": stopped and (str(stopped) or "interrupted"),
     }
+    told = summary["stopped"]
     if folder:
+        place = folder / ("refused" if isinstance(stopped, Refused) else "state")
         clear_run(folder)
-        sim.save(folder / "state")
-        write(record, summary, folder, drawn, vtk)
-    if interrupted:
-        where = f"; go on: python -m dem_demo resume {folder / 'state'} --out NEW" if folder else ""
-        raise KeyboardInterrupt(f"interrupted at {sim.time:.4g} s of model time{where}")
+        sim.save(place, record.state)
+        write(record, summary, folder, pictures, vtk)
+        told = (
+            f"{summary['stopped']}; go on from {record.times[-1]:.4g} s of model time: "
+            f"python -m dem_demo resume {place} --out NEW"
+        )
+    if stopped:
+        raise type(stopped)(told) from None
     return record, summary
 
 
@@ -96,35 +87,17 @@ def play(
     until: float | None = None,
     stop: Callable[[Record], bool] = lambda record: False,
 ) -> None:
-    """Step to `until` (s), or to where `stop` says so, and record on the way. Raises Refused.
-
-    After Ctrl-C the present is the last frame and KeyboardInterrupt is raised; a second Ctrl-C ends
-    the process at once.
-    """
+    """Step to `until` (s), or to where `stop` says so, and record on the way. Raises Refused."""
     steps = steps_to(sim, until)
     every = max(round(min(sim.scene.run.record / sim.dt, steps + 1)), 1)
-    pressed, main = threading.Event(), threading.current_thread() is threading.main_thread()
-
-    def note(_signal, _frame) -> None:  # pymunk's callbacks would swallow a KeyboardInterrupt
-        if pressed.is_set():
-            os._exit(INTERRUPTED)  # at once, and nothing more is written
-        pressed.set()
-
-    before = signal.signal(signal.SIGINT, note) if main else None
-    try:
-        for i in tqdm(range(1, steps + 1), desc=sim.scene.title, disable=not sys.stderr.isatty()):
-            sim.step()
-            if i % LOOKS == 0:
-                record.slips.look(sim)
-            if i % every == 0 or i == steps or pressed.is_set():
-                record.take(sim)
-                if pressed.is_set():
-                    raise KeyboardInterrupt
-                if stop(record):
-                    break
-    finally:
-        if main:
-            signal.signal(signal.SIGINT, before)
+    for i in tqdm(range(1, steps + 1), desc=sim.scene.title, disable=not sys.stderr.isatty()):
+        sim.step()
+        if i % LOOKS == 0:
+            look(record.slips, sim)
+        if i % every == 0 or i == steps:
+            record.take(sim)
+            if stop(record):
+                break
 
 
 def steps_to(sim: Simulation, until: float | None = None) -> int:
@@ -132,14 +105,12 @@ def steps_to(sim: Simulation, until: float | None = None) -> int:
 
     Raises ValueError for a time given that is past, not finite, or out of reach.
     """
-    now, dt, end = sim.time, sim.dt, sim.scene.run.end if until is None else until
-    if until is not None and not now - 0.5 * dt <= until < np.inf:
-        raise ValueError(f"until = {until} s: must be finite and >= the time now, {now:.6g} s")
-    steps = max((end - now) / dt, 0.0)
-    if not steps <= MOST_STEPS:
-        raise ValueError(
-            f"end = {end:g} s: {steps:.3g} steps of {dt:.3g} s; must be <= {MOST_STEPS:g}"
-        )
+    now, dt = sim.time, sim.dt
+    end = max(sim.scene.run.end, now) if until is None else until
+    steps = (end - now) / dt
+    if not -0.5 <= steps <= MOST_STEPS:
+        raise ValueError(f"until = {end:g} s: {steps:.3g} steps of {dt:.3g} s from {now:.6g} s; "
+                         f"must be from 0 to {MOST_STEPS:g}")  # fmt: skip
     return round(steps)
 
 
@@ -148,12 +119,11 @@ def write(record: Record, summary: dict, folder: Path, drawn: str | None, vtk: b
     pictures: dict[str, Callable[[Path], None]] = {}
     if drawn:
         of = Pictures(record)
-        if record.scene.monitors.shear:
-            pictures[f"curves.{drawn}"] = partial(joints, record)
-        pictures[f"energy.{drawn}"] = partial(energy, record)
-        pictures |= {f"final.{drawn}": of.final, "motion.gif": of.animation}
-    write_json(folder / "summary.json", {**summary, "files": [*TABLES, *pictures]})
-    record.write(folder)
+        pictures = {f"final.{drawn}": of.final, "motion.gif": of.animation}
+        if record.scene.shear:
+            pictures[f"curves.{drawn}"] = partial(curves, record)
+    write_json(folder / "summary.json", {**summary, "files": [HISTORY, *pictures]})
+    record.write(folder / HISTORY)
     for name, draw in pictures.items():
         draw(folder / name)
     if vtk:

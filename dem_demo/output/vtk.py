@@ -9,14 +9,14 @@ import numpy as np
 from jointlaw.support.progress import track
 
 from .pictures import STATES, Pictures, outlines
-from .record import JOINT_COLUMNS, Record
+from .record import Record
 
 
 def write(record: Record, folder: Path) -> None:
     """blocks_N.vtu and joints_N.vtu of every frame N, in SI units.
 
-    Blocks carry their number, displacement, velocity and spin. Joints carry what joints.csv has of
-    them, and `state`: 0 stuck, 1 partly sliding, 2 sliding, 3 open, as in final.png.
+    Blocks carry their number, displacement, velocity and spin. Joints carry
+    the numbers of the record and `state`: 0 stuck, 1 partly sliding, 2 sliding, 3 open.
     """
     folder.mkdir(parents=True, exist_ok=True)
     pictures, names = Pictures(record), list(STATES)
@@ -43,7 +43,7 @@ def _blocks(record: Record, i: int) -> meshio.Mesh:
 
 
 def _joints(joints: dict[str, np.ndarray], state: np.ndarray) -> meshio.Mesh:
-    columns = dict(zip(JOINT_COLUMNS, joints["values"].T, strict=True)) | {"state": state}
+    columns = {k: v for k, v in joints.items() if k not in ("who", "ends")} | {"state": state}
     ends = joints["ends"].reshape(-1, 2)
     cells = [("line", np.arange(len(ends)).reshape(-1, 2))]
     data = {name: [values] for name, values in columns.items()}

@@ -9,16 +9,15 @@ scene      a scene in memory
 read       a scene from its file
 """
 
-from .blocks import Block, turn, usual_size
+from .blocks import Block, smallest_width, turn, usual_size
 from .drives import Drive, Drives
 from .keys import Tables, overlay
-from .laws import Files, build_law, coulomb_law, is_coulomb, law_table
-from .read import DENSITY, GRAVITY, TEMPLATE, build, load, names, parse, read_tables
+from .laws import STICKS, Files, build_law, coulomb_law, is_coulomb
+from .read import TEMPLATE, build, load, parse, read_tables, shipped
 from .scene import Key, Run, Scene
 
 __all__ = [
-    "DENSITY",
-    "GRAVITY",
+    "STICKS",
     "TEMPLATE",
     "Block",
     "Drive",
@@ -32,12 +31,12 @@ __all__ = [
     "build_law",
     "coulomb_law",
     "is_coulomb",
-    "law_table",
     "load",
-    "names",
     "overlay",
     "parse",
     "read_tables",
+    "shipped",
+    "smallest_width",
     "turn",
     "usual_size",
 ]

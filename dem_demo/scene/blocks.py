@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 import pymunk
+from shapely import Point, Polygon
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,41 +28,22 @@ class Block:
     held: tuple[str, ...] = ()
 
     @cached_property
-    def _shape(self) -> pymunk.Poly:
-        """The section as pymunk has it, from corner 0 so that a far block loses no digits."""
+    def section(self) -> pymunk.Poly:
+        """The section with its area (m2), mass (kg) and moment of inertia (kg m2) of a metre of
+        thickness; pymunk has it from corner 0, so that a far block loses no digits."""
         shape = pymunk.Poly(None, (self.corners - self.corners[0]).tolist())
         shape.density = self.density
         return shape
 
     @property
-    def area(self) -> float:
-        """Area (m2) of the section."""
-        return self._shape.area
-
-    @property
     def centroid(self) -> np.ndarray:
         """Centre of gravity (m)."""
-        return self.corners[0] + self._shape.center_of_gravity
-
-    @property
-    def mass(self) -> float:
-        """Mass (kg) of a metre of thickness."""
-        return self._shape.mass
-
-    @property
-    def moment(self) -> float:
-        """Moment of inertia about the centroid (kg m2) of a metre of thickness."""
-        return self._shape.moment
+        return self.corners[0] + self.section.center_of_gravity
 
     @property
     def local(self) -> np.ndarray:
         """Corners (m) measured from the centroid."""
         return self.corners - self.centroid
-
-    @property
-    def width(self) -> float:
-        """Smallest width (m) over the directions of its edges."""
-        return smallest_width(self.corners)
 
     @property
     def reach(self) -> float:
@@ -70,13 +52,12 @@ class Block:
 
     def holds(self, point) -> bool:
         """Is a point (m) inside the block?"""
-        edge = np.roll(self.corners, -1, axis=0) - self.corners
-        return bool((_cross(edge, np.asarray(point) - self.corners) > 0).all())
+        return bool(Polygon(self.corners).contains(Point(point)))
 
 
 def usual_size(blocks: Iterable[Block]) -> float:
     """Side (m) of the square with the median area of some blocks."""
-    return float(np.sqrt(np.median([block.area for block in blocks])))
+    return float(np.sqrt(np.median([block.section.area for block in blocks])))
 
 
 def box(width: float, height: float, at=(0.0, 0.0), angle: float = 0.0) -> np.ndarray:
@@ -105,11 +86,8 @@ def check_convex(corners: np.ndarray) -> str | None:
     length = np.hypot(*edge.T)
     if length.min() < 1e-6 * length.max():
         return "has two corners (almost) at the same place"
-    bend = _cross(edge, np.roll(edge, -1, axis=0)) / (length * np.roll(length, -1))
+    x, y = edge.T
+    bend = (x * np.roll(y, -1) - y * np.roll(x, -1)) / (length * np.roll(length, -1))
     if (bend <= 1e-9).any():
         return "must be convex and listed counter-clockwise, without three corners on a line"
     return None
-
-
-def _cross(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    return p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]

@@ -53,21 +53,12 @@ class JointSet:
         return offsets[(offsets > low) & (offsets < high)]
 
 
-@dataclass(frozen=True, eq=False)
-class CutRock:
-    """Convex corners (m, 2) of the blocks, counter-clockwise; of every edge its set's number or -1.
-
-    joined: slivers that became part of a neighbour; dropped: areas (m2) of those that could not.
-    """
-
-    blocks: list[np.ndarray]
-    sets: list[np.ndarray]
-    joined: int
-    dropped: list[float]
-
-
-def cut(outline: np.ndarray, sets: Sequence[JointSet], seed: int, least_width: float) -> CutRock:
+def cut(outline: np.ndarray, sets: Sequence[JointSet], seed: int, least_width: float):
     """Cut a simple outline (m, 2) into convex blocks no narrower than `least_width` (m).
+
+    Returns the corners (m, 2) of each block, counter-clockwise; for each block the numbers (m,) of
+    the sets of its edges, or -1; how many slivers became part of a neighbour; and the areas (m2) of
+    those that could not. Raises ValueError.
 
     A piece that is still not convex (the outline bends inwards) is cut along the first set that
     runs through its inward corner. A sliver joins a neighbour with which it makes a convex block,
@@ -89,7 +80,7 @@ def cut(outline: np.ndarray, sets: Sequence[JointSet], seed: int, least_width: f
     pieces, joined, dropped = _without_slivers(pieces, lines, least_width, tiny)
     shapes = [_corners(piece, tiny) for piece in pieces]
     shapes.sort(key=lambda c: tuple(np.round(c.mean(axis=0)[::-1], 6)))
-    return CutRock(shapes, [_sets_of(c, lines, tiny) for c in shapes], joined, dropped)
+    return shapes, [_sets_of(c, lines, tiny) for c in shapes], joined, dropped
 
 
 def _crossed(piece, normal, offset, tiny, persistence, rng) -> list[Polygon]:
@@ -108,7 +99,7 @@ def _split(piece: Polygon, normal: np.ndarray, offset: float) -> list[Polygon]:
 
 
 def _convex_parts(piece: Polygon, sets, lines, tiny) -> list[Polygon]:
-    if _width(piece) < tiny:
+    if smallest_width(np.array(piece.exterior.coords)) < tiny:
         return []
     corners = _corners(piece, tiny)
     inward = corners[_bends(corners) < 0]
@@ -126,15 +117,15 @@ def _convex_parts(piece: Polygon, sets, lines, tiny) -> list[Polygon]:
 def _without_slivers(pieces: list[Polygon], lines, least: float, tiny: float):
     """Join or drop what is narrower than `least`, the narrowest first."""
     pieces, joined, dropped = list(pieces), 0, []
-    widths = [_width(piece) for piece in pieces]
-    while pieces and min(widths) < least:
-        i = int(np.argmin(widths))
-        sliver = pieces.pop(i)
-        widths.pop(i)
+    while pieces:
+        widths = [smallest_width(np.array(piece.exterior.coords)) for piece in pieces]
+        if min(widths) >= least:
+            break
+        sliver = pieces.pop(int(np.argmin(widths)))
         for j in _neighbours(sliver, pieces, lines, tiny):
             whole = sliver.union(pieces[j]).convex_hull
             if whole.area - sliver.area - pieces[j].area < tiny * whole.length:
-                pieces[j], widths[j] = whole, _width(whole)
+                pieces[j] = whole
                 joined += 1
                 break
         else:
@@ -151,10 +142,6 @@ def _neighbours(sliver: Polygon, pieces: list[Polygon], lines, tiny: float) -> l
         shared = [side.intersection(piece.exterior).length for piece in pieces]
         found += [(int(number), part, j) for j, part in enumerate(shared) if part > 10 * tiny]
     return [j for *_, j in sorted(found, reverse=True)]
-
-
-def _width(piece: Polygon) -> float:
-    return smallest_width(np.array(piece.exterior.coords)[:-1])
 
 
 def _corners(piece: Polygon, tiny: float) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
@@ -18,24 +18,15 @@ TITLES = {"time_s,velocity_m/s": 1, "time_s,acceleration_m/s2": 2}
 SAMPLES = 40  # of a sine, per cycle
 
 
-@dataclass(frozen=True)
-class Reversal:
-    """What a drive does once `block` has slid `slid` (m) along it: go back `by` at `rate` (1/s)."""
-
-    block: int
-    slid: float
-    by: float
-    rate: float
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Drive:
     """Motion of one block along "x" or "y" (m) or "turn" (rad) about its centroid.
 
     Straight lines between (times, values), averaged over the last `ease` seconds so that the
     machine does not strike the rock at a corner; before and after them the block rests.
     With `order` 1 or 2 the values are velocities or accelerations (m/s, m/s2), and after the last
-    the block keeps its velocity, so that nothing strikes it.
+    the block keeps its velocity, so that nothing strikes it. `back`: once `block` has slid `slid`
+    (m) along the driven block, that goes back `by` at `rate` (1/s).
     """
 
     block: int
@@ -43,37 +34,38 @@ class Drive:
     times: tuple[float, ...]
     values: tuple[float, ...]
     ease: float = 0.0
-    back: Reversal | None = None
+    back: dict[str, float] | None = None
     order: int = 0
 
     @cached_property
     def path(self) -> BSpline:
-        """Displacement (m) over the time (s), where `order` is 1 or 2."""
-        return make_interp_spline(self.times, self.values, k=1).antiderivative(self.order)
+        """Displacement (m or rad) over the time (s)."""
+        if not self.ease:
+            return make_interp_spline(self.times, self.values, k=1).antiderivative(self.order)
+        corners = np.union1d(self.times, np.add(self.times, self.ease))
+        now, before = (np.interp(corners - s, self.times, self.values) for s in (0.0, self.ease))
+        return make_interp_spline(corners, (now - before) / self.ease, k=1).antiderivative()
 
     def __call__(self, t: float, reversed_at: float = np.inf) -> float:
         """Prescribed displacement at time t, when it was sent back at `reversed_at`."""
-        if self.order:
-            at = np.clip(t, self.times[0], self.times[-1])
-            return float(self.path(at) + max(t - at, 0.0) * self.path(at, nu=1))
-        if self.ease == 0:
-            return float(self._line(np.array([t]), reversed_at)[0])
-        low, corners = t - self.ease, [*self.times]
-        if self.back and np.isfinite(reversed_at):
-            end = reversed_at + self.back.by / self.back.rate
-            corners = sorted([*corners, reversed_at, end])
-        knots = np.array([low, *(s for s in corners if low < s < t), t])
-        values = self._line(knots, reversed_at)
-        return float(np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(knots)) / self.ease)
+        if np.isfinite(reversed_at):
+            return _sent_back(self, reversed_at)(t)
+        path = self.path
+        at = np.clip(t, path.t[0], path.t[-1])
+        goes_on = (t - at) * path(at, nu=1) if self.order else 0.0
+        return float(path(at) + goes_on)
 
-    def _line(self, t: np.ndarray, reversed_at: float) -> np.ndarray:
-        values = np.interp(np.minimum(t, reversed_at), self.times, self.values)
-        if self.back and np.isfinite(reversed_at):
-            gone = np.clip(self.back.rate * (t - reversed_at), 0.0, self.back.by)
-            ways = np.sign(np.diff(self.values))[np.array(self.times[:-1]) < reversed_at]
-            came = ways[ways != 0][-1:]
-            values = values - gone * (came[0] if came.size else 1.0)
-        return values
+
+@cache
+def _sent_back(drive: Drive, at: float) -> Drive:
+    """A drive that was told at time `at` to go back."""
+    n = int(np.searchsorted(drive.times, at))
+    ways = np.sign(np.diff(drive.values[: n + 1]))
+    way = ways[ways != 0][-1] if ways.any() else 1.0
+    here = float(np.interp(at, drive.times, drive.values))
+    by, rate = drive.back["by"], drive.back["rate"]
+    values = *drive.values[:n], here, here - way * by
+    return replace(drive, times=(*drive.times[:n], at, at + by / rate), values=values)
 
 
 class Drives:
@@ -83,22 +75,23 @@ class Drives:
         self.drives = drives
         self.rows = np.array([d.block for d in drives], int)
         self.axes = np.array([d.axis for d in drives], int)
+        self.reversed_at = np.full(len(drives), np.inf)
 
-    def velocity(self, t: float, dt: float, reversed_at: np.ndarray) -> np.ndarray:
+    def velocity(self, t: float, dt: float) -> np.ndarray:
         """Velocities that carry the drives exactly from t to t + dt."""
-        pairs = zip(self.drives, reversed_at, strict=True)
+        pairs = zip(self.drives, self.reversed_at, strict=True)
         moved = [d(t + dt, at) - d(t, at) if len(d.times) > 1 else 0.0 for d, at in pairs]
         return np.array(moved, float) / dt
 
-    def reverse(
-        self, t: float, reversed_at: np.ndarray, slid: Callable[[int, int], float]
-    ) -> np.ndarray:
+    def reverse(self, t: float, slid: Callable[[int, int], float]) -> None:
         """Send back those drives whose block has slid far enough; slid(block, base) in m."""
-        out = reversed_at.copy()
         for i, d in enumerate(self.drives):
-            if d.back and t < out[i] and slid(d.back.block, d.block) > d.back.slid:
-                out[i] = t
-        return out
+            if (
+                d.back
+                and t < self.reversed_at[i]
+                and slid(d.back["block"], d.block) > d.back["slid"]
+            ):
+                self.reversed_at[i] = t
 
 
 def read_drives(
@@ -111,7 +104,7 @@ def read_drives(
     out = [Drive(i, AXES[axis], (0.0,), (0.0,)) for i, b in enumerate(blocks) for axis in b.held]
     movable = tuple(block.name for block in blocks if not block.fixed)
     for i, table in enumerate(tables):
-        name, motion = f"{where}.drive[{i}]", table["motion"]
+        name, motion = f"{where}: drive[{i}]", table["motion"]
         block = number[one_of(f"{name}.block", table["block"], movable)]
         if motion == "turn" and {"file", "sine"} & set(table):
             raise ValueError(f"{name}: file and sine shake along x or y; for a turn give times")
@@ -125,7 +118,7 @@ def read_drives(
         blocks[block] = replace(blocks[block], held=(*blocks[block].held, motion))
     moved = [(d.block, d.axis) for d in out]
     if len(set(moved)) < len(moved):
-        raise ValueError(f"{where}.drive: a motion of a block is prescribed twice")
+        raise ValueError(f"{where}: drive: a motion of a block is prescribed twice")
     return tuple(out)
 
 
@@ -138,7 +131,8 @@ def _lines(table: Tables, number: dict[str, int], unit: float, where: str) -> di
     line = {"times": tuple(times), "values": tuple(unit * values), "ease": table.get("ease", 0.1)}
     if back := table.get("back"):
         block = number[one_of(f"{where}.back.block", back["block"], tuple(number))]
-        line["back"] = Reversal(block, back["slid"], unit * back["by"], unit * back["rate"])
+        line["back"] = {key: unit * back[key] for key in ("by", "rate")}
+        line["back"] |= {"block": block, "slid": back["slid"]}
     return line
 
 

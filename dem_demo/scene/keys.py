@@ -1,4 +1,4 @@
-"""The keys of a scene's tables, each with what it may be; checked as all TOML of the project."""
+"""The keys of a scene's tables, each with what it may be: rules of `jointlaw.parameters.keys`."""
 
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -7,39 +7,10 @@ from typing import Any
 import numpy as np
 from shapely import Polygon
 
-from jointlaw.parameters.keys import known
+from jointlaw.parameters.keys import Removed
 from jointlaw.support.checks import above, at_least, finite, number, one_of, whole
 
-from ..errors import SceneError
-
 Tables = dict[str, Any]
-
-
-def checked(data: Any, rules: Tables, where: str) -> Tables:
-    """A table whose keys are those of `rules` and whose values pass them. Raises SceneError.
-
-    A rule is a function (name, value) that returns the value or raises ValueError; {...} for a
-    table; [{...}] for a list of tables. A key that ends in "!" is needed.
-    """
-    if not isinstance(data, dict):
-        raise SceneError(f"{where} = {data!r}: must be a table")
-    rule_of = {key.rstrip("!"): rule for key, rule in rules.items()}
-    for key in rules:
-        if key.endswith("!") and key[:-1] not in data:
-            raise SceneError(f"{where}.{key[:-1]} is missing")
-    try:
-        known(data, set(rule_of), where, "")
-        return {key: _value(f"{where}.{key}", data[key], rule_of[key]) for key in data}
-    except (ValueError, TypeError, OverflowError) as error:
-        raise SceneError(str(error)) from None
-
-
-def _value(name: str, value: Any, rule: Any) -> Any:
-    if isinstance(rule, dict):
-        return checked(value, rule, name)
-    if isinstance(rule, list):
-        return [checked(v, rule[0], f"{name}[{i}]") for i, v in enumerate(a(list)(name, value))]
-    return rule(name, value)
 
 
 def a(kind: type) -> Callable[[str, Any], Any]:
@@ -89,14 +60,9 @@ def some_of(name: str, value: Any, names: Iterable[str], count: int | None = Non
     return value
 
 
-def _removed(name: str, value: Any) -> None:
-    raise ValueError(
-        f"{name} is removed: joints carry at their two ends; cut a long block in two instead"
-    )
-
-
+ENDS = Removed("joints carry at their two ends; cut a long block in two instead", None)
 AXES = {"x": 0, "y": 1, "turn": 2}
-TEXT, LIST = a(str), a(list)
+TEXT, LIST, TABLE = a(str), a(list), a(dict)
 POSITIVE, NOT_NEGATIVE = partial(above, bound=0), partial(at_least, bound=0)
 DENSITY = within(50.0, 30000.0, "kg/m3; 2.6 g/cm3 is 2600 kg/m3")
 
@@ -110,9 +76,9 @@ SET = {
     "persistence": within(0, 1, ""), "scatter": within(0, 0.999, "(two joints could meet)"),
 }  # fmt: skip
 ROCK = {
-    "name!": TEXT, "like": TEXT, "outline!": corners, "set!": [SET], "at": vector,
+    "name!": TEXT, "outline!": corners, "set!": [SET], "at": vector,
     "fixed": [{"corners!": corners}], "seed": partial(whole, bound=0), "least_width": POSITIVE,
-    "density": DENSITY, "laws": a(dict),
+    "density": DENSITY, "laws": TABLE,
 }  # fmt: skip
 DRIVE = {
     "block!": TEXT, "motion!": partial(one_of, choices=tuple(AXES)), "ease": NOT_NEGATIVE,
@@ -128,11 +94,11 @@ RUN = {
     "seat": a(bool), "record": POSITIVE, "dashpot_normal": NOT_NEGATIVE,
     "dashpot_shear": NOT_NEGATIVE, "law_steps": partial(whole, bound=1),
     "largest_stress": NOT_NEGATIVE, "skin": POSITIVE, "corner_length": POSITIVE,
-    "max_overlap": POSITIVE, "point_spacing": _removed,
+    "max_overlap": POSITIVE, "point_spacing": ENDS,
 }  # fmt: skip
 SCENE = {
     "title": TEXT, "gravity": vector, "density": DENSITY, "thickness": POSITIVE, "law": TEXT,
-    "laws!": a(dict), "block": [BLOCK], "rock": LIST, "drive": [DRIVE], "run!": RUN,
+    "laws!": TABLE, "block": [BLOCK], "rock": [ROCK], "drive": [DRIVE], "run!": RUN,
     "joint": [{"between": LIST, "around": vector, "law!": TEXT}],
     "watch": {"slip": LIST, "shear": LIST, "pins": LIST},
 }  # fmt: skip

@@ -5,10 +5,11 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import jointlaw as jl
+from jointlaw.parameters.keys import checked
 from jointlaw.parameters.rock import require_rock
+from jointlaw.support.checks import one_of
 
-from ..errors import SceneError
-from .keys import COULOMB, Tables, checked, overlay
+from .keys import COULOMB, TABLE, Tables, overlay
 
 FLAT = 1e15  # orientation.a: no asperity is inclined by more than 2e-15 rad
 STICKS = 1e30  # friction of a joint that never slides
@@ -25,8 +26,7 @@ class Files(dict[str, str]):
         self.folder = Path(folder)
 
     def __missing__(self, name: str) -> str:
-        self[name] = (self.folder / name).read_text(encoding="utf-8-sig")
-        return self[name]
+        return self.setdefault(name, (self.folder / name).read_text(encoding="utf-8-sig"))
 
 
 def coulomb_law(normal_stiffness: float, shear_stiffness: float, friction: float) -> jl.JointLaw:
@@ -35,10 +35,9 @@ def coulomb_law(normal_stiffness: float, shear_stiffness: float, friction: float
     normal_stiffness, shear_stiffness: per area, > 0 (Pa/m); friction: coefficient, >= 0, may be
     infinite. Raises ValueError for others.
     """
-    asperity = jl.Asperity.linear(normal_stiffness, shear_stiffness, min(friction, STICKS))
     return jl.JointLaw(
         orientation=jl.Orientation(FLAT),
-        asperity=asperity,
+        asperity=jl.Asperity.linear(normal_stiffness, shear_stiffness, min(friction, STICKS)),
         asperity_density=1.0,
         resolution=jl.Resolution(1, 3, 1),
         plane=0.0,
@@ -70,17 +69,13 @@ def build_law(data: Tables, where: str, files: Files) -> jl.JointLaw:
 
     Raises ValueError.
     """
-    if not isinstance(data, dict):
-        raise SceneError(f"{where} = {data!r}: must be a table")
-    kind = data.get("kind", "joint")
+    kind = one_of(f"{where}.kind", TABLE(where, data).get("kind", "joint"), ("joint", "coulomb"))
     if kind == "coulomb":
         keys = checked(data, COULOMB, where)
         require_rock({"friction": keys["friction"]}, f"{where}.")
         return coulomb_law(keys["normal_stiffness"], keys["shear_stiffness"], keys["friction"])
-    if kind != "joint":
-        raise SceneError(f"{where}.kind = {kind!r}: must be 'joint' or 'coulomb'")
     if data.get("closure_only"):
-        raise SceneError(f"{where}.closure_only = true: joints between blocks shear; leave it out")
+        raise ValueError(f"{where}.closure_only = true: joints between blocks shear; leave it out")
     keys = {key: value for key, value in law_table(data, files).items() if key != "kind"}
     law = jl.JointLaw.from_dict({"plane": 0.0, **keys}, where)
     require_rock({"mu": law.asperity.mu}, f"{where}.asperity.")

@@ -8,8 +8,6 @@ from .blocks import Block
 from .drives import Drive
 from .laws import Files
 
-SKIN, CORNER = 0.02, 0.1  # of the least width of a block
-
 Key = tuple[int, int, int, int]  # of an interface: block, edge, block, edge
 
 
@@ -18,6 +16,8 @@ class Run:
     """How to run a scene; times in s, lengths in m."""
 
     end: float
+    skin: float  # reach of the search for contacts
+    corner_length: float  # of joint at a corner on an edge
     fraction: float = 0.3  # time step as a share of the limit
     step: float | None = None  # or the time step itself
     seat: bool = True  # start at the gravity closure
@@ -26,8 +26,6 @@ class Run:
     dashpot_shear: float = 0.05
     law_steps: int = 1  # steps of the law per time step: 4 balances energy to 0.5 % in impacts
     largest_stress: float = 0.0  # Pa, expected in impacts: sets the step before anything touches
-    skin: float | None = None  # reach of the search for contacts; default SKIN
-    corner_length: float | None = None  # of a corner on an edge; default CORNER
     max_overlap: float = 0.03  # share of the smaller block's width
 
 
@@ -35,30 +33,24 @@ class Run:
 class Rock:
     """A rock mass of a scene, cut into blocks.
 
-    blocks: their numbers in the scene; free: those that can move; laws: of each (block, edge) that
-    lies on a joint, the law of its set; slivers: what became of them, for a person.
+    blocks: their numbers in the scene; free: those that can move; slivers: what became of them,
+    for a person.
     """
 
     name: str
     blocks: range
     free: list[int]
-    laws: dict[tuple[int, int], str]
     slivers: str
-
-
-@dataclass(frozen=True)
-class Monitors:
-    """What to report on: joints as (moving block, base), points as (block, place in m)."""
-
-    slip: tuple[tuple[int, int], ...] = ()
-    shear: tuple[tuple[int, int], ...] = ()
-    pins: tuple[tuple[int, tuple[float, float]], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
     """Everything that a simulation needs.
 
+    pairs: laws by the blocks of [[joint]] tables; edge_laws: of each (block, edge) that lies on a
+    joint of a rock, the law of its set.
+
+    slip, shear: joints to report on, as (moving block, base); pins: points, as (block, place in m);
     text: of the file that it was read from, empty for a scene made or changed in memory; files:
     what that file names.
     """
@@ -74,29 +66,11 @@ class Scene:
     drives: tuple[Drive, ...] = ()
     gravity: tuple[float, float] = (0.0, -9.81)
     thickness: float = 1.0
-    monitors: Monitors = Monitors()
+    slip: tuple[tuple[int, int], ...] = ()
+    shear: tuple[tuple[int, int], ...] = ()
+    pins: tuple[tuple[int, tuple[float, float]], ...] = ()
     text: str = field(default="", init=False)  # `replace` leaves both out
     files: Files = field(default_factory=Files, init=False)
-
-    @property
-    def skin(self) -> float:
-        """Reach (m) of the search for contacts."""
-        return self.run.skin or SKIN * min(block.width for block in self.blocks)
-
-    @property
-    def corner_length(self) -> float:
-        """Contact length (m) of a corner that stands on an edge."""
-        return self.run.corner_length or CORNER * min(block.width for block in self.blocks)
-
-    @property
-    def doubts(self) -> list[str]:
-        """What of the scene is likely a slip, in words; it can be run all the same."""
-        found = []
-        if self.gravity[1] > 0:
-            found.append(f"gravity = {list(self.gravity)} points upwards: [0, -9.81] is down")
-        if any(self.gravity) and not any(block.fixed or block.held for block in self.blocks):
-            found.append("no block is fixed or held: all fall; give one `fixed = true`")
-        return found
 
     def law_of(self, key: Key) -> str:
         """Name of the law of an interface (block, edge, block, edge).
@@ -109,5 +83,4 @@ class Scene:
             if law := self.pairs.get(frozenset(blocks)):
                 return law
         law = self.edge_laws.get((one, key[1]))
-        same = law is not None and law == self.edge_laws.get((other, key[3]))
-        return law if same else self.default_law
+        return law if law and law == self.edge_laws.get((other, key[3])) else self.default_law

@@ -7,7 +7,7 @@ joints carried nothing stays as it is.
 """
 
 import time
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
@@ -15,22 +15,18 @@ from typing import Any
 
 import numpy as np
 
-import jointlaw as jl
 from jointlaw.laboratory.experiments import PathError
 from jointlaw.parameters.resolution import named
-from jointlaw.support.files import clear_run, write_json
+from jointlaw.support.files import clear_run
 
 from ..dynamics.simulation import Simulation
 from ..errors import Refused
-from ..output.monitors import friction_angle
 from ..output.record import Record, write_csv
 from ..output.run import run
-from ..scene import Scene, coulomb_law, is_coulomb, overlay
+from ..scene import Scene, is_coulomb, overlay
 
-SHALLOW = 1e-3  # step of closure, as a share, over which a stiffness is read
-CELLS = 4  # depth cells at least, where they are placed for the scene
 COST = ("steps", "time_step_s", "cpu_s", "time_ratio", "note")
-VERSION = 2  # of summary.json
+TABLE = "ablation.csv"
 
 SINGLE = {"formation": "individual"}  # population curves are not convex at eta = 0
 STIFFENS = {"orientation", "asperity", "heights"}  # parts that the stiffness depends on
@@ -48,13 +44,11 @@ INGREDIENTS: dict[str, dict[str, Any]] = {  # by name: the keys of a law without
     "one depth cell": {"resolution": {"depth": 1}},
 }
 
-Change = Callable[[jl.JointLaw, list[float]], jl.JointLaw]
 
-
-def ablate(scene: Scene, until: float | None = None, leave_out: Collection[str] = ()) -> list[dict]:
+def ablate(scene: Scene, until: float | None = None) -> list[dict]:
     """Rows: the scene as it is, without each ingredient in turn, and as it is once more.
 
-    until: model time to stop at (s); leave_out: names of variants that are not run. A row holds
+    until: model time to stop at (s). A row holds
     outcomes and "change of ..." against the first row, unit last in the name, and COST. Two rows of
     the whole scene tell how steady the times are; the first also waits for compiled code. A variant
     that cannot be built or run is a row whose note says why.
@@ -64,20 +58,18 @@ def ablate(scene: Scene, until: float | None = None, leave_out: Collection[str] 
         raise Refused(whole["note"])
     rows = [whole]
     for name, make in variants(scene, record):
-        if name not in leave_out:
-            row, other = _run(name, make, until)
-            if other is not None:
-                apart = np.hypot(*(other.motion[-1] - record.motion[-1])[:2])
-                row["end, apart_mm"] = 1e3 * float(apart.max())
-            rows.append(row)
+        row, other = _run(name, make, until)
+        if other is not None:
+            apart = np.hypot(*(other.motion[-1] - record.motion[-1])[:2])
+            row["end, apart_mm"] = 1e3 * float(apart.max())
+        rows.append(row)
     rows.append(_run("whole scene again", lambda: scene, until)[0])
     least = min(whole["cpu_s"], rows[-1]["cpu_s"])
-    numbers = {key: v for key, v in whole.items() if isinstance(v, float) and key not in COST}
+    numbers = [key for key, v in whole.items() if isinstance(v, float) and key not in COST]
     for row in rows:
+        both = [key for key in numbers if row.get(key) is not None]
+        row |= {f"change of {key}": row[key] - whole[key] for key in both}
         row["time_ratio"] = row["cpu_s"] / least
-        for key in numbers.keys() & row.keys():
-            if row[key] is not None:
-                row[f"change of {key}"] = row[key] - whole[key]
     return rows
 
 
@@ -86,37 +78,28 @@ def variants(scene: Scene, record: Record) -> Iterator[tuple[str, Callable[[], S
 
     record: of the whole scene, for the normal stress that the joints of each law carried.
     """
-    pressed: dict[str, list[float]] = {name: [] for name in scene.laws}
+    carried: dict[str, list[float]] = {name: [] for name in scene.laws}
     for i, frame in enumerate(record.joints):
-        stresses = record.joint(i, "normal_stress_Pa").tolist()
+        stresses = record.joints[i]["normal_stress_Pa"].tolist()
         for who, stress in zip(frame["who"].tolist(), stresses, strict=True):
-            pressed[scene.law_of(who)] += [stress] * (stress > 0)
-    joints = {name: law for name, law in scene.laws.items() if not is_coulomb(law)}
-
-    def changed(change: Change) -> Scene:
-        laws = {name: change(law, pressed[name]) for name, law in joints.items() if pressed[name]}
-        return replace(scene, laws={**scene.laws, **laws})
-
-    lacking: dict[str, Change] = {}
-    for law in joints.values():
+            carried[scene.law_of(who)] += [stress] * (stress > 0)
+    pressed = {name: np.median(of) for name, of in carried.items()
+               if of and not is_coulomb(scene.laws[name])}  # fmt: skip
+    lacking: dict[str, dict[str, Any]] = {}
+    for law in (scene.laws[name] for name in pressed):
         names = named(law.critical_slip, law.asperity.yield_interference, law.closure_range)
         given = INGREDIENTS | {
-            f"resolution {n}": {"resolution": asdict(r)} for n, r in names.items()
+            f"resolution {n}": {"resolution": asdict(names[n])} for n in ("fast", "fine")
         }
         own = {"heights": SINGLE} | {k: v for k, v in asdict(law).items() if v is not None}
-        lacking |= {n: partial(_without, keys) for n, keys in given.items() if _differ(own, keys)}
-    if joints:
-        lacking |= {"depth cells at its own stress": _own_range, "plain Coulomb": _coulomb}
-    for name, change in lacking.items():
-        yield name, partial(changed, change)
-    largest = max((max(stresses) for stresses in pressed.values() if stresses), default=0.0)
+        lacking |= {name: keys for name, keys in given.items() if _differ(own, keys)}
+    for name, keys in lacking.items():
+        yield name, partial(_without, scene, keys, pressed)
     run, steps = scene.run, 1 if scene.run.law_steps > 1 else 4
-    fall = max(run.largest_stress, 2.0 * largest)  # a load put down at once reaches its double
     key = "step" if run.step else "fraction"
     others = {
         "no dashpots": {"dashpot_normal": 0.0, "dashpot_shear": 0.0},
         f"law_steps = {steps}": {"law_steps": steps},
-        "not seated": {"seat": False, "largest_stress": fall if run.seat else run.largest_stress},
         "half the time step": {key: 0.5 * getattr(run, key)},
         "twice the time step": {key: 2.0 * getattr(run, key)},
     }
@@ -136,31 +119,16 @@ def _changed(part: Any, keys: dict[str, Any]) -> Any:
     return replace(part, **keys | {k: own and _changed(own, keys[k]) for k, own in nested.items()})
 
 
-def _without(keys: dict[str, Any], law: jl.JointLaw, pressed: list[float]) -> jl.JointLaw:
-    other = _changed(law, keys)
-    if other == law or not STIFFENS & set(keys):
-        return other
-    stress = np.median(pressed)
-    K = law.asperity.K * stress / float(other.normal_stress(law.closure(stress)))
-    return _changed(other, {"asperity": {"K": K}})
-
-
-def _own_range(law: jl.JointLaw, pressed: list[float]) -> jl.JointLaw:
-    """Cells placed for the scene; by default they are for 20 MPa, and all but one lie idle."""
-    closure = float(law.closure(max(pressed)))
-    resolution = replace(law.resolution, depth=max(law.resolution.depth, CELLS))
-    return replace(law, closure_range=closure, resolution=resolution)
-
-
-def _coulomb(law: jl.JointLaw, pressed: list[float]) -> jl.JointLaw:
-    """Constant stiffness and friction: those of the law at the normal stress of its joints."""
-    stress = float(np.median(pressed))
-    closure = float(law.closure(stress))
-    joints = law.joints(1)
-    joints.update([[closure, 0.0]], tangent=False)
-    _, C = joints.trial([[SHALLOW * closure, 0.0]])
-    angle = np.radians(friction_angle(law, stress))
-    return coulomb_law(float(C[0, 0, 0]), float(C[0, 1, 1]), float(np.tan(angle)))
+def _without(scene: Scene, keys: dict[str, Any], pressed: dict[str, float]) -> Scene:
+    """The scene with these keys in the laws whose joints carried; pressed: medians (Pa)."""
+    laws = dict(scene.laws)
+    for name, stress in pressed.items():
+        law, other = laws[name], _changed(laws[name], keys)
+        if other != law and STIFFENS & set(keys):
+            K = law.asperity.K * stress / float(other.normal_stress(law.closure(stress)))
+            other = _changed(other, {"asperity": {"K": K}})
+        laws[name] = other
+    return replace(scene, laws=laws)
 
 
 def _run(name: str, make: Callable[[], Scene], until: float | None) -> tuple[dict, Record | None]:
@@ -168,22 +136,19 @@ def _run(name: str, make: Callable[[], Scene], until: float | None) -> tuple[dic
     row = {"without": name, "steps": 0, "time_step_s": np.nan, "cpu_s": np.nan, "note": ""}
     started = time.process_time()
     try:
-        sim = Simulation(replace(make(), title=name))
-        record, summary = run(sim, None, until)
+        record, summary = run(Simulation(replace(make(), title=name)), None, until)
     except Refused as trouble:
         return row | {"note": f"refused: {trouble}"}, None
     except (ValueError, PathError) as error:
         return row | {"note": f"cannot be built: {error}"}, None
-    row |= {"steps": summary["steps"], "time_step_s": sim.dt}
-    return row | {"cpu_s": time.process_time() - started, **_outcome(record, summary)}, record
+    row |= {"cpu_s": time.process_time() - started, **_outcome(record, summary)}
+    return row | {key: summary[key] for key in ("steps", "time_step_s")}, record
 
 
 def _outcome(record: Record, summary: dict) -> dict[str, Any]:
     """What a scene monitors, and what every scene has: the unit ends the name."""
     found = {f"{slip['block']}, slips at_deg": slip["slip_angle"] for slip in summary["slip"]}
-    last = record.monitored[-1].items()
-    found |= {f"last {key}": value for key, value in last if not key.endswith("_deg")}
-    for moving, _ in record.scene.monitors.shear:
+    for moving, _ in record.scene.shear:
         name = record.scene.blocks[moving].name
         normal, shear = (record.column(f"{name}: {key}_Pa") for key in ("normal", "shear"))
         angle = np.degrees(np.arctan2(np.abs(shear), normal))
@@ -198,16 +163,12 @@ def _outcome(record: Record, summary: dict) -> dict[str, Any]:
 
 
 def write(rows: list[dict], folder: Path) -> str:
-    """ablation.csv and summary.json of some rows; returns what each changed, a line a row."""
+    """ablation.csv of some rows; returns what each changed, a line a row."""
     clear_run(folder)
-    header = [key for key in dict.fromkeys(key for row in rows for key in row) if key not in COST]
-    columns = [*header, *COST]
-    write_csv(folder / "ablation.csv", columns, ([row.get(c) for c in columns] for row in rows))
-    about = {"version": VERSION, "files": ["ablation.csv"], "runs": rows}
-    write_json(folder / "summary.json", about)
-    lines = []
-    for row in rows:
-        apart = row.get("end, apart_mm", 0.0)
-        told = row["note"] or f"ends {apart:.3g} mm apart, time x {row['time_ratio']:.2f}"
-        lines.append(f"{row['without']}: {told}")
-    return "\n".join(lines)
+    columns = [*dict.fromkeys(key for row in rows for key in row if key not in COST), *COST]
+    write_csv(folder / TABLE, columns, ([row.get(c) for c in columns] for row in rows))
+    return "\n".join(
+        f"{row['without']}: " + (row["note"] or f"ends {row.get('end, apart_mm', 0.0):.3g} mm "
+                                 f"apart, time x {row['time_ratio']:.2f}")
+        for row in rows
+    )  # fmt: skip

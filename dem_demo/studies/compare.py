@@ -5,16 +5,18 @@ stiffnesses like those of the joint at half the height of the rock. What it lack
 hardening and direction: the difference between the two runs is what these do.
 """
 
-import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
+
+import jointlaw as jl
 
 from ..dynamics.simulation import Simulation
 from ..errors import Refused
 from ..output.record import Record, far, outcomes
 from ..output.run import play
-from ..scene import DENSITY, GRAVITY, Files, Scene, Tables, build, build_law, read_tables
+from ..scene import Scene, coulomb_law, is_coulomb
 from .strength import alone
 
 
@@ -23,46 +25,31 @@ def compare(scene: Scene, seeds: Sequence[int], until: float) -> Iterator[dict]:
 
     until: model time to stop at (s).
     """
-    data, files = read_tables(scene.text), scene.files
-    for name in (table["name"] for table in data["rock"]):
+    for name in [rock.name for rock in scene.rocks]:
         for seed in seeds:
-            own = alone(data, name, seed)
-            laws = own["laws"].items()
-            plain = {law: _plain(table, own, files) for law, table in laws}
-            run = {**data["run"], "max_overlap": 0.1}  # constant springs are soft in impacts
-            for kind, case in (("joint", own), ("coulomb", {**own, "laws": plain, "run": run})):
-                yield {"law": kind, "seed": seed, **_run(build(case, files=files), until)}
+            own = alone(scene, name, seed)
+            laws = {name: _plain(own, law) for name, law in own.laws.items()}
+            run = replace(own.run, max_overlap=0.1)  # constant springs are soft in impacts
+            for kind, case in (("joint", own), ("coulomb", replace(own, laws=laws, run=run))):
+                yield {"law": kind, "seed": seed, **_run(case, until)}
 
 
 def _run(scene: Scene, until: float) -> dict:
-    started, trouble = time.perf_counter(), ""
     sim = Simulation(scene)
-    record = Record(sim)
+    record, trouble = Record(sim), ""
     try:
         play(sim, record, until, far)
     except Refused as error:
         trouble = str(error)
-    (outcome,) = outcomes(record)
-    return {
-        **outcome,
-        "time_s": sim.time,
-        "steps": sim.n,
-        "largest_energy_error": record.largest_error,
-        "refused": trouble,
-        "wall_time_s": time.perf_counter() - started,
-    }
+    return outcomes(record)[0] | {"time_s": sim.time, "refused": trouble}
 
 
-def _plain(table: Tables, data: Tables, files: Files) -> Tables:
-    if table.get("kind", "joint") == "coulomb":
-        return table
-    height = np.ptp(np.array(data["rock"][0]["outline"], float)[:, 1])
-    stress = 0.5 * data.get("density", DENSITY) * np.hypot(*data.get("gravity", GRAVITY)) * height
-    law = build_law(table, "law", files)
+def _plain(scene: Scene, law: jl.JointLaw) -> jl.JointLaw:
+    if is_coulomb(law):
+        return law
+    (rock,) = scene.rocks
+    blocks = [scene.blocks[i] for i in rock.blocks]
+    height = np.ptp(np.concatenate([block.corners[:, 1] for block in blocks]))
+    stress = 0.5 * blocks[0].density * np.hypot(*scene.gravity) * height
     stiffness = float(stress / law.closure(stress))
-    return {
-        "kind": "coulomb",
-        "normal_stiffness": stiffness,
-        "shear_stiffness": stiffness / law.asperity.lam,
-        "friction": law.asperity.mu,
-    }
+    return coulomb_law(stiffness, stiffness / law.asperity.lam, law.asperity.mu)

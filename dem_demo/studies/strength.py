@@ -4,8 +4,8 @@ Both are found by bisection on the initial equilibrium, without running the bloc
 where no displacements are found with which the joints carry the loads.
 """
 
-import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,7 @@ from ..dynamics.simulation import Simulation
 from ..output.pictures import Pictures
 from ..output.record import Record, far
 from ..output.run import play
-from ..scene import GRAVITY, Files, Scene, Tables, build, law_table, read_tables, turn
+from ..scene import STICKS, Scene, Tables, build, read_tables, turn
 
 EXACT = 0.01  # share of the tilt and of the factor to which they are found
 STEP, STEEPEST, LEAST = 8.0, 60.0, 0.01  # degrees: first step, largest, closest told apart
@@ -35,78 +35,66 @@ def strength_reduction(
     (s) or once a block has moved by the size of a block. Yields `rock`, `factor`, `critical_tilt`
     (degrees), each None where none is found, and the `picture` in `folder`, None without a factor.
     """
-    data, files = read_tables(scene.text), scene.files
-    for table in data.get("rock", [None]):
-        name, one = "scene", data
-        if table is not None:
-            name, one = table["name"], alone(data, table["name"])
-        row = {"rock": name, "factor": strength_factor(one, files)}
-        row |= {"critical_tilt": critical_tilt(one, files), "picture": None}
+    for name in [rock.name for rock in scene.rocks] or ["scene"]:
+        one = alone(scene, name) if scene.rocks else scene
+        row = {"rock": name, "factor": strength_factor(one)}
+        row |= {"critical_tilt": critical_tilt(one), "picture": None}
         if row["factor"]:
             row["picture"], factor = f"failing-{name}.{picture_format}", SHOWN * row["factor"]
             title = f"{scene.title}; {name}, friction divided by {factor:.3g}"
-            sim = Simulation(build({**reduced(one, factor, files), "title": title}, files=files))
+            sim = Simulation(replace(reduced(one, factor), title=title))
             record = Record(sim)
             play(sim, record, until, far)
             Pictures(record).final(folder / row["picture"])
         yield row
 
 
-def critical_tilt(data: Tables, files: Files) -> float | None:
+def critical_tilt(scene: Scene) -> float | None:
     """The turn of gravity (degrees, towards +x) at which a scene just holds; None beyond 60.
 
     Below zero where it does not hold as drawn.
     """
 
-    def tilted(tilt: float) -> Tables:
-        gravity = turn(np.radians(tilt)) @ data.get("gravity", GRAVITY)
-        return {**data, "gravity": gravity.tolist()}
+    return _bisect(
+        lambda tilt: replace(scene, gravity=tuple(turn(np.radians(tilt)) @ scene.gravity)),
+        STEP, STEEPEST, lambda tilt: max(EXACT * abs(tilt), LEAST),
+    )  # fmt: skip
 
-    return _bisect(tilted, files, STEP, STEEPEST, lambda t: max(EXACT * abs(t), LEAST))
 
-
-def strength_factor(data: Tables, files: Files) -> float | None:
+def strength_factor(scene: Scene) -> float | None:
     """What all friction is to be divided by for a scene to just hold.
 
     None if it holds with 1/64 of it, or fails with 64 times of it. No friction is made larger than
     a scene may have, 5.
     """
 
-    def weakened(log: float) -> Tables:
-        return reduced(data, np.exp(log), files)
-
-    log = _bisect(weakened, files, np.log(2), np.log(LARGEST), lambda _: EXACT)
+    log = _bisect(
+        lambda log: reduced(scene, float(np.exp(log))), np.log(2), np.log(LARGEST), lambda _: EXACT
+    )
     return None if log is None else float(np.exp(log))
 
 
-def reduced(data: Tables, factor: float, files: Files) -> Tables:
-    """A scene's tables with the friction of asperities and of plain Coulomb divided by a factor."""
-    highest = RANGES["mu"][1]  # that a scene may have; what fails with it has no factor
-
-    def divided(table: Tables) -> Tables:
-        given = {key: table[key] for key in ("mu", "mu_residual", "friction") if key in table}
-        finite = {key: value for key, value in given.items() if math.isfinite(value)}
-        return table | {key: min(value / factor, highest) for key, value in finite.items()}
-
-    laws = {}
-    for name, table in data["laws"].items():
-        law = law_table(table, files)
-        laws[name] = divided(law) | {k: divided(law[k]) for k in ("asperity",) if k in law}
-    return {**data, "laws": laws}
+def reduced(scene: Scene, factor: float) -> Scene:
+    """A scene with the friction of asperities and of plain Coulomb divided by a factor."""
+    highest, laws = RANGES["mu"][1], {}  # that a scene may have; what fails with it has no factor
+    for name, law in scene.laws.items():
+        given = {key: getattr(law.asperity, key) for key in ("mu", "mu_residual")}
+        weak = {key: min(mu / factor, highest) for key, mu in given.items()
+                if mu is not None and mu < STICKS}  # fmt: skip
+        laws[name] = replace(law, asperity=replace(law.asperity, **weak))
+    return replace(scene, laws=laws)
 
 
 def _bisect(
-    at: Callable[[float], Tables], files: Files, step: float, most: float,
-    exact: Callable[[float], float],
-) -> float | None:  # fmt: skip
+    at: Callable[[float], Scene], step: float, most: float, exact: Callable[[float], float]
+) -> float | None:
     """Where the scenes `at` begin to fail: looked for from 0 up if that one holds, else down."""
     with tqdm(desc="equilibria", delay=2.0, disable=None, leave=False) as bar:
 
         def holds(x: float) -> bool:
             bar.update()
-            data = at(x)
-            scene = build({**data, "run": {**data["run"], "seat": True}}, files=files)
-            return Simulation(scene).balanced
+            scene = at(x)
+            return Simulation(replace(scene, run=replace(scene.run, seat=True))).balanced
 
         sense = 1.0 if holds(0.0) else -1.0
         low, high = 0.0, sense * step
@@ -120,17 +108,16 @@ def _bisect(
     return 0.5 * (low + high)
 
 
-def alone(data: Tables, name: str, seed: int | None = None) -> Tables:
-    """A scene's tables with one of its rocks, cut with a seed (default its own), nothing watched.
+def alone(scene: Scene, name: str, seed: int | None = None) -> Scene:
+    """One rock of a scene, cut with a seed (default its own), with nothing watched.
 
     Of the [[joint]] tables those of this rock stay; those that name its blocks only with its own
     seed, for with another there are other blocks.
     """
-    known: dict[str, Tables] = {}
-    for table in data["rock"]:
-        known[table["name"]] = {**known.get(table.get("like", ""), {}), **table, "like": ""}
-    rock = known[name]
-    same = seed is None or seed == rock.get("seed", 0)
+    data = read_tables(scene.text)
+    rock = next(table for table in data["rock"] if table["name"] == name)
+    own = {"seed": 0, **rock} | ({} if seed is None else {"seed": seed})
+    same = own["seed"] == rock.get("seed", 0)
     blocks = {block["name"] for block in data.get("block", [])}
     low, high = np.quantile(np.add(rock["outline"], rock.get("at", [0, 0])), [0, 1], axis=0)
 
@@ -141,5 +128,4 @@ def alone(data: Tables, name: str, seed: int | None = None) -> Tables:
         return all(other.rpartition(" ")[0] == name for other in others) and (same or not others)
 
     joints = [joint for joint in data.get("joint", []) if belongs(joint)]
-    rock = rock if same else {**rock, "seed": seed}
-    return {**data, "rock": [rock], "watch": {}, "joint": joints}
+    return build({**data, "rock": [own], "watch": {}, "joint": joints}, files=scene.files)

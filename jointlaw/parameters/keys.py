@@ -3,7 +3,7 @@
 Every TOML file of the project is read here. Errors name the file, the key by its path, and what to
 write instead. A rule for the value of a key is one of
 
-    a function (name, value)    returns the value, or raises ValueError
+    a function (name, value)    returns the value, or raises ValueError; the name has file and key
     a mapping of rules          for a table
     [a mapping of rules]        for a list of tables
     Removed(use, neutral)       for a key of former versions
@@ -77,7 +77,7 @@ def checked(data: Any, rules: Mapping[str, Any], where: str, path: str = "") -> 
         elif isinstance(rule, list):
             found[key] = _checked_list(value, rule[0], where, name)
         else:
-            found[key] = rule(name, value)
+            found[key] = rule(f"{where}: {name}", value)
     for key in rules:
         if key.endswith("!") and key[:-1] not in data:
             raise ValueError(f"{where}: key '{prefix}{key[:-1]}' is missing; give it a value")

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 # A folder that has one of these holds a run
-MARKS = ("summary.json", "history.csv", "strength.json", "state", "refused")
-LEFT = ("summary.json", "history.csv", "state/scene.toml", "state/state.npz",
+MARKS = ("summary.json", "history.csv", "strength.json", "ablation.csv", "state", "refused")
+LEFT = ("summary.json", "history.csv", "ablation.csv", "state/scene.toml", "state/state.npz",
         "refused/scene.toml", "refused/state.npz", "refused/why.txt")  # fmt: skip
 
 

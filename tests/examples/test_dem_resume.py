@@ -1,19 +1,13 @@
 """Saved states: whole, of one scene, resumed anywhere, and only as the method can carry it."""
 
-import tomllib
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scene_text import PLAIN, ROCK
-from scipy.sparse.linalg import ArpackNoConvergence
 
 from dem_demo import Refused, Simulation, load, parse
-from dem_demo.dynamics import timestep
-from dem_demo.output.record import Record, outcomes
-from dem_demo.scene import Files
-from dem_demo.studies.strength import critical_tilt
+from dem_demo.output.record import Record
 
 TEXT = f"""
 gravity = [3.0, -9.0]
@@ -48,27 +42,6 @@ def begun(steps, text=TEXT):
     for _ in range(steps):
         sim.step()
     return sim
-
-
-def test_a_resumed_run_keeps_its_time_step_margin(tmp_path):
-    """Looked at again for no reason, the limit would be another one than in a whole run."""
-    for steps in (10, 20, 40):
-        begun(steps).save(tmp_path)
-        again, whole = Simulation.load(tmp_path), begun(steps + 15)
-        for _ in range(15):
-            again.step()
-        assert again.limit.least == whole.limit.least
-
-
-def test_a_state_that_lacks_a_part_is_damaged(tmp_path):
-    begun(3).save(tmp_path)
-    file = tmp_path / "state.npz"
-    with np.load(file) as data:
-        whole = dict(data)
-    for name in whole:
-        np.savez(file, **{key: value for key, value in whole.items() if key != name})
-        with pytest.raises(ValueError, match=r"state\.npz is damaged .*run the scene again"):
-            Simulation.load(tmp_path)
 
 
 DRIVE = """
@@ -141,52 +114,10 @@ end = 0.1
 def test_a_watched_joint_has_the_law_of_the_faces_that_meet():
     """Blocks with a set on each side: edge 0 of both, their bottoms, would give "bedding" twice."""
     record = Record(Simulation(parse(CUT)))
-    (slip,) = record.slips.report()
+    (slip,) = record.slips.values()
     assert slip["law"] == "bedding"
     assert slip["predicted_angle"] == pytest.approx(np.degrees(np.arctan(0.3)))
     assert list(record.laws.values()) == ["bedding", "cross"]
-
-
-@pytest.mark.parametrize("degrees", [58.0, 62.0])
-def test_a_tilt_near_the_steepest_is_found(degrees):
-    """A flat slab slides at its friction angle, also where the last step of the search is short."""
-    text = TEXT.replace("gravity = [3.0, -9.0]", "gravity = [0.0, -9.81]\nlaw = 'rock/rough'")
-    data = tomllib.loads(text.split('[[block]]\nname = "two"')[0] + "[run]\nend = 1.0")
-    data["block"][1]["box"] = [3.0, 0.1]
-    data["block"][1]["at"] = [0.0, 0.05]
-    plain = {"kind": "coulomb", "normal_stiffness": 1e9, "shear_stiffness": 1e9}
-    data["laws"]["rock/rough"] = plain | {"friction": float(np.tan(np.radians(degrees)))}
-    found = critical_tilt(data, Files())
-    assert found is None if degrees > 60 else found == pytest.approx(degrees, rel=0.01)
-
-
-@pytest.mark.parametrize("size", [0.01, 1.0, 100.0])
-def test_failure_is_counted_by_the_size_of_the_blocks(size):
-    """A tenth of a block, in a model of centimetres as in one of a hundred metres."""
-    scene = load("slope")
-    blocks = tuple(replace(block, corners=size * block.corners) for block in scene.blocks)
-    scene = replace(scene, blocks=blocks)
-    start = np.zeros((6, len(blocks)))
-    start[:2] = np.transpose([block.centroid for block in blocks])
-    end, rock = start.copy(), scene.rocks[0]
-    end[0, rock.free[0]] += 0.2 * size  # of blocks of about 1 m2 times size**2
-    end[0, rock.free[1]] += 0.05 * size
-    record = SimpleNamespace(scene=scene, times=[0.0, 1.0], motion=[start, end])
-    assert [entry["failed"] for entry in outcomes(record)] == [1, 0]
-
-
-def test_an_eigenvalue_that_does_not_converge_is_computed_exactly(monkeypatch):
-    scene = load("slope")
-    whole = Simulation(scene).limit.now
-    asked = []
-
-    def never(*_args, **_keys):
-        asked.append(1)
-        raise ArpackNoConvergence("no convergence", np.zeros(0), np.zeros((0, 0)))
-
-    monkeypatch.setattr(timestep, "eigsh", never)
-    assert Simulation(scene).limit.now == pytest.approx(whole, rel=1e-6)
-    assert asked
 
 
 DAMAGE = ", yield_interference = 2e-4, mu_residual = 0.2, wear_slip = 5e-4"
@@ -205,6 +136,7 @@ def test_resume_is_bit_identical(tmp_path, damage):
     assert (again.blocks.motion == whole.blocks.motion).all()
     assert (again.joints.traction == whole.joints.traction).all()
     assert again.ledger.value == whole.ledger.value
+    assert again.limit.least == whole.limit.least
     batch = again.joints.pools["rock/rough"].batch
     assert bool(damage) == (batch.plastic_work.max() > 0.0)
     assert (tmp_path / "notes.txt").read_text() == "mine"
@@ -224,8 +156,12 @@ def test_a_damaged_file_or_another_version_is_refused(tmp_path):
             Simulation.load(tmp_path)
     file.write_bytes(whole)
     with np.load(file) as data:
-        np.savez(file, **{**data, "version": 3})
-    with pytest.raises(ValueError, match="version 3, this demo reads 4: go on with"):
+        arrays = dict(data)
+    np.savez(file, **{key: value for key, value in arrays.items() if key != "contacts-1"})
+    with pytest.raises(ValueError, match=r"state\.npz is damaged .*run the scene again"):
+        Simulation.load(tmp_path)
+    np.savez(file, **{**arrays, "version": 3})
+    with pytest.raises(ValueError, match="version 3, this demo reads 5: go on with"):
         Simulation.load(tmp_path)
     file.unlink()
     with pytest.raises(ValueError, match=r"holds no saved state: state\.npz is missing"):
@@ -236,7 +172,7 @@ def test_a_state_that_is_refused_changes_nothing():
     """A joint that the state lacks would be virgin again, without a word; so would a bad step."""
     sim = begun(5)
     state, limit = sim.state(), sim.limit.now
-    state.joints["rock/rough"][0].pop()
+    state["contacts-0"] = state["contacts-0"][:-1]
     with pytest.raises(ValueError, match="not those of the scene's laws and contacts"):
         Simulation(sim.scene, saved=state)
     for step in (0.0, np.inf, np.nan):

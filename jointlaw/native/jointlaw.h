@@ -651,13 +651,20 @@ JL_IN_ void jl_press_(const jlaw_law *law, const double *f, jl_numbers_ n, int k
   }
 }
 
+/* Whether facets flatten themselves; else the opposite one does. Both do, but for rounding, where
+ * the shear does not move them, as at a right angle to it. */
+JL_IN_ jl_yes_ jl_flattens_itself_(const double *f, const jl_facets_ *o)
+{
+  return o->y1 - jl_column_(f, JLAW_YIELD) >= o->z1 - JLAW_ROUNDED * jl_size_of_(o->y1);
+}
+
 /* Plastic work of facets over A c1: exact where they press themselves flat, else by the mean */
 JL_IN_ jl_real_ jl_crush_(const double *f, const jl_facets_ *o)
 {
   const jl_of_facet_ most = jl_column_(f, JLAW_YIELD);
   const jl_real_ c0 = jl_smaller_(jl_larger_(o->y0 - o->z0, jl_each_(0.0)), jl_each_(most));
   const jl_real_ c1 = jl_smaller_(jl_larger_(o->y1 - o->z1, jl_each_(0.0)), jl_each_(most));
-  return jl_pick_(o->y1 - most >= o->z1, most, 0.5 * (c0 + c1)) * (o->fz1 - o->fz0);
+  return jl_pick_(jl_flattens_itself_(f, o), jl_each_(most), 0.5 * (c0 + c1)) * (o->fz1 - o->fz0);
 }
 
 /* ------------------------------------------------------------------------------- wear */
@@ -873,8 +880,8 @@ JL_IN_ void jl_add_tangent_(const jlaw_law *law, const double *f, const jl_motio
                     jl_sums_ *sum, jl_kind_ k)
 {
   const int drags = law->critical_slip < DBL_MAX;
-  const jl_yes_ moves = (o->z1 > o->z0) & (o->open > 0.0);
-  const jl_yes_ own = o->z1 <= o->y1 - jl_column_(f, JLAW_YIELD); /* or the opposite facet presses */
+  const jl_yes_ moves = (o->z1 - o->z0 > JLAW_ROUNDED * o->z1) & (o->open > 0.0);
+  const jl_yes_ own = jl_flattens_itself_(f, o);
   for (int i = 0; i < k.dim; i++) {
     const jl_of_facet_ n = jl_column_(f, JLAW_N + i) * jl_column_(f, JLAW_A);
     const jl_of_facet_ s = jl_column_(f, JLAW_S + i) * law->soft, t = jl_column_(f, JLAW_T + i) * law->soft;

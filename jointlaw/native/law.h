@@ -194,13 +194,20 @@ IN void press(const jlaw_law *law, const double *f, numbers n, int kept, int at,
   }
 }
 
+/* Whether facets flatten themselves; else the opposite one does. Both do, but for rounding, where
+ * the shear does not move them, as at a right angle to it. */
+IN yes flattens_itself(const double *f, const facets *o)
+{
+  return o->y1 - column(f, JLAW_YIELD) >= o->z1 - JLAW_ROUNDED * size_of(o->y1);
+}
+
 /* Plastic work of facets over A c1: exact where they press themselves flat, else by the mean */
 IN real crush(const double *f, const facets *o)
 {
   const of_facet most = column(f, JLAW_YIELD);
   const real c0 = smaller(larger(o->y0 - o->z0, each(0.0)), each(most));
   const real c1 = smaller(larger(o->y1 - o->z1, each(0.0)), each(most));
-  return pick(o->y1 - most >= o->z1, most, 0.5 * (c0 + c1)) * (o->fz1 - o->fz0);
+  return pick(flattens_itself(f, o), each(most), 0.5 * (c0 + c1)) * (o->fz1 - o->fz0);
 }
 
 /* ------------------------------------------------------------------------------- wear */
@@ -416,8 +423,8 @@ IN void add_tangent(const jlaw_law *law, const double *f, const motion *m, const
                     sums *sum, kind k)
 {
   const int drags = law->critical_slip < DBL_MAX;
-  const yes moves = (o->z1 > o->z0) & (o->open > 0.0);
-  const yes own = o->z1 <= o->y1 - column(f, JLAW_YIELD); /* or the opposite facet presses */
+  const yes moves = (o->z1 - o->z0 > JLAW_ROUNDED * o->z1) & (o->open > 0.0);
+  const yes own = flattens_itself(f, o);
   for (int i = 0; i < k.dim; i++) {
     const of_facet n = column(f, JLAW_N + i) * column(f, JLAW_A);
     const of_facet s = column(f, JLAW_S + i) * law->soft, t = column(f, JLAW_T + i) * law->soft;

@@ -276,5 +276,5 @@ def test_names_and_options(tmp_path, law, capsys):
     assert not (tmp_path / "new").exists()
     options = ["export", "c", "linear-a3", "--out", str(tmp_path / "new"), "--closure", "2um"]
     assert jointlaw.cli.main.main(options) == 2
-    assert "--closure shapes a table for YADE" in capsys.readouterr().err
+    assert "--closure was removed" in capsys.readouterr().err
     assert not (tmp_path / "new").exists()

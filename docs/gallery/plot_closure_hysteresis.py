@@ -41,5 +41,5 @@ right.set_xticks(range(5))
 plt.show()
 
 # %%
-# Rock loses more than that: see *A loop and a set*, and *Unloading* on the page *From
-# measurements to a law*.
+# Rock loses more than that: see *A loop and a set*, and *Unloading* on the page *Fit
+# tests and scans*.

@@ -45,8 +45,7 @@ for stress in (5e6, 10e6, 20e6):
 
 # %%
 # With the few cells of `balanced` the stiffness is about right, and so is the damping of large
-# cycles. Small cycles have next to none. More depth cells cure it; see *How accurate do I need to
-# be?*
+# cycles. Small cycles have next to none. More depth cells cure it; see *Limits and pitfalls*.
 
 coarse, softer = cycles(law, 10e6, amplitudes)
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")

@@ -50,4 +50,4 @@ plt.show()
 
 # %%
 # Without yielding the law unloads almost along its loading curve; the rock does not. What friction
-# and yielding explain of that loop is said on the page *From measurements to a law*.
+# and yielding explain of that loop is said on the page *Fit tests and scans*.

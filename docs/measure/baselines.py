@@ -13,6 +13,7 @@ errors on the Grimsel fracture above 5.3 MPa, which the fits did not see.
 
 import numpy as np
 from scipy.optimize import least_squares
+from tables import table
 
 import jointlaw as jl
 from jointlaw.calibration import datasets
@@ -58,10 +59,11 @@ def main():
     points = stress[seen], closure[seen]
     laws = {"jointlaw": jl.fit_closure(*points).predict}
     laws |= {name: fitted(name, *points) for name in LAWS}
-    print("| law | error at 10.3 MPa | rms from 6 to 10.3 MPa |\n|---|---|---|")
+    rows = []
     for name, law in laws.items():
         error = 100 * (law(closure[~seen]) / stress[~seen] - 1)
-        print(f"| {name} | {error[-1]:+.1f} % | {np.sqrt(np.mean(error**2)):.1f} % |")
+        rows.append([name, f"{error[-1]:+.1f} %", f"{np.sqrt(np.mean(error**2)):.1f} %"])
+    print(table(["law", "error at 10.3 MPa", "rms from 6 to 10.3 MPa"], rows))
 
 
 if __name__ == "__main__":

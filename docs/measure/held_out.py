@@ -10,8 +10,6 @@ the power law and of Barton-Bandis, the draws whose 95 % band of the joint law c
 there, and those whose report says that the curve has another shape than the law.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
@@ -19,6 +17,7 @@ from functools import partial
 
 import numpy as np
 from baselines import LAWS, fitted
+from tables import table
 
 import jointlaw as jl
 from jointlaw.support.progress import track
@@ -27,6 +26,8 @@ STRESS = np.geomspace(0.3e6, 10e6, 16)  # Pa
 FEW = 1e6 * np.array([0.25, 0.5, 0.75, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10])  # Pa
 CLOSURE_NOISE = 0.005  # of the largest closure, with these
 LIMIT = 5e6  # Pa
+HEAD = ["curve made by", "jointlaw, median", "largest", "power law, median",
+        "Barton-Bandis, median", "inside the band", "report warns"]  # fmt: skip
 Rng = np.random.Generator
 Rock = Callable[[Rng, np.ndarray], np.ndarray]
 
@@ -97,26 +98,22 @@ def main() -> None:
     parser.add_argument("--draws", type=int, default=40, help="draws per kind of rock (40)")
     parser.add_argument("--workers", type=int, default=None, help="processes (all cores)")
     parser.add_argument("--prior", action="append", default=[], help="NAME=LOW,HIGH; repeatable")
-    parser.add_argument("--rocks", nargs="+", choices=ROCKS, default=list(ROCKS), metavar="ROCK")
     parser.add_argument("--few", action="store_true", help="13 points, noise of closure too")
     args = parser.parse_args()
     given = (text.partition("=") for text in args.prior)
     priors = {name: tuple(map(float, ends.split(","))) for name, _, ends in given}
-    print(
-        "| curve made by | jointlaw, median | jointlaw, largest | power law, median "
-        "| Barton-Bandis, median | inside the band | report warns |"
-    )
-    print("|---|---:|---:|---:|---:|---:|---:|")
+    rows = []
     with ProcessPoolExecutor(args.workers) as pool:
-        for rock in args.rocks:
+        for rock in ROCKS:
             draws = pool.map(partial(draw, rock, args.few, priors), range(args.draws))
             found = list(track(draws, rock, args.draws))
             errors = 100 * np.abs([row[0] for row in found])
             own, *others = np.median(errors, axis=0)
             columns = [own, np.max(errors[:, 0]), *others]
             covered, warned = (sum(row[k] for row in found) for k in (1, 2))
-            cells = " | ".join(f"{error:.1f} %" for error in columns)
-            print(f"| {rock} | {cells} | {covered}/{len(found)} | {warned} |", flush=True)
+            cells = [f"{error:.1f} %" for error in columns]
+            rows.append([rock, *cells, f"{covered}/{len(found)}", warned])
+    print(table(HEAD, rows))
 
 
 if __name__ == "__main__":

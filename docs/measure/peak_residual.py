@@ -8,13 +8,14 @@ its displacement, and the stress at 10 mm, taken as residual. Printed are the la
 its measured one, what halving the step changes, and how far parameters can move together.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.optimize import least_squares
+from tables import table
 
 import jointlaw as jl
 
+HEAD = ["normal stress (MPa)", "error of the peak", "its displacement, law / measured",
+        "error of the residual", "halved step"]  # fmt: skip
 # normal stress (MPa): peak (MPa), its displacement (mm), stress at 10 mm (MPa)
 MEASURED = {
     1.0: (1.280, 1.937, 0.862),
@@ -75,20 +76,15 @@ def main() -> None:
     start = np.log(list(START.values()))
     found = least_squares(misfit, start, bounds=(start - 3, start + 3), diff_step=1e-3, xtol=1e-6)
     print(", ".join(f"{n} = {v:.4g}" for n, v in zip(START, np.exp(found.x), strict=True)))
-    print(
-        "\n| normal stress (MPa) | error of the peak | displacement at the peak, law / measured "
-        "| error of the residual | effect of the step size (% of the peak) |"
-    )
-    print("|---|---:|---:|---:|---:|")
+    rows = []
     for normal, measured in MEASURED.items():
         stress = shear(found.x, normal)
         peak, at, residual = figures(stress) / measured
         halved = np.max(np.abs(shear(found.x, normal, 240)[::2] - stress)) / stress.max()
         note = "" if normal in FITTED else ", predicted"
-        print(
-            f"| {normal:g}{note} | {100 * (peak - 1):+.1f} % | x {at:.2f} | "
-            f"{100 * (residual - 1):+.1f} % | {100 * halved:.2f} |"
-        )
+        rows.append([f"{normal:g}{note}", f"{100 * (peak - 1):+.1f} %", f"x {at:.2f}",
+                     f"{100 * (residual - 1):+.1f} %", f"{100 * halved:.2f} %"])  # fmt: skip
+    print(table(HEAD, rows))
     _, sizes, directions = np.linalg.svd(found.jac)
     print(f"\nTogether, with no figure moved by more than about {100 * MOVED:g} %:")
     for size, direction in zip(sizes, directions, strict=True):

@@ -1,12 +1,11 @@
 """Tests on joints in text files, those of the package and those of laboratories, by these rules.
 
-lines          that are empty or begin with # are skipped
-names          stand in the first line, units in it or in the second one: "tau [kPa]",
-               "tau (kPa)", "tau /kPa", "tau in kPa", "tau_kPa"; a column without a unit is
-               asked for, never guessed
-separator      semicolon, tab or comma: the first of these in the line of names; else blanks
-decimal mark   a point; or a comma if a number shows it: 0,25 does, but 1,201 may be 1201.
-               Marks between thousands are refused
+- Lines that are empty or begin with # are skipped.
+- Names stand in the first line, units in it or in the second one: "tau [kPa]", "tau (kPa)",
+  "tau /kPa", "tau in kPa", "tau_kPa". A column without a unit is asked for, never guessed.
+- The separator is a semicolon, tab or comma: the first of these in the line of names; else blanks.
+- The decimal mark is a point; or a comma if a number shows it: 0,25 does, but 1,201 may be 1201.
+  Marks between thousands are refused.
 """
 
 import csv

@@ -32,7 +32,7 @@ REMOVED = {
     "export --closure": _TABLE,
     "export --tolerance": _TABLE,
     "tradeoff --loss": "small cycles need more depth cells: write resolution = { u = 3, phi = 6, "
-    "depth = 300 } into the law's file; docs/how-accurate.md says how many",
+    "depth = 300 } into the law's file; docs/accuracy.md says how many",
 }
 
 

@@ -1,7 +1,9 @@
 """Where the law puts its nodes: inclinations against the density, touch depths against the curve.
 
-Both rules only choose places. What the law keeps exact (docs/accuracy-measured.md) holds at any
-number of nodes; `benchmarks/nodes.py` measures these rules against others.
+Both rules only choose places. What the law keeps exact (docs/validation.md) holds at any number of
+nodes. On the presets and random laws these rules had the smallest errors of the worst laws at few
+nodes; Gauss-Legendre inclinations with cells from (i/n)^1.5 are as good up to 48 sliders in a
+plane, and better beyond (at 576 a median error of 0.32 % instead of 0.74 %).
 """
 
 from functools import lru_cache
@@ -13,7 +15,9 @@ from ..parameters.orientation import shape
 from ..support.checks import Array, frozen
 from .virgin_curve import VirginCurve
 
-# Chosen on random laws with `benchmarks/nodes.py`
+# Tried on random laws. A cell of width h misses Phi by Phi'' h^2/8, so cells have equal shares of
+# the integral of sqrt(Phi''); _LOW and _OPEN halve the error of the worst laws against that alone.
+# Equal stiffness a cell, geometric cells and powers of i/n were worse for some laws.
 _STEEPEST = 10.0  # largest tan(theta) that counts: at a = 1 it grows without bound
 _LOW = 0.15  # power of Phi that draws nodes towards small loads
 _OPEN = 1.8  # shares of the grading for the last cell: few cells then lie where most loads are

@@ -12,7 +12,6 @@ from .facets import Facets
 from .nodes import UNUSED, depth_nodes
 from .virgin_curve import VirginCurve
 
-UNDERFLOW = 1e-140  # m, and Pa/m: counts as zero, for powers and squares below it underflow
 VERSION = 2  # of the discretisation: a change of nodes or state changes it, old states are refused
 _OVERFLOW = 1e140  # Pa and J/m2: squares beyond it overflow
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..kernels import reference, wear
-from ..kernels.blocks import LANES, empty_blocks, rows_of, write_rows
+from ..kernels.blocks import LANES, empty_blocks, rows_of, write_rows, zeros
 from ..kernels.engine import CHUNK, Step, engine
 from ..kernels.reference import Measures
 from ..support.checks import Array, numbers, whole
@@ -62,7 +62,7 @@ class JointBatch:
         self.__dict__.update(state)
         self._engine, rows = engine(self.law.tables), state["_state"]
         blocks, kept, lanes = rows.shape
-        self._state = np.zeros((blocks, self._engine.rows, lanes))
+        self._state = zeros(blocks, self._engine.rows, lanes)
         self._state[:, :kept] = rows
         self._engine.refresh(self._state, self._n)
 
@@ -145,7 +145,7 @@ class JointBatch:
         if n < self._n:
             self.reset(np.arange(n, self._n))
         elif n > blocks * lanes:  # grow by doubling, so that steady growth copies rarely
-            grown = np.zeros((max(-(-n // LANES), 2 * blocks), rows, LANES))
+            grown = zeros(max(-(-n // LANES), 2 * blocks), rows, LANES)
             write_rows(grown, rows_of(self._state, self._n), np.arange(self._n))
             self._state = grown
         self._n = n
@@ -160,7 +160,7 @@ class JointBatch:
 
     @property
     def kernel(self) -> str:
-        """Which kernel advances these joints: "numba" or "numpy"."""
+        """Which kernel advances these joints: "native" or "numpy"."""
         return self._engine.name
 
     @property

@@ -28,7 +28,7 @@ def warn_if_crushed(law: JointLaw, closure: ArrayLike) -> None:
     if share > CRUSHED:
         warnings.warn(
             f"closure = {highest:.3g} m: {100 * share:.2f} % of the asperities touch, and they "
-            "yield: here the law ends (docs/not-modelled.md). Lower the normal stress, or give a "
+            "yield: here the law ends (docs/limits.md). Lower the normal stress, or give a "
             "larger asperity.yield_interference or heights that reach farther",
             stacklevel=3,
         )

@@ -82,7 +82,7 @@ class Joint:
 
     @property
     def kernel(self) -> str:
-        """Which kernel advances the joint: "numba" or "numpy"."""
+        """Which kernel advances the joint: "native" or "numpy"."""
         return self._batch.kernel
 
     delta = _OfOne(JointBatch.delta, np.asarray)

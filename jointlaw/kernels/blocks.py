@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 
 from ..support.checks import Array
 
-LANES = 128  # joints per block; again in compiled.py, where a change discards compiled code
+LANES = 8  # joints per block, JLAW_BLOCK in native/batch.h
+_LINE = 64  # bytes that a processor reads at once
 
 Index = NDArray[np.intp]
 
@@ -13,7 +14,15 @@ Index = NDArray[np.intp]
 def empty_blocks(rows: int, n: int) -> Array:
     """Blocks of virgin states for n joints; one joint alone lies in a block of its own."""
     lanes = 1 if n == 1 else LANES
-    return np.zeros((-(-n // lanes), rows, lanes))
+    return zeros(-(-n // lanes), rows, lanes)
+
+
+def zeros(blocks: int, rows: int, lanes: int) -> Array:
+    """Blocks of zeros that begin where a line of memory does."""
+    size = blocks * rows * lanes
+    raw = np.zeros(size + _LINE // 8)
+    first = -raw.ctypes.data % _LINE // 8
+    return raw[first : first + size].reshape(blocks, rows, lanes)
 
 
 def rows_of(state: Array, n: int, index: Index | None = None) -> Array:

@@ -6,8 +6,7 @@ import numpy as np
 
 from ..discretisation.tables import Tables
 from ..support.checks import Array
-
-TINY = 1e-290  # a stiffness whose reciprocal might overflow, or a square that underflows: zero
+from ..support.thresholds import TINY
 
 
 class Cells(NamedTuple):

@@ -1,19 +1,21 @@
 """Which kernel advances a law's joints, and on how many threads.
 
-Both engines keep states in blocks and offer the same methods: numba compiles the inner loops
-(extra `fast`), numpy is the readable reference. JOINTLAW_KERNEL=numpy or numba chooses; by default
-numba is taken where it can be imported. JOINTLAW_THREADS bounds the threads.
+Both engines keep states in blocks and offer the same methods: "native" is the compiled law of
+`jointlaw/native`, "numpy" the readable reference. JOINTLAW_KERNEL chooses; by default native is
+taken where its library was built. JOINTLAW_THREADS bounds the threads.
 """
 
+import ctypes
 import os
-import threading
-from collections.abc import Callable
+import warnings
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..discretisation.tables import Tables
+from ..native import library
+from ..native.library import address
 from ..support.checks import Array, one_of
 from . import reference
 from .blocks import LANES, Index, rows_of, write_rows
@@ -21,8 +23,10 @@ from .threads import share_out, thread_count
 
 CHUNK = 4096  # joints per call of the numpy kernel: keeps its temporaries in cache
 SERIAL = 20_000  # sliders below which a second thread costs more than it saves
-
-Call = Callable[..., None]
+MISSING = (
+    "the compiled law was not built, and numpy's kernel is about forty times slower: install a C "
+    "compiler or `pip install ziglang`, then run `python -m jointlaw.native`"
+)
 
 
 class Step(NamedTuple):
@@ -35,30 +39,41 @@ class Step(NamedTuple):
     keep: bool  # whether the states advance, or stay as they were
 
 
-def engine(tables: Tables) -> "NumpyEngine | NumbaEngine":
+def engine(tables: Tables) -> "NumpyEngine | NativeEngine":
     """The engine of a law's tables, which all its joints share: it holds nothing of theirs."""
     choice = os.environ.get("JOINTLAW_KERNEL", "")
     if choice:
-        one_of("JOINTLAW_KERNEL", choice, ("numpy", "numba"))
+        one_of("JOINTLAW_KERNEL", choice, ("numpy", "native"))
     return _engine(tables, choice)
 
 
+def step_states(
+    tables: Tables, states: Array, d: Array, tangent: bool
+) -> tuple[Array, Array, Array | None]:
+    """New states (n, rows), F (n, dim) and C (n, dim, dim) after the increments d (n, dim)."""
+    n, dim = d.shape
+    new, F = np.array(states, order="C"), np.empty((n, dim))
+    C = np.empty((n, dim, dim)) if tangent else None
+    step = Step(np.ascontiguousarray(d), F, C, None, True)
+    engine(tables).advance(new[:, :, None], step, ledger=True)
+    return new, F, C
+
+
 @lru_cache(maxsize=64)
-def _engine(tables: Tables, choice: str) -> "NumpyEngine | NumbaEngine":
-    if choice != "numpy":
-        try:
-            return NumbaEngine(tables)
-        except ImportError:
-            if choice == "numba":
-                raise
-        except RuntimeError as error:
-            if "cannot cache" not in str(error):
-                raise
-            raise OSError(
-                "numba finds no folder that it can write compiled kernels to: set NUMBA_CACHE_DIR "
-                "to one, or JOINTLAW_KERNEL=numpy to do without numba"
-            ) from error
+def _engine(tables: Tables, choice: str) -> "NumpyEngine | NativeEngine":
+    loaded = None if choice == "numpy" else library.load()
+    if loaded is not None:
+        return NativeEngine(tables, loaded)
+    if choice == "native":
+        raise ImportError(f"JOINTLAW_KERNEL = 'native', but {MISSING}")
+    if choice == "":
+        _warn_once()
     return NumpyEngine(tables)
+
+
+@lru_cache(maxsize=1)
+def _warn_once() -> None:
+    warnings.warn(MISSING, stacklevel=2)
 
 
 class NumpyEngine:
@@ -94,66 +109,58 @@ class NumpyEngine:
             out[:, index] = reference.measures(self.tables, rows)
 
 
-class NumbaEngine:
-    """The compiled kernel, on all threads where there is work for them."""
+class NativeEngine:
+    """The compiled law, on all threads where there is work for them."""
 
-    name = "numba"
+    name = "native"
 
-    def __init__(self, tables: Tables) -> None:
-        from . import compiled
-
-        self._kernel, self._sliders = compiled, tables.sliders
-        self.rows = compiled.block_rows(tables)
-        options = tables.yields or None, tables.wears or None
-        self._law: tuple[Any, ...] = (*compiled.pack(tables), *options)
-        self._with: dict[tuple[bool, bool], tuple[Any, ...]] = {
-            # True or None, for which the compiler leaves the code out; slip is made of the ledger
-            (ledger, tangent): (*self._law, ledger or tables.wears or None, tangent or None)
-            for ledger in (False, True)
-            for tangent in (False, True)
-        }
-        self._energy = tables.curve.T.ravel().copy()
-        self._all = np.empty(0, np.intp)
-        self._none = np.empty((0, tables.dim, tables.dim))
+    def __init__(self, tables: Tables, loaded: ctypes.CDLL) -> None:
+        self._law, self._sliders = library.NativeLaw(tables), tables.sliders
+        self._run, self.lanes = loaded.jlaw_run, loaded.jlaw_lanes()
+        # rows of a block: the state, then Phi and Phi' of all facets, which save half the look-ups;
+        # with flattened facets, the same at their depth
+        self.rows = tables.rows + 2 * (1 + tables.yields) * len(tables.c1)
 
     def advance(self, state: Array, step: Step, ledger: bool) -> None:
         """Take a step; `ledger` adds up the dissipated energy."""
         d, F, C, where, keep = step
-        given = (state, d, F, self._none if C is None else C,
-                 self._all if where is None else where, keep)  # fmt: skip
-        self._run(self._kernel.advance, len(d), given, self._with[ledger, C is not None])
+        pointers = address(d), address(F), None if C is None else address(C)
+        index = None if where is None else address(where)
+        self._call(library.ADVANCE, state, len(d), *pointers, index, ledger, keep)
 
     def refresh(self, state: Array, n: int) -> None:
         """Bring Phi and Phi', kept beside the first n states, up to date with them."""
-        self._run(self._kernel.refresh, n, (state,), self._law)
+        self._call(library.REFRESH, state, n)
 
     def measures(self, state: Array, out: Array) -> None:
         """As `NumpyEngine.measures`."""
-        given = (state, out)
-        self._run(self._kernel.measures, out.shape[1], given, (*self._law, self._energy))
+        self._call(library.MEASURE, state, out.shape[1], None, address(out))
 
-    def _run(self, call: Call, n: int, given: tuple[Any, ...], law: tuple[Any, ...]) -> None:
-        """call(*given, first, last, *work, *law) over n joints, on one thread or several."""
+    def _call(
+        self,
+        what: int,
+        state: Array,
+        n: int,
+        d: int | None = None,
+        F: int | None = None,
+        C: int | None = None,
+        index: int | None = None,
+        ledger: bool = True,
+        keep: bool = True,
+    ) -> None:
+        """A call of the library for n joints, on one thread or several."""
+        _, rows, lanes = state.shape
+        batch = library.BatchCall(
+            self._law.address, address(state), d, F, C, index, n, rows, ledger, keep
+        )
+        where, alone = ctypes.addressof(batch), lanes == 1
         if n * self._sliders <= SERIAL or (threads := min(thread_count(), -(-n // LANES))) == 1:
-            call(*given, 0, n, *self._work(), *law)
+            library.check(self._run(where, 0, n, what, alone, self.lanes))
             return
         share = -(-n // (threads * LANES)) * LANES  # whole blocks, so threads change no result
 
         def part(k: int) -> None:
-            call(*given, min(k * share, n), min((k + 1) * share, n), *self._work(), *law)
+            first, last = min(k * share, n), min((k + 1) * share, n)
+            library.check(self._run(where, first, last, what, alone, self.lanes))
 
         share_out(part, threads)
-
-    def _work(self) -> tuple[Any, ...]:
-        """Working space of the thread that asks: one for all laws, as large as any has needed."""
-        space: tuple[Any, ...] = _space.work
-        if len(space) == 0 or len(space[0]) < self.rows:
-            space = _space.work = self._kernel.new_work(self.rows)
-        return space
-
-
-class _Space(threading.local):
-    work: tuple[Any, ...] = ()
-
-
-_space = _Space()

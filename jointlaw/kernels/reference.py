@@ -15,17 +15,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..discretisation.tables import UNDERFLOW, Tables
+from ..discretisation.tables import Tables
 from ..support.checks import Array
-from .cells import TINY, Cells, cells, compliance, reciprocal
+from ..support.thresholds import GRAZING, LIMIT, NEAR, ROUNDED, TINY, UNDERFLOW
+from .cells import Cells, cells, compliance, reciprocal
 from .wear import friction, slipped, within_limit
 from .yielding import flatten, flattened, plastic_work, softening
-
-NEAR = 1e-5  # of y: below such a change of y the chord of G is lost in rounding, the mean is not
-GRAZING = 1e-12  # cosine at which the offset meets its limit: its derivative has a pole at 0
-LIMIT = 1e-9  # of the friction limit: a slider this close is at it, less the rounding of q
-ROUNDED = 1e-12  # of Phi and of y: as much may be lost in a G next to a node, and in dy
-
 
 Flags = NDArray[np.bool_]
 

@@ -10,8 +10,8 @@ from jointlaw.cli.main import main
 @pytest.mark.parametrize(
     ("line", "where"),
     [
-        ("fit grimsel_vd1_closure --out o", "fit.fit_closure"),
-        ("shear linear-a2 --to 1um --out o", "shear.direct_shear"),
+        ("fit grimsel_vd1_closure --out o", "fit.fit_curves"),
+        ("shear linear-a2 --to 1um --out o", "laboratory.direct_shear"),
     ],
 )
 def test_a_command_of_jointlaw_ends_in_one_line(line, where, tmp_path, capsys, monkeypatch):

@@ -1,46 +1,106 @@
-"""Every row of docs/wrong-inputs.md: what it says and its exit code. None passes in silence."""
+"""Slips that people make with units, signs and columns: refused in one line, nothing is written."""
 
-import re
 import shlex
+from pathlib import Path
 
 import pytest
-import wrong_files
-from pages import text
+from scene_text import PLAIN, ROCK
 
 import dem_demo.cli
+import jointlaw as jl
 from jointlaw.cli.main import main as jointlaw_main
 
-ROW = re.compile(r"^\| (.+?) \| `(jointlaw|python -m dem_demo) (.+?)` \| (.+) \| (\d+) \|$", re.M)
-ROWS = ROW.findall(text("docs/wrong-inputs.md"))
+SHEAR, CLOSURE = "us [mm],tau [MPa]\n", "sigma_n [MPa],closure [um]\n"
+ROWS = "0,0\n0.1,0.9\n0.2,1.3\n0.4,1.4\n"
+LOADING = "0.2,0\n0.5,12\n1,25\n2,40\n4,55\n8,70\n"
+SCENE = f"""
+gravity = [0.0, -9.81]
+density = 2600.0
+[laws.rock]
+plane = 0.0
+{ROCK}[laws.plain]
+{PLAIN}[[block]]
+name = "base"
+box = [4.0, 1.0]
+at = [0.0, -0.5]
+fixed = true
+[[block]]
+name = "top"
+box = [1.0, 0.5]
+at = [0.0, 0.25]
+[run]
+end = 0.002
+record = 0.001
+step = 1e-4
+"""
+FILES = {
+    "good.csv": SHEAR + ROWS,
+    "no-unit.csv": "us [mm],tau\n" + ROWS,
+    "sign.csv": SHEAR + "0,0\n0.1,-0.9\n0.2,-1.3\n0.4,-1.4\n",
+    "drift.csv": "us [mm],tau [MPa],sn [MPa]\n0,0,1\n0.1,0.9,1.1\n0.2,1.3,1.2\n0.4,1.4,1.4\n",
+    "tension.csv": "us [mm],tau [MPa],sn [MPa]\n0,0,-1\n0.1,0.9,-1\n0.2,1.3,-1\n0.4,1.4,-1\n",
+    "closure.csv": CLOSURE + LOADING,
+    "metres.csv": CLOSURE.replace("um", "m") + LOADING,
+    "pascals.csv": CLOSURE.replace("MPa", "Pa") + LOADING,
+    "opening.csv": CLOSURE + LOADING.replace(",", ",-"),
+    "law-mu-35.toml": jl.presets.text("biegel-rough").replace("mu = 0.3", "mu = 35"),
+    "mu-35.toml": SCENE.replace("mu = 0.4", "mu = 35"),
+    "friction-30.toml": SCENE.replace("friction = 0.3", "friction = 30"),
+    "density.toml": SCENE.replace("2600.0", "2.6"),
+    "plane-90.toml": SCENE.replace("plane = 0.0", "plane = 90"),
+    "up.toml": SCENE.replace("-9.81", "9.81"),
+    "all-fall.toml": SCENE.replace("fixed = true", "fixed = false"),
+}
 
 
-@pytest.mark.parametrize(("program", "words", "message", "status"), [row[1:] for row in ROWS])
-def test_row(tmp_path, capsys, program, words, message, status):
-    wrong_files.make(tmp_path)
-    main = jointlaw_main if program == "jointlaw" else dem_demo.cli.main
-    assert main(shlex.split(words)) == int(status)
-    told = capsys.readouterr().err
-    assert message in told
-    assert len(told.splitlines()) == 1
-    assert not (tmp_path / "out").exists()  # nothing is left of a refused command
-    assert (tmp_path / "done" / "shear.csv").read_text() == "of an earlier run"
-
-
-def test_no_row_is_missed():
-    """A row that the pattern does not read would be a row without a test."""
-    page = text("docs/wrong-inputs.md").split("Two more")[0]
-    assert len(ROWS) == page.count("\n| ") - 1 >= 40
-
-
-@pytest.mark.parametrize("folder", ["done", "new"])
-def test_force_replaces_a_run_whole(tmp_path, folder):
-    """What the other run wrote is gone, what the user put there stays."""
-    wrong_files.make(tmp_path)
+@pytest.fixture(autouse=True)
+def _files(tmp_path):
+    for name, text in FILES.items():
+        (tmp_path / name).write_text(text)
+    (tmp_path / "done").mkdir()
+    (tmp_path / "done" / "summary.json").write_text('{"files": ["shear.csv"]}')
+    (tmp_path / "done" / "shear.csv").write_text("of an earlier run")
     (tmp_path / "done" / "notes.txt").write_text("mine")
-    line = f"closure linear-a3 --steps 3 --force --out {folder}"
-    assert jointlaw_main(line.split()) == 0
-    assert (tmp_path / folder / "closure.csv").is_file()
-    assert not (tmp_path / folder / "shear.csv").exists()
-    assert (tmp_path / "done" / "notes.txt").read_text() == "mine"
-    again = f"{line.replace(' --force', '')}"
-    assert jointlaw_main(again.split()) == 2
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("fit --shear no-unit.csv --out out", "column 'tau' gives no unit"),
+        ("fit --shear sign.csv --normal-stress 1MPa --out out", '"tau:-1MPa"'),
+        ("fit --shear good.csv --out out", "which column is the normal stress"),
+        ("fit --shear good.csv --normal-stress 3kPa --out out", "are both in the units"),
+        ("fit --shear drift.csv --out out", "runs from 1e+06 to 1.4e+06 Pa"),
+        ("fit --shear tension.csv --out out", '--normal-column "sn:-1MPa"'),
+        ("fit --shear closure.csv --out out", "which column is the shear displacement"),
+        ("fit metres.csv --out out", "closure = 70 m is outside the range of rock joints"),
+        ("fit pascals.csv --out out", "stress = 8 Pa is outside the range of rock joints"),
+        ("fit opening.csv --out out", '--closure-column "closure:-1um"'),
+        ("fit --out out", "0 closure files: give one"),
+        ("shear biegel-rough --to 2 --out out", "--to: 2 has no unit"),
+        ("shear law-mu-35.toml --to 2um --out out", "tan(35 degrees) = 0.7"),
+        ("shear biegel-rough --to 2um --out done", "done holds another run"),
+        ("check mu-35.toml", "mu-35.toml.laws.rock.asperity.mu = 35 is outside"),
+        ("check friction-30.toml", "friction-30.toml.laws.plain.friction = 30 is outside"),
+        ("check density.toml", "2.6 g/cm3 is 2600 kg/m3"),
+        ("check plane-90.toml", "90 degrees is 1.571 rad"),
+        ("check up.toml", "warning: gravity = [0.0, 9.81] points upwards"),
+        ("check all-fall.toml", "warning: no block is fixed or held"),
+    ],
+)
+def test_a_slip_is_told_in_one_line(capsys, line, told):
+    main = dem_demo.cli.main if line.startswith("check") else jointlaw_main
+    assert main(shlex.split(line)) == (0 if told.startswith("warning") else 2)
+    error = capsys.readouterr().err
+    assert told in error
+    assert len(error.splitlines()) == 1
+    assert not Path("out").exists()
+    assert Path("done/shear.csv").read_text() == "of an earlier run"
+
+
+def test_force_replaces_a_run_whole():
+    """What the other run wrote is gone, what the user put there stays."""
+    assert jointlaw_main(shlex.split("closure linear-a3 --steps 3 --force --out done")) == 0
+    assert Path("done/closure.csv").is_file()
+    assert not Path("done/shear.csv").exists()
+    assert Path("done/notes.txt").read_text() == "mine"

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import jointlaw as jl
 from jointlaw.hosts.c.export import include_dir, table_text
 
 STRICT = ["-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror"]
@@ -97,3 +98,46 @@ class CLaw:
 def at(array):
     """Pointer to an array's numbers."""
     return ctypes.c_void_p(array.ctypes.data)
+
+
+def random_law(seed):
+    """A law of any kind: each choice comes up within every few seeds."""
+    rng = np.random.default_rng(seed)
+    formation = [None, "population", "individual"][seed % 3]
+    eta = [0.5, 0.0, 1.0, 0.37, 0.5][seed % 5]
+    if formation == "population" and eta == 0.0:
+        eta = 0.8  # not convex
+    heights = formation and jl.GammaHeights(3.82, 1.15e-6, 2e-6, formation)
+    if seed % 7 == 6:  # a density infinite at the point of contact
+        heights = jl.GammaHeights(-0.6, 3e-6, 0.0, "individual")
+    kind = {"closure_only": True} if seed % 8 == 5 else {"plane": [None, 0.0, 0.7][seed // 2 % 3]}
+    mu = [0.0, 0.3, 0.7][rng.integers(3)]
+    damage = {"yield_interference": 10.0 ** rng.uniform(-8.0, -6.0)} if seed // 4 % 2 else {}
+    if mu and seed // 5 % 3 == 1:
+        damage |= {"mu_residual": mu * rng.uniform(), "wear_slip": 10.0 ** rng.uniform(-7.0, -5.0)}
+    return jl.JointLaw(
+        orientation=jl.Orientation(
+            rng.uniform(1.0, 6.0), rng.uniform(-0.4, 0.8), rng.uniform(-0.15, 0.15)
+        ),
+        asperity=jl.Asperity(2e8, rng.uniform(0.5, 2.0), eta, mu, **damage),
+        heights=heights,
+        asperity_density=1e10,
+        closure_range=1e-6,
+        critical_slip=[np.inf, 8e-7][seed % 2],
+        resolution=jl.Resolution(int(rng.integers(1, 4)), int(rng.integers(3, 6)), 1 + seed % 6),
+        **kind,
+    )
+
+
+def random_path(dim, seed, steps=60):
+    """Increments (steps, dim) of all sizes, apart and shut again, some components exactly zero."""
+    rng = np.random.default_rng(1000 + seed)
+    d = rng.normal(size=(steps, dim)) * 10.0 ** rng.uniform(-9.0, -6.0, (steps, 1))
+    d[0, 0] = 5e-7
+    d[:, 0] += 3e-8
+    d[rng.integers(0, steps, 4), 0] = -1.5e-6
+    d[rng.integers(1, steps, 6)] = 0.0
+    for component in range(dim):
+        d[rng.integers(1, steps, 6), component] = 0.0
+    d[rng.integers(1, steps, 5), 1:] = 0.0
+    return d

@@ -12,9 +12,9 @@ import jointlaw as jl
 from jointlaw.kernels import reference
 
 sys.path.insert(0, str(Path(__file__).parent))
-from c_host import FAST, CLaw, at, library
+from c_host import FAST, CLaw, at, library, random_law, random_path
 
-SAME, SAME_C = 1e-12, 1e-9  # of the largest on the path, as promised in docs/native.md
+SAME, SAME_C = 1e-12, 1e-10  # of the largest on the path, as promised in docs/native.md
 BUILDS = {
     "gcc -O0": ("gcc", ["-O0", "-ffp-contract=off"]),
     "gcc": ("gcc", FAST),
@@ -30,49 +30,6 @@ BUILDS = {
 @pytest.fixture(scope="session")
 def lib(tmp_path_factory):
     return library(tmp_path_factory.mktemp("c"), *FAST)
-
-
-def random_law(seed):
-    """A law of any kind: each choice comes up within every few seeds."""
-    rng = np.random.default_rng(seed)
-    formation = [None, "population", "individual"][seed % 3]
-    eta = [0.5, 0.0, 1.0, 0.37, 0.5][seed % 5]
-    if formation == "population" and eta == 0.0:
-        eta = 0.8  # not convex
-    heights = formation and jl.GammaHeights(3.82, 1.15e-6, 2e-6, formation)
-    if seed % 7 == 6:  # a density infinite at the point of contact
-        heights = jl.GammaHeights(-0.6, 3e-6, 0.0, "individual")
-    kind = {"closure_only": True} if seed % 8 == 5 else {"plane": [None, 0.0, 0.7][seed // 2 % 3]}
-    mu = [0.0, 0.3, 0.7][rng.integers(3)]
-    damage = {"yield_interference": 10.0 ** rng.uniform(-8.0, -6.0)} if seed // 4 % 2 else {}
-    if mu and seed // 5 % 3 == 1:
-        damage |= {"mu_residual": mu * rng.uniform(), "wear_slip": 10.0 ** rng.uniform(-7.0, -5.0)}
-    return jl.JointLaw(
-        orientation=jl.Orientation(
-            rng.uniform(1.0, 6.0), rng.uniform(-0.4, 0.8), rng.uniform(-0.15, 0.15)
-        ),
-        asperity=jl.Asperity(2e8, rng.uniform(0.5, 2.0), eta, mu, **damage),
-        heights=heights,
-        asperity_density=1e10,
-        closure_range=1e-6,
-        critical_slip=[np.inf, 8e-7][seed % 2],
-        resolution=jl.Resolution(int(rng.integers(1, 4)), int(rng.integers(3, 6)), 1 + seed % 6),
-        **kind,
-    )
-
-
-def random_path(dim, seed, steps=60):
-    """Increments (steps, dim) of all sizes, apart and shut again, some components exactly zero."""
-    rng = np.random.default_rng(1000 + seed)
-    d = rng.normal(size=(steps, dim)) * 10.0 ** rng.uniform(-9.0, -6.0, (steps, 1))
-    d[0, 0] = 5e-7
-    d[:, 0] += 3e-8
-    d[rng.integers(0, steps, 4), 0] = -1.5e-6
-    d[rng.integers(1, steps, 6)] = 0.0
-    for component in range(dim):
-        d[rng.integers(1, steps, 6), component] = 0.0
-    d[rng.integers(1, steps, 5), 1:] = 0.0
-    return d
 
 
 def follow(joint, law, d):
@@ -106,7 +63,7 @@ def test_same_numbers_on_random_laws_and_paths(lib, tmp_path, seed):
     F, C, q, energy = follow(joint, law, random_path(joint.dim, seed))
     assert F < SAME
     assert C < SAME_C
-    assert q < SAME
+    assert q < 3 * SAME
     assert energy < SAME
 
 

@@ -1,8 +1,5 @@
 """Bad input and what the plug-in cannot do: one line each and exit 1, on two processors."""
 
-import re
-import subprocess
-
 import pytest
 from lammps_host import HEAD, build, lammps, run, soft
 
@@ -102,17 +99,3 @@ def test_one_line_and_exit_1(folder, case):
     assert done.returncode == 1, done.stdout[-2000:]
     assert len(errors) == 1, errors
     assert line in errors[0]
-
-
-def test_build_needs_the_pinned_lammps(plugin, tmp_path):
-    """build.sh in an environment with another release."""
-    python = tmp_path / "bin" / "python"
-    python.parent.mkdir()
-    python.write_text("#!/bin/sh\necho 2024.8.29\n")
-    python.chmod(0o755)
-    done = subprocess.run(
-        ["./build.sh"], cwd=plugin, env={"ENV": str(tmp_path), "PATH": "/usr/bin:/bin"},
-        capture_output=True, text=True,
-    )  # fmt: skip
-    assert done.returncode == 1
-    assert re.search(r"LAMMPS 2025\S+ is needed, \S+ has 2024.8.29", done.stdout)

@@ -4,7 +4,6 @@ import json
 import os
 import shutil
 import subprocess
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -82,9 +81,8 @@ def run_yade(folder, script, *args, live=False):
         pytest.skip("YADE is not installed (Debian: apt-get install yade)")
     env = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME")}
     env |= {"OMP_NUM_THREADS": "1", "MPLBACKEND": "Agg"}
-    if live:  # two versions of numba in one cache throw each other's kernels away
-        cache = Path(tempfile.gettempdir()) / "jointlaw-yade-numba"
-        env |= {"PYTHONPATH": str(Path(jl.__file__).parents[1]), "NUMBA_CACHE_DIR": str(cache)}
+    if live:
+        env |= {"PYTHONPATH": str(Path(jl.__file__).parents[1])}
     done = subprocess.run(
         [program, "-n", "-x", str(folder / script), *args],
         cwd=folder, env=env, capture_output=True, text=True, timeout=300, stdin=subprocess.DEVNULL,

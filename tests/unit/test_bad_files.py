@@ -22,7 +22,6 @@ alpha = 3.82
 beta = 1.15e-6
 overlap = 2e-6
 """
-NAMED = GOOD.split("[heights]")[0] + '[heights]\ndistribution = "chi2"\noverlap = 2e-6\n'
 
 
 def told(text, tmp_path):
@@ -68,11 +67,6 @@ def told(text, tmp_path):
 )  # fmt: skip
 def test_a_mistake_is_told_by_file_and_key(tmp_path, old, new, message):
     assert message in told(GOOD.replace(old, new, 1), tmp_path)
-
-
-def test_a_neutral_value_of_a_removed_key_is_skipped():
-    text = "resolution = {u = 3, phi = 6, depth = 3, front = false}\ncritical_slip = inf" + GOOD
-    assert jl.JointLaw.from_text(text) == jl.JointLaw.from_text(GOOD)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 import re
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -96,12 +95,6 @@ def test_parameters_of_the_law(law, name, value, message):
         jl.JointLaw(**({"asperity_density": 1e10} | values | {name: value}))
 
 
-@pytest.mark.parametrize("u_phi_depth", [(0, 4, 2), (2, 2, 2), (2, 4, 0), (2, 4, True)])
-def test_resolution_numbers(u_phi_depth):
-    with pytest.raises(ValueError, match=r"resolution\.(u|phi|depth) = .*whole number >= \d"):
-        jl.Resolution(*u_phi_depth)
-
-
 @pytest.mark.parametrize(
     ("build_it", "name"),
     [
@@ -117,14 +110,6 @@ def test_resolution_numbers(u_phi_depth):
 def test_other_constructors(build_it, name):
     with pytest.raises(ValueError, match=name):
         build_it()
-
-
-@pytest.mark.parametrize("n", [-1, 2.0, True])
-def test_size_of_a_batch(law, n):
-    with pytest.raises(ValueError, match="n = "):
-        law.joints(n)
-    with pytest.raises(ValueError, match="n = "):
-        law.joints(2).resize(n)
 
 
 @pytest.mark.parametrize("method", ["normal_stress", "closure", "contacts", "max_stiffness"])
@@ -149,26 +134,6 @@ def test_closures_whose_forces_overflow(law, ask):
     for value in (10.0 * law.largest_reach, 1e300):
         with pytest.raises(ValueError, match=r"(closure|delta) = .* is out of bounds.*overflow"):
             ask(law, value)
-
-
-def test_a_displacement_of_the_total_form_and_a_direction_that_are_none(law):
-    with pytest.raises(ValueError, match="delta = "):
-        jl.secant(law, [1e-6, np.nan, 0])
-    with pytest.raises(ValueError, match=r"phi = "):
-        law.contacts(1e-6, (0.1, np.inf))
-
-
-@pytest.mark.parametrize(
-    "ask",
-    [
-        lambda shape: jl.closed_form.elastic(shape, 1, 1),
-        lambda shape: jl.closed_form.inelastic(shape, 1, 1, 1e3),  # where nothing slides
-        jl.closed_form.inclination,
-    ],
-)
-def test_shapes_of_the_closed_forms(ask):
-    with pytest.raises(ValueError, match=r"orientation\.b = "):
-        ask(jl.closed_form.Shape(3.0, 7.0))
 
 
 def test_stresses_that_have_no_closure(law):

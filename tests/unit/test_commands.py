@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.cli.main import COMMANDS, REMOVED, main
+from jointlaw.cli.main import COMMANDS, main
 from jointlaw.laboratory.record import UNITS
 
 
@@ -78,14 +78,6 @@ def test_every_command_has_an_example(capsys):
         assert example(command, capsys)[0] == command
 
 
-@pytest.mark.parametrize("removed", REMOVED)
-def test_what_was_removed_is_told_with_its_remedy(capsys, removed):
-    command, *option = removed.split()
-    assert main([command, "biegel-rough", *(f"{word}=1" for word in option)]) == 2
-    told = f"jointlaw {command}: {removed} was removed: {REMOVED[removed]}\n"
-    assert capsys.readouterr().err == told
-
-
 def test_all_options_of_shear(tmp_path):
     assert run(
         "shear biegel-smooth --normal-stress 5MPa --to 0.5um --reverse -0.2um,0 --azimuth -30deg "
@@ -135,13 +127,6 @@ def test_a_refusal_is_one_line_and_leaves_nothing(tmp_path, capsys, arguments, t
     assert not (tmp_path / "o").exists()
 
 
-def test_a_test_that_stops_writes_what_it_has(tmp_path, capsys):
-    assert run("shear linear-a2 --to 1um --reverse 1e301m --steps 5 --out o") == 1
-    assert "direct shear stopped after 6 rows" in capsys.readouterr().err
-    table, summary = read(tmp_path / "o", "shear")
-    assert len(table) == summary["result"]["rows"] == 6
-
-
 def test_version(capsys):
     with pytest.raises(SystemExit) as stop:
         main(["--version"])
@@ -149,15 +134,6 @@ def test_version(capsys):
     assert jl.__version__ in capsys.readouterr().out
     citation = Path(__file__).parents[2] / "CITATION.cff"
     assert f"\nversion: {jl.__version__}\n" in citation.read_text()
-
-
-def test_without_matplotlib_the_numbers_are_written(tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    assert run("shear linear-a2 --to 0 --steps 3 --out o") == 0
-    assert "pip install 'jointlaw[plot]'" in capsys.readouterr().err
-    assert {p.name for p in (tmp_path / "o").iterdir()} == {
-        "shear.csv", "shear.npz", "law.toml", "summary.json",
-    }  # fmt: skip
 
 
 def test_as_a_module(tmp_path):

@@ -23,13 +23,6 @@ def law():
     return jl.JointLaw.from_toml(SPECIMENS / "law.toml")
 
 
-def test_a_law_of_version_1(law):
-    assert law.orientation == jl.Orientation(3.0, 0.5, 0.1)
-    assert law.resolution == jl.Resolution(3, 3, 2)  # "fast"
-    assert law.critical_slip == 1e-3
-    assert "version = 1" in law.to_toml()
-
-
 def test_a_state_of_version_1(law):
     joint = law.joint()
     joint.restore(jl.load_state(SPECIMENS / "state.npz"))
@@ -50,25 +43,3 @@ def test_a_state_of_another_discretisation_is_refused(law):
     other = JointState(f"{int(version) + 1}:{parameters}", state.values)
     with pytest.raises(ValueError, match="run the path again, or install the version"):
         law.joint().restore(other)
-
-
-def test_a_parameter_at_its_default_leaves_the_fingerprint_as_it_was(law):
-    """So that states outlive the parameters that later versions add."""
-    import dataclasses
-
-    from jointlaw.parameters.fingerprint import fingerprint
-
-    @dataclasses.dataclass(frozen=True)
-    class Asperity:
-        K: float
-        new: float = 0.0
-
-    @dataclasses.dataclass(frozen=True)
-    class Before:
-        K: float
-
-    Before.__name__ = "Asperity"
-    assert fingerprint(Asperity(1.0)) == fingerprint(Before(1.0))
-    assert fingerprint(Asperity(1.0, 2.0)) != fingerprint(Before(1.0))
-    for name, value in {"critical_slip": 2e-3, "plane": 0.0, "closure_range": 2e-6}.items():
-        assert dataclasses.replace(law, **{name: value}).fingerprint != law.fingerprint

@@ -12,7 +12,6 @@ import jointlaw as jl
 
 SMOOTH = jl.GammaHeights(alpha=3.82, beta=1.15e-6, overlap=2e-6)
 CHI2 = {"df": 2 * (SMOOTH.alpha + 1), "scale": SMOOTH.beta / 2}  # the same distribution
-EDGES = [1e-6, 2e-6, 4e-6, 5e-6]
 R = np.linspace(0.0, 2e-5, 101)
 
 
@@ -57,24 +56,6 @@ def test_histogram_as_numpy_gives_it():
     assert np.abs(heights.cdf(R) - stats.gamma.cdf(R, 4.0, scale=1e-6)).max() < 1.63 / 20000**0.5
 
 
-def test_histogram_density_and_cumulative():
-    heights = jl.Heights(([1, 2, 1], EDGES), 0.0, "individual")
-    assert heights.cdf([0.0, 1e-6, 1.5e-6, 2e-6, 3e-6, 4e-6, 5e-6, 1.0]).tolist() == pytest.approx(
-        [0, 0, 0.125, 0.25, 0.5, 0.75, 1, 1]
-    )
-    assert heights.pdf([0.5e-6, 1.5e-6, 3e-6, 4.5e-6, 6e-6]).tolist() == pytest.approx(
-        [0, 0.25e6, 0.25e6, 0.25e6, 0]
-    )
-
-
-@pytest.mark.parametrize("counts", [[1, 2, 1], [5, 0, 1], [1, 1, 1]])
-@pytest.mark.parametrize("overlap", [0.0, 1.5e-6, 4.9e-6])
-def test_histogram_needs_the_individual_reading(make_law, counts, overlap):
-    with pytest.raises(ValueError, match=r'not convex .*use formation = "individual"'):
-        make_law(heights=jl.Heights((counts, EDGES), overlap))
-    make_law(heights=jl.Heights((counts, EDGES), overlap, "individual"))
-
-
 @pytest.mark.parametrize(
     ("distribution", "told"),
     [
@@ -116,9 +97,3 @@ def test_bad_distributions(distribution, told):
 def test_bad_parameters_of_a_distribution(parameters, told):
     with pytest.raises(ValueError, match=rf"heights\.parameters{told}"):
         jl.Heights("chi2", 2e-6, parameters=parameters)
-
-
-def test_heights_of_another_kind_are_refused(make_law):
-    """They might hash by their address: in the next process their states would have no law."""
-    with pytest.raises(ValueError, match="must be GammaHeights, Heights or None"):
-        make_law(heights=stats.gamma(4.0))

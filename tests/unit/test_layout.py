@@ -1,20 +1,15 @@
-"""How the files of both packages hang together: imports one way, small files, few at the root."""
+"""How the files of both packages hang together: imports one way, and no printing library."""
 
 import ast
 import re
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
-from itertools import pairwise
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).parents[2]
-PACKAGES = {"jointlaw": 10, "dem_demo": 8}  # Python files at the root, at most
-LINES = 400
-LONGER = {"jointlaw/kernels/compiled.py", "jointlaw/hosts/yade/files/yade_joint.py"}
+PACKAGES = ("jointlaw", "dem_demo")
 # what a user runs prints; everything else returns, warns or logs
-PRINTS = re.compile(r"(jointlaw|dem_demo)/(cli/|cli\.py|__main__\.py|hosts/(yade|lammps)/files/)")
+PRINTS = re.compile(r"(jointlaw|dem_demo)/(cli/|cli\.py|__main__\.py|hosts/yade/files/)")
 
 
 @cache
@@ -52,42 +47,24 @@ def imported(path):
     return found - {None, path}
 
 
-def circles(graph):
-    """Circles of a graph, each as the nodes along it; one edge of each is cut to find the next."""
-    graph, found = {node: set(to) for node, to in graph.items()}, []
-    while True:
-        try:
-            TopologicalSorter(graph).prepare()
-        except CycleError as error:
-            circle = error.args[1][::-1]  # graphlib goes from a predecessor to what needs it
-            graph[circle[0]].discard(circle[1])
-            found.append(circle)
-        else:
-            return found
+def circle(graph):
+    """A circle of imports, each file before the one that it imports; empty if there is none."""
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return error.args[1][::-1]  # graphlib goes from a predecessor to what needs it
+    return []
 
 
 def test_no_circle_of_files():
-    found = circles({path: imported(path) for path in trees()})
-    shown = "\n".join(" -> ".join(circle) for circle in found)
-    assert not found, (
-        f"{len(found)} circles of imports:\n{shown}\nMove what both need into a file below them."
-    )
+    found = circle({path: imported(path) for path in trees()})
+    assert not found, f"{' -> '.join(found)}: move what both need into a file below them"
 
 
-def test_circles_are_found():
-    graph = {"a": {"b"}, "b": {"c"}, "c": set()}
-    assert circles(graph) == []
-    graph |= {"c": {"a"}, "d": {"e", "a"}, "e": {"d"}}
-    found = circles(graph)
-    assert sorted(sorted(set(circle)) for circle in found) == [["a", "b", "c"], ["d", "e"]]
-    for circle in found:  # printed along the imports, and closed
-        assert circle[0] == circle[-1]
-        assert all(to in graph[node] for node, to in pairwise(circle))
-
-
-def test_imports_are_read_wherever_they_stand():
-    """The front door takes its annotation from one file and its rooms within functions."""
-    assert "jointlaw/parameters/orientation.py" in imported("jointlaw/law.py")
+def test_a_circle_is_found_and_imports_in_functions_count():
+    graph = {"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}
+    assert circle(graph) in (["a", "b", "c", "a"], ["b", "c", "a", "b"], ["c", "a", "b", "c"])
+    assert circle(graph | {"c": set()}) == []
     assert "jointlaw/accuracy/tradeoff.py" in imported("jointlaw/law.py")
 
 
@@ -95,22 +72,6 @@ def test_jointlaw_never_imports_the_demo():
     for path in trees():
         if path.startswith("jointlaw/"):
             assert not [f for f in imported(path) if f.startswith("dem_demo/")], path
-
-
-@pytest.mark.parametrize("package", PACKAGES)
-def test_few_files_at_the_root(package):
-    files = sorted(path.name for path in (ROOT / package).glob("*.py"))
-    assert len(files) <= PACKAGES[package], (
-        f"{package} has {len(files)} files at its root, at most {PACKAGES[package]}: move one into "
-        f"the room that holds its kind (CONTRIBUTING.md): {', '.join(files)}"
-    )
-
-
-def test_files_are_short():
-    lengths = {path: (ROOT / path).read_text(encoding="utf-8").count("\n") for path in trees()}
-    long = {p: n for p, n in lengths.items() if n > LINES and p not in LONGER}
-    assert not long, f"more than {LINES} lines, split by what they hold: {long}"
-    assert set(lengths) >= LONGER, "LONGER names a file that is gone"
 
 
 def test_library_code_does_not_print():
@@ -122,17 +83,3 @@ def test_library_code_does_not_print():
         if isinstance(node, ast.Call) and getattr(node.func, "id", None) == "print"
     ]
     assert not printing, f"return it, or use logging; commands (cli) print: {printing}"
-
-
-def test_only_pages_of_this_project_are_cited():
-    pages = {path.name for path in ROOT.glob("docs/*.md")} | {p.name for p in ROOT.glob("*.md")}
-    # names of files that tests and commands write or make up
-    made = {"ablation.md", "report.md", "comparison.md"}
-    wrong = {}
-    for folder in (*PACKAGES, "tests", "docs", "benchmarks"):
-        for path in (ROOT / folder).rglob("*"):
-            if path.suffix in (".py", ".md", ".toml") and "_build" not in path.parts:
-                cited = re.findall(r"[\w-]+\.md\b", path.read_text(encoding="utf-8"))
-                if strange := sorted(set(cited) - pages - made):
-                    wrong[path.relative_to(ROOT).as_posix()] = strange
-    assert not wrong, f"cite docs/theory.md or docs/theory-incremental.md instead: {wrong}"

@@ -22,19 +22,6 @@ def test_each_contact_has_the_history_of_a_joint_of_its_own(any_law):
     assert len(pool.batch) <= 10  # places are used again
 
 
-def test_a_contact_that_comes_back_is_new(law):
-    pool = jl.JointPool(law)
-    first = pool.add(["a", "b"])
-    pool.batch.update(np.full((2, 3), 1e-7), where=first)
-    pool.drop(["a"])
-    again = pool.add(["c", "b", "a"])
-    assert again[1] == first[1]
-    assert again[0] == first[0]  # the place that fell free, virgin
-    assert pool.batch.delta[again].any(axis=1).tolist() == [False, True, False]
-    assert pool.keys == ["b", "c", "a"]
-    np.testing.assert_array_equal(pool.places, again[[1, 0, 2]])
-
-
 def test_unknown_keys_are_refused_and_nothing_is_dropped(law):
     pool = jl.JointPool(law)
     pool.add("ab")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.laboratory.record import UNITS, without_steps
+from jointlaw.laboratory.record import UNITS
 
 COLUMNS = ("closure", "shear_2", "shear_3", "F1", "F2", "F3", "sliding", "separated")
 COLUMNS += ("stored", "dissipated")
@@ -29,15 +29,6 @@ def analytic(azimuth=0.0, sense=1.0):
         "dissipated": np.linspace(0.0, 3.0, 5),
     }
     return jl.Record(columns, azimuth)
-
-
-def test_columns_and_units():
-    record = analytic()
-    assert tuple(record.columns) == COLUMNS == tuple(UNITS)
-    assert [UNITS[c] for c in ("closure", "F1", "sliding", "stored")] == ["m", "Pa", "1", "J/m2"]
-    for name in COLUMNS:
-        assert getattr(record, name) is record.columns[name]
-    assert len(record) == 5
 
 
 @pytest.mark.parametrize(("azimuth", "sense"), [(0.7, 1.0), (math.pi, -1.0)])
@@ -81,15 +72,6 @@ def test_a_curve_without_a_peak_is_told(shear, stress, peak):
     assert record.has_peak is peak
 
 
-def test_figures_of_a_record_without_shear():
-    columns = {name: np.zeros(3) for name in COLUMNS}
-    record = jl.Record(columns)
-    assert record.peak_friction_angle == record.residual_friction_angle == 0.0
-    assert record.dilation_angle == 0.0
-    assert math.isnan(record.secant_stiffness)
-    assert "peak_friction_angle_deg" not in record.summary()
-
-
 def test_csv_round_trip(tmp_path):
     record = analytic(0.3)
     record.to_csv(tmp_path / "r.csv")
@@ -121,12 +103,3 @@ def test_plots_of_both_tests(tmp_path):
         assert (tmp_path / f"{i}.png").read_bytes().startswith(b"\x89PNG")
         labels = [axis.get_ylabel() + axis.get_xlabel() for axis in record.plot().axes]
         assert all("(" in label for label in labels)  # every axis tells its unit
-
-
-def test_shares_are_drawn_without_steps():
-    """Up over four steps and, after the turning point, down at once and up."""
-    x = np.array([0.0, 1, 2, 3, 4, 5, 6, 5, 4])
-    share = np.array([0.0, 0, 0.3, 0.3, 0.6, 1, 1, 0, 0.5])
-    drawn = np.unique(np.stack(without_steps(x, share), axis=1), axis=0)
-    expected = [(0, 0), (1, 0), (2.5, 0.3), (4, 0.6), (4, 0.5), (5, 1), (6, 1), (5, 0)]
-    np.testing.assert_array_equal(drawn, sorted(expected))

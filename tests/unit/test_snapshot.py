@@ -10,12 +10,12 @@ import jointlaw as jl
 from jointlaw.joints.state import JointState
 
 
-def walk(joint, rng, steps=30):
-    dim = joint.law.tables.dim
+def walk(joints, rng, steps=30):
+    """Random increments, mostly closing, of one joint or of each of a batch."""
     for _ in range(steps):
-        d = rng.normal(0.0, 1e-7, dim)
-        d[0] += 2e-8
-        joint.update(d)
+        d = rng.normal(0.0, 1e-7, np.shape(joints.delta))
+        d[..., 0] += 2e-8
+        joints.update(d)
 
 
 def test_trial_leaves_no_trace(any_law):
@@ -62,29 +62,6 @@ def test_a_copy_of_a_joint_moves_alone(any_law, twin_of):
     np.testing.assert_array_equal(twin.snapshot().values, joint.snapshot().values)
 
 
-class Interrupted:
-    """An engine that is interrupted by another trial of the joint before it reads its increment."""
-
-    def __init__(self, engine, first):
-        self.engine, self.first = engine, first
-
-    def advance(self, *given):
-        first, self.first = self.first, lambda: None
-        first()
-        self.engine.advance(*given)
-
-
-def test_trials_of_two_threads_do_not_meet(law):
-    """A trial writes nothing that another trial of the joint reads."""
-    joint = law.joint()
-    alone, C_alone = joint.trial([3e-7, 1e-7, 0.0])
-    batch = joint._batch
-    batch._engine = Interrupted(batch._engine, lambda: joint.trial([9e-7, 0.0, 0.0]))
-    F, C = joint.trial([3e-7, 1e-7, 0.0])
-    np.testing.assert_array_equal(F, alone)
-    np.testing.assert_array_equal(C, C_alone)
-
-
 def test_another_law_is_refused(law, make_law):
     for other in (make_law(mu=0.31), make_law(resolution="fine"), make_law(plane=0.0)):
         joint = other.joint()
@@ -93,24 +70,19 @@ def test_another_law_is_refused(law, make_law):
         assert not joint.snapshot().values.any()
 
 
-def test_another_size_is_refused(law, moved):
+@pytest.mark.parametrize(
+    ("make", "told"),
+    [
+        (lambda law: law.joints(3).snapshot(), "state holds 3 joints, this batch 5"),
+        (lambda law: np.zeros((5, 3)), "not a snapshot"),
+        (lambda law: JointState(law.fingerprint, np.full((5, law.state_size), np.nan)), "damaged"),
+    ],
+)
+def test_a_state_of_other_joints_or_none_is_refused(law, moved, make, told):
     before = moved.snapshot().values
-    with pytest.raises(ValueError, match="state holds 3 joints, this batch 5"):
-        moved.restore(law.joints(3).snapshot())
+    with pytest.raises(ValueError, match=told):
+        moved.restore(make(law))
     np.testing.assert_array_equal(moved.snapshot().values, before)
-
-
-@pytest.mark.parametrize("state", [None, np.zeros((5, 3)), "state.npz"])
-def test_what_is_no_snapshot_is_refused(moved, state):
-    with pytest.raises(ValueError, match="not a snapshot"):
-        moved.restore(state)
-
-
-def test_a_damaged_state_is_refused(law):
-    values = law.joint().snapshot().values
-    values[0, 3] = np.nan
-    with pytest.raises(ValueError, match="damaged"):
-        law.joint().restore(JointState(law.fingerprint, values))
 
 
 @pytest.mark.parametrize(
@@ -151,7 +123,7 @@ def test_joints_move_between_batches_and_go_on_as_before(any_law):
     rng = np.random.default_rng(3)
     here, there = any_law.joints(5), any_law.joints(4)
     for batch in (here, there):
-        walk_batch(batch, rng)
+        walk(batch, rng)
     stays = there.snapshot([0, 2])
     there.restore(here.snapshot(where=[4, 1]), where=[3, 1])
     np.testing.assert_array_equal(there.snapshot([0, 2]).values, stays.values)
@@ -161,10 +133,3 @@ def test_joints_move_between_batches_and_go_on_as_before(any_law):
     np.testing.assert_array_equal(moved, F[[4, 1]])
     with pytest.raises(ValueError, match="state holds 2 joints, where names 1"):
         there.restore(here.snapshot([0, 1]), where=[0])
-
-
-def walk_batch(batch, rng):
-    for _ in range(20):
-        d = rng.normal(0.0, 1e-7, (len(batch), batch.law.tables.dim))
-        d[:, 0] += 2e-8
-        batch.update(d)

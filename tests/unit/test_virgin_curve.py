@@ -109,26 +109,10 @@ def inverse(law):
     assert law.closure([[1e6]]).shape == (1, 1)
 
 
-def test_normal_stress_is_that_of_a_joint(any_law):
-    closure = 3e-7
-    F, _ = any_law.joint().update([closure, *[0.0] * (any_law.tables.dim - 1)])
-    # while asperities yield, sliders slip one by one: few cells do so a little later than many
-    rel = 1e-12 if math.isinf(any_law.asperity.yield_interference) else 5e-3
-    assert any_law.normal_stress(closure) == pytest.approx(F[0], rel=rel)
-    assert any_law.normal_stress(-1e-6) == 0.0
-
-
 @pytest.mark.parametrize("stress", [5e-324, 1e-310, 1e-300, 1e300])
 def test_closure_at_the_ends_of_the_number_range(make_law, stress):
     for heights in (None, CASES["no overlap"], CASES["histogram"]):
         assert math.isfinite(make_law(heights=heights).closure(stress))
-
-
-def test_contact_numbers_are_eq_11(law):
-    r0, N, h = law.heights.overlap, law.asperity_density, law.heights
-    for closure in (0.0, 1e-6, 1e-4, -1e-6, -1.0):
-        count = N * integrate.quad(h.pdf, 0.0, max(r0 + closure, 0.0), epsabs=0, epsrel=1e-12)[0]
-        assert law.contacts(closure) == pytest.approx(count, rel=1e-10)
 
 
 def test_closures_at_many_stresses_are_those_at_each(any_law):

@@ -47,29 +47,6 @@ def test_the_offset_follows_the_tractrix_in_steps_of_any_size(formation, divisio
         assert np.allclose(F, exact, rtol=0.0, atol=1e-10)
 
 
-def test_below_the_limit_nothing_changes():
-    rng = np.random.default_rng(3)
-    inside = rng.normal(0.0, 1.0, (40, 2))
-    inside *= 0.99 * D * rng.random((40, 1)) / np.linalg.norm(inside, axis=1)[:, None]
-    limited, free = law(critical_slip=D).joint(), law().joint()
-    steps = np.column_stack([rng.uniform(-0.2, 0.3, 40), np.diff(inside, axis=0, prepend=0.0)])
-    for d in steps:
-        assert np.array_equal(limited.update(d)[0], free.update(d)[0])
-
-
-def test_friction_and_dilation_settle_beyond_the_limit():
-    joint = law(critical_slip=D).joint()
-    joint.update([1.0, 0.0, 0.0])
-    for _ in range(200):
-        F = joint.update([0.0, 0.05, 0.0])[0]
-    later = joint.update([0.0, 0.05, 0.0])[0]
-    assert np.allclose(later, F, rtol=1e-12)  # steady: the state repeats but for rounding
-    for _ in range(400):
-        back = joint.update([0.0, -0.05, 0.0])[0]
-    # a long way back is the mirror image of the way there
-    assert np.allclose(back, F * [1.0, -1.0, 1.0], rtol=1e-9, atol=1e-12)
-
-
 @pytest.mark.slow
 def test_motion_at_the_limit_with_friction_agrees_with_the_slow_bed():
     n, w = cap_quadrature(3.0, 0.5, 0.1, 8, 24)

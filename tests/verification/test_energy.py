@@ -8,7 +8,7 @@ from work import WorkMeter
 
 import jointlaw as jl
 
-PATHS, LAWS = 10, 20
+PATHS, LAWS = 10, 6
 
 
 def random_law(seed):

@@ -8,7 +8,6 @@ from scipy.integrate import trapezoid
 
 import jointlaw as jl
 from jointlaw.calibration import datasets
-from jointlaw.calibration.measured import ClosureCurve, first_loading
 
 FREE = ("asperity_density", "alpha", "beta", "yield_interference")
 LAW = jl.JointLaw(
@@ -66,13 +65,3 @@ def test_parameters_come_back_from_two_cycles_that_they_made():
     # shares of the largest stress are fitted: at a small one the law is as uncertain in Pa
     low, high = fit.band(np.array([0.3, 1.0]) * record.closure.max())
     assert (high > low).all()
-
-
-def test_cycles_turn_where_the_stress_does_and_not_where_it_scatters():
-    record = jl.closure_test(LAW.joint(), [5e6, 10e6, 7e6], steps=20)
-    stress, closure = record.F1, record.closure
-    wave = stress + 0.01 * stress * (-1) ** np.arange(stress.size)
-    assert first_loading(wave, closure)[0].size == 21
-    with pytest.raises(ValueError, match="after point 20"):
-        ClosureCurve(stress[:61], closure[:61])  # up to its largest stress, but not at first
-    ClosureCurve(stress[:61], closure[:61], cycle=True)

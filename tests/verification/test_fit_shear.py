@@ -28,6 +28,7 @@ def strength(law):
     return ShearCurve(SHEAR, np.ones(12), 5e6).predict(replace(law, plane=0.0))
 
 
+@pytest.mark.slow
 def test_friction_and_inclination_are_covered_by_their_intervals(law, strength):
     """Both are fixed by one shear test: 8 draws x 2, of which 95 % should hold the truth."""
     start = replace(law, orientation=jl.Orientation(2.6, 0.3))
@@ -43,6 +44,7 @@ def test_friction_and_inclination_are_covered_by_their_intervals(law, strength):
     assert hits >= 13  # fewer has a probability of 0.7 % when the intervals are right
 
 
+@pytest.mark.slow
 def test_exact_data_of_the_finest_nodes_give_the_truth(law):
     """A millimetre at 3 MPa, 26 closure ranges, where few nodes would shift mu by 0.03."""
     heights = jl.GammaHeights(3.7, 1e-5, 0.0, "individual")
@@ -54,34 +56,6 @@ def test_exact_data_of_the_finest_nodes_give_the_truth(law):
     fit = jl.fit_shear(shear, exact, 3e6, law=start)
     assert fit.parameters["mu"] == pytest.approx(0.5, abs=0.005)
     assert fit.parameters["a"] == pytest.approx(4.0, abs=0.05)
-
-
-def test_a_law_is_found_again_with_all_that_is_not_fitted(law):
-    """The other parameters are the law's own, so mu and a come back: 2 % is left to the priors."""
-    own = replace(
-        law, orientation=jl.Orientation(6.0, 0.3), critical_slip=2e-6, plane=0.0, closure_range=5e-5
-    )
-    measured = ShearCurve(SHEAR, np.ones(12), 5e6).predict(own)
-    start = replace(own, asperity=replace(own.asperity, mu=0.6), orientation=jl.Orientation(5, 0.3))
-    fit = jl.fit_shear(SHEAR, measured, 5e6, law=start, noise=1e-3)
-    found = fit.parameters
-    assert [found["mu"], found["a"]] == pytest.approx([0.5, 6.0], rel=0.02)
-    asperity = replace(own.asperity, mu=found["mu"])
-    assert fit.law == replace(own, asperity=asperity, orientation=jl.Orientation(found["a"], 0.3))
-
-
-def test_closure_alone_stays_closure_alone(law):
-    own = replace(law, closure_only=True, critical_slip=1e-6)
-    stress = np.geomspace(0.25e6, 10e6, 12)
-    y = own.closure(stress)
-    fit = jl.fit_closure(stress, y - y[0], noise=0.01, law=own, free=("asperity_density",))
-    density = fit.parameters["asperity_density"]
-    assert fit.law == replace(own, asperity_density=density)
-    assert density == pytest.approx(1e6, rel=1e-2)
-    with pytest.raises(ValueError, match="closure_only"):
-        jl.fit_shear(SHEAR, np.ones(12), 5e6, law=own)
-    with pytest.raises(ValueError, match="shear_stress is zero"):
-        jl.fit_shear(SHEAR, np.zeros(12), 5e6, law=law)
 
 
 def test_shear_fixes_what_closure_cannot(law, strength):

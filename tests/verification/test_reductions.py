@@ -6,22 +6,10 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.kernels import engine
-from jointlaw.kernels import reference as kernel
 
 # The full law sums the same terms over all azimuths, a reduced one over one of them: what differs
 # is the rounding of a few hundred sums, carried along the path.
 EXACT = 1e-12
-ENGINES = {"numpy": engine.NumpyEngine, "numba": engine.NumbaEngine}
-
-
-@pytest.fixture(params=ENGINES)
-def with_kernel(request, monkeypatch):
-    """Each kernel in turn; skipped where numba is missing."""
-    if request.param == "numba":
-        pytest.importorskip("numba")
-    monkeypatch.setenv("JOINTLAW_KERNEL", request.param)
-    return ENGINES[request.param]
 
 
 def random_law(seed, **more):
@@ -68,18 +56,17 @@ def followed(law, d):
         step[:, 0] = closing
         F, C = batch.update(step)
         rows.append([F[:, 0], C[:, 0, 0], *batch.measures(), batch.dissipated_energy])
-    return batch, np.array(rows)
+    return np.array(rows)
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_closure_only_is_the_whole_law_on_a_path_of_closure(with_kernel, seed):
+def test_closure_only_is_the_whole_law_on_a_path_of_closure(seed):
     """Traction, tangent, energies and shares, against the law in 3-D and in a plane."""
     d = closures(seed, 7)
-    batch, found = followed(random_law(seed, closure_only=True), d)
-    assert isinstance(batch._engine, with_kernel)
+    found = followed(random_law(seed, closure_only=True), d)
     peak = np.abs(found).max(axis=(0, 2))
     for plane in (None, 0.9):
-        _, full = followed(random_law(seed, plane=plane), d)
+        full = followed(random_law(seed, plane=plane), d)
         gap = np.abs(found - full).max(axis=(0, 2)) / np.where(peak > 0, peak, 1.0)
         F1, C11, sliding, slipping, separated, stored, reach, lost = gap
         assert max(F1, sliding, slipping, separated, stored, reach, lost) < EXACT
@@ -109,28 +96,3 @@ def test_closure_only_is_refused_where_joints_shear(tmp_path):
             use()
     with pytest.raises(ValueError, match="closure_only = 1 must be True or False"):
         replace(law, closure_only=1)
-
-
-def test_linear_asperities_without_heights_need_one_depth_cell():
-    """One spring touches at once: deeper cells, here added by hand, hold nothing."""
-    law = replace(random_law(9), asperity=jl.Asperity.linear(1.0, 0.7, 0.3))
-    assert law.heights is None
-    assert law.resolution.depth > 1
-    few = law.tables
-    assert few.cells == 1
-    inner = np.tile([0.0, 0.1, 0.3, 0.6, 1.0, 1.5, np.inf], (len(law.facets.theta), 1))
-    depth = law.closure_range * inner
-    force, slope = law.curve.force(np.where(np.isfinite(depth), depth, 0.0))
-    force[:, -1] = slope[:, -1] = np.inf
-    slope[:, 0] = 0.0
-    many = replace(few, depth=depth, depth_force=force, depth_slope=slope)
-    rng = np.random.default_rng(3)
-    states = [np.zeros((k.rows, 9)) for k in (few, many)]
-    for step in range(30):
-        d = rng.normal(0.2 if step == 0 else 0.0, 0.3, (few.dim, 9))
-        results = [kernel.step(k, s, d, True) for k, s in zip((few, many), states, strict=True)]
-        states = [result[0] for result in results]
-        for one, other in zip(results[0][1:], results[1][1:], strict=True):
-            assert np.abs(one - other).max() <= EXACT * max(np.abs(other).max(), 1e-3)
-        lost, lost_many = (s[2 * few.dim - 1] for s in states)
-        assert np.abs(lost - lost_many).max() <= EXACT * max(lost.max(), 1e-3)

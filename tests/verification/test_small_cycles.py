@@ -47,7 +47,7 @@ def masing(normal, amplitude):
 
 
 def test_cells_as_thin_as_the_cycle_keep_its_loss():
-    """Hertz contacts of one orientation; sharp-bits.md asks for more depth cells."""
+    """Hertz contacts of one orientation; docs/limits.md asks for more depth cells."""
     coarse, fine, finest = [], [], []
     for found, depth in ((coarse, 8), (fine, 100), (finest, 1000)):
         nodes = jl.Resolution(1, 3, depth)
@@ -82,7 +82,7 @@ PAGE = {  # loss at amplitudes 0.1 and 0.32, shear kept after 100 openings by 0.
 
 
 def test_named_resolutions_miss_what_the_page_says():
-    """The rows of docs/accuracy-measured.md, "Small cycles", against the slow bed."""
+    """The rows of docs/limits.md, "Small cycles", against the slow bed."""
     one = replace(jl.presets.load("westerly-rough"), plane=0.0)
     R, exact = one.closure_range, []
     amplitudes = AMPLITUDES[[16, 20]] * R

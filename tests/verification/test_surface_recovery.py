@@ -65,12 +65,6 @@ def test_turning_the_scan_turns_the_anisotropy(surface):
     assert along > 0.05
 
 
-def test_it_depends_on_the_sampling_length_and_says_so(surface):
-    coarse = jl.from_surface(surface, SPACING, 16 * SPACING)
-    assert coarse.parameters["asperity_density"] < 0.5 / (20 * SPACING) ** 2
-    assert "at another sampling length" in coarse.report()
-
-
 @pytest.mark.parametrize("factor", [1e3, 1e6])
 def test_heights_in_another_unit_fix_no_direction(factor):
     """Taken as m what is in mm or um: all facets stand on edge, and no direction is known."""

@@ -57,21 +57,6 @@ def test_the_tangent_stays_below_both_bounds(seed):
     assert closest > 0.3  # a bound, but not an empty one
 
 
-def test_confined_shear_needs_a_shorter_step_than_closure():
-    """After 100 closure ranges of shear at constant closure one side carries everything."""
-    law = jl.presets.load("westerly-rough")
-    joint = law.joint()
-    joint.update([law.closure_range, 0.0, 0.0])
-    for _ in range(100):
-        C = joint.update([0.0, law.closure_range, 0.0])[1]
-    size = np.linalg.norm(C, 2)
-    unsheared = law.max_stiffness(law.closure_range)
-    assert size > 15.0 * unsheared  # a step for closure alone is 4 times too long
-    step = law.critical_time_step(2.0, 0.5, law.closure_range, shear=100 * law.closure_range)
-    assert step < 2.0 * math.sqrt(2.0 / (0.5 * size))
-    assert step > 0.5 * 2.0 * math.sqrt(2.0 / (0.5 * size))  # and not much shorter than it need be
-
-
 def test_the_step_of_a_batch_is_that_of_each_joint_as_it_is():
     law = jl.presets.load("westerly-smooth")
     joints = law.joints(3)

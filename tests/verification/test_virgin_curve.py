@@ -46,6 +46,8 @@ def test_a_density_infinite_at_the_point_of_contact(alpha, eta):
     rise = mp.gamma(q + 1) / mp.gamma(p + q + 1)
     y = np.geomspace(1e-30, 1e4, 35)
     force, slope = curve.force(y)
+    # at touch the force is a power of y, and so is its integral
+    assert curve.energy(y)[0] / (y[0] * force[0]) == pytest.approx(1 / float(p + q + 1), rel=1e-6)
     with mp.workdps(30):
         for k, z in enumerate(map(mp.mpf, y / 1.15)):
             S = rise * z**p * mp.hyp1f1(p, p + q + 1, -z)

@@ -1,4 +1,4 @@
-"""No step creates energy while asperities yield and wear: by the work along the path.
+"""No step creates energy, elastic or while asperities yield and wear: by the work along the path.
 
 JOINTLAW_PATHS=50 in the environment takes as many paths of each kind, an hour or so.
 """
@@ -18,14 +18,14 @@ PATHS = int(os.environ.get("JOINTLAW_PATHS", 2))
 SEEDS = [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, PATHS))]
 
 
-def random_law(rng, held, wears):
-    """Any law of few facets that yields; `held` has a critical slip."""
+def random_law(rng, held, wears, yields=True):
+    """Any law of few facets; `held` has a critical slip."""
     a = float(rng.choice([1.0, rng.uniform(1.0, 1.6), rng.uniform(1.6, 5.0), 10.0]))
     b, mu = rng.uniform(-1.0, 2.0), rng.uniform(0.0, 1.2) * (rng.random() < 0.8)
     formation = [None, "population", "individual"][rng.integers(3)]
     # the printed heights are convex as a population from eta = 0.287
     eta = rng.uniform(0.3, 1.0) if formation == "population" else rng.choice([0.0, 0.5, 1.0])
-    damage = {"yield_interference": 10.0 ** rng.uniform(-2.5, 0.5)}
+    damage = {"yield_interference": 10.0 ** rng.uniform(-2.5, 0.5)} if yields else {}
     if wears and mu > 0.0:
         damage |= {"mu_residual": mu * rng.random(), "wear_slip": 10.0 ** rng.uniform(-2.0, 0.5)}
     return law(
@@ -50,12 +50,13 @@ def scale(k, state):
     return max(np.sum(k.area * k.c1 * k.curve.energy(y)[:, 0]), stored(k, state)[0])
 
 
+@pytest.mark.parametrize("yields", [False, True])
 @pytest.mark.parametrize("wears", [False, True])
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_no_step_of_a_closed_path_makes_energy(seed, held, wears):
+def test_no_step_of_a_closed_path_makes_energy(seed, held, wears, yields):
     rng = np.random.default_rng(seed)
-    k = random_law(rng, held, wears).tables
+    k = random_law(rng, held, wears, yields).tables
     corners = random_corners(rng, 1)[0]
     corners[-1] = 0.0
     state, gains, peak = np.zeros((k.rows, 1)), [], 0.0
@@ -70,7 +71,8 @@ def test_no_step_of_a_closed_path_makes_energy(seed, held, wears):
     assert sum(gains) <= 1e-12 * peak
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(PATHS))
 def test_no_cycle_that_is_searched_for_returns_work(seed):
     """An adversary: of many triangles from one state that with the least loss, and its children."""
     rng = np.random.default_rng(seed)
@@ -103,22 +105,6 @@ def test_no_cycle_that_is_searched_for_returns_work(seed):
     print(f"{max(made) / peak:.1e} {sum(made[3:]) / peak:.1e} of the peak")
     assert max(made) <= 1e-12 * peak
     assert sum(made[3:]) <= 1e-12 * peak
-
-
-def test_the_drag_of_the_offset_never_returns_work():
-    """T . o >= 0 for the in-plane resultant T of the normal forces, whatever was flattened."""
-    rng = np.random.default_rng(3)
-    k = law(mu=0.3, critical_slip=0.3, a=2.0, damage={"yield_interference": 0.1}).tables
-    state = np.zeros((k.rows, 200))
-    for _ in range(40):
-        d = rng.normal(size=(3, 200)) * [[0.3], [0.4], [0.4]]
-        d[0] += 0.1 - 0.3 * kernel.parts(k, state).delta[0]
-        state = kernel.step(k, state, d, False)[0]
-        now = kernel.parts(k, state)
-        y = kernel.effective_closure(k, now.delta[0], now.offset)
-        force = kernel.flattened(kernel.cells(k, y), kernel.cells(k, now.depth)).force
-        pull = np.sum((k.n[1:] @ (k.area[:, None] * force)) * now.offset, axis=0)
-        assert pull.min() >= -1e-14 * np.max(force)
 
 
 # flattened springs keep the friction limit from growing

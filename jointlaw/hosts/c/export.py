@@ -3,31 +3,26 @@
 from __future__ import annotations
 
 import re
-import sys
 from importlib import resources
 from pathlib import Path
 
 import numpy as np
 
-from ...discretisation.nodes import UNUSED
-from ...discretisation.tables import Tables
-from ...kernels.cells import compliance
-from ...kernels.reference import strength
 from ...law import JointLaw
+from ...native import layout
+from ...native.layout import FORMAT
 from ...support.checks import Array
 from ...support.files import replace_file
 
-LANES = 4  # facets side by side, as in jointlaw.h
-AZIMUTHS = 512  # of a ring of facets at most, as in jointlaw.h
-FORMAT = 2  # of table files: a change of their keywords or columns changes it
-FILES = ("jointlaw.h", "example.c", "example.cpp", "Makefile", "README.md")
-_LARGEST = sys.float_info.max
+FILES = ("example.c", "example.cpp", "Makefile", "README.md")
+HEADER = "jointlaw.h"
+_CONSTANT = "static JLAW_FUNCTION const"  # which on a device lies in its memory
 _MODEL = "granite"  # the name of the tables in these files
 
 
 def include_dir() -> str:
     """Folder of `jointlaw.h`, for a compiler's -I."""
-    return str(Path(__file__).parent)
+    return str(layout.HERE)
 
 
 def export_c(law: JointLaw, directory: str | Path, name: str = "joint") -> list[str]:
@@ -51,10 +46,11 @@ def export_c(law: JointLaw, directory: str | Path, name: str = "joint") -> list[
     source = resources.files(__package__)
     for file in FILES:
         text = (source / file).read_text(encoding="utf-8")
-        _write(folder / file, text if file == "jointlaw.h" else text.replace(_MODEL, name))
+        _write(folder / file, text.replace(_MODEL, name))
+    _write(folder / HEADER, (layout.HERE / HEADER).read_text(encoding="utf-8"))
     for file, text in tables.items():
         _write(folder / file, text)
-    return [*tables, *FILES]
+    return [*tables, HEADER, *FILES]
 
 
 def identifier(text: str) -> str:
@@ -68,10 +64,10 @@ def table_text(law: JointLaw) -> str:
 
     The last line holds a sum (FNV-1a) of the bytes before it, by which damage is told.
     """
-    scalars, arrays = _scalars(law), _arrays(law)
+    numbers, arrays = _numbers(law), _arrays(law)
     lines = [f"jointlaw tables {FORMAT}", f"fingerprint {law.fingerprint}"]
     lines += [f"# {line}" for line in _toml(law)]
-    for key, value in scalars.items():
+    for key, value in numbers.items():
         lines.append(f"{key} {value if isinstance(value, int) else value.hex()}")
     for key, array in arrays.items():
         lines.append(key)
@@ -82,7 +78,7 @@ def table_text(law: JointLaw) -> str:
 
 def header_text(law: JointLaw, name: str) -> str:
     """The tables as constants of C: `&NAME` is the law."""
-    scalars, arrays = _scalars(law), _arrays(law)
+    numbers, arrays = _numbers(law), _arrays(law)
     about = "\n".join(" * " + line.replace("*/", "* /") for line in _toml(law))
     guard = f"JOINTLAW_TABLES_{name.upper()}"
     parts = [
@@ -93,88 +89,44 @@ def header_text(law: JointLaw, name: str) -> str:
     ]
     for key, array in arrays.items():
         rows = ",\n".join(", ".join(map(repr, row.tolist())) for row in array.reshape(-1, 4))
-        parts.append(f"static const double {name}_{key}[{array.size}] = {{\n{rows}}};")
-    values = ", ".join(map(repr, scalars.values()))
+        parts.append(f"{_CONSTANT} double {name}_{key}[{array.size}] = {{\n{rows}}};")
+    values = ", ".join(map(repr, numbers.values()))
     tables = ", ".join(f"{name}_{key}" for key in arrays)
     parts.append(
-        f'static const jlaw_law {name} = {{{values},\n  {tables}, 0, "{law.fingerprint}"}};\n#endif'
+        f'{_CONSTANT} jlaw_law {name} = {{{values},\n  {tables}, 0, "{law.fingerprint}"}};\n#endif'
     )
     return "\n".join([*parts, ""])
 
 
-def _scalars(law: JointLaw) -> dict[str, int | float]:
-    """Keywords and numbers, in the order of `struct jlaw_law`; refuses too many azimuths."""
+def _numbers(law: JointLaw) -> dict[str, int | float]:
+    """Numbers of the law by name, in the order of `struct jlaw_law`; refuses too many azimuths."""
     k, p = law.tables, law.asperity
-    if max(_ring(law.facets.theta)) > AZIMUTHS:
+    if max(_ring(law.facets.theta)) > layout.AZIMUTHS:
         raise ValueError(
             f"resolution.phi = {law.resolution.phi} is out of bounds: jointlaw.h takes at most "
-            f"{AZIMUTHS} azimuths on the circle"
+            f"{layout.AZIMUTHS} azimuths on the circle"
         )
-    return {
-        "dim": k.dim,
-        "facets": len(k.c1),
-        "cells": k.cells,
-        "pieces": len(k.curve.S),
-        "yields": int(k.yields),
-        "wears": int(k.wears),
-        "critical_slip": min(k.critical_slip, _LARGEST),
-        "eta": k.curve.eta,
-        "scale": k.curve.scale,
-        "rise": float(k.curve.rise),
+    numbers, _ = layout.pack(k)
+    return numbers | {
         "closure_factor": law._first_loading.factor,
         "stiffness_factor": (max(1.0, 1.0 / p.lam) + p.mu) * float(np.sum(k.area / k.c1)),
         "largest_reach": law.largest_reach,
         "stretch": 1.0 + 2.0 * float(np.max(np.abs(k.m))),
         "farthest": min(law.largest_reach, law._first_loading.farthest),
-        "mu": k.mu,
-        "mu_residual": k.mu if k.mu_residual is None else k.mu_residual,
-        "wear_slip": min(k.wear_slip, _LARGEST),
     }
 
 
 def _arrays(law: JointLaw) -> dict[str, Array]:
-    """The arrays of `struct jlaw_law`, LANES facets side by side, zeros beyond the last one."""
+    """The arrays of `struct jlaw_law`."""
     k = law.tables
     M = len(k.c1)
-
-    def blocks(columns: Array) -> Array:  # (M, ...) -> (blocks, ..., LANES)
-        full = np.zeros((-(-M // LANES), LANES, *columns.shape[1:]))
-        full.reshape(-1, *columns.shape[1:])[:M] = columns
-        return np.moveaxis(full, 1, -1)
-
-    facet = np.zeros((M, 27))
-    for first, rows in ((0, k.m), (3, k.s), (6, k.t), (9, k.n)):
-        facet[:, first : first + k.dim] = rows.T
-    rest = (
-        k.area, k.area / k.c1, strength(k, np.asarray(k.mu)).ravel(), compliance(k).ravel(),
-        np.full(M, 1.0 / k.lam), k.area * k.c1, k.weight / k.weight.sum(), _mirror(k.n),
-        _ring(law.facets.theta), _used(k.depth),
-    )  # fmt: skip
-    facet[:, 12:22] = np.stack(rest, axis=-1)
-    if k.yield_depth is not None:
+    _, arrays = layout.pack(k)
+    more = {"MIRROR": _mirror(k.n), "RING": _ring(law.facets.theta)}
+    if k.yields:
         late = np.stack(law._first_loading.yielding or (), axis=-1)  # (2 M, 2)
-        facet[:, 22:] = np.column_stack([k.yield_depth, late[:M], late[M:]])
-    return {
-        "facet": blocks(facet),
-        "depth": blocks(_depth(k)),
-        "curve": k.curve.S,
-        "energy": k.curve.T,
-    }
-
-
-def _depth(k: Tables) -> Array:
-    """Depth cells (M, D, 6): zeta, Phi, Phi' at the begin; zeta at the end, G and kappa there."""
-    begin, end = (
-        np.stack([k.depth[:, rows], k.depth_force[:, rows], k.depth_slope[:, rows]])
-        for rows in (slice(-1), slice(1, None))
-    )
-    ends = end[0] < UNUSED  # others are open-ended
-    zeta, force, slope = np.where(ends, end, 0.0)
-    start, force0, slope0 = np.where(begin[0] < UNUSED, begin, 0.0)
-    G = np.where(ends, force - force0 - slope0 * (zeta - start), 0.0)
-    kappa = np.where(ends, slope - slope0, 0.0)
-    last = np.where(ends, zeta, _LARGEST)
-    return np.stack([np.minimum(begin[0], _LARGEST), force0, slope0, last, G, kappa], axis=-1)
+        more["LATE"] = np.hstack([late[:M], late[M:]])
+    facet = arrays["facet"] + layout.in_columns(more, M)
+    return arrays | {"facet": layout.in_blocks(facet), "depth": layout.in_blocks(arrays["depth"])}
 
 
 def _mirror(n: Array) -> Array:
@@ -189,14 +141,6 @@ def _ring(theta: Array) -> Array:
     _, first, count = np.unique(theta, return_index=True, return_counts=True)
     several = count[np.argsort(first)]
     return np.repeat(several, several).astype(float)
-
-
-def _used(depth: Array) -> Array:
-    """Cells (M,) in use, the most of each block of LANES facets."""
-    count = np.sum(depth[:, :-1] < UNUSED, axis=1)
-    first = np.arange(0, len(count), LANES)
-    most = np.maximum.reduceat(count, first)
-    return np.repeat(most, LANES)[: len(count)].astype(float)
 
 
 def _toml(law: JointLaw) -> list[str]:

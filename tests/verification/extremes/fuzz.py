@@ -1,4 +1,4 @@
-"""Random laws on random paths: 1e6 updates in the report, a part of them here."""
+"""Random laws on random paths: 1e6 updates at full length, a part of them otherwise."""
 
 import numpy as np
 

@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 
 import jointlaw as jl
-from jointlaw.kernels.engine import NumbaEngine, engine
+from jointlaw.kernels.engine import NativeEngine, engine
 
 SCALE = 2e-6  # m: closure range and asperity height of the ordinary law
 ORDINARY = {
@@ -63,7 +63,7 @@ def build(**changes):
 
 
 # the numpy kernel takes 20 times as long for small batches: long runs are shorter there
-COMPILED = isinstance(engine(build().tables), NumbaEngine)
+COMPILED = isinstance(engine(build().tables), NativeEngine)
 
 
 def name(changes):

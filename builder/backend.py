@@ -1,0 +1,80 @@
+"""Build backend: setuptools, and before it the library of the compiled law.
+
+Where no C compiler of this machine works, the package `ziglang` is asked for, which is one. A wheel
+with the library fits every Python of its platform; without one it fits every platform.
+"""
+
+import importlib.util
+import os
+import shutil
+import sys
+import sysconfig
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from setuptools import build_meta
+from setuptools.build_meta import *  # noqa: F403
+
+HERE = Path(__file__).parents[1] / "jointlaw" / "native"
+TARGET = "JOINTLAW_TARGET"  # a wheel for another machine: one of build.TARGETS
+
+
+def _load() -> ModuleType:
+    """jointlaw/native/build.py alone: numpy is not there yet."""
+    spec = importlib.util.spec_from_file_location("jointlaw_build", HERE / "build.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+build = _load()
+
+
+def get_requires_for_build_wheel(config_settings: Any = None) -> list[str]:
+    """What setuptools asks for, and a compiler where there is none."""
+    needed = build_meta.get_requires_for_build_wheel(config_settings)
+    own = not os.environ.get(TARGET) and any(map(build.works, build.installed()))
+    return needed if own else [*needed, "ziglang"]
+
+
+get_requires_for_build_editable = get_requires_for_build_wheel
+
+
+def _library() -> bool:
+    """Build the library beside its sources; whether there is one."""
+    for old in HERE.glob("libjointlaw.*"):
+        old.unlink()
+    target = os.environ.get(TARGET)
+    compiler = build.zig(target) if target else build.find_compiler()
+    if compiler is None:
+        print("no C compiler works here: numpy's kernel remains", file=sys.stderr)
+        return False
+    print(build.build(compiler, HERE), "by", *compiler.command, file=sys.stderr)
+    return True
+
+
+def build_wheel(
+    wheel_directory: str, config_settings: Any = None, metadata_directory: str | None = None
+) -> str:
+    """A wheel py3-none-PLATFORM."""
+    # setuptools would add what an earlier build left there
+    shutil.rmtree(HERE.parents[1] / "build", ignore_errors=True)
+    settings = dict(config_settings or {})
+    if _library():
+        target = os.environ.get(TARGET)
+        platform = build.TARGETS[target] if target else sysconfig.get_platform()
+        tags = ["--python-tag", "py3", "--plat-name", platform.replace("-", "_").replace(".", "_")]
+        settings["--build-option"] = tags
+    return build_meta.build_wheel(wheel_directory, settings, metadata_directory)
+
+
+def build_editable(
+    wheel_directory: str, config_settings: Any = None, metadata_directory: str | None = None
+) -> str:
+    """An editable install, with the library beside its sources."""
+    _library()
+    return build_meta.build_editable(wheel_directory, config_settings, metadata_directory)

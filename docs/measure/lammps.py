@@ -1,0 +1,149 @@
+"""ns per contact and step of pair_style jointlaw in a packing, beside LAMMPS' own styles.
+
+    python docs/measure/lammps.py FOLDER [--rounds 3] [--steps 100] [--repeat 2]
+
+Packs 2744 spheres, repeats the box (2: 21 952 spheres), and times the pair styles one after
+another in every round; the least of all rounds counts. Times of one processor are those that it
+used, by LAMMPS' own count; those of two mean something only while no other work is done.
+LAMMPS is that of this Python's environment, or of $ENV.
+"""
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import jointlaw as jl
+from jointlaw.hosts.c.export import table_text
+from jointlaw.hosts.lammps.export import export_lammps
+
+ENV = Path(os.environ.get("ENV", sys.prefix))
+PACK = """units si
+atom_style sphere
+boundary p p p
+comm_modify vel yes
+newton on
+lattice sc 0.0135
+region box block 0 14 0 14 0 14
+create_box 1 box
+create_atoms 1 box
+set type 1 diameter 0.01 density 2600
+displace_atoms all random 0.0015 0.0015 0.0015 4711
+velocity all ramp vx -0.3 0.3 y 0 0.2 sum yes units box
+pair_style gran/hertz/history 1e7 NULL 50.0 NULL 0.4 0
+pair_coeff * *
+neighbor 0.002 bin
+timestep 2e-5
+fix 1 all nve/sphere
+fix v all viscous 1e-4
+variable L equal (2744*4/3*PI*0.005^3/0.645)^(1/3)
+fix d all deform 1 x final 0 $L y final 0 $L z final 0 $L remap x units box
+run 2000
+unfix d
+run 1000
+write_data pack.data nocoeff
+"""
+MEASURE = """units si
+atom_style sphere
+boundary p p p
+comm_modify vel yes
+newton {newton}
+read_data pack.data
+replicate {repeat} {repeat} {repeat}
+{style}
+neighbor 0.0005 bin
+timestep 5e-6
+fix 1 all nve/sphere
+fix v all viscous 0.02
+compute each all contact/atom
+compute count all reduce sum c_each
+thermo_style custom step c_count press
+run {settle}
+run {steps}
+"""
+OWN = {
+    "gran/hertz/history": ("off", "pair_style gran/hertz/history 1e8 NULL 50.0 NULL 0.4 0\n"
+                           "pair_coeff * *"),
+    "granular, mindlin": ("off", "pair_style granular\npair_coeff * * hertz/material 1e9 0.5 0.3 "
+                          "tangential mindlin NULL 1.0 0.4 damping viscoelastic"),
+}  # fmt: skip
+RESOLUTIONS = [jl.Resolution(1, 3, 2), jl.Resolution(2, 3, 4)]
+
+
+def rock(resolution):
+    """Asperities of a tenth of a millimetre, as stiff in the packing as the styles beside it."""
+    return jl.JointLaw(
+        orientation=jl.Orientation(4.0),
+        asperity=jl.Asperity(K=9.5e6, lam=1.2, eta=0.5, mu=0.4),
+        heights=jl.GammaHeights(alpha=3.82, beta=1.15e-4, overlap=3e-4),
+        asperity_density=1e6,
+        resolution=resolution,
+        critical_slip=2e-4,
+    )
+
+
+def lammps(folder, script, processors=1):
+    """Run a script; its log."""
+    (folder / "in.bench").write_text(script)
+    program = next(ENV.glob("lib/python3*/site-packages/lammps/lmp"))
+    command = [program, "-in", "in.bench", "-log", "log.bench", "-screen", "none"]
+    if processors > 1:
+        command = [ENV / "bin/mpirun", "-np", str(processors), *command]
+    env = {**os.environ, "OMP_NUM_THREADS": "1", "LD_LIBRARY_PATH": str(ENV / "lib")}
+    subprocess.run(command, cwd=folder, env=env, check=True, stdin=subprocess.DEVNULL)
+    return (folder / "log.bench").read_text()
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("folder", type=Path)
+    for name, value in {"rounds": 3, "steps": 100, "settle": 300, "repeat": 2}.items():
+        parser.add_argument(f"--{name}", type=int, default=value)
+    parser.add_argument("--processors", type=int, nargs="+", default=[1, 2])
+    options = parser.parse_args()
+    folder = options.folder
+    export_lammps(rock(RESOLUTIONS[0]), folder, "rock")
+    subprocess.run(["./build.sh"], cwd=folder, env={**os.environ, "ENV": str(ENV)}, check=True)
+    if not (folder / "pack.data").exists():
+        lammps(folder, PACK)
+    styles, sizes = dict(OWN), {}
+    for r in RESOLUTIONS:
+        file = f"rock-{r.u}{r.phi}{r.depth}.jlaw"
+        (folder / file).write_text(table_text(rock(r)))
+        name = f"jointlaw ({r.u}, {r.phi}, {r.depth})"
+        styles[name] = ("on", "plugin load ./jointlawplugin.so\npair_style jointlaw opening 5e-4\n"
+                        f"pair_coeff * * {file}")  # fmt: skip
+        sizes[name] = 8 * (rock(r).state_size + 8)
+    best = {}
+    for _ in range(options.rounds):
+        for name, (newton, style) in styles.items():
+            for processors in options.processors:
+                text = MEASURE.format(newton=newton, style=style, **vars(options))
+                log = lammps(folder, text, processors)
+                pair = float(re.findall(r"^Pair +\| \S+ +\| (\S+)", log, re.M)[-1])
+                loop = float(re.findall(r"^Loop time of (\S+)", log, re.M)[-1])
+                if processors == 1:  # what other work took from this core is left out
+                    used = float(re.findall(r"^(\S+)% CPU use", log, re.M)[-1]) / 100
+                    pair, loop = pair * used, loop * used
+                count = float(re.findall(r"^ +\d+ +(\S+) +\S+ *$", log, re.M)[-1]) / 2
+                each = 1e9 / options.steps / count
+                old = best.get((name, processors), (1e99, 1e99, 0))
+                best[name, processors] = (min(old[0], pair * each), min(old[1], loop * each), count)
+    print(
+        "| pair style, `Resolution` | contacts | pair style, ns per contact and step "
+        "| the same / mindlin | whole step, ns | 2 processors: pair style, ns "
+        "| speed-up of the step | bytes per contact |\n" + "|---" * 8 + "|"
+    )
+    for name in styles:
+        (pair, loop, count), (pair2, loop2, _) = (
+            best[name, n] for n in (1, options.processors[-1])
+        )
+        over = pair / best["granular, mindlin", 1][0]
+        print(f"| {name} | {count:.0f} | {pair:.0f} | {over:.2f} | {loop:.0f} | {pair2:.0f} | "
+              f"{loop / loop2:.2f} | {sizes.get(name, '')} |")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,22 @@
+"""Largest error, in % of the peak, of the named resolutions on the standard paths, by preset."""
+
+from dataclasses import replace
+
+from tables import table
+
+import jointlaw as jl
+from jointlaw.accuracy.suite import standard_suite
+from jointlaw.parameters.resolution import NAMED
+
+sliders = dict.fromkeys(NAMED, 0)
+rows = []
+for preset in jl.presets.names():
+    law = replace(jl.presets.load(preset), plane=0.0)
+    suite, cells = standard_suite(law), []
+    for name, resolution in NAMED.items():
+        made = replace(law, resolution=resolution)
+        sliders[name] = max(sliders[name], made.tables.sliders)
+        cells.append(f"{100 * suite.errors(made)[0].max():.2f}")
+    rows.append([preset, *cells])
+most = ["sliders, at most", *sliders.values()]
+print(table(["preset", *NAMED], [*rows, most]))

@@ -1,0 +1,24 @@
+"""Friction angles (deg) of the two laws of the tilt test, alone, by stress and resolution."""
+
+from dataclasses import replace
+
+from tables import table
+
+import dem_demo
+import jointlaw as jl
+
+HEAD = ["u, phi, depth", "along, 26 kPa", "across, 26 kPa", "along, 6 kPa", "across, 6 kPa"]
+RULES = (2, 3, 1), (2, 4, 1), (2, 10, 1), (4, 6, 1), (4, 10, 1), (4, 10, 6), (16, 24, 1)
+
+laws, rows = dem_demo.load("tilt").laws, []
+for rule in RULES:
+    found = []
+    for stress in (26e3, 6e3):
+        for name in ("along", "across"):
+            law = replace(laws[name], resolution=jl.Resolution(*rule))
+            # friction peaks where the contacts begin to be renewed
+            way = [1.2 * law.critical_slip]
+            record = jl.direct_shear(law.joint(), to=way, normal=stress, steps=120)
+            found.append(f"{record.peak_friction_angle:.2f}")
+    rows.append([", ".join(map(str, rule)), *found])
+print(table(HEAD, rows))

@@ -1,0 +1,195 @@
+"""Does `law.at_tolerance(t)` keep its word? Random laws, on random paths that it has never seen.
+
+    python docs/measure/tolerance.py [--laws 100] [--seed 1] [--plane]
+
+Laws: a from 1 to 10 (evenly in log a), b and c over their bounds, mu 0.05 to 1, eta 0 to 0.7,
+heights of either formation or none, in a plane or in space, half of them with a critical slip of 1
+to 1000 R. Paths: 15 per law, six of five to eight legs between random corners, six smooth ones
+(sums of four waves), closures up to the law's closure range R and openings to -0.3 R, shear up to
+R; somewhere each is closed to between half the normal stress S at R and all of it; and three of
+slip at the closure of S/20 to S/2, to three critical slips but 3 R at most, back and forth again.
+Besides, four of slip to three critical slips, or 30 R, and back at random normal stresses, which
+each resolution holds by itself. The truth is twice the reference resolution in each direction.
+
+`met` is the share of laws that keep the tolerance on all of them (one that `at_tolerance`
+refuses does not), `paths` the share of paths that do, `worst` the largest error over the tolerance,
+`seconds` the longest call of `at_tolerance` (the first of a law makes its reference). a < 1.4 is
+reported apart.
+"""
+
+import argparse
+import math
+import time
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from tables import table
+
+import jointlaw as jl
+from jointlaw.accuracy.slip import random_ways, slip
+from jointlaw.accuracy.suite import (
+    errors,
+    far_path,
+    reference_resolution,
+    scaled,
+    steepest,
+    tractions,
+)
+from jointlaw.support.progress import track
+
+TOLERANCES = (0.05, 0.01, 0.003)
+PATHS, STEPS = 6, 160  # of each kind
+FARS, SLIPS = 3, 4  # paths that slip at a given closure, and at a given normal stress
+SMALL_A = 1.4
+HEAD = ["laws", "tolerance", "met", "paths", "worst", "sliders", "refused", "seconds"]
+
+Draw = tuple[jl.JointLaw, list[dict[str, Any]]]
+
+
+def random_law(
+    rng: np.random.Generator, smallest: float = 1.0, largest: float = 10.0
+) -> jl.JointLaw:
+    """Any law within the bounds above; with "population" formation only where that is convex."""
+    a = float(np.exp(rng.uniform(0.0, np.log(10.0))))
+    b = rng.uniform(-1.0, 2.0)
+    c = rng.uniform(-1.0, 1.0) * (1 / 3 - b / 6)
+    eta = rng.uniform(0.0, 0.7) * (rng.random() > 0.1)  # and some linear ones
+    asperity = jl.Asperity(K=2e8 * 1e-6 ** (0.5 - eta), lam=rng.uniform(0.8, 1.5), eta=eta,
+                           mu=rng.uniform(0.05, 1.0))  # fmt: skip
+    formation = (None, "population", "individual")[rng.integers(3)]
+    heights = None
+    if formation is not None:
+        heights = jl.GammaHeights(
+            alpha=rng.uniform(1.5, 8.0), beta=rng.uniform(0.5e-6, 2e-6),
+            overlap=rng.uniform(0.5e-6, 4e-6), formation=formation,
+        )  # fmt: skip
+    plane = None if rng.random() < 0.5 else 0.0
+    law = partial(jl.JointLaw, orientation=jl.Orientation(a, b, c), asperity=asperity,
+                  asperity_density=1e10, plane=plane)  # fmt: skip
+    try:
+        return law(heights=heights)
+    except ValueError:  # not convex
+        return law(heights=replace(heights, formation="individual"))
+
+
+def random_paths(law: jl.JointLaw, rng: np.random.Generator) -> np.ndarray:
+    """Increments (STEPS, 2 PATHS + FARS, dim) in m."""
+    R, s = law.closure_range, np.arange(1, STEPS + 1) / STEPS
+    stress = float(law.normal_stress(R)) / 2
+    far = np.stack([far_path(law, rng, stress, s) for _ in range(FARS)], axis=1)
+    place = np.concatenate([legs(law, rng), waves(law, rng), far], axis=1)[:, :, : law.dim]
+    return np.diff(R * place, axis=0, prepend=0.0)
+
+
+def legs(law: jl.JointLaw, rng: np.random.Generator) -> np.ndarray:
+    """Places (STEPS, PATHS, 3) in units of the closure range, on lines between random corners."""
+    at, R = [], law.closure_range
+    stress = float(law.normal_stress(R))
+    for _ in range(PATHS):
+        count = int(rng.integers(5, 9))
+        closure = np.concatenate([[0.0, rng.uniform(0.4, 1.0)], rng.uniform(-0.3, 1.0, count - 1)])
+        closure[int(rng.integers(1, count + 1))] = law.closure(stress * rng.uniform(0.5, 1.0)) / R
+        shear = np.sqrt(rng.random(count + 1)) * (np.arange(count + 1) > 0)
+        turn = rng.uniform(0.0, 2 * math.pi, count + 1)
+        corners = np.stack([closure, shear * np.cos(turn), shear * np.sin(turn)], axis=1)
+        when = np.arange(1, STEPS + 1) / STEPS * count
+        at.append(np.stack([np.interp(when, np.arange(count + 1), x) for x in corners.T], axis=1))
+    return np.stack(at, axis=1)
+
+
+def waves(law: jl.JointLaw, rng: np.random.Generator) -> np.ndarray:
+    """As `legs`, smooth: each component a sum of four waves of half a period to five."""
+    at, s = [], np.arange(STEPS + 1) / STEPS
+    stress = float(law.normal_stress(law.closure_range))
+
+    def wave() -> np.ndarray:
+        often, turn = rng.uniform(0.5, 5.0, 4), rng.uniform(0.0, 2 * math.pi, 4)
+        size = rng.normal(size=4)
+        made: np.ndarray = np.sin(2 * math.pi * np.outer(s, often) + turn) @ size
+        return made - made[0]
+
+    for _ in range(PATHS):
+        up, x, y = wave(), wave(), wave()
+        low = rng.uniform(-0.3, 0.3)
+        high = float(law.closure(stress * rng.uniform(0.5, 1.0))) / law.closure_range
+        closure = low + (high - low) * (up - up.min()) / np.ptp(up)
+        far = rng.uniform(0.3, 1.0) / np.hypot(x, y).max()
+        # shut within the first tenth of the path
+        at.append(np.stack([np.minimum(10 * s, 1.0) * closure, far * x, far * y], axis=1)[1:])
+    return np.stack(at, axis=1)
+
+
+def misses(law: jl.JointLaw, rng: np.random.Generator) -> list[dict[str, Any]]:
+    """Per tolerance: largest error of each random path over the tolerance, and the sliders."""
+    d = random_paths(law, rng)
+    best = reference_resolution(law)
+    exact = replace(law, resolution=scaled(best, 2.0))
+    truth = tractions(exact, d)
+    stress = float(law.normal_stress(law.closure_range)) / 2
+    ways = random_ways(rng, SLIPS, law.dim)
+    slips = steepest(law) < 88.0  # else it jams
+    slid = slip(exact, law.closure_range, stress, ways) if slips else None
+    found = []
+    for tolerance in TOLERANCES:
+        start = time.perf_counter()
+        try:
+            made = law.at_tolerance(tolerance)
+        except ValueError as error:
+            found.append({"refused": str(error)})
+            continue
+        took = time.perf_counter() - start
+        ratio = errors(tractions(made, d), truth)[0] / tolerance
+        if slid is not None:
+            mine = slip(made, law.closure_range, stress, ways)
+            ratio = np.append(ratio, mine.errors(slid)[0] / tolerance)
+        found.append({"ratio": ratio.tolist(), "sliders": made.tables.sliders, "seconds": took})
+    return found
+
+
+def draw(count: int, seed: int, plane: bool = False) -> list[Draw]:
+    """Random laws, all of them in a plane if asked, and what `misses` says of each."""
+    rng, found = np.random.default_rng(seed), []
+    for _ in track(range(count), "random laws", count):
+        law = random_law(rng)
+        if rng.random() < 0.5:
+            law = replace(law, critical_slip=law.closure_range * 10 ** rng.uniform(0.0, 3.0))
+        law = replace(law, plane=0.0) if plane else law
+        found.append((law, misses(law, rng)))
+    return found
+
+
+def rows(draws: list[Draw]) -> list[list[Any]]:
+    """How often the tolerances were kept; a below and above SMALL_A apart."""
+    found = []
+    steep = [one for one in draws if one[0].orientation.a < SMALL_A]
+    usual = [one for one in draws if one[0].orientation.a >= SMALL_A]
+    for some, name in ((usual, f"a >= {SMALL_A}"), (steep, f"a < {SMALL_A}")):
+        for k, tolerance in enumerate(TOLERANCES):
+            kept = [one[k] for _, one in some if "ratio" in one[k]]
+            if not kept:
+                continue
+            met = sum(max(one["ratio"]) <= 1.0 for one in kept) / len(some)
+            ratio = np.concatenate([one["ratio"] for one in kept])  # fewer of laws that jam
+            sliders = np.median([one["sliders"] for one in kept])
+            seconds = max(one["seconds"] for one in kept)
+            found.append([f"{len(some)} with {name}", f"{tolerance:.1%}", f"{met:.1%}",
+                          f"{np.mean(ratio <= 1.0):.1%}", f"{ratio.max():.2f}", f"{sliders:.0f}",
+                          len(some) - len(kept), f"{seconds:.1f}"])  # fmt: skip
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--laws", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--plane", action="store_true", help="none in space: ten times as fast")
+    options = parser.parse_args()
+    print(table(HEAD, rows(draw(options.laws, options.seed, options.plane))))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,112 @@
+/* batch.c: many joints. Compiled several times, with -DW=8, 4, 2 or 1 and -DKIND=_8 and so on for
+ * states in blocks of JLAW_BLOCK joints side by side, (blocks, rows, JLAW_BLOCK); and with
+ * -DW=4 -DJLAW_ABREAST, or -DW=1, for joints one after the other, (joints, rows).
+ */
+#include "batch.h"
+#include "lanes.h"
+#include "law.h"
+#include <stdlib.h>
+#include <string.h>
+
+#define GLUE2(a, b) a##b
+#define GLUE(a, b) GLUE2(a, b)
+#define NAME(x) GLUE(x, KIND)
+#ifdef JLAW_ABREAST
+#define BLOCK 1
+#else
+#define BLOCK JLAW_BLOCK /* joints of a block */
+#endif
+
+/* Advance the joints of a block: d, F and C of the first of them */
+static void advance_block(const jlaw_batch *b, double *block, size_t ahead, long first, int count)
+{
+  const int dim = b->law->dim, kept = b->rows > state_rows(b->law);
+  const double *d = b->d + first * dim;
+  double *F = b->F + first * dim, *C = b->C ? b->C + first * dim * dim : NULL;
+  for (int at = 0; at < count; at += JOINTS) {
+    const numbers n = {block + at, BLOCK, ahead};
+    of_joint p[3], f[3], c[9];
+    const int some = count - at < JOINTS ? count - at : JOINTS;
+    for (int i = 0; i < dim; i++) {
+      p[i] = each_joint(0.0);
+      for (int l = 0; l < some; l++) JOINT(p[i], l) = d[(at + l) * dim + i];
+    }
+    step_of_kind(b->law, n, p, f, c, b->ledger, C != NULL, kept);
+    for (int l = 0; l < some; l++) {
+      for (int i = 0; i < dim; i++) F[(at + l) * dim + i] = JOINT(f[i], l);
+      for (int i = 0; C && i < dim * dim; i++) C[(at + l) * dim * dim + i] = JOINT(c[i], l);
+    }
+  }
+}
+
+/* Where the numbers of a joint begin; they are BLOCK apart */
+static double *joint_of(const jlaw_batch *b, long long joint)
+{
+  return b->state + joint / BLOCK * BLOCK * b->rows + joint % BLOCK;
+}
+
+/* Advance numbers first to last - 1 of the list b->index, or of all joints where it is NULL; first
+ * begins a block. Without b->keep the states stay as they were. 0, or -1 where memory is short. */
+int NAME(jlaw_advance)(const jlaw_batch *b, long first, long last)
+{
+  const size_t rows = (size_t) b->rows, size = rows * BLOCK;
+  double *copy = NULL;
+  if (b->index || !b->keep) {
+    copy = (double *) calloc(size, sizeof *copy);
+    if (!copy) return -1;
+  }
+  for (long start = first; start < last; start += BLOCK) {
+    const int count = last - start < BLOCK ? (int) (last - start) : BLOCK;
+    double *block = copy;
+    if (b->index)
+      for (int l = 0; l < count; l++) {
+        const double *from = joint_of(b, b->index[start + l]);
+        for (size_t r = 0; r < rows; r++) copy[r * BLOCK + (size_t) l] = from[r * BLOCK];
+      }
+    else if (!b->keep) memcpy(copy, joint_of(b, start), size * sizeof *copy);
+    else block = joint_of(b, start);
+    advance_block(b, block, copy ? 0 : size, start, count);
+    if (b->index && b->keep)
+      for (int l = 0; l < count; l++) {
+        double *to = joint_of(b, b->index[start + l]);
+        for (size_t r = 0; r < rows; r++) to[r * BLOCK] = copy[r * BLOCK + (size_t) l];
+      }
+  }
+  free(copy);
+  return 0;
+}
+
+/* Measures (5, n) of joints first to last - 1, as reference.measures, into b->F */
+int NAME(jlaw_measure)(const jlaw_batch *b, long first, long last)
+{
+  for (long at = first; at < last; at += JOINTS) {
+    const numbers n = {joint_of(b, at), BLOCK, 0};
+    const amounts all = measure(b->law, n);
+    const of_joint out[5] = {all.sliding, all.slipping, all.separated, all.normal + all.sheared,
+                             all.reach};
+    for (int i = 0; i < 5; i++)
+      for (int l = 0; l < JOINTS && at + l < last; l++) b->F[i * b->n + at + l] = JOINT(out[i], l);
+  }
+  return 0;
+}
+
+/* Phi and Phi' that joints first to last - 1 keep, after their states were written */
+int NAME(jlaw_refresh)(const jlaw_batch *b, long first, long last)
+{
+  const jlaw_law *law = b->law;
+  const int M = law->facets, kept = state_rows(law);
+  for (long joint = first; joint < last; joint += JOINTS) {
+    const numbers n = {joint_of(b, joint), BLOCK, 0};
+    for (int at = 0; at < M && b->rows > kept; at += TOGETHER) {
+      const int some = M - at < TOGETHER ? M - at : TOGETHER;
+      facets o;
+      facets_now(law, n, at, &o);
+      put(n, kept + at, 1, some, o.f1);
+      put(n, kept + M + at, 1, some, o.k1);
+      if (!law->yields) continue;
+      put(n, kept + 2 * M + at, 1, some, o.fz1);
+      put(n, kept + 3 * M + at, 1, some, o.kz1);
+    }
+  }
+  return 0;
+}

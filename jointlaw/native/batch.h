@@ -1,0 +1,23 @@
+/* batch.h: what a batch hands to the library; library.py has the same structure */
+#ifndef JLAW_BATCH_H
+#define JLAW_BATCH_H
+#include <float.h>
+#include <math.h>
+#include <stddef.h>
+typedef struct jlaw_law jlaw_law;
+#include "layout.h"
+
+enum { JLAW_BLOCK = 8 /* joints side by side in a block of states */ };
+
+typedef struct {
+  const jlaw_law *law;
+  double *state;          /* (blocks, rows, JLAW_BLOCK), or (n, rows) */
+  const double *d;        /* (n, dim) */
+  double *F, *C;          /* (n, dim), (n, dim, dim); C may be NULL */
+  const long long *index; /* the joints that move (n,), or NULL for all */
+  long long n;
+  int rows, ledger, keep;
+} jlaw_batch;
+
+typedef int jlaw_call(const jlaw_batch *b, long first, long last);
+#endif

@@ -1,0 +1,178 @@
+"""Builds the library of the compiled law, with the standard library of Python alone.
+
+Compilers are taken in the order clang, g++, gcc, zig: as fast as they make the law. A compiler that
+is there may still be a stub, so a trial file is compiled first.
+"""
+
+import hashlib
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any, NamedTuple
+
+HERE = Path(__file__).parent
+SOURCES = ("batch.c", "library.c", "batch.h", "layout.h", "lanes.h", "law.h", "build.py")
+# no fused operations: the same bits with every compiler; the others change no result
+FLAGS = ("-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-w")
+HIDDEN = ("-fPIC", "-fvisibility=hidden")
+LEVELS = {8: "x86-64-v4", 4: "x86-64-v3", 2: "x86-64"}  # of lanes of vectors, on x86-64
+ENDINGS = {"linux": "so", "macos": "dylib", "windows": "dll"}
+TARGETS = {  # of zig, and what wheels call them
+    "x86_64-linux-gnu.2.17": "manylinux_2_17_x86_64",
+    "aarch64-linux-gnu.2.17": "manylinux_2_17_aarch64",
+    "x86_64-macos.11.0": "macosx_11_0_x86_64",
+    "aarch64-macos.11.0": "macosx_11_0_arm64",
+    "x86_64-windows-gnu": "win_amd64",
+    "aarch64-windows-gnu": "win_arm64",
+}
+TRIAL = """#include <math.h>
+#include <stdlib.h>
+typedef double real __attribute__((vector_size(64)));
+typedef int whole __attribute__((vector_size(32)));
+#ifdef __AVX512DQ__
+#include <immintrin.h>
+#endif
+double trial(double x)
+{
+  real v = {x, 1.0};
+  v[0] = exp(v[0]);
+  return __builtin_convertvector(__builtin_convertvector(v, whole), real)[0];
+}
+"""
+
+
+class Compiler(NamedTuple):
+    """A command and what of it differs from others."""
+
+    command: tuple[str, ...]
+    target: str = ""  # of zig, for another machine than this
+
+    @property
+    def zig(self) -> bool:
+        return "ziglang" in self.command
+
+    @property
+    def machine(self) -> tuple[str, str]:
+        """Processor and system that it builds for."""
+        if self.target:
+            processor, system = self.target.split("-")[:2]
+            return processor, system.partition(".")[0]
+        system = {"Darwin": "macos", "Windows": "windows"}.get(platform.system(), "linux")
+        return {"AMD64": "x86_64", "arm64": "aarch64"}.get(
+            platform.machine(), platform.machine()
+        ), system
+
+    def level(self, lanes: int) -> list[str]:
+        """Flags for vectors of so many lanes; at the least those of every such processor."""
+        if self.machine[0] != "x86_64":
+            return []
+        level = LEVELS[lanes]
+        if not self.zig:
+            return [f"-march={level}"]
+        return [f"-mcpu={'baseline' if lanes == 2 else level.replace('-', '_')}"]
+
+    def run(self, *arguments: object) -> None:
+        """Compile; raises CalledProcessError with what the compiler said, or OSError."""
+        subprocess.run(
+            [*self.command, *map(str, arguments)], check=True, capture_output=True, text=True
+        )
+
+
+def zig(target: str = "") -> Compiler:
+    """The compiler of the package `ziglang`, for this machine or another."""
+    known = target or f"{platform.machine()}-linux-gnu.2.17"
+    if not target and platform.system() != "Linux":
+        return Compiler((sys.executable, "-m", "ziglang", "cc"))
+    return Compiler((sys.executable, "-m", "ziglang", "cc", "-target", known), target)
+
+
+def installed() -> list[Compiler]:
+    """Compilers of this machine that may work, the one that makes the fastest library first."""
+    commands = [("clang",), ("g++", "-x", "c++", "-fno-exceptions"), ("gcc",), ("cc",)]
+    return [Compiler(command) for command in commands if shutil.which(command[0])]
+
+
+def works(compiler: Compiler) -> bool:
+    """Whether the compiler makes a library out of a trial file."""
+    with tempfile.TemporaryDirectory() as folder:
+        source, out = Path(folder) / "trial.c", Path(folder) / "trial.out"
+        source.write_text(TRIAL)
+        lanes = max(LEVELS)
+        try:
+            compiler.run(
+                *FLAGS, *HIDDEN, *compiler.level(lanes), "-shared", source, "-o", out, "-lm"
+            )
+        except (OSError, subprocess.CalledProcessError):
+            return False
+        return out.is_file() and out.stat().st_size > 0
+
+
+def find_compiler() -> Compiler | None:
+    """The first compiler of this machine that works, zig included; None if none does."""
+    return next((c for c in [*installed(), zig()] if works(c)), None)
+
+
+def sources() -> str:
+    """Hash of all that a library is built from."""
+    digest = hashlib.sha256()
+    for name in SOURCES:
+        digest.update((HERE / name).read_bytes().replace(b"\r\n", b"\n"))
+    return digest.hexdigest()[:16]
+
+
+def library_name(system: str) -> str:
+    """Name of the library's file on this system."""
+    return f"libjointlaw.{ENDINGS[system]}"
+
+
+def build(compiler: Compiler, folder: Path = HERE) -> Path:
+    """Build the library into the folder; its path. RuntimeError tells the compiler's words."""
+    processor, system = compiler.machine
+    levels = LEVELS if processor == "x86_64" else (2,)
+    folder.mkdir(parents=True, exist_ok=True)
+    out = folder / library_name(system)
+    position = [] if system == "windows" else ["-fPIC"]
+    with tempfile.TemporaryDirectory() as scratch:
+
+        def compile_one(source: str, lanes: int, *what: str) -> Path:
+            to = Path(scratch) / f"{len(what)}{lanes}.o"
+            flags = [*FLAGS, *position, "-fvisibility=hidden", *compiler.level(lanes), *what]
+            _run(compiler, *flags, "-c", HERE / source, "-o", to)
+            return to
+
+        parts: list[tuple[Any, ...]] = [("library.c", 2, f'-DJLAW_SOURCES="{sources()}"')]
+        for lanes in levels:
+            parts += [("batch.c", lanes, f"-DW={lanes}", f"-DKIND=_{lanes}")]
+            parts += [("batch.c", lanes, "-DW=4", f"-DKIND=_{lanes}_alone", "-DJLAW_ABREAST")]
+        with ThreadPoolExecutor() as pool:
+            objects = list(pool.map(lambda part: compile_one(*part), parts))
+        made = Path(scratch) / out.name
+        link = ["-Wl,--as-needed"] if system == "linux" else []
+        linker = compiler._replace(
+            command=tuple(c for c in compiler.command if c not in ("-x", "c++"))
+        )
+        _run(
+            linker,
+            "-shared",
+            *link,
+            *objects,
+            "-o",
+            made,
+            *([] if system == "windows" else ["-lm"]),
+        )
+        # a library that is in use must not be written over: another file takes its place
+        fresh = out.with_name(f"{out.name}.new")
+        shutil.copyfile(made, fresh)
+        fresh.replace(out)
+    return out
+
+
+def _run(compiler: Compiler, *arguments: object) -> None:
+    try:
+        compiler.run(*arguments)
+    except subprocess.CalledProcessError as error:
+        raise RuntimeError(f"{' '.join(map(str, error.cmd))}\n{error.stderr}") from None

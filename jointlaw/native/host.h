@@ -1,0 +1,698 @@
+/* jointlaw.h: the law of a rough rock joint, complete, in C99 (also C++11 and later). MIT licence.
+ *
+ *     #define JOINTLAW_IMPLEMENTATION                  in one source file, before this line:
+ *     #include "jointlaw.h"
+ *
+ *     char message[JLAW_MESSAGE];
+ *     jlaw_law *law = jlaw_read("granite.jlaw", message, sizeof message);
+ *     double state[162] = {0};                         jlaw_state_size(law) numbers; zeros: virgin
+ *     if (jlaw_update(law, state, state, d, F, NULL, message, sizeof message)) ... message tells
+ *
+ * Table files (.jlaw, or as constants NAME.h) are written by `jointlaw export c`.
+ *
+ * Axes: 1 is the normal of the joint, 2 and 3 span it. d is the displacement in this step (m) of
+ * one body into and along the other: closure first, then the jlaw_dim - 1 components of shear.
+ * F is the traction (Pa), compression first: the force on the body that moves by +d is -area F.
+ * C = dF/dd (Pa/m), row by row. Energies are per area (J/m2).
+ *
+ * A law does not change after reading: any number of threads may share it. States belong to the
+ * caller; two threads must not advance one state at a time. No function but jlaw_read and jlaw_free
+ * uses memory, files or the locale; none uses a global variable.
+ *
+ * Build with -ffp-contract=off: the same bits with every compiler and on every x86-64. For speed
+ * -O3 -fno-math-errno -fno-trapping-math, which change no result; never -ffast-math.
+ *
+ * Symbols and order of the step are those of the page "theory-incremental" of the documentation
+ * and of jointlaw/kernels/reference.py.
+ */
+#ifndef JOINTLAW_H
+#define JOINTLAW_H
+#ifndef __CUDACC_RTC__
+#include <stddef.h>
+#endif
+#ifndef JLAW_FUNCTION
+#define JLAW_FUNCTION /* before every function and table: __device__ for CUDA */
+#endif
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define JLAW_MESSAGE 300 /* bytes that hold every message */
+
+typedef struct jlaw_law jlaw_law;
+
+#ifndef JOINTLAW_NO_FILES
+/* Read a table file. NULL and a message if it cannot be read, is damaged or of another version. */
+jlaw_law *jlaw_read(const char *file, char *message, size_t size);
+void jlaw_free(jlaw_law *law);
+#endif
+
+/* Components of d: 3, 2 in a plane, 1 for closure only; numbers of state, as in a snapshot */
+JLAW_FUNCTION int jlaw_dim(const jlaw_law *law);
+JLAW_FUNCTION int jlaw_state_size(const jlaw_law *law);
+
+/* One step from state s0 to s1 (may be the same) by d (dim): F (dim), and C (dim, dim) if not NULL.
+ * Returns 0; or -1 and a message where d or the state is not finite or forces would overflow:
+ * nothing is written then. */
+JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1, const double *d,
+                              double *F, double *C, char *message, size_t size);
+
+/* The same without any check, for hosts that know their steps and for devices: row i of the state is
+ * s[i stride], so that joints may lie side by side, (rows, n). C may be NULL. */
+JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t stride, const double *d,
+                             double *F, double *C);
+
+/* Elastic energy, and energy lost since the virgin state, in J/m2 */
+JLAW_FUNCTION double jlaw_stored(const jlaw_law *law, const double *s);
+JLAW_FUNCTION double jlaw_dissipated(const jlaw_law *law, const double *s);
+/* Shares from 0 to 1. sliding: of all facets, those at their friction limit; slipping: of the
+ * friction capacity, what is at its limit; separated: of all facets, those out of touch. */
+JLAW_FUNCTION void jlaw_shares(const jlaw_law *law, const double *s, double shares[3]);
+
+/* Unsheared joint: normal stress (Pa) at a closure (m), and the inverse. NaN where there is none. */
+JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure);
+JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress);
+/* Bound of |C| (Pa/m) while no facet is closed further: dt < 2 sqrt(mass/(area * this)). */
+JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure);
+
+/* The state in axes 2 and 3 that are turned by this angle (rad, from 2 to 3) about the normal. For a
+ * host that cannot carry its axes with a body, and laws without a preferred direction (c = 0).
+ * Shear and offset turn exactly. Sliders and flattened depths are read between the azimuths of
+ * their ring of facets: exact where the angle is a whole number of azimuths of every ring, else
+ * the better the more there are. Sliders gain no energy; what they lose counts as dissipated. In a
+ * plane the axis keeps or changes its sense. */
+JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle);
+/* The state after the bodies changed their roles: axis 1 turned round, axis 2 kept, axis 3 turned
+ * round with it. Shear along 2 changes its sign, along 3 not. Exact. */
+JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s);
+
+/* Of the law that the tables were made for: a Python state of another fingerprint does not fit. */
+JLAW_FUNCTION const char *jlaw_fingerprint(const jlaw_law *law);
+
+/* The tables, for files NAME.h; not for the host */
+#include "layout.h"
+
+#ifdef __cplusplus
+}
+#endif
+#endif
+
+#if defined(JOINTLAW_IMPLEMENTATION) && !defined(JOINTLAW_IMPLEMENTED)
+#define JOINTLAW_IMPLEMENTED
+#ifdef __FAST_MATH__
+#error "jointlaw.h: -ffast-math breaks the tests for NaN; take -fno-math-errno -fno-trapping-math"
+#endif
+#ifdef __CUDACC_RTC__
+#define DBL_MAX 1.7976931348623157e308
+#ifndef NULL
+#define NULL 0
+#endif
+#else
+#include <float.h>
+#include <math.h>
+#include <string.h>
+#ifndef JOINTLAW_NO_FILES
+#include <stdio.h>
+#include <stdlib.h>
+#endif
+#endif
+#ifdef __cplusplus
+extern "C" {
+#endif
+/* No fused operations here, whatever the flags */
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__) && !defined(__CUDACC__)
+#pragma GCC push_options
+#pragma GCC optimize("fp-contract=off")
+#endif
+#ifdef __GNUC__ /* all functions of vectors are inline; g++ would warn at the end of the file */
+#pragma GCC diagnostic ignored "-Wpsabi"
+#endif
+
+/* Four facets side by side in one vector, or (JOINTLAW_PLAIN, other compilers, CUDA) one after the
+ * other with the same bits. AVX2 or AVX-512 where the machine has it, found out at run time. */
+#if defined(__GNUC__) && !defined(JOINTLAW_PLAIN) && !defined(__CUDACC__) \
+    && !defined(__CUDACC_RTC__)
+#define W 4
+#define JLAW_ABREAST
+#endif
+#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__OPTIMIZE__) && !defined(__AVX2__) \
+    && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && defined(JLAW_ABREAST)
+#define JLAW_CLONES __attribute__((target_clones("arch=x86-64-v4", "avx2", "default")))
+#else
+#define JLAW_CLONES
+#endif
+
+#include "lanes.h"
+#include "law.h"
+
+/* ------------------------------------------------------------------ messages */
+
+typedef struct {
+  char *to;
+  size_t size, at;
+} jlaw_text_;
+
+static JLAW_FUNCTION void jlaw_say_(jlaw_text_ *text, const char *words)
+{
+  for (; *words && text->at + 1 < text->size; words++) text->to[text->at++] = *words;
+  if (text->size) text->to[text->at] = 0;
+}
+
+/* A number to five digits, without stdio and its locale */
+static JLAW_FUNCTION void jlaw_say_number_(jlaw_text_ *text, double x)
+{
+  char digits[24];
+  int exponent = 0, n = 0;
+  if (x != x) {
+    jlaw_say_(text, "nan");
+    return;
+  }
+  if (x < 0.0) {
+    jlaw_say_(text, "-");
+    x = -x;
+  }
+  if (x > DBL_MAX) {
+    jlaw_say_(text, "inf");
+    return;
+  }
+  while (x >= 10.0) {
+    x /= 10.0;
+    exponent++;
+  }
+  while (x > 0.0 && x < 1.0) {
+    x *= 10.0;
+    exponent--;
+  }
+  x += 0.00005;
+  if (x >= 10.0) {
+    x /= 10.0;
+    exponent++;
+  }
+  for (int i = 0; i < 5; i++) {
+    const int digit = (int) x;
+    digits[n++] = (char) ('0' + digit);
+    if (i == 0) digits[n++] = '.';
+    x = 10.0 * (x - digit);
+  }
+  digits[n++] = 'e';
+  digits[n++] = exponent < 0 ? '-' : '+';
+  exponent = exponent < 0 ? -exponent : exponent;
+  for (int unit = exponent >= 100 ? 100 : 10; unit; unit /= 10)
+    digits[n++] = (char) ('0' + exponent / unit % 10);
+  digits[n] = 0;
+  jlaw_say_(text, digits);
+}
+
+/* ------------------------------------------------------------------------ the step */
+
+/* NaN, where the C library may have none */
+static JLAW_FUNCTION double jlaw_none_(void)
+{
+  const double zero = 0.0;
+  return zero / zero;
+}
+
+/* Phi and Phi' at one y */
+static JLAW_FUNCTION double jlaw_virgin_one_(const jlaw_law *law, double y, double *slope)
+{
+  real forces, slopes;
+  virgin_curve(law, resolved(each(y)), &forces, &slopes, (real *) 0);
+  *slope = LANE(slopes, 0);
+  return LANE(forces, 0);
+}
+
+static JLAW_FUNCTION double jlaw_of_facet_(const jlaw_law *law, int facet, int at)
+{
+  const int lane = facet % JLAW_LANES;
+  return law->facet[(facet - lane) * JLAW_COLUMNS + at * JLAW_LANES + lane];
+}
+
+#ifdef JOINTLAW_NO_LEDGER
+enum { JLAW_LEDGER = 0 };
+#else
+enum { JLAW_LEDGER = 1 };
+#endif
+
+JLAW_CLONES JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t stride,
+                                         const double *d, double *F, double *C)
+{
+  const numbers n = {s, stride, 0};
+  double c[9];
+  step_of_kind(law, n, d, F, c, JLAW_LEDGER, C != NULL, 0);
+  for (int i = 0; C && i < law->dim * law->dim; i++) C[i] = c[i];
+}
+
+/* Whether all sliders hold forces that a law can have; not for NaN */
+static JLAW_FUNCTION int jlaw_sound_(const double *q, int n)
+{
+  double sum[4] = {0.0, 0.0, 0.0, 0.0};
+  int i = 0;
+  for (; i + 4 <= n; i += 4)
+    for (int l = 0; l < 4; l++) sum[l] += q[i + l] * q[i + l];
+  for (; i < n; i++) sum[0] += q[i] * q[i];
+  return (sum[0] + sum[1]) + (sum[2] + sum[3]) < 1e300;
+}
+
+/* Whether energies, flattened depths and slip of a state are numbers that a law can have */
+static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
+{
+  const double *rest = s + rest_row(law), *slip = s + slip_row(law);
+  int good = fabs(s[2 * law->dim - 1]) <= DBL_MAX;
+  for (int f = 0; law->yields && f < law->facets; f++)
+    good = good && rest[f] >= 0.0 && rest[f] <= law->largest_reach;
+  if (law->yields) good = good && fabs(rest[law->facets]) <= DBL_MAX;
+  if (law->wears) good = good && slip[0] >= 0.0 && slip[0] <= DBL_MAX;
+  if (law->wears) good = good && slip[1] >= 0.0 && slip[1] <= law->mu;
+  return good && jlaw_sound_(s + 2 * law->dim, rest_row(law) - 2 * law->dim);
+}
+
+static JLAW_FUNCTION int jlaw_refuse_(const jlaw_law *law, const double *s, const double *d,
+                                      int damaged, char *message, size_t size)
+{
+  jlaw_text_ text = {message, size, 0};
+  if (damaged) {
+    jlaw_say_(&text,
+              "the state holds numbers that are not finite or no forces of this law; nothing "
+              "was moved. Start from zeros or from a state that this law wrote");
+    return -1;
+  }
+  jlaw_say_(&text, "the step d = (");
+  int finite = 1;
+  for (int i = 0; i < law->dim; i++) {
+    jlaw_say_(&text, i ? ", " : "");
+    jlaw_say_number_(&text, d[i]);
+    finite = finite && fabs(d[i]) <= DBL_MAX;
+  }
+  if (!finite) {
+    jlaw_say_(&text,
+              ") m is not finite; nothing was moved. Look for the fault in the host's motion");
+    return -1;
+  }
+  jlaw_say_(&text, ") m leads from closure ");
+  jlaw_say_number_(&text, s[0]);
+  jlaw_say_(&text, " m beyond the reach of ");
+  jlaw_say_number_(&text, law->largest_reach);
+  jlaw_say_(&text, " m, where forces overflow; nothing was moved. Take a smaller step");
+  return -1;
+}
+
+JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1, const double *d,
+                              double *F, double *C, char *message, size_t size)
+{
+  const int dim = law->dim, rows = state_rows(law);
+  double far = 0.0, step_size = 0.0; /* NaN stays in sums */
+  for (int i = 0; i < 2 * dim - 1; i++) far += fabs(s0[i]);
+  for (int i = 0; i < dim; i++) step_size += fabs(d[i]);
+  const double reach = law->stretch * (far + step_size);
+  const int damaged = !(far <= DBL_MAX) || !jlaw_proper_(law, s0);
+  if (damaged || !(reach <= law->largest_reach))
+    return jlaw_refuse_(law, s0, d, damaged, message, size);
+  if (s1 != s0)
+    for (int i = 0; i < rows; i++) s1[i] = s0[i];
+  jlaw_step(law, s1, 1, d, F, C);
+  return 0;
+}
+
+/* ------------------------------------------------------------ what a state is */
+
+JLAW_FUNCTION int jlaw_dim(const jlaw_law *law) { return law->dim; }
+JLAW_FUNCTION int jlaw_state_size(const jlaw_law *law) { return state_rows(law); }
+JLAW_FUNCTION const char *jlaw_fingerprint(const jlaw_law *law) { return law->fingerprint; }
+JLAW_FUNCTION double jlaw_dissipated(const jlaw_law *law, const double *s)
+{
+  return s[2 * law->dim - 1];
+}
+
+JLAW_CLONES static JLAW_FUNCTION amounts jlaw_measure_(const jlaw_law *law, const double *s)
+{
+  const numbers n = {(double *) s, 1, 0}; /* only read */
+  return measure(law, n);
+}
+
+JLAW_FUNCTION double jlaw_stored(const jlaw_law *law, const double *s)
+{
+  const amounts all = jlaw_measure_(law, s);
+  return all.normal + all.sheared;
+}
+
+JLAW_FUNCTION void jlaw_shares(const jlaw_law *law, const double *s, double shares[3])
+{
+  const amounts all = jlaw_measure_(law, s);
+  shares[0] = all.sliding;
+  shares[1] = all.slipping;
+  shares[2] = all.separated;
+}
+
+/* ------------------------------------------------------------ unsheared joint */
+
+JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure)
+{
+  double slope, late = 0.0;
+  if (!(closure <= law->largest_reach)) return jlaw_none_();
+  for (int f = 0; law->yields && f < law->facets; f++) /* what yielding takes off first loading */
+    for (int i = JLAW_LATE; i < JLAW_LATE + 4; i += 2) {
+      const double depth = jlaw_of_facet_(law, f, i + 1);
+      late += jlaw_of_facet_(law, f, i) * jlaw_virgin_one_(law, closure - depth, &slope);
+    }
+  return law->closure_factor * jlaw_virgin_one_(law, closure, &slope) - late;
+}
+
+JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure)
+{
+  double slope;
+  if (!(closure <= law->largest_reach)) return jlaw_none_();
+  jlaw_virgin_one_(law, closure, &slope);
+  return law->stiffness_factor * slope;
+}
+
+JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
+{
+  double low = 0.0, high = law->farthest;
+  if (!(normal_stress >= 0.0) || !(jlaw_normal_stress(law, high) >= normal_stress))
+    return jlaw_none_();
+  while (1) { /* the stress rises: halve the exponent first, then the number */
+    const double middle =
+        high > 4.0 * low && high > 1e-300 ? sqrt(high * fmax(low, 1e-300)) : 0.5 * (low + high);
+    if (!(middle > low && middle < high)) return low == 0.0 ? 0.0 : high;
+    if (jlaw_normal_stress(law, middle) < normal_stress) low = middle;
+    else high = middle;
+  }
+}
+
+/* --------------------------------------------------------------- turned axes */
+
+JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s)
+{
+  const int dim = law->dim, D = law->cells, M = law->facets;
+  for (int i = 1; i < 2 * dim - 1; i += dim - 1) s[i] = -s[i]; /* shear and offset along axis 2 */
+  double *qs = s + 2 * dim, *qt = qs + M * D, *depth = qt + M * D;
+  for (int f = 0; f < M; f++) {
+    const int other = (int) jlaw_of_facet_(law, f, JLAW_MIRROR);
+    for (int i = 0; i < D; i++) {
+      const double here = qs[f * D + i], turned = qt[f * D + i];
+      if (other > f) {
+        qs[f * D + i] = qs[other * D + i], qt[f * D + i] = -qt[other * D + i];
+        qs[other * D + i] = here, qt[other * D + i] = -turned;
+      } else if (other == f) qt[f * D + i] = -turned; /* t changes its sense in the mirror */
+    }
+    if (law->yields && other > f) {
+      const double here = depth[f];
+      depth[f] = depth[other], depth[other] = here;
+    }
+  }
+}
+
+/* Numbers of a ring of n facets, read at azimuths turned by the angle: the trigonometric
+ * interpolation of n (even) places, or the straight one, which makes no new extremes */
+static JLAW_FUNCTION void jlaw_turn_(double *x, int n, int step, double angle, int straight)
+{
+  double old[JLAW_AZIMUTHS];
+  const double pi = 3.14159265358979323846;
+  for (int j = 0; j < n; j++) old[j] = x[j * step], x[j * step] = 0.0;
+  for (int j = 0; j < n; j++)
+    for (int k = 0; k < n; k++) {
+      const double way = remainder(angle + 2.0 * pi * (j - k) / n, 2.0 * pi), half = sin(0.5 * way);
+      double weight = 1.0;
+      if (straight) weight = fmax(1.0 - fabs(way) * n / (2.0 * pi), 0.0);
+      else if (fabs(half) > 1e-9) weight = sin(0.5 * n * way) * cos(0.5 * way) / (n * half);
+      x[j * step] += weight * old[k];
+    }
+}
+
+/* Brings sliders beyond their friction limit back to it */
+static JLAW_FUNCTION void jlaw_hold_(const jlaw_law *law, double *s)
+{
+  const numbers n = {s, 1, 0};
+  const int M = law->facets, D = law->cells;
+  const double worn = worn_now(law, n);
+  for (int at = 0; at < M; at += TOGETHER) {
+    const int some = M - at < TOGETHER ? M - at : TOGETHER;
+    const double *cell = cell_of(law, at);
+    facets o;
+    facets_now(law, n, at, &o);
+    for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_LANES) {
+      const int row = 2 * law->dim + at * D + i;
+      real G, kappa, qs = take(n, row, D, some), qt = take(n, row + M * D, D, some);
+      cell_now(cell, &o, law->yields, &G, &kappa);
+      const real cap = column(facet_of(law, at), JLAW_STRENGTH) * worn * G;
+      const real size = root(qs * qs + qt * qt);
+      const yes beyond = size > cap;
+      const real share = pick(beyond, cap / pick(beyond, size, 1.0), 1.0);
+      put(n, row, D, some, qs * share);
+      put(n, row + M * D, D, some, qt * share);
+    }
+  }
+}
+
+JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle)
+{
+  const int dim = law->dim, D = law->cells, M = law->facets;
+  const double before = jlaw_measure_(law, s).sheared, c = cos(angle), d = sin(angle);
+  double *q = s + 2 * dim, *depth = s + rest_row(law);
+  if (dim == 2 && c < 0.0) jlaw_swap_bodies(law, s); /* the axis changes its sense */
+  if (dim != 3) return;
+  for (int i = 1; i <= 3; i += 2) { /* shear and offset */
+    const double along = s[i], across = s[i + 1];
+    s[i] = c * along + d * across, s[i + 1] = c * across - d * along;
+  }
+  for (int f = 0, n; f < M; f += n) { /* rings */
+    n = (int) jlaw_of_facet_(law, f, JLAW_RING);
+    for (int i = 0; i < D; i++) {
+      jlaw_turn_(q + f * D + i, n, D, angle, 0);
+      jlaw_turn_(q + (M + f) * D + i, n, D, angle, 0);
+    }
+    if (law->yields) jlaw_turn_(depth + f, n, 1, angle, 1);
+  }
+  jlaw_hold_(law, s);
+  const double after = jlaw_measure_(law, s).sheared;
+  if (after > before) /* sliders gain nothing */
+    for (int i = 0; i < 2 * M * D; i++) q[i] *= sqrt(before / after);
+  else s[5] += before - after;
+}
+
+/* ------------------------------------------------------------- table files */
+#ifndef JOINTLAW_NO_FILES
+
+#define JLAW_LONGEST ((size_t) 1 << 28) /* bytes of a table file: those of a law have 1e5 to 1e7 */
+
+/* The bytes of a file and a zero; NULL if it cannot be read */
+static char *jlaw_load_(const char *file, size_t *length)
+{
+  FILE *stream = fopen(file, "rb");
+  char *bytes = NULL, *more;
+  size_t room = 0, n = 0;
+  if (!stream) return NULL;
+  for (int open = 1; open && n < JLAW_LONGEST;) {
+    if (n + 1 >= room) {
+      room = room ? 2 * room : (size_t) 1 << 17;
+      more = (char *) realloc(bytes, room);
+      if (!more) break;
+      bytes = more;
+    }
+    const size_t got = fread(bytes + n, 1, room - n - 1, stream);
+    open = got > 0;
+    n += got;
+  }
+  if (ferror(stream) || !bytes) {
+    free(bytes);
+    bytes = NULL;
+  } else bytes[n] = 0;
+  fclose(stream);
+  *length = n;
+  return bytes;
+}
+
+/* FNV-1a of 64 bits, without carriage returns: any other change of one byte changes it */
+static unsigned long long jlaw_sum_of_(const char *bytes, const char *end)
+{
+  unsigned long long sum = 0xCBF29CE484222325ULL;
+  for (; bytes < end; bytes++)
+    if (*bytes != '\r') sum = (sum ^ (unsigned char) *bytes) * 0x100000001B3ULL;
+  return sum;
+}
+
+static int jlaw_hex_(char c)
+{
+  return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
+}
+
+/* Past blanks and lines that begin with # */
+static const char *jlaw_skip_(const char *at)
+{
+  while (*at == ' ' || *at == '\n' || *at == '\r' || *at == '#')
+    if (*at++ == '#')
+      while (*at && *at != '\n') at++;
+  return at;
+}
+
+/* Reads a word into `word`; empty if there is none or it is too long */
+static const char *jlaw_word_(const char *at, char *word, size_t room)
+{
+  size_t n = 0;
+  for (at = jlaw_skip_(at); *at > ' ' && n + 1 < room; at++) word[n++] = *at;
+  word[*at > ' ' ? 0 : n] = 0;
+  return at;
+}
+
+/* Reads a whole number, or a hexadecimal float as Python's float.hex writes it; NULL if neither.
+ * No locale, no rounding. */
+static const char *jlaw_number_(const char *at, double *number)
+{
+  at = jlaw_skip_(at);
+  const int negative = *at == '-';
+  at += negative;
+  const int hex = at[0] == '0' && at[1] == 'x';
+  unsigned long long digits = 0;
+  int count = 0, places = 0, point = 0, power = 0;
+  at += hex ? 2 : 0;
+  for (; jlaw_hex_(*at) >= 0 || (*at == '.' && hex && !point); at++) {
+    if (*at == '.') {
+      point = 1;
+      continue;
+    }
+    const int digit = jlaw_hex_(*at);
+    if (++count > 15 || (!hex && digit > 9)) return NULL;
+    digits = digits * (hex ? 16u : 10u) + (unsigned) digit;
+    places += point;
+  }
+  if (hex && *at == 'p') {
+    const int down = *++at == '-';
+    int n = 0;
+    at += *at == '-' || *at == '+';
+    for (; *at >= '0' && *at <= '9' && n < 5; at++, n++) power = 10 * power + (*at - '0');
+    if (n == 0) return NULL;
+    power = down ? -power : power;
+  }
+  if (count == 0 || *at > ' ') return NULL;
+  *number = ldexp((double) digits, power - 4 * places);
+  if (negative) *number = -*number;
+  return fabs(*number) <= DBL_MAX ? at : NULL;
+}
+
+/* Reads all numbers into law; NULL or what is wrong */
+static const char *jlaw_parse_numbers_(const char **at, jlaw_law *law)
+{
+#define X(name, whole, least, most) {#name, offsetof(jlaw_law, name), whole, least, most},
+  static const struct {
+    const char *name;
+    size_t place;
+    int is_whole;
+    double least, most;
+  } keys[] = {JLAW_NUMBERS(X)};
+#undef X
+  char word[sizeof law->fingerprint];
+  for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
+    double number;
+    char *to = (char *) law + keys[i].place;
+    *at = jlaw_word_(*at, word, sizeof word);
+    if (strcmp(word, keys[i].name)) return "a keyword is missing, unknown or not in its place";
+    *at = jlaw_number_(*at, &number);
+    if (!*at || !(number >= keys[i].least && number <= keys[i].most))
+      return "a parameter is no number or out of its bounds";
+    const int whole_number = (int) (keys[i].is_whole ? number : 0.0);
+    if (keys[i].is_whole) memcpy(to, &whole_number, sizeof whole_number);
+    else memcpy(to, &number, sizeof number);
+  }
+  return NULL;
+}
+
+/* Reads the text of a table file into law; NULL or what is wrong */
+static const char *jlaw_parse_(const char *at, jlaw_law *law, size_t length)
+{
+  char word[sizeof law->fingerprint];
+  at = jlaw_word_(at, word, sizeof word);
+  if (strcmp(word, "fingerprint")) return "it does not tell its fingerprint";
+  at = jlaw_word_(at, law->fingerprint, sizeof law->fingerprint);
+  const char *wrong = jlaw_parse_numbers_(&at, law);
+  if (wrong) return wrong;
+  const size_t blocks = (size_t) (law->facets + JLAW_LANES - 1) / JLAW_LANES;
+  const char *words[4] = {"facet", "depth", "curve", "energy"};
+  const size_t sizes[4] = {blocks * JLAW_COLUMNS * JLAW_LANES,
+                           blocks * (size_t) law->cells * JLAW_ROWS * JLAW_LANES,
+                           4 * (size_t) law->pieces, 4 * (size_t) law->pieces};
+  const size_t all = sizes[0] + sizes[1] + sizes[2] + sizes[3];
+  if (all > length / 2) return "its sizes do not fit one another";
+  double *to = law->own = (double *) malloc(all * sizeof *law->own);
+  if (!to) return "there is no memory for it";
+  for (int i = 0; i < 4; i++) {
+    at = jlaw_word_(at, word, sizeof word);
+    if (strcmp(word, words[i])) return "a table is missing, too short or too long";
+    for (size_t n = 0; n < sizes[i]; n++, to++)
+      if (!(at = jlaw_number_(at, to))) return "a table holds what is no number";
+  }
+  law->facet = law->own, law->depth = law->facet + sizes[0];
+  law->curve = law->depth + sizes[1], law->energy = law->curve + sizes[2];
+  for (size_t n = 0; n < sizes[0]; n++) { /* A and what follows it are no less than zero */
+    const size_t which = n / JLAW_LANES % JLAW_COLUMNS;
+    if ((which >= JLAW_A && !(law->facet[n] >= 0.0))
+        || (which == JLAW_MIRROR && !(law->facet[n] < law->facets)))
+      return "a facet is out of bounds";
+  }
+  for (int f = 0; f < law->facets;) {
+    const double ring = jlaw_of_facet_(law, f, JLAW_RING);
+    if (!(ring >= 1.0 && ring <= (double) JLAW_AZIMUTHS && ring <= law->facets - f))
+      return "a ring of facets is out of bounds";
+    f += (int) ring;
+  }
+  return *jlaw_skip_(at) ? "something follows the last table" : NULL;
+}
+
+static const char *jlaw_check_(char *bytes, size_t length, jlaw_law *law)
+{
+  static const char magic[] = "jointlaw tables ";
+  const char *at = bytes + sizeof magic - 1;
+  double version;
+  if (strncmp(bytes, magic, sizeof magic - 1)) return "it is no table file of jointlaw";
+  at = jlaw_number_(at, &version);
+  if (!at || version != JLAW_FORMAT)
+    return "it is of another version than this jointlaw.h; export law and header anew, together";
+  char *end = bytes + length, word[20];
+  while (end > bytes && end[-1] <= ' ' && end[-1] >= 0) end--;
+  while (end > bytes && end[-1] != '\n') end--; /* to the last line */
+  const char *sum = jlaw_word_(jlaw_word_(end, word, sizeof word), word, sizeof word);
+  unsigned long long told = 0;
+  for (int i = 0; i < 16; i++) {
+    if (jlaw_hex_(word[i]) < 0) return "it ends too early: copy it again, whole";
+    told = 16 * told + (unsigned) jlaw_hex_(word[i]);
+  }
+  if (strncmp(end, "sum ", 4) || word[16] || *jlaw_skip_(sum))
+    return "it ends too early: copy it again, whole";
+  if (told != jlaw_sum_of_(bytes, end)) return "it is damaged: its sum is wrong; export it again";
+  *end = 0;
+  return jlaw_parse_(at, law, length);
+}
+
+jlaw_law *jlaw_read(const char *file, char *message, size_t size)
+{
+  jlaw_text_ text = {message, size, 0};
+  size_t length = 0;
+  const char *wrong = "it cannot be read";
+  char *bytes = jlaw_load_(file, &length);
+  jlaw_law *law = (jlaw_law *) calloc(1, sizeof *law);
+  if (bytes && law) wrong = jlaw_check_(bytes, length, law);
+  free(bytes);
+  if (!wrong) return law;
+  jlaw_free(law);
+  jlaw_say_(&text, file);
+  jlaw_say_(&text, ": ");
+  jlaw_say_(&text, wrong);
+  return NULL;
+}
+
+void jlaw_free(jlaw_law *law)
+{
+  if (law) free(law->own);
+  free(law);
+}
+
+#endif
+
+#if defined(__GNUC__) && !defined(__clang__) && !defined(__CUDACC__)
+#pragma GCC pop_options
+#endif
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,1681 @@
+/* jointlaw.h: the law of a rough rock joint, complete, in C99 (also C++11 and later). MIT licence.
+ *
+ *     #define JOINTLAW_IMPLEMENTATION                  in one source file, before this line:
+ *     #include "jointlaw.h"
+ *
+ *     char message[JLAW_MESSAGE];
+ *     jlaw_law *law = jlaw_read("granite.jlaw", message, sizeof message);
+ *     double state[162] = {0};                         jlaw_state_size(law) numbers; zeros: virgin
+ *     if (jlaw_update(law, state, state, d, F, NULL, message, sizeof message)) ... message tells
+ *
+ * Table files (.jlaw, or as constants NAME.h) are written by `jointlaw export c`.
+ *
+ * Axes: 1 is the normal of the joint, 2 and 3 span it. d is the displacement in this step (m) of
+ * one body into and along the other: closure first, then the jlaw_dim - 1 components of shear.
+ * F is the traction (Pa), compression first: the force on the body that moves by +d is -area F.
+ * C = dF/dd (Pa/m), row by row. Energies are per area (J/m2).
+ *
+ * A law does not change after reading: any number of threads may share it. States belong to the
+ * caller; two threads must not advance one state at a time. No function but jlaw_read and jlaw_free
+ * uses memory, files or the locale; none uses a global variable.
+ *
+ * Build with -ffp-contract=off: the same bits with every compiler and on every x86-64. For speed
+ * -O3 -fno-math-errno -fno-trapping-math, which change no result; never -ffast-math.
+ *
+ * Symbols and order of the step are those of the page "theory-incremental" of the documentation
+ * and of jointlaw/kernels/reference.py.
+ */
+#ifndef JOINTLAW_H
+#define JOINTLAW_H
+#ifndef __CUDACC_RTC__
+#include <stddef.h>
+#endif
+#ifndef JLAW_FUNCTION
+#define JLAW_FUNCTION /* before every function and table: __device__ for CUDA */
+#endif
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define JLAW_MESSAGE 300 /* bytes that hold every message */
+
+typedef struct jlaw_law jlaw_law;
+
+#ifndef JOINTLAW_NO_FILES
+/* Read a table file. NULL and a message if it cannot be read, is damaged or of another version. */
+jlaw_law *jlaw_read(const char *file, char *message, size_t size);
+void jlaw_free(jlaw_law *law);
+#endif
+
+/* Components of d: 3, 2 in a plane, 1 for closure only; numbers of state, as in a snapshot */
+JLAW_FUNCTION int jlaw_dim(const jlaw_law *law);
+JLAW_FUNCTION int jlaw_state_size(const jlaw_law *law);
+
+/* One step from state s0 to s1 (may be the same) by d (dim): F (dim), and C (dim, dim) if not NULL.
+ * Returns 0; or -1 and a message where d or the state is not finite or forces would overflow:
+ * nothing is written then. */
+JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1, const double *d,
+                              double *F, double *C, char *message, size_t size);
+
+/* The same without any check, for hosts that know their steps and for devices: row i of the state is
+ * s[i stride], so that joints may lie side by side, (rows, n). C may be NULL. */
+JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t stride, const double *d,
+                             double *F, double *C);
+
+/* Elastic energy, and energy lost since the virgin state, in J/m2 */
+JLAW_FUNCTION double jlaw_stored(const jlaw_law *law, const double *s);
+JLAW_FUNCTION double jlaw_dissipated(const jlaw_law *law, const double *s);
+/* Shares from 0 to 1. sliding: of all facets, those at their friction limit; slipping: of the
+ * friction capacity, what is at its limit; separated: of all facets, those out of touch. */
+JLAW_FUNCTION void jlaw_shares(const jlaw_law *law, const double *s, double shares[3]);
+
+/* Unsheared joint: normal stress (Pa) at a closure (m), and the inverse. NaN where there is none. */
+JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure);
+JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress);
+/* Bound of |C| (Pa/m) while no facet is closed further: dt < 2 sqrt(mass/(area * this)). */
+JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure);
+
+/* The state in axes 2 and 3 that are turned by this angle (rad, from 2 to 3) about the normal. For a
+ * host that cannot carry its axes with a body, and laws without a preferred direction (c = 0).
+ * Shear and offset turn exactly. Sliders and flattened depths are read between the azimuths of
+ * their ring of facets: exact where the angle is a whole number of azimuths of every ring, else
+ * the better the more there are. Sliders gain no energy; what they lose counts as dissipated. In a
+ * plane the axis keeps or changes its sense. */
+JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle);
+/* The state after the bodies changed their roles: axis 1 turned round, axis 2 kept, axis 3 turned
+ * round with it. Shear along 2 changes its sign, along 3 not. Exact. */
+JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s);
+
+/* Of the law that the tables were made for: a Python state of another fingerprint does not fit. */
+JLAW_FUNCTION const char *jlaw_fingerprint(const jlaw_law *law);
+
+/* The tables, for files NAME.h; not for the host */
+/* Made from layout.py by `python -m jointlaw.native`; change it there. */
+#define JLAW_FORMAT 3 /* of table files */
+enum {
+  JLAW_LANES = 4, /* facets side by side in a block of the tables */
+  JLAW_AZIMUTHS = 512, /* most */
+  JLAW_M = 0, /* m = n/c1: y = m . (closure, offset) */
+  JLAW_S = 3, /* in-facet direction s */
+  JLAW_T = 6, /* in-facet direction t */
+  JLAW_N = 9, /* normal n */
+  JLAW_A = 12, /* A */
+  JLAW_STIFF = 13, /* A/c1 */
+  JLAW_STRENGTH = 14, /* mu lam A */
+  JLAW_COMPLIANCE = 15, /* c1/(2 A lam): from |q|^2/kappa to energy */
+  JLAW_POTENTIAL = 16, /* A c1 */
+  JLAW_SHARE = 17, /* of all orientations */
+  JLAW_YIELD = 18, /* y_p = d_y/c1 */
+  JLAW_MIRROR = 19, /* the facet mirrored along axis 2 */
+  JLAW_RING = 20, /* facets of this inclination, one after the other */
+  JLAW_LATE = 21, /* unsheared joint: share, depth, share, depth of what yielding takes off */
+  JLAW_COLUMNS = 25, /* of a facet */
+  JLAW_LOW = 0, /* zeta at its begin */
+  JLAW_FORCE = 1, /* Phi there */
+  JLAW_SLOPE = 2, /* Phi' there */
+  JLAW_HIGH = 3, /* zeta at its end */
+  JLAW_G = 4, /* G there */
+  JLAW_KAPPA = 5, /* kappa there */
+  JLAW_ROWS = 6 /* of a depth cell */
+};
+#define JLAW_UNDERFLOW 1e-140
+#define JLAW_TINY 1e-290
+#define JLAW_FAINT 1e-150
+#define JLAW_NEAR 1e-05
+#define JLAW_LIMIT 1e-09
+#define JLAW_ROUNDED 1e-12
+#define JLAW_GRAZING 1e-12
+struct jlaw_law {
+  int dim; /* components of a displacement */
+  int facets; /* M */
+  int cells; /* D, depth cells of a facet */
+  int pieces; /* of the virgin curve */
+  int yields; /* whether asperities yield */
+  int wears; /* whether mu falls with slip */
+  double soft; /* 1/lam */
+  double mu; /* of unworn asperities */
+  double mu_residual; /* of asperities that are worn */
+  double wear_slip; /* m: slip that wears */
+  double critical_slip; /* m; infinite: the largest float */
+  double eta; /* exponent of the virgin curve */
+  double scale; /* V of the virgin curve, m^(1/2) */
+  double rise; /* p: the curve is tabulated over w^p */
+  double closure_factor; /* normal stress over Phi */
+  double stiffness_factor; /* bound of |C| over Phi' */
+  double largest_reach; /* m: bound of |y| */
+  double stretch; /* bound of |y| over that of the displacement */
+  double farthest; /* m: largest closure that a stress is looked for in */
+  const double *facet; /* (blocks, JLAW_COLUMNS, JLAW_LANES), zeros beyond the last facet */
+  const double *depth; /* (blocks, cells, JLAW_ROWS, JLAW_LANES) */
+  const double *curve; /* (pieces, 4): S of the virgin curve */
+  const double *energy; /* (pieces, 4): T */
+  double *own; /* what jlaw_free frees */
+  char fingerprint[80];
+};
+/* Each number of a table file: its name, 1 if it is whole, its bounds */
+#define JLAW_NUMBERS(X) \
+  X(dim, 1, 1, 3) \
+  X(facets, 1, 1, 1e6) \
+  X(cells, 1, 1, 1e6) \
+  X(pieces, 1, 1, 1e6) \
+  X(yields, 1, 0, 1) \
+  X(wears, 1, 0, 1) \
+  X(soft, 0, 0, DBL_MAX) \
+  X(mu, 0, 0, DBL_MAX) \
+  X(mu_residual, 0, 0, DBL_MAX) \
+  X(wear_slip, 0, DBL_MIN, DBL_MAX) \
+  X(critical_slip, 0, JLAW_UNDERFLOW, DBL_MAX) \
+  X(eta, 0, 0, DBL_MAX) \
+  X(scale, 0, DBL_MIN, DBL_MAX) \
+  X(rise, 0, 0, DBL_MAX) \
+  X(closure_factor, 0, 0, DBL_MAX) \
+  X(stiffness_factor, 0, 0, DBL_MAX) \
+  X(largest_reach, 0, 0, DBL_MAX) \
+  X(stretch, 0, 1, DBL_MAX) \
+  X(farthest, 0, 0, DBL_MAX)
+
+#ifdef __cplusplus
+}
+#endif
+#endif
+
+#if defined(JOINTLAW_IMPLEMENTATION) && !defined(JOINTLAW_IMPLEMENTED)
+#define JOINTLAW_IMPLEMENTED
+#ifdef __FAST_MATH__
+#error "jointlaw.h: -ffast-math breaks the tests for NaN; take -fno-math-errno -fno-trapping-math"
+#endif
+#ifdef __CUDACC_RTC__
+#define DBL_MAX 1.7976931348623157e308
+#ifndef NULL
+#define NULL 0
+#endif
+#else
+#include <float.h>
+#include <math.h>
+#include <string.h>
+#ifndef JOINTLAW_NO_FILES
+#include <stdio.h>
+#include <stdlib.h>
+#endif
+#endif
+#ifdef __cplusplus
+extern "C" {
+#endif
+/* No fused operations here, whatever the flags */
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__) && !defined(__CUDACC__)
+#pragma GCC push_options
+#pragma GCC optimize("fp-contract=off")
+#endif
+#ifdef __GNUC__ /* all functions of vectors are inline; g++ would warn at the end of the file */
+#pragma GCC diagnostic ignored "-Wpsabi"
+#endif
+
+/* Four facets side by side in one vector, or (JOINTLAW_PLAIN, other compilers, CUDA) one after the
+ * other with the same bits. AVX2 or AVX-512 where the machine has it, found out at run time. */
+#if defined(__GNUC__) && !defined(JOINTLAW_PLAIN) && !defined(__CUDACC__) \
+    && !defined(__CUDACC_RTC__)
+#define JL_W_ 4
+#define JLAW_ABREAST
+#endif
+#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__OPTIMIZE__) && !defined(__AVX2__) \
+    && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && defined(JLAW_ABREAST)
+#define JLAW_CLONES __attribute__((target_clones("arch=x86-64-v4", "avx2", "default")))
+#else
+#define JLAW_CLONES
+#endif
+
+/* lanes.h: W numbers side by side. The law (law.h) is written once, for lanes of three kinds:
+ *
+ *   W joints, W = 8, 4 or 2   a batch; vectors of the compilers gcc, g++, clang, clang++ and zig
+ *   one joint, W = 1          plain C99: any compiler, CUDA (a thread is a joint), WebAssembly
+ *   four facets of one joint  JLAW_ABREAST, W = 4: one joint at a time
+ *
+ * A real is a number per lane, a yes is a truth per lane. An of_facet is a number of a facet's
+ * tables, an of_joint one of a joint: a double where all lanes share it, else a real. All kinds
+ * give the same bits, for facets are added up in the same order: total().
+ */
+#ifndef JL_W_
+#define JL_W_ 1
+#endif
+#ifndef JLAW_FUNCTION
+#define JLAW_FUNCTION /* for CUDA: __device__ */
+#endif
+#if defined(__CUDACC__) || defined(__CUDACC_RTC__)
+#define JL_IN_ static JLAW_FUNCTION __forceinline__
+#elif defined(__GNUC__)
+#define JL_IN_ static inline __attribute__((always_inline))
+#else
+#define JL_IN_ static inline
+#endif
+
+/* ------------------------------------------------------------------- numbers and truths */
+
+#if JL_W_ == 1
+typedef double jl_real_;
+typedef int jl_yes_, jl_whole_;
+#define JL_LANE_(x, l) (x)
+#define JL_LIST_(of) of(0) /* a vector of of(0), of(1) and so on */
+#define jl_each_(x) (x)    /* the number x in all lanes */
+#define jl_pick_(m, a, b) ((m) ? (a) : (b))
+#define jl_only_(m, a) ((m) ? (a) : 0.0)
+#define jl_any_(m) (m)
+#define jl_root_(x) sqrt(x)
+#define jl_size_of_(x) fabs(x)
+#define jl_to_whole_(x) ((int) (x))
+#define jl_to_real_(i) ((double) (i))
+#else
+typedef double jl_real_ __attribute__((vector_size(8 * JL_W_)));
+typedef double jl_loose_ __attribute__((vector_size(8 * JL_W_), aligned(8), may_alias)); /* in memory */
+typedef long long jl_yes_ __attribute__((vector_size(8 * JL_W_)));
+typedef int jl_whole_ __attribute__((vector_size(4 * JL_W_)));
+#define JL_LANE_(x, l) ((x)[l])
+#if JL_W_ == 2
+#define JL_LIST_(of) {of(0), of(1)}
+#elif JL_W_ == 4
+#define JL_LIST_(of) {of(0), of(1), of(2), of(3)}
+#else
+#define JL_LIST_(of) {of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7)}
+#endif
+#define jl_to_whole_(x) __builtin_convertvector(x, jl_whole_)
+#define jl_to_real_(i) __builtin_convertvector(i, jl_real_)
+#ifdef __cplusplus /* "less zero" costs nothing: the compiler leaves it out */
+#define jl_each_(x) ((x) - jl_real_())
+#define jl_pick_(m, a, b) ((m) ? jl_each_(a) : jl_each_(b))
+#define jl_only_(m, a) ((m) ? jl_each_(a) : jl_real_())
+#else
+#define jl_each_(x) ((x) - (jl_real_) {0})
+#define jl_pick_(m, a, b) jl_pick_lanes_(m, jl_each_(a), jl_each_(b))
+#define jl_only_(m, a) jl_only_lanes_(m, jl_each_(a))
+JL_IN_ jl_real_ jl_pick_lanes_(jl_yes_ m, jl_real_ a, jl_real_ b) { return (jl_real_) ((m & (jl_yes_) a) | (~m & (jl_yes_) b)); }
+JL_IN_ jl_real_ jl_only_lanes_(jl_yes_ m, jl_real_ a) { return (jl_real_) (m & (jl_yes_) a); }
+#endif
+JL_IN_ jl_real_ jl_size_of_(jl_real_ x) { return (jl_real_) ((jl_yes_) x & 0x7FFFFFFFFFFFFFFFLL); }
+
+#if defined(__AVX512DQ__) && JL_W_ == 8
+#include <immintrin.h>
+JL_IN_ jl_real_ jl_root_(jl_real_ x) { return (jl_real_) _mm512_sqrt_pd((__m512d) x); }
+JL_IN_ int jl_any_(jl_yes_ m) { return _mm512_movepi64_mask((__m512i) m) != 0; }
+#elif defined(__AVX2__) && JL_W_ == 4
+#include <immintrin.h>
+JL_IN_ jl_real_ jl_root_(jl_real_ x) { return (jl_real_) _mm256_sqrt_pd((__m256d) x); }
+JL_IN_ int jl_any_(jl_yes_ m) { return _mm256_movemask_pd((__m256d) m) != 0; }
+#else
+JL_IN_ jl_real_ jl_root_(jl_real_ x)
+{
+  for (int l = 0; l < JL_W_; l++) x[l] = sqrt(x[l]);
+  return x;
+}
+JL_IN_ int jl_any_(jl_yes_ m)
+{
+#if JL_W_ > 2 /* halves first */
+  typedef long long half __attribute__((vector_size(4 * JL_W_)));
+  const union {
+    jl_yes_ m;
+    half h[2];
+  } two = {m};
+  const half all = two.h[0] | two.h[1];
+  long long some = 0;
+  for (int l = 0; l < JL_W_ / 2; l++) some |= all[l];
+  return some != 0;
+#else
+  return (m[0] | m[1]) != 0;
+#endif
+}
+#endif
+#endif
+
+JL_IN_ jl_real_ jl_larger_(jl_real_ a, jl_real_ b) { return jl_pick_(a > b, a, b); }
+JL_IN_ jl_real_ jl_smaller_(jl_real_ a, jl_real_ b) { return jl_pick_(a < b, a, b); }
+
+/* ------------------------------------------------------------------------------ tables */
+
+/* Of a table of pieces, four coefficients each: those of piece i, per lane */
+JL_IN_ void jl_fetch_(const double *table, jl_whole_ i, jl_real_ c[4])
+{
+#if defined(__AVX512DQ__) && JL_W_ == 8 /* eight wide loads, turned by four times four */
+  const double *p[8];
+  for (int l = 0; l < 8; l++) p[l] = table + 4 * (size_t) (unsigned) i[l];
+#define JL_TWO_(a, b) \
+  _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(p[a])), _mm256_loadu_pd(p[b]), 1)
+  const __m512d r0 = JL_TWO_(0, 4), r1 = JL_TWO_(1, 5), r2 = JL_TWO_(2, 6), r3 = JL_TWO_(3, 7);
+#undef JL_TWO_
+  const __m512d even = _mm512_unpacklo_pd(r0, r1), odd = _mm512_unpackhi_pd(r0, r1);
+  const __m512d even2 = _mm512_unpacklo_pd(r2, r3), odd2 = _mm512_unpackhi_pd(r2, r3);
+  const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
+  const __m512i high = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+  c[0] = (jl_real_) _mm512_permutex2var_pd(even, low, even2);
+  c[1] = (jl_real_) _mm512_permutex2var_pd(odd, low, odd2);
+  c[2] = (jl_real_) _mm512_permutex2var_pd(even, high, even2);
+  c[3] = (jl_real_) _mm512_permutex2var_pd(odd, high, odd2);
+#elif defined(__AVX2__) && JL_W_ == 4
+  __m256d r[4];
+  for (int l = 0; l < 4; l++) r[l] = _mm256_loadu_pd(table + 4 * (size_t) (unsigned) i[l]);
+  const __m256d even = _mm256_unpacklo_pd(r[0], r[1]), odd = _mm256_unpackhi_pd(r[0], r[1]);
+  const __m256d even2 = _mm256_unpacklo_pd(r[2], r[3]), odd2 = _mm256_unpackhi_pd(r[2], r[3]);
+  c[0] = (jl_real_) _mm256_permute2f128_pd(even, even2, 0x20);
+  c[1] = (jl_real_) _mm256_permute2f128_pd(odd, odd2, 0x20);
+  c[2] = (jl_real_) _mm256_permute2f128_pd(even, even2, 0x31);
+  c[3] = (jl_real_) _mm256_permute2f128_pd(odd, odd2, 0x31);
+#else
+  for (int j = 0; j < 4; j++) {
+    jl_real_ of_lanes = jl_each_(0.0);
+    for (int l = 0; l < JL_W_; l++) JL_LANE_(of_lanes, l) = table[4 * JL_LANE_(i, l) + j];
+    c[j] = of_lanes;
+  }
+#endif
+}
+
+/* ------------------------------------------------------------------- facets and joints */
+
+/* The numbers of a joint, or of the first of W joints side by side: row r is s[r stride]. Those of
+ * the next joints, which will be needed soon, lie `ahead`; 0 where there are none. */
+typedef struct {
+  double *s;
+  size_t stride, ahead;
+} jl_numbers_;
+
+#ifdef JLAW_ABREAST
+typedef jl_real_ jl_of_facet_;
+typedef double jl_of_joint_;
+#define jl_somewhere_(m) 1 /* worth working out for some lanes: to ask costs more here */
+#define JL_TOGETHER_ JL_W_     /* facets that are worked out together */
+#define JL_JOINTS_ 1
+#define JL_JOINT_(x, l) (x)
+#define jl_each_joint_(x) (x)
+/* A column of the tables of a block of facets, which lie side by side in it */
+JL_IN_ jl_of_facet_ jl_column_(const double *block, int c)
+{
+  return (jl_real_) * (const jl_loose_ *) (block + c * JLAW_LANES);
+}
+/* A row of the state for each of these facets, `apart` from one another. There are `some` facets:
+ * lanes beyond them, which have zeros in all tables, read the last one and write nothing. */
+JL_IN_ jl_real_ jl_take_(jl_numbers_ n, int row, int apart, int some)
+{
+  const int last = (some - 1) * apart;
+#define JL_OF_(l) n.s[(size_t) (row + ((l) < some ? (l) * apart : last)) * n.stride]
+  const jl_real_ x = JL_LIST_(JL_OF_);
+#undef JL_OF_
+  return x;
+}
+JL_IN_ void jl_put_(jl_numbers_ n, int row, int apart, int some, jl_real_ x)
+{
+  for (int l = 0; l < some; l++) n.s[(size_t) (row + l * apart) * n.stride] = x[l];
+}
+JL_IN_ double jl_take_joint_(jl_numbers_ n, int row) { return n.s[(size_t) row * n.stride]; }
+JL_IN_ void jl_put_joint_(jl_numbers_ n, int row, double x) { n.s[(size_t) row * n.stride] = x; }
+#else
+typedef double jl_of_facet_;
+typedef jl_real_ jl_of_joint_;
+#define jl_somewhere_(m) jl_any_(m)
+#define JL_TOGETHER_ 1
+#define JL_JOINTS_ JL_W_
+#define JL_JOINT_(x, l) JL_LANE_(x, l)
+#define jl_each_joint_(x) jl_each_(x)
+JL_IN_ jl_of_facet_ jl_column_(const double *block, int c) { return block[c * JLAW_LANES]; }
+JL_IN_ jl_real_ jl_take_joint_(jl_numbers_ n, int row)
+{
+#if JL_W_ == 1
+  return n.s[(size_t) row * n.stride];
+#else
+  const double *from = n.s + (size_t) row * n.stride;
+  __builtin_prefetch(from + n.ahead, 1);
+  return (jl_real_) * (const jl_loose_ *) from;
+#endif
+}
+JL_IN_ void jl_put_joint_(jl_numbers_ n, int row, jl_real_ x)
+{
+#if JL_W_ == 1
+  n.s[(size_t) row * n.stride] = x;
+#else
+  *(jl_loose_ *) (n.s + (size_t) row * n.stride) = (jl_loose_) x;
+#endif
+}
+JL_IN_ jl_real_ jl_take_(jl_numbers_ n, int row, int apart, int some)
+{
+  (void) apart, (void) some;
+  return jl_take_joint_(n, row);
+}
+JL_IN_ void jl_put_(jl_numbers_ n, int row, int apart, int some, jl_real_ x)
+{
+  (void) apart, (void) some;
+  jl_put_joint_(n, row, x);
+}
+#endif
+
+/* Every fourth facet is added up in a sum of its own, and these in this order */
+#if defined(__CUDACC__) || defined(__CUDACC_RTC__)
+#define JL_SUMS_ 1 /* on a device one: an array would lie in its slow memory */
+#define jl_total_(sum, of) ((sum)[0].of)
+#elif defined(JLAW_ABREAST)
+#define JL_SUMS_ 1
+#define jl_total_(sum, of) (((sum)[0].of[0] + (sum)[0].of[2]) + ((sum)[0].of[1] + (sum)[0].of[3]))
+#else
+#define JL_SUMS_ 4
+#define jl_total_(sum, of) (((sum)[0].of + (sum)[2].of) + ((sum)[1].of + (sum)[3].of))
+#endif
+/* law.h: one step of a rock joint, and what a state amounts to, in lanes (lanes.h).
+ *
+ * Symbols and order are those of docs/theory-incremental.md and of kernels/reference.py. Rows of
+ * a state: delta (dim) | in-plane offset (dim - 1) | dissipated energy | q_s (M D) | q_t (M D),
+ * q times lam; where asperities yield flattened depth (M) | plastic work; with wear slip of the
+ * asperities | by how much mu had fallen in the last step. A batch keeps beside them Phi and Phi'
+ * of every facet (M each), which saves half the look-ups, and with yielding the same at z.
+ *
+ * Of the functions of the C library that round differently, only expm1, log1p, pow and hypot are
+ * called: zig links exp and log of its own.
+ */
+
+typedef struct { /* what the compiler knows of a step: it leaves out the rest */
+  int dim, yields, wears, ledger, tangent;
+  int kept; /* whether Phi and Phi' lie beside the state */
+} jl_kind_;
+
+typedef struct {                 /* a joint in a step */
+  jl_of_joint_ p[3], from[3], to[3]; /* increment; closure and in-plane offset before and after */
+  jl_of_joint_ J[4], slip;           /* d offset/d p; way along the offset at its limit */
+  jl_of_joint_ worn, since;          /* mu over that of unworn asperities; over that of the last step */
+} jl_motion_;
+
+typedef struct { /* facets in a step: y, Phi, Phi', Phi'' before and after; de */
+  jl_real_ y0, y1, f0, f1, k0, k1, bend, es, et;
+  jl_real_ dy, rdy;                             /* y1 - y0, and 1 over it */
+  jl_yes_ near;                                 /* y has hardly changed */
+  jl_real_ z0, z1, fz0, fz1, kz0, kz1;          /* flattened depth; Phi and Phi' there */
+  jl_real_ qs, qt, lost, vs, vt, bss, bst, btt; /* sums over the cells: q, loss, v and B of C */
+  jl_real_ ws, wt, open;                        /* the same of the softening by z1; any kappa */
+} jl_facets_;
+
+typedef struct {             /* the sliders of one depth cell of facets */
+  jl_real_ G0, G1, k0, k1, kz1;  /* G and kappa before and after; kappa at z1 */
+  jl_real_ reached;              /* G at the new y before springs yield there */
+  jl_real_ strength, cap, chord; /* mu lam A; friction limit; of G over the step */
+  jl_real_ ts, tt, unit, share;  /* trial force, 1 over its size, cap over its size or 1 */
+  jl_real_ old2, new2;           /* squares of q before and of the trial force */
+  jl_yes_ slips;
+} jl_sliders_;
+
+typedef struct { /* what facets add up to */
+  jl_real_ F[3], C[9], pull[2], lost;
+  jl_real_ crushed, normal; /* plastic work; A Phi before and after */
+} jl_sums_;
+
+/* Rows of a state: the first after the sliders, that of the slip of the asperities, and how many */
+JL_IN_ int jl_rest_row_(const jlaw_law *law) { return 2 * law->dim + 2 * law->facets * law->cells; }
+JL_IN_ int jl_slip_row_(const jlaw_law *law) { return jl_rest_row_(law) + (law->yields ? law->facets + 1 : 0); }
+JL_IN_ int jl_state_rows_(const jlaw_law *law) { return jl_slip_row_(law) + 2 * law->wears; }
+
+/* Tables of facets from number `at` on, and of their first depth cell */
+JL_IN_ const double *jl_facet_of_(const jlaw_law *law, int at)
+{
+  const int lane = at % JLAW_LANES;
+  return law->facet + (size_t) (at - lane) * JLAW_COLUMNS + lane;
+}
+JL_IN_ const double *jl_cell_of_(const jlaw_law *law, int at)
+{
+  const int lane = at % JLAW_LANES;
+  return law->depth + (size_t) (at - lane) * (size_t) law->cells * JLAW_ROWS + lane;
+}
+
+/* ------------------------------------------------------------------- the virgin curve */
+
+/* Effective closures below it count as zero: powers and squares of them underflow */
+JL_IN_ jl_real_ jl_resolved_(jl_real_ y) { return jl_only_(jl_size_of_(y) >= JLAW_UNDERFLOW, y); }
+
+typedef struct { /* in the tables of the virgin curve: sqrt(y), and the place x in piece i */
+  jl_real_ y, v, r, x;
+  jl_whole_ i;
+} jl_spot_;
+
+JL_IN_ jl_spot_ jl_spot_of_(const jlaw_law *law, jl_real_ y)
+{
+  const double pieces = law->pieces;
+  jl_spot_ at;
+  at.y = jl_only_(y > 0.0, y);
+  at.v = jl_root_(at.y);
+  at.r = 1.0 / (at.v + law->scale);
+  at.x = at.v * at.r * pieces;
+  at.i = jl_to_whole_(jl_smaller_(at.x, jl_each_(pieces - 1.0)));
+  at.x = at.x - jl_to_real_(at.i);
+  return at;
+}
+
+/* y^eta, zero at y = 0 */
+JL_IN_ jl_real_ jl_power_of_(const jlaw_law *law, const jl_spot_ *at)
+{
+  jl_real_ power = at->v;
+  if (law->eta == 0.0) power = jl_only_(at->y > 0.0, jl_each_(1.0));
+  else if (law->eta != 0.5)
+    for (int l = 0; l < JL_W_; l++)
+      JL_LANE_(power, l) = JL_LANE_(at->y, l) > 0.0 ? pow(JL_LANE_(at->y, l), law->eta) : 0.0;
+  return power;
+}
+
+/* w^rise of curves that are tabulated over it, w = y/(y + V^2) */
+JL_IN_ jl_real_ jl_rise_of_(const jlaw_law *law, jl_real_ w)
+{
+  for (int l = 0; l < JL_W_; l++) JL_LANE_(w, l) = JL_LANE_(w, l) > 0.0 ? pow(JL_LANE_(w, l), law->rise) : 0.0;
+  return w;
+}
+
+/* Phi and Phi' at y, and Phi'' if asked for; zero where y <= 0 */
+JL_IN_ void jl_virgin_curve_(const jlaw_law *law, jl_real_ y, jl_real_ *force, jl_real_ *slope, jl_real_ *bend)
+{
+  const double n = law->pieces, eta = law->eta;
+  const jl_spot_ at = jl_spot_of_(law, y);
+  const jl_real_ x = at.x, ts = at.v * at.r * at.r * law->scale; /* t (1 - t) */
+  jl_real_ c[4];
+  jl_fetch_(law->curve, at.i, c);
+  jl_real_ S = c[0] + x * (c[1] + x * (c[2] + x * c[3]));
+  jl_real_ DS = 0.5 * n * ts * (c[1] + x * (2.0 * c[2] + x * (3.0 * c[3])));
+  jl_real_ DDS = jl_each_(0.0);
+  if (bend)
+    DDS = 0.25 * n * n * ts * ts * (2.0 * c[2] + x * (6.0 * c[3]))
+          + 0.5 * (law->scale - at.v) * at.r * DS;
+  if (law->rise > 0.0) {
+    const jl_real_ w = at.y / (at.y + law->scale * law->scale), more = law->rise * (1.0 - w);
+    const jl_real_ up = jl_rise_of_(law, w);
+    DDS = up * (DDS + 2.0 * more * DS + more * (more - w) * S);
+    DS = up * (DS + more * S);
+    S = up * S;
+  }
+  const jl_real_ power = jl_power_of_(law, &at);
+  *force = power * at.y * S;
+  *slope = power * ((1.0 + eta) * S + DS);
+  if (bend)
+    *bend = power / jl_pick_(y > 0.0, y, 1.0) * (eta * (1.0 + eta) * S + (1.0 + 2.0 * eta) * DS + DDS);
+}
+
+/* Psi, the integral of Phi, at y */
+JL_IN_ jl_real_ jl_psi_(const jlaw_law *law, jl_real_ y)
+{
+  const jl_spot_ at = jl_spot_of_(law, y);
+  jl_real_ c[4];
+  jl_fetch_(law->energy, at.i, c);
+  jl_real_ T = c[0] + at.x * (c[1] + at.x * (c[2] + at.x * c[3]));
+  if (law->rise > 0.0) T = T * jl_rise_of_(law, at.y / (at.y + law->scale * law->scale));
+  return jl_power_of_(law, &at) * at.y * at.y * T;
+}
+
+/* Share G of a depth cell in Phi at y, and its slope kappa */
+JL_IN_ void jl_share_of_(const double *cell, jl_real_ y, jl_real_ force, jl_real_ slope, jl_real_ *G, jl_real_ *kappa)
+{
+  const jl_real_ low = y - jl_column_(cell, JLAW_LOW), high = y - jl_column_(cell, JLAW_HIGH);
+  const jl_of_facet_ end = jl_column_(cell, JLAW_KAPPA);
+  const jl_real_ k = jl_pick_(high > 0.0, end, slope - jl_column_(cell, JLAW_SLOPE));
+  const jl_real_ g = jl_pick_(high > 0.0, jl_column_(cell, JLAW_G) + end * high,
+                      force - jl_column_(cell, JLAW_FORCE) - jl_column_(cell, JLAW_SLOPE) * low);
+  *kappa = jl_only_(low > 0.0, jl_larger_(k, jl_each_(0.0)));
+  *G = jl_larger_(jl_smaller_(g, *kappa * low), jl_each_(0.0));
+}
+
+/* -------------------------------------------------------------- asperities that yield */
+
+/* G and kappa of a cell less what it holds, H, at the flattened depth z: "Yielding" */
+JL_IN_ void jl_flatten_(jl_real_ y, jl_real_ z, jl_real_ H, jl_real_ *G, jl_real_ *kappa)
+{
+  const jl_real_ over = y - z;
+  *kappa = jl_only_(over > 0.0, *kappa);
+  *G = jl_larger_(jl_smaller_(*G - H, *kappa * over), jl_each_(0.0));
+}
+
+/* Phi less its value at the flattened depth */
+JL_IN_ void jl_flatten_facets_(jl_real_ y, jl_real_ z, jl_real_ less, jl_real_ *force, jl_real_ *slope)
+{
+  *force = jl_only_(y > z, jl_larger_(*force - less, jl_each_(0.0)));
+  *slope = jl_only_(y > z, *slope);
+}
+
+/* Flattened depths of facets, before and after the step, and the virgin curve there */
+JL_IN_ void jl_press_(const jlaw_law *law, const double *f, jl_numbers_ n, int kept, int at, int some,
+              const jl_motion_ *m, jl_facets_ *o)
+{
+  const int M = law->facets, depth = jl_rest_row_(law);
+  jl_real_ y = o->y1;
+  if (law->critical_slip < DBL_MAX) /* one depth for a facet and its opposite */
+    y = jl_larger_(y, 2.0 * jl_column_(f, JLAW_M) * m->to[0] - y);
+  o->z0 = jl_take_(n, depth + at, 1, some);
+  o->z1 = jl_larger_(y - jl_column_(f, JLAW_YIELD), o->z0);
+  if (kept) {
+    o->fz0 = jl_take_(n, kept + 2 * M + at, 1, some);
+    o->kz0 = jl_take_(n, kept + 3 * M + at, 1, some);
+  } else jl_virgin_curve_(law, o->z0, &o->fz0, &o->kz0, (jl_real_ *) 0);
+  o->fz1 = o->fz0, o->kz1 = o->kz0;
+  if (!jl_any_(o->z1 > o->z0)) return;
+  jl_virgin_curve_(law, o->z1, &o->fz1, &o->kz1, (jl_real_ *) 0);
+  jl_put_(n, depth + at, 1, some, o->z1);
+  if (kept) {
+    jl_put_(n, kept + 2 * M + at, 1, some, o->fz1);
+    jl_put_(n, kept + 3 * M + at, 1, some, o->kz1);
+  }
+}
+
+/* Plastic work of facets over A c1: exact where they press themselves flat, else by the mean */
+JL_IN_ jl_real_ jl_crush_(const double *f, const jl_facets_ *o)
+{
+  const jl_of_facet_ most = jl_column_(f, JLAW_YIELD);
+  const jl_real_ c0 = jl_smaller_(jl_larger_(o->y0 - o->z0, jl_each_(0.0)), jl_each_(most));
+  const jl_real_ c1 = jl_smaller_(jl_larger_(o->y1 - o->z1, jl_each_(0.0)), jl_each_(most));
+  return jl_pick_(o->y1 - most >= o->z1, most, 0.5 * (c0 + c1)) * (o->fz1 - o->fz0);
+}
+
+/* ------------------------------------------------------------------------------- wear */
+
+/* mu after the slip of the asperities, over that of unworn ones and over that of the last step */
+JL_IN_ void jl_wear_friction_(const jlaw_law *law, jl_of_joint_ slip, jl_of_joint_ fallen, jl_motion_ *m)
+{
+  m->worn = m->since = jl_each_joint_(1.0);
+  if (!(law->mu > 0.0)) return;
+  for (int l = 0; l < JL_JOINTS_; l++) {
+    const double left = 1.0 + expm1(-JL_JOINT_(slip, l) / law->wear_slip);
+    const double now = law->mu_residual + (law->mu - law->mu_residual) * left;
+    const double last = law->mu - JL_JOINT_(fallen, l);
+    JL_JOINT_(m->worn, l) = now / law->mu;
+    JL_JOINT_(m->since, l) = now < last ? now / last : 1.0;
+  }
+}
+
+/* mu has fallen: sliders come back to their limit, and lose what they held beyond it */
+JL_IN_ void jl_wear_sliders_(const jl_sliders_ *c, jl_of_joint_ since, jl_real_ *qs, jl_real_ *qt, jl_real_ *lost)
+{
+  const jl_real_ size2 = *qs * *qs + *qt * *qt, cap = c->strength * c->G0;
+  const jl_real_ back = jl_pick_(size2 > cap * cap, jl_each_(0.0) + since, 1.0);
+  const jl_real_ gone = (1.0 - back) * (1.0 + back) * size2;
+  *lost += jl_only_(c->k0 > JLAW_TINY, gone / jl_pick_(c->k0 > JLAW_TINY, c->k0, 1.0));
+  *qs = back * *qs;
+  *qt = back * *qt;
+}
+
+/* ------------------------------------------------------------------------ large shear */
+
+/* The in-plane offset a of one joint moves by p, dragged along at its limit D; then it is to[0],
+ * to[1], its way along itself to[2], and its derivative by p to[3] to to[6] */
+JL_IN_ void jl_drag_(double D, int dim, double a0, double a1, double p0, double p1, double to[7])
+{
+  const double length = hypot(p0, p1), e0 = p0 / length, e1 = p1 / length;
+  const double along = a0 * e0 + a1 * e1;
+  const double before = D * D - (a0 * a0 + a1 * a1) + along * along;
+  double inside = sqrt(before > 0.0 ? before : 0.0) - along; /* way until it is at its limit */
+  inside = inside > 0.0 ? (inside < length ? inside : length) : 0.0;
+  a0 += inside * e0;
+  a1 += inside * e1;
+  const double x = (length - inside) / D, rest = -expm1(-x), decay = 1.0 - rest;
+  double cosine = (a0 * e0 + a1 * e1) / D;
+  cosine = cosine > 0.0 ? (cosine < 1.0 ? cosine : 1.0) : 0.0;
+  const double sine = (a1 * e0 - a0 * e1) / D;
+  const double bottom = (1.0 + cosine) + (1.0 - cosine) * decay * decay;
+  const double cos1 = ((1.0 + cosine) - (1.0 - cosine) * decay * decay) / bottom;
+  const double sin1 = 2.0 * sine * decay / bottom;
+  to[0] = D * (cos1 * e0 - sin1 * e1);
+  to[1] = D * (cos1 * e1 + sin1 * e0);
+  to[2] = D * (x + log1p(0.5 * bottom - 1.0));
+  const double grazing = cosine > JLAW_GRAZING ? cosine : JLAW_GRAZING;
+  double turn = (rest * rest + cosine * rest * (1.0 + decay)) / bottom;
+  turn += inside / (D * grazing) * (2.0 * decay / bottom - sin1 * sine);
+  turn /= length;
+  const int turns = dim == 3; /* along one line the offset does not turn */
+  const double row0 = turns ? -turn * e1 - sin1 / D * e0 : 0.0;
+  const double row1 = turns ? turn * e0 - sin1 / D * e1 : 0.0;
+  to[3] = -to[1] * row0;
+  to[4] = -to[1] * row1;
+  to[5] = to[0] * row0;
+  to[6] = to[0] * row1;
+}
+
+/* Offsets that have come to their limit are dragged along: "Large shear" */
+JL_IN_ void jl_limit_offset_(const jlaw_law *law, int dim, jl_motion_ *m)
+{
+  const double D = law->critical_slip;
+  m->J[0] = m->J[3] = jl_each_joint_(1.0);
+  m->J[1] = m->J[2] = m->slip = jl_each_joint_(0.0);
+  if (!(D < DBL_MAX) || dim == 1) return;
+  for (int l = 0; l < JL_JOINTS_; l++) {
+    const double p0 = JL_JOINT_(m->p[1], l), p1 = dim > 2 ? JL_JOINT_(m->p[2], l) : 0.0;
+    const double a0 = JL_JOINT_(m->from[1], l), a1 = dim > 2 ? JL_JOINT_(m->from[2], l) : 0.0;
+    const double b0 = a0 + p0, b1 = a1 + p1;
+    if (!(b0 * b0 + b1 * b1 > D * D) || !(b0 * p0 + b1 * p1 > 0.0)) continue;
+    double to[7];
+    jl_drag_(D, dim, a0, a1, p0, p1, to);
+    JL_JOINT_(m->to[1], l) = to[0];
+    if (dim > 2) JL_JOINT_(m->to[2], l) = to[1];
+    JL_JOINT_(m->slip, l) = to[2];
+    for (int j = 0; j < 4; j++) JL_JOINT_(m->J[j], l) = to[3 + j];
+  }
+}
+
+/* Energy that dragging the offset takes; pull: the in-plane part of the normal forces */
+JL_IN_ jl_of_joint_ jl_drag_loss_(const jlaw_law *law, int dim, const jl_motion_ *m, const jl_sums_ *sum)
+{
+  jl_of_joint_ along = jl_total_(sum, pull[0]) * m->to[1];
+  if (dim > 2) along += jl_total_(sum, pull[1]) * m->to[2];
+  for (int l = 0; l < JL_JOINTS_; l++) /* >= 0 by symmetry of the facets, but for rounding */
+    JL_JOINT_(along, l) = JL_JOINT_(along, l) > 0.0 ? JL_JOINT_(along, l) : 0.0;
+  return m->slip * along / law->critical_slip;
+}
+
+/* --------------------------------------------------------------------------- one step */
+
+/* G and kappa of a cell before and after the step; springs yield at the new y at once */
+JL_IN_ void jl_cells_of_(const double *cell, const jl_facets_ *o, jl_sliders_ *c, int yields)
+{
+  jl_share_of_(cell, o->y0, o->f0, o->k0, &c->G0, &c->k0);
+  jl_share_of_(cell, o->y1, o->f1, o->k1, &c->G1, &c->k1);
+  c->reached = c->G1;
+  if (!yields) return;
+  jl_real_ H0, H1, kz0, k = c->k1;
+  jl_share_of_(cell, o->z0, o->fz0, o->kz0, &H0, &kz0);
+  jl_share_of_(cell, o->z1, o->fz1, o->kz1, &H1, &c->kz1);
+  jl_flatten_(o->y0, o->z0, H0, &c->G0, &c->k0);
+  jl_flatten_(o->y1, o->z0, H0, &c->reached, &k);
+  jl_flatten_(o->y1, o->z1, H1, &c->G1, &c->k1);
+}
+
+/* Trial force: loaded by the chord of G where kappa grows; where kappa falls, the springs that part
+ * take their force along. Then the friction limit, |q| <= mu lam A G. */
+JL_IN_ void jl_load_(const double *f, const jl_facets_ *o, jl_sliders_ *c, jl_real_ *qs, jl_real_ *qt, jl_kind_ k)
+{
+  jl_yes_ near = o->near;
+  if (k.yields) near = near & ((c->k0 > 0.0) | (c->k1 <= 0.0)); /* flattened ones touch together */
+  const jl_real_ mean = jl_pick_(near, 0.5 * (c->k0 + c->k1), (c->reached - c->G0) * o->rdy);
+  c->chord = jl_smaller_(jl_larger_(mean, c->k0), c->k1); /* k1 where it falls */
+  c->old2 = *qs * *qs + *qt * *qt;
+  const jl_yes_ falls = c->k1 < c->k0;
+  if (jl_somewhere_(falls)) {
+    const jl_real_ kept = jl_pick_(falls, c->k1 / jl_pick_(falls, c->k0, 1.0), 1.0);
+    *qs = *qs * kept;
+    *qt = *qt * kept;
+  }
+  const jl_real_ add = jl_column_(f, JLAW_STIFF) * c->chord;
+  c->ts = *qs + add * o->es;
+  c->tt = *qt + add * o->et;
+  c->new2 = c->ts * c->ts + c->tt * c->tt;
+  c->cap = c->strength * c->G1;
+  c->slips = c->new2 > c->cap * c->cap;
+  c->unit = jl_each_(0.0);
+  c->share = jl_each_(1.0);
+  if (k.tangent || jl_somewhere_(c->slips)) {
+    c->unit = jl_only_(c->new2 > JLAW_TINY, 1.0 / jl_root_(c->new2));
+    c->share = jl_pick_(c->slips, jl_smaller_(c->cap * c->unit, jl_each_(1.0)), 1.0);
+  }
+  const jl_real_ part = jl_only_(c->new2 > JLAW_TINY, c->share); /* squares of smaller forces underflow */
+  *qs = part * c->ts;
+  *qt = part * c->tt;
+}
+
+/* What sliders, and springs that part under shear, lose: every term is >= 0 as written */
+JL_IN_ jl_real_ jl_friction_loss_(const jl_sliders_ *c)
+{
+  const jl_real_ high = jl_larger_(c->chord, c->k0), low = jl_smaller_(c->k0, c->k1);
+  const jl_real_ a = c->k0 * high, b = c->k1 * c->chord;
+  const jl_real_ A = jl_pick_(a > JLAW_FAINT, a, 1.0), B = jl_pick_(b > JLAW_FAINT, b, 1.0);
+  const jl_real_ r = 1.0 / (A * B); /* one division for both */
+  const jl_real_ rub = c->k1 - c->chord + 2.0 * c->share * (1.0 - c->share) * c->chord;
+  return jl_only_(a > JLAW_FAINT, c->old2 * ((high - low) * (B * r)))
+         + jl_only_(b > JLAW_FAINT, c->new2 * (rub * (A * r)));
+}
+
+/* "The tangent": J_q = beta (I - s s^T) E + v g^T of sliders */
+JL_IN_ void jl_slide_tangent_(const double *f, const double *cell, const jl_sliders_ *c, jl_facets_ *o, jl_kind_ k)
+{
+  const jl_of_facet_ a = jl_column_(f, JLAW_STIFF);
+  const jl_of_facet_ begin = jl_column_(cell, JLAW_LOW), end = jl_column_(cell, JLAW_HIGH);
+  const jl_yes_ inside = (o->y1 > begin) & (o->y1 < end);
+  const jl_real_ bend = jl_only_(inside, o->bend);
+  jl_yes_ near = o->near;
+  if (k.yields) near = near & ((c->k0 > 0.0) | (c->k1 <= 0.0));
+  const jl_real_ chord1 = jl_pick_(near, 0.5 * bend, (c->k1 - c->chord) * o->rdy);
+  const jl_yes_ stiff = c->k1 > JLAW_TINY;
+  const jl_real_ fade = jl_only_(stiff, bend / jl_pick_(stiff, c->k1, 1.0));
+  /* rounding must not decide: what did not close has not grown, what is at its limit slips */
+  const jl_yes_ stiffer = (c->k1 > c->k0) & (o->dy > JLAW_ROUNDED * jl_size_of_(o->y1));
+  const jl_real_ least = c->strength * (c->G1 * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * o->f1);
+  const jl_yes_ limited = c->new2 >= jl_larger_(least, jl_each_(0.0)) * jl_larger_(least, jl_each_(0.0));
+  const jl_real_ vs = jl_pick_(stiffer, a * chord1 * o->es, fade * c->ts);
+  const jl_real_ vt = jl_pick_(stiffer, a * chord1 * o->et, fade * c->tt);
+  const jl_real_ us = c->ts * c->unit, ut = c->tt * c->unit;
+  const jl_real_ dot = us * vs + ut * vt, push = c->strength * c->k1;
+  const jl_real_ beta = jl_only_(c->cap > 0.0, c->share * (a * c->chord)), along = jl_only_(limited, beta);
+  o->vs += jl_pick_(limited, c->share * (vs - us * dot) + push * us, vs);
+  o->vt += jl_pick_(limited, c->share * (vt - ut * dot) + push * ut, vt);
+  o->bss += beta - along * us * us;
+  o->bst -= along * us * ut;
+  o->btt += beta - along * ut * ut;
+  if (k.yields) {
+    const jl_yes_ pulls = limited & (c->k1 > 0.0);
+    const jl_real_ pull = c->strength * jl_only_(pulls, c->kz1);
+    o->ws += pull * us;
+    o->wt += pull * ut;
+    o->open += c->k1;
+  }
+}
+
+/* One depth cell of facets: from the sliders before the step to those after it */
+JL_IN_ void jl_slide_(const double *f, const double *cell, const jl_motion_ *m, jl_facets_ *o, jl_real_ *qs, jl_real_ *qt,
+              jl_kind_ k)
+{
+  jl_sliders_ c;
+  jl_cells_of_(cell, o, &c, k.yields);
+  c.strength = jl_each_(jl_column_(f, JLAW_STRENGTH));
+  if (k.wears) {
+    c.strength = c.strength * m->worn;
+    jl_wear_sliders_(&c, m->since, qs, qt, &o->lost);
+  }
+  jl_load_(f, o, &c, qs, qt, k);
+  o->qs += *qs;
+  o->qt += *qt;
+  if (k.ledger) o->lost += jl_friction_loss_(&c);
+  if (k.tangent) jl_slide_tangent_(f, cell, &c, o, k);
+}
+
+/* C += along g^T + E^T B E of facets; where the flattened depth moves, less softening g_z^T */
+JL_IN_ void jl_add_tangent_(const jlaw_law *law, const double *f, const jl_motion_ *m, const jl_facets_ *o,
+                    jl_sums_ *sum, jl_kind_ k)
+{
+  const int drags = law->critical_slip < DBL_MAX;
+  const jl_yes_ moves = (o->z1 > o->z0) & (o->open > 0.0);
+  const jl_yes_ own = o->z1 <= o->y1 - jl_column_(f, JLAW_YIELD); /* or the opposite facet presses */
+  for (int i = 0; i < k.dim; i++) {
+    const jl_of_facet_ n = jl_column_(f, JLAW_N + i) * jl_column_(f, JLAW_A);
+    const jl_of_facet_ s = jl_column_(f, JLAW_S + i) * law->soft, t = jl_column_(f, JLAW_T + i) * law->soft;
+    const jl_real_ along = n * o->k1 + s * o->vs + t * o->vt;
+    const jl_real_ left = s * o->bss + t * o->bst, right = s * o->bst + t * o->btt;
+    for (int j = 0; j < k.dim; j++) {
+      jl_real_ g = jl_each_(jl_column_(f, JLAW_M + j)); /* dy/dd */
+      if (j > 0 && drags) {
+        g = jl_column_(f, JLAW_M + 1) * m->J[j - 1];
+        if (k.dim > 2) g += jl_column_(f, JLAW_M + 2) * m->J[j + 1];
+      }
+      jl_real_ to = along * g + left * jl_column_(f, JLAW_S + j) + right * jl_column_(f, JLAW_T + j);
+      if (k.yields) {
+        const jl_real_ less = jl_only_(moves, n * o->kz1 + s * o->ws + t * o->wt);
+        to -= j > 0 ? less * jl_pick_(own, g, -g) : less * g;
+      }
+      sum->C[3 * i + j] += to;
+    }
+  }
+}
+
+/* Facets from number `at` on: closures, virgin curve, sliders, and their part of F and C */
+JL_IN_ void jl_step_facets_(const jlaw_law *law, int at, const jl_motion_ *m, jl_numbers_ n, jl_sums_ *sum, jl_kind_ k)
+{
+  const int M = law->facets, D = law->cells, some = M - at < JL_TOGETHER_ ? M - at : JL_TOGETHER_;
+  const int kept = k.kept ? jl_state_rows_(law) : 0;
+  const double *f = jl_facet_of_(law, at), *cell = jl_cell_of_(law, at);
+  jl_facets_ o;
+  o.y0 = o.y1 = o.es = o.et = o.bend = jl_each_(0.0);
+  for (int i = 0; i < k.dim; i++) {
+    o.y0 += jl_column_(f, JLAW_M + i) * m->from[i];
+    o.y1 += jl_column_(f, JLAW_M + i) * m->to[i];
+    o.es += jl_column_(f, JLAW_S + i) * m->p[i];
+    if (i > 0) o.et += jl_column_(f, JLAW_T + i) * m->p[i];
+  }
+  if (!k.yields && !jl_any_((o.y0 > 0.0) | (o.y1 > 0.0))) return; /* apart: all it holds is zero */
+  o.y0 = jl_resolved_(o.y0);
+  o.y1 = jl_resolved_(o.y1);
+  o.dy = o.y1 - o.y0;
+  o.rdy = 1.0 / o.dy;
+  o.near = jl_size_of_(o.dy) <= JLAW_NEAR * jl_size_of_(o.y1);
+  o.qs = o.qt = o.lost = o.vs = o.vt = o.bss = o.bst = o.btt = o.ws = o.wt = o.open = jl_each_(0.0);
+  if (k.kept) {
+    o.f0 = jl_take_(n, kept + at, 1, some);
+    o.k0 = jl_take_(n, kept + M + at, 1, some);
+  } else jl_virgin_curve_(law, o.y0, &o.f0, &o.k0, (jl_real_ *) 0);
+  jl_virgin_curve_(law, o.y1, &o.f1, &o.k1, k.tangent ? &o.bend : (jl_real_ *) 0);
+  if (k.kept) {
+    jl_put_(n, kept + at, 1, some, o.f1);
+    jl_put_(n, kept + M + at, 1, some, o.k1);
+  }
+  o.z0 = o.z1 = o.fz0 = o.fz1 = o.kz0 = o.kz1 = jl_each_(0.0);
+  if (k.yields) jl_press_(law, f, n, kept, at, some, m, &o);
+  for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_LANES) {
+    const jl_of_facet_ low = jl_column_(cell, JLAW_LOW);
+    if (!jl_any_((o.y0 > low) | (o.y1 > low))) break; /* nor does what is deeper */
+    const int row = 2 * k.dim + at * D + i;
+    jl_real_ qs = jl_take_(n, row, D, some), qt = jl_take_(n, row + M * D, D, some);
+    jl_slide_(f, cell, m, &o, &qs, &qt, k);
+    jl_put_(n, row, D, some, qs);
+    jl_put_(n, row + M * D, D, some, qt);
+  }
+  if (k.yields) {
+    sum->crushed += jl_column_(f, JLAW_POTENTIAL) * jl_crush_(f, &o);
+    jl_flatten_facets_(o.y0, o.z0, o.fz0, &o.f0, &o.k0);
+    jl_flatten_facets_(o.y1, o.z1, o.fz1, &o.f1, &o.k1);
+  }
+  if (k.wears) sum->normal += jl_column_(f, JLAW_A) * (o.f0 + o.f1);
+  if (k.ledger) sum->lost += jl_column_(f, JLAW_COMPLIANCE) * o.lost;
+  const jl_real_ normal = jl_column_(f, JLAW_A) * o.f1, qs = law->soft * o.qs, qt = law->soft * o.qt;
+  for (int i = 0; i < k.dim; i++) {
+    const jl_real_ pull = jl_column_(f, JLAW_N + i) * normal;
+    sum->F[i] += pull + (jl_column_(f, JLAW_S + i) * qs + jl_column_(f, JLAW_T + i) * qt);
+    if (i > 0 && k.ledger) sum->pull[i - 1] += pull;
+  }
+  if (k.tangent) jl_add_tangent_(law, f, m, &o, sum, k);
+}
+
+/* Advance joints by the increments d: their numbers n, F (dim), and C (dim, dim) for a tangent */
+JL_IN_ void jl_step_(const jlaw_law *law, jl_numbers_ n, const jl_of_joint_ d[3], jl_of_joint_ F[3], jl_of_joint_ C[9],
+             jl_kind_ k)
+{
+  const int dim = k.dim, M = law->facets, rest = jl_rest_row_(law), slip = jl_slip_row_(law);
+  jl_motion_ m;
+  jl_sums_ sum[JL_SUMS_];
+  for (int i = 0; i < 3; i++) {
+    m.p[i] = i < dim ? d[i] : jl_each_joint_(0.0);
+    m.from[i] = i < dim ? jl_take_joint_(n, i ? dim + i - 1 : 0) : jl_each_joint_(0.0);
+    m.to[i] = m.from[i] + m.p[i];
+  }
+  jl_limit_offset_(law, dim, &m);
+  m.worn = m.since = jl_each_joint_(1.0);
+  if (k.wears) jl_wear_friction_(law, jl_take_joint_(n, slip), jl_take_joint_(n, slip + 1), &m);
+  for (int i = 0; i < JL_SUMS_; i++) {
+    for (int j = 0; j < 3; j++) sum[i].F[j] = jl_each_(0.0);
+    for (int j = 0; k.tangent && j < 9; j++) sum[i].C[j] = jl_each_(0.0);
+    sum[i].pull[0] = sum[i].pull[1] = sum[i].lost = sum[i].crushed = sum[i].normal = jl_each_(0.0);
+  }
+  for (int at = 0; at < M; at += JL_TOGETHER_)
+    jl_step_facets_(law, at, &m, n, sum + at / JL_TOGETHER_ % JL_SUMS_, k);
+  for (int i = 0; i < dim; i++) {
+    F[i] = jl_total_(sum, F[i]);
+    for (int j = 0; k.tangent && j < dim; j++) C[dim * i + j] = jl_total_(sum, C[3 * i + j]);
+    jl_put_joint_(n, i, jl_take_joint_(n, i) + m.p[i]);
+    if (i > 0) jl_put_joint_(n, dim + i - 1, m.to[i]);
+  }
+  if (!k.ledger) return;
+  jl_of_joint_ lost = jl_total_(sum, lost);
+  if (dim > 1 && law->critical_slip < DBL_MAX) lost += jl_drag_loss_(law, dim, &m, sum);
+  if (k.wears) { /* slip of the asperities: the loss over the mean friction limit */
+    const jl_of_joint_ limit = 0.5 * law->mu * m.worn * jl_total_(sum, normal);
+    jl_of_joint_ way = jl_take_joint_(n, slip);
+    for (int l = 0; l < JL_JOINTS_; l++)
+      if (JL_JOINT_(limit, l) > 0.0) JL_JOINT_(way, l) += JL_JOINT_(lost, l) / JL_JOINT_(limit, l);
+    jl_put_joint_(n, slip, way);
+    jl_put_joint_(n, slip + 1, law->mu - law->mu * m.worn);
+  }
+  if (k.yields) {
+    const jl_of_joint_ crushed = jl_total_(sum, crushed);
+    jl_put_joint_(n, rest + M, jl_take_joint_(n, rest + M) + crushed);
+    lost += crushed;
+  }
+  jl_put_joint_(n, 2 * dim - 1, jl_take_joint_(n, 2 * dim - 1) + lost);
+}
+
+/* ------------------------------------------------------------------ what a state is */
+
+/* Facets from number `at` on in a state: y and z with the virgin curve there, as y1 and z1 */
+JL_IN_ void jl_facets_now_(const jlaw_law *law, jl_numbers_ n, int at, jl_facets_ *o)
+{
+  const int dim = law->dim, some = law->facets - at < JL_TOGETHER_ ? law->facets - at : JL_TOGETHER_;
+  const double *f = jl_facet_of_(law, at);
+  o->y1 = o->z1 = o->fz1 = o->kz1 = jl_each_(0.0);
+  for (int i = 0; i < dim; i++) o->y1 += jl_column_(f, JLAW_M + i) * jl_take_joint_(n, i ? dim + i - 1 : 0);
+  o->y1 = jl_resolved_(o->y1);
+  jl_virgin_curve_(law, o->y1, &o->f1, &o->k1, (jl_real_ *) 0);
+  if (!law->yields) return;
+  o->z1 = jl_take_(n, jl_rest_row_(law) + at, 1, some);
+  jl_virgin_curve_(law, o->z1, &o->fz1, &o->kz1, (jl_real_ *) 0);
+}
+
+/* G and kappa of a cell of these facets */
+JL_IN_ void jl_cell_now_(const double *cell, const jl_facets_ *o, int yields, jl_real_ *G, jl_real_ *kappa)
+{
+  jl_share_of_(cell, o->y1, o->f1, o->k1, G, kappa);
+  if (!yields) return;
+  jl_real_ H, kz;
+  jl_share_of_(cell, o->z1, o->fz1, o->kz1, &H, &kz);
+  jl_flatten_(o->y1, o->z1, H, G, kappa);
+}
+
+/* Friction now over that of unworn asperities */
+JL_IN_ jl_of_joint_ jl_worn_now_(const jlaw_law *law, jl_numbers_ n)
+{
+  const int slip = jl_slip_row_(law);
+  jl_motion_ m;
+  m.worn = jl_each_joint_(1.0);
+  if (law->wears) jl_wear_friction_(law, jl_take_joint_(n, slip), jl_take_joint_(n, slip + 1), &m);
+  return m.worn;
+}
+
+typedef struct { /* as reference.Measures; the energies of normal and shear springs */
+  jl_of_joint_ sliding, slipping, separated, normal, sheared, reach;
+} jl_amounts_;
+
+typedef struct {
+  jl_real_ sliding, slipping, separated, normal, sheared;
+} jl_amount_sums_;
+
+JL_IN_ void jl_measure_facets_(const jlaw_law *law, jl_numbers_ n, int at, jl_of_joint_ worn, jl_amount_sums_ *sum,
+                       jl_of_joint_ *reach)
+{
+  const int M = law->facets, D = law->cells, some = M - at < JL_TOGETHER_ ? M - at : JL_TOGETHER_;
+  const double *f = jl_facet_of_(law, at), *cell = jl_cell_of_(law, at);
+  const jl_real_ strength = jl_column_(f, JLAW_STRENGTH) * worn, one = jl_each_(1.0);
+  jl_real_ held = jl_each_(0.0), sheared = jl_each_(0.0), whole_slips = one;
+  jl_facets_ o;
+  jl_facets_now_(law, n, at, &o);
+  for (int i = 0; i < D && jl_any_(o.y1 > jl_column_(cell, JLAW_LOW)); i++) {
+    jl_real_ G, kappa;
+    const int row = 2 * law->dim + at * D + i;
+    const jl_real_ qs = jl_take_(n, row, D, some), qt = jl_take_(n, row + M * D, D, some);
+    jl_cell_now_(cell, &o, law->yields, &G, &kappa);
+    const jl_real_ q2 = qs * qs + qt * qt;
+    const jl_yes_ stiff = kappa > JLAW_TINY;
+    const jl_yes_ limited = jl_root_(q2) >= strength * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * o.f1);
+    held += jl_only_(limited, G);
+    whole_slips = jl_only_(limited, whole_slips);
+    sheared += jl_only_(stiff, q2 / jl_pick_(stiff, kappa, 1.0));
+    cell += JLAW_ROWS * JLAW_LANES;
+  }
+  const jl_yes_ touches = o.y1 > o.z1;
+  const jl_real_ force = jl_only_(touches, jl_larger_(o.f1 - o.fz1, jl_each_(0.0))),
+             share = jl_each_(jl_column_(f, JLAW_SHARE));
+  jl_real_ normal = jl_psi_(law, o.y1);
+  if (law->yields) normal = normal - jl_psi_(law, o.z1) - o.fz1 * (o.y1 - o.z1);
+  sum->sliding += share * jl_only_(touches, whole_slips);
+  sum->slipping += share * jl_smaller_(jl_only_(force > 0.0, held / jl_pick_(force > 0.0, force, 1.0)), one);
+  sum->separated += share * jl_pick_(touches, 0.0, 1.0);
+  sum->normal += jl_column_(f, JLAW_POTENTIAL) * jl_only_(touches, jl_larger_(normal, jl_each_(0.0)));
+  sum->sheared += jl_column_(f, JLAW_COMPLIANCE) * sheared;
+#ifdef JLAW_ABREAST
+  for (int l = 0; l < some; l++) *reach = *reach > o.y1[l] ? *reach : o.y1[l];
+#else
+  *reach = jl_larger_(*reach, o.y1);
+#endif
+}
+
+JL_IN_ jl_amounts_ jl_measure_(const jlaw_law *law, jl_numbers_ n)
+{
+  const jl_of_joint_ worn = jl_worn_now_(law, n);
+  jl_amount_sums_ sum[JL_SUMS_];
+  jl_amounts_ all;
+  all.reach = jl_each_joint_(-DBL_MAX);
+  for (int i = 0; i < JL_SUMS_; i++)
+    sum[i].sliding = sum[i].slipping = sum[i].separated = sum[i].normal = sum[i].sheared =
+        jl_each_(0.0);
+  for (int at = 0; at < law->facets; at += JL_TOGETHER_)
+    jl_measure_facets_(law, n, at, worn, sum + at / JL_TOGETHER_ % JL_SUMS_, &all.reach);
+  all.sliding = jl_total_(sum, sliding);
+  all.slipping = jl_total_(sum, slipping);
+  all.separated = jl_total_(sum, separated);
+  all.normal = jl_total_(sum, normal);
+  all.sheared = jl_total_(sum, sheared);
+  return all;
+}
+
+/* ------------------------------------------------------------- kinds of a step */
+
+JL_IN_ jl_kind_ jl_kind_of_(int dim, int yields, int wears, int ledger, int tangent, int kept)
+{
+  const jl_kind_ k = {dim, yields, wears, ledger, tangent, kept};
+  return k;
+}
+
+/* The step, compiled for each kind apart: a plane costs half of space, and what is not asked for
+ * nothing. Where asperities yield or wear, the ledger is part of the law. */
+JL_IN_ void jl_step_of_kind_(const jlaw_law *law, jl_numbers_ n, const jl_of_joint_ d[3], jl_of_joint_ F[3],
+                     jl_of_joint_ C[9], int ledger, int tangent, int kept)
+{
+  const int dim = law->dim, y = law->yields, w = law->wears;
+  if (y || w || dim == 1) {
+    if (tangent) jl_step_(law, n, d, F, C, jl_kind_of_(dim, y, w, 1, 1, kept));
+    else jl_step_(law, n, d, F, C, jl_kind_of_(dim, y, w, 1, 0, kept));
+  } else if (dim == 3) {
+    if (tangent) jl_step_(law, n, d, F, C, jl_kind_of_(3, 0, 0, ledger, 1, kept));
+    else if (ledger) jl_step_(law, n, d, F, C, jl_kind_of_(3, 0, 0, 1, 0, kept));
+    else jl_step_(law, n, d, F, C, jl_kind_of_(3, 0, 0, 0, 0, kept));
+  } else {
+    if (tangent) jl_step_(law, n, d, F, C, jl_kind_of_(2, 0, 0, ledger, 1, kept));
+    else if (ledger) jl_step_(law, n, d, F, C, jl_kind_of_(2, 0, 0, 1, 0, kept));
+    else jl_step_(law, n, d, F, C, jl_kind_of_(2, 0, 0, 0, 0, kept));
+  }
+}
+
+/* ------------------------------------------------------------------ messages */
+
+typedef struct {
+  char *to;
+  size_t size, at;
+} jlaw_text_;
+
+static JLAW_FUNCTION void jlaw_say_(jlaw_text_ *text, const char *words)
+{
+  for (; *words && text->at + 1 < text->size; words++) text->to[text->at++] = *words;
+  if (text->size) text->to[text->at] = 0;
+}
+
+/* A number to five digits, without stdio and its locale */
+static JLAW_FUNCTION void jlaw_say_number_(jlaw_text_ *text, double x)
+{
+  char digits[24];
+  int exponent = 0, n = 0;
+  if (x != x) {
+    jlaw_say_(text, "nan");
+    return;
+  }
+  if (x < 0.0) {
+    jlaw_say_(text, "-");
+    x = -x;
+  }
+  if (x > DBL_MAX) {
+    jlaw_say_(text, "inf");
+    return;
+  }
+  while (x >= 10.0) {
+    x /= 10.0;
+    exponent++;
+  }
+  while (x > 0.0 && x < 1.0) {
+    x *= 10.0;
+    exponent--;
+  }
+  x += 0.00005;
+  if (x >= 10.0) {
+    x /= 10.0;
+    exponent++;
+  }
+  for (int i = 0; i < 5; i++) {
+    const int digit = (int) x;
+    digits[n++] = (char) ('0' + digit);
+    if (i == 0) digits[n++] = '.';
+    x = 10.0 * (x - digit);
+  }
+  digits[n++] = 'e';
+  digits[n++] = exponent < 0 ? '-' : '+';
+  exponent = exponent < 0 ? -exponent : exponent;
+  for (int unit = exponent >= 100 ? 100 : 10; unit; unit /= 10)
+    digits[n++] = (char) ('0' + exponent / unit % 10);
+  digits[n] = 0;
+  jlaw_say_(text, digits);
+}
+
+/* ------------------------------------------------------------------------ the step */
+
+/* NaN, where the C library may have none */
+static JLAW_FUNCTION double jlaw_none_(void)
+{
+  const double zero = 0.0;
+  return zero / zero;
+}
+
+/* Phi and Phi' at one y */
+static JLAW_FUNCTION double jlaw_virgin_one_(const jlaw_law *law, double y, double *slope)
+{
+  jl_real_ forces, slopes;
+  jl_virgin_curve_(law, jl_resolved_(jl_each_(y)), &forces, &slopes, (jl_real_ *) 0);
+  *slope = JL_LANE_(slopes, 0);
+  return JL_LANE_(forces, 0);
+}
+
+static JLAW_FUNCTION double jlaw_of_facet_(const jlaw_law *law, int facet, int at)
+{
+  const int lane = facet % JLAW_LANES;
+  return law->facet[(facet - lane) * JLAW_COLUMNS + at * JLAW_LANES + lane];
+}
+
+#ifdef JOINTLAW_NO_LEDGER
+enum { JLAW_LEDGER = 0 };
+#else
+enum { JLAW_LEDGER = 1 };
+#endif
+
+JLAW_CLONES JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t stride,
+                                         const double *d, double *F, double *C)
+{
+  const jl_numbers_ n = {s, stride, 0};
+  double c[9];
+  jl_step_of_kind_(law, n, d, F, c, JLAW_LEDGER, C != NULL, 0);
+  for (int i = 0; C && i < law->dim * law->dim; i++) C[i] = c[i];
+}
+
+/* Whether all sliders hold forces that a law can have; not for NaN */
+static JLAW_FUNCTION int jlaw_sound_(const double *q, int n)
+{
+  double sum[4] = {0.0, 0.0, 0.0, 0.0};
+  int i = 0;
+  for (; i + 4 <= n; i += 4)
+    for (int l = 0; l < 4; l++) sum[l] += q[i + l] * q[i + l];
+  for (; i < n; i++) sum[0] += q[i] * q[i];
+  return (sum[0] + sum[1]) + (sum[2] + sum[3]) < 1e300;
+}
+
+/* Whether energies, flattened depths and slip of a state are numbers that a law can have */
+static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
+{
+  const double *rest = s + jl_rest_row_(law), *slip = s + jl_slip_row_(law);
+  int good = fabs(s[2 * law->dim - 1]) <= DBL_MAX;
+  for (int f = 0; law->yields && f < law->facets; f++)
+    good = good && rest[f] >= 0.0 && rest[f] <= law->largest_reach;
+  if (law->yields) good = good && fabs(rest[law->facets]) <= DBL_MAX;
+  if (law->wears) good = good && slip[0] >= 0.0 && slip[0] <= DBL_MAX;
+  if (law->wears) good = good && slip[1] >= 0.0 && slip[1] <= law->mu;
+  return good && jlaw_sound_(s + 2 * law->dim, jl_rest_row_(law) - 2 * law->dim);
+}
+
+static JLAW_FUNCTION int jlaw_refuse_(const jlaw_law *law, const double *s, const double *d,
+                                      int damaged, char *message, size_t size)
+{
+  jlaw_text_ text = {message, size, 0};
+  if (damaged) {
+    jlaw_say_(&text,
+              "the state holds numbers that are not finite or no forces of this law; nothing "
+              "was moved. Start from zeros or from a state that this law wrote");
+    return -1;
+  }
+  jlaw_say_(&text, "the step d = (");
+  int finite = 1;
+  for (int i = 0; i < law->dim; i++) {
+    jlaw_say_(&text, i ? ", " : "");
+    jlaw_say_number_(&text, d[i]);
+    finite = finite && fabs(d[i]) <= DBL_MAX;
+  }
+  if (!finite) {
+    jlaw_say_(&text,
+              ") m is not finite; nothing was moved. Look for the fault in the host's motion");
+    return -1;
+  }
+  jlaw_say_(&text, ") m leads from closure ");
+  jlaw_say_number_(&text, s[0]);
+  jlaw_say_(&text, " m beyond the reach of ");
+  jlaw_say_number_(&text, law->largest_reach);
+  jlaw_say_(&text, " m, where forces overflow; nothing was moved. Take a smaller step");
+  return -1;
+}
+
+JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1, const double *d,
+                              double *F, double *C, char *message, size_t size)
+{
+  const int dim = law->dim, rows = jl_state_rows_(law);
+  double far = 0.0, step_size = 0.0; /* NaN stays in sums */
+  for (int i = 0; i < 2 * dim - 1; i++) far += fabs(s0[i]);
+  for (int i = 0; i < dim; i++) step_size += fabs(d[i]);
+  const double reach = law->stretch * (far + step_size);
+  const int damaged = !(far <= DBL_MAX) || !jlaw_proper_(law, s0);
+  if (damaged || !(reach <= law->largest_reach))
+    return jlaw_refuse_(law, s0, d, damaged, message, size);
+  if (s1 != s0)
+    for (int i = 0; i < rows; i++) s1[i] = s0[i];
+  jlaw_step(law, s1, 1, d, F, C);
+  return 0;
+}
+
+/* ------------------------------------------------------------ what a state is */
+
+JLAW_FUNCTION int jlaw_dim(const jlaw_law *law) { return law->dim; }
+JLAW_FUNCTION int jlaw_state_size(const jlaw_law *law) { return jl_state_rows_(law); }
+JLAW_FUNCTION const char *jlaw_fingerprint(const jlaw_law *law) { return law->fingerprint; }
+JLAW_FUNCTION double jlaw_dissipated(const jlaw_law *law, const double *s)
+{
+  return s[2 * law->dim - 1];
+}
+
+JLAW_CLONES static JLAW_FUNCTION jl_amounts_ jlaw_measure_(const jlaw_law *law, const double *s)
+{
+  const jl_numbers_ n = {(double *) s, 1, 0}; /* only read */
+  return jl_measure_(law, n);
+}
+
+JLAW_FUNCTION double jlaw_stored(const jlaw_law *law, const double *s)
+{
+  const jl_amounts_ all = jlaw_measure_(law, s);
+  return all.normal + all.sheared;
+}
+
+JLAW_FUNCTION void jlaw_shares(const jlaw_law *law, const double *s, double shares[3])
+{
+  const jl_amounts_ all = jlaw_measure_(law, s);
+  shares[0] = all.sliding;
+  shares[1] = all.slipping;
+  shares[2] = all.separated;
+}
+
+/* ------------------------------------------------------------ unsheared joint */
+
+JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure)
+{
+  double slope, late = 0.0;
+  if (!(closure <= law->largest_reach)) return jlaw_none_();
+  for (int f = 0; law->yields && f < law->facets; f++) /* what yielding takes off first loading */
+    for (int i = JLAW_LATE; i < JLAW_LATE + 4; i += 2) {
+      const double depth = jlaw_of_facet_(law, f, i + 1);
+      late += jlaw_of_facet_(law, f, i) * jlaw_virgin_one_(law, closure - depth, &slope);
+    }
+  return law->closure_factor * jlaw_virgin_one_(law, closure, &slope) - late;
+}
+
+JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure)
+{
+  double slope;
+  if (!(closure <= law->largest_reach)) return jlaw_none_();
+  jlaw_virgin_one_(law, closure, &slope);
+  return law->stiffness_factor * slope;
+}
+
+JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
+{
+  double low = 0.0, high = law->farthest;
+  if (!(normal_stress >= 0.0) || !(jlaw_normal_stress(law, high) >= normal_stress))
+    return jlaw_none_();
+  while (1) { /* the stress rises: halve the exponent first, then the number */
+    const double middle =
+        high > 4.0 * low && high > 1e-300 ? sqrt(high * fmax(low, 1e-300)) : 0.5 * (low + high);
+    if (!(middle > low && middle < high)) return low == 0.0 ? 0.0 : high;
+    if (jlaw_normal_stress(law, middle) < normal_stress) low = middle;
+    else high = middle;
+  }
+}
+
+/* --------------------------------------------------------------- turned axes */
+
+JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s)
+{
+  const int dim = law->dim, D = law->cells, M = law->facets;
+  for (int i = 1; i < 2 * dim - 1; i += dim - 1) s[i] = -s[i]; /* shear and offset along axis 2 */
+  double *qs = s + 2 * dim, *qt = qs + M * D, *depth = qt + M * D;
+  for (int f = 0; f < M; f++) {
+    const int other = (int) jlaw_of_facet_(law, f, JLAW_MIRROR);
+    for (int i = 0; i < D; i++) {
+      const double here = qs[f * D + i], turned = qt[f * D + i];
+      if (other > f) {
+        qs[f * D + i] = qs[other * D + i], qt[f * D + i] = -qt[other * D + i];
+        qs[other * D + i] = here, qt[other * D + i] = -turned;
+      } else if (other == f) qt[f * D + i] = -turned; /* t changes its sense in the mirror */
+    }
+    if (law->yields && other > f) {
+      const double here = depth[f];
+      depth[f] = depth[other], depth[other] = here;
+    }
+  }
+}
+
+/* Numbers of a ring of n facets, read at azimuths turned by the angle: the trigonometric
+ * interpolation of n (even) places, or the straight one, which makes no new extremes */
+static JLAW_FUNCTION void jlaw_turn_(double *x, int n, int jl_step_, double angle, int straight)
+{
+  double old[JLAW_AZIMUTHS];
+  const double pi = 3.14159265358979323846;
+  for (int j = 0; j < n; j++) old[j] = x[j * jl_step_], x[j * jl_step_] = 0.0;
+  for (int j = 0; j < n; j++)
+    for (int k = 0; k < n; k++) {
+      const double way = remainder(angle + 2.0 * pi * (j - k) / n, 2.0 * pi), half = sin(0.5 * way);
+      double weight = 1.0;
+      if (straight) weight = fmax(1.0 - fabs(way) * n / (2.0 * pi), 0.0);
+      else if (fabs(half) > 1e-9) weight = sin(0.5 * n * way) * cos(0.5 * way) / (n * half);
+      x[j * jl_step_] += weight * old[k];
+    }
+}
+
+/* Brings sliders beyond their friction limit back to it */
+static JLAW_FUNCTION void jlaw_hold_(const jlaw_law *law, double *s)
+{
+  const jl_numbers_ n = {s, 1, 0};
+  const int M = law->facets, D = law->cells;
+  const double worn = jl_worn_now_(law, n);
+  for (int at = 0; at < M; at += JL_TOGETHER_) {
+    const int some = M - at < JL_TOGETHER_ ? M - at : JL_TOGETHER_;
+    const double *cell = jl_cell_of_(law, at);
+    jl_facets_ o;
+    jl_facets_now_(law, n, at, &o);
+    for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_LANES) {
+      const int row = 2 * law->dim + at * D + i;
+      jl_real_ G, kappa, qs = jl_take_(n, row, D, some), qt = jl_take_(n, row + M * D, D, some);
+      jl_cell_now_(cell, &o, law->yields, &G, &kappa);
+      const jl_real_ cap = jl_column_(jl_facet_of_(law, at), JLAW_STRENGTH) * worn * G;
+      const jl_real_ size = jl_root_(qs * qs + qt * qt);
+      const jl_yes_ beyond = size > cap;
+      const jl_real_ share = jl_pick_(beyond, cap / jl_pick_(beyond, size, 1.0), 1.0);
+      jl_put_(n, row, D, some, qs * share);
+      jl_put_(n, row + M * D, D, some, qt * share);
+    }
+  }
+}
+
+JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle)
+{
+  const int dim = law->dim, D = law->cells, M = law->facets;
+  const double before = jlaw_measure_(law, s).sheared, c = cos(angle), d = sin(angle);
+  double *q = s + 2 * dim, *depth = s + jl_rest_row_(law);
+  if (dim == 2 && c < 0.0) jlaw_swap_bodies(law, s); /* the axis changes its sense */
+  if (dim != 3) return;
+  for (int i = 1; i <= 3; i += 2) { /* shear and offset */
+    const double along = s[i], across = s[i + 1];
+    s[i] = c * along + d * across, s[i + 1] = c * across - d * along;
+  }
+  for (int f = 0, n; f < M; f += n) { /* rings */
+    n = (int) jlaw_of_facet_(law, f, JLAW_RING);
+    for (int i = 0; i < D; i++) {
+      jlaw_turn_(q + f * D + i, n, D, angle, 0);
+      jlaw_turn_(q + (M + f) * D + i, n, D, angle, 0);
+    }
+    if (law->yields) jlaw_turn_(depth + f, n, 1, angle, 1);
+  }
+  jlaw_hold_(law, s);
+  const double after = jlaw_measure_(law, s).sheared;
+  if (after > before) /* sliders gain nothing */
+    for (int i = 0; i < 2 * M * D; i++) q[i] *= sqrt(before / after);
+  else s[5] += before - after;
+}
+
+/* ------------------------------------------------------------- table files */
+#ifndef JOINTLAW_NO_FILES
+
+#define JLAW_LONGEST ((size_t) 1 << 28) /* bytes of a table file: those of a law have 1e5 to 1e7 */
+
+/* The bytes of a file and a zero; NULL if it cannot be read */
+static char *jlaw_load_(const char *file, size_t *length)
+{
+  FILE *stream = fopen(file, "rb");
+  char *bytes = NULL, *more;
+  size_t room = 0, n = 0;
+  if (!stream) return NULL;
+  for (int open = 1; open && n < JLAW_LONGEST;) {
+    if (n + 1 >= room) {
+      room = room ? 2 * room : (size_t) 1 << 17;
+      more = (char *) realloc(bytes, room);
+      if (!more) break;
+      bytes = more;
+    }
+    const size_t got = fread(bytes + n, 1, room - n - 1, stream);
+    open = got > 0;
+    n += got;
+  }
+  if (ferror(stream) || !bytes) {
+    free(bytes);
+    bytes = NULL;
+  } else bytes[n] = 0;
+  fclose(stream);
+  *length = n;
+  return bytes;
+}
+
+/* FNV-1a of 64 bits, without carriage returns: any other change of one byte changes it */
+static unsigned long long jlaw_sum_of_(const char *bytes, const char *end)
+{
+  unsigned long long sum = 0xCBF29CE484222325ULL;
+  for (; bytes < end; bytes++)
+    if (*bytes != '\r') sum = (sum ^ (unsigned char) *bytes) * 0x100000001B3ULL;
+  return sum;
+}
+
+static int jlaw_hex_(char c)
+{
+  return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
+}
+
+/* Past blanks and lines that begin with # */
+static const char *jlaw_skip_(const char *at)
+{
+  while (*at == ' ' || *at == '\n' || *at == '\r' || *at == '#')
+    if (*at++ == '#')
+      while (*at && *at != '\n') at++;
+  return at;
+}
+
+/* Reads a word into `word`; empty if there is none or it is too long */
+static const char *jlaw_word_(const char *at, char *word, size_t room)
+{
+  size_t n = 0;
+  for (at = jlaw_skip_(at); *at > ' ' && n + 1 < room; at++) word[n++] = *at;
+  word[*at > ' ' ? 0 : n] = 0;
+  return at;
+}
+
+/* Reads a whole number, or a hexadecimal float as Python's float.hex writes it; NULL if neither.
+ * No locale, no rounding. */
+static const char *jlaw_number_(const char *at, double *number)
+{
+  at = jlaw_skip_(at);
+  const int negative = *at == '-';
+  at += negative;
+  const int hex = at[0] == '0' && at[1] == 'x';
+  unsigned long long digits = 0;
+  int count = 0, places = 0, point = 0, power = 0;
+  at += hex ? 2 : 0;
+  for (; jlaw_hex_(*at) >= 0 || (*at == '.' && hex && !point); at++) {
+    if (*at == '.') {
+      point = 1;
+      continue;
+    }
+    const int digit = jlaw_hex_(*at);
+    if (++count > 15 || (!hex && digit > 9)) return NULL;
+    digits = digits * (hex ? 16u : 10u) + (unsigned) digit;
+    places += point;
+  }
+  if (hex && *at == 'p') {
+    const int down = *++at == '-';
+    int n = 0;
+    at += *at == '-' || *at == '+';
+    for (; *at >= '0' && *at <= '9' && n < 5; at++, n++) power = 10 * power + (*at - '0');
+    if (n == 0) return NULL;
+    power = down ? -power : power;
+  }
+  if (count == 0 || *at > ' ') return NULL;
+  *number = ldexp((double) digits, power - 4 * places);
+  if (negative) *number = -*number;
+  return fabs(*number) <= DBL_MAX ? at : NULL;
+}
+
+/* Reads all numbers into law; NULL or what is wrong */
+static const char *jlaw_parse_numbers_(const char **at, jlaw_law *law)
+{
+#define X(name, jl_whole_, least, most) {#name, offsetof(jlaw_law, name), jl_whole_, least, most},
+  static const struct {
+    const char *name;
+    size_t place;
+    int is_whole;
+    double least, most;
+  } keys[] = {JLAW_NUMBERS(X)};
+#undef X
+  char word[sizeof law->fingerprint];
+  for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
+    double number;
+    char *to = (char *) law + keys[i].place;
+    *at = jlaw_word_(*at, word, sizeof word);
+    if (strcmp(word, keys[i].name)) return "a keyword is missing, unknown or not in its place";
+    *at = jlaw_number_(*at, &number);
+    if (!*at || !(number >= keys[i].least && number <= keys[i].most))
+      return "a parameter is no number or out of its bounds";
+    const int whole_number = (int) (keys[i].is_whole ? number : 0.0);
+    if (keys[i].is_whole) memcpy(to, &whole_number, sizeof whole_number);
+    else memcpy(to, &number, sizeof number);
+  }
+  return NULL;
+}
+
+/* Reads the text of a table file into law; NULL or what is wrong */
+static const char *jlaw_parse_(const char *at, jlaw_law *law, size_t length)
+{
+  char word[sizeof law->fingerprint];
+  at = jlaw_word_(at, word, sizeof word);
+  if (strcmp(word, "fingerprint")) return "it does not tell its fingerprint";
+  at = jlaw_word_(at, law->fingerprint, sizeof law->fingerprint);
+  const char *wrong = jlaw_parse_numbers_(&at, law);
+  if (wrong) return wrong;
+  const size_t blocks = (size_t) (law->facets + JLAW_LANES - 1) / JLAW_LANES;
+  const char *words[4] = {"facet", "depth", "curve", "energy"};
+  const size_t sizes[4] = {blocks * JLAW_COLUMNS * JLAW_LANES,
+                           blocks * (size_t) law->cells * JLAW_ROWS * JLAW_LANES,
+                           4 * (size_t) law->pieces, 4 * (size_t) law->pieces};
+  const size_t all = sizes[0] + sizes[1] + sizes[2] + sizes[3];
+  if (all > length / 2) return "its sizes do not fit one another";
+  double *to = law->own = (double *) malloc(all * sizeof *law->own);
+  if (!to) return "there is no memory for it";
+  for (int i = 0; i < 4; i++) {
+    at = jlaw_word_(at, word, sizeof word);
+    if (strcmp(word, words[i])) return "a table is missing, too short or too long";
+    for (size_t n = 0; n < sizes[i]; n++, to++)
+      if (!(at = jlaw_number_(at, to))) return "a table holds what is no number";
+  }
+  law->facet = law->own, law->depth = law->facet + sizes[0];
+  law->curve = law->depth + sizes[1], law->energy = law->curve + sizes[2];
+  for (size_t n = 0; n < sizes[0]; n++) { /* A and what follows it are no less than zero */
+    const size_t which = n / JLAW_LANES % JLAW_COLUMNS;
+    if ((which >= JLAW_A && !(law->facet[n] >= 0.0))
+        || (which == JLAW_MIRROR && !(law->facet[n] < law->facets)))
+      return "a facet is out of bounds";
+  }
+  for (int f = 0; f < law->facets;) {
+    const double ring = jlaw_of_facet_(law, f, JLAW_RING);
+    if (!(ring >= 1.0 && ring <= (double) JLAW_AZIMUTHS && ring <= law->facets - f))
+      return "a ring of facets is out of bounds";
+    f += (int) ring;
+  }
+  return *jlaw_skip_(at) ? "something follows the last table" : NULL;
+}
+
+static const char *jlaw_check_(char *bytes, size_t length, jlaw_law *law)
+{
+  static const char magic[] = "jointlaw tables ";
+  const char *at = bytes + sizeof magic - 1;
+  double version;
+  if (strncmp(bytes, magic, sizeof magic - 1)) return "it is no table file of jointlaw";
+  at = jlaw_number_(at, &version);
+  if (!at || version != JLAW_FORMAT)
+    return "it is of another version than this jointlaw.h; export law and header anew, together";
+  char *end = bytes + length, word[20];
+  while (end > bytes && end[-1] <= ' ' && end[-1] >= 0) end--;
+  while (end > bytes && end[-1] != '\n') end--; /* to the last line */
+  const char *sum = jlaw_word_(jlaw_word_(end, word, sizeof word), word, sizeof word);
+  unsigned long long told = 0;
+  for (int i = 0; i < 16; i++) {
+    if (jlaw_hex_(word[i]) < 0) return "it ends too early: copy it again, whole";
+    told = 16 * told + (unsigned) jlaw_hex_(word[i]);
+  }
+  if (strncmp(end, "sum ", 4) || word[16] || *jlaw_skip_(sum))
+    return "it ends too early: copy it again, whole";
+  if (told != jlaw_sum_of_(bytes, end)) return "it is damaged: its sum is wrong; export it again";
+  *end = 0;
+  return jlaw_parse_(at, law, length);
+}
+
+jlaw_law *jlaw_read(const char *file, char *message, size_t size)
+{
+  jlaw_text_ text = {message, size, 0};
+  size_t length = 0;
+  const char *wrong = "it cannot be read";
+  char *bytes = jlaw_load_(file, &length);
+  jlaw_law *law = (jlaw_law *) calloc(1, sizeof *law);
+  if (bytes && law) wrong = jlaw_check_(bytes, length, law);
+  free(bytes);
+  if (!wrong) return law;
+  jlaw_free(law);
+  jlaw_say_(&text, file);
+  jlaw_say_(&text, ": ");
+  jlaw_say_(&text, wrong);
+  return NULL;
+}
+
+void jlaw_free(jlaw_law *law)
+{
+  if (law) free(law->own);
+  free(law);
+}
+
+#endif
+
+#if defined(__GNUC__) && !defined(__clang__) && !defined(__CUDACC__)
+#pragma GCC pop_options
+#endif
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,83 @@
+/* Made from layout.py by `python -m jointlaw.native`; change it there. */
+#define JLAW_FORMAT 3 /* of table files */
+enum {
+  JLAW_LANES = 4, /* facets side by side in a block of the tables */
+  JLAW_AZIMUTHS = 512, /* most */
+  JLAW_M = 0, /* m = n/c1: y = m . (closure, offset) */
+  JLAW_S = 3, /* in-facet direction s */
+  JLAW_T = 6, /* in-facet direction t */
+  JLAW_N = 9, /* normal n */
+  JLAW_A = 12, /* A */
+  JLAW_STIFF = 13, /* A/c1 */
+  JLAW_STRENGTH = 14, /* mu lam A */
+  JLAW_COMPLIANCE = 15, /* c1/(2 A lam): from |q|^2/kappa to energy */
+  JLAW_POTENTIAL = 16, /* A c1 */
+  JLAW_SHARE = 17, /* of all orientations */
+  JLAW_YIELD = 18, /* y_p = d_y/c1 */
+  JLAW_MIRROR = 19, /* the facet mirrored along axis 2 */
+  JLAW_RING = 20, /* facets of this inclination, one after the other */
+  JLAW_LATE = 21, /* unsheared joint: share, depth, share, depth of what yielding takes off */
+  JLAW_COLUMNS = 25, /* of a facet */
+  JLAW_LOW = 0, /* zeta at its begin */
+  JLAW_FORCE = 1, /* Phi there */
+  JLAW_SLOPE = 2, /* Phi' there */
+  JLAW_HIGH = 3, /* zeta at its end */
+  JLAW_G = 4, /* G there */
+  JLAW_KAPPA = 5, /* kappa there */
+  JLAW_ROWS = 6 /* of a depth cell */
+};
+#define JLAW_UNDERFLOW 1e-140
+#define JLAW_TINY 1e-290
+#define JLAW_FAINT 1e-150
+#define JLAW_NEAR 1e-05
+#define JLAW_LIMIT 1e-09
+#define JLAW_ROUNDED 1e-12
+#define JLAW_GRAZING 1e-12
+struct jlaw_law {
+  int dim; /* components of a displacement */
+  int facets; /* M */
+  int cells; /* D, depth cells of a facet */
+  int pieces; /* of the virgin curve */
+  int yields; /* whether asperities yield */
+  int wears; /* whether mu falls with slip */
+  double soft; /* 1/lam */
+  double mu; /* of unworn asperities */
+  double mu_residual; /* of asperities that are worn */
+  double wear_slip; /* m: slip that wears */
+  double critical_slip; /* m; infinite: the largest float */
+  double eta; /* exponent of the virgin curve */
+  double scale; /* V of the virgin curve, m^(1/2) */
+  double rise; /* p: the curve is tabulated over w^p */
+  double closure_factor; /* normal stress over Phi */
+  double stiffness_factor; /* bound of |C| over Phi' */
+  double largest_reach; /* m: bound of |y| */
+  double stretch; /* bound of |y| over that of the displacement */
+  double farthest; /* m: largest closure that a stress is looked for in */
+  const double *facet; /* (blocks, JLAW_COLUMNS, JLAW_LANES), zeros beyond the last facet */
+  const double *depth; /* (blocks, cells, JLAW_ROWS, JLAW_LANES) */
+  const double *curve; /* (pieces, 4): S of the virgin curve */
+  const double *energy; /* (pieces, 4): T */
+  double *own; /* what jlaw_free frees */
+  char fingerprint[80];
+};
+/* Each number of a table file: its name, 1 if it is whole, its bounds */
+#define JLAW_NUMBERS(X) \
+  X(dim, 1, 1, 3) \
+  X(facets, 1, 1, 1e6) \
+  X(cells, 1, 1, 1e6) \
+  X(pieces, 1, 1, 1e6) \
+  X(yields, 1, 0, 1) \
+  X(wears, 1, 0, 1) \
+  X(soft, 0, 0, DBL_MAX) \
+  X(mu, 0, 0, DBL_MAX) \
+  X(mu_residual, 0, 0, DBL_MAX) \
+  X(wear_slip, 0, DBL_MIN, DBL_MAX) \
+  X(critical_slip, 0, JLAW_UNDERFLOW, DBL_MAX) \
+  X(eta, 0, 0, DBL_MAX) \
+  X(scale, 0, DBL_MIN, DBL_MAX) \
+  X(rise, 0, 0, DBL_MAX) \
+  X(closure_factor, 0, 0, DBL_MAX) \
+  X(stiffness_factor, 0, 0, DBL_MAX) \
+  X(largest_reach, 0, 0, DBL_MAX) \
+  X(stretch, 0, 1, DBL_MAX) \
+  X(farthest, 0, 0, DBL_MAX)

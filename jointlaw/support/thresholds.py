@@ -1,0 +1,9 @@
+"""Thresholds of the step, the same in every kernel; native/layout.py writes them into C."""
+
+UNDERFLOW = 1e-140  # m, and Pa/m: counts as zero, for powers and squares below it underflow
+TINY = 1e-290  # a stiffness whose reciprocal might overflow, or a square that underflows: zero
+FAINT = 1e-150  # a product of two stiffnesses, likewise
+NEAR = 1e-5  # of y: below such a change of y the chord of G is lost in rounding, the mean is not
+LIMIT = 1e-9  # of the friction limit: a slider this close is at it, less the rounding of q
+ROUNDED = 1e-12  # of Phi and of y: as much may be lost in a G next to a node, and in dy
+GRAZING = 1e-12  # cosine at which the offset meets its limit: its derivative has a pole at 0

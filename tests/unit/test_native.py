@@ -1,0 +1,177 @@
+"""The library of the compiled law: how it is made, found and refused, and its bits."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+from jointlaw.kernels import engine, reference
+from jointlaw.native import build, layout, library
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "hosts"))
+from c_host import random_law, random_path
+
+SAME, SAME_C = 1e-12, 1e-10  # of the largest on the path; q of a slider carries three times as much
+LINES = 1800  # of C that is written by hand
+SEEDS = (3, 7, 10, 14, 20)  # space and planes, critical slip, yielding, wear, both
+
+
+@pytest.fixture(autouse=True)
+def native(monkeypatch):
+    monkeypatch.setenv("JOINTLAW_KERNEL", "native")
+
+
+def test_headers_are_made_of_what_lies_beside_them():
+    for name, text in layout.made().items():
+        written = (layout.HERE / name).read_text(encoding="utf-8")
+        assert written == text, f"{name}: run `python -m jointlaw.native`"
+
+
+def test_the_text_is_short():
+    by_hand = {p for p in layout.HERE.glob("*.[ch]") if p.name not in layout.made()}
+    assert sum(p.read_text(encoding="utf-8").count("\n") for p in by_hand) <= LINES
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(200))
+def test_same_numbers_on_random_laws_and_paths(seed):
+    """A joint alone, and the same as the last of a batch, against `reference.step`."""
+    law = random_law(seed)
+    k, dim = law.tables, law.dim
+    batch, joint, state = law.joints(9), law.joint(), np.zeros((k.rows, 1))
+    off, peak = np.zeros(4), np.full(4, 1e-300)
+    for d in random_path(dim, seed):
+        state, F, C = reference.step(k, state, d[:, None], True)
+        F_alone, C_alone = joint.update(d)
+        others = np.random.default_rng(0).normal(0.0, 1e-7, (8, dim))
+        F_last, C_last = batch.update(np.vstack([others, d]))
+        np.testing.assert_array_equal(F_last[-1], F_alone)
+        np.testing.assert_array_equal(C_last[-1], C_alone)
+        mine, one, other = (
+            joint.snapshot().values[0],
+            joint.measures(),
+            reference.measures(k, state),
+        )
+        pairs = [
+            (F[:, 0], F_alone), (C[..., 0], C_alone), (state[2 * dim :, 0], mine[2 * dim :]),
+            ([other.stored[0], state[2 * dim - 1, 0]], [one.stored, mine[2 * dim - 1]]),
+        ]  # fmt: skip
+        off = np.maximum(off, [np.abs(np.subtract(a, b)).max() for a, b in pairs])
+        peak = np.maximum(peak, [np.abs(a).max() for a, _ in pairs])
+        assert np.ravel(one[:3]) == pytest.approx(np.ravel(other[:3]), abs=1e-9)
+    assert (off < np.array([SAME, SAME_C, 3 * SAME, SAME]) * peak).all(), off / peak
+
+
+def numbers(law, seed, lanes=None):
+    """All that a batch gives along a path, by vectors of so many lanes."""
+    batch, given = law.joints(19), []
+    if lanes is not None:
+        batch._engine.lanes = lanes
+    steps = [random_path(law.dim, seed + 1000 * k, 25) for k in range(19)]
+    for d in np.stack(steps, axis=1):
+        given += batch.update(d)
+    return [*given, batch.snapshot().values, *batch.measures()]
+
+
+@pytest.fixture
+def engines_anew():
+    """Engines of one test are not those of others."""
+    engine._engine.cache_clear()
+    yield
+    engine._engine.cache_clear()
+    engine._warn_once.cache_clear()
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_same_bits_by_vectors_of_any_width(engines_anew, seed):
+    law = random_law(seed)
+    widest = library.load().jlaw_lanes()
+    for lanes in [lanes for lanes in build.LEVELS if lanes < widest]:
+        for one, other in zip(numbers(law, seed), numbers(law, seed, lanes), strict=True):
+            np.testing.assert_array_equal(one, other)
+        law.joints(1)._engine.lanes = widest
+
+
+COMPILERS = {
+    "gcc": ("gcc",),
+    "gcc -O2": ("gcc", "-O2"),
+    "g++": ("g++", "-x", "c++", "-fno-exceptions"),
+    "clang": ("clang",),
+    "clang -O2": ("clang", "-O2"),
+    "zig": build.zig().command,
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", COMPILERS)
+def test_same_bits_by_every_compiler(engines_anew, monkeypatch, tmp_path, name):
+    compiler = build.Compiler(COMPILERS[name])
+    if not build.works(compiler):
+        pytest.skip(f"{name} does not work here")
+    if "-O2" in compiler.command:  # the last of two counts
+        monkeypatch.setattr(build, "FLAGS", (*build.FLAGS, "-O2"))
+    laws = {seed: random_law(seed) for seed in SEEDS}
+    first = {seed: numbers(law, seed) for seed, law in laws.items()}
+    loaded = library.load_file(build.build(compiler, tmp_path))
+    monkeypatch.setattr(library, "load", lambda: loaded)
+    engine._engine.cache_clear()
+    for seed, law in laws.items():
+        for one, other in zip(first[seed], numbers(law, seed), strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+def test_a_library_of_other_sources_is_refused(monkeypatch):
+    path = layout.HERE / build.library_name(build.Compiler(()).machine[1])
+    monkeypatch.setattr(build, "sources", lambda: "0" * 16)
+    with pytest.raises(library.StaleLibraryError, match=r"python -m jointlaw\.native"):
+        library.load_file(path)
+
+
+def test_without_a_library_numpy_remains_and_that_is_said_once(engines_anew, monkeypatch, recwarn):
+    monkeypatch.setattr(library, "load", lambda: None)
+    law = jl.presets.load("westerly-smooth")
+    with pytest.raises(ImportError, match="ziglang"):
+        law.joint()
+    monkeypatch.delenv("JOINTLAW_KERNEL")
+    assert [law.joint().kernel, jl.presets.load("linear-a3").joint().kernel] == ["numpy", "numpy"]
+    said = [str(warning.message) for warning in recwarn]
+    assert len(said) == 1
+    assert "install a C compiler" in said[0]
+    assert "\n" not in said[0]
+
+
+def test_a_compiler_that_is_there_may_be_a_stub(monkeypatch, tmp_path):
+    for name in ("clang", "g++", "gcc", "cc"):
+        (tmp_path / name).write_text("#!/bin/sh\nexit 0\n")  # makes nothing, and says it did
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert len(build.installed()) == 4
+    assert not any(map(build.works, build.installed()))
+
+
+@pytest.mark.slow
+def test_the_source_archive_holds_the_backend_and_the_text(tmp_path):
+    root = Path(jl.__file__).parents[1]
+    if not (root / "pyproject.toml").exists() or shutil.which("git") is None:
+        pytest.skip("not a checkout")
+    names = subprocess.run(
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard", "jointlaw", "dem_demo",
+         "builder", "pyproject.toml", "MANIFEST.in", "README.md", "LICENSE"],
+        cwd=root, capture_output=True, text=True, check=True,
+    ).stdout.splitlines()  # fmt: skip
+    for name in names:
+        if (root / name).exists():
+            (tmp_path / "src" / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(root / name, tmp_path / "src" / name)
+    code = "import sys; sys.path.insert(0, 'builder'); import backend; backend.build_sdist('..')"
+    subprocess.run([sys.executable, "-c", code], cwd=tmp_path / "src", check=True,
+                   capture_output=True)  # fmt: skip
+    (archive,) = tmp_path.glob("*.tar.gz")
+    listing = subprocess.run(["tar", "tf", archive], capture_output=True, text=True).stdout
+    for name in ("builder/backend.py", *(f"jointlaw/native/{name}" for name in build.SOURCES)):
+        assert f"/{name}\n" in listing
+    assert "libjointlaw" not in listing

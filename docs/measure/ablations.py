@@ -17,8 +17,6 @@ SCENES = sorted(path.stem.partition("-")[2] for path in DATA.glob("ablation-*.cs
 HEAD = ["change", "scenes", "slip or peak angle (deg)", "work of friction",
         "distance of the ends (mm)", "other results", "time"]  # fmt: skip
 MACHINE = "time_step_s", "cpu_s"  # columns of an ablation that docs/data leaves out
-# The first and the last take up to 35 and 8 times the time of a scene
-LEFT_OUT = "resolution reference", "resolution balanced", "not seated"
 UNTIL = {"stack": 0.5, "slope": 0.5, "slope-azimuth": 0.6, "arch": 0.4}  # s
 
 
@@ -36,7 +34,7 @@ def ablate(scene):
     """Write the file of a scene without each of its ingredients in turn, to four digits."""
     with tempfile.TemporaryDirectory() as folder:
         until = ("--until", str(UNTIL[scene])) if scene in UNTIL else ()
-        run("-m", "dem_demo", "ablate", scene, *until, "--out", folder, "--leave-out", *LEFT_OUT)
+        run("-m", "dem_demo", "ablate", scene, *until, "--out", folder)
         rows = load(Path(folder) / "ablation.csv")
     rows = [{key: four(cell) for key, cell in row.items() if key not in MACHINE} for row in rows]
     with data_of(scene).open("w", newline="", encoding="utf-8") as stream:

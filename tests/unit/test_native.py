@@ -66,6 +66,23 @@ def test_same_numbers_on_random_laws_and_paths(seed):
     assert (off < np.array([SAME, SAME_C, 3 * SAME, SAME]) * peak).all(), off / peak
 
 
+def test_facets_that_shear_does_not_move():
+    """At a right angle to the shear only rounding tells which of two opposite facets yields."""
+    law = jl.JointLaw(
+        orientation=jl.Orientation(2.0), asperity_density=1e10, closure_range=2e-6, plane=0.7,
+        asperity=jl.Asperity(2e8, 1.2, 0.5, 0.3, yield_interference=6e-7), critical_slip=5e-6,
+        heights=jl.GammaHeights(3.0, 1e-6, 1e-6, "individual"), resolution=jl.Resolution(3, 6, 3),
+    )  # fmt: skip
+    joint, state = law.joint(), np.zeros((law.state_size, 1))
+    steps = np.random.default_rng(7).normal(0.0, 1.2e-6, (4, 2))
+    steps[:, 0] = np.abs(steps[:, 0])
+    for d in [*steps, [0.0, 4e-7], [0.0, 4e-7]]:
+        state, _, C = reference.step(law.tables, state, np.array(d)[:, None], True)
+        mine = joint.update(d)[1]
+        assert np.abs(mine - C[..., 0]).max() < SAME_C * np.abs(C).max()
+    assert joint.dissipated_energy == pytest.approx(state[3, 0], rel=SAME)
+
+
 def numbers(law, seed, lanes=None):
     """All that a batch gives along a path, by vectors of so many lanes."""
     batch, given = law.joints(19), []

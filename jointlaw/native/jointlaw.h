@@ -256,8 +256,7 @@ extern "C" {
 typedef double jl_real_;
 typedef int jl_yes_, jl_whole_;
 #define JL_LANE_(x, l) (x)
-#define JL_LIST_(of) of(0) /* a vector of of(0), of(1) and so on */
-#define jl_each_(x) (x)    /* the number x in all lanes */
+#define jl_each_(x) (x) /* the number x in all lanes */
 #define jl_pick_(m, a, b) ((m) ? (a) : (b))
 #define jl_only_(m, a) ((m) ? (a) : 0.0)
 #define jl_any_(m) (m)
@@ -271,13 +270,6 @@ typedef double jl_loose_ __attribute__((vector_size(8 * JL_W_), aligned(8), may_
 typedef long long jl_yes_ __attribute__((vector_size(8 * JL_W_)));
 typedef int jl_whole_ __attribute__((vector_size(4 * JL_W_)));
 #define JL_LANE_(x, l) ((x)[l])
-#if JL_W_ == 2
-#define JL_LIST_(of) {of(0), of(1)}
-#elif JL_W_ == 4
-#define JL_LIST_(of) {of(0), of(1), of(2), of(3)}
-#else
-#define JL_LIST_(of) {of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7)}
-#endif
 #define jl_to_whole_(x) __builtin_convertvector(x, jl_whole_)
 #define jl_to_real_(i) __builtin_convertvector(i, jl_real_)
 #ifdef __cplusplus /* "less zero" costs nothing: the compiler leaves it out */
@@ -395,7 +387,7 @@ JL_IN_ jl_real_ jl_take_(jl_numbers_ n, int row, int apart, int some)
 {
   const int last = (some - 1) * apart;
 #define JL_OF_(l) n.s[(size_t) (row + ((l) < some ? (l) * apart : last)) * n.stride]
-  const jl_real_ x = JL_LIST_(JL_OF_);
+  const jl_real_ x = {JL_OF_(0), JL_OF_(1), JL_OF_(2), JL_OF_(3)};
 #undef JL_OF_
   return x;
 }

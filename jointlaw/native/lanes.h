@@ -28,8 +28,7 @@
 typedef double real;
 typedef int yes, whole;
 #define LANE(x, l) (x)
-#define LIST(of) of(0) /* a vector of of(0), of(1) and so on */
-#define each(x) (x)    /* the number x in all lanes */
+#define each(x) (x) /* the number x in all lanes */
 #define pick(m, a, b) ((m) ? (a) : (b))
 #define only(m, a) ((m) ? (a) : 0.0)
 #define any(m) (m)
@@ -43,13 +42,6 @@ typedef double loose __attribute__((vector_size(8 * W), aligned(8), may_alias));
 typedef long long yes __attribute__((vector_size(8 * W)));
 typedef int whole __attribute__((vector_size(4 * W)));
 #define LANE(x, l) ((x)[l])
-#if W == 2
-#define LIST(of) {of(0), of(1)}
-#elif W == 4
-#define LIST(of) {of(0), of(1), of(2), of(3)}
-#else
-#define LIST(of) {of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7)}
-#endif
 #define to_whole(x) __builtin_convertvector(x, whole)
 #define to_real(i) __builtin_convertvector(i, real)
 #ifdef __cplusplus /* "less zero" costs nothing: the compiler leaves it out */
@@ -167,7 +159,7 @@ IN real take(numbers n, int row, int apart, int some)
 {
   const int last = (some - 1) * apart;
 #define OF(l) n.s[(size_t) (row + ((l) < some ? (l) * apart : last)) * n.stride]
-  const real x = LIST(OF);
+  const real x = {OF(0), OF(1), OF(2), OF(3)};
 #undef OF
   return x;
 }

@@ -1,6 +1,5 @@
-"""The law in C gives the numbers of the readable kernel, for laws and paths of every kind."""
+"""The law in C gives the bits of the law in Python, and turns the axes of a joint."""
 
-import os
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -14,14 +13,9 @@ from jointlaw.kernels import reference
 sys.path.insert(0, str(Path(__file__).parent))
 from c_host import FAST, CLaw, at, library, random_law, random_path
 
-SAME, SAME_C = 1e-12, 1e-10  # of the largest on the path, as promised in docs/native.md
-BUILDS = {
-    "gcc -O0": ("gcc", ["-O0", "-ffp-contract=off"]),
+BUILDS = {  # test_native.py tells the same of the library, which is made of the same text
     "gcc": ("gcc", FAST),
-    "gcc, this machine": ("gcc", [*FAST, "-march=native"]),
-    "gcc, no vectors": ("gcc", [*FAST, "-DJOINTLAW_PLAIN"]),
-    "clang -O0": ("clang", ["-O0", "-ffp-contract=off"]),
-    "clang": ("clang", FAST),
+    "gcc -O0, no vectors": ("gcc", ["-O0", "-ffp-contract=off", "-DJOINTLAW_PLAIN"]),
     "clang, this machine": ("clang", [*FAST, "-march=native"]),
     "C++": ("g++", FAST),
 }
@@ -32,42 +26,32 @@ def lib(tmp_path_factory):
     return library(tmp_path_factory.mktemp("c"), *FAST)
 
 
-def follow(joint, law, d):
-    """Largest differences of F, C, sliders and energies along a path, as shares of the largest."""
-    k = law.tables
-    state = np.zeros((k.rows, 1))
-    off, peak = np.zeros(4), np.full(4, 1e-300)
-    for step in d:
-        state, F, C = reference.step(k, state, step[:, None], True)
-        F_c, C_c = joint.step(step)
-        m, shares = reference.measures(k, state), joint.shares()
-        pairs = [
-            (F[:, 0], F_c), (C[..., 0], C_c), (state[2 * k.dim :, 0], joint.state[2 * k.dim :]),
-            ([m.stored[0], state[2 * k.dim - 1, 0]],
-             [joint.lib.jlaw_stored(joint.law, at(joint.state)),
-              joint.lib.jlaw_dissipated(joint.law, at(joint.state))]),
-        ]  # fmt: skip
-        off = np.maximum(off, [np.abs(np.subtract(a, b)).max() for a, b in pairs])
-        peak = np.maximum(peak, [np.abs(a).max() for a, _ in pairs])
-        assert shares == pytest.approx([m.sliding[0], m.slipping[0], m.separated[0]], abs=1e-9)
-    assert (joint.state[: 2 * k.dim - 1] == state[: 2 * k.dim - 1, 0]).all() or np.isfinite(
-        k.critical_slip
-    )
-    return off / peak
+@pytest.mark.parametrize("name", BUILDS)
+def test_the_bits_of_python(tmp_path, name):
+    """F, C, state, energies and shares; the state of a Python joint goes on in C."""
+    cc, flags = BUILDS[name]
+    built = library(tmp_path, *flags, cc=cc)
+    for seed in (0, 3, 7, 10, 13, 14, 20):  # yielding, wear and both, critical slip, planes
+        law = random_law(seed)
+        one, joint = CLaw(built, law, tmp_path), law.joint()
+        path = random_path(one.dim, seed)
+        for step in path[:10]:
+            joint.update(step)
+        one.state[:] = joint.snapshot().values[0]
+        for step in path[10:]:
+            for a, b in zip(one.step(step), joint.update(step), strict=True):
+                np.testing.assert_array_equal(a, b)
+            np.testing.assert_array_equal(one.state, joint.snapshot().values[0])
+            shares = joint.sliding, joint.slipping, joint.separated
+            assert one.shares() == pytest.approx(shares, abs=1e-9)
+            energies = [
+                f(one.law, at(one.state)) for f in (built.jlaw_stored, built.jlaw_dissipated)
+            ]
+            asked = [joint.stored_energy, joint.dissipated_energy]
+            assert energies == pytest.approx(asked, rel=1e-12, abs=1e-300)
 
 
-@pytest.mark.parametrize("seed", range(200 if "JOINTLAW_LONG" in os.environ else 8))
-def test_same_numbers_on_random_laws_and_paths(lib, tmp_path, seed):
-    law = random_law(seed)
-    joint = CLaw(lib, law, tmp_path)
-    F, C, q, energy = follow(joint, law, random_path(joint.dim, seed))
-    assert F < SAME
-    assert C < SAME_C
-    assert q < 3 * SAME
-    assert energy < SAME
-
-
-@pytest.mark.parametrize("seed", range(0, 24, 3))
+@pytest.mark.parametrize("seed", [0, 3, 6, 15])
 def test_the_unsheared_joint(lib, tmp_path, seed):
     law = random_law(seed)
     joint = CLaw(lib, law, tmp_path)
@@ -82,39 +66,6 @@ def test_the_unsheared_joint(lib, tmp_path, seed):
         assert np.isnan(lib.jlaw_closure(joint.law, bad))
     assert np.isnan(lib.jlaw_normal_stress(joint.law, 2 * law.largest_reach))
     assert lib.jlaw_fingerprint(joint.law).decode() == law.fingerprint
-
-
-@pytest.mark.parametrize("name", BUILDS)
-def test_every_build_gives_the_same_bits(lib, tmp_path, name):
-    cc, flags = BUILDS[name]
-    other = library(tmp_path, *flags, cc=cc)
-    for seed in (0, 3, 7, 13, 20):
-        law = random_law(seed)
-        one, two = CLaw(lib, law, tmp_path), CLaw(other, law, tmp_path)
-        for step in random_path(one.dim, seed, 30):
-            for a, b in zip(one.step(step), two.step(step), strict=True):
-                np.testing.assert_array_equal(a, b)
-            np.testing.assert_array_equal(one.state, two.state)
-
-
-@pytest.mark.parametrize("seed", [0, 1, 4, 7])
-def test_c_and_python_continue_each_others_state(lib, tmp_path, seed):
-    """Python, C, Python: the path of a joint that was in C all along, to the last digit."""
-    law = random_law(seed)
-    d = random_path(law.tables.dim, seed, 30)
-    whole, part, joint = CLaw(lib, law, tmp_path), CLaw(lib, law, tmp_path), law.joint()
-    for step in d[:10]:
-        whole.step(step)
-    snapshot = joint.snapshot()
-    snapshot.values[0] = whole.state
-    joint.restore(snapshot)
-    part.state[:] = joint.snapshot().values[0]
-    for step in d[10:]:
-        np.testing.assert_array_equal(whole.step(step)[0], part.step(step)[0])
-    np.testing.assert_array_equal(whole.state, part.state)
-    F_python, _ = joint.trial(d[10])
-    part.state[:] = joint.snapshot().values[0]
-    assert part.step(d[10])[0] == pytest.approx(F_python, abs=SAME * np.abs(F_python).max() + 1e-9)
 
 
 def test_a_refused_step_moves_nothing_and_tells_why(lib, tmp_path):

@@ -27,7 +27,7 @@ from .parameters.fingerprint import fingerprint
 from .parameters.heights import GammaHeights, HeightDistribution, Heights
 from .parameters.orientation import Orientation
 from .parameters.resolution import LOSS_REMOVED, NAMED, Resolution, resolve
-from .support.checks import Array, above, finite, number
+from .support.checks import Array, finite, more_than, number
 from .support.thresholds import UNDERFLOW
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ class JointLaw:
                 f"heights = {self.heights!r} must be GammaHeights, Heights or None; a histogram in "
                 "Heights stands for any other distribution"
             )
-        set_(self, "asperity_density", above("asperity_density", self.asperity_density, 0.0))
+        set_(self, "asperity_density", more_than("asperity_density", self.asperity_density, 0.0))
         asked: str | Resolution = self.resolution
         set_(self, "resolution", resolve(asked))
         if self.plane is not None:
@@ -94,7 +94,11 @@ class JointLaw:
             raise ValueError(
                 f"plane = {self.plane!r}: a joint with closure_only does not shear; leave plane out"
             )
-        set_(self, "critical_slip", above("critical_slip", self.critical_slip, 0.0, infinite=True))
+        set_(
+            self,
+            "critical_slip",
+            more_than("critical_slip", self.critical_slip, 0.0, infinite=True),
+        )
         if self.critical_slip < UNDERFLOW:
             raise ValueError(
                 f"critical_slip = {self.critical_slip!r} m is out of bounds: it must be >= "
@@ -103,7 +107,7 @@ class JointLaw:
         with np.errstate(all="ignore"):  # a result that is not finite is refused below
             if self.closure_range is None:
                 set_(self, "closure_range", self._default_range())
-            set_(self, "closure_range", above("closure_range", self.closure_range, 0.0))
+            set_(self, "closure_range", more_than("closure_range", self.closure_range, 0.0))
             lengths = self.critical_slip, self.asperity.yield_interference, self.closure_range
             set_(self, "resolution", resolve(asked, *lengths))
             self._require_numbers(self.closure_range)  # and check the virgin curve

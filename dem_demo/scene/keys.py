@@ -8,7 +8,7 @@ import numpy as np
 from shapely import Polygon
 
 from jointlaw.parameters.keys import Removed
-from jointlaw.support.checks import above, at_least, finite, number, one_of, whole
+from jointlaw.support.checks import at_least, finite, integer, more_than, number, one_of
 
 Tables = dict[str, Any]
 
@@ -63,7 +63,7 @@ def some_of(name: str, value: Any, names: Iterable[str], count: int | None = Non
 ENDS = Removed("joints carry at their two ends; cut a long block in two instead", None)
 AXES = {"x": 0, "y": 1, "turn": 2}
 TEXT, LIST, TABLE = a(str), a(list), a(dict)
-POSITIVE, NOT_NEGATIVE = partial(above, bound=0), partial(at_least, bound=0)
+POSITIVE, NOT_NEGATIVE = partial(more_than, bound=0), partial(at_least, bound=0)
 DENSITY = within(50.0, 30000.0, "kg/m3; 2.6 g/cm3 is 2600 kg/m3")
 
 BLOCK = {
@@ -77,7 +77,7 @@ SET = {
 }  # fmt: skip
 ROCK = {
     "name!": TEXT, "outline!": corners, "set!": [SET], "at": vector,
-    "fixed": [{"corners!": corners}], "seed": partial(whole, bound=0), "least_width": POSITIVE,
+    "fixed": [{"corners!": corners}], "seed": partial(integer, bound=0), "least_width": POSITIVE,
     "density": DENSITY, "laws": TABLE,
 }  # fmt: skip
 DRIVE = {
@@ -85,14 +85,14 @@ DRIVE = {
     "times": partial(finite, unit="s"), "values": partial(finite, unit="m or degrees"),
     "back": {"block!": TEXT, "slid!": POSITIVE, "by!": POSITIVE, "rate!": POSITIVE},
     "sine": {
-        "acceleration!": POSITIVE, "frequency!": POSITIVE, "cycles": partial(whole, bound=1),
+        "acceleration!": POSITIVE, "frequency!": POSITIVE, "cycles": partial(integer, bound=1),
     },
     "file": TEXT, "scale": number,
 }  # fmt: skip
 RUN = {
     "end!": POSITIVE, "fraction": within(1e-6, 0.95, "of the limit"), "step": POSITIVE,
     "seat": a(bool), "record": POSITIVE, "dashpot_normal": NOT_NEGATIVE,
-    "dashpot_shear": NOT_NEGATIVE, "law_steps": partial(whole, bound=1),
+    "dashpot_shear": NOT_NEGATIVE, "law_steps": partial(integer, bound=1),
     "largest_stress": NOT_NEGATIVE, "skin": POSITIVE, "corner_length": POSITIVE,
     "max_overlap": POSITIVE, "point_spacing": ENDS,
 }  # fmt: skip

@@ -7,7 +7,7 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 from ..parameters.resolution import Resolution
-from ..support.checks import above
+from ..support.checks import more_than
 from ..support.progress import track
 from .suite import Suite, reference_resolution, scaled, standard_suite
 
@@ -26,7 +26,7 @@ _SHARES = (0.5, 0.75, 1.0)  # of the reference, for the directions that are not 
 
 def at_tolerance(law: JointLaw, tolerance: float) -> JointLaw:
     """See `JointLaw.at_tolerance`."""
-    bound = above("tolerance", tolerance, 0.0) / MARGIN
+    bound = more_than("tolerance", tolerance, 0.0) / MARGIN
     found, reached = coarsest(law, bound, EXCURSIONS)
     if found is None:
         raise ValueError(

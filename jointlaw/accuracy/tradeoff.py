@@ -14,7 +14,7 @@ import numpy as np
 
 from ..kernels.threads import thread_count
 from ..parameters.resolution import Resolution, named, resolve
-from ..support.checks import Array, whole
+from ..support.checks import Array, integer
 from ..support.files import replace_file
 from ..support.progress import track
 from ..support.pyplot import pyplot, style, written
@@ -194,7 +194,7 @@ def tradeoff(
     seconds: float = 0.2,
 ) -> Tradeoff:
     """See `JointLaw.tradeoff`."""
-    joints = whole("joints", joints, 0)
+    joints = integer("joints", joints, 0)
     lengths = law.tables.critical_slip, law.asperity.yield_interference, law.closure_range
     names = named(*lengths)
     if resolutions is None:

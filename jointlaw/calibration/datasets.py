@@ -214,7 +214,7 @@ def read_columns(path: Path, decimal_comma: bool = False) -> list[Column]:
         if line.strip(" \t,;") and not line.lstrip().startswith("#")
     ]
     (names, *rows), at = _cells([line for _, line in numbered]), [number for number, _ in numbered]
-    if len(rows) < 2 or any(np.isfinite(_number(cell, ".")) for cell in names):
+    if len(rows) < 2 or any(np.isfinite(_value_of(cell, ".")) for cell in names):
         raise ValueError(
             f"{path}: must hold a line of names with units, such as us [mm],tau [MPa], and numbers "
             "in the lines below it"
@@ -233,7 +233,7 @@ def read_columns(path: Path, decimal_comma: bool = False) -> list[Column]:
                 "decimal mark a comma? Then separate the columns by semicolons"
             )
         for column, cell in enumerate(row):
-            values[column, k] = _number(cell, decimal)
+            values[column, k] = _value_of(cell, decimal)
             if cell and not np.isfinite(values[column, k]) and not wrong[column]:
                 why = _THOUSANDS if _GROUPED.fullmatch(cell) else "is no number"
                 wrong[column] = f"line {at[k]} holds {cell!r}, which {why}"
@@ -282,7 +282,7 @@ def _cells(lines: Sequence[str]) -> list[list[str]]:
     return [row[: max((k + 1 for k, cell in enumerate(row) if cell), default=0)] for row in rows]
 
 
-def _number(cell: str, decimal: str) -> float:
+def _value_of(cell: str, decimal: str) -> float:
     """The number in a cell with this decimal mark; NaN for any other text."""
     text = cell.replace("−", "-")
     try:

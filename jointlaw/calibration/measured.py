@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..laboratory.experiments import direct_shear
 from ..law import JointLaw
-from ..support.checks import Array, above, at_least, finite, number
+from ..support.checks import Array, at_least, finite, more_than, number
 from .forward import Settings, build_for_shear, log_stress
 from .priors import Values
 
@@ -117,7 +117,7 @@ class ClosureCurve:
         set_(self, "steepness", share * steep)
         expected = Noise(STRESS_NOISE, CLOSURE_NOISE * float(np.ptp(closure)))
         if self.noise is not None:
-            expected = Noise(above("noise", self.noise, 0.0), 0.0, known=True)
+            expected = Noise(more_than("noise", self.noise, 0.0), 0.0, known=True)
         set_(self, "expected", expected)
 
     def residuals(self, values: Values, settings: Settings) -> Array:
@@ -162,10 +162,10 @@ class ShearCurve:
             raise ValueError("shear_stress is zero throughout: there is no strength to fit")
         set_(self, "shear", shear)
         set_(self, "shear_stress", stress)
-        set_(self, "normal", above("normal", self.normal, 0.0))
+        set_(self, "normal", more_than("normal", self.normal, 0.0))
         set_(self, "azimuth", number("azimuth", self.azimuth))
         known = self.noise is not None
-        share = above("noise", self.noise, 0.0) if known else SHEAR_NOISE
+        share = more_than("noise", self.noise, 0.0) if known else SHEAR_NOISE
         set_(self, "expected", Noise(share, 0.0, known))
         set_(self, "steepness", np.zeros(shear.size))  # the displacement is taken as exact
 

@@ -12,7 +12,7 @@ from ..kernels import reference, wear
 from ..kernels.blocks import LANES, empty_blocks, rows_of, write_rows, zeros
 from ..kernels.engine import CHUNK, Step, engine
 from ..kernels.reference import Measures
-from ..support.checks import Array, numbers, whole
+from ..support.checks import Array, integer, numbers
 from .state import JointState, NonFiniteError
 from .time_step import stable_step, stiffness_per_facet
 
@@ -46,7 +46,7 @@ class JointBatch:
     def __init__(self, law: JointLaw, n: int, ledger: bool = True) -> None:
         self.law, self.ledger = law, ledger
         self._engine = engine(law.tables)
-        self._n = whole("n", n, 0)
+        self._n = integer("n", n, 0)
         self._state = empty_blocks(self._engine.rows, self._n)
         self._largest_reach = 0.0  # bound of |y| of all facets of all joints
         numbers = np.arange(law.state_size, dtype=np.float64)[:, None]
@@ -140,7 +140,7 @@ class JointBatch:
 
     def resize(self, n: int) -> None:
         """Change the number of joints; joints beyond the old number are new and unloaded."""
-        n = whole("n", n, 0)
+        n = integer("n", n, 0)
         blocks, rows, lanes = self._state.shape
         if n < self._n:
             self.reset(np.arange(n, self._n))

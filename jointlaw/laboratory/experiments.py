@@ -9,7 +9,7 @@ import numpy as np
 from ..joints.crushed import warn_if_crushed
 from ..joints.joint import Joint
 from ..joints.state import NonFiniteError
-from ..support.checks import Array, above, at_least, number, numbers, one_of, whole
+from ..support.checks import Array, at_least, integer, more_than, number, numbers, one_of
 from ..support.progress import track
 from .normal_control import NormalCondition, closing_increments
 from .record import UNITS, Record
@@ -43,8 +43,8 @@ def closure_test(
     Returns the Record, its first row the joint as it was given. Raises ValueError for a bad
     argument and PathError, with the record so far, when a stress cannot be reached.
     """
-    peaks = [above("stress", s, 0.0) for s in _series("stress", stress, "Pa")]
-    steps = whole("steps", steps, 1)
+    peaks = [more_than("stress", s, 0.0) for s in _series("stress", stress, "Pa")]
+    steps = integer("steps", steps, 1)
     grading = (np.arange(1, steps + 1) / steps) ** (1 + joint.law.asperity.eta)
     levels: list[float] = []
     start = max(float(joint.F[0]), 0.0)
@@ -88,9 +88,9 @@ def direct_shear(
     Returns the Record, its first row the seated joint. Raises ValueError for a bad argument and
     PathError, with the record so far, when the normal condition cannot be met.
     """
-    normal = above("normal", normal, 0.0)
+    normal = more_than("normal", normal, 0.0)
     control = one_of("control", control, CONTROLS)
-    steps = whole("steps", steps, 1)
+    steps = integer("steps", steps, 1)
     points = [number("to", p) for p in _series("to", to, "m")]
     azimuth = number("azimuth", azimuth)
     if control == "stiffness":

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..support.checks import above, at_least, finite
+from ..support.checks import at_least, finite, more_than
 
 VISCOSITY, UNIT_WEIGHT = 1.0016e-3, 9789.0  # of water at 20 C, in Pa s and N/m3
 
@@ -20,7 +20,7 @@ def hydraulic_aperture(closure: ArrayLike, aperture: float, spread: float = 0.0)
     h / sqrt(1 + (spread/h)^2) with h = aperture - closure, zero where no gap is left: the geometric
     mean of log-normal gaps (Renshaw 1995, doi:10.1029/95JB02159). Has the shape of `closure`.
     """
-    gap = above("aperture", aperture, 0.0) - finite("closure", closure, "m")
+    gap = more_than("aperture", aperture, 0.0) - finite("closure", closure, "m")
     h = np.maximum(gap, 0.0)
     size = np.hypot(h, at_least("spread", spread, 0.0))
     return np.divide(h * h, size, out=np.zeros_like(h), where=size > 0)[()]
@@ -38,5 +38,5 @@ def transmissivity(
     h = finite("hydraulic_aperture", hydraulic_aperture, "m")
     if not (h >= 0).all():
         raise ValueError(f"hydraulic_aperture = {h} is out of bounds: it must be >= 0")
-    weight = above("unit_weight", unit_weight, 0.0)
-    return weight * h**3 / (12 * above("viscosity", viscosity, 0.0))
+    weight = more_than("unit_weight", unit_weight, 0.0)
+    return weight * h**3 / (12 * more_than("viscosity", viscosity, 0.0))

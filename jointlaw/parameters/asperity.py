@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from ..support.checks import above, at_least, number
+from ..support.checks import at_least, more_than, number
 
 LEAST_RESIDUAL = 1e-6  # of mu_residual: no rock is smoother
 
@@ -41,12 +41,12 @@ class Asperity:
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
-        set_(self, "K", above("asperity.K", self.K, 0.0))
-        set_(self, "lam", above("asperity.lam", self.lam, 0.0))
+        set_(self, "K", more_than("asperity.K", self.K, 0.0))
+        set_(self, "lam", more_than("asperity.lam", self.lam, 0.0))
         set_(self, "eta", at_least("asperity.eta", self.eta, 0.0))
         set_(self, "mu", at_least("asperity.mu", self.mu, 0.0))
         for name in ("yield_interference", "wear_slip"):
-            value = above(f"asperity.{name}", getattr(self, name), 0.0, infinite=True)
+            value = more_than(f"asperity.{name}", getattr(self, name), 0.0, infinite=True)
             set_(self, name, value)
         if (self.mu_residual is None) != math.isinf(self.wear_slip):
             raise ValueError(
@@ -73,7 +73,7 @@ class Asperity:
 
         G: shear modulus (Pa); nu: Poisson's ratio, 0..0.5; R: asperity radius of curvature (m).
         """
-        G, R = above("G", G, 0.0), above("R", R, 0.0)
+        G, R = more_than("G", G, 0.0), more_than("R", R, 0.0)
         nu = number("nu", nu)
         if not 0.0 <= nu <= 0.5:
             raise ValueError(f"nu = {nu!r} is out of bounds: 0 <= nu <= 0.5")
@@ -83,5 +83,5 @@ class Asperity:
     @classmethod
     def linear(cls, kn: float, ks: float, mu: float) -> "Asperity":
         """Constant normal and shear stiffness kn, ks in N/m (section 3 of the paper)."""
-        kn, ks = above("kn", kn, 0.0), above("ks", ks, 0.0)
+        kn, ks = more_than("kn", kn, 0.0), more_than("ks", ks, 0.0)
         return cls(K=ks, lam=kn / ks, eta=0.0, mu=mu)

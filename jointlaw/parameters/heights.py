@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
-from ..support.checks import Array, above, at_least, number, one_of
+from ..support.checks import Array, at_least, more_than, number, one_of
 
 FORMATIONS = ("population", "individual")
 
@@ -38,8 +38,8 @@ class GammaHeights:
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
-        set_(self, "alpha", above("heights.alpha", self.alpha, -1.0))
-        set_(self, "beta", above("heights.beta", self.beta, 0.0))
+        set_(self, "alpha", more_than("heights.alpha", self.alpha, -1.0))
+        set_(self, "beta", more_than("heights.beta", self.beta, 0.0))
         set_(self, "overlap", at_least("heights.overlap", self.overlap, 0.0))
         one_of("heights.formation", self.formation, FORMATIONS)
 
@@ -48,7 +48,7 @@ class GammaHeights:
         cls, mean: float, variance: float, overlap: float = 0.0, formation: str = "population"
     ) -> GammaHeights:
         """The gamma distribution of this mean (m) and variance (m^2): Eq. 13."""
-        mean, variance = above("mean", mean, 0.0), above("variance", variance, 0.0)
+        mean, variance = more_than("mean", mean, 0.0), more_than("variance", variance, 0.0)
         return cls(mean**2 / variance - 1, variance / mean, overlap, formation)
 
     @property

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..support.checks import Array, above, at_least, finite, number
+from ..support.checks import Array, at_least, finite, more_than, number
 
 
 def largest_c(b: float) -> float:
@@ -69,8 +69,8 @@ class Orientation:
         Where two values of b fit (the variance over the squared mean peaks near b = 1.4), the
         smaller is taken.
         """
-        mean = above("mean", mean, 0.0)
-        variance = above("variance", variance, 0.0)
+        mean = more_than("mean", mean, 0.0)
+        variance = more_than("variance", variance, 0.0)
         # Eq. 17 leaves one quadratic in b: v0 + v1 b - b^2 = ratio (6 - b)^2
         ratio = variance / mean / mean  # the square of a mean may be no float
         v0, v1 = 36 * math.pi - 108, 20 - 6 * math.pi

@@ -3,7 +3,7 @@
 import math
 from dataclasses import InitVar, dataclass
 
-from ..support.checks import whole
+from ..support.checks import integer
 
 # What those read who ask for options of former versions
 FRONT_REMOVED = "resolution.front is removed: take more depth cells instead, such as depth = 12"
@@ -27,9 +27,9 @@ class Resolution:
     front: InitVar[bool] = False  # of former versions
 
     def __post_init__(self, front: bool) -> None:
-        object.__setattr__(self, "u", whole("resolution.u", self.u, 1))
-        object.__setattr__(self, "phi", whole("resolution.phi", self.phi, 3))
-        object.__setattr__(self, "depth", whole("resolution.depth", self.depth, 1))
+        object.__setattr__(self, "u", integer("resolution.u", self.u, 1))
+        object.__setattr__(self, "phi", integer("resolution.phi", self.phi, 3))
+        object.__setattr__(self, "depth", integer("resolution.depth", self.depth, 1))
         if front:
             raise ValueError(FRONT_REMOVED)
 

@@ -28,7 +28,7 @@ def number(name: str, value: Any, *, infinite: bool = False) -> float:
     return result
 
 
-def above(name: str, value: Any, bound: float, *, infinite: bool = False) -> float:
+def more_than(name: str, value: Any, bound: float, *, infinite: bool = False) -> float:
     """Return `value` as a float that is strictly larger than `bound`."""
     result = number(name, value, infinite=infinite)
     if not result > bound:
@@ -58,7 +58,7 @@ def one_of(name: str, value: Any, choices: tuple[str, ...]) -> str:
     return str(value)
 
 
-def whole(name: str, value: Any, bound: int) -> int:
+def integer(name: str, value: Any, bound: int) -> int:
     """Return `value` as an int that is not smaller than `bound`."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < bound:
         raise ValueError(

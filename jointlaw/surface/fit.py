@@ -13,7 +13,7 @@ from ..law import JointLaw
 from ..parameters.asperity import Asperity
 from ..parameters.heights import GammaHeights
 from ..parameters.orientation import Orientation
-from ..support.checks import above, finite
+from ..support.checks import finite, more_than
 from .asperities import Asperities, extract
 from .densities import HEIGHTS, Estimate, fit_directions, fit_heights
 
@@ -136,9 +136,9 @@ def from_surface(z: ArrayLike, spacing: float, sampling_length: float | None = N
     described in `asperities` and `densities`.
     """
     heights = finite("z", z, "m, gaps filled or cut off")
-    spacing = above("spacing", spacing, 0.0)
+    spacing = more_than("spacing", spacing, 0.0)
     length = SAMPLES * spacing if sampling_length is None else sampling_length
-    ratio = above("sampling_length", length, 0.0) / spacing
+    ratio = more_than("sampling_length", length, 0.0) / spacing
     samples = max(round(ratio), 3)
     if abs(ratio - samples) > 1e-6 * samples:
         raise ValueError(

@@ -10,7 +10,7 @@ from ..joints.batch import JointBatch
 from ..laboratory.normal_control import NormalCondition, closing_increments
 from ..law import JointLaw
 from ..parameters.resolution import SLIP
-from ..support.checks import Array, above, whole
+from ..support.checks import Array, integer, more_than
 from ..support.version import __version__
 from .joint_table import JointTable
 
@@ -45,13 +45,13 @@ def tabulate(
     Raises ValueError for a bad argument.
     """
     require_3d(law)
-    end = above("closure", law.closure_range if closure is None else closure, 0.0)
-    tolerance = above("tolerance", tolerance, 0.0)
-    steps = whole("steps", steps, 2)
-    if whole("azimuths", azimuths, 3) > 180 or 180 % azimuths:
+    end = more_than("closure", law.closure_range if closure is None else closure, 0.0)
+    tolerance = more_than("tolerance", tolerance, 0.0)
+    steps = integer("steps", steps, 2)
+    if integer("azimuths", azimuths, 3) > 180 or 180 % azimuths:
         raise ValueError(f"azimuths = {azimuths} must divide 180: columns are named by degree")
     default = law.critical_slip if math.isfinite(law.critical_slip) else LONG * law.closure_range
-    limit = above("shear_limit", default if shear_limit is None else shear_limit, 0.0)
+    limit = more_than("shear_limit", default if shear_limit is None else shear_limit, 0.0)
     psi: Array = np.radians(np.arange(azimuths) * (180 // azimuths), dtype=np.float64)
     u, worst = _grid(law, end, psi, tolerance)
     secant, tangent = _normal(law, u)

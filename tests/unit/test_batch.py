@@ -7,25 +7,6 @@ from hypothesis import strategies as st
 
 import jointlaw as jl
 
-COLUMNS = ("delta", "F", "sliding", "slipping", "separated", "stored_energy", "dissipated_energy")
-
-
-def test_a_batch_equals_a_loop(any_law):
-    rng, dim = np.random.default_rng(3), any_law.dim
-    batch, singles = any_law.joints(6), [any_law.joint() for _ in range(6)]
-    for _ in range(40):
-        d = rng.normal(0.0, 1e-7, (6, dim))
-        d[:, 0] += 2e-8
-        F, C = batch.update(d)
-        for i, joint in enumerate(singles):
-            Fi, Ci = joint.update(d[i])
-            # 1e-12: sums over facets may run in another order
-            np.testing.assert_allclose(F[i], Fi, rtol=1e-12, atol=1e-12 * np.abs(F).max())
-            np.testing.assert_allclose(C[i], Ci, rtol=1e-12, atol=1e-12 * np.abs(C).max())
-    for name in COLUMNS:
-        singly = np.array([getattr(joint, name) for joint in singles])
-        np.testing.assert_allclose(getattr(batch, name), singly, rtol=1e-12, atol=1e-12)
-
 
 @given(data=st.data())
 def test_a_history_of_contacts_equals_single_joints(law, data):

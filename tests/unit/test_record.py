@@ -1,13 +1,11 @@
 """Records: columns, files, and summary figures against hand-computed ones."""
 
-import json
 import math
 
 import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.laboratory.record import UNITS
 
 COLUMNS = ("closure", "shear_2", "shear_3", "F1", "F2", "F3", "sliding", "separated")
 COLUMNS += ("stored", "dissipated")
@@ -82,24 +80,3 @@ def test_csv_round_trip(tmp_path):
         np.testing.assert_allclose(table[title], record.columns[name], rtol=1e-11)
     with pytest.raises(ValueError, match="'1furlong' is not a quantity in m"):
         record.to_csv(tmp_path / "r.csv", length="furlong")
-
-
-def test_npz_round_trip(tmp_path):
-    record = analytic(0.3)
-    record.to_npz(str(tmp_path / "r.npz"))
-    with np.load(tmp_path / "r.npz") as data:
-        for name in COLUMNS:
-            np.testing.assert_array_equal(data[name], record.columns[name])
-        assert data["azimuth"] == 0.3
-        assert json.loads(str(data["units"])) == UNITS
-
-
-def test_plots_of_both_tests(tmp_path):
-    matplotlib = pytest.importorskip("matplotlib")
-    matplotlib.use("Agg")
-    flat = {name: np.linspace(0, 1, 3) * (not name.startswith("shear")) for name in COLUMNS}
-    for i, record in enumerate((analytic(), jl.Record(flat))):
-        record.plot(tmp_path / f"{i}.png")
-        assert (tmp_path / f"{i}.png").read_bytes().startswith(b"\x89PNG")
-        labels = [axis.get_ylabel() + axis.get_xlabel() for axis in record.plot().axes]
-        assert all("(" in label for label in labels)  # every axis tells its unit

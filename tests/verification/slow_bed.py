@@ -41,7 +41,7 @@ class SlowBed:
 
     def __init__(
         self, normals, weights, reach, *, K, lam, eta, mu, density, heights=None, n_depth=240,
-        max_step=np.inf, critical_slip=np.inf, yield_interference=np.inf, mu_residual=None,
+        critical_slip=np.inf, yield_interference=np.inf, mu_residual=None,
         wear_slip=np.inf,
     ):  # fmt: skip
         self.n, self.c1 = normals, normals[:, 0]
@@ -52,7 +52,7 @@ class SlowBed:
         pairs = [bins[r] for r in reach]
         self.z = np.array([p[0] for p in pairs])
         self.k = np.array([p[1] for p in pairs])
-        self.max_step, self.critical_slip = max_step, critical_slip
+        self.critical_slip = critical_slip
         self.yields_at = (yield_interference / self.c1)[:, None]  # largest y - z of a spring
         self.wear = mu, mu if mu_residual is None else mu_residual, wear_slip
         self.crushed = self.slip = 0.0  # plastic work, asperity slip
@@ -70,14 +70,8 @@ class SlowBed:
         self.e = np.zeros((2, *self.z.shape))  # in-plane stretch of every spring
 
     def update(self, d):
-        """Advance by the increment d (3,) in equal small steps; return the traction (3,)."""
+        """Advance by the small increment d (3,); return the traction (3,)."""
         d = np.asarray(d, dtype=float)
-        pieces = max(1, int(np.ceil(np.linalg.norm(d) / self.max_step)))
-        for _ in range(pieces):
-            self._small_step(d / pieces)
-        return self.traction()
-
-    def _small_step(self, d):
         self.delta = self.delta + d
         self.offset = self.offset + d[1:]
         pull = np.hypot(*self.offset)
@@ -100,6 +94,7 @@ class SlowBed:
         self.e = free * (limit / np.maximum(size, np.maximum(limit, 1e-300)))
         rubbed = np.sum(self.k * limit * np.clip(size - limit, 0.0, None), axis=1)
         self._wear(np.sum(self.scale / (self.c1 * self.lam) * rubbed), pull)
+        return self.traction()
 
     def _wear(self, rubbed, pull):
         """Slip of the asperities: friction work, the offset's too, over the limit; then mu."""

@@ -5,7 +5,6 @@ import pytest
 from builders import law
 from exact_work import step_work
 from scipy.integrate import solve_ivp
-from slow_bed import SlowBed, cap_quadrature
 
 import jointlaw as jl
 from jointlaw.kernels import reference as kernel
@@ -45,27 +44,6 @@ def test_the_offset_follows_the_tractrix_in_steps_of_any_size(formation, divisio
         exact = free.update([0.8, *tractrix(CORNERS[: k + 1], D)])[0]
         # the turning is solved in closed form: the integration's 1e-12 and rounding are left
         assert np.allclose(F, exact, rtol=0.0, atol=1e-10)
-
-
-@pytest.mark.slow
-def test_motion_at_the_limit_with_friction_agrees_with_the_slow_bed():
-    n, w = cap_quadrature(3.0, 0.5, 0.1, 8, 24)
-    reach = 1.01 * (1.0 + D * np.hypot(n[:, 1], n[:, 2]) / n[:, 0])
-    bed = SlowBed(n, w, reach, K=1.0, lam=1.2, eta=0.5, mu=0.4, density=1.0, n_depth=200,
-                  max_step=0.004, critical_slip=D)  # fmt: skip
-    joint = law(critical_slip=D, resolution=jl.Resolution(6, 12, 24)).joint()
-    bed.update([0.9, 0.0, 0.0])
-    joint.update([0.9, 0.0, 0.0])
-    exact, F = [], []
-    for leg in np.diff(CORNERS, axis=0, prepend=0.0):
-        for _ in range(20):
-            exact.append(bed.update([0.0, *(leg / 20)]))
-            for _ in range(16):
-                joint.update([0.0, *(leg / 320)], tangent=False)
-            F.append(joint.F)
-    gap = np.linalg.norm(np.subtract(F, exact), axis=1).max()
-    # as without a limit; the bed's small radial returns of 1 % of D_c are converged to 0.05 %
-    assert gap < 3e-3 * np.linalg.norm(exact, axis=1).max()
 
 
 def test_steady_friction_under_constant_stress_tends_to_the_steepest_contacts():

@@ -1,8 +1,7 @@
 """A million joints, threads that each own joints, forked and spawned processes, two laws at once.
 
 Arrays of any kind (read-only, strided, float32, integer, empty), pickling, states of the wrong law
-and failed writes: tests/unit/test_batch.py, test_snapshot.py and test_files.py; killed and
-concurrent writes: test_extremes_files.py.
+and failed writes: tests/unit/test_batch.py, test_snapshot.py and test_files.py.
 """
 
 import multiprocessing

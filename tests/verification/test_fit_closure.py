@@ -72,17 +72,6 @@ def test_known_parameters_are_covered_by_their_intervals(law):
     assert all(45 <= count <= 49 for count in hits.values()), hits
 
 
-def test_without_noise_the_parameters_come_back(law):
-    stress = np.geomspace(0.25e6, 10e6, 12)
-    y = law.closure(stress)
-    fit = jl.fit_closure(stress, y - y[0], fixed={"alpha": 3.0}, noise=1e-5)
-    assert fit.parameters["beta"] == pytest.approx(2e-5, rel=1e-3)
-    assert fit.parameters["asperity_density"] == pytest.approx(1e6, rel=1e-3)
-    assert fit.parameters["seating"] == pytest.approx(y[0], rel=1e-3)
-    # the forward model of a fit and the law agree: facets, curve and factor are the same
-    assert fit.predict(y - y[0]) == pytest.approx(stress, rel=1e-5)
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -3,36 +3,9 @@
 import mpmath as mp
 import numpy as np
 import pytest
-from builders import law, slow_heights
-from slow_bed import cap_quadrature
-from slow_virgin import virgin
 
 import jointlaw as jl
 from jointlaw.discretisation.virgin_curve import exact_force, virgin_curve
-
-FORMATIONS = [None, "population", "individual"]
-FAR = [1e-4, 0.01, 0.3, 1.0, 3.0, 12.0, 60.0, 500.0]  # closure ranges
-
-
-def closure_stress(y, formation, eta, mu, lam=1.2, a=3.0, b=0.5):
-    """F1 under pure closure: each facet at min(tan/lam, mu) of its normal force."""
-    n, w = cap_quadrature(a, b, 0.0, 60, 8)  # a kink in theta: second order in 60
-    c1, s1 = n[:, 0], np.hypot(n[:, 1], n[:, 2])
-    per_facet = w * lam * c1 ** (1.0 + eta) * (c1 + s1 * np.minimum(s1 / c1 / lam, mu))
-    return per_facet.sum() * virgin(y, eta, slow_heights(formation))[0]
-
-
-@pytest.mark.parametrize("formation", FORMATIONS)
-@pytest.mark.parametrize("eta", [0.3, 0.5, 1.0])
-def test_closure_from_tiny_to_huge(formation, eta):
-    one = law(eta=eta, mu=5.0, formation=formation, resolution="reference")
-    for y in FAR:
-        exact = closure_stress(y, formation, eta, mu=5.0)
-        # the curve's table is asked for 1e-10 of its largest value, P(r0) is 0.06 of that
-        assert one.normal_stress(y) == pytest.approx(exact, rel=1e-8)
-        joint = one.joint()
-        assert joint.update([y, 0.0, 0.0])[0][0] == pytest.approx(exact, rel=1e-8)
-        assert one.closure(exact) == pytest.approx(y, rel=1e-8)
 
 
 @pytest.mark.parametrize("eta", [0.0, 0.5, 2.0])

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-import jointlaw as jl
 from jointlaw.kernels import reference as kernel
 
 ROUNDING = 1e-12  # of the facet's normal force: a cell's G is a difference of numbers of that size
@@ -104,24 +103,3 @@ def run(law, size, seed, n=8, steps=32):
         d[k, home[k]] = -delta[home[k]] * np.array([1.0, 0.0, 0.0])
         found += [f"step {k}: {fault}" for fault in watch.step(d[k])]
     return found
-
-
-def refused(law, size):
-    """Names of refused inputs that changed the state, or were not refused."""
-    batch = law.joints(3)
-    batch.update(np.full((3, 3), 0.3 * size))
-    before = batch.snapshot().values
-    wrong = []
-    for bad in (np.nan, np.inf, -np.inf, 1e308, 10.0 * law.largest_reach):
-        for slot in range(3):
-            d = np.full((3, 3), 1e-2 * size)
-            d[1, slot] = bad
-            for act in (batch.update, batch.trial):
-                try:
-                    act(d)
-                    wrong.append(f"{bad} in slot {slot} passes")
-                except (ValueError, jl.NonFiniteError):
-                    pass
-    if not np.array_equal(before, batch.snapshot().values):
-        wrong.append("state moved")
-    return wrong

@@ -6,7 +6,6 @@ from extremes.checks import path
 from extremes.laws import HEIGHTS, ORDINARY, SCALE, build
 
 DECIMAL = (1e6, 1e-9)
-BINARY = (2.0**20, 2.0**-30)  # as far, and exact in binary numbers
 
 
 def scaled(changes, length, force):

@@ -7,8 +7,9 @@ import os
 
 import numpy as np
 import pytest
-from builders import increments, law, random_corners
+from builders import law, random_corners
 from exact_work import step_work, stored
+from work import WorkMeter
 
 import jointlaw as jl
 from jointlaw.kernels import reference as kernel
@@ -70,23 +71,40 @@ def test_no_step_of_a_closed_path_makes_energy(seed, held, wears, yields):
     assert sum(gains) <= 1e-12 * peak
 
 
-@pytest.mark.parametrize(
-    "more", [{}, {"formation": "population", "critical_slip": 0.3}, {"eta": 0.0, "a": 1.4}]
-)
-def test_work_is_stored_or_dissipated_to_the_order_of_the_step(more):
-    corners, gaps = random_corners(np.random.default_rng(3), 20), []
-    for steps in (64, 128):
-        joints, work = law(**more).joints(20), 0.0
-        for d in np.moveaxis(increments(corners, steps), 1, 0):
-            for t in 0.5 + np.array([-1.0, 1.0]) / np.sqrt(12.0):  # two points of Gauss
-                work += 0.5 * np.sum(joints.trial(t * d, tangent=False)[0] * d, axis=1)
-            joints.update(d, tangent=False)
-        lost = joints.dissipated_energy
-        gaps.append(np.abs(work - joints.stored_energy - lost) / lost)
-    # the ledger keeps what a step starts and ends with: first order in the step, on the mean of
-    # the paths; 0.9 % at 100 steps in the design, and harder paths here
-    assert np.mean(gaps[1]) < 0.6 * np.mean(gaps[0])
-    assert np.max(gaps[1]) < 0.02
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(PATHS))
+def test_no_cycle_that_is_searched_for_returns_work(seed):
+    """An adversary: of many triangles from one state that with the least loss, and its children."""
+    rng = np.random.default_rng(seed)
+    one = random_law(rng, bool(seed % 2), bool(seed // 2 % 2))
+    first = random_corners(rng, 1, legs=3)[0]
+    first[-1, 0] = rng.uniform(0.2, 0.8)  # in touch
+    d = np.diff(first, axis=0, prepend=0.0)
+    meter, n = WorkMeter(one, 60, panels=16), 60
+    for step in d:
+        meter.step(np.tile(step, (n, 1)))
+    begin, start = meter.copies.snapshot(), meter.stored
+    legs, size = rng.normal(size=(n, 2, 3)) * 10.0 ** rng.uniform(-2, 0, (n, 1, 1)), 1.0
+    best, least = legs[0], np.inf
+    for _ in range(6):
+        meter.copies.restore(begin)
+        work = sum(meter.step(step) for step in (legs[:, 0], legs[:, 1], -legs.sum(axis=1)))
+        lost = (work - meter.stored + start) / np.sum(
+            legs**2, axis=(1, 2)
+        )  # elastic: as the square
+        if lost.min() < least:
+            best, least = legs[lost.argmin()], lost.min()
+        size *= 0.6
+        legs = best * (1.0 + size * rng.normal(size=legs.shape))
+    k, made, peak = one.tables, [], 0.0
+    state, cycle = np.zeros((k.rows, 1)), [*best, -best.sum(axis=0)]
+    for step in [*d, *cycle, *cycle, *cycle]:
+        more, state = gain(k, state, step)
+        made.append(more)
+        peak = max(peak, scale(k, state))
+    print(f"{max(made) / peak:.1e} {sum(made[3:]) / peak:.1e} of the peak")
+    assert max(made) <= 1e-12 * peak
+    assert sum(made[3:]) <= 1e-12 * peak
 
 
 # flattened springs keep the friction limit from growing

@@ -6,6 +6,7 @@ from jointlaw.kernels import reference as kernel
 
 ROUNDING = 1e-12  # of the facet's normal force: a cell's G is a difference of numbers of that size
 KERNELS = 1e-11  # of the largest traction: rounding of y, 1e-16, over a step of NEAR y, 1e-5
+NOTHING = 1e-12  # Pa; squares of sliders' forces in far smaller tractions underflow
 
 
 def sliders_within_friction(batch, mu):
@@ -73,7 +74,7 @@ class Watch:
     def _other_kernel(self, before, d, F):
         """How far the reference kernel is from F, as a share of the largest traction so far."""
         _, reference, _ = kernel.step(self.batch.law.tables, before.T, d.T, False)
-        peak = np.where(self.forces > 0, self.forces, 1.0)
+        peak = np.maximum(self.forces, NOTHING)
         return float(np.max(np.abs(reference.T - F) / peak[:, None], initial=0.0))
 
 

@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scene_text import PLAIN, ROCK
+from scipy.sparse.linalg import ArpackNoConvergence
 
 from dem_demo import Refused, Simulation, load, parse
+from dem_demo.dynamics import timestep
 from dem_demo.output.record import Record
 
 TEXT = f"""
@@ -183,3 +185,17 @@ def test_a_state_that_is_refused_changes_nothing():
     sim.step()
     whole = begun(6)
     assert (sim.blocks.motion == whole.blocks.motion).all()
+
+
+def test_an_eigenvalue_that_does_not_converge_is_computed_exactly(monkeypatch):
+    scene = load("slope")
+    whole = Simulation(scene).limit.now
+    asked = []
+
+    def never(*_args, **_keys):
+        asked.append(1)
+        raise ArpackNoConvergence("no convergence", np.zeros(0), np.zeros((0, 0)))
+
+    monkeypatch.setattr(timestep, "eigsh", never)
+    assert Simulation(scene).limit.now == pytest.approx(whole, rel=1e-6)
+    assert asked

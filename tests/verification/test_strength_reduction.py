@@ -57,6 +57,15 @@ def test_critical_tilt_of_a_block_is_that_of_the_law_alone():
     assert critical_tilt(parse(SCENE)) == pytest.approx(alone, rel=FOUND)
 
 
+@pytest.mark.parametrize("degrees", [58.0, 62.0])
+def test_a_tilt_near_the_steepest_is_found(degrees):
+    """A flat slab slides at its friction angle, also where the last step of the search is short."""
+    text = SCENE.replace("box = [5.0, 1.0]\nat = [-1.0, 0.5]", "box = [3.0, 0.1]\nat = [0.0, 0.05]")
+    plain = coulomb_law(1e9, 1e9, math.tan(math.radians(degrees)))
+    found = critical_tilt(replace(parse(text), gravity=(0.0, -9.81), laws={"joint": plain}))
+    assert found is None if degrees > 60 else found == pytest.approx(degrees, rel=FOUND)
+
+
 def test_all_frictions_are_divided_and_nothing_else():
     scene = parse(SCENE)
     law, sticks = scene.laws["joint"], coulomb_law(1e9, 1e9, math.inf)

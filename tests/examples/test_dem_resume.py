@@ -1,6 +1,7 @@
 """Saved states: whole, of one scene, resumed anywhere, and only as the method can carry it."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from scipy.sparse.linalg import ArpackNoConvergence
 
 from dem_demo import Refused, Simulation, load, parse
 from dem_demo.dynamics import timestep
-from dem_demo.output.record import Record
+from dem_demo.output.record import Record, outcomes
 
 TEXT = f"""
 gravity = [3.0, -9.0]
@@ -199,3 +200,18 @@ def test_an_eigenvalue_that_does_not_converge_is_computed_exactly(monkeypatch):
     monkeypatch.setattr(timestep, "eigsh", never)
     assert Simulation(scene).limit.now == pytest.approx(whole, rel=1e-6)
     assert asked
+
+
+@pytest.mark.parametrize("size", [0.01, 1.0, 100.0])
+def test_failure_is_counted_by_the_size_of_the_blocks(size):
+    """A tenth of a block, in a model of centimetres as in one of a hundred metres."""
+    scene = load("slope")
+    blocks = tuple(replace(block, corners=size * block.corners) for block in scene.blocks)
+    scene, rock = replace(scene, blocks=blocks), scene.rocks[0]
+    start = np.zeros((6, len(blocks)))
+    start[:2] = np.transpose([block.centroid for block in blocks])
+    end = start.copy()
+    end[0, rock.free[0]] += 0.2 * size  # of blocks of about 1 m2 times size**2
+    end[0, rock.free[1]] += 0.05 * size
+    record = SimpleNamespace(scene=scene, times=[0.0, 1.0], motion=[start, end])
+    assert [entry["failed"] for entry in outcomes(record)] == [1, 0]

@@ -51,6 +51,8 @@ class Scene:
     joint of a rock, the law of its set.
 
     slip, shear: joints to report on, as (moving block, base); pins: points, as (block, place in m);
+    reduction: what the shear strength of all joints is divided by (see `Joints`).
+
     text: of the file that it was read from, empty for a scene made or changed in memory; files:
     what that file names.
     """
@@ -69,6 +71,7 @@ class Scene:
     slip: tuple[tuple[int, int], ...] = ()
     shear: tuple[tuple[int, int], ...] = ()
     pins: tuple[tuple[int, tuple[float, float]], ...] = ()
+    reduction: float = 1.0
     text: str = field(default="", init=False)  # `replace` leaves both out
     files: Files = field(default_factory=Files, init=False)
 

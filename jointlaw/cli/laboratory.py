@@ -131,7 +131,7 @@ def _shear(options: argparse.Namespace) -> None:
     print(
         f"{peak} {record.peak_friction_angle:.2f} deg, at the end "
         f"{record.residual_friction_angle:.2f} deg, largest dilation angle "
-        f"{record.dilation_angle:.2f} deg"
+        f"{record.peak_dilation_angle:.2f} deg"
         + ("" if math.isnan(secant) else f", secant shear stiffness {secant:.4g} Pa/m")
     )
 

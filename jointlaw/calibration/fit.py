@@ -23,12 +23,10 @@ from .problem import Problem, Solution, derivative, pose, solve, staged, startin
 MISFITS = 1.5  # of the expected scatter: from this systematic misfit on the law is not the rock
 PRIOR_SHARE = 0.05  # of the variance: up to here the data, not the priors, decide
 WIDEST = math.log(2) / 1.96  # standard error of a logarithm: a factor of 2 either way
-OPEN = math.log(1000) / 1.96  # likewise: of what nothing fixes
+OPEN = 1e6  # upper over lower end of the interval of what nothing fixes
 HALVED = 0.005  # of the largest measured stress: what halving the steps of shear may change
 HALVINGS = 8  # at most
 AT_BOUND = 1e-6  # of the distance of the bounds
-# What acts on a closure curve only as one factor: N lam K times a sum over the inclinations
-_ONE_FACTOR = ("asperity_density", "K", "lam", "mu", "a", "b", "c")
 
 OTHER = (
     "Neighbouring points deviate to the same side. Use the law with this error between the points, "
@@ -47,7 +45,7 @@ NO_COMPLIANCE = (
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Outcome of `fit_closure`, `fit_shear` and `fit_curves`, in SI units.
+    """Outcome of `fit_closure` and `fit_curves`, in SI units.
 
     `free` names the fitted parameters in the order of `covariance`, the seating closure last;
     `parameters` holds all values; `noise` and `systematic_misfit` have an entry for each curve.
@@ -71,17 +69,6 @@ class Fit:
     def law(self) -> JointLaw:
         """The law of these parameters."""
         return build(self.parameters, self.problem.settings, self.problem.settings.plane)
-
-    @property
-    def covariance(self) -> Array:
-        """Covariance (p, p) of the fitted parameters, in the order of `free`."""
-        slope = [TRANSFORMS[name].slope(self.parameters[name]) for name in self.free]
-        return self.solution.covariance * np.outer(slope, slope)
-
-    @property
-    def standard_error(self) -> dict[str, float]:
-        """Standard error of every fitted parameter."""
-        return dict(zip(self.free, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
 
     @property
     def prior_share(self) -> dict[str, float]:
@@ -108,12 +95,10 @@ class Fit:
     @cached_property
     def too_many(self) -> tuple[str, ...]:
         """Fitted parameters to hold, the vaguest first, so that the data alone fix the others."""
-        widest = np.array([WIDEST if TRANSFORMS[name].log else 0.5 for name in self.free])
-        kept, held = list(range(len(self.free))), list[str]()
+        kept, held = [k for k, name in enumerate(self.free) if name != "seating"], list[str]()
         while kept:
             C = np.linalg.inv(self.solution.information[np.ix_(kept, kept)])
-            vague = np.sqrt(np.diag(C)) / widest[kept]
-            vague[[self.free[k] == "seating" for k in kept]] = 0.0  # no one knows it otherwise
+            vague = np.sqrt(np.diag(C)) / self._widest[kept]
             if vague.max() <= 1:
                 break
             held.append(self.free[kept.pop(int(np.argmax(vague)))])
@@ -121,31 +106,29 @@ class Fit:
 
     @cached_property
     def not_identifiable(self) -> dict[str, str]:
-        """Parameters that these data do not fix, each with the reason."""
+        """Fitted parameters that these data do not fix, each with the reason."""
         found: dict[str, str] = {}
-        errors = np.sqrt(np.diag(self.solution.covariance))
+        errors = np.sqrt(np.diag(self.solution.covariance)) / self._widest
         for (name, share), error in zip(self.prior_share.items(), errors, strict=True):
             if name in self.at_bound:
                 found[name] = f"the fit ended at a bound, {self.parameters[name]:.3g}"
             elif share > PRIOR_SHARE:
                 found[name] = f"the priors supply {100 * share:.0f} % of its variance"
-            elif error > (WIDEST if TRANSFORMS[name].log else 0.5):
+            elif error > 1:
                 found[name] = f"the data leave it {self._spread(name)}"
-        sheared = any(isinstance(curve, ShearCurve) for curve in self.problem.curves)
-        for name in ("eta", "alpha", "beta", "overlap", *_ONE_FACTOR):
-            if name not in self.free:
-                factor = name in _ONE_FACTOR and not sheared
-                found[name] = "held" + (
-                    "; acts on a closure curve only as a factor" if factor else ", not fitted"
-                )
         return found
 
+    @property
+    def _widest(self) -> Array:
+        """Standard errors (p,) up to which a parameter is known."""
+        return np.array([WIDEST if TRANSFORMS[name].log else 0.5 for name in self.free])
+
     def _spread(self, name: str) -> str:
-        """The 95 % interval of a fitted parameter, or "open", in words."""
+        """The 95 % interval of a fitted parameter in words."""
+        if name in self.at_bound:
+            return "at a bound"
         low, high = self.interval(name)
-        at = self.free.index(name)
-        wide = math.sqrt(self.solution.covariance[at, at]) > OPEN
-        return "open" if wide and TRANSFORMS[name].log else f"{low:.3g} to {high:.3g}"
+        return "open" if TRANSFORMS[name].log and high > OPEN * low else f"{low:.3g} to {high:.3g}"
 
     @property
     def identifiable(self) -> tuple[str, ...]:
@@ -204,18 +187,16 @@ class Fit:
             "|---|---|---|---|---|---|",
         ]
         for name, share in self.prior_share.items():
-            spread = "at a bound" if name in self.at_bound else self._spread(name)
             lines.append(
-                f"| {name} | {values[name]:.4g} | {spread} | "
+                f"| {name} | {values[name]:.4g} | {self._spread(name)} | "
                 f"{TRANSFORMS[name].unit} | {100 * share:.0f} % | "
                 f"{'no' if name in left else 'yes'} |"
             )
         unworn = {"mu_residual"} if np.isinf(values["wear_slip"]) else set()
         held = [n for n in values if n not in {*self.free, *unworn} and np.isfinite(values[n])]
         lines += ["", "Held: " + ", ".join(f"{n} = {values[n]:.4g}" for n in held) + "."]
-        lines += ["", "Not identifiable from these data:", ""]
-        for reason in dict.fromkeys(left.values()):
-            lines.append(f"- {', '.join(n for n in left if left[n] == reason)}: {reason}")
+        lines += ["", "Not fixed by these data:", ""] if left else []
+        lines += [f"- {name}: {reason}" for name, reason in left.items()]
         if self.too_many:
             lines += ["", f"**{TOO_MANY.format(', '.join(self.too_many), self.too_many[0])}**"]
         lines += [
@@ -329,35 +310,6 @@ def fit_closure(
     Hertz become one curve", for the "individual" reading.
     """
     curve = ClosureCurve(np.asarray(stress), np.asarray(closure), noise, cycle, compliance)
-    return fit_curves([curve], free=free, fixed=fixed, law=law, priors=priors)
-
-
-def fit_shear(
-    shear: ArrayLike,
-    shear_stress: ArrayLike,
-    normal: float,
-    *,
-    law: JointLaw,
-    azimuth: float = 0.0,
-    free: Sequence[str] = ("mu", "a"),
-    fixed: Values | None = None,
-    priors: Ranges | None = None,
-    noise: float | None = None,
-) -> Fit:
-    """Fit friction and inclination to one direct shear test at constant normal stress.
-
-    Parameters
-    ----------
-    shear: shear displacement in m, (n,), from zero; it may turn round.
-    shear_stress: in Pa, (n,).
-    normal: normal stress in Pa.
-    law: the law whose other parameters are kept, such as that of `fit_closure`.
-    azimuth: direction of shear in rad.
-    free, fixed, priors: as in `fit_curves`; noise: as in `ShearCurve`.
-
-    Returns a `Fit`. Raises ValueError for curves or names that do not fit.
-    """
-    curve = ShearCurve(np.asarray(shear), np.asarray(shear_stress), normal, azimuth, noise)
     return fit_curves([curve], free=free, fixed=fixed, law=law, priors=priors)
 
 

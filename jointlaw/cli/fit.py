@@ -104,7 +104,7 @@ def _run(options: argparse.Namespace) -> None:
     summary: dict[str, Any] = {
         "data": name,
         "parameters_SI": fit.parameters,
-        "standard_error_SI": fit.standard_error,
+        "interval_95_SI": {one: fit.interval(one) for one in fit.free},
         "identifiable": list(fit.identifiable),
         "not_identifiable": fit.not_identifiable,
     }

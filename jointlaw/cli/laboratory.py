@@ -166,7 +166,6 @@ def _write(record: Record, law: JointLaw, options: argparse.Namespace) -> None:
     name, (length, stress) = options.command, options.units
     files: Written = {
         f"{name}.csv": partial(record.to_csv, length=length, stress=stress),
-        f"{name}.npz": record.to_npz,
         "law.toml": law.to_toml,
         f"{name}.png": record.plot,
     }

@@ -1,7 +1,6 @@
 """What a laboratory test on a joint measured: named columns, units, summary figures."""
 
 import io
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -163,13 +162,6 @@ class Record:
         header = ",".join(titles)
         np.savetxt(buffer, table, fmt="%.12g", delimiter=",", header=header, comments="")
         replace_file(Path(path), buffer.getvalue().encode())
-
-    def to_npz(self, path: str | Path) -> None:
-        """Write the columns as NPZ with a version, the azimuth and a JSON text of the units."""
-        buffer = io.BytesIO()
-        arrays: dict[str, Any] = dict(self.columns)
-        np.savez(buffer, version=1, **arrays, azimuth=self.azimuth, units=json.dumps(UNITS))
-        replace_file(Path(path), buffer.getvalue())
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Draw the test (needs matplotlib: extra `plot`); returns the figure, saved to `path`."""

@@ -20,9 +20,11 @@ from .joints.batch import JointBatch
 from .joints.crushed import warn_if_crushed
 from .joints.joint import Joint
 from .joints.time_step import largest_stiffness, stable_step
+from .kernels.bond import hold
 from .kernels.engine import step_states
 from .parameters import keys, toml
 from .parameters.asperity import Asperity
+from .parameters.bond import Bond
 from .parameters.fingerprint import fingerprint
 from .parameters.heights import GammaHeights, HeightDistribution, Heights
 from .parameters.orientation import Orientation
@@ -59,6 +61,7 @@ class JointLaw:
         closure. Exact, whatever c, for all azimuths then share one motion.
     critical_slip: D_c (m), > 0: sliding that renews the asperity contacts, so that friction and
         dilation settle. Infinite (off) by default.
+    bond: cohesion and tension beside the asperities, or None for a joint without.
 
     Raises ValueError when a parameter is out of bounds or the virgin curve is not convex.
     """
@@ -72,6 +75,7 @@ class JointLaw:
     plane: float | None = None
     closure_only: bool = False
     critical_slip: float = math.inf
+    bond: Bond | None = None
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
@@ -83,6 +87,8 @@ class JointLaw:
                 f"heights = {self.heights!r} must be GammaHeights, Heights or None; a histogram in "
                 "Heights stands for any other distribution"
             )
+        if not isinstance(self.bond, Bond | None):
+            raise ValueError(f"bond = {self.bond!r} must be of type Bond, or None")
         set_(self, "asperity_density", more_than("asperity_density", self.asperity_density, 0.0))
         asked: str | Resolution = self.resolution
         set_(self, "resolution", resolve(asked))
@@ -180,9 +186,14 @@ class JointLaw:
         """Normal stress (Pa) of a joint closed from zero to `closure` (m), unsheared.
 
         With a yield_interference that of the first loading, of infinitely many depth cells: a
-        joint's own few slip a little later.
+        joint's own few slip a little later. A bond makes it negative where the joint opens.
         """
-        return self._first_loading.stress(self._within_reach(closure))[()]
+        y = self._within_reach(closure)
+        stress = self._first_loading.stress(y)
+        if self.bond is not None:
+            opening = hold(self.bond, y.reshape(1, -1), np.zeros(y.size))
+            stress = stress + opening.F.reshape(y.shape)
+        return stress[()]
 
     def closure(self, normal_stress: ArrayLike) -> Any:
         """Closure (m) at which the normal stress (Pa, >= 0) is reached: inverse of the above.
@@ -216,8 +227,8 @@ class JointLaw:
     def max_stiffness(self, closure: ArrayLike, shear: ArrayLike = 0.0) -> Any:
         """Upper bound of `|C|` (Pa/m) up to this closure (m) and this shear displacement (m, >= 0).
 
-        The shear may have any direction, and counts up to critical_slip. Yielded and worn joints
-        are less stiff.
+        The shear may have any direction, and counts up to critical_slip. Yielded and worn joints,
+        and those of a broken bond, are less stiff.
         """
         y, way = self._within_reach(closure), finite("shear", shear, "m")
         if not (way >= 0).all():
@@ -226,7 +237,8 @@ class JointLaw:
             self.tables.m[1:], axis=0
         )
         self._within_reach(y + np.max(rise, axis=-1))
-        return largest_stiffness(self.tables, y, rise)[()]
+        bond = 0.0 if self.bond is None else self.bond.largest_stiffness
+        return (largest_stiffness(self.tables, y, rise) + bond)[()]
 
     def critical_time_step(
         self, mass: ArrayLike, area: ArrayLike, closure: ArrayLike, shear: ArrayLike = 0.0
@@ -303,7 +315,7 @@ class JointLaw:
         r = self.resolution
         return tables(
             self.facets, self.curve, self.asperity, self.asperity_density,
-            self.closure_range, r.depth, self.critical_slip,
+            self.closure_range, r.depth, self.critical_slip, self.bond,
         )  # fmt: skip
 
     @cached_property

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..parameters.asperity import Asperity
+from ..parameters.bond import Bond
 from ..support.checks import Array, frozen
 from .facets import Facets
 from .nodes import UNUSED, depth_nodes
@@ -46,6 +47,7 @@ class Tables:
     opposite: NDArray[np.intp] | None = None
     mu_residual: float | None = None
     wear_slip: float = math.inf
+    bond: Bond | None = None
 
     @property
     def yields(self) -> bool:
@@ -77,10 +79,12 @@ class Tables:
         """State numbers per joint: delta, offset, dissipated energy, q of all cells, even UNUSED.
 
         Then, with yielding, the flattened depth of every facet and the plastic work; with wear, the
-        slip of the asperities, and by how much mu had fallen in the last step.
+        slip of the asperities, and by how much mu had fallen in the last step; with a bond its
+        damage.
         """
         flattened = len(self.c1) + 1 if self.yields else 0
-        return 2 * self.dim + 2 * len(self.c1) * self.cells + flattened + 2 * self.wears
+        more = flattened + 2 * self.wears + (self.bond is not None)
+        return 2 * self.dim + 2 * len(self.c1) * self.cells + more
 
 
 def tables(
@@ -91,6 +95,7 @@ def tables(
     closure_range: float,
     cells: int,
     critical_slip: float,
+    bond: Bond | None = None,
 ) -> Tables:
     """Lay out the tables; `cells` for the facet of most weight, one where the curve is linear."""
     c1, slope = np.cos(facets.theta), np.tan(facets.theta)
@@ -109,7 +114,7 @@ def tables(
     return Tables(
         curve, *frozen(arrays), asperity.lam, asperity.mu, critical_slip, yield_depth,
         alone if math.isinf(critical_slip) else facets.opposite,
-        asperity.mu_residual, asperity.wear_slip,
+        asperity.mu_residual, asperity.wear_slip, bond,
     )  # fmt: skip
 
 

@@ -177,6 +177,8 @@ class JointBatch:
             now = reference.parts(k, self._rows(index))
             y = reference.effective_closure(k, now.delta[0], now.offset)
             bound[index] = per_facet @ k.curve.force(y)[1]
+        if k.bond is not None:
+            bound += (1.0 - self.damage) * k.bond.largest_stiffness
         return bound
 
     def critical_time_step(self, mass: ArrayLike, area: ArrayLike) -> Array:
@@ -237,6 +239,11 @@ class JointBatch:
         """Friction coefficient (n,) of the asperities, worn by their slip so far."""
         k = self.law.tables
         return wear.friction(k, self._part("slip")) if k.wears else np.full(self._n, k.mu)
+
+    @property
+    def damage(self) -> Array:
+        """Damage (n,) of the bond: 0 whole, 1 broken, and 1 where the law has none."""
+        return self._part("damage") if self.law.bond is not None else np.ones(self._n)
 
     # --------------------------------------------------------------- internals
 

@@ -94,3 +94,4 @@ class Joint:
     dissipated_energy = _OfOne(JointBatch.dissipated_energy, float)
     plastic_work = _OfOne(JointBatch.plastic_work, float)
     friction = _OfOne(JointBatch.friction, float)
+    damage = _OfOne(JointBatch.damage, float)

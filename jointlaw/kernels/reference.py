@@ -7,7 +7,7 @@ joints last: facets (M, B), cells (M, D, B), sliders (2, M, D, B). State (rows, 
 
 where q is the shear force of a slider times lam, in the (s, t) basis of Eq. 25. With asperities
 that yield follow flattened depth (M) | plastic work (1); with wear, slip of the asperities (1) and
-by how much mu had fallen in the last step (1).
+by how much mu had fallen in the last step (1); with a bond its damage (1).
 """
 
 from typing import NamedTuple
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..discretisation.tables import Tables
 from ..support.checks import Array
 from ..support.thresholds import GRAZING, LIMIT, NEAR, ROUNDED, TINY, UNDERFLOW
+from . import bond
 from .cells import Cells, cells, compliance, reciprocal
 from .wear import friction, slipped, within_limit
 from .yielding import flatten, flattened, plastic_work, softening
@@ -36,6 +37,7 @@ class State(NamedTuple):
     plastic: Array  # (B,) or no rows
     slip: Array  # of the asperities (B,), or no rows
     fallen: Array  # by how much mu had fallen in the last step (B,), or no rows
+    damage: Array  # of the bond (B,), or no rows
 
 
 class Sliders(NamedTuple):
@@ -79,6 +81,7 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     5. Traction: F = sum of A Phi n + (1/lam) sum of q (Eq. 21).
     6. Dissipated energy, every term >= 0 ("No step creates energy").
     7. Tangent C = dF/dd ("The tangent"), not without `tangent`.
+    8. The bond, if there is one, adds its own F, dissipated energy and C ("The bond").
     """
     old = parts(k, state)
     new_state = np.empty_like(state)
@@ -123,23 +126,33 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
         new.slip[:] = old.slip + slipped(k, before, after, mu, rubbed)
     if k.yields:
         new.dissipated[:] += new.plastic - old.plastic
+    held = None
+    if k.bond is not None:
+        held = bond.hold(k.bond, new.delta, old.damage)
+        new.damage[:] = held.damage
+        new.dissipated[:] += held.lost
+        F = F + held.F
     if not tangent:
         return new_state, F, None
     g = gradient(k, J_offset)
     C = stiffness(k, before, after, sliders, de, g)
     if flat0 is not None and flat1 is not None:
         C = C - softening(k, after, flat0, flat1, sliders.push, g)
+    if held is not None:
+        C = C + held.C
     return new_state, F, C
 
 
 def parts(k: Tables, state: Array) -> State:
     """Views of the parts of a state array, q as (2, M, D, B)."""
     dim, M = k.dim, len(k.c1)
+    damage = state[-1] if k.bond is not None else state[:0]
+    state = state[:-1] if k.bond is not None else state
     q, rest = np.split(state[2 * dim :], [2 * M * k.cells])
     depth, plastic = (rest[:M], rest[M]) if k.yields else (rest[:0], rest[:0])
     slip, fallen = rest[-2:] if k.wears else (rest[:0], rest[:0])
     place = state[:dim], state[dim : 2 * dim - 1], state[2 * dim - 1]
-    return State(*place, q.reshape(2, M, k.cells, -1), depth, plastic, slip, fallen)
+    return State(*place, q.reshape(2, M, k.cells, -1), depth, plastic, slip, fallen, damage)
 
 
 def effective_closure(k: Tables, closure: Array, offset: Array) -> Array:
@@ -290,7 +303,8 @@ def traction(k: Tables, state: Array) -> Array:
     if k.yields:
         force = np.where(y > now.depth, force - k.curve.force(now.depth)[0], 0.0)
     shear = np.einsum("edm,emb->db", np.stack([k.s, k.t]), now.q.sum(axis=2))
-    return k.n @ (k.area[:, None] * force) + shear / k.lam
+    F: Array = k.n @ (k.area[:, None] * force) + shear / k.lam
+    return F if k.bond is None else F + bond.traction(k.bond, now.delta, now.damage)
 
 
 class Measures(NamedTuple):
@@ -325,4 +339,6 @@ def measures(k: Tables, state: Array) -> Measures:
         normal = np.where(touches, np.maximum(normal, 0.0), 0.0)
     stored = np.sum((k.area * k.c1)[:, None] * normal, axis=0)
     stored = stored + np.sum(compliance(k) * q2 * reciprocal(now.kappa), axis=(0, 1))
+    if k.bond is not None:
+        stored = stored + bond.stored(k.bond, state_now.delta, state_now.damage)
     return Measures(sliding, slipping, separated, stored, np.max(y, axis=0))

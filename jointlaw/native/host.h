@@ -145,6 +145,7 @@ extern "C" {
 #endif
 
 #include "lanes.h"
+#include "bond.h"
 #include "law.h"
 
 /* ------------------------------------------------------------------ messages */
@@ -265,6 +266,7 @@ static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
   if (law->yields) good = good && fabs(rest[law->facets]) <= DBL_MAX;
   if (law->wears) good = good && slip[0] >= 0.0 && slip[0] <= DBL_MAX;
   if (law->wears) good = good && slip[1] >= 0.0 && slip[1] <= law->mu;
+  if (law->bonded) good = good && s[damage_row(law)] >= 0.0 && s[damage_row(law)] <= 1.0;
   return good && jlaw_sound_(s + 2 * law->dim, rest_row(law) - 2 * law->dim);
 }
 
@@ -334,7 +336,7 @@ JLAW_CLONES static JLAW_FUNCTION amounts jlaw_measure_(const jlaw_law *law, cons
 JLAW_FUNCTION double jlaw_stored(const jlaw_law *law, const double *s)
 {
   const amounts all = jlaw_measure_(law, s);
-  return all.normal + all.sheared;
+  return all.normal + all.sheared + all.bond;
 }
 
 JLAW_FUNCTION void jlaw_shares(const jlaw_law *law, const double *s, double shares[3])
@@ -356,6 +358,11 @@ JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure)
       const double depth = jlaw_of_facet_(law, f, i + 1);
       late += jlaw_of_facet_(law, f, i) * jlaw_virgin_one_(law, closure - depth, &slope);
     }
+  if (law->bonded && closure < 0.0) { /* a joint that opens */
+    bonded b = {{closure, 0.0, 0.0}, 0.0, {0.0}, {0.0}, 0.0};
+    hold(law, &b);
+    return b.F[0];
+  }
   return law->closure_factor * jlaw_virgin_one_(law, closure, &slope) - late;
 }
 
@@ -364,7 +371,7 @@ JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure)
   double slope;
   if (!(closure <= law->largest_reach)) return jlaw_none_();
   jlaw_virgin_one_(law, closure, &slope);
-  return law->stiffness_factor * slope;
+  return law->stiffness_factor * slope + fmax(law->bond_normal, law->bond_shear);
 }
 
 JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)

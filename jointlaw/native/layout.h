@@ -1,5 +1,5 @@
 /* Made from layout.py by `python -m jointlaw.native`; change it there. */
-#define JLAW_FORMAT 3 /* of table files */
+#define JLAW_FORMAT 4 /* of table files */
 enum {
   JLAW_LANES = 4, /* facets side by side in a block of the tables */
   JLAW_AZIMUTHS = 512, /* most */
@@ -40,6 +40,7 @@ struct jlaw_law {
   int pieces; /* of the virgin curve */
   int yields; /* whether asperities yield */
   int wears; /* whether mu falls with slip */
+  int bonded; /* whether there is a bond */
   double soft; /* 1/lam */
   double mu; /* of unworn asperities */
   double mu_residual; /* of asperities that are worn */
@@ -48,6 +49,12 @@ struct jlaw_law {
   double eta; /* exponent of the virgin curve */
   double scale; /* V of the virgin curve, m^(1/2) */
   double rise; /* p: the curve is tabulated over w^p */
+  double bond_normal; /* Pa/m: stiffness of the bond */
+  double bond_shear; /* Pa/m */
+  double opening_begin; /* 1/m: one over the opening where it begins to break */
+  double slip_begin; /* 1/m: the same of slip */
+  double opening_end; /* 1/m: where nothing of it is left */
+  double slip_end; /* 1/m */
   double closure_factor; /* normal stress over Phi */
   double stiffness_factor; /* bound of |C| over Phi' */
   double largest_reach; /* m: bound of |y| */
@@ -68,6 +75,7 @@ struct jlaw_law {
   X(pieces, 1, 1, 1e6) \
   X(yields, 1, 0, 1) \
   X(wears, 1, 0, 1) \
+  X(bonded, 1, 0, 1) \
   X(soft, 0, 0, DBL_MAX) \
   X(mu, 0, 0, DBL_MAX) \
   X(mu_residual, 0, 0, DBL_MAX) \
@@ -76,6 +84,12 @@ struct jlaw_law {
   X(eta, 0, 0, DBL_MAX) \
   X(scale, 0, DBL_MIN, DBL_MAX) \
   X(rise, 0, 0, DBL_MAX) \
+  X(bond_normal, 0, 0, DBL_MAX) \
+  X(bond_shear, 0, 0, DBL_MAX) \
+  X(opening_begin, 0, 0, DBL_MAX) \
+  X(slip_begin, 0, 0, DBL_MAX) \
+  X(opening_end, 0, 0, DBL_MAX) \
+  X(slip_end, 0, 0, DBL_MAX) \
   X(closure_factor, 0, 0, DBL_MAX) \
   X(stiffness_factor, 0, 0, DBL_MAX) \
   X(largest_reach, 0, 0, DBL_MAX) \

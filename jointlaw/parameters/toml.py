@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from ..support.files import replace_file
 from .asperity import Asperity
+from .bond import Bond
 from .heights import GammaHeights, Heights
 from .keys import Removed, as_given, checked, keys_of, read
 from .orientation import Orientation
@@ -20,7 +21,7 @@ _LAW = {
     "orientation!": keys_of(Orientation), "asperity!": keys_of(Asperity), "heights": as_given,
     "asperity_density!": as_given, "closure_range": as_given, "resolution": as_given,
     "plane": as_given, "closure_only": as_given, "critical_slip": as_given,
-    "about": as_given,  # free table for title, source and notes
+    "bond": keys_of(Bond), "about": as_given,  # free table for title, source and notes
     "version": as_given,
 }  # fmt: skip
 _HEIGHTS = keys_of(Heights) | {
@@ -29,6 +30,8 @@ _HEIGHTS = keys_of(Heights) | {
 _UNITS = {
     "asperity_density": "1/m2", "closure_range": "m", "critical_slip": "m", "plane": "rad",
     "K": "Pa m^(1-eta)", "yield_interference": "m", "wear_slip": "m", "beta": "m", "overlap": "m",
+    "normal_stiffness": "Pa/m", "shear_stiffness": "Pa/m", "tension": "Pa", "cohesion": "Pa",
+    "energy_I": "J/m2", "energy_II": "J/m2",
 }  # fmt: skip
 _ENDLESS = ("yield_interference", "wear_slip")  # infinite, which is their default: not written
 T = TypeVar("T")
@@ -48,7 +51,7 @@ def write_law(law: Mapping[str, Any], path: Path | None) -> str:
         "resolution = " + (f'"{name}"' if name else own),
         *_lines(law, ("critical_slip", "plane", "closure_only")),
     ]
-    for part in ("orientation", "asperity", "heights"):
+    for part in ("orientation", "asperity", "heights", "bond"):
         if law[part] is not None:
             values = {one.name: getattr(law[part], one.name) for one in fields(law[part])}
             lines += ["", f"[{part}]", *_lines(values, [name for name in values if name[0] != "_"])]
@@ -106,6 +109,8 @@ def build_law(build: Callable[..., T], data: dict[str, Any], where: str) -> T:
     try:
         values["orientation"] = Orientation(**values["orientation"])
         values["asperity"] = Asperity(**values["asperity"])
+        if "bond" in values:
+            values["bond"] = Bond(**values["bond"])
         if "heights" in values:
             values["heights"] = _heights(values["heights"], where)
         if isinstance(values.get("resolution"), dict):

@@ -49,6 +49,7 @@ KINDS = {
     "yielding": {"critical_slip": 2e-6, "damage": {"yield_interference": 2e-7}},
     "wear": {"plane": 0.4, "damage": {"mu_residual": 0.1, "wear_slip": 1e-6}},
     "closure only": {"closure_only": True, "critical_slip": 2e-6},
+    "bond": {"bond": jl.Bond(1e12, 1e12, 5e4, 1e5, 5e-3, 2e-2)},
 }
 
 

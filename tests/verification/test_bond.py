@@ -1,4 +1,4 @@
-"""The bond: strength, energies of fracture, no healing, no energy from cycles, peak with friction."""
+"""The bond: strength, energies of fracture, no healing, no energy made, peak with friction."""
 
 from dataclasses import replace
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..discretisation.tables import Tables
 from ..support.checks import Array
 from ..support.thresholds import GRAZING, LIMIT, NEAR, ROUNDED, TINY, UNDERFLOW
-from . import bond
+from .bond import hold
 from .cells import Cells, cells, compliance, reciprocal
 from .wear import friction, slipped, within_limit
 from .yielding import flatten, flattened, plastic_work, softening
@@ -128,7 +128,7 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
         new.dissipated[:] += new.plastic - old.plastic
     held = None
     if k.bond is not None:
-        held = bond.hold(k.bond, new.delta, old.damage)
+        held = hold(k.bond, new.delta, old.damage)
         new.damage[:] = held.damage
         new.dissipated[:] += held.lost
         F = F + held.F
@@ -304,7 +304,7 @@ def traction(k: Tables, state: Array) -> Array:
         force = np.where(y > now.depth, force - k.curve.force(now.depth)[0], 0.0)
     shear = np.einsum("edm,emb->db", np.stack([k.s, k.t]), now.q.sum(axis=2))
     F: Array = k.n @ (k.area[:, None] * force) + shear / k.lam
-    return F if k.bond is None else F + bond.traction(k.bond, now.delta, now.damage)
+    return F if k.bond is None else F + hold(k.bond, now.delta, now.damage).F
 
 
 class Measures(NamedTuple):
@@ -340,5 +340,5 @@ def measures(k: Tables, state: Array) -> Measures:
     stored = np.sum((k.area * k.c1)[:, None] * normal, axis=0)
     stored = stored + np.sum(compliance(k) * q2 * reciprocal(now.kappa), axis=(0, 1))
     if k.bond is not None:
-        stored = stored + bond.stored(k.bond, state_now.delta, state_now.damage)
+        stored = stored + hold(k.bond, state_now.delta, state_now.damage).stored
     return Measures(sliding, slipping, separated, stored, np.max(y, axis=0))

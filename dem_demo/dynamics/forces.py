@@ -38,7 +38,5 @@ def _dashpots(scene, blocks, contacts, joints, area, pressed) -> tuple[np.ndarra
     critical = blocks.damping(contacts, joints.stiffness * area)
     least = np.where(joints.damage < 1, -np.inf, -pressed)
     push = np.maximum(-run.dashpot_normal * critical * contacts.opening, least)
-    stick = 1.0 - joints.separated - joints.slipping
-    return push, -run.dashpot_shear * critical * np.maximum(
-        stick, 1.0 - joints.damage
-    ) * contacts.sliding
+    stick = np.maximum(1.0 - joints.separated - joints.slipping, 1.0 - joints.damage)
+    return push, -run.dashpot_shear * critical * stick * contacts.sliding

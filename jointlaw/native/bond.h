@@ -65,7 +65,7 @@ IN void step_bond(const jlaw_law *law, numbers n, int row, of_joint F[3], of_joi
     for (int i = 0; i < dim; i++) b.delta[i] = s[(size_t) i * n.stride];
     hold(law, &b);
     s[(size_t) row * n.stride] = b.damage;
-    if (ledger) s[(size_t) (2 * dim - 1) * n.stride] += b.lost;
+    if (ledger) s[(size_t) dim * n.stride] += b.lost;
     for (int i = 0; i < dim; i++) JOINT(F[i], l) += b.F[i];
     for (int i = 0; tangent && i < dim * dim; i++) JOINT(C[i], l) += b.C[i / dim * 3 + i % dim];
   }

@@ -117,10 +117,9 @@ def smoothed(scene: Scene, factor: float) -> Scene:
     """A scene with the friction of asperities and of plain Coulomb divided by a factor."""
     highest, laws = RANGES["mu"][1], {}  # that a scene may have; what fails with it has no factor
     for name, law in scene.laws.items():
-        given = {key: getattr(law.asperity, key) for key in ("mu", "mu_residual")}
-        weak = {key: min(mu / factor, highest) for key, mu in given.items()
-                if mu is not None and mu < STICKS}  # fmt: skip
-        laws[name] = replace(law, asperity=replace(law.asperity, **weak))
+        mu = law.asperity.mu
+        weak = min(mu / factor, highest) if mu < STICKS else mu
+        laws[name] = replace(law, asperity=replace(law.asperity, mu=weak))
     return replace(scene, laws=laws)
 
 

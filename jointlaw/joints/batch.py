@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..kernels import reference, wear
-from ..kernels.blocks import LANES, empty_blocks, rows_of, write_rows, zeros
+from ..kernels.blocks import LANES, rows_of, write_rows, zeros
 from ..kernels.engine import Step, engine
 from ..kernels.reference import Measures
 from ..support.checks import Array, integer, numbers
@@ -47,7 +47,7 @@ class JointBatch:
         self.law, self.ledger = law, ledger
         self._engine = engine(law.tables)
         self._n = integer("n", n, 0)
-        self._state = empty_blocks(self._engine.rows, self._n)
+        self._state = zeros(self._n, self._engine.rows, 1 if self._n == 1 else LANES)
         self._largest_reach = 0.0  # bound of |y| of all facets of all joints
         numbers = np.arange(law.state_size, dtype=np.float64)[:, None]
         self._row_numbers = reference.parts(law.tables, numbers)  # of each part of a state
@@ -140,7 +140,7 @@ class JointBatch:
         if n < self._n:
             self.reset(np.arange(n, self._n))
         elif n > blocks * lanes:  # grow by doubling, so that steady growth copies rarely
-            grown = zeros(max(-(-n // LANES), 2 * blocks), rows, LANES)
+            grown = zeros(max(n, 2 * blocks * LANES), rows)
             write_rows(grown, rows_of(self._state, self._n), np.arange(self._n))
             self._state = grown
         self._n = n

@@ -22,14 +22,16 @@ def run(folder, dim, edits=(), steps=END):
     """Run a project, its text changed by (old, new); jumps (m) and stresses (Pa) of the layer."""
     if not OGS.exists():
         pytest.skip("OpenGeoSys is not installed (pip install 'jointlaw[fem]')")
-    text = (folder / f"opengeosys_{dim}d.prj").read_text()
+    project = "opengeosys_2d.prj" if dim == 2 else "opengeosys_3d.xml"
+    text = (folder / project).read_text()
     for old, new in edits:
         assert old in text, old
         text = text.replace(old, new)
-    (folder / "test.prj").write_text(text)
+    test = f"test{Path(project).suffix}"
+    (folder / test).write_text(text)
     out = folder / "results"
     out.mkdir(exist_ok=True)
-    command = [OGS, "test.prj", "-o", "results"]
+    command = [OGS, test, "-o", "results"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stdout[-2000:]
     files = [meshio.read(out / f"shear_{dim}d_{i}.vtu") for i in range(steps + 1)]

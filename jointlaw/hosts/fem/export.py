@@ -8,13 +8,9 @@ from ...law import JointLaw
 from ...support.checks import number
 from ...support.files import replace_file
 from ..c import export as c
-from . import opengeosys
 
-FILES = ("jointlaw_fem.h", "mgis.c", "umat.c", "Makefile", "kratos.py", "README.md")
 SEATING = 10e3  # Pa
 NORMAL = 2e6  # Pa: of the direct shear tests
-YOUNG, POISSON = 50e9, 0.2  # of the rock: Pa, -
-THICKNESS = 1e-3  # m: of the layer that stands for the joint
 
 
 def export_fem(
@@ -41,32 +37,27 @@ def export_fem(
             "no end; take 10e3, or 1 where all displacements are given"
         )
     c.require_name(name)
-    tables = c.header_text(law, name)
+    texts = {
+        "jointlaw.h": (Path(c.include_dir()) / "jointlaw.h").read_text(encoding="utf-8"),
+        f"{name}.h": c.header_text(law, name),
+    }
+    marks = _marks(law, seating)
+    source = resources.files(__package__) / "files"
+    for file in sorted(source.iterdir(), key=lambda file: file.name):
+        if law.dim == 3 or "3d" not in file.name:
+            text = file.read_text(encoding="utf-8")
+            for mark, value in marks.items():
+                text = text.replace(f"@{mark}@", value)
+            texts[file.name] = text.replace("granite", name)
     folder = Path(directory)
     folder.mkdir(parents=True, exist_ok=True)
-    marks = _marks(law, seating)
-    texts = {"jointlaw.h": (Path(c.include_dir()) / "jointlaw.h").read_text(encoding="utf-8")}
-    texts |= {f"{name}.h": tables} | {file: _filled(file, name, marks) for file in FILES}
-    for dim in range(2, law.dim + 1):
-        zeros = " ".join(["0"] * dim)
-        more = {"D": str(dim), "ZEROS": zeros, "BOUNDARIES": opengeosys.boundaries(dim)}
-        texts[f"opengeosys_{dim}d.prj"] = _filled("opengeosys.prj", name, marks | more)
-        texts |= opengeosys.meshes(dim, THICKNESS)
-    for file, text in texts.items():
-        replace_file(folder / file, text.encode())
+    for file_name, text in texts.items():
+        replace_file(folder / file_name, text.encode())
     return list(texts)
 
 
-def _filled(file: str, name: str, marks: dict[str, str]) -> str:
-    """A file of this package for the joint of this name, with values for its @WORDS@."""
-    text = (resources.files(__package__) / "files" / file).read_text(encoding="utf-8")
-    for mark, value in marks.items():
-        text = text.replace(f"@{mark}@", value)
-    return text.replace("granite", name)
-
-
 def _marks(law: JointLaw, seating: float) -> dict[str, str]:
-    """What stands for the @WORDS@ of all files."""
+    """What stands for the @WORDS@ of the files."""
     start = [*law.joint(normal_stress=seating).snapshot().values[0].tolist(), 1.0]
     names = [f'"State{i}"' for i in range(1, len(start))] + ['"Begun"']
     shear = 5.0 * float(law.closure(NORMAL))
@@ -75,11 +66,9 @@ def _marks(law: JointLaw, seating: float) -> dict[str, str]:
         "STATE": str(len(start)),
         "NAMES": fill(", ".join(names), 96).replace("\n", " \\\n"),
         "START": fill(", ".join(map(repr, start)), 96),
+        "ZEROS": ", ".join(["0.0"] * len(start)),
         "SEATING": f"{seating:g}",
         "NORMAL": f"{NORMAL:g}",
         "SHEAR": repr(shear),
         "BACK": repr(shear / 2),
-        "YOUNG": f"{YOUNG:g}",
-        "POISSON": f"{POISSON:g}",
-        "THICKNESS": f"{THICKNESS:g}",
     }

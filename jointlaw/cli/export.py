@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ..hosts.c.export import export_c, identifier
-from ..hosts.fem.export import SEATING, export_fem
+from ..hosts.fem.export import SEATING, export_fem, require_seating
 from ..hosts.lammps.export import export_lammps
 from ..hosts.yade.export import export_yade
 from ..law import JointLaw
@@ -50,15 +50,16 @@ def _export(options: argparse.Namespace) -> None:
         raise ValueError(
             f"--shear-limit shapes a table for YADE; {host} runs the law itself: leave it out"
         )
-    if options.seating is not None and host != "fem":
+    seating = {} if options.seating is None else {"seating": options.seating}
+    if seating and host != "fem":
         raise ValueError(f"--seating is for fem; in {host} the host closes the joint: leave it out")
+    require_seating(**seating)
     clear_run(folder)
     if host == "yade":
         _export_table(law, folder, options.shear_limit)
     else:
         export = {"c": export_c, "lammps": export_lammps, "fem": export_fem}[host]
-        more = {} if options.seating is None else {"seating": options.seating}
-        files = export(law, folder, identifier(Path(options.law).stem), **more)
+        files = export(law, folder, identifier(Path(options.law).stem), **seating)
         print(f"wrote {', '.join(files)}")
     print(f"run: cd {folder} && {START[host]}")
 

@@ -73,11 +73,10 @@ def make(folder):
     """Write the files that the page loads."""
     folder.mkdir(parents=True, exist_ok=True)
     shutil.copy(SOURCES / "joint.js", folder)
-    titles = {name: presets.about(name)["title"] for name in presets.names()}
-    about = {"presets": titles, "resolutions": RESOLUTIONS}
+    about = {"presets": presets.names(), "resolutions": RESOLUTIONS}
     script = f"const JOINTLAW = {json.dumps(about)};\nJOINTLAW.wasm = {text(compiled())};\n"
     (folder / "law.js").write_text(script, encoding="utf-8")
-    for name in titles:
+    for name in presets.names():
         for resolution in RESOLUTIONS:
             law = replace(presets.load(name), resolution=resolution)
             key = f"{name}-{resolution}"

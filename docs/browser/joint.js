@@ -130,7 +130,7 @@ class Test {
     this.steps.push([...d, ...F]);
     const shear = F[1] * this.along[0] + F[2] * this.along[1];
     this.rows.push({ slip: this.slip, closure: this.closure, normal: F[0], shear });
-    if (this.rows.length > 20000) this.rows.splice(0, 5000);
+    if (this.rows.length > 6000) this.rows.splice(0, 1500);
   }
 
   /* Slip by so much while the normal stress stays */
@@ -188,10 +188,10 @@ let colours = {};
 function canvas(name) {
   const place = part(name), ratio = window.devicePixelRatio || 1;
   const wide = place.clientWidth, high = place.clientHeight;
-  place.width = Math.round(wide * ratio); // which also clears it
-  place.height = Math.round(high * ratio);
-  const c = place.getContext("2d");
-  c.scale(ratio, ratio);
+  const c = place.getContext("2d"), pixels = [wide, high].map((size) => Math.round(size * ratio));
+  if (place.width !== pixels[0] || place.height !== pixels[1]) [place.width, place.height] = pixels;
+  c.setTransform(ratio, 0, 0, ratio, 0, 0);
+  c.clearRect(0, 0, wide, high);
   c.font = "12px system-ui, sans-serif";
   c.lineJoin = "round";
   return { c, wide, high };
@@ -210,7 +210,7 @@ function niceStep(range, most) {
   return power * [1, 2, 5, 10].find((s) => s * power >= rough);
 }
 
-const tidy = (x, step) => x.toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
+const tidy = (x, step) => (Math.abs(x) < step / 2 ? 0 : x).toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
 
 /* Lines against one another. lines: { x, y, colour, name } of numbers in the units of the labels;
  * smallest: range of each axis */
@@ -417,8 +417,9 @@ function tell(per, unit) {
 }
 
 function redraw() {
-  if (!drawn) requestAnimationFrame(draw);
+  if (drawn || !test) return; // nothing to draw while the first tables load
   drawn = true;
+  requestAnimationFrame(draw);
 }
 
 /* Move the upper block: in steps so small that the path of the mouse, not its speed, decides */
@@ -480,8 +481,8 @@ async function begin() {
 }
 
 function listen() {
-  for (const [name, title] of Object.entries(JOINTLAW.presets)) part("preset").add(new Option(title, name));
-  for (const name of JOINTLAW.resolutions) part("resolution").add(new Option(name, name));
+  for (const name of JOINTLAW.presets) part("preset").add(new Option(name));
+  for (const name of JOINTLAW.resolutions) part("resolution").add(new Option(name));
   part("preset").value = "westerly-rough";
   part("resolution").value = "balanced";
   for (const name of ["preset", "resolution"]) part(name).onchange = begin;

@@ -104,6 +104,19 @@ class Chromium:
         self.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1,
                  clickCount=1)  # fmt: skip
 
+    def finger(self, places):
+        """Touch the first place, move over the others, and let go."""
+        self.ask("Emulation.setTouchEmulationEnabled", enabled=True)
+        for i, (x, y) in enumerate(places):
+            kind = "touchMove" if i else "touchStart"
+            self.ask("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": x, "y": y}])
+        self.ask("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+
+    def key(self, name):
+        """Press a key and let go."""
+        for kind in ("keyDown", "keyUp"):
+            self.ask("Input.dispatchKeyEvent", type=kind, key=name)
+
     def picture(self, path):
         """What the window shows, as a PNG file."""
         path.write_bytes(base64.b64decode(self.ask("Page.captureScreenshot")["data"]))

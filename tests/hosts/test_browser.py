@@ -40,13 +40,18 @@ def choose(chromium, part, value):
     chromium.wait("test !== before && test.rows.length >= 40")
 
 
-def drag(chromium, places):
-    """Press the upper block at the first place, move over the others (x, y from there), release."""
+def on_block(chromium, places):
+    """Places (x, y) from the middle of the upper block, in the window."""
     box = chromium.run(
         "(() => { const b = part('scene').getBoundingClientRect();"
         " return [b.x + b.width / 2, b.y + 40]; })()"
     )
-    at = [(box[0] + x, box[1] + y) for x, y in places]
+    return [(box[0] + x, box[1] + y) for x, y in places]
+
+
+def drag(chromium, places):
+    """Press the mouse at the first place, move over the others, release."""
+    at = on_block(chromium, places)
     chromium.mouse("mousePressed", *at[0])
     for place in at:
         chromium.mouse("mouseMoved", *place)
@@ -101,6 +106,19 @@ def test_every_test_and_control_works_without_an_error(chromium):
     assert F[-1, 0] > 1e6
     chromium.run("part('hold').value = 'stress'")
     assert chromium.run("document.documentElement.scrollWidth <= innerWidth")  # at 390 pixels
+    assert chromium.said == []
+
+
+def test_finger_and_keys_move_the_block(chromium):
+    choose(chromium, "preset", "westerly-smooth")
+    chromium.finger(on_block(chromium, [(0, 0), (10, 0), (30, 0)]))
+    way = chromium.run("test.slip * zoomOf(test)")
+    assert 10 < way <= 30.001  # pixels; a browser may pass over the first of them
+    chromium.run("part('scene').focus()")
+    chromium.key("ArrowLeft")
+    back = way - chromium.run("test.slip * zoomOf(test)")
+    assert back == pytest.approx(chromium.run("test.joint.length * zoomOf(test) / 20"))
+    same_bits(chromium, "westerly-smooth", chromium.run("part('resolution').value"))
     assert chromium.said == []
 
 

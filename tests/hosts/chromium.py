@@ -95,9 +95,11 @@ class Chromium:
         return told["result"].get("value")
 
     def wait(self, condition):
-        """Until a condition in the page is true."""
-        look = f"if ({condition}) done(); else setTimeout(look, 20)"
-        self.run(f"new Promise((done) => {{ const look = () => {{ {look} }}; look(); }})")
+        """Until a condition in the page is true, a minute at most."""
+        look = f"if ({condition}) done(true); else setTimeout(look, 20)"
+        late = "setTimeout(() => done(false), 60000)"
+        script = f"new Promise((done) => {{ const look = () => {{ {look} }}; look(); {late}; }})"
+        assert self.run(script), f"never: {condition}; the console says {self.said}"
 
     def mouse(self, kind, x, y):
         """`mousePressed`, `mouseMoved` or `mouseReleased` at a place of the window."""

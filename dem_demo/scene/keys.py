@@ -77,17 +77,17 @@ SET = {
 }  # fmt: skip
 ROCK = {
     "name!": TEXT, "outline!": corners, "set!": [SET], "at": vector,
-    "fixed": [{"corners!": corners}], "seed": partial(integer, bound=0), "least_width": POSITIVE,
-    "density": DENSITY, "laws": TABLE,
+    "fixed": [{"corners!": corners}], "hole": [{"corners!": corners}], "density": DENSITY,
+    "seed": partial(integer, bound=0), "least_width": POSITIVE, "laws": TABLE,
 }  # fmt: skip
 DRIVE = {
-    "block!": TEXT, "motion!": partial(one_of, choices=tuple(AXES)), "ease": NOT_NEGATIVE,
+    "block": TEXT, "motion!": partial(one_of, choices=tuple(AXES)), "ease": NOT_NEGATIVE,
     "times": partial(finite, unit="s"), "values": partial(finite, unit="m or degrees"),
     "back": {"block!": TEXT, "slid!": POSITIVE, "by!": POSITIVE, "rate!": POSITIVE},
     "sine": {
         "acceleration!": POSITIVE, "frequency!": POSITIVE, "cycles": partial(integer, bound=1),
     },
-    "file": TEXT, "scale": number,
+    "file": TEXT, "scale": number, "baseline": a(bool),
 }  # fmt: skip
 RUN = {
     "end!": POSITIVE, "fraction": within(1e-6, 0.95, "of the limit"), "step": POSITIVE,
@@ -100,7 +100,7 @@ SCENE = {
     "title": TEXT, "gravity": vector, "density": DENSITY, "thickness": POSITIVE, "law": TEXT,
     "laws!": TABLE, "block": [BLOCK], "rock": [ROCK], "drive": [DRIVE], "run!": RUN,
     "joint": [{"between": LIST, "around": vector, "law!": TEXT}],
-    "watch": {"slip": LIST, "shear": LIST, "pins": LIST},
+    "watch": {"slip": LIST, "shear": LIST, "pins": LIST, "joints": LIST},
 }  # fmt: skip
 COULOMB = {
     "kind!": TEXT, "normal_stiffness!": POSITIVE, "shear_stiffness!": POSITIVE,

@@ -16,18 +16,18 @@ from ..parameters.asperity import Asperity
 from ..parameters.heights import GammaHeights
 from ..parameters.orientation import Orientation
 from ..parameters.resolution import SLIP, resolve
+from ..parameters.rock import ROCK
 from ..support.checks import Array
 from .priors import Values
 
-# Rock of shear modulus 20 GPa and Poisson's ratio 0.25 with asperities of 1 mm radius (Eq. 34),
-# friction 0.6 (Byerlee 1978), mean inclination 19 degrees as for the paper's rough granite.
-_ROCK = Asperity.hertz_mindlin(G=20e9, nu=0.25, R=1e-3, mu=0.6)
+# With a mean inclination of 19 degrees, as that of the paper's rough granite
 DEFAULTS = {
-    "alpha": 3.7, "beta": 1e-5, "overlap": 0.0, "asperity_density": 1e6, "K": _ROCK.K,
-    "lam": _ROCK.lam, "eta": _ROCK.eta, "mu": _ROCK.mu, "a": 3.0, "b": 0.0, "c": 0.0,
-    "yield_interference": math.inf, "mu_residual": _ROCK.mu, "wear_slip": math.inf,
+    "alpha": 3.7, "beta": 1e-5, "overlap": 0.0, "asperity_density": 1e6, "K": ROCK.K,
+    "lam": ROCK.lam, "eta": ROCK.eta, "mu": ROCK.mu, "a": 3.0, "b": 0.0, "c": 0.0,
+    "yield_interference": math.inf, "mu_residual": ROCK.mu, "wear_slip": math.inf,
     "critical_slip": math.inf,
 }  # fmt: skip
+STEPS = 50  # of the way of a shear test to begin with; a fit halves them while that matters
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,7 @@ class Settings:
     closure_range: Any = None  # m
     plane: float | None = None  # of the law to be found; every shear curve has its own
     closure_only: bool = False
+    steps: int = STEPS  # of the way of a shear test, at least
 
 
 def parameters(law: JointLaw) -> tuple[dict[str, float], Settings]:

@@ -33,10 +33,6 @@ class Transform(NamedTuple):
         """The value whose transform is x."""
         return math.exp(x) - self.shift if self.log else x
 
-    def slope(self, value: float) -> float:
-        """d value / d x."""
-        return value + self.shift if self.log else 1.0
-
 
 TRANSFORMS = {
     "alpha": Transform("1", -0.99, 1e3, shift=1.0),

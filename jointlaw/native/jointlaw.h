@@ -481,7 +481,7 @@ typedef struct { /* facets in a step: y, Phi, Phi', Phi'' before and after; de *
 
 typedef struct {             /* the sliders of one depth cell of facets */
   jl_real_ G0, G1, k0, k1, kz1;  /* G and kappa before and after; kappa at z1 */
-  jl_real_ reached;              /* G at the new y before springs yield there */
+  jl_real_ gained;               /* what G grows by, before springs yield at the new y */
   jl_real_ strength, cap, chord; /* mu lam A; friction limit; of G over the step */
   jl_real_ ts, tt, unit, share;  /* trial force, 1 over its size, cap over its size or 1 */
   jl_real_ old2, new2;           /* squares of q before and of the trial force */
@@ -755,18 +755,19 @@ JL_IN_ jl_of_joint_ jl_drag_loss_(const jlaw_law *law, int dim, const jl_motion_
 
 /* --------------------------------------------------------------------------- one step */
 
-/* G and kappa of a cell before and after the step; springs yield at the new y at once */
+/* G and kappa of a cell before and after the step. What G gains is taken from the virgin curve: the
+ * bounds of `flatten` would show in it where that curve is small and hardly convex. */
 JL_IN_ void jl_cells_of_(const double *cell, const jl_facets_ *o, jl_sliders_ *c, int yields)
 {
   jl_share_of_(cell, o->y0, o->f0, o->k0, &c->G0, &c->k0);
   jl_share_of_(cell, o->y1, o->f1, o->k1, &c->G1, &c->k1);
-  c->reached = c->G1;
+  c->gained = c->G1 - c->G0;
   if (!yields) return;
-  jl_real_ H0, H1, kz0, k = c->k1;
+  jl_real_ H0, H1, kz0;
   jl_share_of_(cell, o->z0, o->fz0, o->kz0, &H0, &kz0);
   jl_share_of_(cell, o->z1, o->fz1, o->kz1, &H1, &c->kz1);
+  c->gained = c->G1 - jl_larger_(c->G0, H0);
   jl_flatten_(o->y0, o->z0, H0, &c->G0, &c->k0);
-  jl_flatten_(o->y1, o->z0, H0, &c->reached, &k);
   jl_flatten_(o->y1, o->z1, H1, &c->G1, &c->k1);
 }
 
@@ -776,7 +777,7 @@ JL_IN_ void jl_load_(const double *f, const jl_facets_ *o, jl_sliders_ *c, jl_re
 {
   jl_yes_ near = o->near;
   if (k.yields) near = near & ((c->k0 > 0.0) | (c->k1 <= 0.0)); /* flattened ones touch together */
-  const jl_real_ mean = jl_pick_(near, 0.5 * (c->k0 + c->k1), (c->reached - c->G0) * o->rdy);
+  const jl_real_ mean = jl_pick_(near, 0.5 * (c->k0 + c->k1), c->gained * o->rdy);
   c->chord = jl_smaller_(jl_larger_(mean, c->k0), c->k1); /* k1 where it falls */
   c->old2 = *qs * *qs + *qt * *qt;
   const jl_yes_ falls = c->k1 < c->k0;

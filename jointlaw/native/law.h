@@ -32,7 +32,7 @@ typedef struct { /* facets in a step: y, Phi, Phi', Phi'' before and after; de *
 
 typedef struct {             /* the sliders of one depth cell of facets */
   real G0, G1, k0, k1, kz1;  /* G and kappa before and after; kappa at z1 */
-  real reached;              /* G at the new y before springs yield there */
+  real gained;               /* what G grows by, before springs yield at the new y */
   real strength, cap, chord; /* mu lam A; friction limit; of G over the step */
   real ts, tt, unit, share;  /* trial force, 1 over its size, cap over its size or 1 */
   real old2, new2;           /* squares of q before and of the trial force */
@@ -306,18 +306,19 @@ IN of_joint drag_loss(const jlaw_law *law, int dim, const motion *m, const sums 
 
 /* --------------------------------------------------------------------------- one step */
 
-/* G and kappa of a cell before and after the step; springs yield at the new y at once */
+/* G and kappa of a cell before and after the step. What G gains is taken from the virgin curve: the
+ * bounds of `flatten` would show in it where that curve is small and hardly convex. */
 IN void cells_of(const double *cell, const facets *o, sliders *c, int yields)
 {
   share_of(cell, o->y0, o->f0, o->k0, &c->G0, &c->k0);
   share_of(cell, o->y1, o->f1, o->k1, &c->G1, &c->k1);
-  c->reached = c->G1;
+  c->gained = c->G1 - c->G0;
   if (!yields) return;
-  real H0, H1, kz0, k = c->k1;
+  real H0, H1, kz0;
   share_of(cell, o->z0, o->fz0, o->kz0, &H0, &kz0);
   share_of(cell, o->z1, o->fz1, o->kz1, &H1, &c->kz1);
+  c->gained = c->G1 - larger(c->G0, H0);
   flatten(o->y0, o->z0, H0, &c->G0, &c->k0);
-  flatten(o->y1, o->z0, H0, &c->reached, &k);
   flatten(o->y1, o->z1, H1, &c->G1, &c->k1);
 }
 
@@ -327,7 +328,7 @@ IN void load(const double *f, const facets *o, sliders *c, real *qs, real *qt, k
 {
   yes near = o->near;
   if (k.yields) near = near & ((c->k0 > 0.0) | (c->k1 <= 0.0)); /* flattened ones touch together */
-  const real mean = pick(near, 0.5 * (c->k0 + c->k1), (c->reached - c->G0) * o->rdy);
+  const real mean = pick(near, 0.5 * (c->k0 + c->k1), c->gained * o->rdy);
   c->chord = smaller(larger(mean, c->k0), c->k1); /* k1 where it falls */
   c->old2 = *qs * *qs + *qt * *qt;
   const yes falls = c->k1 < c->k0;

@@ -213,5 +213,6 @@ def test_failure_is_counted_by_the_size_of_the_blocks(size):
     end = start.copy()
     end[0, rock.free[0]] += 0.2 * size  # of blocks of about 1 m2 times size**2
     end[0, rock.free[1]] += 0.05 * size
-    record = SimpleNamespace(scene=scene, times=[0.0, 1.0], motion=[start, end])
+    record = object.__new__(Record)
+    record.scene, record.times, record.motion = scene, [0.0, 1.0], [start, end]
     assert [entry["failed"] for entry in outcomes(record)] == [1, 0]

@@ -39,7 +39,7 @@ axes[1, 0].set_ylabel("dilation (nm)")
 axes[1, 1].set_ylabel("mobilised friction angle (°)")
 for axis in axes[1]:
     axis.set_xlabel("shear displacement (µm)")
-axes[0, 0].legend(fontsize="small")
+axes[0, 0].legend()
 plt.show()
 
 # %%

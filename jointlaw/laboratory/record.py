@@ -4,6 +4,7 @@ import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -227,7 +228,7 @@ def _arrows(axis: Any, x: Array, y: Array) -> None:
     """The sense of a path, by an arrow in the middle of each leg of two steps or more."""
     turns = np.flatnonzero(np.diff(np.sign(np.diff(x)))) + 1
     ends = [0, *turns.tolist(), len(x) - 1]
-    for first, last in zip(ends[:-1], ends[1:], strict=True):
+    for first, last in pairwise(ends):
         if last - first < 2:
             continue
         at = (first + last) // 2

@@ -26,7 +26,7 @@ records = {
     for label, how in tests.items()
 }
 
-figure, axes = plt.subplots(2, 2, figsize=(9, 6.5), layout="constrained", sharex=True)
+figure, axes = plt.subplots(2, 2, figsize=(7.5, 6.2), layout="constrained", sharex=True)
 for label, record in records.items():
     shear = record.shear * 1e6
     axes[0, 0].plot(shear, record.shear_stress / 1e6, label=label)

@@ -61,6 +61,8 @@ def compiled():
 def tables(law):
     """The bytes of a law's tables, as `take_law` of joint.c reads them."""
     numbers, arrays = packed(law)
+    if numbers["dim"] != 3 or any(numbers[name] for name in ("yields", "fades", "wears", "bonded")):
+        raise ValueError("joint.c runs elastic laws in space, mated and without a bond, alone")
     return b"".join([bytes(Head(**numbers)), *(array.tobytes() for array in arrays.values())])
 
 

@@ -33,10 +33,18 @@ OUT(stored) double stored(const double *s) { return jlaw_stored(&law, s); }
 OUT(dissipated) double dissipated(const double *s) { return jlaw_dissipated(&law, s); }
 OUT(closure_at) double closure_at(double stress) { return jlaw_closure(&law, stress); }
 
-/* One step from s0 to s1: F (3) and C (3, 3); 0, or -1 and a message */
+/* One step from s0 to s1 as jlaw_update, of the one kind of law that the presets are: F (3) and
+ * C (3, 3); 0, or -1 and a message. Other kinds would make the file larger. */
 OUT(update) int update(const double *s0, double *s1, const double *d, double *F, char *message)
 {
-  return jlaw_update(&law, s0, s1, d, F, F + 3, message, JLAW_MESSAGE);
+  const numbers n = {s1, 1, 0};
+  double way = 0.0; /* NaN stays in sums */
+  for (int i = 0; i < 3; i++) way += fabs(s0[i]) + fabs(d[i]);
+  if (!(law.stretch * way <= law.largest_reach))
+    return jlaw_refuse_(&law, s0, d, 0, message, JLAW_MESSAGE);
+  memcpy(s1, s0, (size_t) state_rows(&law) * sizeof *s1);
+  step(&law, n, d, F, F + 3, kind_of(3, 0, 0, 0, 1, 1, 0));
+  return 0;
 }
 
 /* What the page draws of each facet: its normal (3), the load A Phi (Pa), the share of its friction
@@ -46,25 +54,22 @@ OUT(look) void look(double *s, double *to)
 {
   const numbers n = {s, 1, 0};
   const int M = law.facets, D = law.cells;
-  const double worn = worn_now(&law, n);
   for (int at = 0; at < M; at++) {
     const double *f = facet_of(&law, at), *cell = cell_of(&law, at);
     double held = 0.0, *row = to + at * (5 + 2 * D);
     facets o;
     facets_now(&law, n, at, &o);
     const double force = o.y1 > o.z1 ? larger(o.f1 - o.fz1, 0.0) : 0.0;
-    for (int i = 0; i < 3; i++) row[i] = f[(JLAW_N + i) * JLAW_LANES];
+    for (int i = 0; i < 3; i++) row[i] = column(f, JLAW_N + i);
     for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_LANES) {
       double G, kappa;
-      const int of = 2 * law.dim + at * D + i;
+      const int of = slider_row(&law) + at * D + i;
       cell_now(cell, &o, law.yields, &G, &kappa);
-      const double cap = column(f, JLAW_STRENGTH) * worn * G;
       const double q = root(s[of] * s[of] + s[of + M * D] * s[of + M * D]);
-      const double limit = cap * (1.0 - JLAW_LIMIT) - column(f, JLAW_STRENGTH) * worn * JLAW_ROUNDED * o.f1;
-      const double scale = column(f, JLAW_A) / column(f, JLAW_STIFF); /* c1 */
+      const double limit = o.strength * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * o.f1);
       if (G > 0.0 && q >= limit) held += G;
-      row[5 + 2 * i] = scale * (column(cell, JLAW_LOW) - o.y1);
-      row[6 + 2 * i] = G > 0.0 ? (q >= limit ? 1.0 : q / cap) : 0.0;
+      row[5 + 2 * i] = column(f, JLAW_COSINE) * (column(cell, JLAW_LOW) - o.y1);
+      row[6 + 2 * i] = G > 0.0 ? (q >= limit ? 1.0 : q / (o.strength * G)) : 0.0;
     }
     row[3] = column(f, JLAW_A) * force;
     row[4] = force > 0.0 ? smaller(held / force, 1.0) : 0.0;

@@ -17,6 +17,7 @@ from PIL import Image
 
 import jointlaw as jl
 from jointlaw.kernels.cells import cells
+from jointlaw.kernels.mating import planes
 from jointlaw.kernels.reference import at_limit, effective_closure, parts, strength
 from jointlaw.support.pyplot import style
 
@@ -68,9 +69,10 @@ def states(joint, faces):
     """Colour of each face."""
     k, state = joint.law.tables, joint.snapshot().values.T
     now = parts(k, state)
-    found = cells(k, effective_closure(k, now.delta[0], now.offset))
+    found = cells(k, effective_closure(k, now.delta, now.slopes))
     size = np.hypot(*now.q)
-    slides = at_limit(size, strength(k, np.asarray(k.mu)), found.G, found.force)[:, :, 0]
+    limit = strength(k, planes(k, now.delta[1:], now.slopes).gamma)
+    slides = at_limit(size, limit, found.G, found.force)[:, :, 0]
     touches = found.y > k.depth[:, :-1]
     return [
         (SLIDING if slides[f.facet, f.cell] else STUCK) if touches[f.facet, f.cell] else APART

@@ -25,7 +25,7 @@ from .support.version import __version__ as __version__
 from .tables.joint_table import JointTable, load_table
 
 if TYPE_CHECKING:
-    from .calibration.fit import fit_closure, fit_curves, fit_shear
+    from .calibration.fit import fit_closure, fit_curves
     from .hosts.c.export import export_c
     from .hosts.lammps.export import export_lammps
     from .hosts.yade.export import export_yade
@@ -53,7 +53,6 @@ __all__ = [
     "export_yade",
     "fit_closure",
     "fit_curves",
-    "fit_shear",
     "from_surface",
     "load_state",
     "load_table",
@@ -69,7 +68,6 @@ _LATER = {
     "export_yade": "hosts.yade.export",
     "fit_closure": "calibration.fit",
     "fit_curves": "calibration.fit",
-    "fit_shear": "calibration.fit",
     "from_surface": "surface.fit",
     "tabulate": "tables.tabulate",
 }
@@ -92,6 +90,7 @@ _MOVED = {
 _REMOVED = {
     "baselines": "docs/measure/held_out.py fits a power law and Barton-Bandis",
     "fit_many": "map jl.fit_closure over the curves with any concurrent.futures.Executor",
+    "fit_shear": "jl.fit_curves([ShearCurve(shear, tau, normal)], law=law, free=('mu', 'a'))",
     "synthetic_surface": "docs/gallery/plot_from_scan.py makes a surface in ten lines",
     "unloading": "jl.fit_closure(stress, closure, cycle=True) fits and reports unloading",
 }

@@ -43,12 +43,18 @@ class Joints:
 
     delta (k, 2) in m: closure and sliding; traction (k, 2) in Pa; sliding, slipping, separated
     (k,): shares of their shear capacity; stored, lost (k,) in J/m2.
+
+    The scene's `reduction` F divides the shear stress of every joint and multiplies the sliding at
+    which it has it. So tan(friction angle), tan(dilation angle) and cohesion are divided by F, and
+    the work is that of the law: no energy is made.
     """
 
     def __init__(self, scene: Scene) -> None:
-        self.choose = scene.law_of
+        self.choose, self.reduction = scene.law_of, np.array([1.0, scene.reduction])
         self.pools = {name: jl.JointPool(law) for name, law in scene.laws.items()}
         self.curves = {name: virgin_curve(law) for name, law in scene.laws.items()}
+        for curve in self.curves.values():
+            curve["stiffness"] = curve["stiffness"] * max(1.0, scene.reduction**-2)
         self.assign([])
 
     def assign(self, contacts: Sequence[Identity]) -> None:
@@ -66,7 +72,8 @@ class Joints:
         self.n = len(contacts)
         self.traction = np.zeros((self.n, 2))
         for name, rows, places in self.groups:
-            self.traction[rows] = self.pools[name].batch.F[... if places is None else places]
+            F = self.pools[name].batch.F[... if places is None else places]
+            self.traction[rows] = F / self.reduction
         self.measure()
 
     def update(self, closure: np.ndarray, sliding: np.ndarray, parts: int = 1) -> None:
@@ -74,19 +81,19 @@ class Joints:
 
         The law's friction work is first order in its step: more parts balance energy better.
         """
-        d = np.stack([closure - self.delta[:, 0], sliding], axis=1) / parts
+        d = np.stack([closure - self.delta[:, 0], sliding], axis=1) / (parts * self.reduction)
         for name, rows, places in self.groups:
             for _ in range(parts):
                 F, _ = self.pools[name].batch.update(d[rows], where=places, tangent=False)
-            self.traction[rows] = F
+            self.traction[rows] = F / self.reduction
         self.measure()
 
     def trial(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Tractions (k, 2) and tangents (k, 2, 2) for d, leaving the state alone."""
-        F, C = np.empty((self.n, 2)), np.empty((self.n, 2, 2))
+        F, C, by = np.empty((self.n, 2)), np.empty((self.n, 2, 2)), self.reduction
         for name, rows, places in self.groups:
-            F[rows], C[rows] = self.pools[name].batch.trial(d[rows], where=places)
-        return F, C
+            F[rows], C[rows] = self.pools[name].batch.trial(d[rows] / by, where=places)
+        return F / by, C / np.outer(by, by)
 
     def measure(self) -> None:
         """Read what the batches hold by now."""
@@ -94,7 +101,7 @@ class Joints:
         shares = np.zeros((5, self.n))
         for name, rows, places in self.groups:
             batch, here = self.pools[name].batch, slice(None) if places is None else places
-            self.delta[rows] = batch.delta[here]
+            self.delta[rows] = batch.delta[here] * self.reduction
             shares[:, rows] = np.array([*batch.measures()[:4], batch.dissipated_energy])[:, here]
         self.sliding, self.slipping, self.separated, self.stored, self.lost = shares
 

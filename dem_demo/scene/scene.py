@@ -51,7 +51,9 @@ class Scene:
     joint of a rock, the law of its set.
 
     slip, shear: joints to report on, as (moving block, base); near: those nearest to points, as two
-    blocks; pins: points, as (block, place in m);
+    blocks; pins: points, as (block, place in m); reduction: what the shear strength of all joints
+    is divided by (see `Joints`).
+
     text: of the file that it was read from, empty for a scene made or changed in memory; files:
     what that file names.
     """
@@ -71,6 +73,7 @@ class Scene:
     shear: tuple[tuple[int, int], ...] = ()
     near: tuple[tuple[int, int], ...] = ()
     pins: tuple[tuple[int, tuple[float, float]], ...] = ()
+    reduction: float = 1.0
     text: str = field(default="", init=False)  # `replace` leaves both out
     files: Files = field(default_factory=Files, init=False)
 

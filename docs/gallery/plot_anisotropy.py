@@ -2,7 +2,9 @@ r"""
 Anisotropy: friction by direction
 =================================
 
-A joint whose facets lean more often along one direction is stronger there.
+A joint whose facets lean more often along one direction is stronger there. Where a block slides
+along its ridges it meets the weaker one: a strength from a test across them is then unsafe. Of a
+law with ``c = 0`` the last tenths of a degree between two directions are those of its few azimuths.
 """
 
 from dataclasses import replace

@@ -46,7 +46,7 @@ plt.show()
 for label, record in records.items():
     print(
         f"{label:24s} largest friction angle {record.peak_friction_angle:.1f}°, "
-        f"dilation angle {record.dilation_angle:.1f}°, "
+        f"dilation angle {record.peak_dilation_angle:.1f}°, "
         f"shear stress {record.shear_stress[-1] / 1e6:.1f} MPa"
     )
 

@@ -19,7 +19,7 @@ import jointlaw as jl
 
 base = replace(
     jl.presets.load("westerly-smooth"), orientation=jl.Orientation(3.0), plane=0.0,
-    critical_slip=2e-6,
+    mating_length=2e-6,
 )  # fmt: skip
 normal = np.geomspace(0.1e6, 50e6, 12)  # Pa
 
@@ -31,7 +31,7 @@ for length in (np.inf, 0.2e-6, 0.1e-6, 0.05e-6):
     label = "elastic" if np.isinf(length) else f"yields beyond {length * 1e6:g} µm"
     strength = np.array([r.shear_stress.max() for r in records])
     angles[label] = np.array([r.peak_friction_angle for r in records])
-    dilation[label] = np.array([r.dilation_angle for r in records])
+    dilation[label] = np.array([r.peak_dilation_angle for r in records])
     left.plot(normal / 1e6, strength / 1e6, "o-", ms=3, label=label)
     middle.semilogx(normal / 1e6, angles[label], "o-", ms=3, label=label)
     right.semilogx(normal / 1e6, dilation[label], "o-", ms=3, label=label)

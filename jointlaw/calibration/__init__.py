@@ -5,7 +5,7 @@
     measured        closure and shear curves, their misfit, and their noise from its scatter
     datasets        tests in text files: those of the package, in data/, and of laboratories
     problem         what is free, what is held, where to start; least squares with priors
-    fit             fit_closure, fit_shear, fit_curves; their result: law, parameters, intervals,
+    fit             fit_closure, fit_curves; their result: law, parameters, intervals,
                     what the data leave open, words, a picture
 
 Each file imports from those above it only.

@@ -1,14 +1,10 @@
 """Tests on joints in text files, those of the package and those of laboratories, by these rules.
 
-- Lines that are empty or begin with # are skipped.
 - Names stand in the first line, units in it or in the second one: "tau [kPa]", "tau (kPa)",
   "tau /kPa", "tau in kPa", "tau_kPa". A column without a unit is asked for, never guessed.
-- The separator is a semicolon, tab or comma: the first of these in the line of names; else blanks.
-- The decimal mark is a point; or a comma if a number shows it: 0,25 does, but 1,201 may be 1201.
-  Marks between thousands are refused.
+- Separators, decimal marks and marks between thousands are found: `jointlaw.support.text_numbers`.
 """
 
-import csv
 import re
 from collections.abc import Sequence
 from importlib import resources
@@ -20,6 +16,7 @@ import numpy as np
 from ..parameters.rock import require_rock
 from ..support import units
 from ..support.checks import Array, one_of
+from ..support.text_numbers import AMBIGUOUS, cells_of, is_ambiguous, lines_of, marks_of, separator
 from .measured import ShearCurve
 
 _UNIT = r"(?:[numkcMGµμ]?(?:Pa|m)|N/mm[2²]|[kM]N/m[2²]|bar)"
@@ -27,14 +24,6 @@ _ROW_UNIT = re.compile(rf"[\[(].*[\])]|/?\s*{_UNIT}|-?")
 _TITLE = re.compile(
     rf"(.*?)(?:\s*[\[(]\s*([^\])]*?)\s*[\])]|(?:\s*/\s*|\s+in\s+|,\s*|_|\s+)({_UNIT}))\s*"
 )
-# a number whose comma cannot stand between thousands
-_DECIMAL_COMMA = re.compile(r"[-+−]?(?:0?,\d+|\d{4,},\d+|\d+,(?:\d\d?|\d{4,}))(?:[eE][-+]?\d+)?")
-_GROUPED = re.compile(r"[-+−]?\d+([,.]\d{3})+([,.]\d*)?")  # a mark between thousands, perhaps
-_THOUSANDS = (
-    "may have a mark between its thousands: remove such marks from the file, or give "
-    "--decimal-comma if its commas are decimal marks"
-)
-_SWAPPED = str.maketrans(",.", ".,")
 
 
 class Column(NamedTuple):
@@ -107,7 +96,7 @@ def read_closure(
     path: str | Path,
     stress: str | None = None,
     closure: str | None = None,
-    decimal_comma: bool = False,
+    decimal: str | None = None,
 ) -> tuple[Array, Array]:
     """A closure test from a text file.
 
@@ -116,12 +105,12 @@ def read_closure(
     path: the file.
     stress, closure: names of the two columns, with a unit if the file gives none ("Disp:mm", or
         "Disp:-1mm" where closing counts negative); None finds those of the usual names.
-    decimal_comma: True where the decimal mark is a comma, but no number of the file shows it.
+    decimal: the decimal mark, "comma" or "point"; None finds it, if a number of the file shows it.
 
     Raises ValueError naming file, column or line, and the option of the command that helps.
     """
     path = Path(path)
-    columns = read_columns(path, decimal_comma)
+    columns = read_columns(path, decimal)
     s, u = find(columns, STRESS, stress, path), find(columns, CLOSURE, closure, path)
     pressed, closed = _complete_rows(path, s, u)
     top = int(np.argmax(np.abs(pressed)))
@@ -137,7 +126,7 @@ def read_shear(
     stress: str | None = None,
     normal: str | None = None,
     normal_stress: float | None = None,
-    decimal_comma: bool = False,
+    decimal: str | None = None,
 ) -> ShearCurve:
     """A direct shear test at constant normal stress from a text file.
 
@@ -147,12 +136,12 @@ def read_shear(
     shear, stress, normal: names of the columns of shear displacement, shear stress and normal
         stress, with units if the file gives none ("tau:MPa", or "tau:-1MPa" to turn a sign).
     normal_stress: Pa; None takes the mean of the column.
-    decimal_comma: as in `read_closure`.
+    decimal: as in `read_closure`.
 
     Raises ValueError as `read_closure`.
     """
     path = Path(path)
-    columns = read_columns(path, decimal_comma)
+    columns = read_columns(path, decimal)
     u, tau = find(columns, SHEAR, shear, path), find(columns, SHEAR_STRESS, stress, path)
     if normal_stress is None:
         pressed = find(columns, NORMAL, normal, path)
@@ -198,23 +187,16 @@ def _require_sign(right: bool, column: Column, asked: Asked, what: str, path: Pa
         )
 
 
-def read_columns(path: Path, decimal_comma: bool = False) -> list[Column]:
+def read_columns(path: Path, decimal: str | None = None) -> list[Column]:
     """The columns of a text file in UTF-8, by the rules above.
 
-    decimal_comma: True where the decimal mark is a comma but no number shows it. Raises ValueError
-    naming file, line and remedy.
+    decimal: as in `read_closure`. Raises ValueError naming file, line and remedy.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: cannot be read ({error}); give a CSV file in UTF-8") from None
-    numbered = [
-        (number, line)
-        for number, line in enumerate(text.replace("\0", "").splitlines(), 1)
-        if line.strip(" \t,;") and not line.lstrip().startswith("#")
-    ]
-    (names, *rows), at = _cells([line for _, line in numbered]), [number for number, _ in numbered]
-    if len(rows) < 2 or any(np.isfinite(_value_of(cell, ".")) for cell in names):
+    numbered = lines_of(path)
+    mark = separator(next(iter(numbered.values()), ""))
+    (names, *rows), at = cells_of([*numbered.values()] or [""], mark), [*numbered]
+    marks = marks_of((cell for row in rows for cell in row), decimal)
+    if len(rows) < 2 or any(np.isfinite(marks.value(cell)) for cell in names):
         raise ValueError(
             f"{path}: must hold a line of names with units, such as us [mm],tau [MPa], and numbers "
             "in the lines below it"
@@ -223,19 +205,19 @@ def read_columns(path: Path, decimal_comma: bool = False) -> list[Column]:
     given = [cell.strip("[]()/- ") for cell in rows.pop(0)] if units_below else []
     at = at[-len(rows) :]
     given += [""] * (len(names) - len(given))
-    shown = any(_DECIMAL_COMMA.fullmatch(cell) for row in rows for cell in row)
-    decimal = "," if decimal_comma or shown else "."
     values, wrong = np.full((len(names), len(rows)), np.nan), [""] * len(names)
     for k, row in enumerate(rows):
         if len(row) > len(names):
+            remedy = "give each column a name and separate all lines alike"
+            if mark == ",":
+                remedy = "if the decimal mark is a comma, separate the columns by semicolons"
             raise ValueError(
-                f"{path}: line {at[k]} has {len(row)} cells under {len(names)} names; is the "
-                "decimal mark a comma? Then separate the columns by semicolons"
+                f"{path}: line {at[k]} has {len(row)} cells under {len(names)} names; {remedy}"
             )
         for column, cell in enumerate(row):
-            values[column, k] = _value_of(cell, decimal)
+            values[column, k] = marks.value(cell)
             if cell and not np.isfinite(values[column, k]) and not wrong[column]:
-                why = _THOUSANDS if _GROUPED.fullmatch(cell) else "is no number"
+                why = AMBIGUOUS if is_ambiguous(cell) else "is no number"
                 wrong[column] = f"line {at[k]} holds {cell!r}, which {why}"
     return [
         Column(title, *_read_title(title, given[k]), values[k], wrong[k])
@@ -271,24 +253,6 @@ def find(columns: Sequence[Column], asked: Asked, given: str | None, path: Path)
             f"{path}: column {column.title!r} {trouble}; name it, for example {example}"
         ) from None
     return column._replace(values=column.values * factor)
-
-
-def _cells(lines: Sequence[str]) -> list[list[str]]:
-    """Cells of all lines, without empty ones at the end."""
-    mark = next((mark for mark in ";\t," if lines and mark in lines[0]), None)
-    if mark is None:
-        return [re.split(r"\s+(?![\[(/])", line.strip()) for line in lines or [""]]
-    rows = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=mark)]
-    return [row[: max((k + 1 for k, cell in enumerate(row) if cell), default=0)] for row in rows]
-
-
-def _value_of(cell: str, decimal: str) -> float:
-    """The number in a cell with this decimal mark; NaN for any other text."""
-    text = cell.replace("−", "-")
-    try:
-        return float(text.translate(_SWAPPED) if decimal == "," else text)
-    except ValueError:
-        return np.nan
 
 
 def _read_title(title: str, unit: str) -> tuple[str, str]:

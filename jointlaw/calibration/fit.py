@@ -23,13 +23,19 @@ from .problem import Problem, Solution, derivative, pose, solve, staged, startin
 MISFITS = 1.5  # of the expected scatter: from this systematic misfit on the law is not the rock
 PRIOR_SHARE = 0.05  # of the variance: up to here the data, not the priors, decide
 WIDEST = math.log(2) / 1.96  # standard error of a logarithm: a factor of 2 either way
-# What acts on a closure curve only as one factor: N lam K times a sum over the inclinations
-_ONE_FACTOR = ("asperity_density", "K", "lam", "mu", "a", "b", "c")
+OPEN = 1e6  # upper over lower end of the interval of what nothing fixes
+HALVED = 0.005  # of the largest measured stress: what halving the steps of shear may change
+HALVINGS = 8  # at most
+AT_BOUND = 1e-6  # of the distance of the bounds
 
 OTHER = (
     "Neighbouring points deviate to the same side. Use the law with this error between the points, "
-    "and not beyond them. A shear curve that falls after its peak needs wear: let mu_residual and "
-    "wear_slip be free too. Closure of mated joints may follow a hyperbola better."
+    "and not beyond them. A shear curve that falls after its peak needs wear: let mating_length "
+    "and slope_wear be free too. Closure of mated joints may follow a hyperbola better."
+)
+TOO_MANY = (
+    "These data do not fix that many parameters. Hold {}, at values that you know (--set {}=VALUE) "
+    "or by leaving them out of --free: then the data fix the others."
 )
 NO_COMPLIANCE = (
     "No compliance of rock and machine was given: if the closure was measured across rock too, the "
@@ -39,7 +45,7 @@ NO_COMPLIANCE = (
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Outcome of `fit_closure`, `fit_shear` and `fit_curves`, in SI units.
+    """Outcome of `fit_closure` and `fit_curves`, in SI units.
 
     `free` names the fitted parameters in the order of `covariance`, the seating closure last;
     `parameters` holds all values; `noise` and `systematic_misfit` have an entry for each curve.
@@ -47,6 +53,7 @@ class Fit:
 
     problem: Problem
     solution: Solution
+    halved: float = 0.0  # change of the shear stress, of its largest, when steps are halved
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -64,49 +71,64 @@ class Fit:
         return build(self.parameters, self.problem.settings, self.problem.settings.plane)
 
     @property
-    def covariance(self) -> Array:
-        """Covariance (p, p) of the fitted parameters, in the order of `free`."""
-        slope = [TRANSFORMS[name].slope(self.parameters[name]) for name in self.free]
-        return self.solution.covariance * np.outer(slope, slope)
-
-    @property
-    def standard_error(self) -> dict[str, float]:
-        """Standard error of every fitted parameter."""
-        return dict(zip(self.free, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
-
-    @property
     def prior_share(self) -> dict[str, float]:
         """Share of the variance of every fitted parameter that the priors contribute."""
         return dict(zip(self.free, self.solution.prior_share.tolist(), strict=True))
 
     def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
-        """Interval of a fitted parameter that holds it with this probability."""
+        """Interval, within the bounds, that holds a fitted parameter with this probability."""
         if name not in self.free:
             raise ValueError(f"{name!r} was not fitted; fitted are {', '.join(self.free)}")
         at, transform = self.free.index(name), TRANSFORMS[name]
         reach = self.solution.quantile(level) * math.sqrt(self.solution.covariance[at, at])
-        x = float(self.solution.x[at])
-        return transform.back(x - reach), transform.back(x + reach)
+        x, (low, high) = self.solution.x[at], self.problem.bounds()
+        ends = max(x - reach, low[at]), min(x + reach, high[at])
+        return transform.back(float(ends[0])), transform.back(float(ends[1]))
+
+    @cached_property
+    def at_bound(self) -> tuple[str, ...]:
+        """Fitted parameters that the fit left at a bound: the data ask for what no law has."""
+        low, high = self.problem.bounds()
+        gap = np.minimum(self.solution.x - low, high - self.solution.x)
+        return tuple(n for n, g in zip(self.free, gap / (high - low), strict=True) if g < AT_BOUND)
+
+    @cached_property
+    def too_many(self) -> tuple[str, ...]:
+        """Fitted parameters to hold, the vaguest first, so that the data alone fix the others."""
+        kept, held = [k for k, name in enumerate(self.free) if name != "seating"], list[str]()
+        while kept:
+            C = np.linalg.inv(self.solution.information[np.ix_(kept, kept)])
+            vague = np.sqrt(np.diag(C)) / self._widest[kept]
+            if vague.max() <= 1:
+                break
+            held.append(self.free[kept.pop(int(np.argmax(vague)))])
+        return tuple(held)
 
     @cached_property
     def not_identifiable(self) -> dict[str, str]:
-        """Parameters that these data do not fix, each with the reason."""
+        """Fitted parameters that these data do not fix, each with the reason."""
         found: dict[str, str] = {}
-        errors = np.sqrt(np.diag(self.solution.covariance))
+        errors = np.sqrt(np.diag(self.solution.covariance)) / self._widest
         for (name, share), error in zip(self.prior_share.items(), errors, strict=True):
-            if share > PRIOR_SHARE:
+            if name in self.at_bound:
+                found[name] = f"the fit ended at a bound, {self.parameters[name]:.3g}"
+            elif share > PRIOR_SHARE:
                 found[name] = f"the priors supply {100 * share:.0f} % of its variance"
-            elif error > (WIDEST if TRANSFORMS[name].log else 0.5):
-                low, high = self.interval(name)
-                found[name] = f"the data leave it anywhere from {low:.3g} to {high:.3g}"
-        sheared = any(isinstance(curve, ShearCurve) for curve in self.problem.curves)
-        for name in ("eta", "alpha", "beta", "overlap", *_ONE_FACTOR):
-            if name not in self.free:
-                factor = name in _ONE_FACTOR and not sheared
-                found[name] = "held" + (
-                    "; acts on a closure curve only as a factor" if factor else ", not fitted"
-                )
+            elif error > 1:
+                found[name] = f"the data leave it {self._spread(name)}"
         return found
+
+    @property
+    def _widest(self) -> Array:
+        """Standard errors (p,) up to which a parameter is known."""
+        return np.array([WIDEST if TRANSFORMS[name].log else 0.5 for name in self.free])
+
+    def _spread(self, name: str) -> str:
+        """The 95 % interval of a fitted parameter in words."""
+        if name in self.at_bound:
+            return "at a bound"
+        low, high = self.interval(name)
+        return "open" if TRANSFORMS[name].log and high > OPEN * low else f"{low:.3g} to {high:.3g}"
 
     @property
     def identifiable(self) -> tuple[str, ...]:
@@ -165,18 +187,18 @@ class Fit:
             "|---|---|---|---|---|---|",
         ]
         for name, share in self.prior_share.items():
-            low, high = self.interval(name)
             lines.append(
-                f"| {name} | {values[name]:.4g} | {low:.3g} to {high:.3g} | "
+                f"| {name} | {values[name]:.4g} | {self._spread(name)} | "
                 f"{TRANSFORMS[name].unit} | {100 * share:.0f} % | "
                 f"{'no' if name in left else 'yes'} |"
             )
-        unworn = {"mu_residual"} if np.isinf(values["wear_slip"]) else set()
+        unworn = {"slope_residual"} if np.isinf(values["slope_wear"]) else set()
         held = [n for n in values if n not in {*self.free, *unworn} and np.isfinite(values[n])]
         lines += ["", "Held: " + ", ".join(f"{n} = {values[n]:.4g}" for n in held) + "."]
-        lines += ["", "Not identifiable from these data:", ""]
-        for reason in dict.fromkeys(left.values()):
-            lines.append(f"- {', '.join(n for n in left if left[n] == reason)}: {reason}")
+        lines += ["", "Not fixed by these data:", ""] if left else []
+        lines += [f"- {name}: {reason}" for name, reason in left.items()]
+        if self.too_many:
+            lines += ["", f"**{TOO_MANY.format(', '.join(self.too_many), self.too_many[0])}**"]
         lines += [
             "",
             "| curve | points | scatter of the stress | of the closure (um) | systematic misfit |",
@@ -188,12 +210,32 @@ class Fit:
                 f"| {k} | {curve.steepness.size} | {100 * noise.share:.2g} % | "
                 f"{1e6 * noise.absolute:.2g} | {100 * misfit:.2g} % |"
             )
+        lines += self._peaks()
         differ = [str(k) for k, differs in enumerate(self.shape_differs, 1) if differs]
         if differ:
             lines += ["", f"**Curve {', '.join(differ)} has another shape than the law.** {OTHER}"]
         if self.problem.closure is not None and self.problem.closure.compliance == 0.0:
             lines += ["", NO_COMPLIANCE]
         return "\n".join(lines) + "\n"
+
+    def _peaks(self) -> list[str]:
+        """The largest and the last stress of each shear curve, measured and of the law."""
+        head = "| shear curve | largest stress (MPa), at (mm): measured | law | last (MPa) | law |"
+        lines = ["", head, "|---|---|---|---|---|"]
+        for k, curve in enumerate(self.problem.curves, 1):
+            if isinstance(curve, ShearCurve):
+                own = curve.sheared(self._law_of(curve), self.problem.settings.steps)[:2]
+                cells = [
+                    f"{stress[(top := np.argmax(np.abs(stress)))] / 1e6:.4g}, {1e3 * way[top]:.3g}"
+                    for way, stress in ((curve.shear, curve.shear_stress), own)
+                ]
+                ends = [f"{stress[-1] / 1e6:.4g}" for stress in (curve.shear_stress, own[1])]
+                lines.append(f"| {k} | {' | '.join([*cells, *ends])} |")
+        halved = f"Half the step of shear changes these stresses by {100 * self.halved:.2g} %."
+        return [*lines, "", halved] if len(lines) > 3 else []
+
+    def _law_of(self, curve: ShearCurve) -> JointLaw:
+        return build_for_shear(self.parameters, self.problem.settings, curve.azimuth)
 
     @style()
     def plot(
@@ -227,9 +269,9 @@ class Fit:
                 u = x if curve.cycle else u
                 law = np.exp(log_stress(values, values["seating"] + u, settings))
             else:
-                u = x = curve.shear
-                measured, what = curve.shear_stress, f"shear at {curve.normal / 1e6:.3g} MPa"
-                law = curve.predict(build_for_shear(values, settings, curve.azimuth))
+                x, measured = curve.shear, curve.shear_stress
+                what = f"shear at {curve.normal / 1e6:.3g} MPa"
+                u, law, _ = curve.sheared(self._law_of(curve), settings.steps)
             axis.plot(1e6 * u, law / 1e6, color="C1", label="law")
             axis.plot(1e6 * x, measured / 1e6, "oC0", ms=4, label="measured")
             axis.set(xlabel=f"{what} (µm)", ylabel="stress (MPa)")
@@ -271,35 +313,6 @@ def fit_closure(
     return fit_curves([curve], free=free, fixed=fixed, law=law, priors=priors)
 
 
-def fit_shear(
-    shear: ArrayLike,
-    shear_stress: ArrayLike,
-    normal: float,
-    *,
-    law: JointLaw,
-    azimuth: float = 0.0,
-    free: Sequence[str] = ("mu", "a"),
-    fixed: Values | None = None,
-    priors: Ranges | None = None,
-    noise: float | None = None,
-) -> Fit:
-    """Fit friction and inclination to one direct shear test at constant normal stress.
-
-    Parameters
-    ----------
-    shear: shear displacement in m, (n,), from zero; it may turn round.
-    shear_stress: in Pa, (n,).
-    normal: normal stress in Pa.
-    law: the law whose other parameters are kept, such as that of `fit_closure`.
-    azimuth: direction of shear in rad.
-    free, fixed, priors: as in `fit_curves`; noise: as in `ShearCurve`.
-
-    Returns a `Fit`. Raises ValueError for curves or names that do not fit.
-    """
-    curve = ShearCurve(np.asarray(shear), np.asarray(shear_stress), normal, azimuth, noise)
-    return fit_curves([curve], free=free, fixed=fixed, law=law, priors=priors)
-
-
 def fit_curves(
     curves: Sequence[ClosureCurve | ShearCurve],
     *,
@@ -314,11 +327,11 @@ def fit_curves(
     ----------
     curves: at least one, `ShearCurve` and at most one `ClosureCurve`.
     free: parameters to fit, of alpha, beta (m), overlap (m), asperity_density (1/m2),
-        K (Pa m^(1-eta)), lam, eta, mu, a, b, c, yield_interference (m), mu_residual,
-        wear_slip (m), critical_slip (m). Positive ones are fitted as logarithms. A
+        K (Pa m^(1-eta)), lam, eta, mu, a, b, c, yield_interference (m), mating_length (m),
+        slope_wear (J/m2), slope_residual. Positive ones are fitted as logarithms. A
         closure curve that does not begin at zero stress adds its seating closure (m).
     fixed: values of parameters that are known otherwise, such as alpha from a scan, in SI units.
-    law: values of all parameters that are not free, `critical_slip` among them; None takes rock
+    law: values of all parameters that are not free, `mating_length` among them; None takes rock
         asperities, `forward.DEFAULTS`, of "individual" formation. A law of one plane or of closure
         alone stays one.
     priors: 95 % ranges (low, high) in physical units instead of the defaults of `priors.PRIORS`,
@@ -328,4 +341,10 @@ def fit_curves(
     """
     problem = pose(curves, free, fixed, law, priors)
     starts = staged(problem, starting_points(problem, near=law is not None))
-    return Fit(problem, solve(problem, starts))
+    for _ in range(HALVINGS):
+        solution, finer = solve(problem, starts), problem.finer()
+        halved = float(np.max(np.abs(finer.data(solution.x) - problem.data(solution.x))))
+        if halved < HALVED:
+            break
+        problem, starts = finer, [solution.x]
+    return Fit(problem, solution, halved)

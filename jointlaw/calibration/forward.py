@@ -16,18 +16,18 @@ from ..parameters.asperity import Asperity
 from ..parameters.heights import GammaHeights
 from ..parameters.orientation import Orientation
 from ..parameters.resolution import SLIP, resolve
+from ..parameters.rock import ROCK
 from ..support.checks import Array
 from .priors import Values
 
-# Rock of shear modulus 20 GPa and Poisson's ratio 0.25 with asperities of 1 mm radius (Eq. 34),
-# friction 0.6 (Byerlee 1978), mean inclination 19 degrees as for the paper's rough granite.
-_ROCK = Asperity.hertz_mindlin(G=20e9, nu=0.25, R=1e-3, mu=0.6)
+# With a mean inclination of 19 degrees, as that of the paper's rough granite
 DEFAULTS = {
-    "alpha": 3.7, "beta": 1e-5, "overlap": 0.0, "asperity_density": 1e6, "K": _ROCK.K,
-    "lam": _ROCK.lam, "eta": _ROCK.eta, "mu": _ROCK.mu, "a": 3.0, "b": 0.0, "c": 0.0,
-    "yield_interference": math.inf, "mu_residual": _ROCK.mu, "wear_slip": math.inf,
-    "critical_slip": math.inf,
+    "alpha": 3.7, "beta": 1e-5, "overlap": 0.0, "asperity_density": 1e6, "K": ROCK.K,
+    "lam": ROCK.lam, "eta": ROCK.eta, "mu": ROCK.mu, "a": 3.0, "b": 0.0, "c": 0.0,
+    "yield_interference": math.inf, "mating_length": math.inf, "slope_wear": math.inf,
+    "slope_residual": 0.0,
 }  # fmt: skip
+STEPS = 50  # of the way of a shear test to begin with; a fit halves them while that matters
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,7 @@ class Settings:
     closure_range: Any = None  # m
     plane: float | None = None  # of the law to be found; every shear curve has its own
     closure_only: bool = False
+    steps: int = STEPS  # of the way of a shear test, at least
 
 
 def parameters(law: JointLaw) -> tuple[dict[str, float], Settings]:
@@ -51,8 +52,8 @@ def parameters(law: JointLaw) -> tuple[dict[str, float], Settings]:
     values = DEFAULTS | {
         "asperity_density": law.asperity_density, "K": p.K, "lam": p.lam, "eta": p.eta, "mu": p.mu,
         "a": o.a, "b": o.b, "c": o.c, "yield_interference": p.yield_interference,
-        "mu_residual": p.mu if p.mu_residual is None else p.mu_residual,
-        "wear_slip": p.wear_slip, "critical_slip": law.critical_slip,
+        "mating_length": law.mating_length, "slope_wear": law.slope_wear,
+        "slope_residual": law.slope_residual,
     }  # fmt: skip
     kept = ("resolution", "closure_range", "plane", "closure_only")
     settings = Settings(has_heights=h is not None, **{name: getattr(law, name) for name in kept})
@@ -75,7 +76,9 @@ def build(values: Values, settings: Settings, plane: float | None = None) -> Joi
         resolution=settings.resolution,
         plane=plane,
         closure_range=settings.closure_range,
-        critical_slip=v["critical_slip"],
+        mating_length=v["mating_length"],
+        slope_wear=v["slope_wear"],
+        slope_residual=v["slope_residual"],
         closure_only=settings.closure_only,
     )
 
@@ -138,11 +141,7 @@ def _force(closure: Array, eta: float, heights: GammaHeights | None) -> Array:
 
 
 def _asperity(v: Values) -> Asperity:
-    wears = v["wear_slip"] < math.inf
-    return Asperity(
-        v["K"], v["lam"], v["eta"], v["mu"], v["yield_interference"],
-        min(v["mu_residual"], v["mu"]) if wears else None, v["wear_slip"],
-    )  # fmt: skip
+    return Asperity(v["K"], v["lam"], v["eta"], v["mu"], v["yield_interference"])
 
 
 def _heights(v: Values, settings: Settings) -> GammaHeights | None:

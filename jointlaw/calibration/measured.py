@@ -7,12 +7,12 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..laboratory.experiments import direct_shear
 from ..law import JointLaw
 from ..support.checks import Array, at_least, finite, more_than, number
-from .forward import Settings, build_for_shear, log_stress
+from .forward import STEPS, Settings, build_for_shear, log_stress
 from .priors import Values
 
 STRESS_NOISE = 0.01  # of the stress: a load cell with the friction of its loading frame
@@ -169,18 +169,38 @@ class ShearCurve:
         set_(self, "expected", Noise(share, 0.0, known))
         set_(self, "steepness", np.zeros(shear.size))  # the displacement is taken as exact
 
-    def predict(self, law: JointLaw, substeps: int = 1) -> Array:
-        """Shear stress (Pa) of a law along the path of this test, (n,)."""
-        path = self.shear if self.shear[0] else self.shear[1:]
+    def sheared(self, law: JointLaw, steps: int = STEPS) -> tuple[Array, Array, NDArray[np.intp]]:
+        """The test by a law: way (m) and shear stress (Pa), (rows,) each, and the points' rows.
+
+        steps: no step is longer than the whole way over this number, and each ends at a point or
+        within the interval between two.
+        """
+        ends = np.concatenate([[0.0], self.shear])
+        way = np.abs(np.diff(ends))
+        parts = np.maximum(np.ceil(steps * way / way.sum()), 1).astype(int)
+        rows = np.cumsum(parts)
+        path = np.interp(np.arange(rows[-1]) + 1, np.concatenate([[0], rows]), ends)
         record = direct_shear(
-            law.joint(), path.tolist(), self.normal, azimuth=self.azimuth, steps=substeps
+            law.joint(), path.tolist(), self.normal, azimuth=self.azimuth, steps=1
         )
-        stress = record.shear_stress[::substeps]
-        return stress[1:] if self.shear[0] else stress
+        return record.shear, record.shear_stress, rows
+
+    def predict(self, law: JointLaw, steps: int = STEPS) -> Array:
+        """Shear stress (Pa) of a law at the points of this test, (n,); steps: as in `sheared`.
+
+        At the point of the largest measured stress it is the largest of the law between the two
+        neighbouring points: the peak of a law need not lie at a displacement that was measured.
+        """
+        _, stress, rows = self.sheared(law, steps)
+        model, top = stress[rows], int(np.argmax(np.abs(self.shear_stress)))
+        sense = np.sign(self.shear_stress[top])
+        near = stress[rows[max(top - 1, 0)] : rows[min(top + 1, rows.size - 1)] + 1]
+        model[top] = sense * np.max(sense * near)
+        return np.asarray(model)
 
     def residuals(self, values: Values, settings: Settings) -> Array:
         """(model - measured)/largest measured, (n,)."""
-        model = self.predict(build_for_shear(values, settings, self.azimuth))
+        model = self.predict(build_for_shear(values, settings, self.azimuth), settings.steps)
         return np.asarray((model - self.shear_stress) / np.max(np.abs(self.shear_stress)))
 
 

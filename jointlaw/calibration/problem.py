@@ -82,7 +82,14 @@ class Problem:
         high = np.array([t.to(t.high) for t in transforms])
         if "b" in self.free and "c" not in self.free:
             high[self.free.index("b")] = 2 - 6 * abs(self.values["c"])  # Eq. 18
+        if "c" in self.free and "b" not in self.free:
+            at = self.free.index("c")
+            low[at], high[at] = -largest_c(self.values["b"]), largest_c(self.values["b"])
         return low, high
+
+    def finer(self) -> "Problem":
+        """The same with steps of shear half as long."""
+        return replace(self, settings=replace(self.settings, steps=2 * self.settings.steps))
 
     def data(self, x: Array) -> Array:
         """Residuals of all curves, one after the other."""
@@ -180,11 +187,11 @@ def staged(problem: Problem, starts: list[Array]) -> list[Array]:
     """One start near the best fit of closure and shear curves, for fits that have shear curves.
 
     The closure curves place what acts on them, then the shear curves the rest. Kept as they are are
-    starts for closure alone, and a single start without a critical slip to find.
+    starts for closure alone, and a single start without a mating length to find.
     """
     shears = tuple(curve for curve in problem.curves if isinstance(curve, ShearCurve))
     closure = problem.closure
-    finds_slip = "critical_slip" in problem.free
+    finds_slip = "mating_length" in problem.free
     if not shears or (len(starts) == 1 and not finds_slip):
         return starts
     values, rest = [problem.unpack(x) for x in starts], problem.free
@@ -194,7 +201,7 @@ def staged(problem: Problem, starts: list[Array]) -> list[Array]:
         values = [_best(replace(problem, curves=(closure,), free=mine), values)]
     if finds_slip:
         span = max(float(np.ptp(curve.shear)) for curve in shears)
-        values = [v | {"critical_slip": share * span} for v in values for share in SLIPS]
+        values = [v | {"mating_length": share * span} for v in values for share in SLIPS]
     if rest:
         values = [_best(replace(problem, curves=shears, free=rest, values=values[0]), values)]
     return [problem.pack_scaled(values[0])]
@@ -213,6 +220,7 @@ class Solution(NamedTuple):
     """Outcome of `solve`, p parameters after their transforms."""
 
     x: Array
+    information: Array  # (p, p) of the data, and that the parameters lie within their bounds
     covariance: Array  # (p, p)
     noise: tuple[Noise, ...]  # per curve
     freedom: float  # degrees of freedom that the noise was estimated with
@@ -232,7 +240,8 @@ def solve(problem: Problem, starts: Sequence[Array]) -> Solution:
 
     With C = (D + L)^-1 the covariance, D the information of the data and L that of the priors,
     C = C D C + C L C: the share of the priors in the variance of a parameter is the ratio of the
-    diagonals of C L C and C.
+    diagonals of C L C and C. D includes that a parameter lies within its bounds, as a standard
+    error of their distance: what nothing else fixes is then wide open, and C exists.
     """
     expected = tuple(curve.expected for curve in problem.curves)
     steepness = [curve.steepness for curve in problem.curves]
@@ -244,7 +253,8 @@ def solve(problem: Problem, starts: Sequence[Array]) -> Solution:
         weighted = derivative(problem.data, x, *bounds) / sigma[:, None]
         Jp = derivative(problem.prior, x, *bounds)
         precision = Jp.T @ Jp
-        C = np.linalg.pinv(weighted.T @ weighted + precision, hermitian=True)
+        information = weighted.T @ weighted + np.diag((bounds[1] - bounds[0]) ** -2)
+        C = np.linalg.inv(information + precision)
         leverage = np.einsum("ip,pq,iq->i", weighted, C, weighted)
         if all(n.known for n in noise):
             break
@@ -257,7 +267,7 @@ def solve(problem: Problem, starts: Sequence[Array]) -> Solution:
     known = all(n.known for n in noise)
     freedom = np.inf if known else NOISE_WEIGHT + r.size - float(np.sum(leverage))
     share = np.diag(C @ precision @ C) / np.diag(C)
-    return Solution(x, np.asarray(C, np.float64), noise, freedom, share)
+    return Solution(x, information, np.asarray(C, np.float64), noise, freedom, share)
 
 
 def least(problem: Problem, sigma: Array, starts: Sequence[Array]) -> Array:

@@ -9,13 +9,15 @@ from typing import Any
 
 from .. import presets
 from ..law import JointLaw
+from ..parameters import keys
 from ..parameters.resolution import NAMED
-from ..parameters.rock import require_rock
+from ..parameters.rock import ROCK, require_rock
 from ..support import units
 from ..support.files import clear_run, replace_file, write_json
 from ..support.pyplot import FORMATS
 
 VERSION = 2  # of summary.json
+_CONTACTS = {name: getattr(ROCK, name) for name in ("K", "lam", "eta", "mu")}
 Written = Mapping[str, str | Callable[[Path], object]]
 
 
@@ -64,16 +66,37 @@ def quantity(option: str, text: str, unit: str, *, positive: bool = False) -> fl
         raise ValueError(f"{option}: {error}") from None
 
 
+def default_rock() -> str:
+    """Keys and values of the contacts of a rock that is not known."""
+    return ", ".join(f"{name} = {value:.4g}" for name, value in _CONTACTS.items())
+
+
 def add_law(parser: argparse.ArgumentParser, *, resolution: bool = True) -> None:
     """Add the law, a preset or a file, and its resolution; `read_law` reads them."""
     parser.add_argument("law", metavar="PRESET_OR_FILE", help="preset name or TOML file")
+    parser.add_argument(
+        "--default-rock",
+        action="store_true",
+        help="for a file without [asperity], such as that of a scan: " + default_rock(),
+    )
     if resolution:
         parser.add_argument("--resolution", choices=tuple(NAMED), help="instead of the law's own")
 
 
 def read_law(options: argparse.Namespace) -> JointLaw:
-    """The law that the options name."""
-    law = presets.load_any(options.law)
+    """The law that the options name. Raises ValueError that says what is missing."""
+    path, parts = Path(options.law), {}
+    if options.law not in presets.names() and path.is_file():
+        parts = keys.read(path, "law file")
+    if parts and "asperity" not in parts:
+        if not options.default_rock:
+            raise ValueError(
+                f"{path} has no contacts: add the table [asperity] with K (Pa m^(1-eta)), lam, eta "
+                f"and mu of your rock, or give --default-rock, which takes {default_rock()}"
+            )
+        law = JointLaw.from_dict(parts | {"asperity": _CONTACTS}, str(path))
+    else:
+        law = presets.load_any(options.law)
     require_rock({"mu": law.asperity.mu}, f"{options.law}: asperity.")
     require_rock({"plane": law.plane or 0.0}, f"{options.law}: ")
     resolution = getattr(options, "resolution", None)

@@ -13,6 +13,7 @@ from ..calibration.fit import fit_curves
 from ..calibration.measured import ClosureCurve, ShearCurve, first_loading
 from ..parameters.rock import require_rock
 from ..support.checks import Array
+from ..support.text_numbers import DECIMAL
 from .command import Written, add_command, add_out, quantity, write_results
 
 MOST = 60  # points of a shear test that are fitted: a logger writes thousands, each costs a step
@@ -52,9 +53,9 @@ def add(commands: Any) -> None:
     add("--normal-column", help="name and unit of that column: sn:MPa")
     add("--normal-stress", metavar="STRESSES", help="of the shear tests in their order: 1MPa,3MPa")
     add(
-        "--decimal-comma",
-        action="store_true",
-        help="read 1,201 as 1.201 in files whose numbers do not show that the comma is decimal",
+        "--decimal",
+        choices=tuple(DECIMAL),
+        help="the decimal mark of files whose numbers do not show it, as 1,201 and 1.201 do not",
     )
     add("--up-to", help="fit up to this stress, predict the rest: 5.3MPa; or half, of the largest")
     add("--cycle", action="store_true", help="fit unloading too, and with it yield_interference")
@@ -75,7 +76,7 @@ def add(commands: Any) -> None:
         "--free",
         metavar="NAMES",
         help="parameters to fit, with commas between; default asperity_density, of closure tests "
-        "alpha and beta, with --cycle yield_interference, of shear tests mu, a and critical_slip",
+        "alpha and beta, with --cycle yield_interference, of shear tests mu, a and mating_length",
     )
     add("--law", metavar="PRESET_OR_FILE", help="the values of parameters that are not fitted")
     add_out(parser)
@@ -103,7 +104,7 @@ def _run(options: argparse.Namespace) -> None:
     summary: dict[str, Any] = {
         "data": name,
         "parameters_SI": fit.parameters,
-        "standard_error_SI": fit.standard_error,
+        "interval_95_SI": {one: fit.interval(one) for one in fit.free},
         "identifiable": list(fit.identifiable),
         "not_identifiable": fit.not_identifiable,
     }
@@ -133,7 +134,7 @@ def _closure_curve(
         stress, closure = datasets.load(item)
     else:
         columns = options.stress_column, options.closure_column
-        stress, closure = datasets.read_closure(item, *columns, options.decimal_comma)
+        stress, closure = datasets.read_closure(item, *columns, options.decimal)
     if options.compliance:
         length, _, load = options.compliance.partition("/")
         pressed = quantity("--compliance", load, "Pa", positive=True)
@@ -168,7 +169,7 @@ def _shear_curves(options: argparse.Namespace) -> list[ShearCurve]:
     columns = options.shear_column, options.shear_stress_column, options.normal_column
     curves = []
     for path, normal in zip(options.shear, normals, strict=True):
-        test = datasets.read_shear(path, *columns, normal, options.decimal_comma)
+        test = datasets.read_shear(path, *columns, normal, options.decimal)
         n = test.shear.size
         kept = np.unique(np.linspace(0, n - 1, min(n, MOST)).round().astype(int))
         curves.append(ShearCurve(test.shear[kept], test.shear_stress[kept], test.normal))
@@ -180,7 +181,7 @@ def _keywords(options: argparse.Namespace) -> dict[str, Any]:
     free, law = ["asperity_density"], None
     free += ["alpha", "beta"] if options.data else []
     free += ["yield_interference"] if options.cycle else []
-    free += ["mu", "a", "critical_slip"] if options.shear else []
+    free += ["mu", "a", "mating_length"] if options.shear else []
     if options.free:
         free = [name.strip() for name in options.free.split(",")]
     pairs = (item.partition("=") for item in options.set)

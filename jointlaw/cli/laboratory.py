@@ -131,7 +131,7 @@ def _shear(options: argparse.Namespace) -> None:
     print(
         f"{peak} {record.peak_friction_angle:.2f} deg, at the end "
         f"{record.residual_friction_angle:.2f} deg, largest dilation angle "
-        f"{record.dilation_angle:.2f} deg"
+        f"{record.peak_dilation_angle:.2f} deg"
         + ("" if math.isnan(secant) else f", secant shear stiffness {secant:.4g} Pa/m")
     )
 
@@ -166,7 +166,6 @@ def _write(record: Record, law: JointLaw, options: argparse.Namespace) -> None:
     name, (length, stress) = options.command, options.units
     files: Written = {
         f"{name}.csv": partial(record.to_csv, length=length, stress=stress),
-        f"{name}.npz": record.to_npz,
         "law.toml": law.to_toml,
         f"{name}.png": record.plot,
     }

@@ -27,6 +27,7 @@ REMOVED = {
     "tests/verification/test_paper_*.py",
     "closure --yield-interference": _YIELDING,
     "shear --yield-interference": _YIELDING,
+    "fit --decimal-comma": "write --decimal comma",
     "fit --workers": "fit one closure file a command",
     "fit --formation": "give a law of that formation, such as --law westerly-smooth",
     "export --closure": _TABLE,

@@ -1,14 +1,21 @@
 """`jointlaw scan`: a scanned surface to orientation and heights, with a report."""
 
 import argparse
+import math
 from pathlib import Path
 from typing import Any
 
-from ..parameters.rock import require_rock
+from ..laboratory.experiments import direct_shear
+from ..parameters.rock import ROCK, require_rock
 from ..parameters.toml import VERSION
+from ..support.checks import Array
+from ..support.text_numbers import DECIMAL
 from ..surface.fit import SurfaceFit, from_surface
 from ..surface.scan_files import read_scan
-from .command import Written, add_command, add_out, in_unit, quantity, write_results
+from .command import Written, add_command, add_out, default_rock, in_unit, quantity, write_results
+
+STRESS = 1e6  # Pa at which the report tells friction angles
+LONGER = 2  # the second sampling length, over the first
 
 
 def add(commands: Any) -> None:
@@ -16,10 +23,11 @@ def add(commands: Any) -> None:
     what = "read heights, directions and number of asperities off a composite surface"
     example = "jointlaw scan scan.csv --spacing 20um --height-unit um --out out"
     parser = add_command(commands, "scan", what, example, _run)
-    parser.add_argument("file", help="a matrix of heights, CSV or NPY")
+    parser.add_argument("file", help="matrix of heights or list of x, y, z, as text, ASC or NPY")
     length = in_unit("m", positive=True)
     parser.add_argument("--spacing", type=length, required=True, help="of the points: 20um")
     parser.add_argument("--height-unit", help="of the heights, such as um")
+    parser.add_argument("--decimal", choices=tuple(DECIMAL), help="the decimal mark of the file")
     parser.add_argument("--sampling-length", type=length, help="edge of a facet: 4 spacings")
     add_out(parser, pictures=False)
 
@@ -29,10 +37,12 @@ def _run(options: argparse.Namespace) -> None:
         raise ValueError(
             f"{options.file}: gives no unit of its heights; name it, such as --height-unit um"
         )
-    z = read_scan(options.file, quantity("--height-unit", f"1{options.height_unit}", "m"))
+    unit = quantity("--height-unit", f"1{options.height_unit}", "m")
+    z = read_scan(options.file, unit, options.spacing, options.decimal)
     fit = from_surface(z, options.spacing, options.sampling_length)
     require_rock(fit.parameters, f"{Path(options.file).name}: the fitted ")
-    print(fit.report())
+    text = fit.report() + _friction(fit, z)
+    print(text)
     summary = {
         "parameters_SI": fit.parameters,
         "standard_error_SI": fit.standard_error,
@@ -40,11 +50,33 @@ def _run(options: argparse.Namespace) -> None:
         "identifiable": list(fit.identifiable),
         "not_identifiable": fit.not_identifiable,
     }
-    files: Written = {
-        "surface.toml": _toml(fit, Path(options.file).name),
-        "report.md": fit.report(),
-    }
+    files: Written = {"surface.toml": _toml(fit, Path(options.file).name), "report.md": text}
     write_results(options.out, files, summary, "")
+
+
+def _friction(fit: SurfaceFit, z: Array) -> str:
+    """What the scan means for friction, at its sampling length and at a longer one (Markdown)."""
+    lines = [
+        f"\nFriction angle of a joint of this surface at {STRESS / 1e6:g} MPa, sheared by one "
+        f"sampling length, with contacts of an assumed rock ({default_rock()}):\n",
+        "| sampling length (mm) | a | along the rows | across them |",
+        "|---|---|---|---|",
+    ]
+    for length in (fit.asperities.size, LONGER * fit.asperities.size):
+        try:
+            one = from_surface(z, fit.spacing, length)
+            cells = [f"{_largest_angle(one, plane):.1f}°" for plane in (0.0, math.pi / 2)]
+        except ValueError as error:
+            lines.append(f"| {1e3 * length:.3g} | {error} | | |")
+        else:
+            lines.append(f"| {1e3 * length:.3g} | {one.orientation.a:.3g} | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _largest_angle(fit: SurfaceFit, plane: float) -> float:
+    """Largest mobilised friction angle (degrees) of direct shear at `STRESS` along this azimuth."""
+    joint = fit.law(ROCK, plane=plane).joint()
+    return direct_shear(joint, fit.asperities.size, STRESS, steps=100).peak_friction_angle
 
 
 def _toml(fit: SurfaceFit, name: str) -> str:
@@ -52,7 +84,7 @@ def _toml(fit: SurfaceFit, name: str) -> str:
     p = fit.parameters
     return (
         f"# From {name!a}, sampling length {fit.asperities.size:.4g} m. To make it a law, add\n"
-        "# [asperity] with K, lam, eta and mu.\n"
+        "# [asperity] with K, lam, eta and mu; or give commands --default-rock.\n"
         f"version = {VERSION}\n"
         f"asperity_density = {p['asperity_density']!r}  # 1/m2\n"
         f"\n[orientation]\na = {p['a']!r}\nb = {p['b']!r}\nc = {p['c']!r}\n\n"

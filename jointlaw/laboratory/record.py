@@ -1,7 +1,6 @@
 """What a laboratory test on a joint measured: named columns, units, summary figures."""
 
 import io
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -33,7 +32,7 @@ _STRESSES = ((1.0, "Pa"), (1e3, "kPa"), (1e6, "MPa"), (1e9, "GPa"))
 _ENERGIES = ((1e-6, "µJ/m²"), (1e-3, "mJ/m²"), (1.0, "J/m²"), (1e3, "kJ/m²"))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Record:
     """Columns of a test: a row for the joint at its start (direct shear: seated), one per step.
 
@@ -54,6 +53,21 @@ class Record:
 
     def __len__(self) -> int:
         return len(self.columns["closure"])
+
+    def __repr__(self) -> str:
+        if not self._sheared:
+            most = f"{np.max(self.F1) / 1e6:.3g} MPa at a closure of {np.max(self.closure):.3g} m"
+            return f"<Record of a closure test, {len(self)} rows: to {most}>"
+        way, peak = np.max(np.abs(self.shear)), "peak" if self.has_peak else "largest"
+        return (
+            f"<Record of a direct shear test, {len(self)} rows: to {way:.3g} m, {peak} friction "
+            f"angle {self.peak_friction_angle:.1f} deg, largest dilation angle "
+            f"{self.peak_dilation_angle:.1f} deg>"
+        )
+
+    @property
+    def _sheared(self) -> bool:
+        return bool(np.any(self.shear != self.shear[0]))
 
     @property
     def shear(self) -> Array:
@@ -94,14 +108,17 @@ class Record:
         return float(abs(self.friction_angle[-1]))
 
     @property
-    def dilation_angle(self) -> float:
-        """Largest dilation angle atan(opening/shear) of a step, in degrees; 0 without dilation."""
-        slip = np.abs(np.diff(self.shear))
-        opening = -np.diff(self.closure)
-        moved = slip > 1e-9 * max(float(np.max(np.abs(self.shear))), 1e-300)
-        if not moved.any():
-            return 0.0
-        return float(np.degrees(np.arctan(max(0.0, np.max(opening[moved] / slip[moved])))))
+    def dilation_angle(self) -> Array:
+        """Dilation angle atan(opening/shear) of each row's step in degrees; 0 without shear."""
+        slip = np.abs(np.diff(self.shear, prepend=self.shear[0]))
+        opening = -np.diff(self.closure, prepend=self.closure[0])
+        moved = slip > 1e-9 * np.max(np.abs(self.shear))
+        return np.degrees(np.where(moved, np.arctan2(opening, slip), 0.0))
+
+    @property
+    def peak_dilation_angle(self) -> float:
+        """Largest dilation angle of a step in degrees; 0 where the joint never opens."""
+        return max(0.0, float(np.max(self.dilation_angle)))
 
     @property
     def secant_stiffness(self) -> float:
@@ -119,12 +136,12 @@ class Record:
             "stored_J_per_m2": float(self.stored[-1]),
             "dissipated_J_per_m2": float(self.dissipated[-1]),
         }
-        if np.any(self.shear != self.shear[0]):
+        if self._sheared:
             figures |= {
                 "peak_friction_angle_deg": self.peak_friction_angle,
                 "has_peak": self.has_peak,
                 "residual_friction_angle_deg": self.residual_friction_angle,
-                "dilation_angle_deg": self.dilation_angle,
+                "peak_dilation_angle_deg": self.peak_dilation_angle,
                 "secant_shear_stiffness_Pa_per_m": self.secant_stiffness,
             }
         return figures
@@ -146,16 +163,9 @@ class Record:
         np.savetxt(buffer, table, fmt="%.12g", delimiter=",", header=header, comments="")
         replace_file(Path(path), buffer.getvalue().encode())
 
-    def to_npz(self, path: str | Path) -> None:
-        """Write the columns as NPZ with a version, the azimuth and a JSON text of the units."""
-        buffer = io.BytesIO()
-        arrays: dict[str, Any] = dict(self.columns)
-        np.savez(buffer, version=1, **arrays, azimuth=self.azimuth, units=json.dumps(UNITS))
-        replace_file(Path(path), buffer.getvalue())
-
     def plot(self, path: str | Path | None = None) -> Any:
         """Draw the test (needs matplotlib: extra `plot`); returns the figure, saved to `path`."""
-        draw = _shear_figure if np.any(self.shear != self.shear[0]) else _closure_figure
+        draw = _shear_figure if self._sheared else _closure_figure
         with style() as plt:
             return written(draw(self, plt), path)
 

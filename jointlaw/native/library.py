@@ -12,7 +12,6 @@ from ..discretisation.tables import Tables
 from . import build
 from .layout import Law, in_blocks, pack
 
-BLOCK = 8  # joints side by side in a block of states, JLAW_BLOCK in batch.h
 ADVANCE, MEASURE, REFRESH = range(3)  # what jlaw_run calls
 
 
@@ -26,7 +25,7 @@ class BatchCall(ctypes.Structure):
     _fields_ = [
         *((name, ctypes.c_void_p) for name in ("law", "state", "d", "F", "C", "index")),
         ("n", ctypes.c_longlong),
-        *((name, ctypes.c_int) for name in ("rows", "ledger", "keep")),
+        *((name, ctypes.c_int) for name in ("rows", "alone", "lanes", "ledger", "keep")),
     ]
 
 
@@ -44,8 +43,7 @@ def load_file(path: Path) -> ctypes.CDLL:
     """The library of this file."""
     library = ctypes.CDLL(str(path))
     library.jlaw_sources.restype = ctypes.c_char_p
-    run = library.jlaw_run
-    run.argtypes = [ctypes.c_void_p, *[ctypes.c_longlong] * 2, *[ctypes.c_int] * 3]
+    library.jlaw_run.argtypes = [ctypes.c_void_p, *[ctypes.c_longlong] * 2, ctypes.c_int]
     if library.jlaw_sources().decode() != build.sources():
         raise StaleLibraryError(
             f"{path} was built from other sources than lie beside it: build it anew with "
@@ -68,15 +66,11 @@ class NativeLaw:
         self.address = ctypes.addressof(self._law)
 
 
-def address(array: Any) -> int:
-    """Where the numbers of a contiguous array begin."""
+def address(array: Any) -> int | None:
+    """Where the numbers of a contiguous array begin; None for None."""
+    if array is None:
+        return None
     try:  # four times as fast as numpy's own
         return ctypes.addressof(ctypes.c_char.from_buffer(array))
     except (TypeError, ValueError):  # it is empty, or may only be read
         return int(array.ctypes.data)
-
-
-def check(result: int) -> None:
-    """Raises MemoryError where a call says so."""
-    if result:
-        raise MemoryError("no memory for a copy of a block of states")

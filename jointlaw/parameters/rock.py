@@ -6,6 +6,11 @@ The law itself takes any number: it has no unit of its own.
 import math
 from collections.abc import Mapping
 
+from .asperity import Asperity
+
+# Where nothing is known: shear modulus 20 GPa, Poisson's ratio 0.25, asperities of 1 mm radius
+# (Eq. 34), friction 0.6 (Byerlee 1978)
+ROCK = Asperity.hertz_mindlin(G=20e9, nu=0.25, R=1e-3, mu=0.6)
 _OTHER = "is the column in another unit? Name it:"
 _SCALE = "are the columns in the units that were read or given?"
 # the steepest friction angle, 79 degrees, is beyond that of any rock

@@ -47,8 +47,12 @@ def style() -> Iterator[Any]:
 
 
 def written(figure: Any, path: str | Path | None) -> Any:
-    """The figure; with `path` it is written there and closed."""
+    """The figure; with `path` it is written there and closed.
+
+    In a notebook it is closed too: a cell shows what it returns, and would show it twice.
+    """
     if path is not None:
         figure.savefig(path, dpi=STYLE["savefig.dpi"])
+    if path is not None or "inline" in pyplot().get_backend():
         pyplot().close(figure)
     return figure

@@ -113,8 +113,10 @@ def random_law(seed):
     kind = {"closure_only": True} if seed % 8 == 5 else {"plane": [None, 0.0, 0.7][seed // 2 % 3]}
     mu = [0.0, 0.3, 0.7][rng.integers(3)]
     damage = {"yield_interference": 10.0 ** rng.uniform(-8.0, -6.0)} if seed // 4 % 2 else {}
+    kind["mating_length"] = [np.inf, 8e-7][seed % 2]
     if mu and seed // 5 % 3 == 1:
-        damage |= {"mu_residual": mu * rng.uniform(), "wear_slip": 10.0 ** rng.uniform(-7.0, -5.0)}
+        kind |= {"mating_length": 8e-7, "slope_residual": rng.uniform()}
+        kind["slope_wear"] = 10.0 ** rng.uniform(1.0, 4.0)
     return jl.JointLaw(
         orientation=jl.Orientation(
             rng.uniform(1.0, 6.0), rng.uniform(-0.4, 0.8), rng.uniform(-0.15, 0.15)
@@ -123,7 +125,6 @@ def random_law(seed):
         heights=heights,
         asperity_density=1e10,
         closure_range=1e-6,
-        critical_slip=[np.inf, 8e-7][seed % 2],
         resolution=jl.Resolution(int(rng.integers(1, 4)), int(rng.integers(3, 6)), 1 + seed % 6),
         **kind,
     )

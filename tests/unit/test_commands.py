@@ -47,7 +47,7 @@ def read(folder, name):
 def test_shear_example_runs(tmp_path, capsys):
     assert main(example("shear", capsys)) == 0
     out = tmp_path / "out"
-    names = {"law.toml", "summary.json", "shear.csv", "shear.npz", "shear.png"}
+    names = {"law.toml", "summary.json", "shear.csv", "shear.png"}
     assert {path.name for path in out.iterdir()} == names
     # the contacts are kept: friction still rises at both turning points
     assert "no peak: largest friction angle" in capsys.readouterr().out

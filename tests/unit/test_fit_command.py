@@ -66,6 +66,7 @@ def test_without_matplotlib_all_but_the_picture_is_written(tmp_path, cycle, caps
         ("fit loop.csv --normal-stress 1MPa", "--normal-stress is about direct shear tests"),
         ("fit --shear loop.csv --cycle", "--cycle is about a closure test"),
         ("fit loop.csv loop.csv", "2 closure files: give one"),
+        ("fit loop.csv --decimal-comma", "fit --decimal-comma was removed: write --decimal comma"),
         ("fit loop.csv --workers 2", "fit --workers was removed: fit one closure file a command"),
         ("fit loop.csv --formation population", "fit --formation was removed: give a law"),
         ("fit loop.csv --compliance rock.csv", "--compliance: '' is not a quantity in Pa"),
@@ -81,14 +82,24 @@ def test_refused(cycle, capsys, tmp_path, line, told):
     assert not (tmp_path / "o").exists()
 
 
-def test_a_scan_needs_only_the_contacts_to_be_a_law(tmp_path):
+def test_a_scan_needs_only_the_contacts_to_be_a_law(tmp_path, capsys):
     rng = np.random.default_rng(0)
     z = 400e-6 * gaussian_filter(rng.standard_normal((400, 400)), 5)
     np.save(tmp_path / "z.npy", z)
     assert main(["scan", "z.npy", "--spacing", "20um", "--height-unit", "m", "--out", "o"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    told = {length: line for length in ("0.08", "0.16") for line in lines if f"| {length} " in line}
+    assert len(told) == 2
     summary = json.loads((tmp_path / "o" / "summary.json").read_text())
-    contacts = "\n[asperity]\nK = 1e9\nlam = 1.2\neta = 0.5\nmu = 0.6\n"
-    law = jl.JointLaw.from_text((tmp_path / "o" / "surface.toml").read_text() + contacts)
     assert summary["version"] == 2
+    shear = "shear o/surface.toml --normal-stress 1MPa --to 80um --steps 100 --out p"
+    assert main(shear.split()) == 2
+    assert "add the table [asperity] with K" in capsys.readouterr().err
+    assert main([*shear.split(), "--default-rock"]) == 0
+    law = jl.JointLaw.from_toml(tmp_path / "p" / "law.toml")
     assert summary["parameters_SI"]["a"] == law.orientation.a
     assert summary["parameters_SI"]["asperity_density"] == law.asperity_density
+    found = json.loads((tmp_path / "p" / "summary.json").read_text())["result"]
+    # the report's joint moves along the rows alone, in the same nodes: 0.1 degrees are rounding
+    angle = float(told["0.08"].split("|")[3].strip("° "))
+    assert found["peak_friction_angle_deg"] == pytest.approx(angle, abs=0.6)

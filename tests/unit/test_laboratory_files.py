@@ -38,6 +38,15 @@ READ = {  # the file, and what `read_shear` is told of it
         + "\n".join(f'"12:0{k}","{u}","{t}"' for k, (u, t) in enumerate(zip(U, TAU, strict=1))),
         NORMAL,
     ),
+    "thousands that one number shows, on ordinary paper of Europe": (
+        "us [mm];tau [kPa]\n"
+        + rows(U, ["0", "875", "1.250,0", "1.750", "1.625", "1.500"], mark=";").replace("0.", "0,")
+        .replace("1.0;", "1,0;"), NORMAL,
+    ),
+    "the same of America": (
+        "us [mm]\ttau [kPa]\n"
+        + rows(U, ["0", "875", "1,250.0", "1,750", "1,625", "1,500"], mark="\t"), NORMAL,
+    ),
     "names and signs of its own": (
         "way,resistance [MPa]\n" + rows(U, -TAU),
         NORMAL | {"shear": "way:mm", "stress": "resistance:-1MPa"},
@@ -72,7 +81,7 @@ THOUSANDS = "us [mm]\ttau [kPa]\n0.0\t0\n0.1\t875\n0.2\t1,201\n0.3\t1,305\n"
     [
         THOUSANDS,
         THOUSANDS.replace("\t", ";"),
-        THOUSANDS.replace("1,201", "1,201.5"),
+        "us [mm],tau [kPa]\n0,0\n1,1.201\n2,1.305\n",
         THOUSANDS.replace("0.", "0,").replace("1,", "1."),  # decimal commas, points for thousands
         'us [mm],tau [kPa]\n0.0,0\n0.1,875\n0.2,"1,201"\n',
     ],
@@ -80,7 +89,7 @@ THOUSANDS = "us [mm]\ttau [kPa]\n0.0\t0\n0.1\t875\n0.2\t1,201\n0.3\t1,305\n"
 def test_what_may_be_thousands_is_refused(text, tmp_path):
     """1,201 kPa is 1.2 MPa or 1.2 kPa: a factor of 1000 that no later check may see."""
     (tmp_path / "lab.csv").write_text(text)
-    with pytest.raises(ValueError, match=r"may have a mark between its thousands.*--decimal-comma"):
+    with pytest.raises(ValueError, match=r"may have a mark between its thousands.*--decimal comma"):
         read_shear(tmp_path / "lab.csv", **NORMAL)
 
 
@@ -89,9 +98,12 @@ def test_decimal_commas_are_read_where_a_number_or_the_caller_shows_them(tmp_pat
     path.write_text(text)
     assert read_shear(path, **NORMAL).shear_stress[2] == 1.201e6
     path.write_text(text.replace("1,1;", "1;").replace("2,2;", "2;"))
-    assert read_shear(path, **NORMAL, decimal_comma=True).shear_stress[2] == 1.201e6
+    assert read_shear(path, **NORMAL, decimal="comma").shear_stress[2] == 1.201e6
     with pytest.raises(ValueError, match="line 3 holds '1,125'"):
         read_shear(path, **NORMAL)
+    for mark, value in (("comma", 1.201e6), ("point", 1201e6)):
+        path.write_text("us [mm];tau [MPa]\n0;0\n1;1,200\n2;1,201\n")
+        assert read_shear(path, normal_stress=5e7, decimal=mark).shear_stress[2] == value
 
 
 @pytest.mark.parametrize(
@@ -105,7 +117,8 @@ def test_decimal_commas_are_read_where_a_number_or_the_caller_shows_them(tmp_pat
         ("us [mm],tau [MPa]\n0,0\n1,2\n2,inf\n", "line 4 holds 'inf', which is no number"),
         ("us [mm],tau\n" + rows(U, TAU), 'gives no unit; name it, .* "tau:MPa"'),
         ("us [mm],tau [mpa]\n" + rows(U, TAU), "has the unit 'mpa', none of Pa"),
-        ("us [mm],tau [MPa]\n" + rows(U, TAU, decimal=","), "has 4 cells under 2 names"),
+        ("us [mm],tau [MPa]\n" + rows(U, TAU, decimal=","), "has 4 cells .* columns by semicolons"),
+        ("us [mm];tau [MPa]\n1;2;3\n2;3;4\n", "has 3 cells under 2 names; give each column a name"),
         ("us [mm],tau [MPa]\n" + rows(U, -TAU), 'turn its sign: .* "tau:-1MPa"'),
     ],
 )

@@ -35,7 +35,9 @@ def test_summary_figures(azimuth, sense):
     assert record.peak_friction_angle == pytest.approx(45.0, rel=1e-12)
     assert record.residual_friction_angle == pytest.approx(30.0, rel=1e-12)
     # steepest between 2 and 3 um: 0.5 um of opening on 1 um of shear
-    assert record.dilation_angle == pytest.approx(math.degrees(math.atan(0.5)), rel=1e-9)
+    assert record.peak_dilation_angle == pytest.approx(math.degrees(math.atan(0.5)), rel=1e-9)
+    assert record.dilation_angle.shape == record.friction_angle.shape == (5,)
+    assert "5 rows: to 4e-06 m, peak friction angle 45.0 deg, largest dilation" in repr(record)
     assert record.secant_stiffness == pytest.approx(10e6 / 2e-6, rel=1e-12)
     np.testing.assert_allclose(record.shear, sense * np.arange(5) * 1e-6, atol=1e-20)
     assert record.summary() == {
@@ -47,7 +49,7 @@ def test_summary_figures(azimuth, sense):
         "peak_friction_angle_deg": record.peak_friction_angle,
         "has_peak": True,
         "residual_friction_angle_deg": record.residual_friction_angle,
-        "dilation_angle_deg": record.dilation_angle,
+        "peak_dilation_angle_deg": record.peak_dilation_angle,
         "secant_shear_stiffness_Pa_per_m": record.secant_stiffness,
     }
 
@@ -80,3 +82,14 @@ def test_csv_round_trip(tmp_path):
         np.testing.assert_allclose(table[title], record.columns[name], rtol=1e-11)
     with pytest.raises(ValueError, match="'1furlong' is not a quantity in m"):
         record.to_csv(tmp_path / "r.csv", length="furlong")
+
+
+@pytest.mark.parametrize(("backend", "left"), [("agg", 1), ("inline", 0)])
+def test_a_notebook_shows_a_picture_once(backend, left, monkeypatch):
+    """A cell shows the figure that it returns, and every figure that is left open."""
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    monkeypatch.setattr(pyplot, "get_backend", lambda: f"module://matplotlib_{backend}")
+    pyplot.close("all")
+    assert analytic().plot().axes
+    assert len(pyplot.get_fignums()) == left
+    pyplot.close("all")

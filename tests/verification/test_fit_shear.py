@@ -36,7 +36,7 @@ def test_friction_and_inclination_are_covered_by_their_intervals(law, strength):
     rng, hits = np.random.default_rng(0), 0
     for _ in range(8):
         measured = strength + 0.01 * strength.max() * rng.standard_normal(SHEAR.size)
-        fit = jl.fit_shear(SHEAR, measured, 5e6, law=start)
+        fit = jl.fit_curves([ShearCurve(SHEAR, measured, 5e6)], law=start, free=("mu", "a"))
         assert set(fit.identifiable) == {"mu", "a"}
         for name, value in (("mu", 0.5), ("a", 3.0)):
             low, high = fit.interval(name)
@@ -53,7 +53,7 @@ def test_exact_data_of_the_finest_nodes_give_the_truth(law):
     shear = np.linspace(0.0, 1e-3, 21)
     exact = ShearCurve(shear, np.ones(21), 3e6).predict(truth)
     start = replace(start, asperity=replace(law.asperity, mu=0.6))
-    fit = jl.fit_shear(shear, exact, 3e6, law=start)
+    fit = jl.fit_curves([ShearCurve(shear, exact, 3e6)], law=start, free=("mu", "a"))
     assert fit.parameters["mu"] == pytest.approx(0.5, abs=0.005)
     assert fit.parameters["a"] == pytest.approx(4.0, abs=0.05)
 

@@ -72,17 +72,57 @@ def test_heights_in_another_unit_fix_no_direction(factor):
     assert not {"a", "b"} & set(fit.identifiable)
 
 
+def files_of(z):
+    """A scan (ny, nx), points 20 apart, as text of each kind."""
+    matrix = "\n".join(" ".join(map(str, row)) for row in z)
+    points = [f"{20 * x} {20 * y} {z[y, x]}" for y, x in np.ndindex(z.shape)][::-1]
+    return {
+        "commas.csv": "# um\n" + matrix.replace(" ", ","),
+        "names.txt": "a b c d\n" + matrix,
+        "decimal_commas.csv": matrix.replace(" ", ";").replace(".", ","),
+        "grid.asc": f"ncols 4\nnrows 3\ncellsize 20\nNODATA_value -9999\n{matrix}",
+        "points.xyz": "x y z\n" + "\n".join(points),
+    }
+
+
 def test_files_give_the_array_back(tmp_path):
     z = np.arange(12.0).reshape(3, 4) / 8
-    np.savetxt(tmp_path / "z.csv", z, delimiter=",", header="heights in um")
-    np.savetxt(tmp_path / "z.txt", z, header="a b c d", comments="")
     np.save(tmp_path / "z.npy", z)
-    for name in ("z.csv", "z.txt", "z.npy"):
-        np.testing.assert_array_equal(read_scan(tmp_path / name, 1e-6), 1e-6 * z)
-    (tmp_path / "thousands.csv").write_text("1,201;2,305\n1,202;2,306\n")
-    for name in ("thousands.csv", "nothing.npy"):
-        with pytest.raises(ValueError, match="is no matrix of heights"):
-            read_scan(tmp_path / name, 1e-6)
+    for name, text in files_of(z).items():
+        (tmp_path / name).write_text(text)
+    for name in ("z.npy", *files_of(z)):
+        np.testing.assert_array_equal(read_scan(tmp_path / name, 1e-6, SPACING), 1e-6 * z)
+    (tmp_path / "grid.asc").write_text(files_of(z)["grid.asc"].replace("1.375", "-9999"))
+    assert np.isnan(read_scan(tmp_path / "grid.asc", 1e-6, SPACING)[2, 3])
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "told"),
+    [
+        (
+            "t.csv",
+            "1,201;2,305\n1,202;2,306\n",
+            "is no matrix .*'1,201' may have .*--decimal comma",
+        ),
+        ("nothing.npy", None, "is no matrix of heights"),
+        ("z.csv", "1.5;x\n", "is no matrix of heights"),
+        (
+            "z.asc",
+            "cellsize 0.02\n1.5 2\n",
+            "its cellsize 0.02 is 2e-08 m .*but --spacing is 2e-05",
+        ),
+        (
+            "z.xyz",
+            "0 0 1\n20 0 1\n0 20 1\n17 20 1\n",
+            "no square grid .*scipy.interpolate.griddata",
+        ),
+    ],
+)
+def test_files_that_cannot_be_read(name, text, told, tmp_path):
+    if text is not None:
+        (tmp_path / name).write_text(text)
+    with pytest.raises(ValueError, match=told):
+        read_scan(tmp_path / name, 1e-6, SPACING)
 
 
 @pytest.mark.parametrize(

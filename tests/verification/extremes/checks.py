@@ -6,7 +6,7 @@ from jointlaw.kernels import reference as kernel
 
 ROUNDING = 1e-12  # of the facet's normal force: a cell's G is a difference of numbers of that size
 KERNELS = 1e-11  # of the largest traction: rounding of y, 1e-16, over a step of NEAR y, 1e-5
-NOTHING = 1e-9  # Pa; squares of sliders' forces in far smaller tractions underflow
+NOTHING = 1e-130  # Pa; squares of far smaller forces of sliders underflow
 
 
 def sliders_within_friction(batch, mu):

@@ -34,13 +34,11 @@ INGREDIENTS: dict[str, dict[str, Any]] = {  # by name: the keys of a law without
     "no heights": {"heights": None},
     "heights counted one by one": {"heights": SINGLE},
     "linear asperities (eta = 0)": {"asperity": {"eta": 0.0}, "heights": SINGLE},
-    "no friction on asperities": {
-        "asperity": {"mu": 0.0, "mu_residual": None, "wear_slip": np.inf},
-    },
+    "no friction on asperities": {"asperity": {"mu": 0.0}},
     "elastic asperities": {"asperity": {"yield_interference": np.inf}},
     "b = 0": {"orientation": {"b": 0.0}},
     "c = 0": {"orientation": {"c": 0.0}},
-    "no large shear": {"mating_length": np.inf},
+    "no large shear": {"mating_length": np.inf, "slope_wear": np.inf},
     "one depth cell": {"resolution": {"depth": 1}},
 }
 

@@ -146,6 +146,14 @@ class JointBatch:
         self._state[which // lanes, : self.law.dim, which % lanes] = start
         far = self._steepness * float(np.max(np.abs(start)))
         self._largest_reach = max(self._largest_reach, far)
+        if not mated:
+            self.unbond(which)
+
+    def unbond(self, index: Index) -> None:
+        """Break the bonds, if any, of the joints at `index`: faces that meet anew have none."""
+        which, lanes = self._index(index), self._state.shape[2]
+        row = self._row_numbers.damage.astype(int)
+        self._state[which // lanes, row, which % lanes] = 1.0
 
     def resize(self, n: int) -> None:
         """Change the number of joints; joints beyond the old number are new and mated."""
@@ -185,6 +193,8 @@ class JointBatch:
             now = reference.parts(k, self._rows(index))
             y = reference.effective_closure(k, now.delta, now.slopes)
             bound[index] = stiffness_of(k, y)
+        if k.bond is not None:
+            bound += (1.0 - self.damage) * k.bond.largest_stiffness
         return bound
 
     def critical_time_step(self, mass: ArrayLike, area: ArrayLike) -> Array:
@@ -244,6 +254,11 @@ class JointBatch:
     def slopes(self) -> Array:
         """Share (n,) of the slopes of the asperities that has not been worn away."""
         return 1.0 - self._part("worn")
+
+    @property
+    def damage(self) -> Array:
+        """Damage (n,) of the bond: 0 whole, 1 broken, and 1 where the law has none."""
+        return self._part("damage") if self.law.bond is not None else np.ones(self._n)
 
     # --------------------------------------------------------------- internals
 

@@ -26,7 +26,7 @@ def carried(sim, upper):
 def test_the_rock_around_a_cavern_carries_its_own_weight():
     """Between smooth walls what lies above a level line rests on what is below, pillars and all.
 
-    1e-3 leaves room for corners that turn at the walls; a wall that bore weight would miss it.
+    0.5 % leaves room for corners that turn at the walls; a wall that bore weight would miss it.
     """
     sim = Simulation(load("cavern"))
     assert sim.balanced
@@ -37,7 +37,7 @@ def test_the_rock_around_a_cavern_carries_its_own_weight():
     assert 140 <= rock.sum() <= 160
     for level in np.arange(-2.0, 9.5, 1.0):  # on the beds; the opening reaches from 0 to 4 m
         upper = rock & (height > level)
-        assert carried(sim, upper) == pytest.approx(weight[upper].sum(), rel=1e-3), level
+        assert carried(sim, upper) == pytest.approx(weight[upper].sum(), rel=5e-3), level
 
 
 def test_a_roof_wedge_falls_where_its_joints_are_smoother_than_it_is_steep():

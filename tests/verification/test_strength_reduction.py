@@ -1,5 +1,6 @@
-"""The strength reduction factor and critical tilt of one block are those of the law alone."""
+"""Factor of safety and critical tilt against calculations by hand, with the strength of the law."""
 
+import json
 import math
 import re
 from dataclasses import replace
@@ -7,10 +8,12 @@ from dataclasses import replace
 import pytest
 from scipy.optimize import brentq
 
+import jointlaw as jl
 from dem_demo.cli import main
 from dem_demo.output.monitors import friction_angle
 from dem_demo.scene import coulomb_law, parse
-from dem_demo.studies.strength import critical_tilt, reduced, strength_factor
+from dem_demo.studies import strength
+from dem_demo.studies.strength import asperity_factor, critical_tilt, factor_of_safety, smoothed
 
 DIP = 32.0
 SCENE = f"""
@@ -47,9 +50,104 @@ def angle(factor, dip):
     return friction_angle(weak, 2600.0 * 9.81 * math.cos(math.radians(dip)))
 
 
-def test_factor_of_a_block_is_that_of_the_law_alone():
+def bears(law, stress):
+    """Peak shear stress (Pa) of direct shear at a normal stress (Pa)."""
+    record = jl.direct_shear(law.joint(), to=[3e-3], normal=stress, steps=150)
+    return float(record.shear_stress.max())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["joint", "coulomb"])
+def test_factor_of_safety_of_a_block_on_a_plane(kind):
+    """Strength of the joint at its normal stress over the shear stress of the weight."""
+    scene = parse(SCENE)
+    law = scene.laws["joint"] if kind == "joint" else coulomb_law(3e9, 2e9, 0.8)
+    weight, dip = 2600.0 * 9.81, math.radians(DIP)
+    by_hand = bears(law, weight * math.cos(dip)) / (weight * math.sin(dip))
+    found = factor_of_safety(replace(scene, laws={"joint": law}))
+    assert found == pytest.approx(by_hand, rel=FOUND)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["joint", "coulomb"])
+def test_factor_of_safety_of_a_toppling_column(kind):
+    """A column 4 m high tips on its lower corner and pushes the top of a block that slides.
+
+    The side between them is smooth, so the push is that of moments about the corner; the block's
+    weight and the push give the normal stresses at its two ends.
+    """
+    tilt, height, wide, top, load = math.radians(25.0), 4.0, 3.0, 1.2, 2600.0 * 9.81
+    plain = {"free": coulomb_law(3e9, 2e9, 0.0), "foot": coulomb_law(3e9, 2e9, 5.0)}
+    law = parse(SCENE).laws["joint"] if kind == "joint" else coulomb_law(3e9, 2e9, 0.8)
+    head = SCENE[: SCENE.index("[[block]]")].split("[laws.joint]")[1]
+    scene = parse(f"""
+gravity = [{9.81 * math.sin(tilt)}, {-9.81 * math.cos(tilt)}]
+[laws.joint]{head}
+[laws.free]{head}
+[laws.foot]{head}
+[[block]]
+name = "base"
+box = [13.0, 1.0]
+at = [1.5, -0.5]
+fixed = true
+[[block]]
+name = "column"
+box = [1.0, {height}]
+at = [-0.5, {height / 2}]
+[[block]]
+name = "toe"
+box = [{wide}, {top}]
+at = [{wide / 2}, {top / 2}]
+[[joint]]
+between = ["column", "toe"]
+law = "free"
+[[joint]]
+between = ["column", "base"]
+law = "foot"
+[run]
+end = 0.2
+""")
+    push = load * height * (math.sin(tilt) * height / 2 - math.cos(tilt) / 2) / top
+    weight = load * wide * top
+    normal = weight * math.cos(tilt)
+    far = normal / 2 + (weight * math.sin(tilt) * top / 2 + push * top) / wide
+    ends = [2 * part / wide for part in (far, normal - far)]
+    strong = wide / 2 * sum(bears(law, stress) for stress in ends)
+    found = factor_of_safety(replace(scene, laws={"joint": law, **plain}))
+    assert found == pytest.approx(strong / (weight * math.sin(tilt) + push), rel=FOUND)
+
+
+def test_a_stopped_search_goes_on(tmp_path, monkeypatch, capsys):
+    """After Ctrl-C the same command asks only for what was not finished, and ends the same."""
+    scene, out, asked = tmp_path / "slab.toml", tmp_path / "out", []
+    scene.write_text(SCENE)
+    real = strength.displacements
+
+    def stops_at_the_fourth(*given):
+        asked.append(given)
+        if len(asked) == 4:
+            raise KeyboardInterrupt
+        return real(*given)
+
+    monkeypatch.setattr(strength, "displacements", stops_at_the_fourth)
+    words = ["strength-reduction", str(scene), "--out", str(out), "--until", "0.01"]
+    assert main(words) == 130
+    assert "the same command goes on" in capsys.readouterr().err
+    assert len(json.loads((out / "trials.json").read_text())["trials"]) == 3
+    assert main(words) == 0
+    (row,) = json.loads((out / "strength.json").read_text())["rows"]
+    trials = json.loads((out / "trials.json").read_text())["trials"]
+    assert len(asked) == len(trials)  # the stopped one twice; the picture is no equilibrium
+    assert row["factor_of_safety"] == factor_of_safety(parse(SCENE))
+    scene.write_text(SCENE.replace("mu = 0.4", "mu = 0.5"))
+    (out / "strength.json").unlink()
+    assert main(words) == 2
+    assert "trials of another scene" in capsys.readouterr().err
+
+
+def test_asperity_factor_of_a_block_is_that_of_the_law_alone():
     alone = brentq(lambda f: angle(f, DIP) - DIP, 1.0, 3.0, xtol=1e-3)
-    assert strength_factor(parse(SCENE)) == pytest.approx(alone, rel=FOUND)
+    assert asperity_factor(parse(SCENE)) == pytest.approx(alone, rel=FOUND)
 
 
 def test_critical_tilt_of_a_block_is_that_of_the_law_alone():
@@ -71,7 +169,7 @@ def test_all_frictions_are_divided_and_nothing_else():
     law, sticks = scene.laws["joint"], coulomb_law(1e9, 1e9, math.inf)
     worn = replace(law, slope_wear=1e3)
     given = {"worn": worn, "plain": coulomb_law(1e9, 1e9, 0.6), "sticks": sticks}
-    laws = reduced(replace(scene, laws=given), 2.0).laws
+    laws = smoothed(replace(scene, laws=given), 2.0).laws
     assert laws["worn"] == replace(worn, asperity=replace(worn.asperity, mu=law.asperity.mu / 2))
     assert laws["plain"] == coulomb_law(1e9, 1e9, 0.3)
     assert laws["sticks"] == sticks
@@ -83,8 +181,9 @@ def test_command_tells_both_and_draws_the_failure(tmp_path, capsys):
     assert main(["strength-reduction", str(scene), "--out", str(tmp_path / "out")]) == 0
     told = capsys.readouterr().out
     factor, tilt = re.search(
-        r"scene: F = ([\d.]+), critical tilt \+([\d.]+) degrees", told
+        r"scene: factor of safety ([\d.]+), critical tilt in degrees ([\d.]+)", told
     ).groups()
-    assert (float(factor), float(tilt)) == pytest.approx((1.61, 8.0), rel=0.03)
+    by_hand = math.tan(math.radians(angle(1.0, DIP))) / math.tan(math.radians(DIP))
+    assert (float(factor), float(tilt)) == pytest.approx((by_hand, 8.0), rel=0.03)
     assert (tmp_path / "out" / "failing-scene.png").stat().st_size > 10_000
     assert (tmp_path / "out" / "strength.json").exists()

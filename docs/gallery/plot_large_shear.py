@@ -2,7 +2,7 @@ r"""
 Metres of shear
 ===============
 
-With ``mating_length`` slopes fade with the distance from the mated position: dilation ends, friction
+With ``mating_length`` slopes fade with the distance from mate: dilation ends, friction
 falls to that of the asperities, and the way back ends mated.
 """
 
@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 import jointlaw as jl
 
 # %%
-# The mating length is the slip over which faces lose their fit. Without it the joint rises for ever.
+# The mating length is the slip over which faces lose their fit. Without it the joint always rises.
 
 kept = replace(jl.presets.load("biegel-rough"), plane=0.0, resolution="fine")
 fading = replace(kept, mating_length=2e-6)

@@ -20,10 +20,12 @@ from .joints.batch import JointBatch
 from .joints.crushed import warn_if_crushed
 from .joints.joint import Joint
 from .joints.time_step import largest_stiffness, stable_step
+from .kernels.bond import hold
 from .kernels.engine import step_states
 from .kernels.unmated import unmated_start
 from .parameters import keys, toml
 from .parameters.asperity import Asperity
+from .parameters.bond import Bond
 from .parameters.fingerprint import fingerprint
 from .parameters.heights import GammaHeights, HeightDistribution, Heights
 from .parameters.orientation import Orientation
@@ -65,6 +67,7 @@ class JointLaw:
     slope_wear: work of friction (J/m2) that wears slopes down by a factor e, > 0; with a finite
         mating_length. Infinite (no wear) by default.
     slope_residual: share of the slopes that never wears, 0 to 1.
+    bond: cohesion and tension beside the asperities, or None for a joint without.
 
     Raises ValueError when a parameter is out of bounds or the virgin curve is not convex.
     """
@@ -80,6 +83,7 @@ class JointLaw:
     mating_length: float = math.inf
     slope_wear: float = math.inf
     slope_residual: float = 0.0
+    bond: Bond | None = None
     critical_slip: InitVar[Any] = None  # of former versions
 
     def __post_init__(self, critical_slip: Any) -> None:
@@ -94,6 +98,8 @@ class JointLaw:
                 f"heights = {self.heights!r} must be GammaHeights, Heights or None; a histogram in "
                 "Heights stands for any other distribution"
             )
+        if not isinstance(self.bond, Bond | None):
+            raise ValueError(f"bond = {self.bond!r} must be of type Bond, or None")
         set_(self, "asperity_density", more_than("asperity_density", self.asperity_density, 0.0))
         asked: str | Resolution = self.resolution
         set_(self, "resolution", resolve(asked))
@@ -224,9 +230,14 @@ class JointLaw:
         """Normal stress (Pa) of a joint closed from zero to `closure` (m), unsheared.
 
         With a yield_interference that of the first loading, of infinitely many depth cells: a
-        joint's own few slip a little later.
+        joint's own few slip a little later. A bond makes it negative where the joint opens.
         """
-        return self._first_loading.stress(self._within_reach(closure))[()]
+        y = self._within_reach(closure)
+        stress = self._first_loading.stress(y)
+        if self.bond is not None:
+            opening = hold(self.bond, y.reshape(1, -1), np.zeros(y.size))
+            stress = stress + opening.F.reshape(y.shape)
+        return stress[()]
 
     def closure(self, normal_stress: ArrayLike) -> Any:
         """Closure (m) at which the normal stress (Pa, >= 0) is reached: inverse of the above.
@@ -236,11 +247,7 @@ class JointLaw:
         stress = finite("normal_stress", normal_stress, "Pa")
         if not (stress >= 0).all():
             raise ValueError(f"normal_stress = {normal_stress!r} is out of bounds: it must be >= 0")
-        if stress.ndim == 0:
-            return np.float64(self._first_loading.closure(float(stress), self.closure_range))
-        return self._first_loading.closures(stress.ravel(), self.closure_range).reshape(
-            stress.shape
-        )
+        return self._first_loading.closure(stress, self.closure_range)[()]
 
     def contacts(self, closure: ArrayLike, direction: tuple[float, float] | None = None) -> Any:
         """Asperities in touch per m2 at this closure (m), Eq. 11.
@@ -261,7 +268,7 @@ class JointLaw:
         """Upper bound of `|C|` (Pa/m) up to this closure (m) and this shear displacement (m, >= 0).
 
         The shear is the largest distance from the mated position, in any direction. Yielded and
-        worn joints are less stiff.
+        worn joints, and those of a broken bond, are less stiff.
         """
         y, way = self._within_reach(closure), finite("shear", shear, "m")
         if not (way >= 0).all():
@@ -269,7 +276,8 @@ class JointLaw:
         climbed = way / np.hypot(1.0, way / self.mating_length)
         rise = climbed[..., None] * np.linalg.norm(self.tables.m[1:], axis=0)
         self._within_reach(y + np.max(rise, axis=-1))
-        return largest_stiffness(self.tables, y, rise)[()]
+        bond = 0.0 if self.bond is None else self.bond.largest_stiffness
+        return (largest_stiffness(self.tables, y, rise) + bond)[()]
 
     def critical_time_step(
         self, mass: ArrayLike, area: ArrayLike, closure: ArrayLike, shear: ArrayLike = 0.0
@@ -347,6 +355,7 @@ class JointLaw:
         return tables(
             self.facets, self.curve, self.asperity, self.asperity_density,
             self.closure_range, r.depth, self.mating_length, self.slope_wear, self.slope_residual,
+            self.bond,
         )  # fmt: skip
 
     @cached_property
@@ -379,7 +388,7 @@ class JointLaw:
         fixed = facets(self.orientation, r.u, r.phi, self.plane, self.closure_only)
         elastic = facet_sum(fixed.theta, fixed.scale(p, self.asperity_density), p.lam, p.mu)
         try:
-            return FirstLoading(self.curve, elastic).closure(DEFAULT_STRESS, 1.0)
+            return float(FirstLoading(self.curve, elastic).closure(np.array(DEFAULT_STRESS), 1.0))
         except ValueError:
             self._require_numbers(1.0)  # most often the units are wrong
             raise

@@ -103,8 +103,14 @@ def critical_tilt(scene: Scene, trials: Trials | None = None, name: str = "scene
 
 
 def weakened(scene: Scene, factor: float) -> Scene:
-    """A scene with the strength of all joints divided by a factor."""
-    return replace(scene, reduction=scene.reduction * factor)
+    """A scene with the strength of all joints divided by a factor, bonds in tension as well."""
+    laws = dict(scene.laws)
+    for name, law in laws.items():
+        if bond := law.bond:  # an energy above the elastic one stays above it
+            energy = bond.energy_I and bond.energy_I / factor**2
+            bond = replace(bond, tension=bond.tension / factor, energy_I=energy)
+            laws[name] = replace(law, bond=bond)
+    return replace(scene, laws=laws, reduction=scene.reduction * factor)
 
 
 def smoothed(scene: Scene, factor: float) -> Scene:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..parameters.asperity import Asperity
+from ..parameters.bond import Bond
 from ..support.checks import Array, frozen
 from .facets import Facets
 from .nodes import UNUSED, depth_nodes
@@ -50,6 +51,7 @@ class Tables:
     opposite: NDArray[np.intp] | None = None
     slope_wear: float = math.inf
     slope_residual: float = 0.0
+    bond: Bond | None = None
 
     @property
     def yields(self) -> bool:
@@ -86,10 +88,11 @@ class Tables:
         """State numbers per joint: delta, dissipated energy, q of all cells, even UNUSED.
 
         Then, with yielding, the flattened depth of every facet and the plastic work; with wear, the
-        share of the slopes that is gone and the work of friction.
+        share of the slopes that is gone and the work of friction; with a bond its damage.
         """
         flattened = len(self.c1) + 1 if self.yields else 0
-        return self.dim + 1 + 2 * len(self.c1) * self.cells + flattened + 2 * self.wears
+        more = flattened + 2 * self.wears + (self.bond is not None)
+        return self.dim + 1 + 2 * len(self.c1) * self.cells + more
 
 
 def tables(
@@ -102,6 +105,7 @@ def tables(
     mating_length: float = math.inf,
     slope_wear: float = math.inf,
     slope_residual: float = 0.0,
+    bond: Bond | None = None,
 ) -> Tables:
     """Lay out the tables; `cells` for the facet of most weight, one where the curve is linear."""
     c1, slope = np.cos(facets.theta), np.tan(facets.theta)
@@ -121,6 +125,7 @@ def tables(
     return Tables(
         curve, *frozen(arrays), asperity.lam, asperity.mu, mating_length, yield_depth,
         alone if math.isinf(mating_length) else facets.opposite, slope_wear, slope_residual,
+        bond,
     )  # fmt: skip
 
 

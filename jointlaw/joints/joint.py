@@ -96,3 +96,4 @@ class Joint:
     dissipated_energy = _OfOne(JointBatch.dissipated_energy, float)
     plastic_work = _OfOne(JointBatch.plastic_work, float)
     slopes = _OfOne(JointBatch.slopes, float)
+    damage = _OfOne(JointBatch.damage, float)

@@ -8,7 +8,7 @@ joints last: facets (M, B), cells (M, D, B), sliders (2, M, D, B). State (rows, 
 where delta is counted from the mated position, and q is the shear force of a slider times lam, in
 the basis (s, t) of its facet: that of Eq. 25 where the joint is mated. With asperities that yield
 follow flattened depth (M) | plastic work (1); with wear, the share of the slopes that is gone (1) |
-work of friction (1).
+work of friction (1); with a bond its damage (1).
 """
 
 from typing import NamedTuple
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..discretisation.tables import Tables
 from ..support.checks import Array
 from ..support.thresholds import LIMIT, NEAR, ROUNDED, TINY, UNDERFLOW
+from .bond import hold
 from .cells import Cells, cells, compliance, reciprocal
 from .mating import Planes, Turning, offset, planes, turning
 from .wear import lowered, worn_share
@@ -37,6 +38,7 @@ class State(NamedTuple):
     plastic: Array  # (B,) or no rows
     worn: Array  # share of the slopes that is gone (B,), or no rows
     work: Array  # of friction, which wears them (B,), or no rows
+    damage: Array  # of the bond (B,), or no rows
 
     @property
     def slopes(self) -> Array:
@@ -86,6 +88,7 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     5. Traction: F = sum of A Phi n + (1/lam) sum of q (Eq. 21), by the planes at the end.
     6. Dissipated energy, every term >= 0 ("No step creates energy").
     7. Tangent C = dF/dd ("The tangent"), not without `tangent`.
+    8. The bond, if there is one, adds its own F, dissipated energy and C ("The bond").
     """
     old = parts(k, state)
     new_state = np.empty_like(state)
@@ -120,6 +123,12 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
         new.work[:] = old.work + rubbed
     if k.yields:
         new.dissipated[:] += new.plastic - old.plastic
+    held = None
+    if k.bond is not None:
+        held = hold(k.bond, new.delta, old.damage)
+        new.damage[:] = held.damage
+        new.dissipated[:] += held.lost
+        F = F + held.F
     if not tangent:
         return new_state, F, None
     E = middle.basis
@@ -132,16 +141,21 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
         C = C - softening(k, after, flat0, flat1, sliders.push, end)
     if k.fades:
         C[:, 1:] += bending(k, after, sliders, new.q, end, turning(k, new.delta[1:], new.slopes))
+    if held is not None:
+        C = C + held.C
     return new_state, F, C
 
 
 def parts(k: Tables, state: Array) -> State:
     """Views of the parts of a state array, q as (2, M, D, B)."""
     dim, M = k.dim, len(k.c1)
+    damage = state[-1] if k.bond is not None else state[:0]
+    state = state[:-1] if k.bond is not None else state
     q, rest = np.split(state[dim + 1 :], [2 * M * k.cells])
     depth, plastic = (rest[:M], rest[M]) if k.yields else (rest[:0], rest[:0])
     worn, work = rest[-2:] if k.wears else (rest[:0], rest[:0])
-    return State(state[:dim], state[dim], q.reshape(2, M, k.cells, -1), depth, plastic, worn, work)
+    q = q.reshape(2, M, k.cells, -1)
+    return State(state[:dim], state[dim], q, depth, plastic, worn, work, damage)
 
 
 def effective_closure(k: Tables, delta: Array, slopes: Array) -> Array:
@@ -277,7 +291,8 @@ def traction(k: Tables, state: Array) -> Array:
     force, _ = k.curve.force(y)
     if k.yields:
         force = np.where(y > now.depth, force - k.curve.force(now.depth)[0], 0.0)
-    return resultant(k, planes(k, now.delta[1:], now.slopes), force, now.q)
+    F = resultant(k, planes(k, now.delta[1:], now.slopes), force, now.q)
+    return F if k.bond is None else F + hold(k.bond, now.delta, now.damage).F
 
 
 class Measures(NamedTuple):
@@ -312,4 +327,6 @@ def measures(k: Tables, state: Array) -> Measures:
         normal = np.where(touches, np.maximum(normal, 0.0), 0.0)
     stored = np.sum((k.area * k.c1)[:, None] * normal, axis=0)
     stored = stored + np.sum(compliance(k) * q2 * reciprocal(now.kappa), axis=(0, 1))
+    if k.bond is not None:
+        stored = stored + hold(k.bond, state_now.delta, state_now.damage).stored
     return Measures(sliding, slipping, separated, stored, np.max(y, axis=0))

@@ -11,8 +11,11 @@ from .mating import offset
 def unmated_start(k: Tables) -> Array:
     """Displacement (dim,) in m from the mated position, at first touch, along axis 2.
 
-    Raises ValueError for a law without a mating length, or without shear.
+    Zeros for a law without a mating length, or without shear, whose bond alone is missing. Raises
+    ValueError for such a law without a bond.
     """
+    if k.bond is not None and not (k.fades and k.dim > 1):
+        return np.zeros(k.dim)
     if k.dim == 1:
         raise ValueError("mated=False: a joint with closure_only is always mated")
     if not k.fades:

@@ -60,7 +60,8 @@ JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1,
 /* The start of a joint whose faces have never met, as blocks that meet anew after a fall: at first
  * touch, 100 mating lengths from the mated position along axis 2. Closure is counted from the mated
  * position: s[0] is then negative, and a host closes the joint from there on. Returns 0; or -1 for a
- * law with an infinite mating length, always mated: the state is then the virgin one. */
+ * law with an infinite mating length, always mated: the state is then the virgin one. A bond of the
+ * law is broken in either. */
 JLAW_FUNCTION int jlaw_unmated(const jlaw_law *law, double *s);
 
 /* The same without any check, for hosts that know their steps and for devices: row i of the state is
@@ -151,6 +152,7 @@ extern "C" {
 #endif
 
 #include "lanes.h"
+#include "bond.h"
 #include "law.h"
 
 /* ------------------------------------------------------------------ messages */
@@ -270,6 +272,7 @@ static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
     good = good && rest[f] >= 0.0 && rest[f] <= law->largest_reach;
   if (law->yields) good = good && fabs(rest[law->facets]) <= DBL_MAX;
   if (law->wears) good = good && worn[0] >= 0.0 && worn[0] <= 1.0 && worn[1] <= DBL_MAX;
+  if (law->bonded) good = good && s[damage_row(law)] >= 0.0 && s[damage_row(law)] <= 1.0;
   return good && jlaw_sound_(s + slider_row(law), rest_row(law) - slider_row(law));
 }
 
@@ -329,6 +332,7 @@ JLAW_FUNCTION int jlaw_unmated(const jlaw_law *law, double *s)
   const int far = law->fades && law->dim > 1;
   for (int i = 0; i < state_rows(law); i++) s[i] = 0.0;
   if (far) s[0] = law->first_touch, s[1] = JLAW_FAR * law->mating_length;
+  if (law->bonded) s[damage_row(law)] = 1.0;
   return far ? 0 : -1;
 }
 JLAW_FUNCTION double jlaw_dissipated(const jlaw_law *law, const double *s)
@@ -345,7 +349,7 @@ JLAW_CLONES static JLAW_FUNCTION amounts jlaw_measure_(const jlaw_law *law, cons
 JLAW_FUNCTION double jlaw_stored(const jlaw_law *law, const double *s)
 {
   const amounts all = jlaw_measure_(law, s);
-  return all.normal + all.sheared;
+  return all.normal + all.sheared + all.bond;
 }
 
 JLAW_FUNCTION void jlaw_shares(const jlaw_law *law, const double *s, double shares[3])
@@ -367,6 +371,11 @@ JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure)
       const double depth = jlaw_of_facet_(law, f, i + 1);
       late += jlaw_of_facet_(law, f, i) * jlaw_virgin_one_(law, closure - depth, &slope);
     }
+  if (law->bonded && closure < 0.0) { /* a joint that opens */
+    bonded b = {{closure, 0.0, 0.0}, 0.0, {0.0}, {0.0}, 0.0};
+    hold(law, &b);
+    return b.F[0];
+  }
   return law->closure_factor * jlaw_virgin_one_(law, closure, &slope) - late;
 }
 
@@ -375,7 +384,8 @@ JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure)
   double slope;
   if (!(closure <= law->largest_reach)) return jlaw_none_();
   const double force = jlaw_virgin_one_(law, closure, &slope);
-  return law->stiffness_factor * slope + law->bending_factor * force;
+  return law->stiffness_factor * slope + law->bending_factor * force
+         + fmax(law->bond_normal, law->bond_shear);
 }
 
 JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)

@@ -60,7 +60,8 @@ JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1,
 /* The start of a joint whose faces have never met, as blocks that meet anew after a fall: at first
  * touch, 100 mating lengths from the mated position along axis 2. Closure is counted from the mated
  * position: s[0] is then negative, and a host closes the joint from there on. Returns 0; or -1 for a
- * law with an infinite mating length, always mated: the state is then the virgin one. */
+ * law with an infinite mating length, always mated: the state is then the virgin one. A bond of the
+ * law is broken in either. */
 JLAW_FUNCTION int jlaw_unmated(const jlaw_law *law, double *s);
 
 /* The same without any check, for hosts that know their steps and for devices: row i of the state is
@@ -142,6 +143,7 @@ struct jlaw_law {
   int yields; /* whether asperities yield */
   int fades; /* whether slopes fade with the distance from mate */
   int wears; /* whether slopes wear */
+  int bonded; /* whether there is a bond */
   double soft; /* 1/lam */
   double mu; /* friction of asperities */
   double mating_length; /* m; infinite: the largest float */
@@ -151,6 +153,12 @@ struct jlaw_law {
   double eta; /* exponent of the virgin curve */
   double scale; /* V of the virgin curve, m^(1/2) */
   double rise; /* p: the curve is tabulated over w^p */
+  double bond_normal; /* Pa/m: stiffness of the bond */
+  double bond_shear; /* Pa/m */
+  double opening_begin; /* 1/m: one over the opening where it begins to break */
+  double slip_begin; /* 1/m: the same of slip */
+  double opening_end; /* 1/m: where nothing of it is left */
+  double slip_end; /* 1/m */
   double closure_factor; /* normal stress over Phi */
   double stiffness_factor; /* bound of |C| over Phi' */
   double bending_factor; /* what slopes that fade add to it, over Phi */
@@ -173,6 +181,7 @@ struct jlaw_law {
   X(yields, 1, 0, 1) \
   X(fades, 1, 0, 1) \
   X(wears, 1, 0, 1) \
+  X(bonded, 1, 0, 1) \
   X(soft, 0, 0, DBL_MAX) \
   X(mu, 0, 0, DBL_MAX) \
   X(mating_length, 0, DBL_MIN, DBL_MAX) \
@@ -182,6 +191,12 @@ struct jlaw_law {
   X(eta, 0, 0, DBL_MAX) \
   X(scale, 0, DBL_MIN, DBL_MAX) \
   X(rise, 0, 0, DBL_MAX) \
+  X(bond_normal, 0, 0, DBL_MAX) \
+  X(bond_shear, 0, 0, DBL_MAX) \
+  X(opening_begin, 0, 0, DBL_MAX) \
+  X(slip_begin, 0, 0, DBL_MAX) \
+  X(opening_end, 0, 0, DBL_MAX) \
+  X(slip_end, 0, 0, DBL_MAX) \
   X(closure_factor, 0, 0, DBL_MAX) \
   X(stiffness_factor, 0, 0, DBL_MAX) \
   X(bending_factor, 0, 0, DBL_MAX) \
@@ -464,12 +479,96 @@ JL_IN_ void jl_put_(jl_numbers_ n, int row, int apart, int some, jl_real_ x)
 #define JL_SUMS_ 4
 #define jl_total_(sum, of) (((sum)[0].of + (sum)[2].of) + ((sum)[1].of + (sum)[3].of))
 #endif
+/* bond.h: the bond beside the asperities of one joint; symbols of kernels/bond.py */
+
+typedef struct { /* displacement, damage; what the bond adds to traction, tangent and loss */
+  double delta[3], damage, F[3], C[9], lost;
+} jl_bonded_;
+
+/* 1 where opening and slip, squared, are the strength at this damage, more beyond it; p2: one over
+ * its half-axes, squared */
+JL_IN_ double jl_beyond_(const jlaw_law *law, double opening2, double slip2, double damage, double p2[2])
+{
+  const double p = law->opening_begin - damage * (law->opening_begin - law->opening_end);
+  const double q = law->slip_begin - damage * (law->slip_begin - law->slip_end);
+  p2[0] = p * p, p2[1] = q * q;
+  return opening2 * p2[0] + slip2 * p2[1];
+}
+
+/* Damage that opening and slip ask for: the smaller root of the quadratic; half the slope there */
+JL_IN_ double jl_damage_at_(const jlaw_law *law, double opening2, double slip2, double *slope)
+{
+  const double begin0 = law->opening_begin, soft0 = begin0 - law->opening_end;
+  const double begin1 = law->slip_begin, soft1 = begin1 - law->slip_end;
+  const double turn = begin1 * law->opening_end - begin0 * law->slip_end;
+  const double inside =
+      opening2 * (soft0 * soft0) + slip2 * (soft1 * soft1) - opening2 * slip2 * (turn * turn);
+  double p2[2];
+  const double over = jl_beyond_(law, opening2, slip2, 0.0, p2) - 1.0;
+  *slope = sqrt(inside > 0.0 ? inside : 0.0);
+  if (!(over > 0.0)) return 0.0;
+  if (!(jl_beyond_(law, opening2, slip2, 1.0, p2) < 1.0)) return 1.0;
+  const double found = over / (opening2 * (begin0 * soft0) + slip2 * (begin1 * soft1) + *slope);
+  return found < 1.0 ? found : 1.0;
+}
+
+/* A bond that has moved to b->delta, with its damage before; returns its stored energy */
+JL_IN_ double jl_hold_(const jlaw_law *law, jl_bonded_ *b)
+{
+  const double K[2] = {law->bond_normal, law->bond_shear}, old = b->damage;
+  const double u[3] = {b->delta[0] < 0.0 ? b->delta[0] : 0.0, b->delta[1], b->delta[2]};
+  const double opening2 = u[0] * u[0], slip2 = u[1] * u[1] + u[2] * u[2];
+  const double jl_psi_ = 0.5 * (K[0] * opening2 + K[1] * slip2);
+  double p2[2], slope;
+  const double found = jl_damage_at_(law, opening2, slip2, &slope);
+  const double now = b->damage = found > old ? found : old;
+  const int softens = found > old && now < 1.0;
+  const double first = jl_beyond_(law, opening2, slip2, old, p2);
+  const double there = jl_beyond_(law, opening2, slip2, now, p2), last = softens ? 1.0 : there;
+  b->lost = found > old ? (now - old) * jl_psi_ / sqrt(first * last) : 0.0;
+  for (int i = 0; i < 3; i++) {
+    b->F[i] = (1.0 - now) * K[i > 0] * u[i];
+    for (int j = 0; j < 3; j++)
+      b->C[3 * i + j] = softens ? -(K[i > 0] * u[i]) * (u[j] * p2[j > 0] / slope) : 0.0;
+    if (i || u[0] < 0.0) b->C[4 * i] += (1.0 - now) * K[i > 0];
+  }
+  return (1.0 - now) * jl_psi_;
+}
+
+/* Adds what the bond bears in a state after a step; its damage is in this row of the state */
+JL_IN_ void jl_step_bond_(const jlaw_law *law, jl_numbers_ n, int row, jl_of_joint_ F[3], jl_of_joint_ C[9],
+                  int tangent, int ledger)
+{
+  const int dim = law->dim;
+  for (int l = 0; l < JL_JOINTS_; l++) {
+    double *s = n.s + l;
+    jl_bonded_ b = {{0.0}, s[(size_t) row * n.stride], {0.0}, {0.0}, 0.0};
+    for (int i = 0; i < dim; i++) b.delta[i] = s[(size_t) i * n.stride];
+    jl_hold_(law, &b);
+    s[(size_t) row * n.stride] = b.damage;
+    if (ledger) s[(size_t) dim * n.stride] += b.lost;
+    for (int i = 0; i < dim; i++) JL_JOINT_(F[i], l) += b.F[i];
+    for (int i = 0; tangent && i < dim * dim; i++) JL_JOINT_(C[i], l) += b.C[i / dim * 3 + i % dim];
+  }
+}
+
+/* Stored energy of the bond in a state */
+JL_IN_ jl_of_joint_ jl_bond_stored_(const jlaw_law *law, jl_numbers_ n, int row)
+{
+  jl_of_joint_ stored = jl_each_joint_(0.0);
+  for (int l = 0; l < JL_JOINTS_; l++) {
+    jl_bonded_ b = {{0.0}, n.s[(size_t) row * n.stride + (size_t) l], {0.0}, {0.0}, 0.0};
+    for (int i = 0; i < law->dim; i++) b.delta[i] = n.s[(size_t) i * n.stride + (size_t) l];
+    JL_JOINT_(stored, l) = jl_hold_(law, &b);
+  }
+  return stored;
+}
 /* law.h: one step of a rock joint, and what a state amounts to, in lanes (lanes.h).
  *
  * Symbols and order are those of docs/theory-incremental.md and of kernels/reference.py. Rows of
  * a state: delta (dim) from the mated position | dissipated energy | q_s (M D) | q_t (M D), q times
  * lam; where asperities yield flattened depth (M) | plastic work; with wear the share of the slopes
- * that is gone | work of friction. A batch keeps beside them Phi and Phi' of every facet (M each), which saves half
+ * that is gone | work of friction; with a bond its damage. A batch keeps beside them Phi and Phi' of every facet (M each), which saves half
  * the look-ups, and with yielding the same at z.
  *
  * Of the functions of the C library that round differently, only expm1 and pow are called: zig
@@ -528,7 +627,8 @@ typedef struct { /* what facets add up to */
 JL_IN_ int jl_slider_row_(const jlaw_law *law) { return law->dim + 1; }
 JL_IN_ int jl_rest_row_(const jlaw_law *law) { return law->dim + 1 + 2 * law->facets * law->cells; }
 JL_IN_ int jl_worn_row_(const jlaw_law *law) { return jl_rest_row_(law) + (law->yields ? law->facets + 1 : 0); }
-JL_IN_ int jl_state_rows_(const jlaw_law *law) { return jl_worn_row_(law) + 2 * law->wears; }
+JL_IN_ int jl_damage_row_(const jlaw_law *law) { return jl_worn_row_(law) + 2 * law->wears; }
+JL_IN_ int jl_state_rows_(const jlaw_law *law) { return jl_damage_row_(law) + law->bonded; }
 
 /* Tables of facets from number `at` on, and of their first depth cell */
 JL_IN_ const double *jl_facet_of_(const jlaw_law *law, int at)
@@ -812,8 +912,8 @@ JL_IN_ void jl_wear_sliders_(const double *cell, jl_facets_ *o, const jl_sliders
   const jl_yes_ falls = c->k0 < kappa, had = kappa > JLAW_TINY, has = c->k0 > JLAW_TINY;
   const jl_real_ kept = jl_pick_(falls, c->k0 / jl_pick_(falls, kappa, 1.0), 1.0);
   const jl_real_ q2 = *qs * *qs + *qt * *qt, size = kept * jl_root_(q2), cap = o->strength * c->G0;
-  const jl_yes_ beyond = size > cap;
-  const jl_real_ share = kept * jl_pick_(beyond, cap / jl_pick_(beyond, size, 1.0), 1.0);
+  const jl_yes_ jl_beyond_ = size > cap;
+  const jl_real_ share = kept * jl_pick_(jl_beyond_, cap / jl_pick_(jl_beyond_, size, 1.0), 1.0);
   o->worn += jl_only_(had, q2 / jl_pick_(had, kappa, 1.0));
   o->worn -= jl_only_(has, share * share * q2 / jl_pick_(has, c->k0, 1.0));
   *qs = share * *qs;
@@ -1185,8 +1285,8 @@ JL_IN_ void jl_cell_now_(const double *cell, const jl_facets_ *o, int yields, jl
   jl_flatten_(o->y1, o->z1, H, G, kappa);
 }
 
-typedef struct { /* as reference.Measures; the energies of normal and shear springs */
-  jl_of_joint_ sliding, slipping, separated, normal, sheared, reach;
+typedef struct { /* as reference.Measures; energies of normal and shear springs and of the bond */
+  jl_of_joint_ sliding, slipping, separated, normal, sheared, bond, reach;
 } jl_amounts_;
 
 typedef struct {
@@ -1246,6 +1346,7 @@ JL_IN_ jl_amounts_ jl_measure_(const jlaw_law *law, jl_numbers_ n)
   all.separated = jl_total_(sum, separated);
   all.normal = jl_total_(sum, normal);
   all.sheared = jl_total_(sum, sheared);
+  all.bond = law->bonded ? jl_bond_stored_(law, n, jl_damage_row_(law)) : jl_each_joint_(0.0);
   return all;
 }
 
@@ -1286,6 +1387,7 @@ JL_IN_ void jl_step_of_kind_(const jlaw_law *law, jl_numbers_ n, const jl_of_joi
     else if (ledger) jl_step_(law, n, d, F, C, jl_kind_of_(2, 0, 0, 0, 1, 0, kept));
     else jl_step_(law, n, d, F, C, jl_kind_of_(2, 0, 0, 0, 0, 0, kept));
   }
+  if (law->bonded) jl_step_bond_(law, n, jl_damage_row_(law), F, C, tangent, ledger || y || w);
 }
 
 /* ------------------------------------------------------------------ messages */
@@ -1405,6 +1507,7 @@ static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
     good = good && rest[f] >= 0.0 && rest[f] <= law->largest_reach;
   if (law->yields) good = good && fabs(rest[law->facets]) <= DBL_MAX;
   if (law->wears) good = good && worn[0] >= 0.0 && worn[0] <= 1.0 && worn[1] <= DBL_MAX;
+  if (law->bonded) good = good && s[jl_damage_row_(law)] >= 0.0 && s[jl_damage_row_(law)] <= 1.0;
   return good && jlaw_sound_(s + jl_slider_row_(law), jl_rest_row_(law) - jl_slider_row_(law));
 }
 
@@ -1464,6 +1567,7 @@ JLAW_FUNCTION int jlaw_unmated(const jlaw_law *law, double *s)
   const int far = law->fades && law->dim > 1;
   for (int i = 0; i < jl_state_rows_(law); i++) s[i] = 0.0;
   if (far) s[0] = law->first_touch, s[1] = JLAW_FAR * law->mating_length;
+  if (law->bonded) s[jl_damage_row_(law)] = 1.0;
   return far ? 0 : -1;
 }
 JLAW_FUNCTION double jlaw_dissipated(const jlaw_law *law, const double *s)
@@ -1480,7 +1584,7 @@ JLAW_CLONES static JLAW_FUNCTION jl_amounts_ jlaw_measure_(const jlaw_law *law, 
 JLAW_FUNCTION double jlaw_stored(const jlaw_law *law, const double *s)
 {
   const jl_amounts_ all = jlaw_measure_(law, s);
-  return all.normal + all.sheared;
+  return all.normal + all.sheared + all.bond;
 }
 
 JLAW_FUNCTION void jlaw_shares(const jlaw_law *law, const double *s, double shares[3])
@@ -1502,6 +1606,11 @@ JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure)
       const double depth = jlaw_of_facet_(law, f, i + 1);
       late += jlaw_of_facet_(law, f, i) * jlaw_virgin_one_(law, closure - depth, &slope);
     }
+  if (law->bonded && closure < 0.0) { /* a joint that opens */
+    jl_bonded_ b = {{closure, 0.0, 0.0}, 0.0, {0.0}, {0.0}, 0.0};
+    jl_hold_(law, &b);
+    return b.F[0];
+  }
   return law->closure_factor * jlaw_virgin_one_(law, closure, &slope) - late;
 }
 
@@ -1510,7 +1619,8 @@ JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure)
   double slope;
   if (!(closure <= law->largest_reach)) return jlaw_none_();
   const double force = jlaw_virgin_one_(law, closure, &slope);
-  return law->stiffness_factor * slope + law->bending_factor * force;
+  return law->stiffness_factor * slope + law->bending_factor * force
+         + fmax(law->bond_normal, law->bond_shear);
 }
 
 JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
@@ -1583,8 +1693,8 @@ static JLAW_FUNCTION void jlaw_hold_(const jlaw_law *law, double *s)
       jl_cell_now_(cell, &o, law->yields, &G, &kappa);
       const jl_real_ cap = o.strength * G;
       const jl_real_ size = jl_root_(qs * qs + qt * qt);
-      const jl_yes_ beyond = size > cap;
-      const jl_real_ share = jl_pick_(beyond, cap / jl_pick_(beyond, size, 1.0), 1.0);
+      const jl_yes_ jl_beyond_ = size > cap;
+      const jl_real_ share = jl_pick_(jl_beyond_, cap / jl_pick_(jl_beyond_, size, 1.0), 1.0);
       jl_put_(n, row, D, some, qs * share);
       jl_put_(n, row + M * D, D, some, qt * share);
     }

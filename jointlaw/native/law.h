@@ -3,7 +3,7 @@
  * Symbols and order are those of docs/theory-incremental.md and of kernels/reference.py. Rows of
  * a state: delta (dim) from the mated position | dissipated energy | q_s (M D) | q_t (M D), q times
  * lam; where asperities yield flattened depth (M) | plastic work; with wear the share of the slopes
- * that is gone | work of friction. A batch keeps beside them Phi and Phi' of every facet (M each), which saves half
+ * that is gone | work of friction; with a bond its damage. A batch keeps beside them Phi and Phi' of every facet (M each), which saves half
  * the look-ups, and with yielding the same at z.
  *
  * Of the functions of the C library that round differently, only expm1 and pow are called: zig
@@ -62,7 +62,8 @@ typedef struct { /* what facets add up to */
 IN int slider_row(const jlaw_law *law) { return law->dim + 1; }
 IN int rest_row(const jlaw_law *law) { return law->dim + 1 + 2 * law->facets * law->cells; }
 IN int worn_row(const jlaw_law *law) { return rest_row(law) + (law->yields ? law->facets + 1 : 0); }
-IN int state_rows(const jlaw_law *law) { return worn_row(law) + 2 * law->wears; }
+IN int damage_row(const jlaw_law *law) { return worn_row(law) + 2 * law->wears; }
+IN int state_rows(const jlaw_law *law) { return damage_row(law) + law->bonded; }
 
 /* Tables of facets from number `at` on, and of their first depth cell */
 IN const double *facet_of(const jlaw_law *law, int at)
@@ -719,8 +720,8 @@ IN void cell_now(const double *cell, const facets *o, int yields, real *G, real 
   flatten(o->y1, o->z1, H, G, kappa);
 }
 
-typedef struct { /* as reference.Measures; the energies of normal and shear springs */
-  of_joint sliding, slipping, separated, normal, sheared, reach;
+typedef struct { /* as reference.Measures; energies of normal and shear springs and of the bond */
+  of_joint sliding, slipping, separated, normal, sheared, bond, reach;
 } amounts;
 
 typedef struct {
@@ -780,6 +781,7 @@ IN amounts measure(const jlaw_law *law, numbers n)
   all.separated = total(sum, separated);
   all.normal = total(sum, normal);
   all.sheared = total(sum, sheared);
+  all.bond = law->bonded ? bond_stored(law, n, damage_row(law)) : each_joint(0.0);
   return all;
 }
 
@@ -820,4 +822,5 @@ IN void step_of_kind(const jlaw_law *law, numbers n, const of_joint d[3], of_joi
     else if (ledger) step(law, n, d, F, C, kind_of(2, 0, 0, 0, 1, 0, kept));
     else step(law, n, d, F, C, kind_of(2, 0, 0, 0, 0, 0, kept));
   }
+  if (law->bonded) step_bond(law, n, damage_row(law), F, C, tangent, ledger || y || w);
 }

@@ -44,6 +44,7 @@ struct jlaw_law {
   int yields; /* whether asperities yield */
   int fades; /* whether slopes fade with the distance from mate */
   int wears; /* whether slopes wear */
+  int bonded; /* whether there is a bond */
   double soft; /* 1/lam */
   double mu; /* friction of asperities */
   double mating_length; /* m; infinite: the largest float */
@@ -53,6 +54,12 @@ struct jlaw_law {
   double eta; /* exponent of the virgin curve */
   double scale; /* V of the virgin curve, m^(1/2) */
   double rise; /* p: the curve is tabulated over w^p */
+  double bond_normal; /* Pa/m: stiffness of the bond */
+  double bond_shear; /* Pa/m */
+  double opening_begin; /* 1/m: one over the opening where it begins to break */
+  double slip_begin; /* 1/m: the same of slip */
+  double opening_end; /* 1/m: where nothing of it is left */
+  double slip_end; /* 1/m */
   double closure_factor; /* normal stress over Phi */
   double stiffness_factor; /* bound of |C| over Phi' */
   double bending_factor; /* what slopes that fade add to it, over Phi */
@@ -75,6 +82,7 @@ struct jlaw_law {
   X(yields, 1, 0, 1) \
   X(fades, 1, 0, 1) \
   X(wears, 1, 0, 1) \
+  X(bonded, 1, 0, 1) \
   X(soft, 0, 0, DBL_MAX) \
   X(mu, 0, 0, DBL_MAX) \
   X(mating_length, 0, DBL_MIN, DBL_MAX) \
@@ -84,6 +92,12 @@ struct jlaw_law {
   X(eta, 0, 0, DBL_MAX) \
   X(scale, 0, DBL_MIN, DBL_MAX) \
   X(rise, 0, 0, DBL_MAX) \
+  X(bond_normal, 0, 0, DBL_MAX) \
+  X(bond_shear, 0, 0, DBL_MAX) \
+  X(opening_begin, 0, 0, DBL_MAX) \
+  X(slip_begin, 0, 0, DBL_MAX) \
+  X(opening_end, 0, 0, DBL_MAX) \
+  X(slip_end, 0, 0, DBL_MAX) \
   X(closure_factor, 0, 0, DBL_MAX) \
   X(stiffness_factor, 0, 0, DBL_MAX) \
   X(bending_factor, 0, 0, DBL_MAX) \

@@ -18,6 +18,7 @@ from ..discretisation.tables import Tables
 from ..kernels.cells import compliance
 from ..kernels.reference import strength
 from ..kernels.unmated import unmated_start
+from ..parameters.bond import Bond
 from ..support import thresholds
 from ..support.checks import Array
 from .amalgamation import amalgamation
@@ -45,6 +46,7 @@ WHOLE = {
     "yields": Number("0", "1", "whether asperities yield"),
     "fades": Number("0", "1", "whether slopes fade with the distance from mate"),
     "wears": Number("0", "1", "whether slopes wear"),
+    "bonded": Number("0", "1", "whether there is a bond"),
 }
 NUMBERS = {
     "soft": Number("0", "DBL_MAX", "1/lam"),
@@ -56,6 +58,12 @@ NUMBERS = {
     "eta": Number("0", "DBL_MAX", "exponent of the virgin curve"),
     "scale": Number("DBL_MIN", "DBL_MAX", "V of the virgin curve, m^(1/2)"),
     "rise": Number("0", "DBL_MAX", "p: the curve is tabulated over w^p"),
+    "bond_normal": Number("0", "DBL_MAX", "Pa/m: stiffness of the bond"),
+    "bond_shear": Number("0", "DBL_MAX", "Pa/m"),
+    "opening_begin": Number("0", "DBL_MAX", "1/m: one over the opening where it begins to break"),
+    "slip_begin": Number("0", "DBL_MAX", "1/m: the same of slip"),
+    "opening_end": Number("0", "DBL_MAX", "1/m: where nothing of it is left"),
+    "slip_end": Number("0", "DBL_MAX", "1/m"),
     "closure_factor": Number("0", "DBL_MAX", "normal stress over Phi"),
     "stiffness_factor": Number("0", "DBL_MAX", "bound of |C| over Phi'"),
     "bending_factor": Number("0", "DBL_MAX", "what slopes that fade add to it, over Phi"),
@@ -126,6 +134,7 @@ def pack(k: Tables) -> tuple[dict[str, int | float], dict[str, Array]]:
         "yields": int(k.yields),
         "fades": int(k.fades),
         "wears": int(k.wears),
+        "bonded": int(k.bond is not None),
         "soft": 1.0 / k.lam,
         "mu": k.mu,
         "mating_length": min(k.mating_length, LARGEST),
@@ -135,6 +144,7 @@ def pack(k: Tables) -> tuple[dict[str, int | float], dict[str, Array]]:
         "eta": k.curve.eta,
         "scale": k.curve.scale,
         "rise": float(k.curve.rise),
+        **_bond(k.bond or Bond(0.0, 0.0, 0.0, 0.0)),
     }
     columns = {
         "M": k.m.T,
@@ -155,6 +165,14 @@ def pack(k: Tables) -> tuple[dict[str, int | float], dict[str, Array]]:
     facet = in_columns(columns, len(k.c1))
     arrays = {"facet": facet, "depth": _depth(k), "curve": k.curve.S, "energy": k.curve.T}
     return numbers, arrays
+
+
+def _bond(bond: Bond) -> dict[str, float]:
+    """The numbers of a bond."""
+    begin, end = bond.limits
+    values = bond.normal_stiffness, bond.shear_stiffness, *begin.tolist(), *end.tolist()
+    names = [name for name in NUMBERS if name.startswith(("bond_", "opening_", "slip_"))]
+    return dict(zip(names, values, strict=True))
 
 
 def in_columns(columns: dict[str, Array], M: int) -> Array:

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from ..support.files import replace_file
 from .asperity import WEAR_REMOVED, Asperity
+from .bond import Bond
 from .heights import GammaHeights, Heights
 from .keys import Removed, as_given, checked, keys_of, read
 from .orientation import Orientation
@@ -26,7 +27,7 @@ _LAW = {
     "plane": as_given, "closure_only": as_given, "mating_length": as_given,
     "slope_wear": as_given, "slope_residual": as_given,
     "critical_slip": Removed(SLIP_REMOVED, neutral=math.inf),
-    "about": as_given,  # free table for title, source and notes
+    "bond": keys_of(Bond), "about": as_given,  # free table for title, source and notes
     "version": as_given,
 }  # fmt: skip
 _HEIGHTS = keys_of(Heights) | {
@@ -35,7 +36,8 @@ _HEIGHTS = keys_of(Heights) | {
 _UNITS = {
     "asperity_density": "1/m2", "closure_range": "m", "mating_length": "m", "plane": "rad",
     "slope_wear": "J/m2", "K": "Pa m^(1-eta)", "yield_interference": "m", "beta": "m",
-    "overlap": "m",
+    "overlap": "m", "normal_stiffness": "Pa/m", "shear_stiffness": "Pa/m", "tension": "Pa",
+    "cohesion": "Pa", "energy_I": "J/m2", "energy_II": "J/m2",
 }  # fmt: skip
 # Values that a file does not hold: those of parameters that are off
 _OFF = {"yield_interference": math.inf, "slope_wear": math.inf, "slope_residual": 0.0}
@@ -56,7 +58,7 @@ def write_law(law: Mapping[str, Any], path: Path | None) -> str:
         "resolution = " + (f'"{name}"' if name else own),
         *_lines(law, ("mating_length", "slope_wear", "slope_residual", "plane", "closure_only")),
     ]
-    for part in ("orientation", "asperity", "heights"):
+    for part in ("orientation", "asperity", "heights", "bond"):
         if law[part] is not None:
             values = {one.name: getattr(law[part], one.name) for one in fields(law[part])}
             lines += ["", f"[{part}]", *_lines(values, [name for name in values if name[0] != "_"])]
@@ -114,6 +116,8 @@ def build_law(build: Callable[..., T], data: dict[str, Any], where: str) -> T:
     try:
         values["orientation"] = Orientation(**values["orientation"])
         values["asperity"] = Asperity(**values["asperity"])
+        if "bond" in values:
+            values["bond"] = Bond(**values["bond"])
         if "heights" in values:
             values["heights"] = _heights(values["heights"], where)
         if isinstance(values.get("resolution"), dict):

@@ -29,7 +29,7 @@ def tabulate(
     azimuths: int = 12,
     steps: int = 60,
 ) -> JointTable:
-    """Tabulate the virgin response of a law against closure.
+    """Tabulate the virgin response of a law against closure; a bond is left out.
 
     Parameters
     ----------
@@ -45,6 +45,7 @@ def tabulate(
     Raises ValueError for a bad argument.
     """
     require_3d(law)
+    whole, law = law, replace(law, bond=None)
     end = more_than("closure", law.closure_range if closure is None else closure, 0.0)
     tolerance = more_than("tolerance", tolerance, 0.0)
     steps = integer("steps", steps, 2)
@@ -63,7 +64,7 @@ def tabulate(
     finer = _friction(replace(law, resolution=SLIP), u, psi[::4], limit, steps)[1]
     missed = np.degrees(np.abs(np.arctan(mobilised[:, ::4]) - np.arctan(finer)))
     errors = (*worst, float(harmonic), float(missed.max()))
-    return replace(table, metadata=_metadata(law, table, tolerance, errors, limit, steps))
+    return replace(table, metadata=_metadata(whole, table, tolerance, errors, limit, steps))
 
 
 def require_3d(law: JointLaw) -> None:
@@ -94,6 +95,7 @@ def _metadata(
         "yielding": "first loading only: unloading keeps the closure that asperities yielded"
         if law.tables.yields
         else "none",
+        "bond": "none" if law.bond is None else "left out: this is the joint without its bond",
         "loading_path": "virgin joint; kn: pure closure; kt: first shear after pure closure; "
         f"mu, mob, dil: shear to {limit:.6g} m in {steps} steps at constant normal stress; "
         "mu is the largest ratio on the way, mob and dil (opening per shear) are those at the end",

@@ -49,6 +49,7 @@ KINDS = {
     "yielding": {"mating_length": 2e-6, "damage": {"yield_interference": 2e-7}},
     "wear": {"plane": 0.4, "mating_length": 2e-6, "slope_wear": 100.0, "slope_residual": 0.1},
     "closure only": {"closure_only": True, "mating_length": 2e-6},
+    "bond": {"bond": jl.Bond(1e12, 1e12, 5e4, 1e5, 5e-3, 2e-2)},
 }
 
 

@@ -12,8 +12,12 @@ GOOD = {
     "orientation": {"a": 3.0, "b": 0.0, "c": 0.0},
     "asperity": {"K": 1.0, "lam": 1.0, "eta": 0.5, "mu": 0.3},
     "heights": {"alpha": 3.82, "beta": 1.0, "overlap": 2.0},
+    "bond": {"normal_stiffness": 2e9, "shear_stiffness": 1e9, "tension": 1e6, "cohesion": 3e6},
 }
-KINDS = {"orientation": jl.Orientation, "asperity": jl.Asperity, "heights": jl.GammaHeights}
+KINDS = {
+    "orientation": jl.Orientation, "asperity": jl.Asperity, "heights": jl.GammaHeights,
+    "bond": jl.Bond,
+}  # fmt: skip
 NAMES = [f"{part}.{name}" for part, values in GOOD.items() for name in values]
 NAN, INF = float("nan"), float("inf")
 
@@ -48,6 +52,14 @@ def test_what_is_no_finite_number(path, data):
         ("heights.beta", 0.0, "> 0", {}),
         ("heights.overlap", -1e-308, ">= 0", {}),
         ("heights.formation", "both", "population, individual", {}),
+        ("bond.normal_stiffness", -1.0, ">= 0 and <= 1e+100", {}),
+        ("bond.normal_stiffness", 0.0, "> 0, for bond.tension = 1000000.0 Pa", {}),
+        ("bond.shear_stiffness", 0.0, "> 0, for bond.cohesion = 3000000.0 Pa", {}),
+        ("bond.tension", -1e-308, ">= 0", {}),
+        ("bond.cohesion", 1e101, "<= 1e+100", {}),
+        ("bond.energy_I", 249.9, ">= 250, the elastic energy at the peak", {}),
+        ("bond.energy_II", 4499.0, ">= 4500", {}),
+        ("bond.energy_II", 1.0, "<= 0", {"cohesion": 0.0}),
     ],
 )
 def test_a_value_out_of_bounds(path, value, bound, more):
@@ -84,6 +96,7 @@ def test_c_outside_eq_18(b, over, sign):
         ("orientation", {"a": 3.0}, "must be of type Orientation"),
         ("asperity", None, "must be of type Asperity"),
         ("heights", {"alpha": 3.0}, "must be GammaHeights"),
+        ("bond", {"tension": 1e6}, "must be of type Bond"),
     ],
 )
 def test_parameters_of_the_law(law, name, value, message):

@@ -18,6 +18,8 @@ KINDS = {
     "histogram": {"heights": jl.Heights(HISTOGRAM, 1e-6, "individual")},
     "plane": {"plane": -1 / 3, "mating_length": 1 / 3e4, "slope_wear": 1e5 / 3},
     "closure only": {"closure_only": True},
+    "brittle bond": {"bond": jl.Bond(1e10, 1 / 3e-10, 0.0, 1e6)},
+    "bond": {"bond": jl.Bond(1e10, 1e10, 1e6, 1e6, 60.0, 1 / 3e-3)},
     "own resolution": {"resolution": jl.Resolution(3, 5, 7)},
     "named resolution": {"resolution": "fine"},
     "default range": {"closure_range": None},

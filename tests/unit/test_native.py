@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "hosts"))
 from c_host import random_law, random_path
 
 SAME, SAME_C = 1e-12, 1e-10  # of the largest on the path; q of a slider carries three times as much
-LINES = 1950  # of C that is written by hand
+LINES = 2050  # of C that is written by hand
 SEEDS = (3, 7, 10, 14, 20)  # space and planes, mating length, yielding, wear, both
 
 

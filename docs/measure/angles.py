@@ -4,8 +4,8 @@
 
 Laws: all presets and random ones as in docs/measure/tolerance.py, but with a from 1.5 to 9, every
 third with c at its bound, none that jams (atan(mu) + 90 deg/a < 90 deg). Motion in one plane, at
-2 MPa and at half the normal stress of the closure range R, to three critical slips (without one to
-30 R) and back. Misses count from 0.2 critical slips (2 R) on, and on the way back from its first
+2 MPa and at half the normal stress of the closure range R, to three mating lengths (without one to
+30 R) and back. Misses count from 0.2 mating lengths (2 R) on, and on the way back from its first
 fifth (and 2 R) on.
 """
 
@@ -20,7 +20,7 @@ import jointlaw as jl
 from jointlaw.accuracy.slip import LEG, slip
 from jointlaw.support.progress import track
 
-RATIOS = (1.0, 3.0, 10.0, 30.0, 100.0, 1000.0, math.inf)  # critical slip over closure range
+RATIOS = (1.0, 3.0, 10.0, 30.0, 100.0, 1000.0, math.inf)  # mating length over closure range
 BEST = jl.Resolution(24, 14, 12)  # finer ones change the friction angle by less than 0.1 degrees
 TRIED = ("fast", "balanced", "fine")
 

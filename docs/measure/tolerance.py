@@ -3,12 +3,12 @@
     python docs/measure/tolerance.py [--laws 100] [--seed 1] [--plane]
 
 Laws: a from 1 to 10 (evenly in log a), b and c over their bounds, mu 0.05 to 1, eta 0 to 0.7,
-heights of either formation or none, in a plane or in space, half of them with a critical slip of 1
+heights of either formation or none, in a plane or in space, half of them with a mating length of 1
 to 1000 R. Paths: 15 per law, six of five to eight legs between random corners, six smooth ones
 (sums of four waves), closures up to the law's closure range R and openings to -0.3 R, shear up to
 R; somewhere each is closed to between half the normal stress S at R and all of it; and three of
-slip at the closure of S/20 to S/2, to three critical slips but 3 R at most, back and forth again.
-Besides, four of slip to three critical slips, or 30 R, and back at random normal stresses, which
+slip at the closure of S/20 to S/2, to three mating lengths but 3 R at most, back and forth again.
+Besides, four of slip to three mating lengths, or 30 R, and back at random normal stresses, which
 each resolution holds by itself. The truth is twice the reference resolution in each direction.
 
 `met` is the share of laws that keep the tolerance on all of them (one that `at_tolerance`

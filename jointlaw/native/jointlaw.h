@@ -809,8 +809,8 @@ JL_IN_ jl_site_ jl_site_of_(const jlaw_law *law, jl_of_joint_ p0, jl_of_joint_ p
 JL_IN_ jl_real_ jl_climb_(const jlaw_law *law, const double *f, jl_of_joint_ closure, const jl_site_ *at,
               jl_of_joint_ slopes)
 {
-  const jl_real_ x = jl_column_(f, JLAW_E) * at->o[0] + jl_column_(f, JLAW_E + 1) * at->o[1];
-  return closure + slopes * law->mating_length * (jl_column_(f, JLAW_STEEP) * x);
+  const jl_real_ rise = jl_column_(f, JLAW_M + 1) * at->o[0] + jl_column_(f, JLAW_M + 2) * at->o[1];
+  return closure + slopes * law->mating_length * rise;
 }
 
 JL_IN_ jl_plane_ jl_plane_at_(const double *f, const jl_site_ *at, jl_of_joint_ slopes)

@@ -244,8 +244,8 @@ IN site site_of(const jlaw_law *law, of_joint p0, of_joint p1)
 IN real climb(const jlaw_law *law, const double *f, of_joint closure, const site *at,
               of_joint slopes)
 {
-  const real x = column(f, JLAW_E) * at->o[0] + column(f, JLAW_E + 1) * at->o[1];
-  return closure + slopes * law->mating_length * (column(f, JLAW_STEEP) * x);
+  const real rise = column(f, JLAW_M + 1) * at->o[0] + column(f, JLAW_M + 2) * at->o[1];
+  return closure + slopes * law->mating_length * rise;
 }
 
 IN plane plane_at(const double *f, const site *at, of_joint slopes)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from jointlaw.kernels import reference as kernel
-from jointlaw.kernels.mating import planes
+from jointlaw.kernels.mating import offset, planes
 
 ROUNDING = 1e-12  # of the facet's normal force: a cell's G is a difference of numbers of that size
 KERNELS = 1e-11  # of the largest traction: rounding of y, 1e-16, over a step of NEAR y, 1e-5
@@ -23,7 +23,10 @@ def sliders_within_friction(batch):
     strength = kernel.strength(k, planes(k, now.delta[1:], now.slopes).gamma)[:, 0]
     size = np.hypot(now.q[0], now.q[1])
     excess = size - strength[:, None] * cells.G
-    whole = np.where(strength * virgin.force > 0, strength * virgin.force, np.inf)[:, None]
+    # the terms of a facet's y may cancel, where shear is at a right angle to it: y is rounding then
+    terms = np.concatenate([now.delta[:1], offset(k, now.delta[1:])])
+    whole = strength * k.curve.force(np.abs(k.m).T @ np.abs(terms))[0]
+    whole = np.where(whole > 0, whole, np.inf)[:, None]
     touches = y > (now.depth if k.yields else 0)
     lifted = np.where(~touches[:, None] & (size > 0), np.inf, 0.0)
     return float(np.max(np.maximum(excess / whole, lifted), initial=0.0))

@@ -50,7 +50,7 @@ def build(**changes):
     heights = HEIGHTS.get(p["heights"], p["heights"])
     length = p["mating_length"]
     if p["wears over"] < np.inf:  # slopes that wear fade, too
-        length = min(length, SCALE)
+        length = min(length, 3.0 * p["range"])
     return jl.JointLaw(
         orientation=jl.Orientation(p["a"], b, c),
         asperity=jl.Asperity(

@@ -59,22 +59,22 @@ growth = np.log(lost[1] / lost[0]) / np.log(amplitudes[1] / amplitudes[0])
 print(f"loss ~ amplitude^{growth:.1f} at the smallest, stiffness {stiffness / 1e12} MPa/µm")
 
 # %%
-# Asperities that yield or wear, in six cycles of a rough joint whose contacts are renewed. An
+# Asperities that yield or wear, in six cycles of a rough joint whose slopes fade. An
 # elastic joint repeats itself. One that wears loses strength from cycle to cycle. One that yields
 # is weaker at first, and is compacted at every reversal, each time by less.
 
 rough = replace(jl.presets.load("biegel-rough"), plane=0.0, mating_length=2e-6)
-asperity = rough.asperity
 kinds = {
-    "elastic": asperity,
-    "yields beyond 0.1 µm": replace(asperity, yield_interference=0.1e-6),
-    "wears over 50 µm": replace(asperity, mu_residual=0.1, wear_slip=50e-6),
+    "elastic": rough,
+    "yields beyond 0.1 µm": replace(
+        rough, asperity=replace(rough.asperity, yield_interference=0.1e-6)
+    ),
+    "wears over 100 J/m²": replace(rough, slope_wear=100.0),
 }
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
 peaks = {}
 for label, kind in kinds.items():
-    joint = replace(rough, asperity=kind).joint()
-    cycles = jl.direct_shear(joint, [8e-6, -8e-6] * 6 + [0.0], normal=10e6, steps=steps)
+    cycles = jl.direct_shear(kind.joint(), [8e-6, -8e-6] * 6 + [0.0], normal=10e6, steps=steps)
     ratio = cycles.shear_stress / cycles.F1
     peaks[label] = [ratio[2 * steps * k : 2 * steps * (k + 1)].max() for k in range(6)]
     style = {"ls": "--", "zorder": 3} if label == "elastic" else {}

@@ -62,7 +62,7 @@ def test_faces_that_meet_anew_have_no_bond():
     """A block that falls onto its base bounces off: nothing holds it."""
     bond = f"normal_stiffness = 2e9, shear_stiffness = 1e9, tension = {T}, cohesion = 4e5"
     scene = block(LAW.format(mu=0.6, bond=bond))
-    drawn = replace(scene.blocks[1], corners=scene.blocks[1].corners + [0.0, 0.05])
+    drawn = replace(scene.blocks[1], corners=np.add(scene.blocks[1].corners, [0.0, 0.05]))
     run = replace(scene.run, seat=False, largest_stress=2e6)
     sim = Simulation(replace(scene, blocks=(scene.blocks[0], drawn), run=run))
     assert sim.joints.n == 0

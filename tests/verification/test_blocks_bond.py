@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import jointlaw as jl
 from dem_demo import Simulation, load, parse
 from dem_demo.studies.strength import factor_of_safety
 
@@ -106,3 +107,24 @@ def test_slope_with_rock_bridges_stands_and_fails_step_by_step():
     assert np.abs(whole.blocks.motion[:2] - start[0]).max() < 1e-6
     assert (np.diff(broken) > 5).all()
     assert np.abs(weathered.blocks.motion[:2] - start[1]).max() > 5e-3
+
+
+def test_factor_of_safety_of_a_rough_bonded_block():
+    """Brittle bond and asperities that climb: the joint's own peak over the weight along it."""
+    bond = f"normal_stiffness = 1e8, shear_stiffness = 1e8, tension = {T}, cohesion = {C}"
+    law = f"""
+asperity_density = 1e4
+mating_length = 5e-3
+resolution = {{ u = 3, phi = 4, depth = 1 }}
+orientation = {{ a = 6.0 }}
+asperity = {{ K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }}
+heights = {{ alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }}
+bond = {{ {bond} }}
+"""
+    angle, wide, high = np.radians(35.0), 4.0, 0.2
+    scene = block(law, (G * np.sin(angle), -G * np.cos(angle)), box=(wide, high))
+    weight = RHO * G * wide * high
+    joint = scene.laws["joint"].joint()
+    shear = jl.direct_shear(joint, 1e-3, weight * np.cos(angle) / wide, steps=400).shear_stress
+    expected = shear.max() * wide / (weight * np.sin(angle))
+    assert factor_of_safety(scene) == pytest.approx(expected, rel=0.01)

@@ -31,12 +31,13 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx_gallery.gen_gallery",
     "sphinx.ext.mathjax",
+    "browser",
     "claims",
     "commands",
     "docstrings",
     "pages",
 ]
-exclude_patterns = ["_build", "gallery", "paper", "_ext"]
+exclude_patterns = ["_build", "gallery", "paper", "browser", "_ext"]
 suppress_warnings = [
     "config.cache",  # the settings of the gallery hold objects
 ]
@@ -63,7 +64,7 @@ python_use_unqualified_type_names = True
 ORDER = (
     "first_curve", "closure_hysteresis", "closure_cycle", "direct_shear", "strength_envelope",
     "bond", "cyclic_shear", "damping", "anisotropy", "large_shear", "fit_closure", "from_scan",
-    "table", "batch", "blocks", "newton", "snapshot",
+    "table", "batch", "blocks", "newton", "finite_elements", "snapshot",
 )  # fmt: skip
 
 

@@ -125,6 +125,6 @@ bond = {{ {bond} }}
     scene = block(law, (G * np.sin(angle), -G * np.cos(angle)), box=(wide, high))
     weight = RHO * G * wide * high
     joint = scene.laws["joint"].joint()
-    shear = jl.direct_shear(joint, 1e-3, weight * np.cos(angle) / wide, steps=400).shear_stress
+    shear = jl.direct_shear(joint, 3e-4, weight * np.cos(angle) / wide, steps=600).shear_stress
     expected = shear.max() * wide / (weight * np.sin(angle))
     assert factor_of_safety(scene) == pytest.approx(expected, rel=0.01)

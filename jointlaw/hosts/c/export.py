@@ -36,11 +36,7 @@ def export_c(law: JointLaw, directory: str | Path, name: str = "joint") -> list[
     constants), `example.c`, `example.cpp`, `Makefile` and `README.md`. Returns the names. Raises
     ValueError for a name that C cannot have or too many azimuths, before anything is written.
     """
-    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,40}", name):
-        raise ValueError(
-            f"name = {name!r} is no identifier of C; take letters, digits and underscores, a "
-            "letter first, at most 41"
-        )
+    require_name(name)
     tables = {f"{name}.jlaw": table_text(law), f"{name}.h": header_text(law, name)}
     folder = Path(directory)
     folder.mkdir(parents=True, exist_ok=True)
@@ -54,6 +50,15 @@ def export_c(law: JointLaw, directory: str | Path, name: str = "joint") -> list[
     return [*tables, HEADER, *FILES]
 
 
+def require_name(name: str) -> None:
+    """Refuse a name of tables that C cannot have, or that a file of the law has."""
+    if not re.fullmatch(r"(?!jointlaw)[A-Za-z][A-Za-z0-9_]{0,40}", name):
+        raise ValueError(
+            f"name = {name!r} is no identifier of C; take letters, digits and underscores, a "
+            "letter first, at most 41; names of the law's own files begin with jointlaw"
+        )
+
+
 def identifier(text: str) -> str:
     """A name for tables out of any text: letters, digits and underscores, a letter first."""
     name = re.sub(r"[^A-Za-z0-9]+", "_", text).strip("_")[:40]
@@ -65,7 +70,7 @@ def table_text(law: JointLaw) -> str:
 
     The last line holds a sum (FNV-1a) of the bytes before it, by which damage is told.
     """
-    numbers, arrays = _numbers(law), _arrays(law)
+    numbers, arrays = packed(law)
     lines = [f"jointlaw tables {FORMAT}", f"fingerprint {law.fingerprint}"]
     lines += [f"# {line}" for line in _toml(law)]
     for key, value in numbers.items():
@@ -79,7 +84,7 @@ def table_text(law: JointLaw) -> str:
 
 def header_text(law: JointLaw, name: str) -> str:
     """The tables as constants of C: `&NAME` is the law."""
-    numbers, arrays = _numbers(law), _arrays(law)
+    numbers, arrays = packed(law)
     about = "\n".join(" * " + line.replace("*/", "* /") for line in _toml(law))
     guard = f"JOINTLAW_TABLES_{name.upper()}"
     parts = [
@@ -97,6 +102,11 @@ def header_text(law: JointLaw, name: str) -> str:
         f'{_CONSTANT} jlaw_law {name} = {{{values},\n  {tables}, 0, "{law.fingerprint}"}};\n#endif'
     )
     return "\n".join([*parts, ""])
+
+
+def packed(law: JointLaw) -> tuple[dict[str, int | float], dict[str, Array]]:
+    """Numbers and arrays of `struct jlaw_law` by name, in its order."""
+    return _numbers(law), _arrays(law)
 
 
 def _numbers(law: JointLaw) -> dict[str, int | float]:

@@ -59,15 +59,22 @@ class Joints:
             curve["stiffness"] = curve["stiffness"] * max(1.0, scene.reduction**-2)
         self.assign([])
 
-    def assign(self, contacts: Sequence[Identity]) -> None:
-        """Keep the joints of these contacts, forget the others, make new ones virgin."""
+    def assign(self, contacts: Sequence[Identity], bonded: bool = True) -> None:
+        """Keep the joints of these contacts, forget the others, make new ones virgin.
+
+        bonded: whether new ones have the bond of their law, or are of faces that meet anew.
+        """
         of_law: dict[str, list[int]] = {name: [] for name in self.pools}
         for i, (key, _) in enumerate(contacts):
             of_law[self.choose(key)].append(i)
         self.groups = []
         for name, rows in of_law.items():
             pool = self.pools[name]
+            known = set(pool.keys)
             places = pool.assign(contacts[i] for i in rows)
+            if not bonded:
+                new = [contacts[i] not in known for i in rows]
+                pool.batch.unbond(places[np.array(new, bool)])
             if rows:
                 whole = np.array_equal(places, np.arange(len(pool.batch)))
                 self.groups.append((name, np.array(rows), None if whole else places))
@@ -122,9 +129,11 @@ class Joints:
         return self.virgin("stiffness", "stress", stress) * ((stress > 0) | (self.damage < 1))
 
     def renew(self, contact: Identity) -> None:
-        """Make the joint of a contact virgin again."""
+        """Make the joint of a contact virgin again, without a bond."""
         pool = self.pools[self.choose(contact[0])]
-        pool.batch.reset(pool.add([contact]))
+        place = pool.add([contact])
+        pool.batch.reset(place)
+        pool.batch.unbond(place)
         self.measure()
 
     def snapshot(self) -> dict[str, np.ndarray]:

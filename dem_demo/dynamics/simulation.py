@@ -167,7 +167,7 @@ class Simulation:
         ledger, joints, limit = self.ledger, self.joints, self.limit
         held = np.stack([ledger.area, ledger.area * joints.stored, limit.checked], axis=1)
         gone, none = dict(zip(known, held.tolist(), strict=True)), [0.0, 0.0, 0.0]
-        joints.assign(self.tracker.identities)
+        joints.assign(self.tracker.identities, bonded=False)
         kept = [gone.pop(who, none) for who in self.tracker.identities]
         ledger.area, _, limit.checked = np.array(kept).reshape(-1, 3).T
         ledger.value["dropped"] += sum(stored for _, stored, _ in gone.values())

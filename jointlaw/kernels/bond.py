@@ -41,8 +41,8 @@ def hold(bond: Bond, delta: Array, old: Array) -> Held:
     rate = u * half_axes(bond, damage)[[0, 1, 1][: len(u)]] ** 2
     rate = np.divide(rate, slope, out=np.zeros_like(u), where=softens)
     acts = np.stack([u[0] < 0.0, *[damage >= 0.0] * (len(u) - 1)])
-    C = np.eye(len(u))[:, :, None] * ((1.0 - damage) * K * acts)
-    C = C - (K * u)[:, None] * rate[None]
+    whole = np.eye(len(u))[:, :, None] * ((1.0 - damage) * K * acts)
+    C = whole - (K * u)[:, None] * rate[None]
     return Held(damage, (1.0 - damage) * K * u, (1.0 - damage) * psi, lost, C)
 
 

@@ -149,8 +149,7 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
 def parts(k: Tables, state: Array) -> State:
     """Views of the parts of a state array, q as (2, M, D, B)."""
     dim, M = k.dim, len(k.c1)
-    damage = state[-1] if k.bond is not None else state[:0]
-    state = state[:-1] if k.bond is not None else state
+    state, damage = (state, state[:0]) if k.bond is None else (state[:-1], state[-1])
     q, rest = np.split(state[dim + 1 :], [2 * M * k.cells])
     depth, plastic = (rest[:M], rest[M]) if k.yields else (rest[:0], rest[:0])
     worn, work = rest[-2:] if k.wears else (rest[:0], rest[:0])

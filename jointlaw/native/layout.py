@@ -71,6 +71,7 @@ NUMBERS = {
     "stretch": Number("1", "DBL_MAX", "bound of |y| over that of the displacement"),
     "farthest": Number("0", "DBL_MAX", "m: largest closure that a stress is looked for in"),
 }
+BOND = "bond_normal", "bond_shear", "opening_begin", "slip_begin", "opening_end", "slip_end"
 TABLES = {
     "facet": "(blocks, JLAW_COLUMNS, JLAW_LANES), zeros beyond the last facet",
     "depth": "(blocks, cells, JLAW_ROWS, JLAW_LANES)",
@@ -126,6 +127,8 @@ def first_columns() -> dict[str, int]:
 
 def pack(k: Tables) -> tuple[dict[str, int | float], dict[str, Array]]:
     """Numbers and arrays of `struct jlaw_law` as far as the step and the measures read them."""
+    bond = k.bond or Bond(0.0, 0.0, 0.0, 0.0)
+    numbers_of_bond = bond.normal_stiffness, bond.shear_stiffness, *np.ravel(bond.limits).tolist()
     numbers = {
         "dim": k.dim,
         "facets": len(k.c1),
@@ -144,7 +147,7 @@ def pack(k: Tables) -> tuple[dict[str, int | float], dict[str, Array]]:
         "eta": k.curve.eta,
         "scale": k.curve.scale,
         "rise": float(k.curve.rise),
-        **_bond(k.bond or Bond(0.0, 0.0, 0.0, 0.0)),
+        **dict(zip(BOND, numbers_of_bond, strict=True)),
     }
     columns = {
         "M": k.m.T,
@@ -165,14 +168,6 @@ def pack(k: Tables) -> tuple[dict[str, int | float], dict[str, Array]]:
     facet = in_columns(columns, len(k.c1))
     arrays = {"facet": facet, "depth": _depth(k), "curve": k.curve.S, "energy": k.curve.T}
     return numbers, arrays
-
-
-def _bond(bond: Bond) -> dict[str, float]:
-    """The numbers of a bond."""
-    begin, end = bond.limits
-    values = bond.normal_stiffness, bond.shear_stiffness, *begin.tolist(), *end.tolist()
-    names = [name for name in NUMBERS if name.startswith(("bond_", "opening_", "slip_"))]
-    return dict(zip(names, values, strict=True))
 
 
 def in_columns(columns: dict[str, Array], M: int) -> Array:

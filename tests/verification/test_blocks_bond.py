@@ -1,9 +1,12 @@
 """Blocks that hang on a bond or are kept by one: against strengths worked out by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from dem_demo import Simulation, parse
+import jointlaw as jl
+from dem_demo import Simulation, load, parse
 from dem_demo.studies.strength import factor_of_safety
 
 G, RHO, T, C = 9.81, 2600.0, 2e5, 2e4  # m/s2, kg/m3, Pa
@@ -56,6 +59,19 @@ def test_a_block_that_hangs_holds_to_the_tension():
     assert sim.ledger.error == pytest.approx(0.0, abs=1e-3)
 
 
+def test_faces_that_meet_anew_have_no_bond():
+    """A block that falls onto its base bounces off: nothing holds it."""
+    bond = f"normal_stiffness = 2e9, shear_stiffness = 1e9, tension = {T}, cohesion = 4e5"
+    scene = block(LAW.format(mu=0.6, bond=bond))
+    drawn = replace(scene.blocks[1], corners=np.add(scene.blocks[1].corners, [0.0, 0.05]))
+    run = replace(scene.run, seat=False, largest_stress=2e6)
+    sim = Simulation(replace(scene, blocks=(scene.blocks[0], drawn), run=run))
+    assert sim.joints.n == 0
+    while not (sim.joints.traction[:, 0] > 0.0).any():
+        sim.step()
+    assert (sim.joints.damage == 1.0).all()
+
+
 @pytest.mark.parametrize("cohesion", [0.0, C, 3 * C])
 def test_factor_of_safety_of_a_bonded_block(cohesion):
     """Flat joint and ductile bond: (c A + W cos tan(phi))/(W sin)."""
@@ -69,4 +85,46 @@ def test_factor_of_safety_of_a_bonded_block(cohesion):
     scene = block(law, (G * np.sin(angle), -G * np.cos(angle)), box=(wide, high))
     weight = RHO * G * wide * high
     expected = (cohesion * wide + weight * np.cos(angle) * mu) / (weight * np.sin(angle))
+    assert factor_of_safety(scene) == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.slow
+def test_slope_with_rock_bridges_stands_and_fails_step_by_step():
+    """The shipped scene: at rest with its bridges; weathered, more and more of them break."""
+    whole, weathered = Simulation(load("bridges")), Simulation(load("bridges-weathered"))
+    assert whole.balanced
+    assert not weathered.balanced
+    start = [sim.blocks.motion[:2].copy() for sim in (whole, weathered)]
+    first = (whole.joints.damage == 1.0).sum()
+    broken = [(weathered.joints.damage == 1.0).sum()]
+    for until in (0.02, 0.06, 0.12):
+        while weathered.time < until:
+            weathered.step()
+        broken.append((weathered.joints.damage == 1.0).sum())
+    while whole.time < 0.12:
+        whole.step()
+    assert (whole.joints.damage == 1.0).sum() == first
+    assert np.abs(whole.blocks.motion[:2] - start[0]).max() < 1e-6
+    assert (np.diff(broken) > 5).all()
+    assert np.abs(weathered.blocks.motion[:2] - start[1]).max() > 5e-3
+
+
+def test_factor_of_safety_of_a_rough_bonded_block():
+    """Brittle bond and asperities that climb: the joint's own peak over the weight along it."""
+    bond = f"normal_stiffness = 1e8, shear_stiffness = 1e8, tension = {T}, cohesion = {C}"
+    law = f"""
+asperity_density = 1e4
+mating_length = 5e-3
+resolution = {{ u = 3, phi = 4, depth = 1 }}
+orientation = {{ a = 6.0 }}
+asperity = {{ K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }}
+heights = {{ alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }}
+bond = {{ {bond} }}
+"""
+    angle, wide, high = np.radians(35.0), 4.0, 0.2
+    scene = block(law, (G * np.sin(angle), -G * np.cos(angle)), box=(wide, high))
+    weight = RHO * G * wide * high
+    joint = scene.laws["joint"].joint()
+    shear = jl.direct_shear(joint, 3e-4, weight * np.cos(angle) / wide, steps=600).shear_stress
+    expected = shear.max() * wide / (weight * np.sin(angle))
     assert factor_of_safety(scene) == pytest.approx(expected, rel=0.01)

@@ -1,5 +1,6 @@
 """The bond: strength, energies of fracture, no healing, no energy made, peak with friction."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -152,6 +153,24 @@ def test_peak_with_friction_and_residual(name, tough):
             assert peak > one.shear_stress.max() + 0.5 * c
 
 
+def test_an_unmated_joint_has_no_bond(rough):
+    """With a mating length, without one, and where faces meet anew in a batch."""
+    bonded = replace(rough, bond=DUCTILE)
+    for law in (bonded, replace(bonded, mating_length=math.inf)):
+        joint = law.joint(mated=False)
+        opened = joint.update([-1e-3, 1e-4, 0.0])[0]
+        assert joint.damage == 1.0
+        assert not opened.any()
+        pool = jl.JointPool(law)
+        pool.add(["first"])
+        pool.add(["second"], mated=False)
+        np.testing.assert_array_equal(pool.batch.damage[pool.places], [0.0, 1.0])
+        pool.batch.unbond([0])
+        assert (pool.batch.damage == 1.0).all()
+    with pytest.raises(ValueError, match="infinite mating_length"):
+        replace(rough, mating_length=math.inf).joint(mated=False)
+
+
 def test_bound_of_the_stiffness(rough):
     """No eigenvalue of the tangent is above the bound, softening or not."""
     bonded = replace(rough, bond=DUCTILE)
@@ -186,4 +205,6 @@ def test_damage_at_is_the_smaller_root():
 @pytest.fixture(scope="module")
 def rough():
     """A joint in space that carries in shear as well, coarse."""
-    return replace(jl.presets.load("jing-replica"), resolution=jl.Resolution(2, 4, 2))
+    return replace(
+        jl.presets.load("jing-replica"), mating_length=1e-2, resolution=jl.Resolution(2, 4, 2)
+    )

@@ -267,6 +267,10 @@ void PairJointlaw::coeff(int narg, char **arg)
       MPI_Allreduce(&read, &all, 1, MPI_INT, MPI_MIN, world);
       if (!all) error->all(FLERR, "pair_coeff jointlaw: {}", message);
       laws.push_back({arg[2], law});
+      if (law->bonded && opening * law->opening_end < 1.0)
+        error->all(FLERR, "pair_coeff jointlaw: the bond of {} holds until the joint is {} m open, but "
+                   "joints are given up at opening {} m: give pair_style a larger opening", arg[2],
+                   1.0 / law->opening_end, opening);
       if (jlaw_dim(law) != 3)
         error->all(FLERR, "pair_coeff jointlaw: {} is a law for motion in a plane; export one for "
                    "space (no `plane` in its parameters)", arg[2]);
@@ -555,6 +559,8 @@ void PairJointlaw::advance(const Contact &c)
     head[OF_AREA] = c.area;
     const Vector axis = across(c.n);
     std::copy(axis.begin(), axis.end(), head + AXIS);
+    if (law->bonded && !update->setupflag)    // faces that meet anew: the last number is its damage
+      own.at(which, size)[jlaw_state_size(law) - 1] = 1.0;
   }
   seen[which] = 1;
   double *state = own.at(which, size), *head = state + rows;
@@ -588,7 +594,8 @@ void PairJointlaw::advance(const Contact &c)
   if (damps) {
     const double reduced = atom->rmass[i] * atom->rmass[j] / (atom->rmass[i] + atom->rmass[j]);
     const double opens = dot(slide, c.n), k = c.area * std::max(C[0], 0.0);
-    push = std::max(-2.0 * damping * sqrt(k * reduced) * opens, -c.area * F[0]);    // never pulls
+    const double pressed = law->bonded ? std::max(F[0], 0.0) : F[0];
+    push = std::max(-2.0 * damping * sqrt(k * reduced) * opens, -c.area * pressed);    // never pulls
     // this velocity lies between the force of the last step and this one
     joints_of->sums[FixJointlawMemory::DAMPING] -= 0.5 * (head[DAMPED] + push) * opens * dt;
   }

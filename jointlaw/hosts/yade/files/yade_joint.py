@@ -123,6 +123,8 @@ class LiveLaw:
         start = np.zeros((len(closure), 3))
         start[:, 0] = closure
         new = self.pool.add(range(first, self.numbered))
+        if first:  # the contacts of the first step are those that are mated
+            self.batch.unbond(new)
         self.batch.update(start, where=new, tangent=False)
         self.find()
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from jointlaw.laboratory.experiments import PathError
 from jointlaw.support.files import require_free, write_json
-from jointlaw.support.progress import explained
 from jointlaw.support.pyplot import FORMATS
 
 from .dynamics.simulation import Simulation
@@ -15,12 +14,11 @@ from .errors import Refused
 from .output.record import sentence, sentences
 from .output.run import run, steps_to
 from .scene import TEMPLATE, load, shipped
-from .studies import ablate, compare, strength
+from .studies import ablate, compare, strength, trials
 
-VERSION = 1  # of strength.json
+VERSION = 2  # of strength.json
 FAILING = 3.0  # s: most that a failing rock is run for
 INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
-WAIT = "the first run after an installation also compiles the law, once"
 
 ABOUT = """\
 Rigid rock blocks in 2-D whose every contact force comes from a joint law.
@@ -34,9 +32,9 @@ Rigid rock blocks in 2-D whose every contact force comes from a joint law.
                                            every rock of a scene alone, with plain Coulomb as well:
                                            until a block has moved by the usual size of a block
   python -m dem_demo strength-reduction SCENE --out DIR
-                                           by what the friction of all asperities may be divided
-                                           for each rock to just hold, its critical tilt, and how
-                                           it fails with 2 % less friction
+                                           factor of safety of each rock (the strength of all
+                                           joints divided by it), its critical tilt, and how it
+                                           fails with 2 % less strength
   python -m dem_demo resume STATE --out DIR [--until T] [--step DT]
                                            go on from DIR/state or DIR/refused
 """
@@ -57,6 +55,10 @@ OPTIONS = {
     },
     "--format": {"choices": FORMATS, "default": FORMATS[0], "help": "of pictures (default png)"},
     "--vtk": {"action": "store_true", "help": "also VTK files for ParaView, in DIR/vtk (meshio)"},
+    "--asperity": {
+        "action": "store_true",
+        "help": "also the factor that divides the friction of asperities alone",
+    },
     "--seeds": {"type": int, "nargs": "+", "default": [1, 2, 3], "help": "default 1 2 3"},
 }
 REMOVED = {
@@ -86,8 +88,7 @@ def main(arguments: list[str] | None = None) -> int:
         given = parser.parse_args(words)
         if getattr(given, "force", None) is False:
             require_free(given.out)
-        with explained(f"dem_demo is at work; {WAIT}"):
-            command(given)
+        command(given)
     except KeyboardInterrupt as stop:
         print(f"dem_demo: {str(stop) or 'interrupted'}", file=sys.stderr)
         return INTERRUPTED
@@ -156,13 +157,26 @@ def _compare(given: argparse.Namespace) -> None:
 def _reduce(given: argparse.Namespace) -> None:
     scene, rows = load(given.scene), []
     given.out.mkdir(parents=True, exist_ok=True)
+    if given.force:
+        (given.out / trials.FILE).unlink(missing_ok=True)
     until = min(scene.run.end, FAILING) if given.until is None else given.until
-    for row in strength.strength_reduction(scene, until, given.out, given.format):
-        factor, tilt = row["factor"], row["critical_tilt"]
-        told = "no F between 1/64 and 64" if factor is None else f"F = {factor:.3g}"
-        angle = "beyond 60 degrees" if tilt is None else f"{tilt:+.3g} degrees"
-        print(f"{row['rock']}: {told}, critical tilt {angle}", flush=True)
-        rows.append(row)
+    told = {"factor_of_safety": "factor of safety", "asperity_factor": "asperity factor",
+            "critical_tilt": "critical tilt in degrees"}  # fmt: skip
+    found = strength.strength_reduction(scene, until, given.out, given.format, given.asperity)
+    try:
+        for row in found:
+            values = {text: row[key] for key, text in told.items() if key in row}
+            said = (
+                f"{text} {value:.3g}" if value is not None else f"no {text}"
+                for text, value in values.items()
+            )
+            print(f"{row['rock']}: {', '.join(said)}", flush=True)
+            rows.append(row)
+    except KeyboardInterrupt:
+        kept = given.out / trials.FILE
+        raise KeyboardInterrupt(
+            f"interrupted; {kept} has all finished trials: the same command goes on"
+        ) from None
     write_json(given.out / "strength.json", {"version": VERSION, "rows": rows})
     print(f"strength.json and pictures of the failure in {given.out}")
 
@@ -175,5 +189,13 @@ COMMANDS = {
     "check": (_check, "scene"),
     "ablate": (_ablate, "scene", "--out", "--force", "--until"),
     "compare": (_compare, "scene", "--seeds", "--until"),
-    "strength-reduction": (_reduce, "scene", "--out", "--force", "--until", "--format"),
+    "strength-reduction": (
+        _reduce,
+        "scene",
+        "--out",
+        "--force",
+        "--until",
+        "--format",
+        "--asperity",
+    ),
 }

@@ -62,7 +62,7 @@ python_use_unqualified_type_names = True
 
 ORDER = (
     "first_curve", "closure_hysteresis", "closure_cycle", "direct_shear", "strength_envelope",
-    "cyclic_shear", "damping", "anisotropy", "mating", "fit_closure", "from_scan", "table",
+    "bond", "cyclic_shear", "damping", "anisotropy", "mating", "fit_closure", "from_scan", "table",
     "batch", "blocks", "newton", "snapshot",
 )  # fmt: skip
 

@@ -35,6 +35,7 @@ def virgin_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
         # no eigenvalue of its own: (kn, 0; mu kn, 0) has kn and 0. K is ks, lam K is kn.
         p = law.asperity
         stiffness = np.full(len(closure), max(1.0, p.lam) * p.K * law.asperity_density)
+        stiffness += 0.0 if law.bond is None else law.bond.largest_stiffness
     return {"closure": closure, "stress": stress, "stiffness": stiffness, "work": work}
 
 
@@ -42,13 +43,20 @@ class Joints:
     """All joints of a scene. After `assign`, arrays run over the k contacts given.
 
     delta (k, 2) in m: closure and sliding; traction (k, 2) in Pa; sliding, slipping, separated
-    (k,): shares of their shear capacity; stored, lost (k,) in J/m2.
+    (k,): shares of their shear capacity; stored, lost (k,) in J/m2; damage (k,) of their bonds, 1
+    where there is none.
+
+    The scene's `reduction` F divides the shear stress of every joint and multiplies the sliding at
+    which it has it. So tan(friction angle), tan(dilation angle) and cohesion are divided by F, and
+    the work is that of the law: no energy is made.
     """
 
     def __init__(self, scene: Scene) -> None:
-        self.choose = scene.law_of
+        self.choose, self.reduction = scene.law_of, np.array([1.0, scene.reduction])
         self.pools = {name: jl.JointPool(law) for name, law in scene.laws.items()}
         self.curves = {name: virgin_curve(law) for name, law in scene.laws.items()}
+        for curve in self.curves.values():
+            curve["stiffness"] = curve["stiffness"] * max(1.0, scene.reduction**-2)
         self.assign([])
 
     def assign(self, contacts: Sequence[Identity]) -> None:
@@ -66,7 +74,8 @@ class Joints:
         self.n = len(contacts)
         self.traction = np.zeros((self.n, 2))
         for name, rows, places in self.groups:
-            self.traction[rows] = self.pools[name].batch.F[... if places is None else places]
+            F = self.pools[name].batch.F[... if places is None else places]
+            self.traction[rows] = F / self.reduction
         self.measure()
 
     def update(self, closure: np.ndarray, sliding: np.ndarray, parts: int = 1) -> None:
@@ -74,29 +83,30 @@ class Joints:
 
         The law's friction work is first order in its step: more parts balance energy better.
         """
-        d = np.stack([closure - self.delta[:, 0], sliding], axis=1) / parts
+        d = np.stack([closure - self.delta[:, 0], sliding], axis=1) / (parts * self.reduction)
         for name, rows, places in self.groups:
             for _ in range(parts):
                 F, _ = self.pools[name].batch.update(d[rows], where=places, tangent=False)
-            self.traction[rows] = F
+            self.traction[rows] = F / self.reduction
         self.measure()
 
     def trial(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Tractions (k, 2) and tangents (k, 2, 2) for d, leaving the state alone."""
-        F, C = np.empty((self.n, 2)), np.empty((self.n, 2, 2))
+        F, C, by = np.empty((self.n, 2)), np.empty((self.n, 2, 2)), self.reduction
         for name, rows, places in self.groups:
-            F[rows], C[rows] = self.pools[name].batch.trial(d[rows], where=places)
-        return F, C
+            F[rows], C[rows] = self.pools[name].batch.trial(d[rows] / by, where=places)
+        return F / by, C / np.outer(by, by)
 
     def measure(self) -> None:
         """Read what the batches hold by now."""
         self.delta = np.zeros((self.n, 2))
-        shares = np.zeros((5, self.n))
+        shares = np.zeros((6, self.n))
         for name, rows, places in self.groups:
             batch, here = self.pools[name].batch, slice(None) if places is None else places
-            self.delta[rows] = batch.delta[here]
-            shares[:, rows] = np.array([*batch.measures()[:4], batch.dissipated_energy])[:, here]
-        self.sliding, self.slipping, self.separated, self.stored, self.lost = shares
+            self.delta[rows] = batch.delta[here] * self.reduction
+            columns = *batch.measures()[:4], batch.dissipated_energy, batch.damage
+            shares[:, rows] = np.array(columns)[:, here]
+        self.sliding, self.slipping, self.separated, self.stored, self.lost, self.damage = shares
 
     def virgin(self, of: str, by: str, x: np.ndarray) -> np.ndarray:
         """A column of the virgin curves, such as "stress", where another one is x (k,)."""
@@ -109,7 +119,7 @@ class Joints:
     def stiffness(self) -> np.ndarray:
         """Upper bound (k,) of the stiffness at the normal stress of now (Pa/m)."""
         stress = self.traction[:, 0]
-        return self.virgin("stiffness", "stress", stress) * (stress > 0)
+        return self.virgin("stiffness", "stress", stress) * ((stress > 0) | (self.damage < 1))
 
     def renew(self, contact: Identity) -> None:
         """Make the joint of a contact virgin again."""

@@ -19,9 +19,9 @@ class Blocks:
     """The blocks of a scene; arrays (n, 3) run over blocks and motions x, y, turn.
 
     motion (6, n): positions, angles, and the velocities that led there. inertia: mass, mass,
-    moment; mobile: motions of blocks that are not fixed; free: those that forces move; gravity,
-    loads: steady forces (N); root: 1/sqrt(inertia) of the free motions, else 0. near: pairs of
-    blocks within two skins.
+    moment; mobile: motions of blocks that move, driven rock too; free: those that forces move;
+    gravity, loads: steady forces (N); root: 1/sqrt(inertia) of the free motions, else 0. near:
+    pairs of blocks within two skins.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -30,7 +30,7 @@ class Blocks:
         mass = np.array([scene.thickness * block.section.mass for block in blocks])
         moment = np.array([scene.thickness * block.section.moment for block in blocks])
         self.inertia = np.stack([mass, mass, moment], axis=1)
-        self.mobile = np.array([[not block.fixed] * 3 for block in blocks])
+        self.mobile = np.array([[block.moves] * 3 for block in blocks])
         self.drives = Drives(scene.drives)
         self.free = self.mobile.copy()
         self.free[self.drives.rows, self.drives.axes] = False
@@ -49,7 +49,7 @@ class Blocks:
         """pymunk's bodies, and its callbacks."""
         self.space, self.bodies, self._number = pymunk.Space(), [], {}
         for i, block in enumerate(scene.blocks):
-            if block.fixed:
+            if not block.moves:
                 body = pymunk.Body(body_type=pymunk.Body.STATIC)
             else:
                 body = pymunk.Body(self.inertia[i, 0], self.inertia[i, 2])

@@ -49,7 +49,8 @@ class Ledger:
         v["work"] += float(push.sum())
         v["turned"] += float(np.abs(push).sum())
         v["stored"] = float(area @ joints.stored)
-        v["friction"] += float(0.5 * (area + self.area) @ (joints.lost - self.lost))
+        # a joint loses its traction at the end of the step, which acts on the area of then
+        v["friction"] += float(area @ (joints.lost - self.lost))
         self.forces, self.area, self.lost = forces, area, joints.lost
 
     @property

@@ -61,6 +61,25 @@ def seat(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> tupl
     return slid, all_balanced
 
 
+def displacements(scene: Scene, guess: np.ndarray | None = None) -> np.ndarray | None:
+    """Displacements of the free motions at which virgin joints carry a scene as drawn.
+
+    All loads act at once; in unit-mass motions, None where none are found. guess: those of a
+    similar scene, from where they are looked for (default: none).
+    """
+    blocks, joints = Blocks(scene), Joints(scene)
+    tracker = Tracker(scene, blocks.motion)
+    tracker.renew(blocks.motion, blocks.near)
+    joints.assign(tracker.identities)
+    rows, area = rates(blocks, tracker.contacts), tracker.contacts.length * scene.thickness
+    force = ((blocks.gravity + blocks.loads) * blocks.root).ravel()[blocks.free.ravel()]
+    guess, whole = np.zeros(len(force)) if guess is None else guess, np.ones(len(force), bool)
+    opened, slid = (rows @ guess).reshape(2, -1)
+    start = np.concatenate([tracker.contacts.closure - opened, slid])
+    moved, balanced = _equilibrium(joints, rows, start, area, force, whole, True)
+    return guess + moved if balanced.all() else None
+
+
 def _length_forces(scene, blocks, tracker, joints, slid) -> np.ndarray:
     """Forces (n, 3) of joints whose length changes as the blocks move, after their first step."""
     before, none = joints.snapshot(), np.zeros(joints.n)
@@ -88,7 +107,7 @@ def _equilibrium(joints: Joints, rows: csr_array, start, area, force, settle, ne
             joints.virgin("stress", "closure", part * c) for part in (1.0, 1.01, 0.99)
         )
         slope = (above - below) / (0.02 * c)
-        acts = np.where(d[:k] > 0, 1.0, pull)
+        acts = np.where((d[:k] > 0) | (joints.damage < 1), 1.0, pull)
         F = np.concatenate([stress * acts * np.sign(d[:k]), shear * d[k:]])
         return F, diags(np.concatenate([slope * acts, shear]))
 

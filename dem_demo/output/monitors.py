@@ -10,6 +10,7 @@ from jointlaw.laboratory.experiments import PathError
 from ..dynamics.simulation import Simulation
 from ..scene import Scene, is_coulomb, turn
 
+POINT = "x_m", "y_m", "vx_m/s", "vy_m/s"
 SLIP_DISTANCE = 2e-3  # m, for laws without a critical slip distance
 ROUNDS = 50  # most trials of an angle; a handful is enough where there is one
 
@@ -72,17 +73,38 @@ def _face(sim: Simulation, block: int, other: int) -> tuple[int, np.ndarray]:
 
 
 def readings(sim: Simulation) -> dict[str, float]:
-    """What the scene's [watch] table asks for, now; the unit ends the name."""
+    """What the scene's [watch] table asks for, now; the unit ends the name. Pins are told as the
+    base sees them, which itself is told if it is driven."""
     row, blocks = {}, sim.scene.blocks
     for moving, base in (*sim.scene.slip, *sim.scene.shear):
         name = blocks[moving].name
         row[f"{name}: base angle_deg"] = base_angle(sim, moving, base)
         row |= {f"{name}: {key}": value for key, value in _joint(sim, moving, base).items()}
+    for i, pair in enumerate(sim.scene.near):
+        row |= {f"joint {i + 1}: {key}": value for key, value in _joint(sim, *pair).items()}
+    base = _base(sim)
     for i, (block, point) in enumerate(sim.scene.pins):
-        x, y, angle = sim.blocks.motion[:3, block]
-        arm = np.asarray(point) - blocks[block].centroid
-        row[f"pin {i + 1}: moved_m"] = float(np.hypot(*(turn(angle) @ arm + [x, y] - point)))
+        here = _point(sim, block, point) - base
+        row |= {f"pin {i + 1}: {key}": float(value) for key, value in zip(POINT, here, strict=True)}
+        row[f"pin {i + 1}: moved_m"] = float(np.hypot(*(here[:2] - point)))
+    if sim.scene.base is not None and blocks[sim.scene.base].moves:
+        row |= {f"base: {key}": float(value) for key, value in zip(POINT, base, strict=True)}
     return row
+
+
+def _point(sim: Simulation, block: int, point: tuple[float, float]) -> np.ndarray:
+    """Place and velocity (4,) of a point of a block that was drawn at `point` (m, m/s)."""
+    x, y, angle, u, v, spin = sim.blocks.motion[:, block]
+    right, up = turn(angle) @ (np.asarray(point) - sim.scene.blocks[block].centroid)
+    return np.array([x + right, y + up, u - spin * up, v + spin * right])
+
+
+def _base(sim: Simulation) -> np.ndarray:
+    """Displacement since the drawing and velocity (4,) of the scene's base; zero without one."""
+    if sim.scene.base is None:
+        return np.zeros(4)
+    drawn = sim.scene.blocks[sim.scene.base].centroid
+    return sim.blocks.motion[[0, 1, 3, 4], sim.scene.base] - [*drawn, 0.0, 0.0]
 
 
 def _joint(sim: Simulation, moving: int, base: int) -> dict[str, float]:
@@ -97,7 +119,7 @@ def _joint(sim: Simulation, moving: int, base: int) -> dict[str, float]:
 
 def slip_distance(law: jl.JointLaw) -> float:
     """Sliding (m) that counts as slip: the law's critical slip distance."""
-    return law.critical_slip if np.isfinite(law.critical_slip) else SLIP_DISTANCE
+    return law.mating_length if np.isfinite(law.mating_length) else SLIP_DISTANCE
 
 
 def friction_angle(law: jl.JointLaw, stress: float) -> float:

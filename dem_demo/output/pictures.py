@@ -86,7 +86,8 @@ class Pictures:
         by normal stress; a note below the title."""
         record, blocks, shapes = self.record, self.record.scene.blocks, outlines(self.record, i)
         drawn = zip(blocks, outlines(record, 0), strict=True)
-        start = [shape for block, shape in drawn if not block.fixed]
+        along = record.base(i) - record.base(0)
+        start = [shape + along for block, shape in drawn if not block.fixed]
         axes.add_collection(
             PolyCollection(
                 start, facecolors="none", edgecolors="0.7", linestyles=":", linewidths=0.7

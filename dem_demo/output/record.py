@@ -45,10 +45,21 @@ class Record:
         self.monitored.append(readings(sim))
         self.state = sim.state()
 
+    def base(self, i: int) -> np.ndarray:
+        """Displacement (2,) of the scene's base from the drawing to frame i (m); 0 without one."""
+        if (block := self.scene.base) is None:
+            return np.zeros(2)
+        return self.motion[i][:2, block] - self.scene.blocks[block].centroid
+
+    def displaced(self, i: int) -> np.ndarray:
+        """Displacements (n, 2) from the drawing to frame i, relative to the base (m)."""
+        drawn = np.array([block.centroid for block in self.scene.blocks])
+        return self.motion[i][:2].T - drawn - self.base(i)
+
     @property
     def moved(self) -> np.ndarray:
         """Distance (n,) that the blocks have moved since the first frame (m)."""
-        return np.hypot(*(self.motion[-1] - self.motion[0])[:2])
+        return np.hypot(*(self.displaced(-1) - self.displaced(0)).T)
 
     def column(self, name: str) -> np.ndarray:
         """A monitored quantity over all frames."""
@@ -91,16 +102,15 @@ def write_csv(path: Path, header, rows) -> None:
 def outcomes(record: Record) -> list[dict]:
     """One entry for each `[[rock]]` of the scene.
 
-    settled_m: largest displacement from the drawing to step 0; moved_m: largest since
-    then; failed: blocks that moved more than failed_beyond_m; creep_m_per_s: largest mean speed
-    over the last second (or the whole run, if shorter).
+    Displacements are relative to the base. settled_m: largest from the drawing to step 0;
+    moved_m: largest since then; failed: blocks that moved more than failed_beyond_m;
+    creep_m_per_s: largest mean speed over the last second (or the whole run, if shorter).
     """
     out = []
     times = np.array(record.times)
     before = int(np.searchsorted(times, times[-1] - LOOK_BACK + 1e-9))
     before = max(min(before, len(times) - 2), 0)
-    drawn = np.array([block.centroid for block in record.scene.blocks])
-    first, then, last = (record.motion[i][:2].T - drawn for i in (0, before, -1))
+    first, then, last = (record.displaced(i) for i in (0, before, -1))
     crept = np.hypot(*(last - then).T) / max(times[-1] - times[before], 1e-300)
     for rock in record.scene.rocks:
         moved, creep = np.hypot(*(last - first)[rock.free].T), float(crept[rock.free].max())

@@ -2,6 +2,7 @@
 
 from itertools import pairwise
 from pathlib import Path
+from xml.etree.ElementTree import Element, ElementTree, SubElement
 
 import meshio
 import numpy as np
@@ -13,9 +14,10 @@ from .record import Record
 
 
 def write(record: Record, folder: Path) -> None:
-    """blocks_N.vtu and joints_N.vtu of every frame N, in SI units.
+    """blocks_N.vtu and joints_N.vtu of every frame N, in SI units; blocks.pvd and joints.pvd list
+    them with their times (s): open these.
 
-    Blocks carry their number, displacement, velocity and spin. Joints carry
+    Blocks carry their number, displacement relative to the base, velocity and spin. Joints carry
     the numbers of the record and `state`: 0 stuck, 1 partly sliding, 2 sliding, 3 open.
     """
     folder.mkdir(parents=True, exist_ok=True)
@@ -24,17 +26,27 @@ def write(record: Record, folder: Path) -> None:
         _blocks(record, i).write(folder / f"blocks_{i:04d}.vtu")
         state = np.array([names.index(name) for name in pictures.states(i)], float)
         _joints(record.joints[i], state).write(folder / f"joints_{i:04d}.vtu")
+    for kind in ("blocks", "joints"):
+        _list(record.times, kind).write(folder / f"{kind}.pvd")
+
+
+def _list(times: list[float], kind: str) -> ElementTree:
+    """ParaView's list of the files of all frames."""
+    root = Element("VTKFile", type="Collection", version="0.1")
+    files = SubElement(root, "Collection")
+    for i, time in enumerate(times):
+        SubElement(files, "DataSet", timestep=repr(time), part="0", file=f"{kind}_{i:04d}.vtu")
+    return ElementTree(root)
 
 
 def _blocks(record: Record, i: int) -> meshio.Mesh:
     shapes, motion = outlines(record, i), record.motion[i]
     first = np.cumsum([0, *map(len, shapes)])
     cells = [("polygon", np.arange(a, b)[None]) for a, b in pairwise(first)]
-    moved = motion[:3].T - record.motion[0][:3].T
     columns = {
         "block": np.arange(len(shapes), dtype=float),
-        "displacement_m": _in_space(moved[:, :2]),
-        "turn_rad": moved[:, 2],
+        "displacement_m": _in_space(record.displaced(i) - record.displaced(0)),
+        "turn_rad": motion[2] - record.motion[0][2],
         "velocity_m/s": _in_space(motion[3:5].T),
         "spin_rad/s": motion[5],
     }

@@ -15,7 +15,7 @@ class Block:
 
     corners (m, 2) in m, counter-clockwise; density in kg/m3; load (2,) in N at the centroid;
     velocity (2,) in m/s, spin in rad/s; `held` names the motions ("x", "y", "turn") that a drive
-    prescribes.
+    prescribes: of fixed rock none, or all.
     """
 
     name: str
@@ -34,6 +34,11 @@ class Block:
         shape = pymunk.Poly(None, (self.corners - self.corners[0]).tolist())
         shape.density = self.density
         return shape
+
+    @property
+    def moves(self) -> bool:
+        """Does it move, by forces or as fixed rock by a drive?"""
+        return not self.fixed or bool(self.held)
 
     @property
     def centroid(self) -> np.ndarray:

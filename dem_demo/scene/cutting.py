@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from shapely import LineString, Polygon
+from shapely import LineString, Polygon, get_parts
 from shapely.ops import split
 
 from .blocks import smallest_width
@@ -53,20 +53,29 @@ class JointSet:
         return offsets[(offsets > low) & (offsets < high)]
 
 
-def cut(outline: np.ndarray, sets: Sequence[JointSet], seed: int, least_width: float):
+def cut(
+    outline: np.ndarray, sets: Sequence[JointSet], seed: int, least_width: float,
+    holes: Sequence[np.ndarray] = (),
+):  # fmt: skip
     """Cut a simple outline (m, 2) into convex blocks no narrower than `least_width` (m).
 
+    holes: corners (m, 2) of openings, taken out before the sets cut.
     Returns the corners (m, 2) of each block, counter-clockwise; for each block the numbers (m,) of
     the sets of its edges, or -1; how many slivers became part of a neighbour; and the areas (m2) of
     those that could not. Raises ValueError.
 
-    A piece that is still not convex (the outline bends inwards) is cut along the first set that
-    runs through its inward corner. A sliver joins a neighbour with which it makes a convex block,
-    across a joint of the last set if it can, so that joints of the first sets stay whole; one
-    without such a neighbour is dropped.
+    A piece that is still not convex (the outline bends inwards, or it holds an opening) is cut
+    along the first set that runs through its inward corner. A sliver joins a neighbour with which
+    it makes a convex block, across a joint of the last set if it can, so that joints of the first
+    sets stay whole; one without such a neighbour is dropped.
     """
     tiny = EXACT * float(np.ptp(outline, axis=0).max())
-    pieces, lines = [Polygon(outline)], []
+    rock = Polygon(outline)
+    for i, hole in enumerate(holes):
+        before, rock = rock.area, rock.difference(Polygon(hole))
+        if rock.is_empty or not rock.area < before:
+            raise ValueError(f"hole[{i}] must take a part of the rock away and leave another")
+    pieces, lines = list(get_parts(rock)), []
     for number, joints in enumerate(sets):
         rng = np.random.default_rng([seed, number])
         for offset in joints.offsets(outline, rng):
@@ -102,8 +111,9 @@ def _convex_parts(piece: Polygon, sets, lines, tiny) -> list[Polygon]:
     if smallest_width(np.array(piece.exterior.coords)) < tiny:
         return []
     corners = _corners(piece, tiny)
-    inward = corners[_bends(corners) < 0]
-    if len(inward) == 0:
+    inward = [*corners[_bends(corners) < 0]]
+    inward += [np.array(corner) for ring in piece.interiors for corner in ring.coords]
+    if not inward:
         return [piece]
     for number, joints in enumerate(sets):
         offset = float(joints.normal @ inward[0])

@@ -7,39 +7,42 @@ from functools import cache, cached_property
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
-from jointlaw.support.checks import finite, one_of
+from jointlaw.support.checks import one_of
 
 from .blocks import Block
 from .keys import AXES, Tables
 from .laws import Files
+from .records import read_record
 
-# first row of a CSV file: of which time derivative of the motion its second column is
-TITLES = {"time_s,velocity_m/s": 1, "time_s,acceleration_m/s2": 2}
 SAMPLES = 40  # of a sine, per cycle
 
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """Motion of one block along "x" or "y" (m) or "turn" (rad) about its centroid.
+    """Motion of blocks, all alike, along "x" or "y" (m) or "turn" (rad) about their centroids.
 
     Straight lines between (times, values), averaged over the last `ease` seconds so that the
-    machine does not strike the rock at a corner; before and after them the block rests.
+    machine does not strike the rock at a corner; before and after them the blocks rest. `smooth`:
+    a cubic spline that begins and ends at rest instead.
     With `order` 1 or 2 the values are velocities or accelerations (m/s, m/s2), and after the last
-    the block keeps its velocity, so that nothing strikes it. `back`: once `block` has slid `slid`
-    (m) along the driven block, that goes back `by` at `rate` (1/s).
+    the blocks keep their velocity, so that nothing strikes them. `back`: once `block` has slid
+    `slid` (m) along the driven block, that goes back `by` at `rate` (1/s).
     """
 
-    block: int
+    blocks: tuple[int, ...]
     axis: int
     times: tuple[float, ...]
     values: tuple[float, ...]
     ease: float = 0.0
     back: dict[str, float] | None = None
     order: int = 0
+    smooth: bool = False
 
     @cached_property
     def path(self) -> BSpline:
         """Displacement (m or rad) over the time (s)."""
+        if self.smooth:
+            return make_interp_spline(self.times, self.values, k=3, bc_type="clamped")
         if not self.ease:
             return make_interp_spline(self.times, self.values, k=1).antiderivative(self.order)
         corners = np.union1d(self.times, np.add(self.times, self.ease))
@@ -69,19 +72,23 @@ def _sent_back(drive: Drive, at: float) -> Drive:
 
 
 class Drives:
-    """The drives of a scene. reversed_at (d,): when each was told to go back, inf before (s)."""
+    """The drives of a scene.
+
+    rows, axes, which (m,): driven block, its motion, and the number of the drive that moves it;
+    reversed_at (d,): when each drive was told to go back, inf before (s).
+    """
 
     def __init__(self, drives: tuple[Drive, ...]) -> None:
         self.drives = drives
-        self.rows = np.array([d.block for d in drives], int)
-        self.axes = np.array([d.axis for d in drives], int)
+        moved = [(block, d.axis, i) for i, d in enumerate(drives) for block in d.blocks]
+        self.rows, self.axes, self.which = np.array(moved, int).reshape(-1, 3).T
         self.reversed_at = np.full(len(drives), np.inf)
 
     def velocity(self, t: float, dt: float) -> np.ndarray:
-        """Velocities that carry the drives exactly from t to t + dt."""
+        """Velocities (m,) that carry the driven blocks exactly from t to t + dt."""
         pairs = zip(self.drives, self.reversed_at, strict=True)
         moved = [d(t + dt, at) - d(t, at) if len(d.times) > 1 else 0.0 for d, at in pairs]
-        return np.array(moved, float) / dt
+        return np.array(moved, float)[self.which] / dt
 
     def reverse(self, t: float, slid: Callable[[int, int], float]) -> None:
         """Send back those drives whose block has slid far enough; slid(block, base) in m."""
@@ -89,7 +96,7 @@ class Drives:
             if (
                 d.back
                 and t < self.reversed_at[i]
-                and slid(d.back["block"], d.block) > d.back["slid"]
+                and slid(d.back["block"], d.blocks[0]) > d.back["slid"]
             ):
                 self.reversed_at[i] = t
 
@@ -99,27 +106,37 @@ def read_drives(
 ) -> tuple[Drive, ...]:
     """The drives of `[[drive]]` tables and of the blocks' `held` motions; these blocks are held.
 
-    number: of each block by name. Raises ValueError.
+    number: of each block by name. Fixed blocks move as their drives say and no other way.
+    Raises ValueError.
     """
-    out = [Drive(i, AXES[axis], (0.0,), (0.0,)) for i, b in enumerate(blocks) for axis in b.held]
-    movable = tuple(block.name for block in blocks if not block.fixed)
+    drives, rock = [], tuple(i for i, block in enumerate(blocks) if block.fixed)
     for i, table in enumerate(tables):
         name, motion = f"{where}: drive[{i}]", table["motion"]
-        block = number[one_of(f"{name}.block", table["block"], movable)]
+        moved = rock
+        if "block" in table:
+            moved = (number[one_of(f"{name}.block", table["block"], tuple(number))],)
+        elif motion == "turn" or "back" in table or not rock:
+            raise ValueError(f"{name}.block: name one; without it all fixed rock moves, along x or "
+                             "y and not back")  # fmt: skip
         if motion == "turn" and {"file", "sine"} & set(table):
             raise ValueError(f"{name}: file and sine shake along x or y; for a turn give times")
         if "file" in table:
-            line = _record(files, f"{name}.file", table["file"], table.get("scale", 1.0))
+            line = read_record(files, f"{name}.file", table)
         elif "sine" in table:
             line = _sine(**table["sine"])
         else:
             line = _lines(table, number, np.pi / 180 if motion == "turn" else 1.0, name)
-        out.append(Drive(block, AXES[motion], **line))
-        blocks[block] = replace(blocks[block], held=(*blocks[block].held, motion))
-    moved = [(d.block, d.axis) for d in out]
-    if len(set(moved)) < len(moved):
+        drives.append(Drive(moved, AXES[motion], **line))
+    driven = [(block, d.axis) for d in drives for block in d.blocks]
+    held = [(i, AXES[name]) for i, b in enumerate(blocks) if not b.fixed for name in b.held]
+    if len({*driven, *held}) < len(driven) + len(held):
         raise ValueError(f"{where}: drive: a motion of a block is prescribed twice")
-    return tuple(out)
+    shaken = {block for block, _ in driven if blocks[block].fixed}
+    held += [(i, axis) for i in sorted(shaken) for axis in AXES.values() if (i, axis) not in driven]
+    for i, block in enumerate(blocks):
+        names = tuple(name for name, axis in AXES.items() if (i, axis) in {*driven, *held})
+        blocks[i] = replace(block, held=names)
+    return *(Drive((i,), axis, (0.0,), (0.0,)) for i, axis in held), *drives
 
 
 def _lines(table: Tables, number: dict[str, int], unit: float, where: str) -> dict:
@@ -143,28 +160,3 @@ def _sine(acceleration: float, frequency: float, cycles: int = 10) -> dict:
     values = acceleration * envelope * np.sin(2 * np.pi * phase)
     times = tuple((phase / frequency).tolist())
     return {"times": times, "values": tuple(values.tolist()), "order": 2}
-
-
-def _record(files: Files, name: str, file: str, scale: float) -> dict:
-    """Velocities or accelerations of a CSV file. Raises ValueError naming a line that is wrong."""
-    where = f"{name}: {file}"
-    try:
-        lines = files[file].splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"{where} cannot be read ({error}); give a CSV file in UTF-8") from None
-    order = TITLES.get("".join(lines[0].split())) if lines else None
-    if order is None or len(lines) < 3:
-        raise ValueError(f"{where}: must be a line {' or '.join(map(repr, TITLES))}, then numbers")
-    times, values = [], []
-    for n, line in enumerate(lines[1:], 2):
-        try:
-            time, value = finite("line", [float(part) for part in line.split(",")], "SI units")
-        except ValueError:
-            raise ValueError(f"{where}, line {n}: {line!r} must be two numbers") from None
-        if time < 0 or (times and time <= times[-1]):
-            raise ValueError(f"{where}, line {n}: time {time:g} s must be >= 0 and increase")
-        times.append(time)
-        values.append(scale * value)
-    if order == 1 and values[0]:
-        raise ValueError(f"{where}, line 2: the first velocity must be 0, because the blocks rest")
-    return {"times": tuple(times), "values": tuple(values), "order": order}

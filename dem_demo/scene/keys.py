@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from shapely import Polygon
 
-from jointlaw.parameters.keys import Removed
+from jointlaw.parameters.bond import Bond
+from jointlaw.parameters.keys import Removed, checked, keys_of
 from jointlaw.support.checks import at_least, finite, integer, more_than, number, one_of
 
 Tables = dict[str, Any]
@@ -60,6 +61,15 @@ def some_of(name: str, value: Any, names: Iterable[str], count: int | None = Non
     return value
 
 
+def bond(name: str, value: Any) -> Bond:
+    """A rule: the table of a bond."""
+    values = checked(value, keys_of(Bond), name)
+    try:
+        return Bond(**values)
+    except ValueError as error:
+        raise ValueError(f"{name.removesuffix('bond')}{error}") from None
+
+
 ENDS = Removed("joints carry at their two ends; cut a long block in two instead", None)
 AXES = {"x": 0, "y": 1, "turn": 2}
 TEXT, LIST, TABLE = a(str), a(list), a(dict)
@@ -77,17 +87,17 @@ SET = {
 }  # fmt: skip
 ROCK = {
     "name!": TEXT, "outline!": corners, "set!": [SET], "at": vector,
-    "fixed": [{"corners!": corners}], "seed": partial(integer, bound=0), "least_width": POSITIVE,
-    "density": DENSITY, "laws": TABLE,
+    "fixed": [{"corners!": corners}], "hole": [{"corners!": corners}], "density": DENSITY,
+    "seed": partial(integer, bound=0), "least_width": POSITIVE, "laws": TABLE,
 }  # fmt: skip
 DRIVE = {
-    "block!": TEXT, "motion!": partial(one_of, choices=tuple(AXES)), "ease": NOT_NEGATIVE,
+    "block": TEXT, "motion!": partial(one_of, choices=tuple(AXES)), "ease": NOT_NEGATIVE,
     "times": partial(finite, unit="s"), "values": partial(finite, unit="m or degrees"),
     "back": {"block!": TEXT, "slid!": POSITIVE, "by!": POSITIVE, "rate!": POSITIVE},
     "sine": {
         "acceleration!": POSITIVE, "frequency!": POSITIVE, "cycles": partial(integer, bound=1),
     },
-    "file": TEXT, "scale": number,
+    "file": TEXT, "scale": number, "baseline": a(bool),
 }  # fmt: skip
 RUN = {
     "end!": POSITIVE, "fraction": within(1e-6, 0.95, "of the limit"), "step": POSITIVE,
@@ -100,11 +110,11 @@ SCENE = {
     "title": TEXT, "gravity": vector, "density": DENSITY, "thickness": POSITIVE, "law": TEXT,
     "laws!": TABLE, "block": [BLOCK], "rock": [ROCK], "drive": [DRIVE], "run!": RUN,
     "joint": [{"between": LIST, "around": vector, "law!": TEXT}],
-    "watch": {"slip": LIST, "shear": LIST, "pins": LIST},
+    "watch": {"slip": LIST, "shear": LIST, "pins": LIST, "joints": LIST},
 }  # fmt: skip
 COULOMB = {
     "kind!": TEXT, "normal_stiffness!": POSITIVE, "shear_stiffness!": POSITIVE,
-    "friction!": partial(at_least, bound=0, infinite=True),
+    "friction!": partial(at_least, bound=0, infinite=True), "bond": bond,
 }  # fmt: skip
 
 

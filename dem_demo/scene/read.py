@@ -100,9 +100,17 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
         raise ValueError(f"{where}: no block can move; give [[block]] or [[rock]], not all fixed")
     drives = read_drives(top.get("drive", ()), number, blocks, files, where)
     pairs = _pairs(top.get("joint", ()), number, blocks, where)
-    watched = _watched(top.get("watch", {}), number, blocks, f"{where}: watch")
     least = min(smallest_width(block.corners) for block in blocks)
     run = Run(**{"skin": SKIN * least, "corner_length": CORNER * least, **top["run"]})
+    for name, law in laws.items():
+        opening = 0.0 if law.bond is None else 1.0 / law.bond.limits[1][0]
+        if opening > run.skin:
+            raise ValueError(
+                f"{where}: laws.{name}.bond holds until the joint is {opening:.3g} m open, but "
+                f"contacts are followed to run.skin = {run.skin:.3g} m: set a larger run.skin, or "
+                "a smaller energy_I"
+            )
+    watched = _watched(top.get("watch", {}), number, blocks, run.skin, f"{where}: watch")
     default = top.get("law", next(iter(laws), ""))
     for law in [default, *pairs.values(), *edge_laws.values()]:
         one_of(f"{where}: law", law, tuple(laws))
@@ -153,7 +161,7 @@ def _block_at(name: str, point: tuple[float, float], blocks: Sequence[Block]) ->
 
 
 def _watched(
-    table: Tables, number: dict[str, int], blocks: Sequence[Block], where: str
+    table: Tables, number: dict[str, int], blocks: Sequence[Block], skin: float, where: str
 ) -> dict[str, tuple[Any, ...]]:
     watched: dict[str, tuple[Any, ...]] = {}
     for kind in ("slip", "shear"):
@@ -164,7 +172,21 @@ def _watched(
         raise ValueError(f"{where}: slip and shear watch one block on two bases; name one")
     points = [vector(f"{where}.pins", point) for point in table.get("pins", ())]
     pins = tuple((_block_at(f"{where}.pins", point, blocks), point) for point in points)
-    return watched | {"pins": pins}
+    points = [vector(f"{where}.joints", point) for point in table.get("joints", ())]
+    near = tuple(_joint_at(f"{where}.joints", point, blocks, skin) for point in points)
+    return watched | {"pins": pins, "near": near}
+
+
+def _joint_at(
+    name: str, point: tuple[float, float], blocks: Sequence[Block], skin: float
+) -> tuple[int, int]:
+    """The two blocks nearest to a point, in the order of the scene."""
+    away = [Polygon(block.corners).distance(Point(point)) for block in blocks]
+    two = sorted(np.argsort(away, kind="stable")[:2].tolist())
+    shapes = [Polygon(blocks[i].corners) for i in two]
+    if len(two) < 2 or shapes[0].distance(shapes[1]) > skin or all(blocks[i].fixed for i in two):
+        raise ValueError(f"{name} = {list(point)}: must lie at a joint of a block that can move")
+    return two[0], two[1]
 
 
 def _rock(
@@ -180,7 +202,10 @@ def _rock(
     if unknown := set(other) - {s.law for s in sets}:
         raise ValueError(f"{where}.laws: no set of this rock has the law {unknown.pop()!r}")
     try:
-        shapes, numbers, joined, dropped = cut(table["outline"], sets, table.get("seed", 0), least)
+        holes = [part["corners"] for part in table.get("hole", ())]
+        shapes, numbers, joined, dropped = cut(
+            table["outline"], sets, table.get("seed", 0), least, holes
+        )
     except ValueError as error:
         raise ValueError(f"{where}.outline: {error}") from None
     first = len(blocks)

@@ -50,7 +50,10 @@ class Scene:
     pairs: laws by the blocks of [[joint]] tables; edge_laws: of each (block, edge) that lies on a
     joint of a rock, the law of its set.
 
-    slip, shear: joints to report on, as (moving block, base); pins: points, as (block, place in m);
+    slip, shear: joints to report on, as (moving block, base); near: those nearest to points, as two
+    blocks; pins: points, as (block, place in m); reduction: what the shear strength of all joints
+    is divided by (see `Joints`).
+
     text: of the file that it was read from, empty for a scene made or changed in memory; files:
     what that file names.
     """
@@ -68,9 +71,19 @@ class Scene:
     thickness: float = 1.0
     slip: tuple[tuple[int, int], ...] = ()
     shear: tuple[tuple[int, int], ...] = ()
+    near: tuple[tuple[int, int], ...] = ()
     pins: tuple[tuple[int, tuple[float, float]], ...] = ()
+    reduction: float = 1.0
     text: str = field(default="", init=False)  # `replace` leaves both out
     files: Files = field(default_factory=Files, init=False)
+
+    @property
+    def base(self) -> int | None:
+        """The fixed block that displacements are measured from: of a shaken scene, one that moves
+        with all fixed rock and not by a drive of its own."""
+        fixed = [i for i, block in enumerate(self.blocks) if block.fixed]
+        own = {d.blocks[0] for d in self.drives if len(d.times) > 1 and len(d.blocks) < len(fixed)}
+        return min(fixed, key=lambda i: i in own, default=None)
 
     def law_of(self, key: Key) -> str:
         """Name of the law of an interface (block, edge, block, edge).

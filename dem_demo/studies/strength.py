@@ -1,11 +1,13 @@
-"""How far a scene is from failing: its strength reduction factor and its critical tilt.
+"""How far a scene is from failing: its factor of safety and its critical tilt.
 
-Both are found by bisection on the initial equilibrium, without running the blocks: a scene fails
-where no displacements are found with which the joints carry the loads.
+Both are looked for on the initial equilibrium, without running the blocks: a scene fails where no
+displacements are found with which the joints carry the loads. A search starts where the scene
+holds, and looks for every equilibrium from the one before, with shorter steps where none is found.
 """
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,98 +16,151 @@ from tqdm import tqdm
 from jointlaw.parameters.rock import RANGES
 from jointlaw.support.pyplot import FORMATS
 
-from ..dynamics.simulation import Simulation
-from ..output.pictures import Pictures
-from ..output.record import Record, far
-from ..output.run import play
+from ..dynamics.seating import displacements
 from ..scene import STICKS, Scene, Tables, build, read_tables, turn
+from .failure import draw, failing
+from .trials import Trials
 
-EXACT = 0.01  # share of the tilt and of the factor to which they are found
-STEP, STEEPEST, LEAST = 8.0, 60.0, 0.01  # degrees: first step, largest, closest told apart
-LARGEST = 64.0  # factor
-SHOWN = 1.02  # times the factor: what the friction of the failing run is divided by
+TILT = 8.0, 60.0, 0.05  # degrees: first step, largest, to which it is found
+FACTOR = np.log(2.0), np.log(64.0), 0.006  # logarithms: the same of a factor
+SHOWN = 1.02  # times the factor: what the strength of the failing run is divided by
 
 
 def strength_reduction(
-    scene: Scene, until: float, folder: Path, picture_format: str = FORMATS[0]
+    scene: Scene,
+    until: float,
+    folder: Path,
+    picture_format: str = FORMATS[0],
+    asperity: bool = False,
 ) -> Iterator[dict]:
-    """Factor and critical tilt of every rock alone, or of a scene without rocks; and a picture.
+    """Factor of safety and critical tilt of every rock alone, or of a scene without rocks.
 
-    The picture is of a run with friction divided by 1.02 times the factor, which ends at `until`
-    (s) or once a block has moved by the size of a block. Yields `rock`, `factor`, `critical_tilt`
-    (degrees), each None where none is found, and the `picture` in `folder`, None without a factor.
+    Yields `rock`, `factor_of_safety`, with `asperity` also `asperity_factor`, `critical_tilt`
+    (degrees), each None where none is found, and `picture`: the file in `folder` that shows how it
+    fails, None without a factor. That run has the strength divided by 1.02 times the factor, and
+    ends at `until` (s) or once a block has moved by the size of a block. Each finished trial is
+    kept in the folder; called again with it, the search goes on.
     """
+    trials = Trials(scene, folder)
     for name in [rock.name for rock in scene.rocks] or ["scene"]:
         one = alone(scene, name) if scene.rocks else scene
-        row = {"rock": name, "factor": strength_factor(one)}
-        row |= {"critical_tilt": critical_tilt(one), "picture": None}
-        if row["factor"]:
-            row["picture"], factor = f"failing-{name}.{picture_format}", SHOWN * row["factor"]
-            title = f"{scene.title}; {name}, friction divided by {factor:.3g}"
-            sim = Simulation(replace(reduced(one, factor), title=title))
-            record = Record(sim)
-            play(sim, record, until, far)
-            Pictures(record).final(folder / row["picture"])
+        row = {"rock": name, "factor_of_safety": factor_of_safety(one, trials, name)}
+        if asperity:
+            row["asperity_factor"] = asperity_factor(one, trials, name)
+        row |= {"critical_tilt": critical_tilt(one, trials, name), "picture": None}
+        if factor := row["factor_of_safety"]:
+            row["picture"] = f"failing-{name}.{picture_format}"
+            title = f"{name}: factor of safety {factor:.3g}"
+            path, weak = folder / row["picture"], weakened(one, SHOWN * factor)
+            trials.ask(row["picture"], partial(_show, weak, until, title, path))
         yield row
 
 
-def critical_tilt(scene: Scene) -> float | None:
+def _show(scene: Scene, until: float, title: str, path: Path) -> float:
+    """Run and draw a scene that fails; returns the model time (s) that it ran."""
+    record = failing(scene, until)
+    time = record.times[-1]
+    draw(record, f"{title}\nwith strength / {scene.reduction:.3g}, after {time:.2g} s", path)
+    return time
+
+
+def factor_of_safety(
+    scene: Scene, trials: Trials | None = None, name: str = "scene"
+) -> float | None:
+    """What the strength of all joints is divided by for a scene to just hold.
+
+    Strength is the shear stress that a joint can bear at its own normal stress. None if the scene
+    holds with 1/64 of it, or fails with 64 times of it.
+    """
+    return _factor(partial(weakened, scene), trials or Trials(scene), f"{name}: factor of safety")
+
+
+def asperity_factor(
+    scene: Scene, trials: Trials | None = None, name: str = "scene"
+) -> float | None:
+    """What the friction of all asperities is divided by for a scene to just hold.
+
+    None as above. No friction is made larger than a scene may have, 5.
+    """
+    return _factor(partial(smoothed, scene), trials or Trials(scene), f"{name}: asperity factor")
+
+
+def _factor(at: Callable[[float], Scene], trials: Trials, name: str) -> float | None:
+    log = _march(lambda log: at(float(np.exp(log))), FACTOR, trials, name)
+    return None if log is None else float(np.exp(log))
+
+
+def critical_tilt(scene: Scene, trials: Trials | None = None, name: str = "scene") -> float | None:
     """The turn of gravity (degrees, towards +x) at which a scene just holds; None beyond 60.
 
     Below zero where it does not hold as drawn.
     """
 
-    return _bisect(
-        lambda tilt: replace(scene, gravity=tuple(turn(np.radians(tilt)) @ scene.gravity)),
-        STEP, STEEPEST, lambda tilt: max(EXACT * abs(tilt), LEAST),
-    )  # fmt: skip
+    def at(tilt: float) -> Scene:
+        return replace(scene, gravity=tuple(turn(np.radians(tilt)) @ scene.gravity))
+
+    return _march(at, TILT, trials or Trials(scene), f"{name}: critical tilt")
 
 
-def strength_factor(scene: Scene) -> float | None:
-    """What all friction is to be divided by for a scene to just hold.
-
-    None if it holds with 1/64 of it, or fails with 64 times of it. No friction is made larger than
-    a scene may have, 5.
-    """
-
-    log = _bisect(
-        lambda log: reduced(scene, float(np.exp(log))), np.log(2), np.log(LARGEST), lambda _: EXACT
-    )
-    return None if log is None else float(np.exp(log))
+def weakened(scene: Scene, factor: float) -> Scene:
+    """A scene with the strength of all joints divided by a factor, bonds in tension as well."""
+    laws = dict(scene.laws)
+    for name, law in laws.items():
+        if bond := law.bond:  # an energy above the elastic one stays above it
+            energy = bond.energy_I and bond.energy_I / factor**2
+            bond = replace(bond, tension=bond.tension / factor, energy_I=energy)
+            laws[name] = replace(law, bond=bond)
+    return replace(scene, laws=laws, reduction=scene.reduction * factor)
 
 
-def reduced(scene: Scene, factor: float) -> Scene:
+def smoothed(scene: Scene, factor: float) -> Scene:
     """A scene with the friction of asperities and of plain Coulomb divided by a factor."""
     highest, laws = RANGES["mu"][1], {}  # that a scene may have; what fails with it has no factor
     for name, law in scene.laws.items():
-        given = {key: getattr(law.asperity, key) for key in ("mu", "mu_residual")}
-        weak = {key: min(mu / factor, highest) for key, mu in given.items()
-                if mu is not None and mu < STICKS}  # fmt: skip
-        laws[name] = replace(law, asperity=replace(law.asperity, **weak))
+        mu = law.asperity.mu
+        weak = min(mu / factor, highest) if mu < STICKS else mu
+        laws[name] = replace(law, asperity=replace(law.asperity, mu=weak))
     return replace(scene, laws=laws)
 
 
-def _bisect(
-    at: Callable[[float], Scene], step: float, most: float, exact: Callable[[float], float]
+def _march(
+    at: Callable[[float], Scene], reach: tuple[float, float, float], trials: Trials, name: str
 ) -> float | None:
-    """Where the scenes `at` begin to fail: looked for from 0 up if that one holds, else down."""
-    with tqdm(desc="equilibria", delay=2.0, disable=None, leave=False) as bar:
+    """Where the scenes `at` begin to fail; None if that is not between -most and most.
 
-        def holds(x: float) -> bool:
+    reach: the first step, `most`, and to what it is found. It starts at 0, or below at the first
+    multiple of a step that holds. From there on each equilibrium is looked for from the one before;
+    where none is found the step is halved.
+    """
+    step, most, exact = reach
+    with tqdm(desc=name, unit="trial", delay=2.0, disable=None, leave=False) as bar:
+
+        def found(x: float, last: float | None, moved: list[float] | None) -> list[float] | None:
+            guess = None if moved is None else np.array(moved)
+            balance = trials.ask(f"{name} {x} from {last}", lambda: _balance(at(x), guess))
             bar.update()
-            scene = at(x)
-            return Simulation(replace(scene, run=replace(scene.run, seat=True))).balanced
+            return balance
 
-        sense = 1.0 if holds(0.0) else -1.0
-        low, high = 0.0, sense * step
-        while holds(high) == (sense > 0):
-            if abs(high) == most:
+        low, failed = 0.0, False
+        while (moved := found(low, None, None)) is None:
+            if low == -most:
                 return None
-            low, high = high, sense * min(abs(high) + step, most)
-        while abs(high - low) > exact(high):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if holds(middle) == (sense > 0) else (low, middle)
-    return 0.5 * (low + high)
+            low, failed = max(low - step, -most), True
+        while not failed or step > exact:
+            high = min(low + step, most)
+            further = found(high, low, moved)
+            if further is None:
+                failed, step = True, 0.5 * step
+            elif high == most:
+                return None
+            else:
+                low, moved = high, further
+    return low + step
+
+
+def _balance(scene: Scene, guess: np.ndarray | None) -> list[float] | None:
+    moved = displacements(scene, guess)
+    return None if moved is None else moved.tolist()
 
 
 def alone(scene: Scene, name: str, seed: int | None = None) -> Scene:

@@ -9,7 +9,7 @@ With R the law's closure range and S the normal stress there, the paths are
     re-contact         closed and sheared, opened under shear until it separates, closed again
     walk               a smooth random walk in closure and both shears
     weave              closed five times while the shear crosses itself (in space)
-    far                R/2, shear along 20 degrees to three critical slips, 3 R at most, and back
+    far                R/2, shear along 20 degrees to three mating lengths, 3 R at most, and back
     slip               as far at the stresses S/2 and S/20, held by every resolution itself; errors
                        count where friction is mobilised (`Slip.counts`)
 
@@ -42,7 +42,7 @@ from ..laboratory.normal_control import NormalCondition, closing_increments
 from ..parameters.resolution import Resolution
 from ..support.checks import Array
 from ..support.progress import track
-from .slip import HELD, Slip, distance, names, random_ways, slip, standard_ways
+from .slip import HELD, Slip, distance, random_ways, slip, standard_ways
 
 if TYPE_CHECKING:
     from ..law import JointLaw
@@ -108,10 +108,6 @@ class Suite:
         largest, rms = np.append(largest, more[0]), np.append(rms, more[1])
         return Miss(largest, rms, *mine.apart(self.slip))
 
-    def errors(self, law: JointLaw) -> tuple[Array, Array]:
-        """Largest and rms error (paths,) of another resolution, as shares of the peak |F|."""
-        return self.miss(law)[:2]
-
 
 def standard_suite(law: JointLaw, best: Resolution | None = None, excursions: int = 0) -> Suite:
     """The standard paths of a law, with tractions at `best`, by default the reference resolution.
@@ -138,7 +134,8 @@ def _suite(law: JointLaw, excursions: int) -> Suite:
     slid, ways = None, standard_ways(law.tables.dim)
     if not law.closure_only and steepest(law) < _JAMS:
         more = random_ways(np.random.default_rng(18), excursions // 16, law.tables.dim)
-        called += names(law.tables.dim) + tuple(f"slip {i + 1}" for i in range(len(more)))
+        called += tuple(f"slip {way:g} at S/{2 / share:g}" for share, way, _ in ways)
+        called += tuple(f"slip {i + 1}" for i in range(len(more)))
         ways = np.concatenate([ways, more])
         slid = slip(law, law.closure_range, stress, ways)
     suite = Suite(called, d, F, slid, ways, stress, np.zeros(len(called)))
@@ -193,7 +190,7 @@ def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]
     shear = legs([0, 0.1, 1], [0, seat, seat], [0, 0, 1])
     back = legs([0, 0.1, 0.35, 0.75, 1], [0, *4 * [seat]], [0, 0, 0.6, -0.6, 0])
     fixed = legs([0, 0.2, 1], [0, 1, 1], [0, 0, 1])
-    sheared = min(distance(law.tables.critical_slip, R) / R, FAR)
+    sheared = min(distance(law.tables.mating_length, R) / R, FAR)
     far = legs([0, 0.1, 0.55, 1], [0, 0.5, 0.5, 0.5], [0, 0, sheared, 0])
     again = legs([0, 0.15, 0.35, 0.6, 0.7, 1], [0, 0.7, 0.7, -0.6, -0.6, 0.8],
                  [0, 0, 0.4, 0.7, 0.2, 0.5])  # fmt: skip
@@ -259,7 +256,7 @@ def far_path(law: JointLaw, rng: np.random.Generator, stress: float, s: Array) -
     """
     R = law.closure_range
     closure = float(law.closure(stress * rng.uniform(0.1, 1.0))) / R
-    way = min(distance(law.tables.critical_slip, R) / R, FAR) * rng.uniform(0.3, 1.0)
+    way = min(distance(law.tables.mating_length, R) / R, FAR) * rng.uniform(0.3, 1.0)
     back, turn = way * rng.uniform(-1.0, 0.5), rng.uniform(0.0, 2.0 * np.pi)
     at = [0.0, 0.1, 0.4, 0.8, 1.0]
     shear = np.interp(s, at, [0.0, 0.0, way, back, way])

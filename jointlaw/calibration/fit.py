@@ -196,7 +196,8 @@ class Fit:
                 f"{TRANSFORMS[name].unit} | {100 * share:.0f} % | "
                 f"{'no' if name in left else 'yes'} |"
             )
-        held = [n for n in values if n not in self.free and np.isfinite(values[n])]
+        unworn = {"slope_residual"} if np.isinf(values["slope_wear"]) else set()
+        held = [n for n in values if n not in {*self.free, *unworn} and np.isfinite(values[n])]
         lines += ["", "Held: " + ", ".join(f"{n} = {values[n]:.4g}" for n in held) + "."]
         lines += ["", "Not fixed by these data:", ""] if left else []
         lines += [f"- {name}: {reason}" for name, reason in left.items()]

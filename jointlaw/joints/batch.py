@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..kernels import reference, wear
-from ..kernels.blocks import LANES, empty_blocks, rows_of, write_rows, zeros
-from ..kernels.engine import CHUNK, Step, engine
+from ..kernels import reference
+from ..kernels.blocks import LANES, rows_of, write_rows, zeros
+from ..kernels.engine import Step, engine
 from ..kernels.reference import Measures
+from ..kernels.unmated import unmated_start
 from ..support.checks import Array, integer, numbers
 from .state import JointState, NonFiniteError
-from .time_step import stable_step, stiffness_per_facet
+from .time_step import stable_step, stiffness_of
 
 if TYPE_CHECKING:
     from ..law import JointLaw
@@ -47,7 +48,7 @@ class JointBatch:
         self.law, self.ledger = law, ledger
         self._engine = engine(law.tables)
         self._n = integer("n", n, 0)
-        self._state = empty_blocks(self._engine.rows, self._n)
+        self._state = zeros(self._n, self._engine.rows, 1 if self._n == 1 else LANES)
         self._largest_reach = 0.0  # bound of |y| of all facets of all joints
         numbers = np.arange(law.state_size, dtype=np.float64)[:, None]
         self._row_numbers = reference.parts(law.tables, numbers)  # of each part of a state
@@ -55,16 +56,11 @@ class JointBatch:
         self._steepness = 1.0 + 2.0 * float(np.max(np.abs(law.tables.m)))
 
     def __getstate__(self) -> dict[str, Any]:
-        kept = {k: v for k, v in self.__dict__.items() if k != "_engine"}  # holds compiled code
-        return kept | {"_state": self._state[:, : self.law.state_size]}
+        return {"law": self.law, "ledger": self.ledger, "states": self.snapshot()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        self._engine, rows = engine(self.law.tables), state["_state"]
-        blocks, kept, lanes = rows.shape
-        self._state = zeros(blocks, self._engine.rows, lanes)
-        self._state[:, :kept] = rows
-        self._engine.refresh(self._state, self._n)
+        JointBatch.__init__(self, state["law"], len(state["states"]), state["ledger"])
+        self.restore(state["states"])
 
     def __len__(self) -> int:
         return self._n
@@ -132,20 +128,36 @@ class JointBatch:
         self._engine.refresh(self._state, self._n)
         self._largest_reach = self._reach_of(self._rows()).max(initial=0.0)
 
-    def reset(self, index: Index | None = None) -> None:
-        """Return the joints at `index` (all if None) to the virgin state: new contacts."""
+    def reset(self, index: Index | None = None, mated: bool = True) -> None:
+        """Return the joints at `index` (all if None) to their start: new contacts.
+
+        Mated ones to the virgin state, others to the start of faces that have never met, as
+        `JointLaw.joint` has it.
+        """
+        start = 0.0 if mated else unmated_start(self.law.tables)
         which = np.arange(self._n) if index is None else self._index(index)
         lanes = self._state.shape[2]
         self._state[which // lanes, :, which % lanes] = 0.0
+        self._state[which // lanes, : self.law.dim, which % lanes] = start
+        far = self._steepness * float(np.max(np.abs(start)))
+        self._largest_reach = max(self._largest_reach, far)
+        if not mated:
+            self.unbond(which)
+
+    def unbond(self, index: Index) -> None:
+        """Break the bonds, if any, of the joints at `index`: faces that meet anew have none."""
+        which, lanes = self._index(index), self._state.shape[2]
+        row = self._row_numbers.damage.astype(int)
+        self._state[which // lanes, row, which % lanes] = 1.0
 
     def resize(self, n: int) -> None:
-        """Change the number of joints; joints beyond the old number are new and unloaded."""
+        """Change the number of joints; joints beyond the old number are new and mated."""
         n = integer("n", n, 0)
         blocks, rows, lanes = self._state.shape
         if n < self._n:
             self.reset(np.arange(n, self._n))
         elif n > blocks * lanes:  # grow by doubling, so that steady growth copies rarely
-            grown = zeros(max(-(-n // LANES), 2 * blocks), rows, LANES)
+            grown = zeros(max(n, 2 * blocks * LANES), rows)
             write_rows(grown, rows_of(self._state, self._n), np.arange(self._n))
             self._state = grown
         self._n = n
@@ -170,13 +182,10 @@ class JointBatch:
 
     def max_stiffness(self) -> Array:
         """Upper bound (n,) of `|C|` in Pa/m at each joint's present displacement."""
-        k, bound = self.law.tables, np.empty(self._n)
-        per_facet = stiffness_per_facet(k)
-        for first in range(0, self._n, CHUNK):
-            index = np.arange(first, min(first + CHUNK, self._n))
-            now = reference.parts(k, self._rows(index))
-            y = reference.effective_closure(k, now.delta[0], now.offset)
-            bound[index] = per_facet @ k.curve.force(y)[1]
+        k, now = self.law.tables, reference.parts(self.law.tables, self._rows())
+        bound: Array = stiffness_of(k, reference.effective_closure(k, now.delta, now.slopes))
+        if k.bond is not None:
+            bound = bound + (1.0 - self.damage) * k.bond.largest_stiffness
         return bound
 
     def critical_time_step(self, mass: ArrayLike, area: ArrayLike) -> Array:
@@ -193,7 +202,7 @@ class JointBatch:
 
     @property
     def delta(self) -> Array:
-        """Displacement since the virgin state (n, dim): closure and shear, in m."""
+        """Displacement from the mated position (n, dim): closure and shear, in m."""
         return rows_of(self._state[:, : self.law.dim], self._n).T
 
     @property
@@ -233,10 +242,14 @@ class JointBatch:
         return self._ledger("plastic_work", "plastic")
 
     @property
-    def friction(self) -> Array:
-        """Friction coefficient (n,) of the asperities, worn by their slip so far."""
-        k = self.law.tables
-        return wear.friction(k, self._part("slip")) if k.wears else np.full(self._n, k.mu)
+    def slopes(self) -> Array:
+        """Share (n,) of the slopes of the asperities that has not been worn away."""
+        return 1.0 - self._part("worn")
+
+    @property
+    def damage(self) -> Array:
+        """Damage (n,) of the bond: 0 whole, 1 broken, and 1 where the law has none."""
+        return self._part("damage") if self.law.bond is not None else np.ones(self._n)
 
     # --------------------------------------------------------------- internals
 
@@ -290,17 +303,14 @@ class JointBatch:
     def _reach_by_joint(self, step: Step, limit: float) -> float:
         """As `_reach_after`, joint by joint."""
         d, index = step.d, step.where
-        finite = np.isfinite(d).all(axis=1)
-        if not finite.all():
-            row = int(np.argmin(finite))
-            joint = row if index is None else int(index[row])
-            raise ValueError(f"d of joint {joint} = {d[row]} is not finite; nothing was moved")
         old = self._rows(index)
         with np.errstate(over="ignore"):
             new = self._reach_of(old) + self._steepness * np.abs(d).max(axis=1)
-        if (new > limit).any():
-            row = int(np.argmax(new > limit))
+        if not (new <= limit).all():
+            row = int(np.argmin(new <= limit))
             joint = row if index is None else int(index[row])
+            if not np.isfinite(d[row]).all():
+                raise ValueError(f"d of joint {joint} = {d[row]} is not finite; nothing was moved")
             error = NonFiniteError(
                 f"joint {joint}: the step d = {d[row]} m gives a result that is not finite; "
                 "nothing was moved. Take a smaller step (state and d of this error repeat it)"
@@ -312,9 +322,9 @@ class JointBatch:
         return max(float(rest), float(new.max(initial=0.0)))
 
     def _reach_of(self, rows: Array) -> Array:
-        """Bound (n,) of |y| of all facets of states (rows, n), from closure and offset."""
+        """Bound (n,) of |y| of all facets of states (rows, n)."""
         now = reference.parts(self.law.tables, rows)
-        far = np.maximum(np.abs(now.delta).max(axis=0), np.abs(now.offset).max(axis=0, initial=0.0))
+        far: Array = np.abs(now.delta).max(axis=0)
         return self._steepness * far
 
 

@@ -40,6 +40,8 @@ class Joint:
     def __init__(self, law: JointLaw) -> None:
         self.law = law
         self._batch = JointBatch(law, 1)
+        d, F, C = np.empty((1, law.dim)), np.empty((1, law.dim)), np.empty((1, law.dim, law.dim))
+        self._steps = Step(d, F, None), Step(d, F, C)  # without and with tangent
 
     def __copy__(self) -> Joint:
         twin = Joint(self.law)
@@ -58,11 +60,11 @@ class Joint:
         return self._step(d, tangent, keep=False)
 
     def _step(self, d: ArrayLike, tangent: bool, keep: bool) -> tuple[Array, Array | None]:
-        dim = self.law.dim
-        values = increments(d, (dim,))[None].copy()  # the kernel needs numbers without gaps
-        F, C = np.empty((1, dim)), np.empty((1, dim, dim)) if tangent else None
-        self._batch.take(Step(values, F, C, None, keep))
-        return F[0], None if C is None else C[0]
+        step = self._steps[bool(tangent)]
+        step.d[0] = increments(d, (self.law.dim,))
+        step.keep = keep
+        self._batch.take(step)
+        return step.F[0].copy(), None if step.C is None else step.C[0].copy()
 
     def snapshot(self) -> JointState:
         """A copy of the state."""
@@ -72,9 +74,9 @@ class Joint:
         """Return to a snapshot. Raises ValueError if another law wrote it."""
         self._batch.restore(state)
 
-    def reset(self) -> None:
-        """Return to the virgin state."""
-        self._batch.reset()
+    def reset(self, mated: bool = True) -> None:
+        """Return to the start: the virgin state, or that of faces that have never met."""
+        self._batch.reset(mated=mated)
 
     def measures(self) -> Measures:
         """Shares, stored energy and reach in one pass, as numbers."""
@@ -93,4 +95,5 @@ class Joint:
     stored_energy = _OfOne(JointBatch.stored_energy, float)
     dissipated_energy = _OfOne(JointBatch.dissipated_energy, float)
     plastic_work = _OfOne(JointBatch.plastic_work, float)
-    friction = _OfOne(JointBatch.friction, float)
+    slopes = _OfOne(JointBatch.slopes, float)
+    damage = _OfOne(JointBatch.damage, float)

@@ -9,7 +9,7 @@ import ctypes
 import os
 import warnings
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -29,14 +29,21 @@ MISSING = (
 )
 
 
-class Step(NamedTuple):
-    """One step of m joints: increments in, results out."""
+class Step:
+    """A step of m joints of one batch: increments in, results out. It may be taken many times.
 
-    d: Array  # (m, dim) in m
-    F: Array  # (m, dim), written
-    C: Array | None  # (m, dim, dim), written; None for no tangent
-    where: Index | None  # the joints that move, (m,); None for all
-    keep: bool  # whether the states advance, or stay as they were
+    d (m, dim) in m; F (m, dim) and C (m, dim, dim), which are written, C None for no tangent;
+    where: the joints that move (m,), None for all; keep: whether the states advance.
+    """
+
+    def __init__(
+        self, d: Array, F: Array, C: Array | None, where: Index | None = None, keep: bool = True
+    ) -> None:
+        self.d, self.F, self.C, self.where, self.keep = d, F, C, where, keep
+        self.call: tuple[Array | None, Any] = None, None  # of these states, for `NativeEngine`
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"call": (None, None)}  # it holds addresses
 
 
 def engine(tables: Tables) -> "NumpyEngine | NativeEngine":
@@ -54,8 +61,7 @@ def step_states(
     n, dim = d.shape
     new, F = np.array(states, order="C"), np.empty((n, dim))
     C = np.empty((n, dim, dim)) if tangent else None
-    step = Step(np.ascontiguousarray(d), F, C, None, True)
-    engine(tables).advance(new[:, :, None], step, ledger=True)
+    engine(tables).advance(new[:, :, None], Step(np.ascontiguousarray(d), F, C), ledger=True)
     return new, F, C
 
 
@@ -102,11 +108,7 @@ class NumpyEngine:
 
     def measures(self, state: Array, out: Array) -> None:
         """Write the `Measures` of the first n joints into the rows of out (5, n)."""
-        n = out.shape[1]
-        for first in range(0, n, CHUNK):
-            index = np.arange(first, min(first + CHUNK, n))
-            rows = rows_of(state, 0, index)
-            out[:, index] = reference.measures(self.tables, rows)
+        out[:] = reference.measures(self.tables, rows_of(state, out.shape[1]))
 
 
 class NativeEngine:
@@ -116,51 +118,46 @@ class NativeEngine:
 
     def __init__(self, tables: Tables, loaded: ctypes.CDLL) -> None:
         self._law, self._sliders = library.NativeLaw(tables), tables.sliders
-        self._run, self.lanes = loaded.jlaw_run, loaded.jlaw_lanes()
+        self._library, self.lanes = loaded, loaded.jlaw_lanes()
         # rows of a block: the state, then Phi and Phi' of all facets, which save half the look-ups;
         # with flattened facets, the same at their depth
         self.rows = tables.rows + 2 * (1 + tables.yields) * len(tables.c1)
 
     def advance(self, state: Array, step: Step, ledger: bool) -> None:
         """Take a step; `ledger` adds up the dissipated energy."""
-        d, F, C, where, keep = step
-        pointers = address(d), address(F), None if C is None else address(C)
-        index = None if where is None else address(where)
-        self._call(library.ADVANCE, state, len(d), *pointers, index, ledger, keep)
+        of, call = step.call
+        if of is not state:
+            arrays = (address(array) for array in (step.d, step.F, step.C, step.where))
+            call = self._prepared(state, len(step.d), *arrays)
+            step.call = state, call
+        call.ledger, call.keep = ledger, step.keep
+        self._run(library.ADVANCE, call)
 
     def refresh(self, state: Array, n: int) -> None:
         """Bring Phi and Phi', kept beside the first n states, up to date with them."""
-        self._call(library.REFRESH, state, n)
+        self._run(library.REFRESH, self._prepared(state, n))
 
     def measures(self, state: Array, out: Array) -> None:
         """As `NumpyEngine.measures`."""
-        self._call(library.MEASURE, state, out.shape[1], None, address(out))
+        self._run(library.MEASURE, self._prepared(state, out.shape[1], None, address(out)))
 
-    def _call(
-        self,
-        what: int,
-        state: Array,
-        n: int,
-        d: int | None = None,
-        F: int | None = None,
-        C: int | None = None,
-        index: int | None = None,
-        ledger: bool = True,
-        keep: bool = True,
-    ) -> None:
-        """A call of the library for n joints, on one thread or several."""
+    def _prepared(self, state: Array, n: int, *arrays: int | None) -> library.BatchCall:
+        """A call for n joints; arrays: where d, F, C and the index begin."""
         _, rows, lanes = state.shape
-        batch = library.BatchCall(
-            self._law.address, address(state), d, F, C, index, n, rows, ledger, keep
+        given = *arrays, *[None] * (4 - len(arrays))
+        return library.BatchCall(
+            self._law.address, address(state), *given, n, rows, lanes == 1, self.lanes
         )
-        where, alone = ctypes.addressof(batch), lanes == 1
-        if n * self._sliders <= SERIAL or (threads := min(thread_count(), -(-n // LANES))) == 1:
-            library.check(self._run(where, 0, n, what, alone, self.lanes))
-            return
-        share = -(-n // (threads * LANES)) * LANES  # whole blocks, so threads change no result
+
+    def _run(self, what: int, call: library.BatchCall) -> None:
+        """Call the library on one thread or several; each takes whole blocks."""
+        where, n, threads = ctypes.addressof(call), call.n, 1
+        if n * self._sliders > SERIAL:
+            threads = min(thread_count(), -(-n // LANES))
+        share = -(-n // (threads * LANES)) * LANES
 
         def part(k: int) -> None:
-            first, last = min(k * share, n), min((k + 1) * share, n)
-            library.check(self._run(where, first, last, what, alone, self.lanes))
+            if self._library.jlaw_run(where, min(k * share, n), min((k + 1) * share, n), what):
+                raise MemoryError("no memory for a copy of a block of states")
 
         share_out(part, threads)

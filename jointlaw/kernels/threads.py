@@ -2,7 +2,8 @@
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
 
 
 def thread_count() -> int:
@@ -15,24 +16,16 @@ def thread_count() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def share_out(part: Callable[[int], None], threads: int) -> None:
+def share_out(part: Callable[[int], object], threads: int) -> None:
     """Run part(0) here and part(1), ... part(threads - 1) on other threads; wait for all."""
-    waiting = [_pool().submit(part, k) for k in range(1, threads)]
+    others = _pool(os.getpid()).map(part, range(1, threads)) if threads > 1 else ()
     try:
         part(0)
     finally:
-        wait(waiting)
-    for one in waiting:
-        one.result()
+        list(others)
 
 
-_pools: dict[int, ThreadPoolExecutor] = {}
-
-
-def _pool() -> ThreadPoolExecutor:
+@lru_cache(maxsize=1)
+def _pool(process: int) -> ThreadPoolExecutor:
     """Threads of this process: a forked child starts its own."""
-    process = os.getpid()
-    if process not in _pools:
-        _pools.clear()
-        _pools[process] = ThreadPoolExecutor(max(thread_count() - 1, 1), "jointlaw")
-    return _pools[process]
+    return ThreadPoolExecutor(max(thread_count() - 1, 1), "jointlaw")

@@ -16,7 +16,10 @@ typedef struct {
   double *F, *C;          /* (n, dim), (n, dim, dim); C may be NULL */
   const long long *index; /* the joints that move (n,), or NULL for all */
   long long n;
-  int rows, ledger, keep;
+  int rows;
+  int alone; /* whether the states lie (n, rows) */
+  int lanes; /* of vectors: at most what jlaw_lanes() says */
+  int ledger, keep;
 } jlaw_batch;
 
 typedef int jlaw_call(const jlaw_batch *b, long first, long last);

@@ -43,10 +43,8 @@ OUT int jlaw_lanes(void)
 #endif
 }
 
-/* Call number `what` of advance, measure and refresh, for joints first to last - 1 of a batch whose
- * states lie in blocks, or alone, by vectors of so many lanes */
-OUT int jlaw_run(const jlaw_batch *b, long long first, long long last, int what, int alone,
-                 int lanes)
+/* Call number `what` of advance, measure and refresh, for joints first to last - 1 of a batch */
+OUT int jlaw_run(const jlaw_batch *b, long long first, long long last, int what)
 {
   static jlaw_call *const calls[][3] = {
       {KINDS(, _2)}, {KINDS(, _2_alone)},
@@ -54,8 +52,8 @@ OUT int jlaw_run(const jlaw_batch *b, long long first, long long last, int what,
       {KINDS(, _4)}, {KINDS(, _4_alone)}, {KINDS(, _8)}, {KINDS(, _8_alone)},
 #endif
   };
-  const int level = lanes == 8 ? 2 : lanes == 4;
-  return calls[2 * level + alone][what](b, (long) first, (long) last);
+  const int level = b->lanes == 8 ? 2 : b->lanes == 4;
+  return calls[2 * level + b->alone][what](b, (long) first, (long) last);
 }
 
 /* Hash of the sources that this library was built from */

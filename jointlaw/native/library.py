@@ -1,7 +1,6 @@
 """The library of the compiled law: finds, loads and calls it."""
 
 import ctypes
-import platform
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,6 @@ from ..discretisation.tables import Tables
 from . import build
 from .layout import Law, in_blocks, pack
 
-BLOCK = 8  # joints side by side in a block of states, JLAW_BLOCK in batch.h
 ADVANCE, MEASURE, REFRESH = range(3)  # what jlaw_run calls
 
 
@@ -26,26 +24,22 @@ class BatchCall(ctypes.Structure):
     _fields_ = [
         *((name, ctypes.c_void_p) for name in ("law", "state", "d", "F", "C", "index")),
         ("n", ctypes.c_longlong),
-        *((name, ctypes.c_int) for name in ("rows", "ledger", "keep")),
+        *((name, ctypes.c_int) for name in ("rows", "alone", "lanes", "ledger", "keep")),
     ]
 
 
 @lru_cache(maxsize=1)
 def load() -> ctypes.CDLL | None:
     """The library, None if there is none; raises StaleLibraryError if it is of other sources."""
-    system = {"Darwin": "macos", "Windows": "windows"}.get(platform.system(), "linux")
-    path = Path(__file__).parent / build.library_name(system)
-    if not path.exists():
-        return None
-    return load_file(path)
+    path = build.HERE / build.library_name(build.Compiler(()).machine[1])
+    return load_file(path) if path.exists() else None
 
 
 def load_file(path: Path) -> ctypes.CDLL:
     """The library of this file."""
     library = ctypes.CDLL(str(path))
     library.jlaw_sources.restype = ctypes.c_char_p
-    run = library.jlaw_run
-    run.argtypes = [ctypes.c_void_p, *[ctypes.c_longlong] * 2, *[ctypes.c_int] * 3]
+    library.jlaw_run.argtypes = [ctypes.c_void_p, *[ctypes.c_longlong] * 2, ctypes.c_int]
     if library.jlaw_sources().decode() != build.sources():
         raise StaleLibraryError(
             f"{path} was built from other sources than lie beside it: build it anew with "
@@ -68,15 +62,11 @@ class NativeLaw:
         self.address = ctypes.addressof(self._law)
 
 
-def address(array: Any) -> int:
-    """Where the numbers of a contiguous array begin."""
+def address(array: Any) -> int | None:
+    """Where the numbers of a contiguous array begin; None for None."""
+    if array is None:
+        return None
     try:  # four times as fast as numpy's own
         return ctypes.addressof(ctypes.c_char.from_buffer(array))
     except (TypeError, ValueError):  # it is empty, or may only be read
         return int(array.ctypes.data)
-
-
-def check(result: int) -> None:
-    """Raises MemoryError where a call says so."""
-    if result:
-        raise MemoryError("no memory for a copy of a block of states")

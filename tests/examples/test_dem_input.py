@@ -67,7 +67,7 @@ TWICE = '[[joint]]\nbetween = ["base", "top"]\nlaw = "plain"\n[watch]'
         ("[run]", "[run", "at line 34"),
         ("[laws.plain]", "[laws]\nx = 1\n[laws.plain]", "laws.x = 1: must be a table"),
         ("mu = 0.4", "mu = -0.4", "mu"),
-        ("critical_slip = 2e-3", "closure_only = true", "closure_only = true: .* leave it out"),
+        ("mating_length = 2e-3", "closure_only = true", "closure_only = true: .* leave it out"),
         (
             'kind = "coulomb"',
             'kind = "glue"',
@@ -93,7 +93,16 @@ TWICE = '[[joint]]\nbetween = ["base", "top"]\nlaw = "plain"\n[watch]'
         ),
         ('between = ["top", "base"]', 'between = [["top"], "base"]', "between = .* must be 2 of"),
         ("[watch]", TWICE, r"joint\[1\]: another \[\[joint\]\] gives these blocks another law"),
-        ('block = "top"', 'block = "base"', "drive.0..block = 'base' is unknown"),
+        (
+            'block = "top"',
+            'block = "bse"',
+            "drive.0..block = 'bse' is unknown; did you mean 'base'",
+        ),
+        (
+            'block = "top"\nmotion = "x"',
+            'motion = "turn"',
+            "drive.0..block: name one; without it all",
+        ),
         ("times = [0.0, 0.1]", "times = [0.1, 0.1]", "times: must increase, one for each"),
         ("values = [0.0, 1e-3]", "values = [0.0, nan]", "values = .* is not finite"),
         (LINES, "sine = { acceleration = 1.0, frequency = 5.0, cycles = 0 }", "cycles = 0 .* >= 1"),
@@ -124,12 +133,16 @@ MOTION = "time_s,acceleration_m/s2\n0.0,1.0\n0.1,1.0\n0.2,-1.0\n"
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (MOTION.replace("m/s2", "g"), "must be a line 'time_s,velocity_m/s' or 'time_s,accel"),
+        (
+            MOTION.replace("m/s2", "ft/s2"),
+            "must be a line such as 'time_s,.*Acc .g.'",
+        ),
         (MOTION.replace("0.1,1.0", "0.1,nan"), "line 3: '0.1,nan' must be two numbers"),
         (MOTION.replace("0.1,1.0", "0.1,1.0,2.0"), "line 3: .* must be two numbers"),
         (MOTION.replace("0.2,", "0.1,"), r"line 4: time 0\.1 s must be >= 0 and increase"),
-        (MOTION.replace("acceleration_m/s2", "velocity_m/s"), "line 2: the first velocity must be"),
+        (MOTION.replace("acceleration_m/s2", "velocity_m/s"), "line 2: the first value must be 0"),
         (MOTION[:33], "must be a line .*, then numbers"),
+        (MOTION.replace("time_s", "time_ms"), "must be a line"),
         (None, "cannot be read"),
     ],
 )
@@ -139,6 +152,44 @@ def test_a_bad_record_is_refused_by_its_line(tmp_path, text, message):
     shaken = TEXT.replace(LINES, 'file = "motion.csv"\nscale = 2.0')
     with pytest.raises(ValueError, match=r"drive\[0\]\.file: motion\.csv.*" + message):
         parse(shaken, files=Files(tmp_path))
+
+
+def driven(folder, record, keys=""):
+    """The drive of a block by a record, with these further keys."""
+    (folder / "motion.csv").write_text(record)
+    text = TEXT.replace(LINES, f'file = "motion.csv"\n{keys}')
+    return next(d for d in parse(text, files=Files(folder)).drives if len(d.times) > 1)
+
+
+@pytest.mark.parametrize(
+    ("titles", "unit", "order"),
+    [("Time (s),Acc (g)", 9.80665, 2), ('"t [s]","v [cm/s]"', 0.01, 1), ("time_s,a_m/s^2", 1.0, 2)],
+)
+def test_the_unit_says_what_a_record_holds(tmp_path, titles, unit, order):
+    drive = driven(tmp_path, f"{titles}\n0.0,0.0\n0.1,2.0\n")
+    assert (drive.order, drive.values) == (order, (0.0, 2.0 * unit))
+
+
+def test_a_record_of_displacement_begins_and_ends_at_rest(tmp_path):
+    """A clamped cubic of one span is 3 s**2 - 2 s**3 of its rise."""
+    drive = driven(tmp_path, "time_s,u_mm\n1,0\n3,2\n", "scale = 0.5")
+    found = [drive(t) for t in (0.0, 1.0, 1.5, 2.0, 3.0, 9.0)]
+    np.testing.assert_allclose(found, [0.0, 0.0, 1e-3 * 10 / 64, 5e-4, 1e-3, 1e-3], atol=1e-15)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_base_correction_ends_at_rest_and_takes_drift_away(tmp_path, order):
+    """A line in acceleration, a parabola in velocity: what is left does not depend on it."""
+    s = np.linspace(0.0, 2.0, 101)
+    pulse, left = np.where(s < 1, np.sin(2 * np.pi * s) ** 3, 0.0) + 0.2 * s, []
+    for drift in (0.0, 0.3 * s ** (2 - order) - 0.4 * s ** (3 - order)):
+        table = np.column_stack([1.0 + s, pulse + drift]).tolist()
+        rows = [f"time_s,of_{'m/s' if order == 1 else 'm/s2'}", *(f"{t},{v}" for t, v in table)]
+        drive = driven(tmp_path, "\n".join(rows), "baseline = true")
+        assert [drive.path(3.0, nu=1), drive.path(3.0)] == pytest.approx([0.0, 0.0], abs=1e-13)
+        left.append(drive.values)
+    assert np.ptp(left[0]) > 0.5  # the pulse stays
+    np.testing.assert_allclose(*left, atol=1e-13)
 
 
 @pytest.mark.parametrize("title", ["acceleration_m/s2", "velocity_m/s"])

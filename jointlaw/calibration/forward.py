@@ -85,9 +85,13 @@ def build(values: Values, settings: Settings, plane: float | None = None) -> Joi
     )
     if math.isinf(v["mating_length"]):
         return mated
-    slopes = {name: v[name] for name in _SLOPES}
-    slopes["mating_length"] = max(v["mating_length"], SHORTEST * mated.closure_range)
-    return replace(mated, resolution=settings.resolution, **slopes)
+    return replace(
+        mated,
+        resolution=settings.resolution,
+        mating_length=max(v["mating_length"], SHORTEST * mated.closure_range),
+        slope_wear=v["slope_wear"],
+        slope_residual=v["slope_residual"],
+    )
 
 
 def build_for_shear(values: Values, settings: Settings, azimuth: float) -> JointLaw:

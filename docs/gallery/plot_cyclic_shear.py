@@ -57,38 +57,3 @@ plt.show()
 
 growth = np.log(lost[1] / lost[0]) / np.log(amplitudes[1] / amplitudes[0])
 print(f"loss ~ amplitude^{growth:.1f} at the smallest, stiffness {stiffness / 1e12} MPa/µm")
-
-# %%
-# Asperities that yield or wear, in six cycles of a rough joint whose slopes fade. An
-# elastic joint repeats itself. One that wears loses strength from cycle to cycle. One that yields
-# is weaker at first, and is compacted at every reversal, each time by less.
-
-rough = replace(jl.presets.load("biegel-rough"), plane=0.0, mating_length=2e-6)
-kinds = {
-    "elastic": rough,
-    "yields beyond 0.1 µm": replace(
-        rough, asperity=replace(rough.asperity, yield_interference=0.1e-6)
-    ),
-    "wears over 100 J/m²": replace(rough, slope_wear=100.0),
-}
-figure, (left, right) = plt.subplots(1, 2, figsize=(7.5, 3.8), layout="constrained")
-peaks = {}
-for label, kind in kinds.items():
-    cycles = jl.direct_shear(kind.joint(), [8e-6, -8e-6] * 6 + [0.0], normal=10e6, steps=steps)
-    ratio = cycles.shear_stress / cycles.F1
-    peaks[label] = [ratio[2 * steps * k : 2 * steps * (k + 1)].max() for k in range(6)]
-    style = {"ls": "--", "zorder": 3} if label == "elastic" else {}
-    for first, strong in ((0, 0.35), (10 * steps, 1.0)):  # the first cycle pale, the last one full
-        cycle = slice(first, first + 2 * steps + 1)
-        (line,) = left.plot(cycles.shear[cycle] * 1e6, ratio[cycle], alpha=strong, **style)
-        style["color"] = line.get_color()
-    travel = np.cumsum(np.abs(np.diff(cycles.shear, prepend=0.0)))
-    right.plot(travel * 1e6, (cycles.closure - cycles.closure[0]) * 1e6, label=label, **style)
-    print(f"{label}: largest F2/F1 of each cycle {np.round(peaks[label], 3)}")
-left.set_xlabel("shear displacement (µm)")
-left.set_ylabel("shear over normal stress")
-left.set_title("first cycle pale, last one full")
-right.set_xlabel("distance sheared (µm)")
-right.set_ylabel("closure since seating (µm)")
-right.legend(loc="center right")
-plt.show()

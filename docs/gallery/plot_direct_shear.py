@@ -52,4 +52,4 @@ for label, record in records.items():
 
 # %%
 # Dilation without end is a property of the paper's model, in which asperity pairs stay together for
-# ever; the example *Metres of shear* ends it.
+# ever; a mating length ends it (example *Mated, sheared, mated again*).

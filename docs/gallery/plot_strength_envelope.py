@@ -14,8 +14,8 @@ import numpy as np
 import jointlaw as jl
 
 # %%
-# The contacts of lapped Westerly granite, on inclinations up to 30 degrees. Contacts are renewed
-# after 2 µm of sliding, so that shear becomes steady.
+# The contacts of lapped Westerly granite, on inclinations up to 30 degrees. Slopes fade
+# over 2 µm of slip, so that shear becomes steady.
 
 base = replace(
     jl.presets.load("westerly-smooth"), orientation=jl.Orientation(3.0), plane=0.0,

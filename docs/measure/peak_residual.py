@@ -1,4 +1,4 @@
-"""Peak and residual shear stress of sandstone joints: four parameters, fitted to three.
+"""Peak and residual shear stress of sandstone joints: a law fitted to three tests.
 
     python docs/measure/peak_residual.py
 
@@ -26,12 +26,7 @@ MEASURED = {
 }
 FITTED = (1.0, 3.0, 5.0)
 # K (Pa m^(-1/2)) stands for K times the density, which shear tests cannot tell apart
-START = {
-    "K": 3e6,
-    "a": 3.0,
-    "mu": 0.5,
-    "mating_length": 5e-3,
-}
+START = {"K": 3e6, "a": 3.0, "mu": 0.5, "mating_length": 5e-3}
 WEIGHTS = np.array([1.0, 0.25, 1.0])  # a peak is flat: its displacement scatters most
 MOVED = 0.01  # change of any figure that the data would not show
 
@@ -41,9 +36,7 @@ def law(x: np.ndarray) -> jl.JointLaw:
     v = dict(zip(START, np.exp(x).tolist(), strict=True))
     return jl.JointLaw(
         orientation=jl.Orientation(v["a"]),
-        asperity=jl.Asperity(
-            v["K"], 1.17, 0.5, v["mu"],
-        ),
+        asperity=jl.Asperity(v["K"], 1.17, 0.5, v["mu"]),
         asperity_density=1e6, closure_range=1e-3, resolution=jl.Resolution(5, 3, 2), plane=0.0,
         mating_length=v["mating_length"],
     )  # fmt: skip
@@ -72,7 +65,8 @@ def misfit(x: np.ndarray, normals: tuple[float, ...] = FITTED) -> np.ndarray:
 def main() -> None:
     start = np.log(list(START.values()))
     found = least_squares(misfit, start, bounds=(start - 3, start + 3), diff_step=1e-3, xtol=1e-6)
-    print(", ".join(f"{n} = {v:.4g}" for n, v in zip(START, np.exp(found.x), strict=True)))
+    fitted = ", ".join(f"{n} = {v:.4g}" for n, v in zip(START, np.exp(found.x), strict=True))
+    print(f"{fitted}; rms of the weighted misfit {np.sqrt(np.mean(found.fun**2)):.4f}")
     rows = []
     for normal, measured in MEASURED.items():
         stress = shear(found.x, normal)

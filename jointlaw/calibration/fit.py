@@ -30,12 +30,13 @@ AT_BOUND = 1e-6  # of the distance of the bounds
 
 OTHER = (
     "Neighbouring points deviate to the same side. Use the law with this error between the points, "
-    "and not beyond them. A shear curve that falls after its peak needs wear: let mating_length "
-    "and slope_wear be free too. Closure of mated joints may follow a hyperbola better."
+    "and not beyond them. A shear curve that falls after its peak needs a mating_length, cycles "
+    "that lose dilation need slope_wear: let them be free too. Closure of mated joints may follow "
+    "a hyperbola better."
 )
 TOO_MANY = (
-    "These data do not fix that many parameters. Hold {}, at values that you know (--set {}=VALUE) "
-    "or by leaving them out of --free: then the data fix the others."
+    "These data do not fix so many parameters. Hold {}: give what you know (--set {}=VALUE), or "
+    "leave it out of --free. Then the data fix the others."
 )
 NO_COMPLIANCE = (
     "No compliance of rock and machine was given: if the closure was measured across rock too, the "
@@ -89,8 +90,11 @@ class Fit:
     def at_bound(self) -> tuple[str, ...]:
         """Fitted parameters that the fit left at a bound: the data ask for what no law has."""
         low, high = self.problem.bounds()
-        gap = np.minimum(self.solution.x - low, high - self.solution.x)
-        return tuple(n for n, g in zip(self.free, gap / (high - low), strict=True) if g < AT_BOUND)
+        gap = np.minimum(self.solution.x - low, high - self.solution.x) / (high - low)
+        if "mating_length" in self.free:  # of which the closure range is a bound too
+            short = self.law.mating_length > (1 + AT_BOUND) * self.parameters["mating_length"]
+            gap[self.free.index("mating_length")] *= not short
+        return tuple(name for name, g in zip(self.free, gap, strict=True) if g < AT_BOUND)
 
     @cached_property
     def too_many(self) -> tuple[str, ...]:
@@ -206,8 +210,9 @@ class Fit:
         ]
         rows = zip(self.problem.curves, self.solution.noise, self.systematic_misfit, strict=True)
         for k, (curve, noise, misfit) in enumerate(rows, 1):
+            points = (curve.stress if isinstance(curve, ClosureCurve) else curve.shear).size
             lines.append(
-                f"| {k} | {curve.steepness.size} | {100 * noise.share:.2g} % | "
+                f"| {k} | {points} | {100 * noise.share:.2g} % | "
                 f"{1e6 * noise.absolute:.2g} | {100 * misfit:.2g} % |"
             )
         lines += self._peaks()
@@ -327,8 +332,8 @@ def fit_curves(
     ----------
     curves: at least one, `ShearCurve` and at most one `ClosureCurve`.
     free: parameters to fit, of alpha, beta (m), overlap (m), asperity_density (1/m2),
-        K (Pa m^(1-eta)), lam, eta, mu, a, b, c, yield_interference (m), mating_length (m),
-        slope_wear (J/m2), slope_residual. Positive ones are fitted as logarithms. A
+        K (Pa m^(1-eta)), lam, eta, mu, a, b, c, yield_interference (m), mating_length
+        (m), slope_wear (J/m2), slope_residual. Positive ones are fitted as logarithms. A
         closure curve that does not begin at zero stress adds its seating closure (m).
     fixed: values of parameters that are known otherwise, such as alpha from a scan, in SI units.
     law: values of all parameters that are not free, `mating_length` among them; None takes rock

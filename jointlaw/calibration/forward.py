@@ -11,7 +11,7 @@ from scipy import special
 from ..discretisation.facets import facets
 from ..discretisation.first_loading import facet_sum, yield_sum
 from ..discretisation.virgin_curve import exact_force
-from ..law import JointLaw
+from ..law import SHORTEST, JointLaw
 from ..parameters.asperity import Asperity
 from ..parameters.heights import GammaHeights
 from ..parameters.orientation import Orientation
@@ -27,7 +27,10 @@ DEFAULTS = {
     "yield_interference": math.inf, "mating_length": math.inf, "slope_wear": math.inf,
     "slope_residual": 0.0,
 }  # fmt: skip
-STEPS = 50  # of the way of a shear test to begin with; a fit halves them while that matters
+STEPS = 40  # that shear a joint to begin with; a fit halves them while that matters
+
+
+_SLOPES = ("mating_length", "slope_wear", "slope_residual")
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,7 @@ class Settings:
     closure_range: Any = None  # m
     plane: float | None = None  # of the law to be found; every shear curve has its own
     closure_only: bool = False
-    steps: int = STEPS  # of the way of a shear test, at least
+    steps: int = STEPS  # that shear a joint the whole way, see `ShearCurve.sheared`
 
 
 def parameters(law: JointLaw) -> tuple[dict[str, float], Settings]:
@@ -52,8 +55,7 @@ def parameters(law: JointLaw) -> tuple[dict[str, float], Settings]:
     values = DEFAULTS | {
         "asperity_density": law.asperity_density, "K": p.K, "lam": p.lam, "eta": p.eta, "mu": p.mu,
         "a": o.a, "b": o.b, "c": o.c, "yield_interference": p.yield_interference,
-        "mating_length": law.mating_length, "slope_wear": law.slope_wear,
-        "slope_residual": law.slope_residual,
+        **{name: getattr(law, name) for name in _SLOPES},
     }  # fmt: skip
     kept = ("resolution", "closure_range", "plane", "closure_only")
     settings = Settings(has_heights=h is not None, **{name: getattr(law, name) for name in kept})
@@ -66,9 +68,12 @@ def parameters(law: JointLaw) -> tuple[dict[str, float], Settings]:
 
 
 def build(values: Values, settings: Settings, plane: float | None = None) -> JointLaw:
-    """The law of these parameters; `plane` restricts it to motion at that azimuth (rad)."""
+    """The law of these parameters; `plane` restricts it to motion at that azimuth (rad).
+
+    A mating length shorter than a law can have is raised to the shortest.
+    """
     v = values
-    return JointLaw(
+    mated = JointLaw(
         orientation=Orientation(v["a"], v["b"], v["c"]),
         asperity=_asperity(v),
         heights=_heights(v, settings),
@@ -76,10 +81,16 @@ def build(values: Values, settings: Settings, plane: float | None = None) -> Joi
         resolution=settings.resolution,
         plane=plane,
         closure_range=settings.closure_range,
-        mating_length=v["mating_length"],
+        closure_only=settings.closure_only,
+    )
+    if math.isinf(v["mating_length"]):
+        return mated
+    return replace(
+        mated,
+        resolution=settings.resolution,
+        mating_length=max(v["mating_length"], SHORTEST * mated.closure_range),
         slope_wear=v["slope_wear"],
         slope_residual=v["slope_residual"],
-        closure_only=settings.closure_only,
     )
 
 

@@ -21,6 +21,7 @@ SHEAR_NOISE = 0.02  # of the largest shear stress
 FACTOR = 4.0  # 95 % range of a level about the expected one, either way
 _SD = np.log(FACTOR) / 1.96
 _GRID = np.linspace(-3.2, 3.2, 33)
+FINEST = 0.002  # of the whole way: the first step of shear, and the first after a turn
 _TURN = 0.2  # of the stress at a peak: what falls or rises less is scatter
 _FOOT = 0.05  # of the largest stress: likewise, where the stress is small
 
@@ -167,41 +168,45 @@ class ShearCurve:
         known = self.noise is not None
         share = more_than("noise", self.noise, 0.0) if known else SHEAR_NOISE
         set_(self, "expected", Noise(share, 0.0, known))
-        set_(self, "steepness", np.zeros(shear.size))  # the displacement is taken as exact
+        set_(self, "steepness", np.zeros(shear.size + 1))  # the displacement is taken as exact
 
     def sheared(self, law: JointLaw, steps: int = STEPS) -> tuple[Array, Array, NDArray[np.intp]]:
         """The test by a law: way (m) and shear stress (Pa), (rows,) each, and the points' rows.
 
-        steps: no step is longer than the whole way over this number, and each ends at a point or
-        within the interval between two.
+        Every step ends at a point or within the interval between two. The steps grow with the
+        distance from where shear began or turned: `steps` of them, the shortest `FINEST` of the
+        whole way, take the joint that far.
         """
-        ends = np.concatenate([[0.0], self.shear])
-        way = np.abs(np.diff(ends))
-        parts = np.maximum(np.ceil(steps * way / way.sum()), 1).astype(int)
-        rows = np.cumsum(parts)
-        path = np.interp(np.arange(rows[-1]) + 1, np.concatenate([[0], rows]), ends)
-        record = direct_shear(
-            law.joint(), path.tolist(), self.normal, azimuth=self.azimuth, steps=1
-        )
-        return record.shear, record.shear_stress, rows
+        grid = float(np.sum(np.abs(np.diff(self.shear)))) * np.geomspace(FINEST, 1.0, steps)
+        path, rows, start = [0.0], [], 0.0
+        turns = np.flatnonzero(np.diff(np.sign(np.diff(self.shear, prepend=0.0)))) + 1
+        for leg in np.split(self.shear, turns):
+            sense, points = np.sign(leg[-1] - start), np.abs(leg - start)
+            way = np.unique(np.concatenate([grid[grid < points[-1]], points]))
+            rows += (len(path) + np.searchsorted(way, points)).tolist()
+            path += (start + sense * way).tolist()
+            start = path[-1]
+        record = direct_shear(law.joint(), path[1:], self.normal, azimuth=self.azimuth, steps=1)
+        return record.shear, record.shear_stress, np.array(rows)
 
     def predict(self, law: JointLaw, steps: int = STEPS) -> Array:
-        """Shear stress (Pa) of a law at the points of this test, (n,); steps: as in `sheared`.
-
-        At the point of the largest measured stress it is the largest of the law between the two
-        neighbouring points: the peak of a law need not lie at a displacement that was measured.
-        """
+        """Shear stress (Pa) of a law at the points of this test, (n,); steps: as in `sheared`."""
         _, stress, rows = self.sheared(law, steps)
-        model, top = stress[rows], int(np.argmax(np.abs(self.shear_stress)))
-        sense = np.sign(self.shear_stress[top])
-        near = stress[rows[max(top - 1, 0)] : rows[min(top + 1, rows.size - 1)] + 1]
-        model[top] = sense * np.max(sense * near)
-        return np.asarray(model)
+        return stress[rows]
 
     def residuals(self, values: Values, settings: Settings) -> Array:
-        """(model - measured)/largest measured, (n,)."""
-        model = self.predict(build_for_shear(values, settings, self.azimuth), settings.steps)
-        return np.asarray((model - self.shear_stress) / np.max(np.abs(self.shear_stress)))
+        """(model - measured)/largest measured, (n + 1,).
+
+        Last stands how far the law rises above its stress at the largest measured one before the
+        next points on both sides: few points say by it that the peak lies there.
+        """
+        law = build_for_shear(values, settings, self.azimuth)
+        _, stress, rows = self.sheared(law, settings.steps)
+        top = int(np.argmax(np.abs(self.shear_stress)))
+        near = stress[rows[max(top - 1, 0)] : rows[min(top + 1, rows.size - 1)] + 1]
+        rise = np.max(np.sign(self.shear_stress[top]) * (near - stress[rows[top]]))
+        misfit = np.append(stress[rows] - self.shear_stress, rise)
+        return np.asarray(misfit / np.max(np.abs(self.shear_stress)))
 
 
 def first_loading(stress: ArrayLike, closure: ArrayLike) -> tuple[Array, Array]:

@@ -48,7 +48,7 @@ TRANSFORMS = {
     "c": Transform("1", -0.5, 0.5, log=False),
     "yield_interference": Transform("m", 1e-12, 1.0),
     "mating_length": Transform("m", 1e-12, 1e3),
-    "slope_wear": Transform("J/m2", 1e-9, 1e15),
+    "slope_wear": Transform("J/m2", 1e-6, 1e12),
     "slope_residual": Transform("1", 0.0, 1.0, log=False),
     "seating": Transform("m", 1e-12, 1.0),
     # combinations that priors are stated for, see `quantity`

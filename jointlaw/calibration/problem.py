@@ -26,9 +26,9 @@ Curves = Sequence[ClosureCurve | ShearCurve]
 ROUNDS = 12  # at most, of fitting and estimating the noise in turn
 NOISE_WEIGHT = 4.0  # degrees of freedom that the expectation of the noise is worth
 OF_CLOSURE = ("alpha", "beta", "overlap", "asperity_density", "K", "yield_interference", "seating")
-# Critical slips to try, as shares of the longest way sheared: far from the measured one the misfit
+# Mating lengths to try, as shares of the longest way sheared: far from the measured one the misfit
 # is flat, and no descent comes back
-SLIPS = (0.5, 0.15, 0.05, 0.015)
+LENGTHS = (0.5, 0.15, 0.05, 0.015)
 Function = Callable[[Array], Array]
 
 
@@ -143,14 +143,9 @@ def pose(
     build(values, settings)  # raises for values that no law has
     if not settings.has_heights and {"alpha", "beta", "overlap"} & set(names):
         raise ValueError("free: this law has no heights to fit; give it GammaHeights or law=None")
-    for name in names:  # a length that is infinite by default starts within the curves
+    for name in names:
         if math.isinf(values[name]):
-            closure = name == "yield_interference"
-            values[name] = 0.5 * max(
-                float(np.ptp(one.closure if isinstance(one, ClosureCurve) else one.shear))
-                for one in curves
-                if isinstance(one, ClosureCurve) is closure or len(curves) == 1
-            )
+            values[name] = _within(name, curves)
     for curve in closures:
         values["seating"] = float(np.ptp(curve.closure)) if curve.seating is None else curve.seating
         if curve.seating is None:
@@ -162,6 +157,19 @@ def pose(
 
 
 # -------------------------------------------------------------------------- where to start
+
+
+def _within(name: str, curves: Curves) -> float:
+    """Where a parameter starts that is infinite by default: at half of what the tests reach."""
+    closed = [float(np.ptp(one.closure)) for one in curves if isinstance(one, ClosureCurve)]
+    sheared = [one for one in curves if isinstance(one, ShearCurve)]
+    reach = [float(np.ptp(one.shear)) for one in sheared]
+    if name == "slope_wear":
+        reach = [
+            float(np.max(np.abs(one.shear_stress)) * np.sum(np.abs(np.diff(one.shear))))
+            for one in sheared
+        ]
+    return 0.5 * max(closed if name == "yield_interference" and closed else reach or closed)
 
 
 def starting_points(problem: Problem, near: bool) -> list[Array]:
@@ -191,17 +199,17 @@ def staged(problem: Problem, starts: list[Array]) -> list[Array]:
     """
     shears = tuple(curve for curve in problem.curves if isinstance(curve, ShearCurve))
     closure = problem.closure
-    finds_slip = "mating_length" in problem.free
-    if not shears or (len(starts) == 1 and not finds_slip):
+    finds_length = "mating_length" in problem.free
+    if not shears or (len(starts) == 1 and not finds_length):
         return starts
     values, rest = [problem.unpack(x) for x in starts], problem.free
     mine = tuple(n for n in rest if n in OF_CLOSURE)
     if closure is not None and mine:
         rest = tuple(n for n in rest if n not in mine)
         values = [_best(replace(problem, curves=(closure,), free=mine), values)]
-    if finds_slip:
+    if finds_length:
         span = max(float(np.ptp(curve.shear)) for curve in shears)
-        values = [v | {"mating_length": share * span} for v in values for share in SLIPS]
+        values = [v | {"mating_length": share * span} for v in values for share in LENGTHS]
     if rest:
         values = [_best(replace(problem, curves=shears, free=rest, values=values[0]), values)]
     return [problem.pack_scaled(values[0])]

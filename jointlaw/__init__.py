@@ -18,6 +18,7 @@ from .law import JointLaw
 from .paper import closed_form
 from .paper.secant import secant
 from .parameters.asperity import Asperity
+from .parameters.bond import Bond
 from .parameters.heights import GammaHeights, Heights
 from .parameters.orientation import Orientation
 from .parameters.resolution import Resolution
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Asperity",
+    "Bond",
     "GammaHeights",
     "Heights",
     "Joint",

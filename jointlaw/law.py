@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import InitVar, dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .discretisation.facets import Facets, facets
 from .discretisation.first_loading import FirstLoading, facet_sum
@@ -20,13 +20,16 @@ from .joints.batch import JointBatch
 from .joints.crushed import warn_if_crushed
 from .joints.joint import Joint
 from .joints.time_step import largest_stiffness, stable_step
+from .kernels.bond import hold
 from .kernels.engine import step_states
+from .kernels.unmated import unmated_start
 from .parameters import keys, toml
 from .parameters.asperity import Asperity
+from .parameters.bond import Bond
 from .parameters.fingerprint import fingerprint
 from .parameters.heights import GammaHeights, HeightDistribution, Heights
 from .parameters.orientation import Orientation
-from .parameters.resolution import LOSS_REMOVED, NAMED, Resolution, resolve
+from .parameters.resolution import LOSS_REMOVED, NAMED, SLIP_REMOVED, Resolution, resolve
 from .support.checks import Array, finite, more_than, number
 from .support.thresholds import UNDERFLOW
 
@@ -34,6 +37,8 @@ if TYPE_CHECKING:
     from .accuracy.tradeoff import Tradeoff
 
 DEFAULT_STRESS = 20e6  # Pa; its closure is the default closure_range
+SHORTEST = 0.1  # closure ranges: asperities of a smaller mating length are lower than the closure
+FARTHEST = 1e150  # mating lengths of slip: beyond it squares of the distance overflow
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,15 +55,19 @@ class JointLaw:
         normal force stays exact. None takes the closure at 20 MPa without yielding, by the
         orientations of "balanced" whatever the resolution.
     resolution: "fast", "balanced", "fine", "reference" or a `Resolution`. A name becomes the
-        `Resolution` that suits critical_slip over closure_range (docs/accuracy.md); where
+        `Resolution` that suits mating_length over closure_range (docs/accuracy.md); where
         `replace` changes these, give it the name again.
     plane: None for motion in 3-D, or the azimuth (rad) of the one plane in which the joint moves:
         vectors then have two components, closure and shear along the plane. The traction across
         the plane, which is zero only for c = 0 or on a symmetry axis, is dropped.
     closure_only: True for a joint that only opens and closes: vectors then have one component, the
         closure. Exact, whatever c, for all azimuths then share one motion.
-    critical_slip: D_c (m), > 0: sliding that renews the asperity contacts, so that friction and
-        dilation settle. Infinite (off) by default.
+    mating_length: distance (m) from the mated position over which slopes fade, and dilation and
+        friction with them, >= 0.1 closure_range. Infinite by default: dilation never ends.
+    slope_wear: work of friction (J/m2) that wears slopes down by a factor e, > 0; with a finite
+        mating_length. Infinite (no wear) by default.
+    slope_residual: share of the slopes that never wears, 0 to 1.
+    bond: cohesion and tension beside the asperities, or None for a joint without.
 
     Raises ValueError when a parameter is out of bounds or the virgin curve is not convex.
     """
@@ -71,10 +80,16 @@ class JointLaw:
     resolution: Resolution = field(default="balanced")  # type: ignore[assignment]
     plane: float | None = None
     closure_only: bool = False
-    critical_slip: float = math.inf
+    mating_length: float = math.inf
+    slope_wear: float = math.inf
+    slope_residual: float = 0.0
+    bond: Bond | None = None
+    critical_slip: InitVar[Any] = None  # of former versions
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, critical_slip: Any) -> None:
         set_ = object.__setattr__
+        if critical_slip is not None:
+            raise ValueError(f"critical_slip is removed: {SLIP_REMOVED}")
         for name, kind in (("orientation", Orientation), ("asperity", Asperity)):
             if not isinstance(value := getattr(self, name), kind):
                 raise ValueError(f"{name} = {value!r} must be of type {kind.__name__}")
@@ -83,6 +98,8 @@ class JointLaw:
                 f"heights = {self.heights!r} must be GammaHeights, Heights or None; a histogram in "
                 "Heights stands for any other distribution"
             )
+        if not isinstance(self.bond, Bond | None):
+            raise ValueError(f"bond = {self.bond!r} must be of type Bond, or None")
         set_(self, "asperity_density", more_than("asperity_density", self.asperity_density, 0.0))
         asked: str | Resolution = self.resolution
         set_(self, "resolution", resolve(asked))
@@ -94,45 +111,69 @@ class JointLaw:
             raise ValueError(
                 f"plane = {self.plane!r}: a joint with closure_only does not shear; leave plane out"
             )
-        set_(
-            self,
-            "critical_slip",
-            more_than("critical_slip", self.critical_slip, 0.0, infinite=True),
-        )
-        if self.critical_slip < UNDERFLOW:
+        for name in ("mating_length", "slope_wear"):
+            set_(self, name, more_than(name, getattr(self, name), 0.0, infinite=True))
+        set_(self, "slope_residual", number("slope_residual", self.slope_residual))
+        if not 0.0 <= self.slope_residual <= 1.0:
             raise ValueError(
-                f"critical_slip = {self.critical_slip!r} m is out of bounds: it must be >= "
-                f"{UNDERFLOW:g}"
+                f"slope_residual = {self.slope_residual!r} is out of bounds: it is a share, 0 to 1"
+            )
+        if self.slope_wear < math.inf and math.isinf(self.mating_length):
+            raise ValueError(
+                f"slope_wear = {self.slope_wear!r} J/m2 needs a finite mating_length (m): give it"
             )
         with np.errstate(all="ignore"):  # a result that is not finite is refused below
             if self.closure_range is None:
                 set_(self, "closure_range", self._default_range())
             set_(self, "closure_range", more_than("closure_range", self.closure_range, 0.0))
-            lengths = self.critical_slip, self.asperity.yield_interference, self.closure_range
+            lengths = self.mating_length, self.asperity.yield_interference, self.closure_range
             set_(self, "resolution", resolve(asked, *lengths))
             self._require_numbers(self.closure_range)  # and check the virgin curve
+        if self.mating_length < SHORTEST * self.closure_range:
+            raise ValueError(
+                f"mating_length = {self.mating_length!r} m is out of bounds: it must be >= "
+                f"{SHORTEST} closure_range = {SHORTEST * self.closure_range:.4g} m, for asperities "
+                "as short as that are lower than the closure; raise it, or lower closure_range"
+            )
 
     # ----------------------------------------------------------------- joints
 
-    def joint(self, normal_stress: float = 0.0) -> Joint:
+    def joint(self, normal_stress: float = 0.0, mated: bool = True) -> Joint:
         """One joint of this law, unsheared, closed to `closure(normal_stress)` (Pa, >= 0).
 
-        The stress is met to rounding, by asperities that yield to about 0.1 %. Raises ValueError as
-        `closure` does.
+        The stress is met to rounding, by asperities that yield to about 0.1 %. Without `mated`
+        its faces have never met: it starts at first touch, 100 mating lengths from the mated
+        position along axis 2 (`unmated_start`). Raises ValueError as `closure` does, for an unmated
+        joint with an infinite mating length, and for one that is to be closed already.
         """
         joint = Joint(self)
+        if not mated:
+            self._require_open(normal_stress)
+            joint.reset(mated=False)
         if normal_stress != 0.0:
             joint.update(np.eye(self.dim)[0] * self.closure(normal_stress), tangent=False)
             warn_if_crushed(self, joint.delta[0])
         return joint
 
-    def joints(self, n: int, ledger: bool = True, normal_stress: ArrayLike = 0.0) -> JointBatch:
-        """A batch of n joints of this law, advanced together; closed as `joint` is.
+    def joints(
+        self,
+        n: int,
+        ledger: bool = True,
+        normal_stress: ArrayLike = 0.0,
+        mated: bool | NDArray[np.bool_] = True,
+    ) -> JointBatch:
+        """A batch of n joints of this law, advanced together; they start as `joint` does.
 
-        normal_stress: one for all or (n,), in Pa. Without `ledger` dissipated energy is not added
-        up, which is faster.
+        normal_stress: one for all or (n,), in Pa; mated: for all or (n,). Without `ledger`
+        dissipated energy is not added up, which is faster.
         """
         batch = JointBatch(self, n, ledger)
+        if not np.all(mated):
+            self._require_open(normal_stress)
+            far = ~np.asarray(mated, bool)
+            if far.shape not in ((), (n,)):
+                raise ValueError(f"mated has shape {far.shape}: give one truth or ({n},)")
+            batch.reset(np.flatnonzero(np.broadcast_to(far, n)), mated=False)
         if np.any(normal_stress):
             closure = np.asarray(self.closure(normal_stress))
             if closure.shape not in ((), (n,)):
@@ -170,6 +211,15 @@ class JointLaw:
         return self.tables.dim
 
     @property
+    def unmated_start(self) -> Array:
+        """`delta` (dim,) in m of a joint whose faces have never met, at first touch.
+
+        Closure is counted from the mated position, where the highest asperities face the deepest
+        hollows: this one is negative. Raises ValueError for an infinite mating length.
+        """
+        return unmated_start(self.tables)
+
+    @property
     def state_size(self) -> int:
         """Numbers of state of one joint, as `step` takes them and a snapshot holds them."""
         return self.tables.rows
@@ -180,9 +230,14 @@ class JointLaw:
         """Normal stress (Pa) of a joint closed from zero to `closure` (m), unsheared.
 
         With a yield_interference that of the first loading, of infinitely many depth cells: a
-        joint's own few slip a little later.
+        joint's own few slip a little later. A bond makes it negative where the joint opens.
         """
-        return self._first_loading.stress(self._within_reach(closure))[()]
+        y = self._within_reach(closure)
+        stress = self._first_loading.stress(y)
+        if self.bond is not None:
+            opening = hold(self.bond, y.reshape(1, -1), np.zeros(y.size))
+            stress = stress + opening.F.reshape(y.shape)
+        return stress[()]
 
     def closure(self, normal_stress: ArrayLike) -> Any:
         """Closure (m) at which the normal stress (Pa, >= 0) is reached: inverse of the above.
@@ -216,17 +271,17 @@ class JointLaw:
     def max_stiffness(self, closure: ArrayLike, shear: ArrayLike = 0.0) -> Any:
         """Upper bound of `|C|` (Pa/m) up to this closure (m) and this shear displacement (m, >= 0).
 
-        The shear may have any direction, and counts up to critical_slip. Yielded and worn joints
-        are less stiff.
+        The shear is the largest distance from the mated position, in any direction. Yielded and
+        worn joints, and those of a broken bond, are less stiff.
         """
         y, way = self._within_reach(closure), finite("shear", shear, "m")
         if not (way >= 0).all():
             raise ValueError(f"shear = {shear!r} m is out of bounds: it must be >= 0")
-        rise = np.minimum(way, self.critical_slip)[..., None] * np.linalg.norm(
-            self.tables.m[1:], axis=0
-        )
+        climbed = way / np.hypot(1.0, way / self.mating_length)
+        rise = climbed[..., None] * np.linalg.norm(self.tables.m[1:], axis=0)
         self._within_reach(y + np.max(rise, axis=-1))
-        return largest_stiffness(self.tables, y, rise)[()]
+        bond = 0.0 if self.bond is None else self.bond.largest_stiffness
+        return (largest_stiffness(self.tables, y, rise) + bond)[()]
 
     def critical_time_step(
         self, mass: ArrayLike, area: ArrayLike, closure: ArrayLike, shear: ArrayLike = 0.0
@@ -271,7 +326,7 @@ class JointLaw:
 
         tolerance: largest error of the traction on a path, as a share of the path's largest
         traction, > 0: 0.01 is one per cent. Held with a margin on the standard paths and on 128
-        random ones within the law's closure range, and under slip to three critical slips, or 30
+        random ones within the law's closure range, and under slip to three mating lengths, or 30
         closure ranges, where friction is mobilised (`jointlaw.accuracy.suite`); nothing is timed,
         so the answer is the same on every machine. Takes seconds to a minute, below 0.01 minutes,
         without the compiled kernel more.
@@ -303,13 +358,15 @@ class JointLaw:
         r = self.resolution
         return tables(
             self.facets, self.curve, self.asperity, self.asperity_density,
-            self.closure_range, r.depth, self.critical_slip,
+            self.closure_range, r.depth, self.mating_length, self.slope_wear, self.slope_residual,
+            self.bond,
         )  # fmt: skip
 
     @cached_property
     def largest_reach(self) -> float:
         """Effective closure (m) up to which forces, energies and their squares stay finite."""
-        return largest_reach(self.curve, self._scale, self.facets.theta, self.asperity)
+        reach = largest_reach(self.curve, self._scale, self.facets.theta, self.asperity)
+        return min(reach, FARTHEST * self.mating_length)
 
     @cached_property
     def fingerprint(self) -> str:
@@ -350,6 +407,13 @@ class JointLaw:
                 f"asperity_density = {self.asperity_density:g} per m2 give forces that are too "
                 f"{'small' if weak else 'large'} for floating point within closure_range = "
                 f"{closure_range:g} m; check the units"
+            )
+
+    def _require_open(self, normal_stress: ArrayLike) -> None:
+        if np.any(normal_stress):
+            raise ValueError(
+                f"normal_stress = {normal_stress!r} with mated=False: an unmated joint starts at "
+                "first touch; close it by update, or by a laboratory test such as direct_shear"
             )
 
     def _within_reach(self, closure: ArrayLike) -> Array:

@@ -35,6 +35,7 @@ def virgin_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
         # no eigenvalue of its own: (kn, 0; mu kn, 0) has kn and 0. K is ks, lam K is kn.
         p = law.asperity
         stiffness = np.full(len(closure), max(1.0, p.lam) * p.K * law.asperity_density)
+        stiffness += 0.0 if law.bond is None else law.bond.largest_stiffness
     return {"closure": closure, "stress": stress, "stiffness": stiffness, "work": work}
 
 
@@ -42,7 +43,8 @@ class Joints:
     """All joints of a scene. After `assign`, arrays run over the k contacts given.
 
     delta (k, 2) in m: closure and sliding; traction (k, 2) in Pa; sliding, slipping, separated
-    (k,): shares of their shear capacity; stored, lost (k,) in J/m2.
+    (k,): shares of their shear capacity; stored, lost (k,) in J/m2; damage (k,) of their bonds, 1
+    where there is none.
 
     The scene's `reduction` F divides the shear stress of every joint and multiplies the sliding at
     which it has it. So tan(friction angle), tan(dilation angle) and cohesion are divided by F, and
@@ -98,12 +100,13 @@ class Joints:
     def measure(self) -> None:
         """Read what the batches hold by now."""
         self.delta = np.zeros((self.n, 2))
-        shares = np.zeros((5, self.n))
+        shares = np.zeros((6, self.n))
         for name, rows, places in self.groups:
             batch, here = self.pools[name].batch, slice(None) if places is None else places
             self.delta[rows] = batch.delta[here] * self.reduction
-            shares[:, rows] = np.array([*batch.measures()[:4], batch.dissipated_energy])[:, here]
-        self.sliding, self.slipping, self.separated, self.stored, self.lost = shares
+            columns = *batch.measures()[:4], batch.dissipated_energy, batch.damage
+            shares[:, rows] = np.array(columns)[:, here]
+        self.sliding, self.slipping, self.separated, self.stored, self.lost, self.damage = shares
 
     def virgin(self, of: str, by: str, x: np.ndarray) -> np.ndarray:
         """A column of the virgin curves, such as "stress", where another one is x (k,)."""
@@ -116,7 +119,7 @@ class Joints:
     def stiffness(self) -> np.ndarray:
         """Upper bound (k,) of the stiffness at the normal stress of now (Pa/m)."""
         stress = self.traction[:, 0]
-        return self.virgin("stiffness", "stress", stress) * (stress > 0)
+        return self.virgin("stiffness", "stress", stress) * ((stress > 0) | (self.damage < 1))
 
     def renew(self, contact: Identity) -> None:
         """Make the joint of a contact virgin again."""

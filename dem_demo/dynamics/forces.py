@@ -33,9 +33,10 @@ def forces(
 
 
 def _dashpots(scene, blocks, contacts, joints, area, pressed) -> tuple[np.ndarray, np.ndarray]:
-    """Forces (k,) of the dashpots along normal and tangent (N); never a pull."""
+    """Forces (k,) of the dashpots along normal and tangent (N); a pull only where a bond holds."""
     run = scene.run
     critical = blocks.damping(contacts, joints.stiffness * area)
-    push = np.maximum(-run.dashpot_normal * critical * contacts.opening, -pressed)
-    stick = 1.0 - joints.separated - joints.slipping
-    return push, -run.dashpot_shear * critical * np.maximum(stick, 0.0) * contacts.sliding
+    least = np.where(joints.damage < 1, -np.inf, -pressed)
+    push = np.maximum(-run.dashpot_normal * critical * contacts.opening, least)
+    stick = np.maximum(1.0 - joints.separated - joints.slipping, 1.0 - joints.damage)
+    return push, -run.dashpot_shear * critical * stick * contacts.sliding

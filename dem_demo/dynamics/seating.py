@@ -107,7 +107,7 @@ def _equilibrium(joints: Joints, rows: csr_array, start, area, force, settle, ne
             joints.virgin("stress", "closure", part * c) for part in (1.0, 1.01, 0.99)
         )
         slope = (above - below) / (0.02 * c)
-        acts = np.where(d[:k] > 0, 1.0, pull)
+        acts = np.where((d[:k] > 0) | (joints.damage < 1), 1.0, pull)
         F = np.concatenate([stress * acts * np.sign(d[:k]), shear * d[k:]])
         return F, diags(np.concatenate([slope * acts, shear]))
 

@@ -119,7 +119,7 @@ def _joint(sim: Simulation, moving: int, base: int) -> dict[str, float]:
 
 def slip_distance(law: jl.JointLaw) -> float:
     """Sliding (m) that counts as slip: the law's critical slip distance."""
-    return law.critical_slip if np.isfinite(law.critical_slip) else SLIP_DISTANCE
+    return law.mating_length if np.isfinite(law.mating_length) else SLIP_DISTANCE
 
 
 def friction_angle(law: jl.JointLaw, stress: float) -> float:

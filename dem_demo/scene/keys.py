@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from shapely import Polygon
 
-from jointlaw.parameters.keys import Removed
+from jointlaw.parameters.bond import Bond
+from jointlaw.parameters.keys import Removed, checked, keys_of
 from jointlaw.support.checks import at_least, finite, integer, more_than, number, one_of
 
 Tables = dict[str, Any]
@@ -60,6 +61,15 @@ def some_of(name: str, value: Any, names: Iterable[str], count: int | None = Non
     return value
 
 
+def bond(name: str, value: Any) -> Bond:
+    """A rule: the table of a bond."""
+    values = checked(value, keys_of(Bond), name)
+    try:
+        return Bond(**values)
+    except ValueError as error:
+        raise ValueError(f"{name.removesuffix('bond')}{error}") from None
+
+
 ENDS = Removed("joints carry at their two ends; cut a long block in two instead", None)
 AXES = {"x": 0, "y": 1, "turn": 2}
 TEXT, LIST, TABLE = a(str), a(list), a(dict)
@@ -104,7 +114,7 @@ SCENE = {
 }  # fmt: skip
 COULOMB = {
     "kind!": TEXT, "normal_stiffness!": POSITIVE, "shear_stiffness!": POSITIVE,
-    "friction!": partial(at_least, bound=0, infinite=True),
+    "friction!": partial(at_least, bound=0, infinite=True), "bond": bond,
 }  # fmt: skip
 
 

@@ -29,11 +29,13 @@ class Files(dict[str, str]):
         return self.setdefault(name, (self.folder / name).read_text(encoding="utf-8-sig"))
 
 
-def coulomb_law(normal_stiffness: float, shear_stiffness: float, friction: float) -> jl.JointLaw:
+def coulomb_law(
+    normal_stiffness: float, shear_stiffness: float, friction: float, bond: jl.Bond | None = None
+) -> jl.JointLaw:
     """Plain Coulomb friction with constant stiffness, for comparison: level, linear asperities.
 
     normal_stiffness, shear_stiffness: per area, > 0 (Pa/m); friction: coefficient, >= 0, may be
-    infinite. Raises ValueError for others.
+    infinite; bond: cohesion and tension. Raises ValueError for others.
     """
     return jl.JointLaw(
         orientation=jl.Orientation(FLAT),
@@ -41,6 +43,7 @@ def coulomb_law(normal_stiffness: float, shear_stiffness: float, friction: float
         asperity_density=1.0,
         resolution=jl.Resolution(1, 3, 1),
         plane=0.0,
+        bond=bond,
     )
 
 
@@ -73,7 +76,7 @@ def build_law(data: Tables, where: str, files: Files) -> jl.JointLaw:
     if kind == "coulomb":
         keys = checked(data, COULOMB, where)
         require_rock({"friction": keys["friction"]}, f"{where}.")
-        return coulomb_law(keys["normal_stiffness"], keys["shear_stiffness"], keys["friction"])
+        return coulomb_law(**{key: value for key, value in keys.items() if key != "kind"})
     if data.get("closure_only"):
         raise ValueError(f"{where}.closure_only = true: joints between blocks shear; leave it out")
     keys = {key: value for key, value in law_table(data, files).items() if key != "kind"}

@@ -102,6 +102,14 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     pairs = _pairs(top.get("joint", ()), number, blocks, where)
     least = min(smallest_width(block.corners) for block in blocks)
     run = Run(**{"skin": SKIN * least, "corner_length": CORNER * least, **top["run"]})
+    for name, law in laws.items():
+        opening = 0.0 if law.bond is None else 1.0 / law.bond.limits[1][0]
+        if opening > run.skin:
+            raise ValueError(
+                f"{where}: laws.{name}.bond holds until the joint is {opening:.3g} m open, but "
+                f"contacts are followed to run.skin = {run.skin:.3g} m: set a larger run.skin, or "
+                "a smaller energy_I"
+            )
     watched = _watched(top.get("watch", {}), number, blocks, run.skin, f"{where}: watch")
     default = top.get("law", next(iter(laws), ""))
     for law in [default, *pairs.values(), *edge_laws.values()]:

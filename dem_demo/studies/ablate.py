@@ -34,13 +34,11 @@ INGREDIENTS: dict[str, dict[str, Any]] = {  # by name: the keys of a law without
     "no heights": {"heights": None},
     "heights counted one by one": {"heights": SINGLE},
     "linear asperities (eta = 0)": {"asperity": {"eta": 0.0}, "heights": SINGLE},
-    "no friction on asperities": {
-        "asperity": {"mu": 0.0, "mu_residual": None, "wear_slip": np.inf},
-    },
+    "no friction on asperities": {"asperity": {"mu": 0.0}},
     "elastic asperities": {"asperity": {"yield_interference": np.inf}},
     "b = 0": {"orientation": {"b": 0.0}},
     "c = 0": {"orientation": {"c": 0.0}},
-    "no large shear": {"critical_slip": np.inf},
+    "no large shear": {"mating_length": np.inf, "slope_wear": np.inf},
     "one depth cell": {"resolution": {"depth": 1}},
 }
 
@@ -87,7 +85,7 @@ def variants(scene: Scene, record: Record) -> Iterator[tuple[str, Callable[[], S
                if of and not is_coulomb(scene.laws[name])}  # fmt: skip
     lacking: dict[str, dict[str, Any]] = {}
     for law in (scene.laws[name] for name in pressed):
-        names = named(law.critical_slip, law.asperity.yield_interference, law.closure_range)
+        names = named(law.mating_length, law.asperity.yield_interference, law.closure_range)
         given = INGREDIENTS | {
             f"resolution {n}": {"resolution": asdict(names[n])} for n in ("fast", "fine")
         }

@@ -103,18 +103,23 @@ def critical_tilt(scene: Scene, trials: Trials | None = None, name: str = "scene
 
 
 def weakened(scene: Scene, factor: float) -> Scene:
-    """A scene with the strength of all joints divided by a factor."""
-    return replace(scene, reduction=scene.reduction * factor)
+    """A scene with the strength of all joints divided by a factor, bonds in tension as well."""
+    laws = dict(scene.laws)
+    for name, law in laws.items():
+        if bond := law.bond:  # an energy above the elastic one stays above it
+            energy = bond.energy_I and bond.energy_I / factor**2
+            bond = replace(bond, tension=bond.tension / factor, energy_I=energy)
+            laws[name] = replace(law, bond=bond)
+    return replace(scene, laws=laws, reduction=scene.reduction * factor)
 
 
 def smoothed(scene: Scene, factor: float) -> Scene:
     """A scene with the friction of asperities and of plain Coulomb divided by a factor."""
     highest, laws = RANGES["mu"][1], {}  # that a scene may have; what fails with it has no factor
     for name, law in scene.laws.items():
-        given = {key: getattr(law.asperity, key) for key in ("mu", "mu_residual")}
-        weak = {key: min(mu / factor, highest) for key, mu in given.items()
-                if mu is not None and mu < STICKS}  # fmt: skip
-        laws[name] = replace(law, asperity=replace(law.asperity, **weak))
+        mu = law.asperity.mu
+        weak = min(mu / factor, highest) if mu < STICKS else mu
+        laws[name] = replace(law, asperity=replace(law.asperity, mu=weak))
     return replace(scene, laws=laws)
 
 

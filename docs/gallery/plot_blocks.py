@@ -17,7 +17,7 @@ SCENE = """
 title = "A block on its bed"
 [laws.replica]
 asperity_density = 1e4
-critical_slip = 1e-3
+mating_length = 1e-3
 orientation = { a = 4.0, c = 0.3 }
 asperity = { K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }
 heights = { alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }

@@ -63,7 +63,7 @@ print(f"loss ~ amplitude^{growth:.1f} at the smallest, stiffness {stiffness / 1e
 # elastic joint repeats itself. One that wears loses strength from cycle to cycle. One that yields
 # is weaker at first, and is compacted at every reversal, each time by less.
 
-rough = replace(jl.presets.load("biegel-rough"), plane=0.0, critical_slip=2e-6)
+rough = replace(jl.presets.load("biegel-rough"), plane=0.0, mating_length=2e-6)
 asperity = rough.asperity
 kinds = {
     "elastic": asperity,

@@ -2,7 +2,7 @@ r"""
 Metres of shear
 ===============
 
-``critical_slip`` renews the asperity contacts: dilation ends, friction settles, reversal starts it
+``mating_length`` renews the asperity contacts: dilation ends, friction settles, reversal starts it
 anew.
 """
 
@@ -17,7 +17,7 @@ import jointlaw as jl
 # of contacts. Without it the joint rises for ever.
 
 kept = replace(jl.presets.load("biegel-rough"), plane=0.0, resolution="fine")
-renewed = replace(kept, critical_slip=2e-6)
+renewed = replace(kept, mating_length=2e-6)
 turns = (15e-6, 5e-6)
 
 figure, (top, bottom) = plt.subplots(2, 1, figsize=(7, 6), layout="constrained", sharex=True)

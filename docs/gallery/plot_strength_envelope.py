@@ -19,7 +19,7 @@ import jointlaw as jl
 
 base = replace(
     jl.presets.load("westerly-smooth"), orientation=jl.Orientation(3.0), plane=0.0,
-    critical_slip=2e-6,
+    mating_length=2e-6,
 )  # fmt: skip
 normal = np.geomspace(0.1e6, 50e6, 12)  # Pa
 

@@ -47,7 +47,7 @@ def misses(law: jl.JointLaw) -> np.ndarray:
     ways = np.array([(1.0, 0.0, 1.0), (2e6 / stress, 0.0, 1.0)])
     found = np.empty((len(TRIED), len(RATIOS), 4))
     for j, ratio in enumerate(RATIOS):
-        own = replace(law, critical_slip=ratio * R)
+        own = replace(law, mating_length=ratio * R)
         truth = slip(replace(own, resolution=BEST), R, stress, ways)
         there = truth.counts & (np.arange(2 * LEG) < LEG)[:, None]
         back = truth.counts & ~there

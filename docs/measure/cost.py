@@ -137,8 +137,8 @@ def savings(rounds, seconds):
         "no heights, linear asperities: one depth cell": (
             Case(linear), Case(replace(linear, heights=None)),
         ),
-        "no large shear: `critical_slip = inf`": (
-            Case(replace(PLANE, critical_slip=1e-3)), plane,
+        "no large shear: `mating_length = inf`": (
+            Case(replace(PLANE, mating_length=1e-3)), plane,
         ),
         "c = 0": (Case(replace(SPACE, orientation=jl.Orientation(3.0, 0.5, 0.1))), space),
     }  # fmt: skip

@@ -80,7 +80,7 @@ def rock(resolution):
         heights=jl.GammaHeights(alpha=3.82, beta=1.15e-4, overlap=3e-4),
         asperity_density=1e6,
         resolution=resolution,
-        critical_slip=2e-4,
+        mating_length=2e-4,
     )
 
 

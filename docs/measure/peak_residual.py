@@ -32,7 +32,7 @@ START = {
     "mu": 0.5,
     "mu_residual": 0.2,
     "wear_slip": 8e-3,
-    "critical_slip": 5e-3,
+    "mating_length": 5e-3,
 }
 WEIGHTS = np.array([1.0, 0.25, 1.0])  # a peak is flat: its displacement scatters most
 MOVED = 0.01  # change of any figure that the data would not show
@@ -48,7 +48,7 @@ def law(x: np.ndarray) -> jl.JointLaw:
             wear_slip=v["wear_slip"],
         ),
         asperity_density=1e6, closure_range=1e-3, resolution=jl.Resolution(5, 3, 2), plane=0.0,
-        critical_slip=v["critical_slip"],
+        mating_length=v["mating_length"],
     )  # fmt: skip
 
 

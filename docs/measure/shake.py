@@ -37,7 +37,7 @@ def scene(acceleration, name):
 
 def friction(law, stress):
     """Steady friction F2/F1 of the law alone, after ten critical slips at a normal stress (Pa)."""
-    record = jl.direct_shear(law.joint(), to=[10 * law.critical_slip], normal=stress, steps=400)
+    record = jl.direct_shear(law.joint(), to=[10 * law.mating_length], normal=stress, steps=400)
     return float(record.F2[-1] / record.F1[-1])
 
 

@@ -17,7 +17,7 @@ for rule in RULES:
         for name in ("along", "across"):
             law = replace(laws[name], resolution=jl.Resolution(*rule))
             # friction peaks where the contacts begin to be renewed
-            way = [1.2 * law.critical_slip]
+            way = [1.2 * law.mating_length]
             record = jl.direct_shear(law.joint(), to=way, normal=stress, steps=120)
             found.append(f"{record.peak_friction_angle:.2f}")
     rows.append([", ".join(map(str, rule)), *found])

@@ -154,7 +154,7 @@ def draw(count: int, seed: int, plane: bool = False) -> list[Draw]:
     for _ in track(range(count), "random laws", count):
         law = random_law(rng)
         if rng.random() < 0.5:
-            law = replace(law, critical_slip=law.closure_range * 10 ** rng.uniform(0.0, 3.0))
+            law = replace(law, mating_length=law.closure_range * 10 ** rng.uniform(0.0, 3.0))
         law = replace(law, plane=0.0) if plane else law
         found.append((law, misses(law, rng)))
     return found

@@ -1,6 +1,6 @@
 """Slip far beyond the closure: friction and dilation angle at constant normal stress.
 
-The joint is seated and sheared to several critical slips (without one to 30 closure ranges), and
+The joint is seated and sheared to several mating lengths (without one to 30 closure ranges), and
 back by as much. The normal stress is held for every resolution by itself: one and the same path of
 displacement would compare their dilation, summed up over the slip, and not their strength.
 """
@@ -22,16 +22,16 @@ if TYPE_CHECKING:
 LEG = 24  # steps each way
 SHARES = (1.0, 0.1)  # of the normal stress S/2 of the standard paths
 DIRECTIONS = (0.0, 25.0, 90.0)  # degrees, in space
-MOBILISED = 0.2  # of a critical slip, or without one of 10 closure ranges: friction from there on
+MOBILISED = 0.2  # of a mating length, or without one of 10 closure ranges: friction from there on
 _FIRST = 0.1  # first step, in closure ranges
-_FAR, _ENDLESS = 3.0, 30.0  # critical slips; closure ranges without critical slip
+_FAR, _ENDLESS = 3.0, 30.0  # mating lengths; closure ranges without one
 HELD = 1e-5  # of the normal stress
 
 
 class Slip(NamedTuple):
     """F (steps, paths, dim) in Pa, and friction and dilation angle (steps, paths) in degrees.
 
-    `counts` (steps, paths): whether friction is mobilised: beyond 0.2 critical slips, and on the
+    `counts` (steps, paths): whether friction is mobilised: beyond 0.2 mating lengths, and on the
     way back beyond its first fifth and two closure ranges, within which sliders still turn.
     """
 
@@ -47,10 +47,10 @@ class Slip(NamedTuple):
         return float(friction.max()), float(dilation.max())
 
 
-def distance(critical_slip: float, closure_range: float) -> float:
+def distance(mating_length: float, closure_range: float) -> float:
     """How far (m) the paths that slip go."""
-    if math.isfinite(critical_slip):
-        return _FAR * critical_slip
+    if math.isfinite(mating_length):
+        return _FAR * mating_length
     return _ENDLESS * closure_range
 
 
@@ -69,8 +69,8 @@ def random_ways(rng: np.random.Generator, count: int, dim: int) -> Array:
 def slip(law: JointLaw, closure_range: float, stress: float, ways: Array) -> Slip:
     """Shear there and back along `ways` (paths, 3), of which the stress S/2 is in Pa."""
     share, azimuth, length = ways.T
-    dim, R, Dc = law.tables.dim, closure_range, law.tables.critical_slip
-    unit, far = Dc if math.isfinite(Dc) else 10 * R, distance(Dc, R)
+    dim, R, D = law.tables.dim, closure_range, law.tables.mating_length
+    unit, far = D if math.isfinite(D) else 10 * R, distance(D, R)
     places = np.geomspace(_FIRST * min(R, far), far, LEG)[:, None] * length
     leg = np.diff(places, axis=0, prepend=0.0)
     turn = np.radians(azimuth)

@@ -9,7 +9,7 @@ With R the law's closure range and S the normal stress there, the paths are
     re-contact         closed and sheared, opened under shear until it separates, closed again
     walk               a smooth random walk in closure and both shears
     weave              closed five times while the shear crosses itself (in space)
-    far                R/2, shear along 20 degrees to three critical slips, 3 R at most, and back
+    far                R/2, shear along 20 degrees to three mating lengths, 3 R at most, and back
     slip               as far at the stresses S/2 and S/20, held by every resolution itself; errors
                        count where friction is mobilised (`Slip.counts`)
 
@@ -193,7 +193,7 @@ def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]
     shear = legs([0, 0.1, 1], [0, seat, seat], [0, 0, 1])
     back = legs([0, 0.1, 0.35, 0.75, 1], [0, *4 * [seat]], [0, 0, 0.6, -0.6, 0])
     fixed = legs([0, 0.2, 1], [0, 1, 1], [0, 0, 1])
-    sheared = min(distance(law.tables.critical_slip, R) / R, FAR)
+    sheared = min(distance(law.tables.mating_length, R) / R, FAR)
     far = legs([0, 0.1, 0.55, 1], [0, 0.5, 0.5, 0.5], [0, 0, sheared, 0])
     again = legs([0, 0.15, 0.35, 0.6, 0.7, 1], [0, 0.7, 0.7, -0.6, -0.6, 0.8],
                  [0, 0, 0.4, 0.7, 0.2, 0.5])  # fmt: skip
@@ -259,7 +259,7 @@ def far_path(law: JointLaw, rng: np.random.Generator, stress: float, s: Array) -
     """
     R = law.closure_range
     closure = float(law.closure(stress * rng.uniform(0.1, 1.0))) / R
-    way = min(distance(law.tables.critical_slip, R) / R, FAR) * rng.uniform(0.3, 1.0)
+    way = min(distance(law.tables.mating_length, R) / R, FAR) * rng.uniform(0.3, 1.0)
     back, turn = way * rng.uniform(-1.0, 0.5), rng.uniform(0.0, 2.0 * np.pi)
     at = [0.0, 0.1, 0.4, 0.8, 1.0]
     shear = np.interp(s, at, [0.0, 0.0, way, back, way])

@@ -37,7 +37,7 @@ class Price:
     """One resolution: errors are shares of the largest traction (or tangent) of each path.
 
     `error`, `rms` (paths,): of the traction. `friction`, `dilation`: largest misses of the angles
-    (degrees) at constant normal stress, from 0.2 critical slips on. `tangent_rms`, `tangent_max`:
+    (degrees) at constant normal stress, from 0.2 mating lengths on. `tangent_rms`, `tangent_max`:
     of the tangent, over all paths; it jumps between stick and slip, and the largest error is that
     of a jump that comes one step early or late. `ns`, `ns_tangent`: nanoseconds per joint and
     update without and with tangent, no ledger, least of several runs; NaN where nothing was timed.
@@ -195,7 +195,7 @@ def tradeoff(
 ) -> Tradeoff:
     """See `JointLaw.tradeoff`."""
     joints = integer("joints", joints, 0)
-    lengths = law.tables.critical_slip, law.asperity.yield_interference, law.closure_range
+    lengths = law.tables.mating_length, law.asperity.yield_interference, law.closure_range
     names = named(*lengths)
     if resolutions is None:
         resolutions = (*SPREAD, *names.values())

@@ -30,8 +30,8 @@ AT_BOUND = 1e-6  # of the distance of the bounds
 
 OTHER = (
     "Neighbouring points deviate to the same side. Use the law with this error between the points, "
-    "and not beyond them. A shear curve that falls after its peak needs wear: let mu_residual and "
-    "wear_slip be free too. Closure of mated joints may follow a hyperbola better."
+    "and not beyond them. A shear curve that falls after its peak needs wear: let mating_length "
+    "and slope_wear be free too. Closure of mated joints may follow a hyperbola better."
 )
 TOO_MANY = (
     "These data do not fix that many parameters. Hold {}, at values that you know (--set {}=VALUE) "
@@ -192,7 +192,7 @@ class Fit:
                 f"{TRANSFORMS[name].unit} | {100 * share:.0f} % | "
                 f"{'no' if name in left else 'yes'} |"
             )
-        unworn = {"mu_residual"} if np.isinf(values["wear_slip"]) else set()
+        unworn = {"slope_residual"} if np.isinf(values["slope_wear"]) else set()
         held = [n for n in values if n not in {*self.free, *unworn} and np.isfinite(values[n])]
         lines += ["", "Held: " + ", ".join(f"{n} = {values[n]:.4g}" for n in held) + "."]
         lines += ["", "Not fixed by these data:", ""] if left else []
@@ -327,11 +327,11 @@ def fit_curves(
     ----------
     curves: at least one, `ShearCurve` and at most one `ClosureCurve`.
     free: parameters to fit, of alpha, beta (m), overlap (m), asperity_density (1/m2),
-        K (Pa m^(1-eta)), lam, eta, mu, a, b, c, yield_interference (m), mu_residual,
-        wear_slip (m), critical_slip (m). Positive ones are fitted as logarithms. A
+        K (Pa m^(1-eta)), lam, eta, mu, a, b, c, yield_interference (m), mating_length (m),
+        slope_wear (J/m2), slope_residual. Positive ones are fitted as logarithms. A
         closure curve that does not begin at zero stress adds its seating closure (m).
     fixed: values of parameters that are known otherwise, such as alpha from a scan, in SI units.
-    law: values of all parameters that are not free, `critical_slip` among them; None takes rock
+    law: values of all parameters that are not free, `mating_length` among them; None takes rock
         asperities, `forward.DEFAULTS`, of "individual" formation. A law of one plane or of closure
         alone stays one.
     priors: 95 % ranges (low, high) in physical units instead of the defaults of `priors.PRIORS`,

@@ -24,8 +24,8 @@ from .priors import Values
 DEFAULTS = {
     "alpha": 3.7, "beta": 1e-5, "overlap": 0.0, "asperity_density": 1e6, "K": ROCK.K,
     "lam": ROCK.lam, "eta": ROCK.eta, "mu": ROCK.mu, "a": 3.0, "b": 0.0, "c": 0.0,
-    "yield_interference": math.inf, "mu_residual": ROCK.mu, "wear_slip": math.inf,
-    "critical_slip": math.inf,
+    "yield_interference": math.inf, "mating_length": math.inf, "slope_wear": math.inf,
+    "slope_residual": 0.0,
 }  # fmt: skip
 STEPS = 50  # of the way of a shear test to begin with; a fit halves them while that matters
 
@@ -52,8 +52,8 @@ def parameters(law: JointLaw) -> tuple[dict[str, float], Settings]:
     values = DEFAULTS | {
         "asperity_density": law.asperity_density, "K": p.K, "lam": p.lam, "eta": p.eta, "mu": p.mu,
         "a": o.a, "b": o.b, "c": o.c, "yield_interference": p.yield_interference,
-        "mu_residual": p.mu if p.mu_residual is None else p.mu_residual,
-        "wear_slip": p.wear_slip, "critical_slip": law.critical_slip,
+        "mating_length": law.mating_length, "slope_wear": law.slope_wear,
+        "slope_residual": law.slope_residual,
     }  # fmt: skip
     kept = ("resolution", "closure_range", "plane", "closure_only")
     settings = Settings(has_heights=h is not None, **{name: getattr(law, name) for name in kept})
@@ -76,7 +76,9 @@ def build(values: Values, settings: Settings, plane: float | None = None) -> Joi
         resolution=settings.resolution,
         plane=plane,
         closure_range=settings.closure_range,
-        critical_slip=v["critical_slip"],
+        mating_length=v["mating_length"],
+        slope_wear=v["slope_wear"],
+        slope_residual=v["slope_residual"],
         closure_only=settings.closure_only,
     )
 
@@ -139,11 +141,7 @@ def _force(closure: Array, eta: float, heights: GammaHeights | None) -> Array:
 
 
 def _asperity(v: Values) -> Asperity:
-    wears = v["wear_slip"] < math.inf
-    return Asperity(
-        v["K"], v["lam"], v["eta"], v["mu"], v["yield_interference"],
-        min(v["mu_residual"], v["mu"]) if wears else None, v["wear_slip"],
-    )  # fmt: skip
+    return Asperity(v["K"], v["lam"], v["eta"], v["mu"], v["yield_interference"])
 
 
 def _heights(v: Values, settings: Settings) -> GammaHeights | None:

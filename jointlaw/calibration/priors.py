@@ -47,9 +47,9 @@ TRANSFORMS = {
     "b": Transform("1", -1.0, 2.0, log=False),
     "c": Transform("1", -0.5, 0.5, log=False),
     "yield_interference": Transform("m", 1e-12, 1.0),
-    "mu_residual": Transform("1", 1e-3, 5.0),
-    "wear_slip": Transform("m", 1e-12, 1e3),
-    "critical_slip": Transform("m", 1e-12, 1e3),
+    "mating_length": Transform("m", 1e-12, 1e3),
+    "slope_wear": Transform("J/m2", 1e-9, 1e15),
+    "slope_residual": Transform("1", 0.0, 1.0, log=False),
     "seating": Transform("m", 1e-12, 1.0),
     # combinations that priors are stated for, see `quantity`
     "overlap_share": Transform("1", 1e-9, 1e9),

@@ -187,11 +187,11 @@ def staged(problem: Problem, starts: list[Array]) -> list[Array]:
     """One start near the best fit of closure and shear curves, for fits that have shear curves.
 
     The closure curves place what acts on them, then the shear curves the rest. Kept as they are are
-    starts for closure alone, and a single start without a critical slip to find.
+    starts for closure alone, and a single start without a mating length to find.
     """
     shears = tuple(curve for curve in problem.curves if isinstance(curve, ShearCurve))
     closure = problem.closure
-    finds_slip = "critical_slip" in problem.free
+    finds_slip = "mating_length" in problem.free
     if not shears or (len(starts) == 1 and not finds_slip):
         return starts
     values, rest = [problem.unpack(x) for x in starts], problem.free
@@ -201,7 +201,7 @@ def staged(problem: Problem, starts: list[Array]) -> list[Array]:
         values = [_best(replace(problem, curves=(closure,), free=mine), values)]
     if finds_slip:
         span = max(float(np.ptp(curve.shear)) for curve in shears)
-        values = [v | {"critical_slip": share * span} for v in values for share in SLIPS]
+        values = [v | {"mating_length": share * span} for v in values for share in SLIPS]
     if rest:
         values = [_best(replace(problem, curves=shears, free=rest, values=values[0]), values)]
     return [problem.pack_scaled(values[0])]

@@ -76,7 +76,7 @@ def add(commands: Any) -> None:
         "--free",
         metavar="NAMES",
         help="parameters to fit, with commas between; default asperity_density, of closure tests "
-        "alpha and beta, with --cycle yield_interference, of shear tests mu, a and critical_slip",
+        "alpha and beta, with --cycle yield_interference, of shear tests mu, a and mating_length",
     )
     add("--law", metavar="PRESET_OR_FILE", help="the values of parameters that are not fitted")
     add_out(parser)
@@ -181,7 +181,7 @@ def _keywords(options: argparse.Namespace) -> dict[str, Any]:
     free, law = ["asperity_density"], None
     free += ["alpha", "beta"] if options.data else []
     free += ["yield_interference"] if options.cycle else []
-    free += ["mu", "a", "critical_slip"] if options.shear else []
+    free += ["mu", "a", "mating_length"] if options.shear else []
     if options.free:
         free = [name.strip() for name in options.free.split(",")]
     pairs = (item.partition("=") for item in options.set)

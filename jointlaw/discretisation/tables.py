@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..parameters.asperity import Asperity
+from ..parameters.bond import Bond
 from ..support.checks import Array, frozen
 from .facets import Facets
 from .nodes import UNUSED, depth_nodes
 from .virgin_curve import VirginCurve
 
-VERSION = 2  # of the discretisation: a change of nodes or state changes it, old states are refused
+VERSION = 3  # of the discretisation: a change of nodes or state changes it, old states are refused
 _OVERFLOW = 1e140  # Pa and J/m2: squares beyond it overflow
 
 
@@ -20,9 +21,11 @@ _OVERFLOW = 1e140  # Pa and J/m2: squares beyond it overflow
 class Tables:
     """What a kernel reads: everything per facet (M facets, D depth cells), physical axes first.
 
-    `m` (dim, M) maps closure and in-plane offset to the effective closure y of a facet, `s`, `t`
-    (dim, M) are the in-facet directions, `area` is A = N w lam K c1^(1+eta), `depth` (M, D+1) the
-    cell limits zeta with the virgin force and slope there (slope 0 at the first by definition).
+    `m` (dim, M) maps closure and offset to the effective closure y of a facet, `s`, `t` (dim, M)
+    are the in-facet directions, `azimuth` (2, M) is the unit vector of the facet's azimuth and
+    `steep` (M,) its tan(theta), both of the mated joint, `area` is A = N w lam K c1^(1+eta),
+    `depth` (M, D+1) the cell limits zeta with the virgin force and slope there (slope 0 at the
+    first by definition).
     A facet of fewer cells has its limits first; cells that begin at UNUSED stay empty.
     `yield_depth` (M,) is the yield interference along y, None where asperities do not yield;
     `opposite` (M,) names the facet that shares its flattened depth, each itself if none does.
@@ -33,6 +36,8 @@ class Tables:
     m: Array
     s: Array
     t: Array
+    azimuth: Array
+    steep: Array
     c1: Array
     area: Array
     weight: Array
@@ -41,11 +46,12 @@ class Tables:
     depth_slope: Array
     lam: float
     mu: float
-    critical_slip: float
+    mating_length: float
     yield_depth: Array | None = None
     opposite: NDArray[np.intp] | None = None
-    mu_residual: float | None = None
-    wear_slip: float = math.inf
+    slope_wear: float = math.inf
+    slope_residual: float = 0.0
+    bond: Bond | None = None
 
     @property
     def yields(self) -> bool:
@@ -53,9 +59,14 @@ class Tables:
         return self.yield_depth is not None
 
     @property
+    def fades(self) -> bool:
+        """Whether slopes fade with the distance from the mated position."""
+        return self.mating_length < math.inf
+
+    @property
     def wears(self) -> bool:
-        """Whether friction falls with slip."""
-        return self.mu_residual is not None
+        """Whether slopes wear by the work of friction."""
+        return self.slope_wear < math.inf
 
     @property
     def dim(self) -> int:
@@ -74,13 +85,14 @@ class Tables:
 
     @property
     def rows(self) -> int:
-        """State numbers per joint: delta, offset, dissipated energy, q of all cells, even UNUSED.
+        """State numbers per joint: delta, dissipated energy, q of all cells, even UNUSED.
 
         Then, with yielding, the flattened depth of every facet and the plastic work; with wear, the
-        slip of the asperities, and by how much mu had fallen in the last step.
+        share of the slopes that is gone and the work of friction; with a bond its damage.
         """
         flattened = len(self.c1) + 1 if self.yields else 0
-        return 2 * self.dim + 2 * len(self.c1) * self.cells + flattened + 2 * self.wears
+        more = flattened + 2 * self.wears + (self.bond is not None)
+        return self.dim + 1 + 2 * len(self.c1) * self.cells + more
 
 
 def tables(
@@ -90,26 +102,30 @@ def tables(
     asperity_density: float,
     closure_range: float,
     cells: int,
-    critical_slip: float,
+    mating_length: float = math.inf,
+    slope_wear: float = math.inf,
+    slope_residual: float = 0.0,
+    bond: Bond | None = None,
 ) -> Tables:
     """Lay out the tables; `cells` for the facet of most weight, one where the curve is linear."""
     c1, slope = np.cos(facets.theta), np.tan(facets.theta)
     share = np.zeros_like(facets.depth) if curve.linear else facets.depth
     several = np.maximum(np.rint(cells * share), 1).astype(np.intp)
     depth = depth_nodes(curve, closure_range, slope, several)
+    azimuth = np.stack([np.cos(facets.phi), np.sin(facets.phi)])
     arrays = (
-        facets.n, facets.n / c1, facets.s, facets.t, c1,
+        facets.n, facets.n / c1, facets.s, facets.t, azimuth, slope, c1,
         facets.scale(asperity, asperity_density), facets.weight, *_at_limits(curve, depth),
     )  # fmt: skip
     yield_depth = None
     if asperity.yield_interference < math.inf:
         (yield_depth,) = frozen((asperity.yield_interference / c1,))
-    # one depth for both sides of an asperity that critical_slip renews, else it creates energy
+    # one depth for both sides of an asperity whose slopes change, else it creates energy
     (alone,) = frozen((np.arange(len(c1)),))
     return Tables(
-        curve, *frozen(arrays), asperity.lam, asperity.mu, critical_slip, yield_depth,
-        alone if math.isinf(critical_slip) else facets.opposite,
-        asperity.mu_residual, asperity.wear_slip,
+        curve, *frozen(arrays), asperity.lam, asperity.mu, mating_length, yield_depth,
+        alone if math.isinf(mating_length) else facets.opposite, slope_wear, slope_residual,
+        bond,
     )  # fmt: skip
 
 

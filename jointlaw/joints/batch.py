@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..kernels import reference, wear
+from ..kernels import reference
 from ..kernels.blocks import LANES, empty_blocks, rows_of, write_rows, zeros
 from ..kernels.engine import CHUNK, Step, engine
 from ..kernels.reference import Measures
+from ..kernels.unmated import unmated_start
 from ..support.checks import Array, integer, numbers
 from .state import JointState, NonFiniteError
-from .time_step import stable_step, stiffness_per_facet
+from .time_step import stable_step, stiffness_of
 
 if TYPE_CHECKING:
     from ..law import JointLaw
@@ -132,14 +133,30 @@ class JointBatch:
         self._engine.refresh(self._state, self._n)
         self._largest_reach = self._reach_of(self._rows()).max(initial=0.0)
 
-    def reset(self, index: Index | None = None) -> None:
-        """Return the joints at `index` (all if None) to the virgin state: new contacts."""
+    def reset(self, index: Index | None = None, mated: bool = True) -> None:
+        """Return the joints at `index` (all if None) to their start: new contacts.
+
+        Mated ones to the virgin state, others to the start of faces that have never met, as
+        `JointLaw.joint` has it.
+        """
+        start = 0.0 if mated else unmated_start(self.law.tables)
         which = np.arange(self._n) if index is None else self._index(index)
         lanes = self._state.shape[2]
         self._state[which // lanes, :, which % lanes] = 0.0
+        self._state[which // lanes, : self.law.dim, which % lanes] = start
+        far = self._steepness * float(np.max(np.abs(start)))
+        self._largest_reach = max(self._largest_reach, far)
+        if not mated:
+            self.unbond(which)
+
+    def unbond(self, index: Index) -> None:
+        """Break the bonds, if any, of the joints at `index`: faces that meet anew have none."""
+        which, lanes = self._index(index), self._state.shape[2]
+        row = self._row_numbers.damage.astype(int)
+        self._state[which // lanes, row, which % lanes] = 1.0
 
     def resize(self, n: int) -> None:
-        """Change the number of joints; joints beyond the old number are new and unloaded."""
+        """Change the number of joints; joints beyond the old number are new and mated."""
         n = integer("n", n, 0)
         blocks, rows, lanes = self._state.shape
         if n < self._n:
@@ -171,12 +188,13 @@ class JointBatch:
     def max_stiffness(self) -> Array:
         """Upper bound (n,) of `|C|` in Pa/m at each joint's present displacement."""
         k, bound = self.law.tables, np.empty(self._n)
-        per_facet = stiffness_per_facet(k)
         for first in range(0, self._n, CHUNK):
             index = np.arange(first, min(first + CHUNK, self._n))
             now = reference.parts(k, self._rows(index))
-            y = reference.effective_closure(k, now.delta[0], now.offset)
-            bound[index] = per_facet @ k.curve.force(y)[1]
+            y = reference.effective_closure(k, now.delta, now.slopes)
+            bound[index] = stiffness_of(k, y)
+        if k.bond is not None:
+            bound += (1.0 - self.damage) * k.bond.largest_stiffness
         return bound
 
     def critical_time_step(self, mass: ArrayLike, area: ArrayLike) -> Array:
@@ -193,7 +211,7 @@ class JointBatch:
 
     @property
     def delta(self) -> Array:
-        """Displacement since the virgin state (n, dim): closure and shear, in m."""
+        """Displacement from the mated position (n, dim): closure and shear, in m."""
         return rows_of(self._state[:, : self.law.dim], self._n).T
 
     @property
@@ -233,10 +251,14 @@ class JointBatch:
         return self._ledger("plastic_work", "plastic")
 
     @property
-    def friction(self) -> Array:
-        """Friction coefficient (n,) of the asperities, worn by their slip so far."""
-        k = self.law.tables
-        return wear.friction(k, self._part("slip")) if k.wears else np.full(self._n, k.mu)
+    def slopes(self) -> Array:
+        """Share (n,) of the slopes of the asperities that has not been worn away."""
+        return 1.0 - self._part("worn")
+
+    @property
+    def damage(self) -> Array:
+        """Damage (n,) of the bond: 0 whole, 1 broken, and 1 where the law has none."""
+        return self._part("damage") if self.law.bond is not None else np.ones(self._n)
 
     # --------------------------------------------------------------- internals
 
@@ -312,9 +334,9 @@ class JointBatch:
         return max(float(rest), float(new.max(initial=0.0)))
 
     def _reach_of(self, rows: Array) -> Array:
-        """Bound (n,) of |y| of all facets of states (rows, n), from closure and offset."""
+        """Bound (n,) of |y| of all facets of states (rows, n)."""
         now = reference.parts(self.law.tables, rows)
-        far = np.maximum(np.abs(now.delta).max(axis=0), np.abs(now.offset).max(axis=0, initial=0.0))
+        far: Array = np.abs(now.delta).max(axis=0)
         return self._steepness * far
 
 

@@ -74,9 +74,9 @@ class Joint:
         """Return to a snapshot. Raises ValueError if another law wrote it."""
         self._batch.restore(state)
 
-    def reset(self) -> None:
-        """Return to the virgin state."""
-        self._batch.reset()
+    def reset(self, mated: bool = True) -> None:
+        """Return to the start: the virgin state, or that of faces that have never met."""
+        self._batch.reset(mated=mated)
 
     def measures(self) -> Measures:
         """Shares, stored energy and reach in one pass, as numbers."""
@@ -95,4 +95,5 @@ class Joint:
     stored_energy = _OfOne(JointBatch.stored_energy, float)
     dissipated_energy = _OfOne(JointBatch.dissipated_energy, float)
     plastic_work = _OfOne(JointBatch.plastic_work, float)
-    friction = _OfOne(JointBatch.friction, float)
+    slopes = _OfOne(JointBatch.slopes, float)
+    damage = _OfOne(JointBatch.damage, float)

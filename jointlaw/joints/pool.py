@@ -23,7 +23,7 @@ class JointPool:
     A key is whatever names a contact as long as it lasts, such as the pair of its body numbers.
     The joints live in `batch`; `assign` or `add` tell their places there, for
     `batch.update(d, where=places)`. A place that falls free goes to a later contact, whose joint
-    starts virgin.
+    starts anew.
     """
 
     def __init__(self, law: JointLaw, ledger: bool = True) -> None:
@@ -44,14 +44,18 @@ class JointPool:
         """Places (n,) in the batch of the joints of all `keys`."""
         return np.fromiter(self._place.values(), np.intp, len(self._place))
 
-    def assign(self, keys: Iterable[Hashable]) -> Places:
+    def assign(self, keys: Iterable[Hashable], mated: bool = True) -> Places:
         """Hold just these contacts: the others are dropped, new ones added; their places (n,)."""
         wanted = list(keys)
         self.drop(self._place.keys() - set(wanted))
-        return self.add(wanted)
+        return self.add(wanted, mated)
 
-    def add(self, keys: Iterable[Hashable]) -> Places:
-        """Places (n,) of the joints of these contacts; those not held yet get virgin joints."""
+    def add(self, keys: Iterable[Hashable], mated: bool = True) -> Places:
+        """Places (n,) of the joints of these contacts; those not held yet get new joints.
+
+        mated: whether the faces of the new ones fit each other, or have never met
+        (`JointLaw.joint`).
+        """
         wanted = list(keys)
         new = [key for key in dict.fromkeys(wanted) if key not in self._place]
         missing = len(new) - len(self._free)
@@ -61,6 +65,8 @@ class JointPool:
             self._free = [*range(first + missing - 1, first - 1, -1), *self._free]
         for key in new:
             self._place[key] = self._free.pop()
+        if not mated:
+            self.batch.reset([self._place[key] for key in new], mated=False)
         return np.array([self._place[key] for key in wanted], np.intp)
 
     def drop(self, keys: Iterable[Hashable]) -> None:

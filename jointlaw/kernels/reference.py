@@ -3,11 +3,12 @@
 Symbols and order are those of docs/theory-incremental.md. Arrays carry physical axes first and
 joints last: facets (M, B), cells (M, D, B), sliders (2, M, D, B). State (rows, B) holds
 
-    delta (dim) | in-plane offset (dim - 1) | dissipated energy (1) | q (2 M D)
+    delta (dim) | dissipated energy (1) | q (2 M D)
 
-where q is the shear force of a slider times lam, in the (s, t) basis of Eq. 25. With asperities
-that yield follow flattened depth (M) | plastic work (1); with wear, slip of the asperities (1) and
-by how much mu had fallen in the last step (1).
+where delta is counted from the mated position, and q is the shear force of a slider times lam, in
+the basis (s, t) of its facet: that of Eq. 25 where the joint is mated. With asperities that yield
+follow flattened depth (M) | plastic work (1); with wear, the share of the slopes that is gone (1) |
+work of friction (1); with a bond its damage (1).
 """
 
 from typing import NamedTuple
@@ -17,9 +18,11 @@ from numpy.typing import NDArray
 
 from ..discretisation.tables import Tables
 from ..support.checks import Array
-from ..support.thresholds import GRAZING, LIMIT, NEAR, ROUNDED, TINY, UNDERFLOW
+from ..support.thresholds import LIMIT, NEAR, ROUNDED, TINY, UNDERFLOW
+from .bond import hold
 from .cells import Cells, cells, compliance, reciprocal
-from .wear import friction, slipped, within_limit
+from .mating import Planes, Turning, offset, planes, turning
+from .wear import lowered, worn_share
 from .yielding import flatten, flattened, plastic_work, softening
 
 Flags = NDArray[np.bool_]
@@ -29,13 +32,18 @@ class State(NamedTuple):
     """The parts of a state array (rows, B), as views."""
 
     delta: Array
-    offset: Array
     dissipated: Array
     q: Array
     depth: Array  # flattened depth of every facet (M, B), no rows where asperities do not yield
     plastic: Array  # (B,) or no rows
-    slip: Array  # of the asperities (B,), or no rows
-    fallen: Array  # by how much mu had fallen in the last step (B,), or no rows
+    worn: Array  # share of the slopes that is gone (B,), or no rows
+    work: Array  # of friction, which wears them (B,), or no rows
+    damage: Array  # of the bond (B,), or no rows
+
+    @property
+    def slopes(self) -> Array:
+        """Share of the slopes that is left (B,)."""
+        return 1 - self.worn if self.worn.size else np.ones_like(self.dissipated)
 
 
 class Sliders(NamedTuple):
@@ -43,8 +51,8 @@ class Sliders(NamedTuple):
 
     trial: Array  # q before the friction limit
     size: Array  # |trial|
-    strength: Array  # mu lam A: the friction limit of q over G
-    cap: Array  # mu lam A G: the friction limit of q
+    strength: Array  # mu lam A gamma: the friction limit of q over G
+    cap: Array  # strength G: the friction limit of q
     share: Array  # cap over size where the slider slips, 1 elsewhere
     chord: Array  # of G over the step: stiffness of springs that were added on the way
     grows: Flags  # whether the stiffness of the cell has grown
@@ -59,36 +67,42 @@ class Sliders(NamedTuple):
 
     @property
     def push(self) -> Array:
-        """Derivative (2, M, D, B) of q by G: mu lam A along a slider that slips, 0 elsewhere."""
+        """Derivative (2, M, D, B) of q by G: strength along a slider that slips, 0 elsewhere."""
         return np.where(self.slips, self.strength * self.unit, 0.0)
 
 
 def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array, Array | None]:
     """Advance joints by the increments d (dim, B): new state, F (dim, B), C (dim, dim, B).
 
-    1. The joint moves: delta += d, and the in-plane offset with it, up to critical_slip ("Large
-       shear"). Every facet then has y = n . (closure, offset)/c1, before and after.
+    1. Where slopes wear they have, by the work of friction so far ("Wear"). The joint moves: delta
+       += d. Every facet then has y = n . (closure, offset)/c1, before and after; the offset is the
+       displacement in the plane, less than the mating length ("Mating").
     2. Virgin curve at y: Phi, Phi', and the share G, kappa = dG/dy of every depth cell ("Few
        cells, exact virgin curve").
-    3. Sliders are loaded by the facet-plane increment de = (I - n n^T) d. Where kappa grew,
+    3. Sliders are loaded by the increment de of the facet's plane at mid-step. Where kappa grew,
        q += A/c1 chord de; where it fell, the springs that part take their force along,
        q = q kappa1/kappa0 + A/c1 kappa1 de.
-    4. Coulomb friction: |q| <= mu lam A G (Eq. 5, 6).
+    4. Coulomb friction: |q| <= mu lam A gamma G (Eq. 5, 6).
        Where asperities yield, Phi, G and kappa are less their values at the flattened depth
-       ("Yielding"). With wear mu has fallen, and q is reduced to its new limit ("Wear").
-    5. Traction: F = sum of A Phi n + (1/lam) sum of q (Eq. 21).
+       ("Yielding").
+    5. Traction: F = sum of A Phi n + (1/lam) sum of q (Eq. 21), by the planes at the end.
     6. Dissipated energy, every term >= 0 ("No step creates energy").
     7. Tangent C = dF/dd ("The tangent"), not without `tangent`.
+    8. The bond, if there is one, adds its own F, dissipated energy and C ("The bond").
     """
     old = parts(k, state)
     new_state = np.empty_like(state)
     new = parts(k, new_state)
+    q, lost = old.q, np.zeros(d.shape[1])
+    if k.wears:
+        new.worn[:] = worn_share(k, old.worn, old.work)
+        q, lost = wear(k, old, new.slopes)
     new.delta[:] = old.delta + d
-    offset, J_offset, slip = limited_offset(k, old.offset, d[1:])
-    new.offset[:] = offset
+    middle = planes(k, old.delta[1:] + 0.5 * d[1:], new.slopes)
+    end = planes(k, new.delta[1:], new.slopes)
 
-    before = cells(k, effective_closure(k, old.delta[0], old.offset))
-    after = cells(k, effective_closure(k, new.delta[0], offset))
+    before = cells(k, effective_closure(k, old.delta, new.slopes))
+    after = cells(k, effective_closure(k, new.delta, new.slopes))
     gained, flat0, flat1 = after.G - before.G, None, None
     if k.yields:
         new.depth[:] = flatten(k, old.depth, after.y)
@@ -96,58 +110,74 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
         new.plastic[:] = old.plastic + plastic_work(k, before.y, after.y, flat0, flat1)
         gained = after.G - np.maximum(before.G, flat0.G)
         before, after = flattened(before, flat0), flattened(after, flat1)
-    q, lost, mu = old.q, np.zeros(d.shape[1]), np.asarray(k.mu)
-    if k.wears:
-        mu = friction(k, old.slip)
-        q, lost = within_limit(k, before, q, strength(k, mu), old.fallen, mu)
-        new.fallen[:] = k.mu - mu
 
-    basis = np.stack([k.s, k.t])  # (2, dim, M)
-    de = np.einsum("edm,db->emb", basis, d)[:, :, None]  # facet-plane increment (2, M, 1, B)
-    sliders = load(k, before, gained, after, strength(k, mu), q, de)
+    de = np.einsum("edmb,db->emb", middle.basis, d)[:, :, None]  # in the facet (2, M, 1, B)
+    sliders = load(k, before, gained, after, strength(k, end.gamma), q, de)
     resolved = sliders.size**2 > TINY  # squares of smaller forces underflow: they count as zero
     new.q[:] = np.where(resolved, sliders.share, 0.0) * sliders.trial
+    F = resultant(k, end, after.force, new.q)
 
-    F = k.n @ (k.area[:, None] * after.force)
-    F = F + np.einsum("edm,emb->db", basis, new.q.sum(axis=2)) / k.lam
-
-    lost = lost + friction_loss(k, before, after, q, sliders)
-    new.dissipated[:] = old.dissipated + lost
-    if slip.any():
-        pull = k.n[1:] @ (k.area[:, None] * after.force)  # in-plane part of the normal forces
-        # >= 0 by symmetry of the facets, but for rounding
-        pulled = np.maximum(np.sum(pull * offset, axis=0), 0.0)
-        new.dissipated[:] += slip * pulled / k.critical_slip
+    rubbed = friction_loss(k, before, after, q, sliders)
+    new.dissipated[:] = old.dissipated + (lost + rubbed)
     if k.wears:
-        rubbed = new.dissipated - old.dissipated
-        new.slip[:] = old.slip + slipped(k, before, after, mu, rubbed)
+        new.work[:] = old.work + rubbed
     if k.yields:
         new.dissipated[:] += new.plastic - old.plastic
+    held = None
+    if k.bond is not None:
+        held = hold(k.bond, new.delta, old.damage)
+        new.damage[:] = held.damage
+        new.dissipated[:] += held.lost
+        F = F + held.F
     if not tangent:
         return new_state, F, None
-    g = gradient(k, J_offset)
-    C = stiffness(k, before, after, sliders, de, g)
+    E = middle.basis
+    if k.fades:  # the middle moves by half of what d changes by
+        turned = turning(k, old.delta[1:] + 0.5 * d[1:], new.slopes).basis
+        E = np.broadcast_to(E, (*E.shape[:3], d.shape[1])).copy()
+        E[:, 1:] += 0.5 * np.einsum("edjmb,db->ejmb", turned, d)
+    C = stiffness(k, before, after, sliders, de, E, end)
     if flat0 is not None and flat1 is not None:
-        C = C - softening(k, after, flat0, flat1, sliders.push, g)
+        C = C - softening(k, after, flat0, flat1, sliders.push, end)
+    if k.fades:
+        C[:, 1:] += bending(k, after, sliders, new.q, end, turning(k, new.delta[1:], new.slopes))
+    if held is not None:
+        C = C + held.C
     return new_state, F, C
 
 
 def parts(k: Tables, state: Array) -> State:
     """Views of the parts of a state array, q as (2, M, D, B)."""
     dim, M = k.dim, len(k.c1)
-    q, rest = np.split(state[2 * dim :], [2 * M * k.cells])
+    damage = state[-1] if k.bond is not None else state[:0]
+    state = state[:-1] if k.bond is not None else state
+    q, rest = np.split(state[dim + 1 :], [2 * M * k.cells])
     depth, plastic = (rest[:M], rest[M]) if k.yields else (rest[:0], rest[:0])
-    slip, fallen = rest[-2:] if k.wears else (rest[:0], rest[:0])
-    place = state[:dim], state[dim : 2 * dim - 1], state[2 * dim - 1]
-    return State(*place, q.reshape(2, M, k.cells, -1), depth, plastic, slip, fallen)
+    worn, work = rest[-2:] if k.wears else (rest[:0], rest[:0])
+    q = q.reshape(2, M, k.cells, -1)
+    return State(state[:dim], state[dim], q, depth, plastic, worn, work, damage)
 
 
-def effective_closure(k: Tables, closure: Array, offset: Array) -> Array:
+def effective_closure(k: Tables, delta: Array, slopes: Array) -> Array:
     """Effective closure y = n . (closure, offset)/c1 of every facet (M, B)."""
-    y: Array = k.m[0][:, None] * closure
-    for row, o in zip(k.m[1:], offset, strict=True):
-        y = y + row[:, None] * o
+    y: Array = k.m[0][:, None] * delta[0]
+    for row, o in zip(k.m[1:], offset(k, delta[1:]), strict=True):
+        y = y + row[:, None] * (slopes * o if k.wears else o)
     return np.where(np.abs(y) < UNDERFLOW, 0.0, y)
+
+
+def wear(k: Tables, old: State, slopes: Array) -> tuple[Array, Array]:
+    """q (2, M, D, B) and lost energy (B,) after slopes have fallen to the share `slopes` (B,)."""
+    flat = cells(k, old.depth) if k.yields else None
+    was, now = (
+        flattened(cells(k, effective_closure(k, old.delta, share)), flat)
+        for share in (old.slopes, slopes)
+    )
+    mean = 0.5 * (k.area * k.c1)[:, None] * (was.force + now.force)
+    normal = np.sum(mean * (was.y - now.y), axis=0)
+    limit = strength(k, planes(k, old.delta[1:], slopes).gamma)
+    q, lost = lowered(k, was, now, limit, old.q)
+    return q, lost + np.maximum(normal, 0.0)  # >= 0 by the pairs of facets, but for rounding
 
 
 def load(
@@ -177,9 +207,15 @@ def load(
     return Sliders(trial, size, strength, cap, share, chord, grows, near, slips)
 
 
-def strength(k: Tables, mu: Array) -> Array:
-    """mu lam A per facet (M, 1, 1 or B): the friction limit of q over G."""
-    return mu * k.lam * k.area[:, None, None]
+def strength(k: Tables, gamma: Array) -> Array:
+    """mu lam A gamma per facet (M, 1, B): the friction limit of q over G."""
+    return k.mu * k.lam * k.area[:, None, None] * gamma[:, None]
+
+
+def resultant(k: Tables, now: Planes, force: Array, q: Array) -> Array:
+    """Traction F (dim, B) of the normal forces A Phi n, force = Phi (M, B), and the sliders q."""
+    F: Array = np.einsum("dmb,mb->db", now.n, k.area[:, None] * force)
+    return F + np.einsum("edmb,emb->db", now.basis, q.sum(axis=2)) / k.lam
 
 
 def at_limit(size: Array, strength: Array, G: Array, force: Array) -> Flags:
@@ -205,57 +241,13 @@ def friction_loss(k: Tables, before: Cells, after: Cells, q: Array, sliders: Sli
     return np.sum(compliance(k) * lost, axis=(0, 1))
 
 
-def limited_offset(k: Tables, offset: Array, p: Array) -> tuple[Array, Array, Array]:
-    """The offset after the in-plane step p, dragged along where it is at its limit D_c.
-
-    Returns offset (dim-1, B), d offset/d p (dim-1, dim-1, B) and int cos(alpha) ds (B), the part of
-    the drag along the offset, which times the resultant T . o/|o| is the energy it dissipates.
-    docs/theory-incremental.md, "Large shear".
-    """
-    size, free = len(offset), offset + p
-    J = np.broadcast_to(np.eye(size)[:, :, None], (size, *free.shape)).copy()
-    slip = np.zeros(free.shape[1])
-    D = k.critical_slip
-    # an offset that is outside by rounding and moves inwards is not at the limit
-    held = np.flatnonzero((np.sum(free**2, axis=0) > D * D) & (np.sum(free * p, axis=0) > 0))
-    if held.size == 0:
-        return free, J, slip
-    o, step = offset[:, held], p[:, held]
-    length = np.hypot(step[0], step[-1] if size == 2 else 0.0)
-    e = step / length
-    along = np.sum(o * e, axis=0)
-    inside = -along + np.sqrt(np.maximum(D * D - np.sum(o**2, axis=0) + along**2, 0.0))
-    inside = np.clip(inside, 0.0, length)  # way until the offset is at its limit
-    o = o + inside * e
-    x = (length - inside) / D
-    across = np.array([-e[1], e[0]]) if size == 2 else np.zeros_like(e)
-    cos, sin = np.clip(np.sum(o * e, axis=0) / D, 0.0, 1.0), np.sum(o * across, axis=0) / D
-    decay, rest = np.exp(-x), -np.expm1(-x)
-    bottom = (1 + cos) + (1 - cos) * decay**2
-    cos1, sin1 = ((1 + cos) - (1 - cos) * decay**2) / bottom, 2 * sin * decay / bottom
-    free[:, held] = D * (cos1 * e + sin1 * across)
-    slip[held] = D * (x + np.log(bottom / 2))
-    # d(angle of the offset) = turn d(angle of e) - sin1/D d(length), and e turns with step
-    grazing = np.maximum(cos, GRAZING)
-    turn = (rest**2 + cos * rest * (1 + decay)) / bottom
-    turn = turn + inside / (D * grazing) * (2 * decay / bottom - sin1 * sin)
-    new_across = np.array([-free[1, held], free[0, held]]) if size == 2 else np.zeros_like(e)
-    row = turn / length * across - sin1 / D * e
-    J[:, :, held] = new_across[:, None] * row[None]
-    return free, J, slip
-
-
-def gradient(k: Tables, J_offset: Array) -> Array:
-    """g = dy/dd of every facet (dim, M, B)."""
-    g = np.broadcast_to(k.m[:, :, None], (*k.m.shape, J_offset.shape[2])).copy()
-    g[1:] = np.einsum("om,opb->pmb", k.m[1:], J_offset)
-    return g
-
-
 def stiffness(
-    k: Tables, before: Cells, after: Cells, sliders: Sliders, de: Array, g: Array
+    k: Tables, before: Cells, after: Cells, sliders: Sliders, de: Array, E: Array, end: Planes
 ) -> Array:
-    """Tangent C = dF/dd (dim, dim, B): J_q = beta (I - s s^T) E + v g^T per cell, summed."""
+    """Tangent C = dF/dd (dim, dim, B) of planes that keep their slopes.
+
+    J_q = beta (I - s s^T) E + v g^T per cell, summed; E (2, dim, M, B) is d(de)/dd.
+    """
     trial, share, chord, grows = sliders.trial, sliders.share, sliders.chord, sliders.grows
     y, kappa = after.y, after.kappa
     a = (k.area / k.c1)[:, None, None]
@@ -274,23 +266,33 @@ def stiffness(
     beta = np.where(slips, share * beta, beta)
     outer = np.where(slips, unit[:, None] * unit[None], 0.0)
     inner = np.sum(beta * (np.eye(2)[:, :, None, None, None] - outer), axis=3)  # (2, 2, M, B)
-    basis = np.stack([k.s, k.t])
-    along = k.n[:, :, None] * (k.area[:, None] * after.slope)
-    along = along + np.einsum("edm,emb->dmb", basis, np.sum(v, axis=2)) / k.lam
-    C: Array = np.einsum("imb,jmb->ijb", along, g)
-    C = C + np.einsum("eim,efmb,fjm->ijb", basis, inner, basis) / k.lam
+    along = end.n * (k.area[:, None] * after.slope)
+    along = along + np.einsum("edmb,emb->dmb", end.basis, np.sum(v, axis=2)) / k.lam
+    C: Array = np.einsum("imb,jmb->ijb", along, np.broadcast_to(end.g, along.shape))
+    C = C + np.einsum("eimb,efmb,fjmb->ijb", end.basis, inner, E) / k.lam
     return C
+
+
+def bending(
+    k: Tables, after: Cells, sliders: Sliders, q: Array, end: Planes, turned: Turning
+) -> Array:
+    """Part (dim, dim - 1, B) of the tangent by which the planes at the end turn and flatten."""
+    limited = np.sum(sliders.push * after.G, axis=2)  # of q by log(gamma)
+    by_gamma = np.einsum("eimb,emb->imb", end.basis, limited / end.gamma) / k.lam
+    C: Array = np.einsum("ijmb,mb->ijb", turned.n, k.area[:, None] * after.force)
+    C = C + np.einsum("eijmb,emb->ijb", turned.basis, q.sum(axis=2)) / k.lam
+    return C + np.einsum("imb,jmb->ijb", by_gamma, turned.gamma)
 
 
 def traction(k: Tables, state: Array) -> Array:
     """Traction F (dim, B) in Pa that a state carries."""
     now = parts(k, state)
-    y = effective_closure(k, now.delta[0], now.offset)
+    y = effective_closure(k, now.delta, now.slopes)
     force, _ = k.curve.force(y)
     if k.yields:
         force = np.where(y > now.depth, force - k.curve.force(now.depth)[0], 0.0)
-    shear = np.einsum("edm,emb->db", np.stack([k.s, k.t]), now.q.sum(axis=2))
-    return k.n @ (k.area[:, None] * force) + shear / k.lam
+    F = resultant(k, planes(k, now.delta[1:], now.slopes), force, now.q)
+    return F if k.bond is None else F + hold(k.bond, now.delta, now.damage).F
 
 
 class Measures(NamedTuple):
@@ -306,12 +308,12 @@ class Measures(NamedTuple):
 def measures(k: Tables, state: Array) -> Measures:
     """Shares, stored energy and reach of a batch of states (rows, B)."""
     state_now = parts(k, state)
-    virgin = cells(k, effective_closure(k, state_now.delta[0], state_now.offset))
+    virgin = cells(k, effective_closure(k, state_now.delta, state_now.slopes))
     now = flattened(virgin, cells(k, state_now.depth) if k.yields else None)
     y, force, G = now.y, now.force, now.G
-    mu = friction(k, state_now.slip) if k.wears else np.asarray(k.mu)
+    limit = strength(k, planes(k, state_now.delta[1:], state_now.slopes).gamma)
     q2 = state_now.q[0] ** 2 + state_now.q[1] ** 2
-    capped = at_limit(np.sqrt(q2), strength(k, mu), G, virgin.force)
+    capped = at_limit(np.sqrt(q2), limit, G, virgin.force)
     weight = (k.weight / k.weight.sum())[:, None]
     touches = y > (state_now.depth if k.yields else 0.0)
     sliding = np.sum(weight * (touches & np.all(capped, axis=1)), axis=0)
@@ -325,4 +327,6 @@ def measures(k: Tables, state: Array) -> Measures:
         normal = np.where(touches, np.maximum(normal, 0.0), 0.0)
     stored = np.sum((k.area * k.c1)[:, None] * normal, axis=0)
     stored = stored + np.sum(compliance(k) * q2 * reciprocal(now.kappa), axis=(0, 1))
+    if k.bond is not None:
+        stored = stored + hold(k.bond, state_now.delta, state_now.damage).stored
     return Measures(sliding, slipping, separated, stored, np.max(y, axis=0))

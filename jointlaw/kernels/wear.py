@@ -1,4 +1,4 @@
-"""Friction that falls with the slip of the asperities, docs/theory-incremental.md, "Wear"."""
+"""Slopes that wear by the work of friction, docs/theory-incremental.md, "Wear"."""
 
 import numpy as np
 
@@ -7,29 +7,23 @@ from ..support.checks import Array
 from .cells import Cells, compliance, reciprocal
 
 
-def friction(k: Tables, slip: Array) -> Array:
-    """mu (B,) after the slip L (B,) of the asperities."""
-    assert k.mu_residual is not None
-    return k.mu_residual + (k.mu - k.mu_residual) * np.exp(-slip / k.wear_slip)
+def worn_share(k: Tables, worn: Array, work: Array) -> Array:
+    """The share (B,) of the slopes that is gone after the work (B,) of friction in J/m2."""
+    now = (k.slope_residual - 1) * np.expm1(-work / k.slope_wear)
+    return np.maximum(worn, now)
 
 
-def within_limit(
-    k: Tables, before: Cells, q: Array, strength: Array, fallen: Array, mu: Array
-) -> tuple[Array, Array]:
-    """q brought back within the friction limit of mu (B,), and the energy (B,) that it loses.
+def lowered(k: Tables, old: Cells, now: Cells, strength: Array, q: Array) -> tuple[Array, Array]:
+    """q where slopes have worn and joints have not moved, and what sliders lose by it (B,) in J/m2.
 
-    fallen (B,): by how much mu had fallen in the last step. q is within the limits of that step; a
-    slider above its present limit is within it after losing the share that mu has lost since.
+    As in a step without an increment: springs that part take their force along, and friction
+    limits q.
     """
-    last = k.mu - fallen
-    since = np.minimum(np.divide(mu, last, out=np.ones_like(last), where=last > 0), 1.0)
+    kept = np.minimum(now.kappa * reciprocal(old.kappa), 1.0)
+    kept = np.where(now.kappa < old.kappa, kept, 1.0)
+    size = kept * np.sqrt(q[0] ** 2 + q[1] ** 2)
+    cap = strength * now.G
+    share = kept * np.divide(cap, size, out=np.ones_like(size), where=size > cap)
     q2 = q[0] ** 2 + q[1] ** 2
-    share = np.where(q2 > (strength * before.G) ** 2, since, 1.0)
-    lost = (1 - share) * (1 + share) * q2 * reciprocal(before.kappa)
+    lost = q2 * (reciprocal(old.kappa) - share**2 * reciprocal(now.kappa))
     return share * q, np.sum(compliance(k) * lost, axis=(0, 1))
-
-
-def slipped(k: Tables, before: Cells, after: Cells, mu: Array, lost: Array) -> Array:
-    """Slip dL (B,) of the asperities: the energy lost to friction over the mean friction limit."""
-    limit = 0.5 * mu * np.sum(k.area[:, None] * (before.force + after.force), axis=0)
-    return np.divide(lost, limit, out=np.zeros_like(limit), where=limit > 0)

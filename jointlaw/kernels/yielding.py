@@ -12,6 +12,7 @@ from ..discretisation.tables import Tables
 from ..support.checks import Array
 from ..support.thresholds import ROUNDED
 from .cells import Cells
+from .mating import Planes
 
 
 def flatten(k: Tables, depth: Array, y: Array) -> Array:
@@ -56,16 +57,18 @@ def plastic_work(k: Tables, y0: Array, y1: Array, flat0: Cells, flat1: Cells) ->
     return np.sum((k.area * k.c1)[:, None] * deep * (flat1.force - flat0.force), axis=0)
 
 
-def softening(k: Tables, after: Cells, flat0: Cells, flat1: Cells, push: Array, g: Array) -> Array:
+def softening(
+    k: Tables, after: Cells, flat0: Cells, flat1: Cells, push: Array, end: Planes
+) -> Array:
     """Part (dim, dim, B) by which yielding lowers the tangent: the flattened depth moves along.
 
-    push: derivative (2, M, D, B) of q by G in slipping sliders. g: dy/dd (dim, M, B).
+    push: derivative (2, M, D, B) of q by G in slipping sliders. end: the planes after the step.
     """
     assert k.yield_depth is not None
     moves = (flat1.y - flat0.y > ROUNDED * flat1.y) & (after.kappa > 0).any(axis=1)
     own = flattens_itself(k, after.y, flat1.y)
     shear = np.sum(push * np.where(after.kappa > 0, flat1.kappa, 0.0), axis=2)
-    along = k.n[:, :, None] * (k.area[:, None] * flat1.slope)
-    along = along + np.einsum("edm,emb->dmb", np.stack([k.s, k.t]), shear) / k.lam
-    pressing = np.where(own, g, g[:, k.opposite])
+    along = end.n * (k.area[:, None] * flat1.slope)
+    along = along + np.einsum("edmb,emb->dmb", end.basis, shear) / k.lam
+    pressing = np.where(own, end.g, end.g[:, k.opposite])
     return np.einsum("imb,jmb->ijb", np.where(moves, along, 0.0), pressing)

@@ -2,7 +2,7 @@
 
 import re
 
-OWN = ("lanes.h", "law.h")  # whose names are short: a host may have the same
+OWN = ("lanes.h", "bond.h", "law.h")  # whose names are short: a host may have the same
 _DEFINED = re.compile(
     r"^#define (\w+)"
     r"|^(?:IN|static)\b[^;={(]*?(\w+)\("

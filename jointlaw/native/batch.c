@@ -4,6 +4,7 @@
  */
 #include "batch.h"
 #include "lanes.h"
+#include "bond.h"
 #include "law.h"
 #include <stdlib.h>
 #include <string.h>
@@ -82,7 +83,7 @@ int NAME(jlaw_measure)(const jlaw_batch *b, long first, long last)
   for (long at = first; at < last; at += JOINTS) {
     const numbers n = {joint_of(b, at), BLOCK, 0};
     const amounts all = measure(b->law, n);
-    const of_joint out[5] = {all.sliding, all.slipping, all.separated, all.normal + all.sheared,
+    const of_joint out[5] = {all.sliding, all.slipping, all.separated, all.normal + all.sheared + all.bond,
                              all.reach};
     for (int i = 0; i < 5; i++)
       for (int l = 0; l < JOINTS && at + l < last; l++) b->F[i * b->n + at + l] = JOINT(out[i], l);

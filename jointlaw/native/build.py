@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 HERE = Path(__file__).parent
-SOURCES = ("batch.c", "library.c", "batch.h", "layout.h", "lanes.h", "law.h", "build.py")
+SOURCES = ("batch.c", "library.c", "batch.h", "layout.h", "lanes.h", "law.h", "bond.h", "build.py")
 # no fused operations: the same bits with every compiler; the others change no result
 FLAGS = ("-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-w")
 HIDDEN = ("-fPIC", "-fvisibility=hidden")

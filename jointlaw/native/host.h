@@ -5,7 +5,7 @@
  *
  *     char message[JLAW_MESSAGE];
  *     jlaw_law *law = jlaw_read("granite.jlaw", message, sizeof message);
- *     double state[162] = {0};                         jlaw_state_size(law) numbers; zeros: virgin
+ *     double state[162] = {0};                         jlaw_state_size(law) numbers; zeros: virgin, mated
  *     if (jlaw_update(law, state, state, d, F, NULL, message, sizeof message)) ... message tells
  *
  * Table files (.jlaw, or as constants NAME.h) are written by `jointlaw export c`.
@@ -57,6 +57,13 @@ JLAW_FUNCTION int jlaw_state_size(const jlaw_law *law);
 JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1, const double *d,
                               double *F, double *C, char *message, size_t size);
 
+/* The start of a joint whose faces have never met, as blocks that meet anew after a fall: at first
+ * touch, 100 mating lengths from the mated position along axis 2. Closure is counted from the mated
+ * position: s[0] is then negative, and a host closes the joint from there on. Returns 0; or -1 for a
+ * law with an infinite mating length, always mated: the state is then the virgin one. A bond of the
+ * law is broken in either. */
+JLAW_FUNCTION int jlaw_unmated(const jlaw_law *law, double *s);
+
 /* The same without any check, for hosts that know their steps and for devices: row i of the state is
  * s[i stride], so that joints may lie side by side, (rows, n). C may be NULL. */
 JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t stride, const double *d,
@@ -77,7 +84,7 @@ JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure);
 
 /* The state in axes 2 and 3 that are turned by this angle (rad, from 2 to 3) about the normal. For a
  * host that cannot carry its axes with a body, and laws without a preferred direction (c = 0).
- * Shear and offset turn exactly. Sliders and flattened depths are read between the azimuths of
+ * Shear turns exactly. Sliders and flattened depths are read between the azimuths of
  * their ring of facets: exact where the angle is a whole number of azimuths of every ring, else
  * the better the more there are. Sliders gain no energy; what they lose counts as dissipated. In a
  * plane the axis keeps or changes its sense. */
@@ -145,6 +152,7 @@ extern "C" {
 #endif
 
 #include "lanes.h"
+#include "bond.h"
 #include "law.h"
 
 /* ------------------------------------------------------------------ messages */
@@ -258,14 +266,14 @@ static JLAW_FUNCTION int jlaw_sound_(const double *q, int n)
 /* Whether energies, flattened depths and slip of a state are numbers that a law can have */
 static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
 {
-  const double *rest = s + rest_row(law), *slip = s + slip_row(law);
-  int good = fabs(s[2 * law->dim - 1]) <= DBL_MAX;
+  const double *rest = s + rest_row(law), *worn = s + worn_row(law);
+  int good = fabs(s[law->dim]) <= DBL_MAX;
   for (int f = 0; law->yields && f < law->facets; f++)
     good = good && rest[f] >= 0.0 && rest[f] <= law->largest_reach;
   if (law->yields) good = good && fabs(rest[law->facets]) <= DBL_MAX;
-  if (law->wears) good = good && slip[0] >= 0.0 && slip[0] <= DBL_MAX;
-  if (law->wears) good = good && slip[1] >= 0.0 && slip[1] <= law->mu;
-  return good && jlaw_sound_(s + 2 * law->dim, rest_row(law) - 2 * law->dim);
+  if (law->wears) good = good && worn[0] >= 0.0 && worn[0] <= 1.0 && worn[1] <= DBL_MAX;
+  if (law->bonded) good = good && s[damage_row(law)] >= 0.0 && s[damage_row(law)] <= 1.0;
+  return good && jlaw_sound_(s + slider_row(law), rest_row(law) - slider_row(law));
 }
 
 static JLAW_FUNCTION int jlaw_refuse_(const jlaw_law *law, const double *s, const double *d,
@@ -303,8 +311,7 @@ JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1,
 {
   const int dim = law->dim, rows = state_rows(law);
   double far = 0.0, step_size = 0.0; /* NaN stays in sums */
-  for (int i = 0; i < 2 * dim - 1; i++) far += fabs(s0[i]);
-  for (int i = 0; i < dim; i++) step_size += fabs(d[i]);
+  for (int i = 0; i < dim; i++) far += fabs(s0[i]), step_size += fabs(d[i]);
   const double reach = law->stretch * (far + step_size);
   const int damaged = !(far <= DBL_MAX) || !jlaw_proper_(law, s0);
   if (damaged || !(reach <= law->largest_reach))
@@ -320,9 +327,17 @@ JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1,
 JLAW_FUNCTION int jlaw_dim(const jlaw_law *law) { return law->dim; }
 JLAW_FUNCTION int jlaw_state_size(const jlaw_law *law) { return state_rows(law); }
 JLAW_FUNCTION const char *jlaw_fingerprint(const jlaw_law *law) { return law->fingerprint; }
+JLAW_FUNCTION int jlaw_unmated(const jlaw_law *law, double *s)
+{
+  const int far = law->fades && law->dim > 1;
+  for (int i = 0; i < state_rows(law); i++) s[i] = 0.0;
+  if (far) s[0] = law->first_touch, s[1] = JLAW_FAR * law->mating_length;
+  if (law->bonded) s[damage_row(law)] = 1.0;
+  return far ? 0 : -1;
+}
 JLAW_FUNCTION double jlaw_dissipated(const jlaw_law *law, const double *s)
 {
-  return s[2 * law->dim - 1];
+  return s[law->dim];
 }
 
 JLAW_CLONES static JLAW_FUNCTION amounts jlaw_measure_(const jlaw_law *law, const double *s)
@@ -334,7 +349,7 @@ JLAW_CLONES static JLAW_FUNCTION amounts jlaw_measure_(const jlaw_law *law, cons
 JLAW_FUNCTION double jlaw_stored(const jlaw_law *law, const double *s)
 {
   const amounts all = jlaw_measure_(law, s);
-  return all.normal + all.sheared;
+  return all.normal + all.sheared + all.bond;
 }
 
 JLAW_FUNCTION void jlaw_shares(const jlaw_law *law, const double *s, double shares[3])
@@ -356,6 +371,11 @@ JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure)
       const double depth = jlaw_of_facet_(law, f, i + 1);
       late += jlaw_of_facet_(law, f, i) * jlaw_virgin_one_(law, closure - depth, &slope);
     }
+  if (law->bonded && closure < 0.0) { /* a joint that opens */
+    bonded b = {{closure, 0.0, 0.0}, 0.0, {0.0}, {0.0}, 0.0};
+    hold(law, &b);
+    return b.F[0];
+  }
   return law->closure_factor * jlaw_virgin_one_(law, closure, &slope) - late;
 }
 
@@ -363,8 +383,9 @@ JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure)
 {
   double slope;
   if (!(closure <= law->largest_reach)) return jlaw_none_();
-  jlaw_virgin_one_(law, closure, &slope);
-  return law->stiffness_factor * slope;
+  const double force = jlaw_virgin_one_(law, closure, &slope);
+  return law->stiffness_factor * slope + law->bending_factor * force
+         + fmax(law->bond_normal, law->bond_shear);
 }
 
 JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
@@ -386,8 +407,8 @@ JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
 JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s)
 {
   const int dim = law->dim, D = law->cells, M = law->facets;
-  for (int i = 1; i < 2 * dim - 1; i += dim - 1) s[i] = -s[i]; /* shear and offset along axis 2 */
-  double *qs = s + 2 * dim, *qt = qs + M * D, *depth = qt + M * D;
+  if (dim > 1) s[1] = -s[1]; /* shear along axis 2 */
+  double *qs = s + slider_row(law), *qt = qs + M * D, *depth = qt + M * D;
   for (int f = 0; f < M; f++) {
     const int other = (int) jlaw_of_facet_(law, f, JLAW_MIRROR);
     for (int i = 0; i < D; i++) {
@@ -426,17 +447,16 @@ static JLAW_FUNCTION void jlaw_hold_(const jlaw_law *law, double *s)
 {
   const numbers n = {s, 1, 0};
   const int M = law->facets, D = law->cells;
-  const double worn = worn_now(law, n);
   for (int at = 0; at < M; at += TOGETHER) {
     const int some = M - at < TOGETHER ? M - at : TOGETHER;
     const double *cell = cell_of(law, at);
     facets o;
     facets_now(law, n, at, &o);
     for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_LANES) {
-      const int row = 2 * law->dim + at * D + i;
+      const int row = slider_row(law) + at * D + i;
       real G, kappa, qs = take(n, row, D, some), qt = take(n, row + M * D, D, some);
       cell_now(cell, &o, law->yields, &G, &kappa);
-      const real cap = column(facet_of(law, at), JLAW_STRENGTH) * worn * G;
+      const real cap = o.strength * G;
       const real size = root(qs * qs + qt * qt);
       const yes beyond = size > cap;
       const real share = pick(beyond, cap / pick(beyond, size, 1.0), 1.0);
@@ -450,13 +470,11 @@ JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle)
 {
   const int dim = law->dim, D = law->cells, M = law->facets;
   const double before = jlaw_measure_(law, s).sheared, c = cos(angle), d = sin(angle);
-  double *q = s + 2 * dim, *depth = s + rest_row(law);
+  double *q = s + slider_row(law), *depth = s + rest_row(law);
   if (dim == 2 && c < 0.0) jlaw_swap_bodies(law, s); /* the axis changes its sense */
   if (dim != 3) return;
-  for (int i = 1; i <= 3; i += 2) { /* shear and offset */
-    const double along = s[i], across = s[i + 1];
-    s[i] = c * along + d * across, s[i + 1] = c * across - d * along;
-  }
+  const double along = s[1], across = s[2];
+  s[1] = c * along + d * across, s[2] = c * across - d * along;
   for (int f = 0, n; f < M; f += n) { /* rings */
     n = (int) jlaw_of_facet_(law, f, JLAW_RING);
     for (int i = 0; i < D; i++) {
@@ -469,7 +487,7 @@ JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle)
   const double after = jlaw_measure_(law, s).sheared;
   if (after > before) /* sliders gain nothing */
     for (int i = 0; i < 2 * M * D; i++) q[i] *= sqrt(before / after);
-  else s[5] += before - after;
+  else s[dim] += before - after;
 }
 
 /* ------------------------------------------------------------- table files */

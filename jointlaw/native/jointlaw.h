@@ -5,7 +5,7 @@
  *
  *     char message[JLAW_MESSAGE];
  *     jlaw_law *law = jlaw_read("granite.jlaw", message, sizeof message);
- *     double state[162] = {0};                         jlaw_state_size(law) numbers; zeros: virgin
+ *     double state[162] = {0};                         jlaw_state_size(law) numbers; zeros: virgin, mated
  *     if (jlaw_update(law, state, state, d, F, NULL, message, sizeof message)) ... message tells
  *
  * Table files (.jlaw, or as constants NAME.h) are written by `jointlaw export c`.
@@ -57,6 +57,13 @@ JLAW_FUNCTION int jlaw_state_size(const jlaw_law *law);
 JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1, const double *d,
                               double *F, double *C, char *message, size_t size);
 
+/* The start of a joint whose faces have never met, as blocks that meet anew after a fall: at first
+ * touch, 100 mating lengths from the mated position along axis 2. Closure is counted from the mated
+ * position: s[0] is then negative, and a host closes the joint from there on. Returns 0; or -1 for a
+ * law with an infinite mating length, always mated: the state is then the virgin one. A bond of the
+ * law is broken in either. */
+JLAW_FUNCTION int jlaw_unmated(const jlaw_law *law, double *s);
+
 /* The same without any check, for hosts that know their steps and for devices: row i of the state is
  * s[i stride], so that joints may lie side by side, (rows, n). C may be NULL. */
 JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t stride, const double *d,
@@ -77,7 +84,7 @@ JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure);
 
 /* The state in axes 2 and 3 that are turned by this angle (rad, from 2 to 3) about the normal. For a
  * host that cannot carry its axes with a body, and laws without a preferred direction (c = 0).
- * Shear and offset turn exactly. Sliders and flattened depths are read between the azimuths of
+ * Shear turns exactly. Sliders and flattened depths are read between the azimuths of
  * their ring of facets: exact where the angle is a whole number of azimuths of every ring, else
  * the better the more there are. Sliders gain no energy; what they lose counts as dissipated. In a
  * plane the axis keeps or changes its sense. */
@@ -91,7 +98,7 @@ JLAW_FUNCTION const char *jlaw_fingerprint(const jlaw_law *law);
 
 /* The tables, for files NAME.h; not for the host */
 /* Made from layout.py by `python -m jointlaw.native`; change it there. */
-#define JLAW_FORMAT 3 /* of table files */
+#define JLAW_FORMAT 4 /* of table files */
 enum {
   JLAW_LANES = 4, /* facets side by side in a block of the tables */
   JLAW_AZIMUTHS = 512, /* most */
@@ -99,17 +106,20 @@ enum {
   JLAW_S = 3, /* in-facet direction s */
   JLAW_T = 6, /* in-facet direction t */
   JLAW_N = 9, /* normal n */
-  JLAW_A = 12, /* A */
-  JLAW_STIFF = 13, /* A/c1 */
-  JLAW_STRENGTH = 14, /* mu lam A */
-  JLAW_COMPLIANCE = 15, /* c1/(2 A lam): from |q|^2/kappa to energy */
-  JLAW_POTENTIAL = 16, /* A c1 */
-  JLAW_SHARE = 17, /* of all orientations */
-  JLAW_YIELD = 18, /* y_p = d_y/c1 */
-  JLAW_MIRROR = 19, /* the facet mirrored along axis 2 */
-  JLAW_RING = 20, /* facets of this inclination, one after the other */
-  JLAW_LATE = 21, /* unsheared joint: share, depth, share, depth of what yielding takes off */
-  JLAW_COLUMNS = 25, /* of a facet */
+  JLAW_E = 12, /* unit vector of the azimuth */
+  JLAW_STEEP = 14, /* tan(theta) */
+  JLAW_COSINE = 15, /* c1 */
+  JLAW_A = 16, /* A */
+  JLAW_STIFF = 17, /* A/c1 */
+  JLAW_STRENGTH = 18, /* mu lam A */
+  JLAW_COMPLIANCE = 19, /* c1/(2 A lam): from |q|^2/kappa to energy */
+  JLAW_POTENTIAL = 20, /* A c1 */
+  JLAW_SHARE = 21, /* of all orientations */
+  JLAW_YIELD = 22, /* y_p = d_y/c1 */
+  JLAW_MIRROR = 23, /* the facet mirrored along axis 2 */
+  JLAW_RING = 24, /* facets of this inclination, one after the other */
+  JLAW_LATE = 25, /* unsheared joint: share, depth, share, depth of what yielding takes off */
+  JLAW_COLUMNS = 29, /* of a facet */
   JLAW_LOW = 0, /* zeta at its begin */
   JLAW_FORCE = 1, /* Phi there */
   JLAW_SLOPE = 2, /* Phi' there */
@@ -124,24 +134,34 @@ enum {
 #define JLAW_NEAR 1e-05
 #define JLAW_LIMIT 1e-09
 #define JLAW_ROUNDED 1e-12
-#define JLAW_GRAZING 1e-12
+#define JLAW_FAR 100.0
 struct jlaw_law {
   int dim; /* components of a displacement */
   int facets; /* M */
   int cells; /* D, depth cells of a facet */
   int pieces; /* of the virgin curve */
   int yields; /* whether asperities yield */
-  int wears; /* whether mu falls with slip */
+  int fades; /* whether slopes fade with the distance from mate */
+  int wears; /* whether slopes wear */
+  int bonded; /* whether there is a bond */
   double soft; /* 1/lam */
-  double mu; /* of unworn asperities */
-  double mu_residual; /* of asperities that are worn */
-  double wear_slip; /* m: slip that wears */
-  double critical_slip; /* m; infinite: the largest float */
+  double mu; /* friction of asperities */
+  double mating_length; /* m; infinite: the largest float */
+  double slope_wear; /* J/m2; infinite: the largest float */
+  double slope_residual; /* share of the slopes that never wears */
+  double first_touch; /* m: closure at which an unmated joint touches */
   double eta; /* exponent of the virgin curve */
   double scale; /* V of the virgin curve, m^(1/2) */
   double rise; /* p: the curve is tabulated over w^p */
+  double bond_normal; /* Pa/m: stiffness of the bond */
+  double bond_shear; /* Pa/m */
+  double opening_begin; /* 1/m: one over the opening where it begins to break */
+  double slip_begin; /* 1/m: the same of slip */
+  double opening_end; /* 1/m: where nothing of it is left */
+  double slip_end; /* 1/m */
   double closure_factor; /* normal stress over Phi */
   double stiffness_factor; /* bound of |C| over Phi' */
+  double bending_factor; /* what slopes that fade add to it, over Phi */
   double largest_reach; /* m: bound of |y| */
   double stretch; /* bound of |y| over that of the displacement */
   double farthest; /* m: largest closure that a stress is looked for in */
@@ -159,17 +179,27 @@ struct jlaw_law {
   X(cells, 1, 1, 1e6) \
   X(pieces, 1, 1, 1e6) \
   X(yields, 1, 0, 1) \
+  X(fades, 1, 0, 1) \
   X(wears, 1, 0, 1) \
+  X(bonded, 1, 0, 1) \
   X(soft, 0, 0, DBL_MAX) \
   X(mu, 0, 0, DBL_MAX) \
-  X(mu_residual, 0, 0, DBL_MAX) \
-  X(wear_slip, 0, DBL_MIN, DBL_MAX) \
-  X(critical_slip, 0, JLAW_UNDERFLOW, DBL_MAX) \
+  X(mating_length, 0, DBL_MIN, DBL_MAX) \
+  X(slope_wear, 0, DBL_MIN, DBL_MAX) \
+  X(slope_residual, 0, 0, 1) \
+  X(first_touch, 0, -DBL_MAX, 0) \
   X(eta, 0, 0, DBL_MAX) \
   X(scale, 0, DBL_MIN, DBL_MAX) \
   X(rise, 0, 0, DBL_MAX) \
+  X(bond_normal, 0, 0, DBL_MAX) \
+  X(bond_shear, 0, 0, DBL_MAX) \
+  X(opening_begin, 0, 0, DBL_MAX) \
+  X(slip_begin, 0, 0, DBL_MAX) \
+  X(opening_end, 0, 0, DBL_MAX) \
+  X(slip_end, 0, 0, DBL_MAX) \
   X(closure_factor, 0, 0, DBL_MAX) \
   X(stiffness_factor, 0, 0, DBL_MAX) \
+  X(bending_factor, 0, 0, DBL_MAX) \
   X(largest_reach, 0, 0, DBL_MAX) \
   X(stretch, 0, 1, DBL_MAX) \
   X(farthest, 0, 0, DBL_MAX)
@@ -376,6 +406,7 @@ typedef double jl_of_joint_;
 #define JL_JOINTS_ 1
 #define JL_JOINT_(x, l) (x)
 #define jl_each_joint_(x) (x)
+#define jl_root_joint_(x) sqrt(x)
 /* A column of the tables of a block of facets, which lie side by side in it */
 JL_IN_ jl_of_facet_ jl_column_(const double *block, int c)
 {
@@ -405,6 +436,7 @@ typedef jl_real_ jl_of_joint_;
 #define JL_JOINTS_ JL_W_
 #define JL_JOINT_(x, l) JL_LANE_(x, l)
 #define jl_each_joint_(x) jl_each_(x)
+#define jl_root_joint_(x) jl_root_(x)
 JL_IN_ jl_of_facet_ jl_column_(const double *block, int c) { return block[c * JLAW_LANES]; }
 JL_IN_ jl_real_ jl_take_joint_(jl_numbers_ n, int row)
 {
@@ -447,36 +479,134 @@ JL_IN_ void jl_put_(jl_numbers_ n, int row, int apart, int some, jl_real_ x)
 #define JL_SUMS_ 4
 #define jl_total_(sum, of) (((sum)[0].of + (sum)[2].of) + ((sum)[1].of + (sum)[3].of))
 #endif
+/* bond.h: the bond beside the asperities of one joint; symbols of kernels/bond.py */
+
+typedef struct { /* displacement, damage; what the bond adds to traction, tangent and loss */
+  double delta[3], damage, F[3], C[9], lost;
+} jl_bonded_;
+
+/* 1 where opening and slip, squared, are the strength at this damage, more beyond it; p2: one over
+ * its half-axes, squared */
+JL_IN_ double jl_beyond_(const jlaw_law *law, double opening2, double slip2, double damage, double p2[2])
+{
+  const double p = law->opening_begin - damage * (law->opening_begin - law->opening_end);
+  const double q = law->slip_begin - damage * (law->slip_begin - law->slip_end);
+  p2[0] = p * p, p2[1] = q * q;
+  return opening2 * p2[0] + slip2 * p2[1];
+}
+
+/* Damage that opening and slip ask for: the smaller root of the quadratic; half the slope there */
+JL_IN_ double jl_damage_at_(const jlaw_law *law, double opening2, double slip2, double *slope)
+{
+  const double begin0 = law->opening_begin, soft0 = begin0 - law->opening_end;
+  const double begin1 = law->slip_begin, soft1 = begin1 - law->slip_end;
+  const double turn = begin1 * law->opening_end - begin0 * law->slip_end;
+  const double inside =
+      opening2 * (soft0 * soft0) + slip2 * (soft1 * soft1) - opening2 * slip2 * (turn * turn);
+  double p2[2];
+  const double over = jl_beyond_(law, opening2, slip2, 0.0, p2) - 1.0;
+  *slope = sqrt(inside > 0.0 ? inside : 0.0);
+  if (!(over > 0.0)) return 0.0;
+  if (!(jl_beyond_(law, opening2, slip2, 1.0, p2) < 1.0)) return 1.0;
+  const double found = over / (opening2 * (begin0 * soft0) + slip2 * (begin1 * soft1) + *slope);
+  return found < 1.0 ? found : 1.0;
+}
+
+/* A bond that has moved to b->delta, with its damage before; returns its stored energy */
+JL_IN_ double jl_hold_(const jlaw_law *law, jl_bonded_ *b)
+{
+  const double K[2] = {law->bond_normal, law->bond_shear}, old = b->damage;
+  const double u[3] = {b->delta[0] < 0.0 ? b->delta[0] : 0.0, b->delta[1], b->delta[2]};
+  const double opening2 = u[0] * u[0], slip2 = u[1] * u[1] + u[2] * u[2];
+  const double jl_psi_ = 0.5 * (K[0] * opening2 + K[1] * slip2);
+  double p2[2], slope;
+  const double found = jl_damage_at_(law, opening2, slip2, &slope);
+  const double now = b->damage = found > old ? found : old;
+  const int softens = found > old && now < 1.0;
+  const double first = jl_beyond_(law, opening2, slip2, old, p2);
+  const double there = jl_beyond_(law, opening2, slip2, now, p2), last = softens ? 1.0 : there;
+  b->lost = found > old ? (now - old) * jl_psi_ / sqrt(first * last) : 0.0;
+  for (int i = 0; i < 3; i++) {
+    b->F[i] = (1.0 - now) * K[i > 0] * u[i];
+    for (int j = 0; j < 3; j++)
+      b->C[3 * i + j] = softens ? -(K[i > 0] * u[i]) * (u[j] * p2[j > 0] / slope) : 0.0;
+    if (i || u[0] < 0.0) b->C[4 * i] += (1.0 - now) * K[i > 0];
+  }
+  return (1.0 - now) * jl_psi_;
+}
+
+/* Adds what the bond bears in a state after a step; its damage is in this row of the state */
+JL_IN_ void jl_step_bond_(const jlaw_law *law, jl_numbers_ n, int row, jl_of_joint_ F[3], jl_of_joint_ C[9],
+                  int tangent, int ledger)
+{
+  const int dim = law->dim;
+  for (int l = 0; l < JL_JOINTS_; l++) {
+    double *s = n.s + l;
+    jl_bonded_ b = {{0.0}, s[(size_t) row * n.stride], {0.0}, {0.0}, 0.0};
+    for (int i = 0; i < dim; i++) b.delta[i] = s[(size_t) i * n.stride];
+    jl_hold_(law, &b);
+    s[(size_t) row * n.stride] = b.damage;
+    if (ledger) s[(size_t) dim * n.stride] += b.lost;
+    for (int i = 0; i < dim; i++) JL_JOINT_(F[i], l) += b.F[i];
+    for (int i = 0; tangent && i < dim * dim; i++) JL_JOINT_(C[i], l) += b.C[i / dim * 3 + i % dim];
+  }
+}
+
+/* Stored energy of the bond in a state */
+JL_IN_ jl_of_joint_ jl_bond_stored_(const jlaw_law *law, jl_numbers_ n, int row)
+{
+  jl_of_joint_ stored = jl_each_joint_(0.0);
+  for (int l = 0; l < JL_JOINTS_; l++) {
+    jl_bonded_ b = {{0.0}, n.s[(size_t) row * n.stride + (size_t) l], {0.0}, {0.0}, 0.0};
+    for (int i = 0; i < law->dim; i++) b.delta[i] = n.s[(size_t) i * n.stride + (size_t) l];
+    JL_JOINT_(stored, l) = jl_hold_(law, &b);
+  }
+  return stored;
+}
 /* law.h: one step of a rock joint, and what a state amounts to, in lanes (lanes.h).
  *
  * Symbols and order are those of docs/theory-incremental.md and of kernels/reference.py. Rows of
- * a state: delta (dim) | in-plane offset (dim - 1) | dissipated energy | q_s (M D) | q_t (M D),
- * q times lam; where asperities yield flattened depth (M) | plastic work; with wear slip of the
- * asperities | by how much mu had fallen in the last step. A batch keeps beside them Phi and Phi'
- * of every facet (M each), which saves half the look-ups, and with yielding the same at z.
+ * a state: delta (dim) from the mated position | dissipated energy | q_s (M D) | q_t (M D), q times
+ * lam; where asperities yield flattened depth (M) | plastic work; with wear the share of the slopes
+ * that is gone | work of friction; with a bond its damage. A batch keeps beside them Phi and Phi' of every facet (M each), which saves half
+ * the look-ups, and with yielding the same at z.
  *
- * Of the functions of the C library that round differently, only expm1, log1p, pow and hypot are
- * called: zig links exp and log of its own.
+ * Of the functions of the C library that round differently, only expm1 and pow are called: zig
+ * links exp and log of its own.
  */
 
 typedef struct { /* what the compiler knows of a step: it leaves out the rest */
-  int dim, yields, wears, ledger, tangent;
+  int dim, yields, fades, wears, ledger, tangent;
   int kept; /* whether Phi and Phi' lie beside the state */
 } jl_kind_;
 
-typedef struct {                 /* a joint in a step */
-  jl_of_joint_ p[3], from[3], to[3]; /* increment; closure and in-plane offset before and after */
-  jl_of_joint_ J[4], slip;           /* d offset/d p; way along the offset at its limit */
-  jl_of_joint_ worn, since;          /* mu over that of unworn asperities; over that of the last step */
+typedef struct { /* in the plane of a joint: offset over the mating length, root of 1 - |o|^2 */
+  jl_of_joint_ o[2], w;
+} jl_site_;
+
+typedef struct { /* a joint in a step */
+  jl_of_joint_ p[3], from[3], to[3]; /* increment; closure and in-plane displacement before and after */
+  jl_site_ start, middle, end;
+  jl_of_joint_ had, has; /* share of the slopes that was left before the step, and is in it */
 } jl_motion_;
+
+typedef struct { /* the plane of facets: slope along the azimuth e and across it, in axes (1, e) */
+  jl_real_ x, z;                /* offset over the mating length along e and across */
+  jl_real_ along, across;
+  jl_real_ m2, N2, rm, rmn;     /* 1 + along^2, that + across^2; 1/m, 1/(m N) */
+  jl_real_ gamma;               /* c1 N */
+} jl_plane_;
 
 typedef struct { /* facets in a step: y, Phi, Phi', Phi'' before and after; de */
   jl_real_ y0, y1, f0, f1, k0, k1, bend, es, et;
+  jl_plane_ middle, end;
+  jl_real_ yw, fw, kw, strength, worn;          /* before slopes wore: y, Phi, Phi'; limit after it */
   jl_real_ dy, rdy;                             /* y1 - y0, and 1 over it */
   jl_yes_ near;                                 /* y has hardly changed */
   jl_real_ z0, z1, fz0, fz1, kz0, kz1;          /* flattened depth; Phi and Phi' there */
   jl_real_ qs, qt, lost, vs, vt, bss, bst, btt; /* sums over the cells: q, loss, v and B of C */
   jl_real_ ws, wt, open;                        /* the same of the softening by z1; any kappa */
+  jl_real_ gs, gt;                              /* of q by log(gamma) */
 } jl_facets_;
 
 typedef struct {             /* the sliders of one depth cell of facets */
@@ -489,14 +619,16 @@ typedef struct {             /* the sliders of one depth cell of facets */
 } jl_sliders_;
 
 typedef struct { /* what facets add up to */
-  jl_real_ F[3], C[9], pull[2], lost;
-  jl_real_ crushed, normal; /* plastic work; A Phi before and after */
+  jl_real_ F[3], C[9], lost;
+  jl_real_ crushed, lowered, worn; /* plastic work; what the wear of slopes takes: normal, sliders */
 } jl_sums_;
 
-/* Rows of a state: the first after the sliders, that of the slip of the asperities, and how many */
-JL_IN_ int jl_rest_row_(const jlaw_law *law) { return 2 * law->dim + 2 * law->facets * law->cells; }
-JL_IN_ int jl_slip_row_(const jlaw_law *law) { return jl_rest_row_(law) + (law->yields ? law->facets + 1 : 0); }
-JL_IN_ int jl_state_rows_(const jlaw_law *law) { return jl_slip_row_(law) + 2 * law->wears; }
+/* Rows of a state: the first of the sliders, the first after them, that of worn slopes, how many */
+JL_IN_ int jl_slider_row_(const jlaw_law *law) { return law->dim + 1; }
+JL_IN_ int jl_rest_row_(const jlaw_law *law) { return law->dim + 1 + 2 * law->facets * law->cells; }
+JL_IN_ int jl_worn_row_(const jlaw_law *law) { return jl_rest_row_(law) + (law->yields ? law->facets + 1 : 0); }
+JL_IN_ int jl_damage_row_(const jlaw_law *law) { return jl_worn_row_(law) + 2 * law->wears; }
+JL_IN_ int jl_state_rows_(const jlaw_law *law) { return jl_damage_row_(law) + law->bonded; }
 
 /* Tables of facets from number `at` on, and of their first depth cell */
 JL_IN_ const double *jl_facet_of_(const jlaw_law *law, int at)
@@ -625,7 +757,7 @@ JL_IN_ void jl_press_(const jlaw_law *law, const double *f, jl_numbers_ n, int k
 {
   const int M = law->facets, depth = jl_rest_row_(law);
   jl_real_ y = o->y1;
-  if (law->critical_slip < DBL_MAX) /* one depth for a facet and its opposite */
+  if (law->fades) /* one depth for a facet and its opposite */
     y = jl_larger_(y, 2.0 * jl_column_(f, JLAW_M) * m->to[0] - y);
   o->z0 = jl_take_(n, depth + at, 1, some);
   o->z1 = jl_larger_(y - jl_column_(f, JLAW_YIELD), o->z0);
@@ -659,98 +791,133 @@ JL_IN_ jl_real_ jl_crush_(const double *f, const jl_facets_ *o)
   return jl_pick_(jl_flattens_itself_(f, o), jl_each_(most), 0.5 * (c0 + c1)) * (o->fz1 - o->fz0);
 }
 
+/* --------------------------------------------------------------------- slopes that fade */
+
+/* Offset, over the mating length, at the in-plane displacement p0, p1: "Mating" */
+JL_IN_ jl_site_ jl_site_of_(const jlaw_law *law, jl_of_joint_ p0, jl_of_joint_ p1)
+{
+  jl_site_ at;
+  p0 = p0 / law->mating_length;
+  p1 = p1 / law->mating_length;
+  at.w = 1.0 / jl_root_joint_(1.0 + (p0 * p0 + p1 * p1));
+  at.o[0] = at.w * p0;
+  at.o[1] = at.w * p1;
+  return at;
+}
+
+/* Effective closure of facets at this closure, where this share of the slopes is left */
+JL_IN_ jl_real_ jl_climb_(const jlaw_law *law, const double *f, jl_of_joint_ closure, const jl_site_ *at,
+              jl_of_joint_ slopes)
+{
+  const jl_real_ x = jl_column_(f, JLAW_E) * at->o[0] + jl_column_(f, JLAW_E + 1) * at->o[1];
+  return closure + slopes * law->mating_length * (jl_column_(f, JLAW_STEEP) * x);
+}
+
+JL_IN_ jl_plane_ jl_plane_at_(const double *f, const jl_site_ *at, jl_of_joint_ slopes)
+{
+  jl_plane_ s;
+  s.x = jl_column_(f, JLAW_E) * at->o[0] + jl_column_(f, JLAW_E + 1) * at->o[1];
+  s.z = jl_column_(f, JLAW_E) * at->o[1] - jl_column_(f, JLAW_E + 1) * at->o[0];
+  const jl_real_ steep = slopes * at->w * jl_column_(f, JLAW_STEEP);
+  s.along = steep * (1.0 - s.x * s.x);
+  s.across = -steep * s.x * s.z;
+  s.m2 = 1.0 + s.along * s.along;
+  s.N2 = s.m2 + s.across * s.across;
+  const jl_real_ m = jl_root_(s.m2), N = jl_root_(s.N2);
+  s.rmn = 1.0 / (m * N);
+  s.rm = N * s.rmn;
+  s.gamma = jl_column_(f, JLAW_COSINE) * N;
+  return s;
+}
+
+/* Components of the joint's vector (v0, v1, v2) along e and across it, and back */
+JL_IN_ jl_real_ jl_along_azimuth_(const double *f, jl_real_ v1, jl_real_ v2)
+{
+  return jl_column_(f, JLAW_E) * v1 + jl_column_(f, JLAW_E + 1) * v2;
+}
+JL_IN_ jl_real_ jl_across_azimuth_(const double *f, jl_real_ v1, jl_real_ v2)
+{
+  return jl_column_(f, JLAW_E) * v2 - jl_column_(f, JLAW_E + 1) * v1;
+}
+JL_IN_ void jl_to_axes_(const double *f, jl_real_ *along, jl_real_ *across)
+{
+  const jl_real_ v1 = jl_column_(f, JLAW_E) * *along - jl_column_(f, JLAW_E + 1) * *across;
+  *across = jl_column_(f, JLAW_E + 1) * *along + jl_column_(f, JLAW_E) * *across;
+  *along = v1;
+}
+
+/* Derivative of the slopes by the displacement, both along the azimuth and across: ee, ez, zz */
+JL_IN_ void jl_curvature_(const jlaw_law *law, const double *f, const jl_plane_ *s, jl_of_joint_ w, jl_of_joint_ slopes,
+                  jl_real_ h[3])
+{
+  const jl_real_ bend = -(slopes * w * w / law->mating_length) * jl_column_(f, JLAW_STEEP);
+  h[0] = bend * (3.0 * s->x * (1.0 - s->x * s->x));
+  h[1] = bend * (s->z * (1.0 - 3.0 * s->x * s->x));
+  h[2] = bend * (s->x * (1.0 - 3.0 * s->z * s->z));
+}
+
+/* The increment in the plane of facets at mid-step */
+JL_IN_ void jl_move_in_plane_(const double *f, const jl_motion_ *m, jl_facets_ *o)
+{
+  const jl_plane_ *s = &o->middle;
+  const jl_real_ d0 = jl_each_(0.0) + m->p[0];
+  const jl_real_ de = jl_along_azimuth_(f, jl_each_(0.0) + m->p[1], jl_each_(0.0) + m->p[2]);
+  const jl_real_ dz = jl_across_azimuth_(f, jl_each_(0.0) + m->p[1], jl_each_(0.0) + m->p[2]);
+  o->es = (de - s->along * d0) * s->rm;
+  o->et = (s->m2 * dz - s->across * (d0 + s->along * de)) * s->rmn;
+}
+
+/* F of facets that fade: A Phi n and the sliders, in axes (1, e), then in those of the joint */
+JL_IN_ void jl_add_traction_(const jlaw_law *law, const double *f, const jl_facets_ *o, jl_sums_ *sum, int dim)
+{
+  const jl_plane_ *s = &o->end;
+  const jl_real_ n = jl_column_(f, JLAW_POTENTIAL) * o->f1;
+  const jl_real_ qs = law->soft * s->rm * o->qs, qt = law->soft * s->rmn * o->qt;
+  jl_real_ along = n * s->along + (qs - s->along * s->across * qt);
+  jl_real_ across = n * s->across + s->m2 * qt;
+  jl_to_axes_(f, &along, &across);
+  sum->F[0] += n - (s->along * qs + s->across * qt);
+  if (dim > 1) sum->F[1] += along;
+  if (dim > 2) sum->F[2] += across;
+}
+
 /* ------------------------------------------------------------------------------- wear */
 
-/* mu after the slip of the asperities, over that of unworn ones and over that of the last step */
-JL_IN_ void jl_wear_friction_(const jlaw_law *law, jl_of_joint_ slip, jl_of_joint_ fallen, jl_motion_ *m)
+/* Shares of the slopes that were left before the step, and are after the work of friction so far */
+JL_IN_ void jl_wear_slopes_(const jlaw_law *law, jl_numbers_ n, jl_motion_ *m)
 {
-  m->worn = m->since = jl_each_joint_(1.0);
-  if (!(law->mu > 0.0)) return;
+  const int row = jl_worn_row_(law);
+  jl_of_joint_ worn = jl_take_joint_(n, row);
+  const jl_of_joint_ work = jl_take_joint_(n, row + 1);
+  m->had = 1.0 - worn;
   for (int l = 0; l < JL_JOINTS_; l++) {
-    const double left = 1.0 + expm1(-JL_JOINT_(slip, l) / law->wear_slip);
-    const double now = law->mu_residual + (law->mu - law->mu_residual) * left;
-    const double last = law->mu - JL_JOINT_(fallen, l);
-    JL_JOINT_(m->worn, l) = now / law->mu;
-    JL_JOINT_(m->since, l) = now < last ? now / last : 1.0;
+    const double now = (law->slope_residual - 1.0) * expm1(-JL_JOINT_(work, l) / law->slope_wear);
+    JL_JOINT_(worn, l) = now > JL_JOINT_(worn, l) ? now : JL_JOINT_(worn, l);
   }
+  m->has = 1.0 - worn;
+  jl_put_joint_(n, row, worn);
 }
 
-/* mu has fallen: sliders come back to their limit, and lose what they held beyond it */
-JL_IN_ void jl_wear_sliders_(const jl_sliders_ *c, jl_of_joint_ since, jl_real_ *qs, jl_real_ *qt, jl_real_ *lost)
+/* Slopes have worn: springs that part take their force along, and friction limits the rest */
+JL_IN_ void jl_wear_sliders_(const double *cell, jl_facets_ *o, const jl_sliders_ *c, jl_real_ *qs, jl_real_ *qt,
+                     int yields)
 {
-  const jl_real_ size2 = *qs * *qs + *qt * *qt, cap = c->strength * c->G0;
-  const jl_real_ back = jl_pick_(size2 > cap * cap, jl_each_(0.0) + since, 1.0);
-  const jl_real_ gone = (1.0 - back) * (1.0 + back) * size2;
-  *lost += jl_only_(c->k0 > JLAW_TINY, gone / jl_pick_(c->k0 > JLAW_TINY, c->k0, 1.0));
-  *qs = back * *qs;
-  *qt = back * *qt;
-}
-
-/* ------------------------------------------------------------------------ large shear */
-
-/* The in-plane offset a of one joint moves by p, dragged along at its limit D; then it is to[0],
- * to[1], its way along itself to[2], and its derivative by p to[3] to to[6] */
-JL_IN_ void jl_drag_(double D, int dim, double a0, double a1, double p0, double p1, double to[7])
-{
-  const double length = hypot(p0, p1), e0 = p0 / length, e1 = p1 / length;
-  const double along = a0 * e0 + a1 * e1;
-  const double before = D * D - (a0 * a0 + a1 * a1) + along * along;
-  double inside = sqrt(before > 0.0 ? before : 0.0) - along; /* way until it is at its limit */
-  inside = inside > 0.0 ? (inside < length ? inside : length) : 0.0;
-  a0 += inside * e0;
-  a1 += inside * e1;
-  const double x = (length - inside) / D, rest = -expm1(-x), decay = 1.0 - rest;
-  double cosine = (a0 * e0 + a1 * e1) / D;
-  cosine = cosine > 0.0 ? (cosine < 1.0 ? cosine : 1.0) : 0.0;
-  const double sine = (a1 * e0 - a0 * e1) / D;
-  const double bottom = (1.0 + cosine) + (1.0 - cosine) * decay * decay;
-  const double cos1 = ((1.0 + cosine) - (1.0 - cosine) * decay * decay) / bottom;
-  const double sin1 = 2.0 * sine * decay / bottom;
-  to[0] = D * (cos1 * e0 - sin1 * e1);
-  to[1] = D * (cos1 * e1 + sin1 * e0);
-  to[2] = D * (x + log1p(0.5 * bottom - 1.0));
-  const double grazing = cosine > JLAW_GRAZING ? cosine : JLAW_GRAZING;
-  double turn = (rest * rest + cosine * rest * (1.0 + decay)) / bottom;
-  turn += inside / (D * grazing) * (2.0 * decay / bottom - sin1 * sine);
-  turn /= length;
-  const int turns = dim == 3; /* along one line the offset does not turn */
-  const double row0 = turns ? -turn * e1 - sin1 / D * e0 : 0.0;
-  const double row1 = turns ? turn * e0 - sin1 / D * e1 : 0.0;
-  to[3] = -to[1] * row0;
-  to[4] = -to[1] * row1;
-  to[5] = to[0] * row0;
-  to[6] = to[0] * row1;
-}
-
-/* Offsets that have come to their limit are dragged along: "Large shear" */
-JL_IN_ void jl_limit_offset_(const jlaw_law *law, int dim, jl_motion_ *m)
-{
-  const double D = law->critical_slip;
-  m->J[0] = m->J[3] = jl_each_joint_(1.0);
-  m->J[1] = m->J[2] = m->slip = jl_each_joint_(0.0);
-  if (!(D < DBL_MAX) || dim == 1) return;
-  for (int l = 0; l < JL_JOINTS_; l++) {
-    const double p0 = JL_JOINT_(m->p[1], l), p1 = dim > 2 ? JL_JOINT_(m->p[2], l) : 0.0;
-    const double a0 = JL_JOINT_(m->from[1], l), a1 = dim > 2 ? JL_JOINT_(m->from[2], l) : 0.0;
-    const double b0 = a0 + p0, b1 = a1 + p1;
-    if (!(b0 * b0 + b1 * b1 > D * D) || !(b0 * p0 + b1 * p1 > 0.0)) continue;
-    double to[7];
-    jl_drag_(D, dim, a0, a1, p0, p1, to);
-    JL_JOINT_(m->to[1], l) = to[0];
-    if (dim > 2) JL_JOINT_(m->to[2], l) = to[1];
-    JL_JOINT_(m->slip, l) = to[2];
-    for (int j = 0; j < 4; j++) JL_JOINT_(m->J[j], l) = to[3 + j];
+  jl_real_ G, kappa;
+  jl_share_of_(cell, o->yw, o->fw, o->kw, &G, &kappa);
+  if (yields) {
+    jl_real_ H, kz;
+    jl_share_of_(cell, o->z0, o->fz0, o->kz0, &H, &kz);
+    jl_flatten_(o->yw, o->z0, H, &G, &kappa);
   }
-}
-
-/* Energy that dragging the offset takes; pull: the in-plane part of the normal forces */
-JL_IN_ jl_of_joint_ jl_drag_loss_(const jlaw_law *law, int dim, const jl_motion_ *m, const jl_sums_ *sum)
-{
-  jl_of_joint_ along = jl_total_(sum, pull[0]) * m->to[1];
-  if (dim > 2) along += jl_total_(sum, pull[1]) * m->to[2];
-  for (int l = 0; l < JL_JOINTS_; l++) /* >= 0 by symmetry of the facets, but for rounding */
-    JL_JOINT_(along, l) = JL_JOINT_(along, l) > 0.0 ? JL_JOINT_(along, l) : 0.0;
-  return m->slip * along / law->critical_slip;
+  const jl_yes_ falls = c->k0 < kappa, had = kappa > JLAW_TINY, has = c->k0 > JLAW_TINY;
+  const jl_real_ kept = jl_pick_(falls, c->k0 / jl_pick_(falls, kappa, 1.0), 1.0);
+  const jl_real_ q2 = *qs * *qs + *qt * *qt, size = kept * jl_root_(q2), cap = o->strength * c->G0;
+  const jl_yes_ jl_beyond_ = size > cap;
+  const jl_real_ share = kept * jl_pick_(jl_beyond_, cap / jl_pick_(jl_beyond_, size, 1.0), 1.0);
+  o->worn += jl_only_(had, q2 / jl_pick_(had, kappa, 1.0));
+  o->worn -= jl_only_(has, share * share * q2 / jl_pick_(has, c->k0, 1.0));
+  *qs = share * *qs;
+  *qt = share * *qt;
 }
 
 /* --------------------------------------------------------------------------- one step */
@@ -841,6 +1008,11 @@ JL_IN_ void jl_slide_tangent_(const double *f, const double *cell, const jl_slid
   o->bss += beta - along * us * us;
   o->bst -= along * us * ut;
   o->btt += beta - along * ut * ut;
+  if (k.fades) {
+    const jl_real_ by_gamma = jl_only_(limited, c->strength * c->G1);
+    o->gs += by_gamma * us;
+    o->gt += by_gamma * ut;
+  }
   if (k.yields) {
     const jl_yes_ pulls = limited & (c->k1 > 0.0);
     const jl_real_ pull = c->strength * jl_only_(pulls, c->kz1);
@@ -851,16 +1023,13 @@ JL_IN_ void jl_slide_tangent_(const double *f, const double *cell, const jl_slid
 }
 
 /* One depth cell of facets: from the sliders before the step to those after it */
-JL_IN_ void jl_slide_(const double *f, const double *cell, const jl_motion_ *m, jl_facets_ *o, jl_real_ *qs, jl_real_ *qt,
-              jl_kind_ k)
+JL_IN_ void jl_slide_(const double *f, const double *cell, jl_facets_ *o, jl_real_ *qs, jl_real_ *qt, jl_kind_ k)
 {
   jl_sliders_ c;
   jl_cells_of_(cell, o, &c, k.yields);
   c.strength = jl_each_(jl_column_(f, JLAW_STRENGTH));
-  if (k.wears) {
-    c.strength = c.strength * m->worn;
-    jl_wear_sliders_(&c, m->since, qs, qt, &o->lost);
-  }
+  if (k.fades) c.strength = c.strength * o->end.gamma;
+  if (k.wears) jl_wear_sliders_(cell, o, &c, qs, qt, k.yields);
   jl_load_(f, o, &c, qs, qt, k);
   o->qs += *qs;
   o->qt += *qt;
@@ -869,10 +1038,8 @@ JL_IN_ void jl_slide_(const double *f, const double *cell, const jl_motion_ *m, 
 }
 
 /* C += along g^T + E^T B E of facets; where the flattened depth moves, less softening g_z^T */
-JL_IN_ void jl_add_tangent_(const jlaw_law *law, const double *f, const jl_motion_ *m, const jl_facets_ *o,
-                    jl_sums_ *sum, jl_kind_ k)
+JL_IN_ void jl_add_tangent_(const jlaw_law *law, const double *f, const jl_facets_ *o, jl_sums_ *sum, jl_kind_ k)
 {
-  const int drags = law->critical_slip < DBL_MAX;
   const jl_yes_ moves = (o->z1 - o->z0 > JLAW_ROUNDED * o->z1) & (o->open > 0.0);
   const jl_yes_ own = jl_flattens_itself_(f, o);
   for (int i = 0; i < k.dim; i++) {
@@ -881,11 +1048,7 @@ JL_IN_ void jl_add_tangent_(const jlaw_law *law, const double *f, const jl_motio
     const jl_real_ along = n * o->k1 + s * o->vs + t * o->vt;
     const jl_real_ left = s * o->bss + t * o->bst, right = s * o->bst + t * o->btt;
     for (int j = 0; j < k.dim; j++) {
-      jl_real_ g = jl_each_(jl_column_(f, JLAW_M + j)); /* dy/dd */
-      if (j > 0 && drags) {
-        g = jl_column_(f, JLAW_M + 1) * m->J[j - 1];
-        if (k.dim > 2) g += jl_column_(f, JLAW_M + 2) * m->J[j + 1];
-      }
+      const jl_real_ g = jl_each_(jl_column_(f, JLAW_M + j)); /* dy/dd */
       jl_real_ to = along * g + left * jl_column_(f, JLAW_S + j) + right * jl_column_(f, JLAW_T + j);
       if (k.yields) {
         const jl_real_ less = jl_only_(moves, n * o->kz1 + s * o->ws + t * o->wt);
@@ -896,6 +1059,61 @@ JL_IN_ void jl_add_tangent_(const jlaw_law *law, const double *f, const jl_motio
   }
 }
 
+/* The same where slopes fade, and with them planes turn and friction limits fall: worked out in
+ * axes (1, e), then turned. E: derivative of the increment in the plane; A, B: of the sliders'
+ * force by the slopes along and across; h: of these by the displacement. */
+JL_IN_ void jl_add_fading_tangent_(const jlaw_law *law, const double *f, const jl_motion_ *m, const jl_facets_ *o,
+                           jl_sums_ *sum, jl_kind_ k)
+{
+  const jl_yes_ moves = (o->z1 - o->z0 > JLAW_ROUNDED * o->z1) & (o->open > 0.0);
+  const jl_yes_ own = jl_flattens_itself_(f, o);
+  const jl_plane_ *s = &o->end, *r = &o->middle;
+  const jl_real_ soft = jl_each_(law->soft), none = jl_each_(0.0), n = jl_each_(jl_column_(f, JLAW_POTENTIAL));
+  jl_real_ h[3], H[3], C[3][3]; /* ee, ez, zz */
+  jl_curvature_(law, f, s, m->end.w, m->has, h);
+  jl_curvature_(law, f, r, m->middle.w, m->has, H);
+  /* the middle */
+  const jl_real_ d0 = jl_each_(0.0) + m->p[0];
+  const jl_real_ de = jl_along_azimuth_(f, jl_each_(0.0) + m->p[1], jl_each_(0.0) + m->p[2]);
+  const jl_real_ dz = jl_across_azimuth_(f, jl_each_(0.0) + m->p[1], jl_each_(0.0) + m->p[2]);
+  const jl_real_ turn = d0 + r->along * de, rm2 = 1.0 / r->m2, rN2 = 1.0 / r->N2;
+  const jl_real_ ea = -0.5 * turn * (rm2 * r->rm), eb = -0.5 * (turn * r->rmn + o->et * r->across * rN2);
+  const jl_real_ ta = 0.5 * ((2.0 * r->along * dz - r->across * de) * r->rmn
+                         - o->et * r->along * (rm2 + rN2));
+  const jl_real_ Es[3] = {-r->along * r->rm, r->rm + ea * H[0], ea * H[1]};
+  const jl_real_ Et[3] = {-r->across * r->rmn,
+                      -r->along * r->across * r->rmn + ta * H[0] + eb * H[1],
+                      r->m2 * r->rmn + ta * H[1] + eb * H[2]};
+  /* the end */
+  const jl_real_ cs[3] = {-s->along * s->rm, s->rm, none};
+  const jl_real_ ct[3] = {-s->across * s->rmn, -s->along * s->across * s->rmn, s->m2 * s->rmn};
+  const jl_real_ rM2 = 1.0 / s->m2, rn2 = 1.0 / s->N2, rm3 = rM2 * s->rm;
+  const jl_real_ qa = o->qs * rm3, qt = o->qt * s->rmn, fall = s->along * (rM2 + rn2);
+  const jl_real_ A[3] = {-qa - o->qt * ct[0] * fall, -s->along * qa - s->across * qt - o->qt * ct[1] * fall,
+                     2.0 * s->along * qt - o->qt * ct[2] * fall};
+  const jl_real_ down = o->qt * s->across * rn2;
+  const jl_real_ B[3] = {-qt - down * ct[0], -s->along * qt - down * ct[1], -down * ct[2]};
+  const jl_real_ ga = s->along * rn2, gb = s->across * rn2; /* of log(gamma) */
+  const jl_real_ g[3] = {jl_each_(1.0), s->along, s->across};
+  for (int j = 0; j < 3; j++) {
+    const jl_real_ ha = j ? h[j - 1] : none, hb = j ? h[j] : none, gamma = ga * ha + gb * hb;
+    const jl_real_ us = o->vs * g[j] + o->bss * Es[j] + o->bst * Et[j] + o->gs * gamma;
+    const jl_real_ ut = o->vt * g[j] + o->bst * Es[j] + o->btt * Et[j] + o->gt * gamma;
+    const jl_real_ pressing = k.yields ? jl_only_(moves, j ? jl_pick_(own, g[j], -g[j]) : g[j]) : none;
+    for (int i = 0; i < 3; i++) {
+      const jl_real_ bend = i == 1 ? ha : i == 2 ? hb : none;
+      C[i][j] = n * (o->k1 * g[i] * g[j] + o->f1 * bend)
+                + soft * (cs[i] * us + ct[i] * ut + (A[i] * ha + B[i] * hb));
+      if (k.yields)
+        C[i][j] -= pressing * (n * g[i] * o->kz1 + soft * (cs[i] * o->ws + ct[i] * o->wt));
+    }
+  }
+  for (int i = 0; i < 3; i++) jl_to_axes_(f, &C[i][1], &C[i][2]);
+  for (int j = 0; j < 3; j++) jl_to_axes_(f, &C[1][j], &C[2][j]);
+  for (int i = 0; i < k.dim; i++)
+    for (int j = 0; j < k.dim; j++) sum->C[3 * i + j] += C[i][j];
+}
+
 /* Facets from number `at` on: closures, virgin curve, sliders, and their part of F and C */
 JL_IN_ void jl_step_facets_(const jlaw_law *law, int at, const jl_motion_ *m, jl_numbers_ n, jl_sums_ *sum, jl_kind_ k)
 {
@@ -904,23 +1122,39 @@ JL_IN_ void jl_step_facets_(const jlaw_law *law, int at, const jl_motion_ *m, jl
   const double *f = jl_facet_of_(law, at), *cell = jl_cell_of_(law, at);
   jl_facets_ o;
   o.y0 = o.y1 = o.es = o.et = o.bend = jl_each_(0.0);
-  for (int i = 0; i < k.dim; i++) {
+  for (int i = 0; i < k.dim && !k.fades; i++) {
     o.y0 += jl_column_(f, JLAW_M + i) * m->from[i];
     o.y1 += jl_column_(f, JLAW_M + i) * m->to[i];
     o.es += jl_column_(f, JLAW_S + i) * m->p[i];
     if (i > 0) o.et += jl_column_(f, JLAW_T + i) * m->p[i];
   }
-  if (!k.yields && !jl_any_((o.y0 > 0.0) | (o.y1 > 0.0))) return; /* apart: all it holds is zero */
+  if (k.fades) {
+    o.y0 = jl_climb_(law, f, m->from[0], &m->start, m->has);
+    o.y1 = jl_climb_(law, f, m->to[0], &m->end, m->has);
+  }
+  o.yw = k.wears ? jl_resolved_(jl_climb_(law, f, m->from[0], &m->start, m->had)) : o.y0;
+  if (!k.yields && !jl_any_((o.y0 > 0.0) | (o.y1 > 0.0) | (o.yw > 0.0))) return; /* apart: holds zero */
+  if (k.fades) {
+    o.middle = jl_plane_at_(f, &m->middle, m->has);
+    o.end = jl_plane_at_(f, &m->end, m->has);
+    jl_move_in_plane_(f, m, &o);
+  }
+  if (k.wears) o.strength = jl_column_(f, JLAW_STRENGTH) * jl_plane_at_(f, &m->start, m->has).gamma;
   o.y0 = jl_resolved_(o.y0);
   o.y1 = jl_resolved_(o.y1);
   o.dy = o.y1 - o.y0;
   o.rdy = 1.0 / o.dy;
   o.near = jl_size_of_(o.dy) <= JLAW_NEAR * jl_size_of_(o.y1);
   o.qs = o.qt = o.lost = o.vs = o.vt = o.bss = o.bst = o.btt = o.ws = o.wt = o.open = jl_each_(0.0);
+  o.gs = o.gt = o.worn = jl_each_(0.0);
   if (k.kept) {
     o.f0 = jl_take_(n, kept + at, 1, some);
     o.k0 = jl_take_(n, kept + M + at, 1, some);
-  } else jl_virgin_curve_(law, o.y0, &o.f0, &o.k0, (jl_real_ *) 0);
+  } else jl_virgin_curve_(law, o.yw, &o.f0, &o.k0, (jl_real_ *) 0);
+  if (k.wears) {
+    o.fw = o.f0, o.kw = o.k0;
+    jl_virgin_curve_(law, o.y0, &o.f0, &o.k0, (jl_real_ *) 0);
+  }
   jl_virgin_curve_(law, o.y1, &o.f1, &o.k1, k.tangent ? &o.bend : (jl_real_ *) 0);
   if (k.kept) {
     jl_put_(n, kept + at, 1, some, o.f1);
@@ -930,85 +1164,110 @@ JL_IN_ void jl_step_facets_(const jlaw_law *law, int at, const jl_motion_ *m, jl
   if (k.yields) jl_press_(law, f, n, kept, at, some, m, &o);
   for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_LANES) {
     const jl_of_facet_ low = jl_column_(cell, JLAW_LOW);
-    if (!jl_any_((o.y0 > low) | (o.y1 > low))) break; /* nor does what is deeper */
-    const int row = 2 * k.dim + at * D + i;
+    if (!jl_any_((o.y0 > low) | (o.y1 > low) | (o.yw > low))) break; /* nor does what is deeper */
+    const int row = k.dim + 1 + at * D + i;
     jl_real_ qs = jl_take_(n, row, D, some), qt = jl_take_(n, row + M * D, D, some);
-    jl_slide_(f, cell, m, &o, &qs, &qt, k);
+    jl_slide_(f, cell, &o, &qs, &qt, k);
     jl_put_(n, row, D, some, qs);
     jl_put_(n, row + M * D, D, some, qt);
   }
   if (k.yields) {
     sum->crushed += jl_column_(f, JLAW_POTENTIAL) * jl_crush_(f, &o);
+    if (k.wears) jl_flatten_facets_(o.yw, o.z0, o.fz0, &o.fw, &o.kw);
     jl_flatten_facets_(o.y0, o.z0, o.fz0, &o.f0, &o.k0);
     jl_flatten_facets_(o.y1, o.z1, o.fz1, &o.f1, &o.k1);
   }
-  if (k.wears) sum->normal += jl_column_(f, JLAW_A) * (o.f0 + o.f1);
   if (k.ledger) sum->lost += jl_column_(f, JLAW_COMPLIANCE) * o.lost;
+  if (k.wears) {
+    sum->worn += jl_column_(f, JLAW_COMPLIANCE) * o.worn;
+    sum->lowered += 0.5 * jl_column_(f, JLAW_POTENTIAL) * ((o.fw + o.f0) * (o.yw - o.y0));
+  }
+  if (k.fades) {
+    jl_add_traction_(law, f, &o, sum, k.dim);
+    if (k.tangent) jl_add_fading_tangent_(law, f, m, &o, sum, k);
+    return;
+  }
   const jl_real_ normal = jl_column_(f, JLAW_A) * o.f1, qs = law->soft * o.qs, qt = law->soft * o.qt;
   for (int i = 0; i < k.dim; i++) {
     const jl_real_ pull = jl_column_(f, JLAW_N + i) * normal;
     sum->F[i] += pull + (jl_column_(f, JLAW_S + i) * qs + jl_column_(f, JLAW_T + i) * qt);
-    if (i > 0 && k.ledger) sum->pull[i - 1] += pull;
   }
-  if (k.tangent) jl_add_tangent_(law, f, m, &o, sum, k);
+  if (k.tangent) jl_add_tangent_(law, f, &o, sum, k);
 }
 
 /* Advance joints by the increments d: their numbers n, F (dim), and C (dim, dim) for a tangent */
 JL_IN_ void jl_step_(const jlaw_law *law, jl_numbers_ n, const jl_of_joint_ d[3], jl_of_joint_ F[3], jl_of_joint_ C[9],
              jl_kind_ k)
 {
-  const int dim = k.dim, M = law->facets, rest = jl_rest_row_(law), slip = jl_slip_row_(law);
+  const int dim = k.dim, M = law->facets, rest = jl_rest_row_(law);
   jl_motion_ m;
   jl_sums_ sum[JL_SUMS_];
   for (int i = 0; i < 3; i++) {
     m.p[i] = i < dim ? d[i] : jl_each_joint_(0.0);
-    m.from[i] = i < dim ? jl_take_joint_(n, i ? dim + i - 1 : 0) : jl_each_joint_(0.0);
+    m.from[i] = i < dim ? jl_take_joint_(n, i) : jl_each_joint_(0.0);
     m.to[i] = m.from[i] + m.p[i];
   }
-  jl_limit_offset_(law, dim, &m);
-  m.worn = m.since = jl_each_joint_(1.0);
-  if (k.wears) jl_wear_friction_(law, jl_take_joint_(n, slip), jl_take_joint_(n, slip + 1), &m);
+  m.had = m.has = jl_each_joint_(1.0);
+  if (k.wears) jl_wear_slopes_(law, n, &m);
+  if (k.fades) {
+    m.start = jl_site_of_(law, m.from[1], m.from[2]);
+    m.middle = jl_site_of_(law, m.from[1] + 0.5 * m.p[1], m.from[2] + 0.5 * m.p[2]);
+    m.end = jl_site_of_(law, m.to[1], m.to[2]);
+  }
   for (int i = 0; i < JL_SUMS_; i++) {
     for (int j = 0; j < 3; j++) sum[i].F[j] = jl_each_(0.0);
     for (int j = 0; k.tangent && j < 9; j++) sum[i].C[j] = jl_each_(0.0);
-    sum[i].pull[0] = sum[i].pull[1] = sum[i].lost = sum[i].crushed = sum[i].normal = jl_each_(0.0);
+    sum[i].lost = sum[i].crushed = sum[i].lowered = sum[i].worn = jl_each_(0.0);
   }
   for (int at = 0; at < M; at += JL_TOGETHER_)
     jl_step_facets_(law, at, &m, n, sum + at / JL_TOGETHER_ % JL_SUMS_, k);
   for (int i = 0; i < dim; i++) {
     F[i] = jl_total_(sum, F[i]);
     for (int j = 0; k.tangent && j < dim; j++) C[dim * i + j] = jl_total_(sum, C[3 * i + j]);
-    jl_put_joint_(n, i, jl_take_joint_(n, i) + m.p[i]);
-    if (i > 0) jl_put_joint_(n, dim + i - 1, m.to[i]);
+    jl_put_joint_(n, i, m.to[i]);
   }
   if (!k.ledger) return;
   jl_of_joint_ lost = jl_total_(sum, lost);
-  if (dim > 1 && law->critical_slip < DBL_MAX) lost += jl_drag_loss_(law, dim, &m, sum);
-  if (k.wears) { /* slip of the asperities: the loss over the mean friction limit */
-    const jl_of_joint_ limit = 0.5 * law->mu * m.worn * jl_total_(sum, normal);
-    jl_of_joint_ way = jl_take_joint_(n, slip);
-    for (int l = 0; l < JL_JOINTS_; l++)
-      if (JL_JOINT_(limit, l) > 0.0) JL_JOINT_(way, l) += JL_JOINT_(lost, l) / JL_JOINT_(limit, l);
-    jl_put_joint_(n, slip, way);
-    jl_put_joint_(n, slip + 1, law->mu - law->mu * m.worn);
+  if (k.wears) {
+    jl_of_joint_ lowered = jl_total_(sum, lowered);
+    for (int l = 0; l < JL_JOINTS_; l++) /* >= 0 by the pairs of facets, but for rounding */
+      JL_JOINT_(lowered, l) = JL_JOINT_(lowered, l) > 0.0 ? JL_JOINT_(lowered, l) : 0.0;
+    jl_put_joint_(n, jl_worn_row_(law) + 1, jl_take_joint_(n, jl_worn_row_(law) + 1) + lost);
+    lost += jl_total_(sum, worn) + lowered;
   }
   if (k.yields) {
     const jl_of_joint_ crushed = jl_total_(sum, crushed);
     jl_put_joint_(n, rest + M, jl_take_joint_(n, rest + M) + crushed);
     lost += crushed;
   }
-  jl_put_joint_(n, 2 * dim - 1, jl_take_joint_(n, 2 * dim - 1) + lost);
+  jl_put_joint_(n, dim, jl_take_joint_(n, dim) + lost);
 }
 
 /* ------------------------------------------------------------------ what a state is */
 
-/* Facets from number `at` on in a state: y and z with the virgin curve there, as y1 and z1 */
+/* A joint that does not move */
+JL_IN_ jl_motion_ jl_standing_(const jlaw_law *law, jl_numbers_ n)
+{
+  jl_motion_ m;
+  for (int i = 0; i < 3; i++) m.to[i] = i < law->dim ? jl_take_joint_(n, i) : jl_each_joint_(0.0);
+  m.has = jl_each_joint_(1.0);
+  if (law->wears) m.has = 1.0 - jl_take_joint_(n, jl_worn_row_(law));
+  if (law->fades) m.end = jl_site_of_(law, m.to[1], m.to[2]);
+  return m;
+}
+
+/* Facets from number `at` on in a state: y, z, and the virgin curve there as in y1 and z1; the
+ * friction limit of q over G */
 JL_IN_ void jl_facets_now_(const jlaw_law *law, jl_numbers_ n, int at, jl_facets_ *o)
 {
+  const jl_motion_ m = jl_standing_(law, n);
   const int dim = law->dim, some = law->facets - at < JL_TOGETHER_ ? law->facets - at : JL_TOGETHER_;
   const double *f = jl_facet_of_(law, at);
   o->y1 = o->z1 = o->fz1 = o->kz1 = jl_each_(0.0);
-  for (int i = 0; i < dim; i++) o->y1 += jl_column_(f, JLAW_M + i) * jl_take_joint_(n, i ? dim + i - 1 : 0);
+  for (int i = 0; i < dim && !law->fades; i++) o->y1 += jl_column_(f, JLAW_M + i) * m.to[i];
+  if (law->fades) o->y1 = jl_climb_(law, f, m.to[0], &m.end, m.has);
+  o->strength = jl_each_(jl_column_(f, JLAW_STRENGTH));
+  if (law->fades) o->strength = o->strength * jl_plane_at_(f, &m.end, m.has).gamma;
   o->y1 = jl_resolved_(o->y1);
   jl_virgin_curve_(law, o->y1, &o->f1, &o->k1, (jl_real_ *) 0);
   if (!law->yields) return;
@@ -1026,41 +1285,30 @@ JL_IN_ void jl_cell_now_(const double *cell, const jl_facets_ *o, int yields, jl
   jl_flatten_(o->y1, o->z1, H, G, kappa);
 }
 
-/* Friction now over that of unworn asperities */
-JL_IN_ jl_of_joint_ jl_worn_now_(const jlaw_law *law, jl_numbers_ n)
-{
-  const int slip = jl_slip_row_(law);
-  jl_motion_ m;
-  m.worn = jl_each_joint_(1.0);
-  if (law->wears) jl_wear_friction_(law, jl_take_joint_(n, slip), jl_take_joint_(n, slip + 1), &m);
-  return m.worn;
-}
-
-typedef struct { /* as reference.Measures; the energies of normal and shear springs */
-  jl_of_joint_ sliding, slipping, separated, normal, sheared, reach;
+typedef struct { /* as reference.Measures; energies of normal and shear springs and of the bond */
+  jl_of_joint_ sliding, slipping, separated, normal, sheared, bond, reach;
 } jl_amounts_;
 
 typedef struct {
   jl_real_ sliding, slipping, separated, normal, sheared;
 } jl_amount_sums_;
 
-JL_IN_ void jl_measure_facets_(const jlaw_law *law, jl_numbers_ n, int at, jl_of_joint_ worn, jl_amount_sums_ *sum,
-                       jl_of_joint_ *reach)
+JL_IN_ void jl_measure_facets_(const jlaw_law *law, jl_numbers_ n, int at, jl_amount_sums_ *sum, jl_of_joint_ *reach)
 {
   const int M = law->facets, D = law->cells, some = M - at < JL_TOGETHER_ ? M - at : JL_TOGETHER_;
   const double *f = jl_facet_of_(law, at), *cell = jl_cell_of_(law, at);
-  const jl_real_ strength = jl_column_(f, JLAW_STRENGTH) * worn, one = jl_each_(1.0);
+  const jl_real_ one = jl_each_(1.0);
   jl_real_ held = jl_each_(0.0), sheared = jl_each_(0.0), whole_slips = one;
   jl_facets_ o;
   jl_facets_now_(law, n, at, &o);
   for (int i = 0; i < D && jl_any_(o.y1 > jl_column_(cell, JLAW_LOW)); i++) {
     jl_real_ G, kappa;
-    const int row = 2 * law->dim + at * D + i;
+    const int row = jl_slider_row_(law) + at * D + i;
     const jl_real_ qs = jl_take_(n, row, D, some), qt = jl_take_(n, row + M * D, D, some);
     jl_cell_now_(cell, &o, law->yields, &G, &kappa);
     const jl_real_ q2 = qs * qs + qt * qt;
     const jl_yes_ stiff = kappa > JLAW_TINY;
-    const jl_yes_ limited = jl_root_(q2) >= strength * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * o.f1);
+    const jl_yes_ limited = jl_root_(q2) >= o.strength * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * o.f1);
     held += jl_only_(limited, G);
     whole_slips = jl_only_(limited, whole_slips);
     sheared += jl_only_(stiff, q2 / jl_pick_(stiff, kappa, 1.0));
@@ -1069,11 +1317,11 @@ JL_IN_ void jl_measure_facets_(const jlaw_law *law, jl_numbers_ n, int at, jl_of
   const jl_yes_ touches = o.y1 > o.z1;
   const jl_real_ force = jl_only_(touches, jl_larger_(o.f1 - o.fz1, jl_each_(0.0))),
              share = jl_each_(jl_column_(f, JLAW_SHARE));
-  jl_real_ normal = jl_psi_(law, o.y1);
-  if (law->yields) normal = normal - jl_psi_(law, o.z1) - o.fz1 * (o.y1 - o.z1);
   sum->sliding += share * jl_only_(touches, whole_slips);
   sum->slipping += share * jl_smaller_(jl_only_(force > 0.0, held / jl_pick_(force > 0.0, force, 1.0)), one);
   sum->separated += share * jl_pick_(touches, 0.0, 1.0);
+  jl_real_ normal = jl_psi_(law, o.y1);
+  if (law->yields) normal = normal - jl_psi_(law, o.z1) - o.fz1 * (o.y1 - o.z1);
   sum->normal += jl_column_(f, JLAW_POTENTIAL) * jl_only_(touches, jl_larger_(normal, jl_each_(0.0)));
   sum->sheared += jl_column_(f, JLAW_COMPLIANCE) * sheared;
 #ifdef JLAW_ABREAST
@@ -1085,7 +1333,6 @@ JL_IN_ void jl_measure_facets_(const jlaw_law *law, jl_numbers_ n, int at, jl_of
 
 JL_IN_ jl_amounts_ jl_measure_(const jlaw_law *law, jl_numbers_ n)
 {
-  const jl_of_joint_ worn = jl_worn_now_(law, n);
   jl_amount_sums_ sum[JL_SUMS_];
   jl_amounts_ all;
   all.reach = jl_each_joint_(-DBL_MAX);
@@ -1093,20 +1340,21 @@ JL_IN_ jl_amounts_ jl_measure_(const jlaw_law *law, jl_numbers_ n)
     sum[i].sliding = sum[i].slipping = sum[i].separated = sum[i].normal = sum[i].sheared =
         jl_each_(0.0);
   for (int at = 0; at < law->facets; at += JL_TOGETHER_)
-    jl_measure_facets_(law, n, at, worn, sum + at / JL_TOGETHER_ % JL_SUMS_, &all.reach);
+    jl_measure_facets_(law, n, at, sum + at / JL_TOGETHER_ % JL_SUMS_, &all.reach);
   all.sliding = jl_total_(sum, sliding);
   all.slipping = jl_total_(sum, slipping);
   all.separated = jl_total_(sum, separated);
   all.normal = jl_total_(sum, normal);
   all.sheared = jl_total_(sum, sheared);
+  all.bond = law->bonded ? jl_bond_stored_(law, n, jl_damage_row_(law)) : jl_each_joint_(0.0);
   return all;
 }
 
 /* ------------------------------------------------------------- kinds of a step */
 
-JL_IN_ jl_kind_ jl_kind_of_(int dim, int yields, int wears, int ledger, int tangent, int kept)
+JL_IN_ jl_kind_ jl_kind_of_(int dim, int yields, int fades, int wears, int ledger, int tangent, int kept)
 {
-  const jl_kind_ k = {dim, yields, wears, ledger, tangent, kept};
+  const jl_kind_ k = {dim, yields, fades, wears, ledger, tangent, kept};
   return k;
 }
 
@@ -1116,18 +1364,30 @@ JL_IN_ void jl_step_of_kind_(const jlaw_law *law, jl_numbers_ n, const jl_of_joi
                      jl_of_joint_ C[9], int ledger, int tangent, int kept)
 {
   const int dim = law->dim, y = law->yields, w = law->wears;
-  if (y || w || dim == 1) {
-    if (tangent) jl_step_(law, n, d, F, C, jl_kind_of_(dim, y, w, 1, 1, kept));
-    else jl_step_(law, n, d, F, C, jl_kind_of_(dim, y, w, 1, 0, kept));
+  if (law->fades) {
+    if (y || w || dim == 1) {
+      if (tangent) jl_step_(law, n, d, F, C, jl_kind_of_(dim, y, 1, w, 1, 1, kept));
+      else jl_step_(law, n, d, F, C, jl_kind_of_(dim, y, 1, w, 1, 0, kept));
+    } else if (dim == 3) {
+      if (tangent) jl_step_(law, n, d, F, C, jl_kind_of_(3, 0, 1, 0, ledger, 1, kept));
+      else jl_step_(law, n, d, F, C, jl_kind_of_(3, 0, 1, 0, ledger, 0, kept));
+    } else {
+      if (tangent) jl_step_(law, n, d, F, C, jl_kind_of_(2, 0, 1, 0, ledger, 1, kept));
+      else jl_step_(law, n, d, F, C, jl_kind_of_(2, 0, 1, 0, ledger, 0, kept));
+    }
+  } else if (y || dim == 1) {
+    if (tangent) jl_step_(law, n, d, F, C, jl_kind_of_(dim, y, 0, 0, 1, 1, kept));
+    else jl_step_(law, n, d, F, C, jl_kind_of_(dim, y, 0, 0, 1, 0, kept));
   } else if (dim == 3) {
-    if (tangent) jl_step_(law, n, d, F, C, jl_kind_of_(3, 0, 0, ledger, 1, kept));
-    else if (ledger) jl_step_(law, n, d, F, C, jl_kind_of_(3, 0, 0, 1, 0, kept));
-    else jl_step_(law, n, d, F, C, jl_kind_of_(3, 0, 0, 0, 0, kept));
+    if (tangent) jl_step_(law, n, d, F, C, jl_kind_of_(3, 0, 0, 0, ledger, 1, kept));
+    else if (ledger) jl_step_(law, n, d, F, C, jl_kind_of_(3, 0, 0, 0, 1, 0, kept));
+    else jl_step_(law, n, d, F, C, jl_kind_of_(3, 0, 0, 0, 0, 0, kept));
   } else {
-    if (tangent) jl_step_(law, n, d, F, C, jl_kind_of_(2, 0, 0, ledger, 1, kept));
-    else if (ledger) jl_step_(law, n, d, F, C, jl_kind_of_(2, 0, 0, 1, 0, kept));
-    else jl_step_(law, n, d, F, C, jl_kind_of_(2, 0, 0, 0, 0, kept));
+    if (tangent) jl_step_(law, n, d, F, C, jl_kind_of_(2, 0, 0, 0, ledger, 1, kept));
+    else if (ledger) jl_step_(law, n, d, F, C, jl_kind_of_(2, 0, 0, 0, 1, 0, kept));
+    else jl_step_(law, n, d, F, C, jl_kind_of_(2, 0, 0, 0, 0, 0, kept));
   }
+  if (law->bonded) jl_step_bond_(law, n, jl_damage_row_(law), F, C, tangent, ledger || y || w);
 }
 
 /* ------------------------------------------------------------------ messages */
@@ -1241,14 +1501,14 @@ static JLAW_FUNCTION int jlaw_sound_(const double *q, int n)
 /* Whether energies, flattened depths and slip of a state are numbers that a law can have */
 static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
 {
-  const double *rest = s + jl_rest_row_(law), *slip = s + jl_slip_row_(law);
-  int good = fabs(s[2 * law->dim - 1]) <= DBL_MAX;
+  const double *rest = s + jl_rest_row_(law), *worn = s + jl_worn_row_(law);
+  int good = fabs(s[law->dim]) <= DBL_MAX;
   for (int f = 0; law->yields && f < law->facets; f++)
     good = good && rest[f] >= 0.0 && rest[f] <= law->largest_reach;
   if (law->yields) good = good && fabs(rest[law->facets]) <= DBL_MAX;
-  if (law->wears) good = good && slip[0] >= 0.0 && slip[0] <= DBL_MAX;
-  if (law->wears) good = good && slip[1] >= 0.0 && slip[1] <= law->mu;
-  return good && jlaw_sound_(s + 2 * law->dim, jl_rest_row_(law) - 2 * law->dim);
+  if (law->wears) good = good && worn[0] >= 0.0 && worn[0] <= 1.0 && worn[1] <= DBL_MAX;
+  if (law->bonded) good = good && s[jl_damage_row_(law)] >= 0.0 && s[jl_damage_row_(law)] <= 1.0;
+  return good && jlaw_sound_(s + jl_slider_row_(law), jl_rest_row_(law) - jl_slider_row_(law));
 }
 
 static JLAW_FUNCTION int jlaw_refuse_(const jlaw_law *law, const double *s, const double *d,
@@ -1286,8 +1546,7 @@ JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1,
 {
   const int dim = law->dim, rows = jl_state_rows_(law);
   double far = 0.0, step_size = 0.0; /* NaN stays in sums */
-  for (int i = 0; i < 2 * dim - 1; i++) far += fabs(s0[i]);
-  for (int i = 0; i < dim; i++) step_size += fabs(d[i]);
+  for (int i = 0; i < dim; i++) far += fabs(s0[i]), step_size += fabs(d[i]);
   const double reach = law->stretch * (far + step_size);
   const int damaged = !(far <= DBL_MAX) || !jlaw_proper_(law, s0);
   if (damaged || !(reach <= law->largest_reach))
@@ -1303,9 +1562,17 @@ JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1,
 JLAW_FUNCTION int jlaw_dim(const jlaw_law *law) { return law->dim; }
 JLAW_FUNCTION int jlaw_state_size(const jlaw_law *law) { return jl_state_rows_(law); }
 JLAW_FUNCTION const char *jlaw_fingerprint(const jlaw_law *law) { return law->fingerprint; }
+JLAW_FUNCTION int jlaw_unmated(const jlaw_law *law, double *s)
+{
+  const int far = law->fades && law->dim > 1;
+  for (int i = 0; i < jl_state_rows_(law); i++) s[i] = 0.0;
+  if (far) s[0] = law->first_touch, s[1] = JLAW_FAR * law->mating_length;
+  if (law->bonded) s[jl_damage_row_(law)] = 1.0;
+  return far ? 0 : -1;
+}
 JLAW_FUNCTION double jlaw_dissipated(const jlaw_law *law, const double *s)
 {
-  return s[2 * law->dim - 1];
+  return s[law->dim];
 }
 
 JLAW_CLONES static JLAW_FUNCTION jl_amounts_ jlaw_measure_(const jlaw_law *law, const double *s)
@@ -1317,7 +1584,7 @@ JLAW_CLONES static JLAW_FUNCTION jl_amounts_ jlaw_measure_(const jlaw_law *law, 
 JLAW_FUNCTION double jlaw_stored(const jlaw_law *law, const double *s)
 {
   const jl_amounts_ all = jlaw_measure_(law, s);
-  return all.normal + all.sheared;
+  return all.normal + all.sheared + all.bond;
 }
 
 JLAW_FUNCTION void jlaw_shares(const jlaw_law *law, const double *s, double shares[3])
@@ -1339,6 +1606,11 @@ JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure)
       const double depth = jlaw_of_facet_(law, f, i + 1);
       late += jlaw_of_facet_(law, f, i) * jlaw_virgin_one_(law, closure - depth, &slope);
     }
+  if (law->bonded && closure < 0.0) { /* a joint that opens */
+    jl_bonded_ b = {{closure, 0.0, 0.0}, 0.0, {0.0}, {0.0}, 0.0};
+    jl_hold_(law, &b);
+    return b.F[0];
+  }
   return law->closure_factor * jlaw_virgin_one_(law, closure, &slope) - late;
 }
 
@@ -1346,8 +1618,9 @@ JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure)
 {
   double slope;
   if (!(closure <= law->largest_reach)) return jlaw_none_();
-  jlaw_virgin_one_(law, closure, &slope);
-  return law->stiffness_factor * slope;
+  const double force = jlaw_virgin_one_(law, closure, &slope);
+  return law->stiffness_factor * slope + law->bending_factor * force
+         + fmax(law->bond_normal, law->bond_shear);
 }
 
 JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
@@ -1369,8 +1642,8 @@ JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
 JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s)
 {
   const int dim = law->dim, D = law->cells, M = law->facets;
-  for (int i = 1; i < 2 * dim - 1; i += dim - 1) s[i] = -s[i]; /* shear and offset along axis 2 */
-  double *qs = s + 2 * dim, *qt = qs + M * D, *depth = qt + M * D;
+  if (dim > 1) s[1] = -s[1]; /* shear along axis 2 */
+  double *qs = s + jl_slider_row_(law), *qt = qs + M * D, *depth = qt + M * D;
   for (int f = 0; f < M; f++) {
     const int other = (int) jlaw_of_facet_(law, f, JLAW_MIRROR);
     for (int i = 0; i < D; i++) {
@@ -1409,20 +1682,19 @@ static JLAW_FUNCTION void jlaw_hold_(const jlaw_law *law, double *s)
 {
   const jl_numbers_ n = {s, 1, 0};
   const int M = law->facets, D = law->cells;
-  const double worn = jl_worn_now_(law, n);
   for (int at = 0; at < M; at += JL_TOGETHER_) {
     const int some = M - at < JL_TOGETHER_ ? M - at : JL_TOGETHER_;
     const double *cell = jl_cell_of_(law, at);
     jl_facets_ o;
     jl_facets_now_(law, n, at, &o);
     for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_LANES) {
-      const int row = 2 * law->dim + at * D + i;
+      const int row = jl_slider_row_(law) + at * D + i;
       jl_real_ G, kappa, qs = jl_take_(n, row, D, some), qt = jl_take_(n, row + M * D, D, some);
       jl_cell_now_(cell, &o, law->yields, &G, &kappa);
-      const jl_real_ cap = jl_column_(jl_facet_of_(law, at), JLAW_STRENGTH) * worn * G;
+      const jl_real_ cap = o.strength * G;
       const jl_real_ size = jl_root_(qs * qs + qt * qt);
-      const jl_yes_ beyond = size > cap;
-      const jl_real_ share = jl_pick_(beyond, cap / jl_pick_(beyond, size, 1.0), 1.0);
+      const jl_yes_ jl_beyond_ = size > cap;
+      const jl_real_ share = jl_pick_(jl_beyond_, cap / jl_pick_(jl_beyond_, size, 1.0), 1.0);
       jl_put_(n, row, D, some, qs * share);
       jl_put_(n, row + M * D, D, some, qt * share);
     }
@@ -1433,13 +1705,11 @@ JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle)
 {
   const int dim = law->dim, D = law->cells, M = law->facets;
   const double before = jlaw_measure_(law, s).sheared, c = cos(angle), d = sin(angle);
-  double *q = s + 2 * dim, *depth = s + jl_rest_row_(law);
+  double *q = s + jl_slider_row_(law), *depth = s + jl_rest_row_(law);
   if (dim == 2 && c < 0.0) jlaw_swap_bodies(law, s); /* the axis changes its sense */
   if (dim != 3) return;
-  for (int i = 1; i <= 3; i += 2) { /* shear and offset */
-    const double along = s[i], across = s[i + 1];
-    s[i] = c * along + d * across, s[i + 1] = c * across - d * along;
-  }
+  const double along = s[1], across = s[2];
+  s[1] = c * along + d * across, s[2] = c * across - d * along;
   for (int f = 0, n; f < M; f += n) { /* rings */
     n = (int) jlaw_of_facet_(law, f, JLAW_RING);
     for (int i = 0; i < D; i++) {
@@ -1452,7 +1722,7 @@ JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle)
   const double after = jlaw_measure_(law, s).sheared;
   if (after > before) /* sliders gain nothing */
     for (int i = 0; i < 2 * M * D; i++) q[i] *= sqrt(before / after);
-  else s[5] += before - after;
+  else s[dim] += before - after;
 }
 
 /* ------------------------------------------------------------- table files */

@@ -148,6 +148,7 @@ typedef double of_joint;
 #define JOINTS 1
 #define JOINT(x, l) (x)
 #define each_joint(x) (x)
+#define root_joint(x) sqrt(x)
 /* A column of the tables of a block of facets, which lie side by side in it */
 IN of_facet column(const double *block, int c)
 {
@@ -177,6 +178,7 @@ typedef real of_joint;
 #define JOINTS W
 #define JOINT(x, l) LANE(x, l)
 #define each_joint(x) each(x)
+#define root_joint(x) root(x)
 IN of_facet column(const double *block, int c) { return block[c * JLAW_LANES]; }
 IN real take_joint(numbers n, int row)
 {

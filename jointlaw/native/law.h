@@ -1,33 +1,47 @@
 /* law.h: one step of a rock joint, and what a state amounts to, in lanes (lanes.h).
  *
  * Symbols and order are those of docs/theory-incremental.md and of kernels/reference.py. Rows of
- * a state: delta (dim) | in-plane offset (dim - 1) | dissipated energy | q_s (M D) | q_t (M D),
- * q times lam; where asperities yield flattened depth (M) | plastic work; with wear slip of the
- * asperities | by how much mu had fallen in the last step. A batch keeps beside them Phi and Phi'
- * of every facet (M each), which saves half the look-ups, and with yielding the same at z.
+ * a state: delta (dim) from the mated position | dissipated energy | q_s (M D) | q_t (M D), q times
+ * lam; where asperities yield flattened depth (M) | plastic work; with wear the share of the slopes
+ * that is gone | work of friction; with a bond its damage. A batch keeps beside them Phi and Phi' of every facet (M each), which saves half
+ * the look-ups, and with yielding the same at z.
  *
- * Of the functions of the C library that round differently, only expm1, log1p, pow and hypot are
- * called: zig links exp and log of its own.
+ * Of the functions of the C library that round differently, only expm1 and pow are called: zig
+ * links exp and log of its own.
  */
 
 typedef struct { /* what the compiler knows of a step: it leaves out the rest */
-  int dim, yields, wears, ledger, tangent;
+  int dim, yields, fades, wears, ledger, tangent;
   int kept; /* whether Phi and Phi' lie beside the state */
 } kind;
 
-typedef struct {                 /* a joint in a step */
-  of_joint p[3], from[3], to[3]; /* increment; closure and in-plane offset before and after */
-  of_joint J[4], slip;           /* d offset/d p; way along the offset at its limit */
-  of_joint worn, since;          /* mu over that of unworn asperities; over that of the last step */
+typedef struct { /* in the plane of a joint: offset over the mating length, root of 1 - |o|^2 */
+  of_joint o[2], w;
+} site;
+
+typedef struct { /* a joint in a step */
+  of_joint p[3], from[3], to[3]; /* increment; closure and in-plane displacement before and after */
+  site start, middle, end;
+  of_joint had, has; /* share of the slopes that was left before the step, and is in it */
 } motion;
+
+typedef struct { /* the plane of facets: slope along the azimuth e and across it, in axes (1, e) */
+  real x, z;                /* offset over the mating length along e and across */
+  real along, across;
+  real m2, N2, rm, rmn;     /* 1 + along^2, that + across^2; 1/m, 1/(m N) */
+  real gamma;               /* c1 N */
+} plane;
 
 typedef struct { /* facets in a step: y, Phi, Phi', Phi'' before and after; de */
   real y0, y1, f0, f1, k0, k1, bend, es, et;
+  plane middle, end;
+  real yw, fw, kw, strength, worn;          /* before slopes wore: y, Phi, Phi'; limit after it */
   real dy, rdy;                             /* y1 - y0, and 1 over it */
   yes near;                                 /* y has hardly changed */
   real z0, z1, fz0, fz1, kz0, kz1;          /* flattened depth; Phi and Phi' there */
   real qs, qt, lost, vs, vt, bss, bst, btt; /* sums over the cells: q, loss, v and B of C */
   real ws, wt, open;                        /* the same of the softening by z1; any kappa */
+  real gs, gt;                              /* of q by log(gamma) */
 } facets;
 
 typedef struct {             /* the sliders of one depth cell of facets */
@@ -40,14 +54,16 @@ typedef struct {             /* the sliders of one depth cell of facets */
 } sliders;
 
 typedef struct { /* what facets add up to */
-  real F[3], C[9], pull[2], lost;
-  real crushed, normal; /* plastic work; A Phi before and after */
+  real F[3], C[9], lost;
+  real crushed, lowered, worn; /* plastic work; what the wear of slopes takes: normal, sliders */
 } sums;
 
-/* Rows of a state: the first after the sliders, that of the slip of the asperities, and how many */
-IN int rest_row(const jlaw_law *law) { return 2 * law->dim + 2 * law->facets * law->cells; }
-IN int slip_row(const jlaw_law *law) { return rest_row(law) + (law->yields ? law->facets + 1 : 0); }
-IN int state_rows(const jlaw_law *law) { return slip_row(law) + 2 * law->wears; }
+/* Rows of a state: the first of the sliders, the first after them, that of worn slopes, how many */
+IN int slider_row(const jlaw_law *law) { return law->dim + 1; }
+IN int rest_row(const jlaw_law *law) { return law->dim + 1 + 2 * law->facets * law->cells; }
+IN int worn_row(const jlaw_law *law) { return rest_row(law) + (law->yields ? law->facets + 1 : 0); }
+IN int damage_row(const jlaw_law *law) { return worn_row(law) + 2 * law->wears; }
+IN int state_rows(const jlaw_law *law) { return damage_row(law) + law->bonded; }
 
 /* Tables of facets from number `at` on, and of their first depth cell */
 IN const double *facet_of(const jlaw_law *law, int at)
@@ -176,7 +192,7 @@ IN void press(const jlaw_law *law, const double *f, numbers n, int kept, int at,
 {
   const int M = law->facets, depth = rest_row(law);
   real y = o->y1;
-  if (law->critical_slip < DBL_MAX) /* one depth for a facet and its opposite */
+  if (law->fades) /* one depth for a facet and its opposite */
     y = larger(y, 2.0 * column(f, JLAW_M) * m->to[0] - y);
   o->z0 = take(n, depth + at, 1, some);
   o->z1 = larger(y - column(f, JLAW_YIELD), o->z0);
@@ -210,98 +226,133 @@ IN real crush(const double *f, const facets *o)
   return pick(flattens_itself(f, o), each(most), 0.5 * (c0 + c1)) * (o->fz1 - o->fz0);
 }
 
+/* --------------------------------------------------------------------- slopes that fade */
+
+/* Offset, over the mating length, at the in-plane displacement p0, p1: "Mating" */
+IN site site_of(const jlaw_law *law, of_joint p0, of_joint p1)
+{
+  site at;
+  p0 = p0 / law->mating_length;
+  p1 = p1 / law->mating_length;
+  at.w = 1.0 / root_joint(1.0 + (p0 * p0 + p1 * p1));
+  at.o[0] = at.w * p0;
+  at.o[1] = at.w * p1;
+  return at;
+}
+
+/* Effective closure of facets at this closure, where this share of the slopes is left */
+IN real climb(const jlaw_law *law, const double *f, of_joint closure, const site *at,
+              of_joint slopes)
+{
+  const real x = column(f, JLAW_E) * at->o[0] + column(f, JLAW_E + 1) * at->o[1];
+  return closure + slopes * law->mating_length * (column(f, JLAW_STEEP) * x);
+}
+
+IN plane plane_at(const double *f, const site *at, of_joint slopes)
+{
+  plane s;
+  s.x = column(f, JLAW_E) * at->o[0] + column(f, JLAW_E + 1) * at->o[1];
+  s.z = column(f, JLAW_E) * at->o[1] - column(f, JLAW_E + 1) * at->o[0];
+  const real steep = slopes * at->w * column(f, JLAW_STEEP);
+  s.along = steep * (1.0 - s.x * s.x);
+  s.across = -steep * s.x * s.z;
+  s.m2 = 1.0 + s.along * s.along;
+  s.N2 = s.m2 + s.across * s.across;
+  const real m = root(s.m2), N = root(s.N2);
+  s.rmn = 1.0 / (m * N);
+  s.rm = N * s.rmn;
+  s.gamma = column(f, JLAW_COSINE) * N;
+  return s;
+}
+
+/* Components of the joint's vector (v0, v1, v2) along e and across it, and back */
+IN real along_azimuth(const double *f, real v1, real v2)
+{
+  return column(f, JLAW_E) * v1 + column(f, JLAW_E + 1) * v2;
+}
+IN real across_azimuth(const double *f, real v1, real v2)
+{
+  return column(f, JLAW_E) * v2 - column(f, JLAW_E + 1) * v1;
+}
+IN void to_axes(const double *f, real *along, real *across)
+{
+  const real v1 = column(f, JLAW_E) * *along - column(f, JLAW_E + 1) * *across;
+  *across = column(f, JLAW_E + 1) * *along + column(f, JLAW_E) * *across;
+  *along = v1;
+}
+
+/* Derivative of the slopes by the displacement, both along the azimuth and across: ee, ez, zz */
+IN void curvature(const jlaw_law *law, const double *f, const plane *s, of_joint w, of_joint slopes,
+                  real h[3])
+{
+  const real bend = -(slopes * w * w / law->mating_length) * column(f, JLAW_STEEP);
+  h[0] = bend * (3.0 * s->x * (1.0 - s->x * s->x));
+  h[1] = bend * (s->z * (1.0 - 3.0 * s->x * s->x));
+  h[2] = bend * (s->x * (1.0 - 3.0 * s->z * s->z));
+}
+
+/* The increment in the plane of facets at mid-step */
+IN void move_in_plane(const double *f, const motion *m, facets *o)
+{
+  const plane *s = &o->middle;
+  const real d0 = each(0.0) + m->p[0];
+  const real de = along_azimuth(f, each(0.0) + m->p[1], each(0.0) + m->p[2]);
+  const real dz = across_azimuth(f, each(0.0) + m->p[1], each(0.0) + m->p[2]);
+  o->es = (de - s->along * d0) * s->rm;
+  o->et = (s->m2 * dz - s->across * (d0 + s->along * de)) * s->rmn;
+}
+
+/* F of facets that fade: A Phi n and the sliders, in axes (1, e), then in those of the joint */
+IN void add_traction(const jlaw_law *law, const double *f, const facets *o, sums *sum, int dim)
+{
+  const plane *s = &o->end;
+  const real n = column(f, JLAW_POTENTIAL) * o->f1;
+  const real qs = law->soft * s->rm * o->qs, qt = law->soft * s->rmn * o->qt;
+  real along = n * s->along + (qs - s->along * s->across * qt);
+  real across = n * s->across + s->m2 * qt;
+  to_axes(f, &along, &across);
+  sum->F[0] += n - (s->along * qs + s->across * qt);
+  if (dim > 1) sum->F[1] += along;
+  if (dim > 2) sum->F[2] += across;
+}
+
 /* ------------------------------------------------------------------------------- wear */
 
-/* mu after the slip of the asperities, over that of unworn ones and over that of the last step */
-IN void wear_friction(const jlaw_law *law, of_joint slip, of_joint fallen, motion *m)
+/* Shares of the slopes that were left before the step, and are after the work of friction so far */
+IN void wear_slopes(const jlaw_law *law, numbers n, motion *m)
 {
-  m->worn = m->since = each_joint(1.0);
-  if (!(law->mu > 0.0)) return;
+  const int row = worn_row(law);
+  of_joint worn = take_joint(n, row);
+  const of_joint work = take_joint(n, row + 1);
+  m->had = 1.0 - worn;
   for (int l = 0; l < JOINTS; l++) {
-    const double left = 1.0 + expm1(-JOINT(slip, l) / law->wear_slip);
-    const double now = law->mu_residual + (law->mu - law->mu_residual) * left;
-    const double last = law->mu - JOINT(fallen, l);
-    JOINT(m->worn, l) = now / law->mu;
-    JOINT(m->since, l) = now < last ? now / last : 1.0;
+    const double now = (law->slope_residual - 1.0) * expm1(-JOINT(work, l) / law->slope_wear);
+    JOINT(worn, l) = now > JOINT(worn, l) ? now : JOINT(worn, l);
   }
+  m->has = 1.0 - worn;
+  put_joint(n, row, worn);
 }
 
-/* mu has fallen: sliders come back to their limit, and lose what they held beyond it */
-IN void wear_sliders(const sliders *c, of_joint since, real *qs, real *qt, real *lost)
+/* Slopes have worn: springs that part take their force along, and friction limits the rest */
+IN void wear_sliders(const double *cell, facets *o, const sliders *c, real *qs, real *qt,
+                     int yields)
 {
-  const real size2 = *qs * *qs + *qt * *qt, cap = c->strength * c->G0;
-  const real back = pick(size2 > cap * cap, each(0.0) + since, 1.0);
-  const real gone = (1.0 - back) * (1.0 + back) * size2;
-  *lost += only(c->k0 > JLAW_TINY, gone / pick(c->k0 > JLAW_TINY, c->k0, 1.0));
-  *qs = back * *qs;
-  *qt = back * *qt;
-}
-
-/* ------------------------------------------------------------------------ large shear */
-
-/* The in-plane offset a of one joint moves by p, dragged along at its limit D; then it is to[0],
- * to[1], its way along itself to[2], and its derivative by p to[3] to to[6] */
-IN void drag(double D, int dim, double a0, double a1, double p0, double p1, double to[7])
-{
-  const double length = hypot(p0, p1), e0 = p0 / length, e1 = p1 / length;
-  const double along = a0 * e0 + a1 * e1;
-  const double before = D * D - (a0 * a0 + a1 * a1) + along * along;
-  double inside = sqrt(before > 0.0 ? before : 0.0) - along; /* way until it is at its limit */
-  inside = inside > 0.0 ? (inside < length ? inside : length) : 0.0;
-  a0 += inside * e0;
-  a1 += inside * e1;
-  const double x = (length - inside) / D, rest = -expm1(-x), decay = 1.0 - rest;
-  double cosine = (a0 * e0 + a1 * e1) / D;
-  cosine = cosine > 0.0 ? (cosine < 1.0 ? cosine : 1.0) : 0.0;
-  const double sine = (a1 * e0 - a0 * e1) / D;
-  const double bottom = (1.0 + cosine) + (1.0 - cosine) * decay * decay;
-  const double cos1 = ((1.0 + cosine) - (1.0 - cosine) * decay * decay) / bottom;
-  const double sin1 = 2.0 * sine * decay / bottom;
-  to[0] = D * (cos1 * e0 - sin1 * e1);
-  to[1] = D * (cos1 * e1 + sin1 * e0);
-  to[2] = D * (x + log1p(0.5 * bottom - 1.0));
-  const double grazing = cosine > JLAW_GRAZING ? cosine : JLAW_GRAZING;
-  double turn = (rest * rest + cosine * rest * (1.0 + decay)) / bottom;
-  turn += inside / (D * grazing) * (2.0 * decay / bottom - sin1 * sine);
-  turn /= length;
-  const int turns = dim == 3; /* along one line the offset does not turn */
-  const double row0 = turns ? -turn * e1 - sin1 / D * e0 : 0.0;
-  const double row1 = turns ? turn * e0 - sin1 / D * e1 : 0.0;
-  to[3] = -to[1] * row0;
-  to[4] = -to[1] * row1;
-  to[5] = to[0] * row0;
-  to[6] = to[0] * row1;
-}
-
-/* Offsets that have come to their limit are dragged along: "Large shear" */
-IN void limit_offset(const jlaw_law *law, int dim, motion *m)
-{
-  const double D = law->critical_slip;
-  m->J[0] = m->J[3] = each_joint(1.0);
-  m->J[1] = m->J[2] = m->slip = each_joint(0.0);
-  if (!(D < DBL_MAX) || dim == 1) return;
-  for (int l = 0; l < JOINTS; l++) {
-    const double p0 = JOINT(m->p[1], l), p1 = dim > 2 ? JOINT(m->p[2], l) : 0.0;
-    const double a0 = JOINT(m->from[1], l), a1 = dim > 2 ? JOINT(m->from[2], l) : 0.0;
-    const double b0 = a0 + p0, b1 = a1 + p1;
-    if (!(b0 * b0 + b1 * b1 > D * D) || !(b0 * p0 + b1 * p1 > 0.0)) continue;
-    double to[7];
-    drag(D, dim, a0, a1, p0, p1, to);
-    JOINT(m->to[1], l) = to[0];
-    if (dim > 2) JOINT(m->to[2], l) = to[1];
-    JOINT(m->slip, l) = to[2];
-    for (int j = 0; j < 4; j++) JOINT(m->J[j], l) = to[3 + j];
+  real G, kappa;
+  share_of(cell, o->yw, o->fw, o->kw, &G, &kappa);
+  if (yields) {
+    real H, kz;
+    share_of(cell, o->z0, o->fz0, o->kz0, &H, &kz);
+    flatten(o->yw, o->z0, H, &G, &kappa);
   }
-}
-
-/* Energy that dragging the offset takes; pull: the in-plane part of the normal forces */
-IN of_joint drag_loss(const jlaw_law *law, int dim, const motion *m, const sums *sum)
-{
-  of_joint along = total(sum, pull[0]) * m->to[1];
-  if (dim > 2) along += total(sum, pull[1]) * m->to[2];
-  for (int l = 0; l < JOINTS; l++) /* >= 0 by symmetry of the facets, but for rounding */
-    JOINT(along, l) = JOINT(along, l) > 0.0 ? JOINT(along, l) : 0.0;
-  return m->slip * along / law->critical_slip;
+  const yes falls = c->k0 < kappa, had = kappa > JLAW_TINY, has = c->k0 > JLAW_TINY;
+  const real kept = pick(falls, c->k0 / pick(falls, kappa, 1.0), 1.0);
+  const real q2 = *qs * *qs + *qt * *qt, size = kept * root(q2), cap = o->strength * c->G0;
+  const yes beyond = size > cap;
+  const real share = kept * pick(beyond, cap / pick(beyond, size, 1.0), 1.0);
+  o->worn += only(had, q2 / pick(had, kappa, 1.0));
+  o->worn -= only(has, share * share * q2 / pick(has, c->k0, 1.0));
+  *qs = share * *qs;
+  *qt = share * *qt;
 }
 
 /* --------------------------------------------------------------------------- one step */
@@ -392,6 +443,11 @@ IN void slide_tangent(const double *f, const double *cell, const sliders *c, fac
   o->bss += beta - along * us * us;
   o->bst -= along * us * ut;
   o->btt += beta - along * ut * ut;
+  if (k.fades) {
+    const real by_gamma = only(limited, c->strength * c->G1);
+    o->gs += by_gamma * us;
+    o->gt += by_gamma * ut;
+  }
   if (k.yields) {
     const yes pulls = limited & (c->k1 > 0.0);
     const real pull = c->strength * only(pulls, c->kz1);
@@ -402,16 +458,13 @@ IN void slide_tangent(const double *f, const double *cell, const sliders *c, fac
 }
 
 /* One depth cell of facets: from the sliders before the step to those after it */
-IN void slide(const double *f, const double *cell, const motion *m, facets *o, real *qs, real *qt,
-              kind k)
+IN void slide(const double *f, const double *cell, facets *o, real *qs, real *qt, kind k)
 {
   sliders c;
   cells_of(cell, o, &c, k.yields);
   c.strength = each(column(f, JLAW_STRENGTH));
-  if (k.wears) {
-    c.strength = c.strength * m->worn;
-    wear_sliders(&c, m->since, qs, qt, &o->lost);
-  }
+  if (k.fades) c.strength = c.strength * o->end.gamma;
+  if (k.wears) wear_sliders(cell, o, &c, qs, qt, k.yields);
   load(f, o, &c, qs, qt, k);
   o->qs += *qs;
   o->qt += *qt;
@@ -420,10 +473,8 @@ IN void slide(const double *f, const double *cell, const motion *m, facets *o, r
 }
 
 /* C += along g^T + E^T B E of facets; where the flattened depth moves, less softening g_z^T */
-IN void add_tangent(const jlaw_law *law, const double *f, const motion *m, const facets *o,
-                    sums *sum, kind k)
+IN void add_tangent(const jlaw_law *law, const double *f, const facets *o, sums *sum, kind k)
 {
-  const int drags = law->critical_slip < DBL_MAX;
   const yes moves = (o->z1 - o->z0 > JLAW_ROUNDED * o->z1) & (o->open > 0.0);
   const yes own = flattens_itself(f, o);
   for (int i = 0; i < k.dim; i++) {
@@ -432,11 +483,7 @@ IN void add_tangent(const jlaw_law *law, const double *f, const motion *m, const
     const real along = n * o->k1 + s * o->vs + t * o->vt;
     const real left = s * o->bss + t * o->bst, right = s * o->bst + t * o->btt;
     for (int j = 0; j < k.dim; j++) {
-      real g = each(column(f, JLAW_M + j)); /* dy/dd */
-      if (j > 0 && drags) {
-        g = column(f, JLAW_M + 1) * m->J[j - 1];
-        if (k.dim > 2) g += column(f, JLAW_M + 2) * m->J[j + 1];
-      }
+      const real g = each(column(f, JLAW_M + j)); /* dy/dd */
       real to = along * g + left * column(f, JLAW_S + j) + right * column(f, JLAW_T + j);
       if (k.yields) {
         const real less = only(moves, n * o->kz1 + s * o->ws + t * o->wt);
@@ -447,6 +494,61 @@ IN void add_tangent(const jlaw_law *law, const double *f, const motion *m, const
   }
 }
 
+/* The same where slopes fade, and with them planes turn and friction limits fall: worked out in
+ * axes (1, e), then turned. E: derivative of the increment in the plane; A, B: of the sliders'
+ * force by the slopes along and across; h: of these by the displacement. */
+IN void add_fading_tangent(const jlaw_law *law, const double *f, const motion *m, const facets *o,
+                           sums *sum, kind k)
+{
+  const yes moves = (o->z1 - o->z0 > JLAW_ROUNDED * o->z1) & (o->open > 0.0);
+  const yes own = flattens_itself(f, o);
+  const plane *s = &o->end, *r = &o->middle;
+  const real soft = each(law->soft), none = each(0.0), n = each(column(f, JLAW_POTENTIAL));
+  real h[3], H[3], C[3][3]; /* ee, ez, zz */
+  curvature(law, f, s, m->end.w, m->has, h);
+  curvature(law, f, r, m->middle.w, m->has, H);
+  /* the middle */
+  const real d0 = each(0.0) + m->p[0];
+  const real de = along_azimuth(f, each(0.0) + m->p[1], each(0.0) + m->p[2]);
+  const real dz = across_azimuth(f, each(0.0) + m->p[1], each(0.0) + m->p[2]);
+  const real turn = d0 + r->along * de, rm2 = 1.0 / r->m2, rN2 = 1.0 / r->N2;
+  const real ea = -0.5 * turn * (rm2 * r->rm), eb = -0.5 * (turn * r->rmn + o->et * r->across * rN2);
+  const real ta = 0.5 * ((2.0 * r->along * dz - r->across * de) * r->rmn
+                         - o->et * r->along * (rm2 + rN2));
+  const real Es[3] = {-r->along * r->rm, r->rm + ea * H[0], ea * H[1]};
+  const real Et[3] = {-r->across * r->rmn,
+                      -r->along * r->across * r->rmn + ta * H[0] + eb * H[1],
+                      r->m2 * r->rmn + ta * H[1] + eb * H[2]};
+  /* the end */
+  const real cs[3] = {-s->along * s->rm, s->rm, none};
+  const real ct[3] = {-s->across * s->rmn, -s->along * s->across * s->rmn, s->m2 * s->rmn};
+  const real rM2 = 1.0 / s->m2, rn2 = 1.0 / s->N2, rm3 = rM2 * s->rm;
+  const real qa = o->qs * rm3, qt = o->qt * s->rmn, fall = s->along * (rM2 + rn2);
+  const real A[3] = {-qa - o->qt * ct[0] * fall, -s->along * qa - s->across * qt - o->qt * ct[1] * fall,
+                     2.0 * s->along * qt - o->qt * ct[2] * fall};
+  const real down = o->qt * s->across * rn2;
+  const real B[3] = {-qt - down * ct[0], -s->along * qt - down * ct[1], -down * ct[2]};
+  const real ga = s->along * rn2, gb = s->across * rn2; /* of log(gamma) */
+  const real g[3] = {each(1.0), s->along, s->across};
+  for (int j = 0; j < 3; j++) {
+    const real ha = j ? h[j - 1] : none, hb = j ? h[j] : none, gamma = ga * ha + gb * hb;
+    const real us = o->vs * g[j] + o->bss * Es[j] + o->bst * Et[j] + o->gs * gamma;
+    const real ut = o->vt * g[j] + o->bst * Es[j] + o->btt * Et[j] + o->gt * gamma;
+    const real pressing = k.yields ? only(moves, j ? pick(own, g[j], -g[j]) : g[j]) : none;
+    for (int i = 0; i < 3; i++) {
+      const real bend = i == 1 ? ha : i == 2 ? hb : none;
+      C[i][j] = n * (o->k1 * g[i] * g[j] + o->f1 * bend)
+                + soft * (cs[i] * us + ct[i] * ut + (A[i] * ha + B[i] * hb));
+      if (k.yields)
+        C[i][j] -= pressing * (n * g[i] * o->kz1 + soft * (cs[i] * o->ws + ct[i] * o->wt));
+    }
+  }
+  for (int i = 0; i < 3; i++) to_axes(f, &C[i][1], &C[i][2]);
+  for (int j = 0; j < 3; j++) to_axes(f, &C[1][j], &C[2][j]);
+  for (int i = 0; i < k.dim; i++)
+    for (int j = 0; j < k.dim; j++) sum->C[3 * i + j] += C[i][j];
+}
+
 /* Facets from number `at` on: closures, virgin curve, sliders, and their part of F and C */
 IN void step_facets(const jlaw_law *law, int at, const motion *m, numbers n, sums *sum, kind k)
 {
@@ -455,23 +557,39 @@ IN void step_facets(const jlaw_law *law, int at, const motion *m, numbers n, sum
   const double *f = facet_of(law, at), *cell = cell_of(law, at);
   facets o;
   o.y0 = o.y1 = o.es = o.et = o.bend = each(0.0);
-  for (int i = 0; i < k.dim; i++) {
+  for (int i = 0; i < k.dim && !k.fades; i++) {
     o.y0 += column(f, JLAW_M + i) * m->from[i];
     o.y1 += column(f, JLAW_M + i) * m->to[i];
     o.es += column(f, JLAW_S + i) * m->p[i];
     if (i > 0) o.et += column(f, JLAW_T + i) * m->p[i];
   }
-  if (!k.yields && !any((o.y0 > 0.0) | (o.y1 > 0.0))) return; /* apart: all it holds is zero */
+  if (k.fades) {
+    o.y0 = climb(law, f, m->from[0], &m->start, m->has);
+    o.y1 = climb(law, f, m->to[0], &m->end, m->has);
+  }
+  o.yw = k.wears ? resolved(climb(law, f, m->from[0], &m->start, m->had)) : o.y0;
+  if (!k.yields && !any((o.y0 > 0.0) | (o.y1 > 0.0) | (o.yw > 0.0))) return; /* apart: holds zero */
+  if (k.fades) {
+    o.middle = plane_at(f, &m->middle, m->has);
+    o.end = plane_at(f, &m->end, m->has);
+    move_in_plane(f, m, &o);
+  }
+  if (k.wears) o.strength = column(f, JLAW_STRENGTH) * plane_at(f, &m->start, m->has).gamma;
   o.y0 = resolved(o.y0);
   o.y1 = resolved(o.y1);
   o.dy = o.y1 - o.y0;
   o.rdy = 1.0 / o.dy;
   o.near = size_of(o.dy) <= JLAW_NEAR * size_of(o.y1);
   o.qs = o.qt = o.lost = o.vs = o.vt = o.bss = o.bst = o.btt = o.ws = o.wt = o.open = each(0.0);
+  o.gs = o.gt = o.worn = each(0.0);
   if (k.kept) {
     o.f0 = take(n, kept + at, 1, some);
     o.k0 = take(n, kept + M + at, 1, some);
-  } else virgin_curve(law, o.y0, &o.f0, &o.k0, (real *) 0);
+  } else virgin_curve(law, o.yw, &o.f0, &o.k0, (real *) 0);
+  if (k.wears) {
+    o.fw = o.f0, o.kw = o.k0;
+    virgin_curve(law, o.y0, &o.f0, &o.k0, (real *) 0);
+  }
   virgin_curve(law, o.y1, &o.f1, &o.k1, k.tangent ? &o.bend : (real *) 0);
   if (k.kept) {
     put(n, kept + at, 1, some, o.f1);
@@ -481,85 +599,110 @@ IN void step_facets(const jlaw_law *law, int at, const motion *m, numbers n, sum
   if (k.yields) press(law, f, n, kept, at, some, m, &o);
   for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_LANES) {
     const of_facet low = column(cell, JLAW_LOW);
-    if (!any((o.y0 > low) | (o.y1 > low))) break; /* nor does what is deeper */
-    const int row = 2 * k.dim + at * D + i;
+    if (!any((o.y0 > low) | (o.y1 > low) | (o.yw > low))) break; /* nor does what is deeper */
+    const int row = k.dim + 1 + at * D + i;
     real qs = take(n, row, D, some), qt = take(n, row + M * D, D, some);
-    slide(f, cell, m, &o, &qs, &qt, k);
+    slide(f, cell, &o, &qs, &qt, k);
     put(n, row, D, some, qs);
     put(n, row + M * D, D, some, qt);
   }
   if (k.yields) {
     sum->crushed += column(f, JLAW_POTENTIAL) * crush(f, &o);
+    if (k.wears) flatten_facets(o.yw, o.z0, o.fz0, &o.fw, &o.kw);
     flatten_facets(o.y0, o.z0, o.fz0, &o.f0, &o.k0);
     flatten_facets(o.y1, o.z1, o.fz1, &o.f1, &o.k1);
   }
-  if (k.wears) sum->normal += column(f, JLAW_A) * (o.f0 + o.f1);
   if (k.ledger) sum->lost += column(f, JLAW_COMPLIANCE) * o.lost;
+  if (k.wears) {
+    sum->worn += column(f, JLAW_COMPLIANCE) * o.worn;
+    sum->lowered += 0.5 * column(f, JLAW_POTENTIAL) * ((o.fw + o.f0) * (o.yw - o.y0));
+  }
+  if (k.fades) {
+    add_traction(law, f, &o, sum, k.dim);
+    if (k.tangent) add_fading_tangent(law, f, m, &o, sum, k);
+    return;
+  }
   const real normal = column(f, JLAW_A) * o.f1, qs = law->soft * o.qs, qt = law->soft * o.qt;
   for (int i = 0; i < k.dim; i++) {
     const real pull = column(f, JLAW_N + i) * normal;
     sum->F[i] += pull + (column(f, JLAW_S + i) * qs + column(f, JLAW_T + i) * qt);
-    if (i > 0 && k.ledger) sum->pull[i - 1] += pull;
   }
-  if (k.tangent) add_tangent(law, f, m, &o, sum, k);
+  if (k.tangent) add_tangent(law, f, &o, sum, k);
 }
 
 /* Advance joints by the increments d: their numbers n, F (dim), and C (dim, dim) for a tangent */
 IN void step(const jlaw_law *law, numbers n, const of_joint d[3], of_joint F[3], of_joint C[9],
              kind k)
 {
-  const int dim = k.dim, M = law->facets, rest = rest_row(law), slip = slip_row(law);
+  const int dim = k.dim, M = law->facets, rest = rest_row(law);
   motion m;
   sums sum[SUMS];
   for (int i = 0; i < 3; i++) {
     m.p[i] = i < dim ? d[i] : each_joint(0.0);
-    m.from[i] = i < dim ? take_joint(n, i ? dim + i - 1 : 0) : each_joint(0.0);
+    m.from[i] = i < dim ? take_joint(n, i) : each_joint(0.0);
     m.to[i] = m.from[i] + m.p[i];
   }
-  limit_offset(law, dim, &m);
-  m.worn = m.since = each_joint(1.0);
-  if (k.wears) wear_friction(law, take_joint(n, slip), take_joint(n, slip + 1), &m);
+  m.had = m.has = each_joint(1.0);
+  if (k.wears) wear_slopes(law, n, &m);
+  if (k.fades) {
+    m.start = site_of(law, m.from[1], m.from[2]);
+    m.middle = site_of(law, m.from[1] + 0.5 * m.p[1], m.from[2] + 0.5 * m.p[2]);
+    m.end = site_of(law, m.to[1], m.to[2]);
+  }
   for (int i = 0; i < SUMS; i++) {
     for (int j = 0; j < 3; j++) sum[i].F[j] = each(0.0);
     for (int j = 0; k.tangent && j < 9; j++) sum[i].C[j] = each(0.0);
-    sum[i].pull[0] = sum[i].pull[1] = sum[i].lost = sum[i].crushed = sum[i].normal = each(0.0);
+    sum[i].lost = sum[i].crushed = sum[i].lowered = sum[i].worn = each(0.0);
   }
   for (int at = 0; at < M; at += TOGETHER)
     step_facets(law, at, &m, n, sum + at / TOGETHER % SUMS, k);
   for (int i = 0; i < dim; i++) {
     F[i] = total(sum, F[i]);
     for (int j = 0; k.tangent && j < dim; j++) C[dim * i + j] = total(sum, C[3 * i + j]);
-    put_joint(n, i, take_joint(n, i) + m.p[i]);
-    if (i > 0) put_joint(n, dim + i - 1, m.to[i]);
+    put_joint(n, i, m.to[i]);
   }
   if (!k.ledger) return;
   of_joint lost = total(sum, lost);
-  if (dim > 1 && law->critical_slip < DBL_MAX) lost += drag_loss(law, dim, &m, sum);
-  if (k.wears) { /* slip of the asperities: the loss over the mean friction limit */
-    const of_joint limit = 0.5 * law->mu * m.worn * total(sum, normal);
-    of_joint way = take_joint(n, slip);
-    for (int l = 0; l < JOINTS; l++)
-      if (JOINT(limit, l) > 0.0) JOINT(way, l) += JOINT(lost, l) / JOINT(limit, l);
-    put_joint(n, slip, way);
-    put_joint(n, slip + 1, law->mu - law->mu * m.worn);
+  if (k.wears) {
+    of_joint lowered = total(sum, lowered);
+    for (int l = 0; l < JOINTS; l++) /* >= 0 by the pairs of facets, but for rounding */
+      JOINT(lowered, l) = JOINT(lowered, l) > 0.0 ? JOINT(lowered, l) : 0.0;
+    put_joint(n, worn_row(law) + 1, take_joint(n, worn_row(law) + 1) + lost);
+    lost += total(sum, worn) + lowered;
   }
   if (k.yields) {
     const of_joint crushed = total(sum, crushed);
     put_joint(n, rest + M, take_joint(n, rest + M) + crushed);
     lost += crushed;
   }
-  put_joint(n, 2 * dim - 1, take_joint(n, 2 * dim - 1) + lost);
+  put_joint(n, dim, take_joint(n, dim) + lost);
 }
 
 /* ------------------------------------------------------------------ what a state is */
 
-/* Facets from number `at` on in a state: y and z with the virgin curve there, as y1 and z1 */
+/* A joint that does not move */
+IN motion standing(const jlaw_law *law, numbers n)
+{
+  motion m;
+  for (int i = 0; i < 3; i++) m.to[i] = i < law->dim ? take_joint(n, i) : each_joint(0.0);
+  m.has = each_joint(1.0);
+  if (law->wears) m.has = 1.0 - take_joint(n, worn_row(law));
+  if (law->fades) m.end = site_of(law, m.to[1], m.to[2]);
+  return m;
+}
+
+/* Facets from number `at` on in a state: y, z, and the virgin curve there as in y1 and z1; the
+ * friction limit of q over G */
 IN void facets_now(const jlaw_law *law, numbers n, int at, facets *o)
 {
+  const motion m = standing(law, n);
   const int dim = law->dim, some = law->facets - at < TOGETHER ? law->facets - at : TOGETHER;
   const double *f = facet_of(law, at);
   o->y1 = o->z1 = o->fz1 = o->kz1 = each(0.0);
-  for (int i = 0; i < dim; i++) o->y1 += column(f, JLAW_M + i) * take_joint(n, i ? dim + i - 1 : 0);
+  for (int i = 0; i < dim && !law->fades; i++) o->y1 += column(f, JLAW_M + i) * m.to[i];
+  if (law->fades) o->y1 = climb(law, f, m.to[0], &m.end, m.has);
+  o->strength = each(column(f, JLAW_STRENGTH));
+  if (law->fades) o->strength = o->strength * plane_at(f, &m.end, m.has).gamma;
   o->y1 = resolved(o->y1);
   virgin_curve(law, o->y1, &o->f1, &o->k1, (real *) 0);
   if (!law->yields) return;
@@ -577,41 +720,30 @@ IN void cell_now(const double *cell, const facets *o, int yields, real *G, real 
   flatten(o->y1, o->z1, H, G, kappa);
 }
 
-/* Friction now over that of unworn asperities */
-IN of_joint worn_now(const jlaw_law *law, numbers n)
-{
-  const int slip = slip_row(law);
-  motion m;
-  m.worn = each_joint(1.0);
-  if (law->wears) wear_friction(law, take_joint(n, slip), take_joint(n, slip + 1), &m);
-  return m.worn;
-}
-
-typedef struct { /* as reference.Measures; the energies of normal and shear springs */
-  of_joint sliding, slipping, separated, normal, sheared, reach;
+typedef struct { /* as reference.Measures; energies of normal and shear springs and of the bond */
+  of_joint sliding, slipping, separated, normal, sheared, bond, reach;
 } amounts;
 
 typedef struct {
   real sliding, slipping, separated, normal, sheared;
 } amount_sums;
 
-IN void measure_facets(const jlaw_law *law, numbers n, int at, of_joint worn, amount_sums *sum,
-                       of_joint *reach)
+IN void measure_facets(const jlaw_law *law, numbers n, int at, amount_sums *sum, of_joint *reach)
 {
   const int M = law->facets, D = law->cells, some = M - at < TOGETHER ? M - at : TOGETHER;
   const double *f = facet_of(law, at), *cell = cell_of(law, at);
-  const real strength = column(f, JLAW_STRENGTH) * worn, one = each(1.0);
+  const real one = each(1.0);
   real held = each(0.0), sheared = each(0.0), whole_slips = one;
   facets o;
   facets_now(law, n, at, &o);
   for (int i = 0; i < D && any(o.y1 > column(cell, JLAW_LOW)); i++) {
     real G, kappa;
-    const int row = 2 * law->dim + at * D + i;
+    const int row = slider_row(law) + at * D + i;
     const real qs = take(n, row, D, some), qt = take(n, row + M * D, D, some);
     cell_now(cell, &o, law->yields, &G, &kappa);
     const real q2 = qs * qs + qt * qt;
     const yes stiff = kappa > JLAW_TINY;
-    const yes limited = root(q2) >= strength * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * o.f1);
+    const yes limited = root(q2) >= o.strength * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * o.f1);
     held += only(limited, G);
     whole_slips = only(limited, whole_slips);
     sheared += only(stiff, q2 / pick(stiff, kappa, 1.0));
@@ -620,11 +752,11 @@ IN void measure_facets(const jlaw_law *law, numbers n, int at, of_joint worn, am
   const yes touches = o.y1 > o.z1;
   const real force = only(touches, larger(o.f1 - o.fz1, each(0.0))),
              share = each(column(f, JLAW_SHARE));
-  real normal = psi(law, o.y1);
-  if (law->yields) normal = normal - psi(law, o.z1) - o.fz1 * (o.y1 - o.z1);
   sum->sliding += share * only(touches, whole_slips);
   sum->slipping += share * smaller(only(force > 0.0, held / pick(force > 0.0, force, 1.0)), one);
   sum->separated += share * pick(touches, 0.0, 1.0);
+  real normal = psi(law, o.y1);
+  if (law->yields) normal = normal - psi(law, o.z1) - o.fz1 * (o.y1 - o.z1);
   sum->normal += column(f, JLAW_POTENTIAL) * only(touches, larger(normal, each(0.0)));
   sum->sheared += column(f, JLAW_COMPLIANCE) * sheared;
 #ifdef JLAW_ABREAST
@@ -636,7 +768,6 @@ IN void measure_facets(const jlaw_law *law, numbers n, int at, of_joint worn, am
 
 IN amounts measure(const jlaw_law *law, numbers n)
 {
-  const of_joint worn = worn_now(law, n);
   amount_sums sum[SUMS];
   amounts all;
   all.reach = each_joint(-DBL_MAX);
@@ -644,20 +775,21 @@ IN amounts measure(const jlaw_law *law, numbers n)
     sum[i].sliding = sum[i].slipping = sum[i].separated = sum[i].normal = sum[i].sheared =
         each(0.0);
   for (int at = 0; at < law->facets; at += TOGETHER)
-    measure_facets(law, n, at, worn, sum + at / TOGETHER % SUMS, &all.reach);
+    measure_facets(law, n, at, sum + at / TOGETHER % SUMS, &all.reach);
   all.sliding = total(sum, sliding);
   all.slipping = total(sum, slipping);
   all.separated = total(sum, separated);
   all.normal = total(sum, normal);
   all.sheared = total(sum, sheared);
+  all.bond = law->bonded ? bond_stored(law, n, damage_row(law)) : each_joint(0.0);
   return all;
 }
 
 /* ------------------------------------------------------------- kinds of a step */
 
-IN kind kind_of(int dim, int yields, int wears, int ledger, int tangent, int kept)
+IN kind kind_of(int dim, int yields, int fades, int wears, int ledger, int tangent, int kept)
 {
-  const kind k = {dim, yields, wears, ledger, tangent, kept};
+  const kind k = {dim, yields, fades, wears, ledger, tangent, kept};
   return k;
 }
 
@@ -667,16 +799,28 @@ IN void step_of_kind(const jlaw_law *law, numbers n, const of_joint d[3], of_joi
                      of_joint C[9], int ledger, int tangent, int kept)
 {
   const int dim = law->dim, y = law->yields, w = law->wears;
-  if (y || w || dim == 1) {
-    if (tangent) step(law, n, d, F, C, kind_of(dim, y, w, 1, 1, kept));
-    else step(law, n, d, F, C, kind_of(dim, y, w, 1, 0, kept));
+  if (law->fades) {
+    if (y || w || dim == 1) {
+      if (tangent) step(law, n, d, F, C, kind_of(dim, y, 1, w, 1, 1, kept));
+      else step(law, n, d, F, C, kind_of(dim, y, 1, w, 1, 0, kept));
+    } else if (dim == 3) {
+      if (tangent) step(law, n, d, F, C, kind_of(3, 0, 1, 0, ledger, 1, kept));
+      else step(law, n, d, F, C, kind_of(3, 0, 1, 0, ledger, 0, kept));
+    } else {
+      if (tangent) step(law, n, d, F, C, kind_of(2, 0, 1, 0, ledger, 1, kept));
+      else step(law, n, d, F, C, kind_of(2, 0, 1, 0, ledger, 0, kept));
+    }
+  } else if (y || dim == 1) {
+    if (tangent) step(law, n, d, F, C, kind_of(dim, y, 0, 0, 1, 1, kept));
+    else step(law, n, d, F, C, kind_of(dim, y, 0, 0, 1, 0, kept));
   } else if (dim == 3) {
-    if (tangent) step(law, n, d, F, C, kind_of(3, 0, 0, ledger, 1, kept));
-    else if (ledger) step(law, n, d, F, C, kind_of(3, 0, 0, 1, 0, kept));
-    else step(law, n, d, F, C, kind_of(3, 0, 0, 0, 0, kept));
+    if (tangent) step(law, n, d, F, C, kind_of(3, 0, 0, 0, ledger, 1, kept));
+    else if (ledger) step(law, n, d, F, C, kind_of(3, 0, 0, 0, 1, 0, kept));
+    else step(law, n, d, F, C, kind_of(3, 0, 0, 0, 0, 0, kept));
   } else {
-    if (tangent) step(law, n, d, F, C, kind_of(2, 0, 0, ledger, 1, kept));
-    else if (ledger) step(law, n, d, F, C, kind_of(2, 0, 0, 1, 0, kept));
-    else step(law, n, d, F, C, kind_of(2, 0, 0, 0, 0, kept));
+    if (tangent) step(law, n, d, F, C, kind_of(2, 0, 0, 0, ledger, 1, kept));
+    else if (ledger) step(law, n, d, F, C, kind_of(2, 0, 0, 0, 1, 0, kept));
+    else step(law, n, d, F, C, kind_of(2, 0, 0, 0, 0, 0, kept));
   }
+  if (law->bonded) step_bond(law, n, damage_row(law), F, C, tangent, ledger || y || w);
 }

@@ -17,12 +17,14 @@ from ..discretisation.nodes import UNUSED
 from ..discretisation.tables import Tables
 from ..kernels.cells import compliance
 from ..kernels.reference import strength
+from ..kernels.unmated import unmated_start
+from ..parameters.bond import Bond
 from ..support import thresholds
 from ..support.checks import Array
 from .amalgamation import amalgamation
 
 HERE = Path(__file__).parent
-FORMAT = 3  # of table files: a change of what follows changes it
+FORMAT = 4  # of table files: a change of what follows changes it
 LANES = 4  # facets side by side in a block of the tables
 AZIMUTHS = 512  # of a ring of facets at most
 LARGEST = sys.float_info.max  # stands for infinity
@@ -42,19 +44,29 @@ WHOLE = {
     "cells": Number("1", "1e6", "D, depth cells of a facet"),
     "pieces": Number("1", "1e6", "of the virgin curve"),
     "yields": Number("0", "1", "whether asperities yield"),
-    "wears": Number("0", "1", "whether mu falls with slip"),
+    "fades": Number("0", "1", "whether slopes fade with the distance from mate"),
+    "wears": Number("0", "1", "whether slopes wear"),
+    "bonded": Number("0", "1", "whether there is a bond"),
 }
 NUMBERS = {
     "soft": Number("0", "DBL_MAX", "1/lam"),
-    "mu": Number("0", "DBL_MAX", "of unworn asperities"),
-    "mu_residual": Number("0", "DBL_MAX", "of asperities that are worn"),
-    "wear_slip": Number("DBL_MIN", "DBL_MAX", "m: slip that wears"),
-    "critical_slip": Number("JLAW_UNDERFLOW", "DBL_MAX", "m; infinite: the largest float"),
+    "mu": Number("0", "DBL_MAX", "friction of asperities"),
+    "mating_length": Number("DBL_MIN", "DBL_MAX", "m; infinite: the largest float"),
+    "slope_wear": Number("DBL_MIN", "DBL_MAX", "J/m2; infinite: the largest float"),
+    "slope_residual": Number("0", "1", "share of the slopes that never wears"),
+    "first_touch": Number("-DBL_MAX", "0", "m: closure at which an unmated joint touches"),
     "eta": Number("0", "DBL_MAX", "exponent of the virgin curve"),
     "scale": Number("DBL_MIN", "DBL_MAX", "V of the virgin curve, m^(1/2)"),
     "rise": Number("0", "DBL_MAX", "p: the curve is tabulated over w^p"),
+    "bond_normal": Number("0", "DBL_MAX", "Pa/m: stiffness of the bond"),
+    "bond_shear": Number("0", "DBL_MAX", "Pa/m"),
+    "opening_begin": Number("0", "DBL_MAX", "1/m: one over the opening where it begins to break"),
+    "slip_begin": Number("0", "DBL_MAX", "1/m: the same of slip"),
+    "opening_end": Number("0", "DBL_MAX", "1/m: where nothing of it is left"),
+    "slip_end": Number("0", "DBL_MAX", "1/m"),
     "closure_factor": Number("0", "DBL_MAX", "normal stress over Phi"),
     "stiffness_factor": Number("0", "DBL_MAX", "bound of |C| over Phi'"),
+    "bending_factor": Number("0", "DBL_MAX", "what slopes that fade add to it, over Phi"),
     "largest_reach": Number("0", "DBL_MAX", "m: bound of |y|"),
     "stretch": Number("1", "DBL_MAX", "bound of |y| over that of the displacement"),
     "farthest": Number("0", "DBL_MAX", "m: largest closure that a stress is looked for in"),
@@ -70,6 +82,9 @@ COLUMNS = {  # of a facet: how many, and what
     "S": (3, "in-facet direction s"),
     "T": (3, "in-facet direction t"),
     "N": (3, "normal n"),
+    "E": (2, "unit vector of the azimuth"),
+    "STEEP": (1, "tan(theta)"),
+    "COSINE": (1, "c1"),
     "A": (1, "A"),
     "STIFF": (1, "A/c1"),
     "STRENGTH": (1, "mu lam A"),
@@ -117,24 +132,31 @@ def pack(k: Tables) -> tuple[dict[str, int | float], dict[str, Array]]:
         "cells": k.cells,
         "pieces": len(k.curve.S),
         "yields": int(k.yields),
+        "fades": int(k.fades),
         "wears": int(k.wears),
+        "bonded": int(k.bond is not None),
         "soft": 1.0 / k.lam,
         "mu": k.mu,
-        "mu_residual": k.mu if k.mu_residual is None else k.mu_residual,
-        "wear_slip": min(k.wear_slip, LARGEST),
-        "critical_slip": min(k.critical_slip, LARGEST),
+        "mating_length": min(k.mating_length, LARGEST),
+        "slope_wear": min(k.slope_wear, LARGEST),
+        "slope_residual": k.slope_residual,
+        "first_touch": float(unmated_start(k)[0]) if k.fades and k.dim > 1 else 0.0,
         "eta": k.curve.eta,
         "scale": k.curve.scale,
         "rise": float(k.curve.rise),
+        **_bond(k.bond or Bond(0.0, 0.0, 0.0, 0.0)),
     }
     columns = {
         "M": k.m.T,
         "S": k.s.T,
         "T": k.t.T,
         "N": k.n.T,
+        "E": k.azimuth.T,
+        "STEEP": k.steep,
+        "COSINE": k.c1,
         "A": k.area,
         "STIFF": k.area / k.c1,
-        "STRENGTH": strength(k, np.asarray(k.mu)).ravel(),
+        "STRENGTH": strength(k, np.ones((1, 1))).ravel(),
         "COMPLIANCE": compliance(k).ravel(),
         "POTENTIAL": k.area * k.c1,
         "SHARE": k.weight / k.weight.sum(),
@@ -143,6 +165,14 @@ def pack(k: Tables) -> tuple[dict[str, int | float], dict[str, Array]]:
     facet = in_columns(columns, len(k.c1))
     arrays = {"facet": facet, "depth": _depth(k), "curve": k.curve.S, "energy": k.curve.T}
     return numbers, arrays
+
+
+def _bond(bond: Bond) -> dict[str, float]:
+    """The numbers of a bond."""
+    begin, end = bond.limits
+    values = bond.normal_stiffness, bond.shear_stiffness, *begin.tolist(), *end.tolist()
+    names = [name for name in NUMBERS if name.startswith(("bond_", "opening_", "slip_"))]
+    return dict(zip(names, values, strict=True))
 
 
 def in_columns(columns: dict[str, Array], M: int) -> Array:

@@ -50,7 +50,7 @@ def secant(law: JointLaw, delta: ArrayLike, contact: str = "exact") -> Secant:
 
     Reads orientation, asperity, heights (distribution and overlap) and asperity_density of the law.
     The share of asperities in touch is P(r0 + delta_1) for every orientation (Eq. 37 as printed),
-    so `formation` is not read, nor are resolution, closure_range, plane and critical_slip.
+    so `formation` is not read, nor are resolution, closure_range, plane and mating_length.
 
     Parameters
     ----------

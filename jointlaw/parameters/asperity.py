@@ -1,11 +1,13 @@
 """One asperity contact: normal power law, Mindlin shear, Coulomb friction (Eq. 33-36)."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
+from typing import Any
 
 from ..support.checks import at_least, more_than, number
 
-LEAST_RESIDUAL = 1e-6  # of mu_residual: no rock is smoother
+# What those read who ask for parameters of former versions
+WEAR_REMOVED = "slopes wear instead: give the law slope_wear (J/m2) and slope_residual"
 
 
 @dataclass(frozen=True)
@@ -25,10 +27,6 @@ class Asperity:
         asperity normal, > 0. Beyond it the spring yields at constant force and keeps a set.
         Infinite (elastic) by default. Yielding has no end: where nearly all asperities touch
         (`jointlaw.joints.crushed`) the rock between them, which the law leaves out, would bear.
-    mu_residual: friction coefficient of worn asperities, > 0 and <= mu; None for no wear.
-    wear_slip: slip (m) of the asperities over which mu falls to mu_residual by a factor e, > 0:
-        mu(L) = mu_residual + (mu - mu_residual) exp(-L/wear_slip). L is an energy over a force:
-        with critical_slip it is longer than the distance slid (docs/theory-incremental.md).
     """
 
     K: float
@@ -36,36 +34,20 @@ class Asperity:
     eta: float
     mu: float
     yield_interference: float = math.inf
-    mu_residual: float | None = None
-    wear_slip: float = math.inf
+    mu_residual: InitVar[Any] = None  # of former versions
+    wear_slip: InitVar[Any] = None
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, mu_residual: Any, wear_slip: Any) -> None:
         set_ = object.__setattr__
         set_(self, "K", more_than("asperity.K", self.K, 0.0))
         set_(self, "lam", more_than("asperity.lam", self.lam, 0.0))
         set_(self, "eta", at_least("asperity.eta", self.eta, 0.0))
         set_(self, "mu", at_least("asperity.mu", self.mu, 0.0))
-        for name in ("yield_interference", "wear_slip"):
-            value = more_than(f"asperity.{name}", getattr(self, name), 0.0, infinite=True)
-            set_(self, name, value)
-        if (self.mu_residual is None) != math.isinf(self.wear_slip):
-            raise ValueError(
-                f"asperity.mu_residual = {self.mu_residual!r}, wear_slip = {self.wear_slip!r} m: "
-                "wear needs both a residual friction and a finite slip; give both or neither"
-            )
-        if self.mu_residual is not None:
-            residual = number("asperity.mu_residual", self.mu_residual)
-            if residual < LEAST_RESIDUAL:  # the slip is the energy lost, divided by mu
-                raise ValueError(
-                    f"asperity.mu_residual = {residual!r} is out of bounds: it must be >= "
-                    f"{LEAST_RESIDUAL:g}, for without friction the slip that wears has no measure"
-                )
-            if residual > self.mu:
-                raise ValueError(
-                    f"asperity.mu_residual = {residual!r} is out of bounds: it must be <= mu = "
-                    f"{self.mu!r}, for wear lowers friction"
-                )
-            set_(self, "mu_residual", residual)
+        name, limit = "yield_interference", self.yield_interference
+        set_(self, name, more_than(f"asperity.{name}", limit, 0.0, infinite=True))
+        for name, value in (("mu_residual", mu_residual), ("wear_slip", wear_slip)):
+            if value is not None:
+                raise ValueError(f"asperity.{name} is removed: {WEAR_REMOVED}")
 
     @classmethod
     def hertz_mindlin(cls, G: float, nu: float, R: float, mu: float) -> "Asperity":

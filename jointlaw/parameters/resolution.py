@@ -7,6 +7,7 @@ from ..support.checks import integer
 
 # What those read who ask for options of former versions
 FRONT_REMOVED = "resolution.front is removed: take more depth cells instead, such as depth = 12"
+SLIP_REMOVED = "give mating_length (m), over which slopes fade and friction becomes residual"
 LOSS_REMOVED = "loss is removed: take more depth cells instead, such as Resolution(3, 6, 48)"
 
 
@@ -42,7 +43,7 @@ class Resolution:
 # Slip far beyond the closure asks for facets, slip no longer than the closure for depth cells.
 # Of the resolutions with as few sliders these had the smallest errors over the presets and random
 # laws: docs/validation.md, "Friction and dilation angle", and docs/accuracy.md, "Names".
-LONG = 2.5  # closure ranges: a critical slip from here on is long
+LONG = 2.5  # closure ranges: a mating length from here on is long
 NAMED = {
     "fast": Resolution(3, 3, 2),
     "balanced": Resolution(3, 6, 3),
@@ -59,18 +60,18 @@ SLIP = Resolution(10, 10, 6)
 
 
 def named(
-    critical_slip: float = math.inf,
+    mating_length: float = math.inf,
     yield_interference: float = math.inf,
     closure_range: float = 1.0,
 ) -> dict[str, Resolution]:
     """The resolutions by name of a law with these lengths (m)."""
-    names = NAMED if critical_slip / closure_range >= LONG else NAMED_SHORT
+    names = NAMED if mating_length / closure_range >= LONG else NAMED_SHORT
     return names | NAMED_FLAT if yield_interference / closure_range < FLAT else names
 
 
 def resolve(
     value: str | Resolution,
-    critical_slip: float = math.inf,
+    mating_length: float = math.inf,
     yield_interference: float = math.inf,
     closure_range: float = 1.0,
 ) -> Resolution:
@@ -78,7 +79,7 @@ def resolve(
     if isinstance(value, Resolution):
         return value
     if isinstance(value, str) and value in NAMED:
-        return named(critical_slip, yield_interference, closure_range)[value]
+        return named(mating_length, yield_interference, closure_range)[value]
     raise ValueError(
         f"resolution = {value!r} is unknown; choose one of {', '.join(NAMED)} "
         "or give Resolution(u, phi, depth)"

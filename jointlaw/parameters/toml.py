@@ -7,30 +7,40 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..support.files import replace_file
-from .asperity import Asperity
+from .asperity import WEAR_REMOVED, Asperity
+from .bond import Bond
 from .heights import GammaHeights, Heights
 from .keys import Removed, as_given, checked, keys_of, read
 from .orientation import Orientation
-from .resolution import Resolution, named
+from .resolution import SLIP_REMOVED, Resolution, named
 
 _RESOLUTION = keys_of(Resolution) | {
     "front": Removed("take more depth cells instead, such as depth = 12", neutral=False)
 }
+_ASPERITY = keys_of(Asperity) | {
+    "mu_residual": Removed(WEAR_REMOVED, neutral=None),
+    "wear_slip": Removed(WEAR_REMOVED, neutral=math.inf),
+}
 _LAW = {
-    "orientation!": keys_of(Orientation), "asperity!": keys_of(Asperity), "heights": as_given,
+    "orientation!": keys_of(Orientation), "asperity!": _ASPERITY, "heights": as_given,
     "asperity_density!": as_given, "closure_range": as_given, "resolution": as_given,
-    "plane": as_given, "closure_only": as_given, "critical_slip": as_given,
-    "about": as_given,  # free table for title, source and notes
+    "plane": as_given, "closure_only": as_given, "mating_length": as_given,
+    "slope_wear": as_given, "slope_residual": as_given,
+    "critical_slip": Removed(SLIP_REMOVED, neutral=math.inf),
+    "bond": keys_of(Bond), "about": as_given,  # free table for title, source and notes
     "version": as_given,
 }  # fmt: skip
 _HEIGHTS = keys_of(Heights) | {
     "histogram": Removed("write its `counts` and `edges` (m) into this table", neutral=None)
 }
 _UNITS = {
-    "asperity_density": "1/m2", "closure_range": "m", "critical_slip": "m", "plane": "rad",
-    "K": "Pa m^(1-eta)", "yield_interference": "m", "wear_slip": "m", "beta": "m", "overlap": "m",
+    "asperity_density": "1/m2", "closure_range": "m", "mating_length": "m", "plane": "rad",
+    "slope_wear": "J/m2", "K": "Pa m^(1-eta)", "yield_interference": "m", "beta": "m",
+    "overlap": "m", "normal_stiffness": "Pa/m", "shear_stiffness": "Pa/m", "tension": "Pa",
+    "cohesion": "Pa", "energy_I": "J/m2", "energy_II": "J/m2",
 }  # fmt: skip
-_ENDLESS = ("yield_interference", "wear_slip")  # infinite, which is their default: not written
+# Values that a file does not hold: those of parameters that are off
+_OFF = {"yield_interference": math.inf, "slope_wear": math.inf, "slope_residual": 0.0}
 T = TypeVar("T")
 VERSION = 1  # of the keys; a file without one is of version 1
 
@@ -38,7 +48,7 @@ VERSION = 1  # of the keys; a file without one is of version 1
 def write_law(law: Mapping[str, Any], path: Path | None) -> str:
     """TOML text of a law's parameters, also written to `path` if given."""
     r = law["resolution"]
-    lengths = law["critical_slip"], law["asperity"].yield_interference, law["closure_range"]
+    lengths = law["mating_length"], law["asperity"].yield_interference, law["closure_range"]
     names = named(*lengths)
     name = next((n for n, value in names.items() if value == r), None)
     own = f"{{ u = {r.u}, phi = {r.phi}, depth = {r.depth} }}"
@@ -46,9 +56,9 @@ def write_law(law: Mapping[str, Any], path: Path | None) -> str:
         f"version = {VERSION}  # of this file's keys",
         *_lines(law, ("asperity_density", "closure_range")),
         "resolution = " + (f'"{name}"' if name else own),
-        *_lines(law, ("critical_slip", "plane", "closure_only")),
+        *_lines(law, ("mating_length", "slope_wear", "slope_residual", "plane", "closure_only")),
     ]
-    for part in ("orientation", "asperity", "heights"):
+    for part in ("orientation", "asperity", "heights", "bond"):
         if law[part] is not None:
             values = {one.name: getattr(law[part], one.name) for one in fields(law[part])}
             lines += ["", f"[{part}]", *_lines(values, [name for name in values if name[0] != "_"])]
@@ -64,7 +74,7 @@ def _lines(values: Mapping[str, Any], names: Iterable[str]) -> list[str]:
     for name in names:
         value = values[name]
         absent = value is None or value is False or value == ()
-        if absent or (name in _ENDLESS and value == math.inf):
+        if absent or (name in _OFF and value == _OFF[name]):
             continue
         if name == "distribution" and isinstance(value, tuple):
             lines += [f"counts = {list(value[0])}", f"edges = {list(value[1])}  # m"]
@@ -106,6 +116,8 @@ def build_law(build: Callable[..., T], data: dict[str, Any], where: str) -> T:
     try:
         values["orientation"] = Orientation(**values["orientation"])
         values["asperity"] = Asperity(**values["asperity"])
+        if "bond" in values:
+            values["bond"] = Bond(**values["bond"])
         if "heights" in values:
             values["heights"] = _heights(values["heights"], where)
         if isinstance(values.get("resolution"), dict):

@@ -6,4 +6,4 @@ FAINT = 1e-150  # a product of two stiffnesses, likewise
 NEAR = 1e-5  # of y: below such a change of y the chord of G is lost in rounding, the mean is not
 LIMIT = 1e-9  # of the friction limit: a slider this close is at it, less the rounding of q
 ROUNDED = 1e-12  # of Phi and of y: as much may be lost in a G next to a node, and in dy
-GRAZING = 1e-12  # cosine at which the offset meets its limit: its derivative has a pole at 0
+FAR = 100.0  # mating lengths from mate, where unmated joints start: no slope is left to feel

@@ -16,7 +16,7 @@ from .joint_table import JointTable
 
 FLOOR = 1e-4  # stresses below this share of the largest are held to an absolute tolerance
 ROWS = 30  # closures at which friction and dilation are computed
-LONG = 10.0  # shear limit over closure range, where the law has no critical slip
+LONG = 10.0  # shear limit over closure range, where the law has no mating length
 HELD = 1e-9  # of the normal stress
 PROBE = 1e-7  # shear probe over closure: small against any curvature, large against rounding
 
@@ -29,14 +29,14 @@ def tabulate(
     azimuths: int = 12,
     steps: int = 60,
 ) -> JointTable:
-    """Tabulate the virgin response of a law against closure.
+    """Tabulate the virgin response of a law against closure; a bond is left out.
 
     Parameters
     ----------
     law: a law in 3-D (`plane=None`).
     closure: last closure of the table in m; `law.closure_range` by default.
     shear_limit: shear displacement in m at which friction and dilation are read; by default the
-        critical slip distance, or ten closure ranges where that is infinite.
+        mating length, or ten closure ranges where that is infinite.
     tolerance: interpolation error allowed between rows, as a share of the value (for values below
         1e-4 of the largest: of that floor), for normal stress and for shear stiffness.
     azimuths: number of azimuths, evenly spaced over the half circle, 3 or more; a divisor of 180.
@@ -45,12 +45,13 @@ def tabulate(
     Raises ValueError for a bad argument.
     """
     require_3d(law)
+    whole, law = law, replace(law, bond=None)
     end = more_than("closure", law.closure_range if closure is None else closure, 0.0)
     tolerance = more_than("tolerance", tolerance, 0.0)
     steps = integer("steps", steps, 2)
     if integer("azimuths", azimuths, 3) > 180 or 180 % azimuths:
         raise ValueError(f"azimuths = {azimuths} must divide 180: columns are named by degree")
-    default = law.critical_slip if math.isfinite(law.critical_slip) else LONG * law.closure_range
+    default = law.mating_length if math.isfinite(law.mating_length) else LONG * law.closure_range
     limit = more_than("shear_limit", default if shear_limit is None else shear_limit, 0.0)
     psi: Array = np.radians(np.arange(azimuths) * (180 // azimuths), dtype=np.float64)
     u, worst = _grid(law, end, psi, tolerance)
@@ -63,7 +64,7 @@ def tabulate(
     finer = _friction(replace(law, resolution=SLIP), u, psi[::4], limit, steps)[1]
     missed = np.degrees(np.abs(np.arctan(mobilised[:, ::4]) - np.arctan(finer)))
     errors = (*worst, float(harmonic), float(missed.max()))
-    return replace(table, metadata=_metadata(law, table, tolerance, errors, limit, steps))
+    return replace(table, metadata=_metadata(whole, table, tolerance, errors, limit, steps))
 
 
 def require_3d(law: JointLaw) -> None:
@@ -94,6 +95,7 @@ def _metadata(
         "yielding": "first loading only: unloading keeps the closure that asperities yielded"
         if law.tables.yields
         else "none",
+        "bond": "none" if law.bond is None else "left out: this is the joint without its bond",
         "loading_path": "virgin joint; kn: pure closure; kt: first shear after pure closure; "
         f"mu, mob, dil: shear to {limit:.6g} m in {steps} steps at constant normal stress; "
         "mu is the largest ratio on the way, mob and dil (opening per shear) are those at the end",

@@ -67,7 +67,7 @@ TWICE = '[[joint]]\nbetween = ["base", "top"]\nlaw = "plain"\n[watch]'
         ("[run]", "[run", "at line 34"),
         ("[laws.plain]", "[laws]\nx = 1\n[laws.plain]", "laws.x = 1: must be a table"),
         ("mu = 0.4", "mu = -0.4", "mu"),
-        ("critical_slip = 2e-3", "closure_only = true", "closure_only = true: .* leave it out"),
+        ("mating_length = 2e-3", "closure_only = true", "closure_only = true: .* leave it out"),
         (
             'kind = "coulomb"',
             'kind = "glue"',

@@ -1,7 +1,6 @@
 """Saved states: whole, of one scene, resumed anywhere, and only as the method can carry it."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest

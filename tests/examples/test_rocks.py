@@ -95,7 +95,7 @@ def test_a_scene_of_ones_own_from_the_template(tmp_path, capsys):
 VARIANT = """
 [variants.flat]
 title = "Flat"
-laws = { joint = { critical_slip = 1e-3 } }
+laws = { joint = { mating_length = 1e-3 } }
 [[variants.flat.rock]]
 seed = 7
 set = [{ dip = 5.0 }]
@@ -106,7 +106,7 @@ def test_a_variant_changes_what_it_names():
     """Tables key by key, lists of tables in order, all else as it stands."""
     scene, flat = read_tables(TEXT + VARIANT), read_tables('variant = "flat"\n' + TEXT + VARIANT)
     assert flat["title"] == "Flat"
-    assert flat["laws"]["joint"] == {**scene["laws"]["joint"], "critical_slip": 1e-3}
+    assert flat["laws"]["joint"] == {**scene["laws"]["joint"], "mating_length": 1e-3}
     (rock,) = flat["rock"]
     assert [joints["dip"] for joints in rock["set"]] == [5.0, -60.0]
     sets = [{**scene["rock"][0]["set"][0], "dip": 5.0}, scene["rock"][0]["set"][1]]

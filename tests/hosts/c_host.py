@@ -113,8 +113,11 @@ def random_law(seed):
     kind = {"closure_only": True} if seed % 8 == 5 else {"plane": [None, 0.0, 0.7][seed // 2 % 3]}
     mu = [0.0, 0.3, 0.7][rng.integers(3)]
     damage = {"yield_interference": 10.0 ** rng.uniform(-8.0, -6.0)} if seed // 4 % 2 else {}
+    kind["mating_length"] = [np.inf, 8e-7][seed % 2]
     if mu and seed // 5 % 3 == 1:
-        damage |= {"mu_residual": mu * rng.uniform(), "wear_slip": 10.0 ** rng.uniform(-7.0, -5.0)}
+        kind |= {"mating_length": 8e-7, "slope_residual": rng.uniform()}
+        kind["slope_wear"] = 10.0 ** rng.uniform(1.0, 4.0)
+    bond = random_bond(np.random.default_rng(seed)) if seed % 7 in (2, 5, 6) else None
     return jl.JointLaw(
         orientation=jl.Orientation(
             rng.uniform(1.0, 6.0), rng.uniform(-0.4, 0.8), rng.uniform(-0.15, 0.15)
@@ -123,10 +126,18 @@ def random_law(seed):
         heights=heights,
         asperity_density=1e10,
         closure_range=1e-6,
-        critical_slip=[np.inf, 8e-7][seed % 2],
         resolution=jl.Resolution(int(rng.integers(1, 4)), int(rng.integers(3, 6)), 1 + seed % 6),
+        bond=bond,
         **kind,
     )
+
+
+def random_bond(rng):
+    """A bond that breaks on the way of `random_path`, brittle or not in each mode."""
+    stiffness, reach = 10.0 ** rng.uniform(9.0, 12.0, 2), 10.0 ** rng.uniform(-8.0, -6.0, 2)
+    elastic = 0.5 * stiffness * reach**2
+    energies = np.where(rng.random(2) < 0.3, 1.0, 10.0 ** rng.uniform(0.0, 2.0, 2)) * elastic
+    return jl.Bond(*stiffness, *(stiffness * reach), *energies)
 
 
 def random_path(dim, seed, steps=60):

@@ -30,7 +30,7 @@ def soft(resolution="balanced", **changes):
             "heights": jl.GammaHeights(alpha=3.82, beta=1.15e-4, overlap=3e-4),
             "asperity_density": 1e6,
             "resolution": resolution,
-            "critical_slip": 2e-4,
+            "mating_length": 2e-4,
             **changes,
         }
     )

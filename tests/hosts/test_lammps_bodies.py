@@ -50,7 +50,7 @@ def rock(plugin, name="block.jlaw", **changes):
     law = soft(
         asperity_density=1e4,
         heights=jl.GammaHeights(alpha=3.82, beta=1.15e-3, overlap=3e-3),
-        critical_slip=5e-4,
+        mating_length=5e-4,
         resolution="fast",
         **changes,
     )

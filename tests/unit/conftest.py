@@ -45,10 +45,11 @@ KINDS = {
     "no heights": {"heights": None, "a": 1.0, "b": -1.0, "c": 0.5},
     "linear": {"heights": None, "eta": 0.0, "a": 1.0, "mu": 0.0},
     "plane": {"plane": 0.4},
-    "critical slip": {"critical_slip": 2e-6, "plane": math.pi},
-    "yielding": {"critical_slip": 2e-6, "damage": {"yield_interference": 2e-7}},
-    "wear": {"plane": 0.4, "damage": {"mu_residual": 0.1, "wear_slip": 1e-6}},
-    "closure only": {"closure_only": True, "critical_slip": 2e-6},
+    "mating length": {"mating_length": 2e-6, "plane": math.pi},
+    "yielding": {"mating_length": 2e-6, "damage": {"yield_interference": 2e-7}},
+    "wear": {"plane": 0.4, "mating_length": 2e-6, "slope_wear": 100.0, "slope_residual": 0.1},
+    "closure only": {"closure_only": True, "mating_length": 2e-6},
+    "bond": {"bond": jl.Bond(1e12, 1e12, 5e4, 1e5, 5e-3, 2e-2)},
 }
 
 

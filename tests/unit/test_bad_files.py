@@ -53,7 +53,7 @@ def told(text, tmp_path):
         ("a = 3.0", "a = 0.9", "orientation.a = 0.9 is out of bounds: it must be >= 1"),
         ("lam = 1.2", 'lam = "1.2"', "asperity.lam = '1.2' is not a number"),
         ("eta = 0.5", "eta = nan", "asperity.eta = nan is not finite"),
-        ("density = 1e10", "density = 1e10\ncritical_slip = 0", "critical_slip = 0.0"),
+        ("density = 1e10", "density = 1e10\nmating_length = 0", "mating_length = 0.0"),
         ("density = 1e10", 'density = 1e10\nresolution = "rough"', "resolution = 'rough'"),
         ("density = 1e10", "density = 1e10\nresolution = {u = 2, phi = 2, depth = 1}",
          "resolution.phi = 2 is out of bounds"),

@@ -12,10 +12,13 @@ GOOD = {
     "orientation": {"a": 3.0, "b": 0.0, "c": 0.0},
     "asperity": {"K": 1.0, "lam": 1.0, "eta": 0.5, "mu": 0.3},
     "heights": {"alpha": 3.82, "beta": 1.0, "overlap": 2.0},
+    "bond": {"normal_stiffness": 2e9, "shear_stiffness": 1e9, "tension": 1e6, "cohesion": 3e6},
 }
-KINDS = {"orientation": jl.Orientation, "asperity": jl.Asperity, "heights": jl.GammaHeights}
+KINDS = {
+    "orientation": jl.Orientation, "asperity": jl.Asperity, "heights": jl.GammaHeights,
+    "bond": jl.Bond,
+}  # fmt: skip
 NAMES = [f"{part}.{name}" for part, values in GOOD.items() for name in values]
-WEAR = {"mu_residual": 0.1, "wear_slip": 1.0}
 NAN, INF = float("nan"), float("inf")
 
 
@@ -45,15 +48,18 @@ def test_what_is_no_finite_number(path, data):
         ("asperity.eta", -1e-308, ">= 0", {}),
         ("asperity.mu", -1e-308, ">= 0", {}),
         ("asperity.yield_interference", 0.0, "> 0", {}),
-        ("asperity.wear_slip", 0.0, "> 0", WEAR),
-        ("asperity.mu_residual", 0.4, "<= mu = 0.3", WEAR),
-        ("asperity.mu_residual", 0.0, ">= 1e-06", WEAR),
-        ("asperity.mu_residual", 0.1, "give both or neither", {}),
-        ("asperity.wear_slip", 1.0, "give both or neither", {}),
         ("heights.alpha", -1.0, "> -1", {}),
         ("heights.beta", 0.0, "> 0", {}),
         ("heights.overlap", -1e-308, ">= 0", {}),
         ("heights.formation", "both", "population, individual", {}),
+        ("bond.normal_stiffness", -1.0, ">= 0 and <= 1e+100", {}),
+        ("bond.normal_stiffness", 0.0, "> 0, for bond.tension = 1000000.0 Pa", {}),
+        ("bond.shear_stiffness", 0.0, "> 0, for bond.cohesion = 3000000.0 Pa", {}),
+        ("bond.tension", -1e-308, ">= 0", {}),
+        ("bond.cohesion", 1e101, "<= 1e+100", {}),
+        ("bond.energy_I", 249.9, ">= 250, the elastic energy at the peak", {}),
+        ("bond.energy_II", 4499.0, ">= 4500", {}),
+        ("bond.energy_II", 1.0, "<= 0", {"cohesion": 0.0}),
     ],
 )
 def test_a_value_out_of_bounds(path, value, bound, more):
@@ -78,7 +84,10 @@ def test_c_outside_eq_18(b, over, sign):
         ("asperity_density", 0.0, "> 0"),
         ("asperity_density", "1e10", "not a number"),
         ("closure_range", -1e-6, "> 0"),
-        ("critical_slip", NAN, "not finite"),
+        ("mating_length", NAN, "not finite"),
+        ("mating_length", 1e-12, "0.1 closure_range = "),
+        ("slope_wear", 1.0, "finite mating_length"),
+        ("slope_residual", 1.1, "a share, 0 to 1"),
         ("plane", INF, "not finite"),
         ("plane", True, "not a number"),
         ("closure_only", 1, "True or False"),
@@ -87,12 +96,37 @@ def test_c_outside_eq_18(b, over, sign):
         ("orientation", {"a": 3.0}, "must be of type Orientation"),
         ("asperity", None, "must be of type Asperity"),
         ("heights", {"alpha": 3.0}, "must be GammaHeights"),
+        ("bond", {"tension": 1e6}, "must be of type Bond"),
     ],
 )
 def test_parameters_of_the_law(law, name, value, message):
     values = {one: getattr(law, one) for one in ("orientation", "asperity", "heights")}
     with pytest.raises(ValueError, match=f"{name} = .*{message}"):
         jl.JointLaw(**({"asperity_density": 1e10} | values | {name: value}))
+
+
+def test_parameters_of_former_versions_name_their_successors(law):
+    values = {one: getattr(law, one) for one in ("orientation", "asperity", "asperity_density")}
+    with pytest.raises(ValueError, match=r"critical_slip is removed: give mating_length"):
+        jl.JointLaw(**values, critical_slip=1e-3)
+    with pytest.raises(ValueError, match=r"asperity.wear_slip is removed: .* slope_wear"):
+        jl.Asperity(1.0, 1.0, 0.5, 0.3, wear_slip=1.0)
+    with pytest.raises(ValueError, match=r"asperity.mu_residual is removed: .* slope_wear"):
+        jl.Asperity(1.0, 1.0, 0.5, 0.3, mu_residual=0.1)
+
+
+@pytest.mark.parametrize(
+    ("more", "given", "told"),
+    [
+        ({}, {}, "infinite mating_length"),
+        ({"closure_only": True, "mating_length": 1e-5}, {}, "closure_only"),
+        ({"mating_length": 1e-5}, {"normal_stress": 1e6}, "starts at first touch"),
+    ],
+)
+def test_an_unmated_start_that_there_is_not(make_law, more, given, told):
+    for start in (make_law(**more).joint, lambda **kw: make_law(**more).joints(3, **kw)):
+        with pytest.raises(ValueError, match=f"mated=False.*{told}"):
+            start(mated=False, **given)
 
 
 @pytest.mark.parametrize(

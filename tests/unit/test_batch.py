@@ -76,4 +76,4 @@ def test_a_joint_shows_what_a_batch_does(law):
     F[:], C[:], joint.delta[:], joint.F[:] = 0.0, 0.0, 0.0, 0.0  # the caller's own
     np.testing.assert_array_equal(joint.snapshot().values, before)
     assert (law.dim, batch.law.state_size) == (3, batch.snapshot().values.shape[1])
-    assert jl.Joint.delta.__doc__.startswith("Displacement since the virgin state (dim,): closure")
+    assert jl.Joint.delta.__doc__.startswith("Displacement from the mated position (dim,): closure")

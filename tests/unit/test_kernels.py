@@ -28,21 +28,21 @@ def random_law(make_law, seed):
     if seed % 7 == 6:  # a density infinite at the point of contact
         heights = jl.GammaHeights(-0.6, 3e-6, 0.0, "individual")
     mu = [0.0, 0.3, 0.7][rng.integers(3)]
-    damage = {"yield_interference": 3e-7} if seed % 4 > 1 else {}
-    if mu and seed % 6 > 3:
-        damage |= {"mu_residual": 0.4 * mu, "wear_slip": 2e-6}
+    more = {"mating_length": [np.inf, 8e-7][seed % 2]}
+    if seed % 6 > 3:
+        more |= {"mating_length": 3e-6, "slope_wear": 300.0, "slope_residual": 0.3}
     return make_law(
         a=rng.uniform(1.0, 6.0),
         b=rng.uniform(-0.4, 0.8),
         c=rng.uniform(-0.15, 0.15),
         lam=rng.uniform(0.5, 2.0),
         mu=mu,
-        damage=damage,
+        damage={"yield_interference": 3e-7} if seed % 4 > 1 else {},
         eta=eta,
         heights=heights,
         plane=[None, 0.0, 0.7][rng.integers(3)],
-        critical_slip=[np.inf, 8e-7][seed % 2],
         resolution=jl.Resolution(int(rng.integers(1, 4)), int(rng.integers(3, 6)), 1 + seed % 6),
+        **more,
     )
 
 
@@ -77,15 +77,17 @@ def worst(one, other, peak):
     return np.max(np.abs(np.asarray(one) - np.asarray(other)), initial=0.0) / peak
 
 
-# heights of each kind, infinite at touch too; yielding, wear and both; with critical slip; 2-D, 3-D
+# heights of each kind, infinite at touch too; yielding, wear and both; slopes that fade; 2-D, 3-D
 @pytest.mark.parametrize("seed", [2, 3, 5, 8, 10, 13])
 def test_same_numbers_on_random_laws_and_paths(both, make_law, seed):
     same_numbers(both, random_law(make_law, seed), seed)
 
 
 def test_same_numbers_of_facets_with_unequal_cells_that_yield_and_wear(both, make_law):
-    damage = {"yield_interference": 3e-7, "mu_residual": 0.2, "wear_slip": 2e-6}
-    law = make_law(mu=0.5, damage=damage, resolution="balanced", critical_slip=8e-7)
+    law = make_law(
+        mu=0.5, damage={"yield_interference": 3e-7}, resolution="balanced", mating_length=8e-7,
+        slope_wear=300.0, slope_residual=0.2,
+    )  # fmt: skip
     cells = np.count_nonzero(law.tables.depth[:, :-1] < UNUSED, axis=1)
     assert cells.min() < cells.max()
     same_numbers(both, law, 1)

@@ -27,10 +27,10 @@ def test_equal_laws_have_one_fingerprint(make_law):
 
 
 @pytest.mark.parametrize("name", ["fast", "balanced", "fine", "reference"])
-def test_a_short_critical_slip_chooses_other_nodes(make_law, name):
+def test_a_short_mating_length_chooses_other_nodes(make_law, name):
     """Its own depth cells and facets; a file holds the name, not the nodes."""
     for ratio, chosen in ((2.4, named(2.4)), (2.6, named())):
-        law = make_law(resolution=name, closure_range=1e-6, critical_slip=ratio * 1e-6)
+        law = make_law(resolution=name, closure_range=1e-6, mating_length=ratio * 1e-6)
         assert law.resolution == chosen[name]
         assert len(law.facets.theta) == len(law.tables.c1)
         assert f'resolution = "{name}"' in law.to_toml()

@@ -11,7 +11,7 @@ SMOOTH = {"alpha": 3.82, "beta": 1.15, "overlap": 2.0}  # Westerly granite, in u
 def law(a=3.0, b=0.5, c=0.1, K=1.0, lam=1.2, eta=0.5, mu=0.4, formation=None, damage=(), **more):
     """A joint law of unit closure range; `formation` switches the printed smooth heights on.
 
-    damage: yield_interference, mu_residual and wear_slip of the asperities, as a mapping.
+    damage: yield_interference of the asperities, as a mapping.
     """
     heights = None if formation is None else jl.GammaHeights(**SMOOTH, formation=formation)
     more = {"asperity_density": 1.0, "closure_range": 1.0, "resolution": "fine"} | more

@@ -10,6 +10,9 @@ import numpy as np
 
 from jointlaw.discretisation.virgin_curve import VirginCurve
 from jointlaw.kernels import reference as kernel
+from jointlaw.kernels.mating import planes
+from jointlaw.kernels.wear import worn_share
+from jointlaw.kernels.yielding import flatten
 
 _X, _W = np.polynomial.legendre.leggauss(16)
 _X = 0.5 * (_X + 1.0)  # Gauss rule of 16 points on 0 to 1, with weights _W / 2
@@ -20,32 +23,61 @@ _STARTS = np.unique(
 )
 
 
-def _branches(k, state, d, t):
-    """On which side of every kink (kinks, n) the trial steps t d (n,) of one state end."""
-    spread = np.repeat(state, len(t), axis=1)
-    old = kernel.parts(k, spread)
-    new = kernel.parts(k, kernel.step(k, spread, d[:, None] * t, False)[0])
-    virgin = kernel.cells(k, kernel.effective_closure(k, new.delta[0], new.offset))
-    flat = kernel.cells(k, new.depth) if k.yields else None
-    now = kernel.flattened(virgin, flat)
-    mu = kernel.friction(k, old.slip) if k.wears else np.asarray(k.mu)
-    cap = kernel.strength(k, mu) * now.G
-    low = k.depth[:, :-1, None]
-    sides = [
-        np.hypot(new.q[0], new.q[1]) >= cap * (1 - 1e-13),
-        virgin.y[:, None] > low,
-        now.kappa > 0,
-        np.sum((old.offset + d[1:, None] * t) ** 2, axis=0)[None, None] > k.critical_slip**2,
-    ]
+def begun(k, state):
+    """States (rows, B) as a step begins: slopes have worn by the work of friction so far."""
+    new = state.copy()
+    if k.wears:
+        old, now = kernel.parts(k, state), kernel.parts(k, new)
+        now.worn[:] = worn_share(k, old.worn, old.work)
+        now.q[:], lost = kernel.wear(k, old, now.slopes)
+        now.dissipated[:] += lost
+    return new
+
+
+def along(k, state, d, t):
+    """Where steps d (dim, B) from states as they begin (rows, B) are at the time t (B,).
+
+    The planes are those of the whole step, and y runs straight: docs/theory-incremental.md, "No
+    step creates energy". Returns the power (B,), and on which side of every kink (kinks, B).
+    """
+    old = kernel.parts(k, state)
+    p0, p1, slopes = old.delta[1:], old.delta[1:] + d[1:], old.slopes
+    middle = planes(k, 0.5 * (p0 + p1), slopes)
+    gamma = np.maximum(planes(k, p0, slopes).gamma, planes(k, p1, slopes).gamma)
+    y0, y1 = (kernel.effective_closure(k, x, slopes) for x in (old.delta, old.delta + d))
+    before, after = kernel.cells(k, y0), kernel.cells(k, y0 + t * (y1 - y0))
+    gained, depth, y, low = after.G - before.G, old.depth, after.y, k.depth[:, :-1, None]
+    sides = [y[:, None] > low]
     if k.yields:
-        own = virgin.y - k.yield_depth[:, None] >= new.depth
-        sides += [new.depth[:, None] > low, (new.depth > old.depth)[None], own[None]]
-    return np.concatenate([side.reshape(-1, len(t)) for side in sides])
+        depth, flat0 = flatten(k, old.depth, after.y), kernel.cells(k, old.depth)
+        gained = after.G - np.maximum(before.G, flat0.G)
+        before, after = (
+            kernel.flattened(before, flat0), kernel.flattened(after, kernel.cells(k, depth))
+        )  # fmt: skip
+        sides += [depth[:, None] > low, depth > old.depth, y - k.yield_depth[:, None] >= depth]
+    part = np.einsum("edmb,db->emb", middle.basis, d)
+    limit = kernel.strength(k, gamma)
+    sliders = kernel.load(k, before, gained, after, limit, old.q, (t * part)[:, :, None])
+    q = sliders.share * sliders.trial
+    power = np.sum((k.area * k.c1)[:, None] * after.force * (y1 - y0), axis=0)
+    power = power + np.einsum("emb,emdb->b", part, q) / k.lam
+    sides += [np.hypot(q[0], q[1]) >= sliders.cap * (1 - 1e-13), after.kappa > 0]
+    return power, np.concatenate([side.reshape(-1, len(t)) for side in sides])
+
+
+def _at(k, state, d, t):
+    """As `along`, of one joint (rows, 1) and its step (dim,) at many times (n,)."""
+    n = len(t)
+    return along(k, np.repeat(state, n, axis=1), np.repeat(d[:, None], n, axis=1), t)
 
 
 def _kinks(k, state, d):
     """Times at which the branches change, by bisection between a few starts."""
-    at = _branches(k, state, d, _STARTS)
+
+    def branches(t):
+        return _at(k, state, d, t)[1]
+
+    at = branches(_STARTS)
     change = (at[:, 1:] != at[:, :-1]).any(axis=0)
     low, high, side, found = _STARTS[:-1][change], _STARTS[1:][change], at[:, :-1][:, change], []
     for _ in range(80):  # several changes between two starts: one after the other
@@ -54,10 +86,10 @@ def _kinks(k, state, d):
         a, b = low, high
         for _ in range(46):
             c = 0.5 * (a + b)
-            same = (_branches(k, state, d, c) == side).all(axis=0)
+            same = (branches(c) == side).all(axis=0)
             a, b = np.where(same, c, a), np.where(same, b, c)
         found.append(b)
-        after, end = _branches(k, state, d, b), _branches(k, state, d, high)
+        after, end = branches(b), branches(high)
         more = (after != end).any(axis=0) & (b < high)
         low, high, side = b[more], high[more], after[:, more]
     return np.unique(np.concatenate([[0.0, 1.0], *found]))
@@ -94,11 +126,10 @@ def stored(k, state):
 
 
 def step_work(k, state, d):
-    """int_0^1 F(trial(t d)) . d dt of one joint: state (rows, 1), d (dim,)."""
+    """Work along a step of one joint, by `along`: a state as it begins (rows, 1), d (dim,)."""
     edges = _kinks(k, state, d)
     # the pieces of a tabulated virgin curve meet smoothly enough for four rules between kinks
     edges = np.interp(np.arange(0, 4 * len(edges) - 3) / 4, np.arange(len(edges)), edges)
     span = np.diff(edges)[:, None]
     t, w = (edges[:-1, None] + span * _T).ravel(), (span * _TW).ravel()
-    F = kernel.step(k, np.repeat(state, len(t), axis=1), d[:, None] * t, False)[1]
-    return float(w @ (d @ F))
+    return float(w @ _at(k, state, d, t)[0])

@@ -12,7 +12,7 @@ PATHS, LAWS = 10, 6
 
 
 def random_law(seed):
-    """Any admissible parameters; every third law has a critical slip."""
+    """Any admissible parameters."""
     rng = np.random.default_rng(seed)
     a = float(rng.choice([1.0, rng.uniform(1.0, 1.6), rng.uniform(1.6, 5.0), 10.0]))
     b = rng.uniform(-1.0, 2.0)
@@ -28,7 +28,6 @@ def random_law(seed):
         mu=rng.uniform(0.05, 1.2),
         formation=formation,
         resolution=jl.Resolution(*(int(rng.integers(*r)) for r in ((1, 4), (3, 6), (1, 6)))),
-        critical_slip=rng.uniform(0.1, 0.6) if seed % 3 == 2 else np.inf,
     )
 
 

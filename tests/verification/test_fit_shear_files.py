@@ -27,7 +27,7 @@ def law():
         asperity=jl.Asperity.hertz_mindlin(G=20e9, nu=0.25, R=1e-3, mu=0.55),
         heights=jl.GammaHeights(3.8, 3e-5, 0.0, "individual"),
         asperity_density=3e5,
-        critical_slip=0.4e-3,
+        mating_length=0.4e-3,
     )
 
 
@@ -64,8 +64,8 @@ def test_three_shear_files_and_a_closure_file_predict_a_fourth(tmp_path, law, ca
     assert "another shape than the law" not in capsys.readouterr().out
     assert (tmp_path / "o" / "fit.png").read_bytes().startswith(b"\x89PNG")
     summary = json.loads((tmp_path / "o" / "summary.json").read_text())
-    assert {"mu", "a", "critical_slip", "asperity_density"} <= set(summary["identifiable"])
-    assert summary["parameters_SI"]["critical_slip"] == pytest.approx(0.4e-3, rel=0.1)
+    assert {"mu", "a", "mating_length", "asperity_density"} <= set(summary["identifiable"])
+    assert summary["parameters_SI"]["mating_length"] == pytest.approx(0.4e-3, rel=0.1)
     fourth = "shear o/law.toml --normal-stress 4MPa --to 3mm --steps 100 --out p"
     assert main(fourth.split()) == 0
     table = np.genfromtxt(tmp_path / "p" / "shear.csv", delimiter=",", names=True)
@@ -82,7 +82,7 @@ def test_a_curve_that_softens_is_told_and_its_wear_can_be_fitted(tmp_path, law, 
     assert main(f"fit --shear s.csv {held} --out o".split()) == 0
     told = "let mu_residual and wear_slip be free too"
     assert told in capsys.readouterr().out
-    free = "mu,a,critical_slip,mu_residual,wear_slip"
+    free = "mu,a,mating_length,mu_residual,wear_slip"
     assert main(f"fit --shear s.csv {held} --free {free} --out w".split()) == 0
     assert told not in capsys.readouterr().out
     found = json.loads((tmp_path / "w" / "summary.json").read_text())["parameters_SI"]

@@ -17,7 +17,7 @@ SCENE = f"""
 gravity = [{9.81 * math.sin(math.radians(DIP))}, {-9.81 * math.cos(math.radians(DIP))}]
 [laws.joint]
 asperity_density = 1e4
-critical_slip = 2e-3
+mating_length = 2e-3
 plane = 0.0
 resolution = {{ u = 4, phi = 10, depth = 1 }}
 orientation = {{ a = 4.0, b = 0.0, c = 0.3 }}

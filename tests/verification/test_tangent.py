@@ -33,6 +33,7 @@ OPTIONS = {
     "critical slip": {"critical_slip": 0.2},
     "at the critical slip, heights": {"critical_slip": 0.12, "formation": "population"},
     "concave stiffness": {"eta": 0.2},
+    "bond": {"bond": jl.Bond(1.0, 0.7, 0.05, 0.1, energy_I=0.1, energy_II=0.5)},
     "yielding": {"damage": {"yield_interference": 0.3}, **FEW},
     "yielding of both sides": {"damage": {"yield_interference": 0.2}, "critical_slip": 0.12, **FEW},
     "yielding and wear": {

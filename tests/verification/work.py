@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from jointlaw.joints.state import JointState
+
 _X, _W = np.polynomial.legendre.leggauss(2)
 
 
@@ -21,6 +23,11 @@ class WorkMeter:
     def __init__(self, law, n, panels):
         self.n, (self.t, self.w) = n, nodes(panels)
         self.copies = law.joints(n * len(self.t))
+
+    def start(self, state):
+        """Put all joints into one state (rows, 1)."""
+        values = np.repeat(state.T, len(self.copies), axis=0)
+        self.copies.restore(JointState(self.copies.law.fingerprint, values))
 
     def step(self, d):
         """Work (n,) of the increments d (n, dim); the joints move on."""

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...joints.time_step import stiffness_per_facet
 from ...law import JointLaw
 from ...native import layout
 from ...native.layout import FORMAT
@@ -105,16 +106,18 @@ def header_text(law: JointLaw, name: str) -> str:
 
 def _numbers(law: JointLaw) -> dict[str, int | float]:
     """Numbers of the law by name, in the order of `struct jlaw_law`; refuses too many azimuths."""
-    k, p = law.tables, law.asperity
+    k = law.tables
     if max(_ring(law.facets.theta)) > layout.AZIMUTHS:
         raise ValueError(
             f"resolution.phi = {law.resolution.phi} is out of bounds: jointlaw.h takes at most "
             f"{layout.AZIMUTHS} azimuths on the circle"
         )
     numbers, _ = layout.pack(k)
+    per_slope, bend = stiffness_per_facet(k)
     return numbers | {
         "closure_factor": law._first_loading.factor,
-        "stiffness_factor": (max(1.0, 1.0 / p.lam) + p.mu) * float(np.sum(k.area / k.c1)),
+        "stiffness_factor": float(np.sum(per_slope)),
+        "bending_factor": float(np.sum(bend)),
         "largest_reach": law.largest_reach,
         "stretch": 1.0 + 2.0 * float(np.max(np.abs(k.m))),
         "farthest": min(law.largest_reach, law._first_loading.farthest),

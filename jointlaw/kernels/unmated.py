@@ -1,0 +1,29 @@
+"""Where a joint starts whose faces have never met."""
+
+import numpy as np
+
+from ..discretisation.tables import Tables
+from ..support.checks import Array
+from ..support.thresholds import FAR, ROUNDED
+from .mating import offset
+
+
+def unmated_start(k: Tables) -> Array:
+    """Displacement (dim,) in m from the mated position, at first touch, along axis 2.
+
+    Zeros for a law without a mating length, or without shear, whose bond alone is missing. Raises
+    ValueError for such a law without a bond.
+    """
+    if k.bond is not None and not (k.fades and k.dim > 1):
+        return np.zeros(k.dim)
+    if k.dim == 1:
+        raise ValueError("mated=False: a joint with closure_only is always mated")
+    if not k.fades:
+        raise ValueError(
+            "mated=False: with an infinite mating_length a joint stays mated however far it slips; "
+            "give the law a finite one"
+        )
+    p = np.zeros((k.dim - 1, 1))
+    p[0] = FAR * k.mating_length
+    highest = np.max(k.m[1:].T @ offset(k, p))
+    return np.array([-(1 + ROUNDED) * highest, *p[:, 0]])

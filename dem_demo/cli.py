@@ -7,7 +7,6 @@ from pathlib import Path
 
 from jointlaw.laboratory.experiments import PathError
 from jointlaw.support.files import require_free, write_json
-from jointlaw.support.progress import explained
 from jointlaw.support.pyplot import FORMATS
 
 from .dynamics.simulation import Simulation
@@ -20,7 +19,6 @@ from .studies import ablate, compare, strength, trials
 VERSION = 2  # of strength.json
 FAILING = 3.0  # s: most that a failing rock is run for
 INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
-WAIT = "the first run after an installation also compiles the law, once"
 
 ABOUT = """\
 Rigid rock blocks in 2-D whose every contact force comes from a joint law.
@@ -90,8 +88,7 @@ def main(arguments: list[str] | None = None) -> int:
         given = parser.parse_args(words)
         if getattr(given, "force", None) is False:
             require_free(given.out)
-        with explained(f"dem_demo is at work; {WAIT}"):
-            command(given)
+        command(given)
     except KeyboardInterrupt as stop:
         print(f"dem_demo: {str(stop) or 'interrupted'}", file=sys.stderr)
         return INTERRUPTED

@@ -64,7 +64,7 @@ python_use_unqualified_type_names = True
 ORDER = (
     "first_curve", "closure_hysteresis", "closure_cycle", "direct_shear", "strength_envelope",
     "bond", "cyclic_shear", "damping", "anisotropy", "large_shear", "fit_closure", "from_scan",
-    "table", "batch", "blocks", "newton", "snapshot",
+    "table", "batch", "blocks", "newton", "finite_elements", "snapshot",
 )  # fmt: skip
 
 

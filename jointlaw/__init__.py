@@ -28,6 +28,7 @@ from .tables.joint_table import JointTable, load_table
 if TYPE_CHECKING:
     from .calibration.fit import fit_closure, fit_curves
     from .hosts.c.export import export_c
+    from .hosts.fem.export import export_fem
     from .hosts.lammps.export import export_lammps
     from .hosts.yade.export import export_yade
     from .surface.fit import from_surface
@@ -51,6 +52,7 @@ __all__ = [
     "closure_test",
     "direct_shear",
     "export_c",
+    "export_fem",
     "export_lammps",
     "export_yade",
     "fit_closure",
@@ -66,6 +68,7 @@ __all__ = [
 # Tools for measurements and hosts load on first use: a DEM code that embeds the law needs none
 _LATER = {
     "export_c": "hosts.c.export",
+    "export_fem": "hosts.fem.export",
     "export_lammps": "hosts.lammps.export",
     "export_yade": "hosts.yade.export",
     "fit_closure": "calibration.fit",

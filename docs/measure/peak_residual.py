@@ -1,4 +1,4 @@
-"""Peak and residual shear stress of sandstone joints: a law with wear fitted to three tests.
+"""Peak and residual shear stress of sandstone joints: four parameters, fitted to three.
 
     python docs/measure/peak_residual.py
 
@@ -30,8 +30,6 @@ START = {
     "K": 3e6,
     "a": 3.0,
     "mu": 0.5,
-    "mu_residual": 0.2,
-    "wear_slip": 8e-3,
     "mating_length": 5e-3,
 }
 WEIGHTS = np.array([1.0, 0.25, 1.0])  # a peak is flat: its displacement scatters most
@@ -39,13 +37,12 @@ MOVED = 0.01  # change of any figure that the data would not show
 
 
 def law(x: np.ndarray) -> jl.JointLaw:
-    """The law of the logarithms (6,) of the parameters in START."""
+    """The law of the logarithms (4,) of the parameters in START."""
     v = dict(zip(START, np.exp(x).tolist(), strict=True))
     return jl.JointLaw(
         orientation=jl.Orientation(v["a"]),
         asperity=jl.Asperity(
-            v["K"], 1.17, 0.5, v["mu"], mu_residual=min(v["mu_residual"], v["mu"]),
-            wear_slip=v["wear_slip"],
+            v["K"], 1.17, 0.5, v["mu"],
         ),
         asperity_density=1e6, closure_range=1e-3, resolution=jl.Resolution(5, 3, 2), plane=0.0,
         mating_length=v["mating_length"],

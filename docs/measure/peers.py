@@ -71,7 +71,7 @@ def compare(law: jl.JointLaw, rounds: int) -> list[list[Any]]:
             kinds.insert(1, ("the same with tangent", least, True))
         for what, r, tangent in kinds:
             made, name = replace(law, resolution=r), f"{tolerance:.1%}, {what}"
-            error = float(suite.errors(made)[0].max())
+            error = float(suite.miss(made).largest.max())
             about[name] = [f"{r.u}, {r.phi}, {r.depth}", made.tables.sliders, f"{error:.2%}"]
             cases[name] = ours(made, JOINTS, tangent)
     best = dict.fromkeys([*cases, HERTZ], float("inf"))

@@ -143,7 +143,7 @@ def misses(law: jl.JointLaw, rng: np.random.Generator) -> list[dict[str, Any]]:
         ratio = errors(tractions(made, d), truth)[0] / tolerance
         if slid is not None:
             mine = slip(made, law.closure_range, stress, ways)
-            ratio = np.append(ratio, mine.errors(slid)[0] / tolerance)
+            ratio = np.append(ratio, errors(mine.F, slid.F, slid.counts)[0] / tolerance)
         found.append({"ratio": ratio.tolist(), "sliders": made.tables.sliders, "seconds": took})
     return found
 

@@ -93,8 +93,3 @@ def slip(law: JointLaw, closure_range: float, stress: float, ways: Array) -> Sli
     turned = places >= np.maximum(MOBILISED * far * length, 2 * R)
     counts = np.concatenate([places >= MOBILISED * unit, turned])
     return Slip(F, np.degrees(np.arctan2(shear, F[:, :, 0])), np.degrees(np.arctan(rise)), counts)
-
-
-def names(dim: int) -> tuple[str, ...]:
-    """What the paths are called."""
-    return tuple(f"slip {way:g} at S/{2 / share:g}" for share, way, _ in standard_ways(dim))

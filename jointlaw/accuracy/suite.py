@@ -42,7 +42,7 @@ from ..laboratory.normal_control import NormalCondition, closing_increments
 from ..parameters.resolution import Resolution
 from ..support.checks import Array
 from ..support.progress import track
-from .slip import HELD, Slip, distance, names, random_ways, slip, standard_ways
+from .slip import HELD, Slip, distance, random_ways, slip, standard_ways
 
 if TYPE_CHECKING:
     from ..law import JointLaw
@@ -108,10 +108,6 @@ class Suite:
         largest, rms = np.append(largest, more[0]), np.append(rms, more[1])
         return Miss(largest, rms, *mine.apart(self.slip))
 
-    def errors(self, law: JointLaw) -> tuple[Array, Array]:
-        """Largest and rms error (paths,) of another resolution, as shares of the peak |F|."""
-        return self.miss(law)[:2]
-
 
 def standard_suite(law: JointLaw, best: Resolution | None = None, excursions: int = 0) -> Suite:
     """The standard paths of a law, with tractions at `best`, by default the reference resolution.
@@ -138,7 +134,8 @@ def _suite(law: JointLaw, excursions: int) -> Suite:
     slid, ways = None, standard_ways(law.tables.dim)
     if not law.closure_only and steepest(law) < _JAMS:
         more = random_ways(np.random.default_rng(18), excursions // 16, law.tables.dim)
-        called += names(law.tables.dim) + tuple(f"slip {i + 1}" for i in range(len(more)))
+        called += tuple(f"slip {way:g} at S/{2 / share:g}" for share, way, _ in ways)
+        called += tuple(f"slip {i + 1}" for i in range(len(more)))
         ways = np.concatenate([ways, more])
         slid = slip(law, law.closure_range, stress, ways)
     suite = Suite(called, d, F, slid, ways, stress, np.zeros(len(called)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -45,12 +46,10 @@ def coarsest(law: JointLaw, bound: float, excursions: int = 0) -> tuple[Resoluti
     suite, best = _reference(law, bound, excursions)
     if (left_out := _left_out(suite, 1.0)) > bound:
         return None, left_out
-    known: dict[Resolution, float] = {}
 
+    @cache
     def error(r: Resolution) -> float:
-        if r not in known:
-            known[r] = float(suite.errors(replace(law, resolution=r))[0].max())
-        return known[r]
+        return float(suite.miss(replace(law, resolution=r)).largest.max())
 
     # What each of u, phi and depth needs while the other two are fine: with less of it a resolution
     # meets the suite only by chance, where two errors cancel. The errors of u and phi rise and fall
@@ -96,7 +95,7 @@ def _refined(law: JointLaw, suite: Suite, best: Resolution) -> Resolution:
 
     def lost(name: str) -> float:
         fewer = replace(best, **{name: getattr(scaled(best, 2 / 3), name)})
-        return float(suite.errors(replace(law, resolution=fewer))[0].max())
+        return float(suite.miss(replace(law, resolution=fewer)).largest.max())
 
     worst = max(("u", "phi", "depth"), key=lost)
     return replace(best, **{worst: getattr(scaled(best, 1.5), worst)})

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ..hosts.c.export import export_c, identifier
+from ..hosts.fem.export import SEATING, export_fem, require_seating
 from ..hosts.lammps.export import export_lammps
 from ..hosts.yade.export import export_yade
 from ..law import JointLaw
@@ -14,6 +15,7 @@ from .command import add_command, add_law, add_out, in_unit, read_law
 START = {
     "yade": "yade -n -x settle_and_incline.py",
     "c": "make && ./example",
+    "fem": "make",
     "lammps": "./build.sh && lmp -in in.tower",
 }
 
@@ -23,13 +25,21 @@ def add(commands: Any) -> None:
     what = "write a law for a host code: table, adapter and scripts in one folder"
     example = "jointlaw export yade jing-replica --out joint-for-yade"
     parser = add_command(commands, "export", what, example, _export)
-    parser.add_argument("host", choices=tuple(START), help="the host code; c: also C++")
+    parser.add_argument(
+        "host", choices=tuple(START), help="the host code; c: also C++; fem: finite elements"
+    )
     add_law(parser)
     parser.add_argument(
         "--shear-limit",
         metavar="LENGTH",
         type=in_unit("m", positive=True),
         help="yade: shear at which the friction of the table is read, such as 5um",
+    )
+    parser.add_argument(
+        "--seating",
+        metavar="STRESS",
+        type=in_unit("Pa"),
+        help=f"fem: normal stress before the first step (default {SEATING / 1e3:g}kPa)",
     )
     add_out(parser, pictures=False)
 
@@ -40,12 +50,17 @@ def _export(options: argparse.Namespace) -> None:
         raise ValueError(
             f"--shear-limit shapes a table for YADE; {host} runs the law itself: leave it out"
         )
+    seating = {} if options.seating is None else {"seating": options.seating}
+    if seating and host != "fem":
+        raise ValueError(f"--seating is for fem; in {host} the host closes the joint: leave it out")
+    require_seating(**seating)
     clear_run(folder)
     if host == "yade":
         _export_table(law, folder, options.shear_limit)
     else:
-        export = export_c if host == "c" else export_lammps
-        print(f"wrote {', '.join(export(law, folder, identifier(Path(options.law).stem)))}")
+        export = {"c": export_c, "lammps": export_lammps, "fem": export_fem}[host]
+        files = export(law, folder, identifier(Path(options.law).stem), **seating)
+        print(f"wrote {', '.join(files)}")
     print(f"run: cd {folder} && {START[host]}")
 
 

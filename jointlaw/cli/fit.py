@@ -34,7 +34,6 @@ def add(commands: Any) -> None:
     what = "fit the law to measured closure and shear curves; write preset, report and plot"
     example = "jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out out"
     parser = add_command(commands, "fit", what, example, _run)
-    parser.set_defaults(wait="with shear tests it takes half a minute to some minutes")
     add = parser.add_argument
     add("data", nargs="*", metavar="CSV", help="file of stress and closure, or shipped data set")
     add("--stress-column", help="name and unit of that column, such as sigmaZ:MPa")
@@ -46,7 +45,7 @@ def add(commands: Any) -> None:
         default=[],
         help="direct shear tests, one a file, at a constant normal stress that is in a column of "
         "the file or after --normal-stress. One law is fitted to all of them and to the closure "
-        "test, if one is given before",
+        "test, if one is given before; this takes half a minute to some minutes",
     )
     add("--shear-column", help="name and unit of that column, such as us:mm")
     add("--shear-stress-column", help="name and unit of that column: tau:MPa")

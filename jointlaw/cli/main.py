@@ -8,11 +8,9 @@ from typing import Any, NoReturn
 
 from ..laboratory.experiments import PathError
 from ..support.files import require_free
-from ..support.progress import explained
 from ..support.version import __version__
 from . import export, fit, laboratory, presets, scan, tradeoff
 
-WAIT = "the first run after an installation also compiles the law, once"
 COMMANDS = (laboratory, presets, export, fit, scan, tradeoff)
 
 _YIELDING = "write yield_interference into [asperity] of a law file; it starts with \
@@ -58,8 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options = _read(words)
         if getattr(options, "out", None) and not options.force:
             require_free(options.out)
-        with explained(f"{name} is at work; {getattr(options, 'wait', WAIT)}"):
-            return int(options.run(options) or 0)
+        return int(options.run(options) or 0)
     except KeyboardInterrupt:
         print(f"{name}: interrupted; nothing more is written", file=sys.stderr)
         return 130

@@ -45,32 +45,11 @@ class FirstLoading(NamedTuple):
         """Closure (m) beyond which stresses, or their differences, are lost in rounding."""
         return 1e304 if self.yielding is None else _RESOLVED * float(np.max(self.yielding[1]))
 
-    def closure(self, stress: float, start: float) -> float:
-        """Closure (m) at a normal stress (Pa), looked for from the closure `start` (m) on."""
-        from scipy.optimize import brentq  # a third of the package's import time
+    def closure(self, stress: Array, start: float) -> Array:
+        """Closures (m) at normal stresses (Pa), looked for from the closure `start` (m) on.
 
-        if stress < _SMALLEST:
-            return 0.0
-
-        def misfit(log_y: float) -> float:  # finite where the force is zero or overflows
-            force = float(self.stress(np.array(math.exp(log_y))))
-            return math.log(min(max(force, _SMALLEST), _LARGEST)) - math.log(stress)
-
-        low = high = math.log(start)
-        farthest = math.log(self.farthest)
-        with np.errstate(over="ignore"):
-            while misfit(high) < 0.0:
-                high += 1.0
-                if high > farthest:
-                    raise ValueError(_TOO_LARGE.format(stress))
-            while misfit(low) > 0.0:
-                low -= 1.0
-            if low == high:
-                return start
-            return math.exp(brentq(misfit, low, high, xtol=1e-15, rtol=1e-15, maxiter=500))
-
-    def closures(self, stress: Array, start: float) -> Array:
-        """As `closure`, for many stresses (n,) together: bisection of log closure, to rounding."""
+        By bisection of log closure, to rounding.
+        """
         found = np.zeros_like(stress)
         wanted = stress[stress >= _SMALLEST]
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..kernels import reference
-from ..kernels.blocks import LANES, empty_blocks, rows_of, write_rows, zeros
-from ..kernels.engine import CHUNK, Step, engine
+from ..kernels.blocks import LANES, rows_of, write_rows, zeros
+from ..kernels.engine import Step, engine
 from ..kernels.reference import Measures
 from ..kernels.unmated import unmated_start
 from ..support.checks import Array, integer, numbers
@@ -48,7 +48,7 @@ class JointBatch:
         self.law, self.ledger = law, ledger
         self._engine = engine(law.tables)
         self._n = integer("n", n, 0)
-        self._state = empty_blocks(self._engine.rows, self._n)
+        self._state = zeros(self._n, self._engine.rows, 1 if self._n == 1 else LANES)
         self._largest_reach = 0.0  # bound of |y| of all facets of all joints
         numbers = np.arange(law.state_size, dtype=np.float64)[:, None]
         self._row_numbers = reference.parts(law.tables, numbers)  # of each part of a state
@@ -56,16 +56,11 @@ class JointBatch:
         self._steepness = 1.0 + 2.0 * float(np.max(np.abs(law.tables.m)))
 
     def __getstate__(self) -> dict[str, Any]:
-        kept = {k: v for k, v in self.__dict__.items() if k != "_engine"}  # holds compiled code
-        return kept | {"_state": self._state[:, : self.law.state_size]}
+        return {"law": self.law, "ledger": self.ledger, "states": self.snapshot()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        self._engine, rows = engine(self.law.tables), state["_state"]
-        blocks, kept, lanes = rows.shape
-        self._state = zeros(blocks, self._engine.rows, lanes)
-        self._state[:, :kept] = rows
-        self._engine.refresh(self._state, self._n)
+        JointBatch.__init__(self, state["law"], len(state["states"]), state["ledger"])
+        self.restore(state["states"])
 
     def __len__(self) -> int:
         return self._n
@@ -162,7 +157,7 @@ class JointBatch:
         if n < self._n:
             self.reset(np.arange(n, self._n))
         elif n > blocks * lanes:  # grow by doubling, so that steady growth copies rarely
-            grown = zeros(max(-(-n // LANES), 2 * blocks), rows, LANES)
+            grown = zeros(max(n, 2 * blocks * LANES), rows)
             write_rows(grown, rows_of(self._state, self._n), np.arange(self._n))
             self._state = grown
         self._n = n
@@ -187,14 +182,10 @@ class JointBatch:
 
     def max_stiffness(self) -> Array:
         """Upper bound (n,) of `|C|` in Pa/m at each joint's present displacement."""
-        k, bound = self.law.tables, np.empty(self._n)
-        for first in range(0, self._n, CHUNK):
-            index = np.arange(first, min(first + CHUNK, self._n))
-            now = reference.parts(k, self._rows(index))
-            y = reference.effective_closure(k, now.delta, now.slopes)
-            bound[index] = stiffness_of(k, y)
+        k, now = self.law.tables, reference.parts(self.law.tables, self._rows())
+        bound: Array = stiffness_of(k, reference.effective_closure(k, now.delta, now.slopes))
         if k.bond is not None:
-            bound += (1.0 - self.damage) * k.bond.largest_stiffness
+            bound = bound + (1.0 - self.damage) * k.bond.largest_stiffness
         return bound
 
     def critical_time_step(self, mass: ArrayLike, area: ArrayLike) -> Array:
@@ -312,17 +303,14 @@ class JointBatch:
     def _reach_by_joint(self, step: Step, limit: float) -> float:
         """As `_reach_after`, joint by joint."""
         d, index = step.d, step.where
-        finite = np.isfinite(d).all(axis=1)
-        if not finite.all():
-            row = int(np.argmin(finite))
-            joint = row if index is None else int(index[row])
-            raise ValueError(f"d of joint {joint} = {d[row]} is not finite; nothing was moved")
         old = self._rows(index)
         with np.errstate(over="ignore"):
             new = self._reach_of(old) + self._steepness * np.abs(d).max(axis=1)
-        if (new > limit).any():
-            row = int(np.argmax(new > limit))
+        if not (new <= limit).all():
+            row = int(np.argmin(new <= limit))
             joint = row if index is None else int(index[row])
+            if not np.isfinite(d[row]).all():
+                raise ValueError(f"d of joint {joint} = {d[row]} is not finite; nothing was moved")
             error = NonFiniteError(
                 f"joint {joint}: the step d = {d[row]} m gives a result that is not finite; "
                 "nothing was moved. Take a smaller step (state and d of this error repeat it)"

@@ -11,14 +11,9 @@ _LINE = 64  # bytes that a processor reads at once
 Index = NDArray[np.intp]
 
 
-def empty_blocks(rows: int, n: int) -> Array:
-    """Blocks of virgin states for n joints; one joint alone lies in a block of its own."""
-    lanes = 1 if n == 1 else LANES
-    return zeros(-(-n // lanes), rows, lanes)
-
-
-def zeros(blocks: int, rows: int, lanes: int) -> Array:
-    """Blocks of zeros that begin where a line of memory does."""
+def zeros(n: int, rows: int, lanes: int = LANES) -> Array:
+    """Blocks of zeros for n states, which begin where a line of memory does."""
+    blocks = -(-n // lanes)
     size = blocks * rows * lanes
     raw = np.zeros(size + _LINE // 8)
     first = -raw.ctypes.data % _LINE // 8
@@ -27,12 +22,9 @@ def zeros(blocks: int, rows: int, lanes: int) -> Array:
 
 def rows_of(state: Array, n: int, index: Index | None = None) -> Array:
     """State of n joints, or those of `index`, as a copy (rows, n) with joints last."""
-    if index is None:
-        _, rows, lanes = state.shape
-        blocks = -(-n // lanes)
-        part = state[:blocks].transpose(1, 0, 2).reshape(rows, blocks * lanes)[:, :n]
-        return np.array(part, order="C")  # never a view
     lanes = state.shape[2]
+    if index is None:
+        index = np.arange(n)
     return np.ascontiguousarray(state[index // lanes, :, index % lanes].T)
 
 

@@ -76,10 +76,11 @@ class Compiler(NamedTuple):
         return [f"-mcpu={'baseline' if lanes == 2 else level.replace('-', '_')}"]
 
     def run(self, *arguments: object) -> None:
-        """Compile; raises CalledProcessError with what the compiler said, or OSError."""
-        subprocess.run(
-            [*self.command, *map(str, arguments)], check=True, capture_output=True, text=True
-        )
+        """Compile; RuntimeError tells the compiler's words. OSError where it does not start."""
+        command = [*self.command, *map(str, arguments)]
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode:
+            raise RuntimeError(f"{' '.join(command)}\n{done.stderr}")
 
 
 def zig(target: str = "") -> Compiler:
@@ -106,7 +107,7 @@ def works(compiler: Compiler) -> bool:
             compiler.run(
                 *FLAGS, *HIDDEN, *compiler.level(lanes), "-shared", source, "-o", out, "-lm"
             )
-        except (OSError, subprocess.CalledProcessError):
+        except (OSError, RuntimeError):
             return False
         return out.is_file() and out.stat().st_size > 0
 
@@ -141,7 +142,7 @@ def build(compiler: Compiler, folder: Path = HERE) -> Path:
         def compile_one(source: str, lanes: int, *what: str) -> Path:
             to = Path(scratch) / f"{len(what)}{lanes}.o"
             flags = [*FLAGS, *position, "-fvisibility=hidden", *compiler.level(lanes), *what]
-            _run(compiler, *flags, "-c", HERE / source, "-o", to)
+            compiler.run(*flags, "-c", HERE / source, "-o", to)
             return to
 
         parts: list[tuple[Any, ...]] = [("library.c", 2, f'-DJLAW_SOURCES="{sources()}"')]
@@ -152,27 +153,11 @@ def build(compiler: Compiler, folder: Path = HERE) -> Path:
             objects = list(pool.map(lambda part: compile_one(*part), parts))
         made = Path(scratch) / out.name
         link = ["-Wl,--as-needed"] if system == "linux" else []
-        linker = compiler._replace(
-            command=tuple(c for c in compiler.command if c not in ("-x", "c++"))
-        )
-        _run(
-            linker,
-            "-shared",
-            *link,
-            *objects,
-            "-o",
-            made,
-            *([] if system == "windows" else ["-lm"]),
-        )
+        math = [] if system == "windows" else ["-lm"]
+        words = tuple(word for word in compiler.command if word not in ("-x", "c++"))
+        compiler._replace(command=words).run("-shared", *link, *objects, "-o", made, *math)
         # a library that is in use must not be written over: another file takes its place
         fresh = out.with_name(f"{out.name}.new")
         shutil.copyfile(made, fresh)
         fresh.replace(out)
     return out
-
-
-def _run(compiler: Compiler, *arguments: object) -> None:
-    try:
-        compiler.run(*arguments)
-    except subprocess.CalledProcessError as error:
-        raise RuntimeError(f"{' '.join(map(str, error.cmd))}\n{error.stderr}") from None

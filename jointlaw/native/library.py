@@ -1,7 +1,6 @@
 """The library of the compiled law: finds, loads and calls it."""
 
 import ctypes
-import platform
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -32,11 +31,8 @@ class BatchCall(ctypes.Structure):
 @lru_cache(maxsize=1)
 def load() -> ctypes.CDLL | None:
     """The library, None if there is none; raises StaleLibraryError if it is of other sources."""
-    system = {"Darwin": "macos", "Windows": "windows"}.get(platform.system(), "linux")
-    path = Path(__file__).parent / build.library_name(system)
-    if not path.exists():
-        return None
-    return load_file(path)
+    path = build.HERE / build.library_name(build.Compiler(()).machine[1])
+    return load_file(path) if path.exists() else None
 
 
 def load_file(path: Path) -> ctypes.CDLL:

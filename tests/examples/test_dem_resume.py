@@ -122,7 +122,7 @@ def test_a_watched_joint_has_the_law_of_the_faces_that_meet():
     assert list(record.laws.values()) == ["bedding", "cross"]
 
 
-DAMAGE = ", yield_interference = 2e-4, mu_residual = 0.2, wear_slip = 5e-4"
+DAMAGE = ", yield_interference = 2e-4"
 
 
 @pytest.mark.parametrize("damage", ["", pytest.param(DAMAGE, marks=pytest.mark.slow)])

@@ -1,4 +1,4 @@
-"""What the tests of all hosts share: the mark, and LAMMPS' plug-in."""
+"""What the tests of all hosts share: the mark, LAMMPS' plug-in, libraries for finite elements."""
 
 import sys
 from pathlib import Path
@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
+from fem_host import export
 from lammps_host import build, soft
 
 
@@ -21,3 +22,13 @@ def pytest_collection_modifyitems(items):
 def plugin(tmp_path_factory):
     """A folder with LAMMPS' plug-in, built, and rock.jlaw, a soft joint in space."""
     return build(tmp_path_factory.mktemp("lammps"), soft())
+
+
+@pytest.fixture(scope="session")
+def finite_elements(tmp_path_factory):
+    """A folder with the libraries of `fem_host.LAW` for MGIS and UMAT, built."""
+    import os
+
+    if "FEMX" in os.environ:
+        return Path(os.environ["FEMX"])
+    return export(tmp_path_factory.mktemp("fem"))

@@ -41,8 +41,7 @@ class SlowBed:
 
     def __init__(
         self, normals, weights, reach, *, K, lam, eta, mu, density, heights=None, n_depth=240,
-        critical_slip=np.inf, yield_interference=np.inf, mu_residual=None,
-        wear_slip=np.inf,
+        mating_length=np.inf, yield_interference=np.inf,
     ):  # fmt: skip
         self.n, self.c1 = normals, normals[:, 0]
         self.lam, self.mu = lam, mu
@@ -52,20 +51,17 @@ class SlowBed:
         pairs = [bins[r] for r in reach]
         self.z = np.array([p[0] for p in pairs])
         self.k = np.array([p[1] for p in pairs])
-        self.critical_slip = critical_slip
+        self.mating_length, self.steep = mating_length, normals[:, 1:] / self.c1[:, None]
         self.yields_at = (yield_interference / self.c1)[:, None]  # largest y - z of a spring
-        self.wear = mu, mu if mu_residual is None else mu_residual, wear_slip
-        self.crushed = self.slip = 0.0  # plastic work, asperity slip
-        # with a critical slip the asperities of opposite orientations are flattened together
+        self.crushed = 0.0  # plastic work
+        # where slopes fade the asperities of opposite orientations are flattened together
         turned = normals * [1.0, -1.0, -1.0]
         mirror = np.argmin(np.sum((normals[:, None] - turned) ** 2, axis=2), axis=0)
-        self.mirror = mirror if np.isfinite(critical_slip) else np.arange(len(normals))
+        self.mirror = mirror if np.isfinite(mating_length) else np.arange(len(normals))
         azimuth = np.arctan2(normals[:, 2], normals[:, 1])
-        cos, sin, sin_theta = np.cos(azimuth), np.sin(azimuth), np.hypot(*normals[:, 1:].T)
-        s = np.stack([-sin_theta, self.c1 * cos, self.c1 * sin], axis=1)  # Eq. 25
-        t = np.stack([0.0 * azimuth, -sin, cos], axis=1)
-        self.basis = np.stack([s, t], axis=1)  # (m, 2, 3)
-        self.delta, self.offset = np.zeros(3), np.zeros(2)
+        self.e0 = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)
+        self._turn(np.zeros(2))
+        self.delta = np.zeros(3)
         self.y = np.zeros(len(normals))
         self.e = np.zeros((2, *self.z.shape))  # in-plane stretch of every spring
 
@@ -73,10 +69,7 @@ class SlowBed:
         """Advance by the small increment d (3,); return the traction (3,)."""
         d = np.asarray(d, dtype=float)
         self.delta = self.delta + d
-        self.offset = self.offset + d[1:]
-        pull = np.hypot(*self.offset)
-        if pull > self.critical_slip:  # at the limit: turn the offset, small step by small step
-            self.offset *= self.critical_slip / pull
+        self._turn(self.delta[1:] - 0.5 * d[1:])  # planes at mid-step, of sliders that move
         y0, self.y = self.y, self._closure()
         y1, z0 = self.y, self.z
         top = y1[:, None] - self.yields_at
@@ -89,26 +82,31 @@ class SlowBed:
         part = np.where(y0[:, None] < z0, (y1[:, None] - z0) / rise, 1.0) * touching
         de = self.basis @ d  # (m, 2)
         free = self.e * touching + part * de.T[:, :, None]
-        limit = self.mu * self.lam * self.c1[:, None] * np.clip(y1[:, None] - self.z, 0.0, None)
+        self._turn(self.delta[1:])
+        limit = self.mu * self.lam * self.lean[:, None] * self.c1[:, None]
+        limit = limit * np.clip(y1[:, None] - self.z, 0.0, None)
         size = np.sqrt(free[0] ** 2 + free[1] ** 2)
         self.e = free * (limit / np.maximum(size, np.maximum(limit, 1e-300)))
-        rubbed = np.sum(self.k * limit * np.clip(size - limit, 0.0, None), axis=1)
-        self._wear(np.sum(self.scale / (self.c1 * self.lam) * rubbed), pull)
         return self.traction()
 
-    def _wear(self, rubbed, pull):
-        """Slip of the asperities: friction work, the offset's too, over the limit; then mu."""
-        normal = self.facet_forces()[0]
-        if pull > self.critical_slip:
-            along = self.offset / self.critical_slip
-            rubbed += (pull - self.critical_slip) * (normal @ self.n[:, 1:]) @ along
-        first, last, length = self.wear
-        if self.mu * np.sum(normal) > 0.0:
-            self.slip += rubbed / (self.mu * np.sum(normal))
-        self.mu = last + (first - last) * np.exp(-self.slip / length)
+    def _turn(self, p):
+        """Planes of the asperities at the in-plane displacement p (2,), by differences of y."""
+        h = 1e-6 * min(self.mating_length, 1.0)
+
+        def rise(q):
+            return self.steep @ q / np.hypot(1.0, np.hypot(*q) / self.mating_length)
+
+        a = np.stack([(rise(p + h * e) - rise(p - h * e)) / (2 * h) for e in np.eye(2)], axis=1)
+        self.slope = np.column_stack([np.ones(len(a)), a])
+        length = np.linalg.norm(self.slope, axis=1)
+        self.lean = self.c1 * length
+        s = np.column_stack([-np.sum(a * self.e0, axis=1), self.e0])
+        s /= np.linalg.norm(s, axis=1)[:, None]
+        self.basis = np.stack([s, np.cross(self.slope / length[:, None], s)], axis=1)
 
     def _closure(self):
-        return self.delta[0] + self.n[:, 1:] @ self.offset / self.c1
+        p = self.delta[1:]
+        return self.delta[0] + self.steep @ p / np.hypot(1.0, np.hypot(*p) / self.mating_length)
 
     def facet_forces(self):
         """Normal (m,) and shear (m, 2) force of every orientation, per area of joint."""
@@ -118,7 +116,7 @@ class SlowBed:
     def traction(self):
         """Sum of the facet forces, axis 1 the joint normal."""
         normal, shear = self.facet_forces()
-        return normal @ self.n + np.einsum("oi,oij->j", shear, self.basis)
+        return normal @ (self.c1[:, None] * self.slope) + np.einsum("oi,oij->j", shear, self.basis)
 
     def stored(self):
         """Energy in all springs, per area."""

@@ -13,7 +13,7 @@ BEYOND = [
 ]  # fmt: skip
 INSIDE = [
     {"K": 1e100}, {"density": 1e110}, {"K": 1e-120}, {"mu": 1e100}, {"lam": 1e60}, {"eta": 50.0},
-    {"eta": 1e3}, {"a": 1e300}, {"range": 5e-324}, {"critical_slip": 1e-140},
+    {"eta": 1e3}, {"a": 1e300}, {"range": 5e-324},
     {"heights": (3.82, 1.15e-12, 0.0, "individual")},
     {"heights": (3.82, 1.15e-12, 2e-6, "population")},
     {"heights": (3.82, 1e-300, 0.0, "individual")},
@@ -30,11 +30,6 @@ INSIDE = [
 def test_numbers_that_no_float_can_hold_are_refused(changes):
     with pytest.raises(ValueError, match=r"asperity.K = .* too (small|large) for floating point"):
         build(**changes)
-
-
-def test_a_critical_slip_below_the_smallest_length_is_refused():
-    with pytest.raises(ValueError, match="critical_slip = 1e-300 m is out of bounds"):
-        build(critical_slip=1e-300)
 
 
 @pytest.mark.parametrize("formation", ["individual", "population"])

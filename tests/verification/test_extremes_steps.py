@@ -12,7 +12,7 @@ SIZES = [5e-324, 1e-15, HEIGHT, 1e6 * HEIGHT]  # m; a denormal first
 LAWS = [
     {}, {"a": 1.0, "eta": 0.0}, {"a": 1e8}, {"mu": 0.0}, {"mu": 1e6, "lam": 0.1}, {"eta": 2.0},
     {"heights": "printed, population"}, {"heights": "alpha = -0.99, overlap 0"},
-    {"critical_slip": 0.3 * SCALE},
+    {"mating_length": 0.3 * SCALE},
 ]  # fmt: skip
 CLOSED = np.array([0.4 * SCALE, 0.1 * SCALE, -0.05 * SCALE])
 

@@ -1,7 +1,6 @@
 """`jointlaw fit --shear`: laboratory files in, a law that predicts another normal stress out."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -72,20 +71,3 @@ def test_three_shear_files_and_a_closure_file_predict_a_fourth(tmp_path, law, ca
     truth = shear_stress(law, 4e6)
     found = np.interp(U, table["shear_2_m"], table["F2_Pa"])
     np.testing.assert_allclose(found[6:], truth[6:], rtol=0.02)
-
-
-def test_a_curve_that_softens_is_told_and_its_wear_can_be_fitted(tmp_path, law, capsys):
-    """Peak and residual: the law without wear says that the curve has another shape."""
-    worn = replace(law.asperity, mu_residual=0.35, wear_slip=0.6e-3)
-    write_shear(tmp_path / "s.csv", replace(law, asperity=worn), 3, np.random.default_rng(4))
-    held = "--set alpha=3.8 --set beta=3e-5 --set asperity_density=3e5"
-    assert main(f"fit --shear s.csv {held} --out o".split()) == 0
-    told = "let mu_residual and wear_slip be free too"
-    assert told in capsys.readouterr().out
-    free = "mu,a,mating_length,mu_residual,wear_slip"
-    assert main(f"fit --shear s.csv {held} --free {free} --out w".split()) == 0
-    assert told not in capsys.readouterr().out
-    found = json.loads((tmp_path / "w" / "summary.json").read_text())["parameters_SI"]
-    # the friction of the worn faces, of which the points at the end are the plateau
-    ratio = found["mu_residual"] / found["mu"]
-    assert ratio == pytest.approx(0.35 / 0.55, rel=0.15)

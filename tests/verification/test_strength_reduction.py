@@ -69,12 +69,10 @@ def test_a_tilt_near_the_steepest_is_found(degrees):
 def test_all_frictions_are_divided_and_nothing_else():
     scene = parse(SCENE)
     law, sticks = scene.laws["joint"], coulomb_law(1e9, 1e9, math.inf)
-    worn = replace(law, asperity=replace(law.asperity, mu_residual=0.2, wear_slip=1e-3))
+    worn = replace(law, slope_wear=1e3)
     given = {"worn": worn, "plain": coulomb_law(1e9, 1e9, 0.6), "sticks": sticks}
     laws = reduced(replace(scene, laws=given), 2.0).laws
-    assert laws["worn"] == replace(
-        worn, asperity=replace(worn.asperity, mu=law.asperity.mu / 2, mu_residual=0.1)
-    )
+    assert laws["worn"] == replace(worn, asperity=replace(worn.asperity, mu=law.asperity.mu / 2))
     assert laws["plain"] == coulomb_law(1e9, 1e9, 0.3)
     assert laws["sticks"] == sticks
 

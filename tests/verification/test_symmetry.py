@@ -25,16 +25,16 @@ def paths(seed, n=4, steps=8):
 
 @pytest.mark.parametrize("mirror", [[1.0, 1.0, -1.0], [1.0, -1.0, 1.0]])
 def test_mirror_images_across_the_principal_axes(mirror):
-    one = law(c=-0.2, formation="population", critical_slip=0.8)
+    one = law(c=-0.2, formation="population", mating_length=0.8)
     d = paths(3)
     F = run(one, d)
     # cos 2 phi is even about both axes, and so are the azimuths: rounding
     assert np.allclose(run(one, d * mirror), F * mirror, rtol=0.0, atol=1e-12 * np.abs(F).max())
 
 
-@pytest.mark.parametrize("critical_slip", [np.inf, 0.3])
-def test_motion_in_the_plane_of_an_axis_is_the_half_circle(critical_slip):
-    more = {"formation": "population", "critical_slip": critical_slip}
+@pytest.mark.parametrize("mating_length", [np.inf, 0.3])
+def test_motion_in_the_plane_of_an_axis_is_the_half_circle(mating_length):
+    more = {"formation": "population", "mating_length": mating_length}
     d = paths(5) * [1.0, 1.0, 0.0]
     whole = run(law(**more), d)
     half = run(law(**more, plane=0.0), d[..., :2])

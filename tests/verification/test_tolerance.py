@@ -68,7 +68,7 @@ def test_reference_is_refined_in_the_direction_that_errs():
     assert found is not None
     assert reached <= bound
     # half of the bound may be the judge's own error
-    assert fine.errors(replace(law, resolution=found))[0].max() < 1.5 * bound
+    assert fine.miss(replace(law, resolution=found)).largest.max() < 1.5 * bound
 
 
 def test_what_cannot_be_met_is_refused_with_what_was_reached():

@@ -36,11 +36,7 @@ def export_c(law: JointLaw, directory: str | Path, name: str = "joint") -> list[
     constants), `example.c`, `example.cpp`, `Makefile` and `README.md`. Returns the names. Raises
     ValueError for a name that C cannot have or too many azimuths, before anything is written.
     """
-    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,40}", name):
-        raise ValueError(
-            f"name = {name!r} is no identifier of C; take letters, digits and underscores, a "
-            "letter first, at most 41"
-        )
+    require_name(name)
     tables = {f"{name}.jlaw": table_text(law), f"{name}.h": header_text(law, name)}
     folder = Path(directory)
     folder.mkdir(parents=True, exist_ok=True)
@@ -52,6 +48,15 @@ def export_c(law: JointLaw, directory: str | Path, name: str = "joint") -> list[
     for file, text in tables.items():
         _write(folder / file, text)
     return [*tables, HEADER, *FILES]
+
+
+def require_name(name: str) -> None:
+    """Refuse a name of tables that C cannot have, or that a file of the law has."""
+    if not re.fullmatch(r"(?!jointlaw)[A-Za-z][A-Za-z0-9_]{0,40}", name):
+        raise ValueError(
+            f"name = {name!r} is no identifier of C; take letters, digits and underscores, a "
+            "letter first, at most 41; names of the law's own files begin with jointlaw"
+        )
 
 
 def identifier(text: str) -> str:

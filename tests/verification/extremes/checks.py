@@ -3,23 +3,24 @@
 import numpy as np
 
 from jointlaw.kernels import reference as kernel
+from jointlaw.kernels.mating import planes
 
 ROUNDING = 1e-12  # of the facet's normal force: a cell's G is a difference of numbers of that size
 KERNELS = 1e-11  # of the largest traction: rounding of y, 1e-16, over a step of NEAR y, 1e-5
 NOTHING = 1e-130  # Pa; squares of far smaller forces of sliders underflow
 
 
-def sliders_within_friction(batch, mu):
+def sliders_within_friction(batch):
     """Largest excess of |f_s| over mu f_n of any slider, as a share of mu f_n of its facet.
 
-    mu: friction at the beginning of the step; f_n of the facet without what yielding took.
+    f_n of the facet without what yielding took.
     """
     k, values = batch.law.tables, batch.snapshot().values.T
     now = kernel.parts(k, values)
-    y = kernel.effective_closure(k, now.delta[0], now.offset)
+    y = kernel.effective_closure(k, now.delta, now.slopes)
     virgin = kernel.cells(k, y)
     cells = kernel.flattened(virgin, kernel.cells(k, now.depth) if k.yields else None)
-    strength = mu * k.lam * k.area[:, None]
+    strength = kernel.strength(k, planes(k, now.delta[1:], now.slopes).gamma)[:, 0]
     size = np.hypot(now.q[0], now.q[1])
     excess = size - strength[:, None] * cells.G
     whole = np.where(strength * virgin.force > 0, strength * virgin.force, np.inf)[:, None]
@@ -31,7 +32,7 @@ def sliders_within_friction(batch, mu):
 def elastic_force(batch):
     """Forces (n,) in Pa that facets would bear, friction included, if they had not yielded."""
     k, now = batch.law.tables, kernel.parts(batch.law.tables, batch.snapshot().values.T)
-    force, _ = k.curve.force(kernel.effective_closure(k, now.delta[0], now.offset))
+    force, _ = k.curve.force(kernel.effective_closure(k, now.delta, now.slopes))
     return (1.0 + k.mu) * np.sum(k.area[:, None] * force, axis=0)
 
 
@@ -47,7 +48,7 @@ class Watch:
     def step(self, d):
         """Advance by d (n, 3); the list of what is wrong afterwards."""
         faults = []
-        before, mu = self.batch.snapshot().values, self.batch.friction
+        before = self.batch.snapshot().values
         F, C = self.batch.update(d)
         if not np.isfinite(F).all():
             faults.append("F is not finite")
@@ -59,7 +60,7 @@ class Watch:
             faults.append(f"dissipation {np.min(lost - self.lost):.1e} of {np.max(self.peak):.1e}")
         if not (np.isfinite(stored) & (stored >= 0.0)).all():
             faults.append(f"stored energy {np.min(stored):.1e}")
-        if not (excess := sliders_within_friction(self.batch, mu)) <= ROUNDING:
+        if not (excess := sliders_within_friction(self.batch)) <= ROUNDING:
             faults.append(f"a slider exceeds friction by {excess:.1e}")
         if not np.isfinite(self.batch.snapshot().values).all():
             faults.append("the state is not finite")

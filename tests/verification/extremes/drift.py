@@ -13,7 +13,7 @@ LAWS = {
     "eta = 0.5": {},
     "eta = 1": {"eta": 1.0},
     "population": {"heights": "printed, population"},
-    "critical slip": {"critical_slip": 0.3 * SCALE},
+    "mating length": {"mating_length": 0.3 * SCALE},
 }
 AMPLITUDES = (1.0, 0.3, 0.03, 0.003)  # of the closure range
 DIRECTIONS = 4  # of each amplitude

@@ -22,7 +22,7 @@ CASES = {  # law, normal stress of the load (Pa), speed of impact as a share of 
     "linear, no friction": ({"eta": 0.0, "mu": 0.0}, 1e7, 0.3),
     "stiff in shear": ({"lam": 0.1}, 1e7, 0.3),
     "many heights": ({"heights": "printed, population"}, 1e7, 1.0),
-    "renewed contacts": ({"critical_slip": 0.3 * SCALE, "mu": 0.3}, 1e7, 1.0),
+    "slopes that fade": ({"mating_length": 0.3 * SCALE, "mu": 0.3}, 1e7, 1.0),
 }
 
 

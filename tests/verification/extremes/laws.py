@@ -10,7 +10,7 @@ from jointlaw.kernels.engine import NativeEngine, engine
 SCALE = 2e-6  # m: closure range and asperity height of the ordinary law
 ORDINARY = {
     "a": 3.0, "b": 0.5, "c": 0.1, "K": 2e8, "lam": 1.2, "eta": 0.5, "mu": 0.4, "density": 1e10,
-    "heights": None, "range": SCALE, "critical_slip": np.inf, "resolution": jl.Resolution(2, 4, 3),
+    "heights": None, "range": SCALE, "mating_length": np.inf, "resolution": jl.Resolution(2, 4, 3),
     "yields at": np.inf, "wears over": np.inf,
 }  # fmt: skip
 
@@ -37,9 +37,9 @@ EXTREMES = {
     "density": [1e-20, 1e20],
     "range": [SCALE * 1e-6, SCALE * 1e6],
     "heights": list(HEIGHTS),
-    "critical_slip": [SCALE * 1e-3, SCALE * 0.3],
+    "mating_length": [SCALE * 0.1, SCALE * 3.0],
     "yields at": [SCALE * 1e-12, SCALE * 1e-3, SCALE * 0.1, SCALE * 1e3],
-    "wears over": [SCALE * 1e-6, SCALE],
+    "wears over": [1e2, 1e5],  # J/m2; some 1e4 are stored
 }
 
 
@@ -48,16 +48,20 @@ def build(**changes):
     p = ORDINARY | changes
     b, c = p.get("b, c", (p["b"], p["c"]))
     heights = HEIGHTS.get(p["heights"], p["heights"])
-    damage = {"yield_interference": p["yields at"]}
-    if p["wears over"] < np.inf and p["mu"] > 1e-5:  # next to no friction cannot wear
-        damage |= {"wear_slip": p["wears over"], "mu_residual": 0.3 * p["mu"]}
+    length = p["mating_length"]
+    if p["wears over"] < np.inf:  # slopes that wear fade, too
+        length = min(length, SCALE)
     return jl.JointLaw(
         orientation=jl.Orientation(p["a"], b, c),
-        asperity=jl.Asperity(K=p["K"], lam=p["lam"], eta=p["eta"], mu=p["mu"], **damage),
+        asperity=jl.Asperity(
+            K=p["K"], lam=p["lam"], eta=p["eta"], mu=p["mu"], yield_interference=p["yields at"]
+        ),
         heights=heights and jl.GammaHeights(*heights),
         asperity_density=p["density"],
         closure_range=p["range"],
-        critical_slip=p["critical_slip"],
+        mating_length=max(length, 0.1 * p["range"]) if p["range"] and length < np.inf else length,
+        slope_wear=p["wears over"],
+        slope_residual=0.3,
         resolution=p["resolution"],
     )
 
@@ -105,7 +109,7 @@ def random_changes(rng):
         "density": 10.0 ** rng.uniform(-20.0, 20.0),
         "range": SCALE * unit * 10.0 ** rng.choice([0.0, 0.0, rng.uniform(-6.0, 6.0)]),
         "resolution": jl.Resolution(*(int(rng.integers(*r)) for r in ((1, 4), (3, 6), (1, 5)))),
-        "critical_slip": SCALE * unit * 10.0 ** rng.uniform(-3, 1)
+        "mating_length": SCALE * unit * 10.0 ** rng.uniform(-3, 1)
         if rng.random() < 0.3
         else np.inf,
     }

@@ -19,9 +19,9 @@ def scaled(changes, length, force):
         "K": p["K"] * force / length ** (1 + p["eta"]),
         "density": p["density"] / length**2,
         "range": p["range"] * length,
-        "critical_slip": p["critical_slip"] * length,
+        "mating_length": p["mating_length"] * length,
         "yields at": p["yields at"] * length,
-        "wears over": p["wears over"] * length,
+        "wears over": p["wears over"] * force / length,
     }
 
 

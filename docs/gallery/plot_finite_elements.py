@@ -1,0 +1,137 @@
+r"""
+Finite elements: a block pushed over another
+============================================
+
+Two elastic blocks with a rough joint between them, in plane strain: Newton's method on
+``law.step``, and scikit-fem for the rock.
+"""
+
+from dataclasses import replace
+from time import perf_counter
+
+import matplotlib.pyplot as plt
+import numpy as np
+from scipy.sparse import block_diag, csr_matrix
+from scipy.sparse.linalg import spsolve
+from skfem import Basis, ElementQuad2, ElementVector, MeshQuad
+from skfem.models.elasticity import lame_parameters, linear_elasticity
+
+import jointlaw as jl
+
+# %%
+# Each block is 100 mm long and 50 mm high, and has nodes of its own along the joint.
+
+LENGTH, HEIGHT, NORMAL, PUSH = 0.1, 0.05, 2e6, 4e-6  # m, m, Pa, m
+elements = 40  # along the joint
+x, across = np.linspace(0.0, LENGTH, elements + 1), np.linspace(0.0, HEIGHT, 11)
+lower, upper = (
+    Basis(MeshQuad.init_tensor(x, y), ElementVector(ElementQuad2()))
+    for y in (across - HEIGHT, across)
+)
+rock = linear_elasticity(*lame_parameters(50e9, 0.2))
+rocks = block_diag([rock.assemble(block) for block in (lower, upper)]).tocsr()
+
+
+def unknowns(block, where, component):
+    """Numbers of the displacements u^1 or u^2 of the nodes there, in the order of x and y."""
+    found = block.get_dofs(where).all([component])
+    order = np.lexsort(block.doflocs[:, found])
+    return found[order] + (lower.N if block is upper else 0)
+
+
+# %%
+# The matrix ``jump`` gives closure and slip at the nodes of the joint, n of them; each stands for
+# its share of the length by Simpson's rule.
+
+n = 2 * elements + 1
+share = np.full(n, 2.0)
+share[1::2], share[[0, -1]] = 4.0, 1.0
+share *= LENGTH / share.sum()
+up, along = (
+    [unknowns(block, lambda x: abs(x[1]) < 1e-9, name) for block in (lower, upper)]
+    for name in ("u^2", "u^1")
+)
+columns = np.concatenate([up[0], up[1], along[1], along[0]])  # closure: lower less upper; slip
+rows = np.concatenate([np.arange(0, 2 * n, 2)] * 2 + [np.arange(1, 2 * n, 2)] * 2)
+signs = np.repeat([1.0, -1.0, 1.0, -1.0], n)
+jump = csr_matrix((signs, (rows, columns)), (2 * n, rocks.shape[0]))
+
+# %%
+# Each node keeps a state of the law. It starts under 10 kPa: a joint without stress has no
+# stiffness. The lower block is fixed at its bottom, the upper one is pressed from above and then
+# pushed at its left side.
+
+law = replace(jl.presets.load("westerly-rough"), plane=0.0)
+states = law.joints(n, normal_stress=10e3).snapshot().values
+bottom = [unknowns(lower, lambda x: x[1] < 1e-9 - HEIGHT, name) for name in ("u^1", "u^2")]
+left = unknowns(upper, lambda x: x[0] < 1e-9, "u^1")
+free = np.setdiff1d(np.arange(rocks.shape[0]), np.concatenate([*bottom, left]))
+top = unknowns(upper, lambda x: x[1] > HEIGHT - 1e-9, "u^2")
+weight = np.zeros(rocks.shape[0])
+weight[top] = -NORMAL * share  # its nodes are those above the joint
+clock = []  # seconds in the law
+
+
+def solve(u, states, load, push):
+    """Displacements, states and tractions (n, 2) at this load, and the residuals on the way."""
+    start, u, residuals = jump @ u, u.copy(), []
+    for _ in range(20):
+        began = perf_counter()
+        new, F, C = law.step(states, (jump @ u - start).reshape(n, 2))
+        clock.append(perf_counter() - began)
+        force = rocks @ u + jump.T @ (share[:, None] * F).ravel() - load * weight
+        move = np.zeros_like(u)
+        move[left] = push - u[left]
+        if not move.any():  # the left side is where it belongs
+            residuals.append(float(np.linalg.norm(force[free])))
+            if residuals[-1] < 1e-6:
+                return u, new, F, residuals
+        stiffness = rocks + jump.T @ block_diag(share[:, None, None] * C) @ jump
+        right = -(force + stiffness @ move)[free]
+        move[free] = spsolve(stiffness[free][:, free].tocsc(), right)
+        u += move
+    raise RuntimeError(f"no balance at load {load}, push {push}")
+
+
+# %%
+# Eight steps of load, twenty of the push.
+
+u, history, kept = np.zeros(rocks.shape[0]), [], {}
+steps = [(k / 8, 0.0) for k in range(1, 9)] + [(1.0, PUSH * k / 20) for k in range(1, 21)]
+for load, push in steps:
+    u, states, F, residuals = solve(u, states, load, push)
+    history.append(residuals)
+    kept[push] = (jump @ u)[1::2], F
+
+figure, axes = plt.subplots(2, 2, figsize=(9, 6.5), layout="constrained")
+x = np.linspace(0.0, LENGTH, n) * 1e3
+for push in [PUSH * k / 20 for k in (2, 5, 10, 20)]:
+    slip, F = kept[push]
+    axes[0, 0].plot(x, slip * 1e6, label=f"pushed by {push * 1e6:.1f} µm")
+    axes[0, 1].plot(x, F[:, 1] / 1e6)
+    axes[1, 0].plot(x, F[:, 0] / 1e6)
+for axis, label in zip(
+    axes.flat, ("slip (µm)", "shear stress (MPa)", "normal stress (MPa)"), strict=False
+):
+    axis.set_ylabel(label)
+    axis.set_xlabel("along the joint (mm)")
+axes[0, 0].legend(fontsize="small")
+for number, residuals in enumerate(history):
+    pushed = number >= 8
+    axes[1, 1].semilogy(residuals, ".-", color=f"C{int(pushed)}", lw=0.8)
+for pushed, label in enumerate(("8 steps of load", "20 steps of the push")):
+    axes[1, 1].plot([], [], f".-C{pushed}", label=label)
+axes[1, 1].set_xlabel("iteration")
+axes[1, 1].set_ylabel("residual (N/m)")
+axes[1, 1].legend(fontsize="small")
+plt.show()
+
+# %%
+# The slip spreads from the pushed end. Newton's method converges quadratically: the order is the
+# ratio of the last two falls of the residual in powers of ten, in the steps of the push.
+
+orders = [np.log(r[-2] / r[-3]) / np.log(r[-3] / r[-4]) for r in history[8:] if len(r) > 3]
+most = max(map(len, history))
+rate = n * len(clock) / sum(clock)
+print(f"order {np.median(orders):.1f} (median), at most {most - 1} iterations a step")
+print(f"{rate:.0f} points a second in the law, {n} points")

@@ -1,0 +1,79 @@
+"""Export of a joint law to finite elements: MGIS and UMAT, OpenGeoSys and Kratos, in one folder."""
+
+from importlib import resources
+from pathlib import Path
+from textwrap import fill
+
+from ...law import JointLaw
+from ...support.checks import number
+from ...support.files import replace_file
+from ..c import export as c
+
+SEATING = 10e3  # Pa
+NORMAL = 2e6  # Pa: of the direct shear tests
+
+
+def export_fem(
+    law: JointLaw, directory: str | Path, name: str = "joint", seating: float = SEATING
+) -> list[str]:
+    """Write all that a finite-element code needs to run this joint; the folder may be copied away.
+
+    law: a law that shears; with a plane it is for 2-D alone. directory: made if missing; files of
+    the same names are replaced. name: of the behaviours, an identifier of C; NAME is a cohesive
+    zone, NAME_layer a thin layer of solid elements. seating: normal stress in Pa, > 0, of the
+    joint before the first step; its displacements count from there.
+
+    Writes `jointlaw.h` (the law), `NAME.h` (its tables), `jointlaw_fem.h`, `mgis.c` and `umat.c`
+    with a `Makefile`, direct shear tests for OpenGeoSys and Kratos, and `README.md`. Returns the
+    names. Raises ValueError for a law, name or seating that does not fit, before anything is
+    written.
+    """
+    if law.closure_only:
+        raise ValueError("law.closure_only = True: finite elements shear; set closure_only=False")
+    require_seating(seating)
+    c.require_name(name)
+    texts = {
+        "jointlaw.h": (Path(c.include_dir()) / "jointlaw.h").read_text(encoding="utf-8"),
+        f"{name}.h": c.header_text(law, name),
+    }
+    marks = _marks(law, seating)
+    source = resources.files(__package__) / "files"
+    for file in sorted(source.iterdir(), key=lambda file: file.name):
+        if law.dim == 3 or "3d" not in file.name:
+            text = file.read_text(encoding="utf-8")
+            for mark, value in marks.items():
+                text = text.replace(f"@{mark}@", value)
+            texts[file.name] = text.replace("granite", name)
+    folder = Path(directory)
+    folder.mkdir(parents=True, exist_ok=True)
+    for file_name, text in texts.items():
+        replace_file(folder / file_name, text.encode())
+    return list(texts)
+
+
+def require_seating(seating: float = SEATING) -> None:
+    """Refuse a seating stress that leaves the joint without stiffness."""
+    if number("seating", seating) <= 0.0:
+        raise ValueError(
+            f"seating = {seating:g} Pa is out of bounds: it must be > 0. A joint without stress "
+            "has no stiffness, so that under a given force the first step of Newton's method has "
+            "no end; take 10e3, or 1 where all displacements are given"
+        )
+
+
+def _marks(law: JointLaw, seating: float) -> dict[str, str]:
+    """What stands for the @WORDS@ of the files."""
+    start = [*law.joint(normal_stress=seating).snapshot().values[0].tolist(), 1.0]
+    names = [f'"State{i}"' for i in range(1, len(start))] + ['"Begun"']
+    shear = 5.0 * float(law.closure(NORMAL))
+    return {
+        "DIM": str(law.dim),
+        "STATE": str(len(start)),
+        "NAMES": fill(", ".join(names), 96).replace("\n", " \\\n"),
+        "START": fill(", ".join(map(repr, start)), 96),
+        "ZEROS": ", ".join(["0.0"] * len(start)),
+        "SEATING": f"{seating:g}",
+        "NORMAL": f"{NORMAL:g}",
+        "SHEAR": repr(shear),
+        "BACK": repr(shear / 2),
+    }

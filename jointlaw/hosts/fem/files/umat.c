@@ -1,0 +1,44 @@
+/* granite as a UMAT for interface and cohesive elements: DSTRAN is the step of opening and slip (m),
+ * opening and tension positive. With NTENS 2 or 3 the normal comes first, then one shear or two; with
+ * 6 (interface elements of Kratos) zz is the normal, xz and yz are the shears. PROPS(1), if there is
+ * one above 0, is the share of the jump that the element hands over: 0.5 in Kratos, whose elements
+ * then count half of the stress. STATEV holds STATE numbers (jointlaw_fem.h), at the start zeros.
+ * What cannot be done asks for a shorter step (PNEWDT), and gives NaN, so that a host that does not
+ * read PNEWDT cannot go on. */
+#include "jointlaw_fem.h"
+#ifdef __GNUC__
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+__attribute__((visibility("default")))
+#endif
+void umat_(double *stress, double *statev, double *ddsdde, double *sse, double *spd, double *scd,
+           double *rpl, double *ddsddt, double *drplde, double *drpldt, const double *stran,
+           const double *dstran, const double *time, const double *dtime, const double *temp,
+           const double *dtemp, const double *predef, const double *dpred, const char *cmname,
+           const int *ndi, const int *nshr, const int *ntens, const int *nstatv,
+           const double *props, const int *nprops, const double *coords, const double *drot,
+           double *pnewdt)
+{
+  char message[JLAW_MESSAGE] = "";
+  const int n = *ntens, wide = n == 6, dim = wide ? DIM : n;
+  const int at[3] = {wide ? 2 : 0, wide ? 5 : 1, wide ? 4 : 2};
+  const double share = *nprops > 0 && props[0] > 0.0 ? props[0] : 1.0;
+  double s1[STATE], T[3], C[9], du[3] = {0.0, 0.0, 0.0};
+  if (dim < 2 || dim > DIM)
+    snprintf(message, sizeof message, "NTENS = %d, and this joint takes 2 to %d, or 6", n, DIM);
+  else if (*nstatv != STATE)
+    snprintf(message, sizeof message, "NSTATV = %d, and must be %d", *nstatv, STATE);
+  for (int i = 0; !message[0] && i < dim; i++) du[i] = dstran[at[i]] / share;
+  if (message[0] || jl_move(statev, s1, du, T, C, message)) {
+    fprintf(stderr, "granite: %s\n", message);
+    if (pnewdt) *pnewdt = 0.25;
+    for (int i = 0; i < n; i++) stress[i] = NAN;
+    return;
+  }
+  memcpy(statev, s1, sizeof s1);
+  for (int i = 0; i < n * n; i++) ddsdde[i] = 0.0;
+  for (int i = 0; i < dim; i++) stress[at[i]] = T[i] / share;
+  for (int i = 0; i < dim * dim; i++) /* column by column */
+    ddsdde[at[i / dim] + n * at[i % dim]] = C[DIM * (i / dim) + i % dim] / (share * share);
+  *sse = jlaw_stored(&JOINT, s1);
+  *spd = jlaw_dissipated(&JOINT, s1);
+}

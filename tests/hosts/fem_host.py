@@ -1,0 +1,96 @@
+"""Exports a law to finite elements, builds it, and calls its behaviours as MGIS does."""
+
+import ctypes
+import subprocess
+
+import numpy as np
+from c_host import FAST, STRICT, compiler
+
+import jointlaw as jl
+
+LAW = jl.presets.load("westerly-rough")
+SEATING = 1e4  # Pa
+NUMBER, TEXT = ctypes.POINTER(ctypes.c_double), ctypes.c_char_p
+STATE_VIEW = ("gradients", "forces", "density", "properties", "state", "stored", "dissipated")
+
+
+class View(ctypes.Structure):
+    """`mgis_bv_BehaviourDataView` of MGIS 1.2.2 to 3.1."""
+
+    _fields_ = [
+        ("message", TEXT),
+        ("dt", ctypes.c_double),
+        *((name, NUMBER) for name in ("K", "rdt", "speed_of_sound")),
+        *((f"{name}{end}", NUMBER) for end in "01" for name in (*STATE_VIEW, "external")),
+    ]
+
+
+def export(folder, law=LAW, level="-O3", target="all"):
+    """Export a law as rock and build its libraries, without a warning."""
+    compiler("cc")
+    jl.export_fem(law, folder, "rock", SEATING)
+    flags = f"CFLAGS={' '.join([level, '-std=c99', *FAST[1:], *STRICT, '-Wno-psabi'])}"
+    done = subprocess.run(["make", "-C", folder, target, flags], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+class Behaviour:
+    """One point of a behaviour, loaded by its symbols; `update` and `revert` as a host has them."""
+
+    def __init__(self, folder, name="rock", hypothesis="Tridimensional", properties=()):
+        self.lib, self.name = ctypes.CDLL(str(folder / "librock_mgis.so")), name
+        self.function = self.lib[f"{name}_{hypothesis}"]
+        size = {
+            1: {"Tridimensional": 6}.get(hypothesis, 4),
+            2: 3 - (hypothesis != "Tridimensional"),
+        }
+        self.size = n = size[self.types("Gradients")[0]]
+        rows, made = self.number("nInternalStateVariables"), np.zeros
+        self.old = {"gradients": made(n), "forces": made(n), "state": made(rows)}
+        self.old |= {"properties": np.array(properties, float), "stored": made(1)}
+        self.old |= {"dissipated": made(1), "density": made(1), "external": made(1)}
+        self.new = {key: value.copy() for key, value in self.old.items()}
+        self.rdt, self.message = np.ones(1), ctypes.create_string_buffer(512)
+
+    def number(self, name):
+        return ctypes.c_ushort.in_dll(self.lib, f"{self.name}_{name}").value
+
+    def text(self, name):
+        return TEXT.in_dll(self.lib, f"{self.name}_{name}").value.decode()
+
+    def names(self, name):
+        array = (TEXT * self.number(f"n{name}")).in_dll(self.lib, f"{self.name}_{name}")
+        return [word.decode() for word in array]
+
+    def types(self, name):
+        array = ctypes.c_int * self.number(f"n{name}")
+        return list(array.in_dll(self.lib, f"{self.name}_{name}Types"))
+
+    def integrate(self, gradients, want=4.0):
+        """What the function returns, and K (size, size), NaN where it was not written."""
+        self.new["gradients"][:] = gradients
+        K = np.full((self.size, self.size), np.nan)
+        K[0, 0] = want
+        view = View(dt=1.0, K=at(K), rdt=at(self.rdt), speed_of_sound=at(np.zeros(1)))
+        view.message = ctypes.addressof(self.message)
+        for end, data in enumerate((self.old, self.new)):
+            for key, array in data.items():
+                setattr(view, f"{key}{end}", at(array))
+        return self.function(ctypes.byref(view)), K
+
+    def update(self):
+        for key, array in self.new.items():
+            self.old[key][:] = array
+
+    def step(self, by):
+        """Advance by a difference of gradients; forces and K."""
+        done, K = self.integrate(self.old["gradients"] + by)
+        assert done == 1, self.message.value.decode()
+        self.update()
+        return self.new["forces"].copy(), K
+
+
+def at(array):
+    """Pointer to an array's numbers."""
+    return array.ctypes.data_as(NUMBER)

@@ -1,0 +1,237 @@
+"""mgis.c and umat.c, called as their hosts call them, against the law in Python."""
+
+import ctypes
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+
+sys.path.insert(0, str(Path(__file__).parent))
+from fem_host import LAW, SEATING, Behaviour, at, export
+
+YIELDS = replace(LAW.asperity, yield_interference=2e-8)
+PLANE = replace(LAW, asperity=YIELDS, plane=0.0)  # the other kinds of numbers of state
+SIGN = np.array([-1.0, 1.0, 1.0])  # closure and compression against opening and tension
+THICKNESS, YOUNG, POISSON = 1e-3, 5e10, 0.2
+
+
+@pytest.fixture(scope="module")
+def folder(finite_elements):
+    return finite_elements
+
+
+def path(seed):
+    """Steps (300, 3) in m that close, shear, open until the halves part, and close again."""
+    d = np.random.default_rng(seed).normal(size=(300, 3)) * [3e-8, 1e-7, 1e-7]
+    d[:20, 0] = 5e-8
+    d[100] = [-2e-5, 0.0, 0.0]
+    d[110] = [2.02e-5, 1e-7, 0.0]
+    return d
+
+
+def test_symbols_are_those_that_mgis_reads(folder):
+    for name, kind, kinematic, gradient, force, type_, properties in (
+        ("rock", 3, 2, "OpeningDisplacement", "CohesiveForce", 2, []),
+        ("rock_layer", 1, 1, "Strain", "Stress", 1, ["Thickness", "YoungModulus", "PoissonRatio"]),
+    ):
+        b = Behaviour(folder, name)
+        numbers = {
+            "mfront_mkt": 1, "api_version": 1, "BehaviourType": kind,
+            "BehaviourKinematic": kinematic, "SymmetryType": 0, "ElasticSymmetryType": 0,
+            "requiresStiffnessTensor": 0, "requiresThermalExpansionCoefficientTensor": 0,
+            "ComputesInternalEnergy": 1, "ComputesDissipatedEnergy": 1,
+            "TemperatureRemovedFromExternalStateVariables": 1, "nTangentOperatorBlocks": 2,
+            "nExternalStateVariables": 0, "nParameters": 0, "nInitializeFunctions": 0,
+            "nPostProcessings": 0, "nInternalStateVariables": LAW.state_size + 1,
+            "nMaterialProperties": len(properties),
+        }  # fmt: skip
+        assert {key: b.number(key) for key in numbers} == numbers
+        assert (b.text("mfront_ept"), b.text("unit_system")) == (name, "SI")
+        assert (b.text("mfront_interface"), b.text("src")) == ("Generic", "mgis.c")
+        assert b.names("TangentOperatorBlocks") == [force, gradient]
+        assert (b.names("Gradients"), b.types("Gradients")) == ([gradient], [type_])
+        assert b.names("ThermodynamicForces") == [force]
+        assert b.types("ThermodynamicForces") == [type_]
+        states = b.names("InternalStateVariables")
+        assert len(set(states)) == len(states)
+        assert states[-1] == "Begun"
+        assert b.types("InternalStateVariables") == [0] * len(states)  # scalars
+        if properties:
+            assert b.names("MaterialProperties") == properties
+    symbols = subprocess.run(
+        ["nm", "-D", "--defined-only", folder / "librock_umat.so"], capture_output=True, text=True
+    )
+    assert " T umat_\n" in symbols.stdout
+
+
+@pytest.mark.parametrize(
+    ("law", "hypothesis"),
+    [(LAW, "Tridimensional"), (LAW, "PlaneStrain"), (PLANE, "PlaneStrain")],
+)
+def test_cohesive_zone_is_the_law_in_python(folder, tmp_path, law, hypothesis):
+    if law is not LAW:
+        folder = export(tmp_path, law, "-O0", "librock_mgis.so")
+    b = Behaviour(folder, hypothesis=hypothesis)
+    joint, n = law.joint(normal_stress=SEATING), b.size
+    T, K, F, C, energies = [], [], [], [], []
+    for d in path(1):
+        d[n:] = 0.0
+        traction, tangent = b.step((SIGN * d)[:n])
+        expected, stiffness = joint.update(d[: law.dim])
+        T.append(SIGN[:n] * traction)
+        K.append(tangent * np.outer(SIGN[:n], SIGN[:n]))
+        F.append(expected[:n])
+        C.append(stiffness[:n, :n])
+        measures = [joint.measures().stored, joint.dissipated_energy]
+        energies.append([measures, [b.new["stored"][0], b.new["dissipated"][0]]])
+    for mine, theirs, share in ((T, F, 1e-12), (K, C, 1e-8)):
+        assert np.abs(np.subtract(mine, theirs)).max() < share * np.abs(theirs).max()
+    energies = np.array(energies)
+    assert np.abs(energies[:, 0] - energies[:, 1]).max() < 1e-12 * energies.max()
+    assert not np.any(T[100]), "a joint that is open must not bear stress"
+    assert np.any(T[110]), "a joint that touched again must bear stress"
+    state = joint.snapshot().values[0]  # by which Python can go on
+    np.testing.assert_allclose(b.new["state"][:-1], state, rtol=0, atol=1e-12 * np.abs(state).max())
+
+
+@pytest.mark.parametrize(
+    ("hypothesis", "at_", "size", "plane"),
+    [("Tridimensional", [2, 4, 5], 6, [0, 1, 3]), ("PlaneStrain", [1, 3], 4, [0, 2])],
+)
+def test_layer_is_the_joint_over_its_thickness(folder, hypothesis, at_, size, plane):
+    n = len(at_)
+    layer = Behaviour(folder, "rock_layer", hypothesis, [THICKNESS, YOUNG, POISSON])
+    joint = Behaviour(folder, "rock", hypothesis)
+    rng = np.random.default_rng(2)
+    for d in path(2)[:60]:
+        strain = np.zeros(size)
+        strain[plane] = 1e-6 * rng.normal(size=len(plane))
+        strain[at_] = (SIGN * d)[:n] / THICKNESS * [1.0, 0.5**0.5, 0.5**0.5][:n]  # slip is 2 h e
+        stress, K = layer.step(strain)
+        T, C = joint.step((SIGN * d)[:n])
+        # power, of any further motion, per volume and per area: whatever the factors above
+        trial = rng.normal(size=size)
+        jump = THICKNESS * trial[at_] * [1.0, 2**0.5, 2**0.5][:n]
+        elastic = stress[plane] @ trial[plane]
+        assert THICKNESS * (stress @ trial - elastic) == pytest.approx(T @ jump, rel=1e-9, abs=1e-9)
+        further = jump @ C @ jump
+        in_plane = trial[plane] @ K[np.ix_(plane, plane)] @ trial[plane]
+        assert THICKNESS * (trial @ K @ trial - in_plane) == pytest.approx(further, rel=1e-9, abs=1)
+    # plane stress of the rock, in the layer's own plane
+    total = layer.new["gradients"][plane]
+    stiff = np.array([[1, POISSON, 0], [POISSON, 1, 0], [0, 0, 1 - POISSON]])[: len(plane)]
+    stiff = YOUNG / (1 - POISSON**2) * stiff[:, : len(plane)]
+    np.testing.assert_allclose(layer.new["forces"][plane], stiff @ total, rtol=1e-12)
+    np.testing.assert_allclose(K[np.ix_(plane, plane)], stiff, rtol=1e-12)
+    for energy in ("stored", "dissipated"):
+        elastic = 0.5 * total @ stiff @ total if energy == "stored" else 0.0
+        per_volume = joint.new[energy] / THICKNESS + elastic
+        np.testing.assert_allclose(layer.new[energy], per_volume, rtol=1e-9)
+
+
+def test_what_k_asks_for(folder):
+    b, joint = Behaviour(folder), LAW.joint(normal_stress=SEATING)
+    for d in path(3)[:30]:
+        b.step(SIGN * d)
+        joint.update(d)
+    d = np.array([1e-8, 2e-8, -1e-8])
+    _, C = joint.trial(d)
+    _, now = joint.trial(np.zeros(3))
+    for want, expected in ((1.0, C), (4.0, C), (-1.0, now), (-3.0, now)):
+        before = {key: value.copy() for key, value in b.new.items()}
+        done, K = b.integrate(b.old["gradients"] + SIGN * d, want)
+        assert done == 1
+        np.testing.assert_allclose(K * np.outer(SIGN, SIGN), expected, rtol=0, atol=1e-8 * C.max())
+        if want < 0:  # a prediction moves nothing
+            assert all((b.new[key] == before[key]).all() for key in ("state", "forces", "stored"))
+        # a host that reverts goes on from the same state, whatever was tried
+        done, K = b.integrate(b.old["gradients"] + SIGN * d, 0.0)
+        assert np.isnan(K.ravel()[1:]).all()
+        np.testing.assert_allclose(SIGN * b.new["forces"], joint.trial(d)[0], rtol=1e-12)
+    done, _ = b.integrate(b.old["gradients"], 104.0)
+    assert (done, b"speed of sound" in b.message.value) == (-1, True)
+
+
+@pytest.mark.parametrize("name", ["rock", "rock_layer"])
+@pytest.mark.parametrize(("bad", "why"), [(np.nan, "finite"), (-1e300, "reach|finite")])
+def test_a_step_that_cannot_be_done_leaves_the_state_alone(folder, name, bad, why):
+    b = Behaviour(folder, name, properties=[THICKNESS, YOUNG, POISSON])
+    normal = 0 if name == "rock" else 2
+    b.step(np.eye(b.size)[normal] * -1e-7)
+    before = {key: value.copy() for key, value in b.new.items()}
+    b.message.value = b""
+    done, _ = b.integrate(np.eye(b.size)[normal] * bad)
+    assert (done, b.rdt[0]) == (-1, 0.25)
+    assert any(word in b.message.value.decode() for word in why.split("|"))
+    assert all((b.new[key] == before[key]).all() for key in b.new if key != "gradients")
+    if name == "rock_layer":
+        b.new["properties"][0] = 0.0
+        assert b.integrate(b.old["gradients"])[0] == -1
+        assert b"Thickness must be > 0" in b.message.value
+
+
+def test_two_threads_do_not_meet(folder):
+    def run(seed):
+        b = Behaviour(folder)
+        return [b.step(SIGN * d)[0] for d in path(seed)]
+
+    with ThreadPoolExecutor(2) as pool:  # ctypes lets go of the interpreter during a call
+        together = list(pool.map(run, range(8)))
+    np.testing.assert_array_equal(together, [run(seed) for seed in range(8)])
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_umat_is_the_law_in_python(folder, capfd, n):
+    umat = ctypes.CDLL(str(folder / "librock_umat.so")).umat_
+    joint, sizes = LAW.joint(normal_stress=SEATING), (n, LAW.state_size + 1)
+    stress, state, K, pnewdt = np.zeros(n), np.zeros(sizes[1]), np.zeros((n, n)), np.ones(1)
+    energy, dissipated, peak, worst = np.zeros(1), np.zeros(1), 0.0, []
+
+    def call(step, rows=sizes[1]):
+        arguments = [None] * 37
+        arguments[:5] = map(at, (stress, state, K, energy, dissipated))
+        arguments[11], arguments[27] = at(step), at(pnewdt)
+        for place, whole in ((21, n), (22, rows), (24, 0)):
+            arguments[place] = ctypes.byref(ctypes.c_int(whole))
+        umat(*arguments)
+
+    for d in path(4):
+        d[n:] = 0.0
+        call(np.ascontiguousarray((SIGN * d)[:n]))
+        F, C = joint.update(d)
+        peak = np.maximum(peak, [np.abs(F).max(), np.abs(C).max()])
+        signs = np.outer(SIGN, SIGN)[:n, :n]
+        worst.append(
+            [np.abs(SIGN[:n] * stress - F[:n]).max(), np.abs(signs * K.T - C[:n, :n]).max()]
+        )
+    assert (np.max(worst, axis=0) < np.array([1e-12, 1e-8]) * peak).all()
+    assert dissipated[0] == pytest.approx(joint.dissipated_energy, rel=1e-12)
+    assert energy[0] == pytest.approx(joint.measures().stored, rel=1e-12)
+    before = state.copy()
+    for step, rows, why in (
+        (np.full(n, np.nan), sizes[1], "finite"),
+        (np.zeros(n), 7, "NSTATV = 7"),
+    ):
+        stress[:], pnewdt[0] = 0.0, 1.0
+        call(step, rows)
+        assert np.isnan(stress).all()
+        assert (pnewdt[0], (state == before).all()) == (0.25, True)
+        assert why in capfd.readouterr().err
+
+
+def test_export_refuses_before_it_writes(tmp_path):
+    for law, options, why in (
+        (LAW, {"seating": 0.0}, "A joint without stress has no stiffness"),
+        (LAW, {"seating": np.nan}, "seating"),
+        (LAW, {"name": "a b"}, "identifier of C"),
+        (replace(LAW, closure_only=True), {}, "closure_only"),
+    ):
+        with pytest.raises(ValueError, match=why):
+            jl.export_fem(law, tmp_path / "new", **options)
+    assert not (tmp_path / "new").exists()

@@ -1,0 +1,42 @@
+"""The exported script in the real Kratos, against the laboratory test in Python."""
+
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+
+sys.path.insert(0, str(Path(__file__).parent))
+from fem_host import LAW, SEATING
+
+PRESSED, TURN, END = 9, 49, 69  # rows
+
+
+def test_direct_shear_of_two_blocks_with_an_interface_element(finite_elements):
+    if find_spec("KratosMultiphysics") is None:
+        pytest.skip("Kratos is not installed (pip install 'jointlaw[fem]')")
+    done = subprocess.run(
+        [sys.executable, "kratos.py"], cwd=finite_elements, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr
+    test = np.genfromtxt(finite_elements / "kratos.csv", delimiter=",", names=True)
+    assert test["iterations"].max() <= 6
+    # closure: each load, on a joint of its own
+    loads = -test["normal_Pa"][: PRESSED + 1]
+    start = LAW.closure(SEATING)
+    closed = start - test["opening_m"][: PRESSED + 1]
+    assert np.abs(loads / LAW.normal_stress(closed) - 1).max() < 1e-3
+    assert np.abs(loads / np.linspace(2e5, 2e6, PRESSED + 1) - 1).max() < 1e-3
+    # shear at a constant normal stress, forth and back
+    joint, slip = LAW.joint(normal_stress=SEATING), test["slip_m"]
+    forth = jl.direct_shear(joint, slip[TURN], normal=2e6, steps=TURN - PRESSED)
+    back = jl.direct_shear(joint, slip[END] - slip[TURN], normal=2e6, steps=END - TURN)
+    peak, rise = forth.shear_stress.max(), np.ptp(forth.closure)
+    for rows, record in ((slice(PRESSED, TURN + 1), forth), (slice(TURN, END + 1), back)):
+        assert np.abs(test["shear_Pa"][rows] - record.shear_stress).max() < 1e-3 * peak
+        assert np.abs(test["opening_m"][rows] - (start - record.closure)).max() < 1e-3 * rise
+    assert forth.shear_stress[-1] - back.shear_stress[-1] > peak / 2, "the way back must differ"

@@ -1,0 +1,64 @@
+"""Wheels for other machines: all are built by one command, and that for ARM runs here by qemu."""
+
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from jointlaw.hosts.c.export import include_dir, table_text
+from jointlaw.native import build
+
+sys.path.insert(0, str(Path(__file__).parent))
+from c_host import HERE, compiler, random_law, random_path
+
+ROOT = Path(__file__).parents[2]
+ARM = "aarch64-linux-gnu.2.17"
+SYSROOT = "/usr/aarch64-linux-gnu"  # Debian: libc6-arm64-cross
+JOINTS = 11
+PLAIN = (0, 10, 14)  # laws that take no expm1, log1p or hypot, whose last digit may differ on ARM
+
+
+@pytest.fixture(scope="module")
+def wheels(tmp_path_factory):
+    """Folder of all wheels; the command itself looks into their libraries."""
+    for name in ("build", "lief", "ziglang"):  # of the extra `wheels`
+        pytest.importorskip(name)
+    folder = tmp_path_factory.mktemp("wheels")
+    command = [sys.executable, ROOT / "builder" / "wheels.py", folder]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+def test_a_wheel_for_each_machine(wheels):
+    made = {path.stem.partition("-py3-none-")[2] for path in wheels.glob("*.whl")}
+    assert made == set(build.TARGETS.values())
+
+
+def test_arm_gives_the_bits_of_this_machine(wheels, tmp_path):
+    """The library of the wheel, which there gives those of the header: laws of all kinds."""
+    qemu = compiler("qemu-aarch64")
+    wheel = next(wheels.glob(f"*{build.TARGETS[ARM]}.whl"))
+    library = zipfile.ZipFile(wheel).extract("jointlaw/native/libjointlaw.so", tmp_path)
+    program, flags = tmp_path / "library", [*build.FLAGS, f"-I{include_dir()}"]
+    build.zig(ARM).run(*flags, HERE / "library.c", "-o", program, "-lm", "-ldl")
+    for seed in (*PLAIN, 3, 7, 13, 20):
+        law = random_law(seed)
+        paths = np.stack([random_path(law.dim, seed + 100 * k) for k in range(JOINTS)], axis=1)
+        file = tmp_path / "law.jlaw"
+        file.write_text(table_text(law))
+        command = [qemu, "-L", SYSROOT, program, file, library, str(JOINTS)]
+        done = subprocess.run(command, input=paths.tobytes(), capture_output=True)
+        assert done.returncode == 0, done.stderr.decode()
+        batch = law.joints(JOINTS)
+        here = [np.concatenate([np.ravel(x) for x in batch.update(d)]) for d in paths]
+        here = np.stack(here)
+        there = np.frombuffer(done.stdout).reshape(here.shape)
+        if seed in PLAIN:
+            np.testing.assert_array_equal(there, here)
+        for part in (slice(0, JOINTS * law.dim), slice(JOINTS * law.dim, None)):  # F, C
+            off = np.abs(there - here)[:, part].max()
+            assert off < 1e-12 * np.abs(here[:, part]).max()

@@ -1,0 +1,130 @@
+"""Slopes that fade with the distance from mate: strength and dilation belong together."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from exact_work import begun, step_work, stored
+
+import jointlaw as jl
+from jointlaw.kernels import reference as kernel
+
+PRESETS = "westerly-rough", "jing-replica"
+FINE = jl.Resolution(12, 12, 12)
+
+
+def sheared(name, lengths, stress, way, **more):
+    """Law and record of a shear test to `way` mating lengths, each of `lengths` closure ranges."""
+    law = jl.presets.load(name)
+    D = lengths * law.closure_range
+    law = replace(law, mating_length=D, plane=0.0, resolution=FINE, **more)
+    steps = np.concatenate([np.geomspace(1e-3, 1.0, 60), np.linspace(1.05, way, 60)]) * D
+    return law, shear_along(law.joint(), steps, stress)
+
+
+def shear_along(joint, places, stress):
+    """Shear (k,), ratio F2/F1 (k,) and closure (k,) of a joint that is sheared to these places."""
+    rows = []
+    for place in places:
+        record = jl.direct_shear(joint, [place - joint.delta[1]], normal=stress, steps=1)
+        rows.append((place, record.F2[-1] / record.F1[-1], joint.delta[0]))
+    return np.array(rows).T
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stress", [0.1e6, 1e6, 3e6, 30e6])
+@pytest.mark.parametrize("name", PRESETS)
+def test_friction_is_that_of_the_asperities_and_the_dilation(name, stress):
+    """At and after the peak; springs still fill at it, the more the higher the stress."""
+    for lengths in (12.0, 100.0):
+        law, (way, ratio, closure) = sheared(name, lengths, stress, 10.0)
+        friction, D = np.degrees(np.arctan(ratio)), law.mating_length
+        dilation = np.degrees(np.arctan(-np.gradient(closure, way)))
+        away = np.abs(friction - np.degrees(np.arctan(law.asperity.mu)) - dilation)
+        top = int(np.argmax(friction))
+        later = way > way[top] + D
+        print(
+            name,
+            stress,
+            lengths,
+            "peak",
+            friction[top],
+            "at",
+            way[top] / D,
+            "worst",
+            away[top:-1].max(),
+            "later",
+            away[later][:-1].max(),
+            "end",
+            friction[-1],
+        )
+        assert away[top:-1].max() < (4.2 if stress > 3e6 else 3.3)
+        if stress <= 3e6:
+            assert away[later][:-1].max() < 1.2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PRESETS)
+def test_far_from_mate_only_the_friction_of_the_asperities_is_left(name):
+    law = replace(jl.presets.load(name), resolution="fine")
+    law = replace(law, mating_length=12.0 * law.closure_range)
+    for turn in np.arange(8) * np.pi / 4:
+        joint = law.joint(mated=False)
+        e = np.array([np.cos(turn), np.sin(turn)])
+        record = jl.direct_shear(
+            joint, [3.0 * law.closure_range], normal=1e6, azimuth=turn, steps=40
+        )
+        F = joint.F
+        angle = np.degrees(np.arctan2(F[1:] @ e, F[0]))
+        print(name, turn, angle - np.degrees(np.arctan(law.asperity.mu)), record.F1[-1])
+        assert angle == pytest.approx(np.degrees(np.arctan(law.asperity.mu)), abs=0.3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("stress", "left"), [(0.1e6, 0.01), (1e6, 0.01), (3e6, 0.01), (30e6, 0.04)]
+)
+@pytest.mark.parametrize("name", PRESETS)
+def test_back_at_its_origin_the_joint_is_mated(name, stress, left):
+    law = jl.presets.load(name)
+    law = replace(law, mating_length=12 * law.closure_range, plane=0.0, resolution=FINE)
+    joint, D = law.joint(), law.mating_length
+    there = np.concatenate([[0.0], np.geomspace(1e-2, 10.0, 60)]) * D
+    _, _, closure = shear_along(joint, [*there, *there[::-1]], stress)
+    lift = closure[0] - closure
+    print(name, stress, lift[-1] / lift.max())
+    assert abs(lift[-1]) < (0.04 if stress > 3e6 else 0.01) * lift.max()
+
+
+@pytest.mark.slow
+def test_slopes_that_wear_lift_less_from_cycle_to_cycle():
+    law = jl.presets.load("jing-replica")
+    D = 12 * law.closure_range
+    law = replace(law, mating_length=D, slope_wear=1e6, plane=0.0, resolution="fine")
+    kept = {}
+    for stress in (0.1e6, 1e6):
+        joint, lifts, out = law.joint(), [], np.linspace(0.0, 5.0, 40) * D
+        for _ in range(7):
+            _, _, closure = shear_along(joint, [*out, *out[::-1]], stress)
+            lifts.append(closure[0] - closure[39])
+        print(stress, lifts)
+        assert np.all(np.diff(lifts) < 0.0)
+        kept[stress] = lifts[-1] / lifts[0]
+    assert kept[1e6] < 0.7 < 0.85 < kept[0.1e6]
+
+
+def test_a_cycle_that_made_energy_in_the_law_before_makes_none():
+    """With the limit of the offset of `critical_slip` it gained 8.86 J/m2 at mu = 4."""
+    R = 1e-6
+    cycle = [(1, 0.484), (-1.428, -0.503), (-3, 0), (0, -0.281), (0, 0.3), (3.428, 0)]
+    for mu in (0.6, 4.0):
+        one = jl.JointLaw(
+            orientation=jl.Orientation(1.0), asperity=jl.Asperity(1e5, 1.2, 0.0, mu),
+            asperity_density=1e10, closure_range=R, resolution=jl.Resolution(1, 3, 1), plane=0.0,
+            mating_length=0.3 * R,
+        )  # fmt: skip
+        state, work, k = np.zeros((one.tables.rows, 1)), 0.0, one.tables
+        for d in R * np.array(cycle):
+            work += step_work(k, begun(k, state), d)
+            state = kernel.step(k, state, d[:, None], False)[0]
+        assert work > stored(k, state)[0]

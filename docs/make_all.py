@@ -66,6 +66,7 @@ PICTURES = {
     "shear-box.png": ("-m dem_demo shear-box --out FOLDER", "curves.png"),
     "strength.png": ("-m dem_demo strength-reduction slope --out FOLDER", "failing-rough.png"),
     "tradeoff.png": ("-m jointlaw tradeoff westerly-smooth --out FOLDER", "tradeoff.png"),
+    "shaken-slope.png": ("docs/measure/shaken_slope.py FOLDER", "shaken-slope.png"),
     "fit.png": ("-m jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out FOLDER", "fit.png"),
 }
 LOCK = Lock()  # of the pages: two tasks may fill the same one

@@ -11,7 +11,7 @@ from ..dynamics.simulation import Simulation
 from ..scene import Scene, is_coulomb, turn
 
 POINT = "x_m", "y_m", "vx_m/s", "vy_m/s"
-SLIP_DISTANCE = 2e-3  # m, for laws without a critical slip distance
+SLIP_DISTANCE = 2e-3  # m, for laws without a finite mating length
 ROUNDS = 50  # most trials of an angle; a handful is enough where there is one
 
 
@@ -118,7 +118,7 @@ def _joint(sim: Simulation, moving: int, base: int) -> dict[str, float]:
 
 
 def slip_distance(law: jl.JointLaw) -> float:
-    """Sliding (m) that counts as slip: the law's critical slip distance."""
+    """Sliding (m) that counts as slip: the law's mating length."""
     return law.mating_length if np.isfinite(law.mating_length) else SLIP_DISTANCE
 
 
@@ -126,7 +126,7 @@ def friction_angle(law: jl.JointLaw, stress: float) -> float:
     """Peak of F2/F1 (degrees) of the law in direct shear at a constant normal stress (Pa)."""
     if is_coulomb(law):
         return float(np.degrees(np.arctan(law.asperity.mu)))
-    far = 1.2 * slip_distance(law)  # friction peaks where the contacts begin to be renewed
+    far = 1.2 * slip_distance(law)  # friction peaks within a mating length
     record = jl.direct_shear(law.joint(), to=[far], normal=stress, steps=120)
     return float(record.peak_friction_angle)
 

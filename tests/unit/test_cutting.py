@@ -57,6 +57,24 @@ def test_persistence_is_the_share_of_length_that_is_a_joint():
     assert len(cut(outline, [sets[0]], 5, 0.1)[0]) == 40
 
 
+def test_joint_sets_cut_the_rock_around_its_openings():
+    """An opening that no joint meets is cut through at its corners; one at the rim is a notch."""
+    holes = [
+        [[1.2, 1.2], [1.8, 1.2], [1.5, 1.8]],
+        [[9.0, 4.5], [11.0, 4.5], [11.0, 6.5], [9.0, 6.5]],
+    ]
+    sets = [JointSet(0.0, 5.0, "a"), JointSet(60.0, 5.0, "b", through=(5.0, 5.0))]
+    blocks, _, _, dropped = cut(SQUARE, sets, 0, 0.01, [np.array(hole) for hole in holes])
+    shapes, openings = [Polygon(block) for block in blocks], [Polygon(hole) for hole in holes]
+    assert all(check_convex(block) is None for block in blocks)
+    assert max(s.intersection(hole).area for s in shapes for hole in openings) < 1e-6
+    # 0.18 m2 and the part of 2 m2 inside the rock
+    assert sum(s.area for s in shapes) + sum(dropped) == pytest.approx(100 - 0.18 - 2, abs=1e-4)
+    for outline, hole in ((SQUARE + 5.0, holes[0]), (SQUARE, SQUARE)):
+        with pytest.raises(ValueError, match=r"hole\[0\] must take a part of the rock away"):
+            cut(outline, sets, 0, 0.01, [np.array(hole)])
+
+
 def test_a_sliver_joins_its_neighbour_or_is_left_out():
     """A joint 0.1 m from the side: a strip that only the bed next to it can take in."""
     sets = [JointSet(90.0, 9.9, "a", through=(9.9, 0.0))]

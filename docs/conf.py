@@ -31,12 +31,13 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx_gallery.gen_gallery",
     "sphinx.ext.mathjax",
+    "browser",
     "claims",
     "commands",
     "docstrings",
     "pages",
 ]
-exclude_patterns = ["_build", "gallery", "paper", "_ext"]
+exclude_patterns = ["_build", "gallery", "paper", "browser", "_ext"]
 suppress_warnings = [
     "config.cache",  # the settings of the gallery hold objects
 ]

@@ -52,6 +52,9 @@ TIMED = {
 }
 # picture: command that writes into FOLDER, and the file there
 PICTURES = {
+    "moving.gif": ("docs/draw/moving.py FOLDER", "moving.gif"),
+    "three-laws.png": ("docs/draw/three_laws.py FOLDER", "three-laws.png"),
+    "axes.png": ("docs/draw/axes.py FOLDER", "axes.png"),
     "shear.png": (
         "-m jointlaw shear biegel-rough --normal-stress 10MPa --to 2um --reverse=-2um "
         "--resolution fine --out FOLDER",
@@ -59,8 +62,10 @@ PICTURES = {
     ),
     "tilt.png": ("-m dem_demo tilt --out FOLDER", "final.png"),
     "slope.png": ("-m dem_demo slope --out FOLDER", "final.png"),
+    "slope.gif": ("-m dem_demo slope --out FOLDER", "motion.gif"),
     "shear-box.png": ("-m dem_demo shear-box --out FOLDER", "curves.png"),
     "strength.png": ("-m dem_demo strength-reduction slope --out FOLDER", "failing-rough.png"),
+    "tradeoff.png": ("-m jointlaw tradeoff westerly-smooth --out FOLDER", "tradeoff.png"),
     "shaken-slope.png": ("docs/measure/shaken_slope.py FOLDER", "shaken-slope.png"),
     "fit.png": ("-m jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out FOLDER", "fit.png"),
 }

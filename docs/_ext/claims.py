@@ -40,11 +40,22 @@ def tables():
     return "\n\n".join(parts)
 
 
+def figures():
+    """The pictures of the paper's figures, each leading to its page."""
+    lines = []
+    for path in sorted(TESTS.parents[1].glob("docs/paper/plot_*.py")):
+        title = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))).splitlines()[0]
+        picture = f"figures/images/sphx_glr_{path.stem}_001.png"
+        lines.append(f"[![{title}]({picture})](figures/{path.stem}.rst)")
+    return "\n".join([*lines, ""])
+
+
 def fill(app, name, source):
     """Put the tables into the page where it asks for them, and lead its link to the figures."""
     if name == "paper":
         source[0] = source[0].replace("paper/GALLERY_HEADER.rst", "figures/index.rst")
         source[0] = source[0].replace("<!-- claims -->", tables())
+        source[0] = source[0].replace("<!-- figures -->", figures())
 
 
 def setup(app):

@@ -37,15 +37,13 @@ for psi in azimuth:
 friction = np.array(friction)
 
 # %%
-figure, axis = plt.subplots(
-    subplot_kw={"projection": "polar"}, figsize=(6, 6), layout="constrained"
-)
-around = np.concatenate([azimuth, azimuth[1:] + np.pi])  # half a turn gives the same joint
+figure, axis = plt.subplots(figsize=(7.5, 4.5), layout="constrained")
 for k, shear in enumerate(shears):
-    values = np.concatenate([friction[:, k], friction[1:, k]])
-    axis.plot(around, values, "o-", ms=3, label=f"{shear * 1e6:g} µm of shear")
-axis.set_title("mobilised friction angle (°) by azimuth of shear, 10 MPa")
-figure.legend(loc="outside lower center", ncols=3)
+    axis.plot(np.degrees(azimuth), friction[:, k], "o-", label=f"{shear * 1e6:g} µm of shear")
+axis.set(xlabel="azimuth of shear (°)", ylabel="mobilised friction angle (°)")
+axis.set_xticks(range(0, 181, 30))
+axis.set_ylim(bottom=0)
+figure.legend(loc="outside upper center", ncols=3)
 plt.show()
 
 # %%

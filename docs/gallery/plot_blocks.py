@@ -62,7 +62,7 @@ shear, normal = record.column("block: shear_Pa"), record.column("block: normal_P
 closure = record.column("block: closure_m")
 alone = jl.direct_shear(record.scene.laws["replica"].joint(), slid[1:], normal[0], steps=1)
 
-figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
+figure, (left, right) = plt.subplots(1, 2, figsize=(7.5, 3.8), layout="constrained")
 left.plot(slid * 1e3, shear / 1e3, label="shear")
 left.plot(slid * 1e3, alone.shear_stress / 1e3, "k:", label="shear, the law alone")
 left.plot(slid * 1e3, normal / 1e3, "--", color="0.5", label="normal")

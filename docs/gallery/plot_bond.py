@@ -38,7 +38,7 @@ def shares(record):
     return np.array(F) / 1e6, (record.shear_stress - F) / 1e6
 
 
-figure, axes = plt.subplots(1, 3, figsize=(11, 4), layout="constrained", sharex=True)
+figure, axes = plt.subplots(3, 1, figsize=(6, 9), layout="constrained")
 for axis, stress in zip(axes, (0.3e6, 1e6, 3e6), strict=True):
     record = jl.direct_shear(bonded.joint(), 15e-3, stress, steps=600)
     asperities, cement = shares(record)
@@ -46,7 +46,8 @@ for axis, stress in zip(axes, (0.3e6, 1e6, 3e6), strict=True):
     axis.plot(record.shear * 1e3, cement, ":", label="bond")
     axis.plot(record.shear * 1e3, record.shear_stress / 1e6, label="sum")
     axis.set(title=f"normal stress {stress / 1e6:g} MPa", xlabel="shear displacement (mm)")
-axes[0].set_ylabel("shear stress (MPa)")
+for axis in axes:
+    axis.set_ylabel("shear stress (MPa)")
 axes[0].legend()
 plt.show()
 

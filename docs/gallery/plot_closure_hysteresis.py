@@ -19,7 +19,7 @@ import jointlaw as jl
 # depth, so it asks for the finest resolution.
 
 base = replace(jl.presets.load("westerly-smooth"), resolution="reference", plane=0.0)
-figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
+figure, (left, right) = plt.subplots(1, 2, figsize=(7.5, 3.8), layout="constrained")
 steps, loss = 80, {}
 for a in (3.0, 2.0, 1.5):
     law = replace(base, orientation=jl.Orientation(a))

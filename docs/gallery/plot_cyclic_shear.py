@@ -36,7 +36,7 @@ for k in range(len(amplitudes)):
     stiffness.append((record.shear_stress[top] - record.shear_stress[first]) / span)
 lost, stiffness = np.array(lost), np.array(stiffness)
 
-figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
+figure, (left, right) = plt.subplots(1, 2, figsize=(7.5, 3.8), layout="constrained")
 left.plot(record.shear * 1e9, record.shear_stress / 1e6, lw=0.9)
 left.set_xlabel("shear displacement (nm)")
 left.set_ylabel("shear stress (MPa)")
@@ -71,20 +71,24 @@ kinds = {
     ),
     "wears over 100 J/m²": replace(rough, slope_wear=100.0),
 }
-figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
+figure, (left, right) = plt.subplots(1, 2, figsize=(7.5, 3.8), layout="constrained")
 peaks = {}
 for label, kind in kinds.items():
     cycles = jl.direct_shear(kind.joint(), [8e-6, -8e-6] * 6 + [0.0], normal=10e6, steps=steps)
     ratio = cycles.shear_stress / cycles.F1
     peaks[label] = [ratio[2 * steps * k : 2 * steps * (k + 1)].max() for k in range(6)]
     style = {"ls": "--", "zorder": 3} if label == "elastic" else {}
-    left.plot(cycles.shear * 1e6, ratio, lw=0.9, label=label, **style)
+    for first, strong in ((0, 0.35), (10 * steps, 1.0)):  # the first cycle pale, the last one full
+        cycle = slice(first, first + 2 * steps + 1)
+        (line,) = left.plot(cycles.shear[cycle] * 1e6, ratio[cycle], alpha=strong, **style)
+        style["color"] = line.get_color()
     travel = np.cumsum(np.abs(np.diff(cycles.shear, prepend=0.0)))
     right.plot(travel * 1e6, (cycles.closure - cycles.closure[0]) * 1e6, label=label, **style)
     print(f"{label}: largest F2/F1 of each cycle {np.round(peaks[label], 3)}")
 left.set_xlabel("shear displacement (µm)")
 left.set_ylabel("shear over normal stress")
+left.set_title("first cycle pale, last one full")
 right.set_xlabel("distance sheared (µm)")
 right.set_ylabel("closure since seating (µm)")
-right.legend(fontsize=8, loc="center right")
+right.legend(loc="center right")
 plt.show()

@@ -20,7 +20,7 @@ import jointlaw as jl
 
 
 def cycles(law, stress, amplitudes, count=3, steps=20):
-    """Damping ratio (1) and secant stiffness (Pa/m) of the last cycle at each amplitude (m)."""
+    """Damping ratio and secant stiffness (Pa/m) of the last cycle at each amplitude (m)."""
     joints = law.joints(len(amplitudes), normal_stress=stress)
     quarter = np.stack([0 * amplitudes, amplitudes / steps], axis=1)
     signs = np.repeat([1, *[-1, -1, 1, 1] * count], steps)
@@ -48,7 +48,7 @@ for stress in (5e6, 10e6, 20e6):
 # cycles. Small cycles have next to none. More depth cells cure it; see *Limits and pitfalls*.
 
 coarse, softer = cycles(law, 10e6, amplitudes)
-figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
+figure, (left, right) = plt.subplots(1, 2, figsize=(7.5, 3.8), layout="constrained")
 for stress in damping:
     label = f"{stress / 1e6:g} MPa"
     left.loglog(amplitudes * 1e9, 100 * damping[stress], label=label)

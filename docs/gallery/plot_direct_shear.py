@@ -26,7 +26,7 @@ records = {
     for label, how in tests.items()
 }
 
-figure, axes = plt.subplots(2, 2, figsize=(9, 6.5), layout="constrained", sharex=True)
+figure, axes = plt.subplots(2, 2, figsize=(7.5, 6.2), layout="constrained", sharex=True)
 for label, record in records.items():
     shear = record.shear * 1e6
     axes[0, 0].plot(shear, record.shear_stress / 1e6, label=label)
@@ -39,7 +39,7 @@ axes[1, 0].set_ylabel("dilation (nm)")
 axes[1, 1].set_ylabel("mobilised friction angle (°)")
 for axis in axes[1]:
     axis.set_xlabel("shear displacement (µm)")
-axes[0, 0].legend(fontsize="small")
+axes[0, 0].legend()
 plt.show()
 
 # %%

@@ -38,7 +38,7 @@ for name in ("a", "b", "c", "alpha", "beta"):
 law = scan.law(jl.Asperity.hertz_mindlin(G=20e9, nu=0.25, R=1e-3, mu=0.6))
 
 # %%
-figure, axes = plt.subplots(1, 3, figsize=(11, 3.6), layout="constrained")
+figure, axes = plt.subplots(3, 1, figsize=(6, 10), layout="constrained")
 extent = 1e3 * 20e-6 * np.array([0, z.shape[1], 0, z.shape[0]])
 image = axes[0].imshow(z * 1e6, extent=extent, origin="lower", cmap="cividis")
 figure.colorbar(image, ax=axes[0], label="height (µm)", shrink=0.8)

@@ -23,7 +23,7 @@ base = replace(
 )  # fmt: skip
 normal = np.geomspace(0.1e6, 50e6, 12)  # Pa
 
-figure, (left, middle, right) = plt.subplots(1, 3, figsize=(12, 4), layout="constrained")
+figure, (left, middle, right) = plt.subplots(3, 1, figsize=(6, 9), layout="constrained")
 angles, dilation = {}, {}
 for length in (np.inf, 0.2e-6, 0.1e-6, 0.05e-6):
     law = replace(base, asperity=replace(base.asperity, mu=0.4, yield_interference=length))

@@ -43,31 +43,17 @@ error = np.abs(host - exact[1:]).max() / np.abs(exact).max()
 print(f"largest error of the table on this path: {100 * error:.0f} % of the largest traction")
 
 # %%
-# The table against closure, along two azimuths; and the path, by the law and by the host.
+# What the table holds: stiffness against closure. And the path, by the law and by the host.
 
-figure, ((top, stiff), (angles, sheared)) = plt.subplots(2, 2, figsize=(9, 7), layout="constrained")
-closures = table.closure * 1e3
-top.plot(closures, table.normal_stress / 1e6)
-top.set_ylabel("normal stress (MPa)")
-stiff.plot(closures, table.kn_secant / 1e9, label="normal, secant")
-stiff.plot(closures, table.kn_tangent / 1e9, label="normal, tangent")
-stiff.set_ylabel("stiffness (GPa/m)")
+figure, (stiff, sheared) = plt.subplots(1, 2, figsize=(7.5, 4.2), layout="constrained")
+stiff.plot(table.closure * 1e3, table.kn_tangent / 1e9, label="normal")
 for k in (0, 3):
-    azimuth = f"{np.degrees(table.azimuth[k]):.0f}°"
-    stiff.plot(closures, table.shear_stiffness[:, k] / 1e9, "--", label=f"shear tangent, {azimuth}")
-    friction = np.degrees(np.arctan(table.peak_friction[:, k]))
-    dilation = np.degrees(np.arctan(table.dilation[:, k]))
-    angles.plot(closures, friction, f"C{k}", label=f"friction, {azimuth}")
-    angles.plot(closures, dilation, f"C{k}--", label=f"dilation, {azimuth}")
-angles.set_ylabel("friction, dilation (°)")
-angles.set_ylim(bottom=0)
-for axis in (top, stiff, angles):
-    axis.set_xlabel("closure (mm)")
+    azimuth = f"shear, {np.degrees(table.azimuth[k]):.0f}°"
+    stiff.plot(table.closure * 1e3, table.shear_stiffness[:, k] / 1e9, "--", label=azimuth)
+stiff.set(xlabel="closure (mm)", ylabel="tangent stiffness (GPa/m)")
 sheared.plot(path[20:, 1] * 1e3, exact[20:, 1] / 1e6, label="law")
 sheared.plot(path[20:, 1] * 1e3, host[19:, 1] / 1e6, label="table in a host")
-sheared.set_xlabel("shear displacement (mm)")
-sheared.set_ylabel("shear stress (MPa)")
-sheared.set_ylim(top=9)
-for axis in (stiff, angles, sheared):
-    axis.legend(fontsize="small")
+sheared.set(xlabel="shear displacement (mm)", ylabel="shear stress (MPa)")
+for axis in (stiff, sheared):
+    axis.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
 plt.show()

@@ -47,6 +47,6 @@ panels = {"all asperities by inclination": inclined, "share that slides, Kₛ = 
 
 left, right = draw(panels, [("C0", "C3", "C3:"), ("C0", "C0o", "C1", "C1o", "C2", "C2o")])
 left.set(xlabel="inclination θ (°)", ylabel="share per degree (1/°)")
-right.set(xlabel="asperity friction μ", ylabel="sliding share (1)", ylim=(-0.03, 1.5))
+right.set(xlabel="asperity friction μ", ylabel="sliding share", ylim=(-0.03, 1.5))
 right.legend(ncols=2, loc="upper center", fontsize=8)
 beside(("sliding share at a = 2, μ = 0.6", "cos 2θₛ = 0.4706", f"{sliding(2, 0.6)[0]:.4f}"))

@@ -4,6 +4,7 @@ import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -197,36 +198,49 @@ def _scaled(values: Array, units: tuple[tuple[float, str], ...]) -> tuple[Array,
 
 def _shear_figure(record: Record, plt: Any) -> Any:
     shear, length = _scaled(record.shear, _LENGTHS)
-    figure, axes = plt.subplots(2, 2, figsize=(9, 6.5), sharex=True)
+    figure, axes = plt.subplots(2, 2, figsize=(7.5, 6.2), sharex=True)
     stress, unit = _scaled(np.stack([record.shear_stress, record.F1]), _STRESSES)
     axes[0, 0].plot(shear, stress[0], label="shear stress")
     axes[0, 0].plot(shear, stress[1], color="0.5", lw=1, label="normal stress")
     axes[0, 0].set_ylabel(f"stress ({unit})")
     axes[0, 0].legend()
+    _arrows(axes[0, 0], shear, stress[0])
     axes[0, 1].plot(shear, record.friction_angle, color="C3")
     axes[0, 1].set_ylabel("mobilised friction angle (°)")
     dilation, small = _scaled(record.closure[0] - record.closure, _LENGTHS)
     axes[1, 0].plot(shear, dilation, color="C2")
     axes[1, 0].set_ylabel(f"dilation ({small})")
+    _arrows(axes[1, 0], shear, dilation)
     for label, share in (("sliding", record.sliding), ("separated", record.separated)):
         axes[1, 1].plot(*without_steps(shear, 100 * share), label=label)
-    axes[1, 1].set(ylabel="share of facet orientations (%)", ylim=(-3, 103))
+    axes[1, 1].set(ylabel="share of facets (%)", ylim=(-3, 103))
     axes[1, 1].legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False)
     for axis in axes[1]:
         axis.set_xlabel(f"shear displacement ({length})")
-    largest = "peak" if record.has_peak else "largest"
     figure.suptitle(
         f"Direct shear at azimuth {np.degrees(record.azimuth):.0f}°, "
-        f"{largest} friction angle {record.peak_friction_angle:.1f}°"
+        f"largest friction angle {record.peak_friction_angle:.1f}°"
     )
     return figure
+
+
+def _arrows(axis: Any, x: Array, y: Array) -> None:
+    """The sense of a path, by an arrow in the middle of each leg of two steps or more."""
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(x)))) + 1
+    ends = [0, *turns.tolist(), len(x) - 1]
+    for first, last in pairwise(ends):
+        if last - first < 2:
+            continue
+        at = (first + last) // 2
+        way = {"arrowstyle": "-|>", "color": "k", "lw": 0, "mutation_scale": 16}
+        axis.annotate("", (x[at + 1], y[at + 1]), (x[at], y[at]), arrowprops=way)
 
 
 def _closure_figure(record: Record, plt: Any) -> Any:
     closure, length = _scaled(record.closure, _LENGTHS)
     stress, unit = _scaled(record.F1, _STRESSES)
     energy, joule = _scaled(np.stack([record.stored, record.dissipated]), _ENERGIES)
-    figure, axes = plt.subplots(1, 2, figsize=(9, 4))
+    figure, axes = plt.subplots(1, 2, figsize=(7.5, 3.6))
     axes[0].plot(closure, stress)
     axes[0].set(xlabel=f"closure ({length})", ylabel=f"normal stress ({unit})")
     axes[1].plot(closure, energy[0], label="stored")

@@ -70,7 +70,7 @@ def table_text(law: JointLaw) -> str:
 
     The last line holds a sum (FNV-1a) of the bytes before it, by which damage is told.
     """
-    numbers, arrays = _numbers(law), _arrays(law)
+    numbers, arrays = packed(law)
     lines = [f"jointlaw tables {FORMAT}", f"fingerprint {law.fingerprint}"]
     lines += [f"# {line}" for line in _toml(law)]
     for key, value in numbers.items():
@@ -84,7 +84,7 @@ def table_text(law: JointLaw) -> str:
 
 def header_text(law: JointLaw, name: str) -> str:
     """The tables as constants of C: `&NAME` is the law."""
-    numbers, arrays = _numbers(law), _arrays(law)
+    numbers, arrays = packed(law)
     about = "\n".join(" * " + line.replace("*/", "* /") for line in _toml(law))
     guard = f"JOINTLAW_TABLES_{name.upper()}"
     parts = [
@@ -102,6 +102,11 @@ def header_text(law: JointLaw, name: str) -> str:
         f'{_CONSTANT} jlaw_law {name} = {{{values},\n  {tables}, 0, "{law.fingerprint}"}};\n#endif'
     )
     return "\n".join([*parts, ""])
+
+
+def packed(law: JointLaw) -> tuple[dict[str, int | float], dict[str, Array]]:
+    """Numbers and arrays of `struct jlaw_law` by name, in its order."""
+    return _numbers(law), _arrays(law)
 
 
 def _numbers(law: JointLaw) -> dict[str, int | float]:

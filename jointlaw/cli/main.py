@@ -30,6 +30,8 @@ REMOVED = {
     "fit --formation": "give a law of that formation, such as --law westerly-smooth",
     "export --closure": _TABLE,
     "export --tolerance": _TABLE,
+    "tradeoff --tolerance": "in Python law.at_tolerance(0.01) is the coarsest law that keeps it",
+    "tradeoff --format": "the table and tradeoff.csv hold all numbers; draw the columns you need",
     "tradeoff --loss": "small cycles need more depth cells: write resolution = { u = 3, phi = 6, "
     "depth = 300 } into the law's file; docs/accuracy.md says how many",
 }

@@ -9,7 +9,7 @@ from .command import Written, add_command, add_law, add_out, in_unit, read_law, 
 
 def add(commands: Any) -> None:
     """Add the subcommand to the command line."""
-    what = "measure what resolutions of a law cost and how accurate they are; table and picture"
+    what = "measure what resolutions of a law cost and how accurate they are"
     example = "jointlaw tradeoff westerly-smooth --plane 0 --out out"
     parser = add_command(commands, "tradeoff", what, example, _tradeoff)
     add_law(parser, resolution=False)
@@ -20,25 +20,15 @@ def add(commands: Any) -> None:
         help="motion in one plane at this azimuth, such as 30deg",
     )
     parser.add_argument(
-        "--tolerance",
-        metavar="SHARE",
-        type=float,
-        action="append",
-        default=[],
-        help="also find the coarsest law that keeps it: 0.01 (may be repeated)",
-    )
-    parser.add_argument(
         "--joints", type=int, default=10_000, help="of the batch that is timed; 0 times nothing"
     )
-    add_out(parser)
+    add_out(parser, pictures=False)
 
 
 def _tradeoff(options: argparse.Namespace) -> None:
     law = read_law(options)
     if options.plane is not None:
         law = replace(law, plane=options.plane)
-    # Before the long work: a bad tolerance is refused at once
-    chosen = {f"{share:g}": law.at_tolerance(share) for share in options.tolerance}
     found = law.tradeoff(joints=options.joints)
     summary = {
         "law": options.law,
@@ -46,15 +36,11 @@ def _tradeoff(options: argparse.Namespace) -> None:
         "timed on": found.how,
         "reference uncertainty": dict(zip(found.paths, found.uncertainty.tolist(), strict=True)),
         "frontier": [str(price.resolution) for price in found.frontier()],
-        "at tolerance": {share: str(made.resolution) for share, made in chosen.items()},
         "units": {"error": "share of the path's largest traction", "ns": "ns per joint and update"},
     }
     print(found)
-    for share, made in chosen.items():
-        print(f"at_tolerance({share}): {made.resolution}, {made.tables.sliders} sliders")
     files: Written = {
         "tradeoff.csv": found.to_csv,
         "law.toml": law.to_toml,
-        "tradeoff.png": found.plot,
     }
-    write_results(options.out, files, summary, options.format)
+    write_results(options.out, files, summary, "")

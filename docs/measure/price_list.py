@@ -1,7 +1,4 @@
-"""The price list of a preset, shortened.
-
-`jointlaw tradeoff westerly-smooth --plane 0 --out DIR` prints all columns.
-"""
+"""The price list of a preset, shortened; `print(law.tradeoff())` shows all columns."""
 
 from dataclasses import replace
 

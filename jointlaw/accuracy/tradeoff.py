@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import io
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +12,6 @@ import numpy as np
 from ..kernels.threads import thread_count
 from ..parameters.resolution import Resolution, named, resolve
 from ..support.checks import Array, integer
-from ..support.files import replace_file
 from ..support.progress import track
 from .suite import Suite, standard_suite
 
@@ -104,18 +101,6 @@ class Tradeoff:
             f"{timed if self.joints else 'nothing was timed'}"
         )
         return "\n".join(lines)
-
-    def to_csv(self, path: str | Path) -> None:
-        """All prices as CSV; errors are shares (1), angles degrees, times ns, sizes bytes."""
-        numbers = ("sliders", "bytes", "ns", "ns_tangent", "worst", "friction", "dilation")
-        titles = ["u", "phi", "depth", *numbers, *(f"error {path}" for path in self.paths)]
-        rows = []
-        for row in self.rows:
-            r = row.resolution
-            rows.append([r.u, r.phi, r.depth, *(getattr(row, n) for n in numbers), *row.error])
-        stream = io.StringIO()
-        np.savetxt(stream, rows, "%.12g", ",", header=",".join(titles), comments="")
-        replace_file(Path(path), stream.getvalue().encode())
 
 
 def tradeoff(

@@ -1,13 +1,11 @@
-"""The price list: its table, file and command. Nothing is timed here."""
+"""The price list: its table and frontier. Nothing is timed here."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.cli.main import main
 
 CHOSEN = ["fast", "balanced", jl.Resolution(1, 3, 1), "fast"]
 
@@ -50,17 +48,3 @@ def test_the_frontier_falls(found):
     same = replace(frontier[0], sliders=5, error=(1 - 1e-9) * frontier[0].error)
     assert replace(found, rows=(*found.rows, same)).frontier() == frontier
     assert any(line.endswith(" fast") for line in str(found).splitlines())
-
-
-@pytest.mark.slow
-def test_command_writes_table_law_and_summary(tmp_path, monkeypatch):
-    monkeypatch.setattr("jointlaw.accuracy.tradeoff.SPREAD", (jl.Resolution(1, 3, 1),))
-    few = {"fast": jl.Resolution(1, 3, 2)}
-    monkeypatch.setattr("jointlaw.accuracy.tradeoff.named", lambda *_: few)
-    out = tmp_path / "out"
-    arguments = "tradeoff linear-a6 --plane 0 --joints 0 --out"
-    assert main([*arguments.split(), str(out)]) == 0
-    summary = json.loads((out / "summary.json").read_text())
-    assert summary["frontier"] == ["Resolution(u=1, phi=3, depth=1)"]
-    assert (out / "tradeoff.csv").read_text().count("\n") == 3
-    assert jl.JointLaw.from_toml(out / "law.toml").plane == 0.0

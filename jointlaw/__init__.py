@@ -87,16 +87,16 @@ _MOVED = {
     "SurfaceFit": "jointlaw.surface.fit.SurfaceFit",
     "datasets": "jointlaw.calibration.datasets",
     "first_loading": "jointlaw.calibration.measured.first_loading",
-    "hydraulic_aperture": "jointlaw.laboratory.flow.hydraulic_aperture",
     "include_dir": "jointlaw.hosts.c.export.include_dir",
-    "transmissivity": "jointlaw.laboratory.flow.transmissivity",
 }
 # Names that were removed, and what to use
 _REMOVED = {
     "baselines": "docs/measure/held_out.py fits a power law and Barton-Bandis",
     "fit_many": "map jl.fit_closure over the curves with any concurrent.futures.Executor",
     "fit_shear": "jl.fit_curves([ShearCurve(shear, tau, normal)], law=law, free=('mu', 'a'))",
+    "hydraulic_aperture": "aperture - closure; the aperture at zero closure is not of a joint law",
     "synthetic_surface": "docs/gallery/plot_from_scan.py makes a surface in ten lines",
+    "transmissivity": "9789 * h**3 / (12 * 1.0016e-3) in m2/s, water, h the hydraulic aperture (m)",
     "unloading": "jl.fit_closure(stress, closure, cycle=True) fits and reports unloading",
 }
 

@@ -90,8 +90,8 @@ class Tradeoff:
             path = self.paths[int(row.error.argmax())]
             lines.append(
                 f"{f'{r.u} {r.phi} {r.depth}':>12s} {row.sliders:8d} {row.bytes:7d} "
-                f"{row.worst:10.3%} {row.friction:8.2f}° {row.dilation:8.2f}° {_ns(row.ns):>8s} "
-                f"{_ns(row.ns_tangent):>13s}  {path:16s}{names.get(r, '')}".rstrip()
+                f"{row.worst:10.3%} {row.friction:8.2f}° {row.dilation:8.2f}° {row.ns:8.0f} "
+                f"{row.ns_tangent:13.0f}  {path:16s}{names.get(r, '')}".rstrip()
             )
         timed = f"ns per joint and update: up to {self.joints} joints, {self.how}"
         lines.append(
@@ -153,7 +153,3 @@ def _time(law: JointLaw, n: int, tangent: bool, seconds: float) -> float:
         batch.update(steps[k % len(steps)], tangent=tangent)
         best, k = min(best, time.perf_counter() - start), k + 1
     return best / n * 1e9
-
-
-def _ns(value: float) -> str:
-    return "-" if np.isnan(value) else f"{value:.0f}"

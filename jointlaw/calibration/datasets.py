@@ -16,7 +16,7 @@ import numpy as np
 from ..parameters.rock import require_rock
 from ..support import units
 from ..support.checks import Array, one_of
-from ..support.text_numbers import AMBIGUOUS, cells_of, is_ambiguous, lines_of, marks_of, separator
+from ..support.text_numbers import AMBIGUOUS, EITHER, cells_of, lines_of, marks_of, separator
 from .measured import ShearCurve
 
 _UNIT = r"(?:[numkcMGµμ]?(?:Pa|m)|N/mm[2²]|[kM]N/m[2²]|bar)"
@@ -217,7 +217,7 @@ def read_columns(path: Path, decimal: str | None = None) -> list[Column]:
         for column, cell in enumerate(row):
             values[column, k] = marks.value(cell)
             if cell and not np.isfinite(values[column, k]) and not wrong[column]:
-                why = AMBIGUOUS if is_ambiguous(cell) else "is no number"
+                why = AMBIGUOUS if EITHER.fullmatch(cell) else "is no number"
                 wrong[column] = f"line {at[k]} holds {cell!r}, which {why}"
     return [
         Column(title, *_read_title(title, given[k]), values[k], wrong[k])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -322,14 +322,15 @@ def fit_curves(
         asperities, `forward.DEFAULTS`, of "individual" formation. A law of one plane
         stays one; its heights must be GammaHeights.
     priors: 95 % ranges (low, high) in physical units instead of the defaults of `priors.PRIORS`,
-        or None to drop one. Besides the parameters: "overlap_share", "full_contact_stress".
+        or None to drop one. Besides the parameters: "full_contact_stress".
 
     Returns a `Fit`. Raises ValueError naming the parameter when something does not fit.
     """
     problem = pose(curves, free, fixed, law, priors)
     starts = staged(problem, starting_points(problem, near=law is not None))
     for _ in range(HALVINGS):
-        solution, finer = solve(problem, starts), problem.finer()
+        solution, settings = solve(problem, starts), problem.settings
+        finer = replace(problem, settings=replace(settings, steps=2 * settings.steps))
         halved = float(np.max(np.abs(finer.data(solution.x) - problem.data(solution.x))))
         if halved < HALVED:
             break

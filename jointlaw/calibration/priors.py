@@ -51,8 +51,7 @@ TRANSFORMS = {
     "slope_wear": Transform("J/m2", 1e-6, 1e12),
     "slope_residual": Transform("1", 0.0, 1.0, log=False),
     "seating": Transform("m", 1e-12, 1.0),
-    # combinations that priors are stated for, see `quantity`
-    "overlap_share": Transform("1", 1e-9, 1e9),
+    # a combination that a prior is stated for, see `quantity`
     "full_contact_stress": Transform("Pa", 1e-3, 1e18),
 }
 
@@ -63,8 +62,6 @@ PRIORS: dict[str, tuple[float, float]] = {
     "alpha": (0.0, 20.0),
     # Six decades around 10 um: says nothing within any one laboratory
     "beta": (1e-8, 1e-2),
-    # r0 over the mean height; 0.36 and 0.48 in the paper's two sets (Misra 1999, section 4.1)
-    "overlap_share": (0.1, 1.6),
     # N lam K sigma^(1+eta), see `quantity`: 0.63 GPa within a factor of 1000. A factor of 32 drove
     # predictions beyond the data up by several per cent (docs/measure/held_out.py)
     "full_contact_stress": (6.3e5, 6.3e11),
@@ -82,24 +79,18 @@ PRIORS: dict[str, tuple[float, float]] = {
     "c": (-1 / 3, 1 / 3),  # all of Eq. 18
 }
 
-_CONCERNS = {
-    "overlap_share": {"overlap"},
-    "full_contact_stress": {"asperity_density", "K"},
-}
+_CONCERNS = {"full_contact_stress": {"asperity_density", "K"}}
 
 
 def quantity(name: str, values: Values) -> float:
-    """A parameter, or one of the two combinations that priors are stated for.
+    """A parameter, or the combination that a prior is stated for.
 
-    overlap_share: overlap over the mean height.
     full_contact_stress: N lam K sigma^(1+eta) in Pa, the stress that would press all asperities in
         by one standard deviation of their heights. With K of Hertz and N R sigma near 0.05 and
         (sigma/R)^(1/2), the slope of asperities, near 0.3, as measured on random surfaces
         (Greenwood & Williamson 1966; Johnson 1985, section 13.4), it is about 0.03 times the shear
         modulus, 0.6 GPa for G = 20 GPa, whatever the size of the asperities.
     """
-    if name == "overlap_share":
-        return values["overlap"] / (values["beta"] * (values["alpha"] + 1))
     if name == "full_contact_stress":
         sigma = values["beta"] * math.sqrt(values["alpha"] + 1)
         stiffness = values["asperity_density"] * values["lam"] * values["K"]
@@ -116,8 +107,6 @@ def normal_priors(free: tuple[str, ...], given: Ranges | None) -> dict[str, tupl
         name: ends for name, ends in PRIORS.items() if _CONCERNS.get(name, {name}) & set(free)
     }
     ranges |= given or {}
-    if "overlap" in ranges:
-        ranges.pop("overlap_share", None)
     return {name: _normal(name, *ends) for name, ends in ranges.items() if ends is not None}
 
 

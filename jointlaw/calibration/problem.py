@@ -87,10 +87,6 @@ class Problem:
             low[at], high[at] = -largest_c(self.values["b"]), largest_c(self.values["b"])
         return low, high
 
-    def finer(self) -> "Problem":
-        """The same with steps of shear half as long."""
-        return replace(self, settings=replace(self.settings, steps=2 * self.settings.steps))
-
     def data(self, x: Array) -> Array:
         """Residuals of all curves, one after the other."""
         values = self.unpack(x)

@@ -58,6 +58,11 @@ def in_unit(unit: str, *, positive: bool = False) -> Callable[[str], float]:
     return read
 
 
+def several(unit: str, *, positive: bool = False) -> Callable[[str], list[float]]:
+    """Type of an option such as 5MPa,20MPa: one quantity or several with commas between."""
+    return lambda text: [in_unit(unit, positive=positive)(part) for part in text.split(",")]
+
+
 def quantity(option: str, text: str, unit: str, *, positive: bool = False) -> float:
     """The SI value of a part of what was given for an option. Raises ValueError naming it."""
     try:

@@ -14,7 +14,7 @@ from ..calibration.measured import ClosureCurve, ShearCurve, first_loading
 from ..parameters.rock import require_rock
 from ..support.checks import Array
 from ..support.text_numbers import DECIMAL
-from .command import Written, add_command, add_out, quantity, write_results
+from .command import Written, add_command, add_out, in_unit, quantity, several, write_results
 
 MOST = 60  # points of a shear test that are fitted: a logger writes thousands, each costs a step
 NEEDS = {  # what an option is about, where no such test is given
@@ -50,13 +50,18 @@ def add(commands: Any) -> None:
     add("--shear-column", help="name and unit of that column, such as us:mm")
     add("--shear-stress-column", help="name and unit of that column: tau:MPa")
     add("--normal-column", help="name and unit of that column: sn:MPa")
-    add("--normal-stress", metavar="STRESSES", help="of the shear tests in their order: 1MPa,3MPa")
+    add(
+        "--normal-stress",
+        metavar="STRESSES",
+        type=several("Pa", positive=True),
+        help="of the shear tests in their order: 1MPa,3MPa",
+    )
     add(
         "--decimal",
         choices=tuple(DECIMAL),
         help="the decimal mark of files whose numbers do not show it, as 1,201 and 1.201 do not",
     )
-    add("--up-to", help="fit up to this stress, predict the rest: 5.3MPa; or half, of the largest")
+    add("--up-to", type=in_unit("Pa"), help="fit up to this stress, predict the rest: 5.3MPa")
     add("--cycle", action="store_true", help="fit unloading too, and with it yield_interference")
     add(
         "--compliance",
@@ -128,7 +133,7 @@ def _closure_curve(
     options: argparse.Namespace,
 ) -> tuple[ClosureCurve, tuple[Array, Array] | None]:
     """The closure curve to fit; with it stress (Pa) and closure (m) of points held out, or None."""
-    item, compliance, limit = options.data[0], 0.0, np.inf
+    item, compliance = options.data[0], 0.0
     if item in datasets.names() and not Path(item).exists():
         stress, closure = datasets.load(item)
     else:
@@ -142,11 +147,7 @@ def _closure_curve(
         stress, closure = first_loading(stress, closure)
     if options.up_to and options.cycle:
         raise ValueError("--cycle fits all points: leave --up-to out")
-    if options.up_to == "half":
-        limit = 0.5 * float(stress.max())
-    elif options.up_to:
-        limit = quantity("--up-to", options.up_to, "Pa")
-    seen = stress <= limit
+    seen = stress <= (options.up_to or np.inf)
     curve = ClosureCurve(stress[seen], closure[seen], options.noise, options.cycle, compliance)
     held = stress[~seen], closure[~seen] - compliance * stress[~seen]
     return curve, None if seen.all() else held
@@ -154,12 +155,7 @@ def _closure_curve(
 
 def _shear_curves(options: argparse.Namespace) -> list[ShearCurve]:
     """The shear curves of all files, thinned to `MOST` points each."""
-    normals: list[float | None] = [None] * len(options.shear)
-    if options.normal_stress:
-        normals = [
-            quantity("--normal-stress", text, "Pa", positive=True)
-            for text in options.normal_stress.split(",")
-        ]
+    normals = options.normal_stress or [None] * len(options.shear)
     if len(normals) != len(options.shear):
         raise ValueError(
             f"--normal-stress gives {len(normals)} stresses for {len(options.shear)} shear tests: "

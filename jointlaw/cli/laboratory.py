@@ -12,12 +12,16 @@ import numpy as np
 from ..laboratory.experiments import CONTROLS, PathError, closure_test, direct_shear
 from ..laboratory.record import UNITS, Record
 from ..law import JointLaw
-from .command import Written, add_command, add_law, add_out, in_unit, read_law, write_results
-
-
-def several(unit: str, *, positive: bool = False) -> Callable[[str], list[float]]:
-    """Type of an option such as 5MPa,20MPa: one quantity or several with commas between."""
-    return lambda text: [in_unit(unit, positive=positive)(part) for part in text.split(",")]
+from .command import (
+    Written,
+    add_command,
+    add_law,
+    add_out,
+    in_unit,
+    read_law,
+    several,
+    write_results,
+)
 
 
 def add(commands: Any) -> None:

@@ -26,17 +26,13 @@ def add(commands: Any) -> None:
     parser.add_argument("file", help="matrix of heights or list of x, y, z, as text, ASC or NPY")
     length = in_unit("m", positive=True)
     parser.add_argument("--spacing", type=length, required=True, help="of the points: 20um")
-    parser.add_argument("--height-unit", help="of the heights, such as um")
+    parser.add_argument("--height-unit", required=True, help="of the heights, such as um")
     parser.add_argument("--decimal", choices=tuple(DECIMAL), help="the decimal mark of the file")
     parser.add_argument("--sampling-length", type=length, help="edge of a facet: 4 spacings")
     add_out(parser, pictures=False)
 
 
 def _run(options: argparse.Namespace) -> None:
-    if options.height_unit is None:
-        raise ValueError(
-            f"{options.file}: gives no unit of its heights; name it, such as --height-unit um"
-        )
     unit = quantity("--height-unit", f"1{options.height_unit}", "m")
     z = read_scan(options.file, unit, options.spacing, options.decimal)
     fit = from_surface(z, options.spacing, options.sampling_length)

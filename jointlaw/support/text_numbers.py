@@ -22,7 +22,7 @@ AMBIGUOUS = (
 )
 SWAPPED = str.maketrans(",.", ".,")
 _THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?")  # where a point is decimal
-_EITHER = re.compile(r"[-+−]?[1-9]\d{0,2}[.,]\d{3}")
+EITHER = re.compile(r"[-+−]?[1-9]\d{0,2}[.,]\d{3}")
 # m: the decimal mark; g: the mark between thousands
 _SHOWS = r"""[-+−]?(?: 0?[m]\d+ | \d{4,}[m]\d* | \d+[m](?:\d{0,2}|\d{4,}) | \d+[m]\d+(?=e)
     | [1-9]\d{0,2}(?:(?:[g]\d{3})+[m]\d* | (?:[g]\d{3}){2,}) ) (?:e[-+]?\d+)?"""
@@ -41,7 +41,7 @@ class Marks(NamedTuple):
     def value(self, cell: str) -> float:
         """The number in a cell; NaN for any other text, and for a number of two meanings."""
         text = cell.replace("−", "-")
-        if self.decimal is None and _EITHER.fullmatch(text):
+        if self.decimal is None and EITHER.fullmatch(text):
             return np.nan
         text = text.translate(SWAPPED) if self.decimal == "," else text
         if self.grouped and _THOUSANDS.fullmatch(text):
@@ -50,11 +50,6 @@ class Marks(NamedTuple):
             return float(text)
         except ValueError:
             return np.nan
-
-
-def is_ambiguous(cell: str) -> bool:
-    """Whether a cell is a number such as 1,201."""
-    return _EITHER.fullmatch(cell) is not None
 
 
 def marks_of(cells: Iterable[str], decimal: str | None = None) -> Marks:

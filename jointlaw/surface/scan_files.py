@@ -7,9 +7,9 @@ import numpy as np
 from ..support.checks import Array
 from ..support.text_numbers import (
     AMBIGUOUS,
+    EITHER,
     SWAPPED,
     cells_of,
-    is_ambiguous,
     lines_of,
     marks_of,
     separator,
@@ -64,7 +64,7 @@ def _text(path: Path, decimal: str | None) -> tuple[Array, float | None]:
         header[name.lower()] = value
     sample = [cell for row in cells_of(lines[:_SAMPLE], mark) for cell in row]
     marks = marks_of(sample, decimal)
-    if marks.decimal is None and (doubtful := [cell for cell in sample if is_ambiguous(cell)]):
+    if marks.decimal is None and (doubtful := [cell for cell in sample if EITHER.fullmatch(cell)]):
         raise ValueError(f"{doubtful[0]!r} {AMBIGUOUS}")
     if marks.decimal == ",":
         lines = [line.translate(SWAPPED) for line in lines]

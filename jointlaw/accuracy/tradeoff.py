@@ -117,8 +117,6 @@ def tradeoff(
         resolutions = (*SPREAD, *names.values())
     chosen = [resolve(r, *lengths) for r in resolutions]
     found = sorted(dict.fromkeys(chosen), key=lambda r: (r.sliders, r.u, r.phi))
-    if not found:
-        raise ValueError("resolutions is empty; give some, or None for the usual spread")
     suite = standard_suite(law)
     rows = tuple(
         _price(replace(law, resolution=r), suite, joints, seconds)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from ..law import JointLaw
 from ..support.checks import Array
 from ..support.pyplot import pyplot, style, written
-from .forward import build, log_stress
+from .forward import build, build_for_shear, log_stress
 from .measured import ClosureCurve, ShearCurve
 from .priors import TRANSFORMS, Ranges, Values
 from .problem import Problem, Solution, derivative, pose, solve, staged, starting_points
@@ -211,10 +211,11 @@ class Fit:
     def _peaks(self) -> list[str]:
         """The largest and the last stress of each shear curve, measured and of the law."""
         head = "| shear curve | largest stress (MPa), at (mm): measured | law | last (MPa) | law |"
-        lines = ["", head, "|---|---|---|---|---|"]
+        lines, settings = ["", head, "|---|---|---|---|---|"], self.problem.settings
         for k, curve in enumerate(self.problem.curves, 1):
             if isinstance(curve, ShearCurve):
-                own = curve.by_parameters(self.parameters, self.problem.settings)[:2]
+                law = build_for_shear(self.parameters, settings, curve.azimuth)
+                own = curve.sheared(law, settings.steps)[:2]
                 cells = [
                     f"{stress[(top := np.argmax(np.abs(stress)))] / 1e6:.4g}, {1e3 * way[top]:.3g}"
                     for way, stress in ((curve.shear, curve.shear_stress), own)
@@ -258,7 +259,8 @@ class Fit:
             else:
                 x, measured = curve.shear, curve.shear_stress
                 what = f"shear at {curve.normal / 1e6:.3g} MPa"
-                u, law, _ = curve.by_parameters(values, settings)
+                found = build_for_shear(values, settings, curve.azimuth)
+                u, law, _ = curve.sheared(found, settings.steps)
             axis.plot(1e6 * u, law / 1e6, color="C1", label="law")
             axis.plot(1e6 * x, measured / 1e6, "oC0", ms=4, label="measured")
             axis.set(xlabel=f"{what} (µm)", ylabel="stress (MPa)")

@@ -82,7 +82,6 @@ def add(commands: Any) -> None:
         default="20MPa",
         help="largest normal stress (default 20MPa), or one per cycle: 5MPa,20MPa",
     )
-    parser.add_argument("--no-unload", action="store_true", help="stop at the largest stress")
     _add_common(parser, steps=100)
 
 
@@ -128,8 +127,7 @@ def _shear(options: argparse.Namespace) -> None:
 def _closure(options: argparse.Namespace) -> None:
     law = read_law(options)
     joint = replace(law, plane=None, closure_only=True).joint()  # the same numbers, sooner
-    unload, steps = not options.no_unload, options.steps
-    test = partial(closure_test, joint, options.normal_stress, unload=unload, steps=steps)
+    test = partial(closure_test, joint, options.normal_stress, steps=options.steps)
     record = _run(test, law, options)
     at = int(np.argmax(record.F1))
     print(

@@ -24,6 +24,7 @@ REMOVED = {
     "figures": "run the scripts docs/paper/plot_fig_NN.py; the claims are on docs/paper.md and in "
     "tests/verification/test_paper_*.py",
     "closure --yield-interference": _YIELDING,
+    "closure --no-unload": "in Python jl.closure_test(joint, stress, unload=False) stops there",
     "shear --yield-interference": _YIELDING,
     "fit --decimal-comma": "write --decimal comma",
     "fit --workers": "fit one closure file a command",

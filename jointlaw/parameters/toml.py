@@ -3,30 +3,32 @@
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
-from pathlib import Path
 from typing import Any, TypeVar
 
-from ..support.files import replace_file
-from .asperity import WEAR_REMOVED, Asperity
+from .asperity import Asperity
 from .bond import Bond
 from .heights import GammaHeights, Heights
-from .keys import Removed, as_given, checked, keys_of, read
+from .keys import Removed, as_given, checked, keys_of
 from .orientation import Orientation
-from .resolution import SLIP_REMOVED, Resolution, named
+from .resolution import Resolution, named
 
 _RESOLUTION = keys_of(Resolution) | {
     "front": Removed("take more depth cells instead, such as depth = 12", neutral=False)
 }
+_WEAR = "slopes wear instead: give the law slope_wear (J/m2) and slope_residual"
 _ASPERITY = keys_of(Asperity) | {
-    "mu_residual": Removed(WEAR_REMOVED, neutral=None),
-    "wear_slip": Removed(WEAR_REMOVED, neutral=math.inf),
+    "mu_residual": Removed(_WEAR, neutral=None),
+    "wear_slip": Removed(_WEAR, neutral=math.inf),
 }
 _LAW = {
     "orientation!": keys_of(Orientation), "asperity!": _ASPERITY, "heights": as_given,
     "asperity_density!": as_given, "closure_range": as_given, "resolution": as_given,
     "plane": as_given, "closure_only": as_given, "mating_length": as_given,
     "slope_wear": as_given, "slope_residual": as_given,
-    "critical_slip": Removed(SLIP_REMOVED, neutral=math.inf),
+    "critical_slip": Removed(
+        "give mating_length (m), over which slopes fade and friction becomes residual",
+        neutral=math.inf,
+    ),
     "bond": keys_of(Bond), "about": as_given,  # free table for title, source and notes
     "version": as_given,
 }  # fmt: skip
@@ -45,8 +47,8 @@ T = TypeVar("T")
 VERSION = 1  # of the keys; a file without one is of version 1
 
 
-def write_law(law: Mapping[str, Any], path: Path | None) -> str:
-    """TOML text of a law's parameters, also written to `path` if given."""
+def law_text(law: Mapping[str, Any]) -> str:
+    """TOML text of a law's parameters."""
     r = law["resolution"]
     lengths = law["mating_length"], law["asperity"].yield_interference, law["closure_range"]
     names = named(*lengths)
@@ -62,10 +64,7 @@ def write_law(law: Mapping[str, Any], path: Path | None) -> str:
         if law[part] is not None:
             values = {one.name: getattr(law[part], one.name) for one in fields(law[part])}
             lines += ["", f"[{part}]", *_lines(values, [name for name in values if name[0] != "_"])]
-    text = "\n".join(lines) + "\n"
-    if path is not None:
-        replace_file(path, text.encode())
-    return text
+    return "\n".join(lines) + "\n"
 
 
 def _lines(values: Mapping[str, Any], names: Iterable[str]) -> list[str]:
@@ -91,15 +90,6 @@ def _text(value: Any) -> str:
     if isinstance(value, tuple):  # parameters of a distribution
         return "{ " + ", ".join(f"{k} = {v!r}" for k, v in value) + " }"
     return "true" if value is True else f'"{value}"'
-
-
-def read_law(build: Callable[..., T], path: str | Path) -> T:
-    """A law from a TOML file."""
-    if "\n" in str(path):
-        raise ValueError("this is TOML text, not the path of a law file: use JointLaw.from_text")
-    path = Path(path)
-    data = read(path, "law file")
-    return build_law(build, data, str(path))
 
 
 def build_law(build: Callable[..., T], data: dict[str, Any], where: str) -> T:

@@ -92,5 +92,4 @@ def as_given(name: str, value: Any) -> Any:
 
 def keys_of(kind: Any) -> dict[str, Any]:
     """Rules for a table with the fields of a dataclass, which checks their values itself."""
-    own = [one for one in fields(kind) if one.init]
-    return {one.name + ("!" if one.default is MISSING else ""): as_given for one in own}
+    return {one.name + ("!" if one.default is MISSING else ""): as_given for one in fields(kind)}

@@ -32,9 +32,13 @@ _LAW = {
     "bond": keys_of(Bond), "about": as_given,  # free table for title, source and notes
     "version": as_given,
 }  # fmt: skip
-_HEIGHTS = keys_of(Heights) | {
-    "histogram": Removed("write its `counts` and `edges` (m) into this table", neutral=None)
-}
+_BY_NAME = "write `counts` and `edges` (m) of a histogram, or `alpha` and `beta` of a gamma one"
+_HEIGHTS = {
+    "counts!": as_given, "edges!": as_given, "overlap": as_given, "formation": as_given,
+    "histogram": Removed("write its `counts` and `edges` (m) into this table", neutral=None),
+    "distribution": Removed(_BY_NAME, neutral=None),
+    "parameters": Removed(_BY_NAME, neutral=None),
+}  # fmt: skip
 _UNITS = {
     "asperity_density": "1/m2", "closure_range": "m", "mating_length": "m", "plane": "rad",
     "slope_wear": "J/m2", "K": "Pa m^(1-eta)", "yield_interference": "m", "beta": "m",
@@ -63,7 +67,7 @@ def law_text(law: Mapping[str, Any]) -> str:
     for part in ("orientation", "asperity", "heights", "bond"):
         if law[part] is not None:
             values = {one.name: getattr(law[part], one.name) for one in fields(law[part])}
-            lines += ["", f"[{part}]", *_lines(values, [name for name in values if name[0] != "_"])]
+            lines += ["", f"[{part}]", *_lines(values, values)]
     return "\n".join(lines) + "\n"
 
 
@@ -72,10 +76,9 @@ def _lines(values: Mapping[str, Any], names: Iterable[str]) -> list[str]:
     lines = []
     for name in names:
         value = values[name]
-        absent = value is None or value is False or value == ()
-        if absent or (name in _OFF and value == _OFF[name]):
+        if value is None or value is False or (name in _OFF and value == _OFF[name]):
             continue
-        if name == "distribution" and isinstance(value, tuple):
+        if name == "distribution":
             lines += [f"counts = {list(value[0])}", f"edges = {list(value[1])}  # m"]
             continue
         unit = f"  # {_UNITS[name]}" if name in _UNITS else ""
@@ -87,8 +90,6 @@ def _text(value: Any) -> str:
     """A value as TOML."""
     if isinstance(value, float):
         return repr(value + 0.0)  # -0.0 is 0.0; inf is TOML too
-    if isinstance(value, tuple):  # parameters of a distribution
-        return "{ " + ", ".join(f"{k} = {v!r}" for k, v in value) + " }"
     return "true" if value is True else f'"{value}"'
 
 
@@ -120,9 +121,7 @@ def build_law(build: Callable[..., T], data: dict[str, Any], where: str) -> T:
 
 
 def _heights(data: Any, where: str) -> GammaHeights | Heights:
-    table = dict(data) if isinstance(data, dict) else {}
-    if "alpha" in table or "beta" in table:
+    if isinstance(data, dict) and ("alpha" in data or "beta" in data):
         return GammaHeights(**checked(data, keys_of(GammaHeights), where, "heights"))
-    if "counts" in table:
-        table["distribution"] = (table.pop("counts"), table.pop("edges", ()))
-    return Heights(**checked(table or data, _HEIGHTS, where, "heights"))
+    table = checked(data, _HEIGHTS, where, "heights")
+    return Heights((table.pop("counts"), table.pop("edges")), **table)

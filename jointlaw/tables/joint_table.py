@@ -213,7 +213,7 @@ class JointTable:
         return result
 
     def save(self, path: str | Path) -> None:
-        """Write text that `numpy.genfromtxt(path, names=True)` reads: names first, then metadata."""
+        """Write text for `numpy.genfromtxt(path, names=True)`: names first, then metadata."""
         path, columns = Path(path), self.columns
         part = path.with_name(path.name + ".part")  # half a table would still look like one
         with part.open("w", encoding="utf-8") as file:

@@ -251,9 +251,8 @@ class JointLaw:
         With `direction` = (theta, phi) in rad: per m2 and steradian in that direction, Eq. 16.
         """
         y = finite("closure", closure, "m")
-        if self.heights is None:
-            share: Any = np.where(y > 0, 1.0, 0.0)
-        else:
+        share = np.where(y > 0, 1.0, 0.0)
+        if self.heights is not None:
             share = np.asarray(self.heights.cdf(np.maximum(self.heights.overlap + y, 0.0)))
         density = 1.0 if direction is None else self.orientation.density(*direction)
         return (self.asperity_density * share * density)[()]

@@ -27,7 +27,7 @@ class Tables:
     `depth` (M, D+1) the cell limits zeta with the virgin force and slope there (slope 0 at the
     first by definition).
     A facet of fewer cells has its limits first; cells that begin at UNUSED stay empty.
-    `yield_depth` (M,) is the yield interference along y, None where asperities do not yield;
+    `yield_depth` (M,) is the yield interference along y, infinite if asperities do not yield;
     `opposite` (M,) names the facet that shares its flattened depth, each itself if none does.
     """
 
@@ -47,8 +47,8 @@ class Tables:
     lam: float
     mu: float
     mating_length: float
-    yield_depth: Array | None = None
-    opposite: NDArray[np.intp] | None = None
+    yield_depth: Array
+    opposite: NDArray[np.intp]
     slope_wear: float = math.inf
     slope_residual: float = 0.0
     bond: Bond | None = None
@@ -56,7 +56,7 @@ class Tables:
     @property
     def yields(self) -> bool:
         """Whether asperities yield."""
-        return self.yield_depth is not None
+        return bool(self.yield_depth[0] < math.inf)
 
     @property
     def fades(self) -> bool:
@@ -117,11 +117,8 @@ def tables(
         facets.n, facets.n / c1, facets.s, facets.t, azimuth, slope, c1,
         facets.scale(asperity, asperity_density), facets.weight, *_at_limits(curve, depth),
     )  # fmt: skip
-    yield_depth = None
-    if asperity.yield_interference < math.inf:
-        (yield_depth,) = frozen((asperity.yield_interference / c1,))
     # one depth for both sides of an asperity whose slopes change, else it creates energy
-    (alone,) = frozen((np.arange(len(c1)),))
+    alone, yield_depth = frozen((np.arange(len(c1)), asperity.yield_interference / c1))
     return Tables(
         curve, *frozen(arrays), asperity.lam, asperity.mu, mating_length, yield_depth,
         alone if math.isinf(mating_length) else facets.opposite, slope_wear, slope_residual,

@@ -30,10 +30,6 @@ COMPONENTS = {  # what the 1, 2 or 3 components of a displacement are
 FEW = 8  # numbers: the largest of so few is found faster by Python than by numpy
 
 
-class NoLedgerError(AttributeError, ValueError):
-    """Energies that are not added up were asked for."""
-
-
 class JointBatch:
     """n joints of one law. Arrays over joints: displacements (n, dim) in m, tractions (n, dim) in
     Pa; dim is 3 (closure, shear along axes 2 and 3), 2 for a law with a plane, or 1 for a law with
@@ -117,10 +113,10 @@ class JointBatch:
             raise ValueError(f"state = {state!r} is not a snapshot; give one of snapshot()")
         state.require(self.law.fingerprint)
         if state.values.shape != (len(index), self.law.state_size):
-            other = f"this batch {self._n}: resize first"
-            if where is not None:
-                other = f"where names {len(index)}"
-            raise ValueError(f"state holds {len(state)} joints, {other}")
+            raise ValueError(
+                f"state holds {len(state)} joints, for {len(index)} of the batch: resize it, or "
+                "name as many by where"
+            )
         if not np.isfinite(state.values).all():
             raise ValueError("state holds values that are not finite; it is damaged")
         rows = self._state[:, : self.law.state_size]
@@ -261,7 +257,7 @@ class JointBatch:
     def _ledger(self, name: str, part: str) -> Array:
         """A part of the ledger, if it is kept."""
         if not self.ledger:
-            raise NoLedgerError(f"{name} is not added up: make the joints with ledger=True")
+            raise AttributeError(f"{name} is not added up: make the joints with ledger=True")
         return self._part(part)
 
     def _rows(self, index: NDArray[np.intp] | None = None) -> Array:
@@ -323,9 +319,8 @@ class JointBatch:
 
     def _reach_of(self, rows: Array) -> Array:
         """Bound (n,) of |y| of all facets of states (rows, n)."""
-        now = reference.parts(self.law.tables, rows)
-        far: Array = np.abs(now.delta).max(axis=0)
-        return self._steepness * far
+        reach: Array = self._steepness * np.abs(rows[: self.law.dim]).max(axis=0)
+        return reach
 
 
 def increments(d: ArrayLike, shape: tuple[int, ...]) -> Array:

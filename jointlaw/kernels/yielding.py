@@ -17,7 +17,6 @@ from .mating import Planes
 
 def flatten(k: Tables, depth: Array, y: Array) -> Array:
     """Flattened depth (M, B) of every facet once the closures y (M, B) are reached."""
-    assert k.yield_depth is not None
     own = np.maximum(depth, y - k.yield_depth[:, None])
     return np.maximum(own, own[k.opposite])
 
@@ -39,7 +38,6 @@ def flattens_itself(k: Tables, y1: Array, z1: Array) -> NDArray[np.bool_]:
 
     Both do, but for rounding, where the shear does not move them, as at a right angle to it.
     """
-    assert k.yield_depth is not None
     own: NDArray[np.bool_] = y1 - k.yield_depth[:, None] >= z1 - ROUNDED * np.abs(y1)
     return own
 
@@ -50,7 +48,6 @@ def plastic_work(k: Tables, y0: Array, y1: Array, flat0: Cells, flat1: Cells) ->
     Exact for springs that the closure of their own facet flattens; for those that the opposite
     facet flattens it is the mean of their compressions before and after the step.
     """
-    assert k.yield_depth is not None
     largest = k.yield_depth[:, None]
     mean = 0.5 * (np.clip(y0 - flat0.y, 0.0, largest) + np.clip(y1 - flat1.y, 0.0, largest))
     deep = np.where(flattens_itself(k, y1, flat1.y), largest, mean)
@@ -64,7 +61,6 @@ def softening(
 
     push: derivative (2, M, D, B) of q by G in slipping sliders. end: the planes after the step.
     """
-    assert k.yield_depth is not None
     moves = (flat1.y - flat0.y > ROUNDED * flat1.y) & (after.kappa > 0).any(axis=1)
     own = flattens_itself(k, after.y, flat1.y)
     shear = np.sum(push * np.where(after.kappa > 0, flat1.kappa, 0.0), axis=2)

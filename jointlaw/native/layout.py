@@ -163,7 +163,7 @@ def pack(k: Tables) -> tuple[dict[str, int | float], dict[str, Array]]:
         "COMPLIANCE": compliance(k).ravel(),
         "POTENTIAL": k.area * k.c1,
         "SHARE": k.weight / k.weight.sum(),
-        "YIELD": np.zeros(len(k.c1)) if k.yield_depth is None else k.yield_depth,
+        "YIELD": k.yield_depth if k.yields else np.zeros(len(k.c1)),
     }
     facet = in_columns(columns, len(k.c1))
     arrays = {"facet": facet, "depth": _depth(k), "curve": k.curve.S, "energy": k.curve.T}

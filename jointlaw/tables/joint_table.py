@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,18 +33,6 @@ BY_AZIMUTH = {
     "mob": "mobilised_friction",
     "dil": "dilation",
 }
-
-
-class Row(NamedTuple):
-    """What a table says at one closure and azimuth (or arrays of them)."""
-
-    normal_stress: Any
-    kn_secant: Any
-    kn_tangent: Any
-    shear_stiffness: Any
-    peak_friction: Any
-    mobilised_friction: Any
-    dilation: Any
 
 
 class PathError(NamedTuple):
@@ -94,9 +83,11 @@ class JointTable:
     dilation: Array
     metadata: Mapping[str, Any]
 
-    def lookup(self, closure: ArrayLike, azimuth: ArrayLike = 0.0) -> Row:
+    def lookup(self, closure: ArrayLike, azimuth: ArrayLike = 0.0) -> SimpleNamespace:
         """Interpolated values at closures (m) and azimuths (rad), broadcast together.
 
+        They have the names of the table: normal_stress, kn_secant, kn_tangent, shear_stiffness,
+        peak_friction, mobilised_friction and dilation.
         Linear in closure; normal stress is closure times the interpolated secant, past the last
         row it follows the last tangent. Shear stiffness over azimuth is the mean and second
         harmonic (a symmetric matrix), the rest linear. Zero stress and stiffness for closure <= 0.
@@ -113,7 +104,9 @@ class JointTable:
         values = [np.where(u > 0, value, 0.0) for value in by_closure]
         for column in (self.peak_friction, self.mobilised_friction, self.dilation):
             values.append(around(column, psi, row, w))
-        return Row(*(value.reshape(shape)[()] for value in values))
+        names = [*BY_CLOSURE.values(), *BY_AZIMUTH.values()][1:]  # all but the closure
+        found = (value.reshape(shape)[()] for value in values)
+        return SimpleNamespace(**dict(zip(names, found, strict=True)))
 
     def follow(self, delta: ArrayLike) -> Array:
         """Traction (m, 3) in Pa that a host computes from the table along a path delta (m, 3) in m.
@@ -130,9 +123,6 @@ class JointTable:
             F, K = self.step(F[1:], K, d[:, None], path[k, :1])
             tractions[k] = F[:, 0]
         return tractions
-
-    def plot(self, path: Any = None) -> None:
-        raise AttributeError("plot is gone: docs/gallery/plot_table.py draws a table by its arrays")
 
     # ---------------------------------------------- what a host calls in every step
 
@@ -223,11 +213,8 @@ class JointTable:
         return result
 
     def save(self, path: str | Path) -> None:
-        """Write text that `numpy.genfromtxt(path, names=True)` reads: names first, then metadata.
-
-        Raises ValueError for a name that ends in .npz.
-        """
-        path, columns = _text_file(path), self.columns
+        """Write text for `numpy.genfromtxt(path, names=True)`: names first, then metadata."""
+        path, columns = Path(path), self.columns
         part = path.with_name(path.name + ".part")  # half a table would still look like one
         with part.open("w", encoding="utf-8") as file:
             file.write("# " + " ".join(columns) + "\n")
@@ -239,9 +226,8 @@ class JointTable:
 
 def load_table(path: str | Path) -> JointTable:
     """Read a table that `JointTable.save` wrote. Raises ValueError if the file is not one."""
-    path = _text_file(path)
     try:
-        _, marker, rest = path.read_text(encoding="utf-8").partition(MARKER)
+        _, marker, rest = Path(path).read_text(encoding="utf-8").partition(MARKER)
         if not marker:
             raise ValueError(f"it has no line {MARKER.strip()!r}")
         metadata = json.loads(rest.splitlines()[0])
@@ -265,15 +251,6 @@ def load_table(path: str | Path) -> JointTable:
         return JointTable(azimuth=np.radians(angles), metadata=metadata, **held)
     except (OSError, KeyError, ValueError, TypeError, IndexError) as error:
         raise ValueError(f"{str(path)!r} is not a joint table: {error!r}") from None
-
-
-def _text_file(path: str | Path) -> Path:
-    if Path(path).suffix == ".npz":
-        raise ValueError(
-            f"{str(path)!r}: tables are text files now, such as joint.txt: for an .npz of an older "
-            "jointlaw, export the law again"
-        )
-    return Path(path)
 
 
 # ------------------------------------------------------------------- interpolation

@@ -66,7 +66,7 @@ def test_a_copy_of_a_joint_moves_alone(any_law):
             lambda law: replace(law, plane=0.0).joints(5).snapshot(),
             "joint law with other parameters",
         ),
-        (lambda law: law.joints(3).snapshot(), "state holds 3 joints, this batch 5"),
+        (lambda law: law.joints(3).snapshot(), "state holds 3 joints, for 5 of the batch"),
         (lambda law: np.zeros((5, 3)), "not a snapshot"),
         (lambda law: JointState(law.fingerprint, np.full((5, law.state_size), np.nan)), "damaged"),
     ],
@@ -124,5 +124,5 @@ def test_joints_move_between_batches_and_go_on_as_before(any_law):
     F, _ = here.update(d)
     moved, _ = there.update(d[[4, 1]], where=[3, 1])
     np.testing.assert_array_equal(moved, F[[4, 1]])
-    with pytest.raises(ValueError, match="state holds 2 joints, where names 1"):
+    with pytest.raises(ValueError, match="state holds 2 joints, for 1 of the batch"):
         there.restore(here.snapshot([0, 1]), where=[0])

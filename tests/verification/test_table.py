@@ -106,7 +106,6 @@ def test_a_table_of_version_1_is_read():
 @pytest.mark.parametrize(
     ("name", "old", "new", "words"),
     [
-        ("joint.npz", "", "", r"joint\.npz': tables are text files now, .*export the law again"),
         ("missing", None, "", "not a joint table: FileNotFoundError"),
         ("joint.txt", "# metadata: ", "# ", "it has no line '# metadata:'"),
         ("joint.txt", '"version": 1', '"version": 9', "version 9 .* is not 1: tabulate the law"),

@@ -4,6 +4,7 @@ Needs the extra `docs` and no network. The pages are Markdown that also reads we
 gallery is run while the site is built.
 """
 
+import logging
 import os
 import sys
 from importlib.util import find_spec
@@ -60,6 +61,8 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Index", "Out")}
 python_use_unqualified_type_names = True
+
+logging.getLogger("skfem").setLevel(logging.WARNING)  # it tells every step that it takes
 
 ORDER = (
     "first_curve", "closure_hysteresis", "closure_cycle", "direct_shear", "strength_envelope",

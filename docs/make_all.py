@@ -65,7 +65,6 @@ PICTURES = {
     "slope.gif": ("-m dem_demo slope --out FOLDER", "motion.gif"),
     "shear-box.png": ("-m dem_demo shear-box --out FOLDER", "curves.png"),
     "strength.png": ("-m dem_demo strength-reduction slope --out FOLDER", "failing-rough.png"),
-    "tradeoff.png": ("-m jointlaw tradeoff westerly-smooth --out FOLDER", "tradeoff.png"),
     "shaken-slope.png": ("docs/measure/shaken_slope.py FOLDER", "shaken-slope.png"),
     "fit.png": ("-m jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out FOLDER", "fit.png"),
 }

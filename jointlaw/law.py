@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import InitVar, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,8 +29,9 @@ from .parameters.bond import Bond
 from .parameters.fingerprint import fingerprint
 from .parameters.heights import GammaHeights, HeightDistribution, Heights
 from .parameters.orientation import Orientation
-from .parameters.resolution import LOSS_REMOVED, NAMED, SLIP_REMOVED, Resolution, resolve
+from .parameters.resolution import NAMED, Resolution, resolve
 from .support.checks import Array, finite, more_than, number
+from .support.files import replace_file
 from .support.thresholds import UNDERFLOW
 
 if TYPE_CHECKING:
@@ -84,12 +85,9 @@ class JointLaw:
     slope_wear: float = math.inf
     slope_residual: float = 0.0
     bond: Bond | None = None
-    critical_slip: InitVar[Any] = None  # of former versions
 
-    def __post_init__(self, critical_slip: Any) -> None:
+    def __post_init__(self) -> None:
         set_ = object.__setattr__
-        if critical_slip is not None:
-            raise ValueError(f"critical_slip is removed: {SLIP_REMOVED}")
         for name, kind in (("orientation", Orientation), ("asperity", Asperity)):
             if not isinstance(value := getattr(self, name), kind):
                 raise ValueError(f"{name} = {value!r} must be of type {kind.__name__}")
@@ -146,14 +144,7 @@ class JointLaw:
         position along axis 2 (`unmated_start`). Raises ValueError as `closure` does, for an unmated
         joint with an infinite mating length, and for one that is to be closed already.
         """
-        joint = Joint(self)
-        if not mated:
-            self._require_open(normal_stress)
-            joint.reset(mated=False)
-        if normal_stress != 0.0:
-            joint.update(np.eye(self.dim)[0] * self.closure(normal_stress), tangent=False)
-            warn_if_crushed(self, joint.delta[0])
-        return joint
+        return Joint(self, self.joints(1, normal_stress=normal_stress, mated=mated))
 
     def joints(
         self,
@@ -169,7 +160,12 @@ class JointLaw:
         """
         batch = JointBatch(self, n, ledger)
         if not np.all(mated):
-            self._require_open(normal_stress)
+            if np.any(normal_stress):
+                raise ValueError(
+                    f"normal_stress = {normal_stress!r} with mated=False: an unmated joint starts "
+                    "at first touch; close it by update, or by a laboratory test such as "
+                    "direct_shear"
+                )
             far = ~np.asarray(mated, bool)
             if far.shape not in ((), (n,)):
                 raise ValueError(f"mated has shape {far.shape}: give one truth or ({n},)")
@@ -317,7 +313,7 @@ class JointLaw:
 
         return tradeoff(self, resolutions, joints, seconds)
 
-    def at_tolerance(self, tolerance: float, loss: None = None) -> JointLaw:
+    def at_tolerance(self, tolerance: float) -> JointLaw:
         """This law at the resolution with the fewest sliders that is this accurate.
 
         tolerance: largest error of the traction on a path, as a share of the path's largest
@@ -326,13 +322,11 @@ class JointLaw:
         closure ranges, where friction is mobilised (`jointlaw.accuracy.suite`); nothing is timed,
         so the answer is the same on every machine. Takes seconds to a minute, below 0.01 minutes,
         without the compiled kernel more.
-        loss: of former versions, refused; small cycles need more depth cells (docs/limits.md).
-        Raises ValueError where no resolution tried is that accurate.
+        Small cycles need more depth cells (docs/limits.md). Raises ValueError where no resolution
+        tried is that accurate.
         """
         from .accuracy.tolerance import at_tolerance
 
-        if loss is not None:
-            raise ValueError(LOSS_REMOVED)
         return at_tolerance(self, tolerance)
 
     # ---------------------------------------------------------------- tables
@@ -405,13 +399,6 @@ class JointLaw:
                 f"{closure_range:g} m; check the units"
             )
 
-    def _require_open(self, normal_stress: ArrayLike) -> None:
-        if np.any(normal_stress):
-            raise ValueError(
-                f"normal_stress = {normal_stress!r} with mated=False: an unmated joint starts at "
-                "first touch; close it by update, or by a laboratory test such as direct_shear"
-            )
-
     def _within_reach(self, closure: ArrayLike) -> Array:
         """Closures (m) that are finite and whose forces are."""
         y = finite("closure", closure, "m")
@@ -427,17 +414,24 @@ class JointLaw:
     def to_toml(self, path: str | Path | None = None) -> str:
         """The law as TOML text, also written to `path` if given (histograms then as CSV beside)."""
         values = {one.name: getattr(self, one.name) for one in fields(self)}
-        return toml.write_law(values, None if path is None else Path(path))
+        text = toml.law_text(values)
+        if path is not None:
+            replace_file(Path(path), text.encode())
+        return text
 
     @classmethod
     def from_toml(cls, path: str | Path) -> JointLaw:
         """A law from a TOML file; the keys are the parameters above."""
-        return toml.read_law(cls, path)
+        if "\n" in str(path):
+            raise ValueError(
+                "this is TOML text, not the path of a law file: use JointLaw.from_text"
+            )
+        return cls.from_dict(keys.read(Path(path), "law file"), str(path))
 
     @classmethod
     def from_text(cls, text: str) -> JointLaw:
         """A law from TOML text, as `to_toml` returns it."""
-        return toml.build_law(cls, keys.parse(text, "TOML text"), "TOML text")
+        return cls.from_dict(keys.parse(text, "TOML text"), "TOML text")
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], where: str = "law") -> JointLaw:

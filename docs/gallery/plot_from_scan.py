@@ -29,8 +29,8 @@ z = -depth - 20e-6 * (along * abs(x) + across * abs(x)[:, None])
 z = z.swapaxes(1, 2).reshape(480, 480) + 0.3e-6 * rng.standard_normal((480, 480))
 scan = jl.from_surface(z, spacing=20e-6)
 for name in ("a", "b", "c", "alpha", "beta"):
-    low, high = scan.interval(name)
-    print(f"{name:6s} {scan.parameters[name]:.3g}, 95 % interval {low:.3g} to {high:.3g}")
+    one = scan.estimates[name]
+    print(f"{name:6s} {one.value:.3g}, 95 % interval {one.low:.3g} to {one.high:.3g}")
 
 # %%
 # A scan knows shape, not stiffness: that is the rock's, by Hertz.

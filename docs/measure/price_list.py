@@ -1,16 +1,11 @@
-"""The price list of a preset, shortened, and docs/pictures/tradeoff.png.
-
-`jointlaw tradeoff westerly-smooth --plane 0 --out DIR` prints all columns.
-"""
+"""The price list of a preset, shortened; `print(law.tradeoff())` shows all columns."""
 
 from dataclasses import replace
-from pathlib import Path
 
 from tables import table
 
 import jointlaw as jl
 
-PICTURE = Path(__file__).parents[1] / "pictures" / "tradeoff.png"
 HEAD = ["`Resolution`", "sliders", "bytes", "error", "friction", "dilation", "ns", "with tangent"]
 
 found = replace(jl.presets.load("westerly-smooth"), plane=0.0).tradeoff()
@@ -24,4 +19,3 @@ for price in sorted(found.rows, key=lambda price: price.sliders):
                      f"{price.worst:.2%}", f"{price.friction:.2f}°", f"{price.dilation:.2f}°",
                      f"{price.ns:.0f}", f"{price.ns_tangent:.0f}"])  # fmt: skip
 print(table(HEAD, rows))
-found.plot(PICTURE)

@@ -140,10 +140,10 @@ def misses(law: jl.JointLaw, rng: np.random.Generator) -> list[dict[str, Any]]:
             found.append({"refused": str(error)})
             continue
         took = time.perf_counter() - start
-        ratio = errors(tractions(made, d), truth)[0] / tolerance
+        ratio = errors(tractions(made, d), truth) / tolerance
         if slid is not None:
             mine = slip(made, law.closure_range, stress, ways)
-            ratio = np.append(ratio, errors(mine.F, slid.F, slid.counts)[0] / tolerance)
+            ratio = np.append(ratio, errors(mine.F, slid.F, slid.counts) / tolerance)
         found.append({"ratio": ratio.tolist(), "sliders": made.tables.sliders, "seconds": took})
     return found
 

@@ -5,14 +5,12 @@ Figure 16: sliding and separated asperities during shear
 Linear asperities at a constant closure of 1 µm, λ = 1, μ = 0.6. Dotted ticks: separation begins at
 δ₂ = δ₁ cot(π/2a), later for a = 6, as the paper says. Sliding begins earlier for a = 3 but is
 complete earlier for a = 6. The shares of the incremental law change in steps, one for each of its
-orientations; its lines join the middles of the steps.
+orientations.
 """
 
 import math
 
 from _common import LAW, SHEAR, TOTAL, beside, draw, first_sliding, incremental, total
-
-from jointlaw.laboratory.record import without_steps
 
 closure = 1e-6  # m
 panels = {TOTAL: {}, LAW: {}}
@@ -21,7 +19,7 @@ for (title, lines), run in zip(panels.items(), (total, incremental), strict=True
         test, onset = run(f"linear-a{a}", 4e-6, closure=closure), 1 / math.tan(0.5 * math.pi / a)
         x = test.shear * 1e6
         for name, share in (("sliding", test.sliding), ("separated", test.separated)):
-            lines[f"{name}, a = {a}"] = (x, share) if run is total else without_steps(x, share)
+            lines[f"{name}, a = {a}"] = x, share
         lines[f"_onset cot(pi/2a), a = {a}"] = [onset, onset], [0.0, 0.08]
         row = first_sliding(test)
         text = f"{x[row]:.2f} µm at F₂/F₁ = {test.shear_stress[row] / test.F1[row]:.3f}"

@@ -73,12 +73,11 @@ def scaled(r: Resolution, share: float) -> Resolution:
 class Miss(NamedTuple):
     """How far a resolution is off.
 
-    `largest`, `rms` (paths,): shares of the path's largest |F|. `friction`, `dilation`: largest
-    misses of the angles under slip, in degrees; NaN for a joint that does not shear, or jams.
+    `largest` (paths,): shares of the path's largest |F|. `friction`, `dilation`: largest misses of
+    the angles under slip, in degrees; NaN for a joint that does not shear, or jams.
     """
 
     largest: Array
-    rms: Array
     friction: float
     dilation: float
 
@@ -100,13 +99,12 @@ class Suite:
 
     def miss(self, law: JointLaw) -> Miss:
         """How far another resolution is off."""
-        largest, rms = errors(tractions(law, self.d), self.F)
+        largest = errors(tractions(law, self.d), self.F)
         if self.slip is None:
-            return Miss(largest, rms, math.nan, math.nan)
+            return Miss(largest, math.nan, math.nan)
         mine = slip(law, law.closure_range, self.stress, self.ways)
         more = errors(mine.F, self.slip.F, self.slip.counts)
-        largest, rms = np.append(largest, more[0]), np.append(rms, more[1])
-        return Miss(largest, rms, *mine.apart(self.slip))
+        return Miss(np.append(largest, more), *mine.apart(self.slip))
 
 
 def standard_suite(law: JointLaw, best: Resolution | None = None, excursions: int = 0) -> Suite:
@@ -151,24 +149,14 @@ def tractions(law: JointLaw, d: Array) -> Array:
     return F
 
 
-def tangents(law: JointLaw, d: Array) -> Array:
-    """C (steps, paths, dim, dim) in Pa/m along increments d, from the virgin state."""
-    batch, dim = law.joints(d.shape[1], ledger=False), d.shape[2]
-    C = np.empty((*d.shape, dim))
-    for k, step in enumerate(d):
-        _, C[k] = batch.update(step)
-    return C
-
-
-def errors(F: Array, reference: Array, counts: Any = True) -> tuple[Array, Array]:
-    """Largest and rms |F - reference| (steps, paths, dim) over the path's largest |reference|.
+def errors(F: Array, reference: Array, counts: Any = True) -> Array:
+    """Largest |F - reference| (steps, paths, dim) over each path's largest |reference|: (paths,).
 
     counts: (steps, paths), which steps count; all by default.
     """
     peak = np.linalg.norm(reference, axis=2).max(axis=0, where=counts, initial=0.0)
-    off = np.linalg.norm(F - reference, axis=2)
-    mean = np.mean(off**2, axis=0, where=counts)
-    return off.max(axis=0, where=counts, initial=0.0) / peak, np.sqrt(mean) / peak
+    off: Array = np.linalg.norm(F - reference, axis=2).max(axis=0, where=counts, initial=0.0)
+    return off / peak
 
 
 def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]:

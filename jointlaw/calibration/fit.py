@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from ..law import JointLaw
 from ..support.checks import Array
 from ..support.pyplot import pyplot, style, written
-from .forward import build, build_for_shear, log_stress
+from .forward import build, log_stress
 from .measured import ClosureCurve, ShearCurve
 from .priors import TRANSFORMS, Ranges, Values
 from .problem import Problem, Solution, derivative, pose, solve, staged, starting_points
@@ -37,10 +37,6 @@ OTHER = (
 TOO_MANY = (
     "These data do not fix so many parameters. Hold {}: give what you know (--set {}=VALUE), or "
     "leave it out of --free. Then the data fix the others."
-)
-NO_COMPLIANCE = (
-    "No compliance of rock and machine was given: if the closure was measured across rock too, the "
-    "law includes its strain."
 )
 
 
@@ -71,17 +67,12 @@ class Fit:
         """The law of these parameters."""
         return build(self.parameters, self.problem.settings, self.problem.settings.plane)
 
-    @property
-    def prior_share(self) -> dict[str, float]:
-        """Share of the variance of every fitted parameter that the priors contribute."""
-        return dict(zip(self.free, self.solution.prior_share.tolist(), strict=True))
-
-    def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
-        """Interval, within the bounds, that holds a fitted parameter with this probability."""
+    def interval(self, name: str) -> tuple[float, float]:
+        """The 95 % interval of a fitted parameter, within its bounds."""
         if name not in self.free:
             raise ValueError(f"{name!r} was not fitted; fitted are {', '.join(self.free)}")
         at, transform = self.free.index(name), TRANSFORMS[name]
-        reach = self.solution.quantile(level) * math.sqrt(self.solution.covariance[at, at])
+        reach = self.solution.quantile * math.sqrt(self.solution.covariance[at, at])
         x, (low, high) = self.solution.x[at], self.problem.bounds()
         ends = max(x - reach, low[at]), min(x + reach, high[at])
         return transform.back(float(ends[0])), transform.back(float(ends[1]))
@@ -113,7 +104,7 @@ class Fit:
         """Fitted parameters that these data do not fix, each with the reason."""
         found: dict[str, str] = {}
         errors = np.sqrt(np.diag(self.solution.covariance)) / self._widest
-        for (name, share), error in zip(self.prior_share.items(), errors, strict=True):
+        for name, share, error in zip(self.free, self.solution.prior_share, errors, strict=True):
             if name in self.at_bound:
                 found[name] = f"the fit ended at a bound, {self.parameters[name]:.3g}"
             elif share > PRIOR_SHARE:
@@ -160,12 +151,8 @@ class Fit:
         seating = self.parameters["seating"]
         return self.law.normal_stress(np.asarray(closure, float) + seating)
 
-    def band(
-        self,
-        closure: ArrayLike,
-        level: float = 0.95,
-    ) -> tuple[Array, Array]:
-        """Band (low, high) in Pa that holds the curve `predict` with this probability.
+    def band(self, closure: ArrayLike) -> tuple[Array, Array]:
+        """95 % band (low, high) in Pa of the curve `predict`.
 
         By the covariance of the parameters alone: the noise of a further point is not in it, nor
         that rock is not this law, which counts most beyond the largest fitted stress.
@@ -178,7 +165,7 @@ class Fit:
 
         slope = derivative(model, self.solution.x, *self.problem.bounds())
         variance = np.einsum("ip,pq,iq->i", slope, self.solution.covariance, slope)
-        centre, reach = model(self.solution.x), self.solution.quantile(level) * np.sqrt(variance)
+        centre, reach = model(self.solution.x), self.solution.quantile * np.sqrt(variance)
         return np.exp(centre - reach), np.exp(centre + reach)
 
     def report(self) -> str:
@@ -190,7 +177,7 @@ class Fit:
             "| parameter | value | 95 % interval | unit | from the priors | fixed by the data |",
             "|---|---|---|---|---|---|",
         ]
-        for name, share in self.prior_share.items():
+        for name, share in zip(self.free, self.solution.prior_share, strict=True):
             lines.append(
                 f"| {name} | {values[name]:.4g} | {self._spread(name)} | "
                 f"{TRANSFORMS[name].unit} | {100 * share:.0f} % | "
@@ -219,8 +206,6 @@ class Fit:
         differ = [str(k) for k, differs in enumerate(self.shape_differs, 1) if differs]
         if differ:
             lines += ["", f"**Curve {', '.join(differ)} has another shape than the law.** {OTHER}"]
-        if self.problem.closure is not None and self.problem.closure.compliance == 0.0:
-            lines += ["", NO_COMPLIANCE]
         return "\n".join(lines) + "\n"
 
     def _peaks(self) -> list[str]:
@@ -229,7 +214,7 @@ class Fit:
         lines = ["", head, "|---|---|---|---|---|"]
         for k, curve in enumerate(self.problem.curves, 1):
             if isinstance(curve, ShearCurve):
-                own = curve.sheared(self._law_of(curve), self.problem.settings.steps)[:2]
+                own = curve.by_parameters(self.parameters, self.problem.settings)[:2]
                 cells = [
                     f"{stress[(top := np.argmax(np.abs(stress)))] / 1e6:.4g}, {1e3 * way[top]:.3g}"
                     for way, stress in ((curve.shear, curve.shear_stress), own)
@@ -238,9 +223,6 @@ class Fit:
                 lines.append(f"| {k} | {' | '.join([*cells, *ends])} |")
         halved = f"Half the step of shear changes these stresses by {100 * self.halved:.2g} %."
         return [*lines, "", halved] if len(lines) > 3 else []
-
-    def _law_of(self, curve: ShearCurve) -> JointLaw:
-        return build_for_shear(self.parameters, self.problem.settings, curve.azimuth)
 
     @style()
     def plot(
@@ -276,7 +258,7 @@ class Fit:
             else:
                 x, measured = curve.shear, curve.shear_stress
                 what = f"shear at {curve.normal / 1e6:.3g} MPa"
-                u, law, _ = curve.sheared(self._law_of(curve), settings.steps)
+                u, law, _ = curve.by_parameters(values, settings)
             axis.plot(1e6 * u, law / 1e6, color="C1", label="law")
             axis.plot(1e6 * x, measured / 1e6, "oC0", ms=4, label="measured")
             axis.set(xlabel=f"{what} (µm)", ylabel="stress (MPa)")
@@ -337,8 +319,8 @@ def fit_curves(
         closure curve that does not begin at zero stress adds its seating closure (m).
     fixed: values of parameters that are known otherwise, such as alpha from a scan, in SI units.
     law: values of all parameters that are not free, `mating_length` among them; None takes rock
-        asperities, `forward.DEFAULTS`, of "individual" formation. A law of one plane or of closure
-        alone stays one.
+        asperities, `forward.DEFAULTS`, of "individual" formation. A law of one plane
+        stays one; its heights must be GammaHeights.
     priors: 95 % ranges (low, high) in physical units instead of the defaults of `priors.PRIORS`,
         or None to drop one. Besides the parameters: "overlap_share", "full_contact_stress".
 

@@ -39,10 +39,8 @@ class Settings:
 
     formation: str = "individual"
     resolution: Any = "balanced"
-    has_heights: bool = True
     closure_range: Any = None  # m
     plane: float | None = None  # of the law to be found; every shear curve has its own
-    closure_only: bool = False
     steps: int = STEPS  # that shear a joint the whole way, see `ShearCurve.sheared`
 
 
@@ -57,14 +55,11 @@ def parameters(law: JointLaw) -> tuple[dict[str, float], Settings]:
         "a": o.a, "b": o.b, "c": o.c, "yield_interference": p.yield_interference,
         **{name: getattr(law, name) for name in _SLOPES},
     }  # fmt: skip
-    kept = ("resolution", "closure_range", "plane", "closure_only")
-    settings = Settings(has_heights=h is not None, **{name: getattr(law, name) for name in kept})
-    if h is None:
-        return values, settings
+    kept = ("resolution", "closure_range", "plane")
     if not isinstance(h, GammaHeights):
         raise ValueError(f"law: heights = {h!r} cannot be fitted; give it GammaHeights")
     values |= {"alpha": h.alpha, "beta": h.beta, "overlap": h.overlap}
-    return values, replace(settings, formation=h.formation)
+    return values, Settings(h.formation, **{name: getattr(law, name) for name in kept})
 
 
 def build(values: Values, settings: Settings, plane: float | None = None) -> JointLaw:
@@ -81,7 +76,6 @@ def build(values: Values, settings: Settings, plane: float | None = None) -> Joi
         resolution=settings.resolution,
         plane=plane,
         closure_range=settings.closure_range,
-        closure_only=settings.closure_only,
     )
     if math.isinf(v["mating_length"]):
         return mated
@@ -133,14 +127,14 @@ def _yielded(values: Values, closure: Array, force: Array, settings: Settings) -
     return taken / facet_sum(nodes.theta, scale, p.lam, p.mu)
 
 
-def _force(closure: Array, eta: float, heights: GammaHeights | None) -> Array:
+def _force(closure: Array, eta: float, heights: GammaHeights) -> Array:
     """The virgin curve Phi at closures (m, n), a hundred times in a fit.
 
     Asperities of gamma heights that each feel the closure since they touched have a closed form,
     int_0^y (y - r)^(1 + eta) dH(r), by Kummer's function; a product of positive terms.
     """
     y, power = np.maximum(closure, 1e-15), 1 + eta
-    if heights is None or heights.formation != "individual" or heights.overlap > 0:
+    if heights.formation != "individual" or heights.overlap > 0:
         return exact_force(y, eta, heights)[0]
     if heights.alpha > 30 or y.max() > 300 * heights.beta:  # beyond what Kummer's function can
         return exact_force(y, eta, heights)[0]
@@ -155,9 +149,7 @@ def _asperity(v: Values) -> Asperity:
     return Asperity(v["K"], v["lam"], v["eta"], v["mu"], v["yield_interference"])
 
 
-def _heights(v: Values, settings: Settings) -> GammaHeights | None:
-    if not settings.has_heights:
-        return None
+def _heights(v: Values, settings: Settings) -> GammaHeights:
     return GammaHeights(v["alpha"], v["beta"], v["overlap"], settings.formation)
 
 

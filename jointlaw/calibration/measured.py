@@ -189,6 +189,12 @@ class ShearCurve:
         record = direct_shear(law.joint(), path[1:], self.normal, azimuth=self.azimuth, steps=1)
         return record.shear, record.shear_stress, np.array(rows)
 
+    def by_parameters(
+        self, values: Values, settings: Settings
+    ) -> tuple[Array, Array, NDArray[np.intp]]:
+        """As `sheared`, by the law of these parameters."""
+        return self.sheared(build_for_shear(values, settings, self.azimuth), settings.steps)
+
     def predict(self, law: JointLaw, steps: int = STEPS) -> Array:
         """Shear stress (Pa) of a law at the points of this test, (n,); steps: as in `sheared`."""
         _, stress, rows = self.sheared(law, steps)
@@ -200,8 +206,7 @@ class ShearCurve:
         Last stands how far the law rises above its stress at the largest measured one before the
         next points on both sides: few points say by it that the peak lies there.
         """
-        law = build_for_shear(values, settings, self.azimuth)
-        _, stress, rows = self.sheared(law, settings.steps)
+        _, stress, rows = self.by_parameters(values, settings)
         top = int(np.argmax(np.abs(self.shear_stress)))
         near = stress[rows[max(top - 1, 0)] : rows[min(top + 1, rows.size - 1)] + 1]
         rise = np.max(np.sign(self.shear_stress[top]) * (near - stress[rows[top]]))

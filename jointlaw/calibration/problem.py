@@ -133,16 +133,12 @@ def pose(
             "ShearCurves"
         )
     values, settings = (dict(DEFAULTS), Settings()) if law is None else parameters(law)
-    if settings.closure_only and any(isinstance(curve, ShearCurve) for curve in curves):
-        raise ValueError("law: closure_only = True cannot shear; set it False to fit a ShearCurve")
     fixed = fixed or {}
     names = [name for name in free if name not in fixed]
     for name in (*fixed, *names):
         one_of("free or fixed", name, tuple(DEFAULTS))
     values |= {name: number(f"fixed[{name!r}]", value) for name, value in fixed.items()}
     build(values, settings)  # raises for values that no law has
-    if not settings.has_heights and {"alpha", "beta", "overlap"} & set(names):
-        raise ValueError("free: this law has no heights to fit; give it GammaHeights or law=None")
     for name in names:
         if math.isinf(values[name]):
             values[name] = _within(name, curves)
@@ -234,13 +230,11 @@ class Solution(NamedTuple):
     freedom: float  # degrees of freedom that the noise was estimated with
     prior_share: Array  # (p,) share of each variance that the priors contribute
 
-    def quantile(self, level: float) -> float:
-        """Standard errors either way that hold a parameter with this probability."""
-        if not 0 < level < 1:
-            raise ValueError(f"level = {level!r} is out of bounds: it must lie between 0 and 1")
-        if math.isinf(self.freedom):
-            return float(special.ndtri(0.5 + level / 2))
-        return float(special.stdtrit(self.freedom, 0.5 + level / 2))
+    @property
+    def quantile(self) -> float:
+        """Standard errors either way that hold a parameter with a probability of 95 %."""
+        known = math.isinf(self.freedom)
+        return float(special.ndtri(0.975) if known else special.stdtrit(self.freedom, 0.975))
 
 
 def solve(problem: Problem, starts: Sequence[Array]) -> Solution:

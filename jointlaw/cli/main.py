@@ -9,15 +9,15 @@ from typing import Any, NoReturn
 from ..laboratory.experiments import PathError
 from ..support.files import require_free
 from ..support.version import __version__
-from . import export, fit, laboratory, presets, scan, tradeoff
+from . import export, fit, laboratory, presets, scan
 
-COMMANDS = (laboratory, presets, export, fit, scan, tradeoff)
+COMMANDS = (laboratory, presets, export, fit, scan)
 
 _YIELDING = "write yield_interference into [asperity] of a law file; it starts with \
 jointlaw presets NAME > mine.toml"
 _TABLE = "call jointlaw.hosts.yade.export.export_yade(law, folder, closure=..., tolerance=...)"
 
-# Commands ("replay") and options ("tradeoff --loss") that were removed: what to use instead
+# Commands ("replay") and options ("fit --workers") that were removed: what to use instead
 REMOVED = {
     "replay": "a NonFiniteError carries `state` and `d`; joint.restore(error.state) and "
     "joint.update(error.d) repeat the step",
@@ -30,8 +30,8 @@ REMOVED = {
     "fit --formation": "give a law of that formation, such as --law westerly-smooth",
     "export --closure": _TABLE,
     "export --tolerance": _TABLE,
-    "tradeoff --loss": "small cycles need more depth cells: write resolution = { u = 3, phi = 6, "
-    "depth = 300 } into the law's file; docs/accuracy.md says how many",
+    "tradeoff": "in Python: import jointlaw as jl; "
+    "print(jl.JointLaw.from_toml('mine.toml').tradeoff())",
 }
 
 

@@ -45,9 +45,8 @@ def _run(options: argparse.Namespace) -> None:
     print(text)
     summary = {
         "parameters_SI": fit.parameters,
-        "standard_error_SI": fit.standard_error,
+        "standard_error_SI": {name: one.standard_error for name, one in fit.estimates.items()},
         "sampling_length_m": fit.asperities.size,
-        "identifiable": list(fit.identifiable),
         "not_identifiable": fit.not_identifiable,
     }
     files: Written = {"surface.toml": _toml(fit, Path(options.file).name), "report.md": text}

@@ -53,9 +53,8 @@ def _individual(
     (1 - s/y)^p is never seen by an ordinary rule. A histogram is integrated in closed form.
     """
     r0 = heights.overlap
-    if isinstance(heights, Heights) and heights.is_histogram:
+    if isinstance(heights, Heights):
         return _steps(y, 1 + eta, heights, beyond), _steps(y, eta, heights, beyond)
-    first = max(float(heights.breakpoints()[0]) - r0, 0.0)  # no asperity, and no panel, below
     rising = rise(heights)
     if rising:  # its quantiles may lie decades below the halvings
         beyond = beyond[beyond > beyond[-1] * _CLOSE]
@@ -73,7 +72,6 @@ def _individual(
     panel = np.minimum(panel, len(widths))  # beyond the last edge every panel is an ordinary one
     start = edges[np.maximum(panel - 1, 0)]
     start = np.where(panel >= len(widths), edges[np.minimum(panel, len(edges) - 1)], start)
-    start = np.maximum(start, first)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.clip(1 - nodes.ravel() / y[:, None], 0.0, None)
     below = (

@@ -35,18 +35,19 @@ class _OfOne(Generic[T]):
 
 
 class Joint:
-    """One joint: as `JointBatch`, with vectors (dim,) and a matrix (dim, dim)."""
+    """One joint: as `JointBatch`, with vectors (dim,) and a matrix (dim, dim).
 
-    def __init__(self, law: JointLaw) -> None:
+    batch: of one joint, which it takes over; a new one by default.
+    """
+
+    def __init__(self, law: JointLaw, batch: JointBatch | None = None) -> None:
         self.law = law
-        self._batch = JointBatch(law, 1)
+        self._batch = JointBatch(law, 1) if batch is None else batch
         d, F, C = np.empty((1, law.dim)), np.empty((1, law.dim)), np.empty((1, law.dim, law.dim))
         self._steps = Step(d, F, None), Step(d, F, C)  # without and with tangent
 
     def __copy__(self) -> Joint:
-        twin = Joint(self.law)
-        twin._batch = copy(self._batch)
-        return twin
+        return Joint(self.law, copy(self._batch))
 
     def __repr__(self) -> str:
         return f"<Joint at delta = {self.delta} m>"

@@ -29,20 +29,6 @@ class Turning(NamedTuple):
     gamma: Array  # (dim - 1, M, B)
 
 
-class _Slope(NamedTuple):
-    """Slope of every facet now, and the lengths that its plane is made of, all (M, B)."""
-
-    along: Array
-    across: Array
-    m: Array  # root of 1 + along^2
-    N: Array  # root of 1 + along^2 + across^2
-
-
-def in_plane(p: Array) -> Array:
-    """In-plane vectors (dim - 1, B) as (2, B)."""
-    return np.concatenate([p, np.zeros((2 - len(p), p.shape[1]))])
-
-
 def offset(k: Tables, p: Array) -> Array:
     """The offset o (dim - 1, B) that facets climb at the in-plane displacement p (dim - 1, B)."""
     if not k.fades:
@@ -57,8 +43,7 @@ def planes(k: Tables, p: Array, slopes: Array) -> Planes:
     if not k.fades:
         one = np.ones((1, 1))
         return Planes(k.m[:, :, None], k.n[:, :, None], np.stack([k.s, k.t])[..., None], one)
-    now = _slope(k, p, slopes)
-    along, across, m, N = now
+    along, across, m, N = _slope(k, p, slopes)
     one, none = np.ones_like(along), np.zeros_like(along)
     g = in_axes(k, np.stack([one, along, across]))
     s = in_axes(k, np.stack([-along, one, none]) / m)
@@ -69,8 +54,7 @@ def planes(k: Tables, p: Array, slopes: Array) -> Planes:
 
 def turning(k: Tables, p: Array, slopes: Array) -> Turning:
     """How the planes turn where p (dim - 1, B) changes."""
-    now = _slope(k, p, slopes)
-    along, across, m, N = now
+    along, across, m, N = _slope(k, p, slopes)
     w, x, z = _place(k, p)
     bend = -slopes * k.steep[:, None] * w * w / k.mating_length
     ee, ez, zz = 3 * x * (1 - x * x), z * (1 - 3 * x * x), x * (1 - 3 * z * z)
@@ -105,16 +89,19 @@ def _across(e: Array) -> Array:
 
 def _place(k: Tables, p: Array) -> tuple[Array, Array, Array]:
     """Root of 1 - |o/D|^2 (B,), and o/D along and across every azimuth (M, B)."""
-    far = in_plane(p) / k.mating_length
+    far = np.concatenate([p, np.zeros((2 - len(p), p.shape[1]))]) / k.mating_length
     w = 1 / np.sqrt(1 + np.sum(far * far, axis=0))
     x, z = (np.einsum("im,ib->mb", e, w * far) for e in (k.azimuth, _across(k.azimuth)))
     return w, x, z
 
 
-def _slope(k: Tables, p: Array, slopes: Array) -> _Slope:
-    """slopes tan(theta) (do/dp) e, along the azimuth and across it."""
+def _slope(k: Tables, p: Array, slopes: Array) -> tuple[Array, Array, Array, Array]:
+    """Slope of every facet now, slopes tan(theta) (do/dp) e: along the azimuth and across it.
+
+    Then the roots of 1 + along^2 and of 1 + along^2 + across^2, all (M, B).
+    """
     w, x, z = _place(k, p)
     steep = slopes * k.steep[:, None] * w
     along, across = steep * (1 - x * x), -steep * x * z
     m2 = 1 + along**2
-    return _Slope(along, across, np.sqrt(m2), np.sqrt(m2 + across**2))
+    return along, across, np.sqrt(m2), np.sqrt(m2 + across**2)

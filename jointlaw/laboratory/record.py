@@ -4,7 +4,6 @@ import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +26,6 @@ UNITS = {
     "stored": "J/m2",
     "dissipated": "J/m2",
 }
-ROUNDING = 1e-9  # of shares
 _LENGTHS = ((1e-9, "nm"), (1e-6, "µm"), (1e-3, "mm"), (1.0, "m"))
 _STRESSES = ((1.0, "Pa"), (1e3, "kPa"), (1e6, "MPa"), (1e9, "GPa"))
 _ENERGIES = ((1e-6, "µJ/m²"), (1e-3, "mJ/m²"), (1.0, "J/m²"), (1e3, "kJ/m²"))
@@ -171,24 +169,6 @@ class Record:
             return written(draw(self, plt), path)
 
 
-def without_steps(x: Array, share: Array) -> tuple[Array, Array]:
-    """Points (x, share) of a share of discrete facets (rows,), which changes in steps.
-
-    A step between a lower and a higher one is replaced by its middle. Ends, turning points of x
-    and largest and smallest shares stay as they are.
-    """
-    turns = np.flatnonzero(np.diff(np.sign(np.diff(x)))) + 1
-    jumps = np.flatnonzero(np.abs(np.diff(share)) > ROUNDING) + 1
-    first = np.unique([0, *turns, *jumps])
-    last = np.append(first[1:], len(share)) - 1
-    level = share[first]
-    between = np.zeros(len(level), bool)
-    between[1:-1] = np.diff(level)[:-1] * np.diff(level)[1:] > 0
-    ends = np.stack([x[first], x[last]], axis=1)
-    ends[between] = ends[between].mean(axis=1, keepdims=True)
-    return ends.ravel(), np.repeat(level, 2)
-
-
 def _scaled(values: Array, units: tuple[tuple[float, str], ...]) -> tuple[Array, str]:
     """Values in the largest unit that leaves their peak at one or more."""
     peak = float(np.max(np.abs(values)))
@@ -204,15 +184,13 @@ def _shear_figure(record: Record, plt: Any) -> Any:
     axes[0, 0].plot(shear, stress[1], color="0.5", lw=1, label="normal stress")
     axes[0, 0].set_ylabel(f"stress ({unit})")
     axes[0, 0].legend()
-    _arrows(axes[0, 0], shear, stress[0])
     axes[0, 1].plot(shear, record.friction_angle, color="C3")
     axes[0, 1].set_ylabel("mobilised friction angle (°)")
     dilation, small = _scaled(record.closure[0] - record.closure, _LENGTHS)
     axes[1, 0].plot(shear, dilation, color="C2")
     axes[1, 0].set_ylabel(f"dilation ({small})")
-    _arrows(axes[1, 0], shear, dilation)
     for label, share in (("sliding", record.sliding), ("separated", record.separated)):
-        axes[1, 1].plot(*without_steps(shear, 100 * share), label=label)
+        axes[1, 1].plot(shear, 100 * share, label=label)
     axes[1, 1].set(ylabel="share of facets (%)", ylim=(-3, 103))
     axes[1, 1].legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False)
     for axis in axes[1]:
@@ -222,18 +200,6 @@ def _shear_figure(record: Record, plt: Any) -> Any:
         f"largest friction angle {record.peak_friction_angle:.1f}°"
     )
     return figure
-
-
-def _arrows(axis: Any, x: Array, y: Array) -> None:
-    """The sense of a path, by an arrow in the middle of each leg of two steps or more."""
-    turns = np.flatnonzero(np.diff(np.sign(np.diff(x)))) + 1
-    ends = [0, *turns.tolist(), len(x) - 1]
-    for first, last in pairwise(ends):
-        if last - first < 2:
-            continue
-        at = (first + last) // 2
-        way = {"arrowstyle": "-|>", "color": "k", "lw": 0, "mutation_scale": 16}
-        axis.annotate("", (x[at + 1], y[at + 1]), (x[at], y[at]), arrowprops=way)
 
 
 def _closure_figure(record: Record, plt: Any) -> Any:

@@ -1121,7 +1121,7 @@ JL_IN_ void jl_step_facets_(const jlaw_law *law, int at, const jl_motion_ *m, jl
   const int kept = k.kept ? jl_state_rows_(law) : 0;
   const double *f = jl_facet_of_(law, at), *cell = jl_cell_of_(law, at);
   jl_facets_ o;
-  o.y0 = o.y1 = o.es = o.et = o.bend = jl_each_(0.0);
+  o.y0 = o.y1 = o.es = o.et = o.bend = o.strength = o.fw = o.kw = jl_each_(0.0);
   for (int i = 0; i < k.dim && !k.fades; i++) {
     o.y0 += jl_column_(f, JLAW_M + i) * m->from[i];
     o.y1 += jl_column_(f, JLAW_M + i) * m->to[i];

@@ -556,7 +556,7 @@ IN void step_facets(const jlaw_law *law, int at, const motion *m, numbers n, sum
   const int kept = k.kept ? state_rows(law) : 0;
   const double *f = facet_of(law, at), *cell = cell_of(law, at);
   facets o;
-  o.y0 = o.y1 = o.es = o.et = o.bend = each(0.0);
+  o.y0 = o.y1 = o.es = o.et = o.bend = o.strength = o.fw = o.kw = each(0.0);
   for (int i = 0; i < k.dim && !k.fades; i++) {
     o.y0 += column(f, JLAW_M + i) * m->from[i];
     o.y1 += column(f, JLAW_M + i) * m->to[i];

@@ -100,13 +100,6 @@ def hertz_mindlin_ratio(nu: float) -> float:
     return 2 * (1 - nu) / (2 - nu)
 
 
-def inclination(orientation: HasShape) -> tuple[float, float]:
-    """Mean (rad) and variance (rad^2) of the inclinations, Eq. 17; both 0 at a = infinity."""
-    a, b, _ = _shape(orientation)
-    spread = 36 * math.pi - 108 + (20 - 6 * math.pi) * b - b**2
-    return (6 - b) / (6 * a), spread / (6 * a) ** 2
-
-
 def _shape(orientation: HasShape) -> Shape:
     """a, b and c within their bounds; a may be infinite."""
     return Shape(*bounded(orientation.a, orientation.b, orientation.c, smooth=True))

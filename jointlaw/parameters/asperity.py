@@ -1,13 +1,9 @@
 """One asperity contact: normal power law, Mindlin shear, Coulomb friction (Eq. 33-36)."""
 
 import math
-from dataclasses import InitVar, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 from ..support.checks import at_least, more_than, number
-
-# What those read who ask for parameters of former versions
-WEAR_REMOVED = "slopes wear instead: give the law slope_wear (J/m2) and slope_residual"
 
 
 @dataclass(frozen=True)
@@ -34,10 +30,8 @@ class Asperity:
     eta: float
     mu: float
     yield_interference: float = math.inf
-    mu_residual: InitVar[Any] = None  # of former versions
-    wear_slip: InitVar[Any] = None
 
-    def __post_init__(self, mu_residual: Any, wear_slip: Any) -> None:
+    def __post_init__(self) -> None:
         set_ = object.__setattr__
         set_(self, "K", more_than("asperity.K", self.K, 0.0))
         set_(self, "lam", more_than("asperity.lam", self.lam, 0.0))
@@ -45,9 +39,6 @@ class Asperity:
         set_(self, "mu", at_least("asperity.mu", self.mu, 0.0))
         name, limit = "yield_interference", self.yield_interference
         set_(self, name, more_than(f"asperity.{name}", limit, 0.0, infinite=True))
-        for name, value in (("mu_residual", mu_residual), ("wear_slip", wear_slip)):
-            if value is not None:
-                raise ValueError(f"asperity.{name} is removed: {WEAR_REMOVED}")
 
     @classmethod
     def hertz_mindlin(cls, G: float, nu: float, R: float, mu: float) -> "Asperity":

@@ -10,7 +10,7 @@ write instead. A rule for the value of a key is one of
 """
 
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -45,14 +45,6 @@ def parse(text: str, where: str) -> Table:
         raise ValueError(f"{where} is not valid TOML: {error}") from None
 
 
-def known(data: Mapping[str, Any], allowed: Iterable[str], where: str, prefix: str = "") -> None:
-    """Refuse keys that a table does not have. Raises ValueError naming key and remedy."""
-    for key in data:
-        if key not in allowed:
-            hint = remedy(key, sorted(allowed), "known here:")
-            raise ValueError(f"{where}: key '{prefix}{key}' is unknown; {hint}")
-
-
 def checked(data: Any, rules: Mapping[str, Any], where: str, path: str = "") -> Table:
     """A table whose keys are those of `rules`, and whose values pass them.
 
@@ -63,12 +55,15 @@ def checked(data: Any, rules: Mapping[str, Any], where: str, path: str = "") -> 
         raise ValueError(f"{where}: key {path!r} must be a table")
     prefix = f"{path}." if path else ""
     rule_of = {key.rstrip("!"): rule for key, rule in rules.items()}
-    allowed = [key for key, rule in rule_of.items() if not isinstance(rule, Removed)]
-    known({key: None for key in data if not isinstance(rule_of.get(key), Removed)}, allowed,
-          where, prefix)  # fmt: skip
     found: Table = {}
     for key, value in data.items():
-        rule, name = rule_of[key], prefix + key
+        name = prefix + key
+        if key not in rule_of:
+            kept = sorted(k for k, rule in rule_of.items() if not isinstance(rule, Removed))
+            raise ValueError(
+                f"{where}: key '{name}' is unknown; {remedy(key, kept, 'known here:')}"
+            )
+        rule = rule_of[key]
         if isinstance(rule, Removed):
             if value != rule.neutral:
                 raise ValueError(f"{where}: key '{name}' is removed: {rule.use}")
@@ -97,5 +92,4 @@ def as_given(name: str, value: Any) -> Any:
 
 def keys_of(kind: Any) -> dict[str, Any]:
     """Rules for a table with the fields of a dataclass, which checks their values itself."""
-    own = [one for one in fields(kind) if one.init]
-    return {one.name + ("!" if one.default is MISSING else ""): as_given for one in own}
+    return {one.name + ("!" if one.default is MISSING else ""): as_given for one in fields(kind)}

@@ -1,14 +1,9 @@
 """How finely the law is discretised: orientations and depth cells."""
 
 import math
-from dataclasses import InitVar, dataclass
+from dataclasses import dataclass
 
 from ..support.checks import integer
-
-# What those read who ask for options of former versions
-FRONT_REMOVED = "resolution.front is removed: take more depth cells instead, such as depth = 12"
-SLIP_REMOVED = "give mating_length (m), over which slopes fade and friction becomes residual"
-LOSS_REMOVED = "loss is removed: take more depth cells instead, such as Resolution(3, 6, 48)"
 
 
 @dataclass(frozen=True)
@@ -25,14 +20,11 @@ class Resolution:
     u: int
     phi: int
     depth: int
-    front: InitVar[bool] = False  # of former versions
 
-    def __post_init__(self, front: bool) -> None:
+    def __post_init__(self) -> None:
         object.__setattr__(self, "u", integer("resolution.u", self.u, 1))
         object.__setattr__(self, "phi", integer("resolution.phi", self.phi, 3))
         object.__setattr__(self, "depth", integer("resolution.depth", self.depth, 1))
-        if front:
-            raise ValueError(FRONT_REMOVED)
 
     @property
     def sliders(self) -> int:

@@ -3,36 +3,42 @@
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
-from pathlib import Path
 from typing import Any, TypeVar
 
-from ..support.files import replace_file
-from .asperity import WEAR_REMOVED, Asperity
+from .asperity import Asperity
 from .bond import Bond
 from .heights import GammaHeights, Heights
-from .keys import Removed, as_given, checked, keys_of, read
+from .keys import Removed, as_given, checked, keys_of
 from .orientation import Orientation
-from .resolution import SLIP_REMOVED, Resolution, named
+from .resolution import Resolution, named
 
 _RESOLUTION = keys_of(Resolution) | {
     "front": Removed("take more depth cells instead, such as depth = 12", neutral=False)
 }
+_WEAR = "slopes wear instead: give the law slope_wear (J/m2) and slope_residual"
 _ASPERITY = keys_of(Asperity) | {
-    "mu_residual": Removed(WEAR_REMOVED, neutral=None),
-    "wear_slip": Removed(WEAR_REMOVED, neutral=math.inf),
+    "mu_residual": Removed(_WEAR, neutral=None),
+    "wear_slip": Removed(_WEAR, neutral=math.inf),
 }
 _LAW = {
     "orientation!": keys_of(Orientation), "asperity!": _ASPERITY, "heights": as_given,
     "asperity_density!": as_given, "closure_range": as_given, "resolution": as_given,
     "plane": as_given, "closure_only": as_given, "mating_length": as_given,
     "slope_wear": as_given, "slope_residual": as_given,
-    "critical_slip": Removed(SLIP_REMOVED, neutral=math.inf),
+    "critical_slip": Removed(
+        "give mating_length (m), over which slopes fade and friction becomes residual",
+        neutral=math.inf,
+    ),
     "bond": keys_of(Bond), "about": as_given,  # free table for title, source and notes
     "version": as_given,
 }  # fmt: skip
-_HEIGHTS = keys_of(Heights) | {
-    "histogram": Removed("write its `counts` and `edges` (m) into this table", neutral=None)
-}
+_BY_NAME = "write `counts` and `edges` (m) of a histogram, or `alpha` and `beta` of a gamma one"
+_HEIGHTS = {
+    "counts!": as_given, "edges!": as_given, "overlap": as_given, "formation": as_given,
+    "histogram": Removed("write its `counts` and `edges` (m) into this table", neutral=None),
+    "distribution": Removed(_BY_NAME, neutral=None),
+    "parameters": Removed(_BY_NAME, neutral=None),
+}  # fmt: skip
 _UNITS = {
     "asperity_density": "1/m2", "closure_range": "m", "mating_length": "m", "plane": "rad",
     "slope_wear": "J/m2", "K": "Pa m^(1-eta)", "yield_interference": "m", "beta": "m",
@@ -45,8 +51,8 @@ T = TypeVar("T")
 VERSION = 1  # of the keys; a file without one is of version 1
 
 
-def write_law(law: Mapping[str, Any], path: Path | None) -> str:
-    """TOML text of a law's parameters, also written to `path` if given."""
+def law_text(law: Mapping[str, Any]) -> str:
+    """TOML text of a law's parameters."""
     r = law["resolution"]
     lengths = law["mating_length"], law["asperity"].yield_interference, law["closure_range"]
     names = named(*lengths)
@@ -61,11 +67,8 @@ def write_law(law: Mapping[str, Any], path: Path | None) -> str:
     for part in ("orientation", "asperity", "heights", "bond"):
         if law[part] is not None:
             values = {one.name: getattr(law[part], one.name) for one in fields(law[part])}
-            lines += ["", f"[{part}]", *_lines(values, [name for name in values if name[0] != "_"])]
-    text = "\n".join(lines) + "\n"
-    if path is not None:
-        replace_file(path, text.encode())
-    return text
+            lines += ["", f"[{part}]", *_lines(values, values)]
+    return "\n".join(lines) + "\n"
 
 
 def _lines(values: Mapping[str, Any], names: Iterable[str]) -> list[str]:
@@ -73,10 +76,9 @@ def _lines(values: Mapping[str, Any], names: Iterable[str]) -> list[str]:
     lines = []
     for name in names:
         value = values[name]
-        absent = value is None or value is False or value == ()
-        if absent or (name in _OFF and value == _OFF[name]):
+        if value is None or value is False or (name in _OFF and value == _OFF[name]):
             continue
-        if name == "distribution" and isinstance(value, tuple):
+        if name == "distribution":
             lines += [f"counts = {list(value[0])}", f"edges = {list(value[1])}  # m"]
             continue
         unit = f"  # {_UNITS[name]}" if name in _UNITS else ""
@@ -88,18 +90,7 @@ def _text(value: Any) -> str:
     """A value as TOML."""
     if isinstance(value, float):
         return repr(value + 0.0)  # -0.0 is 0.0; inf is TOML too
-    if isinstance(value, tuple):  # parameters of a distribution
-        return "{ " + ", ".join(f"{k} = {v!r}" for k, v in value) + " }"
     return "true" if value is True else f'"{value}"'
-
-
-def read_law(build: Callable[..., T], path: str | Path) -> T:
-    """A law from a TOML file."""
-    if "\n" in str(path):
-        raise ValueError("this is TOML text, not the path of a law file: use JointLaw.from_text")
-    path = Path(path)
-    data = read(path, "law file")
-    return build_law(build, data, str(path))
 
 
 def build_law(build: Callable[..., T], data: dict[str, Any], where: str) -> T:
@@ -130,9 +121,7 @@ def build_law(build: Callable[..., T], data: dict[str, Any], where: str) -> T:
 
 
 def _heights(data: Any, where: str) -> GammaHeights | Heights:
-    table = dict(data) if isinstance(data, dict) else {}
-    if "alpha" in table or "beta" in table:
+    if isinstance(data, dict) and ("alpha" in data or "beta" in data):
         return GammaHeights(**checked(data, keys_of(GammaHeights), where, "heights"))
-    if "counts" in table:
-        table["distribution"] = (table.pop("counts"), table.pop("edges", ()))
-    return Heights(**checked(table or data, _HEIGHTS, where, "heights"))
+    table = checked(data, _HEIGHTS, where, "heights")
+    return Heights((table.pop("counts"), table.pop("edges")), **table)

@@ -28,6 +28,15 @@ def replace_file(path: Path, data: bytes) -> None:
         temporary.unlink(missing_ok=True)
 
 
+def write_files(directory: str | Path, files: Mapping[str, str | bytes]) -> Path:
+    """Write files by name into a folder, which is made if missing; returns it."""
+    folder = Path(directory)
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, data in files.items():
+        replace_file(folder / name, data.encode() if isinstance(data, str) else data)
+    return folder
+
+
 def require_free(folder: Path) -> None:
     """Refuse a folder that holds another run. Raises ValueError with the remedy."""
     if held := [name for name in MARKS if (folder / name).exists()]:

@@ -41,23 +41,9 @@ class SurfaceFit:
         return {name: one.value for name, one in self.estimates.items()}
 
     @property
-    def standard_error(self) -> dict[str, float]:
-        """Their standard errors."""
-        return {name: one.standard_error for name, one in self.estimates.items()}
-
-    def interval(self, name: str) -> tuple[float, float]:
-        """95 % interval of a parameter; of alpha, beta and overlap by their logarithms."""
-        return self.estimates[name].low, self.estimates[name].high
-
-    @property
     def not_identifiable(self) -> dict[str, str]:
         """Parameters that this scan leaves open, with the reason."""
         return {name: one.left_open for name, one in self.estimates.items() if one.left_open}
-
-    @property
-    def identifiable(self) -> tuple[str, ...]:
-        """Parameters that this scan fixes."""
-        return tuple(name for name, one in self.estimates.items() if not one.left_open)
 
     @property
     def orientation(self) -> Orientation:

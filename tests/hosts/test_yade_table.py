@@ -85,7 +85,6 @@ engines()
 class Live:
     mode = "live"
 attempt("keep", lambda: Joints(Live()).attach())
-attempt("lagged", lambda: joints(lagged=True))
 attempt("name", lambda: joints(name="a b"))
 attempt("run", lambda: yade_joint.run("nobody"))
 np.savez("old.npz", ids=[])
@@ -223,7 +222,7 @@ def test_refusals_name_the_remedy(scenes):
     """Set-ups that would give wrong forces are refused, each with what to do instead."""
     words = {
         "no loop": "set O.engines before attach", "stepper": "joints.time_step()",
-        "keep": "neverErase=True", "lagged": "leave it out", "name": "identifier",
+        "keep": "neverErase=True", "name": "identifier",
         "run": ".load(file)", "periodic": "O.periodic", "area": "area = -1", "phys": "select=",
         "version": "start the run anew", "missed": "every step", "taken": "give another name=",
         "npz table": "export the law again",

@@ -73,9 +73,11 @@ def test_a_mistake_is_told_by_file_and_key(tmp_path, old, new, message):
     ("heights", "message"),
     [
         ("heights = 3\n", "key 'heights' must be a table"),
-        ("[heights]\n", "key 'heights.distribution' is missing"),
-        ('[heights]\ndistribution = "chi2"\nparameters = { dff = 3 }', "dff"),
-        ('[heights]\ndistribution = "chi2"\nparameters = 3', "heights.parameters = 3"),
+        ("[heights]\n", "key 'heights.counts' is missing"),
+        (
+            '[heights]\ndistribution = "chi2"',
+            "'heights.distribution' is removed: write `counts`",
+        ),
         (
             '[heights]\nhistogram = "h.csv"',
             "key 'heights.histogram' is removed: write its `counts`",
@@ -103,7 +105,7 @@ def test_a_mapping_is_checked_alike_and_left_alone():
     data |= {"asperity_density": 1.0, "heights": {"counts": [1], "edges": [0.0, 1.0]}}
     data["heights"] |= {"formation": "individual"}
     before = repr(data)
-    assert jl.JointLaw.from_dict(data).heights.is_histogram
+    assert isinstance(jl.JointLaw.from_dict(data).heights, jl.Heights)
     assert repr(data) == before
     data["orientation"]["e"] = 1
     with pytest.raises(ValueError, match=r"here: key 'orientation\.e' is unknown"):

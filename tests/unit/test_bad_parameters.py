@@ -105,16 +105,6 @@ def test_parameters_of_the_law(law, name, value, message):
         jl.JointLaw(**({"asperity_density": 1e10} | values | {name: value}))
 
 
-def test_parameters_of_former_versions_name_their_successors(law):
-    values = {one: getattr(law, one) for one in ("orientation", "asperity", "asperity_density")}
-    with pytest.raises(ValueError, match=r"critical_slip is removed: give mating_length"):
-        jl.JointLaw(**values, critical_slip=1e-3)
-    with pytest.raises(ValueError, match=r"asperity.wear_slip is removed: .* slope_wear"):
-        jl.Asperity(1.0, 1.0, 0.5, 0.3, wear_slip=1.0)
-    with pytest.raises(ValueError, match=r"asperity.mu_residual is removed: .* slope_wear"):
-        jl.Asperity(1.0, 1.0, 0.5, 0.3, mu_residual=0.1)
-
-
 @pytest.mark.parametrize(
     ("more", "given", "told"),
     [

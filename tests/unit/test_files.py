@@ -13,8 +13,6 @@ KINDS = {
     "gamma": {},
     "individual": {"heights": "individual"},
     "no heights": {"heights": None},
-    "chi2": {"heights": jl.Heights("chi2", 2e-6, parameters={"df": 9.6, "scale": 1 / 3e6})},
-    "no parameters": {"heights": jl.Heights("expon", 1e-6, "individual", {})},
     "histogram": {"heights": jl.Heights(HISTOGRAM, 1e-6, "individual")},
     "plane": {"plane": -1 / 3, "mating_length": 1 / 3e4, "slope_wear": 1e5 / 3},
     "closure only": {"closure_only": True},

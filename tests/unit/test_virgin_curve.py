@@ -16,7 +16,7 @@ CASES = {
     "no overlap": jl.GammaHeights(6.14, 3.52e-6, 0.0, "individual"),
     "histogram": jl.Heights(([1, 3, 2], [1e-6, 2e-6, 4e-6, 5e-6]), 0.5e-6, "individual"),
     "histogram, in touch": jl.Heights(([1, 3, 2], [0, 2e-6, 4e-6, 5e-6]), 3e-6, "individual"),
-    "late uniform": jl.Heights("uniform", 0.0, "individual", {"loc": 1e-6, "scale": 1e-5}),
+    "late uniform": jl.Heights(([1], [1e-6, 1.1e-5]), 0.0, "individual"),
 }
 # From touch far below an asperity to far beyond the last, and next to the edges of the histograms
 Y = [*np.geomspace(1e-10, 1e-3, 15), 0.5e-6 * (1 + 1e-9), 1.5e-6 * (1 - 1e-9), 4.5e-6]

@@ -51,7 +51,7 @@ def test_sliding_block(law):
     g = 9.81 * np.array([np.sin(0.84), -np.cos(0.84)])
     sim = Simulation(one_block(law, (float(g[0]), float(g[1])), at=(-1.0, 0.25)))
     lost = [0.0]
-    for _ in range(1500):
+    for _ in range(1100):
         sim.step()
         lost.append(sim.ledger.value["friction"])
     assert sim.blocks.motion[0, 1] > -0.9

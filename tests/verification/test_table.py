@@ -1,7 +1,7 @@
 """The table against the law it was made from: where it must be exact, and what it drops."""
 
 import math
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -178,14 +178,3 @@ def test_follow_makes_no_energy(table):
         d = np.diff(path[100:], axis=0)
         work = np.sum((F[1:] + F[:-1]) / 2 * d)
         assert work > -1e-4 * np.abs(F).max() * table.closure[-1]
-
-
-def test_export_refuses_a_table_of_another_law_and_writes_nothing(law, table, tmp_path):
-    """Else joint.txt and law.toml of one folder would hold different joints."""
-    softer = replace(law, asperity=replace(law.asperity, K=law.asperity.K / 2))
-    with pytest.raises(ValueError, match="table is of another law"):
-        jl.export_yade(softer, tmp_path / "folder", table=table)
-    assert not (tmp_path / "folder").exists()
-    table.save(tmp_path / "joint.txt")  # one that was read back is as good
-    jl.export_yade(law, tmp_path / "folder", table=jl.load_table(tmp_path / "joint.txt"))
-    assert jl.JointLaw.from_toml(tmp_path / "folder" / "law.toml") == law

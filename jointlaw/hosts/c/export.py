@@ -13,7 +13,7 @@ from ...law import JointLaw
 from ...native import layout
 from ...native.layout import FORMAT
 from ...support.checks import Array
-from ...support.files import replace_file
+from ...support.files import write_files
 
 FILES = ("example.c", "example.cpp", "Makefile", "README.md")
 HEADER = "jointlaw.h"
@@ -37,17 +37,13 @@ def export_c(law: JointLaw, directory: str | Path, name: str = "joint") -> list[
     ValueError for a name that C cannot have or too many azimuths, before anything is written.
     """
     require_name(name)
-    tables = {f"{name}.jlaw": table_text(law), f"{name}.h": header_text(law, name)}
-    folder = Path(directory)
-    folder.mkdir(parents=True, exist_ok=True)
+    texts = {f"{name}.jlaw": table_text(law), f"{name}.h": header_text(law, name)}
+    texts[HEADER] = (layout.HERE / HEADER).read_text(encoding="utf-8")
     source = resources.files(__package__)
     for file in FILES:
-        text = (source / file).read_text(encoding="utf-8")
-        _write(folder / file, text.replace(_MODEL, name))
-    _write(folder / HEADER, (layout.HERE / HEADER).read_text(encoding="utf-8"))
-    for file, text in tables.items():
-        _write(folder / file, text)
-    return [*tables, HEADER, *FILES]
+        texts[file] = (source / file).read_text(encoding="utf-8").replace(_MODEL, name)
+    write_files(directory, texts)
+    return list(texts)
 
 
 def require_name(name: str) -> None:
@@ -171,7 +167,3 @@ def _sum(data: bytes) -> int:
         if byte != 13:
             value = (value ^ byte) * 0x100000001B3 & 0xFFFFFFFFFFFFFFFF
     return value
-
-
-def _write(path: Path, text: str) -> None:
-    replace_file(path, text.encode())

@@ -6,7 +6,7 @@ from textwrap import fill
 
 from ...law import JointLaw
 from ...support.checks import number
-from ...support.files import replace_file
+from ...support.files import write_files
 from ..c import export as c
 
 SEATING = 10e3  # Pa
@@ -44,10 +44,7 @@ def export_fem(
             for mark, value in marks.items():
                 text = text.replace(f"@{mark}@", value)
             texts[file.name] = text.replace("granite", name)
-    folder = Path(directory)
-    folder.mkdir(parents=True, exist_ok=True)
-    for file_name, text in texts.items():
-        replace_file(folder / file_name, text.encode())
+    write_files(directory, texts)
     return list(texts)
 
 

@@ -5,7 +5,7 @@ from importlib import resources
 from pathlib import Path
 
 from ...law import JointLaw
-from ...support.files import replace_file
+from ...support.files import write_files
 from ...tables.tabulate import require_3d
 from ..c import export as c
 
@@ -28,13 +28,10 @@ def export_lammps(law: JointLaw, directory: str | Path, name: str = "joint") -> 
     texts = {f"{name}.jlaw": c.table_text(law), "joint.in": variables(law, name)}
     with suppress(ValueError):  # heights of a class of its own have no form as TOML
         texts["law.toml"] = law.to_toml()
-    folder = Path(directory)
-    folder.mkdir(parents=True, exist_ok=True)
     source = resources.files(__package__) / "files"
     copies = {file: (source / file).read_bytes() for file in FILES}
     copies["jointlaw.h"] = (Path(c.include_dir()) / "jointlaw.h").read_bytes()
-    for file, data in {**copies, **{k: v.encode() for k, v in texts.items()}}.items():
-        replace_file(folder / file, data)
+    folder = write_files(directory, {**copies, **texts})
     (folder / "build.sh").chmod(0o755)
     return [*texts, *copies]
 

@@ -6,44 +6,32 @@ from typing import Any
 
 from ... import tables
 from ...law import JointLaw
-from ...support.files import replace_file, write_json
+from ...support.files import write_files, write_json
 from ...tables.joint_table import JointTable
 from ...tables.tabulate import require_3d, tabulate
 
 COPIED = ("yade_joint.py", "joint_table.py", "settle_and_incline.py")
 
 
-def export_yade(
-    law: JointLaw, directory: str | Path, table: JointTable | None = None, **options: Any
-) -> JointTable:
+def export_yade(law: JointLaw, directory: str | Path, **options: Any) -> JointTable:
     """Write all that an unmodified YADE needs to run this joint; the folder may be copied away.
 
     Parameters
     ----------
     law: a law in 3-D (`plane=None`).
     directory: folder to write to; made if missing, files of the same names are replaced.
-    table: a table of this law; made with `tabulate(law, **options)` by default.
+    options: of the table, as in `tabulate`.
 
     Writes `joint.txt` (the table), `law.toml` (for live mode), `yade_joint.py` with
     `joint_table.py` (the adapter: YADE and numpy alone), the script `settle_and_incline.py` and
     `summary.json`. Returns the table. Raises ValueError for a law or option that cannot be
-    tabulated and for a table of another law, before anything is written.
+    tabulated, before anything is written.
     """
     require_3d(law)
-    if table is None:
-        table = tabulate(law, **options)
-    elif options:
-        raise ValueError(f"{', '.join(options)}: give a table or options for one, not both")
-    elif table.metadata.get("law") != law.to_toml():
-        raise ValueError(
-            "table is of another law: joint.txt and law.toml would differ; give the law that its "
-            'metadata["law"] holds, or leave the table out'
-        )
+    table = tabulate(law, **options)
     report = table.report(law)
-    folder = Path(directory)
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = write_files(directory, {"law.toml": law.to_toml()})
     table.save(folder / "joint.txt")
-    law.to_toml(folder / "law.toml")
     copy_files(folder)
     summary = {
         "version": 1,
@@ -58,6 +46,5 @@ def export_yade(
 def copy_files(folder: Path) -> None:
     """Copy the adapter, the table that it needs, and the script."""
     own, shared = resources.files(__package__) / "files", resources.files(tables)
-    for name in COPIED:
-        source = shared if name == "joint_table.py" else own
-        replace_file(folder / name, (source / name).read_bytes())
+    sources = {name: shared if name == "joint_table.py" else own for name in COPIED}
+    write_files(folder, {name: (source / name).read_bytes() for name, source in sources.items()})

@@ -176,11 +176,9 @@ class Joints:
     """
 
     def __init__(self, law, area=None, select=None, azimuth=(1, 0, 0), plane=None, mated=False,
-                 forget=np.inf, name="joints", lagged=False):  # fmt: skip
+                 forget=np.inf, name="joints"):  # fmt: skip
         if not name.isidentifier():
             raise ValueError(f"name = {name!r} must be a Python identifier: it labels the engine")
-        if lagged:
-            raise ValueError("lagged = True is gone, because it created energy: leave it out")
         self.law, self.select, self.name = law, select, name
         self.area = area if area is None or callable(area) else float(area)
         self.azimuth = unit(np.array(azimuth, float))

@@ -42,7 +42,7 @@ def draw(record: Record, title: str, path: Path) -> None:
     blocks, start, now = record.scene.blocks, outlines(record, 0), outlines(record, -1)
     corners = np.concatenate([*start, *now])
     wide, high = np.ptp(corners, axis=0)
-    figure = Figure(figsize=(WIDTH, max(WIDTH * high / wide, 2.0) + 1.3))
+    figure = Figure(figsize=(WIDTH, max(WIDTH * high / wide, 2.0) + 1.6), layout="constrained")
     axes = figure.add_subplot(title=title, xlabel="x (m)", ylabel="y (m)", aspect="equal")
     rock = [shape for block, shape in zip(blocks, now, strict=True) if block.fixed]
     free = np.array([not block.fixed for block in blocks])

@@ -66,11 +66,11 @@ def test_the_unsheared_joint(lib, tmp_path, seed):
         assert np.isnan(lib.jlaw_closure(joint.law, bad))
     assert np.isnan(lib.jlaw_normal_stress(joint.law, 2 * law.largest_reach))
     assert lib.jlaw_fingerprint(joint.law).decode() == law.fingerprint
-    fades, bonded = np.isfinite(law.mating_length), law.bond is not None
+    fades = np.isfinite(law.mating_length)
     joint.state[:] = 1.0  # what was there before is gone
     assert lib.jlaw_unmated(joint.law, at(joint.state)) == (0 if fades else -1)
-    apart = law.joint(mated=not (fades or bonded)).snapshot().values[0]
-    np.testing.assert_array_equal(joint.state, apart)
+    apart = law.joint(mated=law.bond is None and not fades).snapshot()
+    np.testing.assert_array_equal(joint.state, apart.values[0])
 
 
 def test_a_refused_step_moves_nothing_and_tells_why(lib, tmp_path):

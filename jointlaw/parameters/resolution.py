@@ -43,6 +43,9 @@ NAMED = {
     "reference": Resolution(16, 10, 24),
 }
 NAMED_SHORT = NAMED | {"fast": Resolution(2, 3, 3), "balanced": Resolution(2, 4, 4)}
+# Where slopes fade that late friction peaks before they do: the steepest facets decide
+LATE = 100.0  # closure ranges
+NAMED_LATE = {"fine": Resolution(6, 8, 8)}
 # The flattened springs of a facet all touch at the same closure, so that more depth cells help
 # less than more orientations
 FLAT = 0.5  # closure ranges: with a smaller yield interference many facets are flattened
@@ -57,7 +60,10 @@ def named(
     closure_range: float = 1.0,
 ) -> dict[str, Resolution]:
     """The resolutions by name of a law with these lengths (m)."""
-    names = NAMED if mating_length / closure_range >= LONG else NAMED_SHORT
+    lengths = mating_length / closure_range
+    names = NAMED if lengths >= LONG else NAMED_SHORT
+    if LATE <= lengths < math.inf:
+        names = names | NAMED_LATE
     return names | NAMED_FLAT if yield_interference / closure_range < FLAT else names
 
 

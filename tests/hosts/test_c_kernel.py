@@ -51,7 +51,7 @@ def test_the_bits_of_python(tmp_path, name):
             assert energies == pytest.approx(asked, rel=1e-12, abs=1e-300)
 
 
-@pytest.mark.parametrize("seed", [0, 3, 6, 15])
+@pytest.mark.parametrize("seed", [0, 1, 3, 6, 15, 20])
 def test_the_unsheared_joint(lib, tmp_path, seed):
     law = random_law(seed)
     joint = CLaw(lib, law, tmp_path)
@@ -66,6 +66,11 @@ def test_the_unsheared_joint(lib, tmp_path, seed):
         assert np.isnan(lib.jlaw_closure(joint.law, bad))
     assert np.isnan(lib.jlaw_normal_stress(joint.law, 2 * law.largest_reach))
     assert lib.jlaw_fingerprint(joint.law).decode() == law.fingerprint
+    fades = np.isfinite(law.mating_length)
+    joint.state[:] = 1.0  # what was there before is gone
+    assert lib.jlaw_unmated(joint.law, at(joint.state)) == (0 if fades else -1)
+    apart = law.joint(mated=law.bond is None and not fades).snapshot()
+    np.testing.assert_array_equal(joint.state, apart.values[0])
 
 
 def test_a_refused_step_moves_nothing_and_tells_why(lib, tmp_path):

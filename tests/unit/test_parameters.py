@@ -27,15 +27,16 @@ def test_equal_laws_have_one_fingerprint(make_law):
 
 
 @pytest.mark.parametrize("name", ["fast", "balanced", "fine", "reference"])
-def test_a_short_mating_length_chooses_other_nodes(make_law, name):
+def test_the_mating_length_chooses_the_nodes(make_law, name):
     """Its own depth cells and facets; a file holds the name, not the nodes."""
-    for ratio, chosen in ((2.4, named(2.4)), (2.6, named())):
+    for ratio, chosen in ((2.4, named(2.4)), (2.6, named()), (101.0, named(101.0))):
         law = make_law(resolution=name, closure_range=1e-6, mating_length=ratio * 1e-6)
         assert law.resolution == chosen[name]
         assert len(law.facets.theta) == len(law.tables.c1)
         assert f'resolution = "{name}"' in law.to_toml()
         assert jl.JointLaw.from_text(law.to_toml()) == law
     assert (named(2.4)[name] != named()[name]) == (name in ("fast", "balanced"))
+    assert (named(101.0)[name] != named()[name]) == (name == "fine")
 
 
 def test_the_default_closure_range_is_the_same_for_every_resolution(make_law):

@@ -153,7 +153,7 @@ def test_peak_with_friction_and_residual(name, tough):
             assert peak > one.shear_stress.max() + 0.5 * c
 
 
-def test_an_unmated_joint_has_no_bond(rough):
+def test_an_unmated_joint_starts_far_from_mate_and_has_no_bond(rough):
     """With a mating length, without one, and where faces meet anew in a batch."""
     bonded = replace(rough, bond=DUCTILE)
     for law in (bonded, replace(bonded, mating_length=math.inf)):
@@ -164,11 +164,11 @@ def test_an_unmated_joint_has_no_bond(rough):
         pool = jl.JointPool(law)
         pool.add(["first"])
         pool.add(["second"], mated=False)
-        np.testing.assert_array_equal(pool.batch.damage[pool.places], [0.0, 1.0])
-        pool.batch.unbond([0])
-        assert (pool.batch.damage == 1.0).all()
-    with pytest.raises(ValueError, match="infinite mating_length"):
-        replace(rough, mating_length=math.inf).joint(mated=False)
+        one = law.joint(mated=False).snapshot().values[0]
+        np.testing.assert_array_equal(one[:3], law.unmated_start)
+        np.testing.assert_array_equal(pool.snapshot().values, [np.zeros_like(one), one])
+        pool.batch.reset(pool.places[:1], mated=False)
+        np.testing.assert_array_equal(pool.snapshot().values, [one, one])
 
 
 def test_bound_of_the_stiffness(rough):

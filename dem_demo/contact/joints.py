@@ -15,7 +15,15 @@ from jointlaw.joints.state import JointState
 from ..scene import Scene, is_coulomb
 from .tracker import Identity
 
-PARTS = "contacts", "law", "fingerprint"  # of a snapshot of the joints of a law
+PARTS = "contacts", "law", "fingerprint", "touch"  # of a snapshot of the joints of a law
+
+
+def unmated_curve(law: jl.JointLaw, closure: np.ndarray) -> dict[str, np.ndarray]:
+    """Closure from first touch (m) and work (J/m2) of a joint whose faces have never met."""
+    batch = jl.JointBatch(law, len(closure))
+    batch.reset(mated=False)
+    batch.update(np.stack([closure, 0.0 * closure], axis=1), tangent=False)
+    return {"closure": closure, "work": batch.stored_energy}
 
 
 def virgin_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
@@ -49,6 +57,9 @@ class Joints:
     The scene's `reduction` F divides the shear stress of every joint and multiplies the sliding at
     which it has it. So tan(friction angle), tan(dilation angle) and cohesion are divided by F, and
     the work is that of the law: no energy is made.
+
+    Faces that meet in a run are unmated where the law fades. `touch` holds, by contact, where its
+    joint first touches (closure and sliding in m, zeros for a mated one); delta counts from there.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -57,24 +68,30 @@ class Joints:
         self.curves = {name: virgin_curve(law) for name, law in scene.laws.items()}
         for curve in self.curves.values():
             curve["stiffness"] = curve["stiffness"] * max(1.0, scene.reduction**-2)
+        self.touch: dict[Identity, np.ndarray] = {}
         self.assign([])
 
-    def assign(self, contacts: Sequence[Identity], bonded: bool = True) -> None:
+    def assign(self, contacts: Sequence[Identity], started: bool = False) -> None:
         """Keep the joints of these contacts, forget the others, make new ones virgin.
 
-        bonded: whether new ones have the bond of their law, or are of faces that meet anew.
+        started: whether the run has started. Then new ones have no bond, and are mated only where
+        their two faces still touch in a mated joint, which they then continue.
         """
+        fit = {key for (key, _), touch in self.touch.items() if not touch.any()}
+        held, self.touch = self.touch, {}
+        for who in contacts:
+            self.touch[who] = held.get(who, np.zeros(2))
         of_law: dict[str, list[int]] = {name: [] for name in self.pools}
         for i, (key, _) in enumerate(contacts):
             of_law[self.choose(key)].append(i)
         self.groups = []
         for name, rows in of_law.items():
             pool = self.pools[name]
-            known = set(pool.keys)
             places = pool.assign(contacts[i] for i in rows)
-            if not bonded:
-                new = [contacts[i] not in known for i in rows]
-                pool.batch.unbond(places[np.array(new, bool)])
+            for i, place in zip(rows if started else [], places, strict=started):
+                if contacts[i] not in held:
+                    mated = contacts[i][0] in fit or not pool.batch.law.tables.fades
+                    self.touch[contacts[i]] = self._begin(pool, place, mated)
             if rows:
                 whole = np.array_equal(places, np.arange(len(pool.batch)))
                 self.groups.append((name, np.array(rows), None if whole else places))
@@ -107,10 +124,10 @@ class Joints:
     def measure(self) -> None:
         """Read what the batches hold by now."""
         self.delta = np.zeros((self.n, 2))
-        shares = np.zeros((6, self.n))
+        shares, touch = np.zeros((6, self.n)), np.array([*self.touch.values()]).reshape(-1, 2)
         for name, rows, places in self.groups:
             batch, here = self.pools[name].batch, slice(None) if places is None else places
-            self.delta[rows] = batch.delta[here] * self.reduction
+            self.delta[rows] = (batch.delta[here] - touch[rows]) * self.reduction
             columns = *batch.measures()[:4], batch.dissipated_energy, batch.damage
             shares[:, rows] = np.array(columns)[:, here]
         self.sliding, self.slipping, self.separated, self.stored, self.lost, self.damage = shares
@@ -129,19 +146,32 @@ class Joints:
         return self.virgin("stiffness", "stress", stress) * ((stress > 0) | (self.damage < 1))
 
     def renew(self, contact: Identity) -> None:
-        """Make the joint of a contact virgin again, without a bond."""
+        """Let the joint of a contact start anew, mated or not as it was, without a bond."""
         pool = self.pools[self.choose(contact[0])]
-        place = pool.add([contact])
-        pool.batch.reset(place)
-        pool.batch.unbond(place)
+        (place,) = pool.add([contact])
+        self._begin(pool, place, not self.touch[contact].any())
         self.measure()
+
+    def curve(self, contact: Identity) -> dict[str, np.ndarray]:
+        """Closure (m) and work (J/m2) of the joint of a contact that starts anew."""
+        name = self.choose(contact[0])
+        if not self.touch[contact].any():
+            return self.curves[name]
+        return unmated_curve(self.pools[name].batch.law, self.curves[name]["closure"])
+
+    def _begin(self, pool: jl.JointPool, place: int, mated: bool) -> np.ndarray:
+        """Reset a joint, without a bond; closure and sliding (2,) in m where it first touches."""
+        pool.batch.reset([place], mated)
+        pool.batch.unbond([place])
+        return pool.batch.delta[place].copy()
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """A copy of all state; the laws are numbered, their names may be no names of arrays."""
         arrays = {}
         for i, pool in enumerate(self.pools.values()):
             state, contacts = pool.snapshot(), [[*key, number] for key, number in pool.keys]
-            parts = np.array(contacts, int), state.values.T, np.array(state.fingerprint)
+            touch = np.array([self.touch[who] for who in pool.keys]).reshape(-1, 2)
+            parts = np.array(contacts, int), state.values.T, np.array(state.fingerprint), touch
             arrays |= {f"{part}-{i}": array for part, array in zip(PARTS, parts, strict=True)}
         return arrays
 
@@ -149,11 +179,12 @@ class Joints:
         """Back to a snapshot whose contacts were these. Raises ValueError for another's."""
         held = []
         for i in range(len(self.pools)):
-            rows, values, fingerprint = (state[f"{part}-{i}"] for part in PARTS)
+            rows, values, fingerprint, touch = (state[f"{part}-{i}"] for part in PARTS)
             keys = [(tuple(key), number) for *key, number in rows.tolist()]
-            held.append((keys, JointState(str(fingerprint), values.T)))
-        if {contact for keys, _ in held for contact in keys} != set(contacts):
+            held.append((keys, JointState(str(fingerprint), values.T), touch))
+        if {contact for keys, *_ in held for contact in keys} != set(contacts):
             raise ValueError("the state's joints are not those of the scene's laws and contacts")
-        for pool, (keys, joints) in zip(self.pools.values(), held, strict=True):
+        for pool, (keys, joints, touch) in zip(self.pools.values(), held, strict=True):
             pool.restore(keys, joints)
+            self.touch |= dict(zip(keys, touch, strict=True))
         self.assign(contacts)

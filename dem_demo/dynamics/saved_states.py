@@ -16,7 +16,7 @@ from ..contact import PARTS
 from ..scene import Files, Scene, parse
 
 FILE = "state.npz"
-VERSION = 5  # of state.npz
+VERSION = 6  # of state.npz
 STATE = (  # what changes in a run, but for the joints and the velocities to go on with
     "t0", "n", "dt", "limit.now", "limit.least", "limit.checked", "blocks.motion",
     "blocks.drives.reversed_at",

@@ -152,7 +152,7 @@ class Simulation:
             kept = stored[i]
             if ratio[i] > 1:
                 who = tracker.identities[i]
-                curve = joints.curves[joints.choose(who[0])]
+                curve = joints.curve(who)
                 anew = np.interp(held[i] / length[i], curve["work"], curve["closure"])
                 anew = min(anew, closure[i])
                 tracker.offset[i] += closure[i] - anew
@@ -167,7 +167,7 @@ class Simulation:
         ledger, joints, limit = self.ledger, self.joints, self.limit
         held = np.stack([ledger.area, ledger.area * joints.stored, limit.checked], axis=1)
         gone, none = dict(zip(known, held.tolist(), strict=True)), [0.0, 0.0, 0.0]
-        joints.assign(self.tracker.identities, bonded=False)
+        joints.assign(self.tracker.identities, started=True)
         kept = [gone.pop(who, none) for who in self.tracker.identities]
         ledger.area, _, limit.checked = np.array(kept).reshape(-1, 3).T
         ledger.value["dropped"] += sum(stored for _, stored, _ in gone.values())

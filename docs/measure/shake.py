@@ -2,7 +2,8 @@
 
 The base of the scene is shaken by sines of several sizes: the largest acceleration over that at
 which Newmark's block begins to slide. His block (1965) is rigid and has the steady friction of the
-law. Slips are means over the last five of ten full cycles.
+law after ten mating lengths, so nothing of its peak. Slips are means over the last five of ten
+full cycles.
 """
 
 from dataclasses import replace

@@ -49,13 +49,13 @@ def test_dilation_is_what_holds_the_rough_slope():
     """Plain Coulomb bears the dip of its friction angle, no more: atan 0.4 = 21.8 degrees.
 
     Half a degree for blocks that the cutting leaves interlocked or loose; the rough joints bear
-    20 degrees more.
+    16.5 degrees more at a mating length of 5 mm.
     """
     own = alone(load("slope"), "rough", 2)
     laws = {name: _plain(own, law) for name, law in own.laws.items()}
     rough, plain = critical_tilt(own), critical_tilt(replace(own, laws=laws))
     assert 36 + plain == pytest.approx(21.8, abs=0.5)
-    assert rough - plain > 20
+    assert rough - plain > 15
 
 
 def test_a_scene_of_ones_own_from_the_template(tmp_path, capsys):

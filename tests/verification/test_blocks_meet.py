@@ -1,0 +1,81 @@
+"""Blocks that are lifted off and put down again slide on faces that no longer fit each other."""
+
+import numpy as np
+import pytest
+
+import jointlaw as jl
+from dem_demo import Simulation, parse
+
+SCENE = parse("""
+[laws.rock]
+asperity_density = 1e4
+mating_length = 2e-3
+plane = 0.0
+resolution = { u = 4, phi = 10, depth = 1 }
+orientation = { a = 4.0, b = 0.0, c = 0.0 }
+asperity = { K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }
+heights = { alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }
+[[block]]
+name = "base"
+box = [8.0, 1.0]
+at = [0.0, -0.5]
+fixed = true
+[[block]]
+name = "block"
+box = [2.0, 1.0]
+at = [-1.0, 0.5]
+held = ["turn"]
+[[drive]]
+block = "block"
+motion = "x"
+times = [0.0, 0.1, 0.5]
+values = [0.0, 0.0, 1e-3]
+[run]
+end = 0.5
+step = 2e-4
+skin = 0.02
+dashpot_normal = 0.5
+""")
+
+
+def put(sim, across, up):
+    """Move the block by hand and bring it to rest."""
+    motion = sim.blocks.motion
+    motion[0, 1] += across
+    motion[1, 1] += up
+    sim.blocks.place(motion, np.zeros((3, 2)))
+
+
+def friction(sim):
+    """Largest friction angle (degrees) while the block is driven along."""
+    angles = []
+    while sim.time < 0.5:
+        sim.step()
+        force = sim.ledger.area @ sim.joints.traction
+        if sim.time > 0.2:
+            angles.append(np.degrees(np.arctan2(abs(force[1]), force[0])))
+    return max(angles)
+
+
+@pytest.mark.slow
+def test_a_block_put_down_elsewhere_slides_at_the_friction_of_its_asperities():
+    """Never lifted: the peak of the law alone. Lifted: atan 0.4 = 21.8 degrees, bit for bit so
+    after a saved state. Half a degree for the weight that the rising block's inertia takes."""
+    stays, lifted = Simulation(SCENE), Simulation(SCENE)
+    at_rest = lifted.blocks.motion[1, 1]
+    put(lifted, 0.0, 0.2)
+    lifted.step()
+    lifted.step()
+    assert lifted.joints.n == 0
+    put(lifted, 1.0, at_rest + 1e-4 - lifted.blocks.motion[1, 1])
+    for _ in range(40):
+        lifted.step()
+    assert lifted.joints.delta[:, 0] == pytest.approx(0.0, abs=2e-3)  # closure from first touch
+    again = Simulation(SCENE, saved=lifted.state())
+    law, stress = SCENE.laws["rock"], 2600 * 9.81
+    peak = jl.direct_shear(law.joint(), to=[2e-3], normal=stress, steps=200).peak_friction_angle
+    assert friction(stays) == pytest.approx(peak, abs=0.5)
+    assert peak > 30
+    slides = friction(lifted)
+    assert slides == pytest.approx(np.degrees(np.arctan(0.4)), abs=0.5)
+    assert friction(again) == slides

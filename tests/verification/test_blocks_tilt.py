@@ -75,12 +75,16 @@ def slips():
     """Measured and predicted slips of both slabs; the tables tilt at 0.05 degrees per second."""
     scene = load("tilt")
     sim = Simulation(scene)
-    watch = watched_slips(sim)
+    watch, errors = watched_slips(sim), []
     while waiting(watch) and sim.time < scene.run.end:
         for _ in range(LOOKS):
             sim.step()
         look(watch, sim)
-    assert abs(sim.ledger.error) < 1e-4
+        if all(slip["slip_angle"] is None for slip in watch.values()):
+            errors.append(abs(sim.ledger.error))
+    assert max(errors) < 1e-4
+    # The slab that has slipped runs away, at the end by as much as the mating length in a step.
+    assert abs(sim.ledger.error) < 5e-3
     return list(watch.values())
 
 

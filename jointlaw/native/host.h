@@ -271,7 +271,8 @@ static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
   for (int f = 0; law->yields && f < law->facets; f++)
     good = good && rest[f] >= 0.0 && rest[f] <= law->largest_reach;
   if (law->yields) good = good && fabs(rest[law->facets]) <= DBL_MAX;
-  if (law->wears) good = good && worn[0] >= 0.0 && worn[0] <= 1.0 && worn[1] <= DBL_MAX;
+  if (law->wears) good = good && worn[0] >= 0.0 && worn[0] <= 1.0 && worn[1] >= 0.0 &&
+           worn[1] <= DBL_MAX;
   if (law->bonded) good = good && s[damage_row(law)] >= 0.0 && s[damage_row(law)] <= 1.0;
   return good && jlaw_sound_(s + slider_row(law), rest_row(law) - slider_row(law));
 }

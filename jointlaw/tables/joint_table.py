@@ -227,9 +227,9 @@ class JointTable:
 def load_table(path: str | Path) -> JointTable:
     """Read a table that `JointTable.save` wrote. Raises ValueError if the file is not one."""
     try:
-        _, marker, rest = Path(path).read_text(encoding="utf-8").partition(MARKER)
+        _, marker, rest = Path(path).read_text("utf-8", "replace").partition(MARKER)
         if not marker:
-            raise ValueError(f"it has no line {MARKER.strip()!r}")
+            raise ValueError(f"it has no line {MARKER.strip()!r}; export the law again")
         metadata = json.loads(rest.splitlines()[0])
         if (version := metadata.pop("version")) != VERSION:
             raise ValueError(

@@ -89,7 +89,7 @@ attempt("name", lambda: joints(name="a b"))
 attempt("run", lambda: yade_joint.run("nobody"))
 np.savez("old.npz", ids=[])
 attempt("version", lambda: joints().load("old.npz"))
-attempt("npz table", lambda: TableLaw("joint.npz"))
+attempt("npz table", lambda: TableLaw("old.npz"))
 O.periodic = True
 attempt("periodic", lambda: joints().attach())
 O.periodic = False

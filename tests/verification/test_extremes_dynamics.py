@@ -16,8 +16,8 @@ def swung(record, monkeypatch):
     if FULL:
         monkeypatch.setattr(extremes.dynamics, "EVERY", 97)  # looks at the energy cost most
 
-    def run(case, steps, share=0.95):
-        found = swing(case, steps, share=share)
+    def run(case, steps, share=0.95, n=4):
+        found = swing(case, steps, n, share)
         record("dynamics", case, share, steps, *found)
         return found
 
@@ -52,7 +52,7 @@ def test_lossless_impacts_hardly_drift_at_a_fifth_of_the_critical_step(case, swu
 
 @pytest.mark.parametrize("case", LOSSLESS_IMPACTS)
 def test_lossless_impacts_pass_their_bound_near_the_critical_step(case, swung):
-    _, _, reached = swung(case, 20_000 if FULL else 2 * SHORT)
+    _, _, reached = swung(case, 20_000 if FULL else 2 * SHORT, n=16)
     assert reached > 1.0
 
 

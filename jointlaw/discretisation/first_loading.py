@@ -48,8 +48,10 @@ class FirstLoading(NamedTuple):
     def closure(self, stress: Array, start: float) -> Array:
         """Closures (m) at normal stresses (Pa), looked for from the closure `start` (m) on.
 
-        By bisection of log closure, to rounding.
+        By bisection of log closure, to rounding. Raises ValueError where no float holds the answer.
         """
+        if not math.isfinite(self.factor):
+            raise ValueError("the stiffness of the joint is too large for floating point")
         found = np.zeros_like(stress)
         wanted = stress[stress >= _SMALLEST]
 

@@ -1,13 +1,16 @@
 """The compiled kernel gives the numbers of the readable one, however it is called."""
 
 import pickle
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-import jointlaw as jl
-from jointlaw.discretisation.nodes import UNUSED
 from jointlaw.kernels import engine
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "hosts"))
+from c_host import random_law
 
 # Either kernel sums a few hundred terms per facet in its own order and carries q over the path: a
 # few hundred times the rounding of 1e-16. That is the share of the largest value that may differ.
@@ -16,34 +19,6 @@ SAME = 1e-12
 # 1e10, in the few facets that a step hardly opens or closes, and is usual in nearly all joints.
 SAME_C, USUAL_C = 2e-6, 1e-12
 N = 17 * engine.LANES + 3  # blocks of joints and part of another
-
-
-def random_law(make_law, seed):
-    """A law of any kind: each choice comes up within every few seeds."""
-    rng = np.random.default_rng(seed)
-    heights = [None, "population", "individual"][seed % 3]
-    eta = [0.5, 0.0, 1.0, 0.37, 0.5][seed % 5]
-    if heights == "population" and eta == 0.0:
-        eta = 0.8  # not convex
-    if seed % 7 == 6:  # a density infinite at the point of contact
-        heights = jl.GammaHeights(-0.6, 3e-6, 0.0, "individual")
-    mu = [0.0, 0.3, 0.7][rng.integers(3)]
-    more = {"mating_length": [np.inf, 8e-7][seed % 2]}
-    if seed % 6 > 3:
-        more |= {"mating_length": 3e-6, "slope_wear": 300.0, "slope_residual": 0.3}
-    return make_law(
-        a=rng.uniform(1.0, 6.0),
-        b=rng.uniform(-0.4, 0.8),
-        c=rng.uniform(-0.15, 0.15),
-        lam=rng.uniform(0.5, 2.0),
-        mu=mu,
-        damage={"yield_interference": 3e-7} if seed % 4 > 1 else {},
-        eta=eta,
-        heights=heights,
-        plane=[None, 0.0, 0.7][rng.integers(3)],
-        resolution=jl.Resolution(int(rng.integers(1, 4)), int(rng.integers(3, 6)), 1 + seed % 6),
-        **more,
-    )
 
 
 def path(law, seed, steps=25, n=N):
@@ -77,54 +52,9 @@ def worst(one, other, peak):
     return np.max(np.abs(np.asarray(one) - np.asarray(other)), initial=0.0) / peak
 
 
-# heights of each kind, infinite at touch too; yielding, wear and both; slopes that fade; 2-D, 3-D
-@pytest.mark.parametrize("seed", [2, 3, 5, 8, 10, 13])
-def test_same_numbers_on_random_laws_and_paths(both, make_law, seed):
-    same_numbers(both, random_law(make_law, seed), seed)
-
-
-def test_same_numbers_of_facets_with_unequal_cells_that_yield_and_wear(both, make_law):
-    law = make_law(
-        mu=0.5, damage={"yield_interference": 3e-7}, resolution="balanced", mating_length=8e-7,
-        slope_wear=300.0, slope_residual=0.2,
-    )  # fmt: skip
-    cells = np.count_nonzero(law.tables.depth[:, :-1] < UNUSED, axis=1)
-    assert cells.min() < cells.max()
-    same_numbers(both, law, 1)
-
-
-def same_numbers(both, law, seed):
-    slow, fast = both(lambda: law.joints(N))
-    peak, peak_C, off, off_C = 0.0, 0.0, 0.0, []
-    for d in path(law, seed):
-        (F, C), (F2, C2) = slow.update(d), fast.update(d)
-        peak, peak_C = max(peak, np.abs(F).max()), max(peak_C, np.abs(C).max())
-        off = max(off, np.abs(F - F2).max())
-        off_C.append(np.abs(C - C2).max(axis=(1, 2)))
-    # yielding leaves small differences of large forces, and wear feeds the ledger back into q
-    damaged = law.tables.yields or law.tables.wears
-    assert off < (10 * SAME if damaged else SAME) * peak
-    assert np.max(off_C) < SAME_C * peak_C
-    assert np.quantile(off_C, 0.95) < USUAL_C * peak_C
-    lost = slow.dissipated_energy
-    kept = 100 * SAME if damaged else 10 * SAME  # the ledger and wear take from each other
-    assert worst(lost, fast.dissipated_energy, max(lost.max(), 1e-300)) < kept
-
-
-@pytest.mark.parametrize("seed", [5, 10, 13])
-def test_same_measures_of_the_same_state(both, make_law, seed):
-    law = random_law(make_law, seed)
-    slow, fast = both(lambda: law.joints(N))
-    for d in path(law, seed, 12):
-        slow.update(d, tangent=False)
-        fast.restore(slow.snapshot())
-        for one, other in zip(slow.measures(), fast.measures(), strict=True):
-            assert worst(one, other, max(np.abs(one).max(), 1e-300)) < SAME
-
-
-@pytest.mark.parametrize(("seed", "ledger"), [(3, True), (5, False)])
-def test_same_numbers_while_contacts_come_and_go(both, make_law, seed, ledger):
-    law = random_law(make_law, seed)
+@pytest.mark.parametrize(("seed", "ledger"), [(9, True), (10, False)])
+def test_same_numbers_while_contacts_come_and_go(both, seed, ledger):
+    law = random_law(seed)
     d, dim = path(law, seed, 20, 400), law.tables.dim
     results = []
     for batch in both(lambda: law.joints(N, ledger)):
@@ -155,8 +85,8 @@ def test_same_numbers_while_contacts_come_and_go(both, make_law, seed, ledger):
         assert worst(one, other, peak) < SAME
 
 
-def test_a_state_moves_from_kernel_to_kernel(both, make_law, monkeypatch):
-    law = random_law(make_law, 1)
+def test_a_state_moves_from_kernel_to_kernel(both, monkeypatch):
+    law = random_law(1)
     d = path(law, 1, 6)
     batches = both(lambda: law.joints(N))
     for batch in batches:
@@ -176,7 +106,7 @@ def test_a_state_moves_from_kernel_to_kernel(both, make_law, monkeypatch):
 @pytest.mark.parametrize("seed", [3, 8])
 def test_the_tangent_exactly_at_the_friction_limit_is_that_of_sliding_on(both, make_law, seed):
     """A step of nothing leaves sliders exactly at their limit: rounding must not decide C."""
-    law = random_law(make_law, seed)
+    law = random_law(seed)
     slow, fast = both(lambda: law.joints(N))
     for d in path(law, seed, 8):
         slow.update(d)
@@ -193,9 +123,9 @@ def test_the_tangent_exactly_at_the_friction_limit_is_that_of_sliding_on(both, m
         assert worst(onward[:, :, :2], still[:, :, :2], np.abs(onward).max()) < 1e-5
 
 
-@pytest.mark.parametrize("seed", [3, 5])
-def test_a_batch_and_its_joints_agree_to_the_bit(make_law, monkeypatch, seed):
-    law = random_law(make_law, seed)
+@pytest.mark.parametrize("seed", [3, 6])
+def test_a_batch_and_its_joints_agree_to_the_bit(monkeypatch, seed):
+    law = random_law(seed)
     monkeypatch.setenv("JOINTLAW_KERNEL", "native")
     d = path(law, seed, 10)
     batch, joint = law.joints(N), law.joint()
@@ -206,9 +136,9 @@ def test_a_batch_and_its_joints_agree_to_the_bit(make_law, monkeypatch, seed):
         np.testing.assert_array_equal(C[N - 2], alone[1])
 
 
-@pytest.mark.parametrize("seed", [10])
-def test_threads_change_no_bit(make_law, monkeypatch, seed):
-    law = random_law(make_law, seed)
+def test_threads_change_no_bit(monkeypatch):
+    seed = 10
+    law = random_law(seed)
     monkeypatch.setattr(engine, "SERIAL", 0)
     monkeypatch.setenv("JOINTLAW_KERNEL", "native")
     d, index = path(law, seed, 6, 500), np.random.default_rng(0).permutation(500)[:333]

@@ -34,8 +34,9 @@ def test_the_text_is_short():
     assert sum(p.read_text(encoding="utf-8").count("\n") for p in by_hand) <= LINES
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(200))
+@pytest.mark.parametrize(
+    "seed", [*range(16), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(16, 200))]
+)
 def test_same_numbers_on_random_laws_and_paths(seed):
     """A joint alone, and the same as the last of a batch, against `reference.step`."""
     law = random_law(seed)

@@ -43,7 +43,6 @@ TABLES = {
 TIMED = {
     "price-list": ("accuracy.md", "docs/measure/price_list.py"),
     "savings": ("accuracy.md", "docs/measure/cost.py savings --rounds 25 --seconds 0.05"),
-    "update": ("accuracy.md", "docs/measure/cost.py --rounds 3 --seconds 0.05"),
     "peers-smooth": ("validation.md", "docs/measure/peers.py"),
     "peers-rough": ("validation.md", "docs/measure/peers.py --preset westerly-rough"),
     "native": ("native.md", "docs/measure/native.py"),

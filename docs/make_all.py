@@ -38,7 +38,7 @@ TABLES = {
     "named": ("accuracy.md", "docs/measure/named.py"),
     "plane": ("accuracy.md", "docs/measure/plane.py"),
     "ingredients": ("accuracy.md", "docs/measure/ablations.py"),
-    "shake": ("blocks.md", "docs/measure/shake.py"),
+    "newmark": ("blocks.md", "docs/measure/shake.py"),
 }
 TIMED = {
     "price-list": ("accuracy.md", "docs/measure/price_list.py"),
@@ -59,7 +59,7 @@ PICTURES = {
         "--resolution fine --out FOLDER",
         "shear.png",
     ),
-    "tilt.png": ("-m dem_demo tilt --out FOLDER", "final.png"),
+    "tilt.png": ("docs/draw/tilt.py FOLDER", "tilt.png"),
     "slope.png": ("-m dem_demo slope --out FOLDER", "final.png"),
     "slope.gif": ("-m dem_demo slope --out FOLDER", "motion.gif"),
     "shear-box.png": ("-m dem_demo shear-box --out FOLDER", "curves.png"),

@@ -42,7 +42,7 @@ TABLES = {
 }
 TIMED = {
     "price-list": ("accuracy.md", "docs/measure/price_list.py"),
-    "savings": ("accuracy.md", "docs/measure/cost.py savings --rounds 25 --seconds 0.05"),
+    "savings": ("accuracy.md", "docs/measure/cost.py --rounds 25 --seconds 0.05"),
     "peers-smooth": ("validation.md", "docs/measure/peers.py"),
     "peers-rough": ("validation.md", "docs/measure/peers.py --preset westerly-rough"),
     "native": ("native.md", "docs/measure/native.py"),

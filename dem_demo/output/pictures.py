@@ -117,7 +117,8 @@ class Pictures:
     def final(self, path: Path) -> None:
         """The last frame, with slip angles and what became of each rock."""
         figure, axes = self.figure()
-        self.draw(axes, len(self.record.times) - 1, "\n".join(["", *sentences(self.record)]))
+        said = [line.partition(";")[0] for line in sentences(self.record)]  # what fits a phone
+        self.draw(axes, len(self.record.times) - 1, "\n".join(["", *said]))
         written(figure, path)
 
     @style()

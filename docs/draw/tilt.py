@@ -19,7 +19,7 @@ from jointlaw.support.pyplot import style
 COLOURS = "#d95f02", "#1f6fd0"
 WAYS = "rough direction\ndown the slope", "rough direction\nacross the slope"
 DRAWN = 0.5  # m of slip
-SLOW, LEAST = 1e-5, 1e-12  # growth of slip between two records: share of the slip, m; less is rest
+SLOW, LEAST = 1e-4, 1e-12  # growth of slip between two records: share of the slip, m; less is rest
 
 
 def main(folder):

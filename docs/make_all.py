@@ -38,12 +38,11 @@ TABLES = {
     "named": ("accuracy.md", "docs/measure/named.py"),
     "plane": ("accuracy.md", "docs/measure/plane.py"),
     "ingredients": ("accuracy.md", "docs/measure/ablations.py"),
-    "shake": ("blocks.md", "docs/measure/shake.py"),
+    "newmark": ("blocks.md", "docs/measure/shake.py"),
 }
 TIMED = {
     "price-list": ("accuracy.md", "docs/measure/price_list.py"),
-    "savings": ("accuracy.md", "docs/measure/cost.py savings --rounds 25 --seconds 0.05"),
-    "update": ("accuracy.md", "docs/measure/cost.py --rounds 3 --seconds 0.05"),
+    "savings": ("accuracy.md", "docs/measure/cost.py --rounds 25 --seconds 0.05"),
     "peers-smooth": ("validation.md", "docs/measure/peers.py"),
     "peers-rough": ("validation.md", "docs/measure/peers.py --preset westerly-rough"),
     "native": ("native.md", "docs/measure/native.py"),
@@ -60,7 +59,7 @@ PICTURES = {
         "--resolution fine --out FOLDER",
         "shear.png",
     ),
-    "tilt.png": ("-m dem_demo tilt --out FOLDER", "final.png"),
+    "tilt.png": ("docs/draw/tilt.py FOLDER", "tilt.png"),
     "slope.png": ("-m dem_demo slope --out FOLDER", "final.png"),
     "slope.gif": ("-m dem_demo slope --out FOLDER", "motion.gif"),
     "shear-box.png": ("-m dem_demo shear-box --out FOLDER", "curves.png"),

@@ -70,15 +70,15 @@ class Pictures:
     def figure(self) -> tuple[Figure, Axes]:
         """An empty frame with its legend: states, a round stress, the dots of the start."""
         wide, high = self.high - self.low
-        across = min(8.2, 6.0 * wide / high)
-        figure = Figure(figsize=(max(across + 1.0, 8.5), across * high / wide + 1.8))
+        across = min(6.5, 6.0 * wide / high)
+        figure = Figure(figsize=(max(across + 1.0, 7.5), across * high / wide + 1.8))
         marks = [Line2D([], [], color=colour, ls=line, label=f"joint {name}", lw=2.0)
                  for name, (colour, line) in STATES.items()]  # fmt: skip
         stress = float(f"{self.stress:.1g}")
         label, width = f"normal stress {1e-3 * stress:g} kPa", self._width(stress)
         marks.append(Line2D([], [], color=STATES["stuck"][0], lw=width, label=label))
         marks.append(Line2D([], [], color="0.6", ls=":", lw=0.9, label="place at the start"))
-        figure.legend(handles=marks, loc="outside lower center", ncols=4, frameon=False)
+        figure.legend(handles=marks, loc="outside lower center", ncols=3, frameon=False)
         return figure, figure.add_subplot()
 
     def draw(self, axes: Axes, i: int, note: str = "") -> None:
@@ -117,7 +117,8 @@ class Pictures:
     def final(self, path: Path) -> None:
         """The last frame, with slip angles and what became of each rock."""
         figure, axes = self.figure()
-        self.draw(axes, len(self.record.times) - 1, "\n".join(["", *sentences(self.record)]))
+        said = [line.partition(";")[0] for line in sentences(self.record)]  # what fits a phone
+        self.draw(axes, len(self.record.times) - 1, "\n".join(["", *said]))
         written(figure, path)
 
     @style()
@@ -140,7 +141,7 @@ class Pictures:
 @style()
 def curves(record: Record, path: Path) -> None:
     """Stress and dilation of the sheared joints against sliding, and of the law alone."""
-    figure = Figure(figsize=(8, 7))
+    figure = Figure(figsize=(7, 7))
     upper, lower = figure.subplots(2, sharex=True)
     for moving, base in record.scene.shear:
         name = record.scene.blocks[moving].name

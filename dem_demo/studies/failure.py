@@ -43,7 +43,8 @@ def draw(record: Record, title: str, path: Path) -> None:
     corners = np.concatenate([*start, *now])
     wide, high = np.ptp(corners, axis=0)
     figure = Figure(figsize=(WIDTH, max(WIDTH * high / wide, 2.0) + 1.6), layout="constrained")
-    axes = figure.add_subplot(title=title, xlabel="x (m)", ylabel="y (m)", aspect="equal")
+    figure.suptitle(title)  # constrained layout clips a title of axes whose aspect is equal
+    axes = figure.add_subplot(xlabel="x (m)", ylabel="y (m)", aspect="equal")
     rock = [shape for block, shape in zip(blocks, now, strict=True) if block.fixed]
     free = np.array([not block.fixed for block in blocks])
     moves = [shape for block, shape in zip(blocks, now, strict=True) if not block.fixed]

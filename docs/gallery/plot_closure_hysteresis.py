@@ -35,7 +35,7 @@ for a in (3.0, 2.0, 1.5):
 left.set_xlabel("closure (µm)")
 left.set_ylabel("normal stress (MPa)")
 left.legend()
-right.set_xlabel("branch: up, down to 10 MPa; up, down to 20 MPa")
+right.set_xlabel("branch: 10 MPa and back, then 20")
 right.set_ylabel("energy lost to friction (J/m²)")
 right.set_xticks(range(5))
 plt.show()

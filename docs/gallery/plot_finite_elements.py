@@ -103,7 +103,7 @@ for load, push in steps:
     history.append(residuals)
     kept[push] = (jump @ u)[1::2], F
 
-figure, axes = plt.subplots(2, 2, figsize=(9, 6.5), layout="constrained")
+figure, axes = plt.subplots(2, 2, figsize=(7.5, 6.5), layout="constrained")
 x = np.linspace(0.0, LENGTH, n) * 1e3
 for push in [PUSH * k / 20 for k in (2, 5, 10, 20)]:
     slip, F = kept[push]

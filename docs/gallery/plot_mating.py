@@ -51,13 +51,13 @@ back = jl.direct_shear(law.joint(), [10 * length, 0.0], normal=1e6, steps=500)
 worn = replace(law, slope_wear=2e5)
 cycles = jl.direct_shear(worn.joint(), [5 * length, 0.0] * 7, normal=1e6, steps=150)
 
-figure, axes = plt.subplots(1, 3, figsize=(12, 4.2), layout="constrained")
+figure, axes = plt.subplots(3, 1, figsize=(6, 10), layout="constrained")
 axes[0].semilogx(stress, peak, "o-", label="peak")
 axes[0].semilogx(stress, phi_b + rise, "s", mfc="w", label="faces + dilation at the peak")
 axes[0].semilogx(stress, residual, "v-", label="residual, 20 mating lengths")
 axes[0].semilogx(stress, phi_b + JRC * decades, "--k", label=f"Barton-Bandis, JRC {JRC:.1f}")
 axes[0].set(xlabel="normal stress (MPa)", ylabel="friction angle (°)", ylim=(30, 68))
-axes[0].legend(loc="upper center")
+axes[0].legend(loc="upper right")
 for axis, test, title in (
     (axes[1], back, "forward and back"),
     (axes[2], cycles, "seven cycles, slopes wear"),

@@ -45,7 +45,7 @@ plt.show()
 
 # %%
 # At low stress a yield interference of 0.2 µm changes nothing. At high stress even the elastic
-# joint loses some of its friction angle, since contacts are renewed before all of them slide.
+# joint loses some of its friction angle, since slopes fade before all asperities slide.
 # Yielding presses the steep ones flat.
 
 for label, found in angles.items():

@@ -1,11 +1,8 @@
-"""Nanoseconds per joint and update, the least of several rounds in which all cases take turns.
+"""Nanoseconds per joint and update with an ingredient, and without it: the least of several rounds
+in which all cases take turns.
 
-    python docs/measure/cost.py            by resolution and size of the batch
-    python docs/measure/cost.py savings    with an ingredient of the law, and without it
-
-Motion in one plane but where 3-D is named, random steps around a closure of 1 um. A batch of 1 is
-`Joint.update` through Python. F: traction alone; FC: with tangent; +L: with the ledger; x2: on two
-threads; measures: `batch.measures()`.
+Motion in one plane but where 3-D is named, random steps around a closure of 1 um, one thread. F:
+traction alone; FC: with tangent; +L: with the ledger.
 """
 
 import argparse
@@ -17,23 +14,11 @@ import numpy as np
 from tables import table
 
 import jointlaw as jl
-from jointlaw.parameters.resolution import NAMED
 from jointlaw.support.progress import track
 
-SIZES = (1, 10_000)
-# column: kernel, threads, tangent, ledger
-COLUMNS = {
-    "F": ("native", 1, False, False),
-    "F+L": ("native", 1, False, True),
-    "FC": ("native", 1, True, False),
-    "FC+L": ("native", 1, True, True),
-    "F x2": ("native", 2, False, False),
-    "FC x2": ("native", 2, True, False),
-    "measures": ("native", 1, False, False),
-    "numpy F": ("numpy", 1, False, False),
-}
+# column: tangent, ledger
+COLUMNS = {"F": (False, False), "F+L": (False, True), "FC": (True, False), "FC+L": (True, True)}
 STEPS = 4  # different increments, so that no branch is learnt by heart
-LONGEST = 1.0  # s that one update may take
 SPACE = jl.JointLaw(
     orientation=jl.Orientation(3.0, 0.5, 0.0),
     asperity=jl.Asperity(K=2.0e8, lam=1.2, eta=0.5, mu=0.3),
@@ -50,7 +35,7 @@ class Case:
 
     def __init__(self, law, n=10_000, column="F"):
         self.law, self.n, self.column, self.best = law, n, column, np.inf
-        self.kernel, self.threads, self.tangent, self.ledger = COLUMNS[column]
+        self.tangent, self.ledger = COLUMNS[column]
 
     @property
     def bytes(self):
@@ -59,7 +44,7 @@ class Case:
 
     def run(self, seconds):
         """Time single updates for a while, two at least."""
-        os.environ |= {"JOINTLAW_KERNEL": self.kernel, "JOINTLAW_THREADS": str(self.threads)}
+        os.environ |= {"JOINTLAW_KERNEL": "native", "JOINTLAW_THREADS": "1"}
         rng, n, dim = np.random.default_rng(0), self.n, self.law.dim
         d = rng.normal(0.0, 1e-7, (STEPS, n, dim)) * ([0.3] + [1.0] * (dim - 1))
         first = np.zeros((n, dim))
@@ -90,35 +75,9 @@ class Case:
         batch.update(first, tangent=False)
 
         def once(k):
-            if self.column == "measures":
-                batch.measures()
-            else:
-                batch.update(d[k % len(d)], tangent=self.tangent)
+            batch.update(d[k % len(d)], tangent=self.tangent)
 
         return 1, once
-
-
-def possible(n, column):
-    """Whether a column has this size."""
-    kernel, threads, _, ledger = COLUMNS[column]
-    shared = threads == 1 or n >= 10_000  # with fewer there is too little work to share
-    return shared and (n > 1 or kernel == "numpy" or ledger)  # one joint always keeps its ledger
-
-
-def by_resolution(rounds, seconds):
-    """Head and rows: one line per named resolution and size."""
-    laws = {name: replace(PLANE, resolution=name) for name in NAMED}
-    cases = {(name, n, column): Case(law, n, column) for name, law in laws.items()
-             for n in SIZES for column in COLUMNS if possible(n, column)}  # fmt: skip
-    measure(cases.values(), rounds, seconds)
-    rows = []
-    for name in NAMED:
-        for n in SIZES:
-            times = [cases.get((name, n, column)) for column in COLUMNS]
-            cells = [f"{1e9 * case.best:.0f}" if case and np.isfinite(case.best) else "-"
-                     for case in times]  # fmt: skip
-            rows.append([name, n, *cells])
-    return ["resolution", "joints", *COLUMNS], rows
 
 
 def savings(rounds, seconds):
@@ -127,6 +86,9 @@ def savings(rounds, seconds):
     closure = Case(replace(SPACE, closure_only=True))
     linear = replace(PLANE, asperity=replace(PLANE.asperity, eta=0.0))
     pairs = {
+        "one `Joint` by Python, in a batch (tangent, ledger)": (
+            Case(PLANE, n=1, column="FC+L"), Case(PLANE, column="FC+L"),
+        ),
         "no tangent (3-D, with ledger)": (Case(SPACE, column="FC+L"), Case(SPACE, column="F+L")),
         "no tangent (one plane)": (Case(PLANE, column="FC"), plane),
         "no ledger (one plane)": (Case(PLANE, column="F+L"), plane),
@@ -142,36 +104,19 @@ def savings(rounds, seconds):
         ),
         "c = 0": (Case(replace(SPACE, orientation=jl.Orientation(3.0, 0.5, 0.1))), space),
     }  # fmt: skip
-    measure({id(one): one for pair in pairs.values() for one in pair}.values(), rounds, seconds)
+    cases = {id(one): one for pair in pairs.values() for one in pair}.values()
+    for _ in track(range(rounds), "rounds", rounds):
+        for case in cases:
+            case.run(seconds)
     rows = [[name, f"{1e9 * whole.best:.0f}", f"{1e9 * reduced.best:.0f}",
              f"{reduced.best / whole.best:.2f}", whole.bytes, reduced.bytes]
             for name, (whole, reduced) in pairs.items()]  # fmt: skip
     return ["left out", "ns before", "ns after", "after / before", "bytes before", "after"], rows
 
 
-def measure(cases, rounds, seconds):
-    """Time every case in every round, but for those of which smaller batches show that one update
-    takes longer than LONGEST."""
-    slow = set()
-    for _ in track(range(rounds), "rounds", rounds):
-        for case in cases:
-            if case not in slow:
-                case.run(seconds)
-                if case.best * 10_000 > LONGEST:
-                    slow |= {one for one in cases if same(one, case)}
-
-
-def same(one, other):
-    """Whether two cases differ in nothing but the size of the batch, and the first is larger."""
-    return (one.law, one.column) == (other.law, other.column) and one.n > other.n
-
-
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("which", nargs="?", choices=["resolutions", "savings"],
-                        default="resolutions")  # fmt: skip
     parser.add_argument("--rounds", type=int, default=6, help="over all cases (6)")
     parser.add_argument("--seconds", type=float, default=0.1, help="per case and round (0.1)")
     given = parser.parse_args()
-    make = savings if given.which == "savings" else by_resolution
-    print(table(*make(given.rounds, given.seconds)))
+    print(table(*savings(given.rounds, given.seconds)))

@@ -161,14 +161,14 @@ def mirrored(quarter):
     return np.array([*half, *half[1:]])
 
 
-def draw(panels, styles, polar=False, columns=3, **labels):
+def draw(panels, styles, polar=False, **labels):
     """Draw the panels {title: {label: (x, y)}}; returns their axes.
 
     styles: of the lines in turn, one tuple for all panels or a list of one for each. A label that
     begins with "_" is kept out of the legend. Angles of polar axes are given in degrees.
     """
     styles = styles if isinstance(styles, list) else [styles] * len(panels)
-    columns = min(len(panels), columns)
+    columns = 1 if len(panels) % 2 else 2
     rows = -(-len(panels) // columns)
     with plt.rc_context(STYLE):
         size = (4.2 * columns if columns > 1 else 6.0, (5.8 if polar else 3.9) * rows)

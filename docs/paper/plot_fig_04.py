@@ -26,7 +26,7 @@ panels = {
     },
     "plan of the interface, seen along axis 1": {"phi": (0.45 * np.cos(turn), 0.45 * np.sin(turn))},
 }
-figure, (side, plan) = plt.subplots(1, 2, figsize=(10.4, 4.3), layout="constrained")
+figure, (side, plan) = plt.subplots(2, 1, figsize=(6, 8.4), layout="constrained")
 for axes, (title, lines) in zip((side, plan), panels.items(), strict=True):
     for name, line in lines.items():
         axes.plot(*line, color="0.4" if name in ("theta", "phi") else "0.1")

@@ -32,7 +32,7 @@ for (title, lines), form in zip(panels.items(), (0, 1, 0, 1), strict=True):
             lines[f"azimuth {azimuth}°"] = concrete * 1e-6, np.array(values)
 
 styles = [("C0", "C1"), ("C0", "C1"), ("C2", "C2--", "C2:"), ("C2", "C2--", "C2:")]
-axes = draw(panels, styles, columns=2, xlabel="normal stress (MPa)")
+axes = draw(panels, styles, xlabel="normal stress (MPa)")
 for panel in axes[:2]:
     panel.set(ylabel="initial shear stiffness (MPa/µm)", ylim=(0.0, 210.0))
 for panel in axes[2:]:

@@ -68,15 +68,18 @@ def bears(law, stress):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["joint", "coulomb"])
+@pytest.mark.parametrize("kind", ["joint", "coulomb", "bond"])
 def test_factor_of_safety_of_a_block_on_a_plane(kind):
     """Strength of the joint at its normal stress over the shear stress of the weight."""
     scene = parse(SCENE)
     law = PLAIN.get(kind, scene.laws["joint"])
-    weight, dip = 2600.0 * 9.81, math.radians(DIP)
-    by_hand = bears(law, weight * math.cos(dip)) / (weight * math.sin(dip))
+    dip, weight = math.radians(DIP), 2600.0 * 9.81
+    strength = bears(law, normal := weight * math.cos(dip))
+    if kind in PLAIN:
+        cohesion = law.bond.cohesion if law.bond else 0.0
+        assert strength == pytest.approx(cohesion + 0.8 * normal, rel=2e-3)
     found = factor_of_safety(replace(scene, laws={"joint": law}))
-    assert found == pytest.approx(by_hand, rel=FOUND)
+    assert found == pytest.approx(strength / (weight * math.sin(dip)), rel=FOUND)
 
 
 @pytest.mark.slow

@@ -50,8 +50,8 @@ def test_dilation_is_what_holds_the_rough_slope():
     """Plain Coulomb bears a dip of its friction angle, rough joints one of theirs with dilation.
 
     That is the peak of direct shear at the normal stress of the joints: the mean at rest, each
-    weighted by its force. Half a degree for blocks that the cutting leaves interlocked or loose, and
-    for joints that are not at their peaks together.
+    weighted by its force. Half a degree for blocks that the cutting leaves interlocked or loose,
+    and for joints that are not at their peaks together.
     """
     own = alone(load("slope"), "rough", 2)
     laws = {name: _plain(own, law) for name, law in own.laws.items()}

@@ -3,6 +3,7 @@
 import argparse
 import sys
 from importlib.util import find_spec
+from math import inf
 from pathlib import Path
 
 from jointlaw.laboratory.experiments import PathError
@@ -156,6 +157,8 @@ def _compare(given: argparse.Namespace) -> None:
 
 def _reduce(given: argparse.Namespace) -> None:
     scene, rows = load(given.scene), []
+    if any(law.slope_wear < inf for law in scene.laws.values()):
+        print("slope_wear has no effect on these numbers: they are too high")
     given.out.mkdir(parents=True, exist_ok=True)
     if given.force:
         (given.out / trials.FILE).unlink(missing_ok=True)

@@ -45,8 +45,9 @@ def seat(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> tupl
         rows = rates(blocks, tracker.contacts)
         area = tracker.contacts.length * scene.thickness
         start = np.concatenate([tracker.contacts.closure, slid])
-        moved, balanced = _equilibrium(joints, rows, start, area, force, still, attempt > 0)
-        if attempt == 0:
+        near = attempt > 0
+        moved, balanced = _equilibrium(joints, rows, start, area, force, still, near, not near)
+        if not near:
             all_balanced, first = bool(balanced.all()), np.abs(moved).max()
         else:  # what was found before is balanced but for the turning of the joints
             moved = np.where(balanced & still, moved, 0.0)
@@ -64,8 +65,9 @@ def seat(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> tupl
 def displacements(scene: Scene, guess: np.ndarray | None = None) -> np.ndarray | None:
     """Displacements of the free motions at which virgin joints carry a scene as drawn.
 
-    All loads act at once; in unit-mass motions, None where none are found. guess: those of a
-    similar scene, from where they are looked for (default: none).
+    All loads act at once; in unit-mass motions, None where none are found. They are looked for from
+    guess, those of a similar scene, from those with which no joint slides, and from none: where
+    bonds break and joints soften, one of these may find what the others miss.
     """
     blocks, joints = Blocks(scene), Joints(scene)
     tracker = Tracker(scene, blocks.motion)
@@ -73,11 +75,15 @@ def displacements(scene: Scene, guess: np.ndarray | None = None) -> np.ndarray |
     joints.assign(tracker.identities)
     rows, area = rates(blocks, tracker.contacts), tracker.contacts.length * scene.thickness
     force = ((blocks.gravity + blocks.loads) * blocks.root).ravel()[blocks.free.ravel()]
-    guess, whole = np.zeros(len(force)) if guess is None else guess, np.ones(len(force), bool)
-    opened, slid = (rows @ guess).reshape(2, -1)
-    start = np.concatenate([tracker.contacts.closure - opened, slid])
-    moved, balanced = _equilibrium(joints, rows, start, area, force, whole, True)
-    return guess + moved if balanced.all() else None
+    none, whole = np.zeros(len(force)), np.ones(len(force), bool)
+    for first, near in ((guess, True), (none, False), (none, True)):
+        if first is not None:
+            opened, slid = (rows @ first).reshape(2, -1)
+            start = np.concatenate([tracker.contacts.closure - opened, slid])
+            moved, balanced = _equilibrium(joints, rows, start, area, force, whole, near, False)
+            if balanced.all():
+                return first + moved
+    return None
 
 
 def _length_forces(scene, blocks, tracker, joints, slid) -> np.ndarray:
@@ -89,12 +95,13 @@ def _length_forces(scene, blocks, tracker, joints, slid) -> np.ndarray:
     return tracker.contacts.assemble(blocks.motion, none, none, stored) * blocks.mobile
 
 
-def _equilibrium(joints: Joints, rows: csr_array, start, area, force, settle, near):
+def _equilibrium(joints: Joints, rows: csr_array, start, area, force, settle, near, glue):
     """Displacements of the free motions that balance `force`; rows as `rates` gives them.
 
     start (2 k,): closures, then slidings, without these displacements (m), reached in one step
     from the virgin state. settle (free motions,): those that are asked for; near: they are almost
-    in balance. Returns (displacement, balanced), both (free motions,).
+    in balance; glue: place what the law cannot hold with joints that neither slide nor open.
+    Returns (displacement, balanced), both (free motions,).
     """
     k = len(area)
     rows = diags(np.concatenate([-np.ones(k), np.ones(k)])) @ rows  # to (closure, shear)
@@ -123,9 +130,9 @@ def _equilibrium(joints: Joints, rows: csr_array, start, area, force, settle, ne
     if not near:
         guess, _ = _newton(bonded, rows, start, weight, force, nothing, 300, island, idle)
     best, balanced = _newton(law, rows, start, weight, force, guess, 100, island, idle)
-    if not (near or balanced.all()):
-        glue = partial(bonded, pull=1.0)
-        glued, _ = _newton(glue, rows, start, weight, force, nothing, 300, island, balanced)
+    if glue and not balanced.all():
+        closed = partial(bonded, pull=1.0)
+        glued, _ = _newton(closed, rows, start, weight, force, nothing, 300, island, balanced)
         best = np.where(balanced[island], best, glued)
     return best, balanced[island]
 

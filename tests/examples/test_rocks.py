@@ -7,6 +7,7 @@ import pytest
 
 from dem_demo import Simulation, load, parse, run
 from dem_demo.cli import main
+from dem_demo.output.monitors import friction_angle
 from dem_demo.scene import TEMPLATE, read_tables
 from dem_demo.studies.compare import _plain
 from dem_demo.studies.strength import alone, critical_tilt
@@ -46,16 +47,20 @@ def test_short_scenes_end_as_intended(name, until, failed):
 
 @pytest.mark.slow
 def test_dilation_is_what_holds_the_rough_slope():
-    """Plain Coulomb bears the dip of its friction angle, no more: atan 0.4 = 21.8 degrees.
+    """Plain Coulomb bears a dip of its friction angle, rough joints one of theirs with dilation.
 
-    Half a degree for blocks that the cutting leaves interlocked or loose; the rough joints bear
-    16.5 degrees more at a mating length of 5 mm.
+    That is the peak of direct shear at the normal stress of the joints: the mean at rest, each
+    weighted by its force. Half a degree for blocks that the cutting leaves interlocked or loose,
+    and for joints that are not at their peaks together.
     """
     own = alone(load("slope"), "rough", 2)
     laws = {name: _plain(own, law) for name, law in own.laws.items()}
     rough, plain = critical_tilt(own), critical_tilt(replace(own, laws=laws))
+    sim = Simulation(own)
+    stress, force = sim.joints.traction[:, 0], sim.joints.traction[:, 0] * sim.contacts.length
+    pressed = (stress * force).sum() / force.sum()
     assert 36 + plain == pytest.approx(21.8, abs=0.5)
-    assert rough - plain > 15
+    assert 36 + rough == pytest.approx(friction_angle(own.laws["rough"], pressed), abs=0.5)
 
 
 def test_a_scene_of_ones_own_from_the_template(tmp_path, capsys):

@@ -49,6 +49,8 @@ end = 0.2
 fraction = 0.7
 """
 FOUND = 0.01  # share to which both are found
+BOND = jl.Bond(1e9, 1e9, tension=2e5, cohesion=1e4, energy_II=25.0)  # 500 times the elastic energy
+PLAIN = {"coulomb": coulomb_law(3e9, 2e9, 0.8), "bond": coulomb_law(3e9, 2e9, 0.8, BOND)}
 
 
 def angle(factor, dip):
@@ -66,19 +68,22 @@ def bears(law, stress):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["joint", "coulomb"])
+@pytest.mark.parametrize("kind", ["joint", "coulomb", "bond"])
 def test_factor_of_safety_of_a_block_on_a_plane(kind):
     """Strength of the joint at its normal stress over the shear stress of the weight."""
     scene = parse(SCENE)
-    law = scene.laws["joint"] if kind == "joint" else coulomb_law(3e9, 2e9, 0.8)
-    weight, dip = 2600.0 * 9.81, math.radians(DIP)
-    by_hand = bears(law, weight * math.cos(dip)) / (weight * math.sin(dip))
+    law = PLAIN.get(kind, scene.laws["joint"])
+    dip, weight = math.radians(DIP), 2600.0 * 9.81
+    strength = bears(law, normal := weight * math.cos(dip))
+    if kind in PLAIN:
+        cohesion = law.bond.cohesion if law.bond else 0.0
+        assert strength == pytest.approx(cohesion + 0.8 * normal, rel=2e-3)
     found = factor_of_safety(replace(scene, laws={"joint": law}))
-    assert found == pytest.approx(by_hand, rel=FOUND)
+    assert found == pytest.approx(strength / (weight * math.sin(dip)), rel=FOUND)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["joint", "coulomb"])
+@pytest.mark.parametrize("kind", ["joint", "coulomb", "bond"])
 def test_factor_of_safety_of_a_toppling_column(kind):
     """A column 4 m high tips on its lower corner and pushes the top of a block that slides.
 
@@ -87,7 +92,7 @@ def test_factor_of_safety_of_a_toppling_column(kind):
     """
     tilt, height, wide, top, load = math.radians(25.0), 4.0, 3.0, 1.2, 2600.0 * 9.81
     plain = {"free": coulomb_law(3e9, 2e9, 0.0), "foot": coulomb_law(3e9, 2e9, 5.0)}
-    law = parse(SCENE).laws["joint"] if kind == "joint" else coulomb_law(3e9, 2e9, 0.8)
+    law = PLAIN.get(kind, parse(SCENE).laws["joint"])
     head = SCENE[: SCENE.index("[[block]]")].split("[laws.joint]")[1]
     scene = parse(f"""
 gravity = [{9.81 * math.sin(tilt)}, {-9.81 * math.cos(tilt)}]
@@ -127,7 +132,24 @@ end = 0.2
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["joint", "coulomb"])
+def test_factor_of_safety_of_a_column_that_a_bond_keeps_from_toppling():
+    """It tips on its lower corner, and the bond at its heel is torn.
+
+    That end stands for half of the base, with the whole base as its arm: the moment is that of the
+    tension all over the base, tension * width^2 / 2. The weight is not divided by F.
+    """
+    tilt, high, wide, load = math.radians(25.0), 4.0, 1.0, 2600.0 * 9.81
+    bond = jl.Bond(1e9, 1e9, tension=1.2e5, cohesion=2e6)
+    text = SCENE.replace("box = [5.0, 1.0]\nat = [-1.0, 0.5]", "box = [1.0, 4.0]\nat = [0.0, 2.0]")
+    gravity = 9.81 * math.sin(tilt), -9.81 * math.cos(tilt)
+    scene = replace(parse(text), gravity=gravity, laws={"joint": coulomb_law(3e9, 2e9, 0.8, bond)})
+    tips = load * wide * high * (math.sin(tilt) * high / 2 - math.cos(tilt) * wide / 2)
+    by_hand = bond.tension * wide**2 / 2 / tips
+    assert factor_of_safety(scene) == pytest.approx(by_hand, rel=FOUND)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["joint", "coulomb", "bond"])
 def test_factor_of_safety_of_a_wedge_of_two_blocks(kind):
     """The upper block slides on 50 degrees and pushes the lower one, which slides on 15 degrees.
 
@@ -157,9 +179,9 @@ def test_factor_of_safety_of_a_wedge_of_two_blocks(kind):
         )
         + "[run]\nend = 0.2\n"
     )
-    law = scene.laws["joint"] if kind == "joint" else coulomb_law(3e9, 2e9, 0.8)
+    law = PLAIN.get(kind, scene.laws["joint"])
     stress = np.geomspace(1e3, 3e5, 15)  # Pa, of the curve of strength
-    ratio = [bears(law, one) / one for one in stress]
+    strength = [bears(law, one) for one in stress]
     weight = 9.81 * np.array([block.section.mass for block in scene.blocks[:2]])
     length = np.array([far / cos[0], tall / sin[1]]) - cut
 
@@ -167,7 +189,7 @@ def test_factor_of_safety_of_a_wedge_of_two_blocks(kind):
         """Forces (N/m) along both planes that the strength does not bear."""
 
         def bearing(normal, face):
-            return normal * np.interp(np.log(normal / face), np.log(stress), ratio) / factor
+            return face * np.interp(normal / face, stress, strength) / factor
 
         side = bearing(push, tall - cut)
         pushed, down = np.array([push, -push]), weight + np.array([side, -side])

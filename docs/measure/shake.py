@@ -1,15 +1,16 @@
 """The scene `shake` against Newmark's sliding block: slip in mm per cycle.
 
 The base of the scene is shaken by sines of several sizes: the largest acceleration over that at
-which Newmark's block begins to slide. His block (1965) is rigid and has the steady friction of the
-law after ten mating lengths, so nothing of its peak. Slips are means over the last five of ten
-full cycles.
+which Newmark's block begins to slide. His block (1965) is rigid and has the friction that the law
+has at the present normal stress after the slip so far; before the peak that of the peak. Slips are
+means over the last five of ten full cycles.
 """
 
 from dataclasses import replace
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
+from scipy.interpolate import RegularGridInterpolator
 from scipy.optimize import brentq
 from tables import table
 
@@ -36,26 +37,34 @@ def scene(acceleration, name):
     return replace(given, laws={"joint": replace(given.laws["joint"], resolution=name)})
 
 
-def friction(law, stress):
-    """Steady friction F2/F1 of the law alone, after ten mating lengths at a normal stress (Pa)."""
-    record = jl.direct_shear(law.joint(), to=[10 * law.mating_length], normal=stress, steps=400)
-    return float(record.F2[-1] / record.F1[-1])
+def friction(law):
+    """Friction of the law alone: a function of points of normal stress (Pa) and slip (m)."""
+    curves, slips = [], np.linspace(0.0, 10.0, 401) * law.mating_length
+    for stress in STRESSES:
+        record = jl.direct_shear(law.joint(), to=[slips[-1]], normal=stress, steps=400)
+        ratio = record.F2[-401:] / record.F1[-401:]
+        curves.append(np.maximum.accumulate(ratio[::-1])[::-1])
+    return RegularGridInterpolator((STRESSES, slips), np.array(curves))
 
 
-def gain(a, frictions):
+def gain(a, slid, mu):
     """Acceleration (m/s2) of Newmark's block down the joint, for one of the base (m/s2)."""
     normal = GRAVITY * np.cos(DIP) + a * np.sin(DIP)
-    mu = np.interp(LOAD * normal, STRESSES, frictions)
-    return GRAVITY * np.sin(DIP) - a * np.cos(DIP) - mu * normal
+    mu_now = mu(np.stack(np.broadcast_arrays(LOAD * normal, np.minimum(slid, mu.grid[1][-1])), -1))
+    return GRAVITY * np.sin(DIP) - a * np.cos(DIP) - mu_now * normal
 
 
-def newmark(given, frictions):
+def newmark(given, mu):
     """Times (s) and slip (m). The block never slides up the joint."""
     drive = next(drive for drive in given.drives if drive.order)
     t = np.arange(0.0, drive.times[-1], 1e-5)
-    gained = cumulative_trapezoid(gain(drive.path(t, nu=2), frictions), t, initial=0.0)
-    velocity = gained - np.minimum.accumulate(gained)  # what was gained since it last stuck
-    return t, cumulative_trapezoid(velocity, t, initial=0.0)
+    slid, more = np.zeros_like(t), np.inf
+    while more > 1e-9:  # friction falls with slip: each pass slides farther, less and less so
+        gained = cumulative_trapezoid(gain(drive.path(t, nu=2), slid, mu), t, initial=0.0)
+        velocity = gained - np.minimum.accumulate(gained)  # what was gained since it last stuck
+        before, slid = slid, cumulative_trapezoid(velocity, t, initial=0.0)
+        more = np.max(np.abs(slid - before))
+    return t, slid
 
 
 def slip(given):
@@ -74,13 +83,11 @@ def per_cycle(t, slid):
 
 
 law = scene(1.0, "reference").laws["joint"]
-frictions = [friction(law, stress) for stress in STRESSES]
-yields_at = brentq(lambda a: gain(-a, frictions), 0.0, GRAVITY)
+mu = friction(law)
+yields_at = brentq(lambda a: gain(-a, 0.0, mu).item(), 0.0, 0.4 * GRAVITY)
 rows = []
 for size in SIZES:
     scenes = [scene(size * yields_at, name) for name in NAMES]
     found = [slip(given) for given in scenes]
-    rows.append(
-        [f"{size:g}", *(per_cycle(*one) for one in (*found, newmark(scenes[0], frictions)))]
-    )
+    rows.append([f"{size:g}", *(per_cycle(*one) for one in (*found, newmark(scenes[0], mu)))])
 print(table(["size", *NAMES, "Newmark"], rows))

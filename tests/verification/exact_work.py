@@ -34,6 +34,14 @@ def begun(k, state):
     return new
 
 
+def walk(k, state, d):
+    """States (rows, n + 1) of one joint, from (rows, 1) along n steps d (n, dim)."""
+    states = [state]
+    for step in d:
+        states.append(kernel.step(k, states[-1], step[:, None], False)[0])
+    return np.hstack(states)
+
+
 def along(k, state, d, t):
     """Where steps d (dim, B) from states as they begin (rows, B) are at the time t (B,).
 
@@ -65,34 +73,31 @@ def along(k, state, d, t):
     return power, np.concatenate([side.reshape(-1, len(t)) for side in sides])
 
 
-def _at(k, state, d, t):
-    """As `along`, of one joint (rows, 1) and its step (dim,) at many times (n,)."""
-    n = len(t)
-    return along(k, np.repeat(state, n, axis=1), np.repeat(d[:, None], n, axis=1), t)
+def _kinks(k, states, d):
+    """Which step (n,), and when in it (n,), the branches change: bisection between a few starts."""
 
+    def branches(which, t):
+        return along(k, states[:, which], d[:, which], t)[1]
 
-def _kinks(k, state, d):
-    """Times at which the branches change, by bisection between a few starts."""
-
-    def branches(t):
-        return _at(k, state, d, t)[1]
-
-    at = branches(_STARTS)
-    change = (at[:, 1:] != at[:, :-1]).any(axis=0)
-    low, high, side, found = _STARTS[:-1][change], _STARTS[1:][change], at[:, :-1][:, change], []
+    steps = np.arange(d.shape[1])
+    at = branches(np.repeat(steps, len(_STARTS)), np.tile(_STARTS, len(steps)))
+    at = at.reshape(len(at), len(steps), -1)
+    which, i = np.nonzero((at[..., 1:] != at[..., :-1]).any(axis=0))
+    low, high, side = _STARTS[i], _STARTS[i + 1], at[:, which, i]
+    found = [(np.repeat(steps, 2), np.tile([0.0, 1.0], len(steps)))]
     for _ in range(80):  # several changes between two starts: one after the other
         if low.size == 0:
             break
         a, b = low, high
         for _ in range(46):
             c = 0.5 * (a + b)
-            same = (branches(c) == side).all(axis=0)
+            same = (branches(which, c) == side).all(axis=0)
             a, b = np.where(same, c, a), np.where(same, b, c)
-        found.append(b)
-        after, end = branches(b), branches(high)
+        found.append((which, b))
+        after, end = branches(which, b), branches(which, high)
         more = (after != end).any(axis=0) & (b < high)
-        low, high, side = b[more], high[more], after[:, more]
-    return np.unique(np.concatenate([[0.0, 1.0], *found]))
+        which, low, high, side = which[more], b[more], high[more], after[:, more]
+    return np.unique(np.concatenate(found, axis=1), axis=1)
 
 
 class _Integrated(VirginCurve):
@@ -125,11 +130,14 @@ def stored(k, state):
     return kernel.measures(own, state).stored
 
 
-def step_work(k, state, d):
-    """Work along a step of one joint, by `along`: a state as it begins (rows, 1), d (dim,)."""
-    edges = _kinks(k, state, d)
+def step_work(k, states, d):
+    """Work (n,) along steps d (dim, n), by `along`, of states as they begin (rows, n)."""
+    which, edges = _kinks(k, states, d)
     # the pieces of a tabulated virgin curve meet smoothly enough for four rules between kinks
-    edges = np.interp(np.arange(0, 4 * len(edges) - 3) / 4, np.arange(len(edges)), edges)
-    span = np.diff(edges)[:, None]
-    t, w = (edges[:-1, None] + span * _T).ravel(), (span * _TW).ravel()
-    return float(w @ _at(k, state, d, t)[0])
+    start = np.repeat(edges[:-1], 4) + np.outer(np.diff(edges) / 4, np.arange(4)).ravel()
+    inside = np.repeat(which[1:] == which[:-1], 4)
+    start, span = start[inside], np.repeat(np.diff(edges) / 4, 4)[inside]
+    which = np.repeat(np.repeat(which[:-1], 4)[inside].astype(int), len(_T))
+    t, w = start[:, None] + span[:, None] * _T, span[:, None] * _TW
+    power = along(k, states[:, which], d[:, which], t.ravel())[0]
+    return np.bincount(which, w.ravel() * power)

@@ -1,0 +1,129 @@
+"""The largest energy that steps and closed cycles with a mating length gain: searched for.
+
+    python docs/measure/gains.py [--laws 60]
+
+No step gains by the work of the joint's own traction in the limit of small steps, nor does a closed
+cycle. Differential evolution looks for the opposite on random laws: for the step, and the triangle
+of eight steps a side, that gain most. Traction is integrated along each step by a Gauss rule. A
+gain is what is stored at the end, less the work and what was stored at the beginning, as a share of
+the largest energy stored on the way. Printed are the largest of all laws, by steps of at most so
+many mating lengths; of the triangle also in steps of a tenth, and there the largest error of the
+work if it is taken as the trapezoid of the tractions at the ends of steps.
+"""
+
+import argparse
+
+import numpy as np
+from scipy.optimize import differential_evolution
+from tables import table
+
+import jointlaw as jl
+from jointlaw.joints.state import JointState
+
+HEAD = ["step (mating lengths)", "one step", "triangle", "in tenths", "trapezoid", "in tenths"]
+SIZES = 1.0, 0.1, 0.01
+SIDE = 8  # steps
+TRAPEZOID = np.array([0.0, 1.0]), np.array([0.5, 0.5])
+
+
+def gauss(panels):
+    """Two-point Gauss rule on so many parts of a step: times and weights (2 panels,)."""
+    x, w = np.polynomial.legendre.leggauss(2)
+    t = (np.arange(panels)[:, None] + 0.5 * (x + 1.0)) / panels
+    return t.ravel(), np.tile(0.5 * w / panels, panels)
+
+
+def random_law(rng):
+    """Any law whose slopes fade, of few facets, in units of its closure range."""
+    b, wears = rng.uniform(-1.0, 2.0), rng.random() < 0.3
+    return jl.JointLaw(
+        orientation=jl.Orientation(rng.choice([1.0, rng.uniform(1.0, 5.0)]), b,
+                                   rng.uniform(-1.0, 1.0) * (1 / 3 - b / 6)),
+        asperity=jl.Asperity(1.0, rng.uniform(0.3, 2.0), rng.choice([0.0, 0.5, 1.0]),
+                             rng.choice([rng.uniform(0.0, 1.2), rng.uniform(1.2, 4.0)]),
+                             rng.choice([np.inf, 10.0 ** rng.uniform(-2.5, 0.5)])),
+        asperity_density=1.0, closure_range=1.0, mating_length=10.0 ** rng.uniform(-1.0, 1.0),
+        slope_wear=10.0 ** rng.uniform(-2.0, 1.0) if wears else np.inf,
+        plane=[None, 0.7][rng.integers(2)], resolution=jl.Resolution(rng.integers(1, 3), 3, 2),
+    )  # fmt: skip
+
+
+def gains(law, corners, steps, rule):
+    """Gain (n,) of n paths: two legs to where they begin, and on, each leg in so many steps.
+
+    corners (n, legs, dim) in m.
+    """
+    t, w = rule
+    legs = np.diff(corners, axis=1, prepend=0.0)
+    joints, points = law.joints(len(legs)), law.joints(len(legs) * t.size)
+    for leg in (legs[:, 0], legs[:, 1]):
+        joints.update(leg, tangent=False)
+    start = peak = joints.stored_energy
+    work = np.zeros(len(legs))
+    for leg in np.moveaxis(legs[:, 2:], 1, 0):
+        for _ in range(steps):
+            d = leg / steps
+            values = np.repeat(joints.snapshot().values, t.size, axis=0)
+            points.restore(JointState(law.fingerprint, values))
+            spread = np.repeat(d, t.size, axis=0)
+            F = points.trial(spread * np.tile(t, len(legs))[:, None], tangent=False)[0]
+            work += np.sum(F * spread, axis=1).reshape(len(legs), -1) @ w
+            joints.update(d, tangent=False)
+            peak = np.maximum(peak, joints.stored_energy)
+    return (joints.stored_energy - start - work) / np.where(peak > 0, peak, np.inf)
+
+
+def paths(law, x, size, closed):
+    """Corners (n, legs, dim) of candidates x (parameters, n): two, then a step or a triangle.
+
+    The first parameter is the logarithm of how large either is.
+    """
+    places = x[1:].T.reshape(x.shape[1], -1, law.dim)
+    reach = (0.5 * SIDE if closed else 1.0) * size * law.mating_length * 10.0 ** (x[0] - 1.0)
+    shear = [1.0] * (law.dim - 1)
+    begin = places[:, :2] * np.array([1.0, *(2.0 * law.mating_length * s for s in shear)])
+    begin[..., 0] += 0.5  # most are in touch
+    way = places[:, 2:] / np.maximum(1.0, np.linalg.norm(places[:, 2:], axis=2)[..., None])
+    unit = np.stack([np.minimum(reach, 1.0), *(reach * s for s in shear)], axis=-1)
+    way = begin[:, -1:] + way * unit[:, None]
+    return np.concatenate([begin, way, begin[:, -1:]] if closed else [begin, way], axis=1)
+
+
+def search(law, size, closed, seed):
+    """Corners (1, legs, dim) of the step or triangle of the largest gain that was found."""
+    rule, steps = (gauss(2), SIDE) if closed else (gauss(32), 1)
+
+    def loss(x):
+        return -gains(law, paths(law, x, size, closed), steps, rule)
+
+    found = differential_evolution(
+        loss, [(-1.0, 1.0)] * (1 + (4 if closed else 3) * law.dim), maxiter=25, popsize=4,
+        polish=False, vectorized=True, updating="deferred", rng=np.random.default_rng(seed),
+    )  # fmt: skip
+    return paths(law, found.x[:, None], size, closed)
+
+
+def largest(size, seed):
+    """The figures (5,) of one law: gains, and errors of the trapezoid."""
+    law = random_law(np.random.default_rng(seed))
+    step, triangle = (search(law, size, closed, seed) for closed in (False, True))
+    exact, crude = (
+        np.concatenate([gains(law, triangle, SIDE * more, rule) for more in (1, 10)])
+        for rule in (gauss(64), TRAPEZOID)
+    )
+    return [*gains(law, step, 1, gauss(2048)), *exact, *np.abs(crude - exact)]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--laws", type=int, default=60, metavar="N", help="random laws")
+    laws = parser.parse_args().laws
+    rows = []
+    for size in SIZES:
+        found = [largest(size, seed) for seed in range(laws)]
+        rows.append([f"{size:g}", *(f"{most:.1e}" for most in np.max(found, axis=0))])
+    print(table(HEAD, rows))
+
+
+if __name__ == "__main__":
+    main()

@@ -125,7 +125,7 @@ class Fit:
         assert self.law.bond is not None
         (_, begin), (_, end) = self.law.bond.limits
         shears = [np.abs(c.shear) for c in self.problem.curves if isinstance(c, ShearCurve)]
-        inside = [np.count_nonzero((way * begin > 1) & (way * end < 1)) for way in shears]
+        inside = [int(np.sum((way * begin > 1) & (way * end < 1))) for way in shears]
         return max(inside, default=0)
 
     @property

@@ -160,7 +160,7 @@ def _bond(v: Values, given: Bond) -> Bond:
 
     The elastic energy at the peak does so too, hence no strength is out of bounds.
     """
-    changed: dict[str, float | None] = {}
+    changed: dict[str, Any] = {}
     for _, strength, energy in MODES:
         whole, growth = getattr(given, energy), v[strength] / (getattr(given, strength) or 1.0)
         changed |= {strength: v[strength], energy: whole * growth**2 if whole else None}

@@ -26,6 +26,7 @@ WIDEST = math.log(2) / 1.96  # standard error of a logarithm: a factor of 2 eith
 OPEN = 1e6  # upper over lower end of the interval of what nothing fixes
 HALVED = 0.005  # of the largest measured stress: what halving the steps of shear may change
 HALVINGS = 8  # at most
+SOFTENING = 3  # points of one test on the fall of the bond, to know its cohesion by
 AT_BOUND = 1e-6  # of the distance of the bounds
 
 OTHER = (
@@ -107,11 +108,25 @@ class Fit:
         for name, share, error in zip(self.free, self.solution.prior_share, errors, strict=True):
             if name in self.at_bound:
                 found[name] = f"the fit ended at a bound, {self.parameters[name]:.3g}"
+            elif name == "cohesion" and self._softening < SOFTENING:
+                found[name] = (
+                    f"at most {self._softening} points of a test lie where the bond softens: a "
+                    "bond that breaks between two points shows no cohesion"
+                )
             elif share > PRIOR_SHARE:
                 found[name] = f"the priors supply {100 * share:.0f} % of its variance"
             elif error > 1:
                 found[name] = f"the data leave it {self._spread(name)}"
         return found
+
+    @property
+    def _softening(self) -> int:
+        """Points between begin and end of damage in pure shear, of the curve that has most."""
+        assert self.law.bond is not None
+        (_, begin), (_, end) = self.law.bond.limits
+        shears = [np.abs(c.shear) for c in self.problem.curves if isinstance(c, ShearCurve)]
+        inside = [int(np.sum((way * begin > 1) & (way * end < 1))) for way in shears]
+        return max(inside, default=0)
 
     @property
     def _widest(self) -> Array:
@@ -317,12 +332,14 @@ def fit_curves(
     curves: at least one, `ShearCurve` and at most one `ClosureCurve`.
     free: parameters to fit, of alpha, beta (m), overlap (m), asperity_density (1/m2),
         K (Pa m^(1-eta)), lam, eta, mu, a, b, c, yield_interference (m), mating_length
-        (m), slope_wear (J/m2), slope_residual. Positive ones are fitted as logarithms. A
-        closure curve that does not begin at zero stress adds its seating closure (m).
+        (m), slope_wear (J/m2), slope_residual; of a law with a bond cohesion (Pa), tension (Pa).
+        Positive ones are fitted as logarithms. A closure curve that does not begin at zero stress
+        adds its seating closure (m).
     fixed: values of parameters that are known otherwise, such as alpha from a scan, in SI units.
     law: values of all parameters that are not free, `mating_length` among them; None takes rock
-        asperities, `forward.DEFAULTS`, of "individual" formation. A law of one plane
-        stays one; its heights must be GammaHeights.
+        asperities, `forward.DEFAULTS`, of "individual" formation. A law of one plane stays one; its
+        heights must be GammaHeights. Its bond keeps stiffnesses and, where cohesion or tension
+        change, the ratio of each given energy to the elastic energy at the peak.
     priors: 95 % ranges (low, high) in physical units instead of the defaults of `priors.PRIORS`,
         or None to drop one. Besides the parameters: "full_contact_stress".
 

@@ -13,6 +13,7 @@ from ..discretisation.first_loading import facet_sum, yield_sum
 from ..discretisation.virgin_curve import exact_force
 from ..law import SHORTEST, JointLaw
 from ..parameters.asperity import Asperity
+from ..parameters.bond import MODES, Bond
 from ..parameters.heights import GammaHeights
 from ..parameters.orientation import Orientation
 from ..parameters.resolution import SLIP, resolve
@@ -42,12 +43,14 @@ class Settings:
     closure_range: Any = None  # m
     plane: float | None = None  # of the law to be found; every shear curve has its own
     steps: int = STEPS  # that shear a joint the whole way, see `ShearCurve.sheared`
+    bond: Bond | None = None  # its stiffnesses, and energies over the elastic ones at the peak
 
 
 def parameters(law: JointLaw) -> tuple[dict[str, float], Settings]:
     """Parameters of a law by name, those it does not have at their defaults, and its settings.
 
-    Raises ValueError for heights that are not gamma distributed.
+    Of a law with a bond its cohesion and tension too. Raises ValueError for heights that are not
+    gamma distributed.
     """
     o, p, h = law.orientation, law.asperity, law.heights
     values = DEFAULTS | {
@@ -55,10 +58,12 @@ def parameters(law: JointLaw) -> tuple[dict[str, float], Settings]:
         "a": o.a, "b": o.b, "c": o.c, "yield_interference": p.yield_interference,
         **{name: getattr(law, name) for name in _SLOPES},
     }  # fmt: skip
-    kept = ("resolution", "closure_range", "plane")
+    kept = ("resolution", "closure_range", "plane", "bond")
     if not isinstance(h, GammaHeights):
         raise ValueError(f"law: heights = {h!r} cannot be fitted; give it GammaHeights")
     values |= {"alpha": h.alpha, "beta": h.beta, "overlap": h.overlap}
+    if law.bond is not None:
+        values |= {"cohesion": law.bond.cohesion, "tension": law.bond.tension}
     return values, Settings(h.formation, **{name: getattr(law, name) for name in kept})
 
 
@@ -76,6 +81,7 @@ def build(values: Values, settings: Settings, plane: float | None = None) -> Joi
         resolution=settings.resolution,
         plane=plane,
         closure_range=settings.closure_range,
+        bond=None if settings.bond is None else _bond(v, settings.bond),
     )
     if math.isinf(v["mating_length"]):
         return mated
@@ -147,6 +153,18 @@ def _force(closure: Array, eta: float, heights: GammaHeights) -> Array:
 
 def _asperity(v: Values) -> Asperity:
     return Asperity(v["K"], v["lam"], v["eta"], v["mu"], v["yield_interference"])
+
+
+def _bond(v: Values, given: Bond) -> Bond:
+    """The bond of these strengths: an energy that was given grows with the square of its strength.
+
+    The elastic energy at the peak does so too, hence no strength is out of bounds.
+    """
+    changed: dict[str, Any] = {}
+    for _, strength, energy in MODES:
+        whole, growth = getattr(given, energy), v[strength] / (getattr(given, strength) or 1.0)
+        changed |= {strength: v[strength], energy: whole * growth**2 if whole else None}
+    return replace(given, **changed)
 
 
 def _heights(v: Values, settings: Settings) -> GammaHeights:

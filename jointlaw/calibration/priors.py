@@ -50,6 +50,8 @@ TRANSFORMS = {
     "mating_length": Transform("m", 1e-12, 1e3),
     "slope_wear": Transform("J/m2", 1e-6, 1e12),
     "slope_residual": Transform("1", 0.0, 1.0, log=False),
+    "cohesion": Transform("Pa", 1.0, 1e12),
+    "tension": Transform("Pa", 1.0, 1e12),
     "seating": Transform("m", 1e-12, 1.0),
     # a combination that a prior is stated for, see `quantity`
     "full_contact_stress": Transform("Pa", 1e-3, 1e18),

@@ -29,6 +29,7 @@ OF_CLOSURE = ("alpha", "beta", "overlap", "asperity_density", "K", "yield_interf
 # Mating lengths to try, as shares of the longest way sheared: far from the measured one the misfit
 # is flat, and no descent comes back
 LENGTHS = (0.5, 0.15, 0.05, 0.015)
+BONDED = ("cohesion", "tension")
 Function = Callable[[Array], Array]
 
 
@@ -132,7 +133,9 @@ def pose(
     fixed = fixed or {}
     names = [name for name in free if name not in fixed]
     for name in (*fixed, *names):
-        one_of("free or fixed", name, tuple(DEFAULTS))
+        one_of("free or fixed", name, (*DEFAULTS, *BONDED))
+        if name in BONDED and settings.bond is None:
+            raise ValueError(f"{name} is that of a bond: give a law with a bond, which is kept")
     values |= {name: number(f"fixed[{name!r}]", value) for name, value in fixed.items()}
     build(values, settings)  # raises for values that no law has
     for name in names:

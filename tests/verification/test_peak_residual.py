@@ -37,18 +37,12 @@ def figures(normal):
     return found / (np.array(MEASURED[normal]) * [1e6, 1e-3, 1e6]), record
 
 
-def test_the_fitted_figures():
-    """Logarithms, that of the displacement at a quarter of the weight: a peak is flat."""
-    misfit = [np.log(figures(normal)[0]) * [1, 0.25, 1] for normal in (1.0, 3.0, 5.0)]
-    assert np.sqrt(np.mean(np.square(misfit))) < 0.02
-
-
 @pytest.mark.parametrize("normal", MEASURED)
 def test_peak_and_residual(normal):
     (peak, at, residual), record = figures(normal)
     # 2 and 4 MPa were not fitted: peaks +4.6 and +2.3 %, residuals -2.4 and -1.4 %
-    assert peak == pytest.approx(1, rel=0.06)
-    assert residual == pytest.approx(1, rel=0.06)
+    assert peak == pytest.approx(1, rel=0.05)
+    assert residual == pytest.approx(1, rel=0.03)
     assert at == pytest.approx(1, rel=1 / 3)
     assert record.peak_friction_angle - record.residual_friction_angle > 5.0
     finer = jl.direct_shear(law().joint(), [10e-3], normal * 1e6, steps=240).shear_stress

@@ -10,8 +10,10 @@ from yade_host import make_table, run_scene, run_yade
 import jointlaw as jl
 
 SCENES = """
+from dataclasses import replace
 from jointlaw import JointLaw
 law, worn = (JointLaw.from_toml(name) for name in ("law.toml", "worn.toml"))
+bonded = replace(law, bond=worn.bond)
 end = law.closure_range
 
 def pieces(corners=((-.1, .05), (.5, 0), (.5, .5), (.5, -.25), (-.5, -.25), (.5, -.25)), steps=100):
@@ -143,8 +145,8 @@ out = dict(
     reload=[reload(False), reload(True)],
     visits=dict(table=visits(TableLaw("short.txt"), False, 1e-3),
                 live=visits(LiveLaw(law), True, .3 * end, forget=.1 * end),
-                bonded=visits(LiveLaw(worn), True, .3 * end, forget=.1 * end),
-                late=visits(LiveLaw(worn), True, .3 * end, True, forget=.1 * end)))
+                bonded=visits(LiveLaw(bonded), True, .3 * end, forget=.1 * end),
+                late=visits(LiveLaw(bonded), True, .3 * end, True, forget=.1 * end)))
 
 slab_and_sphere()
 O.bodies[1].state.pos = (0, 0, .5 - .1 * end)

@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "verification"))
 from extremes import laws as extreme_laws
 
 FUZZ = HERE / "fuzz.c"
-SANE = ["-g", "-O1", "-fno-sanitize-recover=all"]
+SANE = ["-g1", "-O1", "-fno-sanitize-recover=all"]
 # JOINTLAW_LONG=1: 1e6 steps and 10 000 files, as docs/native.md tells; twenty minutes on one core
 LAWS, STEPS, FILES = (200, 5000, 10_000) if "JOINTLAW_LONG" in os.environ else (12, 3000, 500)
 

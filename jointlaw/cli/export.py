@@ -71,5 +71,5 @@ def _export_table(law: JointLaw, folder: Path, shear_limit: float | None) -> Non
     print(f"wrote the joint for YADE to {folder}: {len(table.closure)} rows")
     missed = table.metadata["resolution_error_friction_angle"]
     print(f"its friction angle at the shear limit is {missed:.2g} degrees off that of finer nodes")
-    print("what the table drops (error against the law, share of each path's largest traction):")
-    print(table.report(law))
+    print(f"bond: {table.metadata['bond']}; what the table drops (error against the law, share of")
+    print("each path's largest traction):", table.report(law), sep="\n")

@@ -1,6 +1,6 @@
-/* batch.c: many joints. Compiled several times, with -DW=8, 4, 2 or 1 and -DKIND=_8 and so on for
- * states in blocks of JLAW_BLOCK joints side by side, (blocks, rows, JLAW_BLOCK); and with
- * -DW=4 -DJLAW_ABREAST, or -DW=1, for joints one after the other, (joints, rows).
+/* batch.c: many joints. Compiled several times: with -DW=8, 4 and 2 for states in blocks of
+ * JLAW_BLOCK joints side by side, (blocks, rows, JLAW_BLOCK); with -DW=4 -DJLAW_ABREAST for joints
+ * one after the other, (joints, rows). -DKIND=_8 and so on ends the names of the functions.
  */
 #include "batch.h"
 #include "lanes.h"
@@ -83,8 +83,8 @@ int NAME(jlaw_measure)(const jlaw_batch *b, long first, long last)
   for (long at = first; at < last; at += JOINTS) {
     const numbers n = {joint_of(b, at), BLOCK, 0};
     const amounts all = measure(b->law, n);
-    const of_joint out[5] = {all.sliding, all.slipping, all.separated, all.normal + all.sheared + all.bond,
-                             all.reach};
+    const of_joint stored = all.normal + all.sheared + all.bond;
+    const of_joint out[5] = {all.sliding, all.slipping, all.separated, stored, all.reach};
     for (int i = 0; i < 5; i++)
       for (int l = 0; l < JOINTS && at + l < last; l++) b->F[i * b->n + at + l] = JOINT(out[i], l);
   }

@@ -5,7 +5,7 @@
  *
  *     char message[JLAW_MESSAGE];
  *     jlaw_law *law = jlaw_read("granite.jlaw", message, sizeof message);
- *     double state[162] = {0};                         jlaw_state_size(law) numbers; zeros: virgin, mated
+ *     double state[162] = {0};                 jlaw_state_size(law) numbers; zeros: virgin, mated
  *     if (jlaw_update(law, state, state, d, F, NULL, message, sizeof message)) ... message tells
  *
  * Table files (.jlaw, or as constants NAME.h) are written by `jointlaw export c`.
@@ -64,8 +64,8 @@ JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1,
  * law is broken in either. */
 JLAW_FUNCTION int jlaw_unmated(const jlaw_law *law, double *s);
 
-/* The same without any check, for hosts that know their steps and for devices: row i of the state is
- * s[i stride], so that joints may lie side by side, (rows, n). C may be NULL. */
+/* The step of jlaw_update without a check, for hosts that know their steps and for devices: row i of
+ * the state is s[i stride], so that joints may lie side by side, (rows, n). C may be NULL. */
 JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t stride, const double *d,
                              double *F, double *C);
 
@@ -252,7 +252,7 @@ JLAW_CLONES JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t 
   for (int i = 0; C && i < law->dim * law->dim; i++) C[i] = c[i];
 }
 
-/* Whether all sliders hold forces that a law can have; not for NaN */
+/* Whether all sliders hold forces that a law can have; 0 for NaN */
 static JLAW_FUNCTION int jlaw_sound_(const double *q, int n)
 {
   double sum[4] = {0.0, 0.0, 0.0, 0.0};
@@ -263,7 +263,7 @@ static JLAW_FUNCTION int jlaw_sound_(const double *q, int n)
   return (sum[0] + sum[1]) + (sum[2] + sum[3]) < 1e300;
 }
 
-/* Whether energies, flattened depths and slip of a state are numbers that a law can have */
+/* Whether energies, flattened depths, wear and damage of a state are numbers of this law */
 static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
 {
   const double *rest = s + rest_row(law), *worn = s + worn_row(law);
@@ -271,8 +271,8 @@ static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
   for (int f = 0; law->yields && f < law->facets; f++)
     good = good && rest[f] >= 0.0 && rest[f] <= law->largest_reach;
   if (law->yields) good = good && fabs(rest[law->facets]) <= DBL_MAX;
-  if (law->wears) good = good && worn[0] >= 0.0 && worn[0] <= 1.0 && worn[1] >= 0.0 &&
-           worn[1] <= DBL_MAX;
+  if (law->wears)
+    good = good && worn[0] >= 0.0 && worn[0] <= 1.0 && worn[1] >= 0.0 && worn[1] <= DBL_MAX;
   if (law->bonded) good = good && s[damage_row(law)] >= 0.0 && s[damage_row(law)] <= 1.0;
   return good && jlaw_sound_(s + slider_row(law), rest_row(law) - slider_row(law));
 }
@@ -336,10 +336,7 @@ JLAW_FUNCTION int jlaw_unmated(const jlaw_law *law, double *s)
   if (law->bonded) s[damage_row(law)] = 1.0;
   return far ? 0 : -1;
 }
-JLAW_FUNCTION double jlaw_dissipated(const jlaw_law *law, const double *s)
-{
-  return s[law->dim];
-}
+JLAW_FUNCTION double jlaw_dissipated(const jlaw_law *law, const double *s) { return s[law->dim]; }
 
 JLAW_CLONES static JLAW_FUNCTION amounts jlaw_measure_(const jlaw_law *law, const double *s)
 {

@@ -5,7 +5,7 @@
  *
  *     char message[JLAW_MESSAGE];
  *     jlaw_law *law = jlaw_read("granite.jlaw", message, sizeof message);
- *     double state[162] = {0};                         jlaw_state_size(law) numbers; zeros: virgin, mated
+ *     double state[162] = {0};                 jlaw_state_size(law) numbers; zeros: virgin, mated
  *     if (jlaw_update(law, state, state, d, F, NULL, message, sizeof message)) ... message tells
  *
  * Table files (.jlaw, or as constants NAME.h) are written by `jointlaw export c`.
@@ -64,8 +64,8 @@ JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1,
  * law is broken in either. */
 JLAW_FUNCTION int jlaw_unmated(const jlaw_law *law, double *s);
 
-/* The same without any check, for hosts that know their steps and for devices: row i of the state is
- * s[i stride], so that joints may lie side by side, (rows, n). C may be NULL. */
+/* The step of jlaw_update without a check, for hosts that know their steps and for devices: row i of
+ * the state is s[i stride], so that joints may lie side by side, (rows, n). C may be NULL. */
 JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t stride, const double *d,
                              double *F, double *C);
 
@@ -296,7 +296,7 @@ typedef int jl_yes_, jl_whole_;
 #define jl_to_real_(i) ((double) (i))
 #else
 typedef double jl_real_ __attribute__((vector_size(8 * JL_W_)));
-typedef double jl_loose_ __attribute__((vector_size(8 * JL_W_), aligned(8), may_alias)); /* in memory */
+typedef double jl_loose_ __attribute__((vector_size(8 * JL_W_), aligned(8), may_alias)); /* anywhere */
 typedef long long jl_yes_ __attribute__((vector_size(8 * JL_W_)));
 typedef int jl_whole_ __attribute__((vector_size(4 * JL_W_)));
 #define JL_LANE_(x, l) ((x)[l])
@@ -307,7 +307,7 @@ typedef int jl_whole_ __attribute__((vector_size(4 * JL_W_)));
 #define jl_pick_(m, a, b) ((m) ? jl_each_(a) : jl_each_(b))
 #define jl_only_(m, a) ((m) ? jl_each_(a) : jl_real_())
 #else
-#define jl_each_(x) ((x) - (jl_real_) {0})
+#define jl_each_(x) ((x) - (jl_real_){0})
 #define jl_pick_(m, a, b) jl_pick_lanes_(m, jl_each_(a), jl_each_(b))
 #define jl_only_(m, a) jl_only_lanes_(m, jl_each_(a))
 JL_IN_ jl_real_ jl_pick_lanes_(jl_yes_ m, jl_real_ a, jl_real_ b) { return (jl_real_) ((m & (jl_yes_) a) | (~m & (jl_yes_) b)); }
@@ -392,7 +392,7 @@ JL_IN_ void jl_fetch_(const double *table, jl_whole_ i, jl_real_ c[4])
 /* ------------------------------------------------------------------- facets and joints */
 
 /* The numbers of a joint, or of the first of W joints side by side: row r is s[r stride]. Those of
- * the next joints, which will be needed soon, lie `ahead`; 0 where there are none. */
+ * the next joints lie `ahead`, and are fetched into the cache; 0 where there are none. */
 typedef struct {
   double *s;
   size_t stride, ahead;
@@ -401,7 +401,7 @@ typedef struct {
 #ifdef JLAW_ABREAST
 typedef jl_real_ jl_of_facet_;
 typedef double jl_of_joint_;
-#define jl_somewhere_(m) 1 /* worth working out for some lanes: to ask costs more here */
+#define jl_somewhere_(m) 1 /* whether a lane needs what follows; not asked here: asking costs more */
 #define JL_TOGETHER_ JL_W_     /* facets that are worked out together */
 #define JL_JOINTS_ 1
 #define JL_JOINT_(x, l) (x)
@@ -468,7 +468,7 @@ JL_IN_ void jl_put_(jl_numbers_ n, int row, int apart, int some, jl_real_ x)
 }
 #endif
 
-/* Every fourth facet is added up in a sum of its own, and these in this order */
+/* Facet i is added to sum i % 4, and the four sums in this order: the same bits for all lanes */
 #if defined(__CUDACC__) || defined(__CUDACC_RTC__)
 #define JL_SUMS_ 1 /* on a device one: an array would lie in its slow memory */
 #define jl_total_(sum, of) ((sum)[0].of)
@@ -568,45 +568,44 @@ JL_IN_ jl_of_joint_ jl_bond_stored_(const jlaw_law *law, jl_numbers_ n, int row)
  * Symbols and order are those of docs/theory-incremental.md and of kernels/reference.py. Rows of
  * a state: delta (dim) from the mated position | dissipated energy | q_s (M D) | q_t (M D), q times
  * lam; where asperities yield flattened depth (M) | plastic work; with wear the share of the slopes
- * that is gone | work of friction; with a bond its damage. A batch keeps beside them Phi and Phi' of every facet (M each), which saves half
- * the look-ups, and with yielding the same at z.
+ * that is gone | work of friction; with a bond its damage. A batch keeps beside them Phi and Phi' of
+ * every facet (M each), which saves half the look-ups, and with yielding the same at that depth.
  *
- * Of the functions of the C library that round differently, only expm1 and pow are called: zig
- * links exp and log of its own.
- */
+ * The last digit of expm1 and pow depends on the C library, that of all else here does not. exp and
+ * log are avoided: zig links its own, which differ from those of the system. */
 
-typedef struct { /* what the compiler knows of a step: it leaves out the rest */
+typedef struct { /* constants of a step: the compiler leaves out what they exclude */
   int dim, yields, fades, wears, ledger, tangent;
   int kept; /* whether Phi and Phi' lie beside the state */
 } jl_kind_;
 
-typedef struct { /* in the plane of a joint: offset over the mating length, root of 1 - |o|^2 */
+typedef struct { /* in the plane of a joint: o, offset over the mating length; w^2 = 1 - |o|^2 */
   jl_of_joint_ o[2], w;
 } jl_site_;
 
-typedef struct { /* a joint in a step */
+typedef struct {                 /* a joint in a step */
   jl_of_joint_ p[3], from[3], to[3]; /* increment; closure and in-plane displacement before and after */
   jl_site_ start, middle, end;
   jl_of_joint_ had, has; /* share of the slopes that was left before the step, and is in it */
 } jl_motion_;
 
 typedef struct { /* the plane of facets: slope along the azimuth e and across it, in axes (1, e) */
-  jl_real_ x, z;                /* offset over the mating length along e and across */
+  jl_real_ x, z;     /* offset over the mating length along e and across */
   jl_real_ along, across;
-  jl_real_ m2, N2, rm, rmn;     /* 1 + along^2, that + across^2; 1/m, 1/(m N) */
-  jl_real_ gamma;               /* c1 N */
+  jl_real_ m2, N2, rm, rmn; /* 1 + along^2, that + across^2; 1/m, 1/(m N) */
+  jl_real_ gamma;           /* c1 N */
 } jl_plane_;
 
 typedef struct { /* facets in a step: y, Phi, Phi', Phi'' before and after; de */
   jl_real_ y0, y1, f0, f1, k0, k1, bend, es, et;
   jl_plane_ middle, end;
-  jl_real_ yw, fw, kw, strength, worn;          /* before slopes wore: y, Phi, Phi'; limit after it */
-  jl_real_ dy, rdy;                             /* y1 - y0, and 1 over it */
-  jl_yes_ near;                                 /* y has hardly changed */
-  jl_real_ z0, z1, fz0, fz1, kz0, kz1;          /* flattened depth; Phi and Phi' there */
+  jl_real_ yw, fw, kw, strength, worn; /* before wear: y, Phi, Phi'; friction limit after it; loss */
+  jl_real_ dy, rdy;                    /* y1 - y0, and 1 over it */
+  jl_yes_ near;                        /* y has hardly changed */
+  jl_real_ z0, z1, fz0, fz1, kz0, kz1; /* flattened depth; Phi and Phi' there */
   jl_real_ qs, qt, lost, vs, vt, bss, bst, btt; /* sums over the cells: q, loss, v and B of C */
-  jl_real_ ws, wt, open;                        /* the same of the softening by z1; any kappa */
-  jl_real_ gs, gt;                              /* of q by log(gamma) */
+  jl_real_ ws, wt, open;                        /* v of the softening by z1; sum of kappa */
+  jl_real_ gs, gt;                              /* derivative of q by log(gamma) */
 } jl_facets_;
 
 typedef struct {             /* the sliders of one depth cell of facets */
@@ -623,7 +622,7 @@ typedef struct { /* what facets add up to */
   jl_real_ crushed, lowered, worn; /* plastic work; what the wear of slopes takes: normal, sliders */
 } jl_sums_;
 
-/* Rows of a state: the first of the sliders, the first after them, that of worn slopes, how many */
+/* Rows of a state: first of the sliders, first after them, worn slopes, damage; number of rows */
 JL_IN_ int jl_slider_row_(const jlaw_law *law) { return law->dim + 1; }
 JL_IN_ int jl_rest_row_(const jlaw_law *law) { return law->dim + 1 + 2 * law->facets * law->cells; }
 JL_IN_ int jl_worn_row_(const jlaw_law *law) { return jl_rest_row_(law) + (law->yields ? law->facets + 1 : 0); }
@@ -736,7 +735,7 @@ JL_IN_ void jl_share_of_(const double *cell, jl_real_ y, jl_real_ force, jl_real
 
 /* -------------------------------------------------------------- asperities that yield */
 
-/* G and kappa of a cell less what it holds, H, at the flattened depth z: "Yielding" */
+/* G and kappa of a cell, less H, its G at the flattened depth z: "Yielding" */
 JL_IN_ void jl_flatten_(jl_real_ y, jl_real_ z, jl_real_ H, jl_real_ *G, jl_real_ *kappa)
 {
   const jl_real_ over = y - z;
@@ -909,7 +908,7 @@ JL_IN_ void jl_wear_sliders_(const double *cell, jl_facets_ *o, const jl_sliders
     jl_share_of_(cell, o->z0, o->fz0, o->kz0, &H, &kz);
     jl_flatten_(o->yw, o->z0, H, &G, &kappa);
   }
-  const jl_yes_ falls = c->k0 < kappa, had = kappa > JLAW_TINY, has = c->k0 > JLAW_TINY;
+  const jl_yes_ falls = kappa > c->k0, had = kappa > JLAW_TINY, has = c->k0 > JLAW_TINY;
   const jl_real_ kept = jl_pick_(falls, c->k0 / jl_pick_(falls, kappa, 1.0), 1.0);
   const jl_real_ q2 = *qs * *qs + *qt * *qt, size = kept * jl_root_(q2), cap = o->strength * c->G0;
   const jl_yes_ jl_beyond_ = size > cap;
@@ -1077,19 +1076,20 @@ JL_IN_ void jl_add_fading_tangent_(const jlaw_law *law, const double *f, const j
   const jl_real_ de = jl_along_azimuth_(f, jl_each_(0.0) + m->p[1], jl_each_(0.0) + m->p[2]);
   const jl_real_ dz = jl_across_azimuth_(f, jl_each_(0.0) + m->p[1], jl_each_(0.0) + m->p[2]);
   const jl_real_ turn = d0 + r->along * de, rm2 = 1.0 / r->m2, rN2 = 1.0 / r->N2;
-  const jl_real_ ea = -0.5 * turn * (rm2 * r->rm), eb = -0.5 * (turn * r->rmn + o->et * r->across * rN2);
-  const jl_real_ ta = 0.5 * ((2.0 * r->along * dz - r->across * de) * r->rmn
-                         - o->et * r->along * (rm2 + rN2));
+  const jl_real_ ea = -0.5 * turn * (rm2 * r->rm),
+             eb = -0.5 * (turn * r->rmn + o->et * r->across * rN2);
+  const jl_real_ ta =
+      0.5 * ((2.0 * r->along * dz - r->across * de) * r->rmn - o->et * r->along * (rm2 + rN2));
   const jl_real_ Es[3] = {-r->along * r->rm, r->rm + ea * H[0], ea * H[1]};
-  const jl_real_ Et[3] = {-r->across * r->rmn,
-                      -r->along * r->across * r->rmn + ta * H[0] + eb * H[1],
+  const jl_real_ Et[3] = {-r->across * r->rmn, -r->along * r->across * r->rmn + ta * H[0] + eb * H[1],
                       r->m2 * r->rmn + ta * H[1] + eb * H[2]};
   /* the end */
   const jl_real_ cs[3] = {-s->along * s->rm, s->rm, none};
   const jl_real_ ct[3] = {-s->across * s->rmn, -s->along * s->across * s->rmn, s->m2 * s->rmn};
   const jl_real_ rM2 = 1.0 / s->m2, rn2 = 1.0 / s->N2, rm3 = rM2 * s->rm;
   const jl_real_ qa = o->qs * rm3, qt = o->qt * s->rmn, fall = s->along * (rM2 + rn2);
-  const jl_real_ A[3] = {-qa - o->qt * ct[0] * fall, -s->along * qa - s->across * qt - o->qt * ct[1] * fall,
+  const jl_real_ A[3] = {-qa - o->qt * ct[0] * fall,
+                     -s->along * qa - s->across * qt - o->qt * ct[1] * fall,
                      2.0 * s->along * qt - o->qt * ct[2] * fall};
   const jl_real_ down = o->qt * s->across * rn2;
   const jl_real_ B[3] = {-qt - down * ct[0], -s->along * qt - down * ct[1], -down * ct[2]};
@@ -1358,8 +1358,8 @@ JL_IN_ jl_kind_ jl_kind_of_(int dim, int yields, int fades, int wears, int ledge
   return k;
 }
 
-/* The step, compiled for each kind apart: a plane costs half of space, and what is not asked for
- * nothing. Where asperities yield or wear, the ledger is part of the law. */
+/* The step, compiled for each kind: a plane costs half of space; a tangent or ledger that is not
+ * asked for costs nothing. Where asperities yield or slopes wear, the law needs the ledger. */
 JL_IN_ void jl_step_of_kind_(const jlaw_law *law, jl_numbers_ n, const jl_of_joint_ d[3], jl_of_joint_ F[3],
                      jl_of_joint_ C[9], int ledger, int tangent, int kept)
 {
@@ -1487,7 +1487,7 @@ JLAW_CLONES JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t 
   for (int i = 0; C && i < law->dim * law->dim; i++) C[i] = c[i];
 }
 
-/* Whether all sliders hold forces that a law can have; not for NaN */
+/* Whether all sliders hold forces that a law can have; 0 for NaN */
 static JLAW_FUNCTION int jlaw_sound_(const double *q, int n)
 {
   double sum[4] = {0.0, 0.0, 0.0, 0.0};
@@ -1498,7 +1498,7 @@ static JLAW_FUNCTION int jlaw_sound_(const double *q, int n)
   return (sum[0] + sum[1]) + (sum[2] + sum[3]) < 1e300;
 }
 
-/* Whether energies, flattened depths and slip of a state are numbers that a law can have */
+/* Whether energies, flattened depths, wear and damage of a state are numbers of this law */
 static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
 {
   const double *rest = s + jl_rest_row_(law), *worn = s + jl_worn_row_(law);
@@ -1506,8 +1506,8 @@ static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
   for (int f = 0; law->yields && f < law->facets; f++)
     good = good && rest[f] >= 0.0 && rest[f] <= law->largest_reach;
   if (law->yields) good = good && fabs(rest[law->facets]) <= DBL_MAX;
-  if (law->wears) good = good && worn[0] >= 0.0 && worn[0] <= 1.0 && worn[1] >= 0.0 &&
-           worn[1] <= DBL_MAX;
+  if (law->wears)
+    good = good && worn[0] >= 0.0 && worn[0] <= 1.0 && worn[1] >= 0.0 && worn[1] <= DBL_MAX;
   if (law->bonded) good = good && s[jl_damage_row_(law)] >= 0.0 && s[jl_damage_row_(law)] <= 1.0;
   return good && jlaw_sound_(s + jl_slider_row_(law), jl_rest_row_(law) - jl_slider_row_(law));
 }
@@ -1571,10 +1571,7 @@ JLAW_FUNCTION int jlaw_unmated(const jlaw_law *law, double *s)
   if (law->bonded) s[jl_damage_row_(law)] = 1.0;
   return far ? 0 : -1;
 }
-JLAW_FUNCTION double jlaw_dissipated(const jlaw_law *law, const double *s)
-{
-  return s[law->dim];
-}
+JLAW_FUNCTION double jlaw_dissipated(const jlaw_law *law, const double *s) { return s[law->dim]; }
 
 JLAW_CLONES static JLAW_FUNCTION jl_amounts_ jlaw_measure_(const jlaw_law *law, const double *s)
 {

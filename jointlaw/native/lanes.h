@@ -38,7 +38,7 @@ typedef int yes, whole;
 #define to_real(i) ((double) (i))
 #else
 typedef double real __attribute__((vector_size(8 * W)));
-typedef double loose __attribute__((vector_size(8 * W), aligned(8), may_alias)); /* in memory */
+typedef double loose __attribute__((vector_size(8 * W), aligned(8), may_alias)); /* anywhere */
 typedef long long yes __attribute__((vector_size(8 * W)));
 typedef int whole __attribute__((vector_size(4 * W)));
 #define LANE(x, l) ((x)[l])
@@ -49,7 +49,7 @@ typedef int whole __attribute__((vector_size(4 * W)));
 #define pick(m, a, b) ((m) ? each(a) : each(b))
 #define only(m, a) ((m) ? each(a) : real())
 #else
-#define each(x) ((x) - (real) {0})
+#define each(x) ((x) - (real){0})
 #define pick(m, a, b) pick_lanes(m, each(a), each(b))
 #define only(m, a) only_lanes(m, each(a))
 IN real pick_lanes(yes m, real a, real b) { return (real) ((m & (yes) a) | (~m & (yes) b)); }
@@ -134,7 +134,7 @@ IN void fetch(const double *table, whole i, real c[4])
 /* ------------------------------------------------------------------- facets and joints */
 
 /* The numbers of a joint, or of the first of W joints side by side: row r is s[r stride]. Those of
- * the next joints, which will be needed soon, lie `ahead`; 0 where there are none. */
+ * the next joints lie `ahead`, and are fetched into the cache; 0 where there are none. */
 typedef struct {
   double *s;
   size_t stride, ahead;
@@ -143,7 +143,7 @@ typedef struct {
 #ifdef JLAW_ABREAST
 typedef real of_facet;
 typedef double of_joint;
-#define somewhere(m) 1 /* worth working out for some lanes: to ask costs more here */
+#define somewhere(m) 1 /* whether a lane needs what follows; not asked here: asking costs more */
 #define TOGETHER W     /* facets that are worked out together */
 #define JOINTS 1
 #define JOINT(x, l) (x)
@@ -210,7 +210,7 @@ IN void put(numbers n, int row, int apart, int some, real x)
 }
 #endif
 
-/* Every fourth facet is added up in a sum of its own, and these in this order */
+/* Facet i is added to sum i % 4, and the four sums in this order: the same bits for all lanes */
 #if defined(__CUDACC__) || defined(__CUDACC_RTC__)
 #define SUMS 1 /* on a device one: an array would lie in its slow memory */
 #define total(sum, of) ((sum)[0].of)

@@ -3,45 +3,44 @@
  * Symbols and order are those of docs/theory-incremental.md and of kernels/reference.py. Rows of
  * a state: delta (dim) from the mated position | dissipated energy | q_s (M D) | q_t (M D), q times
  * lam; where asperities yield flattened depth (M) | plastic work; with wear the share of the slopes
- * that is gone | work of friction; with a bond its damage. A batch keeps beside them Phi and Phi' of every facet (M each), which saves half
- * the look-ups, and with yielding the same at z.
+ * that is gone | work of friction; with a bond its damage. A batch keeps beside them Phi and Phi' of
+ * every facet (M each), which saves half the look-ups, and with yielding the same at that depth.
  *
- * Of the functions of the C library that round differently, only expm1 and pow are called: zig
- * links exp and log of its own.
- */
+ * The last digit of expm1 and pow depends on the C library, that of all else here does not. exp and
+ * log are avoided: zig links its own, which differ from those of the system. */
 
-typedef struct { /* what the compiler knows of a step: it leaves out the rest */
+typedef struct { /* constants of a step: the compiler leaves out what they exclude */
   int dim, yields, fades, wears, ledger, tangent;
   int kept; /* whether Phi and Phi' lie beside the state */
 } kind;
 
-typedef struct { /* in the plane of a joint: offset over the mating length, root of 1 - |o|^2 */
+typedef struct { /* in the plane of a joint: o, offset over the mating length; w^2 = 1 - |o|^2 */
   of_joint o[2], w;
 } site;
 
-typedef struct { /* a joint in a step */
+typedef struct {                 /* a joint in a step */
   of_joint p[3], from[3], to[3]; /* increment; closure and in-plane displacement before and after */
   site start, middle, end;
   of_joint had, has; /* share of the slopes that was left before the step, and is in it */
 } motion;
 
 typedef struct { /* the plane of facets: slope along the azimuth e and across it, in axes (1, e) */
-  real x, z;                /* offset over the mating length along e and across */
+  real x, z;     /* offset over the mating length along e and across */
   real along, across;
-  real m2, N2, rm, rmn;     /* 1 + along^2, that + across^2; 1/m, 1/(m N) */
-  real gamma;               /* c1 N */
+  real m2, N2, rm, rmn; /* 1 + along^2, that + across^2; 1/m, 1/(m N) */
+  real gamma;           /* c1 N */
 } plane;
 
 typedef struct { /* facets in a step: y, Phi, Phi', Phi'' before and after; de */
   real y0, y1, f0, f1, k0, k1, bend, es, et;
   plane middle, end;
-  real yw, fw, kw, strength, worn;          /* before slopes wore: y, Phi, Phi'; limit after it */
-  real dy, rdy;                             /* y1 - y0, and 1 over it */
-  yes near;                                 /* y has hardly changed */
-  real z0, z1, fz0, fz1, kz0, kz1;          /* flattened depth; Phi and Phi' there */
+  real yw, fw, kw, strength, worn; /* before wear: y, Phi, Phi'; friction limit after it; loss */
+  real dy, rdy;                    /* y1 - y0, and 1 over it */
+  yes near;                        /* y has hardly changed */
+  real z0, z1, fz0, fz1, kz0, kz1; /* flattened depth; Phi and Phi' there */
   real qs, qt, lost, vs, vt, bss, bst, btt; /* sums over the cells: q, loss, v and B of C */
-  real ws, wt, open;                        /* the same of the softening by z1; any kappa */
-  real gs, gt;                              /* of q by log(gamma) */
+  real ws, wt, open;                        /* v of the softening by z1; sum of kappa */
+  real gs, gt;                              /* derivative of q by log(gamma) */
 } facets;
 
 typedef struct {             /* the sliders of one depth cell of facets */
@@ -58,7 +57,7 @@ typedef struct { /* what facets add up to */
   real crushed, lowered, worn; /* plastic work; what the wear of slopes takes: normal, sliders */
 } sums;
 
-/* Rows of a state: the first of the sliders, the first after them, that of worn slopes, how many */
+/* Rows of a state: first of the sliders, first after them, worn slopes, damage; number of rows */
 IN int slider_row(const jlaw_law *law) { return law->dim + 1; }
 IN int rest_row(const jlaw_law *law) { return law->dim + 1 + 2 * law->facets * law->cells; }
 IN int worn_row(const jlaw_law *law) { return rest_row(law) + (law->yields ? law->facets + 1 : 0); }
@@ -171,7 +170,7 @@ IN void share_of(const double *cell, real y, real force, real slope, real *G, re
 
 /* -------------------------------------------------------------- asperities that yield */
 
-/* G and kappa of a cell less what it holds, H, at the flattened depth z: "Yielding" */
+/* G and kappa of a cell, less H, its G at the flattened depth z: "Yielding" */
 IN void flatten(real y, real z, real H, real *G, real *kappa)
 {
   const real over = y - z;
@@ -344,7 +343,7 @@ IN void wear_sliders(const double *cell, facets *o, const sliders *c, real *qs, 
     share_of(cell, o->z0, o->fz0, o->kz0, &H, &kz);
     flatten(o->yw, o->z0, H, &G, &kappa);
   }
-  const yes falls = c->k0 < kappa, had = kappa > JLAW_TINY, has = c->k0 > JLAW_TINY;
+  const yes falls = kappa > c->k0, had = kappa > JLAW_TINY, has = c->k0 > JLAW_TINY;
   const real kept = pick(falls, c->k0 / pick(falls, kappa, 1.0), 1.0);
   const real q2 = *qs * *qs + *qt * *qt, size = kept * root(q2), cap = o->strength * c->G0;
   const yes beyond = size > cap;
@@ -512,19 +511,20 @@ IN void add_fading_tangent(const jlaw_law *law, const double *f, const motion *m
   const real de = along_azimuth(f, each(0.0) + m->p[1], each(0.0) + m->p[2]);
   const real dz = across_azimuth(f, each(0.0) + m->p[1], each(0.0) + m->p[2]);
   const real turn = d0 + r->along * de, rm2 = 1.0 / r->m2, rN2 = 1.0 / r->N2;
-  const real ea = -0.5 * turn * (rm2 * r->rm), eb = -0.5 * (turn * r->rmn + o->et * r->across * rN2);
-  const real ta = 0.5 * ((2.0 * r->along * dz - r->across * de) * r->rmn
-                         - o->et * r->along * (rm2 + rN2));
+  const real ea = -0.5 * turn * (rm2 * r->rm),
+             eb = -0.5 * (turn * r->rmn + o->et * r->across * rN2);
+  const real ta =
+      0.5 * ((2.0 * r->along * dz - r->across * de) * r->rmn - o->et * r->along * (rm2 + rN2));
   const real Es[3] = {-r->along * r->rm, r->rm + ea * H[0], ea * H[1]};
-  const real Et[3] = {-r->across * r->rmn,
-                      -r->along * r->across * r->rmn + ta * H[0] + eb * H[1],
+  const real Et[3] = {-r->across * r->rmn, -r->along * r->across * r->rmn + ta * H[0] + eb * H[1],
                       r->m2 * r->rmn + ta * H[1] + eb * H[2]};
   /* the end */
   const real cs[3] = {-s->along * s->rm, s->rm, none};
   const real ct[3] = {-s->across * s->rmn, -s->along * s->across * s->rmn, s->m2 * s->rmn};
   const real rM2 = 1.0 / s->m2, rn2 = 1.0 / s->N2, rm3 = rM2 * s->rm;
   const real qa = o->qs * rm3, qt = o->qt * s->rmn, fall = s->along * (rM2 + rn2);
-  const real A[3] = {-qa - o->qt * ct[0] * fall, -s->along * qa - s->across * qt - o->qt * ct[1] * fall,
+  const real A[3] = {-qa - o->qt * ct[0] * fall,
+                     -s->along * qa - s->across * qt - o->qt * ct[1] * fall,
                      2.0 * s->along * qt - o->qt * ct[2] * fall};
   const real down = o->qt * s->across * rn2;
   const real B[3] = {-qt - down * ct[0], -s->along * qt - down * ct[1], -down * ct[2]};
@@ -793,8 +793,8 @@ IN kind kind_of(int dim, int yields, int fades, int wears, int ledger, int tange
   return k;
 }
 
-/* The step, compiled for each kind apart: a plane costs half of space, and what is not asked for
- * nothing. Where asperities yield or wear, the ledger is part of the law. */
+/* The step, compiled for each kind: a plane costs half of space; a tangent or ledger that is not
+ * asked for costs nothing. Where asperities yield or slopes wear, the law needs the ledger. */
 IN void step_of_kind(const jlaw_law *law, numbers n, const of_joint d[3], of_joint F[3],
                      of_joint C[9], int ledger, int tangent, int kept)
 {

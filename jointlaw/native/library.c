@@ -25,8 +25,8 @@ KINDS(extern jlaw_call, _4_alone);
 KINDS(extern jlaw_call, _2);
 KINDS(extern jlaw_call, _2_alone);
 
-/* Lanes of vectors that this processor and its system have, at most: 8, 4 or 2. Asked of cpuid
- * itself, for zig's own answer is always no. */
+/* Lanes of vectors that this processor and its system have, at most: 8, 4 or 2. Read from cpuid:
+ * under zig __builtin_cpu_supports always says no. */
 OUT int jlaw_lanes(void)
 {
 #if defined(__x86_64__)

@@ -48,8 +48,8 @@ def run(program, *arguments):
 
 
 def library(folder, *flags, cc="cc", name="libjointlaw.so"):
-    """jointlaw.h as a shared library."""
-    path = build(folder, SOURCE, "-shared", "-fPIC", *flags, cc=cc, name=name)
+    """jointlaw.h as a shared library, built without a warning."""
+    path = build(folder, SOURCE, "-shared", "-fPIC", *STRICT, *flags, cc=cc, name=name)
     lib, pointer = ctypes.CDLL(str(path)), ctypes.c_void_p
     for function in ("normal_stress", "closure", "max_stiffness"):
         getattr(lib, f"jlaw_{function}").argtypes = [pointer, ctypes.c_double]

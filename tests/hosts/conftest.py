@@ -27,8 +27,4 @@ def plugin(tmp_path_factory):
 @pytest.fixture(scope="session")
 def finite_elements(tmp_path_factory):
     """A folder with the libraries of `fem_host.LAW` for MGIS and UMAT, built."""
-    import os
-
-    if "FEMX" in os.environ:
-        return Path(os.environ["FEMX"])
     return export(tmp_path_factory.mktemp("fem"))

@@ -9,7 +9,6 @@ import pytest
 
 import jointlaw as jl
 
-sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[2] / "docs" / "_ext"))
 import browser as page
 from chromium import Chromium

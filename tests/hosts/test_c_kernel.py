@@ -1,36 +1,33 @@
 """The law in C gives the bits of the law in Python, and turns the axes of a joint."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from c_host import FAST, CLaw, at, library, random_law, random_path
 
 import jointlaw as jl
 from jointlaw.kernels import reference
 
-sys.path.insert(0, str(Path(__file__).parent))
-from c_host import FAST, CLaw, at, library, random_law, random_path
-
 BUILDS = {  # test_native.py tells the same of the library, which is made of the same text
-    "gcc": ("gcc", FAST),
+    "gcc": ("gcc", [*FAST, "-std=c99"]),
     "gcc -O0, no vectors": ("gcc", ["-O0", "-ffp-contract=off", "-DJOINTLAW_PLAIN"]),
     "clang, this machine": ("clang", [*FAST, "-march=native"]),
-    "C++": ("g++", FAST),
+    "C++": ("g++", [*FAST, "-std=c++17"]),
 }
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def lib(tmp_path_factory):
-    return library(tmp_path_factory.mktemp("c"), *FAST)
+    cc, flags = BUILDS["gcc"]
+    return library(tmp_path_factory.mktemp("c"), *flags, cc=cc)
 
 
 @pytest.mark.parametrize("name", BUILDS)
-def test_the_bits_of_python(tmp_path, name):
+def test_the_bits_of_python(lib, tmp_path, name):
     """F, C, state, energies and shares; the state of a Python joint goes on in C."""
     cc, flags = BUILDS[name]
-    built = library(tmp_path, *flags, cc=cc)
+    built = lib if name == "gcc" else library(tmp_path, *flags, cc=cc)
     for seed in (0, 3, 7, 10, 13, 14, 20):  # yielding, wear and both, mating length, planes
         law = random_law(seed)
         one, joint = CLaw(built, law, tmp_path), law.joint()

@@ -2,18 +2,14 @@
 
 import ctypes
 import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from fem_host import LAW, SEATING, Behaviour, at, export
 
 import jointlaw as jl
-
-sys.path.insert(0, str(Path(__file__).parent))
-from fem_host import LAW, SEATING, Behaviour, at, export
 
 YIELDS = replace(LAW.asperity, yield_interference=2e-8)
 PLANE = replace(LAW, asperity=YIELDS, plane=0.0)  # the other kinds of numbers of state

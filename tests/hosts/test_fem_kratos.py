@@ -3,15 +3,12 @@
 import subprocess
 import sys
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
+from fem_host import LAW, SEATING
 
 import jointlaw as jl
-
-sys.path.insert(0, str(Path(__file__).parent))
-from fem_host import LAW, SEATING
 
 PRESSED, TURN, END = 9, 49, 69  # rows
 

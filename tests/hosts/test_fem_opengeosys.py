@@ -8,11 +8,9 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
+from fem_host import LAW, SEATING
 
 import jointlaw as jl
-
-sys.path.insert(0, str(Path(__file__).parent))
-from fem_host import LAW, SEATING
 
 OGS = Path(sys.prefix) / "bin" / "ogs"
 PRESSED, TURN, END = 10, 50, 70  # steps

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from lammps_host import HEAD, build, dumped, lammps, run, soft
+from lammps_host import HEAD, dumped, lammps, run, soft
 
 import jointlaw as jl
+from jointlaw.hosts.c.export import table_text
 
 R, T, K = 1e-2, 1e5, 1e10  # m, Pa, Pa/m
 BOND = jl.Bond(K, K, T, 2 * T, energy_I=4 * T**2 / (2 * K))
@@ -18,7 +19,7 @@ create_atoms 1 single {apart!r} 0.0 0.0
 set type 1 diameter 0.02 density 2600
 plugin load ./jointlawplugin.so
 pair_style jointlaw opening {opening} damping 0.5
-pair_coeff * * rock.jlaw
+pair_coeff * * bonded.jlaw
 neighbor 0.002 bin
 timestep 1e-7
 group moving id 2
@@ -31,8 +32,9 @@ run 600
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return build(tmp_path_factory.mktemp("bond"), soft(bond=BOND))
+def folder(plugin):
+    (plugin / "bonded.jlaw").write_text(table_text(soft(bond=BOND)))
+    return plugin
 
 
 def test_pulled_apart(folder):

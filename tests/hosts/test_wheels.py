@@ -7,12 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from c_host import HERE, compiler, random_law, random_path
 
 from jointlaw.hosts.c.export import include_dir, table_text
 from jointlaw.native import build
-
-sys.path.insert(0, str(Path(__file__).parent))
-from c_host import HERE, compiler, random_law, random_path
 
 ROOT = Path(__file__).parents[2]
 ARM = "aarch64-linux-gnu.2.17"

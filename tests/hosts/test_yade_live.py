@@ -10,11 +10,13 @@ from yade_host import make_table, run_scene, run_yade
 import jointlaw as jl
 
 SCENES = """
+from dataclasses import replace
 from jointlaw import JointLaw
 law, worn = (JointLaw.from_toml(name) for name in ("law.toml", "worn.toml"))
+bonded = replace(law, bond=worn.bond)
 end = law.closure_range
 
-def pieces(corners=((.5, 0), (.5, .5), (.5, -.25), (-.5, -.25), (.5, -.25)), steps=100):
+def pieces(corners=((-.1, .05), (.5, 0), (.5, .5), (.5, -.25), (-.5, -.25), (.5, -.25)), steps=100):
     # eight pairs in several directions, all pieces of one flat joint; the upper spheres move
     material()
     for k in range(8):
@@ -42,12 +44,14 @@ def pieces(corners=((.5, 0), (.5, .5), (.5, -.25), (-.5, -.25), (.5, -.25)), ste
     return dict(moved=moved, F=F, force=force, measures=[
         batch.slopes, batch.plastic_work, batch.dissipated_energy])
 
-def visits(law, keep, gone, **options):
+def visits(law, keep, gone, late=False, **options):
     slab_and_sphere()
-    O.bodies.append(utils.sphere((3, 0, 0.5), 0.5))
+    O.bodies[1].state.pos = (0, 0, .5 + gone)
+    O.bodies.append(utils.sphere((3, 0, 0.5 + gone), 0.5))
     engines(keep=keep)
     attached(law, **options)
     O.dt = 1e-4
+    if late: O.step()
     for k in (1, 2): O.bodies[k].state.blockedDOFs = "xyzXYZ"
     out = []
     path = [(u, 0) for u in (.1, .2, .3)] + [(.3, s) for s in (.05, .1, .15)]
@@ -139,8 +143,10 @@ def reload(live):
 out = dict(
     pieces=pieces(), loops=loops(),
     reload=[reload(False), reload(True)],
-    visits=[visits(TableLaw("short.txt"), False, 1e-3),
-            visits(LiveLaw(law), True, .3 * end, forget=.1 * end)])
+    visits=dict(table=visits(TableLaw("short.txt"), False, 1e-3),
+                live=visits(LiveLaw(law), True, .3 * end, forget=.1 * end),
+                bonded=visits(LiveLaw(bonded), True, .3 * end, forget=.1 * end),
+                late=visits(LiveLaw(bonded), True, .3 * end, True, forget=.1 * end)))
 
 slab_and_sphere()
 O.bodies[1].state.pos = (0, 0, .5 - .1 * end)
@@ -169,10 +175,14 @@ def law():
 
 @pytest.fixture(scope="module")
 def worn(law):
-    """The same law with asperities that yield and wear."""
-    end = law.closure_range
-    damage = {"yield_interference": 0.1 * end}
-    return dataclasses.replace(law, asperity=dataclasses.replace(law.asperity, **damage))
+    """The same law with asperities that yield, slopes that wear, and a bond."""
+    end, tension = law.closure_range, 5e6
+    return dataclasses.replace(
+        law, asperity=dataclasses.replace(law.asperity, yield_interference=0.1 * end),
+        mating_length=4 * end, slope_wear=1e4, slope_residual=0.3,
+        bond=jl.Bond(tension / (0.04 * end), tension / (0.04 * end), tension, tension,
+                     energy_I=0.1 * end * tension, energy_II=0.2 * end * tension),
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -187,7 +197,7 @@ def scenes(tmp_path_factory, law, worn):
 
 
 def test_pieces_of_one_plane_equal_pure_python(scenes, worn):
-    """Closure, shear, reversal, opening, re-contact of asperities that yield and wear.
+    """Bond pulled and sheared till it softens; closure, shear, reversal, opening, re-contact.
 
     The law on the displacements of the plane, whatever the direction of a pair is. Rounding of
     positions: 1e-16 m of 1e-3 m.
@@ -197,6 +207,7 @@ def test_pieces_of_one_plane_equal_pure_python(scenes, worn):
     exact = np.array([joint.update(d)[0] for d in np.diff(path, axis=0, prepend=np.zeros((1, 3)))])
     peak = np.abs(exact).max()
     assert np.abs(exact[:, 1]).max() > 0.1 * peak
+    assert exact[:, 0].min() < -0.8 * worn.bond.tension
     assert (exact[:, 0] == 0.0).any()
     assert np.abs(F - exact[:, None]).max() < 1e-8 * peak
     on_upper = 2.0 * exact[:, [1, 2, 0]]  # x, y, z; area 2 m2
@@ -233,14 +244,22 @@ def test_closed_loops_never_return_work(scenes):
     assert np.median(share) > 1e-3
 
 
-@pytest.mark.parametrize("live", [False, True])
-def test_a_contact_that_comes_back_is_new(scenes, live):
+@pytest.mark.parametrize("name", ["table", "live", "late"])
+def test_a_contact_that_comes_back_is_new(scenes, name):
     """Three visits of one sphere, joined by another in the second: all are alike."""
-    first, second, third = np.array(scenes["visits"][live])
+    first, second, third = np.array(scenes["visits"][name])
     assert abs(first[-1, 0, 0]) > 0.05 * first[-1, 0, 2] > 0
     for alike in (second[:, 0], third[:, 0], second[:, 1]):
         assert np.abs(alike - first[:, 0]).max() < 1e-9 * np.abs(first).max()
     assert np.abs(third[:, 1]).max() == 0
+
+
+def test_contacts_of_the_first_step_alone_have_a_bond(scenes):
+    """One that comes later has none, be it the first of all."""
+    bonded, late = (np.array(scenes["visits"][name]) for name in ("bonded", "late"))
+    peak = np.abs(late).max()
+    assert np.abs(bonded[1:] - late[1:]).max() < 1e-9 * peak
+    assert bonded[0, -1, 0, 0] < 2 * late[0, -1, 0, 0] < 0.0
 
 
 @pytest.mark.parametrize("live", [False, True])

@@ -1,7 +1,7 @@
 """The table against the law it was made from: where it must be exact, and what it drops."""
 
 import math
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,9 @@ def law():
 
 @pytest.fixture(scope="module")
 def table(law):
-    return jl.tabulate(law, shear_limit=2 * law.closure_range)
+    """Of the same law with a bond, which a table drops."""
+    bonded = replace(law, bond=jl.Bond(1e10, 1e10, 1e6, 1e6))
+    return jl.tabulate(bonded, shear_limit=2 * law.closure_range)
 
 
 def test_normal_stress_is_within_the_stated_tolerance(law, table):
@@ -123,7 +125,11 @@ def test_a_file_that_is_no_table_is_refused_by_name(tmp_path, name, old, new, wo
 
 
 def test_report_says_what_is_dropped(law, table):
-    """Pure closure is kept; unloading, coupling and reversal are dropped, and show as errors."""
+    """Pure closure is kept; unloading, coupling and reversal are dropped, and show as errors.
+
+    A bond is dropped too, and that is said: in all these tests the law has none.
+    """
+    assert table.metadata["bond"] == "left out: this is the joint without its bond"
     report = table.report(law)
     assert report["closure"].largest < 1.1e-3
     assert report["closure, unloading"].normal > 0.05  # hysteresis

@@ -39,7 +39,8 @@ def export_fem(
     marks = _marks(law, seating)
     source = resources.files(__package__) / "files"
     for file in sorted(source.iterdir(), key=lambda file: file.name):
-        if law.dim == 3 or "3d" not in file.name:
+        # pip leaves a folder of compiled Python beside them
+        if file.is_file() and (law.dim == 3 or "3d" not in file.name):
             text = file.read_text(encoding="utf-8")
             for mark, value in marks.items():
                 text = text.replace(f"@{mark}@", value)

@@ -61,7 +61,7 @@ class TableLaw:
         self.f = F[1:]
         return F
 
-    def add(self, closure):
+    def add(self, closure, bonded):
         """Contacts that came: unsheared joints at this closure (m)."""
         row, w, _ = self.table.at(closure)
         self.f = np.concatenate([self.f, np.zeros((2, len(closure)))], axis=1)
@@ -117,13 +117,16 @@ class LiveLaw:
         """Tractions (3, n) after increments d (3, n)."""
         return self.batch.update(d.T, where=self.where, tangent=False)[0].T
 
-    def add(self, closure):
-        """Contacts that came: virgin joints at this closure (m; negative before touch)."""
+    def add(self, closure, bonded):
+        """Contacts that came: virgin joints at this closure (m; negative before touch).
+
+        bonded: whether they have the bond of the law.
+        """
         first, self.numbered = self.numbered, self.numbered + len(closure)
         start = np.zeros((len(closure), 3))
         start[:, 0] = closure
         new = self.pool.add(range(first, self.numbered))
-        if first:  # the contacts of the first step are those that are mated
+        if not bonded:
             self.batch.unbond(new)
         self.batch.update(start, where=new, tangent=False)
         self.find()
@@ -322,7 +325,7 @@ class Joints:
             before = closure[fresh] - dot(du[:, fresh], n[:, fresh])
             if self.mated:
                 before, d[:, fresh] = np.zeros(len(fresh)), 0.0
-            self.law.add(before)
+            self.law.add(before, self.last is None)  # bonds: in the first step
             d[0, fresh] = closure[fresh] - before
         F = self.law.step(d, closure, spin)
         force = (n * F[0] + t2 * F[1] + cross(n, t2) * F[2]) * -c["area"]

@@ -60,9 +60,6 @@ class JointBatch:
     def __len__(self) -> int:
         return self._n
 
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__} of {self._n} joints, {self.law.dim}-D>"
-
     # ------------------------------------------------------------------ steps
 
     def update(self, d: ArrayLike, where: Index | None = None, tangent: bool = True) -> Result:
@@ -201,21 +198,6 @@ class JointBatch:
     def F(self) -> Array:
         """Traction (n, dim) in Pa."""
         return reference.traction(self.law.tables, self._rows()).T
-
-    @property
-    def sliding(self) -> Array:
-        """Share (n,) of all facet orientations: in touch, every cell at its friction limit."""
-        return self.measures().sliding
-
-    @property
-    def slipping(self) -> Array:
-        """Share (n,) of friction capacity that is at its limit: partial slip."""
-        return self.measures().slipping
-
-    @property
-    def separated(self) -> Array:
-        """Share (n,) of all facet orientations: out of touch."""
-        return self.measures().separated
 
     @property
     def stored_energy(self) -> Array:

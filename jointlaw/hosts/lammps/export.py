@@ -26,7 +26,11 @@ def export_lammps(law: JointLaw, directory: str | Path, name: str = "joint") -> 
     require_3d(law)
     texts = {
         f"{name}.jlaw": c.table_text(law),
-        "joint.in": variables(law, name),
+        "joint.in": (
+            "# made by `jointlaw export lammps`: what in.tower needs to know of this joint\n"
+            f"variable law string {name}.jlaw\n"
+            f"variable closure0 equal {float(law.closure(WEIGHT))!r}   # m, under {WEIGHT:g} Pa\n"
+        ),
         "law.toml": law.to_toml(),
     }
     source = resources.files(__package__) / "files"
@@ -35,13 +39,3 @@ def export_lammps(law: JointLaw, directory: str | Path, name: str = "joint") -> 
     folder = write_files(directory, {**copies, **texts})
     (folder / "build.sh").chmod(0o755)
     return [*texts, *copies]
-
-
-def variables(law: JointLaw, name: str) -> str:
-    """What in.tower needs to know of a law, as LAMMPS variables."""
-    closure = float(law.closure(WEIGHT))
-    return (
-        "# made by `jointlaw export lammps`: what in.tower needs to know of this joint\n"
-        f"variable law string {name}.jlaw\n"
-        f"variable closure0 equal {closure!r}   # m, under {WEIGHT:g} Pa\n"
-    )

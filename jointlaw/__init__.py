@@ -77,7 +77,7 @@ _LATER = {
     "tabulate": "tables.tabulate",
 }
 # Names of former versions, and what to use
-_MOVED = {
+_GONE = {
     "ClosureCurve": "jointlaw.calibration.measured.ClosureCurve",
     "Fit": "jointlaw.calibration.fit.Fit",
     "JointState": "jointlaw.joints.state.JointState",
@@ -85,29 +85,24 @@ _MOVED = {
     "Secant": "jointlaw.paper.secant.Secant",
     "ShearCurve": "jointlaw.calibration.measured.ShearCurve",
     "SurfaceFit": "jointlaw.surface.fit.SurfaceFit",
+    "baselines": "docs/measure/held_out.py, which fits a power law and Barton-Bandis",
     "datasets": "jointlaw.calibration.datasets",
     "first_loading": "jointlaw.calibration.measured.first_loading",
-    "include_dir": "jointlaw.hosts.c.export.include_dir",
-}
-# Names that were removed, and what to use
-_REMOVED = {
-    "baselines": "docs/measure/held_out.py fits a power law and Barton-Bandis",
-    "fit_many": "map jl.fit_closure over the curves with any concurrent.futures.Executor",
+    "fit_many": "jl.fit_closure, mapped over the curves by any concurrent.futures.Executor",
     "fit_shear": "jl.fit_curves([ShearCurve(shear, tau, normal)], law=law, free=('mu', 'a'))",
     "hydraulic_aperture": "aperture - closure; the aperture at zero closure is not of a joint law",
-    "synthetic_surface": "docs/gallery/plot_from_scan.py makes a surface in ten lines",
+    "include_dir": "jointlaw.hosts.c.export.include_dir",
+    "synthetic_surface": "docs/gallery/plot_from_scan.py, which makes a surface in ten lines",
     "transmissivity": "9789 * h**3 / (12 * 1.0016e-3) in m2/s, water, h the hydraulic aperture (m)",
-    "unloading": "jl.fit_closure(stress, closure, cycle=True) fits and reports unloading",
+    "unloading": "jl.fit_closure(stress, closure, cycle=True), which reports unloading",
 }
 
 
 def __getattr__(name: str) -> Any:
     if name in _LATER:
         return getattr(import_module(f".{_LATER[name]}", __name__), name)
-    if name in _MOVED:
-        raise AttributeError(f"jointlaw.{name} is no public name any more: use {_MOVED[name]}")
-    if name in _REMOVED:
-        raise AttributeError(f"jointlaw.{name} was removed: {_REMOVED[name]}")
+    if name in _GONE:
+        raise AttributeError(f"jointlaw.{name} is no public name any more: use {_GONE[name]}")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

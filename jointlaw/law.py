@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .discretisation.facets import Facets, facets
-from .discretisation.first_loading import FirstLoading, facet_sum
+from .discretisation.first_loading import FirstLoading, facet_sum, yield_sum
 from .discretisation.tables import VERSION, Tables, largest_reach, tables
 from .discretisation.virgin_curve import VirginCurve, virgin_curve
 from .joints.batch import JointBatch
@@ -373,7 +373,9 @@ class JointLaw:
     @cached_property
     def _first_loading(self) -> FirstLoading:
         """Closure without shear."""
-        return FirstLoading.of(self.curve, self.facets.theta, self._scale, self.asperity)
+        p, theta = self.asperity, self.facets.theta
+        factor = facet_sum(theta, self._scale, p.lam, p.mu)
+        return FirstLoading(self.curve, factor, yield_sum(theta, self._scale, p))
 
     def _default_range(self) -> float:
         """The closure (m) at 20 MPa of elastic asperities: those that yield may not bear it."""

@@ -27,7 +27,7 @@ def sliding(a, mu):
     )
     joint = law.joint()
     joint.update([1.0, 0.0, 0.0])
-    return jl.secant(law, [1.0, 0.0, 0.0]).sliding, joint.sliding
+    return jl.secant(law, [1.0, 0.0, 0.0]).sliding, joint.measures().sliding
 
 
 start = math.degrees(jl.closed_form.sliding_angle(1.0, 1.0, 0.6))

@@ -1,7 +1,5 @@
 """From tests to a law: fits of closure and shear curves, alone or together, and their result."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Measured curves, each with the noise it is expected to carry and what the law says of it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import NamedTuple

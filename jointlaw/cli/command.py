@@ -18,6 +18,7 @@ from ..support.pyplot import FORMATS
 
 VERSION = 2  # of summary.json
 _CONTACTS = {name: getattr(ROCK, name) for name in ("K", "lam", "eta", "mu")}
+DEFAULT_ROCK = ", ".join(f"{name} = {value:.4g}" for name, value in _CONTACTS.items())
 Written = Mapping[str, str | Callable[[Path], object]]
 
 
@@ -63,57 +64,39 @@ def several(unit: str, *, positive: bool = False) -> Callable[[str], list[float]
     return lambda text: [in_unit(unit, positive=positive)(part) for part in text.split(",")]
 
 
-def quantity(option: str, text: str, unit: str, *, positive: bool = False) -> float:
-    """The SI value of a part of what was given for an option. Raises ValueError naming it."""
-    try:
-        return units.typed(text, unit, positive=positive)
-    except ValueError as error:
-        raise ValueError(f"{option}: {error}") from None
-
-
-def default_rock() -> str:
-    """Keys and values of the contacts of a rock that is not known."""
-    return ", ".join(f"{name} = {value:.4g}" for name, value in _CONTACTS.items())
-
-
-def add_law(parser: argparse.ArgumentParser, *, resolution: bool = True) -> None:
+def add_law(parser: argparse.ArgumentParser) -> None:
     """Add the law, a preset or a file, and its resolution; `read_law` reads them."""
     parser.add_argument("law", metavar="PRESET_OR_FILE", help="preset name or TOML file")
     parser.add_argument(
         "--default-rock",
         action="store_true",
-        help="for a file without [asperity], such as that of a scan: " + default_rock(),
+        help="for a file without [asperity], such as that of a scan: " + DEFAULT_ROCK,
     )
-    if resolution:
-        parser.add_argument("--resolution", choices=tuple(NAMED), help="instead of the law's own")
+    parser.add_argument("--resolution", choices=tuple(NAMED), help="instead of the law's own")
 
 
 def read_law(options: argparse.Namespace) -> JointLaw:
     """The law that the options name. Raises ValueError that says what is missing."""
-    path, parts = Path(options.law), {}
-    if options.law not in presets.names() and path.is_file():
+    path = Path(options.law)
+    if options.law in presets.names() or not path.is_file():
+        law = presets.load_any(options.law)
+    else:
         parts = keys.read(path, "law file")
-    if parts and "asperity" not in parts:
-        if not options.default_rock:
+        if "asperity" not in parts and not options.default_rock:
             raise ValueError(
                 f"{path} has no contacts: add the table [asperity] with K (Pa m^(1-eta)), lam, eta "
-                f"and mu of your rock, or give --default-rock, which takes {default_rock()}"
+                f"and mu of your rock, or give --default-rock, which takes {DEFAULT_ROCK}"
             )
-        law = JointLaw.from_dict(parts | {"asperity": _CONTACTS}, str(path))
-    else:
-        law = presets.load_any(options.law)
+        law = JointLaw.from_dict({"asperity": _CONTACTS} | parts, str(path))
     require_rock({"mu": law.asperity.mu}, f"{options.law}: asperity.")
     require_rock({"plane": law.plane or 0.0}, f"{options.law}: ")
-    resolution = getattr(options, "resolution", None)
-    return law if resolution is None else replace(law, resolution=resolution)
+    return replace(law, resolution=options.resolution) if options.resolution else law
 
 
-def add_out(
-    parser: argparse.ArgumentParser, *, required: bool = True, pictures: bool = True
-) -> None:
+def add_out(parser: argparse.ArgumentParser, *, pictures: bool = True) -> None:
     """Add the folder for the results and, of a command that draws, the format of its pictures."""
     parser.add_argument(
-        "--out", metavar="DIR", type=Path, required=required, help="folder for the results"
+        "--out", metavar="DIR", type=Path, required=True, help="folder for the results"
     )
     parser.add_argument(
         "--force", action="store_true", help="replace the results of another run in that folder"

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ..hosts.c.export import export_c, identifier
-from ..hosts.fem.export import SEATING, export_fem, require_seating
+from ..hosts.fem.export import SEATING, export_fem
 from ..hosts.lammps.export import export_lammps
 from ..hosts.yade.export import export_yade
 from ..law import JointLaw
@@ -38,7 +38,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--seating",
         metavar="STRESS",
-        type=in_unit("Pa"),
+        type=in_unit("Pa", positive=True),
         help=f"fem: normal stress before the first step (default {SEATING / 1e3:g}kPa)",
     )
     add_out(parser, pictures=False)
@@ -53,7 +53,6 @@ def _export(options: argparse.Namespace) -> None:
     seating = {} if options.seating is None else {"seating": options.seating}
     if seating and host != "fem":
         raise ValueError(f"--seating is for fem; in {host} the host closes the joint: leave it out")
-    require_seating(**seating)
     clear_run(folder)
     if host == "yade":
         _export_table(law, folder, options.shear_limit)
@@ -68,8 +67,10 @@ def _export_table(law: JointLaw, folder: Path, shear_limit: float | None) -> Non
     """Write the joint for YADE, and print what its table drops."""
     more: dict[str, Any] = {} if shear_limit is None else {"shear_limit": shear_limit}
     table = export_yade(law, folder, tolerance=1e-3, **more)
-    print(f"wrote the joint for YADE to {folder}: {len(table.closure)} rows")
     missed = table.metadata["resolution_error_friction_angle"]
-    print(f"its friction angle at the shear limit is {missed:.2g} degrees off that of finer nodes")
-    print(f"bond: {table.metadata['bond']}; what the table drops (error against the law, share of")
-    print("each path's largest traction):", table.report(law), sep="\n")
+    print(
+        f"wrote the joint for YADE to {folder}: {len(table.closure)} rows\n"
+        f"its friction angle at the shear limit is {missed:.2g} degrees off that of finer nodes\n"
+        f"bond: {table.metadata['bond']}; what the table drops (error against the law, share of\n"
+        f"each path's largest traction):\n{table.report(law)}"
+    )

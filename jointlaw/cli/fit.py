@@ -14,7 +14,7 @@ from ..calibration.measured import ClosureCurve, ShearCurve, first_loading
 from ..parameters.rock import require_rock
 from ..support.checks import Array
 from ..support.text_numbers import DECIMAL
-from .command import Written, add_command, add_out, in_unit, quantity, several, write_results
+from .command import Written, add_command, add_out, in_unit, several, write_results
 
 MOST = 60  # points of a shear test that are fitted: a logger writes thousands, each costs a step
 NEEDS = {  # what an option is about, where no such test is given
@@ -66,6 +66,8 @@ def add(commands: Any) -> None:
     add(
         "--compliance",
         metavar="LENGTH/STRESS",
+        type=_compliance,
+        default=0.0,
         help="of rock and machine, such as 4.2um/10MPa: it is subtracted first",
     )
     add("--noise", type=float, help="known error of the closure test's stress, such as 0.01")
@@ -84,6 +86,12 @@ def add(commands: Any) -> None:
     )
     add("--law", metavar="PRESET_OR_FILE", help="the values of parameters that are not fitted")
     add_out(parser)
+
+
+def _compliance(text: str) -> float:
+    """Type of an option such as 4.2um/10MPa: closure per stress in m/Pa."""
+    length, _, load = text.partition("/")
+    return in_unit("m")(length) / in_unit("Pa", positive=True)(load)
 
 
 def _run(options: argparse.Namespace) -> None:
@@ -133,16 +141,12 @@ def _closure_curve(
     options: argparse.Namespace,
 ) -> tuple[ClosureCurve, tuple[Array, Array] | None]:
     """The closure curve to fit; with it stress (Pa) and closure (m) of points held out, or None."""
-    item, compliance = options.data[0], 0.0
+    item, compliance = options.data[0], options.compliance
     if item in datasets.names() and not Path(item).exists():
         stress, closure = datasets.load(item)
     else:
         columns = options.stress_column, options.closure_column
         stress, closure = datasets.read_closure(item, *columns, options.decimal)
-    if options.compliance:
-        length, _, load = options.compliance.partition("/")
-        pressed = quantity("--compliance", load, "Pa", positive=True)
-        compliance = quantity("--compliance", length, "m") / pressed
     if not options.cycle:
         stress, closure = first_loading(stress, closure)
     if options.up_to and options.cycle:

@@ -12,7 +12,7 @@ from ..support.checks import Array
 from ..support.text_numbers import DECIMAL
 from ..surface.fit import SurfaceFit, from_surface
 from ..surface.scan_files import read_scan
-from .command import Written, add_command, add_out, default_rock, in_unit, quantity, write_results
+from .command import DEFAULT_ROCK, Written, add_command, add_out, in_unit, write_results
 
 STRESS = 1e6  # Pa at which the report tells friction angles
 LONGER = 2  # the second sampling length, over the first
@@ -26,15 +26,19 @@ def add(commands: Any) -> None:
     parser.add_argument("file", help="matrix of heights or list of x, y, z, as text, ASC or NPY")
     length = in_unit("m", positive=True)
     parser.add_argument("--spacing", type=length, required=True, help="of the points: 20um")
-    parser.add_argument("--height-unit", required=True, help="of the heights, such as um")
+    parser.add_argument(
+        "--height-unit",
+        type=lambda unit: in_unit("m")(f"1{unit}"),
+        required=True,
+        help="of the heights, such as um",
+    )
     parser.add_argument("--decimal", choices=tuple(DECIMAL), help="the decimal mark of the file")
     parser.add_argument("--sampling-length", type=length, help="edge of a facet: 4 spacings")
     add_out(parser, pictures=False)
 
 
 def _run(options: argparse.Namespace) -> None:
-    unit = quantity("--height-unit", f"1{options.height_unit}", "m")
-    z = read_scan(options.file, unit, options.spacing, options.decimal)
+    z = read_scan(options.file, options.height_unit, options.spacing, options.decimal)
     fit = from_surface(z, options.spacing, options.sampling_length)
     require_rock(fit.parameters, f"{Path(options.file).name}: the fitted ")
     text = fit.report() + _friction(fit, z)
@@ -53,7 +57,7 @@ def _friction(fit: SurfaceFit, z: Array) -> str:
     """What the scan means for friction, at its sampling length and at a longer one (Markdown)."""
     lines = [
         f"\nFriction angle of a joint of this surface at {STRESS / 1e6:g} MPa, sheared by one "
-        f"sampling length, with contacts of an assumed rock ({default_rock()}):\n",
+        f"sampling length, with contacts of an assumed rock ({DEFAULT_ROCK}):\n",
         "| sampling length (mm) | a | along the rows | across them |",
         "|---|---|---|---|",
     ]

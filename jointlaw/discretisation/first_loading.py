@@ -24,14 +24,6 @@ class FirstLoading(NamedTuple):
     factor: float  # `facet_sum`
     yielding: tuple[Array, Array] | None = None  # `yield_sum`: F1 -= share Phi(closure - depth)
 
-    @classmethod
-    def of(
-        cls, curve: VirginCurve, theta: Array, scale: Array, asperity: Asperity
-    ) -> "FirstLoading":
-        """That of facets of inclination theta (M,) in rad with the normal forces scale Phi."""
-        factor = facet_sum(theta, scale, asperity.lam, asperity.mu)
-        return cls(curve, factor, yield_sum(theta, scale, asperity))
-
     def stress(self, closure: Array) -> Array:
         """Normal stress (Pa) at closures (m), infinite where it overflows."""
         stress: Array = self.factor * self.curve.force(closure)[0]

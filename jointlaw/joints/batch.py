@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..kernels import reference
-from ..kernels.blocks import LANES, rows_of, write_rows, zeros
-from ..kernels.engine import Step, engine
+from ..kernels.engine import LANES, Step, at, blocks, engine
 from ..kernels.reference import Measures
 from ..kernels.unmated import unmated_start
 from ..support.checks import Array, integer, numbers
@@ -44,7 +43,7 @@ class JointBatch:
         self.law, self.ledger = law, ledger
         self._engine = engine(law.tables)
         self._n = integer("n", n, 0)
-        self._state = zeros(self._n, self._engine.rows, 1 if self._n == 1 else LANES)
+        self._state = blocks(self._n, self._engine.rows, 1 if self._n == 1 else LANES)
         self._largest_reach = 0.0  # bound of |y| of all facets of all joints
         numbers = np.arange(law.state_size, dtype=np.float64)[:, None]
         self._row_numbers = reference.parts(law.tables, numbers)  # of each part of a state
@@ -60,9 +59,6 @@ class JointBatch:
 
     def __len__(self) -> int:
         return self._n
-
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__} of {self._n} joints, {self.law.dim}-D>"
 
     # ------------------------------------------------------------------ steps
 
@@ -119,8 +115,7 @@ class JointBatch:
             )
         if not np.isfinite(state.values).all():
             raise ValueError("state holds values that are not finite; it is damaged")
-        rows = self._state[:, : self.law.state_size]
-        write_rows(rows, state.values.T, index)
+        self._state[at(self._state, index, slice(self.law.state_size))] = state.values
         self._engine.refresh(self._state, self._n)
         self._largest_reach = self._reach_of(self._rows()).max(initial=0.0)
 
@@ -132,9 +127,8 @@ class JointBatch:
         """
         start = 0.0 if mated else unmated_start(self.law.tables)
         which = np.arange(self._n) if index is None else self._index(index)
-        lanes = self._state.shape[2]
-        self._state[which // lanes, :, which % lanes] = 0.0
-        self._state[which // lanes, : self.law.dim, which % lanes] = start
+        self._state[at(self._state, which)] = 0.0
+        self._state[at(self._state, which, slice(self.law.dim))] = start
         far = self._steepness * float(np.max(np.abs(start)))
         self._largest_reach = max(self._largest_reach, far)
         if not mated:
@@ -142,19 +136,18 @@ class JointBatch:
 
     def unbond(self, index: Index) -> None:
         """Break the bonds, if any, of the joints at `index`: faces that meet anew have none."""
-        which, lanes = self._index(index), self._state.shape[2]
         row = self._row_numbers.damage.astype(int)
-        self._state[which // lanes, row, which % lanes] = 1.0
+        self._state[at(self._state, self._index(index), row)] = 1.0
 
     def resize(self, n: int) -> None:
         """Change the number of joints; joints beyond the old number are new and mated."""
         n = integer("n", n, 0)
-        blocks, rows, lanes = self._state.shape
+        held, rows, lanes = self._state.shape
         if n < self._n:
             self.reset(np.arange(n, self._n))
-        elif n > blocks * lanes:  # grow by doubling, so that steady growth copies rarely
-            grown = zeros(max(n, 2 * blocks * LANES), rows)
-            write_rows(grown, rows_of(self._state, self._n), np.arange(self._n))
+        elif n > held * lanes:  # grow by doubling, so that steady growth copies rarely
+            grown, old = blocks(max(n, 2 * held * LANES), rows), np.arange(self._n)
+            grown[at(grown, old)] = self._state[at(self._state, old)]
             self._state = grown
         self._n = n
 
@@ -199,27 +192,12 @@ class JointBatch:
     @property
     def delta(self) -> Array:
         """Displacement from the mated position (n, dim): closure and shear, in m."""
-        return rows_of(self._state[:, : self.law.dim], self._n).T
+        return self._state[at(self._state, np.arange(self._n), slice(self.law.dim))]
 
     @property
     def F(self) -> Array:
         """Traction (n, dim) in Pa."""
         return reference.traction(self.law.tables, self._rows()).T
-
-    @property
-    def sliding(self) -> Array:
-        """Share (n,) of all facet orientations: in touch, every cell at its friction limit."""
-        return self.measures().sliding
-
-    @property
-    def slipping(self) -> Array:
-        """Share (n,) of friction capacity that is at its limit: partial slip."""
-        return self.measures().slipping
-
-    @property
-    def separated(self) -> Array:
-        """Share (n,) of all facet orientations: out of touch."""
-        return self.measures().separated
 
     @property
     def stored_energy(self) -> Array:
@@ -251,8 +229,8 @@ class JointBatch:
 
     def _part(self, name: str) -> Array:
         """A part of one row, or of none, of the states of all joints, by name in `State`."""
-        row = getattr(self._row_numbers, name).astype(int).ravel()
-        return np.sum(rows_of(self._state[:, row], self._n), axis=0)
+        row = getattr(self._row_numbers, name).astype(int).reshape(-1, 1)
+        return np.sum(self._state[at(self._state, np.arange(self._n), row)], axis=0)
 
     def _ledger(self, name: str, part: str) -> Array:
         """A part of the ledger, if it is kept."""
@@ -262,7 +240,9 @@ class JointBatch:
 
     def _rows(self, index: NDArray[np.intp] | None = None) -> Array:
         """States (rows, n) of all joints or those of `index`, as a copy."""
-        return rows_of(self._state[:, : self.law.state_size], self._n, index)
+        which = np.arange(self._n) if index is None else index
+        rows = self._state[at(self._state, which, slice(self.law.state_size))]
+        return np.ascontiguousarray(rows.T)
 
     def _index(self, where: Index) -> NDArray[np.intp]:
         index = np.asarray(where)

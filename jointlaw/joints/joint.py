@@ -49,9 +49,6 @@ class Joint:
     def __copy__(self) -> Joint:
         return Joint(self.law, copy(self._batch))
 
-    def __repr__(self) -> str:
-        return f"<Joint at delta = {self.delta} m>"
-
     def update(self, d: ArrayLike, tangent: bool = True) -> tuple[Array, Array | None]:
         """Advance by the increment d (dim,) in m: F (dim,) in Pa, C (dim, dim) in Pa/m."""
         return self._step(d, tangent, keep=True)
@@ -90,9 +87,6 @@ class Joint:
 
     delta = _OfOne(JointBatch.delta, np.asarray)
     F = _OfOne(JointBatch.F, np.asarray)
-    sliding = _OfOne(JointBatch.sliding, float)
-    slipping = _OfOne(JointBatch.slipping, float)
-    separated = _OfOne(JointBatch.separated, float)
     stored_energy = _OfOne(JointBatch.stored_energy, float)
     dissipated_energy = _OfOne(JointBatch.dissipated_energy, float)
     plastic_work = _OfOne(JointBatch.plastic_work, float)

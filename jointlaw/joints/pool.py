@@ -1,18 +1,13 @@
 """Joints for contacts that come and go: every contact keeps its joint as long as it lasts."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..law import JointLaw
 from .batch import JointBatch
 from .state import JointState
-
-if TYPE_CHECKING:
-    from ..law import JointLaw
 
 Places = NDArray[np.intp]
 

@@ -6,27 +6,45 @@ taken where its library was built. JOINTLAW_THREADS bounds the threads.
 """
 
 import ctypes
+import math
 import os
 import warnings
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..discretisation.tables import Tables
 from ..native import library
 from ..native.library import address
 from ..support.checks import Array, one_of
 from . import reference
-from .blocks import LANES, Index, rows_of, write_rows
 from .threads import share_out, thread_count
 
+Index = NDArray[np.intp]
+LANES = 8  # joints of a block, which lie side by side: JLAW_BLOCK in native/batch.h
+LINE = 64  # bytes that a processor reads at once
 CHUNK = 4096  # joints per call of the numpy kernel: keeps its temporaries in cache
 SERIAL = 20_000  # sliders below which a second thread costs more than it saves
 MISSING = (
     "the compiled law was not built, and numpy's kernel is about forty times slower: install a C "
     "compiler or `pip install ziglang`, then run `python -m jointlaw.native`"
 )
+
+
+def blocks(n: int, rows: int, lanes: int = LANES) -> Array:
+    """Zeros for n states, (blocks, rows, lanes), which begin where a line of memory does."""
+    shape = -(-n // lanes), rows, lanes
+    raw = np.zeros(math.prod(shape) + LINE // 8)
+    first = -raw.ctypes.data % LINE // 8
+    return raw[first : first + math.prod(shape)].reshape(shape)
+
+
+def at(state: Array, index: Index, rows: Any = slice(None)) -> tuple[Index, Any, Index]:
+    """Where the blocks `state` hold these rows of the joints of `index`: (n, rows)."""
+    block, lane = np.divmod(index, state.shape[2])
+    return block, rows, lane
 
 
 class Step:
@@ -95,20 +113,22 @@ class NumpyEngine:
         index = np.arange(len(step.d)) if step.where is None else step.where
         for first in range(0, len(step.d), CHUNK):
             part = slice(first, first + CHUNK)
-            old, d = rows_of(state, 0, index[part]), step.d[part].T
-            new, F, C = reference.step(self.tables, old, d, step.C is not None)
+            place = at(state, index[part])
+            old = np.ascontiguousarray(state[place].T)
+            new, F, C = reference.step(self.tables, old, step.d[part].T, step.C is not None)
             step.F[part] = F.T
             if step.C is not None and C is not None:
                 step.C[part] = np.moveaxis(C, 2, 0)
             if step.keep:
-                write_rows(state, new, index[part])
+                state[place] = new.T
 
     def refresh(self, state: Array, n: int) -> None:
         """Nothing is kept beside the states."""
 
     def measures(self, state: Array, out: Array) -> None:
         """Write the `Measures` of the first n joints into the rows of out (5, n)."""
-        out[:] = reference.measures(self.tables, rows_of(state, out.shape[1]))
+        rows = state[at(state, np.arange(out.shape[1]))].T
+        out[:] = reference.measures(self.tables, np.ascontiguousarray(rows))
 
 
 class NativeEngine:

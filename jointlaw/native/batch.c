@@ -83,8 +83,7 @@ int NAME(jlaw_measure)(const jlaw_batch *b, long first, long last)
   for (long at = first; at < last; at += JOINTS) {
     const numbers n = {joint_of(b, at), BLOCK, 0};
     const amounts all = measure(b->law, n);
-    const of_joint stored = all.normal + all.sheared + all.bond;
-    const of_joint out[5] = {all.sliding, all.slipping, all.separated, stored, all.reach};
+    const of_joint out[5] = {all.sliding, all.slipping, all.separated, all.stored, all.reach};
     for (int i = 0; i < 5; i++)
       for (int l = 0; l < JOINTS && at + l < last; l++) b->F[i * b->n + at + l] = JOINT(out[i], l);
   }

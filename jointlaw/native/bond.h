@@ -4,8 +4,7 @@ typedef struct { /* displacement, damage; what the bond adds to traction, tangen
   double delta[3], damage, F[3], C[9], lost;
 } bonded;
 
-/* 1 where opening and slip, squared, are the strength at this damage, more beyond it; p2: one over
- * its half-axes, squared */
+/* 1 where opening and slip, squared, are the strength at this damage; p2: 1/half-axis, squared */
 IN double beyond(const jlaw_law *law, double opening2, double slip2, double damage, double p2[2])
 {
   const double p = law->opening_begin - damage * (law->opening_begin - law->opening_end);
@@ -54,31 +53,23 @@ IN double hold(const jlaw_law *law, bonded *b)
   return (1.0 - now) * psi;
 }
 
-/* Adds what the bond bears in a state after a step; its damage is in this row of the state */
-IN void step_bond(const jlaw_law *law, numbers n, int row, of_joint F[3], of_joint C[9],
-                  int tangent, int ledger)
+/* The bond in a state after a step: adds what it bears, where F is given; returns its stored energy.
+ * Its damage is in this row of the state. */
+IN of_joint step_bond(const jlaw_law *law, numbers n, int row, of_joint F[3], of_joint C[9],
+                      int tangent, int ledger)
 {
   const int dim = law->dim;
+  of_joint stored = each_joint(0.0);
   for (int l = 0; l < JOINTS; l++) {
     double *s = n.s + l;
     bonded b = {{0.0}, s[(size_t) row * n.stride], {0.0}, {0.0}, 0.0};
     for (int i = 0; i < dim; i++) b.delta[i] = s[(size_t) i * n.stride];
-    hold(law, &b);
+    JOINT(stored, l) = hold(law, &b);
+    if (!F) continue;
     s[(size_t) row * n.stride] = b.damage;
     if (ledger) s[(size_t) dim * n.stride] += b.lost;
     for (int i = 0; i < dim; i++) JOINT(F[i], l) += b.F[i];
     for (int i = 0; tangent && i < dim * dim; i++) JOINT(C[i], l) += b.C[i / dim * 3 + i % dim];
-  }
-}
-
-/* Stored energy of the bond in a state */
-IN of_joint bond_stored(const jlaw_law *law, numbers n, int row)
-{
-  of_joint stored = each_joint(0.0);
-  for (int l = 0; l < JOINTS; l++) {
-    bonded b = {{0.0}, n.s[(size_t) row * n.stride + (size_t) l], {0.0}, {0.0}, 0.0};
-    for (int i = 0; i < law->dim; i++) b.delta[i] = n.s[(size_t) i * n.stride + (size_t) l];
-    JOINT(stored, l) = hold(law, &b);
   }
   return stored;
 }

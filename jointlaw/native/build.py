@@ -18,7 +18,6 @@ HERE = Path(__file__).parent
 SOURCES = ("batch.c", "library.c", "batch.h", "layout.h", "lanes.h", "law.h", "bond.h", "build.py")
 # no fused operations: the same bits with every compiler; the others change no result
 FLAGS = ("-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-w")
-HIDDEN = ("-fPIC", "-fvisibility=hidden")
 LEVELS = {8: "x86-64-v4", 4: "x86-64-v3", 2: "x86-64"}  # of lanes of vectors, on x86-64
 ENDINGS = {"linux": "so", "macos": "dylib", "windows": "dll"}
 TARGETS = {  # of zig, and what wheels call them
@@ -52,10 +51,6 @@ class Compiler(NamedTuple):
     target: str = ""  # of zig, for another machine than this
 
     @property
-    def zig(self) -> bool:
-        return "ziglang" in self.command
-
-    @property
     def machine(self) -> tuple[str, str]:
         """Processor and system that it builds for."""
         if self.target:
@@ -66,14 +61,15 @@ class Compiler(NamedTuple):
             platform.machine(), platform.machine()
         ), system
 
-    def level(self, lanes: int) -> list[str]:
-        """Flags for vectors of so many lanes; at the least those of every such processor."""
-        if self.machine[0] != "x86_64":
-            return []
-        level = LEVELS[lanes]
-        if not self.zig:
-            return [f"-march={level}"]
-        return [f"-mcpu={'baseline' if lanes == 2 else level.replace('-', '_')}"]
+    def flags(self, lanes: int) -> list[str]:
+        """Flags, for vectors of so many lanes; at the least those of every such processor."""
+        processor, system = self.machine
+        flags = [*FLAGS, "-fvisibility=hidden", *([] if system == "windows" else ["-fPIC"])]
+        if processor != "x86_64":
+            return flags
+        if "ziglang" not in self.command:
+            return [*flags, f"-march={LEVELS[lanes]}"]
+        return [*flags, f"-mcpu={'baseline' if lanes == 2 else LEVELS[lanes].replace('-', '_')}"]
 
     def run(self, *arguments: object) -> None:
         """Compile; RuntimeError tells the compiler's words. OSError where it does not start."""
@@ -102,11 +98,8 @@ def works(compiler: Compiler) -> bool:
     with tempfile.TemporaryDirectory() as folder:
         source, out = Path(folder) / "trial.c", Path(folder) / "trial.out"
         source.write_text(TRIAL)
-        lanes = max(LEVELS)
         try:
-            compiler.run(
-                *FLAGS, *HIDDEN, *compiler.level(lanes), "-shared", source, "-o", out, "-lm"
-            )
+            compiler.run(*compiler.flags(max(LEVELS)), "-shared", source, "-o", out, "-lm")
         except (OSError, RuntimeError):
             return False
         return out.is_file() and out.stat().st_size > 0
@@ -136,13 +129,11 @@ def build(compiler: Compiler, folder: Path = HERE) -> Path:
     levels = LEVELS if processor == "x86_64" else (2,)
     folder.mkdir(parents=True, exist_ok=True)
     out = folder / library_name(system)
-    position = [] if system == "windows" else ["-fPIC"]
     with tempfile.TemporaryDirectory() as scratch:
 
         def compile_one(source: str, lanes: int, *what: str) -> Path:
             to = Path(scratch) / f"{len(what)}{lanes}.o"
-            flags = [*FLAGS, *position, "-fvisibility=hidden", *compiler.level(lanes), *what]
-            compiler.run(*flags, "-c", HERE / source, "-o", to)
+            compiler.run(*compiler.flags(lanes), *what, "-c", HERE / source, "-o", to)
             return to
 
         parts: list[tuple[Any, ...]] = [("library.c", 2, f'-DJLAW_SOURCES="{sources()}"')]

@@ -173,31 +173,16 @@ static JLAW_FUNCTION void jlaw_say_number_(jlaw_text_ *text, double x)
 {
   char digits[24];
   int exponent = 0, n = 0;
-  if (x != x) {
-    jlaw_say_(text, "nan");
+  if (x < 0.0) jlaw_say_(text, "-");
+  x = fabs(x);
+  if (!(x <= DBL_MAX)) {
+    jlaw_say_(text, x > DBL_MAX ? "inf" : "nan");
     return;
   }
-  if (x < 0.0) {
-    jlaw_say_(text, "-");
-    x = -x;
-  }
-  if (x > DBL_MAX) {
-    jlaw_say_(text, "inf");
-    return;
-  }
-  while (x >= 10.0) {
-    x /= 10.0;
-    exponent++;
-  }
-  while (x > 0.0 && x < 1.0) {
-    x *= 10.0;
-    exponent--;
-  }
+  for (; x >= 10.0; exponent++) x /= 10.0;
+  for (; x > 0.0 && x < 1.0; exponent--) x *= 10.0;
   x += 0.00005;
-  if (x >= 10.0) {
-    x /= 10.0;
-    exponent++;
-  }
+  for (; x >= 10.0; exponent++) x /= 10.0;
   for (int i = 0; i < 5; i++) {
     const int digit = (int) x;
     digits[n++] = (char) ('0' + digit);
@@ -247,9 +232,7 @@ JLAW_CLONES JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t 
                                          const double *d, double *F, double *C)
 {
   const numbers n = {s, stride, 0};
-  double c[9];
-  step_of_kind(law, n, d, F, c, JLAW_LEDGER, C != NULL, 0);
-  for (int i = 0; C && i < law->dim * law->dim; i++) C[i] = c[i];
+  step_of_kind(law, n, d, F, C, JLAW_LEDGER, C != NULL, 0);
 }
 
 /* Whether all sliders hold forces that a law can have; 0 for NaN */
@@ -281,29 +264,27 @@ static JLAW_FUNCTION int jlaw_refuse_(const jlaw_law *law, const double *s, cons
                                       int damaged, char *message, size_t size)
 {
   jlaw_text_ text = {message, size, 0};
-  if (damaged) {
-    jlaw_say_(&text,
-              "the state holds numbers that are not finite or no forces of this law; nothing "
-              "was moved. Start from zeros or from a state that this law wrote");
-    return -1;
-  }
-  jlaw_say_(&text, "the step d = (");
   int finite = 1;
-  for (int i = 0; i < law->dim; i++) {
+  jlaw_say_(&text, damaged ? "" : "the step d = (");
+  for (int i = 0; !damaged && i < law->dim; i++) {
     jlaw_say_(&text, i ? ", " : "");
     jlaw_say_number_(&text, d[i]);
     finite = finite && fabs(d[i]) <= DBL_MAX;
   }
-  if (!finite) {
+  if (damaged) {
+    jlaw_say_(&text,
+              "the state holds numbers that are not finite or no forces of this law; nothing "
+              "was moved. Start from zeros or from a state that this law wrote");
+  } else if (!finite) {
     jlaw_say_(&text,
               ") m is not finite; nothing was moved. Look for the fault in the host's motion");
-    return -1;
+  } else {
+    jlaw_say_(&text, ") m leads from closure ");
+    jlaw_say_number_(&text, s[0]);
+    jlaw_say_(&text, " m beyond the reach of ");
+    jlaw_say_number_(&text, law->largest_reach);
+    jlaw_say_(&text, " m, where forces overflow; nothing was moved. Take a smaller step");
   }
-  jlaw_say_(&text, ") m leads from closure ");
-  jlaw_say_number_(&text, s[0]);
-  jlaw_say_(&text, " m beyond the reach of ");
-  jlaw_say_number_(&text, law->largest_reach);
-  jlaw_say_(&text, " m, where forces overflow; nothing was moved. Take a smaller step");
   return -1;
 }
 
@@ -346,8 +327,7 @@ JLAW_CLONES static JLAW_FUNCTION amounts jlaw_measure_(const jlaw_law *law, cons
 
 JLAW_FUNCTION double jlaw_stored(const jlaw_law *law, const double *s)
 {
-  const amounts all = jlaw_measure_(law, s);
-  return all.normal + all.sheared + all.bond;
+  return jlaw_measure_(law, s).stored;
 }
 
 JLAW_FUNCTION void jlaw_shares(const jlaw_law *law, const double *s, double shares[3])
@@ -453,7 +433,7 @@ static JLAW_FUNCTION void jlaw_hold_(const jlaw_law *law, double *s)
     for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_LANES) {
       const int row = slider_row(law) + at * D + i;
       real G, kappa, qs = take(n, row, D, some), qt = take(n, row + M * D, D, some);
-      cell_now(cell, &o, law->yields, &G, &kappa);
+      hold_cell(cell, o.y1, o.f1, o.k1, o.z1, o.fz1, o.kz1, law->yields, &G, &kappa);
       const real cap = o.strength * G;
       const real size = root(qs * qs + qt * qt);
       const yes beyond = size > cap;
@@ -491,32 +471,20 @@ JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle)
 /* ------------------------------------------------------------- table files */
 #ifndef JOINTLAW_NO_FILES
 
-#define JLAW_LONGEST ((size_t) 1 << 28) /* bytes of a table file: those of a law have 1e5 to 1e7 */
+#define JLAW_LONGEST (1L << 28) /* bytes of a table file: those of a law have 1e5 to 1e7 */
 
 /* The bytes of a file and a zero; NULL if it cannot be read */
 static char *jlaw_load_(const char *file, size_t *length)
 {
   FILE *stream = fopen(file, "rb");
-  char *bytes = NULL, *more;
-  size_t room = 0, n = 0;
-  if (!stream) return NULL;
-  for (int open = 1; open && n < JLAW_LONGEST;) {
-    if (n + 1 >= room) {
-      room = room ? 2 * room : (size_t) 1 << 17;
-      more = (char *) realloc(bytes, room);
-      if (!more) break;
-      bytes = more;
-    }
-    const size_t got = fread(bytes + n, 1, room - n - 1, stream);
-    open = got > 0;
-    n += got;
+  const long size = stream && !fseek(stream, 0, SEEK_END) ? ftell(stream) : -1;
+  char *bytes = size >= 0 && size < JLAW_LONGEST ? (char *) malloc((size_t) size + 1) : NULL;
+  if (bytes) {
+    rewind(stream);
+    *length = fread(bytes, 1, (size_t) size, stream);
+    bytes[*length] = 0;
   }
-  if (ferror(stream) || !bytes) {
-    free(bytes);
-    bytes = NULL;
-  } else bytes[n] = 0;
-  fclose(stream);
-  *length = n;
+  if (stream) fclose(stream);
   return bytes;
 }
 

@@ -456,16 +456,8 @@ JL_IN_ void jl_put_joint_(jl_numbers_ n, int row, jl_real_ x)
   *(jl_loose_ *) (n.s + (size_t) row * n.stride) = (jl_loose_) x;
 #endif
 }
-JL_IN_ jl_real_ jl_take_(jl_numbers_ n, int row, int apart, int some)
-{
-  (void) apart, (void) some;
-  return jl_take_joint_(n, row);
-}
-JL_IN_ void jl_put_(jl_numbers_ n, int row, int apart, int some, jl_real_ x)
-{
-  (void) apart, (void) some;
-  jl_put_joint_(n, row, x);
-}
+#define jl_take_(n, row, apart, some) ((void) (apart), (void) (some), jl_take_joint_(n, row))
+#define jl_put_(n, row, apart, some, x) ((void) (apart), (void) (some), jl_put_joint_(n, row, x))
 #endif
 
 /* Facet i is added to sum i % 4, and the four sums in this order: the same bits for all lanes */
@@ -485,8 +477,7 @@ typedef struct { /* displacement, damage; what the bond adds to traction, tangen
   double delta[3], damage, F[3], C[9], lost;
 } jl_bonded_;
 
-/* 1 where opening and slip, squared, are the strength at this damage, more beyond it; p2: one over
- * its half-axes, squared */
+/* 1 where opening and slip, squared, are the strength at this damage; p2: 1/half-axis, squared */
 JL_IN_ double jl_beyond_(const jlaw_law *law, double opening2, double slip2, double damage, double p2[2])
 {
   const double p = law->opening_begin - damage * (law->opening_begin - law->opening_end);
@@ -535,31 +526,23 @@ JL_IN_ double jl_hold_(const jlaw_law *law, jl_bonded_ *b)
   return (1.0 - now) * jl_psi_;
 }
 
-/* Adds what the bond bears in a state after a step; its damage is in this row of the state */
-JL_IN_ void jl_step_bond_(const jlaw_law *law, jl_numbers_ n, int row, jl_of_joint_ F[3], jl_of_joint_ C[9],
-                  int tangent, int ledger)
+/* The bond in a state after a step: adds what it bears, where F is given; returns its stored energy.
+ * Its damage is in this row of the state. */
+JL_IN_ jl_of_joint_ jl_step_bond_(const jlaw_law *law, jl_numbers_ n, int row, jl_of_joint_ F[3], jl_of_joint_ C[9],
+                      int tangent, int ledger)
 {
   const int dim = law->dim;
+  jl_of_joint_ stored = jl_each_joint_(0.0);
   for (int l = 0; l < JL_JOINTS_; l++) {
     double *s = n.s + l;
     jl_bonded_ b = {{0.0}, s[(size_t) row * n.stride], {0.0}, {0.0}, 0.0};
     for (int i = 0; i < dim; i++) b.delta[i] = s[(size_t) i * n.stride];
-    jl_hold_(law, &b);
+    JL_JOINT_(stored, l) = jl_hold_(law, &b);
+    if (!F) continue;
     s[(size_t) row * n.stride] = b.damage;
     if (ledger) s[(size_t) dim * n.stride] += b.lost;
     for (int i = 0; i < dim; i++) JL_JOINT_(F[i], l) += b.F[i];
     for (int i = 0; tangent && i < dim * dim; i++) JL_JOINT_(C[i], l) += b.C[i / dim * 3 + i % dim];
-  }
-}
-
-/* Stored energy of the bond in a state */
-JL_IN_ jl_of_joint_ jl_bond_stored_(const jlaw_law *law, jl_numbers_ n, int row)
-{
-  jl_of_joint_ stored = jl_each_joint_(0.0);
-  for (int l = 0; l < JL_JOINTS_; l++) {
-    jl_bonded_ b = {{0.0}, n.s[(size_t) row * n.stride + (size_t) l], {0.0}, {0.0}, 0.0};
-    for (int i = 0; i < law->dim; i++) b.delta[i] = n.s[(size_t) i * n.stride + (size_t) l];
-    JL_JOINT_(stored, l) = jl_hold_(law, &b);
   }
   return stored;
 }
@@ -600,6 +583,7 @@ typedef struct { /* facets in a step: y, Phi, Phi', Phi'' before and after; de *
   jl_real_ y0, y1, f0, f1, k0, k1, bend, es, et;
   jl_plane_ middle, end;
   jl_real_ yw, fw, kw, strength, worn; /* before wear: y, Phi, Phi'; friction limit after it; loss */
+  jl_real_ d0, de, dz;                 /* increment: closure, along the azimuth and across it */
   jl_real_ dy, rdy;                    /* y1 - y0, and 1 over it */
   jl_yes_ near;                        /* y has hardly changed */
   jl_real_ z0, z1, fz0, fz1, kz0, kz1; /* flattened depth; Phi and Phi' there */
@@ -664,22 +648,18 @@ JL_IN_ jl_spot_ jl_spot_of_(const jlaw_law *law, jl_real_ y)
   return at;
 }
 
+/* x^p, zero at x = 0 */
+JL_IN_ jl_real_ jl_raised_(jl_real_ x, double p)
+{
+  for (int l = 0; l < JL_W_; l++) JL_LANE_(x, l) = JL_LANE_(x, l) > 0.0 ? pow(JL_LANE_(x, l), p) : 0.0;
+  return x;
+}
+
 /* y^eta, zero at y = 0 */
 JL_IN_ jl_real_ jl_power_of_(const jlaw_law *law, const jl_spot_ *at)
 {
-  jl_real_ power = at->v;
-  if (law->eta == 0.0) power = jl_only_(at->y > 0.0, jl_each_(1.0));
-  else if (law->eta != 0.5)
-    for (int l = 0; l < JL_W_; l++)
-      JL_LANE_(power, l) = JL_LANE_(at->y, l) > 0.0 ? pow(JL_LANE_(at->y, l), law->eta) : 0.0;
-  return power;
-}
-
-/* w^rise of curves that are tabulated over it, w = y/(y + V^2) */
-JL_IN_ jl_real_ jl_rise_of_(const jlaw_law *law, jl_real_ w)
-{
-  for (int l = 0; l < JL_W_; l++) JL_LANE_(w, l) = JL_LANE_(w, l) > 0.0 ? pow(JL_LANE_(w, l), law->rise) : 0.0;
-  return w;
+  if (law->eta == 0.0) return jl_only_(at->y > 0.0, jl_each_(1.0));
+  return law->eta == 0.5 ? at->v : jl_raised_(at->y, law->eta);
 }
 
 /* Phi and Phi' at y, and Phi'' if asked for; zero where y <= 0 */
@@ -698,7 +678,7 @@ JL_IN_ void jl_virgin_curve_(const jlaw_law *law, jl_real_ y, jl_real_ *force, j
           + 0.5 * (law->scale - at.v) * at.r * DS;
   if (law->rise > 0.0) {
     const jl_real_ w = at.y / (at.y + law->scale * law->scale), more = law->rise * (1.0 - w);
-    const jl_real_ up = jl_rise_of_(law, w);
+    const jl_real_ up = jl_raised_(w, law->rise); /* the curve is tabulated over w^rise */
     DDS = up * (DDS + 2.0 * more * DS + more * (more - w) * S);
     DS = up * (DS + more * S);
     S = up * S;
@@ -717,7 +697,7 @@ JL_IN_ jl_real_ jl_psi_(const jlaw_law *law, jl_real_ y)
   jl_real_ c[4];
   jl_fetch_(law->energy, at.i, c);
   jl_real_ T = c[0] + at.x * (c[1] + at.x * (c[2] + at.x * c[3]));
-  if (law->rise > 0.0) T = T * jl_rise_of_(law, at.y / (at.y + law->scale * law->scale));
+  if (law->rise > 0.0) T = T * jl_raised_(at.y / (at.y + law->scale * law->scale), law->rise);
   return jl_power_of_(law, &at) * at.y * at.y * T;
 }
 
@@ -741,6 +721,17 @@ JL_IN_ void jl_flatten_(jl_real_ y, jl_real_ z, jl_real_ H, jl_real_ *G, jl_real
   const jl_real_ over = y - z;
   *kappa = jl_only_(over > 0.0, *kappa);
   *G = jl_larger_(jl_smaller_(*G - H, *kappa * over), jl_each_(0.0));
+}
+
+/* G and kappa of a cell at y, of facets with the flattened depth z */
+JL_IN_ void jl_hold_cell_(const double *cell, jl_real_ y, jl_real_ f, jl_real_ k, jl_real_ z, jl_real_ fz, jl_real_ kz, int yields,
+                  jl_real_ *G, jl_real_ *kappa)
+{
+  jl_real_ H, less;
+  jl_share_of_(cell, y, f, k, G, kappa);
+  if (!yields) return;
+  jl_share_of_(cell, z, fz, kz, &H, &less);
+  jl_flatten_(y, z, H, G, kappa);
 }
 
 /* Phi less its value at the flattened depth */
@@ -829,15 +820,7 @@ JL_IN_ jl_plane_ jl_plane_at_(const double *f, const jl_site_ *at, jl_of_joint_ 
   return s;
 }
 
-/* Components of the joint's vector (v0, v1, v2) along e and across it, and back */
-JL_IN_ jl_real_ jl_along_azimuth_(const double *f, jl_real_ v1, jl_real_ v2)
-{
-  return jl_column_(f, JLAW_E) * v1 + jl_column_(f, JLAW_E + 1) * v2;
-}
-JL_IN_ jl_real_ jl_across_azimuth_(const double *f, jl_real_ v1, jl_real_ v2)
-{
-  return jl_column_(f, JLAW_E) * v2 - jl_column_(f, JLAW_E + 1) * v1;
-}
+/* Components of a vector along e and across it, in the axes of the joint */
 JL_IN_ void jl_to_axes_(const double *f, jl_real_ *along, jl_real_ *across)
 {
   const jl_real_ v1 = jl_column_(f, JLAW_E) * *along - jl_column_(f, JLAW_E + 1) * *across;
@@ -859,11 +842,12 @@ JL_IN_ void jl_curvature_(const jlaw_law *law, const double *f, const jl_plane_ 
 JL_IN_ void jl_move_in_plane_(const double *f, const jl_motion_ *m, jl_facets_ *o)
 {
   const jl_plane_ *s = &o->middle;
-  const jl_real_ d0 = jl_each_(0.0) + m->p[0];
-  const jl_real_ de = jl_along_azimuth_(f, jl_each_(0.0) + m->p[1], jl_each_(0.0) + m->p[2]);
-  const jl_real_ dz = jl_across_azimuth_(f, jl_each_(0.0) + m->p[1], jl_each_(0.0) + m->p[2]);
-  o->es = (de - s->along * d0) * s->rm;
-  o->et = (s->m2 * dz - s->across * (d0 + s->along * de)) * s->rmn;
+  const jl_real_ p1 = jl_each_(0.0) + m->p[1], p2 = jl_each_(0.0) + m->p[2];
+  o->d0 = jl_each_(0.0) + m->p[0];
+  o->de = jl_column_(f, JLAW_E) * p1 + jl_column_(f, JLAW_E + 1) * p2;
+  o->dz = jl_column_(f, JLAW_E) * p2 - jl_column_(f, JLAW_E + 1) * p1;
+  o->es = (o->de - s->along * o->d0) * s->rm;
+  o->et = (s->m2 * o->dz - s->across * (o->d0 + s->along * o->de)) * s->rmn;
 }
 
 /* F of facets that fade: A Phi n and the sliders, in axes (1, e), then in those of the joint */
@@ -902,12 +886,7 @@ JL_IN_ void jl_wear_sliders_(const double *cell, jl_facets_ *o, const jl_sliders
                      int yields)
 {
   jl_real_ G, kappa;
-  jl_share_of_(cell, o->yw, o->fw, o->kw, &G, &kappa);
-  if (yields) {
-    jl_real_ H, kz;
-    jl_share_of_(cell, o->z0, o->fz0, o->kz0, &H, &kz);
-    jl_flatten_(o->yw, o->z0, H, &G, &kappa);
-  }
+  jl_hold_cell_(cell, o->yw, o->fw, o->kw, o->z0, o->fz0, o->kz0, yields, &G, &kappa);
   const jl_yes_ falls = kappa > c->k0, had = kappa > JLAW_TINY, has = c->k0 > JLAW_TINY;
   const jl_real_ kept = jl_pick_(falls, c->k0 / jl_pick_(falls, kappa, 1.0), 1.0);
   const jl_real_ q2 = *qs * *qs + *qt * *qt, size = kept * jl_root_(q2), cap = o->strength * c->G0;
@@ -1072,14 +1051,12 @@ JL_IN_ void jl_add_fading_tangent_(const jlaw_law *law, const double *f, const j
   jl_curvature_(law, f, s, m->end.w, m->has, h);
   jl_curvature_(law, f, r, m->middle.w, m->has, H);
   /* the middle */
-  const jl_real_ d0 = jl_each_(0.0) + m->p[0];
-  const jl_real_ de = jl_along_azimuth_(f, jl_each_(0.0) + m->p[1], jl_each_(0.0) + m->p[2]);
-  const jl_real_ dz = jl_across_azimuth_(f, jl_each_(0.0) + m->p[1], jl_each_(0.0) + m->p[2]);
-  const jl_real_ turn = d0 + r->along * de, rm2 = 1.0 / r->m2, rN2 = 1.0 / r->N2;
+  const jl_real_ turn = o->d0 + r->along * o->de, rm2 = 1.0 / r->m2, rN2 = 1.0 / r->N2;
   const jl_real_ ea = -0.5 * turn * (rm2 * r->rm),
              eb = -0.5 * (turn * r->rmn + o->et * r->across * rN2);
   const jl_real_ ta =
-      0.5 * ((2.0 * r->along * dz - r->across * de) * r->rmn - o->et * r->along * (rm2 + rN2));
+      0.5
+      * ((2.0 * r->along * o->dz - r->across * o->de) * r->rmn - o->et * r->along * (rm2 + rN2));
   const jl_real_ Es[3] = {-r->along * r->rm, r->rm + ea * H[0], ea * H[1]};
   const jl_real_ Et[3] = {-r->across * r->rmn, -r->along * r->across * r->rmn + ta * H[0] + eb * H[1],
                       r->m2 * r->rmn + ta * H[1] + eb * H[2]};
@@ -1245,29 +1222,23 @@ JL_IN_ void jl_step_(const jlaw_law *law, jl_numbers_ n, const jl_of_joint_ d[3]
 
 /* ------------------------------------------------------------------ what a state is */
 
-/* A joint that does not move */
-JL_IN_ jl_motion_ jl_standing_(const jlaw_law *law, jl_numbers_ n)
-{
-  jl_motion_ m;
-  for (int i = 0; i < 3; i++) m.to[i] = i < law->dim ? jl_take_joint_(n, i) : jl_each_joint_(0.0);
-  m.has = jl_each_joint_(1.0);
-  if (law->wears) m.has = 1.0 - jl_take_joint_(n, jl_worn_row_(law));
-  if (law->fades) m.end = jl_site_of_(law, m.to[1], m.to[2]);
-  return m;
-}
-
 /* Facets from number `at` on in a state: y, z, and the virgin curve there as in y1 and z1; the
  * friction limit of q over G */
 JL_IN_ void jl_facets_now_(const jlaw_law *law, jl_numbers_ n, int at, jl_facets_ *o)
 {
-  const jl_motion_ m = jl_standing_(law, n);
-  const int dim = law->dim, some = law->facets - at < JL_TOGETHER_ ? law->facets - at : JL_TOGETHER_;
+  const int some = law->facets - at < JL_TOGETHER_ ? law->facets - at : JL_TOGETHER_;
   const double *f = jl_facet_of_(law, at);
+  jl_of_joint_ slopes = jl_each_joint_(1.0), to[3];
+  for (int i = 0; i < 3; i++) to[i] = i < law->dim ? jl_take_joint_(n, i) : jl_each_joint_(0.0);
+  if (law->wears) slopes = 1.0 - jl_take_joint_(n, jl_worn_row_(law));
   o->y1 = o->z1 = o->fz1 = o->kz1 = jl_each_(0.0);
-  for (int i = 0; i < dim && !law->fades; i++) o->y1 += jl_column_(f, JLAW_M + i) * m.to[i];
-  if (law->fades) o->y1 = jl_climb_(law, f, m.to[0], &m.end, m.has);
   o->strength = jl_each_(jl_column_(f, JLAW_STRENGTH));
-  if (law->fades) o->strength = o->strength * jl_plane_at_(f, &m.end, m.has).gamma;
+  for (int i = 0; i < law->dim && !law->fades; i++) o->y1 += jl_column_(f, JLAW_M + i) * to[i];
+  if (law->fades) {
+    const jl_site_ here = jl_site_of_(law, to[1], to[2]);
+    o->y1 = jl_climb_(law, f, to[0], &here, slopes);
+    o->strength = o->strength * jl_plane_at_(f, &here, slopes).gamma;
+  }
   o->y1 = jl_resolved_(o->y1);
   jl_virgin_curve_(law, o->y1, &o->f1, &o->k1, (jl_real_ *) 0);
   if (!law->yields) return;
@@ -1275,18 +1246,8 @@ JL_IN_ void jl_facets_now_(const jlaw_law *law, jl_numbers_ n, int at, jl_facets
   jl_virgin_curve_(law, o->z1, &o->fz1, &o->kz1, (jl_real_ *) 0);
 }
 
-/* G and kappa of a cell of these facets */
-JL_IN_ void jl_cell_now_(const double *cell, const jl_facets_ *o, int yields, jl_real_ *G, jl_real_ *kappa)
-{
-  jl_share_of_(cell, o->y1, o->f1, o->k1, G, kappa);
-  if (!yields) return;
-  jl_real_ H, kz;
-  jl_share_of_(cell, o->z1, o->fz1, o->kz1, &H, &kz);
-  jl_flatten_(o->y1, o->z1, H, G, kappa);
-}
-
-typedef struct { /* as reference.Measures; energies of normal and shear springs and of the bond */
-  jl_of_joint_ sliding, slipping, separated, normal, sheared, bond, reach;
+typedef struct { /* as reference.Measures; of the stored energy that of the shear springs */
+  jl_of_joint_ sliding, slipping, separated, stored, reach, sheared;
 } jl_amounts_;
 
 typedef struct {
@@ -1297,15 +1258,14 @@ JL_IN_ void jl_measure_facets_(const jlaw_law *law, jl_numbers_ n, int at, jl_am
 {
   const int M = law->facets, D = law->cells, some = M - at < JL_TOGETHER_ ? M - at : JL_TOGETHER_;
   const double *f = jl_facet_of_(law, at), *cell = jl_cell_of_(law, at);
-  const jl_real_ one = jl_each_(1.0);
-  jl_real_ held = jl_each_(0.0), sheared = jl_each_(0.0), whole_slips = one;
+  jl_real_ held = jl_each_(0.0), sheared = jl_each_(0.0), whole_slips = jl_each_(1.0);
   jl_facets_ o;
   jl_facets_now_(law, n, at, &o);
   for (int i = 0; i < D && jl_any_(o.y1 > jl_column_(cell, JLAW_LOW)); i++) {
     jl_real_ G, kappa;
     const int row = jl_slider_row_(law) + at * D + i;
     const jl_real_ qs = jl_take_(n, row, D, some), qt = jl_take_(n, row + M * D, D, some);
-    jl_cell_now_(cell, &o, law->yields, &G, &kappa);
+    jl_hold_cell_(cell, o.y1, o.f1, o.k1, o.z1, o.fz1, o.kz1, law->yields, &G, &kappa);
     const jl_real_ q2 = qs * qs + qt * qt;
     const jl_yes_ stiff = kappa > JLAW_TINY;
     const jl_yes_ limited = jl_root_(q2) >= o.strength * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * o.f1);
@@ -1318,7 +1278,8 @@ JL_IN_ void jl_measure_facets_(const jlaw_law *law, jl_numbers_ n, int at, jl_am
   const jl_real_ force = jl_only_(touches, jl_larger_(o.f1 - o.fz1, jl_each_(0.0))),
              share = jl_each_(jl_column_(f, JLAW_SHARE));
   sum->sliding += share * jl_only_(touches, whole_slips);
-  sum->slipping += share * jl_smaller_(jl_only_(force > 0.0, held / jl_pick_(force > 0.0, force, 1.0)), one);
+  sum->slipping +=
+      share * jl_smaller_(jl_only_(force > 0.0, held / jl_pick_(force > 0.0, force, 1.0)), jl_each_(1.0));
   sum->separated += share * jl_pick_(touches, 0.0, 1.0);
   jl_real_ normal = jl_psi_(law, o.y1);
   if (law->yields) normal = normal - jl_psi_(law, o.z1) - o.fz1 * (o.y1 - o.z1);
@@ -1336,17 +1297,16 @@ JL_IN_ jl_amounts_ jl_measure_(const jlaw_law *law, jl_numbers_ n)
   jl_amount_sums_ sum[JL_SUMS_];
   jl_amounts_ all;
   all.reach = jl_each_joint_(-DBL_MAX);
-  for (int i = 0; i < JL_SUMS_; i++)
-    sum[i].sliding = sum[i].slipping = sum[i].separated = sum[i].normal = sum[i].sheared =
-        jl_each_(0.0);
+  const jl_amount_sums_ none = {jl_each_(0.0), jl_each_(0.0), jl_each_(0.0), jl_each_(0.0), jl_each_(0.0)};
+  for (int i = 0; i < JL_SUMS_; i++) sum[i] = none;
   for (int at = 0; at < law->facets; at += JL_TOGETHER_)
     jl_measure_facets_(law, n, at, sum + at / JL_TOGETHER_ % JL_SUMS_, &all.reach);
   all.sliding = jl_total_(sum, sliding);
   all.slipping = jl_total_(sum, slipping);
   all.separated = jl_total_(sum, separated);
-  all.normal = jl_total_(sum, normal);
   all.sheared = jl_total_(sum, sheared);
-  all.bond = law->bonded ? jl_bond_stored_(law, n, jl_damage_row_(law)) : jl_each_joint_(0.0);
+  all.stored = jl_total_(sum, normal) + all.sheared;
+  if (law->bonded) all.stored += jl_step_bond_(law, n, jl_damage_row_(law), NULL, NULL, 0, 0);
   return all;
 }
 
@@ -1363,30 +1323,19 @@ JL_IN_ jl_kind_ jl_kind_of_(int dim, int yields, int fades, int wears, int ledge
 JL_IN_ void jl_step_of_kind_(const jlaw_law *law, jl_numbers_ n, const jl_of_joint_ d[3], jl_of_joint_ F[3],
                      jl_of_joint_ C[9], int ledger, int tangent, int kept)
 {
+#define JL_STEP_(dim, yields, fades, wears, ledger)                                         \
+  (tangent ? jl_step_(law, n, d, F, C, jl_kind_of_(dim, yields, fades, wears, ledger, 1, kept)) \
+           : jl_step_(law, n, d, F, C, jl_kind_of_(dim, yields, fades, wears, ledger, 0, kept)))
   const int dim = law->dim, y = law->yields, w = law->wears;
-  if (law->fades) {
-    if (y || w || dim == 1) {
-      if (tangent) jl_step_(law, n, d, F, C, jl_kind_of_(dim, y, 1, w, 1, 1, kept));
-      else jl_step_(law, n, d, F, C, jl_kind_of_(dim, y, 1, w, 1, 0, kept));
-    } else if (dim == 3) {
-      if (tangent) jl_step_(law, n, d, F, C, jl_kind_of_(3, 0, 1, 0, ledger, 1, kept));
-      else jl_step_(law, n, d, F, C, jl_kind_of_(3, 0, 1, 0, ledger, 0, kept));
-    } else {
-      if (tangent) jl_step_(law, n, d, F, C, jl_kind_of_(2, 0, 1, 0, ledger, 1, kept));
-      else jl_step_(law, n, d, F, C, jl_kind_of_(2, 0, 1, 0, ledger, 0, kept));
-    }
-  } else if (y || dim == 1) {
-    if (tangent) jl_step_(law, n, d, F, C, jl_kind_of_(dim, y, 0, 0, 1, 1, kept));
-    else jl_step_(law, n, d, F, C, jl_kind_of_(dim, y, 0, 0, 1, 0, kept));
-  } else if (dim == 3) {
-    if (tangent) jl_step_(law, n, d, F, C, jl_kind_of_(3, 0, 0, 0, ledger, 1, kept));
-    else if (ledger) jl_step_(law, n, d, F, C, jl_kind_of_(3, 0, 0, 0, 1, 0, kept));
-    else jl_step_(law, n, d, F, C, jl_kind_of_(3, 0, 0, 0, 0, 0, kept));
-  } else {
-    if (tangent) jl_step_(law, n, d, F, C, jl_kind_of_(2, 0, 0, 0, ledger, 1, kept));
-    else if (ledger) jl_step_(law, n, d, F, C, jl_kind_of_(2, 0, 0, 0, 1, 0, kept));
-    else jl_step_(law, n, d, F, C, jl_kind_of_(2, 0, 0, 0, 0, 0, kept));
-  }
+  if (law->fades && (y || w || dim == 1)) JL_STEP_(dim, y, 1, w, 1);
+  else if (law->fades && dim == 3) JL_STEP_(3, 0, 1, 0, ledger);
+  else if (law->fades) JL_STEP_(2, 0, 1, 0, ledger);
+  else if (y || dim == 1) JL_STEP_(dim, y, 0, 0, 1);
+  else if (dim == 3 && ledger) JL_STEP_(3, 0, 0, 0, 1);
+  else if (dim == 3) JL_STEP_(3, 0, 0, 0, 0);
+  else if (ledger) JL_STEP_(2, 0, 0, 0, 1);
+  else JL_STEP_(2, 0, 0, 0, 0);
+#undef JL_STEP_
   if (law->bonded) jl_step_bond_(law, n, jl_damage_row_(law), F, C, tangent, ledger || y || w);
 }
 
@@ -1408,31 +1357,16 @@ static JLAW_FUNCTION void jlaw_say_number_(jlaw_text_ *text, double x)
 {
   char digits[24];
   int exponent = 0, n = 0;
-  if (x != x) {
-    jlaw_say_(text, "nan");
+  if (x < 0.0) jlaw_say_(text, "-");
+  x = fabs(x);
+  if (!(x <= DBL_MAX)) {
+    jlaw_say_(text, x > DBL_MAX ? "inf" : "nan");
     return;
   }
-  if (x < 0.0) {
-    jlaw_say_(text, "-");
-    x = -x;
-  }
-  if (x > DBL_MAX) {
-    jlaw_say_(text, "inf");
-    return;
-  }
-  while (x >= 10.0) {
-    x /= 10.0;
-    exponent++;
-  }
-  while (x > 0.0 && x < 1.0) {
-    x *= 10.0;
-    exponent--;
-  }
+  for (; x >= 10.0; exponent++) x /= 10.0;
+  for (; x > 0.0 && x < 1.0; exponent--) x *= 10.0;
   x += 0.00005;
-  if (x >= 10.0) {
-    x /= 10.0;
-    exponent++;
-  }
+  for (; x >= 10.0; exponent++) x /= 10.0;
   for (int i = 0; i < 5; i++) {
     const int digit = (int) x;
     digits[n++] = (char) ('0' + digit);
@@ -1482,9 +1416,7 @@ JLAW_CLONES JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t 
                                          const double *d, double *F, double *C)
 {
   const jl_numbers_ n = {s, stride, 0};
-  double c[9];
-  jl_step_of_kind_(law, n, d, F, c, JLAW_LEDGER, C != NULL, 0);
-  for (int i = 0; C && i < law->dim * law->dim; i++) C[i] = c[i];
+  jl_step_of_kind_(law, n, d, F, C, JLAW_LEDGER, C != NULL, 0);
 }
 
 /* Whether all sliders hold forces that a law can have; 0 for NaN */
@@ -1516,29 +1448,27 @@ static JLAW_FUNCTION int jlaw_refuse_(const jlaw_law *law, const double *s, cons
                                       int damaged, char *message, size_t size)
 {
   jlaw_text_ text = {message, size, 0};
-  if (damaged) {
-    jlaw_say_(&text,
-              "the state holds numbers that are not finite or no forces of this law; nothing "
-              "was moved. Start from zeros or from a state that this law wrote");
-    return -1;
-  }
-  jlaw_say_(&text, "the step d = (");
   int finite = 1;
-  for (int i = 0; i < law->dim; i++) {
+  jlaw_say_(&text, damaged ? "" : "the step d = (");
+  for (int i = 0; !damaged && i < law->dim; i++) {
     jlaw_say_(&text, i ? ", " : "");
     jlaw_say_number_(&text, d[i]);
     finite = finite && fabs(d[i]) <= DBL_MAX;
   }
-  if (!finite) {
+  if (damaged) {
+    jlaw_say_(&text,
+              "the state holds numbers that are not finite or no forces of this law; nothing "
+              "was moved. Start from zeros or from a state that this law wrote");
+  } else if (!finite) {
     jlaw_say_(&text,
               ") m is not finite; nothing was moved. Look for the fault in the host's motion");
-    return -1;
+  } else {
+    jlaw_say_(&text, ") m leads from closure ");
+    jlaw_say_number_(&text, s[0]);
+    jlaw_say_(&text, " m beyond the reach of ");
+    jlaw_say_number_(&text, law->largest_reach);
+    jlaw_say_(&text, " m, where forces overflow; nothing was moved. Take a smaller step");
   }
-  jlaw_say_(&text, ") m leads from closure ");
-  jlaw_say_number_(&text, s[0]);
-  jlaw_say_(&text, " m beyond the reach of ");
-  jlaw_say_number_(&text, law->largest_reach);
-  jlaw_say_(&text, " m, where forces overflow; nothing was moved. Take a smaller step");
   return -1;
 }
 
@@ -1581,8 +1511,7 @@ JLAW_CLONES static JLAW_FUNCTION jl_amounts_ jlaw_measure_(const jlaw_law *law, 
 
 JLAW_FUNCTION double jlaw_stored(const jlaw_law *law, const double *s)
 {
-  const jl_amounts_ all = jlaw_measure_(law, s);
-  return all.normal + all.sheared + all.bond;
+  return jlaw_measure_(law, s).stored;
 }
 
 JLAW_FUNCTION void jlaw_shares(const jlaw_law *law, const double *s, double shares[3])
@@ -1688,7 +1617,7 @@ static JLAW_FUNCTION void jlaw_hold_(const jlaw_law *law, double *s)
     for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_LANES) {
       const int row = jl_slider_row_(law) + at * D + i;
       jl_real_ G, kappa, qs = jl_take_(n, row, D, some), qt = jl_take_(n, row + M * D, D, some);
-      jl_cell_now_(cell, &o, law->yields, &G, &kappa);
+      jl_hold_cell_(cell, o.y1, o.f1, o.k1, o.z1, o.fz1, o.kz1, law->yields, &G, &kappa);
       const jl_real_ cap = o.strength * G;
       const jl_real_ size = jl_root_(qs * qs + qt * qt);
       const jl_yes_ jl_beyond_ = size > cap;
@@ -1726,32 +1655,20 @@ JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle)
 /* ------------------------------------------------------------- table files */
 #ifndef JOINTLAW_NO_FILES
 
-#define JLAW_LONGEST ((size_t) 1 << 28) /* bytes of a table file: those of a law have 1e5 to 1e7 */
+#define JLAW_LONGEST (1L << 28) /* bytes of a table file: those of a law have 1e5 to 1e7 */
 
 /* The bytes of a file and a zero; NULL if it cannot be read */
 static char *jlaw_load_(const char *file, size_t *length)
 {
   FILE *stream = fopen(file, "rb");
-  char *bytes = NULL, *more;
-  size_t room = 0, n = 0;
-  if (!stream) return NULL;
-  for (int open = 1; open && n < JLAW_LONGEST;) {
-    if (n + 1 >= room) {
-      room = room ? 2 * room : (size_t) 1 << 17;
-      more = (char *) realloc(bytes, room);
-      if (!more) break;
-      bytes = more;
-    }
-    const size_t got = fread(bytes + n, 1, room - n - 1, stream);
-    open = got > 0;
-    n += got;
+  const long size = stream && !fseek(stream, 0, SEEK_END) ? ftell(stream) : -1;
+  char *bytes = size >= 0 && size < JLAW_LONGEST ? (char *) malloc((size_t) size + 1) : NULL;
+  if (bytes) {
+    rewind(stream);
+    *length = fread(bytes, 1, (size_t) size, stream);
+    bytes[*length] = 0;
   }
-  if (ferror(stream) || !bytes) {
-    free(bytes);
-    bytes = NULL;
-  } else bytes[n] = 0;
-  fclose(stream);
-  *length = n;
+  if (stream) fclose(stream);
   return bytes;
 }
 

@@ -35,6 +35,7 @@ typedef struct { /* facets in a step: y, Phi, Phi', Phi'' before and after; de *
   real y0, y1, f0, f1, k0, k1, bend, es, et;
   plane middle, end;
   real yw, fw, kw, strength, worn; /* before wear: y, Phi, Phi'; friction limit after it; loss */
+  real d0, de, dz;                 /* increment: closure, along the azimuth and across it */
   real dy, rdy;                    /* y1 - y0, and 1 over it */
   yes near;                        /* y has hardly changed */
   real z0, z1, fz0, fz1, kz0, kz1; /* flattened depth; Phi and Phi' there */
@@ -99,22 +100,18 @@ IN spot spot_of(const jlaw_law *law, real y)
   return at;
 }
 
+/* x^p, zero at x = 0 */
+IN real raised(real x, double p)
+{
+  for (int l = 0; l < W; l++) LANE(x, l) = LANE(x, l) > 0.0 ? pow(LANE(x, l), p) : 0.0;
+  return x;
+}
+
 /* y^eta, zero at y = 0 */
 IN real power_of(const jlaw_law *law, const spot *at)
 {
-  real power = at->v;
-  if (law->eta == 0.0) power = only(at->y > 0.0, each(1.0));
-  else if (law->eta != 0.5)
-    for (int l = 0; l < W; l++)
-      LANE(power, l) = LANE(at->y, l) > 0.0 ? pow(LANE(at->y, l), law->eta) : 0.0;
-  return power;
-}
-
-/* w^rise of curves that are tabulated over it, w = y/(y + V^2) */
-IN real rise_of(const jlaw_law *law, real w)
-{
-  for (int l = 0; l < W; l++) LANE(w, l) = LANE(w, l) > 0.0 ? pow(LANE(w, l), law->rise) : 0.0;
-  return w;
+  if (law->eta == 0.0) return only(at->y > 0.0, each(1.0));
+  return law->eta == 0.5 ? at->v : raised(at->y, law->eta);
 }
 
 /* Phi and Phi' at y, and Phi'' if asked for; zero where y <= 0 */
@@ -133,7 +130,7 @@ IN void virgin_curve(const jlaw_law *law, real y, real *force, real *slope, real
           + 0.5 * (law->scale - at.v) * at.r * DS;
   if (law->rise > 0.0) {
     const real w = at.y / (at.y + law->scale * law->scale), more = law->rise * (1.0 - w);
-    const real up = rise_of(law, w);
+    const real up = raised(w, law->rise); /* the curve is tabulated over w^rise */
     DDS = up * (DDS + 2.0 * more * DS + more * (more - w) * S);
     DS = up * (DS + more * S);
     S = up * S;
@@ -152,7 +149,7 @@ IN real psi(const jlaw_law *law, real y)
   real c[4];
   fetch(law->energy, at.i, c);
   real T = c[0] + at.x * (c[1] + at.x * (c[2] + at.x * c[3]));
-  if (law->rise > 0.0) T = T * rise_of(law, at.y / (at.y + law->scale * law->scale));
+  if (law->rise > 0.0) T = T * raised(at.y / (at.y + law->scale * law->scale), law->rise);
   return power_of(law, &at) * at.y * at.y * T;
 }
 
@@ -176,6 +173,17 @@ IN void flatten(real y, real z, real H, real *G, real *kappa)
   const real over = y - z;
   *kappa = only(over > 0.0, *kappa);
   *G = larger(smaller(*G - H, *kappa * over), each(0.0));
+}
+
+/* G and kappa of a cell at y, of facets with the flattened depth z */
+IN void hold_cell(const double *cell, real y, real f, real k, real z, real fz, real kz, int yields,
+                  real *G, real *kappa)
+{
+  real H, less;
+  share_of(cell, y, f, k, G, kappa);
+  if (!yields) return;
+  share_of(cell, z, fz, kz, &H, &less);
+  flatten(y, z, H, G, kappa);
 }
 
 /* Phi less its value at the flattened depth */
@@ -264,15 +272,7 @@ IN plane plane_at(const double *f, const site *at, of_joint slopes)
   return s;
 }
 
-/* Components of the joint's vector (v0, v1, v2) along e and across it, and back */
-IN real along_azimuth(const double *f, real v1, real v2)
-{
-  return column(f, JLAW_E) * v1 + column(f, JLAW_E + 1) * v2;
-}
-IN real across_azimuth(const double *f, real v1, real v2)
-{
-  return column(f, JLAW_E) * v2 - column(f, JLAW_E + 1) * v1;
-}
+/* Components of a vector along e and across it, in the axes of the joint */
 IN void to_axes(const double *f, real *along, real *across)
 {
   const real v1 = column(f, JLAW_E) * *along - column(f, JLAW_E + 1) * *across;
@@ -294,11 +294,12 @@ IN void curvature(const jlaw_law *law, const double *f, const plane *s, of_joint
 IN void move_in_plane(const double *f, const motion *m, facets *o)
 {
   const plane *s = &o->middle;
-  const real d0 = each(0.0) + m->p[0];
-  const real de = along_azimuth(f, each(0.0) + m->p[1], each(0.0) + m->p[2]);
-  const real dz = across_azimuth(f, each(0.0) + m->p[1], each(0.0) + m->p[2]);
-  o->es = (de - s->along * d0) * s->rm;
-  o->et = (s->m2 * dz - s->across * (d0 + s->along * de)) * s->rmn;
+  const real p1 = each(0.0) + m->p[1], p2 = each(0.0) + m->p[2];
+  o->d0 = each(0.0) + m->p[0];
+  o->de = column(f, JLAW_E) * p1 + column(f, JLAW_E + 1) * p2;
+  o->dz = column(f, JLAW_E) * p2 - column(f, JLAW_E + 1) * p1;
+  o->es = (o->de - s->along * o->d0) * s->rm;
+  o->et = (s->m2 * o->dz - s->across * (o->d0 + s->along * o->de)) * s->rmn;
 }
 
 /* F of facets that fade: A Phi n and the sliders, in axes (1, e), then in those of the joint */
@@ -337,12 +338,7 @@ IN void wear_sliders(const double *cell, facets *o, const sliders *c, real *qs, 
                      int yields)
 {
   real G, kappa;
-  share_of(cell, o->yw, o->fw, o->kw, &G, &kappa);
-  if (yields) {
-    real H, kz;
-    share_of(cell, o->z0, o->fz0, o->kz0, &H, &kz);
-    flatten(o->yw, o->z0, H, &G, &kappa);
-  }
+  hold_cell(cell, o->yw, o->fw, o->kw, o->z0, o->fz0, o->kz0, yields, &G, &kappa);
   const yes falls = kappa > c->k0, had = kappa > JLAW_TINY, has = c->k0 > JLAW_TINY;
   const real kept = pick(falls, c->k0 / pick(falls, kappa, 1.0), 1.0);
   const real q2 = *qs * *qs + *qt * *qt, size = kept * root(q2), cap = o->strength * c->G0;
@@ -507,14 +503,12 @@ IN void add_fading_tangent(const jlaw_law *law, const double *f, const motion *m
   curvature(law, f, s, m->end.w, m->has, h);
   curvature(law, f, r, m->middle.w, m->has, H);
   /* the middle */
-  const real d0 = each(0.0) + m->p[0];
-  const real de = along_azimuth(f, each(0.0) + m->p[1], each(0.0) + m->p[2]);
-  const real dz = across_azimuth(f, each(0.0) + m->p[1], each(0.0) + m->p[2]);
-  const real turn = d0 + r->along * de, rm2 = 1.0 / r->m2, rN2 = 1.0 / r->N2;
+  const real turn = o->d0 + r->along * o->de, rm2 = 1.0 / r->m2, rN2 = 1.0 / r->N2;
   const real ea = -0.5 * turn * (rm2 * r->rm),
              eb = -0.5 * (turn * r->rmn + o->et * r->across * rN2);
   const real ta =
-      0.5 * ((2.0 * r->along * dz - r->across * de) * r->rmn - o->et * r->along * (rm2 + rN2));
+      0.5
+      * ((2.0 * r->along * o->dz - r->across * o->de) * r->rmn - o->et * r->along * (rm2 + rN2));
   const real Es[3] = {-r->along * r->rm, r->rm + ea * H[0], ea * H[1]};
   const real Et[3] = {-r->across * r->rmn, -r->along * r->across * r->rmn + ta * H[0] + eb * H[1],
                       r->m2 * r->rmn + ta * H[1] + eb * H[2]};
@@ -680,29 +674,23 @@ IN void step(const jlaw_law *law, numbers n, const of_joint d[3], of_joint F[3],
 
 /* ------------------------------------------------------------------ what a state is */
 
-/* A joint that does not move */
-IN motion standing(const jlaw_law *law, numbers n)
-{
-  motion m;
-  for (int i = 0; i < 3; i++) m.to[i] = i < law->dim ? take_joint(n, i) : each_joint(0.0);
-  m.has = each_joint(1.0);
-  if (law->wears) m.has = 1.0 - take_joint(n, worn_row(law));
-  if (law->fades) m.end = site_of(law, m.to[1], m.to[2]);
-  return m;
-}
-
 /* Facets from number `at` on in a state: y, z, and the virgin curve there as in y1 and z1; the
  * friction limit of q over G */
 IN void facets_now(const jlaw_law *law, numbers n, int at, facets *o)
 {
-  const motion m = standing(law, n);
-  const int dim = law->dim, some = law->facets - at < TOGETHER ? law->facets - at : TOGETHER;
+  const int some = law->facets - at < TOGETHER ? law->facets - at : TOGETHER;
   const double *f = facet_of(law, at);
+  of_joint slopes = each_joint(1.0), to[3];
+  for (int i = 0; i < 3; i++) to[i] = i < law->dim ? take_joint(n, i) : each_joint(0.0);
+  if (law->wears) slopes = 1.0 - take_joint(n, worn_row(law));
   o->y1 = o->z1 = o->fz1 = o->kz1 = each(0.0);
-  for (int i = 0; i < dim && !law->fades; i++) o->y1 += column(f, JLAW_M + i) * m.to[i];
-  if (law->fades) o->y1 = climb(law, f, m.to[0], &m.end, m.has);
   o->strength = each(column(f, JLAW_STRENGTH));
-  if (law->fades) o->strength = o->strength * plane_at(f, &m.end, m.has).gamma;
+  for (int i = 0; i < law->dim && !law->fades; i++) o->y1 += column(f, JLAW_M + i) * to[i];
+  if (law->fades) {
+    const site here = site_of(law, to[1], to[2]);
+    o->y1 = climb(law, f, to[0], &here, slopes);
+    o->strength = o->strength * plane_at(f, &here, slopes).gamma;
+  }
   o->y1 = resolved(o->y1);
   virgin_curve(law, o->y1, &o->f1, &o->k1, (real *) 0);
   if (!law->yields) return;
@@ -710,18 +698,8 @@ IN void facets_now(const jlaw_law *law, numbers n, int at, facets *o)
   virgin_curve(law, o->z1, &o->fz1, &o->kz1, (real *) 0);
 }
 
-/* G and kappa of a cell of these facets */
-IN void cell_now(const double *cell, const facets *o, int yields, real *G, real *kappa)
-{
-  share_of(cell, o->y1, o->f1, o->k1, G, kappa);
-  if (!yields) return;
-  real H, kz;
-  share_of(cell, o->z1, o->fz1, o->kz1, &H, &kz);
-  flatten(o->y1, o->z1, H, G, kappa);
-}
-
-typedef struct { /* as reference.Measures; energies of normal and shear springs and of the bond */
-  of_joint sliding, slipping, separated, normal, sheared, bond, reach;
+typedef struct { /* as reference.Measures; of the stored energy that of the shear springs */
+  of_joint sliding, slipping, separated, stored, reach, sheared;
 } amounts;
 
 typedef struct {
@@ -732,15 +710,14 @@ IN void measure_facets(const jlaw_law *law, numbers n, int at, amount_sums *sum,
 {
   const int M = law->facets, D = law->cells, some = M - at < TOGETHER ? M - at : TOGETHER;
   const double *f = facet_of(law, at), *cell = cell_of(law, at);
-  const real one = each(1.0);
-  real held = each(0.0), sheared = each(0.0), whole_slips = one;
+  real held = each(0.0), sheared = each(0.0), whole_slips = each(1.0);
   facets o;
   facets_now(law, n, at, &o);
   for (int i = 0; i < D && any(o.y1 > column(cell, JLAW_LOW)); i++) {
     real G, kappa;
     const int row = slider_row(law) + at * D + i;
     const real qs = take(n, row, D, some), qt = take(n, row + M * D, D, some);
-    cell_now(cell, &o, law->yields, &G, &kappa);
+    hold_cell(cell, o.y1, o.f1, o.k1, o.z1, o.fz1, o.kz1, law->yields, &G, &kappa);
     const real q2 = qs * qs + qt * qt;
     const yes stiff = kappa > JLAW_TINY;
     const yes limited = root(q2) >= o.strength * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * o.f1);
@@ -753,7 +730,8 @@ IN void measure_facets(const jlaw_law *law, numbers n, int at, amount_sums *sum,
   const real force = only(touches, larger(o.f1 - o.fz1, each(0.0))),
              share = each(column(f, JLAW_SHARE));
   sum->sliding += share * only(touches, whole_slips);
-  sum->slipping += share * smaller(only(force > 0.0, held / pick(force > 0.0, force, 1.0)), one);
+  sum->slipping +=
+      share * smaller(only(force > 0.0, held / pick(force > 0.0, force, 1.0)), each(1.0));
   sum->separated += share * pick(touches, 0.0, 1.0);
   real normal = psi(law, o.y1);
   if (law->yields) normal = normal - psi(law, o.z1) - o.fz1 * (o.y1 - o.z1);
@@ -771,17 +749,16 @@ IN amounts measure(const jlaw_law *law, numbers n)
   amount_sums sum[SUMS];
   amounts all;
   all.reach = each_joint(-DBL_MAX);
-  for (int i = 0; i < SUMS; i++)
-    sum[i].sliding = sum[i].slipping = sum[i].separated = sum[i].normal = sum[i].sheared =
-        each(0.0);
+  const amount_sums none = {each(0.0), each(0.0), each(0.0), each(0.0), each(0.0)};
+  for (int i = 0; i < SUMS; i++) sum[i] = none;
   for (int at = 0; at < law->facets; at += TOGETHER)
     measure_facets(law, n, at, sum + at / TOGETHER % SUMS, &all.reach);
   all.sliding = total(sum, sliding);
   all.slipping = total(sum, slipping);
   all.separated = total(sum, separated);
-  all.normal = total(sum, normal);
   all.sheared = total(sum, sheared);
-  all.bond = law->bonded ? bond_stored(law, n, damage_row(law)) : each_joint(0.0);
+  all.stored = total(sum, normal) + all.sheared;
+  if (law->bonded) all.stored += step_bond(law, n, damage_row(law), NULL, NULL, 0, 0);
   return all;
 }
 
@@ -798,29 +775,18 @@ IN kind kind_of(int dim, int yields, int fades, int wears, int ledger, int tange
 IN void step_of_kind(const jlaw_law *law, numbers n, const of_joint d[3], of_joint F[3],
                      of_joint C[9], int ledger, int tangent, int kept)
 {
+#define STEP(dim, yields, fades, wears, ledger)                                         \
+  (tangent ? step(law, n, d, F, C, kind_of(dim, yields, fades, wears, ledger, 1, kept)) \
+           : step(law, n, d, F, C, kind_of(dim, yields, fades, wears, ledger, 0, kept)))
   const int dim = law->dim, y = law->yields, w = law->wears;
-  if (law->fades) {
-    if (y || w || dim == 1) {
-      if (tangent) step(law, n, d, F, C, kind_of(dim, y, 1, w, 1, 1, kept));
-      else step(law, n, d, F, C, kind_of(dim, y, 1, w, 1, 0, kept));
-    } else if (dim == 3) {
-      if (tangent) step(law, n, d, F, C, kind_of(3, 0, 1, 0, ledger, 1, kept));
-      else step(law, n, d, F, C, kind_of(3, 0, 1, 0, ledger, 0, kept));
-    } else {
-      if (tangent) step(law, n, d, F, C, kind_of(2, 0, 1, 0, ledger, 1, kept));
-      else step(law, n, d, F, C, kind_of(2, 0, 1, 0, ledger, 0, kept));
-    }
-  } else if (y || dim == 1) {
-    if (tangent) step(law, n, d, F, C, kind_of(dim, y, 0, 0, 1, 1, kept));
-    else step(law, n, d, F, C, kind_of(dim, y, 0, 0, 1, 0, kept));
-  } else if (dim == 3) {
-    if (tangent) step(law, n, d, F, C, kind_of(3, 0, 0, 0, ledger, 1, kept));
-    else if (ledger) step(law, n, d, F, C, kind_of(3, 0, 0, 0, 1, 0, kept));
-    else step(law, n, d, F, C, kind_of(3, 0, 0, 0, 0, 0, kept));
-  } else {
-    if (tangent) step(law, n, d, F, C, kind_of(2, 0, 0, 0, ledger, 1, kept));
-    else if (ledger) step(law, n, d, F, C, kind_of(2, 0, 0, 0, 1, 0, kept));
-    else step(law, n, d, F, C, kind_of(2, 0, 0, 0, 0, 0, kept));
-  }
+  if (law->fades && (y || w || dim == 1)) STEP(dim, y, 1, w, 1);
+  else if (law->fades && dim == 3) STEP(3, 0, 1, 0, ledger);
+  else if (law->fades) STEP(2, 0, 1, 0, ledger);
+  else if (y || dim == 1) STEP(dim, y, 0, 0, 1);
+  else if (dim == 3 && ledger) STEP(3, 0, 0, 0, 1);
+  else if (dim == 3) STEP(3, 0, 0, 0, 0);
+  else if (ledger) STEP(2, 0, 0, 0, 1);
+  else STEP(2, 0, 0, 0, 0);
+#undef STEP
   if (law->bonded) step_bond(law, n, damage_row(law), F, C, tangent, ledger || y || w);
 }

@@ -89,17 +89,6 @@ def shear_stiffness(orientation: HasShape, kn: float, ks: float, azimuth: float)
     return math.hypot(c22 * math.cos(azimuth), c33 * math.sin(azimuth))
 
 
-def hertz_mindlin_ratio(nu: float) -> float:
-    """ks/kn of a Hertz-Mindlin contact without slip: 2 (1 - nu)/(2 - nu), Eq. 27.
-
-    nu: Poisson's ratio, 0 to 0.5; the ratio falls from 1 to 2/3.
-    """
-    nu = number("nu", nu)
-    if not 0.0 <= nu <= 0.5:
-        raise ValueError(f"nu = {nu:g} is out of bounds: 0 <= nu <= 0.5")
-    return 2 * (1 - nu) / (2 - nu)
-
-
 def _shape(orientation: HasShape) -> Shape:
     """a, b and c within their bounds; a may be infinite."""
     return Shape(*bounded(orientation.a, orientation.b, orientation.c, smooth=True))

@@ -11,8 +11,6 @@ crossed are known, and so are the inclinations at which the crossings begin and 
 between them a Gauss rule, crowded at both ends, sees no kink and no root.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The bond beside the asperities: cohesion and tension, which break for good."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,9 +1,7 @@
 """Distributions of asperity heights: which share of the asperities touches at an overlap r."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -46,7 +44,7 @@ class GammaHeights:
     @classmethod
     def from_moments(
         cls, mean: float, variance: float, overlap: float = 0.0, formation: str = "population"
-    ) -> GammaHeights:
+    ) -> Self:
         """The gamma distribution of this mean (m) and variance (m^2): Eq. 13."""
         mean, variance = more_than("mean", mean, 0.0), more_than("variance", variance, 0.0)
         return cls(mean**2 / variance - 1, variance / mean, overlap, formation)

@@ -1,10 +1,8 @@
 """Directions of asperity contacts: the density of Eq. 14."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -63,7 +61,7 @@ class Orientation:
             object.__setattr__(self, name, value)
 
     @classmethod
-    def from_moments(cls, mean: float, variance: float, c: float = 0.0) -> Orientation:
+    def from_moments(cls, mean: float, variance: float, c: float = 0.0) -> Self:
         """The a and b that give inclinations of this mean (rad) and variance (rad^2): Eq. 17.
 
         Where two values of b fit (the variance over the squared mean peaks near b = 1.4), the

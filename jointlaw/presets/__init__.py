@@ -5,7 +5,7 @@ from importlib import resources
 from pathlib import Path
 
 from ..law import JointLaw
-from ..support.checks import remedy
+from ..support.checks import one_of, remedy
 
 
 def names() -> list[str]:
@@ -16,8 +16,7 @@ def names() -> list[str]:
 
 def text(name: str) -> str:
     """TOML text of a preset. Raises ValueError for an unknown name."""
-    if name not in names():
-        raise ValueError(f"preset {name!r} is unknown; {remedy(name, names())}")
+    one_of("preset", name, tuple(names()))
     return (resources.files(__package__) / f"{name}.toml").read_text(encoding="utf-8")
 
 

@@ -1,7 +1,5 @@
 """From a scan to a law: heights, directions and number of asperities of a measured surface."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -39,7 +39,7 @@ def test_the_bits_of_python(lib, tmp_path, name):
             for a, b in zip(one.step(step), joint.update(step), strict=True):
                 np.testing.assert_array_equal(a, b)
             np.testing.assert_array_equal(one.state, joint.snapshot().values[0])
-            shares = joint.sliding, joint.slipping, joint.separated
+            shares = joint.measures()[:3]
             assert one.shares() == pytest.approx(shares, abs=1e-9)
             energies = [
                 f(one.law, at(one.state)) for f in (built.jlaw_stored, built.jlaw_dissipated)

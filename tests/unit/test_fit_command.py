@@ -69,7 +69,7 @@ def test_without_matplotlib_all_but_the_picture_is_written(tmp_path, cycle, caps
         ("fit loop.csv --decimal-comma", "fit --decimal-comma was removed: write --decimal comma"),
         ("fit loop.csv --workers 2", "fit --workers was removed: fit one closure file a command"),
         ("fit loop.csv --formation population", "fit --formation was removed: give a law"),
-        ("fit loop.csv --compliance rock.csv", "--compliance: '' is not a quantity in Pa"),
+        ("fit loop.csv --compliance rock.csv", "--compliance: 'rock.csv' is not a quantity"),
         ("fit loop.csv --cycle --up-to 1MPa", "--cycle fits all points: leave --up-to out"),
         ("fit loop.csv --law nothing", "'nothing' is neither a preset"),
         ("fit loop.csv --set alpha=high", "write a name and a number each"),

@@ -74,7 +74,7 @@ def test_sliding_angle(a, mu):
     joint = linear(a, mu, resolution=jl.Resolution(250, 3, 1)).joint()
     joint.update([1.0, 0.0, 0.0])
     # a step function on 250 nodes: off by at most one weight, pi/2/250
-    assert joint.sliding == pytest.approx(share, abs=math.pi / 500)
+    assert joint.measures().sliding == pytest.approx(share, abs=math.pi / 500)
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.2, 0.3])

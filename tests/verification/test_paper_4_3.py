@@ -128,7 +128,7 @@ def test_separation_begins(a):
         joint = linear.joint()
         joint.update([1.0, 0.0])
         joint.update([0.0, onset * x])
-        assert (joint.separated > 0) == parted
+        assert (joint.measures().separated > 0) == parted
         assert (secant(linear, (1.0, onset * x, 0.0)).separated > 1e-12) == parted
 
 

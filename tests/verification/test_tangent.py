@@ -18,12 +18,12 @@ STATES = {
     "touching": ({"mu": 0.4, "a": 2.3}, [[-0.2, 0.3, 0.1]], [0.57, 0.25, 0.13]),
 }
 IS = {
-    "stick": lambda joint: joint.slipping == 0.0,
-    "slip": lambda joint: joint.sliding > 1.0 - 1e-12,
-    "mixed": lambda joint: 0.1 < joint.slipping < 0.9,
-    "unloading": lambda joint: joint.slipping < 0.5,
-    "parted": lambda joint: 0.0 < joint.separated < 1.0,
-    "touching": lambda joint: joint.separated < 0.5,
+    "stick": lambda joint: joint.measures().slipping == 0.0,
+    "slip": lambda joint: joint.measures().sliding > 1.0 - 1e-12,
+    "mixed": lambda joint: 0.1 < joint.measures().slipping < 0.9,
+    "unloading": lambda joint: joint.measures().slipping < 0.5,
+    "parted": lambda joint: 0.0 < joint.measures().separated < 1.0,
+    "touching": lambda joint: joint.measures().separated < 0.5,
 }
 FEW = {"resolution": jl.Resolution(2, 4, 3)}  # a facet that yields has more kinks in a cell
 OPTIONS = {

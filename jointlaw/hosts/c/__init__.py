@@ -1,1 +1,0 @@
-"""C and C++: the law as one header, and its export."""

@@ -1,7 +1,5 @@
 """Export of a joint law to C and C++: header, tables in two forms, examples and a Makefile."""
 
-from __future__ import annotations
-
 import re
 from importlib import resources
 from pathlib import Path
@@ -68,7 +66,7 @@ def table_text(law: JointLaw) -> str:
     """
     numbers, arrays = packed(law)
     lines = [f"jointlaw tables {FORMAT}", f"fingerprint {law.fingerprint}"]
-    lines += [f"# {line}" for line in _toml(law)]
+    lines += [f"# {line}" for line in law.to_toml().splitlines()]
     for key, value in numbers.items():
         lines.append(f"{key} {value if isinstance(value, int) else value.hex()}")
     for key, array in arrays.items():
@@ -81,7 +79,7 @@ def table_text(law: JointLaw) -> str:
 def header_text(law: JointLaw, name: str) -> str:
     """The tables as constants of C: `&NAME` is the law."""
     numbers, arrays = packed(law)
-    about = "\n".join(" * " + line.replace("*/", "* /") for line in _toml(law))
+    about = "\n".join(" * " + line.replace("*/", "* /") for line in law.to_toml().splitlines())
     guard = f"JOINTLAW_TABLES_{name.upper()}"
     parts = [
         f"/* {name}: tables of a joint law, made by `jointlaw export c`.\n{about}\n */",
@@ -150,14 +148,6 @@ def _ring(theta: Array) -> Array:
     _, first, count = np.unique(theta, return_index=True, return_counts=True)
     several = count[np.argsort(first)]
     return np.repeat(several, several).astype(float)
-
-
-def _toml(law: JointLaw) -> list[str]:
-    """The parameters, for the reader."""
-    try:
-        return law.to_toml().splitlines()
-    except ValueError:  # heights that have no form as TOML
-        return ["heights of a class of its own"]
 
 
 def _sum(data: bytes) -> int:

@@ -1,6 +1,5 @@
 """Export of a joint law to LAMMPS: tables, the plug-in and an input script, in one folder."""
 
-from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 
@@ -25,22 +24,18 @@ def export_lammps(law: JointLaw, directory: str | Path, name: str = "joint") -> 
     the names. Raises ValueError for a law that does not fit, before anything is written.
     """
     require_3d(law)
-    texts = {f"{name}.jlaw": c.table_text(law), "joint.in": variables(law, name)}
-    with suppress(ValueError):  # heights of a class of its own have no form as TOML
-        texts["law.toml"] = law.to_toml()
+    texts = {
+        f"{name}.jlaw": c.table_text(law),
+        "joint.in": (
+            "# made by `jointlaw export lammps`: what in.tower needs to know of this joint\n"
+            f"variable law string {name}.jlaw\n"
+            f"variable closure0 equal {float(law.closure(WEIGHT))!r}   # m, under {WEIGHT:g} Pa\n"
+        ),
+        "law.toml": law.to_toml(),
+    }
     source = resources.files(__package__) / "files"
     copies = {file: (source / file).read_bytes() for file in FILES}
     copies["jointlaw.h"] = (Path(c.include_dir()) / "jointlaw.h").read_bytes()
     folder = write_files(directory, {**copies, **texts})
     (folder / "build.sh").chmod(0o755)
     return [*texts, *copies]
-
-
-def variables(law: JointLaw, name: str) -> str:
-    """What in.tower needs to know of a law, as LAMMPS variables."""
-    closure = float(law.closure(WEIGHT))
-    return (
-        "# made by `jointlaw export lammps`: what in.tower needs to know of this joint\n"
-        f"variable law string {name}.jlaw\n"
-        f"variable closure0 equal {closure!r}   # m, under {WEIGHT:g} Pa\n"
-    )

@@ -907,6 +907,7 @@ JL_IN_ void jl_cells_of_(const double *cell, const jl_facets_ *o, jl_sliders_ *c
   jl_share_of_(cell, o->y0, o->f0, o->k0, &c->G0, &c->k0);
   jl_share_of_(cell, o->y1, o->f1, o->k1, &c->G1, &c->k1);
   c->gained = c->G1 - c->G0;
+  c->kz1 = jl_each_(0.0);
   if (!yields) return;
   jl_real_ H0, H1, kz0;
   jl_share_of_(cell, o->z0, o->fz0, o->kz0, &H0, &kz0);

@@ -359,6 +359,7 @@ IN void cells_of(const double *cell, const facets *o, sliders *c, int yields)
   share_of(cell, o->y0, o->f0, o->k0, &c->G0, &c->k0);
   share_of(cell, o->y1, o->f1, o->k1, &c->G1, &c->k1);
   c->gained = c->G1 - c->G0;
+  c->kz1 = each(0.0);
   if (!yields) return;
   real H0, H1, kz0;
   share_of(cell, o->z0, o->fz0, o->kz0, &H0, &kz0);

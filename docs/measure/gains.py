@@ -23,14 +23,16 @@ from jointlaw.joints.state import JointState
 HEAD = ["step (mating lengths)", "one step", "triangle", "in tenths", "trapezoid", "in tenths"]
 SIZES = 1.0, 0.1, 0.01
 SIDE = 8  # steps
-TRAPEZOID = np.array([0.0, 1.0]), np.array([0.5, 0.5])
 
 
-def gauss(panels):
-    """Two-point Gauss rule on so many parts of a step: times and weights (2 panels,)."""
+def rules(panels):
+    """Times (n,) in a step and weights (2, n): of Gauss's two points in each of so many parts, and
+    of the trapezoid."""
     x, w = np.polynomial.legendre.leggauss(2)
-    t = (np.arange(panels)[:, None] + 0.5 * (x + 1.0)) / panels
-    return t.ravel(), np.tile(0.5 * w / panels, panels)
+    inside = (np.arange(panels)[:, None] + 0.5 * (x + 1.0)) / panels
+    gauss = np.tile(0.5 * w / panels, panels)
+    trapezoid = [0.5, *np.zeros(gauss.size), 0.5]
+    return np.array([0.0, *inside.ravel(), 1.0]), np.array([[0.0, *gauss, 0.0], trapezoid])
 
 
 def random_law(rng):
@@ -48,29 +50,32 @@ def random_law(rng):
     )  # fmt: skip
 
 
-def gains(law, corners, steps, rule):
-    """Gain (n,) of n paths: two legs to where they begin, and on, each leg in so many steps.
+def gains(law, corners, steps, panels):
+    """Gains (n, 2) of n paths by both rules: two legs to where they begin, and on.
 
-    corners (n, legs, dim) in m.
+    corners (n, legs, dim) in m; each leg from the third on is taken in so many steps.
     """
-    t, w = rule
+    t, w = rules(panels)
     legs = np.diff(corners, axis=1, prepend=0.0)
     joints, points = law.joints(len(legs)), law.joints(len(legs) * t.size)
+    peak = np.zeros(len(legs))
     for leg in (legs[:, 0], legs[:, 1]):
         joints.update(leg, tangent=False)
-    start = peak = joints.stored_energy
-    work = np.zeros(len(legs))
+        peak = np.maximum(peak, joints.stored_energy)
+    start = joints.stored_energy
+    work = np.zeros((len(legs), 2))
     for leg in np.moveaxis(legs[:, 2:], 1, 0):
         for _ in range(steps):
             d = leg / steps
             values = np.repeat(joints.snapshot().values, t.size, axis=0)
             points.restore(JointState(law.fingerprint, values))
             spread = np.repeat(d, t.size, axis=0)
-            F = points.trial(spread * np.tile(t, len(legs))[:, None], tangent=False)[0]
-            work += np.sum(F * spread, axis=1).reshape(len(legs), -1) @ w
+            F = points.update(spread * np.tile(t, len(legs))[:, None], tangent=False)[0]
+            work += np.sum(F * spread, axis=1).reshape(len(legs), -1) @ w.T
+            peak = np.maximum(peak, points.stored_energy.reshape(len(legs), -1).max(axis=1))
             joints.update(d, tangent=False)
-            peak = np.maximum(peak, joints.stored_energy)
-    return (joints.stored_energy - start - work) / np.where(peak > 0, peak, np.inf)
+    made = (joints.stored_energy - start)[:, None] - work
+    return made / np.where(peak > 0, peak, np.inf)[:, None]
 
 
 def paths(law, x, size, closed):
@@ -91,10 +96,10 @@ def paths(law, x, size, closed):
 
 def search(law, size, closed, seed):
     """Corners (1, legs, dim) of the step or triangle of the largest gain that was found."""
-    rule, steps = (gauss(2), SIDE) if closed else (gauss(32), 1)
+    steps, panels = (SIDE, 2) if closed else (1, 32)
 
     def loss(x):
-        return -gains(law, paths(law, x, size, closed), steps, rule)
+        return -gains(law, paths(law, x, size, closed), steps, panels)[:, 0]
 
     found = differential_evolution(
         loss, [(-1.0, 1.0)] * (1 + (4 if closed else 3) * law.dim), maxiter=25, popsize=4,
@@ -107,11 +112,9 @@ def largest(size, seed):
     """The figures (5,) of one law: gains, and errors of the trapezoid."""
     law = random_law(np.random.default_rng(seed))
     step, triangle = (search(law, size, closed, seed) for closed in (False, True))
-    exact, crude = (
-        np.concatenate([gains(law, triangle, SIDE * more, rule) for more in (1, 10)])
-        for rule in (gauss(64), TRAPEZOID)
-    )
-    return [*gains(law, step, 1, gauss(2048)), *exact, *np.abs(crude - exact)]
+    (made,) = gains(law, step, 1, 2048)
+    whole, tenths = (gains(law, triangle, SIDE * more, 64)[0] for more in (1, 10))
+    return [made[0], whole[0], tenths[0], abs(np.diff(whole)[0]), abs(np.diff(tenths)[0])]
 
 
 def main():

@@ -5,15 +5,19 @@ back by as much. The normal stress is held for every resolution by itself: one a
 displacement would compare their dilation, summed up over the slip, and not their strength.
 """
 
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..laboratory.normal_control import NormalCondition, closing_increments
-from ..law import JointLaw
 from ..support.checks import Array
+
+if TYPE_CHECKING:
+    from ..law import JointLaw
 
 LEG = 24  # steps each way
 SHARES = (1.0, 0.1)  # of the normal stress S/2 of the standard paths
@@ -36,7 +40,7 @@ class Slip(NamedTuple):
     dilation: Array
     counts: NDArray[np.bool_]
 
-    def apart(self, other: "Slip") -> tuple[float, float]:
+    def apart(self, other: Slip) -> tuple[float, float]:
         """Largest difference of the friction and of the dilation angle, in degrees."""
         friction = np.abs(self.friction - other.friction)[self.counts]
         dilation = np.abs(self.dilation - other.dilation)[self.counts]

@@ -28,20 +28,24 @@ constant stress are found once, at half the reference resolution, and are paths 
 then on, so that every resolution is asked the same.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from ..laboratory.normal_control import NormalCondition, closing_increments
-from ..law import JointLaw
 from ..parameters.resolution import Resolution
 from ..support.checks import Array
 from ..support.progress import track
 from .slip import HELD, Slip, distance, random_ways, slip, standard_ways
+
+if TYPE_CHECKING:
+    from ..law import JointLaw
 
 STEPS = 120  # of each path
 FAR = 3.0  # R: the longest slip at a given closure

@@ -1,14 +1,19 @@
 """The coarsest law that is accurate enough."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from functools import cache
 from itertools import product
+from typing import TYPE_CHECKING
 
-from ..law import JointLaw
 from ..parameters.resolution import Resolution
 from ..support.checks import more_than
 from ..support.progress import track
 from .suite import Suite, reference_resolution, scaled, standard_suite
+
+if TYPE_CHECKING:
+    from ..law import JointLaw
 
 # How many times better than the tolerance: 30 random laws then kept it on all paths that were not
 # tried, the worst at 0.88 of it (docs/validation.md, "Does the tolerance hold elsewhere?")

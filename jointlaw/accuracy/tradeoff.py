@@ -1,17 +1,22 @@
 """The price list of a law: what each resolution costs and how far its tractions are off."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..kernels.threads import thread_count
-from ..law import JointLaw
 from ..parameters.resolution import Resolution, named, resolve
 from ..support.checks import Array, integer
 from ..support.progress import track
 from .suite import Suite, standard_suite
+
+if TYPE_CHECKING:
+    from ..law import JointLaw
 
 SPREAD = tuple(
     Resolution(u, phi, depth)

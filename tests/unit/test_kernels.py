@@ -123,19 +123,6 @@ def test_the_tangent_exactly_at_the_friction_limit_is_that_of_sliding_on(both, m
         assert worst(onward[:, :, :2], still[:, :, :2], np.abs(onward).max()) < 1e-5
 
 
-@pytest.mark.parametrize("seed", [3, 6])
-def test_a_batch_and_its_joints_agree_to_the_bit(monkeypatch, seed):
-    law = random_law(seed)
-    monkeypatch.setenv("JOINTLAW_KERNEL", "native")
-    d = path(law, seed, 10)
-    batch, joint = law.joints(N), law.joint()
-    for step in d:
-        F, C = batch.update(step)
-        alone = joint.update(step[N - 2])
-        np.testing.assert_array_equal(F[N - 2], alone[0])
-        np.testing.assert_array_equal(C[N - 2], alone[1])
-
-
 def test_threads_change_no_bit(monkeypatch):
     seed = 10
     law = random_law(seed)

@@ -64,7 +64,7 @@ OUT(look) void look(double *s, double *to)
     for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_LANES) {
       double G, kappa;
       const int of = slider_row(&law) + at * D + i;
-      cell_now(cell, &o, law.yields, &G, &kappa);
+      hold_cell(cell, o.y1, o.f1, o.k1, o.z1, o.fz1, o.kz1, law.yields, &G, &kappa);
       const double q = root(s[of] * s[of] + s[of + M * D] * s[of + M * D]);
       const double limit = o.strength * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * o.f1);
       if (G > 0.0 && q >= limit) held += G;

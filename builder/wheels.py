@@ -1,7 +1,8 @@
 """Wheels for other machines: `python builder/wheels.py FOLDER`, with the extra `wheels` installed.
 
 One for each of `TARGETS` in jointlaw/native/build.py. Each is built from the source archive, in a
-place of its own, and its library is looked into: for which processor it is, and what it exports.
+place of its own, by the packages of this environment. Its library is looked into: for which
+processor it is, and what it exports.
 """
 
 import os
@@ -20,7 +21,7 @@ PROCESSORS = {"x86_64": "X86_64", "aarch64": "ARM64"}  # of zig, and of lief
 
 def build_wheel(target: str, folder: Path) -> Path:
     """The wheel for this target of zig."""
-    command = [sys.executable, "-m", "build", "--outdir", folder, ROOT]
+    command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", folder, ROOT]
     subprocess.run(command, check=True, env=os.environ | {backend.TARGET: target})
     return next(folder.glob(f"*-py3-none-{backend.build.TARGETS[target]}.whl"))
 

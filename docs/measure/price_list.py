@@ -1,11 +1,13 @@
-"""The price list of a preset, shortened; `print(law.tradeoff())` shows all columns."""
+"""The price list of a preset on one thread, shortened; `print(law.tradeoff())` shows it all."""
 
+import os
 from dataclasses import replace
 
 from tables import table
 
 import jointlaw as jl
 
+os.environ["JOINTLAW_THREADS"] = "1"
 HEAD = ["`Resolution`", "sliders", "bytes", "error", "friction", "dilation", "ns", "with tangent"]
 
 found = replace(jl.presets.load("westerly-smooth"), plane=0.0).tradeoff()

@@ -4,11 +4,9 @@
  *     #include "jointlaw.h"
  *
  *     char message[JLAW_MESSAGE];
- *     jlaw_law *law = jlaw_read("granite.jlaw", message, sizeof message);
+ *     jlaw_law *law = jlaw_read("granite.jlaw", message, sizeof message);   `jointlaw export c`
  *     double state[162] = {0};                 jlaw_state_size(law) numbers; zeros: virgin, mated
  *     if (jlaw_update(law, state, state, d, F, NULL, message, sizeof message)) ... message tells
- *
- * Table files (.jlaw, or as constants NAME.h) are written by `jointlaw export c`.
  *
  * Axes: 1 is the normal of the joint, 2 and 3 span it. d is the displacement in this step (m) of
  * one body into and along the other: closure first, then the jlaw_dim - 1 components of shear.

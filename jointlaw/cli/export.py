@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ..hosts.c.export import export_c, identifier
-from ..hosts.fem.export import SEATING, export_fem
+from ..hosts.fem.export import SEATING, export_fem, require_seating
 from ..hosts.lammps.export import export_lammps
 from ..hosts.yade.export import export_yade
 from ..law import JointLaw
@@ -38,7 +38,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--seating",
         metavar="STRESS",
-        type=in_unit("Pa", positive=True),
+        type=in_unit("Pa"),
         help=f"fem: normal stress before the first step (default {SEATING / 1e3:g}kPa)",
     )
     add_out(parser, pictures=False)
@@ -53,6 +53,7 @@ def _export(options: argparse.Namespace) -> None:
     seating = {} if options.seating is None else {"seating": options.seating}
     if seating and host != "fem":
         raise ValueError(f"--seating is for fem; in {host} the host closes the joint: leave it out")
+    require_seating(**seating)
     clear_run(folder)
     if host == "yade":
         _export_table(law, folder, options.shear_limit)

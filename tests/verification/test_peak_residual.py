@@ -37,6 +37,12 @@ def figures(normal):
     return found / (np.array(MEASURED[normal]) * [1e6, 1e-3, 1e6]), record
 
 
+def test_the_fitted_figures():
+    """Logarithms, that of the displacement at a quarter of the weight: a peak is flat."""
+    misfit = [np.log(figures(normal)[0]) * [1, 0.25, 1] for normal in (1.0, 3.0, 5.0)]
+    assert np.sqrt(np.mean(np.square(misfit))) < 0.02
+
+
 @pytest.mark.parametrize("normal", MEASURED)
 def test_peak_and_residual(normal):
     (peak, at, residual), record = figures(normal)

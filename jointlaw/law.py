@@ -243,7 +243,7 @@ class JointLaw:
         stress = finite("normal_stress", normal_stress, "Pa")
         if not (stress >= 0).all():
             raise ValueError(f"normal_stress = {normal_stress!r} is out of bounds: it must be >= 0")
-        return self._first_loading.closure(stress, self.closure_range)[()]
+        return self._first_loading.closure(stress)[()]
 
     def contacts(self, closure: ArrayLike, direction: tuple[float, float] | None = None) -> Any:
         """Asperities in touch per m2 at this closure (m), Eq. 11.
@@ -383,7 +383,7 @@ class JointLaw:
         fixed = facets(self.orientation, r.u, r.phi, self.plane, self.closure_only)
         elastic = facet_sum(fixed.theta, fixed.scale(p, self.asperity_density), p.lam, p.mu)
         try:
-            return float(FirstLoading(self.curve, elastic).closure(np.array(DEFAULT_STRESS), 1.0))
+            return float(FirstLoading(self.curve, elastic).closure(np.array(DEFAULT_STRESS)))
         except ValueError:
             self._require_numbers(1.0)  # most often the units are wrong
             raise

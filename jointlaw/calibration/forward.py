@@ -140,9 +140,8 @@ def _force(closure: Array, eta: float, heights: GammaHeights) -> Array:
     int_0^y (y - r)^(1 + eta) dH(r), by Kummer's function; a product of positive terms.
     """
     y, power = np.maximum(closure, 1e-15), 1 + eta
-    if heights.formation != "individual" or heights.overlap > 0:
-        return exact_force(y, eta, heights)[0]
-    if heights.alpha > 30 or y.max() > 300 * heights.beta:  # beyond what Kummer's function can
+    far = heights.alpha > 30 or y.max() > 300 * heights.beta  # beyond what Kummer's function can
+    if far or heights.formation != "individual" or heights.overlap > 0:
         return exact_force(y, eta, heights)[0]
     x, top = y / heights.beta, heights.alpha + 2 + power
     ratio = special.gammaln(1 + power) - special.gammaln(top) + power * math.log(heights.beta)

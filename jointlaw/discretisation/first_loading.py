@@ -5,16 +5,14 @@ import sys
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..parameters.asperity import Asperity
 from ..support.checks import Array
 from .virgin_curve import VirginCurve
 
 _RESOLVED = 1e8  # yield interferences: Phi less its value one earlier has 8 digits
-_SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
-_HALVINGS = 52  # of 1 in log closure: to rounding
-_TOO_LARGE = "normal_stress = {!r} Pa is beyond any closure"
+_SMALLEST = sys.float_info.min
+_HALVINGS = 63  # of all floats in log closure: to rounding
 
 
 class FirstLoading(NamedTuple):
@@ -37,32 +35,22 @@ class FirstLoading(NamedTuple):
         """Closure (m) beyond which stresses, or their differences, are lost in rounding."""
         return 1e304 if self.yielding is None else _RESOLVED * float(np.max(self.yielding[1]))
 
-    def closure(self, stress: Array, start: float) -> Array:
-        """Closures (m) at normal stresses (Pa), looked for from the closure `start` (m) on.
+    def closure(self, stress: Array) -> Array:
+        """Closures (m) at normal stresses (Pa), by bisection of log closure, to rounding.
 
-        By bisection of log closure, to rounding. Raises ValueError where no float holds the answer.
+        Raises ValueError where no float holds the answer.
         """
         if not math.isfinite(self.factor):
             raise ValueError("the stiffness of the joint is too large for floating point")
         found = np.zeros_like(stress)
         wanted = stress[stress >= _SMALLEST]
-
-        def too_open(log_y: Array) -> NDArray[np.bool_]:
-            return self.stress(np.exp(log_y)) < wanted
-
-        high = np.full(wanted.shape, math.log(start))
+        low, high = (np.full(wanted.shape, math.log(y)) for y in (_SMALLEST, self.farthest))
         with np.errstate(over="ignore"):
-            while (short := too_open(high)).any():
-                high = high + short
-                if (far := high > math.log(self.farthest)).any():
-                    raise ValueError(_TOO_LARGE.format(wanted[far].min()))
-            low = high - 1.0
-            while not (short := too_open(low)).all():
-                low = low - ~short
-            high = np.minimum(high, low + 1.0)
+            if (far := self.stress(np.exp(high)) < wanted).any():
+                raise ValueError(f"normal_stress = {wanted[far].min()!r} Pa is beyond any closure")
             for _ in range(_HALVINGS):
                 middle = 0.5 * (low + high)
-                short = too_open(middle)
+                short = self.stress(np.exp(middle)) < wanted
                 low, high = np.where(short, middle, low), np.where(short, high, middle)
         found[stress >= _SMALLEST] = np.exp(high)
         return found

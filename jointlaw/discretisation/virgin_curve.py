@@ -46,32 +46,13 @@ class VirginCurve(NamedTuple):
 
     def force(self, y: Array) -> tuple[Array, Array]:
         """Phi and its slope Phi' at y (m); both zero where y <= 0."""
-        x, i, _, _ = self._cell(y)
-        c = self.S[i]
-        S = c[..., 0] + x * (c[..., 1] + x * (c[..., 2] + x * c[..., 3]))
-        v = np.sqrt(np.fmin(np.fmax(y, 0.0), _FARTHEST))
-        # t (1 - t)/2 times the number of cells: D in units of the place within a cell
-        weight = 0.5 * len(self.S) * v * self.scale / (v + self.scale) ** 2
-        DS = weight * (c[..., 1] + x * (2 * c[..., 2] + x * (3 * c[..., 3])))
-        if self.rise:
-            lift, slope, _ = self._lift(y)
-            S, DS = lift * S, lift * (DS + slope * S)
+        S, DS, _ = self._factor(y)
         power = np.where(y > 0, np.maximum(y, 0.0) ** self.eta, 0.0)
         return power * y * S, power * ((1 + self.eta) * S + DS)
 
     def curvature(self, y: Array) -> Array:
         """Phi'' at y (m); zero where y <= 0."""
-        x, i, t, s = self._cell(y)
-        c, cells = self.S[i], len(self.S)
-        S = c[..., 0] + x * (c[..., 1] + x * (c[..., 2] + x * c[..., 3]))
-        S1 = cells * (c[..., 1] + x * (2 * c[..., 2] + x * (3 * c[..., 3])))
-        S2 = cells**2 * (2 * c[..., 2] + x * (6 * c[..., 3]))
-        DS = 0.5 * t * s * S1
-        DDS = 0.25 * (t * s) ** 2 * S2 + 0.25 * t * s * (s - t) * S1
-        if self.rise:
-            lift, slope, bend = self._lift(y)
-            DDS = lift * (DDS + 2 * slope * DS + (slope**2 + bend) * S)
-            S, DS = lift * S, lift * (DS + slope * S)
+        S, DS, DDS = self._factor(y)
         value = self.eta * (1 + self.eta) * S + (1 + 2 * self.eta) * DS + DDS
         power = np.where(y > 0, y, 1.0) ** (self.eta - 1)
         return np.where(y > 0, power * value, 0.0)
@@ -84,6 +65,19 @@ class VirginCurve(NamedTuple):
         if self.rise:
             T = self._lift(y)[0] * T
         return np.maximum(y, 0.0) ** (2 + self.eta) * T
+
+    def _factor(self, y: Array) -> tuple[Array, Array, Array]:
+        """S, D S and D D S at y."""
+        x, i, t, s = self._cell(y)
+        c, weight = self.S[i], 0.5 * t * s * len(self.S)  # D in units of the place within a cell
+        S = c[..., 0] + x * (c[..., 1] + x * (c[..., 2] + x * c[..., 3]))
+        DS = weight * (c[..., 1] + x * (2 * c[..., 2] + x * (3 * c[..., 3])))
+        DDS = weight**2 * (2 * c[..., 2] + x * (6 * c[..., 3])) + 0.5 * (s - t) * DS
+        if not self.rise:
+            return S, DS, DDS
+        lift, slope, bend = self._lift(y)
+        DDS = lift * (DDS + 2 * slope * DS + (slope**2 + bend) * S)
+        return lift * S, lift * (DS + slope * S), DDS
 
     def _cell(self, y: Array) -> tuple[Array, Array, Array, Array]:
         """Place within its cell, cell number, t and 1 - t of each y."""

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -131,7 +130,10 @@ class _Log:
 
     def __init__(self, joint: Joint, azimuth: float, name: str) -> None:
         self.joint, self.azimuth, self.name = joint, azimuth, name
-        self.rows: list[list[float]] = []
+        self.rows: list[Array] = []
+        dim, shear = joint.law.dim, [0.0, math.cos(azimuth), math.sin(azimuth)]
+        # the axes of the joint in space (dim, 3)
+        self.axes = np.eye(3) if dim == 3 else np.array([[1.0, 0.0, 0.0], shear])[:dim]
 
     def advance(self, shear: Array, condition: NormalCondition | None) -> None:
         """One step with the in-plane increment `shear` that meets the normal condition."""
@@ -148,19 +150,9 @@ class _Log:
 
     def measure(self, F: Array) -> None:
         """Add a row from the joint's state and its traction F."""
-        now, space = self.joint.measures(), self._in_space
-        shares, energies = (now.sliding, now.separated), (now.stored, self.joint.dissipated_energy)
-        row: list[Any] = [*space(self.joint.delta), *space(F), *shares, *energies]
-        self.rows.append([float(x) for x in row])
-
-    def _in_space(self, vector: Array) -> list[float]:
-        """Three components of a vector with one, two or three."""
-        if len(vector) == 1:
-            return [vector[0], 0.0, 0.0]
-        if len(vector) == 2:
-            cos, sin = math.cos(self.azimuth), math.sin(self.azimuth)
-            return [vector[0], vector[1] * cos, vector[1] * sin]
-        return list(vector)
+        joint, now = self.joint, self.joint.measures()
+        shares, energies = (now.sliding, now.separated), (now.stored, joint.dissipated_energy)
+        self.rows.append(np.hstack([joint.delta @ self.axes, F @ self.axes, *shares, *energies]))
 
     def record(self) -> Record:
         """The rows so far."""

@@ -105,10 +105,9 @@ def build_law(build: Callable[..., T], data: dict[str, Any], where: str) -> T:
     values.pop("version", None)
     values.pop("about", None)
     try:
-        values["orientation"] = Orientation(**values["orientation"])
-        values["asperity"] = Asperity(**values["asperity"])
-        if "bond" in values:
-            values["bond"] = Bond(**values["bond"])
+        for part, kind in (("orientation", Orientation), ("asperity", Asperity), ("bond", Bond)):
+            if part in values:
+                values[part] = kind(**values[part])
         if "heights" in values:
             values["heights"] = _heights(values["heights"], where)
         if isinstance(values.get("resolution"), dict):

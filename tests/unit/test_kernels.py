@@ -58,28 +58,21 @@ def test_same_numbers_while_contacts_come_and_go(both, seed, ledger):
     d, dim = path(law, seed, 20, 400), law.tables.dim
     results = []
     for batch in both(lambda: law.joints(N, ledger)):
-        given = []
-
-        def note(result, given=given):
-            given.append(np.array(result[0]))
-
-        note(batch.update(d[0, :N], tangent=False))
-        note(batch.update(d[1, :40], where=np.arange(N)[::-1][:40], tangent=False))
+        given = [batch.update(d[0, :N], tangent=False)[0]]
+        given += batch.update(d[1, :40], where=np.arange(N)[::-1][:40], tangent=False)[:1]
         batch.reset([0, 7, 64, N - 1])
-        note(batch.trial(d[2, :N], tangent=False))
-        note(batch.update(d[3, :N]))
+        given += batch.trial(d[2, :N], tangent=False)[:1]
+        given += batch.update(d[3, :N])[:1]
         batch.resize(400)  # from two blocks to more
-        note(batch.update(d[4]))
+        given += batch.update(d[4])[:1]
         mask = np.arange(400) % 3 == 0
-        note(batch.update(d[5, mask], where=mask))
-        note(batch.trial(d[5, mask], where=mask))
+        given += batch.update(d[5, mask], where=mask)[:1]
+        given += batch.trial(d[5, mask], where=mask)[:1]
         batch.resize(30)
         batch.resize(150)
-        for step in d[6:]:
-            note(batch.update(step[:150]))
-        note(batch.update(np.empty((0, dim)), where=[]))
-        note((batch.F, None))
-        results.append(given)
+        given += [batch.update(step[:150])[0] for step in d[6:]]
+        given += batch.update(np.empty((0, dim)), where=[])[:1]
+        results.append([*given, batch.F])
     peak = max(np.abs(F).max() for F in results[0] if F.size)
     for one, other in zip(*results, strict=True):
         assert worst(one, other, peak) < SAME

@@ -4,7 +4,7 @@ along the step's own geometry (docs/theory-incremental.md, "No step creates ener
 
 import numpy as np
 import pytest
-from builders import law, random_corners
+from builders import increments, law, random_corners
 from exact_work import begun, step_work, stored, walk
 from work import WorkMeter
 
@@ -109,3 +109,24 @@ def test_no_cycle_that_is_searched_for_returns_work(seed):
     made = gains(k, states, d) / scale(k, states)
     assert max(made) <= 1e-12
     assert sum(made[3:]) <= 1e-12
+
+
+@pytest.mark.parametrize("wears", [False, True])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_trapezoid_of_end_forces_loses_around_closed_paths_in_the_limit(seed, wears):
+    """Where slopes fade; its error is of second order in the step, with friction of first."""
+    rng = np.random.default_rng(100 + seed)
+    one = random_law(rng, True, wears, yields=False)
+    corners = random_corners(rng, 4)[:, :, : one.dim] * [1.0, *[one.mating_length] * (one.dim - 1)]
+    corners[:, -1] = 0.0
+    net, peak = np.zeros((4, 4)), np.zeros(4)
+    for k, steps in enumerate((64, 128, 256, 512)):
+        joints, before = one.joints(4), 0.0
+        for d in np.moveaxis(increments(corners, steps), 1, 0):
+            after, _ = joints.update(d, tangent=False)
+            net[k] += np.sum(0.5 * (before + after) * d, axis=1)
+            before, peak = after, np.maximum(peak, joints.stored_energy)
+        net[k] -= joints.stored_energy
+    change = np.max(np.abs(np.diff(net, axis=0)) / peak, axis=1)
+    assert np.log2(change[0] / change[-1]) / 2 > 0.75  # the order
+    assert np.min(net[-1] / peak) >= -2 * change[-1]  # what halving again may change

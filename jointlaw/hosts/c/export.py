@@ -99,21 +99,16 @@ def header_text(law: JointLaw, name: str) -> str:
 
 
 def packed(law: JointLaw) -> tuple[dict[str, int | float], dict[str, Array]]:
-    """Numbers and arrays of `struct jlaw_law` by name, in its order."""
-    return _numbers(law), _arrays(law)
-
-
-def _numbers(law: JointLaw) -> dict[str, int | float]:
-    """Numbers of the law by name, in the order of `struct jlaw_law`; refuses too many azimuths."""
-    k = law.tables
-    if max(_ring(law.facets.theta)) > layout.AZIMUTHS:
+    """Numbers and arrays of `struct jlaw_law` by name, in its order; refuses too many azimuths."""
+    k, ring = law.tables, _ring(law.facets.theta)
+    if max(ring) > layout.AZIMUTHS:
         raise ValueError(
             f"resolution.phi = {law.resolution.phi} is out of bounds: jointlaw.h takes at most "
             f"{layout.AZIMUTHS} azimuths on the circle"
         )
-    numbers, _ = layout.pack(k)
+    numbers, arrays = layout.pack(k)
     per_slope, bend = stiffness_per_facet(k)
-    return numbers | {
+    numbers |= {
         "closure_factor": law._first_loading.factor,
         "stiffness_factor": float(np.sum(per_slope)),
         "bending_factor": float(np.sum(bend)),
@@ -121,19 +116,13 @@ def _numbers(law: JointLaw) -> dict[str, int | float]:
         "stretch": 1.0 + 2.0 * float(np.max(np.abs(k.m))),
         "farthest": min(law.largest_reach, law._first_loading.farthest),
     }
-
-
-def _arrays(law: JointLaw) -> dict[str, Array]:
-    """The arrays of `struct jlaw_law`."""
-    k = law.tables
-    M = len(k.c1)
-    _, arrays = layout.pack(k)
-    more = {"MIRROR": _mirror(k.n), "RING": _ring(law.facets.theta)}
+    more = {"MIRROR": _mirror(k.n), "RING": ring}
     if k.yields:
         late = np.stack(law._first_loading.yielding or (), axis=-1)  # (2 M, 2)
-        more["LATE"] = np.hstack([late[:M], late[M:]])
-    facet = arrays["facet"] + layout.in_columns(more, M)
-    return arrays | {"facet": layout.in_blocks(facet), "depth": layout.in_blocks(arrays["depth"])}
+        more["LATE"] = np.hstack(np.split(late, 2))
+    facet = arrays["facet"] + layout.in_columns(more, len(ring))
+    blocks = {"facet": layout.in_blocks(facet), "depth": layout.in_blocks(arrays["depth"])}
+    return numbers, arrays | blocks
 
 
 def _mirror(n: Array) -> Array:

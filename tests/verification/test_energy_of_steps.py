@@ -71,9 +71,10 @@ def test_no_step_of_a_random_path_makes_energy(seed, fades, wears, yields):
     legs = np.diff(corners, axis=0, prepend=0.0)
     d = np.concatenate([leg * rng.dirichlet(np.full(3, 0.5))[:, None] for leg in legs])
     states = walk(k, state, d)
-    worst = np.max(gains(k, states, d)) / scale(k, states)
+    peak = scale(k, states)
     # Gauss rules of 16 points between kinks of steps of up to thirty closure ranges
-    assert worst <= 1e-11
+    assert np.max(gains(k, states, d)) <= 1e-11 * peak
+    assert np.min(np.diff(kernel.parts(k, states).dissipated)) >= -1e-12 * peak
 
 
 @pytest.mark.slow
@@ -111,22 +112,25 @@ def test_no_cycle_that_is_searched_for_returns_work(seed):
     assert sum(made[3:]) <= 1e-12
 
 
-@pytest.mark.parametrize("wears", [False, True])
-@pytest.mark.parametrize("seed", SEEDS)
-def test_the_trapezoid_of_end_forces_loses_around_closed_paths_in_the_limit(seed, wears):
-    """Where slopes fade; its error is of second order in the step, with friction of first."""
+@pytest.mark.parametrize("yields", [False, True])
+@pytest.mark.parametrize(("fades", "wears"), [(False, False), (True, False), (True, True)])
+@pytest.mark.parametrize("seed", SEEDS[:12])
+def test_a_closed_path_loses_what_the_ledger_says_in_the_limit(seed, fades, wears, yields):
+    """By the trapezoid of the tractions at the ends of steps, from the virgin joint."""
     rng = np.random.default_rng(100 + seed)
-    one = random_law(rng, True, wears, yields=False)
-    corners = random_corners(rng, 4)[:, :, : one.dim] * [1.0, *[one.mating_length] * (one.dim - 1)]
+    one = random_law(rng, fades, wears, yields)
+    reach = one.mating_length if fades else 1.0
+    corners = random_corners(rng, 4)[:, :, : one.dim] * [1.0, *[reach] * (one.dim - 1)]
     corners[:, -1] = 0.0
-    net, peak = np.zeros((4, 4)), np.zeros(4)
-    for k, steps in enumerate((64, 128, 256, 512)):
-        joints, before = one.joints(4), 0.0
+    gaps = []
+    for steps in (64, 128, 256, 512):
+        joints, before, work, largest = one.joints(4), 0.0, 0.0, 0.0
         for d in np.moveaxis(increments(corners, steps), 1, 0):
             after, _ = joints.update(d, tangent=False)
-            net[k] += np.sum(0.5 * (before + after) * d, axis=1)
-            before, peak = after, np.maximum(peak, joints.stored_energy)
-        net[k] -= joints.stored_energy
-    change = np.max(np.abs(np.diff(net, axis=0)) / peak, axis=1)
-    assert np.log2(change[0] / change[-1]) / 2 > 0.75  # the order
-    assert np.min(net[-1] / peak) >= -2 * change[-1]  # what halving again may change
+            work = work + np.sum(0.5 * (before + after) * d, axis=1)
+            before, largest = after, np.maximum(largest, joints.stored_energy)
+        gap = work - joints.stored_energy - joints.dissipated_energy
+        gaps.append(np.max(np.abs(gap) / (largest + joints.dissipated_energy)))
+    # without friction of second order in the step where nothing yields, else of first
+    assert np.log2(gaps[0] / gaps[-1]) / 3 > (0.5 if one.asperity.mu else 1.0)
+    assert gaps[-1] < 0.02

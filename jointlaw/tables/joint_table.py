@@ -250,7 +250,7 @@ def load_table(path: str | Path) -> JointTable:
             )
         return JointTable(azimuth=np.radians(angles), metadata=metadata, **held)
     except (OSError, KeyError, ValueError, TypeError, IndexError) as error:
-        raise ValueError(f"{str(path)!r} is not a joint table: {error!r}") from None
+        raise ValueError(f"{str(path)!r} is not a joint table: {error}") from None
 
 
 # ------------------------------------------------------------------- interpolation

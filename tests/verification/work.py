@@ -38,15 +38,7 @@ class WorkMeter:
         power = np.sum(force * spread, axis=1).reshape(self.n, -1)
         return power @ self.w
 
-    def _first(self, values):
-        return values.reshape(self.n, -1)[:, 0]
-
     @property
     def stored(self):
         """Stored energy (n,)."""
-        return self._first(self.copies.stored_energy)
-
-    @property
-    def dissipated(self):
-        """Dissipated energy (n,) of the ledger."""
-        return self._first(self.copies.dissipated_energy)
+        return self.copies.stored_energy.reshape(self.n, -1)[:, 0]

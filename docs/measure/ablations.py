@@ -76,7 +76,7 @@ def note(mine, row, whole):
         change = row.get(f"change of {key}")
         if key.endswith("_deg") and change:
             mine["angle"].append(abs(float(change)))
-        elif key.endswith((", state", "_deg")) and change is not None:
+        elif key.endswith(", state") or (key.endswith("_deg") and change is not None):
             mine["otherwise"].append(value != whole[key])
         elif key == "friction_kJ":
             mine["friction"].append(abs(float(change) / float(whole[key])))

@@ -16,6 +16,7 @@ typedef struct {
   double *F, *C;          /* (n, dim), (n, dim, dim); C may be NULL */
   const long long *index; /* the joints that move (n,), or NULL for all */
   long long n;
+  long long taken, grain; /* joints that threads have taken: 0 before a run; how many at once */
   int rows;
   int alone; /* whether the states lie (n, rows) */
   int lanes; /* of vectors: at most what jlaw_lanes() says */

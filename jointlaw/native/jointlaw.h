@@ -580,14 +580,14 @@ typedef struct { /* the plane of facets: slope along the azimuth e and across it
 typedef struct { /* facets in a step: y, Phi, Phi', Phi'' before and after; de */
   jl_real_ y0, y1, f0, f1, k0, k1, bend, es, et;
   jl_plane_ middle, end;
-  jl_real_ yw, fw, kw, strength, worn; /* before wear: y, Phi, Phi'; friction limit after it; loss */
+  jl_real_ yw, fw, kw, limit2, worn;   /* before wear: y, Phi, Phi'; after it: (q/G)^2 at most; loss */
   jl_real_ d0, de, dz;                 /* increment: closure, along the azimuth and across it */
   jl_real_ dy, rdy;                    /* y1 - y0, and 1 over it */
   jl_yes_ near;                        /* y has hardly changed */
   jl_real_ z0, z1, fz0, fz1, kz0, kz1; /* flattened depth; Phi and Phi' there */
   jl_real_ qs, qt, lost, vs, vt, bss, bst, btt; /* sums over the cells: q, loss, v and B of C */
   jl_real_ ws, wt, open;                        /* v of the softening by z1; sum of kappa */
-  jl_real_ gs, gt;                              /* derivative of q by log(gamma) */
+  jl_real_ gs, gt, strength;                    /* derivative of q by log(gamma); mu lam A gamma */
 } jl_facets_;
 
 typedef struct {             /* the sliders of one depth cell of facets */
@@ -879,19 +879,21 @@ JL_IN_ void jl_wear_slopes_(const jlaw_law *law, jl_numbers_ n, jl_motion_ *m)
   jl_put_joint_(n, row, worn);
 }
 
-/* Slopes have worn: springs that part take their force along, and friction limits the rest */
-JL_IN_ void jl_wear_sliders_(const double *cell, jl_facets_ *o, const jl_sliders_ *c, jl_real_ *qs, jl_real_ *qt,
-                     int yields)
+/* Slopes have worn: springs that part take their force along, and friction limits the rest. One
+ * division for all: stiffnesses and forces below 1e-75 count as none. */
+JL_IN_ void jl_wear_sliders_(const double *cell, jl_facets_ *o, const jl_sliders_ *c, jl_real_ *qs, jl_real_ *qt, jl_kind_ k)
 {
   jl_real_ G, kappa;
-  jl_hold_cell_(cell, o->yw, o->fw, o->kw, o->z0, o->fz0, o->kz0, yields, &G, &kappa);
-  const jl_yes_ falls = kappa > c->k0, had = kappa > JLAW_TINY, has = c->k0 > JLAW_TINY;
-  const jl_real_ kept = jl_pick_(falls, c->k0 / jl_pick_(falls, kappa, 1.0), 1.0);
-  const jl_real_ q2 = *qs * *qs + *qt * *qt, size = kept * jl_root_(q2), cap = o->strength * c->G0;
-  const jl_yes_ jl_beyond_ = size > cap;
-  const jl_real_ share = kept * jl_pick_(jl_beyond_, cap / jl_pick_(jl_beyond_, size, 1.0), 1.0);
-  o->worn += jl_only_(had, q2 / jl_pick_(had, kappa, 1.0));
-  o->worn -= jl_only_(has, share * share * q2 / jl_pick_(has, c->k0, 1.0));
+  jl_hold_cell_(cell, o->yw, o->fw, o->kw, o->z0, o->fz0, o->kz0, k.yields, &G, &kappa);
+  const jl_real_ q2 = *qs * *qs + *qt * *qt, cap2 = o->limit2 * (c->G0 * c->G0);
+  const jl_yes_ had = kappa * kappa > JLAW_FAINT, has = c->k0 * c->k0 > JLAW_FAINT;
+  const jl_real_ a = jl_pick_(had, kappa, 1.0), b = jl_pick_(has, c->k0, 1.0);
+  const jl_real_ Q = jl_pick_(q2 > JLAW_FAINT, q2, 1.0);
+  const jl_real_ r = 1.0 / (a * b * Q), was = jl_only_(had, b * Q * r), is = jl_only_(has, a * Q * r);
+  jl_real_ share = jl_pick_(kappa > c->k0, c->k0 * was, 1.0);
+  const jl_yes_ jl_beyond_ = share * share * q2 > cap2;
+  if (jl_somewhere_(jl_beyond_)) share = jl_pick_(jl_beyond_, jl_root_(cap2 * (a * b * r)), share);
+  o->worn += q2 * (was - share * share * is);
   *qs = share * *qs;
   *qt = share * *qt;
 }
@@ -1006,7 +1008,7 @@ JL_IN_ void jl_slide_(const double *f, const double *cell, jl_facets_ *o, jl_rea
   jl_cells_of_(cell, o, &c, k.yields);
   c.strength = jl_each_(jl_column_(f, JLAW_STRENGTH));
   if (k.fades) c.strength = c.strength * o->end.gamma;
-  if (k.wears) jl_wear_sliders_(cell, o, &c, qs, qt, k.yields);
+  if (k.wears) jl_wear_sliders_(cell, o, &c, qs, qt, k);
   jl_load_(f, o, &c, qs, qt, k);
   o->qs += *qs;
   o->qt += *qt;
@@ -1049,17 +1051,14 @@ JL_IN_ void jl_add_fading_tangent_(const jlaw_law *law, const double *f, const j
   jl_real_ h[3], H[3], C[3][3]; /* ee, ez, zz */
   jl_curvature_(law, f, s, m->end.w, m->has, h);
   jl_curvature_(law, f, r, m->middle.w, m->has, H);
-  /* the middle */
-  const jl_real_ turn = o->d0 + r->along * o->de, rm2 = 1.0 / r->m2, rN2 = 1.0 / r->N2;
-  const jl_real_ ea = -0.5 * turn * (rm2 * r->rm),
-             eb = -0.5 * (turn * r->rmn + o->et * r->across * rN2);
+  const jl_real_ turn = 0.5 * (o->d0 + r->along * o->de), et = 0.5 * o->et;
+  const jl_real_ rm2 = 1.0 / r->m2, rN2 = 1.0 / r->N2;
+  const jl_real_ ea = -turn * (rm2 * r->rm), eb = -(turn * r->rmn + et * r->across * rN2);
   const jl_real_ ta =
-      0.5
-      * ((2.0 * r->along * o->dz - r->across * o->de) * r->rmn - o->et * r->along * (rm2 + rN2));
+      (r->along * o->dz - 0.5 * r->across * o->de) * r->rmn - et * r->along * (rm2 + rN2);
   const jl_real_ Es[3] = {-r->along * r->rm, r->rm + ea * H[0], ea * H[1]};
   const jl_real_ Et[3] = {-r->across * r->rmn, -r->along * r->across * r->rmn + ta * H[0] + eb * H[1],
                       r->m2 * r->rmn + ta * H[1] + eb * H[2]};
-  /* the end */
   const jl_real_ cs[3] = {-s->along * s->rm, s->rm, none};
   const jl_real_ ct[3] = {-s->across * s->rmn, -s->along * s->across * s->rmn, s->m2 * s->rmn};
   const jl_real_ rM2 = 1.0 / s->m2, rn2 = 1.0 / s->N2, rm3 = rM2 * s->rm;
@@ -1097,7 +1096,7 @@ JL_IN_ void jl_step_facets_(const jlaw_law *law, int at, const jl_motion_ *m, jl
   const int kept = k.kept ? jl_state_rows_(law) : 0;
   const double *f = jl_facet_of_(law, at), *cell = jl_cell_of_(law, at);
   jl_facets_ o;
-  o.y0 = o.y1 = o.es = o.et = o.bend = o.strength = o.fw = o.kw = jl_each_(0.0);
+  o.y0 = o.y1 = o.es = o.et = o.bend = o.limit2 = o.fw = o.kw = jl_each_(0.0);
   for (int i = 0; i < k.dim && !k.fades; i++) {
     o.y0 += jl_column_(f, JLAW_M + i) * m->from[i];
     o.y1 += jl_column_(f, JLAW_M + i) * m->to[i];
@@ -1115,7 +1114,8 @@ JL_IN_ void jl_step_facets_(const jlaw_law *law, int at, const jl_motion_ *m, jl
     o.end = jl_plane_at_(f, &m->end, m->has);
     jl_move_in_plane_(f, m, &o);
   }
-  if (k.wears) o.strength = jl_column_(f, JLAW_STRENGTH) * jl_plane_at_(f, &m->start, m->has).gamma;
+  const jl_of_facet_ limit = jl_column_(f, JLAW_STRENGTH) * jl_column_(f, JLAW_COSINE);
+  if (k.wears) o.limit2 = limit * limit * jl_plane_at_(f, &m->start, m->has).N2;
   o.y0 = jl_resolved_(o.y0);
   o.y1 = jl_resolved_(o.y1);
   o.dy = o.y1 - o.y0;
@@ -1129,7 +1129,7 @@ JL_IN_ void jl_step_facets_(const jlaw_law *law, int at, const jl_motion_ *m, jl
   } else jl_virgin_curve_(law, o.yw, &o.f0, &o.k0, (jl_real_ *) 0);
   if (k.wears) {
     o.fw = o.f0, o.kw = o.k0;
-    jl_virgin_curve_(law, o.y0, &o.f0, &o.k0, (jl_real_ *) 0);
+    if (jl_somewhere_(o.y0 != o.yw)) jl_virgin_curve_(law, o.y0, &o.f0, &o.k0, (jl_real_ *) 0);
   }
   jl_virgin_curve_(law, o.y1, &o.f1, &o.k1, k.tangent ? &o.bend : (jl_real_ *) 0);
   if (k.kept) {

@@ -34,14 +34,14 @@ typedef struct { /* the plane of facets: slope along the azimuth e and across it
 typedef struct { /* facets in a step: y, Phi, Phi', Phi'' before and after; de */
   real y0, y1, f0, f1, k0, k1, bend, es, et;
   plane middle, end;
-  real yw, fw, kw, strength, worn; /* before wear: y, Phi, Phi'; friction limit after it; loss */
+  real yw, fw, kw, limit2, worn;   /* before wear: y, Phi, Phi'; after it: (q/G)^2 at most; loss */
   real d0, de, dz;                 /* increment: closure, along the azimuth and across it */
   real dy, rdy;                    /* y1 - y0, and 1 over it */
   yes near;                        /* y has hardly changed */
   real z0, z1, fz0, fz1, kz0, kz1; /* flattened depth; Phi and Phi' there */
   real qs, qt, lost, vs, vt, bss, bst, btt; /* sums over the cells: q, loss, v and B of C */
   real ws, wt, open;                        /* v of the softening by z1; sum of kappa */
-  real gs, gt;                              /* derivative of q by log(gamma) */
+  real gs, gt, strength;                    /* derivative of q by log(gamma); mu lam A gamma */
 } facets;
 
 typedef struct {             /* the sliders of one depth cell of facets */
@@ -333,19 +333,21 @@ IN void wear_slopes(const jlaw_law *law, numbers n, motion *m)
   put_joint(n, row, worn);
 }
 
-/* Slopes have worn: springs that part take their force along, and friction limits the rest */
-IN void wear_sliders(const double *cell, facets *o, const sliders *c, real *qs, real *qt,
-                     int yields)
+/* Slopes have worn: springs that part take their force along, and friction limits the rest. One
+ * division for all: stiffnesses and forces below 1e-75 count as none. */
+IN void wear_sliders(const double *cell, facets *o, const sliders *c, real *qs, real *qt, kind k)
 {
   real G, kappa;
-  hold_cell(cell, o->yw, o->fw, o->kw, o->z0, o->fz0, o->kz0, yields, &G, &kappa);
-  const yes falls = kappa > c->k0, had = kappa > JLAW_TINY, has = c->k0 > JLAW_TINY;
-  const real kept = pick(falls, c->k0 / pick(falls, kappa, 1.0), 1.0);
-  const real q2 = *qs * *qs + *qt * *qt, size = kept * root(q2), cap = o->strength * c->G0;
-  const yes beyond = size > cap;
-  const real share = kept * pick(beyond, cap / pick(beyond, size, 1.0), 1.0);
-  o->worn += only(had, q2 / pick(had, kappa, 1.0));
-  o->worn -= only(has, share * share * q2 / pick(has, c->k0, 1.0));
+  hold_cell(cell, o->yw, o->fw, o->kw, o->z0, o->fz0, o->kz0, k.yields, &G, &kappa);
+  const real q2 = *qs * *qs + *qt * *qt, cap2 = o->limit2 * (c->G0 * c->G0);
+  const yes had = kappa * kappa > JLAW_FAINT, has = c->k0 * c->k0 > JLAW_FAINT;
+  const real a = pick(had, kappa, 1.0), b = pick(has, c->k0, 1.0);
+  const real Q = pick(q2 > JLAW_FAINT, q2, 1.0);
+  const real r = 1.0 / (a * b * Q), was = only(had, b * Q * r), is = only(has, a * Q * r);
+  real share = pick(kappa > c->k0, c->k0 * was, 1.0);
+  const yes beyond = share * share * q2 > cap2;
+  if (somewhere(beyond)) share = pick(beyond, root(cap2 * (a * b * r)), share);
+  o->worn += q2 * (was - share * share * is);
   *qs = share * *qs;
   *qt = share * *qt;
 }
@@ -460,7 +462,7 @@ IN void slide(const double *f, const double *cell, facets *o, real *qs, real *qt
   cells_of(cell, o, &c, k.yields);
   c.strength = each(column(f, JLAW_STRENGTH));
   if (k.fades) c.strength = c.strength * o->end.gamma;
-  if (k.wears) wear_sliders(cell, o, &c, qs, qt, k.yields);
+  if (k.wears) wear_sliders(cell, o, &c, qs, qt, k);
   load(f, o, &c, qs, qt, k);
   o->qs += *qs;
   o->qt += *qt;
@@ -503,17 +505,14 @@ IN void add_fading_tangent(const jlaw_law *law, const double *f, const motion *m
   real h[3], H[3], C[3][3]; /* ee, ez, zz */
   curvature(law, f, s, m->end.w, m->has, h);
   curvature(law, f, r, m->middle.w, m->has, H);
-  /* the middle */
-  const real turn = o->d0 + r->along * o->de, rm2 = 1.0 / r->m2, rN2 = 1.0 / r->N2;
-  const real ea = -0.5 * turn * (rm2 * r->rm),
-             eb = -0.5 * (turn * r->rmn + o->et * r->across * rN2);
+  const real turn = 0.5 * (o->d0 + r->along * o->de), et = 0.5 * o->et;
+  const real rm2 = 1.0 / r->m2, rN2 = 1.0 / r->N2;
+  const real ea = -turn * (rm2 * r->rm), eb = -(turn * r->rmn + et * r->across * rN2);
   const real ta =
-      0.5
-      * ((2.0 * r->along * o->dz - r->across * o->de) * r->rmn - o->et * r->along * (rm2 + rN2));
+      (r->along * o->dz - 0.5 * r->across * o->de) * r->rmn - et * r->along * (rm2 + rN2);
   const real Es[3] = {-r->along * r->rm, r->rm + ea * H[0], ea * H[1]};
   const real Et[3] = {-r->across * r->rmn, -r->along * r->across * r->rmn + ta * H[0] + eb * H[1],
                       r->m2 * r->rmn + ta * H[1] + eb * H[2]};
-  /* the end */
   const real cs[3] = {-s->along * s->rm, s->rm, none};
   const real ct[3] = {-s->across * s->rmn, -s->along * s->across * s->rmn, s->m2 * s->rmn};
   const real rM2 = 1.0 / s->m2, rn2 = 1.0 / s->N2, rm3 = rM2 * s->rm;
@@ -551,7 +550,7 @@ IN void step_facets(const jlaw_law *law, int at, const motion *m, numbers n, sum
   const int kept = k.kept ? state_rows(law) : 0;
   const double *f = facet_of(law, at), *cell = cell_of(law, at);
   facets o;
-  o.y0 = o.y1 = o.es = o.et = o.bend = o.strength = o.fw = o.kw = each(0.0);
+  o.y0 = o.y1 = o.es = o.et = o.bend = o.limit2 = o.fw = o.kw = each(0.0);
   for (int i = 0; i < k.dim && !k.fades; i++) {
     o.y0 += column(f, JLAW_M + i) * m->from[i];
     o.y1 += column(f, JLAW_M + i) * m->to[i];
@@ -569,7 +568,8 @@ IN void step_facets(const jlaw_law *law, int at, const motion *m, numbers n, sum
     o.end = plane_at(f, &m->end, m->has);
     move_in_plane(f, m, &o);
   }
-  if (k.wears) o.strength = column(f, JLAW_STRENGTH) * plane_at(f, &m->start, m->has).gamma;
+  const of_facet limit = column(f, JLAW_STRENGTH) * column(f, JLAW_COSINE);
+  if (k.wears) o.limit2 = limit * limit * plane_at(f, &m->start, m->has).N2;
   o.y0 = resolved(o.y0);
   o.y1 = resolved(o.y1);
   o.dy = o.y1 - o.y0;
@@ -583,7 +583,7 @@ IN void step_facets(const jlaw_law *law, int at, const motion *m, numbers n, sum
   } else virgin_curve(law, o.yw, &o.f0, &o.k0, (real *) 0);
   if (k.wears) {
     o.fw = o.f0, o.kw = o.k0;
-    virgin_curve(law, o.y0, &o.f0, &o.k0, (real *) 0);
+    if (somewhere(o.y0 != o.yw)) virgin_curve(law, o.y0, &o.f0, &o.k0, (real *) 0);
   }
   virgin_curve(law, o.y1, &o.f1, &o.k1, k.tangent ? &o.bend : (real *) 0);
   if (k.kept) {

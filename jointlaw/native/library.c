@@ -43,8 +43,9 @@ OUT int jlaw_lanes(void)
 #endif
 }
 
-/* Call number `what` of advance, measure and refresh, for joints first to last - 1 of a batch */
-OUT int jlaw_run(const jlaw_batch *b, long long first, long long last, int what)
+/* Call number `what` of advance, measure and refresh, for the joints of a batch that no other thread
+ * takes: every thread that calls takes the next b->grain of them, whole blocks, until none are left */
+OUT int jlaw_run(jlaw_batch *b, int what)
 {
   static jlaw_call *const calls[][3] = {
       {KINDS(, _2)}, {KINDS(, _2_alone)},
@@ -52,8 +53,12 @@ OUT int jlaw_run(const jlaw_batch *b, long long first, long long last, int what)
       {KINDS(, _4)}, {KINDS(, _4_alone)}, {KINDS(, _8)}, {KINDS(, _8_alone)},
 #endif
   };
-  const int level = b->lanes == 8 ? 2 : b->lanes == 4;
-  return calls[2 * level + b->alone][what](b, (long) first, (long) last);
+  jlaw_call *const call = calls[2 * (b->lanes == 8 ? 2 : b->lanes == 4) + b->alone][what];
+  const long long n = b->n, grain = b->grain;
+  int failed = 0;
+  for (long long at; !failed && (at = __atomic_fetch_add(&b->taken, grain, __ATOMIC_RELAXED)) < n;)
+    failed = call(b, (long) at, (long) (n - at < grain ? n : at + grain));
+  return failed;
 }
 
 /* Hash of the sources that this library was built from */

@@ -23,7 +23,7 @@ class BatchCall(ctypes.Structure):
 
     _fields_ = [
         *((name, ctypes.c_void_p) for name in ("law", "state", "d", "F", "C", "index")),
-        ("n", ctypes.c_longlong),
+        *((name, ctypes.c_longlong) for name in ("n", "taken", "grain")),
         *((name, ctypes.c_int) for name in ("rows", "alone", "lanes", "ledger", "keep")),
     ]
 
@@ -39,7 +39,7 @@ def load_file(path: Path) -> ctypes.CDLL:
     """The library of this file."""
     library = ctypes.CDLL(str(path))
     library.jlaw_sources.restype = ctypes.c_char_p
-    library.jlaw_run.argtypes = [ctypes.c_void_p, *[ctypes.c_longlong] * 2, ctypes.c_int]
+    library.jlaw_run.argtypes = [ctypes.c_void_p, ctypes.c_int]
     if library.jlaw_sources().decode() != build.sources():
         raise StaleLibraryError(
             f"{path} was built from other sources than lie beside it: build it anew with "

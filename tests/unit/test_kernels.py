@@ -2,12 +2,14 @@
 
 import pickle
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from jointlaw.kernels import engine
+from jointlaw.kernels.threads import share_out
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "hosts"))
 from c_host import random_law
@@ -134,6 +136,20 @@ def test_threads_change_no_bit(monkeypatch):
     for other in results[1:]:
         for a, b in zip(results[0], other, strict=True):
             np.testing.assert_array_equal(a, b)
+
+
+def test_what_fails_on_another_thread_is_raised_after_all_have_ended():
+    ended = []
+
+    def work() -> None:
+        if threading.current_thread() is not threading.main_thread():
+            raise MemoryError("no memory")
+        ended.append(True)
+
+    for _ in range(2):  # the thread that failed works on
+        with pytest.raises(MemoryError, match="no memory"):
+            share_out(work, 2)
+    assert ended == [True, True]
 
 
 @pytest.mark.parametrize(

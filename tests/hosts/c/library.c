@@ -14,10 +14,10 @@ typedef struct { /* as in batch.h */
   const double *d;
   double *F, *C;
   const long long *index;
-  long long n;
+  long long n, taken, grain;
   int rows, alone, lanes, ledger, keep;
 } batch;
-typedef int run(const batch *b, long long first, long long last, int what);
+typedef int run(batch *b, int what);
 
 int main(int argc, char **argv)
 {
@@ -31,10 +31,11 @@ int main(int argc, char **argv)
   const size_t rows = (size_t) jlaw_state_size(law), size = n * dim;
   double *state = calloc((n + 7) / 8 * 8 * rows, sizeof *state), *first = calloc(rows, sizeof *first);
   double *d = calloc(size, sizeof *d), *F = calloc(size, sizeof *F), *C = calloc(size * dim, sizeof *C);
-  const batch b = {law, state, d, F, C, NULL, (long long) n, (int) rows, 0, 2, 1, 1};
+  batch b = {law, state, d, F, C, NULL, (long long) n, 0, 8, (int) rows, 0, 2, 1, 1};
   while (fread(d, sizeof *d, size, stdin) == size) {
     double f[3], c[9];
-    if (advance(&b, 0, b.n, 0)) return 3;
+    b.taken = 0;
+    if (advance(&b, 0)) return 3;
     if (jlaw_update(law, first, first, d, f, c, message, sizeof message)) return 4;
     if (memcmp(f, F, dim * sizeof *f) || memcmp(c, C, dim * dim * sizeof *c)) return 5;
     fwrite(F, sizeof *F, size, stdout);

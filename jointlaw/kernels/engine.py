@@ -26,7 +26,7 @@ Index = NDArray[np.intp]
 LANES = 8  # joints of a block, which lie side by side: JLAW_BLOCK in native/batch.h
 LINE = 64  # bytes that a processor reads at once
 CHUNK = 4096  # joints per call of the numpy kernel: keeps its temporaries in cache
-GRAINS = 16  # that a thread takes, one after the other, if all are as fast
+GRAINS = 16  # of joints: a thread takes as many, one after the other, if all are equally fast
 SERIAL = 20_000  # sliders below which a second thread costs more than it saves
 MISSING = (
     "the compiled law was not built, and numpy's kernel is about forty times slower: install a C "
@@ -167,16 +167,14 @@ class NativeEngine:
         _, rows, lanes = state.shape
         given = *arrays, *[None] * (4 - len(arrays))
         return library.BatchCall(
-            self._law.address, address(state), *given, n, 0, n, rows, lanes == 1, self.lanes
+            self._law.address, address(state), *given, n, 0, 0, rows, lanes == 1, self.lanes
         )
 
     def _run(self, what: int, call: library.BatchCall) -> None:
         """Call the library on one thread or several; each takes blocks until none are left."""
-        where, n, threads = ctypes.addressof(call), call.n, 1
-        if n * self._sliders > SERIAL:
-            threads = min(thread_count(), -(-n // LANES))
-            call.grain = -(-n // (GRAINS * threads * LANES)) * LANES
-        call.taken = 0
+        where, n = ctypes.addressof(call), call.n
+        threads = min(thread_count(), -(-n // LANES)) if n * self._sliders > SERIAL else 1
+        call.taken, call.grain = 0, -(-n // (GRAINS * threads * LANES)) * LANES
 
         def work() -> None:
             if self._library.jlaw_run(where, what):

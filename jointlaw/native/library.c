@@ -15,7 +15,8 @@
 #define OUT IN_C __attribute__((visibility("default")))
 #endif
 
-#define KINDS(X, KIND) X jlaw_advance##KIND, jlaw_measure##KIND, jlaw_refresh##KIND
+#define KINDS(X, KIND) \
+  X jlaw_advance##KIND, jlaw_measure##KIND, jlaw_refresh##KIND, jlaw_stiffness##KIND
 #if defined(__x86_64__)
 KINDS(extern jlaw_call, _8);
 KINDS(extern jlaw_call, _4);
@@ -43,11 +44,11 @@ OUT int jlaw_lanes(void)
 #endif
 }
 
-/* Call number `what` of advance, measure and refresh, for the joints of a batch that no other thread
+/* Call number `what` of advance, measure, refresh and stiffness, for the joints of a batch that no other thread
  * takes: every thread that calls takes the next b->grain of them, whole blocks, until none are left */
 OUT int jlaw_run(jlaw_batch *b, int what)
 {
-  static jlaw_call *const calls[][3] = {
+  static jlaw_call *const calls[][4] = {
       {KINDS(, _2)}, {KINDS(, _2_alone)},
 #if defined(__x86_64__)
       {KINDS(, _4)}, {KINDS(, _4_alone)}, {KINDS(, _8)}, {KINDS(, _8_alone)},

@@ -42,8 +42,9 @@ def steepest_gain(k: FacetTables) -> float:
     for limits in np.unique(cells, axis=0):  # one ring of facets
         low, force0, slope0 = limits[np.searchsorted(limits[:-1, 0], y, side="right") - 1].T
         G, kappa = force - force0 - slope0 * (y - low), slope - slope0
-        seen = (kappa > 1e-9 * slope) & (1e-9 * force < G)  # the rest is rounding
-        gain = np.divide(G * bend, kappa * kappa, out=np.zeros_like(y), where=seen)
+        seen = (kappa > 1e-9 * slope) & (1e-9 * force < G) & (kappa > UNDERFLOW)
+        share = np.divide(G, kappa, out=np.zeros_like(y), where=seen)  # the rest is rounding
+        gain = np.divide(share * bend, kappa, out=np.zeros_like(y), where=seen)
         worst = max(worst, float(gain.max()))
     return worst
 

@@ -6,10 +6,10 @@ from math import log
 
 import numpy as np
 import pytest
-from jointlaw.laws.joint_law import JointLaw
 from paper_laws import preset
 from scipy.optimize import brentq
 
+from jointlaw.laws.joint_law import JointLaw
 from jointlaw.paper.secant import secant
 
 GRANITE = SMOOTH, ROUGH = preset("westerly-smooth"), preset("westerly-rough")

@@ -61,9 +61,8 @@ def along(k, state, d, t):
     if k.yields:
         depth, flat0 = flatten(k, old.depth, after.y), asperities.cells(k, old.depth)
         gained = after.G - np.maximum(before.G, flat0.G)
-        before, after = (
-            asperities.flattened(before, flat0), asperities.flattened(after, asperities.cells(k, depth))
-        )  # fmt: skip
+        now = asperities.cells(k, depth)
+        before, after = asperities.flattened(before, flat0), asperities.flattened(after, now)
         sides += [depth[:, None] > low, depth > old.depth, y - k.yield_depth[:, None] >= depth]
     part = np.einsum("edmb,db->emb", middle.basis, d)
     limit = asperities.strength(k, gamma)

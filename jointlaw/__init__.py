@@ -14,6 +14,7 @@ from .joints.pool import JointPool
 from .joints.state import NonFiniteError, load_state
 from .laboratory.experiments import closure_test, direct_shear
 from .laboratory.record import Record
+from .laws.coulomb_law import CoulombLaw
 from .laws.joint_law import JointLaw
 from .paper import closed_form
 from .paper.secant import secant
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Asperity",
     "Bond",
+    "CoulombLaw",
     "GammaHeights",
     "Heights",
     "Joint",

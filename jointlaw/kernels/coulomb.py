@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..support.checks import Array
-from ..support.thresholds import ROUNDED
-from .element import Element, Share
+from ..support.thresholds import LIMIT, ROUNDED
+from .element import Element, Share, Shares
+
+_OVERFLOW = 1e140  # Pa: squares beyond it overflow
 
 
 class Slid(NamedTuple):
@@ -30,7 +32,7 @@ class Coulomb(Element):
     """
 
     def __init__(self, p: Any, dim: int) -> None:
-        self.rows = dim
+        self.dim, self.rows = dim, {"shear": dim - 1, "damage": 1}
         self.normal, self.shear = p.normal_stiffness, p.shear_stiffness
         self.friction, self.cohesion, self.weakening = p.friction, p.cohesion, p.weakening
         left = p.residual_friction, p.residual_cohesion
@@ -39,8 +41,11 @@ class Coulomb(Element):
         # beyond cohesion/friction there is no strength in shear
         apex = self.cohesion / self.friction if self.friction > 0.0 else np.inf
         self.tension = min(p.tension, apex)
+        self.reach = _OVERFLOW / max(self.normal * (1.0 + self.friction), self.shear, 1.0)
+        self.farthest = self.reach
 
     def numbers(self) -> dict[str, float]:
+        """As `Element.numbers`."""
         return {
             "coulomb_normal": self.normal,
             "coulomb_shear": self.shear,
@@ -53,7 +58,7 @@ class Coulomb(Element):
         }
 
     def step(self, delta: Array, d: Array, state: Array, new: Array, tangent: bool) -> Share:
-        """One step; the normal stress sigma = kn u, u the closure, goes straight.
+        """As `Element.step`; the normal stress sigma = kn u, u the closure, goes straight.
 
         1. An intact joint bears sigma >= -tension with |q| <= c + mu sigma. A straight step leaves
            this set once, for it is convex. One that leaves it under tension tears the joint: w = 1,
@@ -147,10 +152,10 @@ class Coulomb(Element):
             slope = np.where(slid.slides & (slid.w < 1.0), fall / self.weakening, 0.0)
             across = across - slope
             push = push + slope * (self.normal * self.friction_at(w) / self.shear)
-        C = np.zeros((self.rows, self.rows, len(w)))
+        C = np.zeros((self.dim, self.dim, len(w)))
         C[0, 0] = self.normal
         C[1:, 0] = push * n
-        C[1:, 1:] = turn * np.eye(self.rows - 1)[:, :, None] + (across - turn) * n[:, None] * n
+        C[1:, 1:] = turn * np.eye(self.dim - 1)[:, :, None] + (across - turn) * n[:, None] * n
         return np.where(touches, C, 0.0)
 
     def strength(self, w: Array, sigma: Array) -> Array:
@@ -163,6 +168,7 @@ class Coulomb(Element):
         return self.friction + (self.residual_friction - self.friction) * w
 
     def stored(self, delta: Array, state: Array) -> Array:
+        """As `Element.stored`."""
         q, w = state[:-1], state[-1]
         u = np.where((w > 0.0) & (delta[0] < 0.0), 0.0, delta[0])
         return 0.5 * self.normal * u * u + 0.5 * squared(q) / self.shear
@@ -175,6 +181,13 @@ class Coulomb(Element):
         w = state[-1] if self.weakening > 0.0 else np.ones_like(state[-1])
         bound = np.maximum(self.normal * np.hypot(1.0, self.friction_at(w)), self.shear)
         return np.where((state[-1] > 0.0) & (delta[0] < 0.0), 0.0, bound)
+
+    def shares(self, delta: Array, state: Array) -> Shares:
+        """As `Element.shares`: all of it slips, or nothing."""
+        apart = (state[-1] > 0.0) & (delta[0] < 0.0)
+        cap = self.strength(state[-1], self.normal * delta[0])
+        sliding = (~apart & (np.sqrt(squared(state[:-1])) >= cap * (1.0 - LIMIT))).astype(float)
+        return Shares(sliding, sliding, apart.astype(float), delta[0])
 
     def largest_stiffness(self, closure: Array, shear: Array) -> Array:
         """Upper bound (...) of `|C|` in Pa/m, at any closure; see `stiffness`."""

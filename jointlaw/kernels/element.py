@@ -34,6 +34,7 @@ class Element(ABC):
     A row that is called damage is 1 in joints whose faces meet anew.
     """
 
+    dim = 1  # components of a displacement that it needs, at least
     rows: dict[str, int]  # of its state: how many, by name
     stretch = 1.0  # bound of the closure that it feels over the size of the displacement
     reach = math.inf  # m: up to this closure its forces, energies and their squares stay finite
@@ -69,7 +70,8 @@ class Element(ABC):
 
     def normal_stress(self, closure: Array) -> Array:
         """Normal stress (...) in Pa of first loading to this closure (...) in m, unsheared."""
-        d = closure.reshape(1, -1)
+        d = np.zeros((self.dim, closure.size))
+        d[0] = closure.ravel()
         virgin = np.zeros((sum(self.rows.values()), d.shape[1]))
         F = self.step(np.zeros_like(d), d, virgin, virgin.copy(), False).F
         return F[0].reshape(closure.shape)

@@ -4,7 +4,7 @@ typedef struct {                     /* the part of a step in which faces touch 
   double q[2], dq[2], start, end, w; /* before; growth of q; normal stress at both ends */
   double now[2], w1, lost, trial[2], size, hold; /* after; q before it is cut to the strength */
   int slides;
-} jl_slide;
+} jl_slip;
 
 JL_IN double jl_coulomb_friction(const jlaw_law *law, double w)
 {
@@ -43,7 +43,7 @@ JL_IN int jl_leaving(const double q[2], const double dq[2], double cap, double r
 }
 
 /* Shear by dq while the normal stress goes from start to end */
-JL_IN void jl_slide_on(const jlaw_law *law, jl_slide *s)
+JL_IN void jl_slip_on(const jlaw_law *law, jl_slip *s)
 {
   const double first = jl_coulomb_strength(law, s->w, s->start), change = s->end - s->start;
   const double cap = jl_coulomb_strength(law, s->w, s->end);
@@ -73,7 +73,7 @@ JL_IN void jl_slide_on(const jlaw_law *law, jl_slide *s)
 }
 
 /* Tangent of a joint that touches; w is that before the slide */
-JL_IN void jl_coulomb_tangent(const jlaw_law *law, const jl_slide *s, double C[9])
+JL_IN void jl_coulomb_tangent(const jlaw_law *law, const jl_slip *s, double C[9])
 {
   const double kn = law->coulomb_normal, ks = law->coulomb_shear, L = law->coulomb_weakening;
   double n[2] = {0.0, 0.0}, turn = s->hold > 0.0 ? ks : 0.0, across = turn, push = 0.0;
@@ -103,7 +103,7 @@ JL_IN double jl_coulomb_step(const jlaw_law *law, jl_part *p, int tangent)
   const int last = law->dim - 1, intact = p->row[last] == 0.0;
   const double u = p->from[0] + p->d[0], before = kn * p->from[0], after = kn * u;
   const double change = after - before, moved = change == 0.0 ? 1.0 : fabs(change);
-  jl_slide s = {{0.0}, {0.0}, before, after, p->row[last], {0.0}, 0.0, 0.0, {0.0}, 0.0, 0.0, 0};
+  jl_slip s = {{0.0}, {0.0}, before, after, p->row[last], {0.0}, 0.0, 0.0, {0.0}, 0.0, 0.0, 0};
   for (int i = 0; i < 3; i++) p->F[i] = 0.0;
   for (int i = 0; i < 9; i++) p->C[i] = 0.0;
   for (int i = 0; i < last; i++) s.q[i] = p->row[i];
@@ -135,7 +135,7 @@ JL_IN double jl_coulomb_step(const jlaw_law *law, jl_part *p, int tangent)
   }
   s.end = touches ? after : 0.0;
   for (int i = 0; i < last; i++) s.dq[i] = ks * p->d[i + 1] * share;
-  jl_slide_on(law, &s);
+  jl_slip_on(law, &s);
   const double shear = 0.5 * (s.now[0] * s.now[0] + s.now[1] * s.now[1]) / ks;
   p->lost = torn + s.lost + (parts ? shear : 0.0);
   for (int i = 0; i < last; i++) p->F[i + 1] = p->row[i] = touches ? s.now[i] : 0.0;
@@ -143,4 +143,38 @@ JL_IN double jl_coulomb_step(const jlaw_law *law, jl_part *p, int tangent)
   p->row[last] = touches ? s.w1 : 1.0;
   if (tangent && touches) jl_coulomb_tangent(law, &s, p->C);
   return touches ? 0.5 * kn * u * u + shear : 0.0;
+}
+
+JL_IN int jl_coulomb_rows(const jlaw_law *law) { return law->dim; }
+
+JL_IN double jl_coulomb_stiffness(const jlaw_law *law, double damage)
+{
+  const double mu = jl_coulomb_friction(law, law->coulomb_weakening > 0.0 ? damage : 1.0);
+  const double slides = law->coulomb_normal * sqrt(1.0 + mu * mu);
+  return slides > law->coulomb_shear ? slides : law->coulomb_shear;
+}
+
+JL_IN int jl_coulomb_good(const jlaw_law *law, const double *row)
+{
+  const int last = law->dim - 1;
+  return row[last] >= 0.0 && row[last] <= 1.0 && fabs(row[0]) < 1e140
+         && fabs(row[last - 1]) < 1e140;
+}
+
+JL_IN void jl_coulomb_turn(const jlaw_law *law, double *row, const double turn[2][2])
+{
+  const double q[2] = {row[0], law->dim > 2 ? row[1] : 0.0};
+  for (int i = 0; i < law->dim - 1; i++) row[i] = turn[i][0] * q[0] + turn[i][1] * q[1];
+}
+
+/* Shares of reference.Measures in a state of these numbers: slides, of the strength too; is apart */
+JL_IN void jl_coulomb_shares(const jlaw_law *law, const double *s, size_t stride, double shares[3])
+{
+  const int dim = law->dim;
+  const double u = s[0], *row = s + (size_t) (dim + 1) * stride;
+  const double w = row[(size_t) (dim - 1) * stride], q[2] = {row[0], dim > 2 ? row[stride] : 0.0};
+  const double none[2] = {0.0, 0.0}, cap = jl_coulomb_strength(law, w, law->coulomb_normal * u);
+  const int apart = w > 0.0 && u < 0.0;
+  shares[0] = shares[1] = !apart && sqrt(jl_squared(q, 0.0, none)) >= cap * (1.0 - JLAW_LIMIT);
+  shares[2] = apart;
 }

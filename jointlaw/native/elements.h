@@ -89,6 +89,8 @@ JL_IN double jl_bonded_step(const jlaw_law *law, jl_part *b, int tangent)
   return (1.0 - now) * psi;
 }
 
+#include "coulomb.h"
+
 /* --------------------------------------------------------------------- all of a joint */
 
 /* Whether there is an element beside the asperities, or in place of them */

@@ -809,6 +809,12 @@ JL_IN jl_amounts jl_measure(const jlaw_law *law, jl_numbers n)
   jl_of_joint here[3], still[3];
   for (int i = 0; i < law->dim; i++) here[i] = jl_take_joint(n, i), still[i] = jl_each_joint(0.0);
   all.stored += jl_step_elements(law, n, jl_element_row(law), here, still, NULL, NULL, 0, 0);
+  for (int l = 0; law->coulomb && l < JL_JOINTS; l++) {
+    double shares[3];
+    jl_coulomb_shares(law, n.s + l, n.stride, shares);
+    JL_JOINT(all.sliding, l) = shares[0], JL_JOINT(all.slipping, l) = shares[1];
+    JL_JOINT(all.separated, l) = shares[2], JL_JOINT(all.reach, l) = JL_JOINT(here[0], l);
+  }
   return all;
 }
 

@@ -39,8 +39,9 @@ WHOLE = {
     "wears": Number("0", "1", "whether slopes wear"),
     "asperities": Number("0", "1", "whether there are asperities"),
     "bonded": Number("0", "1", "whether there is a bond beside them"),
+    "coulomb": Number("0", "1", "whether it is Coulomb's joint"),
 }
-ELEMENTS = ("bonded",)  # beside the asperities: functions of elements.h begin so
+ELEMENTS = ("bonded", "coulomb")  # beside the asperities: functions of elements.h begin so
 NUMBERS = {
     "soft": Number("0", "DBL_MAX", "1/lam"),
     "mu": Number("0", "DBL_MAX", "friction of asperities"),
@@ -57,6 +58,14 @@ NUMBERS = {
     "slip_begin": Number("0", "DBL_MAX", "1/m: the same of slip"),
     "opening_end": Number("0", "DBL_MAX", "1/m: where nothing of it is left"),
     "slip_end": Number("0", "DBL_MAX", "1/m"),
+    "coulomb_normal": Number("0", "DBL_MAX", "Pa/m: stiffness of Coulomb's joint"),
+    "coulomb_shear": Number("0", "DBL_MAX", "Pa/m"),
+    "coulomb_friction": Number("0", "DBL_MAX", "its friction"),
+    "coulomb_cohesion": Number("0", "DBL_MAX", "Pa"),
+    "coulomb_tension": Number("0", "DBL_MAX", "Pa"),
+    "coulomb_residual_friction": Number("0", "DBL_MAX", "once it has weakened"),
+    "coulomb_residual_cohesion": Number("0", "DBL_MAX", "Pa"),
+    "coulomb_weakening": Number("0", "DBL_MAX", "m of shear over which it weakens"),
     "closure_factor": Number("0", "DBL_MAX", "normal stress over Phi"),
     "stiffness_factor": Number("0", "DBL_MAX", "bound of |C| over Phi'"),
     "bending_factor": Number("0", "DBL_MAX", "what slopes that fade add to it, over Phi"),

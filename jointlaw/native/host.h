@@ -89,17 +89,6 @@ JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure);
 JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle);
 /* The state after the bodies changed their roles: axis 1 turned round, axis 2 kept, axis 3 turned
  * round with it. Shear along 2 changes its sign, along 3 not. Exact. */
-/* The rows of elements in axes 2 and 3 that are turned, or turned round */
-static JLAW_FUNCTION void jlaw_turn_elements_(const jlaw_law *law, double *s,
-                                              const double turn[2][2])
-{
-  double *row = s + jl_element_row(law);
-#define JL_TURN(name) \
-  if (law->name) jl_##name##_turn(law, row, turn), row += jl_##name##_rows(law);
-  JLAW_ELEMENTS(JL_TURN)
-#undef JL_TURN
-}
-
 JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s);
 
 /* Of the law that the tables were made for: a Python state of another fingerprint does not fit. */
@@ -403,6 +392,17 @@ JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
 }
 
 /* --------------------------------------------------------------- turned axes */
+
+/* The rows of elements in axes 2 and 3 that are turned, or turned round */
+static JLAW_FUNCTION void jlaw_turn_elements_(const jlaw_law *law, double *s,
+                                              const double turn[2][2])
+{
+  double *row = s + jl_element_row(law);
+#define JL_TURN(name) \
+  if (law->name) jl_##name##_turn(law, row, turn), row += jl_##name##_rows(law);
+  JLAW_ELEMENTS(JL_TURN)
+#undef JL_TURN
+}
 
 JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s)
 {

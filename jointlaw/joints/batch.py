@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..kernels.element import Measures
 from ..kernels.engine import LANES, Step, at, blocks, engine
-from ..kernels.reference import Measures
 from ..support.checks import Array, integer, numbers
-from .law_like import LawLike
 from .state import JointState, NonFiniteError
 from .time_step import stable_step
 
@@ -35,7 +34,8 @@ class JointBatch:
     faster with the compiled kernel.
     """
 
-    def __init__(self, law: LawLike, n: int, ledger: bool = True) -> None:
+    # law: of the class jointlaw.laws.law.Law, which lies above this file
+    def __init__(self, law: Any, n: int, ledger: bool = True) -> None:
         self.law, self.ledger = law, ledger
         self._engine = engine(law.tables)
         self._n = integer("n", n, 0)

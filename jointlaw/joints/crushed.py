@@ -1,16 +1,15 @@
 """Where the law ends: nothing in it stops a joint that yields from closing."""
 
 import warnings
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .law_like import LawLike
-
 CRUSHED = 0.9999  # share of the asperities in touch beyond which a joint that yields is closed
 
 
-def warn_if_crushed(law: LawLike, closure: ArrayLike) -> None:
+def warn_if_crushed(law: Any, closure: ArrayLike) -> None:
     """Warn of closures (m) at which nearly all asperities touch, if they yield.
 
     Real joints stop there, by the rock between the asperities. Laboratory tests and joints that

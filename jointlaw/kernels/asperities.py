@@ -18,9 +18,9 @@ from ..discretisation.tables import FacetTables, largest_reach
 from ..support.checks import Array
 from ..support.thresholds import LIMIT, NEAR, ROUNDED, TINY, UNDERFLOW
 from .cells import Cells, cells, compliance, reciprocal
-from .element import Element, Share, Shares
+from .element import Element, Measures, Share
 from .mating import Planes, Turning, offset, planes, turning
-from .stiffness import largest_stiffness, rises, steepest_gain, stiffness_of, stiffness_per_facet
+from .stiffness import rises, steepest_gain, stiffness_of, stiffness_per_facet
 from .unmated import first_touch
 from .wear import lowered, worn_share
 from .yielding import flatten, flattened, plastic_work, softening
@@ -83,7 +83,6 @@ class Asperities(Element):
         self.farthest = self.first_loading.farthest
 
     def numbers(self) -> dict[str, float]:
-        """As `Element.numbers`."""
         k, (per_slope, bend) = self.k, stiffness_per_facet(self.k)
         return {
             "soft": 1.0 / k.lam,
@@ -179,39 +178,34 @@ class Asperities(Element):
             C[:, 1:] += bending(k, after, sliders, new_.q, end, turning(k, moved[1:], slopes))
         return Share(F, lost, C)
 
-    def _now(self, delta: Array, state: Array) -> tuple[State, Array, Cells, Cells]:
-        """Parts of a state, friction limits, and the cells, virgin and as flattened."""
+    def measures(self, delta: Array, state: Array) -> Measures:
         k, now = self.k, parts(self.k, state)
         virgin = cells(k, effective_closure(k, delta, now.slopes))
+        held = flattened(virgin, cells(k, now.depth) if k.yields else None)
         limit = strength(k, planes(k, delta[1:], now.slopes).gamma)
-        return now, limit, virgin, flattened(virgin, cells(k, now.depth) if k.yields else None)
-
-    def shares(self, delta: Array, state: Array) -> Shares:
-        """As `Element.shares`: shares of all facet orientations, and of the friction capacity."""
-        k, (now, limit, virgin, held) = self.k, self._now(delta, state)
-        capped = at_limit(np.sqrt(now.q[0] ** 2 + now.q[1] ** 2), limit, held.G, virgin.force)
+        q2 = now.q[0] ** 2 + now.q[1] ** 2
+        capped = at_limit(np.sqrt(q2), limit, held.G, virgin.force)
         weight = (k.weight / k.weight.sum())[:, None]
         touches = held.y > (now.depth if k.yields else 0.0)
+        sliding = np.sum(weight * (touches & np.all(capped, axis=1)), axis=0)
         total = np.where(held.force > 0, held.force, 1.0)
-        at_their_limit = np.sum(np.where(capped, held.G, 0.0), axis=1) / total
-        return Shares(
-            np.sum(weight * (touches & np.all(capped, axis=1)), axis=0),
-            np.sum(weight * at_their_limit, axis=0),
-            np.sum(weight * ~touches, axis=0),
-            np.max(held.y, axis=0),
-        )
-
-    def stored(self, delta: Array, state: Array) -> Array:
-        """As `Element.stored`."""
-        k, (now, _, _, held) = self.k, self._now(delta, state)
+        slipping = np.sum(np.where(capped, held.G, 0.0), axis=1) / total
         normal = k.curve.energy(held.y)
         if k.yields:
             normal = normal - k.curve.energy(now.depth)
             normal = normal - k.curve.force(now.depth)[0] * (held.y - now.depth)
-            normal = np.where(held.y > now.depth, np.maximum(normal, 0.0), 0.0)
-        energy: Array = np.sum((k.area * k.c1)[:, None] * normal, axis=0)
-        q2 = now.q[0] ** 2 + now.q[1] ** 2
-        return energy + np.sum(compliance(k) * q2 * reciprocal(held.kappa), axis=(0, 1))
+            normal = np.where(touches, np.maximum(normal, 0.0), 0.0)
+        stored = np.sum((k.area * k.c1)[:, None] * normal, axis=0)
+        return Measures(
+            sliding,
+            np.sum(weight * slipping, axis=0),
+            np.sum(weight * ~touches, axis=0),
+            stored + np.sum(compliance(k) * q2 * reciprocal(held.kappa), axis=(0, 1)),
+            np.max(held.y, axis=0),
+        )
+
+    def stored(self, delta: Array, state: Array) -> Array:
+        return self.measures(delta, state).stored
 
     def normal_stress(self, closure: Array) -> Array:
         """As `Element.normal_stress`, of infinitely many depth cells: a joint's own slip later."""
@@ -222,12 +216,10 @@ class Asperities(Element):
         return stiffness_of(self.k, effective_closure(self.k, delta, parts(self.k, state).slopes))
 
     def largest_stiffness(self, closure: Array, shear: Array) -> Array:
-        """As `Element.largest_stiffness`; yielded and worn asperities are less stiff."""
-        return largest_stiffness(self.k, closure, shear)
-
-    def reached(self, closure: Array, shear: Array) -> Array:
-        """As `Element.reached`."""
-        return closure + np.max(rises(self.k, shear), axis=-1)
+        # shear closes one of two opposite facets, which are alike, and opens the other
+        closed = (closure[..., None] + 0.0 * self.k.c1, closure[..., None] + rises(self.k, shear))
+        level, risen = (stiffness_of(self.k, np.moveaxis(y, -1, 0)) for y in closed)
+        return 0.5 * (level + risen)
 
     @cached_property
     def first_loading(self) -> FirstLoading:

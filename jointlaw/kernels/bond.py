@@ -14,7 +14,6 @@ class Bonded(Element):
         self.bond, self.rows = bond, {"damage": 1}
 
     def numbers(self) -> dict[str, float]:
-        """As `Element.numbers`."""
         begin, end = self.bond.limits
         return {
             "bond_normal": self.bond.normal_stiffness,
@@ -52,20 +51,11 @@ class Bonded(Element):
         return Share((1.0 - damage) * K * u, lost, whole - (K * u)[:, None] * rate[None])
 
     def stored(self, delta: Array, state: Array) -> Array:
-        """As `Element.stored`."""
         return (1.0 - state[0]) * self._energy(self._opened(delta)[0])[1]
 
     def stiffness(self, delta: Array, state: Array) -> Array:
         """As `Element.stiffness`; softening, which lowers it, is left out."""
-        return (1.0 - state[0]) * self._largest
-
-    def largest_stiffness(self, closure: Array, shear: Array) -> Array:
-        """As `Element.largest_stiffness`."""
-        return np.full(np.broadcast_shapes(closure.shape, shear.shape), self._largest)
-
-    @property
-    def _largest(self) -> float:
-        return max(self.bond.normal_stiffness, self.bond.shear_stiffness)
+        return (1.0 - state[0]) * max(self.bond.normal_stiffness, self.bond.shear_stiffness)
 
     def _opened(self, delta: Array) -> tuple[Array, Array]:
         """Opening and slip u (dim, B), and their stiffnesses (dim, 1)."""

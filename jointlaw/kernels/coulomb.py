@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..support.checks import Array
 from ..support.thresholds import LIMIT, ROUNDED
-from .element import Element, Share, Shares
+from .element import Element, Measures, Share
 
 _OVERFLOW = 1e140  # Pa: squares beyond it overflow
 
@@ -45,7 +45,6 @@ class Coulomb(Element):
         self.farthest = self.reach
 
     def numbers(self) -> dict[str, float]:
-        """As `Element.numbers`."""
         return {
             "coulomb_normal": self.normal,
             "coulomb_shear": self.shear,
@@ -168,7 +167,6 @@ class Coulomb(Element):
         return self.friction + (self.residual_friction - self.friction) * w
 
     def stored(self, delta: Array, state: Array) -> Array:
-        """As `Element.stored`."""
         q, w = state[:-1], state[-1]
         u = np.where((w > 0.0) & (delta[0] < 0.0), 0.0, delta[0])
         return 0.5 * self.normal * u * u + 0.5 * squared(q) / self.shear
@@ -182,17 +180,12 @@ class Coulomb(Element):
         bound = np.maximum(self.normal * np.hypot(1.0, self.friction_at(w)), self.shear)
         return np.where((state[-1] > 0.0) & (delta[0] < 0.0), 0.0, bound)
 
-    def shares(self, delta: Array, state: Array) -> Shares:
-        """As `Element.shares`: all of it slips, or nothing."""
+    def measures(self, delta: Array, state: Array) -> Measures:
         apart = (state[-1] > 0.0) & (delta[0] < 0.0)
         cap = self.strength(state[-1], self.normal * delta[0])
         sliding = (~apart & (np.sqrt(squared(state[:-1])) >= cap * (1.0 - LIMIT))).astype(float)
-        return Shares(sliding, sliding, apart.astype(float), delta[0])
-
-    def largest_stiffness(self, closure: Array, shear: Array) -> Array:
-        """Upper bound (...) of `|C|` in Pa/m, at any closure; see `stiffness`."""
-        bound = max(self.normal * float(np.hypot(1.0, self.friction)), self.shear)
-        return np.full(np.broadcast_shapes(np.shape(closure), np.shape(shear)), bound)
+        stored = self.stored(delta, state)
+        return Measures(sliding, sliding, apart.astype(float), stored, delta[0])
 
 
 def squared(q: Array) -> Array:

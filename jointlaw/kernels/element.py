@@ -17,13 +17,14 @@ class Share(NamedTuple):
     C: Array | None  # (dim, dim, B) in Pa/m, if asked for
 
 
-class Shares(NamedTuple):
-    """How much of an element slips and touches, arrays (B,)."""
+class Measures(NamedTuple):
+    """What the states of joints amount to, arrays (n,): docs/theory-incremental.md."""
 
-    sliding: Array  # share of its area that touches and is at its friction limit
-    slipping: Array  # share of its friction capacity that is at its limit
-    separated: Array  # share of its area that is out of touch
-    reach: Array  # largest effective closure, m
+    sliding: Array  # share of all facet orientations: in touch, every cell at its limit
+    slipping: Array  # share of the friction capacity that is at its limit
+    separated: Array  # share of all facet orientations: out of touch
+    stored: Array  # elastic energy, J/m2
+    reach: Array  # largest effective closure of any facet, m
 
 
 class Element(ABC):
@@ -56,14 +57,6 @@ class Element(ABC):
     def stiffness(self, delta: Array, state: Array) -> Array:
         """Upper bound (B,) of `|C|` in Pa/m that it adds to joints in these states."""
 
-    @abstractmethod
-    def largest_stiffness(self, closure: Array, shear: Array) -> Array:
-        """The same (...) for all states up to this closure and this shear (...) in m."""
-
-    def reached(self, closure: Array, shear: Array) -> Array:
-        """Largest effective closure (...) in m at this closure and this shear (...) in m."""
-        return closure + 0.0 * shear
-
     def traction(self, delta: Array, state: Array) -> Array:
         """Traction (dim, B) in Pa that a state carries: that of a step by nothing."""
         return self.step(delta, np.zeros_like(delta), state, np.empty_like(state), False).F
@@ -76,6 +69,11 @@ class Element(ABC):
         F = self.step(np.zeros_like(d), d, virgin, virgin.copy(), False).F
         return F[0].reshape(closure.shape)
 
-    def shares(self, delta: Array, state: Array) -> Shares:
-        """What slips and what touches; asked of the first element of a joint."""
+    def largest_stiffness(self, closure: Array, shear: Array) -> Array:
+        """Upper bound (...) of `|C|` in Pa/m up to this closure and this shear (...) in m."""
+        virgin = np.zeros((sum(self.rows.values()), 1))
+        return self.stiffness(np.zeros((self.dim, 1)), virgin) + 0.0 * (closure + shear)
+
+    def measures(self, delta: Array, state: Array) -> Measures:
+        """What slips, touches and is stored; asked of the first element of a joint."""
         raise NotImplementedError(f"{type(self).__name__} stands beside asperities alone")

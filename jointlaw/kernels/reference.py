@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from ..discretisation.tables import FacetTables
 from ..support.checks import Array
 from . import asperities
 from .asperities import Asperities
-from .element import Element
+from .element import Element, Measures
 from .unmated import first_touch
 
 
@@ -88,16 +87,6 @@ class Tables:
             at = end
 
 
-class Measures(NamedTuple):
-    """What the states of joints amount to, arrays (n,): docs/theory-incremental.md."""
-
-    sliding: Array  # share of all facet orientations: in touch, every cell at its limit
-    slipping: Array  # share of the friction capacity that is at its limit
-    separated: Array  # share of all facet orientations: out of touch
-    stored: Array  # elastic energy, J/m2
-    reach: Array  # largest effective closure of any facet, m
-
-
 def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array, Array | None]:
     """Advance joints by the increments d (dim, B): new state, F (dim, B), C (dim, dim, B).
 
@@ -145,10 +134,10 @@ def stiffness(k: Tables, state: Array) -> Array:
 
 def measures(k: Tables, state: Array) -> Measures:
     """Shares, stored energy and reach of a batch of states (rows, B)."""
-    delta = state[: k.dim]
-    shares = next(element.shares(delta, own) for element, (own,) in k.own(state))
-    stored = sum_of(element.stored(delta, own) for element, (own,) in k.own(state))
-    return Measures(*shares[:3], stored, shares.reach)
+    delta, owned = state[: k.dim], [(element, own) for element, (own,) in k.own(state)]
+    first = owned[0][0].measures(delta, owned[0][1])
+    beside = (element.stored(delta, own) for element, own in owned[1:])
+    return first._replace(stored=sum(beside, start=first.stored))
 
 
 def sum_of(terms: Iterator[Array]) -> Array:

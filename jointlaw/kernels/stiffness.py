@@ -50,33 +50,14 @@ def steepest_gain(k: FacetTables) -> float:
 
 
 def stiffness_of(k: FacetTables, y: Array) -> Array:
-    """Upper bound (B,) of `|C|` in Pa/m of joints whose facets have the closures y (M, B)."""
+    """Upper bound (...) of `|C|` in Pa/m of joints whose facets have the closures y (M, ...)."""
     per_slope, bend = stiffness_per_facet(k)
     force, slope = k.curve.force(y)
-    bound: Array = per_slope @ slope
-    return bound + bend @ force if k.fades else bound
+    bound: Array = np.tensordot(per_slope, slope, 1)
+    return bound + np.tensordot(bend, force, 1) if k.fades else bound
 
 
 def rises(k: FacetTables, shear: Array) -> Array:
     """By how much shear (...) in m, in any direction, closes each facet at most (..., M), in m."""
     climbed = shear / np.hypot(1.0, shear / k.mating_length)
     return climbed[..., None] * np.linalg.norm(k.m[1:], axis=0)
-
-
-def largest_stiffness(k: FacetTables, closure: Array, shear: Array) -> Array:
-    """Upper bound (...) of `|C|` in Pa/m at closures (...) in m, under shear in any direction.
-
-    shear: distance (...) from the mated position, in m. It closes one of two opposite facets, which
-    are alike, and opens the other.
-    """
-    rise = rises(k, shear)
-    per_slope, bend = stiffness_per_facet(k)
-    force, slope = k.curve.force(closure)
-    stiffness: Array = np.sum(per_slope) * slope
-    if k.fades:
-        stiffness = stiffness + np.sum(bend) * force
-    if rise.any():
-        force, slope = k.curve.force(closure[..., None] + rise)
-        steep = slope @ per_slope
-        stiffness = 0.5 * (stiffness + (steep + force @ bend if k.fades else steep))
-    return stiffness

@@ -175,8 +175,7 @@ class Law:
         y, way = self._within_reach(closure), finite("shear", shear, "m")
         if not (way >= 0).all():
             raise ValueError(f"shear = {shear!r} m is out of bounds: it must be >= 0")
-        for one in self.tables.elements:
-            self._within_reach(one.reached(y, way))
+        self._within_reach(y + self.tables.stretch * way)
         return sum_of(one.largest_stiffness(y, way) for one in self.tables.elements)[()]
 
     def critical_time_step(

@@ -1,7 +1,7 @@
 """Distributions of asperity heights: which share of the asperities touches at an overlap r."""
 
 from dataclasses import dataclass
-from typing import Any, Protocol, Self
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -113,40 +113,19 @@ class Heights:
         return np.array(self.distribution[1])
 
 
-class HeightDistribution(Protocol):
-    """What heights are for a law: `GammaHeights`, `Heights`, or a class of the user's own.
-
-    Two of equal numbers must be equal and hash alike, as a frozen dataclass does.
-    """
-
-    def __hash__(self) -> int:
-        """By the numbers, not by the place in memory."""
-
-    @property
-    def overlap(self) -> float:
-        """r0, overlap of the two surfaces at zero closure, in m, >= 0."""
-
-    @property
-    def formation(self) -> str:
-        """One of `FORMATIONS`."""
-
-    def pdf(self, r: ArrayLike) -> Any:
-        """Density in 1/m at the overlap r in m, zero below zero."""
-
-    def cdf(self, r: ArrayLike) -> Any:
-        """Share of the asperities in touch at the overlap r in m, 0 to 1."""
-
-    def breakpoints(self) -> Array:
-        """Heights in m, ascending, between which the density is smooth on one scale."""
-
-
+HeightDistribution: TypeAlias = Any  # see `require_heights`
 # Kinds of heights by the names that files have, the default first
 KINDS = {"gamma": GammaHeights, "histogram": Heights}
 _ASKED = ("overlap", "formation", "pdf", "cdf", "breakpoints")
 
 
 def require_heights(heights: Any) -> None:
-    """Refuse what is neither None nor a distribution of heights, with what it lacks."""
+    """Refuse what is neither None nor a distribution of heights, with what it lacks.
+
+    A class of the user's own has `overlap` (m) and `formation`, `pdf(r)` in 1/m and `cdf(r)` of
+    arrays r (m), and `breakpoints()`: heights in m, ascending, between which its density is smooth
+    on one scale. Two of equal numbers are equal and hash alike, as a frozen dataclass is.
+    """
     if heights is None:
         return
     missing = [name for name in _ASKED if not hasattr(heights, name)]

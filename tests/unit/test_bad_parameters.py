@@ -154,7 +154,7 @@ def test_arguments_of_the_virgin_curve(law, method, value):
 )
 def test_closures_whose_forces_overflow(law, ask):
     """Beyond `largest_reach` a number would be infinite, or next to it: refused."""
-    ask(law, 0.9 * law.largest_reach)
+    ask(law, 0.3 * law.largest_reach)
     for value in (10.0 * law.largest_reach, 1e300):
         with pytest.raises(ValueError, match=r"(closure|delta) = .* is out of bounds.*overflow"):
             ask(law, value)

@@ -57,6 +57,8 @@ def parameters(law: JointLaw | None) -> tuple[dict[str, float], Settings]:
     """
     settings = Settings()
     if law is not None:
+        if not isinstance(law, JointLaw):
+            raise ValueError(f"law: {type(law).__name__} cannot be fitted; give it a JointLaw")
         settings = Settings(law, law.resolution, law.closure_range, law.plane)
     if not isinstance(settings.law.heights, GammaHeights):
         raise ValueError(

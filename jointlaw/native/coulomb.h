@@ -147,8 +147,9 @@ JL_IN double jl_coulomb_step(const jlaw_law *law, jl_part *p, int tangent)
 
 JL_IN int jl_coulomb_rows(const jlaw_law *law) { return law->dim; }
 
-JL_IN double jl_coulomb_stiffness(const jlaw_law *law, double damage)
+JL_IN double jl_coulomb_stiffness(const jlaw_law *law, double damage, double closure)
 {
+  if (damage > 0.0 && closure < 0.0) return 0.0; /* apart */
   const double mu = jl_coulomb_friction(law, law->coulomb_weakening > 0.0 ? damage : 1.0);
   const double slides = law->coulomb_normal * sqrt(1.0 + mu * mu);
   return slides > law->coulomb_shear ? slides : law->coulomb_shear;

@@ -3,7 +3,7 @@
  *
  *   jl_NAME_rows       number of its rows in a state; the last is its damage
  *   jl_NAME_step       a step, which returns the stored energy after it
- *   jl_NAME_stiffness  bound of |C| at this damage; at 0 that of all states
+ *   jl_NAME_stiffness  bound of |C| at this damage and closure; at 0 that of all states
  *   jl_NAME_good       whether rows are such as a step may leave
  *   jl_NAME_turn       its rows in axes 2 and 3 that are turned, or axis 2 turned round
  */
@@ -49,8 +49,9 @@ JL_IN int jl_bonded_rows(const jlaw_law *law)
   return 1;
 }
 
-JL_IN double jl_bonded_stiffness(const jlaw_law *law, double damage)
+JL_IN double jl_bonded_stiffness(const jlaw_law *law, double damage, double closure)
 {
+  (void) closure;
   const double K[2] = {law->bond_normal, law->bond_shear};
   return (1.0 - damage) * (K[0] > K[1] ? K[0] : K[1]);
 }
@@ -140,15 +141,15 @@ JL_IN jl_of_joint jl_step_elements(const jlaw_law *law, jl_numbers n, int row,
   return stored;
 }
 
-/* Bound of the |C| (Pa/m) that elements add, whose rows begin at `row`; a virgin joint's if NULL */
-JL_IN double jl_stiffness_of_elements(const jlaw_law *law, const double *row, size_t stride)
+/* Bound of the |C| (Pa/m) that elements add in a state of these numbers; in all states if NULL */
+JL_IN double jl_stiffness_of_elements(const jlaw_law *law, const double *s, int row, size_t stride)
 {
   double bound = 0.0;
-#define JL_STIFFNESS(name)                                                                      \
-  if (law->name) {                                                                              \
-    const int rows = jl_##name##_rows(law);                                                     \
-    bound += jl_##name##_stiffness(law, row && rows ? row[(size_t) (rows - 1) * stride] : 0.0); \
-    if (row) row += (size_t) rows * stride;                                                     \
+#define JL_STIFFNESS(name)                                                                   \
+  if (law->name) {                                                                           \
+    row += jl_##name##_rows(law);                                                            \
+    const double damage = s && jl_##name##_rows(law) ? s[(size_t) (row - 1) * stride] : 0.0; \
+    bound += jl_##name##_stiffness(law, damage, s ? s[0] : 0.0);                             \
   }
   JLAW_ELEMENTS(JL_STIFFNESS)
 #undef JL_STIFFNESS

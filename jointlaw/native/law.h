@@ -839,9 +839,8 @@ JL_IN jl_of_joint jl_stiffness(const jlaw_law *law, jl_numbers n)
     sum[at / JL_TOGETHER % JL_SUMS].bound += bound;
   }
   jl_of_joint bound = jl_total(sum, bound);
-  const double *row = n.s + (size_t) jl_element_row(law) * n.stride;
   for (int l = 0; l < JL_JOINTS; l++)
-    JL_JOINT(bound, l) += jl_stiffness_of_elements(law, row + l, n.stride);
+    JL_JOINT(bound, l) += jl_stiffness_of_elements(law, n.s + l, jl_element_row(law), n.stride);
   return bound;
 }
 

@@ -72,7 +72,7 @@ class Element(ABC):
     def largest_stiffness(self, closure: Array, shear: Array) -> Array:
         """Upper bound (...) of `|C|` in Pa/m up to this closure and this shear (...) in m."""
         virgin = np.zeros((sum(self.rows.values()), 1))
-        return self.stiffness(np.zeros((self.dim, 1)), virgin) + 0.0 * (closure + shear)
+        return self.stiffness(np.zeros((self.dim, 1)), virgin)[0] + 0.0 * (closure + shear)
 
     def measures(self, delta: Array, state: Array) -> Measures:
         """What slips, touches and is stored; asked of the first element of a joint."""

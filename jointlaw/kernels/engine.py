@@ -139,7 +139,7 @@ class NativeEngine:
 
     def __init__(self, tables: Tables, loaded: ctypes.CDLL) -> None:
         self._law, self._sliders = library.NativeLaw(tables), tables.sliders
-        self._library, self.lanes = loaded, loaded.jlaw_lanes()
+        self._library, self.lanes = loaded, library.lanes(loaded)
         # rows of a block: the state, then Phi and Phi' of all facets, which save half the look-ups;
         # with flattened facets, the same at their depth
         self.rows = tables.rows + 2 * (1 + tables.yields) * len(tables.c1)

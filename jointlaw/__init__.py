@@ -14,7 +14,7 @@ from .joints.pool import JointPool
 from .joints.state import NonFiniteError, load_state
 from .laboratory.experiments import closure_test, direct_shear
 from .laboratory.record import Record
-from .law import JointLaw
+from .laws.joint_law import JointLaw
 from .paper import closed_form
 from .paper.secant import secant
 from .parameters.asperity import Asperity

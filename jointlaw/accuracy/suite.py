@@ -45,7 +45,7 @@ from ..support.progress import track
 from .slip import HELD, Slip, distance, random_ways, slip, standard_ways
 
 if TYPE_CHECKING:
-    from ..law import JointLaw
+    from ..laws.joint_law import JointLaw
 
 STEPS = 120  # of each path
 FAR = 3.0  # R: the longest slip at a given closure
@@ -178,7 +178,7 @@ def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]
     shear = legs([0, 0.1, 1], [0, seat, seat], [0, 0, 1])
     back = legs([0, 0.1, 0.35, 0.75, 1], [0, *4 * [seat]], [0, 0, 0.6, -0.6, 0])
     fixed = legs([0, 0.2, 1], [0, 1, 1], [0, 0, 1])
-    sheared = min(distance(law.tables.mating_length, R) / R, FAR)
+    sheared = min(distance(law.mating_length, R) / R, FAR)
     far = legs([0, 0.1, 0.55, 1], [0, 0.5, 0.5, 0.5], [0, 0, sheared, 0])
     again = legs([0, 0.15, 0.35, 0.6, 0.7, 1], [0, 0.7, 0.7, -0.6, -0.6, 0.8],
                  [0, 0, 0.4, 0.7, 0.2, 0.5])  # fmt: skip
@@ -244,7 +244,7 @@ def far_path(law: JointLaw, rng: np.random.Generator, stress: float, s: Array) -
     """
     R = law.closure_range
     closure = float(law.closure(stress * rng.uniform(0.1, 1.0))) / R
-    way = min(distance(law.tables.mating_length, R) / R, FAR) * rng.uniform(0.3, 1.0)
+    way = min(distance(law.mating_length, R) / R, FAR) * rng.uniform(0.3, 1.0)
     back, turn = way * rng.uniform(-1.0, 0.5), rng.uniform(0.0, 2.0 * np.pi)
     at = [0.0, 0.1, 0.4, 0.8, 1.0]
     shear = np.interp(s, at, [0.0, 0.0, way, back, way])

@@ -13,7 +13,7 @@ from ..support.progress import track
 from .suite import Suite, reference_resolution, scaled, standard_suite
 
 if TYPE_CHECKING:
-    from ..law import JointLaw
+    from ..laws.joint_law import JointLaw
 
 # How many times better than the tolerance: 30 random laws then kept it on all paths that were not
 # tried, the worst at 0.88 of it (docs/validation.md, "Does the tolerance hold elsewhere?")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..law import JointLaw
+from ..laws.joint_law import JointLaw
 from ..support.checks import Array
 from ..support.pyplot import pyplot, style, written
 from .forward import build, build_for_shear, log_stress

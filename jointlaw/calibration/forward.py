@@ -11,7 +11,7 @@ from scipy import special
 from ..discretisation.facets import facets
 from ..discretisation.first_loading import facet_sum, yield_sum
 from ..discretisation.virgin_curve import exact_force
-from ..law import SHORTEST, JointLaw
+from ..laws.joint_law import SHORTEST, JointLaw
 from ..parameters.asperity import Asperity
 from ..parameters.bond import MODES, Bond
 from ..parameters.heights import GammaHeights

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import special
 from scipy.optimize import least_squares
 
-from ..law import JointLaw
+from ..laws.joint_law import JointLaw
 from ..parameters.orientation import largest_c
 from ..support.checks import Array, number, one_of
 from .forward import DEFAULTS, Settings, build, log_stress, parameters

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import presets
-from ..law import JointLaw
+from ..laws.joint_law import JointLaw
 from ..parameters import keys
 from ..parameters.resolution import NAMED
 from ..parameters.rock import ROCK, require_rock

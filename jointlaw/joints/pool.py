@@ -5,8 +5,8 @@ from collections.abc import Hashable, Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..law import JointLaw
 from .batch import JointBatch
+from .law_like import LawLike
 from .state import JointState
 
 Places = NDArray[np.intp]
@@ -21,7 +21,7 @@ class JointPool:
     starts anew.
     """
 
-    def __init__(self, law: JointLaw, ledger: bool = True) -> None:
+    def __init__(self, law: LawLike, ledger: bool = True) -> None:
         self.batch = JointBatch(law, 0, ledger)
         self._place: dict[Hashable, int] = {}
         self._free: list[int] = []

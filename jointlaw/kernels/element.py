@@ -1,5 +1,6 @@
 """An element: one of the parallel parts that a joint is the sum of."""
 
+import math
 from abc import ABC, abstractmethod
 from typing import NamedTuple
 
@@ -9,11 +10,20 @@ from ..support.checks import Array
 
 
 class Share(NamedTuple):
-    """What an element of B joints adds to a step."""
+    """What an element of B joints adds in a step."""
 
     F: Array  # (dim, B) in Pa
     lost: Array  # (B,) in J/m2, >= 0
     C: Array | None  # (dim, dim, B) in Pa/m, if asked for
+
+
+class Shares(NamedTuple):
+    """How much of an element slips and touches, arrays (B,)."""
+
+    sliding: Array  # share of its area that touches and is at its friction limit
+    slipping: Array  # share of its friction capacity that is at its limit
+    separated: Array  # share of its area that is out of touch
+    reach: Array  # largest effective closure, m
 
 
 class Element(ABC):
@@ -21,9 +31,13 @@ class Element(ABC):
 
     Arrays have physical axes first and B joints last. `delta` (dim, B) is the displacement from the
     mated position in m, `state` (rows, B) the element's own rows of the state; zeros are virgin.
+    A row that is called damage is 1 in joints whose faces meet anew.
     """
 
-    rows: int  # of its state
+    rows: dict[str, int]  # of its state: how many, by name
+    stretch = 1.0  # bound of the closure that it feels over the size of the displacement
+    reach = math.inf  # m: up to this closure its forces, energies and their squares stay finite
+    farthest = 1e304  # m: largest closure that a normal stress is looked for in
 
     @abstractmethod
     def numbers(self) -> dict[str, float]:
@@ -43,7 +57,11 @@ class Element(ABC):
 
     @abstractmethod
     def largest_stiffness(self, closure: Array, shear: Array) -> Array:
-        """Upper bound (...) of `|C|` in Pa/m up to this closure and this shear (...) in m."""
+        """The same (...) for all states up to this closure and this shear (...) in m."""
+
+    def reached(self, closure: Array, shear: Array) -> Array:
+        """Largest effective closure (...) in m at this closure and this shear (...) in m."""
+        return closure + 0.0 * shear
 
     def traction(self, delta: Array, state: Array) -> Array:
         """Traction (dim, B) in Pa that a state carries: that of a step by nothing."""
@@ -52,6 +70,10 @@ class Element(ABC):
     def normal_stress(self, closure: Array) -> Array:
         """Normal stress (...) in Pa of first loading to this closure (...) in m, unsheared."""
         d = closure.reshape(1, -1)
-        virgin = np.zeros((self.rows, d.shape[1]))
+        virgin = np.zeros((sum(self.rows.values()), d.shape[1]))
         F = self.step(np.zeros_like(d), d, virgin, virgin.copy(), False).F
         return F[0].reshape(closure.shape)
+
+    def shares(self, delta: Array, state: Array) -> Shares:
+        """What slips and what touches; asked of the first element of a joint."""
+        raise NotImplementedError(f"{type(self).__name__} stands beside asperities alone")

@@ -4,7 +4,7 @@
  */
 #include "batch.h"
 #include "lanes.h"
-#include "bond.h"
+#include "elements.h"
 #include "law.h"
 #include <stdlib.h>
 #include <string.h>
@@ -32,7 +32,7 @@ static void advance_block(const jlaw_batch *b, double *block, size_t ahead, long
       p[i] = jl_each_joint(0.0);
       for (int l = 0; l < some; l++) JL_JOINT(p[i], l) = d[(at + l) * dim + i];
     }
-    jl_step_of_kind(b->law, n, p, f, c, b->ledger, C != NULL, kept);
+    jl_step_of_kind(b->law, n, p, f, c, b->ledger, C != NULL, kept, b->hold);
     for (int l = 0; l < some; l++) {
       for (int i = 0; i < dim; i++) F[(at + l) * dim + i] = JL_JOINT(f[i], l);
       for (int i = 0; C && i < dim * dim; i++) C[(at + l) * dim * dim + i] = JL_JOINT(c[i], l);
@@ -87,6 +87,17 @@ int NAME(jlaw_measure)(const jlaw_batch *b, long first, long last)
     for (int i = 0; i < 5; i++)
       for (int l = 0; l < JL_JOINTS && at + l < last; l++)
         b->F[i * b->n + at + l] = JL_JOINT(out[i], l);
+  }
+  return 0;
+}
+
+/* Bounds (n,) of |C| of joints first to last - 1 as they are, into b->F */
+int NAME(jlaw_stiffness)(const jlaw_batch *b, long first, long last)
+{
+  for (long at = first; at < last; at += JL_JOINTS) {
+    const jl_numbers n = {joint_of(b, at), BLOCK, 0};
+    const jl_of_joint bound = jl_stiffness(b->law, n);
+    for (int l = 0; l < JL_JOINTS && at + l < last; l++) b->F[at + l] = JL_JOINT(bound, l);
   }
   return 0;
 }

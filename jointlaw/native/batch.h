@@ -21,6 +21,7 @@ typedef struct {
   int alone; /* whether the states lie (n, rows) */
   int lanes; /* of vectors: at most jlaw_lanes(), and one of jlaw_levels() */
   int ledger, keep;
+  int hold; /* whether slopes that are to wear have not yet: what a state carries */
 } jlaw_batch;
 
 typedef int jlaw_call(const jlaw_batch *b, long first, long last);

@@ -4,7 +4,8 @@
 #include "batch.h"
 #include "export.h"
 
-#define CALLS(KIND) jlaw_advance##KIND, jlaw_measure##KIND, jlaw_refresh##KIND
+#define CALLS(KIND) \
+  jlaw_advance##KIND, jlaw_measure##KIND, jlaw_refresh##KIND, jlaw_stiffness##KIND
 #if JLAW_LEVELS & 8
 extern jlaw_call CALLS(_8), CALLS(_8_alone);
 #endif
@@ -17,12 +18,12 @@ extern jlaw_call CALLS(_2), CALLS(_2_alone);
 
 OUT int jlaw_levels(void) { return JLAW_LEVELS; }
 
-/* Advance, measure or refresh (`what` = 0, 1, 2) by vectors of so many lanes */
+/* Advance, measure, refresh or stiffness (`what` = 0 to 3), by vectors of so many lanes */
 static jlaw_call *find(int lanes, int alone, int what)
 {
 #define LEVEL(W) \
   if (lanes == W) { \
-    static jlaw_call *const calls[2][3] = {{CALLS(_##W)}, {CALLS(_##W##_alone)}}; \
+    static jlaw_call *const calls[2][4] = {{CALLS(_##W)}, {CALLS(_##W##_alone)}}; \
     return calls[alone][what]; \
   }
 #if JLAW_LEVELS & 8

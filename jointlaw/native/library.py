@@ -5,14 +5,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from ..discretisation.tables import Tables
 from . import build
-from .layout import Law
-from .pack import in_blocks, pack
 
-ADVANCE, MEASURE, REFRESH = range(3)  # what jlaw_run calls
+ADVANCE, MEASURE, REFRESH, STIFFNESS = range(4)  # what jlaw_run calls
 
 
 ANEW = "build it anew with `python -m jointlaw.native`, or set JOINTLAW_KERNEL=numpy to do without"
@@ -28,7 +23,7 @@ class BatchCall(ctypes.Structure):
     _fields_ = [
         *((name, ctypes.c_void_p) for name in ("law", "state", "d", "F", "C", "index")),
         *((name, ctypes.c_longlong) for name in ("n", "taken", "grain")),
-        *((name, ctypes.c_int) for name in ("rows", "alone", "lanes", "ledger", "keep")),
+        *((name, ctypes.c_int) for name in ("rows", "alone", "lanes", "ledger", "keep", "hold")),
     ]
 
 
@@ -61,20 +56,6 @@ def lanes(library: Any) -> int:
     """Lanes of the widest vectors that the library and this processor have; 0 for none."""
     here, built = library.jlaw_lanes(), library.jlaw_levels()
     return max((n for n in build.LEVELS if n <= here and n & built), default=0)
-
-
-class NativeLaw:
-    """The tables of a law as the library reads them."""
-
-    def __init__(self, tables: Tables) -> None:
-        numbers, arrays = pack(tables)
-        arrays = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
-        for name in ("facet", "depth"):
-            arrays[name] = in_blocks(arrays[name])
-        pointers = {name: array.ctypes.data for name, array in arrays.items()}
-        self._arrays = arrays  # which the structure points to
-        self._law = Law(**numbers, **pointers)
-        self.address = ctypes.addressof(self._law)
 
 
 def address(array: Any) -> int | None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..joints.batch import JointBatch
 from ..laboratory.normal_control import NormalCondition, closing_increments
-from ..law import JointLaw
+from ..laws.joint_law import JointLaw
 from ..parameters.resolution import SLIP
 from ..support.checks import Array, integer, more_than
 from ..support.version import __version__

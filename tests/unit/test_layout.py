@@ -62,7 +62,7 @@ def test_a_circle_is_found_and_imports_in_functions_count():
     graph = {"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}
     assert circle(graph) in (["a", "b", "c", "a"], ["b", "c", "a", "b"], ["c", "a", "b", "c"])
     assert circle(graph | {"c": set()}) == []
-    assert "jointlaw/accuracy/tradeoff.py" in imported("jointlaw/law.py")
+    assert "jointlaw/accuracy/tradeoff.py" in imported("jointlaw/laws/joint_law.py")
 
 
 def test_jointlaw_never_imports_the_demo():

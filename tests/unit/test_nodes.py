@@ -67,7 +67,7 @@ def test_cells_rise_and_scale_with_the_unit_of_length(formation):
 
 
 def test_light_facets_have_fewer_cells_and_all_are_counted():
-    k = jl.presets.load("westerly-smooth").tables
+    k = jl.presets.load("westerly-smooth").tables.asperities
     cells = np.count_nonzero(k.depth[:, :-1] < UNUSED, axis=1)
     assert k.cells == cells.max() > cells.min() == 1
     assert k.sliders == cells.sum() < len(cells) * k.cells

@@ -10,6 +10,7 @@ from work import WorkMeter
 
 import jointlaw as jl
 from jointlaw.kernels import reference as kernel
+from jointlaw.kernels.asperities import effective_closure
 
 PATHS, CYCLES = 34, 10  # of each of six kinds of law; docs/measure/gains.py searches on 60
 SEEDS = [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, PATHS))]
@@ -53,9 +54,9 @@ def gains(k, states, d):
 def scale(k, states):
     """Largest energy (J/m2) in the springs of a joint on its way, had none yielded: what is stored
     is a small difference of such energies, and has their rounding."""
-    now = kernel.parts(k, states)
-    y = kernel.effective_closure(k, now.delta, now.slopes)
-    return max(np.max((k.area * k.c1) @ k.curve.energy(y)), np.max(stored(k, states)))
+    now, whole, k = kernel.parts(k, states), k, k.asperities
+    y = effective_closure(k, now.delta, now.slopes)
+    return max(np.max((k.area * k.c1) @ k.curve.energy(y)), np.max(stored(whole, states)))
 
 
 @pytest.mark.parametrize("yields", [False, True])

@@ -4,7 +4,7 @@ from importlib import resources
 from pathlib import Path
 from textwrap import fill
 
-from ...law import JointLaw
+from ...laws.joint_law import JointLaw
 from ...native.layout import jointlaw_h
 from ...support.checks import number
 from ...support.files import write_files

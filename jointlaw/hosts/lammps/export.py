@@ -3,7 +3,7 @@
 from importlib import resources
 from pathlib import Path
 
-from ...law import JointLaw
+from ...laws.joint_law import JointLaw
 from ...native.layout import jointlaw_h
 from ...support.files import write_files
 from ...tables.tabulate import require_3d

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ... import tables
-from ...law import JointLaw
+from ...laws.joint_law import JointLaw
 from ...support.files import write_files, write_json
 from ...tables.joint_table import JointTable
 from ...tables.tabulate import require_3d, tabulate

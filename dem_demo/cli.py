@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from math import inf
 from pathlib import Path
 
-from jointlaw.laboratory.experiments import PathError
+from jointlaw import PathError
 from jointlaw.support.files import require_free, write_json
 from jointlaw.support.pyplot import FORMATS
 
@@ -62,12 +62,6 @@ OPTIONS = {
     },
     "--seeds": {"type": int, "nargs": "+", "default": [1, 2, 3], "help": "default 1 2 3"},
 }
-REMOVED = {
-    "compare --tilt": "turn `gravity` in the scene file",
-    "compare --critical": "strength-reduction finds the critical tilt",
-    "ablate --leave-out": "all variants run",
-    "compare --out": "it prints; write `> FILE`",
-}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -84,8 +78,6 @@ def main(arguments: list[str] | None = None) -> int:
     for option in options:
         parser.add_argument(option, **OPTIONS[option])
     try:
-        for word in REMOVED.keys() & {f"{verb} {word.partition('=')[0]}" for word in words}:
-            raise ValueError(f"{word} is removed: {REMOVED[word]}")
         given = parser.parse_args(words)
         if getattr(given, "force", None) is False:
             require_free(given.out)

@@ -165,7 +165,7 @@ class NativeEngine:
 
     def __init__(self, tables: Tables, loaded: ctypes.CDLL) -> None:
         self._law, self._sliders = NativeLaw(tables), tables.sliders
-        self._library, self.lanes = loaded, loaded.jlaw_lanes()
+        self._library, self.lanes = loaded, library.lanes(loaded)
         # rows of a block: the state, then Phi and Phi' of all facets, which save half the look-ups;
         # with flattened facets, the same at their depth
         facets = 0 if tables.asperities is None else len(tables.asperities.c1)

@@ -19,7 +19,7 @@ typedef struct {
   long long taken, grain; /* joints that threads have taken: 0 before a run; how many at once */
   int rows;
   int alone; /* whether the states lie (n, rows) */
-  int lanes; /* of vectors: at most what jlaw_lanes() says */
+  int lanes; /* of vectors: at most jlaw_lanes(), and one of jlaw_levels() */
   int ledger, keep;
   int hold; /* whether slopes that are to wear have not yet: what a state carries */
 } jlaw_batch;

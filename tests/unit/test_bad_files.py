@@ -5,7 +5,7 @@ import re
 import pytest
 
 import jointlaw as jl
-from jointlaw.parameters.keys import Removed, checked
+from jointlaw.parameters.keys import checked
 from jointlaw.support.checks import number
 
 GOOD = """
@@ -113,16 +113,16 @@ def test_a_mapping_is_checked_alike_and_left_alone():
         jl.JointLaw.from_dict(data, "here")
 
 
-RULES = {"end!": number, "drive": [{"block!": number}], "old": Removed("write end", neutral=0)}
+RULES = {"end!": number, "drive": [{"block!": number}]}
 
 
-def test_rules_for_lists_of_tables_and_removed_keys():
-    data = {"end": 2, "drive": [{"block": 1}], "old": 0}
+def test_rules_for_lists_of_tables():
+    data = {"end": 2, "drive": [{"block": 1}]}
     assert checked(data, RULES, "f") == {"end": 2.0, "drive": [{"block": 1.0}]}
     for message, change in {
         "f: key 'run.drive[1].block' is missing": {"drive": [{"block": 1}, {}]},
         "f: key 'run.drive' must be a list": {"drive": 3},
-        "f: key 'run.old' is removed: write end": {"old": 1},
+        "f: key 'run.old' is unknown; known here: drive, end": {"old": 1},
         "run.end = 'x' is not a number": {"end": "x"},
     }.items():
         with pytest.raises(ValueError, match=re.escape(message)):

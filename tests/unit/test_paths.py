@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.laboratory.experiments import PathError
+from jointlaw import PathError
 
 N = 10e6  # Pa
 

@@ -9,7 +9,7 @@ from ..support.checks import Array
 from ..support.thresholds import LIMIT, ROUNDED
 from .element import Element, Measures, Share
 
-_OVERFLOW = 1e140  # Pa: squares beyond it overflow
+_OVERFLOW = 1e70  # Pa: fourth powers beyond it overflow
 
 
 class Slid(NamedTuple):
@@ -97,8 +97,11 @@ class Coulomb(Element):
         lost = lost + np.where(parts, 0.5 * squared(slid.q) / self.shear, 0.0)
         new[:-1] = np.where(touches, slid.q, 0.0)
         new[-1] = np.where(touches, slid.w, 1.0)
-        C = self.tangent(np.where(apart, 1.0, w), end, touches, slid) if tangent else None
-        return Share(np.concatenate([end[None], new[:-1]]), lost, C)
+        F, C = np.concatenate([end[None], new[:-1]]), None
+        if tangent:
+            C = self.tangent(np.where(apart, 1.0, w), end, self.shear * share, slid)
+            C = np.where(touches, C, 0.0)
+        return Share(F, lost, C)
 
     def slide(self, q: Array, w: Array, dq: Array, start: Array, end: Array) -> Slid:
         """Shear by dq while the normal stress goes from `start` to `end`.
@@ -133,18 +136,19 @@ class Coulomb(Element):
         scale = np.divide(hold, size, out=np.ones_like(size), where=slides)
         return Slid(scale * trial, now, np.where(slides, lost, 0.0), slides, trial, hold)
 
-    def tangent(self, w: Array, sigma: Array, touches: Array, slid: Slid) -> Array:
-        """Tangent (dim, dim, B) in Pa/m; w is that before the slide.
+    def tangent(self, w: Array, sigma: Array, ks: Array, slid: Slid) -> Array:
+        """Tangent (dim, dim, B) in Pa/m of joints that touch; w is that before the slide.
 
-        C_nn = kn; C_ss = ks; where it slides C_ss = ks h/|q*| (1 - n n), C_sn = mu kn n, and while
-        it weakens, by the fall f of the strength from w = 0 to 1, over the length L,
-        C_ss -= (f/L) n n, C_sn += (f/L) (mu kn/ks) n, with mu at the old w.
+        C_nn = kn; C_ss = ks, less in the step in which faces touch, by the part of it before touch.
+        Where it slides C_ss = ks h/|q*| (1 - n n), C_sn = mu kn n, and while it weakens, f the fall
+        of the strength from w = 0 to 1, over the length L, C_ss -= (f/L) n n, C_sn += (f/L)
+        (mu kn/ks) n, with mu at the old w.
         """
         size = np.sqrt(squared(slid.trial))
         n = np.divide(slid.trial, size, out=np.zeros_like(slid.trial), where=size > 0.0)
-        along = np.where(slid.cap > 0.0, self.shear, 0.0)
+        along = np.where(slid.cap > 0.0, ks, 0.0)
         across = np.where(slid.slides, 0.0, along)
-        turn = np.divide(self.shear * slid.cap, size, out=along.copy(), where=slid.slides)
+        turn = np.divide(ks * slid.cap, size, out=along.copy(), where=slid.slides)
         push = np.where(slid.slides, self.normal * self.friction_at(slid.w), 0.0)
         if self.weakening > 0.0:
             fall = self.strength(np.zeros_like(w), sigma) - self.strength(np.ones_like(w), sigma)
@@ -155,7 +159,7 @@ class Coulomb(Element):
         C[0, 0] = self.normal
         C[1:, 0] = push * n
         C[1:, 1:] = turn * np.eye(self.dim - 1)[:, :, None] + (across - turn) * n[:, None] * n
-        return np.where(touches, C, 0.0)
+        return C
 
     def strength(self, w: Array, sigma: Array) -> Array:
         """Strength in shear (B,) in Pa at this w and this normal stress."""
@@ -200,6 +204,10 @@ def leaving(q: Array, dq: Array, cap: Array, rise: Array) -> tuple[NDArray[np.bo
     A t^2 + 2 B t = C, free of cancellation.
     """
     leaves = np.sqrt(squared(q + dq)) > (cap + rise) * (1.0 + ROUNDED)
+    cap, rise = (
+        np.where(leaves, cap, 0.0),
+        np.where(leaves, rise, 0.0),
+    )  # whose squares may overflow
     A = squared(dq) - rise * rise
     B = np.sum(q * dq, axis=0) - cap * rise
     C = np.maximum(cap * cap - squared(q), 0.0)

@@ -72,10 +72,10 @@ JL_IN void jl_slip_on(const jlaw_law *law, jl_slip *s)
   for (int i = 0; i < 2; i++) s->now[i] = s->hold / s->size * s->trial[i];
 }
 
-/* Tangent of a joint that touches; w is that before the slide */
-JL_IN void jl_coulomb_tangent(const jlaw_law *law, const jl_slip *s, double C[9])
+/* Tangent of a joint that touches; w is that before the slide, ks less in the step of touch */
+JL_IN void jl_coulomb_tangent(const jlaw_law *law, const jl_slip *s, double ks, double C[9])
 {
-  const double kn = law->coulomb_normal, ks = law->coulomb_shear, L = law->coulomb_weakening;
+  const double kn = law->coulomb_normal, L = law->coulomb_weakening;
   double n[2] = {0.0, 0.0}, turn = s->hold > 0.0 ? ks : 0.0, across = turn, push = 0.0;
   if (s->size > 0.0) n[0] = s->trial[0] / s->size, n[1] = s->trial[1] / s->size;
   if (s->slides) {
@@ -85,7 +85,7 @@ JL_IN void jl_coulomb_tangent(const jlaw_law *law, const jl_slip *s, double C[9]
       const double slope =
           (jl_coulomb_strength(law, 0.0, s->end) - jl_coulomb_strength(law, 1.0, s->end)) / L;
       across = across - slope;
-      push = push + slope * (kn * jl_coulomb_friction(law, s->w) / ks);
+      push = push + slope * (kn * jl_coulomb_friction(law, s->w) / law->coulomb_shear);
     }
   }
   C[0] = kn;
@@ -141,7 +141,7 @@ JL_IN double jl_coulomb_step(const jlaw_law *law, jl_part *p, int tangent)
   for (int i = 0; i < last; i++) p->F[i + 1] = p->row[i] = touches ? s.now[i] : 0.0;
   p->F[0] = s.end;
   p->row[last] = touches ? s.w1 : 1.0;
-  if (tangent && touches) jl_coulomb_tangent(law, &s, p->C);
+  if (tangent && touches) jl_coulomb_tangent(law, &s, ks * share, p->C);
   return touches ? 0.5 * kn * u * u + shear : 0.0;
 }
 
@@ -158,8 +158,7 @@ JL_IN double jl_coulomb_stiffness(const jlaw_law *law, double damage, double clo
 JL_IN int jl_coulomb_good(const jlaw_law *law, const double *row)
 {
   const int last = law->dim - 1;
-  return row[last] >= 0.0 && row[last] <= 1.0 && fabs(row[0]) < 1e140
-         && fabs(row[last - 1]) < 1e140;
+  return row[last] >= 0.0 && row[last] <= 1.0 && fabs(row[0]) < 1e70 && fabs(row[last - 1]) < 1e70;
 }
 
 JL_IN void jl_coulomb_turn(const jlaw_law *law, double *row, const double turn[2][2])

@@ -17,8 +17,8 @@ from .discretisation.first_loading import FirstLoading, facet_sum, yield_sum
 from .discretisation.tables import VERSION, Tables, largest_reach, tables
 from .discretisation.virgin_curve import VirginCurve, virgin_curve
 from .joints.batch import JointBatch
-from .joints.crushed import warn_if_crushed
 from .joints.joint import Joint
+from .joints.seat import seat
 from .joints.time_step import largest_stiffness, stable_step
 from .kernels.bond import hold
 from .kernels.engine import step_states
@@ -137,9 +137,10 @@ class JointLaw:
     # ----------------------------------------------------------------- joints
 
     def joint(self, normal_stress: float = 0.0, mated: bool = True) -> Joint:
-        """One joint of this law, unsheared, closed to `closure(normal_stress)` (Pa, >= 0).
+        """One joint of this law, unsheared, closed to this normal stress (Pa, >= 0).
 
-        The stress is met to rounding, by asperities that yield to about 0.1 %. Without `mated`
+        The stress is met to rounding: where asperities yield, by the joint's own cells. Its closure
+        then differs a little from `closure(normal_stress)`, that of many cells. Without `mated`
         its faces have never met: it starts at first touch, 100 mating lengths from the mated
         position along axis 2 (`unmated_start`). Raises ValueError as `closure` does, for an unmated
         joint with an infinite mating length, and for one that is to be closed already.
@@ -171,11 +172,7 @@ class JointLaw:
                 raise ValueError(f"mated has shape {far.shape}: give one truth or ({n},)")
             batch.reset(np.flatnonzero(np.broadcast_to(far, n)), mated=False)
         if np.any(normal_stress):
-            closure = np.asarray(self.closure(normal_stress))
-            if closure.shape not in ((), (n,)):
-                raise ValueError(f"normal_stress has shape {closure.shape}: give one or ({n},)")
-            batch.update(np.outer(closure * np.ones(n), np.eye(self.dim)[0]), tangent=False)
-            warn_if_crushed(self, closure)
+            seat(batch, normal_stress)
         return batch
 
     def step(

@@ -38,7 +38,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from ..laboratory.normal_control import NormalCondition, closing_increments
+from ..joints.normal_control import NormalCondition, closing_increments
 from ..parameters.resolution import Resolution
 from ..support.checks import Array
 from ..support.progress import track

@@ -47,7 +47,7 @@ class FirstLoading(NamedTuple):
         low, high = (np.full(wanted.shape, math.log(y)) for y in (_SMALLEST, self.farthest))
         with np.errstate(over="ignore"):
             if (far := self.stress(np.exp(high)) < wanted).any():
-                raise ValueError(f"normal_stress = {wanted[far].min()!r} Pa is beyond any closure")
+                raise ValueError(f"normal_stress = {wanted[far].min():g} Pa is beyond any closure")
             for _ in range(_HALVINGS):
                 middle = 0.5 * (low + high)
                 short = self.stress(np.exp(middle)) < wanted

@@ -106,12 +106,13 @@ def tables(
     slope_wear: float = math.inf,
     slope_residual: float = 0.0,
     bond: Bond | None = None,
+    lowest: float = 1.0,
 ) -> Tables:
     """Lay out the tables; `cells` for the facet of most weight, one where the curve is linear."""
     c1, slope = np.cos(facets.theta), np.tan(facets.theta)
     share = np.zeros_like(facets.depth) if curve.linear else facets.depth
     several = np.maximum(np.rint(cells * share), 1).astype(np.intp)
-    depth = depth_nodes(curve, closure_range, slope, several)
+    depth = depth_nodes(curve, closure_range, slope, several, lowest)
     azimuth = np.stack([np.cos(facets.phi), np.sin(facets.phi)])
     arrays = (
         facets.n, facets.n / c1, facets.s, facets.t, azimuth, slope, c1,

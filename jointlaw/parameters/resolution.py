@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from ..support.checks import integer
+from ..support.checks import integer, more_than
 
 
 @dataclass(frozen=True)
@@ -15,16 +15,26 @@ class Resolution:
         fewer, and motion in 3-D takes both halves.
     depth: cells of touch depth of a facet of the ring of most weight, >= 1; lighter ones have
         fewer.
+    lowest: smallest closure that the cells are made for, as a share of the closure range, > 0 to 1.
+        1 puts nearly all of them where the largest loads act; a smaller share spreads them, so that
+        paths of small loads have small errors too (docs/accuracy.md).
     """
 
     u: int
     phi: int
     depth: int
+    lowest: float = 1.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "u", integer("resolution.u", self.u, 1))
         object.__setattr__(self, "phi", integer("resolution.phi", self.phi, 3))
         object.__setattr__(self, "depth", integer("resolution.depth", self.depth, 1))
+        object.__setattr__(self, "lowest", more_than("resolution.lowest", self.lowest, 0.0))
+        if self.lowest > 1.0:
+            raise ValueError(
+                f"resolution.lowest = {self.lowest!r} is out of bounds: it is a share of the "
+                "closure range, 1 at most; for larger closures raise closure_range"
+            )
 
     @property
     def sliders(self) -> int:

@@ -57,11 +57,12 @@ def law_text(law: Mapping[str, Any]) -> str:
     lengths = law["mating_length"], law["asperity"].yield_interference, law["closure_range"]
     names = named(*lengths)
     name = next((n for n, value in names.items() if value == r), None)
-    own = f"{{ u = {r.u}, phi = {r.phi}, depth = {r.depth} }}"
+    nodes = [(one.name, getattr(r, one.name), one.default) for one in fields(r)]
+    own = ", ".join(f"{name} = {value}" for name, value, off in nodes if value != off)
     lines = [
         f"version = {VERSION}  # of this file's keys",
         *_lines(law, ("asperity_density", "closure_range")),
-        "resolution = " + (f'"{name}"' if name else own),
+        "resolution = " + (f'"{name}"' if name else f"{{ {own} }}"),
         *_lines(law, ("mating_length", "slope_wear", "slope_residual", "plane", "closure_only")),
     ]
     for part in ("orientation", "asperity", "heights", "bond"):

@@ -66,8 +66,12 @@ def steepest(law: JointLaw) -> float:
 
 def scaled(r: Resolution, share: float) -> Resolution:
     """That many times the nodes in each direction."""
-    u, phi, depth = (round(share * n) for n in (r.u, r.phi, r.depth))
-    return Resolution(max(u, 1), max(phi, 3), max(depth, 1), r.lowest)
+    return replace(
+        r,
+        u=max(round(share * r.u), 1),
+        phi=max(round(share * r.phi), 3),
+        depth=max(round(share * r.depth), 1),
+    )
 
 
 class Miss(NamedTuple):
@@ -155,9 +159,8 @@ def errors(F: Array, reference: Array, counts: Any = True) -> Array:
 
     counts: (steps, paths), which steps count; all by default.
     """
-    peak = np.linalg.norm(reference, axis=2).max(axis=0, where=counts, initial=0.0)
     off: Array = np.linalg.norm(F - reference, axis=2).max(axis=0, where=counts, initial=0.0)
-    return off / peak
+    return off / np.linalg.norm(reference, axis=2).max(axis=0, where=counts, initial=0.0)
 
 
 def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]:

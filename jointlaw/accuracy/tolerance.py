@@ -6,12 +6,12 @@ import math
 from dataclasses import replace
 from functools import cache
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..parameters.resolution import Resolution
-from ..support.checks import Array, finite, more_than
+from ..support.checks import finite, more_than
 from ..support.progress import track
 from .suite import Suite, reference_resolution, scaled, standard_suite
 
@@ -23,11 +23,13 @@ if TYPE_CHECKING:
 MARGIN = 1.75
 EXCURSIONS = 128  # random paths beside the standard ones: what others ask shows in few of them
 _LARGEST = 4  # times the sliders of the usual reference: the finest that is tried
+_NODES = ("u", "phi", "depth")
 _U = _DEPTH = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64, 80, 96, 112)
 _PHI = (3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 32, 40, 48)
 _APART = 3.0  # most, of two closure ranges between which a tolerance holds as it does at both
 _MORE = 0.5  # of the cells of one range: added for each ten times that the lowest is smaller
-_SHARES = (0.5, 0.75, 1.0)  # of the reference, for the directions that are not being tried
+_BELOW = 0.25  # of the lowest range is what cells are made for: most loads are below the largest
+_SHARES = (0.5, 0.75)  # of the reference, for the directions that are not being tried
 
 
 def at_tolerance(
@@ -36,7 +38,13 @@ def at_tolerance(
     """See `JointLaw.at_tolerance`."""
     bound, lowest = more_than("tolerance", tolerance, 0.0) / MARGIN, 1.0
     if stress is not None:
-        least, most = law.closure(_ordered(stress)).tolist()
+        ends = finite("stress", stress, "Pa")
+        if ends.shape != (2,) or not 0.0 < ends[0] <= ends[1]:
+            raise ValueError(
+                f"stress = {stress!r}: give the smallest and the largest normal stress of the "
+                "scene in Pa, such as (3e4, 1e6), both > 0"
+            )
+        least, most = law.closure(ends).tolist()
         law, lowest = replace(law, closure_range=most), least / most
     found, reached = coarsest(law, bound, EXCURSIONS, lowest)
     if found is None:
@@ -69,8 +77,7 @@ def coarsest(
     # meets the suite only by chance, where two errors cancel. The errors of u and phi rise and fall
     # as contacts slip and part one by one: so the next finer choice must meet the suite too, unless
     # there are as many as in the reference.
-    share = next((s for s in _SHARES if _left_out(suites, s) < bound / 3), _SHARES[-1])
-    rest = scaled(best, share)
+    rest = scaled(best, next((s for s in _SHARES if _left_out(suites, s) < bound / 3), 1.0))
     needs = []
     for name, choices, times in (("u", _U, 2), ("phi", _PHI, 2), ("depth", _DEPTH, 1)):
         most = getattr(best, name)
@@ -91,17 +98,6 @@ def coarsest(
     return None, min(map(error, several))
 
 
-def _ordered(stress: Any) -> Array:
-    """The ends (2,) of a range of stresses in Pa, checked."""
-    ends = finite("stress", stress, "Pa")
-    if ends.shape != (2,) or not 0.0 < ends[0] <= ends[1]:
-        raise ValueError(
-            f"stress = {stress!r}: give the smallest and the largest normal stress of the scene in "
-            "Pa, such as (3e4, 1e6), both > 0"
-        )
-    return ends
-
-
 def _references(
     law: JointLaw, bound: float, excursions: int, lowest: float
 ) -> tuple[list[Suite], Resolution]:
@@ -109,14 +105,10 @@ def _references(
     steps = 1 + math.ceil(math.log(1.0 / lowest, _APART))
     ranges = (law.closure_range * np.geomspace(1.0, lowest, steps)).tolist()
     known = [_reference(replace(law, closure_range=R), bound, excursions) for R in ranges]
-    u, phi, depth = (max(getattr(r, name) for _, r in known) for name in ("u", "phi", "depth"))
-    best = Resolution(u, phi, depth)
-    if (
-        lowest < 1.0
-    ):  # most loads of a path lie below its largest: cells for a quarter of the lowest
-        many = round(depth * (1.0 - _MORE * math.log10(lowest)))
-        best = replace(best, depth=many, lowest=float(f"{0.25 * lowest:.2g}"))
-    return [suite for suite, _ in known], best
+    u, phi, depth = (max(getattr(r, name) for _, r in known) for name in _NODES)
+    depth = round(depth * (1.0 - _MORE * math.log10(lowest)))
+    spread = float(f"{_BELOW * lowest:.2g}") if lowest < 1.0 else 1.0
+    return [suite for suite, _ in known], Resolution(u, phi, depth, spread)
 
 
 def _reference(law: JointLaw, bound: float, excursions: int) -> tuple[Suite, Resolution]:
@@ -128,19 +120,13 @@ def _reference(law: JointLaw, bound: float, excursions: int) -> tuple[Suite, Res
         suite = standard_suite(law, best, excursions)
         if _left_out([suite], 1.0) <= bound / 2:
             break
-        finer = _refined(law, suite, best)
+        # 1.5 times the nodes in the direction that errs most with two thirds of them
+        fewer, more = ({n: getattr(scaled(best, by), n) for n in _NODES} for by in (2 / 3, 1.5))
+        lost = {n: suite.miss(replace(law, resolution=replace(best, **{n: fewer[n]}))).largest.max()
+                for n in _NODES}  # fmt: skip
+        worst = max(lost, key=lost.__getitem__)
+        finer = replace(best, **{worst: more[worst]})
     return suite, best
-
-
-def _refined(law: JointLaw, suite: Suite, best: Resolution) -> Resolution:
-    """1.5 times the nodes in the direction that errs most with two thirds of them."""
-
-    def lost(name: str) -> float:
-        fewer = replace(best, **{name: getattr(scaled(best, 2 / 3), name)})
-        return float(suite.miss(replace(law, resolution=fewer)).largest.max())
-
-    worst = max(("u", "phi", "depth"), key=lost)
-    return replace(best, **{worst: getattr(scaled(best, 1.5), worst)})
 
 
 def _left_out(suites: list[Suite], share: float) -> float:

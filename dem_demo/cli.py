@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from math import inf
 from pathlib import Path
 
-from jointlaw import PathError
+from jointlaw import JointLaw, PathError
 from jointlaw.support.files import require_free, write_json
 from jointlaw.support.pyplot import FORMATS
 
@@ -128,8 +128,24 @@ def _new(given: argparse.Namespace) -> None:
 
 
 def _check(given: argparse.Namespace) -> None:
-    _announce(Simulation(load(given.scene)))
+    sim = Simulation(load(given.scene))
+    _announce(sim)
+    for name, rows, _ in sim.joints.groups:
+        largest = max(float(sim.joints.traction[rows, 0].max()), sim.scene.run.largest_stress)
+        _warn_of_range(name, sim.scene.laws[name], largest)
     print("the scene is valid")
+
+
+def _warn_of_range(name: str, law: JointLaw, largest: float) -> None:
+    """Say what to write where a law has its cells for far more than this normal stress (Pa)."""
+    made = float(law.normal_stress(law.closure_range * law.resolution.lowest))
+    if law.tables.cells > 1 and 0.0 < largest < 0.1 * made:
+        print(
+            f"law {name!r}: its joints bear {largest:.2g} Pa at most, but its depth cells are for "
+            f"{made:.2g} Pa, so that tractions err by up to 20 % (docs/accuracy.md). In "
+            f"[laws.{name}] write closure_range = {law.closure(2.0 * largest):.2g}, in m, the "
+            "closure at twice that stress; or save sliders by depth = 1 in its resolution"
+        )
 
 
 def _ablate(given: argparse.Namespace) -> None:

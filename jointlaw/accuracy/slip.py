@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..laboratory.normal_control import NormalCondition, closing_increments
+from ..joints.normal_control import NormalCondition, closing_increments
 from ..support.checks import Array
 
 if TYPE_CHECKING:

@@ -38,7 +38,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from ..laboratory.normal_control import NormalCondition, closing_increments
+from ..joints.normal_control import NormalCondition, closing_increments
 from ..parameters.resolution import Resolution
 from ..support.checks import Array
 from ..support.progress import track
@@ -66,8 +66,12 @@ def steepest(law: JointLaw) -> float:
 
 def scaled(r: Resolution, share: float) -> Resolution:
     """That many times the nodes in each direction."""
-    u, phi, depth = (round(share * n) for n in (r.u, r.phi, r.depth))
-    return Resolution(max(u, 1), max(phi, 3), max(depth, 1))
+    return replace(
+        r,
+        u=max(round(share * r.u), 1),
+        phi=max(round(share * r.phi), 3),
+        depth=max(round(share * r.depth), 1),
+    )
 
 
 class Miss(NamedTuple):
@@ -94,15 +98,16 @@ class Suite:
     F: Array
     slip: Slip | None
     ways: Array  # of `slip`
+    reach: float  # m, R
     stress: float  # Pa, S/2
     uncertainty: Array  # (paths,) of F: its difference from two thirds of the nodes
 
     def miss(self, law: JointLaw) -> Miss:
-        """How far another resolution is off."""
+        """How far another resolution is off, or closure range."""
         largest = errors(tractions(law, self.d), self.F)
         if self.slip is None:
             return Miss(largest, math.nan, math.nan)
-        mine = slip(law, law.closure_range, self.stress, self.ways)
+        mine = slip(law, self.reach, self.stress, self.ways)
         more = errors(mine.F, self.slip.F, self.slip.counts)
         return Miss(np.append(largest, more), *mine.apart(self.slip))
 
@@ -136,7 +141,7 @@ def _suite(law: JointLaw, excursions: int) -> Suite:
         called += tuple(f"slip {i + 1}" for i in range(len(more)))
         ways = np.concatenate([ways, more])
         slid = slip(law, law.closure_range, stress, ways)
-    suite = Suite(called, d, F, slid, ways, stress, np.zeros(len(called)))
+    suite = Suite(called, d, F, slid, ways, law.closure_range, stress, np.zeros(len(called)))
     check = suite.miss(replace(law, resolution=scaled(best, 2 / 3))).largest
     return replace(suite, uncertainty=check)
 
@@ -154,9 +159,8 @@ def errors(F: Array, reference: Array, counts: Any = True) -> Array:
 
     counts: (steps, paths), which steps count; all by default.
     """
-    peak = np.linalg.norm(reference, axis=2).max(axis=0, where=counts, initial=0.0)
     off: Array = np.linalg.norm(F - reference, axis=2).max(axis=0, where=counts, initial=0.0)
-    return off / peak
+    return off / np.linalg.norm(reference, axis=2).max(axis=0, where=counts, initial=0.0)
 
 
 def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]:

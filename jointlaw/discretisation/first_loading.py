@@ -53,7 +53,7 @@ def closure_at(stress_of: Callable[[Array], Array], stress: Array, farthest: flo
     low, high = (np.full(wanted.shape, math.log(y)) for y in (_SMALLEST, farthest))
     with np.errstate(over="ignore"):
         if (far := ~(stress_of(np.exp(high)) >= wanted)).any():
-            raise ValueError(f"normal_stress = {wanted[far].min()!r} Pa is beyond any closure")
+            raise ValueError(f"normal_stress = {wanted[far].min():g} Pa is beyond any closure")
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
             short = stress_of(np.exp(middle)) < wanted

@@ -106,12 +106,13 @@ def facet_tables(
     mating_length: float,
     slope_wear: float,
     slope_residual: float,
+    lowest: float,
 ) -> FacetTables:
     """Lay out the tables; `cells` for the facet of most weight, one where the curve is linear."""
     c1, slope = np.cos(facets.theta), np.tan(facets.theta)
     share = np.zeros_like(facets.depth) if curve.linear else facets.depth
     several = np.maximum(np.rint(cells * share), 1).astype(np.intp)
-    depth = depth_nodes(curve, closure_range, slope, several)
+    depth = depth_nodes(curve, closure_range, slope, several, lowest)
     force, bend = _at_limits(curve, depth)
     # one depth for both sides of an asperity whose slopes change, else it creates energy
     shared = math.isfinite(mating_length)

@@ -7,10 +7,10 @@ import numpy as np
 
 from ..joints.crushed import warn_if_crushed
 from ..joints.joint import Joint
+from ..joints.normal_control import NormalCondition, closing_increments
 from ..joints.state import NonFiniteError
 from ..support.checks import Array, at_least, integer, more_than, number, numbers, one_of
 from ..support.progress import track
-from .normal_control import NormalCondition, closing_increments
 from .record import UNITS, Record
 
 CONTROLS = ("stress", "stiffness", "closure")

@@ -158,21 +158,27 @@ class JointLaw(Law, kind="joint"):
 
         return tradeoff(self, resolutions, joints, seconds)
 
-    def at_tolerance(self, tolerance: float) -> JointLaw:
+    def at_tolerance(self, tolerance: float, stress: tuple[float, float] | None = None) -> JointLaw:
         """This law at the resolution with the fewest sliders that is this accurate.
 
         tolerance: largest error of the traction on a path, as a share of the path's largest
         traction, > 0: 0.01 is one per cent. Held with a margin on the standard paths and on 128
-        random ones within the law's closure range, and under slip to three mating lengths, or 30
-        closure ranges, where friction is mobilised (`jointlaw.accuracy.suite`); nothing is timed,
-        so the answer is the same on every machine. Takes seconds to a minute, below 0.01 minutes,
-        without the compiled kernel more.
+        random ones, and under slip to three mating lengths, or 30 closure ranges, where friction is
+        mobilised (`jointlaw.accuracy.suite`).
+        stress: smallest and largest normal stress (Pa, > 0) of the scene. The tolerance then holds
+        on paths whose largest normal stress is either or between them, and the law returned has the
+        closure range of the larger. Without it, it holds on paths that reach half of the normal
+        stress of the law's closure range or more, which is 20 MPa by default: a slab of 1 m presses
+        with 0.03 MPa, where errors are 5 to 15 times the tolerance (docs/accuracy.md).
+
+        Nothing is timed, so the answer is the same on every machine. Takes seconds to a minute,
+        below 0.01 minutes, without the compiled kernel more.
         Small cycles need more depth cells (docs/limits.md). Raises ValueError where no resolution
         tried is that accurate.
         """
         from ..accuracy.tolerance import at_tolerance
 
-        return at_tolerance(self, tolerance)
+        return at_tolerance(self, tolerance, stress)
 
     # ---------------------------------------------------------------- tables
 
@@ -200,6 +206,7 @@ class JointLaw(Law, kind="joint"):
             mating_length=self.mating_length,
             slope_wear=self.slope_wear,
             slope_residual=self.slope_residual,
+            lowest=self.resolution.lowest,
         )
         beside = () if self.bond is None else (Bonded(self.bond),)
         return Tables(len(asperities.m), (Asperities(asperities), *beside))

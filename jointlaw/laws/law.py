@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 from ..discretisation.first_loading import closure_at
 from ..discretisation.tables import VERSION
 from ..joints.batch import JointBatch
-from ..joints.crushed import warn_if_crushed
 from ..joints.joint import Joint
+from ..joints.seat import seat
 from ..joints.time_step import stable_step
 from ..kernels.engine import step_states
 from ..kernels.reference import Tables, sum_of
@@ -47,10 +47,11 @@ class Law:
     # ----------------------------------------------------------------- joints
 
     def joint(self, normal_stress: float = 0.0, mated: bool = True) -> Joint:
-        """One joint of this law, unsheared, closed to `closure(normal_stress)` (Pa, >= 0).
+        """One joint of this law, unsheared, closed to this normal stress (Pa, >= 0).
 
-        The stress is met to rounding, by asperities that yield to about 0.1 %. Without `mated`
-        its faces have never met: it starts at first touch, 100 mating lengths from the mated
+        The stress is met to rounding: where asperities yield, by the joint's own cells. Its closure
+        then differs a little from `closure(normal_stress)`, that of many cells. Without `mated` its
+        faces have never met: it starts at first touch, 100 mating lengths from the mated
         position along axis 2 (`unmated_start`), and without bond or cohesion. Raises ValueError as
         `closure` does, for a law whose faces always fit, and for an unmated joint that is to be
         closed already.
@@ -80,11 +81,7 @@ class Law:
                 )
             batch.reset(np.flatnonzero(far), mated=False)
         if stress.any():
-            closure = np.asarray(self.closure(normal_stress))
-            if closure.shape not in ((), (n,)):
-                raise ValueError(f"normal_stress has shape {closure.shape}: give one or ({n},)")
-            batch.update(np.outer(closure * np.ones(n), np.eye(self.dim)[0]), tangent=False)
-            warn_if_crushed(self, closure)
+            seat(batch, normal_stress)
         return batch
 
     def step(

@@ -23,6 +23,12 @@ class Resolution:
         "cells of touch depth of a facet of the ring of most weight; lighter ones have fewer",
         kind=int, low=1,
     )  # fmt: skip
+    lowest: float = parameter(
+        "smallest closure that the cells are made for, as a share of the closure range. 1 puts "
+        "nearly all of them where the largest loads act; a smaller share spreads them, so that "
+        "paths of small loads have small errors too (docs/accuracy.md)", "", 1.0,
+        above=0.0, high=1.0,
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         check(self, "resolution")

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..joints.batch import JointBatch
-from ..laboratory.normal_control import NormalCondition, closing_increments
+from ..joints.normal_control import NormalCondition, closing_increments
 from ..laws.joint_law import JointLaw
 from ..parameters.resolution import SLIP
 from ..support.checks import Array, integer, more_than

@@ -57,6 +57,8 @@ def told(text, tmp_path):
         ("density = 1e10", 'density = 1e10\nresolution = "rough"', "resolution = 'rough'"),
         ("density = 1e10", "density = 1e10\nresolution = {u = 2, phi = 2, depth = 1}",
          "resolution.phi = 2 is out of bounds"),
+        ("density = 1e10", "density = 1e10\nresolution = {u = 2, phi = 3, depth = 1, lowest = 2}",
+         "resolution.lowest = 2.0 is out of bounds: it must be > 0 and <= 1"),
         ("density = 1e10",
          "density = 1e10\nresolution = {u = 2, phi = 3, depth = 1, front = true}",
          "key 'resolution.front' is unknown"),

@@ -1,11 +1,13 @@
 """The bound of |C| and the explicit time step that follows from it: in touch, open, sheared far."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 
 import jointlaw as jl
+from jointlaw.kernels.stiffness import steepest_gain
 
 R = 1e-6  # closure range, m
 
@@ -53,6 +55,39 @@ def test_the_tangent_stays_below_both_bounds(seed):
         assert np.all(now <= most * (1.0 + 1e-12))
         closest = max(closest, np.max(size[now > 0] / now[now > 0], initial=0.0))
     assert closest > 0.2  # a bound, but not an empty one
+
+
+def test_heights_of_two_groups_are_bounded():
+    """Few asperities touch long before many do: the tangent is up to 60 times the common bound."""
+    worst = 0.0
+    for low, eta in itertools.product((0.02, 0.1), (0.0, 0.5)):
+        edges = 1e-6 * np.array([0.0, low, 0.5, 0.55])
+        law = jl.JointLaw(
+            orientation=jl.Orientation(3.0), asperity=jl.Asperity(2e8, 1.2, eta, 0.6),
+            heights=jl.Heights(([1e-3, 0.0, 1.0], edges)), asperity_density=1e10,
+            closure_range=1e-6, resolution=jl.Resolution(2, 3, 4), plane=0.0,
+        )  # fmt: skip
+        joints = law.joints(1)
+        for closure in np.linspace(0.45e-6, 0.6e-6, 60):
+            joints.update([[closure, 2e-7]] - joints.delta, tangent=False)
+            for d in ([1e-12, 0.0], [-1e-12, 1e-12]):
+                C = joints.trial([d])[1][0]
+                share = np.linalg.norm(C, 2) / joints.max_stiffness()[0]
+                worst = max(worst, share * steepest_gain(law.tables.asperities))
+                assert share <= 1.0 + 1e-9
+    assert worst > 5.0  # where the common bound fails
+
+
+def test_an_unmated_joint_has_a_step_at_its_negative_closure(make_law):
+    law = make_law(mating_length=2e-5, plane=0.0)
+    joints = law.joints(1, mated=False)
+    for _ in range(60):
+        F, _ = joints.update([[1e-8, 0.0]], tangent=False)
+    closure, shear = joints.delta[0]
+    assert closure < 0.0 < F[0, 0]
+    given = law.critical_time_step(1.0, 1.0, closure, shear)
+    assert given == pytest.approx(joints.critical_time_step(1.0, 1.0)[0], rel=0.3)
+    assert given <= joints.critical_time_step(1.0, 1.0)[0]
 
 
 def test_the_step_of_a_batch_is_that_of_each_joint_as_it_is():

@@ -118,7 +118,17 @@ def test_a_joint_closed_beyond_its_highest_asperity_gives_a_warning():
         stiff.joint(30e6)
 
 
-def test_slopes_wear_by_the_work_of_friction():
+def test_closing_and_opening_wear_no_slopes():
+    """Facets rub where a joint closes; real joints keep their slopes without shear."""
+    one = law(mu=0.4, mating_length=3.0, slope_wear=1e-3, plane=0.0)
+    joint = one.joint()
+    for way in 20 * (0.1, 0.1, -0.1, -0.1):
+        joint.update([6.0 * way, 0.0])
+    assert joint.dissipated_energy > 1e-3  # friction was lost
+    assert joint.slopes == 1.0
+
+
+def test_slopes_wear_by_the_work_of_shear():
     """slopes = s + (1 - s) exp(-work/slope_wear), of the step before; lift goes with them."""
     one = law(mu=0.4, mating_length=3.0, slope_wear=0.2, slope_residual=0.25, plane=0.0)
     joint = one.joint()

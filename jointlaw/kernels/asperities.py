@@ -20,7 +20,7 @@ from ..support.thresholds import LIMIT, NEAR, ROUNDED, TINY, UNDERFLOW
 from .cells import Cells, cells, compliance, reciprocal
 from .element import Element, Measures, Share
 from .mating import Planes, Turning, offset, planes, turning
-from .stiffness import rises, steepest_gain, stiffness_of, stiffness_per_facet
+from .stiffness import bend_of, joining, rises, stiffness_of
 from .unmated import first_touch
 from .wear import lowered, worn_share
 from .yielding import flatten, flattened, plastic_work, softening
@@ -83,7 +83,7 @@ class Asperities(Element):
         self.farthest = self.first_loading.farthest
 
     def numbers(self) -> dict[str, float]:
-        k, (per_slope, bend) = self.k, stiffness_per_facet(self.k)
+        k, (more, most) = self.k, joining(self.k)
         return {
             "soft": 1.0 / k.lam,
             "mu": k.mu,
@@ -95,9 +95,10 @@ class Asperities(Element):
             "scale": k.curve.scale,
             "rise": float(k.curve.rise),
             "closure_factor": self.first_loading.factor,
-            "stiffness_factor": float(np.sum(per_slope)),
-            "bending_factor": float(np.sum(bend)),
-            "sliding_factor": k.mu * steepest_gain(k),
+            "stiffness_factor": float(np.sum(k.area / k.c1)),
+            "bending_factor": float(np.sum(bend_of(k))) if k.fades else 0.0,
+            "joining_more": more,
+            "joining_most": most,
         }
 
     def step(self, delta: Array, d: Array, state: Array, new: Array, tangent: bool) -> Share:

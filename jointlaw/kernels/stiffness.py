@@ -9,30 +9,36 @@ from ..support.checks import Array
 from ..support.thresholds import BEND, UNDERFLOW
 
 
-def stiffness_per_facet(k: FacetTables) -> tuple[Array, Array]:
-    """Bounds (M,) of the part of `|C|` in Pa/m that each facet adds, over its Phi' and its Phi.
+def stiffness_of(k: FacetTables, y: Array) -> Array:
+    """Upper bound (...) of `|C|` in Pa/m of joints whose facets have the closures y (M, ...)."""
+    force, slope = k.curve.force(y)
+    more, most = joining(k)
+    per_slope = (max(1.0, 1.0 / k.lam) + k.mu) * slope + k.mu * np.minimum(more * slope, most)
+    bound: Array = np.tensordot(k.area / k.c1, per_slope, 1)
+    return bound + np.tensordot(bend_of(k), force, 1) if k.fades else bound
 
-    The second is what the bending of slopes that fade adds: normal force, sliders and friction
-    limit turn and grow with the slope.
+
+def bend_of(k: FacetTables) -> Array:
+    """What the bending of slopes that fade adds to the bound, over Phi, for each facet (M,).
+
+    Normal force, sliders and friction limit turn and grow with the slope.
     """
-    sliding = k.mu * steepest_gain(k)
-    per_slope: Array = (max(1.0, 1.0 / k.lam) + sliding) * (k.area / k.c1)
-    bend = (BEND / k.mating_length) * k.area * k.steep * (k.c1 + k.mu * (1.0 + k.c1))
-    return per_slope, bend
+    bend: Array = (BEND / k.mating_length) * k.area * k.steep * (k.c1 + k.mu * (1.0 + k.c1))
+    return bend
 
 
 @lru_cache(maxsize=64)
-def steepest_gain(k: FacetTables) -> float:
-    """Largest G kappa'/kappa^2 of any depth cell, at least 1.
+def joining(k: FacetTables) -> tuple[float, float]:
+    """By how much G kappa'/kappa of a depth cell exceeds kappa at most: over kappa, and alone.
 
-    Springs that join a cell under load take up force at the rate q kappa'/kappa, q being at most
-    the friction limit of G. Up to 1 the limit itself, which grows with kappa, bounds that rate. It
-    is more where few asperities touch before many do, as in heights of two groups.
+    Springs that join a cell under load, or part, change its force by q kappa'/kappa, q being at
+    most the friction limit of G. Mostly kappa bounds that rate. It is more where few asperities
+    touch before many do, as in heights of two groups.
     """
-    curve, worst = k.curve, 1.0
+    curve, more, most = k.curve, 0.0, 0.0
     pieces = len(curve.S)
-    if pieces == 1:  # a power of y, below 1
-        return worst
+    if pieces == 1:  # a power of y
+        return more, most
     # Phi'' is smooth within a piece of the table and jumps between two
     places = (np.arange(pieces)[:, None] + np.array([1e-9, 0.25, 0.5, 0.75, 1 - 1e-9])) / pieces
     y = (curve.scale * places / (1 - places)).ravel() ** 2
@@ -44,17 +50,10 @@ def steepest_gain(k: FacetTables) -> float:
         G, kappa = force - force0 - slope0 * (y - low), slope - slope0
         seen = (kappa > 1e-9 * slope) & (1e-9 * force < G) & (kappa > UNDERFLOW)
         share = np.divide(G, kappa, out=np.zeros_like(y), where=seen)  # the rest is rounding
-        gain = np.divide(share * bend, kappa, out=np.zeros_like(y), where=seen)
-        worst = max(worst, float(gain.max()))
-    return worst
-
-
-def stiffness_of(k: FacetTables, y: Array) -> Array:
-    """Upper bound (...) of `|C|` in Pa/m of joints whose facets have the closures y (M, ...)."""
-    per_slope, bend = stiffness_per_facet(k)
-    force, slope = k.curve.force(y)
-    bound: Array = np.tensordot(per_slope, slope, 1)
-    return bound + np.tensordot(bend, force, 1) if k.fades else bound
+        excess = np.where(seen, share * bend - kappa, 0.0)
+        more = max(more, float(np.divide(excess, kappa, out=0.0 * y, where=seen).max()))
+        most = max(most, float(excess.max()))
+    return more, most
 
 
 def rises(k: FacetTables, shear: Array) -> Array:

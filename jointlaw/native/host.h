@@ -373,8 +373,8 @@ JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure)
   double slope = 0.0;
   if (!(closure <= law->largest_reach)) return jlaw_none_();
   const double force = law->asperities ? jlaw_virgin_one_(law, closure, &slope) : 0.0;
-  return law->stiffness_factor * slope + law->bending_factor * force
-         + jl_stiffness_of_elements(law, NULL, 0, 1);
+  return law->stiffness_factor * JL_LANE(jl_stiffness_over(law, jl_each(slope)), 0)
+         + law->bending_factor * force + jl_stiffness_of_elements(law, NULL, 0, 1);
 }
 
 JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)

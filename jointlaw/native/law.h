@@ -818,10 +818,17 @@ JL_IN jl_amounts jl_measure(const jlaw_law *law, jl_numbers n)
   return all;
 }
 
+/* Bound of |C| over A/c1 of a facet with this Phi', less what slopes that fade add */
+JL_IN jl_real jl_stiffness_over(const jlaw_law *law, jl_real slope)
+{
+  const double stick = law->soft > 1.0 ? law->soft : 1.0;
+  const jl_real joins = jl_smaller(law->joining_more * slope, jl_each(law->joining_most));
+  return (stick + law->mu) * slope + law->mu * joins;
+}
+
 /* Bound of |C| (Pa/m) of joints as they are */
 JL_IN jl_of_joint jl_stiffness(const jlaw_law *law, jl_numbers n)
 {
-  const double per_slope = (law->soft > 1.0 ? law->soft : 1.0) + law->sliding_factor;
   const double turn = JLAW_BEND / law->mating_length;
   struct {
     jl_real bound;
@@ -832,7 +839,7 @@ JL_IN jl_of_joint jl_stiffness(const jlaw_law *law, jl_numbers n)
     const jl_of_facet c1 = jl_column(f, JLAW_COSINE);
     jl_facets o;
     jl_facets_now(law, n, at, &o);
-    jl_real bound = per_slope * jl_column(f, JLAW_STIFF) * o.k1;
+    jl_real bound = jl_column(f, JLAW_STIFF) * jl_stiffness_over(law, o.k1);
     if (law->fades)
       bound += turn * jl_column(f, JLAW_A) * jl_column(f, JLAW_STEEP) * (c1 + law->mu * (1.0 + c1))
                * o.f1;

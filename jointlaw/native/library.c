@@ -4,8 +4,7 @@
 #include "batch.h"
 #include "export.h"
 
-#define CALLS(KIND) \
-  jlaw_advance##KIND, jlaw_measure##KIND, jlaw_refresh##KIND, jlaw_stiffness##KIND
+#define CALLS(KIND) jlaw_advance##KIND, jlaw_measure##KIND, jlaw_refresh##KIND, jlaw_stiffness##KIND
 #if JLAW_LEVELS & 8
 extern jlaw_call CALLS(_8), CALLS(_8_alone);
 #endif
@@ -21,10 +20,10 @@ OUT int jlaw_levels(void) { return JLAW_LEVELS; }
 /* Advance, measure, refresh or stiffness (`what` = 0 to 3), by vectors of so many lanes */
 static jlaw_call *find(int lanes, int alone, int what)
 {
-#define LEVEL(W) \
-  if (lanes == W) { \
+#define LEVEL(W)                                                                  \
+  if (lanes == W) {                                                               \
     static jlaw_call *const calls[2][4] = {{CALLS(_##W)}, {CALLS(_##W##_alone)}}; \
-    return calls[alone][what]; \
+    return calls[alone][what];                                                    \
   }
 #if JLAW_LEVELS & 8
   LEVEL(8)

@@ -10,7 +10,7 @@ OUT int jlaw_lanes(void)
 {
 #if defined(__x86_64__)
   const unsigned avx = 1u << 12 | 1u << 22 | 3u << 27 | 1u << 29; /* FMA MOVBE OSXSAVE AVX F16C */
-  const unsigned lzcnt = 1u << 5, avx2 = 1u << 3 | 1u << 5 | 1u << 8; /* BMI1 AVX2 BMI2 */
+  const unsigned lzcnt = 1u << 5, avx2 = 1u << 3 | 1u << 5 | 1u << 8;           /* BMI1 AVX2 BMI2 */
   const unsigned avx512 = 1u << 16 | 1u << 17 | 1u << 28 | 1u << 30 | 1u << 31; /* F DQ CD BW VL */
   unsigned a, b, c, d, saved;
   if (!__get_cpuid(0x80000001, &a, &b, &c, &d) || !(c & lzcnt)) return 2;

@@ -1,9 +1,14 @@
 """The kinds of joints that the code knows, one law each: every test that goes through them does so
-by this list."""
+by this list. And every declared parameter, off its default: no parameter is named here."""
 
 import math
+from dataclasses import fields, is_dataclass, replace
+from itertools import chain
 
 import jointlaw as jl
+from jointlaw.laws.law import Law
+from jointlaw.parameters.declared import parameters_of
+from jointlaw.parameters.toml import kinds_of
 
 
 def make_law(
@@ -37,3 +42,70 @@ LAWS = {
     "coulomb": jl.CoulombLaw(1e12, 5e11, 0.6, 1e5, 5e4, 0.5, 2e4, 1e-6),
     "coulomb in a plane": jl.CoulombLaw(1e12, 5e11, 0.6, 1e5, plane=0.0),
 }
+
+# Sizes at which a parameter of this unit shows in joints that close by 1e-6 m
+SIZES = {"": 0.3, "rad": 0.4, "m": 1e-6, "Pa": 3e4, "Pa/m": 3e11, "J/m2": 1e-2, "1/m2": 1e10}
+
+
+def declared(kind, path=""):
+    """Paths of all declared parameters of a kind of law, and of what it is made of."""
+    for name, said in parameters_of(kind).items():
+        inner = [one for one in kinds_of(said.kind).values() if is_dataclass(one)]
+        yield from chain.from_iterable(declared(one, f"{path}{name}.") for one in inner)
+        if not inner:
+            yield f"{path}{name}", said
+
+
+PARAMETERS = {
+    f"{name}: {path}": (kind, path, said)
+    for name, kind in Law.kinds.items()
+    for path, said in dict(declared(kind)).items()
+}
+
+
+def with_value(part, path, value):
+    """A law, or a part of it, with another value at a path of names."""
+    name, _, rest = path.partition(".")
+    now = getattr(part, name)
+    return replace(part, **{name: with_value(now, rest, value) if rest else value})
+
+
+def candidates(said, value):
+    """Values that a parameter of this value may have instead."""
+    if said.choices:
+        return [one for one in said.choices if one != value]
+    if said.kind in (bool, int):
+        return [not value] if said.kind is bool else [value + 1]
+    if isinstance(value, tuple):
+        return [(tuple(2.0 * x + 1.0 for x in value[0]), value[1])]
+    if value and math.isfinite(value):
+        return [1.2 * value, 0.8 * value]
+    size = SIZES[said.unit]
+    return [size, *(size * 10.0**k for k in (-3, -2, -1, 1, 2, 3))]
+
+
+def off_default(name):
+    """A law with this parameter off its default and off what the law beside it has, and that law.
+
+    A law of the list in which the parameter is at work already comes first.
+    """
+    kind, path, said = PARAMETERS[name]
+    *above, last = path.split(".")
+    found = []
+    for base in (law for law in LAWS.values() if type(law) is kind):
+        part = base
+        for one in above:
+            part = getattr(part, one)
+        if not is_dataclass(part) or last not in {one.name for one in fields(part)}:
+            continue
+        default = next(one.default for one in fields(part) if one.name == last)
+        at_work = getattr(part, last) != default
+        for value in candidates(said, getattr(part, last)):
+            try:
+                found.append((not at_work, len(found), with_value(base, path, value), base))
+                break
+            except ValueError:
+                continue
+    assert found, f"no law of this file takes a value of {path}: add one above"
+    *_, law, base = min(found, key=lambda one: one[:2])
+    return law, base

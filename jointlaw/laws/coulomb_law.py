@@ -61,7 +61,7 @@ class CoulombLaw(Law, kind="coulomb"):
                 )
 
     @property
-    def closure_range(self) -> float:
+    def closure_range(self) -> float:  # type: ignore[override]
         """Closure (m) at 20 MPa, by which tests and tables choose their steps."""
         return CLOSED / self.normal_stiffness
 

@@ -33,6 +33,7 @@ class Law:
     """
 
     plane: float | None
+    closure_range: float
     kinds: ClassVar[dict[str, type[Law]]] = {}  # by the names that files have
 
     def __init_subclass__(cls, kind: str, **others: Any) -> None:

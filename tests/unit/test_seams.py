@@ -3,93 +3,25 @@
 No parameter is named here: a new one is tested by being declared.
 """
 
-import math
 import pickle
-from dataclasses import fields, is_dataclass, replace
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
 import pytest
-from kinds import LAWS
+from kinds import PARAMETERS, off_default
 
 import jointlaw as jl
 from jointlaw.calibration.forward import build, parameters
 from jointlaw.kernels import reference
-from jointlaw.laws.law import Law
-from jointlaw.parameters.declared import parameters_of
-from jointlaw.parameters.toml import kinds_of
 
 PAGES = Path(__file__).parents[2] / "docs"
-# Sizes at which a parameter of this unit shows in joints that close by 1e-6 m
-SIZES = {"": 0.3, "rad": 0.4, "m": 1e-6, "Pa": 3e4, "Pa/m": 3e11, "J/m2": 1e-2, "1/m2": 1e10}
 STEP = 2e-7  # m
-
-
-def declared(kind, path=""):
-    """Paths of all declared parameters of a kind of law, and of what it is made of."""
-    for name, said in parameters_of(kind).items():
-        inner = [one for one in kinds_of(said.kind).values() if is_dataclass(one)]
-        yield from chain.from_iterable(declared(one, f"{path}{name}.") for one in inner)
-        if not inner:
-            yield f"{path}{name}", said
-
-
-PARAMETERS = {
-    f"{name}: {path}": (kind, path, said)
-    for name, kind in Law.kinds.items()
-    for path, said in dict(declared(kind)).items()
-}
-
-
-def with_value(part, path, value):
-    """A law, or a part of it, with another value at a path of names."""
-    name, _, rest = path.partition(".")
-    now = getattr(part, name)
-    return replace(part, **{name: with_value(now, rest, value) if rest else value})
-
-
-def candidates(said, value):
-    """Values that a parameter of this value may have instead."""
-    if said.choices:
-        return [one for one in said.choices if one != value]
-    if said.kind in (bool, int):
-        return [not value] if said.kind is bool else [value + 1]
-    if isinstance(value, tuple):
-        return [(tuple(2.0 * x + 1.0 for x in value[0]), value[1])]
-    if value and math.isfinite(value):
-        return [1.2 * value, 0.8 * value]
-    size = SIZES[said.unit]
-    return [size, *(size * 10.0**k for k in (-3, -2, -1, 1, 2, 3))]
 
 
 @pytest.fixture(scope="module", params=PARAMETERS)
 def pair(request):
-    """A law with this parameter off its default and off what the law beside it has, and that law.
-
-    A law of the list in which the parameter is at work already comes first.
-    """
-    kind, path, said = PARAMETERS[request.param]
-    *above, name = path.split(".")
-    bases = [law for law in LAWS.values() if type(law) is kind]
-    found = []
-    for base in bases:
-        part = base
-        for one in above:
-            part = getattr(part, one)
-        if not is_dataclass(part) or name not in {one.name for one in fields(part)}:
-            continue
-        default = next(one.default for one in fields(part) if one.name == name)
-        at_work = getattr(part, name) != default
-        for value in candidates(said, getattr(part, name)):
-            try:
-                found.append((not at_work, len(found), with_value(base, path, value), base))
-                break
-            except ValueError:
-                continue
-    assert found, f"no law of tests/kinds.py takes a value of {path}: add one there"
-    *_, law, base = min(found, key=lambda one: one[:2])
-    return law, base
+    """A law with a parameter off its default, and the same law without."""
+    return off_default(request.param)
 
 
 def steps(law, count=14):

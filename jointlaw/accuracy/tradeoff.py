@@ -47,7 +47,7 @@ class Price:
 
     @property
     def worst(self) -> float:
-        """Largest error of the traction on any path."""
+        """Largest error of the traction on the standard paths."""
         return float(self.error.max())
 
 

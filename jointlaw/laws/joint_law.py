@@ -169,7 +169,7 @@ class JointLaw(Law, kind="joint"):
         on paths whose largest normal stress is either or between them, and the law returned has the
         closure range of the larger. Without it, it holds on paths that reach half of the normal
         stress of the law's closure range or more, which is 20 MPa by default: a slab of 1 m presses
-        with 0.03 MPa, where errors are 5 to 15 times the tolerance (docs/accuracy.md).
+        with 0.03 MPa, where errors are up to 17 times the tolerance (docs/accuracy.md).
 
         Nothing is timed, so the answer is the same on every machine. Takes seconds to a minute,
         below 0.01 minutes, without the compiled kernel more.

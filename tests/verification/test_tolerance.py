@@ -105,7 +105,7 @@ def test_closure_only_takes_closures_alone():
 
 @pytest.mark.parametrize("name", ["westerly-smooth", "nonlinear-a6"])
 def test_tolerances_are_kept_at_all_stresses_of_a_range(name):
-    """Cells for the closure range alone err by 8 to 15 % within a hundredth of it."""
+    """Cells for the closure range alone err by up to 17 % within a hundredth of it."""
     law = replace(jl.presets.load(name), plane=0.0)
     stress = (1e4, 5e6)
     made = law.at_tolerance(0.02, stress=stress)

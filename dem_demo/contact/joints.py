@@ -5,6 +5,7 @@ reach, so history is never given to the wrong joint.
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -18,14 +19,17 @@ from .tracker import Identity
 PARTS = "contacts", "law", "fingerprint", "touch"  # of a snapshot of the joints of a law
 
 
-def unmated_curve(law: jl.JointLaw, closure: np.ndarray) -> dict[str, np.ndarray]:
+@lru_cache(maxsize=64)
+def unmated_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
     """Closure from first touch (m) and work (J/m2) of a joint whose faces have never met."""
+    closure = virgin_curve(law)["closure"]
     batch = jl.JointBatch(law, len(closure))
     batch.reset(mated=False)
     batch.update(np.stack([closure, 0.0 * closure], axis=1), tangent=False)
     return {"closure": closure, "work": batch.stored_energy}
 
 
+@lru_cache(maxsize=64)
 def virgin_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
     """Closure (m), stress (Pa) and work (J/m2) of a virgin joint from no closure to 2 GPa, more
     than any corner of rock stands, and an upper bound of its stiffness (Pa/m) there.
@@ -65,7 +69,7 @@ class Joints:
     def __init__(self, scene: Scene) -> None:
         self.choose, self.reduction = scene.law_of, np.array([1.0, scene.reduction])
         self.pools = {name: jl.JointPool(law) for name, law in scene.laws.items()}
-        self.curves = {name: virgin_curve(law) for name, law in scene.laws.items()}
+        self.curves = {name: {**virgin_curve(law)} for name, law in scene.laws.items()}
         for curve in self.curves.values():
             curve["stiffness"] = curve["stiffness"] * max(1.0, scene.reduction**-2)
         self.touch: dict[Identity, np.ndarray] = {}
@@ -95,7 +99,7 @@ class Joints:
             if rows:
                 whole = np.array_equal(places, np.arange(len(pool.batch)))
                 self.groups.append((name, np.array(rows), None if whole else places))
-        self.n = len(contacts)
+        self.n, self.contacts = len(contacts), contacts
         self.traction = np.zeros((self.n, 2))
         for name, rows, places in self.groups:
             F = self.pools[name].batch.F[... if places is None else places]
@@ -145,19 +149,23 @@ class Joints:
         stress = self.traction[:, 0]
         return self.virgin("stiffness", "stress", stress) * ((stress > 0) | (self.damage < 1))
 
-    def renew(self, contact: Identity) -> None:
-        """Let the joint of a contact start anew, mated or not as it was, without a bond."""
-        pool = self.pools[self.choose(contact[0])]
-        (place,) = pool.add([contact])
-        self._begin(pool, place, not self.touch[contact].any())
-        self.measure()
+    def renew(self, rows: np.ndarray, work: np.ndarray, most: np.ndarray) -> np.ndarray:
+        """Let joints (m,) start anew, mated or not as they were, without a bond.
 
-    def curve(self, contact: Identity) -> dict[str, np.ndarray]:
-        """Closure (m) and work (J/m2) of the joint of a contact that starts anew."""
-        name = self.choose(contact[0])
-        if not self.touch[contact].any():
-            return self.curves[name]
-        return unmated_curve(self.pools[name].batch.law, self.curves[name]["closure"])
+        Returns closure (m) and stored energy (J/m2) (2, m) to start with: those at which they hold
+        `work` (m,), or at which they are closed by `most` (k,) if that is less.
+        """
+        out = np.empty((2, len(rows)))
+        for i, (row, held) in enumerate(zip(rows.tolist(), work.tolist(), strict=True)):
+            who = self.contacts[row]
+            name, mated = self.choose(who[0]), not self.touch[who].any()
+            law = self.pools[name].batch.law
+            curve = self.curves[name] if mated else unmated_curve(law)
+            anew = min(np.interp(held, curve["work"], curve["closure"]), most[row])
+            out[:, i] = anew, np.interp(anew, curve["closure"], curve["work"])
+            self._begin(self.pools[name], self.pools[name].add([who])[0], mated)
+        self.delta[rows] = self.stored[rows] = 0.0  # what a new joint holds
+        return out
 
     def _begin(self, pool: jl.JointPool, place: int, mated: bool) -> np.ndarray:
         """Reset a joint, without a bond; closure and sliding (2,) in m where it first touches."""

@@ -33,7 +33,7 @@ class Ledger:
         v["kinetic"] = float((0.5 * blocks.inertia * (blocks.motion[3:].T ** 2 - kick**2)).sum())
         v["stored"] = float(area @ joints.stored)
         self.start = v["turned"] = v["kinetic"] + v["stored"]
-        self.forces, self.area, self.lost = forces, area, joints.lost
+        self.forces, self.area, self.lost = forces, area, joints.lost.copy()
 
     def book(self, blocks: Blocks, joints: Joints, forces, dt: float, area) -> None:
         """Add a step in which the blocks moved with the velocities of their motion."""
@@ -51,7 +51,7 @@ class Ledger:
         v["stored"] = float(area @ joints.stored)
         # a joint loses its traction at the end of the step, which acts on the area of then
         v["friction"] += float(area @ (joints.lost - self.lost))
-        self.forces, self.area, self.lost = forces, area, joints.lost
+        self.forces, self.area, self.lost = forces, area, joints.lost.copy()
 
     @property
     def total(self) -> float:

@@ -143,24 +143,18 @@ class Simulation:
         holds what the shorter one held; the rest of the depth becomes its closure offset.
         """
         ledger, tracker, joints = self.ledger, self.tracker, self.joints
-        stored, thickness, length = joints.stored, self.scene.thickness, self.contacts.length
-        held, ratio = stored * before, length / np.maximum(before, 1e-300)
-        closure = tracker.closure
-        ledger.area, ledger.lost = ledger.area.copy(), ledger.lost.copy()
-        tracker.offset = tracker.offset.copy()
-        for i in np.flatnonzero((np.abs(ratio - 1) > MATCH) & (held > 0)).tolist():
-            kept = stored[i]
-            if ratio[i] > 1:
-                who = tracker.identities[i]
-                curve = joints.curve(who)
-                anew = np.interp(held[i] / length[i], curve["work"], curve["closure"])
-                anew = min(anew, closure[i])
-                tracker.offset[i] += closure[i] - anew
-                kept = np.interp(anew, curve["closure"], curve["work"])
-                joints.renew(who)
-                ledger.lost[i] = 0.0
-            ledger.value["dropped"] += max(float(held[i] - kept * length[i]), 0.0) * thickness
-            ledger.area[i] = length[i] * thickness
+        thickness, length = self.scene.thickness, self.contacts.length
+        held, ratio = joints.stored * before, length / np.maximum(before, 1e-300)
+        changed = np.flatnonzero((np.abs(ratio - 1) > MATCH) & (held > 0))
+        longer, kept = ratio[changed] > 1, joints.stored[changed]
+        ledger.area[changed] = length[changed] * thickness
+        if longer.any():
+            fresh = changed[longer]
+            anew, kept[longer] = joints.renew(fresh, held[fresh] / length[fresh], tracker.closure)
+            tracker.offset[fresh] += tracker.closure[fresh] - anew
+            ledger.lost[fresh] = 0.0
+        lost = np.maximum(held[changed] - kept * length[changed], 0.0)
+        ledger.value["dropped"] += float(lost.sum()) * thickness
 
     def _rearrange(self, known: list) -> None:
         """Joints, ledger and limit for a new list of contacts; `known`: the old one."""

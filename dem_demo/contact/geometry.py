@@ -19,6 +19,7 @@ import numpy as np
 from ..scene import Block
 
 FACE, CORNER = 2.0, 5.0  # degrees: up to the first an edge lies on another, from the second not
+TIE, EVEN = 1e-9, 1e-10  # sine of an angle, and m, up to which two are the same but for rounding
 LEVEL = 1e-6  # sine of a tilt that is none, for corners past the limit of their range
 _LOW, _HIGH = np.sin(np.radians([FACE, CORNER]))
 _AHEAD = np.array([[1.0], [-1.0]])  # the sides of a corner: towards the edge's end, and its start
@@ -92,8 +93,9 @@ class Contacts:
         # Behind a corner its edge ends at another corner. Of what follows there, a side of this
         # corner or the next edge of the other block, the one that is turned less is next; the limit
         # is where both are equally deep. The raised end of an edge on an edge has its side next.
+        # Drawn joints are parallel but for rounding, which must not choose: they count as parallel.
         beyond = _AHEAD * o.way[self.behind] / o.way[edge]
-        self.own = (_AHEAD * (side.conj() * beyond).imag <= 0) | (self.rise[::-1] < 0)
+        self.own = (_AHEAD * (side.conj() * beyond).imag <= TIE) | (self.rise[::-1] < -TIE)
         toward = np.where(self.own, both, _AHEAD + beyond)
         self.inside = -(rest[::-1] * toward.conj()).real
         self.inside *= np.where(self.own, np.abs(self.rise) + LEVEL, 1.0)
@@ -114,7 +116,7 @@ class Contacts:
         Of the two edges at a corner the flatter one counts.
         """
         o = self.outlines
-        flatter = np.where(self.rise[0] < self.rise[1], o.before[self.corner], self.corner)
+        flatter = np.where(self.rise[0] < self.rise[1] - TIE, o.before[self.corner], self.corner)
         edges = np.sort([flatter, self.edge], axis=0)
         return np.stack([o.block[edges], o.number[edges]], axis=1).reshape(4, -1).T
 
@@ -168,7 +170,7 @@ def _lengths(o, rise, level, overlap, pull, twist):
     up = rise > 0
     gone, bend = _raised(rise, level)
     held = np.maximum(overlap, 0.0)
-    lies = 0.5 * (1 - gone) * (overlap > 0)
+    lies = 0.5 * (1 - gone) * (overlap > EVEN)
     stands = gone * up
     length = (lies * held).sum(axis=0) + o.corner_length * stands[0] * stands[1]
     # The tilt of the first side falls as the corner's block turns, that of the second rises.

@@ -31,7 +31,7 @@ def faults(wheel: Path, target: str) -> list[str]:
     processor, system = backend.build.Compiler((), target).machine
     with zipfile.ZipFile(wheel) as packed:
         library = lief.parse(
-            packed.read(f"jointlaw/native/{backend.build.library_name(system)}")
+            packed.read(f"jointlaw/native/built/{backend.build.library_name(system)}")
         ).abstract
     found = []
     # Mach-O writes an underscore before each name

@@ -14,8 +14,10 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from . import layout
+
 HERE = Path(__file__).parent
-SOURCES = ("batch.c", "library.c", "batch.h", "layout.h", "lanes.h", "law.h", "bond.h", "build.py")
+BUILT = HERE / "built"  # the library, and headers that are made
 # no fused operations: the same bits with every compiler; the others change no result
 FLAGS = ("-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-w")
 LEVELS = {8: "x86-64-v4", 4: "x86-64-v3", 2: "x86-64"}  # of lanes of vectors, on x86-64
@@ -112,10 +114,17 @@ def find_compiler() -> Compiler | None:
 
 def sources() -> str:
     """Hash of all that a library is built from."""
-    digest = hashlib.sha256()
-    for name in SOURCES:
-        digest.update((HERE / name).read_bytes().replace(b"\r\n", b"\n"))
+    digest = hashlib.sha256(layout.layout_h().encode())
+    for path in sorted([*HERE.glob("*.[ch]"), HERE / "build.py"]):
+        digest.update(path.read_bytes().replace(b"\r\n", b"\n"))
     return digest.hexdigest()[:16]
+
+
+def write_headers(folder: Path = BUILT) -> None:
+    """Write layout.h, for the library, and jointlaw.h, for hosts in C."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "layout.h").write_text(layout.layout_h(), encoding="utf-8")
+    (folder / "jointlaw.h").write_text(layout.jointlaw_h(), encoding="utf-8")
 
 
 def library_name(system: str) -> str:
@@ -123,23 +132,25 @@ def library_name(system: str) -> str:
     return f"libjointlaw.{ENDINGS[system]}"
 
 
-def build(compiler: Compiler, folder: Path = HERE) -> Path:
+def build(compiler: Compiler, folder: Path = BUILT) -> Path:
     """Build the library into the folder; its path. RuntimeError tells the compiler's words."""
     processor, system = compiler.machine
     levels = LEVELS if processor == "x86_64" else (2,)
-    folder.mkdir(parents=True, exist_ok=True)
+    write_headers(folder)
     out = folder / library_name(system)
     with tempfile.TemporaryDirectory() as scratch:
 
         def compile_one(source: str, lanes: int, *what: str) -> Path:
             to = Path(scratch) / f"{len(what)}{lanes}.o"
-            compiler.run(*compiler.flags(lanes), *what, "-c", HERE / source, "-o", to)
+            compiler.run(
+                *compiler.flags(lanes), *what, f"-I{folder}", "-c", HERE / source, "-o", to
+            )
             return to
 
         parts: list[tuple[Any, ...]] = [("library.c", 2, f'-DJLAW_SOURCES="{sources()}"')]
         for lanes in levels:
-            parts += [("batch.c", lanes, f"-DW={lanes}", f"-DKIND=_{lanes}")]
-            parts += [("batch.c", lanes, "-DW=4", f"-DKIND=_{lanes}_alone", "-DJLAW_ABREAST")]
+            parts += [("batch.c", lanes, f"-DJL_W={lanes}", f"-DKIND=_{lanes}")]
+            parts += [("batch.c", lanes, "-DJL_W=4", f"-DKIND=_{lanes}_alone", "-DJLAW_ABREAST")]
         with ThreadPoolExecutor() as pool:
             objects = list(pool.map(lambda part: compile_one(*part), parts))
         made = Path(scratch) / out.name

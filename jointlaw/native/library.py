@@ -9,7 +9,8 @@ import numpy as np
 
 from ..discretisation.tables import Tables
 from . import build
-from .layout import Law, in_blocks, pack
+from .layout import Law
+from .pack import in_blocks, pack
 
 ADVANCE, MEASURE, REFRESH = range(3)  # what jlaw_run calls
 
@@ -31,7 +32,7 @@ class BatchCall(ctypes.Structure):
 @lru_cache(maxsize=1)
 def load() -> ctypes.CDLL | None:
     """The library, None if there is none; raises StaleLibraryError if it is of other sources."""
-    path = build.HERE / build.library_name(build.Compiler(()).machine[1])
+    path = build.BUILT / build.library_name(build.Compiler(()).machine[1])
     return load_file(path) if path.exists() else None
 
 

@@ -8,8 +8,9 @@ import numpy as np
 
 from ...joints.time_step import stiffness_per_facet
 from ...law import JointLaw
-from ...native import layout
-from ...native.layout import FORMAT
+from ...native import build
+from ...native.layout import AZIMUTHS, FORMAT, jointlaw_h
+from ...native.pack import in_blocks, in_columns, pack
 from ...support.checks import Array
 from ...support.files import write_files
 
@@ -20,8 +21,8 @@ _MODEL = "granite"  # the name of the tables in these files
 
 
 def include_dir() -> str:
-    """Folder of `jointlaw.h`, for a compiler's -I."""
-    return str(layout.HERE)
+    """Folder of `jointlaw.h`, for a compiler's -I, where the package was built."""
+    return str(build.BUILT)
 
 
 def export_c(law: JointLaw, directory: str | Path, name: str = "joint") -> list[str]:
@@ -36,7 +37,7 @@ def export_c(law: JointLaw, directory: str | Path, name: str = "joint") -> list[
     """
     require_name(name)
     texts = {f"{name}.jlaw": table_text(law), f"{name}.h": header_text(law, name)}
-    texts[HEADER] = (layout.HERE / HEADER).read_text(encoding="utf-8")
+    texts[HEADER] = jointlaw_h()
     source = resources.files(__package__)
     for file in FILES:
         texts[file] = (source / file).read_text(encoding="utf-8").replace(_MODEL, name)
@@ -101,12 +102,12 @@ def header_text(law: JointLaw, name: str) -> str:
 def packed(law: JointLaw) -> tuple[dict[str, int | float], dict[str, Array]]:
     """Numbers and arrays of `struct jlaw_law` by name, in its order; refuses too many azimuths."""
     k, ring = law.tables, _ring(law.facets.theta)
-    if max(ring) > layout.AZIMUTHS:
+    if max(ring) > AZIMUTHS:
         raise ValueError(
             f"resolution.phi = {law.resolution.phi} is out of bounds: jointlaw.h takes at most "
-            f"{layout.AZIMUTHS} azimuths on the circle"
+            f"{AZIMUTHS} azimuths on the circle"
         )
-    numbers, arrays = layout.pack(k)
+    numbers, arrays = pack(k)
     per_slope, bend = stiffness_per_facet(k)
     numbers |= {
         "closure_factor": law._first_loading.factor,
@@ -120,8 +121,8 @@ def packed(law: JointLaw) -> tuple[dict[str, int | float], dict[str, Array]]:
     if k.yields:
         late = np.stack(law._first_loading.yielding or (), axis=-1)  # (2 M, 2)
         more["LATE"] = np.hstack(np.split(late, 2))
-    facet = arrays["facet"] + layout.in_columns(more, len(ring))
-    blocks = {"facet": layout.in_blocks(facet), "depth": layout.in_blocks(arrays["depth"])}
+    facet = arrays["facet"] + in_columns(more, len(ring))
+    blocks = {"facet": in_blocks(facet), "depth": in_blocks(arrays["depth"])}
     return numbers, arrays | blocks
 
 

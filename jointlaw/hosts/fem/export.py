@@ -5,6 +5,7 @@ from pathlib import Path
 from textwrap import fill
 
 from ...law import JointLaw
+from ...native.layout import jointlaw_h
 from ...support.checks import number
 from ...support.files import write_files
 from ..c import export as c
@@ -33,7 +34,7 @@ def export_fem(
     require_seating(seating)
     c.require_name(name)
     texts = {
-        "jointlaw.h": (Path(c.include_dir()) / "jointlaw.h").read_text(encoding="utf-8"),
+        "jointlaw.h": jointlaw_h(),
         f"{name}.h": c.header_text(law, name),
     }
     marks = _marks(law, seating)

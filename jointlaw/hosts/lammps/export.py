@@ -4,6 +4,7 @@ from importlib import resources
 from pathlib import Path
 
 from ...law import JointLaw
+from ...native.layout import jointlaw_h
 from ...support.files import write_files
 from ...tables.tabulate import require_3d
 from ..c import export as c
@@ -35,7 +36,7 @@ def export_lammps(law: JointLaw, directory: str | Path, name: str = "joint") -> 
     }
     source = resources.files(__package__) / "files"
     copies = {file: (source / file).read_bytes() for file in FILES}
-    copies["jointlaw.h"] = (Path(c.include_dir()) / "jointlaw.h").read_bytes()
+    copies["jointlaw.h"] = jointlaw_h().encode()
     folder = write_files(directory, {**copies, **texts})
     (folder / "build.sh").chmod(0o755)
     return [*texts, *copies]

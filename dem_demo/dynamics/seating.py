@@ -30,14 +30,13 @@ def seat(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> tupl
     """
     slid, free = np.zeros(joints.n), blocks.free.ravel()
     still = np.ones(int(free.sum()), bool)
-    all_balanced, first = True, 0.0
+    all_balanced, first, near = True, 0.0, blocks.near()
     for attempt in range(ATTEMPTS):  # each at the places just found: joints turn with the blocks
         tracker.follow(blocks.motion)
-        before = tracker.identities
-        if tracker.renew(blocks.motion, blocks.near):
-            known = dict(zip(before, slid.tolist(), strict=True))
-            joints.assign(tracker.identities)
-            slid = np.array([known.get(who, 0.0) for who in tracker.identities])
+        before = tracker.renew(blocks.motion, near)
+        if before is not None:
+            joints.rearrange(before, tracker.law, tracker.keys)
+            slid = np.where(before >= 0, slid[before], 0.0)
         force = blocks.gravity + blocks.loads
         if attempt:
             force = force + _length_forces(scene, blocks, tracker, joints, slid)
@@ -45,9 +44,9 @@ def seat(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> tupl
         rows = rates(blocks, tracker.contacts)
         area = tracker.contacts.length * scene.thickness
         start = np.concatenate([tracker.contacts.closure, slid])
-        near = attempt > 0
-        moved, balanced = _equilibrium(joints, rows, start, area, force, still, near, not near)
-        if not near:
+        again = attempt > 0
+        moved, balanced = _equilibrium(joints, rows, start, area, force, still, again, not again)
+        if not again:
             all_balanced, first = bool(balanced.all()), np.abs(moved).max()
         else:  # what was found before is balanced but for the turning of the joints
             moved = np.where(balanced & still, moved, 0.0)
@@ -58,7 +57,7 @@ def seat(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> tupl
         still &= balanced
         if not still.any() or np.abs(moved).max() < SETTLED * first:
             break
-    tracker.renewed_at = blocks.motion[:3].copy()
+    tracker.renewed_at[:] = blocks.motion[:3]
     return slid, all_balanced
 
 
@@ -71,8 +70,9 @@ def displacements(scene: Scene, guess: np.ndarray | None = None) -> np.ndarray |
     """
     blocks, joints = Blocks(scene), Joints(scene)
     tracker = Tracker(scene, blocks.motion)
-    tracker.renew(blocks.motion, blocks.near)
-    joints.assign(tracker.identities)
+    before = tracker.renew(blocks.motion, blocks.near())
+    if before is not None:
+        joints.rearrange(before, tracker.law, tracker.keys)
     rows, area = rates(blocks, tracker.contacts), tracker.contacts.length * scene.thickness
     force = ((blocks.gravity + blocks.loads) * blocks.root).ravel()[blocks.free.ravel()]
     none, whole = np.zeros(len(force)), np.ones(len(force), bool)
@@ -88,10 +88,8 @@ def displacements(scene: Scene, guess: np.ndarray | None = None) -> np.ndarray |
 
 def _length_forces(scene, blocks, tracker, joints, slid) -> np.ndarray:
     """Forces (n, 3) of joints whose length changes as the blocks move, after their first step."""
-    before, none = joints.snapshot(), np.zeros(joints.n)
-    joints.update(tracker.contacts.closure, slid)
-    stored = joints.stored * scene.thickness
-    joints.restore(before, tracker.identities)
+    closed = np.stack([tracker.contacts.closure, slid], axis=1) - joints.delta
+    stored, none = joints.trial(closed)[2] * scene.thickness, np.zeros(joints.n)
     return tracker.contacts.assemble(blocks.motion, none, none, stored) * blocks.mobile
 
 
@@ -119,7 +117,7 @@ def _equilibrium(joints: Joints, rows: csr_array, start, area, force, settle, ne
         return F, diags(np.concatenate([slope * acts, shear]))
 
     def law(d):
-        F, C = joints.trial(np.stack([d[:k], d[k:]], axis=1))
+        F, C, _ = joints.trial(np.stack([d[:k], d[k:]], axis=1))
         blocks = [[diags(C[:, i, j]) for j in (0, 1)] for i in (0, 1)]
         return F.T.ravel(), csr_array(bmat(blocks))
 

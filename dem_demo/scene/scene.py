@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 import jointlaw as jl
 
 from .blocks import Block
@@ -76,6 +78,11 @@ class Scene:
     reduction: float = 1.0
     text: str = field(default="", init=False)  # `replace` leaves both out
     files: Files = field(default_factory=Files, init=False)
+
+    @property
+    def skins(self) -> np.ndarray:
+        """Reach (m) of the search for contacts of each block."""
+        return np.full(len(self.blocks), self.run.skin)
 
     @property
     def base(self) -> int | None:

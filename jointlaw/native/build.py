@@ -148,6 +148,7 @@ def build(compiler: Compiler, folder: Path = BUILT) -> Path:
             return to
 
         parts: list[tuple[Any, ...]] = [("library.c", 2, f'-DJLAW_SOURCES="{sources()}"')]
+        parts += [("blocks.c", 2)]
         for lanes in levels:
             parts += [("batch.c", lanes, f"-DJL_W={lanes}", f"-DKIND=_{lanes}")]
             parts += [("batch.c", lanes, "-DJL_W=4", f"-DKIND=_{lanes}_alone", "-DJLAW_ABREAST")]

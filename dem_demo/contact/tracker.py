@@ -23,7 +23,7 @@ TILT = np.sin(np.radians(6.5))  # how far a side of a corner may dip below the e
 CARRIED = 0.5  # share of an overlap that some joint must see
 ROUNDING = 1e-10  # m: corners stay until their depth is wrong by this, so that none chatters
 STALE = 0.25  # share of its skin that a block may move until its contacts are looked for
-SEEN = 0.125  # from this share on its contacts are looked for when those of another block are
+SEEN = 0.001  # of its skin: who has moved less keeps its contacts when others are looked for
 
 
 def _in_range(contacts: Contacts, known: np.ndarray) -> np.ndarray:

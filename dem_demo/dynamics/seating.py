@@ -33,6 +33,7 @@ def seat(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> tupl
     all_balanced, first, near = True, 0.0, blocks.near()
     for attempt in range(ATTEMPTS):  # each at the places just found: joints turn with the blocks
         tracker.follow(blocks.motion)
+        tracker.urgent[:] = True  # it is cheap here, and nothing is missed
         before = tracker.renew(blocks.motion, near)
         if before is not None:
             joints.rearrange(before, tracker.law, tracker.keys)

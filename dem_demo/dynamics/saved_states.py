@@ -22,9 +22,9 @@ KEPT = (  # of what changes in a run, but for the joints: arrays that stay in th
     "tracker.urgent", "ledger.energy", "ledger.forces",
 )  # fmt: skip
 STATE = (
-    *KEPT, "t0", "n", "dt", "limit.now", "limit.least", "limit.checked", "tracker.keys",
-    "tracker.law", "tracker.numbers", "tracker.offset", "tracker.given", "ledger.start",
-    "ledger.area", "ledger.lost",
+    *KEPT, "t0", "n", "dt", "limit.now", "limit.least", "limit.bound", "limit.checked",
+    "tracker.keys", "tracker.law", "tracker.numbers", "tracker.offset", "tracker.given",
+    "ledger.start", "ledger.area", "ledger.lost",
 )  # fmt: skip
 PLACES = "tracker.corner", "tracker.edge"  # from which the contacts are made anew
 

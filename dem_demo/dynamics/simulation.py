@@ -78,7 +78,7 @@ class Simulation:
         drives.aim[:] = drives.velocity(self.time, dt)
         world.call("after", dt)
         if world.stiffer:
-            self.limit.look(self.scene, self.blocks, self.contacts, self.joints)
+            self.limit.look(self.scene, self.blocks, self.contacts, self.joints, dt)
             self.limit.require(dt)
             world.bind(checked=self.limit.checked)
         if self.n % LOOKS == 0:
@@ -124,7 +124,7 @@ class Simulation:
         if largest := scene.run.largest_stress:
             curves = (held.curve for held in self.joints.held)
             stiffness = max(float(np.interp(largest, c["stress"], c["stiffness"])) for c in curves)
-            limit = min(limit, impact_limit(scene, self.blocks, stiffness))
+            limit = min(limit, impact_limit(scene, self.blocks, self.tracker.outlines, stiffness))
         if not np.isfinite(limit):
             raise Refused(
                 "nothing touches at the start, so no time step follows: set run.largest_stress "

@@ -16,7 +16,7 @@ from jointlaw.native.library import address
 
 from ..compiled import World
 from ..errors import Refused
-from ..scene import Scene, smallest_width
+from ..scene import Scene
 from .geometry import Contacts, Outlines
 
 TILT = np.sin(np.radians(6.5))  # how far a side of a corner may dip below the edge
@@ -38,10 +38,11 @@ def _in_range(contacts: Contacts, known: np.ndarray) -> np.ndarray:
     spot = np.minimum(np.searchsorted(codes[order], beyond), max(len(here) - 1, 0))
     other = here[order[spot]] if len(here) else here
     paired = contacts.codes[other] == beyond
-    pairs = zip(here[paired].tolist(), other[paired].tolist(), strict=True)
-    for i, j in sorted(pairs, key=lambda pair: not known[pair[0]]):
-        ok[j] &= not ok[i]
-    return ok
+    here, other = here[paired], other[paired]
+    first, meant = np.argsort(~known[here], kind="stable"), ok.tolist()
+    for i, j in zip(here[first].tolist(), other[first].tolist(), strict=True):
+        meant[j] &= not meant[i]
+    return np.array(meant, bool)
 
 
 class Tracker:
@@ -59,8 +60,8 @@ class Tracker:
     def __init__(self, scene: Scene, motion: np.ndarray) -> None:
         self.blocks = blocks = scene.blocks
         self.skins = scene.skins
-        self.outlines = Outlines(blocks, scene.run.corner_length, 0.25 * scene.run.skin)
-        self.deepest = scene.run.max_overlap * np.array([smallest_width(b.corners) for b in blocks])
+        self.outlines = Outlines(blocks, scene.run.corner_length, scene.run.soft)
+        self.deepest = scene.run.max_overlap * np.array([block.width for block in blocks])
         self.reach = np.array([block.reach for block in blocks])
         self.fixed = np.array([block.fixed for block in blocks])
         self._read_laws(scene)

@@ -50,6 +50,11 @@ class Block:
         """Corners (m) measured from the centroid."""
         return self.corners - self.centroid
 
+    @cached_property
+    def width(self) -> float:
+        """Smallest width (m)."""
+        return smallest_width(self.corners)
+
     @property
     def reach(self) -> float:
         """Distance (m) from the centroid to the farthest corner."""

@@ -1,6 +1,7 @@
 """A scene in memory: blocks, laws, drives and how to run them."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from .blocks import Block
 from .drives import Drive
 from .laws import Files
 
+SKIN, MOST_SKIN = 0.02, 0.1  # of the usual width of the blocks that move; of its own width
 Key = tuple[int, int, int, int]  # of an interface: block, edge, block, edge
 
 
@@ -18,8 +20,9 @@ class Run:
     """How to run a scene; times in s, lengths in m."""
 
     end: float
-    skin: float  # reach of the search for contacts
     corner_length: float  # of joint at a corner on an edge
+    soft: float  # over which the end of one edge gives way to that of another
+    skin: float | None = None  # reach of the search for contacts; `Scene.skins` without it
     fraction: float = 0.3  # time step as a share of the limit
     step: float | None = None  # or the time step itself
     seat: bool = True  # start at the gravity closure
@@ -79,10 +82,13 @@ class Scene:
     text: str = field(default="", init=False)  # `replace` leaves both out
     files: Files = field(default_factory=Files, init=False)
 
-    @property
+    @cached_property
     def skins(self) -> np.ndarray:
-        """Reach (m) of the search for contacts of each block."""
-        return np.full(len(self.blocks), self.run.skin)
+        """Reach (m) of the search for contacts of each block: of a sliver less than of others."""
+        widths = np.array([block.width for block in self.blocks])
+        usual = np.median(widths[[block.moves for block in self.blocks]])
+        least = np.minimum(SKIN * usual, MOST_SKIN * widths)
+        return least if self.run.skin is None else np.full(len(widths), self.run.skin)
 
     @property
     def base(self) -> int | None:

@@ -13,6 +13,8 @@ import numpy as np
 from shapely import LineString, Polygon, STRtree, get_exterior_ring, get_parts
 from shapely.ops import split
 
+from jointlaw.support.progress import track
+
 from .blocks import next_of, smallest_width
 
 Line = tuple[int, np.ndarray, float]  # a joint: number of its set, normal, distance n . x in m
@@ -81,7 +83,8 @@ def cut(
     pieces = [(piece, _rim(piece)) for piece in get_parts(rock)]
     for number, joints in enumerate(sets):
         rng = np.random.default_rng([seed, number])
-        for offset in joints.offsets(outline, rng):
+        offsets = joints.offsets(outline, rng)
+        for offset in track(offsets, f"cutting, set {number + 1}", len(offsets)):
             lines.append((number, joints.normal, offset))
             pieces = _crossed(pieces, joints.normal, offset, tiny, joints.persistence, rng)
     pieces = [part for piece, _ in pieces for part in _convex_parts(piece, sets, lines, tiny)]

@@ -11,7 +11,8 @@ from .blocks import Block
 from .drives import Drive
 from .laws import Files
 
-SKIN, MOST_SKIN = 0.02, 0.1  # of the usual width of the blocks that move; of its own width
+SKIN = 0.02  # of the usual width of the blocks that move
+THIN = 0.1  # of its own width: most that a sliver may overlap, or look for contacts
 Key = tuple[int, int, int, int]  # of an interface: block, edge, block, edge
 
 
@@ -85,10 +86,20 @@ class Scene:
     @cached_property
     def skins(self) -> np.ndarray:
         """Reach (m) of the search for contacts of each block: of a sliver less than of others."""
-        widths = np.array([block.width for block in self.blocks])
-        usual = np.median(widths[[block.moves for block in self.blocks]])
-        least = np.minimum(SKIN * usual, MOST_SKIN * widths)
-        return least if self.run.skin is None else np.full(len(widths), self.run.skin)
+        skin = self.run.skin
+        return self._shares(SKIN, 0.0) if skin is None else np.full(len(self.blocks), skin)
+
+    @cached_property
+    def deepest(self) -> np.ndarray:
+        """Largest overlap (m) of each block."""
+        return self._shares(self.run.max_overlap, self.run.max_overlap)
+
+    def _shares(self, of_usual: float, of_own: float) -> np.ndarray:
+        """Lengths (m): a share of the usual width of blocks that move, but no more than THIN of a
+        block's own width; at the least a share of that."""
+        own = np.array([block.width for block in self.blocks])
+        usual = np.median(own[[block.moves for block in self.blocks]])
+        return np.maximum(of_own * own, np.minimum(of_usual * usual, THIN * own))
 
     @property
     def base(self) -> int | None:

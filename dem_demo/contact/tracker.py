@@ -61,7 +61,7 @@ class Tracker:
         self.blocks = blocks = scene.blocks
         self.skins = scene.skins
         self.outlines = Outlines(blocks, scene.run.corner_length, scene.run.soft)
-        self.deepest = scene.deepest
+        self.deepest = scene.run.max_overlap * np.array([block.width for block in blocks])
         self.reach = np.array([block.reach for block in blocks])
         self.fixed = np.array([block.fixed for block in blocks])
         self._read_laws(scene)

@@ -70,6 +70,11 @@ def usual_size(blocks: Iterable[Block]) -> float:
     return float(np.sqrt(np.median([block.section.area for block in blocks])))
 
 
+def usual_width(blocks: Iterable[Block]) -> float:
+    """Median width (m) of the blocks that move."""
+    return float(np.median([block.width for block in blocks if block.moves]))
+
+
 def box(width: float, height: float, at=(0.0, 0.0), angle: float = 0.0) -> np.ndarray:
     """Corners of a box centred at `at`, turned by `angle` (degrees)."""
     half = 0.5 * np.array([[-width, -height], [width, -height], [width, height], [-width, height]])

@@ -11,7 +11,7 @@ from shapely import Point, Polygon
 from jointlaw.parameters import keys
 from jointlaw.support.checks import one_of, remedy
 
-from .blocks import Block, box, check_convex
+from .blocks import Block, box, check_convex, usual_width
 from .cutting import JointSet, cut
 from .drives import read_drives
 from .keys import LIST, SCENE, TABLE, Tables, overlay, some_of, vector
@@ -23,6 +23,7 @@ TEMPLATE = Path(__file__).parent / "template.toml"
 GRAVITY, DENSITY = (0.0, -9.81), 2600.0  # m/s2, kg/m3
 CORNER, SOFT = 0.1, 0.005  # of the least width of a block
 SOFT_SKIN = 0.25  # of a skin that is given
+SLIVER = 1 / 3  # of the usual width: narrower blocks do not count
 LEAST = 0.2  # narrowest block of a rock as a share of the smallest spacing
 
 
@@ -103,7 +104,8 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     pairs = _pairs(top.get("joint", ()), number, blocks, where)
     least, skin = min(block.width for block in blocks), top["run"].get("skin")
     soft = SOFT_SKIN * skin if skin else SOFT * least
-    run = Run(**{"corner_length": CORNER * least, "soft": soft, **top["run"]})
+    stands = CORNER * max(least, SLIVER * usual_width(blocks))
+    run = Run(**{"corner_length": stands, "soft": soft, **top["run"]})
     watched = _watched(top.get("watch", {}), number, blocks, run.corner_length, f"{where}: watch")
     default = top.get("law", next(iter(laws), ""))
     for law in [default, *pairs.values(), *edge_laws.values()]:

@@ -7,12 +7,11 @@ import numpy as np
 
 import jointlaw as jl
 
-from .blocks import Block
+from .blocks import Block, usual_width
 from .drives import Drive
 from .laws import Files
 
-SKIN = 0.02  # of the usual width of the blocks that move
-THIN = 0.1  # of its own width: most that a sliver may overlap, or look for contacts
+SKIN, THIN = 0.02, 0.1  # of the usual width of the blocks that move; at most of a block's own
 Key = tuple[int, int, int, int]  # of an interface: block, edge, block, edge
 
 
@@ -32,7 +31,7 @@ class Run:
     dashpot_shear: float = 0.05
     law_steps: int = 1  # steps of the law per time step: 4 balances energy to 0.5 % in impacts
     largest_stress: float = 0.0  # Pa, expected in impacts: sets the step before anything touches
-    max_overlap: float = 0.03  # share of the smaller block's width
+    max_overlap: float = 0.1  # share of the smaller block's width
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,20 +85,9 @@ class Scene:
     @cached_property
     def skins(self) -> np.ndarray:
         """Reach (m) of the search for contacts of each block: of a sliver less than of others."""
-        skin = self.run.skin
-        return self._shares(SKIN, 0.0) if skin is None else np.full(len(self.blocks), skin)
-
-    @cached_property
-    def deepest(self) -> np.ndarray:
-        """Largest overlap (m) of each block."""
-        return self._shares(self.run.max_overlap, self.run.max_overlap)
-
-    def _shares(self, of_usual: float, of_own: float) -> np.ndarray:
-        """Lengths (m): a share of the usual width of blocks that move, but no more than THIN of a
-        block's own width; at the least a share of that."""
-        own = np.array([block.width for block in self.blocks])
-        usual = np.median(own[[block.moves for block in self.blocks]])
-        return np.maximum(of_own * own, np.minimum(of_usual * usual, THIN * own))
+        widths = np.array([block.width for block in self.blocks])
+        skin = np.minimum(SKIN * usual_width(self.blocks), THIN * widths)
+        return skin if self.run.skin is None else np.full(len(widths), self.run.skin)
 
     @property
     def base(self) -> int | None:

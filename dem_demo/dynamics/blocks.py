@@ -107,7 +107,7 @@ class Blocks:
 
     def refuse(self, i: int, dt: float) -> None:
         """Refuse block i, which moves too far in a step of dt (s) to find its contacts."""
-        u, v, spin = np.abs(self.motion[3:, i])
+        u, v, spin = np.abs(self.velocity[:, i])
         path, most = (u + v + spin * self.reach[i]) * dt, MOVED * self.skins[i]
         raise Refused(
             f"block {self.names[i]!r} moves {path:.3g} m in one step: must stay below {most:.3g} m "

@@ -22,7 +22,7 @@ KEPT = (  # of what changes in a run, but for the joints: arrays that stay in th
     "tracker.urgent", "ledger.energy", "ledger.forces",
 )  # fmt: skip
 STATE = (
-    *KEPT, "t0", "n", "dt", "limit.now", "limit.least", "limit.bound", "limit.checked",
+    *KEPT, "t0", "n", "dt", "halvings", "limit.now", "limit.least", "limit.bound", "limit.checked",
     "tracker.keys", "tracker.law", "tracker.numbers", "tracker.offset", "tracker.given",
     "ledger.start", "ledger.area", "ledger.lost",
 )  # fmt: skip

@@ -14,11 +14,17 @@ from .blocks import Blocks
 from .energy import DROPPED, Ledger
 from .saved_states import KEPT, PLACES, STATE, Saved
 from .seating import seat
-from .timestep import StepLimit, impact_limit
+from .timestep import SAFE, StepLimit, impact_limit
 
 NEAR = 0.4  # share of the step's limit below which no change of lever arms matters
 MATCH = 1e-6  # relative: lengths that are equal but for rounding
 LOOKS = 16  # steps between two looks at the drives
+FRACTIONS = {  # of the limit that a time step is, by what can happen
+    "blocks fall or have no equilibrium": 0.15,
+    "drives move blocks": 0.4,
+    "the blocks are in equilibrium": 0.7,
+}
+HALVINGS = 8  # of a time step that was chosen, until a run is refused
 
 
 class Simulation:
@@ -26,7 +32,9 @@ class Simulation:
 
     step: time step (s), instead of the scene's; saved: a state to go on from. blocks: where they
     are; tracker: their contacts; joints: the law; ledger: the energies; limit: of the time step dt
-    (s); balanced: were the blocks in equilibrium at the start?
+    (s), chosen for the reason `why`; balanced: were the blocks in equilibrium at the start? Where
+    neither `step` nor the scene sets the time step, it is halved when joints close too far for it,
+    or blocks become too fast.
     Raises ValueError for a step that is no finite number > 0 and for a state of another scene,
     Refused for a start that the method cannot carry.
     """
@@ -37,6 +45,8 @@ class Simulation:
         self.scene, self.blocks = scene, Blocks(scene)
         self.tracker, self.joints = Tracker(scene, self.blocks.motion), Joints(scene)
         self.limit, self.balanced, self.t0, self.n = StepLimit(), True, 0.0, 0
+        given = step or scene.run.step or scene.run.fraction
+        self.why, self.halvings = "", 0 if given else HALVINGS
         self.ledger = Ledger(len(scene.blocks))
         if saved:
             self._unpack(saved, step)
@@ -66,8 +76,11 @@ class Simulation:
         """
         dt, world, drives = self.dt, self.world, self.blocks.drives
         world.call("before", dt)
-        if world.fast >= 0:
-            self.blocks.refuse(world.fast, dt)
+        while world.fast >= 0:
+            if not self._halve():
+                self.blocks.refuse(world.fast, dt)
+            dt = self.dt
+            world.call("before", dt)
         if world.moved or world.stale:
             world = self._renew()
         if world.deep >= 0:
@@ -79,10 +92,28 @@ class Simulation:
         world.call("after", dt)
         if world.stiffer:
             self.limit.look(self.scene, self.blocks, self.contacts, self.joints, dt)
-            self.limit.require(dt)
+            while self.dt > SAFE * self.limit.now and self._halve():
+                pass
+            self.limit.require(self.dt)
             world.bind(checked=self.limit.checked)
         if self.n % LOOKS == 0:
             drives.reverse(self.time, self.slid)
+
+    def _halve(self) -> bool:
+        """Go on with half the time step, if it may be halved once more."""
+        if not self.halvings:
+            return False
+        self.halvings -= 1
+        self._change_step(0.5 * self.dt)
+        return True
+
+    def _change_step(self, dt: float) -> None:
+        """Velocities are half a step ahead of the places: bring them to half of a step dt (s)."""
+        blocks, drives, now = self.blocks, self.blocks.drives, self.time
+        change = 0.5 * (dt - self.dt) * self.ledger.forces[0] / blocks.inertia
+        blocks.velocity += (change * blocks.free).T
+        blocks.velocity[drives.axes, drives.rows] = drives.velocity(now, dt)
+        self.t0, self.n, self.dt = now, 0, dt
 
     def bind(self) -> None:
         """Tell the compiled step where all arrays lie, after each change of the contacts."""
@@ -120,6 +151,7 @@ class Simulation:
         blocks.velocity[:] = blocks.motion[3:]
 
     def _chosen_step(self) -> float:
+        """By the scene's fraction of the limit, or else by one for what can happen."""
         scene, limit = self.scene, self.limit.now
         if largest := scene.run.largest_stress:
             curves = (held.curve for held in self.joints.held)
@@ -130,7 +162,12 @@ class Simulation:
                 "nothing touches at the start, so no time step follows: set run.largest_stress "
                 "(Pa) to the normal stress expected in impacts, or run.step (s)"
             )
-        return scene.run.fraction * limit
+        if scene.run.fraction:
+            return scene.run.fraction * limit
+        falls = not (scene.run.seat and self.balanced) or self.blocks.velocity.any()
+        driven = any(len(drive.times) > 1 for drive in scene.drives)
+        self.why = [*FRACTIONS][0 if falls else 1 if driven else 2]
+        return FRACTIONS[self.why] * limit
 
     def _renew(self) -> World:
         """Joints, ledger and limit where contacts went on, and where new ones are looked for.
@@ -208,10 +245,8 @@ class Simulation:
         tracker, blocks = self.tracker, self.blocks
         tracker.hold(saved["tracker.corner"], saved["tracker.edge"], blocks.motion)
         self.joints.restore(saved, tracker.law, tracker.keys)
-        if step:  # velocities are half a step ahead of the places: of the new step
-            change = 0.5 * (step - self.dt) * self.ledger.forces[0] / blocks.inertia
-            blocks.velocity += (change * blocks.free).T
-            self.t0, self.n, self.dt = self.time, 0, step
+        if step:
+            self._change_step(step)
             self.limit.look(self.scene, blocks, self.contacts, self.joints)
             self.limit.require(step)
         self.bind()

@@ -23,7 +23,7 @@ class Run:
     corner_length: float  # of joint at a corner on an edge
     soft: float  # over which the end of one edge gives way to that of another
     skin: float | None = None  # reach of the search for contacts; `Scene.skins` without it
-    fraction: float = 0.3  # time step as a share of the limit
+    fraction: float | None = None  # time step as a share of the limit; None: by what can happen
     step: float | None = None  # or the time step itself
     seat: bool = True  # start at the gravity closure
     record: float = 0.05  # time between records

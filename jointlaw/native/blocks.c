@@ -281,12 +281,18 @@ JL_OUT void jl_blocks_press(jl_world *w, double dt)
 }
 
 /* Move the blocks and follow the contacts; increments for the law. Notes a block that is too fast,
- * and whether blocks have moved so far that contacts must be looked for. */
+ * before any has moved, and whether blocks have moved so far that contacts must be looked for. */
 JL_OUT void jl_blocks_before(jl_world *w, double dt)
 {
   const long long n = w->blocks;
   w->fast = -1;
   w->stale = 0;
+  for (long long i = 0; i < n; i++) {
+    const double *v = w->velocity + i;
+    const double speed = fabs(v[0]) + fabs(v[n]) + fabs(v[2 * n]) * w->reach[i];
+    if (w->mobile[i] && !(speed * dt < w->max_path * w->skin[i])) w->fast = i; /* NaN too */
+  }
+  if (w->fast >= 0) return;
   for (long long i = 0; i < n; i++) {
     double *m = w->motion + i, moved[3];
     if (!w->mobile[i]) continue;
@@ -295,13 +301,10 @@ JL_OUT void jl_blocks_before(jl_world *w, double dt)
       m[j * n] += dt * m[(3 + j) * n];
       moved[j] = m[j * n] - w->renewed[j * n + i];
     }
-    const double path = fabs(m[3 * n]) + fabs(m[4 * n]) + fabs(m[5 * n]) * w->reach[i];
-    if (!(path * dt < w->max_path * w->skin[i])) w->fast = i; /* also true for NaN */
     const double far =
         sqrt(moved[0] * moved[0] + moved[1] * moved[1]) + fabs(moved[2]) * w->reach[i];
     if (far > w->max_stale * w->skin[i]) w->stale = 1;
   }
-  if (w->fast >= 0) return;
   jl_blocks_follow(w);
   for (long long i = 0; i < n && w->moved; i++) w->stale |= w->urgent[i];
   jl_blocks_press(w, dt);

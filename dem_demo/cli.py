@@ -2,6 +2,8 @@
 
 import argparse
 import sys
+import time
+from contextlib import suppress
 from importlib.util import find_spec
 from math import inf
 from pathlib import Path
@@ -19,6 +21,7 @@ from .studies import ablate, compare, strength, trials
 
 VERSION = 2  # of strength.json
 FAILING = 3.0  # s: most that a failing rock is run for
+TRIED, PATIENCE = 100, 1.0  # steps, and s, by which the time of a run is estimated
 INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 
 ABOUT = """\
@@ -98,9 +101,12 @@ def _run(given: argparse.Namespace) -> None:
     resumed = "state" in given
     sim = Simulation.load(given.state, given.step) if resumed else Simulation(load(given.scene))
     _announce(sim, given.until)
+    dt = sim.dt
     record, summary = run(sim, given.out, given.until, given.format, given.vtk)
     for line in sentences(record):
         print(line)
+    if sim.dt < dt:
+        print(f"the time step was halved to {sim.dt:.3g} s as joints closed or blocks fell")
     print(
         f"energy balanced to {summary['largest_energy_error']:.1e}, smallest margin of the time "
         f"step {summary['time_step_margin']:.2f}; results in {given.out}"
@@ -113,12 +119,33 @@ def _announce(sim: Simulation, until: float | None = None) -> None:
         f"{sim.scene.title}: {sum(not block.fixed for block in sim.scene.blocks)} moving blocks, "
         f"{sim.joints.n} law points in reach"
     )
-    print(f"time step {dt:.3g} s, limit {limit:.3g} s (margin {limit / dt:.2f}), {steps} steps")
+    why = f"; fraction {dt / limit:.2g}, because {sim.why}" if sim.why else ""
+    print(
+        f"time step {dt:.3g} s, limit {limit:.3g} s (margin {limit / dt:.2f}{why}), {steps} steps"
+    )
+    if seconds := _pace(sim) * steps:
+        print(f"about {_spoken(seconds)} without pictures, by its first steps")
     for rock in sim.scene.rocks:
         print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
               f"{len(rock.blocks) - len(rock.free)} fixed; {rock.slivers}")  # fmt: skip
     if not sim.balanced:
         print("some blocks have no static equilibrium and move from the first step")
+
+
+def _pace(sim: Simulation) -> float:
+    """Time (s) of a step, by the first ones of a copy; 0 where these are refused."""
+    copy, steps, started = Simulation(sim.scene, saved=sim.state()), 0, time.perf_counter()
+    with suppress(Refused):
+        while steps < TRIED and time.perf_counter() < started + PATIENCE:
+            copy.step()
+            steps += 1
+        return (time.perf_counter() - started) / steps
+    return 0.0
+
+
+def _spoken(seconds: float) -> str:
+    """A time for a person."""
+    return f"{seconds:.2g} s" if seconds < 100 else f"{seconds / 60:.2g} min"
 
 
 def _new(given: argparse.Namespace) -> None:

@@ -93,12 +93,12 @@ def variants(scene: Scene, record: Record) -> Iterator[tuple[str, Callable[[], S
     for name, keys in lacking.items():
         yield name, partial(_without, scene, keys, pressed)
     run, steps = scene.run, 1 if scene.run.law_steps > 1 else 4
-    key = "step" if run.step else "fraction"
+    dt = float(record.state["dt"])
     others = {
         "no dashpots": {"dashpot_normal": 0.0, "dashpot_shear": 0.0},
         f"law_steps = {steps}": {"law_steps": steps},
-        "half the time step": {key: 0.5 * getattr(run, key)},
-        "twice the time step": {key: 2.0 * getattr(run, key)},
+        "half the time step": {"step": 0.5 * dt},
+        "twice the time step": {"step": 2.0 * dt},
     }
     for name, keys in others.items():
         if (other := replace(run, **keys)) != run:

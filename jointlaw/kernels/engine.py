@@ -54,13 +54,17 @@ class Step:
     """A step of m joints of one batch: increments in, results out. It may be taken many times.
 
     d (m, dim) in m; F (m, dim) and C (m, dim, dim), which are written, C None for no tangent;
-    where: the joints that move (m,), None for all; keep: whether the states advance.
+    where: the joints that move (m,), None for all; keep: whether the states advance. shown
+    (m, 6 + dim), written if given, as it costs little in the same pass: shares sliding, slipping
+    and separated, stored and dissipated energy (J/m2), damage of the bond, displacement (m).
     """
 
     def __init__(
-        self, d: Array, F: Array, C: Array | None, where: Index | None = None, keep: bool = True
-    ) -> None:
+        self, d: Array, F: Array, C: Array | None, where: Index | None = None, keep: bool = True,
+        shown: Array | None = None,
+    ) -> None:  # fmt: skip
         self.d, self.F, self.C, self.where, self.keep = d, F, C, where, keep
+        self.shown = shown
         self.call: tuple[Array | None, Any] = None, None  # of these states, for `NativeEngine`
 
     def __getstate__(self) -> dict[str, Any]:
@@ -124,6 +128,12 @@ class NumpyEngine:
                 step.C[part] = np.moveaxis(C, 2, 0)
             if step.keep:
                 state[place] = new.T
+            if step.shown is not None:
+                now = reference.parts(self.tables, new)
+                damage = getattr(now, "damage", np.ones(len(F.T)))
+                shares = reference.measures(self.tables, new)[:4]
+                all_shown = np.stack([*shares, now.dissipated, damage, *now.delta])
+                step.shown[part] = all_shown.T
 
     def refresh(self, state: Array, n: int) -> None:
         """Nothing is kept beside the states."""
@@ -175,7 +185,7 @@ class NativeEngine:
         """Take a step; `ledger` adds up the dissipated energy."""
         of, call = step.call
         if of is not state:
-            arrays = (address(array) for array in (step.d, step.F, step.C, step.where))
+            arrays = (address(array) for array in (step.d, step.F, step.C, step.shown, step.where))
             call = self._prepared(state, len(step.d), *arrays)
             step.call = state, call
         call.ledger, call.keep = ledger, step.keep
@@ -201,9 +211,9 @@ class NativeEngine:
         self._run(library.MEASURE, self._prepared(state, out.shape[1], None, address(out)))
 
     def _prepared(self, state: Array, n: int, *arrays: int | None) -> library.BatchCall:
-        """A call for n joints; arrays: where d, F, C and the index begin."""
+        """A call for n joints; arrays: where d, F, C, what is shown and the index begin."""
         _, rows, lanes = state.shape
-        given = *arrays, *[None] * (4 - len(arrays))
+        given = *arrays, *[None] * (5 - len(arrays))
         return library.BatchCall(
             self._law.address, address(state), *given, n, 0, 0, rows, lanes == 1, self.lanes
         )

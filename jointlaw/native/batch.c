@@ -18,7 +18,23 @@
 #define BLOCK JLAW_BLOCK /* joints of a block */
 #endif
 
-/* Advance the joints of a block: d, F and C of the first of them */
+/* What joints at n amount to after a step, into rows of b->shown */
+static void show(const jlaw_batch *b, jl_numbers n, const jl_amounts *all, double *to, int some)
+{
+  const int dim = b->law->dim, size = JLAW_SHOWN + dim, last = jl_state_rows(b->law) - 1;
+  for (int l = 0; l < some; l++, to += size) {
+    const double *s = n.s + l;
+    to[JLAW_SLIDING] = JL_JOINT(all->sliding, l);
+    to[JLAW_SLIPPING] = JL_JOINT(all->slipping, l);
+    to[JLAW_SEPARATED] = JL_JOINT(all->separated, l);
+    to[JLAW_STORED] = JL_JOINT(all->stored, l);
+    to[JLAW_LOST] = s[(size_t) dim * n.stride];
+    to[JLAW_DAMAGE] = jl_element_rows(b->law) ? s[(size_t) last * n.stride] : 1.0;
+    for (int i = 0; i < dim; i++) to[JLAW_SHOWN + i] = s[(size_t) i * n.stride];
+  }
+}
+
+/* Advance the joints of a block: d, F, C and what is shown of the first of them */
 static void advance_block(const jlaw_batch *b, double *block, size_t ahead, long first, int count)
 {
   const int dim = b->law->dim, kept = b->rows > jl_state_rows(b->law);
@@ -32,7 +48,10 @@ static void advance_block(const jlaw_batch *b, double *block, size_t ahead, long
       p[i] = jl_each_joint(0.0);
       for (int l = 0; l < some; l++) JL_JOINT(p[i], l) = d[(at + l) * dim + i];
     }
-    jl_step_of_kind(b->law, n, p, f, c, b->ledger, C != NULL, kept, b->hold);
+    jl_amounts all;
+    jl_step_of_kind(b->law, n, p, f, c, b->ledger, C != NULL, kept, b->hold,
+                    b->shown ? &all : NULL);
+    if (b->shown) show(b, n, &all, b->shown + (first + at) * (JLAW_SHOWN + dim), some);
     for (int l = 0; l < some; l++) {
       for (int i = 0; i < dim; i++) F[(at + l) * dim + i] = JL_JOINT(f[i], l);
       for (int i = 0; C && i < dim * dim; i++) C[(at + l) * dim * dim + i] = JL_JOINT(c[i], l);

@@ -177,7 +177,8 @@ def build(compiler: Compiler, folder: Path = BUILT) -> Path:
     write_headers(folder)
     out = folder / library_name(compiler.machine[1])
     holds = f"-DJLAW_LEVELS={sum(levels)}", f'-DJLAW_SOURCES="{sources()}"'
-    parts = [("library.c", min(LEVELS), holds), ("processor.c", min(LEVELS), ())]
+    own = ("processor.c", min(LEVELS), ()), ("blocks.c", min(LEVELS), ())
+    parts = [("library.c", min(LEVELS), holds), *own]
     for lanes in levels:
         parts += [
             ("batch.c", lanes, (f"-DJL_W={lanes}", f"-DKIND=_{lanes}")),

@@ -230,7 +230,7 @@ JLAW_CLONES JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t 
                                          const double *d, double *F, double *C)
 {
   const jl_numbers n = {s, stride, 0};
-  jl_step_of_kind(law, n, d, F, C, JLAW_LEDGER, C != NULL, 0, 0);
+  jl_step_of_kind(law, n, d, F, C, JLAW_LEDGER, C != NULL, 0, 0, NULL);
 }
 
 /* Whether all sliders hold forces that a law can have; 0 for NaN */

@@ -364,6 +364,56 @@ JL_IN void jl_wear_sliders(const double *cell, jl_facets *o, const jl_sliders *c
   *qt = share * *qt;
 }
 
+/* ------------------------------------------------------------ what a state amounts to */
+
+typedef struct { /* as reference.Measures; of the stored energy that of the shear springs */
+  jl_of_joint sliding, slipping, separated, stored, reach, sheared;
+} jl_amounts;
+
+typedef struct {
+  jl_real sliding, slipping, separated, normal, sheared;
+} jl_amount_sums;
+
+JL_IN jl_amount_sums jl_no_amounts(void)
+{
+  const jl_amount_sums none = {jl_each(0.0), jl_each(0.0), jl_each(0.0), jl_each(0.0),
+                               jl_each(0.0)};
+  return none;
+}
+
+typedef struct { /* of the cells of facets: G of those at their limit; q^2/kappa; whether all are */
+  jl_real held, sheared, slips;
+} jl_cell_sums;
+
+/* One cell with the sliders q, its G and kappa, the friction limit of q over G, Phi of its facet */
+JL_IN void jl_measure_cell(jl_real qs, jl_real qt, jl_real G, jl_real kappa, jl_real strength,
+                           jl_real force, jl_cell_sums *cells)
+{
+  const jl_real q2 = qs * qs + qt * qt;
+  const jl_yes stiff = kappa > JLAW_TINY;
+  const jl_yes limited = jl_root(q2) >= strength * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * force);
+  cells->held += jl_only(limited, G);
+  cells->slips = jl_only(limited, cells->slips);
+  cells->sheared += jl_only(stiff, q2 / jl_pick(stiff, kappa, 1.0));
+}
+
+/* Facets with these cells, at y1 and z1 */
+JL_IN void jl_measure_facets(const jlaw_law *law, const double *f, const jl_facets *o,
+                             const jl_cell_sums *cells, jl_amount_sums *sum)
+{
+  const jl_yes touches = o->y1 > o->z1;
+  const jl_real force = jl_only(touches, jl_larger(o->f1 - o->fz1, jl_each(0.0))),
+                share = jl_each(jl_column(f, JLAW_SHARE));
+  const jl_real part = jl_only(force > 0.0, cells->held / jl_pick(force > 0.0, force, 1.0));
+  sum->sliding += share * jl_only(touches, cells->slips);
+  sum->slipping += share * jl_smaller(part, jl_each(1.0));
+  sum->separated += share * jl_pick(touches, 0.0, 1.0);
+  jl_real normal = jl_psi(law, o->y1);
+  if (law->yields) normal = normal - jl_psi(law, o->z1) - o->fz1 * (o->y1 - o->z1);
+  sum->normal += jl_column(f, JLAW_POTENTIAL) * jl_only(touches, jl_larger(normal, jl_each(0.0)));
+  sum->sheared += jl_column(f, JLAW_COMPLIANCE) * cells->sheared;
+}
+
 /* --------------------------------------------------------------------------- one step */
 
 /* G and kappa of a cell before and after the step. What G gains is taken from the virgin curve: the
@@ -473,7 +523,7 @@ JL_IN void jl_slide_tangent(const double *f, const double *cell, const jl_slider
 
 /* One depth cell of facets: from the sliders before the step to those after it */
 JL_IN void jl_slide(const double *f, const double *cell, jl_facets *o, jl_real *qs, jl_real *qt,
-                    jl_kind k)
+                    jl_kind k, jl_cell_sums *seen)
 {
   jl_sliders c;
   jl_cells_of(cell, o, &c, k.yields);
@@ -489,6 +539,7 @@ JL_IN void jl_slide(const double *f, const double *cell, jl_facets *o, jl_real *
   o->qt += *qt;
   if (k.ledger) o->lost += jl_friction_loss(&c);
   if (k.tangent) jl_slide_tangent(f, cell, &c, o, k);
+  if (seen) jl_measure_cell(*qs, *qt, c.G1, c.k1, c.strength, o->f1, seen);
 }
 
 /* C += along g^T + E^T B E of facets; where the flattened depth moves, less softening g_z^T */
@@ -568,9 +619,10 @@ JL_IN void jl_add_fading_tangent(const jlaw_law *law, const double *f, const jl_
     for (int j = 0; j < k.dim; j++) sum->C[3 * i + j] += C[i][j];
 }
 
-/* Facets from number `at` on: closures, virgin curve, sliders, and their part of F and C */
+/* Facets from number `at` on: closures, virgin curve, sliders, and their part of F and C; and, where
+ * `seen` is given, of what the state then amounts to */
 JL_IN void jl_step_facets(const jlaw_law *law, int at, const jl_motion *m, jl_numbers n,
-                          jl_sums *sum, jl_kind k)
+                          jl_sums *sum, jl_kind k, jl_amount_sums *seen)
 {
   const int M = law->facets, D = law->cells, some = M - at < JL_TOGETHER ? M - at : JL_TOGETHER;
   const int kept = k.kept ? jl_state_rows(law) : 0;
@@ -588,8 +640,10 @@ JL_IN void jl_step_facets(const jlaw_law *law, int at, const jl_motion *m, jl_nu
     o.y1 = jl_climb(law, f, m->to[0], &m->end, m->has);
   }
   o.yw = k.wears ? jl_resolved(jl_climb(law, f, m->from[0], &m->start, m->had)) : o.y0;
-  if (!k.yields && !jl_any((o.y0 > 0.0) | (o.y1 > 0.0) | (o.yw > 0.0)))
+  if (!k.yields && !jl_any((o.y0 > 0.0) | (o.y1 > 0.0) | (o.yw > 0.0))) {
+    if (seen) seen->separated += jl_column(f, JLAW_SHARE);
     return; /* apart: holds zero */
+  }
   if (k.fades) {
     o.middle = jl_plane_at(f, &m->middle, m->has);
     o.end = jl_plane_at(f, &m->end, m->has);
@@ -623,15 +677,17 @@ JL_IN void jl_step_facets(const jlaw_law *law, int at, const jl_motion *m, jl_nu
   }
   o.z0 = o.z1 = o.fz0 = o.fz1 = o.kz0 = o.kz1 = jl_each(0.0);
   if (k.yields) jl_press(law, f, n, kept, at, some, m, &o);
+  jl_cell_sums cells = {jl_each(0.0), jl_each(0.0), jl_each(1.0)};
   for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_LANES) {
     const jl_of_facet low = jl_column(cell, JLAW_LOW);
     if (!jl_any((o.y0 > low) | (o.y1 > low) | (o.yw > low))) break; /* nor does what is deeper */
     const int row = k.dim + 1 + at * D + i;
     jl_real qs = jl_take(n, row, D, some), qt = jl_take(n, row + M * D, D, some);
-    jl_slide(f, cell, &o, &qs, &qt, k);
+    jl_slide(f, cell, &o, &qs, &qt, k, seen ? &cells : (jl_cell_sums *) 0);
     jl_put(n, row, D, some, qs);
     jl_put(n, row + M * D, D, some, qt);
   }
+  if (seen) jl_measure_facets(law, f, &o, &cells, seen);
   if (k.yields) {
     sum->crushed += jl_column(f, JLAW_POTENTIAL) * jl_crush(f, &o);
     if (k.wears) jl_flatten_facets(o.yw, o.z0, o.fz0, &o.fw, &o.kw);
@@ -661,9 +717,20 @@ JL_IN void jl_step_facets(const jlaw_law *law, int at, const jl_motion *m, jl_nu
   if (k.tangent) jl_add_tangent(law, f, &o, sum, k);
 }
 
-/* Advance joints by the increments d: their numbers n, F (dim), and C (dim, dim) for a tangent */
+/* Amounts of joints from the sums over their facets */
+JL_IN void jl_add_up(const jl_amount_sums *sum, jl_amounts *all)
+{
+  all->sliding = jl_total(sum, sliding);
+  all->slipping = jl_total(sum, slipping);
+  all->separated = jl_total(sum, separated);
+  all->sheared = jl_total(sum, sheared);
+  all->stored = jl_total(sum, normal) + all->sheared;
+}
+
+/* Advance joints by the increments d: their numbers n, F (dim), and C (dim, dim) for a tangent; what
+ * they then amount to, but for `reach`, where `all` is given */
 JL_IN void jl_step(const jlaw_law *law, jl_numbers n, const jl_of_joint d[3], jl_of_joint F[3],
-                   jl_of_joint C[9], jl_kind k)
+                   jl_of_joint C[9], jl_kind k, jl_amounts *all)
 {
   const int dim = k.dim, M = law->facets, rest = jl_rest_row(law);
   jl_motion m;
@@ -686,8 +753,13 @@ JL_IN void jl_step(const jlaw_law *law, jl_numbers n, const jl_of_joint d[3], jl
     sum[i].lost = sum[i].crushed = sum[i].lowered = sum[i].worn = jl_each(0.0);
     sum[i].before[0] = sum[i].before[1] = jl_each(0.0);
   }
-  for (int at = 0; at < M; at += JL_TOGETHER)
-    jl_step_facets(law, at, &m, n, sum + at / JL_TOGETHER % JL_SUMS, k);
+  jl_amount_sums seen[JL_SUMS];
+  for (int i = 0; i < JL_SUMS; i++) seen[i] = jl_no_amounts();
+  for (int at = 0; at < M; at += JL_TOGETHER) {
+    const int i = at / JL_TOGETHER % JL_SUMS;
+    jl_step_facets(law, at, &m, n, sum + i, k, all ? seen + i : (jl_amount_sums *) 0);
+  }
+  if (all) jl_add_up(seen, all);
   for (int i = 0; i < dim; i++) {
     F[i] = jl_total(sum, F[i]);
     for (int j = 0; k.tangent && j < dim; j++) C[dim * i + j] = jl_total(sum, C[3 * i + j]);
@@ -741,80 +813,53 @@ JL_IN void jl_facets_now(const jlaw_law *law, jl_numbers n, int at, jl_facets *o
   jl_virgin_curve(law, o->z1, &o->fz1, &o->kz1, (jl_real *) 0);
 }
 
-typedef struct { /* as reference.Measures; of the stored energy that of the shear springs */
-  jl_of_joint sliding, slipping, separated, stored, reach, sheared;
-} jl_amounts;
-
-typedef struct {
-  jl_real sliding, slipping, separated, normal, sheared;
-} jl_amount_sums;
-
-JL_IN void jl_measure_facets(const jlaw_law *law, jl_numbers n, int at, jl_amount_sums *sum,
-                             jl_of_joint *reach)
+/* Adds what the elements beside the asperities, or in place of them, amount to */
+JL_IN void jl_add_elements(const jlaw_law *law, jl_numbers n, jl_of_joint stored, jl_amounts *all)
 {
-  const int M = law->facets, D = law->cells, some = M - at < JL_TOGETHER ? M - at : JL_TOGETHER;
-  const double *f = jl_facet_of(law, at), *cell = jl_cell_of(law, at);
-  jl_real held = jl_each(0.0), sheared = jl_each(0.0), whole_slips = jl_each(1.0);
-  jl_facets o;
-  jl_facets_now(law, n, at, &o);
-  for (int i = 0; i < D && jl_any(o.y1 > jl_column(cell, JLAW_LOW)); i++) {
-    jl_real G, kappa;
-    const int row = jl_slider_row(law) + at * D + i;
-    const jl_real qs = jl_take(n, row, D, some), qt = jl_take(n, row + M * D, D, some);
-    jl_hold_cell(cell, o.y1, o.f1, o.k1, o.z1, o.fz1, o.kz1, law->yields, &G, &kappa);
-    const jl_real q2 = qs * qs + qt * qt;
-    const jl_yes stiff = kappa > JLAW_TINY;
-    const jl_yes limited =
-        jl_root(q2) >= o.strength * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * o.f1);
-    held += jl_only(limited, G);
-    whole_slips = jl_only(limited, whole_slips);
-    sheared += jl_only(stiff, q2 / jl_pick(stiff, kappa, 1.0));
-    cell += JLAW_ROWS * JLAW_LANES;
+  all->stored += stored;
+  for (int l = 0; law->coulomb && l < JL_JOINTS; l++) {
+    double shares[3];
+    jl_coulomb_shares(law, n.s + l, n.stride, shares);
+    JL_JOINT(all->sliding, l) = shares[0], JL_JOINT(all->slipping, l) = shares[1];
+    JL_JOINT(all->separated, l) = shares[2], JL_JOINT(all->reach, l) = n.s[l];
   }
-  const jl_yes touches = o.y1 > o.z1;
-  const jl_real force = jl_only(touches, jl_larger(o.f1 - o.fz1, jl_each(0.0))),
-                share = jl_each(jl_column(f, JLAW_SHARE));
-  sum->sliding += share * jl_only(touches, whole_slips);
-  sum->slipping +=
-      share
-      * jl_smaller(jl_only(force > 0.0, held / jl_pick(force > 0.0, force, 1.0)), jl_each(1.0));
-  sum->separated += share * jl_pick(touches, 0.0, 1.0);
-  jl_real normal = jl_psi(law, o.y1);
-  if (law->yields) normal = normal - jl_psi(law, o.z1) - o.fz1 * (o.y1 - o.z1);
-  sum->normal += jl_column(f, JLAW_POTENTIAL) * jl_only(touches, jl_larger(normal, jl_each(0.0)));
-  sum->sheared += jl_column(f, JLAW_COMPLIANCE) * sheared;
-#ifdef JLAW_ABREAST
-  for (int l = 0; l < some; l++) *reach = *reach > o.y1[l] ? *reach : o.y1[l];
-#else
-  *reach = jl_larger(*reach, o.y1);
-#endif
 }
 
 JL_IN jl_amounts jl_measure(const jlaw_law *law, jl_numbers n)
 {
+  const int M = law->facets, D = law->cells;
   jl_amount_sums sum[JL_SUMS];
   jl_amounts all;
   all.reach = jl_each_joint(-DBL_MAX);
-  const jl_amount_sums none = {jl_each(0.0), jl_each(0.0), jl_each(0.0), jl_each(0.0),
-                               jl_each(0.0)};
-  for (int i = 0; i < JL_SUMS; i++) sum[i] = none;
-  for (int at = 0; at < law->facets; at += JL_TOGETHER)
-    jl_measure_facets(law, n, at, sum + at / JL_TOGETHER % JL_SUMS, &all.reach);
-  all.sliding = jl_total(sum, sliding);
-  all.slipping = jl_total(sum, slipping);
-  all.separated = jl_total(sum, separated);
-  all.sheared = jl_total(sum, sheared);
-  all.stored = jl_total(sum, normal) + all.sheared;
+  for (int i = 0; i < JL_SUMS; i++) sum[i] = jl_no_amounts();
+  for (int at = 0; at < M; at += JL_TOGETHER) {
+    const int some = M - at < JL_TOGETHER ? M - at : JL_TOGETHER;
+    const double *f = jl_facet_of(law, at), *cell = jl_cell_of(law, at);
+    jl_cell_sums cells = {jl_each(0.0), jl_each(0.0), jl_each(1.0)};
+    jl_facets o;
+    jl_facets_now(law, n, at, &o);
+    for (int i = 0; i < D && jl_any(o.y1 > jl_column(cell, JLAW_LOW)); i++) {
+      jl_real G, kappa;
+      const int row = jl_slider_row(law) + at * D + i;
+      const jl_real qs = jl_take(n, row, D, some), qt = jl_take(n, row + M * D, D, some);
+      jl_hold_cell(cell, o.y1, o.f1, o.k1, o.z1, o.fz1, o.kz1, law->yields, &G, &kappa);
+      jl_measure_cell(qs, qt, G, kappa, o.strength, o.f1, &cells);
+      cell += JLAW_ROWS * JLAW_LANES;
+    }
+    jl_measure_facets(law, f, &o, &cells, sum + at / JL_TOGETHER % JL_SUMS);
+#ifdef JLAW_ABREAST
+    for (int l = 0; l < some; l++) all.reach = all.reach > o.y1[l] ? all.reach : o.y1[l];
+#else
+    all.reach = jl_larger(all.reach, o.y1);
+#endif
+  }
+  jl_add_up(sum, &all);
   if (!jl_beside(law)) return all;
   jl_of_joint here[3], still[3];
   for (int i = 0; i < law->dim; i++) here[i] = jl_take_joint(n, i), still[i] = jl_each_joint(0.0);
-  all.stored += jl_step_elements(law, n, jl_element_row(law), here, still, NULL, NULL, 0, 0);
-  for (int l = 0; law->coulomb && l < JL_JOINTS; l++) {
-    double shares[3];
-    jl_coulomb_shares(law, n.s + l, n.stride, shares);
-    JL_JOINT(all.sliding, l) = shares[0], JL_JOINT(all.slipping, l) = shares[1];
-    JL_JOINT(all.separated, l) = shares[2], JL_JOINT(all.reach, l) = JL_JOINT(here[0], l);
-  }
+  const jl_of_joint stored =
+      jl_step_elements(law, n, jl_element_row(law), here, still, NULL, NULL, 0, 0);
+  jl_add_elements(law, n, stored, &all);
   return all;
 }
 
@@ -864,14 +909,15 @@ JL_IN jl_kind jl_kind_of(int dim, int yields, int fades, int wears, int ledger, 
  * asked for costs nothing. Where asperities yield or slopes wear, the law needs the ledger. */
 JL_IN void jl_step_of_kind(const jlaw_law *law, jl_numbers n, const jl_of_joint d[3],
                            jl_of_joint F[3], jl_of_joint C[9], int ledger, int tangent, int kept,
-                           int hold)
+                           int hold, jl_amounts *all)
 {
   jl_of_joint from[3];
   for (int i = 0; i < law->dim; i++) from[i] = jl_take_joint(n, i);
-#define JL_STEP(dim, yields, fades, wears, ledger)                                              \
-  (tangent                                                                                      \
-       ? jl_step(law, n, d, F, C, jl_kind_of(dim, yields, fades, wears, ledger, 1, kept, hold)) \
-       : jl_step(law, n, d, F, C, jl_kind_of(dim, yields, fades, wears, ledger, 0, kept, hold)))
+#define JL_KIND(dim, yields, fades, wears, ledger, tangent) \
+  jl_kind_of(dim, yields, fades, wears, ledger, tangent, kept, hold)
+#define JL_STEP(dim, yields, fades, wears, ledger)                                        \
+  (tangent ? jl_step(law, n, d, F, C, JL_KIND(dim, yields, fades, wears, ledger, 1), all) \
+           : jl_step(law, n, d, F, C, JL_KIND(dim, yields, fades, wears, ledger, 0), all))
   const int dim = law->dim, y = law->yields, w = law->wears;
   if (law->fades && (y || w || dim == 1)) JL_STEP(dim, y, 1, w, 1);
   else if (law->fades && dim == 3) JL_STEP(3, 0, 1, 0, ledger);
@@ -882,6 +928,9 @@ JL_IN void jl_step_of_kind(const jlaw_law *law, jl_numbers n, const jl_of_joint 
   else if (ledger) JL_STEP(2, 0, 0, 0, 1);
   else JL_STEP(2, 0, 0, 0, 0);
 #undef JL_STEP
-  if (jl_beside(law))
-    jl_step_elements(law, n, jl_element_row(law), from, d, F, C, tangent, ledger || y || w);
+#undef JL_KIND
+  if (!jl_beside(law)) return;
+  const jl_of_joint stored =
+      jl_step_elements(law, n, jl_element_row(law), from, d, F, C, tangent, ledger || y || w);
+  if (all) jl_add_elements(law, n, stored, all);
 }

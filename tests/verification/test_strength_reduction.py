@@ -208,11 +208,10 @@ def test_factor_of_safety_of_a_slope_is_that_of_coulomb_of_the_same_strength():
     law, found = one.laws["rough"], factor_of_safety(one)
     sim = Simulation(weakened(one, 0.97 * found))
     laws, pairs, pressed = dict(one.laws), {}, {}
-    contacts = zip(
-        sim.tracker.keys.tolist(), sim.joints.traction[:, 0], sim.contacts.length, strict=True
-    )
-    for who, stress, length in contacts:
-        sums = pressed.setdefault(frozenset((who[0], who[2])), [0.0, 0.0])
+    c = sim.contacts
+    contacts = zip(c.a.tolist(), c.b.tolist(), sim.joints.traction[:, 0], c.length, strict=True)
+    for one_block, other, stress, length in contacts:
+        sums = pressed.setdefault(frozenset((one_block, other)), [0.0, 0.0])
         sums[0] += stress * length
         sums[1] += length * (stress > 0)
     for pair, (force, length) in pressed.items():

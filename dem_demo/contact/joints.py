@@ -15,14 +15,14 @@ from jointlaw.joints.state import JointState
 from jointlaw.kernels.engine import Step
 
 from ..compiled import SHOWN, Pool, World
-from ..scene import Scene, is_coulomb
+from ..scene import Law, Scene
 
 PARTS = "states", "fingerprint"  # of a snapshot of the joints of a law
 NEW = (0.0, 0.0, 1.0, 0.0, 0.0)  # what a new joint shows, but for its bond and where it is
 
 
 @lru_cache(maxsize=64)
-def unmated_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
+def unmated_curve(law: Law) -> dict[str, np.ndarray]:
     """Closure from first touch (m) and work (J/m2) of a joint whose faces have never met."""
     closure = virgin_curve(law)["closure"]
     batch = jl.JointBatch(law, len(closure))
@@ -32,7 +32,7 @@ def unmated_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
 
 
 @lru_cache(maxsize=64)
-def first_touch(law: jl.JointLaw) -> np.ndarray:
+def first_touch(law: Law) -> np.ndarray:
     """Closure and sliding (2,) in m where a joint begins whose faces have never met."""
     batch = jl.JointBatch(law, 1)
     batch.reset(mated=False)
@@ -40,7 +40,7 @@ def first_touch(law: jl.JointLaw) -> np.ndarray:
 
 
 @lru_cache(maxsize=64)
-def virgin_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
+def virgin_curve(law: Law) -> dict[str, np.ndarray]:
     """Closure (m), stress (Pa) and work (J/m2) of a virgin joint from no closure to 2 GPa, more
     than any corner of rock stands, and an upper bound of its stiffness (Pa/m) there.
 
@@ -52,13 +52,10 @@ def virgin_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
     stress = law.normal_stress(closure)
     work = cumulative_trapezoid(stress, closure, initial=0.0)
     stiffness = law.max_stiffness(closure)
-    if is_coulomb(law):
-        # The law's bound adds mu for the coupling of shear to closure. That of level asperities has
-        # no eigenvalue of its own: (kn, 0; mu kn, 0) has kn and 0. K is ks, lam K is kn.
-        p = law.asperity
-        stiffness = np.full(len(closure), max(1.0, p.lam) * p.K * law.asperity_density)
-        if (bond := law.bond) is not None:
-            stiffness += max(bond.normal_stiffness, bond.shear_stiffness)
+    if isinstance(law, jl.CoulombLaw):
+        # The law's bound has mu in it, for the coupling of shear to closure. That has no eigenvalue
+        # of its own: (kn, 0; mu kn, 0) has kn and 0.
+        stiffness = np.full(len(closure), max(law.normal_stiffness, law.shear_stiffness))
     return {"closure": closure, "stress": stress, "stiffness": stiffness, "work": work}
 
 
@@ -69,7 +66,7 @@ class Held:
     places without a contact, the lowest last; curve: the law's virgin curve.
     """
 
-    def __init__(self, law: jl.JointLaw, reduction: float) -> None:
+    def __init__(self, law: Law, reduction: float) -> None:
         self.batch, self.free = jl.JointBatch(law, 0), []
         self.curve = {**virgin_curve(law)}
         self.curve["stiffness"] = self.curve["stiffness"] * max(1.0, reduction**-2)
@@ -105,7 +102,7 @@ class Held:
         self.batch.reset(places, mated)
         if not bonded:
             self.batch.unbond(places)
-        damage = 0.0 if bonded and law.bond is not None else 1.0
+        damage = 0.0 if bonded and "damage" in law.tables.names else 1.0
         self.step.F[places], self.step.shown[places] = 0.0, [*NEW, damage, *start]
         return start
 

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from math import inf
 from pathlib import Path
 
-from jointlaw.laboratory.experiments import PathError
+from jointlaw import JointLaw, PathError
 from jointlaw.support.files import require_free, write_json
 from jointlaw.support.pyplot import FORMATS
 
@@ -65,12 +65,6 @@ OPTIONS = {
     },
     "--seeds": {"type": int, "nargs": "+", "default": [1, 2, 3], "help": "default 1 2 3"},
 }
-REMOVED = {
-    "compare --tilt": "turn `gravity` in the scene file",
-    "compare --critical": "strength-reduction finds the critical tilt",
-    "ablate --leave-out": "all variants run",
-    "compare --out": "it prints; write `> FILE`",
-}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -87,8 +81,6 @@ def main(arguments: list[str] | None = None) -> int:
     for option in options:
         parser.add_argument(option, **OPTIONS[option])
     try:
-        for word in REMOVED.keys() & {f"{verb} {word.partition('=')[0]}" for word in words}:
-            raise ValueError(f"{word} is removed: {REMOVED[word]}")
         given = parser.parse_args(words)
         if getattr(given, "force", None) is False:
             require_free(given.out)
@@ -163,8 +155,24 @@ def _new(given: argparse.Namespace) -> None:
 
 
 def _check(given: argparse.Namespace) -> None:
-    _announce(Simulation(load(given.scene)))
+    sim = Simulation(load(given.scene))
+    _announce(sim)
+    for name, rows, _ in sim.joints.groups:
+        largest = max(float(sim.joints.traction[rows, 0].max()), sim.scene.run.largest_stress)
+        _warn_of_range(name, sim.scene.laws[name], largest)
     print("the scene is valid")
+
+
+def _warn_of_range(name: str, law: JointLaw, largest: float) -> None:
+    """Say what to write where a law has its cells for far more than this normal stress (Pa)."""
+    made = float(law.normal_stress(law.closure_range * law.resolution.lowest))
+    if law.tables.cells > 1 and 0.0 < largest < 0.1 * made:
+        print(
+            f"law {name!r}: its joints bear {largest:.2g} Pa at most, but its depth cells are for "
+            f"{made:.2g} Pa, so that tractions err by up to 20 % (docs/accuracy.md). In "
+            f"[laws.{name}] write closure_range = {law.closure(2.0 * largest):.2g}, in m, the "
+            "closure at twice that stress; or save sliders by depth = 1 in its resolution"
+        )
 
 
 def _ablate(given: argparse.Namespace) -> None:

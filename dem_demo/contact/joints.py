@@ -51,7 +51,8 @@ def virgin_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
         # no eigenvalue of its own: (kn, 0; mu kn, 0) has kn and 0. K is ks, lam K is kn.
         p = law.asperity
         stiffness = np.full(len(closure), max(1.0, p.lam) * p.K * law.asperity_density)
-        stiffness += 0.0 if law.bond is None else law.bond.largest_stiffness
+        if (bond := law.bond) is not None:
+            stiffness += max(bond.normal_stiffness, bond.shear_stiffness)
     return {"closure": closure, "stress": stress, "stiffness": stiffness, "work": work}
 
 

@@ -5,7 +5,6 @@ from contextlib import suppress
 import numpy as np
 
 import jointlaw as jl
-from jointlaw.laboratory.experiments import PathError
 
 from ..dynamics.simulation import Simulation
 from ..scene import Scene, is_coulomb, turn
@@ -142,7 +141,7 @@ def slip_angle(scene: Scene, law_name: str, moving: int, length: float) -> dict:
         before, stress = angle, float(weight / length * np.cos(np.radians(angle)))
         try:
             angle = friction_angle(scene.laws[law_name], stress)
-        except (ValueError, PathError):
+        except (ValueError, jl.PathError):
             break
         if abs(angle - before) <= 5e-3:
             return {"predicted_angle": angle, "normal_stress": stress}
@@ -156,7 +155,7 @@ def shear_curve(law: jl.JointLaw, stress: float, slid: np.ndarray) -> jl.Record 
     motion.
     """
     inner = np.flatnonzero(np.diff(np.sign(np.diff(slid)))) + 1
-    with suppress(ValueError, PathError):
+    with suppress(ValueError, jl.PathError):
         if not is_coulomb(law):
             turns = [*slid[inner].tolist(), float(slid[-1])]
             return jl.direct_shear(law.joint(), to=turns, normal=stress, steps=400)

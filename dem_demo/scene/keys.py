@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from shapely import Polygon
 
-from jointlaw.parameters.bond import Bond
-from jointlaw.parameters.keys import Removed, checked, keys_of
+from jointlaw import Bond
+from jointlaw.parameters.keys import checked, keys_of
 from jointlaw.support.checks import at_least, finite, integer, more_than, number, one_of
 
 Tables = dict[str, Any]
@@ -70,7 +70,6 @@ def bond(name: str, value: Any) -> Bond:
         raise ValueError(f"{name.removesuffix('bond')}{error}") from None
 
 
-ENDS = Removed("joints carry at their two ends; cut a long block in two instead", None)
 AXES = {"x": 0, "y": 1, "turn": 2}
 TEXT, LIST, TABLE = a(str), a(list), a(dict)
 POSITIVE, NOT_NEGATIVE = partial(more_than, bound=0), partial(at_least, bound=0)
@@ -104,7 +103,7 @@ RUN = {
     "seat": a(bool), "record": POSITIVE, "dashpot_normal": NOT_NEGATIVE,
     "dashpot_shear": NOT_NEGATIVE, "law_steps": partial(integer, bound=1),
     "largest_stress": NOT_NEGATIVE, "skin": POSITIVE, "corner_length": POSITIVE,
-    "max_overlap": POSITIVE, "point_spacing": ENDS,
+    "max_overlap": POSITIVE,
 }  # fmt: skip
 SCENE = {
     "title": TEXT, "gravity": vector, "density": DENSITY, "thickness": POSITIVE, "law": TEXT,

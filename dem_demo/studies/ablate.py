@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from jointlaw.laboratory.experiments import PathError
-from jointlaw.parameters.resolution import named
+from jointlaw import PathError
 from jointlaw.support.files import clear_run
 
 from ..dynamics.simulation import Simulation
@@ -85,9 +84,9 @@ def variants(scene: Scene, record: Record) -> Iterator[tuple[str, Callable[[], S
                if of and not is_coulomb(scene.laws[name])}  # fmt: skip
     lacking: dict[str, dict[str, Any]] = {}
     for law in (scene.laws[name] for name in pressed):
-        names = named(law.mating_length, law.asperity.yield_interference, law.closure_range)
         given = INGREDIENTS | {
-            f"resolution {n}": {"resolution": asdict(names[n])} for n in ("fast", "fine")
+            f"resolution {name}": {"resolution": asdict(replace(law, resolution=name).resolution)}
+            for name in ("fast", "fine")
         }
         own = {"heights": SINGLE} | {k: v for k, v in asdict(law).items() if v is not None}
         lacking |= {name: keys for name, keys in given.items() if _differ(own, keys)}

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from jointlaw.parameters.rock import RANGES
+from jointlaw.parameters.rock import STEEPEST
 from jointlaw.support.pyplot import FORMATS
 
 from ..dynamics.seating import displacements
@@ -115,10 +115,10 @@ def weakened(scene: Scene, factor: float) -> Scene:
 
 def smoothed(scene: Scene, factor: float) -> Scene:
     """A scene with the friction of asperities and of plain Coulomb divided by a factor."""
-    highest, laws = RANGES["mu"][1], {}  # that a scene may have; what fails with it has no factor
+    laws = {}
     for name, law in scene.laws.items():
         mu = law.asperity.mu
-        weak = min(mu / factor, highest) if mu < STICKS else mu
+        weak = min(mu / factor, STEEPEST) if mu < STICKS else mu  # what fails so has no factor
         laws[name] = replace(law, asperity=replace(law.asperity, mu=weak))
     return replace(scene, laws=laws)
 

@@ -18,8 +18,8 @@ import numpy as np
 from tables import table
 
 import jointlaw as jl
+from jointlaw import ClosureCurve, ShearCurve
 from jointlaw.calibration.fit import Fit
-from jointlaw.calibration.measured import ClosureCurve, ShearCurve
 from jointlaw.parameters.resolution import SLIP
 from jointlaw.support.progress import track
 

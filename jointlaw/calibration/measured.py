@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..laboratory.experiments import direct_shear
-from ..law import JointLaw
+from ..laws.joint_law import JointLaw
 from ..support.checks import Array, at_least, finite, more_than, number
 from .forward import STEPS, Settings, build_for_shear, log_stress
 from .priors import Values

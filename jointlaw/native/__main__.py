@@ -10,4 +10,8 @@ build.write_headers()
 compiler = build.find_compiler()
 if compiler is None:
     sys.exit("no C compiler works here: install gcc or clang, or `pip install ziglang`")
-sys.stdout.write(f"{build.build(compiler)} by {' '.join(compiler.command)}\n")
+try:
+    made = build.build(compiler)
+except ValueError as error:
+    sys.exit(str(error))
+sys.stdout.write(f"{made} by {' '.join(compiler.command)}\n")

@@ -4,7 +4,7 @@
  */
 #include "batch.h"
 #include "lanes.h"
-#include "bond.h"
+#include "elements.h"
 #include "law.h"
 #include <stdlib.h>
 #include <string.h>
@@ -21,7 +21,7 @@
 /* What joints at n amount to after a step, into rows of b->shown */
 static void show(const jlaw_batch *b, jl_numbers n, const jl_amounts *all, double *to, int some)
 {
-  const int dim = b->law->dim, size = JLAW_SHOWN + dim, bonded = b->law->bonded;
+  const int dim = b->law->dim, size = JLAW_SHOWN + dim, last = jl_state_rows(b->law) - 1;
   for (int l = 0; l < some; l++, to += size) {
     const double *s = n.s + l;
     to[JLAW_SLIDING] = JL_JOINT(all->sliding, l);
@@ -29,7 +29,7 @@ static void show(const jlaw_batch *b, jl_numbers n, const jl_amounts *all, doubl
     to[JLAW_SEPARATED] = JL_JOINT(all->separated, l);
     to[JLAW_STORED] = JL_JOINT(all->stored, l);
     to[JLAW_LOST] = s[(size_t) dim * n.stride];
-    to[JLAW_DAMAGE] = bonded ? s[(size_t) jl_damage_row(b->law) * n.stride] : 1.0;
+    to[JLAW_DAMAGE] = jl_element_rows(b->law) ? s[(size_t) last * n.stride] : 1.0;
     for (int i = 0; i < dim; i++) to[JLAW_SHOWN + i] = s[(size_t) i * n.stride];
   }
 }
@@ -49,7 +49,8 @@ static void advance_block(const jlaw_batch *b, double *block, size_t ahead, long
       for (int l = 0; l < some; l++) JL_JOINT(p[i], l) = d[(at + l) * dim + i];
     }
     jl_amounts all;
-    jl_step_of_kind(b->law, n, p, f, c, b->ledger, C != NULL, kept, b->shown ? &all : NULL);
+    jl_step_of_kind(b->law, n, p, f, c, b->ledger, C != NULL, kept, b->hold,
+                    b->shown ? &all : NULL);
     if (b->shown) show(b, n, &all, b->shown + (first + at) * (JLAW_SHOWN + dim), some);
     for (int l = 0; l < some; l++) {
       for (int i = 0; i < dim; i++) F[(at + l) * dim + i] = JL_JOINT(f[i], l);
@@ -105,6 +106,17 @@ int NAME(jlaw_measure)(const jlaw_batch *b, long first, long last)
     for (int i = 0; i < 5; i++)
       for (int l = 0; l < JL_JOINTS && at + l < last; l++)
         b->F[i * b->n + at + l] = JL_JOINT(out[i], l);
+  }
+  return 0;
+}
+
+/* Bounds (n,) of |C| of joints first to last - 1 as they are, into b->F */
+int NAME(jlaw_stiffness)(const jlaw_batch *b, long first, long last)
+{
+  for (long at = first; at < last; at += JL_JOINTS) {
+    const jl_numbers n = {joint_of(b, at), BLOCK, 0};
+    const jl_of_joint bound = jl_stiffness(b->law, n);
+    for (int l = 0; l < JL_JOINTS && at + l < last; l++) b->F[at + l] = JL_JOINT(bound, l);
   }
   return 0;
 }

@@ -10,7 +10,13 @@ typedef struct jlaw_law jlaw_law;
 enum { JLAW_BLOCK = 8 /* joints side by side in a block of states */ };
 
 enum { /* what a step shows of a joint: shares, J/m2, damage of its bond; then its displacement */
-  JLAW_SLIDING, JLAW_SLIPPING, JLAW_SEPARATED, JLAW_STORED, JLAW_LOST, JLAW_DAMAGE, JLAW_SHOWN
+       JLAW_SLIDING,
+       JLAW_SLIPPING,
+       JLAW_SEPARATED,
+       JLAW_STORED,
+       JLAW_LOST,
+       JLAW_DAMAGE,
+       JLAW_SHOWN
 };
 
 typedef struct {
@@ -24,8 +30,9 @@ typedef struct {
   long long taken, grain; /* joints that threads have taken: 0 before a run; how many at once */
   int rows;
   int alone; /* whether the states lie (n, rows) */
-  int lanes; /* of vectors: at most what jlaw_lanes() says */
+  int lanes; /* of vectors: at most jlaw_lanes(), and one of jlaw_levels() */
   int ledger, keep;
+  int hold; /* whether slopes that are to wear have not yet: what a state carries */
 } jlaw_batch;
 
 typedef int jlaw_call(const jlaw_batch *b, long first, long last);

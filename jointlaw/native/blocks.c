@@ -217,8 +217,7 @@ JL_OUT void jl_blocks_follow(jl_world *w)
     long long still = 0;
     for (long long j = 0; j < left; j++) {
       const long long i = w->out[j];
-      if (!following(w, i, w->corner + i, w->edge + i))
-        w->urgent[w->a[i]] = w->urgent[w->b[i]] = 1;
+      if (!following(w, i, w->corner + i, w->edge + i)) w->urgent[w->a[i]] = w->urgent[w->b[i]] = 1;
       place_contact(w, i);
     }
     for (long long j = 0; j < left; j++)
@@ -240,8 +239,8 @@ static double height(const jl_world *w, long long corner, long long edge)
  * apart (2, p), negative where they overlap. Writes at most `room` of them and returns how many. */
 JL_OUT long long jl_blocks_find(const jl_world *w, long long p, const long long *pairs,
                                 const long long *start, const double *near, const double *deepest,
-                                long long room, long long *corner, long long *edge,
-                                long long *pair, double *apart)
+                                long long room, long long *corner, long long *edge, long long *pair,
+                                double *apart)
 {
   long long found = 0;
   place_corners(w);
@@ -381,8 +380,9 @@ JL_OUT void jl_blocks_forces(jl_world *w, double dt)
     const double critical = 2.0 * sqrt(stiffness * (0.5 / light));
     double resist = -w->dashpot_normal * critical * w->opening[i];
     if (!(damage < 1.0)) resist = larger(resist, -press);
-    const double stick = larger(1.0 - w->shares[JLAW_SEPARATED * k + i]
-                                    - w->shares[JLAW_SLIPPING * k + i], 1.0 - damage);
+    const double stick =
+        larger(1.0 - w->shares[JLAW_SEPARATED * k + i] - w->shares[JLAW_SLIPPING * k + i],
+               1.0 - damage);
     const double drag = -w->dashpot_shear * critical * stick * w->sliding[i];
     push(w, damped, i, plus(times(resist, normal), times(drag, along)), 0.0);
   }

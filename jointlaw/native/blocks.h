@@ -28,7 +28,7 @@ typedef struct {
   double *velocity;     /* (3, n): those to go on with */
   double *renewed;      /* (3, n): where each block was when contacts were looked for */
   double *force, *last; /* (3, n, 3): all, dashpots, drives; (2, n, 3): last dashpots and drives */
-  const double *inertia, *gravity, *loads; /* (n, 3) */
+  const double *inertia, *gravity, *loads;          /* (n, 3) */
   const double *lightness, *reach, *skin, *deepest; /* (n,): 1/kg of what gives way; m */
   const unsigned char *mobile;                      /* (n,) */
   unsigned char *urgent; /* (n,): blocks whose contacts must be looked for */
@@ -38,9 +38,9 @@ typedef struct {
   const long long *block, *before, *after; /* (c,): of each corner: block, corners next to it */
   jl_vector *placed, *turned;              /* (c,): corners and ways of edges now */
 
-  long long *corner, *edge;       /* (k,): which corner is over which edge */
-  long long *a, *b;               /* (k,): their blocks, a < b */
-  jl_vector *at, *normal, *pull;  /* (k,) as dem_demo/contact/geometry.py describes them */
+  long long *corner, *edge;      /* (k,): which corner is over which edge */
+  long long *a, *b;              /* (k,): their blocks, a < b */
+  jl_vector *at, *normal, *pull; /* (k,) as dem_demo/contact/geometry.py describes them */
   double *closure, *length, *twist, *opening, *sliding;
   double *rise, *carried, *inside; /* (2, k) */
   unsigned char *own;              /* (2, k) */

@@ -150,7 +150,7 @@ extern "C" {
 #endif
 
 #include "lanes.h"
-#include "bond.h"
+#include "elements.h"
 #include "law.h"
 
 /* ------------------------------------------------------------------ messages */
@@ -230,7 +230,7 @@ JLAW_CLONES JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t 
                                          const double *d, double *F, double *C)
 {
   const jl_numbers n = {s, stride, 0};
-  jl_step_of_kind(law, n, d, F, C, JLAW_LEDGER, C != NULL, 0, NULL);
+  jl_step_of_kind(law, n, d, F, C, JLAW_LEDGER, C != NULL, 0, 0, NULL);
 }
 
 /* Whether all sliders hold forces that a law can have; 0 for NaN */
@@ -254,7 +254,11 @@ static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
   if (law->yields) good = good && fabs(rest[law->facets]) <= DBL_MAX;
   if (law->wears)
     good = good && worn[0] >= 0.0 && worn[0] <= 1.0 && worn[1] >= 0.0 && worn[1] <= DBL_MAX;
-  if (law->bonded) good = good && s[jl_damage_row(law)] >= 0.0 && s[jl_damage_row(law)] <= 1.0;
+  const double *row = s + jl_element_row(law);
+#define JL_GOOD(name) \
+  if (law->name) good = good && jl_##name##_good(law, row), row += jl_##name##_rows(law);
+  JLAW_ELEMENTS(JL_GOOD)
+#undef JL_GOOD
   return good && jlaw_sound_(s + jl_slider_row(law), jl_rest_row(law) - jl_slider_row(law));
 }
 
@@ -312,7 +316,11 @@ JLAW_FUNCTION int jlaw_unmated(const jlaw_law *law, double *s)
   const int far = law->fades && law->dim > 1;
   for (int i = 0; i < jl_state_rows(law); i++) s[i] = 0.0;
   if (far) s[0] = law->first_touch, s[1] = JLAW_FAR * law->mating_length;
-  if (law->bonded) s[jl_damage_row(law)] = 1.0;
+  int end = jl_element_row(law);
+#define JL_BREAK(name) \
+  if (law->name && jl_##name##_rows(law)) end += jl_##name##_rows(law), s[end - 1] = 1.0;
+  JLAW_ELEMENTS(JL_BREAK)
+#undef JL_BREAK
   return far ? 0 : -1;
 }
 JLAW_FUNCTION double jlaw_dissipated(const jlaw_law *law, const double *s) { return s[law->dim]; }
@@ -347,21 +355,26 @@ JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure)
       const double depth = jlaw_of_facet_(law, f, i + 1);
       late += jlaw_of_facet_(law, f, i) * jlaw_virgin_one_(law, closure - depth, &slope);
     }
-  if (law->bonded && closure < 0.0) { /* a joint that opens */
-    jl_bonded b = {{closure, 0.0, 0.0}, 0.0, {0.0}, {0.0}, 0.0};
-    jl_hold(law, &b);
-    return b.F[0];
+  double stress =
+      law->asperities ? law->closure_factor * jlaw_virgin_one_(law, closure, &slope) - late : 0.0;
+#define JL_FIRST(name)                                                  \
+  if (law->name) {                                                      \
+    jl_part p = {{0.0}, {closure, 0.0, 0.0}, {0.0}, {0.0}, {0.0}, 0.0}; \
+    jl_##name##_step(law, &p, 0);                                       \
+    stress += p.F[0];                                                   \
   }
-  return law->closure_factor * jlaw_virgin_one_(law, closure, &slope) - late;
+  JLAW_ELEMENTS(JL_FIRST)
+#undef JL_FIRST
+  return stress;
 }
 
 JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure)
 {
-  double slope;
+  double slope = 0.0;
   if (!(closure <= law->largest_reach)) return jlaw_none_();
-  const double force = jlaw_virgin_one_(law, closure, &slope);
-  return law->stiffness_factor * slope + law->bending_factor * force
-         + fmax(law->bond_normal, law->bond_shear);
+  const double force = law->asperities ? jlaw_virgin_one_(law, closure, &slope) : 0.0;
+  return law->stiffness_factor * JL_LANE(jl_stiffness_over(law, jl_each(slope)), 0)
+         + law->bending_factor * force + jl_stiffness_of_elements(law, NULL, 0, 1);
 }
 
 JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
@@ -379,6 +392,17 @@ JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
 }
 
 /* --------------------------------------------------------------- turned axes */
+
+/* The rows of elements in axes 2 and 3 that are turned, or turned round */
+static JLAW_FUNCTION void jlaw_turn_elements_(const jlaw_law *law, double *s,
+                                              const double turn[2][2])
+{
+  double *row = s + jl_element_row(law);
+#define JL_TURN(name) \
+  if (law->name) jl_##name##_turn(law, row, turn), row += jl_##name##_rows(law);
+  JLAW_ELEMENTS(JL_TURN)
+#undef JL_TURN
+}
 
 JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s)
 {
@@ -399,6 +423,8 @@ JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s)
       depth[f] = depth[other], depth[other] = here;
     }
   }
+  const double swap[2][2] = {{-1.0, 0.0}, {0.0, 1.0}};
+  jlaw_turn_elements_(law, s, swap);
 }
 
 /* Numbers of a ring of n facets, read at azimuths turned by the angle: the trigonometric
@@ -451,6 +477,8 @@ JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle)
   if (dim != 3) return;
   const double along = s[1], across = s[2];
   s[1] = c * along + d * across, s[2] = c * across - d * along;
+  const double turn[2][2] = {{c, d}, {-d, c}};
+  jlaw_turn_elements_(law, s, turn);
   for (int f = 0, n; f < M; f += n) { /* rings */
     n = (int) jlaw_of_facet_(law, f, JLAW_RING);
     for (int i = 0; i < D; i++) {

@@ -3,8 +3,9 @@
  * Symbols and order are those of docs/theory-incremental.md and of kernels/reference.py. Rows of
  * a state: delta (dim) from the mated position | dissipated energy | q_s (M D) | q_t (M D), q times
  * lam; where asperities yield flattened depth (M) | plastic work; with wear the share of the slopes
- * that is gone | work of friction; with a bond its damage. A batch keeps beside them Phi and Phi' of
- * every facet (M each), which saves half the look-ups, and with yielding the same at that depth.
+ * that is gone | work that wears them; then the rows of elements.h. A batch keeps beside them Phi and
+ * Phi' of every facet (M each), which saves half the look-ups, and with yielding the same at that
+ * depth.
  *
  * The last digit of expm1 and pow depends on the C library, that of all else here does not. exp and
  * log are avoided: zig links its own, which differ from those of the system. */
@@ -12,6 +13,7 @@
 typedef struct { /* constants of a step: the compiler leaves out what they exclude */
   int dim, yields, fades, wears, ledger, tangent;
   int kept; /* whether Phi and Phi' lie beside the state */
+  int hold; /* whether slopes that are to wear in this step do not; no constant */
 } jl_kind;
 
 typedef struct { /* in the plane of a joint: o, offset over the mating length; w^2 = 1 - |o|^2 */
@@ -42,7 +44,8 @@ typedef struct { /* facets in a step: y, Phi, Phi', Phi'' before and after; de *
   jl_real z0, z1, fz0, fz1, kz0, kz1;          /* flattened depth; Phi and Phi' there */
   jl_real qs, qt, lost, vs, vt, bss, bst, btt; /* sums over the cells: q, loss, v and B of C */
   jl_real ws, wt, open;                        /* v of the softening by z1; sum of kappa */
-  jl_real gs, gt, strength;                    /* derivative of q by log(gamma); mu lam A gamma */
+  jl_real us, ut;           /* sums over the cells of q before the step, where slopes wear */
+  jl_real gs, gt, strength; /* derivative of q by log(gamma); mu lam A gamma */
 } jl_facets;
 
 typedef struct {                /* the sliders of one depth cell of facets */
@@ -57,17 +60,18 @@ typedef struct {                /* the sliders of one depth cell of facets */
 typedef struct { /* what facets add up to */
   jl_real F[3], C[9], lost;
   jl_real crushed, lowered, worn; /* plastic work; what the wear of slopes takes: normal, sliders */
+  jl_real before[2];              /* shear stress before the step, where slopes wear */
 } jl_sums;
 
-/* Rows of a state: first of the sliders, first after them, worn slopes, damage; number of rows */
+/* Rows of a state: first of the sliders, first after them, worn slopes, elements; number of rows */
 JL_IN int jl_slider_row(const jlaw_law *law) { return law->dim + 1; }
 JL_IN int jl_rest_row(const jlaw_law *law) { return law->dim + 1 + 2 * law->facets * law->cells; }
 JL_IN int jl_worn_row(const jlaw_law *law)
 {
   return jl_rest_row(law) + (law->yields ? law->facets + 1 : 0);
 }
-JL_IN int jl_damage_row(const jlaw_law *law) { return jl_worn_row(law) + 2 * law->wears; }
-JL_IN int jl_state_rows(const jlaw_law *law) { return jl_damage_row(law) + law->bonded; }
+JL_IN int jl_element_row(const jlaw_law *law) { return jl_worn_row(law) + 2 * law->wears; }
+JL_IN int jl_state_rows(const jlaw_law *law) { return jl_element_row(law) + jl_element_rows(law); }
 
 /* Tables of facets from number `at` on, and of their first depth cell */
 JL_IN const double *jl_facet_of(const jlaw_law *law, int at)
@@ -310,31 +314,29 @@ JL_IN void jl_move_in_plane(const double *f, const jl_motion *m, jl_facets *o)
   o->et = (s->m2 * o->dz - s->across * (o->d0 + s->along * o->de)) * s->rmn;
 }
 
-/* F of facets that fade: A Phi n and the sliders, in axes (1, e), then in those of the joint */
-JL_IN void jl_add_traction(const jlaw_law *law, const double *f, const jl_facets *o, jl_sums *sum,
-                           int dim)
+/* F of facets in a plane: A Phi n and the sliders, in axes (1, e), then in those of the joint */
+JL_IN void jl_traction_in(const jlaw_law *law, const double *f, const jl_plane *s, jl_real force,
+                          jl_real qs, jl_real qt, jl_real F[3])
 {
-  const jl_plane *s = &o->end;
-  const jl_real n = jl_column(f, JLAW_POTENTIAL) * o->f1;
-  const jl_real qs = law->soft * s->rm * o->qs, qt = law->soft * s->rmn * o->qt;
-  jl_real along = n * s->along + (qs - s->along * s->across * qt);
-  jl_real across = n * s->across + s->m2 * qt;
-  jl_to_axes(f, &along, &across);
-  sum->F[0] += n - (s->along * qs + s->across * qt);
-  if (dim > 1) sum->F[1] += along;
-  if (dim > 2) sum->F[2] += across;
+  const jl_real n = jl_column(f, JLAW_POTENTIAL) * force;
+  qs = law->soft * s->rm * qs;
+  qt = law->soft * s->rmn * qt;
+  F[0] = n - (s->along * qs + s->across * qt);
+  F[1] = n * s->along + (qs - s->along * s->across * qt);
+  F[2] = n * s->across + s->m2 * qt;
+  jl_to_axes(f, &F[1], &F[2]);
 }
 
 /* ------------------------------------------------------------------------------- wear */
 
-/* Shares of the slopes that were left before the step, and are after the work of friction so far */
-JL_IN void jl_wear_slopes(const jlaw_law *law, jl_numbers n, jl_motion *m)
+/* Shares of the slopes that were left before the step, and are after the work of shear so far */
+JL_IN void jl_wear_slopes(const jlaw_law *law, jl_numbers n, jl_motion *m, int hold)
 {
   const int row = jl_worn_row(law);
   jl_of_joint worn = jl_take_joint(n, row);
   const jl_of_joint work = jl_take_joint(n, row + 1);
   m->had = 1.0 - worn;
-  for (int l = 0; l < JL_JOINTS; l++) {
+  for (int l = 0; l < JL_JOINTS && !hold; l++) {
     const double now = (law->slope_residual - 1.0) * expm1(-JL_JOINT(work, l) / law->slope_wear);
     JL_JOINT(worn, l) = now > JL_JOINT(worn, l) ? now : JL_JOINT(worn, l);
   }
@@ -374,7 +376,8 @@ typedef struct {
 
 JL_IN jl_amount_sums jl_no_amounts(void)
 {
-  const jl_amount_sums none = {jl_each(0.0), jl_each(0.0), jl_each(0.0), jl_each(0.0), jl_each(0.0)};
+  const jl_amount_sums none = {jl_each(0.0), jl_each(0.0), jl_each(0.0), jl_each(0.0),
+                               jl_each(0.0)};
   return none;
 }
 
@@ -401,8 +404,7 @@ JL_IN void jl_measure_facets(const jlaw_law *law, const double *f, const jl_face
   const jl_yes touches = o->y1 > o->z1;
   const jl_real force = jl_only(touches, jl_larger(o->f1 - o->fz1, jl_each(0.0))),
                 share = jl_each(jl_column(f, JLAW_SHARE));
-  const jl_real part =
-      jl_only(force > 0.0, cells->held / jl_pick(force > 0.0, force, 1.0));
+  const jl_real part = jl_only(force > 0.0, cells->held / jl_pick(force > 0.0, force, 1.0));
   sum->sliding += share * jl_only(touches, cells->slips);
   sum->slipping += share * jl_smaller(part, jl_each(1.0));
   sum->separated += share * jl_pick(touches, 0.0, 1.0);
@@ -472,7 +474,7 @@ JL_IN jl_real jl_friction_loss(const jl_sliders *c)
   const jl_real a = c->k0 * high, b = c->k1 * c->chord;
   const jl_real A = jl_pick(a > JLAW_FAINT, a, 1.0), B = jl_pick(b > JLAW_FAINT, b, 1.0);
   const jl_real r = 1.0 / (A * B); /* one division for both */
-  const jl_real rub = c->k1 - c->chord + 2.0 * c->share * (1.0 - c->share) * c->chord;
+  const jl_real rub = c->share * (c->share * (c->k1 - c->chord) + 2.0 * (1.0 - c->share) * c->k1);
   return jl_only(a > JLAW_FAINT, c->old2 * ((high - low) * (B * r)))
          + jl_only(b > JLAW_FAINT, c->new2 * (rub * (A * r)));
 }
@@ -527,7 +529,11 @@ JL_IN void jl_slide(const double *f, const double *cell, jl_facets *o, jl_real *
   jl_cells_of(cell, o, &c, k.yields);
   c.strength = jl_each(jl_column(f, JLAW_STRENGTH));
   if (k.fades) c.strength = c.strength * o->end.gamma;
-  if (k.wears) jl_wear_sliders(cell, o, &c, qs, qt, k);
+  if (k.wears) {
+    jl_wear_sliders(cell, o, &c, qs, qt, k);
+    o->us += *qs;
+    o->ut += *qt;
+  }
   jl_load(f, o, &c, qs, qt, k);
   o->qs += *qs;
   o->qt += *qt;
@@ -644,14 +650,18 @@ JL_IN void jl_step_facets(const jlaw_law *law, int at, const jl_motion *m, jl_nu
     jl_move_in_plane(f, m, &o);
   }
   const jl_of_facet limit = jl_column(f, JLAW_STRENGTH) * jl_column(f, JLAW_COSINE);
-  if (k.wears) o.limit2 = limit * limit * jl_plane_at(f, &m->start, m->has).N2;
+  jl_plane start;
+  if (k.wears) {
+    start = jl_plane_at(f, &m->start, m->has);
+    o.limit2 = limit * limit * start.N2;
+  }
   o.y0 = jl_resolved(o.y0);
   o.y1 = jl_resolved(o.y1);
   o.dy = o.y1 - o.y0;
   o.rdy = 1.0 / o.dy;
   o.near = jl_size_of(o.dy) <= JLAW_NEAR * jl_size_of(o.y1);
   o.qs = o.qt = o.lost = o.vs = o.vt = o.bss = o.bst = o.btt = o.ws = o.wt = o.open = jl_each(0.0);
-  o.gs = o.gt = o.worn = jl_each(0.0);
+  o.gs = o.gt = o.us = o.ut = o.worn = jl_each(0.0);
   if (k.kept) {
     o.f0 = jl_take(n, kept + at, 1, some);
     o.k0 = jl_take(n, kept + M + at, 1, some);
@@ -688,9 +698,14 @@ JL_IN void jl_step_facets(const jlaw_law *law, int at, const jl_motion *m, jl_nu
   if (k.wears) {
     sum->worn += jl_column(f, JLAW_COMPLIANCE) * o.worn;
     sum->lowered += 0.5 * jl_column(f, JLAW_POTENTIAL) * ((o.fw + o.f0) * (o.yw - o.y0));
+    jl_real F[3];
+    jl_traction_in(law, f, &start, o.f0, o.us, o.ut, F);
+    sum->before[0] += F[1], sum->before[1] += F[2];
   }
   if (k.fades) {
-    jl_add_traction(law, f, &o, sum, k.dim);
+    jl_real F[3];
+    jl_traction_in(law, f, &o.end, o.f1, o.qs, o.qt, F);
+    for (int i = 0; i < k.dim; i++) sum->F[i] += F[i];
     if (k.tangent) jl_add_fading_tangent(law, f, m, &o, sum, k);
     return;
   }
@@ -726,7 +741,7 @@ JL_IN void jl_step(const jlaw_law *law, jl_numbers n, const jl_of_joint d[3], jl
     m.to[i] = m.from[i] + m.p[i];
   }
   m.had = m.has = jl_each_joint(1.0);
-  if (k.wears) jl_wear_slopes(law, n, &m);
+  if (k.wears) jl_wear_slopes(law, n, &m, k.hold);
   if (k.fades) {
     m.start = jl_site_of(law, m.from[1], m.from[2]);
     m.middle = jl_site_of(law, m.from[1] + 0.5 * m.p[1], m.from[2] + 0.5 * m.p[2]);
@@ -736,6 +751,7 @@ JL_IN void jl_step(const jlaw_law *law, jl_numbers n, const jl_of_joint d[3], jl
     for (int j = 0; j < 3; j++) sum[i].F[j] = jl_each(0.0);
     for (int j = 0; k.tangent && j < 9; j++) sum[i].C[j] = jl_each(0.0);
     sum[i].lost = sum[i].crushed = sum[i].lowered = sum[i].worn = jl_each(0.0);
+    sum[i].before[0] = sum[i].before[1] = jl_each(0.0);
   }
   jl_amount_sums seen[JL_SUMS];
   for (int i = 0; i < JL_SUMS; i++) seen[i] = jl_no_amounts();
@@ -752,10 +768,15 @@ JL_IN void jl_step(const jlaw_law *law, jl_numbers n, const jl_of_joint d[3], jl
   if (!k.ledger) return;
   jl_of_joint lost = jl_total(sum, lost);
   if (k.wears) {
-    jl_of_joint lowered = jl_total(sum, lowered);
-    for (int l = 0; l < JL_JOINTS; l++) /* >= 0 by the pairs of facets, but for rounding */
+    jl_of_joint lowered = jl_total(sum, lowered), work = jl_each_joint(0.0);
+    for (int i = 1; i < dim; i++) work += 0.5 * (jl_total(sum, before[i - 1]) + F[i]) * m.p[i];
+    for (int l = 0; l < JL_JOINTS; l++) { /* what wears is work of the joint's own shear */
+      const double shear = fabs(JL_JOINT(work, l)), rubbed = JL_JOINT(lost, l);
+      JL_JOINT(work, l) = shear < rubbed ? shear : rubbed;
+      /* >= 0 by the pairs of facets, but for rounding */
       JL_JOINT(lowered, l) = JL_JOINT(lowered, l) > 0.0 ? JL_JOINT(lowered, l) : 0.0;
-    jl_put_joint(n, jl_worn_row(law) + 1, jl_take_joint(n, jl_worn_row(law) + 1) + lost);
+    }
+    jl_put_joint(n, jl_worn_row(law) + 1, jl_take_joint(n, jl_worn_row(law) + 1) + work);
     lost += jl_total(sum, worn) + lowered;
   }
   if (k.yields) {
@@ -792,6 +813,18 @@ JL_IN void jl_facets_now(const jlaw_law *law, jl_numbers n, int at, jl_facets *o
   jl_virgin_curve(law, o->z1, &o->fz1, &o->kz1, (jl_real *) 0);
 }
 
+/* Adds what the elements beside the asperities, or in place of them, amount to */
+JL_IN void jl_add_elements(const jlaw_law *law, jl_numbers n, jl_of_joint stored, jl_amounts *all)
+{
+  all->stored += stored;
+  for (int l = 0; law->coulomb && l < JL_JOINTS; l++) {
+    double shares[3];
+    jl_coulomb_shares(law, n.s + l, n.stride, shares);
+    JL_JOINT(all->sliding, l) = shares[0], JL_JOINT(all->slipping, l) = shares[1];
+    JL_JOINT(all->separated, l) = shares[2], JL_JOINT(all->reach, l) = n.s[l];
+  }
+}
+
 JL_IN jl_amounts jl_measure(const jlaw_law *law, jl_numbers n)
 {
   const int M = law->facets, D = law->cells;
@@ -821,16 +854,54 @@ JL_IN jl_amounts jl_measure(const jlaw_law *law, jl_numbers n)
 #endif
   }
   jl_add_up(sum, &all);
-  if (law->bonded) all.stored += jl_step_bond(law, n, jl_damage_row(law), NULL, NULL, 0, 0);
+  if (!jl_beside(law)) return all;
+  jl_of_joint here[3], still[3];
+  for (int i = 0; i < law->dim; i++) here[i] = jl_take_joint(n, i), still[i] = jl_each_joint(0.0);
+  const jl_of_joint stored =
+      jl_step_elements(law, n, jl_element_row(law), here, still, NULL, NULL, 0, 0);
+  jl_add_elements(law, n, stored, &all);
   return all;
+}
+
+/* Bound of |C| over A/c1 of a facet with this Phi', less what slopes that fade add */
+JL_IN jl_real jl_stiffness_over(const jlaw_law *law, jl_real slope)
+{
+  const double stick = law->soft > 1.0 ? law->soft : 1.0;
+  const jl_real joins = jl_smaller(law->joining_more * slope, jl_each(law->joining_most));
+  return (stick + law->mu) * slope + law->mu * joins;
+}
+
+/* Bound of |C| (Pa/m) of joints as they are */
+JL_IN jl_of_joint jl_stiffness(const jlaw_law *law, jl_numbers n)
+{
+  const double turn = JLAW_BEND / law->mating_length;
+  struct {
+    jl_real bound;
+  } sum[JL_SUMS];
+  for (int i = 0; i < JL_SUMS; i++) sum[i].bound = jl_each(0.0);
+  for (int at = 0; at < law->facets; at += JL_TOGETHER) {
+    const double *f = jl_facet_of(law, at);
+    const jl_of_facet c1 = jl_column(f, JLAW_COSINE);
+    jl_facets o;
+    jl_facets_now(law, n, at, &o);
+    jl_real bound = jl_column(f, JLAW_STIFF) * jl_stiffness_over(law, o.k1);
+    if (law->fades)
+      bound += turn * jl_column(f, JLAW_A) * jl_column(f, JLAW_STEEP) * (c1 + law->mu * (1.0 + c1))
+               * o.f1;
+    sum[at / JL_TOGETHER % JL_SUMS].bound += bound;
+  }
+  jl_of_joint bound = jl_total(sum, bound);
+  for (int l = 0; l < JL_JOINTS; l++)
+    JL_JOINT(bound, l) += jl_stiffness_of_elements(law, n.s + l, jl_element_row(law), n.stride);
+  return bound;
 }
 
 /* ------------------------------------------------------------- kinds of a step */
 
 JL_IN jl_kind jl_kind_of(int dim, int yields, int fades, int wears, int ledger, int tangent,
-                         int kept)
+                         int kept, int hold)
 {
-  const jl_kind k = {dim, yields, fades, wears, ledger, tangent, kept};
+  const jl_kind k = {dim, yields, fades, wears, ledger, tangent, kept, hold};
   return k;
 }
 
@@ -838,11 +909,15 @@ JL_IN jl_kind jl_kind_of(int dim, int yields, int fades, int wears, int ledger, 
  * asked for costs nothing. Where asperities yield or slopes wear, the law needs the ledger. */
 JL_IN void jl_step_of_kind(const jlaw_law *law, jl_numbers n, const jl_of_joint d[3],
                            jl_of_joint F[3], jl_of_joint C[9], int ledger, int tangent, int kept,
-                           jl_amounts *all)
+                           int hold, jl_amounts *all)
 {
-#define JL_STEP(dim, yields, fades, wears, ledger)                                                 \
-  (tangent ? jl_step(law, n, d, F, C, jl_kind_of(dim, yields, fades, wears, ledger, 1, kept), all) \
-           : jl_step(law, n, d, F, C, jl_kind_of(dim, yields, fades, wears, ledger, 0, kept), all))
+  jl_of_joint from[3];
+  for (int i = 0; i < law->dim; i++) from[i] = jl_take_joint(n, i);
+#define JL_KIND(dim, yields, fades, wears, ledger, tangent) \
+  jl_kind_of(dim, yields, fades, wears, ledger, tangent, kept, hold)
+#define JL_STEP(dim, yields, fades, wears, ledger)                                        \
+  (tangent ? jl_step(law, n, d, F, C, JL_KIND(dim, yields, fades, wears, ledger, 1), all) \
+           : jl_step(law, n, d, F, C, JL_KIND(dim, yields, fades, wears, ledger, 0), all))
   const int dim = law->dim, y = law->yields, w = law->wears;
   if (law->fades && (y || w || dim == 1)) JL_STEP(dim, y, 1, w, 1);
   else if (law->fades && dim == 3) JL_STEP(3, 0, 1, 0, ledger);
@@ -853,8 +928,9 @@ JL_IN void jl_step_of_kind(const jlaw_law *law, jl_numbers n, const jl_of_joint 
   else if (ledger) JL_STEP(2, 0, 0, 0, 1);
   else JL_STEP(2, 0, 0, 0, 0);
 #undef JL_STEP
-  if (!law->bonded) return;
-  const jl_of_joint bond =
-      jl_step_bond(law, n, jl_damage_row(law), F, C, tangent, ledger || y || w);
-  if (all) all->stored += bond;
+#undef JL_KIND
+  if (!jl_beside(law)) return;
+  const jl_of_joint stored =
+      jl_step_elements(law, n, jl_element_row(law), from, d, F, C, tangent, ledger || y || w);
+  if (all) jl_add_elements(law, n, stored, all);
 }

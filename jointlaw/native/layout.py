@@ -31,23 +31,26 @@ class Number(NamedTuple):
 
 WHOLE = {
     "dim": Number("1", "3", "components of a displacement"),
-    "facets": Number("1", "1e6", "M"),
-    "cells": Number("1", "1e6", "D, depth cells of a facet"),
-    "pieces": Number("1", "1e6", "of the virgin curve"),
+    "facets": Number("0", "1e6", "M"),
+    "cells": Number("0", "1e6", "D, depth cells of a facet"),
+    "pieces": Number("0", "1e6", "of the virgin curve"),
     "yields": Number("0", "1", "whether asperities yield"),
     "fades": Number("0", "1", "whether slopes fade with the distance from mate"),
     "wears": Number("0", "1", "whether slopes wear"),
-    "bonded": Number("0", "1", "whether there is a bond"),
+    "asperities": Number("0", "1", "whether there are asperities"),
+    "bonded": Number("0", "1", "whether there is a bond beside them"),
+    "coulomb": Number("0", "1", "whether it is Coulomb's joint"),
 }
+ELEMENTS = ("bonded", "coulomb")  # beside the asperities: functions of elements.h begin so
 NUMBERS = {
     "soft": Number("0", "DBL_MAX", "1/lam"),
     "mu": Number("0", "DBL_MAX", "friction of asperities"),
-    "mating_length": Number("DBL_MIN", "DBL_MAX", "m; infinite: the largest float"),
-    "slope_wear": Number("DBL_MIN", "DBL_MAX", "J/m2; infinite: the largest float"),
+    "mating_length": Number("0", "DBL_MAX", "m; infinite: the largest float"),
+    "slope_wear": Number("0", "DBL_MAX", "J/m2; infinite: the largest float"),
     "slope_residual": Number("0", "1", "share of the slopes that never wears"),
     "first_touch": Number("-DBL_MAX", "0", "m: closure at which an unmated joint touches"),
     "eta": Number("0", "DBL_MAX", "exponent of the virgin curve"),
-    "scale": Number("DBL_MIN", "DBL_MAX", "V of the virgin curve, m^(1/2)"),
+    "scale": Number("0", "DBL_MAX", "V of the virgin curve, m^(1/2)"),
     "rise": Number("0", "DBL_MAX", "p: the curve is tabulated over w^p"),
     "bond_normal": Number("0", "DBL_MAX", "Pa/m: stiffness of the bond"),
     "bond_shear": Number("0", "DBL_MAX", "Pa/m"),
@@ -55,14 +58,23 @@ NUMBERS = {
     "slip_begin": Number("0", "DBL_MAX", "1/m: the same of slip"),
     "opening_end": Number("0", "DBL_MAX", "1/m: where nothing of it is left"),
     "slip_end": Number("0", "DBL_MAX", "1/m"),
+    "coulomb_normal": Number("0", "DBL_MAX", "Pa/m: stiffness of Coulomb's joint"),
+    "coulomb_shear": Number("0", "DBL_MAX", "Pa/m"),
+    "coulomb_friction": Number("0", "DBL_MAX", "its friction"),
+    "coulomb_cohesion": Number("0", "DBL_MAX", "Pa"),
+    "coulomb_tension": Number("0", "DBL_MAX", "Pa"),
+    "coulomb_residual_friction": Number("0", "DBL_MAX", "once it has weakened"),
+    "coulomb_residual_cohesion": Number("0", "DBL_MAX", "Pa"),
+    "coulomb_weakening": Number("0", "DBL_MAX", "m of shear over which it weakens"),
     "closure_factor": Number("0", "DBL_MAX", "normal stress over Phi"),
-    "stiffness_factor": Number("0", "DBL_MAX", "bound of |C| over Phi'"),
+    "stiffness_factor": Number("0", "DBL_MAX", "sum of A/c1: stiffness over Phi'"),
     "bending_factor": Number("0", "DBL_MAX", "what slopes that fade add to it, over Phi"),
+    "joining_more": Number("0", "DBL_MAX", "what springs that join a cell add to it, over Phi'"),
+    "joining_most": Number("0", "DBL_MAX", "and at most"),
     "largest_reach": Number("0", "DBL_MAX", "m: bound of |y|"),
     "stretch": Number("1", "DBL_MAX", "bound of |y| over that of the displacement"),
     "farthest": Number("0", "DBL_MAX", "m: largest closure that a stress is looked for in"),
 }
-BOND = "bond_normal", "bond_shear", "opening_begin", "slip_begin", "opening_end", "slip_end"
 TABLES = {
     "facet": "(blocks, JLAW_COLUMNS, JLAW_LANES), zeros beyond the last facet",
     "depth": "(blocks, cells, JLAW_ROWS, JLAW_LANES)",
@@ -135,6 +147,7 @@ def layout_h() -> str:
     lines += [f"  double {name}; /* {number.about} */" for name, number in NUMBERS.items()]
     lines += [f"  const double *{name}; /* {about} */" for name, about in TABLES.items()]
     lines += ["  double *own; /* what jlaw_free frees */", "  char fingerprint[80];", "};"]
+    lines += [f"#define JLAW_ELEMENTS(X) {' '.join(f'X({name})' for name in ELEMENTS)}"]
     lines += ["/* Each number of a table file: its name, 1 if it is whole, its bounds */"]
     keys = [
         f"  X({name}, {int(numbers is WHOLE)}, {number.least}, {number.most})"

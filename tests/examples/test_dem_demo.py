@@ -246,7 +246,6 @@ def test_history_survives_a_gap():
         (["scene.toml", "--until=inf"], "until = inf s: inf steps"),
         (["check", "endless.toml"], "until = 1e+308 s: "),
         (["compare", "scene.toml"], "has no [[rock]] to compare"),
-        (["compare", "slope", "--tilt", "3"], "compare --tilt is removed: turn `gravity`"),
         (["nobodys"], "no scene 'nobodys': give a TOML file or one of arch"),
     ],
 )

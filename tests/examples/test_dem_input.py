@@ -17,7 +17,7 @@ from dem_demo.output import monitors
 from dem_demo.scene import Files, build, build_law
 from dem_demo.scene.read import SCENES
 from dem_demo.studies.strength import alone
-from jointlaw.laboratory.experiments import PathError
+from jointlaw import PathError
 
 TEXT = f"""
 gravity = [0.0, -9.81]
@@ -62,7 +62,6 @@ TWICE = '[[joint]]\nbetween = ["base", "top"]\nlaw = "plain"\n[watch]'
         ("end = 0.002", "end = 1" + 400 * "0", "end = .* not a number"),
         ("end = 0.002", 'end = "2"', "end = '2' is not a number"),
         ("step = 1e-4", "fraction = 2.0", "fraction = 2.0: must be from 1e-06 to 0.95"),
-        ("step = 1e-4", "point_spacing = 0.3", "point_spacing' is removed: joints carry at their"),
         ("law_steps = 2", "law_steps = 2.9", "law_steps = 2.9 .* whole number >= 1"),
         ("[run]", "[run", "at line 34"),
         ("[laws.plain]", "[laws]\nx = 1\n[laws.plain]", "laws.x = 1: must be a table"),

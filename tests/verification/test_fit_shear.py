@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.calibration.measured import ClosureCurve, ShearCurve
+from jointlaw import ClosureCurve, ShearCurve
 from jointlaw.parameters.resolution import SLIP as FINE
 
 SHEAR = np.linspace(0, 3e-5, 12)

@@ -3,7 +3,7 @@
 from importlib import resources
 from pathlib import Path
 
-from ...law import JointLaw
+from ...laws.law import Law
 from ...native.layout import jointlaw_h
 from ...support.files import write_files
 from ...tables.tabulate import require_3d
@@ -14,7 +14,7 @@ FILES = ("jointlawplugin.cpp", "fix_jointlaw_memory.h", "build.sh", "in.tower")
 WEIGHT = 6e3  # Pa: the mean normal stress under the slabs of in.tower
 
 
-def export_lammps(law: JointLaw, directory: str | Path, name: str = "joint") -> list[str]:
+def export_lammps(law: Law, directory: str | Path, name: str = "joint") -> list[str]:
     """Write all that an unmodified LAMMPS needs to run this joint; the folder may be copied away.
 
     law: a law in 3-D (`plane=None`). directory: made if missing; files of the same names are

@@ -139,7 +139,9 @@ class JointBatch:
 
     def unbond(self, index: Index) -> None:
         """Break bond or cohesion of the joints at `index`: faces that meet anew have none."""
-        self._state[at(self._state, self._index(index), self._row("damage"))] = 1.0
+        row = self._row("damage")
+        if row.size:
+            self._state[at(self._state, self._index(index), int(row[0]))] = 1.0
 
     def resize(self, n: int) -> None:
         """Change the number of joints; joints beyond the old number are new and mated."""

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from ..laboratory.experiments import PathError
+from ..support.checks import one_of
 from ..support.files import require_free
 from ..support.version import __version__
 from . import export, fit, laboratory, presets, scan
@@ -81,4 +82,6 @@ def _read(words: Sequence[str]) -> argparse.Namespace:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for module in COMMANDS:
         module.add(commands)
+    if words and not words[0].startswith("-"):
+        one_of("the command", words[0], tuple(commands.choices))
     return parser.parse_args(words)

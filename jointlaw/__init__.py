@@ -26,6 +26,7 @@ from .support.version import __version__ as __version__
 from .tables.joint_table import JointTable, load_table
 
 if TYPE_CHECKING:
+    from .calibration.field import from_field
     from .calibration.fit import fit_closure, fit_curves
     from .hosts.c.export import export_c
     from .hosts.fem.export import export_fem
@@ -57,6 +58,7 @@ __all__ = [
     "export_yade",
     "fit_closure",
     "fit_curves",
+    "from_field",
     "from_surface",
     "load_state",
     "load_table",
@@ -73,6 +75,7 @@ _LATER = {
     "export_yade": "hosts.yade.export",
     "fit_closure": "calibration.fit",
     "fit_curves": "calibration.fit",
+    "from_field": "calibration.field",
     "from_surface": "surface.fit",
     "tabulate": "tables.tabulate",
 }

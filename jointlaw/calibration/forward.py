@@ -28,7 +28,7 @@ DEFAULTS = {
     "yield_interference": math.inf, "mating_length": math.inf, "slope_wear": math.inf,
     "slope_residual": 0.0,
 }  # fmt: skip
-STEPS = 40  # that shear a joint to begin with; a fit halves them while that matters
+STEPS = 30  # that shear a joint to begin with; a fit halves them while that matters
 
 
 _SLOPES = ("mating_length", "slope_wear", "slope_residual")

@@ -10,9 +10,9 @@ from ..laboratory.experiments import PathError
 from ..support.checks import one_of
 from ..support.files import require_free
 from ..support.version import __version__
-from . import export, fit, laboratory, presets, scan
+from . import export, field, fit, laboratory, presets, scan
 
-COMMANDS = (laboratory, presets, export, fit, scan)
+COMMANDS = (laboratory, presets, export, fit, scan, field)
 
 _YIELDING = "write yield_interference into [asperity] of a law file; it starts with \
 jointlaw presets NAME > mine.toml"

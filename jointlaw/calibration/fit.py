@@ -146,7 +146,7 @@ class Fit(Estimates):
         if shears:
             axes[0, -2].set(xlabel="shear displacement (mm)", ylabel="shear stress (MPa)")
             axes[0, -1].set(xlabel="shear displacement (mm)", ylabel="opening (mm)")
-            axes[0, -2].legend()
+            figure.legend(*axes[0, -2].get_legend_handles_labels(), loc="outside lower center")
         return written(figure, path)
 
     def _draw_closure(

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from jointlaw.calibration.datasets import load, names, read_closure, read_peaks, read_shear
-from jointlaw.calibration.measured import ClosureCurve, first_loading
+from jointlaw.calibration.envelopes import envelope
+from jointlaw.calibration.measured import ClosureCurve, ShearCurve, first_loading
 
 U = np.array([0.0, 0.05, 0.1, 0.2, 0.5, 1.0])  # mm
 TAU = np.array([0.0, 0.875, 1.25, 1.75, 1.625, 1.5])  # MPa
@@ -208,6 +209,22 @@ def test_slack_before_any_load_is_no_closure():
     assert curve.seating is None
     np.testing.assert_array_equal(curve.stress, 1e6 * stress[3:])
     assert "3 rows before any load are slack of 0.0003 m" in curve.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "strength"),
+    [
+        ("Coulomb", lambda s: 0.4e6 + s * np.tan(np.radians(35))),
+        ("Barton", lambda s: s * np.tan(np.radians(30 + 8 * np.log10(60e6 / s)))),
+        ("power law", lambda s: 2e3 * s**0.8),
+    ],
+)
+def test_an_envelope_goes_through_strengths_of_its_own_form(name, strength):
+    stresses = [1e6, 3e6, 5e6]
+    tests = [ShearCurve([0, 1e-3, 1e-2], strength(s) * np.array([0, 1, 0.8]), s) for s in stresses]
+    peak, last = envelope(name, tests, 4e6)
+    assert peak == pytest.approx(strength(4e6), rel=1e-9)
+    assert last == pytest.approx(0.8 * strength(4e6), rel=0.01)  # Barton's form keeps no factor
 
 
 THOUSANDS = "us [mm]\ttau [kPa]\n0.0\t0\n0.1\t875\n0.2\t1,201\n0.3\t1,305\n"

@@ -4,7 +4,7 @@ Where no C compiler of this machine works, the package `ziglang` is asked for, w
 with the library fits every Python of its platform; without one it fits every platform.
 """
 
-import importlib.util
+import importlib
 import os
 import shutil
 import sys
@@ -16,22 +16,14 @@ from typing import Any
 from setuptools import build_meta
 from setuptools.build_meta import *  # noqa: F403
 
-HERE = Path(__file__).parents[1] / "jointlaw" / "native"
+ROOT = Path(__file__).parents[1]
 TARGET = "JOINTLAW_TARGET"  # a wheel for another machine: one of build.TARGETS
 
 
-def _load() -> ModuleType:
-    """jointlaw/native/build.py alone: numpy is not there yet."""
-    spec = importlib.util.spec_from_file_location("jointlaw_build", HERE / "build.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-build = _load()
+# jointlaw/native/build.py without jointlaw/__init__.py, whose imports need numpy
+package = sys.modules["jointlaw"] = ModuleType("jointlaw")
+package.__path__ = [str(ROOT / "jointlaw")]
+build = importlib.import_module("jointlaw.native.build")
 
 
 def get_requires_for_build_wheel(config_settings: Any = None) -> list[str]:
@@ -46,14 +38,14 @@ get_requires_for_build_editable = get_requires_for_build_wheel
 
 def _library() -> bool:
     """Build the library beside its sources; whether there is one."""
-    for old in HERE.glob("libjointlaw.*"):
-        old.unlink()
+    shutil.rmtree(build.BUILT, ignore_errors=True)
+    build.write_headers()
     target = os.environ.get(TARGET)
     compiler = build.zig(target) if target else build.find_compiler()
     if compiler is None:
         print("no C compiler works here: numpy's kernel remains", file=sys.stderr)
         return False
-    print(build.build(compiler, HERE), "by", *compiler.command, file=sys.stderr)
+    print(build.build(compiler), "by", *compiler.command, file=sys.stderr)
     return True
 
 
@@ -62,7 +54,7 @@ def build_wheel(
 ) -> str:
     """A wheel py3-none-PLATFORM."""
     # setuptools would add what an earlier build left there
-    shutil.rmtree(HERE.parents[1] / "build", ignore_errors=True)
+    shutil.rmtree(ROOT / "build", ignore_errors=True)
     settings = dict(config_settings or {})
     if _library():
         target = os.environ.get(TARGET)

@@ -1,8 +1,8 @@
 """Wheels for other machines: `python builder/wheels.py FOLDER`, with the extra `wheels` installed.
 
 One for each of `TARGETS` in jointlaw/native/build.py. Each is built from the source archive, in a
-place of its own, by the packages of this environment. Its library is looked into: for which
-processor it is, and what it exports.
+place of its own, by the packages of this environment, and holds all widths of vectors. Its library
+is looked into: for which processor it is, and what it exports.
 """
 
 import os
@@ -15,7 +15,7 @@ import backend
 import lief
 
 ROOT = Path(__file__).parents[1]
-EXPORTED = {"jlaw_run", "jlaw_lanes", "jlaw_sources"}  # what library.py calls
+EXPORTED = {"jlaw_run", "jlaw_lanes", "jlaw_levels", "jlaw_sources"}  # what library.py calls
 PROCESSORS = {"x86_64": "X86_64", "aarch64": "ARM64"}  # of zig, and of lief
 
 
@@ -31,7 +31,7 @@ def faults(wheel: Path, target: str) -> list[str]:
     processor, system = backend.build.Compiler((), target).machine
     with zipfile.ZipFile(wheel) as packed:
         library = lief.parse(
-            packed.read(f"jointlaw/native/{backend.build.library_name(system)}")
+            packed.read(f"jointlaw/native/built/{backend.build.library_name(system)}")
         ).abstract
     found = []
     # Mach-O writes an underscore before each name

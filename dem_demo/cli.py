@@ -2,11 +2,13 @@
 
 import argparse
 import sys
+import time
+from contextlib import suppress
 from importlib.util import find_spec
 from math import inf
 from pathlib import Path
 
-from jointlaw.laboratory.experiments import PathError
+from jointlaw import JointLaw, PathError
 from jointlaw.support.files import require_free, write_json
 from jointlaw.support.pyplot import FORMATS
 
@@ -19,6 +21,7 @@ from .studies import ablate, compare, strength, trials
 
 VERSION = 2  # of strength.json
 FAILING = 3.0  # s: most that a failing rock is run for
+TRIED, PATIENCE = 100, 1.0  # steps, and s, by which the time of a run is estimated
 INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 
 ABOUT = """\
@@ -62,12 +65,6 @@ OPTIONS = {
     },
     "--seeds": {"type": int, "nargs": "+", "default": [1, 2, 3], "help": "default 1 2 3"},
 }
-REMOVED = {
-    "compare --tilt": "turn `gravity` in the scene file",
-    "compare --critical": "strength-reduction finds the critical tilt",
-    "ablate --leave-out": "all variants run",
-    "compare --out": "it prints; write `> FILE`",
-}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -84,8 +81,6 @@ def main(arguments: list[str] | None = None) -> int:
     for option in options:
         parser.add_argument(option, **OPTIONS[option])
     try:
-        for word in REMOVED.keys() & {f"{verb} {word.partition('=')[0]}" for word in words}:
-            raise ValueError(f"{word} is removed: {REMOVED[word]}")
         given = parser.parse_args(words)
         if getattr(given, "force", None) is False:
             require_free(given.out)
@@ -106,9 +101,12 @@ def _run(given: argparse.Namespace) -> None:
     resumed = "state" in given
     sim = Simulation.load(given.state, given.step) if resumed else Simulation(load(given.scene))
     _announce(sim, given.until)
+    dt = sim.dt
     record, summary = run(sim, given.out, given.until, given.format, given.vtk)
     for line in sentences(record):
         print(line)
+    if sim.dt < dt:
+        print(f"the time step was halved to {sim.dt:.3g} s as joints closed or blocks fell")
     print(
         f"energy balanced to {summary['largest_energy_error']:.1e}, smallest margin of the time "
         f"step {summary['time_step_margin']:.2f}; results in {given.out}"
@@ -121,12 +119,33 @@ def _announce(sim: Simulation, until: float | None = None) -> None:
         f"{sim.scene.title}: {sum(not block.fixed for block in sim.scene.blocks)} moving blocks, "
         f"{sim.joints.n} law points in reach"
     )
-    print(f"time step {dt:.3g} s, limit {limit:.3g} s (margin {limit / dt:.2f}), {steps} steps")
+    why = f"; fraction {dt / limit:.2g}, because {sim.why}" if sim.why else ""
+    print(
+        f"time step {dt:.3g} s, limit {limit:.3g} s (margin {limit / dt:.2f}{why}), {steps} steps"
+    )
+    if seconds := _pace(sim) * steps:
+        print(f"about {_spoken(seconds)} without pictures, by its first steps")
     for rock in sim.scene.rocks:
         print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
               f"{len(rock.blocks) - len(rock.free)} fixed; {rock.slivers}")  # fmt: skip
     if not sim.balanced:
         print("some blocks have no static equilibrium and move from the first step")
+
+
+def _pace(sim: Simulation) -> float:
+    """Time (s) of a step, by the first ones of a copy; 0 where these are refused."""
+    copy, steps, started = Simulation(sim.scene, saved=sim.state()), 0, time.perf_counter()
+    with suppress(Refused):
+        while steps < TRIED and time.perf_counter() < started + PATIENCE:
+            copy.step()
+            steps += 1
+        return (time.perf_counter() - started) / steps
+    return 0.0
+
+
+def _spoken(seconds: float) -> str:
+    """A time for a person."""
+    return f"{seconds:.2g} s" if seconds < 100 else f"{seconds / 60:.2g} min"
 
 
 def _new(given: argparse.Namespace) -> None:
@@ -136,8 +155,25 @@ def _new(given: argparse.Namespace) -> None:
 
 
 def _check(given: argparse.Namespace) -> None:
-    _announce(Simulation(load(given.scene)))
+    sim = Simulation(load(given.scene))
+    _announce(sim)
+    for (name, law), rows in zip(sim.scene.laws.items(), sim.joints.rows, strict=True):
+        pressed = sim.joints.traction[rows, 0].max(initial=0.0)
+        if isinstance(law, JointLaw):
+            _warn_of_range(name, law, max(float(pressed), sim.scene.run.largest_stress))
     print("the scene is valid")
+
+
+def _warn_of_range(name: str, law: JointLaw, largest: float) -> None:
+    """Say what to write where a law has its cells for far more than this normal stress (Pa)."""
+    made = float(law.normal_stress(law.closure_range * law.resolution.lowest))
+    if law.tables.asperities.cells > 1 and 0.0 < largest < 0.1 * made:
+        print(
+            f"law {name!r}: its joints bear {largest:.2g} Pa at most, but its depth cells are for "
+            f"{made:.2g} Pa, so that tractions err by up to 20 % (docs/accuracy.md). In "
+            f"[laws.{name}] write closure_range = {law.closure(2.0 * largest):.2g}, in m, the "
+            "closure at twice that stress; or save sliders by depth = 1 in its resolution"
+        )
 
 
 def _ablate(given: argparse.Namespace) -> None:
@@ -157,7 +193,8 @@ def _compare(given: argparse.Namespace) -> None:
 
 def _reduce(given: argparse.Namespace) -> None:
     scene, rows = load(given.scene), []
-    if any(law.slope_wear < inf for law in scene.laws.values()):
+    rough = [law for law in scene.laws.values() if isinstance(law, JointLaw)]
+    if any(law.slope_wear < inf for law in rough):
         print("slope_wear has no effect on these numbers: they are too high")
     given.out.mkdir(parents=True, exist_ok=True)
     if given.force:

@@ -36,6 +36,7 @@ TABLES = {
     "dynamics": ("validation.md", "docs/measure/recorded.py dynamics"),
     "impact": ("validation.md", "docs/measure/recorded.py impact"),
     "named": ("accuracy.md", "docs/measure/named.py"),
+    "small-loads": ("accuracy.md", "docs/measure/tolerance.py --small --laws 4 --seed 5"),
     "plane": ("accuracy.md", "docs/measure/plane.py"),
     "ingredients": ("accuracy.md", "docs/measure/ablations.py"),
     "newmark": ("blocks.md", "docs/measure/shake.py"),

@@ -12,9 +12,10 @@ from .joints.batch import JointBatch
 from .joints.joint import Joint
 from .joints.pool import JointPool
 from .joints.state import NonFiniteError, load_state
-from .laboratory.experiments import closure_test, direct_shear
+from .laboratory.experiments import PathError, closure_test, direct_shear
 from .laboratory.record import Record
-from .law import JointLaw
+from .laws.coulomb_law import CoulombLaw
+from .laws.joint_law import JointLaw
 from .paper import closed_form
 from .paper.secant import secant
 from .parameters.asperity import Asperity
@@ -28,6 +29,7 @@ from .tables.joint_table import JointTable, load_table
 if TYPE_CHECKING:
     from .calibration.field import from_field
     from .calibration.fit import fit_closure, fit_curves
+    from .calibration.measured import ClosureCurve, ShearCurve
     from .hosts.c.export import export_c
     from .hosts.fem.export import export_fem
     from .hosts.lammps.export import export_lammps
@@ -38,6 +40,8 @@ if TYPE_CHECKING:
 __all__ = [
     "Asperity",
     "Bond",
+    "ClosureCurve",
+    "CoulombLaw",
     "GammaHeights",
     "Heights",
     "Joint",
@@ -47,8 +51,10 @@ __all__ = [
     "JointTable",
     "NonFiniteError",
     "Orientation",
+    "PathError",
     "Record",
     "Resolution",
+    "ShearCurve",
     "closed_form",
     "closure_test",
     "direct_shear",
@@ -69,6 +75,8 @@ __all__ = [
 
 # Tools for measurements and hosts load on first use: a DEM code that embeds the law needs none
 _LATER = {
+    "ClosureCurve": "calibration.measured",
+    "ShearCurve": "calibration.measured",
     "export_c": "hosts.c.export",
     "export_fem": "hosts.fem.export",
     "export_lammps": "hosts.lammps.export",
@@ -79,33 +87,11 @@ _LATER = {
     "from_surface": "surface.fit",
     "tabulate": "tables.tabulate",
 }
-# Names of former versions, and what to use
-_GONE = {
-    "ClosureCurve": "jointlaw.calibration.measured.ClosureCurve",
-    "Fit": "jointlaw.calibration.fit.Fit",
-    "JointState": "jointlaw.joints.state.JointState",
-    "PathError": "jointlaw.laboratory.experiments.PathError",
-    "Secant": "jointlaw.paper.secant.Secant",
-    "ShearCurve": "jointlaw.calibration.measured.ShearCurve",
-    "SurfaceFit": "jointlaw.surface.fit.SurfaceFit",
-    "baselines": "docs/measure/held_out.py, which fits a power law and Barton-Bandis",
-    "datasets": "jointlaw.calibration.datasets",
-    "first_loading": "jointlaw.calibration.measured.first_loading",
-    "fit_many": "jl.fit_closure, mapped over the curves by any concurrent.futures.Executor",
-    "fit_shear": "jl.fit_curves([ShearCurve(shear, tau, normal)], law=law, free=('mu', 'a'))",
-    "hydraulic_aperture": "aperture - closure; the aperture at zero closure is not of a joint law",
-    "include_dir": "jointlaw.hosts.c.export.include_dir",
-    "synthetic_surface": "docs/gallery/plot_from_scan.py, which makes a surface in ten lines",
-    "transmissivity": "9789 * h**3 / (12 * 1.0016e-3) in m2/s, water, h the hydraulic aperture (m)",
-    "unloading": "jl.fit_closure(stress, closure, cycle=True), which reports unloading",
-}
 
 
 def __getattr__(name: str) -> Any:
     if name in _LATER:
         return getattr(import_module(f".{_LATER[name]}", __name__), name)
-    if name in _GONE:
-        raise AttributeError(f"jointlaw.{name} is no public name any more: use {_GONE[name]}")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

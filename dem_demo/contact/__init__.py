@@ -2,11 +2,11 @@
 
 geometry       closure, sliding and length of joint at corners on edges
 tracker        which corners are over which edges, and the identity of each through time
-joints         one pool of joints for each law, and its virgin curve
+joints         one batch of joints for each law, and its virgin curve
 """
 
-from .geometry import Contacts
+from .geometry import Contacts, Outlines
 from .joints import PARTS, Joints, virgin_curve
 from .tracker import Tracker
 
-__all__ = ["PARTS", "Contacts", "Joints", "Tracker", "virgin_curve"]
+__all__ = ["PARTS", "Contacts", "Joints", "Outlines", "Tracker", "virgin_curve"]

@@ -1,32 +1,46 @@
 """The law's side: one batch of joints per law, one call per law and step.
 
-Contacts come and go; each keeps its joint in the pool of its law for as long as its interface is in
-reach, so history is never given to the wrong joint.
+Contacts come and go; each keeps its place in the batch of its law for as long as its interface is
+in reach, so history is never given to the wrong joint. A place that falls free goes to a later
+contact, whose joint starts anew.
 """
 
-from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 import jointlaw as jl
 from jointlaw.joints.state import JointState
+from jointlaw.kernels.engine import Step
 
-from ..scene import Scene, is_coulomb
-from .tracker import Identity
+from ..compiled import SHOWN, Pool, World
+from ..scene import Law, Scene
 
-PARTS = "contacts", "law", "fingerprint", "touch"  # of a snapshot of the joints of a law
+PARTS = "states", "fingerprint"  # of a snapshot of the joints of a law
+NEW = (0.0, 0.0, 1.0, 0.0, 0.0)  # what a new joint shows, but for its bond and where it is
 
 
-def unmated_curve(law: jl.JointLaw, closure: np.ndarray) -> dict[str, np.ndarray]:
+@lru_cache(maxsize=64)
+def unmated_curve(law: Law) -> dict[str, np.ndarray]:
     """Closure from first touch (m) and work (J/m2) of a joint whose faces have never met."""
+    closure = virgin_curve(law)["closure"]
     batch = jl.JointBatch(law, len(closure))
     batch.reset(mated=False)
     batch.update(np.stack([closure, 0.0 * closure], axis=1), tangent=False)
     return {"closure": closure, "work": batch.stored_energy}
 
 
-def virgin_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
+@lru_cache(maxsize=64)
+def first_touch(law: Law) -> np.ndarray:
+    """Closure and sliding (2,) in m where a joint begins whose faces have never met."""
+    batch = jl.JointBatch(law, 1)
+    batch.reset(mated=False)
+    return batch.delta[0]
+
+
+@lru_cache(maxsize=64)
+def virgin_curve(law: Law) -> dict[str, np.ndarray]:
     """Closure (m), stress (Pa) and work (J/m2) of a virgin joint from no closure to 2 GPa, more
     than any corner of rock stands, and an upper bound of its stiffness (Pa/m) there.
 
@@ -38,105 +52,180 @@ def virgin_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
     stress = law.normal_stress(closure)
     work = cumulative_trapezoid(stress, closure, initial=0.0)
     stiffness = law.max_stiffness(closure)
-    if is_coulomb(law):
-        # The law's bound adds mu for the coupling of shear to closure. That of level asperities has
-        # no eigenvalue of its own: (kn, 0; mu kn, 0) has kn and 0. K is ks, lam K is kn.
-        p = law.asperity
-        stiffness = np.full(len(closure), max(1.0, p.lam) * p.K * law.asperity_density)
-        stiffness += 0.0 if law.bond is None else law.bond.largest_stiffness
+    if isinstance(law, jl.CoulombLaw):
+        # The law's bound has mu in it, for the coupling of shear to closure. That has no eigenvalue
+        # of its own: (kn, 0; mu kn, 0) has kn and 0.
+        stiffness = np.full(len(closure), max(law.normal_stiffness, law.shear_stiffness))
     return {"closure": closure, "stress": stress, "stiffness": stiffness, "work": work}
 
 
+class Held:
+    """The joints of one law: batch, and by their places there what the compiled step needs.
+
+    step: d (places, 2) in m, F (places, 2) in Pa and shown (places, 8), of one step of all; free:
+    places without a contact, the lowest last; curve: the law's virgin curve.
+    """
+
+    def __init__(self, law: Law, reduction: float) -> None:
+        self.batch, self.free = jl.JointBatch(law, 0), []
+        self.curve = {**virgin_curve(law)}
+        self.curve["stiffness"] = self.curve["stiffness"] * max(1.0, reduction**-2)
+        self.grow(0)
+
+    def grow(self, n: int) -> None:
+        """Make room for n joints; those that are there keep what they show."""
+        held = len(self.batch)
+        self.free = [*range(n - 1, held - 1, -1), *self.free]
+        self.batch.resize(n)
+        d, F, shown = np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, SHOWN + 2))
+        if held:
+            F[:held], shown[:held] = self.step.F, self.step.shown
+        self.step = Step(d, F, None, shown=shown)
+        self._silent = Step(d, F, None)
+
+    def take(self, m: int) -> np.ndarray:
+        """Places (m,) for new contacts."""
+        if m > len(self.free):
+            self.grow(len(self.batch) + m - len(self.free))
+        return np.array([self.free.pop() for _ in range(m)], int)
+
+    def drop(self, places: np.ndarray) -> None:
+        """Forget the joints at these places."""
+        if len(places):
+            self.batch.reset(places)
+            self.step.d[places] = 0.0
+            self.free = sorted([*self.free, *places.tolist()], reverse=True)
+
+    def begin(self, places: np.ndarray, mated: bool, bonded: bool) -> np.ndarray:
+        """Let joints start, as new; closure and sliding (2,) in m where they first touch."""
+        law, start = self.batch.law, np.zeros(2) if mated else first_touch(self.batch.law)
+        self.batch.reset(places, mated)
+        if not bonded:
+            self.batch.unbond(places)
+        damage = 0.0 if bonded and "damage" in law.tables.names else 1.0
+        self.step.F[places], self.step.shown[places] = 0.0, [*NEW, damage, *start]
+        return start
+
+    def advance(self, parts: int) -> None:
+        """Advance all joints `parts` times by d."""
+        for _ in range(parts - 1):
+            self.batch.take(self._silent)
+        self.batch.take(self.step)
+
+    def pool(self) -> Pool:
+        """What the compiled step knows of them."""
+        arrays = self.step.d, self.step.F, self.step.shown, *self._curve
+        return Pool(*(array.ctypes.data for array in arrays), len(self._curve[0]))
+
+    @property
+    def _curve(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.curve["stress"], self.curve["stiffness"]
+
+
 class Joints:
-    """All joints of a scene. After `assign`, arrays run over the k contacts given.
+    """All joints of a scene; arrays run over the k contacts.
 
     delta (k, 2) in m: closure and sliding; traction (k, 2) in Pa; sliding, slipping, separated
     (k,): shares of their shear capacity; stored, lost (k,) in J/m2; damage (k,) of their bonds, 1
-    where there is none.
+    where there is none. law, place (k,): number of the law, and place in its batch.
 
     The scene's `reduction` F divides the shear stress of every joint and multiplies the sliding at
     which it has it. So tan(friction angle), tan(dilation angle) and cohesion are divided by F, and
     the work is that of the law: no energy is made.
 
-    Faces that meet in a run are unmated where the law fades. `touch` holds, by contact, where its
-    joint first touches (closure and sliding in m, zeros for a mated one); delta counts from there.
+    Faces that meet in a run are unmated where the law fades. touch (k, 2): where its joint first
+    touches (closure and sliding in m, zeros for a mated one); delta counts from there.
     """
 
     def __init__(self, scene: Scene) -> None:
-        self.choose, self.reduction = scene.law_of, np.array([1.0, scene.reduction])
-        self.pools = {name: jl.JointPool(law) for name, law in scene.laws.items()}
-        self.curves = {name: virgin_curve(law) for name, law in scene.laws.items()}
-        for curve in self.curves.values():
-            curve["stiffness"] = curve["stiffness"] * max(1.0, scene.reduction**-2)
-        self.touch: dict[Identity, np.ndarray] = {}
-        self.assign([])
+        self.reduction = np.array([1.0, scene.reduction])
+        self.names = [*scene.laws]
+        self.held = [Held(law, scene.reduction) for law in scene.laws.values()]
+        self.touch, self.keys = np.zeros((0, 2)), np.zeros((0, 2), int)
+        self._arrange(np.zeros(0, int), np.zeros(0, int))
 
-    def assign(self, contacts: Sequence[Identity], started: bool = False) -> None:
-        """Keep the joints of these contacts, forget the others, make new ones virgin.
+    def _arrange(self, law: np.ndarray, place: np.ndarray) -> None:
+        """Arrays for contacts with these laws, their joints at these places."""
+        self.law, self.place, self.n = law.astype(np.int64), place.astype(np.int64), len(law)
+        self.rows = [np.flatnonzero(law == i) for i in range(len(self.held))]
+        self.traction, self.delta = np.zeros((2, self.n, 2))
+        self.shares = np.zeros((SHOWN, self.n))
+        self.sliding, self.slipping, self.separated, self.stored, self.lost, self.damage = (
+            self.shares
+        )
+        self._pools = (Pool * len(self.held))(*(held.pool() for held in self.held))
+        self.world = World(contacts=self.n)
+        self.bind(self.world)
+        self.world.call("read")
 
-        started: whether the run has started. Then new ones have no bond, and are mated only where
-        their two faces still touch in a mated joint, which they then continue.
+    def bind(self, world: World) -> None:
+        """Tell the compiled step where these arrays lie."""
+        names = "law", "place", "touch", "reduction", "traction", "delta", "shares"
+        world.bind(pools=self._pools, **{name: getattr(self, name) for name in names})
+
+    def rearrange(
+        self, before: np.ndarray, law: np.ndarray, keys: np.ndarray, started: bool = False
+    ) -> None:
+        """Keep the joints of the contacts (k,) that were at the rows `before`; -1 is a new one.
+
+        law (k,), keys (k, 2): of each its law and the edges that met. started: whether the run has
+        started. Then new ones have no bond, and are mated only where their two faces still touch in
+        a mated joint, which they then continue.
         """
-        fit = {key for (key, _), touch in self.touch.items() if not touch.any()}
-        held, self.touch = self.touch, {}
-        for who in contacts:
-            self.touch[who] = held.get(who, np.zeros(2))
-        of_law: dict[str, list[int]] = {name: [] for name in self.pools}
-        for i, (key, _) in enumerate(contacts):
-            of_law[self.choose(key)].append(i)
-        self.groups = []
-        for name, rows in of_law.items():
-            pool = self.pools[name]
-            places = pool.assign(contacts[i] for i in rows)
-            for i, place in zip(rows if started else [], places, strict=started):
-                if contacts[i] not in held:
-                    mated = contacts[i][0] in fit or not pool.batch.law.tables.fades
-                    self.touch[contacts[i]] = self._begin(pool, place, mated)
-            if rows:
-                whole = np.array_equal(places, np.arange(len(pool.batch)))
-                self.groups.append((name, np.array(rows), None if whole else places))
-        self.n = len(contacts)
-        self.traction = np.zeros((self.n, 2))
-        for name, rows, places in self.groups:
-            F = self.pools[name].batch.F[... if places is None else places]
-            self.traction[rows] = F / self.reduction
-        self.measure()
+        old, new = before >= 0, np.flatnonzero(before < 0)
+        gone = np.ones(self.n, bool)
+        gone[before[old]] = False
+        place, touch = np.full(len(before), -1), np.zeros((len(before), 2))
+        place[old], touch[old] = self.place[before[old]], self.touch[before[old]]
+        fit = {*map(tuple, self.keys[~self.touch.any(axis=1)].tolist())} if started else set()
+        fits = np.array([not started or key in fit for key in map(tuple, keys[new].tolist())], bool)
+        for i, held in enumerate(self.held):
+            held.drop(self.place[gone & (self.law == i)])
+            mine = law[new] == i
+            mated = fits | (not held.batch.law.tables.fades)
+            for kind in (True, False):
+                rows = new[mine & (mated == kind)]
+                if len(rows):
+                    place[rows] = held.take(len(rows))
+                    touch[rows] = held.begin(place[rows], kind, bonded=not started)
+        self.touch, self.keys = touch, keys
+        self._arrange(law, place)
 
     def update(self, closure: np.ndarray, sliding: np.ndarray, parts: int = 1) -> None:
-        """Advance every joint to a closure (m), and by a sliding (m), in equal parts.
+        """Advance every joint to a closure (m), and by a sliding (m), in equal parts."""
+        d = np.stack([closure - self.delta[:, 0], sliding], axis=1) / (parts * self.reduction)
+        for held, rows in zip(self.held, self.rows, strict=True):
+            held.step.d[self.place[rows]] = d[rows]
+        self.advance(parts)
+        self.world.call("read")
+
+    def advance(self, parts: int) -> None:
+        """Advance the joints of all laws `parts` times by what their steps hold.
 
         The law's friction work is first order in its step: more parts balance energy better.
         """
-        d = np.stack([closure - self.delta[:, 0], sliding], axis=1) / (parts * self.reduction)
-        for name, rows, places in self.groups:
-            for _ in range(parts):
-                F, _ = self.pools[name].batch.update(d[rows], where=places, tangent=False)
-            self.traction[rows] = F / self.reduction
-        self.measure()
+        for held, rows in zip(self.held, self.rows, strict=True):
+            if len(rows):
+                held.advance(parts)
 
-    def trial(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Tractions (k, 2) and tangents (k, 2, 2) for d, leaving the state alone."""
+    def trial(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Tractions (k, 2), tangents (k, 2, 2) and stored energies (k,) in J/m2 after increments d
+        (k, 2), leaving the state alone."""
         F, C, by = np.empty((self.n, 2)), np.empty((self.n, 2, 2)), self.reduction
-        for name, rows, places in self.groups:
-            F[rows], C[rows] = self.pools[name].batch.trial(d[rows] / by, where=places)
-        return F / by, C / np.outer(by, by)
-
-    def measure(self) -> None:
-        """Read what the batches hold by now."""
-        self.delta = np.zeros((self.n, 2))
-        shares, touch = np.zeros((6, self.n)), np.array([*self.touch.values()]).reshape(-1, 2)
-        for name, rows, places in self.groups:
-            batch, here = self.pools[name].batch, slice(None) if places is None else places
-            self.delta[rows] = (batch.delta[here] - touch[rows]) * self.reduction
-            columns = *batch.measures()[:4], batch.dissipated_energy, batch.damage
-            shares[:, rows] = np.array(columns)[:, here]
-        self.sliding, self.slipping, self.separated, self.stored, self.lost, self.damage = shares
+        shown = np.empty((self.n, SHOWN + 2))
+        for held, rows in zip(self.held, self.rows, strict=True):
+            m = len(rows)
+            step = Step(d[rows] / by, np.empty((m, 2)), np.empty((m, 2, 2)), self.place[rows],
+                        False, np.empty((m, SHOWN + 2)))  # fmt: skip
+            held.batch.take(step)
+            F[rows], C[rows], shown[rows] = step.F, step.C, step.shown
+        return F / by, C / np.outer(by, by), shown[:, 3]
 
     def virgin(self, of: str, by: str, x: np.ndarray) -> np.ndarray:
         """A column of the virgin curves, such as "stress", where another one is x (k,)."""
         out = np.empty(self.n)
-        for name, rows, _ in self.groups:
-            out[rows] = np.interp(x[rows], self.curves[name][by], self.curves[name][of])
+        for held, rows in zip(self.held, self.rows, strict=True):
+            out[rows] = np.interp(x[rows], held.curve[by], held.curve[of])
         return out
 
     @property
@@ -145,46 +234,49 @@ class Joints:
         stress = self.traction[:, 0]
         return self.virgin("stiffness", "stress", stress) * ((stress > 0) | (self.damage < 1))
 
-    def renew(self, contact: Identity) -> None:
-        """Let the joint of a contact start anew, mated or not as it was, without a bond."""
-        pool = self.pools[self.choose(contact[0])]
-        (place,) = pool.add([contact])
-        self._begin(pool, place, not self.touch[contact].any())
-        self.measure()
+    def renew(self, rows: np.ndarray, work: np.ndarray, most: np.ndarray) -> np.ndarray:
+        """Let the joints of rows (m,) start anew, mated or not as they were, without a bond.
 
-    def curve(self, contact: Identity) -> dict[str, np.ndarray]:
-        """Closure (m) and work (J/m2) of the joint of a contact that starts anew."""
-        name = self.choose(contact[0])
-        if not self.touch[contact].any():
-            return self.curves[name]
-        return unmated_curve(self.pools[name].batch.law, self.curves[name]["closure"])
-
-    def _begin(self, pool: jl.JointPool, place: int, mated: bool) -> np.ndarray:
-        """Reset a joint, without a bond; closure and sliding (2,) in m where it first touches."""
-        pool.batch.reset([place], mated)
-        pool.batch.unbond([place])
-        return pool.batch.delta[place].copy()
+        Returns closure (m) and stored energy (J/m2) (2, m) to start with: those at which they hold
+        `work` (m,), or at which they are closed by `most` (m,) if that is less.
+        """
+        out, mated = np.empty((2, len(rows))), ~self.touch[rows].any(axis=1)
+        for i, held in enumerate(self.held):
+            for kind in (True, False):
+                mine = (self.law[rows] == i) & (mated == kind)
+                if mine.any():
+                    curve = held.curve if kind else unmated_curve(held.batch.law)
+                    anew = np.interp(work[mine], curve["work"], curve["closure"])
+                    anew = np.minimum(anew, most[mine])
+                    out[:, mine] = anew, np.interp(anew, curve["closure"], curve["work"])
+                    held.begin(self.place[rows[mine]], kind, bonded=False)
+        self.world.call("read")
+        return out
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """A copy of all state; the laws are numbered, their names may be no names of arrays."""
-        arrays = {}
-        for i, pool in enumerate(self.pools.values()):
-            state, contacts = pool.snapshot(), [[*key, number] for key, number in pool.keys]
-            touch = np.array([self.touch[who] for who in pool.keys]).reshape(-1, 2)
-            parts = np.array(contacts, int), state.values.T, np.array(state.fingerprint), touch
+        arrays = {"touch": self.touch.copy()}
+        for i, (held, rows) in enumerate(zip(self.held, self.rows, strict=True)):
+            state = held.batch.snapshot(self.place[rows])
+            parts = state.values.T, np.array(state.fingerprint)
             arrays |= {f"{part}-{i}": array for part, array in zip(PARTS, parts, strict=True)}
         return arrays
 
-    def restore(self, state: dict[str, np.ndarray], contacts: Sequence[Identity]) -> None:
-        """Back to a snapshot whose contacts were these. Raises ValueError for another's."""
-        held = []
-        for i in range(len(self.pools)):
-            rows, values, fingerprint, touch = (state[f"{part}-{i}"] for part in PARTS)
-            keys = [(tuple(key), number) for *key, number in rows.tolist()]
-            held.append((keys, JointState(str(fingerprint), values.T), touch))
-        if {contact for keys, *_ in held for contact in keys} != set(contacts):
-            raise ValueError("the state's joints are not those of the scene's laws and contacts")
-        for pool, (keys, joints, touch) in zip(self.pools.values(), held, strict=True):
-            pool.restore(keys, joints)
-            self.touch |= dict(zip(keys, touch, strict=True))
-        self.assign(contacts)
+    def restore(self, state: dict[str, np.ndarray], law: np.ndarray, keys: np.ndarray) -> None:
+        """Back to a snapshot, of contacts with these laws and keys. Raises ValueError for
+        another's."""
+        place, touch = np.zeros(len(law), int), state["touch"]
+        for i, held in enumerate(self.held):
+            rows = np.flatnonzero(law == i)
+            values, fingerprint = (state[f"{part}-{i}"] for part in PARTS)
+            if len(values.T) != len(rows) or len(touch) != len(law):
+                what = "the scene's laws and contacts"
+                raise ValueError(f"the state's joints are not those of {what}")
+            held.grow(len(rows))
+            held.batch.restore(JointState(str(fingerprint), values.T))
+            held.free, place[rows] = [], np.arange(len(rows))
+            held.step.F[:] = held.batch.F
+            shares = *held.batch.measures()[:4], held.batch.dissipated_energy, held.batch.damage
+            held.step.shown[:] = np.column_stack([*shares, held.batch.delta])
+        self.touch, self.keys = touch.copy(), keys
+        self._arrange(law, place)

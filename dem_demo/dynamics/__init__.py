@@ -1,7 +1,6 @@
 """Dynamics: blocks in motion, forces, energies, time steps.
 
 blocks         the bodies; everything that touches pymunk
-forces         of joints, dashpots, gravity, loads and drives
 energy         the ledger of energies
 timestep       the largest stable step
 seating        displacements that balance the weight

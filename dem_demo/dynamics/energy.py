@@ -2,56 +2,53 @@
 
 Velocities live between positions, so the kinetic energy at a position is half of mass times the
 product of the velocities before and after it; its change over a step is then exactly the trapezoid
-of forces times displacement, and that is how every other entry is summed.
+of forces times displacement, and that is how every other entry is summed (`book` in blocks.c).
 """
 
 import numpy as np
 
+from ..compiled import World
 from ..contact import Joints
 from .blocks import Blocks
 
 COLUMNS = ("kinetic", "potential", "stored", "friction", "dashpots", "dropped", "work", "turned")
+KINETIC, STORED, DROPPED, TURNED = map(COLUMNS.index, ("kinetic", "stored", "dropped", "turned"))
 
 
 class Ledger:
     """Energies in J: kinetic + potential + stored + friction + dashpots + dropped = start + work.
 
-    value: by COLUMNS. friction: dissipated in the joints; dropped: stored in contacts that were
-    given up while they still carried; work: done by drives and loads; turned: gravity's, the
+    energy (8,): by COLUMNS. friction: dissipated in the joints; dropped: stored in contacts that
+    were given up while they still carried; work: done by drives and loads; turned: gravity's, the
     drives' and the loads' power summed in absolute value, plus what was there at the start.
     start: the balance at time 0. Of the end of the last step: forces (3, n, 3) in N: all,
-    dashpots, drives; area (k,) in m2 and dissipated energy `lost` (k,) in J/m2 of the joints.
+    dashpots, drives; last (2, n, 3): dashpots and drives before it; area (k,) in m2 and dissipated
+    energy `lost` (k,) in J/m2 of the joints. The compiled step writes all of them.
     """
 
-    def __init__(self) -> None:
-        self.value, self.start = dict.fromkeys(COLUMNS, 0.0), 0.0
-        self.forces, self.area, self.lost = np.zeros((3, 0, 3)), np.zeros(0), np.zeros(0)
+    def __init__(self, blocks: int) -> None:
+        self.energy, self.start = np.zeros(len(COLUMNS)), 0.0
+        self.forces, self.last = np.zeros((3, blocks, 3)), np.zeros((2, blocks, 3))
+        self.area, self.lost = np.zeros(0), np.zeros(0)
 
-    def open(self, blocks: Blocks, joints: Joints, forces, dt: float, area) -> None:
-        """Begin at time 0, when the velocities of the blocks' motion hold."""
-        v, kick = self.value, 0.5 * dt * forces[0] / blocks.inertia
-        v["kinetic"] = float((0.5 * blocks.inertia * (blocks.motion[3:].T ** 2 - kick**2)).sum())
-        v["stored"] = float(area @ joints.stored)
-        self.start = v["turned"] = v["kinetic"] + v["stored"]
-        self.forces, self.area, self.lost = forces, area, joints.lost
+    def bind(self, world: World) -> None:
+        """Tell the compiled step where these arrays lie."""
+        names = "last", "area", "lost", "energy"
+        world.bind(force=self.forces, **{name: getattr(self, name) for name in names})
 
-    def book(self, blocks: Blocks, joints: Joints, forces, dt: float, area) -> None:
-        """Add a step in which the blocks moved with the velocities of their motion."""
-        v, velocity = self.value, blocks.motion[3:].T
-        _, damped, driven = 0.5 * dt * ((self.forces + forces) * velocity).sum(axis=(1, 2))
-        fall = dt * (blocks.gravity * velocity).sum(axis=1)
-        v["kinetic"] = 0.5 * float((velocity * (blocks.inertia * velocity + dt * forces[0])).sum())
-        v["potential"] -= float(fall.sum())
-        v["dashpots"] -= float(damped)
-        v["work"] += float(driven)
-        v["turned"] += float(np.abs(fall).sum() + abs(driven))
-        push = dt * (blocks.loads * velocity).sum(axis=1)
-        v["work"] += float(push.sum())
-        v["turned"] += float(np.abs(push).sum())
-        v["stored"] = float(area @ joints.stored)
-        # a joint loses its traction at the end of the step, which acts on the area of then
-        v["friction"] += float(area @ (joints.lost - self.lost))
-        self.forces, self.area, self.lost = forces, area, joints.lost
+    def open(self, blocks: Blocks, joints: Joints, dt: float, area: np.ndarray) -> None:
+        """Begin at time 0, when the velocities of the blocks' motion hold; area (k,) in m2."""
+        kick, v = 0.5 * dt * self.forces[0] / blocks.inertia, blocks.motion[3:].T
+        self.area[:], self.lost[:] = area, joints.lost
+        self.energy[KINETIC] = (0.5 * blocks.inertia * (v**2 - kick**2)).sum()
+        self.energy[STORED] = area @ joints.stored
+        self.start = float(self.energy[KINETIC] + self.energy[STORED])
+        self.energy[TURNED] = self.start
+
+    @property
+    def value(self) -> dict[str, float]:
+        """The energies by name."""
+        return dict(zip(COLUMNS, self.energy.tolist(), strict=True))
 
     @property
     def total(self) -> float:
@@ -62,4 +59,5 @@ class Ledger:
     @property
     def error(self) -> float:
         """Imbalance as a share of the energy turned over."""
-        return (self.total - self.start) / self.value["turned"] if self.value["turned"] else 0.0
+        turned = float(self.energy[TURNED])
+        return (self.total - self.start) / turned if turned else 0.0

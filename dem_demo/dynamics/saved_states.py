@@ -16,14 +16,17 @@ from ..contact import PARTS
 from ..scene import Files, Scene, parse
 
 FILE = "state.npz"
-VERSION = 6  # of state.npz
-STATE = (  # what changes in a run, but for the joints and the velocities to go on with
-    "t0", "n", "dt", "limit.now", "limit.least", "limit.checked", "blocks.motion",
-    "blocks.drives.reversed_at",
-    "tracker.corner", "tracker.edge", "tracker.keys", "tracker.numbers", "tracker.offset",
-    "tracker.renewed_at", "tracker.given", "tracker.urgent", "ledger.value", "ledger.start",
-    "ledger.forces", "ledger.area", "ledger.lost",
+VERSION = 7  # of state.npz
+KEPT = (  # of what changes in a run, but for the joints: arrays that stay in their place
+    "blocks.motion", "blocks.velocity", "blocks.drives.reversed_at", "tracker.renewed_at",
+    "tracker.urgent", "ledger.energy", "ledger.forces",
 )  # fmt: skip
+STATE = (
+    *KEPT, "t0", "n", "dt", "halvings", "limit.now", "limit.least", "limit.bound", "limit.checked",
+    "tracker.keys", "tracker.law", "tracker.numbers", "tracker.offset", "tracker.given",
+    "ledger.start", "ledger.area", "ledger.lost",
+)  # fmt: skip
+PLACES = "tracker.corner", "tracker.edge"  # from which the contacts are made anew
 
 
 Saved = dict[str, np.ndarray]  # a copy of everything that the future depends on
@@ -53,7 +56,7 @@ def load(folder: Path) -> tuple[Scene, Saved]:
             files = Files(known=json.loads(str(data["files"])).items())
             scene = parse(str(data["scene"]), str(file), files)
             joints = [f"{part}-{i}" for part in PARTS for i in range(len(scene.laws))]
-            return scene, {name: data[name] for name in (*STATE, "velocity", *joints)}
+            return scene, {name: data[name] for name in (*STATE, *PLACES, "touch", *joints)}
     except (OSError, EOFError, LookupError, ValueError, AttributeError, BadZipFile) as error:
         raise ValueError(f"{file} is damaged ({error}): run the scene again") from None
     raise ValueError(

@@ -5,12 +5,12 @@ placed with joints that neither slide nor open, which always has an answer. Bloc
 connects, such as two slopes side by side, find their answers apart.
 """
 
-from functools import partial
-
 import numpy as np
 from scipy.sparse import bmat, csr_array, diags
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
+
+from jointlaw.support.progress import track
 
 from ..contact import Joints, Tracker
 from ..scene import Scene
@@ -20,6 +20,8 @@ from .timestep import rates
 ATTEMPTS = 40  # most rounds of the initial equilibrium
 SETTLED = 1e-10  # movement of a round, as a share of the first, that ends them
 TIGHT = 1e-11  # residual force as a share of the applied one
+PATIENCE = 20  # trials after which an island is given up whose residual is still above ...
+FALLEN = 0.999  # ... this share of what it was
 
 
 def seat(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> tuple[np.ndarray, bool]:
@@ -30,14 +32,14 @@ def seat(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> tupl
     """
     slid, free = np.zeros(joints.n), blocks.free.ravel()
     still = np.ones(int(free.sum()), bool)
-    all_balanced, first = True, 0.0
+    all_balanced, first, near = True, 0.0, blocks.near()
     for attempt in range(ATTEMPTS):  # each at the places just found: joints turn with the blocks
         tracker.follow(blocks.motion)
-        before = tracker.identities
-        if tracker.renew(blocks.motion, blocks.near):
-            known = dict(zip(before, slid.tolist(), strict=True))
-            joints.assign(tracker.identities)
-            slid = np.array([known.get(who, 0.0) for who in tracker.identities])
+        tracker.urgent[:] = True  # it is cheap here, and nothing is missed
+        before = tracker.renew(blocks.motion, near)
+        if before is not None:
+            joints.rearrange(before, tracker.law, tracker.keys)
+            slid = np.where(before >= 0, slid[before], 0.0)
         force = blocks.gravity + blocks.loads
         if attempt:
             force = force + _length_forces(scene, blocks, tracker, joints, slid)
@@ -45,9 +47,9 @@ def seat(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> tupl
         rows = rates(blocks, tracker.contacts)
         area = tracker.contacts.length * scene.thickness
         start = np.concatenate([tracker.contacts.closure, slid])
-        near = attempt > 0
-        moved, balanced = _equilibrium(joints, rows, start, area, force, still, near, not near)
-        if not near:
+        again = attempt > 0
+        moved, balanced = _equilibrium(joints, rows, start, area, force, still, again, not again)
+        if not again:
             all_balanced, first = bool(balanced.all()), np.abs(moved).max()
         else:  # what was found before is balanced but for the turning of the joints
             moved = np.where(balanced & still, moved, 0.0)
@@ -58,7 +60,7 @@ def seat(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> tupl
         still &= balanced
         if not still.any() or np.abs(moved).max() < SETTLED * first:
             break
-    tracker.renewed_at = blocks.motion[:3].copy()
+    tracker.renewed_at[:] = blocks.motion[:3]
     return slid, all_balanced
 
 
@@ -71,8 +73,9 @@ def displacements(scene: Scene, guess: np.ndarray | None = None) -> np.ndarray |
     """
     blocks, joints = Blocks(scene), Joints(scene)
     tracker = Tracker(scene, blocks.motion)
-    tracker.renew(blocks.motion, blocks.near)
-    joints.assign(tracker.identities)
+    before = tracker.renew(blocks.motion, blocks.near())
+    if before is not None:
+        joints.rearrange(before, tracker.law, tracker.keys)
     rows, area = rates(blocks, tracker.contacts), tracker.contacts.length * scene.thickness
     force = ((blocks.gravity + blocks.loads) * blocks.root).ravel()[blocks.free.ravel()]
     none, whole = np.zeros(len(force)), np.ones(len(force), bool)
@@ -88,10 +91,8 @@ def displacements(scene: Scene, guess: np.ndarray | None = None) -> np.ndarray |
 
 def _length_forces(scene, blocks, tracker, joints, slid) -> np.ndarray:
     """Forces (n, 3) of joints whose length changes as the blocks move, after their first step."""
-    before, none = joints.snapshot(), np.zeros(joints.n)
-    joints.update(tracker.contacts.closure, slid)
-    stored = joints.stored * scene.thickness
-    joints.restore(before, tracker.identities)
+    closed = np.stack([tracker.contacts.closure, slid], axis=1) - joints.delta
+    stored, none = joints.trial(closed)[2] * scene.thickness, np.zeros(joints.n)
     return tracker.contacts.assemble(blocks.motion, none, none, stored) * blocks.mobile
 
 
@@ -107,7 +108,7 @@ def _equilibrium(joints: Joints, rows: csr_array, start, area, force, settle, ne
     rows = diags(np.concatenate([-np.ones(k), np.ones(k)])) @ rows  # to (closure, shear)
     weight = np.concatenate([area, area])
 
-    def bonded(d, pull=0.0):
+    def unsliding(d, pull=0.0):
         c = np.maximum(np.abs(d[:k]), 1e-9)
         shear = joints.virgin("stiffness", "closure", c)
         stress, above, below = (
@@ -118,8 +119,8 @@ def _equilibrium(joints: Joints, rows: csr_array, start, area, force, settle, ne
         F = np.concatenate([stress * acts * np.sign(d[:k]), shear * d[k:]])
         return F, diags(np.concatenate([slope * acts, shear]))
 
-    def law(d):
-        F, C = joints.trial(np.stack([d[:k], d[k:]], axis=1))
+    def real(d):
+        F, C, _ = joints.trial(np.stack([d[:k], d[k:]], axis=1))
         blocks = [[diags(C[:, i, j]) for j in (0, 1)] for i in (0, 1)]
         return F.T.ravel(), csr_array(bmat(blocks))
 
@@ -128,19 +129,23 @@ def _equilibrium(joints: Joints, rows: csr_array, start, area, force, settle, ne
     idle, nothing = np.bincount(island, settle) == 0, np.zeros(len(force))
     guess = nothing
     if not near:
-        guess, _ = _newton(bonded, rows, start, weight, force, nothing, 300, island, idle)
-    best, balanced = _newton(law, rows, start, weight, force, guess, 100, island, idle)
+        guess, _ = _newton(unsliding, rows, start, weight, force, nothing, 300, island, idle)
+    best, balanced = _newton(real, rows, start, weight, force, guess, 100, island, idle)
     if glue and not balanced.all():
-        closed = partial(bonded, pull=1.0)
-        glued, _ = _newton(closed, rows, start, weight, force, nothing, 300, island, balanced)
-        best = np.where(balanced[island], best, glued)
+
+        def glued(d):
+            return unsliding(d, pull=1.0)
+
+        placed, _ = _newton(glued, rows, start, weight, force, nothing, 300, island, balanced, 1.0)
+        best = np.where(balanced[island], best, placed)
     return best, balanced[island]
 
 
-def _newton(law, rows, start, weight, force, y, most, island, idle):
+def _newton(law, rows, start, weight, force, y, most, island, idle, fallen=FALLEN):
     """Levenberg's damped Newton steps on the unbalanced force, each island with its damping.
 
-    island (free motions,): number of the group of connected blocks; idle: islands to leave alone.
+    island (free motions,): number of the group of connected blocks; idle: islands to leave alone;
+    fallen: share of its residual that is still too much for an island after PATIENCE trials.
     Returns y and whether each island found its balance.
     """
 
@@ -155,7 +160,11 @@ def _newton(law, rows, start, weight, force, y, most, island, idle):
     size, target = norm(r), TIGHT * norm(force)
     damp = None
     stuck = idle.copy()  # no damping makes a better step
-    for _ in range(most):
+    last, tried = np.full(len(size), np.inf), 0
+    for _ in track(range(most), f"equilibrium, {law.__name__} joints"):
+        if tried >= PATIENCE:
+            stuck |= size > fallen * last
+            last, tried = size, 0
         active = (size > target) & ~stuck
         if not active.any():
             break
@@ -165,8 +174,9 @@ def _newton(law, rows, start, weight, force, y, most, island, idle):
         waits = active.copy()
         step = np.zeros(len(y))
         for _ in range(40):
-            trial = spsolve((K + diags(damp[island])).tocsc(), r)
-            step = np.where(waits[island], trial, step)
+            tried += 1
+            found = spsolve((K + diags(damp[island])).tocsc(), r)
+            step = np.where(waits[island], found, step)
             r_new, C_new = unbalanced(y + step * active[island])
             waits = active & ~(norm(r_new) < size)
             if not waits.any():

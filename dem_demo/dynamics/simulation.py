@@ -5,20 +5,26 @@ from pathlib import Path
 
 import numpy as np
 
+from ..compiled import World
 from ..contact import Contacts, Joints, Tracker
 from ..errors import Refused
 from ..scene import Scene
 from . import saved_states
 from .blocks import Blocks
-from .energy import COLUMNS, Ledger
-from .forces import forces
-from .saved_states import STATE, Saved
+from .energy import DROPPED, Ledger
+from .saved_states import KEPT, PLACES, STATE, Saved
 from .seating import seat
-from .timestep import StepLimit, impact_limit
+from .timestep import SAFE, StepLimit, impact_limit
 
 NEAR = 0.4  # share of the step's limit below which no change of lever arms matters
 MATCH = 1e-6  # relative: lengths that are equal but for rounding
 LOOKS = 16  # steps between two looks at the drives
+FRACTIONS = {  # of the limit that a time step is, by what can happen
+    "blocks fall or have no equilibrium": 0.15,
+    "drives move blocks": 0.4,
+    "the blocks are in equilibrium": 0.7,
+}
+HALVINGS = 8  # of a time step that was chosen, until a run is refused
 
 
 class Simulation:
@@ -26,7 +32,9 @@ class Simulation:
 
     step: time step (s), instead of the scene's; saved: a state to go on from. blocks: where they
     are; tracker: their contacts; joints: the law; ledger: the energies; limit: of the time step dt
-    (s); balanced: were the blocks in equilibrium at the start?
+    (s), chosen for the reason `why`; balanced: were the blocks in equilibrium at the start? Where
+    neither `step` nor the scene sets the time step, it is halved when joints close too far for it,
+    or blocks become too fast.
     Raises ValueError for a step that is no finite number > 0 and for a state of another scene,
     Refused for a start that the method cannot carry.
     """
@@ -37,7 +45,9 @@ class Simulation:
         self.scene, self.blocks = scene, Blocks(scene)
         self.tracker, self.joints = Tracker(scene, self.blocks.motion), Joints(scene)
         self.limit, self.balanced, self.t0, self.n = StepLimit(), True, 0.0, 0
-        self.ledger = Ledger()
+        given = step or scene.run.step or scene.run.fraction
+        self.why, self.halvings = "", 0 if given else HALVINGS
+        self.ledger = Ledger(len(scene.blocks))
         if saved:
             self._unpack(saved, step)
         else:
@@ -54,14 +64,72 @@ class Simulation:
         return self.tracker.contacts
 
     def step(self) -> None:
-        """One time step. Raises Refused for a state that the method cannot carry."""
-        self.blocks.step(self.dt, self._advance)
+        """One time step. Raises Refused for a state that the method cannot carry.
+
+        1. The blocks move. Their contacts follow to where they are by now; new ones are looked for
+           if blocks have moved far.
+        2. Closure is the depth from the geometry, sliding the velocity times the step: the joints
+           say tractions.
+        3. Tractions, dashpots, weight and drives make forces, and these the next velocities; the
+           energies are booked.
+        4. Check the time step if a joint has stiffened; send back drives.
+        """
+        dt, world, drives = self.dt, self.world, self.blocks.drives
+        world.call("before", dt)
+        while world.fast >= 0:
+            if not self._halve():
+                self.blocks.refuse(world.fast, dt)
+            dt = self.dt
+            world.call("before", dt)
+        if world.moved or world.stale:
+            world = self._renew()
+        if world.deep >= 0:
+            pair = self.contacts.a[world.deep], self.contacts.b[world.deep]
+            self.tracker.refuse(pair, self.contacts.closure[world.deep])
+        self.joints.advance(self.scene.run.law_steps)
+        self.n += 1
+        drives.aim[:] = drives.velocity(self.time, dt)
+        world.call("after", dt)
+        if world.stiffer:
+            self.limit.look(self.scene, self.blocks, self.contacts, self.joints, dt)
+            while self.dt > SAFE * self.limit.now and self._halve():
+                pass
+            self.limit.require(self.dt)
+            world.bind(checked=self.limit.checked)
+        if self.n % LOOKS == 0:
+            drives.reverse(self.time, self.slid)
+
+    def _halve(self) -> bool:
+        """Go on with half the time step, if it may be halved once more."""
+        if not self.halvings:
+            return False
+        self.halvings -= 1
+        self._change_step(0.5 * self.dt)
+        return True
+
+    def _change_step(self, dt: float) -> None:
+        """Velocities are half a step ahead of the places: bring them to half of a step dt (s)."""
+        blocks, drives, now = self.blocks, self.blocks.drives, self.time
+        change = 0.5 * (dt - self.dt) * self.ledger.forces[0] / blocks.inertia
+        blocks.velocity += (change * blocks.free).T
+        blocks.velocity[drives.axes, drives.rows] = drives.velocity(now, dt)
+        self.t0, self.n, self.dt = now, 0, dt
+
+    def bind(self) -> None:
+        """Tell the compiled step where all arrays lie, after each change of the contacts."""
+        run, self.world = self.scene.run, self.contacts.world
+        self.world.thickness, self.world.parts = self.scene.thickness, run.law_steps
+        self.world.dashpot_normal, self.world.dashpot_shear = run.dashpot_normal, run.dashpot_shear
+        for part in (self.blocks, self.tracker, self.joints, self.ledger):
+            part.bind(self.world)
+        self.world.bind(checked=self.limit.checked)
 
     def _start(self, step: float | None) -> None:
         """From the drawing to step 0: equilibrium, a time step, velocities half a step on."""
         scene, blocks, tracker, joints = self.scene, self.blocks, self.tracker, self.joints
-        tracker.renew(blocks.motion, blocks.near)
-        joints.assign(tracker.identities)
+        before = tracker.renew(blocks.motion, blocks.near())
+        if before is not None:
+            joints.rearrange(before, tracker.law, tracker.keys)
         slid = np.zeros(joints.n)
         if scene.run.seat and joints.n:
             slid, self.balanced = seat(scene, blocks, tracker, joints)
@@ -72,70 +140,54 @@ class Simulation:
         self.limit.require(self.dt)
         velocity = blocks.drives.velocity(0.0, self.dt)
         blocks.motion[3:][blocks.drives.axes, blocks.drives.rows] = velocity
+        blocks.drives.aim[:] = velocity
         tracker.follow(blocks.motion)
-        force = forces(scene, blocks, self.contacts, joints, velocity, 0.5 * self.dt)
-        self.ledger.open(blocks, joints, force, self.dt, self.contacts.length * scene.thickness)
-        blocks.motion[3:] += (0.5 * self.dt * force[0] / blocks.inertia * blocks.free).T
-        blocks.place(blocks.motion, blocks.motion[3:])
+        self.ledger.area, self.ledger.lost = np.zeros((2, joints.n))
+        self.bind()
+        self.world.call("forces", 0.5 * self.dt)
+        self.ledger.open(blocks, joints, self.dt, self.contacts.length * scene.thickness)
+        kick = 0.5 * self.dt * self.ledger.forces[0] / blocks.inertia * blocks.free
+        blocks.motion[3:] += kick.T
+        blocks.velocity[:] = blocks.motion[3:]
 
     def _chosen_step(self) -> float:
+        """By the scene's fraction of the limit, or else by one for what can happen."""
         scene, limit = self.scene, self.limit.now
         if largest := scene.run.largest_stress:
-            curves = self.joints.curves.values()
+            curves = (held.curve for held in self.joints.held)
             stiffness = max(float(np.interp(largest, c["stress"], c["stiffness"])) for c in curves)
-            limit = min(limit, impact_limit(scene, self.blocks, stiffness))
+            limit = min(limit, impact_limit(scene, self.blocks, self.tracker.outlines, stiffness))
         if not np.isfinite(limit):
             raise Refused(
                 "nothing touches at the start, so no time step follows: set run.largest_stress "
                 "(Pa) to the normal stress expected in impacts, or run.step (s)"
             )
-        return scene.run.fraction * limit
+        if scene.run.fraction:
+            return scene.run.fraction * limit
+        falls = not (scene.run.seat and self.balanced) or self.blocks.velocity.any()
+        driven = any(len(drive.times) > 1 for drive in scene.drives)
+        self.why = [*FRACTIONS][0 if falls else 1 if driven else 2]
+        return FRACTIONS[self.why] * limit
 
-    def _advance(self) -> np.ndarray:
-        """Forces (n, 3) at the places just reached.
+    def _renew(self) -> World:
+        """Joints, ledger and limit where contacts went on, and where new ones are looked for.
 
-        1. Follow the contacts to where they are by now; look for new ones if blocks have moved far.
-        2. Closure is the depth from the geometry, sliding the velocity times the step: the joints
-           say tractions.
-        3. Tractions, dashpots, weight and drives make forces.
-        4. Check the time step if a joint has stiffened, send back drives, book the energies.
+        Returns the `World` of the contacts of now, ready for the law.
         """
-        scene, blocks, tracker, joints = self.scene, self.blocks, self.tracker, self.joints
-        dt = self.dt
-        blocks.require_slow(dt)
-        self._follow()
-        tracker.require_shallow()
-        joints.update(tracker.closure, self.contacts.sliding * dt, scene.run.law_steps)
-        self.n += 1
-        velocity = blocks.drives.velocity(self.time, dt)
-        force = forces(scene, blocks, self.contacts, joints, velocity, dt)
-        area = self.contacts.length * scene.thickness
-        if (joints.stiffness * area > self.limit.checked).any():
-            self.limit.look(scene, blocks, self.contacts, joints)
-            self.limit.require(dt)
-        self.ledger.book(blocks, joints, force, dt, area)
-        # Where a corner has opened another part of it touches next, with its whole depth.
-        tracker.offset = np.where(self.contacts.closure <= 0, 0.0, tracker.offset)
-        if self.n % LOOKS == 0:
-            blocks.drives.reverse(self.time, self.slid)
-        return force[0]
+        blocks, tracker, world = self.blocks, self.tracker, self.world
+        if world.moved:
+            self._transfer()
+        if world.stale:
+            if self.dt > NEAR * self.limit.now:  # lever arms have changed
+                self.limit.checked[:] = 0.0
+            before = tracker.renew(blocks.motion, blocks.near(), pressed=False)
+            if before is not None:
+                self._rearrange(before)
+        self.world.call("press", self.dt)
+        return self.world
 
-    def _follow(self) -> None:
-        """Bring the contacts to where the blocks are, with joints and ledger for them."""
-        tracker, blocks = self.tracker, self.blocks
-        before = tracker.follow(blocks.motion)
-        if before is not None:
-            self._transfer(before)
-        if not tracker.stale(blocks.motion):
-            return
-        if self.dt > NEAR * self.limit.now:  # lever arms have changed
-            self.limit.checked = np.zeros(self.joints.n)
-        known = tracker.identities
-        if tracker.renew(blocks.motion, blocks.near, pressed=False):
-            self._rearrange(known)
-
-    def _transfer(self, before: np.ndarray) -> None:
-        """Joints and ledger for the lengths of the contacts, `before` (k,) in m.
+    def _transfer(self) -> None:
+        """Joints and ledger for contacts whose corners went on to other edges.
 
         Lengths match wherever an edge that lies on another, or a corner that stands on an edge,
         goes on to the same. Else a joint that became shorter drops what it stored on the rest. One
@@ -143,35 +195,31 @@ class Simulation:
         holds what the shorter one held; the rest of the depth becomes its closure offset.
         """
         ledger, tracker, joints = self.ledger, self.tracker, self.joints
-        stored, thickness, length = joints.stored, self.scene.thickness, self.contacts.length
-        held, ratio = stored * before, length / np.maximum(before, 1e-300)
-        closure = tracker.closure
-        ledger.area, ledger.lost = ledger.area.copy(), ledger.lost.copy()
-        tracker.offset = tracker.offset.copy()
-        for i in np.flatnonzero((np.abs(ratio - 1) > MATCH) & (held > 0)).tolist():
-            kept = stored[i]
-            if ratio[i] > 1:
-                who = tracker.identities[i]
-                curve = joints.curve(who)
-                anew = np.interp(held[i] / length[i], curve["work"], curve["closure"])
-                anew = min(anew, closure[i])
-                tracker.offset[i] += closure[i] - anew
-                kept = np.interp(anew, curve["closure"], curve["work"])
-                joints.renew(who)
-                ledger.lost[i] = 0.0
-            ledger.value["dropped"] += max(float(held[i] - kept * length[i]), 0.0) * thickness
-            ledger.area[i] = length[i] * thickness
+        thickness, length, before = self.scene.thickness, self.contacts.length, self.contacts.was
+        held, ratio = joints.stored * before, length / np.maximum(before, 1e-300)
+        changed = np.flatnonzero((np.abs(ratio - 1) > MATCH) & (held > 0))
+        longer, kept = ratio[changed] > 1, joints.stored[changed]
+        ledger.area[changed] = length[changed] * thickness
+        if longer.any():
+            fresh, closure = changed[longer], tracker.closure[changed[longer]]
+            anew, kept[longer] = joints.renew(fresh, held[fresh] / length[fresh], closure)
+            tracker.offset[fresh] += closure - anew
+            ledger.lost[fresh] = 0.0
+        lost = np.maximum(held[changed] - kept * length[changed], 0.0)
+        ledger.energy[DROPPED] += lost.sum() * thickness
 
-    def _rearrange(self, known: list) -> None:
-        """Joints, ledger and limit for a new list of contacts; `known`: the old one."""
+    def _rearrange(self, before: np.ndarray) -> None:
+        """Joints, ledger and limit for a new list of contacts, which were at the rows `before`."""
         ledger, joints, limit = self.ledger, self.joints, self.limit
-        held = np.stack([ledger.area, ledger.area * joints.stored, limit.checked], axis=1)
-        gone, none = dict(zip(known, held.tolist(), strict=True)), [0.0, 0.0, 0.0]
-        joints.assign(self.tracker.identities, started=True)
-        kept = [gone.pop(who, none) for who in self.tracker.identities]
-        ledger.area, _, limit.checked = np.array(kept).reshape(-1, 3).T
-        ledger.value["dropped"] += sum(stored for _, stored, _ in gone.values())
-        ledger.lost = joints.lost
+        stored, old = ledger.area * joints.stored, before >= 0
+        stored[before[old]] = 0.0
+        ledger.energy[DROPPED] += stored.sum()
+        area, checked = np.zeros((2, len(before)))
+        area[old], checked[old] = ledger.area[before[old]], limit.checked[before[old]]
+        ledger.area, limit.checked = area, checked
+        joints.rearrange(before, self.tracker.law, self.tracker.keys, started=True)
+        ledger.lost = joints.lost.copy()
+        self.bind()
 
     def slid(self, moving: int, base: int) -> float:
         """Shear displacement (m) of the joints between two blocks, mean over their area."""
@@ -183,28 +231,25 @@ class Simulation:
 
     def state(self) -> Saved:
         """A copy of everything that the future depends on."""
-        arrays = {path: np.array(attrgetter(path)(self)) for path in STATE}
-        arrays["ledger.value"] = np.array([*self.ledger.value.values()])
-        arrays["velocity"] = self.blocks.read()[3:]  # that will carry the blocks on
+        arrays = {path: np.array(attrgetter(path)(self)) for path in (*STATE, *PLACES)}
         return arrays | self.joints.snapshot()
 
     def _unpack(self, saved: Saved, step: float | None) -> None:
-        a = {name: array.copy() for name, array in saved.items()}
         for path in STATE:
             holder, _, name = path.rpartition(".")
-            value = a[path] if a[path].ndim else a[path].item()
-            setattr(attrgetter(holder)(self) if holder else self, name, value)
-        self.ledger.value = dict(zip(COLUMNS, a["ledger.value"].tolist(), strict=True))
-        self.tracker.place(self.blocks.motion)
-        self.joints.restore(a, self.tracker.identities)
-        velocity = a["velocity"]
-        if step:  # velocities are half a step ahead of the places: of the new step
-            change = 0.5 * (step - self.dt) * self.ledger.forces[0] / self.blocks.inertia
-            velocity += (change * self.blocks.free).T
-            self.t0, self.n, self.dt = self.time, 0, step
-            self.limit.look(self.scene, self.blocks, self.contacts, self.joints)
+            of, value = attrgetter(holder)(self) if holder else self, saved[path]
+            if path in KEPT:
+                getattr(of, name)[:] = value
+            else:
+                setattr(of, name, value.copy() if value.ndim else value.item())
+        tracker, blocks = self.tracker, self.blocks
+        tracker.hold(saved["tracker.corner"], saved["tracker.edge"], blocks.motion)
+        self.joints.restore(saved, tracker.law, tracker.keys)
+        if step:
+            self._change_step(step)
+            self.limit.look(self.scene, blocks, self.contacts, self.joints)
             self.limit.require(step)
-        self.blocks.place(self.blocks.motion, velocity)
+        self.bind()
 
     def save(self, folder: Path, saved: Saved | None = None) -> None:
         """Write a state (default: now) and its scene to a folder; what else is there stays.

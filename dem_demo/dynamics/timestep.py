@@ -1,5 +1,8 @@
 """Largest stable time step: the eigenvalues of the scene's assembled stiffness and dashpots.
 
+Each block alone gives a bound, which is cheap: the eigenvalues of the whole are worked out only
+where the bound does not do, or falls.
+
 Symplectic Euler with dashpots that lag by half a step is stable while the largest eigenvalue of
 dt^2 K + 2 dt C against the mass matrix stays below 4. For one oscillator that is
 dt < (2/omega)(sqrt(1 + zeta^2) - zeta). Rocking is in K because every contact is, at its place.
@@ -12,7 +15,7 @@ from scipy.linalg import eigh
 from scipy.sparse import csc_array, csr_array, diags
 from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
-from ..contact import Contacts, Joints
+from ..contact import Contacts, Joints, Outlines
 from ..errors import Refused
 from ..scene import Scene
 from .blocks import Blocks
@@ -20,20 +23,25 @@ from .blocks import Blocks
 DENSE = 24  # degrees of freedom up to which a dense eigenproblem is the faster one
 HEADROOM = 1.25  # most growth of a joint's stiffness between two checks of the time step
 SAFE = 0.98  # largest time step as a share of the limit
+FALLEN = 0.95  # share of the lowest bound below which the limit is worked out anew
 
 
 class StepLimit:
-    """Largest stable step (s): now, when last looked at, and the least so far.
+    """Largest stable step (s): now, a lower bound of it; bound, the lowest one so far at which the
+    limit was worked out; least, the lowest limit worked out.
 
     checked (k,): stiffness times area (N/m) of the contacts up to which the time step is good.
     """
 
     def __init__(self) -> None:
-        self.now = self.least = np.inf
+        self.now = self.least = self.bound = np.inf
         self.checked = np.zeros(0)
 
-    def look(self, scene: Scene, blocks: Blocks, contacts: Contacts, joints: Joints) -> None:
-        """Find the limit of a moment from stiffness, dashpots and lever arms."""
+    def look(
+        self, scene: Scene, blocks: Blocks, contacts: Contacts, joints: Joints, dt: float = np.inf
+    ) -> None:
+        """Find the limit of a moment from stiffness, dashpots and lever arms, or a bound of it that
+        is good enough for a step dt (s)."""
         at_closure = joints.virgin("stiffness", "closure", contacts.closure)
         stiffness = np.maximum(joints.stiffness, at_closure)
         # Joints that barely touch count as touching well, or each touch would ask again.
@@ -41,9 +49,15 @@ class StepLimit:
         stiffness = np.maximum(stiffness, 0.2 * stiffness.max(initial=0.0))
         stiffness = stiffness * np.maximum(area, 0.02 * area.max(initial=0.0))
         run, critical = scene.run, blocks.damping(contacts, stiffness)
+        share = max(run.dashpot_normal, run.dashpot_shear)
+        self.checked = stiffness
+        self.now = bound_of_blocks(blocks, contacts, stiffness, share * critical)
+        if dt <= SAFE * self.now and self.now > FALLEN * self.bound:
+            return
+        self.bound = min(self.bound, self.now)
         dashpots = np.concatenate([run.dashpot_normal * critical, run.dashpot_shear * critical])
         self.now = largest_step(rates(blocks, contacts), np.tile(stiffness, 2), dashpots)
-        self.least, self.checked = min(self.least, self.now), stiffness
+        self.least = min(self.least, self.now)
 
     def require(self, dt: float) -> None:
         """Refuse a time step (s) beyond the limit; else note how far joints may stiffen.
@@ -57,6 +71,40 @@ class StepLimit:
                 "set run.largest_stress (Pa)"
             )
         self.checked = min(HEADROOM, (SAFE * self.now / dt) ** 2) * self.checked
+
+
+def _largest(sums: np.ndarray, root: np.ndarray) -> float:
+    """Largest eigenvalue of any block (n,) alone, on springs that hold it in all directions.
+
+    sums (4, n): of stiffness, and of it times x, y and x^2 + y^2 from the centroid; root (n, 3):
+    1/sqrt(inertia) of the free motions, else 0.
+    """
+    k, kx, ky, turning = sums
+    none = np.zeros_like(k)
+    K = np.array([[k, none, -ky], [none, k, kx], [-ky, kx, turning]]).transpose(2, 0, 1)
+    return float(np.linalg.eigvalsh(K * root[:, :, None] * root[:, None, :]).max(initial=0.0))
+
+
+def bound_of_blocks(blocks: Blocks, contacts: Contacts, stiffness, dashpot) -> float:
+    """Lower bound (s) of the largest stable step for springs (k,) in N/m and dashpots (k,) in N s/m
+    that act alike along normal and tangent; inf without springs.
+
+    A spring between two blocks that give way stores at most twice what each alone would store in
+    it, so the largest eigenvalue is at most that of the worst block on springs twice as stiff.
+    """
+    free, n = blocks.free.any(axis=1), len(blocks.free)
+    both = 1.0 + (free[contacts.a] & free[contacts.b])
+    tops = []
+    for each in (both * stiffness, both * dashpot):
+        sums = np.zeros((4, n))
+        for block in (contacts.a, contacts.b):
+            arm = contacts.at - (blocks.motion[0] + 1j * blocks.motion[1])[block]
+            x, y = arm.real, arm.imag
+            parts = each, each * x, each * y, each * (x * x + y * y)
+            sums += [np.bincount(block, part, n) for part in parts]
+        tops.append(_largest(sums, blocks.root))
+    k, c = tops
+    return 4 / (c + np.sqrt(c * c + 4 * k)) if k else np.inf
 
 
 def rates(blocks: Blocks, contacts: Contacts) -> csr_array:
@@ -109,24 +157,16 @@ def _top(matrix: csc_array) -> np.ndarray:
     return eigh(matrix.toarray(), subset_by_index=[size - 1] * 2)[1][:, 0]
 
 
-def impact_limit(scene: Scene, blocks: Blocks, stiffness: float) -> float:
+def impact_limit(scene: Scene, blocks: Blocks, outlines: Outlines, stiffness: float) -> float:
     """Step limit (s) with every block touched along its whole outline at `stiffness` (Pa/m).
 
-    Half of every edge acts at either end, or half a corner length if that is more.
-    Proven for any contacts between them: a joint's energy is at most twice what its two blocks
-    would store in it alone, so the largest eigenvalue is at most twice that of the worst block.
+    Half of every edge acts at either end, or half a corner length if that is more. Twice as stiff,
+    as in `bound_of_blocks`, for any contacts between them.
     """
-    top = 0.0
-    for block, mass, moves in zip(scene.blocks, blocks.inertia, blocks.free, strict=True):
-        if not moves.any():
-            continue
-        p, q = block.local, np.roll(block.local, -1, axis=0)
-        length = np.maximum(np.hypot(*(q - p).T), scene.run.corner_length)
-        half = np.tile(0.5 * length * scene.thickness * stiffness, 2)
-        x, y = np.concatenate([p, q]).T
-        k, kx, ky, turning = half.sum(), half @ x, half @ y, half @ (x * x + y * y)
-        K = np.array([[k, 0.0, -ky], [0.0, k, kx], [-ky, kx, turning]])
-        root = 1 / np.sqrt(mass[moves])
-        largest = np.linalg.eigvalsh(K[np.ix_(moves, moves)] * np.outer(root, root))[-1]
-        top = max(top, 2 * float(largest))
-    return 2 / np.sqrt(top)
+    o, sums = outlines, np.zeros((4, len(blocks.free)))
+    each = stiffness * scene.thickness * np.maximum(o.side, o.corner_length)  # twice a half
+    for corner in (np.arange(len(o.block)), o.after):
+        x, y = o.local[corner].real, o.local[corner].imag
+        parts = each, each * x, each * y, each * (x * x + y * y)
+        sums += [np.bincount(o.block, part, sums.shape[1]) for part in parts]
+    return 2 / np.sqrt(_largest(sums, blocks.root))

@@ -21,11 +21,11 @@ class Record:
     joints[f]: by name, "who" (k, 5) block, edge, block, edge, contact; "ends" (k, 2, 2) the segment
     of joint that a contact carries; and numbers (k,) with their unit in the name. monitored[f]:
     what the scene's [watch] asks for; slips: of its joints; laws: of the watched joints; state:
-    that of the last frame, to return to.
+    that of the last frame, to return to; steps: of the run.
     """
 
     def __init__(self, sim: Simulation) -> None:
-        self.scene, self.slips = sim.scene, watched_slips(sim)
+        self.scene, self.slips, self.steps = sim.scene, watched_slips(sim), 0
         watched = (*sim.scene.slip, *sim.scene.shear)
         self.laws = {pair: law_between(sim, *pair) for pair in watched}
         self.times: list[float] = []

@@ -42,7 +42,7 @@ def run(
     if folder:
         require_text(sim.scene)
         folder.mkdir(parents=True, exist_ok=True)
-    started, first_step, record = time.perf_counter(), sim.n, Record(sim)
+    started, record = time.perf_counter(), Record(sim)
     stopped: BaseException | None = None
     try:
         play(sim, record, until)
@@ -52,7 +52,7 @@ def run(
         "version": VERSION,
         "scene": sim.scene.title,
         "model_time_s": record.times[-1],
-        "steps": int(record.state["n"]) - first_step,
+        "steps": record.steps,
         "time_step_s": sim.dt,
         "step_limit_s": sim.limit.least,
         "time_step_margin": sim.limit.least / sim.dt,
@@ -88,16 +88,27 @@ def play(
     stop: Callable[[Record], bool] = lambda record: False,
 ) -> None:
     """Step to `until` (s), or to where `stop` says so, and record on the way. Raises Refused."""
-    steps = steps_to(sim, until)
-    every = max(round(min(sim.scene.run.record / sim.dt, steps + 1)), 1)
-    for i in tqdm(range(1, steps + 1), desc=sim.scene.title, disable=not sys.stderr.isatty()):
-        sim.step()
-        if i % LOOKS == 0:
-            look(record.slips, sim)
-        if i % every == 0 or i == steps:
-            record.take(sim)
-            if stop(record):
-                break
+    end, left, taken, dt = _end(sim, until), steps_to(sim, until), 0, 0.0
+    with tqdm(total=left, desc=sim.scene.title, disable=not sys.stderr.isatty()) as bar:
+        while left:
+            if sim.dt != dt:  # at the start, and where the time step was halved
+                dt, done, left = sim.dt, 0, round((end - sim.time) / sim.dt)
+                every = max(round(min(sim.scene.run.record / dt, left + 1)), 1)
+                bar.reset(left)
+            sim.step()
+            taken, done, left = taken + 1, done + 1, left - 1
+            bar.update()
+            if done % LOOKS == 0:
+                look(record.slips, sim)
+            if done % every == 0 or left == 0:
+                record.take(sim)
+                record.steps = taken
+                if stop(record):
+                    break
+
+
+def _end(sim: Simulation, until: float | None) -> float:
+    return max(sim.scene.run.end, sim.time) if until is None else until
 
 
 def steps_to(sim: Simulation, until: float | None = None) -> int:
@@ -105,8 +116,7 @@ def steps_to(sim: Simulation, until: float | None = None) -> int:
 
     Raises ValueError for a time given that is past, not finite, or out of reach.
     """
-    now, dt = sim.time, sim.dt
-    end = max(sim.scene.run.end, now) if until is None else until
+    now, dt, end = sim.time, sim.dt, _end(sim, until)
     steps = (end - now) / dt
     if not -0.5 <= steps <= MOST_STEPS:
         raise ValueError(f"until = {end:g} s: {steps:.3g} steps of {dt:.3g} s from {now:.6g} s; "

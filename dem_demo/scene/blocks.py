@@ -50,6 +50,11 @@ class Block:
         """Corners (m) measured from the centroid."""
         return self.corners - self.centroid
 
+    @cached_property
+    def width(self) -> float:
+        """Smallest width (m)."""
+        return smallest_width(self.corners)
+
     @property
     def reach(self) -> float:
         """Distance (m) from the centroid to the farthest corner."""
@@ -65,15 +70,25 @@ def usual_size(blocks: Iterable[Block]) -> float:
     return float(np.sqrt(np.median([block.section.area for block in blocks])))
 
 
+def usual_width(blocks: Iterable[Block]) -> float:
+    """Median width (m) of the blocks that move."""
+    return float(np.median([block.width for block in blocks if block.moves]))
+
+
 def box(width: float, height: float, at=(0.0, 0.0), angle: float = 0.0) -> np.ndarray:
     """Corners of a box centred at `at`, turned by `angle` (degrees)."""
     half = 0.5 * np.array([[-width, -height], [width, -height], [width, height], [-width, height]])
     return half @ turn(np.radians(angle)).T + np.asarray(at, float)
 
 
+def next_of(corners: np.ndarray, step: int = 1) -> np.ndarray:
+    """For each of the rows its next one around, or with step -1 the one before."""
+    return np.concatenate([corners[step:], corners[:step]])
+
+
 def smallest_width(corners: np.ndarray) -> float:
     """Smallest width (m) over the directions of the edges between corners (m, 2)."""
-    edge = np.roll(corners, -1, axis=0) - corners
+    edge = next_of(corners) - corners
     edge = edge[np.hypot(*edge.T) > 0]
     normal = np.stack([-edge[:, 1], edge[:, 0]]) / np.hypot(*edge.T)
     return float(np.ptp(corners @ normal, axis=0).min())
@@ -87,7 +102,7 @@ def turn(angle: float) -> np.ndarray:
 
 def check_convex(corners: np.ndarray) -> str | None:
     """What is wrong with corners (m, 2), three or more; None if nothing is."""
-    edge = np.roll(corners, -1, axis=0) - corners
+    edge = next_of(corners) - corners
     length = np.hypot(*edge.T)
     if length.min() < 1e-6 * length.max():
         return "has two corners (almost) at the same place"

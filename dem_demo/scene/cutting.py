@@ -10,10 +10,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from shapely import LineString, Polygon, get_parts
+from shapely import LineString, Polygon, STRtree, get_exterior_ring, get_parts
 from shapely.ops import split
 
-from .blocks import smallest_width
+from jointlaw.support.progress import track
+
+from .blocks import next_of, smallest_width
+
+Line = tuple[int, np.ndarray, float]  # a joint: number of its set, normal, distance n . x in m
 
 EXACT = 1e-7  # share of the rock's size below which a distance is zero
 
@@ -75,29 +79,40 @@ def cut(
         before, rock = rock.area, rock.difference(Polygon(hole))
         if rock.is_empty or not rock.area < before:
             raise ValueError(f"hole[{i}] must take a part of the rock away and leave another")
-    pieces, lines = list(get_parts(rock)), []
+    lines: list[Line] = []
+    pieces = [(piece, _rim(piece)) for piece in get_parts(rock)]
     for number, joints in enumerate(sets):
         rng = np.random.default_rng([seed, number])
-        for offset in joints.offsets(outline, rng):
+        offsets = joints.offsets(outline, rng)
+        for offset in track(offsets, f"cutting, set {number + 1}", len(offsets)):
             lines.append((number, joints.normal, offset))
-            pieces = [
-                part
-                for piece in pieces
-                for part in _crossed(piece, joints.normal, offset, tiny, joints.persistence, rng)
-            ]
-    pieces = [part for piece in pieces for part in _convex_parts(piece, sets, lines, tiny)]
+            pieces = _crossed(pieces, joints.normal, offset, tiny, joints.persistence, rng)
+    pieces = [part for piece, _ in pieces for part in _convex_parts(piece, sets, lines, tiny)]
     pieces, joined, dropped = _without_slivers(pieces, lines, least_width, tiny)
     shapes = [_corners(piece, tiny) for piece in pieces]
     shapes.sort(key=lambda c: tuple(np.round(c.mean(axis=0)[::-1], 6)))
     return shapes, [_sets_of(c, lines, tiny) for c in shapes], joined, dropped
 
 
-def _crossed(piece, normal, offset, tiny, persistence, rng) -> list[Polygon]:
-    """The parts of a piece on both sides of a joint, if there is one here."""
-    away = np.array(piece.exterior.coords) @ normal - offset
-    if away.max() < tiny or away.min() > -tiny or rng.random() >= persistence:
-        return [piece]
-    return _split(piece, normal, offset)
+def _rim(piece: Polygon) -> np.ndarray:
+    """Coordinates (m, 2) of the outer ring, the first one again at the end."""
+    return np.array(piece.exterior.coords)
+
+
+def _crossed(pieces, normal, offset, tiny, persistence, rng):
+    """Pieces with their rims: in place of each that the joint crosses its parts on both sides."""
+    away = np.concatenate([rim for _, rim in pieces]) @ normal - offset
+    ends = np.cumsum([len(rim) for _, rim in pieces])
+    first = np.concatenate([[0], ends[:-1]])
+    met = np.maximum.reduceat(away, first) >= tiny
+    met &= np.minimum.reduceat(away, first) <= -tiny
+    out = []
+    for pair, meets in zip(pieces, met.tolist(), strict=True):
+        if meets and rng.random() < persistence:
+            out += [(part, _rim(part)) for part in _split(pair[0], normal, offset)]
+        else:
+            out.append(pair)
+    return out
 
 
 def _split(piece: Polygon, normal: np.ndarray, offset: float) -> list[Polygon]:
@@ -108,7 +123,7 @@ def _split(piece: Polygon, normal: np.ndarray, offset: float) -> list[Polygon]:
 
 
 def _convex_parts(piece: Polygon, sets, lines, tiny) -> list[Polygon]:
-    if smallest_width(np.array(piece.exterior.coords)) < tiny:
+    if smallest_width(_rim(piece)) < tiny:
         return []
     corners = _corners(piece, tiny)
     inward = [*corners[_bends(corners) < 0]]
@@ -127,15 +142,14 @@ def _convex_parts(piece: Polygon, sets, lines, tiny) -> list[Polygon]:
 def _without_slivers(pieces: list[Polygon], lines, least: float, tiny: float):
     """Join or drop what is narrower than `least`, the narrowest first."""
     pieces, joined, dropped = list(pieces), 0, []
-    while pieces:
-        widths = [smallest_width(np.array(piece.exterior.coords)) for piece in pieces]
-        if min(widths) >= least:
-            break
-        sliver = pieces.pop(int(np.argmin(widths)))
+    widths = [smallest_width(_rim(piece)) for piece in pieces]
+    while pieces and min(widths) < least:
+        number = int(np.argmin(widths))
+        sliver, _ = pieces.pop(number), widths.pop(number)
         for j in _neighbours(sliver, pieces, lines, tiny):
             whole = sliver.union(pieces[j]).convex_hull
             if whole.area - sliver.area - pieces[j].area < tiny * whole.length:
-                pieces[j] = whole
+                pieces[j], widths[j] = whole, smallest_width(_rim(whole))
                 joined += 1
                 break
         else:
@@ -146,20 +160,23 @@ def _without_slivers(pieces: list[Polygon], lines, least: float, tiny: float):
 def _neighbours(sliver: Polygon, pieces: list[Polygon], lines, tiny: float) -> list[int]:
     """Those across a joint of the last set first, then those that share most boundary."""
     corners, found = _corners(sliver, tiny), []
-    sides = zip(corners, np.roll(corners, -1, axis=0), _sets_of(corners, lines, tiny), strict=True)
+    rings = get_exterior_ring(pieces)
+    near = STRtree(rings)
+    sides = zip(corners, next_of(corners), _sets_of(corners, lines, tiny), strict=True)
     for start, end, number in sides:
         side = LineString([start, end]).buffer(tiny)
-        shared = [side.intersection(piece.exterior).length for piece in pieces]
-        found += [(int(number), part, j) for j, part in enumerate(shared) if part > 10 * tiny]
+        for j in near.query(side).tolist():
+            shared = side.intersection(rings[j]).length
+            found += [(int(number), shared, j)] * (shared > 10 * tiny)
     return [j for *_, j in sorted(found, reverse=True)]
 
 
 def _corners(piece: Polygon, tiny: float) -> np.ndarray:
     """Corners counter-clockwise, without those that bend nothing."""
-    corners = np.array(piece.exterior.coords)[:-1]
+    corners = _rim(piece)[:-1]
     if not piece.exterior.is_ccw:
         corners = corners[::-1]
-    corners = corners[np.hypot(*(corners - np.roll(corners, 1, axis=0)).T) > tiny]
+    corners = corners[np.hypot(*(corners - next_of(corners, -1)).T) > tiny]
     while (flat := np.abs(_bends(corners)) < tiny).any():
         corners = np.delete(corners, flat.argmax(), axis=0)
     return corners
@@ -167,15 +184,16 @@ def _corners(piece: Polygon, tiny: float) -> np.ndarray:
 
 def _bends(corners: np.ndarray) -> np.ndarray:
     """How far (m) each corner stands out from the line of its neighbours; negative inwards."""
-    before, after = np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0)
+    before, after = next_of(corners, -1), next_of(corners)
     chord, arm = after - before, corners - before
     return (arm[:, 1] * -chord[:, 0] + arm[:, 0] * chord[:, 1]) / np.hypot(*chord.T)
 
 
 def _sets_of(corners: np.ndarray, lines, tiny: float) -> np.ndarray:
     """Number of the set on whose joint each edge (corner, next corner) lies, or -1."""
-    out = np.full(len(corners), -1)
-    for number, normal, offset in reversed(lines):
-        on = np.abs(corners @ normal - offset) < 10 * tiny
-        out[on & np.roll(on, -1)] = number
-    return out
+    if not lines:
+        return np.full(len(corners), -1)
+    numbers, normals, offsets = (np.array(part) for part in zip(*lines, strict=True))
+    on = np.abs(corners @ normals.T - offsets) < 10 * tiny
+    on &= next_of(on)
+    return np.where(on.any(axis=1), numbers[on.argmax(axis=1)], -1)  # the first that cut there

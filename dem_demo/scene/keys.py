@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 from shapely import Polygon
 
-from jointlaw.parameters.bond import Bond
-from jointlaw.parameters.keys import Removed, checked, keys_of
 from jointlaw.support.checks import at_least, finite, integer, more_than, number, one_of
 
 Tables = dict[str, Any]
@@ -61,16 +59,6 @@ def some_of(name: str, value: Any, names: Iterable[str], count: int | None = Non
     return value
 
 
-def bond(name: str, value: Any) -> Bond:
-    """A rule: the table of a bond."""
-    values = checked(value, keys_of(Bond), name)
-    try:
-        return Bond(**values)
-    except ValueError as error:
-        raise ValueError(f"{name.removesuffix('bond')}{error}") from None
-
-
-ENDS = Removed("joints carry at their two ends; cut a long block in two instead", None)
 AXES = {"x": 0, "y": 1, "turn": 2}
 TEXT, LIST, TABLE = a(str), a(list), a(dict)
 POSITIVE, NOT_NEGATIVE = partial(more_than, bound=0), partial(at_least, bound=0)
@@ -104,17 +92,13 @@ RUN = {
     "seat": a(bool), "record": POSITIVE, "dashpot_normal": NOT_NEGATIVE,
     "dashpot_shear": NOT_NEGATIVE, "law_steps": partial(integer, bound=1),
     "largest_stress": NOT_NEGATIVE, "skin": POSITIVE, "corner_length": POSITIVE,
-    "max_overlap": POSITIVE, "point_spacing": ENDS,
+    "max_overlap": POSITIVE,
 }  # fmt: skip
 SCENE = {
     "title": TEXT, "gravity": vector, "density": DENSITY, "thickness": POSITIVE, "law": TEXT,
     "laws!": TABLE, "block": [BLOCK], "rock": [ROCK], "drive": [DRIVE], "run!": RUN,
     "joint": [{"between": LIST, "around": vector, "law!": TEXT}],
     "watch": {"slip": LIST, "shear": LIST, "pins": LIST, "joints": LIST},
-}  # fmt: skip
-COULOMB = {
-    "kind!": TEXT, "normal_stiffness!": POSITIVE, "shear_stiffness!": POSITIVE,
-    "friction!": partial(at_least, bound=0, infinite=True), "bond": bond,
 }  # fmt: skip
 
 

@@ -11,17 +11,19 @@ from shapely import Point, Polygon
 from jointlaw.parameters import keys
 from jointlaw.support.checks import one_of, remedy
 
-from .blocks import Block, box, check_convex, smallest_width
+from .blocks import Block, box, check_convex, usual_width
 from .cutting import JointSet, cut
 from .drives import read_drives
 from .keys import LIST, SCENE, TABLE, Tables, overlay, some_of, vector
-from .laws import Files, build_law
+from .laws import Files, build_law, opens_to
 from .scene import Rock, Run, Scene
 
 SCENES = Path(__file__).parent / "scenes"
 TEMPLATE = Path(__file__).parent / "template.toml"
 GRAVITY, DENSITY = (0.0, -9.81), 2600.0  # m/s2, kg/m3
-SKIN, CORNER = 0.02, 0.1  # of the least width of a block
+CORNER, SOFT = 0.1, 0.005  # of the least width of a block
+SOFT_SKIN = 0.25  # of a skin that is given
+SLIVER = 1 / 3  # of the usual width: narrower blocks do not count
 LEAST = 0.2  # narrowest block of a rock as a share of the smallest spacing
 
 
@@ -100,17 +102,11 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
         raise ValueError(f"{where}: no block can move; give [[block]] or [[rock]], not all fixed")
     drives = read_drives(top.get("drive", ()), number, blocks, files, where)
     pairs = _pairs(top.get("joint", ()), number, blocks, where)
-    least = min(smallest_width(block.corners) for block in blocks)
-    run = Run(**{"skin": SKIN * least, "corner_length": CORNER * least, **top["run"]})
-    for name, law in laws.items():
-        opening = 0.0 if law.bond is None else 1.0 / law.bond.limits[1][0]
-        if opening > run.skin:
-            raise ValueError(
-                f"{where}: laws.{name}.bond holds until the joint is {opening:.3g} m open, but "
-                f"contacts are followed to run.skin = {run.skin:.3g} m: set a larger run.skin, or "
-                "a smaller energy_I"
-            )
-    watched = _watched(top.get("watch", {}), number, blocks, run.skin, f"{where}: watch")
+    least, skin = min(block.width for block in blocks), top["run"].get("skin")
+    soft = SOFT_SKIN * skin if skin else SOFT * least
+    stands = CORNER * max(least, SLIVER * usual_width(blocks))
+    run = Run(**{"corner_length": stands, "soft": soft, **top["run"]})
+    watched = _watched(top.get("watch", {}), number, blocks, run.corner_length, f"{where}: watch")
     default = top.get("law", next(iter(laws), ""))
     for law in [default, *pairs.values(), *edge_laws.values()]:
         one_of(f"{where}: law", law, tuple(laws))
@@ -119,6 +115,14 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
         tuple(rocks), edge_laws, drives, top.get("gravity", GRAVITY), top.get("thickness", 1.0),
         **watched,
     )  # fmt: skip
+    for name, law in laws.items():
+        opening = opens_to(law)
+        if opening > scene.skins.min():
+            raise ValueError(
+                f"{where}: laws.{name} holds until the joint is {opening:.3g} m open, but "
+                f"contacts are followed to {scene.skins.min():.3g} m: set a larger run.skin, or "
+                "a smaller tension or energy_I"
+            )
     for name, value in (("files", files), ("text", text)):  # `replace` leaves both out
         object.__setattr__(scene, name, value)
     return scene
@@ -161,7 +165,7 @@ def _block_at(name: str, point: tuple[float, float], blocks: Sequence[Block]) ->
 
 
 def _watched(
-    table: Tables, number: dict[str, int], blocks: Sequence[Block], skin: float, where: str
+    table: Tables, number: dict[str, int], blocks: Sequence[Block], reach: float, where: str
 ) -> dict[str, tuple[Any, ...]]:
     watched: dict[str, tuple[Any, ...]] = {}
     for kind in ("slip", "shear"):
@@ -173,18 +177,18 @@ def _watched(
     points = [vector(f"{where}.pins", point) for point in table.get("pins", ())]
     pins = tuple((_block_at(f"{where}.pins", point, blocks), point) for point in points)
     points = [vector(f"{where}.joints", point) for point in table.get("joints", ())]
-    near = tuple(_joint_at(f"{where}.joints", point, blocks, skin) for point in points)
+    near = tuple(_joint_at(f"{where}.joints", point, blocks, reach) for point in points)
     return watched | {"pins": pins, "near": near}
 
 
 def _joint_at(
-    name: str, point: tuple[float, float], blocks: Sequence[Block], skin: float
+    name: str, point: tuple[float, float], blocks: Sequence[Block], reach: float
 ) -> tuple[int, int]:
     """The two blocks nearest to a point, in the order of the scene."""
     away = [Polygon(block.corners).distance(Point(point)) for block in blocks]
     two = sorted(np.argsort(away, kind="stable")[:2].tolist())
     shapes = [Polygon(blocks[i].corners) for i in two]
-    if len(two) < 2 or shapes[0].distance(shapes[1]) > skin or all(blocks[i].fixed for i in two):
+    if len(two) < 2 or shapes[0].distance(shapes[1]) > reach or all(blocks[i].fixed for i in two):
         raise ValueError(f"{name} = {list(point)}: must lie at a joint of a block that can move")
     return two[0], two[1]
 

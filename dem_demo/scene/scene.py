@@ -1,13 +1,17 @@
 """A scene in memory: blocks, laws, drives and how to run them."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
 
 import jointlaw as jl
 
-from .blocks import Block
+from .blocks import Block, usual_width
 from .drives import Drive
 from .laws import Files
 
+SKIN, THIN = 0.02, 0.1  # of the usual width of the blocks that move; at most of a block's own
 Key = tuple[int, int, int, int]  # of an interface: block, edge, block, edge
 
 
@@ -16,9 +20,10 @@ class Run:
     """How to run a scene; times in s, lengths in m."""
 
     end: float
-    skin: float  # reach of the search for contacts
     corner_length: float  # of joint at a corner on an edge
-    fraction: float = 0.3  # time step as a share of the limit
+    soft: float  # over which the end of one edge gives way to that of another
+    skin: float | None = None  # reach of the search for contacts; `Scene.skins` without it
+    fraction: float | None = None  # time step as a share of the limit; None: by what can happen
     step: float | None = None  # or the time step itself
     seat: bool = True  # start at the gravity closure
     record: float = 0.05  # time between records
@@ -26,7 +31,7 @@ class Run:
     dashpot_shear: float = 0.05
     law_steps: int = 1  # steps of the law per time step: 4 balances energy to 0.5 % in impacts
     largest_stress: float = 0.0  # Pa, expected in impacts: sets the step before anything touches
-    max_overlap: float = 0.03  # share of the smaller block's width
+    max_overlap: float = 0.1  # share of the smaller block's width
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +81,13 @@ class Scene:
     reduction: float = 1.0
     text: str = field(default="", init=False)  # `replace` leaves both out
     files: Files = field(default_factory=Files, init=False)
+
+    @cached_property
+    def skins(self) -> np.ndarray:
+        """Reach (m) of the search for contacts of each block: of a sliver less than of others."""
+        widths = np.array([block.width for block in self.blocks])
+        skin = np.minimum(SKIN * usual_width(self.blocks), THIN * widths)
+        return skin if self.run.skin is None else np.full(len(widths), self.run.skin)
 
     @property
     def base(self) -> int | None:

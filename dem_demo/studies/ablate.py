@@ -15,15 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from jointlaw.laboratory.experiments import PathError
-from jointlaw.parameters.resolution import named
+from jointlaw import JointLaw, PathError
 from jointlaw.support.files import clear_run
 
 from ..dynamics.simulation import Simulation
 from ..errors import Refused
 from ..output.record import Record, write_csv
 from ..output.run import run
-from ..scene import Scene, is_coulomb, overlay
+from ..scene import Scene, overlay
 
 COST = ("steps", "time_step_s", "cpu_s", "time_ratio", "note")
 TABLE = "ablation.csv"
@@ -82,24 +81,24 @@ def variants(scene: Scene, record: Record) -> Iterator[tuple[str, Callable[[], S
         for who, stress in zip(frame["who"].tolist(), stresses, strict=True):
             carried[scene.law_of(who)] += [stress] * (stress > 0)
     pressed = {name: np.median(of) for name, of in carried.items()
-               if of and not is_coulomb(scene.laws[name])}  # fmt: skip
+               if of and isinstance(scene.laws[name], JointLaw)}  # fmt: skip
     lacking: dict[str, dict[str, Any]] = {}
     for law in (scene.laws[name] for name in pressed):
-        names = named(law.mating_length, law.asperity.yield_interference, law.closure_range)
         given = INGREDIENTS | {
-            f"resolution {n}": {"resolution": asdict(names[n])} for n in ("fast", "fine")
+            f"resolution {name}": {"resolution": asdict(replace(law, resolution=name).resolution)}
+            for name in ("fast", "fine")
         }
         own = {"heights": SINGLE} | {k: v for k, v in asdict(law).items() if v is not None}
         lacking |= {name: keys for name, keys in given.items() if _differ(own, keys)}
     for name, keys in lacking.items():
         yield name, partial(_without, scene, keys, pressed)
     run, steps = scene.run, 1 if scene.run.law_steps > 1 else 4
-    key = "step" if run.step else "fraction"
+    dt = float(record.state["dt"])
     others = {
         "no dashpots": {"dashpot_normal": 0.0, "dashpot_shear": 0.0},
         f"law_steps = {steps}": {"law_steps": steps},
-        "half the time step": {key: 0.5 * getattr(run, key)},
-        "twice the time step": {key: 2.0 * getattr(run, key)},
+        "half the time step": {"step": 0.5 * dt},
+        "twice the time step": {"step": 2.0 * dt},
     }
     for name, keys in others.items():
         if (other := replace(run, **keys)) != run:

@@ -17,22 +17,19 @@ from ..output.record import Record, far
 from ..output.run import play
 from ..scene import Scene
 
-HALVINGS = 7  # time steps that are tried, each half of the one before
 WIDTH = 4.6  # inches: text of 9 points can be read on a telephone
 
 
 def failing(scene: Scene, until: float) -> Record:
     """A run to `until` (s), or until a block has moved by the usual size of a block.
 
-    Where joints have closed so far that the time step is too long, it goes on from the last record
-    with half of it. What is recorded by then is kept where that does not help.
+    Where joints close too far for the time step, that is halved. What is recorded by then is kept
+    where that does not help.
     """
-    sim = Simulation(replace(scene, run=replace(scene.run, step=None, seat=True)))
+    sim = Simulation(replace(scene, run=replace(scene.run, step=None, fraction=None, seat=True)))
     record = Record(sim)
-    for step in sim.dt * 0.5 ** np.arange(HALVINGS):
-        with suppress(Refused):
-            play(Simulation(scene, float(step), record.state), record, until, far)
-            break
+    with suppress(Refused):
+        play(sim, record, until, far)
     return record
 
 

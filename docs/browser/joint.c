@@ -3,7 +3,7 @@
 #define JOINTLAW_IMPLEMENTATION
 #define JOINTLAW_PLAIN
 #define JOINTLAW_NO_FILES
-#include "host.h"
+#include "jointlaw.h"
 
 #define OUT(name) __attribute__((export_name(#name)))
 
@@ -37,13 +37,13 @@ OUT(closure_at) double closure_at(double stress) { return jlaw_closure(&law, str
  * C (3, 3); 0, or -1 and a message. Other kinds would make the file larger. */
 OUT(update) int update(const double *s0, double *s1, const double *d, double *F, char *message)
 {
-  const numbers n = {s1, 1, 0};
+  const jl_numbers n = {s1, 1, 0};
   double way = 0.0; /* NaN stays in sums */
   for (int i = 0; i < 3; i++) way += fabs(s0[i]) + fabs(d[i]);
   if (!(law.stretch * way <= law.largest_reach))
     return jlaw_refuse_(&law, s0, d, 0, message, JLAW_MESSAGE);
-  memcpy(s1, s0, (size_t) state_rows(&law) * sizeof *s1);
-  step(&law, n, d, F, F + 3, kind_of(3, 0, 0, 0, 1, 1, 0));
+  memcpy(s1, s0, (size_t) jl_state_rows(&law) * sizeof *s1);
+  jl_step(&law, n, d, F, F + 3, jl_kind_of(3, 0, 0, 0, 1, 1, 0, 0));
   return 0;
 }
 
@@ -52,26 +52,26 @@ OUT(update) int update(const double *s0, double *s1, const double *d, double *F,
  * begins, and its shear force over its friction limit */
 OUT(look) void look(double *s, double *to)
 {
-  const numbers n = {s, 1, 0};
+  const jl_numbers n = {s, 1, 0};
   const int M = law.facets, D = law.cells;
   for (int at = 0; at < M; at++) {
-    const double *f = facet_of(&law, at), *cell = cell_of(&law, at);
+    const double *f = jl_facet_of(&law, at), *cell = jl_cell_of(&law, at);
     double held = 0.0, *row = to + at * (5 + 2 * D);
-    facets o;
-    facets_now(&law, n, at, &o);
-    const double force = o.y1 > o.z1 ? larger(o.f1 - o.fz1, 0.0) : 0.0;
-    for (int i = 0; i < 3; i++) row[i] = column(f, JLAW_N + i);
+    jl_facets o;
+    jl_facets_now(&law, n, at, &o);
+    const double force = o.y1 > o.z1 ? jl_larger(o.f1 - o.fz1, 0.0) : 0.0;
+    for (int i = 0; i < 3; i++) row[i] = jl_column(f, JLAW_N + i);
     for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_LANES) {
       double G, kappa;
-      const int of = slider_row(&law) + at * D + i;
-      hold_cell(cell, o.y1, o.f1, o.k1, o.z1, o.fz1, o.kz1, law.yields, &G, &kappa);
-      const double q = root(s[of] * s[of] + s[of + M * D] * s[of + M * D]);
+      const int of = jl_slider_row(&law) + at * D + i;
+      jl_hold_cell(cell, o.y1, o.f1, o.k1, o.z1, o.fz1, o.kz1, law.yields, &G, &kappa);
+      const double q = jl_root(s[of] * s[of] + s[of + M * D] * s[of + M * D]);
       const double limit = o.strength * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * o.f1);
       if (G > 0.0 && q >= limit) held += G;
-      row[5 + 2 * i] = column(f, JLAW_COSINE) * (column(cell, JLAW_LOW) - o.y1);
+      row[5 + 2 * i] = jl_column(f, JLAW_COSINE) * (jl_column(cell, JLAW_LOW) - o.y1);
       row[6 + 2 * i] = G > 0.0 ? (q >= limit ? 1.0 : q / (o.strength * G)) : 0.0;
     }
-    row[3] = column(f, JLAW_A) * force;
-    row[4] = force > 0.0 ? smaller(held / force, 1.0) : 0.0;
+    row[3] = jl_column(f, JLAW_A) * force;
+    row[4] = force > 0.0 ? jl_smaller(held / force, 1.0) : 0.0;
   }
 }

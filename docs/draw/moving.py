@@ -16,9 +16,10 @@ import numpy as np
 from PIL import Image
 
 import jointlaw as jl
+from jointlaw.kernels.asperities import at_limit, effective_closure, strength
 from jointlaw.kernels.cells import cells
 from jointlaw.kernels.mating import planes
-from jointlaw.kernels.reference import at_limit, effective_closure, parts, strength
+from jointlaw.kernels.reference import parts
 from jointlaw.support.pyplot import style
 
 STRESS = 10e6
@@ -51,7 +52,7 @@ class Moment(NamedTuple):
 
 def choose(law):
     """Faces for the picture: facets that look along the slip or against it, cells of all depths."""
-    k = law.tables
+    k = law.tables.asperities
     tilt = np.arctan2(k.n[1], k.n[0])
     along = np.flatnonzero(np.abs(k.n[2]) < 0.6 * np.abs(np.sin(tilt)) + 0.05)
     sides = [[i for i in along[np.argsort(sign * tilt[along])] if sign * tilt[i] > 0.05]
@@ -67,8 +68,8 @@ def choose(law):
 
 def states(joint, faces):
     """Colour of each face."""
-    k, state = joint.law.tables, joint.snapshot().values.T
-    now = parts(k, state)
+    k = joint.law.tables.asperities
+    now = parts(joint.law.tables, joint.snapshot().values.T)
     found = cells(k, effective_closure(k, now.delta, now.slopes))
     size = np.hypot(*now.q)
     limit = strength(k, planes(k, now.delta[1:], now.slopes).gamma)

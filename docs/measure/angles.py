@@ -1,12 +1,16 @@
 """Friction and dilation angle under slip far beyond the closure: how far a resolution misses them.
 
     python docs/measure/angles.py [--laws 30] [--seed 18]
+    python docs/measure/angles.py --sum
 
 Laws: all presets and random ones as in docs/measure/tolerance.py, but with a from 1.5 to 9, every
 third with c at its bound, none that jams (atan(mu) + 90 deg/a < 90 deg). Motion in one plane, at
 2 MPa and at half the normal stress of the closure range R, to three mating lengths (without one to
 30 R) and back. Misses count from 0.2 mating lengths (2 R) on, and on the way back from its first
 fifth (and 2 R) on.
+
+With --sum: how far the friction angle lies from that of the asperities plus the dilation angle, in
+degrees, at the peak and from one mating length on; the largest of all presets, at "fine".
 """
 
 import argparse
@@ -14,6 +18,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import tables
 from tolerance import random_law
 
 import jointlaw as jl
@@ -81,13 +86,40 @@ def table(found: np.ndarray) -> str:
     return "\n".join(lines)
 
 
+def sums() -> str:
+    """Markdown: rows by normal stress, columns by mating length over closure range."""
+    ratios, rows = RATIOS[:5], []
+    for stress in (1e5, 1e6, 5e6, 20e6):
+        apart = np.array([[excess(name, ratio, stress) for ratio in ratios]
+                          for name in jl.presets.names()]).max(axis=0)  # fmt: skip
+        for k, place in enumerate(("at the peak", "later")):
+            rows.append([f"{stress / 1e6:g} MPa, {place}", *(f"{x:.1f}" for x in apart[:, k])])
+    return tables.table(["normal stress", *(f"{ratio:g}" for ratio in ratios)], rows)
+
+
+def excess(name: str, ratio: float, stress: float) -> tuple[float, float]:
+    """Degrees between friction and that of asperities and dilation: at the peak, and later."""
+    law = replace(jl.presets.load(name), plane=0.0)
+    law = replace(law, mating_length=ratio * law.closure_range, resolution="fine")
+    places = np.geomspace(1e-3, 3.0, 300) * law.mating_length
+    test = jl.direct_shear(law.joint(), places, normal=stress, steps=1)
+    dilation = np.degrees(np.arctan(-np.gradient(test.closure, test.shear_2)))
+    apart = np.abs(test.friction_angle - math.degrees(math.atan(law.asperity.mu)) - dilation)
+    later = test.shear_2 >= law.mating_length
+    return apart[test.friction_angle.argmax()], apart[later][:-1].max()
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--laws", type=int, default=30, help="random ones, beside the presets")
     parser.add_argument("--seed", type=int, default=18)
+    parser.add_argument("--sum", action="store_true", help="friction as a sum of two angles")
     options = parser.parse_args()
+    if options.sum:
+        print(sums())
+        return
     laws = draw(options.laws, options.seed)
     print(table(np.array([misses(law) for law in track(laws, "laws", len(laws))])))
 

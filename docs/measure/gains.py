@@ -3,12 +3,13 @@
     python docs/measure/gains.py [--laws 60]
 
 No step gains by the work of the joint's own traction in the limit of small steps, nor does a closed
-cycle. Differential evolution looks for the opposite on random laws: for the step, and the triangle
-of eight steps a side, that gain most. Traction is integrated along each step by a Gauss rule. A
+cycle. Differential evolution looks for the opposite on random laws: for the step, the step there
+and back (four times, the mean of a round), and the triangle of eight steps a side, that gain most.
+Traction is integrated along each step by a Gauss rule. A
 gain is what is stored at the end, less the work and what was stored at the beginning, as a share of
 the largest energy stored on the way. Printed are the largest of all laws, by steps of at most so
-many mating lengths; of the triangle also in steps of a tenth, and there the largest error of the
-work if it is taken as the trapezoid of the tractions at the ends of steps.
+many mating lengths; of the cycles also in steps of a tenth, and of the triangle the largest error
+of the work if it is taken as the trapezoid of the tractions at the ends of steps.
 """
 
 import argparse
@@ -20,9 +21,12 @@ from tables import table
 import jointlaw as jl
 from jointlaw.joints.state import JointState
 
-HEAD = ["step (mating lengths)", "one step", "triangle", "in tenths", "trapezoid", "in tenths"]
-SIZES = 1.0, 0.1, 0.01
-SIDE = 8  # steps
+HEAD = ["step (mating lengths)", "one step", "there and back", "in tenths", "triangle", "in tenths",
+        "trapezoid", "in tenths"]  # fmt: skip
+SIZES = 1.0, 0.25, 0.1, 0.01
+SIDE, ROUNDS = 8, 4
+# corners that are free beside the first two, steps from one to the next, rounds
+STEP, BACK, TRIANGLE = (1, 1, 0), (1, 1, ROUNDS), (2, SIDE, 1)
 
 
 def rules(panels):
@@ -78,43 +82,47 @@ def gains(law, corners, steps, panels):
     return made / np.where(peak > 0, peak, np.inf)[:, None]
 
 
-def paths(law, x, size, closed):
-    """Corners (n, legs, dim) of candidates x (parameters, n): two, then a step or a triangle.
+def paths(law, x, size, kind):
+    """Corners (n, legs, dim) of candidates x (parameters, n): two, then a step or a cycle.
 
     The first parameter is the logarithm of how large either is.
     """
+    _, steps, rounds = kind
     places = x[1:].T.reshape(x.shape[1], -1, law.dim)
-    reach = (0.5 * SIDE if closed else 1.0) * size * law.mating_length * 10.0 ** (x[0] - 1.0)
+    reach = max(0.5 * steps, 1.0) * size * law.mating_length * 10.0 ** (x[0] - 1.0)
     shear = [1.0] * (law.dim - 1)
     begin = places[:, :2] * np.array([1.0, *(2.0 * law.mating_length * s for s in shear)])
     begin[..., 0] += 0.5  # most are in touch
     way = places[:, 2:] / np.maximum(1.0, np.linalg.norm(places[:, 2:], axis=2)[..., None])
     unit = np.stack([np.minimum(reach, 1.0), *(reach * s for s in shear)], axis=-1)
     way = begin[:, -1:] + way * unit[:, None]
-    return np.concatenate([begin, way, begin[:, -1:]] if closed else [begin, way], axis=1)
+    cycle = np.concatenate([way, begin[:, -1:]], axis=1)
+    return np.concatenate([begin, np.tile(cycle, (1, rounds, 1)) if rounds else way], axis=1)
 
 
-def search(law, size, closed, seed):
-    """Corners (1, legs, dim) of the step or triangle of the largest gain that was found."""
-    steps, panels = (SIDE, 2) if closed else (1, 32)
+def search(law, size, kind, seed):
+    """Corners (1, legs, dim) of the step or cycle of the largest gain that was found."""
+    free, steps, _ = kind
+    panels = 2 if kind == TRIANGLE else 32
 
     def loss(x):
-        return -gains(law, paths(law, x, size, closed), steps, panels)[:, 0]
+        return -gains(law, paths(law, x, size, kind), steps, panels)[:, 0]
 
     found = differential_evolution(
-        loss, [(-1.0, 1.0)] * (1 + (4 if closed else 3) * law.dim), maxiter=25, popsize=4,
+        loss, [(-1.0, 1.0)] * (1 + (2 + free) * law.dim), maxiter=25, popsize=4,
         polish=False, vectorized=True, updating="deferred", rng=np.random.default_rng(seed),
     )  # fmt: skip
-    return paths(law, found.x[:, None], size, closed)
+    return paths(law, found.x[:, None], size, kind)
 
 
 def largest(size, seed):
-    """The figures (5,) of one law: gains, and errors of the trapezoid."""
+    """The figures (7,) of one law: gains, and errors of the trapezoid."""
     law = random_law(np.random.default_rng(seed))
-    step, triangle = (search(law, size, closed, seed) for closed in (False, True))
+    step, back, triangle = (search(law, size, kind, seed) for kind in (STEP, BACK, TRIANGLE))
     (made,) = gains(law, step, 1, 2048)
+    there = [gains(law, back, steps, 256)[0, 0] / ROUNDS for steps in (1, 10)]
     whole, tenths = (gains(law, triangle, SIDE * more, 64)[0] for more in (1, 10))
-    return [made[0], whole[0], tenths[0], abs(np.diff(whole)[0]), abs(np.diff(tenths)[0])]
+    return [made[0], *there, whole[0], tenths[0], *(abs(x[0] - x[1]) for x in (whole, tenths))]
 
 
 def main():

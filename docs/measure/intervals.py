@@ -20,8 +20,8 @@ import numpy as np
 from tables import table
 
 import jointlaw as jl
+from jointlaw import ClosureCurve, ShearCurve
 from jointlaw.calibration.fit import Fit
-from jointlaw.calibration.measured import ClosureCurve, ShearCurve
 from jointlaw.support.progress import track
 
 HEAD = ["curves", "parameter", "interval contains the true value", "called identifiable"]

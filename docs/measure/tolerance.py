@@ -1,6 +1,6 @@
 """Does `law.at_tolerance(t)` keep its word? Random laws, on random paths that it has never seen.
 
-    python docs/measure/tolerance.py [--laws 100] [--seed 1] [--plane]
+    python docs/measure/tolerance.py [--laws 100] [--seed 1] [--plane | --small]
 
 Laws: a from 1 to 10 (evenly in log a), b and c over their bounds, mu 0.05 to 1, eta 0 to 0.7,
 heights of either formation or none, in a plane or in space, half of them with a mating length of 1
@@ -15,6 +15,10 @@ each resolution holds by itself. The truth is twice the reference resolution in 
 refuses does not), `paths` the share of paths that do, `worst` the largest error over the tolerance,
 `seconds` the longest call of `at_tolerance` in processor time (the first of a law makes its
 reference). a < 1.4 is reported apart.
+
+With --small: what paths of small loads ask. The same paths, but within shares of the closure range
+of all presets and of that many of the laws, in one plane; the largest error of all paths, in %, of
+"balanced", of `at_tolerance(0.01)`, and of it with the `stress` at 0.01 closure ranges and at one.
 """
 
 import argparse
@@ -44,13 +48,12 @@ PATHS, STEPS = 6, 160  # of each kind
 FARS, SLIPS = 3, 4  # paths that slip at a given closure, and at a given normal stress
 SMALL_A = 1.4
 HEAD = ["laws", "tolerance", "met", "paths", "worst", "sliders", "refused", "seconds"]
+REACHES = (1.0, 0.3, 0.1, 0.03, 0.01)  # closure ranges
 
 Draw = tuple[jl.JointLaw, list[dict[str, Any]]]
 
 
-def random_law(
-    rng: np.random.Generator, smallest: float = 1.0, largest: float = 10.0
-) -> jl.JointLaw:
+def random_law(rng: np.random.Generator) -> jl.JointLaw:
     """Any law within the bounds above; with "population" formation only where that is convex."""
     a = float(np.exp(rng.uniform(0.0, np.log(10.0))))
     b = rng.uniform(-1.0, 2.0)
@@ -180,6 +183,43 @@ def rows(draws: list[Draw]) -> list[list[Any]]:
     return found
 
 
+def small(law: jl.JointLaw) -> dict[str, list[float]]:
+    """Sliders, and largest errors in % on paths within each of REACHES, of three resolutions."""
+    R = law.closure_range
+    stress = law.normal_stress(np.array([REACHES[-1] * R, R])).tolist()
+    laws = {
+        "`balanced`": replace(law, resolution="balanced"),
+        "`at_tolerance(0.01)`": law.at_tolerance(0.01),
+        "`at_tolerance(0.01, stress=...)`": law.at_tolerance(0.01, stress),
+    }
+    found = {name: [float(made.tables.sliders)] for name, made in laws.items()}
+    for reach in REACHES:
+        near = replace(law, closure_range=reach * R)
+        d = random_paths(near, np.random.default_rng(0))
+        truth = tractions(replace(near, resolution=scaled(reference_resolution(near), 1.2)), d)
+        for name, made in laws.items():
+            found[name].append(100.0 * float(errors(tractions(made, d), truth).max()))
+    return found
+
+
+def small_rows(count: int, seed: int) -> list[list[Any]]:
+    """Median sliders and largest errors of all presets and that many random laws."""
+    laws = [jl.presets.load(name) for name in jl.presets.names()]
+    laws += [random_law(np.random.default_rng([seed, i])) for i in range(count)]
+    found = [small(replace(law, plane=0.0)) for law in track(laws, "laws", len(laws))]
+    made = []
+    for name in found[0]:
+        values = np.array([one[name] for one in found])
+        made.append(
+            [
+                name,
+                f"{np.median(values[:, 0]):.0f}",
+                *(f"{x:.2f}" for x in values[:, 1:].max(axis=0)),
+            ]
+        )
+    return made
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -187,7 +227,12 @@ def main() -> None:
     parser.add_argument("--laws", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--plane", action="store_true", help="none in space: ten times as fast")
+    parser.add_argument("--small", action="store_true", help="errors of paths of small loads")
     options = parser.parse_args()
+    if options.small:
+        head = ["resolution", "sliders", *(f"{reach:g}" for reach in REACHES)]
+        print(table(head, small_rows(options.laws, options.seed)))
+        return
     print(table(HEAD, rows(draw(options.laws, options.seed, options.plane))))
 
 

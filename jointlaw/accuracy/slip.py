@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..laboratory.normal_control import NormalCondition, closing_increments
+from ..joints.normal_control import NormalCondition, closing_increments
 from ..support.checks import Array
 
 if TYPE_CHECKING:
-    from ..law import JointLaw
+    from ..laws.joint_law import JointLaw
 
 LEG = 24  # steps each way
 SHARES = (1.0, 0.1)  # of the normal stress S/2 of the standard paths
@@ -69,7 +69,7 @@ def random_ways(rng: np.random.Generator, count: int, dim: int) -> Array:
 def slip(law: JointLaw, closure_range: float, stress: float, ways: Array) -> Slip:
     """Shear there and back along `ways` (paths, 3), of which the stress S/2 is in Pa."""
     share, azimuth, length = ways.T
-    dim, R, D = law.tables.dim, closure_range, law.tables.mating_length
+    dim, R, D = law.tables.dim, closure_range, law.mating_length
     unit, far = D if math.isfinite(D) else 10 * R, distance(D, R)
     places = np.geomspace(_FIRST * min(R, far), far, LEG)[:, None] * length
     leg = np.diff(places, axis=0, prepend=0.0)

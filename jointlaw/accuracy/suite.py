@@ -38,14 +38,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from ..laboratory.normal_control import NormalCondition, closing_increments
+from ..joints.normal_control import NormalCondition, closing_increments
 from ..parameters.resolution import Resolution
 from ..support.checks import Array
 from ..support.progress import track
 from .slip import HELD, Slip, distance, random_ways, slip, standard_ways
 
 if TYPE_CHECKING:
-    from ..law import JointLaw
+    from ..laws.joint_law import JointLaw
 
 STEPS = 120  # of each path
 FAR = 3.0  # R: the longest slip at a given closure
@@ -66,8 +66,12 @@ def steepest(law: JointLaw) -> float:
 
 def scaled(r: Resolution, share: float) -> Resolution:
     """That many times the nodes in each direction."""
-    u, phi, depth = (round(share * n) for n in (r.u, r.phi, r.depth))
-    return Resolution(max(u, 1), max(phi, 3), max(depth, 1))
+    return replace(
+        r,
+        u=max(round(share * r.u), 1),
+        phi=max(round(share * r.phi), 3),
+        depth=max(round(share * r.depth), 1),
+    )
 
 
 class Miss(NamedTuple):
@@ -94,15 +98,16 @@ class Suite:
     F: Array
     slip: Slip | None
     ways: Array  # of `slip`
+    reach: float  # m, R
     stress: float  # Pa, S/2
     uncertainty: Array  # (paths,) of F: its difference from two thirds of the nodes
 
     def miss(self, law: JointLaw) -> Miss:
-        """How far another resolution is off."""
+        """How far another resolution is off, or closure range."""
         largest = errors(tractions(law, self.d), self.F)
         if self.slip is None:
             return Miss(largest, math.nan, math.nan)
-        mine = slip(law, law.closure_range, self.stress, self.ways)
+        mine = slip(law, self.reach, self.stress, self.ways)
         more = errors(mine.F, self.slip.F, self.slip.counts)
         return Miss(np.append(largest, more), *mine.apart(self.slip))
 
@@ -136,7 +141,7 @@ def _suite(law: JointLaw, excursions: int) -> Suite:
         called += tuple(f"slip {i + 1}" for i in range(len(more)))
         ways = np.concatenate([ways, more])
         slid = slip(law, law.closure_range, stress, ways)
-    suite = Suite(called, d, F, slid, ways, stress, np.zeros(len(called)))
+    suite = Suite(called, d, F, slid, ways, law.closure_range, stress, np.zeros(len(called)))
     check = suite.miss(replace(law, resolution=scaled(best, 2 / 3))).largest
     return replace(suite, uncertainty=check)
 
@@ -154,9 +159,8 @@ def errors(F: Array, reference: Array, counts: Any = True) -> Array:
 
     counts: (steps, paths), which steps count; all by default.
     """
-    peak = np.linalg.norm(reference, axis=2).max(axis=0, where=counts, initial=0.0)
     off: Array = np.linalg.norm(F - reference, axis=2).max(axis=0, where=counts, initial=0.0)
-    return off / peak
+    return off / np.linalg.norm(reference, axis=2).max(axis=0, where=counts, initial=0.0)
 
 
 def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]:
@@ -178,7 +182,7 @@ def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]
     shear = legs([0, 0.1, 1], [0, seat, seat], [0, 0, 1])
     back = legs([0, 0.1, 0.35, 0.75, 1], [0, *4 * [seat]], [0, 0, 0.6, -0.6, 0])
     fixed = legs([0, 0.2, 1], [0, 1, 1], [0, 0, 1])
-    sheared = min(distance(law.tables.mating_length, R) / R, FAR)
+    sheared = min(distance(law.mating_length, R) / R, FAR)
     far = legs([0, 0.1, 0.55, 1], [0, 0.5, 0.5, 0.5], [0, 0, sheared, 0])
     again = legs([0, 0.15, 0.35, 0.6, 0.7, 1], [0, 0.7, 0.7, -0.6, -0.6, 0.8],
                  [0, 0, 0.4, 0.7, 0.2, 0.5])  # fmt: skip
@@ -244,7 +248,7 @@ def far_path(law: JointLaw, rng: np.random.Generator, stress: float, s: Array) -
     """
     R = law.closure_range
     closure = float(law.closure(stress * rng.uniform(0.1, 1.0))) / R
-    way = min(distance(law.tables.mating_length, R) / R, FAR) * rng.uniform(0.3, 1.0)
+    way = min(distance(law.mating_length, R) / R, FAR) * rng.uniform(0.3, 1.0)
     back, turn = way * rng.uniform(-1.0, 0.5), rng.uniform(0.0, 2.0 * np.pi)
     at = [0.0, 0.1, 0.4, 0.8, 1.0]
     shear = np.interp(s, at, [0.0, 0.0, way, back, way])

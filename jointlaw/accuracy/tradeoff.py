@@ -16,7 +16,7 @@ from ..support.progress import track
 from .suite import Suite, standard_suite
 
 if TYPE_CHECKING:
-    from ..law import JointLaw
+    from ..laws.joint_law import JointLaw
 
 SPREAD = tuple(
     Resolution(u, phi, depth)
@@ -47,7 +47,7 @@ class Price:
 
     @property
     def worst(self) -> float:
-        """Largest error of the traction on any path."""
+        """Largest error of the traction on the standard paths."""
         return float(self.error.max())
 
 
@@ -111,7 +111,7 @@ def tradeoff(
 ) -> Tradeoff:
     """See `JointLaw.tradeoff`."""
     joints = integer("joints", joints, 0)
-    lengths = law.tables.mating_length, law.asperity.yield_interference, law.closure_range
+    lengths = law.mating_length, law.asperity.yield_interference, law.closure_range
     names = named(*lengths)
     if resolutions is None:
         resolutions = (*SPREAD, *names.values())

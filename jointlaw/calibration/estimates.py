@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..law import JointLaw
+from ..laws.joint_law import JointLaw
 from ..support.checks import Array
 from .forward import build, log_stress
 from .measured import ShearCurve, sheared

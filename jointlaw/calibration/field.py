@@ -7,7 +7,7 @@ import numpy as np
 
 from ..laboratory.experiments import direct_shear
 from ..laboratory.record import Record
-from ..law import JointLaw
+from ..laws.joint_law import JointLaw
 from ..parameters.heights import GammaHeights
 from ..parameters.orientation import Orientation
 from ..parameters.rock import ROCK

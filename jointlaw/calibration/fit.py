@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..law import JointLaw
+from ..laws.joint_law import JointLaw
 from ..support.checks import Array
 from ..support.progress import track
 from ..support.pyplot import pyplot, style, written
@@ -224,7 +224,7 @@ def fit_curves(
         adds its seating closure (m).
     fixed: values of parameters that are known otherwise, such as alpha from a scan, in SI units.
     law: values of all parameters that are not free, `mating_length` among them; None takes rock
-        asperities, `forward.DEFAULTS`, of "individual" formation. A law of one plane stays one; its
+        asperities, `forward.DEFAULT`, of "individual" formation. A law of one plane stays one; its
         heights must be GammaHeights. Its bond keeps stiffnesses and, where cohesion or tension
         change, the ratio of each given energy to the elastic energy at the peak.
     priors: 95 % ranges (low, high) in physical units instead of the defaults of `priors.PRIORS`,

@@ -11,60 +11,66 @@ from scipy import special
 from ..discretisation.facets import facets
 from ..discretisation.first_loading import facet_sum, yield_sum
 from ..discretisation.virgin_curve import exact_force
-from ..law import SHORTEST, JointLaw
+from ..laws.joint_law import SHORTEST, JointLaw
 from ..parameters.asperity import Asperity
 from ..parameters.bond import MODES, Bond
+from ..parameters.declared import parameters_of
 from ..parameters.heights import GammaHeights
 from ..parameters.orientation import Orientation
 from ..parameters.resolution import SLIP, resolve
 from ..parameters.rock import ROCK
 from ..support.checks import Array
-from .priors import Values
+from .priors import PARTS, Values
 
-# With a mean inclination of 19 degrees, as that of the paper's rough granite
-DEFAULTS = {
-    "alpha": 3.7, "beta": 1e-5, "overlap": 0.0, "asperity_density": 1e6, "K": ROCK.K,
-    "lam": ROCK.lam, "eta": ROCK.eta, "mu": ROCK.mu, "a": 3.0, "b": 0.0, "c": 0.0,
-    "yield_interference": math.inf, "mating_length": math.inf, "slope_wear": math.inf,
-    "slope_residual": 0.0,
-}  # fmt: skip
+# Without a law to begin with. The mean inclination is 19 degrees, as of the paper's rough granite
+DEFAULT = JointLaw(
+    orientation=Orientation(a=3.0),
+    asperity=ROCK,
+    heights=GammaHeights(alpha=3.7, beta=1e-5, formation="individual"),
+    asperity_density=1e6,
+)
 STEPS = 30  # that shear a joint to begin with; a fit halves them while that matters
-
-
-_SLOPES = ("mating_length", "slope_wear", "slope_residual")
 
 
 @dataclass(frozen=True)
 class Settings:
     """What of a law is decided rather than fitted."""
 
-    formation: str = "individual"
+    law: JointLaw = DEFAULT  # whatever is not fitted is kept
     resolution: Any = "balanced"
     closure_range: Any = None  # m
     plane: float | None = None  # of the law to be found; every shear curve has its own
     steps: int = STEPS  # that shear a joint the whole way, see `ShearCurve.sheared`
-    bond: Bond | None = None  # its stiffnesses, and energies over the elastic ones at the peak
 
 
-def parameters(law: JointLaw) -> tuple[dict[str, float], Settings]:
-    """Parameters of a law by name, those it does not have at their defaults, and its settings.
+def fitted(law: JointLaw) -> dict[str, Any]:
+    """The parts of a law that hold parameters which a fit may find, by name; "" is the law."""
+    parts = {part: getattr(law, part) if part else law for part in PARTS}
+    return {part: value for part, value in parts.items() if value is not None}
+
+
+def parameters(law: JointLaw | None) -> tuple[dict[str, float], Settings]:
+    """Parameters of a law by name, those that a fit may find, and its settings.
 
     Of a law with a bond its cohesion and tension too. Raises ValueError for heights that are not
     gamma distributed.
     """
-    o, p, h = law.orientation, law.asperity, law.heights
-    values = DEFAULTS | {
-        "asperity_density": law.asperity_density, "K": p.K, "lam": p.lam, "eta": p.eta, "mu": p.mu,
-        "a": o.a, "b": o.b, "c": o.c, "yield_interference": p.yield_interference,
-        **{name: getattr(law, name) for name in _SLOPES},
-    }  # fmt: skip
-    kept = ("resolution", "closure_range", "plane", "bond")
-    if not isinstance(h, GammaHeights):
-        raise ValueError(f"law: heights = {h!r} cannot be fitted; give it GammaHeights")
-    values |= {"alpha": h.alpha, "beta": h.beta, "overlap": h.overlap}
-    if law.bond is not None:
-        values |= {"cohesion": law.bond.cohesion, "tension": law.bond.tension}
-    return values, Settings(h.formation, **{name: getattr(law, name) for name in kept})
+    settings = Settings()
+    if law is not None:
+        if not isinstance(law, JointLaw):
+            raise ValueError(f"law: {type(law).__name__} cannot be fitted; give it a JointLaw")
+        settings = Settings(law, law.resolution, law.closure_range, law.plane)
+    if not isinstance(settings.law.heights, GammaHeights):
+        raise ValueError(
+            f"law: heights = {settings.law.heights!r} cannot be fitted; give it GammaHeights"
+        )
+    values = {
+        name: getattr(part, name)
+        for part in fitted(settings.law).values()
+        for name, said in parameters_of(part).items()
+        if said.fit
+    }
+    return values, settings
 
 
 def build(values: Values, settings: Settings, plane: float | None = None) -> JointLaw:
@@ -72,26 +78,23 @@ def build(values: Values, settings: Settings, plane: float | None = None) -> Joi
 
     A mating length shorter than a law can have is raised to the shortest.
     """
-    v = values
-    mated = JointLaw(
-        orientation=Orientation(v["a"], v["b"], v["c"]),
-        asperity=_asperity(v),
-        heights=_heights(v, settings),
-        asperity_density=v["asperity_density"],
-        resolution=settings.resolution,
-        plane=plane,
-        closure_range=settings.closure_range,
-        bond=None if settings.bond is None else _bond(v, settings.bond),
-    )
-    if math.isinf(v["mating_length"]):
+    base, own = settings.law, dict[str, Any]()
+    for part, held in fitted(base).items():
+        found = {name: values[name] for name, said in parameters_of(held).items() if said.fit}
+        if isinstance(held, Bond):
+            found = _strengths(values, held)
+        own |= {part: replace(held, **found)} if part else found
+    slopes = {name: own.pop(name) for name in ("mating_length", "slope_wear", "slope_residual")}
+    asked = {"resolution": settings.resolution, "plane": plane}
+    mated = replace(
+        base, **own, **asked, closure_range=settings.closure_range,
+        mating_length=math.inf, slope_wear=math.inf, slope_residual=0.0,
+    )  # fmt: skip
+    if math.isinf(slopes["mating_length"]):
         return mated
-    return replace(
-        mated,
-        resolution=settings.resolution,
-        mating_length=max(v["mating_length"], SHORTEST * mated.closure_range),
-        slope_wear=v["slope_wear"],
-        slope_residual=v["slope_residual"],
-    )
+    shortest = SHORTEST * mated.closure_range
+    slopes["mating_length"] = max(slopes["mating_length"], shortest)
+    return replace(mated, **asked, **slopes)
 
 
 def build_for_shear(values: Values, settings: Settings, azimuth: float) -> JointLaw:
@@ -118,7 +121,11 @@ def log_stress(values: Values, closure: Array, settings: Settings) -> Array:
     names = ("a", "b", "c", "lam", "eta", "mu")
     factor = _facet_factor(*(values[name] for name in names), settings.resolution)
     scale = values["asperity_density"] * values["lam"] * values["K"] * factor
-    return math.log(scale) + np.log(np.maximum(force, 1e-300))
+    stress = math.log(scale) + np.log(np.maximum(force, 1e-300))
+    for element in settings.law.tables.elements[1:]:  # what stands beside the asperities
+        beside = element.normal_stress(np.maximum(closure, 0.0))
+        stress = np.where(beside > 0.0, np.log(np.exp(stress) + beside), stress)
+    return stress
 
 
 def _yielded(values: Values, closure: Array, force: Array, settings: Settings) -> Array:
@@ -154,8 +161,8 @@ def _asperity(v: Values) -> Asperity:
     return Asperity(v["K"], v["lam"], v["eta"], v["mu"], v["yield_interference"])
 
 
-def _bond(v: Values, given: Bond) -> Bond:
-    """The bond of these strengths: an energy that was given grows with the square of its strength.
+def _strengths(v: Values, given: Bond) -> dict[str, Any]:
+    """Strengths, and energies: one that was given grows with the square of its strength.
 
     The elastic energy at the peak does so too, hence no strength is out of bounds.
     """
@@ -163,11 +170,13 @@ def _bond(v: Values, given: Bond) -> Bond:
     for _, strength, energy in MODES:
         whole, growth = getattr(given, energy), v[strength] / (getattr(given, strength) or 1.0)
         changed |= {strength: v[strength], energy: whole * growth**2 if whole else None}
-    return replace(given, **changed)
+    return changed
 
 
 def _heights(v: Values, settings: Settings) -> GammaHeights:
-    return GammaHeights(v["alpha"], v["beta"], v["overlap"], settings.formation)
+    heights = settings.law.heights
+    assert isinstance(heights, GammaHeights)
+    return replace(heights, alpha=v["alpha"], beta=v["beta"], overlap=v["overlap"])
 
 
 @lru_cache(maxsize=256)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..law import JointLaw
+from ..laws.joint_law import JointLaw
 from ..parameters.resolution import Resolution
 from ..support.checks import Array, at_least, finite, more_than, number
 from .forward import STEPS, Settings, build_for_shear, log_stress

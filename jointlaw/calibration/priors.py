@@ -10,6 +10,12 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from ..laws.joint_law import JointLaw
+from ..parameters.asperity import Asperity
+from ..parameters.bond import Bond
+from ..parameters.declared import parameters_of
+from ..parameters.heights import GammaHeights
+from ..parameters.orientation import Orientation
 from ..support.checks import one_of
 
 Values = Mapping[str, float]
@@ -34,24 +40,20 @@ class Transform(NamedTuple):
         return math.exp(x) - self.shift if self.log else x
 
 
+# Parts of a law with the kinds that a fit knows; "" is the law itself
+PARTS = {
+    "orientation": Orientation,
+    "asperity": Asperity,
+    "heights": GammaHeights,
+    "": JointLaw,
+    "bond": Bond,
+}
 TRANSFORMS = {
-    "alpha": Transform("1", -0.99, 1e3, shift=1.0),
-    "beta": Transform("m", 1e-10, 1.0),
-    "overlap": Transform("m", 1e-12, 1.0),
-    "asperity_density": Transform("1/m2", 1e-3, 1e18),
-    "K": Transform("Pa m^(1-eta)", 1e3, 1e16),
-    "lam": Transform("1", 0.05, 20.0),
-    "eta": Transform("1", 0.0, 1.0, log=False),
-    "mu": Transform("1", 1e-3, 5.0),
-    "a": Transform("1", 1.0, 100.0),
-    "b": Transform("1", -1.0, 2.0, log=False),
-    "c": Transform("1", -0.5, 0.5, log=False),
-    "yield_interference": Transform("m", 1e-12, 1.0),
-    "mating_length": Transform("m", 1e-12, 1e3),
-    "slope_wear": Transform("J/m2", 1e-6, 1e12),
-    "slope_residual": Transform("1", 0.0, 1.0, log=False),
-    "cohesion": Transform("Pa", 1.0, 1e12),
-    "tension": Transform("Pa", 1.0, 1e12),
+    name: Transform(said.unit or "1", *said.fit, said.log, said.shift)
+    for kind in PARTS.values()
+    for name, said in parameters_of(kind).items()
+    if said.fit
+} | {
     "seating": Transform("m", 1e-12, 1.0),
     # a combination that a prior is stated for, see `quantity`
     "full_contact_stress": Transform("Pa", 1e-3, 1e18),

@@ -15,10 +15,12 @@ import numpy as np
 from scipy import special
 from scipy.optimize import least_squares
 
-from ..law import JointLaw
+from ..laws.joint_law import JointLaw
+from ..parameters.bond import Bond
+from ..parameters.declared import parameters_of
 from ..parameters.orientation import largest_c
 from ..support.checks import Array, number, one_of
-from .forward import DEFAULTS, Settings, build, log_stress, parameters
+from .forward import Settings, build, log_stress, parameters
 from .measured import ClosureCurve, ShearCurve, sheared
 from .noise import Noise, Series, estimate_noise
 from .priors import TRANSFORMS, Ranges, Values, normal_priors, quantity
@@ -31,7 +33,6 @@ OF_CLOSURE = ("alpha", "beta", "overlap", "asperity_density", "K", "yield_interf
 # is flat, and no descent comes back
 LENGTHS = (0.5, 0.15, 0.05, 0.015)
 EXACT, NEAR = 1e-8, 1e-3  # change of a parameter and of the misfit at which a search ends
-BONDED = ("cohesion", "tension")
 Function = Callable[[Array], Array]
 
 
@@ -153,13 +154,13 @@ def pose(
             f"curves holds {len(closures)} closure curves of {len(curves)}: give one at most, and "
             "ShearCurves"
         )
-    values, settings = (dict(DEFAULTS), Settings()) if law is None else parameters(law)
+    values, settings = parameters(law)
     fixed = fixed or {}
     names = [name for name in free if name not in fixed]
     for name in (*fixed, *names):
-        one_of("free or fixed", name, (*DEFAULTS, *BONDED))
-        if name in BONDED and settings.bond is None:
+        if name in parameters_of(Bond) and settings.law.bond is None:
             raise ValueError(f"{name} is that of a bond: give a law with a bond, which is kept")
+        one_of("free or fixed", name, tuple(values))
     values |= {name: number(f"fixed[{name!r}]", value) for name, value in fixed.items()}
     build(values, settings)  # raises for values that no law has
     for name in names:

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..laboratory.normal_control import NormalCondition, closing_increments
-from ..law import JointLaw
+from ..joints.normal_control import NormalCondition, closing_increments
+from ..laws.joint_law import JointLaw
 from ..support.checks import Array
 
 TOLERANCE = 1e-9  # of the normal stress

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import presets
-from ..law import JointLaw
+from ..laws.joint_law import JointLaw
 from ..parameters import keys
 from ..parameters.resolution import NAMED
 from ..parameters.rock import ROCK, require_rock
@@ -75,21 +75,26 @@ def add_law(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--resolution", choices=tuple(NAMED), help="instead of the law's own")
 
 
-def read_law(options: argparse.Namespace) -> JointLaw:
+def read_law(options: argparse.Namespace) -> Any:
     """The law that the options name. Raises ValueError that says what is missing."""
     path = Path(options.law)
     if options.law in presets.names() or not path.is_file():
         law = presets.load_any(options.law)
     else:
         parts = keys.read(path, "law file")
-        if "asperity" not in parts and not options.default_rock:
+        coulomb = parts.get("kind") == "coulomb"
+        if "asperity" not in parts and not options.default_rock and not coulomb:
             raise ValueError(
                 f"{path} has no contacts: add the table [asperity] with K (Pa m^(1-eta)), lam, eta "
                 f"and mu of your rock, or give --default-rock, which takes {DEFAULT_ROCK}"
             )
-        law = JointLaw.from_dict({"asperity": _CONTACTS} | parts, str(path))
-    require_rock({"mu": law.asperity.mu}, f"{options.law}: asperity.")
+        own = {} if coulomb else {"asperity": _CONTACTS}
+        law = JointLaw.from_dict(own | parts, str(path))
     require_rock({"plane": law.plane or 0.0}, f"{options.law}: ")
+    if not isinstance(law, JointLaw):
+        require_rock({"friction": law.friction}, f"{options.law}: ")
+        return law
+    require_rock({"mu": law.asperity.mu}, f"{options.law}: asperity.")
     return replace(law, resolution=options.resolution) if options.resolution else law
 
 

@@ -8,7 +8,7 @@ from ..hosts.c.export import export_c, identifier
 from ..hosts.fem.export import SEATING, export_fem, require_seating
 from ..hosts.lammps.export import export_lammps
 from ..hosts.yade.export import export_yade
-from ..law import JointLaw
+from ..laws.joint_law import JointLaw
 from ..support.files import clear_run
 from .command import add_command, add_law, add_out, in_unit, read_law
 

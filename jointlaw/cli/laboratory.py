@@ -11,7 +11,7 @@ import numpy as np
 
 from ..laboratory.experiments import CONTROLS, PathError, closure_test, direct_shear
 from ..laboratory.record import UNITS, Record
-from ..law import JointLaw
+from ..laws.joint_law import JointLaw
 from .command import (
     Written,
     add_command,

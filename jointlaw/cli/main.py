@@ -14,28 +14,6 @@ from . import export, field, fit, laboratory, presets, scan
 
 COMMANDS = (laboratory, presets, export, fit, scan, field)
 
-_YIELDING = "write yield_interference into [asperity] of a law file; it starts with \
-jointlaw presets NAME > mine.toml"
-_TABLE = "call jointlaw.hosts.yade.export.export_yade(law, folder, closure=..., tolerance=...)"
-
-# Commands ("replay") and options ("fit --workers") that were removed: what to use instead
-REMOVED = {
-    "replay": "a NonFiniteError carries `state` and `d`; joint.restore(error.state) and "
-    "joint.update(error.d) repeat the step",
-    "figures": "run the scripts docs/paper/plot_fig_NN.py; the claims are on docs/paper.md and in "
-    "tests/verification/test_paper_*.py",
-    "closure --yield-interference": _YIELDING,
-    "closure --no-unload": "in Python jl.closure_test(joint, stress, unload=False) stops there",
-    "shear --yield-interference": _YIELDING,
-    "fit --decimal-comma": "write --decimal comma",
-    "fit --workers": "fit one closure file a command",
-    "fit --formation": "give a law of that formation, such as --law westerly-smooth",
-    "export --closure": _TABLE,
-    "export --tolerance": _TABLE,
-    "tradeoff": "in Python: import jointlaw as jl; "
-    "print(jl.JointLaw.from_toml('mine.toml').tradeoff())",
-}
-
 
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one line each, as those of the commands are."""
@@ -69,10 +47,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _read(words: Sequence[str]) -> argparse.Namespace:
     """The options of the command line. Raises ValueError with one line for the user."""
-    for word in words:
-        for removed in (words[0], f"{words[0]} {word.partition('=')[0]}"):
-            if removed in REMOVED:
-                raise ValueError(f"{removed} was removed: {REMOVED[removed]}")
     parser = Parser(
         prog="jointlaw",
         description="A micromechanical, anisotropic, path-dependent rock joint.",

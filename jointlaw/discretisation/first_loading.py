@@ -2,7 +2,8 @@
 
 import math
 import sys
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -22,6 +23,12 @@ class FirstLoading(NamedTuple):
     factor: float  # `facet_sum`
     yielding: tuple[Array, Array] | None = None  # `yield_sum`: F1 -= share Phi(closure - depth)
 
+    @classmethod
+    def of(cls, curve: VirginCurve, theta: Array, scale: Array, asperity: Asperity) -> Self:
+        """That of facets of these inclinations and A (M,)."""
+        factor = facet_sum(theta, scale, asperity.lam, asperity.mu)
+        return cls(curve, factor, yield_sum(theta, scale, asperity))
+
     def stress(self, closure: Array) -> Array:
         """Normal stress (Pa) at closures (m), infinite where it overflows."""
         stress: Array = self.factor * self.curve.force(closure)[0]
@@ -35,25 +42,24 @@ class FirstLoading(NamedTuple):
         """Closure (m) beyond which stresses, or their differences, are lost in rounding."""
         return 1e304 if self.yielding is None else _RESOLVED * float(np.max(self.yielding[1]))
 
-    def closure(self, stress: Array) -> Array:
-        """Closures (m) at normal stresses (Pa), by bisection of log closure, to rounding.
 
-        Raises ValueError where no float holds the answer.
-        """
-        if not math.isfinite(self.factor):
-            raise ValueError("the stiffness of the joint is too large for floating point")
-        found = np.zeros_like(stress)
-        wanted = stress[stress >= _SMALLEST]
-        low, high = (np.full(wanted.shape, math.log(y)) for y in (_SMALLEST, self.farthest))
-        with np.errstate(over="ignore"):
-            if (far := self.stress(np.exp(high)) < wanted).any():
-                raise ValueError(f"normal_stress = {wanted[far].min()!r} Pa is beyond any closure")
-            for _ in range(_HALVINGS):
-                middle = 0.5 * (low + high)
-                short = self.stress(np.exp(middle)) < wanted
-                low, high = np.where(short, middle, low), np.where(short, high, middle)
-        found[stress >= _SMALLEST] = np.exp(high)
-        return found
+def closure_at(stress_of: Callable[[Array], Array], stress: Array, farthest: float) -> Array:
+    """Closures (m) up to `farthest` at normal stresses (Pa), by bisection of log closure.
+
+    Exact to rounding. Raises ValueError where no closure reaches a stress.
+    """
+    found = np.zeros_like(stress)
+    wanted = stress[stress >= _SMALLEST]
+    low, high = (np.full(wanted.shape, math.log(y)) for y in (_SMALLEST, farthest))
+    with np.errstate(over="ignore"):
+        if (far := ~(stress_of(np.exp(high)) >= wanted)).any():
+            raise ValueError(f"normal_stress = {wanted[far].min():g} Pa is beyond any closure")
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            short = stress_of(np.exp(middle)) < wanted
+            low, high = np.where(short, middle, low), np.where(short, high, middle)
+    found[stress >= _SMALLEST] = np.exp(high)
+    return found
 
 
 def yield_sum(theta: Array, scale: Array, asperity: Asperity) -> tuple[Array, Array] | None:

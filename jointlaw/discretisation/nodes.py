@@ -66,11 +66,16 @@ def azimuths(rings: int, phi: int) -> list[int]:
 
 
 def depth_nodes(
-    curve: VirginCurve, closure_range: float, slope: Array, cells: NDArray[np.intp]
+    curve: VirginCurve,
+    closure_range: float,
+    slope: Array,
+    cells: NDArray[np.intp],
+    lowest: float = 1.0,
 ) -> Array:
     """Limits zeta (M, D + 1) in m of the depth cells of facets of this tan(theta) (M,).
 
     Each facet has `cells` (M,) of them, D at most; limits that it has no use for lie at UNUSED.
+    lowest: as in `Resolution`.
 
     A cell of width h lumps springs of density Phi'' and by that errs by Phi'' h^2/8 at most: equal
     shares of int sqrt(Phi'') dz make the error of all cells the same. A small power of Phi shifts
@@ -78,6 +83,9 @@ def depth_nodes(
     the closure. The last cell has no end: it holds all springs that touch at greater depths, and
     more cells before it do not lower its error. So where there are many cells, they reach farther,
     to twice the shear.
+
+    Errors as shares of the largest load of a path are the same for all loads if the density is
+    sqrt(Phi''/Phi). So it falls from the `lowest` closure on.
     """
     shear = np.clip(cells.max() / _MANY, 1.0, 2.0)
     reach = closure_range * (1.0 + shear * np.minimum(slope, _STEEPEST))
@@ -88,6 +96,7 @@ def depth_nodes(
     with np.errstate(all="ignore"):
         force, bend = curve.force(middle)[0], np.maximum(curve.curvature(middle), 0.0)
         density = np.sqrt(bend / bend.max()) * (force / force[-1]) ** -_LOW
+        density *= np.maximum(force / curve.force(lowest * edges[-1:])[0], 1.0) ** (_LOW - 0.5)
     density = np.where(np.isfinite(density), density, 0.0)
     share = density * np.diff(edges)
     # a least density: a curve without curvature, one linear spring, has none, and any nodes will do

@@ -1,4 +1,4 @@
-"""The tables of a law: everything that a kernel reads, shared by all joints of the law."""
+"""The tables of facets: all that a kernel reads of the asperities of a law."""
 
 import math
 from dataclasses import dataclass
@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..parameters.asperity import Asperity
-from ..parameters.bond import Bond
 from ..support.checks import Array, frozen
 from .facets import Facets
 from .nodes import UNUSED, depth_nodes
@@ -18,12 +17,13 @@ _OVERFLOW = 1e140  # Pa and J/m2: squares beyond it overflow
 
 
 @dataclass(frozen=True, eq=False)
-class Tables:
-    """What a kernel reads: everything per facet (M facets, D depth cells), physical axes first.
+class FacetTables:
+    """Everything per facet (M facets, D depth cells), physical axes first.
 
-    `m` (dim, M) maps closure and offset to the effective closure y of a facet, `s`, `t` (dim, M)
-    are the in-facet directions, `azimuth` (2, M) is the unit vector of the facet's azimuth and
-    `steep` (M,) its tan(theta), both of the mated joint, `area` is A = N w lam K c1^(1+eta),
+    `theta` (M,) are the inclinations. `m` (dim, M) maps closure and offset to the effective
+    closure y of a facet, `s`, `t` (dim, M) are the in-facet directions, `azimuth` (2, M) is the
+    unit vector of the facet's azimuth and `steep` (M,) its tan(theta), both of the mated joint,
+    `area` is A = N w lam K c1^(1+eta),
     `depth` (M, D+1) the cell limits zeta with the virgin force and slope there (slope 0 at the
     first by definition).
     A facet of fewer cells has its limits first; cells that begin at UNUSED stay empty.
@@ -32,6 +32,8 @@ class Tables:
     """
 
     curve: VirginCurve
+    asperity: Asperity
+    theta: Array
     n: Array
     m: Array
     s: Array
@@ -44,14 +46,24 @@ class Tables:
     depth: Array
     depth_force: Array
     depth_slope: Array
-    lam: float
-    mu: float
     mating_length: float
     yield_depth: Array
     opposite: NDArray[np.intp]
-    slope_wear: float = math.inf
-    slope_residual: float = 0.0
-    bond: Bond | None = None
+    slope_wear: float
+    slope_residual: float
+
+    def __post_init__(self) -> None:
+        frozen(tuple(vars(self).values()))
+
+    @property
+    def lam(self) -> float:
+        """Normal over shear stiffness of an asperity."""
+        return self.asperity.lam
+
+    @property
+    def mu(self) -> float:
+        """Friction coefficient of an asperity."""
+        return self.asperity.mu
 
     @property
     def yields(self) -> bool:
@@ -83,56 +95,58 @@ class Tables:
         """Sliders per joint: one for each cell of each facet."""
         return int(np.count_nonzero(self.depth[:, :-1] < UNUSED))
 
-    @property
-    def rows(self) -> int:
-        """State numbers per joint: delta, dissipated energy, q of all cells, even UNUSED.
 
-        Then, with yielding, the flattened depth of every facet and the plastic work; with wear, the
-        share of the slopes that is gone and the work of friction; with a bond its damage.
-        """
-        flattened = len(self.c1) + 1 if self.yields else 0
-        more = flattened + 2 * self.wears + (self.bond is not None)
-        return self.dim + 1 + 2 * len(self.c1) * self.cells + more
-
-
-def tables(
+def facet_tables(
     facets: Facets,
     curve: VirginCurve,
     asperity: Asperity,
     asperity_density: float,
     closure_range: float,
     cells: int,
-    mating_length: float = math.inf,
-    slope_wear: float = math.inf,
-    slope_residual: float = 0.0,
-    bond: Bond | None = None,
-) -> Tables:
+    mating_length: float,
+    slope_wear: float,
+    slope_residual: float,
+    lowest: float,
+) -> FacetTables:
     """Lay out the tables; `cells` for the facet of most weight, one where the curve is linear."""
     c1, slope = np.cos(facets.theta), np.tan(facets.theta)
     share = np.zeros_like(facets.depth) if curve.linear else facets.depth
     several = np.maximum(np.rint(cells * share), 1).astype(np.intp)
-    depth = depth_nodes(curve, closure_range, slope, several)
-    azimuth = np.stack([np.cos(facets.phi), np.sin(facets.phi)])
-    arrays = (
-        facets.n, facets.n / c1, facets.s, facets.t, azimuth, slope, c1,
-        facets.scale(asperity, asperity_density), facets.weight, *_at_limits(curve, depth),
-    )  # fmt: skip
+    depth = depth_nodes(curve, closure_range, slope, several, lowest)
+    force, bend = _at_limits(curve, depth)
     # one depth for both sides of an asperity whose slopes change, else it creates energy
-    alone, yield_depth = frozen((np.arange(len(c1)), asperity.yield_interference / c1))
-    return Tables(
-        curve, *frozen(arrays), asperity.lam, asperity.mu, mating_length, yield_depth,
-        alone if math.isinf(mating_length) else facets.opposite, slope_wear, slope_residual,
-        bond,
-    )  # fmt: skip
+    shared = math.isfinite(mating_length)
+    return FacetTables(
+        curve=curve,
+        asperity=asperity,
+        theta=facets.theta,
+        n=facets.n,
+        m=facets.n / c1,
+        s=facets.s,
+        t=facets.t,
+        azimuth=np.stack([np.cos(facets.phi), np.sin(facets.phi)]),
+        steep=slope,
+        c1=c1,
+        area=facets.scale(asperity, asperity_density),
+        weight=facets.weight,
+        depth=depth,
+        depth_force=force,
+        depth_slope=bend,
+        mating_length=mating_length,
+        yield_depth=asperity.yield_interference / c1,
+        opposite=facets.opposite if shared else np.arange(len(c1)),
+        slope_wear=slope_wear,
+        slope_residual=slope_residual,
+    )
 
 
-def _at_limits(curve: VirginCurve, depth: Array) -> tuple[Array, Array, Array]:
-    """Cell limits (M, D + 1) with the virgin force and slope there."""
+def _at_limits(curve: VirginCurve, depth: Array) -> tuple[Array, Array]:
+    """Virgin force and slope at the cell limits (M, D + 1)."""
     force, slope = curve.force(np.where(depth < UNUSED, depth, 0.0))
     force = np.where(depth < UNUSED, force, depth)
     slope = np.where(depth < UNUSED, slope, depth)
     slope[:, 0] = 0.0  # a spring that touches at once (eta = 0) belongs to the first cell
-    return depth, force, np.maximum.accumulate(slope, axis=1)  # it rises, but for rounding
+    return force, np.maximum.accumulate(slope, axis=1)  # it rises, but for rounding
 
 
 def largest_reach(curve: VirginCurve, scale: Array, theta: Array, asperity: Asperity) -> float:

@@ -1,30 +1,22 @@
 """Where the law ends: nothing in it stops a joint that yields from closing."""
 
-from __future__ import annotations
-
-import math
 import warnings
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-if TYPE_CHECKING:
-    from ..law import JointLaw
-
 CRUSHED = 0.9999  # share of the asperities in touch beyond which a joint that yields is closed
 
 
-def warn_if_crushed(law: JointLaw, closure: ArrayLike) -> None:
+def warn_if_crushed(law: Any, closure: ArrayLike) -> None:
     """Warn of closures (m) at which nearly all asperities touch, if they yield.
 
     Real joints stop there, by the rock between the asperities. Laboratory tests and joints that
     start under a normal stress call this; hosts that close joints themselves may, too.
     """
-    if law.heights is None or math.isinf(law.asperity.yield_interference):
-        return
     highest = float(np.max(closure, initial=0.0))
-    share = law.contacts(highest) / law.asperity_density
+    share = law.crushed(highest)
     if share > CRUSHED:
         warnings.warn(
             f"closure = {highest:.3g} m: {100 * share:.2f} % of the asperities touch, and they "

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..kernels.element import Measures
 from ..kernels.engine import Step
-from ..kernels.reference import Measures
 from ..support.checks import Array
 from .batch import JointBatch, increments
 from .state import JointState
-
-if TYPE_CHECKING:
-    from ..law import JointLaw
 
 T = TypeVar("T")
 
@@ -40,7 +37,7 @@ class Joint:
     batch: of one joint, which it takes over; a new one by default.
     """
 
-    def __init__(self, law: JointLaw, batch: JointBatch | None = None) -> None:
+    def __init__(self, law: Any, batch: JointBatch | None = None) -> None:
         self.law = law
         self._batch = JointBatch(law, 1) if batch is None else batch
         d, F, C = np.empty((1, law.dim)), np.empty((1, law.dim)), np.empty((1, law.dim, law.dim))

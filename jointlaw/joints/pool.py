@@ -1,11 +1,11 @@
 """Joints for contacts that come and go: every contact keeps its joint as long as it lasts."""
 
 from collections.abc import Hashable, Iterable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..law import JointLaw
 from .batch import JointBatch
 from .state import JointState
 
@@ -21,7 +21,7 @@ class JointPool:
     starts anew.
     """
 
-    def __init__(self, law: JointLaw, ledger: bool = True) -> None:
+    def __init__(self, law: Any, ledger: bool = True) -> None:
         self.batch = JointBatch(law, 0, ledger)
         self._place: dict[Hashable, int] = {}
         self._free: list[int] = []

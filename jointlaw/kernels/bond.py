@@ -1,49 +1,73 @@
 """The bond in a step: docs/theory-incremental.md, "The bond"."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ..parameters.bond import Bond
 from ..support.checks import Array
+from .element import Element, Share
 
 
-class Held(NamedTuple):
-    """What the bond of B joints is after a step, and what it adds to the joint."""
+class Bonded(Element):
+    """The bond of a joint, with its damage."""
 
-    damage: Array  # (B,)
-    F: Array  # (dim, B) in Pa
-    stored: Array  # (B,) in J/m2
-    lost: Array  # (B,) in J/m2, >= 0
-    C: Array  # (dim, dim, B) in Pa/m
+    def __init__(self, bond: Bond) -> None:
+        self.bond, self.rows = bond, {"damage": 1}
 
+    def numbers(self) -> dict[str, float]:
+        begin, end = self.bond.limits
+        return {
+            "bond_normal": self.bond.normal_stiffness,
+            "bond_shear": self.bond.shear_stiffness,
+            "opening_begin": float(begin[0]),
+            "slip_begin": float(begin[1]),
+            "opening_end": float(end[0]),
+            "slip_end": float(end[1]),
+        }
 
-def hold(bond: Bond, delta: Array, old: Array) -> Held:
-    """The bond after a step to the displacement delta (dim, B), with the damage `old` (B,) before.
+    def step(self, delta: Array, d: Array, state: Array, new: Array, tangent: bool) -> Share:
+        """As `Element.step`.
 
-    1. Damage D is what opening and slip ask for, and never less than before.
-    2. Traction is (1 - D) K u, u the displacement less its closure; stored is (1 - D) psi.
-    3. Lost is the integral of psi dD towards u, by the geometric mean of psi where the damage
-       begins and ends to grow: exact where one mode acts alone, else in the limit of small steps.
-    4. Tangent is (1 - D) K, less K u (dD/du)^T where the damage grows.
-    """
-    u = np.concatenate([np.minimum(delta[:1], 0.0), delta[1:]])
-    K = np.array([[bond.normal_stiffness], *[[bond.shear_stiffness]] * (len(u) - 1)])
-    squares = np.stack([u[0] * u[0], np.sum(u[1:] * u[1:], axis=0)])
-    psi = 0.5 * (bond.normal_stiffness * squares[0] + bond.shear_stiffness * squares[1])
-    found, slope = damage_at(bond, squares)
-    grows = found > old
-    damage = np.where(grows, found, old)
-    softens = grows & (damage < 1.0)
-    first = np.where(grows, beyond(bond, squares, old), 1.0)
-    last = np.where(grows & ~softens, beyond(bond, squares, damage), 1.0)
-    lost = np.where(grows, (damage - old) * psi / np.sqrt(first * last), 0.0)
-    rate = u * half_axes(bond, damage)[[0, 1, 1][: len(u)]] ** 2
-    rate = np.divide(rate, slope, out=np.zeros_like(u), where=softens)
-    acts = np.stack([u[0] < 0.0, *[damage >= 0.0] * (len(u) - 1)])
-    whole = np.eye(len(u))[:, :, None] * ((1.0 - damage) * K * acts)
-    C = whole - (K * u)[:, None] * rate[None]
-    return Held(damage, (1.0 - damage) * K * u, (1.0 - damage) * psi, lost, C)
+        1. Damage D is what opening and slip ask for, and never less than before.
+        2. Traction is (1 - D) K u, u the displacement less its closure; stored is (1 - D) psi.
+        3. Lost is the integral of psi dD towards u, by the geometric mean of psi where the damage
+           begins and ends to grow: exact where one mode acts alone, else in the limit of small
+           steps.
+        4. Tangent is (1 - D) K, less K u (dD/du)^T where the damage grows.
+        """
+        bond, old = self.bond, state[0]
+        u, K = self._opened(delta + d)
+        squares, psi = self._energy(u)
+        found, slope = damage_at(bond, squares)
+        grows = found > old
+        damage = new[0] = np.where(grows, found, old)
+        softens = grows & (damage < 1.0)
+        first = np.where(grows, beyond(bond, squares, old), 1.0)
+        last = np.where(grows & ~softens, beyond(bond, squares, damage), 1.0)
+        lost = np.where(grows, (damage - old) * psi / np.sqrt(first * last), 0.0)
+        rate = u * half_axes(bond, damage)[[0, 1, 1][: len(u)]] ** 2
+        rate = np.divide(rate, slope, out=np.zeros_like(u), where=softens)
+        acts = np.stack([u[0] < 0.0, *[damage >= 0.0] * (len(u) - 1)])
+        whole = np.eye(len(u))[:, :, None] * ((1.0 - damage) * K * acts)
+        return Share((1.0 - damage) * K * u, lost, whole - (K * u)[:, None] * rate[None])
+
+    def stored(self, delta: Array, state: Array) -> Array:
+        return (1.0 - state[0]) * self._energy(self._opened(delta)[0])[1]
+
+    def stiffness(self, delta: Array, state: Array) -> Array:
+        """As `Element.stiffness`; softening, which lowers it, is left out."""
+        return (1.0 - state[0]) * max(self.bond.normal_stiffness, self.bond.shear_stiffness)
+
+    def _opened(self, delta: Array) -> tuple[Array, Array]:
+        """Opening and slip u (dim, B), and their stiffnesses (dim, 1)."""
+        u = np.concatenate([np.minimum(delta[:1], 0.0), delta[1:]])
+        stiffness = [self.bond.normal_stiffness, *[self.bond.shear_stiffness] * (len(u) - 1)]
+        return u, np.array(stiffness)[:, None]
+
+    def _energy(self, u: Array) -> tuple[Array, Array]:
+        """Squares (2, B) of opening and slip, and psi (B,), the energy of the whole bond."""
+        squares = np.stack([u[0] * u[0], np.sum(u[1:] * u[1:], axis=0)])
+        K = self.bond.normal_stiffness, self.bond.shear_stiffness
+        return squares, 0.5 * (K[0] * squares[0] + K[1] * squares[1])
 
 
 def half_axes(bond: Bond, damage: Array) -> Array:

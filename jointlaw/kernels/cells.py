@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..discretisation.tables import Tables
+from ..discretisation.tables import FacetTables
 from ..support.checks import Array
 from ..support.thresholds import TINY
 
@@ -19,7 +19,7 @@ class Cells(NamedTuple):
     kappa: Array  # its slope dG/dy
 
 
-def cells(k: Tables, y: Array) -> Cells:
+def cells(k: FacetTables, y: Array) -> Cells:
     """Virgin curve at y (M, B), and the share of every depth cell in it."""
     force, slope = k.curve.force(y)
     limits = [x[:, :, None] for x in (k.depth, k.depth_force, k.depth_slope)]
@@ -36,7 +36,7 @@ def cells(k: Tables, y: Array) -> Cells:
     return Cells(y, force, slope, G, kappa)
 
 
-def compliance(k: Tables) -> Array:
+def compliance(k: FacetTables) -> Array:
     """c1/(2 A lam) per facet (M, 1, 1): turns |q|^2/kappa into energy; 0 for an empty facet."""
     scale = 2 * k.area * k.lam
     return np.divide(k.c1, scale, out=np.zeros_like(scale), where=scale > 0)[:, None, None]

@@ -15,11 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..discretisation.tables import Tables
 from ..native import library
+from ..native.layout import Law
 from ..native.library import address
 from ..support.checks import Array, one_of
 from . import reference
+from .pack import pack
+from .reference import Tables
 from .threads import share_out, thread_count
 
 Index = NDArray[np.intp]
@@ -52,13 +54,17 @@ class Step:
     """A step of m joints of one batch: increments in, results out. It may be taken many times.
 
     d (m, dim) in m; F (m, dim) and C (m, dim, dim), which are written, C None for no tangent;
-    where: the joints that move (m,), None for all; keep: whether the states advance.
+    where: the joints that move (m,), None for all; keep: whether the states advance. shown
+    (m, 6 + dim), written if given, as it costs little in the same pass: shares sliding, slipping
+    and separated, stored and dissipated energy (J/m2), damage of the bond, displacement (m).
     """
 
     def __init__(
-        self, d: Array, F: Array, C: Array | None, where: Index | None = None, keep: bool = True
-    ) -> None:
+        self, d: Array, F: Array, C: Array | None, where: Index | None = None, keep: bool = True,
+        shown: Array | None = None,
+    ) -> None:  # fmt: skip
         self.d, self.F, self.C, self.where, self.keep = d, F, C, where, keep
+        self.shown = shown
         self.call: tuple[Array | None, Any] = None, None  # of these states, for `NativeEngine`
 
     def __getstate__(self) -> dict[str, Any]:
@@ -122,14 +128,44 @@ class NumpyEngine:
                 step.C[part] = np.moveaxis(C, 2, 0)
             if step.keep:
                 state[place] = new.T
+            if step.shown is not None:
+                now = reference.parts(self.tables, new)
+                damage = getattr(now, "damage", np.ones(len(F.T)))
+                shares = reference.measures(self.tables, new)[:4]
+                all_shown = np.stack([*shares, now.dissipated, damage, *now.delta])
+                step.shown[part] = all_shown.T
 
     def refresh(self, state: Array, n: int) -> None:
         """Nothing is kept beside the states."""
 
+    def traction(self, state: Array, out: Array) -> None:
+        """Write what the first n joints bear into out (n, dim), in Pa."""
+        out[:] = self._of_states(reference.traction, state, len(out)).T
+
+    def stiffness(self, state: Array, out: Array) -> None:
+        """Write bounds of `|C|` of the first n joints into out (n,), in Pa/m."""
+        out[:] = self._of_states(reference.stiffness, state, len(out))
+
     def measures(self, state: Array, out: Array) -> None:
         """Write the `Measures` of the first n joints into the rows of out (5, n)."""
-        rows = state[at(state, np.arange(out.shape[1]))].T
-        out[:] = reference.measures(self.tables, np.ascontiguousarray(rows))
+        out[:] = self._of_states(reference.measures, state, out.shape[1])
+
+    def _of_states(self, function: Any, state: Array, n: int) -> Any:
+        """What a function of the kernel says of the first n states."""
+        rows = state[at(state, np.arange(n))].T
+        return function(self.tables, np.ascontiguousarray(rows))
+
+
+class NativeLaw:
+    """The tables of a law as the library reads them."""
+
+    def __init__(self, tables: Tables) -> None:
+        numbers, arrays = pack(tables)
+        arrays = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
+        pointers = {name: array.ctypes.data for name, array in arrays.items()}
+        self._arrays = arrays  # which the structure points to
+        self._law = Law(**numbers, **pointers)
+        self.address = ctypes.addressof(self._law)
 
 
 class NativeEngine:
@@ -138,17 +174,18 @@ class NativeEngine:
     name = "native"
 
     def __init__(self, tables: Tables, loaded: ctypes.CDLL) -> None:
-        self._law, self._sliders = library.NativeLaw(tables), tables.sliders
-        self._library, self.lanes = loaded, loaded.jlaw_lanes()
+        self._law, self._sliders = NativeLaw(tables), tables.sliders
+        self._library, self.lanes = loaded, library.lanes(loaded)
         # rows of a block: the state, then Phi and Phi' of all facets, which save half the look-ups;
         # with flattened facets, the same at their depth
-        self.rows = tables.rows + 2 * (1 + tables.yields) * len(tables.c1)
+        facets = 0 if tables.asperities is None else len(tables.asperities.c1)
+        self.rows = tables.rows + 2 * (1 + tables.yields) * facets
 
     def advance(self, state: Array, step: Step, ledger: bool) -> None:
         """Take a step; `ledger` adds up the dissipated energy."""
         of, call = step.call
         if of is not state:
-            arrays = (address(array) for array in (step.d, step.F, step.C, step.where))
+            arrays = (address(array) for array in (step.d, step.F, step.C, step.shown, step.where))
             call = self._prepared(state, len(step.d), *arrays)
             step.call = state, call
         call.ledger, call.keep = ledger, step.keep
@@ -158,14 +195,25 @@ class NativeEngine:
         """Bring Phi and Phi', kept beside the first n states, up to date with them."""
         self._run(library.REFRESH, self._prepared(state, n))
 
+    def traction(self, state: Array, out: Array) -> None:
+        """As `NumpyEngine.traction`: that of a step by nothing."""
+        still = np.zeros_like(out)
+        call = self._prepared(state, len(out), address(still), address(out))
+        call.hold = 1
+        self._run(library.ADVANCE, call)
+
+    def stiffness(self, state: Array, out: Array) -> None:
+        """As `NumpyEngine.stiffness`."""
+        self._run(library.STIFFNESS, self._prepared(state, len(out), None, address(out)))
+
     def measures(self, state: Array, out: Array) -> None:
         """As `NumpyEngine.measures`."""
         self._run(library.MEASURE, self._prepared(state, out.shape[1], None, address(out)))
 
     def _prepared(self, state: Array, n: int, *arrays: int | None) -> library.BatchCall:
-        """A call for n joints; arrays: where d, F, C and the index begin."""
+        """A call for n joints; arrays: where d, F, C, what is shown and the index begin."""
         _, rows, lanes = state.shape
-        given = *arrays, *[None] * (4 - len(arrays))
+        given = *arrays, *[None] * (5 - len(arrays))
         return library.BatchCall(
             self._law.address, address(state), *given, n, 0, 0, rows, lanes == 1, self.lanes
         )

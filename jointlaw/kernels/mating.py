@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..discretisation.tables import Tables
+from ..discretisation.tables import FacetTables
 from ..support.checks import Array
 
 
@@ -29,7 +29,7 @@ class Turning(NamedTuple):
     gamma: Array  # (dim - 1, M, B)
 
 
-def offset(k: Tables, p: Array) -> Array:
+def offset(k: FacetTables, p: Array) -> Array:
     """The offset o (dim - 1, B) that facets climb at the in-plane displacement p (dim - 1, B)."""
     if not k.fades:
         return p
@@ -38,7 +38,7 @@ def offset(k: Tables, p: Array) -> Array:
     return o
 
 
-def planes(k: Tables, p: Array, slopes: Array) -> Planes:
+def planes(k: FacetTables, p: Array, slopes: Array) -> Planes:
     """The planes at p (dim - 1, B), where the share `slopes` (B,) of the slopes is left."""
     if not k.fades:
         one = np.ones((1, 1))
@@ -52,7 +52,7 @@ def planes(k: Tables, p: Array, slopes: Array) -> Planes:
     return Planes(g, c1 * g, np.stack([s, t]), c1 * N)
 
 
-def turning(k: Tables, p: Array, slopes: Array) -> Turning:
+def turning(k: FacetTables, p: Array, slopes: Array) -> Turning:
     """How the planes turn where p (dim - 1, B) changes."""
     along, across, m, N = _slope(k, p, slopes)
     w, x, z = _place(k, p)
@@ -77,7 +77,7 @@ def turning(k: Tables, p: Array, slopes: Array) -> Turning:
     return Turning(n, basis, c1 * (along * d_along + across * d_across) / N)
 
 
-def in_axes(k: Tables, v: Array) -> Array:
+def in_axes(k: FacetTables, v: Array) -> Array:
     """Vectors (3, M, B) along axis 1, the azimuth, and across it, in the axes (dim, M, B)."""
     e = k.azimuth[:, :, None]
     return np.concatenate([v[:1], v[1] * e + v[2] * _across(e)])[: k.dim]
@@ -87,7 +87,7 @@ def _across(e: Array) -> Array:
     return np.stack([-e[1], e[0]])
 
 
-def _place(k: Tables, p: Array) -> tuple[Array, Array, Array]:
+def _place(k: FacetTables, p: Array) -> tuple[Array, Array, Array]:
     """Root of 1 - |o/D|^2 (B,), and o/D along and across every azimuth (M, B)."""
     far = np.concatenate([p, np.zeros((2 - len(p), p.shape[1]))]) / k.mating_length
     w = 1 / np.sqrt(1 + np.sum(far * far, axis=0))
@@ -95,7 +95,7 @@ def _place(k: Tables, p: Array) -> tuple[Array, Array, Array]:
     return w, x, z
 
 
-def _slope(k: Tables, p: Array, slopes: Array) -> tuple[Array, Array, Array, Array]:
+def _slope(k: FacetTables, p: Array, slopes: Array) -> tuple[Array, Array, Array, Array]:
     """Slope of every facet now, slopes tan(theta) (do/dp) e: along the azimuth and across it.
 
     Then the roots of 1 + along^2 and of 1 + along^2 + across^2, all (M, B).

@@ -1,331 +1,148 @@
-"""The readable kernel: one step of a batch of joints. Every other kernel is tested against it.
+"""The readable kernel: a joint is the sum of its elements. All others are tested against it.
 
-Symbols and order are those of docs/theory-incremental.md. Arrays carry physical axes first and
-joints last: facets (M, B), cells (M, D, B), sliders (2, M, D, B). State (rows, B) holds
+Symbols and order are those of docs/theory-incremental.md. Arrays carry physical axes first and B
+joints last. A state (rows, B) holds
 
-    delta (dim) | dissipated energy (1) | q (2 M D)
+    delta (dim) | dissipated energy (1) | rows of the first element | of the second | ...
 
-where delta is counted from the mated position, and q is the shear force of a slider times lam, in
-the basis (s, t) of its facet: that of Eq. 25 where the joint is mated. With asperities that yield
-follow flattened depth (M) | plastic work (1); with wear, the share of the slopes that is gone (1) |
-work of friction (1); with a bond its damage (1).
+where delta is counted from the mated position.
 """
 
-from typing import NamedTuple
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from types import SimpleNamespace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..discretisation.tables import Tables
+from ..discretisation.tables import FacetTables
 from ..support.checks import Array
-from ..support.thresholds import LIMIT, NEAR, ROUNDED, TINY, UNDERFLOW
-from .bond import hold
-from .cells import Cells, cells, compliance, reciprocal
-from .mating import Planes, Turning, offset, planes, turning
-from .wear import lowered, worn_share
-from .yielding import flatten, flattened, plastic_work, softening
-
-Flags = NDArray[np.bool_]
+from . import asperities
+from .asperities import Asperities
+from .element import Element, Measures
+from .unmated import first_touch
 
 
-class State(NamedTuple):
-    """The parts of a state array (rows, B), as views."""
+@dataclass(frozen=True, eq=False)
+class Tables:
+    """All that a kernel reads of a law: its elements. The first tells what slips and touches."""
 
-    delta: Array
-    dissipated: Array
-    q: Array
-    depth: Array  # flattened depth of every facet (M, B), no rows where asperities do not yield
-    plastic: Array  # (B,) or no rows
-    worn: Array  # share of the slopes that is gone (B,), or no rows
-    work: Array  # of friction, which wears them (B,), or no rows
-    damage: Array  # of the bond (B,), or no rows
+    dim: int  # components of a displacement: 3, 2 in one plane, 1 for closure alone
+    elements: tuple[Element, ...]
 
-    @property
-    def slopes(self) -> Array:
-        """Share of the slopes that is left (B,)."""
-        return 1 - self.worn if self.worn.size else np.ones_like(self.dissipated)
+    @cached_property
+    def names(self) -> dict[str, int]:
+        """Rows of a state by name, in their order: how many of each."""
+        own = [row for element in self.elements for row in element.rows.items()]
+        return {"delta": self.dim, "dissipated": 1, **dict(own)}
 
-
-class Sliders(NamedTuple):
-    """The sliders of a step: trial forces (2, M, D, B), the rest (M, D, B)."""
-
-    trial: Array  # q before the friction limit
-    size: Array  # |trial|
-    strength: Array  # mu lam A gamma: the friction limit of q over G
-    cap: Array  # strength G: the friction limit of q
-    share: Array  # cap over size where the slider slips, 1 elsewhere
-    chord: Array  # of G over the step: stiffness of springs that were added on the way
-    grows: Flags  # whether the stiffness of the cell has grown
-    near: Flags  # whether y has hardly changed
-    slips: Flags  # whether the slider is at its friction limit, but for rounding
+    @cached_property
+    def rows(self) -> int:
+        """Numbers of a state."""
+        return sum(self.names.values())
 
     @property
-    def unit(self) -> Array:
-        """Direction of the trial force (2, M, D, B)."""
-        size = self.size
-        return np.divide(self.trial, size, out=np.zeros_like(self.trial), where=size > 0)
+    def asperities(self) -> FacetTables | None:
+        """The tables of the asperities, if the law has any."""
+        first = self.elements[0]
+        return first.k if isinstance(first, Asperities) else None
 
     @property
-    def push(self) -> Array:
-        """Derivative (2, M, D, B) of q by G: strength along a slider that slips, 0 elsewhere."""
-        return np.where(self.slips, self.strength * self.unit, 0.0)
+    def sliders(self) -> int:
+        """Sliders of a joint, at least one."""
+        return 1 if self.asperities is None else self.asperities.sliders
+
+    @property
+    def yields(self) -> bool:
+        """Whether asperities yield."""
+        return self.asperities is not None and self.asperities.yields
+
+    @property
+    def fades(self) -> bool:
+        """Whether slopes fade with the distance from the mated position."""
+        return self.asperities is not None and self.asperities.fades
+
+    @property
+    def unmated_start(self) -> Array:
+        """`delta` (dim,) in m of a joint whose faces have never met, at first touch.
+
+        Zeros where nothing but a bond or cohesion is missing. Raises ValueError where nothing is.
+        """
+        k = self.asperities
+        if k is None or ("damage" in self.names and not (k.fades and k.dim > 1)):
+            return np.zeros(self.dim)
+        return first_touch(k)
+
+    @property
+    def stretch(self) -> float:
+        """Bound of the closure that an element feels over the size of the displacement."""
+        return max(element.stretch for element in self.elements)
+
+    def own(self, *states: Array) -> Iterator[tuple[Element, list[Array]]]:
+        """Every element with its own rows of these states, as views."""
+        at = self.dim + 1
+        for element in self.elements:
+            end = at + sum(element.rows.values())
+            yield element, [state[at:end] for state in states]
+            at = end
 
 
 def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array, Array | None]:
     """Advance joints by the increments d (dim, B): new state, F (dim, B), C (dim, dim, B).
 
-    1. Where slopes wear they have, by the work of friction so far ("Wear"). The joint moves: delta
-       += d. Every facet then has y = n . (closure, offset)/c1, before and after; the offset is the
-       displacement in the plane, less than the mating length ("Mating").
-    2. Virgin curve at y: Phi, Phi', and the share G, kappa = dG/dy of every depth cell ("Few
-       cells, exact virgin curve").
-    3. Sliders are loaded by the increment de of the facet's plane at mid-step. Where kappa grew,
-       q += A/c1 chord de; where it fell, the springs that part take their force along,
-       q = q kappa1/kappa0 + A/c1 kappa1 de.
-    4. Coulomb friction: |q| <= mu lam A gamma G (Eq. 5, 6).
-       Where asperities yield, Phi, G and kappa are less their values at the flattened depth
-       ("Yielding").
-    5. Traction: F = sum of A Phi n + (1/lam) sum of q (Eq. 21), by the planes at the end.
-    6. Dissipated energy, every term >= 0 ("No step creates energy").
-    7. Tangent C = dF/dd ("The tangent"), not without `tangent`.
-    8. The bond, if there is one, adds its own F, dissipated energy and C ("The bond").
+    The displacement grows by d; tractions, tangents and losses of the elements add up. Their own
+    numbered steps: `Asperities.step`, `hold` of the bond, `Coulomb.step`.
     """
-    old = parts(k, state)
-    new_state = np.empty_like(state)
-    new = parts(k, new_state)
-    q, lost = old.q, np.zeros(d.shape[1])
-    if k.wears:
-        new.worn[:] = worn_share(k, old.worn, old.work)
-        q, lost = wear(k, old, new.slopes)
-    new.delta[:] = old.delta + d
-    middle = planes(k, old.delta[1:] + 0.5 * d[1:], new.slopes)
-    end = planes(k, new.delta[1:], new.slopes)
-
-    before = cells(k, effective_closure(k, old.delta, new.slopes))
-    after = cells(k, effective_closure(k, new.delta, new.slopes))
-    gained, flat0, flat1 = after.G - before.G, None, None
-    if k.yields:
-        new.depth[:] = flatten(k, old.depth, after.y)
-        flat0, flat1 = cells(k, old.depth), cells(k, new.depth)
-        new.plastic[:] = old.plastic + plastic_work(k, before.y, after.y, flat0, flat1)
-        gained = after.G - np.maximum(before.G, flat0.G)
-        before, after = flattened(before, flat0), flattened(after, flat1)
-
-    de = np.einsum("edmb,db->emb", middle.basis, d)[:, :, None]  # in the facet (2, M, 1, B)
-    sliders = load(k, before, gained, after, strength(k, end.gamma), q, de)
-    resolved = sliders.size**2 > TINY  # squares of smaller forces underflow: they count as zero
-    new.q[:] = np.where(resolved, sliders.share, 0.0) * sliders.trial
-    F = resultant(k, end, after.force, new.q)
-
-    rubbed = friction_loss(k, before, after, q, sliders)
-    new.dissipated[:] = old.dissipated + (lost + rubbed)
-    if k.wears:
-        new.work[:] = old.work + rubbed
-    if k.yields:
-        new.dissipated[:] += new.plastic - old.plastic
-    held = None
-    if k.bond is not None:
-        held = hold(k.bond, new.delta, old.damage)
-        new.damage[:] = held.damage
-        new.dissipated[:] += held.lost
-        F = F + held.F
-    if not tangent:
-        return new_state, F, None
-    E = middle.basis
-    if k.fades:  # the middle moves by half of what d changes by
-        turned = turning(k, old.delta[1:] + 0.5 * d[1:], new.slopes).basis
-        E = np.broadcast_to(E, (*E.shape[:3], d.shape[1])).copy()
-        E[:, 1:] += 0.5 * np.einsum("edjmb,db->ejmb", turned, d)
-    C = stiffness(k, before, after, sliders, de, E, end)
-    if flat0 is not None and flat1 is not None:
-        C = C - softening(k, after, flat0, flat1, sliders.push, end)
-    if k.fades:
-        C[:, 1:] += bending(k, after, sliders, new.q, end, turning(k, new.delta[1:], new.slopes))
-    if held is not None:
-        C = C + held.C
-    return new_state, F, C
+    new, dim = np.array(state), k.dim
+    new[:dim] += d
+    F, lost = np.zeros_like(d), np.zeros(d.shape[1])
+    C = np.zeros((dim, dim, d.shape[1])) if tangent else None
+    for element, (before, after) in k.own(state, new):
+        share = element.step(state[:dim], d, before, after, tangent)
+        F, lost = F + share.F, lost + share.lost
+        if C is not None and share.C is not None:
+            C = C + share.C
+    new[dim] += lost
+    return new, F, C
 
 
-def parts(k: Tables, state: Array) -> State:
-    """Views of the parts of a state array, q as (2, M, D, B)."""
-    dim, M = k.dim, len(k.c1)
-    state, damage = (state, state[:0]) if k.bond is None else (state[:-1], state[-1])
-    q, rest = np.split(state[dim + 1 :], [2 * M * k.cells])
-    depth, plastic = (rest[:M], rest[M]) if k.yields else (rest[:0], rest[:0])
-    worn, work = rest[-2:] if k.wears else (rest[:0], rest[:0])
-    q = q.reshape(2, M, k.cells, -1)
-    return State(state[:dim], state[dim], q, depth, plastic, worn, work, damage)
+def parts(k: Tables, state: Array) -> SimpleNamespace:
+    """Views of the parts of a state array by name, as rows (B,) where there is one of a kind.
 
-
-def effective_closure(k: Tables, delta: Array, slopes: Array) -> Array:
-    """Effective closure y = n . (closure, offset)/c1 of every facet (M, B)."""
-    y: Array = k.m[0][:, None] * delta[0]
-    for row, o in zip(k.m[1:], offset(k, delta[1:]), strict=True):
-        y = y + row[:, None] * (slopes * o if k.wears else o)
-    return np.where(np.abs(y) < UNDERFLOW, 0.0, y)
-
-
-def wear(k: Tables, old: State, slopes: Array) -> tuple[Array, Array]:
-    """q (2, M, D, B) and lost energy (B,) after slopes have fallen to the share `slopes` (B,)."""
-    flat = cells(k, old.depth) if k.yields else None
-    was, now = (
-        flattened(cells(k, effective_closure(k, old.delta, share)), flat)
-        for share in (old.slopes, slopes)
-    )
-    mean = 0.5 * (k.area * k.c1)[:, None] * (was.force + now.force)
-    normal = np.sum(mean * (was.y - now.y), axis=0)
-    limit = strength(k, planes(k, old.delta[1:], slopes).gamma)
-    q, lost = lowered(k, was, now, limit, old.q)
-    return q, lost + np.maximum(normal, 0.0)  # >= 0 by the pairs of facets, but for rounding
-
-
-def load(
-    k: Tables, before: Cells, gained: Array, after: Cells, strength: Array, q: Array, de: Array
-) -> Sliders:
-    """Trial forces of all sliders and their friction limits: steps 3 and 4 of `step`.
-
-    gained: what G of every cell grows by, before springs yield at the new y, which they do at once.
+    Those of asperities as `asperities.State` has them, and the share of the slopes that is left.
     """
-    kappa0, kappa1 = before.kappa, after.kappa
-    dy = (after.y - before.y)[:, None]
-    near = np.abs(dy) <= NEAR * np.abs(after.y)[:, None]
-    if k.yields:  # all flattened springs touch at one closure: the mean is wrong in that step
-        near = near & ((kappa0 > 0) | (kappa1 == 0))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        chord = np.where(near, 0.5 * (kappa0 + kappa1), gained / dy)
-    chord = np.clip(chord, np.minimum(kappa0, kappa1), np.maximum(kappa0, kappa1))
-    a = (k.area / k.c1)[:, None, None]
-    grows = kappa1 > kappa0
-    kept = np.divide(kappa1, kappa0, out=np.zeros_like(kappa0), where=kappa0 > 0)
-    trial = np.where(grows, q + a * chord * de, q * kept + a * kappa1 * de)
-    cap = strength * after.G
-    size = np.sqrt(trial[0] ** 2 + trial[1] ** 2)
-    share = np.divide(cap, size, out=np.ones_like(size), where=size > cap)
-    force = k.curve.force(after.y)[0] if k.yields else after.force
-    slips = at_limit(size, strength, after.G, force)
-    return Sliders(trial, size, strength, cap, share, chord, grows, near, slips)
-
-
-def strength(k: Tables, gamma: Array) -> Array:
-    """mu lam A gamma per facet (M, 1, B): the friction limit of q over G."""
-    return k.mu * k.lam * k.area[:, None, None] * gamma[:, None]
-
-
-def resultant(k: Tables, now: Planes, force: Array, q: Array) -> Array:
-    """Traction F (dim, B) of the normal forces A Phi n, force = Phi (M, B), and the sliders q."""
-    F: Array = np.einsum("dmb,mb->db", now.n, k.area[:, None] * force)
-    return F + np.einsum("edmb,emb->db", now.basis, q.sum(axis=2)) / k.lam
-
-
-def at_limit(size: Array, strength: Array, G: Array, force: Array) -> Flags:
-    """Whether sliders whose |q| is `size` are at their friction limit, but for rounding.
-
-    force: Phi (M, B) of the virgin curve, whose rounding G has.
-    """
-    return size >= strength * (G * (1 - LIMIT) - ROUNDED * force[:, None])
-
-
-def friction_loss(k: Tables, before: Cells, after: Cells, q: Array, sliders: Sliders) -> Array:
-    """Energy (B,) in J/m2 that sliders, and springs that part under shear, lose in a step.
-
-    Each term is >= 0 as written, for kappa0 <= chord <= kappa1 where the stiffness grows.
-    """
-    kappa0, chord, share = before.kappa, sliders.chord, sliders.share
-    q2, trial2 = q[0] ** 2 + q[1] ** 2, sliders.size**2
-    r0, r1, rc = reciprocal(kappa0), reciprocal(after.kappa), reciprocal(chord)
-    hardening = trial2 * (rc - r1) + np.where(kappa0 > TINY, q2 * (r0 - rc), 0.0)
-    softening = (kappa0 - after.kappa) * r0 * (q2 * r0)
-    lost = np.where(sliders.grows, np.where(chord > TINY, hardening, 0.0), softening)
-    lost = lost + 2 * share * (1 - share) * (trial2 * r1)
-    return np.sum(compliance(k) * lost, axis=(0, 1))
-
-
-def stiffness(
-    k: Tables, before: Cells, after: Cells, sliders: Sliders, de: Array, E: Array, end: Planes
-) -> Array:
-    """Tangent C = dF/dd (dim, dim, B) of planes that keep their slopes.
-
-    J_q = beta (I - s s^T) E + v g^T per cell, summed; E (2, dim, M, B) is d(de)/dd.
-    """
-    trial, share, chord, grows = sliders.trial, sliders.share, sliders.chord, sliders.grows
-    y, kappa = after.y, after.kappa
-    a = (k.area / k.c1)[:, None, None]
-    depth = k.depth[:, :, None]
-    inside = (y[:, None] > depth[:, :-1]) & (y[:, None] < depth[:, 1:])
-    p = np.where(inside, k.curve.curvature(y)[:, None], 0.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        chord_slope = np.where(sliders.near, p / 2, (kappa - chord) / (y - before.y)[:, None])
-    # rounding must not decide: a facet that did not close has not grown; q at its limit slips
-    stiffer = grows & ((y - before.y) > ROUNDED * np.abs(y))[:, None]
-    v = np.where(stiffer, a * chord_slope * de, p * reciprocal(kappa) * trial)
-    beta = np.where(sliders.cap > 0, a * np.where(grows, chord, kappa), 0.0)
-    slips, unit = sliders.slips, sliders.unit
-    v = np.where(slips, share * (v - unit * np.sum(unit * v, axis=0)), v)
-    v = v + np.where(slips, sliders.strength * kappa * unit, 0.0)
-    beta = np.where(slips, share * beta, beta)
-    outer = np.where(slips, unit[:, None] * unit[None], 0.0)
-    inner = np.sum(beta * (np.eye(2)[:, :, None, None, None] - outer), axis=3)  # (2, 2, M, B)
-    along = end.n * (k.area[:, None] * after.slope)
-    along = along + np.einsum("edmb,emb->dmb", end.basis, np.sum(v, axis=2)) / k.lam
-    C: Array = np.einsum("imb,jmb->ijb", along, np.broadcast_to(end.g, along.shape))
-    C = C + np.einsum("eimb,efmb,fjmb->ijb", end.basis, inner, E) / k.lam
-    return C
-
-
-def bending(
-    k: Tables, after: Cells, sliders: Sliders, q: Array, end: Planes, turned: Turning
-) -> Array:
-    """Part (dim, dim - 1, B) of the tangent by which the planes at the end turn and flatten."""
-    limited = np.sum(sliders.push * after.G, axis=2)  # of q by log(gamma)
-    by_gamma = np.einsum("eimb,emb->imb", end.basis, limited / end.gamma) / k.lam
-    C: Array = np.einsum("ijmb,mb->ijb", turned.n, k.area[:, None] * after.force)
-    C = C + np.einsum("eijmb,emb->ijb", turned.basis, q.sum(axis=2)) / k.lam
-    return C + np.einsum("imb,jmb->ijb", by_gamma, turned.gamma)
+    named, at = {}, 0
+    for name, several in k.names.items():
+        named[name] = state[at] if several == 1 and at else state[at : at + several]
+        at += several
+    for element, (own,) in k.own(state):
+        if isinstance(element, Asperities):
+            now = asperities.parts(element.k, own)
+            named |= {**now._asdict(), "slopes": now.slopes}
+    return SimpleNamespace(**named)
 
 
 def traction(k: Tables, state: Array) -> Array:
     """Traction F (dim, B) in Pa that a state carries."""
-    now = parts(k, state)
-    y = effective_closure(k, now.delta, now.slopes)
-    force, _ = k.curve.force(y)
-    if k.yields:
-        force = np.where(y > now.depth, force - k.curve.force(now.depth)[0], 0.0)
-    F = resultant(k, planes(k, now.delta[1:], now.slopes), force, now.q)
-    return F if k.bond is None else F + hold(k.bond, now.delta, now.damage).F
+    return sum_of(element.traction(state[: k.dim], own) for element, (own,) in k.own(state))
 
 
-class Measures(NamedTuple):
-    """What the states of joints amount to, arrays (n,): docs/theory-incremental.md."""
-
-    sliding: Array  # share of all facet orientations: in touch, every cell at its limit
-    slipping: Array  # share of the friction capacity that is at its limit
-    separated: Array  # share of all facet orientations: out of touch
-    stored: Array  # elastic energy, J/m2
-    reach: Array  # largest effective closure of any facet, m
+def stiffness(k: Tables, state: Array) -> Array:
+    """Upper bound (B,) of `|C|` in Pa/m of joints in these states."""
+    return sum_of(element.stiffness(state[: k.dim], own) for element, (own,) in k.own(state))
 
 
 def measures(k: Tables, state: Array) -> Measures:
     """Shares, stored energy and reach of a batch of states (rows, B)."""
-    state_now = parts(k, state)
-    virgin = cells(k, effective_closure(k, state_now.delta, state_now.slopes))
-    now = flattened(virgin, cells(k, state_now.depth) if k.yields else None)
-    y, force, G = now.y, now.force, now.G
-    limit = strength(k, planes(k, state_now.delta[1:], state_now.slopes).gamma)
-    q2 = state_now.q[0] ** 2 + state_now.q[1] ** 2
-    capped = at_limit(np.sqrt(q2), limit, G, virgin.force)
-    weight = (k.weight / k.weight.sum())[:, None]
-    touches = y > (state_now.depth if k.yields else 0.0)
-    sliding = np.sum(weight * (touches & np.all(capped, axis=1)), axis=0)
-    total = np.where(force > 0, force, 1.0)
-    slipping = np.sum(weight * np.sum(np.where(capped, G, 0.0), axis=1) / total, axis=0)
-    separated = np.sum(weight * ~touches, axis=0)
-    normal = k.curve.energy(y)
-    if k.yields:
-        depth = state_now.depth
-        normal = normal - k.curve.energy(depth) - k.curve.force(depth)[0] * (y - depth)
-        normal = np.where(touches, np.maximum(normal, 0.0), 0.0)
-    stored = np.sum((k.area * k.c1)[:, None] * normal, axis=0)
-    stored = stored + np.sum(compliance(k) * q2 * reciprocal(now.kappa), axis=(0, 1))
-    if k.bond is not None:
-        stored = stored + hold(k.bond, state_now.delta, state_now.damage).stored
-    return Measures(sliding, slipping, separated, stored, np.max(y, axis=0))
+    delta, owned = state[: k.dim], [(element, own) for element, (own,) in k.own(state)]
+    first = owned[0][0].measures(delta, owned[0][1])
+    beside = (element.stored(delta, own) for element, own in owned[1:])
+    return first._replace(stored=sum(beside, start=first.stored))
+
+
+def sum_of(terms: Iterator[Array]) -> Array:
+    """The sum of what every element gives."""
+    total = next(terms)
+    for term in terms:
+        total = total + term
+    return total

@@ -1,21 +1,18 @@
-"""Where a joint starts whose faces have never met."""
+"""Where the asperities of a joint touch first whose faces have never met."""
 
 import numpy as np
 
-from ..discretisation.tables import Tables
+from ..discretisation.tables import FacetTables
 from ..support.checks import Array
 from ..support.thresholds import FAR, ROUNDED
 from .mating import offset
 
 
-def unmated_start(k: Tables) -> Array:
+def first_touch(k: FacetTables) -> Array:
     """Displacement (dim,) in m from the mated position, at first touch, along axis 2.
 
-    Zeros for a law without a mating length, or without shear, whose bond alone is missing. Raises
-    ValueError for such a law without a bond.
+    Raises ValueError for asperities that are always mated.
     """
-    if k.bond is not None and not (k.fades and k.dim > 1):
-        return np.zeros(k.dim)
     if k.dim == 1:
         raise ValueError("mated=False: a joint with closure_only is always mated")
     if not k.fades:

@@ -2,18 +2,20 @@
 
 import numpy as np
 
-from ..discretisation.tables import Tables
+from ..discretisation.tables import FacetTables
 from ..support.checks import Array
 from .cells import Cells, compliance, reciprocal
 
 
-def worn_share(k: Tables, worn: Array, work: Array) -> Array:
+def worn_share(k: FacetTables, worn: Array, work: Array) -> Array:
     """The share (B,) of the slopes that is gone after the work (B,) of friction in J/m2."""
     now = (k.slope_residual - 1) * np.expm1(-work / k.slope_wear)
     return np.maximum(worn, now)
 
 
-def lowered(k: Tables, old: Cells, now: Cells, strength: Array, q: Array) -> tuple[Array, Array]:
+def lowered(
+    k: FacetTables, old: Cells, now: Cells, strength: Array, q: Array
+) -> tuple[Array, Array]:
     """q where slopes have worn and joints have not moved, and what sliders lose by it (B,) in J/m2.
 
     As in a step without an increment: springs that part take their force along, and friction

@@ -8,14 +8,14 @@ therefore those of elastic springs at y less those at z_p.
 import numpy as np
 from numpy.typing import NDArray
 
-from ..discretisation.tables import Tables
+from ..discretisation.tables import FacetTables
 from ..support.checks import Array
 from ..support.thresholds import ROUNDED
 from .cells import Cells
 from .mating import Planes
 
 
-def flatten(k: Tables, depth: Array, y: Array) -> Array:
+def flatten(k: FacetTables, depth: Array, y: Array) -> Array:
     """Flattened depth (M, B) of every facet once the closures y (M, B) are reached."""
     own = np.maximum(depth, y - k.yield_depth[:, None])
     return np.maximum(own, own[k.opposite])
@@ -33,7 +33,7 @@ def flattened(virgin: Cells, flat: Cells | None) -> Cells:
     return Cells(virgin.y, force, np.where(touches, virgin.slope, 0.0), G, kappa)
 
 
-def flattens_itself(k: Tables, y1: Array, z1: Array) -> NDArray[np.bool_]:
+def flattens_itself(k: FacetTables, y1: Array, z1: Array) -> NDArray[np.bool_]:
     """Whether facets (M, B) flatten themselves; else the opposite one does.
 
     Both do, but for rounding, where the shear does not move them, as at a right angle to it.
@@ -42,7 +42,7 @@ def flattens_itself(k: Tables, y1: Array, z1: Array) -> NDArray[np.bool_]:
     return own
 
 
-def plastic_work(k: Tables, y0: Array, y1: Array, flat0: Cells, flat1: Cells) -> Array:
+def plastic_work(k: FacetTables, y0: Array, y1: Array, flat0: Cells, flat1: Cells) -> Array:
     """Energy (B,) in J/m2 that springs lose while they are flattened.
 
     Exact for springs that the closure of their own facet flattens; for those that the opposite
@@ -55,7 +55,7 @@ def plastic_work(k: Tables, y0: Array, y1: Array, flat0: Cells, flat1: Cells) ->
 
 
 def softening(
-    k: Tables, after: Cells, flat0: Cells, flat1: Cells, push: Array, end: Planes
+    k: FacetTables, after: Cells, flat0: Cells, flat1: Cells, push: Array, end: Planes
 ) -> Array:
     """Part (dim, dim, B) by which yielding lowers the tangent: the flattened depth moves along.
 

@@ -7,10 +7,10 @@ import numpy as np
 
 from ..joints.crushed import warn_if_crushed
 from ..joints.joint import Joint
+from ..joints.normal_control import NormalCondition, closing_increments
 from ..joints.state import NonFiniteError
 from ..support.checks import Array, at_least, integer, more_than, number, numbers, one_of
 from ..support.progress import track
-from .normal_control import NormalCondition, closing_increments
 from .record import UNITS, Record
 
 CONTROLS = ("stress", "stiffness", "closure")
@@ -44,7 +44,7 @@ def closure_test(
     """
     peaks = [more_than("stress", s, 0.0) for s in _series("stress", stress, "Pa")]
     steps = integer("steps", steps, 1)
-    grading = (np.arange(1, steps + 1) / steps) ** (1 + joint.law.asperity.eta)
+    grading = (np.arange(1, steps + 1) / steps) ** _power(joint)
     levels: list[float] = []
     start = max(float(joint.F[0]), 0.0)
     for peak in peaks:
@@ -54,7 +54,7 @@ def closure_test(
         start = levels[-1]
     log = _Log(joint, 0.0, "closure test")
     log.measure(joint.F)
-    still = np.zeros(joint.law.tables.dim - 1)
+    still = np.zeros(joint.law.dim - 1)
     for level in track(levels, "closure test", len(levels)):
         log.advance(still, NormalCondition(level, max(peaks)))
     return log.record()
@@ -98,7 +98,7 @@ def direct_shear(
         stiffness = at_least("stiffness", stiffness, 0.0)
     elif stiffness is not None:
         raise ValueError(f'stiffness is for control = "stiffness", not {control!r}')
-    if joint.law.closure_only:
+    if joint.law.dim == 1:
         raise ValueError("joint: its law has closure_only; direct shear needs a law without")
     plane = joint.law.plane
     if plane is not None and azimuth not in (0.0, plane):
@@ -115,6 +115,12 @@ def direct_shear(
     for length in track(legs, "direct shear", len(legs)):
         log.advance(length * along, None if control == "closure" else condition)
     return log.record()
+
+
+def _power(joint: Joint) -> float:
+    """The power of closure with which stress grows where all asperities touch."""
+    asperities = joint.law.tables.asperities
+    return 1.0 if asperities is None else 1.0 + asperities.curve.eta
 
 
 def _series(name: str, value: float | Sequence[float], unit: str) -> Array:

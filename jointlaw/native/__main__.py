@@ -2,14 +2,16 @@
 
 import sys
 
-from . import build, layout
+from . import build
 
 if len(sys.argv) > 1:
     sys.exit(f"{__doc__} It takes no options; for other machines: builder/wheels.py")
-for name, text in layout.made().items():
-    if (build.HERE / name).read_text(encoding="utf-8") != text:
-        (build.HERE / name).write_text(text, encoding="utf-8")
+build.write_headers()
 compiler = build.find_compiler()
 if compiler is None:
     sys.exit("no C compiler works here: install gcc or clang, or `pip install ziglang`")
-sys.stdout.write(f"{build.build(compiler)} by {' '.join(compiler.command)}\n")
+try:
+    made = build.build(compiler)
+except ValueError as error:
+    sys.exit(str(error))
+sys.stdout.write(f"{made} by {' '.join(compiler.command)}\n")

@@ -4,7 +4,7 @@
  */
 #include "batch.h"
 #include "lanes.h"
-#include "bond.h"
+#include "elements.h"
 #include "law.h"
 #include <stdlib.h>
 #include <string.h>
@@ -18,24 +18,43 @@
 #define BLOCK JLAW_BLOCK /* joints of a block */
 #endif
 
-/* Advance the joints of a block: d, F and C of the first of them */
+/* What joints at n amount to after a step, into rows of b->shown */
+static void show(const jlaw_batch *b, jl_numbers n, const jl_amounts *all, double *to, int some)
+{
+  const int dim = b->law->dim, size = JLAW_SHOWN + dim, last = jl_state_rows(b->law) - 1;
+  for (int l = 0; l < some; l++, to += size) {
+    const double *s = n.s + l;
+    to[JLAW_SLIDING] = JL_JOINT(all->sliding, l);
+    to[JLAW_SLIPPING] = JL_JOINT(all->slipping, l);
+    to[JLAW_SEPARATED] = JL_JOINT(all->separated, l);
+    to[JLAW_STORED] = JL_JOINT(all->stored, l);
+    to[JLAW_LOST] = s[(size_t) dim * n.stride];
+    to[JLAW_DAMAGE] = jl_element_rows(b->law) ? s[(size_t) last * n.stride] : 1.0;
+    for (int i = 0; i < dim; i++) to[JLAW_SHOWN + i] = s[(size_t) i * n.stride];
+  }
+}
+
+/* Advance the joints of a block: d, F, C and what is shown of the first of them */
 static void advance_block(const jlaw_batch *b, double *block, size_t ahead, long first, int count)
 {
-  const int dim = b->law->dim, kept = b->rows > state_rows(b->law);
+  const int dim = b->law->dim, kept = b->rows > jl_state_rows(b->law);
   const double *d = b->d + first * dim;
   double *F = b->F + first * dim, *C = b->C ? b->C + first * dim * dim : NULL;
-  for (int at = 0; at < count; at += JOINTS) {
-    const numbers n = {block + at, BLOCK, ahead};
-    of_joint p[3], f[3], c[9];
-    const int some = count - at < JOINTS ? count - at : JOINTS;
+  for (int at = 0; at < count; at += JL_JOINTS) {
+    const jl_numbers n = {block + at, BLOCK, ahead};
+    jl_of_joint p[3], f[3], c[9];
+    const int some = count - at < JL_JOINTS ? count - at : JL_JOINTS;
     for (int i = 0; i < dim; i++) {
-      p[i] = each_joint(0.0);
-      for (int l = 0; l < some; l++) JOINT(p[i], l) = d[(at + l) * dim + i];
+      p[i] = jl_each_joint(0.0);
+      for (int l = 0; l < some; l++) JL_JOINT(p[i], l) = d[(at + l) * dim + i];
     }
-    step_of_kind(b->law, n, p, f, c, b->ledger, C != NULL, kept);
+    jl_amounts all;
+    jl_step_of_kind(b->law, n, p, f, c, b->ledger, C != NULL, kept, b->hold,
+                    b->shown ? &all : NULL);
+    if (b->shown) show(b, n, &all, b->shown + (first + at) * (JLAW_SHOWN + dim), some);
     for (int l = 0; l < some; l++) {
-      for (int i = 0; i < dim; i++) F[(at + l) * dim + i] = JOINT(f[i], l);
-      for (int i = 0; C && i < dim * dim; i++) C[(at + l) * dim * dim + i] = JOINT(c[i], l);
+      for (int i = 0; i < dim; i++) F[(at + l) * dim + i] = JL_JOINT(f[i], l);
+      for (int i = 0; C && i < dim * dim; i++) C[(at + l) * dim * dim + i] = JL_JOINT(c[i], l);
     }
   }
 }
@@ -80,12 +99,24 @@ int NAME(jlaw_advance)(const jlaw_batch *b, long first, long last)
 /* Measures (5, n) of joints first to last - 1, as reference.measures, into b->F */
 int NAME(jlaw_measure)(const jlaw_batch *b, long first, long last)
 {
-  for (long at = first; at < last; at += JOINTS) {
-    const numbers n = {joint_of(b, at), BLOCK, 0};
-    const amounts all = measure(b->law, n);
-    const of_joint out[5] = {all.sliding, all.slipping, all.separated, all.stored, all.reach};
+  for (long at = first; at < last; at += JL_JOINTS) {
+    const jl_numbers n = {joint_of(b, at), BLOCK, 0};
+    const jl_amounts all = jl_measure(b->law, n);
+    const jl_of_joint out[5] = {all.sliding, all.slipping, all.separated, all.stored, all.reach};
     for (int i = 0; i < 5; i++)
-      for (int l = 0; l < JOINTS && at + l < last; l++) b->F[i * b->n + at + l] = JOINT(out[i], l);
+      for (int l = 0; l < JL_JOINTS && at + l < last; l++)
+        b->F[i * b->n + at + l] = JL_JOINT(out[i], l);
+  }
+  return 0;
+}
+
+/* Bounds (n,) of |C| of joints first to last - 1 as they are, into b->F */
+int NAME(jlaw_stiffness)(const jlaw_batch *b, long first, long last)
+{
+  for (long at = first; at < last; at += JL_JOINTS) {
+    const jl_numbers n = {joint_of(b, at), BLOCK, 0};
+    const jl_of_joint bound = jl_stiffness(b->law, n);
+    for (int l = 0; l < JL_JOINTS && at + l < last; l++) b->F[at + l] = JL_JOINT(bound, l);
   }
   return 0;
 }
@@ -94,18 +125,18 @@ int NAME(jlaw_measure)(const jlaw_batch *b, long first, long last)
 int NAME(jlaw_refresh)(const jlaw_batch *b, long first, long last)
 {
   const jlaw_law *law = b->law;
-  const int M = law->facets, kept = state_rows(law);
-  for (long joint = first; joint < last; joint += JOINTS) {
-    const numbers n = {joint_of(b, joint), BLOCK, 0};
-    for (int at = 0; at < M && b->rows > kept; at += TOGETHER) {
-      const int some = M - at < TOGETHER ? M - at : TOGETHER;
-      facets o;
-      facets_now(law, n, at, &o);
-      put(n, kept + at, 1, some, o.f1);
-      put(n, kept + M + at, 1, some, o.k1);
+  const int M = law->facets, kept = jl_state_rows(law);
+  for (long joint = first; joint < last; joint += JL_JOINTS) {
+    const jl_numbers n = {joint_of(b, joint), BLOCK, 0};
+    for (int at = 0; at < M && b->rows > kept; at += JL_TOGETHER) {
+      const int some = M - at < JL_TOGETHER ? M - at : JL_TOGETHER;
+      jl_facets o;
+      jl_facets_now(law, n, at, &o);
+      jl_put(n, kept + at, 1, some, o.f1);
+      jl_put(n, kept + M + at, 1, some, o.k1);
       if (!law->yields) continue;
-      put(n, kept + 2 * M + at, 1, some, o.fz1);
-      put(n, kept + 3 * M + at, 1, some, o.kz1);
+      jl_put(n, kept + 2 * M + at, 1, some, o.fz1);
+      jl_put(n, kept + 3 * M + at, 1, some, o.kz1);
     }
   }
   return 0;

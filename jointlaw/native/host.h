@@ -139,7 +139,7 @@ extern "C" {
  * other with the same bits. AVX2 or AVX-512 where the machine has it, found out at run time. */
 #if defined(__GNUC__) && !defined(JOINTLAW_PLAIN) && !defined(__CUDACC__) \
     && !defined(__CUDACC_RTC__)
-#define W 4
+#define JL_W 4
 #define JLAW_ABREAST
 #endif
 #if defined(__x86_64__) && defined(__gnu_linux__) && defined(__OPTIMIZE__) && !defined(__AVX2__) \
@@ -150,7 +150,7 @@ extern "C" {
 #endif
 
 #include "lanes.h"
-#include "bond.h"
+#include "elements.h"
 #include "law.h"
 
 /* ------------------------------------------------------------------ messages */
@@ -208,10 +208,10 @@ static JLAW_FUNCTION double jlaw_none_(void)
 /* Phi and Phi' at one y */
 static JLAW_FUNCTION double jlaw_virgin_one_(const jlaw_law *law, double y, double *slope)
 {
-  real forces, slopes;
-  virgin_curve(law, resolved(each(y)), &forces, &slopes, (real *) 0);
-  *slope = LANE(slopes, 0);
-  return LANE(forces, 0);
+  jl_real forces, slopes;
+  jl_virgin_curve(law, jl_resolved(jl_each(y)), &forces, &slopes, (jl_real *) 0);
+  *slope = JL_LANE(slopes, 0);
+  return JL_LANE(forces, 0);
 }
 
 static JLAW_FUNCTION double jlaw_of_facet_(const jlaw_law *law, int facet, int at)
@@ -229,8 +229,8 @@ enum { JLAW_LEDGER = 1 };
 JLAW_CLONES JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t stride,
                                          const double *d, double *F, double *C)
 {
-  const numbers n = {s, stride, 0};
-  step_of_kind(law, n, d, F, C, JLAW_LEDGER, C != NULL, 0);
+  const jl_numbers n = {s, stride, 0};
+  jl_step_of_kind(law, n, d, F, C, JLAW_LEDGER, C != NULL, 0, 0, NULL);
 }
 
 /* Whether all sliders hold forces that a law can have; 0 for NaN */
@@ -247,15 +247,19 @@ static JLAW_FUNCTION int jlaw_sound_(const double *q, int n)
 /* Whether energies, flattened depths, wear and damage of a state are numbers of this law */
 static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
 {
-  const double *rest = s + rest_row(law), *worn = s + worn_row(law);
+  const double *rest = s + jl_rest_row(law), *worn = s + jl_worn_row(law);
   int good = fabs(s[law->dim]) <= DBL_MAX;
   for (int f = 0; law->yields && f < law->facets; f++)
     good = good && rest[f] >= 0.0 && rest[f] <= law->largest_reach;
   if (law->yields) good = good && fabs(rest[law->facets]) <= DBL_MAX;
   if (law->wears)
     good = good && worn[0] >= 0.0 && worn[0] <= 1.0 && worn[1] >= 0.0 && worn[1] <= DBL_MAX;
-  if (law->bonded) good = good && s[damage_row(law)] >= 0.0 && s[damage_row(law)] <= 1.0;
-  return good && jlaw_sound_(s + slider_row(law), rest_row(law) - slider_row(law));
+  const double *row = s + jl_element_row(law);
+#define JL_GOOD(name) \
+  if (law->name) good = good && jl_##name##_good(law, row), row += jl_##name##_rows(law);
+  JLAW_ELEMENTS(JL_GOOD)
+#undef JL_GOOD
+  return good && jlaw_sound_(s + jl_slider_row(law), jl_rest_row(law) - jl_slider_row(law));
 }
 
 static JLAW_FUNCTION int jlaw_refuse_(const jlaw_law *law, const double *s, const double *d,
@@ -289,7 +293,7 @@ static JLAW_FUNCTION int jlaw_refuse_(const jlaw_law *law, const double *s, cons
 JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1, const double *d,
                               double *F, double *C, char *message, size_t size)
 {
-  const int dim = law->dim, rows = state_rows(law);
+  const int dim = law->dim, rows = jl_state_rows(law);
   double far = 0.0, step_size = 0.0; /* NaN stays in sums */
   for (int i = 0; i < dim; i++) far += fabs(s0[i]), step_size += fabs(d[i]);
   const double reach = law->stretch * (far + step_size);
@@ -305,22 +309,26 @@ JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1,
 /* ------------------------------------------------------------ what a state is */
 
 JLAW_FUNCTION int jlaw_dim(const jlaw_law *law) { return law->dim; }
-JLAW_FUNCTION int jlaw_state_size(const jlaw_law *law) { return state_rows(law); }
+JLAW_FUNCTION int jlaw_state_size(const jlaw_law *law) { return jl_state_rows(law); }
 JLAW_FUNCTION const char *jlaw_fingerprint(const jlaw_law *law) { return law->fingerprint; }
 JLAW_FUNCTION int jlaw_unmated(const jlaw_law *law, double *s)
 {
   const int far = law->fades && law->dim > 1;
-  for (int i = 0; i < state_rows(law); i++) s[i] = 0.0;
+  for (int i = 0; i < jl_state_rows(law); i++) s[i] = 0.0;
   if (far) s[0] = law->first_touch, s[1] = JLAW_FAR * law->mating_length;
-  if (law->bonded) s[damage_row(law)] = 1.0;
+  int end = jl_element_row(law);
+#define JL_BREAK(name) \
+  if (law->name && jl_##name##_rows(law)) end += jl_##name##_rows(law), s[end - 1] = 1.0;
+  JLAW_ELEMENTS(JL_BREAK)
+#undef JL_BREAK
   return far ? 0 : -1;
 }
 JLAW_FUNCTION double jlaw_dissipated(const jlaw_law *law, const double *s) { return s[law->dim]; }
 
-JLAW_CLONES static JLAW_FUNCTION amounts jlaw_measure_(const jlaw_law *law, const double *s)
+JLAW_CLONES static JLAW_FUNCTION jl_amounts jlaw_measure_(const jlaw_law *law, const double *s)
 {
-  const numbers n = {(double *) s, 1, 0}; /* only read */
-  return measure(law, n);
+  const jl_numbers n = {(double *) s, 1, 0}; /* only read */
+  return jl_measure(law, n);
 }
 
 JLAW_FUNCTION double jlaw_stored(const jlaw_law *law, const double *s)
@@ -330,7 +338,7 @@ JLAW_FUNCTION double jlaw_stored(const jlaw_law *law, const double *s)
 
 JLAW_FUNCTION void jlaw_shares(const jlaw_law *law, const double *s, double shares[3])
 {
-  const amounts all = jlaw_measure_(law, s);
+  const jl_amounts all = jlaw_measure_(law, s);
   shares[0] = all.sliding;
   shares[1] = all.slipping;
   shares[2] = all.separated;
@@ -347,21 +355,26 @@ JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure)
       const double depth = jlaw_of_facet_(law, f, i + 1);
       late += jlaw_of_facet_(law, f, i) * jlaw_virgin_one_(law, closure - depth, &slope);
     }
-  if (law->bonded && closure < 0.0) { /* a joint that opens */
-    bonded b = {{closure, 0.0, 0.0}, 0.0, {0.0}, {0.0}, 0.0};
-    hold(law, &b);
-    return b.F[0];
+  double stress =
+      law->asperities ? law->closure_factor * jlaw_virgin_one_(law, closure, &slope) - late : 0.0;
+#define JL_FIRST(name)                                                  \
+  if (law->name) {                                                      \
+    jl_part p = {{0.0}, {closure, 0.0, 0.0}, {0.0}, {0.0}, {0.0}, 0.0}; \
+    jl_##name##_step(law, &p, 0);                                       \
+    stress += p.F[0];                                                   \
   }
-  return law->closure_factor * jlaw_virgin_one_(law, closure, &slope) - late;
+  JLAW_ELEMENTS(JL_FIRST)
+#undef JL_FIRST
+  return stress;
 }
 
 JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure)
 {
-  double slope;
+  double slope = 0.0;
   if (!(closure <= law->largest_reach)) return jlaw_none_();
-  const double force = jlaw_virgin_one_(law, closure, &slope);
-  return law->stiffness_factor * slope + law->bending_factor * force
-         + fmax(law->bond_normal, law->bond_shear);
+  const double force = law->asperities ? jlaw_virgin_one_(law, closure, &slope) : 0.0;
+  return law->stiffness_factor * JL_LANE(jl_stiffness_over(law, jl_each(slope)), 0)
+         + law->bending_factor * force + jl_stiffness_of_elements(law, NULL, 0, 1);
 }
 
 JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
@@ -380,11 +393,22 @@ JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
 
 /* --------------------------------------------------------------- turned axes */
 
+/* The rows of elements in axes 2 and 3 that are turned, or turned round */
+static JLAW_FUNCTION void jlaw_turn_elements_(const jlaw_law *law, double *s,
+                                              const double turn[2][2])
+{
+  double *row = s + jl_element_row(law);
+#define JL_TURN(name) \
+  if (law->name) jl_##name##_turn(law, row, turn), row += jl_##name##_rows(law);
+  JLAW_ELEMENTS(JL_TURN)
+#undef JL_TURN
+}
+
 JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s)
 {
   const int dim = law->dim, D = law->cells, M = law->facets;
   if (dim > 1) s[1] = -s[1]; /* shear along axis 2 */
-  double *qs = s + slider_row(law), *qt = qs + M * D, *depth = qt + M * D;
+  double *qs = s + jl_slider_row(law), *qt = qs + M * D, *depth = qt + M * D;
   for (int f = 0; f < M; f++) {
     const int other = (int) jlaw_of_facet_(law, f, JLAW_MIRROR);
     for (int i = 0; i < D; i++) {
@@ -399,45 +423,47 @@ JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s)
       depth[f] = depth[other], depth[other] = here;
     }
   }
+  const double swap[2][2] = {{-1.0, 0.0}, {0.0, 1.0}};
+  jlaw_turn_elements_(law, s, swap);
 }
 
 /* Numbers of a ring of n facets, read at azimuths turned by the angle: the trigonometric
  * interpolation of n (even) places, or the straight one, which makes no new extremes */
-static JLAW_FUNCTION void jlaw_turn_(double *x, int n, int step, double angle, int straight)
+static JLAW_FUNCTION void jlaw_turn_(double *x, int n, int jl_step, double angle, int straight)
 {
   double old[JLAW_AZIMUTHS];
   const double pi = 3.14159265358979323846;
-  for (int j = 0; j < n; j++) old[j] = x[j * step], x[j * step] = 0.0;
+  for (int j = 0; j < n; j++) old[j] = x[j * jl_step], x[j * jl_step] = 0.0;
   for (int j = 0; j < n; j++)
     for (int k = 0; k < n; k++) {
       const double way = remainder(angle + 2.0 * pi * (j - k) / n, 2.0 * pi), half = sin(0.5 * way);
       double weight = 1.0;
       if (straight) weight = fmax(1.0 - fabs(way) * n / (2.0 * pi), 0.0);
       else if (fabs(half) > 1e-9) weight = sin(0.5 * n * way) * cos(0.5 * way) / (n * half);
-      x[j * step] += weight * old[k];
+      x[j * jl_step] += weight * old[k];
     }
 }
 
 /* Brings sliders beyond their friction limit back to it */
 static JLAW_FUNCTION void jlaw_hold_(const jlaw_law *law, double *s)
 {
-  const numbers n = {s, 1, 0};
+  const jl_numbers n = {s, 1, 0};
   const int M = law->facets, D = law->cells;
-  for (int at = 0; at < M; at += TOGETHER) {
-    const int some = M - at < TOGETHER ? M - at : TOGETHER;
-    const double *cell = cell_of(law, at);
-    facets o;
-    facets_now(law, n, at, &o);
+  for (int at = 0; at < M; at += JL_TOGETHER) {
+    const int some = M - at < JL_TOGETHER ? M - at : JL_TOGETHER;
+    const double *cell = jl_cell_of(law, at);
+    jl_facets o;
+    jl_facets_now(law, n, at, &o);
     for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_LANES) {
-      const int row = slider_row(law) + at * D + i;
-      real G, kappa, qs = take(n, row, D, some), qt = take(n, row + M * D, D, some);
-      hold_cell(cell, o.y1, o.f1, o.k1, o.z1, o.fz1, o.kz1, law->yields, &G, &kappa);
-      const real cap = o.strength * G;
-      const real size = root(qs * qs + qt * qt);
-      const yes beyond = size > cap;
-      const real share = pick(beyond, cap / pick(beyond, size, 1.0), 1.0);
-      put(n, row, D, some, qs * share);
-      put(n, row + M * D, D, some, qt * share);
+      const int row = jl_slider_row(law) + at * D + i;
+      jl_real G, kappa, qs = jl_take(n, row, D, some), qt = jl_take(n, row + M * D, D, some);
+      jl_hold_cell(cell, o.y1, o.f1, o.k1, o.z1, o.fz1, o.kz1, law->yields, &G, &kappa);
+      const jl_real cap = o.strength * G;
+      const jl_real size = jl_root(qs * qs + qt * qt);
+      const jl_yes jl_beyond = size > cap;
+      const jl_real share = jl_pick(jl_beyond, cap / jl_pick(jl_beyond, size, 1.0), 1.0);
+      jl_put(n, row, D, some, qs * share);
+      jl_put(n, row + M * D, D, some, qt * share);
     }
   }
 }
@@ -446,11 +472,13 @@ JLAW_FUNCTION void jlaw_rotate(const jlaw_law *law, double *s, double angle)
 {
   const int dim = law->dim, D = law->cells, M = law->facets;
   const double before = jlaw_measure_(law, s).sheared, c = cos(angle), d = sin(angle);
-  double *q = s + slider_row(law), *depth = s + rest_row(law);
+  double *q = s + jl_slider_row(law), *depth = s + jl_rest_row(law);
   if (dim == 2 && c < 0.0) jlaw_swap_bodies(law, s); /* the axis changes its sense */
   if (dim != 3) return;
   const double along = s[1], across = s[2];
   s[1] = c * along + d * across, s[2] = c * across - d * along;
+  const double turn[2][2] = {{c, d}, {-d, c}};
+  jlaw_turn_elements_(law, s, turn);
   for (int f = 0, n; f < M; f += n) { /* rings */
     n = (int) jlaw_of_facet_(law, f, JLAW_RING);
     for (int i = 0; i < D; i++) {
@@ -556,7 +584,7 @@ static const char *jlaw_number_(const char *at, double *number)
 /* Reads all numbers into law; NULL or what is wrong */
 static const char *jlaw_parse_numbers_(const char **at, jlaw_law *law)
 {
-#define X(name, whole, least, most) {#name, offsetof(jlaw_law, name), whole, least, most},
+#define X(name, jl_whole, least, most) {#name, offsetof(jlaw_law, name), jl_whole, least, most},
   static const struct {
     const char *name;
     size_t place;

@@ -1,59 +1,47 @@
-/* library.c: which of the compiled texts this processor runs */
+/* library.c: calls the compiled texts of batch.c, one for each width of vectors. JLAW_LEVELS is the
+ * sum of the lanes that this library was built for: 8 of 8 alone, 14 of 8, 4 and 2.
+ */
 #include "batch.h"
-#if defined(__x86_64__)
-#include <cpuid.h>
+#include "export.h"
+
+#define CALLS(KIND) jlaw_advance##KIND, jlaw_measure##KIND, jlaw_refresh##KIND, jlaw_stiffness##KIND
+#if JLAW_LEVELS & 8
+extern jlaw_call CALLS(_8), CALLS(_8_alone);
+#endif
+#if JLAW_LEVELS & 4
+extern jlaw_call CALLS(_4), CALLS(_4_alone);
+#endif
+#if JLAW_LEVELS & 2
+extern jlaw_call CALLS(_2), CALLS(_2_alone);
 #endif
 
-#ifdef __cplusplus
-#define IN_C extern "C"
-#else
-#define IN_C
-#endif
-#ifdef _WIN32
-#define OUT IN_C __declspec(dllexport)
-#else
-#define OUT IN_C __attribute__((visibility("default")))
-#endif
+OUT int jlaw_levels(void) { return JLAW_LEVELS; }
 
-#define KINDS(X, KIND) X jlaw_advance##KIND, jlaw_measure##KIND, jlaw_refresh##KIND
-#if defined(__x86_64__)
-KINDS(extern jlaw_call, _8);
-KINDS(extern jlaw_call, _4);
-KINDS(extern jlaw_call, _8_alone);
-KINDS(extern jlaw_call, _4_alone);
-#endif
-KINDS(extern jlaw_call, _2);
-KINDS(extern jlaw_call, _2_alone);
-
-/* Lanes of vectors that this processor and its system have, at most: 8, 4 or 2. Read from cpuid:
- * under zig __builtin_cpu_supports always says no. */
-OUT int jlaw_lanes(void)
+/* Advance, measure, refresh or stiffness (`what` = 0 to 3), by vectors of so many lanes */
+static jlaw_call *find(int lanes, int alone, int what)
 {
-#if defined(__x86_64__)
-  const unsigned avx = 3u << 27 | 1u << 12; /* OSXSAVE, AVX; FMA */
-  const unsigned avx2 = 1u << 5,
-                 avx512 = 1u << 16 | 1u << 17 | 1u << 30 | 1u << 31; /* F DQ BW VL */
-  unsigned a, b, c, d, saved;
-  if (!__get_cpuid(1, &a, &b, &c, &d) || (c & avx) != avx) return 2;
-  __asm__("xgetbv" : "=a"(saved), "=d"(d) : "c"(0)); /* registers that the system keeps */
-  if (!__get_cpuid_count(7, 0, &a, &b, &c, &d) || !(b & avx2) || (saved & 6) != 6) return 2;
-  return (b & avx512) == avx512 && (saved & 0xe6) == 0xe6 ? 8 : 4;
-#else
-  return 2;
+#define LEVEL(W)                                                                  \
+  if (lanes == W) {                                                               \
+    static jlaw_call *const calls[2][4] = {{CALLS(_##W)}, {CALLS(_##W##_alone)}}; \
+    return calls[alone][what];                                                    \
+  }
+#if JLAW_LEVELS & 8
+  LEVEL(8)
 #endif
+#if JLAW_LEVELS & 4
+  LEVEL(4)
+#endif
+#if JLAW_LEVELS & 2
+  LEVEL(2)
+#endif
+  return NULL;
 }
 
-/* Call number `what` of advance, measure and refresh, for the joints of a batch that no other thread
- * takes: every thread that calls takes the next b->grain of them, whole blocks, until none are left */
+/* Call it for the joints of a batch that no other thread takes: every thread that calls takes the
+ * next b->grain of them, whole blocks, until none are left */
 OUT int jlaw_run(jlaw_batch *b, int what)
 {
-  static jlaw_call *const calls[][3] = {
-      {KINDS(, _2)}, {KINDS(, _2_alone)},
-#if defined(__x86_64__)
-      {KINDS(, _4)}, {KINDS(, _4_alone)}, {KINDS(, _8)}, {KINDS(, _8_alone)},
-#endif
-  };
-  jlaw_call *const call = calls[2 * (b->lanes == 8 ? 2 : b->lanes == 4) + b->alone][what];
+  jlaw_call *const call = find(b->lanes, b->alone, what);
   const long long n = b->n, grain = b->grain;
   int failed = 0;
   for (long long at; !failed && (at = __atomic_fetch_add(&b->taken, grain, __ATOMIC_RELAXED)) < n;)

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..law import JointLaw
+from ..laws.joint_law import JointLaw
 from ..parameters.asperity import Asperity
 from ..parameters.orientation import Orientation
 from ..support.checks import Array, numbers, one_of
@@ -66,6 +66,8 @@ def secant(law: JointLaw, delta: ArrayLike, contact: str = "exact") -> Secant:
     an unknown `contact`, or "series" with eta >= 1.
     """
     d = numbers("delta", delta, "m")
+    if not isinstance(law, JointLaw):
+        raise ValueError(f"law: {type(law).__name__} has no asperities; give a JointLaw")
     if d.shape != (3,) or not np.isfinite(d).all():
         raise ValueError(f"delta = {delta!r} must be three finite numbers (m): closure, two shears")
     if not np.abs(d).sum() <= law.largest_reach:

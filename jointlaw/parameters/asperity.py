@@ -3,42 +3,48 @@
 import math
 from dataclasses import dataclass
 
-from ..support.checks import at_least, more_than, number
+from ..support.checks import more_than, number
+from .declared import check, declared, parameter
 
 
+@declared
 @dataclass(frozen=True)
 class Asperity:
     """Stiffness and friction of one asperity contact.
 
     Its normal force is lam K d^(1+eta) at the deformation d (Eq. 33), its initial shear stiffness
     1/lam of its tangent normal stiffness, its shear force at most mu times its normal force.
-
-    Parameters
-    ----------
-    K: stiffness in Pa m^(1-eta), > 0. 200 GPa um^(1/2) is 2.0e8 Pa m^(1/2).
-    lam: normal over shear stiffness, > 0; (2-nu)/(2(1-nu)) for Hertz-Mindlin (Eq. 34).
-    eta: exponent, >= 0; 1/2 for Hertz, 0 for constant stiffness.
-    mu: friction coefficient of the asperity contact, >= 0.
-    yield_interference: largest elastic compression (m) of a spring of the contact, along the
-        asperity normal, > 0. Beyond it the spring yields at constant force and keeps a set.
-        Infinite (elastic) by default. Yielding has no end: where nearly all asperities touch
-        (`jointlaw.joints.crushed`) the rock between them, which the law leaves out, would bear.
     """
 
-    K: float
-    lam: float
-    eta: float
-    mu: float
-    yield_interference: float = math.inf
+    K: float = parameter(
+        "stiffness; 200 GPa um^(1/2) is 2.0e8 Pa m^(1/2)",
+        "Pa m^(1-eta)",
+        above=0.0,
+        fit=(1e3, 1e16),
+    )
+    lam: float = parameter(
+        "normal over shear stiffness; (2-nu)/(2(1-nu)) for Hertz-Mindlin, Eq. 34",
+        above=0.0,
+        fit=(0.05, 20.0),
+    )
+    eta: float = parameter(
+        "exponent; 1/2 for Hertz, 0 for constant stiffness", low=0.0, fit=(0.0, 1.0), log=False
+    )
+    mu: float = parameter("friction coefficient of the asperity contact", low=0.0, fit=(1e-3, 5.0))
+    yield_interference: float = parameter(
+        "largest elastic compression of a spring of the contact, along the asperity normal; beyond "
+        "it the spring yields at constant force and keeps a set. Infinite is elastic. Yielding has "
+        "no end: where nearly all asperities touch (`jointlaw.joints.crushed`) the rock between "
+        "them, which the law leaves out, would bear",
+        "m",
+        math.inf,
+        above=0.0,
+        infinite=True,
+        fit=(1e-12, 1.0),
+    )
 
     def __post_init__(self) -> None:
-        set_ = object.__setattr__
-        set_(self, "K", more_than("asperity.K", self.K, 0.0))
-        set_(self, "lam", more_than("asperity.lam", self.lam, 0.0))
-        set_(self, "eta", at_least("asperity.eta", self.eta, 0.0))
-        set_(self, "mu", at_least("asperity.mu", self.mu, 0.0))
-        name, limit = "yield_interference", self.yield_interference
-        set_(self, name, more_than(f"asperity.{name}", limit, 0.0, infinite=True))
+        check(self, "asperity")
 
     @classmethod
     def hertz_mindlin(cls, G: float, nu: float, R: float, mu: float) -> "Asperity":

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..support.checks import Array, number
+from ..support.checks import Array
 from ..support.thresholds import ROUNDED
+from .declared import check, declared, parameter
 
 LARGEST = 1e100  # of stiffness and strength: squares of forces and displacements stay finite
 LONGEST = 1e30  # an energy of fracture over the elastic energy at the peak
@@ -16,6 +17,7 @@ MODES = (
 )
 
 
+@declared
 @dataclass(frozen=True)
 class Bond:
     """Bridges of rock or cement across a joint: docs/theory-incremental.md, "The bond".
@@ -24,62 +26,48 @@ class Bond:
     closing is theirs. It begins to break where (normal stress/tension)^2 + (shear
     stress/cohesion)^2 = 1, softens linearly in each mode, and never heals.
 
-    Parameters
-    ----------
-    normal_stiffness, shear_stiffness: in Pa/m, >= 0, and > 0 where there is a strength.
-    tension, cohesion: strength in pure opening and in pure shear, in Pa, >= 0. A bond with a
-        strength of 0 breaks at the first motion in that mode.
-    energy_I, energy_II: energy of fracture in opening and in shear, in J/m2, at least the elastic
-        energy at the peak, strength^2/(2 stiffness). None, the default, takes that: brittle.
-
     Raises ValueError when a parameter is out of bounds.
     """
 
-    normal_stiffness: float
-    shear_stiffness: float
-    tension: float
-    cohesion: float
-    energy_I: float | None = None
-    energy_II: float | None = None
+    normal_stiffness: float = parameter(
+        "stiffness in opening, > 0 with a tension", "Pa/m", low=0.0, high=LARGEST
+    )
+    shear_stiffness: float = parameter(
+        "stiffness in shear, > 0 with a cohesion", "Pa/m", low=0.0, high=LARGEST
+    )
+    tension: float = parameter(
+        "strength in pure opening; a bond without breaks at the first motion in that mode",
+        "Pa", low=0.0, high=LARGEST, fit=(1.0, 1e12),
+    )  # fmt: skip
+    cohesion: float = parameter(
+        "strength in pure shear; a bond without breaks at the first motion in that mode",
+        "Pa", low=0.0, high=LARGEST, fit=(1.0, 1e12),
+    )  # fmt: skip
+    energy_I: float | None = parameter(
+        "energy of fracture in opening, at least the elastic energy at the peak, tension^2/(2 "
+        "normal_stiffness); None takes that: brittle", "J/m2", None, low=0.0,
+    )  # fmt: skip
+    energy_II: float | None = parameter(
+        "the same in shear, at least cohesion^2/(2 shear_stiffness)", "J/m2", None, low=0.0
+    )
 
     def __post_init__(self) -> None:
+        check(self, "bond")
         for stiffness, strength, energy in MODES:
-            k, most = self._within(stiffness, "Pa/m"), self._within(strength, "Pa")
+            k, most = getattr(self, stiffness), getattr(self, strength)
             if most > 0.0 and k == 0.0:
                 raise ValueError(
                     f"bond.{stiffness} = {k!r} Pa/m is out of bounds: it must be > 0, for "
                     f"bond.{strength} = {most!r} Pa"
                 )
-            if getattr(self, energy) is not None:
-                self._require_energy(energy, strength, stiffness)
-
-    def _within(self, name: str, unit: str) -> float:
-        """A stiffness or a strength, checked."""
-        value = number(f"bond.{name}", getattr(self, name))
-        if not 0.0 <= value <= LARGEST:
-            raise ValueError(
-                f"bond.{name} = {value!r} {unit} is out of bounds: it must be >= 0 and <= "
-                f"{LARGEST:g}"
-            )
-        object.__setattr__(self, name, value)
-        return value
-
-    def _require_energy(self, name: str, strength: str, stiffness: str) -> None:
-        """Check an energy of fracture that was given."""
-        value, most = number(f"bond.{name}", getattr(self, name)), getattr(self, strength)
-        elastic = 0.5 * most * (most / getattr(self, stiffness)) if most else 0.0
-        if not elastic * (1.0 - ROUNDED) <= value <= LONGEST * elastic:
-            raise ValueError(
-                f"bond.{name} = {value!r} J/m2 is out of bounds: it must be >= {elastic:g}, the "
-                f"elastic energy at the peak, {strength}^2/(2 {stiffness}), and <= "
-                f"{LONGEST * elastic:g}; leave it out for a brittle bond"
-            )
-        object.__setattr__(self, name, value)
-
-    @property
-    def largest_stiffness(self) -> float:
-        """Bound of the stiffness that it adds (Pa/m); softening, which lowers it, is left out."""
-        return max(self.normal_stiffness, self.shear_stiffness)
+            value, elastic = getattr(self, energy), 0.5 * most * (most / k) if most else 0.0
+            least = elastic * (1.0 - ROUNDED)
+            if value is not None and not least <= value <= LONGEST * elastic:
+                raise ValueError(
+                    f"bond.{energy} = {value!r} J/m2 is out of bounds: it must be >= {elastic:g}, "
+                    f"the elastic energy at the peak, {strength}^2/(2 {stiffness}), and <= "
+                    f"{LONGEST * elastic:g}; leave it out for a brittle bond"
+                )
 
     @property
     def limits(self) -> tuple[Array, Array]:

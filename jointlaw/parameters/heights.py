@@ -7,39 +7,36 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import special
 
-from ..support.checks import Array, at_least, more_than, one_of
+from ..support.checks import Array, at_least, finite, more_than, one_of
+from .declared import check, declared, parameter
 
 FORMATIONS = ("population", "individual")
+FORMATION = (
+    '"population": the count of asperities in touch grows as P(r0 + y) and all carry the same '
+    'closure y, Eq. 37 as printed; "individual": each asperity feels only the closure since it '
+    "touched"
+)
 
 # Probabilities at both ends of a distribution; integrals are split at these quantiles
 _TAILS = np.array([1e-15, 1e-12, 1e-9, 1e-6, 1e-4, 1e-2, 0.1, 0.3, 0.5])
 
 
+@declared
 @dataclass(frozen=True)
 class GammaHeights:
-    """Gamma distribution of asperity heights, Eq. 12.
+    """Gamma distribution of asperity heights, Eq. 12."""
 
-    Parameters
-    ----------
-    alpha: shape, > -1 (the mean is beta (alpha + 1), Eq. 13).
-    beta: scale in m, > 0.
-    overlap: r0, overlap of the two surfaces at zero closure, in m, >= 0.
-    formation: "population", the count of asperities in touch grows as P(r0 + y) and all carry the
-        same closure y (Eq. 37 as printed); or "individual", each asperity feels only the closure
-        since it touched.
-    """
-
-    alpha: float
-    beta: float
-    overlap: float = 0.0
-    formation: str = "population"
+    alpha: float = parameter(
+        "shape; the mean is beta (alpha + 1), Eq. 13", above=-1.0, fit=(-0.99, 1e3), shift=1.0
+    )
+    beta: float = parameter("scale", "m", above=0.0, fit=(1e-10, 1.0))
+    overlap: float = parameter(
+        "r0, overlap of the two surfaces at zero closure", "m", 0.0, low=0.0, fit=(1e-12, 1.0)
+    )
+    formation: str = parameter(FORMATION, "", "population", kind=str, choices=FORMATIONS)
 
     def __post_init__(self) -> None:
-        set_ = object.__setattr__
-        set_(self, "alpha", more_than("heights.alpha", self.alpha, -1.0))
-        set_(self, "beta", more_than("heights.beta", self.beta, 0.0))
-        set_(self, "overlap", at_least("heights.overlap", self.overlap, 0.0))
-        one_of("heights.formation", self.formation, FORMATIONS)
+        check(self, "heights")
 
     @classmethod
     def from_moments(
@@ -76,28 +73,28 @@ class GammaHeights:
         return np.unique(self.beta * np.concatenate([[0.0], low, high]))
 
 
+@declared
 @dataclass(frozen=True)
 class Heights:
     """A measured histogram of asperity heights; it stands for any other distribution, too.
 
-    Parameters
-    ----------
-    distribution: (counts, edges in m), as `numpy.histogram` returns them.
-    overlap: r0, overlap at zero closure, in m, >= 0.
-    formation: as in `GammaHeights`. A histogram has steps, so it needs "individual".
-
     Raises ValueError for a histogram that is none.
     """
 
-    distribution: Any
-    overlap: float = 0.0
-    formation: str = "population"
+    distribution: Any = parameter(
+        "counts, and edges in m, as `numpy.histogram` returns them", "m", kind=object
+    )
+    overlap: float = parameter(
+        "r0, overlap of the two surfaces at zero closure", "m", 0.0, low=0.0, fit=(1e-12, 1.0)
+    )
+    formation: str = parameter(
+        f"{FORMATION}. A histogram has steps, which make most closure curves by population concave",
+        "", "individual", kind=str, choices=FORMATIONS,
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
-        set_ = object.__setattr__
-        set_(self, "overlap", at_least("heights.overlap", self.overlap, 0.0))
-        one_of("heights.formation", self.formation, FORMATIONS)
-        set_(self, "distribution", _histogram(self.distribution))
+        check(self, "heights")
+        object.__setattr__(self, "distribution", _histogram(self.distribution))
 
     def pdf(self, r: ArrayLike) -> Any:
         """Density H(r) in 1/m at the overlap r in m."""
@@ -116,7 +113,37 @@ class Heights:
         return np.array(self.distribution[1])
 
 
-HeightDistribution: TypeAlias = GammaHeights | Heights
+HeightDistribution: TypeAlias = Any  # see `require_heights`
+# Kinds of heights by the names that files have, the default first
+KINDS = {"gamma": GammaHeights, "histogram": Heights}
+_ASKED = ("overlap", "formation", "pdf", "cdf", "breakpoints")
+
+
+def require_heights(heights: Any) -> None:
+    """Refuse what is neither None nor a distribution of heights, with what it lacks.
+
+    A class of the user's own has `overlap` (m) and `formation`, `pdf(r)` in 1/m and `cdf(r)` of
+    arrays r (m), and `breakpoints()`: heights in m, ascending, between which its density is smooth
+    on one scale. Two of equal numbers are equal and hash alike, as a frozen dataclass is.
+    """
+    if heights is None:
+        return
+    missing = [name for name in _ASKED if not hasattr(heights, name)]
+    if missing:
+        raise ValueError(
+            f"heights = {heights!r} has no {', '.join(missing)}: give GammaHeights, Heights, None, "
+            "or a class with these (a histogram in Heights stands for any other distribution)"
+        )
+    if getattr(type(heights), "__hash__", None) in (None, object.__hash__):
+        raise ValueError(
+            f"heights = {heights!r}: two of equal numbers must be equal and hash alike; make "
+            f"{type(heights).__name__} a frozen dataclass"
+        )
+    at_least("heights.overlap", heights.overlap, 0.0)
+    one_of("heights.formation", heights.formation, FORMATIONS)
+    points = finite("heights.breakpoints()", heights.breakpoints(), "m")
+    if points.ndim != 1 or points.size < 2 or (np.diff(points) <= 0).any() or points[0] < 0:
+        raise ValueError("heights.breakpoints() must be two or more ascending heights, >= 0 m")
 
 
 def _histogram(pair: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -6,25 +6,17 @@ write instead. A rule for the value of a key is one of
     a function (name, value)    returns the value, or raises ValueError; the name has file and key
     a mapping of rules          for a table
     [a mapping of rules]        for a list of tables
-    Removed(use, neutral)       for a key of former versions
 """
 
 import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..support.checks import remedy
 
 Table = dict[str, Any]
-
-
-class Removed(NamedTuple):
-    """A key that is gone: a neutral value, which asked for nothing, is skipped."""
-
-    use: str  # what to write instead
-    neutral: Any
 
 
 def read(path: Path, what: str = "TOML file") -> Table:
@@ -59,15 +51,11 @@ def checked(data: Any, rules: Mapping[str, Any], where: str, path: str = "") -> 
     for key, value in data.items():
         name = prefix + key
         if key not in rule_of:
-            kept = sorted(k for k, rule in rule_of.items() if not isinstance(rule, Removed))
             raise ValueError(
-                f"{where}: key '{name}' is unknown; {remedy(key, kept, 'known here:')}"
+                f"{where}: key '{name}' is unknown; {remedy(key, sorted(rule_of), 'known here:')}"
             )
         rule = rule_of[key]
-        if isinstance(rule, Removed):
-            if value != rule.neutral:
-                raise ValueError(f"{where}: key '{name}' is removed: {rule.use}")
-        elif isinstance(rule, Mapping):
+        if isinstance(rule, Mapping):
             found[key] = checked(value, rule, where, name)
         elif isinstance(rule, list):
             found[key] = _checked_list(value, rule[0], where, name)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..support.checks import Array, at_least, finite, more_than, number
+from .declared import declared, parameter
 
 
 def largest_c(b: float) -> float:
@@ -39,22 +40,25 @@ def shape(u: Array, b: float) -> Array:
     return density
 
 
+@declared
 @dataclass(frozen=True)
 class Orientation:
     """Density of asperity contact orientations, Eq. 14.
 
-    Parameters
-    ----------
-    a: extent of the inclinations, theta <= pi/(2a); a >= 1 (dimensionless). Large a is smooth.
-    b: shape within that extent, -1 <= b <= 2; b = 2 crowds the contacts towards the joint normal.
-    c: azimuthal anisotropy, within +-(1/3 - b/6); c > 0 makes axis 2 (azimuth 0) the stiffer.
-
     Raises ValueError when a bound of Eq. 18 is broken.
     """
 
-    a: float
-    b: float = 0.0
-    c: float = 0.0
+    a: float = parameter(
+        "extent of the inclinations, theta <= pi/(2a); large a is smooth", low=1.0, fit=(1.0, 100.0)
+    )
+    b: float = parameter(
+        "shape within that extent; b = 2 crowds the contacts towards the joint normal", "", 0.0,
+        low=-1.0, high=2.0, fit=(-1.0, 2.0), log=False,
+    )  # fmt: skip
+    c: float = parameter(
+        "azimuthal anisotropy, within +-(1/3 - b/6); c > 0 makes axis 2 (azimuth 0) the stiffer",
+        "", 0.0, fit=(-0.5, 0.5), log=False,
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         for name, value in zip("abc", bounded(self.a, self.b, self.c), strict=True):

@@ -3,28 +3,35 @@
 import math
 from dataclasses import dataclass
 
-from ..support.checks import integer
+from .declared import check, declared, parameter
 
 
+@declared
 @dataclass(frozen=True)
 class Resolution:
-    """Number of nodes that the law sums over.
+    """Number of nodes that the law sums over."""
 
-    u: rings of one inclination each (Gauss rule of the density, crowded to the steepest), >= 1.
-    phi: intervals of azimuth on the half circle of the steepest ring, >= 3; flatter rings have
-        fewer, and motion in 3-D takes both halves.
-    depth: cells of touch depth of a facet of the ring of most weight, >= 1; lighter ones have
-        fewer.
-    """
-
-    u: int
-    phi: int
-    depth: int
+    u: int = parameter(
+        "rings of one inclination each (Gauss rule of the density, crowded to the steepest)",
+        kind=int, low=1,
+    )  # fmt: skip
+    phi: int = parameter(
+        "intervals of azimuth on the half circle of the steepest ring; flatter rings have fewer, "
+        "and motion in 3-D takes both halves", kind=int, low=3,
+    )  # fmt: skip
+    depth: int = parameter(
+        "cells of touch depth of a facet of the ring of most weight; lighter ones have fewer",
+        kind=int, low=1,
+    )  # fmt: skip
+    lowest: float = parameter(
+        "smallest closure that the cells are made for, as a share of the closure range. 1 puts "
+        "nearly all of them where the largest loads act; a smaller share spreads them, so that "
+        "paths of small loads have small errors too (docs/accuracy.md)", "", 1.0,
+        above=0.0, high=1.0,
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "u", integer("resolution.u", self.u, 1))
-        object.__setattr__(self, "phi", integer("resolution.phi", self.phi, 3))
-        object.__setattr__(self, "depth", integer("resolution.depth", self.depth, 1))
+        check(self, "resolution")
 
     @property
     def sliders(self) -> int:

@@ -13,8 +13,9 @@ from .asperity import Asperity
 ROCK = Asperity.hertz_mindlin(G=20e9, nu=0.25, R=1e-3, mu=0.6)
 _OTHER = "is the column in another unit? Name it:"
 _SCALE = "are the columns in the units that were read or given?"
-# the steepest friction angle, 79 degrees, is beyond that of any rock
-_FRICTION = (0.0, 5.0, "", "it is a coefficient, tan(angle): tan(35 degrees) = 0.7")
+#: Highest coefficient of friction: 79 degrees, beyond any rock
+STEEPEST = 5.0
+_FRICTION = (0.0, STEEPEST, "", "it is a coefficient, tan(angle): tan(35 degrees) = 0.7")
 # lowest, highest, unit, and the likely cause of a number outside
 RANGES = {
     "mu": _FRICTION,

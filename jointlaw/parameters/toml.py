@@ -1,126 +1,100 @@
-"""Laws as TOML files, with the same keys as the constructors."""
+"""Laws as TOML files, with the same keys as the constructors.
 
-import math
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import fields
-from typing import Any, TypeVar
+A table holds what differs from its default. Where there are several kinds, its key `kind` names
+one; without it the first is meant.
+"""
 
-from .asperity import Asperity
-from .bond import Bond
-from .heights import GammaHeights, Heights
-from .keys import Removed, as_given, checked, keys_of
-from .orientation import Orientation
-from .resolution import Resolution, named
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
 
-_RESOLUTION = keys_of(Resolution) | {
-    "front": Removed("take more depth cells instead, such as depth = 12", neutral=False)
-}
-_WEAR = "slopes wear instead: give the law slope_wear (J/m2) and slope_residual"
-_ASPERITY = keys_of(Asperity) | {
-    "mu_residual": Removed(_WEAR, neutral=None),
-    "wear_slip": Removed(_WEAR, neutral=math.inf),
-}
-_LAW = {
-    "orientation!": keys_of(Orientation), "asperity!": _ASPERITY, "heights": as_given,
-    "asperity_density!": as_given, "closure_range": as_given, "resolution": as_given,
-    "plane": as_given, "closure_only": as_given, "mating_length": as_given,
-    "slope_wear": as_given, "slope_residual": as_given,
-    "critical_slip": Removed(
-        "give mating_length (m), over which slopes fade and friction becomes residual",
-        neutral=math.inf,
-    ),
-    "bond": keys_of(Bond), "about": as_given,  # free table for title, source and notes
-    "version": as_given,
-}  # fmt: skip
-_BY_NAME = "write `counts` and `edges` (m) of a histogram, or `alpha` and `beta` of a gamma one"
-_HEIGHTS = {
-    "counts!": as_given, "edges!": as_given, "overlap": as_given, "formation": as_given,
-    "histogram": Removed("write its `counts` and `edges` (m) into this table", neutral=None),
-    "distribution": Removed(_BY_NAME, neutral=None),
-    "parameters": Removed(_BY_NAME, neutral=None),
-}  # fmt: skip
-_UNITS = {
-    "asperity_density": "1/m2", "closure_range": "m", "mating_length": "m", "plane": "rad",
-    "slope_wear": "J/m2", "K": "Pa m^(1-eta)", "yield_interference": "m", "beta": "m",
-    "overlap": "m", "normal_stiffness": "Pa/m", "shear_stiffness": "Pa/m", "tension": "Pa",
-    "cohesion": "Pa", "energy_I": "J/m2", "energy_II": "J/m2",
-}  # fmt: skip
-# Values that a file does not hold: those of parameters that are off
-_OFF = {"yield_interference": math.inf, "slope_wear": math.inf, "slope_residual": 0.0}
-T = TypeVar("T")
+from ..support.checks import one_of
+from .declared import parameters_of
+from .keys import checked, keys_of
+
 VERSION = 1  # of the keys; a file without one is of version 1
+FREE = ("version", "about")  # about: a free table for title, source and notes
+Kinds = Mapping[str, Any]
 
 
-def law_text(law: Mapping[str, Any]) -> str:
-    """TOML text of a law's parameters."""
-    r = law["resolution"]
-    lengths = law["mating_length"], law["asperity"].yield_interference, law["closure_range"]
-    names = named(*lengths)
-    name = next((n for n, value in names.items() if value == r), None)
-    own = f"{{ u = {r.u}, phi = {r.phi}, depth = {r.depth} }}"
-    lines = [
-        f"version = {VERSION}  # of this file's keys",
-        *_lines(law, ("asperity_density", "closure_range")),
-        "resolution = " + (f'"{name}"' if name else own),
-        *_lines(law, ("mating_length", "slope_wear", "slope_residual", "plane", "closure_only")),
-    ]
-    for part in ("orientation", "asperity", "heights", "bond"):
-        if law[part] is not None:
-            values = {one.name: getattr(law[part], one.name) for one in fields(law[part])}
-            lines += ["", f"[{part}]", *_lines(values, values)]
+def law_text(law: Any, kinds: Kinds, shown: Mapping[str, Any]) -> str:
+    """TOML text of a law of one of these kinds; `shown` replaces values.
+
+    Raises ValueError for what no file can name: a class of the user's own.
+    """
+    lines = [f"version = {VERSION}  # of this file's keys", *_lines(law, kinds, "law", shown)]
     return "\n".join(lines) + "\n"
 
 
-def _lines(values: Mapping[str, Any], names: Iterable[str]) -> list[str]:
-    """A line for every value that a file holds, with its unit."""
-    lines = []
-    for name in names:
-        value = values[name]
-        if value is None or value is False or (name in _OFF and value == _OFF[name]):
+def _lines(values: Any, kinds: Kinds, path: str, shown: Mapping[str, Any]) -> list[str]:
+    """Lines of a table, those of tables within it last."""
+    names = [name for name, kind in kinds.items() if type(values) is kind]
+    if not names:
+        raise ValueError(
+            f"{path} = {values!r}: no file can name {type(values).__name__}; known are "
+            f"{', '.join(kinds)} (a histogram stands for any other heights; CONTRIBUTING.md tells "
+            "how to add a kind)"
+        )
+    lines = [f'kind = "{names[0]}"'] if names[0] != next(iter(kinds)) else []
+    inner: list[str] = []
+    defaults = {one.name: one.default for one in fields(values)}
+    for name, said in parameters_of(values).items():
+        value = shown.get(name, getattr(values, name))
+        if value is None or value == defaults[name]:
             continue
-        if name == "distribution":
-            lines += [f"counts = {list(value[0])}", f"edges = {list(value[1])}  # m"]
-            continue
-        unit = f"  # {_UNITS[name]}" if name in _UNITS else ""
-        lines.append(f"{name} = {_text(value)}{unit}")
-    return lines
+        if is_dataclass(value):
+            inner += ["", f"[{name}]", *_lines(value, kinds_of(said.kind), name, {})]
+        elif isinstance(value, Mapping):
+            pairs = ", ".join(f"{key} = {_text(number)}" for key, number in value.items())
+            lines.append(f"{name} = {{ {pairs} }}")
+        else:
+            lines.append(f"{name} = {_text(value)}" + (f"  # {said.unit}" if said.unit else ""))
+    return [*lines, *inner]
 
 
 def _text(value: Any) -> str:
     """A value as TOML."""
-    if isinstance(value, float):
-        return repr(value + 0.0)  # -0.0 is 0.0; inf is TOML too
-    return "true" if value is True else f'"{value}"'
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_text, value))}]"
+    return f'"{value}"' if isinstance(value, str) else repr(value + 0)  # -0.0 is 0.0
 
 
-def build_law(build: Callable[..., T], data: dict[str, Any], where: str) -> T:
-    """A law from a mapping with the keys of the constructor; `where` is named in errors."""
+def kinds_of(kind: Any) -> Kinds:
+    """The kinds that a parameter may be of, by the names that files have."""
+    return kind if isinstance(kind, Mapping) else {"": kind}
+
+
+def law_of(kinds: Kinds, data: Mapping[str, Any], where: str) -> Any:
+    """A law of one of these kinds from the mapping of a file; `where` is named in errors."""
     version = data.get("version", VERSION)
     if version != VERSION:
         raise ValueError(
             f"{where}: key 'version' = {version!r}: this jointlaw reads version {VERSION}; write "
             "the law again with this version, or install the one that wrote it"
         )
-    values = checked(data, _LAW, where)
-    values.pop("version", None)
-    values.pop("about", None)
+    keys = {key: value for key, value in data.items() if key not in FREE}
     try:
-        for part, kind in (("orientation", Orientation), ("asperity", Asperity), ("bond", Bond)):
-            if part in values:
-                values[part] = kind(**values[part])
-        if "heights" in values:
-            values["heights"] = _heights(values["heights"], where)
-        if isinstance(values.get("resolution"), dict):
-            nodes = checked(values["resolution"], _RESOLUTION, where, "resolution")
-            values["resolution"] = Resolution(**nodes)
-        return build(**values)
+        return build(kinds, keys, where, "")
     except ValueError as error:
         text = str(error)
         raise ValueError(text if text.startswith(f"{where}: ") else f"{where}: {text}") from None
 
 
-def _heights(data: Any, where: str) -> GammaHeights | Heights:
-    if isinstance(data, dict) and ("alpha" in data or "beta" in data):
-        return GammaHeights(**checked(data, keys_of(GammaHeights), where, "heights"))
-    table = checked(data, _HEIGHTS, where, "heights")
-    return Heights((table.pop("counts"), table.pop("edges")), **table)
+def build(kinds: Kinds, data: Any, where: str, path: str) -> Any:
+    """An object of one of these kinds from its table, and those within it from theirs."""
+    first = next(iter(kinds))
+    table = dict(data) if isinstance(data, Mapping) else data
+    name = first
+    if len(kinds) > 1 and isinstance(table, dict):
+        key = f"{where}: {path}.kind" if path else f"{where}: kind"
+        name = one_of(key, table.pop("kind", first), tuple(kinds))
+    kind = kinds[name]
+    values = checked(table, keys_of(kind), where, path)
+    for key, said in parameters_of(kind).items():
+        inner, value = kinds_of(said.kind), values.get(key)
+        tables = is_dataclass(next(iter(inner.values())))
+        if tables and value is not None and not isinstance(value, str):
+            values[key] = build(inner, value, where, f"{path}.{key}" if path else key)
+    return kind(**values)

@@ -4,7 +4,7 @@ import tomllib
 from importlib import resources
 from pathlib import Path
 
-from ..law import JointLaw
+from ..laws.joint_law import JointLaw
 from ..support.checks import one_of, remedy
 
 

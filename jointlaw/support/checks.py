@@ -75,6 +75,8 @@ def numbers(name: str, value: Any, unit: str) -> Array:
             raise TypeError
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{name} = {value!r} is not an array of numbers ({unit})") from None
+    if np.ma.is_masked(value):
+        raise ValueError(f"{name} has masked numbers; give values for them, or leave them out")
     if array.dtype == np.float64:
         return array
     with np.errstate(over="ignore"):  # from long double: reported as not finite by the caller
@@ -87,6 +89,14 @@ def finite(name: str, value: Any, unit: str) -> Array:
     if not np.isfinite(array).all():
         raise ValueError(f"{name} = {value!r} is not finite; give finite values in {unit}")
     return array
+
+
+def truths(name: str, value: Any, n: int) -> NDArray[np.bool_]:
+    """Return `value`, one truth or n of them, as (n,) truths."""
+    array = np.asarray(value)
+    if array.dtype != bool or array.shape not in ((), (n,)):
+        raise ValueError(f"{name} = {value!r} must be True or False, or an array ({n},) of them")
+    return np.broadcast_to(array, n)
 
 
 def frozen(arrays: Arrays) -> Arrays:

@@ -14,7 +14,7 @@ import numpy as np
 # A folder that has one of these holds a run
 MARKS = ("summary.json", "history.csv", "strength.json", "ablation.csv", "state", "refused")
 LEFT = ("summary.json", "history.csv", "ablation.csv", "state/scene.toml", "state/state.npz",
-        "refused/scene.toml", "refused/state.npz", "refused/why.txt")  # fmt: skip
+        "refused/scene.toml", "refused/state.npz")  # fmt: skip
 
 
 def replace_file(path: Path, data: bytes) -> None:

@@ -5,7 +5,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-FORMATS = ("png", "svg", "pdf")  # of pictures; the first one unless another is asked for
+#: Formats of pictures; the first one unless another is asked for
+FORMATS = ("png", "svg", "pdf")
 
 # Settings of matplotlib for every picture of the project, 7.5 inches wide or less: letters are
 # then 8 pixels high on a phone, 390 pixels wide. Each axis has a label with its unit in

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..law import JointLaw
+from ..laws.joint_law import JointLaw
 from ..parameters.asperity import Asperity
 from ..parameters.heights import GammaHeights
 from ..parameters.orientation import Orientation

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from ..joints.batch import JointBatch
-from ..laboratory.normal_control import NormalCondition, closing_increments
-from ..law import JointLaw
+from ..joints.normal_control import NormalCondition, closing_increments
+from ..laws.joint_law import JointLaw
 from ..parameters.resolution import SLIP
 from ..support.checks import Array, integer, more_than
 from ..support.version import __version__
@@ -22,7 +22,7 @@ PROBE = 1e-7  # shear probe over closure: small against any curvature, large aga
 
 
 def tabulate(
-    law: JointLaw,
+    law: Any,
     closure: float | None = None,
     shear_limit: float | None = None,
     tolerance: float = 1e-3,
@@ -33,7 +33,7 @@ def tabulate(
 
     Parameters
     ----------
-    law: a law in 3-D (`plane=None`).
+    law: a `JointLaw` or `CoulombLaw` in 3-D (`plane=None`).
     closure: last closure of the table in m; `law.closure_range` by default.
     shear_limit: shear displacement in m at which friction and dilation are read; by default the
         mating length, or ten closure ranges where that is infinite.
@@ -45,14 +45,16 @@ def tabulate(
     Raises ValueError for a bad argument.
     """
     require_3d(law)
-    whole, law = law, replace(law, bond=None)
+    whole, finer, limit = law, law, LONG * law.closure_range
+    if isinstance(law, JointLaw):
+        law, finer = replace(law, bond=None), replace(law, bond=None, resolution=SLIP)
+        limit = law.mating_length if math.isfinite(law.mating_length) else limit
     end = more_than("closure", law.closure_range if closure is None else closure, 0.0)
     tolerance = more_than("tolerance", tolerance, 0.0)
     steps = integer("steps", steps, 2)
     if integer("azimuths", azimuths, 3) > 180 or 180 % azimuths:
         raise ValueError(f"azimuths = {azimuths} must divide 180: columns are named by degree")
-    default = law.mating_length if math.isfinite(law.mating_length) else LONG * law.closure_range
-    limit = more_than("shear_limit", default if shear_limit is None else shear_limit, 0.0)
+    limit = more_than("shear_limit", limit if shear_limit is None else shear_limit, 0.0)
     psi: Array = np.radians(np.arange(azimuths) * (180 // azimuths), dtype=np.float64)
     u, worst = _grid(law, end, psi, tolerance)
     secant, tangent = _normal(law, u)
@@ -61,22 +63,22 @@ def tabulate(
     table = JointTable(u, secant * u, secant, tangent, psi, kt, peak, mobilised, dilation, {})
     harmonic = np.abs(table.lookup(u[1:, None], psi).shear_stiffness / kt[1:] - 1).max()
     # degrees by which few nodes miss the friction that a host will rely on
-    finer = _friction(replace(law, resolution=SLIP), u, psi[::4], limit, steps)[1]
-    missed = np.degrees(np.abs(np.arctan(mobilised[:, ::4]) - np.arctan(finer)))
+    fine = _friction(finer, u, psi[::4], limit, steps)[1]
+    missed = np.degrees(np.abs(np.arctan(mobilised[:, ::4]) - np.arctan(fine)))
     errors = (*worst, float(harmonic), float(missed.max()))
     return replace(table, metadata=_metadata(whole, table, tolerance, errors, limit, steps))
 
 
-def require_3d(law: JointLaw) -> None:
+def require_3d(law: Any) -> None:
     """Refuse a law without the shear in all directions that a table holds."""
+    if law.dim == 1:
+        raise ValueError("law.closure_only = True: this holds shear; set closure_only=False")
     if law.plane is not None:
-        raise ValueError(f"law.plane = {law.plane:g}: a table needs a law in 3-D; set plane=None")
-    if law.closure_only:
-        raise ValueError("law.closure_only = True: a table holds shear; set closure_only=False")
+        raise ValueError(f"law.plane = {law.plane:g}: this needs a law in 3-D; set plane=None")
 
 
 def _metadata(
-    law: JointLaw,
+    law: Any,
     table: JointTable,
     tolerance: float,
     errors: tuple[float, float, float, float],
@@ -95,7 +97,9 @@ def _metadata(
         "yielding": "first loading only: unloading keeps the closure that asperities yielded"
         if law.tables.yields
         else "none",
-        "bond": "none" if law.bond is None else "left out: this is the joint without its bond",
+        "bond": "left out: this is the joint without its bond"
+        if isinstance(law, JointLaw) and law.bond is not None
+        else "none",
         "loading_path": "virgin joint; kn: pure closure; kt: first shear after pure closure; "
         f"mu, mob, dil: shear to {limit:.6g} m in {steps} steps at constant normal stress; "
         "mu is the largest ratio on the way, mob and dil (opening per shear) are those at the end",
@@ -114,9 +118,7 @@ def _metadata(
     }
 
 
-def _grid(
-    law: JointLaw, end: float, psi: Array, tolerance: float
-) -> tuple[Array, tuple[float, float]]:
+def _grid(law: Any, end: float, psi: Array, tolerance: float) -> tuple[Array, tuple[float, float]]:
     """Closures from 0 to `end` between which linear interpolation meets the tolerance."""
     u = np.concatenate([[0.0], end * np.geomspace(1e-3, 1.0, 13)])
     axes = psi[[0, len(psi) // 2]]
@@ -140,7 +142,7 @@ def _grid(
     return u, (float(error.max()), float(off.max()))
 
 
-def _normal(law: JointLaw, u: Array) -> tuple[Array, Array]:
+def _normal(law: Any, u: Array) -> tuple[Array, Array]:
     """Secant and tangent normal stiffness (Pa/m) on the virgin curve; limits at zero closure."""
     x = np.where(u > 0, u, 1e-12 * law.closure_range)
     _, C = law.joints(len(x)).update(np.stack([x, 0 * x, 0 * x], axis=1))
@@ -148,7 +150,7 @@ def _normal(law: JointLaw, u: Array) -> tuple[Array, Array]:
     return law.normal_stress(x) / x, C[:, 0, 0]
 
 
-def _closed(law: JointLaw, u: Array, psi: Array) -> tuple[JointBatch, Array]:
+def _closed(law: Any, u: Array, psi: Array) -> tuple[JointBatch, Array]:
     """Virgin joints closed to every u, one for each psi, and their unit vectors of shear (m, 3)."""
     x, angle = np.repeat(u, len(psi)), np.tile(psi, len(u))
     batch = law.joints(len(x))
@@ -156,7 +158,7 @@ def _closed(law: JointLaw, u: Array, psi: Array) -> tuple[JointBatch, Array]:
     return batch, np.stack([0 * x, np.cos(angle), np.sin(angle)], axis=1)
 
 
-def _shear_stiffness(law: JointLaw, u: Array, psi: Array) -> Array:
+def _shear_stiffness(law: Any, u: Array, psi: Array) -> Array:
     """Initial tangent shear stiffness (n, p) in Pa/m of joints closed to u, along psi."""
     x = np.where(u > 0, u, 1e-12 * law.closure_range)
     batch, along = _closed(law, x, psi)
@@ -168,7 +170,7 @@ def _shear_stiffness(law: JointLaw, u: Array, psi: Array) -> Array:
     return slope.reshape(len(u), len(psi))
 
 
-def _friction(law: JointLaw, u: Array, psi: Array, limit: float, steps: int) -> Array:
+def _friction(law: Any, u: Array, psi: Array, limit: float, steps: int) -> Array:
     """Peak and final shear-to-normal ratio and final dilation (3, n, p), at constant stress."""
     few = np.geomspace(u[1], u[-1], ROWS)  # friction varies slowly with closure
     batch, along = _closed(law, few, psi)

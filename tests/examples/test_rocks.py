@@ -1,6 +1,7 @@
 """Rock masses: the scenes end as intended, the template runs, wrong tables are refused."""
 
 import json
+import re
 from dataclasses import replace
 
 import pytest
@@ -95,6 +96,26 @@ def test_a_scene_of_ones_own_from_the_template(tmp_path, capsys):
     assert 1e-5 < moved < 1e-2  # the settlement of the pin's block, m
     words = ["resume", str(out / "state"), "--until", "0.12", "--no-pictures"]
     assert main([*words, "--out", str(tmp_path / "on")]) == 0
+
+
+def test_a_law_with_cells_for_larger_stresses_is_told_what_to_write(tmp_path, capsys):
+    file = tmp_path / "mine.toml"
+    assert main(["new", str(file)]) == 0
+    text = file.read_text()
+    assert main(["check", str(file)]) == 0
+    assert "closure_range" not in capsys.readouterr().out
+    usual = re.sub(r"closure_range = .*\n", "", text)  # the closure at 20 MPa
+    file.write_text(usual)
+    assert main(["check", str(file)]) == 0
+    said = capsys.readouterr().out
+    assert "law 'joint': its joints bear 9e+04 Pa at most" in said
+    (wanted,) = re.findall(r"In \[laws.joint\] write (closure_range = [^,]*),", said)
+    one_cell = "resolution = { u = 4, phi = 6, depth = 1 }"
+    for cured in (usual.replace("[laws.joint]", f"[laws.joint]\n{wanted}"),
+                  re.sub("resolution = .*", one_cell, usual)):  # fmt: skip
+        file.write_text(cured)
+        assert main(["check", str(file)]) == 0
+        assert "closure_range" not in capsys.readouterr().out
 
 
 VARIANT = """

@@ -8,6 +8,7 @@ from c_host import FAST, CLaw, at, library, random_law, random_path
 
 import jointlaw as jl
 from jointlaw.kernels import reference
+from jointlaw.kernels.asperities import effective_closure
 
 BUILDS = {  # test_native.py tells the same of the library, which is made of the same text
     "gcc": ("gcc", [*FAST, "-std=c99"]),
@@ -134,9 +135,9 @@ def test_axes_turned_by_whole_azimuths(lib, tmp_path, mating_length):
 
 def sheared(joint, law):
     """Energy of the shear springs: what is stored, less the normal springs."""
-    k, s = law.tables, joint.state[:, None]
-    now = reference.parts(k, s)
-    y = reference.effective_closure(k, now.delta, now.slopes)
+    k = law.tables.asperities
+    now = reference.parts(law.tables, joint.state[:, None])
+    y = effective_closure(k, now.delta, now.slopes)
     squeezed = k.curve.energy(y)
     if k.yields:
         squeezed = squeezed - k.curve.energy(now.depth)
@@ -156,7 +157,7 @@ def test_axes_turned_between_azimuths(lib, tmp_path, damage):
         joint = CLaw(lib, law, tmp_path)
         for _ in range(5):
             F, _ = joint.step([1e-7, 5e-8, 2e-8])
-        depths = slice(-1 - len(law.tables.c1), -1)  # where asperities yield
+        depths = slice(-1 - len(law.tables.asperities.c1), -1)  # where asperities yield
         deepest, size = joint.state[depths].max(), np.hypot(*joint.state[1:3])
         before, lost = sheared(joint, law), joint.state[3]
         lib.jlaw_rotate(joint.law, at(joint.state), 0.3)

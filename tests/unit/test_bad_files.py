@@ -5,7 +5,7 @@ import re
 import pytest
 
 import jointlaw as jl
-from jointlaw.parameters.keys import Removed, checked
+from jointlaw.parameters.keys import checked
 from jointlaw.support.checks import number
 
 GOOD = """
@@ -57,9 +57,11 @@ def told(text, tmp_path):
         ("density = 1e10", 'density = 1e10\nresolution = "rough"', "resolution = 'rough'"),
         ("density = 1e10", "density = 1e10\nresolution = {u = 2, phi = 2, depth = 1}",
          "resolution.phi = 2 is out of bounds"),
+        ("density = 1e10", "density = 1e10\nresolution = {u = 2, phi = 3, depth = 1, lowest = 2}",
+         "resolution.lowest = 2.0 is out of bounds: it must be > 0 and <= 1"),
         ("density = 1e10",
          "density = 1e10\nresolution = {u = 2, phi = 3, depth = 1, front = true}",
-         "key 'resolution.front' is removed: take more depth cells"),
+         "key 'resolution.front' is unknown"),
         ("overlap = 2e-6", 'formation = "both"', "heights.formation = 'both'"),
         ("asperity_density", "version = 99\nasperity_density", "reads version 1; write"),
         ("a = 3.0", "a = ", "not valid TOML"),
@@ -73,14 +75,12 @@ def test_a_mistake_is_told_by_file_and_key(tmp_path, old, new, message):
     ("heights", "message"),
     [
         ("heights = 3\n", "key 'heights' must be a table"),
-        ("[heights]\n", "key 'heights.counts' is missing"),
+        ("[heights]\n", "key 'heights.alpha' is missing"),
+        ('[heights]\nkind = "histogram"', "key 'heights.distribution' is missing"),
+        ('[heights]\nkind = "weibull"', "heights.kind = 'weibull' is unknown"),
         (
-            '[heights]\ndistribution = "chi2"',
-            "'heights.distribution' is removed: write `counts`",
-        ),
-        (
-            '[heights]\nhistogram = "h.csv"',
-            "key 'heights.histogram' is removed: write its `counts`",
+            '[heights]\nkind = "histogram"\ndistribution = "chi2"',
+            "heights.distribution = 'chi2' must be (counts, edges)",
         ),
     ],
 )
@@ -96,13 +96,16 @@ def test_a_file_that_cannot_be_read(tmp_path):
         jl.JointLaw.from_toml(path)
     with pytest.raises(ValueError, match="does not exist"):
         jl.JointLaw.from_toml(tmp_path / "missing.toml")
-    with pytest.raises(ValueError, match=r"TOML text.* use JointLaw\.from_text"):
+    with pytest.raises(ValueError, match=r"TOML text.* use from_text"):
         jl.JointLaw.from_toml(GOOD)
 
 
 def test_a_mapping_is_checked_alike_and_left_alone():
     data = {"orientation": {"a": 3.0}, "asperity": {"K": 1.0, "lam": 1.0, "eta": 0.5, "mu": 0.3}}
-    data |= {"asperity_density": 1.0, "heights": {"counts": [1], "edges": [0.0, 1.0]}}
+    data |= {
+        "asperity_density": 1.0,
+        "heights": {"kind": "histogram", "distribution": [[1], [0.0, 1.0]]},
+    }
     data["heights"] |= {"formation": "individual"}
     before = repr(data)
     assert isinstance(jl.JointLaw.from_dict(data).heights, jl.Heights)
@@ -112,16 +115,16 @@ def test_a_mapping_is_checked_alike_and_left_alone():
         jl.JointLaw.from_dict(data, "here")
 
 
-RULES = {"end!": number, "drive": [{"block!": number}], "old": Removed("write end", neutral=0)}
+RULES = {"end!": number, "drive": [{"block!": number}]}
 
 
-def test_rules_for_lists_of_tables_and_removed_keys():
-    data = {"end": 2, "drive": [{"block": 1}], "old": 0}
+def test_rules_for_lists_of_tables():
+    data = {"end": 2, "drive": [{"block": 1}]}
     assert checked(data, RULES, "f") == {"end": 2.0, "drive": [{"block": 1.0}]}
     for message, change in {
         "f: key 'run.drive[1].block' is missing": {"drive": [{"block": 1}, {}]},
         "f: key 'run.drive' must be a list": {"drive": 3},
-        "f: key 'run.old' is removed: write end": {"old": 1},
+        "f: key 'run.old' is unknown; known here: drive, end": {"old": 1},
         "run.end = 'x' is not a number": {"end": "x"},
     }.items():
         with pytest.raises(ValueError, match=re.escape(message)):

@@ -31,4 +31,4 @@ def test_individual_is_always_convex(make_law, heights, eta):
 def test_a_density_that_ends_in_a_step_is_refused(make_law, overlap):
     """Its slope falls at the very end, beyond every quantile."""
     with pytest.raises(ValueError, match="not convex"):
-        make_law(heights=jl.Heights(([1], [0.0, 1e-5]), overlap))
+        make_law(heights=jl.Heights(([1], [0.0, 1e-5]), overlap, "population"))

@@ -19,6 +19,7 @@ KINDS = {
     "brittle bond": {"bond": jl.Bond(1e10, 1 / 3e-10, 0.0, 1e6)},
     "bond": {"bond": jl.Bond(1e10, 1e10, 1e6, 1e6, 60.0, 1 / 3e-3)},
     "own resolution": {"resolution": jl.Resolution(3, 5, 7)},
+    "cells for small loads": {"resolution": jl.Resolution(3, 5, 7, lowest=0.02)},
     "named resolution": {"resolution": "fine"},
     "default range": {"closure_range": None},
 }

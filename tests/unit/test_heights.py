@@ -1,6 +1,9 @@
 """Distributions of asperity heights: Eq. 11 to 13, and as a histogram."""
 
 import math
+from dataclasses import dataclass
+from pathlib import Path
+from textwrap import dedent
 
 import numpy as np
 import pytest
@@ -60,3 +63,50 @@ def test_bad_distributions(distribution, told):
     with pytest.raises(ValueError, match=r"heights\.distribution") as error:
         jl.Heights(distribution, 0.0, "individual")
     assert told in str(error.value)
+
+
+def test_the_default_formation_takes_any_histogram(make_law):
+    for bins in (5, 20):
+        sample = stats.gamma(4.0, scale=1e-6).rvs(5000, random_state=bins)
+        make_law(heights=jl.Heights(np.histogram(sample, bins=bins)))
+
+
+@pytest.fixture(scope="module")
+def exponential():
+    """The class of CONTRIBUTING.md."""
+    page = Path(__file__).parents[2] / "CONTRIBUTING.md"
+    text = page.read_text(encoding="utf-8").partition("    @dataclass")[2]
+    code = dedent("    @dataclass" + text.partition("    law =")[0])
+    names = {"np": np, "dataclass": dataclass}
+    exec(code, names)
+    return names["Exponential"]
+
+
+def test_a_class_of_the_user_works_and_no_file_can_name_it(make_law, exponential):
+    law = make_law(heights=exponential(3e-6))
+    same = make_law(heights=jl.GammaHeights(0.0, 3e-6, 0.0, "individual"))
+    d = [5e-7, 2e-7, 0.0]
+    np.testing.assert_allclose(
+        law.joint().update(d)[0], same.joint().update(d)[0], rtol=1e-8, atol=1.0
+    )
+    with pytest.raises(ValueError, match=r"^heights = .*no file can name Exponential"):
+        law.to_toml()
+
+
+def test_what_is_no_distribution_of_heights_is_refused(make_law, exponential):
+    class ByAddress(exponential):
+        __hash__ = object.__hash__
+
+    class Falling(exponential):
+        def breakpoints(self):
+            return np.array([1e-6, 0.0])
+
+    for heights, told in {
+        3: "has no overlap",
+        ByAddress(1e-6): "must be equal and hash alike",
+        exponential(1e-6, -1e-6): "heights.overlap = -1e-06",
+        exponential(1e-6, 0.0, "both"): "heights.formation = 'both'",
+        Falling(1e-6): "ascending heights",
+    }.items():
+        with pytest.raises(ValueError, match=told):
+            make_law(heights=heights)

@@ -1,12 +1,9 @@
 """`import jointlaw` needs numpy and scipy alone, and leaves the slow parts until they are asked."""
 
-import pkgutil
 import re
 import subprocess
 import sys
 from pathlib import Path
-
-import pytest
 
 import jointlaw as jl
 
@@ -45,13 +42,3 @@ def test_every_public_name_loads_and_stands_on_the_api_page():
         assert getattr(jl, name).__name__.rpartition(".")[2] == name
     for module in ("presets", "closed_form"):
         assert f"automodule:: jointlaw.{module}" in page
-
-
-@pytest.mark.parametrize("name", jl._GONE)
-def test_a_name_of_former_versions_says_what_to_use(name):
-    with pytest.raises(AttributeError, match=re.escape(jl._GONE[name])) as error:
-        getattr(jl, name)
-    assert "\n" not in str(error.value)
-    assert not hasattr(jl, name)
-    if jl._GONE[name].startswith("jointlaw."):
-        pkgutil.resolve_name(jl._GONE[name])  # and that is true

@@ -194,3 +194,16 @@ def test_a_step_of_other_shapes_is_refused(law, state, d):
     size = tuple(law.state_size if n == 0 else n for n in state)
     with pytest.raises(ValueError, match="expected"):
         law.step(np.zeros(size), np.zeros(d))
+
+
+@pytest.mark.parametrize("seed", [9, 10, 21])
+def test_a_step_shows_what_the_state_then_amounts_to(both, seed):
+    """In the pass that advances: the same bits as measured afterwards."""
+    law = random_law(seed)
+    d, dim = path(law, seed, 12, N), law.tables.dim
+    for batch in both(lambda: law.joints(N)):
+        for increments in d:
+            shown = np.empty((N, 6 + dim))
+            batch.take(engine.Step(increments, np.empty((N, dim)), None, shown=shown))
+            measures = *batch.measures()[:4], batch.dissipated_energy, batch.damage
+            np.testing.assert_array_equal(shown, np.column_stack([*measures, batch.delta]))

@@ -1,6 +1,7 @@
-"""How the files of both packages hang together: imports one way."""
+"""How the files of both packages hang together: imports one way, and those of public names."""
 
 import ast
+import re
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -62,10 +63,47 @@ def test_a_circle_is_found_and_imports_in_functions_count():
     graph = {"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}
     assert circle(graph) in (["a", "b", "c", "a"], ["b", "c", "a", "b"], ["c", "a", "b", "c"])
     assert circle(graph | {"c": set()}) == []
-    assert "jointlaw/accuracy/tradeoff.py" in imported("jointlaw/law.py")
+    assert "jointlaw/accuracy/tradeoff.py" in imported("jointlaw/laws/joint_law.py")
 
 
 def test_jointlaw_never_imports_the_demo():
     for path in trees():
         if path.startswith("jointlaw/"):
             assert not [f for f in imported(path) if f.startswith("dem_demo/")], path
+
+
+def public_names():
+    """Full names of what the pages of docs/api show; "MODULE.*" where they show all of a module."""
+    names = set()
+    for page in (ROOT / "docs/api").glob("*.md"):
+        inside, module = "", ""
+        for line in page.read_text(encoding="utf-8").splitlines():
+            if found := re.match(r"\.\. currentmodule:: (\S+)", line):
+                inside = f"{found[1]}."
+            elif found := re.match(r"\.\. auto(\w+):: (\S+)", line):
+                module = found[2] if found[1] == "module" else ""
+                names.add(found[2] if "." in found[2] else inside + found[2])
+            elif module and (found := re.match(r"   :members:(.*)", line)):
+                names |= {f"{module}.{name.strip() or '*'}" for name in found[1].split(",")}
+    return names
+
+
+def test_the_example_host_imports_public_names_only():
+    """What dem_demo takes of jointlaw stands on a page of docs/api: a host of others has it too."""
+    public, taken = public_names(), set()
+    for path in trees():
+        for node in ast.walk(trees()[path]) if path.startswith("dem_demo/") else ():
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and not node.level:
+                names = [f"{node.module}.{alias.name}" for alias in node.names]
+            else:
+                continue
+            taken |= {(path, name) for name in names if name.startswith("jointlaw")}
+    hidden = {
+        (path, name)
+        for path, name in taken
+        if name != "jointlaw" and not {name, f"{name.rpartition('.')[0]}.*"} & public
+    }
+    assert not hidden, f"give them a public place, or do without: {sorted(hidden)}"
+    assert ("dem_demo/cli.py", "jointlaw.PathError") in taken

@@ -2,36 +2,25 @@
 
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import jointlaw as jl
 from jointlaw.kernels import engine, reference
-from jointlaw.native import build, layout, library
+from jointlaw.native import build, library
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "hosts"))
 from c_host import random_law, random_path
 
 SAME, SAME_C = 1e-12, 1e-10  # of the largest on the path; q of a slider carries three times as much
-LINES = 2050  # of C that is written by hand
 SEEDS = (3, 7, 10, 14, 20)  # space and planes, mating length, yielding, wear, both
 
 
 @pytest.fixture(autouse=True)
 def native(monkeypatch):
     monkeypatch.setenv("JOINTLAW_KERNEL", "native")
-
-
-def test_headers_are_made_of_what_lies_beside_them():
-    for name, text in layout.made().items():
-        written = (layout.HERE / name).read_text(encoding="utf-8")
-        assert written == text, f"{name}: run `python -m jointlaw.native`"
-
-
-def test_the_text_is_short():
-    by_hand = {p for p in layout.HERE.glob("*.[ch]") if p.name not in layout.made()}
-    assert sum(p.read_text(encoding="utf-8").count("\n") for p in by_hand) <= LINES
 
 
 @pytest.mark.parametrize(
@@ -102,17 +91,8 @@ def engines_anew():
     engine._warn_once.cache_clear()
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_same_bits_by_vectors_of_any_width(engines_anew, seed):
-    law = random_law(seed)
-    widest = library.load().jlaw_lanes()
-    for lanes in [lanes for lanes in build.LEVELS if lanes < widest]:
-        for one, other in zip(numbers(law, seed), numbers(law, seed, lanes), strict=True):
-            np.testing.assert_array_equal(one, other)
-        law.joints(1)._engine.lanes = widest
-
-
-COMPILERS = {  # the library itself is made by clang at -O3, the header by gcc (test_c_kernel.py)
+COMPILERS = {  # the header is compiled in test_c_kernel.py
+    "clang": ("clang",),
     "gcc -O2": ("gcc", "-O2"),
     "g++": ("g++", "-x", "c++", "-fno-exceptions"),
     "clang -O2": ("clang", "-O2"),
@@ -122,27 +102,65 @@ COMPILERS = {  # the library itself is made by clang at -O3, the header by gcc (
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", COMPILERS)
-def test_same_bits_by_every_compiler(engines_anew, monkeypatch, tmp_path, name):
+def test_same_bits_by_every_compiler_and_width(engines_anew, monkeypatch, tmp_path, name):
     compiler = build.Compiler(COMPILERS[name])
     if not build.works(compiler):
         pytest.skip(f"{name} does not work here")
     if "-O2" in compiler.command:  # the last of two counts
         monkeypatch.setattr(build, "FLAGS", (*build.FLAGS, "-O2"))
+    monkeypatch.setenv("JOINTLAW_LEVELS", "all")
     laws = {seed: random_law(seed) for seed in SEEDS}
     first = {seed: numbers(law, seed) for seed, law in laws.items()}
     loaded = library.load_file(build.build(compiler, tmp_path))
     monkeypatch.setattr(library, "load", lambda: loaded)
     engine._engine.cache_clear()
-    for seed, law in laws.items():
-        for one, other in zip(first[seed], numbers(law, seed), strict=True):
-            np.testing.assert_array_equal(one, other)
+    widths = [lanes for lanes in build.LEVELS if lanes <= loaded.jlaw_lanes()]
+    assert widths == [lanes for lanes in widths if lanes & loaded.jlaw_levels()]
+    for lanes in widths:
+        for seed, law in laws.items():
+            for one, other in zip(first[seed], numbers(law, seed, lanes), strict=True):
+                np.testing.assert_array_equal(one, other)
 
 
 def test_a_library_of_other_sources_is_refused(monkeypatch):
-    path = layout.HERE / build.library_name(build.Compiler(()).machine[1])
+    path = build.BUILT / build.library_name(build.Compiler(()).machine[1])
     monkeypatch.setattr(build, "sources", lambda: "0" * 16)
-    with pytest.raises(library.StaleLibraryError, match=r"python -m jointlaw\.native"):
+    with pytest.raises(library.UnfitLibraryError, match=r"python -m jointlaw\.native"):
         library.load_file(path)
+
+
+def test_a_library_serves_the_processors_that_have_its_vectors(monkeypatch):
+    """Widest vectors of the processor, those of the library: those that are taken; 0 is refused."""
+    taken = {(8, 14): 8, (8, 4): 4, (4, 14): 4, (2, 14): 2, (2, 2): 2, (4, 8): 0, (2, 12): 0}
+    for (here, built), lanes in taken.items():
+        loaded = SimpleNamespace(jlaw_lanes=lambda n=here: n, jlaw_levels=lambda n=built: n)
+        assert library.lanes(loaded) == lanes
+    own = build.BUILT / build.library_name(build.Compiler(()).machine[1])
+    assert library.lanes(library.load_file(own)) == library.load().jlaw_lanes()
+    monkeypatch.setattr(library, "lanes", lambda loaded: 0)
+    with pytest.raises(library.UnfitLibraryError, match=r"`JOINTLAW_LEVELS=all python -m joint"):
+        library.load_file(own)
+
+
+def test_a_file_that_is_no_library_of_this_machine_is_refused(tmp_path):
+    (tmp_path / "libjointlaw.so").write_bytes(b"\x7fELF of another machine")
+    with pytest.raises(library.UnfitLibraryError, match=r"cannot be loaded here .*build it anew"):
+        library.load_file(tmp_path / "libjointlaw.so")
+
+
+def test_what_is_built_for_this_machine_and_for_others(monkeypatch):
+    """One width of vectors for this machine; all for others, and where all are asked for."""
+    monkeypatch.delenv("JOINTLAW_LEVELS", raising=False)
+    compiler = build.find_compiler()
+    assert build.chosen_levels(compiler) == (library.load().jlaw_lanes(),)
+    assert build.chosen_levels(build.zig("x86_64-windows-gnu")) == tuple(build.LEVELS)
+    assert build.chosen_levels(build.zig("aarch64-windows-gnu")) == (2,)
+    monkeypatch.setenv("JOINTLAW_LEVELS", "all")
+    alike = compiler.machine[0] == "x86_64"
+    assert build.chosen_levels(compiler) == (tuple(build.LEVELS) if alike else (2,))
+    monkeypatch.setenv("JOINTLAW_LEVELS", "both")
+    with pytest.raises(ValueError, match="JOINTLAW_LEVELS = 'both' is unknown; write all"):
+        build.chosen_levels(compiler)
 
 
 def test_without_a_library_numpy_remains_and_that_is_said_once(engines_anew, monkeypatch, recwarn):

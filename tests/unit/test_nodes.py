@@ -53,6 +53,18 @@ def test_cells_of_a_power_law_are_a_power_grading(cells, farther):
         np.testing.assert_allclose(zeta[1:-1], reach * share ** (1 / 0.525), rtol=5e-3)
 
 
+def test_cells_for_small_loads_are_a_geometric_grading():
+    """sqrt(Phi''/Phi) ~ 1/y from the lowest closure on: errors are the same shares of all loads."""
+    curve, lowest = virgin_curve(0.5, None), 1e-2
+    (nodes,) = depth_nodes(curve, 2.0, np.zeros(1), np.array([30]), lowest)
+    inner = nodes[nodes > 2.0 * lowest][:-1]
+    ratio = inner[1:] / inner[:-1]
+    assert len(inner) > 15
+    assert np.ptp(ratio) < 0.01 * ratio[0]  # summed over panels
+    usual = depth_nodes(curve, 2.0, np.zeros(1), np.array([30]))
+    assert np.count_nonzero(nodes < 0.1) > 2 * np.count_nonzero(usual < 0.1)
+
+
 @pytest.mark.parametrize("formation", ["population", "individual"])
 def test_cells_rise_and_scale_with_the_unit_of_length(formation):
     slope = np.array([0.0, 0.3, 1e9])
@@ -67,7 +79,7 @@ def test_cells_rise_and_scale_with_the_unit_of_length(formation):
 
 
 def test_light_facets_have_fewer_cells_and_all_are_counted():
-    k = jl.presets.load("westerly-smooth").tables
+    k = jl.presets.load("westerly-smooth").tables.asperities
     cells = np.count_nonzero(k.depth[:, :-1] < UNUSED, axis=1)
     assert k.cells == cells.max() > cells.min() == 1
     assert k.sliders == cells.sum() < len(cells) * k.cells

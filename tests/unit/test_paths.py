@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.laboratory.experiments import PathError
+from jointlaw import PathError
 
 N = 10e6  # Pa
 
@@ -26,7 +26,8 @@ def test_constant_normal_stiffness(any_sheared_law):
     )
     asked = N + spring * (record.closure[0] - record.closure)
     np.testing.assert_allclose(record.F1, asked, atol=1e-9 * N, rtol=1e-9)
-    assert np.ptp(record.F1) > 0.001 * N
+    dilates = any_sheared_law.tables.asperities is not None
+    assert (np.ptp(record.F1) > 0.001 * N) == dilates
 
 
 @pytest.mark.parametrize("azimuth", [math.radians(30), -2.5])

@@ -112,6 +112,20 @@ def test_joints_start_closed_to_a_normal_stress(any_law):
         any_law.joint(normal_stress=-1.0)
 
 
+def test_few_cells_that_yield_bear_the_whole_stress(make_law):
+    """Their closure is not that of many cells: a step to it bears up to 10 % more."""
+    for a, mu, heights in ((1.0, 5.0, None), (3.0, 0.3, "individual"), (1.5, 0.0, "population")):
+        law = make_law(a=a, b=2.0, c=0.0, mu=mu, heights=heights, lam=1.75,
+                       damage={"yield_interference": 5e-9})  # fmt: skip
+        stress = law.normal_stress(1e-6) * np.array([1e-3, 0.0, 1.0, 0.2])
+        batch = law.joints(4, normal_stress=stress)
+        np.testing.assert_allclose(batch.F[:, 0], stress, rtol=1e-12)
+        assert batch.delta[1, 0] == 0.0
+        assert law.joint(normal_stress=stress[0]).delta[0] == batch.delta[0, 0]
+    with pytest.raises(ValueError, match=r"normal_stress = 1e\+20 Pa is beyond any closure"):
+        law.joint(normal_stress=1e20)
+
+
 def test_joints_move_between_batches_and_go_on_as_before(any_law):
     rng = np.random.default_rng(3)
     here, there = any_law.joints(5), any_law.joints(4)

@@ -48,3 +48,9 @@ def test_the_frontier_falls(found):
     same = replace(frontier[0], sliders=5, error=(1 - 1e-9) * frontier[0].error)
     assert replace(found, rows=(*found.rows, same)).frontier() == frontier
     assert any(line.endswith(" fast") for line in str(found).splitlines())
+
+
+@pytest.mark.parametrize("stress", [3e4, (1e6, 3e4), (0.0, 1e6), (3e4, 1e5, 1e6)])
+def test_a_range_of_stresses_is_two_in_order(law, stress):
+    with pytest.raises(ValueError, match=r"give the smallest and the largest normal stress"):
+        law.at_tolerance(0.05, stress=stress)

@@ -9,6 +9,7 @@ import dataclasses
 import numpy as np
 
 from jointlaw.discretisation.virgin_curve import VirginCurve
+from jointlaw.kernels import asperities
 from jointlaw.kernels import reference as kernel
 from jointlaw.kernels.mating import planes
 from jointlaw.kernels.wear import worn_share
@@ -26,10 +27,11 @@ _STARTS = np.unique(
 def begun(k, state):
     """States (rows, B) as a step begins: slopes have worn by the work of friction so far."""
     new = state.copy()
-    if k.wears:
+    facets = k.asperities
+    if facets.wears:
         old, now = kernel.parts(k, state), kernel.parts(k, new)
-        now.worn[:] = worn_share(k, old.worn, old.work)
-        now.q[:], lost = kernel.wear(k, old, now.slopes)
+        now.worn[:] = worn_share(facets, old.worn, old.work)
+        now.q[:], lost = asperities.wear(facets, old.delta, old, 1 - now.worn)
         now.dissipated[:] += lost
     return new
 
@@ -48,24 +50,23 @@ def along(k, state, d, t):
     The planes are those of the whole step, and y runs straight: docs/theory-incremental.md, "No
     step creates energy". Returns the power (B,), and on which side of every kink (kinks, B).
     """
-    old = kernel.parts(k, state)
+    old, k = kernel.parts(k, state), k.asperities
     p0, p1, slopes = old.delta[1:], old.delta[1:] + d[1:], old.slopes
     middle = planes(k, 0.5 * (p0 + p1), slopes)
     gamma = np.maximum(planes(k, p0, slopes).gamma, planes(k, p1, slopes).gamma)
-    y0, y1 = (kernel.effective_closure(k, x, slopes) for x in (old.delta, old.delta + d))
-    before, after = kernel.cells(k, y0), kernel.cells(k, y0 + t * (y1 - y0))
+    y0, y1 = (asperities.effective_closure(k, x, slopes) for x in (old.delta, old.delta + d))
+    before, after = asperities.cells(k, y0), asperities.cells(k, y0 + t * (y1 - y0))
     gained, depth, y, low = after.G - before.G, old.depth, after.y, k.depth[:, :-1, None]
     sides = [y[:, None] > low]
     if k.yields:
-        depth, flat0 = flatten(k, old.depth, after.y), kernel.cells(k, old.depth)
+        depth, flat0 = flatten(k, old.depth, after.y), asperities.cells(k, old.depth)
         gained = after.G - np.maximum(before.G, flat0.G)
-        before, after = (
-            kernel.flattened(before, flat0), kernel.flattened(after, kernel.cells(k, depth))
-        )  # fmt: skip
+        now = asperities.cells(k, depth)
+        before, after = asperities.flattened(before, flat0), asperities.flattened(after, now)
         sides += [depth[:, None] > low, depth > old.depth, y - k.yield_depth[:, None] >= depth]
     part = np.einsum("edmb,db->emb", middle.basis, d)
-    limit = kernel.strength(k, gamma)
-    sliders = kernel.load(k, before, gained, after, limit, old.q, (t * part)[:, :, None])
+    limit = asperities.strength(k, gamma)
+    sliders = asperities.load(k, before, gained, after, limit, old.q, (t * part)[:, :, None])
     q = sliders.share * sliders.trial
     power = np.sum((k.area * k.c1)[:, None] * after.force * (y1 - y0), axis=0)
     power = power + np.einsum("emb,emdb->b", part, q) / k.lam
@@ -126,8 +127,10 @@ def _nodes(curve):
 
 def stored(k, state):
     """Stored energy (B,) in J/m2 of a batch of states (rows, B), without the table of energies."""
-    own = dataclasses.replace(k, curve=_Integrated(*k.curve))
-    return kernel.measures(own, state).stored
+    facets, *beside = k.elements
+    own = dataclasses.replace(facets.k, curve=_Integrated(*facets.k.curve))
+    whole = kernel.Tables(k.dim, (asperities.Asperities(own), *beside))
+    return kernel.measures(whole, state).stored
 
 
 def step_work(k, states, d):

@@ -100,9 +100,9 @@ def held(law, at, angle, more=""):
         motion, tracker = sim.blocks.motion, sim.tracker
         motion[:3, 1] = x, y, np.radians(tilt - angle)
         tracker.follow(motion)
-        if tracker.stale(motion):
-            tracker.renew(motion, {(0, 1)})
-        sim.joints.assign(tracker.identities)
+        before = tracker.renew(motion, np.array([[0, 1]]))
+        if before is not None:
+            sim.joints.rearrange(before, tracker.law, tracker.keys)
         sim.joints.update(sim.contacts.closure, np.zeros(sim.joints.n))
         sim.ledger.area = sim.contacts.length * sim.scene.thickness
         return sim.ledger.area @ sim.joints.stored, contact_forces(sim)[1]

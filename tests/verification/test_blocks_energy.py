@@ -38,6 +38,7 @@ at = [{at[0]}, {at[1]}]
 angle = {angle}
 [run]
 end = 1.0
+fraction = 0.3
 {run}
 """)
 

@@ -34,6 +34,7 @@ box = [1.0, 1.0]
 at = [1.5, 0.5]
 [run]
 end = {end}
+fraction = 0.3
 """)
 
 

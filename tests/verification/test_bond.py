@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from scipy.integrate import quad, trapezoid
 from scipy.optimize import brentq
 
 import jointlaw as jl
-from jointlaw.kernels.bond import damage_at, hold
+from jointlaw.kernels.bond import Bonded, damage_at
 
 STIFFNESS, STRENGTH = (1e10, 5e9), (2e6, 3e6)  # Pa/m, Pa
 BRITTLE = jl.Bond(*STIFFNESS, *STRENGTH)
@@ -25,6 +26,13 @@ def energies(bond):
     given = bond.energy_I, bond.energy_II
     elastic = [0.5 * t**2 / k for k, t in zip(STIFFNESS, STRENGTH, strict=True)]
     return [e if g is None else g for g, e in zip(given, elastic, strict=True)]
+
+
+def hold(bond, delta, old):
+    """Damage (B,), traction and loss of a bond after a step to delta (3, B)."""
+    new = np.empty((1, len(old)))
+    share = Bonded(bond).step(np.zeros_like(delta), delta, old[None], new, False)
+    return SimpleNamespace(damage=new[0], F=share.F, lost=share.lost)
 
 
 def pull(bond, points, law):

@@ -2,6 +2,8 @@
 along the step's own geometry (docs/theory-incremental.md, "No step creates energy").
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from builders import increments, law, random_corners
@@ -10,6 +12,7 @@ from work import WorkMeter
 
 import jointlaw as jl
 from jointlaw.kernels import reference as kernel
+from jointlaw.kernels.asperities import effective_closure
 
 PATHS, CYCLES = 34, 10  # of each of six kinds of law; docs/measure/gains.py searches on 60
 SEEDS = [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, PATHS))]
@@ -53,9 +56,9 @@ def gains(k, states, d):
 def scale(k, states):
     """Largest energy (J/m2) in the springs of a joint on its way, had none yielded: what is stored
     is a small difference of such energies, and has their rounding."""
-    now = kernel.parts(k, states)
-    y = kernel.effective_closure(k, now.delta, now.slopes)
-    return max(np.max((k.area * k.c1) @ k.curve.energy(y)), np.max(stored(k, states)))
+    now, whole, k = kernel.parts(k, states), k, k.asperities
+    y = effective_closure(k, now.delta, now.slopes)
+    return max(np.max((k.area * k.c1) @ k.curve.energy(y)), np.max(stored(whole, states)))
 
 
 @pytest.mark.parametrize("yields", [False, True])
@@ -75,6 +78,25 @@ def test_no_step_of_a_random_path_makes_energy(seed, fades, wears, yields):
     # Gauss rules of 16 points between kinks of steps of up to thirty closure ranges
     assert np.max(gains(k, states, d)) <= 1e-11 * peak
     assert np.min(np.diff(kernel.parts(k, states).dissipated)) >= -1e-12 * peak
+
+
+@pytest.mark.parametrize(("mu", "shares"), [(0.0, ()), (0.05, (1.3, 1.03)), (0.3, (1.3, 1.03))])
+def test_the_ledger_tends_to_the_loss_and_is_nothing_without_friction(mu, shares):
+    """Legs of 1, 10 and 100 steps: at most so many times the loss of 100 steps, and no less."""
+    rough = replace(jl.presets.load("westerly-rough"), plane=0.0)
+    one = replace(rough, asperity=replace(rough.asperity, mu=mu))
+    R, lost = one.closure_range, []
+    for count in (1, 10, 100):
+        joint = one.joint()
+        for leg in ([0.5, 0.5], [0.0, -1.0], [0.3, 0.5]):
+            for _ in range(count):
+                joint.update(R * np.array(leg) / count, tangent=False)
+        lost.append(joint.dissipated_energy)
+    if not mu:
+        assert lost == [0.0, 0.0, 0.0]
+        return
+    assert (np.array(lost[:2]) <= np.array(shares) * lost[2]).all()
+    assert (np.diff(lost) < 0.0).all()
 
 
 @pytest.mark.slow

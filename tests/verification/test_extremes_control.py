@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.laboratory.experiments import PathError
+from jointlaw import PathError
 
 pytestmark = pytest.mark.slow
 

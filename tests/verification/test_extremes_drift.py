@@ -35,7 +35,7 @@ def test_small_normal_cycles_forget_locked_in_shear_at_a_known_rate(eta, depth, 
     [(1 - amplitude)^eta - c]/(1 - c) of its part 1 - c each cycle; the cells above keep theirs.
     """
     amplitude, counts = 1e-2, (1, 10, 100, 1000, 10_000)
-    nodes = sticky(depth, eta).tables.depth[0]
+    nodes = sticky(depth, eta).tables.asperities.depth[0]
     zeta = nodes[nodes < SCALE * (1.0 - amplitude)].max() / SCALE
     c = zeta**eta if zeta > 0.0 else 0.0
     share = 1.0 - c if eta > 0.0 else 0.0  # at eta = 0 one spring holds all, and keeps it

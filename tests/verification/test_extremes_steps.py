@@ -56,7 +56,7 @@ def test_shear_without_normal_load(changes):
     faces that lie flat are not."""
     law = build(**changes)
     joint = law.joint()
-    apart = 1e3 * SCALE * float(np.max(np.abs(law.tables.m[1:])))
+    apart = 1e3 * SCALE * float(np.max(np.abs(law.tables.asperities.m[1:])))
     joint.update([-apart, 0.0, 0.0])
     F, C = joint.update([0.0, 100.0 * SCALE, 50.0 * SCALE])
     assert not F.any()

@@ -96,7 +96,7 @@ def test_known_parameters_are_covered_by_their_intervals(law):
         ({"stress": [1e5, 2e5, 5e5, 3e5, 1e5]}, "first loading alone"),
         ({"stress": [-1e5, 2e5, 3e5, 4e5, 5e5]}, ">= 0"),
         ({"free": ("alpha", "gamma")}, "'gamma' is unknown"),
-        ({"fixed": {"beta": -1.0}}, "beta = -1.0 is out of bounds"),
+        ({"fixed": {"beta": -1.0}}, "beta = -1.0 m is out of bounds"),
         ({"fixed": {"c": 0.45}}, r"c = 0.45 .* 1/3 - b/6 = 0.333333333"),
         ({"priors": {"alpha": (5, 1)}}, "ascending"),
         ({"noise": 0.0}, "noise"),

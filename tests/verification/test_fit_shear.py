@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.calibration.measured import ClosureCurve, ShearCurve
+from jointlaw import ClosureCurve, ShearCurve
 
 SHEAR = np.linspace(0, 3e-5, 12)
 CONVERGED = jl.Resolution(20, 14, 48)  # of what is measured: 200 steps, stress within 0.1 %

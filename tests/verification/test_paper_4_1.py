@@ -9,7 +9,7 @@ import pytest
 from paper_laws import preset
 from scipy.optimize import brentq
 
-from jointlaw.law import JointLaw
+from jointlaw.laws.joint_law import JointLaw
 from jointlaw.paper.secant import secant
 
 GRANITE = SMOOTH, ROUGH = preset("westerly-smooth"), preset("westerly-rough")

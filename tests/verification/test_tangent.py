@@ -94,3 +94,20 @@ def test_tangent(state, option, plane):
     assert least < 1e-8  # eps^(2/3) of rounding is 4e-11; the promise is 1e-8
     joint.update(d)
     assert OPTIONS[option].keys() & {"damage", "mating_length"} or IS[state](joint)
+
+
+def test_shear_while_the_joint_closes_is_softer_than_shear_of_the_closed_joint():
+    """The ratios that docs/limits.md gives, at 1 to 20 MPa."""
+    stated = {"westerly-smooth": (0.53, 0.64), "westerly-rough": (0.50, 0.53),
+              "biegel-smooth": (0.45, 0.53), "biegel-rough": (0.55, 0.58),
+              "jing-replica": (0.15, 0.19), "nonlinear-a6": (0.67, 0.67),
+              "linear-a6": (1.0, 1.0)}  # fmt: skip
+    for name, (least, most) in stated.items():
+        law, ratio = jl.presets.load(name), []
+        for closure in law.closure(np.array([1e6, 5e6, 20e6])):
+            joint = law.joint()
+            closing = joint.update([closure, 0.0, 0.0])[1]
+            closed = joint.trial([0.0, 1e-6 * closure, 0.0])[1]
+            ratio.append(closing[1, 1] / closed[1, 1])
+        assert min(ratio) == pytest.approx(least, abs=6e-3), name  # two digits
+        assert max(ratio) == pytest.approx(most, abs=6e-3), name

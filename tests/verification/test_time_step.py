@@ -55,6 +55,38 @@ def test_the_tangent_stays_below_both_bounds(seed):
     assert closest > 0.2  # a bound, but not an empty one
 
 
+@pytest.mark.parametrize("eta", [0.0, 0.5])
+def test_heights_of_two_groups_are_bounded(eta):
+    """Few asperities touch long before many do: |C| is far above the bound of other heights."""
+    heights = jl.Heights(((0.02, 0.0, 0.98), (0.0, 0.02 * R, R, 1.05 * R)), 0.02 * R)
+    law = jl.JointLaw(
+        orientation=jl.Orientation(10.0), asperity=jl.Asperity(2e8, 1.2, eta, 0.6),
+        heights=heights, asperity_density=1e10, closure_range=2 * R,
+        resolution=jl.Resolution(3, 6, 1), plane=0.0,
+    )  # fmt: skip
+    closure = (0.98 + 0.1 * np.geomspace(1e-6, 1.0, 60)) * R
+    joints, still = law.joints(60), np.zeros(60)
+    joints.update(np.stack([closure, still], axis=1))
+    joints.update(np.stack([still, still + 2.4 * R], axis=1))
+    C = joints.trial(np.tile([-1e-5 * R, -1e-4 * R], (60, 1)))[1]
+    k, share = law.tables.asperities, np.linalg.norm(C, 2, axis=(1, 2)) / joints.max_stiffness()
+    assert share.max() <= 1.0
+    others = (1.0 + 0.6) * law.curve.force(closure)[1] * np.sum(k.area / k.c1)
+    assert (np.linalg.norm(C, 2, axis=(1, 2)) / others).max() > 2.0  # the bound of other heights
+
+
+def test_an_unmated_joint_has_a_step_at_its_negative_closure(make_law):
+    law = make_law(mating_length=2e-5, plane=0.0)
+    joints = law.joints(1, mated=False)
+    for _ in range(60):
+        F, _ = joints.update([[1e-8, 0.0]], tangent=False)
+    closure, shear = joints.delta[0]
+    assert closure < 0.0 < F[0, 0]
+    given = law.critical_time_step(1.0, 1.0, closure, shear)
+    assert given == pytest.approx(joints.critical_time_step(1.0, 1.0)[0], rel=0.3)
+    assert given <= joints.critical_time_step(1.0, 1.0)[0]
+
+
 def test_the_step_of_a_batch_is_that_of_each_joint_as_it_is():
     law = jl.presets.load("westerly-smooth")
     joints = law.joints(3)
@@ -72,5 +104,5 @@ def test_arguments_out_of_bounds(given):
     law = jl.presets.load("linear-a3")
     with pytest.raises(ValueError, match=r"(mass|area|closure|shear) = "):
         law.critical_time_step(*given)
-    with pytest.raises(ValueError, match="mass and area must be numbers or have shape"):
+    with pytest.raises(ValueError, match=r"area has shape \(2, 3\): give a number or \(3,\)"):
         law.joints(3).critical_time_step(1.0, np.ones((2, 3)))

@@ -10,6 +10,7 @@ from slow_bed import SlowBed, cap_quadrature, reach_of
 
 import jointlaw as jl
 from jointlaw.kernels import reference as kernel
+from jointlaw.kernels.asperities import effective_closure
 
 
 @pytest.mark.parametrize("interference", [1e-12, 0.05, 0.3])
@@ -19,7 +20,7 @@ from jointlaw.kernels import reference as kernel
 def test_closure_has_a_closed_form(formation, eta, interference):
     one = law(formation=formation, eta=eta, mu=0.0, resolution=jl.Resolution(2, 4, 3),
               damage={"yield_interference": interference})  # fmt: skip
-    joint, k = one.joint(), one.tables
+    joint, k = one.joint(), one.tables.asperities
 
     def phi(y):
         return k.curve.force(np.asarray(y, float))[0]
@@ -94,9 +95,10 @@ def test_tractions_agree_with_the_slow_bed(interference, mating_length):
 
 def test_both_sides_of_an_asperity_are_flattened_where_slopes_fade():
     """Else slopes that wear would press springs that only the other side has lost."""
-    k = law(mating_length=2.0, damage={"yield_interference": 0.1}).tables
-    state = kernel.step(k, np.zeros((k.rows, 1)), np.array([[0.5], [0.8], [0.3]]), False)[0]
-    depth = kernel.parts(k, state).depth[:, 0]
+    whole = law(mating_length=2.0, damage={"yield_interference": 0.1}).tables
+    d, k = np.array([[0.5], [0.8], [0.3]]), whole.asperities
+    state = kernel.step(whole, np.zeros((whole.rows, 1)), d, False)[0]
+    depth = kernel.parts(whole, state).depth[:, 0]
     turned = k.n * [[1.0], [-1.0], [-1.0]]
     opposite = np.argmax(turned.T @ k.n, axis=1)
     assert np.ptp(depth) > 0.1
@@ -116,7 +118,17 @@ def test_a_joint_closed_beyond_its_highest_asperity_gives_a_warning():
         stiff.joint(30e6)
 
 
-def test_slopes_wear_by_the_work_of_friction():
+def test_closing_and_opening_wear_no_slopes():
+    """Facets rub where a joint closes; real joints keep their slopes without shear."""
+    one = law(mu=0.4, mating_length=3.0, slope_wear=1e-3, plane=0.0)
+    joint = one.joint()
+    for way in 20 * (0.1, 0.1, -0.1, -0.1):
+        joint.update([6.0 * way, 0.0])
+    assert joint.dissipated_energy > 1e-3  # friction was lost
+    assert joint.slopes == 1.0
+
+
+def test_slopes_wear_by_the_work_of_shear():
     """slopes = s + (1 - s) exp(-work/slope_wear), of the step before; lift goes with them."""
     one = law(mu=0.4, mating_length=3.0, slope_wear=0.2, slope_residual=0.25, plane=0.0)
     joint = one.joint()
@@ -126,8 +138,8 @@ def test_slopes_wear_by_the_work_of_friction():
         joint.update([0.0, 0.05])
         assert joint.slopes == pytest.approx(0.25 + 0.75 * np.exp(-before / 0.2), rel=1e-12)
     now = kernel.parts(one.tables, joint.snapshot().values.T)
-    y = kernel.effective_closure(one.tables, now.delta, now.slopes)[:, 0]
+    y = effective_closure(one.tables.asperities, now.delta, now.slopes)[:, 0]
     climbed = 4.0 / np.hypot(1.0, 4.0 / 3.0)
-    expected = 0.6 + joint.slopes * climbed * one.tables.m[1]
+    expected = 0.6 + joint.slopes * climbed * one.tables.asperities.m[1]
     assert joint.slopes < 0.9
     np.testing.assert_allclose(y, expected, rtol=1e-12)

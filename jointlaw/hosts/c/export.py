@@ -4,12 +4,10 @@ import re
 from importlib import resources
 from pathlib import Path
 
-import numpy as np
-
-from ...joints.time_step import stiffness_per_facet
-from ...law import JointLaw
-from ...native import layout
-from ...native.layout import FORMAT
+from ...kernels.pack import pack, rings
+from ...laws.law import Law
+from ...native import build
+from ...native.layout import AZIMUTHS, FORMAT, jointlaw_h
 from ...support.checks import Array
 from ...support.files import write_files
 
@@ -20,11 +18,11 @@ _MODEL = "granite"  # the name of the tables in these files
 
 
 def include_dir() -> str:
-    """Folder of `jointlaw.h`, for a compiler's -I."""
-    return str(layout.HERE)
+    """Folder of `jointlaw.h`, for a compiler's -I, where the package was built."""
+    return str(build.BUILT)
 
 
-def export_c(law: JointLaw, directory: str | Path, name: str = "joint") -> list[str]:
+def export_c(law: Law, directory: str | Path, name: str = "joint") -> list[str]:
     """Write all that a C or C++ code needs to run this law; the folder may be copied away.
 
     law: any law. directory: made if missing; files of the same names are replaced. name: of the
@@ -36,7 +34,7 @@ def export_c(law: JointLaw, directory: str | Path, name: str = "joint") -> list[
     """
     require_name(name)
     texts = {f"{name}.jlaw": table_text(law), f"{name}.h": header_text(law, name)}
-    texts[HEADER] = (layout.HERE / HEADER).read_text(encoding="utf-8")
+    texts[HEADER] = jointlaw_h()
     source = resources.files(__package__)
     for file in FILES:
         texts[file] = (source / file).read_text(encoding="utf-8").replace(_MODEL, name)
@@ -59,7 +57,7 @@ def identifier(text: str) -> str:
     return name if name[:1].isalpha() else f"joint_{name}".rstrip("_")
 
 
-def table_text(law: JointLaw) -> str:
+def table_text(law: Law) -> str:
     """The tables as text for `jlaw_read`: a keyword and its numbers a line, hexadecimal, exact.
 
     The last line holds a sum (FNV-1a) of the bytes before it, by which damage is told.
@@ -76,7 +74,7 @@ def table_text(law: JointLaw) -> str:
     return f"{text}sum {_sum(text.encode()):016x}\n"
 
 
-def header_text(law: JointLaw, name: str) -> str:
+def header_text(law: Law, name: str) -> str:
     """The tables as constants of C: `&NAME` is the law."""
     numbers, arrays = packed(law)
     about = "\n".join(" * " + line.replace("*/", "* /") for line in law.to_toml().splitlines())
@@ -98,45 +96,15 @@ def header_text(law: JointLaw, name: str) -> str:
     return "\n".join([*parts, ""])
 
 
-def packed(law: JointLaw) -> tuple[dict[str, int | float], dict[str, Array]]:
+def packed(law: Law) -> tuple[dict[str, int | float], dict[str, Array]]:
     """Numbers and arrays of `struct jlaw_law` by name, in its order; refuses too many azimuths."""
-    k, ring = law.tables, _ring(law.facets.theta)
-    if max(ring) > layout.AZIMUTHS:
+    facets = law.tables.asperities
+    if facets is not None and (most := rings(facets.theta).max()) > AZIMUTHS:
         raise ValueError(
-            f"resolution.phi = {law.resolution.phi} is out of bounds: jointlaw.h takes at most "
-            f"{layout.AZIMUTHS} azimuths on the circle"
+            f"resolution.phi gives {most:g} azimuths on the circle: jointlaw.h takes at most "
+            f"{AZIMUTHS}; lower it"
         )
-    numbers, arrays = layout.pack(k)
-    per_slope, bend = stiffness_per_facet(k)
-    numbers |= {
-        "closure_factor": law._first_loading.factor,
-        "stiffness_factor": float(np.sum(per_slope)),
-        "bending_factor": float(np.sum(bend)),
-        "largest_reach": law.largest_reach,
-        "stretch": 1.0 + 2.0 * float(np.max(np.abs(k.m))),
-        "farthest": min(law.largest_reach, law._first_loading.farthest),
-    }
-    more = {"MIRROR": _mirror(k.n), "RING": ring}
-    if k.yields:
-        late = np.stack(law._first_loading.yielding or (), axis=-1)  # (2 M, 2)
-        more["LATE"] = np.hstack(np.split(late, 2))
-    facet = arrays["facet"] + layout.in_columns(more, len(ring))
-    blocks = {"facet": layout.in_blocks(facet), "depth": layout.in_blocks(arrays["depth"])}
-    return numbers, arrays | blocks
-
-
-def _mirror(n: Array) -> Array:
-    """Number of the facet (M,) whose normal has the other sign along axis 2."""
-    image = n * np.where(np.arange(len(n)) == 1, -1.0, 1.0)[:, None]
-    away = np.sum((image[:, :, None] - n[:, None]) ** 2, axis=0)
-    return np.argmin(away, axis=1).astype(float)
-
-
-def _ring(theta: Array) -> Array:
-    """Number of the facets (M,) of the same inclination, which follow one another."""
-    _, first, count = np.unique(theta, return_index=True, return_counts=True)
-    several = count[np.argsort(first)]
-    return np.repeat(several, several).astype(float)
+    return pack(law.tables)
 
 
 def _sum(data: bytes) -> int:

@@ -4,7 +4,8 @@ from importlib import resources
 from pathlib import Path
 from textwrap import fill
 
-from ...law import JointLaw
+from ...laws.law import Law
+from ...native.layout import jointlaw_h
 from ...support.checks import number
 from ...support.files import write_files
 from ..c import export as c
@@ -14,7 +15,7 @@ NORMAL = 2e6  # Pa: of the direct shear tests
 
 
 def export_fem(
-    law: JointLaw, directory: str | Path, name: str = "joint", seating: float = SEATING
+    law: Law, directory: str | Path, name: str = "joint", seating: float = SEATING
 ) -> list[str]:
     """Write all that a finite-element code needs to run this joint; the folder may be copied away.
 
@@ -28,12 +29,12 @@ def export_fem(
     names. Raises ValueError for a law, name or seating that does not fit, before anything is
     written.
     """
-    if law.closure_only:
+    if law.dim == 1:
         raise ValueError("law.closure_only = True: finite elements shear; set closure_only=False")
     require_seating(seating)
     c.require_name(name)
     texts = {
-        "jointlaw.h": (Path(c.include_dir()) / "jointlaw.h").read_text(encoding="utf-8"),
+        "jointlaw.h": jointlaw_h(),
         f"{name}.h": c.header_text(law, name),
     }
     marks = _marks(law, seating)
@@ -59,7 +60,7 @@ def require_seating(seating: float = SEATING) -> None:
         )
 
 
-def _marks(law: JointLaw, seating: float) -> dict[str, str]:
+def _marks(law: Law, seating: float) -> dict[str, str]:
     """What stands for the @WORDS@ of the files."""
     start = [*law.joint(normal_stress=seating).snapshot().values[0].tolist(), 1.0]
     names = [f'"State{i}"' for i in range(1, len(start))] + ['"Begun"']

@@ -3,7 +3,8 @@
 from importlib import resources
 from pathlib import Path
 
-from ...law import JointLaw
+from ...laws.law import Law
+from ...native.layout import jointlaw_h
 from ...support.files import write_files
 from ...tables.tabulate import require_3d
 from ..c import export as c
@@ -13,7 +14,7 @@ FILES = ("jointlawplugin.cpp", "fix_jointlaw_memory.h", "build.sh", "in.tower")
 WEIGHT = 6e3  # Pa: the mean normal stress under the slabs of in.tower
 
 
-def export_lammps(law: JointLaw, directory: str | Path, name: str = "joint") -> list[str]:
+def export_lammps(law: Law, directory: str | Path, name: str = "joint") -> list[str]:
     """Write all that an unmodified LAMMPS needs to run this joint; the folder may be copied away.
 
     law: a law in 3-D (`plane=None`). directory: made if missing; files of the same names are
@@ -35,7 +36,7 @@ def export_lammps(law: JointLaw, directory: str | Path, name: str = "joint") -> 
     }
     source = resources.files(__package__) / "files"
     copies = {file: (source / file).read_bytes() for file in FILES}
-    copies["jointlaw.h"] = (Path(c.include_dir()) / "jointlaw.h").read_bytes()
+    copies["jointlaw.h"] = jointlaw_h().encode()
     folder = write_files(directory, {**copies, **texts})
     (folder / "build.sh").chmod(0o755)
     return [*texts, *copies]

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ... import tables
-from ...law import JointLaw
+from ...laws.law import Law
 from ...support.files import write_files, write_json
 from ...tables.joint_table import JointTable
 from ...tables.tabulate import require_3d, tabulate
@@ -13,7 +13,7 @@ from ...tables.tabulate import require_3d, tabulate
 COPIED = ("yade_joint.py", "joint_table.py", "settle_and_incline.py")
 
 
-def export_yade(law: JointLaw, directory: str | Path, **options: Any) -> JointTable:
+def export_yade(law: Law, directory: str | Path, **options: Any) -> JointTable:
     """Write all that an unmodified YADE needs to run this joint; the folder may be copied away.
 
     Parameters

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from jointlaw.kernels import asperities
 from jointlaw.kernels import reference as kernel
 from jointlaw.kernels.mating import offset, planes
 
@@ -15,12 +16,12 @@ def sliders_within_friction(batch):
 
     f_n of the facet without what yielding took.
     """
-    k, values = batch.law.tables, batch.snapshot().values.T
-    now = kernel.parts(k, values)
-    y = kernel.effective_closure(k, now.delta, now.slopes)
-    virgin = kernel.cells(k, y)
-    cells = kernel.flattened(virgin, kernel.cells(k, now.depth) if k.yields else None)
-    strength = kernel.strength(k, planes(k, now.delta[1:], now.slopes).gamma)[:, 0]
+    k = batch.law.tables.asperities
+    now = kernel.parts(batch.law.tables, batch.snapshot().values.T)
+    y = asperities.effective_closure(k, now.delta, now.slopes)
+    virgin = asperities.cells(k, y)
+    cells = asperities.flattened(virgin, asperities.cells(k, now.depth) if k.yields else None)
+    strength = asperities.strength(k, planes(k, now.delta[1:], now.slopes).gamma)[:, 0]
     size = np.hypot(now.q[0], now.q[1])
     excess = size - strength[:, None] * cells.G
     # the terms of a facet's y may cancel, where shear is at a right angle to it: y is rounding then
@@ -34,8 +35,9 @@ def sliders_within_friction(batch):
 
 def elastic_force(batch):
     """Forces (n,) in Pa that facets would bear, friction included, if they had not yielded."""
-    k, now = batch.law.tables, kernel.parts(batch.law.tables, batch.snapshot().values.T)
-    force, _ = k.curve.force(kernel.effective_closure(k, now.delta, now.slopes))
+    k = batch.law.tables.asperities
+    now = kernel.parts(batch.law.tables, batch.snapshot().values.T)
+    force, _ = k.curve.force(asperities.effective_closure(k, now.delta, now.slopes))
     return (1.0 + k.mu) * np.sum(k.area[:, None] * force, axis=0)
 
 

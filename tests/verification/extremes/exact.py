@@ -25,7 +25,7 @@ class Exact:
     """One joint without heights: the same facets and nodes, Phi = y^(1 + eta), exact chords."""
 
     def __init__(self, law):
-        k = law.tables
+        k = law.tables.asperities
 
         def exact(array):
             return [[mp.mpf(float(x)) for x in row] for row in np.atleast_2d(array).T]

@@ -95,7 +95,7 @@ class LiveLaw:
     mode = "live"
 
     def __init__(self, law, ledger=False):
-        if law.plane is not None or law.closure_only:
+        if law.dim != 3:
             raise ValueError(
                 "contacts in YADE shear in 3-D: set law.plane=None, closure_only=False"
             )

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..joints.batch import JointBatch
 from ..support.checks import Array
+from .batch import JointBatch
 
 TOLERANCE = 1e-11  # of the normal stress scale
 _TRIES = 200

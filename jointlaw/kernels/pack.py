@@ -1,0 +1,114 @@
+"""The tables of a law as numbers and arrays of `struct jlaw_law` (native/layout.py)."""
+
+import numpy as np
+
+from ..discretisation.nodes import UNUSED
+from ..discretisation.tables import FacetTables
+from ..native.layout import LANES, LARGEST, NUMBERS, TABLES, WHOLE, first_columns
+from ..support.checks import Array
+from .asperities import Asperities, strength
+from .cells import compliance
+from .reference import Tables
+
+
+def pack(k: Tables) -> tuple[dict[str, int | float], dict[str, Array]]:
+    """Numbers and arrays of `struct jlaw_law` by name, in its order.
+
+    Raises KeyError for an element or a number that native/layout.py does not name.
+    """
+    numbers: dict[str, int | float] = dict.fromkeys(WHOLE, 0) | dict.fromkeys(NUMBERS, 0.0)
+    arrays = {name: np.zeros(0) for name in TABLES}
+    found = {
+        "dim": k.dim,
+        "largest_reach": min(element.reach for element in k.elements),
+        "farthest": min(min(one.reach, one.farthest) for one in k.elements),
+        "stretch": k.stretch,
+    }
+    for element in k.elements:
+        found |= {type(element).__name__.lower(): 1, **element.numbers()}
+        if isinstance(element, Asperities):
+            facets = element.k
+            found |= {
+                "facets": len(facets.c1),
+                "cells": facets.cells,
+                "pieces": len(facets.curve.S),
+                "yields": int(facets.yields),
+                "fades": int(facets.fades),
+                "wears": int(facets.wears),
+            }
+            arrays |= _arrays(facets, element.first_loading.yielding)
+    if missing := found.keys() - numbers.keys():
+        raise KeyError(f"native/layout.py has no {', '.join(sorted(missing))}")
+    numbers |= {name: min(value, LARGEST) for name, value in found.items()}
+    return numbers, arrays
+
+
+def _arrays(k: FacetTables, late: tuple[Array, Array] | None) -> dict[str, Array]:
+    """Tables of facets, in blocks; late: what yielding takes off first loading, `yield_sum`."""
+    columns = {
+        "M": k.m.T,
+        "S": k.s.T,
+        "T": k.t.T,
+        "N": k.n.T,
+        "E": k.azimuth.T,
+        "STEEP": k.steep,
+        "COSINE": k.c1,
+        "A": k.area,
+        "STIFF": k.area / k.c1,
+        "STRENGTH": strength(k, np.ones((1, 1))).ravel(),
+        "COMPLIANCE": compliance(k).ravel(),
+        "POTENTIAL": k.area * k.c1,
+        "SHARE": k.weight / k.weight.sum(),
+        "MIRROR": _mirror(k.n),
+        "RING": rings(k.theta),
+    }
+    if late is not None:
+        columns["YIELD"] = k.yield_depth
+        columns["LATE"] = np.hstack(np.split(np.stack(late, axis=-1), 2))  # of (2 M, 2)
+    first, M = first_columns(), len(k.c1)
+    facet = np.zeros((M, first["COLUMNS"]))
+    for name, values in columns.items():
+        several = values.reshape(M, -1)
+        facet[:, first[name] : first[name] + several.shape[1]] = several
+    return {
+        "facet": _in_blocks(facet),
+        "depth": _in_blocks(_depth(k)),
+        "curve": k.curve.S,
+        "energy": k.curve.T,
+    }
+
+
+def rings(theta: Array) -> Array:
+    """Number of the facets (M,) of the same inclination, which follow one another."""
+    _, first, count = np.unique(theta, return_index=True, return_counts=True)
+    several = count[np.argsort(first)]
+    return np.repeat(several, several).astype(float)
+
+
+def _mirror(n: Array) -> Array:
+    """Number of the facet (M,) whose normal has the other sign along axis 2."""
+    image = n * np.where(np.arange(len(n)) == 1, -1.0, 1.0)[:, None]
+    away = np.sum((image[:, :, None] - n[:, None]) ** 2, axis=0)
+    return np.argmin(away, axis=1).astype(float)
+
+
+def _in_blocks(rows: Array) -> Array:
+    """Rows of facets (M, ...) side by side: (blocks, ..., LANES), zeros beyond the last facet."""
+    full = np.zeros((-(-len(rows) // LANES), LANES, *rows.shape[1:]))
+    full.reshape(-1, *rows.shape[1:])[: len(rows)] = rows
+    return np.ascontiguousarray(np.moveaxis(full, 1, -1))
+
+
+def _depth(k: FacetTables) -> Array:
+    """Depth cells (M, D, 6): zeta, Phi, Phi' at the begin; zeta at the end, G and kappa there."""
+    begin, end = (
+        np.stack([k.depth[:, rows], k.depth_force[:, rows], k.depth_slope[:, rows]])
+        for rows in (slice(-1), slice(1, None))
+    )
+    ends = end[0] < UNUSED  # others are open-ended
+    zeta, force, slope = np.where(ends, end, 0.0)
+    start, force0, slope0 = np.where(begin[0] < UNUSED, begin, 0.0)
+    G = np.where(ends, force - force0 - slope0 * (zeta - start), 0.0)
+    kappa = np.where(ends, slope - slope0, 0.0)
+    last = np.where(ends, zeta, LARGEST)
+    return np.stack([np.minimum(begin[0], LARGEST), force0, slope0, last, G, kappa], axis=-1)

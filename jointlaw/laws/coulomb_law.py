@@ -1,0 +1,74 @@
+"""Coulomb's joint, the law of the handbooks: what every rock engineer knows and compares with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from ..kernels.coulomb import Coulomb
+from ..kernels.reference import Tables
+from ..parameters.bond import LARGEST
+from ..parameters.declared import check, declared, parameter
+from .law import Law
+
+CLOSED = 20e6  # Pa; its closure is the closure_range, as by default of a `JointLaw`
+
+
+@declared
+@dataclass(frozen=True)
+class CoulombLaw(Law, kind="coulomb"):
+    """A joint of constant stiffness that slides at shear stress c + mu sigma (Coulomb).
+
+    In opening it bears tension while it is intact, then nothing. By default cohesion and friction
+    stay while it slides; residual values follow the peak at once, or over `weakening`. There is no
+    dilation. docs/theory-incremental.md, "Coulomb's joint", tells how it differs from a `Bond`.
+
+    Raises ValueError when a parameter is out of bounds.
+    """
+
+    normal_stiffness: float = parameter("stiffness in closure", "Pa/m", above=0.0, high=LARGEST)
+    shear_stiffness: float = parameter("stiffness in shear", "Pa/m", above=0.0, high=LARGEST)
+    friction: float = parameter(
+        "coefficient, tan(phi); infinite: the joint never slides", low=0.0, infinite=True
+    )
+    cohesion: float = parameter("c", "Pa", 0.0, low=0.0, high=LARGEST)
+    tension: float = parameter(
+        "strength in opening; what is beyond cohesion/friction does not count",
+        "Pa", 0.0, low=0.0, high=LARGEST,
+    )  # fmt: skip
+    residual_friction: float | None = parameter(
+        "friction after the peak, at most that of the peak; None keeps it", "", None,
+        low=0.0, high=LARGEST,
+    )  # fmt: skip
+    residual_cohesion: float | None = parameter(
+        "cohesion after the peak, at most that of the peak; None keeps it", "Pa", None,
+        low=0.0, high=LARGEST,
+    )  # fmt: skip
+    weakening: float = parameter(
+        "shear displacement after the peak over which friction and cohesion fall linearly to the "
+        "residual ones; 0: at once", "m", 0.0, low=0.0, high=LARGEST,
+    )  # fmt: skip
+    plane: float | None = parameter(
+        "None for motion in 3-D, or the azimuth of the one plane in which the joint moves: vectors "
+        "then have two components, closure and shear along the plane", "rad", None,
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        check(self)
+        for name in ("friction", "cohesion"):
+            left, most = getattr(self, f"residual_{name}"), getattr(self, name)
+            if left is not None and left > most:
+                raise ValueError(
+                    f"residual_{name} = {left!r} is out of bounds: it must be <= {name} = {most!r}"
+                )
+
+    @property
+    def closure_range(self) -> float:  # type: ignore[override]
+        """Closure (m) at 20 MPa, by which tests and tables choose their steps."""
+        return CLOSED / self.normal_stiffness
+
+    @cached_property
+    def tables(self) -> Tables:
+        """As `Law.tables`."""
+        dim = 3 if self.plane is None else 2
+        return Tables(dim, (Coulomb(self, dim),))

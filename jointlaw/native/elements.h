@@ -1,0 +1,157 @@
+/* elements.h: the elements beside the asperities of a joint, one joint at a time; symbols and order
+ * of kernels/bond.py and kernels/coulomb.py. An element NAME of layout.h has here
+ *
+ *   jl_NAME_rows       number of its rows in a state; the last is its damage
+ *   jl_NAME_step       a step, which returns the stored energy after it
+ *   jl_NAME_stiffness  bound of |C| at this damage and closure; at 0 that of all states
+ *   jl_NAME_good       whether rows are such as a step may leave
+ *   jl_NAME_turn       its rows in axes 2 and 3 that are turned, or axis 2 turned round
+ */
+
+typedef struct {           /* an element of one joint in a step */
+  double from[3], d[3];    /* displacement before the step, and its increment */
+  double row[4];           /* its rows of the state, before and after the step */
+  double F[3], C[9], lost; /* what it adds: traction, tangent (3, 3), loss */
+} jl_part;
+
+/* ------------------------------------------------------------------------- the bond */
+
+/* 1 where opening and slip, squared, are the strength at this damage; p2: 1/half-axis, squared */
+JL_IN double jl_beyond(const jlaw_law *law, double opening2, double slip2, double damage,
+                       double p2[2])
+{
+  const double p = law->opening_begin - damage * (law->opening_begin - law->opening_end);
+  const double q = law->slip_begin - damage * (law->slip_begin - law->slip_end);
+  p2[0] = p * p, p2[1] = q * q;
+  return opening2 * p2[0] + slip2 * p2[1];
+}
+
+/* Damage that opening and slip ask for: the smaller root of the quadratic; half the slope there */
+JL_IN double jl_damage_at(const jlaw_law *law, double opening2, double slip2, double *slope)
+{
+  const double begin0 = law->opening_begin, soft0 = begin0 - law->opening_end;
+  const double begin1 = law->slip_begin, soft1 = begin1 - law->slip_end;
+  const double turn = begin1 * law->opening_end - begin0 * law->slip_end;
+  const double inside =
+      opening2 * (soft0 * soft0) + slip2 * (soft1 * soft1) - opening2 * slip2 * (turn * turn);
+  double p2[2];
+  const double over = jl_beyond(law, opening2, slip2, 0.0, p2) - 1.0;
+  *slope = sqrt(inside > 0.0 ? inside : 0.0);
+  if (!(over > 0.0)) return 0.0;
+  if (!(jl_beyond(law, opening2, slip2, 1.0, p2) < 1.0)) return 1.0;
+  const double found = over / (opening2 * (begin0 * soft0) + slip2 * (begin1 * soft1) + *slope);
+  return found < 1.0 ? found : 1.0;
+}
+
+JL_IN int jl_bonded_rows(const jlaw_law *law)
+{
+  (void) law;
+  return 1;
+}
+
+JL_IN double jl_bonded_stiffness(const jlaw_law *law, double damage, double closure)
+{
+  (void) closure;
+  const double K[2] = {law->bond_normal, law->bond_shear};
+  return (1.0 - damage) * (K[0] > K[1] ? K[0] : K[1]);
+}
+
+JL_IN int jl_bonded_good(const jlaw_law *law, const double *row)
+{
+  (void) law;
+  return row[0] >= 0.0 && row[0] <= 1.0;
+}
+
+JL_IN void jl_bonded_turn(const jlaw_law *law, double *row, const double turn[2][2])
+{
+  (void) law, (void) row, (void) turn;
+}
+
+JL_IN double jl_bonded_step(const jlaw_law *law, jl_part *b, int tangent)
+{
+  const double K[2] = {law->bond_normal, law->bond_shear}, old = b->row[0];
+  const double opened = b->from[0] + b->d[0];
+  const double u[3] = {opened < 0.0 ? opened : 0.0, b->from[1] + b->d[1], b->from[2] + b->d[2]};
+  const double opening2 = u[0] * u[0], slip2 = u[1] * u[1] + u[2] * u[2];
+  const double psi = 0.5 * (K[0] * opening2 + K[1] * slip2);
+  double p2[2], slope;
+  const double found = jl_damage_at(law, opening2, slip2, &slope);
+  const double now = b->row[0] = found > old ? found : old;
+  const int softens = found > old && now < 1.0;
+  const double first = jl_beyond(law, opening2, slip2, old, p2);
+  const double there = jl_beyond(law, opening2, slip2, now, p2), last = softens ? 1.0 : there;
+  b->lost = found > old ? (now - old) * psi / sqrt(first * last) : 0.0;
+  for (int i = 0; i < 3; i++) {
+    b->F[i] = (1.0 - now) * K[i > 0] * u[i];
+    for (int j = 0; tangent && j < 3; j++)
+      b->C[3 * i + j] = softens ? -(K[i > 0] * u[i]) * (u[j] * p2[j > 0] / slope) : 0.0;
+    if (tangent && (i || u[0] < 0.0)) b->C[4 * i] += (1.0 - now) * K[i > 0];
+  }
+  return (1.0 - now) * psi;
+}
+
+#include "coulomb.h"
+
+/* --------------------------------------------------------------------- all of a joint */
+
+/* Whether there is an element beside the asperities, or in place of them */
+JL_IN int jl_beside(const jlaw_law *law)
+{
+#define JL_IS(name) || law->name
+  return 0 JLAW_ELEMENTS(JL_IS);
+#undef JL_IS
+}
+
+JL_IN int jl_element_rows(const jlaw_law *law)
+{
+  int rows = 0;
+#define JL_ROWS(name) rows += law->name ? jl_##name##_rows(law) : 0;
+  JLAW_ELEMENTS(JL_ROWS)
+#undef JL_ROWS
+  return rows;
+}
+
+/* Elements of a step from `from` by d, whose rows of the state begin at `row`. Adds what they bear
+ * to F and C, where F is given; without it a state is only looked at. Returns their stored energy. */
+JL_IN jl_of_joint jl_step_elements(const jlaw_law *law, jl_numbers n, int row,
+                                   const jl_of_joint from[3], const jl_of_joint d[3],
+                                   jl_of_joint F[3], jl_of_joint C[9], int tangent, int ledger)
+{
+  const int dim = law->dim;
+  jl_of_joint stored = jl_each_joint(0.0);
+  for (int l = 0; l < JL_JOINTS; l++) {
+    double *own = n.s + l + (size_t) row * n.stride, *lost = n.s + l + (size_t) dim * n.stride;
+#define JL_STEP_ELEMENT(name)                                                                   \
+  if (law->name) {                                                                              \
+    const int rows = jl_##name##_rows(law);                                                     \
+    jl_part p = {{0.0}, {0.0}, {0.0}, {0.0}, {0.0}, 0.0};                                       \
+    for (int i = 0; i < dim; i++) p.from[i] = JL_JOINT(from[i], l), p.d[i] = JL_JOINT(d[i], l); \
+    for (int i = 0; i < rows; i++) p.row[i] = own[(size_t) i * n.stride];                       \
+    JL_JOINT(stored, l) += jl_##name##_step(law, &p, tangent);                                  \
+    for (int i = 0; F && i < rows; i++) own[(size_t) i * n.stride] = p.row[i];                  \
+    for (int i = 0; F && i < dim; i++) JL_JOINT(F[i], l) += p.F[i];                             \
+    for (int i = 0; F && tangent && i < dim * dim; i++)                                         \
+      JL_JOINT(C[i], l) += p.C[i / dim * 3 + i % dim];                                          \
+    if (F && ledger) *lost += p.lost;                                                           \
+    own += (size_t) rows * n.stride;                                                            \
+  }
+    JLAW_ELEMENTS(JL_STEP_ELEMENT)
+#undef JL_STEP_ELEMENT
+  }
+  return stored;
+}
+
+/* Bound of the |C| (Pa/m) that elements add in a state of these numbers; in all states if NULL */
+JL_IN double jl_stiffness_of_elements(const jlaw_law *law, const double *s, int row, size_t stride)
+{
+  double bound = 0.0;
+#define JL_STIFFNESS(name)                                                                   \
+  if (law->name) {                                                                           \
+    row += jl_##name##_rows(law);                                                            \
+    const double damage = s && jl_##name##_rows(law) ? s[(size_t) (row - 1) * stride] : 0.0; \
+    bound += jl_##name##_stiffness(law, damage, s ? s[0] : 0.0);                             \
+  }
+  JLAW_ELEMENTS(JL_STIFFNESS)
+#undef JL_STIFFNESS
+  return bound;
+}

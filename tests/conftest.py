@@ -1,0 +1,47 @@
+"""Laws that all tests share, and how Hypothesis runs here."""
+
+import sys
+from pathlib import Path
+
+import hypothesis
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+import kinds
+
+# Derandomized: the same cases on every machine, so that a failure is a change of the code.
+hypothesis.settings.register_profile(
+    "jointlaw", deadline=None, max_examples=40, derandomize=True, database=None
+)
+hypothesis.settings.load_profile("jointlaw")
+
+
+@pytest.fixture(scope="session")
+def make_law():
+    """Smooth Westerly granite at the coarsest resolution, any parameter to be replaced."""
+    return kinds.make_law
+
+
+@pytest.fixture(scope="session")
+def law():
+    return kinds.make_law()
+
+
+@pytest.fixture(scope="session", params=kinds.LAWS)
+def any_law(request):
+    """One law of each kind of joint that the code knows."""
+    return kinds.LAWS[request.param]
+
+
+@pytest.fixture(scope="session", params=[k for k, law in kinds.LAWS.items() if law.dim > 1])
+def any_sheared_law(request):
+    """One law of each kind that can shear."""
+    return kinds.LAWS[request.param]
+
+
+@pytest.fixture
+def moved(law):
+    """A batch of five joints, each somewhere else on its path."""
+    batch = law.joints(5)
+    batch.update([[1e-7 * (i + 1), 5e-8 * i, -2e-8 * i] for i in range(5)])
+    return batch

@@ -1,0 +1,123 @@
+"""Every declared parameter of every element, off its default, in every place that it must reach.
+
+No parameter is named here: a new one is tested by being declared.
+"""
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+from kinds import PARAMETERS, off_default
+
+import jointlaw as jl
+from jointlaw.calibration.forward import build, parameters
+from jointlaw.kernels import reference
+
+PAGES = Path(__file__).parents[2] / "docs"
+STEP = 2e-7  # m
+
+
+@pytest.fixture(scope="module", params=PARAMETERS)
+def pair(request):
+    """A law with a parameter off its default, and the same law without."""
+    return off_default(request.param)
+
+
+def steps(law, count=14):
+    """A path with closing, shear, opening and closing again."""
+    d = STEP * np.random.default_rng(5).normal(size=(count, law.dim))
+    d[:4, 0] = 0.5 * STEP
+    d[9, 0] = -6.0 * STEP
+    d[10:, 0] = 1.5 * STEP
+    return d
+
+
+def test_it_acts(pair):
+    """Another value is another joint."""
+    tractions = []
+    for law in pair:
+        joint = law.joint()
+        tractions.append([joint.update(d, tangent=False)[0].tolist() for d in steps(law)])
+    assert tractions[0] != tractions[1]
+
+
+def test_files_fingerprint_and_copies_have_it(pair):
+    law, base = pair
+    assert law != base
+    assert law.fingerprint != base.fingerprint
+    assert jl.JointLaw.from_text(law.to_toml()) == law
+    assert pickle.loads(pickle.dumps(law)) == law
+    with pytest.raises(ValueError, match="other parameters"):
+        base.joint().restore(law.joint().snapshot())
+
+
+def test_kernels_measures_and_bounds_agree(pair):
+    law, _ = pair
+    joints, state = law.joints(3), np.zeros((law.state_size, 1))
+    k, damage = law.tables, np.zeros(3)
+    for d in steps(law):
+        F, C = joints.update(np.tile(d, (3, 1)))
+        state, F_slow, C_slow = reference.step(k, state, d[:, None], True)
+        size = np.abs(F_slow).max() + 1.0
+        assert np.abs(F[0] - F_slow[:, 0]).max() <= 1e-12 * size
+        assert np.abs(C[0] - C_slow[..., 0]).max() <= 1e-9 * np.abs(C_slow).max()
+        assert np.abs(joints.F - F).max() <= 1e-9 * size  # a slider at its limit is cut again
+        assert np.abs(reference.traction(k, state) - F_slow).max() <= 1e-9 * size
+        slow = reference.measures(k, state)
+        for mine, other in zip(joints.measures(), slow, strict=True):
+            assert mine[0] == pytest.approx(other[0], rel=1e-9, abs=1e-12)
+        assert joints.max_stiffness()[0] == pytest.approx(reference.stiffness(k, state)[0])
+        if (joints.damage == damage).all() or damage.all():  # a joint that weakens falls faster
+            norm = np.linalg.norm(C[0], 2) * (1.0 - 1e-9)
+            here = joints.delta[0]
+            assert norm <= max(joints.max_stiffness()[0], before_step(law, here, d))
+            assert norm <= law.max_stiffness(here[0] + abs(d[0]), np.linalg.norm(here[1:]) + STEP)
+        damage = joints.damage
+
+
+def before_step(law, here, d):
+    """Bound for a step in which a joint opens: its tangent is that of the way there."""
+    return law.max_stiffness(here[0] + abs(d[0]), np.linalg.norm(here[1:]) + STEP)
+
+
+def test_first_loading(pair):
+    """Within what few cells slip later where asperities yield."""
+    law, _ = pair
+    for closure in (0.3e-6, 1e-6):
+        joint, start = law.joint(), np.eye(law.dim)[0]
+        F, _ = joint.update(closure * start)
+        few = 2e-3 if law.tables.yields else 1e-9
+        assert F[0] == pytest.approx(law.normal_stress(closure), rel=few)
+        assert law.closure(law.normal_stress(closure)) == pytest.approx(closure, rel=1e-9)
+
+
+def test_energy(pair):
+    """Stored and lost are the work of fine steps, to the second order of a step."""
+    law, _ = pair
+    joint, work, parts = law.joint(), 0.0, 400
+    before, peak = np.zeros(law.dim), 0.0
+    for d in steps(law):
+        for _ in range(parts):
+            F, _ = joint.update(d / parts, tangent=False)
+            work += 0.5 * (before + F) @ d / parts
+            before, peak = F, max(peak, joint.stored_energy)
+    assert joint.dissipated_energy >= 0.0
+    assert joint.stored_energy + joint.dissipated_energy == pytest.approx(work, abs=5e-3 * peak)
+
+
+def test_a_fit_keeps_it_or_refuses(pair):
+    law, _ = pair
+    if not isinstance(getattr(law, "heights", None), jl.GammaHeights):
+        with pytest.raises(ValueError, match=r"^law: .* cannot be fitted"):
+            parameters(law)
+        return
+    values, settings = parameters(law)
+    assert build(values, settings, law.plane) == law
+
+
+def test_pages_tell_it():
+    """The theory, or a page of how to use it, names every parameter."""
+    text = "\n".join(page.read_text(encoding="utf-8") for page in PAGES.glob("*.md"))
+    missing = [path for _, path, _ in PARAMETERS.values() if f"`{path.split('.')[-1]}" not in text]
+    assert not missing, f"no page of docs names {missing}"

@@ -1,0 +1,333 @@
+"""Coulomb's joint: closed forms, tiny steps in plain numbers, energy of every step, tangent."""
+
+import math
+
+import numpy as np
+import pytest
+from test_tangent import STEPS, descent_slope, v_curve
+
+import jointlaw as jl
+
+KN, KS, MU, C, T = 1e10, 4e9, 0.6, 1e6, 4e5  # Pa/m, Pa
+BRITTLE = {"residual_friction": 0.4, "residual_cohesion": 0.3e6}
+WEAKENS = BRITTLE | {"weakening": 1e-3}
+KINDS = {"ductile": {}, "brittle": BRITTLE, "weakens": WEAKENS, "no tension": {"tension": 0.0}}
+ROUNDING = 1e-11  # of sums over some hundred steps
+
+
+def coulomb(plane=0.0, **more):
+    given = {"normal_stiffness": KN, "shear_stiffness": KS, "friction": MU}
+    return jl.CoulombLaw(**given | {"cohesion": C, "tension": T, "plane": plane} | more)
+
+
+def spaces(dim, way):
+    """The law's plane, and the shear `way` along a direction of that plane or of space."""
+    return (0.0, [way]) if dim == 2 else (None, [0.6 * way, -0.8 * way])
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("steps", [1, 7, 200])
+def test_direct_shear_at_constant_normal_stress(kind, dim, steps):
+    """Peak, slope of weakening, residual and loss, in steps of any size."""
+    stress, way = 3e6, 2e-3
+    peak, rest = C + MU * stress, C + MU * stress
+    if kind in ("brittle", "weakens"):
+        rest = 0.3e6 + 0.4 * stress
+    length = KINDS[kind].get("weakening", 0.0)
+    for end in (0.999 * peak / KS, 1.001 * peak / KS, peak / KS + 0.4e-3, way):
+        plane, along = spaces(dim, end)
+        joint = coulomb(plane, **KINDS[kind]).joint(stress)
+        begun = joint.stored_energy
+        for _ in range(steps):
+            F = joint.update([0.0, *np.divide(along, steps)])[0]
+        beyond = end - peak / KS
+        fallen = (beyond > 0.0) * (min(beyond / length, 1.0) if length else 1.0)
+        q = min(KS * end, peak) - fallen * (peak - rest)
+        np.testing.assert_allclose(F, [stress, *np.multiply(along, q / end)], rtol=ROUNDING)
+        weak = min(max(beyond, 0.0), length)
+        area = 0.5 * min(KS * end, peak) ** 2 / KS + 0.5 * weak * (peak + max(q, rest))
+        area += max(beyond - length, 0.0) * q
+        assert joint.stored_energy - begun == pytest.approx(0.5 * q**2 / KS, rel=1e-9)
+        lost = joint.dissipated_energy
+        assert lost == pytest.approx(area - 0.5 * q**2 / KS, rel=1e-9, abs=1e-9 * area)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize(("given", "bears"), [(0.0, 0.0), (T, T), (1e9, C / MU)])
+@pytest.mark.parametrize("share", [0.0, 0.8])
+def test_tension_is_cut_and_faces_close_again_at_mate(given, bears, share, dim):
+    """Under the shear stress `share` of C the joint tears where C + mu sigma no longer holds it."""
+    plane, along = spaces(dim, share * C / KS)
+    joint = coulomb(plane, tension=given).joint(1.0)
+    bears = min(bears, (1.0 - share) * C / MU)
+    joint.update([-0.9999999 * bears / KN - joint.delta[0], *along])
+    assert joint.F[0] == pytest.approx(-bears, rel=1e-6)
+    assert joint.damage == 0.0
+    torn = joint.stored_energy
+    joint.update([-1e-4, *np.zeros(dim - 1)])
+    assert not joint.F.any()
+    assert joint.damage == 1.0
+    assert joint.dissipated_energy == pytest.approx(torn, rel=1e-6)
+    joint.update([-joint.delta[0] - 1e-9, *along])
+    assert not joint.F.any()
+    joint.update([1e-9 + 1e-4, *np.zeros(dim - 1)])
+    np.testing.assert_allclose(joint.F, [1e6, *np.zeros(dim - 1)], rtol=1e-9)
+
+
+def test_shear_counts_from_touch():
+    """Faces that were apart meet in mid-step, in one step or in ten."""
+    law = coulomb(cohesion=9e6, tension=0.0)
+    for steps in (1, 10):
+        joint = law.joint()
+        joint.update([-1e-3, 0.0])
+        for _ in range(steps):
+            F = joint.update(np.array([3e-3, 1.5e-3]) / steps)[0]
+        np.testing.assert_allclose(F, [2e-3 * KN, 1e-3 * KS], rtol=1e-12)
+        assert joint.dissipated_energy == 0.0
+
+
+def test_shear_stress_turns_into_the_direction_of_motion():
+    """At constant strength S the angle between them falls by tan(a/2) = exp(-ks s/S) tan(a0/2)."""
+    law, stress, way = coulomb(None), 2e6, 5e-4
+    strength, errors = C + MU * stress, []
+    for steps in (100, 200, 400):
+        joint = law.joint(stress)
+        joint.update([0.0, 1e-2, 0.0])
+        for _ in range(steps):
+            F = joint.update([0.0, 0.0, way / steps])[0]
+        angle = 2.0 * math.atan(math.exp(-KS * way / strength))
+        assert np.hypot(*F[1:]) == pytest.approx(strength, rel=ROUNDING)
+        errors.append(abs(math.atan2(F[1], F[2]) - angle))
+    assert errors[-1] < 1e-3
+    assert np.diff(np.log2(errors)) == pytest.approx(-1.0, abs=0.05)
+
+
+def tiny_steps(law, legs, n):
+    """Coulomb's words in plain numbers, n steps a leg: yields F, w and what was lost after each."""
+    u, q, w, work, old = 0.0, np.zeros(len(legs[0]) - 1), 0.0, 0.0, np.zeros(len(legs[0]))
+    for leg in legs:
+        d = np.asarray(leg) / n
+        for _ in range(n):
+            u, q = u + d[0], q + law.shear_stiffness * d[1:]
+            sigma, size = law.normal_stiffness * u, math.sqrt(q @ q)
+
+            def strength(w, sigma=sigma):
+                intact = law.cohesion + law.friction * sigma
+                return intact + w * (law.residual_cohesion + law.residual_friction * sigma - intact)
+
+            if sigma < (0.0 if w else -min(law.tension, law.cohesion / law.friction)):
+                w, q, sigma = 1.0, 0.0 * q, 0.0
+            elif size > strength(w):
+                if sigma < 0.0:
+                    w, q, sigma = 1.0, 0.0 * q, 0.0
+                else:
+                    slip = (size - strength(w)) / law.shear_stiffness
+                    w = min(1.0, w + slip / law.weakening) if law.weakening else 1.0
+                    q = q * (strength(w) / size)
+            F = np.array([sigma, *q])
+            work, old = work + 0.5 * (F + old) @ d, F
+        stored = 0.5 * sigma**2 / law.normal_stiffness + 0.5 * q @ q / law.shear_stiffness
+        yield F, w, work - stored
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("kind", ["brittle", "weakens"])
+@pytest.mark.parametrize("seed", range(3))
+def test_tiny_steps_in_plain_numbers(kind, dim, seed):
+    rng = np.random.default_rng([seed, dim])
+    law = coulomb(*([None] if dim == 3 else [0.0]), **KINDS[kind])
+    legs = (
+        rng.normal(size=(6, dim)) * [2e-4, *[6e-4] * (dim - 1)] + [[2e-4] + [0.0] * (dim - 1)] * 6
+    )
+    legs[3, 0] = -4e-4
+    joint = law.joint()
+    for leg, (F, w, lost) in zip(legs, tiny_steps(law, legs, 4000), strict=True):
+        for _ in range(500):
+            joint.update(leg / 500, tangent=False)
+        scale = max(1e6, np.abs(F).max())
+        scale = max(C, np.abs(F).max())
+        np.testing.assert_allclose(joint.F, F, atol=2e-3 * scale)  # first order of either
+        assert joint.damage == pytest.approx(w, abs=2e-3)
+        assert joint.dissipated_energy == pytest.approx(lost, rel=2e-3, abs=1e-6)
+
+
+def work_of_step(one, delta, d, state):
+    """Work (B,) of the tractions that the steps t d lead to, t from 0 to 1; adaptive Lobatto rule,
+    which looks at both ends of each part.
+    """
+    nodes, weights = [0.0, 0.5 - 0.05**0.5, 0.5 + 0.05**0.5, 1.0], np.array([1, 5, 5, 1]) / 12
+
+    def work(j, a, b):
+        total = np.zeros(len(j))
+        for x, weight in zip(nodes, weights, strict=True):
+            t = a + x * (b - a)
+            F = one.step(delta[:, j], t * d[:, j], state[:, j], state[:, j].copy(), False).F
+            total += weight * (b - a) * np.sum(F * d[:, j], axis=0)
+        return total
+
+    edges, n = np.array([0.0, *np.geomspace(1e-5, 1.0, 20)]), d.shape[1]  # it may break at once
+    j, a, b = np.tile(np.arange(n), 20), np.repeat(edges[:-1], n), np.repeat(edges[1:], n)
+    total, exact = np.zeros(n), 1e-14 * energy_scale(one, delta, d)
+    whole = work(j, a, b)
+    while len(j):
+        middle = 0.5 * (a + b)
+        left, right = work(j, a, middle), work(j, middle, b)
+        good = (np.abs(left + right - whole) <= exact[j]) | (b - a < 1e-14)
+        np.add.at(total, j[good], (left + right)[good])
+        j, whole = np.tile(j[~good], 2), np.concatenate([left[~good], right[~good]])
+        ends = (a, middle), (middle, b)
+        a, b = (np.concatenate([v[~good], u[~good]]) for v, u in zip(*ends, strict=True))
+    return total
+
+
+def energy_scale(one, delta, d):
+    """Elastic energy (B,) that no rounding can exceed."""
+    size = np.sum(np.abs(delta) + np.abs(d), axis=0)
+    return max(one.normal * (1.0 + one.friction), one.shear) * size**2 + one.cohesion * size
+
+
+def random_law(rng, dim):
+    """A law whose strengths are met by displacements of about one, some of them zero."""
+    kn, ks = 10.0 ** rng.uniform(-1.0, 1.0, 2)
+    friction, cohesion, tension = rng.uniform(0.1, 1.0, 3) * (rng.random(3) < 0.7) * [1, ks, kn]
+    left = rng.choice([0.0, 0.5, 1.0], 2) * [friction, cohesion]
+    weakening = rng.uniform(0.1, 3.0) * rng.integers(2)
+    plane = None if dim == 3 else 0.0
+    return jl.CoulombLaw(kn, ks, friction, cohesion, tension, *left, weakening, plane)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("seed", range(8))
+def test_energy_of_closed_cycles(seed, dim):
+    """Random large steps and back: no loss is negative, and each step's is its work less what is
+    stored more; in space, where the shear stress turns, the work is at least that which is stored.
+    The compiled kernel takes the same steps, and a step by nothing changes nothing.
+    """
+    rng, n = np.random.default_rng([seed, dim]), 60
+    law = random_law(rng, dim)
+    (one,) = law.tables.elements
+    corners = rng.normal(size=(7, dim, n)) * 10.0 ** rng.uniform(-1.0, 0.7, n)
+    corners[0] = corners[-1] = 0.0
+    corners[4, 0] = corners[3, 0]
+    state, total = np.zeros((dim, n)), np.zeros(n)
+    for delta, d in zip(corners, np.diff(corners, axis=0), strict=False):
+        new, scale = state.copy(), energy_scale(one, delta, d)
+        F, lost, tangent = one.step(delta, d, state, new, True)
+        assert (lost >= 0.0).all()
+        gained = one.stored(delta + d, new) - one.stored(delta, state)
+        work = work_of_step(one, delta, d, state)
+        assert (work >= gained - 1e-10 * scale).all()
+        if dim == 2:
+            assert (np.abs(work - gained - lost) <= 1e-10 * scale).all()
+        size = np.linalg.norm(np.moveaxis(tangent, -1, 0), 2, axis=(1, 2))
+        bound = one.stiffness(delta + d, new)
+        weakens = (new[-1] > state[-1]) & (new[-1] < 1.0)  # by its own slope
+        if weakens.any():
+            fall = one.strength(0.0 * F[0], F[0]) - one.strength(0.0 * F[0] + 1.0, F[0])
+            steep = np.hypot(1.0, one.friction * one.normal / one.shear)
+            bound = bound + weakens * steep * fall / one.weakening
+        assert (size <= bound * (1.0 + 1e-12)).all()
+
+        again = new.copy()
+        still = one.step(delta + d, 0.0 * d, new, again, False)
+        np.testing.assert_array_equal([*again, *still.F, still.lost], [*new, *F, 0.0 * lost])
+        rows = np.concatenate([delta, np.zeros((1, n)), state])
+        compiled, F_c, C_c = law.step(rows.T, d.T)
+        size = one.shear + one.normal
+        np.testing.assert_allclose(F_c.T, F, rtol=1e-12, atol=1e-12 * size)
+        np.testing.assert_allclose(np.moveaxis(C_c, 0, -1), tangent, rtol=1e-11, atol=1e-12 * size)
+        np.testing.assert_allclose(compiled.T[dim:], [lost, *new], rtol=1e-12, atol=1e-12 * size)
+        state, total = new, total + work
+    assert (total >= one.stored(corners[-1], state) - 1e-9 * scale).all()
+    assert (state[-1] > 0.0).mean() > 0.5
+    assert (total > 0.1 * one.cohesion**2 / one.shear).any()
+
+
+def test_ledger_in_space_has_the_second_order_of_the_step():
+    rng, errors = np.random.default_rng(1), []
+    (one,) = coulomb(None, **BRITTLE, weakening=1e-2).tables.elements
+    legs = rng.normal(size=(2, 3, 20)) * [[1e-4], [1e-3], [1e-3]] + [[3e-4], [0.0], [0.0]]
+    for steps in (8, 16, 32):
+        delta, state, error = np.zeros((3, 20)), np.zeros((3, 20)), 0.0
+        for d in legs.repeat(steps, axis=0) / steps:
+            new = state.copy()
+            lost = one.step(delta, d, state, new, False).lost
+            gained = one.stored(delta + d, new) - one.stored(delta, state)
+            error = error + work_of_step(one, delta, d, state) - gained - lost
+            delta, state = delta + d, new
+        errors.append(np.abs(error).mean())
+    assert np.diff(np.log2(errors)) == pytest.approx(-2.0, abs=0.1)
+
+
+# how the law differs from `unit`, steps that lead to the state, the step whose tangent is checked
+TANGENTS = {
+    "stick": ({}, [[0.5, 0.0, 0.0]], [0.1, 0.1, 0.05]),
+    "tension": ({}, [[0.1, 0.0, 0.0]], [-0.14, 0.05, 0.02]),
+    "slide": ({}, [[0.5, 0.0, 0.0], [0.0, 1.5, 0.3]], [-0.1, 0.2, 0.4]),
+    "weakens": ({"weakening": 3.0}, [[0.5, 0.0, 0.0], [0.0, 1.5, 0.3]], [-0.1, 0.2, 0.4]),
+    "falls": ({"weakening": 0.1}, [[0.5, 0.0, 0.0]], [0.1, 1.3, 0.4]),
+    "drops": ({}, [[0.5, 0.0, 0.0]], [0.1, 1.3, 0.4]),
+    "touches and slides": ({}, [[-0.5, 0.0, 0.0]], [0.6, 1.3, 0.4]),
+}
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("state", TANGENTS)
+def test_tangent(state, dim):
+    more, path, d = TANGENTS[state]
+    unit = jl.CoulombLaw(1.0, 0.5, 0.6, 0.1, 0.05, 0.4, 0.03, **more, plane=[0.0, None][dim - 2])
+    copies = unit.joints(2 * dim * len(STEPS))
+    for step in path:
+        copies.update(np.tile(step[:dim], (len(copies), 1)), tangent=False)
+    errors = v_curve(copies, np.array(d[:dim]))
+    assert errors.min() < 1e-8
+    if dim == 3 and state not in ("stick", "tension"):  # q turns, all else is quadratic at most
+        assert descent_slope(errors) == pytest.approx(2.0, abs=0.1)
+
+
+def stands(law, parts, dip):
+    """Whether a block of 3 x 1.5 m (25.5 kN/m3), its base in so many parts, is held on a plane."""
+    x, weights = np.linspace(-1.5, 1.5, parts + 1), np.full(parts + 1, 3.0 / parts)
+    weights[[0, -1]] /= 2.0
+    one = np.ones(parts + 1)  # closure and shear of the base by motion up, down the plane, and turn
+    rows = [[-one, 0.0 * one, -x], [0.0 * one, one, 0.75 * one]]
+    G, joints = np.moveaxis(np.array(rows), -1, 0), law.joints(parts + 1)
+    weight = 25.5e3 * 4.5 * np.array([-math.cos(dip), math.sin(dip), 0.0])
+    for share in np.arange(1, 101) / 100:
+        move = np.zeros(3)
+        for _ in range(40):
+            F, tangent = joints.trial(G @ move)
+            rest = share * weight - np.einsum("nij,ni,n->j", G, F, weights)
+            if np.abs(rest).max() < 1e-6:
+                break
+            K = np.einsum("nia,nij,njb,n->ab", G, tangent, G, weights)
+            if np.linalg.cond(K) > 1e12:
+                return False
+            move = move + np.linalg.solve(K, rest)
+        else:
+            return False
+        joints.update(G @ move)
+    return True
+
+
+def test_planar_block_and_the_size_of_its_parts():
+    """Factor of safety (dip 35, phi 30, c 10 kPa): the handbook's, and less where c is lost."""
+    dip, found = math.radians(35.0), {}
+    given = {"normal_stiffness": 1e10, "shear_stiffness": 5e9}
+    for left in (None, 0.0):
+        for parts in (1, 2, 4, 16):
+            low, high = 0.5, 2.0
+            while high - low > 5e-4:
+                F = 0.5 * (low + high)
+                mu, c = math.tan(math.radians(30.0)) / F, 1e4 / F
+                law = coulomb(friction=mu, cohesion=c, tension=c, residual_cohesion=left, **given)
+                low, high = (F, high) if stands(law, parts, dip) else (low, F)
+            found[left, parts] = low
+    handbook = (
+        1e4 * 3.0 / (25.5e3 * 4.5) + math.cos(dip) * math.tan(math.radians(30.0))
+    ) / math.sin(dip)
+    kept, lost = ([found[left, parts] for parts in (1, 2, 4, 16)] for left in (None, 0.0))
+    assert handbook == pytest.approx(1.280, abs=1e-3)
+    assert kept == pytest.approx([1.280, 1.280, 1.280, 1.266], abs=2e-3)  # these are on the page
+    assert lost == pytest.approx([1.052, 1.022, 0.947, 0.898], abs=2e-3)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from jointlaw.native.library import address, load
+from jointlaw.native.library import load
 
 from .errors import Refused
 
@@ -55,13 +55,20 @@ class World(ctypes.Structure):
         """Tell the library where arrays lie, and keep them."""
         self.__dict__.setdefault("held", {}).update(arrays)
         for name, array in arrays.items():
-            if isinstance(array, np.ndarray) and not array.flags.c_contiguous:
-                raise ValueError(f"{name} must lie in one piece")
             setattr(self, name, address(array))
 
     def call(self, name: str, *arguments: Any) -> Any:
         """Call `jl_blocks_NAME`."""
         return getattr(library(), f"jl_blocks_{name}")(ctypes.byref(self), *arguments)
+
+
+def address(array: Any) -> int:
+    """Where the numbers of an array begin, of numpy or of ctypes."""
+    if not isinstance(array, np.ndarray):
+        return ctypes.addressof(array)
+    if not array.flags.c_contiguous:
+        raise ValueError("an array of the compiled step must lie in one piece")
+    return array.ctypes.data
 
 
 @lru_cache(maxsize=1)

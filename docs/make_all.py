@@ -47,6 +47,7 @@ TIMED = {
     "peers-smooth": ("validation.md", "docs/measure/peers.py"),
     "peers-rough": ("validation.md", "docs/measure/peers.py --preset westerly-rough"),
     "native": ("native.md", "docs/measure/native.py"),
+    "blocks-price": ("blocks.md", "docs/measure/blocks.py"),
     "yade": ("yade.md", "docs/measure/yade.py"),
     "lammps": ("lammps.md", "docs/measure/lammps.py FOLDER --rounds 2 --steps 60 --settle 60"),
 }

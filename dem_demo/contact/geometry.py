@@ -16,9 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from jointlaw.native.library import address
-
-from ..compiled import World
+from ..compiled import World, address
 from ..scene import Block
 
 TIE = 1e-9  # sine of an angle that is none but for rounding, as in blocks.c

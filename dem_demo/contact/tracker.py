@@ -12,9 +12,7 @@ plain arrays.
 
 import numpy as np
 
-from jointlaw.native.library import address
-
-from ..compiled import World
+from ..compiled import World, address
 from ..errors import Refused
 from ..scene import Scene
 from .geometry import Contacts, Outlines

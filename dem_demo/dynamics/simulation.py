@@ -16,7 +16,7 @@ from .saved_states import KEPT, PLACES, STATE, Saved
 from .seating import seat
 from .timestep import SAFE, StepLimit, impact_limit
 
-NEAR = 0.4  # share of the step's limit below which no change of lever arms matters
+NEAR = 0.4  # share of the limit below which no lever arm matters; to which a step is halved
 MATCH = 1e-6  # relative: lengths that are equal but for rounding
 LOOKS = 16  # steps between two looks at the drives
 FRACTIONS = {  # of the limit that a time step is, by what can happen
@@ -92,8 +92,9 @@ class Simulation:
         world.call("after", dt)
         if world.stiffer:
             self.limit.look(self.scene, self.blocks, self.contacts, self.joints, dt)
-            while self.dt > SAFE * self.limit.now and self._halve():
-                pass
+            if self.dt > SAFE * self.limit.now:
+                while self.dt > NEAR * self.limit.now and self._halve():
+                    pass
             self.limit.require(self.dt)
             world.bind(checked=self.limit.checked)
         if self.n % LOOKS == 0:

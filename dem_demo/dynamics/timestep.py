@@ -85,6 +85,12 @@ def _largest(sums: np.ndarray, root: np.ndarray) -> float:
     return float(np.linalg.eigvalsh(K * root[:, :, None] * root[:, None, :]).max(initial=0.0))
 
 
+def _held(block: np.ndarray, at: np.ndarray, each: np.ndarray, n: int) -> np.ndarray:
+    """Sums (4, n), for `_largest`, of springs `each` at complex places from centroids of blocks."""
+    parts = each, each * at.real, each * at.imag, each * np.abs(at) ** 2
+    return np.array([np.bincount(block, part, n) for part in parts])
+
+
 def bound_of_blocks(blocks: Blocks, contacts: Contacts, stiffness, dashpot) -> float:
     """Lower bound (s) of the largest stable step for springs (k,) in N/m and dashpots (k,) in N s/m
     that act alike along normal and tangent; inf without springs.
@@ -94,16 +100,11 @@ def bound_of_blocks(blocks: Blocks, contacts: Contacts, stiffness, dashpot) -> f
     """
     free, n = blocks.free.any(axis=1), len(blocks.free)
     both = 1.0 + (free[contacts.a] & free[contacts.b])
-    tops = []
-    for each in (both * stiffness, both * dashpot):
-        sums = np.zeros((4, n))
-        for block in (contacts.a, contacts.b):
-            arm = contacts.at - (blocks.motion[0] + 1j * blocks.motion[1])[block]
-            x, y = arm.real, arm.imag
-            parts = each, each * x, each * y, each * (x * x + y * y)
-            sums += [np.bincount(block, part, n) for part in parts]
-        tops.append(_largest(sums, blocks.root))
-    k, c = tops
+    sides, centre = (contacts.a, contacts.b), blocks.motion[0] + 1j * blocks.motion[1]
+    k, c = (
+        _largest(sum(_held(x, contacts.at - centre[x], both * part, n) for x in sides), blocks.root)
+        for part in (stiffness, dashpot)
+    )
     return 4 / (c + np.sqrt(c * c + 4 * k)) if k else np.inf
 
 
@@ -163,10 +164,9 @@ def impact_limit(scene: Scene, blocks: Blocks, outlines: Outlines, stiffness: fl
     Half of every edge acts at either end, or half a corner length if that is more. Twice as stiff,
     as in `bound_of_blocks`, for any contacts between them.
     """
-    o, sums = outlines, np.zeros((4, len(blocks.free)))
+    o, n = outlines, len(blocks.free)
     each = stiffness * scene.thickness * np.maximum(o.side, o.corner_length)  # twice a half
-    for corner in (np.arange(len(o.block)), o.after):
-        x, y = o.local[corner].real, o.local[corner].imag
-        parts = each, each * x, each * y, each * (x * x + y * y)
-        sums += [np.bincount(o.block, part, sums.shape[1]) for part in parts]
-    return 2 / np.sqrt(_largest(sums, blocks.root))
+    ends = np.arange(len(o.block)), o.after
+    return 2 / np.sqrt(
+        _largest(sum(_held(o.block, o.local[c], each, n) for c in ends), blocks.root)
+    )

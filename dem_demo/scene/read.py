@@ -23,7 +23,7 @@ TEMPLATE = Path(__file__).parent / "template.toml"
 GRAVITY, DENSITY = (0.0, -9.81), 2600.0  # m/s2, kg/m3
 CORNER, SOFT = 0.1, 0.005  # of the least width of a block
 SOFT_SKIN = 0.25  # of a skin that is given
-SLIVER = 1 / 3  # of the usual width: narrower blocks do not count
+SLIVER = 0.7  # of the usual width: narrower blocks do not count
 LEAST = 0.2  # narrowest block of a rock as a share of the smallest spacing
 
 

@@ -102,3 +102,49 @@ def test_stiffness_at_stress_bounds_a_sheared_joint():
         share = np.linalg.norm(C, ord=2, axis=(1, 2)) / bound
         worst = max(worst, float(share[F[:, 0] > 1e3].max()))
     assert 0.3 < worst < 1.0
+
+
+FALL = """
+[laws.rock]
+asperity_density = 1e4
+mating_length = 2e-3
+orientation = { a = 3.0 }
+asperity = { K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }
+heights = { alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }
+[[block]]
+name = "base"
+box = [3.0, 1.0]
+at = [0.0, -0.5]
+fixed = true
+[[block]]
+name = "block"
+box = [1.0, 0.5]
+at = [0.0, 0.35]
+angle = 3.0
+[run]
+end = 0.4
+seat = false
+law_steps = 4
+"""
+
+
+def test_a_chosen_step_is_halved_in_an_impact_and_time_goes_on():
+    """A step for 10 Pa, far too long for the fall of a block by 0.1 m: halved, the books close, and
+    the block falls as it does with a short step. A step that is given is refused instead."""
+    fast = Simulation(parse(FALL + "largest_stress = 10.0"))
+    first, times = fast.dt, [0.0]
+    while fast.time < 0.4:
+        fast.step()
+        times.append(fast.time)
+    steps = np.diff(times)
+    assert fast.dt <= 0.5 * first
+    assert steps.max() < first * (1 + 1e-6)  # no time is lost or told twice
+    assert steps.min() > 0.999 * fast.dt
+    assert abs(fast.ledger.error) < 5e-3
+    slow = Simulation(parse(FALL), step=0.25 * fast.dt)
+    while slow.time < fast.time:
+        slow.step()
+    assert fast.blocks.motion[:2, 1] == pytest.approx(slow.blocks.motion[:2, 1], abs=2e-3)
+    given = Simulation(parse(FALL), step=first)
+    with pytest.raises(Refused, match="must stay below"):
+        [given.step() for _ in range(100_000)]

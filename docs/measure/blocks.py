@@ -1,0 +1,95 @@
+"""What a step of a scene of blocks costs, and of the same blocks with pymunk's own contact solver.
+
+python docs/measure/blocks.py [--seconds 2]
+
+CPU time on one thread, the least of five parts of the run, from the start of each scene. The two
+last scenes are a slope 20 m high, cut ever finer; they start as drawn, without equilibrium.
+"""
+
+import argparse
+import os
+import time
+from dataclasses import replace
+
+os.environ |= {"JOINTLAW_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # read when numpy is loaded
+
+import pymunk
+
+from dem_demo import Simulation, load, parse
+
+PARTS = 5
+SLOPE = """title = "slope of {spacing} m"
+[laws.rock]
+asperity_density = 1e4
+mating_length = 1.5e-2
+resolution = {{ u = 3, phi = 4, depth = 1 }}
+orientation = {{ a = 2.5 }}
+asperity = {{ K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }}
+heights = {{ alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }}
+[[rock]]
+name = "slope"
+outline = [[-26.0, -2.0], [12.0, -2.0], [12.0, 0.0], [0.0, 0.0], [-9.0, 20.0], [-26.0, 20.0]]
+seed = 3
+set = [
+  {{ dip = 30.0, spacing = {spacing}, law = "rock", scatter = 0.2, through = [-0.2, 0.6] }},
+  {{ dip = -65.0, spacing = {across}, law = "rock", scatter = 0.3 }},
+]
+fixed = [{{ corners = [[-40, -5], [13, -5], [13, 0.2], [0.3, 0.31], [-34, 20.12], [-40, 20]] }}]
+[run]
+end = 1.0
+seat = false
+step = 1e-4
+"""
+
+
+def least(step, seconds: float) -> float:
+    """Least CPU time (s) of a step, over parts of a run."""
+    found = []
+    for _ in range(PARTS):
+        started, n = time.process_time(), 0
+        while time.process_time() < started + seconds / PARTS:
+            step()
+            n += 1
+        found.append((time.process_time() - started) / n)
+    return min(found)
+
+
+def with_own_solver(scene) -> pymunk.Space:
+    """The blocks of a scene in pymunk, friction 0.8, at its default of 10 iterations."""
+    space = pymunk.Space()
+    space.gravity = tuple(scene.gravity)
+    for block in scene.blocks:
+        if block.moves:
+            body = pymunk.Body(block.section.mass, block.section.moment)
+        else:
+            body = pymunk.Body(body_type=pymunk.Body.STATIC)
+        body.position = tuple(block.centroid)
+        shape = pymunk.Poly(body, block.local.tolist())
+        shape.friction = 0.8
+        space.add(body, shape)
+    return space
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seconds", type=float, default=2.0, help="a scene (default 2)")
+    seconds = parser.parse_args().seconds
+    scenes = {name: load(name) for name in ("tilt", "stack", "slope", "slope-full")}
+    for spacing, across in ((0.75, 0.85), (0.33, 0.39)):
+        scenes[f"{spacing} m"] = parse(SLOPE.format(spacing=spacing, across=across))
+    print("| scene | blocks that move | contacts | ms a step | µs a contact and step of the law |"
+          " pymunk's own solver, ms |")  # fmt: skip
+    print("| --- | ---: | ---: | ---: | ---: | ---: |")
+    for name, scene in scenes.items():
+        sim, space = Simulation(replace(scene)), with_own_solver(scene)
+        for _ in range(20):
+            sim.step()
+            space.step(sim.dt)
+        cost, own = least(sim.step, seconds), least(lambda s=space, d=sim.dt: s.step(d), seconds)
+        moves, n = sum(not block.fixed for block in scene.blocks), sim.joints.n
+        each = 1e6 * cost / max(n, 1) / scene.run.law_steps
+        print(f"| {name} | {moves} | {n} | {1e3 * cost:.3g} | {each:.2g} | {1e3 * own:.2g} |")
+
+
+if __name__ == "__main__":
+    main()

@@ -146,7 +146,8 @@ class Fit(Estimates):
         if shears:
             axes[0, -2].set(xlabel="shear displacement (mm)", ylabel="shear stress (MPa)")
             axes[0, -1].set(xlabel="shear displacement (mm)", ylabel="opening (mm)")
-            figure.legend(*axes[0, -2].get_legend_handles_labels(), loc="outside lower center")
+            entries = axes[0, -2].get_legend_handles_labels()
+            figure.legend(*entries, loc="outside lower center", ncols=panels)
         return written(figure, path)
 
     def _draw_closure(

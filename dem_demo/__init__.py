@@ -16,6 +16,6 @@ except ImportError as error:  # `python -m` tells it in one line if it is about 
 from .dynamics.simulation import Simulation
 from .errors import Refused
 from .output.run import run
-from .scene import Scene, coulomb_law, load, parse
+from .scene import Scene, load, parse
 
-__all__ = ["Refused", "Scene", "Simulation", "coulomb_law", "load", "parse", "run"]
+__all__ = ["Refused", "Scene", "Simulation", "load", "parse", "run"]

@@ -157,16 +157,17 @@ def _new(given: argparse.Namespace) -> None:
 def _check(given: argparse.Namespace) -> None:
     sim = Simulation(load(given.scene))
     _announce(sim)
-    for name, rows, _ in sim.joints.groups:
-        largest = max(float(sim.joints.traction[rows, 0].max()), sim.scene.run.largest_stress)
-        _warn_of_range(name, sim.scene.laws[name], largest)
+    for (name, law), rows in zip(sim.scene.laws.items(), sim.joints.rows, strict=True):
+        pressed = sim.joints.traction[rows, 0].max(initial=0.0)
+        if isinstance(law, JointLaw):
+            _warn_of_range(name, law, max(float(pressed), sim.scene.run.largest_stress))
     print("the scene is valid")
 
 
 def _warn_of_range(name: str, law: JointLaw, largest: float) -> None:
     """Say what to write where a law has its cells for far more than this normal stress (Pa)."""
     made = float(law.normal_stress(law.closure_range * law.resolution.lowest))
-    if law.tables.cells > 1 and 0.0 < largest < 0.1 * made:
+    if law.tables.asperities.cells > 1 and 0.0 < largest < 0.1 * made:
         print(
             f"law {name!r}: its joints bear {largest:.2g} Pa at most, but its depth cells are for "
             f"{made:.2g} Pa, so that tractions err by up to 20 % (docs/accuracy.md). In "
@@ -192,7 +193,8 @@ def _compare(given: argparse.Namespace) -> None:
 
 def _reduce(given: argparse.Namespace) -> None:
     scene, rows = load(given.scene), []
-    if any(law.slope_wear < inf for law in scene.laws.values()):
+    rough = [law for law in scene.laws.values() if isinstance(law, JointLaw)]
+    if any(law.slope_wear < inf for law in rough):
         print("slope_wear has no effect on these numbers: they are too high")
     given.out.mkdir(parents=True, exist_ok=True)
     if given.force:

@@ -15,14 +15,14 @@ from jointlaw.joints.state import JointState
 from jointlaw.kernels.engine import Step
 
 from ..compiled import SHOWN, Pool, World
-from ..scene import Scene, is_coulomb
+from ..scene import Law, Scene, opens_to
 
 PARTS = "states", "fingerprint"  # of a snapshot of the joints of a law
 NEW = (0.0, 0.0, 1.0, 0.0, 0.0)  # what a new joint shows, but for its bond and where it is
 
 
 @lru_cache(maxsize=64)
-def unmated_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
+def unmated_curve(law: Law) -> dict[str, np.ndarray]:
     """Closure from first touch (m) and work (J/m2) of a joint whose faces have never met; and the
     closure and sliding (2,) where it begins."""
     closure = virgin_curve(law)["closure"]
@@ -34,7 +34,7 @@ def unmated_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
 
 
 @lru_cache(maxsize=64)
-def virgin_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
+def virgin_curve(law: Law) -> dict[str, np.ndarray]:
     """Closure (m), stress (Pa) and work (J/m2) of a virgin joint from no closure to 2 GPa, more
     than any corner of rock stands, and an upper bound of its stiffness (Pa/m) there.
 
@@ -46,13 +46,10 @@ def virgin_curve(law: jl.JointLaw) -> dict[str, np.ndarray]:
     stress = law.normal_stress(closure)
     work = cumulative_trapezoid(stress, closure, initial=0.0)
     stiffness = law.max_stiffness(closure)
-    if is_coulomb(law):
-        # The law's bound adds mu for the coupling of shear to closure. That of level asperities has
-        # no eigenvalue of its own: (kn, 0; mu kn, 0) has kn and 0. K is ks, lam K is kn.
-        p = law.asperity
-        stiffness = np.full(len(closure), max(1.0, p.lam) * p.K * law.asperity_density)
-        if (bond := law.bond) is not None:
-            stiffness += max(bond.normal_stiffness, bond.shear_stiffness)
+    if isinstance(law, jl.CoulombLaw):
+        # The law's bound has mu in it, for the coupling of shear to closure. That has no eigenvalue
+        # of its own: (kn, 0; mu kn, 0) has kn and 0.
+        stiffness = np.full(len(closure), max(law.normal_stiffness, law.shear_stiffness))
     return {"closure": closure, "stress": stress, "stiffness": stiffness, "work": work}
 
 
@@ -63,7 +60,7 @@ class Held:
     places without a contact, the lowest last; curve: the law's virgin curve.
     """
 
-    def __init__(self, law: jl.JointLaw, reduction: float) -> None:
+    def __init__(self, law: Law, reduction: float) -> None:
         self.batch, self.free = jl.JointBatch(law, 0), []
         self.curve = {**virgin_curve(law)}
         self.curve["stiffness"] = self.curve["stiffness"] * max(1.0, reduction**-2)
@@ -95,14 +92,12 @@ class Held:
 
     def begin(self, places: np.ndarray, mated: bool, bonded: bool) -> np.ndarray:
         """Let joints start, as new; closure and sliding (2,) in m where they first touch."""
-        law, start = (
-            self.batch.law,
-            np.zeros(2) if mated else unmated_curve(self.batch.law)["start"],
-        )
+        law = self.batch.law
+        start = np.zeros(2) if mated else unmated_curve(law)["start"]
         self.batch.reset(places, mated)
         if not bonded:
             self.batch.unbond(places)
-        damage = 0.0 if bonded and law.bond is not None else 1.0
+        damage = 0.0 if bonded and "damage" in law.tables.names else 1.0
         self.step.F[places], self.step.shown[places] = 0.0, [*NEW, damage, *start]
         return start
 
@@ -115,7 +110,8 @@ class Held:
     def pool(self) -> Pool:
         """What the compiled step knows of them."""
         arrays = self.step.d, self.step.F, self.step.shown, *self._curve
-        return Pool(*(array.ctypes.data for array in arrays), len(self._curve[0]))
+        holds = bool(opens_to(self.batch.law) > 0.0)
+        return Pool(*(array.ctypes.data for array in arrays), len(self._curve[0]), holds)
 
     @property
     def _curve(self) -> tuple[np.ndarray, np.ndarray]:
@@ -127,7 +123,7 @@ class Joints:
 
     delta (k, 2) in m: closure and sliding; traction (k, 2) in Pa; sliding, slipping, separated
     (k,): shares of their shear capacity; stored, lost (k,) in J/m2; damage (k,) of their bonds, 1
-    where there is none. law, place (k,): number of the law, and place in its batch.
+    where nothing holds tension. law, place (k,): number of the law, and place in its batch.
 
     The scene's `reduction` F divides the shear stress of every joint and multiplies the sliding at
     which it has it. So tan(friction angle), tan(dilation angle) and cohesion are divided by F, and

@@ -7,7 +7,7 @@ import numpy as np
 import jointlaw as jl
 
 from ..dynamics.simulation import Simulation
-from ..scene import Scene, is_coulomb, turn
+from ..scene import Law, Scene, turn
 
 POINT = "x_m", "y_m", "vx_m/s", "vy_m/s"
 SLIP_DISTANCE = 2e-3  # m, for laws without a finite mating length
@@ -116,15 +116,16 @@ def _joint(sim: Simulation, moving: int, base: int) -> dict[str, float]:
     return {key: float(share @ column) for key, column in zip(keys, columns, strict=True)}
 
 
-def slip_distance(law: jl.JointLaw) -> float:
+def slip_distance(law: Law) -> float:
     """Sliding (m) that counts as slip: the law's mating length."""
-    return law.mating_length if np.isfinite(law.mating_length) else SLIP_DISTANCE
+    fades = isinstance(law, jl.JointLaw) and np.isfinite(law.mating_length)
+    return law.mating_length if fades else SLIP_DISTANCE
 
 
-def friction_angle(law: jl.JointLaw, stress: float) -> float:
+def friction_angle(law: Law, stress: float) -> float:
     """Peak of F2/F1 (degrees) of the law in direct shear at a constant normal stress (Pa)."""
-    if is_coulomb(law):
-        return float(np.degrees(np.arctan(law.asperity.mu)))
+    if isinstance(law, jl.CoulombLaw):
+        return float(np.degrees(np.arctan(law.friction + law.cohesion / stress)))
     far = 1.2 * slip_distance(law)  # friction peaks within a mating length
     record = jl.direct_shear(law.joint(), to=[far], normal=stress, steps=120)
     return float(record.peak_friction_angle)
@@ -148,7 +149,7 @@ def slip_angle(scene: Scene, law_name: str, moving: int, length: float) -> dict:
     return {"predicted_angle": None, "normal_stress": None}
 
 
-def shear_curve(law: jl.JointLaw, stress: float, slid: np.ndarray) -> jl.Record | None:
+def shear_curve(law: Law, stress: float, slid: np.ndarray) -> jl.Record | None:
     """Direct shear of the law alone along the turning points of `slid` (m), at a normal stress.
 
     None for plain Coulomb and where the law cannot be sheared like this: no normal stress, no
@@ -156,7 +157,7 @@ def shear_curve(law: jl.JointLaw, stress: float, slid: np.ndarray) -> jl.Record 
     """
     inner = np.flatnonzero(np.diff(np.sign(np.diff(slid)))) + 1
     with suppress(ValueError, jl.PathError):
-        if not is_coulomb(law):
+        if isinstance(law, jl.JointLaw):
             turns = [*slid[inner].tolist(), float(slid[-1])]
             return jl.direct_shear(law.joint(), to=turns, normal=stress, steps=400)
     return None

@@ -2,7 +2,7 @@
 
 keys       the keys of all tables, and what each may be
 blocks     convex blocks
-laws       joint laws and plain Coulomb
+laws       joint laws and Coulomb's
 drives     prescribed motions
 cutting    an outline cut along joint sets
 scene      a scene in memory
@@ -12,26 +12,25 @@ read       a scene from its file
 from .blocks import Block, smallest_width, turn, usual_size
 from .drives import Drive, Drives
 from .keys import Tables, overlay
-from .laws import STICKS, Files, build_law, coulomb_law, is_coulomb
+from .laws import Files, Law, build_law, opens_to
 from .read import TEMPLATE, build, load, parse, read_tables, shipped
 from .scene import Key, Run, Scene
 
 __all__ = [
-    "STICKS",
     "TEMPLATE",
     "Block",
     "Drive",
     "Drives",
     "Files",
     "Key",
+    "Law",
     "Run",
     "Scene",
     "Tables",
     "build",
     "build_law",
-    "coulomb_law",
-    "is_coulomb",
     "load",
+    "opens_to",
     "overlay",
     "parse",
     "read_tables",

@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 from shapely import Polygon
 
-from jointlaw import Bond
-from jointlaw.parameters.keys import checked, keys_of
 from jointlaw.support.checks import at_least, finite, integer, more_than, number, one_of
 
 Tables = dict[str, Any]
@@ -61,15 +59,6 @@ def some_of(name: str, value: Any, names: Iterable[str], count: int | None = Non
     return value
 
 
-def bond(name: str, value: Any) -> Bond:
-    """A rule: the table of a bond."""
-    values = checked(value, keys_of(Bond), name)
-    try:
-        return Bond(**values)
-    except ValueError as error:
-        raise ValueError(f"{name.removesuffix('bond')}{error}") from None
-
-
 AXES = {"x": 0, "y": 1, "turn": 2}
 TEXT, LIST, TABLE = a(str), a(list), a(dict)
 POSITIVE, NOT_NEGATIVE = partial(more_than, bound=0), partial(at_least, bound=0)
@@ -110,10 +99,6 @@ SCENE = {
     "laws!": TABLE, "block": [BLOCK], "rock": [ROCK], "drive": [DRIVE], "run!": RUN,
     "joint": [{"between": LIST, "around": vector, "law!": TEXT}],
     "watch": {"slip": LIST, "shear": LIST, "pins": LIST, "joints": LIST},
-}  # fmt: skip
-COULOMB = {
-    "kind!": TEXT, "normal_stiffness!": POSITIVE, "shear_stiffness!": POSITIVE,
-    "friction!": partial(at_least, bound=0, infinite=True), "bond": bond,
 }  # fmt: skip
 
 

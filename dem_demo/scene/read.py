@@ -15,7 +15,7 @@ from .blocks import Block, box, check_convex, usual_width
 from .cutting import JointSet, cut
 from .drives import read_drives
 from .keys import LIST, SCENE, TABLE, Tables, overlay, some_of, vector
-from .laws import Files, build_law
+from .laws import Files, build_law, opens_to
 from .scene import Rock, Run, Scene
 
 SCENES = Path(__file__).parent / "scenes"
@@ -116,12 +116,12 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
         **watched,
     )  # fmt: skip
     for name, law in laws.items():
-        opening = 0.0 if law.bond is None else 1.0 / law.bond.limits[1][0]
+        opening = opens_to(law)
         if opening > scene.skins.min():
             raise ValueError(
-                f"{where}: laws.{name}.bond holds until the joint is {opening:.3g} m open, but "
+                f"{where}: laws.{name} holds until the joint is {opening:.3g} m open, but "
                 f"contacts are followed to {scene.skins.min():.3g} m: set a larger run.skin, or "
-                "a smaller energy_I"
+                "a smaller tension or energy_I"
             )
     for name, value in (("files", files), ("text", text)):  # `replace` leaves both out
         object.__setattr__(scene, name, value)

@@ -15,14 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from jointlaw import PathError
+from jointlaw import JointLaw, PathError
 from jointlaw.support.files import clear_run
 
 from ..dynamics.simulation import Simulation
 from ..errors import Refused
 from ..output.record import Record, write_csv
 from ..output.run import run
-from ..scene import Scene, is_coulomb, overlay
+from ..scene import Scene, overlay
 
 COST = ("steps", "time_step_s", "cpu_s", "time_ratio", "note")
 TABLE = "ablation.csv"
@@ -81,7 +81,7 @@ def variants(scene: Scene, record: Record) -> Iterator[tuple[str, Callable[[], S
         for who, stress in zip(frame["who"].tolist(), stresses, strict=True):
             carried[scene.law_of(who)] += [stress] * (stress > 0)
     pressed = {name: np.median(of) for name, of in carried.items()
-               if of and not is_coulomb(scene.laws[name])}  # fmt: skip
+               if of and isinstance(scene.laws[name], JointLaw)}  # fmt: skip
     lacking: dict[str, dict[str, Any]] = {}
     for law in (scene.laws[name] for name in pressed):
         given = INGREDIENTS | {

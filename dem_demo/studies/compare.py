@@ -16,7 +16,7 @@ from ..dynamics.simulation import Simulation
 from ..errors import Refused
 from ..output.record import Record, far, outcomes
 from ..output.run import play
-from ..scene import Scene, coulomb_law, is_coulomb
+from ..scene import Law, Scene
 from .strength import alone
 
 
@@ -44,12 +44,13 @@ def _run(scene: Scene, until: float) -> dict:
     return outcomes(record)[0] | {"time_s": sim.time, "refused": trouble}
 
 
-def _plain(scene: Scene, law: jl.JointLaw) -> jl.JointLaw:
-    if is_coulomb(law):
+def _plain(scene: Scene, law: Law) -> jl.CoulombLaw:
+    if isinstance(law, jl.CoulombLaw):
         return law
     (rock,) = scene.rocks
     blocks = [scene.blocks[i] for i in rock.blocks]
     height = np.ptp(np.concatenate([block.corners[:, 1] for block in blocks]))
     stress = 0.5 * blocks[0].density * np.hypot(*scene.gravity) * height
     stiffness = float(stress / law.closure(stress))
-    return coulomb_law(stiffness, stiffness / law.asperity.lam, law.asperity.mu)
+    mu = law.asperity.mu
+    return jl.CoulombLaw(stiffness, stiffness / law.asperity.lam, mu, plane=0.0)

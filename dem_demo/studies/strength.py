@@ -5,6 +5,7 @@ displacements are found with which the joints carry the loads. A search starts w
 holds, and looks for every equilibrium from the one before, with shorter steps where none is found.
 """
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -13,11 +14,12 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
+import jointlaw as jl
 from jointlaw.parameters.rock import STEEPEST
 from jointlaw.support.pyplot import FORMATS
 
 from ..dynamics.seating import displacements
-from ..scene import STICKS, Scene, Tables, build, read_tables, turn
+from ..scene import Scene, Tables, build, read_tables, turn
 from .failure import draw, failing
 from .trials import Trials
 
@@ -106,7 +108,9 @@ def weakened(scene: Scene, factor: float) -> Scene:
     """A scene with the strength of all joints divided by a factor, bonds in tension as well."""
     laws = dict(scene.laws)
     for name, law in laws.items():
-        if bond := law.bond:  # an energy above the elastic one stays above it
+        if isinstance(law, jl.CoulombLaw):
+            laws[name] = replace(law, tension=law.tension / factor)
+        elif bond := law.bond:  # an energy above the elastic one stays above it
             energy = bond.energy_I and bond.energy_I / factor**2
             bond = replace(bond, tension=bond.tension / factor, energy_I=energy)
             laws[name] = replace(law, bond=bond)
@@ -115,11 +119,20 @@ def weakened(scene: Scene, factor: float) -> Scene:
 
 def smoothed(scene: Scene, factor: float) -> Scene:
     """A scene with the friction of asperities and of plain Coulomb divided by a factor."""
-    laws = {}
+    laws = dict(scene.laws)
     for name, law in scene.laws.items():
-        mu = law.asperity.mu
-        weak = min(mu / factor, STEEPEST) if mu < STICKS else mu  # what fails so has no factor
-        laws[name] = replace(law, asperity=replace(law.asperity, mu=weak))
+        if isinstance(law, jl.CoulombLaw):
+            if math.isinf(law.friction):  # what fails so has no factor
+                continue
+            residual = law.residual_friction
+            laws[name] = replace(
+                law,
+                friction=min(law.friction / factor, STEEPEST),
+                residual_friction=residual and min(residual / factor, STEEPEST),
+            )
+        else:
+            weak = min(law.asperity.mu / factor, STEEPEST)
+            laws[name] = replace(law, asperity=replace(law.asperity, mu=weak))
     return replace(scene, laws=laws)
 
 

@@ -9,6 +9,7 @@ from ..support.checks import Array
 from ..support.thresholds import LIMIT, ROUNDED
 from .element import Element, Measures, Share
 
+STICKS = 1e30  # a friction from here on counts as infinite
 _OVERFLOW = 1e70  # Pa: fourth powers beyond it overflow
 
 
@@ -34,9 +35,10 @@ class Coulomb(Element):
     def __init__(self, p: Any, dim: int) -> None:
         self.dim, self.rows = dim, {"shear": dim - 1, "damage": 1}
         self.normal, self.shear = p.normal_stiffness, p.shear_stiffness
-        self.friction, self.cohesion, self.weakening = p.friction, p.cohesion, p.weakening
+        self.friction = min(p.friction, STICKS)
+        self.cohesion, self.weakening = p.cohesion, p.weakening
         left = p.residual_friction, p.residual_cohesion
-        self.residual_friction = self.friction if left[0] is None else left[0]
+        self.residual_friction = self.friction if left[0] is None else min(left[0], STICKS)
         self.residual_cohesion = self.cohesion if left[1] is None else left[1]
         # beyond cohesion/friction there is no strength in shear
         apex = self.cohesion / self.friction if self.friction > 0.0 else np.inf
@@ -181,7 +183,9 @@ class Coulomb(Element):
         length L. A falling stress asks for no smaller time step.
         """
         w = state[-1] if self.weakening > 0.0 else np.ones_like(state[-1])
-        bound = np.maximum(self.normal * np.hypot(1.0, self.friction_at(w)), self.shear)
+        mu = self.friction_at(w)
+        slides = self.normal * np.hypot(1.0, np.where(mu < STICKS, mu, 0.0))
+        bound = np.maximum(slides, self.shear)
         return np.where((state[-1] > 0.0) & (delta[0] < 0.0), 0.0, bound)
 
     def measures(self, delta: Array, state: Array) -> Measures:

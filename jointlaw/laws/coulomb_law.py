@@ -28,7 +28,9 @@ class CoulombLaw(Law, kind="coulomb"):
 
     normal_stiffness: float = parameter("stiffness in closure", "Pa/m", above=0.0, high=LARGEST)
     shear_stiffness: float = parameter("stiffness in shear", "Pa/m", above=0.0, high=LARGEST)
-    friction: float = parameter("coefficient, tan(phi)", low=0.0, high=LARGEST)
+    friction: float = parameter(
+        "coefficient, tan(phi); infinite: the joint never slides", low=0.0, infinite=True
+    )
     cohesion: float = parameter("c", "Pa", 0.0, low=0.0, high=LARGEST)
     tension: float = parameter(
         "strength in opening; what is beyond cohesion/friction does not count",

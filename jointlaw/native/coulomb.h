@@ -151,7 +151,7 @@ JL_IN double jl_coulomb_stiffness(const jlaw_law *law, double damage, double clo
 {
   if (damage > 0.0 && closure < 0.0) return 0.0; /* apart */
   const double mu = jl_coulomb_friction(law, law->coulomb_weakening > 0.0 ? damage : 1.0);
-  const double slides = law->coulomb_normal * sqrt(1.0 + mu * mu);
+  const double slides = law->coulomb_normal * (mu < 1e30 ? sqrt(1.0 + mu * mu) : 1.0); /* sticks */
   return slides > law->coulomb_shear ? slides : law->coulomb_shear;
 }
 

@@ -33,6 +33,15 @@ def steps(law, count=14):
     return d
 
 
+def test_it_acts(pair):
+    """Another value is another joint."""
+    tractions = []
+    for law in pair:
+        joint = law.joint()
+        tractions.append([joint.update(d, tangent=False)[0].tolist() for d in steps(law)])
+    assert tractions[0] != tractions[1]
+
+
 def test_files_fingerprint_and_copies_have_it(pair):
     law, base = pair
     assert law != base

@@ -1,4 +1,4 @@
-"""Blocks that hang on a bond or are kept by one: against strengths worked out by hand."""
+"""Blocks that hang on tension or are kept by a bond: against strengths worked out by hand."""
 
 import itertools
 from dataclasses import replace
@@ -11,12 +11,13 @@ from dem_demo import Simulation, load, parse
 from dem_demo.studies.strength import factor_of_safety, weakened
 
 G, RHO, T, C = 9.81, 2600.0, 2e5, 2e4  # m/s2, kg/m3, Pa
-LAW = """
+LAW = f"""
 kind = "coulomb"
 normal_stiffness = 2e9
 shear_stiffness = 2e9
-friction = {mu}
-bond = {{ {bond} }}
+friction = 0.6
+tension = {T}
+cohesion = 4e5
 """
 
 
@@ -42,8 +43,7 @@ end = 1.0
 
 def test_a_block_that_hangs_holds_to_the_tension():
     """Loaded slowly: what it bears before it falls is tension times area."""
-    bond = f"normal_stiffness = 2e9, shear_stiffness = 1e9, tension = {T}, cohesion = 4e5"
-    sim = Simulation(block(LAW.format(mu=0.6, bond=bond), at=-0.5))
+    sim = Simulation(block(LAW, at=-0.5))
     weight = RHO * G
     assert sim.balanced
     assert sim.joints.traction[:, 0] == pytest.approx(-weight)
@@ -56,14 +56,12 @@ def test_a_block_that_hangs_holds_to_the_tension():
     assert 0.99 < held <= 1.01
     while sim.joints.n:  # it falls out of reach
         sim.step()
-    # the bond gives back what it stored, but for its energy of fracture
     assert sim.ledger.error == pytest.approx(0.0, abs=1e-3)
 
 
-def test_faces_that_meet_anew_have_no_bond():
+def test_faces_that_meet_anew_have_no_cohesion():
     """A block that falls onto its base bounces off: nothing holds it."""
-    bond = f"normal_stiffness = 2e9, shear_stiffness = 1e9, tension = {T}, cohesion = 4e5"
-    scene = block(LAW.format(mu=0.6, bond=bond))
+    scene = block(LAW)
     drawn = replace(scene.blocks[1], corners=np.add(scene.blocks[1].corners, [0.0, 0.05]))
     run = replace(scene.run, seat=False, largest_stress=2e6)
     sim = Simulation(replace(scene, blocks=(scene.blocks[0], drawn), run=run))

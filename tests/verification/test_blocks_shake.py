@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 
-from dem_demo import Simulation, coulomb_law, load, parse
+import jointlaw as jl
+from dem_demo import Simulation, load, parse
 from dem_demo.output.record import Record
 from dem_demo.scene.read import SCENES
 
@@ -21,7 +22,7 @@ def scene(acceleration):
     text = (SCENES / "shake.toml").read_text(encoding="utf-8")
     text = text.replace("acceleration = 5.0", f"acceleration = {float(acceleration)}")
     given = parse(text.replace("cycles = 10", f"cycles = {CYCLES}"))
-    return replace(given, laws={"joint": coulomb_law(2e8, 1.6e8, MU)})
+    return replace(given, laws={"joint": jl.CoulombLaw(2e8, 1.6e8, MU, plane=0.0)})
 
 
 def per_cycle(t, slid):

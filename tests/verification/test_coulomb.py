@@ -284,3 +284,50 @@ def test_tangent(state, dim):
     assert errors.min() < 1e-8
     if dim == 3 and state not in ("stick", "tension"):  # q turns, all else is quadratic at most
         assert descent_slope(errors) == pytest.approx(2.0, abs=0.1)
+
+
+def stands(law, parts, dip):
+    """Whether a block of 3 x 1.5 m (25.5 kN/m3), its base in so many parts, is held on a plane."""
+    x, weights = np.linspace(-1.5, 1.5, parts + 1), np.full(parts + 1, 3.0 / parts)
+    weights[[0, -1]] /= 2.0
+    one = np.ones(parts + 1)  # closure and shear of the base by motion up, down the plane, and turn
+    rows = [[-one, 0.0 * one, -x], [0.0 * one, one, 0.75 * one]]
+    G, joints = np.moveaxis(np.array(rows), -1, 0), law.joints(parts + 1)
+    weight = 25.5e3 * 4.5 * np.array([-math.cos(dip), math.sin(dip), 0.0])
+    for share in np.arange(1, 101) / 100:
+        move = np.zeros(3)
+        for _ in range(40):
+            F, tangent = joints.trial(G @ move)
+            rest = share * weight - np.einsum("nij,ni,n->j", G, F, weights)
+            if np.abs(rest).max() < 1e-6:
+                break
+            K = np.einsum("nia,nij,njb,n->ab", G, tangent, G, weights)
+            if np.linalg.cond(K) > 1e12:
+                return False
+            move = move + np.linalg.solve(K, rest)
+        else:
+            return False
+        joints.update(G @ move)
+    return True
+
+
+def test_planar_block_and_the_size_of_its_parts():
+    """Factor of safety (dip 35, phi 30, c 10 kPa): the handbook's, and less where c is lost."""
+    dip, found = math.radians(35.0), {}
+    given = {"normal_stiffness": 1e10, "shear_stiffness": 5e9}
+    for left in (None, 0.0):
+        for parts in (1, 2, 4, 16):
+            low, high = 0.5, 2.0
+            while high - low > 5e-4:
+                F = 0.5 * (low + high)
+                mu, c = math.tan(math.radians(30.0)) / F, 1e4 / F
+                law = coulomb(friction=mu, cohesion=c, tension=c, residual_cohesion=left, **given)
+                low, high = (F, high) if stands(law, parts, dip) else (low, F)
+            found[left, parts] = low
+    handbook = (
+        1e4 * 3.0 / (25.5e3 * 4.5) + math.cos(dip) * math.tan(math.radians(30.0))
+    ) / math.sin(dip)
+    kept, lost = ([found[left, parts] for parts in (1, 2, 4, 16)] for left in (None, 0.0))
+    assert handbook == pytest.approx(1.280, abs=1e-3)
+    assert kept == pytest.approx([1.280, 1.280, 1.280, 1.266], abs=2e-3)  # these are on the page
+    assert lost == pytest.approx([1.052, 1.022, 0.947, 0.898], abs=2e-3)

@@ -13,7 +13,7 @@ import jointlaw as jl
 from dem_demo import Simulation
 from dem_demo.cli import main
 from dem_demo.output.monitors import friction_angle
-from dem_demo.scene import coulomb_law, load, parse
+from dem_demo.scene import load, parse
 from dem_demo.studies import strength
 from dem_demo.studies.strength import (
     alone,
@@ -49,8 +49,10 @@ end = 0.2
 fraction = 0.7
 """
 FOUND = 0.01  # share to which both are found
-BOND = jl.Bond(1e9, 1e9, tension=2e5, cohesion=1e4, energy_II=25.0)  # 500 times the elastic energy
-PLAIN = {"coulomb": coulomb_law(3e9, 2e9, 0.8), "bond": coulomb_law(3e9, 2e9, 0.8, BOND)}
+PLAIN = {
+    "coulomb": jl.CoulombLaw(3e9, 2e9, 0.8, plane=0.0),
+    "cohesion": jl.CoulombLaw(3e9, 2e9, 0.8, 1e4, plane=0.0),
+}
 
 
 def angle(factor, dip):
@@ -68,7 +70,7 @@ def bears(law, stress):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["joint", "coulomb", "bond"])
+@pytest.mark.parametrize("kind", ["joint", "coulomb", "cohesion"])
 def test_factor_of_safety_of_a_block_on_a_plane(kind):
     """Strength of the joint at its normal stress over the shear stress of the weight."""
     scene = parse(SCENE)
@@ -76,14 +78,13 @@ def test_factor_of_safety_of_a_block_on_a_plane(kind):
     dip, weight = math.radians(DIP), 2600.0 * 9.81
     strength = bears(law, normal := weight * math.cos(dip))
     if kind in PLAIN:
-        cohesion = law.bond.cohesion if law.bond else 0.0
-        assert strength == pytest.approx(cohesion + 0.8 * normal, rel=2e-3)
+        assert strength == pytest.approx(law.cohesion + 0.8 * normal, rel=2e-3)
     found = factor_of_safety(replace(scene, laws={"joint": law}))
     assert found == pytest.approx(strength / (weight * math.sin(dip)), rel=FOUND)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["joint", "coulomb", "bond"])
+@pytest.mark.parametrize("kind", ["joint", "coulomb", "cohesion"])
 def test_factor_of_safety_of_a_toppling_column(kind):
     """A column 4 m high tips on its lower corner and pushes the top of a block that slides.
 
@@ -91,7 +92,10 @@ def test_factor_of_safety_of_a_toppling_column(kind):
     weight and the push give the normal stresses at its two ends.
     """
     tilt, height, wide, top, load = math.radians(25.0), 4.0, 3.0, 1.2, 2600.0 * 9.81
-    plain = {"free": coulomb_law(3e9, 2e9, 0.0), "foot": coulomb_law(3e9, 2e9, 5.0)}
+    plain = {
+        "free": jl.CoulombLaw(3e9, 2e9, 0.0, plane=0.0),
+        "foot": jl.CoulombLaw(3e9, 2e9, 5.0, plane=0.0),
+    }
     law = PLAIN.get(kind, parse(SCENE).laws["joint"])
     head = SCENE[: SCENE.index("[[block]]")].split("[laws.joint]")[1]
     scene = parse(f"""
@@ -132,24 +136,24 @@ end = 0.2
 
 
 @pytest.mark.slow
-def test_factor_of_safety_of_a_column_that_a_bond_keeps_from_toppling():
-    """It tips on its lower corner, and the bond at its heel is torn.
+def test_factor_of_safety_of_a_column_that_tension_keeps_from_toppling():
+    """It tips on its lower corner, and its heel is torn off.
 
     That end stands for half of the base, with the whole base as its arm: the moment is that of the
     tension all over the base, tension * width^2 / 2. The weight is not divided by F.
     """
     tilt, high, wide, load = math.radians(25.0), 4.0, 1.0, 2600.0 * 9.81
-    bond = jl.Bond(1e9, 1e9, tension=1.2e5, cohesion=2e6)
+    law = jl.CoulombLaw(3e9, 2e9, 0.8, cohesion=2e6, tension=1.2e5, plane=0.0)
     text = SCENE.replace("box = [5.0, 1.0]\nat = [-1.0, 0.5]", "box = [1.0, 4.0]\nat = [0.0, 2.0]")
     gravity = 9.81 * math.sin(tilt), -9.81 * math.cos(tilt)
-    scene = replace(parse(text), gravity=gravity, laws={"joint": coulomb_law(3e9, 2e9, 0.8, bond)})
+    scene = replace(parse(text), gravity=gravity, laws={"joint": law})
     tips = load * wide * high * (math.sin(tilt) * high / 2 - math.cos(tilt) * wide / 2)
-    by_hand = bond.tension * wide**2 / 2 / tips
+    by_hand = law.tension * wide**2 / 2 / tips
     assert factor_of_safety(scene) == pytest.approx(by_hand, rel=FOUND)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["joint", "coulomb", "bond"])
+@pytest.mark.parametrize("kind", ["joint", "coulomb", "cohesion"])
 def test_factor_of_safety_of_a_wedge_of_two_blocks(kind):
     """The upper block slides on 50 degrees and pushes the lower one, which slides on 15 degrees.
 
@@ -220,7 +224,7 @@ def test_factor_of_safety_of_a_slope_is_that_of_coulomb_of_the_same_strength():
         if (name := f"coulomb {eighths}") not in laws:
             stiff = stress / law.closure(stress)
             friction = math.tan(math.radians(friction_angle(law, stress)))
-            laws[name] = coulomb_law(stiff, stiff / law.asperity.lam, friction)
+            laws[name] = jl.CoulombLaw(stiff, stiff / law.asperity.lam, friction, plane=0.0)
         pairs[pair] = name
     alike = factor_of_safety(replace(one, laws=laws, pairs=pairs))
     assert sim.balanced
@@ -270,19 +274,19 @@ def test_critical_tilt_of_a_block_is_that_of_the_law_alone():
 def test_a_tilt_near_the_steepest_is_found(degrees):
     """A flat slab slides at its friction angle, also where the last step of the search is short."""
     text = SCENE.replace("box = [5.0, 1.0]\nat = [-1.0, 0.5]", "box = [3.0, 0.1]\nat = [0.0, 0.05]")
-    plain = coulomb_law(1e9, 1e9, math.tan(math.radians(degrees)))
+    plain = jl.CoulombLaw(1e9, 1e9, math.tan(math.radians(degrees)), plane=0.0)
     found = critical_tilt(replace(parse(text), gravity=(0.0, -9.81), laws={"joint": plain}))
     assert found is None if degrees > 60 else found == pytest.approx(degrees, rel=FOUND)
 
 
 def test_all_frictions_are_divided_and_nothing_else():
     scene = parse(SCENE)
-    law, sticks = scene.laws["joint"], coulomb_law(1e9, 1e9, math.inf)
+    law, sticks = scene.laws["joint"], jl.CoulombLaw(1e9, 1e9, math.inf, plane=0.0)
     worn = replace(law, slope_wear=1e3)
-    given = {"worn": worn, "plain": coulomb_law(1e9, 1e9, 0.6), "sticks": sticks}
+    given = {"worn": worn, "plain": jl.CoulombLaw(1e9, 1e9, 0.6, plane=0.0), "sticks": sticks}
     laws = smoothed(replace(scene, laws=given), 2.0).laws
     assert laws["worn"] == replace(worn, asperity=replace(worn.asperity, mu=law.asperity.mu / 2))
-    assert laws["plain"] == coulomb_law(1e9, 1e9, 0.3)
+    assert laws["plain"] == jl.CoulombLaw(1e9, 1e9, 0.3, plane=0.0)
     assert laws["sticks"] == sticks
 
 

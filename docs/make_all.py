@@ -23,7 +23,7 @@ HERE = Path(__file__).parent
 SCENES = tuple(sorted(path.stem.partition("-")[2] for path in HERE.glob("data/ablation-*.csv")))
 # key: page, command; the first table that it prints goes to the page
 TABLES = {
-    "intervals": ("validation.md", "docs/measure/intervals.py --draws 25 --workers 1"),
+    "intervals": ("validation.md", "docs/measure/intervals.py --draws 40 --workers 1"),
     "held-out-few": ("validation.md", "docs/measure/held_out.py --draws 20 --few --workers 1"),
     "peak-residual": ("validation.md", "docs/measure/peak_residual.py"),
     "baselines": ("validation.md", "docs/measure/baselines.py"),

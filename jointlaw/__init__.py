@@ -27,6 +27,7 @@ from .support.version import __version__ as __version__
 from .tables.joint_table import JointTable, load_table
 
 if TYPE_CHECKING:
+    from .calibration.field import from_field
     from .calibration.fit import fit_closure, fit_curves
     from .calibration.measured import ClosureCurve, ShearCurve
     from .hosts.c.export import export_c
@@ -63,6 +64,7 @@ __all__ = [
     "export_yade",
     "fit_closure",
     "fit_curves",
+    "from_field",
     "from_surface",
     "load_state",
     "load_table",
@@ -81,6 +83,7 @@ _LATER = {
     "export_yade": "hosts.yade.export",
     "fit_closure": "calibration.fit",
     "fit_curves": "calibration.fit",
+    "from_field": "calibration.field",
     "from_surface": "surface.fit",
     "tabulate": "tables.tabulate",
 }

@@ -17,7 +17,7 @@ from pathlib import Path
 from jointlaw import presets
 from jointlaw.hosts.c.export import include_dir, packed
 from jointlaw.native.build import FLAGS, Compiler
-from jointlaw.native.layout import NUMBERS, WHOLE
+from jointlaw.native.layout import ELEMENTS, NUMBERS, WHOLE
 
 SOURCES = Path(__file__).parents[1] / "browser"
 RESOLUTIONS = ("fast", "balanced", "fine")
@@ -61,8 +61,10 @@ def compiled():
 def tables(law):
     """The bytes of a law's tables, as `take_law` of joint.c reads them."""
     numbers, arrays = packed(law)
-    if numbers["dim"] != 3 or any(numbers[name] for name in ("yields", "fades", "wears", "bonded")):
-        raise ValueError("joint.c runs elastic laws in space, mated and without a bond, alone")
+    if numbers["dim"] != 3 or any(
+        numbers[name] for name in ("yields", "fades", "wears", *ELEMENTS)
+    ):
+        raise ValueError("joint.c runs elastic laws in space, mated and of asperities alone")
     return b"".join([bytes(Head(**numbers)), *(array.tobytes() for array in arrays.values())])
 
 

@@ -43,7 +43,7 @@ OUT(update) int update(const double *s0, double *s1, const double *d, double *F,
   if (!(law.stretch * way <= law.largest_reach))
     return jlaw_refuse_(&law, s0, d, 0, message, JLAW_MESSAGE);
   memcpy(s1, s0, (size_t) jl_state_rows(&law) * sizeof *s1);
-  jl_step(&law, n, d, F, F + 3, jl_kind_of(3, 0, 0, 0, 1, 1, 0, 0));
+  jl_step(&law, n, d, F, F + 3, jl_kind_of(3, 0, 0, 0, 1, 1, 0, 0), NULL);
   return 0;
 }
 

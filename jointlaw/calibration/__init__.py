@@ -2,11 +2,16 @@
 
     priors          what is known before: transforms, bounds, 95 % ranges
     forward         parameters to a law and its closure curve, and back
-    measured        closure and shear curves, their misfit, and their noise from its scatter
-    datasets        tests in text files: those of the package, in data/, and of laboratories
+    noise           expected levels of noise, and those that the scatter shows
+    shearing        shear tests by a law, all joints together
+    measured        closure and shear curves, and their misfit
+    tables          columns of text files and spreadsheets, and rows that are no measurement
+    datasets        tests in files: those of the package, in data/, and of laboratories
+    envelopes       Coulomb, Barton, a power law, through the same tests
     problem         what is free, what is held, where to start; least squares with priors
-    fit             fit_closure, fit_curves; their result: law, parameters, intervals,
-                    what the data leave open, words, a picture
+    estimates       what a fit found: law, intervals, what the data leave open
+    fit             fit_closure, fit_curves; their result in words and a picture
+    field           a law from JRC, JCS, a friction angle and a stiffness
 
 Each file imports from those above it only.
 """

@@ -1,9 +1,9 @@
 """From tests to a law: fits of closure and shear curves, alone or together, and their result."""
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
+from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -12,20 +12,16 @@ from numpy.typing import ArrayLike
 
 from ..laws.joint_law import JointLaw
 from ..support.checks import Array
+from ..support.progress import track
 from ..support.pyplot import pyplot, style, written
-from .forward import build, build_for_shear, log_stress
+from .estimates import Estimates
+from .forward import log_stress
 from .measured import ClosureCurve, ShearCurve
 from .priors import TRANSFORMS, Ranges, Values
-from .problem import Problem, Solution, derivative, pose, solve, staged, starting_points
+from .problem import pose, silent, solve, staged, starting_points
 
-MISFITS = 1.5  # of the expected scatter: from this systematic misfit on the law is not the rock
-PRIOR_SHARE = 0.05  # of the variance: up to here the data, not the priors, decide
-WIDEST = math.log(2) / 1.96  # standard error of a logarithm: a factor of 2 either way
-OPEN = 1e6  # upper over lower end of the interval of what nothing fixes
-HALVED = 0.005  # of the largest measured stress: what halving the steps of shear may change
-HALVINGS = 8  # at most
-SOFTENING = 3  # points of one test on the fall of the bond, to know its cohesion by
-AT_BOUND = 1e-6  # of the distance of the bounds
+HALVED = 0.005  # of the largest stress or opening: what finer steps and cells of shear may change
+HALVINGS = 8  # of the steps, at most
 
 OTHER = (
     "Neighbouring points deviate to the same side. Use the law with this error between the points, "
@@ -37,149 +33,16 @@ TOO_MANY = (
     "These data do not fix so many parameters. Hold {}: give what you know (--set {}=VALUE), or "
     "leave it out of --free. Then the data fix the others."
 )
+UNMEASURED = (
+    "**No opening was measured.** At the lowest normal stress the fits that these data allow open "
+    "by {:.3g} to {:.3g} mm, at a largest dilation angle of {:.1f} to {:.1f} degrees: less "
+    "friction and more dilation give the same shear stress. Give the normal displacement of the "
+    "tests, or hold mu (from a tilt test of saw-cut faces) or a (from a scan)."
+)
 
 
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """Outcome of `fit_closure` and `fit_curves`, in SI units.
-
-    `free` names the fitted parameters in the order of `covariance`, the seating closure last;
-    `parameters` holds all values; `noise` and `systematic_misfit` have an entry for each curve.
-    """
-
-    problem: Problem
-    solution: Solution
-    halved: float = 0.0  # change of the shear stress, of its largest, when steps are halved
-
-    @property
-    def free(self) -> tuple[str, ...]:
-        """Names of the fitted parameters, the seating closure last."""
-        return self.problem.free
-
-    @property
-    def parameters(self) -> dict[str, float]:
-        """Every parameter, fitted or held, and the seating closure (m)."""
-        return self.problem.unpack(self.solution.x)
-
-    @cached_property
-    def law(self) -> JointLaw:
-        """The law of these parameters."""
-        return build(self.parameters, self.problem.settings, self.problem.settings.plane)
-
-    def interval(self, name: str) -> tuple[float, float]:
-        """The 95 % interval of a fitted parameter, within its bounds."""
-        if name not in self.free:
-            raise ValueError(f"{name!r} was not fitted; fitted are {', '.join(self.free)}")
-        at, transform = self.free.index(name), TRANSFORMS[name]
-        reach = self.solution.quantile * math.sqrt(self.solution.covariance[at, at])
-        x, (low, high) = self.solution.x[at], self.problem.bounds()
-        ends = max(x - reach, low[at]), min(x + reach, high[at])
-        return transform.back(float(ends[0])), transform.back(float(ends[1]))
-
-    @cached_property
-    def at_bound(self) -> tuple[str, ...]:
-        """Fitted parameters that the fit left at a bound: the data ask for what no law has."""
-        low, high = self.problem.bounds()
-        gap = np.minimum(self.solution.x - low, high - self.solution.x) / (high - low)
-        if "mating_length" in self.free:  # of which the closure range is a bound too
-            short = self.law.mating_length > (1 + AT_BOUND) * self.parameters["mating_length"]
-            gap[self.free.index("mating_length")] *= not short
-        return tuple(name for name, g in zip(self.free, gap, strict=True) if g < AT_BOUND)
-
-    @cached_property
-    def too_many(self) -> tuple[str, ...]:
-        """Fitted parameters to hold, the vaguest first, so that the data alone fix the others."""
-        kept, held = [k for k, name in enumerate(self.free) if name != "seating"], list[str]()
-        while kept:
-            C = np.linalg.inv(self.solution.information[np.ix_(kept, kept)])
-            vague = np.sqrt(np.diag(C)) / self._widest[kept]
-            if vague.max() <= 1:
-                break
-            held.append(self.free[kept.pop(int(np.argmax(vague)))])
-        return tuple(held)
-
-    @cached_property
-    def not_identifiable(self) -> dict[str, str]:
-        """Fitted parameters that these data do not fix, each with the reason."""
-        found: dict[str, str] = {}
-        errors = np.sqrt(np.diag(self.solution.covariance)) / self._widest
-        for name, share, error in zip(self.free, self.solution.prior_share, errors, strict=True):
-            if name in self.at_bound:
-                found[name] = f"the fit ended at a bound, {self.parameters[name]:.3g}"
-            elif name == "cohesion" and self._softening < SOFTENING:
-                found[name] = (
-                    f"at most {self._softening} points of a test lie where the bond softens: a "
-                    "bond that breaks between two points shows no cohesion"
-                )
-            elif share > PRIOR_SHARE:
-                found[name] = f"the priors supply {100 * share:.0f} % of its variance"
-            elif error > 1:
-                found[name] = f"the data leave it {self._spread(name)}"
-        return found
-
-    @property
-    def _softening(self) -> int:
-        """Points between begin and end of damage in pure shear, of the curve that has most."""
-        assert self.law.bond is not None
-        (_, begin), (_, end) = self.law.bond.limits
-        shears = [np.abs(c.shear) for c in self.problem.curves if isinstance(c, ShearCurve)]
-        inside = [int(np.sum((way * begin > 1) & (way * end < 1))) for way in shears]
-        return max(inside, default=0)
-
-    @property
-    def _widest(self) -> Array:
-        """Standard errors (p,) up to which a parameter is known."""
-        return np.array([WIDEST if TRANSFORMS[name].log else 0.5 for name in self.free])
-
-    def _spread(self, name: str) -> str:
-        """The 95 % interval of a fitted parameter in words."""
-        if name in self.at_bound:
-            return "at a bound"
-        low, high = self.interval(name)
-        return "open" if TRANSFORMS[name].log and high > OPEN * low else f"{low:.3g} to {high:.3g}"
-
-    @property
-    def identifiable(self) -> tuple[str, ...]:
-        """Fitted parameters that the data fix: to a factor of 2, the priors all but silent."""
-        return tuple(name for name in self.free if name not in self.not_identifiable)
-
-    @cached_property
-    def systematic_misfit(self) -> tuple[float, ...]:
-        """Misfit that neighbouring points of each curve share, as residuals are.
-
-        The root of the mean product of neighbouring residuals, 0 where that is negative: scatter
-        averages out of it, the misfit of a curve of another shape does not.
-        """
-        curves = self.problem.split(self.problem.data(self.solution.x))
-        return tuple(math.sqrt(max(float(np.mean(r[1:] * r[:-1])), 0.0)) for r in curves)
-
-    @property
-    def shape_differs(self) -> tuple[bool, ...]:
-        """Whether each curve shows that the rock deforms along another curve than the law."""
-        pairs = zip(self.systematic_misfit, self.problem.curves, strict=True)
-        return tuple(misfit > MISFITS * curve.expected.share for misfit, curve in pairs)
-
-    def predict(self, closure: ArrayLike) -> Any:
-        """Normal stress (Pa) at closures (m) counted as in the closure test."""
-        seating = self.parameters["seating"]
-        return self.law.normal_stress(np.asarray(closure, float) + seating)
-
-    def band(self, closure: ArrayLike) -> tuple[Array, Array]:
-        """95 % band (low, high) in Pa of the curve `predict`.
-
-        By the covariance of the parameters alone: the noise of a further point is not in it, nor
-        that rock is not this law, which counts most beyond the largest fitted stress.
-        """
-        settings, u = self.problem.settings, np.atleast_1d(np.asarray(closure, float))
-
-        def model(x: Array) -> Array:
-            values = self.problem.unpack(x)
-            return log_stress(values, values["seating"] + u, settings)
-
-        slope = derivative(model, self.solution.x, *self.problem.bounds())
-        variance = np.einsum("ip,pq,iq->i", slope, self.solution.covariance, slope)
-        centre, reach = model(self.solution.x), self.solution.quantile * np.sqrt(variance)
-        return np.exp(centre - reach), np.exp(centre + reach)
+class Fit(Estimates):
+    """Outcome of `fit_closure` and `fit_curves`: `Estimates`, with words and a picture."""
 
     def report(self) -> str:
         """The fit in words and tables (Markdown)."""
@@ -203,82 +66,108 @@ class Fit:
         lines += [f"- {name}: {reason}" for name, reason in left.items()]
         if self.too_many:
             lines += ["", f"**{TOO_MANY.format(', '.join(self.too_many), self.too_many[0])}**"]
-        lines += [
-            "",
-            "| curve | points | scatter of the stress | of the closure (um) | systematic misfit |",
-            "|---|---|---|---|---|",
-        ]
-        rows = zip(self.problem.curves, self.solution.noise, self.systematic_misfit, strict=True)
-        for k, (curve, noise, misfit) in enumerate(rows, 1):
-            points = (curve.stress if isinstance(curve, ClosureCurve) else curve.shear).size
+        lines += ["", "| curve | points | scatter | of the closure (um) | systematic misfit |"]
+        lines += ["|---|---|---|---|---|"]
+        names = [(one.name, part) for one in self.problem.curves for part in one.series]
+        rows = zip(names, self.solution.noise, self.systematic_misfit, strict=True)
+        for (name, part), noise, misfit in rows:
             lines.append(
-                f"| {k} | {points} | {100 * noise.share:.2g} % | "
+                f"| {name}, {part.what} | {part.points} | {100 * noise.share:.2g} % | "
                 f"{1e6 * noise.absolute:.2g} | {100 * misfit:.2g} % |"
             )
-        lines += self._peaks()
-        differ = [str(k) for k, differs in enumerate(self.shape_differs, 1) if differs]
+        notes = [f"- {one.name}: {note}" for one in self.problem.curves for note in one.notes]
+        lines += ["", "Before the fit:", "", *notes] if notes else []
+        lines += self._peaks() if self.problem.shears else []
+        pairs = zip(names, self.shape_differs, strict=True)
+        differ = [f"{name}, {part.what}" for (name, part), differs in pairs if differs]
         if differ:
-            lines += ["", f"**Curve {', '.join(differ)} has another shape than the law.** {OTHER}"]
+            lines += ["", f"**{'; '.join(differ)} has another shape than the law.** {OTHER}"]
         return "\n".join(lines) + "\n"
 
     def _peaks(self) -> list[str]:
-        """The largest and the last stress of each shear curve, measured and of the law."""
-        head = "| shear curve | largest stress (MPa), at (mm): measured | law | last (MPa) | law |"
-        lines, settings = ["", head, "|---|---|---|---|---|"], self.problem.settings
-        for k, curve in enumerate(self.problem.curves, 1):
-            if isinstance(curve, ShearCurve):
-                law = build_for_shear(self.parameters, settings, curve.azimuth)
-                own = curve.sheared(law, settings.steps)[:2]
-                cells = [
-                    f"{stress[(top := np.argmax(np.abs(stress)))] / 1e6:.4g}, {1e3 * way[top]:.3g}"
-                    for way, stress in ((curve.shear, curve.shear_stress), own)
-                ]
-                ends = [f"{stress[-1] / 1e6:.4g}" for stress in (curve.shear_stress, own[1])]
-                lines.append(f"| {k} | {' | '.join([*cells, *ends])} |")
-        halved = f"Half the step of shear changes these stresses by {100 * self.halved:.2g} %."
-        return [*lines, "", halved] if len(lines) > 3 else []
+        """Peak, last stress and opening of each shear curve, measured and of the law."""
+        head = (
+            "| shear curve | largest stress (MPa), at (mm): measured | law | last (MPa) | law | "
+            "opening at the end (mm) | law |"
+        )
+        lines = ["", head, "|---|---|---|---|---|---|---|"]
+        shears = self.problem.shears
+        for curve, (test, _) in zip(shears, self.predict_shear(*shears), strict=True):
+            both = ((curve.shear, curve.shear_stress, curve.opening), test)
+            tops = [
+                f"{stress[(top := np.argmax(np.abs(stress)))] / 1e6:.4g}, {1e3 * way[top]:.3g}"
+                for way, stress, _ in both
+            ]
+            ends = [f"{stress[-1] / 1e6:.4g}" for _, stress, _ in both]
+            wide = [f"{1e3 * up[-1]:.3g}" if up is not None else "" for _, _, up in both]
+            lines.append(f"| {' | '.join([curve.name, *tops, *ends, *wide])} |")
+        lines += [
+            "",
+            f"Half the step, with finer cells, changes these figures by {100 * self.halved:.2g} %.",
+        ]
+        if self.traded:
+            (least, flat), (most, steep) = self.openings
+            angles = np.degrees(np.arctan([flat, steep]))
+            lines += ["", UNMEASURED.format(1e3 * least, 1e3 * most, *angles)]
+        return lines
 
     @style()
     def plot(
-        self, path: str | Path | None = None, held_out: tuple[Array, Array] | None = None
+        self,
+        path: str | Path | None = None,
+        held_out: tuple[Array, Array] | None = None,
+        predicted: Sequence[ShearCurve] = (),
     ) -> Any:
-        """Draw the points and the law, a closure curve with its band (extra `plot`).
+        """Draw points, law and its 95 % band (extra `plot`): closure, shear stress, opening.
 
-        held_out: stress (Pa) and closure (m) of points of the closure test that were not fitted;
-        they are drawn as open circles.
+        held_out: stress (Pa) and closure (m) of points of the closure test that were not fitted,
+        drawn as open circles; predicted: shear tests that were not fitted, likewise.
         """
-        curves, values, settings = self.problem.curves, self.parameters, self.problem.settings
-        figure, axes = pyplot().subplots(
-            1, len(curves), figsize=(5 * len(curves) + 1, 4.4), layout="constrained", squeeze=False
-        )
-        for axis, curve in zip(axes.flat, curves, strict=True):
-            if isinstance(curve, ClosureCurve):
-                x, measured, what = curve.closure, curve.stress, "closure since the test began"
-                u = np.linspace(x.min(), x.max() if held_out is None else held_out[1].max(), 100)
-                low, high = self.band(u)
-                axis.fill_between(
-                    1e6 * u,
-                    low / 1e6,
-                    high / 1e6,
-                    color="C1",
-                    alpha=0.25,
-                    label="95 % band of the law",
-                )
-                if held_out is not None:
-                    held = 1e6 * held_out[1], held_out[0] / 1e6
-                    axis.plot(*held, "oC0", mfc="w", ms=4, label="measured, not fitted")
-                u = x if curve.cycle else u
-                law = np.exp(log_stress(values, values["seating"] + u, settings))
-            else:
-                x, measured = curve.shear, curve.shear_stress
-                what = f"shear at {curve.normal / 1e6:.3g} MPa"
-                found = build_for_shear(values, settings, curve.azimuth)
-                u, law, _ = curve.sheared(found, settings.steps)
-            axis.plot(1e6 * u, law / 1e6, color="C1", label="law")
-            axis.plot(1e6 * x, measured / 1e6, "oC0", ms=4, label="measured")
-            axis.set(xlabel=f"{what} (µm)", ylabel="stress (MPa)")
-            axis.legend()
+        closure, shears = self.problem.closure, [*self.problem.shears, *predicted]
+        panels = (closure is not None) + 2 * bool(shears)
+        figure, axes = pyplot().subplots(1, panels, figsize=(4.6 * panels + 1, 4.4), squeeze=False)
+        if closure is not None:
+            self._draw_closure(axes[0, 0], closure, held_out)
+        for k, (curve, (test, _)) in enumerate(
+            zip(shears, self.predict_shear(*shears), strict=True)
+        ):
+            fitted, bands = k < len(self.problem.shears), self.shear_band(curve)
+            dots = {"color": f"C{k}", "ls": "none", "marker": "o", "mfc": None if fitted else "w"}
+            columns = (curve.shear_stress, 1e-6), (curve.opening, 1e3)
+            for axis, (points, scale), law, low, high in zip(
+                axes[0, -2:], columns, test[1:], bands[0][1:], bands[1][1:], strict=True
+            ):
+                way = 1e3 * test.way
+                axis.fill_between(way, scale * low, scale * high, color=f"C{k}", alpha=0.2, lw=0)
+                axis.plot(way, scale * law, color=f"C{k}")
+                if points is not None:
+                    axis.plot(1e3 * curve.shear, scale * points, **dots)
+            axes[0, -2].plot([], [], label=curve.name + ("" if fitted else ", predicted"), **dots)
+        if shears:
+            axes[0, -2].set(xlabel="shear displacement (mm)", ylabel="shear stress (MPa)")
+            axes[0, -1].set(xlabel="shear displacement (mm)", ylabel="opening (mm)")
+            figure.legend(*axes[0, -2].get_legend_handles_labels(), loc="outside lower center")
         return written(figure, path)
+
+    def _draw_closure(
+        self, axis: Any, curve: ClosureCurve, held_out: tuple[Array, Array] | None
+    ) -> None:
+        """The closure test, the law and its band."""
+        x = curve.closure
+        u = np.linspace(x.min(), x.max() if held_out is None else held_out[1].max(), 100)
+        low, high = self.band(u)
+        label = "95 % band of the law"
+        axis.fill_between(1e6 * u, low / 1e6, high / 1e6, color="C1", alpha=0.25, label=label)
+        if held_out is not None:
+            held = 1e6 * held_out[1], held_out[0] / 1e6
+            axis.plot(*held, "oC0", mfc="w", ms=4, label="measured, not fitted")
+        u = x if curve.cycle else u
+        values = self.parameters
+        law = np.exp(log_stress(values, values["seating"] + u, self.problem.settings))
+        axis.plot(1e6 * u, law / 1e6, color="C1", label="law")
+        axis.plot(1e6 * x, curve.stress / 1e6, "oC0", ms=4, label="measured")
+        axis.set(xlabel="closure since the test began (µm)", ylabel="normal stress (MPa)")
+        axis.legend()
 
 
 def fit_closure(
@@ -343,13 +232,17 @@ def fit_curves(
 
     Returns a `Fit`. Raises ValueError naming the parameter when something does not fit.
     """
-    problem = pose(curves, free, fixed, law, priors)
+    bar = iter(track(count(), "fit, laws tried"))
+    problem = replace(pose(curves, free, fixed, law, priors), tick=partial(next, bar))
     starts = staged(problem, starting_points(problem, near=law is not None))
     for _ in range(HALVINGS):
-        solution, settings = solve(problem, starts), problem.settings
-        finer = replace(problem, settings=replace(settings, steps=2 * settings.steps))
-        halved = float(np.max(np.abs(finer.data(solution.x) - problem.data(solution.x))))
+        solution, steps = solve(problem, starts), problem.settings.steps
+        finer = replace(problem, settings=replace(problem.settings, steps=2 * steps))
+        change = finer.data(solution.x) - problem.data(solution.x)
+        halved = float(np.max(np.abs(change)))
         if halved < HALVED:
             break
         problem, starts = finer, [solution.x]
-    return Fit(problem, solution, halved)
+    # what is left of an error that falls with the steps is up to twice the change by half of them
+    moved = 2 * solution.gain @ change
+    return Fit(replace(problem, tick=silent), solution, halved, moved)

@@ -29,7 +29,7 @@ DEFAULT = JointLaw(
     heights=GammaHeights(alpha=3.7, beta=1e-5, formation="individual"),
     asperity_density=1e6,
 )
-STEPS = 40  # that shear a joint to begin with; a fit halves them while that matters
+STEPS = 30  # that shear a joint to begin with; a fit halves them while that matters
 
 
 @dataclass(frozen=True)

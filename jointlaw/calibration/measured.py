@@ -1,45 +1,35 @@
 """Measured curves, each with the noise it is expected to carry and what the law says of it."""
 
-from dataclasses import dataclass, field
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..laboratory.experiments import direct_shear
 from ..laws.joint_law import JointLaw
+from ..parameters.resolution import Resolution
 from ..support.checks import Array, at_least, finite, more_than, number
 from .forward import STEPS, Settings, build_for_shear, log_stress
+from .noise import Noise, Series
 from .priors import Values
+from .shearing import Sheared, shear_all
 
 STRESS_NOISE = 0.01  # of the stress: a load cell with the friction of its loading frame
 CLOSURE_NOISE = 0.005  # of the largest closure: linearity and repeatability of a transducer
 SHEAR_NOISE = 0.02  # of the largest shear stress
-FACTOR = 4.0  # 95 % range of a level about the expected one, either way
-_SD = np.log(FACTOR) / 1.96
-_GRID = np.linspace(-3.2, 3.2, 33)
+OPENING_NOISE = 0.03  # of the largest opening: a gauge beside a joint that tilts a little
+CELLS = Resolution(10, 10, 24)  # with `STEPS`: shear stress within 0.2 % of finer ones
+MOST_FINER = 4  # times STEPS: from there on the steps alone grow
 FINEST = 0.002  # of the whole way: the first step of shear, and the first after a turn
 _TURN = 0.2  # of the stress at a peak: what falls or rises less is scatter
-_FOOT = 0.05  # of the largest stress: likewise, where the stress is small
-
-
-class Noise(NamedTuple):
-    """How noisy a measured curve is: two levels, estimated from the scatter about the fit.
-
-    The variance of a residual is share^2 + (absolute * steepness)^2. `share` is the error of the
-    measured stress relative to its scale, `absolute` that of the closure (m), which `steepness`
-    (1/m) turns into one of stress; a curve without a steepness has the first alone. Levels that
-    are `known` are not estimated.
-    """
-
-    share: float
-    absolute: float = 0.0
-    known: bool = False
-
-    def sigma(self, steepness: Array) -> Array:
-        """Standard errors at points of this steepness."""
-        return np.hypot(self.share, self.absolute * steepness)
+_FOOT = 0.02  # of the largest stress: likewise, where the stress is small
+_SLACK = 0.002  # of the largest stress: what is less is none
+_BACK = 0.02  # of the largest shear displacement: what goes back less is scatter
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +48,11 @@ class ClosureCurve:
         a law with a yield_interference has a loop to fit to them.
     compliance: of rock and machine, whose strain the test measured too: closure per stress (m/Pa).
         It is subtracted from `closure` first; 0 where the closure is that of the joint alone.
+    name, notes: of the test in reports, and what was done to its record before.
 
-    `seating`, the closure (m) of the law where that of the test is zero, is known of a test that
-    begins at zero stress; it is None of any other, and fitted.
+    `seating`, the closure (m) of the law where that of the test is zero, is known of a test whose
+    first row has zero stress; it is None of any other, and fitted. Several such rows are slack:
+    they are left out, and no one knows where touch began.
 
     Raises ValueError for arrays that do not fit, fewer than four points, a branch that unloads
     without `cycle`, cycles that never unload, or a compliance larger than the curve.
@@ -71,15 +63,21 @@ class ClosureCurve:
     noise: float | None = None
     cycle: bool = False
     compliance: float = 0.0
+    name: str = "closure"
+    notes: tuple[str, ...] = ()
     seating: float | None = field(init=False)
-    expected: Noise = field(init=False, repr=False)
-    steepness: Array = field(init=False, repr=False)
+    series: tuple[Series, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
-        stress, closure = _pair(stress=self.stress, closure=self.closure)
+        stress, closure = _equally_long(stress=self.stress, closure=self.closure)
         if (stress < 0).any():
             raise ValueError(f"stress = {stress.min():g} Pa is out of bounds: it must be >= 0")
+        slack = int(np.argmax(stress > _SLACK * stress.max()))
+        if slack > 1:
+            told = f"{slack} rows before any load are slack of {np.ptp(closure[:slack]):.3g} m"
+            set_(self, "notes", (*self.notes, f"{told}: they are not fitted"))
+            stress, closure = stress[slack:], closure[slack:]
         turns = turning_points(stress)
         top = turns[1]
         strain = at_least("compliance", self.compliance, 0.0) * stress
@@ -113,11 +111,10 @@ class ClosureCurve:
             branch = slice(start, end + 1)
             steep[branch] = _steepness(closure[branch], stress[branch])
         share = stress / np.max(stress) if self.cycle else 1.0  # as `residuals` are
-        set_(self, "steepness", share * steep)
-        expected = Noise(STRESS_NOISE, CLOSURE_NOISE * float(np.ptp(closure)))
-        if self.noise is not None:
-            expected = Noise(more_than("noise", self.noise, 0.0), 0.0, known=True)
-        set_(self, "expected", expected)
+        expected = _expected("noise", self.noise, STRESS_NOISE)
+        if not expected.known:
+            expected = Noise(STRESS_NOISE, CLOSURE_NOISE * float(np.ptp(closure)))
+        set_(self, "series", (Series("stress", expected, share * steep, steep.size),))
 
     def residuals(self, values: Values, settings: Settings) -> Array:
         """ln(model/measured), (n,); over cycles (model - measured)/largest measured.
@@ -132,111 +129,174 @@ class ClosureCurve:
 
 @dataclass(frozen=True, eq=False)
 class ShearCurve:
-    """Direct shear at constant normal stress: shear stress against shear displacement.
+    """Direct shear at given normal stresses: shear stress, and opening, against displacement.
 
     Parameters
     ----------
     shear: shear displacement in m, (n,), from zero; it may turn round.
     shear_stress: in Pa, (n,), not all zero.
-    normal: normal stress in Pa, > 0.
+    normal: normal stress in Pa, > 0: one of the whole test, or that of each point, (n,).
     azimuth: direction of shear in rad, from axis 2 of the law.
     noise: standard error as a share of the largest shear stress, taken as known; None expects 2 %
         and estimates the level from the scatter.
+    opening: normal displacement in m, (n,), from where shear began, opening positive; None where
+        it was not measured. Then shear stress alone cannot tell friction from dilation.
+    opening_noise: as `noise`, of the largest opening; None expects 3 %.
+    name, notes: of the test in reports, and what was done to its record before.
     """
 
     shear: Array
     shear_stress: Array
-    normal: float
+    normal: float | Array
     azimuth: float = 0.0
     noise: float | None = None
-    expected: Noise = field(init=False, repr=False)
-    steepness: Array = field(init=False, repr=False)
+    opening: Array | None = None
+    opening_noise: float | None = None
+    name: str = "shear"
+    notes: tuple[str, ...] = ()
+    series: tuple[Series, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
-        shear, stress = _pair(shear=self.shear, shear_stress=self.shear_stress)
-        if shear.size < 3 or not np.ptp(shear) > 0:
-            raise ValueError(f"shear has {shear.size} points: at least 3 that move are needed")
-        if not stress.any():
+        columns: dict[str, ArrayLike] = {"shear": self.shear, "shear_stress": self.shear_stress}
+        if not isinstance(self.normal, float | int):
+            columns["normal"] = self.normal
+        if self.opening is not None:
+            columns["opening"] = self.opening
+        for name, values in zip(columns, _equally_long(**columns), strict=True):
+            set_(self, name, values)
+        if self.shear.size < 3 or not np.ptp(self.shear) > 0:
+            raise ValueError(f"shear has {self.shear.size} points: at least 3 that move are needed")
+        if not self.shear_stress.any():
             raise ValueError("shear_stress is zero throughout: there is no strength to fit")
-        set_(self, "shear", shear)
-        set_(self, "shear_stress", stress)
-        set_(self, "normal", more_than("normal", self.normal, 0.0))
+        lowest = more_than("normal", float(np.min(self.normal)), 0.0)
+        if "normal" not in columns:
+            set_(self, "normal", lowest)
         set_(self, "azimuth", number("azimuth", self.azimuth))
-        known = self.noise is not None
-        share = more_than("noise", self.noise, 0.0) if known else SHEAR_NOISE
-        set_(self, "expected", Noise(share, 0.0, known))
-        set_(self, "steepness", np.zeros(shear.size + 1))  # the displacement is taken as exact
+        # the displacement is taken as exact; the last residual of the stress is that of the peak
+        n, expected = self.shear.size, _expected("noise", self.noise, SHEAR_NOISE)
+        series = [Series("stress", expected, np.zeros(n + 1), n)]
+        if self.opening is not None:
+            if not self.opening.any():
+                raise ValueError("opening is zero throughout: leave it out if it was not measured")
+            expected = _expected("opening_noise", self.opening_noise, OPENING_NOISE)
+            series.append(Series("opening", expected, np.zeros(n), n))
+        set_(self, "series", tuple(series))
 
-    def sheared(self, law: JointLaw, steps: int = STEPS) -> tuple[Array, Array, NDArray[np.intp]]:
-        """The test by a law: way (m) and shear stress (Pa), (rows,) each, and the points' rows.
+    @cached_property
+    def turns(self) -> list[int]:
+        """Points where shear turns: the first, those where it does, the last."""
+        way = np.abs(self.shear) > _BACK * np.max(np.abs(self.shear))
+        sense = np.sign(self.shear[int(np.argmax(way))])
+        return [*turning_points(sense * self.shear, 0.0, _BACK)[:-1], self.shear.size - 1]
+
+    def path(self, steps: int) -> tuple[Array, Array, NDArray[np.intp]]:
+        """Displacement (m) and normal stress (Pa) to take a joint through, (rows,), and the rows of
+        the points (n,).
 
         Every step ends at a point or within the interval between two. The steps grow with the
         distance from where shear began or turned: `steps` of them, the shortest `FINEST` of the
-        whole way, take the joint that far.
+        whole way, take the joint that far. Scatter of the displacement is no way: a point behind
+        those before it is taken where they are.
         """
-        grid = float(np.sum(np.abs(np.diff(self.shear)))) * np.geomspace(FINEST, 1.0, steps)
-        path, rows, start = [0.0], [], 0.0
-        turns = np.flatnonzero(np.diff(np.sign(np.diff(self.shear, prepend=0.0)))) + 1
-        for leg in np.split(self.shear, turns):
-            sense, points = np.sign(leg[-1] - start), np.abs(leg - start)
+        normal = np.broadcast_to(self.normal, self.shear.shape)
+        whole = float(np.sum(np.abs(np.diff(self.shear[self.turns], prepend=0.0))))
+        grid = whole * np.geomspace(FINEST, 1.0, steps)
+        ways, stresses, rows, start, first = [np.zeros(1)], [normal[:1]], list[int](), 0.0, 0
+        for end in self.turns[1:]:
+            leg = slice(first, end + 1)
+            sense = np.sign(self.shear[end] - start)
+            points = np.maximum.accumulate(np.maximum(sense * (self.shear[leg] - start), 0.0))
             way = np.unique(np.concatenate([grid[grid < points[-1]], points]))
-            rows += (len(path) + np.searchsorted(way, points)).tolist()
-            path += (start + sense * way).tolist()
-            start = path[-1]
-        record = direct_shear(law.joint(), path[1:], self.normal, azimuth=self.azimuth, steps=1)
-        return record.shear, record.shear_stress, np.array(rows)
+            rows += (sum(map(len, ways)) + np.searchsorted(way, points)).tolist()
+            ways.append(start + sense * way)
+            stresses.append(np.interp(way, [0.0, *points], [stresses[-1][-1], *normal[leg]]))
+            start, first = float(ways[-1][-1]), end + 1
+        return np.concatenate(ways), np.concatenate(stresses), np.array(rows)
 
-    def predict(self, law: JointLaw, steps: int = STEPS) -> Array:
-        """Shear stress (Pa) of a law at the points of this test, (n,); steps: as in `sheared`."""
-        _, stress, rows = self.sheared(law, steps)
-        return stress[rows]
+    def predict(self, law: JointLaw, steps: int = STEPS) -> tuple[Array, Array]:
+        """Shear stress (Pa) and opening (m) of a law of its plane at the points, (n,) each.
 
-    def residuals(self, values: Values, settings: Settings) -> Array:
-        """(model - measured)/largest measured, (n + 1,).
-
-        Last stands how far the law rises above its stress at the largest measured one before the
-        next points on both sides: few points say by it that the peak lies there.
+        steps: as in `path`.
         """
-        law = build_for_shear(values, settings, self.azimuth)
-        _, stress, rows = self.sheared(law, settings.steps)
-        top = int(np.argmax(np.abs(self.shear_stress)))
+        path = self.path(steps)
+        (test,) = shear_all(law, [path])
+        return test.stress[path[2]], test.opening[path[2]]
+
+    def residuals(self, test: Sheared, rows: NDArray[np.intp]) -> list[Array]:
+        """(model - measured)/largest measured, of shear stress (n + 1,) and opening (n,).
+
+        Last of the stress stands how far the law rises above its stress at the largest measured
+        one before the next points on both sides: few points say by it that the peak lies there.
+        """
+        measured, stress = self.shear_stress, test.stress
+        top = int(np.argmax(np.abs(measured)))
         near = stress[rows[max(top - 1, 0)] : rows[min(top + 1, rows.size - 1)] + 1]
-        rise = np.max(np.sign(self.shear_stress[top]) * (near - stress[rows[top]]))
-        misfit = np.append(stress[rows] - self.shear_stress, rise)
-        return np.asarray(misfit / np.max(np.abs(self.shear_stress)))
+        rise = np.max(np.sign(measured[top]) * (near - stress[rows[top]]))
+        found = [np.append(stress[rows] - measured, rise) / np.max(np.abs(measured))]
+        if self.opening is not None:
+            found.append((test.opening[rows] - self.opening) / np.max(np.abs(self.opening)))
+        return found
+
+    def thinned(self, most: int) -> ShearCurve:
+        """This test with `most` points or a few more: evenly spaced, the peak, turns and ends."""
+        n, top = self.shear.size, int(np.argmax(np.abs(self.shear_stress)))
+        if n <= most:
+            return self
+        even = np.linspace(0, n - 1, most).round().astype(int)
+        kept = np.unique([*even, top, *self.turns])
+        told = f"{kept.size} of {n} rows are fitted: evenly spaced ones, the peak, turns and ends"
+        names = ("shear", "shear_stress", "normal", "opening")
+        columns: dict[str, Any] = {
+            name: np.asarray(values)[kept]
+            for name in names
+            if np.ndim(values := getattr(self, name))
+        }
+        return replace(self, **columns, notes=(*self.notes, told))
+
+
+def _expected(name: str, known: float | None, usual: float) -> Noise:
+    """The noise that is known, or the usual one to begin with."""
+    return Noise(usual) if known is None else Noise(more_than(name, known, 0.0), 0.0, True)
 
 
 def first_loading(stress: ArrayLike, closure: ArrayLike) -> tuple[Array, Array]:
-    """Stress (Pa) and closure (m) of a test, (n,) each, up to where the stress first turns."""
-    s, u = _pair(stress=stress, closure=closure)
-    top = turning_points(s)[1]
-    return s[: top + 1], u[: top + 1]
+    """Stress (Pa) and closure (m) of the rows, (n,) each, in which a test loads for the first time.
+
+    Unloading is left out, and reloading up to the largest stress before.
+    """
+    s, u = _equally_long(stress=stress, closure=closure)
+    turns, first = turning_points(s), np.zeros(s.size, bool)
+    for low, peak in zip(turns[::2], turns[1::2], strict=False):
+        first[low : peak + 1] = s[low : peak + 1] > np.max(s[:low], initial=-np.inf)
+    return s[first], u[first]
 
 
-def turning_points(stress: Array) -> list[int]:
-    """Rows where the stress (Pa, (n,)) turns: the first, peaks and lows in turn, the last extreme.
+def turning_points(values: Array, share: float = _TURN, foot: float = _FOOT) -> list[int]:
+    """Rows where values (n,) that rise first turn: the first, peaks and lows in turn, the last
+    extreme.
 
-    It turns where it falls by a fifth of a peak, and where it rises again by as much.
+    They turn where they fall by this share of a peak and by `foot` of the largest, and where they
+    rise again by as much.
     """
     turns, extreme, sense = [0], 0, 1
-    least = _FOOT * float(np.max(stress))
-    for row, now in enumerate(stress):
-        peak = max(stress[extreme], stress[turns[-1]])
-        if sense * (now - stress[extreme]) > 0:
+    least = foot * float(np.max(np.abs(values)))
+    for row, now in enumerate(values):
+        peak = max(values[extreme], values[turns[-1]])
+        if sense * (now - values[extreme]) > 0:
             extreme = row
-        elif sense * (stress[extreme] - now) > max(_TURN * peak, least):
+        elif sense * (values[extreme] - now) > max(share * peak, least):
             turns.append(extreme)
             extreme, sense = row, -sense
     return [*turns, extreme]
 
 
-def _pair(**given: ArrayLike) -> list[Array]:
-    """Two arrays (n,) of finite numbers."""
+def _equally_long(**given: ArrayLike) -> list[Array]:
+    """Arrays (n,) of finite numbers."""
     arrays = [finite(name, x, "m, Pa; leave such points out") for name, x in given.items()]
-    if arrays[0].ndim != 1 or arrays[0].size == 0 or arrays[0].shape != arrays[1].shape:
+    if arrays[0].ndim != 1 or arrays[0].size == 0 or len({x.shape for x in arrays}) > 1:
         raise ValueError(
-            f"{' and '.join(given)} have shapes {arrays[0].shape} and {arrays[1].shape}: give two "
+            f"{' and '.join(given)} have shapes {', '.join(str(x.shape) for x in arrays)}: give "
             "arrays of one dimension and the same length"
         )
     return arrays
@@ -258,21 +318,23 @@ def _steepness(closure: Array, stress: Array) -> Array:
     return np.abs(slope)
 
 
-def estimate_noise(expected: Noise, residual: Array, leverage: Array, steepness: Array) -> Noise:
-    """Levels that the residuals (n,) of a fit with these leverages (n,) make most likely.
+def sheared(
+    curves: Sequence[ShearCurve], values: Values, settings: Settings
+) -> list[tuple[Sheared, NDArray[np.intp]]]:
+    """Each test by the law of these values, and the rows of its points; cells as fine as steps.
 
-    Both have wide priors from what instruments do, because eight points cannot tell two levels by
-    themselves. Restricted likelihood: a point of leverage h has the residual variance
-    (1 - h) sigma^2.
+    A parameter would take up the error of few cells, degrees of friction, and its interval would
+    not show it.
     """
-    if expected.known:
-        return expected
-    free = np.clip(1 - leverage, 0.02, 1.0)
-    steps = _GRID * _SD
-    share = (expected.share * np.exp(steps))[:, None, None]
-    absolute = (expected.absolute * np.exp(steps))[None, :, None]
-    variance = share**2 + (absolute * steepness) ** 2
-    loss = np.sum(free * np.log(variance) + residual**2 / variance, axis=-1)
-    loss = loss + _GRID[:, None] ** 2 + _GRID[None, :] ** 2
-    i, j = np.unravel_index(int(np.argmin(loss)), loss.shape)
-    return Noise(float(share[i, 0, 0]), float(absolute[0, j, 0]))
+    found: dict[int, tuple[Sheared, NDArray[np.intp]]] = {}
+    finer = min(settings.steps / STEPS, MOST_FINER) ** 0.6
+    for azimuth in {curve.azimuth for curve in curves}:
+        mine = [k for k, curve in enumerate(curves) if curve.azimuth == azimuth]
+        law = build_for_shear(values, settings, azimuth)
+        r = law.resolution
+        pairs = ((r.u, CELLS.u), (r.phi, CELLS.phi), (r.depth, CELLS.depth))
+        cells = Resolution(*(round(finer * max(pair)) for pair in pairs))
+        paths = [curves[k].path(settings.steps) for k in mine]
+        tests = shear_all(replace(law, resolution=cells), paths)
+        found |= {k: (test, path[2]) for k, test, path in zip(mine, tests, paths, strict=True)}
+    return [found[k] for k in range(len(curves))]

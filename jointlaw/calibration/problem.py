@@ -21,7 +21,8 @@ from ..parameters.declared import parameters_of
 from ..parameters.orientation import largest_c
 from ..support.checks import Array, number, one_of
 from .forward import Settings, build, log_stress, parameters
-from .measured import ClosureCurve, Noise, ShearCurve, estimate_noise
+from .measured import ClosureCurve, ShearCurve, sheared
+from .noise import Noise, Series, estimate_noise
 from .priors import TRANSFORMS, Ranges, Values, normal_priors, quantity
 
 Curves = Sequence[ClosureCurve | ShearCurve]
@@ -31,7 +32,12 @@ OF_CLOSURE = ("alpha", "beta", "overlap", "asperity_density", "K", "yield_interf
 # Mating lengths to try, as shares of the longest way sheared: far from the measured one the misfit
 # is flat, and no descent comes back
 LENGTHS = (0.5, 0.15, 0.05, 0.015)
+EXACT, NEAR = 1e-8, 1e-3  # change of a parameter and of the misfit at which a search ends
 Function = Callable[[Array], Array]
+
+
+def silent() -> None:
+    """Nothing, where no one looks on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +52,17 @@ class Problem:
     values: Values
     priors: Mapping[str, tuple[float, float]]
     settings: Settings
+    tick: Callable[[], object] = silent  # called for each law that is tried
+
+    @property
+    def shears(self) -> tuple[ShearCurve, ...]:
+        """The shear curves."""
+        return tuple(curve for curve in self.curves if isinstance(curve, ShearCurve))
+
+    @property
+    def series(self) -> tuple[Series, ...]:
+        """What was measured, the curves one after the other."""
+        return tuple(one for curve in self.curves for one in curve.series)
 
     @property
     def closure(self) -> ClosureCurve | None:
@@ -90,9 +107,16 @@ class Problem:
         return low, high
 
     def data(self, x: Array) -> Array:
-        """Residuals of all curves, one after the other."""
-        values = self.unpack(x)
-        return np.concatenate([curve.residuals(values, self.settings) for curve in self.curves])
+        """Residuals of all series, one after the other."""
+        self.tick()
+        values, found = self.unpack(x), list[Array]()
+        tests = iter(sheared(self.shears, values, self.settings))
+        for curve in self.curves:
+            if isinstance(curve, ShearCurve):
+                found += curve.residuals(*next(tests))
+            else:
+                found.append(curve.residuals(values, self.settings))
+        return np.concatenate(found)
 
     def prior(self, x: Array) -> Array:
         """Residuals of the priors."""
@@ -107,13 +131,13 @@ class Problem:
         return np.concatenate([self.data(x) / sigma, self.prior(x)])
 
     def split(self, residuals: Array) -> list[Array]:
-        """Residuals of the data, or what goes with each of them, by curve."""
-        return np.split(residuals, np.cumsum([curve.steepness.size for curve in self.curves])[:-1])
+        """Residuals of the data, or what goes with each of them, by series."""
+        return np.split(residuals, np.cumsum([one.steepness.size for one in self.series])[:-1])
 
     def sigma(self, noise: Sequence[Noise]) -> Array:
-        """Standard errors of all residuals at these noises of the curves."""
-        pairs = zip(noise, self.curves, strict=True)
-        return np.concatenate([n.sigma(curve.steepness) for n, curve in pairs])
+        """Standard errors of all residuals at these noises of the series."""
+        pairs = zip(noise, self.series, strict=True)
+        return np.concatenate([n.sigma(one.steepness) for n, one in pairs])
 
 
 def pose(
@@ -158,12 +182,12 @@ def pose(
 def _within(name: str, curves: Curves) -> float:
     """Where a parameter starts that is infinite by default: at half of what the tests reach."""
     closed = [float(np.ptp(one.closure)) for one in curves if isinstance(one, ClosureCurve)]
-    sheared = [one for one in curves if isinstance(one, ShearCurve)]
-    reach = [float(np.ptp(one.shear)) for one in sheared]
+    shears = [one for one in curves if isinstance(one, ShearCurve)]
+    reach = [float(np.ptp(one.shear)) for one in shears]
     if name == "slope_wear":
         reach = [
             float(np.max(np.abs(one.shear_stress)) * np.sum(np.abs(np.diff(one.shear))))
-            for one in sheared
+            for one in shears
         ]
     return 0.5 * max(closed if name == "yield_interference" and closed else reach or closed)
 
@@ -193,8 +217,7 @@ def staged(problem: Problem, starts: list[Array]) -> list[Array]:
     The closure curves place what acts on them, then the shear curves the rest. Kept as they are are
     starts for closure alone, and a single start without a mating length to find.
     """
-    shears = tuple(curve for curve in problem.curves if isinstance(curve, ShearCurve))
-    closure = problem.closure
+    shears, closure = problem.shears, problem.closure
     finds_length = "mating_length" in problem.free
     if not shears or (len(starts) == 1 and not finds_length):
         return starts
@@ -213,8 +236,8 @@ def staged(problem: Problem, starts: list[Array]) -> list[Array]:
 
 def _best(problem: Problem, starts: Sequence[dict[str, float]]) -> dict[str, float]:
     """The values of least misfit that are found from these, at the noise that is expected."""
-    sigma = problem.sigma([curve.expected for curve in problem.curves])
-    return problem.unpack(least(problem, sigma, [problem.pack(v) for v in starts]))
+    sigma = problem.sigma([one.expected for one in problem.series])
+    return problem.unpack(least(problem, sigma, [problem.pack(v) for v in starts], NEAR))
 
 
 # ------------------------------------------------------------------------- the solution
@@ -226,9 +249,10 @@ class Solution(NamedTuple):
     x: Array
     information: Array  # (p, p) of the data, and that the parameters lie within their bounds
     covariance: Array  # (p, p)
-    noise: tuple[Noise, ...]  # per curve
+    noise: tuple[Noise, ...]  # per series
     freedom: float  # degrees of freedom that the noise was estimated with
     prior_share: Array  # (p,) share of each variance that the priors contribute
+    gain: Array  # (p, n) change of the parameters with the residuals
 
     @property
     def quantile(self) -> float:
@@ -245,8 +269,8 @@ def solve(problem: Problem, starts: Sequence[Array]) -> Solution:
     diagonals of C L C and C. D includes that a parameter lies within its bounds, as a standard
     error of their distance: what nothing else fixes is then wide open, and C exists.
     """
-    expected = tuple(curve.expected for curve in problem.curves)
-    steepness = [curve.steepness for curve in problem.curves]
+    expected = tuple(one.expected for one in problem.series)
+    steepness = [one.steepness for one in problem.series]
     bounds = problem.bounds()
     noise, sigma = expected, problem.sigma(expected)
     x = least(problem, sigma, starts)
@@ -269,17 +293,21 @@ def solve(problem: Problem, starts: Sequence[Array]) -> Solution:
     known = all(n.known for n in noise)
     freedom = np.inf if known else NOISE_WEIGHT + r.size - float(np.sum(leverage))
     share = np.diag(C @ precision @ C) / np.diag(C)
-    return Solution(x, information, np.asarray(C, np.float64), noise, freedom, share)
+    gain = C @ (weighted / sigma[:, None]).T
+    return Solution(x, information, np.asarray(C, np.float64), noise, freedom, share, gain)
 
 
-def least(problem: Problem, sigma: Array, starts: Sequence[Array]) -> Array:
+def least(
+    problem: Problem, sigma: Array, starts: Sequence[Array], tolerance: float = EXACT
+) -> Array:
     """The vector (p,) of the least sum of squares that is found from these starts."""
     low, high = problem.bounds()
     margin = 1e-9 * (high - low)
     fits = [
         least_squares(
             partial(problem.residuals, sigma=sigma), np.clip(x, low + margin, high - margin),
-            bounds=(low, high), method="dogbox", x_scale="jac", xtol=1e-9,
+            bounds=(low, high), method="dogbox", x_scale="jac",
+            xtol=tolerance, ftol=tolerance,
         )
         for x in starts
     ]  # fmt: skip

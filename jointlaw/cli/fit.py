@@ -9,14 +9,16 @@ import numpy as np
 
 from .. import presets
 from ..calibration import datasets
-from ..calibration.fit import fit_curves
+from ..calibration.envelopes import FORMS, envelope, peak_and_last
+from ..calibration.fit import Fit, fit_curves
 from ..calibration.measured import ClosureCurve, ShearCurve, first_loading
 from ..parameters.rock import require_rock
-from ..support.checks import Array
+from ..support.checks import Array, one_of
 from ..support.text_numbers import DECIMAL
 from .command import Written, add_command, add_out, in_unit, several, write_results
 
 MOST = 60  # points of a shear test that are fitted: a logger writes thousands, each costs a step
+SAME = 0.02  # of a normal stress: tests that --fit names
 NEEDS = {  # what an option is about, where no such test is given
     "data": (
         "a closure test: name its file before --shear",
@@ -24,9 +26,10 @@ NEEDS = {  # what an option is about, where no such test is given
     ),
     "shear": (
         "direct shear tests: name their files after --shear",
-        ("shear_column", "shear_stress_column", "normal_column", "normal_stress"),
+        ("shear_column", "shear_stress_column", "normal_column", "opening_column", "area", "side",
+         "normal_stress"),
     ),
-}
+}  # fmt: skip
 
 
 def add(commands: Any) -> None:
@@ -43,13 +46,22 @@ def add(commands: Any) -> None:
         nargs="+",
         metavar="CSV",
         default=[],
-        help="direct shear tests, one a file, at a constant normal stress that is in a column of "
-        "the file or after --normal-stress. One law is fitted to all of them and to the closure "
-        "test, if one is given before; this takes half a minute to some minutes",
+        help="direct shear tests, several to a file or one, as CSV or XLSX. Their normal stress is "
+        "in a column or after --normal-stress. One law is fitted to all of them and to the closure "
+        "test, if one is given before",
+    )
+    add(
+        "--peaks",
+        metavar="CSV",
+        help="a table with one shear test a row: normal_stress, peak_shear_stress, "
+        "peak_displacement, residual_shear_stress, residual_displacement, with units",
     )
     add("--shear-column", help="name and unit of that column, such as us:mm")
     add("--shear-stress-column", help="name and unit of that column: tau:MPa")
     add("--normal-column", help="name and unit of that column: sn:MPa")
+    add("--opening-column", help="name and unit of that column, opening positive: dn:mm")
+    add("--area", type=in_unit("m2", positive=True), help="that forces act on: 100cm2")
+    add("--side", type=in_unit("m", positive=True), help="of an area that slip makes smaller: 10cm")
     add(
         "--normal-stress",
         metavar="STRESSES",
@@ -60,6 +72,17 @@ def add(commands: Any) -> None:
         "--decimal",
         choices=tuple(DECIMAL),
         help="the decimal mark of files whose numbers do not show it, as 1,201 and 1.201 do not",
+    )
+    add(
+        "--outliers",
+        choices=("skip", "keep"),
+        help="what to do with rows that may be no measurement; they are named first",
+    )
+    add(
+        "--fit",
+        metavar="STRESSES",
+        type=several("Pa", positive=True),
+        help="fit the shear tests at these normal stresses, predict the others: 1MPa,3MPa,5MPa",
     )
     add("--up-to", type=in_unit("Pa"), help="fit up to this stress, predict the rest: 5.3MPa")
     add("--cycle", action="store_true", help="fit unloading too, and with it yield_interference")
@@ -95,7 +118,8 @@ def _compliance(text: str) -> float:
 
 
 def _run(options: argparse.Namespace) -> None:
-    if len(options.data) > 1 or not (options.data or options.shear):
+    shears = [*options.shear, *([options.peaks] if options.peaks else [])]
+    if len(options.data) > 1 or not (options.data or shears):
         raise ValueError(
             f"{len(options.data)} closure files: give one, or none and shear tests after --shear"
         )
@@ -103,14 +127,15 @@ def _run(options: argparse.Namespace) -> None:
         for name in names:
             if getattr(options, name) and not getattr(options, tests):
                 raise ValueError(f"--{name.replace('_', '-')} is about {about}, or leave it out")
-    keywords = _keywords(options)
-    curves: list[ClosureCurve | ShearCurve] = []
+    keywords = _keywords(options, bool(shears))
+    closures: list[ClosureCurve] = []
     held: tuple[Array, Array] | None = None
     if options.data:
         curve, held = _closure_curve(options)
-        curves.append(curve)
-    fit = fit_curves([*curves, *_shear_curves(options)], **keywords)
-    name = ", ".join(Path(item).name for item in [*options.data, *options.shear])
+        closures.append(curve)
+    fitted, predicted = _shear_curves(options)
+    fit = fit_curves([*closures, *fitted], **keywords)
+    name = ", ".join(Path(item).name for item in [*options.data, *shears])
     require_rock(fit.parameters, f"{name}: the fitted ")
     text = fit.report()
     summary: dict[str, Any] = {
@@ -128,9 +153,11 @@ def _run(options: argparse.Namespace) -> None:
             f"{100 * error[-1]:+.1f} % at the largest, {held[0][-1] / 1e6:.4g} MPa, and by "
             f"{100 * np.sqrt(np.mean(error**2)):.1f} % (rms) over all of them.\n"
         )
+    if predicted:
+        text += _misses(fit, fitted, predicted)
     print(text)
     files: Written = {
-        "fit.png": partial(fit.plot, held_out=held),
+        "fit.png": partial(fit.plot, held_out=held, predicted=predicted),
         "law.toml": fit.law.to_toml,
         "report.md": text,
     }
@@ -141,46 +168,84 @@ def _closure_curve(
     options: argparse.Namespace,
 ) -> tuple[ClosureCurve, tuple[Array, Array] | None]:
     """The closure curve to fit; with it stress (Pa) and closure (m) of points held out, or None."""
-    item, compliance = options.data[0], options.compliance
-    if item in datasets.names() and not Path(item).exists():
-        stress, closure = datasets.load(item)
-    else:
+    item, compliance, notes = options.data[0], options.compliance, list[str]()
+    if Path(item).exists():
         columns = options.stress_column, options.closure_column
-        stress, closure = datasets.read_closure(item, *columns, options.decimal)
+        stress, closure, notes = datasets.read_closure(
+            item, *columns, options.decimal, options.outliers
+        )
+    else:
+        one_of("the closure test, no file and as data set,", item, tuple(datasets.names()))
+        stress, closure = datasets.load(item)
+    rows = stress.size
     if not options.cycle:
         stress, closure = first_loading(stress, closure)
+        if stress.size < rows:
+            told = f"{rows - stress.size} of {rows} rows unload or load again up to where they were"
+            notes.append(f"{told}: --cycle fits them")
     if options.up_to and options.cycle:
         raise ValueError("--cycle fits all points: leave --up-to out")
     seen = stress <= (options.up_to or np.inf)
-    curve = ClosureCurve(stress[seen], closure[seen], options.noise, options.cycle, compliance)
+    curve = ClosureCurve(
+        stress[seen], closure[seen], options.noise, options.cycle, compliance, item, tuple(notes)
+    )
     held = stress[~seen], closure[~seen] - compliance * stress[~seen]
     return curve, None if seen.all() else held
 
 
-def _shear_curves(options: argparse.Namespace) -> list[ShearCurve]:
-    """The shear curves of all files, thinned to `MOST` points each."""
+def _shear_curves(options: argparse.Namespace) -> tuple[list[ShearCurve], list[ShearCurve]]:
+    """The shear tests to fit, thinned to `MOST` points each, and those to predict."""
     normals = options.normal_stress or [None] * len(options.shear)
     if len(normals) != len(options.shear):
         raise ValueError(
-            f"--normal-stress gives {len(normals)} stresses for {len(options.shear)} shear tests: "
-            "give one for each"
+            f"--normal-stress gives {len(normals)} stresses for {len(options.shear)} files of "
+            "shear tests: give one for each"
         )
-    columns = options.shear_column, options.shear_stress_column, options.normal_column
-    curves = []
-    for path, normal in zip(options.shear, normals, strict=True):
-        test = datasets.read_shear(path, *columns, normal, options.decimal)
-        n = test.shear.size
-        kept = np.unique(np.linspace(0, n - 1, min(n, MOST)).round().astype(int))
-        curves.append(ShearCurve(test.shear[kept], test.shear_stress[kept], test.normal))
-    return curves
+    how = {name: getattr(options, name) for name in ("decimal", "outliers", "area", "side")}
+    for name, option in (("shear", "shear"), ("stress", "shear_stress"), ("normal", "normal"),
+                         ("opening", "opening")):  # fmt: skip
+        how[name] = getattr(options, f"{option}_column")
+    tests = [
+        test.thinned(MOST)
+        for path, normal in zip(options.shear, normals, strict=True)
+        for test in datasets.read_shear(path, normal_stress=normal, **how)
+    ]
+    tests += datasets.read_peaks(options.peaks, options.decimal) if options.peaks else []
+    if options.fit is None:
+        return tests, []
+    given = [float(np.mean(test.normal)) for test in tests]
+    fit = [any(abs(at - one) <= SAME * one for one in options.fit) for at in given]
+    if sum(fit) < 2 or all(fit):
+        raise ValueError(
+            f"--fit names {sum(fit)} of {len(tests)} shear tests, at "
+            f"{', '.join(f'{at / 1e6:.3g}MPa' for at in given)}: name two or more, and leave one"
+        )
+    pairs = list(zip(tests, fit, strict=True))
+    return [test for test, seen in pairs if seen], [test for test, seen in pairs if not seen]
 
 
-def _keywords(options: argparse.Namespace) -> dict[str, Any]:
+def _misses(fit: Fit, fitted: list[ShearCurve], predicted: list[ShearCurve]) -> str:
+    """How far predictions miss, those of envelopes through the same tests beside (Markdown)."""
+    lines = [
+        "\nTests that were not fitted: errors of the predicted peak and last shear stress.\n",
+        f"| test | peak, last (MPa) | law | {' | '.join(FORMS)} |",
+        f"|---|---|---|{'---|' * len(FORMS)}",
+    ]
+    for curve, (test, _) in zip(predicted, fit.predict_shear(*predicted), strict=True):
+        measured, normal = peak_and_last(curve.shear_stress), float(np.mean(curve.normal))
+        found = [peak_and_last(test.stress), *(envelope(form, fitted, normal) for form in FORMS)]
+        cells = ["{:+.1f}, {:+.1f} %".format(*(100 * (one / measured - 1))) for one in found]
+        told = "{:.4g}, {:.4g}".format(*(measured / 1e6))
+        lines.append(f"| {curve.name} | {told} | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _keywords(options: argparse.Namespace, sheared: bool) -> dict[str, Any]:
     """What `fit_curves` takes besides the curves."""
     free, law = ["asperity_density"], None
     free += ["alpha", "beta"] if options.data else []
     free += ["yield_interference"] if options.cycle else []
-    free += ["mu", "a", "mating_length"] if options.shear else []
+    free += ["mu", "a", "mating_length"] if sheared else []
     if options.free:
         free = [name.strip() for name in options.free.split(",")]
     pairs = (item.partition("=") for item in options.set)

@@ -92,9 +92,10 @@ def _add_common(parser: argparse.ArgumentParser, steps: int) -> None:
     )
     parser.add_argument(
         "--units",
+        metavar="LENGTH,STRESS",
         choices=("m,Pa", "mm,kPa", "mm,MPa", "um,MPa"),
         default="m,Pa",
-        help="of the CSV (default m,Pa)",
+        help="of the CSV: one of m,Pa (default) or mm,kPa or mm,MPa or um,MPa",
     )
     add_out(parser)
 

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from ..laboratory.experiments import PathError
+from ..support.checks import one_of
 from ..support.files import require_free
 from ..support.version import __version__
-from . import export, fit, laboratory, presets, scan
+from . import export, field, fit, laboratory, presets, scan
 
-COMMANDS = (laboratory, presets, export, fit, scan)
+COMMANDS = (laboratory, presets, export, fit, scan, field)
 
 
 class Parser(argparse.ArgumentParser):
@@ -55,4 +56,6 @@ def _read(words: Sequence[str]) -> argparse.Namespace:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for module in COMMANDS:
         module.add(commands)
+    if words and not words[0].startswith("-"):
+        one_of("the command", words[0], tuple(commands.choices))
     return parser.parse_args(words)

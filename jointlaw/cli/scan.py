@@ -64,7 +64,9 @@ def _friction(fit: SurfaceFit, z: Array) -> str:
     for length in (fit.asperities.size, LONGER * fit.asperities.size):
         try:
             one = from_surface(z, fit.spacing, length)
-            cells = [f"{_largest_angle(one, plane):.1f}°" for plane in (0.0, math.pi / 2)]
+            cells = ["not told: the law does not describe this surface, see Z2"] * 2
+            if one.describes:
+                cells = [f"{_largest_angle(one, plane):.1f}°" for plane in (0.0, math.pi / 2)]
         except ValueError as error:
             lines.append(f"| {1e3 * length:.3g} | {error} | | |")
         else:

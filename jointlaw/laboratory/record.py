@@ -26,6 +26,7 @@ UNITS = {
     "stored": "J/m2",
     "dissipated": "J/m2",
 }
+DERIVED = {"shear_stress": "Pa", "opening": "m"}  # of shear, along its azimuth and from its start
 _LENGTHS = ((1e-9, "nm"), (1e-6, "µm"), (1e-3, "mm"), (1.0, "m"))
 _STRESSES = ((1.0, "Pa"), (1e3, "kPa"), (1e6, "MPa"), (1e9, "GPa"))
 _ENERGIES = ((1e-6, "µJ/m²"), (1e-3, "mJ/m²"), (1.0, "J/m²"), (1e3, "kJ/m²"))
@@ -148,13 +149,25 @@ class Record:
     def to_csv(self, path: str | Path, length: str = "m", stress: str = "Pa") -> None:
         """Write the columns as CSV; titles end in the unit, "closure_m", and shares have none.
 
+        A shear test has shear stress, opening, friction and dilation angle besides.
+
         length, stress: units to write, such as "mm" and "MPa"; raises ValueError for others.
         """
         chosen = {"m": length, "Pa": stress}
         factors = {unit: units.parse(f"1{chosen[unit]}", unit) for unit in chosen}
         titles, columns = [], []
-        for name, column in self.columns.items():
-            unit = UNITS[name]
+        derived = (
+            {}
+            if not self._sheared
+            else {
+                "shear_stress": self.shear_stress,
+                "opening": self.closure[0] - self.closure,
+                "friction_angle_deg": self.friction_angle,
+                "dilation_angle_deg": self.dilation_angle,
+            }
+        )
+        for name, column in {**self.columns, **derived}.items():
+            unit = UNITS.get(name, DERIVED.get(name, "1"))
             titles.append(name if unit == "1" else f"{name}_{chosen.get(unit, unit)}")
             columns.append(column / factors.get(unit, 1.0))
         buffer, table = io.StringIO(), np.column_stack(columns)

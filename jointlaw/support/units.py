@@ -3,7 +3,9 @@
 import math
 import re
 
-COMMON = {"Pa": "MPa", "m": "mm", "Pa/m": "GPa/m", "rad": "deg"}  # what laboratories write
+COMMON = {
+    "Pa": "MPa", "m": "mm", "Pa/m": "GPa/m", "rad": "deg", "N": "kN", "m2": "cm2",
+}  # fmt: skip
 _PREFIX = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2, "": 1.0,
            "k": 1e3, "M": 1e6, "G": 1e9}  # fmt: skip
 _STRESSES = {
@@ -15,6 +17,7 @@ _STRESSES = {
     "kN/m²": 1e3,
     "bar": 1e5,
 }
+_AREAS = {"m2": 1.0, "m²": 1.0, "cm2": 1e-4, "cm²": 1e-4, "mm2": 1e-6, "mm²": 1e-6}
 _PATTERN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
 
 
@@ -29,7 +32,8 @@ def parse(text: str, unit: str) -> float:
         factor = 1.0 if suffix == "" else _factor(suffix, unit)
         if factor is not None:
             return value * factor
-    example = {"Pa": "10MPa", "m": "2um", "Pa/m": "5GPa/m", "rad": "30deg"}[unit]
+    example = {"Pa": "10MPa", "m": "2um", "Pa/m": "5GPa/m", "rad": "30deg",
+               "N": "5kN", "m2": "100cm2"}[unit]  # fmt: skip
     raise ValueError(f"{text!r} is not a quantity in {unit}; write a number in {unit} or {example}")
 
 
@@ -59,6 +63,8 @@ def _factor(suffix: str, unit: str) -> float | None:
         top, _, bottom = suffix.partition("/")
         over, under = _factor(top, "Pa"), _factor(bottom, "m")
         return None if over is None or under is None else over / under
+    if unit == "m2":
+        return _AREAS.get(suffix)
     if unit == "Pa" and suffix in _STRESSES:
         return _STRESSES[suffix]
     if not suffix.endswith(unit):

@@ -43,7 +43,7 @@ def extract(z: Array, spacing: float, samples: int) -> Asperities:
 
     Summits within `samples` and two of the rim are left out.
     """
-    z, length = _levelled(z), samples * spacing
+    z, length = levelled(z), samples * spacing
     summits = _summits(z, samples)
     _require_several(len(summits), length)
     quadrants = np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)])
@@ -119,7 +119,7 @@ def _planes(
     return np.stack(gradients), np.stack(misfits), moment
 
 
-def _levelled(z: Array) -> Array:
+def levelled(z: Array) -> Array:
     """Heights above the mean plane."""
     y, x = (np.linspace(-1.0, 1.0, n) for n in z.shape)
     level: Array = z - z.mean()

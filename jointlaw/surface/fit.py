@@ -5,18 +5,21 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..laws.joint_law import JointLaw
 from ..parameters.asperity import Asperity
 from ..parameters.heights import GammaHeights
 from ..parameters.orientation import Orientation
-from ..support.checks import finite, more_than
-from .asperities import Asperities, extract
+from ..support.checks import finite, more_than, numbers
+from .asperities import Asperities, extract, levelled
 from .densities import HEIGHTS, Estimate, fit_directions, fit_heights
+from .roughness import measured_slopes, rms_slope, spikes
 
 SAMPLES = 4  # points along the edge of a facet, by default
 UNITS = {"beta": "m", "overlap": "m", "asperity_density": "1/m2"}
+APART = 0.2  # of the measured rms slope: what that of the law may differ by
+RIDGED = 0.1  # the smaller over the larger rms slope: below it a surface has but one direction
 NOISY = 0.04  # error of a gradient over the median gradient, from which summits get misplaced
 
 
@@ -26,12 +29,15 @@ class SurfaceFit:
 
     estimates: by name, a, b, c, alpha, beta (m), overlap (m) and asperity_density (1/m2);
     asperities: summits and facets, `asperities.size` the sampling length (m), at which alone the
-    parameters hold; spacing: of the points in m.
+    parameters hold; spacing: of the points in m; slopes: rms slopes (Z2) of the whole surface along
+    the rows and across them; spikes: grid indices (n, 2) of points that may be none of the surface.
     """
 
     estimates: dict[str, Estimate]
     asperities: Asperities
     spacing: float
+    slopes: tuple[float, float]
+    spikes: NDArray[np.intp]
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -53,6 +59,18 @@ class SurfaceFit:
         """Gamma heights, Eq. 12; their overlap puts zero closure at the highest summit."""
         alpha, beta, overlap = (self.estimates[name].value for name in HEIGHTS)
         return GammaHeights(alpha, beta, overlap, "individual")
+
+    @property
+    def law_slopes(self) -> tuple[float, float]:
+        """`slopes` as the orientation has them."""
+        return rms_slope(self.orientation), rms_slope(self.orientation, math.pi / 2)
+
+    @property
+    def describes(self) -> bool:
+        """Whether the orientation is that of the surface: known, and its slopes within 20 %."""
+        pairs = zip(self.slopes, self.law_slopes, strict=True)
+        close = all(abs(law - measured) <= APART * measured for measured, law in pairs)
+        return close and not set("abc") & set(self.not_identifiable)
 
     def law(self, asperity: Asperity, **options: Any) -> JointLaw:
         """The law of this surface with these asperity contacts, which no scan knows.
@@ -91,6 +109,23 @@ class SurfaceFit:
             "Rock is rough at every scale: at another sampling length the asperities are others. "
             "Choose the size of the contacts that carry the load, and state it with the result.",
         ]
+        lines += [
+            "",
+            "| rms slope (Z2) | along the rows | across them |",
+            "|---|---|---|",
+            *(
+                f"| {name} | {one[0]:.3g} | {one[1]:.3g} |"
+                for name, one in (("measured", self.slopes), ("of the law", self.law_slopes))
+            ),
+        ]
+        if len(self.spikes):
+            row, column = self.spikes[0]
+            lines += [
+                "",
+                f"Warning: {len(self.spikes)} points are spikes, far above or below all their "
+                f"neighbours (the first in row {row}, column {column}, counted from 0): replace "
+                "them, for example by the median of their neighbours, and scan again.",
+            ]
         if found.slope_noise > NOISY * slope:
             lines += [
                 "",
@@ -119,7 +154,13 @@ def from_surface(z: ArrayLike, spacing: float, sampling_length: float | None = N
     Source: Misra 1999, sections 2.2.1, 2.2.2 and Eq. 12 to 18; summits, facets and estimators are
     described in `asperities` and `densities`.
     """
-    heights = finite("z", z, "m, gaps filled or cut off")
+    gaps = np.argwhere(np.isnan(numbers("z", z, "m")))
+    if len(gaps):
+        raise ValueError(
+            f"z is not finite at {len(gaps)} of its points, the first at {gaps[0].tolist()}: fill "
+            "or cut off points without a height"
+        )
+    heights = finite("z", z, "m")
     spacing = more_than("spacing", spacing, 0.0)
     length = SAMPLES * spacing if sampling_length is None else sampling_length
     ratio = more_than("sampling_length", length, 0.0) / spacing
@@ -136,6 +177,15 @@ def from_surface(z: ArrayLike, spacing: float, sampling_length: float | None = N
             "sampling length of "
             f"{samples} points; a profile has one direction only, see docs/field.md for its JRC"
         )
+    level = levelled(heights)
+    slopes = measured_slopes(level, spacing, samples)
+    if min(slopes) < RIDGED * max(slopes):
+        raise ValueError(
+            f"z has ridges: its rms slope (Z2) is {slopes[0]:.3g} along the rows and "
+            f"{slopes[1]:.3g} across them, and no density of Eq. 14 has such directions. Its "
+            "friction angle along the steeper direction is that of its faces (atan mu) plus their "
+            "inclination"
+        )
     found = extract(heights, spacing, samples)
     estimates = fit_directions(found.slope, found.summit, found.slope_noise)
     estimates |= fit_heights(found.depth)
@@ -143,4 +193,4 @@ def from_surface(z: ArrayLike, spacing: float, sampling_length: float | None = N
     estimates["asperity_density"] = Estimate(
         density, error, density - 1.96 * error, density + 1.96 * error
     )
-    return SurfaceFit(estimates, found, spacing)
+    return SurfaceFit(estimates, found, spacing, slopes, spikes(level))

@@ -50,6 +50,8 @@ def read_scan(path: str | Path, factor: float, spacing: float, decimal: str | No
             f"{path}: its cellsize {cell:g} is {cell * factor:g} m in the unit of the heights, but "
             f"--spacing is {spacing:g} m; correct one, or remove the line cellsize"
         )
+    if z.ndim == 2 and z.shape[1] > _LIST and len(z) > 1 and (np.diff(z[:, 0]) == 1.0).all():
+        raise ValueError(f"{path}: its first column counts the rows; remove it")
     if z.ndim == 2 and z.shape[1] == _LIST and len(z) > _LIST:
         return _grid(path, factor * z, spacing)
     return factor * z

@@ -79,6 +79,16 @@ def test_refused(cycle, capsys, tmp_path, line, told):
     assert not (tmp_path / "o").exists()
 
 
+def test_no_friction_angle_of_a_surface_that_the_law_does_not_describe(tmp_path, capsys):
+    """Waves five times as long along the rows: at both sampling lengths."""
+    z = 400e-6 * gaussian_filter(np.random.default_rng(0).standard_normal((400, 400)), (5, 25))
+    np.save(tmp_path / "z.npy", z)
+    assert main(["scan", "z.npy", "--spacing", "20um", "--height-unit", "m", "--out", "o"]) == 0
+    told = [line for line in capsys.readouterr().out.splitlines() if "not told" in line]
+    assert len(told) == 2
+    assert "°" not in "".join(told)
+
+
 def test_a_scan_needs_only_the_contacts_to_be_a_law(tmp_path, capsys):
     rng = np.random.default_rng(0)
     z = 400e-6 * gaussian_filter(rng.standard_normal((400, 400)), 5)

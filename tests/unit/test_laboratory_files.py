@@ -1,9 +1,13 @@
 """Text files of laboratories: read right, or refused with the option that cures it."""
 
+import re
+
 import numpy as np
 import pytest
 
-from jointlaw.calibration.datasets import load, names, read_closure, read_shear
+from jointlaw.calibration.datasets import load, names, read_closure, read_peaks, read_shear
+from jointlaw.calibration.envelopes import envelope
+from jointlaw.calibration.measured import ClosureCurve, ShearCurve, first_loading
 
 U = np.array([0.0, 0.05, 0.1, 0.2, 0.5, 1.0])  # mm
 TAU = np.array([0.0, 0.875, 1.25, 1.75, 1.625, 1.5])  # MPa
@@ -47,6 +51,19 @@ READ = {  # the file, and what `read_shear` is told of it
         "us [mm]\ttau [kPa]\n"
         + rows(U, ["0", "875", "1,250.0", "1,750", "1,625", "1,500"], mark="\t"), NORMAL,
     ),
+    "lines of a form above the names, a separator that Excel names": (
+        "sep=;\nJoint 7, Grimsel; 12.3.2024\nOperator; A. B.\n\nus;tau;sn\n[mm];[MPa];[MPa]\n"
+        + rows(U, TAU, 0 * U + 2, mark=";"), {},
+    ),
+    "Swiss and French thousands, units in small letters": (
+        "us_mm;tau_kpa;sn [kPa]\n"
+        + rows(U, ["0.0", "875.0", "1'250.0", "1 750.0", "1\u202f625.0", "1’500.0"], 0 * U + 2e3,
+               mark=";"), {},
+    ),
+    "forces on an area that slip makes smaller": (
+        "us [mm],shear force [kN],normal force [kN]\n"
+        + rows(U, 10 * TAU * (1 - U / 100), 20 * (1 - U / 100)), {"area": 0.01, "side": 0.1},
+    ),
     "names and signs of its own": (
         "way,resistance [MPa]\n" + rows(U, -TAU),
         NORMAL | {"shear": "way:mm", "stress": "resistance:-1MPa"},
@@ -54,11 +71,15 @@ READ = {  # the file, and what `read_shear` is told of it
 }  # fmt: skip
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "cp1252"])
 @pytest.mark.parametrize("name", READ)
-def test_read_right(name, tmp_path):
+def test_read_right(name, encoding, tmp_path):
     text, told = READ[name]
-    (tmp_path / "lab.csv").write_text(text, encoding="utf-8", newline="")
-    found = read_shear(tmp_path / "lab.csv", **told)
+    text = (
+        text if encoding != "cp1252" else text.translate({0x2212: "-", 0x202F: "\xa0", 0xFEFF: ""})
+    )
+    (tmp_path / "lab.csv").write_text(text, encoding=encoding, newline="")
+    (found,) = read_shear(tmp_path / "lab.csv", **told)
     assert found.normal == pytest.approx(2e6)
     sense = np.sign(found.shear[-1])
     np.testing.assert_allclose(sense * found.shear, 1e-3 * U, atol=1e-15)
@@ -67,10 +88,143 @@ def test_read_right(name, tmp_path):
 
 def test_closure_is_read_alike(tmp_path):
     (tmp_path / "c.csv").write_text("Disp;sigmaZ\n/mm;/kPa\n" + rows(U, 1e3 * U, mark=";"))
-    stress, closure = read_closure(tmp_path / "c.csv")
+    stress, closure, notes = read_closure(tmp_path / "c.csv")
+    assert not notes
     np.testing.assert_allclose(closure, 1e-3 * U)
     np.testing.assert_allclose(stress, 1e6 * U)
     assert all(load(name)[0].max() > 1e6 for name in names())
+
+
+OPENED = np.array([0.0, -0.01, 0.0, 0.05, 0.15, 0.25])  # mm
+SEVERAL = {  # two tests of one file
+    "below": "\n".join(2 * ["us [mm],tau [MPa],sn [MPa],dn [mm]", rows(U, TAU, 0 * U + 2, OPENED)]),
+    "beside": "\n".join(
+        f"{line},,{line}"
+        for line in ["us [mm],tau [MPa],sn [MPa],dn [mm]", *rows(U, TAU, 0 * U + 2, OPENED).split()]
+    ),
+    "sheets": None,
+}
+
+
+@pytest.mark.parametrize("kind", SEVERAL)
+def test_several_tests_of_one_file(kind, tmp_path):
+    path, text = tmp_path / "lab.csv", SEVERAL[kind]
+    if text is None:
+        book = pytest.importorskip("openpyxl").Workbook()
+        for sheet in (book.active, book.create_sheet("other")):
+            sheet.append(["Joint 7"])
+            sheet.append([])
+            sheet.append(["us [mm]", "tau [MPa]", "sn [MPa]", "dn [mm]"])
+            for row in zip(U, TAU, 0 * U + 2, OPENED, strict=True):
+                sheet.append([float(x) for x in row])
+        book.save(path := tmp_path / "lab.xlsx")
+    else:
+        path.write_text(text)
+    tests = read_shear(path)
+    assert len(tests) == 2
+    for test in tests:
+        np.testing.assert_allclose(test.shear_stress, 1e6 * TAU)
+        np.testing.assert_allclose(test.opening, 1e-3 * OPENED)
+        assert test.normal == 2e6
+
+
+def test_a_table_of_peaks_is_a_test_a_row(tmp_path):
+    """Titles as in a published set of sandstone joints."""
+    path = tmp_path / "peaks.csv"
+    path.write_text(
+        "curve_id,normal_stress_mpa,peak_shear_stress_mpa,peak_shear_displacement_mm,"
+        "final_shear_stress_mpa,final_shear_displacement_mm\n"
+        "JA_1,1.0,1.28,1.937,0.862,9.97\nJA_2,2.0,2.31,2.365,1.775,10.0\n"
+    )
+    one, two = read_peaks(path)
+    np.testing.assert_allclose(two.shear, [0, 2.365e-3, 10e-3])
+    np.testing.assert_allclose(one.shear_stress, [0, 1.28e6, 0.862e6])
+    assert (one.normal, two.normal) == (1e6, 2e6)
+
+
+def test_a_normal_stress_that_varies_is_taken_row_by_row(tmp_path):
+    (tmp_path / "lab.csv").write_text("us [mm],tau [MPa],sn [MPa]\n" + rows(U, TAU, 1 + U))
+    (test,) = read_shear(tmp_path / "lab.csv")
+    np.testing.assert_allclose(test.normal, 1e6 * (1 + U))
+
+
+def test_tare_is_subtracted_and_told(tmp_path):
+    """0.1 MPa that the load cell showed before the test; 1 % is scatter of the first row."""
+    path = tmp_path / "lab.csv"
+    path.write_text("us [mm],tau [MPa]\n" + rows(U, TAU + 0.1))
+    (test,) = read_shear(path, **NORMAL)
+    np.testing.assert_allclose(test.shear_stress, 1e6 * TAU)
+    assert "begins at 5.4 % of its largest value, which is subtracted" in test.notes[0]
+    path.write_text("us [mm],tau [MPa]\n" + rows(U, TAU + 0.01))
+    (test,) = read_shear(path, **NORMAL)
+    np.testing.assert_allclose(test.shear_stress, 1e6 * TAU + 1e4)
+    assert not test.notes
+
+
+LONG = np.linspace(0, 1, 21)  # mm
+ODD = {  # a file with a row that is no measurement, and what is told of it
+    "a sentinel": (rows(range(21), LONG, np.where(LONG == 0.5, -999, 2 * LONG)),
+                   "line 12: tau [MPa] is -999.0"),
+    "a jump": (rows(range(21), LONG, np.where(LONG == 0.5, 4, 2 * LONG)),
+               "line 12: tau [MPa] jumps and returns"),
+    "a jump of the gauge": (rows(range(21), np.where(LONG == 0.5, 3, LONG), 2 * LONG),
+                            "line 12: us [mm] jumps and returns"),
+    "a summary": (rows(range(21), LONG, 2 * LONG) + "\nMax,1,2", "line 23: No is 'Max'"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ODD)
+def test_rows_that_are_no_measurement_are_named_until_an_option_settles_it(kind, tmp_path):
+    text, told = ODD[kind]
+    path = tmp_path / "lab.csv"
+    path.write_text("No,us [mm],tau [MPa]\n" + text)
+    with pytest.raises(ValueError, match=rf"{re.escape(told)}\. .*--outliers skip"):
+        read_shear(path, **NORMAL)
+    (skipped,) = read_shear(path, **NORMAL, outliers="skip")
+    if kind != "a sentinel":
+        (kept,) = read_shear(path, **NORMAL, outliers="keep")
+        assert kept.shear.size == skipped.shear.size + 1
+    np.testing.assert_allclose(skipped.shear_stress, 2e9 * skipped.shear, atol=1e-6)
+    assert told in skipped.notes[0]
+
+
+def test_a_displacement_beside_another_is_asked_for(tmp_path):
+    path = tmp_path / "lab.csv"
+    path.write_text("displacement [mm],way [mm],tau [MPa]\n" + rows(U / 9, U, TAU))
+    with pytest.raises(ValueError, match="which column is the shear displacement"):
+        read_shear(path, **NORMAL)
+
+
+def test_preload_cycles_are_first_loading_where_the_stress_is_new():
+    stress = np.array([0.5, 2, 4, 2, 0.5, 2, 4, 6, 8, 4, 0.5, 4, 8, 10, 5, 1.0])
+    found, at = first_loading(stress, np.arange(16.0))
+    np.testing.assert_array_equal(found, [0.5, 2, 4, 6, 8, 10])
+    np.testing.assert_array_equal(at, [0, 1, 2, 7, 8, 13])
+
+
+def test_slack_before_any_load_is_no_closure():
+    """0.3 mm at zero load; then no one knows where touch began, and the seating is fitted."""
+    stress, closure = np.array([0, 0, 0, 1, 2, 4, 8]), np.array([0, 100, 300, 310, 315, 322, 331])
+    curve = ClosureCurve(1e6 * stress, 1e-6 * closure)
+    assert curve.seating is None
+    np.testing.assert_array_equal(curve.stress, 1e6 * stress[3:])
+    assert "3 rows before any load are slack of 0.0003 m" in curve.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "strength"),
+    [
+        ("Coulomb", lambda s: 0.4e6 + s * np.tan(np.radians(35))),
+        ("Barton", lambda s: s * np.tan(np.radians(30 + 8 * np.log10(60e6 / s)))),
+        ("power law", lambda s: 2e3 * s**0.8),
+    ],
+)
+def test_an_envelope_goes_through_strengths_of_its_own_form(name, strength):
+    stresses = [1e6, 3e6, 5e6]
+    tests = [ShearCurve([0, 1e-3, 1e-2], strength(s) * np.array([0, 1, 0.8]), s) for s in stresses]
+    peak, last = envelope(name, tests, 4e6)
+    assert peak == pytest.approx(strength(4e6), rel=1e-9)
+    assert last == pytest.approx(0.8 * strength(4e6), rel=0.01)  # Barton's form keeps no factor
 
 
 THOUSANDS = "us [mm]\ttau [kPa]\n0.0\t0\n0.1\t875\n0.2\t1,201\n0.3\t1,305\n"
@@ -96,14 +250,14 @@ def test_what_may_be_thousands_is_refused(text, tmp_path):
 def test_decimal_commas_are_read_where_a_number_or_the_caller_shows_them(tmp_path):
     path, text = tmp_path / "lab.csv", "us [mm];tau [MPa]\n0;0\n1,1;1,125\n2,2;1,201\n"
     path.write_text(text)
-    assert read_shear(path, **NORMAL).shear_stress[2] == 1.201e6
+    assert read_shear(path, **NORMAL)[0].shear_stress[2] == 1.201e6
     path.write_text(text.replace("1,1;", "1;").replace("2,2;", "2;"))
-    assert read_shear(path, **NORMAL, decimal="comma").shear_stress[2] == 1.201e6
+    assert read_shear(path, **NORMAL, decimal="comma")[0].shear_stress[2] == 1.201e6
     with pytest.raises(ValueError, match="line 3 holds '1,125'"):
         read_shear(path, **NORMAL)
     for mark, value in (("comma", 1.201e6), ("point", 1201e6)):
         path.write_text("us [mm];tau [MPa]\n0;0\n1;1,200\n2;1,201\n")
-        assert read_shear(path, normal_stress=5e7, decimal=mark).shear_stress[2] == value
+        assert read_shear(path, normal_stress=5e7, decimal=mark)[0].shear_stress[2] == value
 
 
 @pytest.mark.parametrize(
@@ -116,7 +270,7 @@ def test_decimal_commas_are_read_where_a_number_or_the_caller_shows_them(tmp_pat
         ("us [mm],us [mm],tau [MPa]\n1,2,3\n2,3,4\n3,4,5\n", "has 2 columns of one name"),
         ("us [mm],tau [MPa]\n0,0\n1,2\n2,inf\n", "line 4 holds 'inf', which is no number"),
         ("us [mm],tau\n" + rows(U, TAU), 'gives no unit; name it, .* "tau:MPa"'),
-        ("us [mm],tau [mpa]\n" + rows(U, TAU), "has the unit 'mpa', none of Pa"),
+        ("us [mm],tau [psi]\n" + rows(U, TAU), "has the unit 'psi', none of Pa"),
         ("us [mm],tau [MPa]\n" + rows(U, TAU, decimal=","), "has 4 cells .* columns by semicolons"),
         ("us [mm];tau [MPa]\n1;2;3\n2;3;4\n", "has 3 cells under 2 names; give each column a name"),
         ("us [mm],tau [MPa]\n" + rows(U, -TAU), 'turn its sign: .* "tau:-1MPa"'),

@@ -76,10 +76,13 @@ def test_csv_round_trip(tmp_path):
     record = analytic(0.3)
     record.to_csv(tmp_path / "r.csv")
     table = np.genfromtxt(tmp_path / "r.csv", delimiter=",", names=True)
-    assert table.dtype.names[-3:] == ("separated", "stored_Jm2", "dissipated_Jm2")
-    for title, name in zip(table.dtype.names, COLUMNS, strict=True):  # twelve digits are written
+    derived = ("shear_stress_Pa", "opening_m", "friction_angle_deg", "dilation_angle_deg")
+    assert table.dtype.names[-6:] == ("stored_Jm2", "dissipated_Jm2", *derived)
+    for title, name in zip(table.dtype.names, COLUMNS, strict=False):  # twelve digits are written
         assert title.startswith(name)
         np.testing.assert_allclose(table[title], record.columns[name], rtol=1e-11)
+    np.testing.assert_allclose(table["friction_angle_deg"], record.friction_angle, rtol=1e-11)
+    np.testing.assert_allclose(table["opening_m"], record.closure[0] - record.closure, rtol=1e-11)
     with pytest.raises(ValueError, match="'1furlong' is not a quantity in m"):
         record.to_csv(tmp_path / "r.csv", length="furlong")
 

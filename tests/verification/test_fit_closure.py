@@ -1,9 +1,12 @@
 """Fits of closure curves: held-out stresses, honest intervals, what one curve cannot tell."""
 
+import pickle
+
 import numpy as np
 import pytest
 
 import jointlaw as jl
+import jointlaw.calibration.fit
 from jointlaw.calibration import datasets
 from jointlaw.calibration.measured import first_loading
 
@@ -50,6 +53,21 @@ def test_a_rock_of_another_curve_is_called_so(law):
     y = law.closure(stress)
     scatter = 1 + 0.01 * np.random.default_rng(0).standard_normal(16)
     assert jl.fit_closure(stress * scatter, y - y[0]).shape_differs == (False,)
+
+
+def test_every_law_that_is_tried_moves_the_bar(grimsel, monkeypatch):
+    """A fit of minutes shows that it goes on; afterwards it is pickled without the bar."""
+    tried = []
+
+    def track(items, label):
+        for item in items:
+            tried.append(label)
+            yield item
+
+    monkeypatch.setattr(jointlaw.calibration.fit, "track", track)
+    fit = jl.fit_closure(*grimsel)
+    assert len(tried) > 20
+    assert pickle.loads(pickle.dumps(fit)).parameters == fit.parameters
 
 
 @pytest.mark.slow

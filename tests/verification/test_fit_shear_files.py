@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -33,17 +34,21 @@ def law():
     )
 
 
-def shear_stress(law, normal):
-    """Shear stress (Pa) at the displacements U, in steps of 5 to 25 um."""
-    return jl.direct_shear(law.joint(), U[1:].tolist(), normal, steps=10).shear_stress[::10]
+def measured(law, normal):
+    """Shear stress (Pa) and opening (m) at the displacements U, in steps of 5 to 25 um."""
+    law = replace(law, resolution=jl.Resolution(12, 12, 32), plane=0.0)
+    record = jl.direct_shear(law.joint(), U[1:].tolist(), normal, steps=10)
+    return record.shear_stress[::10], (record.closure[0] - record.closure)[::10]
 
 
 def write_shear(path, law, normal, rng):
     """A file as a spreadsheet saves it in half of Europe; normal stress in MPa."""
-    tau = shear_stress(law, 1e6 * normal)
-    tau = tau + NOISE * tau.max() * rng.standard_normal(tau.shape) * (U > 0)
-    rows = [f"{1e3 * u:.4f};{t / 1e3:.2f};{normal}" for u, t in zip(U, tau, strict=True)]
-    path.write_text("\n".join(["us;tau;sn", "[mm];[kPa];[MPa]", *rows]).replace(".", ","))
+    columns = [1e3 * U]
+    for x, unit in zip(measured(law, 1e6 * normal), (1e3, 1e-3), strict=True):
+        columns.append((x + NOISE * x.max() * rng.standard_normal(x.shape) * (U > 0)) / unit)
+    rows = [f"{u:.4f};{t:.2f};{up:.5f};{normal}" for u, t, up in zip(*columns, strict=True)]
+    text = "\n".join(["us;tau;un;sn", "[mm];[kPa];[mm];[MPa]", *rows])
+    path.write_text(text.replace(".", ","))
 
 
 def write_closure(path, law, rng):
@@ -71,7 +76,7 @@ def test_three_shear_files_and_a_closure_file_predict_a_fourth(tmp_path, law, ca
     fourth = "shear o/law.toml --normal-stress 4MPa --to 3mm --steps 100 --out p"
     assert main(fourth.split()) == 0
     table = np.genfromtxt(tmp_path / "p" / "shear.csv", delimiter=",", names=True)
-    truth = shear_stress(law, 4e6)
+    truth, _ = measured(law, 4e6)
     found = np.interp(U, table["shear_2_m"], table["F2_Pa"])
     np.testing.assert_allclose(found[6:], truth[6:], rtol=0.02)
 
@@ -103,7 +108,7 @@ def test_the_saved_law_has_the_fitted_peaks(tmp_path, capsys, measured):
     printed = capsys.readouterr().out
     few = measured is peak_and_residual
     assert ("Hold asperity_density: give what you know" in printed) == few
-    assert float(printed.partition("changes these stresses by ")[2].split()[0]) < 0.5
+    assert float(printed.partition("changes these figures by ")[2].split()[0]) < 0.5
     drawn = [line.split("|")[3] for line in printed.splitlines() if line.startswith("| ")][-3:]
     for (normal, (_, stress)), cell in zip(curves.items(), drawn, strict=True):
         fitted = float(cell.partition(",")[0])

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from synthetic import synthetic_surface
+from synthetic import draw_directions, synthetic_surface
 
 import jointlaw as jl
+from jointlaw.surface.roughness import measured_slopes, rms_slope
 from jointlaw.surface.scan_files import read_scan
 
 SPACING = 20e-6
@@ -73,6 +74,48 @@ def test_heights_in_another_unit_fix_no_direction(factor):
     assert {"a", "b"} <= set(fit.not_identifiable)
 
 
+def rough(stretch, seed=0, n=256):
+    """A self-affine surface (Hurst exponent 0.8), `stretch` times as long along the rows."""
+    k = np.hypot(stretch * np.fft.fftfreq(n)[None, :], np.fft.fftfreq(n)[:, None])
+    k[0, 0] = 1.0
+    noise = np.random.default_rng(seed).standard_normal((n, n))
+    z = np.fft.ifft2(np.fft.fft2(noise) * k**-1.8).real
+    return 1e-4 * z / z.std()
+
+
+def test_a_surface_that_no_orientation_describes_is_told_by_its_slopes():
+    """Eq. 18 allows no more than a factor of 2 or so between the slopes along both axes."""
+    found = jl.from_surface(rough(1.0), SPACING)
+    assert found.describes
+    assert found.slopes == pytest.approx(found.law_slopes, rel=0.2)
+    stretched = jl.from_surface(rough(3.0), SPACING)
+    assert not stretched.describes
+    assert stretched.slopes[0] < 0.5 * stretched.law_slopes[0]
+    assert f"| measured | {stretched.slopes[0]:.3g} |" in stretched.report()
+
+
+def test_rms_slopes_of_a_wave_and_of_eq_14():
+    """A wave of 100 points: pi sqrt(2) height/length along it; Eq. 14 by drawing facets."""
+    x = np.arange(400)
+    wave = np.tile(1e-4 * np.sin(2 * np.pi * x / 100), (40, 1))
+    along, across = measured_slopes(wave, SPACING, 4)
+    assert along == pytest.approx(np.pi * np.sqrt(2) * 1e-4 / (100 * SPACING), rel=5e-3)
+    assert across == 0.0
+    theta, phi = draw_directions(ORIENTATION, 100_000, np.random.default_rng(0))
+    drawn = np.sqrt(np.mean((np.tan(theta) * np.cos(phi)) ** 2))
+    assert rms_slope(ORIENTATION) == pytest.approx(drawn, rel=0.01)
+
+
+def test_spikes_are_counted_and_cliffs_are_none(surface):
+    assert not len(jl.from_surface(surface, SPACING).spikes)
+    z = rough(1.0)
+    places = np.random.default_rng(1).integers(1, 255, (30, 2))
+    z[tuple(places.T)] += 2e-4
+    found = jl.from_surface(z, SPACING)
+    assert {tuple(one) for one in found.spikes} == {tuple(one) for one in places}
+    assert "Warning: 30 points are spikes" in found.report()
+
+
 def files_of(z):
     """A scan (ny, nx), points 20 apart, as text of each kind."""
     matrix = "\n".join(" ".join(map(str, row)) for row in z)
@@ -112,6 +155,7 @@ def test_files_give_the_array_back(tmp_path):
             "cellsize 0.02\n1.5 2\n",
             "its cellsize 0.02 is 2e-08 m .*but --spacing is 2e-05",
         ),
+        ("n.csv", "1,5,6,5\n2,6,5,6\n3,5,6,5\n", "its first column counts the rows"),
         (
             "z.xyz",
             "0 0 1\n20 0 1\n0 20 1\n17 20 1\n",
@@ -131,9 +175,18 @@ def test_files_that_cannot_be_read(name, text, told, tmp_path):
     [
         (np.zeros((100, 100)), None, "not flat"),
         (np.arange(100.0), None, "a profile has one direction only"),
-        (np.full((100, 100), np.nan), None, "not finite"),
+        (
+            np.where(np.eye(100) * np.arange(100) > 97, np.nan, np.eye(100)),
+            None,
+            r"not finite at 2 of its points, the first at \[98, 98\]",
+        ),
+        (
+            np.tile(np.abs(np.arange(100) % 20 - 10.0), (100, 1)),
+            None,
+            "z has ridges: .* is 4.56e.* along the rows and 0 across them",
+        ),
         (np.ones((10, 100)), None, "at least 24 points along both axes"),
-        (np.add.outer(np.arange(100.0), np.arange(100.0) ** 2), None, "summits"),
+        (np.add.outer(np.arange(100.0) ** 2, np.arange(100.0) ** 2), None, "summits"),
         (np.eye(100), 3.5 * SPACING, "spacings: it must be a whole number of at least 3"),
     ],
 )

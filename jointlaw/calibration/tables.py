@@ -1,0 +1,308 @@
+"""Tables in the files of laboratories, text and spreadsheets: their columns and odd rows.
+
+- Names stand in one line, units in it or in the next one: "tau [kPa]", "tau (kPa)", "tau /kPa",
+  "tau in kPa", "tau_kPa". A column without a unit is asked for, never guessed.
+- Lines of text above the names are skipped. A sheet holds several tests if the names come again,
+  beside the first ones or below them; a workbook holds those of all its sheets.
+- Separators, decimal marks and marks between thousands: `jointlaw.support.text_numbers`.
+"""
+
+import re
+from collections.abc import Sequence
+from itertools import permutations
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..support import units
+from ..support.checks import Array
+from ..support.text_numbers import (
+    AMBIGUOUS,
+    EITHER,
+    Marks,
+    cells_of,
+    lines_of,
+    marks_of,
+    table_separator,
+)
+
+_UNIT = r"(?:[numkcMGµμ]?(?:Pa|m)|N/mm[2²]|[kM]N/m[2²]|bar|[kmg]pa|[kM]N)"
+_ROW_UNIT = re.compile(rf"[\[(].*[\])]|/?\s*{_UNIT}|N|-?")
+_TITLE = re.compile(
+    rf"(.*?)(?:\s*[\[(]\s*([^\])]*?)\s*[\])]|(?:\s*/\s*|\s+in\s+|,\s*|_|\s+)({_UNIT}))\s*"
+)
+_LETTERS = re.compile(r"[^\W\d_]")
+_SENTINEL = re.compile(r"-?9{3,}(\.0*|\.9+|\.25)?")  # what loggers write where they read nothing
+_WORD = re.compile(r"(?i)(?!nan|none|null).*[^\W\d_]{3}.*")
+JUMP, STILL = 0.2, 0.02  # of the range: what a point jumps by, while the other column stands still
+Rows = dict[int, list[str]]
+
+
+class Column(NamedTuple):
+    """A column: its title as written, its name and unit ("" if it gives none).
+
+    values: (n,), NaN where a cell is empty; wrong: what is wrong with the first cell that is
+    neither empty nor a number, with its line; odd: lines whose value stands for none, such as -999.
+    """
+
+    title: str
+    name: str
+    unit: str
+    values: Array
+    wrong: str
+    odd: dict[int, str]
+
+
+class Asked(NamedTuple):
+    """A quantity to look for: what it is, its SI unit, names it goes by, the option that names it.
+
+    The names are tried in their order, in small letters with _ for all that is no letter or digit.
+    Names in `vague` count only where no other column has a unit of the same kind.
+    """
+
+    what: str
+    base: str
+    names: tuple[str, ...]
+    option: str
+    vague: tuple[str, ...] = ()
+
+
+class Table(NamedTuple):
+    """One test of a file: what to call it, its columns, the line (or row) of each of their values,
+    and lines that are no measurement, with the reason.
+    """
+
+    name: str
+    columns: list[Column]
+    lines: list[int]
+    odd: dict[int, str]
+
+    def column(self, asked: Asked, given: str | None = None) -> Column:
+        """The column of a quantity, in SI units. Raises ValueError with the option that helps.
+
+        given: name and unit from the command line, "Disp:mm", or None.
+        """
+        name, _, unit = (given or "").partition(":")
+        wanted = (*asked.names, *asked.vague) if given is None else (_plain(name),)
+        matches = (
+            [c for c in self.columns if w in (_plain(c.name), _plain(c.title))] for w in wanted
+        )
+        found = next((match for match in matches if match), [])
+        alike = sum(_factor(c.unit, asked.base) is not None for c in self.columns)
+        if given is None and found and _plain(found[0].name) in asked.vague and alike > 1:
+            found = []  # one of several displacements
+        common = units.COMMON[asked.base]
+        example = f'{asked.option} "NAME:{common}"'
+        if len(found) != 1:
+            many = f"{len(found)} columns of one name: " if found else ""
+            raise ValueError(
+                f"{self.name}: which column is the {asked.what}, and in which unit? The file has "
+                f"{many}{', '.join(c.title for c in self.columns)}; write for example {example}"
+            )
+        column = found[0]
+        if column.wrong:
+            raise ValueError(f"{self.name}: column {column.title!r}, {column.wrong}")
+        unit = unit or column.unit
+        factor = _factor(unit, asked.base)
+        if factor is None:
+            trouble = f"has the unit {unit!r}, none of {asked.base}" if unit else "gives no unit"
+            raise ValueError(
+                f"{self.name}: column {column.title!r} {trouble}; name it, for example "
+                f"{example.replace('NAME', column.name)}"
+            )
+        return column._replace(values=column.values * factor)
+
+    def has(self, asked: Asked) -> bool:
+        """Whether a column has one of the names of a quantity."""
+        return any(_plain(name) in asked.names for c in self.columns for name in (c.name, c.title))
+
+    def rows(
+        self, columns: Sequence[Column], outliers: str | None
+    ) -> tuple[list[Array], list[str]]:
+        """The rows in which all these columns hold a number, and what was left out of them.
+
+        Odd rows are those of `odd`, values such as -999, and points where one column jumps and
+        returns while another stands still. outliers: what to do with them, "skip" or "keep".
+        Raises ValueError naming them without it, and for fewer than three rows.
+        """
+        whole, odd = np.isfinite([c.values for c in columns]).all(axis=0), dict(self.odd)
+        lines, values = np.array(self.lines)[whole], [c.values[whole] for c in columns]
+        for c in columns:
+            odd |= c.odd
+        seen = ~np.isin(lines, list(odd))
+        for (_, x), (c, y) in permutations(zip(columns, values, strict=True), 2):
+            jumps = lines[seen][_jumps(x[seen], y[seen])].tolist()
+            odd |= dict.fromkeys(jumps, f"{c.title} jumps and returns")
+        odd = {n: why for n, why in odd.items() if n in lines}
+        told = "; ".join(f"line {n}: {why}" for n, why in sorted(odd.items())[:3])
+        told += f"; and {len(odd) - 3} more" if len(odd) > 3 else ""
+        if odd and outliers is None:
+            raise ValueError(
+                f"{self.name}: {told}. Are these measurements? Write --outliers skip to leave such "
+                "rows out, or --outliers keep"
+            )
+        empty, notes = int(np.sum(~whole)), list[str]()
+        if empty:
+            notes.append(f"{empty} of {whole.size} rows without all numbers are not used")
+        if odd and outliers == "skip":
+            notes.append(f"{len(odd)} rows are left out as outliers ({told})")
+            values = [x[~np.isin(lines, list(odd))] for x in values]
+        if values[0].size < 3:
+            raise ValueError(
+                f"{self.name}: has {values[0].size} rows with both numbers; give 3 or more"
+            )
+        return values, notes
+
+
+def read_tables(path: Path, decimal: str | None = None) -> list[Table]:
+    """The tests of a file, by the rules above.
+
+    decimal: the decimal mark, "comma" or "point"; None finds it, if a number of the file shows it.
+    Raises ValueError naming file, line and remedy.
+    """
+    if path.suffix.lower() in (".xlsx", ".xlsm"):
+        sheets, decimal = _workbook(path), decimal or "point"
+    else:
+        lines = lines_of(path)
+        mark = table_separator(lines)
+        sheets = {"": dict(zip(lines, cells_of([*lines.values()], mark), strict=True))}
+    tables: list[Table] = []
+    for sheet, rows in sheets.items():
+        marks = marks_of((cell for row in rows.values() for cell in row), decimal)
+        name = f"{path}{', sheet ' * bool(sheet)}{sheet}"
+        blocks = [one for block in _below(rows, marks) for one in _beside(*block)]
+        for k, (titles, below, numbers) in enumerate(blocks, 1):
+            several = f", test {k}" if len(blocks) > 1 else ""
+            tables.append(_table(name + several, titles, below, numbers, marks))
+    if not tables:
+        raise ValueError(
+            f"{path}: must hold a line of names with units, such as us [mm],tau [MPa], and numbers "
+            "in the lines below it"
+        )
+    return tables
+
+
+def _workbook(path: Path) -> dict[str, Rows]:
+    """The cells of all sheets as text. Raises ImportError with the remedy without openpyxl."""
+    try:
+        from openpyxl import load_workbook
+    except ImportError as error:
+        raise ImportError(
+            f"{path}: spreadsheets need openpyxl: pip install 'jointlaw[xlsx]', or save it as CSV"
+        ) from error
+    try:
+        book = load_workbook(path, read_only=True, data_only=True)
+    except Exception as error:  # of many kinds, for a file that is none
+        raise ValueError(f"{path}: cannot be read as a spreadsheet ({error})") from None
+    return {
+        sheet.title: {
+            n: ["" if cell is None else str(cell).strip() for cell in row]
+            for n, row in enumerate(sheet.iter_rows(values_only=True), 1)
+            if any(cell is not None for cell in row)
+        }
+        for sheet in book.worksheets
+    }
+
+
+def _below(rows: Rows, marks: Marks) -> list[tuple[list[str], list[str], Rows]]:
+    """Names, units and rows of the tables that stand below one another."""
+    found: list[tuple[list[str], list[str], Rows]] = []
+    for line, row in rows.items():
+        numeric = any(np.isfinite(marks.value(cell)) or EITHER.fullmatch(cell) for cell in row)
+        words = [cell for cell in row if _LETTERS.search(cell)]
+        if found and not found[-1][2] and not numeric and all(map(_ROW_UNIT.fullmatch, row)):
+            found[-1] = (found[-1][0], [cell.strip("[]()/- ") for cell in row], {})
+        elif not numeric and len(words) > 1 and not (found and found[-1][2]):
+            found[-1:] = [(row, [], {})]  # lines of text above it were no names
+        elif not numeric and found and row == found[-1][0]:
+            found.append((row, [], {}))
+        elif found:
+            found[-1][2][line] = row
+    return [block for block in found if block[2]]
+
+
+def _beside(
+    titles: list[str], below: list[str], rows: Rows
+) -> list[tuple[list[str], list[str], Rows]]:
+    """The tables that stand beside one another: the same names come again."""
+    names = [_plain(title) for title in titles]
+    starts = [k for k, name in enumerate(names) if name and name == names[0]]
+    parts = [slice(a, b) for a, b in zip(starts, [*starts[1:], len(names)], strict=True)]
+    same = {tuple(name for name in names[part] if name) for part in parts}
+    if len(parts) < 2 or len(same) > 1 or len(next(iter(same))) < 2:
+        return [(titles, below, rows)]
+    wide = len(titles)
+    return [
+        (
+            titles[part],
+            below[part],
+            {n: cells for n, row in rows.items() if any(cells := row[:wide][part])},
+        )
+        for part in parts
+    ]
+
+
+def _table(name: str, titles: list[str], below: list[str], rows: Rows, marks: Marks) -> Table:
+    """The columns of one test."""
+    below = below + [""] * (len(titles) - len(below))
+    values = np.full((len(titles), len(rows)), np.nan)
+    for k, (line, row) in enumerate(rows.items()):
+        if len(row) > len(titles) and any(row[len(titles) :]):
+            remedy = "give each column a name and separate all lines alike; if the decimal mark is "
+            raise ValueError(
+                f"{name}: line {line} has {len(row)} cells under {len(titles)} names; {remedy}a "
+                "comma, separate the columns by semicolons"
+            )
+        values[: len(row), k] = [marks.value(cell) for cell in row[: len(titles)]]
+    columns, odd = [], dict[int, str]()
+    for k, title in enumerate(titles):
+        cells = {n: row[k] for n, row in rows.items() if k < len(row) and row[k]}
+        known = dict(zip(rows, values[k].tolist(), strict=True))
+        texts = {n: cell for n, cell in cells.items() if not np.isfinite(known[n])}
+        wrong = ""
+        for n, cell in texts.items():
+            why = AMBIGUOUS if EITHER.fullmatch(cell) else "is no number"
+            wrong = wrong or f"line {n} holds {cell!r}, which {why}"
+        if 2 * len(texts) < len(cells):
+            odd |= {n: f"{title} is {c!r}" for n, c in texts.items() if _WORD.fullmatch(c)}
+        sent = {n: cell for n, cell in cells.items() if _SENTINEL.fullmatch(cell)}
+        usual = max((abs(known[n]) for n in cells if n not in sent and n not in texts), default=0)
+        none = {n: f"{title} is {c}" for n, c in sent.items() if abs(known[n]) > 5 * usual}
+        name_unit = _read_title(title, below[k])
+        columns.append(Column(title, *name_unit, values[k], wrong, none))
+    return Table(name, columns, [*rows], odd)
+
+
+def _jumps(x: Array, y: Array) -> NDArray[np.bool_]:
+    """Points (n,) where y leaves its neighbours, which agree, while x goes on between its own."""
+    found = np.zeros(x.size, bool)
+    if x.size < 5 or not np.ptp(x) or not np.ptp(y):
+        return found
+    scale = max(np.ptp(y), 0.2 * np.max(np.abs(y)))  # what hardly changes scatters
+    off_x, off_y = (np.abs(z[1:-1] - (z[2:] + z[:-2]) / 2) for z in (x / np.ptp(x), y / scale))
+    apart = np.abs(y[2:] - y[:-2]) / scale
+    found[1:-1] = (off_y > JUMP) & (apart < 0.25 * off_y) & (off_x < STILL)
+    return found
+
+
+def _factor(unit: str, base: str) -> float | None:
+    """SI units per unit; a quantity, -1mm, turns a sign; None for one of another kind."""
+    unit = re.sub("^([kmg])pa$", lambda match: f"{match[1].upper().replace('K', 'k')}Pa", unit)
+    try:
+        return units.parse(unit if re.match(r"[-+.\d]", unit) else f"1{unit or '?'}", base)
+    except ValueError:
+        return None
+
+
+def _read_title(title: str, unit: str) -> tuple[str, str]:
+    """Name and unit of a title, which goes before the row of units: "tau [kPa]", "closure_mm"."""
+    match = _TITLE.fullmatch(title)
+    if match is None:
+        return title, unit
+    return match[1].strip(" _,") or title, (match[2] or match[3] or "").strip("-") or unit
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"\W+", "_", name.strip().lower()).strip("_")

@@ -124,7 +124,8 @@ def _announce(sim: Simulation, until: float | None = None) -> None:
         f"time step {dt:.3g} s, limit {limit:.3g} s (margin {limit / dt:.2f}{why}), {steps} steps"
     )
     if seconds := _pace(sim) * steps:
-        print(f"about {_spoken(seconds)} without pictures, by its first steps")
+        told = f"{seconds:.2g} s" if seconds < 100 else f"{seconds / 60:.2g} min"
+        print(f"about {told} without pictures, by its first steps")
     for rock in sim.scene.rocks:
         print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
               f"{len(rock.blocks) - len(rock.free)} fixed; {rock.slivers}")  # fmt: skip
@@ -141,11 +142,6 @@ def _pace(sim: Simulation) -> float:
             steps += 1
         return (time.perf_counter() - started) / steps
     return 0.0
-
-
-def _spoken(seconds: float) -> str:
-    """A time for a person."""
-    return f"{seconds:.2g} s" if seconds < 100 else f"{seconds / 60:.2g} min"
 
 
 def _new(given: argparse.Namespace) -> None:

@@ -37,7 +37,7 @@ class Pool(ctypes.Structure):
 
     _fields_ = [
         *((name, ctypes.c_void_p) for name in ("d", "F", "shown", "stress", "stiffness")),
-        ("points", ctypes.c_longlong),
+        *((name, ctypes.c_longlong) for name in ("points", "holds")),
     ]
 
 

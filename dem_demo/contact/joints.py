@@ -15,7 +15,7 @@ from jointlaw.joints.state import JointState
 from jointlaw.kernels.engine import Step
 
 from ..compiled import SHOWN, Pool, World
-from ..scene import Law, Scene
+from ..scene import Law, Scene, opens_to
 
 PARTS = "states", "fingerprint"  # of a snapshot of the joints of a law
 NEW = (0.0, 0.0, 1.0, 0.0, 0.0)  # what a new joint shows, but for its bond and where it is
@@ -92,10 +92,8 @@ class Held:
 
     def begin(self, places: np.ndarray, mated: bool, bonded: bool) -> np.ndarray:
         """Let joints start, as new; closure and sliding (2,) in m where they first touch."""
-        law, start = (
-            self.batch.law,
-            np.zeros(2) if mated else unmated_curve(self.batch.law)["start"],
-        )
+        law = self.batch.law
+        start = np.zeros(2) if mated else unmated_curve(law)["start"]
         self.batch.reset(places, mated)
         if not bonded:
             self.batch.unbond(places)
@@ -113,7 +111,8 @@ class Held:
     def pool(self) -> Pool:
         """What the compiled step knows of them."""
         arrays = self.step.d, self.step.F, self.step.shown, *self._curve
-        return Pool(*(array.ctypes.data for array in arrays), len(self._curve[0]))
+        holds = bool(opens_to(self.batch.law) > 0.0)
+        return Pool(*(array.ctypes.data for array in arrays), len(self._curve[0]), holds)
 
     @property
     def _curve(self) -> tuple[np.ndarray, np.ndarray]:
@@ -125,7 +124,7 @@ class Joints:
 
     delta (k, 2) in m: closure and sliding; traction (k, 2) in Pa; sliding, slipping, separated
     (k,): shares of their shear capacity; stored, lost (k,) in J/m2; damage (k,) of their bonds, 1
-    where there is none. law, place (k,): number of the law, and place in its batch.
+    where nothing holds tension. law, place (k,): number of the law, and place in its batch.
 
     The scene's `reduction` F divides the shear stress of every joint and multiplies the sliding at
     which it has it. So tan(friction angle), tan(dilation angle) and cohesion are divided by F, and

@@ -73,16 +73,6 @@ class Tracker:
         """These corners on these edges, at a motion (6, n)."""
         self.contacts = Contacts(self.outlines, corner, edge, motion)
 
-    @property
-    def corner(self) -> np.ndarray:
-        """Corners (k,) of the contacts."""
-        return self.contacts.corner
-
-    @property
-    def edge(self) -> np.ndarray:
-        """Edges (k,) of the contacts."""
-        return self.contacts.edge
-
     def bind(self, world: World) -> None:
         """Tell the compiled step where these arrays lie."""
         world.max_stale = STALE

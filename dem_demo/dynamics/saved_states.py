@@ -26,7 +26,7 @@ STATE = (
     "tracker.keys", "tracker.law", "tracker.numbers", "tracker.offset", "tracker.given",
     "ledger.start", "ledger.area", "ledger.lost",
 )  # fmt: skip
-PLACES = "tracker.corner", "tracker.edge"  # from which the contacts are made anew
+PLACES = "contacts.corner", "contacts.edge"  # from which the contacts are made anew
 
 
 Saved = dict[str, np.ndarray]  # a copy of everything that the future depends on

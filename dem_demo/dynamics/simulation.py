@@ -244,7 +244,7 @@ class Simulation:
             else:
                 setattr(of, name, value.copy() if value.ndim else value.item())
         tracker, blocks = self.tracker, self.blocks
-        tracker.hold(saved["tracker.corner"], saved["tracker.edge"], blocks.motion)
+        tracker.hold(saved["contacts.corner"], saved["contacts.edge"], blocks.motion)
         self.joints.restore(saved, tracker.law, tracker.keys)
         if step:
             self._change_step(step)

@@ -12,7 +12,7 @@ read       a scene from its file
 from .blocks import Block, smallest_width, turn, usual_size
 from .drives import Drive, Drives
 from .keys import Tables, overlay
-from .laws import Files, Law, build_law
+from .laws import Files, Law, build_law, opens_to
 from .read import TEMPLATE, build, load, parse, read_tables, shipped
 from .scene import Key, Run, Scene
 
@@ -30,6 +30,7 @@ __all__ = [
     "build",
     "build_law",
     "load",
+    "opens_to",
     "overlay",
     "parse",
     "read_tables",

@@ -321,6 +321,7 @@ JL_OUT void jl_blocks_read(jl_world *w)
     w->traction[2 * i] = F[0];
     w->traction[2 * i + 1] = F[1] / w->reduction[1];
     for (int r = 0; r < JLAW_SHOWN; r++) w->shares[r * w->contacts + i] = shown[r];
+    if (!pool->holds) w->shares[JLAW_DAMAGE * w->contacts + i] = 1.0;
     w->delta[2 * i] = shown[JLAW_SHOWN] - w->touch[2 * i];
     w->delta[2 * i + 1] = (shown[JLAW_SHOWN + 1] - w->touch[2 * i + 1]) * w->reduction[1];
   }

@@ -14,7 +14,7 @@ typedef struct {                    /* the joints of one law, by their places in
   const double *F;                  /* (places, 2): tractions after it, Pa */
   const double *shown;              /* (places, JLAW_SHOWN + 2): what batch.h says */
   const double *stress, *stiffness; /* (points,): its virgin curve, Pa and Pa/m */
-  long long points;
+  long long points, holds; /* holds: whether joints hold tension until they are damaged */
 } jl_pool;
 
 typedef struct {

@@ -146,6 +146,7 @@ def test_scenes_are_valid(name, capsys):
     assert main(["check", name]) == 0
     said = capsys.readouterr()
     assert "margin" in said.out
+    assert "without pictures, by its first steps" in said.out
     assert "warning" not in said.err
 
 

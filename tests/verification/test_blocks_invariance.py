@@ -70,7 +70,7 @@ def test_rounding_of_the_drawing_does_not_choose_between_equal_corners():
 
         blocks = tuple(replace(block, corners=moved(block.corners)) for block in scene.blocks)
         sim = Simulation(replace(scene, blocks=blocks))
-        return sim.blocks.motion[:3], list(zip(sim.tracker.corner, sim.tracker.edge, strict=True))
+        return sim.blocks.motion[:3], list(zip(sim.contacts.corner, sim.contacts.edge, strict=True))
 
     place, contacts = start(0)
     other, also = start(2)

@@ -79,3 +79,15 @@ def test_a_block_put_down_elsewhere_slides_at_the_friction_of_its_asperities():
     slides = friction(lifted)
     assert slides == pytest.approx(np.degrees(np.arctan(0.4)), abs=0.5)
     assert friction(again) == slides
+
+
+def test_a_sliver_rules_neither_the_search_nor_the_corners_of_the_others():
+    """Blocks 1 m wide and a sliver of 0.05 m: what follows from the width of the usual block."""
+    wide = [f'[[block]]\nname = "{i}"\nbox = [1.0, 1.0]\nat = [{2 * i}, 0.5]' for i in range(4)]
+    sliver = '[[block]]\nname = "sliver"\nbox = [0.05, 2.0]\nat = [9.0, 1.0]'
+    law = '[laws.a]\nkind = "coulomb"\nnormal_stiffness = 1e9\nshear_stiffness = 1e9\nfriction = 1'
+    scene = parse("\n".join([law, *wide, sliver, "[run]\nend = 1.0"]))
+    assert scene.skins == pytest.approx([0.02] * 4 + [0.005])
+    assert scene.run.corner_length == pytest.approx(0.07)
+    given = parse("\n".join([law, *wide, sliver, "[run]\nend = 1.0\nskin = 0.01"]))
+    assert given.skins == pytest.approx([0.01] * 5)

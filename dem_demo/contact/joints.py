@@ -97,8 +97,7 @@ class Held:
         self.batch.reset(places, mated)
         if not bonded:
             self.batch.unbond(places)
-        pulls = any(element.pulls for element in law.tables.elements)
-        damage = 0.0 if bonded and pulls else 1.0
+        damage = 0.0 if bonded and "damage" in law.tables.names else 1.0
         self.step.F[places], self.step.shown[places] = 0.0, [*NEW, damage, *start]
         return start
 

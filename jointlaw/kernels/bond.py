@@ -11,7 +11,7 @@ class Bonded(Element):
     """The bond of a joint, with its damage."""
 
     def __init__(self, bond: Bond) -> None:
-        self.bond, self.rows, self.pulls = bond, {"damage": 1}, True
+        self.bond, self.rows = bond, {"damage": 1}
 
     def numbers(self) -> dict[str, float]:
         begin, end = self.bond.limits

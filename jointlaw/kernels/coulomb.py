@@ -43,7 +43,6 @@ class Coulomb(Element):
         # beyond cohesion/friction there is no strength in shear
         apex = self.cohesion / self.friction if self.friction > 0.0 else np.inf
         self.tension = min(p.tension, apex)
-        self.pulls = self.tension > 0.0
         self.reach = _OVERFLOW / max(self.normal * (1.0 + self.friction), self.shear, 1.0)
         self.farthest = self.reach
 

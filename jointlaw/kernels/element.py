@@ -36,7 +36,6 @@ class Element(ABC):
     """
 
     dim = 1  # components of a displacement that it needs, at least
-    pulls = False  # whether it bears tension
     rows: dict[str, int]  # of its state: how many, by name
     stretch = 1.0  # bound of the closure that it feels over the size of the displacement
     reach = math.inf  # m: up to this closure its forces, energies and their squares stay finite

@@ -56,8 +56,7 @@ class Step:
     d (m, dim) in m; F (m, dim) and C (m, dim, dim), which are written, C None for no tangent;
     where: the joints that move (m,), None for all; keep: whether the states advance. shown
     (m, 6 + dim), written if given, as it costs little in the same pass: shares sliding, slipping
-    and separated, stored and dissipated energy (J/m2), damage of what bears tension (1 where
-    nothing does), displacement (m).
+    and separated, stored and dissipated energy (J/m2), damage of the bond, displacement (m).
     """
 
     def __init__(
@@ -131,8 +130,7 @@ class NumpyEngine:
                 state[place] = new.T
             if step.shown is not None:
                 now = reference.parts(self.tables, new)
-                pulls = any(element.pulls for element in self.tables.elements)
-                damage = now.damage if pulls else np.ones(len(F.T))
+                damage = getattr(now, "damage", np.ones(len(F.T)))
                 shares = reference.measures(self.tables, new)[:4]
                 all_shown = np.stack([*shares, now.dissipated, damage, *now.delta])
                 step.shown[part] = all_shown.T

@@ -22,7 +22,6 @@
 static void show(const jlaw_batch *b, jl_numbers n, const jl_amounts *all, double *to, int some)
 {
   const int dim = b->law->dim, size = JLAW_SHOWN + dim, last = jl_state_rows(b->law) - 1;
-  const int pulls = b->law->bonded || b->law->coulomb_tension > 0.0; /* whether it bears tension */
   for (int l = 0; l < some; l++, to += size) {
     const double *s = n.s + l;
     to[JLAW_SLIDING] = JL_JOINT(all->sliding, l);
@@ -30,7 +29,7 @@ static void show(const jlaw_batch *b, jl_numbers n, const jl_amounts *all, doubl
     to[JLAW_SEPARATED] = JL_JOINT(all->separated, l);
     to[JLAW_STORED] = JL_JOINT(all->stored, l);
     to[JLAW_LOST] = s[(size_t) dim * n.stride];
-    to[JLAW_DAMAGE] = pulls ? s[(size_t) last * n.stride] : 1.0;
+    to[JLAW_DAMAGE] = jl_element_rows(b->law) ? s[(size_t) last * n.stride] : 1.0;
     for (int i = 0; i < dim; i++) to[JLAW_SHOWN + i] = s[(size_t) i * n.stride];
   }
 }

@@ -41,9 +41,12 @@ def joining(k: FacetTables) -> tuple[float, float]:
         return more, most
     # Phi'' is smooth within a piece of the table and jumps between two
     places = (np.arange(pieces)[:, None] + np.array([1e-9, 0.25, 0.5, 0.75, 1 - 1e-9])) / pieces
-    y = (curve.scale * places / (1 - places)).ravel() ** 2
-    force, slope = curve.force(y)
-    bend = np.maximum(curve.curvature(y), 0.0)
+    with np.errstate(over="ignore", invalid="ignore"):  # heights may be as wide as floats are
+        y = (curve.scale * places / (1 - places)).ravel() ** 2
+        force, slope = curve.force(y)
+        bend = np.maximum(curve.curvature(y), 0.0)
+    sound = np.isfinite(force) & np.isfinite(slope) & np.isfinite(bend)
+    y, force, slope, bend = y[sound], force[sound], slope[sound], bend[sound]
     cells = np.stack([k.depth, k.depth_force, k.depth_slope], axis=-1)
     for limits in np.unique(cells, axis=0):  # one ring of facets
         low, force0, slope0 = limits[np.searchsorted(limits[:-1, 0], y, side="right") - 1].T

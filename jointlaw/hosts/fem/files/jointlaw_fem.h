@@ -21,7 +21,7 @@ static const double START[STATE] = {
 /* One step by du (opening, shear, shear; m) from state s0: the new state s1 (not s0), the traction T
  * (DIM, Pa) and its tangent C (DIM, DIM), row by row, if not NULL. -1 and a message where a number
  * is not finite or forces would overflow: nothing is written then. */
-static int jl_move(const double *s0, double *s1, const double du[3], double *T, double *C,
+static int jlf_move(const double *s0, double *s1, const double du[3], double *T, double *C,
                    char message[JLAW_MESSAGE])
 {
   const double d[3] = {-du[0], du[1], du[2]};

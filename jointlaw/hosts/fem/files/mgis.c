@@ -17,16 +17,16 @@ typedef struct { /* what MGIS hands over since 1.2.2 */
   const double *density, *properties;
   double *state, *stored, *dissipated;
   const double *external;
-} jl_view;
+} jlf_view;
 
 enum { PREDICTION = -1, FORCES, TANGENT }; /* that K[0] asks for */
 
-static int jl_wanted(const jl_view *v)
+static int jlf_wanted(const jlf_view *v)
 {
   return v->K[0] < -0.5 ? PREDICTION : v->K[0] > 0.5 ? TANGENT : FORCES;
 }
 
-static int jl_refuse(const jl_view *v, const char *why)
+static int jlf_refuse(const jlf_view *v, const char *why)
 {
   if (v->message) snprintf(v->message, 512, "granite: %s", why);
   if (v->rdt) *v->rdt = 0.25; /* of the time step, for the next trial */
@@ -34,19 +34,19 @@ static int jl_refuse(const jl_view *v, const char *why)
 }
 
 /* One step by du (m). A prediction is the tangent of the state as it is: nothing moves. */
-static int jl_step(const jl_view *v, const double du[3], double *s1, double *T, double *C)
+static int jlf_step(const jlf_view *v, const double du[3], double *s1, double *T, double *C)
 {
   static const double still[3] = {0.0, 0.0, 0.0};
   char why[JLAW_MESSAGE];
-  const int want = jl_wanted(v);
-  if (v->K[0] > 50.0) return jl_refuse(v, "a joint has no speed of sound: do not ask for it");
-  if (jl_move(v->state0, s1, want == PREDICTION ? still : du, T, want ? C : NULL, why))
-    return jl_refuse(v, why);
+  const int want = jlf_wanted(v);
+  if (v->K[0] > 50.0) return jlf_refuse(v, "a joint has no speed of sound: do not ask for it");
+  if (jlf_move(v->state0, s1, want == PREDICTION ? still : du, T, want ? C : NULL, why))
+    return jlf_refuse(v, why);
   return 0;
 }
 
 /* Writes the new state, and energies (J/m2) over a thickness; 1 for success */
-static int jl_keep(const jl_view *v, const double *s1, double thickness, double elastic)
+static int jlf_keep(const jlf_view *v, const double *s1, double thickness, double elastic)
 {
   memcpy(v->state, s1, STATE * sizeof *s1);
   if (v->stored) *v->stored = jlaw_stored(&JOINT, s1) / thickness + elastic;
@@ -54,22 +54,22 @@ static int jl_keep(const jl_view *v, const double *s1, double thickness, double 
   return 1;
 }
 
-static int jl_cohesive(const jl_view *v, int dim)
+static int jlf_cohesive(const jlf_view *v, int dim)
 {
   double du[3] = {0.0, 0.0, 0.0}, s1[STATE], T[3], C[9];
-  const int want = jl_wanted(v);
+  const int want = jlf_wanted(v);
   for (int i = 0; i < dim; i++) du[i] = v->gradients[i] - v->gradients0[i];
-  if (jl_step(v, du, s1, T, C)) return -1;
+  if (jlf_step(v, du, s1, T, C)) return -1;
   for (int i = 0; want && i < dim * dim; i++) v->K[i] = C[DIM * (i / dim) + i % dim];
   if (want == PREDICTION) return 1;
   memcpy(v->forces, T, (size_t) dim * sizeof *T);
-  return jl_keep(v, s1, 1.0, 0.0);
+  return jlf_keep(v, s1, 1.0, 0.0);
 }
 
 /* Strains are xx yy zz xy xz yz, in a plane the first four; shear strains and shear stresses come
  * times sqrt 2, and slip is twice the thickness times the shear strain. In its own plane (x and b)
  * the layer is elastic, in plane stress, beside the joint. */
-static int jl_layer(const jl_view *v, int dim)
+static int jlf_layer(const jlf_view *v, int dim)
 {
   const double root = 1.4142135623730951, *e = v->gradients, *p = v->properties;
   const double h = p[0], E = p[1], nu = p[2], P = E / (1.0 - nu * nu), G2 = E / (1.0 + nu);
@@ -77,13 +77,13 @@ static int jl_layer(const jl_view *v, int dim)
   const int at[3] = {space ? 2 : 1, space ? 4 : 3, 5}; /* opening and shears */
   const double by[3] = {h, h * root, h * root}, to[3] = {1.0, root, root};
   double du[3] = {0.0, 0.0, 0.0}, s1[STATE], T[3], C[9], *s = v->forces, *K = v->K, far = 0.0;
-  const int want = jl_wanted(v);
+  const int want = jlf_wanted(v);
   if (!(h > 0.0 && h <= DBL_MAX && E >= 0.0 && P <= DBL_MAX && fabs(nu) <= 0.5))
-    return jl_refuse(v, "Thickness must be > 0, YoungModulus >= 0, PoissonRatio from -0.5 to 0.5");
+    return jlf_refuse(v, "Thickness must be > 0, YoungModulus >= 0, PoissonRatio from -0.5 to 0.5");
   for (int i = 0; i < size; i++) far += (1.0 + P) * fabs(e[i]);
-  if (!(far <= DBL_MAX)) return jl_refuse(v, "the strain is not finite; nothing was moved");
+  if (!(far <= DBL_MAX)) return jlf_refuse(v, "the strain is not finite; nothing was moved");
   for (int i = 0; i < dim; i++) du[i] = by[i] * (e[at[i]] - v->gradients0[at[i]]);
-  if (jl_step(v, du, s1, T, C)) return -1;
+  if (jlf_step(v, du, s1, T, C)) return -1;
   for (int i = 0; want && i < size * size; i++) K[i] = 0.0;
   for (int i = 0; want && i < dim * dim; i++)
     K[size * at[i / dim] + at[i % dim]] = to[i / dim] * C[DIM * (i / dim) + i % dim] * by[i % dim];
@@ -97,7 +97,7 @@ static int jl_layer(const jl_view *v, int dim)
   s[0] = P * (e[0] + nu * e[b]);
   s[b] = P * (e[b] + nu * e[0]);
   if (space) s[3] = G2 * e[3];
-  return jl_keep(v, s1, h, 0.5 * (s[0] * e[0] + s[b] * e[b] + (space ? s[3] * e[3] : 0.0)));
+  return jlf_keep(v, s1, h, 0.5 * (s[0] * e[0] + s[b] * e[b] + (space ? s[3] * e[3] : 0.0)));
 }
 
 /* The symbols by which MGIS knows a behaviour */
@@ -113,8 +113,8 @@ static int jl_layer(const jl_view *v, int dim)
 #define TYPES(B, name, ...) EXPORT int B##_##name##Types[] = {__VA_ARGS__};
 #define LIST(B, name, ...) EXPORT const char *B##_##name[] = {__VA_ARGS__};
 #define HYPOTHESIS(B, name, run, dim) \
-  EXPORT int B##_##name(jl_view *v); \
-  int B##_##name(jl_view *v) { return run(v, dim); }
+  EXPORT int B##_##name(jlf_view *v); \
+  int B##_##name(jlf_view *v) { return run(v, dim); }
 
 #define BEHAVIOUR(B, kind, kinematic, gradient, force, type) \
   TEXT(B, mfront_ept, #B) TEXT(B, mfront_interface, "Generic") TEXT(B, tfel_version, "4.2.0") \
@@ -140,19 +140,19 @@ static int jl_layer(const jl_view *v, int dim)
 
 BEHAVIOUR(granite, 3, 2, "OpeningDisplacement", "CohesiveForce", 2)
 NUMBER(granite, nMaterialProperties, 0)
-HYPOTHESIS(granite, PlaneStrain, jl_cohesive, 2)
-HYPOTHESIS(granite, PlaneStress, jl_cohesive, 2)
-HYPOTHESIS(granite, GeneralisedPlaneStrain, jl_cohesive, 2)
-HYPOTHESIS(granite, Axisymmetrical, jl_cohesive, 2)
+HYPOTHESIS(granite, PlaneStrain, jlf_cohesive, 2)
+HYPOTHESIS(granite, PlaneStress, jlf_cohesive, 2)
+HYPOTHESIS(granite, GeneralisedPlaneStrain, jlf_cohesive, 2)
+HYPOTHESIS(granite, Axisymmetrical, jlf_cohesive, 2)
 
 BEHAVIOUR(granite_layer, 1, 1, "Strain", "Stress", 1)
 NUMBER(granite_layer, nMaterialProperties, 3)
 LIST(granite_layer, MaterialProperties, "Thickness", "YoungModulus", "PoissonRatio")
-HYPOTHESIS(granite_layer, PlaneStrain, jl_layer, 2)
-HYPOTHESIS(granite_layer, GeneralisedPlaneStrain, jl_layer, 2)
-HYPOTHESIS(granite_layer, Axisymmetrical, jl_layer, 2)
+HYPOTHESIS(granite_layer, PlaneStrain, jlf_layer, 2)
+HYPOTHESIS(granite_layer, GeneralisedPlaneStrain, jlf_layer, 2)
+HYPOTHESIS(granite_layer, Axisymmetrical, jlf_layer, 2)
 
 #if DIM == 3 /* not for a law of one plane */
-HYPOTHESIS(granite, Tridimensional, jl_cohesive, 3)
-HYPOTHESIS(granite_layer, Tridimensional, jl_layer, 3)
+HYPOTHESIS(granite, Tridimensional, jlf_cohesive, 3)
+HYPOTHESIS(granite_layer, Tridimensional, jlf_layer, 3)
 #endif

@@ -28,7 +28,7 @@ void umat_(double *stress, double *statev, double *ddsdde, double *sse, double *
   else if (*nstatv != STATE)
     snprintf(message, sizeof message, "NSTATV = %d, and must be %d", *nstatv, STATE);
   for (int i = 0; !message[0] && i < dim; i++) du[i] = dstran[at[i]] / share;
-  if (message[0] || jl_move(statev, s1, du, T, C, message)) {
+  if (message[0] || jlf_move(statev, s1, du, T, C, message)) {
     fprintf(stderr, "granite: %s\n", message);
     if (pnewdt) *pnewdt = 0.25;
     for (int i = 0; i < n; i++) stress[i] = NAN;

@@ -54,8 +54,8 @@ def joining(k: FacetTables) -> tuple[float, float]:
         seen = (kappa > 1e-9 * slope) & (1e-9 * force < G) & (kappa > UNDERFLOW)
         share = np.divide(G, kappa, out=np.zeros_like(y), where=seen)  # the rest is rounding
         excess = np.where(seen, share * bend - kappa, 0.0)
-        more = max(more, float(np.divide(excess, kappa, out=0.0 * y, where=seen).max()))
-        most = max(most, float(excess.max()))
+        more = max(more, float(np.divide(excess, kappa, out=0.0 * y, where=seen).max(initial=0.0)))
+        most = max(most, float(excess.max(initial=0.0)))
     return more, most
 
 

@@ -8,7 +8,7 @@ displacement would compare their dilation, summed up over the slip, and not thei
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from ..joints.normal_control import NormalCondition, closing_increments
 from ..support.checks import Array
 
-if TYPE_CHECKING:
-    from ..laws.joint_law import JointLaw
+JointLaw: TypeAlias = Any  # of jointlaw.laws, which lies above
 
 LEG = 24  # steps each way
 SHARES = (1.0, 0.1)  # of the normal stress S/2 of the standard paths

@@ -33,7 +33,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -44,8 +44,7 @@ from ..support.checks import Array
 from ..support.progress import track
 from .slip import HELD, Slip, distance, random_ways, slip, standard_ways
 
-if TYPE_CHECKING:
-    from ..laws.joint_law import JointLaw
+JointLaw: TypeAlias = Any  # of jointlaw.laws, which lies above
 
 STEPS = 120  # of each path
 FAR = 3.0  # R: the longest slip at a given closure

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -15,8 +15,7 @@ from ..support.checks import Array, integer
 from ..support.progress import track
 from .suite import Suite, standard_suite
 
-if TYPE_CHECKING:
-    from ..laws.joint_law import JointLaw
+JointLaw: TypeAlias = Any  # of jointlaw.laws, which lies above
 
 SPREAD = tuple(
     Resolution(u, phi, depth)

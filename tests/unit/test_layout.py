@@ -23,16 +23,20 @@ def file_of(module):
     return next((f for f in (f"{stem}.py", f"{stem}/__init__.py") if f in trees()), None)
 
 
-def imported(path):
-    """Files that a file imports anywhere when it runs: at its top and in functions.
+def imported(path, types=False):
+    """Files that a file imports anywhere when it runs, at its top and in functions; with `types`
+    also what stands under TYPE_CHECKING.
 
-    What stands under TYPE_CHECKING only names types, as that of the law which joints belong to.
     Importing a module also runs the `__init__.py` above it; that counts only where a name is taken
     from there, for the root's imports everything.
     """
     found, nodes = set(), list(ast.walk(trees()[path]))
     for node in nodes:
-        if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING":
+        if (
+            isinstance(node, ast.If)
+            and getattr(node.test, "id", "") == "TYPE_CHECKING"
+            and not types
+        ):
             typing = {id(part) for one in node.body for part in ast.walk(one)}
             nodes = [part for part in nodes if id(part) not in typing]
     for node in nodes:
@@ -57,6 +61,18 @@ def circle(graph):
 def test_no_circle_of_files():
     found = circle({path: imported(path) for path in trees()})
     assert not found, f"{' -> '.join(found)}: move what both need into a file below them"
+
+
+def test_no_circle_of_folders():
+    """Types count, too: a folder that names those of another lies above it."""
+    graph = {}
+    for path in trees():
+        folder = path.rpartition("/")[0]
+        others = {file.rpartition("/")[0] for file in imported(path, types=True)}
+        if "/" in folder:
+            graph[folder] = graph.get(folder, set()) | (others - {folder, *PACKAGES})
+    found = circle(graph)
+    assert not found, f"{' -> '.join(found)}: move what both need into a folder below them"
 
 
 def test_a_circle_is_found_and_imports_in_functions_count():

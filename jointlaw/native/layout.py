@@ -130,7 +130,7 @@ def first_columns() -> dict[str, int]:
 
 def layout_h() -> str:
     """The text of layout.h."""
-    lines = ["/* Made from layout.py; change it there. */"]
+    lines = ["/* Made from layout.py; change it there. */", "#ifndef JLAW_FORMAT"]
     lines += [f"#define JLAW_FORMAT {FORMAT} /* of table files */", "enum {"]
     lines += [f"  JLAW_LANES = {LANES}, /* facets side by side in a block of the tables */"]
     lines += [f"  JLAW_AZIMUTHS = {AZIMUTHS}, /* most */"]
@@ -154,7 +154,7 @@ def layout_h() -> str:
         for numbers in (WHOLE, NUMBERS)
         for name, number in numbers.items()
     ]
-    lines += ["#define JLAW_NUMBERS(X) \\", " \\\n".join(keys)]
+    lines += ["#define JLAW_NUMBERS(X) \\", " \\\n".join(keys), "#endif"]
     return "\n".join([*lines, ""])
 
 

@@ -5,19 +5,11 @@
  */
 #define JOINTLAW_IMPLEMENTATION
 #include "jointlaw.h"
+#include "batch.h"
 #include <dlfcn.h>
 #include <string.h>
 
-typedef struct { /* as in batch.h */
-  const jlaw_law *law;
-  double *state;
-  const double *d;
-  double *F, *C;
-  const long long *index;
-  long long n, taken, grain;
-  int rows, alone, lanes, ledger, keep;
-} batch;
-typedef int run(batch *b, int what);
+typedef int run(jlaw_batch *b, int what);
 
 int main(int argc, char **argv)
 {
@@ -31,7 +23,10 @@ int main(int argc, char **argv)
   const size_t rows = (size_t) jlaw_state_size(law), size = n * dim;
   double *state = calloc((n + 7) / 8 * 8 * rows, sizeof *state), *first = calloc(rows, sizeof *first);
   double *d = calloc(size, sizeof *d), *F = calloc(size, sizeof *F), *C = calloc(size * dim, sizeof *C);
-  batch b = {law, state, d, F, C, NULL, (long long) n, 0, 8, (int) rows, 0, 2, 1, 1};
+  jlaw_batch b = {0};
+  b.law = law, b.state = state, b.d = d, b.F = F, b.C = C;
+  b.n = (long long) n, b.grain = JLAW_BLOCK, b.rows = (int) rows, b.lanes = 2;
+  b.ledger = b.keep = 1;
   while (fread(d, sizeof *d, size, stdin) == size) {
     double f[3], c[9];
     b.taken = 0;

@@ -225,9 +225,10 @@ def fit_curves(
         adds its seating closure (m).
     fixed: values of parameters that are known otherwise, such as alpha from a scan, in SI units.
     law: values of all parameters that are not free, `mating_length` among them; None takes rock
-        asperities, `forward.DEFAULT`, of "individual" formation. A law of one plane stays one; its
-        heights must be GammaHeights. Its bond keeps stiffnesses and, where cohesion or tension
-        change, the ratio of each given energy to the elastic energy at the peak.
+        asperities, `forward.DEFAULT`, of "individual" formation. A law of one plane stays one.
+        Heights of another kind than GammaHeights, or none, are kept. Its bond keeps stiffnesses
+        and, where cohesion or tension change, the ratio of each given energy to the elastic energy
+        at the peak.
     priors: 95 % ranges (low, high) in physical units instead of the defaults of `priors.PRIORS`,
         or None to drop one. Besides the parameters: "full_contact_stress".
 

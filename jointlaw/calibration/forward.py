@@ -1,7 +1,7 @@
 """The forward model: parameters by name to a law and to its closure curve, and a law to them."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, is_dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -15,7 +15,7 @@ from ..laws.joint_law import SHORTEST, JointLaw
 from ..parameters.asperity import Asperity
 from ..parameters.bond import MODES, Bond
 from ..parameters.declared import parameters_of
-from ..parameters.heights import GammaHeights
+from ..parameters.heights import GammaHeights, HeightDistribution
 from ..parameters.orientation import Orientation
 from ..parameters.resolution import SLIP, resolve
 from ..parameters.rock import ROCK
@@ -46,24 +46,20 @@ class Settings:
 def fitted(law: JointLaw) -> dict[str, Any]:
     """The parts of a law that hold parameters which a fit may find, by name; "" is the law."""
     parts = {part: getattr(law, part) if part else law for part in PARTS}
-    return {part: value for part, value in parts.items() if value is not None}
+    return {part: value for part, value in parts.items() if is_dataclass(value)}
 
 
 def parameters(law: JointLaw | None) -> tuple[dict[str, float], Settings]:
     """Parameters of a law by name, those that a fit may find, and its settings.
 
-    Of a law with a bond its cohesion and tension too. Raises ValueError for heights that are not
-    gamma distributed.
+    Of a law with a bond its cohesion and tension too, of one with heights theirs. Raises ValueError
+    for a law without asperities.
     """
     settings = Settings()
     if law is not None:
         if not isinstance(law, JointLaw):
             raise ValueError(f"law: {type(law).__name__} cannot be fitted; give it a JointLaw")
         settings = Settings(law, law.resolution, law.closure_range, law.plane)
-    if not isinstance(settings.law.heights, GammaHeights):
-        raise ValueError(
-            f"law: heights = {settings.law.heights!r} cannot be fitted; give it GammaHeights"
-        )
     values = {
         name: getattr(part, name)
         for part in fitted(settings.law).values()
@@ -140,13 +136,15 @@ def _yielded(values: Values, closure: Array, force: Array, settings: Settings) -
     return taken / facet_sum(nodes.theta, scale, p.lam, p.mu)
 
 
-def _force(closure: Array, eta: float, heights: GammaHeights) -> Array:
+def _force(closure: Array, eta: float, heights: HeightDistribution | None) -> Array:
     """The virgin curve Phi at closures (m, n), a hundred times in a fit.
 
     Asperities of gamma heights that each feel the closure since they touched have a closed form,
     int_0^y (y - r)^(1 + eta) dH(r), by Kummer's function; a product of positive terms.
     """
     y, power = np.maximum(closure, 1e-15), 1 + eta
+    if not isinstance(heights, GammaHeights):
+        return exact_force(y, eta, heights)[0]
     far = heights.alpha > 30 or y.max() > 300 * heights.beta  # beyond what Kummer's function can
     if far or heights.formation != "individual" or heights.overlap > 0:
         return exact_force(y, eta, heights)[0]
@@ -173,10 +171,11 @@ def _strengths(v: Values, given: Bond) -> dict[str, Any]:
     return changed
 
 
-def _heights(v: Values, settings: Settings) -> GammaHeights:
-    heights = settings.law.heights
-    assert isinstance(heights, GammaHeights)
-    return replace(heights, alpha=v["alpha"], beta=v["beta"], overlap=v["overlap"])
+def _heights(v: Values, settings: Settings) -> HeightDistribution | None:
+    held = fitted(settings.law).get("heights")
+    if held is None:
+        return settings.law.heights
+    return replace(held, **{n: v[n] for n, said in parameters_of(held).items() if said.fit})
 
 
 @lru_cache(maxsize=256)

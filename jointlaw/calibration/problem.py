@@ -172,7 +172,9 @@ def pose(
             names.append("seating")
     if not names:
         raise ValueError("free is empty: name at least one parameter to fit")
-    chosen = normal_priors(tuple(names), priors)
+    # its prior is stated for the standard deviation of gamma heights
+    off = {} if "alpha" in values else {"full_contact_stress": None}
+    chosen = normal_priors(tuple(names), {**off, **(priors or {})})
     return Problem(tuple(curves), tuple(names), values, chosen, settings)
 
 

@@ -4,6 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
+from kinds import HISTOGRAM
 
 import jointlaw as jl
 import jointlaw.calibration.fit
@@ -68,6 +69,17 @@ def test_every_law_that_is_tried_moves_the_bar(grimsel, monkeypatch):
     fit = jl.fit_closure(*grimsel)
     assert len(tried) > 20
     assert pickle.loads(pickle.dumps(fit)).parameters == fit.parameters
+
+
+@pytest.mark.parametrize("heights", [None, HISTOGRAM], ids=["none", "histogram"])
+def test_a_law_keeps_heights_that_no_fit_finds(make_law, heights):
+    start, true = (make_law(heights=heights, asperity_density=n) for n in (3e9, 1e10))
+    closure = np.linspace(0.0, 1e-6, 8)
+    fit = jl.fit_closure(true.normal_stress(closure), closure, law=start, free=["asperity_density"])
+    assert fit.parameters["asperity_density"] == pytest.approx(1e10, rel=1e-6)
+    assert fit.law.heights == heights
+    with pytest.raises(ValueError, match="'alpha' is unknown"):
+        jl.fit_closure(true.normal_stress(closure), closure, law=start, free=["alpha"])
 
 
 @pytest.mark.slow

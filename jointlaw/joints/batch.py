@@ -246,7 +246,7 @@ class JointBatch:
         """Rows of the states of all joints, as a copy (n,) or (n, rows): three times as fast as by
         a list of joints."""
         kept: Array = np.moveaxis(self._state[:, rows], -1, 1)
-        return np.array(kept).reshape(-1, *kept.shape[2:])[: self._n]
+        return np.array(kept, order="C").reshape(-1, *kept.shape[2:])[: self._n]
 
     def _ledger(self, name: str, part: str) -> Array:
         """A part of the ledger, if it is kept."""

@@ -160,6 +160,25 @@ def test_closures_whose_forces_overflow(law, ask):
             ask(law, value)
 
 
+def test_a_pure_step_that_overflows_is_refused(law):
+    far = np.array([1.1 * law.largest_reach, 0.0, 0.0])
+    with pytest.raises(ValueError, match="joint 1: .* leads beyond largest_reach"):
+        law.step(np.zeros((2, law.state_size)), [[1e-7, 0.0, 0.0], far])
+    states = np.zeros(law.state_size)
+    states[:3] = far
+    with pytest.raises(ValueError, match="leads beyond largest_reach"):
+        law.step(states, np.zeros(3))
+
+
+def test_truths_and_masks(law):
+    for mated in ([True], [True, True], 1, "yes"):
+        with pytest.raises(ValueError, match=r"mated = .* must be True or False, or an array"):
+            law.joints(3, mated=mated)
+    hidden = np.ma.masked_array([1e-7, 0.0, 0.0], [False, True, False])
+    with pytest.raises(ValueError, match="d has masked numbers"):
+        law.joint().update(hidden)
+
+
 def test_stresses_that_have_no_closure(law):
     with pytest.raises(ValueError, match=re.escape("normal_stress = -1.0 is out of bounds")):
         law.closure(-1.0)

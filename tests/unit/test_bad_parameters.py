@@ -2,6 +2,7 @@
 
 import re
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -162,7 +163,7 @@ def test_closures_whose_forces_overflow(law, ask):
 
 def test_a_pure_step_that_overflows_is_refused(law):
     far = np.array([1.1 * law.largest_reach, 0.0, 0.0])
-    with pytest.raises(ValueError, match="joint 1: .* leads beyond largest_reach"):
+    with pytest.raises(ValueError, match=r"joint 1: .* leads beyond largest_reach"):
         law.step(np.zeros((2, law.state_size)), [[1e-7, 0.0, 0.0], far])
     states = np.zeros(law.state_size)
     states[:3] = far

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scene_text import ROCK
 
 from dem_demo import Refused, Simulation, parse
 from dem_demo.cli import main
@@ -12,16 +13,11 @@ from dem_demo.output.run import run
 from dem_demo.studies.ablate import _run, ablate, variants
 
 # A smooth joint, atan(0.4) + 90/20 = 26.3 degrees at most, on a slope of 22 degrees.
-SLOPE = """
+SLOPE = f"""
 title = "Block on a slope"
 gravity = [3.675, -9.096]
 [laws.rock]
-asperity_density = 1e4
-mating_length = 2e-3
-orientation = { a = 20.0, b = 0.2, c = 0.2 }
-asperity = { K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }
-heights = { alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }
-[[block]]
+{ROCK.replace("a = 3.0", "a = 20.0, b = 0.2, c = 0.2")}[[block]]
 name = "base"
 box = [4.0, 0.5]
 at = [0.5, -0.25]

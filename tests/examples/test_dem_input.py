@@ -207,20 +207,6 @@ def test_a_record_moves_its_block(tmp_path, title):
     np.testing.assert_allclose(found, [*twice, twice[-1] + 0.03], atol=1e-15)
 
 
-def test_plain_coulomb_is_what_its_numbers_say():
-    """Springs kn and ks, a cap of friction times normal stress: by hand, to rounding."""
-    kn, ks, mu = 1e9, 8e8, 0.3
-    joints = jl.CoulombLaw(kn, ks, mu, plane=0.0).joints(1)
-    sums = np.cumsum([[2e-5, 0.0], [0.0, 4e-6], [0.0, 4e-5], [-1e-5, 0.0], [-2e-5, 0.0]], axis=0)
-    shear = [0.0, ks * 4e-6, mu * kn * 2e-5, mu * kn * 1e-5, 0.0]
-    for i, (closure, slid) in enumerate(sums):
-        F, _ = joints.update([[closure, slid]] - joints.delta, tangent=False)
-        assert F[0] == pytest.approx([kn * max(closure, 0.0), shear[i]], rel=1e-12, abs=1e-9)
-    never = jl.CoulombLaw(kn, ks, np.inf, plane=0.0).joints(1)
-    F, _ = never.update([[1e-9, 1.0]], tangent=False)
-    assert F[0, 1] == pytest.approx(ks, rel=1e-12)
-
-
 def test_a_law_by_name_and_the_keys_that_replace_its_own():
     given = jl.presets.load("westerly-rough")
     keys = {"from": "westerly-rough", "asperity": {"mu": 0.5}}

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scene_text import ROCK
 
 import jointlaw as jl
 from dem_demo import Simulation, load, parse
@@ -97,15 +98,8 @@ def test_slope_with_rock_bridges_fails_step_by_step_as_its_strength_falls():
 def test_factor_of_safety_of_a_rough_bonded_block():
     """Brittle bond and asperities that climb: the joint's own peak over the weight along it."""
     bond = f"normal_stiffness = 1e8, shear_stiffness = 1e8, tension = {T}, cohesion = {C}"
-    law = f"""
-asperity_density = 1e4
-mating_length = 5e-3
-resolution = {{ u = 3, phi = 4, depth = 1 }}
-orientation = {{ a = 6.0 }}
-asperity = {{ K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }}
-heights = {{ alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }}
-bond = {{ {bond} }}
-"""
+    rock = ROCK.replace("a = 3.0", "a = 6.0").replace("2e-3", "5e-3")
+    law = f"{rock}resolution = {{ u = 3, phi = 4, depth = 1 }}\nbond = {{ {bond} }}\n"
     angle, wide, high = np.radians(35.0), 4.0, 0.2
     scene = block(law, (G * np.sin(angle), -G * np.cos(angle)), box=(wide, high))
     weight = RHO * G * wide * high

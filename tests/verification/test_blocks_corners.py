@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from block_forces import contact_forces
+from scene_text import ROCK
 
 from dem_demo import Simulation, parse
 
@@ -13,13 +14,7 @@ shear_stiffness = 8e8
 friction = 0.0
 """
 COULOMB = ELASTIC.replace("0.0", "1.0")
-JOINT = """
-asperity_density = 1e4
-mating_length = 2e-3
-orientation = { a = 4.0, b = 0.0, c = 0.0 }
-asperity = { K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }
-heights = { alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }
-"""
+JOINT = ROCK.replace("a = 3.0", "a = 4.0")
 
 
 def scene(law, width, height, at, angle=0.0, velocity=(0.0, 0.0), spin=0.0, run="", more=""):

@@ -2,16 +2,11 @@
 
 import numpy as np
 import pytest
+from scene_text import ROCK
 
 from dem_demo import Simulation, parse
 
-REPLICA = """
-asperity_density = 1e4
-mating_length = 2e-3
-orientation = { a = 4.0, b = 0.0, c = 0.0 }
-asperity = { K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }
-heights = { alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }
-"""
+REPLICA = ROCK.replace("a = 3.0", "a = 4.0")
 COULOMB = """
 kind = "coulomb"
 normal_stiffness = 1e9

@@ -4,17 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scene_text import ROCK
 
 from dem_demo import Simulation, load, parse
 
-LAW = """
-[laws.rock]
-asperity_density = 1e4
-mating_length = 2e-3
-orientation = { a = 4.0, b = 0.0, c = 0.0 }
-asperity = { K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }
-heights = { alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }
-"""
+LAW = "[laws.rock]\n" + ROCK.replace("a = 3.0", "a = 4.0")
 PILE = {
     "base": ([4.0, 1.0], [0.0, -0.5], 0.0),
     "left": ([1.0, 0.5], [-0.5, 0.25], 0.0),

@@ -2,19 +2,15 @@
 
 import numpy as np
 import pytest
+from scene_text import ROCK
 
 import jointlaw as jl
 from dem_demo import Simulation, parse
 
-SCENE = parse("""
+SCENE = parse(f"""
 [laws.rock]
-asperity_density = 1e4
-mating_length = 2e-3
-plane = 0.0
-resolution = { u = 4, phi = 10, depth = 1 }
-orientation = { a = 4.0, b = 0.0, c = 0.0 }
-asperity = { K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }
-heights = { alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }
+{ROCK.replace("a = 3.0", "a = 4.0")}plane = 0.0
+resolution = {{ u = 4, phi = 10, depth = 1 }}
 [[block]]
 name = "base"
 box = [8.0, 1.0]

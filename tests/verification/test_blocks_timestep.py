@@ -1,7 +1,10 @@
 """The predicted critical time step is sharp: bounded at 0.95 of it, diverging at 1.05."""
 
+import tomllib
+
 import numpy as np
 import pytest
+from scene_text import ROCK
 
 from dem_demo import Refused, Simulation, parse
 from dem_demo.contact import virgin_curve
@@ -78,18 +81,7 @@ def test_diverges_above_the_limit(blocks, zeta):
 
 def test_stiffness_at_stress_bounds_a_sheared_joint():
     """The time step takes stiffness from normal stress: the unsheared joint must be stiffest."""
-    law = build_law(
-        {
-            "asperity_density": 1e4,
-            "mating_length": 2e-3,
-            "orientation": {"a": 3.0},
-            "asperity": {"K": 9.5e6, "lam": 1.2, "eta": 0.5, "mu": 0.4},
-            "heights": {"alpha": 3.82, "beta": 1.15e-3, "overlap": 3e-3},
-        },
-        "law",
-        Files(),
-    )
-
+    law = build_law(tomllib.loads(ROCK), "law", Files())
     curve, rng = virgin_curve(law), np.random.default_rng(5)
     batch, closure = law.joints(40), law.closure(np.geomspace(5e3, 3e5, 40))
     batch.update(np.column_stack([closure, np.zeros(40)]), tangent=False)
@@ -104,14 +96,9 @@ def test_stiffness_at_stress_bounds_a_sheared_joint():
     assert 0.3 < worst < 1.0
 
 
-FALL = """
+FALL = f"""
 [laws.rock]
-asperity_density = 1e4
-mating_length = 2e-3
-orientation = { a = 3.0 }
-asperity = { K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }
-heights = { alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }
-[[block]]
+{ROCK}[[block]]
 name = "base"
 box = [3.0, 1.0]
 at = [0.0, -0.5]

@@ -65,20 +65,20 @@ def test_the_intervals_hold_the_truth_of_a_converged_law(law):
 def test_the_opening_tells_friction_from_slopes(law):
     """Without it both are named as not fixed, and fits as good open by what was not measured."""
     stress, opening = measured(law, SHEAR)
-    start = replace(law, orientation=jl.Orientation(2.6, 0.3))
-    both = ShearCurve(SHEAR, stress, 5e6, opening=opening)
-    fit = jl.fit_curves([both], law=start, free=("mu", "a"))
-    assert set(fit.identifiable) == {"mu", "a"}
+    asperity = replace(law.asperity, mu=0.6)
+    start = replace(law, orientation=jl.Orientation(2.6, 0.3), asperity=asperity)
+    both, free = ShearCurve(SHEAR, stress, 5e6, opening=opening), ("mu", "a", "asperity_density")
+    fit = jl.fit_curves([both], law=start, free=free)
+    assert set(fit.identifiable) == set(free)
     assert [fit.parameters["mu"], fit.parameters["a"]] == pytest.approx([0.5, 3.0], rel=0.01)
     known = np.subtract(*fit.interval("mu")[::-1])
-    free = ("mu", "a", "asperity_density")
     alone = jl.fit_curves([replace(both, opening=None)], law=start, free=free)
     assert {"mu", "a"} <= set(alone.not_identifiable)
     (least, flat), (most, steep) = alone.openings
     assert least < np.ptp(opening) < most
     assert flat < steep
     assert "fits that these data allow open by" in alone.report()
-    assert np.subtract(*alone.interval("mu")[::-1]) > 2 * known
+    assert np.subtract(*alone.interval("mu")[::-1]) > 5 * known
     # friction that is known from elsewhere leaves the slopes to the shear stress
     held = jl.fit_curves([replace(both, opening=None)], law=law, free=("a",))
     assert held.identifiable == ("a",)
@@ -111,10 +111,10 @@ def test_a_long_record_keeps_its_peak_turns_and_ends():
     assert "of 1000 rows are fitted" in kept.notes[0]
 
 
-def test_scatter_of_the_displacement_is_no_reversal(law):
-    """A gauge that flickers by 0.2 % gives the stresses of a steady one."""
+def test_scatter_of_the_displacement_is_no_reversal():
+    """A gauge that flickers by 0.2 % has no turns but its ends."""
     flicker = SHEAR + 6e-8 * np.tile([0, 1, -1], 4)
-    many = np.sort(np.concatenate([flicker, flicker - 1e-7]))[::1]
+    many = np.sort(np.concatenate([flicker, flicker - 1e-7]))
     many[1::2], many[::2] = many[::2].copy(), many[1::2].copy()
     curve = ShearCurve(many, np.ones(24), 5e6)
     assert curve.turns == [0, 23]

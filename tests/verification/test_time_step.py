@@ -1,11 +1,14 @@
 """The bound of |C| and the explicit time step that follows from it: in touch, open, sheared far."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import jointlaw as jl
+from jointlaw.kernels.asperities import effective_closure
+from jointlaw.kernels.stiffness import stiffness_of
 
 R = 1e-6  # closure range, m
 
@@ -73,6 +76,24 @@ def test_heights_of_two_groups_are_bounded(eta):
     assert share.max() <= 1.0
     others = (1.0 + 0.6) * law.curve.force(closure)[1] * np.sum(k.area / k.c1)
     assert (np.linalg.norm(C, 2, axis=(1, 2)) / others).max() > 2.0  # the bound of other heights
+
+
+def test_slopes_that_fade_at_once_are_bounded():
+    """Normal forces and friction limits turn: |C| is far above the bound of straight slopes."""
+    rng = np.random.default_rng(0)
+    law = jl.JointLaw(
+        orientation=jl.Orientation(1.0), asperity=jl.Asperity(1e7, 1.2, 0.0, 1.0),
+        asperity_density=1e10, closure_range=R, mating_length=0.1 * R, plane=0.0,
+    )  # fmt: skip
+    joints, straight, most = law.joints(60), replace(law, mating_length=np.inf).tables, 0.0
+    for _ in range(20):
+        d = 0.1 * R * rng.normal(size=(60, 2))
+        d[:, 0] = R * rng.uniform(0.05, 4.0, 60) - joints.delta[:, 0]
+        size = np.linalg.norm(joints.update(d)[1], 2, axis=(1, 2))
+        assert (size <= joints.max_stiffness()).all()
+        y = effective_closure(law.tables.asperities, joints.delta.T, np.ones(60))
+        most = max(most, np.max(size / stiffness_of(straight.asperities, y)))
+    assert most > 1.5
 
 
 def test_an_unmated_joint_has_a_step_at_its_negative_closure(make_law):

@@ -118,6 +118,14 @@ def test_a_joint_closed_beyond_its_highest_asperity_gives_a_warning():
         stiff.joint(30e6)
 
 
+def test_shear_without_friction_wears_no_slopes():
+    joint = law(mu=0.0, mating_length=3.0, slope_wear=1e-3, plane=0.0).joint(0.3)
+    joint.update([0.0, 0.5])
+    joint.update([0.0, 0.5])
+    assert joint.F[1] > 0.0  # it climbs
+    assert joint.slopes == 1.0
+
+
 def test_closing_and_opening_wear_no_slopes():
     """Facets rub where a joint closes; real joints keep their slopes without shear."""
     one = law(mu=0.4, mating_length=3.0, slope_wear=1e-3, plane=0.0)

@@ -82,7 +82,7 @@ class FacetTables:
 
     @property
     def dim(self) -> int:
-        """Components of a displacement: 3, or 2 in one plane."""
+        """Components of a displacement: 3, 2 in one plane, 1 for closure alone."""
         return len(self.m)
 
     @property

@@ -168,7 +168,7 @@ def _tabulate(
     return table, float(np.max(np.abs(half - S[1::2])))
 
 
-def _hermite(value: Array, slope: Array, rises: bool = True) -> Array:
+def _hermite(value: Array, slope: Array, rises: bool) -> Array:
     """Cubic coefficients (cells, 4) through node values and slopes per cell.
 
     Slopes of what `rises` are held below three times the rise of either neighbour, so that the

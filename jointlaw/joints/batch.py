@@ -139,9 +139,8 @@ class JointBatch:
 
     def unbond(self, index: Index) -> None:
         """Break bond or cohesion of the joints at `index`: faces that meet anew have none."""
-        row = self._row("damage")
-        if row.size:
-            self._state[at(self._state, self._index(index), int(row[0]))] = 1.0
+        if (row := self.law.tables.first.get("damage")) is not None:
+            self._state[at(self._state, self._index(index), row)] = 1.0
 
     def resize(self, n: int) -> None:
         """Change the number of joints; joints beyond the old number are new and mated."""
@@ -227,20 +226,14 @@ class JointBatch:
     @property
     def damage(self) -> Array:
         """Damage (n,) of bond or cohesion: 0 whole, 1 broken, and 1 where the law has none."""
-        return self._part("damage") if self._row("damage").size else np.ones(self._n)
+        return self._part("damage", absent=1.0)
 
     # --------------------------------------------------------------- internals
 
-    def _part(self, name: str) -> Array:
-        """A row of the states of all joints, by its name; zeros where the law has none."""
-        rows = self._row(name)
-        return self._all(rows[0]) if rows.size else np.zeros(self._n)
-
-    def _row(self, name: str) -> NDArray[np.intp]:
-        """Numbers of the rows of this name, none or one."""
-        ends = np.cumsum(list(self.law.tables.names.values()))
-        names = dict(zip(self.law.tables.names, ends, strict=True))
-        return np.array([names[name] - 1] if name in names else [], np.intp)
+    def _part(self, name: str, absent: float = 0.0) -> Array:
+        """A row of the states of all joints, by its name; `absent` where the law has none."""
+        row = self.law.tables.first.get(name)
+        return np.full(self._n, absent) if row is None else self._all(row)
 
     def _all(self, rows: Any) -> Array:
         """Rows of the states of all joints, as a copy (n,) or (n, rows): three times as fast as by

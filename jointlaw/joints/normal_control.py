@@ -23,11 +23,6 @@ class NormalCondition(NamedTuple):
     spring: float = 0.0
     seat: float = 0.0
 
-    def misfit(self, F1: Array, closure: Array) -> Array:
-        """How far F1 (n,) in Pa lies above what the condition asks at these closures (n,) in m."""
-        miss: Array = F1 - self.stress - self.spring * (self.seat - closure)
-        return miss
-
 
 def closing_increments(
     batch: JointBatch, step: Array, condition: NormalCondition, tolerance: float = TOLERANCE
@@ -47,7 +42,7 @@ def closing_increments(
     for _ in range(_TRIES):
         F, C = batch.trial(trial)
         assert C is not None
-        miss = condition.misfit(F[:, 0], here + u)
+        miss = F[:, 0] - condition.stress - condition.spring * (condition.seat - (here + u))
         # an open joint meets a stress of zero anywhere: look for the point of contact
         met = (np.abs(miss) <= tolerance * np.asarray(condition.scale)) & (
             (F[:, 0] != 0) | (miss != 0)

@@ -6,11 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..support.checks import Array
-from ..support.thresholds import LIMIT, ROUNDED
+from ..support.thresholds import LIMIT, ROUNDED, STICKS, STRONGEST
 from .element import Element, Measures, Share
-
-STICKS = 1e30  # a friction from here on counts as infinite
-_OVERFLOW = 1e70  # Pa: fourth powers beyond it overflow
 
 
 class Slid(NamedTuple):
@@ -43,7 +40,7 @@ class Coulomb(Element):
         # beyond cohesion/friction there is no strength in shear
         apex = self.cohesion / self.friction if self.friction > 0.0 else np.inf
         self.tension = min(p.tension, apex)
-        self.reach = _OVERFLOW / max(self.normal * (1.0 + self.friction), self.shear, 1.0)
+        self.reach = STRONGEST / max(self.normal * (1.0 + self.friction), self.shear, 1.0)
         self.farthest = self.reach
 
     def numbers(self) -> dict[str, float]:
@@ -208,10 +205,7 @@ def leaving(q: Array, dq: Array, cap: Array, rise: Array) -> tuple[NDArray[np.bo
     A t^2 + 2 B t = C, free of cancellation.
     """
     leaves = np.sqrt(squared(q + dq)) > (cap + rise) * (1.0 + ROUNDED)
-    cap, rise = (
-        np.where(leaves, cap, 0.0),
-        np.where(leaves, rise, 0.0),
-    )  # whose squares may overflow
+    cap, rise = np.where(leaves, [cap, rise], 0.0)  # squares of the others may overflow
     A = squared(dq) - rise * rise
     B = np.sum(q * dq, axis=0) - cap * rise
     C = np.maximum(cap * cap - squared(q), 0.0)

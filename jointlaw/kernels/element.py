@@ -76,4 +76,4 @@ class Element(ABC):
 
     def measures(self, delta: Array, state: Array) -> Measures:
         """What slips, touches and is stored; asked of the first element of a joint."""
-        raise NotImplementedError(f"{type(self).__name__} stands beside asperities alone")
+        raise NotImplementedError(f"{type(self).__name__} may only stand beside asperities")

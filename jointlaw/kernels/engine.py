@@ -156,25 +156,17 @@ class NumpyEngine:
         return function(self.tables, np.ascontiguousarray(rows))
 
 
-class NativeLaw:
-    """The tables of a law as the library reads them."""
-
-    def __init__(self, tables: Tables) -> None:
-        numbers, arrays = pack(tables)
-        arrays = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
-        pointers = {name: array.ctypes.data for name, array in arrays.items()}
-        self._arrays = arrays  # which the structure points to
-        self._law = Law(**numbers, **pointers)
-        self.address = ctypes.addressof(self._law)
-
-
 class NativeEngine:
     """The compiled law, on all threads where there is work for them."""
 
     name = "native"
 
     def __init__(self, tables: Tables, loaded: ctypes.CDLL) -> None:
-        self._law, self._sliders = NativeLaw(tables), tables.sliders
+        numbers, arrays = pack(tables)
+        # kept, for the structure points to them
+        self._arrays = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
+        pointers = {name: array.ctypes.data for name, array in self._arrays.items()}
+        self._law, self._sliders = Law(**numbers, **pointers), tables.sliders
         self._library, self.lanes = loaded, library.lanes(loaded)
         # rows of a block: the state, then Phi and Phi' of all facets, which save half the look-ups;
         # with flattened facets, the same at their depth
@@ -213,9 +205,9 @@ class NativeEngine:
     def _prepared(self, state: Array, n: int, *arrays: int | None) -> library.BatchCall:
         """A call for n joints; arrays: where d, F, C, what is shown and the index begin."""
         _, rows, lanes = state.shape
-        given = *arrays, *[None] * (5 - len(arrays))
+        given = address(state), *arrays, *[None] * (5 - len(arrays))
         return library.BatchCall(
-            self._law.address, address(state), *given, n, 0, 0, rows, lanes == 1, self.lanes
+            ctypes.addressof(self._law), *given, n, 0, 0, rows, lanes == 1, self.lanes
         )
 
     def _run(self, what: int, call: library.BatchCall) -> None:

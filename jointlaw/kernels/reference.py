@@ -11,6 +11,7 @@ where delta is counted from the mated position.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate
 from types import SimpleNamespace
 
 import numpy as np
@@ -35,6 +36,11 @@ class Tables:
         """Rows of a state by name, in their order: how many of each."""
         own = [row for element in self.elements for row in element.rows.items()]
         return {"delta": self.dim, "dissipated": 1, **dict(own)}
+
+    @cached_property
+    def first(self) -> dict[str, int]:
+        """Number of the first row of each name."""
+        return dict(zip(self.names, accumulate(self.names.values(), initial=0), strict=False))
 
     @cached_property
     def rows(self) -> int:
@@ -91,7 +97,7 @@ def step(k: Tables, state: Array, d: Array, tangent: bool) -> tuple[Array, Array
     """Advance joints by the increments d (dim, B): new state, F (dim, B), C (dim, dim, B).
 
     The displacement grows by d; tractions, tangents and losses of the elements add up. Their own
-    numbered steps: `Asperities.step`, `hold` of the bond, `Coulomb.step`.
+    numbered steps: `Asperities.step`, `Bonded.step`, `Coulomb.step`.
     """
     new, dim = np.array(state), k.dim
     new[:dim] += d
@@ -111,10 +117,10 @@ def parts(k: Tables, state: Array) -> SimpleNamespace:
 
     Those of asperities as `asperities.State` has them, and the share of the slopes that is left.
     """
-    named, at = {}, 0
-    for name, several in k.names.items():
-        named[name] = state[at] if several == 1 and at else state[at : at + several]
-        at += several
+    named = {
+        name: state[at] if several == 1 and at else state[at : at + several]
+        for (name, several), at in zip(k.names.items(), k.first.values(), strict=True)
+    }
     for element, (own,) in k.own(state):
         if isinstance(element, Asperities):
             now = asperities.parts(element.k, own)

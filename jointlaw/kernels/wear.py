@@ -23,9 +23,9 @@ def lowered(
     """
     kept = np.minimum(now.kappa * reciprocal(old.kappa), 1.0)
     kept = np.where(now.kappa < old.kappa, kept, 1.0)
-    size = kept * np.sqrt(q[0] ** 2 + q[1] ** 2)
+    q2 = q[0] ** 2 + q[1] ** 2
+    size = kept * np.sqrt(q2)
     cap = strength * now.G
     share = kept * np.divide(cap, size, out=np.ones_like(size), where=size > cap)
-    q2 = q[0] ** 2 + q[1] ** 2
     lost = q2 * (reciprocal(old.kappa) - share**2 * reciprocal(now.kappa))
     return share * q, np.sum(compliance(k) * lost, axis=(0, 1))

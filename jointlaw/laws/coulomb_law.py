@@ -9,9 +9,7 @@ from ..kernels.coulomb import Coulomb
 from ..kernels.reference import Tables
 from ..parameters.bond import LARGEST
 from ..parameters.declared import check, declared, parameter
-from .law import Law
-
-CLOSED = 20e6  # Pa; its closure is the closure_range, as by default of a `JointLaw`
+from .law import DEFAULT_STRESS, Law
 
 
 @declared
@@ -63,9 +61,9 @@ class CoulombLaw(Law, kind="coulomb"):
                 )
 
     @property
-    def closure_range(self) -> float:  # type: ignore[override]
+    def closure_range(self) -> float:
         """Closure (m) at 20 MPa, by which tests and tables choose their steps."""
-        return CLOSED / self.normal_stiffness
+        return DEFAULT_STRESS / self.normal_stiffness
 
     @cached_property
     def tables(self) -> Tables:

@@ -26,12 +26,11 @@ from ..parameters.orientation import Orientation
 from ..parameters.resolution import NAMED, Resolution, named, resolve
 from ..support.checks import finite
 from ..support.thresholds import UNDERFLOW
-from .law import Law
+from .law import DEFAULT_STRESS, Law
 
 if TYPE_CHECKING:
     from ..accuracy.tradeoff import Tradeoff
 
-DEFAULT_STRESS = 20e6  # Pa; its closure is the default closure_range
 SHORTEST = 0.1  # closure ranges: asperities of a smaller mating length are lower than the closure
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -21,19 +20,21 @@ from ..joints.time_step import stable_step
 from ..kernels.engine import step_states
 from ..kernels.reference import Tables, sum_of
 from ..parameters import keys, toml
+from ..parameters.declared import parameters_of
 from ..parameters.fingerprint import fingerprint
 from ..support.checks import Array, finite, truths
 from ..support.files import replace_file
+
+DEFAULT_STRESS = 20e6  # Pa; its closure is the default closure_range
 
 
 class Law:
     """A law: a frozen dataclass of parameters. `JointLaw` is one, `CoulombLaw` another.
 
-    Reading and writing of files, and all that follows from the tables of a law, is here.
+    Reading and writing of files, and all that follows from the tables of a law, is here. Each class
+    has `plane` and `closure_range` besides.
     """
 
-    plane: float | None
-    closure_range: float
     kinds: ClassVar[dict[str, type[Law]]] = {}  # by the names that files have
 
     def __init_subclass__(cls, kind: str, **others: Any) -> None:
@@ -258,6 +259,5 @@ class Law:
         return law
 
     def __getstate__(self) -> dict[str, Any]:
-        names = {one.name for one in fields(self)}  # type: ignore[arg-type]
-        # cached values are computed again when needed
-        return {name: value for name, value in self.__dict__.items() if name in names}
+        # without cached values, which are computed again when needed
+        return {name: getattr(self, name) for name in parameters_of(self)}

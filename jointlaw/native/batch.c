@@ -1,6 +1,6 @@
-/* batch.c: many joints. Compiled several times: with -DW=8, 4 and 2 for states in blocks of
- * JLAW_BLOCK joints side by side, (blocks, rows, JLAW_BLOCK); with -DW=4 -DJLAW_ABREAST for joints
- * one after the other, (joints, rows). -DKIND=_8 and so on ends the names of the functions.
+/* batch.c: many joints. Compiled several times: with -DJL_W=8, 4 and 2 for states in blocks of
+ * JLAW_BLOCK joints side by side, (blocks, rows, JLAW_BLOCK); with -DJL_W=4 -DJLAW_ABREAST for
+ * joints one after the other, (joints, rows). -DKIND=_8 and so on ends the names of the functions.
  */
 #include "batch.h"
 #include "lanes.h"

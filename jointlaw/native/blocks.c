@@ -1,17 +1,7 @@
 /* blocks.c: one step of rigid blocks, around the law's: see blocks.h */
 #include "batch.h"
 #include "blocks.h"
-
-#ifdef __cplusplus
-#define JL_C extern "C"
-#else
-#define JL_C
-#endif
-#ifdef _WIN32
-#define JL_OUT JL_C __declspec(dllexport)
-#else
-#define JL_OUT JL_C __attribute__((visibility("default")))
-#endif
+#include "export.h"
 
 #define LOW 0.03489949670250097  /* sine of 2 degrees: up to there an edge lies on another */
 #define HIGH 0.08715574274765817 /* of 5: from there on it does not */
@@ -164,7 +154,7 @@ static void place_corners(const jl_world *w)
 }
 
 /* All contacts at the motion of the blocks, each where it is */
-JL_OUT void jl_blocks_place(jl_world *w)
+OUT void jl_blocks_place(jl_world *w)
 {
   place_corners(w);
   for (long long i = 0; i < w->contacts; i++) place_contact(w, i);
@@ -184,7 +174,7 @@ static int following(const jl_world *w, long long i, long long *corner, long lon
 }
 
 /* The contacts that come next at the limits of ranges: corners and edges (k,) */
-JL_OUT void jl_blocks_following(const jl_world *w, long long *corner, long long *edge)
+OUT void jl_blocks_following(const jl_world *w, long long *corner, long long *edge)
 {
   for (long long i = 0; i < w->contacts; i++) following(w, i, corner + i, edge + i);
 }
@@ -203,7 +193,7 @@ static int is_double(const jl_world *w, long long i)
 
 /* All contacts at the motion of the blocks, each at the corner and edge where it is by then. Where
  * something new may be next to one, its blocks become urgent. */
-JL_OUT void jl_blocks_follow(jl_world *w)
+OUT void jl_blocks_follow(jl_world *w)
 {
   long long left = 0;
   place_corners(w);
@@ -237,10 +227,10 @@ static double height(const jl_world *w, long long corner, long long edge)
 /* Of pairs (p, 2) of blocks: corners over edges that are `near` or nearer and no deeper than
  * `deepest` (p,) allows, the pairs they belong to (side 1: p + pair), and how far the blocks are
  * apart (2, p), negative where they overlap. Writes at most `room` of them and returns how many. */
-JL_OUT long long jl_blocks_find(const jl_world *w, long long p, const long long *pairs,
-                                const long long *start, const double *near, const double *deepest,
-                                long long room, long long *corner, long long *edge, long long *pair,
-                                double *apart)
+OUT long long jl_blocks_find(const jl_world *w, long long p, const long long *pairs,
+                             const long long *start, const double *near, const double *deepest,
+                             long long room, long long *corner, long long *edge, long long *pair,
+                             double *apart)
 {
   long long found = 0;
   place_corners(w);
@@ -266,7 +256,7 @@ JL_OUT long long jl_blocks_find(const jl_world *w, long long p, const long long 
 /* ------------------------------------------------------------------------ before the law */
 
 /* Increments of all joints, each in its place for its law; notes a contact that is too deep */
-JL_OUT void jl_blocks_press(jl_world *w, double dt)
+OUT void jl_blocks_press(jl_world *w, double dt)
 {
   w->deep = -1;
   for (long long i = 0; i < w->contacts; i++) {
@@ -281,7 +271,7 @@ JL_OUT void jl_blocks_press(jl_world *w, double dt)
 
 /* Move the blocks and follow the contacts; increments for the law. Notes a block that is too fast,
  * before any has moved, and whether blocks have moved so far that contacts must be looked for. */
-JL_OUT void jl_blocks_before(jl_world *w, double dt)
+OUT void jl_blocks_before(jl_world *w, double dt)
 {
   const long long n = w->blocks;
   w->fast = -1;
@@ -312,7 +302,7 @@ JL_OUT void jl_blocks_before(jl_world *w, double dt)
 /* ------------------------------------------------------------------------- after the law */
 
 /* What the law shows of each contact: traction, displacement from first touch, shares */
-JL_OUT void jl_blocks_read(jl_world *w)
+OUT void jl_blocks_read(jl_world *w)
 {
   for (long long i = 0; i < w->contacts; i++) {
     const jl_pool *pool = w->pools + w->law[i];
@@ -359,7 +349,7 @@ static void push(const jl_world *w, double *force, long long i, jl_vector f, dou
 
 /* Forces on the blocks: joints, dashpots, weight and loads, and what drives add so that their blocks
  * have their velocities after dt. Counts the joints that are stiffer than the time step is good for. */
-JL_OUT void jl_blocks_forces(jl_world *w, double dt)
+OUT void jl_blocks_forces(jl_world *w, double dt)
 {
   const long long n = w->blocks, k = w->contacts;
   double *all = w->force, *damped = all + 3 * n, *driven = damped + 3 * n;
@@ -401,7 +391,7 @@ JL_OUT void jl_blocks_forces(jl_world *w, double dt)
   }
 }
 
-/* Add a step to the energies: dynamics/energy.py says how */
+/* Add a step to the energies: dem_demo/dynamics/energy.py says how */
 static void book(jl_world *w, double dt)
 {
   const long long n = w->blocks, k = w->contacts;
@@ -442,7 +432,7 @@ static void book(jl_world *w, double dt)
 }
 
 /* Forces from what the law says, energies, and the velocities to go on with */
-JL_OUT void jl_blocks_after(jl_world *w, double dt)
+OUT void jl_blocks_after(jl_world *w, double dt)
 {
   const long long n = w->blocks;
   jl_blocks_read(w);

@@ -14,7 +14,7 @@ typedef struct {                    /* the joints of one law, by their places in
   const double *F;                  /* (places, 2): tractions after it, Pa */
   const double *shown;              /* (places, JLAW_SHOWN + 2): what batch.h says */
   const double *stress, *stiffness; /* (points,): its virgin curve, Pa and Pa/m */
-  long long points, holds; /* holds: whether joints hold tension until they are damaged */
+  long long points, holds;          /* holds: whether joints hold tension until they are damaged */
 } jl_pool;
 
 typedef struct {
@@ -59,7 +59,7 @@ typedef struct {
 
   const long long *rows, *axes; /* (driven,): blocks and motions that drives move */
   const double *aim;            /* (driven,): velocities that they are to have */
-  double *energy;               /* (8,): as dynamics/energy.py has them */
+  double *energy;               /* (8,): as dem_demo/dynamics/energy.py has them */
 
   long long fast, deep; /* block that moves too fast, contact that is too deep; -1 for none */
   long long moved, stale, stiffer; /* contacts that went on; whether to look; joints to check */

@@ -151,14 +151,15 @@ JL_IN double jl_coulomb_stiffness(const jlaw_law *law, double damage, double clo
 {
   if (damage > 0.0 && closure < 0.0) return 0.0; /* apart */
   const double mu = jl_coulomb_friction(law, law->coulomb_weakening > 0.0 ? damage : 1.0);
-  const double slides = law->coulomb_normal * (mu < 1e30 ? sqrt(1.0 + mu * mu) : 1.0); /* sticks */
+  const double slides = law->coulomb_normal * (mu < JLAW_STICKS ? sqrt(1.0 + mu * mu) : 1.0);
   return slides > law->coulomb_shear ? slides : law->coulomb_shear;
 }
 
 JL_IN int jl_coulomb_good(const jlaw_law *law, const double *row)
 {
   const int last = law->dim - 1;
-  return row[last] >= 0.0 && row[last] <= 1.0 && fabs(row[0]) < 1e70 && fabs(row[last - 1]) < 1e70;
+  return row[last] >= 0.0 && row[last] <= 1.0 && fabs(row[0]) < JLAW_STRONGEST
+         && fabs(row[last - 1]) < JLAW_STRONGEST;
 }
 
 JL_IN void jl_coulomb_turn(const jlaw_law *law, double *row, const double turn[2][2])
@@ -167,7 +168,7 @@ JL_IN void jl_coulomb_turn(const jlaw_law *law, double *row, const double turn[2
   for (int i = 0; i < law->dim - 1; i++) row[i] = turn[i][0] * q[0] + turn[i][1] * q[1];
 }
 
-/* Shares of reference.Measures in a state of these numbers: slides, of the strength too; is apart */
+/* Shares of element.Measures in a state of these numbers: slides, of the strength too; is apart */
 JL_IN void jl_coulomb_shares(const jlaw_law *law, const double *s, size_t stride, double shares[3])
 {
   const int dim = law->dim;

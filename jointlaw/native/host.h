@@ -21,7 +21,7 @@
  * -O3 -fno-math-errno -fno-trapping-math, which change no result; never -ffast-math.
  *
  * Symbols and order of the step are those of the page "theory-incremental" of the documentation
- * and of jointlaw/kernels/reference.py.
+ * and of jointlaw/kernels/asperities.py.
  */
 #ifndef JOINTLAW_H
 #define JOINTLAW_H
@@ -427,20 +427,20 @@ JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s)
   jlaw_turn_elements_(law, s, swap);
 }
 
-/* Numbers of a ring of n facets, read at azimuths turned by the angle: the trigonometric
- * interpolation of n (even) places, or the straight one, which makes no new extremes */
-static JLAW_FUNCTION void jlaw_turn_(double *x, int n, int jl_step, double angle, int straight)
+/* Numbers of a ring of n facets, `apart` from one another, read at azimuths turned by the angle: the
+ * trigonometric interpolation of n (even) places, or the straight one, which makes no new extremes */
+static JLAW_FUNCTION void jlaw_turn_(double *x, int n, int apart, double angle, int straight)
 {
   double old[JLAW_AZIMUTHS];
   const double pi = 3.14159265358979323846;
-  for (int j = 0; j < n; j++) old[j] = x[j * jl_step], x[j * jl_step] = 0.0;
+  for (int j = 0; j < n; j++) old[j] = x[j * apart], x[j * apart] = 0.0;
   for (int j = 0; j < n; j++)
     for (int k = 0; k < n; k++) {
       const double way = remainder(angle + 2.0 * pi * (j - k) / n, 2.0 * pi), half = sin(0.5 * way);
       double weight = 1.0;
       if (straight) weight = fmax(1.0 - fabs(way) * n / (2.0 * pi), 0.0);
       else if (fabs(half) > 1e-9) weight = sin(0.5 * n * way) * cos(0.5 * way) / (n * half);
-      x[j * jl_step] += weight * old[k];
+      x[j * apart] += weight * old[k];
     }
 }
 
@@ -460,8 +460,8 @@ static JLAW_FUNCTION void jlaw_hold_(const jlaw_law *law, double *s)
       jl_hold_cell(cell, o.y1, o.f1, o.k1, o.z1, o.fz1, o.kz1, law->yields, &G, &kappa);
       const jl_real cap = o.strength * G;
       const jl_real size = jl_root(qs * qs + qt * qt);
-      const jl_yes jl_beyond = size > cap;
-      const jl_real share = jl_pick(jl_beyond, cap / jl_pick(jl_beyond, size, 1.0), 1.0);
+      const jl_yes beyond = size > cap;
+      const jl_real share = jl_pick(beyond, cap / jl_pick(beyond, size, 1.0), 1.0);
       jl_put(n, row, D, some, qs * share);
       jl_put(n, row + M * D, D, some, qt * share);
     }
@@ -584,7 +584,7 @@ static const char *jlaw_number_(const char *at, double *number)
 /* Reads all numbers into law; NULL or what is wrong */
 static const char *jlaw_parse_numbers_(const char **at, jlaw_law *law)
 {
-#define X(name, jl_whole, least, most) {#name, offsetof(jlaw_law, name), jl_whole, least, most},
+#define X(name, whole, least, most) {#name, offsetof(jlaw_law, name), whole, least, most},
   static const struct {
     const char *name;
     size_t place;

@@ -1,12 +1,12 @@
-/* lanes.h: W numbers side by side. The law (law.h) is written once, for lanes of three kinds:
+/* lanes.h: W = JL_W numbers side by side. The law (law.h) is written once, for lanes of three kinds:
  *
  *   W joints, W = 8, 4 or 2   a batch; vectors of the compilers gcc, g++, clang, clang++ and zig
  *   one joint, W = 1          plain C99: any compiler, CUDA (a thread is a joint), WebAssembly
  *   four facets of one joint  JLAW_ABREAST, W = 4: one joint at a time
  *
- * A real is a number per lane, a yes is a truth per lane. An of_facet is a number of a facet's
- * tables, an of_joint one of a joint: a double where all lanes share it, else a real. All kinds
- * give the same bits, for facets are added up in the same order: total().
+ * A jl_real is a number per lane, a jl_yes a truth per lane. A jl_of_facet is a number of a facet's
+ * tables, a jl_of_joint one of a joint: a double where all lanes share it, else a jl_real. All kinds
+ * give the same bits, for facets are added up in the same order: jl_total.
  */
 #ifndef JL_W
 #define JL_W 1

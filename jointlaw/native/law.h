@@ -1,6 +1,6 @@
 /* law.h: one step of a rock joint, and what a state amounts to, in lanes (lanes.h).
  *
- * Symbols and order are those of docs/theory-incremental.md and of kernels/reference.py. Rows of
+ * Symbols and order are those of docs/theory-incremental.md and of kernels/asperities.py. Rows of
  * a state: delta (dim) from the mated position | dissipated energy | q_s (M D) | q_t (M D), q times
  * lam; where asperities yield flattened depth (M) | plastic work; with wear the share of the slopes
  * that is gone | work that wears them; then the rows of elements.h. A batch keeps beside them Phi and
@@ -357,8 +357,8 @@ JL_IN void jl_wear_sliders(const double *cell, jl_facets *o, const jl_sliders *c
   const jl_real Q = jl_pick(q2 > JLAW_FAINT, q2, 1.0);
   const jl_real r = 1.0 / (a * b * Q), was = jl_only(had, b * Q * r), is = jl_only(has, a * Q * r);
   jl_real share = jl_pick(kappa > c->k0, c->k0 * was, 1.0);
-  const jl_yes jl_beyond = share * share * q2 > cap2;
-  if (jl_somewhere(jl_beyond)) share = jl_pick(jl_beyond, jl_root(cap2 * (a * b * r)), share);
+  const jl_yes beyond = share * share * q2 > cap2;
+  if (jl_somewhere(beyond)) share = jl_pick(beyond, jl_root(cap2 * (a * b * r)), share);
   o->worn += q2 * (was - share * share * is);
   *qs = share * *qs;
   *qt = share * *qt;
@@ -366,7 +366,7 @@ JL_IN void jl_wear_sliders(const double *cell, jl_facets *o, const jl_sliders *c
 
 /* ------------------------------------------------------------ what a state amounts to */
 
-typedef struct { /* as reference.Measures; of the stored energy that of the shear springs */
+typedef struct { /* as element.Measures; of the stored energy that of the shear springs */
   jl_of_joint sliding, slipping, separated, stored, reach, sheared;
 } jl_amounts;
 
@@ -417,7 +417,7 @@ JL_IN void jl_measure_facets(const jlaw_law *law, const double *f, const jl_face
 /* --------------------------------------------------------------------------- one step */
 
 /* G and kappa of a cell before and after the step. What G gains is taken from the virgin curve: the
- * bounds of `flatten` would show in it where that curve is small and hardly convex. */
+ * bounds of jl_flatten would show in it where that curve is small and hardly convex. */
 JL_IN void jl_cells_of(const double *cell, const jl_facets *o, jl_sliders *c, int yields)
 {
   jl_share_of(cell, o->y0, o->f0, o->k0, &c->G0, &c->k0);

@@ -28,9 +28,9 @@ def number(name: str, value: Any, *, infinite: bool = False) -> float:
     return result
 
 
-def more_than(name: str, value: Any, bound: float, *, infinite: bool = False) -> float:
+def more_than(name: str, value: Any, bound: float) -> float:
     """Return `value` as a float that is strictly larger than `bound`."""
-    result = number(name, value, infinite=infinite)
+    result = number(name, value)
     if not result > bound:
         raise ValueError(f"{name} = {result!r} is out of bounds: it must be > {bound:g}")
     return result

@@ -42,7 +42,7 @@ class Pool(ctypes.Structure):
 
 
 class World(ctypes.Structure):
-    """`jl_world` of blocks.h, which describes its arrays. Calls of the library by their name."""
+    """`jl_world` of blocks.h, which describes its arrays."""
 
     _fields_ = [
         *((name, ctypes.c_longlong) for name in NUMBERS),
@@ -51,8 +51,10 @@ class World(ctypes.Structure):
         *((name, ctypes.c_longlong) for name in FOUND),
     ]
 
-    def bind(self, **arrays: Any) -> None:
-        """Tell the library where arrays lie, and keep them."""
+    def bind(self, holder: Any = None, *names: str, **arrays: Any) -> None:
+        """Tell the library where arrays lie, and keep them: those of these names of an object, and
+        others."""
+        arrays |= {name: getattr(holder, name) for name in names}
         self.__dict__.setdefault("held", {}).update(arrays)
         for name, array in arrays.items():
             setattr(self, name, address(array))

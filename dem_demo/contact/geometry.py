@@ -47,10 +47,10 @@ class Outlines:
 
     def world(self) -> World:
         """What the compiled step knows of them."""
-        names = "local", "way", "side", "block", "before", "after", "placed", "turned"
         world = World(blocks=len(self.start) - 1, corners=len(self.block),
                       corner_length=self.corner_length, soft=self.soft)  # fmt: skip
-        world.bind(**{name: getattr(self, name) for name in names})
+        names = "local", "way", "side", "block", "before", "after", "placed", "turned"
+        world.bind(self, *names)
         return world
 
 

@@ -14,7 +14,7 @@ import jointlaw as jl
 from jointlaw.joints.state import JointState
 from jointlaw.kernels.engine import Step
 
-from ..compiled import SHOWN, Pool, World
+from ..compiled import SHOWN, Pool, World, address
 from ..scene import Law, Scene, opens_to
 
 PARTS = "states", "fingerprint"  # of a snapshot of the joints of a law
@@ -109,13 +109,9 @@ class Held:
 
     def pool(self) -> Pool:
         """What the compiled step knows of them."""
-        arrays = self.step.d, self.step.F, self.step.shown, *self._curve
-        holds = bool(opens_to(self.batch.law) > 0.0)
-        return Pool(*(array.ctypes.data for array in arrays), len(self._curve[0]), holds)
-
-    @property
-    def _curve(self) -> tuple[np.ndarray, np.ndarray]:
-        return self.curve["stress"], self.curve["stiffness"]
+        step, stress = self.step, self.curve["stress"]
+        arrays = step.d, step.F, step.shown, stress, self.curve["stiffness"]
+        return Pool(*map(address, arrays), len(stress), bool(opens_to(self.batch.law) > 0.0))
 
 
 class Joints:
@@ -157,7 +153,7 @@ class Joints:
     def bind(self, world: World) -> None:
         """Tell the compiled step where these arrays lie."""
         names = "law", "place", "touch", "reduction", "traction", "delta", "shares"
-        world.bind(pools=self._pools, **{name: getattr(self, name) for name in names})
+        world.bind(self, *names, pools=self._pools)
 
     def rearrange(
         self, before: np.ndarray, law: np.ndarray, keys: np.ndarray, started: bool = False
@@ -266,8 +262,9 @@ class Joints:
             rows = np.flatnonzero(law == i)
             values, fingerprint = (state[f"{part}-{i}"] for part in PARTS)
             if len(values.T) != len(rows) or len(touch) != len(law):
-                what = "the scene's laws and contacts"
-                raise ValueError(f"the state's joints are not those of {what}")
+                raise ValueError(
+                    "the state's joints are not those of the scene's laws and contacts"
+                )
             held.grow(len(rows))
             held.batch.restore(JointState(str(fingerprint), values.T))
             held.free, place[rows] = [], np.arange(len(rows))

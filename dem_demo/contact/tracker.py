@@ -76,8 +76,7 @@ class Tracker:
     def bind(self, world: World) -> None:
         """Tell the compiled step where these arrays lie."""
         world.max_stale = STALE
-        names = "deepest", "offset", "urgent"
-        world.bind(renewed=self.renewed_at, **{name: getattr(self, name) for name in names})
+        world.bind(self, "deepest", "offset", "urgent", renewed=self.renewed_at)
 
     @property
     def closure(self) -> np.ndarray:
@@ -175,17 +174,15 @@ class Tracker:
         n = len(pairs)
         limit, skin = self.deepest[pairs].min(axis=1), self._skin(*pairs.T)
         near, deepest = 1.5 * skin, 1.5 * limit
-        apart, room, most = np.empty((2, n)), 64, 0
+        apart, room, most = np.empty((2, n)), 0, 64
         world = self.outlines.world()
         world.bind(motion=np.ascontiguousarray(motion, float))
         pairs, start = np.ascontiguousarray(pairs, np.int64), self.outlines.start
-        while most == 0 or most > room:
-            room = max(room, most)
+        given = [address(array) for array in (pairs, start, near, deepest)]
+        while most > room:  # again where there was no room for all
+            room = most
             out = np.empty((3, room), np.int64)
-            given = (address(array) for array in (pairs, start, near, deepest))
             most = world.call("find", n, *given, room, *map(address, out), address(apart))
-            if most == 0:
-                break
         corner, edge, pair = out[:, :most]
         every = Contacts(self.outlines, corner, edge, motion)
         ok = _in_range(every, np.isin(every.codes, known))

@@ -92,12 +92,9 @@ class Blocks:
     def bind(self, world: World) -> None:
         """Tell the compiled step where these arrays lie."""
         names = "motion", "velocity", "inertia", "gravity", "loads", "reach"
-        drives = self.drives
-        world.max_path, world.driven = MOVED, len(drives.rows)
-        world.bind(
-            **{name: getattr(self, name) for name in names}, skin=self.skins, mobile=self._moves,
-            lightness=self._lightness, rows=drives.rows, axes=drives.axes, aim=drives.aim,
-        )  # fmt: skip
+        world.max_path, world.driven = MOVED, len(self.drives.rows)
+        world.bind(self, *names, skin=self.skins, mobile=self._moves, lightness=self._lightness)
+        world.bind(self.drives, "rows", "axes", "aim")
 
     def damping(self, contacts: Contacts, stiffness: np.ndarray) -> np.ndarray:
         """Critical damping (k,) in N s/m: 2 sqrt(stiffness times reduced mass of the two blocks);

@@ -33,8 +33,7 @@ class Ledger:
 
     def bind(self, world: World) -> None:
         """Tell the compiled step where these arrays lie."""
-        names = "last", "area", "lost", "energy"
-        world.bind(force=self.forces, **{name: getattr(self, name) for name in names})
+        world.bind(self, "last", "area", "lost", "energy", force=self.forces)
 
     def open(self, blocks: Blocks, joints: Joints, dt: float, area: np.ndarray) -> None:
         """Begin at time 0, when the velocities of the blocks' motion hold; area (k,) in m2."""

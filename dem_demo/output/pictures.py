@@ -43,12 +43,11 @@ class Pictures:
 
     def __init__(self, record: Record) -> None:
         self.record = record
-        n = len(record.times)
-        corners = np.concatenate([c for i in (0, n - 1) for c in outlines(record, i)])
+        corners = np.concatenate([c for i in (0, -1) for c in outlines(record, i)])
         margin = 0.03 * np.ptp(corners, axis=0).max()
         self.low, self.high = corners.min(axis=0) - margin, corners.max(axis=0) + margin
         start = record.joints[0]["normal_stress_Pa"]
-        whole = [record.joints[i]["normal_stress_Pa"] for i in range(n)]
+        whole = [frame["normal_stress_Pa"] for frame in record.joints]
         pressed = start[start > 0] if (start > 0).any() else np.concatenate(whole)
         pressed = pressed[pressed > 0]
         self.stress = float(np.quantile(pressed, 0.9)) if len(pressed) else 1.0

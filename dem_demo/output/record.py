@@ -37,10 +37,9 @@ class Record:
 
     def take(self, sim: Simulation) -> None:
         """Add the present as a frame."""
-        ledger = sim.ledger
         self.times.append(sim.time)
         self.motion.append(sim.blocks.motion.copy())
-        self.energy.append([*(ledger.value[c] for c in COLUMNS), ledger.error])
+        self.energy.append([*sim.ledger.energy.tolist(), sim.ledger.error])
         self.joints.append(_joints(sim))
         self.monitored.append(readings(sim))
         self.state = sim.state()

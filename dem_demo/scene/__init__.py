@@ -9,20 +9,18 @@ scene      a scene in memory
 read       a scene from its file
 """
 
-from .blocks import Block, smallest_width, turn, usual_size
-from .drives import Drive, Drives
+from .blocks import Block, turn, usual_size
+from .drives import Drives
 from .keys import Tables, overlay
 from .laws import Files, Law, build_law, opens_to
 from .read import TEMPLATE, build, load, parse, read_tables, shipped
-from .scene import Key, Run, Scene
+from .scene import Run, Scene
 
 __all__ = [
     "TEMPLATE",
     "Block",
-    "Drive",
     "Drives",
     "Files",
-    "Key",
     "Law",
     "Run",
     "Scene",
@@ -35,7 +33,6 @@ __all__ = [
     "parse",
     "read_tables",
     "shipped",
-    "smallest_width",
     "turn",
     "usual_size",
 ]

@@ -16,13 +16,13 @@ from .cutting import JointSet, cut
 from .drives import read_drives
 from .keys import LIST, SCENE, TABLE, Tables, overlay, some_of, vector
 from .laws import Files, build_law, opens_to
-from .scene import Rock, Run, Scene
+from .scene import SKIN, Rock, Run, Scene
 
 SCENES = Path(__file__).parent / "scenes"
 TEMPLATE = Path(__file__).parent / "template.toml"
 GRAVITY, DENSITY = (0.0, -9.81), 2600.0  # m/s2, kg/m3
-CORNER, SOFT = 0.1, 0.005  # of the least width of a block
-SOFT_SKIN = 0.25  # of a skin that is given
+CORNER = 0.1  # of the least width of a block
+SOFT = 0.25  # of the skin, that of the narrowest block where none is given
 SLIVER = 0.7  # of the usual width: narrower blocks do not count
 LEAST = 0.2  # narrowest block of a rock as a share of the smallest spacing
 
@@ -103,7 +103,7 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     drives = read_drives(top.get("drive", ()), number, blocks, files, where)
     pairs = _pairs(top.get("joint", ()), number, blocks, where)
     least, skin = min(block.width for block in blocks), top["run"].get("skin")
-    soft = SOFT_SKIN * skin if skin else SOFT * least
+    soft = SOFT * (skin or SKIN * least)
     stands = CORNER * max(least, SLIVER * usual_width(blocks))
     run = Run(**{"corner_length": stands, "soft": soft, **top["run"]})
     watched = _watched(top.get("watch", {}), number, blocks, run.corner_length, f"{where}: watch")

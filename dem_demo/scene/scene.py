@@ -5,11 +5,9 @@ from functools import cached_property
 
 import numpy as np
 
-import jointlaw as jl
-
 from .blocks import Block, usual_width
 from .drives import Drive
-from .laws import Files
+from .laws import Files, Law
 
 SKIN, THIN = 0.02, 0.1  # of the usual width of the blocks that move; at most of a block's own
 Key = tuple[int, int, int, int]  # of an interface: block, edge, block, edge
@@ -65,7 +63,7 @@ class Scene:
 
     title: str
     blocks: tuple[Block, ...]
-    laws: dict[str, jl.JointLaw]
+    laws: dict[str, Law]
     run: Run
     default_law: str
     pairs: dict[frozenset, str] = field(default_factory=dict)
@@ -100,12 +98,14 @@ class Scene:
     def law_of(self, key: Key) -> str:
         """Name of the law of an interface (block, edge, block, edge).
 
-        The law of a [[joint]] table if one names the blocks; else that of the joint set that cut
-        both edges; else the scene's.
+        The law of a [[joint]] table if one names both blocks, or one of them (that of the block
+        that comes first in the scene, if both have one); else that of the joint set that cut both
+        edges; else the scene's.
         """
-        one, other = key[0], key[2]
+        first, edge, second, its = key
+        one, other = sorted((first, second))
         for blocks in ((one, other), (one,), (other,)):
             if law := self.pairs.get(frozenset(blocks)):
                 return law
-        law = self.edge_laws.get((one, key[1]))
-        return law if law and law == self.edge_laws.get((other, key[3])) else self.default_law
+        law = self.edge_laws.get((first, edge))
+        return law if law and law == self.edge_laws.get((second, its)) else self.default_law

@@ -76,8 +76,8 @@ def variants(scene: Scene, record: Record) -> Iterator[tuple[str, Callable[[], S
     record: of the whole scene, for the normal stress that the joints of each law carried.
     """
     carried: dict[str, list[float]] = {name: [] for name in scene.laws}
-    for i, frame in enumerate(record.joints):
-        stresses = record.joints[i]["normal_stress_Pa"].tolist()
+    for frame in record.joints:
+        stresses = frame["normal_stress_Pa"].tolist()
         for who, stress in zip(frame["who"].tolist(), stresses, strict=True):
             carried[scene.law_of(who)] += [stress] * (stress > 0)
     pressed = {name: np.median(of) for name, of in carried.items()

@@ -9,24 +9,20 @@ last scenes are a slope 20 m high, cut ever finer; they start as drawn, without 
 import argparse
 import os
 import time
-from dataclasses import replace
 
 os.environ |= {"JOINTLAW_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # read when numpy is loaded
 
 import pymunk
+from heap import ROCK
+from tables import table
 
 from dem_demo import Simulation, load, parse
 
 PARTS = 5
+HEAD = ["scene", "blocks that move", "contacts", "ms a step", "µs a contact and step of the law",
+        "pymunk's own solver, ms"]  # fmt: skip
 SLOPE = """title = "slope of {spacing} m"
-[laws.rock]
-asperity_density = 1e4
-mating_length = 1.5e-2
-resolution = {{ u = 3, phi = 4, depth = 1 }}
-orientation = {{ a = 2.5 }}
-asperity = {{ K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }}
-heights = {{ alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }}
-[[rock]]
+{law}[[rock]]
 name = "slope"
 outline = [[-26.0, -2.0], [12.0, -2.0], [12.0, 0.0], [0.0, 0.0], [-9.0, 20.0], [-26.0, 20.0]]
 seed = 3
@@ -74,21 +70,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seconds", type=float, default=2.0, help="a scene (default 2)")
     seconds = parser.parse_args().seconds
-    scenes = {name: load(name) for name in ("tilt", "stack", "slope", "slope-full")}
+    scenes, rows = {name: load(name) for name in ("tilt", "stack", "slope", "slope-full")}, []
     for spacing, across in ((0.75, 0.85), (0.33, 0.39)):
-        scenes[f"{spacing} m"] = parse(SLOPE.format(spacing=spacing, across=across))
-    print("| scene | blocks that move | contacts | ms a step | µs a contact and step of the law |"
-          " pymunk's own solver, ms |")  # fmt: skip
-    print("| --- | ---: | ---: | ---: | ---: | ---: |")
+        scenes[f"{spacing} m"] = parse(
+            SLOPE.format(law=ROCK.format(a=2.5, mu=0.4), spacing=spacing, across=across)
+        )
     for name, scene in scenes.items():
-        sim, space = Simulation(replace(scene)), with_own_solver(scene)
+        sim, space = Simulation(scene), with_own_solver(scene)
         for _ in range(20):
             sim.step()
             space.step(sim.dt)
         cost, own = least(sim.step, seconds), least(lambda s=space, d=sim.dt: s.step(d), seconds)
         moves, n = sum(not block.fixed for block in scene.blocks), sim.joints.n
         each = 1e6 * cost / max(n, 1) / scene.run.law_steps
-        print(f"| {name} | {moves} | {n} | {1e3 * cost:.3g} | {each:.2g} | {1e3 * own:.2g} |")
+        rows.append([name, moves, n, f"{1e3 * cost:.3g}", f"{each:.2g}", f"{1e3 * own:.2g}"])
+    print(table(HEAD, rows))
 
 
 if __name__ == "__main__":

@@ -16,15 +16,16 @@ import numpy as np
 from dem_demo import Simulation, load, run
 
 SIZE = 0.6  # m: distance of the centres at the start
-SCENE = """title = "Heap of {n} blocks"
-[laws.rock]
+ROCK = """[laws.rock]
 asperity_density = 1e4
 mating_length = 1.5e-2
 resolution = {{ u = 3, phi = 4, depth = 1 }}
-orientation = {{ a = 3.0 }}
-asperity = {{ K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.6 }}
+orientation = {{ a = {a} }}
+asperity = {{ K = 9.5e6, lam = 1.2, eta = 0.5, mu = {mu} }}
 heights = {{ alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }}
-[run]
+"""
+SCENE = """title = "Heap of {n} blocks"
+{law}[run]
 end = {end}
 seat = false
 largest_stress = 1e4
@@ -36,7 +37,8 @@ corner_length = 0.05
 
 def scene(columns: int, rows: int, end: float) -> str:
     """Blocks of three to six corners in a loose grid, above a floor between two walls."""
-    rng, text = np.random.default_rng(1), [SCENE.format(n=columns * rows, end=end)]
+    rng, law = np.random.default_rng(1), ROCK.format(a=3.0, mu=0.6)
+    text = [SCENE.format(n=columns * rows, law=law, end=end)]
     wide, high = columns * SIZE, rows * SIZE
     for name, size, at in (
         ("floor", [wide + 4.0, 1.0], [0.5 * wide, -0.5]),

@@ -72,14 +72,9 @@ def closure(rng: np.random.Generator) -> Fit:
     return jl.fit_curves([curve], fixed={"alpha": ALPHA}, free=("asperity_density", "beta"))
 
 
-def shear(rng: np.random.Generator) -> Fit:
-    """One direction of shear."""
-    return jl.fit_curves([shear_curve(rng)], law=law(mu=0.6, a=2.6), free=("mu", "a"))
-
-
-def opened(rng: np.random.Generator) -> Fit:
-    """The same with the opening of the joint."""
-    curve = shear_curve(rng, opening=True)
+def shear(rng: np.random.Generator, opening: bool = False) -> Fit:
+    """One direction of shear, also with the opening of the joint."""
+    curve = shear_curve(rng, opening=opening)
     return jl.fit_curves([curve], law=law(mu=0.6, a=2.6), free=("mu", "a"))
 
 
@@ -101,7 +96,7 @@ def closure_and_shear(rng: np.random.Generator) -> Fit:
 CASES: dict[str, Callable[[np.random.Generator], Fit]] = {
     "closure": closure,
     "shear": shear,
-    "shear with opening": opened,
+    "shear with opening": partial(shear, opening=True),
     "two shears": two_shears,
     "closure and shear": closure_and_shear,
 }

@@ -207,17 +207,11 @@ def small_rows(count: int, seed: int) -> list[list[Any]]:
     laws = [jl.presets.load(name) for name in jl.presets.names()]
     laws += [random_law(np.random.default_rng([seed, i])) for i in range(count)]
     found = [small(replace(law, plane=0.0)) for law in track(laws, "laws", len(laws))]
-    made = []
-    for name in found[0]:
-        values = np.array([one[name] for one in found])
-        made.append(
-            [
-                name,
-                f"{np.median(values[:, 0]):.0f}",
-                *(f"{x:.2f}" for x in values[:, 1:].max(axis=0)),
-            ]
-        )
-    return made
+    columns = {name: np.transpose([one[name] for one in found]) for name in found[0]}
+    return [
+        [name, f"{np.median(sliders):.0f}", *(f"{max(largest):.2f}" for largest in missed)]
+        for name, (sliders, *missed) in columns.items()
+    ]
 
 
 def main() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from dem_demo import Simulation, load, parse, run
 from dem_demo.cli import main
-from dem_demo.output.monitors import friction_angle
+from dem_demo.output.monitors import friction_angle, law_between
 from dem_demo.scene import TEMPLATE, read_tables
 from dem_demo.studies.compare import _plain
 from dem_demo.studies.strength import alone, critical_tilt
@@ -162,6 +162,23 @@ def test_joints_have_the_law_of_their_set():
                 expected = law if law == another else "joint"
                 assert scene.law_of((one, i, other, j)) == expected
     assert {law for _, law in edges} == {"joint", "plain"}
+
+
+def test_two_blocks_with_laws_of_their_own_are_told_and_moved_by_the_same():
+    """The law of the first of them, in whichever order a monitor names the two."""
+    box = "[[block]]\nname = '{}'\nbox = [1.0, 1.0]\nat = [0.0, {}]\n"
+    scene = parse(
+        "law = 'rest'\n"
+        + box.format("low", 0.5)
+        + box.format("high", 1.5)
+        + "[[joint]]\naround = [0.0, 0.5]\nlaw = 'soft'\n"
+        + "[[joint]]\naround = [0.0, 1.5]\nlaw = 'hard'\n"
+        + "".join(PLAIN.replace("plain", name) for name in ("hard", "rest", "soft"))
+        + "[run]\nend = 1.0\n"
+    )
+    sim = Simulation(scene)
+    assert law_between(sim, 0, 1) == law_between(sim, 1, 0) == "soft"
+    assert {sim.joints.names[law] for law in sim.joints.law} == {"soft"}
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """A scene in memory: blocks, laws, drives and how to run them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -10,7 +11,6 @@ from .drives import Drive
 from .laws import Files, Law
 
 SKIN, THIN = 0.02, 0.1  # of the usual width of the blocks that move; at most of a block's own
-Key = tuple[int, int, int, int]  # of an interface: block, edge, block, edge
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Scene:
         own = {d.blocks[0] for d in self.drives if len(d.times) > 1 and len(d.blocks) < len(fixed)}
         return min(fixed, key=lambda i: i in own, default=None)
 
-    def law_of(self, key: Key) -> str:
+    def law_of(self, key: Sequence[int]) -> str:
         """Name of the law of an interface (block, edge, block, edge).
 
         The law of a [[joint]] table if one names both blocks, or one of them (that of the block

@@ -79,7 +79,7 @@ def variants(scene: Scene, record: Record) -> Iterator[tuple[str, Callable[[], S
     for frame in record.joints:
         stresses = frame["normal_stress_Pa"].tolist()
         for who, stress in zip(frame["who"].tolist(), stresses, strict=True):
-            carried[scene.law_of(who)] += [stress] * (stress > 0)
+            carried[scene.law_of(who[:4])] += [stress] * (stress > 0)
     pressed = {name: np.median(of) for name, of in carried.items()
                if of and isinstance(scene.laws[name], JointLaw)}  # fmt: skip
     lacking: dict[str, dict[str, Any]] = {}

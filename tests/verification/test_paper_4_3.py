@@ -122,8 +122,8 @@ def test_separation_begins(a):
     total form
     """
     onset = 1 / math.tan(math.pi / (2 * a))
-    linear = law(a, 0.0, 0.0, eta=0.0, plane=0.0, resolution=jl.Resolution(200, 200, 1))
-    # of the incremental law the outermost node lies within 1e-4 of the rim
+    linear = law(a, 0.0, 0.0, eta=0.0, plane=0.0, resolution=jl.Resolution(60, 60, 1))
+    # of the incremental law the outermost node lies within 1e-3 of the rim
     for x, parted in ((1 - 1e-6, False), (1 + 1e-3, True)):
         joint = linear.joint()
         joint.update([1.0, 0.0])

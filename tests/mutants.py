@@ -112,15 +112,15 @@ def in_python(text):
 
 
 def in_c(text):
-    """The same for each line of a file in C that is inside a function."""
+    """The same for each line of a file in C that is inside a function, but for its comment."""
     at = 0
     for line in text.decode().splitlines(keepends=True):
-        rules, end = IN_C if re.match(r"\s+\w", line) else (), at + len(line.encode())
-        yield (
-            0,
-            [(at, end, re.sub(*rule, line, count=1)) for rule in rules if re.search(rule[0], line)],
-        )
-        at = end
+        code = line.partition("/*")[0].encode()
+        rules = IN_C if re.match(rb"\s+\w", code) else ()
+        said = code.decode()
+        found = [rule for rule in rules if re.search(rule[0], said)]
+        yield 0, [(at, at + len(code), re.sub(*rule, said, count=1)) for rule in found]
+        at += len(line.encode())
 
 
 class Copy:

@@ -5,13 +5,17 @@ import re
 import shlex
 import subprocess
 import sys
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import jointlaw as jl
+from jointlaw import hosts
+from jointlaw.cli.export import START
 from jointlaw.cli.main import COMMANDS, main
+from jointlaw.hosts.c.export import identifier, require_name
 from jointlaw.laboratory.record import UNITS
 
 
@@ -126,6 +130,26 @@ def test_a_refusal_is_one_line_and_leaves_nothing(tmp_path, capsys, arguments, t
     assert told in error
     assert len(error.splitlines()) == 1
     assert not (tmp_path / "o").exists()
+
+
+@pytest.mark.parametrize("host", START)
+def test_every_host_gets_its_files_and_is_told_what_to_type(host, tmp_path, capsys):
+    assert run(f"export {host} linear-a3 --resolution fast --out o") == 0
+    assert capsys.readouterr().out.endswith(f"\nrun: cd o && {START[host]}\n")
+    kept = {path.name for path in (resources.files(hosts) / host).rglob("*") if path.is_file()}
+    written = {path.name for path in (tmp_path / "o").iterdir()}
+    typed = [word.removeprefix("./") for word in START[host].split()]
+    assert {word for word in typed if word in kept} <= written
+    assert written & kept
+    assert any("linear_a3" in name for name in written) or "law.toml" in written
+
+
+@pytest.mark.parametrize(
+    ("text", "name"), [("rough-2", "rough_2"), ("7 b.", "joint_7_b"), ("-", "joint")]
+)
+def test_a_name_of_tables_is_an_identifier_of_c(text, name):
+    assert identifier(text) == name
+    require_name(name)
 
 
 def test_version(capsys):

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from jointlaw.calibration import datasets
 from jointlaw.calibration.datasets import load, names, read_closure, read_peaks, read_shear
 from jointlaw.calibration.envelopes import envelope
 from jointlaw.calibration.measured import ClosureCurve, ShearCurve, first_loading
@@ -140,6 +141,30 @@ def test_a_table_of_peaks_is_a_test_a_row(tmp_path):
     np.testing.assert_allclose(two.shear, [0, 2.365e-3, 10e-3])
     np.testing.assert_allclose(one.shear_stress, [0, 1.28e6, 0.862e6])
     assert (one.normal, two.normal) == (1e6, 2e6)
+
+
+CURVE = {
+    datasets.SHEAR: U, datasets.SHEAR_STRESS: TAU, datasets.NORMAL: 0 * U + 2,
+    datasets.OPENING: OPENED,
+}  # fmt: skip
+PEAK = dict(zip(datasets.PEAKS, ([1.25], [0.05], [0.8], [9.9]), strict=True))
+PEAK |= {datasets.NORMAL: [2.0]}
+
+
+@pytest.mark.parametrize(
+    ("table", "asked", "name"),
+    [(table, asked, name) for table in (CURVE, PEAK) for asked in table for name in asked.names],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_every_known_name_of_a_column_is_read(table, asked, name, tmp_path):
+    titles = [name.upper() if one is asked else one.names[0] for one in table]
+    units = [{"m": "mm", "Pa": "MPa"}[one.base] for one in table]
+    header = ",".join(f"{title} [{unit}]" for title, unit in zip(titles, units, strict=True))
+    (tmp_path / "t.csv").write_text(f"{header}\n{rows(*table.values())}")
+    (found,) = (read_peaks if table is PEAK else read_shear)(tmp_path / "t.csv")
+    assert found.normal == pytest.approx(2e6)
+    assert found.shear[1] == pytest.approx(0.05e-3)
+    assert found.shear_stress[2 - (table is PEAK)] == pytest.approx(1.25e6)
 
 
 def test_a_normal_stress_that_varies_is_taken_row_by_row(tmp_path):

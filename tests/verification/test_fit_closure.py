@@ -43,6 +43,7 @@ def test_one_curve_cannot_fix_heights_and_says_so(grimsel):
     fit = jl.fit_closure(*grimsel)
     assert {"alpha", "beta"} <= set(fit.not_identifiable)
     assert set(fit.identifiable) == set(fit.free) - set(fit.not_identifiable)
+    assert all(axis.get_xlabel() and axis.get_ylabel() for axis in fit.plot().axes)
 
 
 def test_a_rock_of_another_curve_is_called_so(law):

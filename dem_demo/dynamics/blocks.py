@@ -21,7 +21,8 @@ class Blocks:
 
     motion (6, n): positions, angles, and the velocities that led there; velocity (3, n): those to
     go on with. inertia: mass, mass, moment; mobile: motions of blocks that move, driven rock too;
-    free: those that forces move; gravity, loads: steady forces (N); root: 1/sqrt(inertia) of the
+    free: those that forces move; gravity, steady: forces that do not change (N); loads: these
+    without gravity and with what water presses (`edge_loads`); root: 1/sqrt(inertia) of the
     free motions, else 0. The compiled step writes to the first two: change them in place.
     """
 
@@ -37,7 +38,8 @@ class Blocks:
         self.free[self.drives.rows, self.drives.axes] = False
         self.root = np.where(self.free, 1 / np.sqrt(self.inertia), 0.0)
         self.gravity = self.mobile * self.inertia * [*scene.gravity, 0.0]
-        self.loads = np.array([[*block.load, 0.0] for block in blocks]) * self.mobile
+        self.steady = np.array([[*block.load, 0.0] for block in blocks]) * self.mobile
+        self.loads = self.steady.copy()
         self.reach = np.array([block.reach for block in blocks])
         self._lightness = self.free[:, :2].any(axis=1) / mass  # 1/kg, of what can give way
         self._moves = self.mobile[:, 0].copy()

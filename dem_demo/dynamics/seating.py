@@ -15,6 +15,7 @@ from jointlaw.support.progress import track
 from ..contact import Joints, Tracker
 from ..scene import Scene
 from .blocks import Blocks
+from .edge_loads import press
 from .timestep import rates
 
 ATTEMPTS = 40  # most rounds of the initial equilibrium
@@ -40,6 +41,7 @@ def seat(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> tupl
         if before is not None:
             joints.rearrange(before, tracker.law, tracker.keys)
             slid = np.where(before >= 0, slid[before], 0.0)
+        press(scene, blocks, tracker)
         force = blocks.gravity + blocks.loads
         if attempt:
             force = force + _length_forces(scene, blocks, tracker, joints, slid)
@@ -76,6 +78,7 @@ def displacements(scene: Scene, guess: np.ndarray | None = None) -> np.ndarray |
     before = tracker.renew(blocks.motion, blocks.near())
     if before is not None:
         joints.rearrange(before, tracker.law, tracker.keys)
+    press(scene, blocks, tracker)
     rows, area = rates(blocks, tracker.contacts), tracker.contacts.length * scene.thickness
     force = ((blocks.gravity + blocks.loads) * blocks.root).ravel()[blocks.free.ravel()]
     none, whole = np.zeros(len(force)), np.ones(len(force), bool)

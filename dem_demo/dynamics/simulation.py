@@ -11,7 +11,8 @@ from ..errors import Refused
 from ..scene import Scene
 from . import saved_states
 from .blocks import Blocks
-from .energy import DROPPED, Ledger
+from .edge_loads import press
+from .energy import DROPPED, WORK, Ledger
 from .saved_states import KEPT, PLACES, STATE, Saved
 from .seating import seat
 from .timestep import SAFE, StepLimit, impact_limit
@@ -131,6 +132,7 @@ class Simulation:
         before = tracker.renew(blocks.motion, blocks.near())
         if before is not None:
             joints.rearrange(before, tracker.law, tracker.keys)
+        press(scene, blocks, tracker)
         slid = np.zeros(joints.n)
         if scene.run.seat and joints.n:
             slid, self.balanced = seat(scene, blocks, tracker, joints)
@@ -184,6 +186,10 @@ class Simulation:
             before = tracker.renew(blocks.motion, blocks.near(), pressed=False)
             if before is not None:
                 self._rearrange(before)
+            loads = blocks.loads.copy()
+            press(self.scene, blocks, tracker)
+            half = 0.5 * self.dt * (blocks.loads - loads)  # the step books the whole
+            self.ledger.energy[WORK] -= (half * blocks.motion[3:].T).sum()
         self.world.call("press", self.dt)
         return self.world
 

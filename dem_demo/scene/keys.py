@@ -59,6 +59,14 @@ def some_of(name: str, value: Any, names: Iterable[str], count: int | None = Non
     return value
 
 
+def polyline(name: str, value: Any) -> np.ndarray:
+    """A rule: points (m, 2) of a line that goes to the right, in m."""
+    points = np.array([vector(name, point) for point in a(list)(name, value)]).reshape(-1, 2)
+    if not len(points) or (np.diff(points[:, 0]) <= 0).any():
+        raise ValueError(f"{name}: must be points [x, y] from left to right, x increasing")
+    return points
+
+
 AXES = {"x": 0, "y": 1, "turn": 2}
 TEXT, LIST, TABLE = a(str), a(list), a(dict)
 POSITIVE, NOT_NEGATIVE = partial(more_than, bound=0), partial(at_least, bound=0)
@@ -98,6 +106,7 @@ SCENE = {
     "title": TEXT, "gravity": vector, "density": DENSITY, "thickness": POSITIVE, "law": TEXT,
     "laws!": TABLE, "block": [BLOCK], "rock": [ROCK], "drive": [DRIVE], "run!": RUN,
     "joint": [{"between": LIST, "around": vector, "law!": TEXT}],
+    "water": {"table": polyline, "unit_weight": POSITIVE, "pressure": TABLE},
     "watch": {"slip": LIST, "shear": LIST, "pins": LIST, "joints": LIST},
 }  # fmt: skip
 

@@ -17,6 +17,7 @@ from .drives import read_drives
 from .keys import LIST, SCENE, TABLE, Tables, overlay, some_of, vector
 from .laws import Files, build_law, opens_to
 from .scene import SKIN, Rock, Run, Scene
+from .stress import read_water
 
 SCENES = Path(__file__).parent / "scenes"
 TEMPLATE = Path(__file__).parent / "template.toml"
@@ -110,10 +111,11 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     default = top.get("law", next(iter(laws), ""))
     for law in [default, *pairs.values(), *edge_laws.values()]:
         one_of(f"{where}: law", law, tuple(laws))
+    gravity, water = top.get("gravity", GRAVITY), top.get("water")
     scene = Scene(
         top.get("title", where), tuple(blocks), laws, run, default, pairs,
-        tuple(rocks), edge_laws, drives, top.get("gravity", GRAVITY), top.get("thickness", 1.0),
-        **watched,
+        tuple(rocks), edge_laws, drives, gravity, top.get("thickness", 1.0),
+        water and read_water(water, gravity, laws, f"{where}: water"), **watched,
     )  # fmt: skip
     for name, law in laws.items():
         opening = opens_to(law)

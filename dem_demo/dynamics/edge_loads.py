@@ -8,25 +8,28 @@ from .blocks import Blocks
 
 
 def press(scene: Scene, blocks: Blocks, tracker: Tracker) -> None:
-    """Bring the loads of the blocks to where they are now: those of water move with the edges.
+    """Bring the loads on edges to where these are now.
 
-    The table's water presses on every edge, so the joints carry what is left, the effective
-    stress. The pressure that is given for a law presses on both faces where edges with a joint of
-    it lie on each other: uniform, it is the same as half of it at either end.
+    The in-situ stress acts on the sides of the scene that it loads, water on all other edges, so
+    the joints carry what is left, the effective stress. The pressure that is given for a law
+    presses on both faces where edges with a joint of it lie on each other: uniform, it is the same
+    as half of it at either end.
     """
-    if (water := scene.water) is None:
-        return
-    contacts, loads = tracker.contacts, blocks.steady.copy()
-    if water.table is not None:
-        loads += scene.thickness * on_edges(water.table, contacts.outlines, blocks.motion)
-    if water.pressure:
+    water, in_situ = scene.water, scene.in_situ
+    contacts, loads, wet = tracker.contacts, blocks.steady.copy(), np.True_
+    if in_situ:
+        wet = ~in_situ.loaded
+        loads += scene.thickness * _on_edges(in_situ.stress, contacts.outlines, blocks.motion, ~wet)
+    if water and water.table:
+        loads += scene.thickness * _on_edges(water.table, contacts.outlines, blocks.motion, wet)
+    if water and water.pressure:
         by_law = np.array([water.pressure.get(name, 0.0) for name in scene.laws])
         push = by_law[tracker.law] * contacts.carried.sum(axis=0) * scene.thickness
         loads += contacts.assemble(blocks.motion, push, 0.0 * push)
     blocks.loads[:] = loads * blocks.mobile
 
 
-def on_edges(stress: Stress, outlines: Outlines, motion: np.ndarray, which=True) -> np.ndarray:
+def _on_edges(stress: Stress, outlines: Outlines, motion: np.ndarray, which) -> np.ndarray:
     """Forces and torques (n, 3) per m of thickness of a stress on the edges of blocks where they
     are now; which: edges (c,) that it acts on."""
     p, block = outlines.placed, outlines.block
@@ -48,12 +51,11 @@ def _integral(stress: Stress, p: np.ndarray, q: np.ndarray, centre: np.ndarray):
     share = np.concatenate([0 * wide, np.sort(np.clip(bends, 0.0, 1.0)), 0 * wide + 1], axis=1)
     at = p[:, None] + share * (q - p)[:, None]
     a, b = at[:, :-1], at[:, 1:]
-    da, db = stress.depth(a), stress.depth(b)
-    wet = np.maximum(da, 0.0), np.maximum(db, 0.0)
+    da, db = stress.signed(a), stress.signed(b)
     crossing = a + (b - a) * da / np.where(da == db, 1.0, da - db)
     crosses = (da > 0) != (db > 0)
     a, b = np.where(crosses & (da <= 0), crossing, a), np.where(crosses & (db <= 0), crossing, b)
-    ua, ub = (stress.weight * part for part in wet)
+    ua, ub = np.maximum(da, 0.0), np.maximum(db, 0.0)
     push = stress.on(1j * (b - a))  # minus the outward normal, times the length
     a, b = a - centre[:, None], b - centre[:, None]
     arms = (a * (2 * ua + ub) + b * (ua + 2 * ub)) / 6

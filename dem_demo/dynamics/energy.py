@@ -23,9 +23,9 @@ class Ledger:
     energy (8,): by COLUMNS. friction: dissipated in the joints; dropped: stored in contacts that
     were given up while they still carried; work: done by drives, loads and water; turned:
     gravity's, the drives' and the loads' power summed in absolute value, plus what was there at
-    the start. start: the balance at time 0. Of the end of the last step: forces (3, n, 3) in N: all,
-    dashpots, drives; last (2, n, 3): dashpots and drives before it; area (k,) in m2 and dissipated
-    energy `lost` (k,) in J/m2 of the joints. The compiled step writes all of them.
+    the start. start: the balance at time 0. Of the end of the last step: forces (3, n, 3) in N:
+    all, dashpots, drives; last (2, n, 3): dashpots and drives before it; area (k,) in m2 and
+    dissipated energy `lost` (k,) in J/m2 of the joints. The compiled step writes all of them.
     """
 
     def __init__(self, blocks: int) -> None:

@@ -13,6 +13,7 @@ from . import saved_states
 from .blocks import Blocks
 from .edge_loads import press
 from .energy import DROPPED, WORK, Ledger
+from .in_situ import begin
 from .saved_states import KEPT, PLACES, STATE, Saved
 from .seating import seat
 from .timestep import SAFE, StepLimit, impact_limit
@@ -129,15 +130,11 @@ class Simulation:
     def _start(self, step: float | None) -> None:
         """From the drawing to step 0: equilibrium, a time step, velocities half a step on."""
         scene, blocks, tracker, joints = self.scene, self.blocks, self.tracker, self.joints
-        before = tracker.renew(blocks.motion, blocks.near())
-        if before is not None:
-            joints.rearrange(before, tracker.law, tracker.keys)
-        press(scene, blocks, tracker)
-        slid = np.zeros(joints.n)
+        slid = begin(scene, blocks, tracker, joints)
         if scene.run.seat and joints.n:
-            slid, self.balanced = seat(scene, blocks, tracker, joints)
+            slid, self.balanced = seat(scene, blocks, tracker, joints, slid)
         tracker.follow(blocks.motion)
-        joints.update(self.contacts.closure, slid)
+        joints.update(tracker.closure, slid)
         self.limit.look(scene, blocks, self.contacts, joints)
         self.dt = step or scene.run.step or self._chosen_step()
         self.limit.require(self.dt)

@@ -70,6 +70,7 @@ def polyline(name: str, value: Any) -> np.ndarray:
 AXES = {"x": 0, "y": 1, "turn": 2}
 TEXT, LIST, TABLE = a(str), a(list), a(dict)
 POSITIVE, NOT_NEGATIVE = partial(more_than, bound=0), partial(at_least, bound=0)
+SIDE = partial(one_of, choices=("held", "rollers", "loaded"))
 DENSITY = within(50.0, 30000.0, "kg/m3; 2.6 g/cm3 is 2600 kg/m3")
 
 BLOCK = {
@@ -106,6 +107,10 @@ SCENE = {
     "title": TEXT, "gravity": vector, "density": DENSITY, "thickness": POSITIVE, "law": TEXT,
     "laws!": TABLE, "block": [BLOCK], "rock": [ROCK], "drive": [DRIVE], "run!": RUN,
     "joint": [{"between": LIST, "around": vector, "law!": TEXT}],
+    "in_situ": {
+        "k0": NOT_NEGATIVE, "stress": partial(finite, unit="Pa"), "surface": polyline,
+        **dict.fromkeys(("left", "right", "bottom", "top"), SIDE),
+    },
     "water": {"table": polyline, "unit_weight": POSITIVE, "pressure": TABLE},
     "watch": {"slip": LIST, "shear": LIST, "pins": LIST, "joints": LIST},
 }  # fmt: skip

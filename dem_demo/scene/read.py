@@ -17,7 +17,7 @@ from .drives import read_drives
 from .keys import LIST, SCENE, TABLE, Tables, overlay, some_of, vector
 from .laws import Files, build_law, opens_to
 from .scene import SKIN, Rock, Run, Scene
-from .stress import read_water
+from .stress import read_in_situ, read_water
 
 SCENES = Path(__file__).parent / "scenes"
 TEMPLATE = Path(__file__).parent / "template.toml"
@@ -96,6 +96,10 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     blocks = [_block(table, density, where) for table in top.get("block", ())]
     edge_laws: dict[tuple[int, int], str] = {}
     rocks = [_rock(table, blocks, edge_laws, density, where) for table in top.get("rock", ())]
+    gravity, water, in_situ = top.get("gravity", GRAVITY), top.get("water"), top.get("in_situ")
+    if in_situ is not None:
+        in_situ = read_in_situ(in_situ, blocks, density, gravity, f"{where}: in_situ")
+        rocks = [replace(r, free=[i for i in r.free if not blocks[i].fixed]) for r in rocks]
     number = {block.name: i for i, block in enumerate(blocks)}
     if len(number) < len(blocks):
         raise ValueError(f"{where}: two blocks have the same name; names must differ")
@@ -111,11 +115,10 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     default = top.get("law", next(iter(laws), ""))
     for law in [default, *pairs.values(), *edge_laws.values()]:
         one_of(f"{where}: law", law, tuple(laws))
-    gravity, water = top.get("gravity", GRAVITY), top.get("water")
     scene = Scene(
         top.get("title", where), tuple(blocks), laws, run, default, pairs,
         tuple(rocks), edge_laws, drives, gravity, top.get("thickness", 1.0),
-        water and read_water(water, gravity, laws, f"{where}: water"), **watched,
+        water and read_water(water, gravity, laws, f"{where}: water"), in_situ, **watched,
     )  # fmt: skip
     for name, law in laws.items():
         opening = opens_to(law)

@@ -9,7 +9,7 @@ import numpy as np
 from .blocks import Block, usual_width
 from .drives import Drive
 from .laws import Files, Law
-from .stress import Water
+from .stress import InSitu, Water
 
 SKIN, THIN = 0.02, 0.1  # of the usual width of the blocks that move; at most of a block's own
 
@@ -54,7 +54,7 @@ class Scene:
     pairs: laws by the blocks of [[joint]] tables; edge_laws: of each (block, edge) that lies on a
     joint of a rock, the law of its set.
 
-    water: in joints and on faces, None for dry rock.
+    water: in joints and on faces; in_situ: stress before an excavation; None without.
 
     slip, shear: joints to report on, as (moving block, base); near: those nearest to points, as two
     blocks; pins: points, as (block, place in m); reduction: what the shear strength of all joints
@@ -76,6 +76,7 @@ class Scene:
     gravity: tuple[float, float] = (0.0, -9.81)
     thickness: float = 1.0
     water: Water | None = None
+    in_situ: InSitu | None = None
     slip: tuple[tuple[int, int], ...] = ()
     shear: tuple[tuple[int, int], ...] = ()
     near: tuple[tuple[int, int], ...] = ()

@@ -16,6 +16,8 @@ def press(scene: Scene, blocks: Blocks, tracker: Tracker) -> None:
     as half of it at either end.
     """
     water, in_situ = scene.water, scene.in_situ
+    if water is None and in_situ is None:
+        return
     contacts, loads, wet = tracker.contacts, blocks.steady.copy(), np.True_
     if in_situ:
         wet = ~in_situ.loaded

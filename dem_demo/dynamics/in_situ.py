@@ -58,7 +58,7 @@ def _displaced(joints: Joints, bears: np.ndarray) -> np.ndarray:
     which it bears what it can.
     """
     closure = joints.virgin("closure", "stress", bears[:, 0])
-    tried = [np.stack([closure, np.zeros(joints.n)], axis=1)]
+    tried, least = [np.stack([closure, np.zeros(joints.n)], axis=1)], np.zeros(joints.n)
     while True:
         F, C, _ = joints.trial(d := tried[-1])
         lacks, stiff = bears - F, np.maximum(C[:, 0, 0], 1e-300)
@@ -66,7 +66,7 @@ def _displaced(joints: Joints, bears: np.ndarray) -> np.ndarray:
         if done.all() or len(tried) == TRIALS:
             return np.where(done[:, None], d, tried[:2][-1])
         slope = C[:, 1, 1] - C[:, 1, 0] * C[:, 0, 1] / stiff  # at constant normal stress
-        least = FLAT * slope if len(tried) == 1 else least
+        least = np.maximum(least, FLAT * slope)
         shear = (lacks[:, 1] - C[:, 1, 0] / stiff * lacks[:, 0]) / np.maximum(slope, least)
         shear[done] = 0.0
         press = (lacks[:, 0] - C[:, 0, 1] * shear) / stiff

@@ -29,18 +29,18 @@ FALLEN = 0.999  # ... this share of what it was
 def seat(
     scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints, slid: np.ndarray
 ) -> tuple[np.ndarray, bool]:
-    """Move the blocks to where their joints carry them; slid (k,): sliding that they begin with (m).
+    """Move the blocks to where their joints carry them; slid (k,) in m: sliding at first.
 
     Returns the first sliding (k,) of the joints (m), and whether the law can hold all blocks: those
     that it cannot hold will move from step 0.
     """
     free = blocks.free.ravel()
     still = np.ones(int(free.sum()), bool)
-    all_balanced, first, near = True, 0.0, blocks.near()
+    all_balanced, first, pairs = True, 0.0, blocks.near()
     for attempt in range(ATTEMPTS):  # each at the places just found: joints turn with the blocks
         tracker.follow(blocks.motion)
         tracker.urgent[:] = True  # it is cheap here, and nothing is missed
-        before = tracker.renew(blocks.motion, near)
+        before = tracker.renew(blocks.motion, pairs)
         if before is not None:
             joints.rearrange(before, tracker.law, tracker.keys)
             slid = np.where(before >= 0, slid[before], 0.0)
@@ -53,9 +53,8 @@ def seat(
         area = tracker.contacts.length * scene.thickness
         start = np.concatenate([tracker.closure, slid])
         again = attempt > 0
-        moved, balanced = _equilibrium(
-            joints, rows, start, area, force, still, again or scene.in_situ is not None, not again
-        )
+        near = again or scene.in_situ is not None
+        moved, balanced = _equilibrium(joints, rows, start, area, force, still, near, not again)
         if not again:
             all_balanced, first = bool(balanced.all()), np.abs(moved).max()
         else:  # what was found before is balanced but for the turning of the joints

@@ -8,7 +8,7 @@ from .blocks import Blocks
 
 
 def press(scene: Scene, blocks: Blocks, tracker: Tracker) -> None:
-    """Bring the loads on edges to where these are now.
+    """Bring the loads of the blocks to what they are with their edges where these are now.
 
     The in-situ stress acts on the sides of the scene that it loads, water on all other edges, so
     the joints carry what is left, the effective stress. The pressure that is given for a law
@@ -16,9 +16,9 @@ def press(scene: Scene, blocks: Blocks, tracker: Tracker) -> None:
     as half of it at either end.
     """
     water, in_situ = scene.water, scene.in_situ
-    if water is None and in_situ is None:
+    if water is None and in_situ is None and not scene.stages:
         return
-    contacts, loads, wet = tracker.contacts, blocks.steady.copy(), np.True_
+    contacts, loads, wet = tracker.contacts, blocks.steady + blocks.share * blocks.support, np.True_
     if in_situ:
         wet = ~in_situ.loaded
         loads += scene.thickness * _on_edges(in_situ.stress, contacts.outlines, blocks.motion, ~wet)

@@ -58,7 +58,7 @@ def _displaced(joints: Joints, bears: np.ndarray) -> np.ndarray:
     which it bears what it can.
     """
     closure = joints.virgin("closure", "stress", bears[:, 0])
-    tried, least = [np.stack([closure, np.zeros(joints.n)], axis=1)], np.zeros(joints.n)
+    tried, least = [np.stack([closure, np.zeros(joints.n)], axis=1)], np.full(joints.n, 1e-300)
     while True:
         F, C, _ = joints.trial(d := tried[-1])
         lacks, stiff = bears - F, np.maximum(C[:, 0, 0], 1e-300)

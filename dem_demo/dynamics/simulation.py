@@ -8,7 +8,7 @@ import numpy as np
 from ..compiled import World
 from ..contact import Contacts, Joints, Tracker
 from ..errors import Refused
-from ..scene import Scene
+from ..scene import Scene, Stage
 from . import saved_states
 from .blocks import Blocks
 from .edge_loads import press
@@ -20,7 +20,8 @@ from .timestep import SAFE, StepLimit, impact_limit
 
 NEAR = 0.4  # share of the limit below which no lever arm matters; to which a step is halved
 MATCH = 1e-6  # relative: lengths that are equal but for rounding
-LOOKS = 16  # steps between two looks at the drives
+LOOKS = 16  # steps between two looks at the drives and at excavations
+REST, RESTING = 1e-4, 0.9  # m/s: speed below which a block rests; share of them that must
 FRACTIONS = {  # of the limit that a time step is, by what can happen
     "blocks fall or have no equilibrium": 0.15,
     "drives move blocks": 0.4,
@@ -34,7 +35,8 @@ class Simulation:
 
     step: time step (s), instead of the scene's; saved: a state to go on from. blocks: where they
     are; tracker: their contacts; joints: the law; ledger: the energies; limit: of the time step dt
-    (s), chosen for the reason `why`; balanced: were the blocks in equilibrium at the start? Where
+    (s), chosen for the reason `why`; balanced: were the blocks in equilibrium at the start?
+    begun (stages,): when stages of the excavation began, inf before (s). Where
     neither `step` nor the scene sets the time step, it is halved when joints close too far for it,
     or blocks become too fast.
     Raises ValueError for a step that is no finite number > 0 and for a state of another scene,
@@ -50,6 +52,7 @@ class Simulation:
         given = step or scene.run.step or scene.run.fraction
         self.why, self.halvings = "", 0 if given else HALVINGS
         self.ledger = Ledger(len(scene.blocks))
+        self.begun = np.full(len(scene.stages), np.inf)
         if saved:
             self._unpack(saved, step)
         else:
@@ -83,6 +86,8 @@ class Simulation:
                 self.blocks.refuse(world.fast, dt)
             dt = self.dt
             world.call("before", dt)
+        if self.n % LOOKS == 0 and self.scene.stages:
+            self._dig()
         if world.moved or world.stale:
             world = self._renew()
         if world.deep >= 0:
@@ -101,6 +106,30 @@ class Simulation:
             world.bind(checked=self.limit.checked)
         if self.n % LOOKS == 0:
             drives.reverse(self.time, self.slid)
+
+    def _dig(self) -> None:
+        """Take away the blocks of a stage when its time has come; then let go what they bore."""
+        blocks, stages, n = self.blocks, self.scene.stages, int(np.isfinite(self.begun).sum())
+        if n < len(stages) and self._is_due(stages[n]):
+            taken, c, joints = stages[n].blocks, self.contacts, self.joints
+            area = c.length * self.scene.thickness * (np.isin(c.a, taken) | np.isin(c.b, taken))
+            stress, shear = area * joints.traction.T
+            stored = np.where(area > 0, joints.stored * self.scene.thickness, 0.0)
+            bore = c.assemble(blocks.motion, stress, -shear, stored)
+            blocks.support[:] = blocks.share * blocks.support + bore
+            blocks.remove(taken)
+            self.tracker.urgent[taken] = True
+            self.begun[n], blocks.share, n = self.time, 1.0, n + 1
+        if blocks.share:
+            blocks.share = max(1 - (self.time - self.begun[n - 1]) / stages[n - 1].over, 0.0)
+            self.world.stale = 1
+
+    def _is_due(self, stage: Stage) -> bool:
+        """Is it time for a stage? Without a time of its own, when the rock is at rest."""
+        if stage.at is not None:
+            return self.time >= stage.at
+        speed = np.hypot(*self.blocks.velocity[:2, self.blocks.mobile[:, 0]])
+        return not self.blocks.share and bool(np.quantile(speed, RESTING) < REST)
 
     def _halve(self) -> bool:
         """Go on with half the time step, if it may be halved once more."""
@@ -247,6 +276,7 @@ class Simulation:
             else:
                 setattr(of, name, value.copy() if value.ndim else value.item())
         tracker, blocks = self.tracker, self.blocks
+        blocks.remove(np.flatnonzero(blocks.gone).tolist())
         tracker.hold(saved["contacts.corner"], saved["contacts.edge"], blocks.motion)
         self.joints.restore(saved, tracker.law, tracker.keys)
         if step:

@@ -27,10 +27,11 @@ FEW = 12  # blocks: most that bear their names
 
 
 def outlines(record: Record, i: int) -> list[np.ndarray]:
-    """Corners (m, 2) of all blocks in frame i (m)."""
+    """Corners (m, 2) of all blocks in frame i (m); NaN for those that were taken away by then."""
+    places = np.where(record.gone[i], np.nan, record.motion[i][:3]).T
     return [
         block.local @ turn(angle).T + [x, y]
-        for block, (x, y, angle) in zip(record.scene.blocks, record.motion[i][:3].T, strict=True)
+        for block, (x, y, angle) in zip(record.scene.blocks, places, strict=True)
     ]
 
 
@@ -44,8 +45,9 @@ class Pictures:
     def __init__(self, record: Record) -> None:
         self.record = record
         corners = np.concatenate([c for i in (0, -1) for c in outlines(record, i)])
-        margin = 0.03 * np.ptp(corners, axis=0).max()
-        self.low, self.high = corners.min(axis=0) - margin, corners.max(axis=0) + margin
+        low, high = np.nanmin(corners, axis=0), np.nanmax(corners, axis=0)
+        margin = 0.03 * (high - low).max()
+        self.low, self.high = low - margin, high + margin
         start = record.joints[0]["normal_stress_Pa"]
         whole = [frame["normal_stress_Pa"] for frame in record.joints]
         pressed = start[start > 0] if (start > 0).any() else np.concatenate(whole)

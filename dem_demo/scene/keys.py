@@ -107,6 +107,7 @@ SCENE = {
     "title": TEXT, "gravity": vector, "density": DENSITY, "thickness": POSITIVE, "law": TEXT,
     "laws!": TABLE, "block": [BLOCK], "rock": [ROCK], "drive": [DRIVE], "run!": RUN,
     "joint": [{"between": LIST, "around": vector, "law!": TEXT}],
+    "excavate": [{"corners!": corners, "at": NOT_NEGATIVE, "over!": POSITIVE}],
     "in_situ": {
         "k0": NOT_NEGATIVE, "stress": partial(finite, unit="Pa"), "surface": polyline,
         **dict.fromkeys(("left", "right", "bottom", "top"), SIDE),

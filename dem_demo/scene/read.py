@@ -16,7 +16,7 @@ from .cutting import JointSet, cut
 from .drives import read_drives
 from .keys import LIST, SCENE, TABLE, Tables, overlay, some_of, vector
 from .laws import Files, build_law, opens_to
-from .scene import SKIN, Rock, Run, Scene
+from .scene import SKIN, Rock, Run, Scene, Stage
 from .stress import read_in_situ, read_water
 
 SCENES = Path(__file__).parent / "scenes"
@@ -95,7 +95,8 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     density = top.get("density", DENSITY)
     blocks = [_block(table, density, where) for table in top.get("block", ())]
     edge_laws: dict[tuple[int, int], str] = {}
-    rocks = [_rock(table, blocks, edge_laws, density, where) for table in top.get("rock", ())]
+    digs = top.get("excavate", ())
+    rocks = [_rock(table, blocks, edge_laws, density, digs, where) for table in top.get("rock", ())]
     gravity, water, in_situ = top.get("gravity", GRAVITY), top.get("water"), top.get("in_situ")
     if in_situ is not None:
         in_situ = read_in_situ(in_situ, blocks, density, gravity, f"{where}: in_situ")
@@ -118,7 +119,8 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     scene = Scene(
         top.get("title", where), tuple(blocks), laws, run, default, pairs,
         tuple(rocks), edge_laws, drives, gravity, top.get("thickness", 1.0),
-        water and read_water(water, gravity, laws, f"{where}: water"), in_situ, **watched,
+        water and read_water(water, gravity, laws, f"{where}: water"), in_situ,
+        _stages(digs, blocks, where), **watched,
     )  # fmt: skip
     for name, law in laws.items():
         opening = opens_to(law)
@@ -198,9 +200,23 @@ def _joint_at(
     return two[0], two[1]
 
 
+def _stages(tables: list[Tables], blocks: Sequence[Block], where: str) -> tuple[Stage, ...]:
+    """The stages of an excavation: each takes the blocks whose centroids lie in its corners."""
+    left, stages = set(range(len(blocks))), []
+    for i, table in enumerate(tables):
+        region = Polygon(table["corners"])
+        taken = sorted(j for j in left if region.contains(Point(blocks[j].centroid)))
+        if not taken:
+            raise ValueError(f"{where}: excavate[{i}].corners: no block is left there")
+        left.difference_update(taken)
+        stages.append(Stage(taken, table.get("at"), table["over"]))
+    return tuple(stages)
+
+
 def _rock(
-    table: Tables, blocks: list[Block], laws: dict[tuple[int, int], str], density: float, where: str
-) -> Rock:
+    table: Tables, blocks: list[Block], laws: dict[tuple[int, int], str], density: float,
+    digs: list[Tables], where: str,
+) -> Rock:  # fmt: skip
     """Cut a rock, and add its blocks and the laws of their edges to those of the scene."""
     name = table["name"]
     where = f"{where}: rock[{name!r}]"
@@ -212,8 +228,9 @@ def _rock(
         raise ValueError(f"{where}.laws: no set of this rock has the law {unknown.pop()!r}")
     try:
         holes = [part["corners"] for part in table.get("hole", ())]
+        regions = [part["corners"] - shift for part in digs]
         shapes, numbers, joined, dropped = cut(
-            table["outline"], sets, table.get("seed", 0), least, holes
+            table["outline"], sets, table.get("seed", 0), least, holes, regions
         )
     except ValueError as error:
         raise ValueError(f"{where}.outline: {error}") from None

@@ -1,7 +1,7 @@
 """A scene in memory: blocks, laws, drives and how to run them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -47,6 +47,16 @@ class Rock:
     slivers: str
 
 
+@dataclass(frozen=True)
+class Stage:
+    """Blocks that are taken away: at a time (s), or without one when the rock is at rest after the
+    stage before; over: time (s) in which what they bore is let go."""
+
+    blocks: list[int]
+    at: float | None
+    over: float
+
+
 @dataclass(frozen=True, eq=False)
 class Scene:
     """Everything that a simulation needs.
@@ -55,6 +65,7 @@ class Scene:
     joint of a rock, the law of its set.
 
     water: in joints and on faces; in_situ: stress before an excavation; None without.
+    stages: of an excavation; gone: blocks that are not there from the start.
 
     slip, shear: joints to report on, as (moving block, base); near: those nearest to points, as two
     blocks; pins: points, as (block, place in m); reduction: what the shear strength of all joints
@@ -77,6 +88,8 @@ class Scene:
     thickness: float = 1.0
     water: Water | None = None
     in_situ: InSitu | None = None
+    stages: tuple[Stage, ...] = ()
+    gone: tuple[int, ...] = ()
     slip: tuple[tuple[int, int], ...] = ()
     shear: tuple[tuple[int, int], ...] = ()
     near: tuple[tuple[int, int], ...] = ()
@@ -91,6 +104,12 @@ class Scene:
         widths = np.array([block.width for block in self.blocks])
         skin = np.minimum(SKIN * usual_width(self.blocks), THIN * widths)
         return skin if self.run.skin is None else np.full(len(widths), self.run.skin)
+
+    @property
+    def excavated(self) -> "Scene":
+        """The scene without what its excavation takes away, but with the stress of before."""
+        gone = [i for stage in self.stages for i in stage.blocks]
+        return replace(self, stages=(), gone=(*self.gone, *gone)) if gone else self
 
     @property
     def base(self) -> int | None:

@@ -21,7 +21,7 @@ from .timestep import SAFE, StepLimit, impact_limit
 NEAR = 0.4  # share of the limit below which no lever arm matters; to which a step is halved
 MATCH = 1e-6  # relative: lengths that are equal but for rounding
 LOOKS = 16  # steps between two looks at the drives and at excavations
-REST, RESTING = 1e-4, 0.9  # m/s: speed below which a block rests; share of them that must
+REST, RESTING = (1e-4, 0.1), 0.9  # m/s, m/s2: below which a block rests; share that must
 FRACTIONS = {  # of the limit that a time step is, by what can happen
     "blocks fall or have no equilibrium": 0.15,
     "drives move blocks": 0.4,
@@ -86,7 +86,7 @@ class Simulation:
                 self.blocks.refuse(world.fast, dt)
             dt = self.dt
             world.call("before", dt)
-        if self.n % LOOKS == 0 and self.scene.stages:
+        if self.scene.stages:
             self._dig()
         if world.moved or world.stale:
             world = self._renew()
@@ -110,7 +110,7 @@ class Simulation:
     def _dig(self) -> None:
         """Take away the blocks of a stage when its time has come; then let go what they bore."""
         blocks, stages, n = self.blocks, self.scene.stages, int(np.isfinite(self.begun).sum())
-        if n < len(stages) and self._is_due(stages[n]):
+        if self.n % LOOKS == 0 and n < len(stages) and self._is_due(stages[n]):
             taken, c, joints = stages[n].blocks, self.contacts, self.joints
             area = c.length * self.scene.thickness * (np.isin(c.a, taken) | np.isin(c.b, taken))
             stress, shear = area * joints.traction.T
@@ -118,18 +118,20 @@ class Simulation:
             bore = c.assemble(blocks.motion, stress, -shear, stored)
             blocks.support[:] = blocks.share * blocks.support + bore
             blocks.remove(taken)
-            self.tracker.urgent[taken] = True
+            self.tracker.urgent[taken], self.world.stale = True, 1
             self.begun[n], blocks.share, n = self.time, 1.0, n + 1
         if blocks.share:
             blocks.share = max(1 - (self.time - self.begun[n - 1]) / stages[n - 1].over, 0.0)
-            self.world.stale = 1
+            self._load()
 
     def _is_due(self, stage: Stage) -> bool:
         """Is it time for a stage? Without a time of its own, when the rock is at rest."""
         if stage.at is not None:
             return self.time >= stage.at
-        speed = np.hypot(*self.blocks.velocity[:2, self.blocks.mobile[:, 0]])
-        return not self.blocks.share and bool(np.quantile(speed, RESTING) < REST)
+        force, mass = self.ledger.forces[0], self.blocks.inertia[:, 0]
+        changes = np.hypot(*self.blocks.velocity[:2]), np.hypot(*force.T[:2]) / mass
+        moves = np.quantile(np.array(changes)[:, self.blocks.mobile[:, 0]], RESTING, axis=1)
+        return not self.blocks.share and bool((moves < REST).all())
 
     def _halve(self) -> bool:
         """Go on with half the time step, if it may be halved once more."""
@@ -212,12 +214,17 @@ class Simulation:
             before = tracker.renew(blocks.motion, blocks.near(), pressed=False)
             if before is not None:
                 self._rearrange(before)
-            loads = blocks.loads.copy()
-            press(self.scene, blocks, tracker)
-            half = 0.5 * self.dt * (blocks.loads - loads)  # the step books the whole
-            self.ledger.energy[WORK] -= (half * blocks.motion[3:].T).sum()
+            self._load()
         self.world.call("press", self.dt)
         return self.world
+
+    def _load(self) -> None:
+        """Bring the loads on the blocks up to date, and the work of this step, which books the new
+        ones and is to have the mean of old and new."""
+        blocks, loads = self.blocks, self.blocks.loads.copy()
+        press(self.scene, blocks, self.tracker)
+        change = 0.5 * self.dt * (blocks.loads - loads)
+        self.ledger.energy[WORK] -= (change * blocks.motion[3:].T).sum()
 
     def _transfer(self) -> None:
         """Joints and ledger for contacts whose corners went on to other edges.

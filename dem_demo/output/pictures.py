@@ -16,7 +16,7 @@ from ..scene import turn
 from .monitors import shear_curve
 from .record import CREEP, Record, sentences
 
-FIXED, DRIVEN, FREE = "#8d8d8d", "#b9b4a7", "#efe9dc"
+FIXED, DRIVEN, FREE, WATER = "#8d8d8d", "#b9b4a7", "#efe9dc", "#1f6fd0"
 STATES = {  # of a joint: colour and line
     "stuck": ("#3a3a3a", "-"), "partly sliding": ("#e69f00", "-"), "sliding": ("#d81b1b", "-"),
     "open": ("#1f9ed1", "--"),
@@ -80,6 +80,8 @@ class Pictures:
         label, width = f"{kind} {1e-3 * stress:g} kPa", self._width(stress)
         marks.append(Line2D([], [], color=STATES["stuck"][0], lw=width, label=label))
         marks.append(Line2D([], [], color="0.6", ls=":", lw=0.9, label="place at the start"))
+        if (water := self.record.scene.water) and water.table:
+            marks.append(Line2D([], [], color=WATER, ls="-.", label="water table"))
         figure.legend(handles=marks, loc="outside lower center", ncols=3, frameon=False)
         return figure, figure.add_subplot()
 
@@ -102,6 +104,8 @@ class Pictures:
         if len(blocks) <= FEW:
             for block, shape in zip(blocks, shapes, strict=True):
                 axes.text(*shape.mean(axis=0), block.name, ha="center", va="center")
+        if (water := record.scene.water) and water.table:
+            axes.plot(*water.table.line.T, color=WATER, lw=1.5, ls="-.", zorder=4)
         ends, state = record.joints[i]["ends"], self.states(i)
         widths = self._width(record.joints[i]["normal_stress_Pa"])
         for name, (colour, line) in STATES.items():

@@ -21,8 +21,9 @@ class Record:
 
     joints[f]: by name, "who" (k, 5) block, edge, block, edge, contact; "ends" (k, 2, 2) the segment
     of joint that a contact carries; and numbers (k,) with their unit in the name. monitored[f]:
-    what the scene's [watch] asks for; slips: of its joints; laws: of the watched joints; state:
-    that of the last frame, to return to; steps: of the run.
+    what the scene's [watch] asks for; slips: of its joints; laws: of the watched joints;
+    begun: times (s) of the stages of an excavation, inf for what is still there; state: that of
+    the last frame, to return to; steps: of the run.
     """
 
     def __init__(self, sim: Simulation) -> None:
@@ -35,6 +36,7 @@ class Record:
         self.energy: list[list[float]] = []
         self.joints: list[dict[str, np.ndarray]] = []
         self.monitored: list[dict[str, float]] = []
+        self.begun = sim.begun
         self.take(sim)
 
     def take(self, sim: Simulation) -> None:
@@ -149,6 +151,9 @@ def sentences(record: Record) -> list[str]:
         said = "had slipped before this run" if slip["slipped_before"] else said
         law = "nothing" if alone is None else f"{alone:.2f} degrees"
         found.append(f"{slip['block']}: {said}, the law alone says {law}")
+    if len(record.begun):
+        times = (f"{time:.3g} s" if np.isfinite(time) else "not yet" for time in record.begun)
+        found.append(f"stages excavated from: {', '.join(times)}")
     return [*found, *map(sentence, outcomes(record))]
 
 

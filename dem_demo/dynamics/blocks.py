@@ -23,8 +23,8 @@ class Blocks:
     go on with. inertia: mass, mass, moment; mobile: motions of blocks that move, driven rock too;
     free: those that forces move; gravity, steady: forces that do not change (N); loads: these
     without gravity and with what water presses (`edge_loads`); root: 1/sqrt(inertia) of the
-    free motions, else 0; gone (n,): blocks that were taken away; support (n, 3): what these bore
-    on the others (N), of which a share acts. The compiled step writes to the first two: change
+    free motions, else 0; gone (n,): blocks that were taken away; support (n, 3): what is left
+    of what these bore on the others (N). The compiled step writes to the first two: change
     them in place.
     """
 
@@ -52,7 +52,6 @@ class Blocks:
         self._near: set[int] = set()
         self._build(scene)
         self.gone, self.support = np.zeros(len(blocks), bool), np.zeros((len(blocks), 3))
-        self.share = 0.0
         self.remove(list(scene.gone))
 
     def _build(self, scene: Scene) -> None:

@@ -46,6 +46,11 @@ class Ledger:
         self.start = float(self.energy[KINETIC] + self.energy[STORED])
         self.energy[TURNED] = self.start
 
+    def load(self, blocks: Blocks, more: np.ndarray, dt: float) -> None:
+        """Loads have changed by `more` (n, 3) within a step dt (s): it books the whole of the new
+        ones, and is to have the mean."""
+        self.energy[WORK] -= 0.5 * dt * (more * blocks.motion[3:].T).sum()
+
     @property
     def value(self) -> dict[str, float]:
         """The energies by name."""

@@ -21,34 +21,26 @@ def begin(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> np.
     if before is not None:
         joints.rearrange(before, tracker.law, tracker.keys)
     press(scene, blocks, tracker)
-    if scene.in_situ is None or not joints.n:
+    stress, c, skin = scene.in_situ, tracker.contacts, scene.skins.min()
+    if stress is None or not joints.n:
         return np.zeros(joints.n)
-    bears = _tractions(scene, tracker)
-    bears[(tracker.contacts.closure < -TOUCHES * scene.skins.min()) | (bears[:, 0] <= 0)] = 0.0
-    closure, slid = _displaced(joints, bears).T
-    if closure.max() > scene.skins.min():
+    # The end p of an overlap bears (2 S(p) + S(q))/3, q the other end: together they have force and
+    # moment of a stress that goes straight from p to q. It is that at (2 p + q)/3.
+    way = np.where(c.outlines.block[c.edge] == c.a, 1j, -1j) * c.normal
+    ahead, behind = c.carried
+    at = c.at + 2 / 3 * (ahead**2 - behind**2) / np.maximum(c.length, 1e-300) * way
+    on = np.maximum(stress.signed(at), 0.0) * stress.on(c.normal) * c.normal.conj()
+    if scene.water:
+        on -= np.maximum(scene.water.signed(at), 0.0)
+    on[(c.closure < -TOUCHES * skin) | (on.real <= 0)] = 0.0
+    closure, slid = _displaced(joints, np.stack([on.real, on.imag], axis=1)).T
+    if closure.max() > skin:
         raise ValueError(
             f"in_situ closes joints by up to {closure.max():.3g} m, but contacts are followed to "
-            f"{scene.skins.min():.3g} m: set a larger run.skin, or stiffer laws"
+            f"{skin:.3g} m: set a larger run.skin, or stiffer laws"
         )
-    tracker.offset = np.where(closure > 0, tracker.contacts.closure - closure, 0.0)
+    tracker.offset = np.where(closure > 0, c.closure - closure, 0.0)
     return slid
-
-
-def _tractions(scene: Scene, tracker: Tracker) -> np.ndarray:
-    """Normal and shear stress (k, 2) in Pa, without the water's, that the contacts stand for.
-
-    The end p of an overlap bears (2 S(p) + S(q))/3, q the other end: together they have force and
-    moment of a stress that goes straight from p to q. It is that at (2 p + q)/3.
-    """
-    c, (ahead, behind) = tracker.contacts, tracker.contacts.carried
-    way = np.where(c.outlines.block[c.edge] == c.a, 1j, -1j) * c.normal
-    at = c.at + 2 / 3 * (ahead**2 - behind**2) / np.maximum(c.length, 1e-300) * way
-    stress, water = scene.in_situ.stress, scene.water
-    on = np.maximum(stress.signed(at), 0.0) * stress.on(c.normal) * c.normal.conj()
-    if water and water.table:
-        on -= np.maximum(water.table.signed(at), 0.0)
-    return np.stack([on.real, on.imag], axis=1)
 
 
 def _displaced(joints: Joints, bears: np.ndarray) -> np.ndarray:

@@ -24,7 +24,7 @@ KEPT = (  # of what changes in a run, but for the joints: arrays that stay in th
 )  # fmt: skip
 STATE = (
     *KEPT, "t0", "n", "dt", "halvings", "limit.now", "limit.least", "limit.bound", "limit.checked",
-    "blocks.share", "tracker.keys", "tracker.law", "tracker.numbers", "tracker.offset",
+    "tracker.keys", "tracker.law", "tracker.numbers", "tracker.offset",
     "tracker.given", "ledger.start", "ledger.area", "ledger.lost",
 )  # fmt: skip
 PLACES = "contacts.corner", "contacts.edge"  # from which the contacts are made anew

@@ -8,11 +8,11 @@ import numpy as np
 from ..compiled import World
 from ..contact import Contacts, Joints, Tracker
 from ..errors import Refused
-from ..scene import Scene, Stage
+from ..scene import Scene
 from . import saved_states
 from .blocks import Blocks
 from .edge_loads import press
-from .energy import DROPPED, WORK, Ledger
+from .energy import DROPPED, Ledger
 from .in_situ import begin
 from .saved_states import KEPT, PLACES, STATE, Saved
 from .seating import seat
@@ -21,7 +21,7 @@ from .timestep import SAFE, StepLimit, impact_limit
 NEAR = 0.4  # share of the limit below which no lever arm matters; to which a step is halved
 MATCH = 1e-6  # relative: lengths that are equal but for rounding
 LOOKS = 16  # steps between two looks at the drives and at excavations
-REST, RESTING = (1e-4, 0.1), 0.9  # m/s, m/s2: below which a block rests; share that must
+SLOW, EVEN, RESTING = 1e-4, 0.1, 0.9  # m/s, m/s2: below which a block rests; share that must
 FRACTIONS = {  # of the limit that a time step is, by what can happen
     "blocks fall or have no equilibrium": 0.15,
     "drives move blocks": 0.4,
@@ -108,30 +108,29 @@ class Simulation:
             drives.reverse(self.time, self.slid)
 
     def _dig(self) -> None:
-        """Take away the blocks of a stage when its time has come; then let go what they bore."""
+        """Take away the blocks of a stage when its time has come, or, if it has none, when the rock
+        is at rest; then let go what they bore."""
         blocks, stages, n = self.blocks, self.scene.stages, int(np.isfinite(self.begun).sum())
-        if self.n % LOOKS == 0 and n < len(stages) and self._is_due(stages[n]):
-            taken, c, joints = stages[n].blocks, self.contacts, self.joints
-            area = c.length * self.scene.thickness * (np.isin(c.a, taken) | np.isin(c.b, taken))
-            stress, shear = area * joints.traction.T
-            stored = np.where(area > 0, joints.stored * self.scene.thickness, 0.0)
-            bore = c.assemble(blocks.motion, stress, -shear, stored)
-            blocks.support[:] = blocks.share * blocks.support + bore
+        due = self.n % LOOKS == 0 and n < len(stages)
+        if due and (self._rests() if (at := stages[n]["at"]) is None else self.time >= at):
+            taken, c, joints = stages[n]["blocks"], self.contacts, self.joints
+            mine = (np.isin(c.a, taken) | np.isin(c.b, taken)) * self.scene.thickness
+            stress, shear = mine * c.length * joints.traction.T
+            blocks.support += c.assemble(blocks.motion, stress, -shear, mine * joints.stored)
             blocks.remove(taken)
             self.tracker.urgent[taken], self.world.stale = True, 1
-            self.begun[n], blocks.share, n = self.time, 1.0, n + 1
-        if blocks.share:
-            blocks.share = max(1 - (self.time - self.begun[n - 1]) / stages[n - 1].over, 0.0)
-            self._load()
+            self.begun[n], n = self.time, n + 1
+        if blocks.support.any():
+            left = self.begun[n - 1] + stages[n - 1]["over"] - self.time
+            blocks.support *= max(left, 0.0) / max(left + self.dt, self.dt)
+            self.ledger.load(blocks, press(self.scene, blocks, self.tracker), self.dt)
 
-    def _is_due(self, stage: Stage) -> bool:
-        """Is it time for a stage? Without a time of its own, when the rock is at rest."""
-        if stage.at is not None:
-            return self.time >= stage.at
-        force, mass = self.ledger.forces[0], self.blocks.inertia[:, 0]
-        changes = np.hypot(*self.blocks.velocity[:2]), np.hypot(*force.T[:2]) / mass
-        moves = np.quantile(np.array(changes)[:, self.blocks.mobile[:, 0]], RESTING, axis=1)
-        return not self.blocks.share and bool((moves < REST).all())
+    def _rests(self) -> bool:
+        """Is no support going, and are almost all blocks slow and in balance?"""
+        blocks, force = self.blocks, self.ledger.forces[0].T[:2]
+        speed, pull = np.hypot(*blocks.velocity[:2]), np.hypot(*force) / blocks.inertia[:, 0]
+        moves = np.maximum(speed / SLOW, pull / EVEN)[blocks.mobile[:, 0]]
+        return not blocks.support.any() and bool(np.quantile(moves, RESTING) < 1)
 
     def _halve(self) -> bool:
         """Go on with half the time step, if it may be halved once more."""
@@ -214,17 +213,9 @@ class Simulation:
             before = tracker.renew(blocks.motion, blocks.near(), pressed=False)
             if before is not None:
                 self._rearrange(before)
-            self._load()
+            self.ledger.load(blocks, press(self.scene, blocks, tracker), self.dt)
         self.world.call("press", self.dt)
         return self.world
-
-    def _load(self) -> None:
-        """Bring the loads on the blocks up to date, and the work of this step, which books the new
-        ones and is to have the mean of old and new."""
-        blocks, loads = self.blocks, self.blocks.loads.copy()
-        press(self.scene, blocks, self.tracker)
-        change = 0.5 * self.dt * (blocks.loads - loads)
-        self.ledger.energy[WORK] -= (change * blocks.motion[3:].T).sum()
 
     def _transfer(self) -> None:
         """Joints and ledger for contacts whose corners went on to other edges.

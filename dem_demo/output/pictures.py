@@ -27,11 +27,10 @@ FEW = 12  # blocks: most that bear their names
 
 
 def outlines(record: Record, i: int) -> list[np.ndarray]:
-    """Corners (m, 2) of all blocks in frame i (m); NaN for those that were taken away by then."""
-    places = np.where(record.gone[i], np.nan, record.motion[i][:3]).T
+    """Corners (m, 2) of all blocks in frame i (m); NaN for those that are gone."""
     return [
         block.local @ turn(angle).T + [x, y]
-        for block, (x, y, angle) in zip(record.scene.blocks, places, strict=True)
+        for block, (x, y, angle) in zip(record.scene.blocks, record.motion[i][:3].T, strict=True)
     ]
 
 
@@ -70,17 +69,17 @@ class Pictures:
 
     def figure(self) -> tuple[Figure, Axes]:
         """An empty frame with its legend: states, a round stress, the dots of the start."""
-        wide, high = self.high - self.low
+        (wide, high), scene = self.high - self.low, self.record.scene
         across = min(6.5, 6.0 * wide / high)
         figure = Figure(figsize=(max(across + 1.0, 7.5), across * high / wide + 1.8))
         marks = [Line2D([], [], color=colour, ls=line, label=f"joint {name}", lw=2.0)
                  for name, (colour, line) in STATES.items()]  # fmt: skip
         stress = float(f"{self.stress:.1g}")
-        kind = "normal stress" if self.record.scene.water is None else "effective normal stress"
-        label, width = f"{kind} {1e-3 * stress:g} kPa", self._width(stress)
+        kind = "effective " * (scene.water is not None or any(scene.pressure))
+        label, width = f"{kind}normal stress {1e-3 * stress:g} kPa", self._width(stress)
         marks.append(Line2D([], [], color=STATES["stuck"][0], lw=width, label=label))
         marks.append(Line2D([], [], color="0.6", ls=":", lw=0.9, label="place at the start"))
-        if (water := self.record.scene.water) and water.table:
+        if scene.water:
             marks.append(Line2D([], [], color=WATER, ls="-.", label="water table"))
         figure.legend(handles=marks, loc="outside lower center", ncols=3, frameon=False)
         return figure, figure.add_subplot()
@@ -104,8 +103,8 @@ class Pictures:
         if len(blocks) <= FEW:
             for block, shape in zip(blocks, shapes, strict=True):
                 axes.text(*shape.mean(axis=0), block.name, ha="center", va="center")
-        if (water := record.scene.water) and water.table:
-            axes.plot(*water.table.line.T, color=WATER, lw=1.5, ls="-.", zorder=4)
+        if record.scene.water:
+            axes.plot(*record.scene.water.line.T, color=WATER, lw=1.5, ls="-.", zorder=4)
         ends, state = record.joints[i]["ends"], self.states(i)
         widths = self._width(record.joints[i]["normal_stress_Pa"])
         for name, (colour, line) in STATES.items():

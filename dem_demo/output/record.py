@@ -16,14 +16,13 @@ LOOK_BACK = 1.0  # s over which creep is measured
 
 
 class Record:
-    """Frames of a run: times (f,), motion (f, 6, n), energies (f, 9), joints; gone (f, n):
-    blocks that were taken away by then.
+    """Frames of a run: times (f,), motion (f, 6, n), NaN for blocks that are gone, energies (f, 9),
+    joints.
 
     joints[f]: by name, "who" (k, 5) block, edge, block, edge, contact; "ends" (k, 2, 2) the segment
     of joint that a contact carries; and numbers (k,) with their unit in the name. monitored[f]:
-    what the scene's [watch] asks for; slips: of its joints; laws: of the watched joints;
-    begun: times (s) of the stages of an excavation, inf for what is still there; state: that of
-    the last frame, to return to; steps: of the run.
+    what the scene's [watch] asks for; slips: of its joints; laws: of the watched joints; state:
+    that of the last frame, to return to; steps: of the run.
     """
 
     def __init__(self, sim: Simulation) -> None:
@@ -32,18 +31,15 @@ class Record:
         self.laws = {pair: law_between(sim, *pair) for pair in watched}
         self.times: list[float] = []
         self.motion: list[np.ndarray] = []
-        self.gone: list[np.ndarray] = []
         self.energy: list[list[float]] = []
         self.joints: list[dict[str, np.ndarray]] = []
         self.monitored: list[dict[str, float]] = []
-        self.begun = sim.begun
         self.take(sim)
 
     def take(self, sim: Simulation) -> None:
         """Add the present as a frame."""
         self.times.append(sim.time)
-        self.motion.append(sim.blocks.motion.copy())
-        self.gone.append(sim.blocks.gone.copy())
+        self.motion.append(np.where(sim.blocks.gone, np.nan, sim.blocks.motion))
         self.energy.append([*sim.ledger.energy.tolist(), sim.ledger.error])
         self.joints.append(_joints(sim))
         self.monitored.append(readings(sim))
@@ -117,7 +113,7 @@ def outcomes(record: Record) -> list[dict]:
     first, then, last = (record.displaced(i) for i in (0, before, -1))
     crept = np.hypot(*(last - then).T) / max(times[-1] - times[before], 1e-300)
     for rock in record.scene.rocks:
-        free = [i for i in rock.free if not record.gone[-1][i]]
+        free = [i for i in rock.free if np.isfinite(last[i, 0])]
         moved, creep = np.hypot(*(last - first)[free].T), float(crept[free].max())
         limit = FAILED * usual_size(record.scene.blocks[i] for i in free)
         failed = int((moved > limit).sum())
@@ -139,7 +135,7 @@ def outcomes(record: Record) -> list[dict]:
 def far(record: Record) -> bool:
     """Has a block moved by more than the usual size of a block?"""
     free = (block for block in record.scene.blocks if not block.fixed)
-    return bool(record.moved.max() > usual_size(free))
+    return bool(np.nanmax(record.moved) > usual_size(free))
 
 
 def sentences(record: Record) -> list[str]:
@@ -151,9 +147,6 @@ def sentences(record: Record) -> list[str]:
         said = "had slipped before this run" if slip["slipped_before"] else said
         law = "nothing" if alone is None else f"{alone:.2f} degrees"
         found.append(f"{slip['block']}: {said}, the law alone says {law}")
-    if len(record.begun):
-        times = (f"{time:.3g} s" if np.isfinite(time) else "not yet" for time in record.begun)
-        found.append(f"stages excavated from: {', '.join(times)}")
     return [*found, *map(sentence, outcomes(record))]
 
 

@@ -15,7 +15,7 @@ from .drives import Drives
 from .keys import Tables, overlay
 from .laws import Files, Law, build_law, opens_to
 from .read import TEMPLATE, build, load, parse, read_tables, shipped
-from .scene import Run, Scene, Stage
+from .scene import Run, Scene
 from .stress import Stress
 
 __all__ = [
@@ -26,7 +26,6 @@ __all__ = [
     "Law",
     "Run",
     "Scene",
-    "Stage",
     "Stress",
     "Tables",
     "build",

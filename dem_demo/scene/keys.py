@@ -112,7 +112,7 @@ SCENE = {
         "k0": NOT_NEGATIVE, "stress": partial(finite, unit="Pa"), "surface": polyline,
         **dict.fromkeys(("left", "right", "bottom", "top"), SIDE),
     },
-    "water": {"table": polyline, "unit_weight": POSITIVE, "pressure": TABLE},
+    "water": {"table!": polyline, "unit_weight": POSITIVE},
     "watch": {"slip": LIST, "shear": LIST, "pins": LIST, "joints": LIST},
 }  # fmt: skip
 

@@ -1,6 +1,6 @@
 """Reads scenes: TOML files, or their text, checked."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,10 +14,10 @@ from jointlaw.support.checks import one_of, remedy
 from .blocks import Block, box, check_convex, usual_width
 from .cutting import JointSet, cut
 from .drives import read_drives
-from .keys import LIST, SCENE, TABLE, Tables, overlay, some_of, vector
+from .keys import LIST, NOT_NEGATIVE, SCENE, TABLE, Tables, overlay, some_of, vector
 from .laws import Files, build_law, opens_to
-from .scene import SKIN, Rock, Run, Scene, Stage
-from .stress import read_in_situ, read_water
+from .scene import SKIN, Rock, Run, Scene
+from .stress import read_stresses
 
 SCENES = Path(__file__).parent / "scenes"
 TEMPLATE = Path(__file__).parent / "template.toml"
@@ -92,15 +92,16 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     top, files = keys.checked(data, SCENE, where), Files() if files is None else files
     laws = {name: build_law(table, f"{where}: laws.{name}", files)
             for name, table in top["laws"].items()}  # fmt: skip
+    pressure = (NOT_NEGATIVE(f"{where}: laws.{name}.pressure", table.get("pressure", 0.0))
+                for name, table in top["laws"].items())  # fmt: skip
     density = top.get("density", DENSITY)
     blocks = [_block(table, density, where) for table in top.get("block", ())]
     edge_laws: dict[tuple[int, int], str] = {}
     digs = top.get("excavate", ())
     rocks = [_rock(table, blocks, edge_laws, density, digs, where) for table in top.get("rock", ())]
-    gravity, water, in_situ = top.get("gravity", GRAVITY), top.get("water"), top.get("in_situ")
-    if in_situ is not None:
-        in_situ = read_in_situ(in_situ, blocks, density, gravity, f"{where}: in_situ")
-        rocks = [replace(r, free=[i for i in r.free if not blocks[i].fixed]) for r in rocks]
+    gravity = top.get("gravity", GRAVITY)
+    water, in_situ = read_stresses(top, blocks, density, gravity, where)
+    rocks = [replace(r, free=[i for i in r.free if not blocks[i].fixed]) for r in rocks]
     number = {block.name: i for i, block in enumerate(blocks)}
     if len(number) < len(blocks):
         raise ValueError(f"{where}: two blocks have the same name; names must differ")
@@ -119,8 +120,7 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     scene = Scene(
         top.get("title", where), tuple(blocks), laws, run, default, pairs,
         tuple(rocks), edge_laws, drives, gravity, top.get("thickness", 1.0),
-        water and read_water(water, gravity, laws, f"{where}: water"), in_situ,
-        _stages(digs, blocks, where), **watched,
+        water, in_situ, tuple(pressure), tuple(_stages(digs, blocks, where)), **watched,
     )  # fmt: skip
     for name, law in laws.items():
         opening = opens_to(law)
@@ -200,17 +200,16 @@ def _joint_at(
     return two[0], two[1]
 
 
-def _stages(tables: list[Tables], blocks: Sequence[Block], where: str) -> tuple[Stage, ...]:
+def _stages(tables: list[Tables], blocks: Sequence[Block], where: str) -> Iterator[Tables]:
     """The stages of an excavation: each takes the blocks whose centroids lie in its corners."""
-    left, stages = set(range(len(blocks))), []
+    left = dict(enumerate(Point(block.centroid) for block in blocks))
     for i, table in enumerate(tables):
         region = Polygon(table["corners"])
-        taken = sorted(j for j in left if region.contains(Point(blocks[j].centroid)))
+        taken = [j for j, at in left.items() if region.contains(at)]
         if not taken:
             raise ValueError(f"{where}: excavate[{i}].corners: no block is left there")
-        left.difference_update(taken)
-        stages.append(Stage(taken, table.get("at"), table["over"]))
-    return tuple(stages)
+        left = {j: at for j, at in left.items() if j not in taken}
+        yield {"at": None, **table, "blocks": taken}
 
 
 def _rock(

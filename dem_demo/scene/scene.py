@@ -8,8 +8,9 @@ import numpy as np
 
 from .blocks import Block, usual_width
 from .drives import Drive
+from .keys import Tables
 from .laws import Files, Law
-from .stress import InSitu, Water
+from .stress import Stress
 
 SKIN, THIN = 0.02, 0.1  # of the usual width of the blocks that move; at most of a block's own
 
@@ -47,16 +48,6 @@ class Rock:
     slivers: str
 
 
-@dataclass(frozen=True)
-class Stage:
-    """Blocks that are taken away: at a time (s), or without one when the rock is at rest after the
-    stage before; over: time (s) in which what they bore is let go."""
-
-    blocks: list[int]
-    at: float | None
-    over: float
-
-
 @dataclass(frozen=True, eq=False)
 class Scene:
     """Everything that a simulation needs.
@@ -64,8 +55,10 @@ class Scene:
     pairs: laws by the blocks of [[joint]] tables; edge_laws: of each (block, edge) that lies on a
     joint of a rock, the law of its set.
 
-    water: in joints and on faces; in_situ: stress before an excavation; None without.
-    stages: of an excavation; gone: blocks that are not there from the start.
+    water: stress of water in joints and on faces; in_situ: stress before an excavation; pressure:
+    of water (Pa) in the joints of each law. stages: of an excavation, `blocks` that are taken away
+    `at` a time (s), or None when the rock is at rest, and `over` what time (s) their support goes;
+    gone: blocks that are not there from the start.
 
     slip, shear: joints to report on, as (moving block, base); near: those nearest to points, as two
     blocks; pins: points, as (block, place in m); reduction: what the shear strength of all joints
@@ -86,9 +79,10 @@ class Scene:
     drives: tuple[Drive, ...] = ()
     gravity: tuple[float, float] = (0.0, -9.81)
     thickness: float = 1.0
-    water: Water | None = None
-    in_situ: InSitu | None = None
-    stages: tuple[Stage, ...] = ()
+    water: Stress | None = None
+    in_situ: Stress | None = None
+    pressure: tuple[float, ...] = ()
+    stages: tuple[Tables, ...] = ()
     gone: tuple[int, ...] = ()
     slip: tuple[tuple[int, int], ...] = ()
     shear: tuple[tuple[int, int], ...] = ()
@@ -108,7 +102,7 @@ class Scene:
     @property
     def excavated(self) -> "Scene":
         """The scene without what its excavation takes away, but with the stress of before."""
-        gone = [i for stage in self.stages for i in stage.blocks]
+        gone = [i for stage in self.stages for i in stage["blocks"]]
         return replace(self, stages=(), gone=(*self.gone, *gone)) if gone else self
 
     @property

@@ -1,10 +1,8 @@
 """Stress that is given in the ground: of water in joints, and of the rock before an excavation."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-
-from jointlaw.support.checks import at_least, number, one_of
 
 from .blocks import Block, next_of
 from .keys import Tables
@@ -17,16 +15,19 @@ ROLLERS = ("x", "turn"), ("y", "turn")  # what they hold on a side across x, and
 
 @dataclass(frozen=True, eq=False)
 class Stress:
-    """A tensor times a number that grows with the depth below a line, at least 0.
+    """A tensor times a number that grows with the depth below a line, at least 0; their product is
+    in Pa.
 
     tensor (2, 2), compression positive; line (m, 2): [x, y] (m) of the line, level beyond its ends;
-    weight: growth of the number per m of depth; top: the number on the line. The product is in Pa.
+    weight: growth of the number per m of depth; top: the number on the line; edges (c,): those of
+    all blocks, one after the other, that the stress acts on from outside.
     """
 
     tensor: np.ndarray
     line: np.ndarray
     weight: float
-    top: float = 0.0
+    top: float
+    edges: np.ndarray
 
     def signed(self, at: np.ndarray) -> np.ndarray:
         """The number at places x + iy (m), below zero where it counts as zero."""
@@ -38,68 +39,47 @@ class Stress:
         return x * normal.real + y * normal.imag
 
 
-@dataclass(frozen=True, eq=False)
-class Water:
-    """Water in the ground: its stress below the table; pressure (Pa) given for the joints of laws,
-    by their names."""
+def read_stresses(
+    top: Tables, blocks: list[Block], density: float, gravity: tuple[float, float], where: str
+) -> tuple[Stress | None, Stress | None]:
+    """The stresses of the tables `[water]` and `[in_situ]` of a scene.
 
-    table: Stress | None = None
-    pressure: dict[str, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, eq=False)
-class InSitu:
-    """Stress before an excavation, water included; loaded (c,): the edges of all blocks, one after
-    the other, that it acts on from outside."""
-
-    stress: Stress
-    loaded: np.ndarray
-
-
-def read_water(table: Tables, gravity: tuple[float, float], laws: Tables, where: str) -> Water:
-    """The water of a `[water]` table. Raises ValueError."""
-    pressure = table.get("pressure", {})
-    for name, value in pressure.items():
-        one_of(f"{where}.pressure", name, tuple(laws))
-        at_least(f"{where}.pressure.{name}", number(f"{where}.pressure.{name}", value), 0)
-    if "table" not in table:
-        return Water(None, pressure)
-    _require_down(f"{where}.table", gravity)
-    weight = table.get("unit_weight", UNIT_WEIGHT)
-    return Water(Stress(np.eye(2), table["table"], weight), pressure)
-
-
-def read_in_situ(
-    table: Tables, blocks: list[Block], density: float, gravity: tuple[float, float], where: str
-) -> InSitu:
-    """The stress of an `[in_situ]` table; blocks on the sides of the scene that it holds are fixed
-    or held. Raises ValueError."""
-    if ("k0" in table) == ("stress" in table):
-        raise ValueError(f"{where}: give k0 or stress, one of them")
+    Blocks on its sides are fixed or held as `[in_situ]` says. On a side that the stress loads there
+    is no water, which is part of the stress. Raises ValueError.
+    """
+    water, given = top.get("water"), top.get("in_situ", {})
+    if given and ("k0" in given) == ("stress" in given):
+        raise ValueError(f"{where}: in_situ: give k0 or stress, one of them")
+    if (water or "k0" in given) and (gravity[0] or gravity[1] > 0):
+        raise ValueError(f"{where}: gravity = {list(gravity)} must point down, [0, -9.81], for a "
+                         "water table and for k0")  # fmt: skip
     corners = np.concatenate([block.corners for block in blocks])
+    loaded = _sides(given, blocks, corners)
+    if water:
+        weight = water.get("unit_weight", UNIT_WEIGHT)
+        water = Stress(np.eye(2), water["table"], weight, 0.0, ~loaded)
+    if "stress" in given:
+        x, y, shear = given["stress"]
+        tensor = np.array([[x, shear], [shear, y]])
+        return water, Stress(tensor, np.zeros((1, 2)), 0.0, 1.0, loaded)
+    if not given:
+        return water, None
+    line = given.get("surface", np.array([[0.0, corners[:, 1].max()]]))
+    tensor = np.diag([given["k0"], 1.0])
+    return water, Stress(tensor, line, -density * gravity[1], 0.0, loaded)
+
+
+def _sides(given: Tables, blocks: list[Block], corners: np.ndarray) -> np.ndarray:
+    """Hold the blocks on the sides of a scene as `[in_situ]` says; which edges (c,) are loaded."""
     number = np.repeat(np.arange(len(blocks)), [len(block.corners) for block in blocks])
     ends = np.concatenate([next_of(block.corners) for block in blocks])
     loaded = np.zeros(len(corners), bool)
     for side, (axis, way) in SIDES.items():
-        reach = way * np.stack([corners, ends])[..., axis]
+        reach, kind = way * np.stack([corners, ends])[..., axis], given.get(side)
         on = (reach > reach.max() - EXACT * np.ptp(corners)).all(axis=0)
-        loaded |= on & (table.get(side) == "loaded")
-        for i in np.unique(number[on]).tolist():
-            if table.get(side) == "held":
-                blocks[i] = replace(blocks[i], fixed=True)
-            elif table.get(side) == "rollers" and not blocks[i].fixed:
-                held = {*blocks[i].held, *ROLLERS[axis]}
-                blocks[i] = replace(blocks[i], held=tuple(sorted(held)))
-    if "stress" in table:
-        x, y, shear = table["stress"]
-        whole = Stress(np.array([[x, shear], [shear, y]]), np.zeros((1, 2)), 0.0, 1.0)
-        return InSitu(whole, loaded)
-    _require_down(f"{where}.k0", gravity)
-    surface = table.get("surface", [[0.0, corners[:, 1].max()]])
-    weight = -density * gravity[1]
-    return InSitu(Stress(np.diag([table["k0"], 1.0]), np.array(surface), weight), loaded)
-
-
-def _require_down(name: str, gravity: tuple[float, float]) -> None:
-    if gravity[0] or gravity[1] > 0:
-        raise ValueError(f"{name}: gravity = {list(gravity)} must point down, [0, -9.81]")
+        loaded |= on & (kind == "loaded")
+        for i in np.unique(number[on & (kind in ("held", "rollers"))]).tolist():
+            fixed, held = blocks[i].fixed or kind == "held", {*blocks[i].held, *ROLLERS[axis]}
+            held = () if fixed else tuple(sorted(held))
+            blocks[i] = replace(blocks[i], fixed=fixed, held=held)
+    return loaded

@@ -64,11 +64,11 @@ def test_a_resumed_excavation_goes_on_bit_for_bit():
 def test_rock_is_cut_along_what_is_taken_away():
     """The blocks of the stages cover their corners, in one rock or in two."""
     scene = load("tunnel")
-    areas = [sum(scene.blocks[i].section.area for i in stage.blocks) for stage in scene.stages]
+    areas = [sum(scene.blocks[i].section.area for i in stage["blocks"]) for stage in scene.stages]
     assert areas == pytest.approx([6 * 2 + (6 + 4.2) / 2 * 1.6 + 4.2 / 2 * 0.8, 18.0], rel=0.02)
     assert sum(block.section.area for block in scene.blocks) == pytest.approx(24 * 20, rel=0.01)
     left = scene.excavated
-    assert sorted(left.gone) == sorted([*scene.stages[0].blocks, *scene.stages[1].blocks])
+    assert sorted(left.gone) == sorted([i for stage in scene.stages for i in stage["blocks"]])
     assert not left.stages
 
 

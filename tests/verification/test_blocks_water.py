@@ -112,7 +112,7 @@ def test_a_planar_slide_with_a_tension_crack(phi, cohesion, depth):
 
 def test_pressure_given_for_a_law_is_taken_from_the_stress_of_its_joints():
     """20 kPa under a slab of 1 m on a slope of 3 in 4: of its 25.5 kPa x 0.8 0.4 are left."""
-    text = "gravity = [5.886, -7.848]\n[water]\npressure = { wet = 2e4 }\n" + law("wet", 0.9)
+    text = "gravity = [5.886, -7.848]\n" + law("wet", 0.9) + "pressure = 2e4\n"
     text += block("floor", [(-9, -3), (9, -3), (9, 0), (-9, 0)], "fixed = true")
     text += block("slab", [(-2, 0), (2, 0), (2, 1), (-2, 1)], "held = ['x', 'turn']")
     sim = Simulation(parse(text + RUN))
@@ -128,14 +128,19 @@ def test_pressure_given_for_a_law_is_taken_from_the_stress_of_its_joints():
     ("wrong", "told"),
     [
         ("table = [[0.0, 1.0], [0.0, 2.0]]", "x increasing"),
-        ("pressure = { j = -1.0 }", "water.pressure.j = -1.0"),
-        ("pressure = { wet = 1.0 }", "water.pressure"),
+        ("table = []", "must be points"),
+        ("unit_weight = 1e4", "water.table"),
         ("table = [[0.0, 1.0]]\n[gone]", "unknown"),
     ],
 )
 def test_wrong_water_is_refused(wrong, told):
     with pytest.raises(ValueError, match=told):
         parse(law("j", 0.5) + block("stone", STONE) + RUN + f"[water]\n{wrong}\n")
+
+
+def test_a_negative_pressure_is_refused():
+    with pytest.raises(ValueError, match=r"laws\.j\.pressure = -1\.0"):
+        parse(law("j", 0.5) + "pressure = -1.0\n" + block("stone", STONE) + RUN)
 
 
 def test_a_table_needs_gravity_that_points_down():

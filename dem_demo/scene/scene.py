@@ -109,7 +109,8 @@ class Scene:
     def base(self) -> int | None:
         """The fixed block that displacements are measured from: of a shaken scene, one that moves
         with all fixed rock and not by a drive of its own."""
-        fixed = [i for i, block in enumerate(self.blocks) if block.fixed]
+        gone = {*self.excavated.gone}
+        fixed = [i for i, block in enumerate(self.blocks) if block.fixed and i not in gone]
         own = {d.blocks[0] for d in self.drives if len(d.times) > 1 and len(d.blocks) < len(fixed)}
         return min(fixed, key=lambda i: i in own, default=None)
 

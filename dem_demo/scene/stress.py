@@ -48,8 +48,9 @@ def read_stresses(
     is no water, which is part of the stress. Raises ValueError.
     """
     water, given = top.get("water"), top.get("in_situ", {})
-    if given and ("k0" in given) == ("stress" in given):
-        raise ValueError(f"{where}: in_situ: give k0 or stress, one of them")
+    stress = np.ravel(given.get("stress", ()))
+    if "in_situ" in top and ("k0" in given, len(stress)) not in ((True, 0), (False, 3)):
+        raise ValueError(f"{where}: in_situ: give either k0 or stress = [sxx, syy, sxy]")
     if (water or "k0" in given) and (gravity[0] or gravity[1] > 0):
         raise ValueError(f"{where}: gravity = {list(gravity)} must point down, [0, -9.81], for a "
                          "water table and for k0")  # fmt: skip
@@ -58,15 +59,12 @@ def read_stresses(
     if water:
         weight = water.get("unit_weight", UNIT_WEIGHT)
         water = Stress(np.eye(2), water["table"], weight, 0.0, ~loaded)
-    if "stress" in given:
-        x, y, shear = given["stress"]
-        tensor = np.array([[x, shear], [shear, y]])
-        return water, Stress(tensor, np.zeros((1, 2)), 0.0, 1.0, loaded)
     if not given:
         return water, None
-    line = given.get("surface", np.array([[0.0, corners[:, 1].max()]]))
-    tensor = np.diag([given["k0"], 1.0])
-    return water, Stress(tensor, line, -density * gravity[1], 0.0, loaded)
+    uniform, line = len(stress) > 0, given.get("surface", [[0.0, corners[:, 1].max()]])
+    x, y, shear = stress if uniform else (given["k0"], 1.0, 0.0)
+    weight, tensor = -density * gravity[1] * (not uniform), np.array([[x, shear], [shear, y]])
+    return water, Stress(tensor, np.array(line), weight, float(uniform), loaded)
 
 
 def _sides(given: Tables, blocks: list[Block], corners: np.ndarray) -> np.ndarray:
@@ -80,6 +78,5 @@ def _sides(given: Tables, blocks: list[Block], corners: np.ndarray) -> np.ndarra
         loaded |= on & (kind == "loaded")
         for i in np.unique(number[on & (kind in ("held", "rollers"))]).tolist():
             fixed, held = blocks[i].fixed or kind == "held", {*blocks[i].held, *ROLLERS[axis]}
-            held = () if fixed else tuple(sorted(held))
-            blocks[i] = replace(blocks[i], fixed=fixed, held=held)
+            blocks[i] = replace(blocks[i], fixed=fixed, held=() if fixed else tuple(sorted(held)))
     return loaded

@@ -120,6 +120,14 @@ def test_water_takes_its_part_of_the_stress():
     assert moved(sim) < 1e-4
 
 
+@pytest.mark.parametrize(
+    "wrong", ["", "stress = [1e6, 2e6]", "k0 = 1.0\nstress = [1e6, 1e6, 0.0]", 'left = "held"']
+)
+def test_wrong_stresses_are_refused(wrong):
+    with pytest.raises(ValueError, match="give either k0 or stress"):
+        cut(wrong, "")
+
+
 def test_a_joint_keeps_its_closure_of_before_while_it_opens():
     """Two blocks let go from 0.5 MPa: their joint opens by stress over stiffness, 0.05 mm, before
     it bears nothing, and what it stored becomes their speed, but for the dashpots."""

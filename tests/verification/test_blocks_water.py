@@ -77,7 +77,7 @@ def test_a_sinking_block_gets_from_the_water_what_its_potential_loses():
     assert work == pytest.approx(gained, abs=3e-3 * np.ptp(gained))
 
 
-HEIGHT, FACE, PLANE, CRACK = 10.0, radians(60), radians(35), 4.0  # m; Hoek and Bray's slide
+HEIGHT, FACE, PLANE, CRACK = 20.0, radians(60), radians(35), 6.0  # m; Hoek and Bray's slide
 CREST = -HEIGHT / tan(FACE)
 BACK = -(HEIGHT - CRACK) / tan(PLANE)  # x of the crack; the toe is at 0, 0
 SLIDE = [(0, 0), (CREST, HEIGHT), (BACK, HEIGHT), (BACK, HEIGHT - CRACK)]
@@ -87,8 +87,8 @@ def planar(friction, cohesion, depth):
     """The slide with water in its crack, whose pressure falls in a line along the plane to 0."""
     level = HEIGHT - CRACK + depth
     table = f"[water]\ntable = [[-99.0, {level}], [{BACK}, {level}], [0.0, 0.0]]\n"
-    base = [(-40, -1), (0, -1), (0, 0), (BACK, HEIGHT - CRACK), (-40, HEIGHT - CRACK)]
-    behind = [(-40, HEIGHT - CRACK), SLIDE[3], SLIDE[2], (-40, HEIGHT)]
+    base = [(-60, -1), (0, -1), (0, 0), (BACK, HEIGHT - CRACK), (-60, HEIGHT - CRACK)]
+    behind = [(-60, HEIGHT - CRACK), SLIDE[3], SLIDE[2], (-60, HEIGHT)]
     text = law("j", friction, cohesion) + law("crack", 0.0) + (table if depth else "")
     text += block("base", base, "fixed = true") + block("behind", behind, "fixed = true")
     joint = '[[joint]]\nbetween = ["slide", "behind"]\nlaw = "crack"\n'

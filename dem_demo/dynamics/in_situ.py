@@ -8,6 +8,7 @@ from .blocks import Blocks
 from .edge_loads import press
 
 TOUCHES = 0.01  # of the least skin: joints drawn farther open bear nothing
+SHORT = 1e-6  # m: joints that are drawn shorter bear nothing either
 TRIALS = 50  # most steps to closure and sliding for a stress
 BALANCED = 1e-12  # what a joint may lack, as a share of its normal stress
 FLAT = 0.05  # least slope of the shear stress, as a share of that of the unsheared joint
@@ -32,7 +33,7 @@ def begin(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> np.
     on = np.maximum(stress.signed(at), 0.0) * stress.on(c.normal) * c.normal.conj()
     if scene.water:
         on -= np.maximum(scene.water.signed(at), 0.0)
-    on[(c.closure < -TOUCHES * skin) | (on.real <= 0)] = 0.0
+    on[(c.closure < -TOUCHES * skin) | (c.length < SHORT) | (on.real <= 0)] = 0.0
     closure, slid = _displaced(joints, np.stack([on.real, on.imag], axis=1)).T
     if closure.max() > skin:
         raise ValueError(

@@ -1,0 +1,108 @@
+"""A joint in a browser: the law as WebAssembly, the tables of the presets and a page around them."""
+
+import base64
+import json
+import sys
+import tempfile
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from ... import presets
+from ...laws.law import Law
+from ...native.build import FLAGS, Compiler
+from ...native.layout import ELEMENTS, LANES, NUMBERS, ROWS, TABLES, WHOLE, first_columns
+from ...native.layout import Law as Struct
+from ...support.files import write_files
+from ..c.export import include_dir, packed
+
+HERE = Path(__file__).parent
+WASM = "joint.wasm"  # in the repository: a reader of the page needs no compiler
+SCRIPTS = ("law.js", "test.js", "pictures.js", "story.js", "page.js")
+ZIG = Compiler((sys.executable, "-m", "ziglang", "cc"), "wasm32-wasi")
+_FLAGS = ("-target", "wasm32-wasi", "-mexec-model=reactor", "-nostartfiles", "-Wl,--strip-all")
+_PAGE = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width">
+<title>A joint in your browser</title>
+</head>
+<body style="font-family: system-ui, sans-serif; max-width: 60rem; margin: auto; padding: 0 0.6rem">
+<style>:root {{ color-scheme: light dark; }}</style>
+{}
+<script>
+{}
+</script>
+</body>
+</html>
+"""
+
+
+def export_browser(directory: str | Path) -> Path:
+    """Write `index.html`, a joint to drag in a browser, with all that it needs; returns its path.
+
+    directory: made if missing; a file of that name is replaced. Raises OSError where it cannot be
+    written.
+    """
+    write_files(directory, {"index.html": _PAGE.format(page(), script())})
+    return Path(directory) / "index.html"
+
+
+def page() -> str:
+    """The part of a page that holds the joint."""
+    return _read("joint.html").decode()
+
+
+def script() -> str:
+    """The script of that part: tables of the presets, the law, and what draws it."""
+    about = {
+        "numbers": {name: getattr(Struct, name).offset for name in (*WHOLE, *NUMBERS)},
+        "begin": getattr(Struct, next(iter(TABLES))).offset,
+        "columns": first_columns(),
+        "rows": list(ROWS),
+        "lanes": LANES,
+        "wasm": _text(_read(WASM)),
+        "rocks": {name: _rock(presets.load(name)) for name in presets.names()},
+    }
+    law = f'"use strict";\nconst JOINTLAW = {json.dumps(about)};\n'
+    return law + "".join(_read(name).decode() for name in SCRIPTS)
+
+
+def tables(law: Law) -> bytes:
+    """A law's tables, as `take_law` of joint.c reads them: the numbers, then the arrays.
+
+    Raises ValueError for a law that joint.c does not run.
+    """
+    numbers, arrays = packed(law)
+    if numbers["dim"] != 3 or any(numbers[name] for name in ("yields", "wears", "rise", *ELEMENTS)):
+        raise ValueError("joint.c runs elastic laws in space, of asperities alone")
+    head = bytes(Struct(**numbers))[: getattr(Struct, next(iter(TABLES))).offset]
+    return b"".join([head, *(array.tobytes() for array in arrays.values())])
+
+
+def compiled() -> bytes:
+    """The law in WebAssembly, by the compiler of the package `ziglang`, as `joint.wasm` holds it.
+
+    Raises RuntimeError that names what is missing, or tells the compiler's words.
+    """
+    with tempfile.TemporaryDirectory() as scratch:
+        made = Path(scratch) / WASM
+        flags = ["-Os" if flag == "-O3" else flag for flag in FLAGS]
+        ZIG.run(*_FLAGS, *flags, f"-I{include_dir()}", HERE / "joint.c", "-o", made)
+        return made.read_bytes()
+
+
+def _rock(law: Any) -> dict[str, Any]:
+    """What the page knows of a preset."""
+    o, p = law.orientation, law.asperity
+    numbers = {"a": o.a, "b": o.b, "c": o.c, "mu": p.mu, "lam": p.lam, "range": law.closure_range}
+    return {**numbers, "tables": _text(tables(law))}
+
+
+def _read(name: str) -> bytes:
+    return (resources.files(__package__) / name).read_bytes()
+
+
+def _text(data: bytes) -> str:
+    return base64.b64encode(data).decode()

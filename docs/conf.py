@@ -38,7 +38,7 @@ extensions = [
     "docstrings",
     "pages",
 ]
-exclude_patterns = ["_build", "gallery", "paper", "browser", "_ext"]
+exclude_patterns = ["_build", "gallery", "paper", "_ext"]
 suppress_warnings = [
     "config.cache",  # the settings of the gallery hold objects
 ]

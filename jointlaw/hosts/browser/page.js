@@ -135,7 +135,7 @@ function setLevel(share) {
 
 /* Begin anew at this level, and play a test, or none */
 function play(name) {
-  const { level, hold } = test, steps = (PLAYED[name] || function* () {})(test);
+  const { level, hold } = test;
   const start = level > 0 ? level : Math.max(test.joint.F[0], SEAT / 10);
   remake([{ hold: "stress", level: start, d: [0, 0, 0], steps: 1 }]);
   test.hold = hold;
@@ -143,7 +143,7 @@ function play(name) {
   const mine = playing, advance = () => {
     if (playing !== mine || !mine) return;
     guarded(() => {
-      for (let i = 0; i < 2 && playing; i++) if (mine.next().done) playing = null;
+      for (let i = 0; i < 8 && playing; i++) if (mine.next().done) playing = null;
     });
     if (playing) requestAnimationFrame(advance);
   };
@@ -163,7 +163,7 @@ function begin() {
 
 function listen() {
   for (const name of Object.keys(JOINTLAW.rocks)) part("preset").add(new Option(name));
-  part("preset").value = "westerly-rough";
+  part("preset").value = "westerly-smooth";
   part("preset").onchange = begin;
   for (const name of ["a", "c", "mu"])
     part(name).oninput = () => ((numbers[name] = Number(part(name).value)), remake(test.legs));
@@ -207,7 +207,9 @@ function follow(place, act) {
   place.onpointerup = place.onpointercancel = () => (from = null);
 }
 
-const hand = (x, y) => drag(x / zoomOf(test), y / zoomOf(test));
+/* Pixels of the hand over those of the block */
+const gear = () => (story.step && !story.isDone && story.step.gear) || 1;
+const hand = (x, y) => drag((gear() * x) / zoomOf(test), (gear() * y) / zoomOf(test));
 const turnHemisphere = (x) => ((spin += x / 80), redraw());
 
 function key(event) {

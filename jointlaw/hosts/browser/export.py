@@ -1,17 +1,15 @@
-"""A joint in a browser: the law as WebAssembly, the tables of the presets and a page around them."""
+"""A joint in a browser: the law as WebAssembly, tables of the presets and a page around them."""
 
 import base64
 import json
 import sys
 import tempfile
-from importlib import resources
 from pathlib import Path
-from typing import Any
 
 from ... import presets
 from ...laws.law import Law
 from ...native.build import FLAGS, Compiler
-from ...native.layout import ELEMENTS, LANES, NUMBERS, ROWS, TABLES, WHOLE, first_columns
+from ...native.layout import ELEMENTS, LANES, NUMBERS, ROWS, WHOLE, first_columns
 from ...native.layout import Law as Struct
 from ...support.files import write_files
 from ..c.export import include_dir, packed
@@ -45,28 +43,30 @@ def export_browser(directory: str | Path) -> Path:
     directory: made if missing; a file of that name is replaced. Raises OSError where it cannot be
     written.
     """
-    write_files(directory, {"index.html": _PAGE.format(page(), script())})
-    return Path(directory) / "index.html"
-
-
-def page() -> str:
-    """The part of a page that holds the joint."""
-    return _read("joint.html").decode()
+    part = (HERE / "joint.html").read_text(encoding="utf-8")
+    return write_files(directory, {"index.html": _PAGE.format(part, script())}) / "index.html"
 
 
 def script() -> str:
-    """The script of that part: tables of the presets, the law, and what draws it."""
+    """The script of that page: tables of the presets, the law, and what draws it."""
     about = {
         "numbers": {name: getattr(Struct, name).offset for name in (*WHOLE, *NUMBERS)},
-        "begin": getattr(Struct, next(iter(TABLES))).offset,
+        "begin": Struct.facet.offset,
         "columns": first_columns(),
         "rows": list(ROWS),
         "lanes": LANES,
-        "wasm": _text(_read(WASM)),
-        "rocks": {name: _rock(presets.load(name)) for name in presets.names()},
+        "wasm": _text((HERE / WASM).read_bytes()),
     }
-    law = f'"use strict";\nconst JOINTLAW = {json.dumps(about)};\n'
-    return law + "".join(_read(name).decode() for name in SCRIPTS)
+    rocks = {}
+    for name in presets.names():
+        law = presets.load(name)
+        o, p = law.orientation, law.asperity
+        numbers = {"a": o.a, "b": o.b, "c": o.c, "mu": p.mu, "range": law.closure_range}
+        rocks[name] = numbers | {"tables": _text(tables(law))}
+    parts = [(HERE / name).read_text(encoding="utf-8") for name in SCRIPTS]
+    return "".join(
+        [f'"use strict";\nconst JOINTLAW = {json.dumps(about | {"rocks": rocks})};\n', *parts]
+    )
 
 
 def tables(law: Law) -> bytes:
@@ -77,7 +77,7 @@ def tables(law: Law) -> bytes:
     numbers, arrays = packed(law)
     if numbers["dim"] != 3 or any(numbers[name] for name in ("yields", "wears", "rise", *ELEMENTS)):
         raise ValueError("joint.c runs elastic laws in space, of asperities alone")
-    head = bytes(Struct(**numbers))[: getattr(Struct, next(iter(TABLES))).offset]
+    head = bytes(Struct(**numbers))[: Struct.facet.offset]
     return b"".join([head, *(array.tobytes() for array in arrays.values())])
 
 
@@ -91,17 +91,6 @@ def compiled() -> bytes:
         flags = ["-Os" if flag == "-O3" else flag for flag in FLAGS]
         ZIG.run(*_FLAGS, *flags, f"-I{include_dir()}", HERE / "joint.c", "-o", made)
         return made.read_bytes()
-
-
-def _rock(law: Any) -> dict[str, Any]:
-    """What the page knows of a preset."""
-    o, p = law.orientation, law.asperity
-    numbers = {"a": o.a, "b": o.b, "c": o.c, "mu": p.mu, "lam": p.lam, "range": law.closure_range}
-    return {**numbers, "tables": _text(tables(law))}
-
-
-def _read(name: str) -> bytes:
-    return (resources.files(__package__) / name).read_bytes()
 
 
 def _text(data: bytes) -> str:

@@ -28,6 +28,8 @@ def export_fem(
     with a `Makefile`, direct shear tests for OpenGeoSys and Kratos, and `README.md`. Returns the
     names. Raises ValueError for a law, name or seating that does not fit, before anything is
     written.
+
+    >>> names = jl.export_fem(law, "joint-for-fem")
     """
     if law.dim == 1:
         raise ValueError("law.closure_only = True: finite elements shear; set closure_only=False")

@@ -7,12 +7,11 @@ inclination, gap and state are theirs. The profiles are drawn through the faces;
 are enlarged alike. Writes FOLDER/moving.gif.
 """
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from folder import asked
 from PIL import Image
 
 import jointlaw as jl
@@ -26,7 +25,7 @@ STRESS = 10e6
 LEGS = (3.5, -7.0, 7.0)  # slips, over the closure at this stress
 FRAMES = 6  # for a slip as long as that closure
 TEETH = 14
-STUCK, SLIDING, APART = "#1f6fd0", "#d95f02", "#8a8a8a"
+STUCK, SLIDING, APART = "#1f6fd0", "#c95500", "#8a8a8a"
 LARGE = {"font.size": 15, "legend.fontsize": 14, "axes.labelsize": 15, "lines.linewidth": 2.0}
 
 
@@ -180,10 +179,10 @@ def main(folder):
         images = [frame(plt, faces, moments[: i + 1], moments) for i in range(len(moments))]
     palette = images[len(images) // 2].quantize(64)
     small = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
-    path = Path(folder) / "moving.gif"
+    path = folder / "moving.gif"
     small[0].save(path, save_all=True, append_images=small[1:], duration=80, loop=0, optimize=True)
     print(f"{path}: {len(small)} frames, {path.stat().st_size / 1e6:.1f} MB")
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(asked(__doc__))

@@ -2,23 +2,18 @@
 
 import base64
 import json
-import sys
-import tempfile
 from pathlib import Path
 
 from ... import presets
 from ...laws.law import Law
-from ...native.build import FLAGS, Compiler
 from ...native.layout import ELEMENTS, LANES, NUMBERS, ROWS, WHOLE, first_columns
 from ...native.layout import Law as Struct
 from ...support.files import write_files
-from ..c.export import include_dir, packed
+from ..c.export import packed
 
 HERE = Path(__file__).parent
-WASM = "joint.wasm"  # in the repository: a reader of the page needs no compiler
+WASM = "joint.wasm"  # by builder/wasm.py; in the repository: a reader of the page needs no compiler
 SCRIPTS = ("law.js", "test.js", "pictures.js", "story.js", "page.js")
-ZIG = Compiler((sys.executable, "-m", "ziglang", "cc"), "wasm32-wasi")
-_FLAGS = ("-target", "wasm32-wasi", "-mexec-model=reactor", "-nostartfiles", "-Wl,--strip-all")
 _PAGE = """<!doctype html>
 <html lang="en">
 <head>
@@ -79,18 +74,6 @@ def tables(law: Law) -> bytes:
         raise ValueError("joint.c runs elastic laws in space, of asperities alone")
     head = bytes(Struct(**numbers))[: Struct.facet.offset]
     return b"".join([head, *(array.tobytes() for array in arrays.values())])
-
-
-def compiled() -> bytes:
-    """The law in WebAssembly, by the compiler of the package `ziglang`, as `joint.wasm` holds it.
-
-    Raises RuntimeError that names what is missing, or tells the compiler's words.
-    """
-    with tempfile.TemporaryDirectory() as scratch:
-        made = Path(scratch) / WASM
-        flags = ["-Os" if flag == "-O3" else flag for flag in FLAGS]
-        ZIG.run(*_FLAGS, *flags, f"-I{include_dir()}", HERE / "joint.c", "-o", made)
-        return made.read_bytes()
 
 
 def _text(data: bytes) -> str:

@@ -1,6 +1,6 @@
 /* joint.c: the law for the page "A joint in your browser", as WebAssembly. The law is the same text
  * as everywhere, one lane wide, which gives the same bits. After a change here or in the law's own
- * files: `python -m jointlaw.hosts.browser` makes joint.wasm anew. */
+ * files: `python builder/wasm.py` makes joint.wasm anew. */
 #define JOINTLAW_IMPLEMENTATION
 #define JOINTLAW_PLAIN
 #define JOINTLAW_NO_FILES

@@ -30,7 +30,7 @@ const STORY = [
   },
   {
     name: "Turn back",
-    tells: "Contacts stick again, then slip the other way one by one. Between the two curves lies what friction lost.",
+    tells: "Contacts stick again, then slip the other way one by one. Most of what lies between the two curves is lost to friction.",
     task: "Drag the block back to the left.",
     before: [10, [5, 0]], meant: ["stress"], mark: "sliding", done: (test, begun) => test.slip < begun.slip - 3 * test.joint.length,
   },

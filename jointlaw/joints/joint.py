@@ -63,7 +63,7 @@ class Joint:
 
     def _step(self, d: ArrayLike, tangent: bool, keep: bool) -> tuple[Array, Array | None]:
         step = self._steps[bool(tangent)]
-        step.d[0] = increments(d, (self.law.dim,))
+        step.d[0] = increments(d, step.d.shape[1:])
         step.keep = keep
         self._batch.take(step)
         return step.F[0].copy(), None if step.C is None else step.C[0].copy()

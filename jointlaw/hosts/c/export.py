@@ -25,14 +25,14 @@ def include_dir() -> str:
 def export_c(law: Law, directory: str | Path, name: str = "joint") -> list[str]:
     """Write all that a C or C++ code needs to run this law; the folder may be copied away.
 
+    >>> names = jl.export_c(law, "joint-for-c")
+
     law: any law. directory: made if missing; files of the same names are replaced. name: of the
     tables, an identifier of C.
 
     Writes `jointlaw.h` (the law), `NAME.jlaw` (its tables, for `jlaw_read`), `NAME.h` (the same as
     constants), `example.c`, `example.cpp`, `Makefile` and `README.md`. Returns the names. Raises
     ValueError for a name that C cannot have or too many azimuths, before anything is written.
-
-    >>> names = jl.export_c(law, "joint-for-c")
     """
     require_name(name)
     texts = {f"{name}.jlaw": table_text(law), f"{name}.h": header_text(law, name)}

@@ -15,6 +15,8 @@ HERE = backend.ROOT / "jointlaw/hosts/browser"
 ZIG = (sys.executable, "-m", "ziglang", "cc", "-target", "wasm32-wasi")
 FLAGS = ("-mexec-model=reactor", "-nostartfiles", "-Wl,--strip-all", "-Os")
 
+if any(word.startswith("-") for word in sys.argv[1:]):
+    sys.exit(__doc__)
 with tempfile.TemporaryDirectory() as headers:
     backend.build.write_headers(Path(headers))
     flags = [*FLAGS, *(flag for flag in backend.build.FLAGS if flag != "-O3"), f"-I{headers}"]

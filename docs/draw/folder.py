@@ -6,8 +6,9 @@ from pathlib import Path
 
 def asked(about):
     """Its path, made if missing; `about`, the text of the script, is what --help shows."""
-    formatter = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser(description=about, formatter_class=formatter)
+    parser = argparse.ArgumentParser(
+        description=about, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("folder", type=Path, help="for the pictures")
     folder = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)

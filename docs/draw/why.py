@@ -85,9 +85,11 @@ def three_laws(plt):
         axes.plot(slip, values, color=colour, zorder=3 - i)
         axes.text(0.03, 0.95 - 0.09 * i, f"{name}: {lost:.1f} J/m² lost", va="top", color=colour,
                   weight="bold", transform=axes.transAxes)  # fmt: skip
-    axes.set(xlabel="slip (µm)", ylabel="shear stress (MPa)", ylim=(-7.5, 11.5))
-    axes.set_title(
-        "A cycle of shear at a normal stress of 10 MPa: three laws, no test", fontsize=15
+    axes.set(
+        xlabel="slip (µm)",
+        ylabel="shear stress (MPa)",
+        ylim=(-7.5, 11.5),
+        title="A cycle of shear at a normal stress of 10 MPa: three laws, no test",
     )
     return figure
 
@@ -130,8 +132,7 @@ def jrc(plt):
     for stress, shade in zip(STRESSES, (1.0, 0.65, 0.4), strict=True):
         record = jl.direct_shear(law.joint(), 4e-3, stress, steps=300)
         axes.plot(record.shear * 1e3, record.shear_stress / stress, color=OURS, alpha=shade)
-        x = np.linspace(0, 4, 300)
-        rough = JRC * np.log10(JCS / stress)
+        x, rough = np.linspace(0, 4, 300), JRC * np.log10(JCS / stress)
         axes.plot(x, barton_bandis(x, 1.0, peak, rough, BASIC), color=BARTON, alpha=shade, ls="--")
         axes.text(4.05, record.shear_stress[-1] / stress, f"{stress / 1e6:g} MPa", va="center")
     axes.text(0.97, 0.08, "Barton, JRC 10", color=BARTON, ha="right", weight="bold",
@@ -179,11 +180,17 @@ def strength_surface(plt):
 
 def main(folder):
     with style() as plt:
-        plt.rcParams.update({"font.size": 14, "lines.linewidth": 2.4})
+        plt.rcParams.update(
+            {
+                "font.size": 14,
+                "axes.titlesize": 15,
+                "lines.linewidth": 2.4,
+                "axes.grid": True,
+                "grid.alpha": 0.3,
+            }
+        )
         for draw in (three_laws, along_across, jrc, strength_surface):
             figure = draw(plt)
-            for axes in figure.axes:
-                axes.grid(alpha=0.3)
             figure.savefig(folder / f"{draw.__name__.replace('_', '-')}.png", dpi=100)
 
 

@@ -312,6 +312,16 @@ SCENES = {
         ("is", "Math.abs(test.joint.F[0] - 5e6) < 1"),
         ("is", "test.rows.every((row, i, all) => !i || row.normal - all[i - 1].normal < 1.1e6)"),
     ],
+    "other numbers do again all that was done, and back": [
+        ("drag", [(0, 0), (34, 0)]),
+        ("drag", LEFT),
+        ("run", "window.before = [...test.joint.F, test.slip]"),
+        ("move", "a", 9),
+        ("is", "Math.abs(test.slip / before[3] - 1) > 0.01"),
+        ("move", "a", 3),
+        ("is", "[...test.joint.F, test.slip]"
+               ".every((x, i) => Math.abs(x - before[i]) <= 1e-4 * Math.abs(before[i]))"),
+    ],
     "the right button moves nothing": [("right button",), ("is", "test.slip === 0")],
     "two fingers move nothing": [("two fingers",), ("is", "test.slip === 0")],
     "what is kept has an end": [

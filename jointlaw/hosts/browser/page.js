@@ -99,10 +99,14 @@ function remake(legs) {
     made.turn(degrees);
     test = made;
     finish(test.repeat(legs));
+    test.asked = { legs, rows: test.rows.length }; // all of it, for the next numbers may go on farther
     if (hold === "stress") test.turn(degrees), (test.hold = hold);
     compare();
   });
 }
+
+/* What was done to this joint, or asked of it, if nothing was done since */
+const path = () => (test.asked && test.asked.rows === test.rows.length ? test.asked.legs : test.legs);
 
 /* What was done to reach a step of the story, as legs */
 function legsOf([stress, ...slips]) {
@@ -166,9 +170,9 @@ function listen() {
   part("preset").value = "westerly-smooth";
   part("preset").onchange = begin;
   for (const name of ["a", "c", "mu"])
-    part(name).oninput = () => ((numbers[name] = Number(part(name).value)), remake(test.legs));
+    part(name).oninput = () => ((numbers[name] = Number(part(name).value)), remake(path()));
   part("mating").max = MATINGS.length - 1;
-  part("mating").oninput = () => ((numbers.mating = MATINGS[part("mating").value] * test.joint.length), remake(test.legs));
+  part("mating").oninput = () => ((numbers.mating = MATINGS[part("mating").value] * test.joint.length), remake(path()));
   part("direction").oninput = () => guarded(() => (test.turn(Number(part("direction").value)), compare()));
   part("hold").onchange = () => guarded(() => {
     test.hold = part("hold").value;

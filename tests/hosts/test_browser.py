@@ -315,12 +315,12 @@ SCENES = {
     "other numbers do again all that was done, and back": [
         ("drag", [(0, 0), (34, 0)]),
         ("drag", LEFT),
-        ("run", "window.before = [...test.joint.F, test.slip]"),
+        ("run", "window.before = [...test.joint.F.slice(0, 2), test.slip]"),
         ("move", "a", 9),
-        ("is", "Math.abs(test.slip / before[3] - 1) > 0.01"),
+        ("is", "Math.abs(test.slip / before[2] - 1) > 0.01"),
         ("move", "a", 3),
-        ("is", "[...test.joint.F, test.slip]"
-               ".every((x, i) => Math.abs(x - before[i]) <= 1e-4 * Math.abs(before[i]))"),
+        ("is", "[...test.joint.F.slice(0, 2), test.slip]"
+               ".every((x, i) => Math.abs(x / before[i] - 1) < 1e-4)"),
     ],
     "the right button moves nothing": [("right button",), ("is", "test.slip === 0")],
     "two fingers move nothing": [("two fingers",), ("is", "test.slip === 0")],

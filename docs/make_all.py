@@ -54,7 +54,10 @@ TIMED = {
 # picture: command that writes into FOLDER, and the file there
 PICTURES = {
     "moving.gif": ("docs/draw/moving.py FOLDER", "moving.gif"),
-    "three-laws.png": ("docs/draw/three_laws.py FOLDER", "three-laws.png"),
+    **{
+        f"{name}.png": ("docs/draw/why.py FOLDER", f"{name}.png")
+        for name in ("three-laws", "along-across", "jrc", "strength-surface")
+    },
     "axes.png": ("docs/draw/axes.py FOLDER", "axes.png"),
     "shear.png": (
         "-m jointlaw shear biegel-rough --normal-stress 10MPa --to 2um --reverse=-2um "

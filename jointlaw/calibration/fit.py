@@ -92,8 +92,8 @@ class Fit(Estimates):
         )
         lines = ["", head, "|---|---|---|---|---|---|---|"]
         shears = self.problem.shears
-        for curve, (test, _) in zip(shears, self.predict_shear(*shears), strict=True):
-            both = ((curve.shear, curve.shear_stress, curve.opening), test)
+        for curve, test in zip(shears, self.predict_shear(*shears), strict=True):
+            both = ((curve.shear, curve.shear_stress, curve.opening), test[:3])
             tops = [
                 f"{stress[(top := np.argmax(np.abs(stress)))] / 1e6:.4g}, {1e3 * way[top]:.3g}"
                 for way, stress, _ in both
@@ -128,16 +128,13 @@ class Fit(Estimates):
         figure, axes = pyplot().subplots(1, panels, figsize=(4.6 * panels + 1, 4.4), squeeze=False)
         if closure is not None:
             self._draw_closure(axes[0, 0], closure, held_out)
-        for k, (curve, (test, _)) in enumerate(
-            zip(shears, self.predict_shear(*shears), strict=True)
-        ):
-            fitted, bands = k < len(self.problem.shears), self.shear_band(curve)
+        for k, (curve, test) in enumerate(zip(shears, self.predict_shear(*shears), strict=True)):
+            fitted, way = k < len(self.problem.shears), 1e3 * test.way
             dots = {"color": f"C{k}", "ls": "none", "marker": "o", "mfc": None if fitted else "w"}
             columns = (curve.shear_stress, 1e-6), (curve.opening, 1e3)
-            for axis, (points, scale), law, low, high in zip(
-                axes[0, -2:], columns, test[1:], bands[0][1:], bands[1][1:], strict=True
+            for axis, (points, scale), law, (low, high) in zip(
+                axes[0, -2:], columns, test[1:3], self.shear_band(curve), strict=True
             ):
-                way = 1e3 * test.way
                 axis.fill_between(way, scale * low, scale * high, color=f"C{k}", alpha=0.2, lw=0)
                 axis.plot(way, scale * law, color=f"C{k}")
                 if points is not None:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..laws.joint_law import JointLaw
 from ..parameters.resolution import Resolution
 from ..support.checks import Array, at_least, finite, more_than, number
-from .forward import STEPS, Settings, build_for_shear, log_stress
+from .forward import STEPS, Settings, build, log_stress
 from .noise import Noise, Series
 from .priors import Values
 from .shearing import Sheared, shear_all
@@ -219,17 +219,16 @@ class ShearCurve:
 
         steps: as in `path`.
         """
-        path = self.path(steps)
-        (test,) = shear_all(law, [path])
-        return test.stress[path[2]], test.opening[path[2]]
+        (test,) = shear_all(law, [self.path(steps)])
+        return test.stress[test.points], test.opening[test.points]
 
-    def residuals(self, test: Sheared, rows: NDArray[np.intp]) -> list[Array]:
+    def residuals(self, test: Sheared) -> list[Array]:
         """(model - measured)/largest measured, of shear stress (n + 1,) and opening (n,).
 
         Last of the stress stands how far the law rises above its stress at the largest measured
         one before the next points on both sides: few points say by it that the peak lies there.
         """
-        measured, stress = self.shear_stress, test.stress
+        measured, stress, rows = self.shear_stress, test.stress, test.points
         top = int(np.argmax(np.abs(measured)))
         near = stress[rows[max(top - 1, 0)] : rows[min(top + 1, rows.size - 1)] + 1]
         rise = np.max(np.sign(measured[top]) * (near - stress[rows[top]]))
@@ -318,23 +317,20 @@ def _steepness(closure: Array, stress: Array) -> Array:
     return np.abs(slope)
 
 
-def sheared(
-    curves: Sequence[ShearCurve], values: Values, settings: Settings
-) -> list[tuple[Sheared, NDArray[np.intp]]]:
-    """Each test by the law of these values, and the rows of its points; cells as fine as steps.
+def sheared(curves: Sequence[ShearCurve], values: Values, settings: Settings) -> list[Sheared]:
+    """Each test by the law of these values; cells as fine as steps.
 
     A parameter would take up the error of few cells, degrees of friction, and its interval would
     not show it.
     """
-    found: dict[int, tuple[Sheared, NDArray[np.intp]]] = {}
+    found: dict[int, Sheared] = {}
     finer = min(settings.steps / STEPS, MOST_FINER) ** 0.6
     for azimuth in {curve.azimuth for curve in curves}:
         mine = [k for k, curve in enumerate(curves) if curve.azimuth == azimuth]
-        law = build_for_shear(values, settings, azimuth)
+        law = build(values, settings, azimuth)
         r = law.resolution
         pairs = ((r.u, CELLS.u), (r.phi, CELLS.phi), (r.depth, CELLS.depth))
         cells = Resolution(*(round(finer * max(pair)) for pair in pairs))
         paths = [curves[k].path(settings.steps) for k in mine]
-        tests = shear_all(replace(law, resolution=cells), paths)
-        found |= {k: (test, path[2]) for k, test, path in zip(mine, tests, paths, strict=True)}
+        found |= zip(mine, shear_all(replace(law, resolution=cells), paths), strict=True)
     return [found[k] for k in range(len(curves))]

@@ -113,7 +113,7 @@ class Problem:
         tests = iter(sheared(self.shears, values, self.settings))
         for curve in self.curves:
             if isinstance(curve, ShearCurve):
-                found += curve.residuals(*next(tests))
+                found += curve.residuals(next(tests))
             else:
                 found.append(curve.residuals(values, self.settings))
         return np.concatenate(found)

@@ -231,7 +231,7 @@ def _misses(fit: Fit, fitted: list[ShearCurve], predicted: list[ShearCurve]) -> 
         f"| test | peak, last (MPa) | law | {' | '.join(FORMS)} |",
         f"|---|---|---|{'---|' * len(FORMS)}",
     ]
-    for curve, (test, _) in zip(predicted, fit.predict_shear(*predicted), strict=True):
+    for curve, test in zip(predicted, fit.predict_shear(*predicted), strict=True):
         measured, normal = peak_and_last(curve.shear_stress), float(np.mean(curve.normal))
         found = [peak_and_last(test.stress), *(envelope(form, fitted, normal) for form in FORMS)]
         cells = ["{:+.1f}, {:+.1f} %".format(*(100 * (one / measured - 1))) for one in found]

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy import special
@@ -199,17 +199,13 @@ def starting_points(problem: Problem, near: bool) -> list[Array]:
 
     near: whether the values at hand are those of a law and not the defaults.
     """
-    free, curve = set(problem.free), problem.closure
+    free, curve, values = set(problem.free), problem.closure, problem.values
     if curve is None or not free & {"alpha", "beta"} or (near and len(problem.curves) > 1):
-        return [problem.pack_scaled(problem.values)]
-    span = float(np.ptp(curve.closure))
-    starts = []
-    for shape in (2.0, 5.0, 10.0) if "alpha" in free else (problem.values["alpha"] + 1,):
-        guess: dict[str, Any] = {"alpha": shape - 1, "beta": 1.5 * span / shape}
-        guess["overlap"] = 0.1 * shape * guess["beta"]
-        guess["seating"] = span / 2
-        chosen = {name: value for name, value in guess.items() if name in free}
-        starts.append(problem.pack_scaled({**problem.values, **chosen}))
+        return [problem.pack_scaled(values)]
+    span, starts = float(np.ptp(curve.closure)), list[Array]()
+    for shape in (2.0, 5.0, 10.0) if "alpha" in free else (values["alpha"] + 1,):
+        guess = {"alpha": shape - 1, "beta": 1.5 * span / shape, "overlap": 0.15 * span}
+        starts.append(problem.pack_scaled({**values, **guess, "seating": span / 2}))
     return starts
 
 
@@ -271,10 +267,8 @@ def solve(problem: Problem, starts: Sequence[Array]) -> Solution:
     diagonals of C L C and C. D includes that a parameter lies within its bounds, as a standard
     error of their distance: what nothing else fixes is then wide open, and C exists.
     """
-    expected = tuple(one.expected for one in problem.series)
-    steepness = [one.steepness for one in problem.series]
-    bounds = problem.bounds()
-    noise, sigma = expected, problem.sigma(expected)
+    bounds, noise = problem.bounds(), tuple(one.expected for one in problem.series)
+    sigma = problem.sigma(noise)
     x = least(problem, sigma, starts)
     for _ in range(ROUNDS):
         r = problem.data(x)
@@ -284,9 +278,7 @@ def solve(problem: Problem, starts: Sequence[Array]) -> Solution:
         information = weighted.T @ weighted + np.diag((bounds[1] - bounds[0]) ** -2)
         C = np.linalg.inv(information + precision)
         leverage = np.einsum("ip,pq,iq->i", weighted, C, weighted)
-        if all(n.known for n in noise):
-            break
-        pieces = zip(expected, problem.split(r), problem.split(leverage), steepness, strict=True)
+        pieces = zip(problem.series, problem.split(r), problem.split(leverage), strict=True)
         previous, noise = noise, tuple(estimate_noise(*piece) for piece in pieces)
         if noise == previous:
             break

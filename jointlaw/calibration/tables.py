@@ -246,33 +246,41 @@ def _beside(
 
 def _table(name: str, titles: list[str], below: list[str], rows: Rows, marks: Marks) -> Table:
     """The columns of one test."""
-    below = below + [""] * (len(titles) - len(below))
-    values = np.full((len(titles), len(rows)), np.nan)
-    for k, (line, row) in enumerate(rows.items()):
-        if len(row) > len(titles) and any(row[len(titles) :]):
-            remedy = "give each column a name and separate all lines alike; if the decimal mark is "
+    wide = len(titles)
+    for line, row in rows.items():
+        if any(row[wide:]):
             raise ValueError(
-                f"{name}: line {line} has {len(row)} cells under {len(titles)} names; {remedy}a "
-                "comma, separate the columns by semicolons"
+                f"{name}: line {line} has {len(row)} cells under {wide} names; give each column a "
+                "name and separate all lines alike; if the decimal mark is a comma, separate the "
+                "columns by semicolons"
             )
-        values[: len(row), k] = [marks.value(cell) for cell in row[: len(titles)]]
     columns, odd = [], dict[int, str]()
-    for k, title in enumerate(titles):
-        cells = {n: row[k] for n, row in rows.items() if k < len(row) and row[k]}
-        known = dict(zip(rows, values[k].tolist(), strict=True))
-        texts = {n: cell for n, cell in cells.items() if not np.isfinite(known[n])}
-        wrong = ""
-        for n, cell in texts.items():
-            why = AMBIGUOUS if EITHER.fullmatch(cell) else "is no number"
-            wrong = wrong or f"line {n} holds {cell!r}, which {why}"
-        if 2 * len(texts) < len(cells):
-            odd |= {n: f"{title} is {c!r}" for n, c in texts.items() if _WORD.fullmatch(c)}
-        sent = {n: cell for n, cell in cells.items() if _SENTINEL.fullmatch(cell)}
-        usual = max((abs(known[n]) for n in cells if n not in sent and n not in texts), default=0)
-        none = {n: f"{title} is {c}" for n, c in sent.items() if abs(known[n]) > 5 * usual}
-        name_unit = _read_title(title, below[k])
-        columns.append(Column(title, *name_unit, values[k], wrong, none))
+    padded = ([*row, *[""] * wide][:wide] for row in (below, *rows.values()))
+    for title, unit, *cells in zip(titles, *padded, strict=True):
+        column, summaries = _column(title, unit, dict(zip(rows, cells, strict=True)), marks)
+        columns.append(column)
+        odd |= summaries
     return Table(name, columns, [*rows], odd)
+
+
+def _column(
+    title: str, unit: str, cells: dict[int, str], marks: Marks
+) -> tuple[Column, dict[int, str]]:
+    """A column from its cells by line; and lines that hold a word, such as Max, among numbers."""
+    found = {n: marks.value(cell) for n, cell in cells.items()}
+    known = {n: abs(x) for n, x in found.items() if np.isfinite(x)}
+    texts = {n: cell for n, cell in cells.items() if cell and n not in known}
+    wrong = (
+        f"line {n} holds {cell!r}, which {AMBIGUOUS if EITHER.fullmatch(cell) else 'is no number'}"
+        for n, cell in texts.items()
+    )
+    words = {n: f"{title} is {cell!r}" for n, cell in texts.items() if _WORD.fullmatch(cell)}
+    sent = [n for n in known if _SENTINEL.fullmatch(cells[n])]
+    usual = max((x for n, x in known.items() if n not in sent), default=0.0)
+    odd = {n: f"{title} is {cells[n]}" for n in sent if known[n] > 5 * usual}
+    values = np.array([*found.values()])
+    column = Column(title, *_read_title(title, unit), values, next(wrong, ""), odd)
+    return column, words if len(texts) < len(known) else {}
 
 
 def _jumps(x: Array, y: Array) -> NDArray[np.bool_]:

@@ -6,6 +6,14 @@ from typing import Any
 from ..calibration.field import ASSUMED, from_field, peak_displacement, tested
 from .command import Written, add_command, add_out, in_unit, write_results
 
+QUANTITIES = {  # unit, default, and what it is
+    "jcs": ("Pa", None, "strength of the joint wall: 100MPa"),
+    "length": ("m", None, "of the joint: 10cm"),
+    "normal_stress": ("Pa", None, "at which the law is right: 1MPa"),
+    "normal_stiffness": ("Pa/m", None, "at that stress: 30GPa/m"),
+    "basic_friction": ("rad", "30deg", "angle of the flat rock (default 30deg)"),
+}
+
 
 def add(commands: Any) -> None:
     """Add `field` to the subparsers of the command line."""
@@ -15,29 +23,20 @@ def add(commands: Any) -> None:
         "--normal-stiffness 30GPa/m --out out"
     )
     parser = add_command(commands, "field", what, example, _run)
-    add, stress = parser.add_argument, in_unit("Pa", positive=True)
-    add("--jrc", type=float, required=True, help="joint roughness coefficient, such as 10")
-    add("--jcs", type=stress, required=True, help="strength of the joint wall: 100MPa")
-    add("--length", type=in_unit("m", positive=True), required=True, help="of the joint: 10cm")
-    add("--normal-stress", type=stress, required=True, help="at which the law is right: 1MPa")
-    add(
-        "--normal-stiffness",
-        type=in_unit("Pa/m", positive=True),
-        required=True,
-        help="at that stress: 30GPa/m",
-    )
-    add(
-        "--basic-friction",
-        type=in_unit("rad", positive=True),
-        default="30deg",
-        help="angle of the flat rock (default 30deg)",
-    )
+    parser.add_argument("--jrc", type=float, required=True, help="joint roughness coefficient")
+    for name, (unit, default, about) in QUANTITIES.items():
+        parser.add_argument(
+            f"--{name.replace('_', '-')}",
+            type=in_unit(unit, positive=True),
+            required=default is None,
+            default=default,
+            help=about,
+        )
     add_out(parser)
 
 
 def _run(options: argparse.Namespace) -> None:
-    names = ("jrc", "jcs", "length", "normal_stress", "normal_stiffness", "basic_friction")
-    given = {name: getattr(options, name) for name in names}
+    given = {name: getattr(options, name) for name in ("jrc", *QUANTITIES)}
     law, slip = from_field(**given), peak_displacement(options.jrc, options.length)
     record, stiffness = tested(law, options.normal_stress, slip)
     text = (

@@ -14,11 +14,29 @@ from ..calibration.fit import Fit, fit_curves
 from ..calibration.measured import ClosureCurve, ShearCurve, first_loading
 from ..parameters.rock import require_rock
 from ..support.checks import Array, one_of
+from ..support.markdown import table
 from ..support.text_numbers import DECIMAL
 from .command import Written, add_command, add_out, in_unit, several, write_results
 
 MOST = 60  # points of a shear test that are fitted: a logger writes thousands, each costs a step
 SAME = 0.02  # of a normal stress: tests that --fit names
+COLUMNS = {
+    "stress": "sigmaZ:MPa",
+    "closure": "Disp:mm",
+    "shear": "us:mm",
+    "shear-stress": "tau:MPa",
+    "normal": "sn:MPa",
+    "opening": "dn:mm, opening positive",
+}
+QUANTITIES = {
+    "area": ("m2", "that forces act on: 100cm2"),
+    "side": ("m", "of an area that slip makes smaller: 10cm"),
+    "up-to": ("Pa", "fit up to this stress, predict the rest: 5.3MPa"),
+}
+STRESSES = {
+    "normal-stress": "of the shear tests in their order: 1MPa,3MPa",
+    "fit": "fit the shear tests at these normal stresses, predict the others: 1MPa,3MPa,5MPa",
+}
 NEEDS = {  # what an option is about, where no such test is given
     "data": (
         "a closure test: name its file before --shear",
@@ -39,8 +57,6 @@ def add(commands: Any) -> None:
     parser = add_command(commands, "fit", what, example, _run)
     add = parser.add_argument
     add("data", nargs="*", metavar="CSV", help="file of stress and closure, or shipped data set")
-    add("--stress-column", help="name and unit of that column, such as sigmaZ:MPa")
-    add("--closure-column", help="name and unit of that column, such as Disp:mm")
     add(
         "--shear",
         nargs="+",
@@ -56,18 +72,12 @@ def add(commands: Any) -> None:
         help="a table with one shear test a row: normal_stress, peak_shear_stress, "
         "peak_displacement, residual_shear_stress, residual_displacement, with units",
     )
-    add("--shear-column", help="name and unit of that column, such as us:mm")
-    add("--shear-stress-column", help="name and unit of that column: tau:MPa")
-    add("--normal-column", help="name and unit of that column: sn:MPa")
-    add("--opening-column", help="name and unit of that column, opening positive: dn:mm")
-    add("--area", type=in_unit("m2", positive=True), help="that forces act on: 100cm2")
-    add("--side", type=in_unit("m", positive=True), help="of an area that slip makes smaller: 10cm")
-    add(
-        "--normal-stress",
-        metavar="STRESSES",
-        type=several("Pa", positive=True),
-        help="of the shear tests in their order: 1MPa,3MPa",
-    )
+    for name, column in COLUMNS.items():
+        add(f"--{name}-column", help=f"name and unit of that column, such as {column}")
+    for name, (unit, about) in QUANTITIES.items():
+        add(f"--{name}", type=in_unit(unit, positive=True), help=about)
+    for name, about in STRESSES.items():
+        add(f"--{name}", metavar="STRESSES", type=several("Pa", positive=True), help=about)
     add(
         "--decimal",
         choices=tuple(DECIMAL),
@@ -78,13 +88,6 @@ def add(commands: Any) -> None:
         choices=("skip", "keep"),
         help="what to do with rows that may be no measurement; they are named first",
     )
-    add(
-        "--fit",
-        metavar="STRESSES",
-        type=several("Pa", positive=True),
-        help="fit the shear tests at these normal stresses, predict the others: 1MPa,3MPa,5MPa",
-    )
-    add("--up-to", type=in_unit("Pa"), help="fit up to this stress, predict the rest: 5.3MPa")
     add("--cycle", action="store_true", help="fit unloading too, and with it yield_interference")
     add(
         "--compliance",
@@ -226,17 +229,15 @@ def _shear_curves(options: argparse.Namespace) -> tuple[list[ShearCurve], list[S
 
 def _misses(fit: Fit, fitted: list[ShearCurve], predicted: list[ShearCurve]) -> str:
     """How far predictions miss, those of envelopes through the same tests beside (Markdown)."""
-    lines = [
-        "\nTests that were not fitted: errors of the predicted peak and last shear stress.\n",
-        f"| test | peak, last (MPa) | law | {' | '.join(FORMS)} |",
-        f"|---|---|---|{'---|' * len(FORMS)}",
-    ]
+    rows = []
     for curve, test in zip(predicted, fit.predict_shear(*predicted), strict=True):
         measured, normal = peak_and_last(curve.shear_stress), float(np.mean(curve.normal))
         found = [peak_and_last(test.stress), *(envelope(form, fitted, normal) for form in FORMS)]
         cells = ["{:+.1f}, {:+.1f} %".format(*(100 * (one / measured - 1))) for one in found]
         told = "{:.4g}, {:.4g}".format(*(measured / 1e6))
-        lines.append(f"| {curve.name} | {told} | {' | '.join(cells)} |")
+        rows.append(" | ".join([curve.name, told, *cells]))
+    what = "\nTests that were not fitted: errors of the predicted peak and last shear stress.\n"
+    lines = [what, *table(f"test | peak, last (MPa) | law | {' | '.join(FORMS)}", rows)]
     return "\n".join(lines) + "\n"
 
 

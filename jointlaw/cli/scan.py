@@ -9,6 +9,7 @@ from ..laboratory.experiments import direct_shear
 from ..parameters.rock import ROCK, require_rock
 from ..parameters.toml import VERSION
 from ..support.checks import Array
+from ..support.markdown import table
 from ..support.text_numbers import DECIMAL
 from ..surface.fit import SurfaceFit, from_surface
 from ..surface.scan_files import read_scan
@@ -55,12 +56,7 @@ def _run(options: argparse.Namespace) -> None:
 
 def _friction(fit: SurfaceFit, z: Array) -> str:
     """What the scan means for friction, at its sampling length and at a longer one (Markdown)."""
-    lines = [
-        f"\nFriction angle of a joint of this surface at {STRESS / 1e6:g} MPa, sheared by one "
-        f"sampling length, with contacts of an assumed rock ({DEFAULT_ROCK}):\n",
-        "| sampling length (mm) | a | along the rows | across them |",
-        "|---|---|---|---|",
-    ]
+    rows = []
     for length in (fit.asperities.size, LONGER * fit.asperities.size):
         try:
             one = from_surface(z, fit.spacing, length)
@@ -68,10 +64,15 @@ def _friction(fit: SurfaceFit, z: Array) -> str:
             if one.describes:
                 cells = [f"{_largest_angle(one, plane):.1f}°" for plane in (0.0, math.pi / 2)]
         except ValueError as error:
-            lines.append(f"| {1e3 * length:.3g} | {error} | | |")
+            rows.append(f"{1e3 * length:.3g} | {error} | |")
         else:
-            lines.append(f"| {1e3 * length:.3g} | {one.orientation.a:.3g} | {' | '.join(cells)} |")
-    return "\n".join(lines) + "\n"
+            rows.append(f"{1e3 * length:.3g} | {one.orientation.a:.3g} | {' | '.join(cells)}")
+    what = (
+        f"\nFriction angle of a joint of this surface at {STRESS / 1e6:g} MPa, sheared by one "
+        f"sampling length, with contacts of an assumed rock ({DEFAULT_ROCK}):\n"
+    )
+    lines = table("sampling length (mm) | a | along the rows | across them", rows)
+    return "\n".join([what, *lines]) + "\n"
 
 
 def _largest_angle(fit: SurfaceFit, plane: float) -> float:

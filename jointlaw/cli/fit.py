@@ -2,6 +2,7 @@
 
 import argparse
 from functools import partial
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -204,10 +205,16 @@ def _shear_curves(options: argparse.Namespace) -> tuple[list[ShearCurve], list[S
             f"--normal-stress gives {len(normals)} stresses for {len(options.shear)} files of "
             "shear tests: give one for each"
         )
-    how = {name: getattr(options, name) for name in ("decimal", "outliers", "area", "side")}
-    for name, option in (("shear", "shear"), ("stress", "shear_stress"), ("normal", "normal"),
-                         ("opening", "opening")):  # fmt: skip
-        how[name] = getattr(options, f"{option}_column")
+    how = {
+        "shear": options.shear_column,
+        "stress": options.shear_stress_column,
+        "normal": options.normal_column,
+        "opening": options.opening_column,
+        "decimal": options.decimal,
+        "outliers": options.outliers,
+        "area": options.area,
+        "side": options.side,
+    }
     tests = [
         test.thinned(MOST)
         for path, normal in zip(options.shear, normals, strict=True)
@@ -223,8 +230,7 @@ def _shear_curves(options: argparse.Namespace) -> tuple[list[ShearCurve], list[S
             f"--fit names {sum(fit)} of {len(tests)} shear tests, at "
             f"{', '.join(f'{at / 1e6:.3g}MPa' for at in given)}: name two or more, and leave one"
         )
-    pairs = list(zip(tests, fit, strict=True))
-    return [test for test, seen in pairs if seen], [test for test, seen in pairs if not seen]
+    return list(compress(tests, fit)), list(compress(tests, np.logical_not(fit)))
 
 
 def _misses(fit: Fit, fitted: list[ShearCurve], predicted: list[ShearCurve]) -> str:
@@ -236,9 +242,9 @@ def _misses(fit: Fit, fitted: list[ShearCurve], predicted: list[ShearCurve]) -> 
         cells = ["{:+.1f}, {:+.1f} %".format(*(100 * (one / measured - 1))) for one in found]
         told = "{:.4g}, {:.4g}".format(*(measured / 1e6))
         rows.append(" | ".join([curve.name, told, *cells]))
-    what = "\nTests that were not fitted: errors of the predicted peak and last shear stress.\n"
-    lines = [what, *table(f"test | peak, last (MPa) | law | {' | '.join(FORMS)}", rows)]
-    return "\n".join(lines) + "\n"
+    lines = table(f"test | peak, last (MPa) | law | {' | '.join(FORMS)}", rows)
+    what = "Tests that were not fitted: errors of the predicted peak and last shear stress."
+    return "\n".join(["", what, "", *lines, ""])
 
 
 def _keywords(options: argparse.Namespace, sheared: bool) -> dict[str, Any]:
@@ -258,5 +264,4 @@ def _keywords(options: argparse.Namespace, sheared: bool) -> dict[str, Any]:
         ) from None
     if options.law:
         law = presets.load_any(options.law)
-        require_rock({"mu": law.asperity.mu}, f"{options.law}: asperity.")
     return {"fixed": fixed, "free": free, "law": law}

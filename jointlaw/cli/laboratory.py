@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..laboratory.experiments import CONTROLS, PathError, closure_test, direct_shear
+from ..laboratory.experiments import PathError, closure_test, direct_shear
 from ..laboratory.record import UNITS, Record
 from ..laws.joint_law import JointLaw
 from .command import (
@@ -58,17 +58,12 @@ def add(commands: Any) -> None:
         help="direction of shear from axis 2 towards axis 3, such as 30deg (default 0)",
     )
     parser.add_argument(
-        "--control",
-        choices=CONTROLS,
-        default="stress",
-        help="keep the normal stress (default), let it grow with dilation by --normal-stiffness, "
-        "or keep the closure",
-    )
-    parser.add_argument(
         "--normal-stiffness",
         metavar="STIFFNESS",
         type=in_unit("Pa/m"),
-        help="of the surroundings, for --control stiffness, such as 5GPa/m",
+        default="0",
+        help="of the surroundings, such as 5GPa/m: the normal stress grows by it times the "
+        "dilation (default 0: it is kept)",
     )
     _add_common(parser, steps=200)
 
@@ -102,16 +97,13 @@ def _add_common(parser: argparse.ArgumentParser, steps: int) -> None:
 
 def _shear(options: argparse.Namespace) -> None:
     law = read_law(options)
-    if (options.control == "stiffness") != (options.normal_stiffness is not None):
-        raise ValueError("--control stiffness and --normal-stiffness go together; give both")
     test = partial(
         direct_shear,
         law.joint(),
         [options.to, *options.reverse],
         options.normal_stress,
-        options.control,
-        options.azimuth,
         options.normal_stiffness,
+        options.azimuth,
         options.steps,
     )
     record = _run(test, law, options)

@@ -68,11 +68,11 @@ def _friction(fit: SurfaceFit, z: Array) -> str:
         else:
             rows.append(f"{1e3 * length:.3g} | {one.orientation.a:.3g} | {' | '.join(cells)}")
     what = (
-        f"\nFriction angle of a joint of this surface at {STRESS / 1e6:g} MPa, sheared by one "
-        f"sampling length, with contacts of an assumed rock ({DEFAULT_ROCK}):\n"
+        f"Friction angle of a joint of this surface at {STRESS / 1e6:g} MPa, sheared by one "
+        f"sampling length, with contacts of an assumed rock ({DEFAULT_ROCK}):"
     )
     lines = table("sampling length (mm) | a | along the rows | across them", rows)
-    return "\n".join([what, *lines]) + "\n"
+    return "\n".join(["", what, "", *lines, ""])
 
 
 def _largest_angle(fit: SurfaceFit, plane: float) -> float:

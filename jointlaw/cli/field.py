@@ -23,7 +23,8 @@ def add(commands: Any) -> None:
         "--normal-stiffness 30GPa/m --out out"
     )
     parser = add_command(commands, "field", what, example, _run)
-    parser.add_argument("--jrc", type=float, required=True, help="joint roughness coefficient")
+    about = "joint roughness coefficient, such as 10"
+    parser.add_argument("--jrc", type=float, required=True, help=about)
     for name, (unit, default, about) in QUANTITIES.items():
         parser.add_argument(
             f"--{name.replace('_', '-')}",

@@ -27,7 +27,7 @@ COLUMNS = {
     "shear": "us:mm",
     "shear-stress": "tau:MPa",
     "normal": "sn:MPa",
-    "opening": "dn:mm, opening positive",
+    "opening": "dn:mm (opening positive)",
 }
 QUANTITIES = {
     "area": ("m2", "that forces act on: 100cm2"),

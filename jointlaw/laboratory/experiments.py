@@ -25,16 +25,13 @@ class PathError(RuntimeError):
         return str(self.args[0])
 
 
-def closure_test(
-    joint: Joint, stress: float | Sequence[float], unload: bool = True, steps: int = 100
-) -> Record:
+def closure_test(joint: Joint, stress: float | Sequence[float], steps: int = 100) -> Record:
     """Close a joint to a normal stress, from the one it carries, and open it again.
 
     Parameters
     ----------
     joint: the joint; it is left in the state at the end of the test.
     stress: largest normal stress in Pa, > 0, or one for each cycle.
-    unload: whether to unload to zero stress after each peak.
     steps: steps per branch; rows crowd towards small stress as the stiffness does.
 
     Returns the Record, its first row the joint as it was given. Raises ValueError for a bad
@@ -46,10 +43,8 @@ def closure_test(
     levels: list[float] = []
     start = max(float(joint.F[0]), 0.0)
     for peak in peaks:
-        levels += list(start + (peak - start) * grading)
-        if unload:
-            levels += [*list(peak * grading[-2::-1]), 0.0]
-        start = levels[-1]
+        levels += [*(start + (peak - start) * grading), *(peak * grading[-2::-1]), 0.0]
+        start = 0.0
     log = _Log(joint, 0.0, "closure test")
     log.measure(joint.F)
     still = np.zeros(joint.law.dim - 1)

@@ -111,19 +111,15 @@ class Suite:
         return Miss(np.append(largest, more), *mine.apart(self.slip))
 
 
+@lru_cache(maxsize=16)
 def standard_suite(law: JointLaw, best: Resolution | None = None, excursions: int = 0) -> Suite:
     """The standard paths of a law, with tractions at `best`, by default the reference resolution.
 
     `excursions` random paths come after them. Second-order convergence makes the reference's own
     error about 0.8 of its `uncertainty`.
     """
-    return _suite(replace(law, resolution=best or reference_resolution(law)), excursions)
-
-
-@lru_cache(maxsize=16)
-def _suite(law: JointLaw, excursions: int) -> Suite:
-    """The suite of a law at its reference resolution."""
-    best = law.resolution
+    best = best or reference_resolution(law)
+    law = replace(law, resolution=best)
     stress = float(law.normal_stress(law.closure_range)) / 2
     called, goal, held = _paths(law, stress)
     if excursions:
@@ -132,7 +128,7 @@ def _suite(law: JointLaw, excursions: int) -> Suite:
         called += tuple(f"excursion {i + 1}" for i in range(excursions))
     d = np.diff(goal, axis=0, prepend=0.0)
     d = _hold_stress(replace(law, resolution=scaled(best, 1 / 2)), d, held, stress)
-    F = tractions(replace(law), d)  # a copy: the cache keeps this law, and would its working space
+    F = tractions(law, d)
     slid, ways = None, standard_ways(law.tables.dim)
     if not law.closure_only and steepest(law) < _JAMS:
         more = random_ways(np.random.default_rng(18), excursions // 16, law.tables.dim)

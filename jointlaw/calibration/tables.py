@@ -85,16 +85,14 @@ class Table(NamedTuple):
         given: name and unit from the command line, "Disp:mm", or None.
         """
         name, _, unit = (given or "").partition(":")
-        wanted = (*asked.names, *asked.vague) if given is None else (_plain(name),)
+        alike = sum(_factor(c.unit, asked.base) is not None for c in self.columns)
+        vague = asked.vague if alike < 2 else ()  # not one of several displacements
+        wanted = (*asked.names, *vague) if given is None else (_plain(name),)
         matches = (
             [c for c in self.columns if w in (_plain(c.name), _plain(c.title))] for w in wanted
         )
         found = next((match for match in matches if match), [])
-        alike = sum(_factor(c.unit, asked.base) is not None for c in self.columns)
-        if given is None and found and _plain(found[0].name) in asked.vague and alike > 1:
-            found = []  # one of several displacements
-        common = units.COMMON[asked.base]
-        example = f'{asked.option} "NAME:{common}"'
+        example = f'{asked.option} "NAME:{units.COMMON[asked.base]}"'
         if len(found) != 1:
             many = f"{len(found)} columns of one name: " if found else ""
             raise ValueError(

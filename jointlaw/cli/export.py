@@ -66,8 +66,7 @@ def _export(options: argparse.Namespace) -> None:
 
 def _export_table(law: JointLaw, folder: Path, shear_limit: float | None) -> None:
     """Write the joint for YADE, and print what its table drops."""
-    more: dict[str, Any] = {} if shear_limit is None else {"shear_limit": shear_limit}
-    table = export_yade(law, folder, tolerance=1e-3, **more)
+    table = export_yade(law, folder, shear_limit=shear_limit)
     missed = table.metadata["resolution_error_friction_angle"]
     print(
         f"wrote the joint for YADE to {folder}: {len(table.closure)} rows\n"

@@ -17,27 +17,10 @@ from ..parameters.rock import require_rock
 from ..support.checks import Array, one_of
 from ..support.markdown import table
 from ..support.text_numbers import DECIMAL
-from .command import Written, add_command, add_out, in_unit, several, write_results
+from .command import OUT, PICTURES, Command, Written, in_unit, option, several, write_results
 
 MOST = 60  # points of a shear test that are fitted: a logger writes thousands, each costs a step
 SAME = 0.02  # of a normal stress: tests that --fit names
-COLUMNS = {
-    "stress": "sigmaZ:MPa",
-    "closure": "Disp:mm",
-    "shear": "us:mm",
-    "shear-stress": "tau:MPa",
-    "normal": "sn:MPa",
-    "opening": "dn:mm (opening positive)",
-}
-QUANTITIES = {
-    "area": ("m2", "that forces act on: 100cm2"),
-    "side": ("m", "of an area that slip makes smaller: 10cm"),
-    "up-to": ("Pa", "fit up to this stress, predict the rest: 5.3MPa"),
-}
-STRESSES = {
-    "normal-stress": "of the shear tests in their order: 1MPa,3MPa",
-    "fit": "fit the shear tests at these normal stresses, predict the others: 1MPa,3MPa,5MPa",
-}
 NEEDS = {  # what an option is about, where no such test is given
     "data": (
         "a closure test: name its file before --shear",
@@ -49,70 +32,6 @@ NEEDS = {  # what an option is about, where no such test is given
          "normal_stress"),
     ),
 }  # fmt: skip
-
-
-def add(commands: Any) -> None:
-    """Add `fit` to the subparsers of the command line."""
-    what = "fit the law to measured closure and shear curves; write preset, report and plot"
-    example = "jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out out"
-    parser = add_command(commands, "fit", what, example, _run)
-    add = parser.add_argument
-    add("data", nargs="*", metavar="CSV", help="file of stress and closure, or shipped data set")
-    add(
-        "--shear",
-        nargs="+",
-        metavar="CSV",
-        default=[],
-        help="direct shear tests, several to a file or one, as CSV or XLSX. Their normal stress is "
-        "in a column or after --normal-stress. One law is fitted to all of them and to the closure "
-        "test, if one is given before",
-    )
-    add(
-        "--peaks",
-        metavar="CSV",
-        help="a table with one shear test a row: normal_stress, peak_shear_stress, "
-        "peak_displacement, residual_shear_stress, residual_displacement, with units",
-    )
-    for name, column in COLUMNS.items():
-        add(f"--{name}-column", help=f"name and unit of that column, such as {column}")
-    for name, (unit, about) in QUANTITIES.items():
-        add(f"--{name}", type=in_unit(unit, positive=True), help=about)
-    for name, about in STRESSES.items():
-        add(f"--{name}", metavar="STRESSES", type=several("Pa", positive=True), help=about)
-    add(
-        "--decimal",
-        choices=tuple(DECIMAL),
-        help="the decimal mark of files whose numbers do not show it, as 1,201 and 1.201 do not",
-    )
-    add(
-        "--outliers",
-        choices=("skip", "keep"),
-        help="what to do with rows that may be no measurement; they are named first",
-    )
-    add("--cycle", action="store_true", help="fit unloading too, and with it yield_interference")
-    add(
-        "--compliance",
-        metavar="LENGTH/STRESS",
-        type=_compliance,
-        default=0.0,
-        help="of rock and machine, such as 4.2um/10MPa: it is subtracted first",
-    )
-    add("--noise", type=float, help="known error of the closure test's stress, such as 0.01")
-    add(
-        "--set",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="hold a parameter at a value in SI units, such as alpha=3.8; repeatable",
-    )
-    add(
-        "--free",
-        metavar="NAMES",
-        help="parameters to fit, with commas between; default asperity_density, of closure tests "
-        "alpha and beta, with --cycle yield_interference, of shear tests mu, a and mating_length",
-    )
-    add("--law", metavar="PRESET_OR_FILE", help="the values of parameters that are not fitted")
-    add_out(parser)
 
 
 def _compliance(text: str) -> float:
@@ -265,3 +184,103 @@ def _keywords(options: argparse.Namespace, sheared: bool) -> dict[str, Any]:
     if options.law:
         law = presets.load_any(options.law)
     return {"fixed": fixed, "free": free, "law": law}
+
+
+COMMAND = Command(
+    "fit",
+    "fit the law to measured closure and shear curves; write preset, report and plot",
+    "jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out out",
+    _run,
+    (
+        option(
+            "data", nargs="*", metavar="CSV", help="file of stress and closure, or shipped data set"
+        ),
+        option("--stress-column", help="name and unit of that column, such as sigmaZ:MPa"),
+        option("--closure-column", help="name and unit of that column, such as Disp:mm"),
+        option(
+            "--shear",
+            nargs="+",
+            metavar="CSV",
+            default=[],
+            help="direct shear tests, several to a file or one, as CSV or XLSX. Their normal "
+            "stress is in a column or after --normal-stress. One law is fitted to all of them and "
+            "to the closure test, if one is given before",
+        ),
+        option(
+            "--peaks",
+            metavar="CSV",
+            help="a table with one shear test a row: normal_stress, peak_shear_stress, "
+            "peak_displacement, residual_shear_stress, residual_displacement, with units",
+        ),
+        option("--shear-column", help="name and unit of that column, such as us:mm"),
+        option("--shear-stress-column", help="name and unit of that column: tau:MPa"),
+        option("--normal-column", help="name and unit of that column: sn:MPa"),
+        option("--opening-column", help="name and unit of that column, opening positive: dn:mm"),
+        option("--area", type=in_unit("m2", positive=True), help="that forces act on: 100cm2"),
+        option(
+            "--side",
+            type=in_unit("m", positive=True),
+            help="of an area that slip makes smaller: 10cm",
+        ),
+        option(
+            "--normal-stress",
+            metavar="STRESSES",
+            type=several("Pa", positive=True),
+            help="of the shear tests in their order: 1MPa,3MPa",
+        ),
+        option(
+            "--decimal",
+            choices=tuple(DECIMAL),
+            help="the decimal mark of files whose numbers do not show it, as 1,201 and 1.201 do "
+            "not",
+        ),
+        option(
+            "--outliers",
+            choices=("skip", "keep"),
+            help="what to do with rows that may be no measurement; they are named first",
+        ),
+        option(
+            "--fit",
+            metavar="STRESSES",
+            type=several("Pa", positive=True),
+            help="fit the shear tests at these normal stresses, predict the others: 1MPa,3MPa,5MPa",
+        ),
+        option(
+            "--up-to",
+            type=in_unit("Pa", positive=True),
+            help="fit up to this stress, predict the rest: 5.3MPa",
+        ),
+        option(
+            "--cycle", action="store_true", help="fit unloading too, and with it yield_interference"
+        ),
+        option(
+            "--compliance",
+            metavar="LENGTH/STRESS",
+            type=_compliance,
+            default=0.0,
+            help="of rock and machine, such as 4.2um/10MPa: it is subtracted first",
+        ),
+        option(
+            "--noise", type=float, help="known error of the closure test's stress, such as 0.01"
+        ),
+        option(
+            "--set",
+            action="append",
+            default=[],
+            metavar="NAME=VALUE",
+            help="hold a parameter at a value in SI units, such as alpha=3.8; repeatable",
+        ),
+        option(
+            "--free",
+            metavar="NAMES",
+            help="parameters to fit, with commas between; default asperity_density, of closure "
+            "tests alpha and beta, with --cycle yield_interference, of shear tests mu, a and "
+            "mating_length",
+        ),
+        option(
+            "--law", metavar="PRESET_OR_FILE", help="the values of parameters that are not fitted"
+        ),
+        *OUT,
+        PICTURES,
+    ),
+)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..laws.joint_law import JointLaw
-from ..support.checks import Array
+from ..support.checks import Array, one_of
 from .forward import build, log_stress
 from .measured import ShearCurve, sheared
 from .priors import TRANSFORMS, Values
@@ -60,8 +60,7 @@ class Estimates:
 
     def interval(self, name: str) -> tuple[float, float]:
         """The 95 % interval of a fitted parameter, within its bounds."""
-        if name not in self.free:
-            raise ValueError(f"{name!r} was not fitted; fitted are {', '.join(self.free)}")
+        one_of("fitted parameter", name, self.free)
         at, transform = self.free.index(name), TRANSFORMS[name]
         reach = self.solution.quantile * math.sqrt(self.solution.covariance[at, at])
         reach += abs(self.moved[at])
@@ -117,9 +116,8 @@ class Estimates:
         """Points between begin and end of damage in pure shear, of the curve that has most."""
         assert self.law.bond is not None
         (_, begin), (_, end) = self.law.bond.limits
-        shears = [np.abs(curve.shear) for curve in self.problem.shears]
-        inside = [int(np.sum((way * begin > 1) & (way * end < 1))) for way in shears]
-        return max(inside, default=0)
+        ways = (np.abs(curve.shear) for curve in self.problem.shears)
+        return max((int(np.sum((way * begin > 1) & (way * end < 1))) for way in ways), default=0)
 
     @property
     def _widest(self) -> Array:

@@ -24,10 +24,6 @@ class Noise(NamedTuple):
     absolute: float = 0.0
     known: bool = False
 
-    def sigma(self, steepness: Array) -> Array:
-        """Standard errors at points of this steepness."""
-        return np.hypot(self.share, self.absolute * steepness)
-
 
 class Series(NamedTuple):
     """One measured quantity of a test: what it is, the noise it is expected to carry, for each of

@@ -133,7 +133,7 @@ class Problem:
     def sigma(self, noise: Sequence[Noise]) -> Array:
         """Standard errors of all residuals at these noises of the series."""
         pairs = zip(noise, self.series, strict=True)
-        return np.concatenate([n.sigma(one.steepness) for n, one in pairs])
+        return np.concatenate([np.hypot(n.share, n.absolute * one.steepness) for n, one in pairs])
 
 
 def pose(

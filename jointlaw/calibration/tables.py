@@ -231,12 +231,11 @@ def _beside(
     same = {tuple(name for name in names[part] if name) for part in parts}
     if len(parts) < 2 or len(same) > 1 or len(next(iter(same))) < 2:
         return [(titles, below, rows)]
-    wide = len(titles)
     return [
         (
             titles[part],
             below[part],
-            {n: cells for n, row in rows.items() if any(cells := row[:wide][part])},
+            {n: cells for n, row in rows.items() if any(cells := row[part])},
         )
         for part in parts
     ]

@@ -51,11 +51,7 @@ def _run(options: argparse.Namespace) -> None:
             if getattr(options, name) and not getattr(options, tests):
                 raise ValueError(f"--{name.replace('_', '-')} is about {about}, or leave it out")
     keywords = _keywords(options, bool(shears))
-    closures: list[ClosureCurve] = []
-    held: tuple[Array, Array] | None = None
-    if options.data:
-        curve, held = _closure_curve(options)
-        closures.append(curve)
+    closures, held = _closure_curve(options)
     fitted, predicted = _shear_curves(options)
     fit = fit_curves([*closures, *fitted], **keywords)
     name = ", ".join(Path(item).name for item in [*options.data, *shears])
@@ -89,8 +85,10 @@ def _run(options: argparse.Namespace) -> None:
 
 def _closure_curve(
     options: argparse.Namespace,
-) -> tuple[ClosureCurve, tuple[Array, Array] | None]:
-    """The closure curve to fit; with it stress (Pa) and closure (m) of points held out, or None."""
+) -> tuple[list[ClosureCurve], tuple[Array, Array] | None]:
+    """The closure curve to fit, if there is one; stress (Pa) and closure (m) of points held out."""
+    if not options.data:
+        return [], None
     item, compliance, notes = options.data[0], options.compliance, list[str]()
     if Path(item).exists():
         columns = options.stress_column, options.closure_column
@@ -113,7 +111,7 @@ def _closure_curve(
         stress[seen], closure[seen], options.noise, options.cycle, compliance, item, tuple(notes)
     )
     held = stress[~seen], closure[~seen] - compliance * stress[~seen]
-    return curve, None if seen.all() else held
+    return [curve], None if seen.all() else held
 
 
 def _shear_curves(options: argparse.Namespace) -> tuple[list[ShearCurve], list[ShearCurve]]:
@@ -168,7 +166,7 @@ def _misses(fit: Fit, fitted: list[ShearCurve], predicted: list[ShearCurve]) -> 
 
 def _keywords(options: argparse.Namespace, sheared: bool) -> dict[str, Any]:
     """What `fit_curves` takes besides the curves."""
-    free, law = ["asperity_density"], None
+    free = ["asperity_density"]
     free += ["alpha", "beta"] if options.data else []
     free += ["yield_interference"] if options.cycle else []
     free += ["mu", "a", "mating_length"] if sheared else []
@@ -181,8 +179,7 @@ def _keywords(options: argparse.Namespace, sheared: bool) -> dict[str, Any]:
         raise ValueError(
             f"--set {options.set}: write a name and a number each, such as alpha=3.8"
         ) from None
-    if options.law:
-        law = presets.load_any(options.law)
+    law = presets.load_any(options.law) if options.law else None
     return {"fixed": fixed, "free": free, "law": law}
 
 

@@ -39,7 +39,10 @@ def closure_test(joint: Joint, stress: float | Sequence[float], steps: int = 100
     """
     peaks = [more_than("stress", s, 0.0) for s in _series("stress", stress, "Pa")]
     steps = integer("steps", steps, 1)
-    grading = (np.arange(1, steps + 1) / steps) ** _power(joint)
+    asperities = joint.law.tables.asperities
+    # stress grows with this power of closure where all asperities touch
+    power = 1.0 if asperities is None else 1.0 + asperities.curve.eta
+    grading = (np.arange(1, steps + 1) / steps) ** power
     levels: list[float] = []
     start = max(float(joint.F[0]), 0.0)
     for peak in peaks:
@@ -100,12 +103,6 @@ def direct_shear(
     for length in track(legs, "direct shear", len(legs)):
         log.advance(length * along, None if math.isinf(stiffness) else condition)
     return log.record()
-
-
-def _power(joint: Joint) -> float:
-    """The power of closure with which stress grows where all asperities touch."""
-    asperities = joint.law.tables.asperities
-    return 1.0 if asperities is None else 1.0 + asperities.curve.eta
 
 
 def _series(name: str, value: float | Sequence[float], unit: str) -> Array:

@@ -40,9 +40,8 @@ def fit_heights(depth: Array) -> dict[str, Estimate]:
     precise and never unbounded. The errors are those of
     the logarithms of alpha + 1, beta and overlap.
     """
-    x = np.sort(depth)
-    scale = float(np.mean(x))
-    x = x / scale
+    scale = float(np.mean(depth))
+    x = np.sort(depth) / scale
 
     def loss(q: Array) -> float:
         shape, beta, start = np.exp(q)

@@ -265,11 +265,10 @@ def between(values: Array, row: NDArray[np.intp], w: Array) -> Array:
 def around(values: Array, psi: Array, row: NDArray[np.intp], w: Array) -> Array:
     """Linear interpolation in azimuth psi and between rows of values (rows, azimuths)."""
     azimuths = values.shape[1]
-    place = np.mod(psi, np.pi) * (azimuths / np.pi)
-    a = np.floor(place).astype(int) % azimuths
-    x, b = place - np.floor(place), (a + 1) % azimuths
-    low = values[row, a] * (1 - w) + values[row + 1, a] * w
-    high = values[row, b] * (1 - w) + values[row + 1, b] * w
+    whole, x = np.divmod(np.mod(psi, np.pi) * (azimuths / np.pi), 1.0)
+    a = whole.astype(int)
+    columns = (a % azimuths, (a + 1) % azimuths)
+    low, high = (values[row, k] * (1 - w) + values[row + 1, k] * w for k in columns)
     return np.asarray(low * (1 - x) + high * x)
 
 

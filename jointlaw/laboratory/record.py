@@ -27,10 +27,7 @@ UNITS = {
     "dissipated": "J/m2",
 }
 DERIVED = {"shear_stress": "Pa", "opening": "m"}  # of shear, along its azimuth and from its start
-_LENGTHS = ((1e-9, "nm"), (1e-6, "µm"), (1e-3, "mm"), (1.0, "m"))
-_STRESSES = ((1.0, "Pa"), (1e3, "kPa"), (1e6, "MPa"), (1e9, "GPa"))
-_ENERGIES = ((1e-6, "µJ/m²"), (1e-3, "mJ/m²"), (1.0, "J/m²"), (1e3, "kJ/m²"))
-
+_PREFIXES = {"n": 1e-9, "µ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
 Panels = dict[str, dict[str, Array]]
 
 
@@ -195,18 +192,18 @@ class Record:
         return written(figure, path)
 
 
-def _scaled(values: Array, units: tuple[tuple[float, str], ...]) -> tuple[Array, str]:
-    """Values in the largest unit that leaves their peak at one or more."""
+def _scaled(values: Array, unit: str) -> tuple[Array, str]:
+    """Values in the largest multiple of a unit that leaves their peak at one or more; its name."""
     peak = float(np.max(np.abs(values)))
-    factor, name = next(((f, n) for f, n in reversed(units) if peak >= f), units[0])
-    return values / factor, name
+    prefix = next((p for p, x in reversed(_PREFIXES.items()) if x <= peak), "")
+    return values / _PREFIXES[prefix], prefix + unit
 
 
 def _shear_panels(record: Record) -> tuple[str, Array, str, Panels]:
     """Title, and of the panels of a shear test x with its label, and curves by label and name."""
-    shear, length = _scaled(record.shear, _LENGTHS)
-    stress, unit = _scaled(np.stack([record.shear_stress, record.F1]), _STRESSES)
-    dilation, small = _scaled(record.closure[0] - record.closure, _LENGTHS)
+    shear, length = _scaled(record.shear, "m")
+    stress, unit = _scaled(np.stack([record.shear_stress, record.F1]), "Pa")
+    dilation, small = _scaled(record.closure[0] - record.closure, "m")
     title = (
         f"Direct shear at azimuth {np.degrees(record.azimuth):.0f}°, "
         f"largest friction angle {record.peak_friction_angle:.1f}°"
@@ -225,9 +222,9 @@ def _shear_panels(record: Record) -> tuple[str, Array, str, Panels]:
 
 def _closure_panels(record: Record) -> tuple[str, Array, str, Panels]:
     """The same of a closure test."""
-    closure, length = _scaled(record.closure, _LENGTHS)
-    stress, unit = _scaled(record.F1, _STRESSES)
-    energy, joule = _scaled(np.stack([record.stored, record.dissipated]), _ENERGIES)
+    closure, length = _scaled(record.closure, "m")
+    stress, unit = _scaled(record.F1, "Pa")
+    energy, joule = _scaled(np.stack([record.stored, record.dissipated]), "J/m²")
     panels = {
         f"normal stress ({unit})": {"": stress},
         f"energy ({joule})": {"stored": energy[0], "dissipated": energy[1]},

@@ -100,13 +100,16 @@ class JointTable:
         row, w, secant = self.at(u)
         K22, K33, K23 = self.shear_matrix(row, w)
         stiffness = (K22 + K33) / 2 + (K22 - K33) / 2 * np.cos(2 * psi) + K23 * np.sin(2 * psi)
-        by_closure = (secant * u, secant, between(self.kn_tangent, row, w), stiffness)
-        values = [np.where(u > 0, value, 0.0) for value in by_closure]
-        for column in (self.peak_friction, self.mobilised_friction, self.dilation):
-            values.append(around(column, psi, row, w))
-        names = [*BY_CLOSURE.values(), *BY_AZIMUTH.values()][1:]  # all but the closure
-        found = (value.reshape(shape)[()] for value in values)
-        return SimpleNamespace(**dict(zip(names, found, strict=True)))
+        while_closed = {
+            "normal_stress": secant * u,
+            "kn_secant": secant,
+            "kn_tangent": between(self.kn_tangent, row, w),
+            "shear_stiffness": stiffness,
+        }
+        found = {name: np.where(u > 0, value, 0.0) for name, value in while_closed.items()}
+        for name in ("peak_friction", "mobilised_friction", "dilation"):
+            found[name] = around(getattr(self, name), psi, row, w)
+        return SimpleNamespace(**{name: value.reshape(shape)[()] for name, value in found.items()})
 
     def follow(self, delta: ArrayLike) -> Array:
         """Traction (m, 3) in Pa that a host computes from the table along a path delta (m, 3) in m.

@@ -125,10 +125,9 @@ class Table(NamedTuple):
         returns while another stands still. outliers: what to do with them, "skip" or "keep".
         Raises ValueError naming them without it, and for fewer than three rows.
         """
-        whole, odd = np.isfinite([c.values for c in columns]).all(axis=0), dict(self.odd)
+        whole = np.isfinite([c.values for c in columns]).all(axis=0)
         lines, values = np.array(self.lines)[whole], [c.values[whole] for c in columns]
-        for c in columns:
-            odd |= c.odd
+        odd = self.odd | {n: why for c in columns for n, why in c.odd.items()}
         seen = ~np.isin(lines, list(odd))
         for (_, x), (c, y) in permutations(zip(columns, values, strict=True), 2):
             jumps = lines[seen][_jumps(x[seen], y[seen])].tolist()

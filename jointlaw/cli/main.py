@@ -10,9 +10,10 @@ from ..laboratory.experiments import PathError
 from ..support.checks import one_of
 from ..support.files import require_free
 from ..support.version import __version__
-from . import export, field, fit, laboratory, presets, scan
+from . import browser, export, field, fit, laboratory, presets, scan
 
 COMMANDS = (
+    browser.COMMAND,
     laboratory.SHEAR,
     laboratory.CLOSURE,
     presets.COMMAND,

@@ -67,8 +67,8 @@ class Problem:
 
     def unpack(self, x: Array) -> dict[str, float]:
         """All parameters in SI units from the vector of the free ones."""
-        values = dict(self.values)
-        values |= {n: TRANSFORMS[n].back(float(v)) for n, v in zip(self.free, x, strict=True)}
+        found = {n: TRANSFORMS[n].back(float(v)) for n, v in zip(self.free, x, strict=True)}
+        values = {**self.values, **found}
         if "c" in self.free:
             bound = largest_c(values["b"])
             values["c"] = min(max(values["c"], -bound), bound)

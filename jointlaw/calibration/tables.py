@@ -287,7 +287,8 @@ def _jumps(x: Array, y: Array) -> NDArray[np.bool_]:
     scale = max(np.ptp(y), 0.2 * np.max(np.abs(y)))  # what hardly changes scatters
     off_x, off_y = (np.abs(z[1:-1] - (z[2:] + z[:-2]) / 2) for z in (x / np.ptp(x), y / scale))
     apart = np.abs(y[2:] - y[:-2]) / scale
-    found[1:-1] = (off_y > JUMP) & (apart < 0.25 * off_y) & (off_x < STILL)
+    goes_on = np.diff(x)[1:] * np.diff(x)[:-1] >= 0  # and does not turn, as at the end of unloading
+    found[1:-1] = (off_y > JUMP) & (apart < 0.25 * off_y) & (off_x < STILL) & goes_on
     return found
 
 

@@ -104,8 +104,7 @@ def direct_shear(
     along = np.array([math.cos(azimuth), math.sin(azimuth)]) if plane is None else np.ones(1)
     log.advance(np.zeros_like(along), NormalCondition(normal, normal))  # seated without shear
     condition = NormalCondition(normal, normal, stiffness, float(joint.delta[0]))
-    increments = np.diff(np.concatenate([[0.0], points])) / steps
-    legs = np.repeat(increments, steps)
+    legs = np.repeat(np.diff(points, prepend=0.0) / steps, steps)
     for length in track(legs, "direct shear", len(legs)):
         log.advance(length * along, None if math.isinf(stiffness) else condition)
     return log.record()

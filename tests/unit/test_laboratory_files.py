@@ -188,6 +188,13 @@ def test_rows_that_are_no_measurement_are_named_until_an_option_settles_it(kind,
     assert told in skipped.notes[0]
 
 
+def test_the_steep_foot_of_two_cycles_is_no_jump(tmp_path):
+    """Unloading to zero stress takes back a third of the closure in one row."""
+    stress = np.array([0.5, 2, 4, 2, 0.1, 0, 0.1, 2, 4, 8])
+    (tmp_path / "c.csv").write_text("s [MPa],closure [um]\n" + rows(stress, 50 * stress**0.2))
+    assert read_closure(tmp_path / "c.csv", "s:MPa")[0].size == 10
+
+
 def test_a_displacement_beside_another_is_asked_for(tmp_path):
     path = tmp_path / "lab.csv"
     path.write_text("displacement [mm],way [mm],tau [MPa]\n" + rows(U / 9, U, TAU))

@@ -128,7 +128,7 @@ def _announce(sim: Simulation, until: float | None = None) -> None:
         print(f"about {told} without pictures, by its first steps")
     for rock in sim.scene.rocks:
         print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
-              f"{len(rock.blocks) - len(rock.free)} fixed; {rock.slivers}")  # fmt: skip
+              f"{len(rock.blocks) - len(rock.free)} fixed; {rock.told[0]}", *rock.told[1:], sep="\n  ")  # fmt: skip
     if not sim.balanced:
         print("some blocks have no static equilibrium and move from the first step")
 

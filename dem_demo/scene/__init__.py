@@ -9,15 +9,16 @@ scene      a scene in memory
 read       a scene from its file
 """
 
-from .blocks import Block, turn, usual_size
+from .blocks import Block, turn, usual_size, usual_stress
 from .drives import Drives
 from .keys import Tables, overlay
-from .laws import Files, Law, build_law, opens_to
+from .laws import WHOLE, Files, Law, build_law, opens_to, springs
 from .read import TEMPLATE, build, load, parse, read_tables, shipped
 from .scene import Run, Scene
 
 __all__ = [
     "TEMPLATE",
+    "WHOLE",
     "Block",
     "Drives",
     "Files",
@@ -33,6 +34,8 @@ __all__ = [
     "parse",
     "read_tables",
     "shipped",
+    "springs",
     "turn",
     "usual_size",
+    "usual_stress",
 ]

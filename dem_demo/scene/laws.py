@@ -53,8 +53,9 @@ def build_law(data: Tables, where: str, files: Files) -> Law:
         raise ValueError(f"{where}.closure_only = true: joints between blocks shear; leave it out")
     law: Law = jl.JointLaw.from_dict({"plane": 0.0, **law_table(data, files)}, where)
     if isinstance(law, jl.CoulombLaw):
-        require_rock({"friction": law.friction}, f"{where}.")
+        require_rock({**vars(law), "plane": 0.0}, f"{where}.")
     else:
+        require_rock({"stiffness at 1 MPa": springs(law, 1e6)[0]}, f"{where}: ")
         require_rock({"mu": law.asperity.mu}, f"{where}.asperity.")
     require_rock({"plane": law.plane or 0.0}, f"{where}.")
     return law

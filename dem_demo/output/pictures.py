@@ -137,7 +137,9 @@ class Pictures:
         if self.loose is not None:
             marked = [shapes[j] for j in np.flatnonzero(self.loose)]
             axes.add_collection(
-                PolyCollection(marked, facecolors="none", edgecolors=LOOSE, linewidths=2.0, zorder=4)
+                PolyCollection(
+                    marked, facecolors="none", edgecolors=LOOSE, linewidths=2.0, zorder=4
+                )
             )
         far = self.free & (np.hypot(*moved.T) > ARROW * self.most)
         tails, arrows = record.motion[i][:2].T[far], self.longer * moved[far]

@@ -21,7 +21,9 @@ from .blocks import next_of, smallest_width
 Line = tuple[int, np.ndarray, float]  # a joint: number of its set, normal, distance n . x in m
 
 EXACT = 1e-7  # share of the rock's size below which a distance is zero
-CUT = 10**6  # the number, in place of a set's, of cuts through inward corners: no joints of the rock
+CUT = (
+    10**6
+)  # the number, in place of a set's, of cuts through inward corners: no joints of the rock
 LESS = 0.9  # share of a sliver that may be left when a neighbour takes a part of it
 
 

@@ -20,7 +20,8 @@ class Record:
     joints.
 
     joints[f]: by name, "who" (k, 5) block, edge, block, edge, contact; "ends" (k, 2, 2) the segment
-    of joint that a contact carries; and numbers (k,) with their unit in the name. monitored[f]:
+    of joint that a contact carries; and numbers (k,) with their unit in the name. stresses[f] (n, 2,
+    2): of the blocks. monitored[f]:
     what the scene's [watch] asks for; slips: of its joints; laws: of the watched joints; state:
     that of the last frame, to return to; steps: of the run.
     """
@@ -33,6 +34,7 @@ class Record:
         self.motion: list[np.ndarray] = []
         self.energy: list[list[float]] = []
         self.joints: list[dict[str, np.ndarray]] = []
+        self.stresses: list[np.ndarray] = []
         self.monitored: list[dict[str, float]] = []
         self.take(sim)
 
@@ -42,6 +44,7 @@ class Record:
         self.motion.append(np.where(sim.blocks.gone, np.nan, sim.blocks.motion))
         self.energy.append([*sim.ledger.energy.tolist(), sim.ledger.error])
         self.joints.append(_joints(sim))
+        self.stresses.append(block_stresses(sim))
         self.monitored.append(readings(sim))
         self.state = sim.state()
 
@@ -89,6 +92,21 @@ def _joints(sim: Simulation) -> dict[str, np.ndarray]:
         "length_m": c.length, "sliding_m/s": c.sliding,
     }  # fmt: skip
     return {name: column[c.length > 0] for name, column in columns.items()}
+
+
+def block_stresses(sim: Simulation) -> np.ndarray:
+    """Mean stress (n, 2, 2) in each block (Pa, compression positive) by the forces of its joints:
+    sum of force times arm over the volume, made symmetric."""
+    c, blocks, thickness = sim.contacts, sim.scene.blocks, sim.scene.thickness
+    push, shear = (sim.joints.traction * c.length[:, None] * thickness).T
+    force, n = (push + 1j * shear) * c.normal, len(blocks)
+    out = np.zeros((n, 2, 2))
+    for block, way in ((c.a, 1.0), (c.b, -1.0)):
+        arm = c.at - (sim.blocks.motion[0] + 1j * sim.blocks.motion[1])[block]
+        pairs = [np.stack([part.real, part.imag], axis=1) for part in (way * force, arm)]
+        np.add.at(out, block, pairs[0][:, :, None] * pairs[1][:, None, :])
+    volume = thickness * np.array([block.section.area for block in blocks])
+    return 0.5 * (out + out.transpose(0, 2, 1)) / volume[:, None, None]
 
 
 def write_csv(path: Path, header, rows) -> None:

@@ -10,16 +10,17 @@ scene      a scene in memory
 read       a scene from its file
 """
 
-from .blocks import Block, turn, usual_size
+from .blocks import Block, turn, usual_size, usual_stress
 from .drives import Drives
 from .keys import Tables, overlay
-from .laws import Files, Law, build_law, opens_to
+from .laws import WHOLE, Files, Law, build_law, opens_to, springs
 from .read import TEMPLATE, build, load, parse, read_tables, shipped
 from .scene import Run, Scene
 from .stress import Stress
 
 __all__ = [
     "TEMPLATE",
+    "WHOLE",
     "Block",
     "Drives",
     "Files",
@@ -36,6 +37,8 @@ __all__ = [
     "parse",
     "read_tables",
     "shipped",
+    "springs",
     "turn",
     "usual_size",
+    "usual_stress",
 ]

@@ -142,8 +142,9 @@ def _announce(sim: Simulation, until: float | None = None) -> None:
         told = f"{seconds / 60**size:.2g} {('s', 'min', 'hours')[size]}"
         print(f"about {told} without pictures, by its first steps")
     for rock in sim.scene.rocks:
-        print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
-              f"{len(rock.blocks) - len(rock.free)} fixed; {rock.told[0]}", *rock.told[1:], sep="\n  ")  # fmt: skip
+        free, fixed = len(rock.free), len(rock.blocks) - len(rock.free)
+        print(f"rock {rock.name!r}: {free} blocks that can move, {fixed} fixed;", end=" ")
+        print(*rock.told, sep="\n  ")
     if not sim.balanced:
         print("some blocks have no static equilibrium and move from the first step")
 

@@ -67,8 +67,10 @@ def read_tables(text: str, where: str = "scene") -> Tables:
     copy. Raises ValueError."""
     data = keys.parse(text, where)
     if "asperity_density" in data or "kind" in data:
-        raise ValueError(f"{where} is the parameter file of a law, no scene: a scene that uses it has "
-                         f"[laws.NAME] with from = {where!r}")  # fmt: skip
+        raise ValueError(
+            f"{where} is the parameter file of a law, no scene: a scene that uses it has "
+            f"[laws.NAME] with from = {where!r}"
+        )
     variants, chosen = data.pop("variants", {}), data.pop("variant", None)
     if chosen is not None:
         data = overlay(data, variants[one_of(f"{where}: variant", chosen, tuple(variants))])

@@ -1,4 +1,4 @@
-"""Factors of safety of blocks against what is not the demo: limit analysis, and hand calculation."""
+"""Factors of safety of blocks against others than the demo: limit analysis, and by hand."""
 
 import numpy as np
 import pytest
@@ -74,7 +74,7 @@ def test_a_slope_whose_columns_lean_has_less_than_limit_analysis_says():
 
 
 def test_limit_analysis_of_one_block_is_that_by_hand():
-    """A block of 3 m by 1.5 m on a plane of 25 degrees; a narrow one turns, whatever its friction."""
+    """A block of 3 m by 1.5 m on a plane of 25 degrees; a narrow one turns at any friction."""
     text = """
 gravity = [4.1459, -8.8909]
 [laws.j]

@@ -21,8 +21,8 @@ class Record:
 
     joints[f]: by name, "who" (k, 5) block, edge, block, edge, contact; "ends" (k, 2, 2) the segment
     of joint that a contact carries; and numbers (k,) with their unit in the name. stresses[f]
-    (n, 2, 2): of the blocks. monitored[f]: what the scene's [watch] asks for; slips: of its joints; laws: of the watched joints; state:
-    that of the last frame, to return to; steps: of the run.
+    (n, 2, 2): of the blocks. monitored[f]: what the scene's [watch] asks for; slips: of its joints;
+    laws: of the watched joints; state: that of the last frame, to return to; steps: of the run.
     """
 
     def __init__(self, sim: Simulation) -> None:

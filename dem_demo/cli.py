@@ -26,7 +26,6 @@ from .studies import ablate, compare, strength, trials
 VERSION = 2  # of strength.json
 FAILING = 3.0  # s: most that a failing rock is run for
 TRIED, PATIENCE = 100, 1.0  # steps, and s, by which the time of a run is estimated
-STATES = "state", "refused"  # folders in that of a run from which it can go on
 MOBILISED = 0.9  # share of friction that a bond should wait for
 INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 
@@ -106,11 +105,7 @@ def _run(given: argparse.Namespace) -> None:
     if given.vtk and not find_spec("meshio"):
         raise ValueError("--vtk needs meshio: pip install meshio")
     resumed = "state" in given
-    if resumed:  # DIR, which a run wrote, is as good as DIR/state
-        kept = [given.state / name for name in STATES if (given.state / name).is_dir()]
-        sim = Simulation.load([*kept, given.state][0], given.step)
-    else:
-        sim = Simulation(load(given.scene))
+    sim = Simulation.load(given.state, given.step) if resumed else Simulation(load(given.scene))
     _announce(sim, given.until)
     dt = sim.dt
     record, summary = run(sim, given.out, given.until, given.format, given.vtk)
@@ -138,13 +133,12 @@ def _announce(sim: Simulation, until: float | None = None) -> None:
         f"time step {dt:.3g} s, limit {limit:.3g} s (margin {limit / dt:.2f}{why}), {steps} steps"
     )
     if seconds := _pace(sim) * steps:
-        size = int(np.searchsorted([100, 6000], seconds))  # s, min, h
+        size = (seconds >= 100) + (seconds >= 6000)
         told = f"{seconds / 60**size:.2g} {('s', 'min', 'hours')[size]}"
         print(f"about {told} without pictures, by its first steps")
     for rock in sim.scene.rocks:
-        free, fixed = len(rock.free), len(rock.blocks) - len(rock.free)
-        print(f"rock {rock.name!r}: {free} blocks that can move, {fixed} fixed;", end=" ")
-        print(*rock.told, sep="\n  ")
+        print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
+              f"{len(rock.blocks) - len(rock.free)} fixed", *rock.told, sep="\n  ")  # fmt: skip
     if not sim.balanced:
         print("some blocks have no static equilibrium and move from the first step")
 

@@ -57,7 +57,8 @@ class Pictures:
     def __init__(
         self, record: Record, title: str | None = None, loose: np.ndarray | None = None
     ) -> None:
-        self.record, self.title, self.loose = record, title or record.scene.title, loose
+        self.record, self.title = record, title or record.scene.title
+        self.loose = np.zeros(len(record.scene.blocks), bool) if loose is None else loose
         blocks, shown = record.scene.blocks, [*outlines(record, 0), *outlines(record, -1)]
         moving = zip((*blocks, *blocks), shown, strict=True)
         corners = np.concatenate([shape for block, shape in moving if block.moves])
@@ -90,23 +91,23 @@ class Pictures:
         return np.where(closed, names, "open")
 
     def figure(self) -> tuple[Figure, Axes]:
-        """An empty frame with its legend: states, a round stress, the dots of the start."""
+        """An empty frame with its legend: states, a round stress, how long the arrows are."""
         (wide, high), scene = self.high - self.low, self.record.scene
         across = min(6.5, 6.0 * wide / high)
         figure = Figure(figsize=(max(across + 1.0, 7.5), across * high / wide + 2.6))
-        marks = [Line2D([], [], color=colour, ls=line, label=f"joint {name}", lw=2.0)
-                 for name, (colour, line) in STATES.items()]  # fmt: skip
-        stress = float(f"{self.stress:.1g}")
-        kind, (unit, name) = "effective " * scene.wet, pressure(stress)
-        label, width = f"{kind}normal stress {unit * stress:g} {name}", self._width(stress)
-        marks.append(Line2D([], [], color=STATES["stuck"][0], lw=width, label=label))
-        marks.append(Line2D([], [], color="0.6", ls=":", lw=0.9, label="place at the start"))
-        label = f"displacement, drawn × {self.longer:g}"
-        marks.append(Line2D([], [], color="k", lw=1.0, marker=">", label=label))
-        if scene.water:
-            marks.append(Line2D([], [], color=WATER, ls="-.", label="water table"))
-        if self.loose is not None and self.loose.any():
-            marks.append(Line2D([], [], color=LOOSE, lw=2.0, label="block that nothing holds"))
+        stress, unit, name = float(f"{self.stress:.1g}"), *pressure(self.stress)
+        kind = "effective " * (scene.water is not None or any(scene.pressure))
+        stuck, loose = STATES["stuck"][0], bool(self.loose.any())
+        lines = [
+            *((f"joint {state}", {"color": colour, "ls": line, "lw": 2.0})
+              for state, (colour, line) in STATES.items()),
+            (f"{kind}normal stress {unit * stress:g} {name}",
+             {"color": stuck, "lw": self._width(stress)}),
+            (f"displacement, drawn × {self.longer:g}", {"color": "k", "lw": 1.0, "marker": ">"}),
+            *[("water table", {"color": WATER, "ls": "-."})] * bool(scene.water),
+            *[("block that nothing holds", {"color": LOOSE, "lw": 2.0})] * loose,
+        ]  # fmt: skip
+        marks = [Line2D([], [], label=label, **drawn) for label, drawn in lines]
         figure.legend(handles=marks, loc="outside lower center", ncols=3, frameon=False)
         axes, scale = figure.add_subplot(), Normalize(0.0, self.unit * self.most)
         figure.colorbar(
@@ -116,30 +117,16 @@ class Pictures:
         return figure, axes
 
     def draw(self, axes: Axes, i: int, note: str = "") -> None:
-        """Frame i: blocks, dotted where they were at the start, colour and arrow by displacement;
-        joints, colour by state, width by normal stress; a note below the title."""
+        """Frame i: blocks, colour and arrow by displacement; joints, colour by state, width by
+        normal stress; a note below the title."""
         record, blocks, shapes = self.record, self.record.scene.blocks, outlines(self.record, i)
-        drawn = zip(blocks, outlines(record, 0), strict=True)
-        along = record.base(i) - record.base(0)
-        start = [shape + along for block, shape in drawn if not block.fixed]
-        axes.add_collection(
-            PolyCollection(
-                start, facecolors="none", edgecolors="0.7", linestyles=":", linewidths=0.7
-            )
-        )
         moved = record.displaced(i) - record.displaced(0)
         colours = MOVED(np.hypot(*moved.T) / self.most)
         colours[~self.free] = to_rgba(FIXED)
-        axes.add_collection(
-            PolyCollection(shapes, facecolors=colours, edgecolors="0.45", linewidths=0.6)
-        )
-        if self.loose is not None:
-            marked = [shapes[j] for j in np.flatnonzero(self.loose)]
-            axes.add_collection(
-                PolyCollection(
-                    marked, facecolors="none", edgecolors=LOOSE, linewidths=2.0, zorder=4
-                )
-            )
+        for which, edge, width in ((~self.loose, "0.45", 0.6), (self.loose, LOOSE, 2.0)):
+            some = [shapes[j] for j in np.flatnonzero(which)]
+            face = {"facecolors": colours[which], "edgecolors": edge, "linewidths": width}
+            axes.add_collection(PolyCollection(some, **face))
         far = self.free & (np.hypot(*moved.T) > ARROW * self.most)
         tails, arrows = record.motion[i][:2].T[far], self.longer * moved[far]
         axes.quiver(

@@ -20,9 +20,10 @@ class Record:
     joints.
 
     joints[f]: by name, "who" (k, 5) block, edge, block, edge, contact; "ends" (k, 2, 2) the segment
-    of joint that a contact carries; and numbers (k,) with their unit in the name. stresses[f]
-    (n, 2, 2): of the blocks. monitored[f]: what the scene's [watch] asks for; slips: of its joints;
-    laws: of the watched joints; state: that of the last frame, to return to; steps: of the run.
+    of joint that a contact carries; and numbers (k,) with their unit in the name. stresses[f] (3,
+    n): of the blocks. monitored[f]:
+    what the scene's [watch] asks for; slips: of its joints; laws: of the watched joints; state:
+    that of the last frame, to return to; steps: of the run.
     """
 
     def __init__(self, sim: Simulation) -> None:
@@ -94,18 +95,16 @@ def _joints(sim: Simulation) -> dict[str, np.ndarray]:
 
 
 def block_stresses(sim: Simulation) -> np.ndarray:
-    """Mean stress (n, 2, 2) in each block (Pa, compression positive) by the forces of its joints:
-    sum of force times arm over the volume, made symmetric."""
-    c, blocks, thickness = sim.contacts, sim.scene.blocks, sim.scene.thickness
-    push, shear = (sim.joints.traction * c.length[:, None] * thickness).T
-    force, n = (push + 1j * shear) * c.normal, len(blocks)
-    out = np.zeros((n, 2, 2))
-    for block, way in ((c.a, 1.0), (c.b, -1.0)):
-        arm = c.at - (sim.blocks.motion[0] + 1j * sim.blocks.motion[1])[block]
-        pairs = [np.stack([part.real, part.imag], axis=1) for part in (way * force, arm)]
-        np.add.at(out, block, pairs[0][:, :, None] * pairs[1][:, None, :])
-    volume = thickness * np.array([block.section.area for block in blocks])
-    return 0.5 * (out + out.transpose(0, 2, 1)) / volume[:, None, None]
+    """Mean stress xx, yy, xy (3, n) in each block (Pa, compression positive): force times arm of
+    its joints, over its volume."""
+    c, blocks = sim.contacts, sim.scene.blocks
+    push, shear = (sim.joints.traction * c.length[:, None]).T
+    on_b, block = (push + 1j * shear) * c.normal, np.concatenate([c.a, c.b])
+    fx, fy = (part := np.concatenate([on_b, -on_b])).real, part.imag
+    arm = np.tile(c.at, 2) - (sim.blocks.motion[0] + 1j * sim.blocks.motion[1])[block]
+    parts = fx * arm.real, fy * arm.imag, 0.5 * (fx * arm.imag + fy * arm.real)
+    sums = np.array([np.bincount(block, part, len(blocks)) for part in parts])
+    return sums / [one.section.area for one in blocks]
 
 
 def write_csv(path: Path, header, rows) -> None:

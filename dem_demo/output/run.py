@@ -122,10 +122,8 @@ def steps_to(sim: Simulation, until: float | None = None) -> int:
     now, dt, end = sim.time, sim.dt, _end(sim, until)
     steps = (end - now) / dt
     if not -0.5 <= steps <= MOST_STEPS:
-        raise ValueError(
-            f"until = {end:g} s: {steps:.3g} steps of {dt:.3g} s from {now:.6g} s; "
-            f"must be from 0 to {MOST_STEPS:g}: run.end and stiffnesses in SI?"
-        )
+        raise ValueError(f"until = {end:g} s: {steps:.3g} steps of {dt:.3g} s from {now:.6g} s; "
+                         f"must be from 0 to {MOST_STEPS:g}; units?")  # fmt: skip
     return round(steps)
 
 

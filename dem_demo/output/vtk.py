@@ -45,7 +45,8 @@ def _blocks(record: Record, i: int) -> meshio.Mesh:
     motion, shapes = record.motion[i], [s for s in outlines(record, i) if np.isfinite(s).all()]
     first = np.cumsum([0, *map(len, shapes)])
     cells = [("polygon", np.arange(a, b)[None]) for a, b in pairwise(first)]
-    values, ways = np.linalg.eigh(record.stresses[i])
+    xx, yy, xy = record.stresses[i]
+    values, ways = np.linalg.eigh(np.stack([xx, xy, xy, yy], axis=1).reshape(-1, 2, 2))
     columns = {
         "block": np.arange(len(motion.T), dtype=float),
         "displacement_m": _in_space(record.displaced(i) - record.displaced(0)),

@@ -10,16 +10,17 @@ scene      a scene in memory
 read       a scene from its file
 """
 
-from .blocks import Block, turn, usual_size, usual_stress
+from .blocks import Block, turn, usual_size
 from .drives import Drives
 from .keys import Tables, overlay
-from .laws import WHOLE, Files, Law, build_law, opens_to, springs
+from .laws import USUAL, WHOLE, Files, Law, build_law, opens_to, springs
 from .read import TEMPLATE, build, load, parse, read_tables, shipped
 from .scene import Run, Scene
 from .stress import Stress
 
 __all__ = [
     "TEMPLATE",
+    "USUAL",
     "WHOLE",
     "Block",
     "Drives",
@@ -40,5 +41,4 @@ __all__ = [
     "springs",
     "turn",
     "usual_size",
-    "usual_stress",
 ]

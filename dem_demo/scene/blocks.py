@@ -1,6 +1,6 @@
 """Convex blocks: their corners, and what pymunk says of them."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -73,12 +73,6 @@ def usual_size(blocks: Iterable[Block]) -> float:
 def usual_width(blocks: Iterable[Block]) -> float:
     """Median width (m) of the blocks that move."""
     return float(np.median([block.width for block in blocks if block.moves]))
-
-
-def usual_stress(blocks: Sequence[Block], gravity: tuple[float, float]) -> float:
-    """Stress (Pa) at half of the height of some blocks by their weight."""
-    height = np.ptp(np.concatenate([block.corners[:, 1] for block in blocks]))
-    return float(0.5 * blocks[0].density * np.hypot(*gravity) * height)
 
 
 def box(width: float, height: float, at=(0.0, 0.0), angle: float = 0.0) -> np.ndarray:

@@ -12,6 +12,7 @@ from .keys import TABLE, Tables, overlay
 
 Law: TypeAlias = jl.JointLaw | jl.CoulombLaw
 WHOLE = "whole rock"  # name of the law of cuts that are no joints
+USUAL = 1e5  # Pa: normal stress of a joint where it is not known
 STRONG = 1e3  # cohesion of whole rock over its tension
 
 
@@ -71,10 +72,10 @@ def springs(law: Law, stress: float) -> tuple[float, float]:
     return stiffness, stiffness / law.asperity.lam
 
 
-def whole_rock(laws: Iterable[Law], stress: float, opening: float) -> jl.CoulombLaw:
-    """A joint as stiff as the stiffest of some laws at a stress (Pa), which holds until it is
+def whole_rock(laws: Iterable[Law], opening: float) -> jl.CoulombLaw:
+    """A joint as stiff as the stiffest of some laws at the usual stress, which holds until it is
     open by `opening` (m)."""
-    normal, shear = max(springs(law, stress) for law in laws)
+    normal, shear = max(springs(law, USUAL) for law in laws)
     tension = normal * opening
     return jl.CoulombLaw(normal, shear, 1.0, STRONG * tension, tension, plane=0.0)
 

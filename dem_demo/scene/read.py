@@ -11,7 +11,7 @@ from shapely import Point, Polygon
 from jointlaw.parameters import keys
 from jointlaw.support.checks import one_of, remedy
 
-from .blocks import Block, box, check_convex, usual_stress, usual_width
+from .blocks import Block, box, check_convex, usual_width
 from .cutting import CUT, JointSet, cut
 from .drives import read_drives
 from .keys import LIST, NOT_NEGATIVE, SCENE, TABLE, Tables, overlay, some_of, vector
@@ -25,7 +25,7 @@ GRAVITY, DENSITY = (0.0, -9.81), 2600.0  # m/s2, kg/m3
 CORNER = 0.1  # of the least width of a block
 SOFT = 0.25  # of the skin, that of the narrowest block where none is given
 SLIVER = 0.7  # of the usual width: narrower blocks do not count
-HELD, LIGHTEST = 0.5, 1e3  # of the skin that whole rock may open; Pa, where nothing weighs
+HELD = 0.5  # of the skin that whole rock may open
 LEAST = 0.2  # narrowest block of a rock as a share of the smallest spacing
 
 
@@ -67,10 +67,8 @@ def read_tables(text: str, where: str = "scene") -> Tables:
     copy. Raises ValueError."""
     data = keys.parse(text, where)
     if "asperity_density" in data or "kind" in data:
-        raise ValueError(
-            f"{where} is the parameter file of a law, no scene: a scene that uses it has "
-            f"[laws.NAME] with from = {where!r}"
-        )
+        raise ValueError(f"{where} is the parameter file of a law, no scene: in a scene write "
+                         f"[laws.NAME] with from = {where!r}")  # fmt: skip
     variants, chosen = data.pop("variants", {}), data.pop("variant", None)
     if chosen is not None:
         data = overlay(data, variants[one_of(f"{where}: variant", chosen, tuple(variants))])
@@ -130,9 +128,8 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
         water, in_situ, (*pressure, 0.0), tuple(_stages(digs, blocks, where)), **watched,
     )  # fmt: skip
     if WHOLE in edge_laws.values():
-        stress = max(usual_stress(blocks, scene.gravity), LIGHTEST)
-        springy = [laws[law] for law in sorted(jointed) or [default]]
-        laws.setdefault(WHOLE, whole_rock(springy, stress, HELD * scene.skins.min()))
+        cut = [laws[law] for law in jointed or [default]]
+        laws.setdefault(WHOLE, whole_rock(cut, HELD * scene.skins.min()))
     for name, law in laws.items():
         opening = opens_to(law)
         if opening > scene.skins.min():
@@ -254,12 +251,13 @@ def _rock(
         for edge, number in enumerate(of.tolist()):
             if number >= 0:
                 laws[first + i, edge] = of_edge[number]
-    told = [f"{joined} slivers joined to neighbours"]
-    for sliver in dropped:
-        x, y = sliver.centroid.coords[0] + shift
-        told.append(f"a gap of {sliver.area:.2g} m2 at ({x:.3g}, {y:.3g}), a sliver left out")
-    if cuts := sum(int((of == CUT).sum()) for of in numbers) // 2:
-        told.append(f"{cuts} cuts that are no joints, at inward corners: law {of_edge[CUT]!r}")
+    cuts = sum(int((of == CUT).sum()) for of in numbers) // 2
+    told = [
+        f"{joined} slivers joined to neighbours",
+        *(f"a gap of {sliver.area:.2g} m2 at ({sliver.centroid.x + shift[0]:.3g}, "
+          f"{sliver.centroid.y + shift[1]:.3g}), a sliver left out" for sliver in dropped),
+        *[f"{cuts} cuts that are no joints, at inward corners: law {of_edge[CUT]!r}"] * (cuts > 0),
+    ]  # fmt: skip
     free = [i for i in range(first, len(blocks)) if not blocks[i].fixed]
     if not free:
         raise ValueError(f"{where}.fixed: all blocks of the rock are fixed")

@@ -3,7 +3,6 @@
 "coulomb" has the peak and residual strength that each law itself has at the normal stress that its
 joints bear at the start, which is what an engineer would give it: the difference to "joint" is what
 the law adds to a strength, such as dilation, and friction that depends on stress and direction.
-"facets" has the friction of the asperities alone.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,7 +17,7 @@ from ..errors import Refused
 from ..output.monitors import slip_distance
 from ..output.record import Record, far, outcomes
 from ..output.run import play
-from ..scene import Scene, springs, usual_stress
+from ..scene import USUAL, Scene, springs
 from .strength import alone
 
 FAR = 20.0  # slip distances: where the strength of a law is its residual one
@@ -37,10 +36,9 @@ def compare(scene: Scene, seeds: Sequence[int], until: float) -> Iterator[dict]:
             yield {"law": "joint", "seed": seed, "laws": {}, **_run(own, until)}
             stress = stresses(Simulation(own))
             run = replace(own.run, max_overlap=0.1)  # constant springs are soft in impacts
-            for kind, of in (("coulomb", of_strength), ("facets", of_facets)):
-                laws = {name: of(law, stress[name]) for name, law in rough.items()}
-                case = replace(own, laws=own.laws | laws, run=run)
-                yield {"law": kind, "seed": seed, "laws": laws, **_run(case, until)}
+            laws = {name: of_strength(law, stress[name]) for name, law in rough.items()}
+            case = replace(own, laws=own.laws | laws, run=run)
+            yield {"law": "coulomb", "seed": seed, "laws": laws, **_run(case, until)}
 
 
 def _run(scene: Scene, until: float) -> dict:
@@ -54,13 +52,13 @@ def _run(scene: Scene, until: float) -> dict:
 
 
 def stresses(sim: Simulation) -> dict[str, float]:
-    """Mean normal stress (Pa) of the joints of each law, weighted by their forces; where none is
-    pressed, the stress by weight at half of the scene's height."""
-    usual, found = usual_stress(sim.scene.blocks, sim.scene.gravity), {}
+    """Mean normal stress (Pa) of the joints of each law, weighted by their forces; the usual one
+    where none is pressed."""
+    found = {}
     for name, rows in zip(sim.scene.laws, sim.joints.rows, strict=True):
         stress = np.maximum(sim.joints.traction[rows, 0], 0.0)
         force = stress * sim.contacts.length[rows]
-        found[name] = float(stress @ force / force.sum()) if force.any() else usual
+        found[name] = float(stress @ force / force.sum()) if force.any() else USUAL
     return found
 
 
@@ -78,8 +76,3 @@ def of_strength(law: jl.JointLaw, stress: float) -> jl.CoulombLaw:
         *springs(law, stress), fall + residual, residual_friction=residual, residual_cohesion=0.0,
         weakening=2 * work / fall if fall else 0.0, plane=0.0, **bond,
     )  # fmt: skip
-
-
-def of_facets(law: jl.JointLaw, stress: float) -> jl.CoulombLaw:
-    """Coulomb's joint with the friction of the asperities themselves."""
-    return jl.CoulombLaw(*springs(law, stress), law.asperity.mu, plane=0.0)

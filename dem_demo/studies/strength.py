@@ -20,7 +20,7 @@ from jointlaw.support.pyplot import FORMATS
 
 from ..dynamics.seating import displacements
 from ..output.pictures import Pictures
-from ..scene import WHOLE, Scene, Tables, build, read_tables, turn
+from ..scene import Scene, Tables, build, read_tables, turn
 from .failure import failing
 from .trials import Trials
 
@@ -106,12 +106,9 @@ def critical_tilt(scene: Scene, trials: Trials | None = None, name: str = "scene
 
 
 def weakened(scene: Scene, factor: float) -> Scene:
-    """A scene with the strength of all joints divided by a factor, bonds in tension as well; whole
-    rock keeps its tension."""
+    """A scene with the strength of all joints divided by a factor, bonds in tension as well."""
     laws = dict(scene.laws)
     for name, law in laws.items():
-        if name == WHOLE:
-            continue
         if isinstance(law, jl.CoulombLaw):
             laws[name] = replace(law, tension=law.tension / factor)
         elif bond := law.bond:  # an energy above the elastic one stays above it

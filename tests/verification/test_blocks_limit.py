@@ -1,4 +1,4 @@
-"""Factors of safety of blocks against others than the demo: limit analysis, and by hand."""
+"""Blocks against what is not the demo: limit analysis, and calculations by hand."""
 
 import numpy as np
 import pytest
@@ -74,7 +74,7 @@ def test_a_slope_whose_columns_lean_has_less_than_limit_analysis_says():
 
 
 def test_limit_analysis_of_one_block_is_that_by_hand():
-    """A block of 3 m by 1.5 m on a plane of 25 degrees; a narrow one turns at any friction."""
+    """A block of 3 m by 1.5 m on a plane of 25 degrees; a narrow one turns for any friction."""
     text = """
 gravity = [4.1459, -8.8909]
 [laws.j]
@@ -194,3 +194,50 @@ def test_a_roof_wedge_drawn_with_its_apex(half_angle, phi, push):
         push * np.sin(angle) + half * np.cos(angle),
     )
     assert factor_of_safety(scene) == pytest.approx(mu * normal / shear, rel=FOUND)
+
+
+COHESIVE = """
+gravity = [{down}, {on}]
+[laws.j]
+kind = "coulomb"
+normal_stiffness = 1e10
+shear_stiffness = 5e9
+friction = {mu}
+cohesion = {cohesion}
+tension = {cohesion}
+{residual}
+[[block]]
+name = "base"
+box = [12.0, 1.0]
+at = [0.0, -0.5]
+fixed = true
+[[block]]
+name = "block"
+box = [3.0, 1.5]
+at = [0.0, 0.75]
+[run]
+end = 0.2
+"""
+
+
+@pytest.mark.parametrize("brittle", [False, True], ids=["kept", "lost"])
+@pytest.mark.parametrize(
+    ("dip", "phi", "cohesion"),
+    [(35, 30, 10e3), (45, 35, 20e3), (60, 30, 40e3), (60, 0, 40e3)],
+)
+def test_a_block_held_by_cohesion(dip, phi, cohesion, brittle):
+    """Cohesion that stays adds to friction: (c A + W cos tan phi)/(W sin). Where it is lost after
+    the peak, the block holds while its upper end is below its peak, or while the lower end and what
+    is left at the upper one bear it, whichever is more; the load turns the block onto its lower
+    end."""
+    slope, mu = np.radians(dip), np.tan(np.radians(phi))
+    down, on = 9.81 * np.sin(slope), -9.81 * np.cos(slope)
+    residual = "residual_cohesion = 0.0" if brittle else ""
+    text = COHESIVE.format(down=down, on=on, mu=mu, cohesion=cohesion, residual=residual)
+    normal, shear = -2600.0 * 1.5 * on, 2600.0 * 1.5 * down  # Pa, means over the base
+    upper, lower = normal - shear * np.array([0.5, -0.5])  # 2 (1.5 m / 2) over 3 m
+    expected = (cohesion + mu * normal) / shear
+    if brittle:
+        peak = (cohesion + mu * upper) / shear
+        expected = max(peak, 0.5 * (cohesion + mu * lower + mu * upper) / shear)
+    assert factor_of_safety(parse(text)) == pytest.approx(expected, rel=0.01)

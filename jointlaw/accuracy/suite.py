@@ -58,6 +58,11 @@ def reference_resolution(law: JointLaw) -> Resolution:
     return Resolution(math.ceil(6 + 32 / law.orientation.a), 16, 36)
 
 
+def steepest(law: JointLaw) -> float:
+    """Limit of the friction angle under long slip at small stress: atan(mu) + 90 deg/a."""
+    return math.degrees(math.atan(law.asperity.mu)) + 90.0 / law.orientation.a
+
+
 def scaled(r: Resolution, share: float) -> Resolution:
     """That many times the nodes in each direction."""
     return replace(
@@ -125,9 +130,7 @@ def standard_suite(law: JointLaw, best: Resolution | None = None, excursions: in
     d = _hold_stress(replace(law, resolution=scaled(best, 1 / 2)), d, held, stress)
     F = tractions(law, d)
     slid, ways = None, standard_ways(law.tables.dim)
-    # the limit of the friction angle under long slip at small stress
-    steepest = math.degrees(math.atan(law.asperity.mu)) + 90.0 / law.orientation.a
-    if not law.closure_only and steepest < _JAMS:
+    if not law.closure_only and steepest(law) < _JAMS:
         more = random_ways(np.random.default_rng(18), excursions // 16, law.tables.dim)
         called += tuple(f"slip {way:g} at S/{2 / share:g}" for share, way, _ in ways)
         called += tuple(f"slip {i + 1}" for i in range(len(more)))

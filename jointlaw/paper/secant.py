@@ -15,6 +15,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -88,10 +89,16 @@ def secant(law: JointLaw, delta: ArrayLike, contact: str = "exact") -> Secant:
         elastic, inelastic = _stiffness(asperity, d, n, zone, limit, contact)
         Ce += (weight * elastic).sum(-1)
         Cp += (weight * inelastic).sum(-1)
-    touch = 1.0 if law.heights is None else law.heights.cdf(law.heights.overlap + d[0])
-    scale = law.asperity_density * float(touch)
+    scale = law.asperity_density * touching(law, float(d[0]))
     Ce, Cp = scale * Ce, scale * Cp
     return Secant((Ce - Cp) @ d, Ce, Cp, float(shares[1]), float(shares[2]))
+
+
+def touching(law: JointLaw, closure: ArrayLike) -> Any:
+    """Share of the asperities in touch at a closure (m), P(r0 + delta_1); 1 without heights."""
+    if law.heights is None:
+        return np.ones_like(closure, float)[()]
+    return law.heights.cdf(law.heights.overlap + np.asarray(closure))
 
 
 def shear_factor(x: ArrayLike, eta: float, contact: str = "exact") -> Array:

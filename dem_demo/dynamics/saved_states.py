@@ -53,7 +53,8 @@ def load(folder: Path) -> tuple[Scene, Saved]:
     if not file.is_file():
         raise ValueError(f"{str(folder)!r} holds no saved state: {FILE} is missing")
     try:
-        with np.load(file, allow_pickle=False) as stored:  # a ZIP file: it checks its sums
+        # a ZIP file: it checks its sums; opened here, for numpy leaves a damaged one open
+        with file.open("rb") as opened, np.load(opened, allow_pickle=False) as stored:
             data = {name: stored[name] for name in stored.files}
         if (version := int(data["version"])) == VERSION:
             files = Files(known=json.loads(str(data["files"])).items())

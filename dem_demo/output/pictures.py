@@ -75,7 +75,7 @@ class Pictures:
         marks = [Line2D([], [], color=colour, ls=line, label=f"joint {name}", lw=2.0)
                  for name, (colour, line) in STATES.items()]  # fmt: skip
         stress = float(f"{self.stress:.1g}")
-        kind = "effective " * (scene.water is not None or any(scene.pressure))
+        kind = "effective " * scene.wet
         label, width = f"{kind}normal stress {1e-3 * stress:g} kPa", self._width(stress)
         marks.append(Line2D([], [], color=STATES["stuck"][0], lw=width, label=label))
         marks.append(Line2D([], [], color="0.6", ls=":", lw=0.9, label="place at the start"))

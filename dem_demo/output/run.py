@@ -59,6 +59,7 @@ def run(
         "time_step_margin": sim.limit.least / sim.dt,
         "started_in_equilibrium": bool(sim.balanced),
         "law_points": sim.joints.n,
+        "stresses_of_joints": "effective" if sim.scene.wet else "total",
         "stages_begun_s": [time if time < inf else None for time in sim.begun.tolist()],
         "energy_J": dict(zip(COLUMNS, record.energy[-1][:-1], strict=True)),
         "energy_error": record.energy[-1][-1],

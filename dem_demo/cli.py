@@ -129,7 +129,7 @@ def _announce(sim: Simulation, until: float | None = None) -> None:
     for rock in sim.scene.rocks:
         print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
               f"{len(rock.blocks) - len(rock.free)} fixed; {rock.slivers}")  # fmt: skip
-    if not sim.balanced:
+    if sim.loose.any():
         print("some blocks have no static equilibrium and move from the first step")
 
 

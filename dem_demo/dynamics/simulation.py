@@ -12,6 +12,7 @@ from ..scene import Scene
 from . import saved_states
 from .blocks import Blocks
 from .energy import DROPPED, Ledger
+from .equilibrium import out_of_balance
 from .saved_states import KEPT, PLACES, STATE, Saved
 from .seating import seat
 from .timestep import SAFE, StepLimit, impact_limit
@@ -32,7 +33,7 @@ class Simulation:
 
     step: time step (s), instead of the scene's; saved: a state to go on from. blocks: where they
     are; tracker: their contacts; joints: the law; ledger: the energies; limit: of the time step dt
-    (s), chosen for the reason `why`; balanced: were the blocks in equilibrium at the start? Where
+    (s), chosen for the reason `why`; loose (blocks,): those that nothing held at time 0. Where
     neither `step` nor the scene sets the time step, it is halved when joints close too far for it,
     or blocks become too fast.
     Raises ValueError for a step that is no finite number > 0 and for a state of another scene,
@@ -44,7 +45,7 @@ class Simulation:
             raise ValueError(f"step = {step} s: must be a finite number > 0")
         self.scene, self.blocks = scene, Blocks(scene)
         self.tracker, self.joints = Tracker(scene, self.blocks.motion), Joints(scene)
-        self.limit, self.balanced, self.t0, self.n = StepLimit(), True, 0.0, 0
+        self.limit, self.t0, self.n = StepLimit(), 0.0, 0
         given = step or scene.run.step or scene.run.fraction
         self.why, self.halvings = "", 0 if given else HALVINGS
         self.ledger = Ledger(len(scene.blocks))
@@ -133,9 +134,10 @@ class Simulation:
             joints.rearrange(before, tracker.law, tracker.keys)
         slid = np.zeros(joints.n)
         if scene.run.seat and joints.n:
-            slid, self.balanced = seat(scene, blocks, tracker, joints)
+            slid = seat(scene, blocks, tracker, joints)
         tracker.follow(blocks.motion)
         joints.update(self.contacts.closure, slid)
+        self.loose = out_of_balance(scene, blocks, self.contacts, joints)
         self.limit.look(scene, blocks, self.contacts, joints)
         self.dt = step or scene.run.step or self._chosen_step()
         self.limit.require(self.dt)
@@ -165,7 +167,7 @@ class Simulation:
             )
         if scene.run.fraction:
             return scene.run.fraction * limit
-        falls = not (scene.run.seat and self.balanced) or self.blocks.velocity.any()
+        falls = not scene.run.seat or self.loose.any() or self.blocks.velocity.any()
         driven = any(len(drive.times) > 1 for drive in scene.drives)
         self.why = [*FRACTIONS][0 if falls else 1 if driven else 2]
         return FRACTIONS[self.why] * limit

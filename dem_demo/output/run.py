@@ -56,7 +56,7 @@ def run(
         "time_step_s": sim.dt,
         "step_limit_s": sim.limit.least,
         "time_step_margin": sim.limit.least / sim.dt,
-        "started_in_equilibrium": bool(sim.balanced),
+        "started_in_equilibrium": not sim.loose.any(),
         "law_points": sim.joints.n,
         "energy_J": dict(zip(COLUMNS, record.energy[-1][:-1], strict=True)),
         "energy_error": record.energy[-1][-1],

@@ -26,11 +26,10 @@ ITERATIONS, DAMPINGS = 60, 20  # most of Newton's, and most trials of damping in
 FAR = 0.1  # of its reach: how far the drag of the first guess lets a block fall
 STEPS = 40  # most of the creep
 WEAKER, STRONGER = 0.1, 10.0  # change of the drag after a step, and after one that was not found
-STEADY = (
-    0.8,
-    0.9,
-)  # unbalanced force over that of the step before: no fall, with less drag or the same
-LET_GO, FALLS = 10, 0.99  # most steps in which loose blocks let go; a fall of what is unbalanced
+WEAK = 2e-3, 1e-1  # drag, as a share of the median stiffness, from which on that is asked
+STEADY = 0.8, 0.9  # unbalanced force over that before: no fall, with less drag or the same drag
+LET_GO, FALLS = 40, 0.9  # most steps in which loose blocks let go, which go on while this falls
+SLOW = 0.01  # their drag, as a share of the median stiffness
 HELD = 1e25  # drag (1/s2) that holds a block where it is
 
 
@@ -54,7 +53,7 @@ class Equilibrium:
     """The search for an equilibrium from where the blocks are.
 
     Joints are new but for their closure and what they have slid so far, (k,) in m. force (n, 3):
-    what they have to carry. Displacements y (free motions,) are in unit-mass motions, as in `rates`.
+    what they have to carry. Displacements y (free motions,) are in unit-mass motions.
     """
 
     def __init__(
@@ -66,10 +65,11 @@ class Equilibrium:
         self.rows: csr_array = signs @ rates(blocks, contacts)  # to closure and shear
         self.area = np.tile(contacts.length * scene.thickness, 2)
         self.start = np.concatenate([contacts.closure, slid])
-        self.free, arms = blocks.free.ravel(), np.ones(blocks.free.shape)
-        arms[:, 2] = blocks.reach
-        self.root, self.arm = (part.ravel()[self.free] for part in (blocks.root, arms))
-        self.block = np.repeat(np.arange(len(arms)), 3)[self.free]
+        self.free = blocks.free.ravel()
+        self.root = blocks.root.ravel()[self.free]
+        self.block = np.repeat(np.arange(len(blocks.free)), 3)[self.free]
+        pull = np.hypot(*force[:, :2].T) / blocks.inertia[:, 0] / blocks.reach
+        self.slow = float(np.median(pull[blocks.free.any(axis=1)]))  # drag: the reach in a step
         self.force, self.none = force.ravel()[self.free] * self.root, np.zeros(len(self.block))
         touched = abs(self.rows[: self.k]) + abs(self.rows[self.k :])
         self.island = connected_components(touched.T @ touched, directed=False)[1]
@@ -88,33 +88,22 @@ class Equilibrium:
         nothing moves any more. The others move by a few closures from where they are, as far as
         they need to let go of the rest.
         """
-        closed = (self.start + self.rows @ guess)[: self.k]
-        far = float(np.median(closed[closed > 0])) if (closed > 0).any() else 1.0
-        least = np.where((loose & stay)[self.block], HELD, self._drag(far)) * loose[self.block]
+        drag = max(SLOW * self._median(guess), 1e3 * self.slow)
+        least = np.where((loose & stay)[self.block], HELD, drag) * loose[self.block]
         y = np.where(loose[self.block], 0.0, guess)
-        moved, found = self._let_go(y, least, LET_GO if (loose & ~stay).any() else 1)
+        before = np.inf
+        for _ in range(LET_GO if (loose & ~stay).any() else 1):
+            moved, r, found = self._step(y, least)
+            y = np.where(found, moved, y)
+            if not found.all() or np.linalg.norm(r) > FALLS * before:
+                break
+            before = np.linalg.norm(r)
         if found.all():
             return moved, loose & False
-        y, least = np.where(found, moved, y), np.where(found, HELD, least)
+        least = np.where(found, HELD, least)
         moved, r = self._creep(y, least)
         out = self._shares(np.where(least > 0, 0.0, r))
         return moved, out > max(BALANCED, min(LOOSE, 0.5 * out.max()))
-
-    def _let_go(self, y: np.ndarray, least: np.ndarray, steps: int):
-        """Steps through the drag `least` until what holds loose blocks no longer falls."""
-        before = np.inf
-        for _ in range(steps):
-            y, r, found = self._step(y, least)
-            size = np.linalg.norm(r)
-            if not found.all() or size > FALLS * before:
-                break
-            before = size
-        return y, found
-
-    def _drag(self, far: float) -> np.ndarray:
-        """Drag through which a weight moves a block by `far` (m) in a step."""
-        weight = np.hypot(*self.blocks.gravity[:, :2].T) / far
-        return (weight + 1e-300)[self.block] * (self.root * self.arm) ** 2
 
     def _shares(self, r: np.ndarray) -> np.ndarray:
         return shares(self.blocks, self.spread(r / self.root))
@@ -122,16 +111,22 @@ class Equilibrium:
     def _stiffness(self, C) -> csc_array:
         return (self.rows.T @ (diags(self.area) @ C) @ self.rows).tocsc()
 
-    def unslid(self) -> np.ndarray:
-        """Displacements with joints that cannot slide, for a guess."""
-        far = FAR * float(np.median(self.blocks.reach))
-        return self._step(self.none, self._drag(far), ROUGH, slides=False)[0]
+    def guess(self) -> np.ndarray:
+        """Displacements after one step through a drag in which a block falls by a tenth of its
+        reach; none where that is not found."""
+        y, _, found = self._step(self.none, self.slow / FAR + self.none, ROUGH)
+        return y * found
+
+    def _median(self, y: np.ndarray) -> float:
+        """Median stiffness of the free motions."""
+        stiffness = self._stiffness(self._unbalanced(y)[1]).diagonal()
+        return float(np.median(stiffness[stiffness > 0])) if (stiffness > 0).any() else 0.0
 
     def _creep(self, y: np.ndarray, least: np.ndarray):
         """Steps through less and less drag, of some motions at `least` that much, until all others
         are in balance or what they lack no longer falls. Returns y and the unbalanced force."""
-        median = np.median(self._stiffness(self._unbalanced(y)[1]).diagonal())
-        drag, r, before, change = 1e3 * median, self.none, np.inf, WEAKER
+        drag, change = max(1e3 * self._median(y), 1e4 * self.slow), WEAKER
+        r, before = self.none, np.inf
         for _ in track(range(STEPS), "looking for loose blocks"):
             further, lacking, found = self._step(y, np.maximum(drag, least), ROUGH)
             if not found.all():
@@ -139,68 +134,54 @@ class Equilibrium:
                 continue
             y, r = further, lacking
             now = self._shares(np.where(least > 0, 0.0, r))
-            steady = now > STEADY[change == 1.0] * before
-            if now.max() <= BALANCED or drag < 0.1 * median and steady[now > LOOSE].all():
+            steady = (now > STEADY[change == 1.0] * before)[now > LOOSE].all()
+            if now.max() <= BALANCED or (steady and drag < WEAK[change == 1.0] * self._median(y)):
                 break
             before, drag = now, drag * change
         return y, r
 
-    def _unbalanced(self, y: np.ndarray, slides: bool = True):
+    def _unbalanced(self, y: np.ndarray):
         """Unbalanced forces (free motions,), and the stiffness (2 k, 2 k) of the joints."""
-        joints, k, d = self.joints, self.k, self.start + self.rows @ y
-        if slides:
-            F, C, _ = joints.trial(d.reshape(2, k).T)
-            F, (nn, ns, sn, ss) = F.T.ravel(), C.reshape(k, 4).T
-        else:
-            c, sign, shear = np.maximum(np.abs(d[:k]), 1e-9), np.sign(d[:k]), d[k:]
-            (stress, ss), above, below = (
-                np.array([joints.virgin(of, "closure", c * at) for of in ("stress", "stiffness")])
-                for at in (1.0, 1.01, 0.99)
-            )
-            slope, stiffens = (above - below) / (0.02 * c)
-            acts = (d[:k] > 0) | (joints.damage < 1)
-            F = np.concatenate([stress * acts * sign, ss * shear])
-            nn, ns, sn = slope * acts, 0.0 * c, stiffens * sign * shear
-        stiffness = csr_array(bmat([[diags(nn), diags(ns)], [diags(sn), diags(ss)]]))
-        return self.force - self.rows.T @ (self.area * F), stiffness
+        F, C, _ = self.joints.trial((self.start + self.rows @ y).reshape(2, -1).T)
+        nn, ns, sn, ss = (diags(part) for part in C.reshape(-1, 4).T)
+        stiffness = csr_array(bmat([[nn, ns], [sn, ss]]))
+        return self.force - self.rows.T @ (self.area * F.T.ravel()), stiffness
 
-    def _step(self, y: np.ndarray, drag: np.ndarray, tight: float = TIGHT, slides: bool = True):
+    def _step(self, y: np.ndarray, drag: np.ndarray, tight: float = TIGHT):
         """An implicit step through a drag (free motions,), or without drag to the equilibrium.
 
         Newton's iterations, damped where the residual does not fall, each island of blocks that
         touch by itself. Returns y, the unbalanced forces, and which motions belong to islands whose
         step was found.
         """
-        begin, island, free = y, self.island, drag < HELD
+        island, free, begin = self.island, drag < HELD, y
 
         def norm(parts):
             return np.sqrt(np.bincount(island, parts * parts))
 
         def at(y):
-            r, C = self._unbalanced(y, slides)
+            r, C = self._unbalanced(y)
             left = (r - drag * (y - begin)) * free
             return r, C, left, norm(left)
 
-        r, C, left, size = at(y)
-        target = tight * norm(self.force)
-        damp, stuck = np.zeros(len(size)), np.zeros(len(size), bool)
+        (r, C, left, size), target = at(y), tight * norm(self.force)
+        damp, active = 0.0 * target, size > target
         for _ in track(range(ITERATIONS), "equilibrium"):
-            active = (size > target) & ~stuck
             if not active.any():
                 break
             K = self._stiffness(C)
-            least = 1e-3 * K.diagonal().max() + 1.0
-            waits, step = active, self.none
+            least, waits, step = 1e-3 * K.diagonal().max() + 1.0, active, self.none
             for _ in range(DAMPINGS):
-                trial = spsolve((K + diags(drag + damp[island] + 1e-9 * least)).tocsc(), left)
-                step = np.where(waits[island], trial, step)
-                r, C, left_new, size_new = at(y + step * active[island])
-                waits = active & ~(size_new < size)
+                damped = diags(drag + damp[island] + 1e-9 * least)
+                step = np.where(waits[island], spsolve((K + damped).tocsc(), left), step)
+                now = at(y + step * active[island])
+                waits = active & ~(now[-1] < size)
                 if not waits.any():
                     break
                 damp = np.where(waits, np.maximum(4 * damp, least), damp)
-            stuck |= waits
-            y = y + step * (active & ~waits)[island]
-            r, C, left, size = at(y) if waits.any() else (r, C, left_new, size_new)
-            damp = np.where(active & ~waits, np.where(damp > least, damp / 10, 0.0), damp)
+            active = active & ~waits
+            y = y + step * active[island]
+            r, C, left, size = at(y) if waits.any() else now
+            damp = np.where(active & (damp <= least), 0.0, damp / 10)
+            active = active & (size > target)
         return y, r, (size <= 1e3 * target)[island]

@@ -31,7 +31,7 @@ def seat(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> np.n
         if again:
             force = force + _length_forces(scene, blocks, tracker, joints, slid)
         search = Equilibrium(scene, blocks, tracker.contacts, joints, slid, force)
-        guess, more, old = search.none if again else search.unslid(), ~loose, loose
+        guess, more, old = search.none if again else search.guess(), ~loose, loose
         while more.any():
             moved, more = search.attempt(guess, loose, old)
             loose = loose | more
@@ -51,8 +51,9 @@ def displacements(
     """Displacements of the free motions at which virgin joints carry a scene as drawn.
 
     All loads act at once; in unit-mass motions, None where none are found. They are looked for from
-    guess, those of a similar scene, and from those with which no joint slides. loose (n,): blocks
-    that need not be carried.
+    guess, those of a similar scene, and from those after a step through a drag: where bonds break
+    and joints soften, one may find what the other misses. loose (n,): blocks that need not be
+    carried.
     """
     blocks, joints = Blocks(scene), Joints(scene)
     tracker = Tracker(scene, blocks.motion)
@@ -62,10 +63,11 @@ def displacements(
     force, contacts = blocks.gravity + blocks.loads, tracker.contacts
     search = Equilibrium(scene, blocks, contacts, joints, np.zeros(joints.n), force)
     known = np.zeros(len(force), bool) if loose is None else loose
-    for first in [search.unslid] if guess is None else [lambda: guess, search.unslid]:
-        moved, more = search.attempt(first(), known)
-        if not more.any():
-            return moved
+    for first in (guess, search.guess()):
+        if first is not None:
+            moved, more = search.attempt(first, known)
+            if not more.any():
+                return moved
     return None
 
 

@@ -133,7 +133,7 @@ class Simulation:
         if before is not None:
             joints.rearrange(before, tracker.law, tracker.keys)
         slid = np.zeros(joints.n)
-        if scene.run.seat and joints.n:
+        if scene.run.seat and joints.n and blocks.free.any():
             slid = seat(scene, blocks, tracker, joints)
         tracker.follow(blocks.motion)
         joints.update(self.contacts.closure, slid)

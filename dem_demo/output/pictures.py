@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from jointlaw.support.progress import track
 from jointlaw.support.pyplot import style, written
@@ -16,7 +17,7 @@ from ..scene import turn
 from .monitors import shear_curve
 from .record import CREEP, Record, sentences
 
-FIXED, DRIVEN, FREE = "#8d8d8d", "#b9b4a7", "#efe9dc"
+FIXED, DRIVEN, FREE, LOOSE = "#8d8d8d", "#b9b4a7", "#efe9dc", "#f2a7a0"  # of blocks
 STATES = {  # of a joint: colour and line
     "stuck": ("#3a3a3a", "-"), "partly sliding": ("#e69f00", "-"), "sliding": ("#d81b1b", "-"),
     "open": ("#1f9ed1", "--"),
@@ -77,6 +78,8 @@ class Pictures:
         label, width = f"normal stress {1e-3 * stress:g} kPa", self._width(stress)
         marks.append(Line2D([], [], color=STATES["stuck"][0], lw=width, label=label))
         marks.append(Line2D([], [], color="0.6", ls=":", lw=0.9, label="place at the start"))
+        if self.record.loose.any():
+            marks.append(Patch(fc=LOOSE, ec="0.45", label="could not be held at the start"))
         figure.legend(handles=marks, loc="outside lower center", ncols=3, frameon=False)
         return figure, figure.add_subplot()
 
@@ -92,7 +95,8 @@ class Pictures:
                 start, facecolors="none", edgecolors="0.7", linestyles=":", linewidths=0.7
             )
         )
-        colours = [FIXED if b.fixed else DRIVEN if len(b.held) > 1 else FREE for b in blocks]
+        colours = [FIXED if b.fixed else LOOSE if loose else DRIVEN if len(b.held) > 1 else FREE
+                   for b, loose in zip(blocks, record.loose, strict=True)]  # fmt: skip
         axes.add_collection(
             PolyCollection(shapes, facecolors=colours, edgecolors="0.45", linewidths=0.6)
         )

@@ -17,12 +17,12 @@ from ..dynamics.simulation import Simulation
 from ..errors import Refused
 from .monitors import look
 from .pictures import Pictures, curves
-from .record import Record, outcomes
+from .record import Record, named, outcomes
 
 MOST_STEPS = 1e12  # of a run: years
 LOOKS = 8  # steps between two looks for slip
-VERSION = 1  # of summary.json
-HISTORY = "history.csv"
+VERSION = 2  # of summary.json
+HISTORY, BLOCKS = "history.csv", "blocks.csv"
 
 
 def run(
@@ -56,7 +56,8 @@ def run(
         "time_step_s": sim.dt,
         "step_limit_s": sim.limit.least,
         "time_step_margin": sim.limit.least / sim.dt,
-        "started_in_equilibrium": not sim.loose.any(),
+        "started_in_equilibrium": not record.loose.any(),
+        "loose": named(sim.scene, record.loose),
         "law_points": sim.joints.n,
         "energy_J": dict(zip(COLUMNS, record.energy[-1][:-1], strict=True)),
         "energy_error": record.energy[-1][-1],
@@ -132,8 +133,9 @@ def write(record: Record, summary: dict, folder: Path, drawn: str | None, vtk: b
         pictures = {f"final.{drawn}": of.final, "motion.gif": of.animation}
         if record.scene.shear:
             pictures[f"curves.{drawn}"] = partial(curves, record)
-    write_json(folder / "summary.json", {**summary, "files": [HISTORY, *pictures]})
+    write_json(folder / "summary.json", {**summary, "files": [HISTORY, BLOCKS, *pictures]})
     record.write(folder / HISTORY)
+    record.write_blocks(folder / BLOCKS)
     for name, draw in pictures.items():
         draw(folder / name)
     if vtk:

@@ -49,6 +49,7 @@ def _blocks(record: Record, i: int) -> meshio.Mesh:
         "turn_rad": motion[2] - record.motion[0][2],
         "velocity_m/s": _in_space(motion[3:5].T),
         "spin_rad/s": motion[5],
+        "loose": record.loose.astype(float),
     }
     data = {name: [row[None] for row in values] for name, values in columns.items()}
     return meshio.Mesh(_in_space(np.concatenate(shapes)), cells, cell_data=data)

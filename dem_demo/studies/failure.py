@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from jointlaw.support.pyplot import style, written
 
@@ -15,9 +16,15 @@ from ..errors import Refused
 from ..output.pictures import FIXED, outlines
 from ..output.record import Record, far
 from ..output.run import play
-from ..scene import Scene
+from ..scene import Scene, usual_size
 
+FIRST = 0.01  # of the usual size of a block: who has moved by half of the most then moves first
 WIDTH = 4.6  # inches: text of 9 points can be read on a telephone
+
+
+def seated(scene: Scene) -> Scene:
+    """A scene that starts from its equilibrium, with the time step that follows."""
+    return replace(scene, run=replace(scene.run, step=None, fraction=None, seat=True))
 
 
 def failing(scene: Scene, until: float) -> Record:
@@ -26,16 +33,25 @@ def failing(scene: Scene, until: float) -> Record:
     Where joints close too far for the time step, that is halved. What is recorded by then is kept
     where that does not help.
     """
-    sim = Simulation(replace(scene, run=replace(scene.run, step=None, fraction=None, seat=True)))
+    sim = Simulation(seated(scene))
     record = Record(sim)
     with suppress(Refused):
         play(sim, record, until, far)
     return record
 
 
+def first(record: Record) -> np.ndarray:
+    """Mask (n,) of the blocks that move first."""
+    size = usual_size(block for block in record.scene.blocks if not block.fixed)
+    moved = [np.hypot(*(record.displaced(i) - record.displaced(0)).T)
+             for i in range(len(record.times))]  # fmt: skip
+    away = next((frame for frame in moved if frame.max() > FIRST * size), moved[-1])
+    return away > 0.5 * away.max()
+
+
 @style()
 def draw(record: Record, title: str, path: Path) -> None:
-    """How far each block has moved (m), where it is now, and dotted where it was."""
+    """How far each block has moved (m), where it is, dotted where it was, and who went first."""
     blocks, start, now = record.scene.blocks, outlines(record, 0), outlines(record, -1)
     corners = np.concatenate([*start, *now])
     wide, high = np.ptp(corners, axis=0)
@@ -53,6 +69,9 @@ def draw(record: Record, title: str, path: Path) -> None:
     axes.add_collection(
         PolyCollection(before, facecolors="none", edgecolors="0.5", linestyles=":", lw=0.6)
     )
+    ahead = [shape for shape, goes in zip(now, first(record), strict=True) if goes]
+    axes.add_collection(PolyCollection(ahead, facecolors="none", edgecolors="k", linewidths=1.6))
+    axes.legend(handles=[Patch(fc="none", ec="k", lw=1.6, label="moves first")])
     axes.autoscale_view()
     figure.colorbar(drawn, location="bottom", label="moved since the start (m)", aspect=40)
     written(figure, path)

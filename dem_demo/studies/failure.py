@@ -40,18 +40,18 @@ def failing(scene: Scene, until: float) -> Record:
     return record
 
 
-def first(record: Record) -> np.ndarray:
-    """Mask (n,) of the blocks that move first."""
+def first(record: Record, apart: np.ndarray) -> np.ndarray:
+    """Mask (n,) of the blocks that move first, but for those of a mask `apart`."""
     size = usual_size(block for block in record.scene.blocks if not block.fixed)
-    moved = [np.hypot(*(record.displaced(i) - record.displaced(0)).T)
+    moved = [~apart * np.hypot(*(record.displaced(i) - record.displaced(0)).T)
              for i in range(len(record.times))]  # fmt: skip
     away = next((frame for frame in moved if frame.max() > FIRST * size), moved[-1])
     return away > 0.5 * away.max()
 
 
 @style()
-def draw(record: Record, title: str, path: Path) -> None:
-    """How far each block has moved (m), where it is, dotted where it was, and who went first."""
+def draw(record: Record, title: str, path: Path, ahead: np.ndarray) -> None:
+    """How far each block moved (m), where it is, dotted where it was; bold who went ahead (n,)."""
     blocks, start, now = record.scene.blocks, outlines(record, 0), outlines(record, -1)
     corners = np.concatenate([*start, *now])
     wide, high = np.ptp(corners, axis=0)
@@ -69,8 +69,8 @@ def draw(record: Record, title: str, path: Path) -> None:
     axes.add_collection(
         PolyCollection(before, facecolors="none", edgecolors="0.5", linestyles=":", lw=0.6)
     )
-    ahead = [shape for shape, goes in zip(now, first(record), strict=True) if goes]
-    axes.add_collection(PolyCollection(ahead, facecolors="none", edgecolors="k", linewidths=1.6))
+    went = [shape for shape, goes in zip(now, ahead, strict=True) if goes]
+    axes.add_collection(PolyCollection(went, facecolors="none", edgecolors="k", linewidths=1.6))
     axes.legend(handles=[Patch(fc="none", ec="k", lw=1.6, label="moves first")])
     axes.autoscale_view()
     figure.colorbar(drawn, location="bottom", label="moved since the start (m)", aspect=40)

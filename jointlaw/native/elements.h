@@ -124,8 +124,11 @@ JL_IN jl_of_joint jl_step_elements(const jlaw_law *law, jl_numbers n, int row,
 #define JL_STEP_ELEMENT(name)                                                                   \
   if (law->name) {                                                                              \
     const int rows = jl_##name##_rows(law);                                                     \
-    jl_part p = {{0.0}, {0.0}, {0.0}, {0.0}, {0.0}, 0.0};                                       \
-    for (int i = 0; i < dim; i++) p.from[i] = JL_JOINT(from[i], l), p.d[i] = JL_JOINT(d[i], l); \
+    jl_part p; /* what a step does not write is not read */                                                                     \
+    for (int i = 0; i < 3; i++) {                                                                \
+      p.from[i] = i < dim ? JL_JOINT(from[i], l) : 0.0;                                         \
+      p.d[i] = i < dim ? JL_JOINT(d[i], l) : 0.0;                                               \
+    }                                                                                            \
     for (int i = 0; i < rows; i++) p.row[i] = own[(size_t) i * n.stride];                       \
     JL_JOINT(stored, l) += jl_##name##_step(law, &p, tangent);                                  \
     for (int i = 0; F && i < rows; i++) own[(size_t) i * n.stride] = p.row[i];                  \

@@ -129,7 +129,10 @@ extern "C" {
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__GNUC__) && !defined(__CUDACC__)
 #pragma GCC push_options
-#pragma GCC optimize("fp-contract=off")
+#pragma GCC optimize("fp-contract=off", "no-gcse", "no-gcse-after-reload")
+#ifdef __AVX512F__
+#pragma GCC target("no-avx512f")
+#endif
 #endif
 #ifdef __GNUC__ /* all functions of vectors are inline; g++ would warn at the end of the file */
 #pragma GCC diagnostic ignored "-Wpsabi"
@@ -144,7 +147,7 @@ extern "C" {
 #endif
 #if defined(__x86_64__) && defined(__gnu_linux__) && defined(__OPTIMIZE__) && !defined(__AVX2__) \
     && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && defined(JLAW_ABREAST)
-#define JLAW_CLONES __attribute__((target_clones("arch=x86-64-v4", "avx2", "default")))
+#define JLAW_CLONES __attribute__((target_clones("avx2", "default")))
 #else
 #define JLAW_CLONES
 #endif
@@ -226,11 +229,25 @@ enum { JLAW_LEDGER = 0 };
 enum { JLAW_LEDGER = 1 };
 #endif
 
-JLAW_CLONES JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t stride,
-                                         const double *d, double *F, double *C)
+JLAW_CLONES static JLAW_FUNCTION void jlaw_step_(const jlaw_law *law, double *s, size_t stride,
+                                          const double *d, double *F)
 {
   const jl_numbers n = {s, stride, 0};
-  jl_step_of_kind(law, n, d, F, C, JLAW_LEDGER, C != NULL, 0, 0, NULL);
+  jl_step_of_kind(law, n, d, F, NULL, JLAW_LEDGER, 0, 0, 0, NULL);
+}
+
+JLAW_CLONES static JLAW_FUNCTION void jlaw_step_c_(const jlaw_law *law, double *s, size_t stride,
+                                          const double *d, double *F, double *C)
+{
+  const jl_numbers n = {s, stride, 0};
+  jl_step_of_kind(law, n, d, F, C, JLAW_LEDGER, 1, 0, 0, NULL);
+}
+
+JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t stride,
+                                         const double *d, double *F, double *C)
+{
+  if (C) jlaw_step_c_(law, s, stride, d, F, C);
+  else jlaw_step_(law, s, stride, d, F);
 }
 
 /* Whether all sliders hold forces that a law can have; 0 for NaN */

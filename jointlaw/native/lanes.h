@@ -16,7 +16,7 @@
 #endif
 #if defined(__CUDACC__) || defined(__CUDACC_RTC__)
 #define JL_IN static JLAW_FUNCTION __forceinline__
-#elif defined(__GNUC__)
+#elif defined(__GNUC__) && defined(__OPTIMIZE__)
 #define JL_IN static inline __attribute__((always_inline))
 #else
 #define JL_IN static inline

@@ -120,7 +120,8 @@ JL_IN jl_of_joint jl_step_elements(const jlaw_law *law, jl_numbers n, int row,
   const int dim = law->dim;
   jl_of_joint stored = jl_each_joint(0.0);
   for (int l = 0; l < JL_JOINTS; l++) {
-    double *own = n.s + l + (size_t) row * n.stride, *lost = n.s + l + (size_t) dim * n.stride;
+    double *own = JL_OF_LANE(n, l) + (size_t) row * n.stride,
+           *lost = JL_OF_LANE(n, l) + (size_t) dim * n.stride;
 #define JL_STEP_ELEMENT(name)                                                                   \
   if (law->name) {                                                                              \
     const int rows = jl_##name##_rows(law);                                                     \

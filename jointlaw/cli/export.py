@@ -10,49 +10,52 @@ from ..hosts.lammps.export import export_lammps
 from ..hosts.yade.export import export_yade
 from ..laws.joint_law import JointLaw
 from ..support.files import clear_run
+from ..tables.tabulate import require_3d
 from .command import add_command, add_law, add_out, in_unit, read_law
 
-START = {
-    "yade": "yade -n -x settle_and_incline.py",
-    "c": "make && ./example",
-    "fem": "make",
-    "lammps": "./build.sh && lmp -in in.tower",
+HOSTS = {  # what is written, and what runs it
+    "yade": ("for YADE: table, law, adapter, script", "yade -n -x settle_and_incline.py"),
+    "c": ("for C, C++ and Fortran: one header, tables, examples", "make && ./example"),
+    "fem": ("for finite elements: MGIS, UMAT, shear tests in OpenGeoSys and Kratos", "make"),
+    "lammps": ("for LAMMPS: a pair style, an input script", "./build.sh && lmp -in in.tower"),
 }
 
 
 def add(commands: Any) -> None:
-    """Add the subcommand to the command line."""
-    what = "write a law for a host code: table, adapter and scripts in one folder"
-    example = "jointlaw export yade jing-replica --out joint-for-yade"
-    parser = add_command(commands, "export", what, example, _export)
-    parser.add_argument(
-        "host", choices=tuple(START), help="the host code; c: also C++; fem: finite elements"
-    )
-    add_law(parser)
-    parser.add_argument(
-        "--shear-limit",
-        metavar="LENGTH",
-        type=in_unit("m", positive=True),
-        help="yade: shear at which the friction of the table is read, such as 5um",
-    )
-    parser.add_argument(
-        "--seating",
-        metavar="STRESS",
-        type=in_unit("Pa"),
-        help=f"fem: normal stress before the first step (default {SEATING / 1e3:g}kPa)",
-    )
-    add_out(parser, pictures=False)
+    """Add the subcommand to the command line, with one of its own for each host."""
+    what = "write a law for a host code: all that it needs, in one folder"
+    parser = add_command(commands, "export", what, _example("lammps"), _export)
+    hosts = parser.add_subparsers(dest="host", required=True, metavar="HOST")
+    for host, (about, _) in HOSTS.items():
+        one = add_command(hosts, host, f"write a law {about}", _example(host), _export)
+        add_law(one)
+        if host == "yade":
+            one.add_argument(
+                "--shear-limit",
+                metavar="LENGTH",
+                type=in_unit("m", positive=True),
+                help="shear at which the friction of the table is read, such as 5um",
+            )
+        if host == "fem":
+            one.add_argument(
+                "--seating",
+                metavar="STRESS",
+                type=in_unit("Pa"),
+                default=SEATING,
+                help=f"normal stress before the first step (default {SEATING / 1e3:g}kPa)",
+            )
+        add_out(one, pictures=False)
+
+
+def _example(host: str) -> str:
+    return f"jointlaw export {host} jing-replica --out joint-for-{host}"
 
 
 def _export(options: argparse.Namespace) -> None:
     law, host, folder = read_law(options), options.host, options.out
-    if options.shear_limit and host != "yade":
-        raise ValueError(
-            f"--shear-limit shapes a table for YADE; {host} runs the law itself: leave it out"
-        )
-    seating = {} if options.seating is None else {"seating": options.seating}
-    if seating and host != "fem":
-        raise ValueError(f"--seating is for fem; in {host} the host closes the joint: leave it out")
+    if host in ("yade", "lammps"):
+        require_3d(law, f"motion in {host.upper()}")
+    seating = {"seating": options.seating} if host == "fem" else {}
     require_seating(**seating)
     clear_run(folder)
     if host == "yade":
@@ -61,7 +64,7 @@ def _export(options: argparse.Namespace) -> None:
         export = {"c": export_c, "lammps": export_lammps, "fem": export_fem}[host]
         files = export(law, folder, identifier(Path(options.law).stem), **seating)
         print(f"wrote {', '.join(files)}")
-    print(f"run: cd {folder} && {START[host]}")
+    print(f"run: cd {folder} && {HOSTS[host][1]}")
 
 
 def _export_table(law: JointLaw, folder: Path, shear_limit: float | None) -> None:

@@ -31,7 +31,8 @@ def export_c(law: Law, directory: str | Path, name: str = "joint") -> list[str]:
 
     Writes `jointlaw.h` (the law), `NAME.jlaw` (its tables, for `jlaw_read`), `NAME.h` (the same as
     constants), `jointlaw.c` (compiles the law), `example.c`, `example.cpp`, `example.f90`,
-    `Makefile`, `CMakeLists.txt` and `README.md`. Returns the names. Raises ValueError for a name that C cannot have or too many azimuths, before anything is written.
+    `Makefile`, `CMakeLists.txt` and `README.md`. Returns the names. Raises ValueError for a name
+    that C cannot have or too many azimuths, before anything is written.
     """
     require_name(name)
     texts = {f"{name}.jlaw": table_text(law), f"{name}.h": header_text(law, name)}

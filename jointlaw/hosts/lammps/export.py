@@ -24,7 +24,7 @@ def export_lammps(law: Law, directory: str | Path, name: str = "joint") -> list[
     the script `in.tower`, `joint.in` (what it needs to know of this law) and `law.toml`. Returns
     the names. Raises ValueError for a law that does not fit, before anything is written.
     """
-    require_3d(law)
+    require_3d(law, "motion in LAMMPS")
     texts = {
         f"{name}.jlaw": c.table_text(law),
         "joint.in": (

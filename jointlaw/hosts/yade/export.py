@@ -27,7 +27,7 @@ def export_yade(law: Law, directory: str | Path, **options: Any) -> JointTable:
     `summary.json`. Returns the table. Raises ValueError for a law or option that cannot be
     tabulated, before anything is written.
     """
-    require_3d(law)
+    require_3d(law, "motion in YADE")
     table = tabulate(law, **options)
     report = table.report(law)
     folder = write_files(directory, {"law.toml": law.to_toml()})

@@ -72,6 +72,21 @@ def test_the_bits_of_python(lib, tmp_path, name):
         many_are_one_by_one(built, one, law)
 
 
+def test_coulomb(lib, tmp_path):
+    """Pressed, then sheared in space: kn u, and ks s up to c + mu sigma; the tangent of each."""
+    law = jl.CoulombLaw(normal_stiffness=1e12, shear_stiffness=5e11, friction=0.6, cohesion=1e5)
+    one, way, slip = CLaw(lib, law, tmp_path), np.array([0.6, 0.8]), 0.0
+    assert one.step([2e-6, 0.0, 0.0])[0] == pytest.approx([2e6, 0.0, 0.0])
+    for k in range(1, 11):
+        F, C = one.step([0.0, *(5e-7 * way)])
+        slip += 5e-7
+        shear = min(5e11 * slip, 1e5 + 0.6 * 2e6)
+        assert F == pytest.approx([2e6, *(shear * way)], rel=1e-12)
+        assert way @ C[1:, 0] == pytest.approx(0.6e12 * (k > 5), abs=1.0)
+    lost = shear * (slip - shear / 5e11)
+    assert lib.jlaw_dissipated(one.law, at(one.state)) == pytest.approx(lost, rel=1e-12)
+
+
 @pytest.mark.parametrize("seed", [0, 1, 3, 6, 15, 20])
 def test_the_unsheared_joint(lib, tmp_path, seed):
     law = random_law(seed)

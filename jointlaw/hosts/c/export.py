@@ -92,7 +92,8 @@ def header_text(law: Law, name: str) -> str:
     ]
     for key, array in arrays.items():
         rows = ",\n".join(", ".join(map(repr, row.tolist())) for row in array.reshape(-1, 4))
-        parts.append(f"{_CONSTANT} double {name}_{key}[{array.size}] = {{\n{rows}}};")
+        size = max(array.size, 1)  # C has no empty arrays; Coulomb's joint has no facets
+        parts.append(f"{_CONSTANT} double {name}_{key}[{size}] = {{\n{rows or '0.0'}}};")
     values = ", ".join(map(repr, numbers.values()))
     tables = ", ".join(f"{name}_{key}" for key in arrays)
     parts.append(

@@ -131,7 +131,7 @@ def test_a_layer_that_is_not_level(finite_elements, tmp_path):
 
 
 def test_coulomb_and_a_reason(tmp_path):
-    """Pressed to 2 MPa, then sheared: ks s up to mu sigma; a thickness of -1 is told by its name."""
+    """Pressed to 2 MPa, then sheared: ks s up to mu sigma; a thickness of -1 is told on stderr."""
     law = jl.CoulombLaw(normal_stiffness=1e12, shear_stiffness=5e11, friction=0.6)
     export(tmp_path, law, target="librock_mgis.so")
     jumps, stress, _ = run(tmp_path, 2)

@@ -2,11 +2,12 @@
 
     python docs/measure/lammps_scale.py FOLDER [--small]
 
-The packing of lammps.py, settled with the law, repeated, in a periodic box that is sheared (50 1/s). Times are those of
-the pair style by LAMMPS' own count; with two processes they mean something only while no other
-work is done. The last row is computed from the row before it: 1e8 contacts on 1024 processes. What
-a process sends in a step are position, velocity and spin of its ghost atoms, and their force and
-torque back: 15 numbers each. Needs 12 GB of memory and 4 GB of disk; ten minutes.
+The packing of lammps.py, settled with the law, repeated, in a periodic box that is sheared at a
+rate of 50 1/s. Times are those of the pair style by LAMMPS' own count; with two processes they mean
+something only while no other work is done. The last row is computed from the row before it: 1e8
+contacts on 1024 processes. What a process sends in a step are position, velocity and spin of its
+ghost atoms, and their force and torque back: 15 numbers each. Needs 12 GB of memory and 4 GB of
+disk; ten minutes.
 """
 
 import argparse

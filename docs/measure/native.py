@@ -7,8 +7,8 @@
 Each figure is the least of many short rounds, taken in turn, in nanoseconds per joint and update.
 In the first table it is the time of one thread, so that other programs count little. C:
 `jlaw_update`, one joint at a time as in a pair loop; many: `jlaw_update_many`; both built with the
-flags of the exported Makefile. batch: `JointBatch.update` of all joints. F: traction alone, FC: with
-tangent. Steps are random around a closure of 1 um. The second table is of the clock, for threads.
+flags of the exported Makefile. batch: `JointBatch.update` of all joints. F: traction alone, FC:
+with tangent. Steps are random around a closure of 1 um. The second table is by the clock.
 """
 
 import argparse

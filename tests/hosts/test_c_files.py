@@ -215,6 +215,15 @@ def test_examples_build_as_written_and_run(tmp_path, law, capsys, monkeypatch):
     lines = [line.strip() for line in text.splitlines() if line.startswith("    ")]
     assert len(lines) == 8
     page, said = (DOCS / "native.md").read_text(), {}
+    told = subprocess.run(
+        [sys.executable, "-c", re.search(r'`python -c "(.*)"` prints the folder', page)[1]],
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert told.stdout.strip() == include_dir()
+    whole = (folder / "CMakeLists.txt").read_text().splitlines()
+    assert set(re.search(r"```cmake\n(.*?)```", page, re.S)[1].splitlines()) <= set(whole)
+    (folder / "first.c").write_text(copied()["native.md 0"])
+    lines += [*re.findall(r"^    ((?:cc|c\+\+|gfortran) .*)", page, re.M), "./first"]
     for line in [*lines, "cmake -B build && cmake --build build", "build/example"]:
         quick = line.replace("-O3", "-O0")
         done = subprocess.run(quick, shell=True, cwd=folder, capture_output=True, text=True)

@@ -153,7 +153,7 @@ extern "C" {
 #define JLAW_ABREAST
 #endif
 #if defined(__x86_64__) && defined(__gnu_linux__) && defined(__OPTIMIZE__) && !defined(__AVX2__) \
-    && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && defined(JLAW_ABREAST) \
+    && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && defined(JLAW_ABREAST)  \
     && !defined(JOINTLAW_ONE_PROCESSOR)
 #define JLAW_CLONES __attribute__((target_clones("avx2", "default")))
 #else
@@ -174,8 +174,8 @@ enum { JLAW_LEDGER = 1 };
 #endif
 #define JM_APART
 #include "many.h"
-static void jlaw_step_many_(const jlaw_law *law, double *s, size_t apart, const double *d, double *F,
-                            double *C)
+static void jlaw_step_many_(const jlaw_law *law, double *s, size_t apart, const double *d,
+                            double *F, double *C)
 {
   const jm_numbers n = {s, 1, apart};
   const int dim = law->dim;
@@ -264,25 +264,11 @@ static JLAW_FUNCTION double jlaw_of_facet_(const jlaw_law *law, int facet, int a
   return law->facet[(facet - lane) * JLAW_COLUMNS + at * JLAW_LANES + lane];
 }
 
-JLAW_CLONES static JLAW_FUNCTION void jlaw_step_(const jlaw_law *law, double *s, size_t stride,
-                                          const double *d, double *F)
-{
-  const jl_numbers n = {s, stride, 0};
-  jl_step_of_kind(law, n, d, F, NULL, JLAW_LEDGER, 0, 0, 0, NULL);
-}
-
-JLAW_CLONES static JLAW_FUNCTION void jlaw_step_c_(const jlaw_law *law, double *s, size_t stride,
-                                          const double *d, double *F, double *C)
-{
-  const jl_numbers n = {s, stride, 0};
-  jl_step_of_kind(law, n, d, F, C, JLAW_LEDGER, 1, 0, 0, NULL);
-}
-
-JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t stride,
+JLAW_CLONES JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t stride,
                                          const double *d, double *F, double *C)
 {
-  if (C) jlaw_step_c_(law, s, stride, d, F, C);
-  else jlaw_step_(law, s, stride, d, F);
+  const jl_numbers n = {s, stride, 0};
+  jl_step_of_kind(law, n, d, F, C, JLAW_LEDGER, C != NULL, 0, 0, NULL);
 }
 
 /* Whether all sliders hold forces that a law can have; 0 for NaN */

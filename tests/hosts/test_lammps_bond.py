@@ -44,8 +44,7 @@ def scene(apart, speed, opening=1e-4, law="bonded"):
 
 
 def test_coulomb_is_one_word(folder):
-    """Pulled apart: kn u up to the tension, then none; pressed and sheared: ks s up to c + mu sigma,
-    then mu sigma.
+    """Pulled apart: kn u up to the tension; sheared: ks s up to c + mu sigma, then mu sigma.
 
     As it is sheared by 6 um, the normal turns by 3e-4, and closure changes by 1e-3 of it.
     """
@@ -93,8 +92,9 @@ def test_spheres_that_meet_have_no_bond(folder):
 
 
 def test_an_opening_that_is_too_small_is_told(folder):
-    for law, opening, words in (("bonded", 3e-5, "holds until the joint is 4"),
-                                ("coulomb", 9e-7, "bears tension until the joint is 1e-06 m")):  # fmt: skip
+    cases = {"bonded": (3e-5, "holds until the joint is 4"),
+             "coulomb": (9e-7, "bears tension until the joint is 1e-06 m")}  # fmt: skip
+    for law, (opening, words) in cases.items():
         done = lammps(folder, scene(2 * R, "1.0 0.0 0.0", opening, law))
         assert done.returncode != 0
         assert words in done.stdout + done.stderr

@@ -16,15 +16,16 @@ from ..contact import PARTS
 from ..scene import Files, Scene, parse
 
 FILE = "state.npz"
-VERSION = 7  # of state.npz
+VERSION = 8  # of state.npz
 KEPT = (  # of what changes in a run, but for the joints: arrays that stay in their place
-    "blocks.motion", "blocks.velocity", "blocks.drives.reversed_at", "tracker.renewed_at",
-    "tracker.urgent", "ledger.energy", "ledger.forces",
+    "blocks.motion", "blocks.velocity", "blocks.loads", "blocks.gone", "blocks.support", "begun",
+    "blocks.drives.reversed_at",
+    "tracker.renewed_at", "tracker.urgent", "ledger.energy", "ledger.forces",
 )  # fmt: skip
 STATE = (
     *KEPT, "t0", "n", "dt", "halvings", "limit.now", "limit.least", "limit.bound", "limit.checked",
-    "tracker.keys", "tracker.law", "tracker.numbers", "tracker.offset", "tracker.given",
-    "ledger.start", "ledger.area", "ledger.lost",
+    "tracker.keys", "tracker.law", "tracker.numbers", "tracker.offset",
+    "tracker.given", "ledger.start", "ledger.area", "ledger.lost",
 )  # fmt: skip
 PLACES = "contacts.corner", "contacts.edge"  # from which the contacts are made anew
 

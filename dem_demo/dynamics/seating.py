@@ -15,6 +15,8 @@ from jointlaw.support.progress import track
 from ..contact import Joints, Tracker
 from ..scene import Scene
 from .blocks import Blocks
+from .edge_loads import press
+from .in_situ import begin
 from .timestep import rates
 
 ATTEMPTS = 40  # most rounds of the initial equilibrium
@@ -24,31 +26,35 @@ PATIENCE = 20  # trials after which an island is given up whose residual is stil
 FALLEN = 0.999  # ... this share of what it was
 
 
-def seat(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> tuple[np.ndarray, bool]:
-    """Move the blocks to where their joints carry them.
+def seat(
+    scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints, slid: np.ndarray
+) -> tuple[np.ndarray, bool]:
+    """Move the blocks to where their joints carry them; slid (k,) in m: sliding at first.
 
     Returns the first sliding (k,) of the joints (m), and whether the law can hold all blocks: those
     that it cannot hold will move from step 0.
     """
-    slid, free = np.zeros(joints.n), blocks.free.ravel()
+    free = blocks.free.ravel()
     still = np.ones(int(free.sum()), bool)
-    all_balanced, first, near = True, 0.0, blocks.near()
+    all_balanced, first, pairs = True, 0.0, blocks.near()
     for attempt in range(ATTEMPTS):  # each at the places just found: joints turn with the blocks
         tracker.follow(blocks.motion)
         tracker.urgent[:] = True  # it is cheap here, and nothing is missed
-        before = tracker.renew(blocks.motion, near)
+        before = tracker.renew(blocks.motion, pairs)
         if before is not None:
             joints.rearrange(before, tracker.law, tracker.keys)
             slid = np.where(before >= 0, slid[before], 0.0)
+        press(scene, blocks, tracker)
         force = blocks.gravity + blocks.loads
         if attempt:
             force = force + _length_forces(scene, blocks, tracker, joints, slid)
         force = (force * blocks.root).ravel()[free]
         rows = rates(blocks, tracker.contacts)
         area = tracker.contacts.length * scene.thickness
-        start = np.concatenate([tracker.contacts.closure, slid])
+        start = np.concatenate([tracker.closure, slid])
         again = attempt > 0
-        moved, balanced = _equilibrium(joints, rows, start, area, force, still, again, not again)
+        near = again or scene.in_situ is not None
+        moved, balanced = _equilibrium(joints, rows, start, area, force, still, near, not again)
         if not again:
             all_balanced, first = bool(balanced.all()), np.abs(moved).max()
         else:  # what was found before is balanced but for the turning of the joints
@@ -73,16 +79,14 @@ def displacements(scene: Scene, guess: np.ndarray | None = None) -> np.ndarray |
     """
     blocks, joints = Blocks(scene), Joints(scene)
     tracker = Tracker(scene, blocks.motion)
-    before = tracker.renew(blocks.motion, blocks.near())
-    if before is not None:
-        joints.rearrange(before, tracker.law, tracker.keys)
+    closed = begin(scene, blocks, tracker, joints)
     rows, area = rates(blocks, tracker.contacts), tracker.contacts.length * scene.thickness
     force = ((blocks.gravity + blocks.loads) * blocks.root).ravel()[blocks.free.ravel()]
     none, whole = np.zeros(len(force)), np.ones(len(force), bool)
     for first, near in ((guess, True), (none, False), (none, True)):
         if first is not None:
             opened, slid = (rows @ first).reshape(2, -1)
-            start = np.concatenate([tracker.contacts.closure - opened, slid])
+            start = np.concatenate([tracker.closure - opened, closed + slid])
             moved, balanced = _equilibrium(joints, rows, start, area, force, whole, near, False)
             if balanced.all():
                 return first + moved
@@ -91,7 +95,7 @@ def displacements(scene: Scene, guess: np.ndarray | None = None) -> np.ndarray |
 
 def _length_forces(scene, blocks, tracker, joints, slid) -> np.ndarray:
     """Forces (n, 3) of joints whose length changes as the blocks move, after their first step."""
-    closed = np.stack([tracker.contacts.closure, slid], axis=1) - joints.delta
+    closed = np.stack([tracker.closure, slid], axis=1) - joints.delta
     stored, none = joints.trial(closed)[2] * scene.thickness, np.zeros(joints.n)
     return tracker.contacts.assemble(blocks.motion, none, none, stored) * blocks.mobile
 

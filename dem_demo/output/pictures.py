@@ -16,7 +16,7 @@ from ..scene import turn
 from .monitors import shear_curve
 from .record import CREEP, Record, sentences
 
-FIXED, DRIVEN, FREE = "#8d8d8d", "#b9b4a7", "#efe9dc"
+FIXED, DRIVEN, FREE, WATER = "#8d8d8d", "#b9b4a7", "#efe9dc", "#1f6fd0"
 STATES = {  # of a joint: colour and line
     "stuck": ("#3a3a3a", "-"), "partly sliding": ("#e69f00", "-"), "sliding": ("#d81b1b", "-"),
     "open": ("#1f9ed1", "--"),
@@ -27,7 +27,7 @@ FEW = 12  # blocks: most that bear their names
 
 
 def outlines(record: Record, i: int) -> list[np.ndarray]:
-    """Corners (m, 2) of all blocks in frame i (m)."""
+    """Corners (m, 2) of all blocks in frame i (m); NaN for those that are gone."""
     return [
         block.local @ turn(angle).T + [x, y]
         for block, (x, y, angle) in zip(record.scene.blocks, record.motion[i][:3].T, strict=True)
@@ -44,8 +44,9 @@ class Pictures:
     def __init__(self, record: Record) -> None:
         self.record = record
         corners = np.concatenate([c for i in (0, -1) for c in outlines(record, i)])
-        margin = 0.03 * np.ptp(corners, axis=0).max()
-        self.low, self.high = corners.min(axis=0) - margin, corners.max(axis=0) + margin
+        low, high = np.nanmin(corners, axis=0), np.nanmax(corners, axis=0)
+        margin = 0.03 * (high - low).max()
+        self.low, self.high = low - margin, high + margin
         start = record.joints[0]["normal_stress_Pa"]
         whole = [frame["normal_stress_Pa"] for frame in record.joints]
         pressed = start[start > 0] if (start > 0).any() else np.concatenate(whole)
@@ -68,15 +69,18 @@ class Pictures:
 
     def figure(self) -> tuple[Figure, Axes]:
         """An empty frame with its legend: states, a round stress, the dots of the start."""
-        wide, high = self.high - self.low
+        (wide, high), scene = self.high - self.low, self.record.scene
         across = min(6.5, 6.0 * wide / high)
         figure = Figure(figsize=(max(across + 1.0, 7.5), across * high / wide + 1.8))
         marks = [Line2D([], [], color=colour, ls=line, label=f"joint {name}", lw=2.0)
                  for name, (colour, line) in STATES.items()]  # fmt: skip
         stress = float(f"{self.stress:.1g}")
-        label, width = f"normal stress {1e-3 * stress:g} kPa", self._width(stress)
+        kind = "effective " * scene.wet
+        label, width = f"{kind}normal stress {1e-3 * stress:g} kPa", self._width(stress)
         marks.append(Line2D([], [], color=STATES["stuck"][0], lw=width, label=label))
         marks.append(Line2D([], [], color="0.6", ls=":", lw=0.9, label="place at the start"))
+        if scene.water:
+            marks.append(Line2D([], [], color=WATER, ls="-.", label="water table"))
         figure.legend(handles=marks, loc="outside lower center", ncols=3, frameon=False)
         return figure, figure.add_subplot()
 
@@ -99,6 +103,8 @@ class Pictures:
         if len(blocks) <= FEW:
             for block, shape in zip(blocks, shapes, strict=True):
                 axes.text(*shape.mean(axis=0), block.name, ha="center", va="center")
+        if record.scene.water:
+            axes.plot(*record.scene.water.line.T, color=WATER, lw=1.5, ls="-.", zorder=4)
         ends, state = record.joints[i]["ends"], self.states(i)
         widths = self._width(record.joints[i]["normal_stress_Pa"])
         for name, (colour, line) in STATES.items():

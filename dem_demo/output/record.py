@@ -16,7 +16,8 @@ LOOK_BACK = 1.0  # s over which creep is measured
 
 
 class Record:
-    """Frames of a run: times (f,), motion (f, 6, n), energies (f, 9), joints.
+    """Frames of a run: times (f,), motion (f, 6, n), NaN for blocks that are gone, energies (f, 9),
+    joints.
 
     joints[f]: by name, "who" (k, 5) block, edge, block, edge, contact; "ends" (k, 2, 2) the segment
     of joint that a contact carries; and numbers (k,) with their unit in the name. monitored[f]:
@@ -38,7 +39,7 @@ class Record:
     def take(self, sim: Simulation) -> None:
         """Add the present as a frame."""
         self.times.append(sim.time)
-        self.motion.append(sim.blocks.motion.copy())
+        self.motion.append(np.where(sim.blocks.gone, np.nan, sim.blocks.motion))
         self.energy.append([*sim.ledger.energy.tolist(), sim.ledger.error])
         self.joints.append(_joints(sim))
         self.monitored.append(readings(sim))
@@ -112,15 +113,16 @@ def outcomes(record: Record) -> list[dict]:
     first, then, last = (record.displaced(i) for i in (0, before, -1))
     crept = np.hypot(*(last - then).T) / max(times[-1] - times[before], 1e-300)
     for rock in record.scene.rocks:
-        moved, creep = np.hypot(*(last - first)[rock.free].T), float(crept[rock.free].max())
-        limit = FAILED * usual_size(record.scene.blocks[i] for i in rock.free)
+        free = [i for i in rock.free if np.isfinite(last[i, 0])]
+        moved, creep = np.hypot(*(last - first)[free].T), float(crept[free].max())
+        limit = FAILED * usual_size(record.scene.blocks[i] for i in free)
         failed = int((moved > limit).sum())
         out.append(
             {
                 "rock": rock.name,
                 "state": "fails" if failed else "stands" if creep < CREEP else "moves",
-                "blocks": len(rock.free),
-                "settled_m": float(np.hypot(*first[rock.free].T).max()),
+                "blocks": len(free),
+                "settled_m": float(np.hypot(*first[free].T).max()),
                 "moved_m": float(moved.max()),
                 "failed": failed,
                 "failed_beyond_m": limit,
@@ -133,7 +135,7 @@ def outcomes(record: Record) -> list[dict]:
 def far(record: Record) -> bool:
     """Has a block moved by more than the usual size of a block?"""
     free = (block for block in record.scene.blocks if not block.fixed)
-    return bool(record.moved.max() > usual_size(free))
+    return bool(np.nanmax(record.moved) > usual_size(free))
 
 
 def sentences(record: Record) -> list[str]:

@@ -4,6 +4,7 @@ import sys
 import time
 from collections.abc import Callable
 from functools import partial
+from math import inf
 from pathlib import Path
 
 from tqdm import tqdm
@@ -58,6 +59,8 @@ def run(
         "time_step_margin": sim.limit.least / sim.dt,
         "started_in_equilibrium": bool(sim.balanced),
         "law_points": sim.joints.n,
+        "stresses_of_joints": "effective" if sim.scene.wet else "total",
+        "stages_begun_s": [time if time < inf else None for time in sim.begun.tolist()],
         "energy_J": dict(zip(COLUMNS, record.energy[-1][:-1], strict=True)),
         "energy_error": record.energy[-1][-1],
         "largest_energy_error": max((abs(row[-1]) for row in record.energy[1:]), default=0.0),

@@ -40,17 +40,20 @@ def _list(times: list[float], kind: str) -> ElementTree:
 
 
 def _blocks(record: Record, i: int) -> meshio.Mesh:
-    shapes, motion = outlines(record, i), record.motion[i]
+    motion, shapes = record.motion[i], [s for s in outlines(record, i) if np.isfinite(s).all()]
     first = np.cumsum([0, *map(len, shapes)])
     cells = [("polygon", np.arange(a, b)[None]) for a, b in pairwise(first)]
     columns = {
-        "block": np.arange(len(shapes), dtype=float),
+        "block": np.arange(len(motion.T), dtype=float),
         "displacement_m": _in_space(record.displaced(i) - record.displaced(0)),
         "turn_rad": motion[2] - record.motion[0][2],
         "velocity_m/s": _in_space(motion[3:5].T),
         "spin_rad/s": motion[5],
     }
-    data = {name: [row[None] for row in values] for name, values in columns.items()}
+    data = {
+        name: [row[None] for row in values[np.isfinite(motion[0])]]
+        for name, values in columns.items()
+    }
     return meshio.Mesh(_in_space(np.concatenate(shapes)), cells, cell_data=data)
 
 

@@ -4,6 +4,7 @@ keys       the keys of all tables, and what each may be
 blocks     convex blocks
 laws       joint laws and Coulomb's
 drives     prescribed motions
+stress     of water in the ground
 cutting    an outline cut along joint sets
 scene      a scene in memory
 read       a scene from its file
@@ -15,6 +16,7 @@ from .keys import Tables, overlay
 from .laws import Files, Law, build_law, opens_to
 from .read import TEMPLATE, build, load, parse, read_tables, shipped
 from .scene import Run, Scene
+from .stress import Stress
 
 __all__ = [
     "TEMPLATE",
@@ -24,6 +26,7 @@ __all__ = [
     "Law",
     "Run",
     "Scene",
+    "Stress",
     "Tables",
     "build",
     "build_law",

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from shapely import LineString, Polygon, STRtree, get_exterior_ring, get_parts
-from shapely.ops import split
+from shapely.ops import split, unary_union
 
 from jointlaw.support.progress import track
 
@@ -59,11 +59,12 @@ class JointSet:
 
 def cut(
     outline: np.ndarray, sets: Sequence[JointSet], seed: int, least_width: float,
-    holes: Sequence[np.ndarray] = (),
+    holes: Sequence[np.ndarray] = (), regions: Sequence[np.ndarray] = (),
 ):  # fmt: skip
     """Cut a simple outline (m, 2) into convex blocks no narrower than `least_width` (m).
 
-    holes: corners (m, 2) of openings, taken out before the sets cut.
+    holes: corners (m, 2) of openings, taken out before the sets cut; regions: of parts to be taken
+    out later, along whose outlines the rock is cut first.
     Returns the corners (m, 2) of each block, counter-clockwise; for each block the numbers (m,) of
     the sets of its edges, or -1; how many slivers became part of a neighbour; and the areas (m2) of
     those that could not. Raises ValueError.
@@ -80,7 +81,10 @@ def cut(
         if rock.is_empty or not rock.area < before:
             raise ValueError(f"hole[{i}] must take a part of the rock away and leave another")
     lines: list[Line] = []
-    pieces = [(piece, _rim(piece)) for piece in get_parts(rock)]
+    parts, rims = [rock], unary_union([Polygon(region).exterior.buffer(tiny) for region in regions])
+    for region in map(Polygon, regions):
+        parts = [side for part in parts for side in (part - region, part & region)]
+    pieces = [(piece, _rim(piece)) for part in parts for piece in get_parts(part) if piece.area]
     for number, joints in enumerate(sets):
         rng = np.random.default_rng([seed, number])
         offsets = joints.offsets(outline, rng)
@@ -88,7 +92,7 @@ def cut(
             lines.append((number, joints.normal, offset))
             pieces = _crossed(pieces, joints.normal, offset, tiny, joints.persistence, rng)
     pieces = [part for piece, _ in pieces for part in _convex_parts(piece, sets, lines, tiny)]
-    pieces, joined, dropped = _without_slivers(pieces, lines, least_width, tiny)
+    pieces, joined, dropped = _without_slivers(pieces, lines, least_width, tiny, rims)
     shapes = [_corners(piece, tiny) for piece in pieces]
     shapes.sort(key=lambda c: tuple(np.round(c.mean(axis=0)[::-1], 6)))
     return shapes, [_sets_of(c, lines, tiny) for c in shapes], joined, dropped
@@ -139,14 +143,14 @@ def _convex_parts(piece: Polygon, sets, lines, tiny) -> list[Polygon]:
     raise ValueError(f"no set runs through the inward corner {inward[0].round(3).tolist()} m")
 
 
-def _without_slivers(pieces: list[Polygon], lines, least: float, tiny: float):
-    """Join or drop what is narrower than `least`, the narrowest first."""
+def _without_slivers(pieces: list[Polygon], lines, least: float, tiny: float, rims: Polygon):
+    """Join or drop what is narrower than `least`, the narrowest first; nothing across `rims`."""
     pieces, joined, dropped = list(pieces), 0, []
     widths = [smallest_width(_rim(piece)) for piece in pieces]
     while pieces and min(widths) < least:
         number = int(np.argmin(widths))
         sliver, _ = pieces.pop(number), widths.pop(number)
-        for j in _neighbours(sliver, pieces, lines, tiny):
+        for j in _neighbours(sliver, pieces, lines, tiny, rims):
             whole = sliver.union(pieces[j]).convex_hull
             if whole.area - sliver.area - pieces[j].area < tiny * whole.length:
                 pieces[j], widths[j] = whole, smallest_width(_rim(whole))
@@ -157,7 +161,7 @@ def _without_slivers(pieces: list[Polygon], lines, least: float, tiny: float):
     return pieces, joined, dropped
 
 
-def _neighbours(sliver: Polygon, pieces: list[Polygon], lines, tiny: float) -> list[int]:
+def _neighbours(sliver: Polygon, pieces: list[Polygon], lines, tiny, rims) -> list[int]:
     """Those across a joint of the last set first, then those that share most boundary."""
     corners, found = _corners(sliver, tiny), []
     rings = get_exterior_ring(pieces)
@@ -167,7 +171,8 @@ def _neighbours(sliver: Polygon, pieces: list[Polygon], lines, tiny: float) -> l
         side = LineString([start, end]).buffer(tiny)
         for j in near.query(side).tolist():
             shared = side.intersection(rings[j]).length
-            found += [(int(number), shared, j)] * (shared > 10 * tiny)
+            beside = shared > 10 * tiny and not rims.contains(LineString([start, end]))
+            found += [(int(number), shared, j)] * beside
     return [j for *_, j in sorted(found, reverse=True)]
 
 

@@ -43,13 +43,15 @@ def law_table(data: Tables, files: Files) -> Tables:
 
 
 def build_law(data: Tables, where: str, files: Files) -> Law:
-    """A law from a scene's `[laws.NAME]` table; `kind` is "joint" (default) or "coulomb".
+    """A law from a scene's `[laws.NAME]` table; `kind` is "joint" (default) or "coulomb". Its
+    `pressure` is that of water in the joints, no part of the law.
 
     Raises ValueError.
     """
     if TABLE(where, data).get("closure_only"):
         raise ValueError(f"{where}.closure_only = true: joints between blocks shear; leave it out")
-    law: Law = jl.JointLaw.from_dict({"plane": 0.0, **law_table(data, files)}, where)
+    own = {key: value for key, value in law_table(data, files).items() if key != "pressure"}
+    law: Law = jl.JointLaw.from_dict({"plane": 0.0, **own}, where)
     if isinstance(law, jl.CoulombLaw):
         require_rock({"friction": law.friction}, f"{where}.")
     else:

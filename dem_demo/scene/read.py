@@ -1,6 +1,6 @@
 """Reads scenes: TOML files, or their text, checked."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,9 +14,10 @@ from jointlaw.support.checks import one_of, remedy
 from .blocks import Block, box, check_convex, usual_width
 from .cutting import JointSet, cut
 from .drives import read_drives
-from .keys import LIST, SCENE, TABLE, Tables, overlay, some_of, vector
+from .keys import LIST, NOT_NEGATIVE, SCENE, TABLE, Tables, overlay, some_of, vector
 from .laws import Files, build_law, opens_to
 from .scene import SKIN, Rock, Run, Scene
+from .stress import read_stresses
 
 SCENES = Path(__file__).parent / "scenes"
 TEMPLATE = Path(__file__).parent / "template.toml"
@@ -91,10 +92,16 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     top, files = keys.checked(data, SCENE, where), Files() if files is None else files
     laws = {name: build_law(table, f"{where}: laws.{name}", files)
             for name, table in top["laws"].items()}  # fmt: skip
+    pressure = (NOT_NEGATIVE(f"{where}: laws.{name}.pressure", table.get("pressure", 0.0))
+                for name, table in top["laws"].items())  # fmt: skip
     density = top.get("density", DENSITY)
     blocks = [_block(table, density, where) for table in top.get("block", ())]
     edge_laws: dict[tuple[int, int], str] = {}
-    rocks = [_rock(table, blocks, edge_laws, density, where) for table in top.get("rock", ())]
+    digs = top.get("excavate", ())
+    rocks = [_rock(table, blocks, edge_laws, density, digs, where) for table in top.get("rock", ())]
+    gravity = top.get("gravity", GRAVITY)
+    water, in_situ = read_stresses(top, blocks, density, gravity, where)
+    rocks = [replace(r, free=[i for i in r.free if not blocks[i].fixed]) for r in rocks]
     number = {block.name: i for i, block in enumerate(blocks)}
     if len(number) < len(blocks):
         raise ValueError(f"{where}: two blocks have the same name; names must differ")
@@ -112,8 +119,8 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
         one_of(f"{where}: law", law, tuple(laws))
     scene = Scene(
         top.get("title", where), tuple(blocks), laws, run, default, pairs,
-        tuple(rocks), edge_laws, drives, top.get("gravity", GRAVITY), top.get("thickness", 1.0),
-        **watched,
+        tuple(rocks), edge_laws, drives, gravity, top.get("thickness", 1.0),
+        water, in_situ, tuple(pressure), tuple(_stages(digs, blocks, where)), **watched,
     )  # fmt: skip
     for name, law in laws.items():
         opening = opens_to(law)
@@ -193,9 +200,22 @@ def _joint_at(
     return two[0], two[1]
 
 
+def _stages(tables: list[Tables], blocks: Sequence[Block], where: str) -> Iterator[Tables]:
+    """The stages of an excavation: each takes the blocks whose centroids lie in its corners."""
+    left = dict(enumerate(Point(block.centroid) for block in blocks))
+    for i, table in enumerate(tables):
+        region = Polygon(table["corners"])
+        taken = [j for j, at in left.items() if region.contains(at)]
+        if not taken:
+            raise ValueError(f"{where}: excavate[{i}].corners: no block is left there")
+        left = {j: at for j, at in left.items() if j not in taken}
+        yield {"at": None, **table, "blocks": taken}
+
+
 def _rock(
-    table: Tables, blocks: list[Block], laws: dict[tuple[int, int], str], density: float, where: str
-) -> Rock:
+    table: Tables, blocks: list[Block], laws: dict[tuple[int, int], str], density: float,
+    digs: list[Tables], where: str,
+) -> Rock:  # fmt: skip
     """Cut a rock, and add its blocks and the laws of their edges to those of the scene."""
     name = table["name"]
     where = f"{where}: rock[{name!r}]"
@@ -207,8 +227,9 @@ def _rock(
         raise ValueError(f"{where}.laws: no set of this rock has the law {unknown.pop()!r}")
     try:
         holes = [part["corners"] for part in table.get("hole", ())]
+        regions = [part["corners"] - shift for part in digs]
         shapes, numbers, joined, dropped = cut(
-            table["outline"], sets, table.get("seed", 0), least, holes
+            table["outline"], sets, table.get("seed", 0), least, holes, regions
         )
     except ValueError as error:
         raise ValueError(f"{where}.outline: {error}") from None

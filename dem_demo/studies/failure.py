@@ -38,7 +38,7 @@ def draw(record: Record, title: str, path: Path) -> None:
     """How far each block has moved (m), where it is now, and dotted where it was."""
     blocks, start, now = record.scene.blocks, outlines(record, 0), outlines(record, -1)
     corners = np.concatenate([*start, *now])
-    wide, high = np.ptp(corners, axis=0)
+    wide, high = np.ptp(corners[np.isfinite(corners).all(axis=1)], axis=0)
     figure = Figure(figsize=(WIDTH, max(WIDTH * high / wide, 2.0) + 1.6), layout="constrained")
     figure.suptitle(title)  # constrained layout clips a title of axes whose aspect is equal
     axes = figure.add_subplot(xlabel="x (m)", ylabel="y (m)", aspect="equal")

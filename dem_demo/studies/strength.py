@@ -45,7 +45,7 @@ def strength_reduction(
     """
     trials = Trials(scene, folder)
     for name in [rock.name for rock in scene.rocks] or ["scene"]:
-        one = alone(scene, name) if scene.rocks else scene
+        one = (alone(scene, name) if scene.rocks else scene).excavated
         row = {"rock": name, "factor_of_safety": factor_of_safety(one, trials, name)}
         if asperity:
             row["asperity_factor"] = asperity_factor(one, trials, name)
@@ -196,4 +196,6 @@ def alone(scene: Scene, name: str, seed: int | None = None) -> Scene:
         return all(other.rpartition(" ")[0] == name for other in others) and (same or not others)
 
     joints = [joint for joint in data.get("joint", []) if belongs(joint)]
-    return build({**data, "rock": [own], "watch": {}, "joint": joints}, files=scene.files)
+    digs = [dig for dig in data.get("excavate", []) if belongs({"around": dig["corners"][0]})]
+    kept = {"rock": [own], "watch": {}, "joint": joints, "excavate": digs}
+    return build({**data, **kept}, files=scene.files)

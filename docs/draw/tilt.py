@@ -6,17 +6,16 @@ Runs the scene `tilt`. Each pair of slab and table is drawn when the slab has sl
 Writes FOLDER/tilt.png.
 """
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
+from folder import asked
 
 import dem_demo
 from dem_demo.output.pictures import DRIVEN, FREE, outlines
 from jointlaw.support.pyplot import style
 
-COLOURS = "#d95f02", "#1f6fd0"
+COLOURS = "#c95500", "#1f6fd0"
 WAYS = "rough direction\ndown the slope", "rough direction\nacross the slope"
 DRAWN = 0.5  # m of slip
 SLOW, LEAST = 1e-4, 1e-12  # growth of slip between two records: share of the slip, m; less is rest
@@ -51,8 +50,8 @@ def main(folder):
         above.axis("off")
         below.set(xlabel="slip (mm)", ylabel="friction angle (°)", xlim=(0.01, 9e3), ylim=(18, 37))
         below.grid(alpha=0.3)
-        figure.savefig(Path(folder) / "tilt.png", dpi=100)
+        figure.savefig(folder / "tilt.png", dpi=100)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(asked(__doc__))

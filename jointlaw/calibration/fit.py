@@ -200,6 +200,8 @@ def fit_closure(
 
     Source: Misra 1999, Eq. 11, 12, 33, 37; docs/theory-incremental.md, "Heights, direction and
     Hertz become one curve", for the "individual" reading.
+
+    >>> fit = jl.fit_closure(record.F1[1:100:9], record.closure[1:100:9])
     """
     curve = ClosureCurve(np.asarray(stress), np.asarray(closure), noise, cycle, compliance)
     return fit_curves([curve], free=free, fixed=fixed, law=law, priors=priors)
@@ -233,6 +235,8 @@ def fit_curves(
         or None to drop one. Besides the parameters: "full_contact_stress".
 
     Returns a `Fit`. Raises ValueError naming the parameter when something does not fit.
+
+    >>> fit = jl.fit_curves([curve], free=["mu"], law=law)
     """
     bar = iter(track(count(), "fit, laws tried"))
     problem = replace(pose(curves, free, fixed, law, priors), tick=partial(next, bar))

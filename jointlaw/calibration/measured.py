@@ -56,6 +56,8 @@ class ClosureCurve:
 
     Raises ValueError for arrays that do not fit, fewer than four points, a branch that unloads
     without `cycle`, cycles that never unload, or a compliance larger than the curve.
+
+    >>> curve = jl.ClosureCurve(stress=record.F1[:100], closure=record.closure[:100])
     """
 
     stress: Array
@@ -119,7 +121,8 @@ class ClosureCurve:
     def residuals(self, values: Values, settings: Settings) -> Array:
         """ln(model/measured), (n,); over cycles (model - measured)/largest measured.
 
-        Unloading ends at zero stress, where a ratio says nothing.
+        values: parameters. settings: what else the fit holds. Unloading ends at zero stress, where
+        a ratio says nothing. Raises nothing.
         """
         model = log_stress(values, values["seating"] + self.closure, settings)
         if not self.cycle:
@@ -143,6 +146,8 @@ class ShearCurve:
         it was not measured. Then shear stress alone cannot tell friction from dilation.
     opening_noise: as `noise`, of the largest opening; None expects 3 %.
     name, notes: of the test in reports, and what was done to its record before.
+
+    >>> curve = jl.ShearCurve(sheared.shear, sheared.shear_stress, normal=5e6)
     """
 
     shear: Array
@@ -197,7 +202,7 @@ class ShearCurve:
         Every step ends at a point or within the interval between two. The steps grow with the
         distance from where shear began or turned: `steps` of them, the shortest `FINEST` of the
         whole way, take the joint that far. Scatter of the displacement is no way: a point behind
-        those before it is taken where they are.
+        those before it is taken where they are. Raises nothing.
         """
         normal = np.broadcast_to(self.normal, self.shear.shape)
         whole = float(np.sum(np.abs(np.diff(self.shear[self.turns], prepend=0.0))))
@@ -217,7 +222,7 @@ class ShearCurve:
     def predict(self, law: JointLaw, steps: int = STEPS) -> tuple[Array, Array]:
         """Shear stress (Pa) and opening (m) of a law of its plane at the points, (n,) each.
 
-        steps: as in `path`.
+        law: with a plane. steps: as in `path`. Raises PathError where the law cannot follow.
         """
         path = self.path(steps)
         (test,) = shear_all(law, [path])
@@ -226,6 +231,7 @@ class ShearCurve:
     def residuals(self, test: Sheared, rows: NDArray[np.intp]) -> list[Array]:
         """(model - measured)/largest measured, of shear stress (n + 1,) and opening (n,).
 
+        test: what a law gives. rows: of the points in it. Raises nothing.
         Last of the stress stands how far the law rises above its stress at the largest measured
         one before the next points on both sides: few points say by it that the peak lies there.
         """
@@ -239,7 +245,10 @@ class ShearCurve:
         return found
 
     def thinned(self, most: int) -> ShearCurve:
-        """This test with `most` points or a few more: evenly spaced, the peak, turns and ends."""
+        """This test with `most` points or a few more: evenly spaced, the peak, turns and ends.
+
+        Raises nothing.
+        """
         n, top = self.shear.size, int(np.argmax(np.abs(self.shear_stress)))
         if n <= most:
             return self

@@ -10,9 +10,9 @@ from ..laboratory.experiments import PathError
 from ..support.checks import one_of
 from ..support.files import require_free
 from ..support.version import __version__
-from . import export, field, fit, laboratory, presets, scan
+from . import browser, export, field, fit, laboratory, presets, scan
 
-COMMANDS = (laboratory, presets, export, fit, scan, field)
+COMMANDS = (browser, laboratory, presets, export, fit, scan, field)
 
 
 class Parser(argparse.ArgumentParser):

@@ -17,7 +17,7 @@ CONTROLS = ("stress", "stiffness", "closure")
 
 
 class PathError(RuntimeError):
-    """A test could not go on; `record` holds all rows measured so far."""
+    """A test could not go on, as `message` says; `record` holds all rows measured so far."""
 
     def __init__(self, message: str, record: Record) -> None:
         super().__init__(message, record)  # both, so that it can be pickled
@@ -41,6 +41,9 @@ def closure_test(
 
     Returns the Record, its first row the joint as it was given. Raises ValueError for a bad
     argument and PathError, with the record so far, when a stress cannot be reached.
+
+    >>> record = jl.closure_test(law.joint(), 5e6)
+    >>> closed = record.closure.max()
     """
     peaks = [more_than("stress", s, 0.0) for s in _series("stress", stress, "Pa")]
     steps = integer("steps", steps, 1)
@@ -86,6 +89,9 @@ def direct_shear(
 
     Returns the Record, its first row the seated joint. Raises ValueError for a bad argument and
     PathError, with the record so far, when the normal condition cannot be met.
+
+    >>> record = jl.direct_shear(law.joint(), to=[1e-6, -1e-6], normal=5e6)
+    >>> angle = record.peak_friction_angle
     """
     normal = more_than("normal", normal, 0.0)
     control = one_of("control", control, CONTROLS)

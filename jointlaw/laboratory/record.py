@@ -38,7 +38,7 @@ class Record:
 
     Columns (also as attributes, arrays (rows,)): closure, shear_2, shear_3 in m; F1, F2, F3 in Pa;
     sliding, separated as shares of the facet orientations; stored, dissipated in J/m2. `azimuth`
-    is the direction of shear.
+    is the direction of shear in rad; `columns` are all, by name, and `name` is that of the test.
     """
 
     columns: Mapping[str, Array]
@@ -151,7 +151,8 @@ class Record:
 
         A shear test has shear stress, opening, friction and dilation angle besides.
 
-        length, stress: units to write, such as "mm" and "MPa"; raises ValueError for others.
+        path: of the file. length, stress: units to write, such as "mm" and "MPa"; raises ValueError
+        for others.
         """
         chosen = {"m": length, "Pa": stress}
         factors = {unit: units.parse(f"1{chosen[unit]}", unit) for unit in chosen}
@@ -176,7 +177,10 @@ class Record:
         replace_file(Path(path), buffer.getvalue().encode())
 
     def plot(self, path: str | Path | None = None) -> Any:
-        """Draw the test (needs matplotlib: extra `plot`); returns the figure, saved to `path`."""
+        """Draw the test (needs matplotlib: extra `plot`); returns the figure, saved to `path`.
+
+        Raises ImportError without it, OSError where the file cannot be written.
+        """
         draw = _shear_figure if self._sheared else _closure_figure
         with style() as plt:
             return written(draw(self, plt), path)

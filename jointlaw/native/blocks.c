@@ -260,11 +260,11 @@ OUT void jl_blocks_press(jl_world *w, double dt)
 {
   w->deep = -1;
   for (long long i = 0; i < w->contacts; i++) {
-    const double closure = w->closure[i];
+    const double closure = w->closure[i], offset = w->offset[i];
     const double most = smaller(w->deepest[w->a[i]], w->deepest[w->b[i]]);
     if (w->length[i] > 0.0 && closure > most) w->deep = i;
     double *d = w->pools[w->law[i]].d + 2 * w->place[i];
-    d[0] = (closure - (closure > 0.0 ? w->offset[i] : 0.0) - w->delta[2 * i]) / w->parts;
+    d[0] = (closure - (closure > 0.0 || offset < 0.0 ? offset : 0.0) - w->delta[2 * i]) / w->parts;
     d[1] = w->sliding[i] * dt / (w->parts * w->reduction[1]);
   }
 }
@@ -439,7 +439,7 @@ OUT void jl_blocks_after(jl_world *w, double dt)
   jl_blocks_forces(w, dt);
   book(w, dt);
   for (long long i = 0; i < w->contacts; i++) /* where a corner has opened it touches anew next */
-    if (w->closure[i] <= 0.0) w->offset[i] = 0.0;
+    if (w->closure[i] <= 0.0 && w->offset[i] > 0.0) w->offset[i] = 0.0;
   for (long long i = 0; i < n; i++)
     for (int j = 0; j < 3 && w->mobile[i]; j++)
       w->velocity[j * n + i] += dt * w->force[3 * i + j] / w->inertia[3 * i + j];

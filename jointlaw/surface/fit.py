@@ -153,6 +153,10 @@ def from_surface(z: ArrayLike, spacing: float, sampling_length: float | None = N
 
     Source: Misra 1999, sections 2.2.1, 2.2.2 and Eq. 12 to 18; summits, facets and estimators are
     described in `asperities` and `densities`.
+
+    >>> from scipy.ndimage import gaussian_filter
+    >>> z = 4e-4 * gaussian_filter(np.random.default_rng(0).standard_normal((200, 200)), 3)
+    >>> surface = jl.from_surface(z, spacing=1e-4)
     """
     gaps = np.argwhere(np.isnan(numbers("z", z, "m")))
     if len(gaps):

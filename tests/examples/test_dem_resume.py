@@ -163,7 +163,7 @@ def test_a_damaged_file_or_another_version_is_refused(tmp_path):
     with pytest.raises(ValueError, match=r"state\.npz is damaged .*run the scene again"):
         Simulation.load(tmp_path)
     np.savez(file, **{**arrays, "version": 3})
-    with pytest.raises(ValueError, match="version 3, this demo reads 7: go on with"):
+    with pytest.raises(ValueError, match="version 3, this demo reads 8: go on with"):
         Simulation.load(tmp_path)
     file.unlink()
     with pytest.raises(ValueError, match=r"holds no saved state: state\.npz is missing"):

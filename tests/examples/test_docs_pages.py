@@ -14,6 +14,22 @@ def test_theory_leaves_no_equation_out():
     assert placed >= set(range(1, 38))
 
 
+@pytest.mark.parametrize("page", ["README.md", "docs/index.md"])
+def test_a_command_stands_beside_every_number(page):
+    """In the last table of validation.md; code and versions of Python apart."""
+    table = text("docs/validation.md").split("## Numbers of the README")[1].split("##")[0]
+    prose = re.sub(r"```.*?```|`[^`]*`|Python [\d.]+", "", text(page), flags=re.DOTALL)
+    numbers = set(re.findall(r"(?<![\w.])[-+]?\d+\.\d+", prose))
+    assert numbers <= set(re.findall(r"(?<![\w.])[-+]?\d+\.\d+", table))
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_cells_of_tables_are_short(page):
+    """Longer ones belong into the text."""
+    rows = [line for line in text(page).splitlines() if line.startswith("|")]
+    assert [cell for row in rows for cell in row.split("|") if len(cell.split()) > 40] == []
+
+
 @pytest.mark.parametrize("page", PAGES)
 def test_links_lead_to_files(page):
     """As on GitHub; the site's own links are checked where it is built."""

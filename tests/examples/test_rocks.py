@@ -47,6 +47,16 @@ def test_short_scenes_end_as_intended(name, until, failed):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "state"), [("wet-slope", "fails"), ("wet-slope-drained", "stands")]
+)
+def test_a_slope_slides_for_its_water(name, state):
+    _, summary = run(Simulation(load(name)), until=0.6)
+    assert [rock["state"] for rock in summary["rocks"]] == [state]
+    assert summary["largest_energy_error"] < 5e-3
+
+
+@pytest.mark.slow
 def test_dilation_is_what_holds_the_rough_slope():
     """Plain Coulomb bears a dip of its friction angle, rough joints one of theirs with dilation.
 

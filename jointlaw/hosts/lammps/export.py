@@ -24,6 +24,8 @@ def export_lammps(law: Law, directory: str | Path, name: str = "joint") -> list[
     the script `in.tower`, `joint.in` (what it needs to know of this law), `law.toml` and
     `README.md`. Returns the names. Raises ValueError for a law that does not fit, before anything
     is written.
+
+    >>> names = jl.export_lammps(law, "joint-for-lammps")
     """
     require_3d(law, "motion in LAMMPS")
     texts = {

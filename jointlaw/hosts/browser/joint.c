@@ -1,5 +1,6 @@
 /* joint.c: the law for the page "A joint in your browser", as WebAssembly. The law is the same text
- * as everywhere, one lane wide, which gives the same bits. */
+ * as everywhere, one lane wide, which gives the same bits. After a change here or in the law's own
+ * files: `python builder/wasm.py` makes joint.wasm anew. */
 #define JOINTLAW_IMPLEMENTATION
 #define JOINTLAW_PLAIN
 #define JOINTLAW_NO_FILES
@@ -10,7 +11,7 @@
 extern unsigned char __heap_base;
 static jlaw_law law;
 
-/* Where the page puts the bytes that make.py wrote: the numbers of the law, then its tables */
+/* Where the page puts the bytes that export.py wrote: the numbers of the law, then its tables */
 OUT(bytes) unsigned char *bytes(void) { return &__heap_base + (16 - (size_t) &__heap_base % 16); }
 
 /* Take these bytes for the law. Returns the first free byte after them. */
@@ -33,8 +34,8 @@ OUT(stored) double stored(const double *s) { return jlaw_stored(&law, s); }
 OUT(dissipated) double dissipated(const double *s) { return jlaw_dissipated(&law, s); }
 OUT(closure_at) double closure_at(double stress) { return jlaw_closure(&law, stress); }
 
-/* One step from s0 to s1 as jlaw_update, of the one kind of law that the presets are: F (3) and
- * C (3, 3); 0, or -1 and a message. Other kinds would make the file larger. */
+/* One step from s0 to s1 as jlaw_update, of elastic asperities in space, whose slopes may fade: F (3)
+ * and C (3, 3); 0, or -1 and a message. Other kinds of law would make the file larger. */
 OUT(update) int update(const double *s0, double *s1, const double *d, double *F, char *message)
 {
   const jl_numbers n = {s1, 1, 0};
@@ -43,7 +44,8 @@ OUT(update) int update(const double *s0, double *s1, const double *d, double *F,
   if (!(law.stretch * way <= law.largest_reach))
     return jlaw_refuse_(&law, s0, d, 0, message, JLAW_MESSAGE);
   memcpy(s1, s0, (size_t) jl_state_rows(&law) * sizeof *s1);
-  jl_step(&law, n, d, F, F + 3, jl_kind_of(3, 0, 0, 0, 1, 1, 0, 0), NULL);
+  if (law.fades) jl_step(&law, n, d, F, F + 3, jl_kind_of(3, 0, 1, 0, 1, 1, 0, 0), NULL);
+  else jl_step(&law, n, d, F, F + 3, jl_kind_of(3, 0, 0, 0, 1, 1, 0, 0), NULL);
   return 0;
 }
 

@@ -222,7 +222,7 @@ def test_examples_build_as_written_and_run(tmp_path, law, capsys, monkeypatch):
     assert told.stdout.strip() == include_dir()
     whole = (folder / "CMakeLists.txt").read_text().splitlines()
     assert set(re.search(r"```cmake\n(.*?)```", page, re.S)[1].splitlines()) <= set(whole)
-    (folder / "first.c").write_text(copied()["native.md 0"])
+    (folder / "first.c").write_text(copied()["native.md"])
     lines += [*re.findall(r"^    ((?:cc|c\+\+|gfortran) .*)", page, re.M), "./first"]
     for line in [*lines, "cmake -B build && cmake --build build", "build/example"]:
         quick = line.replace("-O3", "-O0")
@@ -243,16 +243,14 @@ def test_examples_build_as_written_and_run(tmp_path, law, capsys, monkeypatch):
 
 
 def copied():
-    """Every text in C that a header, README or page shows, by where it stands."""
-    found = {}
-    for path in [DOCS.parent / "README.md", *DOCS.rglob("*.md"), *HOSTS.rglob("*.md")]:
-        for k, text in enumerate(re.findall(r"^```c\n(.*?)^```", path.read_text(), re.M | re.S)):
-            found[f"{path.name} {k}"] = text
-    for path in (Path(include_dir()) / "jointlaw.h", *HOSTS.rglob("*.h"), *HOSTS.rglob("*.c")):
-        lines = re.findall(r"^ \*     (.*)", path.read_text().partition("*/")[0], re.M)
-        if any(";" in line for line in lines):  # others are commands
-            found[path.name] = "\n".join(lines)
-    return found
+    """The text in C that a header, README or page shows, one at most, by where it stands."""
+    pages = [DOCS.parent / "README.md", *DOCS.rglob("*.md"), *HOSTS.rglob("*.md")]
+    found = {path.name: re.findall(r"^```c\n(.*?)^```", path.read_text(), re.M | re.S)
+             for path in pages}  # fmt: skip
+    for path in (Path(include_dir()) / "jointlaw.h", *HOSTS.rglob("*.[hc]")):
+        head = re.findall(r"^ \*     (.*)", path.read_text().partition("*/")[0], re.M)
+        found[path.name] = ["\n".join(head)] * any(";" in line for line in head)  # no commands
+    return {name: text for name, texts in found.items() for (text,) in [texts] * bool(texts)}
 
 
 def test_texts_that_a_user_copies(tmp_path):
@@ -262,21 +260,20 @@ def test_texts_that_a_user_copies(tmp_path):
     )
     for name in ("granite", "westerly_smooth"):
         (tmp_path / f"{name}.jlaw").write_text(table_text(law))
-    texts = copied()
-    assert set(texts) == {"native.md 0", "jointlaw.h"}
+    texts, show = copied(), 'printf("%.1f %.1f %.1f Pa\\n", F[0], F[1], F[2]); return 0;'
+    assert set(texts) == {"native.md", "jointlaw.h"}
     F, _ = law.joint().update([1e-7, 5e-8, 0.0])
-    show = 'printf("%.1f %.1f %.1f Pa\\n", F[0], F[1], F[2]);'
     for where, text in texts.items():
         if "int main" not in text:
-            head = [line for line in text.splitlines() if line.startswith("#")]
-            body = [line for line in text.splitlines() if not line.startswith("#")]
-            text = "\n".join([*head, "int main(void)", "{", *body, show, "return 0;", "}"])
+            head, body = re.match(r"((?:#.*\n)+)(.*)", text, re.S).groups()
+            text = f"{head}int main(void)\n{{\n{body}\n{show}\n}}\n"
         program = build(tmp_path, text, "-std=c99", *SANE, "-fsanitize=address", "-Werror")
-        env = os.environ | {"ASAN_OPTIONS": "detect_leaks=0"}  # they end with the program
-        done = subprocess.run([program], cwd=tmp_path, env=env, capture_output=True, text=True)
+        done = subprocess.run(
+            [program], cwd=tmp_path, capture_output=True, text=True,
+            env=os.environ | {"ASAN_OPTIONS": "detect_leaks=0"},  # they end with the program
+        )  # fmt: skip
         assert (done.returncode, done.stderr) == (0, ""), where
-        found = [float(word) for word in done.stdout.split()[:3]]
-        assert found == pytest.approx(F, abs=0.051), where
+        assert [float(word) for word in done.stdout.split()[:3]] == pytest.approx(F, abs=0.051)
 
 
 @pytest.mark.parametrize("plane", ["plane = 0.0", "closure_only = true"])

@@ -46,12 +46,15 @@ def save(scene: Scene, saved: Saved, folder: Path) -> None:
 
 
 def load(folder: Path) -> tuple[Scene, Saved]:
-    """The scene and the state that `save` wrote. Raises ValueError if they are not whole."""
-    file = folder / FILE
+    """The scene and the state that `save` wrote into a folder, or a run into folders in it. Raises
+    ValueError if they are not whole."""
+    places = (folder / part / FILE for part in ("", "state", "refused"))
+    file = next((place for place in places if place.is_file()), folder / FILE)
     if not file.is_file():
         raise ValueError(f"{str(folder)!r} holds no saved state: {FILE} is missing")
     try:
-        with np.load(file, allow_pickle=False) as stored:  # a ZIP file: it checks its sums
+        # a ZIP file: it checks its sums; opened here, for numpy leaves a damaged one open
+        with file.open("rb") as opened, np.load(opened, allow_pickle=False) as stored:
             data = {name: stored[name] for name in stored.files}
         if (version := int(data["version"])) == VERSION:
             files = Files(known=json.loads(str(data["files"])).items())

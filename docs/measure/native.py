@@ -21,7 +21,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from tables import table
 
 import jointlaw as jl
 from jointlaw.hosts.c.export import include_dir, table_text

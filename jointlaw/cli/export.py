@@ -2,7 +2,6 @@
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from ..hosts.c.export import export_c, identifier
 from ..hosts.fem.export import SEATING, export_fem, require_seating
@@ -11,44 +10,14 @@ from ..hosts.yade.export import export_yade
 from ..laws.joint_law import JointLaw
 from ..support.files import clear_run
 from ..tables.tabulate import require_3d
-from .command import add_command, add_law, add_out, in_unit, read_law
+from .command import LAW, OUT, Command, Option, in_unit, option, read_law
 
-HOSTS = {  # what is written, and what runs it
-    "yade": ("for YADE: table, law, adapter, script", "yade -n -x settle_and_incline.py"),
-    "c": ("for C, C++ and Fortran: one header, tables, examples", "make && ./example"),
-    "fem": ("for finite elements: MGIS, UMAT, shear tests in OpenGeoSys and Kratos", "make"),
-    "lammps": ("for LAMMPS: a pair style, an input script", "./build.sh && lmp -in in.tower"),
+START = {
+    "yade": "yade -n -x settle_and_incline.py",
+    "c": "make && ./example",
+    "fem": "make",
+    "lammps": "./build.sh && lmp -in in.tower",
 }
-
-
-def add(commands: Any) -> None:
-    """Add the subcommand to the command line, with one of its own for each host."""
-    what = "write a law for a host code: all that it needs, in one folder"
-    parser = add_command(commands, "export", what, _example("lammps"), _export)
-    hosts = parser.add_subparsers(dest="host", required=True, metavar="HOST")
-    for host, (about, _) in HOSTS.items():
-        one = add_command(hosts, host, f"write a law {about}", _example(host), _export)
-        add_law(one)
-        if host == "yade":
-            one.add_argument(
-                "--shear-limit",
-                metavar="LENGTH",
-                type=in_unit("m", positive=True),
-                help="shear at which the friction of the table is read, such as 5um",
-            )
-        if host == "fem":
-            one.add_argument(
-                "--seating",
-                metavar="STRESS",
-                type=in_unit("Pa"),
-                default=SEATING,
-                help=f"normal stress before the first step (default {SEATING / 1e3:g}kPa)",
-            )
-        add_out(one, pictures=False)
-
-
-def _example(host: str) -> str:
-    return f"jointlaw export {host} jing-replica --out joint-for-{host}"
 
 
 def _export(options: argparse.Namespace) -> None:
@@ -64,13 +33,12 @@ def _export(options: argparse.Namespace) -> None:
         export = {"c": export_c, "lammps": export_lammps, "fem": export_fem}[host]
         files = export(law, folder, identifier(Path(options.law).stem), **seating)
         print(f"wrote {', '.join(files)}")
-    print(f"run: cd {folder} && {HOSTS[host][1]}")
+    print(f"run: cd {folder} && {START[host]}")
 
 
 def _export_table(law: JointLaw, folder: Path, shear_limit: float | None) -> None:
     """Write the joint for YADE, and print what its table drops."""
-    more: dict[str, Any] = {} if shear_limit is None else {"shear_limit": shear_limit}
-    table = export_yade(law, folder, tolerance=1e-3, **more)
+    table = export_yade(law, folder, shear_limit=shear_limit)
     missed = table.metadata["resolution_error_friction_angle"]
     print(
         f"wrote the joint for YADE to {folder}: {len(table.closure)} rows\n"
@@ -78,3 +46,45 @@ def _export_table(law: JointLaw, folder: Path, shear_limit: float | None) -> Non
         f"bond: {table.metadata['bond']}; what the table drops (error against the law, share of\n"
         f"each path's largest traction):\n{table.report(law)}"
     )
+
+
+def _example(host: str) -> str:
+    return f"jointlaw export {host} jing-replica --out joint-for-{host}"
+
+
+def _host(host: str, about: str, *own: Option) -> Command:
+    """The command for one host, with options of its own."""
+    return Command(host, f"write a law {about}", _example(host), _export, (*LAW, *own, *OUT))
+
+
+COMMAND = Command(
+    "export",
+    "write a law for a host code: all that it needs, in one folder",
+    _example("lammps"),
+    _export,
+    parts=(
+        _host(
+            "yade",
+            "for YADE: table, law, adapter, script",
+            option(
+                "--shear-limit",
+                metavar="LENGTH",
+                type=in_unit("m", positive=True),
+                help="shear at which the friction of the table is read, such as 5um",
+            ),
+        ),
+        _host("c", "for C, C++ and Fortran: one header, tables, examples"),
+        _host(
+            "fem",
+            "for finite elements: MGIS, UMAT, shear tests in OpenGeoSys and Kratos",
+            option(
+                "--seating",
+                metavar="STRESS",
+                type=in_unit("Pa"),
+                default=SEATING,
+                help=f"normal stress before the first step (default {SEATING / 1e3:g}kPa)",
+            ),
+        ),
+        _host("lammps", "for LAMMPS: a pair style, an input script"),
+    ),
+)

@@ -11,8 +11,18 @@ from ..support.checks import one_of
 from ..support.files import require_free
 from ..support.version import __version__
 from . import browser, export, field, fit, laboratory, presets, scan
+from .command import Command
 
-COMMANDS = (browser, laboratory, presets, export, fit, scan, field)
+COMMANDS = (
+    browser.COMMAND,
+    laboratory.SHEAR,
+    laboratory.CLOSURE,
+    presets.COMMAND,
+    export.COMMAND,
+    fit.COMMAND,
+    scan.COMMAND,
+    field.COMMAND,
+)
 
 
 class Parser(argparse.ArgumentParser):
@@ -54,8 +64,25 @@ def _read(words: Sequence[str]) -> argparse.Namespace:
     )
     parser.add_argument("--version", action="version", version=f"jointlaw {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for module in COMMANDS:
-        module.add(commands)
+    _add(commands, COMMANDS)
     if words and not words[0].startswith("-"):
         one_of("the command", words[0], tuple(commands.choices))
     return parser.parse_args(words)
+
+
+def _add(commands: Any, ours: Sequence[Command]) -> None:
+    """Add commands with their options, and those of their own."""
+    for one in ours:
+        command = commands.add_parser(
+            one.name,
+            help=one.what,
+            description=one.what,
+            epilog=f"example:\n  {one.example}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        command.set_defaults(run=one.run)
+        for names, settings in one.options:
+            command.add_argument(*names, **settings)
+        if one.parts:
+            hosts = command.add_subparsers(dest="host", required=True, metavar="HOST")
+            _add(hosts, one.parts)

@@ -21,6 +21,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from tables import table
 
 import jointlaw as jl
 from jointlaw.hosts.c.export import include_dir, table_text

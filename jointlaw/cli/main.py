@@ -84,5 +84,4 @@ def _add(commands: Any, ours: Sequence[Command]) -> None:
         for names, settings in one.options:
             command.add_argument(*names, **settings)
         if one.parts:
-            hosts = command.add_subparsers(dest="host", required=True, metavar="HOST")
-            _add(hosts, one.parts)
+            _add(command.add_subparsers(dest="host", required=True, metavar="HOST"), one.parts)

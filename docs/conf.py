@@ -38,7 +38,7 @@ extensions = [
     "docstrings",
     "pages",
 ]
-exclude_patterns = ["_build", "gallery", "paper", "browser", "_ext"]
+exclude_patterns = ["_build", "gallery", "paper", "_ext"]
 suppress_warnings = [
     "config.cache",  # the settings of the gallery hold objects
 ]
@@ -52,6 +52,11 @@ html_theme = "furo"
 html_title = f"jointlaw {release}"
 html_static_path = ["_static", str(MATHJAX)]
 html_css_files = ["site.css"]
+html_js_files = ["pause.js"]
+html_theme_options = {  # the palette of site.css, of the joint in the browser and of docs/draw
+    "light_css_variables": {"color-brand-primary": "#1f6fd0", "color-brand-content": "#1f6fd0"},
+    "dark_css_variables": {"color-brand-primary": "#5aa2f5", "color-brand-content": "#5aa2f5"},
+}
 mathjax_path = MATHJAX.name
 html_show_sourcelink = False
 html_copy_source = False
@@ -66,7 +71,7 @@ logging.getLogger("skfem").setLevel(logging.WARNING)  # it tells every step that
 
 ORDER = (
     "first_curve", "closure_hysteresis", "closure_cycle", "direct_shear", "strength_envelope",
-    "bond", "cyclic_shear", "damping", "anisotropy", "mating", "fit_closure", "from_scan", "table",
+    "bond", "damping", "mating", "fit_closure", "from_scan", "table",
     "batch", "blocks", "newton", "finite_elements", "snapshot",
 )  # fmt: skip
 
@@ -87,6 +92,7 @@ sphinx_gallery_conf = {
     "capture_repr": (),  # what is printed, not what a last line returns
     "download_all_examples": False,
     "show_memory": False,
+    "thumbnail_size": (640, 448),  # pixels: twice what is shown
     "write_computation_times": False,
     "min_reported_time": 5,
     "show_signature": False,

@@ -54,7 +54,10 @@ TIMED = {
 # picture: command that writes into FOLDER, and the file there
 PICTURES = {
     "moving.gif": ("docs/draw/moving.py FOLDER", "moving.gif"),
-    "three-laws.png": ("docs/draw/three_laws.py FOLDER", "three-laws.png"),
+    **{
+        f"{name}.png": ("docs/draw/why.py FOLDER", f"{name}.png")
+        for name in ("three-laws", "along-across", "jrc", "strength-surface")
+    },
     "axes.png": ("docs/draw/axes.py FOLDER", "axes.png"),
     "shear.png": (
         "-m jointlaw shear biegel-rough --normal-stress 10MPa --to 2um --reverse=-2um "
@@ -66,6 +69,8 @@ PICTURES = {
     "slope.gif": ("-m dem_demo slope --out FOLDER", "motion.gif"),
     "shear-box.png": ("-m dem_demo shear-box --out FOLDER", "curves.png"),
     "strength.png": ("-m dem_demo strength-reduction slope --out FOLDER", "failing-rough.png"),
+    "wet-slope.png": ("-m dem_demo wet-slope --out FOLDER", "final.png"),
+    "tunnel.png": ("-m dem_demo tunnel --out FOLDER", "final.png"),
     "shaken-slope.png": ("docs/measure/shaken_slope.py FOLDER", "shaken-slope.png"),
     "fit.png": ("-m jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out FOLDER", "fit.png"),
 }

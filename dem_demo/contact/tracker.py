@@ -48,7 +48,9 @@ class Tracker:
 
     contacts: at the motion followed to, on corner and edge (k,); keys (k, 2): edges that met when
     found; law (k,): number of the law between these; numbers (k,): their names for life; offset
-    (k,): closure offset, the depth (m) that each had to give up (see `Simulation._transfer`);
+    (k,): closure offset (m): above zero the depth that a contact had to give up (see
+    `Simulation._transfer`), until it opens; below zero less the closure from the stress of before,
+    for life;
     given: numbers given so far; renewed_at (3, blocks): motion when the contacts of each block were
     last looked for; urgent (blocks,): must be looked for, wherever the block is.
     skins (blocks,): pymunk reports pairs within the sum of their skins; a corner counts from a gap
@@ -81,7 +83,8 @@ class Tracker:
     @property
     def closure(self) -> np.ndarray:
         """Closure (k,) that the joints see: the depth less the closure offset."""
-        return self.contacts.closure - np.where(self.contacts.closure > 0, self.offset, 0.0)
+        counts = (self.contacts.closure > 0) | (self.offset < 0)
+        return self.contacts.closure - np.where(counts, self.offset, 0.0)
 
     def follow(self, motion: np.ndarray) -> None:
         """Bring the contacts to a motion (6, n), each to the corner and edge where it is by then.

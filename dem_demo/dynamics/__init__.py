@@ -1,6 +1,7 @@
 """Dynamics: blocks in motion, forces, energies, time steps.
 
 blocks         the bodies; everything that touches pymunk
+edge_loads     forces of water on the edges of blocks
 energy         the ledger of energies
 timestep       the largest stable step
 equilibrium    the equilibrium, and what it cannot hold

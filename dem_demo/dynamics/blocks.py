@@ -21,8 +21,11 @@ class Blocks:
 
     motion (6, n): positions, angles, and the velocities that led there; velocity (3, n): those to
     go on with. inertia: mass, mass, moment; mobile: motions of blocks that move, driven rock too;
-    free: those that forces move; gravity, loads: steady forces (N); root: 1/sqrt(inertia) of the
-    free motions, else 0. The compiled step writes to the first two: change them in place.
+    free: those that forces move; gravity, steady: forces that do not change (N); loads: these
+    without gravity and with what water presses (`edge_loads`); root: 1/sqrt(inertia) of the
+    free motions, else 0; gone (n,): blocks that were taken away; support (n, 3): what is left
+    of what these bore on the others (N). The compiled step writes to the first two: change
+    them in place.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -37,7 +40,8 @@ class Blocks:
         self.free[self.drives.rows, self.drives.axes] = False
         self.root = np.where(self.free, 1 / np.sqrt(self.inertia), 0.0)
         self.gravity = self.mobile * self.inertia * [*scene.gravity, 0.0]
-        self.loads = np.array([[*block.load, 0.0] for block in blocks]) * self.mobile
+        self.steady = np.array([[*block.load, 0.0] for block in blocks]) * self.mobile
+        self.loads = self.steady.copy()
         self.reach = np.array([block.reach for block in blocks])
         self._lightness = self.free[:, :2].any(axis=1) / mass  # 1/kg, of what can give way
         self._moves = self.mobile[:, 0].copy()
@@ -47,6 +51,8 @@ class Blocks:
         self.motion = np.concatenate([places, self.velocity])
         self._near: set[int] = set()
         self._build(scene)
+        self.gone, self.support = np.zeros(len(blocks), bool), np.zeros((len(blocks), 3))
+        self.remove(list(scene.gone))
 
     def _build(self, scene: Scene) -> None:
         """pymunk's bodies, and its callbacks."""
@@ -83,7 +89,15 @@ class Blocks:
         self._held[:] = self.motion[:3]
         self._space.step(1e-9)  # pymunk looks for pairs in a step, in which nothing moves
         codes = np.sort(np.fromiter(self._near, np.int64, len(self._near)))
-        return np.stack(np.divmod(codes, len(self._bodies)), axis=1)
+        pairs = np.stack(np.divmod(codes, len(self._bodies)), axis=1)
+        return pairs[~self.gone[pairs].any(axis=1)]
+
+    def remove(self, rows: list[int]) -> None:
+        """Take blocks away: nothing moves or meets them any more."""
+        self.gone[rows] = True
+        for array in (self.mobile, self.free, self.root, self._lightness, self._moves):
+            array[rows] = 0
+        self.motion[3:, rows] = self.velocity[:, rows] = 0.0
 
     def place(self, motion: np.ndarray, velocity: np.ndarray) -> None:
         """Put the blocks where `motion` (6, n) says, to go on with a velocity (3, n)."""

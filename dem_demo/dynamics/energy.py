@@ -12,18 +12,20 @@ from ..contact import Joints
 from .blocks import Blocks
 
 COLUMNS = ("kinetic", "potential", "stored", "friction", "dashpots", "dropped", "work", "turned")
-KINETIC, STORED, DROPPED, TURNED = map(COLUMNS.index, ("kinetic", "stored", "dropped", "turned"))
+KINETIC, STORED, DROPPED, WORK, TURNED = (
+    COLUMNS.index(name) for name in ("kinetic", "stored", "dropped", "work", "turned")
+)
 
 
 class Ledger:
     """Energies in J: kinetic + potential + stored + friction + dashpots + dropped = start + work.
 
     energy (8,): by COLUMNS. friction: dissipated in the joints; dropped: stored in contacts that
-    were given up while they still carried; work: done by drives and loads; turned: gravity's, the
-    drives' and the loads' power summed in absolute value, plus what was there at the start.
-    start: the balance at time 0. Of the end of the last step: forces (3, n, 3) in N: all,
-    dashpots, drives; last (2, n, 3): dashpots and drives before it; area (k,) in m2 and dissipated
-    energy `lost` (k,) in J/m2 of the joints. The compiled step writes all of them.
+    were given up while they still carried; work: done by drives, loads and water; turned:
+    gravity's, the drives' and the loads' power summed in absolute value, plus what was there at
+    the start. start: the balance at time 0. Of the end of the last step: forces (3, n, 3) in N:
+    all, dashpots, drives; last (2, n, 3): dashpots and drives before it; area (k,) in m2 and
+    dissipated energy `lost` (k,) in J/m2 of the joints. The compiled step writes all of them.
     """
 
     def __init__(self, blocks: int) -> None:
@@ -43,6 +45,11 @@ class Ledger:
         self.energy[STORED] = area @ joints.stored
         self.start = float(self.energy[KINETIC] + self.energy[STORED])
         self.energy[TURNED] = self.start
+
+    def load(self, blocks: Blocks, more: np.ndarray, dt: float) -> None:
+        """Loads have changed by `more` (n, 3) within a step dt (s): it books the whole of the new
+        ones, and is to have the mean."""
+        self.energy[WORK] -= 0.5 * dt * (more * blocks.motion[3:].T).sum()
 
     @property
     def value(self) -> dict[str, float]:

@@ -14,7 +14,7 @@ from scipy.sparse.linalg import spsolve
 
 from jointlaw.support.progress import track
 
-from ..contact import Contacts, Joints
+from ..contact import Contacts, Joints, Tracker
 from ..scene import Scene
 from .blocks import Blocks
 from .timestep import rates
@@ -31,14 +31,15 @@ STEADY = 0.8, 0.9  # unbalanced force over that before: no fall, with less drag 
 LET_GO, FALLS = 40, 0.9  # most steps in which loose blocks let go, which go on while this falls
 SLOW = 0.01  # their drag, as a share of the median stiffness
 FOLLOW = 6  # steps in which blocks that a loose one props follow it
+EARTH = 9.81  # m/s2
 HELD = 1e25  # drag (1/s2) that holds a block where it is
 
 
 def shares(blocks: Blocks, force: np.ndarray) -> np.ndarray:
-    """Sizes of forces (n, 3) as shares (n,) of the weights, moments divided by the block's reach;
-    where there is no weight, of a millionth of the largest load."""
-    weight = np.hypot(*blocks.gravity[:, :2].T)
-    largest = np.abs(blocks.gravity + blocks.loads).max(initial=1e-300)
+    """Sizes of forces (n, 3) as shares (n,) of the weights, on Earth where there is no gravity, or
+    of a millionth of the largest load if that is more; moments are divided by the block's reach."""
+    mass, largest = blocks.inertia[:, 0], np.abs(blocks.gravity + blocks.loads).max(initial=0.0)
+    weight = mass * ((np.hypot(*blocks.gravity[:, :2].T) / mass).max() or EARTH)
     x, y, turn = (force * blocks.free).T
     return np.sqrt(x**2 + y**2 + (turn / blocks.reach) ** 2) / np.maximum(weight, 1e-6 * largest)
 
@@ -58,14 +59,14 @@ class Equilibrium:
     """
 
     def __init__(
-        self, scene: Scene, blocks: Blocks, contacts: Contacts, joints: Joints,
+        self, scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints,
         slid: np.ndarray, force: np.ndarray,
     ) -> None:  # fmt: skip
         self.blocks, self.joints, self.k = blocks, joints, joints.n
-        signs = diags(np.repeat([-1.0, 1.0], self.k))
+        signs, contacts = diags(np.repeat([-1.0, 1.0], self.k)), tracker.contacts
         self.rows: csr_array = signs @ rates(blocks, contacts)  # to closure and shear
         self.area = np.tile(contacts.length * scene.thickness, 2)
-        self.start = np.concatenate([contacts.closure, slid])
+        self.start = np.concatenate([tracker.closure, slid])
         self.free = blocks.free.ravel()
         self.root = blocks.root.ravel()[self.free]
         self.block = np.repeat(np.arange(len(blocks.free)), 3)[self.free]

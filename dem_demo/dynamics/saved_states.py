@@ -18,8 +18,9 @@ from ..scene import Files, Scene, parse
 FILE = "state.npz"
 VERSION = 8  # of state.npz
 KEPT = (  # of what changes in a run, but for the joints: arrays that stay in their place
-    "blocks.motion", "blocks.velocity", "blocks.drives.reversed_at", "tracker.renewed_at",
-    "tracker.urgent", "ledger.energy", "ledger.forces",
+    "blocks.motion", "blocks.velocity", "blocks.loads", "blocks.gone", "blocks.support", "begun",
+    "blocks.drives.reversed_at",
+    "tracker.renewed_at", "tracker.urgent", "ledger.energy", "ledger.forces",
 )  # fmt: skip
 STATE = (
     *KEPT, "t0", "n", "dt", "halvings", "limit.now", "limit.least", "limit.bound", "limit.checked",
@@ -45,12 +46,15 @@ def save(scene: Scene, saved: Saved, folder: Path) -> None:
 
 
 def load(folder: Path) -> tuple[Scene, Saved]:
-    """The scene and the state that `save` wrote. Raises ValueError if they are not whole."""
-    file = folder / FILE
+    """The scene and the state that `save` wrote into a folder, or a run into folders in it. Raises
+    ValueError if they are not whole."""
+    places = (folder / part / FILE for part in ("", "state", "refused"))
+    file = next((place for place in places if place.is_file()), folder / FILE)
     if not file.is_file():
         raise ValueError(f"{str(folder)!r} holds no saved state: {FILE} is missing")
     try:
-        with np.load(file, allow_pickle=False) as stored:  # a ZIP file: it checks its sums
+        # a ZIP file: it checks its sums; opened here, for numpy leaves a damaged one open
+        with file.open("rb") as opened, np.load(opened, allow_pickle=False) as stored:
             data = {name: stored[name] for name in stored.files}
         if (version := int(data["version"])) == VERSION:
             files = Files(known=json.loads(str(data["files"])).items())

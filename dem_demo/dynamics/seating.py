@@ -5,21 +5,24 @@ import numpy as np
 from ..contact import Joints, Tracker
 from ..scene import Scene
 from .blocks import Blocks
+from .edge_loads import press
 from .equilibrium import Equilibrium
+from .in_situ import begin
 
 ROUNDS = 40  # most rounds of the initial equilibrium
 SETTLED = 1e-10  # movement of a round, as a share of the first, that ends them
 
 
-def seat(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> np.ndarray:
-    """Move the blocks to where their joints carry them; returns the first sliding (k,) of the
-    joints (m).
+def seat(
+    scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints, slid: np.ndarray
+) -> np.ndarray:
+    """Move the blocks to where their joints carry them; slid (k,) in m: sliding at first. Returns
+    the sliding with which the joints start.
 
     Loose blocks, which cannot be held, stay almost where they are drawn; all others are in balance
     with what the loose ones do to them there.
     """
-    slid, loose, first = np.zeros(joints.n), np.zeros(len(blocks.free), bool), 0.0
-    near = blocks.near()
+    loose, first, near = np.zeros(len(blocks.free), bool), 0.0, blocks.near()
     for again in range(ROUNDS):  # each at the places just found: joints turn with the blocks
         tracker.follow(blocks.motion)
         tracker.urgent[:] = True  # it is cheap here, and nothing is missed
@@ -27,11 +30,13 @@ def seat(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> np.n
         if before is not None:
             joints.rearrange(before, tracker.law, tracker.keys)
             slid = np.where(before >= 0, slid[before], 0.0)
+        press(scene, blocks, tracker)
         force = blocks.gravity + blocks.loads
         if again:
             force = force + _length_forces(scene, blocks, tracker, joints, slid)
-        search = Equilibrium(scene, blocks, tracker.contacts, joints, slid, force)
-        guess, more, old = search.none if again else search.guess(), ~loose, loose
+        search = Equilibrium(scene, blocks, tracker, joints, slid, force)
+        guess = search.none if again or scene.in_situ is not None else search.guess()
+        more, old = ~loose, loose
         while more.any():
             moved, more = search.attempt(guess, loose, old)
             loose = loose | more
@@ -39,7 +44,7 @@ def seat(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> np.n
         blocks.motion[:3] += search.spread(moved * search.root).T
         most = np.abs(moved[~loose[search.block]]).max(initial=0.0)
         first = first or most
-        if most <= SETTLED * first:
+        if again and most <= SETTLED * first:
             break
     tracker.renewed_at[:] = blocks.motion[:3]
     return slid
@@ -57,12 +62,9 @@ def displacements(
     """
     blocks, joints = Blocks(scene), Joints(scene)
     tracker = Tracker(scene, blocks.motion)
-    before = tracker.renew(blocks.motion, blocks.near())
-    if before is not None:
-        joints.rearrange(before, tracker.law, tracker.keys)
-    force, contacts = blocks.gravity + blocks.loads, tracker.contacts
-    search = Equilibrium(scene, blocks, contacts, joints, np.zeros(joints.n), force)
-    known = np.zeros(len(force), bool) if loose is None else loose
+    slid = begin(scene, blocks, tracker, joints)
+    search = Equilibrium(scene, blocks, tracker, joints, slid, blocks.gravity + blocks.loads)
+    known = np.zeros(len(blocks.free), bool) if loose is None else loose
     for first in (guess, search.guess()):
         if first is not None:
             moved, more = search.attempt(first, known)
@@ -73,6 +75,6 @@ def displacements(
 
 def _length_forces(scene, blocks, tracker, joints, slid) -> np.ndarray:
     """Forces (n, 3) of joints whose length changes as the blocks move, after their first step."""
-    closed = np.stack([tracker.contacts.closure, slid], axis=1) - joints.delta
+    closed = np.stack([tracker.closure, slid], axis=1) - joints.delta
     stored, none = joints.trial(closed)[2] * scene.thickness, np.zeros(joints.n)
     return tracker.contacts.assemble(blocks.motion, none, none, stored) * blocks.mobile

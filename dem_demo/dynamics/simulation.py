@@ -11,15 +11,18 @@ from ..errors import Refused
 from ..scene import Scene
 from . import saved_states
 from .blocks import Blocks
+from .edge_loads import press
 from .energy import DROPPED, Ledger
 from .equilibrium import out_of_balance
+from .in_situ import begin
 from .saved_states import KEPT, PLACES, STATE, Saved
 from .seating import seat
 from .timestep import SAFE, StepLimit, impact_limit
 
 NEAR = 0.4  # share of the limit below which no lever arm matters; to which a step is halved
 MATCH = 1e-6  # relative: lengths that are equal but for rounding
-LOOKS = 16  # steps between two looks at the drives
+LOOKS = 16  # steps between two looks at the drives and at excavations
+SLOW, EVEN, RESTING = 1e-4, 0.1, 0.9  # m/s, m/s2: below which a block rests; share that must
 FRACTIONS = {  # of the limit that a time step is, by what can happen
     "blocks fall or have no equilibrium": 0.15,
     "drives move blocks": 0.4,
@@ -33,7 +36,8 @@ class Simulation:
 
     step: time step (s), instead of the scene's; saved: a state to go on from. blocks: where they
     are; tracker: their contacts; joints: the law; ledger: the energies; limit: of the time step dt
-    (s), chosen for the reason `why`; loose (blocks,): those that nothing held at time 0. Where
+    (s), chosen for the reason `why`; loose (blocks,): those that nothing held at time 0;
+    begun (stages,): when stages of the excavation began, inf before (s). Where
     neither `step` nor the scene sets the time step, it is halved when joints close too far for it,
     or blocks become too fast.
     Raises ValueError for a step that is no finite number > 0 and for a state of another scene,
@@ -49,6 +53,7 @@ class Simulation:
         given = step or scene.run.step or scene.run.fraction
         self.why, self.halvings = "", 0 if given else HALVINGS
         self.ledger = Ledger(len(scene.blocks))
+        self.begun = np.full(len(scene.stages), np.inf)
         if saved:
             self._unpack(saved, step)
         else:
@@ -82,6 +87,8 @@ class Simulation:
                 self.blocks.refuse(world.fast, dt)
             dt = self.dt
             world.call("before", dt)
+        if self.scene.stages:
+            self._dig()
         if world.moved or world.stale:
             world = self._renew()
         if world.deep >= 0:
@@ -100,6 +107,31 @@ class Simulation:
             world.bind(checked=self.limit.checked)
         if self.n % LOOKS == 0:
             drives.reverse(self.time, self.slid)
+
+    def _dig(self) -> None:
+        """Take away the blocks of a stage when its time has come, or, if it has none, when the rock
+        is at rest; then let go what they bore."""
+        blocks, stages, n = self.blocks, self.scene.stages, int(np.isfinite(self.begun).sum())
+        due = self.n % LOOKS == 0 and n < len(stages)
+        if due and (self._rests() if (at := stages[n]["at"]) is None else self.time >= at):
+            taken, c, joints = stages[n]["blocks"], self.contacts, self.joints
+            mine = (np.isin(c.a, taken) | np.isin(c.b, taken)) * self.scene.thickness
+            stress, shear = mine * c.length * joints.traction.T
+            blocks.support += c.assemble(blocks.motion, stress, -shear, mine * joints.stored)
+            blocks.remove(taken)
+            self.tracker.urgent[taken], self.world.stale = True, 1
+            self.begun[n], n = self.time, n + 1
+        if blocks.support.any():
+            left = self.begun[n - 1] + stages[n - 1]["over"] - self.time
+            blocks.support *= max(left, 0.0) / max(left + self.dt, self.dt)
+            self.ledger.load(blocks, press(self.scene, blocks, self.tracker), self.dt)
+
+    def _rests(self) -> bool:
+        """Is no support going, and are almost all blocks slow and in balance?"""
+        blocks, force = self.blocks, self.ledger.forces[0].T[:2]
+        speed, pull = np.hypot(*blocks.velocity[:2]), np.hypot(*force) / blocks.inertia[:, 0]
+        moves = np.maximum(speed / SLOW, pull / EVEN)[blocks.mobile[:, 0]]
+        return not blocks.support.any() and bool(np.quantile(moves, RESTING) < 1)
 
     def _halve(self) -> bool:
         """Go on with half the time step, if it may be halved once more."""
@@ -129,14 +161,11 @@ class Simulation:
     def _start(self, step: float | None) -> None:
         """From the drawing to step 0: equilibrium, a time step, velocities half a step on."""
         scene, blocks, tracker, joints = self.scene, self.blocks, self.tracker, self.joints
-        before = tracker.renew(blocks.motion, blocks.near())
-        if before is not None:
-            joints.rearrange(before, tracker.law, tracker.keys)
-        slid = np.zeros(joints.n)
+        slid = begin(scene, blocks, tracker, joints)
         if scene.run.seat and joints.n and blocks.free.any():
-            slid = seat(scene, blocks, tracker, joints)
+            slid = seat(scene, blocks, tracker, joints, slid)
         tracker.follow(blocks.motion)
-        joints.update(self.contacts.closure, slid)
+        joints.update(tracker.closure, slid)
         self.loose = out_of_balance(scene, blocks, self.contacts, joints)
         self.limit.look(scene, blocks, self.contacts, joints)
         self.dt = step or scene.run.step or self._chosen_step()
@@ -186,6 +215,7 @@ class Simulation:
             before = tracker.renew(blocks.motion, blocks.near(), pressed=False)
             if before is not None:
                 self._rearrange(before)
+            self.ledger.load(blocks, press(self.scene, blocks, tracker), self.dt)
         self.world.call("press", self.dt)
         return self.world
 
@@ -246,6 +276,7 @@ class Simulation:
             else:
                 setattr(of, name, value.copy() if value.ndim else value.item())
         tracker, blocks = self.tracker, self.blocks
+        blocks.remove(np.flatnonzero(blocks.gone).tolist())
         tracker.hold(saved["contacts.corner"], saved["contacts.edge"], blocks.motion)
         self.joints.restore(saved, tracker.law, tracker.keys)
         if step:

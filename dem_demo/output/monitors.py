@@ -135,10 +135,10 @@ def slip_angle(scene: Scene, law_name: str, moving: int, length: float) -> dict:
     """Base angle (degrees) at which a block on a joint of `length` (m) should slip, and the stress.
 
     The normal stress falls as the base tilts, so angle and stress are found together. Both are None
-    where the law says nothing: no contact, no gravity, a stress that it cannot carry.
+    where the law says nothing: no contact, no gravity, a stress that it cannot carry, water.
     """
     weight, angle = scene.blocks[moving].section.mass * np.hypot(*scene.gravity), 35.0
-    for _ in range(ROUNDS if length > 0 else 0):
+    for _ in range(ROUNDS if length > 0 and not scene.wet else 0):
         before, stress = angle, float(weight / length * np.cos(np.radians(angle)))
         try:
             angle = friction_angle(scene.laws[law_name], stress)

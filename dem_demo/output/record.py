@@ -17,10 +17,12 @@ TOLD = 12  # most blocks that a sentence names
 
 
 class Record:
-    """Frames of a run: times (f,), motion (f, 6, n), energies (f, 9), joints.
+    """Frames of a run: times (f,), motion (f, 6, n), NaN for blocks that are gone, energies (f, 9),
+    joints.
 
     joints[f]: by name, "who" (k, 5) block, edge, block, edge, contact; "ends" (k, 2, 2) the segment
-    of joint that a contact carries; and numbers (k,) with their unit in the name. monitored[f]:
+    of joint that a contact carries; and numbers (k,) with their unit in the name. stresses[f] (3,
+    n): of the blocks. monitored[f]:
     what the scene's [watch] asks for; slips: of its joints; laws: of the watched joints; state:
     that of the last frame, to return to; steps: of the run; loose (n,): who was at its start.
     """
@@ -34,15 +36,17 @@ class Record:
         self.motion: list[np.ndarray] = []
         self.energy: list[list[float]] = []
         self.joints: list[dict[str, np.ndarray]] = []
+        self.stresses: list[np.ndarray] = []
         self.monitored: list[dict[str, float]] = []
         self.take(sim)
 
     def take(self, sim: Simulation) -> None:
         """Add the present as a frame."""
         self.times.append(sim.time)
-        self.motion.append(sim.blocks.motion.copy())
+        self.motion.append(np.where(sim.blocks.gone, np.nan, sim.blocks.motion))
         self.energy.append([*sim.ledger.energy.tolist(), sim.ledger.error])
         self.joints.append(_joints(sim))
+        self.stresses.append(block_stresses(sim))
         self.monitored.append(readings(sim))
         self.state = sim.state()
 
@@ -127,6 +131,19 @@ def _joints(sim: Simulation) -> dict[str, np.ndarray]:
     return {name: column[c.length > 0] for name, column in columns.items()}
 
 
+def block_stresses(sim: Simulation) -> np.ndarray:
+    """Mean stress xx, yy, xy (3, n) in each block (Pa, compression positive): force times arm of
+    its joints, over its volume."""
+    c, blocks = sim.contacts, sim.scene.blocks
+    push, shear = (sim.joints.traction * c.length[:, None]).T
+    on_b, block = (push + 1j * shear) * c.normal, np.concatenate([c.a, c.b])
+    fx, fy = (part := np.concatenate([on_b, -on_b])).real, part.imag
+    arm = np.tile(c.at, 2) - (sim.blocks.motion[0] + 1j * sim.blocks.motion[1])[block]
+    parts = fx * arm.real, fy * arm.imag, 0.5 * (fx * arm.imag + fy * arm.real)
+    sums = np.array([np.bincount(block, part, len(blocks)) for part in parts])
+    return sums / [one.section.area for one in blocks]
+
+
 def write_csv(path: Path, header, rows) -> None:
     """A table with the names of its columns."""
     with path.open("w", newline="") as stream:
@@ -151,7 +168,8 @@ def outcomes(record: Record) -> list[dict]:
     groups, blocks = {rock.name: rock.free for rock in record.scene.rocks}, record.scene.blocks
     rest = {i for i, block in enumerate(blocks) if not (block.fixed or block.held)}
     groups |= {"other blocks" if groups else "blocks": sorted(rest.difference(*groups.values()))}
-    for name, free in groups.items():
+    for name, group in groups.items():
+        free = [i for i in group if np.isfinite(last[i, 0])]
         if not free:
             continue
         moved, creep = np.hypot(*(last - first)[free].T), float(crept[free].max())
@@ -175,7 +193,7 @@ def outcomes(record: Record) -> list[dict]:
 def far(record: Record) -> bool:
     """Has a block moved by more than the usual size of a block?"""
     free = (block for block in record.scene.blocks if not block.fixed)
-    return bool(record.moved.max() > usual_size(free))
+    return bool(np.nanmax(record.moved) > usual_size(free))
 
 
 def sentences(record: Record) -> list[str]:

@@ -4,6 +4,7 @@ import sys
 import time
 from collections.abc import Callable
 from functools import partial
+from math import inf
 from pathlib import Path
 
 from tqdm import tqdm
@@ -19,7 +20,7 @@ from .monitors import look
 from .pictures import Pictures, curves
 from .record import Record, named, outcomes
 
-MOST_STEPS = 1e12  # of a run: years
+MOST_STEPS = 1e8  # of a run: days for a hundred blocks
 LOOKS = 8  # steps between two looks for slip
 VERSION = 2  # of summary.json
 HISTORY, BLOCKS = "history.csv", "blocks.csv"
@@ -59,6 +60,8 @@ def run(
         "started_in_equilibrium": not record.loose.any(),
         "loose": named(sim.scene, record.loose),
         "law_points": sim.joints.n,
+        "stresses_of_joints": "effective" if sim.scene.wet else "total",
+        "stages_begun_s": [time if time < inf else None for time in sim.begun.tolist()],
         "energy_J": dict(zip(COLUMNS, record.energy[-1][:-1], strict=True)),
         "energy_error": record.energy[-1][-1],
         "largest_energy_error": max((abs(row[-1]) for row in record.energy[1:]), default=0.0),
@@ -121,7 +124,7 @@ def steps_to(sim: Simulation, until: float | None = None) -> int:
     steps = (end - now) / dt
     if not -0.5 <= steps <= MOST_STEPS:
         raise ValueError(f"until = {end:g} s: {steps:.3g} steps of {dt:.3g} s from {now:.6g} s; "
-                         f"must be from 0 to {MOST_STEPS:g}")  # fmt: skip
+                         f"must be from 0 to {MOST_STEPS:g}; units?")  # fmt: skip
     return round(steps)
 
 

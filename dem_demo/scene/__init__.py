@@ -4,6 +4,7 @@ keys       the keys of all tables, and what each may be
 blocks     convex blocks
 laws       joint laws and Coulomb's
 drives     prescribed motions
+stress     of water in the ground
 cutting    an outline cut along joint sets
 scene      a scene in memory
 read       a scene from its file
@@ -12,18 +13,22 @@ read       a scene from its file
 from .blocks import Block, turn, usual_size
 from .drives import Drives
 from .keys import Tables, overlay
-from .laws import Files, Law, build_law, opens_to
+from .laws import USUAL, WHOLE, Files, Law, build_law, opens_to, springs
 from .read import TEMPLATE, build, load, parse, read_tables, shipped
 from .scene import Run, Scene
+from .stress import Stress
 
 __all__ = [
     "TEMPLATE",
+    "USUAL",
+    "WHOLE",
     "Block",
     "Drives",
     "Files",
     "Law",
     "Run",
     "Scene",
+    "Stress",
     "Tables",
     "build",
     "build_law",
@@ -33,6 +38,7 @@ __all__ = [
     "parse",
     "read_tables",
     "shipped",
+    "springs",
     "turn",
     "usual_size",
 ]

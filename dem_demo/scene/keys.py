@@ -59,9 +59,18 @@ def some_of(name: str, value: Any, names: Iterable[str], count: int | None = Non
     return value
 
 
+def polyline(name: str, value: Any) -> np.ndarray:
+    """A rule: points (m, 2) of a line that goes to the right, in m."""
+    points = np.array([vector(name, point) for point in a(list)(name, value)]).reshape(-1, 2)
+    if not len(points) or (np.diff(points[:, 0]) <= 0).any():
+        raise ValueError(f"{name}: must be points [x, y] from left to right, x increasing")
+    return points
+
+
 AXES = {"x": 0, "y": 1, "turn": 2}
 TEXT, LIST, TABLE = a(str), a(list), a(dict)
 POSITIVE, NOT_NEGATIVE = partial(more_than, bound=0), partial(at_least, bound=0)
+SIDE = partial(one_of, choices=("held", "rollers", "loaded"))
 DENSITY = within(50.0, 30000.0, "kg/m3; 2.6 g/cm3 is 2600 kg/m3")
 
 BLOCK = {
@@ -70,13 +79,14 @@ BLOCK = {
     "held": partial(some_of, names=AXES),
 }  # fmt: skip
 SET = {
-    "dip!": within(-90, 90, "degrees"), "spacing!": POSITIVE, "law!": TEXT, "through": vector,
+    "dip!": within(-90, 90, "degrees"), "spacing!": POSITIVE, "law": TEXT, "through": vector,
     "persistence": within(0, 1, ""), "scatter": within(0, 0.999, "(two joints could meet)"),
 }  # fmt: skip
 ROCK = {
     "name!": TEXT, "outline!": corners, "set!": [SET], "at": vector,
     "fixed": [{"corners!": corners}], "hole": [{"corners!": corners}], "density": DENSITY,
     "seed": partial(integer, bound=0), "least_width": POSITIVE, "laws": TABLE,
+    "cut_law": TEXT,
 }  # fmt: skip
 DRIVE = {
     "block": TEXT, "motion!": partial(one_of, choices=tuple(AXES)), "ease": NOT_NEGATIVE,
@@ -98,6 +108,12 @@ SCENE = {
     "title": TEXT, "gravity": vector, "density": DENSITY, "thickness": POSITIVE, "law": TEXT,
     "laws!": TABLE, "block": [BLOCK], "rock": [ROCK], "drive": [DRIVE], "run!": RUN,
     "joint": [{"between": LIST, "around": vector, "law!": TEXT}],
+    "excavate": [{"corners!": corners, "at": NOT_NEGATIVE, "over!": POSITIVE}],
+    "in_situ": {
+        "k0": NOT_NEGATIVE, "stress": partial(finite, unit="Pa"), "surface": polyline,
+        **dict.fromkeys(("left", "right", "bottom", "top"), SIDE),
+    },
+    "water": {"table!": polyline, "unit_weight": POSITIVE},
     "watch": {"slip": LIST, "shear": LIST, "pins": LIST, "joints": LIST},
 }  # fmt: skip
 

@@ -1,14 +1,16 @@
 """A scene in memory: blocks, laws, drives and how to run them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from .blocks import Block, usual_width
 from .drives import Drive
+from .keys import Tables
 from .laws import Files, Law
+from .stress import Stress
 
 SKIN, THIN = 0.02, 0.1  # of the usual width of the blocks that move; at most of a block's own
 
@@ -36,14 +38,14 @@ class Run:
 class Rock:
     """A rock mass of a scene, cut into blocks.
 
-    blocks: their numbers in the scene; free: those that can move; slivers: what became of them,
-    for a person.
+    blocks: their numbers in the scene; free: those that can move; told: what became of slivers
+    and at inward corners, for a person.
     """
 
     name: str
     blocks: range
     free: list[int]
-    slivers: str
+    told: list[str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +54,11 @@ class Scene:
 
     pairs: laws by the blocks of [[joint]] tables; edge_laws: of each (block, edge) that lies on a
     joint of a rock, the law of its set.
+
+    water: stress of water in joints and on faces; in_situ: stress before an excavation; pressure:
+    of water (Pa) in the joints of each law. stages: of an excavation, `blocks` that are taken away
+    `at` a time (s), or None when the rock is at rest, and `over` what time (s) their support goes;
+    gone: blocks that are not there from the start.
 
     slip, shear: joints to report on, as (moving block, base); near: those nearest to points, as two
     blocks; pins: points, as (block, place in m); reduction: what the shear strength of all joints
@@ -72,6 +79,11 @@ class Scene:
     drives: tuple[Drive, ...] = ()
     gravity: tuple[float, float] = (0.0, -9.81)
     thickness: float = 1.0
+    water: Stress | None = None
+    in_situ: Stress | None = None
+    pressure: tuple[float, ...] = ()
+    stages: tuple[Tables, ...] = ()
+    gone: tuple[int, ...] = ()
     slip: tuple[tuple[int, int], ...] = ()
     shear: tuple[tuple[int, int], ...] = ()
     near: tuple[tuple[int, int], ...] = ()
@@ -88,10 +100,22 @@ class Scene:
         return skin if self.run.skin is None else np.full(len(widths), self.run.skin)
 
     @property
+    def wet(self) -> bool:
+        """Is there water, so that the stresses of joints are effective ones?"""
+        return self.water is not None or any(self.pressure)
+
+    @property
+    def excavated(self) -> "Scene":
+        """The scene without what its excavation takes away, but with the stress of before."""
+        gone = [i for stage in self.stages for i in stage["blocks"]]
+        return replace(self, stages=(), gone=(*self.gone, *gone)) if gone else self
+
+    @property
     def base(self) -> int | None:
         """The fixed block that displacements are measured from: of a shaken scene, one that moves
         with all fixed rock and not by a drive of its own."""
-        fixed = [i for i, block in enumerate(self.blocks) if block.fixed]
+        gone = {*self.excavated.gone}
+        fixed = [i for i, block in enumerate(self.blocks) if block.fixed and i not in gone]
         own = {d.blocks[0] for d in self.drives if len(d.times) > 1 and len(d.blocks) < len(fixed)}
         return min(fixed, key=lambda i: i in own, default=None)
 

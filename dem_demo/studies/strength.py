@@ -20,9 +20,10 @@ from jointlaw.support.pyplot import FORMATS
 
 from ..dynamics.seating import displacements
 from ..dynamics.simulation import Simulation
+from ..output.pictures import Pictures
 from ..output.record import named, told
 from ..scene import Scene, Tables, build, read_tables, turn
-from .failure import draw, failing, first, seated
+from .failure import failing, first, seated
 from .trials import Trials
 
 TILT = 8.0, 60.0, 0.05  # degrees: first step, largest, to which it is found
@@ -53,7 +54,7 @@ def strength_reduction(
     """
     trials = Trials(scene, folder)
     for name in [rock.name for rock in scene.rocks] or ["scene"]:
-        one = alone(scene, name) if scene.rocks else scene
+        one = (alone(scene, name) if scene.rocks else scene).excavated
         tell(f"{name}: looking for blocks that cannot be held")
         loose, free = trials.ask(f"{name}: loose", partial(_loose, one)), _free(one)
         tell(f"{name}: {len(loose)} of {free} blocks cannot be held" + _listed(loose))
@@ -101,9 +102,10 @@ def _loose(scene: Scene) -> list[dict]:
 def _show(scene: Scene, until: float, title: str, path: Path, apart: np.ndarray) -> list[dict]:
     """Run and draw a scene that fails; returns which blocks move first, but for those apart."""
     record = failing(scene, until)
-    time, ahead = record.times[-1], first(record, apart)
-    draw(record, f"{title}\nwith strength / {scene.reduction:.3g}, after {time:.2g} s", path, ahead)
-    return named(scene, ahead)
+    moving = first(record, apart)
+    title = f"{title}\nwith strength / {scene.reduction:.3g}"
+    Pictures(record, title, moving, "moves first").final(path)
+    return named(scene, moving)
 
 
 def factor_of_safety(
@@ -241,4 +243,6 @@ def alone(scene: Scene, name: str, seed: int | None = None) -> Scene:
         return all(other.rpartition(" ")[0] == name for other in others) and (same or not others)
 
     joints = [joint for joint in data.get("joint", []) if belongs(joint)]
-    return build({**data, "rock": [own], "watch": {}, "joint": joints}, files=scene.files)
+    digs = [dig for dig in data.get("excavate", []) if belongs({"around": dig["corners"][0]})]
+    kept = {"rock": [own], "watch": {}, "joint": joints, "excavate": digs}
+    return build({**data, **kept}, files=scene.files)

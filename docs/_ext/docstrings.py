@@ -24,6 +24,13 @@ def process(app, what, name, obj, options, lines):
     lines[:] = "\n\n".join(map(fields, "\n".join(lines).split("\n\n"))).split("\n")
 
 
+def unwrap(app, what, name, obj, options, signature, returns):
+    """Names of types instead of the wrapper that Sphinx puts round them in a union."""
+    pattern = r"TypeAliasForwardRef\('(\w+)'\)"
+    return tuple(text and re.sub(pattern, r"\1", text) for text in (signature, returns))
+
+
 def setup(app):
     app.connect("autodoc-process-docstring", process)
+    app.connect("autodoc-process-signature", unwrap)
     return {"parallel_read_safe": True}

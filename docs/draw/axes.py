@@ -1,14 +1,12 @@
 """Axes and signs of a joint: `python docs/draw/axes.py FOLDER` writes FOLDER/axes.png."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
+from folder import asked
 
 from jointlaw.support.pyplot import style
 
 TILT, AZIMUTH = np.radians(28.0), np.radians(38.0)
-MOTION, FACET, AXIS = "#d95f02", "#1f6fd0", "0.35"
+MOTION, FACET, AXIS = "#c95500", "#1f6fd0", "0.35"
 
 
 def arrow(axes, at, way, name, colour):
@@ -68,8 +66,8 @@ def main(folder):
             draw(axes)
             axes.set(aspect="equal", xlim=(-wide, wide), ylim=(-1.75, 1.75))
             axes.axis("off")
-        figure.savefig(Path(folder) / "axes.png", dpi=100)
+        figure.savefig(folder / "axes.png", dpi=100)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(asked(__doc__))

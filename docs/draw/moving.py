@@ -3,16 +3,15 @@
     python docs/draw/moving.py FOLDER
 
 A run of the law at a kept normal stress. Each face stands for a facet and one of its depth cells:
-inclination, gap and state are theirs. The profiles are drawn through the faces; all displacements
-are enlarged alike. Writes FOLDER/moving.gif.
+inclination, gap and state are theirs; all displacements are enlarged alike. Writes
+FOLDER/moving.gif.
 """
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from folder import asked
 from PIL import Image
 
 import jointlaw as jl
@@ -25,14 +24,17 @@ from jointlaw.support.pyplot import style
 STRESS = 10e6
 LEGS = (3.5, -7.0, 7.0)  # slips, over the closure at this stress
 FRAMES = 6  # for a slip as long as that closure
-TEETH = 14
-STUCK, SLIDING, APART = "#1f6fd0", "#d95f02", "#8a8a8a"
+TEETH = 8
+ROUND = 0.1  # radius of a tip, over the width of a ramp
+BAR = 0.5e-6  # m
+STUCK, SLIDING, APART = "#1f6fd0", "#c95500", "#8a8a8a"
 LARGE = {"font.size": 15, "legend.fontsize": 14, "axes.labelsize": 15, "lines.linewidth": 2.0}
 
 
 class Face(NamedTuple):
     """A face of the drawn profiles."""
 
+    place: int
     facet: int
     cell: int
     tilt: float  # rad, upward in the direction of slip
@@ -43,6 +45,7 @@ class Moment(NamedTuple):
     """What a frame shows: m, Pa, J/m2, and a colour for each face."""
 
     slip: float
+    start: float  # of the closure
     closure: float
     stress: float
     stored: float
@@ -62,7 +65,7 @@ def choose(law):
         facet = sides[j % 2][(2 * (j // 2) + j // 4) % len(sides[j % 2])]
         gaps = k.c1[facet] * k.depth[facet, :-1]
         cell = (3 * j + j // 2) % max(1, np.sum(gaps < 1.5 * law.closure(STRESS)))
-        faces.append(Face(facet, cell, tilt[facet], gaps[cell]))
+        faces.append(Face(j, facet, cell, tilt[facet], gaps[cell]))
     return faces
 
 
@@ -91,51 +94,51 @@ def run(law, faces):
             step = leg * length / count
             now = jl.direct_shear(joint, step, normal=STRESS, steps=5)
             slip += step
-            energies = now.stored[-1], now.dissipated[-1]
-            moments.append(
-                Moment(slip, now.closure[-1], now.shear_stress[-1], *energies, states(joint, faces))
-            )
+            last = [x[-1] for x in (now.closure, now.shear_stress, now.stored, now.dissipated)]
+            moments.append(Moment(slip, length, *last, states(joint, faces)))
     return moments
 
 
-def profiles(faces, moment, zoom):
-    """Ends (TEETH, 2, 2) of the faces of the lower block, and of the upper one where it is."""
-    half = 0.5
-    rise = np.tan([f.tilt for f in faces])
-    z = np.concatenate([[0.0], np.cumsum(2 * half * rise)])
-    x = np.arange(TEETH + 1.0)
-    lower = np.stack([np.stack([x[:-1], z[:-1]], -1), np.stack([x[1:], z[1:]], -1)], 1)
-    normal = np.array([(-np.sin(f.tilt), np.cos(f.tilt)) for f in faces])
-    gap = np.array([f.gap for f in faces])[:, None]
-    shift = zoom * (normal * gap + (moment.slip, -moment.closure))
-    return lower, lower + shift[:, None]
-
-
-def shrunk(ends, share):
-    """Faces (n, 2, 2) without this share of their length at each end."""
-    middle = ends.mean(axis=1, keepdims=True)
-    return middle + (1 - 2 * share) * (ends - middle)
+def tips(faces, moment, zoom):
+    """Ground under the faces, (TEETH + 1, 2), and the middles of the tips above it, (TEETH, 2)."""
+    tilt, gap = np.array([f.tilt for f in faces]), np.array([f.gap for f in faces])
+    ground = np.stack([np.arange(TEETH + 1.0), np.cumsum([0.0, *np.tan(tilt)])], -1)
+    above = np.stack([-np.sin(tilt), np.cos(tilt)], -1) * (zoom * gap + ROUND)[:, None]
+    moved = zoom * np.array([moment.slip, -moment.closure])
+    return ground, 0.5 * (ground[1:] + ground[:-1]) + above + moved
 
 
 def draw_blocks(axes, faces, moment, zoom):
-    """The two profiles and the coloured faces between them."""
-    lower, upper = profiles(faces, moment, zoom)
-    upper = shrunk(upper, 0.12)
-    for ends, edge, colour in ((lower, -1.6, "#c9c2b6"), (upper, 1.9, "#dbd5c9")):
-        x, z = ends.reshape(-1, 2).T
-        axes.fill_between(x, z, edge, color=colour, lw=0, alpha=0.85)
-        axes.plot(x, z, color="0.45", lw=1)
-    for ends, colour in zip(shrunk(upper, 0.08), moment.colours, strict=True):
-        axes.plot(*ends.T, color=colour, lw=6, solid_capstyle="round")
+    """Ramps with the inclinations of the facets, and over each a tip of the upper block.
+
+    Where a tip is pressed against its ramp it lies behind it.
+    """
+    ground, middle = tips(faces, moment, zoom)
+    turn, top = np.linspace(np.pi, 2 * np.pi, 24), ground[:, 1].max() + 0.22
+    top -= zoom * (moment.closure - moment.start)
+    arcs = middle[:, None] + ROUND * np.stack([np.cos(turn), np.sin(turn)], -1)
+    feet = zip(middle[:, 0], arcs, strict=True)
+    tooth = [[(x - 0.4, top), *arc, (x + 0.4, top)] for x, arc in feet]
+    outline = np.concatenate([[(-1, top)], *tooth, [(TEETH + 1, top)]])
+    parts = (outline, 2.0, "#e6e1d7"), (ground, -1.0, "#cfc8bb")
+    for order, (line, edge, colour) in enumerate(parts):
+        axes.fill_between(*line.T, edge, color=colour, lw=0, zorder=order)
+        axes.plot(*line.T, color="0.45", lw=1, zorder=order)
+    for face, (x, z), colour in zip(faces, middle, moment.colours, strict=True):
+        along = np.array([np.cos(face.tilt), np.sin(face.tilt)])
+        floor = ground[face.place, 1] + (x - face.place) * np.tan(face.tilt)
+        foot = min(ROUND, (z - floor) * np.cos(face.tilt))  # along the normal, from ramp to middle
+        at = np.array([x, z]) + foot * np.array([np.sin(face.tilt), -np.cos(face.tilt)])
+        ends = at + np.outer([-0.11, 0.11], along)
+        axes.plot(*ends.T, color=colour, lw=7, solid_capstyle="round")
     for i, (name, colour) in enumerate(
         (("stuck", STUCK), ("sliding", SLIDING), ("separated", APART))
     ):
-        axes.text(0.22 + 0.28 * i, 0.93, name, color=colour, weight="bold", ha="center", va="top",
+        axes.text(0.22 + 0.28 * i, 0.95, name, color=colour, weight="bold", ha="center", va="top",
                   transform=axes.transAxes)  # fmt: skip
-    bar = 0.5e-6
-    axes.plot([2.5, 2.5 + zoom * bar], [-1.35, -1.35], color="k", lw=3)
-    axes.text(2.5, -1.25, f"{1e6 * bar:g} µm of slip", va="bottom")
-    axes.set(xlim=(2.2, TEETH - 2.2), ylim=(-1.6, 1.9), xticks=[], yticks=[])
+    axes.plot([0.6, 0.6 + zoom * BAR], [-0.3, -0.3], color="k", lw=3)
+    axes.text(0.7 + zoom * BAR, -0.3, f"{1e6 * BAR:g} µm", va="center")
+    axes.set(xlim=(0.5, TEETH - 0.5), ylim=(-0.4, 1.35), xticks=[], yticks=[])
 
 
 def draw_curve(axes, moments, all_moments, lines, label):
@@ -155,7 +158,7 @@ def frame(plt, faces, moments, all_moments):
     """One picture."""
     now, start = moments[-1], all_moments[0].closure
     figure, axes = plt.subplot_mosaic("AAA;BCD", figsize=(7.8, 5.4), height_ratios=(1, 1))
-    draw_blocks(axes["A"], faces, now, 1.4 / max(m.slip for m in all_moments))
+    draw_blocks(axes["A"], faces, now, 0.36 / max(m.slip for m in all_moments))
     draw_curve(axes["B"], moments, all_moments, [(lambda m: m.stress / 1e6, "k")],
                "shear stress (MPa)")  # fmt: skip
     draw_curve(axes["C"], moments, all_moments, [(lambda m: 1e9 * (start - m.closure), "k")],
@@ -180,10 +183,10 @@ def main(folder):
         images = [frame(plt, faces, moments[: i + 1], moments) for i in range(len(moments))]
     palette = images[len(images) // 2].quantize(64)
     small = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
-    path = Path(folder) / "moving.gif"
+    path = folder / "moving.gif"
     small[0].save(path, save_all=True, append_images=small[1:], duration=80, loop=0, optimize=True)
     print(f"{path}: {len(small)} frames, {path.stat().st_size / 1e6:.1f} MB")
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(asked(__doc__))

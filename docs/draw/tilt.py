@@ -6,17 +6,16 @@ Runs the scene `tilt`. Each pair of slab and table is drawn when the slab has sl
 Writes FOLDER/tilt.png.
 """
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
+from folder import asked
 
 import dem_demo
-from dem_demo.output.pictures import DRIVEN, FREE, outlines
+from dem_demo.output.pictures import FIXED, outlines
 from jointlaw.support.pyplot import style
 
-COLOURS = "#d95f02", "#1f6fd0"
+COLOURS = "#c95500", "#1f6fd0"
 WAYS = "rough direction\ndown the slope", "rough direction\nacross the slope"
 DRAWN = 0.5  # m of slip
 SLOW, LEAST = 1e-4, 1e-12  # growth of slip between two records: share of the slip, m; less is rest
@@ -33,8 +32,8 @@ def main(folder):
             name, tilt = scene.blocks[moving].name, record.slips[moving, base]["slip_angle"]
             slip = np.abs(record.column(f"{name}: slid_m"))
             shape = outlines(record, int(np.argmax(slip > DRAWN)))
-            above.fill(*shape[base].T, color=DRIVEN)
-            above.fill(*shape[moving].T, color=FREE, ec=colour, lw=2)
+            above.fill(*shape[base].T, color=FIXED)
+            above.fill(*shape[moving].T, color="#efe9dc", ec=colour, lw=2)
             above.text(shape[base][:, 0].mean(), 3.2, way, color=colour, ha="center", va="bottom")
             farther = np.diff(np.maximum.accumulate(slip), prepend=0.0) > SLOW * slip + LEAST
             ratio = record.column(f"{name}: shear_Pa") / record.column(f"{name}: normal_Pa")
@@ -51,8 +50,8 @@ def main(folder):
         above.axis("off")
         below.set(xlabel="slip (mm)", ylabel="friction angle (°)", xlim=(0.01, 9e3), ylim=(18, 37))
         below.grid(alpha=0.3)
-        figure.savefig(Path(folder) / "tilt.png", dpi=100)
+        figure.savefig(folder / "tilt.png", dpi=100)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(asked(__doc__))

@@ -5,12 +5,11 @@ python docs/measure/ablations.py tilt     ablate this scene anew, into docs/data
 """
 
 import csv
-import sys
 import tempfile
 from collections import defaultdict
 from pathlib import Path
 
-from tables import ROOT, run, table
+from tables import ROOT, asked, run, table
 
 DATA = ROOT / "docs" / "data"
 SCENES = sorted(path.stem.partition("-")[2] for path in DATA.glob("ablation-*.csv"))
@@ -107,8 +106,8 @@ def span(values, form):
 
 
 if __name__ == "__main__":
-    if sys.argv[1:]:
-        for name in sys.argv[1:]:
+    if scenes := asked(__doc__, "scenes", nargs="*").scenes:
+        for name in scenes:
             ablate(name)
     else:
         print(table(HEAD, by_ingredient([load(data_of(name)) for name in SCENES])))

@@ -18,7 +18,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import tables
+from tables import table
 from tolerance import random_law
 
 import jointlaw as jl
@@ -65,25 +65,22 @@ def misses(law: jl.JointLaw) -> np.ndarray:
     return found
 
 
-def table(found: np.ndarray) -> str:
+def missed(found: np.ndarray) -> str:
     """Markdown of misses (laws, tried, ratios, 4)."""
-    names = [f"{ratio:g}" if math.isfinite(ratio) else "none" for ratio in RATIOS]
-    lines = [
-        f"| resolution | error of | {' | '.join(names)} |",
-        f"|---|---|{'---:|' * len(names)}",
-    ]
     kinds = (
         "friction, before reversal",
         "friction, after reversal",
         "friction, median",
         "dilation",
     )
+    rows = []
     for i, name in enumerate(TRIED):
-        for k, kind in enumerate(kinds):
+        for k, kind in enumerate([*kinds, "dilation"]):
             some = found[:, i, :, k]
             row = np.median(some, axis=0) if k == 2 else some.max(axis=0)
-            lines.append(f"| {name} | {kind} | {' | '.join(f'{x:.2f}' for x in row)} |")
-    return "\n".join(lines)
+            rows.append([name, kind, *(f"{x:.2f}" for x in row)])
+    names = [f"{ratio:g}" if math.isfinite(ratio) else "none" for ratio in RATIOS]
+    return table(["resolution", "error of", *names], rows)
 
 
 def sums() -> str:
@@ -94,7 +91,7 @@ def sums() -> str:
                           for name in jl.presets.names()]).max(axis=0)  # fmt: skip
         for k, place in enumerate(("at the peak", "later")):
             rows.append([f"{stress / 1e6:g} MPa, {place}", *(f"{x:.1f}" for x in apart[:, k])])
-    return tables.table(["normal stress", *(f"{ratio:g}" for ratio in ratios)], rows)
+    return table(["normal stress", *(f"{ratio:g}" for ratio in ratios)], rows)
 
 
 def excess(name: str, ratio: float, stress: float) -> tuple[float, float]:
@@ -121,7 +118,7 @@ def main() -> None:
         print(sums())
         return
     laws = draw(options.laws, options.seed)
-    print(table(np.array([misses(law) for law in track(laws, "laws", len(laws))])))
+    print(missed(np.array([misses(law) for law in track(laws, "laws", len(laws))])))
 
 
 if __name__ == "__main__":

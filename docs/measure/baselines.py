@@ -14,7 +14,7 @@ the joint law over nine choices: three priors of alpha, and data up to three str
 
 import numpy as np
 from scipy.optimize import least_squares
-from tables import table
+from tables import asked, table
 
 import jointlaw as jl
 from jointlaw.calibration import datasets
@@ -77,4 +77,5 @@ def main():
 
 
 if __name__ == "__main__":
+    asked(__doc__)
     main()

@@ -3,12 +3,14 @@ the random ones of `at_tolerance`."""
 
 from dataclasses import replace
 
-from tables import table
+from tables import asked, table
 
 import jointlaw as jl
 from jointlaw.accuracy.suite import standard_suite
 from jointlaw.accuracy.tolerance import EXCURSIONS
 from jointlaw.parameters.resolution import NAMED
+
+asked(__doc__)
 
 sliders = dict.fromkeys(NAMED, 0)
 rows = []

@@ -10,7 +10,7 @@ its measured one, what halving the step changes, and how far parameters can move
 
 import numpy as np
 from scipy.optimize import least_squares
-from tables import table
+from tables import asked, table
 
 import jointlaw as jl
 
@@ -84,4 +84,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    asked(__doc__)
     main()

@@ -3,9 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
-from tables import table
+from tables import asked, table
 
 import jointlaw as jl
+
+asked(__doc__)
 
 LAW = jl.JointLaw(
     orientation=jl.Orientation(3.0, 0.0, 0.3),

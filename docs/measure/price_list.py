@@ -3,9 +3,11 @@
 import os
 from dataclasses import replace
 
-from tables import table
+from tables import asked, table
 
 import jointlaw as jl
+
+asked(__doc__)
 
 os.environ["JOINTLAW_THREADS"] = "1"
 HEAD = ["`Resolution`", "sliders", "bytes", "error", "friction", "dilation", "ns", "with tangent"]

@@ -14,7 +14,7 @@ from collections import defaultdict
 from pathlib import Path
 from xml.etree import ElementTree
 
-from tables import ROOT, table
+from tables import ROOT, asked, table
 
 CHECKS = "slope / bound", "halving 16 to 128 steps", "units, F", "units, energy"
 
@@ -102,5 +102,5 @@ TABLES = {
 }  # fmt: skip
 
 if __name__ == "__main__":
-    make, names = TABLES[sys.argv[1]]
+    make, names = TABLES[asked(__doc__, "name", choices=TABLES).name]
     print(make(figures(names)))

@@ -12,11 +12,13 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import RegularGridInterpolator
 from scipy.optimize import brentq
-from tables import table
+from tables import asked, table
 
 import dem_demo
 import jointlaw as jl
 from dem_demo.scene.read import SCENES
+
+asked(__doc__)
 
 BASE, SLAB = 0, 1
 DIP, FREQUENCY, LOAD = np.radians(20.0), 4.0, 2600 * 0.6  # rad, 1/s, kg/m2: of the scene

@@ -1,15 +1,17 @@
 """Picture: slip of the scene `shaken-slope` with plain Coulomb and with the joint law, and of
 Newmark's sliding block (1965): `python docs/measure/shaken_slope.py FOLDER`."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 from scipy.integrate import cumulative_trapezoid
+from tables import asked
 
 from dem_demo import Simulation, load, run
 from jointlaw.support.pyplot import style, written
+
+FOLDER = asked(__doc__, "folder", type=Path).folder
 
 DIP, GRAVITY = np.radians(25.0), 9.81  # rad, m/s2: of the scene
 CASES = {"shaken-slope-plain": "blocks, Coulomb 0.6", "shaken-slope": "blocks, joint law"}
@@ -46,4 +48,4 @@ def draw(path):
     written(figure, path)
 
 
-draw(Path(sys.argv[1]) / "shaken-slope.png")
+draw(FOLDER / "shaken-slope.png")

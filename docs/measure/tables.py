@@ -1,11 +1,22 @@
 """Tables in Markdown, and what a command of this project prints."""
 
+import argparse
 import os
 import subprocess
 import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
+
+
+def asked(about, *names, **more):
+    """The words after a command, by name; --help shows `about`, the text of its script."""
+    parser = argparse.ArgumentParser(
+        description=about, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    for name in names:
+        parser.add_argument(name, **more)
+    return parser.parse_args()
 
 
 def table(head, rows):

@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 
-from tables import table
+from tables import asked, table
 
 import dem_demo
 import jointlaw as jl
+
+asked(__doc__)
 
 HEAD = ["u, phi, depth", "along, 26 kPa", "across, 26 kPa", "along, 6 kPa", "across, 6 kPa"]
 RULES = (2, 3, 1), (2, 4, 1), (2, 10, 1), (4, 6, 1), (4, 10, 1), (4, 10, 6), (16, 24, 1)

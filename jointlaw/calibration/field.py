@@ -46,6 +46,9 @@ def from_field(
     `ASSUMED` says what else is in it. Raises ValueError for values that no such law has.
 
     Source: Barton & Choubey 1977 (peak angle), Barton & Bandis 1982 (its displacement).
+
+    >>> made = jl.from_field(jrc=10, jcs=100e6, length=0.1, normal_stress=1e6,
+    ...                      normal_stiffness=30e9, basic_friction=np.radians(30))
     """
     for name, value in (("jrc", jrc), ("jcs", jcs), ("length", length),
                         ("normal_stress", normal_stress), ("normal_stiffness", normal_stiffness),

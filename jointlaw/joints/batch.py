@@ -32,6 +32,9 @@ class JointBatch:
     The traction is the joint's resistance in the sense of the displacement: the force on the body
     that moves by +d is -area * F. Without `ledger` no dissipated energy is added up, which is
     faster with the compiled kernel.
+
+    >>> joints = law.joints(1000)
+    >>> F, _ = joints.update(np.full((1000, 3), 1e-9), tangent=False)
     """
 
     # law: of the class jointlaw.laws.law.Law, which lies above this file
@@ -67,7 +70,7 @@ class JointBatch:
         return self._step(d, where, tangent, keep=True)
 
     def trial(self, d: ArrayLike, where: Index | None = None, tangent: bool = True) -> Result:
-        """As `update`, but the state is left untouched."""
+        """As `update` of d, where, tangent, but the state is left untouched. Raises the same."""
         return self._step(d, where, tangent, keep=False)
 
     def _step(self, d: ArrayLike, where: Index | None, tangent: bool, keep: bool) -> Result:
@@ -79,7 +82,10 @@ class JointBatch:
         return F, C
 
     def take(self, step: Step) -> None:
-        """Take a step whose arrays have the right shapes: check its numbers, then the kernel."""
+        """Take a step whose arrays have the right shapes: check its numbers, then the kernel.
+
+        Raises as `update`.
+        """
         reach = self._reach_after(step)
         self._engine.advance(self._state, step, self.ledger)
         if step.keep:
@@ -88,7 +94,10 @@ class JointBatch:
     # ------------------------------------------------------------------ state
 
     def snapshot(self, where: Index | None = None) -> JointState:
-        """A copy of the state of all joints, or of those that `where` names, in that order."""
+        """A copy of the state of all joints, or of those that `where` names, in that order.
+
+        Raises ValueError for a wrong index.
+        """
         index = None if where is None else self._index(where)
         return JointState(self.law.fingerprint, self._rows(index))
 
@@ -125,8 +134,8 @@ class JointBatch:
     def reset(self, index: Index | None = None, mated: bool = True) -> None:
         """Return the joints at `index` (all if None) to their start: new contacts.
 
-        Mated ones to the virgin state, others to the start of faces that have never met, as
-        `JointLaw.joint` has it.
+        If `mated` to the virgin state, else to the start of faces that have never met, as
+        `JointLaw.joint` has it. Raises ValueError for a wrong index, or a law that is always mated.
         """
         start = 0.0 if mated else self.law.tables.unmated_start
         which = np.arange(self._n) if index is None else self._index(index)
@@ -138,12 +147,18 @@ class JointBatch:
             self.unbond(which)
 
     def unbond(self, index: Index) -> None:
-        """Break bond or cohesion of the joints at `index`: faces that meet anew have none."""
+        """Break bond or cohesion of the joints at `index`: faces that meet anew have none.
+
+        Raises ValueError for a wrong index, if the law has any.
+        """
         if (row := self.law.tables.first.get("damage")) is not None:
             self._state[at(self._state, self._index(index), row)] = 1.0
 
     def resize(self, n: int) -> None:
-        """Change the number of joints; joints beyond the old number are new and mated."""
+        """Change the number of joints to n; joints beyond the old number are new and mated.
+
+        Raises ValueError where n is no whole number >= 0.
+        """
         n = integer("n", n, 0)
         held, rows, lanes = self._state.shape
         if n < self._n:
@@ -183,7 +198,8 @@ class JointBatch:
 
         mass: reduced mass m1 m2/(m1 + m2) in kg; area: in m2; numbers or (n,). Infinite where
         nothing touches. Joints that close or shear further grow stiffer: ask again, or take a
-        margin. As for `JointLaw.critical_time_step`, rotation is not counted.
+        margin. As for `JointLaw.critical_time_step`, rotation is not counted. Raises ValueError for
+        other shapes or numbers that are not > 0.
         """
         for name, given in (("mass", mass), ("area", area)):
             if (shape := np.shape(given)) not in ((), (self._n,)):

@@ -34,7 +34,11 @@ class _OfOne(Generic[T]):
 class Joint:
     """One joint: as `JointBatch`, with vectors (dim,) and a matrix (dim, dim).
 
-    batch: of one joint, which it takes over; a new one by default.
+    law: of the joint; `law.joint()` makes one. batch: of one joint, which it takes over; a new one
+    by default.
+
+    >>> joint = law.joint()
+    >>> F, C = joint.update([2e-7, 0.0, 0.0])
     """
 
     def __init__(self, law: Any, batch: JointBatch | None = None) -> None:
@@ -47,16 +51,19 @@ class Joint:
         return Joint(self.law, copy(self._batch))
 
     def update(self, d: ArrayLike, tangent: bool = True) -> tuple[Array, Array | None]:
-        """Advance by the increment d (dim,) in m: F (dim,) in Pa, C (dim, dim) in Pa/m."""
+        """Advance by the increment d (dim,) in m: F (dim,) in Pa, C (dim, dim) in Pa/m.
+
+        tangent: without it C is None, and the step is faster. Raises as `JointBatch.update`.
+        """
         return self._step(d, tangent, keep=True)
 
     def trial(self, d: ArrayLike, tangent: bool = True) -> tuple[Array, Array | None]:
-        """As `update`, but the state is left untouched."""
+        """As `update` of d, tangent or not, but the state is left untouched. Raises the same."""
         return self._step(d, tangent, keep=False)
 
     def _step(self, d: ArrayLike, tangent: bool, keep: bool) -> tuple[Array, Array | None]:
         step = self._steps[bool(tangent)]
-        step.d[0] = increments(d, (self.law.dim,))
+        step.d[0] = increments(d, step.d.shape[1:])
         step.keep = keep
         self._batch.take(step)
         return step.F[0].copy(), None if step.C is None else step.C[0].copy()
@@ -66,11 +73,14 @@ class Joint:
         return self._batch.snapshot()
 
     def restore(self, state: JointState) -> None:
-        """Return to a snapshot. Raises ValueError if another law wrote it."""
+        """Return to `state`, a snapshot. Raises ValueError if another law wrote it."""
         self._batch.restore(state)
 
     def reset(self, mated: bool = True) -> None:
-        """Return to the start: the virgin state, or that of faces that have never met."""
+        """Return to the start: the virgin state, or that of faces that have never met.
+
+        mated: which of the two. Raises ValueError for a law that is always mated.
+        """
         self._batch.reset(mated=mated)
 
     def measures(self) -> Measures:

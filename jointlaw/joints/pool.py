@@ -18,7 +18,11 @@ class JointPool:
     A key is whatever names a contact as long as it lasts, such as the pair of its body numbers.
     The joints live in `batch`; `assign` or `add` tell their places there, for
     `batch.update(d, where=places)`. A place that falls free goes to a later contact, whose joint
-    starts anew.
+    starts anew. law, ledger: as of `JointBatch`.
+
+    >>> pool = jl.JointPool(law)
+    >>> places = pool.assign([(1, 2), (1, 3)])
+    >>> F, _ = pool.batch.update(np.full((2, 3), 1e-8), where=places)
     """
 
     def __init__(self, law: Any, ledger: bool = True) -> None:
@@ -40,7 +44,10 @@ class JointPool:
         return np.fromiter(self._place.values(), np.intp, len(self._place))
 
     def assign(self, keys: Iterable[Hashable], mated: bool = True) -> Places:
-        """Hold just these contacts: the others are dropped, new ones added; their places (n,)."""
+        """Hold just these contacts: the others are dropped, new ones added; their places (n,).
+
+        keys, mated: as of `add`, which raises the same.
+        """
         wanted = list(keys)
         self.drop(self._place.keys() - set(wanted))
         return self.add(wanted, mated)
@@ -48,8 +55,8 @@ class JointPool:
     def add(self, keys: Iterable[Hashable], mated: bool = True) -> Places:
         """Places (n,) of the joints of these contacts; those not held yet get new joints.
 
-        mated: whether the faces of the new ones fit each other, or have never met
-        (`JointLaw.joint`).
+        keys: of n contacts. mated: whether the faces of the new ones fit each other, or have never
+        met (`JointLaw.joint`). Raises ValueError where a law is always mated.
         """
         wanted = list(keys)
         new = [key for key in dict.fromkeys(wanted) if key not in self._place]
@@ -65,7 +72,7 @@ class JointPool:
         return np.array([self._place[key] for key in wanted], np.intp)
 
     def drop(self, keys: Iterable[Hashable]) -> None:
-        """Forget these contacts and their history. Raises KeyError for a key that is not held."""
+        """Forget the contacts of these `keys`. Raises KeyError for a key that is not held."""
         gone = list(dict.fromkeys(keys))
         places = [self._place[key] for key in gone]
         self.batch.reset(places)

@@ -59,7 +59,11 @@ class NonFiniteError(FloatingPointError, ValueError):
 
 
 def load_state(path: str | Path) -> JointState:
-    """Read a state that `JointState.save` wrote. Raises ValueError if the file is not one."""
+    """Read a state that `JointState.save` wrote to `path`. Raises ValueError if it is none.
+
+    >>> joint.snapshot().save("joint.npz")
+    >>> joint.restore(jl.load_state("joint.npz"))
+    """
     path = Path(path)
     try:
         with path.open("rb") as stream:

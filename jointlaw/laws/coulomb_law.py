@@ -22,6 +22,8 @@ class CoulombLaw(Law, kind="coulomb"):
     dilation. docs/theory-incremental.md, "Coulomb's joint", tells how it differs from a `Bond`.
 
     Raises ValueError when a parameter is out of bounds.
+
+    >>> made = jl.CoulombLaw(normal_stiffness=1e10, shear_stiffness=5e9, friction=0.7, cohesion=1e5)
     """
 
     normal_stiffness: float = parameter("stiffness in closure", "Pa/m", above=0.0, high=LARGEST)

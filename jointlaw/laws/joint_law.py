@@ -40,6 +40,10 @@ class JointLaw(Law, kind="joint"):
     """A micromechanical, anisotropic, path-dependent law for a rough rock joint (Misra 1999).
 
     Raises ValueError when a parameter is out of bounds or the virgin curve is not convex.
+
+    >>> asperity = jl.Asperity(K=2.0e8, lam=1.2, eta=0.5, mu=0.3)
+    >>> made = jl.JointLaw(orientation=jl.Orientation(a=3.0), asperity=asperity,
+    ...                    asperity_density=1e10)
     """
 
     orientation: Orientation = parameter(
@@ -118,6 +122,7 @@ class JointLaw(Law, kind="joint"):
         """Asperities in touch per m2 at this closure (m), Eq. 11.
 
         With `direction` = (theta, phi) in rad: per m2 and steradian in that direction, Eq. 16.
+        Raises ValueError for numbers that are not finite.
         """
         y = finite("closure", closure, "m")
         share = np.where(y > 0, 1.0, 0.0)
@@ -127,7 +132,7 @@ class JointLaw(Law, kind="joint"):
         return (self.asperity_density * share * density)[()]
 
     def crushed(self, closure: float) -> float:
-        """As `Law.crushed`."""
+        """As `Law.crushed` at this closure (m). Raises nothing."""
         if self.heights is None or math.isinf(self.asperity.yield_interference):
             return 0.0
         return float(self.contacts(closure) / self.asperity_density)
@@ -151,7 +156,7 @@ class JointLaw(Law, kind="joint"):
         resolutions: those to measure; None takes a spread of 42 and the named ones. joints: of the
         batch that is timed; 0 times nothing. seconds: spent on each timing. Errors are those of the
         standard paths, as shares of each path's largest traction, and of the friction and dilation
-        angle under slip, in degrees.
+        angle under slip, in degrees. Raises ValueError for an unknown resolution.
         """
         from ..accuracy.tradeoff import tradeoff  # loads scipy.interpolate, slow to import
 

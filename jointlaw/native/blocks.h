@@ -45,7 +45,7 @@ typedef struct {
   double *rise, *carried, *inside; /* (2, k) */
   unsigned char *own;              /* (2, k) */
   double *was;                     /* (k,): length before a corner went on to another edge */
-  double *offset;                  /* (k,): closure offset */
+  double *offset;                  /* (k,): closure offset; below zero at any depth */
   long long *out;                  /* (k,): work */
 
   const jl_pool *pools;

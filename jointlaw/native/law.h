@@ -381,37 +381,38 @@ JL_IN jl_amount_sums jl_no_amounts(void)
   return none;
 }
 
-typedef struct { /* of the cells of facets: G of those at their limit; q^2/kappa; whether all are */
-  jl_real held, sheared, slips;
-} jl_cell_sums;
-
-/* One cell with the sliders q, its G and kappa, the friction limit of q over G, Phi of its facet */
-JL_IN void jl_measure_cell(jl_real qs, jl_real qt, jl_real G, jl_real kappa, jl_real strength,
-                           jl_real force, jl_cell_sums *cells)
+/* Facets from number `at` on, as jl_facets_now leaves them */
+JL_IN void jl_measure_facets(const jlaw_law *law, jl_numbers n, int at, const jl_facets *o,
+                             jl_amount_sums *sum)
 {
-  const jl_real q2 = qs * qs + qt * qt;
-  const jl_yes stiff = kappa > JLAW_TINY;
-  const jl_yes limited = jl_root(q2) >= strength * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * force);
-  cells->held += jl_only(limited, G);
-  cells->slips = jl_only(limited, cells->slips);
-  cells->sheared += jl_only(stiff, q2 / jl_pick(stiff, kappa, 1.0));
-}
-
-/* Facets with these cells, at y1 and z1 */
-JL_IN void jl_measure_facets(const jlaw_law *law, const double *f, const jl_facets *o,
-                             const jl_cell_sums *cells, jl_amount_sums *sum)
-{
+  const int M = law->facets, D = law->cells, some = M - at < JL_TOGETHER ? M - at : JL_TOGETHER;
+  const double *f = jl_facet_of(law, at), *cell = jl_cell_of(law, at);
+  jl_real held = jl_each(0.0), sheared = held, slips = jl_each(1.0); /* G of cells at their limit */
+  for (int i = 0; i < D && jl_any(o->y1 > jl_column(cell, JLAW_LOW)); i++) {
+    jl_real G, kappa;
+    const int row = jl_slider_row(law) + at * D + i;
+    const jl_real qs = jl_take(n, row, D, some), qt = jl_take(n, row + M * D, D, some);
+    const jl_real q2 = qs * qs + qt * qt;
+    jl_hold_cell(cell, o->y1, o->f1, o->k1, o->z1, o->fz1, o->kz1, law->yields, &G, &kappa);
+    const jl_yes stiff = kappa > JLAW_TINY;
+    const jl_yes limited =
+        jl_root(q2) >= o->strength * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * o->f1);
+    held += jl_only(limited, G);
+    slips = jl_only(limited, slips);
+    sheared += jl_only(stiff, q2 / jl_pick(stiff, kappa, 1.0));
+    cell += JLAW_ROWS * JLAW_LANES;
+  }
   const jl_yes touches = o->y1 > o->z1;
   const jl_real force = jl_only(touches, jl_larger(o->f1 - o->fz1, jl_each(0.0))),
                 share = jl_each(jl_column(f, JLAW_SHARE));
-  const jl_real part = jl_only(force > 0.0, cells->held / jl_pick(force > 0.0, force, 1.0));
-  sum->sliding += share * jl_only(touches, cells->slips);
+  const jl_real part = jl_only(force > 0.0, held / jl_pick(force > 0.0, force, 1.0));
+  sum->sliding += share * jl_only(touches, slips);
   sum->slipping += share * jl_smaller(part, jl_each(1.0));
   sum->separated += share * jl_pick(touches, 0.0, 1.0);
   jl_real normal = jl_psi(law, o->y1);
   if (law->yields) normal = normal - jl_psi(law, o->z1) - o->fz1 * (o->y1 - o->z1);
   sum->normal += jl_column(f, JLAW_POTENTIAL) * jl_only(touches, jl_larger(normal, jl_each(0.0)));
-  sum->sheared += jl_column(f, JLAW_COMPLIANCE) * cells->sheared;
+  sum->sheared += jl_column(f, JLAW_COMPLIANCE) * sheared;
 }
 
 /* --------------------------------------------------------------------------- one step */
@@ -523,12 +524,11 @@ JL_IN void jl_slide_tangent(const double *f, const double *cell, const jl_slider
 
 /* One depth cell of facets: from the sliders before the step to those after it */
 JL_IN void jl_slide(const double *f, const double *cell, jl_facets *o, jl_real *qs, jl_real *qt,
-                    jl_kind k, jl_cell_sums *seen)
+                    jl_kind k)
 {
   jl_sliders c;
   jl_cells_of(cell, o, &c, k.yields);
-  c.strength = jl_each(jl_column(f, JLAW_STRENGTH));
-  if (k.fades) c.strength = c.strength * o->end.gamma;
+  c.strength = o->strength;
   if (k.wears) {
     jl_wear_sliders(cell, o, &c, qs, qt, k);
     o->us += *qs;
@@ -539,7 +539,6 @@ JL_IN void jl_slide(const double *f, const double *cell, jl_facets *o, jl_real *
   o->qt += *qt;
   if (k.ledger) o->lost += jl_friction_loss(&c);
   if (k.tangent) jl_slide_tangent(f, cell, &c, o, k);
-  if (seen) jl_measure_cell(*qs, *qt, c.G1, c.k1, c.strength, o->f1, seen);
 }
 
 /* C += along g^T + E^T B E of facets; where the flattened depth moves, less softening g_z^T */
@@ -677,17 +676,18 @@ JL_IN void jl_step_facets(const jlaw_law *law, int at, const jl_motion *m, jl_nu
   }
   o.z0 = o.z1 = o.fz0 = o.fz1 = o.kz0 = o.kz1 = jl_each(0.0);
   if (k.yields) jl_press(law, f, n, kept, at, some, m, &o);
-  jl_cell_sums cells = {jl_each(0.0), jl_each(0.0), jl_each(1.0)};
+  o.strength = jl_each(jl_column(f, JLAW_STRENGTH));
+  if (k.fades) o.strength = o.strength * o.end.gamma;
   for (int i = 0; i < D; i++, cell += JLAW_ROWS * JLAW_LANES) {
     const jl_of_facet low = jl_column(cell, JLAW_LOW);
     if (!jl_any((o.y0 > low) | (o.y1 > low) | (o.yw > low))) break; /* nor does what is deeper */
     const int row = k.dim + 1 + at * D + i;
     jl_real qs = jl_take(n, row, D, some), qt = jl_take(n, row + M * D, D, some);
-    jl_slide(f, cell, &o, &qs, &qt, k, seen ? &cells : (jl_cell_sums *) 0);
+    jl_slide(f, cell, &o, &qs, &qt, k);
     jl_put(n, row, D, some, qs);
     jl_put(n, row + M * D, D, some, qt);
   }
-  if (seen) jl_measure_facets(law, f, &o, &cells, seen);
+  if (seen) jl_measure_facets(law, n, at, &o, seen);
   if (k.yields) {
     sum->crushed += jl_column(f, JLAW_POTENTIAL) * jl_crush(f, &o);
     if (k.wears) jl_flatten_facets(o.yw, o.z0, o.fz0, &o.fw, &o.kw);
@@ -827,28 +827,18 @@ JL_IN void jl_add_elements(const jlaw_law *law, jl_numbers n, jl_of_joint stored
 
 JL_IN jl_amounts jl_measure(const jlaw_law *law, jl_numbers n)
 {
-  const int M = law->facets, D = law->cells;
+  const int M = law->facets;
   jl_amount_sums sum[JL_SUMS];
   jl_amounts all;
   all.reach = jl_each_joint(-DBL_MAX);
   for (int i = 0; i < JL_SUMS; i++) sum[i] = jl_no_amounts();
   for (int at = 0; at < M; at += JL_TOGETHER) {
-    const int some = M - at < JL_TOGETHER ? M - at : JL_TOGETHER;
-    const double *f = jl_facet_of(law, at), *cell = jl_cell_of(law, at);
-    jl_cell_sums cells = {jl_each(0.0), jl_each(0.0), jl_each(1.0)};
     jl_facets o;
     jl_facets_now(law, n, at, &o);
-    for (int i = 0; i < D && jl_any(o.y1 > jl_column(cell, JLAW_LOW)); i++) {
-      jl_real G, kappa;
-      const int row = jl_slider_row(law) + at * D + i;
-      const jl_real qs = jl_take(n, row, D, some), qt = jl_take(n, row + M * D, D, some);
-      jl_hold_cell(cell, o.y1, o.f1, o.k1, o.z1, o.fz1, o.kz1, law->yields, &G, &kappa);
-      jl_measure_cell(qs, qt, G, kappa, o.strength, o.f1, &cells);
-      cell += JLAW_ROWS * JLAW_LANES;
-    }
-    jl_measure_facets(law, f, &o, &cells, sum + at / JL_TOGETHER % JL_SUMS);
+    jl_measure_facets(law, n, at, &o, sum + at / JL_TOGETHER % JL_SUMS);
 #ifdef JLAW_ABREAST
-    for (int l = 0; l < some; l++) all.reach = all.reach > o.y1[l] ? all.reach : o.y1[l];
+    for (int l = 0; l < JL_TOGETHER && at + l < M; l++)
+      all.reach = all.reach > o.y1[l] ? all.reach : o.y1[l];
 #else
     all.reach = jl_larger(all.reach, o.y1);
 #endif

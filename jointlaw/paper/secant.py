@@ -64,6 +64,8 @@ def secant(law: JointLaw, delta: ArrayLike, contact: str = "exact") -> Secant:
 
     Raises ValueError for a wrong shape, a number that is not finite or beyond `law.largest_reach`,
     an unknown `contact`, or "series" with eta >= 1.
+
+    >>> F = jl.secant(law, [2e-7, 1e-7, 0.0]).F
     """
     d = numbers("delta", delta, "m")
     if not isinstance(law, JointLaw):

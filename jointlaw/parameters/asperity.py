@@ -50,7 +50,10 @@ class Asperity:
     def hertz_mindlin(cls, G: float, nu: float, R: float, mu: float) -> "Asperity":
         """Hertz-Mindlin contact of elastic spheres, Eq. 34.
 
-        G: shear modulus (Pa); nu: Poisson's ratio, 0..0.5; R: asperity radius of curvature (m).
+        G: shear modulus (Pa); nu: Poisson's ratio, 0..0.5; R: asperity radius of curvature (m); mu:
+        friction coefficient. Raises ValueError for a number out of its bounds.
+
+        >>> asperity = jl.Asperity.hertz_mindlin(G=20e9, nu=0.25, R=1e-3, mu=0.55)
         """
         G, R = more_than("G", G, 0.0), more_than("R", R, 0.0)
         nu = number("nu", nu)
@@ -61,6 +64,9 @@ class Asperity:
 
     @classmethod
     def linear(cls, kn: float, ks: float, mu: float) -> "Asperity":
-        """Constant normal and shear stiffness kn, ks in N/m (section 3 of the paper)."""
+        """Constant normal and shear stiffness kn, ks in N/m, friction mu (section 3 of the paper).
+
+        Raises ValueError for a number out of its bounds.
+        """
         kn, ks = more_than("kn", kn, 0.0), more_than("ks", ks, 0.0)
         return cls(K=ks, lam=kn / ks, eta=0.0, mu=mu)

@@ -27,6 +27,8 @@ class Bond:
     stress/cohesion)^2 = 1, softens linearly in each mode, and never heals.
 
     Raises ValueError when a parameter is out of bounds.
+
+    >>> bond = jl.Bond(normal_stiffness=1e12, shear_stiffness=1e12, tension=1e6, cohesion=2e6)
     """
 
     normal_stiffness: float = parameter(

@@ -46,6 +46,8 @@ class Orientation:
     """Density of asperity contact orientations, Eq. 14.
 
     Raises ValueError when a bound of Eq. 18 is broken.
+
+    >>> orientation = jl.Orientation(a=3.0, b=0.5, c=0.1)
     """
 
     a: float = parameter(
@@ -68,8 +70,10 @@ class Orientation:
     def from_moments(cls, mean: float, variance: float, c: float = 0.0) -> Self:
         """The a and b that give inclinations of this mean (rad) and variance (rad^2): Eq. 17.
 
-        Where two values of b fit (the variance over the squared mean peaks near b = 1.4), the
-        smaller is taken.
+        c: as of the class. Where two values of b fit (the variance over the squared mean peaks near
+        b = 1.4), the smaller is taken. Raises ValueError where none fits.
+
+        >>> orientation = jl.Orientation.from_moments(mean=0.2, variance=0.0056)
         """
         mean = more_than("mean", mean, 0.0)
         variance = more_than("variance", variance, 0.0)
@@ -99,7 +103,10 @@ class Orientation:
         return (36 * math.pi - 108 + 20 * b - 6 * b * math.pi - b * b) / (36 * self.a**2)
 
     def density(self, theta: ArrayLike, phi: ArrayLike = 0.0) -> Any:
-        """Density per solid angle (1/sr) at inclination theta and azimuth phi in rad, Eq. 14."""
+        """Density per solid angle (1/sr) at inclination theta and azimuth phi in rad, Eq. 14.
+
+        Raises ValueError for angles that are not finite.
+        """
         th, ph = finite("theta", theta, "rad"), finite("phi", phi, "rad")
         # a sin(a theta)/sin(theta) -> a^2 as theta -> 0, by the ratio of two sinc functions
         ratio = self.a**2 * np.sinc(self.a * th / np.pi) / np.sinc(th / np.pi)

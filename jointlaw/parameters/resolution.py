@@ -9,7 +9,10 @@ from .declared import check, declared, parameter
 @declared
 @dataclass(frozen=True)
 class Resolution:
-    """Number of nodes that the law sums over."""
+    """Number of nodes that the law sums over.
+
+    >>> fine = replace(law, resolution=jl.Resolution(u=5, phi=7, depth=8))
+    """
 
     u: int = parameter(
         "rings of one inclination each (Gauss rule of the density, crowded to the steepest)",

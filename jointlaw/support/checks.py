@@ -75,7 +75,7 @@ def numbers(name: str, value: Any, unit: str) -> Array:
             raise TypeError
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{name} = {value!r} is not an array of numbers ({unit})") from None
-    if np.ma.is_masked(value):
+    if isinstance(value, np.ma.MaskedArray) and value.mask.any():
         raise ValueError(f"{name} has masked numbers; give values for them, or leave them out")
     if array.dtype == np.float64:
         return array

@@ -100,13 +100,16 @@ class JointTable:
         row, w, secant = self.at(u)
         K22, K33, K23 = self.shear_matrix(row, w)
         stiffness = (K22 + K33) / 2 + (K22 - K33) / 2 * np.cos(2 * psi) + K23 * np.sin(2 * psi)
-        by_closure = (secant * u, secant, between(self.kn_tangent, row, w), stiffness)
-        values = [np.where(u > 0, value, 0.0) for value in by_closure]
-        for column in (self.peak_friction, self.mobilised_friction, self.dilation):
-            values.append(around(column, psi, row, w))
-        names = [*BY_CLOSURE.values(), *BY_AZIMUTH.values()][1:]  # all but the closure
-        found = (value.reshape(shape)[()] for value in values)
-        return SimpleNamespace(**dict(zip(names, found, strict=True)))
+        while_closed = {
+            "normal_stress": secant * u,
+            "kn_secant": secant,
+            "kn_tangent": between(self.kn_tangent, row, w),
+            "shear_stiffness": stiffness,
+        }
+        found = {name: np.where(u > 0, value, 0.0) for name, value in while_closed.items()}
+        for name in ("peak_friction", "mobilised_friction", "dilation"):
+            found[name] = around(getattr(self, name), psi, row, w)
+        return SimpleNamespace(**{name: value.reshape(shape)[()] for name, value in found.items()})
 
     def follow(self, delta: ArrayLike) -> Array:
         """Traction (m, 3) in Pa that a host computes from the table along a path delta (m, 3) in m.
@@ -133,7 +136,8 @@ class JointTable:
 
         f (2, n), K (3, n): shear traction and stiffness at the beginning; closure (n,) at the end;
         spin (n,) in rad turns f. Shear is elastic with d, scaled down with K when the joint
-        softens, and capped at friction times normal stress in the direction of the force.
+        softens, and capped at friction times normal stress in the direction of the force. Raises
+        nothing.
         """
         row, w, secant = self.at(closure)
         normal = np.where(closure > 0, secant * closure, 0.0)
@@ -156,7 +160,10 @@ class JointTable:
         return np.array([normal, f[0], f[1]]), now
 
     def at(self, closure: Array) -> tuple[NDArray[np.intp], Array, Array]:
-        """Rows, weights of linear interpolation and secant normal stiffness (Pa/m), each (n,)."""
+        """Rows, weights of linear interpolation and secant normal stiffness (Pa/m), each (n,).
+
+        closure: (n,) in m. Raises nothing.
+        """
         row = np.clip(np.searchsorted(self.closure, closure, "right") - 1, 0, len(self.closure) - 2)
         low, end = self.closure[row], self.closure[-1]
         w = np.clip((closure - low) / (self.closure[row + 1] - low), 0.0, 1.0)
@@ -168,7 +175,10 @@ class JointTable:
         return row, w, secant
 
     def shear_matrix(self, row: NDArray[np.intp], w: Array) -> Array:
-        """Initial shear stiffness K22, K33, K23 (3, n) in Pa/m at these rows and weights."""
+        """Initial shear stiffness K22, K33, K23 (3, n) in Pa/m at these rows and weights w.
+
+        row, w: (n,) each, as `at` gives them. Raises nothing.
+        """
         mean, c, s = (between(part, row, w) for part in self._harmonics)
         return np.array([mean + c, mean - c, s])
 
@@ -182,7 +192,7 @@ class JointTable:
     # ------------------------------------------------------- what the table drops
 
     def report(self, law: Any) -> Report:
-        """What the table drops: its error against its JointLaw on a suite of paths."""
+        """What the table drops: its error against its `law` on a suite of paths. Raises nothing."""
         report = Report()
         for name, azimuth, corners in _paths(self.closure[-1], self.metadata["shear_limit"]):
             psi = np.radians(azimuth)
@@ -213,7 +223,10 @@ class JointTable:
         return result
 
     def save(self, path: str | Path) -> None:
-        """Write text for `numpy.genfromtxt(path, names=True)`: names first, then metadata."""
+        """Write text for `numpy.genfromtxt(path, names=True)`: names first, then metadata.
+
+        Raises OSError where it cannot be written.
+        """
         path, columns = Path(path), self.columns
         part = path.with_name(path.name + ".part")  # half a table would still look like one
         with part.open("w", encoding="utf-8") as file:
@@ -225,7 +238,7 @@ class JointTable:
 
 
 def load_table(path: str | Path) -> JointTable:
-    """Read a table that `JointTable.save` wrote. Raises ValueError if the file is not one."""
+    """Read a table that `JointTable.save` wrote to `path`. Raises ValueError if it is none."""
     try:
         _, marker, rest = Path(path).read_text("utf-8", "replace").partition(MARKER)
         if not marker:
@@ -265,11 +278,10 @@ def between(values: Array, row: NDArray[np.intp], w: Array) -> Array:
 def around(values: Array, psi: Array, row: NDArray[np.intp], w: Array) -> Array:
     """Linear interpolation in azimuth psi and between rows of values (rows, azimuths)."""
     azimuths = values.shape[1]
-    place = np.mod(psi, np.pi) * (azimuths / np.pi)
-    a = np.floor(place).astype(int) % azimuths
-    x, b = place - np.floor(place), (a + 1) % azimuths
-    low = values[row, a] * (1 - w) + values[row + 1, a] * w
-    high = values[row, b] * (1 - w) + values[row + 1, b] * w
+    whole, x = np.divmod(np.mod(psi, np.pi) * (azimuths / np.pi), 1.0)
+    a = whole.astype(int)
+    columns = (a % azimuths, (a + 1) % azimuths)
+    low, high = (values[row, k] * (1 - w) + values[row + 1, k] * w for k in columns)
     return np.asarray(low * (1 - x) + high * x)
 
 

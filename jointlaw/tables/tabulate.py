@@ -43,6 +43,10 @@ def tabulate(
     steps: steps of the shear path, quadratically graded.
 
     Raises ValueError for a bad argument.
+
+    >>> table = jl.tabulate(law, azimuths=4, tolerance=1e-2)
+    >>> table.save("joint.txt")
+    >>> same = jl.load_table("joint.txt")
     """
     require_3d(law)
     whole, finer, limit = law, law, LONG * law.closure_range

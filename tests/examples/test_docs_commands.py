@@ -34,7 +34,8 @@ def is_long(line):
 
 
 @pytest.fixture
-def _files_that_the_reader_has():
+def _files_that_the_reader_has(monkeypatch):
+    monkeypatch.setenv("BROWSER", "true")  # opens nothing
     z = gaussian_filter(np.random.default_rng(0).standard_normal((400, 400)), 5)
     np.savetxt("scan.csv", 400 * z, delimiter=",")
     Path("block.toml").write_text(blocks("docs/blocks.md", "toml")[0])

@@ -89,23 +89,21 @@ def test_jointlaw_never_imports_the_demo():
 
 
 def public_names():
-    """Full names of what the pages of docs/api show; "MODULE.*" where they show all of a module."""
-    names = set()
-    for page in (ROOT / "docs/api").glob("*.md"):
-        inside, module = "", ""
-        for line in page.read_text(encoding="utf-8").splitlines():
-            if found := re.match(r"\.\. currentmodule:: (\S+)", line):
-                inside = f"{found[1]}."
-            elif found := re.match(r"\.\. auto(\w+):: (\S+)", line):
-                module = found[2] if found[1] == "module" else ""
-                names.add(found[2] if "." in found[2] else inside + found[2])
-            elif module and (found := re.match(r"   :members:(.*)", line)):
-                names |= {f"{module}.{name.strip() or '*'}" for name in found[1].split(",")}
+    """Full names of what docs/api.md shows; "MODULE.*" where it shows all of a module."""
+    names, inside, module = set(), "", ""
+    for line in (ROOT / "docs/api.md").read_text(encoding="utf-8").splitlines():
+        if found := re.match(r"\.\. currentmodule:: (\S+)", line):
+            inside = f"{found[1]}."
+        elif found := re.match(r"\.\. auto(\w+):: (\S+)", line):
+            module = found[2] if found[1] == "module" else ""
+            names.add(found[2] if "." in found[2] else inside + found[2])
+        elif module and (found := re.match(r"   :members:(.*)", line)):
+            names |= {f"{module}.{name.strip() or '*'}" for name in found[1].split(",")}
     return names
 
 
 def test_the_example_host_imports_public_names_only():
-    """What dem_demo takes of jointlaw stands on a page of docs/api: a host of others has it too."""
+    """What dem_demo takes of jointlaw stands in docs/api.md: a host of others has it too."""
     public, taken = public_names(), set()
     for path in trees():
         for node in ast.walk(trees()[path]) if path.startswith("dem_demo/") else ():

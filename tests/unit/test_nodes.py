@@ -5,7 +5,7 @@ import pytest
 
 import jointlaw as jl
 from jointlaw.discretisation.facets import facets
-from jointlaw.discretisation.nodes import UNUSED, azimuths, depth_nodes, inclinations
+from jointlaw.discretisation.nodes import azimuths, depth_nodes, inclinations
 from jointlaw.discretisation.virgin_curve import virgin_curve
 
 
@@ -76,11 +76,3 @@ def test_cells_rise_and_scale_with_the_unit_of_length(formation):
             found.append(depth_nodes(curve, 1e-6 * unit, slope, np.full(3, cells)))
         assert (np.diff(found[0], axis=1) > 0).all()
         np.testing.assert_array_equal(found[1][:, :-1], 4.0 * found[0][:, :-1])  # to the bit
-
-
-def test_light_facets_have_fewer_cells_and_all_are_counted():
-    k = jl.presets.load("westerly-smooth").tables.asperities
-    cells = np.count_nonzero(k.depth[:, :-1] < UNUSED, axis=1)
-    assert k.cells == cells.max() > cells.min() == 1
-    assert k.sliders == cells.sum() < len(cells) * k.cells
-    assert (np.diff(cells[np.argsort(k.weight)]) >= 0).all()  # c = 0: weights of a ring are equal

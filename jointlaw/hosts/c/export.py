@@ -25,6 +25,8 @@ def include_dir() -> str:
 def export_c(law: Law, directory: str | Path, name: str = "joint") -> list[str]:
     """Write all that a C or C++ code needs to run this law; the folder may be copied away.
 
+    >>> names = jl.export_c(law, "joint-for-c")
+
     law: any law. directory: made if missing; files of the same names are replaced. name: of the
     tables, an identifier of C.
 

@@ -19,6 +19,8 @@ def export_fem(
 ) -> list[str]:
     """Write all that a finite-element code needs to run this joint; the folder may be copied away.
 
+    >>> names = jl.export_fem(law, "joint-for-fem")
+
     law: a law that shears; with a plane it is for 2-D alone. directory: made if missing; files of
     the same names are replaced. name: of the behaviours, an identifier of C; NAME is a cohesive
     zone, NAME_layer a thin layer of solid elements. seating: normal stress in Pa, > 0, of the

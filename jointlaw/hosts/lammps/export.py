@@ -23,6 +23,8 @@ def export_lammps(law: Law, directory: str | Path, name: str = "joint") -> list[
     Writes `NAME.jlaw` (the tables), `jointlaw.h` (the law), the plug-in's source and `build.sh`,
     the script `in.tower`, `joint.in` (what it needs to know of this law) and `law.toml`. Returns
     the names. Raises ValueError for a law that does not fit, before anything is written.
+
+    >>> names = jl.export_lammps(law, "joint-for-lammps")
     """
     require_3d(law)
     texts = {

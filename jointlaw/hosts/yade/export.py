@@ -26,6 +26,8 @@ def export_yade(law: Law, directory: str | Path, **options: Any) -> JointTable:
     `joint_table.py` (the adapter: YADE and numpy alone), the script `settle_and_incline.py` and
     `summary.json`. Returns the table. Raises ValueError for a law or option that cannot be
     tabulated, before anything is written.
+
+    >>> table = jl.export_yade(law, "joint-for-yade", tolerance=1e-2, azimuths=4)
     """
     require_3d(law)
     table = tabulate(law, **options)

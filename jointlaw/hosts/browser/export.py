@@ -1,0 +1,80 @@
+"""A joint in a browser: the law as WebAssembly, tables of the presets and a page around them."""
+
+import base64
+import json
+from pathlib import Path
+
+from ... import presets
+from ...laws.law import Law
+from ...native.layout import ELEMENTS, LANES, NUMBERS, ROWS, WHOLE, first_columns
+from ...native.layout import Law as Struct
+from ...support.files import write_files
+from ..c.export import packed
+
+HERE = Path(__file__).parent
+WASM = "joint.wasm"  # by builder/wasm.py; in the repository: a reader of the page needs no compiler
+SCRIPTS = ("law.js", "test.js", "pictures.js", "story.js", "page.js")
+_PAGE = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width">
+<title>A joint in your browser</title>
+</head>
+<body style="font-family: system-ui, sans-serif; max-width: 60rem; margin: auto; padding: 0 0.6rem">
+<style>:root {{ color-scheme: light dark; }}</style>
+{}
+<script>
+{}
+</script>
+</body>
+</html>
+"""
+
+
+def export_browser(directory: str | Path) -> Path:
+    """Write `index.html`, a joint to drag in a browser, with all that it needs; returns its path.
+
+    directory: made if missing; a file of that name is replaced. Raises OSError where it cannot be
+    written.
+    """
+    part = (HERE / "joint.html").read_text(encoding="utf-8")
+    return write_files(directory, {"index.html": _PAGE.format(part, script())}) / "index.html"
+
+
+def script() -> str:
+    """The script of that page: tables of the presets, the law, and what draws it."""
+    about = {
+        "numbers": {name: getattr(Struct, name).offset for name in (*WHOLE, *NUMBERS)},
+        "begin": Struct.facet.offset,
+        "columns": first_columns(),
+        "rows": list(ROWS),
+        "lanes": LANES,
+        "wasm": _text((HERE / WASM).read_bytes()),
+    }
+    rocks = {}
+    for name in presets.names():
+        law = presets.load(name)
+        o, p = law.orientation, law.asperity
+        numbers = {"a": o.a, "b": o.b, "c": o.c, "mu": p.mu, "range": law.closure_range}
+        rocks[name] = numbers | {"tables": _text(tables(law))}
+    parts = [(HERE / name).read_text(encoding="utf-8") for name in SCRIPTS]
+    return "".join(
+        [f'"use strict";\nconst JOINTLAW = {json.dumps(about | {"rocks": rocks})};\n', *parts]
+    )
+
+
+def tables(law: Law) -> bytes:
+    """A law's tables, as `take_law` of joint.c reads them: the numbers, then the arrays.
+
+    Raises ValueError for a law that joint.c does not run.
+    """
+    numbers, arrays = packed(law)
+    if numbers["dim"] != 3 or any(numbers[name] for name in ("yields", "wears", "rise", *ELEMENTS)):
+        raise ValueError("joint.c runs elastic laws in space, of asperities alone")
+    head = bytes(Struct(**numbers))[: Struct.facet.offset]
+    return b"".join([head, *(array.tobytes() for array in arrays.values())])
+
+
+def _text(data: bytes) -> str:
+    return base64.b64encode(data).decode()

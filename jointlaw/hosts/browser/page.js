@@ -1,0 +1,275 @@
+/* The page: controls, the hand, the address. */
+
+let exports, test, numbers, simpler = [], playing = null, drawn = false, spin = -0.6, resting = 0;
+const story = new Story();
+const MATINGS = [0.5, 1, 2, 3, 5, 8, 12, 20, 40, Infinity]; // mating length in closures at 10 MPa
+
+const rockName = () => part("preset").value;
+const rock = () => JOINTLAW.rocks[rockName()];
+
+// --------------------------------------------------------------------------------------- drawing
+
+function redraw() {
+  if (drawn || !test) return;
+  drawn = true;
+  requestAnimationFrame(draw);
+}
+
+function draw() {
+  drawn = false;
+  readColours();
+  story.look(test);
+  const facets = test.joint.look(), mark = story.step && !story.isDone ? story.step.mark : "";
+  drawScene(test, facets, numbers.mating, mark);
+  drawCurves(test, simpler);
+  drawHemisphere(test, facets, numbers.a, spin);
+  showNumbers();
+  showStory();
+  clearTimeout(resting);
+  resting = setTimeout(rest, 400);
+}
+
+/* Once nothing moves: what a screen reader tells, and the address */
+function rest() {
+  const last = test.rows.at(-1);
+  if (!last || playing) return;
+  part("status").textContent = `${test.says} ${part("told").textContent}`;
+  part("scene").setAttribute("aria-valuenow", three(test.slip / test.joint.length));
+  part("scene").setAttribute("aria-valuetext", part("told").textContent);
+  const { a, c, mu, mating } = numbers, legs = legsAsText(test.legs);
+  const state = { rock: rockName(), a, c, mu, mating, hold: test.hold, turn: test.degrees, path: legs };
+  history.replaceState(null, "", `#${new URLSearchParams(state)}`);
+}
+
+function showNumbers() {
+  const { joint } = test, [per, unit] = scale(joint.length), size = joint.length * per;
+  const last = test.rows.at(-1) || { normal: 0, shear: 0 };
+  part("told").textContent = `normal stress ${three(last.normal / 1e6)} MPa, shear stress ${three(last.shear / 1e6)} MPa, `
+    + `closure ${three(test.closure * per, size)} ${unit}, slip ${three(test.slip * per, size)} ${unit}`;
+  part("says").textContent = test.says;
+  const stored = joint.stored, lost = joint.dissipated, most = Math.max(stored + lost, 1e-300);
+  const joules = (x) => `${three(x, most)} J/m²`;
+  part("stored").textContent = joules(stored);
+  part("lost").textContent = joules(lost);
+  part("stored-bar").style.width = `${(100 * stored) / most}%`;
+  part("lost-bar").style.width = `${(100 * lost) / most}%`;
+  const held = test.hold === "stress";
+  part("level-name").textContent = held ? "Normal stress" : "Closure";
+  part("level").value = held ? (400 * test.level) / FULL_STRESS : 200 * (test.closure / joint.length);
+  part("level-told").textContent = held ? `${three(test.level / 1e6)} MPa` : `${three(test.closure * per, size)} ${unit}`;
+  part("direction").value = test.degrees;
+  part("direction-told").textContent = `${test.degrees}°`;
+  part("hold").value = test.hold;
+  for (const name of ["a", "c", "mu"]) (part(name).value = numbers[name]), (part(`${name}-told`).textContent = three(numbers[name]));
+  const { mating } = numbers;
+  part("mating-told").textContent = mating < Infinity ? `${three(mating * per)} ${unit}` : "endless";
+  part("scene").style.touchAction = held ? "pan-y" : "none";
+}
+
+function showStory() {
+  const { step, at, isDone } = story;
+  if (!step) return;
+  part("step").textContent = `${at + 1} of ${STORY.length}: ${step.name}. `;
+  part("tells").textContent = step.tells;
+  part("task").textContent = isDone ? `Done. ${at + 1 < STORY.length ? "Go on." : "That was the story: now try the numbers of the joint."}` : step.task;
+  part("next").disabled = at + 1 === STORY.length;
+  part("back").disabled = at === 0;
+  for (const place of document.querySelectorAll("#joint .meant")) place.classList.remove("meant");
+  for (const name of isDone ? ["next"] : step.meant) part(name).classList.add("meant");
+}
+
+// ------------------------------------------------------------------------------------ doing things
+
+/* Do it and draw; a step that the law refuses tells its reason and changes nothing */
+function guarded(what) {
+  try {
+    what();
+  } catch (error) {
+    playing = null;
+    test.says = error.message;
+  }
+  redraw();
+}
+
+/* A joint of this rock with these numbers, to which all these legs were done */
+function remake(legs) {
+  playing = null;
+  const { degrees, hold } = test || { degrees: 0, hold: "stress" };
+  guarded(() => {
+    const made = new Test(new Joint(exports, tablesOf(rock(), numbers)));
+    made.turn(degrees);
+    test = made;
+    finish(test.repeat(legs));
+    test.asked = { legs, rows: test.rows.length }; // all of it, for the next numbers may go on farther
+    if (hold === "stress") test.turn(degrees), (test.hold = hold);
+    compare();
+  });
+}
+
+/* What was done to this joint, or asked of it, if nothing was done since */
+const path = () => (test.asked && test.asked.rows === test.rows.length ? test.asked.legs : test.legs);
+
+/* What was done to reach a step of the story, as legs */
+function legsOf([stress, ...slips]) {
+  const { length } = test.joint, legs = [{ hold: "stress", level: stress * 1e6, d: [0, 0, 0], steps: 1 }];
+  for (const [x, y] of slips)
+    legs.push({ hold: "stress", level: stress * 1e6, d: [0, x * length, y * length], steps: Math.ceil(100 * Math.hypot(x, y)) });
+  return legs;
+}
+
+/* The curves of Coulomb and of Barton-Bandis for this stress and direction */
+function compare() {
+  simpler = test.hold === "stress" && test.level > 0 ? simplerLaws(test, numbers.mu, test.level) : [];
+}
+
+/* Move the upper block by so much */
+function drag(slip, closure) {
+  playing = null;
+  guarded(() => finish(test.hold === "stress" ? test.slide(slip) : test.move(closure, slip)));
+}
+
+/* Go to a normal stress or a closure, of 0 to 1, at this slip */
+function setLevel(share) {
+  playing = null;
+  guarded(() => {
+    if (test.hold === "closure") return finish(test.move(2 * share * test.joint.length - test.closure, 0));
+    finish(test.press(Math.max(share, 0.005) * FULL_STRESS));
+    compare();
+  });
+}
+
+/* Begin anew at this level, and play a test, or none */
+function play(name) {
+  const { level, hold } = test;
+  const start = level > 0 ? level : Math.max(test.joint.F[0], SEAT / 10);
+  remake([{ hold: "stress", level: start, d: [0, 0, 0], steps: 1 }]);
+  test.hold = hold;
+  playing = name ? PLAYED[name](test) : null;
+  const mine = playing, advance = () => {
+    if (playing !== mine || !mine) return;
+    guarded(() => {
+      for (let i = 0; i < 8 && playing; i++) if (mine.next().done) playing = null;
+    });
+    if (playing) requestAnimationFrame(advance);
+  };
+  advance();
+}
+
+/* Another rock, with its own numbers, seated at 10 MPa */
+function begin() {
+  numbers = numbersOf(rock());
+  const bound = 1 / 3 - rock().b / 6;
+  [part("c").min, part("c").max] = [-bound, bound];
+  part("mating").value = MATINGS.length - 1;
+  remake([{ hold: "stress", level: SEAT, d: [0, 0, 0], steps: 1 }]);
+}
+
+// ---------------------------------------------------------------------------------------- the page
+
+function listen() {
+  for (const name of Object.keys(JOINTLAW.rocks)) part("preset").add(new Option(name));
+  part("preset").value = "westerly-smooth";
+  part("preset").onchange = begin;
+  for (const name of ["a", "c", "mu"])
+    part(name).oninput = () => ((numbers[name] = Number(part(name).value)), remake(path()));
+  part("mating").max = MATINGS.length - 1;
+  part("mating").oninput = () => ((numbers.mating = MATINGS[part("mating").value] * test.joint.length), remake(path()));
+  part("direction").oninput = () => guarded(() => (test.turn(Number(part("direction").value)), compare()));
+  part("hold").onchange = () => guarded(() => {
+    test.hold = part("hold").value;
+    test.level = Math.max(0, test.joint.F[0]);
+    compare();
+  });
+  part("level").oninput = () => setLevel(part("level").value / 400);
+  for (const button of document.querySelectorAll("#joint [data-test]")) button.onclick = () => play(button.dataset.test);
+  const again = (before) => remake(legsOf(before));
+  part("next").onclick = () => (story.go(story.at + 1, again), redraw());
+  part("back").onclick = () => (story.go(story.at - 1, again), redraw());
+  part("python").onclick = () => give(python(rockName(), numbers, test), "jointlaw.py", "This law and path in Python");
+  part("csv").onclick = () => give(csv(test), "joint.csv", "All steps");
+  part("link").onclick = () => (rest(), give(location.href, "", "The address of this joint"));
+  for (const [name, act] of [["scene", hand], ["facets", turnHemisphere]]) follow(part(name), act);
+  part("scene").onkeydown = key;
+  window.addEventListener("resize", redraw);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+  new MutationObserver(redraw).observe(document.body, { attributeFilter: ["data-theme"] });
+}
+
+/* Call act(x, y) with the way of the one finger, or of the mouse with its first button */
+function follow(place, act) {
+  let from = null;
+  place.onpointerdown = (event) => {
+    from = null; // a second finger ends the drag
+    if (!event.isPrimary || event.button !== 0) return;
+    from = event;
+    place.setPointerCapture(event.pointerId);
+  };
+  place.onpointermove = (event) => {
+    if (!from || event.pointerId !== from.pointerId) return;
+    act(event.clientX - from.clientX, event.clientY - from.clientY);
+    from = event;
+  };
+  place.onpointerup = place.onpointercancel = () => (from = null);
+}
+
+/* Pixels of the hand over those of the block */
+const gear = () => (story.step && !story.isDone && story.step.gear) || 1;
+const hand = (x, y) => drag((gear() * x) / zoomOf(test), (gear() * y) / zoomOf(test));
+const turnHemisphere = (x) => ((spin += x / 80), redraw());
+
+function key(event) {
+  const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }, way = ways[event.key];
+  if (!way || (test.hold === "stress" && way[1])) return; // the page scrolls
+  event.preventDefault();
+  drag((way[0] * test.joint.length) / 20, (way[1] * test.joint.length) / 20);
+}
+
+/* Copy a text, or show it where the browser does not allow that; offer it as a file */
+async function give(text, file, name) {
+  part("text").value = text;
+  part("given").open = true;
+  const link = part("file");
+  link.hidden = !file;
+  link.download = file;
+  link.href = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
+  const copied = await navigator.clipboard?.writeText(text).then(() => true, () => false);
+  part("given-name").textContent = copied ? `${name}: copied` : name;
+}
+
+/* The joint that the address tells of, or that of the story's begin */
+function recall() {
+  const told = new URLSearchParams(location.hash.slice(1));
+  if (told.get("rock") in JOINTLAW.rocks) part("preset").value = told.get("rock");
+  begin();
+  try {
+    for (const name of ["a", "c", "mu", "mating"]) {
+      const value = Number(told.get(name) || "nothing");
+      if (value >= { a: 1, c: -1, mu: 0, mating: 0 }[name]) numbers[name] = value;
+    }
+    if (told.has("path")) {
+      const legs = legsOfText(told.get("path"));
+      remake(legs.length ? legs : legsOf([10]));
+      test.turn(Number(told.get("turn")) || 0);
+      if (told.get("hold") === "closure") test.hold = "closure";
+    } else story.go(0, (before) => remake(legsOf(before)));
+  } catch (error) {
+    begin();
+    test.says = `The address is not one of this page (${error.message}); here is a new joint.`;
+  }
+}
+
+async function open() {
+  try {
+    if (typeof JOINTLAW === "undefined") throw new Error("its script law.js is missing");
+    exports = (await WebAssembly.instantiate(decoded(JOINTLAW.wasm), {})).instance.exports;
+    for (const one of Object.values(JOINTLAW.rocks)) one.bytes = decoded(one.tables);
+    listen();
+    recall();
+    redraw();
+  } catch (error) {
+    part("says").textContent = `The joint cannot be shown: ${error.message}.`;
+    throw error;
+  }
+}
+
+open();

@@ -1,0 +1,148 @@
+"""Stress before an excavation: rock in balance that does not move, and its joints bear that stress.
+
+A block whose edges all bear a stress with div S = weight is in balance, and each joint bears S on
+its direction.
+"""
+
+import numpy as np
+import pytest
+from block_forces import contact_forces
+from scene_text import ROCK
+
+from dem_demo import Simulation
+from dem_demo.scene import parse, turn
+
+PLAIN = 'kind = "coulomb"\nnormal_stiffness = 1e10\nshear_stiffness = 5e9\nfriction = 0.8\n'
+LAWS = {"plain": PLAIN, "rough": ROCK}
+RUN = "[run]\nend = 1.0\n"
+DEPTH = 100.0  # m, of the origin: stresses that hardly change from end to end of a joint
+WEIGHT = 2600 * 9.81
+HELD = 'left = "held"\nright = "held"\nbottom = "held"\ntop = "held"\n'
+ROCK_CUT = """
+[[rock]]
+name = "rock"
+outline = [[0, 0], [10, 0], [10, 10], [0, 10]]
+set = [{ dip = 35, spacing = 1.5, scatter = 0.3, law = "j" },
+       { dip = -60, spacing = 1.7, scatter = 0.3, law = "j" }]
+"""
+
+
+def bricks(angle, k0, law):
+    """5 x 5 bricks in a running bond, turned by an angle (degrees), in a ring of fixed ones."""
+    text = f"[laws.j]\n{LAWS[law]}{RUN}[in_situ]\nk0 = {k0}\nsurface = [[0, 20.0]]\n"
+    for row, column in np.ndindex(7, 7):
+        left = column + 0.5 * (row % 2)
+        box = np.array([[left, row], [left + 1, row], [left + 1, row + 1], [left, row + 1]])
+        fixed = str(not (0 < row < 6 and 0 < column < 6)).lower()
+        text += f'[[block]]\nname = "{row} {column}"\nfixed = {fixed}\n'
+        text += f"corners = {(box @ turn(np.radians(angle)).T).tolist()}\n"
+    return parse(text)
+
+
+def cut(stress, sides, law="plain", more=""):
+    return parse(f"[laws.j]\n{LAWS[law]}{RUN}{more}{ROCK_CUT}[in_situ]\n{stress}\n{sides}")
+
+
+def moved(sim, time=0.02):
+    """Farthest (m) that a block is from its drawing at the start of a run or after a time (s)."""
+    drawn = np.array([block.centroid for block in sim.scene.blocks]).T
+    far = [np.hypot(*(sim.blocks.motion[:2] - drawn)).max()]
+    while sim.time < time:
+        sim.step()
+    return max(*far, np.hypot(*(sim.blocks.motion[:2] - drawn)).max())
+
+
+def wrong(sim, stress):
+    """What the joints' tractions are wrong by, as shares of those of a stress (2, 2)."""
+    c = sim.contacts
+    on = [1, 1j] @ stress @ [c.normal.real, c.normal.imag] * c.normal.conj()
+    share = np.abs(sim.joints.traction @ [1, 1j] - on) / np.abs(on)
+    return share[c.length > 0.02]
+
+
+@pytest.mark.parametrize("k0", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("angle", [0, 30])
+def test_bricks_do_not_move(angle, k0):
+    """1e-9 m at a depth of 15 m. What is left grows with the square of the stress: a joint's energy
+    changes with its length, as one block slides off another."""
+    sim = Simulation(bricks(angle, k0, "plain"))
+    assert not sim.loose.any()
+    assert moved(sim) < 1e-9
+    weights = np.abs(sim.ledger.forces[0]).max() / np.abs(sim.blocks.gravity).max()
+    assert weights < 1e-8
+
+
+@pytest.mark.parametrize("k0", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("law", ["plain", "rough"])
+def test_rock_cut_by_two_sets_bears_the_stress_and_stays(law, k0):
+    sim = Simulation(cut(f"k0 = {k0}\nsurface = [[0, {10 * DEPTH}]]", HELD, law))
+    assert not sim.loose.any()
+    stress = np.diag([k0, 1.0]) * WEIGHT * (10 * DEPTH - 5)
+    assert np.quantile(wrong(sim, stress), 0.95) < 0.01
+    assert moved(sim) < 1e-5
+
+
+def test_a_given_stress_turns_with_the_joints():
+    """Without weight, loaded from three sides: (sxx, syy, sxy) on each joint."""
+    sides = HELD.replace("held", "loaded").replace('bottom = "loaded"', 'bottom = "held"')
+    scene = cut("stress = [4e6, 2e6, 0.5e6]", sides)
+    sim = Simulation(parse("gravity = [0.0, 0.0]\n" + scene.text))
+    stress = np.array([[4e6, 0.5e6], [0.5e6, 2e6]])
+    assert np.quantile(wrong(sim, stress), 0.95) < 1e-3
+    assert moved(sim) < 1e-5
+
+
+@pytest.mark.parametrize("sides", ["rollers", "loaded"])
+def test_the_floor_bears_the_weight_and_the_load_above(sides):
+    """On rollers and between loads no side takes part of the weight, at any K0."""
+    given = f'left = "{sides}"\nright = "{sides}"\nbottom = "held"\ntop = "loaded"'
+    sim = Simulation(cut(f"k0 = 1.5\nsurface = [[0, {DEPTH}]]", given))
+    assert not sim.loose.any()
+    fixed = np.array([block.fixed for block in sim.scene.blocks])
+    load = -WEIGHT * (DEPTH - 10) * 10
+    assert sim.blocks.loads[~fixed, 1].sum() == pytest.approx(load, rel=1e-4)
+    carried = contact_forces(sim)[fixed, 1].sum()
+    above = (sim.blocks.gravity + sim.blocks.loads)[~fixed, 1].sum()
+    assert carried == pytest.approx(above, rel=1e-4)
+
+
+def test_water_takes_its_part_of_the_stress():
+    """Between held sides, with K0 = 1: the joints bear what is left of a total stress of 90 m of
+    rock by water to 85 m."""
+    water = "[water]\ntable = [[0, 85]]\n"
+    scene = cut(f"k0 = 1.0\nsurface = [[0, {DEPTH}]]", HELD, more=water)
+    sim = Simulation(scene)
+    drawn = sim.contacts.at.imag
+    left = WEIGHT * (DEPTH - drawn) - 9810 * (85 - drawn)
+    c = sim.contacts
+    share = np.abs(sim.joints.traction[:, 0] / left - 1)[c.length > 0.02]
+    assert np.quantile(share, 0.95) < 0.01
+    assert moved(sim) < 1e-7
+
+
+@pytest.mark.parametrize(
+    "wrong", ["", "stress = [1e6, 2e6]", "k0 = 1.0\nstress = [1e6, 1e6, 0.0]", 'left = "held"']
+)
+def test_wrong_stresses_are_refused(wrong):
+    with pytest.raises(ValueError, match="give either k0 or stress"):
+        cut(wrong, "")
+
+
+def test_a_joint_keeps_its_closure_of_before_while_it_opens():
+    """Two blocks let go from 0.5 MPa: their joint opens by stress over stiffness, 0.05 mm, before
+    it bears nothing, and what it stored becomes their speed, but for the dashpots."""
+    text = f"gravity = [0.0, 0.0]\n[laws.j]\n{PLAIN}[run]\nend = 0.1\nseat = false\n"
+    text += "[in_situ]\nstress = [0.0, 5e5, 0.0]\n"
+    for i in range(2):
+        text += f'[[block]]\nname = "{i}"\nbox = [1.0, 1.0]\nat = [0.0, {i}.0]\n'
+    sim, seen = Simulation(parse(text)), []
+    assert sim.ledger.value["stored"] == pytest.approx(5e5**2 / 2e10, rel=1e-9)
+    while sim.time < 4e-3:
+        sim.step()
+        depth, stress = sim.contacts.closure, sim.joints.traction[:, 0]
+        seen.append(depth.min())
+        assert stress == pytest.approx(1e10 * np.maximum(depth + 5e-5, 0.0), abs=1e-3)
+    assert min(seen) < -1e-4
+    assert sim.ledger.value["stored"] == 0.0
+    assert sim.ledger.value["kinetic"] > 0.8 * 5e5**2 / 2e10
+    assert abs(sim.ledger.error) < 5e-3  # as in an impact: a joint opens within a step

@@ -35,7 +35,7 @@ def failing(scene: Scene, until: float) -> Record:
 def first(record: Record, apart: np.ndarray) -> np.ndarray:
     """Mask (n,) of the blocks that move first, but for those of a mask `apart`."""
     size = usual_size(block for block in record.scene.blocks if not block.fixed)
-    moved = [~apart * np.hypot(*(record.displaced(i) - record.displaced(0)).T)
+    moved = [np.where(apart, 0.0, np.hypot(*(record.displaced(i) - record.displaced(0)).T))
              for i in range(len(record.times))]  # fmt: skip
     away = next((frame for frame in moved if np.nanmax(frame) > FIRST * size), moved[-1])
     return away > 0.5 * np.nanmax(away)

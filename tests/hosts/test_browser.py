@@ -144,6 +144,7 @@ def test_python_text_and_csv_give_the_joint_of_the_page(chromium):
         move(chromium, part, value)
     drag(chromium, [(0, 0), (20, 0), (8, 0)])
     move(chromium, "direction", 60)
+    move(chromium, "level", 240)
     drag(chromium, [(0, 0), (10, 0)])
     move(chromium, "hold", "closure")
     drag(chromium, [(0, 0), (4, 2)])

@@ -242,11 +242,12 @@ function python(name, numbers, test) {
   if (parts.length) lines.push(`law = replace(law, ${parts.join(", ")})`);
   lines.push("joint = law.joint()");
   if (test.isShort) lines.push("# the first legs of this long path are no longer known");
-  for (const { hold, level, d, steps } of test.legs) {
+  for (const { hold, level, d, steps, from } of test.legs) {
     const degrees = degreesOf(d[1], d[2]), angle = (degrees * Math.PI) / 180;
     const slip = d[1] * Math.cos(angle) + d[2] * Math.sin(angle);
     if (hold === "closure") lines.push(`for _ in range(${steps}):`, `    joint.update(np.array([${d.map(short)}]) / ${steps})`);
-    else if (!slip) lines.push(`jl.closure_test(joint, ${short(level)}, unload=False)`);
+    else if (!slip) lines.push(`for stress in np.linspace(${short(from)}, ${short(level)}, ${steps} + 1)[1:]:`,
+      "    jl.direct_shear(joint, 0.0, normal=stress, steps=1)");
     else lines.push(`record = jl.direct_shear(joint, ${short(slip)}, normal=${short(level)}, azimuth=np.radians(${short(degrees)}), steps=${steps})`);
   }
   return [...lines, 'print(joint.F, "Pa")', ""].join("\n");

@@ -1,5 +1,7 @@
 """Places of the nodes: quadrature exact where it says so, cells where the curve asks for them."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -76,3 +78,12 @@ def test_cells_rise_and_scale_with_the_unit_of_length(formation):
             found.append(depth_nodes(curve, 1e-6 * unit, slope, np.full(3, cells)))
         assert (np.diff(found[0], axis=1) > 0).all()
         np.testing.assert_array_equal(found[1][:, :-1], 4.0 * found[0][:, :-1])  # to the bit
+
+
+def test_memory_goes_with_the_number_of_facets(make_law):
+    """Of 3660 facets; their distances from each other would be 300 MB."""
+    tracemalloc.start()
+    make_law(resolution=jl.Resolution(60, 60, 1), plane=0.0).joint()
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 20e6

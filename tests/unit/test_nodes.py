@@ -9,6 +9,7 @@ import jointlaw as jl
 from jointlaw.discretisation.facets import facets
 from jointlaw.discretisation.nodes import azimuths, depth_nodes, inclinations
 from jointlaw.discretisation.virgin_curve import virgin_curve
+from jointlaw.kernels.pack import _mirror as mirror
 
 
 @pytest.mark.parametrize("b", [-1.0, 0.5, 2.0])
@@ -87,3 +88,10 @@ def test_memory_goes_with_the_number_of_facets(make_law):
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert most < 20e6
+
+
+@pytest.mark.parametrize("kind", [{}, {"plane": 0.4}, {"closure_only": True}])
+def test_the_mirror_of_a_facet_leans_the_other_way_along_axis_2(make_law, kind):
+    n = make_law(**kind).tables.asperities.n
+    image = n * np.array([[1.0], [-1.0], [1.0]])[: len(n)]
+    np.testing.assert_allclose(n[:, mirror(n).astype(int)], image, atol=1e-15)

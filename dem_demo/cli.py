@@ -4,16 +4,20 @@ import argparse
 import sys
 import time
 from contextlib import suppress
+from dataclasses import replace
 from importlib.util import find_spec
 from math import inf
 from pathlib import Path
 
-from jointlaw import JointLaw, PathError
+import numpy as np
+
+from jointlaw import JointLaw, PathError, direct_shear
 from jointlaw.support.files import require_free, write_json
 from jointlaw.support.pyplot import FORMATS
 
 from .dynamics.simulation import Simulation
 from .errors import Refused
+from .output.monitors import friction_angle
 from .output.record import sentence, sentences
 from .output.run import run, steps_to
 from .scene import TEMPLATE, load, shipped
@@ -22,6 +26,7 @@ from .studies import ablate, compare, strength, trials
 VERSION = 2  # of strength.json
 FAILING = 3.0  # s: most that a failing rock is run for
 TRIED, PATIENCE = 100, 1.0  # steps, and s, by which the time of a run is estimated
+MOBILISED = 0.9  # share of friction that a bond should wait for
 INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 
 ABOUT = """\
@@ -33,19 +38,20 @@ Rigid rock blocks in 2-D whose every contact force comes from a joint law.
   python -m dem_demo ablate SCENE --out DIR
                                            run it without each of its ingredients in turn
   python -m dem_demo compare SCENE [--seeds 1 2 3] [--until T]
-                                           every rock of a scene alone, with plain Coulomb as well:
+                                           every rock of a scene alone, with Coulomb of the same
+                                           strength and with that of the facets as well:
                                            until a block has moved by the usual size of a block
   python -m dem_demo strength-reduction SCENE --out DIR
                                            factor of safety of each rock (the strength of all
                                            joints divided by it), its critical tilt, and how it
                                            fails with 2 % less strength
-  python -m dem_demo resume STATE --out DIR [--until T] [--step DT]
-                                           go on from DIR/state or DIR/refused
+  python -m dem_demo resume DIR --out NEW [--until T] [--step DT]
+                                           go on from DIR, where a run left its state
 """
 OPTIONS = {
     "scene": {"nargs": "?", "default": "tilt", "help": "a name or a TOML file (default tilt)"},
     "file": {"type": Path},
-    "state": {"type": Path, "help": "folder that a run left: DIR/state, DIR/refused"},
+    "state": {"type": Path, "help": "folder of a run, or the state in it"},
     "--out": {"type": Path, "default": Path("out"), "help": "folder for the results"},
     "--force": {"action": "store_true", "help": "replace another run in that folder"},
     "--until": {"type": float, "help": "model time to stop at (s)"},
@@ -127,11 +133,12 @@ def _announce(sim: Simulation, until: float | None = None) -> None:
         f"time step {dt:.3g} s, limit {limit:.3g} s (margin {limit / dt:.2f}{why}), {steps} steps"
     )
     if seconds := _pace(sim) * steps:
-        told = f"{seconds:.2g} s" if seconds < 100 else f"{seconds / 60:.2g} min"
+        size = (seconds >= 100) + (seconds >= 6000)
+        told = f"{seconds / 60**size:.2g} {('s', 'min', 'hours')[size]}"
         print(f"about {told} without pictures, by its first steps")
     for rock in sim.scene.rocks:
         print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
-              f"{len(rock.blocks) - len(rock.free)} fixed; {rock.slivers}")  # fmt: skip
+              f"{len(rock.blocks) - len(rock.free)} fixed", *rock.told, sep="\n  ")  # fmt: skip
     if not sim.balanced:
         print("some blocks have no static equilibrium and move from the first step")
 
@@ -160,6 +167,7 @@ def _check(given: argparse.Namespace) -> None:
         pressed = sim.joints.traction[rows, 0].max(initial=0.0)
         if isinstance(law, JointLaw):
             _warn_of_range(name, law, max(float(pressed), sim.scene.run.largest_stress))
+            _warn_of_bond(name, law, float(pressed))
     print("the scene is valid")
 
 
@@ -175,6 +183,21 @@ def _warn_of_range(name: str, law: JointLaw, largest: float) -> None:
         )
 
 
+def _warn_of_bond(name: str, law: JointLaw, stress: float) -> None:
+    """Say where a bond breaks before the asperities have slid as far as their friction needs."""
+    if not (law.bond and law.bond.cohesion and stress > 0.0):
+        return
+    bare, slip = replace(law, bond=None), law.bond.cohesion / law.bond.shear_stiffness
+    borne = direct_shear(bare.joint(), to=[slip], normal=stress, steps=20).shear_stress[-1]
+    share = borne / (stress * np.tan(np.radians(friction_angle(bare, stress))))
+    if share < MOBILISED:
+        print(
+            f"law {name!r}: its bond breaks after {slip:.2g} m of shear, where the asperities bear "
+            f"{share:.0%} of their friction at {stress:.2g} Pa: the two strengths do not add up. "
+            'For cohesion that friction adds to, take kind = "coulomb" with cohesion and tension'
+        )
+
+
 def _ablate(given: argparse.Namespace) -> None:
     given.out.mkdir(parents=True, exist_ok=True)  # a folder that cannot be is known before the work
     print(ablate.write(ablate.ablate(load(given.scene), given.until), given.out))
@@ -186,6 +209,10 @@ def _compare(given: argparse.Namespace) -> None:
     if not scene.rocks:
         raise ValueError(f"{given.scene} has no [[rock]] to compare")
     for row in compare.compare(scene, given.seeds, given.until or scene.run.end):
+        for name, law in row["laws"].items():
+            peak, left = np.degrees(np.arctan([law.friction, law.residual_friction or 0.0]))
+            print(f"law {name!r} as Coulomb: {peak:.1f} degrees at the peak, {left:.1f} after "
+                  f"{1e3 * law.weakening:.2g} mm")  # fmt: skip
         when = f"seed {row['seed']}, {row['law']:7s} after {row['time_s']:.3g} s"
         print(f"{when}, {sentence(row)} {row['refused']}", flush=True)
 

@@ -46,8 +46,10 @@ def save(scene: Scene, saved: Saved, folder: Path) -> None:
 
 
 def load(folder: Path) -> tuple[Scene, Saved]:
-    """The scene and the state that `save` wrote. Raises ValueError if they are not whole."""
-    file = folder / FILE
+    """The scene and the state that `save` wrote into a folder, or a run into folders in it. Raises
+    ValueError if they are not whole."""
+    places = (folder / part / FILE for part in ("", "state", "refused"))
+    file = next((place for place in places if place.is_file()), folder / FILE)
     if not file.is_file():
         raise ValueError(f"{str(folder)!r} holds no saved state: {FILE} is missing")
     try:

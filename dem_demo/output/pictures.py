@@ -1,22 +1,27 @@
-"""Pictures of a run: blocks with the state of their joints, one frame or a GIF; and curves."""
+"""Pictures of a run: how far the blocks have moved and the state of their joints, one frame or a
+GIF; and curves."""
 
 from pathlib import Path
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import ListedColormap, Normalize, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from jointlaw.support.progress import track
 from jointlaw.support.pyplot import style, written
 
-from ..scene import turn
+from ..scene import turn, usual_size
 from .monitors import shear_curve
 from .record import CREEP, Record, sentences
 
-FIXED, DRIVEN, FREE, WATER = "#8d8d8d", "#b9b4a7", "#efe9dc", "#1f6fd0"
+FIXED, LOOSE, WATER = "#8d8d8d", "#c2187a", "#1f6fd0"
+MOVED = ListedColormap(colormaps["Purples"](np.linspace(0.05, 0.65, 100)))
 STATES = {  # of a joint: colour and line
     "stuck": ("#3a3a3a", "-"), "partly sliding": ("#e69f00", "-"), "sliding": ("#d81b1b", "-"),
     "open": ("#1f9ed1", "--"),
@@ -24,6 +29,7 @@ STATES = {  # of a joint: colour and line
 PARTIAL, FULL = 0.05, 0.9  # shares of the shear capacity in sliding that divide the states
 FRAMES, RATE, DPI = 60, 11, 75  # of an animation: most frames, frames per second
 FEW = 12  # blocks: most that bear their names
+ARROW = 0.02  # of the farthest: shorter ways bear no arrow
 
 
 def outlines(record: Record, i: int) -> list[np.ndarray]:
@@ -34,19 +40,36 @@ def outlines(record: Record, i: int) -> list[np.ndarray]:
     ]
 
 
+def pressure(stress: float) -> tuple[float, str]:
+    """The unit in which a stress (Pa) is told, and what it is times Pa."""
+    return (1e-6, "MPa") if stress >= 1e6 else (1e-3, "kPa")
+
+
 class Pictures:
-    """Draws a run, all frames to one scale: low, high (2,) in m; widths by `stress` (Pa).
+    """Draws a run, all frames to one scale: low, high (2,) in m, of the blocks that move and what
+    is beside them; colours by distances moved, up to `most` (m); widths by `stress` (Pa).
 
     That is the stress of the start, or of all frames where nothing touches then: those of impacts
-    would make all others hair lines.
+    would make all others hair lines. title: that of the scene unless another is given; loose (n,):
+    blocks to be marked as those that nothing holds.
     """
 
-    def __init__(self, record: Record) -> None:
-        self.record = record
-        corners = np.concatenate([c for i in (0, -1) for c in outlines(record, i)])
+    def __init__(
+        self, record: Record, title: str | None = None, loose: np.ndarray | None = None
+    ) -> None:
+        self.record, self.title = record, title or record.scene.title
+        self.loose = np.zeros(len(record.scene.blocks), bool) if loose is None else loose
+        blocks, shown = record.scene.blocks, [*outlines(record, 0), *outlines(record, -1)]
+        moving = zip((*blocks, *blocks), shown, strict=True)
+        corners = np.concatenate([shape for block, shape in moving if block.moves])
         low, high = np.nanmin(corners, axis=0), np.nanmax(corners, axis=0)
-        margin = 0.03 * (high - low).max()
+        margin = 0.07 * (high - low).max()
         self.low, self.high = low - margin, high + margin
+        self.free = np.array([not block.fixed for block in blocks])
+        self.most = max(float(np.nanmax(record.moved[self.free])), 1e-6)
+        size = usual_size(block for block in blocks if not block.fixed)
+        self.longer = float(f"{0.5 * size / self.most:.0e}")  # of arrows than what they stand for
+        self.unit, self.name = (1e3, "mm") if self.most < 0.1 else (1.0, "m")
         start = record.joints[0]["normal_stress_Pa"]
         whole = [frame["normal_stress_Pa"] for frame in record.joints]
         pressed = start[start > 0] if (start > 0).any() else np.concatenate(whole)
@@ -68,41 +91,50 @@ class Pictures:
         return np.where(closed, names, "open")
 
     def figure(self) -> tuple[Figure, Axes]:
-        """An empty frame with its legend: states, a round stress, the dots of the start."""
+        """An empty frame with its legend: states, a round stress, how long the arrows are."""
         (wide, high), scene = self.high - self.low, self.record.scene
         across = min(6.5, 6.0 * wide / high)
-        figure = Figure(figsize=(max(across + 1.0, 7.5), across * high / wide + 1.8))
-        marks = [Line2D([], [], color=colour, ls=line, label=f"joint {name}", lw=2.0)
-                 for name, (colour, line) in STATES.items()]  # fmt: skip
-        stress = float(f"{self.stress:.1g}")
-        kind = "effective " * scene.wet
-        label, width = f"{kind}normal stress {1e-3 * stress:g} kPa", self._width(stress)
-        marks.append(Line2D([], [], color=STATES["stuck"][0], lw=width, label=label))
-        marks.append(Line2D([], [], color="0.6", ls=":", lw=0.9, label="place at the start"))
-        if scene.water:
-            marks.append(Line2D([], [], color=WATER, ls="-.", label="water table"))
+        figure = Figure(figsize=(max(across + 1.0, 7.5), across * high / wide + 2.6))
+        stress, unit, name = float(f"{self.stress:.1g}"), *pressure(self.stress)
+        kind = "effective " * (scene.water is not None or any(scene.pressure))
+        stuck, loose = STATES["stuck"][0], bool(self.loose.any())
+        lines = [
+            *((f"joint {state}", {"color": colour, "ls": line, "lw": 2.0})
+              for state, (colour, line) in STATES.items()),
+            (f"{kind}normal stress {unit * stress:g} {name}",
+             {"color": stuck, "lw": self._width(stress)}),
+            (f"displacement, drawn × {self.longer:g}", {"color": "k", "lw": 1.0, "marker": ">"}),
+            *[("water table", {"color": WATER, "ls": "-."})] * bool(scene.water),
+            *[("block that nothing holds", {"color": LOOSE, "lw": 2.0})] * loose,
+        ]  # fmt: skip
+        marks = [Line2D([], [], label=label, **drawn) for label, drawn in lines]
         figure.legend(handles=marks, loc="outside lower center", ncols=3, frameon=False)
-        return figure, figure.add_subplot()
+        axes, scale = figure.add_subplot(), Normalize(0.0, self.unit * self.most)
+        figure.colorbar(
+            ScalarMappable(scale, MOVED), ax=axes, location="bottom", aspect=50,
+            label=f"moved since the start ({self.name})",
+        )  # fmt: skip
+        return figure, axes
 
     def draw(self, axes: Axes, i: int, note: str = "") -> None:
-        """Frame i: blocks, dotted where they were at the start, and joints: colour by state, width
-        by normal stress; a note below the title."""
+        """Frame i: blocks, colour and arrow by displacement; joints, colour by state, width by
+        normal stress; a note below the title."""
         record, blocks, shapes = self.record, self.record.scene.blocks, outlines(self.record, i)
-        drawn = zip(blocks, outlines(record, 0), strict=True)
-        along = record.base(i) - record.base(0)
-        start = [shape + along for block, shape in drawn if not block.fixed]
-        axes.add_collection(
-            PolyCollection(
-                start, facecolors="none", edgecolors="0.7", linestyles=":", linewidths=0.7
-            )
-        )
-        colours = [FIXED if b.fixed else DRIVEN if len(b.held) > 1 else FREE for b in blocks]
-        axes.add_collection(
-            PolyCollection(shapes, facecolors=colours, edgecolors="0.45", linewidths=0.6)
+        moved = record.displaced(i) - record.displaced(0)
+        colours = MOVED(np.hypot(*moved.T) / self.most)
+        colours[~self.free] = to_rgba(FIXED)
+        for which, edge, width in ((~self.loose, "0.45", 0.6), (self.loose, LOOSE, 2.0)):
+            some = [shapes[j] for j in np.flatnonzero(which)]
+            face = {"facecolors": colours[which], "edgecolors": edge, "linewidths": width}
+            axes.add_collection(PolyCollection(some, **face))
+        far = self.free & (np.hypot(*moved.T) > ARROW * self.most)
+        tails, arrows = record.motion[i][:2].T[far], self.longer * moved[far]
+        axes.quiver(
+            *tails.T, *arrows.T, angles="xy", scale_units="xy", scale=1.0, width=0.003, zorder=5
         )
         if len(blocks) <= FEW:
             for block, shape in zip(blocks, shapes, strict=True):
-                axes.text(*shape.mean(axis=0), block.name, ha="center", va="center")
+                axes.text(*shape.mean(axis=0), block.name, ha="center", va="center", clip_on=True)
         if record.scene.water:
             axes.plot(*record.scene.water.line.T, color=WATER, lw=1.5, ls="-.", zorder=4)
         ends, state = record.joints[i]["ends"], self.states(i)
@@ -116,7 +148,7 @@ class Pictures:
             )
         axes.set(xlim=(self.low[0], self.high[0]), xlabel="x (m)", aspect="equal")
         axes.set(ylim=(self.low[1], self.high[1]), ylabel="y (m)")
-        axes.figure.suptitle(f"{record.scene.title}\nt = {record.times[i]:.2f} s{note}")
+        axes.figure.suptitle(f"{self.title}\nt = {record.times[i]:.2f} s{note}")
 
     @style()
     def final(self, path: Path) -> None:
@@ -140,7 +172,7 @@ class Pictures:
 
     def _width(self, stress):
         """Line width (points) of a normal stress (Pa)."""
-        return 0.9 + 3.5 * np.clip(np.asarray(stress) / self.stress, 0, 1.2)
+        return 0.7 + 2.0 * np.clip(np.asarray(stress) / self.stress, 0, 1.2)
 
 
 @style()
@@ -152,14 +184,15 @@ def curves(record: Record, path: Path) -> None:
         name = record.scene.blocks[moving].name
         keys = ("slid_m", "closure_m", "normal_Pa", "shear_Pa")
         slid, closure, stress, tau = (record.column(f"{name}: {key}") for key in keys)
-        upper.plot(1e3 * slid, 1e-3 * tau, label=f"{name} (blocks)")
+        unit, told = pressure(float(stress.max()))
+        upper.plot(1e3 * slid, unit * tau, label=f"{name} (blocks)")
         lower.plot(1e3 * slid, 1e3 * (closure[0] - closure))
         law = record.scene.laws[record.laws[moving, base]]
         if alone := shear_curve(law, float(stress[0]), slid):
             dots, label = {"color": "k", "ls": ":"}, "law alone, at the normal stress of the start"
-            upper.plot(1e3 * alone.shear_2, 1e-3 * alone.F2, label=label, **dots)
+            upper.plot(1e3 * alone.shear_2, unit * alone.F2, label=label, **dots)
             lower.plot(1e3 * alone.shear_2, 1e3 * (alone.closure[0] - alone.closure), **dots)
-    upper.set(title=record.scene.title, ylabel="shear stress (kPa)")
+    upper.set(title=record.scene.title, ylabel=f"shear stress ({told})")
     lower.set(ylabel="dilation since seating (mm)", xlabel="shear displacement (mm)")
     figure.legend(loc="outside lower center", ncols=3)
     written(figure, path)

@@ -20,7 +20,8 @@ class Record:
     joints.
 
     joints[f]: by name, "who" (k, 5) block, edge, block, edge, contact; "ends" (k, 2, 2) the segment
-    of joint that a contact carries; and numbers (k,) with their unit in the name. monitored[f]:
+    of joint that a contact carries; and numbers (k,) with their unit in the name. stresses[f] (3,
+    n): of the blocks. monitored[f]:
     what the scene's [watch] asks for; slips: of its joints; laws: of the watched joints; state:
     that of the last frame, to return to; steps: of the run.
     """
@@ -33,6 +34,7 @@ class Record:
         self.motion: list[np.ndarray] = []
         self.energy: list[list[float]] = []
         self.joints: list[dict[str, np.ndarray]] = []
+        self.stresses: list[np.ndarray] = []
         self.monitored: list[dict[str, float]] = []
         self.take(sim)
 
@@ -42,6 +44,7 @@ class Record:
         self.motion.append(np.where(sim.blocks.gone, np.nan, sim.blocks.motion))
         self.energy.append([*sim.ledger.energy.tolist(), sim.ledger.error])
         self.joints.append(_joints(sim))
+        self.stresses.append(block_stresses(sim))
         self.monitored.append(readings(sim))
         self.state = sim.state()
 
@@ -89,6 +92,19 @@ def _joints(sim: Simulation) -> dict[str, np.ndarray]:
         "length_m": c.length, "sliding_m/s": c.sliding,
     }  # fmt: skip
     return {name: column[c.length > 0] for name, column in columns.items()}
+
+
+def block_stresses(sim: Simulation) -> np.ndarray:
+    """Mean stress xx, yy, xy (3, n) in each block (Pa, compression positive): force times arm of
+    its joints, over its volume."""
+    c, blocks = sim.contacts, sim.scene.blocks
+    push, shear = (sim.joints.traction * c.length[:, None]).T
+    on_b, block = (push + 1j * shear) * c.normal, np.concatenate([c.a, c.b])
+    fx, fy = (part := np.concatenate([on_b, -on_b])).real, part.imag
+    arm = np.tile(c.at, 2) - (sim.blocks.motion[0] + 1j * sim.blocks.motion[1])[block]
+    parts = fx * arm.real, fy * arm.imag, 0.5 * (fx * arm.imag + fy * arm.real)
+    sums = np.array([np.bincount(block, part, len(blocks)) for part in parts])
+    return sums / [one.section.area for one in blocks]
 
 
 def write_csv(path: Path, header, rows) -> None:

@@ -20,7 +20,7 @@ from .monitors import look
 from .pictures import Pictures, curves
 from .record import Record, outcomes
 
-MOST_STEPS = 1e12  # of a run: years
+MOST_STEPS = 1e8  # of a run: days for a hundred blocks
 LOOKS = 8  # steps between two looks for slip
 VERSION = 1  # of summary.json
 HISTORY = "history.csv"
@@ -123,7 +123,7 @@ def steps_to(sim: Simulation, until: float | None = None) -> int:
     steps = (end - now) / dt
     if not -0.5 <= steps <= MOST_STEPS:
         raise ValueError(f"until = {end:g} s: {steps:.3g} steps of {dt:.3g} s from {now:.6g} s; "
-                         f"must be from 0 to {MOST_STEPS:g}")  # fmt: skip
+                         f"must be from 0 to {MOST_STEPS:g}; units?")  # fmt: skip
     return round(steps)
 
 

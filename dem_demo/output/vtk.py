@@ -17,7 +17,9 @@ def write(record: Record, folder: Path) -> None:
     """blocks_N.vtu and joints_N.vtu of every frame N, in SI units; blocks.pvd and joints.pvd list
     them with their times (s): open these.
 
-    Blocks carry their number, displacement relative to the base, velocity and spin. Joints carry
+    Blocks carry their number, displacement relative to the base, velocity, spin, the principal
+    values of their mean stress (compression positive; the second is the smaller one) and the first
+    as a vector along its direction. Joints carry
     the numbers of the record and `state`: 0 stuck, 1 partly sliding, 2 sliding, 3 open.
     """
     folder.mkdir(parents=True, exist_ok=True)
@@ -43,12 +45,17 @@ def _blocks(record: Record, i: int) -> meshio.Mesh:
     motion, shapes = record.motion[i], [s for s in outlines(record, i) if np.isfinite(s).all()]
     first = np.cumsum([0, *map(len, shapes)])
     cells = [("polygon", np.arange(a, b)[None]) for a, b in pairwise(first)]
+    xx, yy, xy = record.stresses[i]
+    values, ways = np.linalg.eigh(np.stack([xx, xy, xy, yy], axis=1).reshape(-1, 2, 2))
     columns = {
         "block": np.arange(len(motion.T), dtype=float),
         "displacement_m": _in_space(record.displaced(i) - record.displaced(0)),
         "turn_rad": motion[2] - record.motion[0][2],
         "velocity_m/s": _in_space(motion[3:5].T),
         "spin_rad/s": motion[5],
+        "stress_1_Pa": values[:, 1],
+        "stress_2_Pa": values[:, 0],
+        "along_stress_1_Pa": _in_space(values[:, 1:] * ways[:, :, 1]),
     }
     data = {
         name: [row[None] for row in values[np.isfinite(motion[0])]]

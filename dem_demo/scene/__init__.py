@@ -13,13 +13,15 @@ read       a scene from its file
 from .blocks import Block, turn, usual_size
 from .drives import Drives
 from .keys import Tables, overlay
-from .laws import Files, Law, build_law, opens_to
+from .laws import USUAL, WHOLE, Files, Law, build_law, opens_to, springs
 from .read import TEMPLATE, build, load, parse, read_tables, shipped
 from .scene import Run, Scene
 from .stress import Stress
 
 __all__ = [
     "TEMPLATE",
+    "USUAL",
+    "WHOLE",
     "Block",
     "Drives",
     "Files",
@@ -36,6 +38,7 @@ __all__ = [
     "parse",
     "read_tables",
     "shipped",
+    "springs",
     "turn",
     "usual_size",
 ]

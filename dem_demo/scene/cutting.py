@@ -7,6 +7,7 @@ set may end at those of an earlier one.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,10 @@ from .blocks import next_of, smallest_width
 Line = tuple[int, np.ndarray, float]  # a joint: number of its set, normal, distance n . x in m
 
 EXACT = 1e-7  # share of the rock's size below which a distance is zero
+CUT = (
+    10**6
+)  # the number, in place of a set's, of cuts through inward corners: no joints of the rock
+LESS = 0.9  # share of a sliver that may be left when a neighbour takes a part of it
 
 
 @dataclass(frozen=True)
@@ -66,13 +71,14 @@ def cut(
     holes: corners (m, 2) of openings, taken out before the sets cut; regions: of parts to be taken
     out later, along whose outlines the rock is cut first.
     Returns the corners (m, 2) of each block, counter-clockwise; for each block the numbers (m,) of
-    the sets of its edges, or -1; how many slivers became part of a neighbour; and the areas (m2) of
-    those that could not. Raises ValueError.
+    the sets of its edges, -1 for the outline, or CUT; how many slivers became part of neighbours;
+    and the shapes of those that could not. Raises ValueError.
 
     A piece that is still not convex (the outline bends inwards, or it holds an opening) is cut
     along the first set that runs through its inward corner. A sliver joins a neighbour with which
     it makes a convex block, across a joint of the last set if it can, so that joints of the first
-    sets stay whole; one without such a neighbour is dropped.
+    sets stay whole. Else both are cut through their inward corners, if this leaves less of the
+    sliver; what no neighbour can take is dropped.
     """
     tiny = EXACT * float(np.ptp(outline, axis=0).max())
     rock = Polygon(outline)
@@ -92,7 +98,7 @@ def cut(
             lines.append((number, joints.normal, offset))
             pieces = _crossed(pieces, joints.normal, offset, tiny, joints.persistence, rng)
     pieces = [part for piece, _ in pieces for part in _convex_parts(piece, sets, lines, tiny)]
-    pieces, joined, dropped = _without_slivers(pieces, lines, least_width, tiny, rims)
+    pieces, joined, dropped = _without_slivers(pieces, sets, lines, least_width, tiny, rims)
     shapes = [_corners(piece, tiny) for piece in pieces]
     shapes.sort(key=lambda c: tuple(np.round(c.mean(axis=0)[::-1], 6)))
     return shapes, [_sets_of(c, lines, tiny) for c in shapes], joined, dropped
@@ -133,32 +139,48 @@ def _convex_parts(piece: Polygon, sets, lines, tiny) -> list[Polygon]:
     inward = [*corners[_bends(corners) < 0]]
     inward += [np.array(corner) for ring in piece.interiors for corner in ring.coords]
     if not inward:
-        return [piece]
-    for number, joints in enumerate(sets):
+        return [Polygon(corners)]
+    for joints in sets:
         offset = float(joints.normal @ inward[0])
         parts = _split(piece, joints.normal, offset)
         if len(parts) > 1:
-            lines.append((number, joints.normal, offset))
+            lines.append((CUT, joints.normal, offset))
             return [p for part in parts for p in _convex_parts(part, sets, lines, tiny)]
     raise ValueError(f"no set runs through the inward corner {inward[0].round(3).tolist()} m")
 
 
-def _without_slivers(pieces: list[Polygon], lines, least: float, tiny: float, rims: Polygon):
+def _without_slivers(pieces: list[Polygon], sets, lines, least: float, tiny: float, rims: Polygon):
     """Join or drop what is narrower than `least`, the narrowest first; nothing across `rims`."""
     pieces, joined, dropped = list(pieces), 0, []
     widths = [smallest_width(_rim(piece)) for piece in pieces]
     while pieces and min(widths) < least:
         number = int(np.argmin(widths))
         sliver, _ = pieces.pop(number), widths.pop(number)
+        shared = []  # what may become of both: convex?, what is left over of slivers (m2), ...
         for j in _neighbours(sliver, pieces, lines, tiny, rims):
-            whole = sliver.union(pieces[j]).convex_hull
-            if whole.area - sliver.area - pieces[j].area < tiny * whole.length:
-                pieces[j], widths[j] = whole, smallest_width(_rim(whole))
-                joined += 1
-                break
+            whole, before = _union(sliver, pieces[j], tiny), pieces[j].area * (widths[j] < least)
+            for joints in sets:
+                with suppress(ValueError):
+                    cuts: list[Line] = []
+                    parts = _convex_parts(whole, [joints], cuts, tiny)
+                    wide = [smallest_width(_rim(part)) for part in parts]
+                    left = sum(p.area for p, w in zip(parts, wide, strict=True) if w < least)
+                    if len(parts) == 1 or left - before < LESS * sliver.area:
+                        shared.append((len(parts), left - before, j, parts, wide, cuts))
+        if shared:
+            *_, j, parts, wide, cuts = min(shared, key=lambda option: option[:2])
+            pieces[j : j + 1], widths[j : j + 1] = parts, wide
+            lines += cuts
+            joined += 1
         else:
-            dropped.append(sliver.area)
+            dropped.append(sliver)
     return pieces, joined, dropped
+
+
+def _union(one: Polygon, other: Polygon, tiny: float) -> Polygon:
+    """Both as one, without the slit that rounding leaves between them."""
+    wide = (part.buffer(tiny, join_style="mitre", mitre_limit=1e3) for part in (one, other))
+    return next(wide).union(next(wide)).buffer(-tiny, join_style="mitre", mitre_limit=1e3)
 
 
 def _neighbours(sliver: Polygon, pieces: list[Polygon], lines, tiny, rims) -> list[int]:

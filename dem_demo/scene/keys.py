@@ -79,13 +79,14 @@ BLOCK = {
     "held": partial(some_of, names=AXES),
 }  # fmt: skip
 SET = {
-    "dip!": within(-90, 90, "degrees"), "spacing!": POSITIVE, "law!": TEXT, "through": vector,
+    "dip!": within(-90, 90, "degrees"), "spacing!": POSITIVE, "law": TEXT, "through": vector,
     "persistence": within(0, 1, ""), "scatter": within(0, 0.999, "(two joints could meet)"),
 }  # fmt: skip
 ROCK = {
     "name!": TEXT, "outline!": corners, "set!": [SET], "at": vector,
     "fixed": [{"corners!": corners}], "hole": [{"corners!": corners}], "density": DENSITY,
     "seed": partial(integer, bound=0), "least_width": POSITIVE, "laws": TABLE,
+    "cut_law": TEXT,
 }  # fmt: skip
 DRIVE = {
     "block": TEXT, "motion!": partial(one_of, choices=tuple(AXES)), "ease": NOT_NEGATIVE,

@@ -11,6 +11,9 @@ from jointlaw.parameters.rock import require_rock
 from .keys import TABLE, Tables, overlay
 
 Law: TypeAlias = jl.JointLaw | jl.CoulombLaw
+WHOLE = "whole rock"  # name of the law of cuts that are no joints
+USUAL = 1e5  # Pa: normal stress of a joint where it is not known
+STRONG = 1e3  # cohesion of whole rock over its tension
 
 
 class Files(dict[str, str]):
@@ -53,11 +56,28 @@ def build_law(data: Tables, where: str, files: Files) -> Law:
     own = {key: value for key, value in law_table(data, files).items() if key != "pressure"}
     law: Law = jl.JointLaw.from_dict({"plane": 0.0, **own}, where)
     if isinstance(law, jl.CoulombLaw):
-        require_rock({"friction": law.friction}, f"{where}.")
+        require_rock({**vars(law), "plane": 0.0}, f"{where}.")
     else:
+        require_rock({"stiffness at 1 MPa": springs(law, 1e6)[0]}, f"{where}: ")
         require_rock({"mu": law.asperity.mu}, f"{where}.asperity.")
     require_rock({"plane": law.plane or 0.0}, f"{where}.")
     return law
+
+
+def springs(law: Law, stress: float) -> tuple[float, float]:
+    """Stiffnesses in closure and shear (Pa/m): of a joint law that is closed by a stress (Pa)."""
+    if isinstance(law, jl.CoulombLaw):
+        return law.normal_stiffness, law.shear_stiffness
+    stiffness = float(stress / law.closure(stress))
+    return stiffness, stiffness / law.asperity.lam
+
+
+def whole_rock(laws: Iterable[Law], opening: float) -> jl.CoulombLaw:
+    """A joint as stiff as the stiffest of some laws at the usual stress, which holds until it is
+    open by `opening` (m)."""
+    normal, shear = max(springs(law, USUAL) for law in laws)
+    tension = normal * opening
+    return jl.CoulombLaw(normal, shear, 1.0, STRONG * tension, tension, plane=0.0)
 
 
 def opens_to(law: Law) -> float:

@@ -12,10 +12,10 @@ from jointlaw.parameters import keys
 from jointlaw.support.checks import one_of, remedy
 
 from .blocks import Block, box, check_convex, usual_width
-from .cutting import JointSet, cut
+from .cutting import CUT, JointSet, cut
 from .drives import read_drives
 from .keys import LIST, NOT_NEGATIVE, SCENE, TABLE, Tables, overlay, some_of, vector
-from .laws import Files, build_law, opens_to
+from .laws import WHOLE, Files, build_law, opens_to, whole_rock
 from .scene import SKIN, Rock, Run, Scene
 from .stress import read_stresses
 
@@ -25,6 +25,7 @@ GRAVITY, DENSITY = (0.0, -9.81), 2600.0  # m/s2, kg/m3
 CORNER = 0.1  # of the least width of a block
 SOFT = 0.25  # of the skin, that of the narrowest block where none is given
 SLIVER = 0.7  # of the usual width: narrower blocks do not count
+HELD = 0.5  # of the skin that whole rock may open
 LEAST = 0.2  # narrowest block of a rock as a share of the smallest spacing
 
 
@@ -65,6 +66,9 @@ def read_tables(text: str, where: str = "scene") -> Tables:
     """The tables of a scene's text: its `variant` laid over them, rocks with the keys that they
     copy. Raises ValueError."""
     data = keys.parse(text, where)
+    if "asperity_density" in data or "kind" in data:
+        raise ValueError(f"{where} is the parameter file of a law, no scene: in a scene write "
+                         f"[laws.NAME] with from = {where!r}")  # fmt: skip
     variants, chosen = data.pop("variants", {}), data.pop("variant", None)
     if chosen is not None:
         data = overlay(data, variants[one_of(f"{where}: variant", chosen, tuple(variants))])
@@ -97,8 +101,9 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     density = top.get("density", DENSITY)
     blocks = [_block(table, density, where) for table in top.get("block", ())]
     edge_laws: dict[tuple[int, int], str] = {}
-    digs = top.get("excavate", ())
-    rocks = [_rock(table, blocks, edge_laws, density, digs, where) for table in top.get("rock", ())]
+    default = top.get("law", next(iter(laws), ""))
+    usual, digs = {"density": density, "law": default}, top.get("excavate", ())
+    rocks = [_rock(table, blocks, edge_laws, usual, digs, where) for table in top.get("rock", ())]
     gravity = top.get("gravity", GRAVITY)
     water, in_situ = read_stresses(top, blocks, density, gravity, where)
     rocks = [replace(r, free=[i for i in r.free if not blocks[i].fixed]) for r in rocks]
@@ -114,14 +119,17 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     stands = CORNER * max(least, SLIVER * usual_width(blocks))
     run = Run(**{"corner_length": stands, "soft": soft, **top["run"]})
     watched = _watched(top.get("watch", {}), number, blocks, run.corner_length, f"{where}: watch")
-    default = top.get("law", next(iter(laws), ""))
-    for law in [default, *pairs.values(), *edge_laws.values()]:
+    jointed = {*edge_laws.values()} - {WHOLE}
+    for law in [default, *pairs.values(), *sorted(jointed)]:
         one_of(f"{where}: law", law, tuple(laws))
     scene = Scene(
         top.get("title", where), tuple(blocks), laws, run, default, pairs,
         tuple(rocks), edge_laws, drives, gravity, top.get("thickness", 1.0),
-        water, in_situ, tuple(pressure), tuple(_stages(digs, blocks, where)), **watched,
+        water, in_situ, (*pressure, 0.0), tuple(_stages(digs, blocks, where)), **watched,
     )  # fmt: skip
+    if WHOLE in edge_laws.values():
+        cut = [laws[law] for law in jointed or [default]]
+        laws.setdefault(WHOLE, whole_rock(cut, HELD * scene.skins.min()))
     for name, law in laws.items():
         opening = opens_to(law)
         if opening > scene.skins.min():
@@ -213,13 +221,14 @@ def _stages(tables: list[Tables], blocks: Sequence[Block], where: str) -> Iterat
 
 
 def _rock(
-    table: Tables, blocks: list[Block], laws: dict[tuple[int, int], str], density: float,
+    table: Tables, blocks: list[Block], laws: dict[tuple[int, int], str], usual: Tables,
     digs: list[Tables], where: str,
 ) -> Rock:  # fmt: skip
-    """Cut a rock, and add its blocks and the laws of their edges to those of the scene."""
+    """Cut a rock, and add its blocks and the laws of their edges to those of the scene; usual: its
+    density and the law of its sets where they name none."""
     name = table["name"]
     where = f"{where}: rock[{name!r}]"
-    sets = [JointSet(**part) for part in table["set"]]
+    sets = [JointSet(**{"law": usual["law"], **part}) for part in table["set"]]
     shift, other = np.array(table.get("at", (0.0, 0.0))), table.get("laws", {})
     fixed = [Polygon(part["corners"]) for part in table.get("fixed", ())]
     least = table.get("least_width", LEAST * min((s.spacing for s in sets), default=0.0))
@@ -233,18 +242,23 @@ def _rock(
         )
     except ValueError as error:
         raise ValueError(f"{where}.outline: {error}") from None
-    first = len(blocks)
+    first, names = len(blocks), [other.get(s.law, s.law) for s in sets]
+    of_edge = dict(enumerate(names)) | {CUT: table.get("cut_law", WHOLE)}
     for i, (shape, of) in enumerate(zip(shapes, numbers, strict=True)):
-        block = Block(f"{name} {i + 1}", shape + shift, table.get("density", density))
+        block = Block(f"{name} {i + 1}", shape + shift, table.get("density", usual["density"]))
         stays = any(region.contains(Point(block.centroid - shift)) for region in fixed)
         blocks.append(replace(block, fixed=stays))
         for edge, number in enumerate(of.tolist()):
             if number >= 0:
-                laws[first + i, edge] = other.get(sets[number].law, sets[number].law)
-    slivers = f"{joined} slivers joined to neighbours"
-    if dropped:
-        slivers += f", {len(dropped)} left out ({sum(dropped):.2g} m2)"
+                laws[first + i, edge] = of_edge[number]
+    cuts = sum(int((of == CUT).sum()) for of in numbers) // 2
+    told = [
+        f"{joined} slivers joined to neighbours",
+        *(f"a gap of {sliver.area:.2g} m2 at ({sliver.centroid.x + shift[0]:.3g}, "
+          f"{sliver.centroid.y + shift[1]:.3g}), a sliver left out" for sliver in dropped),
+        *[f"{cuts} cuts that are no joints, at inward corners: law {of_edge[CUT]!r}"] * (cuts > 0),
+    ]  # fmt: skip
     free = [i for i in range(first, len(blocks)) if not blocks[i].fixed]
     if not free:
         raise ValueError(f"{where}.fixed: all blocks of the rock are fixed")
-    return Rock(name, range(first, len(blocks)), free, slivers)
+    return Rock(name, range(first, len(blocks)), free, told)

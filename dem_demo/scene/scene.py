@@ -38,14 +38,14 @@ class Run:
 class Rock:
     """A rock mass of a scene, cut into blocks.
 
-    blocks: their numbers in the scene; free: those that can move; slivers: what became of them,
-    for a person.
+    blocks: their numbers in the scene; free: those that can move; told: what became of slivers
+    and at inward corners, for a person.
     """
 
     name: str
     blocks: range
     free: list[int]
-    slivers: str
+    told: list[str]
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,8 +1,8 @@
-"""The rocks of a scene one by one: for several seeds, with their own laws and with plain Coulomb.
+"""The rocks of a scene one by one: for several seeds, with their own laws and with Coulomb's.
 
-Plain Coulomb has the friction of the asperities themselves, the same in all directions, and
-stiffnesses like those of the joint at half the height of the rock. What it lacks is dilation,
-hardening and direction: the difference between the two runs is what these do.
+"coulomb" has the peak and residual strength that each law itself has at the normal stress that its
+joints bear at the start, which is what an engineer would give it: the difference to "joint" is what
+the law adds to a strength, such as dilation, and friction that depends on stress and direction.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,24 +14,31 @@ import jointlaw as jl
 
 from ..dynamics.simulation import Simulation
 from ..errors import Refused
+from ..output.monitors import slip_distance
 from ..output.record import Record, far, outcomes
 from ..output.run import play
-from ..scene import Law, Scene
+from ..scene import USUAL, Scene, springs
 from .strength import alone
+
+FAR = 20.0  # slip distances: where the strength of a law is its residual one
 
 
 def compare(scene: Scene, seeds: Sequence[int], until: float) -> Iterator[dict]:
-    """Every rock of a scene, for each seed and each kind of law; yields outcomes.
+    """Every rock of a scene, for each seed and each kind of law; yields outcomes, and `laws`:
+    Coulomb's joints that stand for joint laws.
 
     until: model time to stop at (s).
     """
     for name in [rock.name for rock in scene.rocks]:
         for seed in seeds:
             own = alone(scene, name, seed)
-            laws = {name: _plain(own, law) for name, law in own.laws.items()}
+            rough = {n: law for n, law in own.laws.items() if isinstance(law, jl.JointLaw)}
+            yield {"law": "joint", "seed": seed, "laws": {}, **_run(own, until)}
+            stress = stresses(Simulation(own))
             run = replace(own.run, max_overlap=0.1)  # constant springs are soft in impacts
-            for kind, case in (("joint", own), ("coulomb", replace(own, laws=laws, run=run))):
-                yield {"law": kind, "seed": seed, **_run(case, until)}
+            laws = {name: of_strength(law, stress[name]) for name, law in rough.items()}
+            case = replace(own, laws=own.laws | laws, run=run)
+            yield {"law": "coulomb", "seed": seed, "laws": laws, **_run(case, until)}
 
 
 def _run(scene: Scene, until: float) -> dict:
@@ -44,13 +51,28 @@ def _run(scene: Scene, until: float) -> dict:
     return outcomes(record)[0] | {"time_s": sim.time, "refused": trouble}
 
 
-def _plain(scene: Scene, law: Law) -> jl.CoulombLaw:
-    if isinstance(law, jl.CoulombLaw):
-        return law
-    (rock,) = scene.rocks
-    blocks = [scene.blocks[i] for i in rock.blocks]
-    height = np.ptp(np.concatenate([block.corners[:, 1] for block in blocks]))
-    stress = 0.5 * blocks[0].density * np.hypot(*scene.gravity) * height
-    stiffness = float(stress / law.closure(stress))
-    mu = law.asperity.mu
-    return jl.CoulombLaw(stiffness, stiffness / law.asperity.lam, mu, plane=0.0)
+def stresses(sim: Simulation) -> dict[str, float]:
+    """Mean normal stress (Pa) of the joints of each law, weighted by their forces; the usual one
+    where none is pressed."""
+    found = {}
+    for name, rows in zip(sim.scene.laws, sim.joints.rows, strict=True):
+        stress = np.maximum(sim.joints.traction[rows, 0], 0.0)
+        force = stress * sim.contacts.length[rows]
+        found[name] = float(stress @ force / force.sum()) if force.any() else USUAL
+    return found
+
+
+def of_strength(law: jl.JointLaw, stress: float) -> jl.CoulombLaw:
+    """Coulomb's joint with the peak and residual friction of a joint law at a normal stress (Pa),
+    which it loses with the same work; its bond as cohesion and tension."""
+    bare = replace(law, bond=None).joint()
+    record = jl.direct_shear(bare, to=[FAR * slip_distance(law)], normal=stress, steps=800)
+    friction, slid = record.shear_stress / stress, record.shear_2
+    top, residual = int(friction.argmax()), float(friction[-1])
+    fall = float(friction[top] - residual)
+    work = float(np.trapezoid(friction[top:] - residual, slid[top:]))
+    bond = {"cohesion": law.bond.cohesion, "tension": law.bond.tension} if law.bond else {}
+    return jl.CoulombLaw(
+        *springs(law, stress), fall + residual, residual_friction=residual, residual_cohesion=0.0,
+        weakening=2 * work / fall if fall else 0.0, plane=0.0, **bond,
+    )  # fmt: skip

@@ -19,8 +19,9 @@ from jointlaw.parameters.rock import STEEPEST
 from jointlaw.support.pyplot import FORMATS
 
 from ..dynamics.seating import displacements
+from ..output.pictures import Pictures
 from ..scene import Scene, Tables, build, read_tables, turn
-from .failure import draw, failing
+from .failure import failing
 from .trials import Trials
 
 TILT = 8.0, 60.0, 0.05  # degrees: first step, largest, to which it is found
@@ -62,7 +63,7 @@ def _show(scene: Scene, until: float, title: str, path: Path) -> float:
     """Run and draw a scene that fails; returns the model time (s) that it ran."""
     record = failing(scene, until)
     time = record.times[-1]
-    draw(record, f"{title}\nwith strength / {scene.reduction:.3g}, after {time:.2g} s", path)
+    Pictures(record, f"{title}\nwith strength / {scene.reduction:.3g}").final(path)
     return time
 
 

@@ -56,6 +56,16 @@ static inline double soft_size(double x, double soft, double *slope)
   return size * part * (2.0 - part);
 }
 
+/* Length of joint at a corner that stands on an edge (m): none at the end of the edge, where blocks
+ * meet in a point; its derivative by x, the place of the corner along the edge (m) */
+static double stood_on(const jl_world *w, double x, double whole_edge, double *slope)
+{
+  const double reach = 0.5 * smaller(w->corner_length, whole_edge), left = whole_edge - x;
+  const double part = larger(smaller(smaller(x, left) / reach, 1.0), 0.0);
+  *slope = w->corner_length * 6.0 * part * (1.0 - part) / (x < left ? reach : -reach);
+  return w->corner_length * part * part * (3.0 - 2.0 * part);
+}
+
 /* 0 for an edge that lies on the other, 1 for one that does not; derivative by its tilt (1/rad) */
 static inline double raised(double sine, double cosine, double *bend)
 {
@@ -105,11 +115,12 @@ static void place_contact(const jl_world *w, long long i)
     lies[s] = overlap > EVEN ? 0.5 * (1.0 - gone[s]) : 0.0;
     stands[s] = rise[s] > 0.0 ? gone[s] : 0.0;
   }
-  double turning = 0.0;
-  jl_vector pull = vector(0.0, 0.0);
+  double turning = 0.0, along;
+  const double stood = stood_on(w, here.x, whole_edge, &along);
+  jl_vector pull = vector(stands[0] * stands[1] * along, 0.0);
   for (int s = 0; s < 2; s++) {
     const double up = (double) ((rise[s] > 0.0) - (rise[s] < 0.0));
-    const double by_tilt = w->corner_length * (up > 0.0) * stands[1 - s] - 0.5 * held[s] * up;
+    const double by_tilt = stood * (up > 0.0) * stands[1 - s] - 0.5 * held[s] * up;
     turning += lies[s] * twist[s] - ahead[s] * bend[s] * by_tilt;
     pull = plus(pull, times(lies[s], part[s]));
     w->rise[s * k + i] = rise[s];
@@ -124,7 +135,7 @@ static void place_contact(const jl_world *w, long long i)
     w->own[s * k + i] = (unsigned char) own;
     w->inside[s * k + i] = -dot(rest[1 - s], toward) * (own ? fabs(rise[s]) + LEVEL : 1.0);
   }
-  w->length[i] = w->carried[i] + w->carried[k + i] + w->corner_length * stands[0] * stands[1];
+  w->length[i] = w->carried[i] + w->carried[k + i] + stood * stands[0] * stands[1];
   w->pull[i] = times(sign, turn(pull, way));
   w->twist[i] = sign * turning;
   w->at[i] = at;

@@ -15,11 +15,16 @@ _OTHER = "is the column in another unit? Name it:"
 _SCALE = "are the columns in the units that were read or given?"
 #: Highest coefficient of friction: 79 degrees, beyond any rock
 STEEPEST = 5.0
+# from soft infill under paper to lapped granite under a mountain
+_STIFFNESS = (1e6, 1e15, " Pa/m", "1 GPa/m is 1e9 Pa/m")
 _FRICTION = (0.0, STEEPEST, "", "it is a coefficient, tan(angle): tan(35 degrees) = 0.7")
 # lowest, highest, unit, and the likely cause of a number outside
 RANGES = {
     "mu": _FRICTION,
     "friction": _FRICTION,
+    "normal_stiffness": _STIFFNESS,
+    "shear_stiffness": _STIFFNESS,
+    "stiffness at 1 MPa": _STIFFNESS,
     # asperities of 1 nm are rougher than a polish; 5 cm is a step in the rock, no asperity
     "beta": (1e-10, 0.05, " m", _SCALE),
     "overlap": (0.0, 0.2, " m", _SCALE),

@@ -84,6 +84,10 @@ def test_vtk_files_hold_what_the_record_holds(tmp_path):
     assert set(joints.cell_data["state"][0]) <= {0, 1, 2, 3}
     blocks = meshio.read(sorted(tmp_path.glob("vtk/blocks_*.vtu"))[-1])
     number = np.concatenate(blocks.cell_data["block"]).astype(int)
+    largest, vector = (
+        np.concatenate(blocks.cell_data[name]) for name in ("stress_1_Pa", "along_stress_1_Pa")
+    )
+    assert np.hypot(*vector[:, :2].T) == pytest.approx(np.abs(largest), rel=1e-9)
     speed = np.concatenate(blocks.cell_data["velocity_m/s"])[:, :2]
     np.testing.assert_array_equal(speed, record.motion[-1][3:5, number].T)
 
@@ -246,6 +250,8 @@ def test_history_survives_a_gap():
     [
         (["scene.toml", "--until=inf"], "until = inf s: inf steps"),
         (["check", "endless.toml"], "until = 1e+308 s: "),
+        (["check", "long.toml"], "until = 1e+06 s: "),
+        (["check", "law.toml"], "law.toml is the parameter file of a law, no scene"),
         (["compare", "scene.toml"], "has no [[rock]] to compare"),
         (["nobodys"], "no scene 'nobodys': give a TOML file or one of arch"),
     ],
@@ -253,6 +259,8 @@ def test_history_survives_a_gap():
 def test_a_command_says_what_it_cannot_do(words, message, tmp_path, capsys):
     (tmp_path / "scene.toml").write_text(SHORT)
     (tmp_path / "endless.toml").write_text(SHORT.replace("end = 0.12", "end = 1e308"))
+    (tmp_path / "long.toml").write_text(SHORT.replace("end = 0.12", "end = 1e6"))
+    (tmp_path / "law.toml").write_text(ROCK)
     assert main(words) == 2
     assert message in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

@@ -74,6 +74,12 @@ TWICE = '[[joint]]\nbetween = ["base", "top"]\nlaw = "plain"\n[watch]'
         ),
         ("friction = 0.3", "friction = -0.3", "friction = -0.3 .* must be >= 0"),
         ("friction = 0.3", "friction = true", "friction = True is not a number"),
+        (
+            "normal_stiffness = 1e9",
+            "normal_stiffness = 5.0",
+            "normal_stiffness = 5 Pa/m is outside .*1e.06 to 1e.15 Pa/m.: 1 GPa/m is 1e9",
+        ),
+        ("K = 9.5e6", "K = 9.5e16", "laws.rock: stiffness at 1 MPa = .* Pa/m is outside"),
         ('law = "rock"', 'law = "rocks"', "law = 'rocks' is unknown; did you mean 'rock'"),
         ("gravity = [0.0, -9.81]", "gravity = 9.81", "gravity = 9.81: must be two numbers"),
         ("box = [1.0, 0.5]", "box = [1.0, -0.5]", "or box. must be convex"),

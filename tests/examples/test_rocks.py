@@ -4,13 +4,15 @@ import json
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+import jointlaw as jl
 from dem_demo import Simulation, load, parse, run
 from dem_demo.cli import main
 from dem_demo.output.monitors import friction_angle, law_between
-from dem_demo.scene import TEMPLATE, read_tables
-from dem_demo.studies.compare import _plain
+from dem_demo.scene import TEMPLATE, WHOLE, read_tables
+from dem_demo.studies.compare import compare, of_strength
 from dem_demo.studies.strength import alone, critical_tilt
 
 TEXT = TEMPLATE.read_text()
@@ -65,7 +67,8 @@ def test_dilation_is_what_holds_the_rough_slope():
     and for joints that are not at their peaks together.
     """
     own = alone(load("slope"), "rough", 2)
-    laws = {name: _plain(own, law) for name, law in own.laws.items()}
+    facets = jl.CoulombLaw(1e8, 1e8, 0.4, plane=0.0)  # the friction of the asperities alone
+    laws = {name: own.laws[name] if name == WHOLE else facets for name in own.laws}
     rough, plain = critical_tilt(own), critical_tilt(replace(own, laws=laws))
     sim = Simulation(own)
     stress, force = sim.joints.traction[:, 0], sim.joints.traction[:, 0] * sim.contacts.length
@@ -118,7 +121,7 @@ def test_a_law_with_cells_for_larger_stresses_is_told_what_to_write(tmp_path, ca
     file.write_text(usual)
     assert main(["check", str(file)]) == 0
     said = capsys.readouterr().out
-    assert "law 'joint': its joints bear 9e+04 Pa at most" in said
+    assert "law 'joint': its joints bear 1e+05 Pa at most" in said
     (wanted,) = re.findall(r"In \[laws.joint\] write (closure_range = [^,]*),", said)
     one_cell = "resolution = { u = 4, phi = 6, depth = 1 }"
     for cured in (usual.replace("[laws.joint]", f"[laws.joint]\n{wanted}"),
@@ -216,3 +219,83 @@ def test_nonsense_is_named(old, new, message):
     assert old in TEXT
     with pytest.raises(ValueError, match=message):
         parse(TEXT.replace(old, new, 1), "scene.toml")
+
+
+def test_coulomb_in_compare_has_the_strength_of_the_law():
+    """Peak and residual friction of the law at the stress, and the work between the two."""
+    law, stress = load("slope").laws["rough"], 5e4
+    fair = of_strength(law, stress)
+    mu = law.asperity.mu
+    assert np.degrees(np.arctan(fair.friction)) == pytest.approx(
+        friction_angle(law, stress), abs=0.1
+    )
+    assert fair.residual_friction == pytest.approx(mu, rel=1e-3)
+    record = jl.direct_shear(law.joint(), to=[0.2], normal=stress, steps=2000)
+    work = np.trapezoid(np.maximum(record.shear_stress / stress - mu, 0.0), record.shear_2)
+    above = fair.friction - mu
+    before = 0.02 * above  # m: a bound of what the law has before its peak
+    assert 0.5 * above * fair.weakening < work < 0.5 * above * fair.weakening + before
+    rows = list(compare(load("shaken-slope"), [1], 0.02))
+    assert [row["law"] for row in rows] == ["joint", "coulomb"]
+    assert rows[1]["laws"]["joint"].friction > rows[1]["laws"]["joint"].residual_friction
+
+
+BONDED = """
+[laws.bonded]
+asperity_density = 1e4
+mating_length = 2e-3
+orientation = { a = 3.0 }
+asperity = { K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }
+heights = { alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }
+bond = { cohesion = 1e4, tension = 1e4, normal_stiffness = 1e10, shear_stiffness = %s }
+[[block]]
+name = "base"
+box = [3.0, 1.0]
+at = [0.0, -0.5]
+fixed = true
+[[block]]
+name = "block"
+box = [2.0, 1.0]
+at = [0.0, 0.5]
+[run]
+end = 0.01
+"""
+
+
+def test_a_bond_that_breaks_before_friction_is_there_is_told(tmp_path, capsys):
+    for stiffness, told in (("1e10", True), ("1e6", False)):
+        (tmp_path / "scene.toml").write_text(BONDED % stiffness)
+        assert main(["check", str(tmp_path / "scene.toml")]) == 0
+        said = capsys.readouterr().out
+        assert ("law 'bonded': its bond breaks after 1e-06 m of shear" in said) == told
+
+
+NOTCHED = """
+law = "joint"
+[laws.joint]
+kind = "coulomb"
+normal_stiffness = 1e9
+shear_stiffness = 1e9
+friction = 0.1
+[[rock]]
+name = "beam"
+outline = [[0, 0], [1, 0], [1, 2], [4, 2], [4, 3], [0, 3]]
+least_width = 0.1
+CUT[[rock.set]]
+dip = 90.0
+spacing = 50.0
+through = [-10.0, 0.0]
+[[rock.fixed]]
+corners = [[-1, -1], [1.001, -1], [1.001, 4], [-1, 4]]
+[run]
+end = 0.1
+"""
+
+
+def test_a_cut_through_an_inward_corner_holds(tmp_path, capsys):
+    """A cantilever 3 m long on the side of a pillar: whole rock bears it, a joint does not."""
+    for cut, state in (("", "stands"), ('cut_law = "joint"\n', "moves")):
+        scene = parse(NOTCHED.replace("CUT", cut))
+        assert any("1 cuts that are no joints" in line for line in scene.rocks[0].told)
+        _, summary = run(Simulation(scene))
+        assert summary["rocks"][0]["state"] == state

@@ -5,7 +5,7 @@ import pytest
 from shapely import Polygon
 
 from dem_demo.scene.blocks import check_convex
-from dem_demo.scene.cutting import JointSet, cut
+from dem_demo.scene.cutting import CUT, JointSet, cut
 
 SQUARE = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
 SLOPE = np.array([[-12.0, 0], [6, 0], [6, 1], [2, 1], [-2, 9], [-12, 9]])
@@ -26,7 +26,7 @@ def test_a_regular_grid_is_exact():
             assert np.ptp(block, axis=0) == pytest.approx([1.0, 2.0], abs=1e-13)
             on_outline = np.isclose(block, 0.0).any() or np.isclose(block, 10.0).any()
             assert (of == -1).any() == on_outline
-            assert sorted(set(of[of >= 0].tolist())) == [0, 1]
+            assert sorted(set(of[of >= 0].tolist())) == [0, 1]  # and no cut that is no joint
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -35,7 +35,7 @@ def test_blocks_are_convex_wide_enough_and_fill_the_rock(seed):
     blocks, _sets_of, _joined, dropped = cut(SLOPE, [FLAT, STEEP], seed, least_width=0.25)
     shapes = [Polygon(block) for block in blocks]
     assert all(check_convex(block) is None for block in blocks)
-    lost = sum(dropped)
+    lost = sum(sliver.area for sliver in dropped)
     assert lost < 0.05
     # Joining fills gaps of 1e-7 of the rock's size at most.
     assert sum(s.area for s in shapes) == pytest.approx(Polygon(SLOPE).area - lost, abs=1e-4)
@@ -69,7 +69,9 @@ def test_joint_sets_cut_the_rock_around_its_openings():
     assert all(check_convex(block) is None for block in blocks)
     assert max(s.intersection(hole).area for s in shapes for hole in openings) < 1e-6
     # 0.18 m2 and the part of 2 m2 inside the rock
-    assert sum(s.area for s in shapes) + sum(dropped) == pytest.approx(100 - 0.18 - 2, abs=1e-4)
+    assert sum(s.area for s in shapes) + sum(s.area for s in dropped) == pytest.approx(
+        100 - 0.18 - 2, abs=1e-4
+    )
     for outline, hole in ((SQUARE + 5.0, holes[0]), (SQUARE, SQUARE)):
         with pytest.raises(ValueError, match=r"hole\[0\] must take a part of the rock away"):
             cut(outline, sets, 0, 0.01, [np.array(hole)])
@@ -81,8 +83,26 @@ def test_a_sliver_joins_its_neighbour_or_is_left_out():
     blocks, _, joined, _ = cut(SQUARE, sets, seed=0, least_width=0.2)
     assert (len(blocks), joined) == (1, 1)
     assert Polygon(blocks[0]).area == pytest.approx(100.0, abs=1e-9)
-    # Two beds meet a strip that is whole (by the seed): joined to either it would not be convex.
+    # Two beds meet a strip that is whole (by the seed): joined to either it would not be convex, so
+    # each takes its part, and the joint between them goes on through it.
     beds = JointSet(0.0, 6.0, "b", through=(0.0, 5.0), persistence=0.5)
-    blocks, _sets_of, joined, dropped = cut(SQUARE, [*sets, beds], seed=6, least_width=0.2)
-    assert (len(blocks), joined) == (2, 0)
-    assert dropped == pytest.approx([0.1 * 10.0], abs=1e-9)
+    blocks, sets_of, joined, dropped = cut(SQUARE, [*sets, beds], seed=6, least_width=0.2)
+    assert (len(blocks), joined, dropped) == (2, 2, [])
+    assert [Polygon(block).area for block in blocks] == pytest.approx([50.0, 50.0], abs=1e-9)
+    assert [(of == 1).sum() for of in sets_of] == [1, 1]
+    # Between an opening and the side of the rock nothing can take it in.
+    hole = np.array([[1.0, 1.0], [9.95, 1.0], [9.95, 9.0], [1.0, 9.0]])
+    cross = [JointSet(0.0, 5.0, "a", through=(0.0, 1.0)), JointSet(90.0, 20.0, "b")]
+    blocks, _, _, dropped = cut(SQUARE, cross, 0, 0.2, [hole])
+    assert sum(s.area for s in dropped) > 0
+    rest = Polygon(SQUARE).area - Polygon(hole).area - sum(s.area for s in dropped)
+    assert sum(Polygon(block).area for block in blocks) == pytest.approx(rest, abs=1e-9)
+
+
+def test_cuts_through_inward_corners_are_not_joints():
+    """A notch in a corner of the rock, far from all joints: one cut, of both blocks beside it."""
+    notched = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 7.0], [7.0, 7.0], [7.0, 10.0], [0.0, 10.0]])
+    blocks, sets_of, _, _ = cut(notched, [JointSet(0.0, 4.0, "a", through=(0.0, 2.0))], 0, 0.1)
+    assert sum((of == CUT).sum() for of in sets_of) == 2
+    cuts = [block[of == CUT] for block, of in zip(blocks, sets_of, strict=True)]
+    assert np.concatenate(cuts)[:, 1] == pytest.approx([7.0, 7.0])

@@ -35,7 +35,10 @@ class PlainContacts:
         mean = both / np.maximum(np.abs(both), 1e-9)
         self.rise, level = -side.imag, _AHEAD * side.real
         overlap, pull, twist = _overlaps(rest, o.side[self.sides] * side, mean, o.soft)
-        self.length, self.carried, pull, twist = _lengths(o, self.rise, level, overlap, pull, twist)
+        stood, along = _stood_on(o.corner_length, here.real, o.side[edge])
+        self.length, self.carried, pull, twist = _lengths(
+            stood, along, self.rise, level, overlap, pull, twist
+        )
         self.pull, self.twist = sign * pull * way, sign * twist
         # Behind a corner its edge ends at another corner. Of what follows there, a side of this
         # corner or the next edge of the other block, the one that is turned less is next; the limit
@@ -79,7 +82,17 @@ def _overlaps(rest, whole, mean, soft):
     return overlap, -(by_edge + by_end) * mean, 0.5 * twist
 
 
-def _lengths(o, rise, level, overlap, pull, twist):
+def _stood_on(corner_length, x, whole_edge):
+    """Length of joint (k,) at corners that stand at x on edges: none at the end of an edge, where
+    blocks meet in a point, all of it from half of it on; and its derivative by x."""
+    reach = 0.5 * np.minimum(corner_length, whole_edge)
+    left = whole_edge - x
+    part = np.clip(np.minimum(x, left) / reach, 0, 1)
+    slope = np.where(x < left, 1, -1) * 6 * part * (1 - part) / reach
+    return corner_length * part * part * (3 - 2 * part), corner_length * slope
+
+
+def _lengths(stood, along, rise, level, overlap, pull, twist):
     """Length of joint at the corners and that of each side, and the derivatives of the length by
     motion of the corner's block relative to the edge's."""
     up = rise > 0
@@ -87,11 +100,11 @@ def _lengths(o, rise, level, overlap, pull, twist):
     held = np.maximum(overlap, 0.0)
     lies = 0.5 * (1 - gone) * (overlap > EVEN)
     stands = gone * up
-    length = (lies * held).sum(axis=0) + o.corner_length * stands[0] * stands[1]
+    length = (lies * held).sum(axis=0) + stood * stands[0] * stands[1]
     # The tilt of the first side falls as the corner's block turns, that of the second rises.
-    by_tilt = o.corner_length * up * stands[::-1] - 0.5 * held * np.sign(rise)
+    by_tilt = stood * up * stands[::-1] - 0.5 * held * np.sign(rise)
     twist = (lies * twist - _AHEAD * bend * by_tilt).sum(axis=0)
-    return length, lies * held, (lies * pull).sum(axis=0), twist
+    return length, lies * held, (lies * pull).sum(axis=0) + stands.prod(axis=0) * along, twist
 
 
 def _raised(sine: np.ndarray, cosine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

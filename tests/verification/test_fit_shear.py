@@ -88,7 +88,7 @@ def test_the_opening_tells_friction_from_slopes(law):
 def test_a_test_under_constant_stiffness_is_fitted_by_its_own_normal_stress(law):
     """The normal stress grows from 2 to 4 MPa with the dilation; its mean would be wrong."""
     law = replace(law, plane=0.0, resolution=CONVERGED)
-    record = jl.direct_shear(law.joint(), 3e-4, 2e6, "stiffness", stiffness=5e10, steps=200)
+    record = jl.direct_shear(law.joint(), 3e-4, 2e6, stiffness=5e10, steps=200)
     assert record.F1[-1] > 1.5 * record.F1[0]
     rows = slice(None, None, 20)
     curve = ShearCurve(record.shear[rows], record.shear_stress[rows], record.F1[rows])

@@ -1,0 +1,243 @@
+"""Blocks against what is not the demo: limit analysis, and calculations by hand."""
+
+import numpy as np
+import pytest
+from limit_analysis import upper_factor
+
+from dem_demo import Simulation, parse
+from dem_demo.studies.failure import failing
+from dem_demo.studies.strength import FACTOR, factor_of_safety, weakened
+
+FOUND = FACTOR[2]  # to which a factor is found
+
+SLOPE = """
+[laws.rock]
+kind = "coulomb"
+normal_stiffness = 5e9
+shear_stiffness = 2e9
+friction = 0.7002
+[[rock]]
+name = "slope"
+outline = [[-22, -2], [12, -2], [12, 0], [0, 0], [-9, 12], [-22, 12]]
+seed = {seed}
+[[rock.set]]
+dip = 30.0
+spacing = {spacing}
+scatter = 0.2
+through = [-0.2, 0.6]
+[[rock.set]]
+dip = {dip}
+spacing = {across}
+scatter = 0.3
+persistence = {persistence}
+[[rock.fixed]]
+corners = [[-40, -5], [13, -5], [13, 0.2], [0.3, 0.31], [-34, 20.12], [-40, 20]]
+[run]
+end = 1.0
+"""
+
+
+def slope(**keys):
+    scene = parse(SLOPE.format(**keys))
+    assert len(scene.rocks[0].free) >= 100
+    return scene
+
+
+def turning(scene):
+    """How far the block that moves farthest turns, as a share: arm times angle over distance."""
+    record = failing(scene, 0.3)
+    first = int(record.moved.argmax())
+    turned = record.motion[-1][2, first] - record.motion[0][2, first]
+    return abs(turned) * scene.blocks[first].reach / record.moved[first]
+
+
+@pytest.mark.slow
+def test_a_slope_that_slides_has_the_factor_of_limit_analysis():
+    """Steep cross joints with bridges: beds slide. tan(35 degrees)/tan(30 degrees) by hand."""
+    scene = slope(spacing=0.45, dip=-75.0, across=1.3, persistence=0.8, seed=2)
+    most, found = upper_factor(scene), factor_of_safety(scene)
+    assert most == pytest.approx(0.7002 / np.tan(np.radians(30)), rel=2e-3)
+    assert found == pytest.approx(most, rel=0.01)
+    assert found < most * (1 + FOUND)
+    assert turning(weakened(scene, 1.05 * found)) < 0.01
+
+
+@pytest.mark.slow
+def test_a_slope_whose_columns_lean_has_less_than_limit_analysis_says():
+    """Columns across the beds turn before the mass slides. Limit analysis may choose the forces
+    that hold them best; joints that do not dilate have those that come of their displacements."""
+    scene = slope(spacing=0.7, dip=-60.0, across=1.0, persistence=1.0, seed=1)
+    most, found = upper_factor(scene), factor_of_safety(scene)
+    assert most < 0.9 * 0.7002 / np.tan(np.radians(30))
+    assert 0.85 * most < found < 0.98 * most
+    assert turning(weakened(scene, 1.05 * found)) > 0.05
+
+
+def test_limit_analysis_of_one_block_is_that_by_hand():
+    """A block of 3 m by 1.5 m on a plane of 25 degrees; a narrow one turns for any friction."""
+    text = """
+gravity = [4.1459, -8.8909]
+[laws.j]
+kind = "coulomb"
+normal_stiffness = 1e10
+shear_stiffness = 5e9
+friction = 0.7002
+[[block]]
+name = "base"
+box = [12.0, 1.0]
+at = [0.0, -0.5]
+fixed = true
+[[block]]
+name = "block"
+box = [3.0, 1.5]
+at = [0.0, 0.75]
+[run]
+end = 0.2
+"""
+    by_hand = 0.7002 / np.tan(np.radians(25.0))
+    assert upper_factor(parse(text)) == pytest.approx(by_hand, rel=2e-3)
+    with pytest.raises(AssertionError):  # it is held by no friction at all
+        upper_factor(parse(text.replace("box = [3.0, 1.5]", "box = [0.6, 1.5]")))
+
+
+PLANE = """
+gravity = [{down}, {on}]
+[laws.j]
+kind = "coulomb"
+normal_stiffness = 1e7
+shear_stiffness = 1e7
+friction = {friction}
+[[block]]
+name = "base"
+box = [60.0, 20.0]
+at = [20.0, -10.0]
+fixed = true
+[[block]]
+name = "block"
+box = [10.0, {height}]
+at = [0.0, {middle}]
+[run]
+end = 1.5
+dashpot_normal = 1.0
+corner_length = 4.0
+"""
+
+
+@pytest.mark.parametrize(
+    ("height", "phi", "fails"),
+    [
+        (10.0, 40.1, "not"),  # phi above the dip, and 10/10 above tan(40 degrees) = 0.839
+        (5.0, 24.0, "slides"),  # width over height above tan(24 degrees) = 0.445
+        (20.0, 24.0, "slides"),  # 0.5: it would turn if it stuck, but it slides away below itself
+        (25.0, 24.0, "turns"),  # 0.4
+        (40.0, 24.0, "turns"),  # 0.25
+    ],
+)
+def test_a_block_on_a_slope_stands_slides_or_turns(height, phi, fails):
+    """3DEC's sliding block: 10 m wide, on a slope of 40 degrees, joint of 10 MPa/m."""
+    dip, friction = np.radians(40.0), np.tan(np.radians(phi))
+    down, on = 9.81 * np.sin(dip), -9.81 * np.cos(dip)
+    sim = Simulation(
+        parse(PLANE.format(down=down, on=on, friction=friction, height=height, middle=height / 2))
+    )
+    x, _, turn = sim.blocks.motion[:3, 1].copy()
+    while sim.time < sim.scene.run.end:
+        sim.step()
+    slid, turned = sim.blocks.motion[0, 1] - x, np.degrees(sim.blocks.motion[2, 1] - turn)
+    if fails == "not":
+        assert abs(slid) < 1e-6
+        assert abs(turned) < 1e-6
+    elif fails == "slides":  # as a mass point does; it rocks by what the joint closes under its toe
+        gain = down + friction * on
+        assert slid == pytest.approx(0.5 * gain * sim.time**2, rel=0.1)
+        assert abs(turned) < 1.0
+    else:
+        assert turned < -5.0
+
+
+WEDGE = """
+[laws.j]
+kind = "coulomb"
+normal_stiffness = 1e10
+shear_stiffness = 5e9
+friction = {friction}
+[[block]]
+name = "left"
+corners = [[-6.0, 0.0], [-1.5, 0.0], [0.0, {height}], [-6.0, {height}]]
+held = ["y", "turn"]
+load = [{push}, 0.0]
+[[block]]
+name = "right"
+corners = [[1.5, 0.0], [6.0, 0.0], [6.0, {height}], [0.0, {height}]]
+held = ["y", "turn"]
+load = [-{push}, 0.0]
+[[block]]
+name = "wedge"
+corners = [[-1.5, 0.0], [1.5, 0.0], [0.0, {height}]]
+[run]
+end = 0.2
+"""
+
+
+@pytest.mark.parametrize(
+    ("half_angle", "phi", "push"),
+    [(20, 35, 1e5), (30, 35, 4e5), (30, 45, 2e5), (40, 45, 1e6)],
+)
+def test_a_roof_wedge_drawn_with_its_apex(half_angle, phi, push):
+    """Three blocks meet in a point, where the walls press on nothing: they press the wedge."""
+    angle, mu = np.radians(half_angle), np.tan(np.radians(phi))
+    height = 1.5 / np.tan(angle)
+    half = 0.5 * 2600.0 * 9.81 * 1.5 * height  # of its weight, N
+    scene = parse(WEDGE.format(friction=mu, height=height, push=push))
+    normal, shear = (
+        push * np.cos(angle) - half * np.sin(angle),
+        push * np.sin(angle) + half * np.cos(angle),
+    )
+    assert factor_of_safety(scene) == pytest.approx(mu * normal / shear, rel=FOUND)
+
+
+COHESIVE = """
+gravity = [{down}, {on}]
+[laws.j]
+kind = "coulomb"
+normal_stiffness = 1e10
+shear_stiffness = 5e9
+friction = {mu}
+cohesion = {cohesion}
+tension = {cohesion}
+{residual}
+[[block]]
+name = "base"
+box = [12.0, 1.0]
+at = [0.0, -0.5]
+fixed = true
+[[block]]
+name = "block"
+box = [3.0, 1.5]
+at = [0.0, 0.75]
+[run]
+end = 0.2
+"""
+
+
+@pytest.mark.parametrize("brittle", [False, True], ids=["kept", "lost"])
+@pytest.mark.parametrize(
+    ("dip", "phi", "cohesion"),
+    [(35, 30, 10e3), (45, 35, 20e3), (60, 30, 40e3), (60, 0, 40e3)],
+)
+def test_a_block_held_by_cohesion(dip, phi, cohesion, brittle):
+    """Cohesion that stays adds to friction: (c A + W cos tan phi)/(W sin). Where it is lost after
+    the peak, the block holds while its upper end is below its peak, or while the lower end and what
+    is left at the upper one bear it, whichever is more; the load turns the block onto its lower
+    end."""
+    slope, mu = np.radians(dip), np.tan(np.radians(phi))
+    down, on = 9.81 * np.sin(slope), -9.81 * np.cos(slope)
+    residual = "residual_cohesion = 0.0" if brittle else ""
+    text = COHESIVE.format(down=down, on=on, mu=mu, cohesion=cohesion, residual=residual)
+    normal, shear = -2600.0 * 1.5 * on, 2600.0 * 1.5 * down  # Pa, means over the base
+    upper, lower = normal - shear * np.array([0.5, -0.5])  # 2 (1.5 m / 2) over 3 m
+    expected = (cohesion + mu * normal) / shear
+    if brittle:
+        peak = (cohesion + mu * upper) / shear
+        expected = max(peak, 0.5 * (cohesion + mu * lower + mu * upper) / shear)
+    assert factor_of_safety(parse(text)) == pytest.approx(expected, rel=0.01)

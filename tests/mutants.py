@@ -146,7 +146,8 @@ class Copy:
         return done.returncode, done.stdout + done.stderr
 
     def pytest(self, *arguments, **limit):
-        return self.python("pytest", "-q", "-p", "no:cacheprovider", *arguments, **limit)
+        without = "-p", "no:cacheprovider", "-p", "no:randomly"
+        return self.python("pytest", "-q", *without, *arguments, **limit)
 
     def library(self):
         """The bytes of the library without the hash of its sources."""

@@ -88,8 +88,12 @@ def rings(theta: Array) -> Array:
 def _mirror(n: Array) -> Array:
     """Number of the facet (M,) whose normal has the other sign along axis 2."""
     image = n * np.where(np.arange(len(n)) == 1, -1.0, 1.0)[:, None]
-    away = np.sum((image[:, :, None] - n[:, None]) ** 2, axis=0)
-    return np.argmin(away, axis=1).astype(float)
+    found = []
+    # among those of its inclination, which follow one another: else memory as the square of M
+    for ring in np.split(np.arange(n.shape[1]), np.flatnonzero(np.diff(n[0])) + 1):
+        away = np.sum((image[:, ring, None] - n[:, None, ring]) ** 2, axis=0)
+        found.append(ring[np.argmin(away, axis=1)])
+    return np.concatenate(found).astype(float)
 
 
 def _in_blocks(rows: Array) -> Array:

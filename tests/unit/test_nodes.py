@@ -1,5 +1,7 @@
 """Places of the nodes: quadrature exact where it says so, cells where the curve asks for them."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ import jointlaw as jl
 from jointlaw.discretisation.facets import facets
 from jointlaw.discretisation.nodes import azimuths, depth_nodes, inclinations
 from jointlaw.discretisation.virgin_curve import virgin_curve
+from jointlaw.kernels.pack import _mirror as mirror
 
 
 @pytest.mark.parametrize("b", [-1.0, 0.5, 2.0])
@@ -76,3 +79,19 @@ def test_cells_rise_and_scale_with_the_unit_of_length(formation):
             found.append(depth_nodes(curve, 1e-6 * unit, slope, np.full(3, cells)))
         assert (np.diff(found[0], axis=1) > 0).all()
         np.testing.assert_array_equal(found[1][:, :-1], 4.0 * found[0][:, :-1])  # to the bit
+
+
+def test_memory_goes_with_the_number_of_facets(make_law):
+    """Of 3660 facets; their distances from each other would be 300 MB."""
+    tracemalloc.start()
+    make_law(resolution=jl.Resolution(60, 60, 1), plane=0.0).joint()
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 20e6
+
+
+@pytest.mark.parametrize("kind", [{}, {"plane": 0.4}, {"closure_only": True}])
+def test_the_mirror_of_a_facet_leans_the_other_way_along_axis_2(make_law, kind):
+    n = make_law(**kind).tables.asperities.n
+    image = n * np.array([[1.0], [-1.0], [1.0]])[: len(n)]
+    np.testing.assert_allclose(n[:, mirror(n).astype(int)], image, atol=1e-15)

@@ -96,3 +96,16 @@ def test_a_notebook_shows_a_picture_once(backend, left, monkeypatch):
     assert analytic().plot().axes
     assert len(pyplot.get_fignums()) == left
     pyplot.close("all")
+
+
+@pytest.mark.parametrize("size", [0.0, 1.0])
+def test_every_panel_of_a_picture_is_labelled(size):
+    """Of a closure test and of a shear test."""
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    columns = analytic().columns
+    sheared = {name: size * columns[name] for name in ("shear_2", "shear_3")}
+    axes = jl.Record(columns | sheared).plot().axes
+    assert len(axes) == (4 if size else 2)
+    assert all(axis.get_ylabel() for axis in axes)
+    assert all(axis.get_legend() for axis in axes if len(axis.lines) > 1)
+    pyplot.close("all")

@@ -1,13 +1,8 @@
 """Laws that all tests share, and how Hypothesis runs here."""
 
-import sys
-from pathlib import Path
-
 import hypothesis
-import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
 import kinds
+import pytest
 
 # Derandomized: the same cases on every machine, so that a failure is a change of the code.
 hypothesis.settings.register_profile(

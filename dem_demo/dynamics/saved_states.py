@@ -24,8 +24,8 @@ KEPT = (  # of what changes in a run, but for the joints: arrays that stay in th
 )  # fmt: skip
 STATE = (
     *KEPT, "t0", "n", "dt", "halvings", "limit.now", "limit.least", "limit.bound", "limit.checked",
-    "tracker.keys", "tracker.law", "tracker.numbers", "tracker.offset",
-    "tracker.given", "ledger.start", "ledger.area", "ledger.lost",
+    "tracker.keys", "tracker.law", "tracker.numbers", "tracker.offset", "tracker.given",
+    "ledger.start", "ledger.area", "ledger.lost", "loose",
 )  # fmt: skip
 PLACES = "contacts.corner", "contacts.edge"  # from which the contacts are made anew
 
@@ -53,7 +53,8 @@ def load(folder: Path) -> tuple[Scene, Saved]:
     if not file.is_file():
         raise ValueError(f"{str(folder)!r} holds no saved state: {FILE} is missing")
     try:
-        with np.load(file, allow_pickle=False) as stored:  # a ZIP file: it checks its sums
+        # a ZIP file: it checks its sums; opened here, for numpy leaves a damaged one open
+        with file.open("rb") as opened, np.load(opened, allow_pickle=False) as stored:
             data = {name: stored[name] for name in stored.files}
         if (version := int(data["version"])) == VERSION:
             files = Files(known=json.loads(str(data["files"])).items())

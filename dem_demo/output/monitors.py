@@ -138,8 +138,7 @@ def slip_angle(scene: Scene, law_name: str, moving: int, length: float) -> dict:
     where the law says nothing: no contact, no gravity, a stress that it cannot carry, water.
     """
     weight, angle = scene.blocks[moving].section.mass * np.hypot(*scene.gravity), 35.0
-    dry = scene.water is None and not any(scene.pressure)
-    for _ in range(ROUNDS if length > 0 and dry else 0):
+    for _ in range(ROUNDS if length > 0 and not scene.wet else 0):
         before, stress = angle, float(weight / length * np.cos(np.radians(angle)))
         try:
             angle = friction_angle(scene.laws[law_name], stress)

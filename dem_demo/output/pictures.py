@@ -51,14 +51,15 @@ class Pictures:
 
     That is the stress of the start, or of all frames where nothing touches then: those of impacts
     would make all others hair lines. title: that of the scene unless another is given; marked (n,):
-    blocks with a thick outline, which `mark` explains.
+    blocks to be marked, and what they are; without it those that nothing held at the start.
     """
 
     def __init__(
-        self, record: Record, title: str = "", marked: np.ndarray | None = None, mark: str = ""
-    ) -> None:
-        self.record, self.title, self.mark = record, title or record.scene.title, mark
-        self.marked = np.zeros(len(record.scene.blocks), bool) if marked is None else marked
+        self, record: Record, title: str | None = None, marked: np.ndarray | None = None,
+        mark: str = "block that nothing holds",
+    ) -> None:  # fmt: skip
+        self.record, self.title = record, title or record.scene.title
+        self.marked, self.mark = record.loose if marked is None else marked, mark
         blocks, shown = record.scene.blocks, [*outlines(record, 0), *outlines(record, -1)]
         moving = zip((*blocks, *blocks), shown, strict=True)
         corners = np.concatenate([shape for block, shape in moving if block.moves])
@@ -67,8 +68,8 @@ class Pictures:
         self.low, self.high = low - margin, high + margin
         self.free = np.array([not block.fixed for block in blocks])
         self.most = max(float(np.nanmax(record.moved[self.free])), 1e-6)
-        arrow = 0.5 * usual_size(block for block in blocks if not block.fixed)
-        self.longer = float(f"{arrow / self.most:.0e}")  # of arrows than what they stand for
+        size = usual_size(block for block in blocks if not block.fixed)
+        self.longer = float(f"{0.5 * size / self.most:.0e}")  # of arrows than what they stand for
         self.unit, self.name = (1e3, "mm") if self.most < 0.1 else (1.0, "m")
         start = record.joints[0]["normal_stress_Pa"]
         whole = [frame["normal_stress_Pa"] for frame in record.joints]
@@ -96,12 +97,12 @@ class Pictures:
         across = min(6.5, 6.0 * wide / high)
         figure = Figure(figsize=(max(across + 1.0, 7.5), across * high / wide + 2.6))
         stress, unit, name = float(f"{self.stress:.1g}"), *pressure(self.stress)
-        kind = "effective " * (scene.water is not None or any(scene.pressure))
+        stuck = STATES["stuck"][0]
         lines = [
             *((f"joint {state}", {"color": colour, "ls": line, "lw": 2.0})
               for state, (colour, line) in STATES.items()),
-            (f"{kind}normal stress {unit * stress:g} {name}",
-             {"color": STATES["stuck"][0], "lw": self._width(stress)}),
+            (f"{'effective ' * scene.wet}normal stress {unit * stress:g} {name}",
+             {"color": stuck, "lw": self._width(stress)}),
             (f"displacement, drawn × {self.longer:g}", {"color": "k", "lw": 1.0, "marker": ">"}),
             *[("water table", {"color": WATER, "ls": "-."})] * bool(scene.water),
             *[(self.mark, {"color": MARKED, "lw": 2.0})] * bool(self.marked.any()),
@@ -127,10 +128,10 @@ class Pictures:
             face = {"facecolors": colours[which], "edgecolors": edge, "linewidths": width}
             axes.add_collection(PolyCollection(some, **face))
         far = self.free & (np.hypot(*moved.T) > ARROW * self.most)
+        tails, arrows = record.motion[i][:2].T[far], self.longer * moved[far]
         axes.quiver(
-            *record.motion[i][:2, far], *self.longer * moved[far].T, angles="xy", scale_units="xy",
-            scale=1.0, width=0.003, zorder=5,
-        )  # fmt: skip
+            *tails.T, *arrows.T, angles="xy", scale_units="xy", scale=1.0, width=0.003, zorder=5
+        )
         if len(blocks) <= FEW:
             for block, shape in zip(blocks, shapes, strict=True):
                 axes.text(*shape.mean(axis=0), block.name, ha="center", va="center", clip_on=True)

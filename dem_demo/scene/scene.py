@@ -100,6 +100,11 @@ class Scene:
         return skin if self.run.skin is None else np.full(len(widths), self.run.skin)
 
     @property
+    def wet(self) -> bool:
+        """Is there water, so that the stresses of joints are effective ones?"""
+        return self.water is not None or any(self.pressure)
+
+    @property
     def excavated(self) -> "Scene":
         """The scene without what its excavation takes away, but with the stress of before."""
         gone = [i for stage in self.stages for i in stage["blocks"]]

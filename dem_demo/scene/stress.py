@@ -10,7 +10,6 @@ from .keys import Tables
 UNIT_WEIGHT = 9810.0  # N/m3, of water
 SIDES = {"left": (0, -1.0), "right": (0, 1.0), "bottom": (1, -1.0), "top": (1, 1.0)}
 EXACT = 1e-7  # share of the size of a scene below which a distance from its side is zero
-ROLLERS = ("x", "turn"), ("y", "turn")  # what they hold on a side across x, and across y
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +76,6 @@ def _sides(given: Tables, blocks: list[Block], corners: np.ndarray) -> np.ndarra
         on = (reach > reach.max() - EXACT * np.ptp(corners)).all(axis=0)
         loaded |= on & (kind == "loaded")
         for i in np.unique(number[on & (kind in ("held", "rollers"))]).tolist():
-            fixed, held = blocks[i].fixed or kind == "held", {*blocks[i].held, *ROLLERS[axis]}
+            fixed, held = blocks[i].fixed or kind == "held", {*blocks[i].held, "xy"[axis], "turn"}
             blocks[i] = replace(blocks[i], fixed=fixed, held=() if fixed else tuple(sorted(held)))
     return loaded

@@ -6,6 +6,8 @@ A joint that may rise dilates; one between stiff walls turns its dilation into n
 becomes stronger.
 """
 
+import math
+
 import matplotlib.pyplot as plt
 
 import jointlaw as jl
@@ -17,13 +19,13 @@ law = jl.presets.load("biegel-rough")
 # (constant stiffness), or walls that do not move (constant closure).
 
 tests = {
-    "constant normal stress": {"control": "stress"},
-    "stiffness 2e13 Pa/m": {"control": "stiffness", "stiffness": 2e13},
-    "constant closure": {"control": "closure"},
+    "constant normal stress": 0.0,
+    "stiffness 2e13 Pa/m": 2e13,
+    "constant closure": math.inf,
 }
 records = {
-    label: jl.direct_shear(law.joint(), 1e-6, normal=10e6, steps=120, **how)
-    for label, how in tests.items()
+    label: jl.direct_shear(law.joint(), 1e-6, normal=10e6, stiffness=stiffness, steps=120)
+    for label, stiffness in tests.items()
 }
 
 figure, axes = plt.subplots(2, 2, figsize=(7.5, 6.2), layout="constrained", sharex=True)

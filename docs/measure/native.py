@@ -19,7 +19,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from tables import table
 
 import jointlaw as jl
 from jointlaw.hosts.c.export import include_dir, table_text
@@ -120,7 +119,8 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=60, help="of which the least counts")
     options = parser.parse_args()
     preset = jl.presets.load("westerly-smooth")
-    rows = []
+    print("| sliders | bytes of state |", *(f" {name} |" for name in COLUMNS), sep="")
+    print("|---" * (2 + len(COLUMNS)) + "|")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         libs = {"C": library(folder, options.cc),
@@ -129,9 +129,10 @@ def main() -> None:
             law = replace(preset, resolution=resolution, plane=plane)
             t = measure(law, libs, folder, options.joints, options.rounds)
             where = "space" if plane is None else "plane"
-            cells = (f"{t[key]:.0f}" for key in COLUMNS.values())
-            rows.append([f"{law.tables.sliders} ({where})", 8 * law.state_size, *cells])
-    print(table(["sliders", "bytes of state", *COLUMNS], rows))
+            cells = [f"{t[key]:.0f}" for key in COLUMNS.values()]
+            print(
+                f"| {law.tables.sliders} ({where}) | {8 * law.state_size} | {' | '.join(cells)} |"
+            )
 
 
 if __name__ == "__main__":

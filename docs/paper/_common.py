@@ -48,7 +48,7 @@ def incremental(name, to, normal=None, closure=None):
     """Record of direct shear to the displacement `to`, at a kept normal stress or closure."""
     found = law(name)
     stress = float(found.normal_stress(closure)) if closure else normal
-    return jl.direct_shear(found.joint(), to, stress, "closure" if closure else "stress")
+    return jl.direct_shear(found.joint(), to, stress, stiffness=np.inf if closure else 0.0)
 
 
 @cache

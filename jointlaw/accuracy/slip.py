@@ -75,10 +75,7 @@ def slip(law: JointLaw, closure_range: float, stress: float, ways: Array) -> Sli
     turn = np.radians(azimuth)
     along = np.stack([np.cos(turn), np.sin(turn)], axis=-1)[:, : dim - 1]
     goal = stress * share
-    batch = law.joints(len(goal), ledger=False)
-    seat = np.zeros((len(goal), dim))
-    seat[:, 0] = law.closure(goal)
-    batch.update(seat, tangent=False)
+    batch = law.joints(len(goal), ledger=False, normal_stress=goal)
     F = np.empty((2 * LEG, len(goal), dim))
     rise, rate = np.empty(F.shape[:2]), np.zeros(len(goal))
     for k, steps in enumerate(np.concatenate([leg, -leg])):

@@ -111,19 +111,15 @@ class Suite:
         return Miss(np.append(largest, more), *mine.apart(self.slip))
 
 
+@lru_cache(maxsize=16)
 def standard_suite(law: JointLaw, best: Resolution | None = None, excursions: int = 0) -> Suite:
     """The standard paths of a law, with tractions at `best`, by default the reference resolution.
 
     `excursions` random paths come after them. Second-order convergence makes the reference's own
     error about 0.8 of its `uncertainty`.
     """
-    return _suite(replace(law, resolution=best or reference_resolution(law)), excursions)
-
-
-@lru_cache(maxsize=16)
-def _suite(law: JointLaw, excursions: int) -> Suite:
-    """The suite of a law at its reference resolution."""
-    best = law.resolution
+    best = best or reference_resolution(law)
+    law = replace(law, resolution=best)
     stress = float(law.normal_stress(law.closure_range)) / 2
     called, goal, held = _paths(law, stress)
     if excursions:
@@ -132,7 +128,7 @@ def _suite(law: JointLaw, excursions: int) -> Suite:
         called += tuple(f"excursion {i + 1}" for i in range(excursions))
     d = np.diff(goal, axis=0, prepend=0.0)
     d = _hold_stress(replace(law, resolution=scaled(best, 1 / 2)), d, held, stress)
-    F = tractions(replace(law), d)  # a copy: the cache keeps this law, and would its working space
+    F = tractions(law, d)
     slid, ways = None, standard_ways(law.tables.dim)
     if not law.closure_only and steepest(law) < _JAMS:
         more = random_ways(np.random.default_rng(18), excursions // 16, law.tables.dim)
@@ -169,21 +165,12 @@ def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]
     """
     R, seat = law.closure_range, float(law.closure(stress)) / law.closure_range
     s = np.arange(1, STEPS + 1) / STEPS
-    zero = np.zeros_like(s)
-
-    def legs(at: list[float], *columns: list[float]) -> Array:
-        return np.stack([np.interp(s, at, column) for column in columns], axis=-1)
-
-    def along(path: Array, degrees: float) -> Array:
-        cos, sin = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-        return np.stack([path[:, 0], cos * path[:, 1], sin * path[:, 1]], axis=-1)
-
-    shear = legs([0, 0.1, 1], [0, seat, seat], [0, 0, 1])
-    back = legs([0, 0.1, 0.35, 0.75, 1], [0, *4 * [seat]], [0, 0, 0.6, -0.6, 0])
-    fixed = legs([0, 0.2, 1], [0, 1, 1], [0, 0, 1])
+    shear = _legs(s, [0, 0.1, 1], [0, seat, seat], [0, 0, 1])
+    back = _legs(s, [0, 0.1, 0.35, 0.75, 1], [0, *4 * [seat]], [0, 0, 0.6, -0.6, 0])
+    fixed = _legs(s, [0, 0.2, 1], [0, 1, 1], [0, 0, 1])
     sheared = min(distance(law.mating_length, R) / R, FAR)
-    far = legs([0, 0.1, 0.55, 1], [0, 0.5, 0.5, 0.5], [0, 0, sheared, 0])
-    again = legs([0, 0.15, 0.35, 0.6, 0.7, 1], [0, 0.7, 0.7, -0.6, -0.6, 0.8],
+    far = _legs(s, [0, 0.1, 0.55, 1], [0, 0.5, 0.5, 0.5], [0, 0, sheared, 0])
+    again = _legs(s, [0, 0.15, 0.35, 0.6, 0.7, 1], [0, 0.7, 0.7, -0.6, -0.6, 0.8],
                  [0, 0, 0.4, 0.7, 0.2, 0.5])  # fmt: skip
     turn = 2 * np.pi * s
     walk = np.stack([
@@ -197,15 +184,15 @@ def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]
         0.7 * (np.sin(2.1 * turn + 0.7) - np.sin(0.7)) / (1 + np.sin(0.7)),
     ], axis=-1)  # fmt: skip
     named = {
-        "closure": np.stack([np.interp(s, [0, 0.4, 0.8, 1], [0, 1, 0, 0.5]), zero, zero], -1),
-        "shear 0": along(shear, 0),
-        "shear 45": along(shear, 45),
-        "shear 90": along(shear, 90),
-        "reversal": along(back, 30),
-        "constant closure": along(fixed, 20),
-        "re-contact": along(again, 65),
+        "closure": _along(_legs(s, [0, 0.4, 0.8, 1], [0, 1, 0, 0.5], [0, 0, 0, 0]), 0),
+        "shear 0": _along(shear, 0),
+        "shear 45": _along(shear, 45),
+        "shear 90": _along(shear, 90),
+        "reversal": _along(back, 30),
+        "constant closure": _along(fixed, 20),
+        "re-contact": _along(again, 65),
         "walk": walk,
-        "far": along(far, 20),
+        "far": _along(far, 20),
         "weave": weave,
     }
     if law.closure_only:
@@ -234,9 +221,7 @@ def _excursions(law: JointLaw, stress: float, count: int) -> Array:
         turn = rng.uniform(0.0, 2.0 * np.pi, legs + 1)
         corners = np.stack([closure, shear * np.cos(turn), shear * np.sin(turn)], axis=-1)
         at = np.linspace(0.0, 1.0, legs + 1)
-        rounded = PchipInterpolator(at, corners)(s)
-        straight = np.stack([np.interp(s, at, x) for x in corners.T], axis=-1)
-        goal.append(rounded if i % 2 else straight)
+        goal.append(PchipInterpolator(at, corners)(s) if i % 2 else _legs(s, at, *corners.T))
     return R * np.stack(goal, axis=1)[:, :, : law.tables.dim]
 
 
@@ -249,10 +234,19 @@ def far_path(law: JointLaw, rng: np.random.Generator, stress: float, s: Array) -
     closure = float(law.closure(stress * rng.uniform(0.1, 1.0))) / R
     way = min(distance(law.mating_length, R) / R, FAR) * rng.uniform(0.3, 1.0)
     back, turn = way * rng.uniform(-1.0, 0.5), rng.uniform(0.0, 2.0 * np.pi)
-    at = [0.0, 0.1, 0.4, 0.8, 1.0]
-    shear = np.interp(s, at, [0.0, 0.0, way, back, way])
-    shut = np.interp(s, at, [0.0, *4 * [closure]])
-    return np.stack([shut, np.cos(turn) * shear, np.sin(turn) * shear], axis=-1)
+    path = _legs(s, [0.0, 0.1, 0.4, 0.8, 1.0], [0.0, *4 * [closure]], [0.0, 0.0, way, back, way])
+    return _along(path, np.degrees(turn))
+
+
+def _legs(s: Array, at: Any, *columns: Any) -> Array:
+    """Places (steps, columns) on straight legs between corners, which are reached at `at`."""
+    return np.stack([np.interp(s, at, column) for column in columns], axis=-1)
+
+
+def _along(path: Array, degrees: float) -> Array:
+    """Closure and shear (steps, 2) as places in space, the shear along this azimuth."""
+    turn = np.radians(degrees)
+    return np.stack([path[:, 0], np.cos(turn) * path[:, 1], np.sin(turn) * path[:, 1]], axis=-1)
 
 
 def _hold_stress(law: JointLaw, d: Array, held: Array, stress: float) -> Array:

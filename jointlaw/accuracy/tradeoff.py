@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import cycle
+from timeit import Timer
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -140,13 +141,10 @@ def _time(law: JointLaw, n: int, tangent: bool, seconds: float) -> float:
     batch, dim = law.joints(n, ledger=False), law.tables.dim
     rng = np.random.default_rng(0)
     steps = rng.normal(0.0, 0.1 * law.closure_range, (3, n, dim))
-    steps = np.concatenate([steps, -steps])
+    moves = cycle([*steps, *-steps])
     first = np.zeros((n, dim))
     first[:, 0] = law.closure_range * rng.uniform(0.3, 0.8, n)
     batch.update(first, tangent=tangent)
-    best, k, end = float("inf"), 0, time.perf_counter() + seconds
-    while k < 3 or time.perf_counter() < end:
-        start = time.perf_counter()
-        batch.update(steps[k % len(steps)], tangent=tangent)
-        best, k = min(best, time.perf_counter() - start), k + 1
-    return best / n * 1e9
+    timer = Timer(lambda: batch.update(next(moves), tangent=tangent))
+    runs = max(3, round(seconds / timer.timeit(1)))
+    return min(timer.repeat(runs, 1)) / n * 1e9

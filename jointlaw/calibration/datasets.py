@@ -162,14 +162,16 @@ def _shear_test(
     if area is not None:
         now = area * (1 - np.abs(x) / (side or np.inf))
         y, pressed = y / now, pressed / (now if normal_stress is None else 1.0)
-    if normal_stress is None:
-        down = bool(np.mean(pressed) > 0)
-        _require_sign(down, columns["normal"], NORMAL, "has compression negative", table)
-    work = float(np.sum(np.diff(x) * (y[1:] + y[:-1])))
-    _require_sign(work > 0, columns["stress"], SHEAR_STRESS, "opposes the displacement", table)
-    if opened is not None:
-        opens = bool(opened[int(np.argmax(np.abs(x)))] >= 0)
-        _require_sign(opens, columns["opening"], OPENING, "closes the joint by the end", table)
+    work = np.sum(np.diff(x) * (y[1:] + y[:-1]))
+    opens = opened is None or opened[np.argmax(np.abs(x))] >= 0
+    signs = {
+        "normal": (np.mean(pressed) > 0, "has compression negative"),
+        "stress": (work > 0, "opposes the displacement"),
+        "opening": (opens, "closes the joint by the end"),
+    }
+    for name, (right, what) in signs.items():
+        if name in columns:
+            _require_sign(right, columns[name], asked[name][0], what, table)
     mean = float(np.mean(pressed))
     require_rock(
         {
@@ -193,8 +195,7 @@ def read_peaks(path: str | Path, decimal: str | None = None) -> list[ShearCurve]
     found = []
     for table in read_tables(Path(path), decimal):
         columns = [table.column(one) for one in (NORMAL, *PEAKS)]
-        for row in np.stack([column.values for column in columns], -1).tolist():
-            normal, peak, at, last, end = row
+        for normal, peak, at, last, end in zip(*(column.values for column in columns), strict=True):
             name = f"{Path(path).name}, {normal / 1e6:.3g} MPa"
             require_rock({"shear displacement": end, "shear stress": peak}, f"{name}: ")
             x, y = np.array([0.0, at, end]), np.array([0.0, peak, last])
@@ -202,7 +203,7 @@ def read_peaks(path: str | Path, decimal: str | None = None) -> list[ShearCurve]
     return found
 
 
-def _require_sign(right: bool, column: Column, asked: Asked, what: str, table: Table) -> None:
+def _require_sign(right: Any, column: Column, asked: Asked, what: str, table: Table) -> None:
     """Refuse a column whose sign is not ours, with the option that turns it."""
     if not right:
         raise ValueError(

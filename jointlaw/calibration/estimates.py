@@ -7,13 +7,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..laws.joint_law import JointLaw
-from ..support.checks import Array
+from ..support.checks import Array, one_of
 from .forward import build, log_stress
 from .measured import ShearCurve, sheared
-from .priors import TRANSFORMS
+from .priors import TRANSFORMS, Values
 from .problem import Problem, Solution, derivative
 from .shearing import Sheared
 
@@ -56,12 +56,11 @@ class Estimates:
     @cached_property
     def law(self) -> JointLaw:
         """The law of these parameters."""
-        return build(self.parameters, self.problem.settings, self.problem.settings.plane)
+        return build(self.parameters, self.problem.settings, self.problem.settings.law.plane)
 
     def interval(self, name: str) -> tuple[float, float]:
         """The 95 % interval of a fitted parameter, within its bounds."""
-        if name not in self.free:
-            raise ValueError(f"{name!r} was not fitted; fitted are {', '.join(self.free)}")
+        one_of("fitted parameter", name, self.free)
         at, transform = self.free.index(name), TRANSFORMS[name]
         reach = self.solution.quantile * math.sqrt(self.solution.covariance[at, at])
         reach += abs(self.moved[at])
@@ -117,9 +116,8 @@ class Estimates:
         """Points between begin and end of damage in pure shear, of the curve that has most."""
         assert self.law.bond is not None
         (_, begin), (_, end) = self.law.bond.limits
-        shears = [np.abs(curve.shear) for curve in self.problem.shears]
-        inside = [int(np.sum((way * begin > 1) & (way * end < 1))) for way in shears]
-        return max(inside, default=0)
+        ways = (np.abs(curve.shear) for curve in self.problem.shears)
+        return max((int(np.sum((way * begin > 1) & (way * end < 1))) for way in ways), default=0)
 
     @property
     def _widest(self) -> Array:
@@ -166,52 +164,44 @@ class Estimates:
         return bool(unmeasured) and all(unmeasured) and set(TRADED) <= set(self.free)
 
     @property
-    def openings(self) -> tuple[Array, Array]:
-        """95 % interval, low and high, of the opening (m) in the shear test of the lowest normal
-        stress, and of the tangent of its largest dilation angle.
+    def openings(self) -> Array:
+        """95 % interval, low and high (2, 2), of the opening (m) in the shear test of the lowest
+        normal stress, and of the tangent of its largest dilation angle.
         """
         curve = min(self.problem.shears, key=lambda one: np.mean(one.normal))
 
-        def model(x: Array) -> Array:
-            values, settings = self.problem.unpack(x), self.problem.settings
-            ((test, _),) = sheared([curve], values, settings)
+        def model(values: Values) -> Array:
+            (test,) = sheared([curve], values, self.problem.settings)
             return np.log([np.ptp(test.opening), test.dilation])
 
-        low, high = self._band(model)
-        return np.exp(low), np.exp(high)
+        return np.exp(self._band(model))
 
-    def predict_shear(self, *curves: ShearCurve) -> list[tuple[Sheared, NDArray[np.intp]]]:
-        """These tests by the fitted law, and the rows of their points."""
+    def predict_shear(self, *curves: ShearCurve) -> list[Sheared]:
+        """These tests by the fitted law."""
         return sheared(curves, self.parameters, self.problem.settings)
 
-    def band(self, closure: ArrayLike) -> tuple[Array, Array]:
-        """95 % band (low, high) in Pa of the curve `predict`.
+    def band(self, closure: ArrayLike) -> Array:
+        """95 % band (2, n), low and high, in Pa of the curve `predict`.
 
         By the covariance of the parameters alone: the noise of a further point is not in it, nor
         that rock is not this law, which counts most beyond the largest fitted stress.
         """
-        u = np.atleast_1d(np.asarray(closure, float))
+        u, settings = np.atleast_1d(np.asarray(closure, float)), self.problem.settings
+        return np.exp(self._band(lambda v: log_stress(v, v["seating"] + u, settings)))
 
-        def model(x: Array) -> Array:
-            values = self.problem.unpack(x)
-            return log_stress(values, values["seating"] + u, self.problem.settings)
+    def shear_band(self, curve: ShearCurve) -> Array:
+        """The same of shear stress and opening of a test (2, 2, rows): low and high of each."""
 
-        low, high = self._band(model)
-        return np.exp(low), np.exp(high)
+        def model(values: Values) -> Array:
+            (test,) = sheared([curve], values, self.problem.settings)
+            return np.stack([test.stress, test.opening])
 
-    def shear_band(self, curve: ShearCurve) -> tuple[Sheared, Sheared]:
-        """The same of shear stress and opening of a test: low and high."""
+        return self._band(model).swapaxes(0, 1)
 
-        def model(x: Array) -> Array:
-            values, settings = self.problem.unpack(x), self.problem.settings
-            return np.stack(sheared([curve], values, settings)[0][0])
-
-        low, high = self._band(model)
-        return Sheared(*low), Sheared(*high)
-
-    def _band(self, model: Callable[[Array], Array]) -> tuple[Array, Array]:
-        """The 95 % band of what a model gives of the vector of parameters."""
-        slope = derivative(model, self.solution.x, *self.problem.bounds())
+    def _band(self, model: Callable[[Values], Array]) -> Array:
+        """The 95 % band, low and high, of what a model gives of the parameters."""
+        x, unpack = self.solution.x, self.problem.unpack
+        slope = derivative(lambda x: model(unpack(x)), x, *self.problem.bounds())
         variance = np.einsum("...p,pq,...q->...", slope, self.solution.covariance, slope)
-        centre, reach = model(self.solution.x), self.solution.quantile * np.sqrt(variance)
-        return centre - reach, centre + reach
+        centre, reach = model(self.parameters), self.solution.quantile * np.sqrt(variance)
+        return np.stack([centre - reach, centre + reach])

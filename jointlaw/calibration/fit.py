@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import count
+from itertools import compress, count
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..laws.joint_law import JointLaw
 from ..support.checks import Array
+from ..support.markdown import table
 from ..support.progress import track
 from ..support.pyplot import pyplot, style, written
 from .estimates import Estimates
@@ -23,6 +24,10 @@ from .problem import pose, silent, solve, staged, starting_points
 HALVED = 0.005  # of the largest stress or opening: what finer steps and cells of shear may change
 HALVINGS = 8  # of the steps, at most
 
+_PEAKS = (
+    "shear curve | largest stress (MPa), at (mm): measured | law | last (MPa) | law | "
+    "opening at the end (mm) | law"
+)
 OTHER = (
     "Neighbouring points deviate to the same side. Use the law with this error between the points, "
     "and not beyond them. A shear curve that falls after its peak needs a mating_length, cycles "
@@ -47,18 +52,19 @@ class Fit(Estimates):
     def report(self) -> str:
         """The fit in words and tables (Markdown)."""
         values, left = self.parameters, self.not_identifiable
+        rows = (
+            f"{name} | {values[name]:.4g} | {self._spread(name)} | {TRANSFORMS[name].unit} | "
+            f"{100 * share:.0f} % | {'no' if name in left else 'yes'}"
+            for name, share in zip(self.free, self.solution.prior_share, strict=True)
+        )
         lines = [
             "# Fit of the joint law",
             "",
-            "| parameter | value | 95 % interval | unit | from the priors | fixed by the data |",
-            "|---|---|---|---|---|---|",
+            *table(
+                "parameter | value | 95 % interval | unit | from the priors | fixed by the data",
+                rows,
+            ),
         ]
-        for name, share in zip(self.free, self.solution.prior_share, strict=True):
-            lines.append(
-                f"| {name} | {values[name]:.4g} | {self._spread(name)} | "
-                f"{TRANSFORMS[name].unit} | {100 * share:.0f} % | "
-                f"{'no' if name in left else 'yes'} |"
-            )
         unworn = {"slope_residual"} if np.isinf(values["slope_wear"]) else set()
         held = [n for n in values if n not in {*self.free, *unworn} and np.isfinite(values[n])]
         lines += ["", "Held: " + ", ".join(f"{n} = {values[n]:.4g}" for n in held) + "."]
@@ -66,42 +72,38 @@ class Fit(Estimates):
         lines += [f"- {name}: {reason}" for name, reason in left.items()]
         if self.too_many:
             lines += ["", f"**{TOO_MANY.format(', '.join(self.too_many), self.too_many[0])}**"]
-        lines += ["", "| curve | points | scatter | of the closure (um) | systematic misfit |"]
-        lines += ["|---|---|---|---|---|"]
-        names = [(one.name, part) for one in self.problem.curves for part in one.series]
-        rows = zip(names, self.solution.noise, self.systematic_misfit, strict=True)
-        for (name, part), noise, misfit in rows:
-            lines.append(
-                f"| {name}, {part.what} | {part.points} | {100 * noise.share:.2g} % | "
-                f"{1e6 * noise.absolute:.2g} | {100 * misfit:.2g} % |"
-            )
+        names = [f"{one.name}, {part.what}" for one in self.problem.curves for part in one.series]
+        series = zip(names, self.problem.series, self.solution.noise, strict=True)
+        rows = (
+            f"{name} | {one.points} | {100 * noise.share:.2g} % | {1e6 * noise.absolute:.2g} | "
+            f"{100 * misfit:.2g} %"
+            for (name, one, noise), misfit in zip(series, self.systematic_misfit, strict=True)
+        )
+        lines.append("")
+        lines += table("curve | points | scatter | of the closure (um) | systematic misfit", rows)
         notes = [f"- {one.name}: {note}" for one in self.problem.curves for note in one.notes]
         lines += ["", "Before the fit:", "", *notes] if notes else []
         lines += self._peaks() if self.problem.shears else []
-        pairs = zip(names, self.shape_differs, strict=True)
-        differ = [f"{name}, {part.what}" for (name, part), differs in pairs if differs]
-        if differ:
+        if any(self.shape_differs):
+            differ = compress(names, self.shape_differs)
             lines += ["", f"**{'; '.join(differ)} has another shape than the law.** {OTHER}"]
         return "\n".join(lines) + "\n"
 
     def _peaks(self) -> list[str]:
         """Peak, last stress and opening of each shear curve, measured and of the law."""
-        head = (
-            "| shear curve | largest stress (MPa), at (mm): measured | law | last (MPa) | law | "
-            "opening at the end (mm) | law |"
-        )
-        lines = ["", head, "|---|---|---|---|---|---|---|"]
-        shears = self.problem.shears
-        for curve, (test, _) in zip(shears, self.predict_shear(*shears), strict=True):
-            both = ((curve.shear, curve.shear_stress, curve.opening), test)
+        rows, shears = list[str](), self.problem.shears
+        for curve, test in zip(shears, self.predict_shear(*shears), strict=True):
+            both = ((curve.shear, curve.shear_stress, curve.opening), test[:3])
             tops = [
                 f"{stress[(top := np.argmax(np.abs(stress)))] / 1e6:.4g}, {1e3 * way[top]:.3g}"
                 for way, stress, _ in both
             ]
             ends = [f"{stress[-1] / 1e6:.4g}" for _, stress, _ in both]
             wide = [f"{1e3 * up[-1]:.3g}" if up is not None else "" for _, _, up in both]
-            lines.append(f"| {' | '.join([curve.name, *tops, *ends, *wide])} |")
-        lines += [
+            rows.append(" | ".join([curve.name, *tops, *ends, *wide]))
+        lines = [
+            "",
+            *table(_PEAKS, rows),
             "",
             f"Half the step, with finer cells, changes these figures by {100 * self.halved:.2g} %.",
         ]
@@ -128,16 +130,13 @@ class Fit(Estimates):
         figure, axes = pyplot().subplots(1, panels, figsize=(4.6 * panels + 1, 4.4), squeeze=False)
         if closure is not None:
             self._draw_closure(axes[0, 0], closure, held_out)
-        for k, (curve, (test, _)) in enumerate(
-            zip(shears, self.predict_shear(*shears), strict=True)
-        ):
-            fitted, bands = k < len(self.problem.shears), self.shear_band(curve)
+        for k, (curve, test) in enumerate(zip(shears, self.predict_shear(*shears), strict=True)):
+            fitted, way = k < len(self.problem.shears), 1e3 * test.way
             dots = {"color": f"C{k}", "ls": "none", "marker": "o", "mfc": None if fitted else "w"}
             columns = (curve.shear_stress, 1e-6), (curve.opening, 1e3)
-            for axis, (points, scale), law, low, high in zip(
-                axes[0, -2:], columns, test[1:], bands[0][1:], bands[1][1:], strict=True
+            for axis, (points, scale), law, (low, high) in zip(
+                axes[0, -2:], columns, test[1:3], self.shear_band(curve), strict=True
             ):
-                way = 1e3 * test.way
                 axis.fill_between(way, scale * low, scale * high, color=f"C{k}", alpha=0.2, lw=0)
                 axis.plot(way, scale * law, color=f"C{k}")
                 if points is not None:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..laws.joint_law import JointLaw
 from ..parameters.resolution import Resolution
 from ..support.checks import Array, at_least, finite, more_than, number
-from .forward import STEPS, Settings, build_for_shear, log_stress
+from .forward import STEPS, Settings, build, log_stress
 from .noise import Noise, Series
 from .priors import Values
 from .shearing import Sheared, shear_all
@@ -29,6 +29,7 @@ FINEST = 0.002  # of the whole way: the first step of shear, and the first after
 _TURN = 0.2  # of the stress at a peak: what falls or rises less is scatter
 _FOOT = 0.02  # of the largest stress: likewise, where the stress is small
 _SLACK = 0.002  # of the largest stress: what is less is none
+_COLUMNS = ("shear", "shear_stress", "normal", "opening")
 _BACK = 0.02  # of the largest shear displacement: what goes back less is scatter
 
 
@@ -113,9 +114,8 @@ class ClosureCurve:
             branch = slice(start, end + 1)
             steep[branch] = _steepness(closure[branch], stress[branch])
         share = stress / np.max(stress) if self.cycle else 1.0  # as `residuals` are
-        expected = _expected("noise", self.noise, STRESS_NOISE)
-        if not expected.known:
-            expected = Noise(STRESS_NOISE, CLOSURE_NOISE * float(np.ptp(closure)))
+        usual = Noise(STRESS_NOISE, CLOSURE_NOISE * float(np.ptp(closure)))
+        expected = _expected("noise", self.noise, usual)
         set_(self, "series", (Series("stress", expected, share * steep, steep.size),))
 
     def residuals(self, values: Values, settings: Settings) -> Array:
@@ -138,7 +138,7 @@ class ShearCurve:
     ----------
     shear: shear displacement in m, (n,), from zero; it may turn round.
     shear_stress: in Pa, (n,), not all zero.
-    normal: normal stress in Pa, > 0: one of the whole test, or that of each point, (n,).
+    normal: normal stress in Pa, > 0, (n,); one number is that of all points.
     azimuth: direction of shear in rad, from axis 2 of the law.
     noise: standard error as a share of the largest shear stress, taken as known; None expects 2 %
         and estimates the level from the scatter.
@@ -152,7 +152,7 @@ class ShearCurve:
 
     shear: Array
     shear_stress: Array
-    normal: float | Array
+    normal: Any
     azimuth: float = 0.0
     noise: float | None = None
     opening: Array | None = None
@@ -163,28 +163,24 @@ class ShearCurve:
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
-        columns: dict[str, ArrayLike] = {"shear": self.shear, "shear_stress": self.shear_stress}
-        if not isinstance(self.normal, float | int):
-            columns["normal"] = self.normal
-        if self.opening is not None:
-            columns["opening"] = self.opening
-        for name, values in zip(columns, _equally_long(**columns), strict=True):
+        given = {name: x for name in _COLUMNS if (x := getattr(self, name)) is not None}
+        if np.ndim(self.normal) == 0:
+            given["normal"] = np.full(np.shape(self.shear), self.normal)
+        for name, values in zip(given, _equally_long(**given), strict=True):
             set_(self, name, values)
         if self.shear.size < 3 or not np.ptp(self.shear) > 0:
             raise ValueError(f"shear has {self.shear.size} points: at least 3 that move are needed")
         if not self.shear_stress.any():
             raise ValueError("shear_stress is zero throughout: there is no strength to fit")
-        lowest = more_than("normal", float(np.min(self.normal)), 0.0)
-        if "normal" not in columns:
-            set_(self, "normal", lowest)
-        set_(self, "azimuth", number("azimuth", self.azimuth))
+        more_than("normal", np.min(self.normal), 0.0)
+        number("azimuth", self.azimuth)
         # the displacement is taken as exact; the last residual of the stress is that of the peak
-        n, expected = self.shear.size, _expected("noise", self.noise, SHEAR_NOISE)
+        n, expected = self.shear.size, _expected("noise", self.noise, Noise(SHEAR_NOISE))
         series = [Series("stress", expected, np.zeros(n + 1), n)]
         if self.opening is not None:
             if not self.opening.any():
                 raise ValueError("opening is zero throughout: leave it out if it was not measured")
-            expected = _expected("opening_noise", self.opening_noise, OPENING_NOISE)
+            expected = _expected("opening_noise", self.opening_noise, Noise(OPENING_NOISE))
             series.append(Series("opening", expected, np.zeros(n), n))
         set_(self, "series", tuple(series))
 
@@ -204,10 +200,9 @@ class ShearCurve:
         whole way, take the joint that far. Scatter of the displacement is no way: a point behind
         those before it is taken where they are. Raises nothing.
         """
-        normal = np.broadcast_to(self.normal, self.shear.shape)
         whole = float(np.sum(np.abs(np.diff(self.shear[self.turns], prepend=0.0))))
         grid = whole * np.geomspace(FINEST, 1.0, steps)
-        ways, stresses, rows, start, first = [np.zeros(1)], [normal[:1]], list[int](), 0.0, 0
+        ways, stresses, rows, start, first = [np.zeros(1)], [self.normal[:1]], list[int](), 0.0, 0
         for end in self.turns[1:]:
             leg = slice(first, end + 1)
             sense = np.sign(self.shear[end] - start)
@@ -215,7 +210,7 @@ class ShearCurve:
             way = np.unique(np.concatenate([grid[grid < points[-1]], points]))
             rows += (sum(map(len, ways)) + np.searchsorted(way, points)).tolist()
             ways.append(start + sense * way)
-            stresses.append(np.interp(way, [0.0, *points], [stresses[-1][-1], *normal[leg]]))
+            stresses.append(np.interp(way, [0.0, *points], [stresses[-1][-1], *self.normal[leg]]))
             start, first = float(ways[-1][-1]), end + 1
         return np.concatenate(ways), np.concatenate(stresses), np.array(rows)
 
@@ -224,18 +219,17 @@ class ShearCurve:
 
         law: with a plane. steps: as in `path`. Raises PathError where the law cannot follow.
         """
-        path = self.path(steps)
-        (test,) = shear_all(law, [path])
-        return test.stress[path[2]], test.opening[path[2]]
+        (test,) = shear_all(law, [self.path(steps)])
+        return test.stress[test.points], test.opening[test.points]
 
-    def residuals(self, test: Sheared, rows: NDArray[np.intp]) -> list[Array]:
+    def residuals(self, test: Sheared) -> list[Array]:
         """(model - measured)/largest measured, of shear stress (n + 1,) and opening (n,).
 
         test: what a law gives. rows: of the points in it. Raises nothing.
         Last of the stress stands how far the law rises above its stress at the largest measured
         one before the next points on both sides: few points say by it that the peak lies there.
         """
-        measured, stress = self.shear_stress, test.stress
+        measured, stress, rows = self.shear_stress, test.stress, test.points
         top = int(np.argmax(np.abs(measured)))
         near = stress[rows[max(top - 1, 0)] : rows[min(top + 1, rows.size - 1)] + 1]
         rise = np.max(np.sign(measured[top]) * (near - stress[rows[top]]))
@@ -255,18 +249,13 @@ class ShearCurve:
         even = np.linspace(0, n - 1, most).round().astype(int)
         kept = np.unique([*even, top, *self.turns])
         told = f"{kept.size} of {n} rows are fitted: evenly spaced ones, the peak, turns and ends"
-        names = ("shear", "shear_stress", "normal", "opening")
-        columns: dict[str, Any] = {
-            name: np.asarray(values)[kept]
-            for name in names
-            if np.ndim(values := getattr(self, name))
-        }
+        columns = {name: x[kept] for name in _COLUMNS if (x := getattr(self, name)) is not None}
         return replace(self, **columns, notes=(*self.notes, told))
 
 
-def _expected(name: str, known: float | None, usual: float) -> Noise:
+def _expected(name: str, known: float | None, usual: Noise) -> Noise:
     """The noise that is known, or the usual one to begin with."""
-    return Noise(usual) if known is None else Noise(more_than(name, known, 0.0), 0.0, True)
+    return usual if known is None else Noise(more_than(name, known, 0.0), 0.0, True)
 
 
 def first_loading(stress: ArrayLike, closure: ArrayLike) -> tuple[Array, Array]:
@@ -327,23 +316,20 @@ def _steepness(closure: Array, stress: Array) -> Array:
     return np.abs(slope)
 
 
-def sheared(
-    curves: Sequence[ShearCurve], values: Values, settings: Settings
-) -> list[tuple[Sheared, NDArray[np.intp]]]:
-    """Each test by the law of these values, and the rows of its points; cells as fine as steps.
+def sheared(curves: Sequence[ShearCurve], values: Values, settings: Settings) -> list[Sheared]:
+    """Each test by the law of these values; cells as fine as steps.
 
     A parameter would take up the error of few cells, degrees of friction, and its interval would
     not show it.
     """
-    found: dict[int, tuple[Sheared, NDArray[np.intp]]] = {}
+    found: dict[int, Sheared] = {}
     finer = min(settings.steps / STEPS, MOST_FINER) ** 0.6
     for azimuth in {curve.azimuth for curve in curves}:
         mine = [k for k, curve in enumerate(curves) if curve.azimuth == azimuth]
-        law = build_for_shear(values, settings, azimuth)
+        law = build(values, settings, azimuth)
         r = law.resolution
         pairs = ((r.u, CELLS.u), (r.phi, CELLS.phi), (r.depth, CELLS.depth))
         cells = Resolution(*(round(finer * max(pair)) for pair in pairs))
         paths = [curves[k].path(settings.steps) for k in mine]
-        tests = shear_all(replace(law, resolution=cells), paths)
-        found |= {k: (test, path[2]) for k, test, path in zip(mine, tests, paths, strict=True)}
+        found |= zip(mine, shear_all(replace(law, resolution=cells), paths), strict=True)
     return [found[k] for k in range(len(curves))]

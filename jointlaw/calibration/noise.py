@@ -24,10 +24,6 @@ class Noise(NamedTuple):
     absolute: float = 0.0
     known: bool = False
 
-    def sigma(self, steepness: Array) -> Array:
-        """Standard errors at points of this steepness."""
-        return np.hypot(self.share, self.absolute * steepness)
-
 
 class Series(NamedTuple):
     """One measured quantity of a test: what it is, the noise it is expected to carry, for each of
@@ -40,21 +36,20 @@ class Series(NamedTuple):
     points: int
 
 
-def estimate_noise(expected: Noise, residual: Array, leverage: Array, steepness: Array) -> Noise:
+def estimate_noise(series: Series, residual: Array, leverage: Array) -> Noise:
     """Levels that the residuals (n,) of a fit with these leverages (n,) make most likely.
 
     Both have wide priors from what instruments do, because eight points cannot tell two levels by
     themselves. Restricted likelihood: a point of leverage h has the residual variance
     (1 - h) sigma^2.
     """
+    expected = series.expected
     if expected.known:
         return expected
     free = np.clip(1 - leverage, 0.02, 1.0)
-    steps = _GRID * _SD
-    share = (expected.share * np.exp(steps))[:, None, None]
-    absolute = (expected.absolute * np.exp(steps))[None, :, None]
-    variance = share**2 + (absolute * steepness) ** 2
+    share, absolute = (level * np.exp(_GRID * _SD) for level in expected[:2])
+    variance = share[:, None, None] ** 2 + (absolute[:, None] * series.steepness) ** 2
     loss = np.sum(free * np.log(variance) + residual**2 / variance, axis=-1)
     loss = loss + _GRID[:, None] ** 2 + _GRID[None, :] ** 2
     i, j = np.unravel_index(int(np.argmin(loss)), loss.shape)
-    return Noise(float(share[i, 0, 0]), float(absolute[0, j, 0]))
+    return Noise(float(share[i]), float(absolute[j]))

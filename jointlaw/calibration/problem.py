@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy import special
@@ -47,7 +47,8 @@ class Problem:
     A vector x (p,) holds the free parameters after their transforms, mostly logarithms.
     """
 
-    curves: tuple[ClosureCurve | ShearCurve, ...]
+    closure: ClosureCurve | None
+    shears: tuple[ShearCurve, ...]
     free: tuple[str, ...]
     values: Values
     priors: Mapping[str, tuple[float, float]]
@@ -55,24 +56,19 @@ class Problem:
     tick: Callable[[], object] = silent  # called for each law that is tried
 
     @property
-    def shears(self) -> tuple[ShearCurve, ...]:
-        """The shear curves."""
-        return tuple(curve for curve in self.curves if isinstance(curve, ShearCurve))
+    def curves(self) -> Curves:
+        """The closure curve, if there is one, and the shear curves."""
+        return [curve for curve in (self.closure, *self.shears) if curve is not None]
 
     @property
     def series(self) -> tuple[Series, ...]:
         """What was measured, the curves one after the other."""
         return tuple(one for curve in self.curves for one in curve.series)
 
-    @property
-    def closure(self) -> ClosureCurve | None:
-        """The closure curve, if there is one."""
-        return next((curve for curve in self.curves if isinstance(curve, ClosureCurve)), None)
-
     def unpack(self, x: Array) -> dict[str, float]:
         """All parameters in SI units from the vector of the free ones."""
-        values = dict(self.values)
-        values |= {n: TRANSFORMS[n].back(float(v)) for n, v in zip(self.free, x, strict=True)}
+        found = {n: TRANSFORMS[n].back(float(v)) for n, v in zip(self.free, x, strict=True)}
+        values = {**self.values, **found}
         if "c" in self.free:
             bound = largest_c(values["b"])
             values["c"] = min(max(values["c"], -bound), bound)
@@ -110,12 +106,12 @@ class Problem:
         """Residuals of all series, one after the other."""
         self.tick()
         values, found = self.unpack(x), list[Array]()
-        tests = iter(sheared(self.shears, values, self.settings))
-        for curve in self.curves:
-            if isinstance(curve, ShearCurve):
-                found += curve.residuals(*next(tests))
-            else:
-                found.append(curve.residuals(values, self.settings))
+        if self.closure is not None:
+            found.append(self.closure.residuals(values, self.settings))
+        for curve, test in zip(
+            self.shears, sheared(self.shears, values, self.settings), strict=True
+        ):
+            found += curve.residuals(test)
         return np.concatenate(found)
 
     def prior(self, x: Array) -> Array:
@@ -137,7 +133,7 @@ class Problem:
     def sigma(self, noise: Sequence[Noise]) -> Array:
         """Standard errors of all residuals at these noises of the series."""
         pairs = zip(noise, self.series, strict=True)
-        return np.concatenate([n.sigma(one.steepness) for n, one in pairs])
+        return np.concatenate([np.hypot(n.share, n.absolute * one.steepness) for n, one in pairs])
 
 
 def pose(
@@ -149,6 +145,7 @@ def pose(
 ) -> Problem:
     """The problem that the arguments of `fit_curves` pose; raises as that does."""
     closures = [curve for curve in curves if isinstance(curve, ClosureCurve)]
+    shears = tuple(curve for curve in curves if isinstance(curve, ShearCurve))
     if not curves or len(closures) > 1:
         raise ValueError(
             f"curves holds {len(closures)} closure curves of {len(curves)}: give one at most, and "
@@ -165,7 +162,7 @@ def pose(
     build(values, settings)  # raises for values that no law has
     for name in names:
         if math.isinf(values[name]):
-            values[name] = _within(name, curves)
+            values[name] = _within(name, closures, shears)
     for curve in closures:
         values["seating"] = float(np.ptp(curve.closure)) if curve.seating is None else curve.seating
         if curve.seating is None:
@@ -175,23 +172,22 @@ def pose(
     # its prior is stated for the standard deviation of gamma heights
     off = {} if "alpha" in values else {"full_contact_stress": None}
     chosen = normal_priors(tuple(names), {**off, **(priors or {})})
-    return Problem(tuple(curves), tuple(names), values, chosen, settings)
+    return Problem(next(iter(closures), None), shears, tuple(names), values, chosen, settings)
 
 
 # -------------------------------------------------------------------------- where to start
 
 
-def _within(name: str, curves: Curves) -> float:
+def _within(name: str, closures: Sequence[ClosureCurve], shears: Sequence[ShearCurve]) -> float:
     """Where a parameter starts that is infinite by default: at half of what the tests reach."""
-    closed = [float(np.ptp(one.closure)) for one in curves if isinstance(one, ClosureCurve)]
-    shears = [one for one in curves if isinstance(one, ShearCurve)]
-    reach = [float(np.ptp(one.shear)) for one in shears]
+    if not shears or (closures and name == "yield_interference"):
+        return 0.5 * max(float(np.ptp(one.closure)) for one in closures)
     if name == "slope_wear":
-        reach = [
+        return 0.5 * max(
             float(np.max(np.abs(one.shear_stress)) * np.sum(np.abs(np.diff(one.shear))))
             for one in shears
-        ]
-    return 0.5 * max(closed if name == "yield_interference" and closed else reach or closed)
+        )
+    return 0.5 * max(float(np.ptp(one.shear)) for one in shears)
 
 
 def starting_points(problem: Problem, near: bool) -> list[Array]:
@@ -199,17 +195,13 @@ def starting_points(problem: Problem, near: bool) -> list[Array]:
 
     near: whether the values at hand are those of a law and not the defaults.
     """
-    free, curve = set(problem.free), problem.closure
-    if curve is None or not free & {"alpha", "beta"} or (near and len(problem.curves) > 1):
-        return [problem.pack_scaled(problem.values)]
-    span = float(np.ptp(curve.closure))
-    starts = []
-    for shape in (2.0, 5.0, 10.0) if "alpha" in free else (problem.values["alpha"] + 1,):
-        guess: dict[str, Any] = {"alpha": shape - 1, "beta": 1.5 * span / shape}
-        guess["overlap"] = 0.1 * shape * guess["beta"]
-        guess["seating"] = span / 2
-        chosen = {name: value for name, value in guess.items() if name in free}
-        starts.append(problem.pack_scaled({**problem.values, **chosen}))
+    free, curve, values = set(problem.free), problem.closure, problem.values
+    if curve is None or not free & {"alpha", "beta"} or (near and problem.shears):
+        return [problem.pack_scaled(values)]
+    span, starts = float(np.ptp(curve.closure)), list[Array]()
+    for shape in (2.0, 5.0, 10.0) if "alpha" in free else (values["alpha"] + 1,):
+        guess = {"alpha": shape - 1, "beta": 1.5 * span / shape, "overlap": 0.15 * span}
+        starts.append(problem.pack_scaled({**values, **guess, "seating": span / 2}))
     return starts
 
 
@@ -227,12 +219,12 @@ def staged(problem: Problem, starts: list[Array]) -> list[Array]:
     mine = tuple(n for n in rest if n in OF_CLOSURE)
     if closure is not None and mine:
         rest = tuple(n for n in rest if n not in mine)
-        values = [_best(replace(problem, curves=(closure,), free=mine), values)]
+        values = [_best(replace(problem, shears=(), free=mine), values)]
     if finds_length:
         span = max(float(np.ptp(curve.shear)) for curve in shears)
         values = [v | {"mating_length": share * span} for v in values for share in LENGTHS]
     if rest:
-        values = [_best(replace(problem, curves=shears, free=rest, values=values[0]), values)]
+        values = [_best(replace(problem, closure=None, free=rest, values=values[0]), values)]
     return [problem.pack_scaled(values[0])]
 
 
@@ -271,10 +263,8 @@ def solve(problem: Problem, starts: Sequence[Array]) -> Solution:
     diagonals of C L C and C. D includes that a parameter lies within its bounds, as a standard
     error of their distance: what nothing else fixes is then wide open, and C exists.
     """
-    expected = tuple(one.expected for one in problem.series)
-    steepness = [one.steepness for one in problem.series]
-    bounds = problem.bounds()
-    noise, sigma = expected, problem.sigma(expected)
+    bounds, noise = problem.bounds(), tuple(one.expected for one in problem.series)
+    sigma = problem.sigma(noise)
     x = least(problem, sigma, starts)
     for _ in range(ROUNDS):
         r = problem.data(x)
@@ -284,9 +274,7 @@ def solve(problem: Problem, starts: Sequence[Array]) -> Solution:
         information = weighted.T @ weighted + np.diag((bounds[1] - bounds[0]) ** -2)
         C = np.linalg.inv(information + precision)
         leverage = np.einsum("ip,pq,iq->i", weighted, C, weighted)
-        if all(n.known for n in noise):
-            break
-        pieces = zip(expected, problem.split(r), problem.split(leverage), steepness, strict=True)
+        pieces = zip(problem.series, problem.split(r), problem.split(leverage), strict=True)
         previous, noise = noise, tuple(estimate_noise(*piece) for piece in pieces)
         if noise == previous:
             break

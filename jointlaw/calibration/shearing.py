@@ -15,11 +15,14 @@ Path = tuple[Array, Array, NDArray[np.intp]]
 
 
 class Sheared(NamedTuple):
-    """A shear test by a law: displacement (m), shear stress (Pa), opening (m), (rows,) each."""
+    """A shear test by a law: displacement (m), shear stress (Pa), opening (m), (rows,) each; and
+    the rows of the measured points (n,).
+    """
 
     way: Array
     stress: Array
     opening: Array
+    points: NDArray[np.intp]
 
     @property
     def dilation(self) -> float:
@@ -55,6 +58,6 @@ def shear_all(law: JointLaw, paths: Sequence[Path]) -> list[Sheared]:
             ) from error
         stress[k], closure[k] = F[:, 1], joints.delta[:, 0]
     return [
-        Sheared(way[:n, k], stress[:n, k], closure[0, k] - closure[:n, k])
-        for k, n in enumerate(path[0].size for path in paths)
+        Sheared(way[:n, k], stress[:n, k], closure[0, k] - closure[:n, k], points)
+        for k, (n, points) in enumerate((path[0].size, path[2]) for path in paths)
     ]

@@ -85,16 +85,14 @@ class Table(NamedTuple):
         given: name and unit from the command line, "Disp:mm", or None.
         """
         name, _, unit = (given or "").partition(":")
-        wanted = (*asked.names, *asked.vague) if given is None else (_plain(name),)
+        alike = sum(_factor(c.unit, asked.base) is not None for c in self.columns)
+        vague = asked.vague if alike < 2 else ()  # not one of several displacements
+        wanted = (*asked.names, *vague) if given is None else (_plain(name),)
         matches = (
             [c for c in self.columns if w in (_plain(c.name), _plain(c.title))] for w in wanted
         )
         found = next((match for match in matches if match), [])
-        alike = sum(_factor(c.unit, asked.base) is not None for c in self.columns)
-        if given is None and found and _plain(found[0].name) in asked.vague and alike > 1:
-            found = []  # one of several displacements
-        common = units.COMMON[asked.base]
-        example = f'{asked.option} "NAME:{common}"'
+        example = f'{asked.option} "NAME:{units.COMMON[asked.base]}"'
         if len(found) != 1:
             many = f"{len(found)} columns of one name: " if found else ""
             raise ValueError(
@@ -127,10 +125,9 @@ class Table(NamedTuple):
         returns while another stands still. outliers: what to do with them, "skip" or "keep".
         Raises ValueError naming them without it, and for fewer than three rows.
         """
-        whole, odd = np.isfinite([c.values for c in columns]).all(axis=0), dict(self.odd)
+        whole = np.isfinite([c.values for c in columns]).all(axis=0)
         lines, values = np.array(self.lines)[whole], [c.values[whole] for c in columns]
-        for c in columns:
-            odd |= c.odd
+        odd = self.odd | {n: why for c in columns for n, why in c.odd.items()}
         seen = ~np.isin(lines, list(odd))
         for (_, x), (c, y) in permutations(zip(columns, values, strict=True), 2):
             jumps = lines[seen][_jumps(x[seen], y[seen])].tolist()
@@ -233,12 +230,11 @@ def _beside(
     same = {tuple(name for name in names[part] if name) for part in parts}
     if len(parts) < 2 or len(same) > 1 or len(next(iter(same))) < 2:
         return [(titles, below, rows)]
-    wide = len(titles)
     return [
         (
             titles[part],
             below[part],
-            {n: cells for n, row in rows.items() if any(cells := row[:wide][part])},
+            {n: cells for n, row in rows.items() if any(cells := row[part])},
         )
         for part in parts
     ]
@@ -246,33 +242,41 @@ def _beside(
 
 def _table(name: str, titles: list[str], below: list[str], rows: Rows, marks: Marks) -> Table:
     """The columns of one test."""
-    below = below + [""] * (len(titles) - len(below))
-    values = np.full((len(titles), len(rows)), np.nan)
-    for k, (line, row) in enumerate(rows.items()):
-        if len(row) > len(titles) and any(row[len(titles) :]):
-            remedy = "give each column a name and separate all lines alike; if the decimal mark is "
+    wide = len(titles)
+    for line, row in rows.items():
+        if any(row[wide:]):
             raise ValueError(
-                f"{name}: line {line} has {len(row)} cells under {len(titles)} names; {remedy}a "
-                "comma, separate the columns by semicolons"
+                f"{name}: line {line} has {len(row)} cells under {wide} names; give each column a "
+                "name and separate all lines alike; if the decimal mark is a comma, separate the "
+                "columns by semicolons"
             )
-        values[: len(row), k] = [marks.value(cell) for cell in row[: len(titles)]]
     columns, odd = [], dict[int, str]()
-    for k, title in enumerate(titles):
-        cells = {n: row[k] for n, row in rows.items() if k < len(row) and row[k]}
-        known = dict(zip(rows, values[k].tolist(), strict=True))
-        texts = {n: cell for n, cell in cells.items() if not np.isfinite(known[n])}
-        wrong = ""
-        for n, cell in texts.items():
-            why = AMBIGUOUS if EITHER.fullmatch(cell) else "is no number"
-            wrong = wrong or f"line {n} holds {cell!r}, which {why}"
-        if 2 * len(texts) < len(cells):
-            odd |= {n: f"{title} is {c!r}" for n, c in texts.items() if _WORD.fullmatch(c)}
-        sent = {n: cell for n, cell in cells.items() if _SENTINEL.fullmatch(cell)}
-        usual = max((abs(known[n]) for n in cells if n not in sent and n not in texts), default=0)
-        none = {n: f"{title} is {c}" for n, c in sent.items() if abs(known[n]) > 5 * usual}
-        name_unit = _read_title(title, below[k])
-        columns.append(Column(title, *name_unit, values[k], wrong, none))
+    padded = ([*row, *[""] * wide][:wide] for row in (below, *rows.values()))
+    for title, unit, *cells in zip(titles, *padded, strict=True):
+        column, summaries = _column(title, unit, dict(zip(rows, cells, strict=True)), marks)
+        columns.append(column)
+        odd |= summaries
     return Table(name, columns, [*rows], odd)
+
+
+def _column(
+    title: str, unit: str, cells: dict[int, str], marks: Marks
+) -> tuple[Column, dict[int, str]]:
+    """A column from its cells by line; and lines that hold a word, such as Max, among numbers."""
+    found = {n: marks.value(cell) for n, cell in cells.items()}
+    known = {n: abs(x) for n, x in found.items() if np.isfinite(x)}
+    texts = {n: cell for n, cell in cells.items() if cell and n not in known}
+    wrong = (
+        f"line {n} holds {cell!r}, which {AMBIGUOUS if EITHER.fullmatch(cell) else 'is no number'}"
+        for n, cell in texts.items()
+    )
+    words = {n: f"{title} is {cell!r}" for n, cell in texts.items() if _WORD.fullmatch(cell)}
+    sent = [n for n in known if _SENTINEL.fullmatch(cells[n])]
+    usual = max((x for n, x in known.items() if n not in sent), default=0.0)
+    odd = {n: f"{title} is {cells[n]}" for n in sent if known[n] > 5 * usual}
+    values = np.array([*found.values()])
+    column = Column(title, *_read_title(title, unit), values, next(wrong, ""), odd)
+    return column, words if len(texts) < len(known) else {}
 
 
 def _jumps(x: Array, y: Array) -> NDArray[np.bool_]:
@@ -283,7 +287,8 @@ def _jumps(x: Array, y: Array) -> NDArray[np.bool_]:
     scale = max(np.ptp(y), 0.2 * np.max(np.abs(y)))  # what hardly changes scatters
     off_x, off_y = (np.abs(z[1:-1] - (z[2:] + z[:-2]) / 2) for z in (x / np.ptp(x), y / scale))
     apart = np.abs(y[2:] - y[:-2]) / scale
-    found[1:-1] = (off_y > JUMP) & (apart < 0.25 * off_y) & (off_x < STILL)
+    goes_on = np.diff(x)[1:] * np.diff(x)[:-1] >= 0  # and does not turn, as at the end of unloading
+    found[1:-1] = (off_y > JUMP) & (apart < 0.25 * off_y) & (off_x < STILL) & goes_on
     return found
 
 

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from .. import presets
 from ..laws.joint_law import JointLaw
@@ -22,26 +22,24 @@ DEFAULT_ROCK = ", ".join(f"{name} = {value:.4g}" for name, value in _CONTACTS.it
 Written = Mapping[str, str | Callable[[Path], object]]
 
 
-def add_command(
-    commands: Any,
-    name: str,
-    what: str,
-    example: str,
-    run: Callable[[argparse.Namespace], int | None],
-) -> argparse.ArgumentParser:
-    """Add a subcommand with its one-line purpose and an example that runs as printed.
+Option = tuple[tuple[str, ...], dict[str, Any]]
 
-    run: what the command does with its options; returns the exit status, None for success.
+
+class Command(NamedTuple):
+    """A subcommand: its one-line purpose, an example that runs as printed, what it does with its
+    options (it returns the exit status, None for success), and the options.
     """
-    parser: argparse.ArgumentParser = commands.add_parser(
-        name,
-        help=what,
-        description=what,
-        epilog=f"example:\n  {example}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.set_defaults(run=run)
-    return parser
+
+    name: str
+    what: str
+    example: str
+    run: Callable[[argparse.Namespace], int | None]
+    options: tuple[Option, ...]
+
+
+def option(*names: str, **settings: Any) -> Option:
+    """An option or argument, as `add_argument` of argparse takes it."""
+    return names, settings
 
 
 def in_unit(unit: str, *, positive: bool = False) -> Callable[[str], float]:
@@ -64,15 +62,22 @@ def several(unit: str, *, positive: bool = False) -> Callable[[str], list[float]
     return lambda text: [in_unit(unit, positive=positive)(part) for part in text.split(",")]
 
 
-def add_law(parser: argparse.ArgumentParser) -> None:
-    """Add the law, a preset or a file, and its resolution; `read_law` reads them."""
-    parser.add_argument("law", metavar="PRESET_OR_FILE", help="preset name or TOML file")
-    parser.add_argument(
+LAW = (  # a preset or a file, and its resolution; `read_law` reads them
+    option("law", metavar="PRESET_OR_FILE", help="preset name or TOML file"),
+    option(
         "--default-rock",
         action="store_true",
         help="for a file without [asperity], such as that of a scan: " + DEFAULT_ROCK,
-    )
-    parser.add_argument("--resolution", choices=tuple(NAMED), help="instead of the law's own")
+    ),
+    option("--resolution", choices=tuple(NAMED), help="instead of the law's own"),
+)
+OUT = (  # the folder for the results
+    option("--out", metavar="DIR", type=Path, required=True, help="folder for the results"),
+    option(
+        "--force", action="store_true", help="replace the results of another run in that folder"
+    ),
+)
+PICTURES = option("--format", choices=FORMATS, default=FORMATS[0], help="of pictures (default png)")
 
 
 def read_law(options: argparse.Namespace) -> Any:
@@ -96,20 +101,6 @@ def read_law(options: argparse.Namespace) -> Any:
         return law
     require_rock({"mu": law.asperity.mu}, f"{options.law}: asperity.")
     return replace(law, resolution=options.resolution) if options.resolution else law
-
-
-def add_out(parser: argparse.ArgumentParser, *, pictures: bool = True) -> None:
-    """Add the folder for the results and, of a command that draws, the format of its pictures."""
-    parser.add_argument(
-        "--out", metavar="DIR", type=Path, required=True, help="folder for the results"
-    )
-    parser.add_argument(
-        "--force", action="store_true", help="replace the results of another run in that folder"
-    )
-    if pictures:
-        parser.add_argument(
-            "--format", choices=FORMATS, default=FORMATS[0], help="of pictures (default png)"
-        )
 
 
 def write_results(

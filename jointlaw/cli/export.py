@@ -2,7 +2,6 @@
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from ..hosts.c.export import export_c, identifier
 from ..hosts.fem.export import SEATING, export_fem, require_seating
@@ -10,7 +9,7 @@ from ..hosts.lammps.export import export_lammps
 from ..hosts.yade.export import export_yade
 from ..laws.joint_law import JointLaw
 from ..support.files import clear_run
-from .command import add_command, add_law, add_out, in_unit, read_law
+from .command import LAW, OUT, Command, in_unit, option, read_law
 
 START = {
     "yade": "yade -n -x settle_and_incline.py",
@@ -18,30 +17,6 @@ START = {
     "fem": "make",
     "lammps": "./build.sh && lmp -in in.tower",
 }
-
-
-def add(commands: Any) -> None:
-    """Add the subcommand to the command line."""
-    what = "write a law for a host code: table, adapter and scripts in one folder"
-    example = "jointlaw export yade jing-replica --out joint-for-yade"
-    parser = add_command(commands, "export", what, example, _export)
-    parser.add_argument(
-        "host", choices=tuple(START), help="the host code; c: also C++; fem: finite elements"
-    )
-    add_law(parser)
-    parser.add_argument(
-        "--shear-limit",
-        metavar="LENGTH",
-        type=in_unit("m", positive=True),
-        help="yade: shear at which the friction of the table is read, such as 5um",
-    )
-    parser.add_argument(
-        "--seating",
-        metavar="STRESS",
-        type=in_unit("Pa"),
-        help=f"fem: normal stress before the first step (default {SEATING / 1e3:g}kPa)",
-    )
-    add_out(parser, pictures=False)
 
 
 def _export(options: argparse.Namespace) -> None:
@@ -66,8 +41,7 @@ def _export(options: argparse.Namespace) -> None:
 
 def _export_table(law: JointLaw, folder: Path, shear_limit: float | None) -> None:
     """Write the joint for YADE, and print what its table drops."""
-    more: dict[str, Any] = {} if shear_limit is None else {"shear_limit": shear_limit}
-    table = export_yade(law, folder, tolerance=1e-3, **more)
+    table = export_yade(law, folder, shear_limit=shear_limit)
     missed = table.metadata["resolution_error_friction_angle"]
     print(
         f"wrote the joint for YADE to {folder}: {len(table.closure)} rows\n"
@@ -75,3 +49,30 @@ def _export_table(law: JointLaw, folder: Path, shear_limit: float | None) -> Non
         f"bond: {table.metadata['bond']}; what the table drops (error against the law, share of\n"
         f"each path's largest traction):\n{table.report(law)}"
     )
+
+
+COMMAND = Command(
+    "export",
+    "write a law for a host code: table, adapter and scripts in one folder",
+    "jointlaw export yade jing-replica --out joint-for-yade",
+    _export,
+    (
+        option(
+            "host", choices=tuple(START), help="the host code; c: also C++; fem: finite elements"
+        ),
+        *LAW,
+        option(
+            "--shear-limit",
+            metavar="LENGTH",
+            type=in_unit("m", positive=True),
+            help="yade: shear at which the friction of the table is read, such as 5um",
+        ),
+        option(
+            "--seating",
+            metavar="STRESS",
+            type=in_unit("Pa"),
+            help=f"fem: normal stress before the first step (default {SEATING / 1e3:g}kPa)",
+        ),
+        *OUT,
+    ),
+)

@@ -1,43 +1,16 @@
 """`jointlaw field`: a law from JRC, JCS, a friction angle and a stiffness."""
 
 import argparse
-from typing import Any
 
 from ..calibration.field import ASSUMED, from_field, peak_displacement, tested
-from .command import Written, add_command, add_out, in_unit, write_results
+from .command import OUT, PICTURES, Command, Written, in_unit, option, write_results
 
-
-def add(commands: Any) -> None:
-    """Add `field` to the subparsers of the command line."""
-    what = "a law from field values: JRC, JCS, friction angle, stiffness at a normal stress"
-    example = (
-        "jointlaw field --jrc 10 --jcs 100MPa --length 0.1m --normal-stress 1MPa "
-        "--normal-stiffness 30GPa/m --out out"
-    )
-    parser = add_command(commands, "field", what, example, _run)
-    add, stress = parser.add_argument, in_unit("Pa", positive=True)
-    add("--jrc", type=float, required=True, help="joint roughness coefficient, such as 10")
-    add("--jcs", type=stress, required=True, help="strength of the joint wall: 100MPa")
-    add("--length", type=in_unit("m", positive=True), required=True, help="of the joint: 10cm")
-    add("--normal-stress", type=stress, required=True, help="at which the law is right: 1MPa")
-    add(
-        "--normal-stiffness",
-        type=in_unit("Pa/m", positive=True),
-        required=True,
-        help="at that stress: 30GPa/m",
-    )
-    add(
-        "--basic-friction",
-        type=in_unit("rad", positive=True),
-        default="30deg",
-        help="angle of the flat rock (default 30deg)",
-    )
-    add_out(parser)
+GIVEN = ("jrc", "jcs", "length", "normal_stress", "normal_stiffness", "basic_friction")
+_STRESS = in_unit("Pa", positive=True)
 
 
 def _run(options: argparse.Namespace) -> None:
-    names = ("jrc", "jcs", "length", "normal_stress", "normal_stiffness", "basic_friction")
-    given = {name: getattr(options, name) for name in names}
+    given = {name: getattr(options, name) for name in GIVEN}
     law, slip = from_field(**given), peak_displacement(options.jrc, options.length)
     record, stiffness = tested(law, options.normal_stress, slip)
     text = (
@@ -53,3 +26,36 @@ def _run(options: argparse.Namespace) -> None:
     write_results(
         options.out, files, {"given_SI": given, "result": record.summary()}, options.format
     )
+
+
+COMMAND = Command(
+    "field",
+    "a law from field values: JRC, JCS, friction angle, stiffness at a normal stress",
+    "jointlaw field --jrc 10 --jcs 100MPa --length 0.1m --normal-stress 1MPa "
+    "--normal-stiffness 30GPa/m --out out",
+    _run,
+    (
+        option("--jrc", type=float, required=True, help="joint roughness coefficient, such as 10"),
+        option("--jcs", type=_STRESS, required=True, help="strength of the joint wall: 100MPa"),
+        option(
+            "--length", type=in_unit("m", positive=True), required=True, help="of the joint: 10cm"
+        ),
+        option(
+            "--normal-stress", type=_STRESS, required=True, help="at which the law is right: 1MPa"
+        ),
+        option(
+            "--normal-stiffness",
+            type=in_unit("Pa/m", positive=True),
+            required=True,
+            help="at that stress: 30GPa/m",
+        ),
+        option(
+            "--basic-friction",
+            type=in_unit("rad", positive=True),
+            default="30deg",
+            help="angle of the flat rock (default 30deg)",
+        ),
+        *OUT,
+        PICTURES,
+    ),
+)

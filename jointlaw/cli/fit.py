@@ -2,6 +2,7 @@
 
 import argparse
 from functools import partial
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,9 @@ from ..calibration.fit import Fit, fit_curves
 from ..calibration.measured import ClosureCurve, ShearCurve, first_loading
 from ..parameters.rock import require_rock
 from ..support.checks import Array, one_of
+from ..support.markdown import table
 from ..support.text_numbers import DECIMAL
-from .command import Written, add_command, add_out, in_unit, several, write_results
+from .command import OUT, PICTURES, Command, Written, in_unit, option, several, write_results
 
 MOST = 60  # points of a shear test that are fitted: a logger writes thousands, each costs a step
 SAME = 0.02  # of a normal stress: tests that --fit names
@@ -30,85 +32,6 @@ NEEDS = {  # what an option is about, where no such test is given
          "normal_stress"),
     ),
 }  # fmt: skip
-
-
-def add(commands: Any) -> None:
-    """Add `fit` to the subparsers of the command line."""
-    what = "fit the law to measured closure and shear curves; write preset, report and plot"
-    example = "jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out out"
-    parser = add_command(commands, "fit", what, example, _run)
-    add = parser.add_argument
-    add("data", nargs="*", metavar="CSV", help="file of stress and closure, or shipped data set")
-    add("--stress-column", help="name and unit of that column, such as sigmaZ:MPa")
-    add("--closure-column", help="name and unit of that column, such as Disp:mm")
-    add(
-        "--shear",
-        nargs="+",
-        metavar="CSV",
-        default=[],
-        help="direct shear tests, several to a file or one, as CSV or XLSX. Their normal stress is "
-        "in a column or after --normal-stress. One law is fitted to all of them and to the closure "
-        "test, if one is given before",
-    )
-    add(
-        "--peaks",
-        metavar="CSV",
-        help="a table with one shear test a row: normal_stress, peak_shear_stress, "
-        "peak_displacement, residual_shear_stress, residual_displacement, with units",
-    )
-    add("--shear-column", help="name and unit of that column, such as us:mm")
-    add("--shear-stress-column", help="name and unit of that column: tau:MPa")
-    add("--normal-column", help="name and unit of that column: sn:MPa")
-    add("--opening-column", help="name and unit of that column, opening positive: dn:mm")
-    add("--area", type=in_unit("m2", positive=True), help="that forces act on: 100cm2")
-    add("--side", type=in_unit("m", positive=True), help="of an area that slip makes smaller: 10cm")
-    add(
-        "--normal-stress",
-        metavar="STRESSES",
-        type=several("Pa", positive=True),
-        help="of the shear tests in their order: 1MPa,3MPa",
-    )
-    add(
-        "--decimal",
-        choices=tuple(DECIMAL),
-        help="the decimal mark of files whose numbers do not show it, as 1,201 and 1.201 do not",
-    )
-    add(
-        "--outliers",
-        choices=("skip", "keep"),
-        help="what to do with rows that may be no measurement; they are named first",
-    )
-    add(
-        "--fit",
-        metavar="STRESSES",
-        type=several("Pa", positive=True),
-        help="fit the shear tests at these normal stresses, predict the others: 1MPa,3MPa,5MPa",
-    )
-    add("--up-to", type=in_unit("Pa"), help="fit up to this stress, predict the rest: 5.3MPa")
-    add("--cycle", action="store_true", help="fit unloading too, and with it yield_interference")
-    add(
-        "--compliance",
-        metavar="LENGTH/STRESS",
-        type=_compliance,
-        default=0.0,
-        help="of rock and machine, such as 4.2um/10MPa: it is subtracted first",
-    )
-    add("--noise", type=float, help="known error of the closure test's stress, such as 0.01")
-    add(
-        "--set",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="hold a parameter at a value in SI units, such as alpha=3.8; repeatable",
-    )
-    add(
-        "--free",
-        metavar="NAMES",
-        help="parameters to fit, with commas between; default asperity_density, of closure tests "
-        "alpha and beta, with --cycle yield_interference, of shear tests mu, a and mating_length",
-    )
-    add("--law", metavar="PRESET_OR_FILE", help="the values of parameters that are not fitted")
-    add_out(parser)
 
 
 def _compliance(text: str) -> float:
@@ -128,11 +51,7 @@ def _run(options: argparse.Namespace) -> None:
             if getattr(options, name) and not getattr(options, tests):
                 raise ValueError(f"--{name.replace('_', '-')} is about {about}, or leave it out")
     keywords = _keywords(options, bool(shears))
-    closures: list[ClosureCurve] = []
-    held: tuple[Array, Array] | None = None
-    if options.data:
-        curve, held = _closure_curve(options)
-        closures.append(curve)
+    closures, held = _closure_curve(options)
     fitted, predicted = _shear_curves(options)
     fit = fit_curves([*closures, *fitted], **keywords)
     name = ", ".join(Path(item).name for item in [*options.data, *shears])
@@ -166,8 +85,10 @@ def _run(options: argparse.Namespace) -> None:
 
 def _closure_curve(
     options: argparse.Namespace,
-) -> tuple[ClosureCurve, tuple[Array, Array] | None]:
-    """The closure curve to fit; with it stress (Pa) and closure (m) of points held out, or None."""
+) -> tuple[list[ClosureCurve], tuple[Array, Array] | None]:
+    """The closure curve to fit, if there is one; stress (Pa) and closure (m) of points held out."""
+    if not options.data:
+        return [], None
     item, compliance, notes = options.data[0], options.compliance, list[str]()
     if Path(item).exists():
         columns = options.stress_column, options.closure_column
@@ -190,7 +111,7 @@ def _closure_curve(
         stress[seen], closure[seen], options.noise, options.cycle, compliance, item, tuple(notes)
     )
     held = stress[~seen], closure[~seen] - compliance * stress[~seen]
-    return curve, None if seen.all() else held
+    return [curve], None if seen.all() else held
 
 
 def _shear_curves(options: argparse.Namespace) -> tuple[list[ShearCurve], list[ShearCurve]]:
@@ -201,10 +122,16 @@ def _shear_curves(options: argparse.Namespace) -> tuple[list[ShearCurve], list[S
             f"--normal-stress gives {len(normals)} stresses for {len(options.shear)} files of "
             "shear tests: give one for each"
         )
-    how = {name: getattr(options, name) for name in ("decimal", "outliers", "area", "side")}
-    for name, option in (("shear", "shear"), ("stress", "shear_stress"), ("normal", "normal"),
-                         ("opening", "opening")):  # fmt: skip
-        how[name] = getattr(options, f"{option}_column")
+    how = {
+        "shear": options.shear_column,
+        "stress": options.shear_stress_column,
+        "normal": options.normal_column,
+        "opening": options.opening_column,
+        "decimal": options.decimal,
+        "outliers": options.outliers,
+        "area": options.area,
+        "side": options.side,
+    }
     tests = [
         test.thinned(MOST)
         for path, normal in zip(options.shear, normals, strict=True)
@@ -220,29 +147,26 @@ def _shear_curves(options: argparse.Namespace) -> tuple[list[ShearCurve], list[S
             f"--fit names {sum(fit)} of {len(tests)} shear tests, at "
             f"{', '.join(f'{at / 1e6:.3g}MPa' for at in given)}: name two or more, and leave one"
         )
-    pairs = list(zip(tests, fit, strict=True))
-    return [test for test, seen in pairs if seen], [test for test, seen in pairs if not seen]
+    return list(compress(tests, fit)), list(compress(tests, np.logical_not(fit)))
 
 
 def _misses(fit: Fit, fitted: list[ShearCurve], predicted: list[ShearCurve]) -> str:
     """How far predictions miss, those of envelopes through the same tests beside (Markdown)."""
-    lines = [
-        "\nTests that were not fitted: errors of the predicted peak and last shear stress.\n",
-        f"| test | peak, last (MPa) | law | {' | '.join(FORMS)} |",
-        f"|---|---|---|{'---|' * len(FORMS)}",
-    ]
-    for curve, (test, _) in zip(predicted, fit.predict_shear(*predicted), strict=True):
+    rows = []
+    for curve, test in zip(predicted, fit.predict_shear(*predicted), strict=True):
         measured, normal = peak_and_last(curve.shear_stress), float(np.mean(curve.normal))
         found = [peak_and_last(test.stress), *(envelope(form, fitted, normal) for form in FORMS)]
         cells = ["{:+.1f}, {:+.1f} %".format(*(100 * (one / measured - 1))) for one in found]
         told = "{:.4g}, {:.4g}".format(*(measured / 1e6))
-        lines.append(f"| {curve.name} | {told} | {' | '.join(cells)} |")
-    return "\n".join(lines) + "\n"
+        rows.append(" | ".join([curve.name, told, *cells]))
+    lines = table(f"test | peak, last (MPa) | law | {' | '.join(FORMS)}", rows)
+    what = "Tests that were not fitted: errors of the predicted peak and last shear stress."
+    return "\n".join(["", what, "", *lines, ""])
 
 
 def _keywords(options: argparse.Namespace, sheared: bool) -> dict[str, Any]:
     """What `fit_curves` takes besides the curves."""
-    free, law = ["asperity_density"], None
+    free = ["asperity_density"]
     free += ["alpha", "beta"] if options.data else []
     free += ["yield_interference"] if options.cycle else []
     free += ["mu", "a", "mating_length"] if sheared else []
@@ -255,7 +179,105 @@ def _keywords(options: argparse.Namespace, sheared: bool) -> dict[str, Any]:
         raise ValueError(
             f"--set {options.set}: write a name and a number each, such as alpha=3.8"
         ) from None
-    if options.law:
-        law = presets.load_any(options.law)
-        require_rock({"mu": law.asperity.mu}, f"{options.law}: asperity.")
+    law = presets.load_any(options.law) if options.law else None
     return {"fixed": fixed, "free": free, "law": law}
+
+
+COMMAND = Command(
+    "fit",
+    "fit the law to measured closure and shear curves; write preset, report and plot",
+    "jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out out",
+    _run,
+    (
+        option(
+            "data", nargs="*", metavar="CSV", help="file of stress and closure, or shipped data set"
+        ),
+        option("--stress-column", help="name and unit of that column, such as sigmaZ:MPa"),
+        option("--closure-column", help="name and unit of that column, such as Disp:mm"),
+        option(
+            "--shear",
+            nargs="+",
+            metavar="CSV",
+            default=[],
+            help="direct shear tests, several to a file or one, as CSV or XLSX. Their normal "
+            "stress is in a column or after --normal-stress. One law is fitted to all of them and "
+            "to the closure test, if one is given before",
+        ),
+        option(
+            "--peaks",
+            metavar="CSV",
+            help="a table with one shear test a row: normal_stress, peak_shear_stress, "
+            "peak_displacement, residual_shear_stress, residual_displacement, with units",
+        ),
+        option("--shear-column", help="name and unit of that column, such as us:mm"),
+        option("--shear-stress-column", help="name and unit of that column: tau:MPa"),
+        option("--normal-column", help="name and unit of that column: sn:MPa"),
+        option("--opening-column", help="name and unit of that column, opening positive: dn:mm"),
+        option("--area", type=in_unit("m2", positive=True), help="that forces act on: 100cm2"),
+        option(
+            "--side",
+            type=in_unit("m", positive=True),
+            help="of an area that slip makes smaller: 10cm",
+        ),
+        option(
+            "--normal-stress",
+            metavar="STRESSES",
+            type=several("Pa", positive=True),
+            help="of the shear tests in their order: 1MPa,3MPa",
+        ),
+        option(
+            "--decimal",
+            choices=tuple(DECIMAL),
+            help="the decimal mark of files whose numbers do not show it, as 1,201 and 1.201 do "
+            "not",
+        ),
+        option(
+            "--outliers",
+            choices=("skip", "keep"),
+            help="what to do with rows that may be no measurement; they are named first",
+        ),
+        option(
+            "--fit",
+            metavar="STRESSES",
+            type=several("Pa", positive=True),
+            help="fit the shear tests at these normal stresses, predict the others: 1MPa,3MPa,5MPa",
+        ),
+        option(
+            "--up-to",
+            type=in_unit("Pa", positive=True),
+            help="fit up to this stress, predict the rest: 5.3MPa",
+        ),
+        option(
+            "--cycle", action="store_true", help="fit unloading too, and with it yield_interference"
+        ),
+        option(
+            "--compliance",
+            metavar="LENGTH/STRESS",
+            type=_compliance,
+            default=0.0,
+            help="of rock and machine, such as 4.2um/10MPa: it is subtracted first",
+        ),
+        option(
+            "--noise", type=float, help="known error of the closure test's stress, such as 0.01"
+        ),
+        option(
+            "--set",
+            action="append",
+            default=[],
+            metavar="NAME=VALUE",
+            help="hold a parameter at a value in SI units, such as alpha=3.8; repeatable",
+        ),
+        option(
+            "--free",
+            metavar="NAMES",
+            help="parameters to fit, with commas between; default asperity_density, of closure "
+            "tests alpha and beta, with --cycle yield_interference, of shear tests mu, a and "
+            "mating_length",
+        ),
+        option(
+            "--law", metavar="PRESET_OR_FILE", help="the values of parameters that are not fitted"
+        ),
+        *OUT,
+        PICTURES,
+    ),
+)

@@ -5,113 +5,36 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
-from ..laboratory.experiments import CONTROLS, PathError, closure_test, direct_shear
+from ..laboratory.experiments import PathError, closure_test, direct_shear
 from ..laboratory.record import UNITS, Record
 from ..laws.joint_law import JointLaw
 from .command import (
+    LAW,
+    OUT,
+    PICTURES,
+    Command,
+    Option,
     Written,
-    add_command,
-    add_law,
-    add_out,
     in_unit,
+    option,
     read_law,
     several,
     write_results,
 )
 
 
-def add(commands: Any) -> None:
-    """Add both subcommands to the command line."""
-    what = "direct shear test: seat the joint at a normal stress, shear it, write curve and picture"
-    example = "jointlaw shear biegel-rough --normal-stress 10MPa --to 2um --reverse -2um --out out"
-    parser = add_command(commands, "shear", what, example, _shear)
-    parser.add_argument(
-        "--normal-stress",
-        metavar="STRESS",
-        type=in_unit("Pa", positive=True),
-        default="10MPa",
-        help="normal stress (default 10MPa)",
-    )
-    parser.add_argument(
-        "--to",
-        metavar="LENGTH",
-        type=in_unit("m"),
-        required=True,
-        help="shear displacement, such as 2um",
-    )
-    parser.add_argument(
-        "--reverse",
-        metavar="LENGTHS",
-        type=several("m"),
-        default=[],
-        help="further turning points, separated by commas: --reverse -2um,0",
-    )
-    parser.add_argument(
-        "--azimuth",
-        metavar="ANGLE",
-        type=in_unit("rad"),
-        default="0",
-        help="direction of shear from axis 2 towards axis 3, such as 30deg (default 0)",
-    )
-    parser.add_argument(
-        "--control",
-        choices=CONTROLS,
-        default="stress",
-        help="keep the normal stress (default), let it grow with dilation by --normal-stiffness, "
-        "or keep the closure",
-    )
-    parser.add_argument(
-        "--normal-stiffness",
-        metavar="STIFFNESS",
-        type=in_unit("Pa/m"),
-        help="of the surroundings, for --control stiffness, such as 5GPa/m",
-    )
-    _add_common(parser, steps=200)
-
-    what = "closure test: load the joint to a normal stress and unload it"
-    example = "jointlaw closure westerly-smooth --normal-stress 20MPa --out out"
-    parser = add_command(commands, "closure", what, example, _closure)
-    parser.add_argument(
-        "--normal-stress",
-        metavar="STRESSES",
-        type=several("Pa", positive=True),
-        default="20MPa",
-        help="largest normal stress (default 20MPa), or one per cycle: 5MPa,20MPa",
-    )
-    _add_common(parser, steps=100)
-
-
-def _add_common(parser: argparse.ArgumentParser, steps: int) -> None:
-    add_law(parser)
-    parser.add_argument(
-        "--steps", metavar="N", type=int, default=steps, help=f"steps per leg (default {steps})"
-    )
-    parser.add_argument(
-        "--units",
-        metavar="LENGTH,STRESS",
-        choices=("m,Pa", "mm,kPa", "mm,MPa", "um,MPa"),
-        default="m,Pa",
-        help="of the CSV: one of m,Pa (default) or mm,kPa or mm,MPa or um,MPa",
-    )
-    add_out(parser)
-
-
 def _shear(options: argparse.Namespace) -> None:
     law = read_law(options)
-    if (options.control == "stiffness") != (options.normal_stiffness is not None):
-        raise ValueError("--control stiffness and --normal-stiffness go together; give both")
     test = partial(
         direct_shear,
         law.joint(),
         [options.to, *options.reverse],
         options.normal_stress,
-        options.control,
-        options.azimuth,
         options.normal_stiffness,
+        options.azimuth,
         options.steps,
     )
     record = _run(test, law, options)
@@ -160,3 +83,85 @@ def _write(record: Record, law: JointLaw, options: argparse.Namespace) -> None:
     settings = {k: v for k, v in vars(options).items() if k not in ("run", "out", "force")}
     summary = {"settings_SI": settings, "result": record.summary(), "units": UNITS}
     write_results(options.out, files, summary, options.format)
+
+
+def _common(steps: int) -> tuple[Option, ...]:
+    """Options of both commands."""
+    return (
+        *LAW,
+        option(
+            "--steps", metavar="N", type=int, default=steps, help=f"steps per leg (default {steps})"
+        ),
+        option(
+            "--units",
+            metavar="LENGTH,STRESS",
+            choices=("m,Pa", "mm,kPa", "mm,MPa", "um,MPa"),
+            default="m,Pa",
+            help="of the CSV: one of m,Pa (default) or mm,kPa or mm,MPa or um,MPa",
+        ),
+        *OUT,
+        PICTURES,
+    )
+
+
+SHEAR = Command(
+    "shear",
+    "direct shear test: seat the joint at a normal stress, shear it, write curve and picture",
+    "jointlaw shear biegel-rough --normal-stress 10MPa --to 2um --reverse -2um --out out",
+    _shear,
+    (
+        option(
+            "--normal-stress",
+            metavar="STRESS",
+            type=in_unit("Pa", positive=True),
+            default="10MPa",
+            help="normal stress (default 10MPa)",
+        ),
+        option(
+            "--to",
+            metavar="LENGTH",
+            type=in_unit("m"),
+            required=True,
+            help="shear displacement, such as 2um",
+        ),
+        option(
+            "--reverse",
+            metavar="LENGTHS",
+            type=several("m"),
+            default=[],
+            help="further turning points, separated by commas: --reverse -2um,0",
+        ),
+        option(
+            "--azimuth",
+            metavar="ANGLE",
+            type=in_unit("rad"),
+            default="0",
+            help="direction of shear from axis 2 towards axis 3, such as 30deg (default 0)",
+        ),
+        option(
+            "--normal-stiffness",
+            metavar="STIFFNESS",
+            type=in_unit("Pa/m"),
+            default="0",
+            help="of the surroundings, such as 5GPa/m: the normal stress grows by it times the "
+            "dilation (default 0: it is kept)",
+        ),
+        *_common(steps=200),
+    ),
+)
+CLOSURE = Command(
+    "closure",
+    "closure test: load the joint to a normal stress and unload it",
+    "jointlaw closure westerly-smooth --normal-stress 20MPa --out out",
+    _closure,
+    (
+        option(
+            "--normal-stress",
+            metavar="STRESSES",
+            type=several("Pa", positive=True),
+            default="20MPa",
+            help="largest normal stress (default 20MPa), or one per cycle: 5MPa,20MPa",
+        ),
+        *_common(steps=100),
+    ),
+)

@@ -12,7 +12,16 @@ from ..support.files import require_free
 from ..support.version import __version__
 from . import browser, export, field, fit, laboratory, presets, scan
 
-COMMANDS = (browser, laboratory, presets, export, fit, scan, field)
+COMMANDS = (
+    browser.COMMAND,
+    laboratory.SHEAR,
+    laboratory.CLOSURE,
+    presets.COMMAND,
+    export.COMMAND,
+    fit.COMMAND,
+    scan.COMMAND,
+    field.COMMAND,
+)
 
 
 class Parser(argparse.ArgumentParser):
@@ -54,8 +63,17 @@ def _read(words: Sequence[str]) -> argparse.Namespace:
     )
     parser.add_argument("--version", action="version", version=f"jointlaw {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for module in COMMANDS:
-        module.add(commands)
+    for one in COMMANDS:
+        command = commands.add_parser(
+            one.name,
+            help=one.what,
+            description=one.what,
+            epilog=f"example:\n  {one.example}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        command.set_defaults(run=one.run)
+        for names, settings in one.options:
+            command.add_argument(*names, **settings)
     if words and not words[0].startswith("-"):
         one_of("the command", words[0], tuple(commands.choices))
     return parser.parse_args(words)

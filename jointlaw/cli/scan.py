@@ -3,38 +3,19 @@
 import argparse
 import math
 from pathlib import Path
-from typing import Any
 
 from ..laboratory.experiments import direct_shear
 from ..parameters.rock import ROCK, require_rock
 from ..parameters.toml import VERSION
 from ..support.checks import Array
+from ..support.markdown import table
 from ..support.text_numbers import DECIMAL
 from ..surface.fit import SurfaceFit, from_surface
 from ..surface.scan_files import read_scan
-from .command import DEFAULT_ROCK, Written, add_command, add_out, in_unit, write_results
+from .command import DEFAULT_ROCK, OUT, Command, Written, in_unit, option, write_results
 
 STRESS = 1e6  # Pa at which the report tells friction angles
 LONGER = 2  # the second sampling length, over the first
-
-
-def add(commands: Any) -> None:
-    """Add `scan` to the subparsers of the command line."""
-    what = "read heights, directions and number of asperities off a composite surface"
-    example = "jointlaw scan scan.csv --spacing 20um --height-unit um --out out"
-    parser = add_command(commands, "scan", what, example, _run)
-    parser.add_argument("file", help="matrix of heights or list of x, y, z, as text, ASC or NPY")
-    length = in_unit("m", positive=True)
-    parser.add_argument("--spacing", type=length, required=True, help="of the points: 20um")
-    parser.add_argument(
-        "--height-unit",
-        type=lambda unit: in_unit("m")(f"1{unit}"),
-        required=True,
-        help="of the heights, such as um",
-    )
-    parser.add_argument("--decimal", choices=tuple(DECIMAL), help="the decimal mark of the file")
-    parser.add_argument("--sampling-length", type=length, help="edge of a facet: 4 spacings")
-    add_out(parser, pictures=False)
 
 
 def _run(options: argparse.Namespace) -> None:
@@ -55,12 +36,7 @@ def _run(options: argparse.Namespace) -> None:
 
 def _friction(fit: SurfaceFit, z: Array) -> str:
     """What the scan means for friction, at its sampling length and at a longer one (Markdown)."""
-    lines = [
-        f"\nFriction angle of a joint of this surface at {STRESS / 1e6:g} MPa, sheared by one "
-        f"sampling length, with contacts of an assumed rock ({DEFAULT_ROCK}):\n",
-        "| sampling length (mm) | a | along the rows | across them |",
-        "|---|---|---|---|",
-    ]
+    rows = []
     for length in (fit.asperities.size, LONGER * fit.asperities.size):
         try:
             one = from_surface(z, fit.spacing, length)
@@ -68,10 +44,15 @@ def _friction(fit: SurfaceFit, z: Array) -> str:
             if one.describes:
                 cells = [f"{_largest_angle(one, plane):.1f}°" for plane in (0.0, math.pi / 2)]
         except ValueError as error:
-            lines.append(f"| {1e3 * length:.3g} | {error} | | |")
+            rows.append(f"{1e3 * length:.3g} | {error} | |")
         else:
-            lines.append(f"| {1e3 * length:.3g} | {one.orientation.a:.3g} | {' | '.join(cells)} |")
-    return "\n".join(lines) + "\n"
+            rows.append(f"{1e3 * length:.3g} | {one.orientation.a:.3g} | {' | '.join(cells)}")
+    what = (
+        f"Friction angle of a joint of this surface at {STRESS / 1e6:g} MPa, sheared by one "
+        f"sampling length, with contacts of an assumed rock ({DEFAULT_ROCK}):"
+    )
+    lines = table("sampling length (mm) | a | along the rows | across them", rows)
+    return "\n".join(["", what, "", *lines, ""])
 
 
 def _largest_angle(fit: SurfaceFit, plane: float) -> float:
@@ -92,3 +73,33 @@ def _toml(fit: SurfaceFit, name: str) -> str:
         f"[heights]\nalpha = {p['alpha']!r}\nbeta = {p['beta']!r}  # m\n"
         f'overlap = {p["overlap"]!r}  # m\nformation = "individual"\n'
     )
+
+
+COMMAND = Command(
+    "scan",
+    "read heights, directions and number of asperities off a composite surface",
+    "jointlaw scan scan.csv --spacing 20um --height-unit um --out out",
+    _run,
+    (
+        option("file", help="matrix of heights or list of x, y, z, as text, ASC or NPY"),
+        option(
+            "--spacing",
+            type=in_unit("m", positive=True),
+            required=True,
+            help="of the points: 20um",
+        ),
+        option(
+            "--height-unit",
+            type=lambda unit: in_unit("m")(f"1{unit}"),
+            required=True,
+            help="of the heights, such as um",
+        ),
+        option("--decimal", choices=tuple(DECIMAL), help="the decimal mark of the file"),
+        option(
+            "--sampling-length",
+            type=in_unit("m", positive=True),
+            help="edge of a facet: 4 spacings",
+        ),
+        *OUT,
+    ),
+)

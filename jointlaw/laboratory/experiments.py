@@ -9,11 +9,9 @@ from ..joints.crushed import warn_if_crushed
 from ..joints.joint import Joint
 from ..joints.normal_control import NormalCondition, closing_increments
 from ..joints.state import NonFiniteError
-from ..support.checks import Array, at_least, integer, more_than, number, numbers, one_of
+from ..support.checks import Array, at_least, integer, more_than, number, numbers
 from ..support.progress import track
 from .record import UNITS, Record
-
-CONTROLS = ("stress", "stiffness", "closure")
 
 
 class PathError(RuntimeError):
@@ -27,16 +25,13 @@ class PathError(RuntimeError):
         return str(self.args[0])
 
 
-def closure_test(
-    joint: Joint, stress: float | Sequence[float], unload: bool = True, steps: int = 100
-) -> Record:
+def closure_test(joint: Joint, stress: float | Sequence[float], steps: int = 100) -> Record:
     """Close a joint to a normal stress, from the one it carries, and open it again.
 
     Parameters
     ----------
     joint: the joint; it is left in the state at the end of the test.
     stress: largest normal stress in Pa, > 0, or one for each cycle.
-    unload: whether to unload to zero stress after each peak.
     steps: steps per branch; rows crowd towards small stress as the stiffness does.
 
     Returns the Record, its first row the joint as it was given. Raises ValueError for a bad
@@ -47,14 +42,15 @@ def closure_test(
     """
     peaks = [more_than("stress", s, 0.0) for s in _series("stress", stress, "Pa")]
     steps = integer("steps", steps, 1)
-    grading = (np.arange(1, steps + 1) / steps) ** _power(joint)
+    asperities = joint.law.tables.asperities
+    # stress grows with this power of closure where all asperities touch
+    power = 1.0 if asperities is None else 1.0 + asperities.curve.eta
+    grading = (np.arange(1, steps + 1) / steps) ** power
     levels: list[float] = []
     start = max(float(joint.F[0]), 0.0)
     for peak in peaks:
-        levels += list(start + (peak - start) * grading)
-        if unload:
-            levels += [*list(peak * grading[-2::-1]), 0.0]
-        start = levels[-1]
+        levels += [*(start + (peak - start) * grading), *(peak * grading[-2::-1]), 0.0]
+        start = 0.0
     log = _Log(joint, 0.0, "closure test")
     log.measure(joint.F)
     still = np.zeros(joint.law.dim - 1)
@@ -67,9 +63,8 @@ def direct_shear(
     joint: Joint,
     to: float | Sequence[float],
     normal: float = 10e6,
-    control: str = "stress",
+    stiffness: float = 0.0,
     azimuth: float = 0.0,
-    stiffness: float | None = None,
     steps: int = 200,
 ) -> Record:
     """Seat a joint at a normal stress and shear it to one or more turning points.
@@ -80,11 +75,10 @@ def direct_shear(
     to: turning points of the shear displacement in m, along the azimuth from where the joint
         stands: one number, or several for reversals. No motion across the azimuth.
     normal: normal stress in Pa at which the joint is seated, > 0.
-    control: "stress" keeps the normal stress, "stiffness" lets it grow by `stiffness` times the
-        dilation, "closure" keeps the closure.
+    stiffness: normal stiffness of the surroundings in Pa/m: the normal stress grows by it times
+        the dilation. Zero keeps the normal stress, infinity keeps the closure.
     azimuth: direction of shear in rad, from axis 2 towards axis 3; a law with a plane shears
         along that plane.
-    stiffness: normal stiffness of the surroundings in Pa/m, for control = "stiffness".
     steps: steps per leg.
 
     Returns the Record, its first row the seated joint. Raises ValueError for a bad argument and
@@ -94,16 +88,10 @@ def direct_shear(
     >>> angle = record.peak_friction_angle
     """
     normal = more_than("normal", normal, 0.0)
-    control = one_of("control", control, CONTROLS)
+    stiffness = at_least("stiffness", stiffness, 0.0, infinite=True)
     steps = integer("steps", steps, 1)
     points = [number("to", p) for p in _series("to", to, "m")]
     azimuth = number("azimuth", azimuth)
-    if control == "stiffness":
-        if stiffness is None:
-            raise ValueError('stiffness is missing: control = "stiffness" needs it in Pa/m')
-        stiffness = at_least("stiffness", stiffness, 0.0)
-    elif stiffness is not None:
-        raise ValueError(f'stiffness is for control = "stiffness", not {control!r}')
     if joint.law.dim == 1:
         raise ValueError("joint: its law has closure_only; direct shear needs a law without")
     plane = joint.law.plane
@@ -115,18 +103,11 @@ def direct_shear(
     log = _Log(joint, azimuth if plane is None else plane, "direct shear")
     along = np.array([math.cos(azimuth), math.sin(azimuth)]) if plane is None else np.ones(1)
     log.advance(np.zeros_like(along), NormalCondition(normal, normal))  # seated without shear
-    condition = NormalCondition(normal, normal, stiffness or 0.0, float(joint.delta[0]))
-    increments = np.diff(np.concatenate([[0.0], points])) / steps
-    legs = np.repeat(increments, steps)
+    condition = NormalCondition(normal, normal, stiffness, float(joint.delta[0]))
+    legs = np.repeat(np.diff(points, prepend=0.0) / steps, steps)
     for length in track(legs, "direct shear", len(legs)):
-        log.advance(length * along, None if control == "closure" else condition)
+        log.advance(length * along, None if math.isinf(stiffness) else condition)
     return log.record()
-
-
-def _power(joint: Joint) -> float:
-    """The power of closure with which stress grows where all asperities touch."""
-    asperities = joint.law.tables.asperities
-    return 1.0 if asperities is None else 1.0 + asperities.curve.eta
 
 
 def _series(name: str, value: float | Sequence[float], unit: str) -> Array:

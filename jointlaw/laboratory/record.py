@@ -12,7 +12,7 @@ import numpy as np
 from ..support import units
 from ..support.checks import Array
 from ..support.files import replace_file
-from ..support.pyplot import style, written
+from ..support.pyplot import pyplot, style, written
 
 UNITS = {
     "closure": "m",
@@ -27,9 +27,8 @@ UNITS = {
     "dissipated": "J/m2",
 }
 DERIVED = {"shear_stress": "Pa", "opening": "m"}  # of shear, along its azimuth and from its start
-_LENGTHS = ((1e-9, "nm"), (1e-6, "µm"), (1e-3, "mm"), (1.0, "m"))
-_STRESSES = ((1.0, "Pa"), (1e3, "kPa"), (1e6, "MPa"), (1e9, "GPa"))
-_ENERGIES = ((1e-6, "µJ/m²"), (1e-3, "mJ/m²"), (1.0, "J/m²"), (1e3, "kJ/m²"))
+_PREFIXES = {"n": 1e-9, "µ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
+Panels = dict[str, dict[str, Array]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -176,59 +175,62 @@ class Record:
         np.savetxt(buffer, table, fmt="%.12g", delimiter=",", header=header, comments="")
         replace_file(Path(path), buffer.getvalue().encode())
 
+    @style()
     def plot(self, path: str | Path | None = None) -> Any:
         """Draw the test (needs matplotlib: extra `plot`); returns the figure, saved to `path`.
 
         Raises ImportError without it, OSError where the file cannot be written.
         """
-        draw = _shear_figure if self._sheared else _closure_figure
-        with style() as plt:
-            return written(draw(self, plt), path)
+        panels_of = _shear_panels if self._sheared else _closure_panels
+        title, x, label, panels = panels_of(self)
+        rows = len(panels) // 2
+        figure, axes = pyplot().subplots(rows, 2, figsize=(7.5, 1 + 2.6 * rows), sharex=True)
+        figure.suptitle(title)
+        figure.supxlabel(label, fontsize="medium")
+        for axis, (name, curves) in zip(axes.flat, panels.items(), strict=True):
+            axis.set_ylabel(name)
+            for curve, values in curves.items():
+                axis.plot(x, values, label=curve)
+            if len(curves) > 1:
+                axis.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False)
+        return written(figure, path)
 
 
-def _scaled(values: Array, units: tuple[tuple[float, str], ...]) -> tuple[Array, str]:
-    """Values in the largest unit that leaves their peak at one or more."""
+def _scaled(values: Array, unit: str) -> tuple[Array, str]:
+    """Values in the largest multiple of a unit that leaves their peak at one or more; its name."""
     peak = float(np.max(np.abs(values)))
-    factor, name = next(((f, n) for f, n in reversed(units) if peak >= f), units[0])
-    return values / factor, name
+    prefix = next((p for p, x in reversed(_PREFIXES.items()) if x <= peak), "")
+    return values / _PREFIXES[prefix], prefix + unit
 
 
-def _shear_figure(record: Record, plt: Any) -> Any:
-    shear, length = _scaled(record.shear, _LENGTHS)
-    figure, axes = plt.subplots(2, 2, figsize=(7.5, 6.2), sharex=True)
-    stress, unit = _scaled(np.stack([record.shear_stress, record.F1]), _STRESSES)
-    axes[0, 0].plot(shear, stress[0], label="shear stress")
-    axes[0, 0].plot(shear, stress[1], color="0.5", lw=1, label="normal stress")
-    axes[0, 0].set_ylabel(f"stress ({unit})")
-    axes[0, 0].legend()
-    axes[0, 1].plot(shear, record.friction_angle, color="C3")
-    axes[0, 1].set_ylabel("mobilised friction angle (°)")
-    dilation, small = _scaled(record.closure[0] - record.closure, _LENGTHS)
-    axes[1, 0].plot(shear, dilation, color="C2")
-    axes[1, 0].set_ylabel(f"dilation ({small})")
-    for label, share in (("sliding", record.sliding), ("separated", record.separated)):
-        axes[1, 1].plot(shear, 100 * share, label=label)
-    axes[1, 1].set(ylabel="share of facets (%)", ylim=(-3, 103))
-    axes[1, 1].legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False)
-    for axis in axes[1]:
-        axis.set_xlabel(f"shear displacement ({length})")
-    figure.suptitle(
+def _shear_panels(record: Record) -> tuple[str, Array, str, Panels]:
+    """Title, and of the panels of a shear test x with its label, and curves by label and name."""
+    shear, length = _scaled(record.shear, "m")
+    stress, unit = _scaled(np.stack([record.shear_stress, record.F1]), "Pa")
+    dilation, small = _scaled(record.closure[0] - record.closure, "m")
+    title = (
         f"Direct shear at azimuth {np.degrees(record.azimuth):.0f}°, "
         f"largest friction angle {record.peak_friction_angle:.1f}°"
     )
-    return figure
+    panels = {
+        f"stress ({unit})": {"shear stress": stress[0], "normal stress": stress[1]},
+        "mobilised friction angle (°)": {"": record.friction_angle},
+        f"dilation ({small})": {"": dilation},
+        "share of facets (%)": {
+            "sliding": 100 * record.sliding,
+            "separated": 100 * record.separated,
+        },
+    }
+    return title, shear, f"shear displacement ({length})", panels
 
 
-def _closure_figure(record: Record, plt: Any) -> Any:
-    closure, length = _scaled(record.closure, _LENGTHS)
-    stress, unit = _scaled(record.F1, _STRESSES)
-    energy, joule = _scaled(np.stack([record.stored, record.dissipated]), _ENERGIES)
-    figure, axes = plt.subplots(1, 2, figsize=(7.5, 3.6))
-    axes[0].plot(closure, stress)
-    axes[0].set(xlabel=f"closure ({length})", ylabel=f"normal stress ({unit})")
-    axes[1].plot(closure, energy[0], label="stored")
-    axes[1].plot(closure, energy[1], label="dissipated")
-    axes[1].set(xlabel=f"closure ({length})", ylabel=f"energy ({joule})")
-    axes[1].legend()
-    figure.suptitle("Closure test")
-    return figure
+def _closure_panels(record: Record) -> tuple[str, Array, str, Panels]:
+    """The same of a closure test."""
+    closure, length = _scaled(record.closure, "m")
+    stress, unit = _scaled(record.F1, "Pa")
+    energy, joule = _scaled(np.stack([record.stored, record.dissipated]), "J/m²")
+    panels = {
+        f"normal stress ({unit})": {"": stress},
+        f"energy ({joule})": {"stored": energy[0], "dissipated": energy[1]},
+    }
+    return "Closure test", closure, f"closure ({length})", panels

@@ -44,9 +44,6 @@ def _lines(values: Any, kinds: Kinds, path: str, shown: Mapping[str, Any]) -> li
             continue
         if is_dataclass(value):
             inner += ["", f"[{name}]", *_lines(value, kinds_of(said.kind), name, {})]
-        elif isinstance(value, Mapping):
-            pairs = ", ".join(f"{key} = {_text(number)}" for key, number in value.items())
-            lines.append(f"{name} = {{ {pairs} }}")
         else:
             lines.append(f"{name} = {_text(value)}" + (f"  # {said.unit}" if said.unit else ""))
     return [*lines, *inner]

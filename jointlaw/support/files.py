@@ -2,14 +2,11 @@
 
 import contextlib
 import json
-import math
 import os
 import threading
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 # A folder that has one of these holds a run
 MARKS = ("summary.json", "history.csv", "strength.json", "ablation.csv", "state", "refused")
@@ -63,17 +60,6 @@ def clear_run(folder: Path) -> None:
 
 def write_json(path: Path, data: Any) -> None:
     """Strict JSON: what is not finite becomes null, numpy's numbers and arrays plain ones."""
-    text = json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False)
-    replace_file(path, (text + "\n").encode())
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
-    if isinstance(value, Mapping):
-        return {key: _plain(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+    plain = json.dumps(data, default=lambda one: one.tolist())
+    finite = json.loads(plain, parse_constant=lambda name: None)
+    replace_file(path, (json.dumps(finite, indent=2, ensure_ascii=False) + "\n").encode())

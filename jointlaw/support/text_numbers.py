@@ -102,12 +102,11 @@ def table_separator(lines: dict[int, str]) -> str | None:
             del lines[number]
             return line[4:5]
     texts = list(lines.values())
-    named = [k for k, line in enumerate(texts) if re.search(r"[^\W\d_]", line)]
     # the names are in the last line of letters above the first two lines that hold numbers most
     first = next((k for k in range(len(texts)) if all(map(_numeric, texts[k : k + 2]))), 0)
-    at = [k for k in named if k < first and not _numeric(texts[k])]
-    marks = [separator(texts[k]) for k in at[-2:]]  # below the names may stand a line of units
-    return next((mark for mark in marks[::-1] if mark), None)
+    above = [line for line in texts[:first] if re.search(r"[^\W\d_]", line) and not _numeric(line)]
+    marks = map(separator, reversed(above[-2:]))  # below the names may stand a line of units
+    return next((mark for mark in marks if mark), None)
 
 
 def _numeric(line: str) -> bool:

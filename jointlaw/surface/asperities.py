@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
+from scipy import ndimage, special
 
 from ..support.checks import Array
 
@@ -49,9 +49,7 @@ def extract(z: Array, spacing: float, samples: int) -> Asperities:
     quadrants = np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)])
     gradient, misfit, moment = _planes(z, summits, quadrants, samples)
     gradient = gradient / spacing
-    count = samples**2 - 3
-    # the median of chi^2 with n degrees of freedom is n (1 - 2/(9n))^3
-    middle = count * (1 - 2 / (9 * count)) ** 3
+    middle = special.chdtri(samples**2 - 3, 0.5)  # the median of chi^2
     noise = float(np.sqrt(np.median(misfit) / middle / moment)) / spacing
     keep = misfit <= 9 * np.median(misfit)
     fall = -np.einsum("qnd,qd->qn", gradient, quadrants) / np.sqrt(2)
@@ -86,9 +84,9 @@ def _summits(z: Array, samples: int) -> NDArray[np.intp]:
     ranked = smooth + ramp  # of equal points one is the summit
     top = ranked == ndimage.maximum_filter(ranked, size=2 * samples + 1, mode="nearest")
     rim = samples + RIM
-    places = np.argwhere(top[tuple(slice(rim, n - rim) for n in z.shape)]) + rim
-    near = places[:, None, :] + np.array(list(np.ndindex(*(3,) * z.ndim))) - 1
-    best = np.argmax(z[tuple(np.moveaxis(near, -1, 0))], axis=1)
+    places = np.argwhere(top[rim:-rim, rim:-rim]) + rim
+    near = places[:, None, :] + np.array(list(np.ndindex(3, 3))) - 1
+    best = np.argmax(z[near[..., 0], near[..., 1]], axis=1)
     return np.asarray(near[np.arange(len(places)), best])
 
 
@@ -97,26 +95,19 @@ def _planes(
 ) -> tuple[Array, Array, float]:
     """Planes through the squares in the quadrants beside the summits.
 
-    Gradients in m per point (quadrants, n, dim), sums of squared misfits (quadrants, n) in m2, and
+    Gradients in m per point (quadrants, n, 2), sums of squared misfits (quadrants, n) in m2, and
     the sum over a square of squared distances from its middle line, in points squared.
     """
-    dim, axis = z.ndim, np.arange(1, samples + 1)
-    centred = axis - axis.mean()
-    moment = samples ** (dim - 1) * float(centred @ centred)
-    within = tuple(range(1, dim + 1))
-    gradients, misfits = [], []
-    for signs in quadrants:
-        offsets = np.stack(np.meshgrid(*np.outer(signs, axis), indexing="ij"), -1)
-        index = summits.reshape(-1, *(1,) * dim, dim) + offsets
-        patch = z[tuple(np.moveaxis(index, -1, 0))]
-        left = patch - patch.mean(axis=within, keepdims=True)
-        gradient = []
-        for arm in np.meshgrid(*np.outer(signs, centred), indexing="ij", sparse=True):
-            gradient.append((left * arm).sum(axis=within) / moment)
-            left = left - arm * gradient[-1].reshape(-1, *(1,) * dim)
-        gradients.append(np.stack(gradient, -1))
-        misfits.append(np.sum(left**2, axis=within))
-    return np.stack(gradients), np.stack(misfits), moment
+    axis = np.arange(1, samples + 1)
+    arm = axis - axis.mean()
+    moment = samples * float(arm @ arm)
+    row, column = summits.T[:, None, :, None] + quadrants.T[:, :, None, None] * axis
+    patch = z[row[..., None], column[..., None, :]]
+    left = patch - patch.mean(axis=(2, 3), keepdims=True)
+    down, along = (left.sum(axis=3) @ arm / moment, left.sum(axis=2) @ arm / moment)
+    left = left - down[..., None, None] * arm[:, None] - along[..., None, None] * arm
+    gradient: Array = np.stack([down, along], -1) * quadrants[:, None]
+    return gradient, np.sum(left**2, axis=(2, 3)), moment
 
 
 def levelled(z: Array) -> Array:

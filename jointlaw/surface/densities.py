@@ -37,12 +37,11 @@ def fit_heights(depth: Array) -> dict[str, Estimate]:
     The highest summit of a specimen is a draw like any other: the distribution begins some way
     above it, and that distance is fitted too (it becomes the overlap at first touch). Likelihood
     fails for an end point, so the product of spacings is maximised (Cheng & Amin 1983), which is as
-    precise and never unbounded. The errors are those of
-    the logarithms of alpha + 1, beta and overlap.
+    precise and never unbounded. The errors are those of the logarithms of alpha + 1, beta and
+    overlap.
     """
-    x = np.sort(depth)
-    scale = float(np.mean(x))
-    x = x / scale
+    scale = float(np.mean(depth))
+    x = np.sort(depth) / scale
 
     def loss(q: Array) -> float:
         shape, beta, start = np.exp(q)
@@ -82,8 +81,7 @@ def fit_directions(slope: Array, summit: NDArray[np.intp], noise: float) -> dict
     from Eq. 14. The errors are those of the jackknife over summits, whose facets are kin.
     """
     theta = np.arctan(np.linalg.norm(slope, axis=-1))
-    along, across = slope[:, 1] ** 2, slope[:, 0] ** 2
-    cosine = (along - across) / np.maximum(along + across, 1e-300)
+    cosine = np.cos(2 * np.arctan2(slope[:, 0], slope[:, 1]))
     of_facets = np.stack([np.ones(theta.size), theta, theta**2 - noise**2, cosine], -1)
     of_summits = np.zeros((int(summit.max()) + 1, 4))
     np.add.at(of_summits, summit, of_facets)

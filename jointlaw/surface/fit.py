@@ -12,6 +12,7 @@ from ..parameters.asperity import Asperity
 from ..parameters.heights import GammaHeights
 from ..parameters.orientation import Orientation
 from ..support.checks import finite, more_than, numbers
+from ..support.markdown import table
 from .asperities import Asperities, extract, levelled
 from .densities import HEIGHTS, Estimate, fit_directions, fit_heights
 from .roughness import measured_slopes, rms_slope, spikes
@@ -86,37 +87,31 @@ class SurfaceFit:
         """The fit in words and a table (Markdown)."""
         found = self.asperities
         slope = float(np.median(np.linalg.norm(found.slope, axis=-1)))
+        estimates = (
+            f"{name} | {one.value:.4g} | {one.standard_error:.2g} | {UNITS.get(name, '1')} | "
+            f"{'no' if one.left_open else 'yes'}"
+            for name, one in self.estimates.items()
+        )
+        pairs = {"measured": self.slopes, "of the law": self.law_slopes}
+        slopes = (f"{name} | {one[0]:.3g} | {one[1]:.3g}" for name, one in pairs.items())
         lines = [
             "# Asperities of a scanned surface",
             "",
             f"{found.depth.size} summits and {len(found.slope)} facets at a sampling length of "
             f"{found.size:.3g} m (spacing {self.spacing:.3g} m).",
             "",
-            "| parameter | value | standard error | unit | fixed by this scan |",
-            "|---|---|---|---|---|",
-        ]
-        for name, one in self.estimates.items():
-            lines.append(
-                f"| {name} | {one.value:.4g} | {one.standard_error:.2g} | {UNITS.get(name, '1')} | "
-                f"{'no' if one.left_open else 'yes'} |"
-            )
-        lines += ["", "Not identifiable from this scan:", ""]
-        lines += [f"- {name}: {reason}" for name, reason in self.not_identifiable.items()]
-        lines += [
+            *table("parameter | value | standard error | unit | fixed by this scan", estimates),
+            "",
+            "Not identifiable from this scan:",
+            "",
+            *(f"- {name}: {reason}" for name, reason in self.not_identifiable.items()),
             "- K, lam, eta, mu: no scan measures stiffness or friction; take them from the rock or "
             "from a closure and a shear test",
             "",
             "Rock is rough at every scale: at another sampling length the asperities are others. "
             "Choose the size of the contacts that carry the load, and state it with the result.",
-        ]
-        lines += [
             "",
-            "| rms slope (Z2) | along the rows | across them |",
-            "|---|---|---|",
-            *(
-                f"| {name} | {one[0]:.3g} | {one[1]:.3g} |"
-                for name, one in (("measured", self.slopes), ("of the law", self.law_slopes))
-            ),
+            *table("rms slope (Z2) | along the rows | across them", slopes),
         ]
         if len(self.spikes):
             row, column = self.spikes[0]

@@ -100,13 +100,16 @@ class JointTable:
         row, w, secant = self.at(u)
         K22, K33, K23 = self.shear_matrix(row, w)
         stiffness = (K22 + K33) / 2 + (K22 - K33) / 2 * np.cos(2 * psi) + K23 * np.sin(2 * psi)
-        by_closure = (secant * u, secant, between(self.kn_tangent, row, w), stiffness)
-        values = [np.where(u > 0, value, 0.0) for value in by_closure]
-        for column in (self.peak_friction, self.mobilised_friction, self.dilation):
-            values.append(around(column, psi, row, w))
-        names = [*BY_CLOSURE.values(), *BY_AZIMUTH.values()][1:]  # all but the closure
-        found = (value.reshape(shape)[()] for value in values)
-        return SimpleNamespace(**dict(zip(names, found, strict=True)))
+        while_closed = {
+            "normal_stress": secant * u,
+            "kn_secant": secant,
+            "kn_tangent": between(self.kn_tangent, row, w),
+            "shear_stiffness": stiffness,
+        }
+        found = {name: np.where(u > 0, value, 0.0) for name, value in while_closed.items()}
+        for name in ("peak_friction", "mobilised_friction", "dilation"):
+            found[name] = around(getattr(self, name), psi, row, w)
+        return SimpleNamespace(**{name: value.reshape(shape)[()] for name, value in found.items()})
 
     def follow(self, delta: ArrayLike) -> Array:
         """Traction (m, 3) in Pa that a host computes from the table along a path delta (m, 3) in m.
@@ -275,11 +278,10 @@ def between(values: Array, row: NDArray[np.intp], w: Array) -> Array:
 def around(values: Array, psi: Array, row: NDArray[np.intp], w: Array) -> Array:
     """Linear interpolation in azimuth psi and between rows of values (rows, azimuths)."""
     azimuths = values.shape[1]
-    place = np.mod(psi, np.pi) * (azimuths / np.pi)
-    a = np.floor(place).astype(int) % azimuths
-    x, b = place - np.floor(place), (a + 1) % azimuths
-    low = values[row, a] * (1 - w) + values[row + 1, a] * w
-    high = values[row, b] * (1 - w) + values[row + 1, b] * w
+    whole, x = np.divmod(np.mod(psi, np.pi) * (azimuths / np.pi), 1.0)
+    a = whole.astype(int)
+    columns = (a % azimuths, (a + 1) % azimuths)
+    low, high = (values[row, k] * (1 - w) + values[row + 1, k] * w for k in columns)
     return np.asarray(low * (1 - x) + high * x)
 
 

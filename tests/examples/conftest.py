@@ -1,11 +1,6 @@
 """Examples run as a reader runs them: in an empty folder, without a display."""
 
-import sys
-from pathlib import Path
-
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
 
 
 @pytest.fixture(autouse=True)

@@ -3,7 +3,9 @@
 import re
 
 import pytest
-from pages import PAGES, text
+from pages import PAGES, ROOT, text
+
+import jointlaw
 
 
 def test_theory_leaves_no_equation_out():
@@ -12,6 +14,17 @@ def test_theory_leaves_no_equation_out():
         for first, last in re.findall(r"(\d+)(?:-(\d+))?", mention):
             placed |= set(range(int(first), int(last or first) + 1))
     assert placed >= set(range(1, 38))
+
+
+def test_files_for_a_code_host_can_be_read():
+    """The citation has the version and the one address; the checks are those of .ci/run."""
+    yaml = pytest.importorskip("yaml")  # comes with the extra `docs`
+    read = {path.name: yaml.safe_load(path.read_text(encoding="utf-8"))
+            for path in (ROOT / "CITATION.cff", *ROOT.glob(".github/workflows/*.yml"))}  # fmt: skip
+    assert read["CITATION.cff"]["version"] == jointlaw.__version__
+    assert read["CITATION.cff"]["repository-code"].startswith("https://")
+    assert read["ci.yml"]["jobs"]["all"]["steps"][-1] == {"run": "bash .ci/run"}
+    assert set(read["wheels.yml"]["jobs"]) == {"build", "publish"}
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/index.md"])

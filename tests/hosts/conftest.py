@@ -1,11 +1,8 @@
 """What the tests of all hosts share: the mark, LAMMPS' plug-in, libraries for finite elements."""
 
-import sys
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
 from fem_host import export
 from lammps_host import build, soft
 

@@ -3,19 +3,16 @@
 import ctypes
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from c_host import HERE, SOURCE, STRICT, CLaw, build, compiler, library, run
+from extremes import laws as extreme_laws
 
 import jointlaw as jl
 import jointlaw.cli.main
 from jointlaw.hosts.c.export import FORMAT, header_text, identifier, include_dir, table_text
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "verification"))
-from extremes import laws as extreme_laws
 
 FUZZ = HERE / "fuzz.c"
 SANE = ["-g1", "-O1", "-fno-sanitize-recover=all"]

@@ -5,13 +5,17 @@ import re
 import shlex
 import subprocess
 import sys
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import jointlaw as jl
+from jointlaw import hosts
+from jointlaw.cli.export import START
 from jointlaw.cli.main import COMMANDS, main
+from jointlaw.hosts.c.export import identifier, require_name
 from jointlaw.laboratory.record import UNITS
 
 
@@ -73,7 +77,7 @@ def test_every_command_has_an_example(capsys):
     with pytest.raises(SystemExit):
         main(["--help"])
     commands = re.findall(r"^    (\w+) ", capsys.readouterr().out, re.MULTILINE)
-    assert len(commands) == len(COMMANDS) + 1  # one module adds shear and closure
+    assert commands == [command.name for command in COMMANDS]
     for command in commands:
         assert example(command, capsys)[0] == command
 
@@ -81,7 +85,7 @@ def test_every_command_has_an_example(capsys):
 def test_all_options_of_shear(tmp_path):
     assert run(
         "shear biegel-smooth --normal-stress 5MPa --to 0.5um --reverse -0.2um,0 --azimuth -30deg "
-        "--control stiffness --normal-stiffness 5GPa/mm --resolution fast --steps 10 --out a/b"
+        "--normal-stiffness 5GPa/mm --resolution fast --steps 10 --out a/b"
     ) == 0  # fmt: skip
     table, _ = read(tmp_path / "a" / "b", "shear")
     assert table["shear_3"][10] == pytest.approx(-0.25e-6)
@@ -109,7 +113,6 @@ def test_options_of_closure(tmp_path):
         ("shear biegel-rough --to 2MPa", "--to: '2MPa' is not a quantity in m"),
         ("shear biegel-rough --to 1um --reverse 1um,,2um", "--reverse: ''"),
         ("shear biegel-rough --to 1um --units mm", "--units: invalid choice: 'mm'"),
-        ("shear biegel-rough --to 1um --control stiffness", "go together"),
         ("shear biegel-rough --to 1um --steps 0", "steps = 0"),
         ("shear biegel-rough", "the following arguments are required: --to"),
         ("shear biegel-rough --to 1um --out", "--out: expected one argument"),
@@ -126,6 +129,26 @@ def test_a_refusal_is_one_line_and_leaves_nothing(tmp_path, capsys, arguments, t
     assert told in error
     assert len(error.splitlines()) == 1
     assert not (tmp_path / "o").exists()
+
+
+@pytest.mark.parametrize("host", START)
+def test_every_host_gets_its_files_and_is_told_what_to_type(host, tmp_path, capsys):
+    assert run(f"export {host} linear-a3 --resolution fast --out o") == 0
+    assert capsys.readouterr().out.endswith(f"\nrun: cd o && {START[host]}\n")
+    kept = {path.name for path in (resources.files(hosts) / host).rglob("*") if path.is_file()}
+    written = {path.name for path in (tmp_path / "o").iterdir()}
+    typed = [word.removeprefix("./") for word in START[host].split()]
+    assert {word for word in typed if word in kept} <= written
+    assert written & kept
+    assert any("linear_a3" in name for name in written) or "law.toml" in written
+
+
+@pytest.mark.parametrize(
+    ("text", "name"), [("rough-2", "rough_2"), ("7 b.", "joint_7_b"), ("-", "joint")]
+)
+def test_a_name_of_tables_is_an_identifier_of_c(text, name):
+    assert identifier(text) == name
+    require_name(name)
 
 
 def test_version(capsys):

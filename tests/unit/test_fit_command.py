@@ -92,13 +92,14 @@ def test_no_friction_angle_of_a_surface_that_the_law_does_not_describe(tmp_path,
 def test_a_scan_needs_only_the_contacts_to_be_a_law(tmp_path, capsys):
     rng = np.random.default_rng(0)
     z = 400e-6 * gaussian_filter(rng.standard_normal((400, 400)), 5)
-    np.save(tmp_path / "z.npy", z)
-    assert main(["scan", "z.npy", "--spacing", "20um", "--height-unit", "m", "--out", "o"]) == 0
+    np.save(tmp_path / "z.npy", 1e6 * z)
+    assert main(["scan", "z.npy", "--spacing", "20um", "--height-unit", "um", "--out", "o"]) == 0
     lines = capsys.readouterr().out.splitlines()
     told = {length: line for length in ("0.08", "0.16") for line in lines if f"| {length} " in line}
     assert len(told) == 2
     summary = json.loads((tmp_path / "o" / "summary.json").read_text())
     assert summary["version"] == 2
+    assert summary["parameters_SI"] == pytest.approx(jl.from_surface(z, 20e-6).parameters)
     shear = "shear o/surface.toml --normal-stress 1MPa --to 80um --steps 100 --out p"
     assert main(shear.split()) == 2
     assert "add the table [asperity] with K" in capsys.readouterr().err

@@ -1,18 +1,13 @@
 """The compiled kernel gives the numbers of the readable one, however it is called."""
 
-import pickle
-import sys
 import threading
-from pathlib import Path
 
 import numpy as np
 import pytest
+from c_host import random_law
 
 from jointlaw.kernels import engine
 from jointlaw.kernels.threads import share_out
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "hosts"))
-from c_host import random_law
 
 # Either kernel sums a few hundred terms per facet in its own order and carries q over the path: a
 # few hundred times the rounding of 1e-16. That is the share of the largest value that may differ.
@@ -78,24 +73,6 @@ def test_same_numbers_while_contacts_come_and_go(both, seed, ledger):
     peak = max(np.abs(F).max() for F in results[0] if F.size)
     for one, other in zip(*results, strict=True):
         assert worst(one, other, peak) < SAME
-
-
-def test_a_state_moves_from_kernel_to_kernel(both, monkeypatch):
-    law = random_law(1)
-    d = path(law, 1, 6)
-    batches = both(lambda: law.joints(N))
-    for batch in batches:
-        for step in d[:3]:
-            batch.update(step)
-    data = [pickle.dumps(batch) for batch in batches]
-    results = []
-    for name in ("numpy", "native"):
-        monkeypatch.setenv("JOINTLAW_KERNEL", name)
-        for stored in data:
-            results.append([pickle.loads(stored).update(step)[0] for step in d[3:]])
-    peak = np.max(np.abs(results[0]))
-    for other in results[1:]:
-        assert worst(results[0], other, peak) < SAME
 
 
 @pytest.mark.parametrize("seed", [3, 8])

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from jointlaw.calibration import datasets
 from jointlaw.calibration.datasets import load, names, read_closure, read_peaks, read_shear
 from jointlaw.calibration.envelopes import envelope
 from jointlaw.calibration.measured import ClosureCurve, ShearCurve, first_loading
@@ -125,7 +126,7 @@ def test_several_tests_of_one_file(kind, tmp_path):
     for test in tests:
         np.testing.assert_allclose(test.shear_stress, 1e6 * TAU)
         np.testing.assert_allclose(test.opening, 1e-3 * OPENED)
-        assert test.normal == 2e6
+        np.testing.assert_array_equal(test.normal, 2e6)
 
 
 def test_a_table_of_peaks_is_a_test_a_row(tmp_path):
@@ -139,7 +140,31 @@ def test_a_table_of_peaks_is_a_test_a_row(tmp_path):
     one, two = read_peaks(path)
     np.testing.assert_allclose(two.shear, [0, 2.365e-3, 10e-3])
     np.testing.assert_allclose(one.shear_stress, [0, 1.28e6, 0.862e6])
-    assert (one.normal, two.normal) == (1e6, 2e6)
+    assert (one.normal[0], two.normal[0]) == (1e6, 2e6)
+
+
+CURVE = {
+    datasets.SHEAR: U, datasets.SHEAR_STRESS: TAU, datasets.NORMAL: 0 * U + 2,
+    datasets.OPENING: OPENED,
+}  # fmt: skip
+PEAK = dict(zip(datasets.PEAKS, ([1.25], [0.05], [0.8], [9.9]), strict=True))
+PEAK |= {datasets.NORMAL: [2.0]}
+
+
+@pytest.mark.parametrize(
+    ("table", "asked", "name"),
+    [(table, asked, name) for table in (CURVE, PEAK) for asked in table for name in asked.names],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_every_known_name_of_a_column_is_read(table, asked, name, tmp_path):
+    titles = [name.upper() if one is asked else one.names[0] for one in table]
+    units = [{"m": "mm", "Pa": "MPa"}[one.base] for one in table]
+    header = ",".join(f"{title} [{unit}]" for title, unit in zip(titles, units, strict=True))
+    (tmp_path / "t.csv").write_text(f"{header}\n{rows(*table.values())}")
+    (found,) = (read_peaks if table is PEAK else read_shear)(tmp_path / "t.csv")
+    assert found.normal == pytest.approx(2e6)
+    assert found.shear[1] == pytest.approx(0.05e-3)
+    assert found.shear_stress[2 - (table is PEAK)] == pytest.approx(1.25e6)
 
 
 def test_a_normal_stress_that_varies_is_taken_row_by_row(tmp_path):
@@ -186,6 +211,13 @@ def test_rows_that_are_no_measurement_are_named_until_an_option_settles_it(kind,
         assert kept.shear.size == skipped.shear.size + 1
     np.testing.assert_allclose(skipped.shear_stress, 2e9 * skipped.shear, atol=1e-6)
     assert told in skipped.notes[0]
+
+
+def test_the_steep_foot_of_two_cycles_is_no_jump(tmp_path):
+    """Unloading to zero stress takes back a third of the closure in one row."""
+    stress = np.array([0.5, 2, 4, 2, 0.1, 0, 0.1, 2, 4, 8])
+    (tmp_path / "c.csv").write_text("s [MPa],closure [um]\n" + rows(stress, 50 * stress**0.2))
+    assert read_closure(tmp_path / "c.csv", "s:MPa")[0].size == 10
 
 
 def test_a_displacement_beside_another_is_asked_for(tmp_path):

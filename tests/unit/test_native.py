@@ -1,18 +1,14 @@
 """The library of the compiled law: how it is made, found and refused, and its bits."""
 
-import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from c_host import random_law, random_path
 
 import jointlaw as jl
 from jointlaw.kernels import engine, reference
 from jointlaw.native import build, library
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "hosts"))
-from c_host import random_law, random_path
 
 SAME, SAME_C = 1e-12, 1e-10  # of the largest on the path; q of a slider carries three times as much
 SEEDS = (3, 7, 10, 14, 20)  # space and planes, mating length, yielding, wear, both

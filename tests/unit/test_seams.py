@@ -90,11 +90,12 @@ def test_kernels_measures_and_bounds_agree(pair):
 
 
 def test_first_loading(pair):
-    """Within what few cells slip later where asperities yield."""
+    """In one step or in many; within what few cells slip later where asperities yield."""
     law, _ = pair
-    for closure in (0.3e-6, 1e-6):
+    for closure, parts in ((0.3e-6, 1), (1e-6, 1), (1e-6, 7)):
         joint, start = law.joint(), np.eye(law.dim)[0]
-        F, _ = joint.update(closure * start)
+        for _ in range(parts):
+            F, _ = joint.update(closure / parts * start)
         few = 2e-3 if law.tables.yields else 1e-9
         assert F[0] == pytest.approx(law.normal_stress(closure), rel=few)
         assert law.closure(law.normal_stress(closure)) == pytest.approx(closure, rel=1e-9)

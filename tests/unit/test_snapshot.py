@@ -78,17 +78,27 @@ def test_a_state_of_other_joints_or_none_is_refused(law, moved, make, told):
     np.testing.assert_array_equal(moved.snapshot().values, before)
 
 
+def written(write, *values, **named):
+    """What writes a file of any ending by a function of numpy."""
+
+    def to(path):
+        with path.open("wb") as file:
+            write(file, *values, **named)
+
+    return to
+
+
 @pytest.mark.parametrize(
     "content",
     [
         lambda path: None,
         lambda path: path.write_bytes(b""),
         lambda path: path.write_text("closure,F1\n0,0\n"),
-        lambda path: np.save(path.open("wb"), np.zeros(3)),
-        lambda path: np.savez(path.open("wb"), values=np.zeros((3, 1))),
-        lambda path: np.savez(path.open("wb"), version=99, fingerprint="a", values=np.zeros(3)),
-        lambda path: np.savez(path.open("wb"), version=1, fingerprint="a", values=np.zeros(3)),
-        lambda path: np.savez(path.open("wb"), version=1, fingerprint="a", values="text"),
+        written(np.save, np.zeros(3)),
+        written(np.savez, values=np.zeros((3, 1))),
+        written(np.savez, version=99, fingerprint="a", values=np.zeros(3)),
+        written(np.savez, version=1, fingerprint="a", values=np.zeros(3)),
+        written(np.savez, version=1, fingerprint="a", values="text"),
         lambda path: path.mkdir(),
     ],
 )

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
+from jointlaw.accuracy.tradeoff import _time
 
 CHOSEN = ["fast", "balanced", jl.Resolution(1, 3, 1), "fast"]
 
@@ -48,6 +49,12 @@ def test_the_frontier_falls(found):
     same = replace(frontier[0], sliders=5, error=(1 - 1e-9) * frontier[0].error)
     assert replace(found, rows=(*found.rows, same)).frontier() == frontier
     assert any(line.endswith(" fast") for line in str(found).splitlines())
+
+
+@pytest.mark.parametrize("tangent", [False, True])
+def test_a_time_is_that_of_one_joint_in_nanoseconds(law, tangent):
+    """An update of three joints takes more than a microsecond and less than seconds."""
+    assert 1e2 < _time(law, 3, tangent, 0.0) < 1e9
 
 
 @pytest.mark.parametrize("stress", [3e4, (1e6, 3e4), (0.0, 1e6), (3e4, 1e5, 1e6)])

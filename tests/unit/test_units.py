@@ -1,6 +1,7 @@
 """Quantities of the command line."""
 
 import math
+import re
 
 import pytest
 
@@ -29,6 +30,40 @@ from jointlaw.support import units
 )
 def test_quantities(text, unit, value):
     assert units.parse(text, unit) == pytest.approx(value, rel=1e-15)
+
+
+PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
+
+
+def of_prefix(text, unit):
+    """The factor of a unit by the prefixes of the SI alone."""
+    return PREFIXES[re.sub("[µμ]", "u", text.removesuffix(unit))]
+
+
+@pytest.mark.parametrize(
+    ("row", "unit"),
+    [(row, unit) for unit in ("m", "N", "Pa", "m2") for row in units._FACTORS[unit]],
+)
+def test_every_row_of_the_tables_of_units(row, unit):
+    """By the parts of its name: kN/m2 is a thousand newtons on a square metre."""
+    force, _, area = row.replace("²", "2").partition("/")
+    if row == "bar":
+        exact = 1e5
+    elif area:
+        exact = of_prefix(force, "N") / of_prefix(area, "m2") ** 2
+    elif unit == "m2":
+        exact = of_prefix(force, "m2") ** 2
+    else:
+        exact = of_prefix(force, unit)
+    assert units.parse(f"1{row}", unit) == pytest.approx(exact, rel=1e-15)
+
+
+def test_every_unit_has_an_example_and_a_common_unit():
+    for unit, common in units.COMMON.items():
+        assert units.parse(f"1{common}", unit) > 0
+        with pytest.raises(ValueError, match=f"is not a quantity in {unit}; write") as error:
+            units.parse("x", unit)
+        assert units.parse(str(error.value).rsplit(" ", 1)[-1], unit) > 0
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,8 @@
 """What the tests of this folder share."""
 
 import json
-import sys
-from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))  # its helpers are imported by name
 
 
 @pytest.fixture

@@ -77,6 +77,21 @@ def test_a_block_put_down_elsewhere_slides_at_the_friction_of_its_asperities():
     assert friction(again) == slides
 
 
+def test_a_contact_that_is_pressed_when_found_starts_with_nothing():
+    """Its closure would be energy that no one put in: the depth of 0.1 mm becomes its offset."""
+    sim = Simulation(SCENE)
+    at_rest = sim.blocks.motion[1, 1]
+    put(sim, 0.0, 0.2)
+    sim.step()
+    sim.step()
+    assert sim.joints.n == 0
+    put(sim, 0.0, at_rest - 1e-4 - sim.blocks.motion[1, 1])
+    sim.step()
+    assert sim.contacts.closure.min() > 0.9e-4
+    assert sim.tracker.closure.max() < 1e-6
+    assert sim.ledger.value["stored"] == pytest.approx(0.0, abs=1e-6 * sim.ledger.value["turned"])
+
+
 def test_a_sliver_rules_neither_the_search_nor_the_corners_of_the_others():
     """Blocks 1 m wide and a sliver of 0.05 m: what follows from the width of the usual block."""
     wide = [f'[[block]]\nname = "{i}"\nbox = [1.0, 1.0]\nat = [{2 * i}, 0.5]' for i in range(4)]

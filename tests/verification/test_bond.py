@@ -10,7 +10,7 @@ from scipy.integrate import quad, trapezoid
 from scipy.optimize import brentq
 
 import jointlaw as jl
-from jointlaw.kernels.bond import Bonded, damage_at
+from jointlaw.kernels.bond import Bonded
 
 STIFFNESS, STRENGTH = (1e10, 5e9), (2e6, 3e6)  # Pa/m, Pa
 BRITTLE = jl.Bond(*STIFFNESS, *STRENGTH)
@@ -196,19 +196,6 @@ def test_bound_of_the_stiffness(rough):
         rough.max_stiffness(closure) + max(STIFFNESS)
     )
     assert bonded.normal_stress(-1e-4) == pytest.approx(-1e6)
-
-
-def test_damage_at_is_the_smaller_root():
-    """On a grid of displacements the strength of the damage found just holds them."""
-    opening, slip = (g.ravel() for g in np.meshgrid(*[np.geomspace(1e-6, 3e-2, 60)] * 2))
-    found, _ = damage_at(DUCTILE, np.stack([opening**2, slip**2]))
-    begin, end = (limit[:, None] for limit in DUCTILE.limits)
-    reach = np.hypot(*(np.stack([opening, slip]) * (begin - found * (begin - end))))
-    within = (found > 0.0) & (found < 1.0)
-    assert within.sum() > 200
-    np.testing.assert_allclose(reach[within], 1.0, rtol=1e-12)
-    assert (reach[found == 0.0] <= 1.0).all()
-    assert (reach[found == 1.0] >= 1.0).all()
 
 
 @pytest.fixture(scope="module")

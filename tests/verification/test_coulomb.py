@@ -254,22 +254,6 @@ def test_energy_of_closed_cycles(seed, dim):
     assert (total > 0.1 * one.cohesion**2 / one.shear).any()
 
 
-def test_ledger_in_space_has_the_second_order_of_the_step():
-    rng, errors = np.random.default_rng(1), []
-    (one,) = coulomb(None, **BRITTLE, weakening=1e-2).tables.elements
-    legs = rng.normal(size=(2, 3, 20)) * [[1e-4], [1e-3], [1e-3]] + [[3e-4], [0.0], [0.0]]
-    for steps in (8, 16, 32):
-        delta, state, error = np.zeros((3, 20)), np.zeros((3, 20)), 0.0
-        for d in legs.repeat(steps, axis=0) / steps:
-            new = state.copy()
-            lost = one.step(delta, d, state, new, False).lost
-            gained = one.stored(delta + d, new) - one.stored(delta, state)
-            error = error + work_of_step(one, delta, d, state) - gained - lost
-            delta, state = delta + d, new
-        errors.append(np.abs(error).mean())
-    assert np.diff(np.log2(errors)) == pytest.approx(-2.0, abs=0.1)
-
-
 # how the law differs from `unit`, steps that lead to the state, the step whose tangent is checked
 TANGENTS = {
     "stick": ({}, [[0.5, 0.0, 0.0]], [0.1, 0.1, 0.05]),

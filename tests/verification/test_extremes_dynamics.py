@@ -1,12 +1,105 @@
 """One mass on one joint under explicit integration at 0.95 of the critical time step."""
 
-import extremes.dynamics
 import numpy as np
 import pytest
 from extremes import FULL
-from extremes.dynamics import AREA, CASES, LOSSLESS, LOSSLESS_IMPACTS, MASS, SHORT, Mass, swing
+from extremes.laws import COMPILED, SCALE, build
+
+import jointlaw as jl
+from jointlaw.kernels.engine import Step
 
 pytestmark = pytest.mark.slow
+
+COARSE = jl.Resolution(2, 3, 1)
+MASS, AREA = 1e3, 1.0  # kg, m2
+EVERY = 5  # steps between looks at the energy: no divisor of a period
+CASES = {  # law, normal stress of the load (Pa), speed of impact as a share of that at rest closure
+    "Hertz at 1 Pa": ({}, 1.0, 0.3),
+    "Hertz at 10 GPa": ({}, 1e10, 0.3),
+    "Hertz, no friction": ({"mu": 0.0}, 1e7, 0.3),
+    "impact from opening": ({}, 1e6, 3.0),
+    "impact, little friction": ({"mu": 0.01}, 1e6, 3.0),
+    "impact, no friction": ({"mu": 0.0}, 1e6, 3.0),
+    "impact on flat faces": ({"a": 1e8}, 1e6, 3.0),
+    "steep faces, impact": ({"a": 1.0, "mu": 0.6}, 1e6, 3.0),
+    "linear, soft in shear": ({"eta": 0.0, "lam": 10.0}, 1e7, 0.3),
+    "linear, no friction": ({"eta": 0.0, "mu": 0.0}, 1e7, 0.3),
+    "stiff in shear": ({"lam": 0.1}, 1e7, 0.3),
+    "many heights": ({"heights": "printed, population"}, 1e7, 1.0),
+    "slopes that fade": ({"mating_length": 0.3 * SCALE, "mu": 0.3}, 1e7, 1.0),
+}
+
+
+class Mass:
+    """n masses, each on its joint under a constant normal load, hit in n directions; leapfrog."""
+
+    def __init__(self, case, n=8):
+        changes, stress, share = CASES[case]
+        self.law = build(resolution=COARSE, **changes)
+        self.load = np.array([stress * AREA, 0.0, 0.0])
+        self.joints = self.law.joints(n)
+        rest = float(self.law.closure(stress))
+        apart = rest if share > 1.0 else 0.0
+        if apart:
+            self.joints.update(np.tile([-apart, 0.0, 0.0], (n, 1)))
+        else:
+            self.joints.update(np.tile([rest, 0.0, 0.0], (n, 1)))
+        speed = share * np.sqrt(stress * AREA * rest / MASS)
+        toward = np.random.default_rng(4).normal(size=(n, 3))
+        toward[:, 0] = np.abs(toward[:, 0])
+        self.start = toward / np.linalg.norm(toward, axis=1, keepdims=True) * speed
+        self.rest = rest
+
+    def run(self, steps, dt):
+        """Energies at every fifth step, and the largest effective closure.
+
+        The energy counts the kinetic part as the product of the speeds before and after: that is
+        what leapfrog keeps, to the last digit on a linear spring.
+        """
+        joints, load, n = self.joints, self.load, len(self.joints)
+        v, F, d = self.start.copy(), joints.F.copy(), np.empty((n, 3))
+        step = Step(d, F, None, None, keep=True)
+        energies, reach = np.empty((-(-steps // EVERY), n)), 0.0
+        for k in range(steps):
+            faster = v + (load - F * AREA) * (dt / MASS)
+            if k % EVERY == 0:
+                measures = joints.measures()
+                kinetic = 0.5 * MASS * np.sum(v * faster, axis=1)
+                energies[k // EVERY] = kinetic + AREA * measures.stored - joints.delta @ load
+                reach = max(reach, float(np.max(measures.reach)))
+            v = faster
+            np.multiply(v, dt, out=d)
+            joints.take(step)
+        return energies, reach
+
+
+def swing(case, steps, n=4, share=0.95):
+    """Runs at this share of the critical step of the largest closure reached.
+
+    Returns, as shares of the kinetic energy at the start and the work of the load up to rest, how
+    far the energy ever rises above the first, and how far after the first tenth above the largest
+    in it; and the largest reach over that which the time step was made for.
+    """
+    probe = Mass(case, n)
+    bound = 10.0 * probe.rest
+    short = 0.1 * probe.law.critical_time_step(MASS, AREA, bound)
+    bound = 1.1 * Mass(case, n).run(PROBE, short)[1]  # the closure reached, on a fine step
+    mass = Mass(case, n)
+    energies, reach = mass.run(steps, share * mass.law.critical_time_step(MASS, AREA, bound))
+    early = len(energies) // 10
+    scale = mass.rest * mass.load[0] + 0.5 * MASS * np.sum(mass.start**2, axis=1)
+    above = (energies.max(axis=0) - energies[0]) / scale
+    growth = (energies[early:].max(axis=0) - energies[:early].max(axis=0)) / scale
+    return float(np.max(above)), float(np.max(growth)), reach / bound
+
+
+PROBE, SHORT = (6000, 4000) if COMPILED else (1200, 500)
+# Impacts that lose nothing: without friction, and along the normal of flat faces. They gain and
+# lose at every touch, as the bare power law does: test_extremes_impact.py
+LOSSLESS_IMPACTS = ("impact, no friction", "impact on flat faces")
+LOSSLESS = ("Hertz, no friction", "linear, no friction", "linear, soft in shear")
+
+
 STEPS = 1_000_000 if FULL else SHORT
 
 
@@ -14,7 +107,7 @@ STEPS = 1_000_000 if FULL else SHORT
 def swung(record, monkeypatch):
     """`swing`, whose figures are recorded."""
     if FULL:
-        monkeypatch.setattr(extremes.dynamics, "EVERY", 97)  # looks at the energy cost most
+        monkeypatch.setitem(globals(), "EVERY", 97)  # looks at the energy cost most
 
     def run(case, steps, share=0.95, n=4):
         found = swing(case, steps, n, share)

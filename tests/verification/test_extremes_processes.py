@@ -1,4 +1,4 @@
-"""A million joints, threads that each own joints, forked and spawned processes, two laws at once.
+"""A batch goes on in forked and spawned processes.
 
 Arrays of any kind (read-only, strided, float32, integer, empty), pickling, states of the wrong law
 and failed writes: tests/unit/test_batch.py, test_snapshot.py and test_files.py.
@@ -10,7 +10,7 @@ import pickle
 import numpy as np
 import pytest
 from extremes.checks import path
-from extremes.laws import COMPILED, SCALE, build
+from extremes.laws import SCALE, build
 
 import jointlaw as jl
 
@@ -24,7 +24,6 @@ def go_on(batch):
     return batch.update(np.full((len(batch), 3), 0.01 * SCALE), tangent=False)[0]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("method", ["fork", "spawn"])
 def test_a_batch_goes_on_in_another_process(method):
     """After the parent has used its threads, which a fork does not take along."""
@@ -34,23 +33,3 @@ def test_a_batch_goes_on_in_another_process(method):
     with multiprocessing.get_context(method).Pool(1) as pool:
         elsewhere = pool.apply(go_on, (batch,))
     np.testing.assert_array_equal(elsewhere, go_on(pickle.loads(pickle.dumps(batch))))
-
-
-@pytest.mark.slow
-def test_a_million_joints_are_a_million_single_joints():
-    n = 1_000_000 if COMPILED else 100_000
-    law = build(resolution=FAST)
-    batch = law.joints(n, ledger=False)
-    rng = np.random.default_rng(2)
-    steps = [rng.normal(size=(n, 3)) * 0.1 * SCALE + [SCALE, 0.0, 0.0] for _ in range(2)]
-    for d in steps:
-        F, C = batch.update(d, tangent=False)
-    assert C is None
-    assert np.isfinite(F).all()
-    for k in (0, 63, 64, n // 2 - 1, n - 1):
-        joint = law.joint()
-        for d in steps:
-            one, _ = joint.update(d[k], tangent=False)
-        # to the bit; but numpy's matrix product adds up one column in another order than many
-        rounding = 0.0 if COMPILED else 1e-15 * np.abs(one).max()
-        np.testing.assert_allclose(F[k], one, rtol=0.0, atol=rounding)

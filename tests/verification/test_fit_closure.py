@@ -43,6 +43,7 @@ def test_one_curve_cannot_fix_heights_and_says_so(grimsel):
     fit = jl.fit_closure(*grimsel)
     assert {"alpha", "beta"} <= set(fit.not_identifiable)
     assert set(fit.identifiable) == set(fit.free) - set(fit.not_identifiable)
+    assert all(axis.get_xlabel() and axis.get_ylabel() for axis in fit.plot().axes)
 
 
 def test_a_rock_of_another_curve_is_called_so(law):
@@ -80,6 +81,17 @@ def test_a_law_keeps_heights_that_no_fit_finds(make_law, heights):
     assert fit.law.heights == heights
     with pytest.raises(ValueError, match="'alpha' is unknown"):
         jl.fit_closure(true.normal_stress(closure), closure, law=start, free=["alpha"])
+
+
+def test_the_interval_of_one_factor_is_that_of_a_mean(make_law):
+    """All stresses go with the density: of n points its logarithm has the error noise/sqrt(n)."""
+    law, n, noise = make_law(), 20, 0.01
+    closure = np.linspace(0.0, 1e-6, n + 1)  # from zero stress on, so that the seating is known
+    stress = law.normal_stress(closure) * np.append(1.0, np.tile([1.01, 0.99], n // 2))
+    found = jl.fit_closure(stress, closure, law=law, free=["asperity_density"], noise=noise)
+    low, high = found.interval("asperity_density")
+    # 95 % of the normal density, for noise that is known; stresses are not linear in logarithms
+    assert np.log(high / low) / 2 == pytest.approx(1.95996 * noise / n**0.5, rel=1e-3)
 
 
 @pytest.mark.slow

@@ -61,6 +61,15 @@ def test_a_scan_makes_a_law(surface):
     assert law.contacts(0.0) / law.asperity_density * fit.asperities.depth.size < 10
 
 
+def test_depths_of_summits_are_those_of_the_heights_that_are_given(surface):
+    """Above the mean plane, by least squares."""
+    found = jl.from_surface(surface, SPACING).asperities
+    place = np.stack([np.ones(surface.size), *np.indices(surface.shape).reshape(2, -1)], axis=1)
+    plane = place @ np.linalg.lstsq(place, surface.ravel(), rcond=None)[0]
+    height = (surface - plane.reshape(surface.shape))[tuple(found.places.T)]
+    np.testing.assert_allclose(found.depth, height.max() - height, atol=1e-12)
+
+
 def test_turning_the_scan_turns_the_anisotropy(surface):
     along, across = (jl.from_surface(z, SPACING).parameters["c"] for z in (surface, surface.T))
     assert along == pytest.approx(-across, abs=1e-3)  # quadrants are left out in another order

@@ -167,6 +167,19 @@ def test_follow_is_the_elastic_frictional_law_written_out(table):
     assert np.abs(table.follow(path) - exact).max() < 1e-12 * exact.max()
 
 
+def test_the_shear_traction_turns_with_the_contact(table):
+    """The traction before a step by the whole spin, what the step adds by half of it."""
+    closure, spin = table.closure[-1:] / 2, np.array([0.3])
+    K22, K33, K23 = K = table.shear_matrix(*table.at(closure)[:2])
+    turn, half = (np.exp(1j * part) for part in (spin, spin / 2))
+    size = 0.01 * table.lookup(closure).normal_stress  # far from friction
+    f, d = size * np.array([[0.6], [0.8]]), size / K22 * np.array([[0.0], [0.5], [-0.2]])
+    found, _ = table.step(f, K, d, closure, spin)
+    added = K22 * d[1] + K23 * d[2] + 1j * (K23 * d[1] + K33 * d[2])
+    exact = turn * (f[0] + 1j * f[1]) + half * added
+    np.testing.assert_allclose(found[1] + 1j * found[2], exact, rtol=1e-12)
+
+
 def test_follow_makes_no_energy(table):
     """Closed loops in closure and shear: an elastic, softening, frictional host loses work only.
 

@@ -44,19 +44,6 @@ def test_closure_has_a_closed_form(formation, eta, interference):
     assert joint.stored_energy >= 0.0
 
 
-def test_first_loading_in_closed_form_is_that_of_many_cells():
-    for mu in (0.0, 0.2, 0.8):
-        one = law(formation="population", mu=mu, resolution=jl.Resolution(4, 3, 60),
-                  damage={"yield_interference": 0.1})  # fmt: skip
-        joint, last = one.joint(), 0.0
-        for u in np.linspace(0.1, 1.2, 12):
-            stress = joint.update([u - last, 0.0, 0.0])[0][0]
-            last = u
-            # sixty cells slip nearly as the springs do, one by one: 2e-4 at worst seen
-            assert stress == pytest.approx(one.normal_stress(u), rel=1e-3)
-            assert one.closure(one.normal_stress(u)) == pytest.approx(u, rel=1e-9)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("interference", "mating_length"),

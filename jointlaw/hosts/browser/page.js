@@ -57,6 +57,7 @@ function showNumbers() {
   part("level-name").textContent = held ? "Normal stress" : "Closure";
   part("level").value = held ? (400 * test.level) / FULL_STRESS : 200 * (test.closure / joint.length);
   part("level-told").textContent = held ? `${three(test.level / 1e6)} MPa` : `${three(test.closure * per, size)} ${unit}`;
+  part("direction").value = test.degrees;
   part("direction-told").textContent = `${test.degrees}°`;
   part("hold").value = test.hold;
   for (const name of ["a", "c", "mu"]) (part(name).value = numbers[name]), (part(`${name}-told`).textContent = three(numbers[name]));
@@ -249,7 +250,6 @@ function recall() {
       const legs = legsOfText(told.get("path"));
       remake(legs.length ? legs : legsOf([10]));
       test.turn(Number(told.get("turn")) || 0);
-      part("direction").value = test.degrees;
       if (told.get("hold") === "closure") test.hold = "closure";
     } else story.go(0, (before) => remake(legsOf(before)));
   } catch (error) {

@@ -12,7 +12,7 @@ const STORY = [
   },
   {
     name: "Stick",
-    tells: "At first all contacts stick (blue): the joint is elastic, and would spring back.",
+    tells: "At first nearly all contacts stick (blue): the joint is elastic, and would spring back.",
     task: "Drag the upper block to the right by a finger's breadth. In this step it moves a twentieth as far.",
     before: [10], meant: ["scene"], mark: "stuck", gear: 0.05, done: (test, begun) => test.slip - begun.slip > 0.04 * test.joint.length,
   },

@@ -4,8 +4,8 @@ A task is a table that a command prints, and takes its place between the marks o
 page; or a picture of docs/pictures that a command draws; or a shipped scene, whose ablation goes to
 docs/data. `--list` prints all of them. Tasks of which no time is kept run two at a time, on one
 thread each; those that measure times come last, one by one: let nothing else run beside them. Each
-prints what it took. Tables of YADE and LAMMPS need these installed. A task that fails does not stop
-the others.
+prints what it took. Tables of YADE and LAMMPS need these installed. `timed` makes all that
+measure times, the tables of costs. A task that fails does not stop the others.
 """
 
 import os
@@ -47,9 +47,11 @@ TIMED = {
     "peers-smooth": ("validation.md", "docs/measure/peers.py"),
     "peers-rough": ("validation.md", "docs/measure/peers.py --preset westerly-rough"),
     "native": ("native.md", "docs/measure/native.py"),
+    "joints": ("native.md", "docs/measure/native.py --joints"),
     "blocks-price": ("blocks.md", "docs/measure/blocks.py"),
     "yade": ("yade.md", "docs/measure/yade.py"),
     "lammps": ("lammps.md", "docs/measure/lammps.py FOLDER --rounds 2 --steps 60 --settle 60"),
+    "lammps-scale": ("lammps.md", "docs/measure/lammps_scale.py FOLDER"),
 }
 # picture: command that writes into FOLDER, and the file there
 PICTURES = {
@@ -142,7 +144,7 @@ def main():
         for key in (*PICTURES, *SCENES):
             print(f"{key}\tpicture or scene")
         return
-    keys = sys.argv[1:] or TASKS
+    keys = TIMED if sys.argv[1:] == ["timed"] else sys.argv[1:] or TASKS
     if unknown := set(keys).difference(TASKS):
         sys.exit(f"no task {', '.join(sorted(unknown))}; --list prints all")
     last = [key for key in keys if key == "ingredients" or key in TIMED]  # of the scenes' files

@@ -31,6 +31,7 @@ STEADY = 0.8, 0.9  # unbalanced force over that before: no fall, with less drag 
 LET_GO, FALLS = 40, 0.9  # most steps in which loose blocks let go, which go on while this falls
 SLOW = 0.01  # their drag, as a share of the median stiffness
 EARTH = 9.81  # m/s2
+FOLLOW = 6  # steps in which blocks that a loose one props follow it
 HELD = 1e25  # drag (1/s2) that holds a block where it is
 
 
@@ -100,11 +101,23 @@ class Equilibrium:
                 break
             before = np.linalg.norm(r)
         if found.all():
-            return moved, loose & False
+            return moved, self._follow(moved, loose, least)
         least = np.where(found, HELD, least)
         moved, r = self._creep(y, least)
         out = self._shares(np.where(least > 0, 0.0, r))
         return moved, out > max(BALANCED, min(LOOSE, 0.5 * out.max()))
+
+    def _follow(self, y: np.ndarray, loose: np.ndarray, least: np.ndarray) -> np.ndarray:
+        """Blocks (n,) that only the drag `least` of loose ones holds: these move on through less of
+        it now, and others that follow are loose as well."""
+        out, drag = 0.0 * loose, WEAK[0] * self._median(y) + self.none
+        drag = np.where(least < HELD, drag, HELD)
+        for _ in range(FOLLOW if ((least > 0) & (least < HELD)).any() else 0):
+            y, r, found = self._step(y, drag, ROUGH)
+            if not found.all():
+                break
+            out = self._shares(np.where(drag < HELD, r, 0.0)) * ~loose
+        return out > LOOSE
 
     def _shares(self, r: np.ndarray) -> np.ndarray:
         return shares(self.blocks, self.spread(r / self.root))

@@ -32,10 +32,10 @@ def failing(scene: Scene, until: float) -> Record:
     return record
 
 
-def first(record: Record) -> np.ndarray:
-    """Mask (n,) of the blocks that move first."""
+def first(record: Record, apart: np.ndarray) -> np.ndarray:
+    """Mask (n,) of the blocks that move first, but for those of a mask `apart`."""
     size = usual_size(block for block in record.scene.blocks if not block.fixed)
-    moved = [np.hypot(*(record.displaced(i) - record.displaced(0)).T)
+    moved = [~apart * np.hypot(*(record.displaced(i) - record.displaced(0)).T)
              for i in range(len(record.times))]  # fmt: skip
     away = next((frame for frame in moved if np.nanmax(frame) > FIRST * size), moved[-1])
     return away > 0.5 * np.nanmax(away)

@@ -64,12 +64,12 @@ def strength_reduction(
             row["without"] = trials.ask(f"{name}: loose with strength * {TWICE:g}", ask)
             tell(f"{name}: {len(row['without'])} of them with {TWICE:g} times the strength neither"
                  + _listed(row["without"]))  # fmt: skip
+        apart = np.isin([block.name for block in one.blocks], [b["block"] for b in row["without"]])
         tell(f"{name}: factor of safety of all blocks")
         factor = row["factor_of_safety"] = factor_of_safety(one, trials, name)
         if 0 < len(row["without"]) < free:
             tell(f"{name}: factor of safety without those {len(row['without'])}")
-            which = np.isin([b.name for b in one.blocks], [b["block"] for b in row["without"]])
-            factor = factor_of_safety(one, trials, f"{name} without loose blocks", which)
+            factor = factor_of_safety(one, trials, f"{name} without loose blocks", apart)
             row["factor_without"] = factor
         if asperity:
             row["asperity_factor"] = asperity_factor(one, trials, name)
@@ -80,7 +80,9 @@ def strength_reduction(
             title = f"{name}: factor of safety {factor:.3g}"
             path, weak = folder / row["picture"], weakened(one, SHOWN * factor)
             tell(f"{name}: running it with strength / {weak.reduction:.3g}")
-            row["first"] = trials.ask(row["picture"], partial(_show, weak, until, title, path))
+            row["first"] = trials.ask(
+                row["picture"], partial(_show, weak, until, title, path, apart)
+            )
             tell(f"{name}: first to move: {told(row['first'])}")
         yield row
 
@@ -97,13 +99,12 @@ def _loose(scene: Scene) -> list[dict]:
     return named(scene, Simulation(seated(scene)).loose)
 
 
-def _show(scene: Scene, until: float, title: str, path: Path) -> list[dict]:
-    """Run and draw a scene that fails; returns which blocks move first."""
+def _show(scene: Scene, until: float, title: str, path: Path, apart: np.ndarray) -> list[dict]:
+    """Run and draw a scene that fails; returns which blocks move first, but for those apart."""
     record = failing(scene, until)
-    moving = first(record)
-    title = f"{title}\nwith strength / {scene.reduction:.3g}"
-    Pictures(record, title, moving, "moves first").final(path)
-    return named(scene, moving)
+    ahead, title = first(record, apart), f"{title}\nwith strength / {scene.reduction:.3g}"
+    Pictures(record, title, ahead, "moves first").final(path)
+    return named(scene, ahead)
 
 
 def factor_of_safety(

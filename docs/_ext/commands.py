@@ -18,7 +18,7 @@ def told(*words):
 
 def verbs(text):
     """Words after the program's name in its own help that are commands with a help."""
-    if listed := re.search(r"^  COMMAND\n((?:    .*\n)+)", text, re.MULTILINE):
+    if listed := re.search(r"^  (?:COMMAND|HOST)\n((?:    .*\n)+)", text, re.MULTILINE):
         return re.findall(r"^    (\w[\w-]*)", listed[1], re.MULTILINE)
     return re.findall(r"^  python -m \w+ ([a-z][a-z-]*)\b", text, re.MULTILINE)
 
@@ -31,11 +31,13 @@ class Help(Directive):
     def run(self):
         program = self.arguments[0]
         whole, parts = told(program), []
-        for verb in ["", *dict.fromkeys(verbs(whole))]:
-            name = f"{program} {verb}".strip()
+        todo = [[], *([verb] for verb in dict.fromkeys(verbs(whole)))]
+        for words in todo:
+            name = " ".join([program, *words])
             part = nodes.section(ids=[nodes.make_id(name)])
             part += nodes.title(text=name)
-            text = told(program, verb) if verb else whole
+            text = told(program, *words) if words else whole
+            todo += [[*words, verb] for verb in verbs(text)] if words else []
             part += nodes.literal_block(text, text, language="text")
             parts.append(part)
         return parts

@@ -54,7 +54,7 @@ read_data pack.data
 replicate {repeat} {repeat} {repeat}
 {style}
 neighbor 0.0005 bin
-timestep 5e-6
+timestep 1e-6
 fix 1 all nve/sphere
 fix v all viscous 0.02
 compute each all contact/atom
@@ -69,7 +69,7 @@ OWN = {
     "granular, mindlin": ("off", "pair_style granular\npair_coeff * * hertz/material 1e9 0.5 0.3 "
                           "tangential mindlin NULL 1.0 0.4 damping viscoelastic"),
 }  # fmt: skip
-RESOLUTIONS = [jl.Resolution(1, 3, 2), jl.Resolution(2, 3, 4)]
+RESOLUTIONS = "fast", "balanced", "fine"
 
 
 def rock(resolution):
@@ -104,15 +104,15 @@ def main():
     parser.add_argument("--processors", type=int, nargs="+", default=[1, 2])
     options = parser.parse_args()
     folder = options.folder
-    export_lammps(rock(RESOLUTIONS[0]), folder, "rock")
+    export_lammps(rock("balanced"), folder, "rock")
     subprocess.run(["./build.sh"], cwd=folder, env={**os.environ, "ENV": str(ENV)}, check=True)
     if not (folder / "pack.data").exists():
         lammps(folder, PACK)
     styles, sizes = dict(OWN), {}
     for r in RESOLUTIONS:
-        file = f"rock-{r.u}{r.phi}{r.depth}.jlaw"
+        file = f"rock-{r}.jlaw"
         (folder / file).write_text(table_text(rock(r)))
-        name = f"jointlaw ({r.u}, {r.phi}, {r.depth})"
+        name = f"jointlaw, {r}"
         styles[name] = ("on", "plugin load ./jointlawplugin.so\npair_style jointlaw opening 5e-4\n"
                         f"pair_coeff * * {file}")  # fmt: skip
         sizes[name] = 8 * (rock(r).state_size + 8)
@@ -132,7 +132,7 @@ def main():
                 old = best.get((name, processors), (1e99, 1e99, 0))
                 best[name, processors] = (min(old[0], pair * each), min(old[1], loop * each), count)
     print(
-        "| pair style, `Resolution` | contacts | pair style, ns per contact and step "
+        "| pair style, resolution | contacts | pair style, ns per contact and step "
         "| the same / mindlin | whole step, ns | 2 processors: pair style, ns "
         "| speed-up of the step | bytes per contact |\n" + "|---" * 8 + "|"
     )

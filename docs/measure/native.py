@@ -1,12 +1,14 @@
-"""Time of one update in C, beside the compiled batch of Python.
+"""Time of one update in C, beside the compiled batch of Python, of the named resolutions.
 
-    python docs/measure/native.py              the table of docs/native.md, two minutes
+    python docs/measure/native.py              the first table of docs/native.md, three minutes
     python docs/measure/native.py --cc clang   with another compiler
+    python docs/measure/native.py --joints     the second table: when states leave the cache
 
-Each figure is the least of many short rounds, taken in turn, in nanoseconds of one thread's own
-time per joint and update, so that other programs count little. C: `jlaw_update`, one joint at a
-time as in a pair loop, built with the flags of the Makefile. batch: `JointBatch.update` of all
-joints. F: traction alone, FC: with tangent. Steps are random around a closure of 1 um.
+Each figure is the least of many short rounds, taken in turn, in nanoseconds per joint and update.
+In the first table it is the time of one thread, so that other programs count little. C:
+`jlaw_update`, one joint at a time as in a pair loop; many: `jlaw_update_many`; both built with the
+flags of the exported Makefile. batch: `JointBatch.update` of all joints. F: traction alone, FC:
+with tangent. Steps are random around a closure of 1 um. The second table is by the clock.
 """
 
 import argparse
@@ -19,27 +21,29 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from tables import table
 
 import jointlaw as jl
 from jointlaw.hosts.c.export import include_dir, table_text
 
 os.environ["JOINTLAW_THREADS"] = "1"
-FLAGS = ["-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-Wno-psabi"]
-CASES = [  # resolution, plane
-    (jl.Resolution(1, 3, 2), 0.0),
-    (jl.Resolution(1, 3, 2), None),
-    (jl.Resolution(2, 3, 4), 0.0),
-    (jl.Resolution(2, 3, 4), None),
-]
+FLAGS = ["-O3", "-march=native", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math",
+         "-Wno-psabi"]  # fmt: skip
+NAMES, PLACES = ("fast", "balanced", "fine"), {"plane": 0.0, "space": None}
 COLUMNS = {  # of the table, and what was measured
-    "C F": "C F",
     "C F, no ledger": "bare F",
+    "C F": "C F",
     "C FC": "C FC",
+    "many F": "many F",
+    "many FC": "many FC",
     "batch F": "batch F",
     "batch F + ledger": "batch + ledger F",
     "batch FC + ledger": "batch + ledger FC",
 }
-LOOP = """
+MOST = 4000  # joints of a batch
+LOOP = (
+    f"#define MOST {MOST}\n"
+    + """
 #define _POSIX_C_SOURCE 199309L
 #define JOINTLAW_IMPLEMENTATION
 #include "jointlaw.h"
@@ -61,20 +65,29 @@ double loop(const jlaw_law *law, double *states, const double *d, long n, int ta
       return -1;
   return (now() - start) / (double) n;
 }
+double many(const jlaw_law *law, double *states, const double *d, long n, int tangent)
+{
+  static double F[3 * MOST], C[9 * MOST];
+  const size_t rows = (size_t) jlaw_state_size(law), count = (size_t) n;
+  const double start = now();
+  if (jlaw_update_many(law, states, rows, d, F, tangent ? C : NULL, count) != count) return -1;
+  return (now() - start) / (double) n;
+}
 """
+)
 
 
 def library(folder: Path, cc: str, *flags: str) -> ctypes.CDLL:
     """The loop, compiled."""
-    name = "-".join(["loop", *flags]).replace("/", "")
-    source, target = folder / "loop.c", folder / f"{name}.so"
+    source, target = folder / "loop.c", folder / f"{'-'.join(['loop', *flags])}.so"
     source.write_text(LOOP)
     command = [cc, "-std=c99", *FLAGS, *flags, "-shared", "-fPIC", f"-I{include_dir()}"]
     subprocess.run([*command, str(source), "-o", str(target), "-lm"], check=True)
     lib = ctypes.CDLL(str(target))
-    lib.loop.restype = ctypes.c_double
     lib.jlaw_read.restype = ctypes.c_void_p
-    lib.loop.argtypes = [*[ctypes.c_void_p] * 3, ctypes.c_long, ctypes.c_int]
+    for function in (lib.loop, lib.many):
+        function.restype = ctypes.c_double
+        function.argtypes = [*[ctypes.c_void_p] * 3, ctypes.c_long, ctypes.c_int]
     return lib
 
 
@@ -92,6 +105,7 @@ def measure(law: jl.JointLaw, libs: dict[str, ctypes.CDLL], folder: Path, n: int
     file.write_text(table_text(law))
     laws = {name: ctypes.c_void_p(lib.jlaw_read(str(file).encode(), None, 0))
             for name, lib in libs.items()}  # fmt: skip
+    loops = {name: lib.many if name == "many" else lib.loop for name, lib in libs.items()}
     states = {name: batches["batch"].snapshot().values.copy() for name in libs}
     best: dict[str, float] = {}
 
@@ -101,8 +115,8 @@ def measure(law: jl.JointLaw, libs: dict[str, ctypes.CDLL], folder: Path, n: int
     for k in range(rounds):
         step = d[k % 4]
         for tangent, column in ((False, "F"), (True, "FC")):
-            for name, lib in libs.items():
-                ns = lib.loop(laws[name], states[name].ctypes.data, step.ctypes.data, n, tangent)
+            for name, loop in loops.items():
+                ns = loop(laws[name], states[name].ctypes.data, step.ctypes.data, n, tangent)
                 note(f"{name} {column}", ns)
             for name, batch in batches.items():
                 before = time.thread_time()
@@ -111,28 +125,57 @@ def measure(law: jl.JointLaw, libs: dict[str, ctypes.CDLL], folder: Path, n: int
     return best
 
 
+def beyond_the_cache(rounds):
+    """Rows: ns per joint of batches of 1e3 to 1e6 joints at "balanced", on one and two threads."""
+    rows = []
+    for n in (1000, 10_000, 100_000, 1_000_000):
+        cells = []
+        for plane in PLACES.values():
+            law = replace(jl.presets.load("westerly-smooth"), resolution="balanced", plane=plane)
+            batch, rng = law.joints(n, ledger=False), np.random.default_rng(1)
+            d = rng.normal(0.0, 2e-8, (2, n, law.dim))
+            d[1], d[0, :, 0] = -d[0], d[0, :, 0] + 1e-6
+            batch.update(d[0], tangent=False)
+            d[0] = -d[1]
+            best = {"1": np.inf, "2": np.inf}
+            for k in range(max(rounds * 10_000 // n, 6)):
+                for threads in best:
+                    os.environ["JOINTLAW_THREADS"] = threads
+                    before = time.perf_counter()
+                    batch.update(d[k % 2], tangent=False)
+                    took = time.perf_counter() - before
+                    best[threads] = min(best[threads], took)
+            cells += [f"{batch.bytes_per_joint * n / 1e6:.1f}"]
+            cells += [f"{1e9 * took / n:.0f}" for took in best.values()]
+        rows.append([n, *cells])
+    return rows
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--cc", default="cc", help="the C compiler")
-    parser.add_argument("--joints", type=int, default=4000, help="of a batch")
+    parser.add_argument("--joints", action="store_true", help="the second table")
     parser.add_argument("--rounds", type=int, default=60, help="of which the least counts")
     options = parser.parse_args()
-    preset = jl.presets.load("westerly-smooth")
-    print("| sliders | bytes of state |", *(f" {name} |" for name in COLUMNS), sep="")
-    print("|---" * (2 + len(COLUMNS)) + "|")
+    if options.joints:
+        head = [f"{place}: {what}" for place in PLACES for what in ("MB", "1 thread", "2 threads")]
+        print(table(["joints", *head], beyond_the_cache(options.rounds)))
+        return
+    preset, rows = jl.presets.load("westerly-smooth"), []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         libs = {"C": library(folder, options.cc),
-                "bare": library(folder, options.cc, "-DJOINTLAW_NO_LEDGER")}  # fmt: skip
-        for resolution, plane in CASES:
-            law = replace(preset, resolution=resolution, plane=plane)
-            t = measure(law, libs, folder, options.joints, options.rounds)
-            where = "space" if plane is None else "plane"
-            cells = [f"{t[key]:.0f}" for key in COLUMNS.values()]
-            print(
-                f"| {law.tables.sliders} ({where}) | {8 * law.state_size} | {' | '.join(cells)} |"
-            )
+                "bare": library(folder, options.cc, "-DJOINTLAW_NO_LEDGER"),
+                "many": library(folder, options.cc, "-DJOINTLAW_MANY")}  # fmt: skip
+        for resolution in NAMES:
+            for where, plane in PLACES.items():
+                law = replace(preset, resolution=resolution, plane=plane)
+                t = measure(law, libs, folder, MOST, options.rounds)
+                sizes = [law.tables.sliders, 8 * law.state_size]
+                times = [f"{t[key]:.0f}" for key in COLUMNS.values()]
+                rows.append([f"{resolution}, {where}", *sizes, *times])
+    print(table(["resolution", "sliders", "bytes of state", *COLUMNS], rows))
 
 
 if __name__ == "__main__":

@@ -13,12 +13,14 @@ import os
 import shutil
 import subprocess
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 from tables import table
 
 import jointlaw as jl
 from jointlaw.hosts.yade.export import export_yade
+from jointlaw.parameters.resolution import NAMED
 
 COLUMNS = {"loop": "law and geometry of YADE", "adapter": "time that the adapter adds",
            "law": "part of it in our law"}  # fmt: skip
@@ -28,6 +30,7 @@ sys.path.insert(0, ".")
 import numpy as np
 from yade_joint import Joints, LiveLaw, TableLaw
 contacts, runs, steps = {contacts}, {runs}, 1
+OWN = "cundall", "hertz"
 N = round((contacts / 3) ** (1 / 3)) + 1
 R = 0.5
 
@@ -44,7 +47,7 @@ def build(law):
     ip2, law2 = Ip2_FrictMat_FrictMat_FrictPhys(), Law2_ScGeom_FrictPhys_CundallStrack()
     if law == "hertz":
         ip2, law2 = Ip2_FrictMat_FrictMat_MindlinPhys(), Law2_ScGeom_MindlinPhys_Mindlin()
-    if law in ("table", "live"): law2.neverErase = True
+    if law not in OWN: law2.neverErase = True
     O.engines = [ForceResetter(), InsertionSortCollider([Bo1_Sphere_Aabb()], verletDist=.01),
                  InteractionLoop([Ig2_Sphere_Sphere_ScGeom()], [ip2], [law2]),
                  NewtonIntegrator(damping=.2)]
@@ -78,15 +81,13 @@ def adapter(joints):
 out = {{}}
 for law in {kinds}:
     build(law)
-    if law in ("table", "live"):
+    if law not in OWN:
         if law == "table": joints = Joints(TableLaw("joint.txt"))
-        else:
-            from jointlaw import JointLaw
-            joints = Joints(LiveLaw(JointLaw.from_toml("law.toml")))
+        else: joints = Joints(LiveLaw(law + ".toml"))
         joints.attach()
     for _ in range(3): O.step()
     n = O.interactions.countReal()
-    if law in ("table", "live"):
+    if law not in OWN:
         whole, inner = adapter(joints)
         assert len(joints) == n and np.isfinite(joints.F).all() and joints.F[0].min() > 0
         out[law] = dict(contacts=n, adapter=whole / n, law=inner / n)
@@ -103,6 +104,8 @@ def measure(law, kinds, contacts=20_000, runs=60):
         raise SystemExit("YADE is not installed (Debian: apt-get install yade)")
     with tempfile.TemporaryDirectory() as folder:
         export_yade(law, folder)
+        for resolution in set(kinds) & set(NAMED):
+            replace(law, resolution=resolution).to_toml(Path(folder) / f"{resolution}.toml")
         overlap = 0.2 * law.closure_range
         scene = SCENE.format(contacts=contacts, runs=runs, overlap=overlap, kinds=kinds)
         (Path(folder) / "scene.py").write_text(scene)
@@ -129,8 +132,10 @@ def main():
     parser.add_argument("--preset", default="jing-replica")
     options = parser.parse_args()
     law = jl.presets.load(options.preset)
-    names = {"cundall": "Cundall-Strack", "hertz": "Hertz-Mindlin", "table": "table mode",
-             "live": f"live mode, `{law.resolution}` in space"}  # fmt: skip
+    names = {"cundall": "Cundall-Strack", "hertz": "Hertz-Mindlin", "table": "table mode"}
+    for name in ("fast", "balanced", "fine"):
+        size = 8 * replace(law, resolution=name).state_size
+        names[name] = f"live mode, {name} in space: {size} bytes of state"
     found = measure(law, list(names), options.contacts, options.runs)
     rows = [
         [name, *(f"{found[kind][k]:.0f}" if k in found[kind] else "" for k in COLUMNS)]

@@ -27,14 +27,16 @@ Option = tuple[tuple[str, ...], dict[str, Any]]
 
 class Command(NamedTuple):
     """A subcommand: its one-line purpose, an example that runs as printed, what it does with its
-    options (it returns the exit status, None for success), and the options.
+    options (it returns the exit status, None for success), and the options; or its own subcommands,
+    which are called hosts.
     """
 
     name: str
     what: str
     example: str
     run: Callable[[argparse.Namespace], int | None]
-    options: tuple[Option, ...]
+    options: tuple[Option, ...] = ()
+    parts: tuple["Command", ...] = ()
 
 
 def option(*names: str, **settings: Any) -> Option:

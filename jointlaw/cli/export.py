@@ -9,7 +9,8 @@ from ..hosts.lammps.export import export_lammps
 from ..hosts.yade.export import export_yade
 from ..laws.joint_law import JointLaw
 from ..support.files import clear_run
-from .command import LAW, OUT, Command, in_unit, option, read_law
+from ..tables.tabulate import require_3d
+from .command import LAW, OUT, Command, Option, in_unit, option, read_law
 
 START = {
     "yade": "yade -n -x settle_and_incline.py",
@@ -21,13 +22,9 @@ START = {
 
 def _export(options: argparse.Namespace) -> None:
     law, host, folder = read_law(options), options.host, options.out
-    if options.shear_limit and host != "yade":
-        raise ValueError(
-            f"--shear-limit shapes a table for YADE; {host} runs the law itself: leave it out"
-        )
-    seating = {} if options.seating is None else {"seating": options.seating}
-    if seating and host != "fem":
-        raise ValueError(f"--seating is for fem; in {host} the host closes the joint: leave it out")
+    if host in ("yade", "lammps"):
+        require_3d(law, f"motion in {host.upper()}")
+    seating = {"seating": options.seating} if host == "fem" else {}
     require_seating(**seating)
     clear_run(folder)
     if host == "yade":
@@ -51,28 +48,43 @@ def _export_table(law: JointLaw, folder: Path, shear_limit: float | None) -> Non
     )
 
 
+def _example(host: str) -> str:
+    return f"jointlaw export {host} jing-replica --out joint-for-{host}"
+
+
+def _host(host: str, about: str, *own: Option) -> Command:
+    """The command for one host, with options of its own."""
+    return Command(host, f"write a law {about}", _example(host), _export, (*LAW, *own, *OUT))
+
+
 COMMAND = Command(
     "export",
-    "write a law for a host code: table, adapter and scripts in one folder",
-    "jointlaw export yade jing-replica --out joint-for-yade",
+    "write a law for a host code: all that it needs, in one folder",
+    _example("lammps"),
     _export,
-    (
-        option(
-            "host", choices=tuple(START), help="the host code; c: also C++; fem: finite elements"
+    parts=(
+        _host(
+            "yade",
+            "for YADE: table, law, adapter, script",
+            option(
+                "--shear-limit",
+                metavar="LENGTH",
+                type=in_unit("m", positive=True),
+                help="shear at which the friction of the table is read, such as 5um",
+            ),
         ),
-        *LAW,
-        option(
-            "--shear-limit",
-            metavar="LENGTH",
-            type=in_unit("m", positive=True),
-            help="yade: shear at which the friction of the table is read, such as 5um",
+        _host("c", "for C, C++ and Fortran: one header, tables, examples"),
+        _host(
+            "fem",
+            "for finite elements: MGIS, UMAT, shear tests in OpenGeoSys and Kratos",
+            option(
+                "--seating",
+                metavar="STRESS",
+                type=in_unit("Pa"),
+                default=SEATING,
+                help=f"normal stress before the first step (default {SEATING / 1e3:g}kPa)",
+            ),
         ),
-        option(
-            "--seating",
-            metavar="STRESS",
-            type=in_unit("Pa"),
-            help=f"fem: normal stress before the first step (default {SEATING / 1e3:g}kPa)",
-        ),
-        *OUT,
+        _host("lammps", "for LAMMPS: a pair style, an input script"),
     ),
 )

@@ -11,6 +11,7 @@ from ..support.checks import one_of
 from ..support.files import require_free
 from ..support.version import __version__
 from . import browser, export, field, fit, laboratory, presets, scan
+from .command import Command
 
 COMMANDS = (
     browser.COMMAND,
@@ -63,7 +64,15 @@ def _read(words: Sequence[str]) -> argparse.Namespace:
     )
     parser.add_argument("--version", action="version", version=f"jointlaw {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for one in COMMANDS:
+    _add(commands, COMMANDS)
+    if words and not words[0].startswith("-"):
+        one_of("the command", words[0], tuple(commands.choices))
+    return parser.parse_args(words)
+
+
+def _add(commands: Any, ours: Sequence[Command]) -> None:
+    """Add commands with their options, and those of their own."""
+    for one in ours:
         command = commands.add_parser(
             one.name,
             help=one.what,
@@ -74,6 +83,5 @@ def _read(words: Sequence[str]) -> argparse.Namespace:
         command.set_defaults(run=one.run)
         for names, settings in one.options:
             command.add_argument(*names, **settings)
-    if words and not words[0].startswith("-"):
-        one_of("the command", words[0], tuple(commands.choices))
-    return parser.parse_args(words)
+        if one.parts:
+            _add(command.add_subparsers(dest="host", required=True, metavar="HOST"), one.parts)

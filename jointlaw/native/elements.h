@@ -120,20 +120,24 @@ JL_IN jl_of_joint jl_step_elements(const jlaw_law *law, jl_numbers n, int row,
   const int dim = law->dim;
   jl_of_joint stored = jl_each_joint(0.0);
   for (int l = 0; l < JL_JOINTS; l++) {
-    double *own = n.s + l + (size_t) row * n.stride, *lost = n.s + l + (size_t) dim * n.stride;
-#define JL_STEP_ELEMENT(name)                                                                   \
-  if (law->name) {                                                                              \
-    const int rows = jl_##name##_rows(law);                                                     \
-    jl_part p = {{0.0}, {0.0}, {0.0}, {0.0}, {0.0}, 0.0};                                       \
-    for (int i = 0; i < dim; i++) p.from[i] = JL_JOINT(from[i], l), p.d[i] = JL_JOINT(d[i], l); \
-    for (int i = 0; i < rows; i++) p.row[i] = own[(size_t) i * n.stride];                       \
-    JL_JOINT(stored, l) += jl_##name##_step(law, &p, tangent);                                  \
-    for (int i = 0; F && i < rows; i++) own[(size_t) i * n.stride] = p.row[i];                  \
-    for (int i = 0; F && i < dim; i++) JL_JOINT(F[i], l) += p.F[i];                             \
-    for (int i = 0; F && tangent && i < dim * dim; i++)                                         \
-      JL_JOINT(C[i], l) += p.C[i / dim * 3 + i % dim];                                          \
-    if (F && ledger) *lost += p.lost;                                                           \
-    own += (size_t) rows * n.stride;                                                            \
+    double *own = JL_OF_LANE(n, l) + (size_t) row * n.stride,
+           *lost = JL_OF_LANE(n, l) + (size_t) dim * n.stride;
+#define JL_STEP_ELEMENT(name)                                                  \
+  if (law->name) {                                                             \
+    const int rows = jl_##name##_rows(law);                                    \
+    jl_part p; /* what a step does not write is not read */                    \
+    for (int i = 0; i < 3; i++) {                                              \
+      p.from[i] = i < dim ? JL_JOINT(from[i], l) : 0.0;                        \
+      p.d[i] = i < dim ? JL_JOINT(d[i], l) : 0.0;                              \
+    }                                                                          \
+    for (int i = 0; i < rows; i++) p.row[i] = own[(size_t) i * n.stride];      \
+    JL_JOINT(stored, l) += jl_##name##_step(law, &p, tangent);                 \
+    for (int i = 0; F && i < rows; i++) own[(size_t) i * n.stride] = p.row[i]; \
+    for (int i = 0; F && i < dim; i++) JL_JOINT(F[i], l) += p.F[i];            \
+    for (int i = 0; F && tangent && i < dim * dim; i++)                        \
+      JL_JOINT(C[i], l) += p.C[i / dim * 3 + i % dim];                         \
+    if (F && ledger) *lost += p.lost;                                          \
+    own += (size_t) rows * n.stride;                                           \
   }
     JLAW_ELEMENTS(JL_STEP_ELEMENT)
 #undef JL_STEP_ELEMENT

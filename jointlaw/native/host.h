@@ -1,12 +1,13 @@
 /* jointlaw.h: the law of a rough rock joint, complete, in C99 (also C++11 and later). MIT licence.
  *
- *     #define JOINTLAW_IMPLEMENTATION                  in one source file, before this line:
+ *     #define JOINTLAW_IMPLEMENTATION   // in one source file, before this line:
  *     #include "jointlaw.h"
  *
  *     char message[JLAW_MESSAGE];
- *     jlaw_law *law = jlaw_read("granite.jlaw", message, sizeof message);   `jointlaw export c`
- *     double state[162] = {0};                 jlaw_state_size(law) numbers; zeros: virgin, mated
- *     if (jlaw_update(law, state, state, d, F, NULL, message, sizeof message)) ... message tells
+ *     jlaw_law *law = jlaw_read("granite.jlaw", message, sizeof message); // of `jointlaw export c`
+ *     double *state = (double *) calloc(jlaw_state_size(law), sizeof *state); // virgin, mated
+ *     double d[3] = {1e-7, 5e-8, 0.0}, F[3];
+ *     if (jlaw_update(law, state, state, d, F, NULL, message, sizeof message)) puts(message);
  *
  * Axes: 1 is the normal of the joint, 2 and 3 span it. d is the displacement in this step (m) of
  * one body into and along the other: closure first, then the jlaw_dim - 1 components of shear.
@@ -18,7 +19,8 @@
  * uses memory, files or the locale; none uses a global variable.
  *
  * Build with -ffp-contract=off: the same bits with every compiler and on every x86-64. For speed
- * -O3 -fno-math-errno -fno-trapping-math, which change no result; never -ffast-math.
+ * -O3 -fno-math-errno -fno-trapping-math, which change no result; never -ffast-math. -march=native
+ * compiles the law once, for this machine; without it gcc and clang do so for two kinds of x86-64.
  *
  * Symbols and order of the step are those of the page "theory-incremental" of the documentation
  * and of jointlaw/kernels/asperities.py.
@@ -54,6 +56,13 @@ JLAW_FUNCTION int jlaw_state_size(const jlaw_law *law);
  * nothing is written then. */
 JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1, const double *d,
                               double *F, double *C, char *message, size_t size);
+
+/* The step of jlaw_update for n joints of an array, as fast as vectors make it with -DJOINTLAW_MANY
+ * -march=native: their states begin `stride` numbers apart, d (n, dim), F (n, dim), and C (n, dim,
+ * dim) if not NULL. The same bits. Returns n; or the number of the first joint whose step is refused:
+ * it and those after it have not moved, and jlaw_update tells why. */
+JLAW_FUNCTION size_t jlaw_update_many(const jlaw_law *law, double *states, size_t stride,
+                                      const double *d, double *F, double *C, size_t n);
 
 /* The start of a joint whose faces have never met, as blocks that meet anew after a fall: at first
  * touch, 100 mating lengths from the mated position along axis 2. Closure is counted from the mated
@@ -129,24 +138,59 @@ extern "C" {
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__GNUC__) && !defined(__CUDACC__)
 #pragma GCC push_options
-#pragma GCC optimize("fp-contract=off")
+#pragma GCC optimize("fp-contract=off", "no-gcse", "no-gcse-after-reload")
 #endif
 #ifdef __GNUC__ /* all functions of vectors are inline; g++ would warn at the end of the file */
 #pragma GCC diagnostic ignored "-Wpsabi"
 #endif
 
 /* Four facets side by side in one vector, or (JOINTLAW_PLAIN, other compilers, CUDA) one after the
- * other with the same bits. AVX2 or AVX-512 where the machine has it, found out at run time. */
+ * other with the same bits. AVX2 where the machine has it, found out at run time unless the compiler
+ * may use it or JOINTLAW_ONE_PROCESSOR tells that there is one machine. */
 #if defined(__GNUC__) && !defined(JOINTLAW_PLAIN) && !defined(__CUDACC__) \
     && !defined(__CUDACC_RTC__)
 #define JL_W 4
 #define JLAW_ABREAST
 #endif
 #if defined(__x86_64__) && defined(__gnu_linux__) && defined(__OPTIMIZE__) && !defined(__AVX2__) \
-    && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && defined(JLAW_ABREAST)
-#define JLAW_CLONES __attribute__((target_clones("arch=x86-64-v4", "avx2", "default")))
+    && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && defined(JLAW_ABREAST)  \
+    && !defined(JOINTLAW_ONE_PROCESSOR)
+#define JLAW_CLONES __attribute__((target_clones("avx2", "default")))
 #else
 #define JLAW_CLONES
+#endif
+#ifdef JOINTLAW_NO_LEDGER
+enum { JLAW_LEDGER = 0 };
+#else
+enum { JLAW_LEDGER = 1 };
+#endif
+
+/* The law once more, for joints side by side: of as many as a vector of this machine has numbers */
+#if defined(JOINTLAW_MANY) && defined(__AVX2__) && defined(__OPTIMIZE__) && defined(JLAW_ABREAST)
+#ifdef __AVX512DQ__
+#define JM_W 8
+#else
+#define JM_W 4
+#endif
+#define JM_APART
+#include "many.h"
+static void jlaw_step_many_(const jlaw_law *law, double *s, size_t apart, const double *d,
+                            double *F, double *C)
+{
+  const jm_numbers n = {s, 1, apart};
+  const int dim = law->dim;
+  jm_real p[3], f[3], c[9];
+  for (int l = 0; l < JM_W; l++)
+    for (int i = 0; i < dim; i++) p[i][l] = d[l * dim + i];
+  jm_step_of_kind(law, n, p, f, c, JLAW_LEDGER, C != NULL, 0, 0, NULL);
+  for (int l = 0; l < JM_W; l++) {
+    for (int i = 0; i < dim; i++) F[l * dim + i] = f[i][l];
+    for (int i = 0; C && i < dim * dim; i++) C[l * dim * dim + i] = c[i][l];
+  }
+}
+#endif
+#if defined(__AVX512F__) && !defined(__clang__) /* which makes gcc's code slower here */
+#pragma GCC target("no-avx512f")
 #endif
 
 #include "lanes.h"
@@ -220,12 +264,6 @@ static JLAW_FUNCTION double jlaw_of_facet_(const jlaw_law *law, int facet, int a
   return law->facet[(facet - lane) * JLAW_COLUMNS + at * JLAW_LANES + lane];
 }
 
-#ifdef JOINTLAW_NO_LEDGER
-enum { JLAW_LEDGER = 0 };
-#else
-enum { JLAW_LEDGER = 1 };
-#endif
-
 JLAW_CLONES JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t stride,
                                          const double *d, double *F, double *C)
 {
@@ -290,20 +328,43 @@ static JLAW_FUNCTION int jlaw_refuse_(const jlaw_law *law, const double *s, cons
   return -1;
 }
 
+/* Whether a state and a step are such as jlaw_update takes; else 0, and whether the state is not */
+static JLAW_FUNCTION int jlaw_allowed_(const jlaw_law *law, const double *s, const double *d,
+                                       int *damaged)
+{
+  double far = 0.0, step_size = 0.0; /* NaN stays in sums */
+  for (int i = 0; i < law->dim; i++) far += fabs(s[i]), step_size += fabs(d[i]);
+  *damaged = !(far <= DBL_MAX) || !jlaw_proper_(law, s);
+  return !*damaged && law->stretch * (far + step_size) <= law->largest_reach;
+}
+
 JLAW_FUNCTION int jlaw_update(const jlaw_law *law, const double *s0, double *s1, const double *d,
                               double *F, double *C, char *message, size_t size)
 {
-  const int dim = law->dim, rows = jl_state_rows(law);
-  double far = 0.0, step_size = 0.0; /* NaN stays in sums */
-  for (int i = 0; i < dim; i++) far += fabs(s0[i]), step_size += fabs(d[i]);
-  const double reach = law->stretch * (far + step_size);
-  const int damaged = !(far <= DBL_MAX) || !jlaw_proper_(law, s0);
-  if (damaged || !(reach <= law->largest_reach))
-    return jlaw_refuse_(law, s0, d, damaged, message, size);
+  int damaged;
+  if (!jlaw_allowed_(law, s0, d, &damaged)) return jlaw_refuse_(law, s0, d, damaged, message, size);
   if (s1 != s0)
-    for (int i = 0; i < rows; i++) s1[i] = s0[i];
+    for (int i = 0; i < jl_state_rows(law); i++) s1[i] = s0[i];
   jlaw_step(law, s1, 1, d, F, C);
   return 0;
+}
+
+JLAW_FUNCTION size_t jlaw_update_many(const jlaw_law *law, double *states, size_t stride,
+                                      const double *d, double *F, double *C, size_t n)
+{
+  const size_t dim = (size_t) law->dim;
+  size_t good = 0, at = 0;
+  for (int damaged; good < n; good++)
+    if (!jlaw_allowed_(law, states + good * stride, d + good * dim, &damaged)) break;
+#ifdef JM_W
+  for (; at + JM_W <= good; at += JM_W)
+    jlaw_step_many_(law, states + at * stride, stride, d + at * dim, F + at * dim,
+                    C ? C + at * dim * dim : NULL);
+#endif
+  for (; at < good; at++)
+    jlaw_step(law, states + at * stride, 1, d + at * dim, F + at * dim,
+              C ? C + at * dim * dim : NULL);
+  return good;
 }
 
 /* ------------------------------------------------------------ what a state is */

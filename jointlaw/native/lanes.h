@@ -16,7 +16,7 @@
 #endif
 #if defined(__CUDACC__) || defined(__CUDACC_RTC__)
 #define JL_IN static JLAW_FUNCTION __forceinline__
-#elif defined(__GNUC__)
+#elif defined(__GNUC__) && defined(__OPTIMIZE__)
 #define JL_IN static inline __attribute__((always_inline))
 #else
 #define JL_IN static inline
@@ -65,10 +65,6 @@ JL_IN jl_real jl_size_of(jl_real x) { return (jl_real) ((jl_yes) x & 0x7FFFFFFFF
 #include <immintrin.h>
 JL_IN jl_real jl_root(jl_real x) { return (jl_real) _mm512_sqrt_pd((__m512d) x); }
 JL_IN int jl_any(jl_yes m) { return _mm512_movepi64_mask((__m512i) m) != 0; }
-#elif defined(__AVX2__) && JL_W == 4
-#include <immintrin.h>
-JL_IN jl_real jl_root(jl_real x) { return (jl_real) _mm256_sqrt_pd((__m256d) x); }
-JL_IN int jl_any(jl_yes m) { return _mm256_movemask_pd((__m256d) m) != 0; }
 #else
 JL_IN jl_real jl_root(jl_real x)
 {
@@ -117,15 +113,6 @@ JL_IN void jl_fetch(const double *table, jl_whole i, jl_real c[4])
   c[1] = (jl_real) _mm512_permutex2var_pd(odd, low, odd2);
   c[2] = (jl_real) _mm512_permutex2var_pd(even, high, even2);
   c[3] = (jl_real) _mm512_permutex2var_pd(odd, high, odd2);
-#elif defined(__AVX2__) && JL_W == 4
-  __m256d r[4];
-  for (int l = 0; l < 4; l++) r[l] = _mm256_loadu_pd(table + 4 * (size_t) (unsigned) i[l]);
-  const __m256d even = _mm256_unpacklo_pd(r[0], r[1]), odd = _mm256_unpackhi_pd(r[0], r[1]);
-  const __m256d even2 = _mm256_unpacklo_pd(r[2], r[3]), odd2 = _mm256_unpackhi_pd(r[2], r[3]);
-  c[0] = (jl_real) _mm256_permute2f128_pd(even, even2, 0x20);
-  c[1] = (jl_real) _mm256_permute2f128_pd(odd, odd2, 0x20);
-  c[2] = (jl_real) _mm256_permute2f128_pd(even, even2, 0x31);
-  c[3] = (jl_real) _mm256_permute2f128_pd(odd, odd2, 0x31);
 #else
   for (int j = 0; j < 4; j++) {
     jl_real of_lanes = jl_each(0.0);
@@ -138,11 +125,17 @@ JL_IN void jl_fetch(const double *table, jl_whole i, jl_real c[4])
 /* ------------------------------------------------------------------- facets and joints */
 
 /* The numbers of a joint, or of the first of W joints side by side: row r is s[r stride]. Those of
- * the next joints lie `ahead`, and are fetched into the cache; 0 where there are none. */
+ * the next joints lie `ahead`, and are fetched into the cache; 0 where there are none. JL_APART:
+ * joints lie one after the other, `ahead` numbers apart. */
 typedef struct {
   double *s;
   size_t stride, ahead;
 } jl_numbers;
+#ifdef JL_APART
+#define JL_OF_LANE(n, l) ((n).s + (size_t) (l) * (n).ahead)
+#else
+#define JL_OF_LANE(n, l) ((n).s + (l))
+#endif
 
 #ifdef JLAW_ABREAST
 typedef jl_real jl_of_facet;
@@ -188,6 +181,10 @@ JL_IN jl_real jl_take_joint(jl_numbers n, int row)
 {
 #if JL_W == 1
   return n.s[(size_t) row * n.stride];
+#elif defined(JL_APART)
+  jl_real x = {0.0};
+  for (int l = 0; l < JL_W; l++) x[l] = JL_OF_LANE(n, l)[row];
+  return x;
 #else
   const double *from = n.s + (size_t) row * n.stride;
   __builtin_prefetch(from + n.ahead, 1);
@@ -198,6 +195,8 @@ JL_IN void jl_put_joint(jl_numbers n, int row, jl_real x)
 {
 #if JL_W == 1
   n.s[(size_t) row * n.stride] = x;
+#elif defined(JL_APART)
+  for (int l = 0; l < JL_W; l++) JL_OF_LANE(n, l)[row] = x[l];
 #else
   *(jl_loose *) (n.s + (size_t) row * n.stride) = (jl_loose) x;
 #endif

@@ -159,7 +159,10 @@ def layout_h() -> str:
 
 
 def jointlaw_h() -> str:
-    """The text of jointlaw.h: host.h with all that it includes, one file for a host."""
+    """The text of jointlaw.h: host.h with all that it includes, one file for a host.
+
+    many.h, the law for many joints side by side, is its text once more, under other names.
+    """
     texts = {path.name: path.read_text(encoding="utf-8") for path in HERE.glob("*.h")}
     texts["layout.h"] = layout_h()
 
@@ -168,4 +171,7 @@ def jointlaw_h() -> str:
             r'^#include "(\w+\.h)"\n', lambda found: unfold(texts[found[1]]), text, flags=re.M
         )
 
+    law = unfold(texts["lanes.h"] + texts["elements.h"] + texts["law.h"])
+    other = {"jl_": "jm_", "JL_": "JM_", "JLAW_ABREAST": "JM_ABREAST"}
+    texts["many.h"] = re.sub(r"\b(jl_|JL_|JLAW_ABREAST)", lambda found: other[found[1]], law)
     return unfold(texts["host.h"])

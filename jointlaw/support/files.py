@@ -25,10 +25,21 @@ def replace_file(path: Path, data: bytes) -> None:
         temporary.unlink(missing_ok=True)
 
 
+def made(folder: Path) -> Path:
+    """The folder, made if it is missing. Raises ValueError where it cannot be."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ValueError(
+            f"no folder can be made at {folder} ({error.strerror}): give one in a place where you "
+            "may write"
+        ) from None
+    return folder
+
+
 def write_files(directory: str | Path, files: Mapping[str, str | bytes]) -> Path:
     """Write files by name into a folder, which is made if missing; returns it."""
-    folder = Path(directory)
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = made(Path(directory))
     for name, data in files.items():
         replace_file(folder / name, data.encode() if isinstance(data, str) else data)
     return folder
@@ -45,7 +56,7 @@ def require_free(folder: Path) -> None:
 
 def clear_run(folder: Path) -> None:
     """Make a folder for results; of a run that it holds what that wrote is removed, and no more."""
-    folder.mkdir(parents=True, exist_ok=True)
+    made(folder)
     paths = [*(folder / name for name in LEFT), *folder.glob("vtk/*.vtu")]
     with contextlib.suppress(OSError, ValueError):  # an interrupted run has no summary
         written = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["files"]

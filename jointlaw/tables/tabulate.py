@@ -48,7 +48,7 @@ def tabulate(
     >>> table.save("joint.txt")
     >>> same = jl.load_table("joint.txt")
     """
-    require_3d(law)
+    require_3d(law, "a table")
     whole, finer, limit = law, law, LONG * law.closure_range
     if isinstance(law, JointLaw):
         law, finer = replace(law, bond=None), replace(law, bond=None, resolution=SLIP)
@@ -73,12 +73,12 @@ def tabulate(
     return replace(table, metadata=_metadata(whole, table, tolerance, errors, limit, steps))
 
 
-def require_3d(law: Any) -> None:
-    """Refuse a law without the shear in all directions that a table holds."""
+def require_3d(law: Any, what: str) -> None:
+    """Refuse a law without shear in all directions for `what`, which has it."""
     if law.dim == 1:
-        raise ValueError("law.closure_only = True: this holds shear; set closure_only=False")
+        raise ValueError(f"law.closure_only = True: {what} has shear; set closure_only=False")
     if law.plane is not None:
-        raise ValueError(f"law.plane = {law.plane:g}: this needs a law in 3-D; set plane=None")
+        raise ValueError(f"law.plane = {law.plane:g}: {what} has shear in 3-D; set plane=None")
 
 
 def _metadata(

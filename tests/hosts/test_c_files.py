@@ -2,7 +2,10 @@
 
 import ctypes
 import os
+import re
 import subprocess
+import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +18,8 @@ import jointlaw.cli.main
 from jointlaw.hosts.c.export import FORMAT, header_text, identifier, include_dir, table_text
 
 FUZZ = HERE / "fuzz.c"
+DOCS = Path(__file__).parents[2] / "docs"
+HOSTS = Path(jointlaw.hosts.__file__).parent
 SANE = ["-g1", "-O1", "-fno-sanitize-recover=all"]
 # JOINTLAW_LONG=1: 1e6 steps and 10 000 files, as docs/native.md tells; twenty minutes on one core.
 # Without it every kind of step, size and damage comes as well, on the first twelve of these laws.
@@ -63,7 +68,7 @@ def test_builds_without_a_warning(tmp_path, law, cc, flags):
 def test_compiles_as_cuda(tmp_path, law):
     """Without a toolkit, by clang: with what a device has of its own, and the lines of the page."""
     (tmp_path / "rock.h").write_text(header_text(law, "rock"))
-    page = (Path(__file__).parents[2] / "docs/native.md").read_text()
+    page = (DOCS / "native.md").read_text()
     kernel = page.partition('RawModule(code=r"""\n')[2].partition('\n"""')[0]
     assert "jlaw_step(" in kernel
     (tmp_path / "x.cu").write_text(DEVICE + kernel)
@@ -195,35 +200,86 @@ def test_both_forms_of_the_tables_are_one_law(lib, tmp_path, law):
     two.law = None  # constants are not freed
 
 
-def test_examples_build_as_written_and_run(tmp_path, capsys, monkeypatch):
+def test_examples_build_as_written_and_run(tmp_path, law, capsys, monkeypatch):
     """The lines of the folder's README, and what docs/native.md shows: the same bits at -O0."""
-    for cc in ("cc", "c++"):
+    for cc in ("cc", "c++", "gfortran", "cmake"):
         compiler(cc)
     monkeypatch.chdir(tmp_path)
     command = ["export", "c", "westerly-smooth", "--out", "out", "--resolution", "balanced"]
     assert jointlaw.cli.main.main(command) == 0
     assert "make && ./example" in capsys.readouterr().out
     folder = tmp_path / "out"
-    lines = [
-        line.strip() for line in (folder / "README.md").read_text().splitlines()
-        if line.startswith("    ")
-    ]  # fmt: skip
-    assert len(lines) == 4
-    page = (Path(__file__).parents[2] / "docs/native.md").read_text()
-    for line in lines:
+    text = (folder / "README.md").read_text()
+    lines = [line.strip() for line in text.splitlines() if line.startswith("    ")]
+    assert len(lines) == 8
+    page, said = (DOCS / "native.md").read_text(), {}
+    told = subprocess.run(
+        [sys.executable, "-c", re.search(r'`python -c "(.*)"` prints the folder', page)[1]],
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert told.stdout.strip() == include_dir()
+    whole = (folder / "CMakeLists.txt").read_text().splitlines()
+    assert set(re.search(r"```cmake\n(.*?)```", page, re.S)[1].splitlines()) <= set(whole)
+    (folder / "first.c").write_text(copied()["native.md"])
+    lines += [*re.findall(r"^    ((?:cc|c\+\+|gfortran) .*)", page, re.M), "./first"]
+    for line in [*lines, "cmake -B build && cmake --build build", "build/example"]:
         quick = line.replace("-O3", "-O0")
         done = subprocess.run(quick, shell=True, cwd=folder, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
-        if line in ("./example", "./spheres"):
-            shown = page.partition(f"$ {line}\n")[2].partition("```")[0].split("...\n")[0]
-            assert shown.strip()
-            assert done.stdout.startswith(shown)
+        said[line] = done.stdout
+    assert "`cmake -B build && cmake --build build`" in text
+    assert said["build/example"] == said["./example"]
+    for line in ("./example", "./spheres"):
+        shown = page.partition(f"$ {line}\n")[2].partition("```")[0].split("...\n")[0]
+        assert shown.strip()
+        assert said[line].startswith(shown)
+    joint = replace(law, resolution="balanced").joint()
+    for k in range(20):
+        F, _ = joint.update([5e-8 * (k < 10), 5e-8 * (k >= 10), 0.0])
+    last = [float(cell) for cell in said["./fortran"].splitlines()[-1].split(",")]
+    assert last[2:] == pytest.approx(1e-6 * F[:2], abs=1e-4)
+
+
+def copied():
+    """The text in C that a header, README or page shows, one at most, by where it stands."""
+    pages = [DOCS.parent / "README.md", *DOCS.rglob("*.md"), *HOSTS.rglob("*.md")]
+    found = {path.name: re.findall(r"^```c\n(.*?)^```", path.read_text(), re.M | re.S)
+             for path in pages}  # fmt: skip
+    for path in (Path(include_dir()) / "jointlaw.h", *HOSTS.rglob("*.[hc]")):
+        head = re.findall(r"^ \*     (.*)", path.read_text().partition("*/")[0], re.M)
+        found[path.name] = ["\n".join(head)] * any(";" in line for line in head)  # no commands
+    return {name: text for name, texts in found.items() for (text,) in [texts] * bool(texts)}
+
+
+def test_texts_that_a_user_copies(tmp_path):
+    """Under AddressSanitizer, for a law that has many more numbers than the one that is named."""
+    law = jl.JointLaw.from_text(
+        'resolution = "fine"\nmating_length = 1e-5\n' + jl.presets.load("westerly-smooth").to_toml()
+    )
+    for name in ("granite", "westerly_smooth"):
+        (tmp_path / f"{name}.jlaw").write_text(table_text(law))
+    texts, show = copied(), 'printf("%.1f %.1f %.1f Pa\\n", F[0], F[1], F[2]); return 0;'
+    assert set(texts) == {"native.md", "jointlaw.h"}
+    F, _ = law.joint().update([1e-7, 5e-8, 0.0])
+    for where, text in texts.items():
+        if "int main" not in text:
+            head, body = re.match(r"((?:#.*\n)+)(.*)", text, re.S).groups()
+            text = f"{head}int main(void)\n{{\n{body}\n{show}\n}}\n"
+        program = build(tmp_path, text, "-std=c99", *SANE, "-fsanitize=address", "-Werror")
+        done = subprocess.run(
+            [program], cwd=tmp_path, capture_output=True, text=True,
+            env=os.environ | {"ASAN_OPTIONS": "detect_leaks=0"},  # they end with the program
+        )  # fmt: skip
+        assert (done.returncode, done.stderr) == (0, ""), where
+        assert [float(word) for word in done.stdout.split()[:3]] == pytest.approx(F, abs=0.051)
 
 
 @pytest.mark.parametrize("plane", ["plane = 0.0", "closure_only = true"])
 def test_examples_of_fewer_components(tmp_path, law, plane):
     jl.export_c(jl.JointLaw.from_text(f"{plane}\n{law.to_toml()}"), tmp_path, "flat")
     flags = [*STRICT, "-O0", "-DJOINTLAW_PLAIN"]
+    law_o = build(tmp_path, SOURCE, *flags, "-std=c99", "-c", name="jointlaw.o")
+    flags.append(str(law_o))
     example = build(tmp_path, tmp_path / "example.c", *flags, "-std=c99", name="e")
     lines = run(example, tmp_path / "flat.jlaw").splitlines()
     assert len(lines) == (2 if "only" in plane else 41)

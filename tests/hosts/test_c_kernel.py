@@ -1,5 +1,6 @@
 """The law in C gives the bits of the law in Python, and turns the axes of a joint."""
 
+import ctypes
 from dataclasses import replace
 
 import numpy as np
@@ -13,9 +14,30 @@ from jointlaw.kernels.asperities import effective_closure
 BUILDS = {  # test_native.py tells the same of the library, which is made of the same text
     "gcc": ("gcc", [*FAST, "-std=c99"]),
     "gcc -O0, no vectors": ("gcc", ["-O0", "-ffp-contract=off", "-DJOINTLAW_PLAIN"]),
-    "clang, this machine": ("clang", [*FAST, "-march=native"]),
-    "C++": ("g++", [*FAST, "-std=c++17"]),
+    "gcc, this machine": ("gcc", [*FAST, "-std=c99", "-march=native", "-DJOINTLAW_MANY"]),
+    "clang, this machine": ("clang", [*FAST, "-march=native", "-DJOINTLAW_MANY"]),
+    "C++": ("g++", [*FAST, "-std=c++17", "-march=x86-64-v3", "-DJOINTLAW_MANY"]),
 }
+
+
+def many_are_one_by_one(built, one, law):
+    """21 joints of an array, each on a path of its own, until the step of one is refused."""
+    n, rows, dim = 21, len(one.state), one.dim
+    states, F, C = np.zeros((n, rows + 3)), np.zeros((n, dim)), np.zeros((n, dim, dim))
+    paths = np.array([random_path(dim, seed, 12) for seed in range(n)])
+    joints = law.joints(n)
+    for step in range(12):
+        d, tangent = np.ascontiguousarray(paths[:, step]), step % 2
+        stopped = n if step < 11 else 13
+        d[stopped:] = np.nan
+        moved = built.jlaw_update_many(one.law, at(states), ctypes.c_size_t(rows + 3), at(d), at(F),
+                                       at(C) if tangent else None, ctypes.c_size_t(n))  # fmt: skip
+        assert moved == stopped
+        asked = joints.update(d[:moved], where=np.arange(moved), tangent=bool(tangent))
+        for a, b in zip((F, C), asked, strict=True):
+            assert b is None or (a[:moved] == b).all()
+        np.testing.assert_array_equal(states[:, :rows], joints.snapshot().values)
+        assert not states[:, rows:].any()
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +69,22 @@ def test_the_bits_of_python(lib, tmp_path, name):
             ]
             asked = [joint.stored_energy, joint.dissipated_energy]
             assert energies == pytest.approx(asked, rel=1e-12, abs=1e-300)
+        many_are_one_by_one(built, one, law)
+
+
+def test_coulomb(lib, tmp_path):
+    """Pressed, then sheared in space: kn u, and ks s up to c + mu sigma; the tangent of each."""
+    law = jl.CoulombLaw(normal_stiffness=1e12, shear_stiffness=5e11, friction=0.6, cohesion=1e5)
+    one, way, slip = CLaw(lib, law, tmp_path), np.array([0.6, 0.8]), 0.0
+    assert one.step([2e-6, 0.0, 0.0])[0] == pytest.approx([2e6, 0.0, 0.0])
+    for k in range(1, 11):
+        F, C = one.step([0.0, *(5e-7 * way)])
+        slip += 5e-7
+        shear = min(5e11 * slip, 1e5 + 0.6 * 2e6)
+        assert pytest.approx([2e6, *(shear * way)], rel=1e-12) == F
+        assert way @ C[1:, 0] == pytest.approx(0.6e12 * (k > 5), abs=1.0)
+    lost = shear * (slip - shear / 5e11)
+    assert lib.jlaw_dissipated(one.law, at(one.state)) == pytest.approx(lost, rel=1e-12)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 3, 6, 15, 20])

@@ -6,22 +6,34 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
-from fem_host import LAW, SEATING
+from fem_host import LAW, SEATING, export
 
 import jointlaw as jl
 
 PRESSED, TURN, END = 9, 49, 69  # rows
 
 
-def test_direct_shear_of_two_blocks_with_an_interface_element(finite_elements):
+def run(folder):
+    """Rows of the exported script's file."""
     if find_spec("KratosMultiphysics") is None:
         pytest.skip("Kratos is not installed (pip install 'jointlaw[fem]')")
-    done = subprocess.run(
-        [sys.executable, "kratos.py"], cwd=finite_elements, capture_output=True, text=True
-    )
+    done = subprocess.run([sys.executable, "kratos.py"], cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr
-    test = np.genfromtxt(finite_elements / "kratos.csv", delimiter=",", names=True)
+    test = np.genfromtxt(folder / "kratos.csv", delimiter=",", names=True)
     assert test["iterations"].max() <= 6
+    return test
+
+
+def test_coulomb(tmp_path):
+    law = jl.CoulombLaw(normal_stiffness=1e12, shear_stiffness=5e11, friction=0.6)
+    test = run(export(tmp_path, law, target="librock_umat.so"))
+    shear = np.minimum(5e11 * test["slip_m"], -0.6 * test["normal_Pa"])[: TURN + 1]
+    np.testing.assert_allclose(test["shear_Pa"][: TURN + 1], shear, rtol=0, atol=1e-3 * shear.max())
+    assert 0.0 < shear[PRESSED + 2] < shear[TURN] == pytest.approx(1.2e6, rel=1e-3)
+
+
+def test_direct_shear_of_two_blocks_with_an_interface_element(finite_elements):
+    test = run(finite_elements)
     # closure: each load, on a joint of its own
     loads = -test["normal_Pa"][: PRESSED + 1]
     start = LAW.closure(SEATING)

@@ -1,6 +1,7 @@
 """The exported projects in the real OpenGeoSys, against the laboratory test in Python."""
 
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -8,7 +9,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
-from fem_host import LAW, SEATING
+from fem_host import LAW, SEATING, export
 
 import jointlaw as jl
 
@@ -83,14 +84,72 @@ def test_restart(finite_elements):
     np.testing.assert_allclose(again, stress[30:], rtol=0, atol=1e-9 * np.abs(stress).max())
 
 
+def moved(folder, down, along):
+    """Edits by which the upper block is moved, not pressed: curves of its two displacements (m)."""
+    text = (folder / "opengeosys_2d.prj").read_text()
+    return (
+        ("<mesh>top_2d</mesh><type>Neumann</type>", "<mesh>upper_2d</mesh><type>Dirichlet</type>"),
+        *zip(re.findall(r"<coords>.*?</values>", text, re.DOTALL), (down, along), strict=True),
+    )
+
+
+def curve(times, values):
+    words = (" ".join(map(repr, numbers)) for numbers in (times, values))
+    return "<coords>{}</coords><values>{}</values>".format(*words)
+
+
+def test_a_layer_that_is_not_level(finite_elements, tmp_path):
+    """Turned by 30 degrees with all that moves it, by the lines of the page: the same stress."""
+    page = (Path(__file__).parents[2] / "docs" / "fem.md").read_text()
+    axes, vectors = re.findall(r"```xml\n(.*?)```", page, re.DOTALL)
+    times, down, along = [0, 20, 70], [0.0, -2e-6, -2e-6], [0.0, 0.0, 3e-6]
+    level = run(finite_elements, 2, moved(finite_elements, curve(times, down), curve(times, along)))
+    shutil.copytree(finite_elements, tmp_path / "turned")
+    turn = np.array([[3**0.5 / 2, -0.5], [0.5, 3**0.5 / 2]])  # columns: the two axes
+    assert re.findall(r"<values>(.*?)</values>", vectors) == ["0.8660254 0.5", "-0.5 0.8660254"]
+    for row, axis in zip(turn.T, ("0.8660254 0.5", "-0.5 0.8660254"), strict=True):
+        vectors = vectors.replace(f">{axis}<", f">{row[0].item()!r} {row[1].item()!r}<")
+    for path in (tmp_path / "turned").glob("*_2d.vtu"):
+        mesh = meshio.read(path)
+        mesh.points[:, :2] = mesh.points[:, :2] @ turn.T
+        mesh.write(path)
+    x, y = (turn @ [along, down]).tolist()
+    edits = (
+        *moved(finite_elements, curve(times, y), curve(times, x)),
+        ("  <parameters>", f"{axes}  <parameters>{vectors}"),
+    )
+    _, stress, _ = run(tmp_path / "turned", 2, edits)
+    xx, yy, _, xy = stress.T
+    back = [turn.T @ [[a, b], [b, c]] @ turn for a, b, c in zip(xx, xy, yy, strict=True)]
+    there = level[1]
+    for mine, theirs in (
+        (np.array(back)[:, 1, 1], there[:, 1]),
+        (np.array(back)[:, 0, 1], there[:, 3]),
+    ):
+        assert np.abs(mine - theirs).max() < 1e-8 * np.abs(theirs).max()
+    assert np.abs(there[-1, 3]) > 0.1 * np.abs(there[-1, 1])
+
+
+def test_coulomb_and_a_reason(tmp_path):
+    """Pressed to 2 MPa, then sheared: ks s up to mu sigma; a thickness of -1 is told on stderr."""
+    law = jl.CoulombLaw(normal_stiffness=1e12, shear_stiffness=5e11, friction=0.6)
+    export(tmp_path, law, target="librock_mgis.so")
+    jumps, stress, _ = run(tmp_path, 2)
+    shear = np.minimum(law.shear_stiffness * jumps[: TURN + 1, 0], 0.6 * -stress[: TURN + 1, 1])
+    np.testing.assert_allclose(stress[: TURN + 1, 3], shear, rtol=0, atol=1e-3 * shear.max())
+    assert shear[PRESSED + 1] < shear[TURN] == pytest.approx(1.2e6, rel=1e-3)
+    text = (tmp_path / "opengeosys_2d.prj").read_text()
+    (tmp_path / "bad.prj").write_text(text.replace("<value>1e-3</value>", "<value>-1</value>"))
+    done = subprocess.run([OGS, "bad.prj", "-o", "results"], cwd=tmp_path, capture_output=True)
+    assert b"rock: Thickness must be > 0" in done.stderr
+
+
 def test_opens_separates_and_touches_again(finite_elements):
     """The top is moved, not pressed: down, up until nothing touches, and down again, in shear."""
-    text = (finite_elements / "opengeosys_2d.prj").read_text()
-    curves = re.findall(r"<coords>.*?</values>", text, re.DOTALL)
-    edits = (
-        ("<type>Neumann</type>", "<type>Dirichlet</type>"),
-        (curves[0], "<coords>0 20 40 70</coords><values>0 -2e-6 3e-6 -2e-6</values>"),
-        (curves[1], "<coords>0 10 30 70</coords><values>0 0 2e-7 2e-7</values>"),
+    edits = moved(
+        finite_elements,
+        "<coords>0 20 40 70</coords><values>0 -2e-6 3e-6 -2e-6</values>",
+        "<coords>0 10 30 70</coords><values>0 0 2e-7 2e-7</values>",
     )
     jumps, stress, _ = run(finite_elements, 2, edits)
     joint, traction = LAW.joint(normal_stress=SEATING), []

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lammps_host import HEAD, run, soft, thermo
+from lammps_host import HEAD, dumped, run, soft, thermo
 
 PAGE = Path(__file__).parents[2] / "docs" / "lammps.md"
 R = 0.01
@@ -59,15 +59,22 @@ def test_collisions_never_gain_energy(plugin):
 
 @pytest.mark.parametrize("processors", [1, 4])
 def test_values_of_each_joint(plugin, processors):
-    """compute pair/local against the sums of compute pair."""
+    """compute pair/local against the sums of compute pair, beside the IDs of its two atoms."""
     more = """compute local all pair/local dist eng p1 p5 p6 p7 p8
-dump 1 all local 200 local index c_local[*]
+compute who all property/local patom1 patom2
+dump 1 all local 200 local index c_local[*] c_who[*]
 dump_modify 1 format float %.15g
+dump 2 all custom 200 places x y z id
+dump_modify 2 sort id format float %.17g
 run 200"""
     table = thermo(run(plugin, heap(more, heat=1e18), processors))[0]
     frame = (plugin / "local").read_text().split("ITEM: ENTRIES")[-1].split("\n", 1)[1]
     rows = np.array([line.split() for line in frame.splitlines()], float)[:, 1:]
-    distance, energy, closure, sliding, stored, lost, _ = rows[rows[:, 6] > 0].T
+    distance, energy, closure, sliding, stored, lost, _, *who = rows[rows[:, 6] > 0].T
+    one, other = (dumped(plugin / "places")[-1, ids.astype(int) - 1, :3] for ids in who)
+    box = 4 * 0.01999
+    apart = np.linalg.norm(one - other - box * np.round((one - other) / box), axis=1)
+    assert np.abs(closure - (2 * R - apart)).max() < 1e-12
     assert len(distance) == table["c_joint[1]"][-1] > 20
     for one in (energy, stored):
         assert one.sum() == pytest.approx(table["PotEng"][-1], rel=1e-12)

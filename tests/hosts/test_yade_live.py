@@ -140,11 +140,18 @@ def reload(live):
     return dict(unbroken=unbroken, again=picture(), counts=[len(last["ids"]), len(joints), early],
                 F=last["traction"][a], F_again=again["traction"][b])
 
+def coulomb():
+    slab_and_sphere()
+    engines(keep=True)
+    attached(LiveLaw("coulomb.toml"), area=2.0)
+    O.dt = 1e-3
+    return drive([(1e-5 * min(k, 10), 1e-6 * max(k - 10, 0), 0) for k in range(1, 40)])
+
 out = dict(
-    pieces=pieces(), loops=loops(),
+    pieces=pieces(), loops=loops(), coulomb=coulomb(),
     reload=[reload(False), reload(True)],
     visits=dict(table=visits(TableLaw("short.txt"), False, 1e-3),
-                live=visits(LiveLaw(law), True, .3 * end, forget=.1 * end),
+                live=visits(LiveLaw("law.toml"), True, .3 * end, forget=.1 * end),
                 bonded=visits(LiveLaw(bonded), True, .3 * end, forget=.1 * end),
                 late=visits(LiveLaw(bonded), True, .3 * end, True, forget=.1 * end)))
 
@@ -166,6 +173,8 @@ O.step()
 out.update(untouched=untouched, running=[before, live.F], told=told)
 result(**out)
 """
+
+COULOMB = jl.CoulombLaw(normal_stiffness=1e9, shear_stiffness=5e9, friction=0.6, cohesion=1e4)
 
 
 @pytest.fixture(scope="module")
@@ -191,6 +200,7 @@ def scenes(tmp_path_factory, law, worn):
     folder = tmp_path_factory.mktemp("live")
     law.to_toml(folder / "law.toml")
     worn.to_toml(folder / "worn.toml")
+    COULOMB.to_toml(folder / "coulomb.toml")
     make_table(folder / "joint.txt", eta=0.5, uneven=0.2)
     make_table(folder / "short.txt", eta=0.5, end=law.closure_range)
     return run_scene(folder, SCENES, live=True)
@@ -215,6 +225,16 @@ def test_pieces_of_one_plane_equal_pure_python(scenes, worn):
     alone = [joint.slopes, joint.plastic_work, joint.dissipated_energy]
     assert np.allclose(measures, np.reshape(alone, (3, 1)), rtol=1e-8, atol=0)
     assert 0.0 < joint.plastic_work < joint.dissipated_energy
+
+
+def test_coulomb_is_one_word(scenes):
+    """Pressed to 100 um, then sheared: kn u, and ks s up to c + mu sigma."""
+    F, k = np.array(scenes["coulomb"]), np.arange(1, 40)
+    normal = COULOMB.normal_stiffness * 1e-5 * np.minimum(k, 10)
+    strength = COULOMB.cohesion + COULOMB.friction * normal
+    shear = np.minimum(COULOMB.shear_stiffness * 1e-6 * np.maximum(k - 10, 0), strength)
+    assert (shear[-1], shear[11]) == (strength[-1], COULOMB.shear_stiffness * 2e-6)
+    np.testing.assert_allclose(F[:, :2], 2.0 * np.transpose([normal, -shear]), rtol=1e-7, atol=1e-6)
 
 
 def test_exported_script_agrees_with_a_shear_test(tmp_path, law):

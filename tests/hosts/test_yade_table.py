@@ -98,7 +98,9 @@ def stepped(**options):
     O.dt = 1e-6
     O.step()
 O.bodies[1].state.pos = (0, 0, .499)
-attempt("area", lambda: stepped(area=-1))
+attempt("area", lambda: joints(area=-1))
+attempt("forget", lambda: joints(forget=nan))
+attempt("areas", lambda: stepped(area=lambda i: -1))
 slab_and_sphere()
 O.bodies[1].state.pos = (0, 0, .499)
 engines()
@@ -224,6 +226,7 @@ def test_refusals_name_the_remedy(scenes):
         "no loop": "set O.engines before attach", "stepper": "joints.time_step()",
         "keep": "neverErase=True", "name": "identifier",
         "run": ".load(file)", "periodic": "O.periodic", "area": "area = -1", "phys": "select=",
+        "forget": "forget = nan", "areas": "area = -1.0 m2 of contact",
         "version": "start the run anew", "missed": "every step", "taken": "give another name=",
         "npz table": "export the law again",
     }  # fmt: skip

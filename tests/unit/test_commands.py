@@ -34,7 +34,7 @@ def run(line):
 def example(command, capsys):
     """The example that --help gives, as arguments."""
     with pytest.raises(SystemExit) as stop:
-        main([command, "--help"])
+        main([*command.split(), "--help"])
     assert stop.value.code == 0
     line = re.search(r"example:\n  jointlaw (.*)\n", capsys.readouterr().out).group(1)
     return shlex.split(line)
@@ -80,6 +80,8 @@ def test_every_command_has_an_example(capsys):
     assert commands == [command.name for command in COMMANDS]
     for command in commands:
         assert example(command, capsys)[0] == command
+    for host in START:
+        assert example(f"export {host}", capsys)[1] == host
 
 
 def test_all_options_of_shear(tmp_path):
@@ -116,13 +118,18 @@ def test_options_of_closure(tmp_path):
         ("shear biegel-rough --to 1um --steps 0", "steps = 0"),
         ("shear biegel-rough", "the following arguments are required: --to"),
         ("shear biegel-rough --to 1um --out", "--out: expected one argument"),
-        ("export c biegel-rough --shear-limit 5um", "--shear-limit shapes a table for YADE"),
-        ("export c biegel-rough --seating 5kPa", "--seating is for fem"),
+        ("export c biegel-rough --out /proc/x", "no folder can be made at /proc/x"),
+        ("export c biegel-rough --shear-limit 5um", "unrecognized arguments: --shear-limit 5um"),
+        ("export lammps plane.toml", "law.plane = 0: motion in LAMMPS has shear in 3-D"),
+        ("export yade closure.toml", "law.closure_only = True: motion in YADE has shear"),
         ("export fem biegel-rough --seating 0", "A joint without stress has no stiffness"),
     ],
 )
 def test_a_refusal_is_one_line_and_leaves_nothing(tmp_path, capsys, arguments, told):
-    out = [] if arguments.endswith("--out") else ["--out", "o"]
+    for name, line in (("plane", "plane = 0.0"), ("closure", "closure_only = true")):
+        text = jl.presets.load("linear-a3").to_toml()
+        (tmp_path / f"{name}.toml").write_text(f"{line}\n{text}")
+    out = [] if "--out" in arguments else ["--out", "o"]
     assert main([*arguments.split(), *out]) == 2
     error = capsys.readouterr().err
     assert error.startswith("jointlaw ")

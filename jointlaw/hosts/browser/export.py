@@ -35,8 +35,8 @@ _PAGE = """<!doctype html>
 def export_browser(directory: str | Path) -> Path:
     """Write `index.html`, a joint to drag in a browser, with all that it needs; returns its path.
 
-    directory: made if missing; a file of that name is replaced. Raises OSError where it cannot be
-    written.
+    directory: made if missing; a file of that name is replaced. Raises ValueError where it cannot
+    be made.
     """
     part = (HERE / "joint.html").read_text(encoding="utf-8")
     return write_files(directory, {"index.html": _PAGE.format(part, script())}) / "index.html"

@@ -3,8 +3,11 @@
  *
  *     ./example [granite.jlaw [normal stress in Pa [shear in m]]]
  */
-#define JOINTLAW_IMPLEMENTATION
 #include "jointlaw.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 static char message[JLAW_MESSAGE];
 

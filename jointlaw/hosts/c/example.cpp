@@ -4,7 +4,6 @@
 #include <cstdio>
 #include <map>
 #include <vector>
-#define JOINTLAW_IMPLEMENTATION
 #include "granite.h"
 
 struct Sphere {

@@ -11,7 +11,8 @@ from ...native.layout import AZIMUTHS, FORMAT, jointlaw_h
 from ...support.checks import Array
 from ...support.files import write_files
 
-FILES = ("example.c", "example.cpp", "Makefile", "README.md")
+FILES = ("jointlaw.c", "example.c", "example.cpp", "example.f90", "Makefile", "CMakeLists.txt",
+         "README.md")  # fmt: skip
 HEADER = "jointlaw.h"
 _CONSTANT = "static JLAW_FUNCTION const"  # which on a device lies in its memory
 _MODEL = "granite"  # the name of the tables in these files
@@ -31,17 +32,21 @@ def export_c(law: Law, directory: str | Path, name: str = "joint") -> list[str]:
     tables, an identifier of C.
 
     Writes `jointlaw.h` (the law), `NAME.jlaw` (its tables, for `jlaw_read`), `NAME.h` (the same as
-    constants), `example.c`, `example.cpp`, `Makefile` and `README.md`. Returns the names. Raises
-    ValueError for a name that C cannot have or too many azimuths, before anything is written.
+    constants), `jointlaw.c` (compiles the law), `example.c`, `example.cpp`, `example.f90`,
+    `Makefile`, `CMakeLists.txt` and `README.md`. Returns the names. Raises ValueError for a name
+    that C cannot have or too many azimuths, before anything is written.
     """
     require_name(name)
     texts = {f"{name}.jlaw": table_text(law), f"{name}.h": header_text(law, name)}
     texts[HEADER] = jointlaw_h()
-    source = resources.files(__package__)
-    for file in FILES:
-        texts[file] = (source / file).read_text(encoding="utf-8").replace(_MODEL, name)
+    texts |= {file: file_text(file).replace(_MODEL, name) for file in FILES}
     write_files(directory, texts)
     return list(texts)
+
+
+def file_text(file: str) -> str:
+    """A file of this folder, which has tables of the name granite."""
+    return (resources.files(__package__) / file).read_text(encoding="utf-8")
 
 
 def require_name(name: str) -> None:
@@ -89,7 +94,8 @@ def header_text(law: Law, name: str) -> str:
     ]
     for key, array in arrays.items():
         rows = ",\n".join(", ".join(map(repr, row.tolist())) for row in array.reshape(-1, 4))
-        parts.append(f"{_CONSTANT} double {name}_{key}[{array.size}] = {{\n{rows}}};")
+        size = max(array.size, 1)  # C has no empty arrays; Coulomb's joint has no facets
+        parts.append(f"{_CONSTANT} double {name}_{key}[{size}] = {{\n{rows or '0.0'}}};")
     values = ", ".join(map(repr, numbers.values()))
     tables = ", ".join(f"{name}_{key}" for key in arrays)
     parts.append(

@@ -26,10 +26,10 @@ def export_fem(
     zone, NAME_layer a thin layer of solid elements. seating: normal stress in Pa, > 0, of the
     joint before the first step; its displacements count from there.
 
-    Writes `jointlaw.h` (the law), `NAME.h` (its tables), `jointlaw_fem.h`, `mgis.c` and `umat.c`
-    with a `Makefile`, direct shear tests for OpenGeoSys and Kratos, and `README.md`. Returns the
-    names. Raises ValueError for a law, name or seating that does not fit, before anything is
-    written.
+    Writes `jointlaw.h` and `jointlaw.c` (the law), `NAME.h` (its tables), `jointlaw_fem.h`,
+    `mgis.c` and `umat.c` with a `Makefile`, direct shear tests for OpenGeoSys and Kratos, and
+    `README.md`. Returns the names. Raises ValueError for a law, name or seating that does not
+    fit, before anything is written.
     """
     if law.dim == 1:
         raise ValueError("law.closure_only = True: finite elements shear; set closure_only=False")
@@ -37,6 +37,7 @@ def export_fem(
     c.require_name(name)
     texts = {
         "jointlaw.h": jointlaw_h(),
+        "jointlaw.c": c.file_text("jointlaw.c"),
         f"{name}.h": c.header_text(law, name),
     }
     marks = _marks(law, seating)

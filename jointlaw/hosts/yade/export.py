@@ -10,7 +10,7 @@ from ...support.files import write_files, write_json
 from ...tables.joint_table import JointTable
 from ...tables.tabulate import require_3d, tabulate
 
-COPIED = ("yade_joint.py", "joint_table.py", "settle_and_incline.py")
+COPIED = ("yade_joint.py", "joint_table.py", "settle_and_incline.py", "README.md")
 
 
 def export_yade(law: Law, directory: str | Path, **options: Any) -> JointTable:
@@ -23,13 +23,13 @@ def export_yade(law: Law, directory: str | Path, **options: Any) -> JointTable:
     options: of the table, as in `tabulate`.
 
     Writes `joint.txt` (the table), `law.toml` (for live mode), `yade_joint.py` with
-    `joint_table.py` (the adapter: YADE and numpy alone), the script `settle_and_incline.py` and
-    `summary.json`. Returns the table. Raises ValueError for a law or option that cannot be
-    tabulated, before anything is written.
+    `joint_table.py` (the adapter: YADE and numpy alone), the script `settle_and_incline.py`,
+    `README.md` and `summary.json`. Returns the table. Raises ValueError for a law or option that
+    cannot be tabulated, before anything is written.
 
     >>> table = jl.export_yade(law, "joint-for-yade", tolerance=1e-2, azimuths=4)
     """
-    require_3d(law)
+    require_3d(law, "motion in YADE")
     table = tabulate(law, **options)
     report = table.report(law)
     folder = write_files(directory, {"law.toml": law.to_toml()})

@@ -4,9 +4,11 @@
  * the joint. SI. A state is STATE numbers. Zeros are the joint of START, unsheared under the seating
  * stress. The last number tells whether the joint has begun to move; the others are the numbers of
  * jointlaw.h and of a snapshot in Python. */
-#define JOINTLAW_IMPLEMENTATION
-#include "jointlaw.h"
 #include "granite.h"
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
 
 #define JOINT granite
 #define DIM @DIM@ /* 3; 2 for a law of one plane */

@@ -29,6 +29,7 @@ static int jlf_wanted(const jlf_view *v)
 static int jlf_refuse(const jlf_view *v, const char *why)
 {
   if (v->message) snprintf(v->message, 512, "granite: %s", why);
+  fprintf(stderr, "granite: %s\n", why); /* OpenGeoSys does not show the message */
   if (v->rdt) *v->rdt = 0.25; /* of the time step, for the next trial */
   return -1;
 }

@@ -1,10 +1,11 @@
 /* granite as a UMAT for interface and cohesive elements: DSTRAN is the step of opening and slip (m),
- * opening and tension positive. With NTENS 2 or 3 the normal comes first, then one shear or two; with
- * 6 (interface elements of Kratos) zz is the normal, xz and yz are the shears. PROPS(1), if there is
- * one above 0, is the share of the jump that the element hands over: 0.5 in Kratos, whose elements
- * then count half of the stress. STATEV holds STATE numbers (jointlaw_fem.h), at the start zeros.
- * What cannot be done asks for a shorter step (PNEWDT), and gives NaN, so that a host that does not
- * read PNEWDT cannot go on. */
+ * opening and tension positive. With NTENS 2 or 3 the normal comes first, then one shear or two. With
+ * 6 (interface elements of Kratos: xx yy zz xy yz xz) number 3 is the normal, 6 the shear along axis
+ * 2, 5 that along axis 3; in a host that counts xz before yz, as Abaqus, these axes change places.
+ * PROPS(1), if there is one above 0, is the share of the jump that the element hands over: 0.5 in
+ * Kratos, whose elements then count half of the stress. STATEV holds STATE numbers (jointlaw_fem.h),
+ * at the start zeros. What cannot be done asks for a shorter step (PNEWDT), and gives NaN, so that a
+ * host that does not read PNEWDT cannot go on. */
 #include "jointlaw_fem.h"
 #ifdef __GNUC__
 #pragma GCC diagnostic ignored "-Wunused-parameter"

@@ -87,6 +87,19 @@ class PairJointlaw : public Pair {
     double closure, area;
     Vector n, arm_i, arm_j;    // from the centres to the contact
   };
+  // The step of a joint, which is worked out beside those of other atoms
+  struct Step {
+    Contact contact;
+    const jlaw_law *law;
+    int which, flag;    // of the owner's joints; where it is in `seen`, -1: a joint that begins
+    Vector slide, axis2, axis3;
+  };
+  // An atom of which the joints are met: how many it had, and where their flags begin
+  struct Visit {
+    int i, had, flags;
+  };
+  enum { MISSED, MET, PARTED };              // flags of the joints that an atom had
+  static constexpr size_t GROUP = 64;        // joints whose steps are worked out together, or a few more
   // Points of one body opposite a point, the nearest three across the normal
   struct Opposite {
     tagint key;
@@ -112,7 +125,10 @@ class PairJointlaw : public Pair {
   std::vector<double> largest;
   std::vector<int> first, candidates;    // of each atom in the list: what it may own joints with
   std::vector<Opposite> opposites;
+  std::vector<Step> steps;
+  std::vector<Visit> visits;
   std::vector<char> seen;
+  std::vector<double> states, increments, tractions, tangents;    // of the steps
   std::vector<double> scratch, stiffness;    // of the joints of each atom, N/m
   double lost_warned = 0.0, bound = 0.0, bound_told = 0.0, bound_warned = 0.0;
   bool ending = false;
@@ -138,6 +154,8 @@ class PairJointlaw : public Pair {
   void meet_bodies(int, const int *, int);
   bool height(const Opposite &, double, double &) const;
   void advance(const Contact &);
+  void take_steps();
+  void bear(const Step &, double *, const double *, const double *);
   void end(int, int, bool);
   void refuse_other_commands() const;
   double foreseen() const;
@@ -271,9 +289,14 @@ void PairJointlaw::coeff(int narg, char **arg)
         error->all(FLERR, "pair_coeff jointlaw: the bond of {} holds until the joint is {} m open, but "
                    "joints are given up at opening {} m: give pair_style a larger opening", arg[2],
                    1.0 / law->opening_end, opening);
+      if (law->coulomb && opening * law->coulomb_normal < law->coulomb_tension)
+        error->all(FLERR, "pair_coeff jointlaw: {} bears tension until the joint is {} m open, but "
+                   "joints are given up at opening {} m: give pair_style a larger opening", arg[2],
+                   law->coulomb_tension / law->coulomb_normal, opening);
       if (jlaw_dim(law) != 3)
-        error->all(FLERR, "pair_coeff jointlaw: {} is a law for motion in a plane; export one for "
-                   "space (no `plane` in its parameters)", arg[2]);
+        error->all(FLERR, "pair_coeff jointlaw: {} is a law for {}; export one for space (no `{}` in "
+                   "its parameters)", arg[2], jlaw_dim(law) == 1 ? "closure alone" : "motion in a plane",
+                   jlaw_dim(law) == 1 ? "closure_only" : "plane");
       if (!planar && !isotropic(law))
         error->all(FLERR, "pair_coeff jointlaw: {} has a preferred direction, which spheres do not "
                    "have; use pair_style jointlaw ... plane X Y Z, or a law with c = 0", arg[2]);
@@ -445,13 +468,13 @@ void PairJointlaw::compute(int eflag, int vflag)
     const int count = first[ii + 1] - first[ii];
     OwnJoints &own = joints_of->of[i];
     if (count == 0 && own.n == 0) continue;
-    seen.assign(own.n, 0);
+    visits.push_back({i, own.n, static_cast<int>(seen.size())});
+    seen.resize(seen.size() + own.n, MISSED);
     if (planar) meet_bodies(i, who, count);
     else meet_spheres(i, who, count);
-    for (int k = own.n - 1; k >= 0; k--)    // opened too far, or the partner is gone
-      if (!seen[k]) end(i, k, true);
-    joints_of->longest(own.n);
+    if (steps.size() >= GROUP) take_steps();
   }
+  take_steps();
   if (check) check_joints();    // on all processors, those without atoms too
   if (eflag_either) {
     const double *sums = joints_of->sums;
@@ -541,7 +564,7 @@ void PairJointlaw::meet_bodies(int i, const int *who, int count)
   }
 }
 
-// One joint over one step: geometry to increments, law, forces and torques
+// One joint in one step: from geometry to increments
 void PairJointlaw::advance(const Contact &c)
 {
   const int i = c.i, j = c.j;
@@ -553,16 +576,16 @@ void PairJointlaw::advance(const Contact &c)
   if (fresh) {
     if (!(c.closure > 0.0)) return;
     own.resize(which + 1, size);
-    seen.push_back(1);
     double *head = own.at(which, size) + rows;
     head[KEY] = from_whole(c.key);
     head[OF_AREA] = c.area;
     const Vector axis = across(c.n);
     std::copy(axis.begin(), axis.end(), head + AXIS);
-    if (law->bonded && !update->setupflag)    // faces that meet anew: the last number is its damage
+    if ((law->bonded || law->coulomb) && !update->setupflag)    // faces that meet anew: the last number is its damage
       own.at(which, size)[jlaw_state_size(law) - 1] = 1.0;
   }
-  seen[which] = 1;
+  const int flag = fresh ? -1 : visits.back().flags + which;
+  if (!fresh) seen[flag] = MET;
   double *state = own.at(which, size), *head = state + rows;
   head[PARTNER] = from_whole(atom->tag[j]);
   head[TYPE] = atom->type[j];
@@ -579,23 +602,72 @@ void PairJointlaw::advance(const Contact &c)
   const Vector axis3 = cross(axis2, c.n);    // axis 1 is -n: into i closes
   std::copy(axis2.begin(), axis2.end(), head + AXIS);
 
-  const double d[3] = {c.closure - state[0], dt * dot(slide, axis2), dt * dot(slide, axis3)};
+  for (const double d : {c.closure - state[0], dt * dot(slide, axis2), dt * dot(slide, axis3)})
+    increments.push_back(d);
+  steps.push_back({c, law, which, flag, slide, axis2, axis3});
+}
+
+// The law for all joints that are met: runs of one law, in order. Then joints end.
+void PairJointlaw::take_steps()
+{
   const bool damps = damping > 0.0;
-  double F[3], C[9];
-  char message[JLAW_MESSAGE];
-  if (jlaw_update(law, state, state, d, F, damps ? C : nullptr, message, sizeof message))
-    error->one(FLERR, "pair_style jointlaw: atoms {} {} at step {}: {}", atom->tag[i], atom->tag[j],
-               update->ntimestep, message);
+  tractions.resize(3 * steps.size());
+  tangents.resize(9 * steps.size());
+  states.resize(rows * steps.size());
+  for (size_t first = 0, n; first < steps.size(); first += n) {
+    const jlaw_law *law = steps[first].law;
+    const size_t bytes = jlaw_state_size(law) * sizeof(double);
+    const auto of = [&](size_t k) {
+      return joints_of->of[steps[first + k].contact.i].at(steps[first + k].which, size);
+    };
+    for (n = 0; first + n < steps.size() && steps[first + n].law == law; n++)
+      memcpy(states.data() + rows * n, of(n), bytes);
+    double *d = increments.data() + 3 * first, *F = tractions.data(), *C = tangents.data();
+    const size_t done = jlaw_update_many(law, states.data(), rows, d, F, damps ? C : nullptr, n);
+    if (done < n) {
+      const Contact &c = steps[first + done].contact;
+      char message[JLAW_MESSAGE];
+      jlaw_update(law, of(done), of(done), d + 3 * done, F, nullptr, message, sizeof message);
+      error->one(FLERR, "pair_style jointlaw: atoms {} {} at step {}: {}", atom->tag[c.i],
+                 atom->tag[c.j], update->ntimestep, message);
+    }
+    for (size_t k = 0; k < n; k++) {
+      memcpy(of(k), states.data() + rows * k, bytes);
+      bear(steps[first + k], of(k), F + 3 * k, C + 9 * k);
+    }
+  }
+  for (const Visit &v : visits) {    // opened too far, the partner is gone, or parted without force
+    OwnJoints &own = joints_of->of[v.i];
+    for (int k = v.had - 1; k >= 0; k--)
+      if (seen[v.flags + k] != MET) end(v.i, k, seen[v.flags + k] == MISSED);
+    joints_of->longest(own.n);
+  }
+  steps.clear();
+  visits.clear();
+  seen.clear();
+  increments.clear();
+}
+
+// Forces and torques of a joint after its step
+void PairJointlaw::bear(const Step &step, double *state, const double *F, const double *C)
+{
+  const Contact &c = step.contact;
+  const Vector &slide = step.slide, &axis2 = step.axis2, &axis3 = step.axis3;
+  const jlaw_law *law = step.law;
+  const int i = c.i, j = c.j;
+  const bool fresh = step.flag < 0;
+  const double dt = update->setupflag ? 0.0 : update->dt;
+  double *head = state + rows;
   if (!planar && c.closure < 0.0 && F[0] == 0.0 && F[1] == 0.0 && F[2] == 0.0) {
-    end(i, which, false);    // parted; virgin when they meet again
+    seen[step.flag] = PARTED;    // virgin when they meet again
     return;
   }
   double push = 0.0;    // in a setup too: from the velocities and the words that hold now
-  if (damps) {
+  if (damping > 0.0) {
     const double reduced = atom->rmass[i] * atom->rmass[j] / (atom->rmass[i] + atom->rmass[j]);
     const double opens = dot(slide, c.n), k = c.area * std::max(C[0], 0.0);
-    const double pressed = law->bonded ? std::max(F[0], 0.0) : F[0];
-    push = std::max(-2.0 * damping * sqrt(k * reduced) * opens, -c.area * pressed);    // never pulls
+    const double most = c.area * std::max(F[0], 0.0);
+    push = std::max(-2.0 * damping * sqrt(k * reduced) * opens, -most);    // never pulls
     // this velocity lies between the force of the last step and this one
     joints_of->sums[FixJointlawMemory::DAMPING] -= 0.5 * (head[DAMPED] + push) * opens * dt;
   }
@@ -619,10 +691,10 @@ void PairJointlaw::advance(const Contact &c)
   }
   if (!stiffness.empty()) {    // as unsheared at this closure, or, dilated, as it is
     const double zero[3] = {0.0, 0.0, 0.0};
-    double same[3], squares = 0.0;
+    double same[3], as_is[9], squares = 0.0;
     scratch.assign(state, state + rows);
-    jlaw_update(law, state, scratch.data(), zero, same, C, nullptr, 0);
-    for (const double x : C) squares += x * x;
+    jlaw_update(law, state, scratch.data(), zero, same, as_is, nullptr, 0);
+    for (const double x : as_is) squares += x * x;
     const double k = jlaw_max_stiffness(law, std::max(c.closure, 0.0));
     stiffness[i] += c.area * std::max(k, sqrt(squares));
     stiffness[j] += c.area * std::max(k, sqrt(squares));
@@ -646,8 +718,6 @@ void PairJointlaw::end(int i, int which, bool given_up)
     sums[FixJointlawMemory::COUNT] += stored > 0.0;
   }
   own.drop(which, size);
-  seen[which] = seen[own.n];
-  seen.pop_back();
 }
 
 // A body of mass m on springs k: |v + w x r|^2 <= (1 + r^2 m/I)(v^2 + w^2 I/m), 3.5 (...) for spheres,
@@ -828,6 +898,16 @@ static void *make_memory(void *lmp, int narg, char **arg)
 void lammpsplugin_init(void *instance, void *handle, void *add_plugin)
 {
   auto lmp = static_cast<LAMMPS *>(instance);
+#if defined(__AVX512F__)
+  const bool fits = __builtin_cpu_supports("avx512f");
+#elif defined(__AVX2__)
+  const bool fits = __builtin_cpu_supports("avx2");
+#else
+  const bool fits = true;
+#endif
+  if (!fits)
+    lmp->error->all(FLERR, "jointlawplugin.so was built for another processor than this one; run "
+                    "`MACHINE= ./build.sh` for a plug-in that runs on all");
   const int version = lammps_version(instance);
   if (version != JOINTLAW_LAMMPS)
     lmp->error->all(FLERR, "jointlawplugin.so was built for LAMMPS {}, this is {}; run build.sh "

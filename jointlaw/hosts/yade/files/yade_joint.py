@@ -1,7 +1,7 @@
 """Rock joints on the contacts of a YADE simulation. Needs YADE, numpy and `joint_table.py`.
 
     from yade_joint import Joints, TableLaw     # both files in the script's folder (on sys.path)
-    joints = Joints(TableLaw("joint.txt"))      # or Joints(LiveLaw(law)), law a jointlaw.JointLaw
+    joints = Joints(TableLaw("joint.txt"))      # or Joints(LiveLaw("law.toml")): the law itself
     joints.attach()                             # after O.engines is set
     O.dt = joints.time_step()
 
@@ -88,19 +88,21 @@ class LiveLaw:
 
     Memory belongs to a contact as long as YADE keeps it, so `Law2...(neverErase=True)` is needed:
     a sheared joint dilates and carries stress at negative closure. A new contact counts the shear
-    made in touch only. The memory turns with body id1. `ledger` adds up the energy that friction
-    takes, for `batch.dissipated_energy`, at some cost.
+    made in touch only. The memory turns with body id1. `law` is a law of jointlaw, or the path of
+    its file. `ledger` adds up the energy that friction takes, for `batch.dissipated_energy`, at
+    some cost.
     """
 
     mode = "live"
 
     def __init__(self, law, ledger=False):
+        from jointlaw import JointLaw, JointPool  # table mode does without
+
+        law = law if hasattr(law, "dim") else JointLaw.from_toml(law)
         if law.dim != 3:
             raise ValueError(
                 "contacts in YADE shear in 3-D: set law.plane=None, closure_only=False"
             )
-        from jointlaw import JointPool  # table mode does without
-
         self.law, self.pool = law, JointPool(law, ledger)
         self.numbered = 0  # contacts so far: the keys of the pool are their numbers
 
@@ -184,6 +186,10 @@ class Joints:
             raise ValueError(f"name = {name!r} must be a Python identifier: it labels the engine")
         self.law, self.select, self.name = law, select, name
         self.area = area if area is None or callable(area) else float(area)
+        if not (area is None or callable(area) or 0 < area < np.inf):
+            raise ValueError(f"area = {area} m2 must be > 0 and finite")
+        if not forget >= 0:
+            raise ValueError(f"forget = {forget} m must be >= 0")
         self.azimuth = unit(np.array(azimuth, float))
         self.plane = None if plane is None else unit(np.array(plane, float))
         self.mated, self.forget = mated, forget

@@ -169,7 +169,8 @@ def _check(given: argparse.Namespace) -> None:
         pressed = sim.joints.traction[rows, 0].max(initial=0.0)
         if isinstance(law, JointLaw):
             _warn_of_range(name, law, max(float(pressed), sim.scene.run.largest_stress))
-            _warn_of_bond(name, law, float(pressed))
+            if law.bond and law.bond.cohesion and pressed > 0.0:
+                _warn_of_bond(name, law, float(pressed))
     print("the scene is valid")
 
 
@@ -187,8 +188,6 @@ def _warn_of_range(name: str, law: JointLaw, largest: float) -> None:
 
 def _warn_of_bond(name: str, law: JointLaw, stress: float) -> None:
     """Say where a bond breaks before the asperities have slid as far as their friction needs."""
-    if not (law.bond and law.bond.cohesion and stress > 0.0):
-        return
     bare, slip = replace(law, bond=None), law.bond.cohesion / law.bond.shear_stiffness
     borne = direct_shear(bare.joint(), to=[slip], normal=stress, steps=20).shear_stress[-1]
     share = borne / (stress * np.tan(np.radians(friction_angle(bare, stress))))

@@ -9,6 +9,7 @@ set may end at those of an earlier one.
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from shapely import LineString, Polygon, STRtree, get_exterior_ring, get_parts
@@ -109,6 +110,10 @@ def _rim(piece: Polygon) -> np.ndarray:
     return np.array(piece.exterior.coords)
 
 
+def _width(piece: Polygon) -> float:
+    return smallest_width(_rim(piece))
+
+
 def _crossed(pieces, normal, offset, tiny, persistence, rng):
     """Pieces with their rims: in place of each that the joint crosses its parts on both sides."""
     away = np.concatenate([rim for _, rim in pieces]) @ normal - offset
@@ -133,7 +138,7 @@ def _split(piece: Polygon, normal: np.ndarray, offset: float) -> list[Polygon]:
 
 
 def _convex_parts(piece: Polygon, sets, lines, tiny) -> list[Polygon]:
-    if smallest_width(_rim(piece)) < tiny:
+    if _width(piece) < tiny:
         return []
     corners = _corners(piece, tiny)
     inward = [*corners[_bends(corners) < 0]]
@@ -151,25 +156,23 @@ def _convex_parts(piece: Polygon, sets, lines, tiny) -> list[Polygon]:
 
 def _without_slivers(pieces: list[Polygon], sets, lines, least: float, tiny: float, rims: Polygon):
     """Join or drop what is narrower than `least`, the narrowest first; nothing across `rims`."""
-    pieces, joined, dropped = list(pieces), 0, []
-    widths = [smallest_width(_rim(piece)) for piece in pieces]
-    while pieces and min(widths) < least:
-        number = int(np.argmin(widths))
-        sliver, _ = pieces.pop(number), widths.pop(number)
-        shared = []  # what may become of both: convex?, what is left over of slivers (m2), ...
-        for j in _neighbours(sliver, pieces, lines, tiny, rims):
-            whole, before = _union(sliver, pieces[j], tiny), pieces[j].area * (widths[j] < least)
-            for joints in sets:
-                with suppress(ValueError):
-                    cuts: list[Line] = []
-                    parts = _convex_parts(whole, [joints], cuts, tiny)
-                    wide = [smallest_width(_rim(part)) for part in parts]
-                    left = sum(p.area for p, w in zip(parts, wide, strict=True) if w < least)
-                    if len(parts) == 1 or left - before < LESS * sliver.area:
-                        shared.append((len(parts), left - before, j, parts, wide, cuts))
+    joined, dropped = 0, []
+
+    def slim(parts):
+        return sum(part.area for part in parts if _width(part) < least)
+
+    while pieces and _width(sliver := min(pieces, key=_width)) < least:
+        pieces, shared = [piece for piece in pieces if piece is not sliver], []
+        for j, joints in product(_neighbours(sliver, pieces, lines, tiny, rims), sets):
+            whole, cuts = _union(sliver, pieces[j], tiny), list[Line]()
+            with suppress(ValueError):
+                parts = _convex_parts(whole, [joints], cuts, tiny)
+                left = slim(parts) - slim([pieces[j]])
+                if len(parts) == 1 or left < LESS * sliver.area:
+                    shared.append((len(parts), left, j, parts, cuts))
         if shared:
-            *_, j, parts, wide, cuts = min(shared, key=lambda option: option[:2])
-            pieces[j : j + 1], widths[j : j + 1] = parts, wide
+            *_, j, parts, cuts = min(shared, key=lambda option: option[:2])
+            pieces[j : j + 1] = parts
             lines += cuts
             joined += 1
         else:

@@ -128,8 +128,8 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
         water, in_situ, (*pressure, 0.0), tuple(_stages(digs, blocks, where)), **watched,
     )  # fmt: skip
     if WHOLE in edge_laws.values():
-        cut = [laws[law] for law in jointed or [default]]
-        laws.setdefault(WHOLE, whole_rock(cut, HELD * scene.skins.min()))
+        joints = [laws[law] for law in jointed or [default]]
+        laws.setdefault(WHOLE, whole_rock(joints, HELD * scene.skins.min()))
     for name, law in laws.items():
         opening = opens_to(law)
         if opening > scene.skins.min():

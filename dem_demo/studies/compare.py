@@ -32,11 +32,11 @@ def compare(scene: Scene, seeds: Sequence[int], until: float) -> Iterator[dict]:
     for name in [rock.name for rock in scene.rocks]:
         for seed in seeds:
             own = alone(scene, name, seed)
-            rough = {n: law for n, law in own.laws.items() if isinstance(law, jl.JointLaw)}
             yield {"law": "joint", "seed": seed, "laws": {}, **_run(own, until)}
             stress = stresses(Simulation(own))
             run = replace(own.run, max_overlap=0.1)  # constant springs are soft in impacts
-            laws = {name: of_strength(law, stress[name]) for name, law in rough.items()}
+            laws = {name: of_strength(law, stress[name]) for name, law in own.laws.items()
+                    if isinstance(law, jl.JointLaw)}  # fmt: skip
             case = replace(own, laws=own.laws | laws, run=run)
             yield {"law": "coulomb", "seed": seed, "laws": laws, **_run(case, until)}
 
@@ -54,12 +54,12 @@ def _run(scene: Scene, until: float) -> dict:
 def stresses(sim: Simulation) -> dict[str, float]:
     """Mean normal stress (Pa) of the joints of each law, weighted by their forces; the usual one
     where none is pressed."""
-    found = {}
-    for name, rows in zip(sim.scene.laws, sim.joints.rows, strict=True):
-        stress = np.maximum(sim.joints.traction[rows, 0], 0.0)
-        force = stress * sim.contacts.length[rows]
-        found[name] = float(stress @ force / force.sum()) if force.any() else USUAL
-    return found
+    press = np.maximum(sim.joints.traction[:, 0], 0.0)
+    force = press * sim.contacts.length
+    return {
+        name: float(np.average(press[rows], weights=force[rows])) if force[rows].any() else USUAL
+        for name, rows in zip(sim.scene.laws, sim.joints.rows, strict=True)
+    }
 
 
 def of_strength(law: jl.JointLaw, stress: float) -> jl.CoulombLaw:

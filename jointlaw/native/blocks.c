@@ -60,7 +60,7 @@ static inline double soft_size(double x, double soft, double *slope)
  * meet in a point; its derivative by x, the place of the corner along the edge (m) */
 static double stood_on(const jl_world *w, double x, double whole_edge, double *slope)
 {
-  const double reach = 0.5 * smaller(w->corner_length, whole_edge), left = whole_edge - x;
+  const double reach = smaller(w->soft, 0.5 * whole_edge), left = whole_edge - x;
   const double part = larger(smaller(smaller(x, left) / reach, 1.0), 0.0);
   *slope = w->corner_length * 6.0 * part * (1.0 - part) / (x < left ? reach : -reach);
   return w->corner_length * part * part * (3.0 - 2.0 * part);

@@ -35,7 +35,7 @@ class PlainContacts:
         mean = both / np.maximum(np.abs(both), 1e-9)
         self.rise, level = -side.imag, _AHEAD * side.real
         overlap, pull, twist = _overlaps(rest, o.side[self.sides] * side, mean, o.soft)
-        stood, along = _stood_on(o.corner_length, here.real, o.side[edge])
+        stood, along = _stood_on(o.corner_length, o.soft, here.real, o.side[edge])
         self.length, self.carried, pull, twist = _lengths(
             stood, along, self.rise, level, overlap, pull, twist
         )
@@ -82,10 +82,10 @@ def _overlaps(rest, whole, mean, soft):
     return overlap, -(by_edge + by_end) * mean, 0.5 * twist
 
 
-def _stood_on(corner_length, x, whole_edge):
+def _stood_on(corner_length, soft, x, whole_edge):
     """Length of joint (k,) at corners that stand at x on edges: none at the end of an edge, where
-    blocks meet in a point, all of it from half of it on; and its derivative by x."""
-    reach = 0.5 * np.minimum(corner_length, whole_edge)
+    blocks meet in a point, all of it from `soft` (m) on; and its derivative by x."""
+    reach = np.minimum(soft, 0.5 * whole_edge)
     left = whole_edge - x
     part = np.clip(np.minimum(x, left) / reach, 0, 1)
     slope = np.where(x < left, 1, -1) * 6 * part * (1 - part) / reach

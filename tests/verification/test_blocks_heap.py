@@ -76,7 +76,7 @@ def test_a_corner_forced_over_another_makes_no_energy():
     """A block, held at its height, is pushed over the edge of a base 1 cm too low, and back.
 
     Its bottom is parallel to the base's top, its side is not parallel to the base's: a corner 1 cm
-    from the end of its edge, of 0.1 m less what is not on the edge, gives way to an edge that
+    from the end of its edge, of 0.1 m, gives way to an edge that
     overlaps by 1 cm, and takes over again on the way back. The first drops stored energy, the
     second would make it: the corner starts anew instead, with a closure offset.
     """

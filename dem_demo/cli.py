@@ -5,6 +5,7 @@ import sys
 import time
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from importlib.util import find_spec
 from math import inf
 from pathlib import Path
@@ -18,12 +19,12 @@ from jointlaw.support.pyplot import FORMATS
 from .dynamics.simulation import Simulation
 from .errors import Refused
 from .output.monitors import friction_angle
-from .output.record import sentence, sentences
+from .output.record import named, sentence, sentences, told
 from .output.run import run, steps_to
 from .scene import TEMPLATE, load, shipped
 from .studies import ablate, compare, strength, trials
 
-VERSION = 2  # of strength.json
+VERSION = 3  # of strength.json
 FAILING = 3.0  # s: most that a failing rock is run for
 TRIED, PATIENCE = 100, 1.0  # steps, and s, by which the time of a run is estimated
 MOBILISED = 0.9  # share of friction that a bond should wait for
@@ -134,13 +135,14 @@ def _announce(sim: Simulation, until: float | None = None) -> None:
     )
     if seconds := _pace(sim) * steps:
         size = (seconds >= 100) + (seconds >= 6000)
-        told = f"{seconds / 60**size:.2g} {('s', 'min', 'hours')[size]}"
-        print(f"about {told} without pictures, by its first steps")
+        lasts = f"{seconds / 60**size:.2g} {('s', 'min', 'hours')[size]}"
+        print(f"about {lasts} without pictures, by its first steps")
     for rock in sim.scene.rocks:
         print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
               f"{len(rock.blocks) - len(rock.free)} fixed", *rock.told, sep="\n  ")  # fmt: skip
-    if not sim.balanced:
-        print("some blocks have no static equilibrium and move from the first step")
+    if sim.loose.any() and sim.scene.run.seat:
+        print(f"{sim.loose.sum()} blocks cannot be held and move from the first step: "
+              f"{told(named(sim.scene, sim.loose))}")  # fmt: skip
 
 
 def _pace(sim: Simulation) -> float:
@@ -226,12 +228,18 @@ def _reduce(given: argparse.Namespace) -> None:
     if given.force:
         (given.out / trials.FILE).unlink(missing_ok=True)
     until = min(scene.run.end, FAILING) if given.until is None else given.until
-    told = {"factor_of_safety": "factor of safety", "asperity_factor": "asperity factor",
-            "critical_tilt": "critical tilt in degrees"}  # fmt: skip
-    found = strength.strength_reduction(scene, until, given.out, given.format, given.asperity)
+    texts = {
+        "factor_of_safety": "factor of safety",
+        "factor_without": "factor of safety without those",
+        "asperity_factor": "asperity factor",
+        "critical_tilt": "critical tilt in degrees",
+    }
+    found = strength.strength_reduction(
+        scene, until, given.out, given.format, given.asperity, partial(print, flush=True)
+    )
     try:
         for row in found:
-            values = {text: row[key] for key, text in told.items() if key in row}
+            values = {text: row[key] for key, text in texts.items() if key in row}
             said = (
                 f"{text} {value:.3g}" if value is not None else f"no {text}"
                 for text, value in values.items()

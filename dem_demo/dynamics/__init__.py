@@ -4,6 +4,7 @@ blocks         the bodies; everything that touches pymunk
 edge_loads     forces of water on the edges of blocks
 energy         the ledger of energies
 timestep       the largest stable step
+equilibrium    the equilibrium, and what it cannot hold
 seating        displacements that balance the weight
 saved_states   states in memory and in files
 simulation     all of it, for a user

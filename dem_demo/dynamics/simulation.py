@@ -13,6 +13,7 @@ from . import saved_states
 from .blocks import Blocks
 from .edge_loads import press
 from .energy import DROPPED, Ledger
+from .equilibrium import out_of_balance
 from .in_situ import begin
 from .saved_states import KEPT, PLACES, STATE, Saved
 from .seating import seat
@@ -35,7 +36,7 @@ class Simulation:
 
     step: time step (s), instead of the scene's; saved: a state to go on from. blocks: where they
     are; tracker: their contacts; joints: the law; ledger: the energies; limit: of the time step dt
-    (s), chosen for the reason `why`; balanced: were the blocks in equilibrium at the start?
+    (s), chosen for the reason `why`; loose (blocks,): those that nothing held at time 0;
     begun (stages,): when stages of the excavation began, inf before (s). Where
     neither `step` nor the scene sets the time step, it is halved when joints close too far for it,
     or blocks become too fast.
@@ -48,7 +49,7 @@ class Simulation:
             raise ValueError(f"step = {step} s: must be a finite number > 0")
         self.scene, self.blocks = scene, Blocks(scene)
         self.tracker, self.joints = Tracker(scene, self.blocks.motion), Joints(scene)
-        self.limit, self.balanced, self.t0, self.n = StepLimit(), True, 0.0, 0
+        self.limit, self.t0, self.n = StepLimit(), 0.0, 0
         given = step or scene.run.step or scene.run.fraction
         self.why, self.halvings = "", 0 if given else HALVINGS
         self.ledger = Ledger(len(scene.blocks))
@@ -161,10 +162,11 @@ class Simulation:
         """From the drawing to step 0: equilibrium, a time step, velocities half a step on."""
         scene, blocks, tracker, joints = self.scene, self.blocks, self.tracker, self.joints
         slid = begin(scene, blocks, tracker, joints)
-        if scene.run.seat and joints.n:
-            slid, self.balanced = seat(scene, blocks, tracker, joints, slid)
+        if scene.run.seat and joints.n and blocks.free.any():
+            slid = seat(scene, blocks, tracker, joints, slid)
         tracker.follow(blocks.motion)
         joints.update(tracker.closure, slid)
+        self.loose = out_of_balance(scene, blocks, self.contacts, joints)
         self.limit.look(scene, blocks, self.contacts, joints)
         self.dt = step or scene.run.step or self._chosen_step()
         self.limit.require(self.dt)
@@ -194,7 +196,7 @@ class Simulation:
             )
         if scene.run.fraction:
             return scene.run.fraction * limit
-        falls = not (scene.run.seat and self.balanced) or self.blocks.velocity.any()
+        falls = not scene.run.seat or self.loose.any() or self.blocks.velocity.any()
         driven = any(len(drive.times) > 1 for drive in scene.drives)
         self.why = [*FRACTIONS][0 if falls else 1 if driven else 2]
         return FRACTIONS[self.why] * limit

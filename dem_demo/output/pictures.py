@@ -20,7 +20,7 @@ from ..scene import turn, usual_size
 from .monitors import shear_curve
 from .record import CREEP, Record, sentences
 
-FIXED, LOOSE, WATER = "#8d8d8d", "#c2187a", "#1f6fd0"
+FIXED, MARKED, WATER = "#8d8d8d", "#c2187a", "#1f6fd0"
 MOVED = ListedColormap(colormaps["Purples"](np.linspace(0.05, 0.65, 100)))
 STATES = {  # of a joint: colour and line
     "stuck": ("#3a3a3a", "-"), "partly sliding": ("#e69f00", "-"), "sliding": ("#d81b1b", "-"),
@@ -50,15 +50,16 @@ class Pictures:
     is beside them; colours by distances moved, up to `most` (m); widths by `stress` (Pa).
 
     That is the stress of the start, or of all frames where nothing touches then: those of impacts
-    would make all others hair lines. title: that of the scene unless another is given; loose (n,):
-    blocks to be marked as those that nothing holds.
+    would make all others hair lines. title: that of the scene unless another is given; marked (n,):
+    blocks to be marked, and what they are; without it those that nothing held at the start.
     """
 
     def __init__(
-        self, record: Record, title: str | None = None, loose: np.ndarray | None = None
-    ) -> None:
+        self, record: Record, title: str | None = None, marked: np.ndarray | None = None,
+        mark: str = "block that nothing holds",
+    ) -> None:  # fmt: skip
         self.record, self.title = record, title or record.scene.title
-        self.loose = np.zeros(len(record.scene.blocks), bool) if loose is None else loose
+        self.marked, self.mark = record.loose if marked is None else marked, mark
         blocks, shown = record.scene.blocks, [*outlines(record, 0), *outlines(record, -1)]
         moving = zip((*blocks, *blocks), shown, strict=True)
         corners = np.concatenate([shape for block, shape in moving if block.moves])
@@ -96,16 +97,15 @@ class Pictures:
         across = min(6.5, 6.0 * wide / high)
         figure = Figure(figsize=(max(across + 1.0, 7.5), across * high / wide + 2.6))
         stress, unit, name = float(f"{self.stress:.1g}"), *pressure(self.stress)
-        kind = "effective " * (scene.water is not None or any(scene.pressure))
-        stuck, loose = STATES["stuck"][0], bool(self.loose.any())
+        stuck = STATES["stuck"][0]
         lines = [
             *((f"joint {state}", {"color": colour, "ls": line, "lw": 2.0})
               for state, (colour, line) in STATES.items()),
-            (f"{kind}normal stress {unit * stress:g} {name}",
+            (f"{'effective ' * scene.wet}normal stress {unit * stress:g} {name}",
              {"color": stuck, "lw": self._width(stress)}),
             (f"displacement, drawn × {self.longer:g}", {"color": "k", "lw": 1.0, "marker": ">"}),
             *[("water table", {"color": WATER, "ls": "-."})] * bool(scene.water),
-            *[("block that nothing holds", {"color": LOOSE, "lw": 2.0})] * loose,
+            *[(self.mark, {"color": MARKED, "lw": 2.0})] * bool(self.marked.any()),
         ]  # fmt: skip
         marks = [Line2D([], [], label=label, **drawn) for label, drawn in lines]
         figure.legend(handles=marks, loc="outside lower center", ncols=3, frameon=False)
@@ -123,7 +123,7 @@ class Pictures:
         moved = record.displaced(i) - record.displaced(0)
         colours = MOVED(np.hypot(*moved.T) / self.most)
         colours[~self.free] = to_rgba(FIXED)
-        for which, edge, width in ((~self.loose, "0.45", 0.6), (self.loose, LOOSE, 2.0)):
+        for which, edge, width in ((~self.marked, "0.45", 0.6), (self.marked, MARKED, 2.0)):
             some = [shapes[j] for j in np.flatnonzero(which)]
             face = {"facecolors": colours[which], "edgecolors": edge, "linewidths": width}
             axes.add_collection(PolyCollection(some, **face))

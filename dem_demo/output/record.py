@@ -7,12 +7,13 @@ import numpy as np
 
 from ..dynamics.energy import COLUMNS
 from ..dynamics.simulation import Simulation
-from ..scene import usual_size
+from ..scene import Scene, usual_size
 from .monitors import law_between, readings, watched_slips
 
 FAILED = 0.1  # of the usual size of a rock's blocks: one that has moved farther has failed
 CREEP = 1e-6  # m/s: faster is not at rest
 LOOK_BACK = 1.0  # s over which creep is measured
+TOLD = 12  # most blocks that a sentence names
 
 
 class Record:
@@ -23,11 +24,12 @@ class Record:
     of joint that a contact carries; and numbers (k,) with their unit in the name. stresses[f] (3,
     n): of the blocks. monitored[f]:
     what the scene's [watch] asks for; slips: of its joints; laws: of the watched joints; state:
-    that of the last frame, to return to; steps: of the run.
+    that of the last frame, to return to; steps: of the run; loose (n,): who was at its start.
     """
 
     def __init__(self, sim: Simulation) -> None:
         self.scene, self.slips, self.steps = sim.scene, watched_slips(sim), 0
+        self.loose = sim.loose
         watched = (*sim.scene.slip, *sim.scene.shear)
         self.laws = {pair: law_between(sim, *pair) for pair in watched}
         self.times: list[float] = []
@@ -74,6 +76,41 @@ class Record:
         rows = zip(self.times, self.energy, self.monitored, strict=True)
         write_csv(path, header, ([t, *e, *w.values()] for t, e, w in rows))
 
+    def write_blocks(self, path: Path) -> None:
+        """blocks.csv: where each block is at the end, and how it moved since step 0."""
+        last, away, slip = (
+            self.motion[-1].T,
+            self.displaced(-1) - self.displaced(0),
+            self.loose * 0.0,
+        )
+        joints = self.joints[-1]
+        for side in (0, 2):
+            np.maximum.at(slip, joints["who"][:, side], np.abs(joints["shear_m"]))
+        columns = {
+            "block": [block.name for block in self.scene.blocks], "x_m": last[:, 0],
+            "y_m": last[:, 1], "displacement_m": np.hypot(*away.T), "displacement_x_m": away[:, 0],
+            "displacement_y_m": away[:, 1],
+            "rotation_deg": np.degrees(last[:, 2] - self.motion[0][2]),
+            "speed_m/s": np.hypot(*last[:, 3:5].T), "largest_joint_slip_m": slip,
+            "loose_at_start": self.loose.astype(int),
+        }  # fmt: skip
+        write_csv(path, columns, zip(*columns.values(), strict=True))
+
+
+def named(scene: Scene, which: np.ndarray) -> list[dict]:
+    """The blocks of a mask (n,): names and centroids as drawn (m)."""
+    centroids = [(block.name, *block.centroid.tolist()) for block in scene.blocks]
+    return [dict(zip(("block", "x_m", "y_m"), centroids[i], strict=True))
+            for i in np.flatnonzero(which)]  # fmt: skip
+
+
+def told(blocks: list[dict]) -> str:
+    """Names and centroids of some blocks, for a person."""
+    first = [
+        f"{block['block']} ({block['x_m']:.2f}, {block['y_m']:.2f})" for block in blocks[:TOLD]
+    ]
+    return ", ".join([*first, f"and {len(blocks) - TOLD} more"] if blocks[TOLD:] else first)
+
 
 def _joints(sim: Simulation) -> dict[str, np.ndarray]:
     """Joints that touch or almost touch."""
@@ -116,7 +153,7 @@ def write_csv(path: Path, header, rows) -> None:
 
 
 def outcomes(record: Record) -> list[dict]:
-    """One entry for each `[[rock]]` of the scene.
+    """One entry for each `[[rock]]` of the scene, and one for other blocks that nothing drives.
 
     Displacements are relative to the base. settled_m: largest from the drawing to step 0;
     moved_m: largest since then; failed: blocks that moved more than failed_beyond_m;
@@ -128,14 +165,19 @@ def outcomes(record: Record) -> list[dict]:
     before = max(min(before, len(times) - 2), 0)
     first, then, last = (record.displaced(i) for i in (0, before, -1))
     crept = np.hypot(*(last - then).T) / max(times[-1] - times[before], 1e-300)
-    for rock in record.scene.rocks:
-        free = [i for i in rock.free if np.isfinite(last[i, 0])]
+    groups, blocks = {rock.name: rock.free for rock in record.scene.rocks}, record.scene.blocks
+    rest = {i for i, block in enumerate(blocks) if not (block.fixed or block.held)}
+    groups |= {"other blocks" if groups else "blocks": sorted(rest.difference(*groups.values()))}
+    for name, group in groups.items():
+        free = [i for i in group if np.isfinite(last[i, 0])]
+        if not free:
+            continue
         moved, creep = np.hypot(*(last - first)[free].T), float(crept[free].max())
-        limit = FAILED * usual_size(record.scene.blocks[i] for i in free)
+        limit = FAILED * usual_size(blocks[i] for i in free)
         failed = int((moved > limit).sum())
         out.append(
             {
-                "rock": rock.name,
+                "rock": name,
                 "state": "fails" if failed else "stands" if creep < CREEP else "moves",
                 "blocks": len(free),
                 "settled_m": float(np.hypot(*first[free].T).max()),

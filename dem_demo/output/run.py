@@ -18,12 +18,12 @@ from ..dynamics.simulation import Simulation
 from ..errors import Refused
 from .monitors import look
 from .pictures import Pictures, curves
-from .record import Record, outcomes
+from .record import Record, named, outcomes
 
 MOST_STEPS = 1e8  # of a run: days for a hundred blocks
 LOOKS = 8  # steps between two looks for slip
-VERSION = 1  # of summary.json
-HISTORY = "history.csv"
+VERSION = 2  # of summary.json
+HISTORY, BLOCKS = "history.csv", "blocks.csv"
 
 
 def run(
@@ -57,7 +57,8 @@ def run(
         "time_step_s": sim.dt,
         "step_limit_s": sim.limit.least,
         "time_step_margin": sim.limit.least / sim.dt,
-        "started_in_equilibrium": bool(sim.balanced),
+        "started_in_equilibrium": not record.loose.any(),
+        "loose": named(sim.scene, record.loose),
         "law_points": sim.joints.n,
         "stresses_of_joints": "effective" if sim.scene.wet else "total",
         "stages_begun_s": [time if time < inf else None for time in sim.begun.tolist()],
@@ -135,8 +136,9 @@ def write(record: Record, summary: dict, folder: Path, drawn: str | None, vtk: b
         pictures = {f"final.{drawn}": of.final, "motion.gif": of.animation}
         if record.scene.shear:
             pictures[f"curves.{drawn}"] = partial(curves, record)
-    write_json(folder / "summary.json", {**summary, "files": [HISTORY, *pictures]})
+    write_json(folder / "summary.json", {**summary, "files": [HISTORY, BLOCKS, *pictures]})
     record.write(folder / HISTORY)
+    record.write_blocks(folder / BLOCKS)
     for name, draw in pictures.items():
         draw(folder / name)
     if vtk:

@@ -56,6 +56,7 @@ def _blocks(record: Record, i: int) -> meshio.Mesh:
         "stress_1_Pa": values[:, 1],
         "stress_2_Pa": values[:, 0],
         "along_stress_1_Pa": _in_space(values[:, 1:] * ways[:, :, 1]),
+        "loose": record.loose.astype(float),
     }
     data = {
         name: [row[None] for row in values[np.isfinite(motion[0])]]

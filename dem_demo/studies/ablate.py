@@ -150,7 +150,7 @@ def _outcome(record: Record, summary: dict) -> dict[str, Any]:
         normal, shear = (record.column(f"{name}: {key}_Pa") for key in ("normal", "shear"))
         angle = np.degrees(np.arctan2(np.abs(shear), normal))
         found[f"{name}, peak friction_deg"] = float(angle.max())
-    for rock in summary["rocks"]:
+    for rock in summary["rocks"][: len(record.scene.rocks)]:
         found |= {f"{rock['rock']}, {key}": rock[key] for key in ("state", "moved_m")}
     return found | {
         "largest displacement_m": float(record.moved.max()),

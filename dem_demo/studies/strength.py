@@ -19,13 +19,16 @@ from jointlaw.parameters.rock import STEEPEST
 from jointlaw.support.pyplot import FORMATS
 
 from ..dynamics.seating import displacements
+from ..dynamics.simulation import Simulation
 from ..output.pictures import Pictures
+from ..output.record import named, told
 from ..scene import Scene, Tables, build, read_tables, turn
-from .failure import failing
+from .failure import failing, first, seated
 from .trials import Trials
 
 TILT = 8.0, 60.0, 0.05  # degrees: first step, largest, to which it is found
 FACTOR = np.log(2.0), np.log(64.0), 0.006  # logarithms: the same of a factor
+TWICE = 2.0  # where all blocks are loose: times the strength, with which fewer are
 SHOWN = 1.02  # times the factor: what the strength of the failing run is divided by
 
 
@@ -35,47 +38,87 @@ def strength_reduction(
     folder: Path,
     picture_format: str = FORMATS[0],
     asperity: bool = False,
+    tell: Callable[[str], None] = lambda text: None,
 ) -> Iterator[dict]:
     """Factor of safety and critical tilt of every rock alone, or of a scene without rocks.
 
-    Yields `rock`, `factor_of_safety`, with `asperity` also `asperity_factor`, `critical_tilt`
-    (degrees), each None where none is found, and `picture`: the file in `folder` that shows how it
-    fails, None without a factor. That run has the strength divided by 1.02 times the factor, and
-    ends at `until` (s) or once a block has moved by the size of a block. Each finished trial is
-    kept in the folder; called again with it, the search goes on.
+    Yields `rock`; `loose`: blocks that cannot be held as drawn, names and centroids (m);
+    `without`: the same, or where all are loose, those that twice the strength does not hold either;
+    `factor_of_safety`; with such blocks `factor_without`: of all others, while these move away;
+    with `asperity` also `asperity_factor`; `critical_tilt` (degrees); each None where none is
+    found. `picture`: the file in `folder` that shows how it fails, None without a factor; `first`:
+    the blocks that move first there. That run has the strength divided by 1.02 times the factor
+    (without loose blocks, if there are any), and ends at `until` (s) or once a block has moved by
+    the size of a block. Each finished trial is kept in the folder; called again with it, the search
+    goes on. tell: is told what is done, a line at a time.
     """
     trials = Trials(scene, folder)
     for name in [rock.name for rock in scene.rocks] or ["scene"]:
         one = (alone(scene, name) if scene.rocks else scene).excavated
-        row = {"rock": name, "factor_of_safety": factor_of_safety(one, trials, name)}
+        tell(f"{name}: looking for blocks that cannot be held")
+        loose, free = trials.ask(f"{name}: loose", partial(_loose, one)), _free(one)
+        tell(f"{name}: {len(loose)} of {free} blocks cannot be held" + _listed(loose))
+        row: dict = {"rock": name, "loose": loose, "without": loose}
+        if len(loose) == free:
+            ask = partial(_loose, weakened(one, 1 / TWICE))
+            row["without"] = trials.ask(f"{name}: loose with strength * {TWICE:g}", ask)
+            tell(f"{name}: {len(row['without'])} of them with {TWICE:g} times the strength neither"
+                 + _listed(row["without"]))  # fmt: skip
+        apart = np.isin([block.name for block in one.blocks], [b["block"] for b in row["without"]])
+        tell(f"{name}: factor of safety of all blocks")
+        factor = row["factor_of_safety"] = factor_of_safety(one, trials, name)
+        if 0 < len(row["without"]) < free:
+            tell(f"{name}: factor of safety without those {len(row['without'])}")
+            factor = factor_of_safety(one, trials, f"{name} without loose blocks", apart)
+            row["factor_without"] = factor
         if asperity:
             row["asperity_factor"] = asperity_factor(one, trials, name)
+        tell(f"{name}: critical tilt")
         row |= {"critical_tilt": critical_tilt(one, trials, name), "picture": None}
-        if factor := row["factor_of_safety"]:
+        if factor:
             row["picture"] = f"failing-{name}.{picture_format}"
             title = f"{name}: factor of safety {factor:.3g}"
             path, weak = folder / row["picture"], weakened(one, SHOWN * factor)
-            trials.ask(row["picture"], partial(_show, weak, until, title, path))
+            tell(f"{name}: running it with strength / {weak.reduction:.3g}")
+            row["first"] = trials.ask(
+                row["picture"], partial(_show, weak, until, title, path, apart)
+            )
+            tell(f"{name}: first to move: {told(row['first'])}")
         yield row
 
 
-def _show(scene: Scene, until: float, title: str, path: Path) -> float:
-    """Run and draw a scene that fails; returns the model time (s) that it ran."""
+def _free(scene: Scene) -> int:
+    return sum(not block.fixed for block in scene.blocks)
+
+
+def _listed(blocks: list[dict]) -> str:
+    return f": {told(blocks)}" if blocks else ""
+
+
+def _loose(scene: Scene) -> list[dict]:
+    return named(scene, Simulation(seated(scene)).loose)
+
+
+def _show(scene: Scene, until: float, title: str, path: Path, apart: np.ndarray) -> list[dict]:
+    """Run and draw a scene that fails; returns which blocks move first, but for those apart."""
     record = failing(scene, until)
-    time = record.times[-1]
-    Pictures(record, f"{title}\nwith strength / {scene.reduction:.3g}").final(path)
-    return time
+    ahead, title = first(record, apart), f"{title}\nwith strength / {scene.reduction:.3g}"
+    Pictures(record, title, ahead, "moves first").final(path)
+    return named(scene, ahead)
 
 
 def factor_of_safety(
-    scene: Scene, trials: Trials | None = None, name: str = "scene"
+    scene: Scene, trials: Trials | None = None, name: str = "scene", loose: np.ndarray | None = None
 ) -> float | None:
     """What the strength of all joints is divided by for a scene to just hold.
+
+    loose (n,): blocks that need not hold.
 
     Strength is the shear stress that a joint can bear at its own normal stress. None if the scene
     holds with 1/64 of it, or fails with 64 times of it.
     """
-    return _factor(partial(weakened, scene), trials or Trials(scene), f"{name}: factor of safety")
+    name = f"{name}: factor of safety"
+    return _factor(partial(weakened, scene), trials or Trials(scene), name, loose)
 
 
 def asperity_factor(
@@ -88,8 +131,8 @@ def asperity_factor(
     return _factor(partial(smoothed, scene), trials or Trials(scene), f"{name}: asperity factor")
 
 
-def _factor(at: Callable[[float], Scene], trials: Trials, name: str) -> float | None:
-    log = _march(lambda log: at(float(np.exp(log))), FACTOR, trials, name)
+def _factor(at: Callable[[float], Scene], trials: Trials, name: str, loose=None) -> float | None:
+    log = _march(lambda log: at(float(np.exp(log))), FACTOR, trials, name, loose)
     return None if log is None else float(np.exp(log))
 
 
@@ -138,9 +181,11 @@ def smoothed(scene: Scene, factor: float) -> Scene:
 
 
 def _march(
-    at: Callable[[float], Scene], reach: tuple[float, float, float], trials: Trials, name: str
-) -> float | None:
-    """Where the scenes `at` begin to fail; None if that is not between -most and most.
+    at: Callable[[float], Scene], reach: tuple[float, float, float], trials: Trials, name: str,
+    loose: np.ndarray | None = None,
+) -> float | None:  # fmt: skip
+    """Where the scenes `at` begin to fail, apart from loose blocks (n,); None if that is not
+    between -most and most.
 
     reach: the first step, `most`, and to what it is found. It starts at 0, or below at the first
     multiple of a step that holds. From there on each equilibrium is looked for from the one before;
@@ -151,7 +196,7 @@ def _march(
 
         def found(x: float, last: float | None, moved: list[float] | None) -> list[float] | None:
             guess = None if moved is None else np.array(moved)
-            balance = trials.ask(f"{name} {x} from {last}", lambda: _balance(at(x), guess))
+            balance = trials.ask(f"{name} {x} from {last}", lambda: _balance(at(x), guess, loose))
             bar.update()
             return balance
 
@@ -172,8 +217,8 @@ def _march(
     return low + step
 
 
-def _balance(scene: Scene, guess: np.ndarray | None) -> list[float] | None:
-    moved = displacements(scene, guess)
+def _balance(scene: Scene, guess: np.ndarray | None, loose: np.ndarray | None):
+    moved = displacements(scene, guess, loose)
     return None if moved is None else moved.tolist()
 
 

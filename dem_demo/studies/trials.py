@@ -10,7 +10,7 @@ from jointlaw.support.files import write_json
 from ..scene import Scene
 
 FILE = "trials.json"
-VERSION = 1  # of trials.json
+VERSION = 2  # of trials.json
 
 
 class Trials:

@@ -12,7 +12,7 @@ import numpy as np
 from folder import asked
 
 import dem_demo
-from dem_demo.output.pictures import DRIVEN, FREE, outlines
+from dem_demo.output.pictures import FIXED, outlines
 from jointlaw.support.pyplot import style
 
 COLOURS = "#c95500", "#1f6fd0"
@@ -32,8 +32,8 @@ def main(folder):
             name, tilt = scene.blocks[moving].name, record.slips[moving, base]["slip_angle"]
             slip = np.abs(record.column(f"{name}: slid_m"))
             shape = outlines(record, int(np.argmax(slip > DRAWN)))
-            above.fill(*shape[base].T, color=DRIVEN)
-            above.fill(*shape[moving].T, color=FREE, ec=colour, lw=2)
+            above.fill(*shape[base].T, color=FIXED)
+            above.fill(*shape[moving].T, color="#efe9dc", ec=colour, lw=2)
             above.text(shape[base][:, 0].mean(), 3.2, way, color=colour, ha="center", va="bottom")
             farther = np.diff(np.maximum.accumulate(slip), prepend=0.0) > SLOW * slip + LEAST
             ratio = record.column(f"{name}: shear_Pa") / record.column(f"{name}: normal_Pa")

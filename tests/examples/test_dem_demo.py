@@ -59,7 +59,7 @@ def test_run_writes_everything(done):
     summary = json.loads((done / "summary.json").read_text())
     written = {path.name for path in done.iterdir()} - {"state", "summary.json"}
     assert set(summary["files"]) == written
-    assert written == {"history.csv", "final.png", "motion.gif", "curves.png"}
+    assert written == {"history.csv", "blocks.csv", "final.png", "motion.gif", "curves.png"}
     assert summary["time_step_margin"] > 2
     assert summary["steps"] * summary["time_step_s"] == pytest.approx(0.12, rel=0.01)
     assert summary["slip"][0]["slip_angle"] is None

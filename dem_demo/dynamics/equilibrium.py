@@ -1,0 +1,201 @@
+"""The equilibrium of blocks on their joints, and the blocks that no equilibrium holds.
+
+Newton's method finds the displacements at which all blocks are in balance. Where there are none the
+blocks creep through a drag: drag times movement = unbalanced force, in implicit steps, through less
+and less drag. What can be held comes to rest. What cannot be held moves on, and what it lacks of a
+balance no longer falls: it is loose. Contacts keep their places and normals here: displacements are
+small, and where a loose block would be in the end means nothing.
+"""
+
+import numpy as np
+from scipy.sparse import bmat, csc_array, csr_array, diags
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import spsolve
+
+from jointlaw.support.progress import track
+
+from ..contact import Contacts, Joints, Tracker
+from ..scene import Scene
+from .blocks import Blocks
+from .timestep import rates
+
+BALANCED = 1e-3  # most unbalanced force of a block that is held, as a share of its weight
+LOOSE = 1e-2  # least that a loose block keeps in the creep; held ones that follow it keep less
+TIGHT, ROUGH = 1e-11, 1e-8  # residual of a solution and of a step of the creep, shares of the load
+ITERATIONS, DAMPINGS = 60, 20  # most of Newton's, and most trials of damping in one
+FAR = 0.1  # of its reach: how far the drag of the first guess lets a block fall
+STEPS = 40  # most of the creep
+WEAKER, STRONGER = 0.1, 10.0  # change of the drag after a step, and after one that was not found
+WEAK = 2e-3, 1e-1  # drag, as a share of the median stiffness, from which on that is asked
+STEADY = 0.8, 0.9  # unbalanced force over that before: no fall, with less drag or the same drag
+LET_GO, FALLS = 40, 0.9  # most steps in which loose blocks let go, which go on while this falls
+SLOW = 0.01  # their drag, as a share of the median stiffness
+EARTH = 9.81  # m/s2
+FOLLOW = 6  # steps in which blocks that a loose one props follow it
+HELD = 1e25  # drag (1/s2) that holds a block where it is
+
+
+def shares(blocks: Blocks, force: np.ndarray) -> np.ndarray:
+    """Sizes of forces (n, 3) as shares (n,) of the weights, on Earth where there is no gravity, or
+    of a millionth of the largest load if that is more; moments are divided by the block's reach."""
+    mass, largest = blocks.inertia[:, 0], np.abs(blocks.gravity + blocks.loads).max(initial=0.0)
+    weight = mass * ((np.hypot(*blocks.gravity[:, :2].T) / mass).max() or EARTH)
+    x, y, turn = (force * blocks.free).T
+    return np.sqrt(x**2 + y**2 + (turn / blocks.reach) ** 2) / np.maximum(weight, 1e-6 * largest)
+
+
+def out_of_balance(scene: Scene, blocks: Blocks, contacts: Contacts, joints: Joints) -> np.ndarray:
+    """Which blocks (n,) their joints do not carry now, apart from dashpots and drives."""
+    push, slide = (joints.traction * contacts.length[:, None] * scene.thickness).T
+    held = contacts.assemble(blocks.motion, push, -slide, joints.stored * scene.thickness)
+    return shares(blocks, held + blocks.gravity + blocks.loads) > BALANCED
+
+
+class Equilibrium:
+    """The search for an equilibrium from where the blocks are.
+
+    Joints are new but for their closure and what they have slid so far, (k,) in m. force (n, 3):
+    what they have to carry. Displacements y (free motions,) are in unit-mass motions.
+    """
+
+    def __init__(
+        self, scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints,
+        slid: np.ndarray, force: np.ndarray,
+    ) -> None:  # fmt: skip
+        self.blocks, self.joints, self.k = blocks, joints, joints.n
+        signs, contacts = diags(np.repeat([-1.0, 1.0], self.k)), tracker.contacts
+        self.rows: csr_array = signs @ rates(blocks, contacts)  # to closure and shear
+        self.area = np.tile(contacts.length * scene.thickness, 2)
+        self.start = np.concatenate([tracker.closure, slid])
+        self.free = blocks.free.ravel()
+        self.root = blocks.root.ravel()[self.free]
+        self.block = np.repeat(np.arange(len(blocks.free)), 3)[self.free]
+        pull = np.hypot(*force[:, :2].T) / blocks.inertia[:, 0] / blocks.reach
+        self.slow = float(np.median(pull[blocks.free.any(axis=1)]))  # drag: the reach in a step
+        self.force, self.none = force.ravel()[self.free] * self.root, np.zeros(len(self.block))
+        touched = abs(self.rows[: self.k]) + abs(self.rows[self.k :])
+        self.island = connected_components(touched.T @ touched, directed=False)[1]
+
+    def spread(self, parts: np.ndarray) -> np.ndarray:
+        """Values (n, 3) of all motions from those (free motions,) of free ones."""
+        out = np.zeros(self.free.size)
+        out[self.free] = parts
+        return out.reshape(-1, 3)
+
+    def attempt(self, guess: np.ndarray, loose: np.ndarray, stay: np.ndarray | bool = False):
+        """Displacements at which all blocks but loose ones are in balance, and, if there are none,
+        which others are loose as well (n,).
+
+        guess: where to begin; loose (n,): those that are known to be; stay: those of them that
+        nothing moves any more. The others move by a few closures from where they are, as far as
+        they need to let go of the rest.
+        """
+        drag = max(SLOW * self._median(guess), 1e3 * self.slow)
+        least = np.where((loose & stay)[self.block], HELD, drag) * loose[self.block]
+        y = np.where(loose[self.block], 0.0, guess)
+        before = np.inf
+        for _ in range(LET_GO if (loose & ~stay).any() else 1):
+            moved, r, found = self._step(y, least)
+            y = np.where(found, moved, y)
+            if not found.all() or np.linalg.norm(r) > FALLS * before:
+                break
+            before = np.linalg.norm(r)
+        if found.all():
+            return moved, self._follow(moved, loose, least)
+        least = np.where(found, HELD, least)
+        moved, r = self._creep(y, least)
+        out = self._shares(np.where(least > 0, 0.0, r))
+        return moved, out > max(BALANCED, min(LOOSE, 0.5 * out.max()))
+
+    def _follow(self, y: np.ndarray, loose: np.ndarray, least: np.ndarray) -> np.ndarray:
+        """Blocks (n,) that only the drag `least` of loose ones holds: these move on through less of
+        it now, and others that follow are loose as well."""
+        out, drag = 0.0 * loose, WEAK[0] * self._median(y) + self.none
+        drag = np.where(least < HELD, drag, HELD)
+        for _ in range(FOLLOW if ((least > 0) & (least < HELD)).any() else 0):
+            y, r, found = self._step(y, drag, ROUGH)
+            if not found.all():
+                break
+            out = self._shares(np.where(drag < HELD, r, 0.0)) * ~loose
+        return out > LOOSE
+
+    def _shares(self, r: np.ndarray) -> np.ndarray:
+        return shares(self.blocks, self.spread(r / self.root))
+
+    def _stiffness(self, C) -> csc_array:
+        return (self.rows.T @ (diags(self.area) @ C) @ self.rows).tocsc()
+
+    def guess(self) -> np.ndarray:
+        """Displacements after one step through a drag in which a block falls by a tenth of its
+        reach; none where that is not found."""
+        y, _, found = self._step(self.none, self.slow / FAR + self.none, ROUGH)
+        return y * found
+
+    def _median(self, y: np.ndarray) -> float:
+        """Median stiffness of the free motions."""
+        stiffness = self._stiffness(self._unbalanced(y)[1]).diagonal()
+        return float(np.median(stiffness[stiffness > 0])) if (stiffness > 0).any() else 0.0
+
+    def _creep(self, y: np.ndarray, least: np.ndarray):
+        """Steps through less and less drag, of some motions at `least` that much, until all others
+        are in balance or what they lack no longer falls. Returns y and the unbalanced force."""
+        drag, change = max(1e3 * self._median(y), 1e4 * self.slow), WEAKER
+        r, before = self.none, np.inf
+        for _ in track(range(STEPS), "looking for loose blocks"):
+            further, lacking, found = self._step(y, np.maximum(drag, least), ROUGH)
+            if not found.all():
+                drag, change, before = drag * STRONGER, 1.0, np.inf
+                continue
+            y, r = further, lacking
+            now = self._shares(np.where(least > 0, 0.0, r))
+            steady = (now > STEADY[change == 1.0] * before)[now > LOOSE].all()
+            if now.max() <= BALANCED or (steady and drag < WEAK[change == 1.0] * self._median(y)):
+                break
+            before, drag = now, drag * change
+        return y, r
+
+    def _unbalanced(self, y: np.ndarray):
+        """Unbalanced forces (free motions,), and the stiffness (2 k, 2 k) of the joints."""
+        F, C, _ = self.joints.trial((self.start + self.rows @ y).reshape(2, -1).T)
+        nn, ns, sn, ss = (diags(part) for part in C.reshape(-1, 4).T)
+        stiffness = csr_array(bmat([[nn, ns], [sn, ss]]))
+        return self.force - self.rows.T @ (self.area * F.T.ravel()), stiffness
+
+    def _step(self, y: np.ndarray, drag: np.ndarray, tight: float = TIGHT):
+        """An implicit step through a drag (free motions,), or without drag to the equilibrium.
+
+        Newton's iterations, damped where the residual does not fall, each island of blocks that
+        touch by itself. Returns y, the unbalanced forces, and which motions belong to islands whose
+        step was found.
+        """
+        island, free, begin = self.island, drag < HELD, y
+
+        def norm(parts):
+            return np.sqrt(np.bincount(island, parts * parts))
+
+        def at(y):
+            r, C = self._unbalanced(y)
+            left = (r - drag * (y - begin)) * free
+            return r, C, left, norm(left)
+
+        (r, C, left, size), target = at(y), tight * norm(self.force)
+        damp, active = 0.0 * target, size > target
+        for _ in track(range(ITERATIONS), "equilibrium"):
+            if not active.any():
+                break
+            K = self._stiffness(C)
+            least, waits, step = 1e-3 * K.diagonal().max() + 1.0, active, self.none
+            for _ in range(DAMPINGS):
+                damped = diags(drag + damp[island] + 1e-9 * least)
+                step = np.where(waits[island], spsolve((K + damped).tocsc(), left), step)
+                now = at(y + step * active[island])
+                waits = active & ~(now[-1] < size)
+                if not waits.any():
+                    break
+                damp = np.where(waits, np.maximum(4 * damp, least), damp)
+            active = active & ~waits
+            y = y + step * active[island]
+            r, C, left, size = at(y) if waits.any() else now
+            damp = np.where(active & (damp <= least), 0.0, damp / 10)
+            active = active & (size > target)
+        return y, r, (size <= 1e3 * target)[island]

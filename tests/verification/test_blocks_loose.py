@@ -1,0 +1,116 @@
+"""Blocks that cannot be held: who is named, and that all others start in balance."""
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dem_demo import Simulation, load
+from dem_demo.cli import main
+from dem_demo.scene import parse
+
+SLOPE = np.radians(25.0)
+BLOCK = f"""
+gravity = [{9.81 * np.sin(SLOPE)}, {-9.81 * np.cos(SLOPE)}]
+[laws.j]
+kind = "coulomb"
+normal_stiffness = 1e10
+shear_stiffness = 5e9
+friction = {np.tan(np.radians(35.0))}
+[[block]]
+name = "base"
+box = [12.0, 1.0]
+at = [0.0, -0.5]
+fixed = true
+[[block]]
+name = "block"
+box = [3.0, 1.5]
+at = [0.0, 0.75]
+[[block]]
+name = "stuck to its face"
+corners = [[1.5, 0.2], [2.0, 0.4], [2.0, 1.0], [1.5, 1.2]]
+[run]
+end = 0.02
+record = 0.01
+"""
+
+
+def unbalanced(sim):
+    """Unbalanced forces (n,) at step 0, as shares of the weights."""
+    force = np.hypot(*(sim.ledger.forces[0] * sim.blocks.free)[:, :2].T)
+    return force / np.hypot(*sim.blocks.gravity[:, :2].T).clip(1e-300)
+
+
+def names(sim):
+    return [sim.scene.blocks[i].name for i in np.flatnonzero(sim.loose)]
+
+
+def test_a_loose_block_leaves_the_one_that_it_touches_in_balance():
+    sim = Simulation(parse(BLOCK))
+    assert names(sim) == ["stuck to its face"]
+    lacking = unbalanced(sim)
+    assert lacking[1] < 1e-9
+    assert lacking[2] == pytest.approx(1.0, abs=0.01)  # nothing holds it
+    again = Simulation(sim.scene, saved=sim.state())
+    assert (again.loose == sim.loose).all()
+
+
+def test_a_block_that_slides_lacks_what_friction_does_not_hold():
+    """At 40 degrees: sin - cos tan 35, of its weight."""
+    steep = np.radians(40.0)
+    pull = 9.81 * np.array([np.sin(steep), -np.cos(steep)])
+    sim = Simulation(replace(parse(BLOCK), gravity=tuple(pull.tolist())))
+    lacking = np.sin(steep) - np.cos(steep) * np.tan(np.radians(35.0))
+    assert names(sim) == ["block", "stuck to its face"]
+    assert unbalanced(sim)[1] == pytest.approx(lacking, rel=0.03)
+
+
+def test_the_run_names_loose_blocks_and_says_how_each_block_moved(tmp_path, capsys):
+    (tmp_path / "scene.toml").write_text(BLOCK)
+    out = tmp_path / "out"
+    assert main([str(tmp_path / "scene.toml"), "--out", str(out), "--no-pictures"]) == 0
+    said = capsys.readouterr().out
+    assert "1 blocks cannot be held" in said
+    assert "stuck to its face (1.73, 0.70)" in said
+    assert "blocks: " in said  # a verdict without a [[rock]]
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["started_in_equilibrium"] is False
+    assert [block["block"] for block in summary["loose"]] == ["stuck to its face"]
+    rows = list(csv.DictReader((out / "blocks.csv").open()))
+    assert [row["block"] for row in rows] == ["base", "block", "stuck to its face"]
+    assert [row["loose_at_start"] for row in rows] == ["0", "0", "1"]
+    fell = float(rows[2]["displacement_m"])
+    assert fell == pytest.approx(0.5 * 9.81 * 0.02**2, rel=0.1)
+    assert float(rows[2]["speed_m/s"]) == pytest.approx(9.81 * 0.02, rel=0.1)
+    assert float(rows[1]["displacement_m"]) < 1e-6
+
+
+def test_strength_reduction_with_and_without_loose_blocks(tmp_path, capsys):
+    (tmp_path / "scene.toml").write_text(BLOCK)
+    out = tmp_path / "out"
+    words = [str(tmp_path / "scene.toml"), "--out", str(out), "--until", "0.3"]
+    assert main(["strength-reduction", *words]) == 0
+    (row,) = json.loads((out / "strength.json").read_text())["rows"]
+    assert [block["block"] for block in row["loose"]] == ["stuck to its face"]
+    assert row["factor_of_safety"] is None
+    assert row["factor_without"] == pytest.approx(np.tan(np.radians(35)) / np.tan(SLOPE), rel=0.01)
+    assert [block["block"] for block in row["first"]] == ["block"]
+    said = capsys.readouterr().out
+    assert said.index("cannot be held") < said.index("factor of safety without")
+
+
+@pytest.mark.slow
+def test_only_the_roof_of_a_cavern_falls():
+    """`cavern-smooth`: the wedge and the two blocks beside it fall, all others stay."""
+    sim = Simulation(load("cavern-smooth"))
+    assert sorted(names(sim)) == ["rock 78", "rock 84", "wedge"]
+    held = ~sim.loose & sim.blocks.free.any(axis=1)
+    assert unbalanced(sim)[held].max() < 1e-6
+    start = sim.blocks.motion[:2].copy()
+    while sim.time < 0.2:
+        sim.step()
+    moved = np.hypot(*(sim.blocks.motion[:2] - start))
+    assert moved[held].max() < 2e-3
+    assert moved[sim.loose].min() > 0.05

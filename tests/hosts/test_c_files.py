@@ -263,7 +263,7 @@ def test_texts_that_a_user_copies(tmp_path):
     F, _ = law.joint().update([1e-7, 5e-8, 0.0])
     for where, text in texts.items():
         if "int main" not in text:
-            head, body = re.match(r"((?:#.*\n)+)(.*)", text, re.S).groups()
+            head, body = re.match(r"((?:#[^\n]*\n)+)(.*)", text, re.S).groups()
             text = f"{head}int main(void)\n{{\n{body}\n{show}\n}}\n"
         program = build(tmp_path, text, "-std=c99", *SANE, "-fsanitize=address", "-Werror")
         done = subprocess.run(

@@ -213,6 +213,18 @@ class Joints:
             F[rows], C[rows], shown[rows] = step.F, step.C, step.shown
         return F / by, C / np.outer(by, by), shown[:, 3]
 
+    def unslid(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """As `trial` of virgin joints that cannot slide: tractions and tangents."""
+        closure, sign, shear = np.maximum(np.abs(d[:, 0]), 1e-9), np.sign(d[:, 0]), d[:, 1]
+        (stress, ss), above, below = (
+            np.array([self.virgin(of, "closure", closure * at) for of in ("stress", "stiffness")])
+            for at in (1.0, 1.01, 0.99)
+        )
+        rises, stiffens = (above - below) / (0.02 * closure)
+        acts = (d[:, 0] > 0) | (self.damage < 1)  # a joint that is open bears nothing, a bond does
+        C = np.stack([rises * acts, 0.0 * rises, stiffens * sign * shear, ss], axis=1)
+        return np.stack([stress * acts * sign, ss * shear], axis=1), C.reshape(-1, 2, 2)
+
     def virgin(self, of: str, by: str, x: np.ndarray) -> np.ndarray:
         """A column of the virgin curves, such as "stress", where another one is x (k,)."""
         out = np.empty(self.n)

@@ -126,9 +126,9 @@ class Equilibrium:
         return (self.rows.T @ (diags(self.area) @ C) @ self.rows).tocsc()
 
     def guess(self) -> np.ndarray:
-        """Displacements after one step through a drag in which a block falls by a tenth of its
-        reach; none where that is not found."""
-        y, _, found = self._step(self.none, self.slow / FAR + self.none, ROUGH)
+        """Displacements with joints that cannot slide, in a step through a drag in which a block
+        that nothing holds falls by a tenth of its reach; none where that is not found."""
+        y, _, found = self._step(self.none, self.slow / FAR + self.none, ROUGH, slides=False)
         return y * found
 
     def _median(self, y: np.ndarray) -> float:
@@ -154,14 +154,15 @@ class Equilibrium:
             before, drag = now, drag * change
         return y, r
 
-    def _unbalanced(self, y: np.ndarray):
+    def _unbalanced(self, y: np.ndarray, slides: bool = True):
         """Unbalanced forces (free motions,), and the stiffness (2 k, 2 k) of the joints."""
-        F, C, _ = self.joints.trial((self.start + self.rows @ y).reshape(2, -1).T)
+        d = (self.start + self.rows @ y).reshape(2, -1).T
+        F, C = self.joints.trial(d)[:2] if slides else self.joints.unslid(d)
         nn, ns, sn, ss = (diags(part) for part in C.reshape(-1, 4).T)
         stiffness = csr_array(bmat([[nn, ns], [sn, ss]]))
         return self.force - self.rows.T @ (self.area * F.T.ravel()), stiffness
 
-    def _step(self, y: np.ndarray, drag: np.ndarray, tight: float = TIGHT):
+    def _step(self, y: np.ndarray, drag: np.ndarray, tight: float = TIGHT, slides: bool = True):
         """An implicit step through a drag (free motions,), or without drag to the equilibrium.
 
         Newton's iterations, damped where the residual does not fall, each island of blocks that
@@ -174,7 +175,7 @@ class Equilibrium:
             return np.sqrt(np.bincount(island, parts * parts))
 
         def at(y):
-            r, C = self._unbalanced(y)
+            r, C = self._unbalanced(y, slides)
             left = (r - drag * (y - begin)) * free
             return r, C, left, norm(left)
 

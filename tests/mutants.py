@@ -11,7 +11,6 @@ blocks, where it is in C. All this in copies under the temporary folder. No part
 import argparse
 import ast
 import collections
-import difflib
 import hashlib
 import os
 import random
@@ -21,7 +20,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from queue import Queue
 
@@ -30,9 +29,6 @@ HOME = Path(tempfile.gettempdir()) / f"mutants-{hashlib.sha256(bytes(ROOT)).hexd
 BUILT = "jointlaw/native/built"
 COVERAGE = "[run]\nsource = jointlaw, dem_demo\ncontext = ${PYTEST_CURRENT_TEST-}\n"
 COVERAGE += "parallel = true\npatch = subprocess\ndata_file = "
-PAIRS = "Add Sub, Mult Div, Lt LtE, Gt GtE, Eq NotEq, Is IsNot, In NotIn, And Or, BitAnd BitOr"
-OTHER = dict([getattr(ast, one) for one in pair.split()] for pair in PAIRS.split(","))
-OTHER |= {b: a for a, b in OTHER.items()} | {ast.Pow: ast.Mult, ast.FloorDiv: ast.Mult}
 IN_C = (
     (r" \+ ", " - "), (r" - ", " + "), (r" \* ", " / "), (r" / ", " * "), (r" < ", " <= "),
     (r" > ", " >= "), (r" ([<>])= ", r" \1 "), (r" == ", " != "), (r" && ", " || "),
@@ -41,86 +37,37 @@ IN_C = (
     (r"\bif \((.*)\)", r"if (!(\1))"), (r"\b(\w+)\((\w+), (\w+)", r"\1(\3, \2"),
     (r"^( +)[^{}]*;$", r"\1;"),
 )  # fmt: skip
+IN_PYTHON = (
+    *IN_C[:8], *IN_C[10:17], (r" and ", " or "), (r" or ", " and "), (r"\bnot ", ""),
+    (r" is ", " is not "), (r" is not ", " is "), (r" in ", " not in "), (r" not in ", " in "),
+    (r"\bTrue\b", "False"), (r"\bFalse\b", "True"), (r" & ", " | "), (r" \| ", " & "), (r"\*\*", "*"),
+    (r" // ", " * "),
+    (r"\b([02-9]|\d\d+)\b(?![.e])", r"(\1 + 1)"), (r"\b(\d+\.\d+(e-?\d+)?)\b", r"(1.1 * \1)"),
+    (r"\bif (.+?)(:$| else )", r"if not (\1)\2"), (r"\bif (.+?)(:$| else )", r"if False\2"),
+    (r"\bwhile (.+):$", r"while not (\1):"), (r"(\"[\w./-]+)\"", r"\1x\""),
+    (r"\b(\w+)\(([\w.]+), ([\w.]+)", r"\1(\3, \2"), (r", \w+=[\w.]+\)", ")"),
+    (r"^( +)(raise .*|[\w.\[\]:, ]+ [-+*/|]?= .*|[\w.]+\(.*\))$", r"\1pass"),
+)  # fmt: skip
 
 
-def own(node):
-    """A node and its expressions, without annotations, texts with parts and inner statements."""
-    yield node
-    for name, value in ast.iter_fields(node):
-        for child in value if isinstance(value, list) else [value]:
-            skipped = name in ("annotation", "returns") or isinstance(
-                child, ast.stmt | ast.JoinedStr
-            )
-            if isinstance(child, ast.AST) and not skipped:
-                yield from own(child)
-
-
-def faults(node):
-    """Nodes at and below this one, and what may stand in place of each."""
-
-    def changed(**fields):
-        whole = type(node)(**(dict(ast.iter_fields(node)) | fields))
-        text = ast.unparse(ast.fix_missing_locations(whole))
-        return node, text if isinstance(node, ast.stmt) else f"({text})"
-
-    match node:
-        case ast.If(test=test) | ast.IfExp(test=test) | ast.While(test=test):
-            yield from ((test, f"(not ({ast.unparse(test)}))"), (test, "False"))
-        case ast.BinOp(op=op) | ast.BoolOp(op=op) | ast.AugAssign(op=op) if type(op) in OTHER:
-            yield changed(op=OTHER[type(op)]())
-        case ast.Compare(ops=[op]) if type(op) in OTHER:
-            yield changed(ops=[OTHER[type(op)]()])
-        case ast.UnaryOp(operand=operand):
-            yield node, f"({ast.unparse(operand)})"
-        case ast.Constant(value=bool(value)):
-            yield node, str(not value)
-        case ast.Constant(value=int(value)):
-            yield node, str(value + 1)
-        case ast.Constant(value=float(value)):
-            yield node, repr(1.1 * value or 1.0)
-        case ast.Constant(value=str(value)) if re.fullmatch(r"[\w./-]+", value):
-            yield node, repr(value + "x")
-        case ast.Call(args=[first, second, *more]):
-            yield changed(args=[second, first, *more])
-        case ast.Call(keywords=[*before, _]):
-            yield changed(keywords=before)
-    if isinstance(node, ast.Expr | ast.Assign | ast.AugAssign | ast.Raise):
-        yield node, "pass"
-
-
-def in_python(text):
-    """For each statement that can have a fault its line, and (begin, end, new bytes) of each."""
-    starts = [0]
-    for line in text.splitlines(keepends=True):
-        starts.append(starts[-1] + len(line))
-    for statement in ast.walk(ast.parse(text)):
-        words = isinstance(getattr(statement, "value", None), ast.Constant)
-        if not isinstance(statement, ast.stmt) or (isinstance(statement, ast.Expr) and words):
-            continue
-        yield (
-            statement.lineno,
-            [
-                (
-                    starts[at.lineno - 1] + at.col_offset,
-                    starts[at.end_lineno - 1] + at.end_col_offset,
-                    new,
-                )
-                for node in own(statement)
-                for at, new in faults(node)
-            ],
-        )
-
-
-def in_c(text):
-    """The same for each line of a file in C that is inside a function, but for its comment."""
-    at = 0
-    for line in text.decode().splitlines(keepends=True):
-        code = line.partition("/*")[0].encode()
-        rules = IN_C if re.match(rb"\s+\w", code) else ()
-        said = code.decode()
-        found = [rule for rule in rules if re.search(rule[0], said)]
-        yield 0, [(at, at + len(code), re.sub(*rule, said, count=1)) for rule in found]
-        at += len(line.encode())
+def places(path):
+    """Of each line that can have a fault: its own number, that of its statement as coverage counts
+    (0 in C), and what may stand in its place. Lines of words have none.
+    """
+    text, c, of = path.read_text(), path.suffix != ".py", {}
+    for one in ast.walk(ast.parse("" if c else text)):
+        if isinstance(one, ast.stmt):
+            words = isinstance(one, ast.Expr) and isinstance(one.value, ast.Constant)
+            last = one.body[0].lineno - 1 if getattr(one, "body", None) else one.end_lineno
+            of |= dict.fromkeys(range(one.lineno, last + 1), 0 if words else one.lineno)
+    for i, line in enumerate(text.splitlines(keepends=True), 1):
+        code = re.split(r"/\*|  #", line.rstrip("\n"))[0]
+        inside = re.match(r"\s+\w", code) if c else of.get(i)
+        made = {code[: at.start()] + at.expand(new) + code[at.end() :] + line[len(code) :]
+                for rule, new in (IN_C if c else IN_PYTHON)
+                for at in re.finditer(rule, code)} - {line}  # fmt: skip
+        if inside and made:
+            yield i, of.get(i, 0), sorted(made)
 
 
 class Copy:
@@ -157,9 +104,10 @@ class Copy:
     def judge(self, name, fault, tests, limit):
         """What comes of a fault, and the first test that sees it."""
         file, native = self.at / name, "native" in name
-        before, library = file.read_bytes(), self.library()
-        file.write_bytes(fault)
+        before, library = file.read_text(), self.library()
         try:
+            compile(fault, name, "exec") if file.suffix == ".py" else None
+            file.write_text(fault)
             if native and self.python("jointlaw.native")[0]:
                 return "cannot be built", ""
             if file.suffix != ".py" and self.library() == library:
@@ -168,10 +116,10 @@ class Copy:
             status, said = self.pytest("-x", "-n0", "-m", "", "@chosen", limit=limit)
             by = re.findall(r"^(?:FAILED|ERROR) (.*?)(?: - |$)", said, re.M) or [said[-300:]]
             return ("seen", f"by {by[0]}") if status else ("survived", f"{len(tests)} tests")
-        except subprocess.TimeoutExpired:
-            return "too long", ""
+        except (SyntaxError, subprocess.TimeoutExpired) as error:
+            return type(error).__name__, ""
         finally:
-            file.write_bytes(before)
+            file.write_text(before)
             if native:
                 shutil.copytree(ROOT / BUILT, self.at / BUILT, dirs_exist_ok=True)
 
@@ -212,45 +160,41 @@ def main():
     options = parser.parse_args()
     lines = tests_of_lines("" if options.slow else "not slow")
     every = set().union(*(tests for file in lines.values() for tests in file.values()))
-    places = []
+    found = []
     for where in (ROOT / one for one in options.where):
         for path in [where] if where.is_file() else sorted(where.rglob("*.*")):
-            read = {".py": in_python, ".c": in_c, ".h": in_c}.get(path.suffix)
-            if read and BUILT not in str(path):
-                name, text = str(path.relative_to(ROOT)), path.read_bytes()
-                places += [(name, line, made) for line, made in read(text) if made]
-    draw = random.Random(options.seed)
-    drawn = draw.sample(places, min(options.count, len(places)))
-    drawn = [(name, line, draw.choice(made)) for name, line, made in drawn]
-    copies, counts = Queue(), collections.Counter()
+            if path.suffix in (".py", ".c", ".h") and BUILT not in str(path):
+                found += [(str(path.relative_to(ROOT)), *place) for place in places(path)]
+    draw, copies, counts = random.Random(options.seed), Queue(), collections.Counter()
+    drawn = draw.sample(found, min(options.count, len(found)))
     for i in range(2):
         copies.put(Copy(f"copy-{i}"))
 
-    def run(place):
-        name, line, (begin, end, new) = place
-        text, runs = (ROOT / name).read_bytes(), name
-        fault = text[:begin] + new.encode() + text[end:]
-        if not name.endswith(".py"):
+    def run(name, i, statement, made):
+        text, runs = (ROOT / name).read_text().splitlines(keepends=True), name
+        old, new = text[i - 1], draw.choice(made)
+        if not statement:
             runs = "dem_demo/compiled.py" if "blocks" in name else "jointlaw/kernels/engine.py"
         of_file = lines.get(runs, {})
-        of_line = of_file.get(line, set()) if name.endswith(".py") else set()
-        ran = line in of_file or not line
-        tests = ran and (of_line or set().union(*of_file.values()) or every)
+        ran = not statement or statement in of_file
+        tests = ran and (of_file.get(statement) or set().union(*of_file.values()) or every)
         order = sorted(tests, key=lambda test: ("/unit/" not in test, test)) if tests else []
-        copied = copies.get()
-        try:
-            fate = copied.judge(name, fault, order, options.limit) if tests else ("not run", "")
-        finally:
-            copies.put(copied)
-        texts = (one.decode().splitlines() for one in (text, fault))
-        return name, *fate, [*difflib.unified_diff(*texts, lineterm="", n=0)][2:]
+        fault, copied = "".join([*text[: i - 1], new, *text[i:]]), copies.get()
+        fate = copied.judge(name, fault, order, options.limit) if tests else ("not run", "")
+        copies.put(copied)
+        counts[fate[0]] += 1
+        print(
+            " ".join(fate),
+            f"{name}:{i}",
+            f"- {old.strip()}",
+            f"+ {new.strip()}",
+            sep="\n  ",
+            flush=True,
+        )
 
     with ThreadPoolExecutor(2) as pool:
-        for done in as_completed([pool.submit(run, place) for place in drawn]):
-            name, fate, by, diff = done.result()
-            counts[fate] += 1
-            print(f"{fate} {by}", name, *diff, sep="\n  ", flush=True)
-    print(f"{len(places)} places; {', '.join(f'{n} {fate}' for fate, n in counts.items())}")
+        list(pool.map(lambda place: run(*place), drawn))
+    print(f"{len(found)} places; {', '.join(f'{n} {fate}' for fate, n in counts.items())}")
 
 
 if __name__ == "__main__":

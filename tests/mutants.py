@@ -40,8 +40,8 @@ IN_C = (
 IN_PYTHON = (
     *IN_C[:8], *IN_C[10:17], (r" and ", " or "), (r" or ", " and "), (r"\bnot ", ""),
     (r" is ", " is not "), (r" is not ", " is "), (r" in ", " not in "), (r" not in ", " in "),
-    (r"\bTrue\b", "False"), (r"\bFalse\b", "True"), (r" & ", " | "), (r" \| ", " & "), (r"\*\*", "*"),
-    (r" // ", " * "),
+    (r"\bTrue\b", "False"), (r"\bFalse\b", "True"), (r" & ", " | "), (r" \| ", " & "),
+    (r"\*\*", "*"), (r" // ", " * "),
     (r"\b([02-9]|\d\d+)\b(?![.e])", r"(\1 + 1)"), (r"\b(\d+\.\d+(e-?\d+)?)\b", r"(1.1 * \1)"),
     (r"\bif (.+?)(:$| else )", r"if not (\1)\2"), (r"\bif (.+?)(:$| else )", r"if False\2"),
     (r"\bwhile (.+):$", r"while not (\1):"), (r"(\"[\w./-]+)\"", r"\1x\""),

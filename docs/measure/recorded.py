@@ -1,8 +1,7 @@
 """Tables of figures that tests record: `python docs/measure/recorded.py TABLE`.
 
 The tests run at full length (JOINTLAW_FULL=1) and write each figure as a property of their report,
-a list in JSON. They also assert what the tables show. `drift` and `dynamics` take minutes, the
-others about one at most.
+a list in JSON. They also assert what the tables show. Each takes about a minute at most.
 """
 
 import json
@@ -16,7 +15,7 @@ from xml.etree import ElementTree
 
 from tables import ROOT, asked, table
 
-CHECKS = "slope / bound", "halving 16 to 128 steps", "units, F", "units, energy"
+CHECKS = "slope / bound", "units, F", "units, energy"
 
 
 def figures(tests):
@@ -56,31 +55,9 @@ def exact(found):
     return table(["a", "mu", "lam", "cells", "largest error of F"], rows)
 
 
-def drift(found):
-    rows = []
-    for amplitude in dict.fromkeys(row[0] for row in found["drift"]):
-        some = [row[1:] for row in found["drift"] if row[0] == amplitude]
-        settled, force, loss = zip(*some, strict=True)
-        rows.append([amplitude, f"{min(settled)} to {max(settled)}", f"{max(force):.0e}",
-                     f"{max(loss):.0e}"])  # fmt: skip
-    head = ["amplitude / closure", "cycles to shake down", "F, of its peak",
-            "loss per cycle, of the peak energy"]  # fmt: skip
-    return table(head, rows)
-
-
 def forgetting(found):
     rows = [[depth, *(f"{share:.4f}" for share in left)] for depth, *left in found["forgetting"]]
     return table(["cells", "1 cycle", "10", "100", "1000", "10 000"], rows)
-
-
-def dynamics(found):
-    rows = [
-        [case, share, steps, f"{above:.0e}", f"{growth:.0e}", f"{reached:.3f}"]
-        for case, share, steps, above, growth, reached in found["dynamics"]
-    ]
-    head = ["case", "of the critical step", "steps", "above the first energy",
-            "growth after a tenth", "reach / bound"]  # fmt: skip
-    return table(head, rows)
 
 
 def impact(found):
@@ -89,15 +66,12 @@ def impact(found):
     return table(["of the critical step", "samples of an impact", "change of energy"], rows)
 
 
-DRIFT = "test_cycles_repeat_after_shakedown"
 FORGETTING = "test_small_normal_cycles_forget_locked_in_shear_at_a_known_rate"
 # name: what makes it of the figures, tests that record them
 TABLES = {
     "matrix": (matrix, [f"extremes_{name}.py" for name in ("matrix", "continuity", "units")]),
     "exact": (exact, ["extremes_exact.py"]),
-    "drift": (drift, [f"extremes_drift.py::{DRIFT}"]),
     "forgetting": (forgetting, [f"extremes_drift.py::{FORGETTING}"]),
-    "dynamics": (dynamics, ["extremes_dynamics.py"]),
     "impact": (impact, ["extremes_impact.py"]),
 }  # fmt: skip
 

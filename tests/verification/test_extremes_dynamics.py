@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from extremes import FULL
 from extremes.laws import COMPILED, SCALE, build
 
 import jointlaw as jl
@@ -19,8 +18,6 @@ CASES = {  # law, normal stress of the load (Pa), speed of impact as a share of 
     "Hertz, no friction": ({"mu": 0.0}, 1e7, 0.3),
     "impact from opening": ({}, 1e6, 3.0),
     "impact, little friction": ({"mu": 0.01}, 1e6, 3.0),
-    "impact, no friction": ({"mu": 0.0}, 1e6, 3.0),
-    "impact on flat faces": ({"a": 1e8}, 1e6, 3.0),
     "steep faces, impact": ({"a": 1.0, "mu": 0.6}, 1e6, 3.0),
     "linear, soft in shear": ({"eta": 0.0, "lam": 10.0}, 1e7, 0.3),
     "linear, no friction": ({"eta": 0.0, "mu": 0.0}, 1e7, 0.3),
@@ -28,12 +25,14 @@ CASES = {  # law, normal stress of the load (Pa), speed of impact as a share of 
     "many heights": ({"heights": "printed, population"}, 1e7, 1.0),
     "slopes that fade": ({"mating_length": 0.3 * SCALE, "mu": 0.3}, 1e7, 1.0),
 }
+LOSSLESS = ("Hertz, no friction", "linear, no friction", "linear, soft in shear")
+PROBE, STEPS = (6000, 4000) if COMPILED else (1200, 500)
 
 
 class Mass:
     """n masses, each on its joint under a constant normal load, hit in n directions; leapfrog."""
 
-    def __init__(self, case, n=8):
+    def __init__(self, case, n=4):
         changes, stress, share = CASES[case]
         self.law = build(resolution=COARSE, **changes)
         self.load = np.array([stress * AREA, 0.0, 0.0])
@@ -73,19 +72,19 @@ class Mass:
         return energies, reach
 
 
-def swing(case, steps, n=4, share=0.95):
-    """Runs at this share of the critical step of the largest closure reached.
+def swing(case):
+    """Runs at 0.95 of the critical step of the largest closure reached.
 
     Returns, as shares of the kinetic energy at the start and the work of the load up to rest, how
     far the energy ever rises above the first, and how far after the first tenth above the largest
     in it; and the largest reach over that which the time step was made for.
     """
-    probe = Mass(case, n)
+    probe = Mass(case)
     bound = 10.0 * probe.rest
     short = 0.1 * probe.law.critical_time_step(MASS, AREA, bound)
-    bound = 1.1 * Mass(case, n).run(PROBE, short)[1]  # the closure reached, on a fine step
-    mass = Mass(case, n)
-    energies, reach = mass.run(steps, share * mass.law.critical_time_step(MASS, AREA, bound))
+    bound = 1.1 * Mass(case).run(PROBE, short)[1]  # the closure reached, on a fine step
+    mass = Mass(case)
+    energies, reach = mass.run(STEPS, 0.95 * mass.law.critical_time_step(MASS, AREA, bound))
     early = len(energies) // 10
     scale = mass.rest * mass.load[0] + 0.5 * MASS * np.sum(mass.start**2, axis=1)
     above = (energies.max(axis=0) - energies[0]) / scale
@@ -93,60 +92,23 @@ def swing(case, steps, n=4, share=0.95):
     return float(np.max(above)), float(np.max(growth)), reach / bound
 
 
-PROBE, SHORT = (6000, 4000) if COMPILED else (1200, 500)
-# Impacts that lose nothing: without friction, and along the normal of flat faces. They gain and
-# lose at every touch, as the bare power law does: test_extremes_impact.py
-LOSSLESS_IMPACTS = ("impact, no friction", "impact on flat faces")
-LOSSLESS = ("Hertz, no friction", "linear, no friction", "linear, soft in shear")
-
-
-STEPS = 1_000_000 if FULL else SHORT
-
-
-@pytest.fixture
-def swung(record, monkeypatch):
-    """`swing`, whose figures are recorded."""
-    if FULL:
-        monkeypatch.setitem(globals(), "EVERY", 97)  # looks at the energy cost most
-
-    def run(case, steps, share=0.95, n=4):
-        found = swing(case, steps, n, share)
-        record("dynamics", case, share, steps, *found)
-        return found
-
-    return run
-
-
-@pytest.mark.parametrize("case", [c for c in CASES if c not in (*LOSSLESS, *LOSSLESS_IMPACTS)])
-def test_with_friction_energy_never_rises_above_the_first(case, swung):
+@pytest.mark.parametrize("case", [case for case in CASES if case not in LOSSLESS])
+def test_with_friction_energy_never_rises_above_the_first(case):
     """At 0.95 of the critical step, impacts from opening and a friction of 0.01 included: no more
     than the rounding of the sums that energy is."""
-    above, growth, reached = swung(case, STEPS)
+    above, growth, reached = swing(case)
     assert reached <= 1.0
     assert max(above, growth) <= 1e-12
 
 
 @pytest.mark.parametrize("case", LOSSLESS)
-def test_lossless_lasting_contact_keeps_its_energy(case, swung):
+def test_lossless_lasting_contact_keeps_its_energy(case):
     """Leapfrog keeps that of a linear spring to rounding; that of a Hertz contact at 0.95 of its
     critical step comes and goes by 1 %, and after a tenth of the run no farther than before."""
-    above, growth, reached = swung(case, STEPS)
+    above, growth, reached = swing(case)
     assert reached <= 1.0 or "linear" in case  # which is as stiff at any closure
     assert above <= (0.02 if case == "Hertz, no friction" else 1e-12)
     assert growth <= (1e-3 if case == "Hertz, no friction" else 1e-12)
-
-
-@pytest.mark.parametrize("case", LOSSLESS_IMPACTS)
-def test_lossless_impacts_hardly_drift_at_a_fifth_of_the_critical_step(case, swung):
-    above, _, reached = swung(case, STEPS if FULL else 2 * SHORT, share=0.2)
-    assert reached <= 1.0
-    assert above < (0.05 if FULL else 0.02)  # without friction it grows, slowly
-
-
-@pytest.mark.parametrize("case", LOSSLESS_IMPACTS)
-def test_lossless_impacts_pass_their_bound_near_the_critical_step(case, swung):
-    _, _, reached = swung(case, 20_000 if FULL else 2 * SHORT, n=16)
-    assert reached > 1.0
 
 
 def test_beyond_the_critical_step_a_linear_joint_breaks_loose():

@@ -94,7 +94,7 @@ def path(rng, n, steps, size):
     d[kinds == 2, 0] = 0.0  # pure shear
     d[kinds == 3] *= 1e-290 / size  # 1e-300 and around
     d[kinds == 4] *= 1e-10
-    d[kinds == 5] = 0.0
+    d[kinds == 5] *= 5e-324 / size  # the smallest number, or nothing
     d[kinds == 6] *= 1e4
     d[0] = [size, 0.0, 0.0]
     return d, kinds == 7

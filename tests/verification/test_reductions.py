@@ -4,38 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from c_host import random_law
 
 import jointlaw as jl
 
 # The full law sums the same terms over all azimuths, a reduced one over one of them: what differs
 # is the rounding of a few hundred sums, carried along the path.
 EXACT = 1e-12
-
-
-def random_law(seed, **more):
-    """A law of any kind; heights and exponents come up in all combinations that are convex."""
-    rng = np.random.default_rng(seed)
-    a, b = rng.uniform(1.0, 8.0), rng.uniform(-1.0, 2.0)
-    formation = [None, "population", "individual"][seed % 3]
-    heights = None
-    if formation:
-        heights = jl.GammaHeights(alpha=3.82, beta=1.15, overlap=2.0, formation=formation)
-    asperity = jl.Asperity(
-        K=1.0,
-        lam=rng.uniform(0.5, 2.0),
-        eta=0.5 if formation == "population" else [0.5, 0.0, 1.0, 0.3][seed % 4],
-        mu=[0.0, 0.2, 1.0][rng.integers(3)],
-    )
-    resolution = jl.Resolution(int(rng.integers(1, 5)), int(rng.integers(3, 7)), 1 + seed % 5)
-    return jl.JointLaw(
-        orientation=jl.Orientation(a, b, rng.uniform(-1.0, 1.0) * (1 / 3 - b / 6)),
-        asperity=asperity,
-        heights=heights,
-        asperity_density=1.0,
-        closure_range=1.0,
-        resolution=resolution,
-        **more,
-    )
 
 
 def closures(seed, n, steps=40):
@@ -59,14 +34,14 @@ def followed(law, d):
     return np.array(rows)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, 1, 2, 3, 8, 12])
 def test_closure_only_is_the_whole_law_on_a_path_of_closure(seed):
     """Traction, tangent, energies and shares, against the law in 3-D and in a plane."""
-    d = closures(seed, 7)
-    found = followed(random_law(seed, closure_only=True), d)
+    d, law = 1e-6 * closures(seed, 7), random_law(seed)
+    found = followed(replace(law, plane=None, closure_only=True), d)
     peak = np.abs(found).max(axis=(0, 2))
     for plane in (None, 0.9):
-        full = followed(random_law(seed, plane=plane), d)
+        full = followed(replace(law, plane=plane), d)
         gap = np.abs(found - full).max(axis=(0, 2)) / np.where(peak > 0, peak, 1.0)
         F1, C11, sliding, slipping, separated, stored, reach, lost = gap
         assert max(F1, sliding, slipping, separated, stored, reach, lost) < EXACT
@@ -76,16 +51,16 @@ def test_closure_only_is_the_whole_law_on_a_path_of_closure(seed):
 
 
 def test_closure_only_has_one_facet_per_inclination():
-    law = random_law(1, closure_only=True)
+    law = replace(random_law(1), plane=None, closure_only=True)
     whole = replace(law, closure_only=False)
     assert len(law.facets.weight) == law.resolution.u
     assert len(whole.facets.weight) >= 2 * 3 * law.resolution.u
-    assert law.max_stiffness(0.7) == pytest.approx(whole.max_stiffness(0.7), rel=EXACT)
-    assert law.normal_stress(0.7) == pytest.approx(whole.normal_stress(0.7), rel=EXACT)
+    assert law.max_stiffness(0.7e-6) == pytest.approx(whole.max_stiffness(0.7e-6), rel=EXACT)
+    assert law.normal_stress(0.7e-6) == pytest.approx(whole.normal_stress(0.7e-6), rel=EXACT)
 
 
 def test_closure_only_is_refused_where_joints_shear(tmp_path):
-    law = random_law(2, closure_only=True)
+    law = replace(random_law(2), plane=None, closure_only=True)
     for use in (
         lambda: replace(law, plane=0.0),
         lambda: jl.direct_shear(law.joint(), to=0.1, normal=0.1),

@@ -40,3 +40,11 @@ def moved(law):
     batch = law.joints(5)
     batch.update([[1e-7 * (i + 1), 5e-8 * i, -2e-8 * i] for i in range(5)])
     return batch
+
+
+@pytest.fixture
+def in_an_empty_folder(tmp_path, monkeypatch):
+    """As a reader runs a command: in an empty folder, without a display."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    monkeypatch.setenv("COLUMNS", "80")

@@ -4,9 +4,7 @@ import pytest
 
 
 @pytest.fixture(autouse=True)
-def _in_an_empty_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("MPLBACKEND", "Agg")
+def _without_a_display(in_an_empty_folder):
     from matplotlib import pyplot
 
     pyplot.switch_backend("Agg")

@@ -15,7 +15,7 @@ from extremes import laws as extreme_laws
 
 import jointlaw as jl
 import jointlaw.cli.main
-from jointlaw.hosts.c.export import FORMAT, header_text, identifier, include_dir, table_text
+from jointlaw.hosts.c.export import FORMAT, header_text, include_dir, table_text
 
 FUZZ = HERE / "fuzz.c"
 DOCS = Path(__file__).parents[2] / "docs"
@@ -288,9 +288,6 @@ def test_examples_of_fewer_components(tmp_path, law, plane):
 
 
 def test_names(tmp_path, law):
-    assert identifier("jing-replica") == "jing_replica"
-    assert identifier("3 mm rock") == "joint_3_mm_rock"
-    assert identifier("---") == "joint"
     for name in ("3mm", "a-b", "", "x" * 60):
         with pytest.raises(ValueError, match="is no identifier of C; take letters"):
             jl.export_c(law, tmp_path / "new", name)

@@ -18,12 +18,7 @@ from jointlaw.cli.main import COMMANDS, main
 from jointlaw.hosts.c.export import identifier, require_name
 from jointlaw.laboratory.record import UNITS
 
-
-@pytest.fixture(autouse=True)
-def _in_an_empty_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("MPLBACKEND", "Agg")
-    monkeypatch.setenv("COLUMNS", "80")
+pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 
 
 def run(line):
@@ -151,7 +146,13 @@ def test_every_host_gets_its_files_and_is_told_what_to_type(host, tmp_path, caps
 
 
 @pytest.mark.parametrize(
-    ("text", "name"), [("rough-2", "rough_2"), ("7 b.", "joint_7_b"), ("-", "joint")]
+    ("text", "name"),
+    [
+        ("rough-2", "rough_2"),
+        ("7 b.", "joint_7_b"),
+        ("---", "joint"),
+        ("jing-replica", "jing_replica"),
+    ],
 )
 def test_a_name_of_tables_is_an_identifier_of_c(text, name):
     assert identifier(text) == name

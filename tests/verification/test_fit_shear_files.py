@@ -12,15 +12,9 @@ from test_peak_residual import law as sandstone
 import jointlaw as jl
 from jointlaw.cli.main import main
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("in_an_empty_folder")]
 U = np.concatenate([np.linspace(0, 0.5e-3, 9), np.linspace(0.75e-3, 3e-3, 10)])  # m
 NOISE = 0.005  # of the largest shear stress
-
-
-@pytest.fixture(autouse=True)
-def _in_an_empty_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("MPLBACKEND", "Agg")
 
 
 @pytest.fixture(scope="module")

@@ -42,20 +42,6 @@ def test_azimuths_are_exact_for_the_harmonics_of_c(phi, flattest):
             assert np.sum(f.weight * np.cos(k * f.phi)) == pytest.approx(0.0, abs=1e-14)
 
 
-@pytest.mark.parametrize(("cells", "farther"), [(6, 1), (16, 2)])
-def test_cells_of_a_power_law_are_a_power_grading(cells, farther):
-    # sqrt(Phi'') Phi^-0.15 ~ y^-0.475 for Phi = y^1.5: its integral ~ y^0.525
-    curve, slopes = virgin_curve(0.5, None), np.array([0.0, 1.0])
-    nodes = depth_nodes(curve, 2.0, slopes, np.full(2, cells))
-    share = np.arange(1, cells) / (cells - 1 + 1.8)
-    for zeta, slope in zip(nodes, slopes, strict=True):  # the closure, and what shear adds to it
-        assert zeta[0] == 0.0
-        assert np.isinf(zeta[-1])
-        reach = 2.0 * (1.0 + farther * slope)  # many cells: twice the shear
-        # summed over 512 panels
-        np.testing.assert_allclose(zeta[1:-1], reach * share ** (1 / 0.525), rtol=5e-3)
-
-
 def test_cells_for_small_loads_are_a_geometric_grading():
     """sqrt(Phi''/Phi) ~ 1/y from the lowest closure on: errors are the same shares of all loads."""
     curve, lowest = virgin_curve(0.5, None), 1e-2
@@ -66,19 +52,6 @@ def test_cells_for_small_loads_are_a_geometric_grading():
     assert np.ptp(ratio) < 0.01 * ratio[0]  # summed over panels
     usual = depth_nodes(curve, 2.0, np.zeros(1), np.array([30]))
     assert np.count_nonzero(nodes < 0.1) > 2 * np.count_nonzero(usual < 0.1)
-
-
-@pytest.mark.parametrize("formation", ["population", "individual"])
-def test_cells_rise_and_scale_with_the_unit_of_length(formation):
-    slope = np.array([0.0, 0.3, 1e9])
-    for cells in (1, 2, 17):
-        found = []
-        for unit in (1.0, 4.0):
-            heights = jl.GammaHeights(3.82, 1.15e-6 * unit, 2e-6 * unit, formation)
-            curve = virgin_curve(0.5, heights)
-            found.append(depth_nodes(curve, 1e-6 * unit, slope, np.full(3, cells)))
-        assert (np.diff(found[0], axis=1) > 0).all()
-        np.testing.assert_array_equal(found[1][:, :-1], 4.0 * found[0][:, :-1])  # to the bit
 
 
 def test_memory_goes_with_the_number_of_facets(make_law):

@@ -1,11 +1,11 @@
-"""The virgin curve against scipy's own quadrature, its derivative, its inverse, its counts."""
+"""The virgin curve against its definition, its derivative, its inverse, its counts."""
 
 import math
-from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy import integrate
+from slow_virgin import virgin
 
 import jointlaw as jl
 
@@ -28,37 +28,15 @@ def case(request, make_law):
     return make_law(heights=CASES[request.param])
 
 
-def by_quadrature(h, eta, y):
-    """Phi and Phi', the integrals by QUADPACK piece by piece.
-
-    Source: docs/theory-incremental.md, "Heights, direction and Hertz become one curve".
-    """
-    if h.formation == "population":
-        P, H = h.cdf(h.overlap + y), h.pdf(h.overlap + y)
-        return P * y ** (1 + eta), (1 + eta) * P * y**eta + H * y ** (1 + eta)
-    P = h.cdf(h.overlap)
-    ends = [0.0, *(s for s in h.breakpoints() - h.overlap if 0 < s < y), y]
-    integrals = []
-    for p in (1 + eta, eta):
-        total = 0.0
-        for low, high in pairwise(ends):
-            # the density in u = s/y; the last piece with QUADPACK's weight for (1 - u)^p
-            last = high == y
-            f = lambda u, q: float(h.pdf(h.overlap + u * y)) * (1 - u) ** q  # noqa: E731
-            rule = {"weight": "alg", "wvar": (0.0, p)} if last else {}
-            total += integrate.quad(
-                f, low / y, high / y, (0.0 if last else p,), epsabs=0, epsrel=1e-10, **rule
-            )[0]
-        integrals.append(y * total)
-    return y ** (1 + eta) * (P + integrals[0]), (1 + eta) * y**eta * (P + integrals[1])
-
-
 @pytest.mark.filterwarnings("ignore::scipy.integrate.IntegrationWarning")
 def test_curve_and_slope(case):
-    eta = case.asperity.eta
+    eta, h = case.asperity.eta, case.heights
+    slow = SimpleNamespace(
+        density=h.pdf, cumulative=h.cdf, overlap=h.overlap, formation=h.formation
+    )
     force, slope = case.curve.force(np.array(Y))
     for y, F, K in zip(Y, force, slope, strict=True):
-        exact, exact_slope = by_quadrature(case.heights, eta, y)
+        exact, exact_slope = virgin(y, eta, slow, h.breakpoints())
         # S = Phi/y^(1+eta), at most 1, is tabulated to 1e-10 (1e-9 at the edges of a histogram),
         # its derivative is one order lower
         assert F / y ** (1 + eta) == pytest.approx(exact / y ** (1 + eta), abs=1e-9)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 from scipy.integrate import quad
 from scipy.special import gammainc, gammaln
@@ -28,8 +29,11 @@ class SlowGamma:
         return float(gammainc(self.alpha + 1.0, max(r, 0.0) / self.beta))
 
 
-def virgin(y, eta, heights=None):
-    """Phi(y) and Phi'(y) of a single closure y >= 0."""
+def virgin(y, eta, heights=None, ends=()):
+    """Phi(y) and Phi'(y) of a single closure y >= 0; `ends`: heights between which H is smooth.
+
+    Source: docs/theory-incremental.md, "Heights, direction and Hertz become one curve".
+    """
     if y <= 0.0:
         p0 = 1.0 if heights is None else heights.cumulative(heights.overlap)
         return 0.0, (p0 if eta == 0.0 else 0.0)
@@ -43,10 +47,17 @@ def virgin(y, eta, heights=None):
     p0 = heights.cumulative(r0)
 
     def new(power):
-        def f(s):
-            return heights.density(r0 + s)
+        total = 0.0
+        for low, high in pairwise([0.0, *(s - r0 for s in ends if r0 < s < r0 + y), y]):
+            # the density in u = s/y; the last piece with QUADPACK's weight for (1 - u)^power: no
+            # loss at the end where contacts are born
+            last = high == y
+            rule = {"weight": "alg", "wvar": (0.0, power)} if last else {}
 
-        # quad's algebraic weight (y - s)**power: no loss at the end where contacts are born
-        return quad(f, 0.0, y, weight="alg", wvar=(0.0, power), epsrel=1e-12, epsabs=0.0)[0]
+            def f(u, p=0.0 if last else power):
+                return heights.density(r0 + u * y) * (1.0 - u) ** p
+
+            total += quad(f, low / y, high / y, epsrel=1e-12, epsabs=0.0, **rule)[0]
+        return total * y ** (1.0 + power)
 
     return p0 * force + new(1.0 + eta), p0 * slope + (1.0 + eta) * new(eta)

@@ -58,21 +58,17 @@ def circle(graph):
     return []
 
 
-def test_no_circle_of_files():
-    found = circle({path: imported(path) for path in trees()})
-    assert not found, f"{' -> '.join(found)}: move what both need into a file below them"
-
-
-def test_no_circle_of_folders():
-    """Types count, too: a folder that names those of another lies above it."""
-    graph = {}
+def test_no_circle_of_files_or_folders():
+    """Types count for folders, too: a folder that names those of another lies above it."""
+    folders = {}
     for path in trees():
         folder = path.rpartition("/")[0]
         others = {file.rpartition("/")[0] for file in imported(path, types=True)}
         if "/" in folder:
-            graph[folder] = graph.get(folder, set()) | (others - {folder, *PACKAGES})
-    found = circle(graph)
-    assert not found, f"{' -> '.join(found)}: move what both need into a folder below them"
+            folders[folder] = folders.get(folder, set()) | (others - {folder, *PACKAGES})
+    for graph in ({path: imported(path) for path in trees()}, folders):
+        found = circle(graph)
+        assert not found, f"{' -> '.join(found)}: move what both need into one below them"
 
 
 def test_a_circle_is_found_and_imports_in_functions_count():

@@ -7,6 +7,8 @@ balance no longer falls: it is loose. Contacts keep their places and normals her
 small, and where a loose block would be in the end means nothing.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.sparse import bmat, csc_array, csr_array, diags
 from scipy.sparse.csgraph import connected_components
@@ -125,11 +127,13 @@ class Equilibrium:
     def _stiffness(self, C) -> csc_array:
         return (self.rows.T @ (diags(self.area) @ C) @ self.rows).tocsc()
 
-    def guess(self) -> np.ndarray:
-        """Displacements with joints that cannot slide, in a step through a drag in which a block
-        that nothing holds falls by a tenth of its reach; none where that is not found."""
-        y, _, found = self._step(self.none, self.slow / FAR + self.none, ROUGH, slides=False)
-        return y * found
+    def starts(self) -> Iterator[np.ndarray]:
+        """Displacements to begin with: after a step through a drag in which a block that nothing
+        holds falls by a tenth of its reach, with joints that cannot slide, and with those that can;
+        none where that is not found."""
+        for slides in (False, True):
+            y, _, found = self._step(self.none, self.slow / FAR + self.none, ROUGH, slides)
+            yield y * found
 
     def _median(self, y: np.ndarray) -> float:
         """Median stiffness of the free motions."""

@@ -1,5 +1,8 @@
 """The initial equilibrium: displacements with which the joints carry gravity and loads."""
 
+from collections.abc import Iterable
+from itertools import chain
+
 import numpy as np
 
 from ..contact import Joints, Tracker
@@ -22,11 +25,11 @@ def seat(
     Loose blocks, which cannot be held, stay almost where they are drawn; all others are in balance
     with what the loose ones do to them there.
     """
-    loose, first, near = np.zeros(len(blocks.free), bool), 0.0, blocks.near()
+    loose, first, pairs = np.zeros(len(blocks.free), bool), 0.0, blocks.near()
     for again in range(ROUNDS):  # each at the places just found: joints turn with the blocks
         tracker.follow(blocks.motion)
         tracker.urgent[:] = True  # it is cheap here, and nothing is missed
-        before = tracker.renew(blocks.motion, near)
+        before = tracker.renew(blocks.motion, pairs)
         if before is not None:
             joints.rearrange(before, tracker.law, tracker.keys)
             slid = np.where(before >= 0, slid[before], 0.0)
@@ -35,11 +38,8 @@ def seat(
         if again:
             force = force + _length_forces(scene, blocks, tracker, joints, slid)
         search = Equilibrium(scene, blocks, tracker, joints, slid, force)
-        guess = search.none if again or scene.in_situ is not None else search.guess()
-        more, old = ~loose, loose
-        while more.any():
-            moved, more = search.attempt(guess, loose, old)
-            loose = loose | more
+        near = again or scene.in_situ is not None
+        moved, loose = _placed(search, [search.none] if near else search.starts(), loose)
         slid = slid + (search.rows @ moved)[len(slid) :]
         blocks.motion[:3] += search.spread(moved * search.root).T
         most = np.abs(moved[~loose[search.block]]).max(initial=0.0)
@@ -65,12 +65,29 @@ def displacements(
     slid = begin(scene, blocks, tracker, joints)
     search = Equilibrium(scene, blocks, tracker, joints, slid, blocks.gravity + blocks.loads)
     known = np.zeros(len(blocks.free), bool) if loose is None else loose
-    for first in (guess, search.guess()):
-        if first is not None:
-            moved, more = search.attempt(first, known)
-            if not more.any():
-                return moved
+    given = [] if guess is None else [guess]
+    for start in chain(given, search.starts()):
+        moved, more = search.attempt(start, known)
+        if not more.any():
+            return moved
     return None
+
+
+def _placed(search: Equilibrium, starts: Iterable[np.ndarray], loose: np.ndarray):
+    """Displacements at which all blocks but loose ones are in balance, and who is loose (n,): from
+    that of the starts which leaves the fewest. loose (n,): those that are known to be.
+    """
+    best = None
+    for start in starts:
+        now, more = loose, ~loose
+        while more.any():
+            moved, more = search.attempt(start, now, loose)
+            now = now | more
+        if best is None or now.sum() < best[1].sum():
+            best = moved, now
+        if (now == loose).all():
+            break
+    return best
 
 
 def _length_forces(scene, blocks, tracker, joints, slid) -> np.ndarray:

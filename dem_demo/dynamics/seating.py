@@ -1,8 +1,5 @@
 """The initial equilibrium: displacements with which the joints carry gravity and loads."""
 
-from collections.abc import Iterable
-from itertools import chain
-
 import numpy as np
 
 from ..contact import Joints, Tracker
@@ -38,8 +35,11 @@ def seat(
         if again:
             force = force + _length_forces(scene, blocks, tracker, joints, slid)
         search = Equilibrium(scene, blocks, tracker, joints, slid, force)
-        near = again or scene.in_situ is not None
-        moved, loose = _placed(search, [search.none] if near else search.starts(), loose)
+        start = search.none if again or scene.in_situ is not None else search.unslid()
+        more, known = ~loose, loose
+        while more.any():
+            moved, more = search.attempt(start, loose, known)
+            loose = loose | more
         slid = slid + (search.rows @ moved)[len(slid) :]
         blocks.motion[:3] += search.spread(moved * search.root).T
         most = np.abs(moved[~loose[search.block]]).max(initial=0.0)
@@ -56,7 +56,7 @@ def displacements(
     """Displacements of the free motions at which virgin joints carry a scene as drawn.
 
     All loads act at once; in unit-mass motions, None where none are found. They are looked for from
-    guess, those of a similar scene, and from those after a step through a drag: where bonds break
+    guess, those of a similar scene, and from those of joints that cannot slide: where bonds break
     and joints soften, one may find what the other misses. loose (n,): blocks that need not be
     carried.
     """
@@ -65,29 +65,12 @@ def displacements(
     slid = begin(scene, blocks, tracker, joints)
     search = Equilibrium(scene, blocks, tracker, joints, slid, blocks.gravity + blocks.loads)
     known = np.zeros(len(blocks.free), bool) if loose is None else loose
-    given = [] if guess is None else [guess]
-    for start in chain(given, search.starts()):
-        moved, more = search.attempt(start, known)
-        if not more.any():
-            return moved
+    for start in (guess, search.unslid()):
+        if start is not None:
+            moved, more = search.attempt(start, known)
+            if not more.any():
+                return moved
     return None
-
-
-def _placed(search: Equilibrium, starts: Iterable[np.ndarray], loose: np.ndarray):
-    """Displacements at which all blocks but loose ones are in balance, and who is loose (n,): from
-    that of the starts which leaves the fewest. loose (n,): those that are known to be.
-    """
-    best = None
-    for start in starts:
-        now, more = loose, ~loose
-        while more.any():
-            moved, more = search.attempt(start, now, loose)
-            now = now | more
-        if best is None or now.sum() < best[1].sum():
-            best = moved, now
-        if (now == loose).all():
-            break
-    return best
 
 
 def _length_forces(scene, blocks, tracker, joints, slid) -> np.ndarray:

@@ -44,11 +44,12 @@ def slope(**keys):
 
 
 def turning(scene):
-    """How far the block that moves farthest turns, as a share: arm times angle over distance."""
+    """How far the blocks turn that move far, arm times angle over distance: their median."""
     record = failing(scene, 0.3)
-    first = int(record.moved.argmax())
-    turned = record.motion[-1][2, first] - record.motion[0][2, first]
-    return abs(turned) * scene.blocks[first].reach / record.moved[first]
+    far = record.moved > 0.5 * record.moved.max()
+    arms = np.array([block.reach for block in scene.blocks])
+    turned = np.abs(record.motion[-1][2] - record.motion[0][2]) * arms
+    return np.median(turned[far] / record.moved[far])
 
 
 @pytest.mark.slow
@@ -59,7 +60,7 @@ def test_a_slope_that_slides_has_the_factor_of_limit_analysis():
     assert most == pytest.approx(0.7002 / np.tan(np.radians(30)), rel=2e-3)
     assert found == pytest.approx(most, rel=0.02)
     assert found < most * (1 + FOUND)
-    assert turning(weakened(scene, 1.05 * found)) < 0.05
+    assert turning(weakened(scene, 1.05 * found)) < 0.01
 
 
 @pytest.mark.slow

@@ -66,10 +66,6 @@ OPTIONS = {
     },
     "--format": {"choices": FORMATS, "default": FORMATS[0], "help": "of pictures (default png)"},
     "--vtk": {"action": "store_true", "help": "also VTK files for ParaView, in DIR/vtk (meshio)"},
-    "--asperity": {
-        "action": "store_true",
-        "help": "also the factor that divides the friction of asperities alone",
-    },
     "--seeds": {"type": int, "nargs": "+", "default": [1, 2, 3], "help": "default 1 2 3"},
 }
 
@@ -230,11 +226,10 @@ def _reduce(given: argparse.Namespace) -> None:
     texts = {
         "factor_of_safety": "factor of safety",
         "factor_without": "factor of safety without those",
-        "asperity_factor": "asperity factor",
         "critical_tilt": "critical tilt in degrees",
     }
     found = strength.strength_reduction(
-        scene, until, given.out, given.format, given.asperity, partial(print, flush=True)
+        scene, until, given.out, given.format, partial(print, flush=True)
     )
     try:
         for row in found:
@@ -262,13 +257,5 @@ COMMANDS = {
     "check": (_check, "scene"),
     "ablate": (_ablate, "scene", "--out", "--force", "--until"),
     "compare": (_compare, "scene", "--seeds", "--until"),
-    "strength-reduction": (
-        _reduce,
-        "scene",
-        "--out",
-        "--force",
-        "--until",
-        "--format",
-        "--asperity",
-    ),
+    "strength-reduction": (_reduce, "scene", "--out", "--force", "--until", "--format"),
 }

@@ -5,7 +5,6 @@ displacements are found with which the joints carry the loads. A search starts w
 holds, and looks for every equilibrium from the one before, with shorter steps where none is found.
 """
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -15,7 +14,6 @@ import numpy as np
 from tqdm import tqdm
 
 import jointlaw as jl
-from jointlaw.parameters.rock import STEEPEST
 from jointlaw.support.pyplot import FORMATS
 
 from ..dynamics.seating import displacements
@@ -37,7 +35,6 @@ def strength_reduction(
     until: float,
     folder: Path,
     picture_format: str = FORMATS[0],
-    asperity: bool = False,
     tell: Callable[[str], None] = lambda text: None,
 ) -> Iterator[dict]:
     """Factor of safety and critical tilt of every rock alone, or of a scene without rocks.
@@ -45,7 +42,7 @@ def strength_reduction(
     Yields `rock`; `loose`: blocks that cannot be held as drawn, names and centroids (m);
     `without`: the same, or where all are loose, those that twice the strength does not hold either;
     `factor_of_safety`; with such blocks `factor_without`: of all others, while these move away;
-    with `asperity` also `asperity_factor`; `critical_tilt` (degrees); each None where none is
+    `critical_tilt` (degrees); each None where none is
     found. `picture`: the file in `folder` that shows how it fails, None without a factor; `first`:
     the blocks that move first there. That run has the strength divided by 1.02 times the factor
     (without loose blocks, if there are any), and ends at `until` (s) or once a block has moved by
@@ -71,8 +68,6 @@ def strength_reduction(
             tell(f"{name}: factor of safety without those {len(row['without'])}")
             factor = factor_of_safety(one, trials, f"{name} without loose blocks", apart)
             row["factor_without"] = factor
-        if asperity:
-            row["asperity_factor"] = asperity_factor(one, trials, name)
         tell(f"{name}: critical tilt")
         row |= {"critical_tilt": critical_tilt(one, trials, name), "picture": None}
         if factor:
@@ -117,22 +112,11 @@ def factor_of_safety(
     Strength is the shear stress that a joint can bear at its own normal stress. None if the scene
     holds with 1/64 of it, or fails with 64 times of it.
     """
-    name = f"{name}: factor of safety"
-    return _factor(partial(weakened, scene), trials or Trials(scene), name, loose)
 
+    def at(log: float) -> Scene:
+        return weakened(scene, float(np.exp(log)))
 
-def asperity_factor(
-    scene: Scene, trials: Trials | None = None, name: str = "scene"
-) -> float | None:
-    """What the friction of all asperities is divided by for a scene to just hold.
-
-    None as above. No friction is made larger than a scene may have, 5.
-    """
-    return _factor(partial(smoothed, scene), trials or Trials(scene), f"{name}: asperity factor")
-
-
-def _factor(at: Callable[[float], Scene], trials: Trials, name: str, loose=None) -> float | None:
-    log = _march(lambda log: at(float(np.exp(log))), FACTOR, trials, name, loose)
+    log = _march(at, FACTOR, trials or Trials(scene), f"{name}: factor of safety", loose)
     return None if log is None else float(np.exp(log))
 
 
@@ -159,25 +143,6 @@ def weakened(scene: Scene, factor: float) -> Scene:
             bond = replace(bond, tension=bond.tension / factor, energy_I=energy)
             laws[name] = replace(law, bond=bond)
     return replace(scene, laws=laws, reduction=scene.reduction * factor)
-
-
-def smoothed(scene: Scene, factor: float) -> Scene:
-    """A scene with the friction of asperities and of plain Coulomb divided by a factor."""
-    laws = dict(scene.laws)
-    for name, law in scene.laws.items():
-        if isinstance(law, jl.CoulombLaw):
-            if math.isinf(law.friction):  # what fails so has no factor
-                continue
-            residual = law.residual_friction
-            laws[name] = replace(
-                law,
-                friction=min(law.friction / factor, STEEPEST),
-                residual_friction=residual and min(residual / factor, STEEPEST),
-            )
-        else:
-            weak = min(law.asperity.mu / factor, STEEPEST)
-            laws[name] = replace(law, asperity=replace(law.asperity, mu=weak))
-    return replace(scene, laws=laws)
 
 
 def _march(

@@ -28,6 +28,7 @@ FRACTIONS = {  # of the limit that a time step is, by what can happen
     "drives move blocks": 0.4,
     "the blocks are in equilibrium": 0.7,
 }
+IMPACT = 1e4  # Pa: normal stress of a first impact, for a time step before anything touches
 HALVINGS = 8  # of a time step that was chosen, until a run is refused
 
 
@@ -185,15 +186,12 @@ class Simulation:
     def _chosen_step(self) -> float:
         """By the scene's fraction of the limit, or else by one for what can happen."""
         scene, limit = self.scene, self.limit.now
-        if largest := scene.run.largest_stress:
+        if not np.isfinite(limit):  # nothing touches yet
             curves = (held.curve for held in self.joints.held)
-            stiffness = max(float(np.interp(largest, c["stress"], c["stiffness"])) for c in curves)
-            limit = min(limit, impact_limit(scene, self.blocks, self.tracker.outlines, stiffness))
+            stiffness = max(float(np.interp(IMPACT, c["stress"], c["stiffness"])) for c in curves)
+            limit = impact_limit(scene, self.blocks, self.tracker.outlines, stiffness)
         if not np.isfinite(limit):
-            raise Refused(
-                "nothing touches at the start, so no time step follows: set run.largest_stress "
-                "(Pa) to the normal stress expected in impacts, or run.step (s)"
-            )
+            raise Refused("forces move no block, so no time step follows: set run.step (s)")
         if scene.run.fraction:
             return scene.run.fraction * limit
         falls = not scene.run.seat or self.loose.any() or self.blocks.velocity.any()

@@ -30,7 +30,6 @@ class Run:
     dashpot_normal: float = 0.05  # shares of critical
     dashpot_shear: float = 0.05
     law_steps: int = 1  # steps of the law per time step: 4 balances energy to 0.5 % in impacts
-    largest_stress: float = 0.0  # Pa, expected in impacts: sets the step before anything touches
     max_overlap: float = 0.1  # share of the smaller block's width
 
 

@@ -57,18 +57,20 @@ def base_angle(sim: Simulation, moving: int, base: int) -> float:
 
 def law_between(sim: Simulation, moving: int, base: int) -> str:
     """Name of the law of the joint between the faces with which two blocks face each other."""
-    faces = _face(sim, moving, base)[0], _face(sim, base, moving)[0]
-    return sim.scene.law_of((moving, faces[0], base, faces[1]))
+    one, other = sorted((moving, base))
+    edges = [_face(sim, one, other)[0], _face(sim, other, one)[0]]
+    return sim.joints.names[sim.tracker.laws_of(np.array([edges]))[0]]
 
 
 def _face(sim: Simulation, block: int, other: int) -> tuple[int, np.ndarray]:
-    """Number and outward normal of a block's face that another's centroid is farthest outside."""
+    """The edge of a block that another's centroid is farthest outside of, by its number among all
+    edges, and its outward normal."""
     x, y, angle = sim.blocks.motion[:3, block]
     corners = sim.scene.blocks[block].local @ turn(angle).T + [x, y]
     along = np.roll(corners, -1, axis=0) - corners
     outward = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
     face = int(((sim.blocks.motion[:2, other] - corners) * outward).sum(axis=1).argmax())
-    return face, outward[face]
+    return sim.tracker.outlines.start[block] + face, outward[face]
 
 
 def readings(sim: Simulation) -> dict[str, float]:

@@ -20,8 +20,9 @@ class Record:
     """Frames of a run: times (f,), motion (f, 6, n), NaN for blocks that are gone, energies (f, 9),
     joints.
 
-    joints[f]: by name, "who" (k, 5) block, edge, block, edge, contact; "ends" (k, 2, 2) the segment
-    of joint that a contact carries; and numbers (k,) with their unit in the name. stresses[f] (3,
+    joints[f]: by name, "who" (k, 2) its blocks; "ends" (k, 2, 2) the segment
+    of joint that a contact carries; "law" (k,), by its number in the scene; and numbers (k,) with
+    their unit in the name. stresses[f] (3,
     n): of the blocks. monitored[f]:
     what the scene's [watch] asks for; slips: of its joints; laws: of the watched joints; state:
     that of the last frame, to return to; steps: of the run; loose (n,): who was at its start.
@@ -84,8 +85,7 @@ class Record:
             self.loose * 0.0,
         )
         joints = self.joints[-1]
-        for side in (0, 2):
-            np.maximum.at(slip, joints["who"][:, side], np.abs(joints["shear_m"]))
+        np.maximum.at(slip, joints["who"], np.abs(joints["shear_m"])[:, None])
         columns = {
             "block": [block.name for block in self.scene.blocks], "x_m": last[:, 0],
             "y_m": last[:, 1], "displacement_m": np.hypot(*away.T), "displacement_x_m": away[:, 0],
@@ -122,7 +122,7 @@ def _joints(sim: Simulation) -> dict[str, np.ndarray]:
     ends = c.at + np.stack([ahead, ahead - 1], axis=0) * c.length * along
     ends = np.stack([ends.real, ends.imag], axis=-1).swapaxes(0, 1)
     columns = {
-        "who": np.column_stack([c.interfaces, sim.tracker.numbers]), "ends": ends,
+        "who": np.column_stack([c.a, c.b]), "ends": ends, "law": sim.tracker.law,
         "closure_m": c.closure, "shear_m": joints.delta[:, 1],
         "normal_stress_Pa": joints.traction[:, 0], "shear_stress_Pa": joints.traction[:, 1],
         "sliding": joints.sliding, "slipping": joints.slipping, "separated": joints.separated,

@@ -8,7 +8,7 @@ import numpy as np
 from ..dynamics.energy import COLUMNS
 from ..dynamics.simulation import Simulation
 from ..scene import Scene, usual_size
-from .monitors import law_between, readings, watched_slips
+from .monitors import base_of, law_between, readings, watched_slips
 
 FAILED = 0.1  # of the usual size of a rock's blocks: one that has moved farther has failed
 CREEP = 1e-6  # m/s: faster is not at rest
@@ -51,16 +51,10 @@ class Record:
         self.monitored.append(readings(sim))
         self.state = sim.state()
 
-    def base(self, i: int) -> np.ndarray:
-        """Displacement (2,) of the scene's base from the drawing to frame i (m); 0 without one."""
-        if (block := self.scene.base) is None:
-            return np.zeros(2)
-        return self.motion[i][:2, block] - self.scene.blocks[block].centroid
-
     def displaced(self, i: int) -> np.ndarray:
         """Displacements (n, 2) from the drawing to frame i, relative to the base (m)."""
         drawn = np.array([block.centroid for block in self.scene.blocks])
-        return self.motion[i][:2].T - drawn - self.base(i)
+        return self.motion[i][:2].T - drawn - base_of(self.scene, self.motion[i])[:2]
 
     @property
     def moved(self) -> np.ndarray:

@@ -1,6 +1,5 @@
-"""How a scene fails with a little less strength than it needs."""
+"""How a scene fails: a run that ends once it has."""
 
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -15,21 +14,21 @@ FIRST = 0.01  # of the usual size of a block: who has moved by half of the most 
 
 
 def seated(scene: Scene) -> Scene:
-    """A scene that starts from its equilibrium, with the time step that follows."""
+    """A scene that starts from its equilibrium, with the time step that follows: it is halved where
+    joints close too far for it."""
     return replace(scene, run=replace(scene.run, step=None, fraction=None, seat=True))
 
 
-def failing(scene: Scene, until: float) -> Record:
-    """A run to `until` (s), or until a block has moved by the usual size of a block.
-
-    Where joints close too far for the time step, that is halved. What is recorded by then is kept
-    where that does not help.
-    """
-    sim = Simulation(seated(scene))
-    record = Record(sim)
-    with suppress(Refused):
+def to_failure(scene: Scene, until: float) -> tuple[Record, str]:
+    """A run to `until` (s), or until a block has moved by the usual size of a block; and why it was
+    refused, if it was: what is recorded by then is kept."""
+    sim = Simulation(scene)
+    record, refused = Record(sim), ""
+    try:
         play(sim, record, until, far)
-    return record
+    except Refused as error:
+        refused = str(error)
+    return record, refused
 
 
 def first(record: Record, apart: np.ndarray) -> np.ndarray:

@@ -21,7 +21,7 @@ from ..dynamics.simulation import Simulation
 from ..output.pictures import Pictures
 from ..output.record import named, told
 from ..scene import Scene, Tables, build, read_tables, turn
-from .failure import failing, first, seated
+from .failure import first, seated, to_failure
 from .trials import Trials
 
 TILT = 8.0, 60.0, 0.05  # degrees: first step, largest, to which it is found
@@ -53,7 +53,8 @@ def strength_reduction(
     for name in [rock.name for rock in scene.rocks] or ["scene"]:
         one = (alone(scene, name) if scene.rocks else scene).excavated
         tell(f"{name}: looking for blocks that cannot be held")
-        loose, free = trials.ask(f"{name}: loose", partial(_loose, one)), _free(one)
+        loose = trials.ask(f"{name}: loose", partial(_loose, one))
+        free = sum(not block.fixed for block in one.blocks)
         tell(f"{name}: {len(loose)} of {free} blocks cannot be held" + _listed(loose))
         row: dict = {"rock": name, "loose": loose, "without": loose}
         if len(loose) == free:
@@ -82,10 +83,6 @@ def strength_reduction(
         yield row
 
 
-def _free(scene: Scene) -> int:
-    return sum(not block.fixed for block in scene.blocks)
-
-
 def _listed(blocks: list[dict]) -> str:
     return f": {told(blocks)}" if blocks else ""
 
@@ -96,7 +93,7 @@ def _loose(scene: Scene) -> list[dict]:
 
 def _show(scene: Scene, until: float, title: str, path: Path, apart: np.ndarray) -> list[dict]:
     """Run and draw a scene that fails; returns which blocks move first, but for those apart."""
-    record = failing(scene, until)
+    record, _ = to_failure(seated(scene), until)
     ahead, title = first(record, apart), f"{title}\nwith strength / {scene.reduction:.3g}"
     Pictures(record, title, ahead, "moves first").final(path)
     return named(scene, ahead)

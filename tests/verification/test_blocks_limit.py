@@ -5,7 +5,7 @@ import pytest
 from limit_analysis import upper_factor
 
 from dem_demo import Simulation, parse
-from dem_demo.studies.failure import failing
+from dem_demo.studies.failure import seated, to_failure
 from dem_demo.studies.strength import FACTOR, factor_of_safety, weakened
 
 NOT_FOUND = pytest.mark.xfail(
@@ -48,7 +48,7 @@ def slope(**keys):
 
 def turning(scene):
     """How far the block that moves farthest turns, as a share: arm times angle over distance."""
-    record = failing(scene, 0.3)
+    record, _ = to_failure(seated(scene), 0.3)
     first = int(record.moved.argmax())
     turned = record.motion[-1][2, first] - record.motion[0][2, first]
     return abs(turned) * scene.blocks[first].reach / record.moved[first]

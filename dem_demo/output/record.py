@@ -103,7 +103,8 @@ def told(blocks: list[dict]) -> str:
     first = [
         f"{block['block']} ({block['x_m']:.2f}, {block['y_m']:.2f})" for block in blocks[:TOLD]
     ]
-    return ", ".join([*first, f"and {len(blocks) - TOLD} more"] if blocks[TOLD:] else first)
+    more = [f"and {len(blocks) - TOLD} more"] * (len(blocks) > TOLD)
+    return ", ".join([*first, *more]) or "none"
 
 
 def _joints(sim: Simulation) -> dict[str, np.ndarray]:

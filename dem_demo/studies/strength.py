@@ -42,12 +42,12 @@ def strength_reduction(
     Yields `rock`; `loose`: blocks that cannot be held as drawn, names and centroids (m);
     `without`: the same, or where all are loose, those that twice the strength does not hold either;
     `factor_of_safety`; with such blocks `factor_without`: of all others, while these move away;
-    `critical_tilt` (degrees); each None where none is
-    found. `picture`: the file in `folder` that shows how it fails, None without a factor; `first`:
-    the blocks that move first there. That run has the strength divided by 1.02 times the factor
-    (without loose blocks, if there are any), and ends at `until` (s) or once a block has moved by
-    the size of a block. Each finished trial is kept in the folder; called again with it, the search
-    goes on. tell: is told what is done, a line at a time.
+    `critical_tilt` (degrees); each None where none is found. `picture`: the file in `folder` that
+    shows how it fails, None without a factor; `first`: the blocks that move first there. That run
+    has the strength divided by 1.02 times the factor (without loose blocks, if there are any), and
+    ends at `until` (s) or once a block has moved by the size of a block. Each finished trial is
+    kept in the folder; called again with it, the search goes on. tell: is told what is done, a line
+    at a time.
     """
     trials = Trials(scene, folder)
     for name in [rock.name for rock in scene.rocks] or ["scene"]:
@@ -55,13 +55,13 @@ def strength_reduction(
         tell(f"{name}: looking for blocks that cannot be held")
         loose = trials.ask(f"{name}: loose", partial(_loose, one))
         free = sum(not block.fixed for block in one.blocks)
-        tell(f"{name}: {len(loose)} of {free} blocks cannot be held" + _listed(loose))
+        tell(f"{name}: {len(loose)} of {free} blocks cannot be held: {told(loose)}")
         row: dict = {"rock": name, "loose": loose, "without": loose}
         if len(loose) == free:
             ask = partial(_loose, weakened(one, 1 / TWICE))
             row["without"] = trials.ask(f"{name}: loose with strength * {TWICE:g}", ask)
-            tell(f"{name}: {len(row['without'])} of them with {TWICE:g} times the strength neither"
-                 + _listed(row["without"]))  # fmt: skip
+            tell(f"{name}: {len(row['without'])} of them with {TWICE:g} times the strength "
+                 f"neither: {told(row['without'])}")  # fmt: skip
         apart = np.isin([block.name for block in one.blocks], [b["block"] for b in row["without"]])
         tell(f"{name}: factor of safety of all blocks")
         factor = row["factor_of_safety"] = factor_of_safety(one, trials, name)
@@ -81,10 +81,6 @@ def strength_reduction(
             )
             tell(f"{name}: first to move: {told(row['first'])}")
         yield row
-
-
-def _listed(blocks: list[dict]) -> str:
-    return f": {told(blocks)}" if blocks else ""
 
 
 def _loose(scene: Scene) -> list[dict]:

@@ -48,7 +48,7 @@ def ring(scene, share, steps):
     sim.blocks.motion[3:] = (
         1e-7 * rng.standard_normal(sim.blocks.motion[3:].shape) * sim.blocks.mobile.T
     )
-    sim.blocks.place(sim.blocks.motion, sim.blocks.motion[3:])
+    sim.blocks.velocity[:] = sim.blocks.motion[3:] * sim.blocks.mobile.T
     size = []
     try:
         for _ in range(steps):

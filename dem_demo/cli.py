@@ -39,9 +39,9 @@ Rigid rock blocks in 2-D whose every contact force comes from a joint law.
   python -m dem_demo ablate SCENE --out DIR
                                            run it without each of its ingredients in turn
   python -m dem_demo compare SCENE [--seeds 1 2 3] [--until T]
-                                           every rock of a scene alone, with Coulomb of the same
-                                           strength and with that of the facets as well:
-                                           until a block has moved by the usual size of a block
+                                           every rock of a scene alone, with its own laws and with
+                                           Coulomb of the same strength, until a block has moved by
+                                           the usual size of a block
   python -m dem_demo strength-reduction SCENE --out DIR
                                            factor of safety of each rock (the strength of all
                                            joints divided by it), its critical tilt, and how it

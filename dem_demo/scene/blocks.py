@@ -6,7 +6,6 @@ from functools import cached_property
 
 import numpy as np
 import pymunk
-from shapely import Point, Polygon
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +58,6 @@ class Block:
     def reach(self) -> float:
         """Distance (m) from the centroid to the farthest corner."""
         return float(np.hypot(*self.local.T).max())
-
-    def holds(self, point) -> bool:
-        """Is a point (m) inside the block?"""
-        return bool(Polygon(self.corners).contains(Point(point)))
 
 
 def usual_size(blocks: Iterable[Block]) -> float:

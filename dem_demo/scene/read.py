@@ -174,7 +174,7 @@ def _pairs(
 
 def _block_at(name: str, point: tuple[float, float], blocks: Sequence[Block]) -> int:
     for i, block in enumerate(blocks):
-        if not block.fixed and block.holds(point):
+        if not block.fixed and Polygon(block.corners).contains(Point(point)):
             return i
     raise ValueError(f"{name} = {list(point)}: must lie inside a block that can move")
 

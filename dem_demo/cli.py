@@ -233,10 +233,10 @@ def _reduce(given: argparse.Namespace) -> None:
     )
     try:
         for row in found:
-            values = {text: row[key] for key, text in texts.items() if key in row}
             said = (
-                f"{text} {value:.3g}" if value is not None else f"no {text}"
-                for text, value in values.items()
+                f"no {text}" if row[key] is None else f"{text} {row[key]:.3g}"
+                for key, text in texts.items()
+                if key in row
             )
             print(f"{row['rock']}: {', '.join(said)}", flush=True)
             rows.append(row)

@@ -140,14 +140,19 @@ class Tracker:
         return 0.5 * (self.skins[a] + self.skins[b])
 
     def _read_laws(self, scene: Scene) -> None:
-        """Laws by number: of the scene's default, of edges, and of pairs of blocks."""
+        """Laws by number: of the scene's default, of edges, and of blocks: for the second block of
+        a contact, for its first, and for both; a later one overrules those before."""
         number = {name: i for i, name in enumerate(scene.laws)}
         self._default, o = number[scene.default_law], self.outlines
         self._of_edge = np.full(len(o.block), -1)
         for (block, edge), law in scene.edge_laws.items():
             self._of_edge[o.start[block] + edge] = number[law]
-        pairs = ((sorted(meant), number[law]) for meant, law in scene.pairs.items())
-        self._of_blocks = sorted(pairs, key=lambda pair: len(pair[0]))
+        self._of_blocks = [
+            (sides, sorted(meant), number[law])
+            for sides in ([1], [0], [0, 1])
+            for meant, law in scene.pairs.items()
+            if len(meant) == len(sides)
+        ]
 
     def laws_of(self, edges: np.ndarray) -> np.ndarray:
         """Number (k,) of the law of edges (k, 2) that meet, in the order of their blocks.
@@ -159,12 +164,8 @@ class Tracker:
         one, other = self._of_edge[edges].T
         out = np.where((one == other) & (one >= 0), one, self._default)
         blocks = self.outlines.block[edges]
-        single = [(meant[0], law) for meant, law in self._of_blocks if len(meant) == 1]
-        for side in (1, 0):  # the first block's law before that of the second
-            for block, law in single:
-                out[blocks[:, side] == block] = law
-        for meant, law in self._of_blocks[len(single) :]:
-            out[(blocks == meant).all(axis=1)] = law
+        for sides, meant, law in self._of_blocks:
+            out[(blocks[:, sides] == meant).all(axis=1)] = law
         return out
 
     def _found(

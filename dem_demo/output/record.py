@@ -185,12 +185,6 @@ def outcomes(record: Record) -> list[dict]:
     return out
 
 
-def far(record: Record) -> bool:
-    """Has a block moved by more than the usual size of a block?"""
-    free = (block for block in record.scene.blocks if not block.fixed)
-    return bool(np.nanmax(record.moved) > usual_size(free))
-
-
 def sentences(record: Record) -> list[str]:
     """What a person wants to know at the end: a line for each watched slip and each rock."""
     found = []

@@ -14,8 +14,8 @@ import jointlaw as jl
 
 from ..output.monitors import slip_distance
 from ..output.record import Record, outcomes
+from ..output.run import to_failure
 from ..scene import USUAL, Scene, springs
-from .failure import to_failure
 from .strength import alone
 
 FAR = 20.0  # slip distances: where the strength of a law is its residual one

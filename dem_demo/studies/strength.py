@@ -19,14 +19,15 @@ from jointlaw.support.pyplot import FORMATS
 from ..dynamics.seating import displacements
 from ..dynamics.simulation import Simulation
 from ..output.pictures import Pictures
-from ..output.record import named, told
-from ..scene import Scene, Tables, build, read_tables, turn
-from .failure import first, seated, to_failure
+from ..output.record import Record, named, told
+from ..output.run import to_failure
+from ..scene import Scene, Tables, build, read_tables, turn, usual_size
 from .trials import Trials
 
 TILT = 8.0, 60.0, 0.05  # degrees: first step, largest, to which it is found
 FACTOR = np.log(2.0), np.log(64.0), 0.006  # logarithms: the same of a factor
 TWICE = 2.0  # where all blocks are loose: times the strength, with which fewer are
+FIRST = 0.01  # of the usual size of a block: who has moved by half of the most then moves first
 SHOWN = 1.02  # times the factor: what the strength of the failing run is divided by
 
 
@@ -83,6 +84,12 @@ def strength_reduction(
         yield row
 
 
+def seated(scene: Scene) -> Scene:
+    """A scene that starts from its equilibrium, with the time step that follows: it is halved where
+    joints close too far for it."""
+    return replace(scene, run=replace(scene.run, step=None, fraction=None, seat=True))
+
+
 def _loose(scene: Scene) -> list[dict]:
     return named(scene, Simulation(seated(scene)).loose)
 
@@ -90,9 +97,18 @@ def _loose(scene: Scene) -> list[dict]:
 def _show(scene: Scene, until: float, title: str, path: Path, apart: np.ndarray) -> list[dict]:
     """Run and draw a scene that fails; returns which blocks move first, but for those apart."""
     record, _ = to_failure(seated(scene), until)
-    ahead, title = first(record, apart), f"{title}\nwith strength / {scene.reduction:.3g}"
+    ahead, title = _first(record, apart), f"{title}\nwith strength / {scene.reduction:.3g}"
     Pictures(record, title, ahead, "moves first").final(path)
     return named(scene, ahead)
+
+
+def _first(record: Record, apart: np.ndarray) -> np.ndarray:
+    """Mask (n,) of the blocks that move first, but for those of a mask `apart`."""
+    size = usual_size(block for block in record.scene.blocks if not block.fixed)
+    moved = [np.where(apart, 0.0, np.hypot(*(record.displaced(i) - record.displaced(0)).T))
+             for i in range(len(record.times))]  # fmt: skip
+    away = next((frame for frame in moved if np.nanmax(frame) > FIRST * size), moved[-1])
+    return away > 0.5 * np.nanmax(away)
 
 
 def factor_of_safety(

@@ -5,8 +5,8 @@ import pytest
 from limit_analysis import upper_factor
 
 from dem_demo import Simulation, parse
-from dem_demo.studies.failure import seated, to_failure
-from dem_demo.studies.strength import FACTOR, factor_of_safety, weakened
+from dem_demo.output.run import to_failure
+from dem_demo.studies.strength import FACTOR, factor_of_safety, seated, weakened
 
 NOT_FOUND = pytest.mark.xfail(
     reason="the search for equilibria finds none where walls slide freely", strict=True

@@ -85,12 +85,7 @@ class Contacts:
         self.world = outlines.world()
         self.world.contacts = k
         arrays = {name: a for name, a in vars(self).items() if isinstance(a, np.ndarray)}
-        self.world.bind(**arrays, out=out)
-        self.place(motion)
-
-    def place(self, motion: np.ndarray) -> None:
-        """To a motion (6, n), all on the same edges."""
-        self.world.bind(motion=np.ascontiguousarray(motion, float))
+        self.world.bind(**arrays, out=out, motion=np.ascontiguousarray(motion, float))
         self.world.call("place")
 
     @property

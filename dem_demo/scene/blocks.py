@@ -7,6 +7,8 @@ from functools import cached_property
 import numpy as np
 import pymunk
 
+EXACT = 1e-7  # share of the size of a rock or scene below which a distance is zero
+
 
 @dataclass(frozen=True, eq=False)
 class Block:

@@ -104,8 +104,11 @@ class Equilibrium:
             return moved, self._follow(moved, loose, least)
         least = np.where(found, HELD, least)
         moved, r = self._creep(y, least)
-        out = self._shares(np.where(least > 0, 0.0, r))
-        return moved, out > max(BALANCED, min(LOOSE, 0.5 * out.max()))
+        if (out := self._shares(np.where(least > 0, 0.0, r))).max() <= BALANCED:
+            y, _, found = self._step(moved, least)  # is it at rest, or does it creep on?
+            if found.all():
+                return y, loose & False
+        return moved, out > min(LOOSE, 0.5 * out.max())
 
     def _follow(self, y: np.ndarray, loose: np.ndarray, least: np.ndarray) -> np.ndarray:
         """Blocks (n,) that only the drag `least` of loose ones holds: these move on through less of
@@ -125,9 +128,10 @@ class Equilibrium:
     def _stiffness(self, C) -> csc_array:
         return (self.rows.T @ (diags(self.area) @ C) @ self.rows).tocsc()
 
-    def guess(self) -> np.ndarray:
-        """Displacements with joints that cannot slide, in a step through a drag in which a block
-        that nothing holds falls by a tenth of its reach; none where that is not found."""
+    def unslid(self) -> np.ndarray:
+        """Displacements to begin with: those of joints that cannot slide, in a step through a drag
+        in which a block that nothing holds falls by a tenth of its reach; none where that is not
+        found."""
         y, _, found = self._step(self.none, self.slow / FAR + self.none, ROUGH, slides=False)
         return y * found
 
@@ -139,7 +143,8 @@ class Equilibrium:
     def _creep(self, y: np.ndarray, least: np.ndarray):
         """Steps through less and less drag, of some motions at `least` that much, until all others
         are in balance or what they lack no longer falls. Returns y and the unbalanced force."""
-        drag, change = max(1e3 * self._median(y), 1e4 * self.slow), WEAKER
+        stiff = self._median(y)
+        drag, change = max(1e3 * stiff, 1e4 * self.slow), WEAKER
         r, before = self.none, np.inf
         for _ in track(range(STEPS), "looking for loose blocks"):
             further, lacking, found = self._step(y, np.maximum(drag, least), ROUGH)
@@ -148,8 +153,10 @@ class Equilibrium:
                 continue
             y, r = further, lacking
             now = self._shares(np.where(least > 0, 0.0, r))
-            steady = (now > STEADY[change == 1.0] * before)[now > LOOSE].all()
-            if now.max() <= BALANCED or (steady and drag < WEAK[change == 1.0] * self._median(y)):
+            asked = now > (LOOSE if now.max() > LOOSE else BALANCED)
+            steady = (now > STEADY[change == 1.0] * before)[asked].all()
+            stiff = max(stiff, self._median(y))  # it is none where all blocks fall
+            if now.max() <= BALANCED or (steady and drag < WEAK[change == 1.0] * stiff):
                 break
             before, drag = now, drag * change
         return y, r

@@ -22,11 +22,11 @@ def seat(
     Loose blocks, which cannot be held, stay almost where they are drawn; all others are in balance
     with what the loose ones do to them there.
     """
-    loose, first, near = np.zeros(len(blocks.free), bool), 0.0, blocks.near()
+    loose, first, pairs = np.zeros(len(blocks.free), bool), 0.0, blocks.near()
     for again in range(ROUNDS):  # each at the places just found: joints turn with the blocks
         tracker.follow(blocks.motion)
         tracker.urgent[:] = True  # it is cheap here, and nothing is missed
-        before = tracker.renew(blocks.motion, near)
+        before = tracker.renew(blocks.motion, pairs)
         if before is not None:
             joints.rearrange(before, tracker.law, tracker.keys)
             slid = np.where(before >= 0, slid[before], 0.0)
@@ -35,10 +35,10 @@ def seat(
         if again:
             force = force + _length_forces(scene, blocks, tracker, joints, slid)
         search = Equilibrium(scene, blocks, tracker, joints, slid, force)
-        guess = search.none if again or scene.in_situ is not None else search.guess()
-        more, old = ~loose, loose
+        start = search.none if again or scene.in_situ is not None else search.unslid()
+        more, known = ~loose, loose
         while more.any():
-            moved, more = search.attempt(guess, loose, old)
+            moved, more = search.attempt(start, loose, known)
             loose = loose | more
         slid = slid + (search.rows @ moved)[len(slid) :]
         blocks.motion[:3] += search.spread(moved * search.root).T
@@ -56,7 +56,7 @@ def displacements(
     """Displacements of the free motions at which virgin joints carry a scene as drawn.
 
     All loads act at once; in unit-mass motions, None where none are found. They are looked for from
-    guess, those of a similar scene, and from those after a step through a drag: where bonds break
+    guess, those of a similar scene, and from those of joints that cannot slide: where bonds break
     and joints soften, one may find what the other misses. loose (n,): blocks that need not be
     carried.
     """
@@ -65,9 +65,9 @@ def displacements(
     slid = begin(scene, blocks, tracker, joints)
     search = Equilibrium(scene, blocks, tracker, joints, slid, blocks.gravity + blocks.loads)
     known = np.zeros(len(blocks.free), bool) if loose is None else loose
-    for first in (guess, search.guess()):
-        if first is not None:
-            moved, more = search.attempt(first, known)
+    for start in (guess, search.unslid()):
+        if start is not None:
+            moved, more = search.attempt(start, known)
             if not more.any():
                 return moved
     return None

@@ -8,9 +8,6 @@ from dem_demo import Simulation, parse
 from dem_demo.output.run import to_failure
 from dem_demo.studies.strength import FACTOR, factor_of_safety, seated, weakened
 
-NOT_FOUND = pytest.mark.xfail(
-    reason="the search for equilibria finds none where walls slide freely", strict=True
-)
 FOUND = FACTOR[2]  # to which a factor is found
 
 SLOPE = """
@@ -47,11 +44,12 @@ def slope(**keys):
 
 
 def turning(scene):
-    """How far the block that moves farthest turns, as a share: arm times angle over distance."""
+    """How far the blocks turn that move far, arm times angle over distance: their median."""
     record, _ = to_failure(seated(scene), 0.3)
-    first = int(record.moved.argmax())
-    turned = record.motion[-1][2, first] - record.motion[0][2, first]
-    return abs(turned) * scene.blocks[first].reach / record.moved[first]
+    far = record.moved > 0.5 * record.moved.max()
+    arms = np.array([block.reach for block in scene.blocks])
+    turned = np.abs(record.motion[-1][2] - record.motion[0][2]) * arms
+    return np.median(turned[far] / record.moved[far])
 
 
 @pytest.mark.slow
@@ -60,7 +58,7 @@ def test_a_slope_that_slides_has_the_factor_of_limit_analysis():
     scene = slope(spacing=0.45, dip=-75.0, across=1.3, persistence=0.8, seed=2)
     most, found = upper_factor(scene), factor_of_safety(scene)
     assert most == pytest.approx(0.7002 / np.tan(np.radians(30)), rel=2e-3)
-    assert found == pytest.approx(most, rel=0.01)
+    assert found == pytest.approx(most, rel=0.02)
     assert found < most * (1 + FOUND)
     assert turning(weakened(scene, 1.05 * found)) < 0.01
 
@@ -185,10 +183,11 @@ end = 0.2
 @pytest.mark.parametrize(
     ("half_angle", "phi", "push"),
     [
-        pytest.param(20, 35, 1e5, marks=NOT_FOUND),
-        (30, 35, 4e5),
-        pytest.param(30, 45, 2e5, marks=NOT_FOUND),
-        (40, 45, 1e6),
+        (20, 35, 1e5),
+        pytest.param(30, 35, 4e5, marks=pytest.mark.slow),
+        pytest.param(30, 45, 2e5, marks=pytest.mark.slow),
+        pytest.param(40, 45, 1e6, marks=pytest.mark.slow),
+        pytest.param(25, 30, 3e5, marks=pytest.mark.slow),
     ],
 )
 def test_a_roof_wedge_drawn_with_its_apex(half_angle, phi, push):
@@ -228,6 +227,7 @@ end = 0.2
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("brittle", [False, True], ids=["kept", "lost"])
 @pytest.mark.parametrize(
     ("dip", "phi", "cohesion"),

@@ -75,3 +75,15 @@ def test_rock_is_cut_along_what_is_taken_away():
 def test_an_empty_excavation_is_refused():
     with pytest.raises(ValueError, match=r"excavate\[1\].corners: no block is left there"):
         parse(TOWER + 2 * UNDER.format(over=0.1, at=""))
+
+
+@pytest.mark.slow
+def test_the_blocks_of_a_tunnel_that_are_named_loose_are_those_that_fall():
+    scene = load("tunnel")
+    sim, named = Simulation(scene), Simulation(scene.excavated).loose
+    assert not sim.loose.any()
+    drawn = sim.blocks.motion[:2].copy()
+    moved = np.hypot(*(run(sim, 1.0).blocks.motion[:2] - drawn)) * ~sim.blocks.gone
+    assert named.any()
+    assert (moved[named] > 0.02).all()
+    assert (moved[~named] < 2e-3).all()

@@ -26,9 +26,9 @@ class Outlines:
     """Corners of all blocks in one list: edge i starts at corner i and ends at corner after[i].
 
     local (c,): corners from the centroids; way (c,): directions of the edges; side (c,): their
-    lengths; block, before, after (c,): numbers; number (c,): of each edge in its block; start
-    (blocks + 1,): first corner of each block, and c. corner_length (m): of joint at a corner that
-    stands on an edge; soft (m): over which the end of one edge gives way to that of another.
+    lengths; block, before, after (c,): numbers; start (blocks + 1,): first corner of each block,
+    and c. corner_length (m): of joint at a corner that stands on an edge; soft (m): over which the
+    end of one edge gives way to that of another.
     """
 
     def __init__(self, blocks: Sequence[Block], corner_length: float, soft: float) -> None:
@@ -37,8 +37,8 @@ class Outlines:
         self.start = np.concatenate([[0], np.cumsum(sizes)])
         self.block = np.repeat(np.arange(len(blocks)), sizes)
         first, size = self.start[self.block], sizes[self.block]
-        self.number = np.arange(len(first)) - first
-        self.after, self.before = first + (self.number + 1) % size, first + (self.number - 1) % size
+        number = np.arange(len(first)) - first
+        self.after, self.before = first + (number + 1) % size, first + (number - 1) % size
         self.local = np.concatenate([block.local for block in blocks]) @ [1, 1j]
         edge = self.local[self.after] - self.local
         self.side = np.abs(edge)
@@ -85,12 +85,7 @@ class Contacts:
         self.world = outlines.world()
         self.world.contacts = k
         arrays = {name: a for name, a in vars(self).items() if isinstance(a, np.ndarray)}
-        self.world.bind(**arrays, out=out)
-        self.place(motion)
-
-    def place(self, motion: np.ndarray) -> None:
-        """To a motion (6, n), all on the same edges."""
-        self.world.bind(motion=np.ascontiguousarray(motion, float))
+        self.world.bind(**arrays, out=out, motion=np.ascontiguousarray(motion, float))
         self.world.call("place")
 
     @property
@@ -105,12 +100,6 @@ class Contacts:
         before = self.outlines.before[self.corner]
         flatter = np.where(self.rise[0] < self.rise[1] - TIE, before, self.corner)
         return np.sort([flatter, self.edge], axis=0).T
-
-    @property
-    def interfaces(self) -> np.ndarray:
-        """Block, edge, block, edge (k, 4) that meet, the first block first."""
-        o, edges = self.outlines, self.edges
-        return np.stack([o.block[edges], o.number[edges]], axis=2).reshape(-1, 4)
 
     def following(self) -> np.ndarray:
         """One number (k,), as in `codes`, for what comes next at the nearer limit of each range."""

@@ -3,11 +3,10 @@
 The range of a corner along an edge ends where what comes next is as deep: another corner that
 takes over, or the next edge. So of the corners of two blocks that overlap the least deep are found.
 
-A contact is a number given when its corner came within reach of an edge. It keeps its number, and
-with it its joint, while the corner slides along the edge, turns on it from one side of the block to
-the next, or trades roles with another corner at the end of an edge. New contacts are looked for
-only next to blocks that have moved far enough to matter; between such renewals the geometry is
-plain arrays.
+A contact begins when a corner comes within reach of an edge. It keeps its joint while the corner
+slides along the edge, turns on it from one side of the block to the next, or trades roles with
+another corner at the end of an edge. New contacts are looked for only next to blocks that have
+moved far enough to matter; between such renewals the geometry is plain arrays.
 """
 
 import numpy as np
@@ -47,12 +46,11 @@ class Tracker:
     """Follows the contacts of a scene.
 
     contacts: at the motion followed to, on corner and edge (k,); keys (k, 2): edges that met when
-    found; law (k,): number of the law between these; numbers (k,): their names for life; offset
-    (k,): closure offset (m): above zero the depth that a contact had to give up (see
-    `Simulation._transfer`), until it opens; below zero less the closure from the stress of before,
-    for life;
-    given: numbers given so far; renewed_at (3, blocks): motion when the contacts of each block were
-    last looked for; urgent (blocks,): must be looked for, wherever the block is.
+    found; law (k,): number of the law between these; offset (k,): closure offset (m): above zero
+    the depth that a contact had to give up (see `Simulation._transfer`), until it opens; below zero
+    less the closure from the stress of before, for life; renewed_at (3, blocks): motion when the
+    contacts of each block were last looked for; urgent (blocks,): must be looked for, wherever the
+    block is.
     skins (blocks,): pymunk reports pairs within the sum of their skins; a corner counts from a gap
     of the mean and is forgotten beyond 1.5 of it (m).
     """
@@ -66,8 +64,8 @@ class Tracker:
         self.fixed = np.array([block.fixed for block in blocks])
         self._read_laws(scene)
         none = np.zeros(0, int)
-        self.numbers, self.law, self.keys, self.offset = none, none, none.reshape(0, 2), np.zeros(0)
-        self.given, self.urgent = 0, np.zeros(len(blocks), bool)
+        self.law, self.keys, self.offset = none, none.reshape(0, 2), np.zeros(0)
+        self.urgent = np.zeros(len(blocks), bool)
         self.renewed_at = np.full((3, len(blocks)), np.nan)  # never
         self.hold(none, none, motion)
 
@@ -109,7 +107,7 @@ class Tracker:
         which = self.urgent | ~(moved <= SEEN * self.skins)
         self.renewed_at[:, which], self.urgent[:] = motion[:3, which], False
         pairs = near[which[near].any(axis=1) & ~self.fixed[near].all(axis=1)]
-        now, k = self.contacts, len(self.numbers)
+        now, k = self.contacts, len(self.law)
         asked = np.flatnonzero(which[now.a] | which[now.b])
         known, first = np.unique(now.codes[asked], return_index=True)
         found, keys = self._found(motion, pairs, known)
@@ -129,9 +127,7 @@ class Tracker:
         lost = np.maximum(found.closure[fresh], 0.0) * (not pressed)
         self.keys = np.concatenate([self.keys[rows], keys[fresh]])
         self.law = np.concatenate([self.law[rows], law[fresh]])
-        self.numbers = np.concatenate([self.numbers[rows], self.given + np.arange(many)])
         self.offset = np.concatenate([self.offset[rows], lost])
-        self.given += many
         corner = np.concatenate([now.corner[rows], found.corner[fresh]])
         self.hold(corner, np.concatenate([now.edge[rows], found.edge[fresh]]), motion)
         return np.concatenate([rows, np.full(many, -1)])
@@ -144,26 +140,32 @@ class Tracker:
         return 0.5 * (self.skins[a] + self.skins[b])
 
     def _read_laws(self, scene: Scene) -> None:
-        """Laws by number: of the scene's default, of edges, and of pairs of blocks."""
+        """Laws by number: of the scene's default, of edges, and of blocks: for the second block of
+        a contact, for its first, and for both; a later one overrules those before."""
         number = {name: i for i, name in enumerate(scene.laws)}
         self._default, o = number[scene.default_law], self.outlines
         self._of_edge = np.full(len(o.block), -1)
         for (block, edge), law in scene.edge_laws.items():
             self._of_edge[o.start[block] + edge] = number[law]
-        pairs = ((sorted(meant), number[law]) for meant, law in scene.pairs.items())
-        self._of_blocks = sorted(pairs, key=lambda pair: len(pair[0]))
+        self._of_blocks = [
+            (sides, sorted(meant), number[law])
+            for sides in ([1], [0], [0, 1])
+            for meant, law in scene.pairs.items()
+            if len(meant) == len(sides)
+        ]
 
     def laws_of(self, edges: np.ndarray) -> np.ndarray:
-        """Number (k,) of the law of edges (k, 2) that meet, as `Scene.law_of` chooses it."""
+        """Number (k,) of the law of edges (k, 2) that meet, in the order of their blocks.
+
+        The law of a [[joint]] table if one names both blocks, or one of them (that of the block
+        that comes first in the scene, if both have one); else that of the joint set that cut both
+        edges; else the scene's.
+        """
         one, other = self._of_edge[edges].T
         out = np.where((one == other) & (one >= 0), one, self._default)
         blocks = self.outlines.block[edges]
-        single = [(meant[0], law) for meant, law in self._of_blocks if len(meant) == 1]
-        for side in (1, 0):  # the first block's law before that of the second
-            for block, law in single:
-                out[blocks[:, side] == block] = law
-        for meant, law in self._of_blocks[len(single) :]:
-            out[(blocks == meant).all(axis=1)] = law
+        for sides, meant, law in self._of_blocks:
+            out[(blocks[:, sides] == meant).all(axis=1)] = law
         return out
 
     def _found(

@@ -99,10 +99,6 @@ class Blocks:
             array[rows] = 0
         self.motion[3:, rows] = self.velocity[:, rows] = 0.0
 
-    def place(self, motion: np.ndarray, velocity: np.ndarray) -> None:
-        """Put the blocks where `motion` (6, n) says, to go on with a velocity (3, n)."""
-        self.motion[:], self.velocity[:] = motion, velocity * self.mobile.T
-
     def bind(self, world: World) -> None:
         """Tell the compiled step where these arrays lie."""
         names = "motion", "velocity", "inertia", "gravity", "loads", "reach"

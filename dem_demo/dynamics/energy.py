@@ -59,8 +59,7 @@ class Ledger:
     @property
     def total(self) -> float:
         """What the balance says is constant (J)."""
-        v = self.value
-        return sum(v[name] for name in COLUMNS[:6]) - v["work"]
+        return float(self.energy[:WORK].sum() - self.energy[WORK])
 
     @property
     def error(self) -> float:

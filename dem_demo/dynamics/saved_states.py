@@ -24,7 +24,7 @@ KEPT = (  # of what changes in a run, but for the joints: arrays that stay in th
 )  # fmt: skip
 STATE = (
     *KEPT, "t0", "n", "dt", "halvings", "limit.now", "limit.least", "limit.bound", "limit.checked",
-    "tracker.keys", "tracker.law", "tracker.numbers", "tracker.offset", "tracker.given",
+    "tracker.keys", "tracker.law", "tracker.offset",
     "ledger.start", "ledger.area", "ledger.lost", "loose",
 )  # fmt: skip
 PLACES = "contacts.corner", "contacts.edge"  # from which the contacts are made anew

@@ -21,6 +21,7 @@ from .timestep import SAFE, StepLimit, impact_limit
 
 NEAR = 0.4  # share of the limit below which no lever arm matters; to which a step is halved
 MATCH = 1e-6  # relative: lengths that are equal but for rounding
+TINY = 1e-300  # in place of nothing, below a line
 LOOKS = 16  # steps between two looks at the drives and at excavations
 SLOW, EVEN, RESTING = 1e-4, 0.1, 0.9  # m/s, m/s2: below which a block rests; share that must
 FRACTIONS = {  # of the limit that a time step is, by what can happen
@@ -28,6 +29,7 @@ FRACTIONS = {  # of the limit that a time step is, by what can happen
     "drives move blocks": 0.4,
     "the blocks are in equilibrium": 0.7,
 }
+IMPACT = 1e4  # Pa: normal stress of a first impact, for a time step before anything touches
 HALVINGS = 8  # of a time step that was chosen, until a run is refused
 
 
@@ -185,15 +187,12 @@ class Simulation:
     def _chosen_step(self) -> float:
         """By the scene's fraction of the limit, or else by one for what can happen."""
         scene, limit = self.scene, self.limit.now
-        if largest := scene.run.largest_stress:
+        if not np.isfinite(limit):  # nothing touches yet
             curves = (held.curve for held in self.joints.held)
-            stiffness = max(float(np.interp(largest, c["stress"], c["stiffness"])) for c in curves)
-            limit = min(limit, impact_limit(scene, self.blocks, self.tracker.outlines, stiffness))
+            stiffness = max(float(np.interp(IMPACT, c["stress"], c["stiffness"])) for c in curves)
+            limit = impact_limit(scene, self.blocks, self.tracker.outlines, stiffness)
         if not np.isfinite(limit):
-            raise Refused(
-                "nothing touches at the start, so no time step follows: set run.largest_stress "
-                "(Pa) to the normal stress expected in impacts, or run.step (s)"
-            )
+            raise Refused("forces move no block, so no time step follows: set run.step (s)")
         if scene.run.fraction:
             return scene.run.fraction * limit
         falls = not scene.run.seat or self.loose.any() or self.blocks.velocity.any()
@@ -229,7 +228,7 @@ class Simulation:
         """
         ledger, tracker, joints = self.ledger, self.tracker, self.joints
         thickness, length, before = self.scene.thickness, self.contacts.length, self.contacts.was
-        held, ratio = joints.stored * before, length / np.maximum(before, 1e-300)
+        held, ratio = joints.stored * before, length / np.maximum(before, TINY)
         changed = np.flatnonzero((np.abs(ratio - 1) > MATCH) & (held > 0))
         longer, kept = ratio[changed] > 1, joints.stored[changed]
         ledger.area[changed] = length[changed] * thickness
@@ -254,13 +253,14 @@ class Simulation:
         ledger.lost = joints.lost.copy()
         self.bind()
 
+    def shares(self, moving: int, base: int) -> np.ndarray:
+        """Share (k,) of each contact in the area of the joint between two blocks; zeros without."""
+        area = self.ledger.area * self.tracker.between(moving, base)
+        return area / max(area.sum(), TINY)
+
     def slid(self, moving: int, base: int) -> float:
-        """Shear displacement (m) of the joints between two blocks, mean over their area."""
-        here = self.tracker.between(moving, base)
-        area = self.ledger.area[here]
-        if not area.any():
-            return 0.0
-        return abs(float(self.joints.delta[here, 1] @ area / area.sum()))
+        """Shear displacement (m) of the joint between two blocks, mean over its area."""
+        return abs(float(self.shares(moving, base) @ self.joints.delta[:, 1]))
 
     def state(self) -> Saved:
         """A copy of everything that the future depends on."""

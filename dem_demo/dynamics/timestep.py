@@ -67,8 +67,7 @@ class StepLimit:
         if dt > SAFE * self.now:
             raise Refused(
                 f"time step {dt:.3g} s: must stay below {SAFE} of the limit, which has fallen "
-                f"to {self.now:.3g} s as the joints closed; resume with a smaller step or "
-                "set run.largest_stress (Pa)"
+                f"to {self.now:.3g} s as the joints closed; resume with a smaller step"
             )
         self.checked = min(HEADROOM, (SAFE * self.now / dt) ** 2) * self.checked
 
@@ -159,7 +158,8 @@ def _top(matrix: csc_array) -> np.ndarray:
 
 
 def impact_limit(scene: Scene, blocks: Blocks, outlines: Outlines, stiffness: float) -> float:
-    """Step limit (s) with every block touched along its whole outline at `stiffness` (Pa/m).
+    """Step limit (s) with every block touched along its whole outline at `stiffness` (Pa/m); inf
+    where forces move none.
 
     Half of every edge acts at either end, or half a corner length if that is more. Twice as stiff,
     as in `bound_of_blocks`, for any contacts between them.
@@ -167,6 +167,5 @@ def impact_limit(scene: Scene, blocks: Blocks, outlines: Outlines, stiffness: fl
     o, n = outlines, len(blocks.free)
     each = stiffness * scene.thickness * np.maximum(o.side, o.corner_length)  # twice a half
     ends = np.arange(len(o.block)), o.after
-    return 2 / np.sqrt(
-        _largest(sum(_held(o.block, o.local[c], each, n) for c in ends), blocks.root)
-    )
+    largest = _largest(sum(_held(o.block, o.local[c], each, n) for c in ends), blocks.root)
+    return 2 / np.sqrt(largest) if largest else np.inf

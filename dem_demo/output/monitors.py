@@ -57,18 +57,20 @@ def base_angle(sim: Simulation, moving: int, base: int) -> float:
 
 def law_between(sim: Simulation, moving: int, base: int) -> str:
     """Name of the law of the joint between the faces with which two blocks face each other."""
-    faces = _face(sim, moving, base)[0], _face(sim, base, moving)[0]
-    return sim.scene.law_of((moving, faces[0], base, faces[1]))
+    one, other = sorted((moving, base))
+    edges = [_face(sim, one, other)[0], _face(sim, other, one)[0]]
+    return sim.joints.names[sim.tracker.laws_of(np.array([edges]))[0]]
 
 
 def _face(sim: Simulation, block: int, other: int) -> tuple[int, np.ndarray]:
-    """Number and outward normal of a block's face that another's centroid is farthest outside."""
+    """The edge of a block that another's centroid is farthest outside of, by its number among all
+    edges, and its outward normal."""
     x, y, angle = sim.blocks.motion[:3, block]
     corners = sim.scene.blocks[block].local @ turn(angle).T + [x, y]
     along = np.roll(corners, -1, axis=0) - corners
     outward = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
     face = int(((sim.blocks.motion[:2, other] - corners) * outward).sum(axis=1).argmax())
-    return face, outward[face]
+    return sim.tracker.outlines.start[block] + face, outward[face]
 
 
 def readings(sim: Simulation) -> dict[str, float]:
@@ -81,7 +83,7 @@ def readings(sim: Simulation) -> dict[str, float]:
         row |= {f"{name}: {key}": value for key, value in _joint(sim, moving, base).items()}
     for i, pair in enumerate(sim.scene.near):
         row |= {f"joint {i + 1}: {key}": value for key, value in _joint(sim, *pair).items()}
-    base = _base(sim)
+    base = base_of(sim.scene, sim.blocks.motion)
     for i, (block, point) in enumerate(sim.scene.pins):
         here = _point(sim, block, point) - base
         row |= {f"pin {i + 1}: {key}": float(value) for key, value in zip(POINT, here, strict=True)}
@@ -98,21 +100,19 @@ def _point(sim: Simulation, block: int, point: tuple[float, float]) -> np.ndarra
     return np.array([x + right, y + up, u - spin * up, v + spin * right])
 
 
-def _base(sim: Simulation) -> np.ndarray:
-    """Displacement since the drawing and velocity (4,) of the scene's base; zero without one."""
-    if sim.scene.base is None:
+def base_of(scene: Scene, motion: np.ndarray) -> np.ndarray:
+    """Displacement since the drawing and velocity (4,) of the scene's base at a motion (6, n); zero
+    without one."""
+    if (base := scene.base) is None:
         return np.zeros(4)
-    drawn = sim.scene.blocks[sim.scene.base].centroid
-    return sim.blocks.motion[[0, 1, 3, 4], sim.scene.base] - [*drawn, 0.0, 0.0]
+    return motion[[0, 1, 3, 4], base] - [*scene.blocks[base].centroid, 0.0, 0.0]
 
 
 def _joint(sim: Simulation, moving: int, base: int) -> dict[str, float]:
     """Mean over the joint between two blocks: stresses, closure, sliding, sliding share."""
-    here, joints = sim.tracker.between(moving, base), sim.joints
-    area = sim.ledger.area[here]
-    columns = [*joints.traction[here].T, *joints.delta[here].T, joints.sliding[here]]
+    joints, share = sim.joints, sim.shares(moving, base)
+    columns = [*joints.traction.T, *joints.delta.T, joints.sliding]
     keys = "normal_Pa", "shear_Pa", "closure_m", "slid_m", "sliding_share"
-    share = area / area.sum() if area.any() else 0.0 * area
     return {key: float(share @ column) for key, column in zip(keys, columns, strict=True)}
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from ..dynamics.energy import COLUMNS
 from ..dynamics.simulation import Simulation
 from ..scene import Scene, usual_size
-from .monitors import law_between, readings, watched_slips
+from .monitors import base_of, law_between, readings, watched_slips
 
 FAILED = 0.1  # of the usual size of a rock's blocks: one that has moved farther has failed
 CREEP = 1e-6  # m/s: faster is not at rest
@@ -20,8 +20,9 @@ class Record:
     """Frames of a run: times (f,), motion (f, 6, n), NaN for blocks that are gone, energies (f, 9),
     joints.
 
-    joints[f]: by name, "who" (k, 5) block, edge, block, edge, contact; "ends" (k, 2, 2) the segment
-    of joint that a contact carries; and numbers (k,) with their unit in the name. stresses[f] (3,
+    joints[f]: by name, "who" (k, 2) its blocks; "ends" (k, 2, 2) the segment
+    of joint that a contact carries; "law" (k,), by its number in the scene; and numbers (k,) with
+    their unit in the name. stresses[f] (3,
     n): of the blocks. monitored[f]:
     what the scene's [watch] asks for; slips: of its joints; laws: of the watched joints; state:
     that of the last frame, to return to; steps: of the run; loose (n,): who was at its start.
@@ -50,16 +51,10 @@ class Record:
         self.monitored.append(readings(sim))
         self.state = sim.state()
 
-    def base(self, i: int) -> np.ndarray:
-        """Displacement (2,) of the scene's base from the drawing to frame i (m); 0 without one."""
-        if (block := self.scene.base) is None:
-            return np.zeros(2)
-        return self.motion[i][:2, block] - self.scene.blocks[block].centroid
-
     def displaced(self, i: int) -> np.ndarray:
         """Displacements (n, 2) from the drawing to frame i, relative to the base (m)."""
         drawn = np.array([block.centroid for block in self.scene.blocks])
-        return self.motion[i][:2].T - drawn - self.base(i)
+        return self.motion[i][:2].T - drawn - base_of(self.scene, self.motion[i])[:2]
 
     @property
     def moved(self) -> np.ndarray:
@@ -84,8 +79,7 @@ class Record:
             self.loose * 0.0,
         )
         joints = self.joints[-1]
-        for side in (0, 2):
-            np.maximum.at(slip, joints["who"][:, side], np.abs(joints["shear_m"]))
+        np.maximum.at(slip, joints["who"], np.abs(joints["shear_m"])[:, None])
         columns = {
             "block": [block.name for block in self.scene.blocks], "x_m": last[:, 0],
             "y_m": last[:, 1], "displacement_m": np.hypot(*away.T), "displacement_x_m": away[:, 0],
@@ -109,7 +103,8 @@ def told(blocks: list[dict]) -> str:
     first = [
         f"{block['block']} ({block['x_m']:.2f}, {block['y_m']:.2f})" for block in blocks[:TOLD]
     ]
-    return ", ".join([*first, f"and {len(blocks) - TOLD} more"] if blocks[TOLD:] else first)
+    more = [f"and {len(blocks) - TOLD} more"] * (len(blocks) > TOLD)
+    return ", ".join([*first, *more]) or "none"
 
 
 def _joints(sim: Simulation) -> dict[str, np.ndarray]:
@@ -122,7 +117,7 @@ def _joints(sim: Simulation) -> dict[str, np.ndarray]:
     ends = c.at + np.stack([ahead, ahead - 1], axis=0) * c.length * along
     ends = np.stack([ends.real, ends.imag], axis=-1).swapaxes(0, 1)
     columns = {
-        "who": np.column_stack([c.interfaces, sim.tracker.numbers]), "ends": ends,
+        "who": np.column_stack([c.a, c.b]), "ends": ends, "law": sim.tracker.law,
         "closure_m": c.closure, "shear_m": joints.delta[:, 1],
         "normal_stress_Pa": joints.traction[:, 0], "shear_stress_Pa": joints.traction[:, 1],
         "sliding": joints.sliding, "slipping": joints.slipping, "separated": joints.separated,
@@ -188,12 +183,6 @@ def outcomes(record: Record) -> list[dict]:
             }
         )
     return out
-
-
-def far(record: Record) -> bool:
-    """Has a block moved by more than the usual size of a block?"""
-    free = (block for block in record.scene.blocks if not block.fixed)
-    return bool(np.nanmax(record.moved) > usual_size(free))
 
 
 def sentences(record: Record) -> list[str]:

@@ -7,6 +7,7 @@ from functools import partial
 from math import inf
 from pathlib import Path
 
+import numpy as np
 from tqdm import tqdm
 
 from jointlaw.support.files import clear_run, write_json
@@ -16,6 +17,7 @@ from ..dynamics.energy import COLUMNS
 from ..dynamics.saved_states import require_text
 from ..dynamics.simulation import Simulation
 from ..errors import Refused
+from ..scene import Scene, usual_size
 from .monitors import look
 from .pictures import Pictures, curves
 from .record import Record, named, outcomes
@@ -109,6 +111,18 @@ def play(
                 record.steps = taken
                 if stop(record):
                     break
+
+
+def to_failure(scene: Scene, until: float) -> tuple[Record, str]:
+    """A run to `until` (s), or until a block has moved by the usual size of a block; and why it was
+    refused, if it was: what is recorded by then is kept."""
+    sim, size = Simulation(scene), usual_size(block for block in scene.blocks if not block.fixed)
+    record, refused = Record(sim), ""
+    try:
+        play(sim, record, until, lambda record: bool(np.nanmax(record.moved) > size))
+    except Refused as error:
+        refused = str(error)
+    return record, refused
 
 
 def _end(sim: Simulation, until: float | None) -> float:

@@ -6,7 +6,8 @@ from functools import cached_property
 
 import numpy as np
 import pymunk
-from shapely import Point, Polygon
+
+EXACT = 1e-7  # share of the size of a rock or scene below which a distance is zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +60,6 @@ class Block:
     def reach(self) -> float:
         """Distance (m) from the centroid to the farthest corner."""
         return float(np.hypot(*self.local.T).max())
-
-    def holds(self, point) -> bool:
-        """Is a point (m) inside the block?"""
-        return bool(Polygon(self.corners).contains(Point(point)))
 
 
 def usual_size(blocks: Iterable[Block]) -> float:

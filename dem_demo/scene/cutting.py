@@ -17,11 +17,10 @@ from shapely.ops import split, unary_union
 
 from jointlaw.support.progress import track
 
-from .blocks import next_of, smallest_width
+from .blocks import EXACT, next_of, smallest_width
 
 Line = tuple[int, np.ndarray, float]  # a joint: number of its set, normal, distance n . x in m
 
-EXACT = 1e-7  # share of the rock's size below which a distance is zero
 CUT = (
     10**6
 )  # the number, in place of a set's, of cuts through inward corners: no joints of the rock

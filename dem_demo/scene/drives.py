@@ -49,16 +49,12 @@ class Drive:
         now, before = (np.interp(corners - s, self.times, self.values) for s in (0.0, self.ease))
         return make_interp_spline(corners, (now - before) / self.ease, k=1).antiderivative()
 
-    @cached_property
-    def _ends(self) -> tuple[float, float]:
-        return float(self.path.t[0]), float(self.path.t[-1])
-
     def __call__(self, t: float, reversed_at: float = np.inf) -> float:
         """Prescribed displacement at time t, when it was sent back at `reversed_at`."""
         if np.isfinite(reversed_at):
             return _sent_back(self, reversed_at)(t)
         path = self.path
-        at = min(max(t, self._ends[0]), self._ends[1])
+        at = min(max(t, path.t[0]), path.t[-1])
         goes_on = (t - at) * path(at, nu=1) if self.order else 0.0
         return float(path(at) + goes_on)
 

@@ -101,7 +101,7 @@ RUN = {
     "end!": POSITIVE, "fraction": within(1e-6, 0.95, "of the limit"), "step": POSITIVE,
     "seat": a(bool), "record": POSITIVE, "dashpot_normal": NOT_NEGATIVE,
     "dashpot_shear": NOT_NEGATIVE, "law_steps": partial(integer, bound=1),
-    "largest_stress": NOT_NEGATIVE, "skin": POSITIVE, "corner_length": POSITIVE,
+    "skin": POSITIVE, "corner_length": POSITIVE,
     "max_overlap": POSITIVE,
 }  # fmt: skip
 SCENE = {

@@ -106,7 +106,7 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     rocks = [_rock(table, blocks, edge_laws, usual, digs, where) for table in top.get("rock", ())]
     gravity = top.get("gravity", GRAVITY)
     water, in_situ = read_stresses(top, blocks, density, gravity, where)
-    rocks = [replace(r, free=[i for i in r.free if not blocks[i].fixed]) for r in rocks]
+    rocks = [replace(r, free=[i for i in r.blocks if not blocks[i].fixed]) for r in rocks]
     number = {block.name: i for i, block in enumerate(blocks)}
     if len(number) < len(blocks):
         raise ValueError(f"{where}: two blocks have the same name; names must differ")
@@ -174,7 +174,7 @@ def _pairs(
 
 def _block_at(name: str, point: tuple[float, float], blocks: Sequence[Block]) -> int:
     for i, block in enumerate(blocks):
-        if not block.fixed and block.holds(point):
+        if not block.fixed and Polygon(block.corners).contains(Point(point)):
             return i
     raise ValueError(f"{name} = {list(point)}: must lie inside a block that can move")
 
@@ -225,7 +225,7 @@ def _rock(
     digs: list[Tables], where: str,
 ) -> Rock:  # fmt: skip
     """Cut a rock, and add its blocks and the laws of their edges to those of the scene; usual: its
-    density and the law of its sets where they name none."""
+    density and the law of its sets where they name none. Which can move is left open."""
     name = table["name"]
     where = f"{where}: rock[{name!r}]"
     sets = [JointSet(**{"law": usual["law"], **part}) for part in table["set"]]
@@ -258,7 +258,4 @@ def _rock(
           f"{sliver.centroid.y + shift[1]:.3g}), a sliver left out" for sliver in dropped),
         *[f"{cuts} cuts that are no joints, at inward corners: law {of_edge[CUT]!r}"] * (cuts > 0),
     ]  # fmt: skip
-    free = [i for i in range(first, len(blocks)) if not blocks[i].fixed]
-    if not free:
-        raise ValueError(f"{where}.fixed: all blocks of the rock are fixed")
-    return Rock(name, range(first, len(blocks)), free, told)
+    return Rock(name, range(first, len(blocks)), [], told)

@@ -1,6 +1,5 @@
 """A scene in memory: blocks, laws, drives and how to run them."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -30,7 +29,6 @@ class Run:
     dashpot_normal: float = 0.05  # shares of critical
     dashpot_shear: float = 0.05
     law_steps: int = 1  # steps of the law per time step: 4 balances energy to 0.5 % in impacts
-    largest_stress: float = 0.0  # Pa, expected in impacts: sets the step before anything touches
     max_overlap: float = 0.1  # share of the smaller block's width
 
 
@@ -118,18 +116,3 @@ class Scene:
         fixed = [i for i, block in enumerate(self.blocks) if block.fixed and i not in gone]
         own = {d.blocks[0] for d in self.drives if len(d.times) > 1 and len(d.blocks) < len(fixed)}
         return min(fixed, key=lambda i: i in own, default=None)
-
-    def law_of(self, key: Sequence[int]) -> str:
-        """Name of the law of an interface (block, edge, block, edge).
-
-        The law of a [[joint]] table if one names both blocks, or one of them (that of the block
-        that comes first in the scene, if both have one); else that of the joint set that cut both
-        edges; else the scene's.
-        """
-        first, edge, second, its = key
-        one, other = sorted((first, second))
-        for blocks in ((one, other), (one,), (other,)):
-            if law := self.pairs.get(frozenset(blocks)):
-                return law
-        law = self.edge_laws.get((first, edge))
-        return law if law and law == self.edge_laws.get((second, its)) else self.default_law

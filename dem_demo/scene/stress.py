@@ -4,12 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .blocks import Block, next_of
+from .blocks import EXACT, Block, next_of
 from .keys import Tables
 
 UNIT_WEIGHT = 9810.0  # N/m3, of water
 SIDES = {"left": (0, -1.0), "right": (0, 1.0), "bottom": (1, -1.0), "top": (1, 1.0)}
-EXACT = 1e-7  # share of the size of a scene below which a distance from its side is zero
 
 
 @dataclass(frozen=True, eq=False)

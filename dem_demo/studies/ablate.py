@@ -75,13 +75,11 @@ def variants(scene: Scene, record: Record) -> Iterator[tuple[str, Callable[[], S
 
     record: of the whole scene, for the normal stress that the joints of each law carried.
     """
-    carried: dict[str, list[float]] = {name: [] for name in scene.laws}
-    for frame in record.joints:
-        stresses = frame["normal_stress_Pa"].tolist()
-        for who, stress in zip(frame["who"].tolist(), stresses, strict=True):
-            carried[scene.law_of(who[:4])] += [stress] * (stress > 0)
-    pressed = {name: np.median(of) for name, of in carried.items()
-               if of and isinstance(scene.laws[name], JointLaw)}  # fmt: skip
+    of_law, stress = (np.concatenate([frame[key] for frame in record.joints])
+                      for key in ("law", "normal_stress_Pa"))  # fmt: skip
+    carried = {name: stress[(of_law == i) & (stress > 0)] for i, name in enumerate(scene.laws)}
+    pressed = {name: float(np.median(of)) for name, of in carried.items()
+               if of.size and isinstance(scene.laws[name], JointLaw)}  # fmt: skip
     lacking: dict[str, dict[str, Any]] = {}
     for law in (scene.laws[name] for name in pressed):
         given = INGREDIENTS | {

@@ -12,11 +12,9 @@ import numpy as np
 
 import jointlaw as jl
 
-from ..dynamics.simulation import Simulation
-from ..errors import Refused
 from ..output.monitors import slip_distance
-from ..output.record import Record, far, outcomes
-from ..output.run import play
+from ..output.record import Record, outcomes
+from ..output.run import to_failure
 from ..scene import USUAL, Scene, springs
 from .strength import alone
 
@@ -32,34 +30,26 @@ def compare(scene: Scene, seeds: Sequence[int], until: float) -> Iterator[dict]:
     for name in [rock.name for rock in scene.rocks]:
         for seed in seeds:
             own = alone(scene, name, seed)
-            yield {"law": "joint", "seed": seed, "laws": {}, **_run(own, until)}
-            stress = stresses(Simulation(own))
+            record, refused = to_failure(own, until)
+            yield {"law": "joint", "seed": seed, "laws": {}, **_row(record, refused)}
             run = replace(own.run, max_overlap=0.1)  # constant springs are soft in impacts
-            laws = {name: of_strength(law, stress[name]) for name, law in own.laws.items()
+            stresses = zip(own.laws.items(), _stresses(record), strict=True)
+            laws = {name: of_strength(law, stress) for (name, law), stress in stresses
                     if isinstance(law, jl.JointLaw)}  # fmt: skip
-            case = replace(own, laws=own.laws | laws, run=run)
-            yield {"law": "coulomb", "seed": seed, "laws": laws, **_run(case, until)}
+            case = to_failure(replace(own, laws=own.laws | laws, run=run), until)
+            yield {"law": "coulomb", "seed": seed, "laws": laws, **_row(*case)}
 
 
-def _run(scene: Scene, until: float) -> dict:
-    sim = Simulation(scene)
-    record, trouble = Record(sim), ""
-    try:
-        play(sim, record, until, far)
-    except Refused as error:
-        trouble = str(error)
-    return outcomes(record)[0] | {"time_s": sim.time, "refused": trouble}
+def _row(record: Record, refused: str) -> dict:
+    return outcomes(record)[0] | {"time_s": record.times[-1], "refused": refused}
 
 
-def stresses(sim: Simulation) -> dict[str, float]:
-    """Mean normal stress (Pa) of the joints of each law, weighted by their forces; the usual one
-    where none is pressed."""
-    press = np.maximum(sim.joints.traction[:, 0], 0.0)
-    force = press * sim.contacts.length
-    return {
-        name: float(np.average(press[rows], weights=force[rows])) if force[rows].any() else USUAL
-        for name, rows in zip(sim.scene.laws, sim.joints.rows, strict=True)
-    }
+def _stresses(record: Record) -> list[float]:
+    """Mean normal stress (Pa) of the joints of each law at the start, weighted by their forces; the
+    usual one where none is pressed."""
+    law, press, length = (record.joints[0][key] for key in ("law", "normal_stress_Pa", "length_m"))
+    forces = (np.maximum(press, 0.0) * length * (law == i) for i in range(len(record.scene.laws)))
+    return [float(np.average(press, weights=f)) if f.any() else USUAL for f in forces]
 
 
 def of_strength(law: jl.JointLaw, stress: float) -> jl.CoulombLaw:

@@ -5,7 +5,6 @@ displacements are found with which the joints carry the loads. A search starts w
 holds, and looks for every equilibrium from the one before, with shorter steps where none is found.
 """
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -15,20 +14,20 @@ import numpy as np
 from tqdm import tqdm
 
 import jointlaw as jl
-from jointlaw.parameters.rock import STEEPEST
 from jointlaw.support.pyplot import FORMATS
 
 from ..dynamics.seating import displacements
 from ..dynamics.simulation import Simulation
 from ..output.pictures import Pictures
-from ..output.record import named, told
-from ..scene import Scene, Tables, build, read_tables, turn
-from .failure import failing, first, seated
+from ..output.record import Record, named, told
+from ..output.run import to_failure
+from ..scene import Scene, Tables, build, read_tables, turn, usual_size
 from .trials import Trials
 
 TILT = 8.0, 60.0, 0.05  # degrees: first step, largest, to which it is found
 FACTOR = np.log(2.0), np.log(64.0), 0.006  # logarithms: the same of a factor
 TWICE = 2.0  # where all blocks are loose: times the strength, with which fewer are
+FIRST = 0.01  # of the usual size of a block: who has moved by half of the most then moves first
 SHOWN = 1.02  # times the factor: what the strength of the failing run is divided by
 
 
@@ -37,7 +36,6 @@ def strength_reduction(
     until: float,
     folder: Path,
     picture_format: str = FORMATS[0],
-    asperity: bool = False,
     tell: Callable[[str], None] = lambda text: None,
 ) -> Iterator[dict]:
     """Factor of safety and critical tilt of every rock alone, or of a scene without rocks.
@@ -45,25 +43,26 @@ def strength_reduction(
     Yields `rock`; `loose`: blocks that cannot be held as drawn, names and centroids (m);
     `without`: the same, or where all are loose, those that twice the strength does not hold either;
     `factor_of_safety`; with such blocks `factor_without`: of all others, while these move away;
-    with `asperity` also `asperity_factor`; `critical_tilt` (degrees); each None where none is
-    found. `picture`: the file in `folder` that shows how it fails, None without a factor; `first`:
-    the blocks that move first there. That run has the strength divided by 1.02 times the factor
-    (without loose blocks, if there are any), and ends at `until` (s) or once a block has moved by
-    the size of a block. Each finished trial is kept in the folder; called again with it, the search
-    goes on. tell: is told what is done, a line at a time.
+    `critical_tilt` (degrees); each None where none is found. `picture`: the file in `folder` that
+    shows how it fails, None without a factor; `first`: the blocks that move first there. That run
+    has the strength divided by 1.02 times the factor (without loose blocks, if there are any), and
+    ends at `until` (s) or once a block has moved by the size of a block. Each finished trial is
+    kept in the folder; called again with it, the search goes on. tell: is told what is done, a line
+    at a time.
     """
     trials = Trials(scene, folder)
     for name in [rock.name for rock in scene.rocks] or ["scene"]:
         one = (alone(scene, name) if scene.rocks else scene).excavated
         tell(f"{name}: looking for blocks that cannot be held")
-        loose, free = trials.ask(f"{name}: loose", partial(_loose, one)), _free(one)
-        tell(f"{name}: {len(loose)} of {free} blocks cannot be held" + _listed(loose))
+        loose = trials.ask(f"{name}: loose", partial(_loose, one))
+        free = sum(not block.fixed for block in one.blocks)
+        tell(f"{name}: {len(loose)} of {free} blocks cannot be held: {told(loose)}")
         row: dict = {"rock": name, "loose": loose, "without": loose}
         if len(loose) == free:
             ask = partial(_loose, weakened(one, 1 / TWICE))
             row["without"] = trials.ask(f"{name}: loose with strength * {TWICE:g}", ask)
-            tell(f"{name}: {len(row['without'])} of them with {TWICE:g} times the strength neither"
-                 + _listed(row["without"]))  # fmt: skip
+            tell(f"{name}: {len(row['without'])} of them with {TWICE:g} times the strength "
+                 f"neither: {told(row['without'])}")  # fmt: skip
         apart = np.isin([block.name for block in one.blocks], [b["block"] for b in row["without"]])
         tell(f"{name}: factor of safety of all blocks")
         factor = row["factor_of_safety"] = factor_of_safety(one, trials, name)
@@ -71,8 +70,6 @@ def strength_reduction(
             tell(f"{name}: factor of safety without those {len(row['without'])}")
             factor = factor_of_safety(one, trials, f"{name} without loose blocks", apart)
             row["factor_without"] = factor
-        if asperity:
-            row["asperity_factor"] = asperity_factor(one, trials, name)
         tell(f"{name}: critical tilt")
         row |= {"critical_tilt": critical_tilt(one, trials, name), "picture": None}
         if factor:
@@ -87,12 +84,10 @@ def strength_reduction(
         yield row
 
 
-def _free(scene: Scene) -> int:
-    return sum(not block.fixed for block in scene.blocks)
-
-
-def _listed(blocks: list[dict]) -> str:
-    return f": {told(blocks)}" if blocks else ""
+def seated(scene: Scene) -> Scene:
+    """A scene that starts from its equilibrium, with the time step that follows: it is halved where
+    joints close too far for it."""
+    return replace(scene, run=replace(scene.run, step=None, fraction=None, seat=True))
 
 
 def _loose(scene: Scene) -> list[dict]:
@@ -101,10 +96,19 @@ def _loose(scene: Scene) -> list[dict]:
 
 def _show(scene: Scene, until: float, title: str, path: Path, apart: np.ndarray) -> list[dict]:
     """Run and draw a scene that fails; returns which blocks move first, but for those apart."""
-    record = failing(scene, until)
-    ahead, title = first(record, apart), f"{title}\nwith strength / {scene.reduction:.3g}"
+    record, _ = to_failure(seated(scene), until)
+    ahead, title = _first(record, apart), f"{title}\nwith strength / {scene.reduction:.3g}"
     Pictures(record, title, ahead, "moves first").final(path)
     return named(scene, ahead)
+
+
+def _first(record: Record, apart: np.ndarray) -> np.ndarray:
+    """Mask (n,) of the blocks that move first, but for those of a mask `apart`."""
+    size = usual_size(block for block in record.scene.blocks if not block.fixed)
+    moved = [np.where(apart, 0.0, np.hypot(*(record.displaced(i) - record.displaced(0)).T))
+             for i in range(len(record.times))]  # fmt: skip
+    away = next((frame for frame in moved if np.nanmax(frame) > FIRST * size), moved[-1])
+    return away > 0.5 * np.nanmax(away)
 
 
 def factor_of_safety(
@@ -117,22 +121,11 @@ def factor_of_safety(
     Strength is the shear stress that a joint can bear at its own normal stress. None if the scene
     holds with 1/64 of it, or fails with 64 times of it.
     """
-    name = f"{name}: factor of safety"
-    return _factor(partial(weakened, scene), trials or Trials(scene), name, loose)
 
+    def at(log: float) -> Scene:
+        return weakened(scene, float(np.exp(log)))
 
-def asperity_factor(
-    scene: Scene, trials: Trials | None = None, name: str = "scene"
-) -> float | None:
-    """What the friction of all asperities is divided by for a scene to just hold.
-
-    None as above. No friction is made larger than a scene may have, 5.
-    """
-    return _factor(partial(smoothed, scene), trials or Trials(scene), f"{name}: asperity factor")
-
-
-def _factor(at: Callable[[float], Scene], trials: Trials, name: str, loose=None) -> float | None:
-    log = _march(lambda log: at(float(np.exp(log))), FACTOR, trials, name, loose)
+    log = _march(at, FACTOR, trials or Trials(scene), f"{name}: factor of safety", loose)
     return None if log is None else float(np.exp(log))
 
 
@@ -159,25 +152,6 @@ def weakened(scene: Scene, factor: float) -> Scene:
             bond = replace(bond, tension=bond.tension / factor, energy_I=energy)
             laws[name] = replace(law, bond=bond)
     return replace(scene, laws=laws, reduction=scene.reduction * factor)
-
-
-def smoothed(scene: Scene, factor: float) -> Scene:
-    """A scene with the friction of asperities and of plain Coulomb divided by a factor."""
-    laws = dict(scene.laws)
-    for name, law in scene.laws.items():
-        if isinstance(law, jl.CoulombLaw):
-            if math.isinf(law.friction):  # what fails so has no factor
-                continue
-            residual = law.residual_friction
-            laws[name] = replace(
-                law,
-                friction=min(law.friction / factor, STEEPEST),
-                residual_friction=residual and min(residual / factor, STEEPEST),
-            )
-        else:
-            weak = min(law.asperity.mu / factor, STEEPEST)
-            laws[name] = replace(law, asperity=replace(law.asperity, mu=weak))
-    return replace(scene, laws=laws)
 
 
 def _march(

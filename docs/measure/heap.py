@@ -28,7 +28,6 @@ SCENE = """title = "Heap of {n} blocks"
 {law}[run]
 end = {end}
 seat = false
-largest_stress = 1e4
 law_steps = 2
 record = 0.1
 corner_length = 0.05

@@ -1,15 +1,19 @@
 """Rock masses: the scenes end as intended, the template runs, wrong tables are refused."""
 
+import itertools
 import json
 import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from shapely import Point, Polygon
 
 import jointlaw as jl
 from dem_demo import Simulation, load, parse, run
 from dem_demo.cli import main
+from dem_demo.contact import Tracker
+from dem_demo.dynamics.blocks import Blocks
 from dem_demo.output.monitors import friction_angle, law_between
 from dem_demo.scene import TEMPLATE, WHOLE, read_tables
 from dem_demo.studies.compare import compare, of_strength
@@ -164,17 +168,17 @@ def test_joints_have_the_law_of_their_set():
     scene = parse(
         text.replace("[watch]", "[[joint]]\naround = [-3.0, 7.0]\nlaw = 'plain'\n[watch]")
     )
-    block = next(i for i, b in enumerate(scene.blocks) if b.holds((-3.0, 7.0)))
-    assert (
-        scene.law_of((0, 0, block, 0)) == scene.law_of((block, 1, len(scene.blocks), 0)) == "plain"
-    )
-    edges = list(scene.edge_laws.items())
-    for (one, i), law in edges:
-        for (other, j), another in edges:
-            if block not in (one, other):
-                expected = law if law == another else "joint"
-                assert scene.law_of((one, i, other, j)) == expected
-    assert {law for _, law in edges} == {"joint", "plain"}
+    inside = [Polygon(block.corners).contains(Point(-3.0, 7.0)) for block in scene.blocks]
+    block = inside.index(True)
+    tracker = Tracker(scene, Blocks(scene).motion)
+    start, of = tracker.outlines.start, tracker.outlines.block
+    laws = {int(start[one] + edge): law for (one, edge), law in scene.edge_laws.items()}
+    pairs = np.array([*itertools.combinations(sorted(laws), 2)])
+    found = [[*scene.laws][law] for law in tracker.laws_of(pairs)]
+    for (one, other), law in zip(pairs.tolist(), found, strict=True):
+        alike = laws[one] if laws[one] == laws[other] else "joint"
+        assert law == ("plain" if block in (of[one], of[other]) else alike)
+    assert {*laws.values()} == {*found} == {"joint", "plain"}
 
 
 def test_two_blocks_with_laws_of_their_own_are_told_and_moved_by_the_same():

@@ -20,7 +20,7 @@ def test_dashpots_never_pull():
     text = BLOCK.format(**WORDS, driven=0.0).replace("end =", "dashpot_normal = 0.3\nend =")
     sim = Simulation(parse(text))
     sim.blocks.motion[4, 1] = 1.0
-    sim.contacts.place(sim.blocks.motion)
+    sim.world.call("place")
     sim.world.call("forces", sim.dt)
     force = sim.ledger.forces
     assert force[1, 1, 1] < 0.0  # they brake

@@ -5,8 +5,8 @@ import pytest
 from limit_analysis import upper_factor
 
 from dem_demo import Simulation, parse
-from dem_demo.studies.failure import failing
-from dem_demo.studies.strength import FACTOR, factor_of_safety, weakened
+from dem_demo.output.run import to_failure
+from dem_demo.studies.strength import FACTOR, factor_of_safety, seated, weakened
 
 FOUND = FACTOR[2]  # to which a factor is found
 
@@ -45,7 +45,7 @@ def slope(**keys):
 
 def turning(scene):
     """How far the blocks turn that move far, arm times angle over distance: their median."""
-    record = failing(scene, 0.3)
+    record, _ = to_failure(seated(scene), 0.3)
     far = record.moved > 0.5 * record.moved.max()
     arms = np.array([block.reach for block in scene.blocks])
     turned = np.abs(record.motion[-1][2] - record.motion[0][2]) * arms

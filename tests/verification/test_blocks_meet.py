@@ -39,7 +39,7 @@ def put(sim, across, up):
     motion = sim.blocks.motion
     motion[0, 1] += across
     motion[1, 1] += up
-    sim.blocks.place(motion, np.zeros((3, 2)))
+    sim.blocks.motion[:], sim.blocks.velocity[:] = motion, 0.0
 
 
 def friction(sim):

@@ -8,6 +8,7 @@ from scene_text import ROCK
 
 from dem_demo import Refused, Simulation, parse
 from dem_demo.contact import virgin_curve
+from dem_demo.dynamics import simulation
 from dem_demo.scene import Files, build_law
 
 STEPS = 3000
@@ -47,7 +48,7 @@ def ring(scene, share, steps):
     sim.blocks.motion[3:] = (
         1e-7 * rng.standard_normal(sim.blocks.motion[3:].shape) * sim.blocks.mobile.T
     )
-    sim.blocks.place(sim.blocks.motion, sim.blocks.motion[3:])
+    sim.blocks.velocity[:] = sim.blocks.motion[3:] * sim.blocks.mobile.T
     size = []
     try:
         for _ in range(steps):
@@ -115,10 +116,12 @@ law_steps = 4
 """
 
 
-def test_a_chosen_step_is_halved_in_an_impact_and_time_goes_on():
+def test_a_chosen_step_is_halved_in_an_impact_and_time_goes_on(monkeypatch):
     """A step for 10 Pa, far too long for the fall of a block by 0.1 m: halved, the books close, and
-    the block falls as it does with a short step. A step that is given is refused instead."""
-    fast = Simulation(parse(FALL + "largest_stress = 10.0"))
+    the block falls as it does with a short step, given or chosen. A long one that is given is
+    refused instead."""
+    monkeypatch.setattr(simulation, "IMPACT", 10.0)
+    fast = Simulation(parse(FALL))
     first, times = fast.dt, [0.0]
     while fast.time < 0.4:
         fast.step()
@@ -132,6 +135,19 @@ def test_a_chosen_step_is_halved_in_an_impact_and_time_goes_on():
     while slow.time < fast.time:
         slow.step()
     assert fast.blocks.motion[:2, 1] == pytest.approx(slow.blocks.motion[:2, 1], abs=2e-3)
+    monkeypatch.undo()
+    chosen = Simulation(parse(FALL))
+    assert chosen.dt < first
+    while chosen.time < fast.time:
+        chosen.step()
+    assert abs(chosen.ledger.error) < 1e-2  # a longer step
+    assert chosen.blocks.motion[:2, 1] == pytest.approx(slow.blocks.motion[:2, 1], abs=2e-3)
     given = Simulation(parse(FALL), step=first)
     with pytest.raises(Refused, match="must stay below"):
         [given.step() for _ in range(100_000)]
+
+
+def test_a_scene_in_which_forces_move_nothing_asks_for_a_step():
+    driven = parse(FALL.replace("angle = 3.0", 'held = ["x", "y", "turn"]'))
+    with pytest.raises(Refused, match=r"set run.step \(s\)"):
+        Simulation(driven)

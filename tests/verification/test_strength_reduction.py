@@ -17,10 +17,8 @@ from dem_demo.scene import load, parse
 from dem_demo.studies import strength
 from dem_demo.studies.strength import (
     alone,
-    asperity_factor,
     critical_tilt,
     factor_of_safety,
-    smoothed,
     weakened,
 )
 
@@ -262,11 +260,6 @@ def test_a_stopped_search_goes_on(tmp_path, monkeypatch, capsys):
     assert "trials of another scene" in capsys.readouterr().err
 
 
-def test_asperity_factor_of_a_block_is_that_of_the_law_alone():
-    alone = brentq(lambda f: angle(f, DIP) - DIP, 1.0, 3.0, xtol=1e-3)
-    assert asperity_factor(parse(SCENE)) == pytest.approx(alone, rel=FOUND)
-
-
 def test_critical_tilt_of_a_block_is_that_of_the_law_alone():
     alone = brentq(lambda tilt: angle(1.0, DIP + tilt) - DIP - tilt, 0.0, 15.0, xtol=1e-3)
     # degrees: 0.05 of the search, 0.03 of one step in place of many, ends that press unlike
@@ -280,17 +273,6 @@ def test_a_tilt_near_the_steepest_is_found(degrees):
     plain = jl.CoulombLaw(1e9, 1e9, math.tan(math.radians(degrees)), plane=0.0)
     found = critical_tilt(replace(parse(text), gravity=(0.0, -9.81), laws={"joint": plain}))
     assert found is None if degrees > 60 else found == pytest.approx(degrees, rel=FOUND)
-
-
-def test_all_frictions_are_divided_and_nothing_else():
-    scene = parse(SCENE)
-    law, sticks = scene.laws["joint"], jl.CoulombLaw(1e9, 1e9, math.inf, plane=0.0)
-    worn = replace(law, slope_wear=1e3)
-    given = {"worn": worn, "plain": jl.CoulombLaw(1e9, 1e9, 0.6, plane=0.0), "sticks": sticks}
-    laws = smoothed(replace(scene, laws=given), 2.0).laws
-    assert laws["worn"] == replace(worn, asperity=replace(worn.asperity, mu=law.asperity.mu / 2))
-    assert laws["plain"] == jl.CoulombLaw(1e9, 1e9, 0.3, plane=0.0)
-    assert laws["sticks"] == sticks
 
 
 def test_command_tells_both_and_draws_the_failure(tmp_path, capsys):

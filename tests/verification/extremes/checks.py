@@ -8,7 +8,7 @@ from jointlaw.kernels.mating import offset, planes
 
 ROUNDING = 1e-12  # of the facet's normal force: a cell's G is a difference of numbers of that size
 KERNELS = 1e-11  # of the largest traction: rounding of y, 1e-16, over a step of NEAR y, 1e-5
-NOTHING = 1e-130  # Pa; squares of far smaller forces of sliders underflow
+NOTHING = 1e-60  # Pa; far below, forces of sliders count as none: their squares underflow
 
 
 def sliders_within_friction(batch):
@@ -26,9 +26,10 @@ def sliders_within_friction(batch):
     excess = size - strength[:, None] * cells.G
     # the terms of a facet's y may cancel, where shear is at a right angle to it: y is rounding then
     terms = np.concatenate([now.delta[:1], offset(k, now.delta[1:])])
-    whole = strength * k.curve.force(np.abs(k.m).T @ np.abs(terms))[0]
+    reach = np.abs(k.m).T @ np.abs(terms)
+    whole = strength * k.curve.force(reach)[0]
     whole = np.where(whole > 0, whole, np.inf)[:, None]
-    touches = y > (now.depth if k.yields else 0)
+    touches = y + ROUNDING * reach > (now.depth if k.yields else 0)
     lifted = np.where(~touches[:, None] & (size > 0), np.inf, 0.0)
     return float(np.max(np.maximum(excess / whole, lifted), initial=0.0))
 

@@ -25,6 +25,7 @@ CUT = (
     10**6
 )  # the number, in place of a set's, of cuts through inward corners: no joints of the rock
 LESS = 0.9  # share of a sliver that may be left when a neighbour takes a part of it
+ROUNDING = 1e-6  # of the length below which a distance is zero: coordinates so small are zero
 
 
 @dataclass(frozen=True)
@@ -100,6 +101,8 @@ def cut(
     pieces = [part for piece, _ in pieces for part in _convex_parts(piece, sets, lines, tiny)]
     pieces, joined, dropped = _without_slivers(pieces, sets, lines, least_width, tiny, rims)
     shapes = [_corners(piece, tiny) for piece in pieces]
+    for corners in shapes:  # of coordinates such as 1e-22 GEOS says overlaps that are not there
+        corners[np.abs(corners) < ROUNDING * tiny] = 0.0
     shapes.sort(key=lambda c: tuple(np.round(c.mean(axis=0)[::-1], 6)))
     return shapes, [_sets_of(c, lines, tiny) for c in shapes], joined, dropped
 

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.integrate import trapezoid
 
 import jointlaw as jl
 
@@ -60,7 +61,7 @@ def of_strength(law: jl.JointLaw, stress: float) -> jl.CoulombLaw:
     friction, slid = record.shear_stress / stress, record.shear_2
     top, residual = int(friction.argmax()), float(friction[-1])
     fall = float(friction[top] - residual)
-    work = float(np.trapezoid(friction[top:] - residual, slid[top:]))
+    work = float(trapezoid(friction[top:] - residual, slid[top:]))
     bond = {"cohesion": law.bond.cohesion, "tension": law.bond.tension} if law.bond else {}
     return jl.CoulombLaw(
         *springs(law, stress), fall + residual, residual_friction=residual, residual_cohesion=0.0,

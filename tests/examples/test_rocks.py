@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 from shapely import Point, Polygon
 
 import jointlaw as jl
@@ -235,7 +236,7 @@ def test_coulomb_in_compare_has_the_strength_of_the_law():
     )
     assert fair.residual_friction == pytest.approx(mu, rel=1e-3)
     record = jl.direct_shear(law.joint(), to=[0.2], normal=stress, steps=2000)
-    work = np.trapezoid(np.maximum(record.shear_stress / stress - mu, 0.0), record.shear_2)
+    work = trapezoid(np.maximum(record.shear_stress / stress - mu, 0.0), record.shear_2)
     above = fair.friction - mu
     before = 0.02 * above  # m: a bound of what the law has before its peak
     assert 0.5 * above * fair.weakening < work < 0.5 * above * fair.weakening + before

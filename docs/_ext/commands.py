@@ -17,9 +17,13 @@ def told(*words):
 
 
 def verbs(text):
-    """Words after the program's name in its own help that are commands with a help."""
-    if listed := re.search(r"^  (?:COMMAND|HOST)\n((?:    .*\n)+)", text, re.MULTILINE):
-        return re.findall(r"^    (\w[\w-]*)", listed[1], re.MULTILINE)
+    """Words that a help lists as commands with a help of their own."""
+    listed = re.search(r"^  (?:COMMAND|HOST)\n((?:    .*\n)+)", text, re.MULTILINE)
+    return re.findall(r"^    (\w[\w-]*)", listed[1], re.MULTILINE) if listed else []
+
+
+def shown(text):
+    """Words after the program's name in the examples of its own help."""
     return re.findall(r"^  python -m \w+ ([a-z][a-z-]*)\b", text, re.MULTILINE)
 
 
@@ -31,7 +35,7 @@ class Help(Directive):
     def run(self):
         program = self.arguments[0]
         whole, parts = told(program), []
-        todo = [[], *([verb] for verb in dict.fromkeys(verbs(whole)))]
+        todo = [[], *([verb] for verb in dict.fromkeys(verbs(whole) or shown(whole)))]
         for words in todo:
             name = " ".join([program, *words])
             part = nodes.section(ids=[nodes.make_id(name)])

@@ -106,9 +106,9 @@ def _run(given: argparse.Namespace) -> None:
     _announce(sim, given.until)
     dt = sim.dt
     record, summary = run(sim, given.out, given.until, given.format, given.vtk)
-    if scheduled := summary["stages_begun_s"]:
-        told = ("not yet" if time is None else f"from {time:.3g} s" for time in scheduled)
-        print(f"stages of the excavation: {', '.join(told)}")
+    if begun := summary["stages_begun_s"]:
+        said = ("not yet" if time is None else f"from {time:.3g} s" for time in begun)
+        print(f"stages of the excavation: {', '.join(said)}")
     for line in sentences(record):
         print(line)
     if sim.dt < dt:

@@ -16,12 +16,13 @@ def press(scene: Scene, blocks: Blocks, tracker: Tracker) -> np.ndarray:
     uniform, it is the same as half of it at either end.
     """
     given = [stress for stress in (scene.water, scene.in_situ) if stress]
-    if not (given or any(scene.pressure) or scene.stages):
+    if not (given or scene.wet or scene.stages):
         return 0.0 * blocks.loads
     contacts, loads, before = tracker.contacts, blocks.steady + blocks.support, blocks.loads.copy()
     for stress in given:
         loads += scene.thickness * _on_edges(stress, contacts.outlines, blocks.motion)
-    push = np.array(scene.pressure)[tracker.law] * contacts.carried.sum(axis=0) * scene.thickness
+    pressure = np.array([scene.pressure.get(name, 0.0) for name in scene.laws])[tracker.law]
+    push = pressure * contacts.carried.sum(axis=0) * scene.thickness
     loads += contacts.assemble(blocks.motion, push, 0.0 * push)
     blocks.loads[:] = loads * blocks.mobile
     return blocks.loads - before

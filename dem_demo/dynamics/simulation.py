@@ -75,7 +75,7 @@ class Simulation:
         """One time step. Raises Refused for a state that the method cannot carry.
 
         1. The blocks move. Their contacts follow to where they are by now; new ones are looked for
-           if blocks have moved far.
+           if blocks have moved far. An excavation takes blocks away, or lets their support go.
         2. Closure is the depth from the geometry, sliding the velocity times the step: the joints
            say tractions.
         3. Tractions, dashpots, weight and drives make forces, and these the next velocities; the

@@ -17,15 +17,14 @@ TOLD = 12  # most blocks that a sentence names
 
 
 class Record:
-    """Frames of a run: times (f,), motion (f, 6, n), NaN for blocks that are gone, energies (f, 9),
-    joints.
+    """Frames of a run: times (f,), motion (f, 6, n), NaN for blocks that were taken away, energies
+    (f, 9), joints.
 
-    joints[f]: by name, "who" (k, 2) its blocks; "ends" (k, 2, 2) the segment
-    of joint that a contact carries; "law" (k,), by its number in the scene; and numbers (k,) with
-    their unit in the name. stresses[f] (3,
-    n): of the blocks. monitored[f]:
-    what the scene's [watch] asks for; slips: of its joints; laws: of the watched joints; state:
-    that of the last frame, to return to; steps: of the run; loose (n,): who was at its start.
+    joints[f]: by name, "who" (k, 2) the two blocks; "ends" (k, 2, 2) the segment of joint that a
+    contact carries; "law" (k,) its number in the scene; and numbers (k,) with their unit in the
+    name. stresses[f] (3, n): xx, yy, xy of the blocks (Pa). monitored[f]: what the scene's [watch]
+    asks for; slips: of its joints; laws: of the watched joints; state: that of the last frame, to
+    return to; steps: of the run; loose (n,): blocks that nothing held at the start.
     """
 
     def __init__(self, sim: Simulation) -> None:
@@ -73,12 +72,8 @@ class Record:
 
     def write_blocks(self, path: Path) -> None:
         """blocks.csv: where each block is at the end, and how it moved since step 0."""
-        last, away, slip = (
-            self.motion[-1].T,
-            self.displaced(-1) - self.displaced(0),
-            self.loose * 0.0,
-        )
-        joints = self.joints[-1]
+        last, away = self.motion[-1].T, self.displaced(-1) - self.displaced(0)
+        slip, joints = np.zeros(len(last)), self.joints[-1]
         np.maximum.at(slip, joints["who"], np.abs(joints["shear_m"])[:, None])
         columns = {
             "block": [block.name for block in self.scene.blocks], "x_m": last[:, 0],

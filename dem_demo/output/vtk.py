@@ -17,10 +17,10 @@ def write(record: Record, folder: Path) -> None:
     """blocks_N.vtu and joints_N.vtu of every frame N, in SI units; blocks.pvd and joints.pvd list
     them with their times (s): open these.
 
-    Blocks carry their number, displacement relative to the base, velocity, spin, the principal
-    values of their mean stress (compression positive; the second is the smaller one) and the first
-    as a vector along its direction. Joints carry
-    the numbers of the record and `state`: 0 stuck, 1 partly sliding, 2 sliding, 3 open.
+    Blocks carry their number, displacement relative to the base, velocity, spin, whether they were
+    loose at the start, the principal values of their mean stress (compression positive; the second
+    is the smaller one) and the first as a vector along its direction. Joints carry the numbers of
+    the record and `state`: 0 stuck, 1 partly sliding, 2 sliding, 3 open.
     """
     folder.mkdir(parents=True, exist_ok=True)
     pictures, names = Pictures(record), list(STATES)

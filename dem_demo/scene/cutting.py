@@ -21,9 +21,7 @@ from .blocks import EXACT, next_of, smallest_width
 
 Line = tuple[int, np.ndarray, float]  # a joint: number of its set, normal, distance n . x in m
 
-CUT = (
-    10**6
-)  # the number, in place of a set's, of cuts through inward corners: no joints of the rock
+CUT = 10**6  # in place of a set's number: of cuts through inward corners, no joints of the rock
 LESS = 0.9  # share of a sliver that may be left when a neighbour takes a part of it
 ROUNDING = 1e-6  # of the length below which a distance is zero: coordinates so small are zero
 

@@ -96,8 +96,8 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     top, files = keys.checked(data, SCENE, where), Files() if files is None else files
     laws = {name: build_law(table, f"{where}: laws.{name}", files)
             for name, table in top["laws"].items()}  # fmt: skip
-    pressure = (NOT_NEGATIVE(f"{where}: laws.{name}.pressure", table.get("pressure", 0.0))
-                for name, table in top["laws"].items())  # fmt: skip
+    pressure = {name: NOT_NEGATIVE(f"{where}: laws.{name}.pressure", table["pressure"])
+                for name, table in top["laws"].items() if "pressure" in table}  # fmt: skip
     density = top.get("density", DENSITY)
     blocks = [_block(table, density, where) for table in top.get("block", ())]
     edge_laws: dict[tuple[int, int], str] = {}
@@ -125,7 +125,7 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     scene = Scene(
         top.get("title", where), tuple(blocks), laws, run, default, pairs,
         tuple(rocks), edge_laws, drives, gravity, top.get("thickness", 1.0),
-        water, in_situ, (*pressure, 0.0), tuple(_stages(digs, blocks, where)), **watched,
+        water, in_situ, pressure, tuple(_stages(digs, blocks, where)), **watched,
     )  # fmt: skip
     if WHOLE in edge_laws.values():
         joints = [laws[law] for law in jointed or [default]]

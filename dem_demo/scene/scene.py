@@ -54,9 +54,9 @@ class Scene:
     joint of a rock, the law of its set.
 
     water: stress of water in joints and on faces; in_situ: stress before an excavation; pressure:
-    of water (Pa) in the joints of each law. stages: of an excavation, `blocks` that are taken away
-    `at` a time (s), or None when the rock is at rest, and `over` what time (s) their support goes;
-    gone: blocks that are not there from the start.
+    of water (Pa) in the joints of laws, by their names. stages: of an excavation, `blocks` that are
+    taken away `at` a time (s), or None when the rock is at rest, and `over` what time (s) their
+    support goes; gone: blocks that are not there from the start.
 
     slip, shear: joints to report on, as (moving block, base); near: those nearest to points, as two
     blocks; pins: points, as (block, place in m); reduction: what the shear strength of all joints
@@ -79,7 +79,7 @@ class Scene:
     thickness: float = 1.0
     water: Stress | None = None
     in_situ: Stress | None = None
-    pressure: tuple[float, ...] = ()
+    pressure: dict[str, float] = field(default_factory=dict)
     stages: tuple[Tables, ...] = ()
     gone: tuple[int, ...] = ()
     slip: tuple[tuple[int, int], ...] = ()
@@ -100,7 +100,7 @@ class Scene:
     @property
     def wet(self) -> bool:
         """Is there water, so that the stresses of joints are effective ones?"""
-        return self.water is not None or any(self.pressure)
+        return self.water is not None or any(self.pressure.values())
 
     @property
     def excavated(self) -> "Scene":

@@ -28,7 +28,7 @@ from .tables.joint_table import JointTable, load_table
 
 if TYPE_CHECKING:
     from .calibration.field import from_field
-    from .calibration.fit import fit_closure, fit_curves
+    from .calibration.fit import fit_curves
     from .calibration.measured import ClosureCurve, ShearCurve
     from .hosts.c.export import export_c
     from .hosts.fem.export import export_fem
@@ -62,7 +62,6 @@ __all__ = [
     "export_fem",
     "export_lammps",
     "export_yade",
-    "fit_closure",
     "fit_curves",
     "from_field",
     "from_surface",
@@ -81,7 +80,6 @@ _LATER = {
     "export_fem": "hosts.fem.export",
     "export_lammps": "hosts.lammps.export",
     "export_yade": "hosts.yade.export",
-    "fit_closure": "calibration.fit",
     "fit_curves": "calibration.fit",
     "from_field": "calibration.field",
     "from_surface": "surface.fit",

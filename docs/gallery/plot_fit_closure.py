@@ -20,7 +20,7 @@ from jointlaw.calibration.measured import first_loading
 every_stress, every_closure = datasets.load("grimsel_vd1_closure")
 stress, closure = first_loading(every_stress, every_closure)
 seen = stress <= 5.3e6
-fit = jl.fit_closure(stress[seen], closure[seen])
+fit = jl.fit_curves([jl.ClosureCurve(stress[seen], closure[seen])])
 for name in fit.parameters:
     if name in fit.not_identifiable:
         print(f"{name}: {fit.not_identifiable[name]}")

@@ -61,7 +61,7 @@ def main():
     stress, closure = first_loading(*datasets.load("grimsel_vd1_closure"))
     seen = stress <= 5.3e6
     points = stress[seen], closure[seen]
-    laws = {"jointlaw": jl.fit_closure(*points).predict}
+    laws = {"jointlaw": jl.fit_curves([jl.ClosureCurve(*points)]).predict}
     laws |= {name: fitted(name, *points) for name in LAWS}
     rows = []
     for name, law in laws.items():
@@ -70,7 +70,8 @@ def main():
     choices = []
     for top, alpha in CHOICES:
         seen = stress <= top
-        fit = jl.fit_closure(stress[seen], closure[seen], priors={"alpha": alpha})
+        curve = jl.ClosureCurve(stress[seen], closure[seen])
+        fit = jl.fit_curves([curve], priors={"alpha": alpha})
         choices.append(100 * (fit.predict(closure[-1]) / stress[-1] - 1))
     rows.append(["jointlaw, nine choices", f"{min(choices):+.1f} to {max(choices):+.1f} %", ""])
     print(table(["law", "error at 10.3 MPa", "rms from 6 to 10.3 MPa"], rows))

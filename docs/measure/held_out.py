@@ -85,7 +85,7 @@ def draw(
     noisy = stress * (1 + 0.01 * rng.standard_normal(stress.size))
     measured = closure + few * CLOSURE_NOISE * closure[-1] * rng.standard_normal(stress.size)
     seen = noisy[stress <= LIMIT], measured[stress <= LIMIT]
-    fit = jl.fit_closure(*seen, priors=priors)
+    fit = jl.fit_curves([jl.ClosureCurve(*seen)], priors=priors)
     laws = (fit.predict, *(fitted(name, *seen) for name in LAWS))
     # judged by the curve, not by one draw of the noise
     errors = [float(law(closure[-1])) / stress[-1] - 1 for law in laws]

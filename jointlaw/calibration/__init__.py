@@ -10,7 +10,7 @@
     envelopes       Coulomb, Barton, a power law, through the same tests
     problem         what is free, what is held, where to start; least squares with priors
     estimates       what a fit found: law, intervals, what the data leave open
-    fit             fit_closure, fit_curves; their result in words and a picture
+    fit             fit_curves; its result in words and a picture
     field           a law from JRC, JCS, a friction angle and a stiffness
 
 Each file imports from those above it only.

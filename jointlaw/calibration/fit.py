@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..laws.joint_law import JointLaw
 from ..support.checks import Array
@@ -47,7 +46,7 @@ UNMEASURED = (
 
 
 class Fit(Estimates):
-    """Outcome of `fit_closure` and `fit_curves`: `Estimates`, with words and a picture."""
+    """Outcome of `fit_curves`: `Estimates`, with words and a picture."""
 
     def report(self) -> str:
         """The fit in words and tables (Markdown)."""
@@ -170,51 +169,15 @@ class Fit(Estimates):
         axis.legend()
 
 
-def fit_closure(
-    stress: ArrayLike,
-    closure: ArrayLike,
-    *,
-    free: Sequence[str] = ("asperity_density", "alpha", "beta"),
-    fixed: Values | None = None,
-    law: JointLaw | None = None,
-    priors: Ranges | None = None,
-    noise: float | None = None,
-    cycle: bool = False,
-    compliance: float = 0.0,
-) -> Fit:
-    """Fit the law to one closure test.
-
-    Parameters
-    ----------
-    stress: normal stress in Pa, (n,), n >= 4.
-    closure: closure in m, (n,), from wherever the test began.
-    free: names of the parameters to fit; see `fit_curves`. `overlap` is held at 0 by default: the
-        law's closure then counts from the first touch of the highest asperity, and the seating
-        closure, which is fitted, already says how far the test began beyond it.
-    fixed, law, priors: as in `fit_curves`.
-    noise, cycle, compliance: as in `ClosureCurve`; cycles need "yield_interference" among
-        `free` or `fixed`, or a law that has one.
-
-    Returns a `Fit`. Raises ValueError for curves or names that do not fit.
-
-    Source: Misra 1999, Eq. 11, 12, 33, 37; docs/theory-incremental.md, "Heights, direction and
-    Hertz become one curve", for the "individual" reading.
-
-    >>> fit = jl.fit_closure(record.F1[1:100:9], record.closure[1:100:9])
-    """
-    curve = ClosureCurve(np.asarray(stress), np.asarray(closure), noise, cycle, compliance)
-    return fit_curves([curve], free=free, fixed=fixed, law=law, priors=priors)
-
-
 def fit_curves(
     curves: Sequence[ClosureCurve | ShearCurve],
     *,
-    free: Sequence[str] = ("asperity_density", "alpha", "beta", "mu", "a"),
+    free: Sequence[str] | None = None,
     fixed: Values | None = None,
     law: JointLaw | None = None,
     priors: Ranges | None = None,
 ) -> Fit:
-    """Fit one law to several measured curves at once.
+    """Fit one law to one measured curve or to several at once.
 
     Parameters
     ----------
@@ -223,7 +186,8 @@ def fit_curves(
         K (Pa m^(1-eta)), lam, eta, mu, a, b, c, yield_interference (m), mating_length
         (m), slope_wear (J/m2), slope_residual; of a law with a bond cohesion (Pa), tension (Pa).
         Positive ones are fitted as logarithms. A closure curve that does not begin at zero stress
-        adds its seating closure (m).
+        adds its seating closure (m). None takes asperity_density; with a closure curve alpha and
+        beta, over cycles yield_interference too; with shear curves mu, a and mating_length.
     fixed: values of parameters that are known otherwise, such as alpha from a scan, in SI units.
     law: values of all parameters that are not free, `mating_length` among them; None takes rock
         asperities, `forward.DEFAULT`, of "individual" formation. A law of one plane stays one.
@@ -235,6 +199,12 @@ def fit_curves(
 
     Returns a `Fit`. Raises ValueError naming the parameter when something does not fit.
 
+    Source: Misra 1999, Eq. 11, 12, 33, 37; docs/theory-incremental.md, "Heights, direction and
+    Hertz become one curve", for the "individual" reading.
+
+    >>> curve = jl.ClosureCurve(record.F1[1:100:9], record.closure[1:100:9])
+    >>> fit = jl.fit_curves([curve])
+    >>> curve = jl.ShearCurve(sheared.shear, sheared.shear_stress, normal=5e6)
     >>> fit = jl.fit_curves([curve], free=["mu"], law=law)
     """
     bar = iter(track(count(), "fit, laws tried"))

@@ -37,7 +37,7 @@ class Settings:
     law: JointLaw = DEFAULT  # whatever is not fitted is kept
     resolution: Any = "balanced"
     closure_range: Any = None  # m
-    steps: int = STEPS  # that shear a joint the whole way, see `ShearCurve.sheared`
+    steps: int = STEPS  # that shear a joint the whole way, see `ShearCurve.path`
 
 
 def found_in(part: Any) -> list[str]:

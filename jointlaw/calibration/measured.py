@@ -217,7 +217,7 @@ class ShearCurve:
     def predict(self, law: JointLaw, steps: int = STEPS) -> tuple[Array, Array]:
         """Shear stress (Pa) and opening (m) of a law of its plane at the points, (n,) each.
 
-        law: with a plane. steps: as in `path`. Raises PathError where the law cannot follow.
+        law: with a plane. steps: as in `path`. Raises ValueError where the law cannot follow.
         """
         (test,) = shear_all(law, [self.path(steps)])
         return test.stress[test.points], test.opening[test.points]
@@ -225,7 +225,7 @@ class ShearCurve:
     def residuals(self, test: Sheared) -> list[Array]:
         """(model - measured)/largest measured, of shear stress (n + 1,) and opening (n,).
 
-        test: what a law gives. rows: of the points in it. Raises nothing.
+        test: what a law gives. Raises nothing.
         Last of the stress stands how far the law rises above its stress at the largest measured
         one before the next points on both sides: few points say by it that the peak lies there.
         """

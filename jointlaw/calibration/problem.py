@@ -138,7 +138,7 @@ class Problem:
 
 def pose(
     curves: Curves,
-    free: Sequence[str],
+    free: Sequence[str] | None,
     fixed: Values | None,
     law: JointLaw | None,
     priors: Ranges | None,
@@ -153,6 +153,7 @@ def pose(
         )
     values, settings = parameters(law)
     fixed = fixed or {}
+    free = _usual(closures, shears) if free is None else free
     names = [name for name in free if name not in fixed]
     for name in (*fixed, *names):
         if name in parameters_of(Bond) and settings.law.bond is None:
@@ -173,6 +174,14 @@ def pose(
     off = {} if "alpha" in values else {"full_contact_stress": None}
     chosen = normal_priors(tuple(names), {**off, **(priors or {})})
     return Problem(next(iter(closures), None), shears, tuple(names), values, chosen, settings)
+
+
+def _usual(closures: Sequence[ClosureCurve], shears: Sequence[ShearCurve]) -> list[str]:
+    """The parameters that a fit to such tests finds if it is not told which."""
+    names = ["asperity_density"]
+    names += ["alpha", "beta"] if closures else []
+    names += ["yield_interference"] if any(curve.cycle for curve in closures) else []
+    return names + (["mu", "a", "mating_length"] if shears else [])
 
 
 # -------------------------------------------------------------------------- where to start

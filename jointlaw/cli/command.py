@@ -20,8 +20,6 @@ VERSION = 2  # of summary.json
 _CONTACTS = {name: getattr(ROCK, name) for name in ("K", "lam", "eta", "mu")}
 DEFAULT_ROCK = ", ".join(f"{name} = {value:.4g}" for name, value in _CONTACTS.items())
 Written = Mapping[str, str | Callable[[Path], object]]
-
-
 Option = tuple[tuple[str, ...], dict[str, Any]]
 
 

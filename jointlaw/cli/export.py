@@ -1,15 +1,16 @@
 """`jointlaw export`: a law as files for a host code."""
 
 import argparse
+import shutil
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from ..hosts.c.export import export_c, identifier
-from ..hosts.fem.export import SEATING, export_fem, require_seating
+from ..hosts.fem.export import SEATING, export_fem
 from ..hosts.lammps.export import export_lammps
 from ..hosts.yade.export import export_yade
 from ..laws.joint_law import JointLaw
 from ..support.files import clear_run
-from ..tables.tabulate import require_3d
 from .command import LAW, OUT, Command, Option, in_unit, option, read_law
 
 START = {
@@ -22,26 +23,26 @@ START = {
 
 def _export(options: argparse.Namespace) -> None:
     law, host, folder = read_law(options), options.host, options.out
-    if host in ("yade", "lammps"):
-        require_3d(law, f"motion in {host.upper()}")
-    seating = {"seating": options.seating} if host == "fem" else {}
-    require_seating(**seating)
-    clear_run(folder)
-    if host == "yade":
-        _export_table(law, folder, options.shear_limit)
-    else:
-        export = {"c": export_c, "lammps": export_lammps, "fem": export_fem}[host]
-        files = export(law, folder, identifier(Path(options.law).stem), **seating)
-        print(f"wrote {', '.join(files)}")
-    print(f"run: cd {folder} && {START[host]}")
+    with TemporaryDirectory() as whole:  # a law that is refused leaves the folder as it was
+        if host == "yade":
+            told = _export_table(law, whole, options.shear_limit)
+        else:
+            export = {"c": export_c, "lammps": export_lammps, "fem": export_fem}[host]
+            seating = {"seating": options.seating} if host == "fem" else {}
+            files = export(law, whole, identifier(Path(options.law).stem), **seating)
+            told = f"wrote {', '.join(files)}"
+        clear_run(folder)
+        for file in Path(whole).iterdir():
+            shutil.copy(file, folder)
+    print(f"{told}\nrun: cd {folder} && {START[host]}")
 
 
-def _export_table(law: JointLaw, folder: Path, shear_limit: float | None) -> None:
-    """Write the joint for YADE, and print what its table drops."""
+def _export_table(law: JointLaw, folder: str, shear_limit: float | None) -> str:
+    """Write the joint for YADE; what its table drops, in words."""
     table = export_yade(law, folder, shear_limit=shear_limit)
     missed = table.metadata["resolution_error_friction_angle"]
-    print(
-        f"wrote the joint for YADE to {folder}: {len(table.closure)} rows\n"
+    return (
+        f"wrote the joint for YADE, a table of {len(table.closure)} rows\n"
         f"its friction angle at the shear limit is {missed:.2g} degrees off that of finer nodes\n"
         f"bond: {table.metadata['bond']}; what the table drops (error against the law, share of\n"
         f"each path's largest traction):\n{table.report(law)}"

@@ -50,7 +50,7 @@ def _run(options: argparse.Namespace) -> None:
         for name in names:
             if getattr(options, name) and not getattr(options, tests):
                 raise ValueError(f"--{name.replace('_', '-')} is about {about}, or leave it out")
-    keywords = _keywords(options, bool(shears))
+    keywords = _keywords(options)
     closures, held = _closure_curve(options)
     fitted, predicted = _shear_curves(options)
     fit = fit_curves([*closures, *fitted], **keywords)
@@ -164,14 +164,9 @@ def _misses(fit: Fit, fitted: list[ShearCurve], predicted: list[ShearCurve]) -> 
     return "\n".join(["", what, "", *lines, ""])
 
 
-def _keywords(options: argparse.Namespace, sheared: bool) -> dict[str, Any]:
+def _keywords(options: argparse.Namespace) -> dict[str, Any]:
     """What `fit_curves` takes besides the curves."""
-    free = ["asperity_density"]
-    free += ["alpha", "beta"] if options.data else []
-    free += ["yield_interference"] if options.cycle else []
-    free += ["mu", "a", "mating_length"] if sheared else []
-    if options.free:
-        free = [name.strip() for name in options.free.split(",")]
+    free = [name.strip() for name in options.free.split(",")] if options.free else None
     pairs = (item.partition("=") for item in options.set)
     try:
         fixed = {name.strip(): float(value) for name, _, value in pairs}

@@ -10,7 +10,7 @@ from ..parameters.toml import VERSION
 from ..support.checks import Array
 from ..support.markdown import table
 from ..support.text_numbers import DECIMAL
-from ..surface.fit import SurfaceFit, from_surface
+from ..surface.fit import SAMPLES, SurfaceFit, from_surface
 from ..surface.scan_files import read_scan
 from .command import DEFAULT_ROCK, OUT, Command, Written, in_unit, option, write_results
 
@@ -98,7 +98,7 @@ COMMAND = Command(
         option(
             "--sampling-length",
             type=in_unit("m", positive=True),
-            help="edge of a facet: 4 spacings",
+            help=f"edge of a facet (default {SAMPLES} spacings)",
         ),
         *OUT,
     ),

@@ -116,6 +116,7 @@ def test_options_of_closure(tmp_path):
         ("export c biegel-rough --shear-limit 5um", "unrecognized arguments: --shear-limit 5um"),
         ("export lammps plane.toml", "law.plane = 0: motion in LAMMPS has shear in 3-D"),
         ("export yade closure.toml", "law.closure_only = True: motion in YADE has shear"),
+        ("export fem closure.toml", "law.closure_only = True: finite elements shear"),
         ("export fem biegel-rough --seating 0", "A joint without stress has no stiffness"),
     ],
 )

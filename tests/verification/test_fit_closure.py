@@ -10,6 +10,7 @@ import jointlaw as jl
 import jointlaw.calibration.fit
 from jointlaw.calibration import datasets
 from jointlaw.calibration.measured import first_loading
+from jointlaw.calibration.problem import pose
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +31,7 @@ def law():
 def test_the_upper_half_of_the_measured_curve_is_predicted_within_one_percent(grimsel):
     stress, closure = grimsel
     half = stress <= 5.3e6
-    fit = jl.fit_closure(stress[half], closure[half])
+    fit = jl.fit_curves([jl.ClosureCurve(stress[half], closure[half])])
     held, u = stress[~half], closure[~half]
     assert fit.predict(u) == pytest.approx(held, rel=0.01)
     low, high = fit.band(u)
@@ -40,7 +41,7 @@ def test_the_upper_half_of_the_measured_curve_is_predicted_within_one_percent(gr
 
 
 def test_one_curve_cannot_fix_heights_and_says_so(grimsel):
-    fit = jl.fit_closure(*grimsel)
+    fit = jl.fit_curves([jl.ClosureCurve(*grimsel)])
     assert {"alpha", "beta"} <= set(fit.not_identifiable)
     assert set(fit.identifiable) == set(fit.free) - set(fit.not_identifiable)
     assert all(axis.get_xlabel() and axis.get_ylabel() for axis in fit.plot().axes)
@@ -49,12 +50,13 @@ def test_one_curve_cannot_fix_heights_and_says_so(grimsel):
 def test_a_rock_of_another_curve_is_called_so(law):
     stress = np.geomspace(0.3e6, 10e6, 16)
     hyperbola = 1e-4 * stress / (stress + 1e6)  # closes fully: no asperities do that
-    fit = jl.fit_closure(stress, hyperbola - hyperbola[0])
+    fit = jl.fit_curves([jl.ClosureCurve(stress, hyperbola - hyperbola[0])])
     assert fit.shape_differs == (True,)
     assert "has another shape than the law" in fit.report()
     y = law.closure(stress)
     scatter = 1 + 0.01 * np.random.default_rng(0).standard_normal(16)
-    assert jl.fit_closure(stress * scatter, y - y[0]).shape_differs == (False,)
+    scattered = jl.ClosureCurve(stress * scatter, y - y[0])
+    assert jl.fit_curves([scattered]).shape_differs == (False,)
 
 
 def test_every_law_that_is_tried_moves_the_bar(grimsel, monkeypatch):
@@ -67,7 +69,7 @@ def test_every_law_that_is_tried_moves_the_bar(grimsel, monkeypatch):
             yield item
 
     monkeypatch.setattr(jointlaw.calibration.fit, "track", track)
-    fit = jl.fit_closure(*grimsel)
+    fit = jl.fit_curves([jl.ClosureCurve(*grimsel)])
     assert len(tried) > 20
     assert pickle.loads(pickle.dumps(fit)).parameters == fit.parameters
 
@@ -76,11 +78,12 @@ def test_every_law_that_is_tried_moves_the_bar(grimsel, monkeypatch):
 def test_a_law_keeps_heights_that_no_fit_finds(make_law, heights):
     start, true = (make_law(heights=heights, asperity_density=n) for n in (3e9, 1e10))
     closure = np.linspace(0.0, 1e-6, 8)
-    fit = jl.fit_closure(true.normal_stress(closure), closure, law=start, free=["asperity_density"])
+    curve = jl.ClosureCurve(true.normal_stress(closure), closure)
+    fit = jl.fit_curves([curve], law=start, free=["asperity_density"])
     assert fit.parameters["asperity_density"] == pytest.approx(1e10, rel=1e-6)
     assert fit.law.heights == heights
     with pytest.raises(ValueError, match="'alpha' is unknown"):
-        jl.fit_closure(true.normal_stress(closure), closure, law=start, free=["alpha"])
+        jl.fit_curves([curve], law=start, free=["alpha"])
 
 
 def test_the_interval_of_one_factor_is_that_of_a_mean(make_law):
@@ -88,7 +91,8 @@ def test_the_interval_of_one_factor_is_that_of_a_mean(make_law):
     law, n, noise = make_law(), 20, 0.01
     closure = np.linspace(0.0, 1e-6, n + 1)  # from zero stress on, so that the seating is known
     stress = law.normal_stress(closure) * np.append(1.0, np.tile([1.01, 0.99], n // 2))
-    found = jl.fit_closure(stress, closure, law=law, free=["asperity_density"], noise=noise)
+    curve = jl.ClosureCurve(stress, closure, noise)
+    found = jl.fit_curves([curve], law=law, free=["asperity_density"])
     low, high = found.interval("asperity_density")
     # 95 % of the normal density, for noise that is known; stresses are not linear in logarithms
     assert np.log(high / low) / 2 == pytest.approx(1.95996 * noise / n**0.5, rel=1e-3)
@@ -104,12 +108,31 @@ def test_known_parameters_are_covered_by_their_intervals(law):
     rng = np.random.default_rng(0)
     for _ in range(50):
         measured = stress * (1 + 0.01 * rng.standard_normal(stress.size))
-        fit = jl.fit_closure(measured, y - y[0], fixed={"alpha": 3.0})
+        fit = jl.fit_curves([jl.ClosureCurve(measured, y - y[0])], fixed={"alpha": 3.0})
         for name, value in truth.items():
             assert name in fit.identifiable
             low, high = fit.interval(name)
             hits[name] += low <= value <= high
     assert all(45 <= count <= 49 for count in hits.values()), hits
+
+
+def test_what_is_fitted_follows_from_the_tests(grimsel):
+    closure, shear = (
+        jl.ClosureCurve(*grimsel),
+        jl.ShearCurve([0.0, 1e-3, 2e-3], [0.0, 1e6, 9e5], 2e6),
+    )
+    cycle = jl.ClosureCurve(*datasets.load("grimsel_vd1_closure"), cycle=True)
+
+    def found(*curves):
+        return set(pose(curves, None, None, None, None).free) - {"seating"}
+
+    of_closure, of_shear = {"asperity_density", "alpha", "beta"}, {"mu", "a", "mating_length"}
+    assert found(closure) == of_closure
+    assert found(cycle) == of_closure | {"yield_interference"}
+    assert found(shear) == {"asperity_density"} | of_shear
+    assert found(closure, shear) == of_closure | of_shear
+    with pytest.raises(ValueError, match="free is empty"):
+        pose([shear], (), None, None, None)
 
 
 @pytest.mark.parametrize(
@@ -130,8 +153,8 @@ def test_known_parameters_are_covered_by_their_intervals(law):
     ],
 )
 def test_bad_input_is_named(change, words):
-    options = {"stress": [1e5, 2e5, 3e5, 4e5, 5e5], "closure": [0, 1e-6, 2e-6, 3e-6, 4e-6]}
-    options |= change
-    stress, closure = options.pop("stress"), options.pop("closure")
+    test = {"stress": [1e5, 2e5, 3e5, 4e5, 5e5], "closure": [0, 1e-6, 2e-6, 3e-6, 4e-6]}
+    of_fit = {name: change[name] for name in ("free", "fixed", "priors") if name in change}
+    test |= {name: value for name, value in change.items() if name not in of_fit}
     with pytest.raises(ValueError, match=words):
-        jl.fit_closure(stress, closure, **options)
+        jl.fit_curves([jl.ClosureCurve(**test)], **of_fit)

@@ -39,10 +39,9 @@ OUT(closure_at) double closure_at(double stress) { return jlaw_closure(&law, str
 OUT(update) int update(const double *s0, double *s1, const double *d, double *F, char *message)
 {
   const jl_numbers n = {s1, 1, 0};
-  double way = 0.0; /* NaN stays in sums */
-  for (int i = 0; i < 3; i++) way += fabs(s0[i]) + fabs(d[i]);
-  if (!(law.stretch * way <= law.largest_reach))
-    return jlaw_refuse_(&law, s0, d, 0, message, JLAW_MESSAGE);
+  int damaged;
+  if (!jlaw_allowed_(&law, s0, d, &damaged))
+    return jlaw_refuse_(&law, s0, d, damaged, message, JLAW_MESSAGE);
   memcpy(s1, s0, (size_t) jl_state_rows(&law) * sizeof *s1);
   if (law.fades) jl_step(&law, n, d, F, F + 3, jl_kind_of(3, 0, 1, 0, 1, 1, 0, 0), NULL);
   else jl_step(&law, n, d, F, F + 3, jl_kind_of(3, 0, 0, 0, 1, 1, 0, 0), NULL);

@@ -171,7 +171,8 @@ class Joint {
     this.next = numbers(size);
     this.d = numbers(DIM);
     this.out = numbers(DIM + DIM * DIM); // F and C of the last trial
-    this.seen = numbers(this.facets * (5 + 2 * this.cells));
+    this.wide = 5 + 2 * this.cells; // numbers of a facet that `look` writes
+    this.seen = numbers(this.facets * this.wide);
     this.words = new Uint8Array(exports.memory.buffer, free, 300);
     this.length = exports.closure_at(SEAT); // of the joint: its closure at 10 MPa
     this.reset();
@@ -229,9 +230,8 @@ class Joint {
   /* Facets now: normal, load, share of the friction that slides, and of its cells gap and use */
   look() {
     this.wasm.look(this.state.byteOffset, this.seen.byteOffset);
-    const wide = 5 + 2 * this.cells;
     return Array.from({ length: this.facets }, (_, i) => {
-      const row = this.seen.subarray(i * wide, (i + 1) * wide);
+      const row = this.seen.subarray(i * this.wide, (i + 1) * this.wide);
       const cells = Array.from({ length: this.cells }, (_, j) => ({ gap: row[5 + 2 * j], use: row[6 + 2 * j] }));
       return { n: Array.from(row.subarray(0, 3)), load: row[3], slides: row[4], cells };
     });

@@ -109,11 +109,14 @@ function remake(legs) {
 /* What was done to this joint, or asked of it, if nothing was done since */
 const path = () => (test.asked && test.asked.rows === test.rows.length ? test.asked.legs : test.legs);
 
+/* The leg that seats a joint at this normal stress */
+const seat = (level) => ({ hold: "stress", level, d: [0, 0, 0], steps: 1 });
+
 /* What was done to reach a step of the story, as legs */
 function legsOf([stress, ...slips]) {
-  const { length } = test.joint, legs = [{ hold: "stress", level: stress * 1e6, d: [0, 0, 0], steps: 1 }];
+  const { length } = test.joint, legs = [seat(stress * 1e6)];
   for (const [x, y] of slips)
-    legs.push({ hold: "stress", level: stress * 1e6, d: [0, x * length, y * length], steps: Math.ceil(100 * Math.hypot(x, y)) });
+    legs.push({ ...legs[0], d: [0, x * length, y * length], steps: Math.ceil(100 * Math.hypot(x, y)) });
   return legs;
 }
 
@@ -142,7 +145,7 @@ function setLevel(share) {
 function play(name) {
   const { level, hold } = test;
   const start = level > 0 ? level : Math.max(test.joint.F[0], SEAT / 10);
-  remake([{ hold: "stress", level: start, d: [0, 0, 0], steps: 1 }]);
+  remake([seat(start)]);
   test.hold = hold;
   playing = name ? PLAYED[name](test) : null;
   const mine = playing, advance = () => {
@@ -161,7 +164,7 @@ function begin() {
   const bound = 1 / 3 - rock().b / 6;
   [part("c").min, part("c").max] = [-bound, bound];
   part("mating").value = MATINGS.length - 1;
-  remake([{ hold: "stress", level: SEAT, d: [0, 0, 0], steps: 1 }]);
+  remake([seat(SEAT)]);
 }
 
 // ---------------------------------------------------------------------------------------- the page

@@ -109,7 +109,8 @@ function drawCurves(test, simpler) {
   const column = (some, key, factor) => some.map((row) => row[key] * factor);
   const slipLabel = `slip (${unit})`, closureLabel = `closure (${unit})`;
   const line = (some, key, factor, more) => ({ x: column(some, "slip", per), y: column(some, key, factor), ...more });
-  const now = rows.filter((row) => row.turn === test.turns), before = rows.filter((row) => row.turn !== test.turns);
+  const byTurn = (some) => [true, false].map((last) => some.filter((row) => (row.turn === test.turns) === last));
+  const [now, before] = byTurn(rows);
   const here = now.length ? now : [{ ...test.rows.at(-1), slip: test.slip, shear: 0 }];
   const most = Math.max(few, ...here.map((row) => Math.abs(row.slip * per)));
   const across = Array.from({ length: 121 }, (_, i) => (most * (i - 60)) / 60 + 1e-9 * few);
@@ -121,10 +122,10 @@ function drawCurves(test, simpler) {
     line(here, "normal", 1e-6, { colour: colours.faint, name: "normal" }),
     line(here, "shear", 1e-6, { colour: colours.sliding, name: "shear" }),
   ], [few, 0.1]);
-  const slid = rows.findIndex((row) => row.d[1] || row.d[2]), seated = rows.slice(Math.max(0, slid)).concat(rows.slice(-1));
+  const slid = rows.findIndex((row) => row.d[1] || row.d[2]), [last, earlier] = byTurn([...rows.slice(Math.max(0, slid)), ...rows.slice(-1)]);
   plot("closure", slipLabel, "", [
-    line(seated.filter((row) => row.turn !== test.turns), "closure", per, { colour: colours.stuck, pale: true, wide: 1 }),
-    line(slid < 0 ? here.slice(-1) : seated.filter((row) => row.turn === test.turns), "closure", per, { colour: colours.stuck, name: closureLabel }),
+    line(earlier, "closure", per, { colour: colours.stuck, pale: true, wide: 1 }),
+    line(slid < 0 ? here.slice(-1) : last, "closure", per, { colour: colours.stuck, name: closureLabel }),
   ].filter((one) => one.x.length), [few, 0.1 * few]);
   plot("normal", closureLabel, "", [
     { x: column(rows, "closure", per), y: column(rows, "normal", 1e-6), colour: colours.ink, name: "normal stress (MPa)" },
@@ -136,9 +137,9 @@ function drawCurves(test, simpler) {
 function drawHemisphere(test, facets, a, spin) {
   const { c, wide, high } = canvas("facets"), R = Math.min(wide / 2 - 12, (high - 40) / 1.45);
   const x0 = wide / 2, y0 = high - 14 - R * 0.5, lift = Math.sqrt(0.75);
-  const seen = (u, azimuth, r = R) => { // u: height on the sphere
+  const seen = (u, azimuth) => { // u: height on the sphere
     const flat = Math.sqrt(Math.max(0, 1 - u * u)), [x, y] = [flat * Math.cos(azimuth + spin), flat * Math.sin(azimuth + spin)];
-    return { x: x0 + r * x, y: y0 - r * (0.5 * y + lift * u), back: y };
+    return { x: x0 + R * x, y: y0 - R * (0.5 * y + lift * u), back: y };
   };
   c.strokeStyle = colours.line;
   c.lineWidth = 1;
@@ -147,11 +148,11 @@ function drawHemisphere(test, facets, a, spin) {
     for (let i = 0; i <= 72; i++) { const p = seen(u, (i * Math.PI) / 36); c.lineTo(p.x, p.y); }
     c.stroke();
   }
-  const way = Math.atan2(test.along[1], test.along[0]), tip = seen(0, way, R * 1.0), middle = seen(0, 0, 0);
+  const way = Math.atan2(test.along[1], test.along[0]), tip = seen(0, way);
   c.strokeStyle = c.fillStyle = colours.ink;
   c.lineWidth = 1.5;
   c.beginPath();
-  c.moveTo(middle.x, middle.y);
+  c.moveTo(x0, y0);
   c.lineTo(tip.x, tip.y);
   c.stroke();
   c.beginPath();
@@ -235,12 +236,12 @@ function drawScene(test, facets, mating, mark) {
   const Y = (height) => base - height;
   c.beginPath(); // the upper block with its tips
   c.moveTo(-20, -2);
-  for (const { tip, x } of teeth) {
-    const [px, pz] = tip, foot = 0.42 * pitch, root = px;
-    c.lineTo(root - foot, Y(top));
+  for (const { tip: [px, pz] } of teeth) {
+    const foot = 0.42 * pitch;
+    c.lineTo(px - foot, Y(top));
     c.quadraticCurveTo(px - R * 1.5, Y(top), px - R, Y(pz));
     c.arc(px, Y(pz), R, Math.PI, 0, true);
-    c.quadraticCurveTo(px + R * 1.5, Y(top), root + foot, Y(top));
+    c.quadraticCurveTo(px + R * 1.5, Y(top), px + foot, Y(top));
   }
   c.lineTo(wide + 20 + pitch, -2);
   c.closePath();

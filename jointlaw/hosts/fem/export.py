@@ -33,7 +33,12 @@ def export_fem(
     """
     if law.dim == 1:
         raise ValueError("law.closure_only = True: finite elements shear; set closure_only=False")
-    require_seating(seating)
+    if number("seating", seating) <= 0.0:
+        raise ValueError(
+            f"seating = {seating:g} Pa is out of bounds: it must be > 0. A joint without stress "
+            "has no stiffness, so that under a given force the first step of Newton's method has "
+            "no end; take 10e3, or 1 where all displacements are given"
+        )
     c.require_name(name)
     texts = {
         "jointlaw.h": jointlaw_h(),
@@ -51,16 +56,6 @@ def export_fem(
             texts[file.name] = text.replace("granite", name)
     write_files(directory, texts)
     return list(texts)
-
-
-def require_seating(seating: float = SEATING) -> None:
-    """Refuse a seating stress (Pa) that leaves the joint without stiffness, with the reason."""
-    if number("seating", seating) <= 0.0:
-        raise ValueError(
-            f"seating = {seating:g} Pa is out of bounds: it must be > 0. A joint without stress "
-            "has no stiffness, so that under a given force the first step of Newton's method has "
-            "no end; take 10e3, or 1 where all displacements are given"
-        )
 
 
 def _marks(law: Law, seating: float) -> dict[str, str]:

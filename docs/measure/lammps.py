@@ -15,6 +15,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tables import table
+
 import jointlaw as jl
 from jointlaw.hosts.c.export import table_text
 from jointlaw.hosts.lammps.export import export_lammps
@@ -70,6 +72,9 @@ OWN = {
                           "tangential mindlin NULL 1.0 0.4 damping viscoelastic"),
 }  # fmt: skip
 RESOLUTIONS = "fast", "balanced", "fine"
+HEAD = ["pair style, resolution", "contacts", "pair style, ns per contact and step",
+        "the same / mindlin", "whole step, ns", "2 processors: pair style, ns",
+        "speed-up of the step", "bytes per contact"]  # fmt: skip
 
 
 def rock(resolution):
@@ -131,18 +136,15 @@ def main():
                 each = 1e9 / options.steps / count
                 old = best.get((name, processors), (1e99, 1e99, 0))
                 best[name, processors] = (min(old[0], pair * each), min(old[1], loop * each), count)
-    print(
-        "| pair style, resolution | contacts | pair style, ns per contact and step "
-        "| the same / mindlin | whole step, ns | 2 processors: pair style, ns "
-        "| speed-up of the step | bytes per contact |\n" + "|---" * 8 + "|"
-    )
+    rows = []
     for name in styles:
         (pair, loop, count), (pair2, loop2, _) = (
             best[name, n] for n in (1, options.processors[-1])
         )
         over = pair / best["granular, mindlin", 1][0]
-        print(f"| {name} | {count:.0f} | {pair:.0f} | {over:.2f} | {loop:.0f} | {pair2:.0f} | "
-              f"{loop / loop2:.2f} | {sizes.get(name, '')} |")  # fmt: skip
+        rows.append([name, f"{count:.0f}", f"{pair:.0f}", f"{over:.2f}", f"{loop:.0f}",
+                     f"{pair2:.0f}", f"{loop / loop2:.2f}", sizes.get(name, "")])  # fmt: skip
+    print(table(HEAD, rows))
 
 
 if __name__ == "__main__":

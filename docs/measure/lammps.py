@@ -101,6 +101,19 @@ def lammps(folder, script, processors=1):
     return (folder / "log.bench").read_text()
 
 
+def number(pattern, log):
+    """The last number that is found."""
+    return float(re.findall(pattern, log, re.M)[-1])
+
+
+def times(log, processors):
+    """Seconds of the pair style and of the whole run; of one processor those that it used, so that
+    what other work took from it is left out."""
+    used = number(r"^(\S+)% CPU use", log) / 100 if processors == 1 else 1.0
+    pair, loop = r"^Pair +\| \S+ +\| (\S+)", r"^Loop time of (\S+)"
+    return used * number(pair, log), used * number(loop, log)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("folder", type=Path)
@@ -127,12 +140,8 @@ def main():
             for processors in options.processors:
                 text = MEASURE.format(newton=newton, style=style, **vars(options))
                 log = lammps(folder, text, processors)
-                pair = float(re.findall(r"^Pair +\| \S+ +\| (\S+)", log, re.M)[-1])
-                loop = float(re.findall(r"^Loop time of (\S+)", log, re.M)[-1])
-                if processors == 1:  # what other work took from this core is left out
-                    used = float(re.findall(r"^(\S+)% CPU use", log, re.M)[-1]) / 100
-                    pair, loop = pair * used, loop * used
-                count = float(re.findall(r"^ +\d+ +(\S+) +\S+ *$", log, re.M)[-1]) / 2
+                pair, loop = times(log, processors)
+                count = number(r"^ +\d+ +(\S+) +\S+ *$", log) / 2
                 each = 1e9 / options.steps / count
                 old = best.get((name, processors), (1e99, 1e99, 0))
                 best[name, processors] = (min(old[0], pair * each), min(old[1], loop * each), count)

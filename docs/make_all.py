@@ -71,7 +71,7 @@ PICTURES = {
     "strength.png": ("-m dem_demo strength-reduction slope --out FOLDER", "failing-rough.png"),
     "wet-slope.png": ("-m dem_demo wet-slope --out FOLDER", "final.png"),
     "tunnel.png": ("-m dem_demo tunnel --out FOLDER", "final.png"),
-    "shaken-slope.png": ("docs/measure/shaken_slope.py FOLDER", "shaken-slope.png"),
+    "shaken-slope.png": ("docs/draw/shaken_slope.py FOLDER", "shaken-slope.png"),
     "fit.png": ("-m jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out FOLDER", "fit.png"),
 }
 LOCK = Lock()  # of the pages: two tasks may fill the same one

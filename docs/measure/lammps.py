@@ -15,6 +15,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tables import table
+
 import jointlaw as jl
 from jointlaw.hosts.c.export import table_text
 from jointlaw.hosts.lammps.export import export_lammps
@@ -70,6 +72,9 @@ OWN = {
                           "tangential mindlin NULL 1.0 0.4 damping viscoelastic"),
 }  # fmt: skip
 RESOLUTIONS = "fast", "balanced", "fine"
+HEAD = ["pair style, resolution", "contacts", "pair style, ns per contact and step",
+        "the same / mindlin", "whole step, ns", "2 processors: pair style, ns",
+        "speed-up of the step", "bytes per contact"]  # fmt: skip
 
 
 def rock(resolution):
@@ -94,6 +99,19 @@ def lammps(folder, script, processors=1):
     env = {**os.environ, "OMP_NUM_THREADS": "1", "LD_LIBRARY_PATH": str(ENV / "lib")}
     subprocess.run(command, cwd=folder, env=env, check=True, stdin=subprocess.DEVNULL)
     return (folder / "log.bench").read_text()
+
+
+def number(pattern, log):
+    """The last number that is found."""
+    return float(re.findall(pattern, log, re.M)[-1])
+
+
+def times(log, processors):
+    """Seconds of the pair style and of the whole run; of one processor those that it used, so that
+    what other work took from it is left out."""
+    used = number(r"^(\S+)% CPU use", log) / 100 if processors == 1 else 1.0
+    pair, loop = r"^Pair +\| \S+ +\| (\S+)", r"^Loop time of (\S+)"
+    return used * number(pair, log), used * number(loop, log)
 
 
 def main():
@@ -122,27 +140,20 @@ def main():
             for processors in options.processors:
                 text = MEASURE.format(newton=newton, style=style, **vars(options))
                 log = lammps(folder, text, processors)
-                pair = float(re.findall(r"^Pair +\| \S+ +\| (\S+)", log, re.M)[-1])
-                loop = float(re.findall(r"^Loop time of (\S+)", log, re.M)[-1])
-                if processors == 1:  # what other work took from this core is left out
-                    used = float(re.findall(r"^(\S+)% CPU use", log, re.M)[-1]) / 100
-                    pair, loop = pair * used, loop * used
-                count = float(re.findall(r"^ +\d+ +(\S+) +\S+ *$", log, re.M)[-1]) / 2
+                pair, loop = times(log, processors)
+                count = number(r"^ +\d+ +(\S+) +\S+ *$", log) / 2
                 each = 1e9 / options.steps / count
                 old = best.get((name, processors), (1e99, 1e99, 0))
                 best[name, processors] = (min(old[0], pair * each), min(old[1], loop * each), count)
-    print(
-        "| pair style, resolution | contacts | pair style, ns per contact and step "
-        "| the same / mindlin | whole step, ns | 2 processors: pair style, ns "
-        "| speed-up of the step | bytes per contact |\n" + "|---" * 8 + "|"
-    )
+    rows = []
     for name in styles:
         (pair, loop, count), (pair2, loop2, _) = (
             best[name, n] for n in (1, options.processors[-1])
         )
         over = pair / best["granular, mindlin", 1][0]
-        print(f"| {name} | {count:.0f} | {pair:.0f} | {over:.2f} | {loop:.0f} | {pair2:.0f} | "
-              f"{loop / loop2:.2f} | {sizes.get(name, '')} |")  # fmt: skip
+        rows.append([name, f"{count:.0f}", f"{pair:.0f}", f"{over:.2f}", f"{loop:.0f}",
+                     f"{pair2:.0f}", f"{loop / loop2:.2f}", sizes.get(name, "")])  # fmt: skip
+    print(table(HEAD, rows))
 
 
 if __name__ == "__main__":

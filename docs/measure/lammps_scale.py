@@ -68,24 +68,16 @@ def last_row(log):
     return [float(word) for word in rows[-1].splitlines()[-1].split()]
 
 
-def number(pattern, log):
-    """The last number that is found."""
-    return float(re.findall(pattern, log, re.M)[-1])
-
-
 def measure(folder, repeat, processes):
     """A row of the table, and what the computed row needs of it."""
     text = BEGIN.format(repeat) + (SAVE if processes == 2 else "")
     log = lammps.lammps(folder, text, processes)
-    timed = log.split("Loop time of")[2]
-    loop = float(timed.split()[0])
-    pair = number(r"^Pair +\| \S+ +\| (\S+)", timed)
-    if processes == 1:  # what other work took from this core is left out
-        used = number(r"^(\S+)% CPU use", timed) / 100
-        pair, loop = pair * used, loop * used
+    timed = "Loop time of" + log.split("Loop time of")[2]
+    pair, loop = lammps.times(timed, processes)
     contacts = last_row(log)[2]
-    spheres = number(r"^ +(\d+) atoms$", log)
-    memory, ghosts = number(r"resident set size: +(\S+)", log), number(r"^Nghost: +(\S+)", timed)
+    spheres = lammps.number(r"^ +(\d+) atoms$", log)
+    memory = lammps.number(r"resident set size: +(\S+)", log)
+    ghosts = lammps.number(r"^Nghost: +(\S+)", timed)
     row = [spheres, processes, contacts, 1e9 * processes * pair / STEPS / contacts,
            1e3 * loop / STEPS, memory, 1e6 * processes * memory / contacts,
            ghosts * 15 * 8 / 1e6]  # fmt: skip

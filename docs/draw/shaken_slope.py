@@ -1,17 +1,13 @@
 """Picture: slip of the scene `shaken-slope` with plain Coulomb and with the joint law, and of
-Newmark's sliding block (1965): `python docs/measure/shaken_slope.py FOLDER`."""
-
-from pathlib import Path
+Newmark's sliding block (1965): `python docs/draw/shaken_slope.py FOLDER`."""
 
 import numpy as np
+from folder import asked
 from matplotlib.figure import Figure
 from scipy.integrate import cumulative_trapezoid
-from tables import asked
 
 from dem_demo import Simulation, load, run
 from jointlaw.support.pyplot import style, written
-
-FOLDER = asked(__doc__, "folder", type=Path).folder
 
 DIP, GRAVITY = np.radians(25.0), 9.81  # rad, m/s2: of the scene
 CASES = {"shaken-slope-plain": "blocks, Coulomb 0.6", "shaken-slope": "blocks, joint law"}
@@ -48,4 +44,4 @@ def draw(path):
     written(figure, path)
 
 
-draw(FOLDER / "shaken-slope.png")
+draw(asked(__doc__) / "shaken-slope.png")

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scene_text import ROCK
+from scene_text import ROCK, on_base
 
 from dem_demo import Refused, Simulation, parse
 from dem_demo.cli import main
@@ -13,27 +13,17 @@ from dem_demo.output.run import run
 from dem_demo.studies.ablate import _run, ablate, variants
 
 # A smooth joint, atan(0.4) + 90/20 = 26.3 degrees at most, on a slope of 22 degrees.
-SLOPE = f"""
-title = "Block on a slope"
-gravity = [3.675, -9.096]
-[laws.rock]
-{ROCK.replace("a = 3.0", "a = 20.0, b = 0.2, c = 0.2")}[[block]]
-name = "base"
-box = [4.0, 0.5]
-at = [0.5, -0.25]
-fixed = true
-[[block]]
-name = "block"
-box = [1.0, 0.3]
-at = [0.0, 0.15]
+LAW = ROCK.replace("a = 3.0", "a = 20.0, b = 0.2, c = 0.2")
+SLOPE = (
+    on_base(LAW, [1.0, 0.3], 22.0, end=0.05)
+    + """\
+record = 0.01
+fraction = 0.4
 [watch]
 slip = [["block", "base"]]
 shear = [["block", "base"]]
-[run]
-end = 0.05
-record = 0.01
-fraction = 0.4
 """
+)
 NAMES = {
     "no heights", "heights counted one by one", "linear asperities (eta = 0)",
     "no friction on asperities", "b = 0", "c = 0", "no large shear",
@@ -107,4 +97,4 @@ def test_what_cannot_be_built_or_run_is_a_row_with_its_reason():
 def test_a_scene_that_cannot_run_is_not_ablated():
     """The block starts deep in its base, which no time step mends."""
     with pytest.raises(Refused, match="overlap by"):
-        ablate(parse(SLOPE.replace("at = [0.0, 0.15]", "at = [0.0, 0.1]")))
+        ablate(parse(SLOPE.replace("0.15]", "0.1]")))

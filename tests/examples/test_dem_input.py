@@ -75,7 +75,7 @@ TWICE = '[[joint]]\nbetween = ["base", "top"]\nlaw = "plain"\n[watch]'
         ("friction = 0.3", "friction = -0.3", "friction = -0.3 .* must be >= 0"),
         ("friction = 0.3", "friction = true", "friction = True is not a number"),
         (
-            "normal_stiffness = 1e9",
+            "normal_stiffness = 1000000000.0",
             "normal_stiffness = 5.0",
             "normal_stiffness = 5 Pa/m is outside .*1e.06 to 1e.15 Pa/m.: 1 GPa/m is 1e9",
         ),

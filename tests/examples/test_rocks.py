@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scene_text import ROCK, block, coulomb, on_base
 from scipy.integrate import trapezoid
 from shapely import Point, Polygon
 
@@ -21,13 +22,7 @@ from dem_demo.studies.compare import compare, of_strength
 from dem_demo.studies.strength import alone, critical_tilt
 
 TEXT = TEMPLATE.read_text()
-PLAIN = """
-[laws.plain]
-kind = "coulomb"
-normal_stiffness = 4e8
-shear_stiffness = 3e8
-friction = 0.4
-"""
+PLAIN = f"\n[laws.plain]\n{coulomb(0.4, 4e8, 3e8)}"
 
 
 @pytest.mark.slow
@@ -184,11 +179,10 @@ def test_joints_have_the_law_of_their_set():
 
 def test_two_blocks_with_laws_of_their_own_are_told_and_moved_by_the_same():
     """The law of the first of them, in whichever order a monitor names the two."""
-    box = "[[block]]\nname = '{}'\nbox = [1.0, 1.0]\nat = [0.0, {}]\n"
     scene = parse(
         "law = 'rest'\n"
-        + box.format("low", 0.5)
-        + box.format("high", 1.5)
+        + block("low", box=[1.0, 1.0], at=[0.0, 0.5])
+        + block("high", box=[1.0, 1.0], at=[0.0, 1.5])
         + "[[joint]]\naround = [0.0, 0.5]\nlaw = 'soft'\n"
         + "[[joint]]\naround = [0.0, 1.5]\nlaw = 'hard'\n"
         + "".join(PLAIN.replace("plain", name) for name in ("hard", "rest", "soft"))
@@ -245,43 +239,18 @@ def test_coulomb_in_compare_has_the_strength_of_the_law():
     assert rows[1]["laws"]["joint"].friction > rows[1]["laws"]["joint"].residual_friction
 
 
-BONDED = """
-[laws.bonded]
-asperity_density = 1e4
-mating_length = 2e-3
-orientation = { a = 3.0 }
-asperity = { K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }
-heights = { alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }
-bond = { cohesion = 1e4, tension = 1e4, normal_stiffness = 1e10, shear_stiffness = %s }
-[[block]]
-name = "base"
-box = [3.0, 1.0]
-at = [0.0, -0.5]
-fixed = true
-[[block]]
-name = "block"
-box = [2.0, 1.0]
-at = [0.0, 0.5]
-[run]
-end = 0.01
-"""
+BOND = "bond = {{ cohesion = 1e4, tension = 1e4, normal_stiffness = 1e10, shear_stiffness = {} }}\n"
 
 
 def test_a_bond_that_breaks_before_friction_is_there_is_told(tmp_path, capsys):
     for stiffness, told in (("1e10", True), ("1e6", False)):
-        (tmp_path / "scene.toml").write_text(BONDED % stiffness)
+        (tmp_path / "scene.toml").write_text(on_base(ROCK + BOND.format(stiffness), [2.0, 1.0]))
         assert main(["check", str(tmp_path / "scene.toml")]) == 0
         said = capsys.readouterr().out
-        assert ("law 'bonded': its bond breaks after 1e-06 m of shear" in said) == told
+        assert ("law 'rock': its bond breaks after 1e-06 m of shear" in said) == told
 
 
 NOTCHED = """
-law = "joint"
-[laws.joint]
-kind = "coulomb"
-normal_stiffness = 1e9
-shear_stiffness = 1e9
-friction = 0.1
 [[rock]]
 name = "beam"
 outline = [[0, 0], [1, 0], [1, 2], [4, 2], [4, 3], [0, 3]]
@@ -300,7 +269,7 @@ end = 0.1
 def test_a_cut_through_an_inward_corner_holds(tmp_path, capsys):
     """A cantilever 3 m long on the side of a pillar: whole rock bears it, a joint does not."""
     for cut, state in (("", "stands"), ('cut_law = "joint"\n', "moves")):
-        scene = parse(NOTCHED.replace("CUT", cut))
+        scene = parse(f"[laws.joint]\n{coulomb(0.1, 1e9, 1e9)}" + NOTCHED.replace("CUT", cut))
         assert any("1 cuts that are no joints" in line for line in scene.rocks[0].told)
         _, summary = run(Simulation(scene))
         assert summary["rocks"][0]["state"] == state

@@ -5,52 +5,30 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scene_text import ROCK
+from scene_text import ROCK, coulomb, on_base
 
 import jointlaw as jl
 from dem_demo import Simulation, load, parse
 from dem_demo.studies.strength import factor_of_safety, weakened
 
 G, RHO, T, C = 9.81, 2600.0, 2e5, 2e4  # m/s2, kg/m3, Pa
-LAW = f"""
-kind = "coulomb"
-normal_stiffness = 2e9
-shear_stiffness = 2e9
-friction = 0.6
-tension = {T}
-cohesion = 4e5
-"""
+LAW = coulomb(0.6, 2e9, 2e9, tension=T, cohesion=4e5)
 
 
-def block(law, gravity=(0.0, -G), at=0.5, box=(1.0, 1.0)):
-    """A block under a roof (at = -0.5) or on a base (0.5); the joint is 1 m2 per m of its width."""
-    return parse(f"""
-gravity = [{gravity[0]}, {gravity[1]}]
-[laws.joint]
-{law}
-[[block]]
-name = "rock"
-box = [8.0, 1.0]
-at = [0.0, {-np.sign(at) * 0.5}]
-fixed = true
-[[block]]
-name = "block"
-box = [{box[0]}, {box[1]}]
-at = [0.0, {np.sign(at) * 0.5 * box[1]}]
-[run]
-end = 1.0
-""")
+def under(law):
+    """A block under a roof; the joint is 1 m2 per m of its width."""
+    return parse(on_base(law, [1.0, 1.0], 180.0))
 
 
 def test_a_block_that_hangs_holds_to_the_tension():
     """Loaded slowly: what it bears before it falls is tension times area."""
-    sim = Simulation(block(LAW, at=-0.5))
+    sim = Simulation(under(LAW))
     weight = RHO * G
     assert not sim.loose.any()
     assert sim.joints.traction[:, 0] == pytest.approx(-weight)
     held = 0.0
     for share in np.linspace(weight / T, 1.01, 4000):
-        sim.blocks.loads[1, 1] = weight - share * T
+        sim.blocks.loads[1, 1] = share * T - weight
         sim.step()
         if (sim.joints.damage < 1.0).all():
             held = share
@@ -62,7 +40,7 @@ def test_a_block_that_hangs_holds_to_the_tension():
 
 def test_faces_that_meet_anew_have_no_cohesion():
     """A block that falls onto its base bounces off: nothing holds it."""
-    scene = block(LAW)
+    scene = parse(on_base(LAW, [1.0, 1.0]))
     drawn = replace(scene.blocks[1], corners=np.add(scene.blocks[1].corners, [0.0, 0.05]))
     run = replace(scene.run, seat=False)
     sim = Simulation(replace(scene, blocks=(scene.blocks[0], drawn), run=run))
@@ -101,9 +79,9 @@ def test_factor_of_safety_of_a_rough_bonded_block():
     rock = ROCK.replace("a = 3.0", "a = 6.0").replace("2e-3", "5e-3")
     law = f"{rock}resolution = {{ u = 3, phi = 4, depth = 1 }}\nbond = {{ {bond} }}\n"
     angle, wide, high = np.radians(35.0), 4.0, 0.2
-    scene = block(law, (G * np.sin(angle), -G * np.cos(angle)), box=(wide, high))
+    scene = parse(on_base(law, [wide, high], 35.0))
     weight = RHO * G * wide * high
-    joint = scene.laws["joint"].joint()
+    joint = scene.laws["rock"].joint()
     shear = jl.direct_shear(joint, 3e-4, weight * np.cos(angle) / wide, steps=600).shear_stress
     expected = shear.max() * wide / (weight * np.sin(angle))
     assert factor_of_safety(scene) == pytest.approx(expected, rel=0.01)

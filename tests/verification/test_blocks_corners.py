@@ -5,52 +5,27 @@ import collections
 import numpy as np
 import pytest
 from block_forces import contact_forces
-from scene_text import ROCK
+from scene_text import ROCK, coulomb, on_base
 
 from dem_demo import Simulation, parse
 
-ELASTIC = """
-kind = "coulomb"
-normal_stiffness = 1e9
-shear_stiffness = 8e8
-friction = 0.0
-"""
-COULOMB = ELASTIC.replace("0.0", "1.0")
+ELASTIC = coulomb(0.0, 1e9, 8e8)
+COULOMB = coulomb(1.0, 1e9, 8e8)
 JOINT = ROCK.replace("a = 3.0", "a = 4.0")
 
 
-def scene(law, width, height, at, angle=0.0, velocity=(0.0, 0.0), spin=0.0, run="", more=""):
+def scene(law, width, height, at, run, **more):
     """One block on a fixed base whose top is y = 0, without dashpots."""
-    return parse(f"""
-[laws.rock]
-{law}
-[[block]]
-name = "base"
-box = [10.0, 1.0]
-at = [0.0, -0.5]
-fixed = true
-[[block]]
-name = "block"
-box = [{width}, {height}]
-at = [{at[0]}, {at[1]}]
-angle = {angle}
-velocity = [{velocity[0]}, {velocity[1]}]
-spin = {spin}
-{more}
-[run]
-end = 10.0
-seat = false
-dashpot_normal = 0.0
-dashpot_shear = 0.0
-{run}
-""")
+    text = on_base(law, [width, height], at=at, base=(10.0, 1.0), end=10.0, **more)
+    return parse(f"{text}seat = false\ndashpot_normal = 0.0\ndashpot_shear = 0.0\n{run}")
 
 
 def on_corner(law, width, height, tilt, spin, run):
     """Turned clockwise by `tilt` degrees about the lower right corner, which is at the origin."""
     c, s = np.cos(np.radians(tilt)), np.sin(np.radians(tilt))
     x, y = -0.5 * width * c + 0.5 * height * s, 0.5 * width * s + 0.5 * height * c
-    return scene(law, width, height, (x, y), -tilt, (spin * y, -spin * x), -spin, run)
+    more = {"angle": -tilt, "velocity": (spin * y, -spin * x), "spin": -spin}
+    return scene(law, width, height, (x, y), run, **more)
 
 
 def play(sim, tilt, end):
@@ -101,7 +76,7 @@ def test_tumbling_block_keeps_its_energy(law, spin, steps, within):
 
 def held(law, at, angle, more=""):
     """A block 1 m square to be put where one likes, and what it stores and feels there."""
-    sim = Simulation(scene(law, 1.0, 1.0, at, angle, run="step = 1e-6\nmax_overlap = 0.2"))
+    sim = Simulation(scene(law, 1.0, 1.0, at, "step = 1e-6\nmax_overlap = 0.2", angle=angle))
 
     def place(x, y, tilt):
         motion, tracker = sim.blocks.motion, sim.tracker

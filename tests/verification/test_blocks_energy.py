@@ -2,50 +2,26 @@
 
 import numpy as np
 import pytest
-from scene_text import ROCK
+from scene_text import ROCK, coulomb, on_base
 
 from dem_demo import Simulation, parse
 
 REPLICA = ROCK.replace("a = 3.0", "a = 4.0")
-COULOMB = """
-kind = "coulomb"
-normal_stiffness = 1e9
-shear_stiffness = 8e8
-friction = 0.6
-"""
+COULOMB = coulomb(0.6, 1e9, 8e8)
 
 
-def one_block(law, gravity=(0.0, -9.81), at=(0.0, 0.25), angle=0.0, run="", length=6.0):
+def one_block(law, dip=0.0, at=None, run=""):
     """A block 1.0 by 0.5 m over a fixed base."""
-    return parse(f"""
-gravity = [{gravity[0]}, {gravity[1]}]
-[laws.rock]
-{law}
-[[block]]
-name = "base"
-box = [{length}, 1.0]
-at = [0.0, -0.5]
-fixed = true
-[[block]]
-name = "block"
-box = [1.0, 0.5]
-at = [{at[0]}, {at[1]}]
-angle = {angle}
-[run]
-end = 1.0
-fraction = 0.3
-{run}
-""")
+    return parse(on_base(law, [1.0, 0.5], dip, (6.0, 1.0), at) + f"fraction = 0.3\n{run}")
 
 
 @pytest.mark.parametrize("law", [COULOMB, REPLICA], ids=["coulomb", "joint"])
 def test_sliding_block(law):
-    """Gravity turned by 48 degrees, more than either joint holds: friction eats most of the work.
+    """A dip of 48 degrees, more than either joint holds: friction eats most of the work.
 
     The first 0.02 s wind the joints up; the ledger must close to 1e-4 over the whole slide.
     """
-    g = 9.81 * np.array([np.sin(0.84), -np.cos(0.84)])
-    sim = Simulation(one_block(law, (float(g[0]), float(g[1])), at=(-1.0, 0.25)))
+    sim = Simulation(one_block(law, 48.0, at=(-1.0, 0.25)))
     lost = [0.0]
     for _ in range(1100):
         sim.step()
@@ -73,29 +49,19 @@ def test_linear_joint_conserves_to_round_off():
 def test_a_shrinking_joint_gives_its_energy_back():
     """A block pushed over the end of its base, without friction: the joint shrinks under load, and
     the drive that holds the block back gains what the joint and the sinking block lose."""
-    scene = parse(f"""
-[laws.rock]
-{COULOMB.replace("0.6", "0.0")}
-[[block]]
-name = "base"
-box = [1.0, 0.5]
-at = [0.0, -0.25]
-fixed = true
-[[block]]
-name = "block"
-box = [1.0, 0.5]
-at = [0.0, 0.25]
-held = ["turn"]
+    law = coulomb(0.0, 1e9, 8e8)
+    scene = parse(
+        on_base(law, [1.0, 0.5], base=(1.0, 0.5), held=["turn"], end=1.6)
+        + """\
+dashpot_normal = 0.0
+dashpot_shear = 0.0
 [[drive]]
 block = "block"
 motion = "x"
 times = [0.0, 1.5]
 values = [0.0, 0.3]
-[run]
-end = 1.6
-dashpot_normal = 0.0
-dashpot_shear = 0.0
-""")
+"""
+    )
     sim = Simulation(scene)
     stored = sim.ledger.value["stored"]
     while sim.time < scene.run.end:

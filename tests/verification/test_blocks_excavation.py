@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
+from scene_text import block, coulomb
 
 from dem_demo import Simulation, load
 from dem_demo.scene import parse
 
-LAW = 'kind = "coulomb"\nnormal_stiffness = 1e10\nshear_stiffness = 5e9\nfriction = 0.7\n'
-BOX = '[[block]]\nname = "{}"\nbox = [1, 1]\nat = [0, {}]\nfixed = {}\n'
-BOXES = [BOX.format(i, i - 1.0, str(i == 0).lower()) for i in range(4)]
-TOWER = f"[laws.j]\n{LAW}{''.join(BOXES)}[run]\nend = 1.0\n"
+BOXES = [block(f"{i}", box=[1, 1], at=[0, i - 1.0], fixed=i == 0) for i in range(4)]
+TOWER = f"[laws.j]\n{coulomb()}{''.join(BOXES)}[run]\nend = 1.0\n"
 UNDER = "[[excavate]]\ncorners = [[-1, -0.4], [1, -0.4], [0, 0.5]]\nover = {over}\n{at}\n"
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scene_text import block, coulomb
 
 from dem_demo import Simulation, parse
 
@@ -16,21 +17,13 @@ SHAPES = [
 
 def heap(friction):
     """Five irregular blocks, 3 to 5 corners each, dropped into a trough."""
-    text = [
-        f"""
-[laws.rock]
-kind = "coulomb"
-normal_stiffness = 1e9
-shear_stiffness = 8e8
-friction = {friction}
-"""
-    ]
+    text = ["[laws.rock]", coulomb(friction, 1e9, 8e8)]
     walls = (("floor", [4.0, 0.4], [0.0, -0.2]), ("left", [0.4, 3.0], [-1.3, 1.5]),
              ("right", [0.4, 3.0], [1.3, 1.5]))  # fmt: skip
     for name, size, at in walls:
-        text.append(f'[[block]]\nname = "{name}"\nbox = {size}\nat = {at}\nfixed = true')
+        text.append(block(name, box=size, at=at, fixed=True))
     for i, corners in enumerate(SHAPES):
-        text.append(f'[[block]]\nname = "{i}"\ncorners = {corners}\nspin = {0.5 * i - 1}')
+        text.append(block(f"{i}", corners=corners, spin=0.5 * i - 1))
     text.append("""
 [run]
 end = 1.0
@@ -80,13 +73,9 @@ def test_a_corner_forced_over_another_makes_no_energy():
     overlaps by 1 cm, and takes over again on the way back. The first drops stored energy, the
     second would make it: the corner starts anew instead, with a closure offset.
     """
-    scene = parse("""
-gravity = [0.0, 0.0]
-[laws.rock]
-kind = "coulomb"
-normal_stiffness = 1e9
-shear_stiffness = 8e8
-friction = 0.0
+    scene = parse(
+        f"gravity = [0, 0]\n[laws.rock]\n{coulomb(0.0, 1e9, 8e8)}"
+        + """
 [[block]]
 name = "base"
 box = [4.0, 1.0]
@@ -112,7 +101,8 @@ step = 1e-4
 corner_length = 0.1
 dashpot_normal = 0.0
 dashpot_shear = 0.0
-""")
+"""
+    )
     sim = Simulation(scene)
     rows = []
     while sim.time < scene.run.end:

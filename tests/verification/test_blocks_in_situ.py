@@ -7,12 +7,12 @@ its direction.
 import numpy as np
 import pytest
 from block_forces import contact_forces
-from scene_text import ROCK
+from scene_text import ROCK, block, coulomb
 
 from dem_demo import Simulation
 from dem_demo.scene import parse, turn
 
-PLAIN = 'kind = "coulomb"\nnormal_stiffness = 1e10\nshear_stiffness = 5e9\nfriction = 0.8\n'
+PLAIN = coulomb(0.8)
 LAWS = {"plain": PLAIN, "rough": ROCK}
 RUN = "[run]\nend = 1.0\n"
 DEPTH = 100.0  # m, of the origin: stresses that hardly change from end to end of a joint
@@ -33,9 +33,8 @@ def bricks(angle, k0, law):
     for row, column in np.ndindex(7, 7):
         left = column + 0.5 * (row % 2)
         box = np.array([[left, row], [left + 1, row], [left + 1, row + 1], [left, row + 1]])
-        fixed = str(not (0 < row < 6 and 0 < column < 6)).lower()
-        text += f'[[block]]\nname = "{row} {column}"\nfixed = {fixed}\n'
-        text += f"corners = {(box @ turn(np.radians(angle)).T).tolist()}\n"
+        corners, fixed = box @ turn(np.radians(angle)).T, not (0 < row < 6 and 0 < column < 6)
+        text += block(f"{row} {column}", corners=corners, fixed=fixed)
     return parse(text)
 
 
@@ -134,7 +133,7 @@ def test_a_joint_keeps_its_closure_of_before_while_it_opens():
     text = f"gravity = [0.0, 0.0]\n[laws.j]\n{PLAIN}[run]\nend = 0.1\nseat = false\n"
     text += "[in_situ]\nstress = [0.0, 5e5, 0.0]\n"
     for i in range(2):
-        text += f'[[block]]\nname = "{i}"\nbox = [1.0, 1.0]\nat = [0.0, {i}.0]\n'
+        text += block(f"{i}", box=[1.0, 1.0], at=[0.0, i])
     sim, seen = Simulation(parse(text)), []
     assert sim.ledger.value["stored"] == pytest.approx(5e5**2 / 2e10, rel=1e-9)
     while sim.time < 4e-3:

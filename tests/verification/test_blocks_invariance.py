@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scene_text import ROCK
+from scene_text import ROCK, block
 
 from dem_demo import Simulation, load, parse
 
@@ -23,10 +23,8 @@ def pile(order, turned=0.0):
     text = [f"gravity = [{9.81 * s}, {-9.81 * c}]", LAW]
     for name in order:
         size, (x, y), angle = PILE[name]
-        text.append(
-            f'[[block]]\nname = "{name}"\nbox = {size}\nangle = {angle + turned}\n'
-            f"at = [{c * x - s * y}, {s * x + c * y}]\nfixed = {str(name == 'base').lower()}"
-        )
+        where = [c * x - s * y, s * x + c * y]
+        text.append(block(name, box=size, angle=angle + turned, at=where, fixed=name == "base"))
     text.append("[run]\nend = 1.0\nseat = false\nstep = 1e-4")
     return Simulation(parse("\n".join(text)))
 

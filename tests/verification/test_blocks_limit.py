@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from limit_analysis import upper_factor
+from scene_text import coulomb, dipping, on_base
 
 from dem_demo import Simulation, parse
 from dem_demo.output.run import to_failure
@@ -11,11 +12,6 @@ from dem_demo.studies.strength import FACTOR, factor_of_safety, seated, weakened
 FOUND = FACTOR[2]  # to which a factor is found
 
 SLOPE = """
-[laws.rock]
-kind = "coulomb"
-normal_stiffness = 5e9
-shear_stiffness = 2e9
-friction = 0.7002
 [[rock]]
 name = "slope"
 outline = [[-22, -2], [12, -2], [12, 0], [0, 0], [-9, 12], [-22, 12]]
@@ -38,7 +34,7 @@ end = 1.0
 
 
 def slope(**keys):
-    scene = parse(SLOPE.format(**keys))
+    scene = parse(f"[laws.rock]\n{coulomb(0.7002, 5e9, 2e9)}" + SLOPE.format(**keys))
     assert len(scene.rocks[0].free) >= 100
     return scene
 
@@ -76,52 +72,11 @@ def test_a_slope_whose_columns_lean_has_less_than_limit_analysis_says():
 
 def test_limit_analysis_of_one_block_is_that_by_hand():
     """A block of 3 m by 1.5 m on a plane of 25 degrees; a narrow one turns for any friction."""
-    text = """
-gravity = [4.1459, -8.8909]
-[laws.j]
-kind = "coulomb"
-normal_stiffness = 1e10
-shear_stiffness = 5e9
-friction = 0.7002
-[[block]]
-name = "base"
-box = [12.0, 1.0]
-at = [0.0, -0.5]
-fixed = true
-[[block]]
-name = "block"
-box = [3.0, 1.5]
-at = [0.0, 0.75]
-[run]
-end = 0.2
-"""
+    text = on_base(coulomb(0.7002), [3.0, 1.5], 25.0)
     by_hand = 0.7002 / np.tan(np.radians(25.0))
     assert upper_factor(parse(text)) == pytest.approx(by_hand, rel=2e-3)
     with pytest.raises(AssertionError):  # it is held by no friction at all
         upper_factor(parse(text.replace("box = [3.0, 1.5]", "box = [0.6, 1.5]")))
-
-
-PLANE = """
-gravity = [{down}, {on}]
-[laws.j]
-kind = "coulomb"
-normal_stiffness = 1e7
-shear_stiffness = 1e7
-friction = {friction}
-[[block]]
-name = "base"
-box = [60.0, 20.0]
-at = [20.0, -10.0]
-fixed = true
-[[block]]
-name = "block"
-box = [10.0, {height}]
-at = [0.0, {middle}]
-[run]
-end = 1.5
-dashpot_normal = 1.0
-corner_length = 4.0
-"""
 
 
 @pytest.mark.parametrize(
@@ -136,11 +91,9 @@ corner_length = 4.0
 )
 def test_a_block_on_a_slope_stands_slides_or_turns(height, phi, fails):
     """3DEC's sliding block: 10 m wide, on a slope of 40 degrees, joint of 10 MPa/m."""
-    dip, friction = np.radians(40.0), np.tan(np.radians(phi))
-    down, on = 9.81 * np.sin(dip), -9.81 * np.cos(dip)
-    sim = Simulation(
-        parse(PLANE.format(down=down, on=on, friction=friction, height=height, middle=height / 2))
-    )
+    friction, (down, on) = np.tan(np.radians(phi)), dipping(40.0)
+    text = on_base(coulomb(friction, 1e7, 1e7), [10.0, height], 40.0, [80.0, 20.0], end=1.5)
+    sim = Simulation(parse(text + "dashpot_normal = 1.0\ncorner_length = 4.0\n"))
     x, _, turn = sim.blocks.motion[:3, 1].copy()
     while sim.time < sim.scene.run.end:
         sim.step()
@@ -157,11 +110,6 @@ def test_a_block_on_a_slope_stands_slides_or_turns(height, phi, fails):
 
 
 WEDGE = """
-[laws.j]
-kind = "coulomb"
-normal_stiffness = 1e10
-shear_stiffness = 5e9
-friction = {friction}
 [[block]]
 name = "left"
 corners = [[-6.0, 0.0], [-1.5, 0.0], [0.0, {height}], [-6.0, {height}]]
@@ -195,36 +143,13 @@ def test_a_roof_wedge_drawn_with_its_apex(half_angle, phi, push):
     angle, mu = np.radians(half_angle), np.tan(np.radians(phi))
     height = 1.5 / np.tan(angle)
     half = 0.5 * 2600.0 * 9.81 * 1.5 * height  # of its weight, N
-    scene = parse(WEDGE.format(friction=mu, height=height, push=push))
+    law = f"[laws.j]\n{coulomb(mu)}"
+    scene = parse(law + WEDGE.format(height=height, push=push))
     normal, shear = (
         push * np.cos(angle) - half * np.sin(angle),
         push * np.sin(angle) + half * np.cos(angle),
     )
     assert factor_of_safety(scene) == pytest.approx(mu * normal / shear, rel=FOUND)
-
-
-COHESIVE = """
-gravity = [{down}, {on}]
-[laws.j]
-kind = "coulomb"
-normal_stiffness = 1e10
-shear_stiffness = 5e9
-friction = {mu}
-cohesion = {cohesion}
-tension = {cohesion}
-{residual}
-[[block]]
-name = "base"
-box = [12.0, 1.0]
-at = [0.0, -0.5]
-fixed = true
-[[block]]
-name = "block"
-box = [3.0, 1.5]
-at = [0.0, 0.75]
-[run]
-end = 0.2
-"""
 
 
 @pytest.mark.slow
@@ -238,14 +163,15 @@ def test_a_block_held_by_cohesion(dip, phi, cohesion, brittle):
     the peak, the block holds while its upper end is below its peak, or while the lower end and what
     is left at the upper one bear it, whichever is more; the load turns the block onto its lower
     end."""
-    slope, mu = np.radians(dip), np.tan(np.radians(phi))
-    down, on = 9.81 * np.sin(slope), -9.81 * np.cos(slope)
-    residual = "residual_cohesion = 0.0" if brittle else ""
-    text = COHESIVE.format(down=down, on=on, mu=mu, cohesion=cohesion, residual=residual)
+    mu, (down, on) = np.tan(np.radians(phi)), dipping(dip)
+    residual = {"residual_cohesion": 0.0} if brittle else {}
+    law = coulomb(mu, cohesion=cohesion, tension=cohesion, **residual)
     normal, shear = -2600.0 * 1.5 * on, 2600.0 * 1.5 * down  # Pa, means over the base
     upper, lower = normal - shear * np.array([0.5, -0.5])  # 2 (1.5 m / 2) over 3 m
     expected = (cohesion + mu * normal) / shear
     if brittle:
         peak = (cohesion + mu * upper) / shear
         expected = max(peak, 0.5 * (cohesion + mu * lower + mu * upper) / shear)
-    assert factor_of_safety(parse(text)) == pytest.approx(expected, rel=0.01)
+    assert factor_of_safety(parse(on_base(law, [3.0, 1.5], dip))) == pytest.approx(
+        expected, rel=0.01
+    )

@@ -6,35 +6,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scene_text import coulomb, dipping, on_base
 
 from dem_demo import Simulation, load
 from dem_demo.cli import main
 from dem_demo.scene import parse
 
-SLOPE = np.radians(25.0)
-BLOCK = f"""
-gravity = [{9.81 * np.sin(SLOPE)}, {-9.81 * np.cos(SLOPE)}]
-[laws.j]
-kind = "coulomb"
-normal_stiffness = 1e10
-shear_stiffness = 5e9
-friction = {np.tan(np.radians(35.0))}
-[[block]]
-name = "base"
-box = [12.0, 1.0]
-at = [0.0, -0.5]
-fixed = true
-[[block]]
-name = "block"
-box = [3.0, 1.5]
-at = [0.0, 0.75]
+BLOCK = (
+    on_base(coulomb(np.tan(np.radians(35.0))), [3.0, 1.5], 25.0, end=0.02)
+    + """\
+record = 0.01
 [[block]]
 name = "stuck to its face"
 corners = [[1.5, 0.2], [2.0, 0.4], [2.0, 1.0], [1.5, 1.2]]
-[run]
-end = 0.02
-record = 0.01
 """
+)
 
 
 def unbalanced(sim):
@@ -60,8 +46,7 @@ def test_a_loose_block_leaves_the_one_that_it_touches_in_balance():
 def test_a_block_that_slides_lacks_what_friction_does_not_hold():
     """At 40 degrees: sin - cos tan 35, of its weight."""
     steep = np.radians(40.0)
-    pull = 9.81 * np.array([np.sin(steep), -np.cos(steep)])
-    sim = Simulation(replace(parse(BLOCK), gravity=tuple(pull.tolist())))
+    sim = Simulation(replace(parse(BLOCK), gravity=tuple(dipping(40.0))))
     lacking = np.sin(steep) - np.cos(steep) * np.tan(np.radians(35.0))
     assert names(sim) == ["block", "stuck to its face"]
     assert unbalanced(sim)[1] == pytest.approx(lacking, rel=0.03)
@@ -95,7 +80,9 @@ def test_strength_reduction_with_and_without_loose_blocks(tmp_path, capsys):
     (row,) = json.loads((out / "strength.json").read_text())["rows"]
     assert [block["block"] for block in row["loose"]] == ["stuck to its face"]
     assert row["factor_of_safety"] is None
-    assert row["factor_without"] == pytest.approx(np.tan(np.radians(35)) / np.tan(SLOPE), rel=0.01)
+    assert row["factor_without"] == pytest.approx(
+        np.tan(np.radians(35)) / np.tan(np.radians(25)), rel=0.01
+    )
     assert [block["block"] for block in row["first"]] == ["block"]
     said = capsys.readouterr().out
     assert said.index("cannot be held") < said.index("factor of safety without")

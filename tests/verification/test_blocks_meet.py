@@ -2,36 +2,29 @@
 
 import numpy as np
 import pytest
-from scene_text import ROCK
+from scene_text import PLAIN, ROCK, block, on_base
 
 import jointlaw as jl
 from dem_demo import Simulation, parse
 
-SCENE = parse(f"""
-[laws.rock]
-{ROCK.replace("a = 3.0", "a = 4.0")}plane = 0.0
-resolution = {{ u = 4, phi = 10, depth = 1 }}
-[[block]]
-name = "base"
-box = [8.0, 1.0]
-at = [0.0, -0.5]
-fixed = true
-[[block]]
-name = "block"
-box = [2.0, 1.0]
-at = [-1.0, 0.5]
-held = ["turn"]
+LAW = (
+    ROCK.replace("a = 3.0", "a = 4.0")
+    + "plane = 0.0\nresolution = { u = 4, phi = 10, depth = 1 }\n"
+)
+TEXT = (
+    on_base(LAW, [2.0, 1.0], at=[-1.0, 0.5], held=["turn"], end=0.5)
+    + """\
+step = 2e-4
+skin = 0.02
+dashpot_normal = 0.5
 [[drive]]
 block = "block"
 motion = "x"
 times = [0.0, 0.1, 0.5]
 values = [0.0, 0.0, 1e-3]
-[run]
-end = 0.5
-step = 2e-4
-skin = 0.02
-dashpot_normal = 0.5
-""")
+"""
+)
+SCENE = parse(TEXT)
 
 
 def put(sim, across, up):
@@ -94,9 +87,9 @@ def test_a_contact_that_is_pressed_when_found_starts_with_nothing():
 
 def test_a_sliver_rules_neither_the_search_nor_the_corners_of_the_others():
     """Blocks 1 m wide and a sliver of 0.05 m: what follows from the width of the usual block."""
-    wide = [f'[[block]]\nname = "{i}"\nbox = [1.0, 1.0]\nat = [{2 * i}, 0.5]' for i in range(4)]
-    sliver = '[[block]]\nname = "sliver"\nbox = [0.05, 2.0]\nat = [9.0, 1.0]'
-    law = '[laws.a]\nkind = "coulomb"\nnormal_stiffness = 1e9\nshear_stiffness = 1e9\nfriction = 1'
+    wide = [block(f"{i}", box=[1.0, 1.0], at=[2 * i, 0.5]) for i in range(4)]
+    sliver = block("sliver", box=[0.05, 2.0], at=[9.0, 1.0])
+    law = f"[laws.a]\n{PLAIN}"
     scene = parse("\n".join([law, *wide, sliver, "[run]\nend = 1.0"]))
     assert scene.skins == pytest.approx([0.02] * 4 + [0.005])
     assert scene.run.corner_length == pytest.approx(0.07)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from block_forces import contact_forces
+from scene_text import block, coulomb, dipping, lines
 
 from dem_demo import Simulation, parse
 
@@ -11,31 +12,13 @@ G, RHO, MU = 9.81, 2600.0, 0.6
 
 def slope(angle, mu=MU, end=1.0, stiffness=2e9):
     """Two 1 m blocks on a base, gravity turned by `angle` degrees instead of the base."""
-    gravity = [G * np.sin(np.radians(angle)), -G * np.cos(np.radians(angle))]
-    return parse(f"""
-gravity = [{gravity[0]!s}, {gravity[1]!s}]
-[laws.rock]
-kind = "coulomb"
-normal_stiffness = {stiffness}
-shear_stiffness = {stiffness}
-friction = {mu}
-[[block]]
-name = "base"
-box = [12.0, 1.0]
-at = [2.0, -0.5]
-fixed = true
-[[block]]
-name = "lower"
-box = [1.0, 1.0]
-at = [0.0, 0.5]
-[[block]]
-name = "upper"
-box = [1.0, 1.0]
-at = [1.5, 0.5]
-[run]
-end = {end}
-fraction = 0.3
-""")
+    law = f"[laws.rock]\n{coulomb(mu, stiffness, stiffness)}"
+    boxes = block("lower", box=[1.0, 1.0], at=[0.0, 0.5]) + block(
+        "upper", box=[1.0, 1.0], at=[1.5, 0.5]
+    )
+    base = block("base", box=[12.0, 1.0], at=[2.0, -0.5], fixed=True)
+    run = f"[run]\nend = {end}\nfraction = 0.3\n"
+    return parse(lines(gravity=dipping(angle)) + law + base + boxes + run)
 
 
 def test_base_shear_at_20_degrees():

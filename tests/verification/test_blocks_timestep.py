@@ -4,7 +4,7 @@ import tomllib
 
 import numpy as np
 import pytest
-from scene_text import ROCK
+from scene_text import ROCK, block, coulomb, lines, on_base
 
 from dem_demo import Refused, Simulation, parse
 from dem_demo.contact import virgin_curve
@@ -16,27 +16,11 @@ STEPS = 3000
 
 def column(blocks, zeta):
     """Blocks on each other with a linear law that neither slides nor differs by direction."""
-    boxes = "".join(
-        f'[[block]]\nname = "{i}"\nbox = [1.0, 0.6]\nat = [0.0, {0.3 + 0.6 * i}]\n'
-        for i in range(blocks)
-    )
-    return parse(f"""
-[laws.linear]
-kind = "coulomb"
-normal_stiffness = 1e8
-shear_stiffness = 1e8
-friction = inf
-[[block]]
-name = "base"
-box = [2.0, 1.0]
-at = [0.0, -0.5]
-fixed = true
-{boxes}
-[run]
-end = 1.0
-dashpot_normal = {zeta}
-dashpot_shear = {zeta}
-""")
+    law = f"[laws.linear]\n{coulomb(np.inf, 1e8, 1e8)}"
+    boxes = [block(f"{i}", box=[1.0, 0.6], at=[0.0, 0.3 + 0.6 * i]) for i in range(blocks)]
+    base = block("base", box=[2.0, 1.0], at=[0.0, -0.5], fixed=True)
+    run = lines(end=1.0, dashpot_normal=zeta, dashpot_shear=zeta)
+    return parse(law + base + "".join(boxes) + "[run]\n" + run)
 
 
 def ring(scene, share, steps):
@@ -97,23 +81,9 @@ def test_stiffness_at_stress_bounds_a_sheared_joint():
     assert 0.3 < worst < 1.0
 
 
-FALL = f"""
-[laws.rock]
-{ROCK}[[block]]
-name = "base"
-box = [3.0, 1.0]
-at = [0.0, -0.5]
-fixed = true
-[[block]]
-name = "block"
-box = [1.0, 0.5]
-at = [0.0, 0.35]
-angle = 3.0
-[run]
-end = 0.4
-seat = false
-law_steps = 4
-"""
+FALL = (
+    on_base(ROCK, [1.0, 0.5], at=[0.0, 0.35], angle=3.0, end=0.4) + "seat = false\nlaw_steps = 4\n"
+)
 
 
 def test_a_chosen_step_is_halved_in_an_impact_and_time_goes_on(monkeypatch):

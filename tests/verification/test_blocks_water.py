@@ -4,6 +4,7 @@ from math import atan, cos, hypot, radians, sin, tan
 
 import numpy as np
 import pytest
+from scene_text import block, coulomb
 from shapely import Polygon
 
 from dem_demo import Simulation
@@ -12,32 +13,25 @@ from dem_demo.studies.strength import factor_of_safety
 
 WATER = 9810.0  # N/m3
 RUN = "[run]\nend = 1.0\n"
-LAW = """
-[laws.{name}]
-kind = "coulomb"
-normal_stiffness = 1e10
-shear_stiffness = 5e9
-friction = {friction}
-cohesion = {cohesion}
-"""
 
 
 def law(name, friction, cohesion=0.0):
-    return LAW.format(name=name, friction=friction, cohesion=cohesion)
+    return f"[laws.{name}]\n{coulomb(friction, cohesion=cohesion)}"
 
 
-def block(name, corners, more=""):
-    return f'[[block]]\nname = "{name}"\ncorners = {[list(c) for c in corners]}\n{more}\n'
-
-
-FLOOR = block("floor", [(-9, -3), (9, -3), (9, -2), (-9, -2)], "fixed = true")
+FLOOR = block("floor", corners=[(-9, -3), (9, -3), (9, -2), (-9, -2)], fixed=True)
 STONE = [(-0.8, -0.7), (1.1, -0.5), (0.9, 0.8), (-0.5, 0.6)]
 
 
 def test_pressure_on_edges_is_that_of_a_sum_over_short_pieces():
     """A table with kinks that crosses edges; 2e5 pieces an edge leave 1e-9 of the force."""
     table = np.array([[-1.0, 0.3], [0.2, 0.9], [0.7, -0.4], [2.0, 0.5]])
-    text = law("j", 0.5) + f"[water]\ntable = {table.tolist()}\n" + block("stone", STONE) + FLOOR
+    text = (
+        law("j", 0.5)
+        + f"[water]\ntable = {table.tolist()}\n"
+        + block("stone", corners=STONE)
+        + FLOOR
+    )
     scene = parse(text + RUN + "seat = false\nstep = 1e-5\n")
     centre, total = scene.blocks[0].centroid, np.zeros(3)
     for p, q in zip(np.array(STONE), np.roll(STONE, -1, axis=0), strict=True):
@@ -57,7 +51,7 @@ def test_a_sinking_block_gets_from_the_water_what_its_potential_loses():
     The pressure is brought up to date when the block has moved by a quarter of its skin, 1 mm.
     """
     text = law("j", 0.5) + "[water]\ntable = [[-9.0, -1.2], [9.0, 0.6]]\n" + FLOOR
-    text += block("stone", STONE, "velocity = [1.0, 2.0]\nspin = -1.5")
+    text += block("stone", corners=STONE, velocity=[1.0, 2.0], spin=-1.5)
     sim = Simulation(parse(text + "[run]\nend = 1.0\nseat = false\nstep = 1e-4\nskin = 4e-3\n"))
     below = Polygon([(-9, -9), (9, -9), (9, 0.6), (-9, -1.2)])
 
@@ -90,9 +84,9 @@ def planar(friction, cohesion, depth):
     base = [(-60, -1), (0, -1), (0, 0), (BACK, HEIGHT - CRACK), (-60, HEIGHT - CRACK)]
     behind = [(-60, HEIGHT - CRACK), SLIDE[3], SLIDE[2], (-60, HEIGHT)]
     text = law("j", friction, cohesion) + law("crack", 0.0) + (table if depth else "")
-    text += block("base", base, "fixed = true") + block("behind", behind, "fixed = true")
+    text += block("base", corners=base, fixed=True) + block("behind", corners=behind, fixed=True)
     joint = '[[joint]]\nbetween = ["slide", "behind"]\nlaw = "crack"\n'
-    return parse(text + block("slide", SLIDE) + joint + RUN)
+    return parse(text + block("slide", corners=SLIDE) + joint + RUN)
 
 
 @pytest.mark.parametrize("depth", [0.0, 0.5 * CRACK, CRACK])
@@ -113,13 +107,13 @@ def test_a_planar_slide_with_a_tension_crack(phi, cohesion, depth):
 def test_pressure_given_for_a_law_is_taken_from_the_stress_of_its_joints():
     """20 kPa under a slab of 1 m on a slope of 3 in 4: of its 25.5 kPa x 0.8 0.4 are left."""
     text = "gravity = [5.886, -7.848]\n" + law("wet", 0.9) + "pressure = 2e4\n"
-    text += block("floor", [(-9, -3), (9, -3), (9, 0), (-9, 0)], "fixed = true")
-    text += block("slab", [(-2, 0), (2, 0), (2, 1), (-2, 1)], "held = ['x', 'turn']")
+    text += block("floor", corners=[(-9, -3), (9, -3), (9, 0), (-9, 0)], fixed=True)
+    text += block("slab", corners=[(-2, 0), (2, 0), (2, 1), (-2, 1)], held=["x", "turn"])
     sim = Simulation(parse(text + RUN))
     area = sim.contacts.length
     left = sim.joints.traction[:, 0] @ area / area.sum()
     assert left == pytest.approx(2600 * 7.848 - 2e4, rel=1e-6)
-    free = parse((text + RUN).replace("held = ['x', 'turn']", "").replace("2e4", "1e4"))
+    free = parse((text + RUN).replace('held = ["x", "turn"]', "").replace("2e4", "1e4"))
     factor = 0.9 * (1 - 1e4 / (2600 * 7.848)) / tan(atan(0.75))
     assert factor_of_safety(free) == pytest.approx(factor, rel=0.01)
 
@@ -135,15 +129,15 @@ def test_pressure_given_for_a_law_is_taken_from_the_stress_of_its_joints():
 )
 def test_wrong_water_is_refused(wrong, told):
     with pytest.raises(ValueError, match=told):
-        parse(law("j", 0.5) + block("stone", STONE) + RUN + f"[water]\n{wrong}\n")
+        parse(law("j", 0.5) + block("stone", corners=STONE) + RUN + f"[water]\n{wrong}\n")
 
 
 def test_a_negative_pressure_is_refused():
     with pytest.raises(ValueError, match=r"laws\.j\.pressure = -1\.0"):
-        parse(law("j", 0.5) + "pressure = -1.0\n" + block("stone", STONE) + RUN)
+        parse(law("j", 0.5) + "pressure = -1.0\n" + block("stone", corners=STONE) + RUN)
 
 
 def test_a_table_needs_gravity_that_points_down():
-    text = "gravity = [1.0, -9.0]\n" + law("j", 0.5) + block("stone", STONE) + RUN
+    text = "gravity = [1.0, -9.0]\n" + law("j", 0.5) + block("stone", corners=STONE) + RUN
     with pytest.raises(ValueError, match="must point down"):
         parse(text + "[water]\ntable = [[0.0, 0.0]]\n")

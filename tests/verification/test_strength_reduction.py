@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scene_text import ROCK, block, dipping, lines, on_base
 from scipy.optimize import brentq, fsolve
 
 import jointlaw as jl
@@ -23,29 +24,9 @@ from dem_demo.studies.strength import (
 )
 
 DIP = 32.0
-SCENE = f"""
-gravity = [{9.81 * math.sin(math.radians(DIP))}, {-9.81 * math.cos(math.radians(DIP))}]
-[laws.joint]
-asperity_density = 1e4
-mating_length = 2e-3
-plane = 0.0
-resolution = {{ u = 4, phi = 10, depth = 1 }}
-orientation = {{ a = 4.0, b = 0.0, c = 0.3 }}
-asperity = {{ K = 9.5e6, lam = 1.2, eta = 0.5, mu = 0.4 }}
-heights = {{ alpha = 3.82, beta = 1.15e-3, overlap = 3e-3 }}
-[[block]]
-name = "base"
-box = [9.0, 1.0]
-at = [0.0, -0.5]
-fixed = true
-[[block]]
-name = "slab"
-box = [5.0, 1.0]
-at = [-1.0, 0.5]
-[run]
-end = 0.2
-fraction = 0.7
-"""
+LAW = ROCK.replace("a = 3.0", "a = 4.0, b = 0.0, c = 0.3")
+LAW += "plane = 0.0\nresolution = { u = 4, phi = 10, depth = 1 }\n"
+SCENE = on_base(LAW, [5.0, 1.0], DIP, end=0.2, at=[-1.0, 0.5]) + "fraction = 0.7\n"
 FOUND = 0.01  # share to which both are found
 PLAIN = {
     "coulomb": jl.CoulombLaw(3e9, 2e9, 0.8, plane=0.0),
@@ -56,7 +37,7 @@ PLAIN = {
 def angle(factor, dip):
     """Friction angle (degrees) of the scene's law with its mu divided, at the slab's weight."""
     scene = parse(SCENE)
-    law = scene.laws["joint"]
+    law = scene.laws["rock"]
     weak = replace(law, asperity=replace(law.asperity, mu=law.asperity.mu / factor))
     return friction_angle(weak, 2600.0 * 9.81 * math.cos(math.radians(dip)))
 
@@ -72,12 +53,12 @@ def bears(law, stress):
 def test_factor_of_safety_of_a_block_on_a_plane(kind):
     """Strength of the joint at its normal stress over the shear stress of the weight."""
     scene = parse(SCENE)
-    law = PLAIN.get(kind, scene.laws["joint"])
+    law = PLAIN.get(kind, scene.laws["rock"])
     dip, weight = math.radians(DIP), 2600.0 * 9.81
     strength = bears(law, normal := weight * math.cos(dip))
     if kind in PLAIN:
         assert strength == pytest.approx(law.cohesion + 0.8 * normal, rel=2e-3)
-    found = factor_of_safety(replace(scene, laws={"joint": law}))
+    found = factor_of_safety(replace(scene, laws={"rock": law}))
     assert found == pytest.approx(strength / (weight * math.sin(dip)), rel=FOUND)
 
 
@@ -94,42 +75,21 @@ def test_factor_of_safety_of_a_toppling_column(kind):
         "free": jl.CoulombLaw(3e9, 2e9, 0.0, plane=0.0),
         "foot": jl.CoulombLaw(3e9, 2e9, 5.0, plane=0.0),
     }
-    law = PLAIN.get(kind, parse(SCENE).laws["joint"])
-    head = SCENE[: SCENE.index("[[block]]")].split("[laws.joint]")[1]
-    scene = parse(f"""
-gravity = [{9.81 * math.sin(tilt)}, {-9.81 * math.cos(tilt)}]
-[laws.joint]{head}
-[laws.free]{head}
-[laws.foot]{head}
-[[block]]
-name = "base"
-box = [13.0, 1.0]
-at = [1.5, -0.5]
-fixed = true
-[[block]]
-name = "column"
-box = [1.0, {height}]
-at = [-0.5, {height / 2}]
-[[block]]
-name = "toe"
-box = [{wide}, {top}]
-at = [{wide / 2}, {top / 2}]
-[[joint]]
-between = ["column", "toe"]
-law = "free"
-[[joint]]
-between = ["column", "base"]
-law = "foot"
-[run]
-end = 0.2
-""")
+    law = PLAIN.get(kind, parse(SCENE).laws["rock"])
+    text = "".join(f"[laws.{name}]\n{LAW}" for name in ("rock", "free", "foot"))
+    text += block("base", box=[13.0, 1.0], at=[1.5, -0.5], fixed=True)
+    text += block("column", box=[1.0, height], at=[-0.5, height / 2])
+    text += block("toe", box=[wide, top], at=[wide / 2, top / 2])
+    for other, name in (("toe", "free"), ("base", "foot")):
+        text += "[[joint]]\n" + lines(between=["column", other], law=name)
+    scene = parse(lines(gravity=dipping(25.0)) + text + "[run]\nend = 0.2\n")
     push = load * height * (math.sin(tilt) * height / 2 - math.cos(tilt) / 2) / top
     weight = load * wide * top
     normal = weight * math.cos(tilt)
     far = normal / 2 + (weight * math.sin(tilt) * top / 2 + push * top) / wide
     ends = [2 * part / wide for part in (far, normal - far)]
     strong = wide / 2 * sum(bears(law, stress) for stress in ends)
-    found = factor_of_safety(replace(scene, laws={"joint": law, **plain}))
+    found = factor_of_safety(replace(scene, laws={"rock": law, **plain}))
     assert found == pytest.approx(strong / (weight * math.sin(tilt) + push), rel=FOUND)
 
 
@@ -142,9 +102,7 @@ def test_factor_of_safety_of_a_column_that_tension_keeps_from_toppling():
     """
     tilt, high, wide, load = math.radians(25.0), 4.0, 1.0, 2600.0 * 9.81
     law = jl.CoulombLaw(3e9, 2e9, 0.8, cohesion=2e6, tension=1.2e5, plane=0.0)
-    text = SCENE.replace("box = [5.0, 1.0]\nat = [-1.0, 0.5]", "box = [1.0, 4.0]\nat = [0.0, 2.0]")
-    gravity = 9.81 * math.sin(tilt), -9.81 * math.cos(tilt)
-    scene = replace(parse(text), gravity=gravity, laws={"joint": law})
+    scene = replace(parse(on_base(LAW, [1.0, 4.0], 25.0)), laws={"rock": law})
     tips = load * wide * high * (math.sin(tilt) * high / 2 - math.cos(tilt) * wide / 2)
     by_hand = law.tension * wide**2 / 2 / tips
     assert factor_of_safety(scene) == pytest.approx(by_hand, rel=FOUND)
@@ -169,19 +127,12 @@ def test_factor_of_safety_of_a_wedge_of_two_blocks(kind):
         "right": [[0, -3], [6, -3], [6, -6 * low], [0, 0]],
         "left": [[-8, -3], [0, -3], [0, 0], [-8, 8 * steep]],
     }
-    fixed = {name: "true" if name in ("left", "right") else "false" for name in drawn}
-    law_text = SCENE[SCENE.index("[laws.joint]") : SCENE.index("[[block]]")]
-    scene = parse(
-        "gravity = [0.0, -9.81]\n"
-        + law_text.replace("mating_length = 2e-3", "mating_length = 5e-3")
-        + "".join(
-            f'[[block]]\nname = "{name}"\ncorners = {np.array(corners, float).tolist()}\n'
-            f"fixed = {fixed[name]}\n"
-            for name, corners in drawn.items()
-        )
-        + "[run]\nend = 0.2\n"
-    )
-    law = PLAIN.get(kind, scene.laws["joint"])
+    text = "[laws.rock]\n" + LAW.replace("mating_length = 2e-3", "mating_length = 5e-3")
+    for name, corners in drawn.items():
+        corners = np.array(corners, float)
+        text += block(name, corners=corners, fixed=name in ("left", "right"))
+    scene = parse(text + "[run]\nend = 0.2\n")
+    law = PLAIN.get(kind, scene.laws["rock"])
     stress = np.geomspace(1e3, 3e5, 15)  # Pa, of the curve of strength
     strength = [bears(law, one) for one in stress]
     weight = 9.81 * np.array([block.section.mass for block in scene.blocks[:2]])
@@ -199,7 +150,7 @@ def test_factor_of_safety_of_a_wedge_of_two_blocks(kind):
         return down * sin + pushed * cos - bearing(normal, length)
 
     by_hand = fsolve(lambda x: lacking(x[0] * weight[1], x[1]) / weight[1], [0.3, 1.5])[1]
-    found = factor_of_safety(replace(scene, laws={"joint": law}))
+    found = factor_of_safety(replace(scene, laws={"rock": law}))
     assert found == pytest.approx(by_hand, rel=FOUND)
 
 
@@ -269,9 +220,8 @@ def test_critical_tilt_of_a_block_is_that_of_the_law_alone():
 @pytest.mark.parametrize("degrees", [58.0, 62.0])
 def test_a_tilt_near_the_steepest_is_found(degrees):
     """A flat slab slides at its friction angle, also where the last step of the search is short."""
-    text = SCENE.replace("box = [5.0, 1.0]\nat = [-1.0, 0.5]", "box = [3.0, 0.1]\nat = [0.0, 0.05]")
     plain = jl.CoulombLaw(1e9, 1e9, math.tan(math.radians(degrees)), plane=0.0)
-    found = critical_tilt(replace(parse(text), gravity=(0.0, -9.81), laws={"joint": plain}))
+    found = critical_tilt(replace(parse(on_base(LAW, [3.0, 0.1])), laws={"rock": plain}))
     assert found is None if degrees > 60 else found == pytest.approx(degrees, rel=FOUND)
 
 

@@ -11,7 +11,9 @@ blocks, where it is in C. All this in copies under the temporary folder. No part
 import argparse
 import ast
 import collections
+import copy
 import hashlib
+import itertools
 import os
 import random
 import re
@@ -37,37 +39,81 @@ IN_C = (
     (r"\bif \((.*)\)", r"if (!(\1))"), (r"\b(\w+)\((\w+), (\w+)", r"\1(\3, \2"),
     (r"^( +)[^{}]*;$", r"\1;"),
 )  # fmt: skip
-IN_PYTHON = (
-    *IN_C[:8], *IN_C[10:17], (r" and ", " or "), (r" or ", " and "), (r"\bnot ", ""),
-    (r" is ", " is not "), (r" is not ", " is "), (r" in ", " not in "), (r" not in ", " in "),
-    (r"\bTrue\b", "False"), (r"\bFalse\b", "True"), (r" & ", " | "), (r" \| ", " & "),
-    (r"\*\*", "*"), (r" // ", " * "),
-    (r"\b([02-9]|\d\d+)\b(?![.e])", r"(\1 + 1)"), (r"\b(\d+\.\d+(e-?\d+)?)\b", r"(1.1 * \1)"),
-    (r"\bif (.+?)(:$| else )", r"if not (\1)\2"), (r"\bif (.+?)(:$| else )", r"if False\2"),
-    (r"\bwhile (.+):$", r"while not (\1):"), (r"(\"[\w./-]+)\"", r"\1x\""),
-    (r"\b(\w+)\(([\w.]+), ([\w.]+)", r"\1(\3, \2"), (r", \w+=[\w.]+\)", ")"),
-    (r"^( +)(raise .*|[\w.\[\]:, ]+ [-+*/|]?= .*|[\w.]+\(.*\))$", r"\1pass"),
-)  # fmt: skip
+OTHER = {
+    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Pow: ast.Mult,
+    ast.FloorDiv: ast.Mult, ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd, ast.And: ast.Or,
+    ast.Or: ast.And, ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt,
+    ast.Eq: ast.NotEq, ast.NotEq: ast.Eq, ast.Is: ast.IsNot, ast.IsNot: ast.Is,
+    ast.In: ast.NotIn, ast.NotIn: ast.In,
+}  # fmt: skip
 
 
-def places(path):
-    """Of each line that can have a fault: its own number, that of its statement as coverage counts
-    (0 in C), and what may stand in its place. Lines of words have none.
+def changed(node, **fields):
+    """A copy of a node with other fields."""
+    new = copy.copy(node)
+    vars(new).update(fields)
+    return new
+
+
+def faults_of(node):
+    """Nodes of Python, this one or its condition, each with what may stand in its place."""
+    match node:
+        case ast.BinOp(op=op) | ast.BoolOp(op=op) | ast.AugAssign(op=op) if type(op) in OTHER:
+            yield node, changed(node, op=OTHER[type(op)]())
+        case ast.Compare(ops=[op]):
+            yield node, changed(node, ops=[OTHER[type(op)]()])
+        case ast.UnaryOp(operand=operand):
+            yield node, operand
+        case ast.Constant(value=bool(value)):
+            yield node, ast.Constant(not value)
+        case ast.Constant(value=int(value)):
+            yield node, ast.Constant(value + 1)
+        case ast.Constant(value=float(value)):
+            yield node, ast.Constant(1.1 * value or 0.1)
+        case ast.Constant(value=str(value)) if re.fullmatch(r"[\w./-]+", value):
+            yield node, ast.Constant(f"{value}x")
+        case ast.If(test=test) | ast.IfExp(test=test) | ast.While(test=test):
+            yield test, ast.UnaryOp(ast.Not(), test)
+            yield test, ast.Constant(False)
+        case ast.Call(args=[first, second, *rest]):
+            yield node, changed(node, args=[second, first, *rest])
+        case ast.Call(keywords=[*rest, _]):
+            yield node, changed(node, keywords=rest)
+        case ast.Raise() | ast.Assign() | ast.Expr():
+            yield node, ast.Pass()
+
+
+def in_python(text):
+    """Each fault: its line, that of its statement as coverage counts, its first and last byte, and
+    what stands there. Types, docstrings and messages have none.
     """
-    text, c, of = path.read_text(), path.suffix != ".py", {}
-    for one in ast.walk(ast.parse("" if c else text)):
-        if isinstance(one, ast.stmt):
-            words = isinstance(one, ast.Expr) and isinstance(one.value, ast.Constant)
-            last = one.body[0].lineno - 1 if getattr(one, "body", None) else one.end_lineno
-            of |= dict.fromkeys(range(one.lineno, last + 1), 0 if words else one.lineno)
+    starts = [0, *itertools.accumulate(map(len, text.splitlines(keepends=True)))]
+    queue = [(ast.parse(text), 0)]
+    while queue:
+        node, of = queue.pop()
+        docstring = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+        if docstring or isinstance(node, ast.JoinedStr):
+            continue
+        of = node.lineno if isinstance(node, ast.stmt) else of
+        for name, below in ast.iter_fields(node):
+            if name not in ("annotation", "returns"):
+                below = below if isinstance(below, list) else [below]
+                queue += [(one, of) for one in below if isinstance(one, ast.AST)]
+        for old, new in faults_of(node):
+            said = ast.unparse(new) if isinstance(new, ast.stmt) else f"({ast.unparse(new)})"
+            start = starts[old.lineno - 1] + old.col_offset
+            yield old.lineno, of, start, starts[old.end_lineno - 1] + old.end_col_offset, said
+
+
+def in_c(text):
+    """As `in_python`; statements are not counted: 0."""
+    start = 0
     for i, line in enumerate(text.splitlines(keepends=True), 1):
-        code = re.split(r"/\*|  #", line.rstrip("\n"))[0]
-        inside = re.match(r"\s+\w", code) if c else of.get(i)
-        made = {code[: at.start()] + at.expand(new) + code[at.end() :] + line[len(code) :]
-                for rule, new in (IN_C if c else IN_PYTHON)
-                for at in re.finditer(rule, code)} - {line}  # fmt: skip
-        if inside and made:
-            yield i, of.get(i, 0), sorted(made)
+        code = line.partition(b"/*")[0].rstrip()
+        for rule, new in IN_C if re.match(rb"\s+\w", code) else ():
+            for at in re.finditer(rule, code.decode()):
+                yield i, 0, start + at.start(), start + at.end(), at.expand(new)
+        start += len(line)
 
 
 class Copy:
@@ -102,24 +148,23 @@ class Copy:
         return re.sub(rb"[0-9a-f]{16}", b"", made.read_bytes())
 
     def judge(self, name, fault, tests, limit):
-        """What comes of a fault, and the first test that sees it."""
+        """What comes of a file with a fault, and the first test that sees it."""
         file, native = self.at / name, "native" in name
-        before, library = file.read_text(), self.library()
+        before, library = file.read_bytes(), self.library()
         try:
-            compile(fault, name, "exec") if file.suffix == ".py" else None
-            file.write_text(fault)
+            file.write_bytes(fault)
             if native and self.python("jointlaw.native")[0]:
                 return "cannot be built", ""
             if file.suffix != ".py" and self.library() == library:
                 return "the same library", ""
             (self.at / "chosen").write_text("\n".join(tests))
             status, said = self.pytest("-x", "-n0", "-m", "", "@chosen", limit=limit)
-            by = re.findall(r"^(?:FAILED|ERROR) (.*?)(?: - |$)", said, re.M) or [said[-300:]]
-            return ("seen", f"by {by[0]}") if status else ("survived", f"{len(tests)} tests")
-        except (SyntaxError, subprocess.TimeoutExpired) as error:
-            return type(error).__name__, ""
+            by = re.findall(r"^(?:FAILED|ERROR|E +) ?(.*?)(?: - |$)", said, re.M) or ["all"]
+            return ("seen", f"by {by[-1]}") if status else ("survived", f"{len(tests)} tests")
+        except subprocess.TimeoutExpired:
+            return "too long", ""
         finally:
-            file.write_text(before)
+            file.write_bytes(before)
             if native:
                 shutil.copytree(ROOT / BUILT, self.at / BUILT, dirs_exist_ok=True)
 
@@ -133,7 +178,9 @@ def tests_of_lines(marks):
     if not data.exists():
         (copied.at / "coverage.ini").write_text(f"{COVERAGE}{data}.part\n")
         options = "--cov", "--cov-config=coverage.ini", "--cov-context=test", "--cov-report="
-        print(copied.pytest("-m", marks, *options)[1][-1000:])
+        status, said = copied.pytest("-m", marks, *options)
+        if status:
+            raise SystemExit(f"tests fail without a fault:\n{said[-1000:]}")
         copied.python("coverage", "combine", "--rcfile=coverage.ini")
         data.with_suffix(".part").rename(data)
     from coverage import CoverageData
@@ -160,41 +207,38 @@ def main():
     options = parser.parse_args()
     lines = tests_of_lines("" if options.slow else "not slow")
     every = set().union(*(tests for file in lines.values() for tests in file.values()))
-    found = []
+    found = collections.defaultdict(set)  # by file and line
     for where in (ROOT / one for one in options.where):
         for path in [where] if where.is_file() else sorted(where.rglob("*.*")):
             if path.suffix in (".py", ".c", ".h") and BUILT not in str(path):
-                found += [(str(path.relative_to(ROOT)), *place) for place in places(path)]
+                made = (in_python if path.suffix == ".py" else in_c)(path.read_bytes())
+                for line, *fault in made:
+                    found[str(path.relative_to(ROOT)), line].add(tuple(fault))
     draw, copies, counts = random.Random(options.seed), Queue(), collections.Counter()
-    drawn = draw.sample(found, min(options.count, len(found)))
+    drawn = [(*place, *draw.choice(sorted(found[place])))
+             for place in draw.sample(sorted(found), min(options.count, len(found)))]  # fmt: skip
     for i in range(2):
         copies.put(Copy(f"copy-{i}"))
 
-    def run(name, i, statement, made):
-        text, runs = (ROOT / name).read_text().splitlines(keepends=True), name
-        old, new = text[i - 1], draw.choice(made)
+    def run(name, line, statement, start, end, new):
+        text, runs = (ROOT / name).read_bytes(), name
         if not statement:
             runs = "dem_demo/compiled.py" if "blocks" in name else "jointlaw/kernels/engine.py"
         of_file = lines.get(runs, {})
         ran = not statement or statement in of_file
         tests = ran and (of_file.get(statement) or set().union(*of_file.values()) or every)
         order = sorted(tests, key=lambda test: ("/unit/" not in test, test)) if tests else []
-        fault, copied = "".join([*text[: i - 1], new, *text[i:]]), copies.get()
+        fault, copied = text[:start] + new.encode() + text[end:], copies.get()
         fate = copied.judge(name, fault, order, options.limit) if tests else ("not run", "")
         copies.put(copied)
         counts[fate[0]] += 1
-        print(
-            " ".join(fate),
-            f"{name}:{i}",
-            f"- {old.strip()}",
-            f"+ {new.strip()}",
-            sep="\n  ",
-            flush=True,
-        )
+        was = text.splitlines()[line - 1].decode().strip()
+        change = " ".join(f"{text[start:end].decode()} -> {new}".split())
+        print(*fate, f"\n  {name}:{line}: {was}\n  {change}", flush=True)
 
     with ThreadPoolExecutor(2) as pool:
         list(pool.map(lambda place: run(*place), drawn))
-    print(f"{len(found)} places; {', '.join(f'{n} {fate}' for fate, n in counts.items())}")
+    print(f"{len(found)} lines; {', '.join(f'{n} {fate}' for fate, n in counts.items())}")
 
 
 if __name__ == "__main__":

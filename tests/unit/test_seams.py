@@ -12,7 +12,7 @@ import pytest
 from kinds import PARAMETERS, off_default
 
 import jointlaw as jl
-from jointlaw.calibration.forward import build, parameters
+from jointlaw.calibration.forward import build, log_stress, parameters
 from jointlaw.kernels import reference
 
 PAGES = Path(__file__).parents[2] / "docs"
@@ -123,6 +123,9 @@ def test_a_fit_keeps_it_or_refuses(pair):
         return
     values, settings = parameters(law)
     assert build(values, settings, law.plane) == law
+    closure = np.array([0.3e-6, 1e-6])
+    stress = [law.normal_stress(u) for u in closure]
+    assert np.exp(log_stress(values, closure, settings)) == pytest.approx(stress, rel=1e-6)
 
 
 def test_pages_tell_it():

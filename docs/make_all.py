@@ -4,8 +4,8 @@ A task is a table that a command prints, and takes its place between the marks o
 page; or a picture of docs/pictures that a command draws; or a shipped scene, whose ablation goes to
 docs/data. `--list` prints all of them. Tasks of which no time is kept run two at a time, on one
 thread each; those that measure times come last, one by one: let nothing else run beside them. Each
-prints what it took. The table of YADE needs it installed. `timed` makes all that
-measure times, the tables of costs. A task that fails does not stop the others.
+prints what it took. `timed` makes all that measure times. A task that fails does not stop the
+others.
 """
 
 import os
@@ -28,10 +28,7 @@ TABLES = {
     "baselines": ("validation.md", "docs/measure/baselines.py"),
     "small-loads": ("accuracy.md", "docs/measure/tolerance.py --small --laws 4 --seed 5"),
 }
-TIMED = {
-    "price-list": ("accuracy.md", "docs/measure/price_list.py"),
-    "yade": ("particles.md", "docs/measure/yade.py"),
-}
+TIMED = {"price-list": ("accuracy.md", "docs/measure/price_list.py")}
 # picture: command that writes into FOLDER, and the file there
 PICTURES = {
     "moving.gif": ("docs/draw/moving.py FOLDER", "moving.gif"),

@@ -4,8 +4,8 @@ A task is a table that a command prints, and takes its place between the marks o
 page; or a picture of docs/pictures that a command draws; or a shipped scene, whose ablation goes to
 docs/data. `--list` prints all of them. Tasks of which no time is kept run two at a time, on one
 thread each; those that measure times come last, one by one: let nothing else run beside them. Each
-prints what it took. Tables of YADE and LAMMPS need these installed. `timed` makes all that
-measure times, the tables of costs. A task that fails does not stop the others.
+prints what it took. `timed` makes all that measure times. A task that fails does not stop the
+others.
 """
 
 import os
@@ -23,34 +23,12 @@ HERE = Path(__file__).parent
 SCENES = tuple(sorted(path.stem.partition("-")[2] for path in HERE.glob("data/ablation-*.csv")))
 # key: page, command; the first table that it prints goes to the page
 TABLES = {
-    "intervals": ("validation.md", "docs/measure/intervals.py --draws 40 --workers 1"),
     "held-out-few": ("validation.md", "docs/measure/held_out.py --draws 20 --few --workers 1"),
     "peak-residual": ("validation.md", "docs/measure/peak_residual.py"),
     "baselines": ("validation.md", "docs/measure/baselines.py"),
-    "friction-angles": ("validation.md", "docs/measure/angles.py"),
-    "tolerances": ("validation.md", "docs/measure/tolerance.py --laws 3 --seed 31 --plane"),
-    "matrix": ("validation.md", "docs/measure/recorded.py matrix"),
-    "exact": ("validation.md", "docs/measure/recorded.py exact"),
-    "forgetting": ("limits.md", "docs/measure/recorded.py forgetting"),
-    "impact": ("validation.md", "docs/measure/recorded.py impact"),
-    "named": ("accuracy.md", "docs/measure/named.py"),
     "small-loads": ("accuracy.md", "docs/measure/tolerance.py --small --laws 4 --seed 5"),
-    "plane": ("accuracy.md", "docs/measure/plane.py"),
-    "ingredients": ("accuracy.md", "docs/measure/ablations.py"),
-    "newmark": ("blocks.md", "docs/measure/shake.py"),
 }
-TIMED = {
-    "price-list": ("accuracy.md", "docs/measure/price_list.py"),
-    "savings": ("accuracy.md", "docs/measure/cost.py --rounds 25 --seconds 0.05"),
-    "peers-smooth": ("validation.md", "docs/measure/peers.py"),
-    "peers-rough": ("validation.md", "docs/measure/peers.py --preset westerly-rough"),
-    "native": ("native.md", "docs/measure/native.py"),
-    "joints": ("native.md", "docs/measure/native.py --joints"),
-    "blocks-price": ("blocks.md", "docs/measure/blocks.py"),
-    "yade": ("yade.md", "docs/measure/yade.py"),
-    "lammps": ("lammps.md", "docs/measure/lammps.py FOLDER --rounds 2 --steps 60 --settle 60"),
-    "lammps-scale": ("lammps.md", "docs/measure/lammps_scale.py FOLDER"),
-}
+TIMED = {"price-list": ("accuracy.md", "docs/measure/price_list.py")}
 # picture: command that writes into FOLDER, and the file there
 PICTURES = {
     "moving.gif": ("docs/draw/moving.py FOLDER", "moving.gif"),
@@ -145,7 +123,7 @@ def main():
     keys = TIMED if sys.argv[1:] == ["timed"] else sys.argv[1:] or TASKS
     if unknown := set(keys).difference(TASKS):
         sys.exit(f"no task {', '.join(sorted(unknown))}; --list prints all")
-    last = [key for key in keys if key == "ingredients" or key in TIMED]  # of the scenes' files
+    last = [key for key in keys if key in TIMED]
     with ThreadPoolExecutor(2) as pool:  # each waits for a process of its own
         done = list(pool.map(task, [key for key in keys if key not in last]))
     done += [task(key) for key in last]

@@ -1,4 +1,4 @@
-"""The table of the paper's claims on the page docs/paper.md, made from the tests of the claims.
+"""The table of the paper's claims on the page docs/theory.md, made from the tests of the claims.
 
 A docstring in tests/verification/test_paper_*.py holds one paragraph for each claim that its test
 decides: "PLACE: what the paper says", and from the next line that begins with one of VERDICTS on,
@@ -52,7 +52,7 @@ def figures():
 
 def fill(app, name, source):
     """Put the tables into the page where it asks for them, and lead its link to the figures."""
-    if name == "paper":
+    if name == "theory":
         source[0] = source[0].replace("paper/GALLERY_HEADER.rst", "figures/index.rst")
         source[0] = source[0].replace("<!-- claims -->", tables())
         source[0] = source[0].replace("<!-- figures -->", figures())

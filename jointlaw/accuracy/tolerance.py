@@ -18,7 +18,7 @@ from .suite import Suite, reference_resolution, scaled, standard_suite
 JointLaw: TypeAlias = Any  # of jointlaw.laws, which lies above
 
 # How many times better than the tolerance: 30 random laws then kept it on all paths that were not
-# tried, the worst at 0.88 of it (docs/validation.md, "Does the tolerance hold elsewhere?")
+# tried, the worst at 0.88 of it (docs/measure/tolerance.py)
 MARGIN = 1.75
 EXCURSIONS = 128  # random paths beside the standard ones: what others ask shows in few of them
 _LARGEST = 4  # times the sliders of the usual reference: the finest that is tried

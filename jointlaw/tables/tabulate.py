@@ -116,7 +116,7 @@ def _metadata(
         "largest_kt": kt,
         "critical_time_step": 2 / math.sqrt(max(kn, kt)),
         "critical_time_step_is": "s for 1 kg per m2 of joint: multiply by sqrt(reduced mass/area); "
-        "translation of one contact only, see docs/yade.md",
+        "translation of one contact only, see docs/particles.md",
         "law": law.to_toml(),
         "resolution_error_friction_angle": errors[3],
     }

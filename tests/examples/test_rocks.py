@@ -78,7 +78,7 @@ def test_dilation_is_what_holds_the_rough_slope():
 
 
 def test_a_scene_of_ones_own_from_the_template(tmp_path, capsys):
-    """new, edit as docs/scenes.md says, check, run, resume."""
+    """new, edit as docs/blocks.md says, check, run, resume."""
     file = tmp_path / "mine.toml"
     assert main(["new", str(file)]) == 0
     assert main(["new", str(file)]) == 2  # what is there stays there

@@ -100,7 +100,7 @@ def curve(times, values):
 
 def test_a_layer_that_is_not_level(finite_elements, tmp_path):
     """Turned by 30 degrees with all that moves it, by the lines of the page: the same stress."""
-    page = (Path(__file__).parents[2] / "docs" / "fem.md").read_text()
+    page = (Path(__file__).parents[2] / "docs" / "native.md").read_text()
     axes, vectors = re.findall(r"```xml\n(.*?)```", page, re.DOTALL)
     times, down, along = [0, 20, 70], [0.0, -2e-6, -2e-6], [0.0, 0.0, 3e-6]
     level = run(finite_elements, 2, moved(finite_elements, curve(times, down), curve(times, along)))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from lammps_host import HEAD, dumped, run, soft, thermo
 
-PAGE = Path(__file__).parents[2] / "docs" / "lammps.md"
+PAGE = Path(__file__).parents[2] / "docs" / "particles.md"
 R = 0.01
 AREA, MASS = np.pi * R**2, 2600 * 4 / 3 * np.pi * R**3
 STYLE = "pair_style jointlaw opening 1e-3\npair_coeff * * rock.jlaw"

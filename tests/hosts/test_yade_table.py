@@ -269,12 +269,12 @@ print("\\nRESULT " + json.dumps(
 
 
 def test_script_of_the_page(tmp_path):
-    """A sphere comes to rest on the joint, as printed in docs/yade.md.
+    """A sphere comes to rest on the joint, as printed in docs/particles.md.
 
     Damped to rest within 10 000 steps: what is left of the bounce was 0.02 %.
     """
     jl.export_yade(jl.presets.load("jing-replica"), tmp_path, azimuths=3, steps=10)
-    page = Path(__file__).parents[2] / "docs" / "yade.md"
+    page = Path(__file__).parents[2] / "docs" / "particles.md"
     block = page.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
     found = run_scene(tmp_path, block + ASK, preamble="")
     (area,), (traction,) = found["area"], found["traction"]

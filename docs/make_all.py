@@ -23,12 +23,21 @@ HERE = Path(__file__).parent
 SCENES = tuple(sorted(path.stem.partition("-")[2] for path in HERE.glob("data/ablation-*.csv")))
 # key: page, command; the first table that it prints goes to the page
 TABLES = {
+    "intervals": ("validation.md", "docs/measure/intervals.py --draws 40 --workers 1"),
     "held-out-few": ("validation.md", "docs/measure/held_out.py --draws 20 --few --workers 1"),
     "peak-residual": ("validation.md", "docs/measure/peak_residual.py"),
     "baselines": ("validation.md", "docs/measure/baselines.py"),
     "small-loads": ("accuracy.md", "docs/measure/tolerance.py --small --laws 4 --seed 5"),
 }
-TIMED = {"price-list": ("accuracy.md", "docs/measure/price_list.py")}
+TIMED = {
+    "price-list": ("accuracy.md", "docs/measure/price_list.py"),
+    "native": ("native.md", "docs/measure/native.py"),
+    "joints": ("native.md", "docs/measure/native.py --joints"),
+    "blocks-price": ("blocks.md", "docs/measure/blocks.py"),
+    "yade": ("particles.md", "docs/measure/yade.py"),
+    "lammps": ("particles.md", "docs/measure/lammps.py FOLDER --rounds 2 --steps 60 --settle 60"),
+    "lammps-scale": ("particles.md", "docs/measure/lammps_scale.py FOLDER"),
+}
 # picture: command that writes into FOLDER, and the file there
 PICTURES = {
     "moving.gif": ("docs/draw/moving.py FOLDER", "moving.gif"),

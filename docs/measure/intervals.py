@@ -10,14 +10,11 @@ are made by a law in cells and steps so fine that finer ones change it by 0.1 %;
 with cells as coarse as those of a simulation.
 """
 
-import argparse
-from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
-from tables import table
+from tables import asked, table
 
 import jointlaw as jl
 from jointlaw import ClosureCurve, ShearCurve
@@ -93,7 +90,7 @@ def closure_and_shear(rng: np.random.Generator) -> Fit:
     )
 
 
-CASES: dict[str, Callable[[np.random.Generator], Fit]] = {
+CASES = {
     "closure": closure,
     "shear": shear,
     "shear with opening": partial(shear, opening=True),
@@ -102,33 +99,14 @@ CASES: dict[str, Callable[[np.random.Generator], Fit]] = {
 }
 
 
-def draw(case: str, seed: tuple[int, int]) -> dict[str, tuple[bool, bool]]:
-    """For each parameter: does the interval hold the truth, and is it called identifiable?"""
-    fit = CASES[case](np.random.default_rng(seed))
-    out = {}
-    for name in fit.free:
-        if name in TRUTH:
-            low, high = fit.interval(name)
-            out[name] = low <= TRUTH[name] <= high, name in fit.identifiable
-    return out
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--draws", type=int, default=40, help="draws per case (40)")
-    parser.add_argument("--workers", type=int, default=None, help="processes (all cores)")
-    args = parser.parse_args()
-    rows = []
-    with ProcessPoolExecutor(args.workers) as pool:
-        for case in CASES:
-            found = pool.map(partial(draw, case), [(0, k) for k in range(args.draws)])
-            draws = list(track(found, case, args.draws))
-            for name in draws[0]:
-                held = sum(d[name][0] for d in draws)
-                known = sum(d[name][1] for d in draws)
-                rows.append([case, f"`{name}`", f"{held}/{len(draws)}", known])
-    print(table(HEAD, rows))
-
-
 if __name__ == "__main__":
-    main()
+    draws, rows = asked(__doc__, draws=40).draws, []
+    for case, fitted in CASES.items():
+        found = track(range(draws), case, draws)
+        fits = [fitted(np.random.default_rng((0, k))) for k in found]
+        for name in filter(TRUTH.__contains__, fits[0].free):
+            ends = [fit.interval(name) for fit in fits]
+            held = sum(low <= TRUTH[name] <= high for low, high in ends)
+            known = sum(name in fit.identifiable for fit in fits)
+            rows.append([case, f"`{name}`", f"{held}/{draws}", known])
+    print(table(HEAD, rows))

@@ -21,7 +21,6 @@ of all presets and of that many of the laws, in one plane; the largest error of 
 "balanced", of `at_tolerance(0.01)`, and of it with the `stress` at 0.01 closure ranges and at one.
 """
 
-import argparse
 import math
 import time
 from dataclasses import replace
@@ -29,7 +28,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from tables import table
+from tables import asked, table
 
 import jointlaw as jl
 from jointlaw.accuracy.slip import random_ways, slip
@@ -214,21 +213,10 @@ def small_rows(count: int, seed: int) -> list[list[Any]]:
     ]
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--laws", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--plane", action="store_true", help="none in space: ten times as fast")
-    parser.add_argument("--small", action="store_true", help="errors of paths of small loads")
-    options = parser.parse_args()
-    if options.small:
-        head = ["resolution", "sliders", *(f"{reach:g}" for reach in REACHES)]
-        print(table(head, small_rows(options.laws, options.seed)))
-        return
-    print(table(HEAD, rows(draw(options.laws, options.seed, options.plane))))
-
-
 if __name__ == "__main__":
-    main()
+    given = asked(__doc__, laws=100, seed=1, plane=False, small=False)
+    if given.small:
+        head = ["resolution", "sliders", *(f"{reach:g}" for reach in REACHES)]
+        print(table(head, small_rows(given.laws, given.seed)))
+    else:
+        print(table(HEAD, rows(draw(given.laws, given.seed, given.plane))))

@@ -71,7 +71,7 @@ logging.getLogger("skfem").setLevel(logging.WARNING)  # it tells every step that
 
 ORDER = (
     "first_curve", "closure_hysteresis", "closure_cycle", "direct_shear", "strength_envelope",
-    "bond", "damping", "mating", "fit_closure", "from_scan", "table",
+    "bond", "damping", "mating", "from_scan", "table",
     "batch", "blocks", "newton", "finite_elements", "snapshot",
 )  # fmt: skip
 

@@ -23,8 +23,8 @@ HERE = Path(__file__).parent
 SCENES = tuple(sorted(path.stem.partition("-")[2] for path in HERE.glob("data/ablation-*.csv")))
 # key: page, command; the first table that it prints goes to the page
 TABLES = {
-    "intervals": ("validation.md", "docs/measure/intervals.py --draws 40 --workers 1"),
-    "held-out-few": ("validation.md", "docs/measure/held_out.py --draws 20 --few --workers 1"),
+    "intervals": ("validation.md", "docs/measure/intervals.py"),
+    "held-out-few": ("validation.md", "docs/measure/held_out.py"),
     "peak-residual": ("validation.md", "docs/measure/peak_residual.py"),
     "baselines": ("validation.md", "docs/measure/baselines.py"),
     "friction-angles": ("validation.md", "docs/measure/angles.py"),
@@ -48,7 +48,7 @@ TIMED = {
     "joints": ("native.md", "docs/measure/native.py --joints"),
     "blocks-price": ("blocks.md", "docs/measure/blocks.py"),
     "yade": ("yade.md", "docs/measure/yade.py"),
-    "lammps": ("lammps.md", "docs/measure/lammps.py FOLDER --rounds 2 --steps 60 --settle 60"),
+    "lammps": ("lammps.md", "docs/measure/lammps.py FOLDER"),
     "lammps-scale": ("lammps.md", "docs/measure/lammps_scale.py FOLDER"),
 }
 # picture: command that writes into FOLDER, and the file there

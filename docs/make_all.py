@@ -87,7 +87,7 @@ def make(key):
             run(command, folder, key)
             shutil.copy(Path(folder) / made, HERE / "pictures" / key)
         elif key in SCENES:
-            run(f"docs/measure/ablations.py {key}", folder, key)
+            run(f"docs/measure/ablations.py --scene {key}", folder, key)
         else:
             page, command = tables[key]
             fill(page, key, first_table(run(command, folder, key)))

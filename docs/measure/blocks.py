@@ -8,6 +8,7 @@ last scenes are a slope 20 m high, cut ever finer; they start as drawn, without 
 
 import os
 import time
+from timeit import Timer
 
 os.environ |= {"JOINTLAW_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # read when numpy is loaded
 
@@ -39,14 +40,9 @@ step = 1e-4
 
 def least(step, seconds: float) -> float:
     """Least CPU time (s) of a step, over parts of a run."""
-    found = []
-    for _ in range(PARTS):
-        started, n = time.process_time(), 0
-        while time.process_time() < started + seconds / PARTS:
-            step()
-            n += 1
-        found.append((time.process_time() - started) / n)
-    return min(found)
+    timer = Timer(step, timer=time.process_time)
+    steps = max(1, round(seconds / PARTS / timer.timeit(1)))
+    return min(timer.repeat(PARTS, steps)) / steps
 
 
 def with_own_solver(scene) -> pymunk.Space:

@@ -27,7 +27,6 @@ from tables import asked, least, table
 import jointlaw as jl
 from jointlaw.hosts.c.export import include_dir, table_text
 
-os.environ["JOINTLAW_THREADS"] = "1"
 FLAGS = ["-O3", "-march=native", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math",
          "-Wno-psabi"]  # fmt: skip
 NAMES, PLACES = ("fast", "balanced", "fine"), {"plane": 0.0, "space": None}
@@ -82,6 +81,14 @@ def library(folder: Path, cc: str, *flags: str) -> ctypes.CDLL:
     return lib
 
 
+def once(batch, steps, clock, threads, tangent=False):
+    """Nanoseconds per joint of one update."""
+    os.environ["JOINTLAW_THREADS"] = threads
+    before = clock()
+    batch.update(next(steps), tangent=tangent)
+    return 1e9 * (clock() - before) / len(batch)
+
+
 def measure(law: jl.JointLaw, libs: dict[str, ctypes.CDLL], file: Path, rounds: int):
     """Least ns per update: column -> figure."""
     rng, start = np.random.default_rng(1), np.zeros((MOST, law.dim))
@@ -99,15 +106,9 @@ def measure(law: jl.JointLaw, libs: dict[str, ctypes.CDLL], file: Path, rounds: 
         return lambda: loop(read, states.ctypes.data, next(steps).ctypes.data, MOST, tangent)
 
     def in_python(ledger, tangent):
-        steps, batch = cycle(d), law.joints(MOST, ledger=ledger)
+        batch = law.joints(MOST, ledger=ledger)
         batch.update(start, tangent=False)
-
-        def once():
-            before = time.thread_time()
-            batch.update(next(steps), tangent=tangent)
-            return 1e9 * (time.thread_time() - before) / MOST
-
-        return once
+        return partial(once, batch, cycle(d), time.thread_time, "1", tangent)
 
     cases = {
         "C F, no ledger": in_c("bare", False),
@@ -132,22 +133,13 @@ def beyond_the_cache(rounds):
             batch, rng = law.joints(n, ledger=False), np.random.default_rng(1)
             d = rng.normal(0.0, 2e-8, (n, law.dim))
             batch.update(d + 1e-6 * np.eye(law.dim)[0], tangent=False)
-            best = least(
-                {threads: partial(once, batch, cycle([d, -d]), threads) for threads in "12"},
-                max(rounds * 10_000 // n, 6),
-            )
+            cases = {threads: partial(once, batch, cycle([d, -d]), time.perf_counter, threads)
+                     for threads in "12"}  # fmt: skip
+            best = least(cases, max(rounds * 10_000 // n, 6))
             cells += [f"{batch.bytes_per_joint * n / 1e6:.1f}"]
             cells += [f"{ns:.0f}" for ns in best.values()]
         rows.append([n, *cells])
     return rows
-
-
-def once(batch, steps, threads):
-    """Nanoseconds per joint of one update, by the clock."""
-    os.environ["JOINTLAW_THREADS"] = threads
-    before = time.perf_counter()
-    batch.update(next(steps), tangent=False)
-    return 1e9 * (time.perf_counter() - before) / len(batch)
 
 
 def main() -> None:

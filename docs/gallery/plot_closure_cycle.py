@@ -39,8 +39,7 @@ for label, one in (("yields", law), ("elastic", elastic)):
     loss[label] = 1 + trapezoid(record.F1[top:], record.closure[top:]) / up
     axis.plot((record.closure - seating) * 1e6, record.F1 / 1e6, label=label)
     print(f"{label}: the cycle loses {100 * loss[label]:.1f} % of its work of loading")
-axis.set_xlabel("closure since the test began (µm)")
-axis.set_ylabel("normal stress (MPa)")
+axis.set(xlabel="closure since the test began (µm)", ylabel="normal stress (MPa)")
 axis.legend()
 plt.show()
 
@@ -55,7 +54,6 @@ for k in range(3):
     rows = slice(120 * k, 120 * (k + 1) + 1)
     label = f"cycle {k + 1}, keeps {kept[k] * 1e6:.0f} µm in all"
     axis.plot(record.closure[rows] * 1e6, record.F1[rows] / 1e6, label=label)
-axis.set_xlabel("closure from first touch (µm)")
-axis.set_ylabel("normal stress (MPa)")
+axis.set(xlabel="closure from first touch (µm)", ylabel="normal stress (MPa)")
 axis.legend(loc="upper left")
 plt.show()

@@ -32,12 +32,10 @@ for a in (3.0, 2.0, 1.5):
     right.plot(np.arange(len(record)) / steps, record.dissipated, label=label)
     print(f"{label}: the second cycle loses {100 * loss[a]:.1f} % of its work of loading")
 
-left.set_xlabel("closure (µm)")
-left.set_ylabel("normal stress (MPa)")
+left.set(xlabel="closure (µm)", ylabel="normal stress (MPa)")
 left.legend()
-right.set_xlabel("branch: 10 MPa and back, then 20")
-right.set_ylabel("energy lost to friction (J/m²)")
-right.set_xticks(range(5))
+right.set(xlabel="branch: 10 MPa and back, then 20", ylabel="energy lost to friction (J/m²)",
+          xticks=range(5))  # fmt: skip
 plt.show()
 
 # %%

@@ -1,8 +1,8 @@
 """Nanoseconds per joint and update with an ingredient, and without it: the least of several rounds
 in which all cases take turns.
 
-Motion in one plane but where 3-D is named, random steps around a closure of 1 um, one thread. F:
-traction alone; FC: with tangent; +L: with the ledger.
+Motion in one plane but where 3-D is named, random steps around a closure of 1 um, one thread;
+traction alone but where a tangent or the ledger is named.
 """
 
 import os
@@ -17,8 +17,6 @@ from tables import asked, least, table
 import jointlaw as jl
 
 os.environ |= {"JOINTLAW_KERNEL": "native", "JOINTLAW_THREADS": "1"}
-# column: tangent, ledger
-COLUMNS = {"F": (False, False), "F+L": (False, True), "FC": (True, False), "FC+L": (True, True)}
 STEPS = 4  # different increments, so that no branch is learnt by heart
 SPACE = jl.JointLaw(
     orientation=jl.Orientation(3.0, 0.5, 0.0),
@@ -31,9 +29,9 @@ SPACE = jl.JointLaw(
 PLANE = replace(SPACE, plane=0.0)
 
 
-def once(law, n, column, seconds):
+def once(law, n, tangent, ledger, seconds):
     """Least ns per joint of single updates for a while; n joints: 1 by `Joint`, more by a batch."""
-    (tangent, ledger), rng = COLUMNS[column], np.random.default_rng(0)
+    rng = np.random.default_rng(0)
     d = rng.normal(0.0, 1e-7, (STEPS, n, law.dim)) * ([0.3] + [1.0] * (law.dim - 1))
     first, d = np.zeros((n, law.dim)), np.concatenate([d, -d])
     first[:, 0] = rng.uniform(5e-7, 1.5e-6, n)
@@ -50,19 +48,21 @@ def once(law, n, column, seconds):
 def savings(rounds, seconds):
     """Rows: one line for each ingredient that can be left out."""
 
-    def case(law, n=10_000, column="F"):
-        return law, n, column
+    def case(law, n=10_000, tangent=False, ledger=False):
+        return law, n, tangent, ledger
 
     space, plane = case(SPACE), case(PLANE)
     closure = case(replace(SPACE, closure_only=True))
     linear = replace(PLANE, asperity=replace(PLANE.asperity, eta=0.0))
     pairs = {
         "one `Joint` by Python, in a batch (tangent, ledger)": (
-            case(PLANE, n=1, column="FC+L"), case(PLANE, column="FC+L"),
+            case(PLANE, n=1, tangent=True, ledger=True), case(PLANE, tangent=True, ledger=True),
         ),
-        "no tangent (3-D, with ledger)": (case(SPACE, column="FC+L"), case(SPACE, column="F+L")),
-        "no tangent (one plane)": (case(PLANE, column="FC"), plane),
-        "no ledger (one plane)": (case(PLANE, column="F+L"), plane),
+        "no tangent (3-D, with ledger)": (
+            case(SPACE, tangent=True, ledger=True), case(SPACE, ledger=True),
+        ),
+        "no tangent (one plane)": (case(PLANE, tangent=True), plane),
+        "no ledger (one plane)": (case(PLANE, ledger=True), plane),
         "motion in one plane, of 3-D": (space, plane),
         "closure only, of 3-D": (space, closure),
         "closure only, of one plane": (plane, closure),

@@ -21,7 +21,6 @@ from jointlaw.joints.state import JointState
 
 HEAD = ["step (mating lengths)", "one step", "there and back", "in tenths", "triangle", "in tenths",
         "trapezoid", "in tenths"]  # fmt: skip
-SIZES = 1.0, 0.25, 0.1, 0.01
 SIDE, ROUNDS = 8, 4
 # corners that are free beside the first two, steps from one to the next, rounds
 STEP, BACK, TRIANGLE = (1, 1, 0), (1, 1, ROUNDS), (2, SIDE, 1)
@@ -125,7 +124,7 @@ def largest(size, seed):
 
 if __name__ == "__main__":
     laws, rows = asked(__doc__, laws=60).laws, []
-    for size in SIZES:
+    for size in (1.0, 0.25, 0.1, 0.01):
         found = [largest(size, seed) for seed in range(laws)]
         rows.append([f"{size:g}", *(f"{most:.1e}" for most in np.max(found, axis=0))])
     print(table(HEAD, rows))

@@ -11,14 +11,13 @@ with cells as coarse as those of a simulation.
 """
 
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 from tables import asked, table
 
 import jointlaw as jl
 from jointlaw import ClosureCurve, ShearCurve
-from jointlaw.calibration.fit import Fit
 from jointlaw.support.progress import track
 
 HEAD = ["curves", "parameter", "interval contains the true value", "called identifiable"]
@@ -55,36 +54,28 @@ def exact(azimuth: float) -> tuple[np.ndarray, np.ndarray]:
     return clean.predict(replace(law(), plane=azimuth, resolution=CONVERGED), STEPS)
 
 
-def shear_curve(
-    rng: np.random.Generator, azimuth: float = 0.0, opening: bool = False
-) -> ShearCurve:
+def shear_curve(rng: np.random.Generator, azimuth: float, opening: bool) -> ShearCurve:
     """A shear test of the truth."""
     tau, up = (x + NOISE * x.max() * rng.standard_normal(x.size) for x in exact(azimuth))
     return ShearCurve(SHEAR, tau, NORMAL, azimuth, opening=up if opening else None)
 
 
-def closure(rng: np.random.Generator) -> Fit:
+def closure(rng: np.random.Generator):
     """Closure alone, alpha known from a scan."""
     curve = closure_curve(rng)
     return jl.fit_curves([curve], fixed={"alpha": ALPHA}, free=("asperity_density", "beta"))
 
 
-def shear(rng: np.random.Generator, opening: bool = False) -> Fit:
-    """One direction of shear, also with the opening of the joint."""
-    curve = shear_curve(rng, opening=opening)
-    return jl.fit_curves([curve], law=law(mu=0.6, a=2.6), free=("mu", "a"))
+def shear(rng: np.random.Generator, *azimuths: float, opening: bool = True, **start: float):
+    """Shear in some directions, with the opening of the joint; start: of more free parameters."""
+    curves = [shear_curve(rng, azimuth, opening) for azimuth in azimuths]
+    return jl.fit_curves(curves, law=law(mu=0.6, a=2.6, **start), free=("mu", "a", *start))
 
 
-def two_shears(rng: np.random.Generator) -> Fit:
-    """Shear along the rough direction and across it, with opening."""
-    curves = [shear_curve(rng, azimuth, opening=True) for azimuth in (0.0, np.pi / 2)]
-    return jl.fit_curves(curves, law=law(mu=0.6, a=2.6, c=0.0), free=("mu", "a", "c"))
-
-
-def closure_and_shear(rng: np.random.Generator) -> Fit:
+def closure_and_shear(rng: np.random.Generator):
     """Both tests of one joint, alpha known from a scan, with opening."""
     return jl.fit_curves(
-        [closure_curve(rng), shear_curve(rng, opening=True)],
+        [closure_curve(rng), shear_curve(rng, 0.0, opening=True)],
         law=law(mu=0.6, a=2.6, beta=1.5e-5, asperity_density=1.5e6),
         free=("asperity_density", "beta", "mu", "a"),
     )
@@ -92,9 +83,9 @@ def closure_and_shear(rng: np.random.Generator) -> Fit:
 
 CASES = {
     "closure": closure,
-    "shear": shear,
-    "shear with opening": partial(shear, opening=True),
-    "two shears": two_shears,
+    "shear": lambda rng: shear(rng, 0.0, opening=False),
+    "shear with opening": lambda rng: shear(rng, 0.0),
+    "two shears": lambda rng: shear(rng, 0.0, np.pi / 2, c=0.0),
     "closure and shear": closure_and_shear,
 }
 

@@ -72,7 +72,6 @@ OWN = {
     "granular, mindlin": ("off", "pair_style granular\npair_coeff * * hertz/material 1e9 0.5 0.3 "
                           "tangential mindlin NULL 1.0 0.4 damping viscoelastic"),
 }  # fmt: skip
-RESOLUTIONS = "fast", "balanced", "fine"
 HEAD = ["pair style, resolution", "contacts", "pair style, ns per contact and step",
         "the same / mindlin", "whole step, ns", "2 processors: pair style, ns",
         "speed-up of the step", "bytes per contact"]  # fmt: skip
@@ -128,7 +127,7 @@ def main():
     where = options.folder
     prepare(where)
     styles, sizes = dict(OWN), {}
-    for r in RESOLUTIONS:
+    for r in ("fast", "balanced", "fine"):
         file = f"rock-{r}.jlaw"
         (where / file).write_text(table_text(rock(r)))
         name = f"jointlaw, {r}"

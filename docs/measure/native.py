@@ -29,7 +29,7 @@ from jointlaw.hosts.c.export import include_dir, table_text
 
 FLAGS = ["-O3", "-march=native", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math",
          "-Wno-psabi"]  # fmt: skip
-NAMES, PLACES = ("fast", "balanced", "fine"), {"plane": 0.0, "space": None}
+PLACES = {"plane": 0.0, "space": None}
 MOST = 4000  # joints of a batch
 LOOP = (
     f"#define MOST {MOST}\n"
@@ -155,7 +155,7 @@ def main() -> None:
         libs = {"C": library(folder, options.cc),
                 "bare": library(folder, options.cc, "-DJOINTLAW_NO_LEDGER"),
                 "many": library(folder, options.cc, "-DJOINTLAW_MANY")}  # fmt: skip
-        for resolution in NAMES:
+        for resolution in ("fast", "balanced", "fine"):
             for where, plane in PLACES.items():
                 law = replace(preset, resolution=resolution, plane=plane)
                 best = measure(law, libs, folder / "law.jlaw", options.rounds)

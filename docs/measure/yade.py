@@ -105,8 +105,8 @@ def measure(law, kinds, contacts=20_000, runs=60):
         export_yade(law, folder)
         for resolution in set(kinds) & set(NAMED):
             replace(law, resolution=resolution).to_toml(Path(folder) / f"{resolution}.toml")
-        overlap = 0.2 * law.closure_range
-        scene = SCENE.format(contacts=contacts, runs=runs, overlap=overlap, kinds=kinds)
+        scene = SCENE.format(contacts=contacts, runs=runs, kinds=kinds,
+                              overlap=0.2 * law.closure_range)  # fmt: skip
         (Path(folder) / "scene.py").write_text(scene)
         env = os.environ | {
             "OMP_NUM_THREADS": "1",

@@ -2,10 +2,11 @@
 
 A task is a table that a command prints, and takes its place between the marks of that name in a
 page; or a picture of docs/pictures that a command draws; or a shipped scene, whose ablation goes to
-docs/data. `--list` prints all of them. Tasks of which no time is kept run two at a time, on one
-thread each; those that measure times come last, one by one: let nothing else run beside them. Each
-prints what it took. Tables of YADE and LAMMPS need these installed. `timed` makes all that
-measure times, the tables of costs. A task that fails does not stop the others.
+docs/data. `--list` prints all of them: key, page or file that the command writes, command. Tasks of
+which no time is kept run two at a time, on one thread each; those that measure times come last, one
+by one: let nothing else run beside them. Each prints what it took. Tables of YADE and LAMMPS need
+these installed. `timed` makes all that measure times, the tables of costs. A task that fails does
+not stop the others.
 """
 
 import os

@@ -70,8 +70,8 @@ python_use_unqualified_type_names = True
 logging.getLogger("skfem").setLevel(logging.WARNING)  # it tells every step that it takes
 
 ORDER = (
-    "first_curve", "closure_hysteresis", "closure_cycle", "direct_shear", "strength_envelope",
-    "bond", "damping", "mating", "fit_closure", "from_scan", "table",
+    "first_curve", "closure_cycle", "direct_shear", "strength_envelope",
+    "bond", "damping", "mating", "from_scan", "table",
     "batch", "blocks", "newton", "finite_elements", "snapshot",
 )  # fmt: skip
 

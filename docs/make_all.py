@@ -2,10 +2,11 @@
 
 A task is a table that a command prints, and takes its place between the marks of that name in a
 page; or a picture of docs/pictures that a command draws; or a shipped scene, whose ablation goes to
-docs/data. `--list` prints all of them. Tasks of which no time is kept run two at a time, on one
-thread each; those that measure times come last, one by one: let nothing else run beside them. Each
-prints what it took. `timed` makes all that measure times. A task that fails does not stop the
-others.
+docs/data. `--list` prints all of them: key, page or file that the command writes, command. Tasks of
+which no time is kept run two at a time, on one thread each; those that measure times come last, one
+by one: let nothing else run beside them. Each prints what it took. Tables of YADE and LAMMPS need
+these installed. `timed` makes all that measure times, the tables of costs. A task that fails does
+not stop the others.
 """
 
 import os
@@ -20,11 +21,10 @@ from pathlib import Path
 from threading import Lock
 
 HERE = Path(__file__).parent
-SCENES = tuple(sorted(path.stem.partition("-")[2] for path in HERE.glob("data/ablation-*.csv")))
-# key: page, command; the first table that it prints goes to the page
+# key: where it goes, and the command; the first table that it prints goes to a page
 TABLES = {
-    "intervals": ("validation.md", "docs/measure/intervals.py --draws 40 --workers 1"),
-    "held-out-few": ("validation.md", "docs/measure/held_out.py --draws 20 --few --workers 1"),
+    "intervals": ("validation.md", "docs/measure/intervals.py"),
+    "held-out-few": ("validation.md", "docs/measure/held_out.py"),
     "peak-residual": ("validation.md", "docs/measure/peak_residual.py"),
     "baselines": ("validation.md", "docs/measure/baselines.py"),
     "small-loads": ("accuracy.md", "docs/measure/tolerance.py --small --laws 4 --seed 5"),
@@ -35,49 +35,52 @@ TIMED = {
     "joints": ("native.md", "docs/measure/native.py --joints"),
     "blocks-price": ("blocks.md", "docs/measure/blocks.py"),
     "yade": ("particles.md", "docs/measure/yade.py"),
-    "lammps": ("particles.md", "docs/measure/lammps.py FOLDER --rounds 2 --steps 60 --settle 60"),
+    "lammps": ("particles.md", "docs/measure/lammps.py FOLDER"),
     "lammps-scale": ("particles.md", "docs/measure/lammps_scale.py FOLDER"),
 }
-# picture: command that writes into FOLDER, and the file there
+# the file that a command writes into FOLDER becomes the picture
 PICTURES = {
-    "moving.gif": ("docs/draw/moving.py FOLDER", "moving.gif"),
+    "moving.gif": ("moving.gif", "docs/draw/moving.py FOLDER"),
     **{
-        f"{name}.png": ("docs/draw/why.py FOLDER", f"{name}.png")
+        f"{name}.png": (f"{name}.png", "docs/draw/why.py FOLDER")
         for name in ("three-laws", "along-across", "jrc", "strength-surface")
     },
-    "axes.png": ("docs/draw/axes.py FOLDER", "axes.png"),
+    "axes.png": ("axes.png", "docs/draw/axes.py FOLDER"),
     "shear.png": (
+        "shear.png",
         "-m jointlaw shear biegel-rough --normal-stress 10MPa --to 2um --reverse=-2um "
         "--resolution fine --out FOLDER",
-        "shear.png",
     ),
-    "tilt.png": ("docs/draw/tilt.py FOLDER", "tilt.png"),
-    "slope.png": ("-m dem_demo slope --out FOLDER", "final.png"),
-    "slope.gif": ("-m dem_demo slope --out FOLDER", "motion.gif"),
-    "shear-box.png": ("-m dem_demo shear-box --out FOLDER", "curves.png"),
-    "strength.png": ("-m dem_demo strength-reduction slope --out FOLDER", "failing-rough.png"),
-    "wet-slope.png": ("-m dem_demo wet-slope --out FOLDER", "final.png"),
-    "tunnel.png": ("-m dem_demo tunnel --out FOLDER", "final.png"),
-    "shaken-slope.png": ("docs/draw/shaken_slope.py FOLDER", "shaken-slope.png"),
-    "fit.png": ("-m jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out FOLDER", "fit.png"),
+    "tilt.png": ("tilt.png", "docs/draw/tilt.py FOLDER"),
+    "slope.png": ("final.png", "-m dem_demo slope --out FOLDER"),
+    "slope.gif": ("motion.gif", "-m dem_demo slope --out FOLDER"),
+    "shear-box.png": ("curves.png", "-m dem_demo shear-box --out FOLDER"),
+    "strength.png": (
+        "failing-rough.png",
+        "-m dem_demo strength-reduction slope --out FOLDER",
+    ),
+    "wet-slope.png": ("final.png", "-m dem_demo wet-slope --out FOLDER"),
+    "tunnel.png": ("final.png", "-m dem_demo tunnel --out FOLDER"),
+    "shaken-slope.png": ("shaken-slope.png", "docs/draw/shaken_slope.py FOLDER"),
+    "fit.png": ("fit.png", "-m jointlaw fit grimsel_vd1_closure --up-to 5.3MPa --out FOLDER"),
 }
+SCENES = {  # the command writes to docs/data itself
+    scene: ("docs/data", f"docs/measure/ablations.py --scene {scene}")
+    for scene in sorted(path.stem.partition("-")[2] for path in HERE.glob("data/ablation-*.csv"))
+}
+TASKS = TABLES | PICTURES | SCENES | TIMED
 LOCK = Lock()  # of the pages: two tasks may fill the same one
-TASKS = (*TABLES, *PICTURES, *SCENES, *TIMED)
 
 
 def make(key):
     """Run the command of a task and store what it makes."""
-    tables = TABLES | TIMED
+    place, command = TASKS[key]
     with tempfile.TemporaryDirectory() as folder:
+        printed = run(command, folder, key)
         if key in PICTURES:
-            command, made = PICTURES[key]
-            run(command, folder, key)
-            shutil.copy(Path(folder) / made, HERE / "pictures" / key)
-        elif key in SCENES:
-            run(f"docs/measure/ablations.py {key}", folder, key)
-        else:
-            page, command = tables[key]
-            fill(page, key, first_table(run(command, folder, key)))
+            shutil.copy(Path(folder) / place, HERE / "pictures" / key)
+        elif key not in SCENES:
+            fill(place, key, first_table(printed))
 
 
 def run(command, folder, key):
@@ -124,15 +127,13 @@ def task(key):
 
 def main():
     if "--list" in sys.argv:
-        for key, (page, command) in (TABLES | TIMED).items():
-            print(f"{key}\t{page}\t{command}")
-        for key in (*PICTURES, *SCENES):
-            print(f"{key}\tpicture or scene")
+        for key, (place, command) in TASKS.items():
+            print(f"{key}\t{place}\t{command}")
         return
     keys = TIMED if sys.argv[1:] == ["timed"] else sys.argv[1:] or TASKS
     if unknown := set(keys).difference(TASKS):
         sys.exit(f"no task {', '.join(sorted(unknown))}; --list prints all")
-    last = [key for key in keys if key in TIMED]
+    last = [key for key in keys if key == "ingredients" or key in TIMED]  # of the scenes' files
     with ThreadPoolExecutor(2) as pool:  # each waits for a process of its own
         done = list(pool.map(task, [key for key in keys if key not in last]))
     done += [task(key) for key in last]

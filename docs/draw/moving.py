@@ -31,26 +31,13 @@ STUCK, SLIDING, APART = "#1f6fd0", "#c95500", "#8a8a8a"
 LARGE = {"font.size": 15, "legend.fontsize": 14, "axes.labelsize": 15, "lines.linewidth": 2.0}
 
 
-class Face(NamedTuple):
-    """A face of the drawn profiles."""
+class Faces(NamedTuple):
+    """The faces of the drawn profiles, from left to right: (TEETH,) each."""
 
-    place: int
-    facet: int
-    cell: int
-    tilt: float  # rad, upward in the direction of slip
-    gap: float  # m, before the joint was closed
-
-
-class Moment(NamedTuple):
-    """What a frame shows: m, Pa, J/m2, and a colour for each face."""
-
-    slip: float
-    start: float  # of the closure
-    closure: float
-    stress: float
-    stored: float
-    lost: float
-    colours: list[str]
+    facet: np.ndarray
+    cell: np.ndarray
+    tilt: np.ndarray  # rad, upward in the direction of slip
+    gap: np.ndarray  # m, before the joint was closed
 
 
 def choose(law):
@@ -60,132 +47,110 @@ def choose(law):
     along = np.flatnonzero(np.abs(k.n[2]) < 0.6 * np.abs(np.sin(tilt)) + 0.05)
     sides = [[i for i in along[np.argsort(sign * tilt[along])] if sign * tilt[i] > 0.05]
              for sign in (1, -1)]  # fmt: skip
-    faces = []
-    for j in range(TEETH):
-        facet = sides[j % 2][(2 * (j // 2) + j // 4) % len(sides[j % 2])]
-        gaps = k.c1[facet] * k.depth[facet, :-1]
-        cell = (3 * j + j // 2) % max(1, np.sum(gaps < 1.5 * law.closure(STRESS)))
-        faces.append(Face(j, facet, cell, tilt[facet], gaps[cell]))
-    return faces
+    facet = np.array([sides[j % 2][(2 * (j // 2) + j // 4) % len(sides[j % 2])]
+                      for j in range(TEETH)])  # fmt: skip
+    gaps, j = k.c1[facet, None] * k.depth[facet, :-1], np.arange(TEETH)
+    near = np.sum(gaps < 1.5 * law.closure(STRESS), axis=1)
+    cell = (3 * j + j // 2) % np.maximum(near, 1)
+    return Faces(facet, cell, tilt[facet], gaps[j, cell])
 
 
-def states(joint, faces):
-    """Colour of each face."""
-    k = joint.law.tables.asperities
+def colours(joint, faces):
+    """Colour of each face by its state."""
+    k, chosen = joint.law.tables.asperities, faces[:2]
     now = parts(joint.law.tables, joint.snapshot().values.T)
     found = cells(k, effective_closure(k, now.delta, now.slopes))
-    size = np.hypot(*now.q)
     limit = strength(k, planes(k, now.delta[1:], now.slopes).gamma)
-    slides = at_limit(size, limit, found.G, found.force)[:, :, 0]
-    touches = found.y > k.depth[:, :-1]
-    return [
-        (SLIDING if slides[f.facet, f.cell] else STUCK) if touches[f.facet, f.cell] else APART
-        for f in faces
-    ]
+    slides = at_limit(np.hypot(*now.q), limit, found.G, found.force)[:, :, 0][chosen]
+    touches = (found.y > k.depth[:, :-1])[chosen]
+    return np.where(touches, np.where(slides, SLIDING, STUCK), APART)
 
 
 def run(law, faces):
-    """The moments of the test."""
-    joint, moments, slip = law.joint(), [], 0.0
-    length = float(law.closure(STRESS))
+    """The test by frames: columns of its record, with the slip as `shear`, and colours."""
+    joint, length, frames, states = law.joint(), float(law.closure(STRESS)), [], []
     for leg in LEGS:
         count = round(FRAMES * abs(leg))
         for _ in range(count):
-            step = leg * length / count
-            now = jl.direct_shear(joint, step, normal=STRESS, steps=5)
-            slip += step
-            last = [x[-1] for x in (now.closure, now.shear_stress, now.stored, now.dissipated)]
-            moments.append(Moment(slip, length, *last, states(joint, faces)))
-    return moments
+            now = jl.direct_shear(joint, leg * length / count, normal=STRESS, steps=5)
+            frames.append([x[-1] for x in (now.shear, now.closure, now.shear_stress, now.stored,
+                                           now.dissipated)])  # fmt: skip
+            states.append(colours(joint, faces))
+    return np.transpose(frames), states
 
 
-def tips(faces, moment, zoom):
-    """Ground under the faces, (TEETH + 1, 2), and the middles of the tips above it, (TEETH, 2)."""
-    tilt, gap = np.array([f.tilt for f in faces]), np.array([f.gap for f in faces])
-    ground = np.stack([np.arange(TEETH + 1.0), np.cumsum([0.0, *np.tan(tilt)])], -1)
-    above = np.stack([-np.sin(tilt), np.cos(tilt)], -1) * (zoom * gap + ROUND)[:, None]
-    moved = zoom * np.array([moment.slip, -moment.closure])
-    return ground, 0.5 * (ground[1:] + ground[:-1]) + above + moved
-
-
-def draw_blocks(axes, faces, moment, zoom):
+def draw_blocks(axes, faces, slip, closure, start, states, zoom):
     """Ramps with the inclinations of the facets, and over each a tip of the upper block.
 
-    Where a tip is pressed against its ramp it lies behind it.
+    start: closure (m) from which the upper block is drawn as high as the picture. Where a tip is
+    pressed against its ramp it lies behind it.
     """
-    ground, middle = tips(faces, moment, zoom)
+    tilt, place = faces.tilt, np.arange(TEETH)
+    ground = np.stack([np.arange(TEETH + 1.0), np.cumsum([0.0, *np.tan(tilt)])], -1)
+    along = np.stack([np.cos(tilt), np.sin(tilt)], -1)
+    normal = np.stack([-np.sin(tilt), np.cos(tilt)], -1)
+    middle = 0.5 * (ground[1:] + ground[:-1]) + normal * (zoom * faces.gap + ROUND)[:, None]
+    middle += zoom * np.array([slip, -closure])
     turn, top = np.linspace(np.pi, 2 * np.pi, 24), ground[:, 1].max() + 0.22
-    top -= zoom * (moment.closure - moment.start)
-    arcs = middle[:, None] + ROUND * np.stack([np.cos(turn), np.sin(turn)], -1)
-    feet = zip(middle[:, 0], arcs, strict=True)
-    tooth = [[(x - 0.4, top), *arc, (x + 0.4, top)] for x, arc in feet]
-    outline = np.concatenate([[(-1, top)], *tooth, [(TEETH + 1, top)]])
-    parts = (outline, 2.0, "#e6e1d7"), (ground, -1.0, "#cfc8bb")
-    for order, (line, edge, colour) in enumerate(parts):
+    top -= zoom * (closure - start)
+    tips = middle[:, None] + ROUND * np.stack([np.cos(turn), np.sin(turn)], -1)
+    teeth = [
+        [(x - 0.4, top), *tip, (x + 0.4, top)] for x, tip in zip(middle[:, 0], tips, strict=True)
+    ]
+    outline = np.concatenate([[(-1, top)], *teeth, [(TEETH + 1, top)]])
+    for order, (line, edge, colour) in enumerate(
+        ((outline, 2.0, "#e6e1d7"), (ground, -1.0, "#cfc8bb"))
+    ):
         axes.fill_between(*line.T, edge, color=colour, lw=0, zorder=order)
         axes.plot(*line.T, color="0.45", lw=1, zorder=order)
-    for face, (x, z), colour in zip(faces, middle, moment.colours, strict=True):
-        along = np.array([np.cos(face.tilt), np.sin(face.tilt)])
-        floor = ground[face.place, 1] + (x - face.place) * np.tan(face.tilt)
-        foot = min(ROUND, (z - floor) * np.cos(face.tilt))  # along the normal, from ramp to middle
-        at = np.array([x, z]) + foot * np.array([np.sin(face.tilt), -np.cos(face.tilt)])
-        ends = at + np.outer([-0.11, 0.11], along)
-        axes.plot(*ends.T, color=colour, lw=7, solid_capstyle="round")
-    for i, (name, colour) in enumerate(
-        (("stuck", STUCK), ("sliding", SLIDING), ("separated", APART))
-    ):
-        axes.text(0.22 + 0.28 * i, 0.95, name, color=colour, weight="bold", ha="center", va="top",
+    floor = ground[:-1, 1] + (middle[:, 0] - place) * np.tan(tilt)
+    foot = np.minimum(ROUND, (middle[:, 1] - floor) * np.cos(tilt))  # along the normal, to the ramp
+    at = middle - foot[:, None] * normal
+    for a, b, colour in zip(at - 0.11 * along, at + 0.11 * along, states, strict=True):
+        axes.plot(*np.transpose([a, b]), color=colour, lw=7, solid_capstyle="round")
+    for x, name, colour in ((0.22, "stuck", STUCK), (0.5, "sliding", SLIDING),
+                            (0.78, "separated", APART)):  # fmt: skip
+        axes.text(x, 0.95, name, color=colour, weight="bold", ha="center", va="top",
                   transform=axes.transAxes)  # fmt: skip
     axes.plot([0.6, 0.6 + zoom * BAR], [-0.3, -0.3], color="k", lw=3)
     axes.text(0.7 + zoom * BAR, -0.3, f"{1e6 * BAR:g} µm", va="center")
     axes.set(xlim=(0.5, TEETH - 0.5), ylim=(-0.4, 1.35), xticks=[], yticks=[])
 
 
-def draw_curve(axes, moments, all_moments, lines, label):
-    """Lines up to this moment against slip, in axes that hold all of the test."""
-    slip = np.array([m.slip for m in all_moments]) * 1e6
-    for of, colour in lines:
-        values = np.array([of(m) for m in all_moments])
-        axes.plot(slip, values, color=colour, alpha=0.12)
-        axes.plot(slip[: len(moments)], values[: len(moments)], color=colour)
-        axes.plot(slip[len(moments) - 1], values[len(moments) - 1], "o", color=colour, ms=8)
+def draw_curve(axes, i, slip, label, *lines):
+    """Lines (values, colour) up to frame i against slip (m), in axes that hold all of the test."""
+    for values, colour in lines:
+        axes.plot(1e6 * slip, values, color=colour, alpha=0.12)
+        axes.plot(1e6 * slip[: i + 1], values[: i + 1], color=colour)
+        axes.plot(1e6 * slip[i], values[i], "o", color=colour, ms=8)
     axes.set(xlabel="slip (µm)", xticks=[-0.5, 0, 0.5], xticklabels=["−0.5", "0", "0.5"])
     axes.set_title(label, fontsize=15, loc="left")
     axes.grid(alpha=0.3)
 
 
-def frame(plt, faces, moments, all_moments):
-    """One picture."""
-    now, start = moments[-1], all_moments[0].closure
-    figure, axes = plt.subplot_mosaic("AAA;BCD", figsize=(7.8, 5.4), height_ratios=(1, 1))
-    draw_blocks(axes["A"], faces, now, 0.36 / max(m.slip for m in all_moments))
-    draw_curve(axes["B"], moments, all_moments, [(lambda m: m.stress / 1e6, "k")],
-               "shear stress (MPa)")  # fmt: skip
-    draw_curve(axes["C"], moments, all_moments, [(lambda m: 1e9 * (start - m.closure), "k")],
-               "dilation (nm)")  # fmt: skip
-    energies = [(lambda m: m.stored, STUCK), (lambda m: m.lost, SLIDING)]
-    draw_curve(axes["D"], moments, all_moments, energies, "energy (J/m²)")
-    axes["D"].text(0.04, 0.96, "lost", color=SLIDING, transform=axes["D"].transAxes, va="top")
-    axes["D"].text(0.04, 0.28, "stored", color=STUCK, transform=axes["D"].transAxes, va="top")
-    figure.canvas.draw()
-    image = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())[..., :3].copy())
-    plt.close(figure)
-    return image
-
-
 def main(folder):
     law = replace(jl.presets.load("biegel-rough"), resolution="fine")
-    faces = choose(law)
-    moments = run(law, faces)
+    faces, start, images = choose(law), float(law.closure(STRESS)), []
+    (slip, closure, stress, stored, lost), states = run(law, faces)
     with style() as plt:
         plt.rcParams.update(LARGE)
-        plt.rcParams["figure.dpi"] = 100
-        images = [frame(plt, faces, moments[: i + 1], moments) for i in range(len(moments))]
+        figure, axes = plt.subplot_mosaic("AAA;BCD", figsize=(7.8, 5.4), dpi=100)
+        for i, state in enumerate(states):
+            for one in axes.values():
+                one.clear()
+            draw_blocks(axes["A"], faces, slip[i], closure[i], start, state, 0.36 / slip.max())
+            draw_curve(axes["B"], i, slip, "shear stress (MPa)", (stress / 1e6, "k"))
+            dilation = 1e9 * (closure[0] - closure)
+            draw_curve(axes["C"], i, slip, "dilation (nm)", (dilation, "k"))
+            draw_curve(axes["D"], i, slip, "energy (J/m²)", (stored, STUCK), (lost, SLIDING))
+            for y, name, colour in ((0.96, "lost", SLIDING), (0.28, "stored", STUCK)):
+                axes["D"].text(0.04, y, name, color=colour, transform=axes["D"].transAxes, va="top")
+            figure.canvas.draw()
+            images.append(Image.fromarray(np.array(figure.canvas.buffer_rgba())[..., :3]))
     palette = images[len(images) // 2].quantize(64)
-    small = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
-    path = folder / "moving.gif"
-    small[0].save(path, save_all=True, append_images=small[1:], duration=80, loop=0, optimize=True)
-    print(f"{path}: {len(small)} frames, {path.stat().st_size / 1e6:.1f} MB")
+    first, *others = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    first.save(folder / "moving.gif", save_all=True, append_images=others, duration=80, loop=0,
+               optimize=True)  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from scipy.integrate import trapezoid
 from scipy.optimize import least_squares
 
 import jointlaw as jl
+from jointlaw.calibration.field import peak_displacement
 from jointlaw.support.pyplot import style
 
 STRESS, REACH, STEPS = 10e6, 0.6e-6, 150
@@ -113,11 +114,12 @@ def along_across(plt):
     for k, colour in enumerate((OURS, OTHER)):
         axes.plot(path, ours[:, k], color=colour)
         axes.plot(path, theirs[:, k], color=COULOMB, alpha=0.6, ls=("-", "--")[k], lw=1.8)
-    axes.text(0.58, 6.3, "along axis 2", color=OURS, ha="right", weight="bold")
-    axes.text(1.2, 4.9, "along axis 3", color=OTHER, ha="right", weight="bold")
-    axes.text(
-        1.2, 0.3, "Coulomb, fitted to the first 0.6 µm", color=COULOMB, ha="right", weight="bold"
-    )
+    for x, y, text, colour in (
+        (0.58, 6.3, "along axis 2", OURS),
+        (1.2, 4.9, "along axis 3", OTHER),
+        (1.2, 0.3, "Coulomb, fitted to the first 0.6 µm", COULOMB),
+    ):
+        axes.text(x, y, text, color=colour, ha="right", weight="bold")
     axes.axvline(REACH * 1e6, color="0.5", ls=":")
     axes.set(xlabel="slip (µm): first along axis 2, then along axis 3", ylabel="shear stress (MPa)")
     return figure
@@ -127,7 +129,7 @@ def jrc(plt):
     """Shear stress over normal stress, at three normal stresses."""
     law = jl.from_field(jrc=JRC, jcs=JCS, length=0.1, normal_stress=1e6, normal_stiffness=30e9,
                         basic_friction=np.radians(BASIC))  # fmt: skip
-    peak = 0.1 / 500 * (JRC / 0.1) ** 0.33 * 1e3  # mm, Barton & Bandis 1982
+    peak = 1e3 * peak_displacement(JRC, 0.1)  # mm
     figure, axes = plt.subplots(figsize=(7.8, 4.6))
     for stress, shade in zip(STRESSES, (1.0, 0.65, 0.4), strict=True):
         record = jl.direct_shear(law.joint(), 4e-3, stress, steps=300)
@@ -190,8 +192,7 @@ def main(folder):
             }
         )
         for draw in (three_laws, along_across, jrc, strength_surface):
-            figure = draw(plt)
-            figure.savefig(folder / f"{draw.__name__.replace('_', '-')}.png", dpi=100)
+            draw(plt).savefig(folder / f"{draw.__name__.replace('_', '-')}.png", dpi=100)
 
 
 if __name__ == "__main__":

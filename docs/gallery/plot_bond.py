@@ -45,9 +45,8 @@ for axis, stress in zip(axes, (0.3e6, 1e6, 3e6), strict=True):
     axis.plot(record.shear * 1e3, asperities, "--", label="asperities")
     axis.plot(record.shear * 1e3, cement, ":", label="bond")
     axis.plot(record.shear * 1e3, record.shear_stress / 1e6, label="sum")
-    axis.set(title=f"normal stress {stress / 1e6:g} MPa", xlabel="shear displacement (mm)")
-for axis in axes:
-    axis.set_ylabel("shear stress (MPa)")
+    axis.set(xlabel="shear displacement (mm)", ylabel="shear stress (MPa)",
+             title=f"normal stress {stress / 1e6:g} MPa")  # fmt: skip
 axes[0].legend()
 plt.show()
 

@@ -55,11 +55,9 @@ for stress in damping:
     right.semilogx(amplitudes * 1e9, 100 * stiffness[stress] / stiffness[stress][0], label=label)
 left.loglog(amplitudes * 1e9, 100 * coarse, "C1--", label="10 MPa, balanced")
 right.semilogx(amplitudes * 1e9, 100 * softer / stiffness[10e6][0], "C1--")
-left.set_ylim(0.01, 100)
-left.set_ylabel("damping ratio (%)")
-right.set_ylabel("secant stiffness (% of its largest)")
+left.set(xlabel="shear amplitude (nm)", ylabel="damping ratio (%)", ylim=(0.01, 100))
+right.set(xlabel="shear amplitude (nm)", ylabel="secant stiffness (% of its largest)")
 for axes in (left, right):
-    axes.set_xlabel("shear amplitude (nm)")
     axes.grid(alpha=0.3)
 left.legend()
 plt.show()

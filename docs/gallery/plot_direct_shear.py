@@ -35,10 +35,10 @@ for label, record in records.items():
     axes[0, 1].plot(shear, record.F1 / 1e6)
     axes[1, 0].plot(shear, (record.closure[0] - record.closure) * 1e9)
     axes[1, 1].plot(shear, record.friction_angle)
-axes[0, 0].set_ylabel("shear stress (MPa)")
-axes[0, 1].set_ylabel("normal stress (MPa)")
-axes[1, 0].set_ylabel("dilation (nm)")
-axes[1, 1].set_ylabel("mobilised friction angle (°)")
+names = ("shear stress (MPa)", "normal stress (MPa)", "dilation (nm)",
+         "mobilised friction angle (°)")  # fmt: skip
+for axis, name in zip(axes.flat, names, strict=True):
+    axis.set_ylabel(name)
 for axis in axes[1]:
     axis.set_xlabel("shear displacement (µm)")
 axes[0, 0].legend()

@@ -113,16 +113,13 @@ for push in [PUSH * k / 20 for k in (2, 5, 10, 20)]:
 for axis, label in zip(
     axes.flat, ("slip (µm)", "shear stress (MPa)", "normal stress (MPa)"), strict=False
 ):
-    axis.set_ylabel(label)
-    axis.set_xlabel("along the joint (mm)")
+    axis.set(xlabel="along the joint (mm)", ylabel=label)
 axes[0, 0].legend(fontsize="small")
+named = {0: "8 steps of load", 8: "20 steps of the push"}  # by their first
 for number, residuals in enumerate(history):
-    pushed = number >= 8
-    axes[1, 1].semilogy(residuals, ".-", color=f"C{int(pushed)}", lw=0.8)
-for pushed, label in enumerate(("8 steps of load", "20 steps of the push")):
-    axes[1, 1].plot([], [], f".-C{pushed}", label=label)
-axes[1, 1].set_xlabel("iteration")
-axes[1, 1].set_ylabel("residual (N/m)")
+    colour, label = "C1" if number >= 8 else "C0", named.get(number)
+    axes[1, 1].semilogy(residuals, ".-", color=colour, lw=0.8, label=label)
+axes[1, 1].set(xlabel="iteration", ylabel="residual (N/m)")
 axes[1, 1].legend(fontsize="small")
 plt.show()
 

@@ -51,8 +51,7 @@ print(f"with the tangent of the start {modified[-1]:.0e} Pa are left after {len(
 figure, axis = plt.subplots(layout="constrained")
 axis.semilogy(newton, "o-", label="consistent tangent")
 axis.semilogy(modified, "s--", markevery=5, label="tangent of the start")
-axis.set_xlabel("iteration")
-axis.set_ylabel("imbalance (Pa)")
+axis.set(xlabel="iteration", ylabel="imbalance (Pa)")
 axis.legend()
 plt.show()
 

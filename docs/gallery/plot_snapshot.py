@@ -63,7 +63,6 @@ for rows, label in (
     axis.plot(rows[:, 1] * 1e6, rows[:, 4] / 1e6, label=label)
 axis.plot(closed_first[-1, 1] * 1e6, closed_first[-1, 4] / 1e6, "C0o")
 axis.plot(sheared_first[-1, 1] * 1e6, sheared_first[-1, 4] / 1e6, "C1o")
-axis.set_xlabel("shear displacement (µm)")
-axis.set_ylabel("shear stress (MPa)")
+axis.set(xlabel="shear displacement (µm)", ylabel="shear stress (MPa)")
 axis.legend()
 plt.show()

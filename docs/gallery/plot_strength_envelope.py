@@ -35,11 +35,9 @@ for length in (np.inf, 0.2e-6, 0.1e-6, 0.05e-6):
     left.plot(normal / 1e6, strength / 1e6, "o-", ms=3, label=label)
     middle.semilogx(normal / 1e6, angles[label], "o-", ms=3, label=label)
     right.semilogx(normal / 1e6, dilation[label], "o-", ms=3, label=label)
-left.set_ylabel("shear strength (MPa)")
-middle.set_ylabel("largest friction angle (°)")
-right.set_ylabel("largest dilation angle (°)")
-for axis in (left, middle, right):
-    axis.set_xlabel("normal stress (MPa)")
+names = "shear strength (MPa)", "largest friction angle (°)", "largest dilation angle (°)"
+for axis, name in zip((left, middle, right), names, strict=True):
+    axis.set(xlabel="normal stress (MPa)", ylabel=name)
 left.legend()
 plt.show()
 

@@ -1,7 +1,7 @@
 """What each ingredient does to the shipped scenes.
 
-python docs/measure/ablations.py          the table over all scenes, from docs/data
-python docs/measure/ablations.py tilt     ablate this scene anew, into docs/data
+python docs/measure/ablations.py                  the table over all scenes, from docs/data
+python docs/measure/ablations.py --scene tilt     ablate this scene anew, into docs/data
 """
 
 import csv
@@ -9,7 +9,9 @@ import tempfile
 from collections import defaultdict
 from pathlib import Path
 
-from tables import ROOT, asked, run, table
+from tables import ROOT, asked, table
+
+from dem_demo.cli import main
 
 DATA = ROOT / "docs" / "data"
 SCENES = sorted(path.stem.partition("-")[2] for path in DATA.glob("ablation-*.csv"))
@@ -33,7 +35,7 @@ def ablate(scene):
     """Write the file of a scene without each of its ingredients in turn, to four digits."""
     with tempfile.TemporaryDirectory() as folder:
         until = ("--until", str(UNTIL[scene])) if scene in UNTIL else ()
-        run("-m", "dem_demo", "ablate", scene, *until, "--out", folder)
+        main(["ablate", scene, *until, "--out", folder])
         rows = load(Path(folder) / "ablation.csv")
     rows = [{key: four(cell) for key, cell in row.items() if key not in MACHINE} for row in rows]
     with data_of(scene).open("w", newline="", encoding="utf-8") as stream:
@@ -66,9 +68,9 @@ def by_ingredient(scenes):
 
 def note(mine, row, whole):
     """Add what one scene says of an ingredient."""
-    mine["scenes"].append(1)
-    if row["time_ratio"] == "nan":
-        mine["refused"].append(1)
+    refused = row["time_ratio"] == "nan"
+    mine["refused"].append(refused)
+    if refused:
         return
     mine["time"].append(float(row["time_ratio"]))
     for key, value in row.items():
@@ -85,29 +87,24 @@ def note(mine, row, whole):
 
 def summary(name, mine):
     """Cells of an ingredient."""
-    count = f"{len(mine['scenes'])}"
-    if mine["refused"]:
-        count += f", refused in {len(mine['refused'])}"
-    cells = [f"{max(mine['angle']):.2f}" if mine["angle"] else "-",
-             f"{max(mine['friction']):.0%}" if mine["friction"] else "-",
-             span(mine["apart"], "{:.2g}"),
-             str(sum(mine["otherwise"])) if mine["otherwise"] else "-",
-             span(mine["time"], "{:.2f}")]  # fmt: skip
-    return [name, count, *cells]
+    refused = sum(mine["refused"])
+    return [name, f"{len(mine['refused'])}" + f", refused in {refused}" * bool(refused),
+            f"{max(mine['angle']):.2f}" if mine["angle"] else "-",
+            f"{max(mine['friction']):.0%}" if mine["friction"] else "-",
+            span(mine["apart"], "{:.2g}"),
+            sum(mine["otherwise"]) if mine["otherwise"] else "-",
+            span(mine["time"], "{:.2f}")]  # fmt: skip
 
 
 def span(values, form):
     """Least and largest, or the one value."""
-    if not values:
-        return "-"
-    low, high = (form.format(value) if value < 100 else f"{value:.0f}"
-                 for value in (min(values), max(values)))  # fmt: skip
-    return low if low == high else f"{low} to {high}"
+    ends = (min(values), max(values)) if values else ()
+    told = [form.format(value) if value < 100 else f"{value:.0f}" for value in ends]
+    return " to ".join(dict.fromkeys(told)) or "-"
 
 
 if __name__ == "__main__":
-    if scenes := asked(__doc__, "scenes", nargs="*").scenes:
-        for name in scenes:
-            ablate(name)
+    if scene := asked(__doc__, scene="").scene:
+        ablate(scene)
     else:
         print(table(HEAD, by_ingredient([load(data_of(name)) for name in SCENES])))

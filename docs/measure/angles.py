@@ -13,12 +13,11 @@ With --sum: how far the friction angle lies from that of the asperities plus the
 degrees, at the peak and from one mating length on; the largest of all presets, at "fine".
 """
 
-import argparse
 import math
 from dataclasses import replace
 
 import numpy as np
-from tables import table
+from tables import asked, table
 from tolerance import random_law
 
 import jointlaw as jl
@@ -67,15 +66,10 @@ def misses(law: jl.JointLaw) -> np.ndarray:
 
 def missed(found: np.ndarray) -> str:
     """Markdown of misses (laws, tried, ratios, 4)."""
-    kinds = (
-        "friction, before reversal",
-        "friction, after reversal",
-        "friction, median",
-        "dilation",
-    )
+    kinds = "friction, before reversal", "friction, after reversal", "friction, median", "dilation"
     rows = []
     for i, name in enumerate(TRIED):
-        for k, kind in enumerate([*kinds, "dilation"]):
+        for k, kind in enumerate(kinds):
             some = found[:, i, :, k]
             row = np.median(some, axis=0) if k == 2 else some.max(axis=0)
             rows.append([name, kind, *(f"{x:.2f}" for x in row)])
@@ -106,20 +100,10 @@ def excess(name: str, ratio: float, stress: float) -> tuple[float, float]:
     return apart[test.friction_angle.argmax()], apart[later][:-1].max()
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--laws", type=int, default=30, help="random ones, beside the presets")
-    parser.add_argument("--seed", type=int, default=18)
-    parser.add_argument("--sum", action="store_true", help="friction as a sum of two angles")
-    options = parser.parse_args()
+if __name__ == "__main__":
+    options = asked(__doc__, laws=30, seed=18, sum=False)
     if options.sum:
         print(sums())
-        return
-    laws = draw(options.laws, options.seed)
-    print(missed(np.array([misses(law) for law in track(laws, "laws", len(laws))])))
-
-
-if __name__ == "__main__":
-    main()
+    else:
+        laws = draw(options.laws, options.seed)
+        print(missed(np.array([misses(law) for law in track(laws, "laws", len(laws))])))

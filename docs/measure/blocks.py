@@ -6,15 +6,15 @@ CPU time on one thread, the least of five parts of the run, from the start of ea
 last scenes are a slope 20 m high, cut ever finer; they start as drawn, without equilibrium.
 """
 
-import argparse
 import os
 import time
+from timeit import Timer
 
 os.environ |= {"JOINTLAW_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # read when numpy is loaded
 
 import pymunk
 from heap import ROCK
-from tables import table
+from tables import asked, table
 
 from dem_demo import Simulation, load, parse
 
@@ -40,14 +40,9 @@ step = 1e-4
 
 def least(step, seconds: float) -> float:
     """Least CPU time (s) of a step, over parts of a run."""
-    found = []
-    for _ in range(PARTS):
-        started, n = time.process_time(), 0
-        while time.process_time() < started + seconds / PARTS:
-            step()
-            n += 1
-        found.append((time.process_time() - started) / n)
-    return min(found)
+    timer = Timer(step, timer=time.process_time)
+    steps = max(1, round(seconds / PARTS / timer.timeit(1)))
+    return min(timer.repeat(PARTS, steps)) / steps
 
 
 def with_own_solver(scene) -> pymunk.Space:
@@ -66,10 +61,7 @@ def with_own_solver(scene) -> pymunk.Space:
     return space
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seconds", type=float, default=2.0, help="a scene (default 2)")
-    seconds = parser.parse_args().seconds
+def main(seconds: float) -> None:
     scenes, rows = {name: load(name) for name in ("tilt", "stack", "slope", "slope-full")}, []
     for spacing, across in ((0.75, 0.85), (0.33, 0.39)):
         scenes[f"{spacing} m"] = parse(
@@ -88,4 +80,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(asked(__doc__, seconds=2.0).seconds)

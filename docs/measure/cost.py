@@ -1,23 +1,22 @@
 """Nanoseconds per joint and update with an ingredient, and without it: the least of several rounds
 in which all cases take turns.
 
-Motion in one plane but where 3-D is named, random steps around a closure of 1 um, one thread. F:
-traction alone; FC: with tangent; +L: with the ledger.
+Motion in one plane but where 3-D is named, random steps around a closure of 1 um, one thread;
+traction alone but where a tangent or the ledger is named.
 """
 
-import argparse
 import os
-import time
 from dataclasses import replace
+from functools import partial
+from itertools import cycle
+from timeit import Timer
 
 import numpy as np
-from tables import table
+from tables import asked, least, table
 
 import jointlaw as jl
-from jointlaw.support.progress import track
 
-# column: tangent, ledger
-COLUMNS = {"F": (False, False), "F+L": (False, True), "FC": (True, False), "FC+L": (True, True)}
+os.environ |= {"JOINTLAW_KERNEL": "native", "JOINTLAW_THREADS": "1"}
 STEPS = 4  # different increments, so that no branch is learnt by heart
 SPACE = jl.JointLaw(
     orientation=jl.Orientation(3.0, 0.5, 0.0),
@@ -30,93 +29,62 @@ SPACE = jl.JointLaw(
 PLANE = replace(SPACE, plane=0.0)
 
 
-class Case:
-    """One law, batch size and column; holds its least time."""
-
-    def __init__(self, law, n=10_000, column="F"):
-        self.law, self.n, self.column, self.best = law, n, column, np.inf
-        self.tangent, self.ledger = COLUMNS[column]
-
-    @property
-    def bytes(self):
-        """Memory of one joint."""
-        return self.law.joints(0).bytes_per_joint
-
-    def run(self, seconds):
-        """Time single updates for a while, two at least."""
-        os.environ |= {"JOINTLAW_KERNEL": "native", "JOINTLAW_THREADS": "1"}
-        rng, n, dim = np.random.default_rng(0), self.n, self.law.dim
-        d = rng.normal(0.0, 1e-7, (STEPS, n, dim)) * ([0.3] + [1.0] * (dim - 1))
-        first = np.zeros((n, dim))
-        first[:, 0] = rng.uniform(5e-7, 1.5e-6, n)
-        calls, once = (self._joint if n == 1 else self._batch)(first, np.concatenate([d, -d]))
-        once(0)  # compiles, or loads from the cache
-        end, k = time.perf_counter() + seconds, 0
-        while k < 2 or time.perf_counter() < end:
-            start = time.perf_counter()
-            once(k)
-            self.best = min(self.best, (time.perf_counter() - start) / (calls * n))
-            k += 1
-
-    def _joint(self, first, d):
-        """So many updates of one joint, and a function that takes them."""
-        joint, steps = self.law.joint(), list(d[:, 0])
-        joint.update(first[0])
-
-        def once(k):
-            for i in range(50):
-                joint.update(steps[i % len(steps)], tangent=self.tangent)
-
-        return 50, once
-
-    def _batch(self, first, d):
-        """The same of one update of a batch."""
-        batch = self.law.joints(self.n, ledger=self.ledger)
-        batch.update(first, tangent=False)
-
-        def once(k):
-            batch.update(d[k % len(d)], tangent=self.tangent)
-
-        return 1, once
+def once(law, n, tangent, ledger, seconds):
+    """Least ns per joint of single updates for a while; n joints: 1 by `Joint`, more by a batch."""
+    rng = np.random.default_rng(0)
+    d = rng.normal(0.0, 1e-7, (STEPS, n, law.dim)) * ([0.3] + [1.0] * (law.dim - 1))
+    first, d = np.zeros((n, law.dim)), np.concatenate([d, -d])
+    first[:, 0] = rng.uniform(5e-7, 1.5e-6, n)
+    joints, calls = law.joints(n, ledger=ledger), 1
+    if n == 1:
+        joints, calls, first, d = law.joint(), 50, first[0], d[:, 0]
+    steps = cycle(d)
+    joints.update(first, tangent=False)
+    timer = Timer(lambda: joints.update(next(steps), tangent=tangent))
+    runs = max(2, round(seconds / timer.timeit(calls)))
+    return 1e9 * min(timer.repeat(runs, calls)) / (calls * n)
 
 
 def savings(rounds, seconds):
-    """Head and rows: one line for each ingredient that can be left out."""
-    space, plane = Case(SPACE), Case(PLANE)
-    closure = Case(replace(SPACE, closure_only=True))
+    """Rows: one line for each ingredient that can be left out."""
+
+    def case(law, n=10_000, tangent=False, ledger=False):
+        return law, n, tangent, ledger
+
+    space, plane = case(SPACE), case(PLANE)
+    closure = case(replace(SPACE, closure_only=True))
     linear = replace(PLANE, asperity=replace(PLANE.asperity, eta=0.0))
     pairs = {
         "one `Joint` by Python, in a batch (tangent, ledger)": (
-            Case(PLANE, n=1, column="FC+L"), Case(PLANE, column="FC+L"),
+            case(PLANE, n=1, tangent=True, ledger=True), case(PLANE, tangent=True, ledger=True),
         ),
-        "no tangent (3-D, with ledger)": (Case(SPACE, column="FC+L"), Case(SPACE, column="F+L")),
-        "no tangent (one plane)": (Case(PLANE, column="FC"), plane),
-        "no ledger (one plane)": (Case(PLANE, column="F+L"), plane),
+        "no tangent (3-D, with ledger)": (
+            case(SPACE, tangent=True, ledger=True), case(SPACE, ledger=True),
+        ),
+        "no tangent (one plane)": (case(PLANE, tangent=True), plane),
+        "no ledger (one plane)": (case(PLANE, ledger=True), plane),
         "motion in one plane, of 3-D": (space, plane),
         "closure only, of 3-D": (space, closure),
         "closure only, of one plane": (plane, closure),
-        "no heights": (plane, Case(replace(PLANE, heights=None))),
+        "no heights": (plane, case(replace(PLANE, heights=None))),
         "no heights, linear asperities: one depth cell": (
-            Case(linear), Case(replace(linear, heights=None)),
+            case(linear), case(replace(linear, heights=None)),
         ),
         "no large shear: `mating_length = inf`": (
-            Case(replace(PLANE, mating_length=1e-3)), plane,
+            case(replace(PLANE, mating_length=1e-3)), plane,
         ),
-        "c = 0": (Case(replace(SPACE, orientation=jl.Orientation(3.0, 0.5, 0.1))), space),
+        "c = 0": (case(replace(SPACE, orientation=jl.Orientation(3.0, 0.5, 0.1))), space),
     }  # fmt: skip
-    cases = {id(one): one for pair in pairs.values() for one in pair}.values()
-    for _ in track(range(rounds), "rounds", rounds):
-        for case in cases:
-            case.run(seconds)
-    rows = [[name, f"{1e9 * whole.best:.0f}", f"{1e9 * reduced.best:.0f}",
-             f"{reduced.best / whole.best:.2f}", whole.bytes, reduced.bytes]
-            for name, (whole, reduced) in pairs.items()]  # fmt: skip
-    return ["left out", "ns before", "ns after", "after / before", "bytes before", "after"], rows
+    cases = {one: partial(once, *one, seconds) for pair in pairs.values() for one in pair}
+    best, rows = least(cases, rounds), []
+    for name, pair in pairs.items():
+        before, after = (best[one] for one in pair)
+        sizes = [law.joints(0).bytes_per_joint for law, *_ in pair]
+        rows.append([name, f"{before:.0f}", f"{after:.0f}", f"{after / before:.2f}", *sizes])
+    return rows
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--rounds", type=int, default=6, help="over all cases (6)")
-    parser.add_argument("--seconds", type=float, default=0.1, help="per case and round (0.1)")
-    given = parser.parse_args()
-    print(table(*savings(given.rounds, given.seconds)))
+    given = asked(__doc__, rounds=6, seconds=0.1)
+    head = ["left out", "ns before", "ns after", "after / before", "bytes before", "after"]
+    print(table(head, savings(given.rounds, given.seconds)))

@@ -12,18 +12,15 @@ many mating lengths; of the cycles also in steps of a tenth, and of the triangle
 of the work if it is taken as the trapezoid of the tractions at the ends of steps.
 """
 
-import argparse
-
 import numpy as np
 from scipy.optimize import differential_evolution
-from tables import table
+from tables import asked, table
 
 import jointlaw as jl
 from jointlaw.joints.state import JointState
 
 HEAD = ["step (mating lengths)", "one step", "there and back", "in tenths", "triangle", "in tenths",
         "trapezoid", "in tenths"]  # fmt: skip
-SIZES = 1.0, 0.25, 0.1, 0.01
 SIDE, ROUNDS = 8, 4
 # corners that are free beside the first two, steps from one to the next, rounds
 STEP, BACK, TRIANGLE = (1, 1, 0), (1, 1, ROUNDS), (2, SIDE, 1)
@@ -125,16 +122,9 @@ def largest(size, seed):
     return [made[0], *there, whole[0], tenths[0], *(abs(x[0] - x[1]) for x in (whole, tenths))]
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--laws", type=int, default=60, metavar="N", help="random laws")
-    laws = parser.parse_args().laws
-    rows = []
-    for size in SIZES:
+if __name__ == "__main__":
+    laws, rows = asked(__doc__, laws=60).laws, []
+    for size in (1.0, 0.25, 0.1, 0.01):
         found = [largest(size, seed) for seed in range(laws)]
         rows.append([f"{size:g}", *(f"{most:.1e}" for most in np.max(found, axis=0))])
     print(table(HEAD, rows))
-
-
-if __name__ == "__main__":
-    main()

@@ -5,13 +5,12 @@
 writes the scene and its run into FOLDER and prints a line of what it took.
 """
 
-import argparse
 import json
 import resource
 import time
-from pathlib import Path
 
 import numpy as np
+from tables import asked, folder
 
 from dem_demo import Simulation, load, run
 
@@ -56,13 +55,7 @@ def scene(columns: int, rows: int, end: float) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--columns", type=int, default=625)
-    parser.add_argument("--rows", type=int, default=16)
-    parser.add_argument("--end", type=float, default=2.5)
-    given = parser.parse_args()
-    given.folder.mkdir(parents=True, exist_ok=True)
+    given = asked(__doc__, folder=folder, columns=625, rows=16, end=2.5)
     file = given.folder / "heap.toml"
     file.write_text(scene(given.columns, given.rows, given.end))
     started, cpu = time.perf_counter(), time.process_time()

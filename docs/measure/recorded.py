@@ -76,5 +76,5 @@ TABLES = {
 }  # fmt: skip
 
 if __name__ == "__main__":
-    make, names = TABLES[asked(__doc__, "name", choices=TABLES).name]
+    make, names = TABLES[asked(__doc__, name=tuple(TABLES)).name]
     print(make(figures(names)))

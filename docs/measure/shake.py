@@ -84,12 +84,11 @@ def per_cycle(t, slid):
     return f"{1e3 * np.diff(np.interp(ends, t, slid))[0] / LAST:.3g}"
 
 
-law = scene(1.0, "reference").laws["joint"]
-mu = friction(law)
+mu = friction(scene(1.0, "reference").laws["joint"])
 yields_at = brentq(lambda a: gain(-a, 0.0, mu).item(), 0.0, 0.4 * GRAVITY)
 rows = []
 for size in SIZES:
     scenes = [scene(size * yields_at, name) for name in NAMES]
-    found = [slip(given) for given in scenes]
-    rows.append([f"{size:g}", *(per_cycle(*one) for one in (*found, newmark(scenes[0], mu)))])
+    found = [*map(slip, scenes), newmark(scenes[0], mu)]
+    rows.append([f"{size:g}", *(per_cycle(*one) for one in found)])
 print(table(["size", *NAMES, "Newmark"], rows))

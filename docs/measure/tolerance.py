@@ -21,19 +21,18 @@ of all presets and of that many of the laws, in one plane; the largest error of 
 "balanced", of `at_tolerance(0.01)`, and of it with the `stress` at 0.01 closure ranges and at one.
 """
 
-import argparse
 import math
 import time
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
-from tables import table
+from tables import asked, table
 
 import jointlaw as jl
 from jointlaw.accuracy.slip import random_ways, slip
 from jointlaw.accuracy.suite import (
+    Suite,
     errors,
     far_path,
     reference_resolution,
@@ -50,8 +49,6 @@ SMALL_A = 1.4
 HEAD = ["laws", "tolerance", "met", "paths", "worst", "sliders", "refused", "seconds"]
 REACHES = (1.0, 0.3, 0.1, 0.03, 0.01)  # closure ranges
 
-Draw = tuple[jl.JointLaw, list[dict[str, Any]]]
-
 
 def random_law(rng: np.random.Generator) -> jl.JointLaw:
     """Any law within the bounds above; with "population" formation only where that is convex."""
@@ -62,12 +59,10 @@ def random_law(rng: np.random.Generator) -> jl.JointLaw:
     asperity = jl.Asperity(K=2e8 * 1e-6 ** (0.5 - eta), lam=rng.uniform(0.8, 1.5), eta=eta,
                            mu=rng.uniform(0.05, 1.0))  # fmt: skip
     formation = (None, "population", "individual")[rng.integers(3)]
-    heights = None
-    if formation is not None:
-        heights = jl.GammaHeights(
-            alpha=rng.uniform(1.5, 8.0), beta=rng.uniform(0.5e-6, 2e-6),
-            overlap=rng.uniform(0.5e-6, 4e-6), formation=formation,
-        )  # fmt: skip
+    heights = formation and jl.GammaHeights(
+        alpha=rng.uniform(1.5, 8.0), beta=rng.uniform(0.5e-6, 2e-6),
+        overlap=rng.uniform(0.5e-6, 4e-6), formation=formation,
+    )  # fmt: skip
     plane = None if rng.random() < 0.5 else 0.0
     law = partial(jl.JointLaw, orientation=jl.Orientation(a, b, c), asperity=asperity,
                   asperity_density=1e10, plane=plane)  # fmt: skip
@@ -80,106 +75,87 @@ def random_law(rng: np.random.Generator) -> jl.JointLaw:
 def random_paths(law: jl.JointLaw, rng: np.random.Generator) -> np.ndarray:
     """Increments (STEPS, 2 PATHS + FARS, dim) in m."""
     R, s = law.closure_range, np.arange(1, STEPS + 1) / STEPS
-    stress = float(law.normal_stress(R)) / 2
-    far = np.stack([far_path(law, rng, stress, s) for _ in range(FARS)], axis=1)
-    place = np.concatenate([legs(law, rng), waves(law, rng), far], axis=1)[:, :, : law.dim]
+    stress = float(law.normal_stress(R))
+    far = [far_path(law, rng, stress / 2, s) for _ in range(FARS)]
+    straight = [legs(law, rng, stress, s) for _ in range(PATHS)]
+    smooth = [waves(law, rng, stress) for _ in range(PATHS)]
+    place = np.stack([*straight, *smooth, *far], axis=1)[:, :, : law.dim]
     return np.diff(R * place, axis=0, prepend=0.0)
 
 
-def legs(law: jl.JointLaw, rng: np.random.Generator) -> np.ndarray:
-    """Places (STEPS, PATHS, 3) in units of the closure range, on lines between random corners."""
-    at, R = [], law.closure_range
-    stress = float(law.normal_stress(R))
-    for _ in range(PATHS):
-        count = int(rng.integers(5, 9))
-        closure = np.concatenate([[0.0, rng.uniform(0.4, 1.0)], rng.uniform(-0.3, 1.0, count - 1)])
-        closure[int(rng.integers(1, count + 1))] = law.closure(stress * rng.uniform(0.5, 1.0)) / R
-        shear = np.sqrt(rng.random(count + 1)) * (np.arange(count + 1) > 0)
-        turn = rng.uniform(0.0, 2 * math.pi, count + 1)
-        corners = np.stack([closure, shear * np.cos(turn), shear * np.sin(turn)], axis=1)
-        when = np.arange(1, STEPS + 1) / STEPS * count
-        at.append(np.stack([np.interp(when, np.arange(count + 1), x) for x in corners.T], axis=1))
-    return np.stack(at, axis=1)
+def legs(law: jl.JointLaw, rng: np.random.Generator, stress: float, s: np.ndarray) -> np.ndarray:
+    """Places (STEPS, 3) in units of the closure range, on lines between random corners."""
+    count = int(rng.integers(5, 9))
+    closure = np.concatenate([[0.0, rng.uniform(0.4, 1.0)], rng.uniform(-0.3, 1.0, count - 1)])
+    highest = law.closure(stress * rng.uniform(0.5, 1.0)) / law.closure_range
+    closure[rng.integers(1, count + 1)] = highest
+    shear = np.sqrt(rng.random(count + 1)) * (np.arange(count + 1) > 0)
+    turn = rng.uniform(0.0, 2 * math.pi, count + 1)
+    corners = closure, shear * np.cos(turn), shear * np.sin(turn)
+    return np.stack([np.interp(s * count, np.arange(count + 1), x) for x in corners], axis=1)
 
 
-def waves(law: jl.JointLaw, rng: np.random.Generator) -> np.ndarray:
+def waves(law: jl.JointLaw, rng: np.random.Generator, stress: float) -> np.ndarray:
     """As `legs`, smooth: each component a sum of four waves of half a period to five."""
-    at, s = [], np.arange(STEPS + 1) / STEPS
-    stress = float(law.normal_stress(law.closure_range))
+    s = np.arange(STEPS + 1) / STEPS
 
     def wave() -> np.ndarray:
         often, turn = rng.uniform(0.5, 5.0, 4), rng.uniform(0.0, 2 * math.pi, 4)
-        size = rng.normal(size=4)
-        made: np.ndarray = np.sin(2 * math.pi * np.outer(s, often) + turn) @ size
+        made = np.sin(2 * math.pi * np.outer(s, often) + turn) @ rng.normal(size=4)
         return made - made[0]
 
-    for _ in range(PATHS):
-        up, x, y = wave(), wave(), wave()
-        low = rng.uniform(-0.3, 0.3)
-        high = float(law.closure(stress * rng.uniform(0.5, 1.0))) / law.closure_range
-        closure = low + (high - low) * (up - up.min()) / np.ptp(up)
-        far = rng.uniform(0.3, 1.0) / np.hypot(x, y).max()
-        # shut within the first tenth of the path
-        at.append(np.stack([np.minimum(10 * s, 1.0) * closure, far * x, far * y], axis=1)[1:])
-    return np.stack(at, axis=1)
+    up, x, y = wave(), wave(), wave()
+    low = rng.uniform(-0.3, 0.3)
+    high = float(law.closure(stress * rng.uniform(0.5, 1.0))) / law.closure_range
+    closure = low + (high - low) * (up - up.min()) / np.ptp(up)
+    far = rng.uniform(0.3, 1.0) / np.hypot(x, y).max()
+    # shut within the first tenth of the path
+    return np.stack([np.minimum(10 * s, 1.0) * closure, far * x, far * y], axis=1)[1:]
 
 
-def misses(law: jl.JointLaw, rng: np.random.Generator) -> list[dict[str, Any]]:
-    """Per tolerance: largest error of each random path over the tolerance, and the sliders."""
-    d = random_paths(law, rng)
-    best = reference_resolution(law)
-    exact = replace(law, resolution=scaled(best, 2.0))
-    truth = tractions(exact, d)
-    stress = float(law.normal_stress(law.closure_range)) / 2
-    ways = random_ways(rng, SLIPS, law.dim)
-    slips = steepest(law) < 88.0  # else it jams
-    slid = slip(exact, law.closure_range, stress, ways) if slips else None
+def misses(law: jl.JointLaw, rng: np.random.Generator):
+    """Per tolerance: errors of the random paths over it, sliders, seconds; None if refused."""
+    d, R = random_paths(law, rng), law.closure_range
+    exact = replace(law, resolution=scaled(reference_resolution(law), 2.0))
+    stress, ways = float(law.normal_stress(R)) / 2, random_ways(rng, SLIPS, law.dim)
+    slid = slip(exact, R, stress, ways) if steepest(law) < 88.0 else None  # else it jams
+    suite = Suite((), d, tractions(exact, d), slid, ways, R, stress, np.zeros(0))
     found = []
     for tolerance in TOLERANCES:
         start = time.process_time()
         try:
             made = law.at_tolerance(tolerance)
-        except ValueError as error:
-            found.append({"refused": str(error)})
+        except ValueError:
+            found.append(None)
             continue
         took = time.process_time() - start
-        ratio = errors(tractions(made, d), truth) / tolerance
-        if slid is not None:
-            mine = slip(made, law.closure_range, stress, ways)
-            ratio = np.append(ratio, errors(mine.F, slid.F, slid.counts) / tolerance)
-        found.append({"ratio": ratio.tolist(), "sliders": made.tables.sliders, "seconds": took})
+        found.append((suite.miss(made).largest / tolerance, made.tables.sliders, took))
     return found
 
 
-def draw(count: int, seed: int, plane: bool = False) -> list[Draw]:
-    """Random laws, all of them in a plane if asked, and what `misses` says of each."""
-    rng, found = np.random.default_rng(seed), []
+def rows(count: int, seed: int, plane: bool = False) -> list[list]:
+    """How often random laws, all of them in a plane if asked, kept the tolerances; a below and
+    above SMALL_A apart."""
+    rng, usual, steep = np.random.default_rng(seed), [], []
     for _ in track(range(count), "random laws", count):
         law = random_law(rng)
         if rng.random() < 0.5:
             law = replace(law, mating_length=law.closure_range * 10 ** rng.uniform(0.0, 3.0))
         law = replace(law, plane=0.0) if plane else law
-        found.append((law, misses(law, rng)))
-    return found
-
-
-def rows(draws: list[Draw]) -> list[list[Any]]:
-    """How often the tolerances were kept; a below and above SMALL_A apart."""
+        (usual if law.orientation.a >= SMALL_A else steep).append(misses(law, rng))
     found = []
-    steep = [one for one in draws if one[0].orientation.a < SMALL_A]
-    usual = [one for one in draws if one[0].orientation.a >= SMALL_A]
     for some, name in ((usual, f"a >= {SMALL_A}"), (steep, f"a < {SMALL_A}")):
-        for k, tolerance in enumerate(TOLERANCES):
-            kept = [one[k] for _, one in some if "ratio" in one[k]]
+        for tolerance, column in zip(TOLERANCES, zip(*some, strict=True), strict=False):
+            kept = [one for one in column if one is not None]
             if not kept:
                 continue
-            met = sum(max(one["ratio"]) <= 1.0 for one in kept) / len(some)
-            ratio = np.concatenate([one["ratio"] for one in kept])  # fewer of laws that jam
-            sliders = np.median([one["sliders"] for one in kept])
-            seconds = max(one["seconds"] for one in kept)
+            ratios, sliders, seconds = zip(*kept, strict=True)
+            met = sum(ratio.max() <= 1.0 for ratio in ratios) / len(some)
+            ratio = np.concatenate(ratios)  # fewer of laws that jam
             found.append([f"{len(some)} with {name}", f"{tolerance:.1%}", f"{met:.1%}",
-                          f"{np.mean(ratio <= 1.0):.1%}", f"{ratio.max():.2f}", f"{sliders:.0f}",
-                          len(some) - len(kept), f"{seconds:.1f}"])  # fmt: skip
+                          f"{np.mean(ratio <= 1.0):.1%}", f"{ratio.max():.2f}",
+                          f"{np.median(sliders):.0f}", len(some) - len(kept),
+                          f"{max(seconds):.1f}"])  # fmt: skip
     return found
 
 
@@ -192,43 +168,31 @@ def small(law: jl.JointLaw) -> dict[str, list[float]]:
         "`at_tolerance(0.01)`": law.at_tolerance(0.01),
         "`at_tolerance(0.01, stress=...)`": law.at_tolerance(0.01, stress),
     }
-    found = {name: [float(made.tables.sliders)] for name, made in laws.items()}
+    found = {name: [made.tables.sliders] for name, made in laws.items()}
     for reach in REACHES:
         near = replace(law, closure_range=reach * R)
         d = random_paths(near, np.random.default_rng(0))
         truth = tractions(replace(near, resolution=scaled(reference_resolution(near), 1.2)), d)
         for name, made in laws.items():
-            found[name].append(100.0 * float(errors(tractions(made, d), truth).max()))
+            found[name].append(100.0 * errors(tractions(made, d), truth).max())
     return found
 
 
-def small_rows(count: int, seed: int) -> list[list[Any]]:
+def small_rows(count: int, seed: int) -> list[list]:
     """Median sliders and largest errors of all presets and that many random laws."""
     laws = [jl.presets.load(name) for name in jl.presets.names()]
     laws += [random_law(np.random.default_rng([seed, i])) for i in range(count)]
-    found = [small(replace(law, plane=0.0)) for law in track(laws, "laws", len(laws))]
-    columns = {name: np.transpose([one[name] for one in found]) for name in found[0]}
-    return [
-        [name, f"{np.median(sliders):.0f}", *(f"{max(largest):.2f}" for largest in missed)]
-        for name, (sliders, *missed) in columns.items()
-    ]
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--laws", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--plane", action="store_true", help="none in space: ten times as fast")
-    parser.add_argument("--small", action="store_true", help="errors of paths of small loads")
-    options = parser.parse_args()
-    if options.small:
-        head = ["resolution", "sliders", *(f"{reach:g}" for reach in REACHES)]
-        print(table(head, small_rows(options.laws, options.seed)))
-        return
-    print(table(HEAD, rows(draw(options.laws, options.seed, options.plane))))
+    found, made = [small(replace(law, plane=0.0)) for law in track(laws, "laws", len(laws))], []
+    for name in found[0]:
+        sliders, *missed = np.transpose([one[name] for one in found])
+        made.append([name, f"{np.median(sliders):.0f}", *(f"{max(one):.2f}" for one in missed)])
+    return made
 
 
 if __name__ == "__main__":
-    main()
+    given = asked(__doc__, laws=100, seed=1, plane=False, small=False)
+    if given.small:
+        head = ["resolution", "sliders", *(f"{reach:g}" for reach in REACHES)]
+        print(table(head, small_rows(given.laws, given.seed)))
+    else:
+        print(table(HEAD, rows(given.laws, given.seed, given.plane)))

@@ -7,7 +7,6 @@ InteractionLoop with its own law and the geometry; `adapter` is what a joint add
 included; `law` is the share of the law inside.
 """
 
-import argparse
 import json
 import os
 import shutil
@@ -16,7 +15,7 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
-from tables import table
+from tables import asked, table
 
 import jointlaw as jl
 from jointlaw.hosts.yade.export import export_yade
@@ -106,8 +105,8 @@ def measure(law, kinds, contacts=20_000, runs=60):
         export_yade(law, folder)
         for resolution in set(kinds) & set(NAMED):
             replace(law, resolution=resolution).to_toml(Path(folder) / f"{resolution}.toml")
-        overlap = 0.2 * law.closure_range
-        scene = SCENE.format(contacts=contacts, runs=runs, overlap=overlap, kinds=kinds)
+        scene = SCENE.format(contacts=contacts, runs=runs, kinds=kinds,
+                              overlap=0.2 * law.closure_range)  # fmt: skip
         (Path(folder) / "scene.py").write_text(scene)
         env = os.environ | {
             "OMP_NUM_THREADS": "1",
@@ -126,11 +125,7 @@ def measure(law, kinds, contacts=20_000, runs=60):
 
 def main():
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--contacts", type=int, default=20_000)
-    parser.add_argument("--runs", type=int, default=60, help="single steps; the minimum counts")
-    parser.add_argument("--preset", default="jing-replica")
-    options = parser.parse_args()
+    options = asked(__doc__, contacts=20_000, runs=60, preset="jing-replica")
     law = jl.presets.load(options.preset)
     names = {"cundall": "Cundall-Strack", "hertz": "Hertz-Mindlin", "table": "table mode"}
     for name in ("fast", "balanced", "fine"):

@@ -13,47 +13,55 @@ import math
 import matplotlib.pyplot as plt
 import numpy as np
 
-theta, phi = math.radians(32), math.radians(40)
+theta, phi = math.radians(28), math.radians(38)
+arc, turn = np.linspace(-math.pi / 2, theta - math.pi / 2, 40), np.linspace(0.0, phi, 40)
 n, s = (math.sin(theta), -math.cos(theta)), (math.cos(theta), math.sin(theta))
-arc, turn = np.radians(np.linspace(-90, -90 + 32, 30)), np.radians(np.linspace(0, 40, 30))
-x, y = np.outer(s, [-0.62, 0.62])
+rise = 0.7 * math.tan(theta)
+joint = [-1.9, -0.7, 0.7, 1.9], [-rise, -rise, rise, rise]
 panels = {
-    "section along the azimuth of the asperity": {
-        "facet": (x, y),
-        "left": ([-1.7, x[0]], [y[0], y[0]]),
-        "right": ([x[1], 1.7], [y[1], y[1]]),
-        "theta": (0.55 * np.cos(arc), 0.55 * np.sin(arc)),
+    "section along an asperity's azimuth": {
+        "joint": joint,
+        "theta": (0.5 * np.cos(arc), 0.5 * np.sin(arc)),
     },
-    "plan of the interface, seen along axis 1": {"phi": (0.45 * np.cos(turn), 0.45 * np.sin(turn))},
+    "plan, seen along axis 1": {"phi": (0.5 * np.cos(turn), 0.5 * np.sin(turn))},
 }
-figure, (side, plan) = plt.subplots(2, 1, figsize=(6, 8.4), layout="constrained")
+figure, (side, plan) = plt.subplots(
+    1, 2, figsize=(7.8, 4.2), width_ratios=(3.8, 3.4), layout="constrained"
+)
 for axes, (title, lines) in zip((side, plan), panels.items(), strict=True):
-    for name, line in lines.items():
-        axes.plot(*line, color="0.4" if name in ("theta", "phi") else "0.1")
-    axes.set(title=title, xlim=(-1.8, 1.8), ylim=(-1.4, 1.4), aspect="equal")
-    axes.set_axis_off()
+    for line in lines.values():
+        axes.plot(*line, "k", lw=2)
+    axes.set_title(title, fontsize=14)
+    axes.set_aspect("equal")
+    axes.axis("off")
+side.set(xlim=(-1.9, 1.9), ylim=(-1.75, 1.75))
+plan.set(xlim=(-0.8, 2.6), ylim=(-0.85, 2.65))
+for edge, color in ((-1.75, "#c9c2b6"), (1.75, "#e6e1d8")):  # body at rest, moving body
+    side.fill_between(*joint, edge, color=color, lw=0)
 
-# arrows, each with its text beyond the head; then the other texts
-for axes, tail, head, text, color in (
-    (side, (0.0, 0.0), (0.0, -1.0), "1", "0.4"),
-    (side, (0.0, 0.0), n, "n", "C0"),
-    (side, (0.0, 0.0), s, "s", "C0"),
-    (side, (-1.15, 0.95), (-1.15, 0.35), "δ₁ > 0", "C3"),
-    (side, (-1.0, 1.0), (-0.45, 1.0), "shear > 0", "C3"),
-    (plan, (0.0, 0.0), (1.1, 0.0), "2", "0.4"),
-    (plan, (0.0, 0.0), (0.0, 1.1), "3", "0.4"),
-    (plan, (0.0, 0.0), (0.9 * math.cos(phi), 0.9 * math.sin(phi)), "n", "C0"),
-    (plan, (0.0, 0.0), (-0.8 * math.sin(phi), 0.8 * math.cos(phi)), "t", "C0"),
+MOTION, FACET, AXIS = "#c95500", "#1f6fd0", "0.35"  # colours
+# arrows, each with its name beyond the tip; then the other texts
+for axes, tail, way, name, color in (
+    (side, (0.0, 0.0), (0.0, -1.0), "1", AXIS),
+    (side, (0.0, 0.0), np.multiply(1.15, n), "n", FACET),
+    (side, (0.0, 0.0), np.multiply(1.05, s), "s", FACET),
+    (side, (-1.4, 1.3), (0.0, -0.8), "", MOTION),
+    (side, (-1.4, 1.3), (0.8, 0.0), "", MOTION),
+    (plan, (0.0, 0.0), (2.2, 0.0), "2", AXIS),
+    (plan, (0.0, 0.0), (0.0, 2.2), "3", AXIS),
+    (plan, (0.0, 0.0), (1.7 * math.cos(phi), 1.7 * math.sin(phi)), "n, s", FACET),
+    (plan, (0.0, 0.0), (-0.9 * math.sin(phi), 0.9 * math.cos(phi)), "t", FACET),
 ):
-    axes.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.4})
-    along = np.subtract(head, tail) / math.dist(head, tail)
-    place = "left" if along[0] > 0.9 else "center"
-    axes.text(*(head + along * [0.08, 0.11]), text, color=color, ha=place, va="center")
+    head = np.add(tail, way)
+    axes.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 2.5})
+    place = head + 0.16 * np.array(way) / math.hypot(*way)
+    axes.text(*place, name, color=color, ha="center", va="center", fontsize=14)
 for axes, x, y, text, color in (
-    (side, 0.16, -0.72, "θ", "0.2"),
-    (side, 0.9, 1.25, "moving body: gets traction −F", "C3"),
-    (side, 0.85, -1.15, "body at rest: gets +F", "0.2"),
-    (plan, 0.56, 0.2, "φ", "0.2"),
-    (plan, 0.55, -0.3, "azimuth turns from 2 to 3", "0.2"),
+    (side, 0.66 * math.sin(theta / 2), -0.66 * math.cos(theta / 2), "θ", "k"),
+    (side, 0.2, 1.3, "shear δ₂, δ₃ > 0", MOTION),
+    (side, -0.6, 0.45, "closure δ₁ > 0", MOTION),
+    (side, 0.75, 1.58, "moving body feels −F", "k"),
+    (side, -0.9, -1.6, "body at rest feels +F", "k"),
+    (plan, 0.66 * math.cos(phi / 2), 0.66 * math.sin(phi / 2), "φ", "k"),
 ):
-    axes.text(x, y, text, color=color, ha="center")
+    axes.text(x, y, text, color=color, ha="center", va="center", fontsize=14)

@@ -39,7 +39,7 @@ styles = [("C0", "C1"), ("C0", "C0:", "C1", "C1:"), ("C0--", "C0", "C1--", "C1")
 axes = draw(panels, styles, xlabel="closure δ₁ (µm)", ylabel="normal stress F₁ (MPa)")
 axes[1].set_ylim(0.0, 75.0)  # room for the legend
 
-smooth, rough = (law(name) for name, _ in WESTERLY)
 for stress in (1e6, 50e6):
-    text = " µm and ".join(f"{float(found.closure(stress)) * 1e6:.4f}" for found in (smooth, rough))
+    closures = (1e6 * float(law(name).closure(stress)) for name, _ in WESTERLY)
+    text = " µm and ".join(f"{closure:.4f}" for closure in closures)
     beside((f"closure at {stress * 1e-6:g} MPa, smooth and rough", "smooth stiffer", f"{text} µm"))

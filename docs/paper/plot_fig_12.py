@@ -20,16 +20,12 @@ unit = initial_stiffness(replica, 10e6)[1]
 panels = {
     f"{letter}, {kind}": {} for letter in ("(a) granite", "(b) replica") for kind in (TOTAL, LAW)
 }
-for (title, lines), form in zip(panels.items(), (0, 1, 0, 1), strict=True):
-    if "granite" in title:
-        for name, label in WESTERLY:
-            values = [initial_stiffness(law(name), float(s))[form] * 1e-12 for s in granite]
-            lines[label] = granite * 1e-6, np.array(values)
-    else:
-        for azimuth in (0, 45, 90):
-            turn = np.radians(azimuth)
-            values = [initial_stiffness(replica, float(s), turn)[form] / unit for s in concrete]
-            lines[f"azimuth {azimuth}°"] = concrete * 1e-6, np.array(values)
+cases = [("(a) granite", label, law(name), 0, granite, 1e12) for name, label in WESTERLY]
+cases += [("(b) replica", f"azimuth {way}°", replica, way, concrete, unit) for way in (0, 45, 90)]
+for joint, label, found, azimuth, stresses, one in cases:
+    pairs = [initial_stiffness(found, float(s), np.radians(azimuth)) for s in stresses]
+    for kind, values in zip((TOTAL, LAW), np.transpose(pairs), strict=True):
+        panels[f"{joint}, {kind}"][label] = stresses * 1e-6, values / one
 
 styles = [("C0", "C1"), ("C0", "C1"), ("C2", "C2--", "C2:"), ("C2", "C2--", "C2:")]
 axes = draw(panels, styles, xlabel="normal stress (MPa)")

@@ -1,10 +1,13 @@
 """A bad increment is refused before anything moves, in one joint and in every joint of a batch."""
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from refusals import refused
 
 small = st.floats(-1e-6, 1e-6)
 not_finite = st.sampled_from([np.nan, np.inf, -np.inf])
@@ -15,28 +18,20 @@ not_finite = st.sampled_from([np.nan, np.inf, -np.inf])
 def test_not_finite_in_any_slot(law, d, joint, slot, bad, keep):
     batch = law.joints(5)
     batch.update(np.abs(d))
-    before = batch.snapshot().values
     d[joint, slot] = bad
-    with pytest.raises(ValueError, match=rf"d of joint {joint} = .*not finite"):
+    with refused(batch, rf"d of joint {joint} = .*not finite"):
         (batch.update if keep else batch.trial)(d)
-    np.testing.assert_array_equal(batch.snapshot().values, before)
 
 
 @given(shape=hnp.array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=6), keep=st.booleans())
 def test_wrong_shape(law, shape, keep):
     joint, batch = law.joint(), law.joints(5)
-    d = np.full(shape, 1e-7)
-    if shape != (3,):
-        with pytest.raises(ValueError, match=r"d has shape .*expected \(3,\)"):
-            (joint.update if keep else joint.trial)(d)
-    if shape != (5, 3):
-        with pytest.raises(ValueError, match=r"d has shape .*expected \(5, 3\)"):
-            (batch.update if keep else batch.trial)(d)
-    if shape != (2, 3):
-        with pytest.raises(ValueError, match=r"d has shape .*expected \(2, 3\)"):
-            batch.update(d, where=[0, 3])
-    assert not joint.snapshot().values.any()
-    assert not batch.snapshot().values.any()
+    for joints, expected, some in (
+        (joint, (3,), {}), (batch, (5, 3), {}), (batch, (2, 3), {"where": [0, 3]})
+    ):  # fmt: skip
+        if shape != expected:
+            with refused(joints, re.escape(f"d has shape {shape}; expected {expected}")):
+                (joints.update if keep else joints.trial)(np.full(shape, 1e-7), **some)
 
 
 @pytest.mark.parametrize(
@@ -57,14 +52,10 @@ def test_wrong_shape(law, shape, keep):
     ids=repr,
 )
 def test_wrong_type(law, d):
-    joint = law.joint()
-    joint.update([1e-7, 2e-8, 0.0])
-    before = joint.snapshot().values
-    with pytest.raises(ValueError, match=r"^d "):
-        joint.update(d)
-    with pytest.raises(ValueError, match=r"^d "):
-        joint.trial(d)
-    np.testing.assert_array_equal(joint.snapshot().values, before)
+    joint = law.joint(normal_stress=1e6)
+    for step in (joint.update, joint.trial):
+        with refused(joint, r"^d "):
+            step(d)
 
 
 @pytest.mark.parametrize(
@@ -81,8 +72,6 @@ def test_wrong_type(law, d):
     ],
 )
 def test_bad_index(moved, where, told):
-    before = moved.snapshot().values
     for act in (lambda: moved.update(np.zeros((2, 3)), where=where), lambda: moved.reset(where)):
-        with pytest.raises(ValueError, match=told):
+        with refused(moved, told):
             act()
-    np.testing.assert_array_equal(moved.snapshot().values, before)

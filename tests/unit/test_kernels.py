@@ -147,23 +147,17 @@ def test_bad_settings_are_named(law, monkeypatch, name, value, message):
 def test_a_host_that_keeps_the_states_itself(make_law, plane):
     """`law.step` is a pure function: the same path as a joint's, and nothing given is changed."""
     law = make_law(plane=plane)
-    rng, joint = np.random.default_rng(4), law.joint()
-    state = np.zeros(law.state_size)
-    for _ in range(20):
-        d = rng.normal(0.0, 1e-7, law.tables.dim)
-        given = state.copy()
-        new, F, C = law.step(state, d)
-        assert (state == given).all()
-        state, (F_joint, C_joint) = new, joint.update(d)
-        assert worst(F, F_joint, np.abs(F_joint).max() + 1.0) < 1e-12
+    joints, states = law.joints(2), np.zeros((2, law.state_size))
+    for d in np.random.default_rng(4).normal(0.0, 1e-7, (20, 2, law.dim)):
+        given = states.copy()
+        new, alone = law.step(states, d), law.step(states[1], d[1])
+        np.testing.assert_array_equal(states, given)
+        for two, one in zip(new, alone, strict=True):
+            assert worst(two[1], one, np.abs(one).max() + 1e-300) < SAME_C
+        (states, F, C), (F_joint, C_joint) = new, joints.update(d)
+        assert worst(F, F_joint, np.abs(F_joint).max() + 1.0) < SAME
         assert worst(C, C_joint, np.abs(C_joint).max() + 1.0) < 1e-9
-    assert worst(state, joint.snapshot().values[0], np.abs(state).max()) < 1e-12
-    two, F_two, C_two = law.step(joint_and_new := np.stack([given, 0 * given]), np.stack([d, d]))
-    assert two.shape == joint_and_new.shape == (2, law.state_size)
-    for k, single in enumerate(joint_and_new):
-        alone, F, C = law.step(single, d)
-        for both_, one in ((two[k], alone), (F_two[k], F), (C_two[k], C)):
-            assert worst(both_, one, np.abs(one).max() + 1e-300) < SAME_C
+    assert worst(states, joints.snapshot().values, np.abs(states).max()) < SAME
 
 
 @pytest.mark.parametrize(("state", "d"), [((3,), (3,)), ((2, 0), (3,))])

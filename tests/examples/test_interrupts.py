@@ -1,7 +1,5 @@
 """Ctrl-C: a command of jointlaw ends in one line, with exit code 130, and leaves nothing."""
 
-import signal
-
 import pytest
 
 from jointlaw.cli.main import main
@@ -15,14 +13,11 @@ from jointlaw.cli.main import main
     ],
 )
 def test_a_command_of_jointlaw_ends_in_one_line(line, where, tmp_path, capsys, monkeypatch):
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-
     def pressed(*_args, **_keys):
-        signal.raise_signal(signal.SIGINT)
+        raise KeyboardInterrupt
 
     monkeypatch.setattr(f"jointlaw.cli.{where}", pressed)
     assert main(line.split()) == 130
     told = f"jointlaw {line.split()[0]}: interrupted; nothing more is written\n"
     assert capsys.readouterr().err == told
     assert not (tmp_path / "o").exists()
-    signal.signal(signal.SIGINT, before)

@@ -2,6 +2,7 @@
 
 import shlex
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 from scene_text import PLAIN, ROCK
@@ -141,6 +142,21 @@ def test_a_slip_is_told_in_one_line(capsys, line, told):
     assert told in error
     assert not Path("out").exists()
     assert Path("done/shear.csv").read_text() == "of an earlier run"
+
+
+@pytest.mark.parametrize(
+    ("line", "where"),
+    [
+        ("fit grimsel_vd1_closure --out out", "fit.fit_curves"),
+        ("shear linear-a2 --to 1um --out out", "laboratory.direct_shear"),
+    ],
+)
+def test_ctrl_c_ends_a_command_in_one_line(line, where, capsys, monkeypatch):
+    monkeypatch.setattr(f"jointlaw.cli.{where}", Mock(side_effect=KeyboardInterrupt))
+    assert jointlaw_main(line.split()) == 130
+    told = f"jointlaw {line.split()[0]}: interrupted; nothing more is written\n"
+    assert capsys.readouterr().err == told
+    assert not Path("out").exists()
 
 
 def test_force_replaces_a_run_whole():

@@ -1,5 +1,6 @@
 """The command line: a run and its files, runs that are refused or stopped, and go on."""
 
+import itertools
 import json
 import re
 from xml.etree import ElementTree
@@ -76,11 +77,12 @@ def test_vtk_files_hold_what_the_record_holds(tmp_path):
         times = {float(file.get("timestep")): file.get("file") for file in files}
         assert list(times) == record.times
         assert {*times.values()} <= {path.name for path in (tmp_path / "vtk").iterdir()}
-    joints = meshio.read(sorted(tmp_path.glob("vtk/joints_*.vtu"))[-1])
+    blocks, joints = (
+        meshio.read(sorted(tmp_path.glob(f"vtk/{kind}_*.vtu"))[-1]) for kind in ("blocks", "joints")
+    )
     for name in ("closure_m", "shear_m", "normal_stress_Pa", "shear_stress_Pa", "sliding"):
         np.testing.assert_array_equal(joints.cell_data[name][0], record.joints[-1][name])
     assert set(joints.cell_data["state"][0]) <= {0, 1, 2, 3}
-    blocks = meshio.read(sorted(tmp_path.glob("vtk/blocks_*.vtu"))[-1])
     number = np.concatenate(blocks.cell_data["block"]).astype(int)
     largest, vector = (
         np.concatenate(blocks.cell_data[name]) for name in ("stress_1_Pa", "along_stress_1_Pa")
@@ -160,12 +162,11 @@ def test_a_run_stopped_by_ctrl_c_goes_on_bit_for_bit(tmp_path, capsys, monkeypat
     (tmp_path / "scene.toml").write_text(text)
     words = ["scene.toml", "--no-pictures", "--out"]
     assert main([*words, "whole"]) == 0
-    step, count = Simulation.step, []
+    step, count = Simulation.step, itertools.count(1)
 
     def pressed(self):
         step(self)
-        count.append(1)
-        if len(count) == TRIED + 37:  # the first ones tell how long the run will take
+        if next(count) == TRIED + 37:  # the first ones tell how long the run will take
             raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:

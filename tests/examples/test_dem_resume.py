@@ -1,6 +1,7 @@
 """Saved states: whole, of one scene, resumed anywhere, and only as the method can carry it."""
 
 from dataclasses import replace
+from shutil import rmtree
 from unittest.mock import Mock
 
 import numpy as np
@@ -42,7 +43,10 @@ record = 0.002
 
 def begun(steps, text=TEXT):
     """A simulation some steps after its start."""
-    sim = Simulation(parse(text))
+    return advanced(Simulation(parse(text)), steps)
+
+
+def advanced(sim, steps):
     for _ in range(steps):
         sim.step()
     return sim
@@ -66,18 +70,13 @@ def test_files_are_found_beside_their_scene_and_kept_in_the_state(tmp_path, monk
     parse(TEXT).laws["rock/rough"].to_toml(home / "mine.toml")
     text = TEXT.replace(ROCK, 'from = "mine.toml"\n').replace("[run]\n", DRIVE)
     (home / "scene.toml").write_text(text)
-    scene = load(home / "scene.toml")
-    assert scene.laws["rock/rough"].heights is not None
-    assert scene.drives[0].times == (0.0, 0.1)
-    sim = Simulation(scene)
+    sim = Simulation(load(home / "scene.toml"))
+    assert sim.scene.laws["rock/rough"].heights is not None
+    assert sim.scene.drives[0].times == (0.0, 0.1)
     sim.save(tmp_path / "state")
-    for file in home.iterdir():
-        file.unlink()
-    again = Simulation.load(tmp_path / "state")
-    for _ in range(20):
-        sim.step()
-        again.step()
-    assert (again.blocks.motion == sim.blocks.motion).all()
+    rmtree(home)
+    again = advanced(Simulation.load(tmp_path / "state"), 20)
+    assert (again.blocks.motion == advanced(sim, 20).blocks.motion).all()
 
 
 def test_a_scene_changed_in_memory_is_not_saved(tmp_path):
@@ -132,12 +131,10 @@ def test_resume_is_bit_identical(tmp_path, damage):
     text = TEXT.replace("mu = 0.4", f"mu = 0.4{damage}").replace("-0.05]", "-0.3]")
     begun(170, text).save(tmp_path)
     (tmp_path / "notes.txt").write_text("mine")
-    again, whole = Simulation.load(tmp_path), begun(400, text)
-    for _ in range(230):
-        again.step()
-    assert again.time == whole.time
+    again, whole = advanced(Simulation.load(tmp_path), 230), begun(400, text)
     assert (again.blocks.motion == whole.blocks.motion).all()
     assert (again.joints.traction == whole.joints.traction).all()
+    assert again.time == whole.time
     assert again.ledger.value == whole.ledger.value
     assert again.limit.least == whole.limit.least
     batch = again.joints.held[again.joints.names.index("rock/rough")].batch
@@ -176,9 +173,7 @@ def test_a_state_that_is_refused_changes_nothing():
             Simulation(sim.scene, step, sim.state())
     with pytest.raises(Refused, match=r"must stay below 0\.98 of the limit"):
         Simulation(sim.scene, 1.01 * limit, sim.state())
-    sim.step()
-    whole = begun(6)
-    assert (sim.blocks.motion == whole.blocks.motion).all()
+    assert (advanced(sim, 1).blocks.motion == begun(6).blocks.motion).all()
 
 
 def test_an_eigenvalue_that_does_not_converge_is_computed_exactly(monkeypatch):

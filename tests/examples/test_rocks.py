@@ -1,5 +1,6 @@
 """Rock masses: the scenes end as intended, the template runs, wrong tables are refused."""
 
+import csv
 import itertools
 import json
 import re
@@ -108,12 +109,12 @@ def test_a_scene_of_ones_own_from_the_template(tmp_path, capsys):
     out = tmp_path / "out"
     assert main([str(file), "--out", str(out)]) == 0
     assert "slope: stands" in capsys.readouterr().out
-    for name in ("final.png", "motion.gif", "history.csv", "state"):
-        assert (out / name).exists(), name
+    written = {path.name for path in out.iterdir()}
+    assert written >= {"final.png", "motion.gif", "history.csv", "state"}
     assert json.loads((out / "summary.json").read_text())["largest_energy_error"] < 1e-4
-    header, *rows = (out / "history.csv").read_text().splitlines()
-    moved = float(rows[-1].split(",")[header.split(",").index("pin 1: moved_m")])
-    assert 1e-5 < moved < 1e-2  # the settlement of the pin's block, m
+    with (out / "history.csv").open() as stream:
+        *_, last = csv.DictReader(stream)
+    assert 1e-5 < float(last["pin 1: moved_m"]) < 1e-2  # the settlement of the pin's block, m
     words = ["resume", str(out / "state"), "--until", "0.12", "--no-pictures"]
     assert main([*words, "--out", str(tmp_path / "on")]) == 0
 

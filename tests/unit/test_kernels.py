@@ -110,9 +110,9 @@ def test_threads_change_no_bit(monkeypatch):
         given += batch.update(d[4, :333], where=index)
         given += batch.trial(d[5])
         results.append([*given, batch.snapshot().values, *batch.measures()])
-    for other in results[1:]:
-        for a, b in zip(results[0], other, strict=True):
-            np.testing.assert_array_equal(a, b)
+    for one, two, five in zip(*results, strict=True):
+        np.testing.assert_array_equal(one, two)
+        np.testing.assert_array_equal(one, five)
 
 
 def test_what_fails_on_another_thread_is_raised_after_all_have_ended():

@@ -84,35 +84,50 @@ def test_c_outside_eq_18(b, over, sign):
         jl.Orientation(3.0, b, sign * (bound + over))
 
 
-@pytest.mark.parametrize(
-    ("more", "given", "told"),
-    [
-        ({}, {}, "infinite mating_length"),
-        ({"closure_only": True, "mating_length": 1e-5}, {}, "closure_only"),
-        ({"mating_length": 1e-5}, {"normal_stress": 1e6}, "starts at first touch"),
-    ],
-)
-def test_an_unmated_start_that_there_is_not(make_law, more, given, told):
-    for start in (make_law(**more).joint, lambda **kw: make_law(**more).joints(3, **kw)):
-        with pytest.raises(ValueError, match=f"mated=False.*{told}"):
-            start(mated=False, **given)
+WEAK = jl.JointLaw(
+    orientation=jl.Orientation(3.0), asperity_density=1e6,
+    asperity=jl.Asperity(1e9, 1.0, 0.0, 0.3, yield_interference=1e-6),
+)  # fmt: skip
+MATING = kinds.make_law(mating_length=1e-5)
+HIDDEN = np.ma.masked_array([1e-7, 0.0, 0.0], [False, True, False])
+NO_CLOSURE = r"1e\+12 Pa is beyond any closure"
+NO_TRUTH = r"mated = .* must be True or False, or an array"
+NO_RANGE = "give the smallest and the largest normal stress"
 
 
 @pytest.mark.parametrize(
-    ("build_it", "name"),
+    ("call", "told"),
     [
-        (lambda: jl.Asperity.hertz_mindlin(-1.0, 0.2, 1e-5, 0.3), "G"),
-        (lambda: jl.Asperity.hertz_mindlin(1e10, 0.6, 1e-5, 0.3), "nu"),
-        (lambda: jl.Asperity.linear(0.0, 1.0, 0.3), "kn"),
-        (lambda: jl.Orientation.from_moments(0.0, 0.01), "mean"),
-        (lambda: jl.Orientation.from_moments(0.3, 10.0), "variance"),
-        (lambda: jl.Orientation.from_moments(1e-300, 1e300), "variance"),
-        (lambda: jl.GammaHeights.from_moments(1e-6, NAN), "variance"),
+        (lambda law: jl.Asperity.hertz_mindlin(-1.0, 0.2, 1e-5, 0.3), "G"),
+        (lambda law: jl.Asperity.hertz_mindlin(1e10, 0.6, 1e-5, 0.3), "nu"),
+        (lambda law: jl.Asperity.linear(0.0, 1.0, 0.3), "kn"),
+        (lambda law: jl.Orientation.from_moments(0.0, 0.01), "mean"),
+        (lambda law: jl.Orientation.from_moments(0.3, 10.0), "variance"),
+        (lambda law: jl.Orientation.from_moments(1e-300, 1e300), "variance"),
+        (lambda law: jl.GammaHeights.from_moments(1e-6, NAN), "variance"),
+        (lambda law: law.closure(-1.0), r"normal_stress = -1\.0 is out of bounds"),
+        (lambda law: WEAK.closure(1e12), NO_CLOSURE),
+        (lambda law: WEAK.closure([1e3, 1e12]), NO_CLOSURE),
+        (lambda law: law.joint(mated=False), "mated=False.*infinite mating_length"),
+        (lambda law: law.joints(3, mated=False), "mated=False.*infinite mating_length"),
+        (lambda law: kinds.LAWS["closure only"].joint(mated=False), "mated=False.*closure_only"),
+        (lambda law: MATING.joint(1e6, mated=False), "mated=False.*starts at first touch"),
+        (lambda law: law.joints(3, mated=[True]), NO_TRUTH),
+        (lambda law: law.joints(3, mated=[True, True]), NO_TRUTH),
+        (lambda law: law.joints(3, mated=1), NO_TRUTH),
+        (lambda law: law.joints(3, mated="yes"), NO_TRUTH),
+        (lambda law: law.joint().update(HIDDEN), "d has masked numbers"),
+        (lambda law: law.step(np.zeros(3), np.zeros(3)), "expected"),
+        (lambda law: law.step(np.zeros((2, law.state_size)), np.zeros(3)), "expected"),
+        (lambda law: law.at_tolerance(0.05, stress=3e4), NO_RANGE),
+        (lambda law: law.at_tolerance(0.05, stress=(1e6, 3e4)), NO_RANGE),
+        (lambda law: law.at_tolerance(0.05, stress=(0.0, 1e6)), NO_RANGE),
+        (lambda law: law.at_tolerance(0.05, stress=(3e4, 1e5, 1e6)), NO_RANGE),
     ],
 )
-def test_other_constructors(build_it, name):
-    with pytest.raises(ValueError, match=name):
-        build_it()
+def test_an_argument_that_a_call_refuses(law, call, told):
+    with pytest.raises(ValueError, match=told):
+        call(law)
 
 
 @pytest.mark.parametrize("method", ["normal_stress", "closure", "contacts", "max_stiffness"])
@@ -145,22 +160,3 @@ def test_a_pure_step_that_overflows_is_refused(law):
     for start, d in ((states, far), (np.hstack([far, states[:, 3:]]), 0.0 * far)):
         with pytest.raises(ValueError, match=r"joint 1: .* leads beyond largest_reach"):
             law.step(start, d)
-
-
-def test_truths_and_masks(law):
-    for mated in ([True], [True, True], 1, "yes"):
-        with pytest.raises(ValueError, match=r"mated = .* must be True or False, or an array"):
-            law.joints(3, mated=mated)
-    hidden = np.ma.masked_array([1e-7, 0.0, 0.0], [False, True, False])
-    with pytest.raises(ValueError, match="d has masked numbers"):
-        law.joint().update(hidden)
-
-
-def test_stresses_that_have_no_closure(law):
-    with pytest.raises(ValueError, match=re.escape("normal_stress = -1.0 is out of bounds")):
-        law.closure(-1.0)
-    asperity = jl.Asperity(1e9, 1.0, 0.0, 0.3, yield_interference=1e-6)
-    weak = jl.JointLaw(orientation=jl.Orientation(3.0), asperity=asperity, asperity_density=1e6)
-    for stress in (1e12, [1e3, 1e12]):
-        with pytest.raises(ValueError, match=r"1e\+12 Pa is beyond any closure"):
-            weak.closure(stress)

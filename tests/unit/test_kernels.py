@@ -160,13 +160,6 @@ def test_a_host_that_keeps_the_states_itself(make_law, plane):
     assert worst(states, joints.snapshot().values, np.abs(states).max()) < SAME
 
 
-@pytest.mark.parametrize(("state", "d"), [((3,), (3,)), ((2, 0), (3,))])
-def test_a_step_of_other_shapes_is_refused(law, state, d):
-    size = tuple(law.state_size if n == 0 else n for n in state)
-    with pytest.raises(ValueError, match="expected"):
-        law.step(np.zeros(size), np.zeros(d))
-
-
 @pytest.mark.parametrize("seed", [9, 10, 21])
 def test_a_step_shows_what_the_state_then_amounts_to(both, seed):
     """In the pass that advances: the same bits as measured afterwards."""

@@ -24,13 +24,18 @@ def run(line):
     return main(shlex.split(line))
 
 
+def asked(line, capsys):
+    """What is printed where a user asks for it, as by --help."""
+    with pytest.raises(SystemExit) as stop:
+        run(line)
+    assert stop.value.code == 0
+    return capsys.readouterr().out
+
+
 def example(command, capsys):
     """The example that --help gives, as arguments."""
-    with pytest.raises(SystemExit) as stop:
-        main([*command.split(), "--help"])
-    assert stop.value.code == 0
-    line = re.search(r"example:\n  jointlaw (.*)\n", capsys.readouterr().out).group(1)
-    return shlex.split(line)
+    said = asked(f"{command} --help", capsys)
+    return shlex.split(re.search(r"example:\n  jointlaw (.*)\n", said).group(1))
 
 
 def test_shear_example_runs(tmp_path, capsys):
@@ -60,14 +65,10 @@ def test_presets_are_listed_and_start_a_file(tmp_path, capsys):
 
 
 def test_every_command_has_an_example(capsys):
-    with pytest.raises(SystemExit):
-        main(["--help"])
-    commands = re.findall(r"^    (\w+) ", capsys.readouterr().out, re.MULTILINE)
+    commands = re.findall(r"^    (\w+) ", asked("--help", capsys), re.MULTILINE)
     assert commands == [command.name for command in COMMANDS]
-    for command in commands:
-        assert example(command, capsys)[0] == command
-    for host in START:
-        assert example(f"export {host}", capsys)[1] == host
+    for typed in [*commands, *(f"export {host}" for host in START)]:
+        assert example(typed, capsys)[: typed.count(" ") + 1] == typed.split()
 
 
 def test_all_options_of_shear(tmp_path):
@@ -121,10 +122,7 @@ def test_a_name_of_tables_is_an_identifier_of_c(text, name):
 
 
 def test_version(capsys):
-    with pytest.raises(SystemExit) as stop:
-        main(["--version"])
-    assert stop.value.code == 0
-    assert jl.__version__ in capsys.readouterr().out
+    assert asked("--version", capsys).endswith(f"{jl.__version__}\n")
 
 
 def test_as_a_module(tmp_path):

@@ -150,11 +150,18 @@ def test_a_variant_changes_what_it_names():
     sets = [{**scene["rock"][0]["set"][0], "dip": 5.0}, scene["rock"][0]["set"][1]]
     assert rock == {**scene["rock"][0], "seed": 7, "set": sets}
     assert {key for key in scene if flat[key] != scene[key]} == {"title", "laws", "rock"}
-    with pytest.raises(ValueError, match=r"variant = 'flt' is unknown; did you mean 'flat'"):
-        parse('variant = "flt"\n' + TEXT + VARIANT)
-    wrong = VARIANT.replace("seed", "sead")
-    with pytest.raises(ValueError, match="sead' is unknown; did you mean 'seed'"):
-        parse('variant = "flat"\n' + TEXT + wrong)
+
+
+@pytest.mark.parametrize(
+    ("variant", "text", "told"),
+    [
+        ("flt", VARIANT, "variant = 'flt' is unknown; did you mean 'flat'"),
+        ("flat", VARIANT.replace("seed", "sead"), "sead' is unknown; did you mean 'seed'"),
+    ],
+)
+def test_nonsense_of_a_variant_is_named(variant, text, told):
+    with pytest.raises(ValueError, match=told):
+        parse(f'variant = "{variant}"\n{TEXT}{text}')
 
 
 def test_joints_have_the_law_of_their_set():

@@ -80,10 +80,8 @@ def exponential():
 def test_a_class_of_the_user_works_and_no_file_can_name_it(make_law, exponential):
     law = make_law(heights=exponential(3e-6))
     same = make_law(heights=jl.GammaHeights(0.0, 3e-6, 0.0, "individual"))
-    d = [5e-7, 2e-7, 0.0]
-    np.testing.assert_allclose(
-        law.joint().update(d)[0], same.joint().update(d)[0], rtol=1e-8, atol=1.0
-    )
+    ours, exact = (one.joint().update([5e-7, 2e-7, 0.0])[0] for one in (law, same))
+    np.testing.assert_allclose(ours, exact, rtol=1e-8, atol=1.0)
     with pytest.raises(ValueError, match=r"^heights = .*no file can name Exponential"):
         law.to_toml()
 

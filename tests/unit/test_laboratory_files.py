@@ -123,12 +123,11 @@ def test_several_tests_of_one_file(kind, tmp_path):
     path, text = tmp_path / "lab.csv", SEVERAL[kind]
     if text is None:
         book = pytest.importorskip("openpyxl").Workbook()
+        titles = ["us [mm]", "tau [MPa]", "sn [MPa]", "dn [mm]"]
+        table = np.column_stack([U, TAU, 0 * U + 2, OPENED]).tolist()
         for sheet in (book.active, book.create_sheet("other")):
-            sheet.append(["Joint 7"])
-            sheet.append([])
-            sheet.append(["us [mm]", "tau [MPa]", "sn [MPa]", "dn [mm]"])
-            for row in zip(U, TAU, 0 * U + 2, OPENED, strict=True):
-                sheet.append([float(x) for x in row])
+            for row in (["Joint 7"], [], titles, *table):
+                sheet.append(row)
         book.save(path := tmp_path / "lab.xlsx")
     else:
         path.write_text(text)

@@ -1,7 +1,10 @@
-"""How the files of both packages hang together: imports one way, and those of public names."""
+"""How the files of both packages hang together: imports one way, those of public names, and slow
+ones only when they are asked for."""
 
 import ast
 import re
+import subprocess
+import sys
 from collections import defaultdict
 from functools import cache
 from graphlib import TopologicalSorter
@@ -11,6 +14,10 @@ import jointlaw as jl
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("jointlaw", "dem_demo")
+LATE = (
+    "matplotlib", "pymunk", "tqdm", "pandas", "scipy.stats", "scipy.optimize", "scipy.spatial",
+    "jointlaw.calibration", "jointlaw.surface", "jointlaw.tables.tabulate",
+)  # fmt: skip
 
 
 @cache
@@ -104,3 +111,10 @@ def test_the_example_host_imports_public_names_only():
     }
     assert not hidden, f"give them a public place, or do without: {sorted(hidden)}"
     assert ("dem_demo/cli.py", "jointlaw.PathError") in taken
+
+
+def test_a_code_that_embeds_the_law_loads_no_tools_for_measurements():
+    code = "import sys, jointlaw; print(*sys.modules)"
+    modules = subprocess.check_output([sys.executable, "-c", code], text=True).split()
+    assert "jointlaw" in modules
+    assert [module for module in modules if module.startswith(LATE)] == []

@@ -65,9 +65,9 @@ def test_summary_figures(azimuth, sense):
 )
 def test_a_curve_without_a_peak_is_told(shear, stress, peak):
     columns = {name: np.zeros(len(shear)) for name in UNITS}
-    columns |= {"shear_2": np.array(shear, float), "F2": np.array(stress, float)}
-    record = jl.Record(columns | {"F1": np.full(len(shear), 10.0)})
-    assert record.has_peak is peak
+    given = {"shear_2": shear, "F1": np.full(len(shear), 10), "F2": stress}
+    columns |= {name: np.array(column, float) for name, column in given.items()}
+    assert jl.Record(columns).has_peak is peak
 
 
 def test_csv_round_trip(tmp_path):

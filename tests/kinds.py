@@ -2,7 +2,9 @@
 by this list. And every declared parameter, off its default: no parameter is named here."""
 
 import math
-from dataclasses import fields, is_dataclass, replace
+from contextlib import suppress
+from dataclasses import is_dataclass, replace
+from functools import reduce
 from itertools import chain
 
 import jointlaw as jl
@@ -93,19 +95,14 @@ def off_default(name):
     *above, last = path.split(".")
     found = []
     for base in (law for law in LAWS.values() if type(law) is kind):
-        part = base
-        for one in above:
-            part = getattr(part, one)
-        if not is_dataclass(part) or last not in {one.name for one in fields(part)}:
-            continue
-        default = next(one.default for one in fields(part) if one.name == last)
-        at_work = getattr(part, last) != default
-        for value in candidates(said, getattr(part, last)):
-            try:
-                found.append((not at_work, len(found), with_value(base, path, value), base))
-                break
-            except ValueError:
-                continue
+        part = reduce(getattr, above, base)
+        if last in getattr(part, "__dataclass_fields__", {}):
+            now, default = getattr(part, last), part.__dataclass_fields__[last].default
+            for value in candidates(said, now):
+                with suppress(ValueError):
+                    law = with_value(base, path, value)
+                    found.append((now == default, len(found), law, base))
+                    break
     assert found, f"no law of this file takes a value of {path}: add one above"
     *_, law, base = min(found, key=lambda one: one[:2])
     return law, base

@@ -1,8 +1,8 @@
 """The command line: a run and its files, runs that are refused or stopped, and go on."""
 
+import itertools
 import json
 import re
-import signal
 from xml.etree import ElementTree
 
 import meshio
@@ -50,8 +50,7 @@ def done(tmp_path_factory):
     """The folder of a run with everything."""
     folder = tmp_path_factory.mktemp("run")
     (folder / "scene.toml").write_text(SHORT)
-    words = [str(folder / "scene.toml"), "--out", str(folder / "out")]
-    assert main(words) == 0
+    assert main([str(folder / "scene.toml"), "--out", str(folder / "out")]) == 0
     return folder / "out"
 
 
@@ -77,12 +76,13 @@ def test_vtk_files_hold_what_the_record_holds(tmp_path):
         files = ElementTree.parse(tmp_path / "vtk" / f"{kind}.pvd").iter("DataSet")
         times = {float(file.get("timestep")): file.get("file") for file in files}
         assert list(times) == record.times
-        assert all((tmp_path / "vtk" / file).is_file() for file in times.values())
-    joints = meshio.read(sorted(tmp_path.glob("vtk/joints_*.vtu"))[-1])
+        assert {*times.values()} <= {path.name for path in (tmp_path / "vtk").iterdir()}
+    blocks, joints = (
+        meshio.read(sorted(tmp_path.glob(f"vtk/{kind}_*.vtu"))[-1]) for kind in ("blocks", "joints")
+    )
     for name in ("closure_m", "shear_m", "normal_stress_Pa", "shear_stress_Pa", "sliding"):
         np.testing.assert_array_equal(joints.cell_data[name][0], record.joints[-1][name])
     assert set(joints.cell_data["state"][0]) <= {0, 1, 2, 3}
-    blocks = meshio.read(sorted(tmp_path.glob("vtk/blocks_*.vtu"))[-1])
     number = np.concatenate(blocks.cell_data["block"]).astype(int)
     largest, vector = (
         np.concatenate(blocks.cell_data[name]) for name in ("stress_1_Pa", "along_stress_1_Pa")
@@ -129,14 +129,17 @@ def test_fixed_rock_is_driven_and_a_block_on_it_told_relative_to_it(tmp_path):
     (tmp_path / "scene.toml").write_text(SHAKEN)
     scene, a = load(tmp_path / "scene.toml"), 0.2 * 9.80665
     record, _ = run(Simulation(scene), tmp_path / "out", pictures=None)
-    last, load_ = record.monitored[-1], 2600 * 0.5  # kg/m2
-    assert last["joint 1: normal_Pa"] == pytest.approx(load_ * 9.81, rel=1e-3)
-    assert abs(last["joint 1: shear_Pa"]) == pytest.approx(load_ * a, rel=1e-3)
-    assert last["base: vx_m/s"] == pytest.approx(a * (record.times[-1] - 0.025), rel=1e-2)
-    assert last["base: x_m"] == pytest.approx(a * 0.275**2 / 2, rel=1e-2)
-    assert last["pin 1: x_m"] == pytest.approx(-0.9, abs=1e-5)  # 2.5 kPa on springs of 1 GPa/m
-    assert last["pin 1: y_m"] == pytest.approx(0.4, abs=1e-4)
-    assert abs(last["pin 1: vx_m/s"]) < 1e-3 * last["base: vx_m/s"]
+    last, weight = record.monitored[-1], 2600 * 0.5  # kg/m2
+    known = {
+        "joint 1: normal_Pa": pytest.approx(weight * 9.81, rel=1e-3),
+        "base: vx_m/s": pytest.approx(a * (record.times[-1] - 0.025), rel=1e-2),
+        "base: x_m": pytest.approx(a * 0.275**2 / 2, rel=1e-2),
+        "pin 1: x_m": pytest.approx(-0.9, abs=1e-5),  # 2.5 kPa on springs of 1 GPa/m
+        "pin 1: y_m": pytest.approx(0.4, abs=1e-4),
+        "pin 1: vx_m/s": pytest.approx(0.0, abs=1e-3 * last["base: vx_m/s"]),
+    }
+    assert {name: last[name] for name in known} == known
+    assert abs(last["joint 1: shear_Pa"]) == pytest.approx(weight * a, rel=1e-3)
     assert record.moved.max() < 1e-5
     header, *_ = (tmp_path / "out" / "history.csv").read_text().splitlines()
     assert set(last) <= set(header.split(","))
@@ -157,16 +160,14 @@ def test_scenes_are_valid(name, capsys):
 def test_a_run_stopped_by_ctrl_c_goes_on_bit_for_bit(tmp_path, capsys, monkeypatch):
     text = SHORT.replace("end = 0.12", "end = 0.02").replace("record = 0.02", "record = 0.002")
     (tmp_path / "scene.toml").write_text(text)
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     words = ["scene.toml", "--no-pictures", "--out"]
     assert main([*words, "whole"]) == 0
-    step, count = Simulation.step, []
+    step, count = Simulation.step, itertools.count(1)
 
     def pressed(self):
         step(self)
-        count.append(1)
-        if len(count) == TRIED + 37:  # the first ones tell how long the run will take
-            signal.raise_signal(signal.SIGINT)
+        if next(count) == TRIED + 37:  # the first ones tell how long the run will take
+            raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
         patch.setattr(Simulation, "step", pressed)
@@ -181,7 +182,6 @@ def test_a_run_stopped_by_ctrl_c_goes_on_bit_for_bit(tmp_path, capsys, monkeypat
     whole, end = (np.load(tmp_path / name / "state" / "state.npz") for name in ("whole", "end"))
     for name in whole.files:
         np.testing.assert_array_equal(whole[name], end[name], err_msg=name)
-    signal.signal(signal.SIGINT, before)
 
 
 DROP = f"""
@@ -221,9 +221,7 @@ def test_failed_runs_are_resumed_with_a_smaller_step(tmp_path, capsys, height, s
     file, out, more = tmp_path / "scene.toml", tmp_path / "out", tmp_path / "more"
     file.write_text(text.replace("STEP", str(step)))
     assert main([str(file), "--no-pictures", "--out", str(out)]) == 2
-    said = capsys.readouterr().err
-    assert re.search(why, said)
-    assert str(out / "refused") in said
+    assert re.search(f"{why}.*{out / 'refused'}", capsys.readouterr().err)
     assert re.search(why, json.loads((out / "summary.json").read_text())["stopped"])
     words = ["resume", str(out / "refused"), "--step", "1e-4", "--no-pictures", "--out", str(more)]
     assert main(words) == 0
@@ -243,24 +241,3 @@ def test_history_survives_a_gap():
     assert opened
     assert sim.tracker.keys is keys  # the list of contacts never changed
     assert (sim.joints.place == places).all()
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["scene.toml", "--until=inf"], "until = inf s: inf steps"),
-        (["check", "endless.toml"], "until = 1e+308 s: "),
-        (["check", "long.toml"], "until = 1e+06 s: "),
-        (["check", "law.toml"], "law.toml is the parameter file of a law, no scene"),
-        (["compare", "scene.toml"], "has no [[rock]] to compare"),
-        (["nobodys"], "no scene 'nobodys': give a TOML file or one of arch"),
-    ],
-)
-def test_a_command_says_what_it_cannot_do(words, message, tmp_path, capsys):
-    (tmp_path / "scene.toml").write_text(SHORT)
-    (tmp_path / "endless.toml").write_text(SHORT.replace("end = 0.12", "end = 1e308"))
-    (tmp_path / "long.toml").write_text(SHORT.replace("end = 0.12", "end = 1e6"))
-    (tmp_path / "law.toml").write_text(ROCK)
-    assert main(words) == 2
-    assert message in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()

@@ -6,6 +6,7 @@ import sys
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -126,10 +127,9 @@ def test_lists_of_tables_hold_tables(table):
 
 
 def test_a_file_that_is_no_text_is_named(tmp_path):
-    file = tmp_path / "scene.toml"
-    file.write_bytes(b"\xff\xfe\x00")
+    (tmp_path / "scene.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ValueError, match=r"scene\.toml is not UTF-8 text"):
-        load(file)
+        load(tmp_path / "scene.toml")
 
 
 MOTION = "time_s,acceleration_m/s2\n0.0,1.0\n0.1,1.0\n0.2,-1.0\n"
@@ -197,26 +197,23 @@ def test_base_correction_ends_at_rest_and_takes_drift_away(tmp_path, order):
     np.testing.assert_allclose(*left, atol=1e-13)
 
 
-@pytest.mark.parametrize("title", ["acceleration_m/s2", "velocity_m/s"])
-def test_a_record_moves_its_block(tmp_path, title):
+# at 0, 0.1 ... 0.6 s: the integral of the record, doubled by `scale`; and the integral of that,
+# 5 s**3/6 while it rises, then a parabola, then a line
+ONCE = [0.0, 0.0, 0.025, 0.1, 0.2, 0.3, 0.4]
+TWICE = [0.0, 0.0, 5e-3 / 6, 0.04 / 6, 0.04 / 6 + 0.015, 0.04 / 6 + 0.04, 0.04 / 6 + 0.07]
+
+
+@pytest.mark.parametrize(("title", "exact"), [("velocity_m/s", ONCE), ("acceleration_m/s2", TWICE)])
+def test_a_record_moves_its_block(tmp_path, title, exact):
     """Straight lines between accelerations, or velocities, by hand; then at constant velocity."""
-    (tmp_path / "motion.csv").write_text(f"time_s, {title}\n0.1,0.0\n0.3,0.5\n0.5,0.5\n")
-    text = TEXT.replace(LINES, 'file = "motion.csv"\nscale = 2.0')
-    (drive,) = (d for d in parse(text, files=Files(tmp_path)).drives if d.order)
-    once = np.array([0.0, 0.0, 0.025, 0.1, 0.2, 0.3, 0.4])  # doubled by `scale`
+    drive = driven(tmp_path, f"time_s, {title}\n0.1,0.0\n0.3,0.5\n0.5,0.5\n", "scale = 2.0")
     found = [drive(at) for at in (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)]
-    if title.startswith("velocity"):
-        np.testing.assert_allclose(found, once, atol=1e-15)
-        return
-    # integrals of `once`: 5 s**3/6 while it rises, then a parabola, then a line
-    twice = [0.0, 0.0, 5e-3 / 6, 0.04 / 6, 0.04 / 6 + 0.01 + 0.005, 0.04 / 6 + 0.02 + 0.02]
-    np.testing.assert_allclose(found, [*twice, twice[-1] + 0.03], atol=1e-15)
+    np.testing.assert_allclose(found, exact, atol=1e-15)
 
 
 def test_a_law_by_name_and_the_keys_that_replace_its_own():
     given = jl.presets.load("westerly-rough")
-    keys = {"from": "westerly-rough", "asperity": {"mu": 0.5}}
-    law = build_law(keys, "law", Files())
+    law = build_law({"from": "westerly-rough", "asperity": {"mu": 0.5}}, "law", Files())
     assert law == replace(given, plane=0.0, asperity=replace(given.asperity, mu=0.5))
     with pytest.raises(ValueError, match=r"'no\.toml' is neither a preset"):
         parse(TEXT.replace(ROCK, 'from = "no.toml"\n'))
@@ -228,10 +225,7 @@ def test_an_angle_that_is_not_found_is_given_up(monkeypatch):
     monkeypatch.setattr(monitors, "friction_angle", lambda law, stress: next(angles))
     assert monitors.slip_angle(scene, "rock", 1, 1.0)["predicted_angle"] is None
 
-    def fails(*_args, **_keys):
-        raise PathError("no further", None)
-
-    monkeypatch.setattr(jl, "direct_shear", fails)
+    monkeypatch.setattr(jl, "direct_shear", Mock(side_effect=PathError("no further", None)))
     assert monitors.shear_curve(scene.laws["rock"], 1e4, np.array([0.0, 1e-3])) is None
 
 

@@ -1,6 +1,8 @@
 """Saved states: whole, of one scene, resumed anywhere, and only as the method can carry it."""
 
 from dataclasses import replace
+from shutil import rmtree
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from scipy.sparse.linalg import ArpackNoConvergence
 
 from dem_demo import Refused, Simulation, load, parse
 from dem_demo.dynamics import timestep
+from dem_demo.dynamics.blocks import Blocks
 from dem_demo.output.record import Record, outcomes
 
 TEXT = f"""
@@ -40,7 +43,10 @@ record = 0.002
 
 def begun(steps, text=TEXT):
     """A simulation some steps after its start."""
-    sim = Simulation(parse(text))
+    return advanced(Simulation(parse(text)), steps)
+
+
+def advanced(sim, steps):
     for _ in range(steps):
         sim.step()
     return sim
@@ -57,26 +63,20 @@ file = "motion.csv"
 
 def test_files_are_found_beside_their_scene_and_kept_in_the_state(tmp_path, monkeypatch):
     """A record and a law, relative to the scene; a state goes on without them, from anywhere."""
-    home, other = tmp_path / "home", tmp_path / "other"
+    home = tmp_path / "home"
     home.mkdir()
-    other.mkdir()
-    monkeypatch.chdir(other)
+    monkeypatch.chdir("/")
     (home / "motion.csv").write_text("time_s,acceleration_m/s2\n0.0,0.0\n0.1,1.0\n")
     parse(TEXT).laws["rock/rough"].to_toml(home / "mine.toml")
     text = TEXT.replace(ROCK, 'from = "mine.toml"\n').replace("[run]\n", DRIVE)
     (home / "scene.toml").write_text(text)
-    scene = load(home / "scene.toml")
-    assert scene.laws["rock/rough"].heights is not None
-    assert scene.drives[0].times == (0.0, 0.1)
-    sim = Simulation(scene)
+    sim = Simulation(load(home / "scene.toml"))
+    assert sim.scene.laws["rock/rough"].heights is not None
+    assert sim.scene.drives[0].times == (0.0, 0.1)
     sim.save(tmp_path / "state")
-    for file in home.iterdir():
-        file.unlink()
-    again = Simulation.load(tmp_path / "state")
-    for _ in range(20):
-        sim.step()
-        again.step()
-    assert (again.blocks.motion == sim.blocks.motion).all()
+    rmtree(home)
+    again = advanced(Simulation.load(tmp_path / "state"), 20)
+    assert (again.blocks.motion == advanced(sim, 20).blocks.motion).all()
 
 
 def test_a_scene_changed_in_memory_is_not_saved(tmp_path):
@@ -131,12 +131,10 @@ def test_resume_is_bit_identical(tmp_path, damage):
     text = TEXT.replace("mu = 0.4", f"mu = 0.4{damage}").replace("-0.05]", "-0.3]")
     begun(170, text).save(tmp_path)
     (tmp_path / "notes.txt").write_text("mine")
-    again, whole = Simulation.load(tmp_path), begun(400, text)
-    for _ in range(230):
-        again.step()
-    assert again.time == whole.time
+    again, whole = advanced(Simulation.load(tmp_path), 230), begun(400, text)
     assert (again.blocks.motion == whole.blocks.motion).all()
     assert (again.joints.traction == whole.joints.traction).all()
+    assert again.time == whole.time
     assert again.ledger.value == whole.ledger.value
     assert again.limit.least == whole.limit.least
     batch = again.joints.held[again.joints.names.index("rock/rough")].batch
@@ -147,27 +145,20 @@ def test_resume_is_bit_identical(tmp_path, damage):
 def test_a_damaged_file_or_another_version_is_refused(tmp_path):
     begun(3).save(tmp_path)
     file = tmp_path / "state.npz"
-    whole = file.read_bytes()
-    for damage in (
-        whole[: len(whole) // 2],
-        b"",
-        whole[:2000] + bytes([whole[2000] ^ 1]) + whole[2001:],
+    whole, arrays = file.read_bytes(), dict(np.load(file))
+    damaged = r"state\.npz is damaged .*run the scene again"
+    lacking = {key: value for key, value in arrays.items() if key != "states-1"}
+    for write, told in (
+        (lambda: file.write_bytes(whole[: len(whole) // 2]), damaged),
+        (lambda: file.write_bytes(b""), damaged),
+        (lambda: file.write_bytes(whole[:2000] + bytes([whole[2000] ^ 1]) + whole[2001:]), damaged),
+        (lambda: np.savez(file, **lacking), damaged),
+        (lambda: np.savez(file, **{**arrays, "version": 3}), "version 3, this demo reads 8: go on"),
+        (file.unlink, r"holds no saved state: state\.npz is missing"),
     ):
-        file.write_bytes(damage)
-        with pytest.raises(ValueError, match=r"state\.npz is damaged .*run the scene again"):
+        write()
+        with pytest.raises(ValueError, match=told):
             Simulation.load(tmp_path)
-    file.write_bytes(whole)
-    with np.load(file) as data:
-        arrays = dict(data)
-    np.savez(file, **{key: value for key, value in arrays.items() if key != "states-1"})
-    with pytest.raises(ValueError, match=r"state\.npz is damaged .*run the scene again"):
-        Simulation.load(tmp_path)
-    np.savez(file, **{**arrays, "version": 3})
-    with pytest.raises(ValueError, match="version 3, this demo reads 8: go on with"):
-        Simulation.load(tmp_path)
-    file.unlink()
-    with pytest.raises(ValueError, match=r"holds no saved state: state\.npz is missing"):
-        Simulation.load(tmp_path)
 
 
 def test_a_state_that_is_refused_changes_nothing():
@@ -182,23 +173,16 @@ def test_a_state_that_is_refused_changes_nothing():
             Simulation(sim.scene, step, sim.state())
     with pytest.raises(Refused, match=r"must stay below 0\.98 of the limit"):
         Simulation(sim.scene, 1.01 * limit, sim.state())
-    sim.step()
-    whole = begun(6)
-    assert (sim.blocks.motion == whole.blocks.motion).all()
+    assert (advanced(sim, 1).blocks.motion == begun(6).blocks.motion).all()
 
 
 def test_an_eigenvalue_that_does_not_converge_is_computed_exactly(monkeypatch):
     scene = load("slope")
     whole = Simulation(scene).limit.now
-    asked = []
-
-    def never(*_args, **_keys):
-        asked.append(1)
-        raise ArpackNoConvergence("no convergence", np.zeros(0), np.zeros((0, 0)))
-
+    never = Mock(side_effect=ArpackNoConvergence("", np.zeros(0), np.zeros((0, 0))))
     monkeypatch.setattr(timestep, "eigsh", never)
     assert Simulation(scene).limit.now == pytest.approx(whole, rel=1e-6)
-    assert asked
+    assert never.called
 
 
 @pytest.mark.parametrize("size", [0.01, 1.0, 100.0])
@@ -207,11 +191,9 @@ def test_failure_is_counted_by_the_size_of_the_blocks(size):
     scene = load("slope")
     blocks = tuple(replace(block, corners=size * block.corners) for block in scene.blocks)
     scene, rock = replace(scene, blocks=blocks), scene.rocks[0]
-    start = np.zeros((6, len(blocks)))
-    start[:2] = np.transpose([block.centroid for block in blocks])
+    start = Blocks(scene).motion
     end = start.copy()
-    end[0, rock.free[0]] += 0.2 * size  # of blocks of about 1 m2 times size**2
-    end[0, rock.free[1]] += 0.05 * size
+    end[0, rock.free[:2]] += [0.2 * size, 0.05 * size]  # of blocks of about 1 m2 times size**2
     record = object.__new__(Record)
     record.scene, record.times, record.motion = scene, [0.0, 1.0], [start, end]
     assert [entry["failed"] for entry in outcomes(record)] == [1, 0]

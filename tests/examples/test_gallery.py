@@ -21,20 +21,15 @@ WITHOUT_UNIT = re.compile(r"iteration|branch: .*|.+ over .+")  # counts and rati
 
 def run(path):
     """Each picture as it was after the cell that drew it."""
+    from matplotlib import pyplot
+
     space, shown = {"__name__": "__main__"}, []
     for number, cell in enumerate(re.split(r"^# %%.*$", path.read_text(), flags=re.MULTILINE)):
         exec(compile(cell, f"{path.name}, cell {number + 1}", "exec"), space)
-        shown += [(axes, len(axes.get_children())) for axes in close_pictures()]
+        figures = [pyplot.figure(number) for number in pyplot.get_fignums()]
+        shown += [(axes, len(axes.get_children())) for one in figures for axes in one.axes]
+        pyplot.close("all")
     return shown
-
-
-def close_pictures():
-    """Close all pictures, as the site does, and return their axes."""
-    from matplotlib import pyplot
-
-    axes = [one for number in pyplot.get_fignums() for one in pyplot.figure(number).axes]
-    pyplot.close("all")
-    return axes
 
 
 def faults(axes, parts):

@@ -1,5 +1,6 @@
 """Rock masses: the scenes end as intended, the template runs, wrong tables are refused."""
 
+import csv
 import itertools
 import json
 import re
@@ -25,6 +26,18 @@ TEXT = TEMPLATE.read_text()
 PLAIN = f"\n[laws.plain]\n{coulomb(0.4, 4e8, 3e8)}"
 
 
+@pytest.fixture
+def check(tmp_path, capsys):
+    """What the command `check` tells of a scene of this text."""
+
+    def told(text):
+        (tmp_path / "mine.toml").write_text(text)
+        assert main(["check", str(tmp_path / "mine.toml")]) == 0
+        return capsys.readouterr().out
+
+    return told
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "until", "failed"), [("slope", 0.7, 20), ("slope-azimuth", 0.9, 15), ("arch", 0.4, 3)]
@@ -37,13 +50,10 @@ def test_short_scenes_end_as_intended(name, until, failed):
     """
     scene = load(name)
     assert sum(not block.fixed for block in scene.blocks) <= 60
-    sim = Simulation(scene)
-    _, summary = run(sim, until=until)
+    _, summary = run(Simulation(scene), until=until)
     stands, fails = summary["rocks"]
-    assert stands["state"] == "stands"
-    assert stands["moved_m"] < 1e-9
-    assert stands["creep_m_per_s"] < 1e-9
-    assert fails["state"] == "fails"
+    assert (stands["state"], fails["state"]) == ("stands", "fails")
+    assert max(stands["moved_m"], stands["creep_m_per_s"]) < 1e-9
     assert fails["failed"] >= failed
     assert summary["largest_energy_error"] < 5e-3
 
@@ -99,36 +109,25 @@ def test_a_scene_of_ones_own_from_the_template(tmp_path, capsys):
     out = tmp_path / "out"
     assert main([str(file), "--out", str(out)]) == 0
     assert "slope: stands" in capsys.readouterr().out
-    for name in ("final.png", "motion.gif", "history.csv", "state"):
-        assert (out / name).exists(), name
-    summary = json.loads((out / "summary.json").read_text())
-    assert summary["rocks"][0]["state"] == "stands"
-    assert summary["largest_energy_error"] < 1e-4
-    header, *rows = (out / "history.csv").read_text().splitlines()
-    moved = float(rows[-1].split(",")[header.split(",").index("pin 1: moved_m")])
-    assert 1e-5 < moved < 1e-2  # the settlement of the pin's block, m
+    written = {path.name for path in out.iterdir()}
+    assert written >= {"final.png", "motion.gif", "history.csv", "state"}
+    assert json.loads((out / "summary.json").read_text())["largest_energy_error"] < 1e-4
+    with (out / "history.csv").open() as stream:
+        *_, last = csv.DictReader(stream)
+    assert 1e-5 < float(last["pin 1: moved_m"]) < 1e-2  # the settlement of the pin's block, m
     words = ["resume", str(out / "state"), "--until", "0.12", "--no-pictures"]
     assert main([*words, "--out", str(tmp_path / "on")]) == 0
 
 
-def test_a_law_with_cells_for_larger_stresses_is_told_what_to_write(tmp_path, capsys):
-    file = tmp_path / "mine.toml"
-    assert main(["new", str(file)]) == 0
-    text = file.read_text()
-    assert main(["check", str(file)]) == 0
-    assert "closure_range" not in capsys.readouterr().out
-    usual = re.sub(r"closure_range = .*\n", "", text)  # the closure at 20 MPa
-    file.write_text(usual)
-    assert main(["check", str(file)]) == 0
-    said = capsys.readouterr().out
+def test_a_law_with_cells_for_larger_stresses_is_told_what_to_write(check):
+    usual = re.sub(r"closure_range = .*\n", "", TEXT)  # the closure at 20 MPa
+    said = check(usual)
     assert "law 'joint': its joints bear 1e+05 Pa at most" in said
     (wanted,) = re.findall(r"In \[laws.joint\] write (closure_range = [^,]*),", said)
     one_cell = "resolution = { u = 4, phi = 6, depth = 1 }"
-    for cured in (usual.replace("[laws.joint]", f"[laws.joint]\n{wanted}"),
-                  re.sub("resolution = .*", one_cell, usual)):  # fmt: skip
-        file.write_text(cured)
-        assert main(["check", str(file)]) == 0
-        assert "closure_range" not in capsys.readouterr().out
+    cured = usual.replace("[laws.joint]", f"[laws.joint]\n{wanted}")
+    for text in (TEXT, cured, re.sub("resolution = .*", one_cell, usual)):
+        assert "closure_range" not in check(text)
 
 
 VARIANT = """
@@ -151,11 +150,18 @@ def test_a_variant_changes_what_it_names():
     sets = [{**scene["rock"][0]["set"][0], "dip": 5.0}, scene["rock"][0]["set"][1]]
     assert rock == {**scene["rock"][0], "seed": 7, "set": sets}
     assert {key for key in scene if flat[key] != scene[key]} == {"title", "laws", "rock"}
-    with pytest.raises(ValueError, match=r"variant = 'flt' is unknown; did you mean 'flat'"):
-        parse('variant = "flt"\n' + TEXT + VARIANT)
-    wrong = VARIANT.replace("seed", "sead")
-    with pytest.raises(ValueError, match="sead' is unknown; did you mean 'seed'"):
-        parse('variant = "flat"\n' + TEXT + wrong)
+
+
+@pytest.mark.parametrize(
+    ("variant", "text", "told"),
+    [
+        ("flt", VARIANT, "variant = 'flt' is unknown; did you mean 'flat'"),
+        ("flat", VARIANT.replace("seed", "sead"), "sead' is unknown; did you mean 'seed'"),
+    ],
+)
+def test_nonsense_of_a_variant_is_named(variant, text, told):
+    with pytest.raises(ValueError, match=told):
+        parse(f'variant = "{variant}"\n{TEXT}{text}')
 
 
 def test_joints_have_the_law_of_their_set():
@@ -164,8 +170,7 @@ def test_joints_have_the_law_of_their_set():
     scene = parse(
         text.replace("[watch]", "[[joint]]\naround = [-3.0, 7.0]\nlaw = 'plain'\n[watch]")
     )
-    inside = [Polygon(block.corners).contains(Point(-3.0, 7.0)) for block in scene.blocks]
-    block = inside.index(True)
+    block = [Polygon(one.corners).contains(Point(-3.0, 7.0)) for one in scene.blocks].index(True)
     tracker = Tracker(scene, Blocks(scene).motion)
     start, of = tracker.outlines.start, tracker.outlines.block
     laws = {int(start[one] + edge): law for (one, edge), law in scene.edge_laws.items()}
@@ -242,11 +247,9 @@ def test_coulomb_in_compare_has_the_strength_of_the_law():
 BOND = "bond = {{ cohesion = 1e4, tension = 1e4, normal_stiffness = 1e10, shear_stiffness = {} }}\n"
 
 
-def test_a_bond_that_breaks_before_friction_is_there_is_told(tmp_path, capsys):
+def test_a_bond_that_breaks_before_friction_is_there_is_told(check):
     for stiffness, told in (("1e10", True), ("1e6", False)):
-        (tmp_path / "scene.toml").write_text(on_base(ROCK + BOND.format(stiffness), [2.0, 1.0]))
-        assert main(["check", str(tmp_path / "scene.toml")]) == 0
-        said = capsys.readouterr().out
+        said = check(on_base(ROCK + BOND.format(stiffness), [2.0, 1.0]))
         assert ("law 'rock': its bond breaks after 1e-06 m of shear" in said) == told
 
 
@@ -266,7 +269,7 @@ end = 0.1
 """
 
 
-def test_a_cut_through_an_inward_corner_holds(tmp_path, capsys):
+def test_a_cut_through_an_inward_corner_holds():
     """A cantilever 3 m long on the side of a pillar: whole rock bears it, a joint does not."""
     for cut, state in (("", "stands"), ('cut_law = "joint"\n', "moves")):
         scene = parse(f"[laws.joint]\n{coulomb(0.1, 1e9, 1e9)}" + NOTCHED.replace("CUT", cut))

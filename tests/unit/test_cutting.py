@@ -18,9 +18,7 @@ def test_a_regular_grid_is_exact():
     sets = [JointSet(0.0, 2.0, "a"), JointSet(90.0, 1.0, "b")]
     for outline in (SQUARE, SQUARE[::-1]):
         blocks, sets_of, joined, dropped = cut(outline, sets, seed=0, least_width=0.1)
-        assert len(blocks) == 50
-        assert joined == 0
-        assert dropped == []
+        assert (len(blocks), joined, dropped) == (50, 0, [])
         for block, of in zip(blocks, sets_of, strict=True):
             # Rounding of coordinates of size 10.
             assert np.ptp(block, axis=0) == pytest.approx([1.0, 2.0], abs=1e-13)

@@ -15,6 +15,17 @@ TAU = np.array([0.0, 0.875, 1.25, 1.75, 1.625, 1.5])  # MPa
 NORMAL = {"normal_stress": 2e6}
 
 
+@pytest.fixture
+def shear_of(tmp_path):
+    """Writes a text to a file and reads its tests of shear."""
+
+    def read(text, **told):
+        (tmp_path / "lab.csv").write_text(text, encoding="utf-8")
+        return read_shear(tmp_path / "lab.csv", **told)
+
+    return read
+
+
 def rows(*columns, mark=",", decimal="."):
     """Lines of a file."""
     table = zip(*(np.asarray(c).tolist() for c in columns), strict=True)
@@ -112,12 +123,11 @@ def test_several_tests_of_one_file(kind, tmp_path):
     path, text = tmp_path / "lab.csv", SEVERAL[kind]
     if text is None:
         book = pytest.importorskip("openpyxl").Workbook()
+        titles = ["us [mm]", "tau [MPa]", "sn [MPa]", "dn [mm]"]
+        table = np.column_stack([U, TAU, 0 * U + 2, OPENED]).tolist()
         for sheet in (book.active, book.create_sheet("other")):
-            sheet.append(["Joint 7"])
-            sheet.append([])
-            sheet.append(["us [mm]", "tau [MPa]", "sn [MPa]", "dn [mm]"])
-            for row in zip(U, TAU, 0 * U + 2, OPENED, strict=True):
-                sheet.append([float(x) for x in row])
+            for row in (["Joint 7"], [], titles, *table):
+                sheet.append(row)
         book.save(path := tmp_path / "lab.xlsx")
     else:
         path.write_text(text)
@@ -167,21 +177,17 @@ def test_every_known_name_of_a_column_is_read(table, asked, name, tmp_path):
     assert found.shear_stress[2 - (table is PEAK)] == pytest.approx(1.25e6)
 
 
-def test_a_normal_stress_that_varies_is_taken_row_by_row(tmp_path):
-    (tmp_path / "lab.csv").write_text("us [mm],tau [MPa],sn [MPa]\n" + rows(U, TAU, 1 + U))
-    (test,) = read_shear(tmp_path / "lab.csv")
+def test_a_normal_stress_that_varies_is_taken_row_by_row(shear_of):
+    (test,) = shear_of("us [mm],tau [MPa],sn [MPa]\n" + rows(U, TAU, 1 + U))
     np.testing.assert_allclose(test.normal, 1e6 * (1 + U))
 
 
-def test_tare_is_subtracted_and_told(tmp_path):
+def test_tare_is_subtracted_and_told(shear_of):
     """0.1 MPa that the load cell showed before the test; 1 % is scatter of the first row."""
-    path = tmp_path / "lab.csv"
-    path.write_text("us [mm],tau [MPa]\n" + rows(U, TAU + 0.1))
-    (test,) = read_shear(path, **NORMAL)
+    (test,) = shear_of("us [mm],tau [MPa]\n" + rows(U, TAU + 0.1), **NORMAL)
     np.testing.assert_allclose(test.shear_stress, 1e6 * TAU)
     assert "begins at 5.4 % of its largest value, which is subtracted" in test.notes[0]
-    path.write_text("us [mm],tau [MPa]\n" + rows(U, TAU + 0.01))
-    (test,) = read_shear(path, **NORMAL)
+    (test,) = shear_of("us [mm],tau [MPa]\n" + rows(U, TAU + 0.01), **NORMAL)
     np.testing.assert_allclose(test.shear_stress, 1e6 * TAU + 1e4)
     assert not test.notes
 
@@ -199,15 +205,13 @@ ODD = {  # a file with a row that is no measurement, and what is told of it
 
 
 @pytest.mark.parametrize("kind", ODD)
-def test_rows_that_are_no_measurement_are_named_until_an_option_settles_it(kind, tmp_path):
-    text, told = ODD[kind]
-    path = tmp_path / "lab.csv"
-    path.write_text("No,us [mm],tau [MPa]\n" + text)
+def test_rows_that_are_no_measurement_are_named_until_an_option_settles_it(kind, shear_of):
+    text, told = "No,us [mm],tau [MPa]\n" + ODD[kind][0], ODD[kind][1]
     with pytest.raises(ValueError, match=rf"{re.escape(told)}\. .*--outliers skip"):
-        read_shear(path, **NORMAL)
-    (skipped,) = read_shear(path, **NORMAL, outliers="skip")
+        shear_of(text, **NORMAL)
+    (skipped,) = shear_of(text, **NORMAL, outliers="skip")
     if kind != "a sentinel":
-        (kept,) = read_shear(path, **NORMAL, outliers="keep")
+        (kept,) = shear_of(text, **NORMAL, outliers="keep")
         assert kept.shear.size == skipped.shear.size + 1
     np.testing.assert_allclose(skipped.shear_stress, 2e9 * skipped.shear, atol=1e-6)
     assert told in skipped.notes[0]
@@ -218,13 +222,6 @@ def test_the_steep_foot_of_two_cycles_is_no_jump(tmp_path):
     stress = np.array([0.5, 2, 4, 2, 0.1, 0, 0.1, 2, 4, 8])
     (tmp_path / "c.csv").write_text("s [MPa],closure [um]\n" + rows(stress, 50 * stress**0.2))
     assert read_closure(tmp_path / "c.csv", "s:MPa")[0].size == 10
-
-
-def test_a_displacement_beside_another_is_asked_for(tmp_path):
-    path = tmp_path / "lab.csv"
-    path.write_text("displacement [mm],way [mm],tau [MPa]\n" + rows(U / 9, U, TAU))
-    with pytest.raises(ValueError, match="which column is the shear displacement"):
-        read_shear(path, **NORMAL)
 
 
 def test_preload_cycles_are_first_loading_where_the_stress_is_new():
@@ -262,39 +259,41 @@ def test_an_envelope_goes_through_strengths_of_its_own_form(name, strength):
 THOUSANDS = "us [mm]\ttau [kPa]\n0.0\t0\n0.1\t875\n0.2\t1,201\n0.3\t1,305\n"
 
 
+# 1,201 kPa is 1.2 MPa or 1.2 kPa: a factor of 1000 that no later check may see
+MAY_BE_THOUSANDS = [
+    THOUSANDS,
+    THOUSANDS.replace("\t", ";"),
+    "us [mm],tau [kPa]\n0,0\n1,1.201\n2,1.305\n",
+    THOUSANDS.replace("0.", "0,").replace("1,", "1."),  # decimal commas, points for thousands
+    'us [mm],tau [kPa]\n0.0,0\n0.1,875\n0.2,"1,201"\n',
+]
+
+
 @pytest.mark.parametrize(
-    "text",
+    ("cells", "decimal", "stress"),
     [
-        THOUSANDS,
-        THOUSANDS.replace("\t", ";"),
-        "us [mm],tau [kPa]\n0,0\n1,1.201\n2,1.305\n",
-        THOUSANDS.replace("0.", "0,").replace("1,", "1."),  # decimal commas, points for thousands
-        'us [mm],tau [kPa]\n0.0,0\n0.1,875\n0.2,"1,201"\n',
+        ("1,1;1,125\n2,2;1,201\n", None, 1.201e6),
+        ("1;1,125\n2;1,201\n", "comma", 1.201e6),
+        ("1;1,200\n2;1,201\n", "comma", 1.201e6),
+        ("1;1,200\n2;1,201\n", "point", 1201e6),
     ],
 )
-def test_what_may_be_thousands_is_refused(text, tmp_path):
-    """1,201 kPa is 1.2 MPa or 1.2 kPa: a factor of 1000 that no later check may see."""
-    (tmp_path / "lab.csv").write_text(text)
-    with pytest.raises(ValueError, match=r"may have a mark between its thousands.*--decimal comma"):
-        read_shear(tmp_path / "lab.csv", **NORMAL)
-
-
-def test_decimal_commas_are_read_where_a_number_or_the_caller_shows_them(tmp_path):
-    path, text = tmp_path / "lab.csv", "us [mm];tau [MPa]\n0;0\n1,1;1,125\n2,2;1,201\n"
-    path.write_text(text)
-    assert read_shear(path, **NORMAL)[0].shear_stress[2] == 1.201e6
-    path.write_text(text.replace("1,1;", "1;").replace("2,2;", "2;"))
-    assert read_shear(path, **NORMAL, decimal="comma")[0].shear_stress[2] == 1.201e6
-    with pytest.raises(ValueError, match="line 3 holds '1,125'"):
-        read_shear(path, **NORMAL)
-    for mark, value in (("comma", 1.201e6), ("point", 1201e6)):
-        path.write_text("us [mm];tau [MPa]\n0;0\n1;1,200\n2;1,201\n")
-        assert read_shear(path, normal_stress=5e7, decimal=mark)[0].shear_stress[2] == value
+def test_decimal_commas_are_read_where_a_number_or_the_caller_shows_them(
+    cells, decimal, stress, shear_of
+):
+    text = "us [mm];tau [MPa]\n0;0\n" + cells
+    (test,) = shear_of(text, normal_stress=5e7, decimal=decimal)
+    assert test.shear_stress[2] == stress
 
 
 @pytest.mark.parametrize(
     ("text", "told"),
     [
+        *((text, "may have a mark between its thousands.*--decimal comma")
+          for text in MAY_BE_THOUSANDS),
+        ("us [mm];tau [MPa]\n0;0\n1;1,125\n2;1,201\n", "line 3 holds '1,125'"),
+        ("displacement [mm],way [mm],tau [MPa]\n" + rows(U / 9, U, TAU),
+         "which column is the shear displacement"),
         (None, r"lab\.csv: cannot be read .*; give a CSV file"),
         ("", "must hold a line of names with units"),
         (rows(U, TAU), "must hold a line of names with units"),
@@ -307,7 +306,7 @@ def test_decimal_commas_are_read_where_a_number_or_the_caller_shows_them(tmp_pat
         ("us [mm];tau [MPa]\n1;2;3\n2;3;4\n", "has 3 cells under 2 names; give each column a name"),
         ("us [mm],tau [MPa]\n" + rows(U, -TAU), 'turn its sign: .* "tau:-1MPa"'),
     ],
-)
+)  # fmt: skip
 def test_what_cannot_be_read(text, told, tmp_path):
     if text is not None:
         (tmp_path / "lab.csv").write_text(text)

@@ -27,14 +27,13 @@ def test_same_numbers_on_random_laws_and_paths(seed):
     law = random_law(seed)
     k, dim = law.tables, law.dim
     batch, joint, state = law.joints(9), law.joint(), np.zeros((k.rows, 1))
+    others = np.random.default_rng(0).normal(0.0, 1e-7, (8, dim))
     off, peak = np.zeros(4), np.full(4, 1e-300)
     for d in random_path(dim, seed):
         state, F, C = reference.step(k, state, d[:, None], True)
         F_alone, C_alone = joint.update(d)
-        others = np.random.default_rng(0).normal(0.0, 1e-7, (8, dim))
-        F_last, C_last = batch.update(np.vstack([others, d]))
-        np.testing.assert_array_equal(F_last[-1], F_alone)
-        np.testing.assert_array_equal(C_last[-1], C_alone)
+        for alone, all_ in zip((F_alone, C_alone), batch.update([*others, d]), strict=True):
+            np.testing.assert_array_equal(all_[-1], alone)
         mine, one, other = (
             joint.snapshot().values[0],
             joint.measures(),

@@ -9,7 +9,6 @@ import jointlaw as jl
 from jointlaw.discretisation.facets import facets
 from jointlaw.discretisation.nodes import azimuths, depth_nodes, inclinations
 from jointlaw.discretisation.virgin_curve import virgin_curve
-from jointlaw.kernels.pack import _mirror as mirror
 
 
 @pytest.mark.parametrize("b", [-1.0, 0.5, 2.0])
@@ -18,9 +17,7 @@ from jointlaw.kernels.pack import _mirror as mirror
 )
 def test_inclinations_integrate_the_density_exactly(b, count, root):
     u, share = inclinations(b, count)
-    assert (np.diff(u) > 0).all()
-    assert u[0] > 0
-    assert u[-1] < 1
+    assert (np.diff([0.0, *u, 1.0]) > 0).all()
     assert (share > 0).all()
     # a Gauss rule in v, u = v^root: exact to the degree 2 count - 1 of v
     power = np.arange(min(2 * count, 12)) / root
@@ -38,8 +35,9 @@ def test_azimuths_are_exact_for_the_harmonics_of_c(phi, flattest):
     for plane in (None, 0.0):
         f = facets(jl.Orientation(3.0, 0.3, 0.0), 6, phi, plane)
         assert f.weight.sum() == pytest.approx(1.0, abs=1e-14)
-        for k in (1, 2, 3, 4):  # cos 2 phi of the density times cos 2 phi of the stiffness
-            assert np.sum(f.weight * np.cos(k * f.phi)) == pytest.approx(0.0, abs=1e-14)
+        # cos 2 phi of the density times cos 2 phi of the stiffness
+        harmonics = np.cos(np.outer([1, 2, 3, 4], f.phi)) @ f.weight
+        np.testing.assert_allclose(harmonics, 0.0, atol=1e-14)
 
 
 def test_cells_for_small_loads_are_a_geometric_grading():
@@ -61,10 +59,3 @@ def test_memory_goes_with_the_number_of_facets(make_law):
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert most < 20e6
-
-
-@pytest.mark.parametrize("kind", [{}, {"plane": 0.4}, {"closure_only": True}])
-def test_the_mirror_of_a_facet_leans_the_other_way_along_axis_2(make_law, kind):
-    n = make_law(**kind).tables.asperities.n
-    image = n * np.array([[1.0], [-1.0], [1.0]])[: len(n)]
-    np.testing.assert_allclose(n[:, mirror(n).astype(int)], image, atol=1e-15)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from refusals import refused
 
 import jointlaw as jl
 from jointlaw import PathError
@@ -51,9 +52,7 @@ def test_a_law_with_a_plane_is_recorded_in_three_dimensions(make_law):
 def test_closure_test_loads_and_unloads(any_law):
     joint = any_law.joint()
     record = jl.closure_test(joint, 20e6, steps=30)
-    assert record.F1[0] == 0.0
-    assert record.F1.max() == pytest.approx(20e6, rel=1e-9)
-    assert record.F1[-1] == pytest.approx(0.0, abs=20e6 * 1e-9)
+    assert record.F1[[0, 30, -1]] == pytest.approx([0.0, 20e6, 0.0], abs=20e6 * 1e-9)
     assert (np.diff(record.F1[:31]) > 0).all()
     assert (np.diff(record.F1[30:]) < 0).all()
     assert (np.diff(record.dissipated) >= 0).all()
@@ -74,9 +73,8 @@ def test_closure_test_loads_and_unloads(any_law):
 )
 def test_bad_arguments_of_direct_shear(law, arguments, told):
     joint = law.joint()
-    with pytest.raises(ValueError, match=told):
+    with refused(joint, told):
         jl.direct_shear(joint, **({"to": 1e-7, "normal": N} | arguments))
-    assert not joint.snapshot().values.any()
 
 
 def test_a_path_error_keeps_the_record_so_far(law):
@@ -87,6 +85,6 @@ def test_a_path_error_keeps_the_record_so_far(law):
     record = error.value.record
     assert len(record) == 21
     assert record.shear[-1] == pytest.approx(-1e-7)
-    last = [record.F1[-1], record.F2[-1], record.F3[-1]]
     # rounding: the record holds what the update returned, joint.F sums the state again
+    last = [record.F1[-1], record.F2[-1], record.F3[-1]]
     np.testing.assert_allclose(joint.F, last, rtol=0, atol=1e-14 * N)

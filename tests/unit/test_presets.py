@@ -37,21 +37,18 @@ def test_every_printed_set_is_a_preset_and_every_preset_is_printed():
 
 @pytest.mark.parametrize("name", PRINTED)
 def test_numbers_of_the_paper(name):
-    (a, b, c), asperity, heights, length = PRINTED[name]
+    shape, asperity, heights, length = PRINTED[name]
     law = jl.presets.load(name)
-    assert (law.orientation.a, law.orientation.b, law.orientation.c) == (a, b, c)
-    if "K" in asperity:  # GPa um^(1/2), for every length scale of the heights
-        asperity = asperity | {"K": asperity["K"] * GPA * UM**0.5}
-    printed = [(law.asperity, asperity)]
+    assert law.orientation == jl.Orientation(*shape)
+    # K in GPa um^(1/2), for every length scale of the heights
+    sizes = {"K": GPA * UM**0.5, "beta": length, "overlap": length}
+    for part, values in ((law.asperity, asperity), (law.heights, heights or {})):
+        printed = {key: value * sizes.get(key, 1.0) for key, value in values.items()}
+        assert {key: getattr(part, key) for key in values} == pytest.approx(printed, rel=1e-12)
     if heights is None:
-        assert law.heights is None
-        assert law.closure_range == 1 * UM  # the closure kept in Fig. 14 to 16
+        assert (law.heights, law.closure_range) == (None, 1 * UM)  # the closure of Fig. 14 to 16
     else:
-        lengths = {key: heights[key] * length for key in ("beta", "overlap")}
-        printed += [(law.heights, heights | lengths)]
         assert law.heights.formation == "population"
-    for part, values in printed:
-        assert {key: getattr(part, key) for key in values} == pytest.approx(values, rel=1e-12)
 
 
 @pytest.mark.parametrize("name", PRINTED)

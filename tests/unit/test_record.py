@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-
-COLUMNS = ("closure", "shear_2", "shear_3", "F1", "F2", "F3", "sliding", "separated")
-COLUMNS += ("stored", "dissipated")
+from jointlaw.laboratory.record import UNITS
 
 
 def analytic(azimuth=0.0, sense=1.0):
@@ -16,7 +14,7 @@ def analytic(azimuth=0.0, sense=1.0):
     shear = np.array([0.0, 1e-6, 2e-6, 3e-6, 4e-6])
     stress = 10e6 * np.array([0.0, 0.5, 1.0, 0.8, math.tan(math.radians(30))])
     closure = np.array([1.0, 1.1, 1.0, 0.5, 0.25]) * 1e-6
-    columns = dict.fromkeys(COLUMNS, np.zeros(5)) | {
+    columns = dict.fromkeys(UNITS, np.zeros(5)) | {
         "closure": closure,
         "shear_2": sense * shear * math.cos(azimuth),
         "shear_3": sense * shear * math.sin(azimuth),
@@ -66,10 +64,10 @@ def test_summary_figures(azimuth, sense):
     ],
 )
 def test_a_curve_without_a_peak_is_told(shear, stress, peak):
-    columns = {name: np.zeros(len(shear)) for name in COLUMNS}
-    columns |= {"shear_2": np.array(shear, float), "F2": np.array(stress, float)}
-    record = jl.Record(columns | {"F1": np.full(len(shear), 10.0)})
-    assert record.has_peak is peak
+    columns = {name: np.zeros(len(shear)) for name in UNITS}
+    given = {"shear_2": shear, "F1": np.full(len(shear), 10), "F2": stress}
+    columns |= {name: np.array(column, float) for name, column in given.items()}
+    assert jl.Record(columns).has_peak is peak
 
 
 def test_csv_round_trip(tmp_path):
@@ -78,7 +76,7 @@ def test_csv_round_trip(tmp_path):
     table = np.genfromtxt(tmp_path / "r.csv", delimiter=",", names=True)
     derived = ("shear_stress_Pa", "opening_m", "friction_angle_deg", "dilation_angle_deg")
     assert table.dtype.names[-6:] == ("stored_Jm2", "dissipated_Jm2", *derived)
-    for title, name in zip(table.dtype.names, COLUMNS, strict=False):  # twelve digits are written
+    for title, name in zip(table.dtype.names, UNITS, strict=False):  # twelve digits are written
         assert title.startswith(name)
         np.testing.assert_allclose(table[title], record.columns[name], rtol=1e-11)
     np.testing.assert_allclose(table["friction_angle_deg"], record.friction_angle, rtol=1e-11)
@@ -103,8 +101,7 @@ def test_every_panel_of_a_picture_is_labelled(size):
     """Of a closure test and of a shear test."""
     pyplot = pytest.importorskip("matplotlib.pyplot")
     columns = analytic().columns
-    sheared = {name: size * columns[name] for name in ("shear_2", "shear_3")}
-    axes = jl.Record(columns | sheared).plot().axes
+    axes = jl.Record(columns | {"shear_2": size * columns["shear_2"]}).plot().axes
     assert len(axes) == (4 if size else 2)
     assert all(axis.get_ylabel() for axis in axes)
     assert all(axis.get_legend() for axis in axes if len(axis.lines) > 1)

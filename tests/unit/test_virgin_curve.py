@@ -65,12 +65,9 @@ def test_slope_curvature_and_energy_are_derivatives(case):
 def test_no_tension_anywhere(case):
     y = np.concatenate([[-1.0, 0.0], np.geomspace(1e-300, 1e100, 500)])
     force, slope = case.curve.force(y)
-    assert (force >= 0).all()
-    assert (slope >= 0).all()
-    assert (np.diff(force) >= 0).all()
-    assert (case.curve.energy(y) >= 0).all()
-    assert not force[:2].any()
-    assert not slope[:2].any()
+    for never_falls_below_zero in (force, slope, np.diff(force), case.curve.energy(y)):
+        assert (never_falls_below_zero >= 0).all()
+    assert not np.any([force[:2], slope[:2]])
 
 
 def test_closure_is_the_inverse_of_normal_stress(case):
@@ -87,3 +84,34 @@ def test_closure_is_the_inverse_of_normal_stress(case):
 def test_closure_at_the_ends_of_the_number_range(make_law, stress):
     for heights in (None, CASES["no overlap"], CASES["histogram"]):
         assert math.isfinite(make_law(heights=heights).closure(stress))
+
+
+# Which heights the reading "population" admits: the virgin curve must be convex
+SMOOTH = {"alpha": 3.82, "beta": 1.15e-6, "overlap": 2e-6}
+ROUGH = {"alpha": 6.14, "beta": 3.52e-6, "overlap": 12e-6}
+
+
+@pytest.mark.parametrize(("heights", "least"), [(SMOOTH, 0.287), (ROUGH, 0.312)])
+def test_least_exponent_of_the_printed_heights(make_law, heights, least):
+    """Where `Phi` of Eq. 37 stops being convex, found by hand to three digits."""
+    make_law(heights=jl.GammaHeights(**heights), eta=least)
+    with pytest.raises(ValueError, match="not convex") as error:
+        make_law(heights=jl.GammaHeights(**heights), eta=least - 0.001)
+    for remedy in ('formation = "individual"', "broader", "larger overlap", "larger eta"):
+        assert remedy in str(error.value)
+    assert f"asperity.eta = {least - 0.001:g}" in str(error.value)
+
+
+@pytest.mark.parametrize("eta", [0.0, 1.0])
+@pytest.mark.parametrize(
+    "heights", [SMOOTH, ROUGH, SMOOTH | {"beta": 1e-9}, ROUGH | {"overlap": 0}]
+)
+def test_individual_is_always_convex(make_law, heights, eta):
+    make_law(heights=jl.GammaHeights(**heights, formation="individual"), eta=eta)
+
+
+@pytest.mark.parametrize("overlap", [0.0, 9.9e-6])
+def test_a_density_that_ends_in_a_step_is_refused(make_law, overlap):
+    """Its slope falls at the very end, beyond every quantile."""
+    with pytest.raises(ValueError, match="not convex"):
+        make_law(heights=jl.Heights(([1], [0.0, 1e-5]), overlap, "population"))

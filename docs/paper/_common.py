@@ -6,6 +6,7 @@ F = touching(size cos tilt) size^(1 + eta) f(tilt). So a shear test by the total
 along the tilt: f comes from `secant` once for each, the size from one scalar equation.
 """
 
+import atexit
 import math
 from dataclasses import replace
 from functools import cache
@@ -19,6 +20,7 @@ from scipy.optimize import brentq, minimize_scalar
 import jointlaw as jl
 from jointlaw.paper.secant import secant, touching
 
+atexit.register(plt.show)  # a script that has printed shows what it drew
 TOTAL, LAW = "total form (as printed)", "incremental law (this package)"
 WESTERLY = (("westerly-smooth", "smooth"), ("westerly-rough", "rough"))
 SHEAR = "shear displacement δ₂ (µm)"

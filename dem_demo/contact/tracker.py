@@ -11,7 +11,7 @@ moved far enough to matter; between such renewals the geometry is plain arrays.
 
 import numpy as np
 
-from ..compiled import World, address
+from ..compiled import address
 from ..errors import Refused
 from ..scene import Scene
 from .geometry import Contacts, Outlines
@@ -72,11 +72,6 @@ class Tracker:
     def hold(self, corner: np.ndarray, edge: np.ndarray, motion: np.ndarray) -> None:
         """These corners on these edges, at a motion (6, n)."""
         self.contacts = Contacts(self.outlines, corner, edge, motion)
-
-    def bind(self, world: World) -> None:
-        """Tell the compiled step where these arrays lie."""
-        world.max_stale = STALE
-        world.bind(self, "deepest", "offset", "urgent", renewed=self.renewed_at)
 
     @property
     def closure(self) -> np.ndarray:

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from ..compiled import World
-from ..contact import Contacts, Joints, Tracker
+from ..contact import STALE, Contacts, Joints, Tracker
 from ..errors import Refused
 from ..scene import Scene
 from . import saved_states
-from .blocks import Blocks
+from .blocks import MOVED, Blocks
 from .edge_loads import press
 from .energy import DROPPED, Ledger
 from .equilibrium import out_of_balance
@@ -106,7 +106,7 @@ class Simulation:
                 while self.dt > NEAR * self.limit.now and self._halve():
                     pass
             self.limit.require(self.dt)
-            world.bind(checked=self.limit.checked)
+            world.bind(self.limit, "checked")
         if self.n % LOOKS == 0:
             drives.reverse(self.time, self.slid)
 
@@ -153,12 +153,18 @@ class Simulation:
 
     def bind(self) -> None:
         """Tell the compiled step where all arrays lie, after each change of the contacts."""
-        run, self.world = self.scene.run, self.contacts.world
-        self.world.thickness, self.world.parts = self.scene.thickness, run.law_steps
-        self.world.dashpot_normal, self.world.dashpot_shear = run.dashpot_normal, run.dashpot_shear
-        for part in (self.blocks, self.tracker, self.joints, self.ledger):
-            part.bind(self.world)
-        self.world.bind(checked=self.limit.checked)
+        run, blocks, tracker, ledger = self.scene.run, self.blocks, self.tracker, self.ledger
+        self.world = world = self.contacts.world
+        world.thickness, world.parts = self.scene.thickness, run.law_steps
+        world.dashpot_normal, world.dashpot_shear = run.dashpot_normal, run.dashpot_shear
+        world.max_path, world.max_stale, world.driven = MOVED, STALE, len(blocks.drives.rows)
+        names = "motion", "velocity", "inertia", "gravity", "loads", "lightness", "reach"
+        world.bind(blocks, *names, skin=blocks.skins, mobile=blocks.moves)
+        world.bind(blocks.drives, "rows", "axes", "aim")
+        world.bind(tracker, "deepest", "offset", "urgent", renewed=tracker.renewed_at)
+        world.bind(ledger, "last", "area", "lost", "energy", force=ledger.forces)
+        world.bind(self.limit, "checked")
+        self.joints.bind(world)
 
     def _start(self, step: float | None) -> None:
         """From the drawing to step 0: equilibrium, a time step, velocities half a step on."""

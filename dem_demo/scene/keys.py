@@ -91,7 +91,7 @@ ROCK = {
 DRIVE = {
     "block": TEXT, "motion!": partial(one_of, choices=tuple(AXES)), "ease": NOT_NEGATIVE,
     "times": partial(finite, unit="s"), "values": partial(finite, unit="m or degrees"),
-    "back": {"block!": TEXT, "slid!": POSITIVE, "by!": POSITIVE, "rate!": POSITIVE},
+    "back": {"block!": TEXT, "slid!": POSITIVE, "by!": number, "over!": POSITIVE},
     "sine": {
         "acceleration!": POSITIVE, "frequency!": POSITIVE, "cycles": partial(integer, bound=1),
     },

@@ -104,12 +104,10 @@ class Tracker:
         pairs = near[which[near].any(axis=1) & ~self.fixed[near].all(axis=1)]
         now, k = self.contacts, len(self.law)
         asked = np.flatnonzero(which[now.a] | which[now.b])
-        known, first = np.unique(now.codes[asked], return_index=True)
-        found, keys = self._found(motion, pairs, known)
-        spot = np.minimum(np.searchsorted(known, found.codes), max(len(known) - 1, 0))
-        old = np.full(len(spot), -1)
-        if len(known):
-            old = np.where(known[spot] == found.codes, asked[first[spot]], -1)
+        found, keys = self._found(motion, pairs, now.codes[asked])
+        _, again, place = np.intersect1d(found.codes, now.codes[asked], return_indices=True)
+        old = np.full(len(keys), -1)
+        old[again] = asked[place]
         law = self.laws_of(keys)
         stays = (old >= 0) & ((found.closure > 0) | (self.law[old] == law if k else False))
         fresh = ~stays & (found.closure > -self._skin(found.a, found.b))
@@ -118,14 +116,14 @@ class Tracker:
         kept[old[stays]] = True
         if kept.all() and not fresh.any():
             return None
-        rows, many = np.flatnonzero(kept), int(fresh.sum())
+        rows = np.flatnonzero(kept)
         lost = np.maximum(found.closure[fresh], 0.0) * (not pressed)
         self.keys = np.concatenate([self.keys[rows], keys[fresh]])
         self.law = np.concatenate([self.law[rows], law[fresh]])
         self.offset = np.concatenate([self.offset[rows], lost])
         corner = np.concatenate([now.corner[rows], found.corner[fresh]])
         self.hold(corner, np.concatenate([now.edge[rows], found.edge[fresh]]), motion)
-        return np.concatenate([rows, np.full(many, -1)])
+        return np.concatenate([rows, np.full(len(lost), -1)])
 
     def between(self, one: int, other: int) -> np.ndarray:
         """Mask (k,) of the contacts between two blocks."""

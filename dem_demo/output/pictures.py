@@ -71,10 +71,9 @@ class Pictures:
         size = usual_size(block for block in blocks if not block.fixed)
         self.longer = float(f"{0.5 * size / self.most:.0e}")  # of arrows than what they stand for
         self.unit, self.name = (1e3, "mm") if self.most < 0.1 else (1.0, "m")
-        start = record.joints[0]["normal_stress_Pa"]
-        whole = [frame["normal_stress_Pa"] for frame in record.joints]
-        pressed = start[start > 0] if (start > 0).any() else np.concatenate(whole)
-        pressed = pressed[pressed > 0]
+        frames = [frame["normal_stress_Pa"] for frame in record.joints]
+        start, whole = (stress[stress > 0] for stress in (frames[0], np.concatenate(frames)))
+        pressed = start if len(start) else whole
         self.stress = float(np.quantile(pressed, 0.9)) if len(pressed) else 1.0
 
     def states(self, i: int) -> np.ndarray:
@@ -85,11 +84,10 @@ class Pictures:
         """
         now = self.record.joints[i]
         shares = now["slipping"] / np.maximum(1 - now["separated"], 1e-12)
-        moves = np.abs(now["sliding_m/s"]) > CREEP
-        names = np.where(moves & (shares > PARTIAL), "partly sliding", "stuck")
-        names = np.where(moves & (shares > FULL), "sliding", names)
-        closed = now["normal_stress_Pa"] > 1e-3 * self.stress
-        return np.where(closed, names, "open")
+        rests = np.abs(now["sliding_m/s"]) <= CREEP
+        is_open = now["normal_stress_Pa"] <= 1e-3 * self.stress
+        asked = [is_open, rests | (shares <= PARTIAL), shares <= FULL]
+        return np.select(asked, ["open", "stuck", "partly sliding"], "sliding")
 
     def figure(self) -> tuple[Figure, Axes]:
         """An empty frame with its legend: states, a round stress, how long the arrows are."""
@@ -146,8 +144,8 @@ class Pictures:
                     ends[here], linewidths=widths[here], colors=colour, ls=line, zorder=3
                 )
             )
-        axes.set(xlim=(self.low[0], self.high[0]), xlabel="x (m)", aspect="equal")
-        axes.set(ylim=(self.low[1], self.high[1]), ylabel="y (m)")
+        axes.set(xlim=(self.low[0], self.high[0]), xlabel="x (m)", aspect="equal",
+                 ylim=(self.low[1], self.high[1]), ylabel="y (m)")  # fmt: skip
         axes.figure.suptitle(f"{self.title}\nt = {record.times[i]:.2f} s{note}")
 
     @style()

@@ -149,10 +149,9 @@ def outcomes(record: Record) -> list[dict]:
     moved_m: largest since then; failed: blocks that moved more than failed_beyond_m;
     creep_m_per_s: largest mean speed over the last second (or the whole run, if shorter).
     """
-    out = []
-    times = np.array(record.times)
-    before = int(np.searchsorted(times, times[-1] - LOOK_BACK + 1e-9))
-    before = max(min(before, len(times) - 2), 0)
+    out, times = [], np.array(record.times)
+    since = int(np.searchsorted(times, times[-1] - LOOK_BACK + 1e-9))
+    before = max(min(since, len(times) - 2), 0)
     first, then, last = (record.displaced(i) for i in (0, before, -1))
     crept = np.hypot(*(last - then).T) / max(times[-1] - times[before], 1e-300)
     groups, blocks = {rock.name: rock.free for rock in record.scene.rocks}, record.scene.blocks

@@ -38,7 +38,7 @@ def read_record(files: Files, name: str, table: Tables) -> Tables:
     if order < 2 and values[0]:
         raise ValueError(f"{where}, line 2: the first value must be 0, because the blocks rest")
     values *= unit * table.get("scale", 1.0)
-    if table.get("baseline"):
+    if table.get("baseline") and order:  # a displacement ends at rest in any case
         values = _at_rest(times, values, order)
     return {"times": tuple(times.tolist()), "values": tuple(values.tolist()), "order": order,
             "smooth": order == 0}  # fmt: skip
@@ -67,9 +67,7 @@ def _numbers(lines: list[str], where: str) -> tuple[np.ndarray, np.ndarray]:
 
 def _at_rest(times: np.ndarray, values: np.ndarray, order: int) -> np.ndarray:
     """Values less a straight line in acceleration (a parabola in velocity), so that the motion ends
-    at rest where it began; a record of displacement ends at rest in any case."""
-    if order == 0:
-        return values
+    at rest where it began."""
     since = times - times[0]
     parts = since ** (2 - order), since ** (3 - order)
 

@@ -147,8 +147,8 @@ class Joints:
 
     def bind(self, world: World) -> None:
         """Tell the compiled step where these arrays lie."""
-        names = "law", "place", "touch", "reduction", "traction", "delta", "shares"
-        world.bind(self, *names, pools=self._pools)
+        world.bind(self, "law", "place", "touch", "reduction", "traction", "delta", "shares",
+                   pools=self._pools)  # fmt: skip
 
     def rearrange(
         self, before: np.ndarray, law: np.ndarray, keys: np.ndarray, started: bool = False
@@ -167,10 +167,9 @@ class Joints:
         fits = np.array([not started or key in fit for key in map(tuple, keys[new].tolist())], bool)
         for i, held in enumerate(self.held):
             held.drop(self.place[gone & (self.law == i)])
-            mine = law[new] == i
             mated = fits | (not held.batch.law.tables.fades)
             for kind in (True, False):
-                rows = new[mine & (mated == kind)]
+                rows = new[(law[new] == i) & (mated == kind)]
                 if len(rows):
                     place[rows] = held.take(len(rows))
                     touch[rows] = held.begin(place[rows], kind, bonded=not started)

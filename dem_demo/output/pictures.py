@@ -95,12 +95,11 @@ class Pictures:
         across = min(6.5, 6.0 * wide / high)
         figure = Figure(figsize=(max(across + 1.0, 7.5), across * high / wide + 2.6))
         stress, unit, name = float(f"{self.stress:.1g}"), *pressure(self.stress)
-        stuck = STATES["stuck"][0]
         lines = [
             *((f"joint {state}", {"color": colour, "ls": line, "lw": 2.0})
               for state, (colour, line) in STATES.items()),
             (f"{'effective ' * scene.wet}normal stress {unit * stress:g} {name}",
-             {"color": stuck, "lw": self._width(stress)}),
+             {"color": STATES["stuck"][0], "lw": self._width(stress)}),
             (f"displacement, drawn × {self.longer:g}", {"color": "k", "lw": 1.0, "marker": ">"}),
             *[("water table", {"color": WATER, "ls": "-."})] * bool(scene.water),
             *[(self.mark, {"color": MARKED, "lw": 2.0})] * bool(self.marked.any()),
@@ -122,9 +121,10 @@ class Pictures:
         colours = MOVED(np.hypot(*moved.T) / self.most)
         colours[~self.free] = to_rgba(FIXED)
         for which, edge, width in ((~self.marked, "0.45", 0.6), (self.marked, MARKED, 2.0)):
-            some = [shapes[j] for j in np.flatnonzero(which)]
-            face = {"facecolors": colours[which], "edgecolors": edge, "linewidths": width}
-            axes.add_collection(PolyCollection(some, **face))
+            axes.add_collection(PolyCollection(
+                [shapes[j] for j in np.flatnonzero(which)], facecolors=colours[which],
+                edgecolors=edge, linewidths=width,
+            ))  # fmt: skip
         far = self.free & (np.hypot(*moved.T) > ARROW * self.most)
         tails, arrows = record.motion[i][:2].T[far], self.longer * moved[far]
         axes.quiver(

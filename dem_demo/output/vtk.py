@@ -35,8 +35,8 @@ def _list(times: list[float], kind: str) -> str:
     """ParaView's list of the files of all frames."""
     files = (f'<DataSet timestep="{time!r}" part="0" file="{kind}_{i:04d}.vtu" />'
              for i, time in enumerate(times))  # fmt: skip
-    inside = f"<Collection>{''.join(files)}</Collection>"
-    return f'<VTKFile type="Collection" version="0.1">{inside}</VTKFile>'
+    return (f'<VTKFile type="Collection" version="0.1"><Collection>{"".join(files)}'
+            "</Collection></VTKFile>")  # fmt: skip
 
 
 def _blocks(record: Record, i: int) -> meshio.Mesh:

@@ -158,5 +158,5 @@ def _sine(acceleration: float, frequency: float, cycles: int = 10) -> dict:
     phase = np.arange((cycles + 2) * SAMPLES + 1) / SAMPLES  # in cycles
     envelope = np.clip(np.minimum(phase, cycles + 2 - phase), 0.0, 1.0)
     values = acceleration * envelope * np.sin(2 * np.pi * phase)
-    times = tuple((phase / frequency).tolist())
-    return {"times": times, "values": tuple(values.tolist()), "order": 2}
+    return {"times": tuple((phase / frequency).tolist()), "values": tuple(values.tolist()),
+            "order": 2}  # fmt: skip

@@ -106,7 +106,6 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     rocks = [_rock(table, blocks, edge_laws, usual, digs, where) for table in top.get("rock", ())]
     gravity = top.get("gravity", GRAVITY)
     water, in_situ = read_stresses(top, blocks, density, gravity, where)
-    rocks = [replace(r, free=[i for i in r.blocks if not blocks[i].fixed]) for r in rocks]
     number = {block.name: i for i, block in enumerate(blocks)}
     if len(number) < len(blocks):
         raise ValueError(f"{where}: two blocks have the same name; names must differ")
@@ -115,24 +114,24 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     drives = read_drives(top.get("drive", ()), number, blocks, files, where)
     pairs = _pairs(top.get("joint", ()), number, blocks, where)
     least, skin = min(block.width for block in blocks), top["run"].get("skin")
-    soft = SOFT * (skin or SKIN * least)
-    stands = CORNER * max(least, SLIVER * usual_width(blocks))
-    run = Run(**{"corner_length": stands, "soft": soft, **top["run"]})
+    lengths = {"corner_length": CORNER * max(least, SLIVER * usual_width(blocks)),
+               "soft": SOFT * (skin or SKIN * least)}  # fmt: skip
+    run = Run(**lengths | top["run"])
     watched = _watched(top.get("watch", {}), number, blocks, run.corner_length, f"{where}: watch")
     jointed = {*edge_laws.values()} - {WHOLE}
     for law in [default, *pairs.values(), *sorted(jointed)]:
         one_of(f"{where}: law", law, tuple(laws))
     scene = Scene(
         top.get("title", where), tuple(blocks), laws, run, default, pairs,
-        tuple(rocks), edge_laws, drives, gravity, top.get("thickness", 1.0),
-        water, in_situ, pressure, tuple(_stages(digs, blocks, where)), **watched,
+        tuple(replace(r, free=[i for i in r.blocks if not blocks[i].fixed]) for r in rocks),
+        edge_laws, drives, gravity, top.get("thickness", 1.0), water, in_situ, pressure,
+        tuple(_stages(digs, blocks, where)), **watched,
     )  # fmt: skip
     if WHOLE in edge_laws.values():
         joints = [laws[law] for law in jointed or [default]]
         laws.setdefault(WHOLE, whole_rock(joints, HELD * scene.skins.min()))
     for name, law in laws.items():
-        opening = opens_to(law)
-        if opening > scene.skins.min():
+        if (opening := opens_to(law)) > scene.skins.min():
             raise ValueError(
                 f"{where}: laws.{name} holds until the joint is {opening:.3g} m open, but "
                 f"contacts are followed to {scene.skins.min():.3g} m: set a larger run.skin, or "

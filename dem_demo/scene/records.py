@@ -49,7 +49,8 @@ def _unit(title: str) -> str:
     return re.split(r"[\s_(\[]", title.strip(" \t\"')]").lower())[-1].replace("^", "")
 
 
-def _numbers(lines: list[str], where: str) -> tuple[np.ndarray, np.ndarray]:
+def _numbers(lines: list[str], where: str) -> np.ndarray:
+    """Times and values (2, n) of the lines below the first."""
     rows: list[np.ndarray] = []
     for n, line in enumerate(lines[1:], 2):
         try:
@@ -61,8 +62,7 @@ def _numbers(lines: list[str], where: str) -> tuple[np.ndarray, np.ndarray]:
         if row[0] < 0 or (rows and row[0] <= rows[-1][0]):
             raise ValueError(f"{where}, line {n}: time {row[0]:g} s must be >= 0 and increase")
         rows.append(row)
-    times, values = np.transpose(rows)
-    return times, values
+    return np.transpose(rows)
 
 
 def _at_rest(times: np.ndarray, values: np.ndarray, order: int) -> np.ndarray:

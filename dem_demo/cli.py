@@ -227,11 +227,9 @@ def _reduce(given: argparse.Namespace) -> None:
         "factor_without": "factor of safety without those",
         "critical_tilt": "critical tilt in degrees",
     }
-    found = strength.strength_reduction(
-        scene, until, given.out, given.format, partial(print, flush=True)
-    )
+    tell = partial(print, flush=True)
     try:
-        for row in found:
+        for row in strength.strength_reduction(scene, until, given.out, given.format, tell):
             said = (
                 f"no {text}" if row[key] is None else f"{text} {row[key]:.3g}"
                 for key, text in texts.items()

@@ -104,8 +104,8 @@ class Pictures:
             *[("water table", {"color": WATER, "ls": "-."})] * bool(scene.water),
             *[(self.mark, {"color": MARKED, "lw": 2.0})] * bool(self.marked.any()),
         ]  # fmt: skip
-        marks = [Line2D([], [], label=label, **drawn) for label, drawn in lines]
-        figure.legend(handles=marks, loc="outside lower center", ncols=3, frameon=False)
+        figure.legend(handles=[Line2D([], [], label=label, **drawn) for label, drawn in lines],
+                      loc="outside lower center", ncols=3, frameon=False)  # fmt: skip
         axes, scale = figure.add_subplot(), Normalize(0.0, self.unit * self.most)
         figure.colorbar(
             ScalarMappable(scale, MOVED), ax=axes, location="bottom", aspect=50,

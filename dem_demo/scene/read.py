@@ -247,9 +247,8 @@ def _rock(
         block = Block(f"{name} {i + 1}", shape + shift, table.get("density", usual["density"]))
         stays = any(region.contains(Point(block.centroid - shift)) for region in fixed)
         blocks.append(replace(block, fixed=stays))
-        for edge, number in enumerate(of.tolist()):
-            if number >= 0:
-                laws[first + i, edge] = of_edge[number]
+        laws.update(((first + i, edge), of_edge[number])
+                    for edge, number in enumerate(of.tolist()) if number >= 0)  # fmt: skip
     cuts = sum(int((of == CUT).sum()) for of in numbers) // 2
     told = [
         f"{joined} slivers joined to neighbours",

@@ -212,7 +212,6 @@ def alone(scene: Scene, name: str, seed: int | None = None) -> Scene:
         others = set(joint["between"]) - blocks
         return all(other.rpartition(" ")[0] == name for other in others) and (same or not others)
 
-    joints = [joint for joint in data.get("joint", []) if belongs(joint)]
-    digs = [dig for dig in data.get("excavate", []) if belongs({"around": dig["corners"][0]})]
-    kept = {"rock": [own], "watch": {}, "joint": joints, "excavate": digs}
-    return build(data | kept, files=scene.files)
+    digs = (dig for dig in data.get("excavate", []) if belongs({"around": dig["corners"][0]}))
+    kept = {"joint": [*filter(belongs, data.get("joint", []))], "excavate": [*digs]}
+    return build({**data, **kept, "rock": [own], "watch": {}}, files=scene.files)

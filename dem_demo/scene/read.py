@@ -143,15 +143,15 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
 
 
 def _block(table: Tables, density: float, where: str) -> Block:
-    shape, at = table.pop("corners", None), table.pop("at", (0.0, 0.0))
+    name, drawn = f"{where}: block[{table['name']!r}]", {"corners", "box", "at", "angle"} & {*table}
+    if drawn != {"corners"} and ("box" not in drawn or "corners" in drawn):
+        raise ValueError(f"{name}: give `corners`, or `box` and `at`, with `angle`")
     if "box" in table:
-        shape = box(*table.pop("box"), at, table.pop("angle", 0.0))
-    if shape is None:
-        raise ValueError(f"{where}: block[{table['name']!r}]: give `corners`, or `box` and `at`")
-    if trouble := check_convex(shape):
-        raise ValueError(f"{where}: block[{table['name']!r}].corners (or box) {trouble}")
-    held = tuple(table.pop("held", ()))
-    return Block(**{"corners": shape, "density": density, "held": held, **table})
+        at, angle = table.pop("at", (0.0, 0.0)), table.pop("angle", 0.0)
+        table["corners"] = box(*table.pop("box"), at, angle)
+    if trouble := check_convex(table["corners"]):
+        raise ValueError(f"{name}.corners (or box) {trouble}")
+    return Block(**{"density": density, **table, "held": tuple(table.get("held", ()))})
 
 
 def _pairs(

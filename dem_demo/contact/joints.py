@@ -44,13 +44,17 @@ def virgin_curve(law: Law) -> dict[str, np.ndarray]:
     top = float(law.closure(2e9))
     closure = np.concatenate([[0.0], np.geomspace(1e-8 * top, top, 600)])
     stress = law.normal_stress(closure)
-    work = cumulative_trapezoid(stress, closure, initial=0.0)
     stiffness = law.max_stiffness(closure)
     if isinstance(law, jl.CoulombLaw):
         # The law's bound has mu in it, for the coupling of shear to closure. That has no eigenvalue
         # of its own: (kn, 0; mu kn, 0) has kn and 0.
         stiffness = np.full(len(closure), max(law.normal_stiffness, law.shear_stiffness))
-    return {"closure": closure, "stress": stress, "stiffness": stiffness, "work": work}
+    return {
+        "closure": closure,
+        "stress": stress,
+        "stiffness": stiffness,
+        "work": cumulative_trapezoid(stress, closure, initial=0.0),
+    }
 
 
 class Held:

@@ -67,11 +67,7 @@ class Tracker:
         self.law, self.keys, self.offset = none, none.reshape(0, 2), np.zeros(0)
         self.urgent = np.zeros(len(blocks), bool)
         self.renewed_at = np.full((3, len(blocks)), np.nan)  # never
-        self.hold(none, none, motion)
-
-    def hold(self, corner: np.ndarray, edge: np.ndarray, motion: np.ndarray) -> None:
-        """These corners on these edges, at a motion (6, n)."""
-        self.contacts = Contacts(self.outlines, corner, edge, motion)
+        self.contacts = Contacts(self.outlines, none, none, motion)
 
     @property
     def closure(self) -> np.ndarray:
@@ -122,7 +118,8 @@ class Tracker:
         self.law = np.concatenate([self.law[rows], law[fresh]])
         self.offset = np.concatenate([self.offset[rows], lost])
         corner = np.concatenate([now.corner[rows], found.corner[fresh]])
-        self.hold(corner, np.concatenate([now.edge[rows], found.edge[fresh]]), motion)
+        edge = np.concatenate([now.edge[rows], found.edge[fresh]])
+        self.contacts = Contacts(self.outlines, corner, edge, motion)
         return np.concatenate([rows, np.full(len(lost), -1)])
 
     def between(self, one: int, other: int) -> np.ndarray:
@@ -206,10 +203,9 @@ class Tracker:
     def refuse(self, pair, depth: float) -> None:
         """Refuse an overlap (m) of two blocks beyond run.max_overlap."""
         one, other = (self.blocks[n].name for n in pair)
-        most = self.deepest[list(pair)].min()
         raise Refused(
             f"blocks {one!r} and {other!r} overlap by {depth:.3g} m: must stay below "
-            f"{most:.3g} m (a share of the smaller block's width); resume "
+            f"{self.deepest[list(pair)].min():.3g} m (a share of the smaller block's width); resume "
             "with a smaller step, or use stiffer joints, lower loads or speeds, a larger "
             "run.corner_length or run.max_overlap"
         )

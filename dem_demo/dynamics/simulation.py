@@ -283,7 +283,8 @@ class Simulation:
                 setattr(of, name, value.copy() if value.ndim else value.item())
         tracker, blocks = self.tracker, self.blocks
         blocks.remove(np.flatnonzero(blocks.gone).tolist())
-        tracker.hold(saved["contacts.corner"], saved["contacts.edge"], blocks.motion)
+        places = (saved[path] for path in PLACES)
+        tracker.contacts = Contacts(tracker.outlines, *places, blocks.motion)
         self.joints.restore(saved, tracker.law, tracker.keys)
         if step:
             self._change_step(step)

@@ -205,7 +205,7 @@ class Tracker:
         one, other = (self.blocks[n].name for n in pair)
         raise Refused(
             f"blocks {one!r} and {other!r} overlap by {depth:.3g} m: must stay below "
-            f"{self.deepest[list(pair)].min():.3g} m (a share of the smaller block's width); resume "
-            "with a smaller step, or use stiffer joints, lower loads or speeds, a larger "
+            f"{self.deepest[list(pair)].min():.3g} m (a share of the smaller block's width); "
+            "resume with a smaller step, or use stiffer joints, lower loads or speeds, a larger "
             "run.corner_length or run.max_overlap"
         )

@@ -101,8 +101,8 @@ def _run(given: argparse.Namespace) -> None:
     """Run a scene, or a saved state, to its end."""
     if given.vtk and not find_spec("meshio"):
         raise ValueError("--vtk needs meshio: pip install meshio")
-    resumed = "state" in given
-    sim = Simulation.load(given.state, given.step) if resumed else Simulation(load(given.scene))
+    sim = (Simulation.load(given.state, given.step) if "state" in given
+           else Simulation(load(given.scene)))  # fmt: skip
     _announce(sim, given.until)
     dt = sim.dt
     record, summary = run(sim, given.out, given.until, given.format, given.vtk)
@@ -216,8 +216,7 @@ def _compare(given: argparse.Namespace) -> None:
 
 def _reduce(given: argparse.Namespace) -> None:
     scene, rows = load(given.scene), []
-    rough = [law for law in scene.laws.values() if isinstance(law, JointLaw)]
-    if any(law.slope_wear < inf for law in rough):
+    if any(isinstance(law, JointLaw) and law.slope_wear < inf for law in scene.laws.values()):
         print("slope_wear has no effect on these numbers: they are too high")
     given.out.mkdir(parents=True, exist_ok=True)
     if given.force:
@@ -228,11 +227,9 @@ def _reduce(given: argparse.Namespace) -> None:
         "factor_without": "factor of safety without those",
         "critical_tilt": "critical tilt in degrees",
     }
-    found = strength.strength_reduction(
-        scene, until, given.out, given.format, partial(print, flush=True)
-    )
+    tell = partial(print, flush=True)
     try:
-        for row in found:
+        for row in strength.strength_reduction(scene, until, given.out, given.format, tell):
             said = (
                 f"no {text}" if row[key] is None else f"{text} {row[key]:.3g}"
                 for key, text in texts.items()
@@ -241,9 +238,9 @@ def _reduce(given: argparse.Namespace) -> None:
             print(f"{row['rock']}: {', '.join(said)}", flush=True)
             rows.append(row)
     except KeyboardInterrupt:
-        kept = given.out / trials.FILE
         raise KeyboardInterrupt(
-            f"interrupted; {kept} has all finished trials: the same command goes on"
+            f"interrupted; {given.out / trials.FILE} has all finished trials: the same command "
+            "goes on"
         ) from None
     write_json(given.out / "strength.json", {"version": VERSION, "rows": rows})
     print(f"strength.json and pictures of the failure in {given.out}")

@@ -7,6 +7,6 @@ joints         one batch of joints for each law, and its virgin curve
 
 from .geometry import Contacts, Outlines
 from .joints import PARTS, Joints, virgin_curve
-from .tracker import Tracker
+from .tracker import STALE, Tracker
 
-__all__ = ["PARTS", "Contacts", "Joints", "Outlines", "Tracker", "virgin_curve"]
+__all__ = ["PARTS", "STALE", "Contacts", "Joints", "Outlines", "Tracker", "virgin_curve"]

@@ -49,8 +49,7 @@ class Outlines:
         """What the compiled step knows of them."""
         world = World(blocks=len(self.start) - 1, corners=len(self.block),
                       corner_length=self.corner_length, soft=self.soft)  # fmt: skip
-        names = "local", "way", "side", "block", "before", "after", "placed", "turned"
-        world.bind(self, *names)
+        world.bind(self, "local", "way", "side", "block", "before", "after", "placed", "turned")
         return world
 
 
@@ -119,6 +118,5 @@ class Contacts:
         on_a, on_b = (((self.at - centre[x]).conj() * force).imag for x in (self.a, self.b))
         x, y = force.real, force.imag
         parts = np.concatenate([-x, x, -y, y, couple - on_a, on_b - couple])
-        row = 3 * np.concatenate([self.a, self.b])
-        place = np.concatenate([row, row + 1, row + 2])
+        place = (3 * np.concatenate([self.a, self.b]) + np.arange(3)[:, None]).ravel()
         return np.bincount(place, parts, 3 * motion.shape[1]).reshape(-1, 3)

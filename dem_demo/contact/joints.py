@@ -44,20 +44,25 @@ def virgin_curve(law: Law) -> dict[str, np.ndarray]:
     top = float(law.closure(2e9))
     closure = np.concatenate([[0.0], np.geomspace(1e-8 * top, top, 600)])
     stress = law.normal_stress(closure)
-    work = cumulative_trapezoid(stress, closure, initial=0.0)
     stiffness = law.max_stiffness(closure)
     if isinstance(law, jl.CoulombLaw):
         # The law's bound has mu in it, for the coupling of shear to closure. That has no eigenvalue
         # of its own: (kn, 0; mu kn, 0) has kn and 0.
         stiffness = np.full(len(closure), max(law.normal_stiffness, law.shear_stiffness))
-    return {"closure": closure, "stress": stress, "stiffness": stiffness, "work": work}
+    return {
+        "closure": closure,
+        "stress": stress,
+        "stiffness": stiffness,
+        "work": cumulative_trapezoid(stress, closure, initial=0.0),
+    }
 
 
 class Held:
     """The joints of one law: batch, and by their places there what the compiled step needs.
 
-    step: d (places, 2) in m, F (places, 2) in Pa and shown (places, 8), of one step of all; free:
-    places without a contact, the lowest last; curve: the law's virgin curve.
+    step: d (places, 2) in m, F (places, 2) in Pa and shown (places, 8), of one step of all; silent:
+    the same without shown; free: places without a contact, the lowest last; curve: the law's virgin
+    curve.
     """
 
     def __init__(self, law: Law, reduction: float) -> None:
@@ -75,7 +80,7 @@ class Held:
         if held:
             F[:held], shown[:held] = self.step.F, self.step.shown
         self.step = Step(d, F, None, shown=shown)
-        self._silent = Step(d, F, None)
+        self.silent = Step(d, F, None)
 
     def take(self, m: int) -> np.ndarray:
         """Places (m,) for new contacts."""
@@ -100,12 +105,6 @@ class Held:
         damage = 0.0 if bonded and "damage" in law.tables.names else 1.0
         self.step.F[places], self.step.shown[places] = 0.0, [*NEW, damage, *start]
         return start
-
-    def advance(self, parts: int) -> None:
-        """Advance all joints `parts` times by d."""
-        for _ in range(parts - 1):
-            self.batch.take(self._silent)
-        self.batch.take(self.step)
 
     def pool(self) -> Pool:
         """What the compiled step knows of them."""
@@ -152,8 +151,8 @@ class Joints:
 
     def bind(self, world: World) -> None:
         """Tell the compiled step where these arrays lie."""
-        names = "law", "place", "touch", "reduction", "traction", "delta", "shares"
-        world.bind(self, *names, pools=self._pools)
+        world.bind(self, "law", "place", "touch", "reduction", "traction", "delta", "shares",
+                   pools=self._pools)  # fmt: skip
 
     def rearrange(
         self, before: np.ndarray, law: np.ndarray, keys: np.ndarray, started: bool = False
@@ -165,30 +164,28 @@ class Joints:
         a mated joint, which they then continue.
         """
         old, new = before >= 0, np.flatnonzero(before < 0)
-        gone = np.ones(self.n, bool)
-        gone[before[old]] = False
+        gone = ~np.isin(np.arange(self.n), before)
         place, touch = np.full(len(before), -1), np.zeros((len(before), 2))
         place[old], touch[old] = self.place[before[old]], self.touch[before[old]]
         fit = {*map(tuple, self.keys[~self.touch.any(axis=1)].tolist())} if started else set()
         fits = np.array([not started or key in fit for key in map(tuple, keys[new].tolist())], bool)
         for i, held in enumerate(self.held):
             held.drop(self.place[gone & (self.law == i)])
-            mine = law[new] == i
             mated = fits | (not held.batch.law.tables.fades)
             for kind in (True, False):
-                rows = new[mine & (mated == kind)]
+                rows = new[(law[new] == i) & (mated == kind)]
                 if len(rows):
                     place[rows] = held.take(len(rows))
                     touch[rows] = held.begin(place[rows], kind, bonded=not started)
         self.touch, self.keys = touch, keys
         self._arrange(law, place)
 
-    def update(self, closure: np.ndarray, sliding: np.ndarray, parts: int = 1) -> None:
-        """Advance every joint to a closure (m), and by a sliding (m), in equal parts."""
-        d = np.stack([closure - self.delta[:, 0], sliding], axis=1) / (parts * self.reduction)
+    def update(self, closure: np.ndarray, sliding: np.ndarray) -> None:
+        """Advance every joint to a closure (m), and by a sliding (m), in one step."""
+        d = np.stack([closure - self.delta[:, 0], sliding], axis=1) / self.reduction
         for held, rows in zip(self.held, self.rows, strict=True):
             held.step.d[self.place[rows]] = d[rows]
-        self.advance(parts)
+        self.advance(1)
         self.world.call("read")
 
     def advance(self, parts: int) -> None:
@@ -198,7 +195,8 @@ class Joints:
         """
         for held, rows in zip(self.held, self.rows, strict=True):
             if len(rows):
-                held.advance(parts)
+                for step in [held.silent] * (parts - 1) + [held.step]:
+                    held.batch.take(step)
 
     def trial(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Tractions (k, 2), tangents (k, 2, 2) and stored energies (k,) in J/m2 after increments d

@@ -11,7 +11,7 @@ moved far enough to matter; between such renewals the geometry is plain arrays.
 
 import numpy as np
 
-from ..compiled import World, address
+from ..compiled import address
 from ..errors import Refused
 from ..scene import Scene
 from .geometry import Contacts, Outlines
@@ -67,16 +67,7 @@ class Tracker:
         self.law, self.keys, self.offset = none, none.reshape(0, 2), np.zeros(0)
         self.urgent = np.zeros(len(blocks), bool)
         self.renewed_at = np.full((3, len(blocks)), np.nan)  # never
-        self.hold(none, none, motion)
-
-    def hold(self, corner: np.ndarray, edge: np.ndarray, motion: np.ndarray) -> None:
-        """These corners on these edges, at a motion (6, n)."""
-        self.contacts = Contacts(self.outlines, corner, edge, motion)
-
-    def bind(self, world: World) -> None:
-        """Tell the compiled step where these arrays lie."""
-        world.max_stale = STALE
-        world.bind(self, "deepest", "offset", "urgent", renewed=self.renewed_at)
+        self.contacts = Contacts(self.outlines, none, none, motion)
 
     @property
     def closure(self) -> np.ndarray:
@@ -109,12 +100,10 @@ class Tracker:
         pairs = near[which[near].any(axis=1) & ~self.fixed[near].all(axis=1)]
         now, k = self.contacts, len(self.law)
         asked = np.flatnonzero(which[now.a] | which[now.b])
-        known, first = np.unique(now.codes[asked], return_index=True)
-        found, keys = self._found(motion, pairs, known)
-        spot = np.minimum(np.searchsorted(known, found.codes), max(len(known) - 1, 0))
-        old = np.full(len(spot), -1)
-        if len(known):
-            old = np.where(known[spot] == found.codes, asked[first[spot]], -1)
+        found, keys = self._found(motion, pairs, now.codes[asked])
+        _, again, place = np.intersect1d(found.codes, now.codes[asked], return_indices=True)
+        old = np.full(len(keys), -1)
+        old[again] = asked[place]
         law = self.laws_of(keys)
         stays = (old >= 0) & ((found.closure > 0) | (self.law[old] == law if k else False))
         fresh = ~stays & (found.closure > -self._skin(found.a, found.b))
@@ -123,14 +112,15 @@ class Tracker:
         kept[old[stays]] = True
         if kept.all() and not fresh.any():
             return None
-        rows, many = np.flatnonzero(kept), int(fresh.sum())
+        rows = np.flatnonzero(kept)
         lost = np.maximum(found.closure[fresh], 0.0) * (not pressed)
         self.keys = np.concatenate([self.keys[rows], keys[fresh]])
         self.law = np.concatenate([self.law[rows], law[fresh]])
         self.offset = np.concatenate([self.offset[rows], lost])
         corner = np.concatenate([now.corner[rows], found.corner[fresh]])
-        self.hold(corner, np.concatenate([now.edge[rows], found.edge[fresh]]), motion)
-        return np.concatenate([rows, np.full(many, -1)])
+        edge = np.concatenate([now.edge[rows], found.edge[fresh]])
+        self.contacts = Contacts(self.outlines, corner, edge, motion)
+        return np.concatenate([rows, np.full(len(lost), -1)])
 
     def between(self, one: int, other: int) -> np.ndarray:
         """Mask (k,) of the contacts between two blocks."""
@@ -213,10 +203,9 @@ class Tracker:
     def refuse(self, pair, depth: float) -> None:
         """Refuse an overlap (m) of two blocks beyond run.max_overlap."""
         one, other = (self.blocks[n].name for n in pair)
-        most = self.deepest[list(pair)].min()
         raise Refused(
             f"blocks {one!r} and {other!r} overlap by {depth:.3g} m: must stay below "
-            f"{most:.3g} m (a share of the smaller block's width); resume "
-            "with a smaller step, or use stiffer joints, lower loads or speeds, a larger "
+            f"{self.deepest[list(pair)].min():.3g} m (a share of the smaller block's width); "
+            "resume with a smaller step, or use stiffer joints, lower loads or speeds, a larger "
             "run.corner_length or run.max_overlap"
         )

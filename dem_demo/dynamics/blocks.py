@@ -8,7 +8,6 @@ then velocities with the forces at the new positions).
 import numpy as np
 import pymunk
 
-from ..compiled import World
 from ..contact import Contacts
 from ..errors import Refused
 from ..scene import Drives, Scene
@@ -23,9 +22,9 @@ class Blocks:
     go on with. inertia: mass, mass, moment; mobile: motions of blocks that move, driven rock too;
     free: those that forces move; gravity, steady: forces that do not change (N); loads: these
     without gravity and with what water presses (`edge_loads`); root: 1/sqrt(inertia) of the
-    free motions, else 0; gone (n,): blocks that were taken away; support (n, 3): what is left
-    of what these bore on the others (N). The compiled step writes to the first two: change
-    them in place.
+    free motions, else 0; moves (n,): blocks that do; lightness (n,): 1/kg, of what can give way;
+    gone (n,): blocks that were taken away; support (n, 3): what is left of what these bore on the
+    others (N). The compiled step writes to the first two: change them in place.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -43,8 +42,8 @@ class Blocks:
         self.steady = np.array([[*block.load, 0.0] for block in blocks]) * self.mobile
         self.loads = self.steady.copy()
         self.reach = np.array([block.reach for block in blocks])
-        self._lightness = self.free[:, :2].any(axis=1) / mass  # 1/kg, of what can give way
-        self._moves = self.mobile[:, 0].copy()
+        self.lightness = self.free[:, :2].any(axis=1) / mass
+        self.moves = self.mobile[:, 0].copy()
         places = np.array([[*block.centroid, 0.0] for block in blocks]).T
         start = np.array([[*block.velocity, block.spin] for block in blocks])
         self.velocity = np.ascontiguousarray((start * self.mobile).T)
@@ -58,10 +57,8 @@ class Blocks:
         """pymunk's bodies, and its callbacks."""
         self._space, self._bodies, self._number = pymunk.Space(), [], {}
         for i, block in enumerate(scene.blocks):
-            if block.moves:
-                body = pymunk.Body(self.inertia[i, 0], self.inertia[i, 2])
-            else:
-                body = pymunk.Body(body_type=pymunk.Body.STATIC)
+            kind = pymunk.Body.DYNAMIC if block.moves else pymunk.Body.STATIC
+            body = pymunk.Body(self.inertia[i, 0], self.inertia[i, 2], kind)
             body.position = tuple(block.centroid)
             shape = pymunk.Poly(body, block.local.tolist(), radius=float(self.skins[i]))
             shape.sensor, shape.collision_type = True, 1
@@ -83,7 +80,7 @@ class Blocks:
     def near(self) -> np.ndarray:
         """Pairs (p, 2) of blocks whose gap is below the sum of their skins, or almost."""
         moved = np.abs(self.motion[:3] - self._held) > 0.0
-        for i in np.flatnonzero(moved.any(axis=0) & self._moves).tolist():
+        for i in np.flatnonzero(moved.any(axis=0) & self.moves).tolist():
             x, y, angle = self.motion[:3, i].tolist()
             self._bodies[i].position, self._bodies[i].angle = (x, y), angle
         self._held[:] = self.motion[:3]
@@ -95,21 +92,14 @@ class Blocks:
     def remove(self, rows: list[int]) -> None:
         """Take blocks away: nothing moves or meets them any more."""
         self.gone[rows] = True
-        for array in (self.mobile, self.free, self.root, self._lightness, self._moves):
+        for array in (self.mobile, self.free, self.root, self.lightness, self.moves):
             array[rows] = 0
         self.motion[3:, rows] = self.velocity[:, rows] = 0.0
-
-    def bind(self, world: World) -> None:
-        """Tell the compiled step where these arrays lie."""
-        names = "motion", "velocity", "inertia", "gravity", "loads", "reach"
-        world.max_path, world.driven = MOVED, len(self.drives.rows)
-        world.bind(self, *names, skin=self.skins, mobile=self._moves, lightness=self._lightness)
-        world.bind(self.drives, "rows", "axes", "aim")
 
     def damping(self, contacts: Contacts, stiffness: np.ndarray) -> np.ndarray:
         """Critical damping (k,) in N s/m: 2 sqrt(stiffness times reduced mass of the two blocks);
         stiffness in N/m. Each block carries half of a joint."""
-        light = self._lightness[contacts.a] + self._lightness[contacts.b]
+        light = self.lightness[contacts.a] + self.lightness[contacts.b]
         return 2.0 * np.sqrt(stiffness * (0.5 / np.where(light > 0, light, np.inf)))
 
     def refuse(self, i: int, dt: float) -> None:

@@ -7,7 +7,6 @@ of forces times displacement, and that is how every other entry is summed (`book
 
 import numpy as np
 
-from ..compiled import World
 from ..contact import Joints
 from .blocks import Blocks
 
@@ -32,10 +31,6 @@ class Ledger:
         self.energy, self.start = np.zeros(len(COLUMNS)), 0.0
         self.forces, self.last = np.zeros((3, blocks, 3)), np.zeros((2, blocks, 3))
         self.area, self.lost = np.zeros(0), np.zeros(0)
-
-    def bind(self, world: World) -> None:
-        """Tell the compiled step where these arrays lie."""
-        world.bind(self, "last", "area", "lost", "energy", force=self.forces)
 
     def open(self, blocks: Blocks, joints: Joints, dt: float, area: np.ndarray) -> None:
         """Begin at time 0, when the velocities of the blocks' motion hold; area (k,) in m2."""

@@ -65,11 +65,10 @@ def displacements(
     slid = begin(scene, blocks, tracker, joints)
     search = Equilibrium(scene, blocks, tracker, joints, slid, blocks.gravity + blocks.loads)
     known = np.zeros(len(blocks.free), bool) if loose is None else loose
-    for start in (lambda: guess, search.unslid)[guess is None :]:  # each only when it is needed
-        moved, more = search.attempt(start(), known)
-        if not more.any():
-            return moved
-    return None
+    moved, more = search.attempt(search.unslid() if guess is None else guess, known)
+    if more.any() and guess is not None:
+        moved, more = search.attempt(search.unslid(), known)
+    return None if more.any() else moved
 
 
 def _length_forces(scene, blocks, tracker, joints, slid) -> np.ndarray:

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from ..compiled import World
-from ..contact import Contacts, Joints, Tracker
+from ..contact import STALE, Contacts, Joints, Tracker
 from ..errors import Refused
 from ..scene import Scene
 from . import saved_states
-from .blocks import Blocks
+from .blocks import MOVED, Blocks
 from .edge_loads import press
 from .energy import DROPPED, Ledger
 from .equilibrium import out_of_balance
@@ -52,8 +52,8 @@ class Simulation:
         self.scene, self.blocks = scene, Blocks(scene)
         self.tracker, self.joints = Tracker(scene, self.blocks.motion), Joints(scene)
         self.limit, self.t0, self.n = StepLimit(), 0.0, 0
-        given = step or scene.run.step or scene.run.fraction
-        self.why, self.halvings = "", 0 if given else HALVINGS
+        self.why = ""
+        self.halvings = 0 if step or scene.run.step or scene.run.fraction else HALVINGS
         self.ledger = Ledger(len(scene.blocks))
         self.begun = np.full(len(scene.stages), np.inf)
         if saved:
@@ -82,13 +82,12 @@ class Simulation:
            energies are booked.
         4. Check the time step if a joint has stiffened; send back drives.
         """
-        dt, world, drives = self.dt, self.world, self.blocks.drives
-        world.call("before", dt)
+        world, drives = self.world, self.blocks.drives
+        world.call("before", self.dt)
         while world.fast >= 0:
             if not self._halve():
-                self.blocks.refuse(world.fast, dt)
-            dt = self.dt
-            world.call("before", dt)
+                self.blocks.refuse(world.fast, self.dt)
+            world.call("before", self.dt)
         if self.scene.stages:
             self._dig()
         if world.moved or world.stale:
@@ -98,15 +97,15 @@ class Simulation:
             self.tracker.refuse(pair, self.contacts.closure[world.deep])
         self.joints.advance(self.scene.run.law_steps)
         self.n += 1
-        drives.aim[:] = drives.velocity(self.time, dt)
-        world.call("after", dt)
+        drives.aim[:] = drives.velocity(self.time, self.dt)
+        world.call("after", self.dt)
         if world.stiffer:
-            self.limit.look(self.scene, self.blocks, self.contacts, self.joints, dt)
+            self.limit.look(self.scene, self.blocks, self.contacts, self.joints, self.dt)
             if self.dt > SAFE * self.limit.now:
                 while self.dt > NEAR * self.limit.now and self._halve():
                     pass
             self.limit.require(self.dt)
-            world.bind(checked=self.limit.checked)
+            world.bind(self.limit, "checked")
         if self.n % LOOKS == 0:
             drives.reverse(self.time, self.slid)
 
@@ -153,12 +152,18 @@ class Simulation:
 
     def bind(self) -> None:
         """Tell the compiled step where all arrays lie, after each change of the contacts."""
-        run, self.world = self.scene.run, self.contacts.world
-        self.world.thickness, self.world.parts = self.scene.thickness, run.law_steps
-        self.world.dashpot_normal, self.world.dashpot_shear = run.dashpot_normal, run.dashpot_shear
-        for part in (self.blocks, self.tracker, self.joints, self.ledger):
-            part.bind(self.world)
-        self.world.bind(checked=self.limit.checked)
+        run, blocks, tracker, ledger = self.scene.run, self.blocks, self.tracker, self.ledger
+        self.world = world = self.contacts.world
+        world.thickness, world.parts = self.scene.thickness, run.law_steps
+        world.dashpot_normal, world.dashpot_shear = run.dashpot_normal, run.dashpot_shear
+        world.max_path, world.max_stale, world.driven = MOVED, STALE, len(blocks.drives.rows)
+        world.bind(blocks, "motion", "velocity", "inertia", "gravity", "loads", "lightness",
+                   "reach", skin=blocks.skins, mobile=blocks.moves)  # fmt: skip
+        world.bind(blocks.drives, "rows", "axes", "aim")
+        world.bind(tracker, "deepest", "offset", "urgent", renewed=tracker.renewed_at)
+        world.bind(ledger, "last", "area", "lost", "energy", force=ledger.forces)
+        world.bind(self.limit, "checked")
+        self.joints.bind(world)
 
     def _start(self, step: float | None) -> None:
         """From the drawing to step 0: equilibrium, a time step, velocities half a step on."""
@@ -264,8 +269,9 @@ class Simulation:
 
     def state(self) -> Saved:
         """A copy of everything that the future depends on."""
-        arrays = {path: np.array(attrgetter(path)(self)) for path in (*STATE, *PLACES)}
-        return arrays | self.joints.snapshot()
+        return self.joints.snapshot() | {
+            path: np.array(attrgetter(path)(self)) for path in (*STATE, *PLACES)
+        }
 
     def _unpack(self, saved: Saved, step: float | None) -> None:
         for path in STATE:
@@ -277,7 +283,8 @@ class Simulation:
                 setattr(of, name, value.copy() if value.ndim else value.item())
         tracker, blocks = self.tracker, self.blocks
         blocks.remove(np.flatnonzero(blocks.gone).tolist())
-        tracker.hold(saved["contacts.corner"], saved["contacts.edge"], blocks.motion)
+        places = (saved[path] for path in PLACES)
+        tracker.contacts = Contacts(tracker.outlines, *places, blocks.motion)
         self.joints.restore(saved, tracker.law, tracker.keys)
         if step:
             self._change_step(step)

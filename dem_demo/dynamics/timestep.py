@@ -109,20 +109,14 @@ def bound_of_blocks(blocks: Blocks, contacts: Contacts, stiffness, dashpot) -> f
 
 def rates(blocks: Blocks, contacts: Contacts) -> csr_array:
     """(2 k, free motions): opening rates along normal and tangent of unit-mass motions."""
-    k, free = len(contacts.closure), blocks.free
-    number = (np.cumsum(free) - 1).reshape(free.shape)
-    data, row, col = [], [], []
-    for block, sign in ((contacts.a, -1.0), (contacts.b, 1.0)):
-        arm = contacts.at - (blocks.motion[0] + 1j * blocks.motion[1])[block]
-        for first, way in ((0, contacts.normal), (k, -1j * contacts.normal)):
-            parts = (way.real, way.imag, (arm.conj() * way).imag)
-            for axis, part in enumerate(parts):
-                ok = free[block, axis]
-                data.append((sign * part * blocks.root[block, axis])[ok])
-                row.append((first + np.arange(k))[ok])
-                col.append(number[block, axis][ok])
-    entries = np.concatenate(data), (np.concatenate(row), np.concatenate(col))
-    return csr_array(entries, shape=(2 * k, int(free.sum())))
+    k, block = len(contacts.closure), np.concatenate([contacts.a, contacts.b])
+    arm = np.tile(contacts.at, 2) - (blocks.motion[0] + 1j * blocks.motion[1])[block]
+    way = np.repeat([-1.0, 1.0], k) * np.tile([contacts.normal, -1j * contacts.normal], 2)
+    parts = np.stack([way.real, way.imag, (arm.conj() * way).imag], axis=2) * blocks.root[block]
+    row = np.tile(np.arange(2 * k).reshape(2, k), 2)[:, :, None]
+    places = np.broadcast_arrays(row, 3 * block[:, None] + np.arange(3))
+    entries = parts.ravel(), tuple(place.ravel() for place in places)
+    return csr_array(entries, shape=(2 * k, blocks.free.size))[:, blocks.free.ravel()]
 
 
 def largest_step(rates: csr_array, stiffness: np.ndarray, dashpot: np.ndarray) -> float:

@@ -76,21 +76,19 @@ def _face(sim: Simulation, block: int, other: int) -> tuple[int, np.ndarray]:
 def readings(sim: Simulation) -> dict[str, float]:
     """What the scene's [watch] table asks for, now; the unit ends the name. Pins are told as the
     base sees them, which itself is told if it is driven."""
-    row, blocks = {}, sim.scene.blocks
-    for moving, base in (*sim.scene.slip, *sim.scene.shear):
-        name = blocks[moving].name
-        row[f"{name}: base angle_deg"] = base_angle(sim, moving, base)
-        row |= {f"{name}: {key}": value for key, value in _joint(sim, moving, base).items()}
-    for i, pair in enumerate(sim.scene.near):
-        row |= {f"joint {i + 1}: {key}": value for key, value in _joint(sim, *pair).items()}
-    base = base_of(sim.scene, sim.blocks.motion)
-    for i, (block, point) in enumerate(sim.scene.pins):
-        here = _point(sim, block, point) - base
-        row |= {f"pin {i + 1}: {key}": float(value) for key, value in zip(POINT, here, strict=True)}
-        row[f"pin {i + 1}: moved_m"] = float(np.hypot(*(here[:2] - point)))
-    if sim.scene.base is not None and blocks[sim.scene.base].moves:
-        row |= {f"base: {key}": float(value) for key, value in zip(POINT, base, strict=True)}
-    return row
+    groups, scene = [], sim.scene
+    for moving, base in (*scene.slip, *scene.shear):
+        joint = {"base angle_deg": base_angle(sim, moving, base), **_joint(sim, moving, base)}
+        groups.append((scene.blocks[moving].name, joint))
+    groups += [(f"joint {i + 1}", _joint(sim, *pair)) for i, pair in enumerate(scene.near)]
+    origin = base_of(scene, sim.blocks.motion)
+    for i, (block, point) in enumerate(scene.pins):
+        here = _point(sim, block, point) - origin
+        values = *here.tolist(), float(np.hypot(*(here[:2] - point)))
+        groups.append((f"pin {i + 1}", dict(zip((*POINT, "moved_m"), values, strict=True))))
+    if scene.base is not None and scene.blocks[scene.base].moves:
+        groups.append(("base", dict(zip(POINT, origin.tolist(), strict=True))))
+    return {f"{name}: {key}": value for name, group in groups for key, value in group.items()}
 
 
 def _point(sim: Simulation, block: int, point: tuple[float, float]) -> np.ndarray:

@@ -71,10 +71,9 @@ class Pictures:
         size = usual_size(block for block in blocks if not block.fixed)
         self.longer = float(f"{0.5 * size / self.most:.0e}")  # of arrows than what they stand for
         self.unit, self.name = (1e3, "mm") if self.most < 0.1 else (1.0, "m")
-        start = record.joints[0]["normal_stress_Pa"]
-        whole = [frame["normal_stress_Pa"] for frame in record.joints]
-        pressed = start[start > 0] if (start > 0).any() else np.concatenate(whole)
-        pressed = pressed[pressed > 0]
+        frames = [frame["normal_stress_Pa"] for frame in record.joints]
+        start, whole = (stress[stress > 0] for stress in (frames[0], np.concatenate(frames)))
+        pressed = start if len(start) else whole
         self.stress = float(np.quantile(pressed, 0.9)) if len(pressed) else 1.0
 
     def states(self, i: int) -> np.ndarray:
@@ -85,11 +84,10 @@ class Pictures:
         """
         now = self.record.joints[i]
         shares = now["slipping"] / np.maximum(1 - now["separated"], 1e-12)
-        moves = np.abs(now["sliding_m/s"]) > CREEP
-        names = np.where(moves & (shares > PARTIAL), "partly sliding", "stuck")
-        names = np.where(moves & (shares > FULL), "sliding", names)
-        closed = now["normal_stress_Pa"] > 1e-3 * self.stress
-        return np.where(closed, names, "open")
+        rests = np.abs(now["sliding_m/s"]) <= CREEP
+        is_open = now["normal_stress_Pa"] <= 1e-3 * self.stress
+        asked = [is_open, rests | (shares <= PARTIAL), shares <= FULL]
+        return np.select(asked, ["open", "stuck", "partly sliding"], "sliding")
 
     def figure(self) -> tuple[Figure, Axes]:
         """An empty frame with its legend: states, a round stress, how long the arrows are."""
@@ -97,18 +95,17 @@ class Pictures:
         across = min(6.5, 6.0 * wide / high)
         figure = Figure(figsize=(max(across + 1.0, 7.5), across * high / wide + 2.6))
         stress, unit, name = float(f"{self.stress:.1g}"), *pressure(self.stress)
-        stuck = STATES["stuck"][0]
         lines = [
             *((f"joint {state}", {"color": colour, "ls": line, "lw": 2.0})
               for state, (colour, line) in STATES.items()),
             (f"{'effective ' * scene.wet}normal stress {unit * stress:g} {name}",
-             {"color": stuck, "lw": self._width(stress)}),
+             {"color": STATES["stuck"][0], "lw": self._width(stress)}),
             (f"displacement, drawn × {self.longer:g}", {"color": "k", "lw": 1.0, "marker": ">"}),
             *[("water table", {"color": WATER, "ls": "-."})] * bool(scene.water),
             *[(self.mark, {"color": MARKED, "lw": 2.0})] * bool(self.marked.any()),
         ]  # fmt: skip
-        marks = [Line2D([], [], label=label, **drawn) for label, drawn in lines]
-        figure.legend(handles=marks, loc="outside lower center", ncols=3, frameon=False)
+        figure.legend(handles=[Line2D([], [], label=label, **drawn) for label, drawn in lines],
+                      loc="outside lower center", ncols=3, frameon=False)  # fmt: skip
         axes, scale = figure.add_subplot(), Normalize(0.0, self.unit * self.most)
         figure.colorbar(
             ScalarMappable(scale, MOVED), ax=axes, location="bottom", aspect=50,
@@ -124,9 +121,10 @@ class Pictures:
         colours = MOVED(np.hypot(*moved.T) / self.most)
         colours[~self.free] = to_rgba(FIXED)
         for which, edge, width in ((~self.marked, "0.45", 0.6), (self.marked, MARKED, 2.0)):
-            some = [shapes[j] for j in np.flatnonzero(which)]
-            face = {"facecolors": colours[which], "edgecolors": edge, "linewidths": width}
-            axes.add_collection(PolyCollection(some, **face))
+            axes.add_collection(PolyCollection(
+                [shapes[j] for j in np.flatnonzero(which)], facecolors=colours[which],
+                edgecolors=edge, linewidths=width,
+            ))  # fmt: skip
         far = self.free & (np.hypot(*moved.T) > ARROW * self.most)
         tails, arrows = record.motion[i][:2].T[far], self.longer * moved[far]
         axes.quiver(
@@ -146,8 +144,8 @@ class Pictures:
                     ends[here], linewidths=widths[here], colors=colour, ls=line, zorder=3
                 )
             )
-        axes.set(xlim=(self.low[0], self.high[0]), xlabel="x (m)", aspect="equal")
-        axes.set(ylim=(self.low[1], self.high[1]), ylabel="y (m)")
+        axes.set(xlim=(self.low[0], self.high[0]), xlabel="x (m)", aspect="equal",
+                 ylim=(self.low[1], self.high[1]), ylabel="y (m)")  # fmt: skip
         axes.figure.suptitle(f"{self.title}\nt = {record.times[i]:.2f} s{note}")
 
     @style()

@@ -30,8 +30,7 @@ class Record:
     def __init__(self, sim: Simulation) -> None:
         self.scene, self.slips, self.steps = sim.scene, watched_slips(sim), 0
         self.loose = sim.loose
-        watched = (*sim.scene.slip, *sim.scene.shear)
-        self.laws = {pair: law_between(sim, *pair) for pair in watched}
+        self.laws = {pair: law_between(sim, *pair) for pair in (*sim.scene.slip, *sim.scene.shear)}
         self.times: list[float] = []
         self.motion: list[np.ndarray] = []
         self.energy: list[list[float]] = []
@@ -88,9 +87,9 @@ class Record:
 
 def named(scene: Scene, which: np.ndarray) -> list[dict]:
     """The blocks of a mask (n,): names and centroids as drawn (m)."""
-    centroids = [(block.name, *block.centroid.tolist()) for block in scene.blocks]
-    return [dict(zip(("block", "x_m", "y_m"), centroids[i], strict=True))
-            for i in np.flatnonzero(which)]  # fmt: skip
+    some = [scene.blocks[i] for i in np.flatnonzero(which)]
+    return [dict(zip(("block", "x_m", "y_m"), (block.name, *block.centroid.tolist()), strict=True))
+            for block in some]  # fmt: skip
 
 
 def told(blocks: list[dict]) -> str:
@@ -149,10 +148,9 @@ def outcomes(record: Record) -> list[dict]:
     moved_m: largest since then; failed: blocks that moved more than failed_beyond_m;
     creep_m_per_s: largest mean speed over the last second (or the whole run, if shorter).
     """
-    out = []
-    times = np.array(record.times)
-    before = int(np.searchsorted(times, times[-1] - LOOK_BACK + 1e-9))
-    before = max(min(before, len(times) - 2), 0)
+    out, times = [], np.array(record.times)
+    since = int(np.searchsorted(times, times[-1] - LOOK_BACK + 1e-9))
+    before = max(min(since, len(times) - 2), 0)
     first, then, last = (record.displaced(i) for i in (0, before, -1))
     crept = np.hypot(*(last - then).T) / max(times[-1] - times[before], 1e-300)
     groups, blocks = {rock.name: rock.free for rock in record.scene.rocks}, record.scene.blocks

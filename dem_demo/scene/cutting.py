@@ -141,8 +141,8 @@ def _convex_parts(piece: Polygon, sets, lines, tiny) -> list[Polygon]:
     if _width(piece) < tiny:
         return []
     corners = _corners(piece, tiny)
-    inward = [*corners[_bends(corners) < 0]]
-    inward += [np.array(corner) for ring in piece.interiors for corner in ring.coords]
+    of_holes = (np.array(corner) for ring in piece.interiors for corner in ring.coords)
+    inward = [*corners[_bends(corners) < 0], *of_holes]
     if not inward:
         return [Polygon(corners)]
     for joints in sets:
@@ -182,8 +182,8 @@ def _without_slivers(pieces: list[Polygon], sets, lines, least: float, tiny: flo
 
 def _union(one: Polygon, other: Polygon, tiny: float) -> Polygon:
     """Both as one, without the slit that rounding leaves between them."""
-    wide = (part.buffer(tiny, join_style="mitre", mitre_limit=1e3) for part in (one, other))
-    return next(wide).union(next(wide)).buffer(-tiny, join_style="mitre", mitre_limit=1e3)
+    corner = {"join_style": "mitre", "mitre_limit": 1e3}
+    return one.buffer(tiny, **corner).union(other.buffer(tiny, **corner)).buffer(-tiny, **corner)
 
 
 def _neighbours(sliver: Polygon, pieces: list[Polygon], lines, tiny, rims) -> list[int]:

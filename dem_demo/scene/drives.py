@@ -26,7 +26,7 @@ class Drive:
     a cubic spline that begins and ends at rest instead.
     With `order` 1 or 2 the values are velocities or accelerations (m/s, m/s2), and after the last
     the blocks keep their velocity, so that nothing strikes them. `back`: once `block` has slid
-    `slid` (m) along the driven block, that goes back `by` at `rate` (1/s).
+    `slid` (m) along the driven block, that moves by `by` from where it is within `over` (s).
     """
 
     blocks: tuple[int, ...]
@@ -62,13 +62,9 @@ class Drive:
 @cache
 def _sent_back(drive: Drive, at: float) -> Drive:
     """A drive that was told at time `at` to go back."""
-    n = int(np.searchsorted(drive.times, at))
-    ways = np.sign(np.diff(drive.values[: n + 1]))
-    way = ways[ways != 0][-1] if ways.any() else 1.0
-    here = float(np.interp(at, drive.times, drive.values))
-    by, rate = drive.back["by"], drive.back["rate"]
-    values = *drive.values[:n], here, here - way * by
-    return replace(drive, times=(*drive.times[:n], at, at + by / rate), values=values)
+    n, here = int(np.searchsorted(drive.times, at)), float(np.interp(at, drive.times, drive.values))
+    values = *drive.values[:n], here, here + drive.back["by"]
+    return replace(drive, times=(*drive.times[:n], at, at + drive.back["over"]), values=values)
 
 
 class Drives:
@@ -152,9 +148,8 @@ def _lines(table: Tables, number: dict[str, int], unit: float, where: str) -> di
         raise ValueError(f"{where}.times: must increase, one for each of `values`")
     line = {"times": tuple(times), "values": tuple(unit * values), "ease": table.get("ease", 0.1)}
     if back := table.get("back"):
-        block = number[one_of(f"{where}.back.block", back["block"], tuple(number))]
-        line["back"] = {key: unit * back[key] for key in ("by", "rate")}
-        line["back"] |= {"block": block, "slid": back["slid"]}
+        block = one_of(f"{where}.back.block", back["block"], tuple(number))
+        line["back"] = {**back, "block": number[block], "by": unit * back["by"]}
     return line
 
 
@@ -163,5 +158,5 @@ def _sine(acceleration: float, frequency: float, cycles: int = 10) -> dict:
     phase = np.arange((cycles + 2) * SAMPLES + 1) / SAMPLES  # in cycles
     envelope = np.clip(np.minimum(phase, cycles + 2 - phase), 0.0, 1.0)
     values = acceleration * envelope * np.sin(2 * np.pi * phase)
-    times = tuple((phase / frequency).tolist())
-    return {"times": times, "values": tuple(values.tolist()), "order": 2}
+    return {"times": tuple((phase / frequency).tolist()), "values": tuple(values.tolist()),
+            "order": 2}  # fmt: skip

@@ -1,6 +1,6 @@
 """The keys of a scene's tables, each with what it may be: rules of `jointlaw.parameters.keys`."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
@@ -12,27 +12,19 @@ from jointlaw.support.checks import at_least, finite, integer, more_than, number
 Tables = dict[str, Any]
 
 
-def a(kind: type) -> Callable[[str, Any], Any]:
+def of_kind(name: str, value: Any, kind: type) -> Any:
     """A rule: of this kind."""
-
-    def check(name: str, value: Any) -> Any:
-        if not isinstance(value, kind):
-            kinds = {str: "a text", bool: "true or false", list: "a list", dict: "a table"}
-            raise ValueError(f"{name} = {value!r}: must be {kinds[kind]}")
-        return value
-
-    return check
+    if not isinstance(value, kind):
+        kinds = {str: "a text", bool: "true or false", list: "a list", dict: "a table"}
+        raise ValueError(f"{name} = {value!r}: must be {kinds[kind]}")
+    return value
 
 
-def within(low: float, high: float, unit: str) -> Callable[[str, Any], float]:
+def within(name: str, value: Any, low: float, high: float, unit: str) -> float:
     """A rule: a number from `low` to `high`."""
-
-    def check(name: str, value: Any) -> float:
-        if not low <= number(name, value) <= high:
-            raise ValueError(f"{name} = {value!r}: must be from {low:g} to {high:g} {unit}")
-        return float(value)
-
-    return check
+    if not low <= number(name, value) <= high:
+        raise ValueError(f"{name} = {value!r}: must be from {low:g} to {high:g} {unit}")
+    return float(value)
 
 
 def vector(name: str, value: Any) -> tuple[float, float]:
@@ -44,7 +36,7 @@ def vector(name: str, value: Any) -> tuple[float, float]:
 
 def corners(name: str, value: Any) -> np.ndarray:
     """A rule: the corners (k, 2) of a polygon that does not cross itself, in m."""
-    points = np.array([vector(name, point) for point in a(list)(name, value)])
+    points = np.array([vector(name, point) for point in LIST(name, value)])
     if len(points) < 3 or not Polygon(points).is_valid:
         raise ValueError(f"{name}: must be 3 corners [x, y] or more that do not cross or touch")
     return points
@@ -61,26 +53,27 @@ def some_of(name: str, value: Any, names: Iterable[str], count: int | None = Non
 
 def polyline(name: str, value: Any) -> np.ndarray:
     """A rule: points (m, 2) of a line that goes to the right, in m."""
-    points = np.array([vector(name, point) for point in a(list)(name, value)]).reshape(-1, 2)
+    points = np.array([vector(name, point) for point in LIST(name, value)]).reshape(-1, 2)
     if not len(points) or (np.diff(points[:, 0]) <= 0).any():
         raise ValueError(f"{name}: must be points [x, y] from left to right, x increasing")
     return points
 
 
 AXES = {"x": 0, "y": 1, "turn": 2}
-TEXT, LIST, TABLE = a(str), a(list), a(dict)
+TEXT, FLAG, LIST, TABLE = (partial(of_kind, kind=kind) for kind in (str, bool, list, dict))
 POSITIVE, NOT_NEGATIVE = partial(more_than, bound=0), partial(at_least, bound=0)
 SIDE = partial(one_of, choices=("held", "rollers", "loaded"))
-DENSITY = within(50.0, 30000.0, "kg/m3; 2.6 g/cm3 is 2600 kg/m3")
+DENSITY = partial(within, low=50.0, high=30000.0, unit="kg/m3; 2.6 g/cm3 is 2600 kg/m3")
 
 BLOCK = {
     "name!": TEXT, "box": vector, "at": vector, "angle": number, "corners": corners,
-    "density": DENSITY, "fixed": a(bool), "velocity": vector, "spin": number, "load": vector,
+    "density": DENSITY, "fixed": FLAG, "velocity": vector, "spin": number, "load": vector,
     "held": partial(some_of, names=AXES),
 }  # fmt: skip
 SET = {
-    "dip!": within(-90, 90, "degrees"), "spacing!": POSITIVE, "law": TEXT, "through": vector,
-    "persistence": within(0, 1, ""), "scatter": within(0, 0.999, "(two joints could meet)"),
+    "dip!": partial(within, low=-90, high=90, unit="degrees"), "spacing!": POSITIVE, "law": TEXT,
+    "through": vector, "persistence": partial(within, low=0, high=1, unit=""),
+    "scatter": partial(within, low=0, high=0.999, unit="(two joints could meet)"),
 }  # fmt: skip
 ROCK = {
     "name!": TEXT, "outline!": corners, "set!": [SET], "at": vector,
@@ -91,15 +84,16 @@ ROCK = {
 DRIVE = {
     "block": TEXT, "motion!": partial(one_of, choices=tuple(AXES)), "ease": NOT_NEGATIVE,
     "times": partial(finite, unit="s"), "values": partial(finite, unit="m or degrees"),
-    "back": {"block!": TEXT, "slid!": POSITIVE, "by!": POSITIVE, "rate!": POSITIVE},
+    "back": {"block!": TEXT, "slid!": POSITIVE, "by!": number, "over!": POSITIVE},
     "sine": {
         "acceleration!": POSITIVE, "frequency!": POSITIVE, "cycles": partial(integer, bound=1),
     },
-    "file": TEXT, "scale": number, "baseline": a(bool),
+    "file": TEXT, "scale": number, "baseline": FLAG,
 }  # fmt: skip
 RUN = {
-    "end!": POSITIVE, "fraction": within(1e-6, 0.95, "of the limit"), "step": POSITIVE,
-    "seat": a(bool), "record": POSITIVE, "dashpot_normal": NOT_NEGATIVE,
+    "end!": POSITIVE, "fraction": partial(within, low=1e-6, high=0.95, unit="of the limit"),
+    "step": POSITIVE,
+    "seat": FLAG, "record": POSITIVE, "dashpot_normal": NOT_NEGATIVE,
     "dashpot_shear": NOT_NEGATIVE, "law_steps": partial(integer, bound=1),
     "skin": POSITIVE, "corner_length": POSITIVE,
     "max_overlap": POSITIVE,

@@ -30,30 +30,22 @@ class Files(dict[str, str]):
         return self.setdefault(name, (self.folder / name).read_text(encoding="utf-8-sig"))
 
 
-def law_table(data: Tables, files: Files) -> Tables:
-    """A law's table with the keys of the law that it is `from`, by name or from a file.
-
-    Raises ValueError.
-    """
-    if "from" not in data:
-        return data
-    name = str(data["from"])
-    if name not in files:
-        path = files.folder / name
-        files[name] = jl.presets.load_any(str(path) if path.is_file() else name).to_toml()
-    own = {key: value for key, value in data.items() if key != "from"}
-    return overlay(tomllib.loads(files[name]), own)
-
-
 def build_law(data: Tables, where: str, files: Files) -> Law:
-    """A law from a scene's `[laws.NAME]` table; `kind` is "joint" (default) or "coulomb". Its
-    `pressure` is that of water in the joints, no part of the law.
+    """A law from a scene's `[laws.NAME]` table; `kind` is "joint" (default) or "coulomb". Its keys
+    are laid over those of the law that it is `from`, by name or from a file. Its `pressure` is that
+    of water in the joints, no part of the law.
 
     Raises ValueError.
     """
     if TABLE(where, data).get("closure_only"):
         raise ValueError(f"{where}.closure_only = true: joints between blocks shear; leave it out")
-    own = {key: value for key, value in law_table(data, files).items() if key != "pressure"}
+    own = {key: value for key, value in data.items() if key not in ("from", "pressure")}
+    if "from" in data:
+        name = str(data["from"])
+        if name not in files:
+            path = files.folder / name
+            files[name] = jl.presets.load_any(str(path) if path.is_file() else name).to_toml()
+        own = overlay(tomllib.loads(files[name]), own)
     law: Law = jl.JointLaw.from_dict({"plane": 0.0, **own}, where)
     if isinstance(law, jl.CoulombLaw):
         require_rock({**vars(law), "plane": 0.0}, f"{where}.")

@@ -106,7 +106,6 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     rocks = [_rock(table, blocks, edge_laws, usual, digs, where) for table in top.get("rock", ())]
     gravity = top.get("gravity", GRAVITY)
     water, in_situ = read_stresses(top, blocks, density, gravity, where)
-    rocks = [replace(r, free=[i for i in r.blocks if not blocks[i].fixed]) for r in rocks]
     number = {block.name: i for i, block in enumerate(blocks)}
     if len(number) < len(blocks):
         raise ValueError(f"{where}: two blocks have the same name; names must differ")
@@ -115,24 +114,24 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     drives = read_drives(top.get("drive", ()), number, blocks, files, where)
     pairs = _pairs(top.get("joint", ()), number, blocks, where)
     least, skin = min(block.width for block in blocks), top["run"].get("skin")
-    soft = SOFT * (skin or SKIN * least)
-    stands = CORNER * max(least, SLIVER * usual_width(blocks))
-    run = Run(**{"corner_length": stands, "soft": soft, **top["run"]})
+    lengths = {"corner_length": CORNER * max(least, SLIVER * usual_width(blocks)),
+               "soft": SOFT * (skin or SKIN * least)}  # fmt: skip
+    run = Run(**lengths | top["run"])
     watched = _watched(top.get("watch", {}), number, blocks, run.corner_length, f"{where}: watch")
     jointed = {*edge_laws.values()} - {WHOLE}
     for law in [default, *pairs.values(), *sorted(jointed)]:
         one_of(f"{where}: law", law, tuple(laws))
     scene = Scene(
         top.get("title", where), tuple(blocks), laws, run, default, pairs,
-        tuple(rocks), edge_laws, drives, gravity, top.get("thickness", 1.0),
-        water, in_situ, pressure, tuple(_stages(digs, blocks, where)), **watched,
+        tuple(replace(r, free=[i for i in r.blocks if not blocks[i].fixed]) for r in rocks),
+        edge_laws, drives, gravity, top.get("thickness", 1.0), water, in_situ, pressure,
+        tuple(_stages(digs, blocks, where)), **watched,
     )  # fmt: skip
     if WHOLE in edge_laws.values():
         joints = [laws[law] for law in jointed or [default]]
         laws.setdefault(WHOLE, whole_rock(joints, HELD * scene.skins.min()))
     for name, law in laws.items():
-        opening = opens_to(law)
-        if opening > scene.skins.min():
+        if (opening := opens_to(law)) > scene.skins.min():
             raise ValueError(
                 f"{where}: laws.{name} holds until the joint is {opening:.3g} m open, but "
                 f"contacts are followed to {scene.skins.min():.3g} m: set a larger run.skin, or "
@@ -144,15 +143,15 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
 
 
 def _block(table: Tables, density: float, where: str) -> Block:
-    shape, at = table.pop("corners", None), table.pop("at", (0.0, 0.0))
+    name, drawn = f"{where}: block[{table['name']!r}]", {"corners", "box", "at", "angle"} & {*table}
+    if drawn != {"corners"} and ("box" not in drawn or "corners" in drawn):
+        raise ValueError(f"{name}: give `corners`, or `box` and `at`, with `angle`")
     if "box" in table:
-        shape = box(*table.pop("box"), at, table.pop("angle", 0.0))
-    if shape is None:
-        raise ValueError(f"{where}: block[{table['name']!r}]: give `corners`, or `box` and `at`")
-    if trouble := check_convex(shape):
-        raise ValueError(f"{where}: block[{table['name']!r}].corners (or box) {trouble}")
-    held = tuple(table.pop("held", ()))
-    return Block(**{"corners": shape, "density": density, "held": held, **table})
+        at, angle = table.pop("at", (0.0, 0.0)), table.pop("angle", 0.0)
+        table["corners"] = box(*table.pop("box"), at, angle)
+    if trouble := check_convex(table["corners"]):
+        raise ValueError(f"{name}.corners (or box) {trouble}")
+    return Block(**{"density": density, **table, "held": tuple(table.get("held", ()))})
 
 
 def _pairs(
@@ -248,9 +247,8 @@ def _rock(
         block = Block(f"{name} {i + 1}", shape + shift, table.get("density", usual["density"]))
         stays = any(region.contains(Point(block.centroid - shift)) for region in fixed)
         blocks.append(replace(block, fixed=stays))
-        for edge, number in enumerate(of.tolist()):
-            if number >= 0:
-                laws[first + i, edge] = of_edge[number]
+        laws.update(((first + i, edge), of_edge[number])
+                    for edge, number in enumerate(of.tolist()) if number >= 0)  # fmt: skip
     cuts = sum(int((of == CUT).sum()) for of in numbers) // 2
     told = [
         f"{joined} slivers joined to neighbours",

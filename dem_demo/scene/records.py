@@ -38,7 +38,7 @@ def read_record(files: Files, name: str, table: Tables) -> Tables:
     if order < 2 and values[0]:
         raise ValueError(f"{where}, line 2: the first value must be 0, because the blocks rest")
     values *= unit * table.get("scale", 1.0)
-    if table.get("baseline"):
+    if table.get("baseline") and order:  # a displacement ends at rest in any case
         values = _at_rest(times, values, order)
     return {"times": tuple(times.tolist()), "values": tuple(values.tolist()), "order": order,
             "smooth": order == 0}  # fmt: skip
@@ -49,7 +49,8 @@ def _unit(title: str) -> str:
     return re.split(r"[\s_(\[]", title.strip(" \t\"')]").lower())[-1].replace("^", "")
 
 
-def _numbers(lines: list[str], where: str) -> tuple[np.ndarray, np.ndarray]:
+def _numbers(lines: list[str], where: str) -> np.ndarray:
+    """Times and values (2, n) of the lines below the first."""
     rows: list[np.ndarray] = []
     for n, line in enumerate(lines[1:], 2):
         try:
@@ -61,15 +62,12 @@ def _numbers(lines: list[str], where: str) -> tuple[np.ndarray, np.ndarray]:
         if row[0] < 0 or (rows and row[0] <= rows[-1][0]):
             raise ValueError(f"{where}, line {n}: time {row[0]:g} s must be >= 0 and increase")
         rows.append(row)
-    times, values = np.transpose(rows)
-    return times, values
+    return np.transpose(rows)
 
 
 def _at_rest(times: np.ndarray, values: np.ndarray, order: int) -> np.ndarray:
     """Values less a straight line in acceleration (a parabola in velocity), so that the motion ends
-    at rest where it began; a record of displacement ends at rest in any case."""
-    if order == 0:
-        return values
+    at rest where it began."""
     since = times - times[0]
     parts = since ** (2 - order), since ** (3 - order)
 

@@ -28,7 +28,7 @@ class Run:
     record: float = 0.05  # time between records
     dashpot_normal: float = 0.05  # shares of critical
     dashpot_shear: float = 0.05
-    law_steps: int = 1  # steps of the law per time step: 4 balances energy to 0.5 % in impacts
+    law_steps: int = 1  # steps of the law per time step; 2 for impacts
     max_overlap: float = 0.1  # share of the smaller block's width
 
 

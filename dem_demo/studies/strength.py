@@ -121,11 +121,10 @@ def factor_of_safety(
     Strength is the shear stress that a joint can bear at its own normal stress. None if the scene
     holds with 1/64 of it, or fails with 64 times of it.
     """
-
-    def at(log: float) -> Scene:
-        return weakened(scene, float(np.exp(log)))
-
-    log = _march(at, FACTOR, trials or Trials(scene), f"{name}: factor of safety", loose)
+    log = _march(
+        lambda log: weakened(scene, float(np.exp(log))), FACTOR, trials or Trials(scene),
+        f"{name}: factor of safety", loose,
+    )  # fmt: skip
     return None if log is None else float(np.exp(log))
 
 
@@ -134,11 +133,10 @@ def critical_tilt(scene: Scene, trials: Trials | None = None, name: str = "scene
 
     Below zero where it does not hold as drawn.
     """
-
-    def at(tilt: float) -> Scene:
-        return replace(scene, gravity=tuple(turn(np.radians(tilt)) @ scene.gravity))
-
-    return _march(at, TILT, trials or Trials(scene), f"{name}: critical tilt")
+    return _march(
+        lambda tilt: replace(scene, gravity=tuple(turn(np.radians(tilt)) @ scene.gravity)), TILT,
+        trials or Trials(scene), f"{name}: critical tilt",
+    )  # fmt: skip
 
 
 def weakened(scene: Scene, factor: float) -> Scene:
@@ -169,8 +167,7 @@ def _march(
     with tqdm(desc=name, unit="trial", delay=2.0, disable=None, leave=False) as bar:
 
         def found(x: float, last: float | None, moved: list[float] | None) -> list[float] | None:
-            guess = None if moved is None else np.array(moved)
-            balance = trials.ask(f"{name} {x} from {last}", lambda: _balance(at(x), guess, loose))
+            balance = trials.ask(f"{name} {x} from {last}", lambda: _balance(at(x), moved, loose))
             bar.update()
             return balance
 
@@ -191,8 +188,8 @@ def _march(
     return low + step
 
 
-def _balance(scene: Scene, guess: np.ndarray | None, loose: np.ndarray | None):
-    moved = displacements(scene, guess, loose)
+def _balance(scene: Scene, guess: list[float] | None, loose: np.ndarray | None):
+    moved = displacements(scene, None if guess is None else np.array(guess), loose)
     return None if moved is None else moved.tolist()
 
 
@@ -215,7 +212,6 @@ def alone(scene: Scene, name: str, seed: int | None = None) -> Scene:
         others = set(joint["between"]) - blocks
         return all(other.rpartition(" ")[0] == name for other in others) and (same or not others)
 
-    joints = [joint for joint in data.get("joint", []) if belongs(joint)]
-    digs = [dig for dig in data.get("excavate", []) if belongs({"around": dig["corners"][0]})]
-    kept = {"rock": [own], "watch": {}, "joint": joints, "excavate": digs}
-    return build({**data, **kept}, files=scene.files)
+    digs = (dig for dig in data.get("excavate", []) if belongs({"around": dig["corners"][0]}))
+    kept = {"joint": [*filter(belongs, data.get("joint", []))], "excavate": [*digs]}
+    return build({**data, **kept, "rock": [own], "watch": {}}, files=scene.files)

@@ -50,6 +50,7 @@ record = 0.001
 step = 1e-4
 law_steps = 2
 """
+BOX = "box = [1.0, 0.5]\nat = [0.0, 0.25]"
 LINES = "times = [0.0, 0.1]\nvalues = [0.0, 1e-3]"
 TWICE = '[[joint]]\nbetween = ["base", "top"]\nlaw = "plain"\n[watch]'
 
@@ -84,9 +85,10 @@ TWICE = '[[joint]]\nbetween = ["base", "top"]\nlaw = "plain"\n[watch]'
         ('law = "rock"', 'law = "rocks"', "law = 'rocks' is unknown; did you mean 'rock'"),
         ("gravity = [0.0, -9.81]", "gravity = 9.81", "gravity = 9.81: must be two numbers"),
         ("box = [1.0, 0.5]", "box = [1.0, -0.5]", "or box. must be convex"),
-        ("box = [1.0, 0.5]", "corners = [[0, 0], [0, 1], [1, 0]]", "counter-clockwise"),
+        (BOX, "corners = [[0, 0], [0, 1], [1, 0]]", "counter-clockwise"),
         ("box = [1.0, 0.5]", 'corners = [["0", 0], [1, 0], [0, 1]]', "'0' is not a number"),
         ("box = [1.0, 0.5]", "spin = 1.0", "give `corners`, or `box` and `at`"),
+        ("box = [1.0, 0.5]", "corners = [[0, 0], [1, 0], [0, 1]]", "give `corners`, or `box`"),
         ('name = "top"', 'name = "base"', "two blocks have the same name"),
         ('held = ["turn"]', "fixed = true", "no block can move"),
         ('held = ["turn"]', 'held = ["x", "x"]', "held = .* some of x, y, turn, each once"),

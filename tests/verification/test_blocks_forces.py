@@ -39,7 +39,7 @@ def test_critical_damping_is_that_of_the_block_on_all_its_joints():
 def test_a_drive_goes_back_once_its_block_has_slid():
     """The base turns from 25 to 32 degrees against gravity, but for the block: from 26.6 on, that
     is from 1.6 of the drive's 7 degrees, it slides, and the base goes back."""
-    back = 'back = { block = "top", slid = 1e-3, by = 3.0, rate = 50.0 }\n[watch]'
+    back = 'back = { block = "top", slid = 1e-3, by = -3.0, over = 0.06 }\n[watch]'
     down = (9.81 * np.array([-np.sin(np.radians(25)), -np.cos(np.radians(25))])).tolist()
     words = BLOCK.format(**{**WORDS, "gravity": down}, driven=7.0)
     sim, turned = Simulation(parse(words.replace("[watch]", back))), []

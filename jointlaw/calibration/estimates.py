@@ -154,8 +154,7 @@ class Estimates:
 
     def predict(self, closure: ArrayLike) -> Any:
         """Normal stress (Pa) at closures (m) counted as in the closure test."""
-        seating = self.parameters["seating"]
-        return self.law.normal_stress(np.asarray(closure, float) + seating)
+        return self.law.normal_stress(np.asarray(closure, float) + self.parameters["seating"])
 
     @property
     def traded(self) -> bool:

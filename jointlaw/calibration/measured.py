@@ -1,12 +1,10 @@
 """Measured curves, each with the noise it is expected to carry and what the law says of it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -238,7 +236,7 @@ class ShearCurve:
             found.append((test.opening[rows] - self.opening) / np.max(np.abs(self.opening)))
         return found
 
-    def thinned(self, most: int) -> ShearCurve:
+    def thinned(self, most: int) -> Self:
         """This test with `most` points or a few more: evenly spaced, the peak, turns and ends.
 
         Raises nothing.

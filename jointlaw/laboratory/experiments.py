@@ -53,9 +53,8 @@ def closure_test(joint: Joint, stress: float | Sequence[float], steps: int = 100
         start = 0.0
     log = _Log(joint, 0.0, "closure test")
     log.measure(joint.F)
-    still = np.zeros(joint.law.dim - 1)
     for level in track(levels, "closure test", len(levels)):
-        log.advance(still, NormalCondition(level, max(peaks)))
+        log.advance(np.zeros(joint.law.dim - 1), NormalCondition(level, max(peaks)))
     return log.record()
 
 

@@ -1,7 +1,6 @@
 """Export of a joint law to C and C++: header, tables in two forms, examples and a Makefile."""
 
 import re
-from importlib import resources
 from pathlib import Path
 
 from ...kernels.pack import pack, rings
@@ -46,7 +45,7 @@ def export_c(law: Law, directory: str | Path, name: str = "joint") -> list[str]:
 
 def file_text(file: str) -> str:
     """A file of this folder, which has tables of the name granite."""
-    return (resources.files(__package__) / file).read_text(encoding="utf-8")
+    return Path(__file__).with_name(file).read_text(encoding="utf-8")
 
 
 def require_name(name: str) -> None:

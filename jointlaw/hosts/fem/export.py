@@ -1,6 +1,5 @@
 """Export of a joint law to finite elements: MGIS and UMAT, OpenGeoSys and Kratos, in one folder."""
 
-from importlib import resources
 from pathlib import Path
 from textwrap import fill
 
@@ -46,8 +45,7 @@ def export_fem(
         f"{name}.h": c.header_text(law, name),
     }
     marks = _marks(law, seating)
-    source = resources.files(__package__) / "files"
-    for file in sorted(source.iterdir(), key=lambda file: file.name):
+    for file in sorted(Path(__file__).with_name("files").iterdir()):
         # pip leaves a folder of compiled Python beside them
         if file.is_file() and (law.dim == 3 or "3d" not in file.name):
             text = file.read_text(encoding="utf-8")

@@ -1,6 +1,5 @@
 """Export of a joint law to LAMMPS: tables, the plug-in and an input script, in one folder."""
 
-from importlib import resources
 from pathlib import Path
 
 from ...laws.law import Law
@@ -37,7 +36,7 @@ def export_lammps(law: Law, directory: str | Path, name: str = "joint") -> list[
         ),
         "law.toml": law.to_toml(),
     }
-    source = resources.files(__package__) / "files"
+    source = Path(__file__).with_name("files")
     copies = {file: (source / file).read_bytes() for file in FILES}
     copies["jointlaw.h"] = jointlaw_h().encode()
     folder = write_files(directory, {**copies, **texts})

@@ -152,8 +152,10 @@ def _shear_test(
     largest = float(np.abs(y).max())
     if abs(y[0]) <= TARE * largest:  # the gauges need not begin at zero
         if abs(y[0]) > SCATTER * largest:
-            share = f"{100 * abs(y[0]) / largest:.2g} % of its largest value"
-            notes.append(f"the shear stress begins at {share}, which is subtracted as tare")
+            notes.append(
+                f"the shear stress begins at {100 * abs(y[0]) / largest:.2g} % of its largest "
+                "value, which is subtracted as tare"
+            )
             y = y - y[0]
         x, opened = x - x[0], None if opened is None else opened - opened[0]
     pressed = found.get("normal", np.full(x.shape, normal_stress))

@@ -143,8 +143,8 @@ class _Log:
     def measure(self, F: Array) -> None:
         """Add a row from the joint's state and its traction F."""
         joint, now = self.joint, self.joint.measures()
-        shares, energies = (now.sliding, now.separated), (now.stored, joint.dissipated_energy)
-        self.rows.append(np.hstack([joint.delta @ self.axes, F @ self.axes, *shares, *energies]))
+        numbers = (now.sliding, now.separated, now.stored, joint.dissipated_energy)
+        self.rows.append(np.hstack([joint.delta @ self.axes, F @ self.axes, *numbers]))
 
     def record(self) -> Record:
         """The rows so far."""

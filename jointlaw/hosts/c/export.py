@@ -5,7 +5,6 @@ from pathlib import Path
 
 from ...kernels.pack import pack, rings
 from ...laws.law import Law
-from ...native import build
 from ...native.layout import AZIMUTHS, FORMAT, jointlaw_h
 from ...support.checks import Array
 from ...support.files import write_files
@@ -15,11 +14,6 @@ FILES = ("jointlaw.c", "example.c", "example.cpp", "example.f90", "Makefile", "C
 HEADER = "jointlaw.h"
 _CONSTANT = "static JLAW_FUNCTION const"  # which on a device lies in its memory
 _MODEL = "granite"  # the name of the tables in these files
-
-
-def include_dir() -> str:
-    """Folder of `jointlaw.h`, for a compiler's -I, where the package was built."""
-    return str(build.BUILT)
 
 
 def export_c(law: Law, directory: str | Path, name: str = "joint") -> list[str]:
@@ -36,9 +30,12 @@ def export_c(law: Law, directory: str | Path, name: str = "joint") -> list[str]:
     that C cannot have or too many azimuths, before anything is written.
     """
     require_name(name)
-    texts = {f"{name}.jlaw": table_text(law), f"{name}.h": header_text(law, name)}
-    texts[HEADER] = jointlaw_h()
-    texts |= {file: file_text(file).replace(_MODEL, name) for file in FILES}
+    texts = {
+        f"{name}.jlaw": table_text(law),
+        f"{name}.h": header_text(law, name),
+        HEADER: jointlaw_h(),
+        **{file: file_text(file).replace(_MODEL, name) for file in FILES},
+    }
     write_files(directory, texts)
     return list(texts)
 

@@ -197,7 +197,7 @@ class Joints:
         _running[name] = self
 
     def _clear(self):
-        self.c = {key: np.zeros(0, int if key in "id1 id2 made b1 b2" else float)
+        self.c = {key: np.zeros(0, int if key in ("id1", "id2", "made", "b1", "b2") else float)
                   for key in PER_CONTACT}  # fmt: skip
         self.c.update({key: np.zeros((3, 0)) for key in VECTORS})
         self.own, self.others = [], {}  # interactions that are joints; by key those that are not
@@ -563,8 +563,7 @@ class Joints:
 
     def write_back(self):
         """Show the joint forces in i.phys, for utils.getStress and such, until the next step."""
-        c = self.c
-        F = c["F"]
+        c, F = self.c, self.F
         normal = (c["n"] * F[0] * c["area"]).T.tolist()
         shear = ((c["t2"] * F[1] + cross(c["n"], c["t2"]) * F[2]) * c["area"]).T.tolist()
         for i, a, b in zip(self.own, normal, shear):

@@ -310,8 +310,7 @@ def _steepness(closure: Array, stress: Array) -> Array:
     shifts = np.geomspace(0.02, 5.0, 25)
     fits = [np.polyfit(np.log(x + s), np.log(stress), 1, full=True) for s in shifts]
     at = int(np.argmin([float(f[1][0]) if f[1].size else np.inf for f in fits]))
-    slope: Array = float(fits[at][0][0]) / ((x + shifts[at]) * span)
-    return np.abs(slope)
+    return np.abs(float(fits[at][0][0]) / ((x + shifts[at]) * span))
 
 
 def sheared(curves: Sequence[ShearCurve], values: Values, settings: Settings) -> list[Sheared]:

@@ -159,9 +159,7 @@ def pose(
         one_of("free or fixed", name, tuple(values))
     values |= {name: number(f"fixed[{name!r}]", value) for name, value in fixed.items()}
     build(values, settings)  # raises for values that no law has
-    for name in names:
-        if math.isinf(values[name]):
-            values[name] = _within(name, closures, shears)
+    values |= {n: _within(n, closures, shears) for n in names if math.isinf(values[n])}
     for curve in closures:
         values["seating"] = float(np.ptp(curve.closure)) if curve.seating is None else curve.seating
         if curve.seating is None:

@@ -51,8 +51,8 @@ def _friction(fit: SurfaceFit, z: Array) -> str:
         f"Friction angle of a joint of this surface at {STRESS / 1e6:g} MPa, sheared by one "
         f"sampling length, with contacts of an assumed rock ({DEFAULT_ROCK}):"
     )
-    lines = table("sampling length (mm) | a | along the rows | across them", rows)
-    return "\n".join(["", what, "", *lines, ""])
+    head = "sampling length (mm) | a | along the rows | across them"
+    return "\n".join(["", what, "", *table(head, rows), ""])
 
 
 def _largest_angle(fit: SurfaceFit, plane: float) -> float:

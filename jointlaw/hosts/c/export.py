@@ -68,8 +68,7 @@ def table_text(law: Law) -> str:
     numbers, arrays = packed(law)
     lines = [f"jointlaw tables {FORMAT}", f"fingerprint {law.fingerprint}"]
     lines += [f"# {line}" for line in law.to_toml().splitlines()]
-    for key, value in numbers.items():
-        lines.append(f"{key} {value if isinstance(value, int) else value.hex()}")
+    lines += [f"{key} {x if isinstance(x, int) else x.hex()}" for key, x in numbers.items()]
     for key, array in arrays.items():
         lines.append(key)
         lines += [" ".join(map(float.hex, row.tolist())) for row in array.reshape(-1, 4)]
@@ -114,7 +113,6 @@ def packed(law: Law) -> tuple[dict[str, int | float], dict[str, Array]]:
 def _sum(data: bytes) -> int:
     """FNV-1a of 64 bits, without carriage returns."""
     value = 0xCBF29CE484222325
-    for byte in data:
-        if byte != 13:
-            value = (value ^ byte) * 0x100000001B3 & 0xFFFFFFFFFFFFFFFF
+    for byte in data.replace(b"\r", b""):
+        value = (value ^ byte) * 0x100000001B3 & 0xFFFFFFFFFFFFFFFF
     return value

@@ -29,8 +29,9 @@ then on, so that every resolution is asked the same.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -92,9 +93,7 @@ class Suite:
     d: Array
     F: Array
     slip: Slip | None
-    ways: Array  # of `slip`
-    reach: float  # m, R
-    stress: float  # Pa, S/2
+    slide: Callable[[JointLaw], Slip]  # along the same ways at the same stress
     uncertainty: Array  # (paths,) of F: its difference from two thirds of the nodes
 
     def miss(self, law: JointLaw) -> Miss:
@@ -102,7 +101,7 @@ class Suite:
         largest = errors(tractions(law, self.d), self.F)
         if self.slip is None:
             return Miss(largest, math.nan, math.nan)
-        mine = slip(law, self.reach, self.stress, self.ways)
+        mine = self.slide(law)
         more = errors(mine.F, self.slip.F, self.slip.counts)
         return Miss(np.append(largest, more), *mine.apart(self.slip))
 
@@ -131,8 +130,8 @@ def standard_suite(law: JointLaw, best: Resolution | None = None, excursions: in
         called += tuple(f"slip {i + 1}" for i in range(len(more)))
         ways = np.concatenate([ways, more])
         slid = slip(law, law.closure_range, stress, ways)
-    reach, unknown = law.closure_range, np.full(len(called), np.nan)
-    suite = Suite(called, d, tractions(law, d), slid, ways, reach, stress, unknown)
+    slide = partial(slip, closure_range=law.closure_range, stress=stress, ways=ways)
+    suite = Suite(called, d, tractions(law, d), slid, slide, np.full(len(called), np.nan))
     coarser = replace(law, resolution=scaled(best, 2 / 3))
     return replace(suite, uncertainty=suite.miss(coarser).largest)
 

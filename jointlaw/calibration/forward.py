@@ -54,7 +54,7 @@ def parameters(law: JointLaw | None) -> tuple[dict[str, float], Settings]:
     """
     if not isinstance(law, JointLaw | None):
         raise ValueError(f"law: {type(law).__name__} cannot be fitted; give it a JointLaw")
-    settings = Settings(law, law.resolution, law.closure_range) if law else Settings()
+    settings = Settings() if law is None else Settings(law, law.resolution, law.closure_range)
     parts = [getattr(settings.law, name) if name else settings.law for name in PARTS]
     return {name: getattr(part, name) for part in parts for name in found_in(part)}, settings
 

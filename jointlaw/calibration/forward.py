@@ -80,11 +80,16 @@ def build(values: Values, settings: Settings, plane: float | None = None) -> Joi
 
 
 def _filled(part: Any, values: Values) -> Any:
-    """A part of a law with these values of all that a fit may find in it."""
-    if isinstance(part, Bond):
-        return replace(part, **_strengths(values, part))
-    names = found_in(part)
-    return replace(part, **{name: values[name] for name in names}) if names else part
+    """A part of a law with these values of all that a fit may find in it.
+
+    An energy of fracture that was given grows with the square of its strength, as the elastic
+    energy at the peak does: hence no strength is out of bounds.
+    """
+    changed: dict[str, Any] = {name: values[name] for name in found_in(part)}
+    for _, strength, energy in MODES if isinstance(part, Bond) else ():
+        whole, growth = getattr(part, energy), values[strength] / (getattr(part, strength) or 1.0)
+        changed[energy] = whole * growth**2 if whole else None
+    return replace(part, **changed) if changed else part
 
 
 def log_stress(values: Values, closure: Array, settings: Settings) -> Array:
@@ -128,15 +133,3 @@ def _force(closure: Array, eta: float, heights: HeightDistribution | None) -> Ar
     ratio = special.gammaln(1 + power) - special.gammaln(top) + power * math.log(heights.beta)
     kummer: Array = special.hyp1f1(1 + power, top, x)
     return kummer * np.exp(ratio + (top - 1) * np.log(x) - x)
-
-
-def _strengths(v: Values, given: Bond) -> dict[str, Any]:
-    """Strengths, and energies: one that was given grows with the square of its strength.
-
-    The elastic energy at the peak does so too, hence no strength is out of bounds.
-    """
-    changed: dict[str, Any] = {}
-    for _, strength, energy in MODES:
-        whole, growth = getattr(given, energy), v[strength] / (getattr(given, strength) or 1.0)
-        changed |= {strength: v[strength], energy: whole * growth**2 if whole else None}
-    return changed

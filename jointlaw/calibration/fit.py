@@ -37,10 +37,13 @@ TOO_MANY = (
     "leave it out of --free. Then the data fix the others."
 )
 UNMEASURED = (
-    "**No opening was measured.** At the lowest normal stress the fits that these data allow open "
-    "by {:.3g} to {:.3g} mm, at a largest dilation angle of {:.1f} to {:.1f} degrees: less "
-    "friction and more dilation give the same shear stress. Give the normal displacement of the "
-    "tests, or hold mu (from a tilt test of saw-cut faces) or a (from a scan)."
+    "**No opening was measured.** {}Less friction and more dilation give the same shear stress. "
+    "Give the normal displacement of the tests, or hold mu (from a tilt test of saw-cut faces) or "
+    "a (from a scan)."
+)
+OPENS = (
+    "At the lowest normal stress the fits that these data allow open by {:.3g} to {:.3g} mm, at a "
+    "largest dilation angle of {:.1f} to {:.1f} degrees. "
 )
 
 
@@ -108,7 +111,8 @@ class Fit(Estimates):
         if self.traded:
             (least, flat), (most, steep) = self.openings
             angles = np.degrees(np.arctan([flat, steep]))
-            lines += ["", UNMEASURED.format(1e3 * least, 1e3 * most, *angles)]
+            told = OPENS.format(1e3 * least, 1e3 * most, *angles)
+            lines += ["", UNMEASURED.format("" if np.isnan(angles).any() else told)]
         return lines
 
     @style()

@@ -85,10 +85,10 @@ def test_the_opening_tells_friction_from_slopes(law):
 
 
 def test_a_joint_that_only_closes_in_shear_is_told_no_dilation_angle(law):
-    flat = replace(law, orientation=jl.Orientation(9.0), mating_length=6e-6, plane=0.0)
-    shear = np.linspace(0.0, 1e-4, 8)
+    flat = replace(law, mating_length=6e-6, plane=0.0)
+    shear = np.linspace(0.0, 1e-5, 8)
     stress, opening = ShearCurve(shear, np.ones(8), 5e6).predict(flat)
-    assert opening[1:].max() < 0
+    assert (np.diff(opening) < 0).all()
     fit = jl.fit_curves([ShearCurve(shear, stress, 5e6)], law=flat, free=("mu", "a"))
     assert fit.traded
     assert "No opening was measured" in fit.report()

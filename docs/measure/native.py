@@ -25,7 +25,8 @@ import numpy as np
 from tables import asked, least, table
 
 import jointlaw as jl
-from jointlaw.hosts.c.export import include_dir, table_text
+from jointlaw.hosts.c.export import table_text
+from jointlaw.native.build import BUILT
 
 FLAGS = ["-O3", "-march=native", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math",
          "-Wno-psabi"]  # fmt: skip
@@ -71,7 +72,7 @@ def library(folder: Path, cc: str, *flags: str) -> ctypes.CDLL:
     """The loop, compiled."""
     source, target = folder / "loop.c", folder / f"{'-'.join(['loop', *flags])}.so"
     source.write_text(LOOP)
-    command = [cc, "-std=c99", *FLAGS, *flags, "-shared", "-fPIC", f"-I{include_dir()}"]
+    command = [cc, "-std=c99", *FLAGS, *flags, "-shared", "-fPIC", f"-I{BUILT}"]
     subprocess.run([*command, str(source), "-o", str(target), "-lm"], check=True)
     lib = ctypes.CDLL(str(target))
     lib.jlaw_read.restype = ctypes.c_void_p

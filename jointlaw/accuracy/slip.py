@@ -5,8 +5,6 @@ back by as much. The normal stress is held for every resolution by itself: one a
 displacement would compare their dilation, summed up over the slip, and not their strength.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple, TypeAlias
 
@@ -39,11 +37,10 @@ class Slip(NamedTuple):
     dilation: Array
     counts: NDArray[np.bool_]
 
-    def apart(self, other: Slip) -> tuple[float, float]:
+    def apart(self, other: "Slip") -> list[float]:
         """Largest difference of the friction and of the dilation angle, in degrees."""
-        friction = np.abs(self.friction - other.friction)[self.counts]
-        dilation = np.abs(self.dilation - other.dilation)[self.counts]
-        return float(friction.max()), float(dilation.max())
+        off = np.abs([self.friction - other.friction, self.dilation - other.dilation])
+        return off.max(axis=(1, 2), where=self.counts, initial=0.0).tolist()
 
 
 def distance(mating_length: float, closure_range: float) -> float:
@@ -84,8 +81,7 @@ def slip(law: JointLaw, closure_range: float, stress: float, ways: Array) -> Sli
         F[k], _ = batch.update(step, tangent=False)
         rate = step[:, 0] / steps
         rise[k] = -step[:, 0] / np.abs(steps)
-    sense = np.repeat([1.0, -1.0], LEG)[:, None]
-    shear = sense * np.sum(F[:, :, 1:] * along, axis=2)
+    shear = np.repeat([1.0, -1.0], LEG)[:, None] * np.sum(F[:, :, 1:] * along, axis=2)
     turned = places >= np.maximum(MOBILISED * far * length, 2 * R)
     counts = np.concatenate([places >= MOBILISED * unit, turned])
     return Slip(F, np.degrees(np.arctan2(shear, F[:, :, 0])), np.degrees(np.arctan(rise)), counts)

@@ -28,12 +28,11 @@ constant stress are found once, at half the reference resolution, and are paths 
 then on, so that every resolution is asked the same.
 """
 
-from __future__ import annotations
-
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Any, NamedTuple, TypeAlias
+from functools import lru_cache, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -42,9 +41,7 @@ from ..joints.normal_control import NormalCondition, closing_increments
 from ..parameters.resolution import Resolution
 from ..support.checks import Array
 from ..support.progress import track
-from .slip import HELD, Slip, distance, random_ways, slip, standard_ways
-
-JointLaw: TypeAlias = Any  # of jointlaw.laws, which lies above
+from .slip import HELD, JointLaw, Slip, distance, random_ways, slip, standard_ways
 
 STEPS = 120  # of each path
 FAR = 3.0  # R: the longest slip at a given closure
@@ -96,9 +93,7 @@ class Suite:
     d: Array
     F: Array
     slip: Slip | None
-    ways: Array  # of `slip`
-    reach: float  # m, R
-    stress: float  # Pa, S/2
+    slide: Callable[[JointLaw], Slip]  # along the same ways at the same stress
     uncertainty: Array  # (paths,) of F: its difference from two thirds of the nodes
 
     def miss(self, law: JointLaw) -> Miss:
@@ -106,7 +101,7 @@ class Suite:
         largest = errors(tractions(law, self.d), self.F)
         if self.slip is None:
             return Miss(largest, math.nan, math.nan)
-        mine = slip(law, self.reach, self.stress, self.ways)
+        mine = self.slide(law)
         more = errors(mine.F, self.slip.F, self.slip.counts)
         return Miss(np.append(largest, more), *mine.apart(self.slip))
 
@@ -128,7 +123,6 @@ def standard_suite(law: JointLaw, best: Resolution | None = None, excursions: in
         called += tuple(f"excursion {i + 1}" for i in range(excursions))
     d = np.diff(goal, axis=0, prepend=0.0)
     d = _hold_stress(replace(law, resolution=scaled(best, 1 / 2)), d, held, stress)
-    F = tractions(law, d)
     slid, ways = None, standard_ways(law.tables.dim)
     if not law.closure_only and steepest(law) < _JAMS:
         more = random_ways(np.random.default_rng(18), excursions // 16, law.tables.dim)
@@ -136,9 +130,10 @@ def standard_suite(law: JointLaw, best: Resolution | None = None, excursions: in
         called += tuple(f"slip {i + 1}" for i in range(len(more)))
         ways = np.concatenate([ways, more])
         slid = slip(law, law.closure_range, stress, ways)
-    suite = Suite(called, d, F, slid, ways, law.closure_range, stress, np.zeros(len(called)))
-    check = suite.miss(replace(law, resolution=scaled(best, 2 / 3))).largest
-    return replace(suite, uncertainty=check)
+    slide = partial(slip, closure_range=law.closure_range, stress=stress, ways=ways)
+    suite = Suite(called, d, tractions(law, d), slid, slide, np.full(len(called), np.nan))
+    coarser = replace(law, resolution=scaled(best, 2 / 3))
+    return replace(suite, uncertainty=suite.miss(coarser).largest)
 
 
 def tractions(law: JointLaw, d: Array) -> Array:
@@ -168,8 +163,8 @@ def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]
     shear = _legs(s, [0, 0.1, 1], [0, seat, seat], [0, 0, 1])
     back = _legs(s, [0, 0.1, 0.35, 0.75, 1], [0, *4 * [seat]], [0, 0, 0.6, -0.6, 0])
     fixed = _legs(s, [0, 0.2, 1], [0, 1, 1], [0, 0, 1])
-    sheared = min(distance(law.mating_length, R) / R, FAR)
-    far = _legs(s, [0, 0.1, 0.55, 1], [0, 0.5, 0.5, 0.5], [0, 0, sheared, 0])
+    way = min(distance(law.mating_length, R) / R, FAR)
+    far = _legs(s, [0, 0.1, 0.55, 1], [0, 0.5, 0.5, 0.5], [0, 0, way, 0])
     again = _legs(s, [0, 0.15, 0.35, 0.6, 0.7, 1], [0, 0.7, 0.7, -0.6, -0.6, 0.8],
                  [0, 0, 0.4, 0.7, 0.2, 0.5])  # fmt: skip
     turn = 2 * np.pi * s

@@ -1,21 +1,17 @@
 """The coarsest law that is accurate enough."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache
 from itertools import product
-from typing import Any, TypeAlias
 
 import numpy as np
 
 from ..parameters.resolution import Resolution
 from ..support.checks import finite, more_than
 from ..support.progress import track
+from .slip import JointLaw
 from .suite import Suite, reference_resolution, scaled, standard_suite
-
-JointLaw: TypeAlias = Any  # of jointlaw.laws, which lies above
 
 # How many times better than the tolerance: 30 random laws then kept it on all paths that were not
 # tried, the worst at 0.88 of it (docs/measure/tolerance.py)

@@ -1,12 +1,9 @@
 """The price list of a law: what each resolution costs and how far its tractions are off."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import cycle
 from timeit import Timer
-from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -14,9 +11,8 @@ from ..kernels.threads import thread_count
 from ..parameters.resolution import Resolution, named, resolve
 from ..support.checks import Array, integer
 from ..support.progress import track
+from .slip import JointLaw
 from .suite import Suite, standard_suite
-
-JointLaw: TypeAlias = Any  # of jointlaw.laws, which lies above
 
 SPREAD = tuple(
     Resolution(u, phi, depth)
@@ -94,13 +90,13 @@ class Tradeoff:
                 f"{row.ns_tangent:13.0f}  {path:16s}{names.get(r, '')}".rstrip()
             )
         timed = f"ns per joint and update: up to {self.joints} joints, {self.how}"
-        lines.append(
+        return "\n".join([
+            *lines,
             f"{len(self.rows)} resolutions tried; listed are the named ones and the Pareto front "
-            "of sliders and max error.\n"
+            "of sliders and max error.",
             f"Uncertainty of the comparison solution {self.uncertainty.max():.2%}; "
-            f"{timed if self.joints else 'nothing was timed'}"
-        )
-        return "\n".join(lines)
+            f"{timed if self.joints else 'nothing was timed'}",
+        ])  # fmt: skip
 
 
 def tradeoff(
@@ -115,8 +111,8 @@ def tradeoff(
     names = named(*lengths)
     if resolutions is None:
         resolutions = (*SPREAD, *names.values())
-    chosen = [resolve(r, *lengths) for r in resolutions]
-    found = sorted(dict.fromkeys(chosen), key=lambda r: (r.sliders, r.u, r.phi))
+    chosen = {resolve(r, *lengths) for r in resolutions}
+    found = sorted(chosen, key=lambda r: (r.sliders, r.u, r.phi, r.lowest))
     suite = standard_suite(law)
     rows = tuple(
         _price(replace(law, resolution=r), suite, joints, seconds)
@@ -128,9 +124,9 @@ def tradeoff(
 
 
 def _price(law: JointLaw, suite: Suite, joints: int, seconds: float) -> Price:
-    ns = [_time(law, joints, tangent, seconds) for tangent in (False, True)]
     size = law.joints(0).bytes_per_joint
-    return Price(law.resolution, law.tables.sliders, *suite.miss(law), ns[0], ns[1], size)
+    ns, with_tangent = (_time(law, joints, tangent, seconds) for tangent in (False, True))
+    return Price(law.resolution, law.tables.sliders, *suite.miss(law), ns, with_tangent, size)
 
 
 def _time(law: JointLaw, n: int, tangent: bool, seconds: float) -> float:
@@ -146,5 +142,4 @@ def _time(law: JointLaw, n: int, tangent: bool, seconds: float) -> float:
     first[:, 0] = law.closure_range * rng.uniform(0.3, 0.8, n)
     batch.update(first, tangent=tangent)
     timer = Timer(lambda: batch.update(next(moves), tangent=tangent))
-    runs = max(3, round(seconds / timer.timeit(1)))
-    return min(timer.repeat(runs, 1)) / n * 1e9
+    return min(timer.repeat(max(3, round(seconds / timer.timeit(1))), 1)) / n * 1e9

@@ -6,7 +6,6 @@
 - What is done to a record, and rows that are not used, are in the `notes` of a curve.
 """
 
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from ..support.checks import Array, one_of
 from .measured import ShearCurve
 from .tables import Asked, Column, Table, read_tables
 
-_FOLDER = resources.files(__package__) / "data"
+_FOLDER = Path(__file__).with_name("data")
 STRESS = Asked(
     "normal stress of the closure test (a direct shear test goes after --shear)", "Pa",
     ("stress", "normal_stress", "sigma", "sigmaz", "sigma_n", "σ", "σn", "σ_n", "f1"),
@@ -70,14 +69,13 @@ SCATTER, TARE = 0.02, 0.1  # of the largest shear stress: see above
 
 def names() -> list[str]:
     """Names of all data sets."""
-    return sorted(entry.name[:-4] for entry in _FOLDER.iterdir() if entry.name.endswith(".csv"))
+    return sorted(path.stem for path in _FOLDER.glob("*.csv"))
 
 
 def load(name: str) -> tuple[Array, Array]:
     """Stress (Pa) and closure (m) of a data set, loading and unloading in the order measured."""
     one_of("data set", name, tuple(names()))
-    with resources.as_file(_FOLDER / f"{name}.csv") as path:
-        return read_closure(path)[:2]
+    return read_closure(_FOLDER / f"{name}.csv")[:2]
 
 
 def read_closure(
@@ -154,8 +152,10 @@ def _shear_test(
     largest = float(np.abs(y).max())
     if abs(y[0]) <= TARE * largest:  # the gauges need not begin at zero
         if abs(y[0]) > SCATTER * largest:
-            share = f"{100 * abs(y[0]) / largest:.2g} % of its largest value"
-            notes.append(f"the shear stress begins at {share}, which is subtracted as tare")
+            notes.append(
+                f"the shear stress begins at {100 * abs(y[0]) / largest:.2g} % of its largest "
+                "value, which is subtracted as tare"
+            )
             y = y - y[0]
         x, opened = x - x[0], None if opened is None else opened - opened[0]
     pressed = found.get("normal", np.full(x.shape, normal_stress))

@@ -31,5 +31,4 @@ def envelope(name: str, curves: Sequence[ShearCurve], normal: float) -> Array:
     s = np.array([np.mean(curve.normal) for curve in curves])
     tau = np.stack([peak_and_last(curve.shear_stress) for curve in curves])
     slope, start = np.polyfit(across(s), up(s[:, None], tau), 1)
-    found: Array = back(normal, slope * across(normal) + start)
-    return found
+    return np.asarray(back(normal, slope * across(normal) + start))

@@ -62,8 +62,8 @@ class Estimates:
         """The 95 % interval of a fitted parameter, within its bounds."""
         one_of("fitted parameter", name, self.free)
         at, transform = self.free.index(name), TRANSFORMS[name]
-        reach = self.solution.quantile * math.sqrt(self.solution.covariance[at, at])
-        reach += abs(self.moved[at])
+        error = math.sqrt(self.solution.covariance[at, at])
+        reach = self.solution.quantile * error + abs(self.moved[at])
         x, (low, high) = self.solution.x[at], self.problem.bounds()
         ends = max(x - reach, low[at]), min(x + reach, high[at])
         return transform.back(float(ends[0])), transform.back(float(ends[1]))
@@ -154,8 +154,7 @@ class Estimates:
 
     def predict(self, closure: ArrayLike) -> Any:
         """Normal stress (Pa) at closures (m) counted as in the closure test."""
-        seating = self.parameters["seating"]
-        return self.law.normal_stress(np.asarray(closure, float) + seating)
+        return self.law.normal_stress(np.asarray(closure, float) + self.parameters["seating"])
 
     @property
     def traded(self) -> bool:
@@ -166,13 +165,14 @@ class Estimates:
     @property
     def openings(self) -> Array:
         """95 % interval, low and high (2, 2), of the opening (m) in the shear test of the lowest
-        normal stress, and of the tangent of its largest dilation angle.
+        normal stress, and of the tangent of its largest dilation angle; NaN where it only closes.
         """
         curve = min(self.problem.shears, key=lambda one: np.mean(one.normal))
 
         def model(values: Values) -> Array:
             (test,) = sheared([curve], values, self.problem.settings)
-            return np.log([np.ptp(test.opening), test.dilation])
+            with np.errstate(invalid="ignore"):
+                return np.log([np.ptp(test.opening), test.dilation])
 
         return np.exp(self._band(model))
 

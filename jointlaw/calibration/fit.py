@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import compress, count
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from .estimates import Estimates
 from .forward import log_stress
 from .measured import ClosureCurve, ShearCurve
 from .priors import TRANSFORMS, Ranges, Values
-from .problem import pose, silent, solve, staged, starting_points
+from .problem import NO_BAR, pose, solve, staged, starting_points
 
 HALVED = 0.005  # of the largest stress or opening: what finer steps and cells of shear may change
 HALVINGS = 8  # of the steps, at most
@@ -38,10 +37,13 @@ TOO_MANY = (
     "leave it out of --free. Then the data fix the others."
 )
 UNMEASURED = (
-    "**No opening was measured.** At the lowest normal stress the fits that these data allow open "
-    "by {:.3g} to {:.3g} mm, at a largest dilation angle of {:.1f} to {:.1f} degrees: less "
-    "friction and more dilation give the same shear stress. Give the normal displacement of the "
-    "tests, or hold mu (from a tilt test of saw-cut faces) or a (from a scan)."
+    "**No opening was measured.** {}Less friction and more dilation give the same shear stress. "
+    "Give the normal displacement of the tests, or hold mu (from a tilt test of saw-cut faces) or "
+    "a (from a scan)."
+)
+OPENS = (
+    "At the lowest normal stress the fits that these data allow open by {:.3g} to {:.3g} mm, at a "
+    "largest dilation angle of {:.1f} to {:.1f} degrees. "
 )
 
 
@@ -109,7 +111,8 @@ class Fit(Estimates):
         if self.traded:
             (least, flat), (most, steep) = self.openings
             angles = np.degrees(np.arctan([flat, steep]))
-            lines += ["", UNMEASURED.format(1e3 * least, 1e3 * most, *angles)]
+            told = OPENS.format(1e3 * least, 1e3 * most, *angles)
+            lines += ["", UNMEASURED.format("" if np.isnan(angles).any() else told)]
         return lines
 
     @style()
@@ -207,8 +210,8 @@ def fit_curves(
     >>> curve = jl.ShearCurve(sheared.shear, sheared.shear_stress, normal=5e6)
     >>> fit = jl.fit_curves([curve], free=["mu"], law=law)
     """
-    bar = iter(track(count(), "fit, laws tried"))
-    problem = replace(pose(curves, free, fixed, law, priors), tick=partial(next, bar))
+    problem = pose(curves, free, fixed, law, priors)
+    problem = replace(problem, bar=iter(track(count(), "fit, laws tried")))
     starts = staged(problem, starting_points(problem, near=law is not None))
     for _ in range(HALVINGS):
         solution, steps = solve(problem, starts), problem.settings.steps
@@ -219,5 +222,4 @@ def fit_curves(
             break
         problem, starts = finer, [solution.x]
     # what is left of an error that falls with the steps is up to twice the change by half of them
-    moved = 2 * solution.gain @ change
-    return Fit(replace(problem, tick=silent), solution, halved, moved)
+    return Fit(replace(problem, bar=NO_BAR), solution, halved, 2 * solution.gain @ change)

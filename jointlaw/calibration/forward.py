@@ -42,9 +42,8 @@ class Settings:
 
 def found_in(part: Any) -> list[str]:
     """Names of the parameters of a law, or of a part of it, that a fit may find."""
-    if not is_dataclass(part):
-        return []
-    return [name for name, said in parameters_of(part).items() if said.fit]
+    declared = parameters_of(part) if is_dataclass(part) else {}
+    return [name for name, said in declared.items() if said.fit]
 
 
 def parameters(law: JointLaw | None) -> tuple[dict[str, float], Settings]:
@@ -53,11 +52,9 @@ def parameters(law: JointLaw | None) -> tuple[dict[str, float], Settings]:
     Of a law with a bond its cohesion and tension too, of one with heights theirs. Raises ValueError
     for a law without asperities.
     """
-    settings = Settings()
-    if law is not None:
-        if not isinstance(law, JointLaw):
-            raise ValueError(f"law: {type(law).__name__} cannot be fitted; give it a JointLaw")
-        settings = Settings(law, law.resolution, law.closure_range)
+    if not isinstance(law, JointLaw | None):
+        raise ValueError(f"law: {type(law).__name__} cannot be fitted; give it a JointLaw")
+    settings = Settings() if law is None else Settings(law, law.resolution, law.closure_range)
     parts = [getattr(settings.law, name) if name else settings.law for name in PARTS]
     return {name: getattr(part, name) for part in parts for name in found_in(part)}, settings
 
@@ -83,11 +80,16 @@ def build(values: Values, settings: Settings, plane: float | None = None) -> Joi
 
 
 def _filled(part: Any, values: Values) -> Any:
-    """A part of a law with these values of all that a fit may find in it."""
-    if isinstance(part, Bond):
-        return replace(part, **_strengths(values, part))
-    names = found_in(part)
-    return replace(part, **{name: values[name] for name in names}) if names else part
+    """A part of a law with these values of all that a fit may find in it.
+
+    An energy of fracture that was given grows with the square of its strength, as the elastic
+    energy at the peak does: hence no strength is out of bounds.
+    """
+    changed: dict[str, Any] = {name: values[name] for name in found_in(part)}
+    for _, strength, energy in MODES if isinstance(part, Bond) else ():
+        whole, growth = getattr(part, energy), values[strength] / (getattr(part, strength) or 1.0)
+        changed[energy] = whole * growth**2 if whole else None
+    return replace(part, **changed) if changed else part
 
 
 def log_stress(values: Values, closure: Array, settings: Settings) -> Array:
@@ -129,18 +131,5 @@ def _force(closure: Array, eta: float, heights: HeightDistribution | None) -> Ar
         return exact_force(y.ravel(), eta, heights)[0].reshape(y.shape)
     x, top = y / heights.beta, heights.alpha + 2 + power
     ratio = special.gammaln(1 + power) - special.gammaln(top) + power * math.log(heights.beta)
-    kummer = special.hyp1f1(1 + power, top, x)
-    result: Array = kummer * np.exp(ratio + (top - 1) * np.log(x) - x)
-    return result
-
-
-def _strengths(v: Values, given: Bond) -> dict[str, Any]:
-    """Strengths, and energies: one that was given grows with the square of its strength.
-
-    The elastic energy at the peak does so too, hence no strength is out of bounds.
-    """
-    changed: dict[str, Any] = {}
-    for _, strength, energy in MODES:
-        whole, growth = getattr(given, energy), v[strength] / (getattr(given, strength) or 1.0)
-        changed |= {strength: v[strength], energy: whole * growth**2 if whole else None}
-    return changed
+    kummer: Array = special.hyp1f1(1 + power, top, x)
+    return kummer * np.exp(ratio + (top - 1) * np.log(x) - x)

@@ -1,12 +1,10 @@
 """Measured curves, each with the noise it is expected to carry and what the law says of it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -238,7 +236,7 @@ class ShearCurve:
             found.append((test.opening[rows] - self.opening) / np.max(np.abs(self.opening)))
         return found
 
-    def thinned(self, most: int) -> ShearCurve:
+    def thinned(self, most: int) -> Self:
         """This test with `most` points or a few more: evenly spaced, the peak, turns and ends.
 
         Raises nothing.
@@ -312,8 +310,7 @@ def _steepness(closure: Array, stress: Array) -> Array:
     shifts = np.geomspace(0.02, 5.0, 25)
     fits = [np.polyfit(np.log(x + s), np.log(stress), 1, full=True) for s in shifts]
     at = int(np.argmin([float(f[1][0]) if f[1].size else np.inf for f in fits]))
-    slope: Array = float(fits[at][0][0]) / ((x + shifts[at]) * span)
-    return np.abs(slope)
+    return np.abs(float(fits[at][0][0]) / ((x + shifts[at]) * span))
 
 
 def sheared(curves: Sequence[ShearCurve], values: Values, settings: Settings) -> list[Sheared]:

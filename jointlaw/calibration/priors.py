@@ -107,10 +107,8 @@ def normal_priors(free: tuple[str, ...], given: Ranges | None) -> dict[str, tupl
 
     `given` replaces defaults by 95 % ranges in physical units, or drops one with None.
     """
-    ranges: dict[str, tuple[float, float] | None] = {
-        name: ends for name, ends in PRIORS.items() if _CONCERNS.get(name, {name}) & set(free)
-    }
-    ranges |= given or {}
+    usual = {n: ends for n, ends in PRIORS.items() if _CONCERNS.get(n, {n}) & set(free)}
+    ranges: Ranges = {**usual, **(given or {})}
     return {name: _normal(name, *ends) for name, ends in ranges.items() if ends is not None}
 
 

@@ -6,9 +6,10 @@ with the parameters, see `measured.Noise`.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import repeat
 from typing import NamedTuple
 
 import numpy as np
@@ -33,11 +34,8 @@ OF_CLOSURE = ("alpha", "beta", "overlap", "asperity_density", "K", "yield_interf
 # is flat, and no descent comes back
 LENGTHS = (0.5, 0.15, 0.05, 0.015)
 EXACT, NEAR = 1e-8, 1e-3  # change of a parameter and of the misfit at which a search ends
+NO_BAR = repeat(None)  # where no one looks on
 Function = Callable[[Array], Array]
-
-
-def silent() -> None:
-    """Nothing, where no one looks on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +51,7 @@ class Problem:
     values: Values
     priors: Mapping[str, tuple[float, float]]
     settings: Settings
-    tick: Callable[[], object] = silent  # called for each law that is tried
+    bar: Iterator[object] = NO_BAR  # of progress: a step for each law that is tried
 
     @property
     def curves(self) -> Curves:
@@ -104,7 +102,7 @@ class Problem:
 
     def data(self, x: Array) -> Array:
         """Residuals of all series, one after the other."""
-        self.tick()
+        next(self.bar)
         values, found = self.unpack(x), list[Array]()
         if self.closure is not None:
             found.append(self.closure.residuals(values, self.settings))
@@ -161,9 +159,7 @@ def pose(
         one_of("free or fixed", name, tuple(values))
     values |= {name: number(f"fixed[{name!r}]", value) for name, value in fixed.items()}
     build(values, settings)  # raises for values that no law has
-    for name in names:
-        if math.isinf(values[name]):
-            values[name] = _within(name, closures, shears)
+    values |= {n: _within(n, closures, shears) for n in names if math.isinf(values[n])}
     for curve in closures:
         values["seating"] = float(np.ptp(curve.closure)) if curve.seating is None else curve.seating
         if curve.seating is None:
@@ -289,8 +285,8 @@ def solve(problem: Problem, starts: Sequence[Array]) -> Solution:
             break
         sigma = problem.sigma(noise)
         x = least(problem, sigma, [x])
-    known = all(n.known for n in noise)
-    freedom = np.inf if known else NOISE_WEIGHT + r.size - float(np.sum(leverage))
+    left = NOISE_WEIGHT + r.size - float(np.sum(leverage))
+    freedom = np.inf if all(n.known for n in noise) else left
     share = np.diag(C @ precision @ C) / np.diag(C)
     gain = C @ (weighted / sigma[:, None]).T
     return Solution(x, information, np.asarray(C, np.float64), noise, freedom, share, gain)
@@ -315,9 +311,6 @@ def least(
 
 def derivative(f: Function, x: Array, low: Array, high: Array) -> Array:
     """Derivative (n, p) of a function within bounds, by central differences."""
-    columns = []
-    for k in range(x.size):
-        up, down = x.copy(), x.copy()
-        up[k], down[k] = min(x[k] + 1e-4, high[k]), max(x[k] - 1e-4, low[k])
-        columns.append((f(up) - f(down)) / (up[k] - down[k]))
-    return np.stack(columns, -1)
+    steps = 1e-4 * np.eye(x.size)
+    pairs = zip(np.minimum(x + steps, high), np.maximum(x - steps, low), strict=True)
+    return np.stack([(f(up) - f(down)) / np.sum(up - down) for up, down in pairs], -1)

@@ -9,7 +9,6 @@ from ..hosts.c.export import export_c, identifier
 from ..hosts.fem.export import SEATING, export_fem
 from ..hosts.lammps.export import export_lammps
 from ..hosts.yade.export import export_yade
-from ..laws.joint_law import JointLaw
 from ..support.files import clear_run
 from .command import LAW, OUT, Command, Option, in_unit, option, read_law
 
@@ -25,7 +24,14 @@ def _export(options: argparse.Namespace) -> None:
     law, host, folder = read_law(options), options.host, options.out
     with TemporaryDirectory() as whole:  # a law that is refused leaves the folder as it was
         if host == "yade":
-            told = _export_table(law, whole, options.shear_limit)
+            table = export_yade(law, whole, shear_limit=options.shear_limit)
+            missed = table.metadata["resolution_error_friction_angle"]
+            told = (
+                f"wrote the joint for YADE, a table of {len(table.closure)} rows\n"
+                f"its friction angle at the shear limit is {missed:.2g} degrees off that of finer "
+                f"nodes\nbond: {table.metadata['bond']}; what the table drops (error against the "
+                f"law, share of\neach path's largest traction):\n{table.report(law)}"
+            )
         else:
             export = {"c": export_c, "lammps": export_lammps, "fem": export_fem}[host]
             seating = {"seating": options.seating} if host == "fem" else {}
@@ -35,18 +41,6 @@ def _export(options: argparse.Namespace) -> None:
         for file in Path(whole).iterdir():
             shutil.copy(file, folder)
     print(f"{told}\nrun: cd {folder} && {START[host]}")
-
-
-def _export_table(law: JointLaw, folder: str, shear_limit: float | None) -> str:
-    """Write the joint for YADE; what its table drops, in words."""
-    table = export_yade(law, folder, shear_limit=shear_limit)
-    missed = table.metadata["resolution_error_friction_angle"]
-    return (
-        f"wrote the joint for YADE, a table of {len(table.closure)} rows\n"
-        f"its friction angle at the shear limit is {missed:.2g} degrees off that of finer nodes\n"
-        f"bond: {table.metadata['bond']}; what the table drops (error against the law, share of\n"
-        f"each path's largest traction):\n{table.report(law)}"
-    )
 
 
 def _example(host: str) -> str:

@@ -91,9 +91,8 @@ def _closure_curve(
         return [], None
     item, compliance, notes = options.data[0], options.compliance, list[str]()
     if Path(item).exists():
-        columns = options.stress_column, options.closure_column
         stress, closure, notes = datasets.read_closure(
-            item, *columns, options.decimal, options.outliers
+            item, options.stress_column, options.closure_column, options.decimal, options.outliers
         )
     else:
         one_of("the closure test, no file and as data set,", item, tuple(datasets.names()))
@@ -159,9 +158,9 @@ def _misses(fit: Fit, fitted: list[ShearCurve], predicted: list[ShearCurve]) -> 
         cells = ["{:+.1f}, {:+.1f} %".format(*(100 * (one / measured - 1))) for one in found]
         told = "{:.4g}, {:.4g}".format(*(measured / 1e6))
         rows.append(" | ".join([curve.name, told, *cells]))
-    lines = table(f"test | peak, last (MPa) | law | {' | '.join(FORMS)}", rows)
+    head = f"test | peak, last (MPa) | law | {' | '.join(FORMS)}"
     what = "Tests that were not fitted: errors of the predicted peak and last shear stress."
-    return "\n".join(["", what, "", *lines, ""])
+    return "\n".join(["", what, "", *table(head, rows), ""])
 
 
 def _keywords(options: argparse.Namespace) -> dict[str, Any]:

@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +29,9 @@ from .command import (
 
 def _shear(options: argparse.Namespace) -> None:
     law = read_law(options)
-    test = partial(
+    record = _run(
+        law,
+        options,
         direct_shear,
         law.joint(),
         [options.to, *options.reverse],
@@ -37,7 +40,6 @@ def _shear(options: argparse.Namespace) -> None:
         options.azimuth,
         options.steps,
     )
-    record = _run(test, law, options)
     peak = "peak friction angle" if record.has_peak else "no peak: largest friction angle"
     secant = record.secant_stiffness
     print(
@@ -51,8 +53,7 @@ def _shear(options: argparse.Namespace) -> None:
 def _closure(options: argparse.Namespace) -> None:
     law = read_law(options)
     joint = replace(law, plane=None, closure_only=True).joint()  # the same numbers, sooner
-    test = partial(closure_test, joint, options.normal_stress, steps=options.steps)
-    record = _run(test, law, options)
+    record = _run(law, options, closure_test, joint, options.normal_stress, options.steps)
     at = int(np.argmax(record.F1))
     print(
         f"closure {1e6 * record.closure[at]:.4g} um at {1e-6 * record.F1[at]:.4g} MPa, "
@@ -60,10 +61,12 @@ def _closure(options: argparse.Namespace) -> None:
     )
 
 
-def _run(test: Callable[[], Record], law: JointLaw, options: argparse.Namespace) -> Record:
+def _run(
+    law: JointLaw, options: argparse.Namespace, test: Callable[..., Record], *arguments: Any
+) -> Record:
     """Run a test and write its record, also that of a test that stopped early."""
     try:
-        record = test()
+        record = test(*arguments)
     except PathError as error:
         if len(error.record):
             _write(error.record, law, options)

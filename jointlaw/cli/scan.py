@@ -42,7 +42,9 @@ def _friction(fit: SurfaceFit, z: Array) -> str:
             one = from_surface(z, fit.spacing, length)
             cells = ["not told: the law does not describe this surface, see Z2"] * 2
             if one.describes:
-                cells = [f"{_largest_angle(one, plane):.1f}°" for plane in (0.0, math.pi / 2)]
+                joints = (one.law(ROCK, plane=plane).joint() for plane in (0.0, math.pi / 2))
+                tests = (direct_shear(j, one.asperities.size, STRESS, steps=100) for j in joints)
+                cells = [f"{test.peak_friction_angle:.1f}°" for test in tests]
         except ValueError as error:
             rows.append(f"{1e3 * length:.3g} | {error} | |")
         else:
@@ -51,14 +53,8 @@ def _friction(fit: SurfaceFit, z: Array) -> str:
         f"Friction angle of a joint of this surface at {STRESS / 1e6:g} MPa, sheared by one "
         f"sampling length, with contacts of an assumed rock ({DEFAULT_ROCK}):"
     )
-    lines = table("sampling length (mm) | a | along the rows | across them", rows)
-    return "\n".join(["", what, "", *lines, ""])
-
-
-def _largest_angle(fit: SurfaceFit, plane: float) -> float:
-    """Largest mobilised friction angle (degrees) of direct shear at `STRESS` along this azimuth."""
-    joint = fit.law(ROCK, plane=plane).joint()
-    return direct_shear(joint, fit.asperities.size, STRESS, steps=100).peak_friction_angle
+    head = "sampling length (mm) | a | along the rows | across them"
+    return "\n".join(["", what, "", *table(head, rows), ""])
 
 
 def _toml(fit: SurfaceFit, name: str) -> str:

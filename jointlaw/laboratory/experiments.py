@@ -53,9 +53,8 @@ def closure_test(joint: Joint, stress: float | Sequence[float], steps: int = 100
         start = 0.0
     log = _Log(joint, 0.0, "closure test")
     log.measure(joint.F)
-    still = np.zeros(joint.law.dim - 1)
     for level in track(levels, "closure test", len(levels)):
-        log.advance(still, NormalCondition(level, max(peaks)))
+        log.advance(np.zeros(joint.law.dim - 1), NormalCondition(level, max(peaks)))
     return log.record()
 
 
@@ -144,8 +143,8 @@ class _Log:
     def measure(self, F: Array) -> None:
         """Add a row from the joint's state and its traction F."""
         joint, now = self.joint, self.joint.measures()
-        shares, energies = (now.sliding, now.separated), (now.stored, joint.dissipated_energy)
-        self.rows.append(np.hstack([joint.delta @ self.axes, F @ self.axes, *shares, *energies]))
+        numbers = (now.sliding, now.separated, now.stored, joint.dissipated_energy)
+        self.rows.append(np.hstack([joint.delta @ self.axes, F @ self.axes, *numbers]))
 
     def record(self) -> Record:
         """The rows so far."""

@@ -26,7 +26,6 @@ UNITS = {
     "stored": "J/m2",
     "dissipated": "J/m2",
 }
-DERIVED = {"shear_stress": "Pa", "opening": "m"}  # of shear, along its azimuth and from its start
 _PREFIXES = {"n": 1e-9, "µ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
 Panels = dict[str, dict[str, Array]]
 
@@ -155,24 +154,20 @@ class Record:
         """
         chosen = {"m": length, "Pa": stress}
         factors = {unit: units.parse(f"1{chosen[unit]}", unit) for unit in chosen}
-        titles, columns = [], []
-        derived = (
-            {}
-            if not self._sheared
-            else {
-                "shear_stress": self.shear_stress,
-                "opening": self.closure[0] - self.closure,
-                "friction_angle_deg": self.friction_angle,
-                "dilation_angle_deg": self.dilation_angle,
-            }
+        columns = [(name, UNITS[name], column) for name, column in self.columns.items()]
+        if self._sheared:
+            columns += [
+                ("shear_stress", "Pa", self.shear_stress),
+                ("opening", "m", self.closure[0] - self.closure),
+                ("friction_angle_deg", "1", self.friction_angle),
+                ("dilation_angle_deg", "1", self.dilation_angle),
+            ]
+        titles = (
+            f"{name}_{chosen.get(unit, unit)}".removesuffix("_1") for name, unit, _ in columns
         )
-        for name, column in {**self.columns, **derived}.items():
-            unit = UNITS.get(name, DERIVED.get(name, "1"))
-            titles.append(name if unit == "1" else f"{name}_{chosen.get(unit, unit)}")
-            columns.append(column / factors.get(unit, 1.0))
-        buffer, table = io.StringIO(), np.column_stack(columns)
-        header = ",".join(titles)
-        np.savetxt(buffer, table, fmt="%.12g", delimiter=",", header=header, comments="")
+        table = np.column_stack([column / factors.get(unit, 1.0) for _, unit, column in columns])
+        buffer, head = io.StringIO(), ",".join(titles)
+        np.savetxt(buffer, table, fmt="%.12g", delimiter=",", header=head, comments="")
         replace_file(Path(path), buffer.getvalue().encode())
 
     @style()
@@ -181,8 +176,7 @@ class Record:
 
         Raises ImportError without it, OSError where the file cannot be written.
         """
-        panels_of = _shear_panels if self._sheared else _closure_panels
-        title, x, label, panels = panels_of(self)
+        title, x, label, panels = _shear_panels(self) if self._sheared else _closure_panels(self)
         rows = len(panels) // 2
         figure, axes = pyplot().subplots(rows, 2, figsize=(7.5, 1 + 2.6 * rows), sharex=True)
         figure.suptitle(title)

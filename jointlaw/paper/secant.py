@@ -148,22 +148,19 @@ def _panels(
     orientation: Orientation, asperity: Asperity, d: Array, limit: float
 ) -> Iterator[tuple[Array, Array, Array, Array]]:
     """theta, phi, weight and zone (0 elastic, 1 sliding, 2 separated) of the nodes, panel-wise."""
-    shear = math.hypot(d[1], d[2])
-    tilt, azimuth = math.atan2(shear, d[0]), math.atan2(d[2], d[1])
+    tilt, azimuth = math.atan2(math.hypot(d[1], d[2]), d[0]), math.atan2(d[2], d[1])
     cone = math.atan(limit * asperity.mu * asperity.lam)
-    circles = (cone, 0.5 * math.pi) if d.any() else (0.0, 0.0)
+    circles = np.array([cone, 0.5 * math.pi] if d.any() else [0.0, 0.0])
     top = 0.5 * math.pi / orientation.a
-    breaks = [tilt]
-    for radius in circles:
-        breaks += [abs(tilt - radius), tilt + radius, 2 * math.pi - tilt - radius]
-    edges = np.unique([0.0, top, *(point for point in breaks if 0.0 < point < top)])
+    ends = np.abs(tilt - circles), tilt + circles, 2 * math.pi - tilt - circles
+    edges = np.unique(np.clip([0.0, top, tilt, *np.concatenate(ends)], 0.0, top))
     x, w = _crowded(_THETA_NODES)
     y, v = _crowded(_PHI_NODES)
     for low, high in pairwise(edges):
         theta = low + (high - low) * x
-        ends = [np.zeros_like(theta), *(_crossing(theta, tilt, r) for r in circles)]
-        ends.append(np.full_like(theta, math.pi))
-        for zone, (start, stop) in enumerate(pairwise(ends)):
+        crossings = (_crossing(theta, tilt, radius) for radius in circles)
+        limits = [np.zeros_like(theta), *crossings, np.full_like(theta, math.pi)]
+        for zone, (start, stop) in enumerate(pairwise(limits)):
             width = stop - start
             if not (width > 0).any():
                 continue

@@ -1,7 +1,6 @@
 """Parameter sets printed in the paper, in SI units, each with its source."""
 
 import tomllib
-from importlib import resources
 from pathlib import Path
 
 from ..laws.joint_law import JointLaw
@@ -10,14 +9,13 @@ from ..support.checks import one_of, remedy
 
 def names() -> list[str]:
     """Names of all presets."""
-    folder = resources.files(__package__)
-    return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return sorted(path.stem for path in Path(__file__).parent.glob("*.toml"))
 
 
 def text(name: str) -> str:
     """TOML text of a preset. Raises ValueError for an unknown name."""
     one_of("preset", name, tuple(names()))
-    return (resources.files(__package__) / f"{name}.toml").read_text(encoding="utf-8")
+    return Path(__file__).with_name(f"{name}.toml").read_text(encoding="utf-8")
 
 
 def about(name: str) -> dict[str, str]:

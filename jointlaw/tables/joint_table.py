@@ -53,10 +53,9 @@ class Report(dict[str, PathError]):
     """Errors of a table against its law by the name of the path; print it to read it."""
 
     def __str__(self) -> str:
-        lines = [" ".join([f"{'path':34s}", *(f"{name:>8s}" for name in PathError._fields)])]
-        for name, error in self.items():
-            lines.append(" ".join([f"{name:34s}", *(f"{100 * share:6.1f} %" for share in error)]))
-        return "\n".join(lines)
+        rows = [[f"{'path':34s}", *(f"{name:>8s}" for name in PathError._fields)]]
+        rows += [[f"{n:34s}", *(f"{100 * x:6.1f} %" for x in error)] for n, error in self.items()]
+        return "\n".join(map(" ".join, rows))
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,8 +217,8 @@ class JointTable:
         result = {name: getattr(self, attribute) for name, attribute in BY_CLOSURE.items()}
         result["mu"] = self.peak_friction.mean(axis=1)
         for name, attribute in BY_AZIMUTH.items():
-            for psi, column in zip(self.azimuth, getattr(self, attribute).T, strict=True):
-                result[f"{name}_{round(np.degrees(psi)):03d}"] = column
+            titles = (f"{name}_{round(np.degrees(psi)):03d}" for psi in self.azimuth)
+            result |= zip(titles, getattr(self, attribute).T, strict=True)
         return result
 
     def save(self, path: str | Path) -> None:

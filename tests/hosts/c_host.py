@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
-from jointlaw.hosts.c.export import include_dir, table_text
+from jointlaw.hosts.c.export import table_text
+from jointlaw.native.build import BUILT
 
 STRICT = ["-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror"]
 FAST = ["-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"]
@@ -32,7 +33,7 @@ def build(folder, source, *flags, cc="cc", name="program"):
         path = folder / ("source.cpp" if cc.endswith("++") else "source.c")
         path.write_text(source)
     out = folder / name
-    command = [compiler(cc), *flags, f"-I{include_dir()}", str(path), "-o", str(out), "-lm"]
+    command = [compiler(cc), *flags, f"-I{BUILT}", str(path), "-o", str(out), "-lm"]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, f"{' '.join(command)}\n{done.stderr}"
     return out

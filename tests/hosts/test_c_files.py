@@ -15,7 +15,8 @@ from extremes import laws as extreme_laws
 
 import jointlaw as jl
 import jointlaw.cli.main
-from jointlaw.hosts.c.export import FORMAT, header_text, include_dir, table_text
+from jointlaw.hosts.c.export import FORMAT, header_text, table_text
+from jointlaw.native.build import BUILT
 
 FUZZ = HERE / "fuzz.c"
 DOCS = Path(__file__).parents[2] / "docs"
@@ -74,7 +75,7 @@ def test_compiles_as_cuda(tmp_path, law):
     (tmp_path / "x.cu").write_text(DEVICE + kernel)
     command = [
         compiler("clang"), "-x", "cuda", "--cuda-device-only", "--cuda-gpu-arch=sm_80",
-        "-nocudalib", "-nocudainc", "-O1", f"-I{include_dir()}", f"-I{tmp_path}",
+        "-nocudalib", "-nocudainc", "-O1", f"-I{BUILT}", f"-I{tmp_path}",
         "-S", str(tmp_path / "x.cu"), "-o", str(tmp_path / "x.ptx"),
     ]  # fmt: skip
     done = subprocess.run(command, capture_output=True, text=True)
@@ -86,7 +87,7 @@ def test_compiles_as_cuda(tmp_path, law):
 def test_fast_math_is_refused(tmp_path, cc):
     path = tmp_path / "source.c"
     path.write_text(SOURCE)
-    command = [compiler(cc), "-ffast-math", f"-I{include_dir()}", "-c", str(path), "-o", "x.o"]
+    command = [compiler(cc), "-ffast-math", f"-I{BUILT}", "-c", str(path), "-o", "x.o"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode != 0
     assert "take -fno-math-errno -fno-trapping-math" in done.stderr
@@ -217,7 +218,7 @@ def test_examples_build_as_written_and_run(tmp_path, law, capsys, monkeypatch):
         [sys.executable, "-c", re.search(r'`python -c "(.*)"` prints the folder', page)[1]],
         capture_output=True, text=True,
     )  # fmt: skip
-    assert told.stdout.strip() == include_dir()
+    assert told.stdout.strip() == str(BUILT)
     whole = (folder / "CMakeLists.txt").read_text().splitlines()
     assert set(re.search(r"```cmake\n(.*?)```", page, re.S)[1].splitlines()) <= set(whole)
     (folder / "first.c").write_text(copied()["native.md"])
@@ -245,7 +246,7 @@ def copied():
     pages = [DOCS.parent / "README.md", *DOCS.rglob("*.md"), *HOSTS.rglob("*.md")]
     found = {path.name: re.findall(r"^```c\n(.*?)^```", path.read_text(), re.M | re.S)
              for path in pages}  # fmt: skip
-    for path in (Path(include_dir()) / "jointlaw.h", *HOSTS.rglob("*.[hc]")):
+    for path in (Path(BUILT) / "jointlaw.h", *HOSTS.rglob("*.[hc]")):
         head = re.findall(r"^ \*     (.*)", path.read_text().partition("*/")[0], re.M)
         found[path.name] = ["\n".join(head)] * any(";" in line for line in head)  # no commands
     return {name: text for name, texts in found.items() for (text,) in [texts] * bool(texts)}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from c_host import HERE, compiler, random_law, random_path
 
-from jointlaw.hosts.c.export import include_dir, table_text
+from jointlaw.hosts.c.export import table_text
 from jointlaw.native import build
 
 ROOT = Path(__file__).parents[2]
@@ -41,7 +41,7 @@ def test_arm_gives_the_bits_of_this_machine(wheels, tmp_path):
     qemu = compiler("qemu-aarch64")
     wheel = next(wheels.glob(f"*{build.TARGETS[ARM]}.whl"))
     library = zipfile.ZipFile(wheel).extract("jointlaw/native/built/libjointlaw.so", tmp_path)
-    program, flags = tmp_path / "library", [*build.FLAGS, f"-I{include_dir()}", f"-I{build.HERE}"]
+    program, flags = tmp_path / "library", [*build.FLAGS, f"-I{build.BUILT}", f"-I{build.HERE}"]
     build.zig(ARM).run(*flags, HERE / "library.c", "-o", program, "-lm", "-ldl")
     for seed in (*PLAIN, 3, 7, 13, 20):
         law = random_law(seed)

@@ -84,6 +84,17 @@ def test_the_opening_tells_friction_from_slopes(law):
     assert held.identifiable == ("a",)
 
 
+def test_a_joint_that_only_closes_in_shear_is_told_no_dilation_angle(law):
+    flat = replace(law, mating_length=6e-6, plane=0.0)
+    shear = np.linspace(0.0, 1e-5, 8)
+    stress, opening = ShearCurve(shear, np.ones(8), 5e6).predict(flat)
+    assert (np.diff(opening) < 0).all()
+    fit = jl.fit_curves([ShearCurve(shear, stress, 5e6)], law=flat, free=("mu", "a"))
+    assert fit.traded
+    assert "No opening was measured" in fit.report()
+    assert "nan" not in fit.report()
+
+
 @pytest.mark.slow
 def test_a_test_under_constant_stiffness_is_fitted_by_its_own_normal_stress(law):
     """The normal stress grows from 2 to 4 MPa with the dilation; its mean would be wrong."""

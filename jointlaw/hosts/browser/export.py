@@ -56,8 +56,10 @@ def script() -> str:
     for name in presets.names():
         law = presets.load(name)
         o, p = law.orientation, law.asperity
-        numbers = {"a": o.a, "b": o.b, "c": o.c, "mu": p.mu, "range": law.closure_range}
-        rocks[name] = numbers | {"tables": _text(tables(law))}
+        rocks[name] = {
+            "a": o.a, "b": o.b, "c": o.c, "mu": p.mu, "range": law.closure_range,
+            "tables": _text(tables(law)),
+        }  # fmt: skip
     parts = [(HERE / name).read_text(encoding="utf-8") for name in SCRIPTS]
     return "".join(
         [f'"use strict";\nconst JOINTLAW = {json.dumps(about | {"rocks": rocks})};\n', *parts]

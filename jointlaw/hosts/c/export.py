@@ -1,12 +1,10 @@
 """Export of a joint law to C and C++: header, tables in two forms, examples and a Makefile."""
 
 import re
-from importlib import resources
 from pathlib import Path
 
 from ...kernels.pack import pack, rings
 from ...laws.law import Law
-from ...native import build
 from ...native.layout import AZIMUTHS, FORMAT, jointlaw_h
 from ...support.checks import Array
 from ...support.files import write_files
@@ -16,11 +14,6 @@ FILES = ("jointlaw.c", "example.c", "example.cpp", "example.f90", "Makefile", "C
 HEADER = "jointlaw.h"
 _CONSTANT = "static JLAW_FUNCTION const"  # which on a device lies in its memory
 _MODEL = "granite"  # the name of the tables in these files
-
-
-def include_dir() -> str:
-    """Folder of `jointlaw.h`, for a compiler's -I, where the package was built."""
-    return str(build.BUILT)
 
 
 def export_c(law: Law, directory: str | Path, name: str = "joint") -> list[str]:
@@ -37,16 +30,19 @@ def export_c(law: Law, directory: str | Path, name: str = "joint") -> list[str]:
     that C cannot have or too many azimuths, before anything is written.
     """
     require_name(name)
-    texts = {f"{name}.jlaw": table_text(law), f"{name}.h": header_text(law, name)}
-    texts[HEADER] = jointlaw_h()
-    texts |= {file: file_text(file).replace(_MODEL, name) for file in FILES}
+    texts = {
+        f"{name}.jlaw": table_text(law),
+        f"{name}.h": header_text(law, name),
+        HEADER: jointlaw_h(),
+        **{file: file_text(file).replace(_MODEL, name) for file in FILES},
+    }
     write_files(directory, texts)
     return list(texts)
 
 
 def file_text(file: str) -> str:
     """A file of this folder, which has tables of the name granite."""
-    return (resources.files(__package__) / file).read_text(encoding="utf-8")
+    return Path(__file__).with_name(file).read_text(encoding="utf-8")
 
 
 def require_name(name: str) -> None:
@@ -72,8 +68,7 @@ def table_text(law: Law) -> str:
     numbers, arrays = packed(law)
     lines = [f"jointlaw tables {FORMAT}", f"fingerprint {law.fingerprint}"]
     lines += [f"# {line}" for line in law.to_toml().splitlines()]
-    for key, value in numbers.items():
-        lines.append(f"{key} {value if isinstance(value, int) else value.hex()}")
+    lines += [f"{key} {x if isinstance(x, int) else x.hex()}" for key, x in numbers.items()]
     for key, array in arrays.items():
         lines.append(key)
         lines += [" ".join(map(float.hex, row.tolist())) for row in array.reshape(-1, 4)]
@@ -118,7 +113,6 @@ def packed(law: Law) -> tuple[dict[str, int | float], dict[str, Array]]:
 def _sum(data: bytes) -> int:
     """FNV-1a of 64 bits, without carriage returns."""
     value = 0xCBF29CE484222325
-    for byte in data:
-        if byte != 13:
-            value = (value ^ byte) * 0x100000001B3 & 0xFFFFFFFFFFFFFFFF
+    for byte in data.replace(b"\r", b""):
+        value = (value ^ byte) * 0x100000001B3 & 0xFFFFFFFFFFFFFFFF
     return value

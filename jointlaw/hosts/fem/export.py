@@ -1,6 +1,5 @@
 """Export of a joint law to finite elements: MGIS and UMAT, OpenGeoSys and Kratos, in one folder."""
 
-from importlib import resources
 from pathlib import Path
 from textwrap import fill
 
@@ -45,25 +44,10 @@ def export_fem(
         "jointlaw.c": c.file_text("jointlaw.c"),
         f"{name}.h": c.header_text(law, name),
     }
-    marks = _marks(law, seating)
-    source = resources.files(__package__) / "files"
-    for file in sorted(source.iterdir(), key=lambda file: file.name):
-        # pip leaves a folder of compiled Python beside them
-        if file.is_file() and (law.dim == 3 or "3d" not in file.name):
-            text = file.read_text(encoding="utf-8")
-            for mark, value in marks.items():
-                text = text.replace(f"@{mark}@", value)
-            texts[file.name] = text.replace("granite", name)
-    write_files(directory, texts)
-    return list(texts)
-
-
-def _marks(law: Law, seating: float) -> dict[str, str]:
-    """What stands for the @WORDS@ of the files."""
     start = [*law.joint(normal_stress=seating).snapshot().values[0].tolist(), 1.0]
     names = [f'"State{i}"' for i in range(1, len(start))] + ['"Begun"']
     shear = 5.0 * float(law.closure(NORMAL))
-    return {
+    marks = {  # what stands for the @WORDS@ of the files
         "DIM": str(law.dim),
         "STATE": str(len(start)),
         "NAMES": fill(", ".join(names), 96).replace("\n", " \\\n"),
@@ -74,3 +58,12 @@ def _marks(law: Law, seating: float) -> dict[str, str]:
         "SHEAR": repr(shear),
         "BACK": repr(shear / 2),
     }
+    for file in sorted(Path(__file__).with_name("files").iterdir()):
+        # pip leaves a folder of compiled Python beside them
+        if file.is_file() and (law.dim == 3 or "3d" not in file.name):
+            text = file.read_text(encoding="utf-8")
+            for mark, value in marks.items():
+                text = text.replace(f"@{mark}@", value)
+            texts[file.name] = text.replace("granite", name)
+    write_files(directory, texts)
+    return list(texts)

@@ -1,6 +1,5 @@
 """Export of a joint law to LAMMPS: tables, the plug-in and an input script, in one folder."""
 
-from importlib import resources
 from pathlib import Path
 
 from ...laws.law import Law
@@ -28,7 +27,8 @@ def export_lammps(law: Law, directory: str | Path, name: str = "joint") -> list[
     >>> names = jl.export_lammps(law, "joint-for-lammps")
     """
     require_3d(law, "motion in LAMMPS")
-    texts = {
+    source = Path(__file__).with_name("files")
+    files: dict[str, str | bytes] = {
         f"{name}.jlaw": c.table_text(law),
         "joint.in": (
             "# made by `jointlaw export lammps`: what in.tower needs to know of this joint\n"
@@ -36,10 +36,9 @@ def export_lammps(law: Law, directory: str | Path, name: str = "joint") -> list[
             f"variable closure0 equal {float(law.closure(WEIGHT))!r}   # m, under {WEIGHT:g} Pa\n"
         ),
         "law.toml": law.to_toml(),
+        **{file: (source / file).read_bytes() for file in FILES},
+        "jointlaw.h": jointlaw_h(),
     }
-    source = resources.files(__package__) / "files"
-    copies = {file: (source / file).read_bytes() for file in FILES}
-    copies["jointlaw.h"] = jointlaw_h().encode()
-    folder = write_files(directory, {**copies, **texts})
+    folder = write_files(directory, files)
     (folder / "build.sh").chmod(0o755)
-    return [*texts, *copies]
+    return list(files)

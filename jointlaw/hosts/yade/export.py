@@ -1,12 +1,11 @@
 """Export of a joint law to YADE: table, law, adapter and script, in one folder."""
 
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ... import tables
 from ...laws.law import Law
 from ...support.files import write_files, write_json
+from ...tables import joint_table
 from ...tables.joint_table import JointTable
 from ...tables.tabulate import require_3d, tabulate
 
@@ -47,6 +46,6 @@ def export_yade(law: Law, directory: str | Path, **options: Any) -> JointTable:
 
 def copy_files(folder: Path) -> None:
     """Copy the adapter, the table that it needs, and the script."""
-    own, shared = resources.files(__package__) / "files", resources.files(tables)
-    sources = {name: shared if name == "joint_table.py" else own for name in COPIED}
-    write_files(folder, {name: (source / name).read_bytes() for name, source in sources.items()})
+    own, table = Path(__file__).with_name("files"), Path(joint_table.__file__)
+    sources = (table if name == table.name else own / name for name in COPIED)
+    write_files(folder, {source.name: source.read_bytes() for source in sources})

@@ -118,7 +118,7 @@ else:
     for azimuth in (0.0, 45.0, 90.0):
         friction = table.lookup(closure, np.radians(azimuth)).peak_friction
         angle = np.degrees(np.arctan(friction))
-        for off in (-0.1, 0.1):
-            moved = tilt(angle + off, azimuth)[0] / closure
-            print(f"azimuth {azimuth:.0f} deg: friction angle {angle:.4f} deg, {off:+.1f} deg: "
+        for more in (-0.1, 0.1):
+            moved = tilt(angle + more, azimuth)[0] / closure
+            print(f"azimuth {azimuth:.0f} deg: friction angle {angle:.4f} deg, {more:+.1f} deg: "
                   f"{'slides' if moved > 1e-3 else 'sticks'} ({moved:.1e} closures)")  # fmt: skip

@@ -138,22 +138,13 @@ class NumpyEngine:
     def refresh(self, state: Array, n: int) -> None:
         """Nothing is kept beside the states."""
 
-    def traction(self, state: Array, out: Array) -> None:
-        """Write what the first n joints bear into out (n, dim), in Pa."""
-        out[:] = self._of_states(reference.traction, state, len(out)).T
+    def of_states(self, what: str, state: Array, n: int) -> Array:
+        """What the first n states amount to, joints first, by a function of `reference`:
 
-    def stiffness(self, state: Array, out: Array) -> None:
-        """Write bounds of `|C|` of the first n joints into out (n,), in Pa/m."""
-        out[:] = self._of_states(reference.stiffness, state, len(out))
-
-    def measures(self, state: Array, out: Array) -> None:
-        """Write the `Measures` of the first n joints into the rows of out (5, n)."""
-        out[:] = self._of_states(reference.measures, state, out.shape[1])
-
-    def _of_states(self, function: Any, state: Array, n: int) -> Any:
-        """What a function of the kernel says of the first n states."""
-        rows = state[at(state, np.arange(n))].T
-        return function(self.tables, np.ascontiguousarray(rows))
+        "traction" (n, dim) in Pa, "stiffness" (n,) in Pa/m or "measures" (n, 5).
+        """
+        rows = np.ascontiguousarray(state[at(state, np.arange(n))].T)
+        return np.array(getattr(reference, what)(self.tables, rows)).T
 
 
 class NativeEngine:
@@ -187,20 +178,16 @@ class NativeEngine:
         """Bring Phi and Phi', kept beside the first n states, up to date with them."""
         self._run(library.REFRESH, self._prepared(state, n))
 
-    def traction(self, state: Array, out: Array) -> None:
-        """As `NumpyEngine.traction`: that of a step by nothing."""
-        still = np.zeros_like(out)
-        call = self._prepared(state, len(out), address(still), address(out))
-        call.hold = 1
-        self._run(library.ADVANCE, call)
-
-    def stiffness(self, state: Array, out: Array) -> None:
-        """As `NumpyEngine.stiffness`."""
-        self._run(library.STIFFNESS, self._prepared(state, len(out), None, address(out)))
-
-    def measures(self, state: Array, out: Array) -> None:
-        """As `NumpyEngine.measures`."""
-        self._run(library.MEASURE, self._prepared(state, out.shape[1], None, address(out)))
+    def of_states(self, what: str, state: Array, n: int) -> Array:
+        """As `NumpyEngine.of_states`; the traction is that of a step by nothing."""
+        call, *shape = {
+            "traction": (library.ADVANCE, n, self._law.dim),
+            "stiffness": (library.STIFFNESS, n),
+            "measures": (library.MEASURE, n, 5),
+        }[what]
+        out = np.empty(shape)
+        self._run(call, self._prepared(state, n, None, address(out)))
+        return out
 
     def _prepared(self, state: Array, n: int, *arrays: int | None) -> library.BatchCall:
         """A call for n joints; arrays: where d, F, C, what is shown and the index begin."""

@@ -34,8 +34,7 @@ def offset(k: FacetTables, p: Array) -> Array:
     if not k.fades:
         return p
     x = p / k.mating_length
-    o: Array = p / np.sqrt(1 + np.sum(x * x, axis=0))
-    return o
+    return p / np.sqrt(1 + np.sum(x * x, axis=0))
 
 
 def planes(k: FacetTables, p: Array, slopes: Array) -> Planes:

@@ -18,7 +18,7 @@ from ..joints.joint import Joint
 from ..joints.seat import seat
 from ..joints.time_step import stable_step
 from ..kernels.engine import step_states
-from ..kernels.reference import Tables, sum_of
+from ..kernels.reference import Tables
 from ..parameters import keys, toml
 from ..parameters.declared import parameters_of
 from ..parameters.fingerprint import fingerprint
@@ -175,7 +175,7 @@ class Law:
         if not (way >= 0).all():
             raise ValueError(f"shear = {shear!r} m is out of bounds: it must be >= 0")
         self._within_reach(y + self.tables.stretch * way)
-        return sum_of(one.largest_stiffness(y, way) for one in self.tables.elements)[()]
+        return np.sum([one.largest_stiffness(y, way) for one in self.tables.elements], axis=0)[()]
 
     def critical_time_step(
         self, mass: ArrayLike, area: ArrayLike, closure: ArrayLike, shear: ArrayLike = 0.0
@@ -201,7 +201,7 @@ class Law:
 
     def _first_loading(self, closure: Array) -> Array:
         """`normal_stress` of closures that are within reach."""
-        return sum_of(one.normal_stress(closure) for one in self.tables.elements)
+        return np.sum([one.normal_stress(closure) for one in self.tables.elements], axis=0)
 
     def _within_reach(self, closure: ArrayLike) -> Array:
         """Closures (m) that are finite and whose forces are."""

@@ -182,7 +182,7 @@ static void jlaw_step_many_(const jlaw_law *law, double *s, size_t apart, const 
   jm_real p[3], f[3], c[9];
   for (int l = 0; l < JM_W; l++)
     for (int i = 0; i < dim; i++) p[i][l] = d[l * dim + i];
-  jm_step_of_kind(law, n, p, f, c, JLAW_LEDGER, C != NULL, 0, 0, NULL);
+  jm_step_of_kind(law, n, p, f, c, JLAW_LEDGER, C != NULL, 0, NULL);
   for (int l = 0; l < JM_W; l++) {
     for (int i = 0; i < dim; i++) F[l * dim + i] = f[i][l];
     for (int i = 0; C && i < dim * dim; i++) C[l * dim * dim + i] = c[i][l];
@@ -268,7 +268,7 @@ JLAW_CLONES JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t 
                                          const double *d, double *F, double *C)
 {
   const jl_numbers n = {s, stride, 0};
-  jl_step_of_kind(law, n, d, F, C, JLAW_LEDGER, C != NULL, 0, 0, NULL);
+  jl_step_of_kind(law, n, d, F, C, JLAW_LEDGER, C != NULL, 0, NULL);
 }
 
 /* Whether all sliders hold forces that a law can have; 0 for NaN */

@@ -14,8 +14,8 @@ _APART = 0.4  # least distance of a halving from a breakpoint, in halvings
 _SMOOTH = 0.999  # a power that needs no help
 
 
-def factor(y: Array, eta: float, heights: HeightDistribution, beyond: Array) -> tuple[Array, Array]:
-    """S and D S at y >= 0, infinity included; `beyond` holds the breakpoints above the overlap."""
+def factor(y: Array, eta: float, heights: HeightDistribution) -> tuple[Array, Array]:
+    """S and D S at y >= 0, infinity included."""
     r0 = heights.overlap
     S, DS = np.ones_like(y), np.zeros_like(y)
     finite = np.isfinite(y)
@@ -25,9 +25,8 @@ def factor(y: Array, eta: float, heights: HeightDistribution, beyond: Array) -> 
         with np.errstate(invalid="ignore"):  # 0 times an infinite density at r = 0
             DS[finite] = np.where(yf > 0, yf * heights.pdf(r0 + yf), 0.0)
         return S, DS
-    base = float(heights.cdf(r0))
-    grown, slope = _individual(yf, eta, heights, beyond)
-    S[finite] = base + grown
+    grown, slope = _individual(yf, eta, heights)
+    S[finite] = float(heights.cdf(r0)) + grown
     DS[finite] = (1 + eta) * (slope - grown)
     return S, DS
 
@@ -43,16 +42,15 @@ def rise(heights: HeightDistribution) -> float:
     return power if power < _SMOOTH else 0.0
 
 
-def _individual(
-    y: Array, eta: float, heights: HeightDistribution, beyond: Array
-) -> tuple[Array, Array]:
+def _individual(y: Array, eta: float, heights: HeightDistribution) -> tuple[Array, Array]:
     """int_0^y H(r0 + s) (1 - s/y)^p ds for p = 1 + eta and p = eta.
 
     Gauss-Legendre on panels between the breakpoints, and a Gauss-Jacobi rule that knows the power
     on the panel in which y lies together with the one below it, so that the end singularity of
     (1 - s/y)^p is never seen by an ordinary rule. A histogram is integrated in closed form.
     """
-    r0 = heights.overlap
+    r0, points = heights.overlap, heights.breakpoints()
+    beyond = points[points > r0] - r0
     if isinstance(heights, Heights):
         return _steps(y, 1 + eta, heights, beyond), _steps(y, eta, heights, beyond)
     rising = rise(heights)

@@ -10,9 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..kernels.element import Measures
 from ..kernels.engine import LANES, Step, at, blocks, engine
-from ..support.checks import Array, integer, numbers
+from ..support.checks import Array, finite, integer, numbers
 from .state import JointState, NonFiniteError
-from .time_step import stable_step
 
 Index = Sequence[int] | NDArray[np.integer[Any]] | NDArray[np.bool_]
 Result = tuple[Array, Array | None]
@@ -332,3 +331,15 @@ def increments(d: ArrayLike, shape: tuple[int, ...]) -> Array:
             f"d has shape {values.shape}; expected {shape}: {joints}{COMPONENTS[shape[-1]]}"
         )
     return values
+
+
+def stable_step(mass: ArrayLike, area: ArrayLike, stiffness: Array) -> Array:
+    """2 sqrt(m/(K area)) in s, infinite where nothing touches.
+
+    mass: reduced mass in kg, > 0; area: in m2, > 0; stiffness: K in Pa/m.
+    """
+    m, a = finite("mass", mass, "kg"), finite("area", area, "m2")
+    if not ((m > 0).all() and (a > 0).all()):
+        raise ValueError(f"mass = {m} kg, area = {a} m2 are out of bounds: both must be > 0")
+    with np.errstate(divide="ignore"):
+        return 2 * np.sqrt(m / (stiffness * a))

@@ -19,9 +19,8 @@ from ..support.checks import Array
 from ..support.thresholds import LIMIT, NEAR, ROUNDED, TINY, UNDERFLOW
 from .cells import Cells, cells, compliance, reciprocal
 from .element import Element, Measures, Share
-from .mating import Planes, Turning, offset, planes, turning
+from .mating import Planes, Turning, first_touch, offset, planes, turning
 from .stiffness import bend_of, joining, rises, stiffness_of
-from .unmated import first_touch
 from .wear import lowered, worn_share
 from .yielding import flatten, flattened, plastic_work, softening
 
@@ -85,6 +84,12 @@ class Asperities(Element):
     def numbers(self) -> dict[str, float]:
         k, (more, most) = self.k, joining(self.k)
         return {
+            "facets": len(k.c1),
+            "cells": k.cells,
+            "pieces": len(k.curve.S),
+            "yields": int(k.yields),
+            "fades": int(k.fades),
+            "wears": int(k.wears),
             "soft": 1.0 / k.lam,
             "mu": k.mu,
             "mating_length": k.mating_length,

@@ -79,17 +79,6 @@ def engine(tables: Tables) -> "NumpyEngine | NativeEngine":
     return _engine(tables, choice)
 
 
-def step_states(
-    tables: Tables, states: Array, d: Array, tangent: bool
-) -> tuple[Array, Array, Array | None]:
-    """New states (n, rows), F (n, dim) and C (n, dim, dim) after the increments d (n, dim)."""
-    n, dim = d.shape
-    new, F = np.array(states, order="C"), np.empty((n, dim))
-    C = np.empty((n, dim, dim)) if tangent else None
-    engine(tables).advance(new[:, :, None], Step(np.ascontiguousarray(d), F, C), ledger=True)
-    return new, F, C
-
-
 @lru_cache(maxsize=64)
 def _engine(tables: Tables, choice: str) -> "NumpyEngine | NativeEngine":
     loaded = None if choice == "numpy" else library.load()

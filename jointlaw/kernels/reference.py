@@ -21,7 +21,7 @@ from ..support.checks import Array
 from . import asperities
 from .asperities import Asperities
 from .element import Element, Measures
-from .unmated import first_touch
+from .mating import first_touch
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,6 @@
 /* batch.c: many joints. Compiled several times: with -DJL_W=8, 4 and 2 for states in blocks of
  * JLAW_BLOCK joints side by side, (blocks, rows, JLAW_BLOCK); with -DJL_W=4 -DJLAW_ABREAST for
- * joints one after the other, (joints, rows). -DKIND=_8 and so on ends the names of the functions.
+ * joints one after the other, (joints, rows). -DKIND=_8 and so on ends the name of the table of functions.
  */
 #include "batch.h"
 #include "lanes.h"
@@ -67,7 +67,7 @@ static double *joint_of(const jlaw_batch *b, long long joint)
 /* Advance numbers first to last - 1 of the list b->index, or of all joints where it is NULL; first
  * begins a block. Without b->keep, which b->d = NULL asks for, the states stay as they were. 0, or -1
  * where memory is short. */
-int NAME(jlaw_advance)(const jlaw_batch *b, long first, long last)
+static int advance(const jlaw_batch *b, long first, long last)
 {
   const size_t rows = (size_t) b->rows, size = rows * BLOCK;
   double *copy = NULL;
@@ -99,7 +99,7 @@ int NAME(jlaw_advance)(const jlaw_batch *b, long first, long last)
 }
 
 /* Measures (n, 5) of joints first to last - 1, as reference.measures, into b->F */
-int NAME(jlaw_measure)(const jlaw_batch *b, long first, long last)
+static int measure(const jlaw_batch *b, long first, long last)
 {
   for (long at = first; at < last; at += JL_JOINTS) {
     const jl_numbers n = {joint_of(b, at), BLOCK, 0};
@@ -113,7 +113,7 @@ int NAME(jlaw_measure)(const jlaw_batch *b, long first, long last)
 }
 
 /* Bounds (n,) of |C| of joints first to last - 1 as they are, into b->F */
-int NAME(jlaw_stiffness)(const jlaw_batch *b, long first, long last)
+static int stiffness(const jlaw_batch *b, long first, long last)
 {
   for (long at = first; at < last; at += JL_JOINTS) {
     const jl_numbers n = {joint_of(b, at), BLOCK, 0};
@@ -124,7 +124,7 @@ int NAME(jlaw_stiffness)(const jlaw_batch *b, long first, long last)
 }
 
 /* Phi and Phi' that joints first to last - 1 keep, after their states were written */
-int NAME(jlaw_refresh)(const jlaw_batch *b, long first, long last)
+static int refresh(const jlaw_batch *b, long first, long last)
 {
   const jlaw_law *law = b->law;
   const int M = law->facets, kept = jl_state_rows(law);
@@ -143,3 +143,6 @@ int NAME(jlaw_refresh)(const jlaw_batch *b, long first, long last)
   }
   return 0;
 }
+
+extern jlaw_call *const NAME(jlaw_calls)[4];
+jlaw_call *const NAME(jlaw_calls)[4] = {advance, measure, refresh, stiffness};

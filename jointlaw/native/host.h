@@ -293,10 +293,9 @@ static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
   if (law->wears)
     good = good && worn[0] >= 0.0 && worn[0] <= 1.0 && worn[1] >= 0.0 && worn[1] <= DBL_MAX;
   const double *row = s + jl_element_row(law);
-#define JL_GOOD(name) \
-  if (law->name) good = good && jl_##name##_good(law, row), row += jl_##name##_rows(law);
-  JLAW_ELEMENTS(JL_GOOD)
-#undef JL_GOOD
+  for (int i = 0; i < JL_ELEMENTS; i++)
+    for (int left = jl_rows_of(law, i); left > 0; left--, row++)
+      good = good && (left > 1 ? fabs(*row) < JLAW_STRONGEST : *row >= 0.0 && *row <= 1.0);
   return good && jlaw_sound_(s + jl_slider_row(law), jl_rest_row(law) - jl_slider_row(law));
 }
 
@@ -377,11 +376,9 @@ JLAW_FUNCTION int jlaw_unmated(const jlaw_law *law, double *s)
   const int far = law->fades && law->dim > 1;
   for (int i = 0; i < jl_state_rows(law); i++) s[i] = 0.0;
   if (far) s[0] = law->first_touch, s[1] = JLAW_FAR * law->mating_length;
-  int end = jl_element_row(law);
-#define JL_BREAK(name) \
-  if (law->name && jl_##name##_rows(law)) end += jl_##name##_rows(law), s[end - 1] = 1.0;
-  JLAW_ELEMENTS(JL_BREAK)
-#undef JL_BREAK
+  double *row = s + jl_element_row(law);
+  for (int i = 0; i < JL_ELEMENTS; row += jl_rows_of(law, i), i++)
+    if (jl_rows_of(law, i)) row[jl_rows_of(law, i) - 1] = 1.0; /* broken */
   return far ? 0 : -1;
 }
 JLAW_FUNCTION double jlaw_dissipated(const jlaw_law *law, const double *s) { return s[law->dim]; }
@@ -454,15 +451,16 @@ JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
 
 /* --------------------------------------------------------------- turned axes */
 
-/* The rows of elements in axes 2 and 3 that are turned, or turned round */
+/* The vectors of elements in axes 2 and 3 that are turned, or turned round */
 static JLAW_FUNCTION void jlaw_turn_elements_(const jlaw_law *law, double *s,
                                               const double turn[2][2])
 {
   double *row = s + jl_element_row(law);
-#define JL_TURN(name) \
-  if (law->name) jl_##name##_turn(law, row, turn), row += jl_##name##_rows(law);
-  JLAW_ELEMENTS(JL_TURN)
-#undef JL_TURN
+  for (int i = 0; i < JL_ELEMENTS; row += jl_rows_of(law, i), i++) {
+    const int n = jl_rows_of(law, i) - 1;
+    const double q[2] = {n > 0 ? row[0] : 0.0, n > 1 ? row[1] : 0.0};
+    for (int j = 0; j < n; j++) row[j] = turn[j][0] * q[0] + turn[j][1] * q[1];
+  }
 }
 
 JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s)
@@ -584,11 +582,6 @@ static unsigned long long jlaw_sum_of_(const char *bytes, const char *end)
   return sum;
 }
 
-static int jlaw_hex_(char c)
-{
-  return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
-}
-
 /* Past blanks and lines that begin with # */
 static const char *jlaw_skip_(const char *at)
 {
@@ -607,39 +600,14 @@ static const char *jlaw_word_(const char *at, char *word, size_t room)
   return at;
 }
 
-/* Reads a whole number, or a hexadecimal float as Python's float.hex writes it; NULL if neither.
- * No locale, no rounding. */
+/* Reads a whole number, or a float as a whole hexadecimal number and a power of two: without a point
+ * no locale and no rounding matter. NULL if it is neither, or not finite. */
 static const char *jlaw_number_(const char *at, double *number)
 {
-  at = jlaw_skip_(at);
-  const int negative = *at == '-';
-  at += negative;
-  const int hex = at[0] == '0' && at[1] == 'x';
-  unsigned long long digits = 0;
-  int count = 0, places = 0, point = 0, power = 0;
-  at += hex ? 2 : 0;
-  for (; jlaw_hex_(*at) >= 0 || (*at == '.' && hex && !point); at++) {
-    if (*at == '.') {
-      point = 1;
-      continue;
-    }
-    const int digit = jlaw_hex_(*at);
-    if (++count > 15 || (!hex && digit > 9)) return NULL;
-    digits = digits * (hex ? 16u : 10u) + (unsigned) digit;
-    places += point;
-  }
-  if (hex && *at == 'p') {
-    const int down = *++at == '-';
-    int n = 0;
-    at += *at == '-' || *at == '+';
-    for (; *at >= '0' && *at <= '9' && n < 5; at++, n++) power = 10 * power + (*at - '0');
-    if (n == 0) return NULL;
-    power = down ? -power : power;
-  }
-  if (count == 0 || *at > ' ') return NULL;
-  *number = ldexp((double) digits, power - 4 * places);
-  if (negative) *number = -*number;
-  return fabs(*number) <= DBL_MAX ? at : NULL;
+  const char *begin = jlaw_skip_(at);
+  char *end;
+  *number = strtod(begin, &end);
+  return end > begin && *end <= ' ' && fabs(*number) <= DBL_MAX ? end : NULL;
 }
 
 /* Reads all numbers into law; NULL or what is wrong */
@@ -723,14 +691,11 @@ static const char *jlaw_check_(char *bytes, size_t length, jlaw_law *law)
   while (end > bytes && end[-1] <= ' ' && end[-1] >= 0) end--;
   while (end > bytes && end[-1] != '\n') end--; /* to the last line */
   const char *sum = jlaw_word_(jlaw_word_(end, word, sizeof word), word, sizeof word);
-  unsigned long long told = 0;
-  for (int i = 0; i < 16; i++) {
-    if (jlaw_hex_(word[i]) < 0) return "it ends too early: copy it again, whole";
-    told = 16 * told + (unsigned) jlaw_hex_(word[i]);
-  }
-  if (strncmp(end, "sum ", 4) || word[16] || *jlaw_skip_(sum))
+  if (strncmp(end, "sum ", 4) || strspn(word, "0123456789abcdef") != 16 || word[16]
+      || *jlaw_skip_(sum))
     return "it ends too early: copy it again, whole";
-  if (told != jlaw_sum_of_(bytes, end)) return "it is damaged: its sum is wrong; export it again";
+  if (strtoull(word, NULL, 16) != jlaw_sum_of_(bytes, end))
+    return "it is damaged: its sum is wrong; export it again";
   *end = 0;
   return jlaw_parse_(at, law, length);
 }

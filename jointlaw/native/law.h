@@ -843,7 +843,7 @@ JL_IN jl_amounts jl_measure(const jlaw_law *law, jl_numbers n)
 #endif
   }
   jl_add_up(sum, &all);
-  if (!jl_beside(law)) return all;
+  if (!jl_element_rows(law)) return all;
   jl_of_joint here[3], still[3];
   for (int i = 0; i < law->dim; i++) here[i] = jl_take_joint(n, i), still[i] = jl_each_joint(0.0);
   const jl_of_joint stored =
@@ -915,7 +915,7 @@ JL_IN void jl_step_of_kind(const jlaw_law *law, jl_numbers n, const jl_of_joint 
   else if (ledger) JL_STEP(2, 0, 0, 0, 1);
   else JL_STEP(2, 0, 0, 0, 0);
 #undef JL_STEP
-  if (!jl_beside(law)) return;
+  if (!jl_element_rows(law)) return;
   const jl_of_joint stored =
       jl_step_elements(law, n, jl_element_row(law), from, d, F, C, tangent, ledger || y || w);
   if (all) jl_add_elements(law, n, stored, all);

@@ -1,5 +1,6 @@
 """Export of a joint law to C and C++: header, tables in two forms, examples and a Makefile."""
 
+import math
 import re
 from importlib import resources
 from pathlib import Path
@@ -73,10 +74,10 @@ def table_text(law: Law) -> str:
     lines = [f"jointlaw tables {FORMAT}", f"fingerprint {law.fingerprint}"]
     lines += [f"# {line}" for line in law.to_toml().splitlines()]
     for key, value in numbers.items():
-        lines.append(f"{key} {value if isinstance(value, int) else value.hex()}")
+        lines.append(f"{key} {value if isinstance(value, int) else _exact(value)}")
     for key, array in arrays.items():
         lines.append(key)
-        lines += [" ".join(map(float.hex, row.tolist())) for row in array.reshape(-1, 4)]
+        lines += [" ".join(map(_exact, row.tolist())) for row in array.reshape(-1, 4)]
     text = "\n".join([*lines, ""])
     return f"{text}sum {_sum(text.encode()):016x}\n"
 
@@ -113,6 +114,12 @@ def packed(law: Law) -> tuple[dict[str, int | float], dict[str, Array]]:
             f"{AZIMUTHS}; lower it"
         )
     return pack(law.tables)
+
+
+def _exact(value: float) -> str:
+    """A hexadecimal float without a point, which locales write each in their own way."""
+    mantissa, exponent = math.frexp(value)
+    return f"{int(mantissa * 2**53):#x}p{exponent - 53}"
 
 
 def _sum(data: bytes) -> int:

@@ -78,25 +78,12 @@ JL_IN double jl_bonded_step(const jlaw_law *law, jl_part *b, int tangent)
 
 /* --------------------------------------------------------------------- all of a joint */
 
-#define JL_ONE(name) +1
-enum { JL_ELEMENTS = JLAW_ELEMENTS(JL_ONE) };
-#undef JL_ONE
-
-/* Rows of element number i in a state; 0 where the law is without it */
-JL_IN int jl_rows_of(const jlaw_law *law, int i)
-{
-#define JL_ROWS(name) law->name ? jl_##name##_rows(law) : 0,
-  const int rows[JL_ELEMENTS] = {JLAW_ELEMENTS(JL_ROWS)};
-#undef JL_ROWS
-  return rows[i];
-}
-
-/* Rows of all elements; 0 where there are none beside the asperities */
+/* Rows of all elements; 0 where there are none beside the asperities, or in place of them */
 JL_IN int jl_element_rows(const jlaw_law *law)
 {
-  int rows = 0;
-  for (int i = 0; i < JL_ELEMENTS; i++) rows += jl_rows_of(law, i);
-  return rows;
+#define JL_ROWS(name) +(law->name ? jl_##name##_rows(law) : 0)
+  return 0 JLAW_ELEMENTS(JL_ROWS);
+#undef JL_ROWS
 }
 
 /* Elements of a step from `from` by d, whose rows of the state begin at `row`. Adds what they bear

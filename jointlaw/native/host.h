@@ -282,6 +282,9 @@ static JLAW_FUNCTION int jlaw_sound_(const double *q, int n)
   return (sum[0] + sum[1]) + (sum[2] + sum[3]) < 1e300;
 }
 
+#define JL_ROWS(name) law->name ? jl_##name##_rows(law) : 0,
+#define JLAW_ROWS_OF(law) {JLAW_ELEMENTS(JL_ROWS) -1} /* each element's rows, 0 without it; -1 */
+
 /* Whether energies, flattened depths, wear and damage of a state are numbers of this law */
 static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
 {
@@ -293,8 +296,9 @@ static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
   if (law->wears)
     good = good && worn[0] >= 0.0 && worn[0] <= 1.0 && worn[1] >= 0.0 && worn[1] <= DBL_MAX;
   const double *row = s + jl_element_row(law);
-  for (int i = 0; i < JL_ELEMENTS; i++)
-    for (int left = jl_rows_of(law, i); left > 0; left--, row++)
+  const int rows[] = JLAW_ROWS_OF(law);
+  for (int i = 0; rows[i] >= 0; i++)
+    for (int left = rows[i]; left > 0; left--, row++)
       good = good && (left > 1 ? fabs(*row) < JLAW_STRONGEST : *row >= 0.0 && *row <= 1.0);
   return good && jlaw_sound_(s + jl_slider_row(law), jl_rest_row(law) - jl_slider_row(law));
 }
@@ -304,17 +308,18 @@ static JLAW_FUNCTION int jlaw_refuse_(const jlaw_law *law, const double *s, cons
 {
   jlaw_text_ text = {message, size, 0};
   int finite = 1;
-  jlaw_say_(&text, damaged ? "" : "the step d = (");
-  for (int i = 0; !damaged && i < law->dim; i++) {
-    jlaw_say_(&text, i ? ", " : "");
-    jlaw_say_number_(&text, d[i]);
-    finite = finite && fabs(d[i]) <= DBL_MAX;
-  }
   if (damaged) {
     jlaw_say_(&text,
               "the state holds numbers that are not finite or no forces of this law; nothing "
               "was moved. Start from zeros or from a state that this law wrote");
-  } else if (!finite) {
+    return -1;
+  }
+  for (int i = 0; i < law->dim; i++) {
+    jlaw_say_(&text, i ? ", " : "the step d = (");
+    jlaw_say_number_(&text, d[i]);
+    finite = finite && fabs(d[i]) <= DBL_MAX;
+  }
+  if (!finite) {
     jlaw_say_(&text,
               ") m is not finite; nothing was moved. Look for the fault in the host's motion");
   } else {
@@ -377,8 +382,9 @@ JLAW_FUNCTION int jlaw_unmated(const jlaw_law *law, double *s)
   for (int i = 0; i < jl_state_rows(law); i++) s[i] = 0.0;
   if (far) s[0] = law->first_touch, s[1] = JLAW_FAR * law->mating_length;
   double *row = s + jl_element_row(law);
-  for (int i = 0; i < JL_ELEMENTS; row += jl_rows_of(law, i), i++)
-    if (jl_rows_of(law, i)) row[jl_rows_of(law, i) - 1] = 1.0; /* broken */
+  const int rows[] = JLAW_ROWS_OF(law);
+  for (int i = 0; rows[i] >= 0; row += rows[i++])
+    if (rows[i]) row[rows[i] - 1] = 1.0; /* broken */
   return far ? 0 : -1;
 }
 JLAW_FUNCTION double jlaw_dissipated(const jlaw_law *law, const double *s) { return s[law->dim]; }
@@ -456,10 +462,10 @@ static JLAW_FUNCTION void jlaw_turn_elements_(const jlaw_law *law, double *s,
                                               const double turn[2][2])
 {
   double *row = s + jl_element_row(law);
-  for (int i = 0; i < JL_ELEMENTS; row += jl_rows_of(law, i), i++) {
-    const int n = jl_rows_of(law, i) - 1;
-    const double q[2] = {n > 0 ? row[0] : 0.0, n > 1 ? row[1] : 0.0};
-    for (int j = 0; j < n; j++) row[j] = turn[j][0] * q[0] + turn[j][1] * q[1];
+  const int rows[] = JLAW_ROWS_OF(law);
+  for (int i = 0; rows[i] >= 0; row += rows[i++]) {
+    const double q[2] = {rows[i] > 1 ? row[0] : 0.0, rows[i] > 2 ? row[1] : 0.0};
+    for (int j = 0; j < rows[i] - 1; j++) row[j] = turn[j][0] * q[0] + turn[j][1] * q[1];
   }
 }
 
@@ -469,18 +475,16 @@ JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s)
   if (dim > 1) s[1] = -s[1]; /* shear along axis 2 */
   double *qs = s + jl_slider_row(law), *qt = qs + M * D, *depth = qt + M * D;
   for (int f = 0; f < M; f++) {
-    const int other = (int) jlaw_of_facet_(law, f, JLAW_MIRROR);
+    const int other = (int) jlaw_of_facet_(law, f, JLAW_MIRROR); /* f itself across the plane */
+    if (other < f) continue;                                     /* both have changed */
     for (int i = 0; i < D; i++) {
-      const double here = qs[f * D + i], turned = qt[f * D + i];
-      if (other > f) {
-        qs[f * D + i] = qs[other * D + i], qt[f * D + i] = -qt[other * D + i];
-        qs[other * D + i] = here, qt[other * D + i] = -turned;
-      } else if (other == f) qt[f * D + i] = -turned; /* t changes its sense in the mirror */
+      const double here = qs[f * D + i], turned = -qt[f * D + i]; /* t changes its sense */
+      qs[f * D + i] = qs[other * D + i], qt[f * D + i] = -qt[other * D + i];
+      qs[other * D + i] = here, qt[other * D + i] = turned;
     }
-    if (law->yields && other > f) {
-      const double here = depth[f];
-      depth[f] = depth[other], depth[other] = here;
-    }
+    if (!law->yields) continue;
+    const double here = depth[f];
+    depth[f] = depth[other], depth[other] = here;
   }
   const double swap[2][2] = {{-1.0, 0.0}, {0.0, 1.0}};
   jlaw_turn_elements_(law, s, swap);

@@ -67,15 +67,12 @@ def _individual(y: Array, eta: float, heights: HeightDistribution) -> tuple[Arra
         nodes[0] = edges[1] * 0.5 * (xj + 1)
         mass[0] = heights.cdf(r0 + edges[1]) * wj / wj.sum()
     panel = np.searchsorted(edges, y, side="left") - 1  # edges[panel] < y
-    panel = np.minimum(panel, len(widths))  # beyond the last edge every panel is an ordinary one
-    start = edges[np.maximum(panel - 1, 0)]
-    start = np.where(panel >= len(widths), edges[np.minimum(panel, len(edges) - 1)], start)
+    # panels of the ordinary rule: beyond the last edge every one, else those below the one below y
+    ordinary = np.where(panel < len(widths), panel - 1, len(widths))
+    start = edges[np.maximum(ordinary, 0)]
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.clip(1 - nodes.ravel() / y[:, None], 0.0, None)
-    below = (
-        np.repeat(np.arange(len(widths)), 16)
-        < np.where(panel >= len(widths), len(widths), panel - 1)[:, None]
-    )
+    below = np.repeat(np.arange(len(widths)), 16) < ordinary[:, None]
     ratio = np.where(below & (y[:, None] > 0), ratio, 0.0)
     power = np.where(ratio > 0, ratio**eta, 0.0)
     results = []

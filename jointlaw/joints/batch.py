@@ -118,14 +118,13 @@ class JointBatch:
             )
         if not np.isfinite(state.values).all():
             raise ValueError("state holds values that are not finite; it is damaged")
+        values = state.values
         if index is None:
             lanes = self._state.shape[2]
             whole = n // lanes * lanes  # joints of blocks that are full
-            blocks = state.values[:whole].reshape(-1, lanes, rows)
+            blocks = values[:whole].reshape(-1, lanes, rows)
             self._state[: len(blocks), :rows] = np.moveaxis(blocks, 1, 2)
-            index, values = np.arange(whole, n), state.values[whole:]
-        else:
-            values = state.values
+            index, values = np.arange(whole, n), values[whole:]
         self._state[at(self._state, index, slice(rows))] = values
         self._engine.refresh(self._state, self._n)
         self._largest_reach = self._reach_of(self.delta).max(initial=0.0)
@@ -260,9 +259,7 @@ class JointBatch:
     def _rows(self, index: NDArray[np.intp] | None = None) -> Array:
         """States (n, rows) of all joints or those of `index`, as a copy."""
         rows = slice(self.law.state_size)
-        if index is None:
-            return self._all(rows)
-        return self._state[at(self._state, index, rows)]
+        return self._all(rows) if index is None else self._state[at(self._state, index, rows)]
 
     def _index(self, where: Index) -> NDArray[np.intp]:
         index = np.asarray(where)

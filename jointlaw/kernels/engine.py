@@ -63,8 +63,7 @@ class Step:
         self, d: Array, F: Array, C: Array | None, where: Index | None = None, keep: bool = True,
         shown: Array | None = None,
     ) -> None:  # fmt: skip
-        self.d, self.F, self.C, self.where, self.keep = d, F, C, where, keep
-        self.shown = shown
+        self.d, self.F, self.C, self.shown, self.where, self.keep = d, F, C, shown, where, keep
         self.call: tuple[Array | None, Any] = None, None  # of these states, for `NativeEngine`
 
     def __getstate__(self) -> dict[str, Any]:
@@ -183,14 +182,16 @@ class NativeEngine:
         _, rows, lanes = state.shape
         given = address(state), *arrays, *[None] * (5 - len(arrays))
         return library.BatchCall(
-            ctypes.addressof(self._law), *given, n, 0, 0, rows, lanes == 1, self.lanes
+            ctypes.addressof(self._law), *given, n, 0, n, rows, lanes == 1, self.lanes
         )
 
     def _run(self, what: int, call: library.BatchCall) -> None:
         """Call the library on one thread or several; each takes blocks until none are left."""
         where, n = ctypes.addressof(call), call.n
         threads = min(thread_count(), -(-n // LANES)) if n * self._sliders > SERIAL else 1
-        call.taken, call.grain = 0, -(-n // (GRAINS * threads * LANES)) * LANES
+        call.taken = 0
+        if threads > 1:
+            call.grain = -(-n // (GRAINS * threads * LANES)) * LANES
 
         def work() -> None:
             if self._library.jlaw_run(where, what):

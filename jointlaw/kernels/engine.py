@@ -9,7 +9,7 @@ import ctypes
 import math
 import os
 import warnings
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -146,7 +146,7 @@ class NativeEngine:
         self._arrays = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
         pointers = {name: array.ctypes.data for name, array in self._arrays.items()}
         self._law, self._sliders = Law(**numbers, **pointers), tables.sliders
-        self._library, self.lanes = loaded, library.lanes(loaded)
+        self._library_run, self.lanes = loaded.jlaw_run, library.lanes(loaded)
         # rows of a block: the state, then Phi and Phi' of all facets, which save half the look-ups;
         # with flattened facets, the same at their depth
         facets = 0 if tables.asperities is None else len(tables.asperities.c1)
@@ -186,15 +186,17 @@ class NativeEngine:
         )
 
     def _run(self, what: int, call: library.BatchCall) -> None:
-        """Call the library on one thread or several; each takes blocks until none are left."""
+        """Call the library on one thread or several, which share the joints out."""
         where, n = ctypes.addressof(call), call.n
         threads = min(thread_count(), -(-n // LANES)) if n * self._sliders > SERIAL else 1
         call.taken = 0
-        if threads > 1:
-            call.grain = -(-n // (GRAINS * threads * LANES)) * LANES
+        if threads == 1:
+            self._work(where, what)
+            return
+        call.grain = -(-n // (GRAINS * threads * LANES)) * LANES
+        share_out(partial(self._work, where, what), threads)
 
-        def work() -> None:
-            if self._library.jlaw_run(where, what):
-                raise MemoryError("no memory for a copy of a block of states")
-
-        share_out(work, threads) if threads > 1 else work()
+    def _work(self, where: int, what: int) -> None:
+        """Have the library take joints of a call until none are left."""
+        if self._library_run(where, what):
+            raise MemoryError("no memory for a copy of a block of states")

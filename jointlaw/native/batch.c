@@ -1,6 +1,7 @@
 /* batch.c: many joints. Compiled several times: with -DJL_W=8, 4 and 2 for states in blocks of
  * JLAW_BLOCK joints side by side, (blocks, rows, JLAW_BLOCK); with -DJL_W=4 -DJLAW_ABREAST for
- * joints one after the other, (joints, rows). -DKIND=_8 and so on ends the name of the table of functions.
+ * joints one after the other, (joints, rows). -DKIND=_8 and so on ends the name of the table of
+ * functions.
  */
 #include "batch.h"
 #include "lanes.h"
@@ -65,7 +66,7 @@ static double *joint_of(const jlaw_batch *b, long long joint)
 }
 
 /* Advance numbers first to last - 1 of the list b->index, or of all joints where it is NULL; first
- * begins a block. Without b->keep, which b->d = NULL asks for, the states stay as they were. 0, or -1
+ * begins a block. Without b->keep, as always without b->d, the states stay as they were. 0, or -1
  * where memory is short. */
 static int advance(const jlaw_batch *b, long first, long last)
 {

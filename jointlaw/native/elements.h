@@ -124,11 +124,11 @@ JL_IN jl_of_joint jl_step_elements(const jlaw_law *law, jl_numbers n, int row,
 JL_IN double jl_stiffness_of_elements(const jlaw_law *law, const double *s, int row, size_t stride)
 {
   double bound = 0.0;
-#define JL_STIFFNESS(name)                                           \
-  if (law->name) {                                                   \
-    row += jl_##name##_rows(law);                                    \
-    const double damage = s ? s[(size_t) (row - 1) * stride] : 0.0;  \
-    bound += jl_##name##_stiffness(law, damage, s ? s[0] : 0.0);     \
+#define JL_STIFFNESS(name)                                          \
+  if (law->name) {                                                  \
+    row += jl_##name##_rows(law);                                   \
+    const double damage = s ? s[(size_t) (row - 1) * stride] : 0.0; \
+    bound += jl_##name##_stiffness(law, damage, s ? s[0] : 0.0);    \
   }
   JLAW_ELEMENTS(JL_STIFFNESS)
 #undef JL_STIFFNESS

@@ -283,7 +283,7 @@ static JLAW_FUNCTION int jlaw_sound_(const double *q, int n)
 }
 
 #define JL_ROWS(name) law->name ? jl_##name##_rows(law) : 0,
-#define JLAW_ROWS_OF(law) {JLAW_ELEMENTS(JL_ROWS) -1} /* each element's rows, 0 without it; -1 */
+#define JLAW_ROWS_OF(law) {JLAW_ELEMENTS(JL_ROWS) - 1} /* each element's rows, 0 without it; -1 */
 
 /* Whether energies, flattened depths, wear and damage of a state are numbers of this law */
 static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
@@ -604,8 +604,8 @@ static const char *jlaw_word_(const char *at, char *word, size_t room)
   return at;
 }
 
-/* Reads a whole number, or a float as a whole hexadecimal number and a power of two: without a point
- * no locale and no rounding matter. NULL if it is neither, or not finite. */
+/* Reads a number; NULL if it is none or not finite. Floats are hexadecimal and have no point: neither
+ * locale nor rounding matters. */
 static const char *jlaw_number_(const char *at, double *number)
 {
   const char *begin = jlaw_skip_(at);

@@ -902,9 +902,10 @@ JL_IN void jl_step_of_kind(const jlaw_law *law, jl_numbers n, const jl_of_joint 
 {
   jl_of_joint from[3];
   for (int i = 0; i < law->dim; i++) from[i] = jl_take_joint(n, i);
-#define JL_STEP(dim, yields, fades, wears, ledger)                                                 \
-  (tangent ? jl_step(law, n, d, F, C, jl_kind_of(dim, yields, fades, wears, ledger, 1, kept), all) \
-           : jl_step(law, n, d, F, C, jl_kind_of(dim, yields, fades, wears, ledger, 0, kept), all))
+#define JL_STEP(dim, yields, fades, wears, ledger)                                             \
+  (tangent                                                                                     \
+       ? jl_step(law, n, d, F, C, jl_kind_of(dim, yields, fades, wears, ledger, 1, kept), all) \
+       : jl_step(law, n, d, F, C, jl_kind_of(dim, yields, fades, wears, ledger, 0, kept), all))
   const int dim = law->dim, y = law->yields, w = law->wears;
   if (law->fades && (y || w || dim == 1)) JL_STEP(dim, y, 1, w, 1);
   else if (law->fades && dim == 3) JL_STEP(3, 0, 1, 0, ledger);

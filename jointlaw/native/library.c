@@ -9,10 +9,10 @@ OUT int jlaw_levels(void) { return JLAW_LEVELS; }
 /* Advance, measure, refresh or stiffness (`what` = 0 to 3), by vectors of so many lanes */
 static jlaw_call *find(int lanes, int alone, int what)
 {
-#define LEVEL(W)                                                               \
-  if (lanes == W) {                                                            \
+#define LEVEL(W)                                                                 \
+  if (lanes == W) {                                                              \
     extern jlaw_call *const jlaw_calls_##W[4], *const jlaw_calls_##W##_alone[4]; \
-    return (alone ? jlaw_calls_##W##_alone : jlaw_calls_##W)[what];            \
+    return (alone ? jlaw_calls_##W##_alone : jlaw_calls_##W)[what];              \
   }
 #if JLAW_LEVELS & 8
   LEVEL(8)

@@ -64,6 +64,11 @@ class Tables:
         return self.asperities is not None and self.asperities.yields
 
     @property
+    def fades(self) -> bool:
+        """Whether slopes fade with the distance from the mated position."""
+        return self.asperities is not None and self.asperities.fades
+
+    @property
     def unmated_start(self) -> Array:
         """`delta` (dim,) in m of a joint whose faces have never met, at first touch.
 

@@ -12,13 +12,13 @@ from ..support.checks import Array, frozen
 from .nodes import azimuths, inclinations
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Facets:
     """Quadrature nodes of the orientation density, as arrays over the facets (M,).
 
     `n`, `s`, `t` (dim, M) are the facet normal and the two in-facet directions of Eq. 25; dim is 3,
     2 (closure, shear along the plane) for motion in one plane, or 1 for closure alone. `weight`
-    sums to 1. `depth` (0 to 1) is the share of the depth cells that a facet needs: as the third
+    sums to 1. `share` (0 to 1) is the share of the depth cells that a facet needs: as the third
     root of its weight, for then a cell more lowers the error of every facet by as much.
     `opposite` is the facet of the same inclination that faces the other way.
     """
@@ -29,13 +29,13 @@ class Facets:
     n: Array
     s: Array
     t: Array
-    depth: Array
+    share: Array
     opposite: NDArray[np.intp]
 
     def scale(self, asperity: Asperity, asperity_density: float) -> Array:
         """A = N w lam K c1^(1+eta) of each facet (M,): its normal force is A Phi(y)."""
         c1 = np.cos(self.theta)
-        K: Array = asperity_density * self.weight * asperity.lam * asperity.K
+        K = asperity_density * self.weight * asperity.lam * asperity.K
         return K * c1 ** (1 + asperity.eta)
 
 
@@ -90,8 +90,8 @@ def facets(
 
 def _ring(m: int, full: bool) -> tuple[Array, Array]:
     """Azimuths and shares of a full ring of 2 m facets, or of the m + 1 of its half circle."""
-    azimuth: Array = np.arange(2.0 * m if full else m + 1.0) * (math.pi / m)
-    even: Array = np.full_like(azimuth, (0.5 if full else 1.0) / m)
+    azimuth = np.arange(2.0 * m if full else m + 1.0) * (math.pi / m)
+    even = np.full_like(azimuth, (0.5 if full else 1.0) / m)
     if not full:
         even[[0, -1]] /= 2.0
     return azimuth, even

@@ -14,8 +14,8 @@ _APART = 0.4  # least distance of a halving from a breakpoint, in halvings
 _SMOOTH = 0.999  # a power that needs no help
 
 
-def factor(y: Array, eta: float, heights: HeightDistribution, beyond: Array) -> tuple[Array, Array]:
-    """S and D S at y >= 0, infinity included; `beyond` holds the breakpoints above the overlap."""
+def factor(y: Array, eta: float, heights: HeightDistribution) -> tuple[Array, Array]:
+    """S and D S at y >= 0, infinity included."""
     r0 = heights.overlap
     S, DS = np.ones_like(y), np.zeros_like(y)
     finite = np.isfinite(y)
@@ -25,9 +25,8 @@ def factor(y: Array, eta: float, heights: HeightDistribution, beyond: Array) -> 
         with np.errstate(invalid="ignore"):  # 0 times an infinite density at r = 0
             DS[finite] = np.where(yf > 0, yf * heights.pdf(r0 + yf), 0.0)
         return S, DS
-    base = float(heights.cdf(r0))
-    grown, slope = _individual(yf, eta, heights, beyond)
-    S[finite] = base + grown
+    grown, slope = _individual(yf, eta, heights)
+    S[finite] = float(heights.cdf(r0)) + grown
     DS[finite] = (1 + eta) * (slope - grown)
     return S, DS
 
@@ -43,16 +42,15 @@ def rise(heights: HeightDistribution) -> float:
     return power if power < _SMOOTH else 0.0
 
 
-def _individual(
-    y: Array, eta: float, heights: HeightDistribution, beyond: Array
-) -> tuple[Array, Array]:
+def _individual(y: Array, eta: float, heights: HeightDistribution) -> tuple[Array, Array]:
     """int_0^y H(r0 + s) (1 - s/y)^p ds for p = 1 + eta and p = eta.
 
     Gauss-Legendre on panels between the breakpoints, and a Gauss-Jacobi rule that knows the power
     on the panel in which y lies together with the one below it, so that the end singularity of
     (1 - s/y)^p is never seen by an ordinary rule. A histogram is integrated in closed form.
     """
-    r0 = heights.overlap
+    r0, points = heights.overlap, heights.breakpoints()
+    beyond = points[points > r0] - r0
     if isinstance(heights, Heights):
         return _steps(y, 1 + eta, heights, beyond), _steps(y, eta, heights, beyond)
     rising = rise(heights)
@@ -69,15 +67,12 @@ def _individual(
         nodes[0] = edges[1] * 0.5 * (xj + 1)
         mass[0] = heights.cdf(r0 + edges[1]) * wj / wj.sum()
     panel = np.searchsorted(edges, y, side="left") - 1  # edges[panel] < y
-    panel = np.minimum(panel, len(widths))  # beyond the last edge every panel is an ordinary one
-    start = edges[np.maximum(panel - 1, 0)]
-    start = np.where(panel >= len(widths), edges[np.minimum(panel, len(edges) - 1)], start)
+    # panels of the ordinary rule: beyond the last edge every one, else those below the one below y
+    ordinary = np.where(panel < len(widths), panel - 1, len(widths))
+    start = edges[np.maximum(ordinary, 0)]
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.clip(1 - nodes.ravel() / y[:, None], 0.0, None)
-    below = (
-        np.repeat(np.arange(len(widths)), 16)
-        < np.where(panel >= len(widths), len(widths), panel - 1)[:, None]
-    )
+    below = np.repeat(np.arange(len(widths)), 16) < ordinary[:, None]
     ratio = np.where(below & (y[:, None] > 0), ratio, 0.0)
     power = np.where(ratio > 0, ratio**eta, 0.0)
     results = []

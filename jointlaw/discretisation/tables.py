@@ -1,10 +1,9 @@
 """The tables of facets: all that a kernel reads of the asperities of a law."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..parameters.asperity import Asperity
 from ..support.checks import Array, frozen
@@ -17,12 +16,11 @@ _OVERFLOW = 1e140  # Pa and J/m2: squares beyond it overflow
 
 
 @dataclass(frozen=True, eq=False)
-class FacetTables:
-    """Everything per facet (M facets, D depth cells), physical axes first.
+class FacetTables(Facets):
+    """Everything per facet (M facets, D depth cells), physical axes first, of the mated joint.
 
-    `theta` (M,) are the inclinations. `m` (dim, M) maps closure and offset to the effective
-    closure y of a facet, `s`, `t` (dim, M) are the in-facet directions, `azimuth` (2, M) is the
-    unit vector of the facet's azimuth and `steep` (M,) its tan(theta), both of the mated joint,
+    `m` (dim, M) maps closure and offset to the effective closure y of a facet, `azimuth` (2, M) is
+    the unit vector of the facet's azimuth and `steep` (M,) its tan(theta),
     `area` is A = N w lam K c1^(1+eta),
     `depth` (M, D+1) the cell limits zeta with the virgin force and slope there (slope 0 at the
     first by definition).
@@ -33,22 +31,16 @@ class FacetTables:
 
     curve: VirginCurve
     asperity: Asperity
-    theta: Array
-    n: Array
     m: Array
-    s: Array
-    t: Array
     azimuth: Array
     steep: Array
     c1: Array
     area: Array
-    weight: Array
     depth: Array
     depth_force: Array
     depth_slope: Array
     mating_length: float
     yield_depth: Array
-    opposite: NDArray[np.intp]
     slope_wear: float
     slope_residual: float
 
@@ -110,31 +102,28 @@ def facet_tables(
 ) -> FacetTables:
     """Lay out the tables; `cells` for the facet of most weight, one where the curve is linear."""
     c1, slope = np.cos(facets.theta), np.tan(facets.theta)
-    share = np.zeros_like(facets.depth) if curve.linear else facets.depth
+    share = np.zeros_like(facets.share) if curve.linear else facets.share
     several = np.maximum(np.rint(cells * share), 1).astype(np.intp)
     depth = depth_nodes(curve, closure_range, slope, several, lowest)
     force, bend = _at_limits(curve, depth)
-    # one depth for both sides of an asperity whose slopes change, else it creates energy
-    shared = math.isfinite(mating_length)
+    # slopes that change need one flattened depth for both sides of an asperity, else it creates
+    # energy; with others each side has its own
+    if math.isinf(mating_length):
+        facets = replace(facets, opposite=np.arange(len(c1)))
     return FacetTables(
+        **vars(facets),
         curve=curve,
         asperity=asperity,
-        theta=facets.theta,
-        n=facets.n,
         m=facets.n / c1,
-        s=facets.s,
-        t=facets.t,
         azimuth=np.stack([np.cos(facets.phi), np.sin(facets.phi)]),
         steep=slope,
         c1=c1,
         area=facets.scale(asperity, asperity_density),
-        weight=facets.weight,
         depth=depth,
         depth_force=force,
         depth_slope=bend,
         mating_length=mating_length,
         yield_depth=asperity.yield_interference / c1,
-        opposite=facets.opposite if shared else np.arange(len(c1)),
         slope_wear=slope_wear,
         slope_residual=slope_residual,
     )

@@ -112,13 +112,12 @@ def virgin_curve(eta: float, heights: HeightDistribution | None) -> VirginCurve:
         flat = np.array([[1.0, 0.0, 0.0, 0.0]])
         return frozen(VirginCurve(eta, 1.0, flat, flat / (2 + eta), 0.0))
     r0, points = heights.overlap, heights.breakpoints()
-    beyond = points[points > r0] - r0
-    far = float(beyond[-1]) if beyond.size else r0
+    far = float(points[-1]) - r0 if points[-1] > r0 else r0
     middle = float(points[len(points) // 2]) - r0
     scale = float(np.sqrt(max(middle, far / 30)))
     power = rise(heights)
     _require_convex(eta, heights, far)
-    shape = (eta, heights, beyond, scale, power)
+    shape = (eta, heights, scale, power)
     # what is too steep for the finest table is so at the very start: no need for all of it
     error = _tabulate(*shape, _CELLS[-1], 16)[1]
     for cells in _CELLS if error < WORST_ERROR else ():
@@ -140,22 +139,20 @@ def exact_force(y: Array, eta: float, heights: HeightDistribution | None) -> tup
     """Phi and Phi' at y > 0 (m) without a table: the reference that the table is tested against."""
     if heights is None:
         return y ** (1 + eta), (1 + eta) * y**eta
-    points = heights.breakpoints()
-    S, DS = factor(y, eta, heights, points[points > heights.overlap] - heights.overlap)
+    S, DS = factor(y, eta, heights)
     return y ** (1 + eta) * S, y**eta * ((1 + eta) * S + DS)
 
 
 def _tabulate(
-    eta: float, heights: HeightDistribution, beyond: Array, scale: float, power: float,
-    cells: int, first: int,
-) -> tuple[Array, float]:  # fmt: skip
+    eta: float, heights: HeightDistribution, scale: float, power: float, cells: int, first: int
+) -> tuple[Array, float]:
     """The first so many cells of the table of S/w^p, and its largest error between the nodes."""
     t = np.arange(2 * first + 1) / (2 * cells)  # nodes and, between them, the points that test
     with np.errstate(divide="ignore"):
         y = (scale * t / (1 - t)) ** 2
     if power:
         y[0] = _NEARLY * y[1]
-    S, DS = factor(y, eta, heights, beyond)
+    S, DS = factor(y, eta, heights)
     if power:
         w, rest = shares(y, scale)
         S = S / w**power

@@ -10,9 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..kernels.element import Measures
 from ..kernels.engine import LANES, Step, at, blocks, engine
-from ..support.checks import Array, integer, numbers
+from ..support.checks import Array, finite, integer, numbers
 from .state import JointState, NonFiniteError
-from .time_step import stable_step
 
 Index = Sequence[int] | NDArray[np.integer[Any]] | NDArray[np.bool_]
 Result = tuple[Array, Array | None]
@@ -119,14 +118,13 @@ class JointBatch:
             )
         if not np.isfinite(state.values).all():
             raise ValueError("state holds values that are not finite; it is damaged")
+        values = state.values
         if index is None:
             lanes = self._state.shape[2]
             whole = n // lanes * lanes  # joints of blocks that are full
-            blocks = state.values[:whole].reshape(-1, lanes, rows)
+            blocks = values[:whole].reshape(-1, lanes, rows)
             self._state[: len(blocks), :rows] = np.moveaxis(blocks, 1, 2)
-            index, values = np.arange(whole, n), state.values[whole:]
-        else:
-            values = state.values
+            index, values = np.arange(whole, n), values[whole:]
         self._state[at(self._state, index, slice(rows))] = values
         self._engine.refresh(self._state, self._n)
         self._largest_reach = self._reach_of(self.delta).max(initial=0.0)
@@ -173,9 +171,8 @@ class JointBatch:
 
     def measures(self) -> Measures:
         """Shares, stored energy and reach of all joints in one pass, as arrays (n,)."""
-        values = np.empty((5, self._n))
-        self._engine.measures(self._state, values)
-        return Measures(*values)
+        values = self._engine.of_states("measures", self._state, self._n)
+        return Measures(*np.array(values.T, order="C"))
 
     @property
     def kernel(self) -> str:
@@ -189,9 +186,7 @@ class JointBatch:
 
     def max_stiffness(self) -> Array:
         """Upper bound (n,) of `|C|` in Pa/m at each joint's present displacement."""
-        bound = np.empty(self._n)
-        self._engine.stiffness(self._state, bound)
-        return bound
+        return self._engine.of_states("stiffness", self._state, self._n)
 
     def critical_time_step(self, mass: ArrayLike, area: ArrayLike) -> Array:
         """Largest stable explicit step (n,) in s of one translating mass on each joint as it is.
@@ -214,9 +209,7 @@ class JointBatch:
     @property
     def F(self) -> Array:
         """Traction (n, dim) in Pa."""
-        F = np.empty((self._n, self.law.dim))
-        self._engine.traction(self._state, F)
-        return F
+        return self._engine.of_states("traction", self._state, self._n)
 
     @property
     def stored_energy(self) -> Array:
@@ -254,7 +247,7 @@ class JointBatch:
     def _all(self, rows: Any) -> Array:
         """Rows of the states of all joints, as a copy (n,) or (n, rows): three times as fast as by
         a list of joints."""
-        kept: Array = np.moveaxis(self._state[:, rows], -1, 1)
+        kept = np.moveaxis(self._state[:, rows], -1, 1)
         return np.array(kept, order="C").reshape(-1, *kept.shape[2:])[: self._n]
 
     def _ledger(self, name: str, part: str) -> Array:
@@ -266,9 +259,7 @@ class JointBatch:
     def _rows(self, index: NDArray[np.intp] | None = None) -> Array:
         """States (n, rows) of all joints or those of `index`, as a copy."""
         rows = slice(self.law.state_size)
-        if index is None:
-            return self._all(rows)
-        return self._state[at(self._state, index, rows)]
+        return self._all(rows) if index is None else self._state[at(self._state, index, rows)]
 
     def _index(self, where: Index) -> NDArray[np.intp]:
         index = np.asarray(where)
@@ -325,8 +316,7 @@ class JointBatch:
 
     def _reach_of(self, delta: Array) -> Array:
         """Bound (n,) of |y| of all facets of joints at delta (n, dim)."""
-        reach: Array = self._steepness * np.abs(delta).max(axis=1)
-        return reach
+        return self._steepness * np.abs(delta).max(axis=1)
 
 
 def increments(d: ArrayLike, shape: tuple[int, ...]) -> Array:
@@ -338,3 +328,15 @@ def increments(d: ArrayLike, shape: tuple[int, ...]) -> Array:
             f"d has shape {values.shape}; expected {shape}: {joints}{COMPONENTS[shape[-1]]}"
         )
     return values
+
+
+def stable_step(mass: ArrayLike, area: ArrayLike, stiffness: Array) -> Array:
+    """2 sqrt(m/(K area)) in s, infinite where nothing touches.
+
+    mass: reduced mass in kg, > 0; area: in m2, > 0; stiffness: K in Pa/m.
+    """
+    m, a = finite("mass", mass, "kg"), finite("area", area, "m2")
+    if not ((m > 0).all() and (a > 0).all()):
+        raise ValueError(f"mass = {m} kg, area = {a} m2 are out of bounds: both must be > 0")
+    with np.errstate(divide="ignore"):
+        return 2 * np.sqrt(m / (stiffness * a))

@@ -19,9 +19,8 @@ from ..support.checks import Array
 from ..support.thresholds import LIMIT, NEAR, ROUNDED, TINY, UNDERFLOW
 from .cells import Cells, cells, compliance, reciprocal
 from .element import Element, Measures, Share
-from .mating import Planes, Turning, offset, planes, turning
+from .mating import Planes, Turning, first_touch, offset, planes, turning
 from .stiffness import bend_of, joining, rises, stiffness_of
-from .unmated import first_touch
 from .wear import lowered, worn_share
 from .yielding import flatten, flattened, plastic_work, softening
 
@@ -85,6 +84,12 @@ class Asperities(Element):
     def numbers(self) -> dict[str, float]:
         k, (more, most) = self.k, joining(self.k)
         return {
+            "facets": len(k.c1),
+            "cells": k.cells,
+            "pieces": len(k.curve.S),
+            "yields": int(k.yields),
+            "fades": int(k.fades),
+            "wears": int(k.wears),
             "soft": 1.0 / k.lam,
             "mu": k.mu,
             "mating_length": k.mating_length,
@@ -120,20 +125,9 @@ class Asperities(Element):
            of the joint's own shear wears slopes from the next step on.
         7. Tangent C = dF/dd ("The tangent"), not without `tangent`.
         """
-        return self._step(delta, d, state, new, tangent, wears=self.k.wears)
-
-    def traction(self, delta: Array, state: Array) -> Array:
-        """As `Element.traction`: slopes that are to wear in the next step have not yet."""
-        new = np.empty_like(state)
-        return self._step(delta, np.zeros_like(delta), state, new, False, wears=False).F
-
-    def _step(
-        self, delta: Array, d: Array, state: Array, new: Array, tangent: bool, wears: bool
-    ) -> Share:
         k, old, new_ = self.k, parts(self.k, state), parts(self.k, new)
         q, lost, slopes = old.q, np.zeros(d.shape[1]), old.slopes
-        new_.worn[:] = old.worn
-        if wears:
+        if k.wears:
             new_.worn[:] = worn_share(k, old.worn, old.work)
             slopes = new_.slopes
             q, lost = wear(k, delta, old, slopes)
@@ -179,6 +173,12 @@ class Asperities(Element):
             C[:, 1:] += bending(k, after, sliders, new_.q, end, turning(k, moved[1:], slopes))
         return Share(F, lost, C)
 
+    def traction(self, delta: Array, state: Array) -> Array:
+        """As `Element.traction`: slopes that are to wear in the next step have not yet."""
+        held = state.copy()
+        parts(self.k, held).work[:] = 0.0
+        return super().traction(delta, held)
+
     def measures(self, delta: Array, state: Array) -> Measures:
         k, now = self.k, parts(self.k, state)
         virgin = cells(k, effective_closure(k, delta, now.slopes))
@@ -204,9 +204,6 @@ class Asperities(Element):
             stored + np.sum(compliance(k) * q2 * reciprocal(held.kappa), axis=(0, 1)),
             np.max(held.y, axis=0),
         )
-
-    def stored(self, delta: Array, state: Array) -> Array:
-        return self.measures(delta, state).stored
 
     def normal_stress(self, closure: Array) -> Array:
         """As `Element.normal_stress`, of infinitely many depth cells: a joint's own slip later."""
@@ -244,7 +241,7 @@ def shear_work(F0: Array, F: Array, d: Array) -> Array:
 
 def effective_closure(k: FacetTables, delta: Array, slopes: Array) -> Array:
     """Effective closure y = n . (closure, offset)/c1 of every facet (M, B)."""
-    y: Array = k.m[0][:, None] * delta[0]
+    y = k.m[0][:, None] * delta[0]
     for row, o in zip(k.m[1:], offset(k, delta[1:]), strict=True):
         y = y + row[:, None] * (slopes * o if k.wears else o)
     return np.where(np.abs(y) < UNDERFLOW, 0.0, y)
@@ -298,7 +295,7 @@ def strength(k: FacetTables, gamma: Array) -> Array:
 
 def resultant(k: FacetTables, now: Planes, force: Array, q: Array) -> Array:
     """Traction F (dim, B) of the normal forces A Phi n, force = Phi (M, B), and the sliders q."""
-    F: Array = np.einsum("dmb,mb->db", now.n, k.area[:, None] * force)
+    F = np.einsum("dmb,mb->db", now.n, k.area[:, None] * force)
     return F + np.einsum("edmb,emb->db", now.basis, q.sum(axis=2)) / k.lam
 
 
@@ -353,9 +350,8 @@ def stiffness(
     inner = np.sum(beta * (np.eye(2)[:, :, None, None, None] - outer), axis=3)  # (2, 2, M, B)
     along = end.n * (k.area[:, None] * after.slope)
     along = along + np.einsum("edmb,emb->dmb", end.basis, np.sum(v, axis=2)) / k.lam
-    C: Array = np.einsum("imb,jmb->ijb", along, np.broadcast_to(end.g, along.shape))
-    C = C + np.einsum("eimb,efmb,fjmb->ijb", end.basis, inner, E) / k.lam
-    return C
+    C = np.einsum("imb,jmb->ijb", along, np.broadcast_to(end.g, along.shape))
+    return C + np.einsum("eimb,efmb,fjmb->ijb", end.basis, inner, E) / k.lam
 
 
 def bending(
@@ -364,6 +360,6 @@ def bending(
     """Part (dim, dim - 1, B) of the tangent by which the planes at the end turn and flatten."""
     limited = np.sum(sliders.push * after.G, axis=2)  # of q by log(gamma)
     by_gamma = np.einsum("eimb,emb->imb", end.basis, limited / end.gamma) / k.lam
-    C: Array = np.einsum("ijmb,mb->ijb", turned.n, k.area[:, None] * after.force)
+    C = np.einsum("ijmb,mb->ijb", turned.n, k.area[:, None] * after.force)
     C = C + np.einsum("eijmb,emb->ijb", turned.basis, q.sum(axis=2)) / k.lam
     return C + np.einsum("imb,jmb->ijb", by_gamma, turned.gamma)

@@ -169,11 +169,6 @@ class Coulomb(Element):
         """Coefficient of friction (B,) at this w."""
         return self.friction + (self.residual_friction - self.friction) * w
 
-    def stored(self, delta: Array, state: Array) -> Array:
-        q, w = state[:-1], state[-1]
-        u = np.where((w > 0.0) & (delta[0] < 0.0), 0.0, delta[0])
-        return 0.5 * self.normal * u * u + 0.5 * squared(q) / self.shear
-
     def stiffness(self, delta: Array, state: Array) -> Array:
         """Upper bound (B,) of `|C|` in Pa/m; a joint that weakens may exceed it, for its shear
         stress falls: by (f/L) sqrt(1 + (mu kn/ks)^2), f the fall of the strength over the weakening
@@ -186,11 +181,13 @@ class Coulomb(Element):
         return np.where((state[-1] > 0.0) & (delta[0] < 0.0), 0.0, bound)
 
     def measures(self, delta: Array, state: Array) -> Measures:
-        apart = (state[-1] > 0.0) & (delta[0] < 0.0)
-        cap = self.strength(state[-1], self.normal * delta[0])
-        sliding = (~apart & (np.sqrt(squared(state[:-1])) >= cap * (1.0 - LIMIT))).astype(float)
-        stored = self.stored(delta, state)
-        return Measures(sliding, sliding, apart.astype(float), stored, delta[0])
+        q, w, u = state[:-1], state[-1], delta[0]
+        apart = (w > 0.0) & (u < 0.0)
+        cap = self.strength(w, self.normal * u)
+        sliding = (~apart & (np.sqrt(squared(q)) >= cap * (1.0 - LIMIT))).astype(float)
+        held = np.where(apart, 0.0, u)
+        stored = 0.5 * self.normal * held * held + 0.5 * squared(q) / self.shear
+        return Measures(sliding, sliding, apart.astype(float), stored, u)
 
 
 def squared(q: Array) -> Array:

@@ -50,10 +50,6 @@ class Element(ABC):
         """Advance from `delta` by d (dim, B) in m, from `state` to `new`, which is written."""
 
     @abstractmethod
-    def stored(self, delta: Array, state: Array) -> Array:
-        """Elastic energy (B,) in J/m2."""
-
-    @abstractmethod
     def stiffness(self, delta: Array, state: Array) -> Array:
         """Upper bound (B,) of `|C|` in Pa/m that it adds to joints in these states."""
 
@@ -73,6 +69,10 @@ class Element(ABC):
         """Upper bound (...) of `|C|` in Pa/m up to this closure and this shear (...) in m."""
         virgin = np.zeros((sum(self.rows.values()), 1))
         return self.stiffness(np.zeros((self.dim, 1)), virgin)[0] + 0.0 * (closure + shear)
+
+    def stored(self, delta: Array, state: Array) -> Array:
+        """Elastic energy (B,) in J/m2."""
+        return self.measures(delta, state).stored
 
     def measures(self, delta: Array, state: Array) -> Measures:
         """What slips, touches and is stored; asked of the first element of a joint."""

@@ -9,7 +9,7 @@ import ctypes
 import math
 import os
 import warnings
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -63,8 +63,7 @@ class Step:
         self, d: Array, F: Array, C: Array | None, where: Index | None = None, keep: bool = True,
         shown: Array | None = None,
     ) -> None:  # fmt: skip
-        self.d, self.F, self.C, self.where, self.keep = d, F, C, where, keep
-        self.shown = shown
+        self.d, self.F, self.C, self.shown, self.where, self.keep = d, F, C, shown, where, keep
         self.call: tuple[Array | None, Any] = None, None  # of these states, for `NativeEngine`
 
     def __getstate__(self) -> dict[str, Any]:
@@ -77,17 +76,6 @@ def engine(tables: Tables) -> "NumpyEngine | NativeEngine":
     if choice:
         one_of("JOINTLAW_KERNEL", choice, ("numpy", "native"))
     return _engine(tables, choice)
-
-
-def step_states(
-    tables: Tables, states: Array, d: Array, tangent: bool
-) -> tuple[Array, Array, Array | None]:
-    """New states (n, rows), F (n, dim) and C (n, dim, dim) after the increments d (n, dim)."""
-    n, dim = d.shape
-    new, F = np.array(states, order="C"), np.empty((n, dim))
-    C = np.empty((n, dim, dim)) if tangent else None
-    engine(tables).advance(new[:, :, None], Step(np.ascontiguousarray(d), F, C), ledger=True)
-    return new, F, C
 
 
 @lru_cache(maxsize=64)
@@ -138,22 +126,13 @@ class NumpyEngine:
     def refresh(self, state: Array, n: int) -> None:
         """Nothing is kept beside the states."""
 
-    def traction(self, state: Array, out: Array) -> None:
-        """Write what the first n joints bear into out (n, dim), in Pa."""
-        out[:] = self._of_states(reference.traction, state, len(out)).T
+    def of_states(self, what: str, state: Array, n: int) -> Array:
+        """What the first n states amount to, joints first, by a function of `reference`:
 
-    def stiffness(self, state: Array, out: Array) -> None:
-        """Write bounds of `|C|` of the first n joints into out (n,), in Pa/m."""
-        out[:] = self._of_states(reference.stiffness, state, len(out))
-
-    def measures(self, state: Array, out: Array) -> None:
-        """Write the `Measures` of the first n joints into the rows of out (5, n)."""
-        out[:] = self._of_states(reference.measures, state, out.shape[1])
-
-    def _of_states(self, function: Any, state: Array, n: int) -> Any:
-        """What a function of the kernel says of the first n states."""
-        rows = state[at(state, np.arange(n))].T
-        return function(self.tables, np.ascontiguousarray(rows))
+        "traction" (n, dim) in Pa, "stiffness" (n,) in Pa/m or "measures" (n, 5).
+        """
+        rows = np.ascontiguousarray(state[at(state, np.arange(n))].T)
+        return np.array(getattr(reference, what)(self.tables, rows)).T
 
 
 class NativeEngine:
@@ -167,7 +146,7 @@ class NativeEngine:
         self._arrays = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
         pointers = {name: array.ctypes.data for name, array in self._arrays.items()}
         self._law, self._sliders = Law(**numbers, **pointers), tables.sliders
-        self._library, self.lanes = loaded, library.lanes(loaded)
+        self._library_run, self.lanes = loaded.jlaw_run, library.lanes(loaded)
         # rows of a block: the state, then Phi and Phi' of all facets, which save half the look-ups;
         # with flattened facets, the same at their depth
         facets = 0 if tables.asperities is None else len(tables.asperities.c1)
@@ -187,37 +166,37 @@ class NativeEngine:
         """Bring Phi and Phi', kept beside the first n states, up to date with them."""
         self._run(library.REFRESH, self._prepared(state, n))
 
-    def traction(self, state: Array, out: Array) -> None:
-        """As `NumpyEngine.traction`: that of a step by nothing."""
-        still = np.zeros_like(out)
-        call = self._prepared(state, len(out), address(still), address(out))
-        call.hold = 1
-        self._run(library.ADVANCE, call)
-
-    def stiffness(self, state: Array, out: Array) -> None:
-        """As `NumpyEngine.stiffness`."""
-        self._run(library.STIFFNESS, self._prepared(state, len(out), None, address(out)))
-
-    def measures(self, state: Array, out: Array) -> None:
-        """As `NumpyEngine.measures`."""
-        self._run(library.MEASURE, self._prepared(state, out.shape[1], None, address(out)))
+    def of_states(self, what: str, state: Array, n: int) -> Array:
+        """As `NumpyEngine.of_states`; the traction is that of a step by nothing."""
+        call, *shape = {
+            "traction": (library.ADVANCE, n, self._law.dim),
+            "stiffness": (library.STIFFNESS, n),
+            "measures": (library.MEASURE, n, 5),
+        }[what]
+        out = np.empty(shape)
+        self._run(call, self._prepared(state, n, None, address(out)))
+        return out
 
     def _prepared(self, state: Array, n: int, *arrays: int | None) -> library.BatchCall:
         """A call for n joints; arrays: where d, F, C, what is shown and the index begin."""
         _, rows, lanes = state.shape
         given = address(state), *arrays, *[None] * (5 - len(arrays))
         return library.BatchCall(
-            ctypes.addressof(self._law), *given, n, 0, 0, rows, lanes == 1, self.lanes
+            ctypes.addressof(self._law), *given, n, 0, n, rows, lanes == 1, self.lanes
         )
 
     def _run(self, what: int, call: library.BatchCall) -> None:
-        """Call the library on one thread or several; each takes blocks until none are left."""
+        """Call the library on one thread or several, which share the joints out."""
         where, n = ctypes.addressof(call), call.n
         threads = min(thread_count(), -(-n // LANES)) if n * self._sliders > SERIAL else 1
-        call.taken, call.grain = 0, -(-n // (GRAINS * threads * LANES)) * LANES
+        call.taken = 0
+        if threads == 1:
+            self._work(where, what)
+            return
+        call.grain = -(-n // (GRAINS * threads * LANES)) * LANES
+        share_out(partial(self._work, where, what), threads)
 
-        def work() -> None:
-            if self._library.jlaw_run(where, what):
-                raise MemoryError("no memory for a copy of a block of states")
-
-        share_out(work, threads) if threads > 1 else work()
+    def _work(self, where: int, what: int) -> None:
+        """Have the library take joints of a call until none are left."""
+        if self._library_run(where, what):
+            raise MemoryError("no memory for a copy of a block of states")

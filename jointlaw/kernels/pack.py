@@ -27,16 +27,7 @@ def pack(k: Tables) -> tuple[dict[str, int | float], dict[str, Array]]:
     for element in k.elements:
         found |= {type(element).__name__.lower(): 1, **element.numbers()}
         if isinstance(element, Asperities):
-            facets = element.k
-            found |= {
-                "facets": len(facets.c1),
-                "cells": facets.cells,
-                "pieces": len(facets.curve.S),
-                "yields": int(facets.yields),
-                "fades": int(facets.fades),
-                "wears": int(facets.wears),
-            }
-            arrays |= _arrays(facets, element.first_loading.yielding)
+            arrays |= _arrays(element.k, element.first_loading.yielding)
     if missing := found.keys() - numbers.keys():
         raise KeyError(f"native/layout.py has no {', '.join(sorted(missing))}")
     numbers |= {name: min(value, LARGEST) for name, value in found.items()}

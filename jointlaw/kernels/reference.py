@@ -21,7 +21,7 @@ from ..support.checks import Array
 from . import asperities
 from .asperities import Asperities
 from .element import Element, Measures
-from .unmated import first_touch
+from .mating import first_touch
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,25 +130,20 @@ def parts(k: Tables, state: Array) -> SimpleNamespace:
 
 def traction(k: Tables, state: Array) -> Array:
     """Traction F (dim, B) in Pa that a state carries."""
-    return sum_of(element.traction(state[: k.dim], own) for element, (own,) in k.own(state))
+    bear = [element.traction(state[: k.dim], own) for element, (own,) in k.own(state)]
+    return np.sum(bear, axis=0)
 
 
 def stiffness(k: Tables, state: Array) -> Array:
     """Upper bound (B,) of `|C|` in Pa/m of joints in these states."""
-    return sum_of(element.stiffness(state[: k.dim], own) for element, (own,) in k.own(state))
+    bounds = [element.stiffness(state[: k.dim], own) for element, (own,) in k.own(state)]
+    return np.sum(bounds, axis=0)
 
 
 def measures(k: Tables, state: Array) -> Measures:
     """Shares, stored energy and reach of a batch of states (rows, B)."""
-    delta, owned = state[: k.dim], [(element, own) for element, (own,) in k.own(state)]
-    first = owned[0][0].measures(delta, owned[0][1])
-    beside = (element.stored(delta, own) for element, own in owned[1:])
-    return first._replace(stored=sum(beside, start=first.stored))
-
-
-def sum_of(terms: Iterator[Array]) -> Array:
-    """The sum of what every element gives."""
-    total = next(terms)
-    for term in terms:
-        total = total + term
-    return total
+    delta = state[: k.dim]
+    (first, (own,)), *others = k.own(state)
+    now = first.measures(delta, own)
+    beside = (element.stored(delta, own) for element, (own,) in others)
+    return now._replace(stored=sum(beside, start=now.stored))

@@ -14,7 +14,7 @@ def stiffness_of(k: FacetTables, y: Array) -> Array:
     force, slope = k.curve.force(y)
     more, most = joining(k)
     per_slope = (max(1.0, 1.0 / k.lam) + k.mu) * slope + k.mu * np.minimum(more * slope, most)
-    bound: Array = np.tensordot(k.area / k.c1, per_slope, 1)
+    bound = np.tensordot(k.area / k.c1, per_slope, 1)
     return bound + np.tensordot(bend_of(k), force, 1) if k.fades else bound
 
 
@@ -23,8 +23,7 @@ def bend_of(k: FacetTables) -> Array:
 
     Normal force, sliders and friction limit turn and grow with the slope.
     """
-    bend: Array = (BEND / k.mating_length) * k.area * k.steep * (k.c1 + k.mu * (1.0 + k.c1))
-    return bend
+    return (BEND / k.mating_length) * k.area * k.steep * (k.c1 + k.mu * (1.0 + k.c1))
 
 
 @lru_cache(maxsize=64)

@@ -38,8 +38,7 @@ def flattens_itself(k: FacetTables, y1: Array, z1: Array) -> NDArray[np.bool_]:
 
     Both do, but for rounding, where the shear does not move them, as at a right angle to it.
     """
-    own: NDArray[np.bool_] = y1 - k.yield_depth[:, None] >= z1 - ROUNDED * np.abs(y1)
-    return own
+    return y1 - k.yield_depth[:, None] >= z1 - ROUNDED * np.abs(y1)
 
 
 def plastic_work(k: FacetTables, y0: Array, y1: Array, flat0: Cells, flat1: Cells) -> Array:

@@ -13,15 +13,13 @@ from numpy.typing import ArrayLike
 
 from ..discretisation.first_loading import closure_at
 from ..discretisation.tables import VERSION
-from ..joints.batch import JointBatch
+from ..joints.batch import JointBatch, stable_step
 from ..joints.joint import Joint
 from ..joints.seat import seat
-from ..joints.time_step import stable_step
-from ..kernels.engine import step_states
-from ..kernels.reference import Tables, sum_of
+from ..kernels.engine import Step, engine
+from ..kernels.reference import Tables
 from ..parameters import keys, toml
-from ..parameters.declared import parameters_of
-from ..parameters.fingerprint import fingerprint
+from ..parameters.declared import fingerprint, parameters_of
 from ..support.checks import Array, finite, truths
 from ..support.files import replace_file
 
@@ -105,7 +103,7 @@ class Law:
                 f"states have shape {old.shape} and d {move.shape}; expected (n, {rows}) and "
                 f"(n, {dim}), or ({rows},) and ({dim},) for one joint"
             )
-        old, move = old.reshape(-1, rows), move.reshape(-1, dim)
+        old, move = old.reshape(-1, rows), np.ascontiguousarray(move).reshape(-1, dim)
         size = np.abs(old[:, :dim]).max(axis=1) + np.abs(move).max(axis=1)
         if (far := ~(self.tables.stretch * size <= self.largest_reach)).any():
             joint = int(np.argmax(far))
@@ -113,9 +111,12 @@ class Law:
                 f"joint {joint}: the step d = {move[joint]} m leads beyond largest_reach = "
                 f"{self.largest_reach:g} m, where forces overflow; take a smaller step"
             )
-        new, F, C = step_states(self.tables, old, move, tangent)
-        C = None if C is None else C.reshape(*joints, dim, dim)
-        return new.reshape(*joints, rows), F.reshape(*joints, dim), C
+        new, F = np.array(old, order="C"), np.empty((*joints, dim))
+        C = np.empty((*joints, dim, dim)) if tangent else None
+        each = None if C is None else C.reshape(-1, dim, dim)
+        step = Step(move, F.reshape(-1, dim), each)
+        engine(self.tables).advance(new[:, :, None], step, ledger=True)
+        return new.reshape(*joints, rows), F, C
 
     @property
     def dim(self) -> int:
@@ -175,7 +176,7 @@ class Law:
         if not (way >= 0).all():
             raise ValueError(f"shear = {shear!r} m is out of bounds: it must be >= 0")
         self._within_reach(y + self.tables.stretch * way)
-        return sum_of(one.largest_stiffness(y, way) for one in self.tables.elements)[()]
+        return np.sum([one.largest_stiffness(y, way) for one in self.tables.elements], axis=0)[()]
 
     def critical_time_step(
         self, mass: ArrayLike, area: ArrayLike, closure: ArrayLike, shear: ArrayLike = 0.0
@@ -201,7 +202,7 @@ class Law:
 
     def _first_loading(self, closure: Array) -> Array:
         """`normal_stress` of closures that are within reach."""
-        return sum_of(one.normal_stress(closure) for one in self.tables.elements)
+        return np.sum([one.normal_stress(closure) for one in self.tables.elements], axis=0)
 
     def _within_reach(self, closure: ArrayLike) -> Array:
         """Closures (m) that are finite and whose forces are."""

@@ -6,7 +6,6 @@ from . import build
 
 if len(sys.argv) > 1:
     sys.exit(f"{__doc__} It takes no options; for other machines: builder/wheels.py")
-build.write_headers()
 compiler = build.find_compiler()
 if compiler is None:
     sys.exit("no C compiler works here: install gcc or clang, or `pip install ziglang`")

@@ -1,6 +1,7 @@
 /* batch.c: many joints. Compiled several times: with -DJL_W=8, 4 and 2 for states in blocks of
  * JLAW_BLOCK joints side by side, (blocks, rows, JLAW_BLOCK); with -DJL_W=4 -DJLAW_ABREAST for
- * joints one after the other, (joints, rows). -DKIND=_8 and so on ends the names of the functions.
+ * joints one after the other, (joints, rows). -DKIND=_8 and so on ends the name of the table of
+ * functions.
  */
 #include "batch.h"
 #include "lanes.h"
@@ -38,7 +39,7 @@ static void show(const jlaw_batch *b, jl_numbers n, const jl_amounts *all, doubl
 static void advance_block(const jlaw_batch *b, double *block, size_t ahead, long first, int count)
 {
   const int dim = b->law->dim, kept = b->rows > jl_state_rows(b->law);
-  const double *d = b->d + first * dim;
+  const double *d = b->d ? b->d + first * dim : NULL;
   double *F = b->F + first * dim, *C = b->C ? b->C + first * dim * dim : NULL;
   for (int at = 0; at < count; at += JL_JOINTS) {
     const jl_numbers n = {block + at, BLOCK, ahead};
@@ -46,11 +47,10 @@ static void advance_block(const jlaw_batch *b, double *block, size_t ahead, long
     const int some = count - at < JL_JOINTS ? count - at : JL_JOINTS;
     for (int i = 0; i < dim; i++) {
       p[i] = jl_each_joint(0.0);
-      for (int l = 0; l < some; l++) JL_JOINT(p[i], l) = d[(at + l) * dim + i];
+      for (int l = 0; d && l < some; l++) JL_JOINT(p[i], l) = d[(at + l) * dim + i];
     }
     jl_amounts all;
-    jl_step_of_kind(b->law, n, p, f, c, b->ledger, C != NULL, kept, b->hold,
-                    b->shown ? &all : NULL);
+    jl_step_of_kind(b->law, n, p, f, c, b->ledger, C != NULL, kept, b->shown ? &all : NULL);
     if (b->shown) show(b, n, &all, b->shown + (first + at) * (JLAW_SHOWN + dim), some);
     for (int l = 0; l < some; l++) {
       for (int i = 0; i < dim; i++) F[(at + l) * dim + i] = JL_JOINT(f[i], l);
@@ -66,8 +66,9 @@ static double *joint_of(const jlaw_batch *b, long long joint)
 }
 
 /* Advance numbers first to last - 1 of the list b->index, or of all joints where it is NULL; first
- * begins a block. Without b->keep the states stay as they were. 0, or -1 where memory is short. */
-int NAME(jlaw_advance)(const jlaw_batch *b, long first, long last)
+ * begins a block. Without b->keep, as always without b->d, the states stay as they were. 0, or -1
+ * where memory is short. */
+static int advance(const jlaw_batch *b, long first, long last)
 {
   const size_t rows = (size_t) b->rows, size = rows * BLOCK;
   double *copy = NULL;
@@ -85,6 +86,8 @@ int NAME(jlaw_advance)(const jlaw_batch *b, long first, long last)
       }
     else if (!b->keep) memcpy(copy, joint_of(b, start), size * sizeof *copy);
     else block = joint_of(b, start);
+    for (int l = 0; !b->d && b->law->wears && l < BLOCK; l++)
+      copy[(size_t) (jl_worn_row(b->law) + 1) * BLOCK + (size_t) l] = 0.0; /* work that wears */
     advance_block(b, block, copy ? 0 : size, start, count);
     if (b->index && b->keep)
       for (int l = 0; l < count; l++) {
@@ -96,8 +99,8 @@ int NAME(jlaw_advance)(const jlaw_batch *b, long first, long last)
   return 0;
 }
 
-/* Measures (5, n) of joints first to last - 1, as reference.measures, into b->F */
-int NAME(jlaw_measure)(const jlaw_batch *b, long first, long last)
+/* Measures (n, 5) of joints first to last - 1, as reference.measures, into b->F */
+static int measure(const jlaw_batch *b, long first, long last)
 {
   for (long at = first; at < last; at += JL_JOINTS) {
     const jl_numbers n = {joint_of(b, at), BLOCK, 0};
@@ -105,13 +108,13 @@ int NAME(jlaw_measure)(const jlaw_batch *b, long first, long last)
     const jl_of_joint out[5] = {all.sliding, all.slipping, all.separated, all.stored, all.reach};
     for (int i = 0; i < 5; i++)
       for (int l = 0; l < JL_JOINTS && at + l < last; l++)
-        b->F[i * b->n + at + l] = JL_JOINT(out[i], l);
+        b->F[5 * (at + l) + i] = JL_JOINT(out[i], l);
   }
   return 0;
 }
 
 /* Bounds (n,) of |C| of joints first to last - 1 as they are, into b->F */
-int NAME(jlaw_stiffness)(const jlaw_batch *b, long first, long last)
+static int stiffness(const jlaw_batch *b, long first, long last)
 {
   for (long at = first; at < last; at += JL_JOINTS) {
     const jl_numbers n = {joint_of(b, at), BLOCK, 0};
@@ -122,7 +125,7 @@ int NAME(jlaw_stiffness)(const jlaw_batch *b, long first, long last)
 }
 
 /* Phi and Phi' that joints first to last - 1 keep, after their states were written */
-int NAME(jlaw_refresh)(const jlaw_batch *b, long first, long last)
+static int refresh(const jlaw_batch *b, long first, long last)
 {
   const jlaw_law *law = b->law;
   const int M = law->facets, kept = jl_state_rows(law);
@@ -141,3 +144,6 @@ int NAME(jlaw_refresh)(const jlaw_batch *b, long first, long last)
   }
   return 0;
 }
+
+extern jlaw_call *const NAME(jlaw_calls)[4];
+jlaw_call *const NAME(jlaw_calls)[4] = {advance, measure, refresh, stiffness};

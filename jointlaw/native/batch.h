@@ -22,7 +22,7 @@ enum { /* what a step shows of a joint: shares, J/m2, damage of its bond; then i
 typedef struct {
   const jlaw_law *law;
   double *state;          /* (blocks, rows, JLAW_BLOCK), or (n, rows) */
-  const double *d;        /* (n, dim) */
+  const double *d;        /* (n, dim), or NULL: what the states bear, before slopes wear */
   double *F, *C;          /* (n, dim), (n, dim, dim); C may be NULL */
   double *shown;          /* (n, JLAW_SHOWN + dim): what joints then amount to, or NULL */
   const long long *index; /* the joints that move (n,), or NULL for all */
@@ -32,7 +32,6 @@ typedef struct {
   int alone; /* whether the states lie (n, rows) */
   int lanes; /* of vectors: at most jlaw_lanes(), and one of jlaw_levels() */
   int ledger, keep;
-  int hold; /* whether slopes that are to wear have not yet: what a state carries */
 } jlaw_batch;
 
 typedef int jlaw_call(const jlaw_batch *b, long first, long last);

@@ -155,19 +155,6 @@ JL_IN double jl_coulomb_stiffness(const jlaw_law *law, double damage, double clo
   return slides > law->coulomb_shear ? slides : law->coulomb_shear;
 }
 
-JL_IN int jl_coulomb_good(const jlaw_law *law, const double *row)
-{
-  const int last = law->dim - 1;
-  return row[last] >= 0.0 && row[last] <= 1.0 && fabs(row[0]) < JLAW_STRONGEST
-         && fabs(row[last - 1]) < JLAW_STRONGEST;
-}
-
-JL_IN void jl_coulomb_turn(const jlaw_law *law, double *row, const double turn[2][2])
-{
-  const double q[2] = {row[0], law->dim > 2 ? row[1] : 0.0};
-  for (int i = 0; i < law->dim - 1; i++) row[i] = turn[i][0] * q[0] + turn[i][1] * q[1];
-}
-
 /* Shares of element.Measures in a state of these numbers: slides, of the strength too; is apart */
 JL_IN void jl_coulomb_shares(const jlaw_law *law, const double *s, size_t stride, double shares[3])
 {

@@ -1,11 +1,10 @@
 /* elements.h: the elements beside the asperities of a joint, one joint at a time; symbols and order
- * of kernels/bond.py and kernels/coulomb.py. An element NAME of layout.h has here
+ * of kernels/bond.py and kernels/coulomb.py. Its rows in a state are a vector in the plane of the
+ * joint (Pa), or none, and last its damage, 0 to 1. An element NAME of layout.h has here
  *
- *   jl_NAME_rows       number of its rows in a state; the last is its damage
+ *   jl_NAME_rows       number of its rows
  *   jl_NAME_step       a step, which returns the stored energy after it
  *   jl_NAME_stiffness  bound of |C| at this damage and closure; at 0 that of all states
- *   jl_NAME_good       whether rows are such as a step may leave
- *   jl_NAME_turn       its rows in axes 2 and 3 that are turned, or axis 2 turned round
  */
 
 typedef struct {           /* an element of one joint in a step */
@@ -43,28 +42,13 @@ JL_IN double jl_damage_at(const jlaw_law *law, double opening2, double slip2, do
   return found < 1.0 ? found : 1.0;
 }
 
-JL_IN int jl_bonded_rows(const jlaw_law *law)
-{
-  (void) law;
-  return 1;
-}
+JL_IN int jl_bonded_rows(const jlaw_law *law) { return law->bonded; }
 
 JL_IN double jl_bonded_stiffness(const jlaw_law *law, double damage, double closure)
 {
   (void) closure;
   const double K[2] = {law->bond_normal, law->bond_shear};
   return (1.0 - damage) * (K[0] > K[1] ? K[0] : K[1]);
-}
-
-JL_IN int jl_bonded_good(const jlaw_law *law, const double *row)
-{
-  (void) law;
-  return row[0] >= 0.0 && row[0] <= 1.0;
-}
-
-JL_IN void jl_bonded_turn(const jlaw_law *law, double *row, const double turn[2][2])
-{
-  (void) law, (void) row, (void) turn;
 }
 
 JL_IN double jl_bonded_step(const jlaw_law *law, jl_part *b, int tangent)
@@ -94,21 +78,12 @@ JL_IN double jl_bonded_step(const jlaw_law *law, jl_part *b, int tangent)
 
 /* --------------------------------------------------------------------- all of a joint */
 
-/* Whether there is an element beside the asperities, or in place of them */
-JL_IN int jl_beside(const jlaw_law *law)
-{
-#define JL_IS(name) || law->name
-  return 0 JLAW_ELEMENTS(JL_IS);
-#undef JL_IS
-}
-
+/* Rows of all elements; 0 where there are none beside the asperities, or in place of them */
 JL_IN int jl_element_rows(const jlaw_law *law)
 {
-  int rows = 0;
-#define JL_ROWS(name) rows += law->name ? jl_##name##_rows(law) : 0;
-  JLAW_ELEMENTS(JL_ROWS)
+#define JL_ROWS(name) +(law->name ? jl_##name##_rows(law) : 0)
+  return 0 JLAW_ELEMENTS(JL_ROWS);
 #undef JL_ROWS
-  return rows;
 }
 
 /* Elements of a step from `from` by d, whose rows of the state begin at `row`. Adds what they bear
@@ -149,11 +124,11 @@ JL_IN jl_of_joint jl_step_elements(const jlaw_law *law, jl_numbers n, int row,
 JL_IN double jl_stiffness_of_elements(const jlaw_law *law, const double *s, int row, size_t stride)
 {
   double bound = 0.0;
-#define JL_STIFFNESS(name)                                                                   \
-  if (law->name) {                                                                           \
-    row += jl_##name##_rows(law);                                                            \
-    const double damage = s && jl_##name##_rows(law) ? s[(size_t) (row - 1) * stride] : 0.0; \
-    bound += jl_##name##_stiffness(law, damage, s ? s[0] : 0.0);                             \
+#define JL_STIFFNESS(name)                                          \
+  if (law->name) {                                                  \
+    row += jl_##name##_rows(law);                                   \
+    const double damage = s ? s[(size_t) (row - 1) * stride] : 0.0; \
+    bound += jl_##name##_stiffness(law, damage, s ? s[0] : 0.0);    \
   }
   JLAW_ELEMENTS(JL_STIFFNESS)
 #undef JL_STIFFNESS

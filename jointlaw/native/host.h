@@ -182,7 +182,7 @@ static void jlaw_step_many_(const jlaw_law *law, double *s, size_t apart, const 
   jm_real p[3], f[3], c[9];
   for (int l = 0; l < JM_W; l++)
     for (int i = 0; i < dim; i++) p[i][l] = d[l * dim + i];
-  jm_step_of_kind(law, n, p, f, c, JLAW_LEDGER, C != NULL, 0, 0, NULL);
+  jm_step_of_kind(law, n, p, f, c, JLAW_LEDGER, C != NULL, 0, NULL);
   for (int l = 0; l < JM_W; l++) {
     for (int i = 0; i < dim; i++) F[l * dim + i] = f[i][l];
     for (int i = 0; C && i < dim * dim; i++) C[l * dim * dim + i] = c[i][l];
@@ -268,7 +268,7 @@ JLAW_CLONES JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t 
                                          const double *d, double *F, double *C)
 {
   const jl_numbers n = {s, stride, 0};
-  jl_step_of_kind(law, n, d, F, C, JLAW_LEDGER, C != NULL, 0, 0, NULL);
+  jl_step_of_kind(law, n, d, F, C, JLAW_LEDGER, C != NULL, 0, NULL);
 }
 
 /* Whether all sliders hold forces that a law can have; 0 for NaN */
@@ -282,6 +282,9 @@ static JLAW_FUNCTION int jlaw_sound_(const double *q, int n)
   return (sum[0] + sum[1]) + (sum[2] + sum[3]) < 1e300;
 }
 
+#define JL_ROWS(name) law->name ? jl_##name##_rows(law) : 0,
+#define JLAW_ROWS_OF(law) {JLAW_ELEMENTS(JL_ROWS) - 1} /* each element's rows, 0 without it; -1 */
+
 /* Whether energies, flattened depths, wear and damage of a state are numbers of this law */
 static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
 {
@@ -293,10 +296,10 @@ static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
   if (law->wears)
     good = good && worn[0] >= 0.0 && worn[0] <= 1.0 && worn[1] >= 0.0 && worn[1] <= DBL_MAX;
   const double *row = s + jl_element_row(law);
-#define JL_GOOD(name) \
-  if (law->name) good = good && jl_##name##_good(law, row), row += jl_##name##_rows(law);
-  JLAW_ELEMENTS(JL_GOOD)
-#undef JL_GOOD
+  const int rows[] = JLAW_ROWS_OF(law);
+  for (int i = 0; rows[i] >= 0; i++)
+    for (int left = rows[i]; left > 0; left--, row++)
+      good = good && (left > 1 ? fabs(*row) < JLAW_STRONGEST : *row >= 0.0 && *row <= 1.0);
   return good && jlaw_sound_(s + jl_slider_row(law), jl_rest_row(law) - jl_slider_row(law));
 }
 
@@ -305,17 +308,18 @@ static JLAW_FUNCTION int jlaw_refuse_(const jlaw_law *law, const double *s, cons
 {
   jlaw_text_ text = {message, size, 0};
   int finite = 1;
-  jlaw_say_(&text, damaged ? "" : "the step d = (");
-  for (int i = 0; !damaged && i < law->dim; i++) {
-    jlaw_say_(&text, i ? ", " : "");
-    jlaw_say_number_(&text, d[i]);
-    finite = finite && fabs(d[i]) <= DBL_MAX;
-  }
   if (damaged) {
     jlaw_say_(&text,
               "the state holds numbers that are not finite or no forces of this law; nothing "
               "was moved. Start from zeros or from a state that this law wrote");
-  } else if (!finite) {
+    return -1;
+  }
+  for (int i = 0; i < law->dim; i++) {
+    jlaw_say_(&text, i ? ", " : "the step d = (");
+    jlaw_say_number_(&text, d[i]);
+    finite = finite && fabs(d[i]) <= DBL_MAX;
+  }
+  if (!finite) {
     jlaw_say_(&text,
               ") m is not finite; nothing was moved. Look for the fault in the host's motion");
   } else {
@@ -377,11 +381,10 @@ JLAW_FUNCTION int jlaw_unmated(const jlaw_law *law, double *s)
   const int far = law->fades && law->dim > 1;
   for (int i = 0; i < jl_state_rows(law); i++) s[i] = 0.0;
   if (far) s[0] = law->first_touch, s[1] = JLAW_FAR * law->mating_length;
-  int end = jl_element_row(law);
-#define JL_BREAK(name) \
-  if (law->name && jl_##name##_rows(law)) end += jl_##name##_rows(law), s[end - 1] = 1.0;
-  JLAW_ELEMENTS(JL_BREAK)
-#undef JL_BREAK
+  double *row = s + jl_element_row(law);
+  const int rows[] = JLAW_ROWS_OF(law);
+  for (int i = 0; rows[i] >= 0; row += rows[i++])
+    if (rows[i]) row[rows[i] - 1] = 1.0; /* broken */
   return far ? 0 : -1;
 }
 JLAW_FUNCTION double jlaw_dissipated(const jlaw_law *law, const double *s) { return s[law->dim]; }
@@ -454,15 +457,16 @@ JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
 
 /* --------------------------------------------------------------- turned axes */
 
-/* The rows of elements in axes 2 and 3 that are turned, or turned round */
+/* The vectors of elements in axes 2 and 3 that are turned, or turned round */
 static JLAW_FUNCTION void jlaw_turn_elements_(const jlaw_law *law, double *s,
                                               const double turn[2][2])
 {
   double *row = s + jl_element_row(law);
-#define JL_TURN(name) \
-  if (law->name) jl_##name##_turn(law, row, turn), row += jl_##name##_rows(law);
-  JLAW_ELEMENTS(JL_TURN)
-#undef JL_TURN
+  const int rows[] = JLAW_ROWS_OF(law);
+  for (int i = 0; rows[i] >= 0; row += rows[i++]) {
+    const double q[2] = {rows[i] > 1 ? row[0] : 0.0, rows[i] > 2 ? row[1] : 0.0};
+    for (int j = 0; j < rows[i] - 1; j++) row[j] = turn[j][0] * q[0] + turn[j][1] * q[1];
+  }
 }
 
 JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s)
@@ -471,18 +475,16 @@ JLAW_FUNCTION void jlaw_swap_bodies(const jlaw_law *law, double *s)
   if (dim > 1) s[1] = -s[1]; /* shear along axis 2 */
   double *qs = s + jl_slider_row(law), *qt = qs + M * D, *depth = qt + M * D;
   for (int f = 0; f < M; f++) {
-    const int other = (int) jlaw_of_facet_(law, f, JLAW_MIRROR);
+    const int other = (int) jlaw_of_facet_(law, f, JLAW_MIRROR); /* f itself across the plane */
+    if (other < f) continue;                                     /* both have changed */
     for (int i = 0; i < D; i++) {
-      const double here = qs[f * D + i], turned = qt[f * D + i];
-      if (other > f) {
-        qs[f * D + i] = qs[other * D + i], qt[f * D + i] = -qt[other * D + i];
-        qs[other * D + i] = here, qt[other * D + i] = -turned;
-      } else if (other == f) qt[f * D + i] = -turned; /* t changes its sense in the mirror */
+      const double here = qs[f * D + i], turned = -qt[f * D + i]; /* t changes its sense */
+      qs[f * D + i] = qs[other * D + i], qt[f * D + i] = -qt[other * D + i];
+      qs[other * D + i] = here, qt[other * D + i] = turned;
     }
-    if (law->yields && other > f) {
-      const double here = depth[f];
-      depth[f] = depth[other], depth[other] = here;
-    }
+    if (!law->yields) continue;
+    const double here = depth[f];
+    depth[f] = depth[other], depth[other] = here;
   }
   const double swap[2][2] = {{-1.0, 0.0}, {0.0, 1.0}};
   jlaw_turn_elements_(law, s, swap);
@@ -584,11 +586,6 @@ static unsigned long long jlaw_sum_of_(const char *bytes, const char *end)
   return sum;
 }
 
-static int jlaw_hex_(char c)
-{
-  return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
-}
-
 /* Past blanks and lines that begin with # */
 static const char *jlaw_skip_(const char *at)
 {
@@ -607,39 +604,14 @@ static const char *jlaw_word_(const char *at, char *word, size_t room)
   return at;
 }
 
-/* Reads a whole number, or a hexadecimal float as Python's float.hex writes it; NULL if neither.
- * No locale, no rounding. */
+/* Reads a number; NULL if it is none or not finite. Floats are hexadecimal and have no point: neither
+ * locale nor rounding matters. */
 static const char *jlaw_number_(const char *at, double *number)
 {
-  at = jlaw_skip_(at);
-  const int negative = *at == '-';
-  at += negative;
-  const int hex = at[0] == '0' && at[1] == 'x';
-  unsigned long long digits = 0;
-  int count = 0, places = 0, point = 0, power = 0;
-  at += hex ? 2 : 0;
-  for (; jlaw_hex_(*at) >= 0 || (*at == '.' && hex && !point); at++) {
-    if (*at == '.') {
-      point = 1;
-      continue;
-    }
-    const int digit = jlaw_hex_(*at);
-    if (++count > 15 || (!hex && digit > 9)) return NULL;
-    digits = digits * (hex ? 16u : 10u) + (unsigned) digit;
-    places += point;
-  }
-  if (hex && *at == 'p') {
-    const int down = *++at == '-';
-    int n = 0;
-    at += *at == '-' || *at == '+';
-    for (; *at >= '0' && *at <= '9' && n < 5; at++, n++) power = 10 * power + (*at - '0');
-    if (n == 0) return NULL;
-    power = down ? -power : power;
-  }
-  if (count == 0 || *at > ' ') return NULL;
-  *number = ldexp((double) digits, power - 4 * places);
-  if (negative) *number = -*number;
-  return fabs(*number) <= DBL_MAX ? at : NULL;
+  const char *begin = jlaw_skip_(at);
+  char *end;
+  *number = strtod(begin, &end);
+  return end > begin && *end <= ' ' && fabs(*number) <= DBL_MAX ? end : NULL;
 }
 
 /* Reads all numbers into law; NULL or what is wrong */
@@ -723,14 +695,11 @@ static const char *jlaw_check_(char *bytes, size_t length, jlaw_law *law)
   while (end > bytes && end[-1] <= ' ' && end[-1] >= 0) end--;
   while (end > bytes && end[-1] != '\n') end--; /* to the last line */
   const char *sum = jlaw_word_(jlaw_word_(end, word, sizeof word), word, sizeof word);
-  unsigned long long told = 0;
-  for (int i = 0; i < 16; i++) {
-    if (jlaw_hex_(word[i]) < 0) return "it ends too early: copy it again, whole";
-    told = 16 * told + (unsigned) jlaw_hex_(word[i]);
-  }
-  if (strncmp(end, "sum ", 4) || word[16] || *jlaw_skip_(sum))
+  if (strncmp(end, "sum ", 4) || strspn(word, "0123456789abcdef") != 16 || word[16]
+      || *jlaw_skip_(sum))
     return "it ends too early: copy it again, whole";
-  if (told != jlaw_sum_of_(bytes, end)) return "it is damaged: its sum is wrong; export it again";
+  if (strtoull(word, NULL, 16) != jlaw_sum_of_(bytes, end))
+    return "it is damaged: its sum is wrong; export it again";
   *end = 0;
   return jlaw_parse_(at, law, length);
 }

@@ -13,7 +13,6 @@
 typedef struct { /* constants of a step: the compiler leaves out what they exclude */
   int dim, yields, fades, wears, ledger, tangent;
   int kept; /* whether Phi and Phi' lie beside the state */
-  int hold; /* whether slopes that are to wear in this step do not; no constant */
 } jl_kind;
 
 typedef struct { /* in the plane of a joint: o, offset over the mating length; w^2 = 1 - |o|^2 */
@@ -330,13 +329,13 @@ JL_IN void jl_traction_in(const jlaw_law *law, const double *f, const jl_plane *
 /* ------------------------------------------------------------------------------- wear */
 
 /* Shares of the slopes that were left before the step, and are after the work of shear so far */
-JL_IN void jl_wear_slopes(const jlaw_law *law, jl_numbers n, jl_motion *m, int hold)
+JL_IN void jl_wear_slopes(const jlaw_law *law, jl_numbers n, jl_motion *m)
 {
   const int row = jl_worn_row(law);
   jl_of_joint worn = jl_take_joint(n, row);
   const jl_of_joint work = jl_take_joint(n, row + 1);
   m->had = 1.0 - worn;
-  for (int l = 0; l < JL_JOINTS && !hold; l++) {
+  for (int l = 0; l < JL_JOINTS; l++) {
     const double now = (law->slope_residual - 1.0) * expm1(-JL_JOINT(work, l) / law->slope_wear);
     JL_JOINT(worn, l) = now > JL_JOINT(worn, l) ? now : JL_JOINT(worn, l);
   }
@@ -741,7 +740,7 @@ JL_IN void jl_step(const jlaw_law *law, jl_numbers n, const jl_of_joint d[3], jl
     m.to[i] = m.from[i] + m.p[i];
   }
   m.had = m.has = jl_each_joint(1.0);
-  if (k.wears) jl_wear_slopes(law, n, &m, k.hold);
+  if (k.wears) jl_wear_slopes(law, n, &m);
   if (k.fades) {
     m.start = jl_site_of(law, m.from[1], m.from[2]);
     m.middle = jl_site_of(law, m.from[1] + 0.5 * m.p[1], m.from[2] + 0.5 * m.p[2]);
@@ -754,7 +753,7 @@ JL_IN void jl_step(const jlaw_law *law, jl_numbers n, const jl_of_joint d[3], jl
     sum[i].before[0] = sum[i].before[1] = jl_each(0.0);
   }
   jl_amount_sums seen[JL_SUMS];
-  for (int i = 0; i < JL_SUMS; i++) seen[i] = jl_no_amounts();
+  for (int i = 0; all && i < JL_SUMS; i++) seen[i] = jl_no_amounts();
   for (int at = 0; at < M; at += JL_TOGETHER) {
     const int i = at / JL_TOGETHER % JL_SUMS;
     jl_step_facets(law, at, &m, n, sum + i, k, all ? seen + i : (jl_amount_sums *) 0);
@@ -844,7 +843,7 @@ JL_IN jl_amounts jl_measure(const jlaw_law *law, jl_numbers n)
 #endif
   }
   jl_add_up(sum, &all);
-  if (!jl_beside(law)) return all;
+  if (!jl_element_rows(law)) return all;
   jl_of_joint here[3], still[3];
   for (int i = 0; i < law->dim; i++) here[i] = jl_take_joint(n, i), still[i] = jl_each_joint(0.0);
   const jl_of_joint stored =
@@ -889,9 +888,9 @@ JL_IN jl_of_joint jl_stiffness(const jlaw_law *law, jl_numbers n)
 /* ------------------------------------------------------------- kinds of a step */
 
 JL_IN jl_kind jl_kind_of(int dim, int yields, int fades, int wears, int ledger, int tangent,
-                         int kept, int hold)
+                         int kept)
 {
-  const jl_kind k = {dim, yields, fades, wears, ledger, tangent, kept, hold};
+  const jl_kind k = {dim, yields, fades, wears, ledger, tangent, kept};
   return k;
 }
 
@@ -899,15 +898,14 @@ JL_IN jl_kind jl_kind_of(int dim, int yields, int fades, int wears, int ledger, 
  * asked for costs nothing. Where asperities yield or slopes wear, the law needs the ledger. */
 JL_IN void jl_step_of_kind(const jlaw_law *law, jl_numbers n, const jl_of_joint d[3],
                            jl_of_joint F[3], jl_of_joint C[9], int ledger, int tangent, int kept,
-                           int hold, jl_amounts *all)
+                           jl_amounts *all)
 {
   jl_of_joint from[3];
   for (int i = 0; i < law->dim; i++) from[i] = jl_take_joint(n, i);
-#define JL_KIND(dim, yields, fades, wears, ledger, tangent) \
-  jl_kind_of(dim, yields, fades, wears, ledger, tangent, kept, hold)
-#define JL_STEP(dim, yields, fades, wears, ledger)                                        \
-  (tangent ? jl_step(law, n, d, F, C, JL_KIND(dim, yields, fades, wears, ledger, 1), all) \
-           : jl_step(law, n, d, F, C, JL_KIND(dim, yields, fades, wears, ledger, 0), all))
+#define JL_STEP(dim, yields, fades, wears, ledger)                                             \
+  (tangent                                                                                     \
+       ? jl_step(law, n, d, F, C, jl_kind_of(dim, yields, fades, wears, ledger, 1, kept), all) \
+       : jl_step(law, n, d, F, C, jl_kind_of(dim, yields, fades, wears, ledger, 0, kept), all))
   const int dim = law->dim, y = law->yields, w = law->wears;
   if (law->fades && (y || w || dim == 1)) JL_STEP(dim, y, 1, w, 1);
   else if (law->fades && dim == 3) JL_STEP(3, 0, 1, 0, ledger);
@@ -918,8 +916,7 @@ JL_IN void jl_step_of_kind(const jlaw_law *law, jl_numbers n, const jl_of_joint 
   else if (ledger) JL_STEP(2, 0, 0, 0, 1);
   else JL_STEP(2, 0, 0, 0, 0);
 #undef JL_STEP
-#undef JL_KIND
-  if (!jl_beside(law)) return;
+  if (!jl_element_rows(law)) return;
   const jl_of_joint stored =
       jl_step_elements(law, n, jl_element_row(law), from, d, F, C, tangent, ledger || y || w);
   if (all) jl_add_elements(law, n, stored, all);

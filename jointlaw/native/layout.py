@@ -130,32 +130,42 @@ def first_columns() -> dict[str, int]:
 
 def layout_h() -> str:
     """The text of layout.h."""
-    lines = ["/* Made from layout.py; change it there. */", "#ifndef JLAW_FORMAT"]
-    lines += [f"#define JLAW_FORMAT {FORMAT} /* of table files */", "enum {"]
-    lines += [f"  JLAW_LANES = {LANES}, /* facets side by side in a block of the tables */"]
-    lines += [f"  JLAW_AZIMUTHS = {AZIMUTHS}, /* most */"]
-    for name, first in first_columns().items():
-        about = COLUMNS[name][1] if name in COLUMNS else "of a facet"
-        lines += [f"  JLAW_{name} = {first}, /* {about} */"]
-    lines += [f"  JLAW_{name} = {i}, /* {about} */" for i, (name, about) in enumerate(ROWS.items())]
-    lines += [f"  JLAW_ROWS = {len(ROWS)} /* of a depth cell */", "};"]
-    for name, value in vars(thresholds).items():
-        if name.isupper():
-            lines += [f"#define JLAW_{name} {value!r}"]
-    lines += ["struct jlaw_law {"]
-    lines += [f"  int {name}; /* {number.about} */" for name, number in WHOLE.items()]
-    lines += [f"  double {name}; /* {number.about} */" for name, number in NUMBERS.items()]
-    lines += [f"  const double *{name}; /* {about} */" for name, about in TABLES.items()]
-    lines += ["  double *own; /* what jlaw_free frees */", "  char fingerprint[80];", "};"]
-    lines += [f"#define JLAW_ELEMENTS(X) {' '.join(f'X({name})' for name in ELEMENTS)}"]
-    lines += ["/* Each number of a table file: its name, 1 if it is whole, its bounds */"]
+    columns = COLUMNS | {"COLUMNS": (0, "of a facet")}
     keys = [
         f"  X({name}, {int(numbers is WHOLE)}, {number.least}, {number.most})"
         for numbers in (WHOLE, NUMBERS)
         for name, number in numbers.items()
     ]
-    lines += ["#define JLAW_NUMBERS(X) \\", " \\\n".join(keys), "#endif"]
-    return "\n".join([*lines, ""])
+    lines = [
+        "/* Made from layout.py; change it there. */",
+        "#ifndef JLAW_FORMAT",
+        f"#define JLAW_FORMAT {FORMAT} /* of table files */",
+        "enum {",
+        f"  JLAW_LANES = {LANES}, /* facets side by side in a block of the tables */",
+        f"  JLAW_AZIMUTHS = {AZIMUTHS}, /* most */",
+        *(f"  JLAW_{name} = {i}, /* {columns[name][1]} */" for name, i in first_columns().items()),
+        *(f"  JLAW_{name} = {i}, /* {about} */" for i, (name, about) in enumerate(ROWS.items())),
+        f"  JLAW_ROWS = {len(ROWS)} /* of a depth cell */",
+        "};",
+        *(
+            f"#define JLAW_{name} {value!r}"
+            for name, value in vars(thresholds).items()
+            if name.isupper()
+        ),
+        "struct jlaw_law {",
+        *(f"  int {name}; /* {number.about} */" for name, number in WHOLE.items()),
+        *(f"  double {name}; /* {number.about} */" for name, number in NUMBERS.items()),
+        *(f"  const double *{name}; /* {about} */" for name, about in TABLES.items()),
+        "  double *own; /* what jlaw_free frees */",
+        "  char fingerprint[80];",
+        "};",
+        f"#define JLAW_ELEMENTS(X) {' '.join(f'X({name})' for name in ELEMENTS)}",
+        "/* Each number of a table file: its name, 1 if it is whole, its bounds */",
+        "#define JLAW_NUMBERS(X) \\",
+        " \\\n".join(keys),
+        "#endif\n",
+    ]
+    return "\n".join(lines)
 
 
 def jointlaw_h() -> str:

@@ -4,26 +4,15 @@
 #include "batch.h"
 #include "export.h"
 
-#define CALLS(KIND) jlaw_advance##KIND, jlaw_measure##KIND, jlaw_refresh##KIND, jlaw_stiffness##KIND
-#if JLAW_LEVELS & 8
-extern jlaw_call CALLS(_8), CALLS(_8_alone);
-#endif
-#if JLAW_LEVELS & 4
-extern jlaw_call CALLS(_4), CALLS(_4_alone);
-#endif
-#if JLAW_LEVELS & 2
-extern jlaw_call CALLS(_2), CALLS(_2_alone);
-#endif
-
 OUT int jlaw_levels(void) { return JLAW_LEVELS; }
 
 /* Advance, measure, refresh or stiffness (`what` = 0 to 3), by vectors of so many lanes */
 static jlaw_call *find(int lanes, int alone, int what)
 {
-#define LEVEL(W)                                                                  \
-  if (lanes == W) {                                                               \
-    static jlaw_call *const calls[2][4] = {{CALLS(_##W)}, {CALLS(_##W##_alone)}}; \
-    return calls[alone][what];                                                    \
+#define LEVEL(W)                                                                 \
+  if (lanes == W) {                                                              \
+    extern jlaw_call *const jlaw_calls_##W[4], *const jlaw_calls_##W##_alone[4]; \
+    return (alone ? jlaw_calls_##W##_alone : jlaw_calls_##W)[what];              \
   }
 #if JLAW_LEVELS & 8
   LEVEL(8)

@@ -23,7 +23,7 @@ class BatchCall(ctypes.Structure):
     _fields_ = [
         *((name, ctypes.c_void_p) for name in ("law", "state", "d", "F", "C", "shown", "index")),
         *((name, ctypes.c_longlong) for name in ("n", "taken", "grain")),
-        *((name, ctypes.c_int) for name in ("rows", "alone", "lanes", "ledger", "keep", "hold")),
+        *((name, ctypes.c_int) for name in ("rows", "alone", "lanes", "ledger", "keep")),
     ]
 
 

@@ -4,8 +4,9 @@ A dataclass whose fields come from `parameter` and that `declared` decorates lis
 docstring. Checks, TOML files, fingerprints, tables and fits go through the same list.
 """
 
+import hashlib
 import math
-from dataclasses import MISSING, field, fields
+from dataclasses import MISSING, field, fields, is_dataclass
 from textwrap import fill
 from typing import Any, NamedTuple, TypeVar
 
@@ -115,3 +116,23 @@ def within(name: str, value: Any, said: Parameter) -> float:
         unit = f" {said.unit}" if said.unit else ""
         raise ValueError(f"{name} = {result!r}{unit} is out of bounds: it must be {said.bounds}")
     return result
+
+
+def fingerprint(parameters: Any) -> str:
+    """Hash of a dataclass of parameters and of those within it.
+
+    Fields at their default are left out, so that a parameter that is added later, and is off by
+    default, leaves the hashes of all laws without it as they were.
+    """
+    return hashlib.sha256(_text(parameters).encode()).hexdigest()
+
+
+def _text(value: Any) -> str:
+    if not is_dataclass(value):
+        return repr(value + 0.0 if isinstance(value, float) else value)  # -0.0 is 0.0
+    parts = []
+    for one in fields(value):
+        now = getattr(value, one.name)
+        if one.compare and (one.default is MISSING or now != one.default):
+            parts.append(f"{one.name}={_text(now)}")
+    return f"{type(value).__name__}({', '.join(parts)})"

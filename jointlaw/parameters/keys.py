@@ -58,19 +58,17 @@ def checked(data: Any, rules: Mapping[str, Any], where: str, path: str = "") -> 
         if isinstance(rule, Mapping):
             found[key] = checked(value, rule, where, name)
         elif isinstance(rule, list):
-            found[key] = _checked_list(value, rule[0], where, name)
+            if not isinstance(value, list):
+                raise ValueError(f"{where}: key {name!r} must be a list of tables")
+            found[key] = [
+                checked(one, rule[0], where, f"{name}[{i}]") for i, one in enumerate(value)
+            ]
         else:
             found[key] = rule(f"{where}: {name}", value)
     for key in rules:
         if key.endswith("!") and key[:-1] not in data:
             raise ValueError(f"{where}: key '{prefix}{key[:-1]}' is missing; give it a value")
     return found
-
-
-def _checked_list(value: Any, rules: Mapping[str, Any], where: str, path: str) -> list[Table]:
-    if not isinstance(value, list):
-        raise ValueError(f"{where}: key {path!r} must be a list of tables")
-    return [checked(one, rules, where, f"{path}[{i}]") for i, one in enumerate(value)]
 
 
 def as_given(name: str, value: Any) -> Any:

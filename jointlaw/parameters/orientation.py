@@ -36,8 +36,7 @@ def bounded(a: Any, b: Any, c: Any, *, smooth: bool = False) -> tuple[float, flo
 
 def shape(u: Array, b: float) -> Array:
     """Density of Eq. 14 over u = cos(a theta), mean of all azimuths: 1 for b = 0."""
-    density: Array = 1.0 + 0.5 * b * (3.0 * u**2 - 1.0)
-    return density
+    return 1.0 + 0.5 * b * (3.0 * u**2 - 1.0)
 
 
 @declared

@@ -1,5 +1,6 @@
 """Export of a joint law to C and C++: header, tables in two forms, examples and a Makefile."""
 
+import math
 import re
 from pathlib import Path
 
@@ -68,10 +69,10 @@ def table_text(law: Law) -> str:
     numbers, arrays = packed(law)
     lines = [f"jointlaw tables {FORMAT}", f"fingerprint {law.fingerprint}"]
     lines += [f"# {line}" for line in law.to_toml().splitlines()]
-    lines += [f"{key} {x if isinstance(x, int) else x.hex()}" for key, x in numbers.items()]
+    lines += [f"{key} {x if isinstance(x, int) else _exact(x)}" for key, x in numbers.items()]
     for key, array in arrays.items():
         lines.append(key)
-        lines += [" ".join(map(float.hex, row.tolist())) for row in array.reshape(-1, 4)]
+        lines += [" ".join(map(_exact, row.tolist())) for row in array.reshape(-1, 4)]
     text = "\n".join([*lines, ""])
     return f"{text}sum {_sum(text.encode()):016x}\n"
 
@@ -108,6 +109,12 @@ def packed(law: Law) -> tuple[dict[str, int | float], dict[str, Array]]:
             f"{AZIMUTHS}; lower it"
         )
     return pack(law.tables)
+
+
+def _exact(value: float) -> str:
+    """A hexadecimal float without a point, which locales write each in their own way."""
+    mantissa, exponent = math.frexp(value)
+    return f"{int(mantissa * 2**53):#x}p{exponent - 53}"
 
 
 def _sum(data: bytes) -> int:

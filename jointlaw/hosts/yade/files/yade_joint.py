@@ -200,10 +200,11 @@ class Joints:
         self.c = {key: np.zeros(0, int if key in ("id1", "id2", "made", "b1", "b2") else float)
                   for key in PER_CONTACT}  # fmt: skip
         self.c.update({key: np.zeros((3, 0)) for key in VECTORS})
-        self.own, self.others = [], {}  # interactions that are joints; by key those that are not
-        self.states, self.index = [], {}  # bodies with joints, and the places of their ids
+        self.own, self.others = [], []  # interactions that are joints, and that are not
+        self.states, self.ids, self.index = [], [], {}  # bodies with joints
         self.x, self.q = np.zeros((3, 0)), np.zeros((4, 0))
         self.last = None  # O.iter of the last step
+        self.loaded = None  # contacts that are no joints, of a state that waits for its scene
         self.bodies = len(O.bodies)
 
     @property
@@ -296,10 +297,12 @@ class Joints:
                 f"joints {self.name!r}: O.iter went from {self.last} to {now}. The adapter must "
                 "run in every step (iterPeriod=1); after O.load call .load(file)"
             )
-        self._find()
+        if self.loaded is not None:
+            self._bind()
+        self._find(now)
         if self.own:
             self._advance()
-        elif self.index:
+        elif self.ids:
             self.x, self.q = self._read()
         self.last = now
 
@@ -394,42 +397,64 @@ class Joints:
 
     def _apply(self, force, c1, c2):
         """Add the forces on id1, their opposites on id2, and their torques to the bodies."""
-        c, size = self.c, len(self.index)
+        c, size = self.c, len(self.ids)
         torque1, torque2 = cross(c1, force), cross(force, c2)
         total = [np.bincount(c["b1"], f, size) - np.bincount(c["b2"], f, size) for f in force]
         turn = [np.bincount(c["b1"], t1, size) + np.bincount(c["b2"], t2, size)
                 for t1, t2 in zip(torque1, torque2)]  # fmt: skip
         forces = O.forces
-        for k, f, t in zip(self.index, np.array(total).T.tolist(), np.array(turn).T.tolist()):
+        for k, f, t in zip(self.ids, np.array(total).T.tolist(), np.array(turn).T.tolist()):
             forces.addF(k, f)
             forces.addT(k, t)
 
     # ---------------------------------------------------------------- contacts
 
-    def _find(self):
-        """Follow YADE's list of contacts, by ids and the step that made them: some went or came."""
+    def _find(self, now):
+        """Follow YADE's list of contacts: some went, some came."""
         self.fresh = np.zeros(0, int)
-        known = [*self.own, *self.others.values()]
-        if (len(O.bodies) == self.bodies and O.interactions.countReal() == len(known)
-                and all(i.isReal for i in known)):  # fmt: skip
+        if len(O.bodies) != self.bodies:
+            self._join(self._match())
             return
+        real = [i.isReal for i in self.own]
+        if not all(real):
+            self._keep(np.array(real))
+        self.others = [i for i in self.others if i.isReal]
+        missing = O.interactions.countReal() - len(self.own) - len(self.others)
+        if missing:
+            new = [i for i in O.interactions.all(True) if i.iterMadeReal == now]
+            self._join(new if len(new) == missing else self._match())
+
+    def _match(self):
+        """The slow way: compare with what YADE has, by ids and by the step that made them."""
+        c = self.c
+        have = {key: k for k, key in enumerate(zip(c["id1"], c["id2"], c["made"]))}
+        place, others = {}, {(i.id1, i.id2, i.iterMadeReal) for i in self.others}
+        new, self.others = [], []
+        for i in O.interactions.all(True):
+            key = (i.id1, i.id2, i.iterMadeReal)
+            if key in have:
+                place[have[key]] = i
+            elif key in others:
+                self.others.append(i)
+            else:
+                new.append(i)
+        self._keep(np.isin(np.arange(len(c["made"])), list(place)))
+        self.own = [place[k] for k in sorted(place)]
         self.bodies = len(O.bodies)
-        real = {(i.id1, i.id2, i.iterMadeReal): i for i in O.interactions.all(True)}
-        held = list(zip(*(self.c[key].tolist() for key in ("id1", "id2", "made"))))
-        mask = np.array([key in real for key in held], bool)
+        return new
+
+    def _keep(self, mask):
+        """Forget the contacts where `mask` is False."""
         self.c = {key: value[..., mask] for key, value in self.c.items()}
+        self.own = [i for i, keep in zip(self.own, mask) if keep]
         self.law.keep(mask)
-        self.own = [real[key] for key in held if key in real]
-        self.others = {key: real[key] for key in self.others if key in real}
-        old = {*held, *self.others}
-        self._join({key: i for key, i in real.items() if key not in old})
 
     def _join(self, contacts):
-        """New contacts by key: choose the joints among them and set up what stays constant."""
+        """New contacts: choose the joints among them and set up what stays constant."""
         own, rows = [], []
-        for key, i in contacts.items():
+        for i in contacts:
             if self.select is not None and not self.select(i):
-                self.others[key] = i
+                self.others.append(i)
                 continue
             if not isinstance(i.geom, ScGeom) or type(i.phys) is not FrictPhys:
                 raise TypeError(
@@ -438,14 +463,14 @@ class Joints:
                     "FrictMat_FrictPhys, Law2_ScGeom_FrictPhys_CundallStrack); select= excludes it"
                 )
             own.append(i)
-            rows.append((*key, *self._radii(i)))
+            rows.append((i.id1, i.id2, i.iterMadeReal, *self._radii(i)))
         if not own:
             return
         first, m = len(self.own), len(own)
         self.own += own
         new = dict(zip(("id1", "id2", "made", "R1", "R2", "ball", "area"), zip(*rows)))
-        self._add_bodies(k for key in ("id1", "id2") for k in new[key])
-        new["b1"], new["b2"] = ([self.index[k] for k in new[key]] for key in ("id1", "id2"))
+        new["b1"], new["b2"] = ([self._body(k) for k in new[key]] for key in ("id1", "id2"))
+        self._add_bodies()
         for key, value in self.c.items():
             tail = np.zeros((*value.shape[:-1], m), value.dtype)
             tail[...] = new.get(key, 0)
@@ -491,15 +516,18 @@ class Joints:
             raise ValueError(f"area = {area} m2 of contact {i.id1}-{i.id2} must be > 0 and finite")
         return (*(R if ball else (i.geom.refR1, i.geom.refR2)), ball, area)
 
-    def _add_bodies(self, ids):
-        """New ones of these bodies, where they were one step ago by their velocities (leapfrog)."""
+    def _body(self, k):
+        """Place of body k among the bodies with joints."""
+        if k not in self.index:
+            self.index[k] = len(self.ids)
+            self.ids.append(k)
+            self.states.append(O.bodies[k].state)
+        return self.index[k]
+
+    def _add_bodies(self):
+        """Positions of new bodies one step ago, from their velocities (YADE's leapfrog)."""
         x, q = [], []
-        for k in ids:
-            if k in self.index:
-                continue
-            state = O.bodies[k].state
-            self.index[k] = len(self.index)
-            self.states.append(state)
+        for state in self.states[self.x.shape[1] :]:
             angle = state.angVel.norm() * O.dt
             axis = state.angVel.normalized() if angle > 0 else Vector3(0, 0, 1)
             x.append((state.pos - state.vel * O.dt).__getinitargs__())
@@ -516,12 +544,14 @@ class Joints:
 
     def save(self, path):
         """Write the adapter's state (NPZ): call it with every O.save, between two runs."""
+        if self.loaded is not None:
+            self._bind()
         data = {f"contact_{key}": value for key, value in self.c.items()}
         data.update({f"law_{key}": value for key, value in self.law.state().items()})
-        data["others"] = np.array(list(self.others), int)
+        data["others"] = np.array([(i.id1, i.id2, i.iterMadeReal) for i in self.others], int)
         data["last"] = -1 if self.last is None else self.last
         with open(path, "wb") as file:
-            np.savez(file, version=VERSION, ids=list(self.index), x=self.x, q=self.q, **data)
+            np.savez(file, version=VERSION, ids=self.ids, x=self.x, q=self.q, **data)
 
     def load(self, path):
         """Take up a state that `save` wrote: call it after O.load, before the next step.
@@ -546,12 +576,18 @@ class Joints:
         self.law.restore({key[4:]: value for key, value in data.items() if key.startswith("law_")})
         self._clear()
         self.c = {key[8:]: value for key, value in data.items() if key.startswith("contact_")}
-        self.x, self.q, ids = data["x"], data["q"], data["ids"].tolist()
-        self.index = {k: place for place, k in enumerate(ids)}
-        self.states = [O.bodies[k].state for k in ids]
+        self.ids, self.x, self.q = data["ids"].tolist(), data["x"], data["q"]
+        self.index = {k: place for place, k in enumerate(self.ids)}
         self.last = int(data["last"]) if data["last"] >= 0 else None
-        self.others = dict.fromkeys(map(tuple, data["others"].reshape(-1, 3).tolist()))
-        self.bodies, self.attached = -1, True  # _find then finds the contacts by their keys
+        self.loaded, self.attached = data["others"], True
+
+    def _bind(self):
+        """Find the bodies of a loaded state and the contacts that are no joints, in this scene."""
+        other = {tuple(row) for row in self.loaded.reshape(-1, 3).tolist()}
+        self.states = [O.bodies[k].state for k in self.ids]
+        contacts = O.interactions.all(True)
+        self.others = [i for i in contacts if (i.id1, i.id2, i.iterMadeReal) in other]
+        self.loaded, self.bodies = None, -1  # _find then finds the joints by their ids
 
     def contacts(self):
         """Arrays: ids (n, 2), closure (n,), traction (n, 3) in Pa, normal (n, 3), area (n,)."""

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from builders import law
 from scipy.integrate import trapezoid
-from slow_bed import SlowBed, cap_quadrature, reach_of
-from slow_virgin import SlowGamma
+from slow_bed import SlowBed
 
 import jointlaw as jl
 
@@ -62,19 +61,6 @@ def test_cells_as_thin_as_the_cycle_keep_its_loss():
     assert np.abs(finest[1]).max() < 1e-3
 
 
-def slow_bed(one, path, springs):
-    """Normal and shear stress (steps, 2) of many springs along a path in the plane."""
-    o, p, h = one.orientation, one.asperity, one.heights
-    normals, weights = cap_quadrature(o.a, o.b, o.c, 6, 16)
-    flat = np.column_stack([path, np.zeros(len(path))])
-    bed = SlowBed(
-        normals, weights, reach_of(flat, normals), K=p.K, lam=p.lam, eta=p.eta, mu=p.mu,
-        density=one.asperity_density, n_depth=springs,
-        heights=SlowGamma(h.alpha, h.beta, h.overlap, h.formation),
-    )  # fmt: skip
-    return np.array([bed.update(d)[:2] for d in np.diff(flat, axis=0, prepend=0.0)])
-
-
 PAGE = {  # loss at amplitudes 0.1 and 0.32, shear kept after 100 openings by 0.01 and 0.1
     "balanced": ((1.20, 1.05), (0.848, 0.786)),
     "fine": ((1.11, 1.01), (0.952, 0.883)),
@@ -90,7 +76,8 @@ def test_named_resolutions_miss_what_the_page_says():
         quarter = np.linspace(0.0, amplitude, 41)[1:]
         back = np.concatenate([quarter[::-1][1:], [0.0], -quarter])
         shear = np.concatenate([[0.0], quarter, np.tile([*back, *-back], CYCLES)])
-        F = slow_bed(one, np.column_stack([np.full(len(shear), CLOSURE * R), shear]), 300)
+        path = np.column_stack([np.full(len(shear), CLOSURE * R), shear, 0.0 * shear])
+        F, _ = SlowBed(one, path, 6, 16, 300).follow()
         last = slice(-2 * len(back) - 1, None)
         exact.append(trapezoid(F[last, 1], shear[last]))
     for name, (ratios, kept) in PAGE.items():

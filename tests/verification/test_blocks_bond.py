@@ -24,7 +24,6 @@ def test_a_block_that_hangs_holds_to_the_tension():
     """Loaded slowly: what it bears before it falls is tension times area."""
     sim = Simulation(under(LAW))
     weight = RHO * G
-    assert not sim.loose.any()
     assert sim.joints.traction[:, 0] == pytest.approx(-weight)
     held = 0.0
     for share in np.linspace(weight / T, 1.01, 4000):
@@ -44,7 +43,6 @@ def test_faces_that_meet_anew_have_no_cohesion():
     drawn = replace(scene.blocks[1], corners=np.add(scene.blocks[1].corners, [0.0, 0.05]))
     run = replace(scene.run, seat=False)
     sim = Simulation(replace(scene, blocks=(scene.blocks[0], drawn), run=run))
-    assert sim.joints.n == 0
     while not (sim.joints.traction[:, 0] > 0.0).any():
         sim.step()
     assert (sim.joints.damage == 1.0).all()

@@ -4,7 +4,7 @@ import collections
 
 import numpy as np
 import pytest
-from block_forces import contact_forces
+from running import contact_forces
 from scene_text import ROCK, coulomb, on_base
 
 from dem_demo import Simulation, parse

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from running import steps, until
 from scene_text import ROCK, coulomb, on_base
 
 from dem_demo import Simulation, parse
@@ -22,10 +23,7 @@ def test_sliding_block(law):
     The first 0.02 s wind the joints up; the ledger must close to 1e-4 over the whole slide.
     """
     sim = Simulation(one_block(law, 48.0, at=(-1.0, 0.25)))
-    lost = [0.0]
-    for _ in range(1100):
-        sim.step()
-        lost.append(sim.ledger.value["friction"])
+    lost = [0.0, *steps(sim, 1100, lambda: sim.ledger.value["friction"])]
     assert sim.blocks.motion[0, 1] > -0.9
     assert np.diff(lost).min() >= -1e-9 * lost[-1]
     assert lost[-1] > 0.3 * sim.ledger.value["turned"]
@@ -39,8 +37,7 @@ def test_linear_joint_conserves_to_round_off():
     """
     run = "dashpot_normal = 0.0\ndashpot_shear = 0.0\nseat = false"
     sim = Simulation(one_block(COULOMB.replace("0.6", "inf"), run=run))
-    for _ in range(1000):
-        sim.step()
+    steps(sim, 1000)
     # Joules, of 0.1 that come and go: places are known to 5e-17 m, times a weight of 13 kN.
     assert sim.ledger.total == pytest.approx(sim.ledger.start, abs=2e-11)
 
@@ -64,8 +61,7 @@ values = [0.0, 0.3]
     )
     sim = Simulation(scene)
     stored = sim.ledger.value["stored"]
-    while sim.time < scene.run.end:
-        sim.step()
+    until(sim, scene.run.end)
     assert sim.contacts.length.sum() == pytest.approx(0.7, abs=1e-9)
     v = sim.ledger.value
     assert v["friction"] == v["dashpots"] == v["dropped"] == 0

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from running import until
 from scene_text import block, coulomb
 
 from dem_demo import Simulation, load
@@ -16,12 +17,6 @@ def tower(over, at=""):
     return parse(TOWER + UNDER.format(over=over, at=at))
 
 
-def run(sim, until):
-    while sim.time < until:
-        sim.step()
-    return sim
-
-
 def test_a_block_falls_as_its_support_goes():
     """Two blocks on one that is taken away: after t the force on them is t/T of their weight, so
     they have fallen by g t^3/(6 T), and at T by g T^2/6."""
@@ -29,7 +24,7 @@ def test_a_block_falls_as_its_support_goes():
     sim = Simulation(tower(over))
     start = sim.blocks.motion[1].copy()
     for time in (0.5 * over, over):
-        run(sim, time)
+        until(sim, time)
         fallen = start - sim.blocks.motion[1]
         assert fallen[2:] == pytest.approx(9.81 * sim.time**3 / (6 * over), rel=0.02)
         assert abs(sim.ledger.error) < 1e-3
@@ -43,18 +38,23 @@ def test_a_block_falls_as_its_support_goes():
 def test_a_stage_waits_for_its_time_or_for_rest():
     """A block dropped by 1 mm first comes to rest; a time of its own is kept."""
     text = tower(0.01, "at = 0.02").text
-    assert run(Simulation(parse(text)), 0.03).begun == pytest.approx(0.02, abs=2e-3)
+    sim = Simulation(parse(text))
+    until(sim, 0.03)
+    assert sim.begun == pytest.approx(0.02, abs=2e-3)
     rest = text.replace("at = 0.02", "").replace("at = [0, 2.0]", "at = [0, 2.001]")
-    sim = run(Simulation(parse(rest.replace("[run]", "[run]\nseat = false\n"))), 0.02)
+    sim = Simulation(parse(rest.replace("[run]", "[run]\nseat = false\n")))
+    until(sim, 0.02)
     assert np.isinf(sim.begun)
-    assert np.isfinite(run(sim, 1.0).begun)
+    until(sim, 1.0)
+    assert np.isfinite(sim.begun)
 
 
 def test_a_resumed_excavation_goes_on_bit_for_bit():
-    one = run(Simulation(tower(0.1)), 0.05)
+    one = Simulation(tower(0.1))
+    until(one, 0.05)
     other = Simulation(one.scene, saved=one.state())
     for sim in (one, other):
-        run(sim, 0.12)
+        until(sim, 0.12)
     assert np.array_equal(one.blocks.motion, other.blocks.motion)
     assert np.array_equal(one.ledger.energy, other.ledger.energy)
     assert other.blocks.mobile[:, 0].tolist() == [False, False, True, True]
@@ -82,7 +82,8 @@ def test_the_blocks_of_a_tunnel_that_are_named_loose_are_those_that_fall():
     sim, named = Simulation(scene), Simulation(scene.excavated).loose
     assert not sim.loose.any()
     drawn = sim.blocks.motion[:2].copy()
-    moved = np.hypot(*(run(sim, 1.0).blocks.motion[:2] - drawn)) * ~sim.blocks.gone
+    until(sim, 1.0)
+    moved = np.hypot(*(sim.blocks.motion[:2] - drawn)) * ~sim.blocks.gone
     assert named.any()
     assert (moved[named] > 0.02).all()
     assert (moved[~named] < 2e-3).all()

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from plain_blocks import PlainContacts, plain_step
+from running import until
 from test_blocks_tilt import BLOCK
 
 import jointlaw
@@ -42,10 +43,8 @@ def test_a_drive_goes_back_once_its_block_has_slid():
     back = 'back = { block = "top", slid = 1e-3, by = 3.0, rate = 50.0 }\n[watch]'
     down = (9.81 * np.array([-np.sin(np.radians(25)), -np.cos(np.radians(25))])).tolist()
     words = BLOCK.format(**{**WORDS, "gravity": down}, driven=7.0)
-    sim, turned = Simulation(parse(words.replace("[watch]", back))), []
-    while sim.time < 0.6:
-        sim.step()
-        turned.append(np.degrees(sim.blocks.motion[2, 0]))
+    sim = Simulation(parse(words.replace("[watch]", back)))
+    turned = until(sim, 0.6, lambda: np.degrees(sim.blocks.motion[2, 0]))
     assert 1.6 < max(turned) < 6.5
     assert turned[-1] < max(turned) - 1.5  # on its way back
 

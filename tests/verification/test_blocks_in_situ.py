@@ -6,7 +6,7 @@ its direction.
 
 import numpy as np
 import pytest
-from block_forces import contact_forces
+from running import contact_forces, until
 from scene_text import ROCK, block, coulomb
 
 from dem_demo import Simulation
@@ -46,8 +46,7 @@ def moved(sim, time=0.02):
     """Farthest (m) that a block is from its drawing at the start of a run or after a time (s)."""
     drawn = np.array([block.centroid for block in sim.scene.blocks]).T
     far = [np.hypot(*(sim.blocks.motion[:2] - drawn)).max()]
-    while sim.time < time:
-        sim.step()
+    until(sim, time)
     return max(*far, np.hypot(*(sim.blocks.motion[:2] - drawn)).max())
 
 
@@ -134,14 +133,12 @@ def test_a_joint_keeps_its_closure_of_before_while_it_opens():
     text += "[in_situ]\nstress = [0.0, 5e5, 0.0]\n"
     for i in range(2):
         text += block(f"{i}", box=[1.0, 1.0], at=[0.0, i])
-    sim, seen = Simulation(parse(text)), []
+    sim = Simulation(parse(text))
     assert sim.ledger.value["stored"] == pytest.approx(5e5**2 / 2e10, rel=1e-9)
-    while sim.time < 4e-3:
-        sim.step()
-        depth, stress = sim.contacts.closure, sim.joints.traction[:, 0]
-        seen.append(depth.min())
+    seen = until(sim, 4e-3, lambda: (sim.contacts.closure, sim.joints.traction[:, 0]))
+    for depth, stress in seen:
         assert stress == pytest.approx(1e10 * np.maximum(depth + 5e-5, 0.0), abs=1e-3)
-    assert min(seen) < -1e-4
+    assert min(depth.min() for depth, _ in seen) < -1e-4
     assert sim.ledger.value["stored"] == 0.0
     assert sim.ledger.value["kinetic"] > 0.8 * 5e5**2 / 2e10
     assert abs(sim.ledger.error) < 5e-3  # as in an impact: a joint opens within a step

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from running import steps
 from scene_text import ROCK, block
 
 from dem_demo import Simulation, load, parse
@@ -31,8 +32,7 @@ def pile(order, turned=0.0):
 
 def motion(sim, order, turned=0.0):
     """Places and angles after 0.12 s, by name, turned back."""
-    for _ in range(1200):
-        sim.step()
+    steps(sim, 1200)
     c, s = np.cos(np.radians(turned)), np.sin(np.radians(turned))
     x, y, angle = sim.blocks.motion[:3]
     back = np.array([c * x + s * y, c * y - s * x, angle])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from limit_analysis import upper_factor
+from running import until
 from scene_text import coulomb, dipping, on_base
 
 from dem_demo import Simulation, parse
@@ -95,8 +96,7 @@ def test_a_block_on_a_slope_stands_slides_or_turns(height, phi, fails):
     text = on_base(coulomb(friction, 1e7, 1e7), [10.0, height], 40.0, [80.0, 20.0], end=1.5)
     sim = Simulation(parse(text + "dashpot_normal = 1.0\ncorner_length = 4.0\n"))
     x, _, turn = sim.blocks.motion[:3, 1].copy()
-    while sim.time < sim.scene.run.end:
-        sim.step()
+    until(sim, sim.scene.run.end)
     slid, turned = sim.blocks.motion[0, 1] - x, np.degrees(sim.blocks.motion[2, 1] - turn)
     if fails == "not":
         assert abs(slid) < 1e-6

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from running import steps, until
 from scene_text import PLAIN, ROCK, block, on_base
 
 import jointlaw as jl
@@ -37,13 +38,9 @@ def put(sim, across, up):
 
 def friction(sim):
     """Largest friction angle (degrees) while the block is driven along."""
-    angles = []
-    while sim.time < 0.5:
-        sim.step()
-        force = sim.ledger.area @ sim.joints.traction
-        if sim.time > 0.2:
-            angles.append(np.degrees(np.arctan2(abs(force[1]), force[0])))
-    return max(angles)
+    until(sim, 0.2)
+    forces = np.array(until(sim, 0.5, lambda: sim.ledger.area @ sim.joints.traction))
+    return np.degrees(np.arctan(np.abs(forces[:, 1]) / forces[:, 0])).max()
 
 
 @pytest.mark.slow
@@ -53,12 +50,10 @@ def test_a_block_put_down_elsewhere_slides_at_the_friction_of_its_asperities():
     stays, lifted = Simulation(SCENE), Simulation(SCENE)
     at_rest = lifted.blocks.motion[1, 1]
     put(lifted, 0.0, 0.2)
-    lifted.step()
-    lifted.step()
+    steps(lifted, 2)
     assert lifted.joints.n == 0
     put(lifted, 1.0, at_rest + 1e-4 - lifted.blocks.motion[1, 1])
-    for _ in range(40):
-        lifted.step()
+    steps(lifted, 40)
     assert lifted.joints.delta[:, 0] == pytest.approx(0.0, abs=2e-3)  # closure from first touch
     again = Simulation(SCENE, saved=lifted.state())
     law, stress = SCENE.laws["rock"], 2600 * 9.81
@@ -75,8 +70,7 @@ def test_a_contact_that_is_pressed_when_found_starts_with_nothing():
     sim = Simulation(SCENE)
     at_rest = sim.blocks.motion[1, 1]
     put(sim, 0.0, 0.2)
-    sim.step()
-    sim.step()
+    steps(sim, 2)
     assert sim.joints.n == 0
     put(sim, 0.0, at_rest - 1e-4 - sim.blocks.motion[1, 1])
     sim.step()

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from running import until
 
 import jointlaw as jl
 from dem_demo import Simulation, load
@@ -14,16 +15,12 @@ def box():
     """Shear displacement, normal and shear stress, closure in every step of the scene."""
     scene = load("shear-box")
     sim = Simulation(scene)
-    rows = [_row(sim)]
-    while sim.time < scene.run.end:
-        sim.step()
-        rows.append(_row(sim))
-    return scene, sim, np.array(rows).T
 
+    def row():
+        closure, shear = sim.joints.delta.mean(axis=0)
+        return [shear, *sim.joints.traction.mean(axis=0), closure]
 
-def _row(sim):
-    delta = sim.joints.delta
-    return [delta[:, 1].mean(), *sim.joints.traction.mean(axis=0), delta[:, 0].mean()]
+    return scene, sim, np.array([row(), *until(sim, scene.run.end, row)]).T
 
 
 def test_stress_and_dilation_against_direct_shear(box):

@@ -4,6 +4,7 @@ import tomllib
 
 import numpy as np
 import pytest
+from running import until
 from scene_text import ROCK, block, coulomb, lines, on_base
 
 from dem_demo import Refused, Simulation, parse
@@ -92,29 +93,24 @@ def test_a_chosen_step_is_halved_in_an_impact_and_time_goes_on(monkeypatch):
     refused instead."""
     monkeypatch.setattr(simulation, "IMPACT", 10.0)
     fast = Simulation(parse(FALL))
-    first, times = fast.dt, [0.0]
-    while fast.time < 0.4:
-        fast.step()
-        times.append(fast.time)
-    steps = np.diff(times)
+    first = fast.dt
+    steps = np.diff(until(fast, 0.4, lambda: fast.time), prepend=0.0)
     assert fast.dt <= 0.5 * first
     assert steps.max() < first * (1 + 1e-6)  # no time is lost or told twice
     assert steps.min() > 0.999 * fast.dt
     assert abs(fast.ledger.error) < 5e-3
     slow = Simulation(parse(FALL), step=0.25 * fast.dt)
-    while slow.time < fast.time:
-        slow.step()
+    until(slow, fast.time)
     assert fast.blocks.motion[:2, 1] == pytest.approx(slow.blocks.motion[:2, 1], abs=2e-3)
     monkeypatch.undo()
     chosen = Simulation(parse(FALL))
     assert chosen.dt < first
-    while chosen.time < fast.time:
-        chosen.step()
+    until(chosen, fast.time)
     assert abs(chosen.ledger.error) < 1e-2  # a longer step
     assert chosen.blocks.motion[:2, 1] == pytest.approx(slow.blocks.motion[:2, 1], abs=2e-3)
     given = Simulation(parse(FALL), step=first)
     with pytest.raises(Refused, match="must stay below"):
-        [given.step() for _ in range(100_000)]
+        until(given, 0.4)
 
 
 def test_a_scene_in_which_forces_move_nothing_asks_for_a_step():

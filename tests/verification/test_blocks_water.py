@@ -4,6 +4,7 @@ from math import atan, cos, hypot, radians, sin, tan
 
 import numpy as np
 import pytest
+from running import until
 from scene_text import block, coulomb
 from shapely import Polygon
 
@@ -61,12 +62,10 @@ def test_a_sinking_block_gets_from_the_water_what_its_potential_loses():
         at = wet.centroid
         return WATER * wet.area * (0.1 * (at.x + 9) - 1.2 - at.y) if wet.area else 0.0
 
-    start, seen = potential(), []
-    while sim.time < 0.7:
-        sim.step()
-        seen.append((sim.ledger.value["work"], start - potential()))
-        assert abs(sim.ledger.error) < 1e-12
+    start = potential()
+    seen = until(sim, 0.7, lambda: (sim.ledger.value["work"], start - potential()))
     work, gained = np.array(seen).T
+    assert abs(sim.ledger.error) < 1e-12
     assert np.ptp(gained) > 1e4  # J: 2.2 m2 of water lifted by a metre
     assert work == pytest.approx(gained, abs=3e-3 * np.ptp(gained))
 

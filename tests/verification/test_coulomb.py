@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from test_tangent import STEPS, descent_slope, v_curve
+from work import work_of_step
 
 import jointlaw as jl
 from jointlaw.kernels import reference
@@ -160,35 +161,6 @@ def test_tiny_steps_in_plain_numbers(kind, dim, seed):
         assert joint.dissipated_energy == pytest.approx(lost, rel=2e-3, abs=1e-6)
 
 
-def work_of_step(one, delta, d, state):
-    """Work (B,) of the tractions that the steps t d lead to, t from 0 to 1; adaptive Lobatto rule,
-    which looks at both ends of each part.
-    """
-    nodes, weights = [0.0, 0.5 - 0.05**0.5, 0.5 + 0.05**0.5, 1.0], np.array([1, 5, 5, 1]) / 12
-
-    def work(j, a, b):
-        total = np.zeros(len(j))
-        for x, weight in zip(nodes, weights, strict=True):
-            t = a + x * (b - a)
-            F = one.step(delta[:, j], t * d[:, j], state[:, j], state[:, j].copy(), False).F
-            total += weight * (b - a) * np.sum(F * d[:, j], axis=0)
-        return total
-
-    edges, n = np.array([0.0, *np.geomspace(1e-5, 1.0, 20)]), d.shape[1]  # it may break at once
-    j, a, b = np.tile(np.arange(n), 20), np.repeat(edges[:-1], n), np.repeat(edges[1:], n)
-    total, exact = np.zeros(n), 1e-14 * energy_scale(one, delta, d)
-    whole = work(j, a, b)
-    while len(j):
-        middle = 0.5 * (a + b)
-        left, right = work(j, a, middle), work(j, middle, b)
-        good = (np.abs(left + right - whole) <= exact[j]) | (b - a < 1e-14)
-        np.add.at(total, j[good], (left + right)[good])
-        j, whole = np.tile(j[~good], 2), np.concatenate([left[~good], right[~good]])
-        ends = (a, middle), (middle, b)
-        a, b = (np.concatenate([v[~good], u[~good]]) for v, u in zip(*ends, strict=True))
-    return total
-
-
 def energy_scale(one, delta, d):
     """Elastic energy (B,) that no rounding can exceed."""
     size = np.sum(np.abs(delta) + np.abs(d), axis=0)
@@ -224,7 +196,7 @@ def test_energy_of_closed_cycles(seed, dim):
         F, lost, tangent = one.step(delta, d, state, new, True)
         assert (lost >= 0.0).all()
         gained = one.stored(delta + d, new) - one.stored(delta, state)
-        work = work_of_step(one, delta, d, state)
+        work = work_of_step(one, delta, d, state, 1e-14 * scale)
         assert (work >= gained - 1e-10 * scale).all()
         if dim == 2:
             assert (np.abs(work - gained - lost) <= 1e-10 * scale).all()

@@ -117,21 +117,21 @@ def test_unloading_is_secant_and_nothing_heals(rough):
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
 def test_no_energy_from_closed_cycles(seed):
-    """4000 cycles of a random bond: along each straight step the work is at least what is stored."""
+    """2000 cycles of a random bond: along straight steps the work is at least what is stored."""
     rng = np.random.default_rng(seed)
     stiffness, strength = 10.0 ** rng.uniform(8, 11, 2), 10.0 ** rng.uniform(5, 7, 2)
     tough = np.where(rng.random(2) < 0.3, 1.0, 10.0 ** rng.uniform(0.0, 2.0, 2))
     bond = jl.Bond(*stiffness, *strength, *(tough * 0.5 * strength**2 / stiffness))
-    size = (2.0 * tough * strength / stiffness).max() * 10.0 ** rng.uniform(-2.0, 2.0, 4000)
-    corners = rng.normal(size=(5, 3, 4000)) * size
+    size = (2.0 * tough * strength / stiffness).max() * 10.0 ** rng.uniform(-2.0, 2.0, 2000)
+    corners = rng.normal(size=(5, 3, 2000)) * size
     corners[0] = corners[-1] = 0.0
-    one, damage, work, scale = Bonded(bond), np.zeros((1, 4000)), 0.0, 0.0
+    one, damage, work, scale = Bonded(bond), np.zeros((1, 2000)), 0.0, 0.0
     for at, end in pairwise(corners):
-        new, scale = damage.copy(), np.maximum(scale, one.stored(end, np.zeros((1, 4000))))
+        new, scale = damage.copy(), np.maximum(scale, one.stored(end, np.zeros((1, 2000))))
         one.step(at, end - at, damage, new, False)
-        work = work + work_of_step(one, at, end - at, damage, 1e-11 * scale)
+        work = work + work_of_step(one, at, end - at, damage, 1e-14 * scale)
         damage = new
-        assert (work >= one.stored(end, damage) - 1e-9 * scale).all()
+        assert (work >= one.stored(end, damage) - 1e-10 * scale).all()
     assert (damage > 0.0).mean() > 0.5
 
 

@@ -1,5 +1,6 @@
 """The predicted critical time step is sharp: bounded at 0.95 of it, diverging at 1.05."""
 
+import contextlib
 import tomllib
 
 import numpy as np
@@ -35,32 +36,24 @@ def ring(scene, share, steps):
     )
     sim.blocks.velocity[:] = sim.blocks.motion[3:] * sim.blocks.mobile.T
     size = []
-    try:
+    with contextlib.suppress(Refused):  # overlap or speed: it has diverged as far as it can
         for _ in range(steps):
             sim.step()
             size.append(np.abs(sim.blocks.motion[3:]).max())
-    except Refused:  # overlap or speed: it has diverged as far as it can
-        pass
     return np.array(size)
 
 
 @pytest.mark.parametrize("zeta", [0.0, 0.1])
 @pytest.mark.parametrize("blocks", [1, 10])
-def test_bounded_below_the_limit(blocks, zeta):
-    steps = STEPS
-    size = ring(column(blocks, zeta), 0.95, steps)
-    assert len(size) == steps
-    # Energy of the leapfrog at 0.95 of the limit lets velocities grow by 1/sqrt(1 - 0.95^2) = 3.2
-    # over the pushes, times a few modes that add up.
+def test_bounded_below_the_limit_and_not_above(blocks, zeta):
+    """Energy of the leapfrog at 0.95 of the limit lets velocities grow by 1/sqrt(1 - 0.95^2) = 3.2
+    over the pushes, times a few modes that add up. Without dashpots the growth per step is 1.88 at
+    1.05 of the limit: 1e4 within 30 steps."""
+    size = ring(column(blocks, zeta), 0.95, STEPS)
+    assert len(size) == STEPS
     assert size.max() < 10 * size[:50].max()
     if zeta:
         assert size[-1] < 0.5 * size[0]  # the slowest mode of ten blocks rings longest
-
-
-@pytest.mark.parametrize("zeta", [0.0, 0.1])
-@pytest.mark.parametrize("blocks", [1, 10])
-def test_diverges_above_the_limit(blocks, zeta):
-    """Without dashpots the growth per step is 1.88 at 1.05 of the limit: 1e4 within 30 steps."""
     size = ring(column(blocks, zeta), 1.05, 300)
     assert size.max() > 1e4 * size[0]
 

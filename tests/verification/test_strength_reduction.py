@@ -49,11 +49,14 @@ def bears(law, stress):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["joint", "coulomb", "cohesion"])
+@pytest.mark.parametrize("kind", ["joint", "coulomb", "cohesion", "bond"])
 def test_factor_of_safety_of_a_block_on_a_plane(kind):
-    """Strength of the joint at its normal stress over the shear stress of the weight."""
+    """Strength of the joint at its normal stress over the shear stress of the weight; that of a
+    brittle bond beside asperities that climb is their joint peak."""
     scene = parse(SCENE)
     law = PLAIN.get(kind, scene.laws["rock"])
+    if kind == "bond":
+        law = replace(law, mating_length=5e-3, bond=jl.Bond(1e8, 1e8, 2e5, 2e4))
     dip, weight = math.radians(DIP), 2600.0 * 9.81
     strength = bears(law, normal := weight * math.cos(dip))
     if kind in PLAIN:

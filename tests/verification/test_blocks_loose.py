@@ -91,23 +91,6 @@ def test_strength_reduction_with_and_without_loose_blocks(tmp_path, capsys):
     assert said.index("cannot be held") < said.index("factor of safety without")
 
 
-@pytest.mark.slow
-def test_only_the_roof_of_a_cavern_falls():
-    """`cavern-smooth`: the wedge and the blocks beside it fall, all that are not loose stay."""
-    sim = Simulation(load("cavern-smooth"))
-    falls = np.isin([block.name for block in sim.scene.blocks],
-                    ["wedge", "rock 78", "rock 83", "rock 84"])  # fmt: skip
-    assert sim.loose[falls].all()
-    assert sim.loose.sum() <= 6  # two beside them are named too
-    held = ~sim.loose & sim.blocks.free.any(axis=1)
-    assert unbalanced(sim)[held].max() < 1e-6
-    start = sim.blocks.motion[:2].copy()
-    until(sim, 0.2)
-    moved = np.hypot(*(sim.blocks.motion[:2] - start))
-    assert moved[held].max() < 2e-3
-    assert moved[falls].min() > 0.05
-
-
 HALF = np.arctan(1.25 / 2.0)  # rad: of the wedge at its apex, 32 degrees
 
 

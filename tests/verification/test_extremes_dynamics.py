@@ -45,24 +45,24 @@ class Mass:
         self.rest = rest
 
     def run(self, steps, dt):
-        """Energies at every fifth step, and the largest effective closure.
+        """Energies (every fifth step, n), and the largest effective closure.
 
         The energy counts the kinetic part as the product of the speeds before and after: that is
         what leapfrog keeps, to the last digit on a linear spring.
         """
-        joints, load, n = self.joints, self.load, len(self.joints)
+        joints, load, seen = self.joints, self.load, []
         v, F = self.start, joints.F
-        energies, reach = np.empty((-(-steps // EVERY), n)), 0.0
         for k in range(steps):
             faster = v + (load - F * AREA) * (dt / MASS)
             if k % EVERY == 0:
                 measures = joints.measures()
                 kinetic = 0.5 * MASS * np.sum(v * faster, axis=1)
-                energies[k // EVERY] = kinetic + AREA * measures.stored - joints.delta @ load
-                reach = max(reach, float(np.max(measures.reach)))
+                energy = kinetic + AREA * measures.stored - joints.delta @ load
+                seen.append((energy, measures.reach))
             v = faster
             F = joints.update(v * dt, tangent=False)[0]
-        return energies, reach
+        energies, reach = np.array(seen).swapaxes(0, 1)
+        return energies, reach.max()
 
 
 def swing(case):
@@ -72,11 +72,9 @@ def swing(case):
     far the energy ever rises above the first, and how far after the first tenth above the largest
     in it; and the largest reach over that which the time step was made for.
     """
-    probe = Mass(case)
-    bound = 10.0 * probe.rest
-    short = 0.1 * probe.law.critical_time_step(MASS, AREA, bound)
-    bound = 1.1 * Mass(case).run(PROBE, short)[1]  # the closure reached, on a fine step
-    mass = Mass(case)
+    probe, mass = Mass(case), Mass(case)
+    short = 0.1 * probe.law.critical_time_step(MASS, AREA, 10.0 * probe.rest)
+    bound = 1.1 * probe.run(PROBE, short)[1]  # the closure reached, on a fine step
     energies, reach = mass.run(STEPS, 0.95 * mass.law.critical_time_step(MASS, AREA, bound))
     early = len(energies) // 10
     scale = mass.rest * mass.load[0] + 0.5 * MASS * np.sum(mass.start**2, axis=1)

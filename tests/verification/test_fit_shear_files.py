@@ -83,27 +83,18 @@ def peak_and_residual(normal):
     return [0.0, at, 10.0], [0.0, peak, residual]
 
 
-def whole_curve(normal):
-    """The same of the law fitted to that sandstone, every 40 um, with 1 % of noise."""
-    record = jl.direct_shear(sandstone().joint(), 10e-3, normal * 1e6, steps=250)
-    noise = np.random.default_rng(int(normal)).standard_normal(record.shear.size)
-    return record.shear * 1e3, record.shear_stress / 1e6 * (1 + 0.01 * noise)
-
-
-@pytest.mark.parametrize("measured", [peak_and_residual, whole_curve])
-def test_the_saved_law_has_the_fitted_peaks(tmp_path, capsys, measured):
+def test_the_saved_law_has_the_fitted_peaks(tmp_path, capsys):
     """In steps of 1 um. It has fewer nodes than that of the fit: 3 % holds these. The measured
     peaks lie within 5 %, as in `test_peak_and_residual`.
     """
-    curves = {normal: measured(normal) for normal in (1.0, 3.0, 5.0)}
+    curves = {normal: peak_and_residual(normal) for normal in (1.0, 3.0, 5.0)}
     for normal, rows in curves.items():
         lines = [f"{way:.4f},{stress:.4f},{normal}" for way, stress in zip(*rows, strict=True)]
         text = "\n".join(["us [mm],tau [MPa],sn [MPa]", *lines])
         (tmp_path / f"{normal}.csv").write_text(text)
     assert main(["fit", "--shear", "1.0.csv", "3.0.csv", "5.0.csv", "--out", "o"]) == 0
     printed = capsys.readouterr().out
-    few = measured is peak_and_residual
-    assert ("Hold asperity_density: give what you know" in printed) == few
+    assert "Hold asperity_density: give what you know" in printed
     assert float(printed.partition("changes these figures by ")[2].split()[0]) < 0.5
     drawn = [line.split("|")[3] for line in printed.splitlines() if line.startswith("| ")][-3:]
     for (normal, (_, stress)), cell in zip(curves.items(), drawn, strict=True):
@@ -154,12 +145,6 @@ def figures(normal):
     top = int(np.argmax(record.shear_stress))
     found = np.array([record.shear_stress[top], record.shear[top], record.shear_stress[-1]])
     return found / (np.array(MEASURED[normal]) * [1e6, 1e-3, 1e6]), record
-
-
-def test_the_fitted_figures():
-    """Logarithms, that of the displacement at a quarter of the weight: a peak is flat."""
-    misfit = [np.log(figures(normal)[0]) * [1, 0.25, 1] for normal in (1.0, 3.0, 5.0)]
-    assert np.sqrt(np.mean(np.square(misfit))) < 0.02
 
 
 @pytest.mark.parametrize("normal", MEASURED)

@@ -7,19 +7,8 @@ with it.
 """
 
 import numpy as np
+from paper_laws import directions
 from slow_virgin import SlowGamma, virgin
-
-
-def cap_quadrature(a, b, c, n_u, n_phi):
-    """Contact normals (m, 3) and weights (m,) that integrate Eq. 14 in u = cos(a theta) and phi."""
-    x, g = np.polynomial.legendre.leggauss(n_u)
-    u = np.repeat(0.5 * (x + 1.0), n_phi)
-    phi = np.tile(2.0 * np.pi * np.arange(n_phi) / n_phi, n_u)
-    theta = np.arccos(u) / a
-    weight = np.repeat(0.5 * g, n_phi) / n_phi
-    weight *= 1.0 + 0.5 * b * (3.0 * u**2 - 1.0) + 3.0 * c * (1.0 - u**2) * np.cos(2.0 * phi)
-    sin = np.sin(theta)
-    return np.stack([np.cos(theta), sin * np.cos(phi), sin * np.sin(phi)], axis=1), weight
 
 
 def depth_bins(y_max, n_depth, eta, heights):
@@ -39,12 +28,13 @@ def depth_bins(y_max, n_depth, eta, heights):
 class SlowBed:
     """One joint with the parameters of a law, from zero along a path of displacements (steps, 3).
 
-    n_u, n_phi: inclinations and azimuths; n_depth: springs of each.
+    n_theta, n_phi: inclinations and azimuths; n_depth: springs of each.
     """
 
-    def __init__(self, law, path, n_u, n_phi, n_depth):
+    def __init__(self, law, path, n_theta, n_phi, n_depth):
         o, p, h = law.orientation, law.asperity, law.heights
-        normals, weights = cap_quadrature(o.a, o.b, o.c, n_u, n_phi)
+        n, weights = directions(o.a, o.b, o.c, order=n_theta, azimuths=n_phi)
+        normals, weights = n.reshape(3, -1).T, weights.ravel()
         self.n, self.c1, self.path = normals, normals[:, 0], path
         self.lam, self.mu = p.lam, p.mu
         self.scale = law.asperity_density * weights * p.lam * p.K * self.c1 ** (1.0 + p.eta)

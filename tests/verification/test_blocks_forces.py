@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from plain_blocks import PlainContacts, plain_step
 from running import steps, until
-from scene_text import ROCK, block, lines
+from scene_text import ROCK, block, coulomb, lines, on_base
 from test_blocks_tilt import BLOCK
 
 import jointlaw
@@ -53,6 +53,9 @@ def test_a_drive_goes_back_once_its_block_has_slid():
     assert turned[-1] < max(turned) - 1.5  # on its way back
 
 
+# a block that falls on its corner, at tilts at which its lower edge is raised in part
+ROCKING = on_base(coulomb(0.5, 1e9, 8e8), [1.0, 0.5], at=[0.0, 0.279], angle=3.5)
+ROCKING += "seat = false\nstep = 1e-4\n"
 GEOMETRY = ("at", "normal", "closure", "length", "pull", "twist", "opening", "sliding", "rise",
             "carried", "inside")  # fmt: skip
 
@@ -60,7 +63,7 @@ GEOMETRY = ("at", "normal", "closure", "length", "pull", "twist", "opening", "sl
 @pytest.mark.parametrize(
     ("name", "steps"),
     [("slope", (1, 40)), ("tilt", (1, 30)), ("stack", (1200, 30)), ("bridges-weathered", (20, 40)),
-     ("shear-box", (300, 300))],
+     ("shear-box", (300, 300)), pytest.param(ROCKING, (5, 200, 200), id="rocking")],
 )  # fmt: skip
 def test_a_compiled_step_is_that_of_plain_numpy(name, steps):
     """Geometry, forces with their torques, energies and velocities of steps on the way of a scene.
@@ -68,7 +71,7 @@ def test_a_compiled_step_is_that_of_plain_numpy(name, steps):
     Places of 20 m are known to 4e-15 m; what is divided by a length of 1 mm or so loses three
     digits. Forces on the scale of those of the contacts: at rest their sum is almost nothing.
     """
-    sim = Simulation(load(name))
+    sim = Simulation(parse(name) if "[run]" in name else load(name))
     for steps_on in steps:
         for _ in range(steps_on):
             before = sim.ledger.value

@@ -119,14 +119,6 @@ def test_water_takes_its_part_of_the_stress():
     assert moved(sim) < 1e-7
 
 
-@pytest.mark.parametrize(
-    "wrong", ["", "stress = [1e6, 2e6]", "k0 = 1.0\nstress = [1e6, 1e6, 0.0]", 'left = "held"']
-)
-def test_wrong_stresses_are_refused(wrong):
-    with pytest.raises(ValueError, match="give either k0 or stress"):
-        cut(wrong, "")
-
-
 def test_a_joint_keeps_its_closure_of_before_while_it_opens():
     """Two blocks let go from 0.5 MPa: their joint opens by stress over stiffness, 0.05 mm, before
     it bears nothing, and what it stored becomes their speed, but for the dashpots."""
@@ -208,11 +200,6 @@ def test_rock_is_cut_along_what_is_taken_away():
     assert not left.stages
 
 
-def test_an_empty_excavation_is_refused():
-    with pytest.raises(ValueError, match=r"excavate\[1\].corners: no block is left there"):
-        parse(TOWER + 2 * UNDER.format(over=0.1, at=""))
-
-
 @pytest.mark.slow
 def test_the_blocks_of_a_tunnel_that_are_named_loose_are_those_that_fall():
     scene = load("tunnel")
@@ -224,3 +211,24 @@ def test_the_blocks_of_a_tunnel_that_are_named_loose_are_those_that_fall():
     assert named.any()
     assert (moved[named] > 0.02).all()
     assert (moved[~named] < 2e-3).all()
+
+
+GIVE = "give either k0 or stress"
+
+
+@pytest.mark.parametrize(
+    ("make", "told"),
+    [
+        (lambda: cut("", ""), GIVE),
+        (lambda: cut("stress = [1e6, 2e6]", ""), GIVE),
+        (lambda: cut("k0 = 1.0\nstress = [1e6, 1e6, 0.0]", ""), GIVE),
+        (lambda: cut('left = "held"', ""), GIVE),
+        (
+            lambda: parse(TOWER + 2 * UNDER.format(over=0.1, at="")),
+            r"excavate\[1\].corners: no block is left there",
+        ),
+    ],
+)
+def test_wrong_stresses_and_excavations_are_refused(make, told):
+    with pytest.raises(ValueError, match=told):
+        make()

@@ -184,14 +184,9 @@ G, RHO, T = 9.81, 2600.0, 2e5  # m/s2, kg/m3, Pa
 LAW = coulomb(0.6, 2e9, 2e9, tension=T, cohesion=4e5)
 
 
-def under(law):
-    """A block under a roof; the joint is 1 m2 per m of its width."""
-    return parse(on_base(law, [1.0, 1.0], 180.0))
-
-
 def test_a_block_that_hangs_holds_to_the_tension():
     """Loaded slowly: what it bears before it falls is tension times area."""
-    sim = Simulation(under(LAW))
+    sim = Simulation(parse(on_base(LAW, [1.0, 1.0], 180.0)))  # under a roof
     weight = RHO * G
     assert sim.joints.traction[:, 0] == pytest.approx(-weight)
     held = 0.0

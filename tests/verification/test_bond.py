@@ -97,21 +97,12 @@ def test_mixed_opening_and_shear(name, angle):
     assert lost == pytest.approx(integral, rel=1e-5)  # second order of 4000 steps
 
 
-def test_unloading_is_secant_and_nothing_heals(rough):
+def test_unloading_is_secant(rough):
     d = np.array([-0.3e-3, 1.1e-3, 0.4e-3])
     joint, _, (loaded, half, back) = pull(DUCTILE, [[0, 0, 0], d, d / 2, d], rough)
     assert 0.1 < joint.damage < 0.9
     np.testing.assert_allclose(half, loaded / 2, rtol=1e-12)
     np.testing.assert_allclose(back, loaded, rtol=1e-12)
-    rng = np.random.default_rng(3)
-    old = np.zeros(500)
-    for _ in range(200):
-        delta = rng.normal(size=(3, 500)) * 10.0 ** rng.uniform(-5.0, 1.0, 500)
-        new = hold(MIXED, delta, old)
-        assert (new.damage >= old).all()
-        assert (new.lost >= 0.0).all()
-        old = new.damage
-    assert (old == 1.0).mean() > 0.5
 
 
 @pytest.mark.slow
@@ -128,7 +119,8 @@ def test_no_energy_from_closed_cycles(seed):
     one, damage, work, scale = Bonded(bond), np.zeros((1, 2000)), 0.0, 0.0
     for at, end in pairwise(corners):
         new, scale = damage.copy(), np.maximum(scale, one.stored(end, np.zeros((1, 2000))))
-        one.step(at, end - at, damage, new, False)
+        assert (one.step(at, end - at, damage, new, False).lost >= 0.0).all()
+        assert (new >= damage).all()  # nothing heals
         work = work + work_of_step(one, at, end - at, damage, 1e-14 * scale)
         damage = new
         assert (work >= one.stored(end, damage) - 1e-10 * scale).all()

@@ -73,11 +73,6 @@ def test_tension_is_cut_and_faces_close_again_at_mate(given, bears, share, dim):
     np.testing.assert_allclose(joint.F, [1e6, *np.zeros(dim - 1)], rtol=1e-9)
 
 
-def test_infinite_friction_never_slides():
-    F, _ = coulomb(friction=math.inf).joint().update([1e-9, 1.0], tangent=False)
-    assert F[1] == pytest.approx(KS, rel=1e-12)
-
-
 def test_shear_counts_from_touch():
     """Faces that were apart meet in mid-step, in one step or in ten."""
     law = coulomb(cohesion=9e6, tension=0.0)

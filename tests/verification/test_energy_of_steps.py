@@ -2,8 +2,6 @@
 along the step's own geometry (docs/theory-incremental.md, "No step creates energy").
 """
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from builders import law, random_corners
@@ -84,25 +82,6 @@ def test_no_step_of_a_random_path_makes_energy(seed, fades, wears, yields):
     made, rounding = gains(k, states, d)
     assert made.max() <= rounding
     assert np.diff(kernel.parts(k, states).dissipated).min() >= -1e-12 * scale(k, states)
-
-
-@pytest.mark.parametrize(("mu", "shares"), [(0.0, ()), (0.05, (1.3, 1.03)), (0.3, (1.3, 1.03))])
-def test_the_ledger_tends_to_the_loss_and_is_nothing_without_friction(mu, shares):
-    """Legs of 1, 10 and 100 steps: at most so many times the loss of 100 steps, and no less."""
-    rough = replace(jl.presets.load("westerly-rough"), plane=0.0)
-    one = replace(rough, asperity=replace(rough.asperity, mu=mu))
-    R, lost = one.closure_range, []
-    for count in (1, 10, 100):
-        joint = one.joint()
-        for leg in ([0.5, 0.5], [0.0, -1.0], [0.3, 0.5]):
-            for _ in range(count):
-                joint.update(R * np.array(leg) / count, tangent=False)
-        lost.append(joint.dissipated_energy)
-    if not mu:
-        assert lost == [0.0, 0.0, 0.0]
-        return
-    assert (np.array(lost[:2]) <= np.array(shares) * lost[2]).all()
-    assert (np.diff(lost) < 0.0).all()
 
 
 @pytest.mark.slow

@@ -56,7 +56,8 @@ def test_factor_of_safety_of_a_block_on_a_plane(kind):
     scene = parse(SCENE)
     law = PLAIN.get(kind, scene.laws["rock"])
     if kind == "bond":
-        law = replace(law, mating_length=5e-3, bond=jl.Bond(1e8, 1e8, 2e5, 2e4))
+        bond, few = jl.Bond(1e8, 1e8, 2e5, 2e4), jl.Resolution(3, 4, 1)
+        law = replace(law, mating_length=5e-3, bond=bond, resolution=few)
     dip, weight = math.radians(DIP), 2600.0 * 9.81
     strength = bears(law, normal := weight * math.cos(dip))
     if kind in PLAIN:

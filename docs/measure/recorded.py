@@ -66,13 +66,14 @@ def impact(found):
     return table(["of the critical step", "samples of an impact", "change of energy"], rows)
 
 
+MATRIX = "alone", "in_pairs", "force_is_lipschitz", "results_scale"
 FORGETTING = "test_small_normal_cycles_forget_locked_in_shear_at_a_known_rate"
 # name: what makes it of the figures, tests that record them
 TABLES = {
-    "matrix": (matrix, [f"extremes_{name}.py" for name in ("matrix", "continuity", "units")]),
+    "matrix": (matrix, [f"extremes.py::test_{name}" for name in MATRIX]),
     "exact": (exact, ["extremes_exact.py"]),
-    "forgetting": (forgetting, [f"extremes_drift.py::{FORGETTING}"]),
-    "impact": (impact, ["extremes_impact.py"]),
+    "forgetting": (forgetting, [f"small_cycles.py::{FORGETTING}"]),
+    "impact": (impact, ["extremes_dynamics.py"]),
 }  # fmt: skip
 
 if __name__ == "__main__":

@@ -1,7 +1,6 @@
 """Laws and paths that the verification tests share, in units of the closure range."""
 
 import numpy as np
-from slow_virgin import SlowGamma
 
 import jointlaw as jl
 
@@ -21,11 +20,6 @@ def law(a=3.0, b=0.5, c=0.1, K=1.0, lam=1.2, eta=0.5, mu=0.4, formation=None, da
         heights=heights,
         **more,
     )
-
-
-def slow_heights(formation):
-    """The same heights for the slow bed."""
-    return None if formation is None else SlowGamma(**SMOOTH, formation=formation)
 
 
 def random_corners(rng, n, legs=6):

@@ -8,7 +8,7 @@ joints without dilation may fail before, because they cannot choose among the fo
 """
 
 import numpy as np
-from scipy.optimize import linprog
+from scipy.optimize import bisect, linprog
 from scipy.sparse import diags, hstack
 
 from dem_demo.contact import Tracker
@@ -25,8 +25,7 @@ def upper_factor(scene, low=0.25, high=4.0, exact=1e-3):
     carries = np.flatnonzero(contacts.length > 0)
     k, free = len(contacts.length), blocks.free.ravel()
     ways = rates(blocks, contacts)[np.concatenate([carries, k + carries])].T  # of N, and of shear
-    laws = list(scene.laws.values())
-    friction = np.array([laws[i].friction for i in tracker.law[carries]])
+    friction = np.array([law.friction for law in scene.laws.values()])[tracker.law[carries]]
     n = len(carries)
     press, shear = ways[:, :n], ways[:, n:]
     load = ((blocks.gravity + blocks.loads) * blocks.root).ravel()[free]
@@ -38,11 +37,6 @@ def upper_factor(scene, low=0.25, high=4.0, exact=1e-3):
         across = press @ diags(factor / friction)
         balance = hstack([press, across + shear, across - shear]).tocsr()
         found = linprog(np.zeros(3 * n), A_eq=balance, b_eq=-load / scale, bounds=(0, None))
-        return found.status == 0
+        return 1.0 if found.status == 0 else -1.0
 
-    assert holds(low)
-    assert not holds(high)
-    while high / low > 1 + exact:
-        middle = np.sqrt(low * high)
-        low, high = (middle, high) if holds(middle) else (low, middle)
-    return low
+    return bisect(holds, low, high, xtol=exact)

@@ -54,15 +54,6 @@ class PlainContacts:
         v *= self.normal.conj()
         self.opening, self.sliding = v.real, -v.imag
 
-    def following(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Corner and edge that come next at the nearer limit of each corner's range, and whether
-        the corner at the end of the edge takes over there."""
-        o, side, k = self.outlines, self.inside.argmin(axis=0), np.arange(len(self.corner))
-        trade = self.own[side, k]
-        there = np.where(side == 0, self.edge, o.after[self.edge])
-        edge = np.where(trade, self.sides[side, k], self.behind[side, k])
-        return np.where(trade, there, self.corner), edge, trade
-
 
 def _overlaps(rest, whole, mean, soft):
     """Overlap of each side with the edge (2, k), measured along the mean of both so that the blocks

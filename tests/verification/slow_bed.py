@@ -7,19 +7,8 @@ with it.
 """
 
 import numpy as np
-from slow_virgin import virgin
-
-
-def cap_quadrature(a, b, c, n_u, n_phi):
-    """Contact normals (m, 3) and weights (m,) that integrate Eq. 14 in u = cos(a theta) and phi."""
-    x, g = np.polynomial.legendre.leggauss(n_u)
-    u = np.repeat(0.5 * (x + 1.0), n_phi)
-    phi = np.tile(2.0 * np.pi * np.arange(n_phi) / n_phi, n_u)
-    theta = np.arccos(u) / a
-    weight = np.repeat(0.5 * g, n_phi) / n_phi
-    weight *= 1.0 + 0.5 * b * (3.0 * u**2 - 1.0) + 3.0 * c * (1.0 - u**2) * np.cos(2.0 * phi)
-    sin = np.sin(theta)
-    return np.stack([np.cos(theta), sin * np.cos(phi), sin * np.sin(phi)], axis=1), weight
+from paper_laws import directions
+from slow_virgin import SlowGamma, virgin
 
 
 def depth_bins(y_max, n_depth, eta, heights):
@@ -37,27 +26,30 @@ def depth_bins(y_max, n_depth, eta, heights):
 
 
 class SlowBed:
-    """One joint. `reach` (m,) is the largest closure y that each orientation will see."""
+    """One joint with the parameters of a law, from zero along a path of displacements (steps, 3).
 
-    def __init__(
-        self, normals, weights, reach, *, K, lam, eta, mu, density, heights=None, n_depth=240,
-        mating_length=np.inf, yield_interference=np.inf,
-    ):  # fmt: skip
-        self.n, self.c1 = normals, normals[:, 0]
-        self.lam, self.mu = lam, mu
-        self.scale = density * weights * lam * K * self.c1 ** (1.0 + eta)
-        reach = [float(f"{r:.12g}") for r in reach]  # rows of equal tilt share their depths
-        bins = {r: depth_bins(r, n_depth, eta, heights) for r in set(reach)}
-        pairs = [bins[r] for r in reach]
-        self.z = np.array([p[0] for p in pairs])
-        self.k = np.array([p[1] for p in pairs])
-        self.mating_length, self.steep = mating_length, normals[:, 1:] / self.c1[:, None]
-        self.yields_at = (yield_interference / self.c1)[:, None]  # largest y - z of a spring
+    n_theta, n_phi: inclinations and azimuths; n_depth: springs of each.
+    """
+
+    def __init__(self, law, path, n_theta, n_phi, n_depth):
+        o, p, h = law.orientation, law.asperity, law.heights
+        n, weights = directions(o.a, o.b, o.c, order=n_theta, azimuths=n_phi)
+        normals, weights = n.reshape(3, -1).T, weights.ravel()
+        self.n, self.c1, self.path = normals, normals[:, 0], path
+        self.lam, self.mu = p.lam, p.mu
+        self.scale = law.asperity_density * weights * p.lam * p.K * self.c1 ** (1.0 + p.eta)
+        heights = h and SlowGamma(h.alpha, h.beta, h.overlap, h.formation)
+        # rows of equal tilt share their depths
+        reach = [float(f"{r:.12g}") for r in reach_of(path, normals)]
+        bins = {r: depth_bins(r, n_depth, p.eta, heights) for r in set(reach)}
+        self.z, self.k = np.moveaxis([bins[r] for r in reach], 1, 0)
+        self.mating_length, self.steep = law.mating_length, normals[:, 1:] / self.c1[:, None]
+        self.yields_at = (p.yield_interference / self.c1)[:, None]  # largest y - z of a spring
         self.crushed = 0.0  # plastic work
         # where slopes fade the asperities of opposite orientations are flattened together
         turned = normals * [1.0, -1.0, -1.0]
         mirror = np.argmin(np.sum((normals[:, None] - turned) ** 2, axis=2), axis=0)
-        self.mirror = mirror if np.isfinite(mating_length) else np.arange(len(normals))
+        self.mirror = mirror if np.isfinite(law.mating_length) else np.arange(len(normals))
         azimuth = np.arctan2(normals[:, 2], normals[:, 1])
         self.e0 = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)
         self._turn(np.zeros(2))
@@ -70,7 +62,7 @@ class SlowBed:
         d = np.asarray(d, dtype=float)
         self.delta = self.delta + d
         self._turn(self.delta[1:] - 0.5 * d[1:])  # planes at mid-step, of sliders that move
-        y0, self.y = self.y, self._closure()
+        y0, self.y = self.y, self.delta[0] + self._rise(self.delta[1:])
         y1, z0 = self.y, self.z
         top = y1[:, None] - self.yields_at
         self.z = np.maximum(z0, np.maximum(top, top[self.mirror]))
@@ -92,11 +84,8 @@ class SlowBed:
     def _turn(self, p):
         """Planes of the asperities at the in-plane displacement p (2,), by differences of y."""
         h = 1e-6 * min(self.mating_length, 1.0)
-
-        def rise(q):
-            return self.steep @ q / np.hypot(1.0, np.hypot(*q) / self.mating_length)
-
-        a = np.stack([(rise(p + h * e) - rise(p - h * e)) / (2 * h) for e in np.eye(2)], axis=1)
+        ways = [(self._rise(p + h * e) - self._rise(p - h * e)) / (2 * h) for e in np.eye(2)]
+        a = np.stack(ways, axis=1)
         self.slope = np.column_stack([np.ones(len(a)), a])
         length = np.linalg.norm(self.slope, axis=1)
         self.lean = self.c1 * length
@@ -104,19 +93,19 @@ class SlowBed:
         s /= np.linalg.norm(s, axis=1)[:, None]
         self.basis = np.stack([s, np.cross(self.slope / length[:, None], s)], axis=1)
 
-    def _closure(self):
-        p = self.delta[1:]
-        return self.delta[0] + self.steep @ p / np.hypot(1.0, np.hypot(*p) / self.mating_length)
-
-    def facet_forces(self):
-        """Normal (m,) and shear (m, 2) force of every orientation, per area of joint."""
-        normal = self.scale * np.sum(self.k * np.clip(self.y[:, None] - self.z, 0.0, None), axis=1)
-        return normal, (self.scale / (self.c1 * self.lam) * np.sum(self.k * self.e, axis=2)).T
+    def _rise(self, p):
+        return self.steep @ p / np.hypot(1.0, np.hypot(*p) / self.mating_length)
 
     def traction(self):
-        """Sum of the facet forces, axis 1 the joint normal."""
-        normal, shear = self.facet_forces()
-        return normal @ (self.c1[:, None] * self.slope) + np.einsum("oi,oij->j", shear, self.basis)
+        """Sum of the forces of all facets, axis 1 the joint normal."""
+        normal = self.scale * np.sum(self.k * np.clip(self.y[:, None] - self.z, 0.0, None), axis=1)
+        shear = self.scale / (self.c1 * self.lam) * np.sum(self.k * self.e, axis=2)
+        return normal @ (self.c1[:, None] * self.slope) + np.einsum("io,oij->j", shear, self.basis)
+
+    def follow(self):
+        """Tractions (steps, 3) along the path, and stored energies (steps,)."""
+        rows = [(self.update(d), self.stored()) for d in np.diff(self.path, axis=0, prepend=0.0)]
+        return tuple(np.array(part) for part in zip(*rows, strict=True))
 
     def stored(self):
         """Energy in all springs, per area."""

@@ -19,14 +19,12 @@ class SlowGamma:
 
     def density(self, r):
         """H(r), Eq. 12."""
-        if r <= 0.0:
-            return 0.0
         x = r / self.beta
         return math.exp(self.alpha * math.log(x) - x - gammaln(self.alpha + 1.0)) / self.beta
 
     def cumulative(self, r):
         """P(r), the share of asperities that overlap by less than r."""
-        return float(gammainc(self.alpha + 1.0, max(r, 0.0) / self.beta))
+        return float(gammainc(self.alpha + 1.0, r / self.beta))
 
 
 def virgin(y, eta, heights=None, ends=()):

@@ -1,4 +1,5 @@
 """Stress before an excavation: rock in balance that does not move, and its joints bear that stress.
+Then rock is taken away in stages: what it bore goes bit by bit, and the rest answers.
 
 A block whose edges all bear a stress with div S = weight is in balance, and each joint bears S on
 its direction.
@@ -6,10 +7,10 @@ its direction.
 
 import numpy as np
 import pytest
-from block_forces import contact_forces
+from running import contact_forces, until
 from scene_text import ROCK, block, coulomb
 
-from dem_demo import Simulation
+from dem_demo import Simulation, load
 from dem_demo.scene import parse, turn
 
 PLAIN = coulomb(0.8)
@@ -46,8 +47,7 @@ def moved(sim, time=0.02):
     """Farthest (m) that a block is from its drawing at the start of a run or after a time (s)."""
     drawn = np.array([block.centroid for block in sim.scene.blocks]).T
     far = [np.hypot(*(sim.blocks.motion[:2] - drawn)).max()]
-    while sim.time < time:
-        sim.step()
+    until(sim, time)
     return max(*far, np.hypot(*(sim.blocks.motion[:2] - drawn)).max())
 
 
@@ -119,14 +119,6 @@ def test_water_takes_its_part_of_the_stress():
     assert moved(sim) < 1e-7
 
 
-@pytest.mark.parametrize(
-    "wrong", ["", "stress = [1e6, 2e6]", "k0 = 1.0\nstress = [1e6, 1e6, 0.0]", 'left = "held"']
-)
-def test_wrong_stresses_are_refused(wrong):
-    with pytest.raises(ValueError, match="give either k0 or stress"):
-        cut(wrong, "")
-
-
 def test_a_joint_keeps_its_closure_of_before_while_it_opens():
     """Two blocks let go from 0.5 MPa: their joint opens by stress over stiffness, 0.05 mm, before
     it bears nothing, and what it stored becomes their speed, but for the dashpots."""
@@ -134,14 +126,109 @@ def test_a_joint_keeps_its_closure_of_before_while_it_opens():
     text += "[in_situ]\nstress = [0.0, 5e5, 0.0]\n"
     for i in range(2):
         text += block(f"{i}", box=[1.0, 1.0], at=[0.0, i])
-    sim, seen = Simulation(parse(text)), []
+    sim = Simulation(parse(text))
     assert sim.ledger.value["stored"] == pytest.approx(5e5**2 / 2e10, rel=1e-9)
-    while sim.time < 4e-3:
-        sim.step()
-        depth, stress = sim.contacts.closure, sim.joints.traction[:, 0]
-        seen.append(depth.min())
+    seen = until(sim, 4e-3, lambda: (sim.contacts.closure, sim.joints.traction[:, 0]))
+    for depth, stress in seen:
         assert stress == pytest.approx(1e10 * np.maximum(depth + 5e-5, 0.0), abs=1e-3)
-    assert min(seen) < -1e-4
+    assert min(depth.min() for depth, _ in seen) < -1e-4
     assert sim.ledger.value["stored"] == 0.0
     assert sim.ledger.value["kinetic"] > 0.8 * 5e5**2 / 2e10
     assert abs(sim.ledger.error) < 5e-3  # as in an impact: a joint opens within a step
+
+
+BOXES = [block(f"{i}", box=[1, 1], at=[0, i - 1.0], fixed=i == 0) for i in range(4)]
+TOWER = f"[laws.j]\n{coulomb()}{''.join(BOXES)}[run]\nend = 1.0\n"
+UNDER = "[[excavate]]\ncorners = [[-1, -0.4], [1, -0.4], [0, 0.5]]\nover = {over}\n{at}\n"
+
+
+def tower(over, at=""):
+    return parse(TOWER + UNDER.format(over=over, at=at))
+
+
+def test_a_block_falls_as_its_support_goes():
+    """Two blocks on one that is taken away: after t the force on them is t/T of their weight, so
+    they have fallen by g t^3/(6 T), and at T by g T^2/6."""
+    over = 0.1
+    sim = Simulation(tower(over))
+    start = sim.blocks.motion[1].copy()
+    for time in (0.5 * over, over):
+        until(sim, time)
+        fallen = start - sim.blocks.motion[1]
+        assert fallen[2:] == pytest.approx(9.81 * sim.time**3 / (6 * over), rel=0.02)
+        assert abs(sim.ledger.error) < 1e-3
+    assert sim.begun == 0.0
+    assert sim.blocks.gone.tolist() == [False, True, False, False]
+    assert abs(fallen[1]) < 1e-15
+    assert sim.tracker.between(2, 3).any()
+    assert not sim.tracker.between(1, 2).any()
+
+
+def test_a_stage_waits_for_its_time_or_for_rest():
+    """A block dropped by 1 mm first comes to rest; a time of its own is kept."""
+    text = tower(0.01, "at = 0.02").text
+    sim = Simulation(parse(text))
+    until(sim, 0.03)
+    assert sim.begun == pytest.approx(0.02, abs=2e-3)
+    rest = text.replace("at = 0.02", "").replace("at = [0, 2.0]", "at = [0, 2.001]")
+    sim = Simulation(parse(rest.replace("[run]", "[run]\nseat = false\n")))
+    until(sim, 0.02)
+    assert np.isinf(sim.begun)
+    until(sim, 1.0)
+    assert np.isfinite(sim.begun)
+
+
+def test_a_resumed_excavation_goes_on_bit_for_bit():
+    one = Simulation(tower(0.1))
+    until(one, 0.05)
+    other = Simulation(one.scene, saved=one.state())
+    for sim in (one, other):
+        until(sim, 0.12)
+    assert np.array_equal(one.blocks.motion, other.blocks.motion)
+    assert np.array_equal(one.ledger.energy, other.ledger.energy)
+    assert other.blocks.mobile[:, 0].tolist() == [False, False, True, True]
+
+
+def test_rock_is_cut_along_what_is_taken_away():
+    """The blocks of the stages cover their corners, in one rock or in two."""
+    scene = load("tunnel")
+    areas = [sum(scene.blocks[i].section.area for i in stage["blocks"]) for stage in scene.stages]
+    assert areas == pytest.approx([6 * 2 + (6 + 4.2) / 2 * 1.6 + 4.2 / 2 * 0.8, 18.0], rel=0.02)
+    assert sum(block.section.area for block in scene.blocks) == pytest.approx(24 * 20, rel=0.01)
+    left = scene.excavated
+    assert sorted(left.gone) == sorted([i for stage in scene.stages for i in stage["blocks"]])
+    assert not left.stages
+
+
+@pytest.mark.slow
+def test_the_blocks_of_a_tunnel_that_are_named_loose_are_those_that_fall():
+    scene = load("tunnel")
+    sim, named = Simulation(scene), Simulation(scene.excavated).loose
+    assert not sim.loose.any()
+    drawn = sim.blocks.motion[:2].copy()
+    until(sim, 1.0)
+    moved = np.hypot(*(sim.blocks.motion[:2] - drawn)) * ~sim.blocks.gone
+    assert named.any()
+    assert (moved[named] > 0.02).all()
+    assert (moved[~named] < 2e-3).all()
+
+
+GIVE = "give either k0 or stress"
+
+
+@pytest.mark.parametrize(
+    ("make", "told"),
+    [
+        (lambda: cut("", ""), GIVE),
+        (lambda: cut("stress = [1e6, 2e6]", ""), GIVE),
+        (lambda: cut("k0 = 1.0\nstress = [1e6, 1e6, 0.0]", ""), GIVE),
+        (lambda: cut('left = "held"', ""), GIVE),
+        (
+            lambda: parse(TOWER + 2 * UNDER.format(over=0.1, at="")),
+            r"excavate\[1\].corners: no block is left there",
+        ),
+    ],
+)
+def test_wrong_stresses_and_excavations_are_refused(make, told):
+    with pytest.raises(ValueError, match=told):
+        make()

@@ -2,12 +2,14 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.integrate import quad, trapezoid
 from scipy.optimize import brentq
+from work import work_of_step
 
 import jointlaw as jl
 from jointlaw.kernels.bond import Bonded
@@ -95,48 +97,33 @@ def test_mixed_opening_and_shear(name, angle):
     assert lost == pytest.approx(integral, rel=1e-5)  # second order of 4000 steps
 
 
-def test_unloading_is_secant_and_nothing_heals(rough):
+def test_unloading_is_secant(rough):
     d = np.array([-0.3e-3, 1.1e-3, 0.4e-3])
     joint, _, (loaded, half, back) = pull(DUCTILE, [[0, 0, 0], d, d / 2, d], rough)
     assert 0.1 < joint.damage < 0.9
     np.testing.assert_allclose(half, loaded / 2, rtol=1e-12)
     np.testing.assert_allclose(back, loaded, rtol=1e-12)
-    rng = np.random.default_rng(3)
-    old = np.zeros(500)
-    for _ in range(200):
-        delta = rng.normal(size=(3, 500)) * 10.0 ** rng.uniform(-5.0, 1.0, 500)
-        new = hold(MIXED, delta, old)
-        assert (new.damage >= old).all()
-        assert (new.lost >= 0.0).all()
-        old = new.damage
-    assert (old == 1.0).mean() > 0.5
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
 def test_no_energy_from_closed_cycles(seed):
-    """1e4 cycles of a random bond: along each straight step the work is at least what is stored."""
+    """2000 cycles of a random bond: along straight steps the work is at least what is stored."""
     rng = np.random.default_rng(seed)
     stiffness, strength = 10.0 ** rng.uniform(8, 11, 2), 10.0 ** rng.uniform(5, 7, 2)
     tough = np.where(rng.random(2) < 0.3, 1.0, 10.0 ** rng.uniform(0.0, 2.0, 2))
     bond = jl.Bond(*stiffness, *strength, *(tough * 0.5 * strength**2 / stiffness))
-    size = (2.0 * tough * strength / stiffness).max() * 10.0 ** rng.uniform(-2.0, 2.0, 10_000)
-    corners = rng.normal(size=(5, 3, 10_000)) * size
+    size = (2.0 * tough * strength / stiffness).max() * 10.0 ** rng.uniform(-2.0, 2.0, 2000)
+    corners = rng.normal(size=(5, 3, 2000)) * size
     corners[0] = corners[-1] = 0.0
-    damage = work = peak = np.zeros(10_000)
-    at, F = corners[0], np.zeros((3, 10_000))
-    for end in corners[1:]:
-        shut = np.clip(at[0] / np.where(at[0] == end[0], 1.0, at[0] - end[0]), 0.0, 1.0)
-        for stop in (at + shut * (end - at), end):  # the traction has a kink where the joint shuts
-            d = (stop - at) / 50
-            for _ in range(50):  # the trapezoid rule is exact but for the growth of damage
-                at = at + d
-                new = hold(bond, at, damage)
-                u = np.concatenate([np.minimum(at[:1], 0.0), at[1:]])
-                stored = 0.5 * np.sum(new.F * u, axis=0)
-                work = work + 0.5 * np.sum((F + new.F) * d, axis=0)
-                damage, F, peak = new.damage, new.F, np.maximum(peak, stored)
-        assert (work >= stored - 1e-12 * peak).all()
+    one, damage, work, scale = Bonded(bond), np.zeros((1, 2000)), 0.0, 0.0
+    for at, end in pairwise(corners):
+        new, scale = damage.copy(), np.maximum(scale, one.stored(end, np.zeros((1, 2000))))
+        assert (one.step(at, end - at, damage, new, False).lost >= 0.0).all()
+        assert (new >= damage).all()  # nothing heals
+        work = work + work_of_step(one, at, end - at, damage, 1e-14 * scale)
+        damage = new
+        assert (work >= one.stored(end, damage) - 1e-10 * scale).all()
     assert (damage > 0.0).mean() > 0.5
 
 

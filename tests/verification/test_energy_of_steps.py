@@ -2,13 +2,10 @@
 along the step's own geometry (docs/theory-incremental.md, "No step creates energy").
 """
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from builders import increments, law, random_corners
-from exact_work import begun, step_work, stored, walk
-from work import WorkMeter
+from builders import law, random_corners
+from work import begun, step_work, walk
 
 import jointlaw as jl
 from jointlaw.kernels import reference as kernel
@@ -45,20 +42,28 @@ def start_of(one, rng):
     return state
 
 
-def gains(k, states, d):
-    """Energy (n,) in J/m2 that steps d (n, dim) between states (rows, n + 1) make."""
-    begin, held = begun(k, states[:, :-1]), stored(k, states)
-    lowered = stored(k, begin) - held[:-1]  # by slopes that wear: no work is done
-    made = held[1:] - held[:-1] - lowered - step_work(k, begin, d.T)
-    return np.maximum(np.maximum(made, made + lowered), lowered)
+def stored(k, states):
+    """Stored energies (n,) in J/m2."""
+    return kernel.measures(k, states).stored
 
 
 def scale(k, states):
     """Largest energy (J/m2) in the springs of a joint on its way, had none yielded: what is stored
     is a small difference of such energies, and has their rounding."""
-    now, whole, k = kernel.parts(k, states), k, k.asperities
-    y = effective_closure(k, now.delta, now.slopes)
-    return max(np.max((k.area * k.c1) @ k.curve.energy(y)), np.max(stored(whole, states)))
+    now, facets = kernel.parts(k, states), k.asperities
+    y = effective_closure(facets, now.delta, now.slopes)
+    return max(np.max((facets.area * facets.c1) @ facets.curve.energy(y)), stored(k, states).max())
+
+
+def gains(k, states, d):
+    """Energy (n,) that steps d (n, dim) between states (rows, n + 1) make, as a share of `scale`,
+    and what of it is rounding: of the energies of virgin curves that are tabulated, and of sums."""
+    most, rounding = scale(k, states), 1e-9 if len(k.asperities.curve.S) > 1 else 1e-11
+    begin, held = begun(k, states[:, :-1]), stored(k, states)
+    lowered = stored(k, begin) - held[:-1]  # by slopes that wear: no work is done
+    work = step_work(k, begin, d.T, np.full(len(d), 1e-3 * rounding * most))
+    made = held[1:] - held[:-1] - lowered - work
+    return np.maximum(np.maximum(made, made + lowered), lowered) / most, rounding
 
 
 @pytest.mark.parametrize("yields", [False, True])
@@ -74,29 +79,9 @@ def test_no_step_of_a_random_path_makes_energy(seed, fades, wears, yields):
     legs = np.diff(corners, axis=0, prepend=0.0)
     d = np.concatenate([leg * rng.dirichlet(np.full(3, 0.5))[:, None] for leg in legs])
     states = walk(k, state, d)
-    peak = scale(k, states)
-    # Gauss rules of 16 points between kinks of steps of up to thirty closure ranges
-    assert np.max(gains(k, states, d)) <= 1e-11 * peak
-    assert np.min(np.diff(kernel.parts(k, states).dissipated)) >= -1e-12 * peak
-
-
-@pytest.mark.parametrize(("mu", "shares"), [(0.0, ()), (0.05, (1.3, 1.03)), (0.3, (1.3, 1.03))])
-def test_the_ledger_tends_to_the_loss_and_is_nothing_without_friction(mu, shares):
-    """Legs of 1, 10 and 100 steps: at most so many times the loss of 100 steps, and no less."""
-    rough = replace(jl.presets.load("westerly-rough"), plane=0.0)
-    one = replace(rough, asperity=replace(rough.asperity, mu=mu))
-    R, lost = one.closure_range, []
-    for count in (1, 10, 100):
-        joint = one.joint()
-        for leg in ([0.5, 0.5], [0.0, -1.0], [0.3, 0.5]):
-            for _ in range(count):
-                joint.update(R * np.array(leg) / count, tangent=False)
-        lost.append(joint.dissipated_energy)
-    if not mu:
-        assert lost == [0.0, 0.0, 0.0]
-        return
-    assert (np.array(lost[:2]) <= np.array(shares) * lost[2]).all()
-    assert (np.diff(lost) < 0.0).all()
+    made, rounding = gains(k, states, d)
+    assert made.max() <= rounding
+    assert np.diff(kernel.parts(k, states).dissipated).min() >= -1e-12 * scale(k, states)
 
 
 @pytest.mark.slow
@@ -108,51 +93,23 @@ def test_no_cycle_that_is_searched_for_returns_work(seed):
     dim, state = one.dim, start_of(one, rng)
     first = random_corners(rng, 1, legs=3)[0][:, :dim]
     first[-1, 0] = rng.uniform(0.2, 0.8)  # in touch
-    d = np.diff(first, axis=0, prepend=0.0)
-    meter, n = WorkMeter(one, 60, panels=16), 60
-    meter.start(state)
-    for step in d:
-        meter.step(np.tile(step, (n, 1)))
-    begin, start = meter.copies.snapshot(), meter.stored
+    d, k, n = np.diff(first, axis=0, prepend=0.0), one.tables, 60
+    begin = np.tile(walk(k, state, d)[:, -1:], (1, n))
     legs, size = rng.normal(size=(n, 2, dim)) * 10.0 ** rng.uniform(-2, 0, (n, 1, 1)), 1.0
     best, least = legs[0], np.inf
     for _ in range(6):
-        meter.copies.restore(begin)
-        work = sum(meter.step(step) for step in (legs[:, 0], legs[:, 1], -legs.sum(axis=1)))
-        lost = (work - meter.stored + start) / np.sum(
-            legs**2, axis=(1, 2)
-        )  # elastic: as the square
+        states, work = begin, 0.0
+        squares = np.sum(legs**2, axis=(1, 2))  # elastic energies go with them
+        for leg in (legs[:, 0], legs[:, 1], -legs.sum(axis=1)):
+            work = work + step_work(k, begun(k, states), leg.T, 1e-4 * squares)
+            states = kernel.step(k, states, leg.T, False)[0]
+        lost = (work - stored(k, states) + stored(k, begin)) / squares
         if lost.min() < least:
             best, least = legs[lost.argmin()], lost.min()
         size *= 0.6
         legs = best * (1.0 + size * rng.normal(size=legs.shape))
-    k, cycle = one.tables, np.vstack([best, -best.sum(axis=0)])
+    cycle = np.vstack([best, -best.sum(axis=0)])
     d = np.vstack([d, cycle, cycle, cycle])
-    states = walk(k, state, d)
-    made = gains(k, states, d) / scale(k, states)
-    assert max(made) <= 1e-12
-    assert sum(made[3:]) <= 1e-12
-
-
-@pytest.mark.parametrize("yields", [False, True])
-@pytest.mark.parametrize(("fades", "wears"), [(False, False), (True, False), (True, True)])
-@pytest.mark.parametrize("seed", SEEDS[:12])
-def test_a_closed_path_loses_what_the_ledger_says_in_the_limit(seed, fades, wears, yields):
-    """By the trapezoid of the tractions at the ends of steps, from the virgin joint."""
-    rng = np.random.default_rng(100 + seed)
-    one = random_law(rng, fades, wears, yields)
-    reach = one.mating_length if fades else 1.0
-    corners = random_corners(rng, 4)[:, :, : one.dim] * [1.0, *[reach] * (one.dim - 1)]
-    corners[:, -1] = 0.0
-    gaps = []
-    for steps in (64, 128, 256, 512):
-        joints, before, work, largest = one.joints(4), 0.0, 0.0, 0.0
-        for d in np.moveaxis(increments(corners, steps), 1, 0):
-            after, _ = joints.update(d, tangent=False)
-            work = work + np.sum(0.5 * (before + after) * d, axis=1)
-            before, largest = after, np.maximum(largest, joints.stored_energy)
-        gap = work - joints.stored_energy - joints.dissipated_energy
-        gaps.append(np.max(np.abs(gap) / (largest + joints.dissipated_energy)))
-    # without friction of second order in the step where nothing yields, else of first
-    assert np.log2(gaps[0] / gaps[-1]) / 3 > (0.5 if one.asperity.mu else 1.0)
-    assert gaps[-1] < 0.02
+    made, rounding = gains(k, walk(k, state, d), d)
+    assert max(made) <= rounding
+    assert sum(made[3:]) <= rounding

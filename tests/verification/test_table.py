@@ -178,21 +178,3 @@ def test_the_shear_traction_turns_with_the_contact(table):
     added = K22 * d[1] + K23 * d[2] + 1j * (K23 * d[1] + K33 * d[2])
     exact = turn * (f[0] + 1j * f[1]) + half * added
     np.testing.assert_allclose(found[1] + 1j * found[2], exact, rtol=1e-12)
-
-
-def test_follow_makes_no_energy(table):
-    """Closed loops in closure and shear: an elastic, softening, frictional host loses work only.
-
-    2000 steps per loop; the trapezoid's own error is of second order in the step.
-    """
-    rng = np.random.default_rng(2)
-    for _ in range(5):
-        corners = rng.uniform([0.1, -0.3, -0.3], [0.8, 0.3, 0.3], (4, 3)) * table.closure[-1]
-        legs = [
-            np.linspace(a, b, 300) for a, b in zip(corners, np.roll(corners, -1, 0), strict=True)
-        ]
-        path = np.concatenate([np.linspace(0 * corners[0], corners[0], 100), *legs])
-        F = table.follow(path)[100:]
-        d = np.diff(path[100:], axis=0)
-        work = np.sum((F[1:] + F[:-1]) / 2 * d)
-        assert work > -1e-4 * np.abs(F).max() * table.closure[-1]

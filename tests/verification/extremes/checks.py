@@ -47,36 +47,29 @@ class Watch:
 
     def __init__(self, law, n):
         self.batch = law.joints(n)
-        self.lost = np.zeros(n)
-        self.peak = np.zeros(n)
-        self.forces = np.zeros(n)
+        self.lost, self.peak, self.forces = np.zeros((3, n))
 
     def step(self, d):
         """Advance by d (n, 3); the list of what is wrong afterwards."""
-        faults = []
         before = self.batch.snapshot().values
         F, C = self.batch.update(d)
-        if not np.isfinite(F).all():
-            faults.append("F is not finite")
-        if not np.isfinite(C).all():
-            faults.append("C is not finite")
         lost, stored = self.batch.dissipated_energy, self.batch.stored_energy
         self.peak = np.maximum(self.peak, stored)
-        if not (lost - self.lost >= 0.0).all():
-            faults.append(f"dissipation {np.min(lost - self.lost):.1e} of {np.max(self.peak):.1e}")
-        if not (np.isfinite(stored) & (stored >= 0.0)).all():
-            faults.append(f"stored energy {np.min(stored):.1e}")
-        if not (excess := sliders_within_friction(self.batch)) <= ROUNDING:
-            faults.append(f"a slider exceeds friction by {excess:.1e}")
-        if not np.isfinite(self.batch.snapshot().values).all():
-            faults.append("the state is not finite")
         self.forces = np.maximum(self.forces, np.abs(F).max(axis=1))
         if self.batch.law.tables.yields:  # a small difference of large forces
             self.forces = np.maximum(self.forces, elastic_force(self.batch))
-        if not (gap := self._other_kernel(before, d, F)) <= KERNELS:
-            faults.append(f"the two kernels differ by {gap:.1e}")
-        self.lost = lost
-        return faults
+        excess, gap = sliders_within_friction(self.batch), self._other_kernel(before, d, F)
+        gained, self.lost = lost - self.lost, lost
+        holds = {
+            "F is not finite": np.isfinite(F).all(),
+            "C is not finite": np.isfinite(C).all(),
+            f"dissipation {gained.min():.1e} of {self.peak.max():.1e}": (gained >= 0.0).all(),
+            f"stored energy {stored.min():.1e}": (np.isfinite(stored) & (stored >= 0.0)).all(),
+            f"a slider exceeds friction by {excess:.1e}": excess <= ROUNDING,
+            "the state is not finite": np.isfinite(self.batch.snapshot().values).all(),
+            f"the two kernels differ by {gap:.1e}": gap <= KERNELS,
+        }
+        return [fault for fault, held in holds.items() if not held]
 
     def _other_kernel(self, before, d, F):
         """How far the reference kernel is from F, as a share of the largest traction so far."""
@@ -103,11 +96,9 @@ def path(rng, n, steps, size):
 
 def run(law, size, seed, n=8, steps=32):
     """All faults along random paths of n joints, each with its step."""
-    watch = Watch(law, n)
-    d, home = path(np.random.default_rng(seed), n, steps, size)
-    found = []
-    for k in range(steps):
-        delta = watch.batch.delta
-        d[k, home[k]] = -delta[home[k]] * np.array([1.0, 0.0, 0.0])
-        found += [f"step {k}: {fault}" for fault in watch.step(d[k])]
+    watch, found = Watch(law, n), []
+    paths = path(np.random.default_rng(seed), n, steps, size)
+    for k, (d, home) in enumerate(zip(*paths, strict=True)):
+        d[home] = -watch.batch.delta[home] * [1.0, 0.0, 0.0]
+        found += [f"step {k}: {fault}" for fault in watch.step(d)]
     return found

@@ -6,7 +6,7 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
-from fem_host import LAW, SEATING, export
+from fem_host import LAW, SEATING
 
 import jointlaw as jl
 
@@ -22,14 +22,6 @@ def run(folder):
     test = np.genfromtxt(folder / "kratos.csv", delimiter=",", names=True)
     assert test["iterations"].max() <= 6
     return test
-
-
-def test_coulomb(tmp_path):
-    law = jl.CoulombLaw(normal_stiffness=1e12, shear_stiffness=5e11, friction=0.6)
-    test = run(export(tmp_path, law, target="librock_umat.so"))
-    shear = np.minimum(5e11 * test["slip_m"], -0.6 * test["normal_Pa"])[: TURN + 1]
-    np.testing.assert_allclose(test["shear_Pa"][: TURN + 1], shear, rtol=0, atol=1e-3 * shear.max())
-    assert 0.0 < shear[PRESSED + 2] < shear[TURN] == pytest.approx(1.2e6, rel=1e-3)
 
 
 def test_direct_shear_of_two_blocks_with_an_interface_element(finite_elements):

@@ -36,6 +36,19 @@ def export(folder, law=LAW, level="-O3", target="all"):
     return folder
 
 
+def is_the_test_in_python(slip, opening, shear, pressed, turn):
+    """Direct shear of a host at 2 MPa, from step `pressed` forth to step `turn`, then back."""
+    joint = LAW.joint(normal_stress=SEATING)
+    start = joint.delta[0]
+    forth = jl.direct_shear(joint, slip[turn], normal=2e6, steps=turn - pressed)
+    back = jl.direct_shear(joint, slip[-1] - slip[turn], normal=2e6, steps=len(slip) - 1 - turn)
+    peak, rise = forth.shear_stress.max(), np.ptp(forth.closure)
+    for rows, record in ((slice(pressed, turn + 1), forth), (slice(turn, None), back)):
+        assert np.abs(shear[rows] - record.shear_stress).max() < 1e-3 * peak
+        assert np.abs(opening[rows] - (start - record.closure)).max() < 1e-3 * rise
+    assert forth.shear_stress[-1] - back.shear_stress[-1] > peak / 2, "the way back must differ"
+
+
 class Behaviour:
     """One point of a behaviour, loaded by its symbols; `update` and `revert` as a host has them."""
 

@@ -44,16 +44,15 @@ compute ke all ke
 )
 
 
-def rock(plugin, name="block.jlaw", **changes):
+def rock(plugin):
     """A joint under the weight of a block: its law, and the tables in the folder."""
     law = soft(
         asperity_density=1e4,
         heights=jl.GammaHeights(alpha=3.82, beta=1.15e-3, overlap=3e-3),
         mating_length=5e-4,
         resolution="fast",
-        **changes,
     )
-    (plugin / name).write_text(table_text(law))
+    (plugin / "block.jlaw").write_text(table_text(law))
     return law
 
 

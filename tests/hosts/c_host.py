@@ -48,9 +48,10 @@ def run(program, *arguments):
     return done.stdout
 
 
-def library(folder, *flags, cc="cc", name="libjointlaw.so"):
-    """jointlaw.h as a shared library, built without a warning."""
-    path = build(folder, SOURCE, "-shared", "-fPIC", *STRICT, *flags, cc=cc, name=name)
+def library(folder, *flags, cc="cc", more=""):
+    """jointlaw.h, and more text, as a shared library, built without a warning."""
+    flags = ["-shared", "-fPIC", *STRICT, *flags]
+    path = build(folder, SOURCE + more, *flags, cc=cc, name="libjointlaw.so")
     lib, pointer = ctypes.CDLL(str(path)), ctypes.c_void_p
     for function in ("normal_stress", "closure", "max_stiffness"):
         getattr(lib, f"jlaw_{function}").argtypes = [pointer, ctypes.c_double]
@@ -72,9 +73,6 @@ class CLaw:
         assert self.law, self.message.value.decode()
         self.dim = lib.jlaw_dim(self.law)
         self.state = np.zeros(lib.jlaw_state_size(self.law))
-
-    def __del__(self):
-        self.lib.jlaw_free(self.law)
 
     def step(self, d, tangent=True, keep=True):
         """F and C; raises ValueError with the message of a refusal."""

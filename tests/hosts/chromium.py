@@ -1,6 +1,5 @@
 """Chromium without a window, driven by its DevTools protocol over a pipe."""
 
-import base64
 import json
 import os
 import shutil
@@ -78,13 +77,10 @@ class Chromium:
         if what == "Log.entryAdded" and told["entry"]["level"] == "error":
             self.said.append(told["entry"]["text"])
 
-    def window(self, wide, high, scheme="light"):
-        """Size in pixels of the page, and whether the reader asks for light or dark."""
-        phone = wide < 600
+    def window(self, wide, high):
+        """Size in pixels of the page, as of a phone."""
         self.ask("Emulation.setDeviceMetricsOverride", width=wide, height=high,
-                 deviceScaleFactor=2 if phone else 1, mobile=phone)  # fmt: skip
-        feature = {"name": "prefers-color-scheme", "value": scheme}
-        self.ask("Emulation.setEmulatedMedia", features=[feature])
+                 deviceScaleFactor=2, mobile=True)  # fmt: skip
 
     def run(self, script):
         """The value of a script in the page; a promise is waited for."""
@@ -101,24 +97,18 @@ class Chromium:
         script = f"new Promise((done) => {{ const look = () => {{ {look} }}; look(); {late}; }})"
         assert self.run(script), f"never: {condition}; the console says {self.said}"
 
-    def mouse(self, kind, x, y):
+    def mouse(self, kind, x, y, button="left"):
         """`mousePressed`, `mouseMoved` or `mouseReleased` at a place of the window."""
-        self.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1,
-                 clickCount=1)  # fmt: skip
+        self.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, clickCount=1,
+                 buttons={"left": 1, "right": 2}[button])  # fmt: skip
 
-    def finger(self, places):
-        """Touch the first place, move over the others, and let go."""
+    def touch(self, kind, places):
+        """`Start`, `Move` or `End`, with a finger at each place."""
         self.ask("Emulation.setTouchEmulationEnabled", enabled=True)
-        for i, (x, y) in enumerate(places):
-            kind = "touchMove" if i else "touchStart"
-            self.ask("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": x, "y": y}])
-        self.ask("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+        points = [{"x": x, "y": y, "id": i} for i, (x, y) in enumerate(places)]
+        self.ask("Input.dispatchTouchEvent", type=f"touch{kind}", touchPoints=points)
 
     def key(self, name):
         """Press a key and let go."""
         for kind in ("keyDown", "keyUp"):
             self.ask("Input.dispatchKeyEvent", type=kind, key=name)
-
-    def picture(self, path):
-        """What the window shows, as a PNG file."""
-        path.write_bytes(base64.b64decode(self.ask("Page.captureScreenshot")["data"]))

@@ -36,6 +36,19 @@ def export(folder, law=LAW, level="-O3", target="all"):
     return folder
 
 
+def is_the_test_in_python(slip, opening, shear, pressed, turn):
+    """Direct shear of a host at 2 MPa, from step `pressed` forth to step `turn`, then back."""
+    joint = LAW.joint(normal_stress=SEATING)
+    start = joint.delta[0]
+    forth = jl.direct_shear(joint, slip[turn], normal=2e6, steps=turn - pressed)
+    back = jl.direct_shear(joint, slip[-1] - slip[turn], normal=2e6, steps=len(slip) - 1 - turn)
+    peak, rise = forth.shear_stress.max(), np.ptp(forth.closure)
+    for rows, record in ((slice(pressed, turn + 1), forth), (slice(turn, None), back)):
+        assert np.abs(shear[rows] - record.shear_stress).max() < 1e-3 * peak
+        assert np.abs(opening[rows] - (start - record.closure)).max() < 1e-3 * rise
+    assert forth.shear_stress[-1] - back.shear_stress[-1] > peak / 2, "the way back must differ"
+
+
 class Behaviour:
     """One point of a behaviour, loaded by its symbols; `update` and `revert` as a host has them."""
 
@@ -52,6 +65,7 @@ class Behaviour:
         self.old |= {"properties": np.array(properties, float), "stored": made(1)}
         self.old |= {"dissipated": made(1), "density": made(1), "external": made(1)}
         self.new = {key: value.copy() for key, value in self.old.items()}
+        self.state = self.new["state"]
         self.rdt, self.message = np.ones(1), ctypes.create_string_buffer(512)
 
     def number(self, name):
@@ -90,6 +104,35 @@ class Behaviour:
         assert done == 1, self.message.value.decode()
         self.update()
         return self.new["forces"].copy(), K
+
+    @property
+    def energies(self):
+        """Stored and dissipated, J/m2 or J/m3."""
+        return [self.new["stored"][0], self.new["dissipated"][0]]
+
+
+class Umat:
+    """One point of the UMAT, with n components."""
+
+    def __init__(self, folder, n):
+        self.function, self.size = ctypes.CDLL(str(folder / "librock_umat.so")).umat_, n
+        self.stress, self.state, self.K = (
+            np.zeros(n),
+            np.zeros(LAW.state_size + 1),
+            np.zeros((n, n)),
+        )
+        self.energies, self.pnewdt = np.zeros(2), np.ones(1)
+
+    def step(self, by, rows=LAW.state_size + 1):
+        """Advance by an increment of the jump; stress and K."""
+        arguments, by = [None] * 37, np.ascontiguousarray(by)
+        numbers = self.stress, self.state, self.K, self.energies[:1], self.energies[1:]
+        arguments[:5] = map(at, numbers)
+        arguments[11], arguments[27] = at(by), at(self.pnewdt)
+        for place, whole in ((21, self.size), (22, rows), (24, 0)):
+            arguments[place] = ctypes.byref(ctypes.c_int(whole))
+        self.function(*arguments)
+        return self.stress.copy(), self.K.T.copy()  # its columns come first in Fortran
 
 
 def at(array):

@@ -69,13 +69,21 @@ def on_block(chromium, places):
     return [(box[0] + x, box[1] + y) for x, y in places]
 
 
-def drag(chromium, places):
+def drag(chromium, places, button="left"):
     """Press the mouse at the first place, move over the others, release."""
     at = on_block(chromium, places)
-    chromium.mouse("mousePressed", *at[0])
+    chromium.mouse("mousePressed", *at[0], button)
     for place in at:
-        chromium.mouse("mouseMoved", *place)
-    chromium.mouse("mouseReleased", *at[-1])
+        chromium.mouse("mouseMoved", *place, button)
+    chromium.mouse("mouseReleased", *at[-1], button)
+
+
+def touch(chromium, *moves):
+    """Fingers at each of these lists of places, one after the other; then they let go."""
+    for places, before in zip(moves, ([], *moves), strict=False):
+        more = len(places) > len(before)
+        chromium.touch("Start" if more else "Move", on_block(chromium, places))
+    chromium.touch("End", [])
 
 
 def press(chromium, key):
@@ -217,45 +225,6 @@ def test_what_cannot_be_loaded_is_told(browser, made, tmp_path):
     browser.said.clear()
 
 
-def test_the_state_stays_when_the_direction_turns(chromium):
-    drag(chromium, [(0, 0), (20, 0)])
-    before = chromium.run("[test.joint.F, test.joint.dissipated]")
-    move(chromium, "direction", 90)
-    assert chromium.run("[test.joint.F, test.joint.dissipated]") == before
-    drag(chromium, [(0, 0), (20, 0)])
-    _, F = same_bits(chromium, "westerly-rough")
-    assert F[-1, 1] < 0.5 * before[0][1]  # friction turns; facets that were climbed stay loaded
-    assert F[-1, 2] > 0.8 * before[0][1]
-
-
-def test_finger_and_keys_move_the_block(chromium):
-    chromium.finger(on_block(chromium, [(0, 0), (10, 0), (25, 0)]))
-    way = chromium.run("test.slip * zoomOf(test)")
-    assert 10 < way <= 25.001  # pixels; a browser may pass over the first of them
-    press(chromium, "ArrowRight")
-    more = chromium.run("test.slip * zoomOf(test)") - way
-    assert more == pytest.approx(chromium.run("test.joint.length * zoomOf(test) / 20"))
-    same_bits(chromium, "westerly-rough")
-
-
-def two_fingers(chromium):
-    """Touch with one, then with another, and move both."""
-    [(x, y)] = on_block(chromium, [(0, 0)])
-    chromium.ask("Emulation.setTouchEmulationEnabled", enabled=True)
-    one, two, moved = [x], [x, x + 90], [x + 30, x + 120]
-    for kind, xs in (("Start", one), ("Start", two), ("Move", moved), ("End", [])):
-        points = [{"x": at, "y": y, "id": i} for i, at in enumerate(xs)]
-        chromium.ask("Input.dispatchTouchEvent", type=f"touch{kind}", touchPoints=points)
-
-
-def right_button(chromium):
-    """Drag with it."""
-    [(x, y)] = on_block(chromium, [(0, 0)])
-    for kind, to in (("Pressed", x), ("Moved", x + 40), ("Released", x + 40)):
-        chromium.ask("Input.dispatchMouseEvent", type=f"mouse{kind}", x=to, y=y, button="right",
-                     buttons=2)  # fmt: skip
-
-
 def reload(chromium):
     """Load the page again, once the address tells of the joint."""
     chromium.wait("location.hash.includes('turn=45')")
@@ -266,9 +235,8 @@ def reload(chromium):
     chromium.run(f"window.before = {json.dumps(before)}")
 
 
-DO = {"drag": drag, "move": move, "press": press, "choose": choose, "reload": reload,
-      "run": Chromium.run, "is": Chromium.wait, "right button": right_button,
-      "two fingers": two_fingers}  # fmt: skip
+DO = {"drag": drag, "touch": touch, "move": move, "press": press, "choose": choose,
+      "reload": reload, "run": Chromium.run, "is": Chromium.wait, "bits": same_bits}  # fmt: skip
 RIGHT, LEFT, UP, DOWN = ([(0, 0), way] for way in ((20, 0), (-15, 0), (0, -20), (0, 150)))
 SEEN = "new MutationObserver(() => heard++).observe(part('status'), { childList: true })"
 SCENES = {
@@ -323,8 +291,33 @@ SCENES = {
         ("is", "[...test.joint.F.slice(0, 2), test.slip]"
                ".every((x, i) => Math.abs(x / before[i] - 1) < 1e-4)"),
     ],
-    "the right button moves nothing": [("right button",), ("is", "test.slip === 0")],
-    "two fingers move nothing": [("two fingers",), ("is", "test.slip === 0")],
+    "the right button moves nothing": [
+        ("drag", [(0, 0), (40, 0)], "right"),
+        ("is", "test.slip === 0"),
+    ],
+    "two fingers move nothing": [
+        ("touch", [(0, 0)], [(0, 0), (90, 0)], [(30, 0), (120, 0)]),
+        ("is", "test.slip === 0"),
+    ],
+    "a finger and the keys move the block": [
+        ("touch", [(0, 0)], [(10, 0)], [(25, 0)]),
+        ("run", "window.before = test.slip"),
+        # pixels; a browser may pass over the first of them
+        ("is", "before * zoomOf(test) > 10 && before * zoomOf(test) <= 25.001"),
+        ("press", "ArrowRight"),
+        ("is", "Math.abs((test.slip - before) / test.joint.length * 20 - 1) < 1e-6"),
+        ("bits", "westerly-rough"),
+    ],
+    "the state stays when the direction turns, and friction turns": [
+        ("drag", RIGHT),
+        ("run", "window.before = [...test.joint.F, test.joint.dissipated]"),
+        ("move", "direction", 90),
+        ("is", "[...test.joint.F, test.joint.dissipated].every((x, i) => x === before[i])"),
+        ("drag", RIGHT),
+        ("bits", "westerly-rough"),
+        # facets that were climbed stay loaded
+        ("is", "test.joint.F[1] < 0.5 * before[1] && test.joint.F[2] > 0.8 * before[1]"),
+    ],
     "what is kept has an end": [
         ("run", "for (let i = 0; i < 400; i++) drag((i % 2 ? -0.3 : 0.3) * test.joint.length, 0)"),
         ("is", "test.rows.length > 4000 && test.rows.length <= 6000"),

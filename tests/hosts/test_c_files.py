@@ -10,23 +10,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from c_host import HERE, SOURCE, STRICT, CLaw, build, compiler, library, run
+from c_host import HERE, SOURCE, STRICT, build, compiler, library, run
 from extremes import laws as extreme_laws
 
 import jointlaw as jl
-import jointlaw.cli.main
-from jointlaw.hosts.c.export import FORMAT, header_text, table_text
+from jointlaw.cli.main import main
+from jointlaw.hosts.c.export import FORMAT, _sum, header_text, table_text
 from jointlaw.native.build import BUILT
+from jointlaw.native.layout import jointlaw_h
 
 FUZZ = HERE / "fuzz.c"
 DOCS = Path(__file__).parents[2] / "docs"
-HOSTS = Path(jointlaw.hosts.__file__).parent
+PAGE = (DOCS / "native.md").read_text()
+HOSTS = DOCS.parent / "jointlaw" / "hosts"
 SANE = ["-g1", "-O1", "-fno-sanitize-recover=all"]
 # JOINTLAW_LONG=1: 1e6 steps and 10 000 files, as docs/native.md tells; twenty minutes on one core.
 # Without it every kind of step, size and damage comes as well, on the first twelve of these laws.
 LAWS, STEPS, FILES = (200, 5000, 10_000) if "JOINTLAW_LONG" in os.environ else (12, 3000, 500)
-
-
+COPIED = {
+    "native.md": re.search(r"^```c\n(.*?)^```", PAGE, re.M | re.S)[1],
+    "jointlaw.h": "\n".join(re.findall(r"^ \*     (.*)", jointlaw_h().partition("*/")[0], re.M)),
+}
 BARE = ["-DJOINTLAW_PLAIN", "-DJOINTLAW_NO_LEDGER"]
 DEVICE = """
 #define __CUDACC_RTC__
@@ -69,28 +73,20 @@ def test_builds_without_a_warning(tmp_path, law, cc, flags):
 def test_compiles_as_cuda(tmp_path, law):
     """Without a toolkit, by clang: with what a device has of its own, and the lines of the page."""
     (tmp_path / "rock.h").write_text(header_text(law, "rock"))
-    page = (DOCS / "native.md").read_text()
-    kernel = page.partition('RawModule(code=r"""\n')[2].partition('\n"""')[0]
+    kernel = PAGE.partition('RawModule(code=r"""\n')[2].partition('\n"""')[0]
     assert "jlaw_step(" in kernel
-    (tmp_path / "x.cu").write_text(DEVICE + kernel)
-    command = [
-        compiler("clang"), "-x", "cuda", "--cuda-device-only", "--cuda-gpu-arch=sm_80",
-        "-nocudalib", "-nocudainc", "-O1", f"-I{BUILT}", f"-I{tmp_path}",
-        "-S", str(tmp_path / "x.cu"), "-o", str(tmp_path / "x.ptx"),
+    flags = [
+        "-x", "cuda", "--cuda-device-only", "--cuda-gpu-arch=sm_80", "-nocudalib", "-nocudainc",
+        "-O1", "-S", f"-I{tmp_path}",
     ]  # fmt: skip
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert ".entry advance" in (tmp_path / "x.ptx").read_text()
+    made = build(tmp_path, DEVICE + kernel, *flags, cc="clang")
+    assert ".entry advance" in made.read_text()
 
 
 @pytest.mark.parametrize("cc", ["gcc", "clang"])
 def test_fast_math_is_refused(tmp_path, cc):
-    path = tmp_path / "source.c"
-    path.write_text(SOURCE)
-    command = [compiler(cc), "-ffast-math", f"-I{BUILT}", "-c", str(path), "-o", "x.o"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode != 0
-    assert "take -fno-math-errno -fno-trapping-math" in done.stderr
+    with pytest.raises(AssertionError, match="take -fno-math-errno -fno-trapping-math"):
+        build(tmp_path, SOURCE, "-ffast-math", "-c", cc=cc)
 
 
 # --------------------------------------------------------------- hostile input
@@ -140,8 +136,6 @@ def test_two_threads_on_one_law(tmp_path, law):
 
 def resigned(text):
     """The text with a sum that fits."""
-    from jointlaw.hosts.c.export import _sum
-
     body = text[: text.rindex("\nsum ") + 1]
     return f"{body}sum {_sum(body.encode()):016x}\n"
 
@@ -185,44 +179,28 @@ def test_a_bad_file_is_told(lib, tmp_path, law, name):
 # ------------------------------------------------------------ what is exported
 
 
-def test_both_forms_of_the_tables_are_one_law(lib, tmp_path, law):
-    (tmp_path / "rock.h").write_text(header_text(law, "rock"))
-    text = '#include "rock.h"\nconst jlaw_law *tables(void) { return &rock; }\n'
-    compiled = build(tmp_path, text, "-shared", "-fPIC", f"-I{tmp_path}", name="rock.so")
-    one = CLaw(lib, law, tmp_path)
-    tables = ctypes.CDLL(str(compiled)).tables
-    tables.restype = ctypes.c_void_p
-    two = CLaw(lib, law, tmp_path)
-    lib.jlaw_free(two.law)
-    two.law = ctypes.c_void_p(tables())
-    rng = np.random.default_rng(0)
-    for d in rng.normal(2e-8, 1e-7, (30, 3)):
-        np.testing.assert_array_equal(one.step(d)[1], two.step(d)[1])
-    two.law = None  # constants are not freed
-
-
 def test_examples_build_as_written_and_run(tmp_path, law, capsys, monkeypatch):
     """The lines of the folder's README, and what docs/native.md shows: the same bits at -O0."""
     for cc in ("cc", "c++", "gfortran", "cmake"):
         compiler(cc)
     monkeypatch.chdir(tmp_path)
     command = ["export", "c", "westerly-smooth", "--out", "out", "--resolution", "balanced"]
-    assert jointlaw.cli.main.main(command) == 0
+    assert main(command) == 0
     assert "make && ./example" in capsys.readouterr().out
     folder = tmp_path / "out"
     text = (folder / "README.md").read_text()
     lines = [line.strip() for line in text.splitlines() if line.startswith("    ")]
     assert len(lines) == 8
-    page, said = (DOCS / "native.md").read_text(), {}
+    said = {}
     told = subprocess.run(
-        [sys.executable, "-c", re.search(r'`python -c "(.*)"` prints the folder', page)[1]],
+        [sys.executable, "-c", re.search(r'`python -c "(.*)"` prints the folder', PAGE)[1]],
         capture_output=True, text=True,
     )  # fmt: skip
     assert told.stdout.strip() == str(BUILT)
     whole = (folder / "CMakeLists.txt").read_text().splitlines()
-    assert set(re.search(r"```cmake\n(.*?)```", page, re.S)[1].splitlines()) <= set(whole)
-    (folder / "first.c").write_text(copied()["native.md"])
-    lines += [*re.findall(r"^    ((?:cc|c\+\+|gfortran) .*)", page, re.M), "./first"]
+    assert set(re.search(r"```cmake\n(.*?)```", PAGE, re.S)[1].splitlines()) <= set(whole)
+    (folder / "first.c").write_text(COPIED["native.md"])
+    lines += [*re.findall(r"^    ((?:cc|c\+\+|gfortran) .*)", PAGE, re.M), "./first"]
     for line in [*lines, "cmake -B build && cmake --build build", "build/example"]:
         quick = line.replace("-O3", "-O0")
         done = subprocess.run(quick, shell=True, cwd=folder, capture_output=True, text=True)
@@ -231,7 +209,7 @@ def test_examples_build_as_written_and_run(tmp_path, law, capsys, monkeypatch):
     assert "`cmake -B build && cmake --build build`" in text
     assert said["build/example"] == said["./example"]
     for line in ("./example", "./spheres"):
-        shown = page.partition(f"$ {line}\n")[2].partition("```")[0].split("...\n")[0]
+        shown = PAGE.partition(f"$ {line}\n")[2].partition("```")[0].split("...\n")[0]
         assert shown.strip()
         assert said[line].startswith(shown)
     joint = replace(law, resolution="balanced").joint()
@@ -241,38 +219,29 @@ def test_examples_build_as_written_and_run(tmp_path, law, capsys, monkeypatch):
     assert last[2:] == pytest.approx(1e-6 * F[:2], abs=1e-4)
 
 
-def copied():
-    """The text in C that a header, README or page shows, one at most, by where it stands."""
-    pages = [DOCS.parent / "README.md", *DOCS.rglob("*.md"), *HOSTS.rglob("*.md")]
-    found = {path.name: re.findall(r"^```c\n(.*?)^```", path.read_text(), re.M | re.S)
-             for path in pages}  # fmt: skip
-    for path in (Path(BUILT) / "jointlaw.h", *HOSTS.rglob("*.[hc]")):
-        head = re.findall(r"^ \*     (.*)", path.read_text().partition("*/")[0], re.M)
-        found[path.name] = ["\n".join(head)] * any(";" in line for line in head)  # no commands
-    return {name: text for name, texts in found.items() for (text,) in [texts] * bool(texts)}
-
-
-def test_texts_that_a_user_copies(tmp_path):
+@pytest.mark.parametrize("name", COPIED)
+def test_texts_that_a_user_copies(tmp_path, name):
     """Under AddressSanitizer, for a law that has many more numbers than the one that is named."""
-    law = jl.JointLaw.from_text(
-        'resolution = "fine"\nmating_length = 1e-5\n' + jl.presets.load("westerly-smooth").to_toml()
-    )
-    for name in ("granite", "westerly_smooth"):
-        (tmp_path / f"{name}.jlaw").write_text(table_text(law))
-    texts, show = copied(), 'printf("%.1f %.1f %.1f Pa\\n", F[0], F[1], F[2]); return 0;'
-    assert set(texts) == {"native.md", "jointlaw.h"}
+    more, text = 'resolution = "fine"\nmating_length = 1e-5\n', COPIED[name]
+    law = jl.JointLaw.from_text(more + jl.presets.load("westerly-smooth").to_toml())
+    (tmp_path / re.search(r'jlaw_read\("(.*?)"', text)[1]).write_text(table_text(law))
+    if "int main" not in text:
+        head, body = re.match(r"((?:#[^\n]*\n)+)(.*)", text, re.S).groups()
+        show = 'printf("%.1f %.1f %.1f Pa\\n", F[0], F[1], F[2]); return 0;'
+        text = f"{head}int main(void)\n{{\n{body}\n{show}\n}}\n"
+    program = build(tmp_path, text, "-std=c99", *SANE, "-fsanitize=address", "-Werror")
+    done = subprocess.run(
+        [program], cwd=tmp_path, capture_output=True, text=True,
+        env=os.environ | {"ASAN_OPTIONS": "detect_leaks=0"},  # they end with the program
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
     F, _ = law.joint().update([1e-7, 5e-8, 0.0])
-    for where, text in texts.items():
-        if "int main" not in text:
-            head, body = re.match(r"((?:#[^\n]*\n)+)(.*)", text, re.S).groups()
-            text = f"{head}int main(void)\n{{\n{body}\n{show}\n}}\n"
-        program = build(tmp_path, text, "-std=c99", *SANE, "-fsanitize=address", "-Werror")
-        done = subprocess.run(
-            [program], cwd=tmp_path, capture_output=True, text=True,
-            env=os.environ | {"ASAN_OPTIONS": "detect_leaks=0"},  # they end with the program
-        )  # fmt: skip
-        assert (done.returncode, done.stderr) == (0, ""), where
-        assert [float(word) for word in done.stdout.split()[:3]] == pytest.approx(F, abs=0.051)
+    assert [float(word) for word in done.stdout.split()[:3]] == pytest.approx(F, abs=0.051)
+
+
+def test_no_other_page_shows_a_text_in_c():
+    pages = [DOCS.parent / "README.md", *DOCS.rglob("*.md"), *HOSTS.rglob("*.md")]
+    assert [page.name for page in pages if "```c\n" in page.read_text()] == ["native.md"]
 
 
 @pytest.mark.parametrize("plane", ["plane = 0.0", "closure_only = true"])

@@ -18,9 +18,7 @@ SCENE = (
 processors * 1 1
 region box block -0.2 0.225 -0.2 0.2 -0.2 0.2
 create_box 1 box
-{atoms}
-set type 1 diameter 0.02 density 2600
-{motion}
+{atoms}set type 1 diameter 0.02 density 2600
 plugin load ./jointlawplugin.so
 pair_style jointlaw opening 1e-3 damping {damping}
 pair_coeff * * rock.jlaw
@@ -32,22 +30,20 @@ dump_modify 1 sort id format float %.17g
 {run}
 """
 )
+ATOM = """create_atoms 1 single {1!r} {2!r} {3!r}
+set atom {0} vx {4!r} vy {5!r} vz {6!r}
+set atom {0} omega {7!r} {8!r} {9!r}
+"""
 
 
 def scene(out="out", swap=False, velocity=(0, 0, 0), damping=0.0, run=f"run {STEPS}", shift=0.0):
     """Input script of the two spheres; `swap` exchanges their IDs, `shift` (m) is along x."""
-    atoms, motion = [], []
-    for tag, k in enumerate((1, 0) if swap else (0, 1), 1):
-        atoms.append(
-            "create_atoms 1 single {!r} {!r} {!r}".format(*(X[k] + [shift, 0, 0]).tolist())
-        )
-        motion.append(
-            "set atom {} vx {!r} vy {!r} vz {!r}".format(tag, *(V[k] + velocity).tolist())
-        )
-        motion.append("set atom {} omega {!r} {!r} {!r}".format(tag, *W[k].tolist()))
-    return SCENE.format(
-        atoms="\n".join(atoms), motion="\n".join(motion), out=out, damping=damping, run=run
+    x, v = (X + np.array([shift, 0, 0])).tolist(), (V + velocity).tolist()
+    order = (1, 0) if swap else (0, 1)
+    atoms = "".join(
+        ATOM.format(tag, *x[k], *v[k], *W[k].tolist()) for tag, k in enumerate(order, 1)
     )
+    return SCENE.format(atoms=atoms, out=out, damping=damping, run=run)
 
 
 def in_python(law):

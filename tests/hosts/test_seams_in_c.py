@@ -1,84 +1,83 @@
 """Every declared parameter, off its default, in C: through the exported header and table file."""
 
+import contextlib
+import ctypes
+
 import numpy as np
 import pytest
-from c_host import CLaw, build, library, run
+from c_host import CLaw, at, library, random_law
 from kinds import PARAMETERS, off_default
 
 import jointlaw as jl
 from jointlaw.hosts.c.export import header_text
 
 STEPS = ((3e-7, 0.0, 0.0), (2e-7, 1e-7, -5e-8), (-1e-7, 2e-7, 1e-7), (1e-7, -1e-7, 1e-7))
-PROGRAM = """#define JOINTLAW_IMPLEMENTATION
-#define JOINTLAW_PLAIN
-{headers}
-#include <stdio.h>
-static void show(const jlaw_law *law)
-{{
-  static double s[1000];
-  const double d[][3] = {{{steps}}};
-  char message[JLAW_MESSAGE];
-  double F[3] = {{0.0}};
-  for (int i = 0; i < 1000; i++) s[i] = 0.0;
-  for (int i = 0; i < {count}; i++) jlaw_update(law, s, s, d[i], F, NULL, message, sizeof message);
-  for (int i = 0; i < jlaw_dim(law); i++) printf("%.17g ", F[i]);
-  printf("%.17g %.17g %.17g %.17g\\n", jlaw_stored(law, s), jlaw_dissipated(law, s),
-         jlaw_normal_stress(law, 3e-7), jlaw_max_stiffness(law, 3e-7));
-}}
-int main(void)
-{{
-{calls}
-  return 0;
-}}
+CLOSURES, STRESSES = (-1e-6, 0.0, 1e-9, 3e-7, 2e-6), (0.0, 1e3, 5e6)
+LAWS = [off_default(name)[0] for name in PARAMETERS]
+LAWS.append(random_law(6))  # heights of a density that is infinite at the point of contact
+CONSTANTS = """#include "law_{0}.h"
+const jlaw_law *constants_{0}(void);
+const jlaw_law *constants_{0}(void) {{ return &law_{0}; }}
 """
 
 
-@pytest.fixture(scope="module")
-def laws():
-    return [off_default(name)[0] for name in PARAMETERS]
-
-
-def shown(law):
-    """What the program prints, by Python."""
+def by_python(law):
+    """Traction and energies at the end of a path; the unsheared joint."""
     joint = law.joint()
     for d in STEPS:
         F, _ = joint.update(d[: law.dim], tangent=False)
-    amounts = joint.stored_energy, joint.dissipated_energy
-    return [*F, *amounts, law.normal_stress(3e-7), law.max_stiffness(3e-7)]
+    return [
+        *F, joint.stored_energy, joint.dissipated_energy, *law.normal_stress(CLOSURES),
+        *map(law.max_stiffness, CLOSURES), *map(law.closure, STRESSES),
+    ]  # fmt: skip
 
 
-def test_constants_of_the_header(laws, tmp_path):
-    names = [f"law_{i}" for i in range(len(laws))]
-    for law, name in zip(laws, names, strict=True):
-        (tmp_path / f"{name}.h").write_text(header_text(law, name))
-    source = PROGRAM.format(
-        headers="\n".join(f'#include "{name}.h"' for name in names),
-        steps=", ".join(f"{{{', '.join(map(repr, d))}}}" for d in STEPS),
-        count=len(STEPS),
-        calls="\n".join(f"  show(&{name});" for name in names),
+def by_c(one):
+    """The same numbers."""
+    for d in STEPS:
+        F, _ = one.step(d[: one.dim])
+    energies = [f(one.law, at(one.state)) for f in (one.lib.jlaw_stored, one.lib.jlaw_dissipated)]
+    stresses, bounds = (
+        [f(one.law, closure) for closure in CLOSURES]
+        for f in (one.lib.jlaw_normal_stress, one.lib.jlaw_max_stiffness)
     )
-    flags = "-O1", "-ffp-contract=off", "-Wno-psabi", f"-I{tmp_path}"
-    lines = run(build(tmp_path, source, *flags)).splitlines()
-    for law, line in zip(laws, lines, strict=True):
-        np.testing.assert_allclose(np.array(line.split(), float), shown(law), rtol=1e-9, atol=1e-9)
+    closures = [one.lib.jlaw_closure(one.law, stress) for stress in STRESSES]
+    return [*F, *energies, *stresses, *bounds, *closures]
 
 
-def test_table_files(laws, tmp_path):
-    lib = library(tmp_path, "-O1", "-DJOINTLAW_PLAIN", "-ffp-contract=off")
-    for law in laws:
-        one = CLaw(lib, law, tmp_path)
-        for d in STEPS:
-            F, _ = one.step(d[: law.dim])
-        found = [
-            *F, lib.jlaw_stored(one.law, one.state.ctypes.data_as(type(one.law))),
-            one.state[law.dim], lib.jlaw_normal_stress(one.law, 3e-7),
-            lib.jlaw_max_stiffness(one.law, 3e-7),
-        ]  # fmt: skip
-        np.testing.assert_allclose(found, shown(law), rtol=1e-9, atol=1e-9)
+@pytest.fixture(scope="module")
+def lib(tmp_path_factory):
+    """The law in C, with the tables of all laws as constants."""
+    folder = tmp_path_factory.mktemp("constants")
+    for i, law in enumerate(LAWS):
+        (folder / f"law_{i}.h").write_text(header_text(law, f"law_{i}"))
+    more = "".join(map(CONSTANTS.format, range(len(LAWS))))
+    flags = "-O1", "-DJOINTLAW_PLAIN", "-ffp-contract=off", f"-I{folder}"
+    return library(folder, *flags, more=more)
 
 
-def test_the_law_file_of_lammps(laws, tmp_path):
-    for law in laws:
+@pytest.mark.parametrize("i", range(len(LAWS)))
+def test_both_forms_of_the_tables_give_what_python_gives(lib, tmp_path, i):
+    law, read, compiled = LAWS[i], *(CLaw(lib, LAWS[i], tmp_path) for _ in range(2))
+    constants = getattr(lib, f"constants_{i}")
+    constants.restype = ctypes.c_void_p
+    compiled.law = ctypes.c_void_p(constants())
+    found = by_c(read)
+    np.testing.assert_allclose(found, by_python(law), rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(by_c(compiled), found)
+    for one in (read, compiled):
+        assert lib.jlaw_fingerprint(one.law).decode() == law.fingerprint
+        assert np.isnan([lib.jlaw_closure(one.law, bad) for bad in (np.nan, -1.0, np.inf)]).all()
+        assert np.isnan(lib.jlaw_normal_stress(one.law, 2 * law.largest_reach))
+        apart = law.joint()
+        with contextlib.suppress(ValueError):  # of a law whose faces always fit
+            apart = law.joint(mated=False)
+        assert lib.jlaw_unmated(one.law, at(one.state)) == (0 if apart.delta.any() else -1)
+        np.testing.assert_array_equal(one.state, apart.snapshot().values[0])
+
+
+def test_the_law_file_of_lammps(tmp_path):
+    for law in LAWS:
         if law.dim == 3:
             jl.export_lammps(law, tmp_path)
             assert jl.JointLaw.from_toml(tmp_path / "law.toml") == law

@@ -52,8 +52,7 @@ def test_arm_gives_the_bits_of_this_machine(wheels, tmp_path):
         done = subprocess.run(command, input=paths.tobytes(), capture_output=True)
         assert done.returncode == 0, done.stderr.decode()
         batch = law.joints(JOINTS)
-        here = [np.concatenate([np.ravel(x) for x in batch.update(d)]) for d in paths]
-        here = np.stack(here)
+        here = np.array([np.concatenate([*map(np.ravel, batch.update(d))]) for d in paths])
         there = np.frombuffer(done.stdout).reshape(here.shape)
         if seed in PLAIN:
             np.testing.assert_array_equal(there, here)

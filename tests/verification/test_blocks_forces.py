@@ -87,8 +87,7 @@ def test_a_compiled_step_is_that_of_plain_numpy(name, steps):
         scale = np.abs(c.length[:, None] * sim.joints.traction).max(initial=0.0)
         scale = max(scale, float(np.abs(sim.blocks.gravity).max()))
         np.testing.assert_allclose(sim.ledger.forces, force, rtol=0, atol=1e-12 * scale)
-        light = sim.blocks.inertia.min()
-        tiny = 1e-12 * scale * dt / light
+        tiny = 1e-12 * scale * dt / sim.blocks.inertia.min()
         np.testing.assert_allclose(sim.blocks.velocity, velocity, rtol=0, atol=tiny)
         for entry, now in sim.ledger.value.items():
             if entry in booked:

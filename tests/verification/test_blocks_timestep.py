@@ -13,8 +13,6 @@ from dem_demo.contact import virgin_curve
 from dem_demo.dynamics import simulation
 from dem_demo.scene import Files, build_law
 
-STEPS = 3000
-
 
 def column(blocks, zeta):
     """Blocks on each other with a linear law that neither slides nor differs by direction."""
@@ -49,8 +47,8 @@ def test_bounded_below_the_limit_and_not_above(blocks, zeta):
     """Energy of the leapfrog at 0.95 of the limit lets velocities grow by 1/sqrt(1 - 0.95^2) = 3.2
     over the pushes, times a few modes that add up. Without dashpots the growth per step is 1.88 at
     1.05 of the limit: 1e4 within 30 steps."""
-    size = ring(column(blocks, zeta), 0.95, STEPS)
-    assert len(size) == STEPS
+    size = ring(column(blocks, zeta), 0.95, 3000)
+    assert len(size) == 3000
     assert size.max() < 10 * size[:50].max()
     if zeta:
         assert size[-1] < 0.5 * size[0]  # the slowest mode of ten blocks rings longest
@@ -107,6 +105,5 @@ def test_a_chosen_step_is_halved_in_an_impact_and_time_goes_on(monkeypatch):
 
 
 def test_a_scene_in_which_forces_move_nothing_asks_for_a_step():
-    driven = parse(FALL.replace("angle = 3.0", 'held = ["x", "y", "turn"]'))
     with pytest.raises(Refused, match=r"set run.step \(s\)"):
-        Simulation(driven)
+        Simulation(parse(FALL.replace("angle = 3.0", 'held = ["x", "y", "turn"]')))

@@ -2,6 +2,8 @@
 along the step's own geometry (docs/theory-incremental.md, "No step creates energy").
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from builders import law, random_corners
@@ -82,6 +84,22 @@ def test_no_step_of_a_random_path_makes_energy(seed, fades, wears, yields):
     made, rounding = gains(k, states, d)
     assert made.max() <= rounding
     assert np.diff(kernel.parts(k, states).dissipated).min() >= -1e-12 * scale(k, states)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.05, 0.3])
+def test_the_ledger_tends_to_the_loss_and_is_nothing_without_friction(mu):
+    """Legs of 1, 10 and 100 steps: at most so many times the loss of 100 steps, and no less."""
+    rough = replace(jl.presets.load("westerly-rough"), plane=0.0)
+    one, lost = replace(rough, asperity=replace(rough.asperity, mu=mu)), []
+    legs = one.closure_range * np.array([[0.5, 0.5], [0.0, -1.0], [0.3, 0.5]])
+    for count in (1, 10, 100):
+        joint = one.joint()
+        for d in np.repeat(legs / count, count, axis=0):
+            joint.update(d, tangent=False)
+        lost.append(joint.dissipated_energy)
+    assert (lost[2] > 0.0) == (mu > 0.0)
+    assert lost[2] <= lost[1] <= 1.03 * lost[2]
+    assert lost[1] <= lost[0] <= 1.3 * lost[2]
 
 
 @pytest.mark.slow

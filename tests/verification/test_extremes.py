@@ -1,6 +1,8 @@
-"""Laws at the ends of what their parameters allow: what must hold does, after every step; and
-presets at stresses from 1 Pa to 10 GPa."""
+"""Laws at the ends of what their parameters allow: what must hold does, after every step; presets
+at stresses from 1 Pa to 10 GPa; a batch that goes on in another process."""
 
+import multiprocessing
+import pickle
 import re
 
 import numpy as np
@@ -296,3 +298,20 @@ def test_normal_control_converges_from_1_pascal_to_10_gigapascal(preset):
         far = float(law.closure(stress))
         record = jl.direct_shear(law.joint(), [far, -far], stress, steps=12)
         np.testing.assert_allclose(record.F1 / stress, 1.0, rtol=0, atol=MISS)
+
+
+def go_on(batch):
+    """A batch that came from another process takes a step."""
+    return batch.update(np.full((len(batch), 3), 0.01 * SCALE), tangent=False)[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["fork", "spawn"])
+def test_a_batch_goes_on_in_another_process(method):
+    """After the parent has used its threads, which a fork does not take along."""
+    batch = build(resolution=jl.Resolution(1, 3, 1)).joints(5000)
+    for d in path(np.random.default_rng(1), 5000, 3, SCALE)[0]:
+        batch.update(d)
+    with multiprocessing.get_context(method).Pool(1) as pool:
+        elsewhere = pool.apply(go_on, (batch,))
+    np.testing.assert_array_equal(elsewhere, go_on(pickle.loads(pickle.dumps(batch))))

@@ -96,7 +96,6 @@ def test_named_resolutions_miss_what_the_page_says():
         np.testing.assert_allclose(left[:, 1] / locked[:, 1], kept, atol=1e-3)
 
 
-ONE = jl.Resolution(2, 3, 1)
 LAWS = {
     "eta = 0": {"eta": 0.0},
     "eta = 0.5": {},
@@ -129,7 +128,10 @@ def forgetting(counts, depth, amplitude, eta=0.5):
 def test_cycles_repeat_after_shakedown(kind):
     """Closed parallelograms in random directions. Those of 0.3 of the closure range forget 7 % each
     time. 1e-9 of the peak is asked."""
-    joints, rng = build(resolution=ONE, **LAWS[kind]).joints(4), np.random.default_rng(1)
+    joints, rng = (
+        build(resolution=jl.Resolution(2, 3, 1), **LAWS[kind]).joints(4),
+        np.random.default_rng(1),
+    )
     u, v = (w / np.linalg.norm(w, axis=1, keepdims=True) for w in rng.normal(size=(2, 4, 3)))
     joints.update(np.tile([0.7 * SCALE, 0.0, 0.0], (4, 1)))
 

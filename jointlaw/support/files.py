@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-# A folder that has one of these holds a run
-MARKS = ("summary.json", "history.csv", "strength.json", "ablation.csv", "state", "refused")
+# What a run leaves beside what its summary lists; a folder that has one of these holds a run
 LEFT = ("summary.json", "history.csv", "ablation.csv", "state/scene.toml", "state/state.npz",
         "refused/scene.toml", "refused/state.npz")  # fmt: skip
+MARKS = (*dict.fromkeys(name.partition("/")[0] for name in LEFT), "strength.json")
 
 
 def replace_file(path: Path, data: bytes) -> None:

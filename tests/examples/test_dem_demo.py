@@ -61,6 +61,7 @@ def test_run_writes_everything(done):
     assert written == {"history.csv", "blocks.csv", "final.png", "motion.gif", "curves.png"}
     assert summary["time_step_margin"] > 2
     assert summary["steps"] * summary["time_step_s"] == pytest.approx(0.12, rel=0.01)
+    assert summary["scene"] == "A block on a slope"
     assert summary["slip"][0]["slip_angle"] is None
     assert 35 < summary["slip"][0]["predicted_angle"] < 50
     assert abs(summary["energy_error"]) < 5e-3
@@ -162,6 +163,7 @@ def test_a_run_stopped_by_ctrl_c_goes_on_bit_for_bit(tmp_path, capsys, monkeypat
     (tmp_path / "scene.toml").write_text(text)
     words = ["scene.toml", "--no-pictures", "--out"]
     assert main([*words, "whole"]) == 0
+    assert not list((tmp_path / "whole").glob("*.png"))
     step, count = Simulation.step, itertools.count(1)
 
     def pressed(self):
@@ -223,6 +225,8 @@ def test_failed_runs_are_resumed_with_a_smaller_step(tmp_path, capsys, height, s
     assert main([str(file), "--no-pictures", "--out", str(out)]) == 2
     assert re.search(f"{why}.*{out / 'refused'}", capsys.readouterr().err)
     assert re.search(why, json.loads((out / "summary.json").read_text())["stopped"])
+    assert main([str(file), "--out", str(out)]) == 2
+    assert "holds another run (summary.json, history.csv, refused)" in capsys.readouterr().err
     words = ["resume", str(out / "refused"), "--step", "1e-4", "--no-pictures", "--out", str(more)]
     assert main(words) == 0
     summary = json.loads((more / "summary.json").read_text())

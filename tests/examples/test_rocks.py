@@ -180,6 +180,7 @@ def test_joints_have_the_law_of_their_set():
         alike = laws[one] if laws[one] == laws[other] else "joint"
         assert law == ("plain" if block in (of[one], of[other]) else alike)
     assert {*laws.values()} == {*found} == {"joint", "plain"}
+    assert alone(scene, scene.rocks[0].name).pairs == scene.pairs
 
 
 def test_two_blocks_with_laws_of_their_own_are_told_and_moved_by_the_same():

@@ -105,6 +105,8 @@ def test_every_host_gets_its_files_and_is_told_what_to_type(host, tmp_path, caps
     assert {word for word in typed if word in kept} <= written
     assert written & kept
     assert any("linear_a3" in name for name in written) or "law.toml" in written
+    texts = (path.read_bytes() for path in (tmp_path / "o").iterdir())
+    assert not any(re.search(rb"@\w+@", text) for text in texts)
 
 
 @pytest.mark.parametrize(

@@ -46,6 +46,15 @@ def test_a_loose_block_leaves_the_one_that_it_touches_in_balance():
     assert (again.loose == sim.loose).all()
 
 
+def test_a_weakened_block_in_water_starts_in_balance():
+    text = on_base(coulomb(0.7), [3.0, 1.5], load=[2e4, 0.0])
+    sim = Simulation(
+        replace(parse(text + "[water]\ntable = [[-9, 0.5], [9, 0.6]]\n"), reduction=1.3)
+    )
+    assert sim.blocks.loads[1, 1] > 1e4  # N, uplift
+    assert unbalanced(sim)[1] < 1e-9
+
+
 def test_a_block_that_slides_lacks_what_friction_does_not_hold():
     """At 40 degrees: sin - cos tan 35, of its weight."""
     steep = np.radians(40.0)

@@ -34,21 +34,20 @@ class _OfOne(Generic[T]):
 class Joint:
     """One joint: as `JointBatch`, with vectors (dim,) and a matrix (dim, dim).
 
-    law: of the joint; `law.joint()` makes one. batch: of one joint, which it takes over; a new one
-    by default.
+    `law.joint()` makes one. batch: of one joint, which it takes over; law: that of the batch.
 
     >>> joint = law.joint()
     >>> F, C = joint.update([2e-7, 0.0, 0.0])
     """
 
-    def __init__(self, law: Any, batch: JointBatch | None = None) -> None:
-        self.law = law
-        self._batch = JointBatch(law, 1) if batch is None else batch
+    def __init__(self, batch: JointBatch) -> None:
+        self._batch = batch
+        self.law = law = batch.law
         d, F, C = np.empty((1, law.dim)), np.empty((1, law.dim)), np.empty((1, law.dim, law.dim))
         self._steps = Step(d, F, None), Step(d, F, C)  # without and with tangent
 
     def __copy__(self) -> Joint:
-        return Joint(self.law, copy(self._batch))
+        return Joint(copy(self._batch))
 
     def update(self, d: ArrayLike, tangent: bool = True) -> tuple[Array, Array | None]:
         """Advance by the increment d (dim,) in m: F (dim,) in Pa, C (dim, dim) in Pa/m.

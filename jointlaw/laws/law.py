@@ -56,7 +56,7 @@ class Law:
         `closure` does, for a law whose faces always fit, and for an unmated joint that is to be
         closed already.
         """
-        return Joint(self, self.joints(1, normal_stress=normal_stress, mated=mated))
+        return Joint(self.joints(1, normal_stress=normal_stress, mated=mated))
 
     def joints(
         self,

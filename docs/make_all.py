@@ -133,7 +133,7 @@ def main():
     keys = TIMED if sys.argv[1:] == ["timed"] else sys.argv[1:] or TASKS
     if unknown := set(keys).difference(TASKS):
         sys.exit(f"no task {', '.join(sorted(unknown))}; --list prints all")
-    last = [key for key in keys if key == "ingredients" or key in TIMED]  # of the scenes' files
+    last = [key for key in keys if key in TIMED]
     with ThreadPoolExecutor(2) as pool:  # each waits for a process of its own
         done = list(pool.map(task, [key for key in keys if key not in last]))
     done += [task(key) for key in last]

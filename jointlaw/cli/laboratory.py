@@ -76,7 +76,7 @@ def _run(
 
 
 def _write(record: Record, law: JointLaw, options: argparse.Namespace) -> None:
-    """Curve (CSV, NPZ), picture, law and summary of a test."""
+    """Curve (CSV), picture, law and summary of a test."""
     name, (length, stress) = options.command, options.units.split(",")
     files: Written = {
         f"{name}.csv": partial(record.to_csv, length=length, stress=stress),

@@ -1,9 +1,9 @@
 """Where the law puts its nodes: inclinations against the density, touch depths against the curve.
 
-Both rules only choose places. What the law keeps exact (docs/validation.md) holds at any number of
-nodes. On the presets and random laws these rules had the smallest errors of the worst laws at few
-nodes; Gauss-Legendre inclinations with cells from (i/n)^1.5 are as good up to 48 sliders in a
-plane, and better beyond (at 576 a median error of 0.32 % instead of 0.74 %).
+Both rules only choose places. What the law keeps exact (docs/theory-incremental.md) holds at any
+number of nodes. On the presets and random laws these rules had the smallest errors of the worst
+laws at few nodes; Gauss-Legendre inclinations with cells from (i/n)^1.5 are as good up to 48
+sliders in a plane, and better beyond (at 576 a median error of 0.32 % instead of 0.74 %).
 """
 
 from functools import lru_cache

@@ -148,7 +148,7 @@ BAD = {
     ),
     "cut": (lambda text: text[: len(text) // 2], "it ends too early: copy it again, whole"),
     "one digit": (
-        lambda text: text.replace("0x1.8", "0x1.9", 1),
+        lambda text: text.replace("0x1", "0x2", 1),
         "it is damaged: its sum is wrong",
     ),
     "unknown keyword": (

@@ -94,7 +94,7 @@ class Equilibrium:
         least = np.where((loose & stay)[self.block], HELD, drag) * loose[self.block]
         y = np.where(loose[self.block], 0.0, guess)
         before = np.inf
-        for _ in range(LET_GO if (loose & ~stay).any() else 1):
+        for _ in range(LET_GO if (loose & np.logical_not(stay)).any() else 1):
             moved, r, found = self._step(y, least)
             y = np.where(found, moved, y)
             if not found.all() or np.linalg.norm(r) > FALLS * before:

@@ -17,7 +17,7 @@ from .estimates import Estimates
 from .forward import log_stress
 from .measured import ClosureCurve, ShearCurve
 from .priors import TRANSFORMS, Ranges, Values
-from .problem import NO_BAR, pose, solve, staged, starting_points
+from .problem import pose, solve, staged, starting_points
 
 HALVED = 0.005  # of the largest stress or opening: what finer steps and cells of shear may change
 HALVINGS = 8  # of the steps, at most
@@ -222,4 +222,4 @@ def fit_curves(
             break
         problem, starts = finer, [solution.x]
     # what is left of an error that falls with the steps is up to twice the change by half of them
-    return Fit(replace(problem, bar=NO_BAR), solution, halved, 2 * solution.gain @ change)
+    return Fit(replace(problem, bar=None), solution, halved, 2 * solution.gain @ change)

@@ -9,7 +9,6 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import repeat
 from typing import NamedTuple
 
 import numpy as np
@@ -34,7 +33,6 @@ OF_CLOSURE = ("alpha", "beta", "overlap", "asperity_density", "K", "yield_interf
 # is flat, and no descent comes back
 LENGTHS = (0.5, 0.15, 0.05, 0.015)
 EXACT, NEAR = 1e-8, 1e-3  # change of a parameter and of the misfit at which a search ends
-NO_BAR = repeat(None)  # where no one looks on
 Function = Callable[[Array], Array]
 
 
@@ -51,7 +49,7 @@ class Problem:
     values: Values
     priors: Mapping[str, tuple[float, float]]
     settings: Settings
-    bar: Iterator[object] = NO_BAR  # of progress: a step for each law that is tried
+    bar: Iterator[object] | None = None  # of progress: a step for each law that is tried
 
     @property
     def curves(self) -> Curves:
@@ -102,7 +100,8 @@ class Problem:
 
     def data(self, x: Array) -> Array:
         """Residuals of all series, one after the other."""
-        next(self.bar)
+        if self.bar is not None:
+            next(self.bar)
         values, found = self.unpack(x), list[Array]()
         if self.closure is not None:
             found.append(self.closure.residuals(values, self.settings))

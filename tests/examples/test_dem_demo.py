@@ -62,8 +62,10 @@ def test_run_writes_everything(done):
     assert summary["time_step_margin"] > 2
     assert summary["steps"] * summary["time_step_s"] == pytest.approx(0.12, rel=0.01)
     assert summary["scene"] == "A block on a slope"
-    assert summary["slip"][0]["slip_angle"] is None
-    assert 35 < summary["slip"][0]["predicted_angle"] < 50
+    slip = summary["slip"][0]
+    assert (slip["block"], slip["base"], slip["law"]) == ("one", "base", "rock")
+    assert slip["slip_angle"] is None
+    assert 35 < slip["predicted_angle"] < 50
     assert abs(summary["energy_error"]) < 5e-3
     header, first, *_ = (done / "history.csv").read_text().splitlines()
     assert header.startswith("time_s,kinetic_J,potential_J")
@@ -84,6 +86,9 @@ def test_vtk_files_hold_what_the_record_holds(tmp_path):
     for name in ("closure_m", "shear_m", "normal_stress_Pa", "shear_stress_Pa", "sliding"):
         np.testing.assert_array_equal(joints.cell_data[name][0], record.joints[-1][name])
     assert set(joints.cell_data["state"][0]) <= {0, 1, 2, 3}
+    mine = (np.sort(record.joints[-1]["who"]) == [0, 1]).all(axis=1)
+    x = record.joints[-1]["ends"][mine][:, :, 0]  # of the joint below a block of 1 m
+    assert [x.min(), x.max(), np.ptp(x, axis=1).sum()] == pytest.approx([-0.5, 0.5, 1.0], abs=1e-3)
     number = np.concatenate(blocks.cell_data["block"]).astype(int)
     largest, vector = (
         np.concatenate(blocks.cell_data[name]) for name in ("stress_1_Pa", "along_stress_1_Pa")

@@ -49,6 +49,7 @@ def test_shear_example_runs(tmp_path, capsys):
     summary = json.loads((out / "summary.json").read_text(), parse_constant=pytest.fail)
     assert len(table) == summary["result"]["rows"] == 401
     assert table["shear_2_m"][[200, 400]] == pytest.approx([2e-6, -2e-6])
+    assert summary["units"]["F1"] == "Pa"
     assert summary["settings_SI"]["reverse"] == pytest.approx([-2e-6])
     assert jl.JointLaw.from_toml(out / "law.toml") == jl.presets.load("biegel-rough")
 
@@ -105,8 +106,10 @@ def test_every_host_gets_its_files_and_is_told_what_to_type(host, tmp_path, caps
     assert {word for word in typed if word in kept} <= written
     assert written & kept
     assert any("linear_a3" in name for name in written) or "law.toml" in written
-    texts = (path.read_bytes() for path in (tmp_path / "o").iterdir())
-    assert not any(re.search(rb"@\w+@", text) for text in texts)
+    for path in (tmp_path / "o").iterdir():
+        text = path.read_bytes().decode(errors="ignore")
+        assert not re.search(r"@\w+@", text)
+        assert set(re.findall(r'^#include "(jointlaw.*)"', text, re.MULTILINE)) <= written
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
+from jointlaw.accuracy.suite import standard_suite
 from jointlaw.accuracy.tradeoff import _time
 
 CHOSEN = ["fast", "balanced", jl.Resolution(1, 3, 1), "fast"]
@@ -51,6 +52,12 @@ def test_the_frontier_falls(found):
     same = replace(frontier[0], sliders=5, error=(1 - 1e-9) * frontier[0].error)
     assert replace(found, rows=(*found.rows, same)).frontier() == frontier
     assert any(line.endswith(" fast") for line in str(found).splitlines())
+
+
+def test_a_joint_that_only_closes_has_the_paths_that_do_not_shear(make_law):
+    suite = standard_suite(make_law(closure_only=True), jl.Resolution(4, 4, 8))
+    assert suite.names == ("closure", "re-contact", "walk", "weave")
+    assert suite.d.shape[1:] == (4, 1)
 
 
 @pytest.mark.parametrize("tangent", [False, True])

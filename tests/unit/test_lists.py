@@ -10,6 +10,7 @@ import pytest
 import jointlaw as jl
 from dem_demo.scene import Run
 from jointlaw.calibration.priors import PRIORS, TRANSFORMS
+from jointlaw.laboratory.record import UNITS
 from jointlaw.parameters.resolution import NAMED, NAMED_FLAT, NAMED_LATE, NAMED_SHORT
 
 KEYS = (Path(__file__).parents[2] / "docs/blocks.md").read_text().partition("## The keys of")[2]
@@ -24,6 +25,10 @@ def test_what_replaces_a_resolution_has_its_name(group):
 
 def test_priors_are_of_what_a_fit_can_find():
     assert set(PRIORS) <= set(TRANSFORMS)
+
+
+def test_columns_of_a_record_have_si_units():
+    assert set(UNITS.values()) == {"m", "Pa", "J/m2", "1"}
 
 
 @pytest.mark.parametrize("name", FIELD)

@@ -15,6 +15,8 @@ from .laws import Files
 from .records import read_record
 
 SAMPLES = 40  # of a sine, per cycle
+# Keys that go together, of the three ways to say a motion
+WAYS = {"times", "values", "ease", "back"}, {"sine"}, {"file", "scale", "baseline"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +121,13 @@ def read_drives(
         elif motion == "turn" or "back" in table or not rock:
             raise ValueError(f"{name}.block: name one; without it all fixed rock moves, along x or "
                              "y and not back")  # fmt: skip
-        if motion == "turn" and {"file", "sine"} & set(table):
+        given = set(table) - {"block", "motion"}
+        if not any(given <= way for way in WAYS):
+            raise ValueError(
+                f"{name}: {', '.join(sorted(given))} do not go together: give times and values (ease, "
+                "back), or sine, or file (scale, baseline)"
+            )
+        if motion == "turn" and {"file", "sine"} & given:
             raise ValueError(f"{name}: file and sine shake along x or y; for a turn give times")
         if "file" in table:
             line = read_record(files, f"{name}.file", table)

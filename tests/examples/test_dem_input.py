@@ -111,6 +111,7 @@ TWICE = '[[joint]]\nbetween = ["base", "top"]\nlaw = "plain"\n[watch]'
             'motion = "turn"',
             "drive.0..block: name one; without it all",
         ),
+        ("times = [0.0, 0.1]", "scale = 2.0\ntimes = [0.0, 0.1]", "scale, times, values do not go"),
         ("times = [0.0, 0.1]", "times = [0.1, 0.1]", "times: must increase, one for each"),
         ("values = [0.0, 1e-3]", "values = [0.0, nan]", "values = .* is not finite"),
         (LINES, "sine = { acceleration = 1.0, frequency = 5.0, cycles = 0 }", "cycles = 0 .* >= 1"),

@@ -124,8 +124,8 @@ def read_drives(
         given = set(table) - {"block", "motion"}
         if not any(given <= way for way in WAYS):
             raise ValueError(
-                f"{name}: {', '.join(sorted(given))} do not go together: give times and values (ease, "
-                "back), or sine, or file (scale, baseline)"
+                f"{name}: {', '.join(sorted(given))} do not go together: give times and values "
+                "(ease, back), or sine, or file (scale, baseline)"
             )
         if motion == "turn" and {"file", "sine"} & given:
             raise ValueError(f"{name}: file and sine shake along x or y; for a turn give times")

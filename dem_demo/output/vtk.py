@@ -2,6 +2,7 @@
 
 from itertools import pairwise
 from pathlib import Path
+from xml.etree.ElementTree import Element, ElementTree, SubElement
 
 import meshio
 import numpy as np
@@ -28,15 +29,16 @@ def write(record: Record, folder: Path) -> None:
         state = np.array([names.index(name) for name in pictures.states(i)], float)
         _joints(record.joints[i], state).write(folder / f"joints_{i:04d}.vtu")
     for kind in ("blocks", "joints"):
-        (folder / f"{kind}.pvd").write_text(_list(record.times, kind))
+        _list(record.times, kind).write(folder / f"{kind}.pvd")
 
 
-def _list(times: list[float], kind: str) -> str:
+def _list(times: list[float], kind: str) -> ElementTree:
     """ParaView's list of the files of all frames."""
-    files = (f'<DataSet timestep="{time!r}" part="0" file="{kind}_{i:04d}.vtu" />'
-             for i, time in enumerate(times))  # fmt: skip
-    return (f'<VTKFile type="Collection" version="0.1"><Collection>{"".join(files)}'
-            "</Collection></VTKFile>")  # fmt: skip
+    root = Element("VTKFile", type="Collection", version="0.1")
+    files = SubElement(root, "Collection")
+    for i, time in enumerate(times):
+        SubElement(files, "DataSet", timestep=repr(time), part="0", file=f"{kind}_{i:04d}.vtu")
+    return ElementTree(root)
 
 
 def _blocks(record: Record, i: int) -> meshio.Mesh:

@@ -145,7 +145,7 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
 def _block(table: Tables, density: float, where: str) -> Block:
     name, drawn = f"{where}: block[{table['name']!r}]", {"corners", "box", "at", "angle"} & {*table}
     if drawn != {"corners"} and ("box" not in drawn or "corners" in drawn):
-        raise ValueError(f"{name}: give `corners`, or `box` and `at`, with `angle`")
+        raise ValueError(f"{name}: give `corners` alone, or `box` with `at` and `angle`")
     if "box" in table:
         at, angle = table.pop("at", (0.0, 0.0)), table.pop("angle", 0.0)
         table["corners"] = box(*table.pop("box"), at, angle)

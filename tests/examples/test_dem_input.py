@@ -88,7 +88,11 @@ TWICE = '[[joint]]\nbetween = ["base", "top"]\nlaw = "plain"\n[watch]'
         (BOX, "corners = [[0, 0], [0, 1], [1, 0]]", "counter-clockwise"),
         ("box = [1.0, 0.5]", 'corners = [["0", 0], [1, 0], [0, 1]]', "'0' is not a number"),
         ("box = [1.0, 0.5]", "spin = 1.0", "give `corners` alone, or `box` with"),
-        ("box = [1.0, 0.5]", "corners = [[0, 0], [1, 0], [0, 1]]", "give `corners` alone, or `box`"),
+        (
+            "box = [1.0, 0.5]",
+            "corners = [[0, 0], [1, 0], [0, 1]]",
+            "give `corners` alone, or `box`",
+        ),
         ('name = "top"', 'name = "base"', "two blocks have the same name"),
         ('held = ["turn"]', "fixed = true", "no block can move"),
         ('held = ["turn"]', 'held = ["x", "x"]', "held = .* some of x, y, turn, each once"),

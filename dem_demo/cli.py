@@ -22,7 +22,7 @@ from .output.monitors import friction_angle
 from .output.record import named, sentence, sentences, told
 from .output.run import run, steps_to
 from .scene import TEMPLATE, load, shipped
-from .studies import ablate, compare, strength, trials
+from .studies import ablate, compare, strength
 
 VERSION = 3  # of strength.json
 FAILING = 3.0  # s: most that a failing rock is run for
@@ -220,7 +220,7 @@ def _reduce(given: argparse.Namespace) -> None:
         print("slope_wear has no effect on these numbers: they are too high")
     given.out.mkdir(parents=True, exist_ok=True)
     if given.force:
-        (given.out / trials.FILE).unlink(missing_ok=True)
+        (given.out / strength.FILE).unlink(missing_ok=True)
     until = min(scene.run.end, FAILING) if given.until is None else given.until
     texts = {
         "factor_of_safety": "factor of safety",
@@ -239,7 +239,7 @@ def _reduce(given: argparse.Namespace) -> None:
             rows.append(row)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(
-            f"interrupted; {given.out / trials.FILE} has all finished trials: the same command "
+            f"interrupted; {given.out / strength.FILE} has all finished trials: the same command "
             "goes on"
         ) from None
     write_json(given.out / "strength.json", {"version": VERSION, "rows": rows})

@@ -1,11 +1,10 @@
 """Dynamics: blocks in motion, forces, energies, time steps.
 
-blocks         the bodies; everything that touches pymunk
-edge_loads     forces of water on the edges of blocks
+blocks         the bodies, everything that touches pymunk, and loads on their edges
 energy         the ledger of energies
 timestep       the largest stable step
 equilibrium    the equilibrium, and what it cannot hold
-seating        displacements that balance the weight
+start          joints that bear the stress of before, displacements that balance the weight
 saved_states   states in memory and in files
 simulation     all of it, for a user
 """

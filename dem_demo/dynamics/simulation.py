@@ -10,13 +10,11 @@ from ..contact import STALE, Contacts, Joints, Tracker
 from ..errors import Refused
 from ..scene import Scene
 from . import saved_states
-from .blocks import MOVED, Blocks
-from .edge_loads import press
+from .blocks import MOVED, Blocks, press
 from .energy import DROPPED, Ledger
 from .equilibrium import out_of_balance
-from .in_situ import begin
 from .saved_states import KEPT, PLACES, STATE, Saved
-from .seating import seat
+from .start import begin, seat
 from .timestep import SAFE, StepLimit, impact_limit
 
 NEAR = 0.4  # share of the limit below which no lever arm matters; to which a step is halved

@@ -2,6 +2,5 @@
 
 compare    every rock alone, for several seeds, with plain Coulomb as well
 strength   the factor of safety, the critical tilt, and how a scene fails
-trials     what such a search has found, kept in a file
 ablate     a scene without each of its ingredients: what that changes
 """

@@ -5,30 +5,62 @@ displacements are found with which the joints carry the loads. A search starts w
 holds, and looks for every equilibrium from the one before, with shorter steps where none is found.
 """
 
+import json
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from tqdm import tqdm
 
 import jointlaw as jl
+from jointlaw.support.files import write_json
 from jointlaw.support.pyplot import FORMATS
 
-from ..dynamics.seating import displacements
 from ..dynamics.simulation import Simulation
+from ..dynamics.start import displacements
 from ..output.pictures import Pictures
 from ..output.record import Record, named, told
 from ..output.run import to_failure
 from ..scene import Scene, Tables, build, read_tables, turn, usual_size
-from .trials import Trials
 
+FILE = "trials.json"
+VERSION = 2  # of trials.json
 TILT = 8.0, 60.0, 0.05  # degrees: first step, largest, to which it is found
 FACTOR = np.log(2.0), np.log(64.0), 0.006  # logarithms: the same of a factor
 TWICE = 2.0  # where all blocks are loose: times the strength, with which fewer are
 FIRST = 0.01  # of the usual size of a block: who has moved by half of the most then moves first
 SHOWN = 1.02  # times the factor: what the strength of the failing run is divided by
+
+
+class Trials:
+    """What has been found about a scene, by name; with a `folder` also in its trials.json.
+
+    Raises ValueError for a folder with trials of another scene.
+    """
+
+    def __init__(self, scene: Scene, folder: Path | None = None) -> None:
+        self.path = folder and folder / FILE
+        self.of = {"version": VERSION, "scene": scene.text, "files": dict(scene.files)}
+        self.known: dict[str, Any] = {}
+        if self.path and self.path.exists():
+            kept = json.loads(self.path.read_text(encoding="utf-8"))
+            self.known = kept.pop("trials")
+            if kept != self.of:
+                raise ValueError(
+                    f"{self.path} holds trials of another scene: give another --out, or --force to "
+                    "replace them"
+                )
+
+    def ask(self, name: str, find: Callable[[], Any]) -> Any:
+        """What `find` says, as JSON keeps it; known from before, it is not asked again."""
+        if name not in self.known:
+            self.known[name] = find()
+            if self.path:
+                write_json(self.path, {**self.of, "trials": self.known})
+        return self.known[name]
 
 
 def strength_reduction(

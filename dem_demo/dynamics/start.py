@@ -1,16 +1,72 @@
-"""The initial equilibrium: displacements with which the joints carry gravity and loads."""
+"""The start of a scene: contacts and loads as drawn, joints that bear the stress of before, and
+displacements with which the joints carry gravity and loads."""
 
 import numpy as np
 
 from ..contact import Joints, Tracker
 from ..scene import Scene
-from .blocks import Blocks
-from .edge_loads import press
+from .blocks import Blocks, press
 from .equilibrium import Equilibrium
-from .in_situ import begin
 
 ROUNDS = 40  # most rounds of the initial equilibrium
 SETTLED = 1e-10  # movement of a round, as a share of the first, that ends them
+TOUCHES = 0.01  # of the least skin: joints drawn farther open bear nothing
+SHORT = 1e-6  # m: joints that are drawn shorter bear nothing either
+TRIALS = 50  # most steps to closure and sliding for a stress
+BALANCED = 1e-12  # what a joint may lack, as a share of its normal stress
+FLAT = 0.05  # least slope of the shear stress, as a share of that of the unsheared joint
+
+
+def begin(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> np.ndarray:
+    """Find the contacts of blocks as drawn; their joints are virgin. Returns the sliding (k,) in m
+    with which they start, and keeps as the tracker's offset the closure: both are those of the
+    in-situ stress, zero without one."""
+    before = tracker.renew(blocks.motion, blocks.near())
+    if before is not None:
+        joints.rearrange(before, tracker.law, tracker.keys)
+    press(scene, blocks, tracker)
+    stress, c, skin = scene.in_situ, tracker.contacts, scene.skins.min()
+    if stress is None or not joints.n:
+        return np.zeros(joints.n)
+    # The end p of an overlap bears (2 S(p) + S(q))/3, q the other end: together they have force and
+    # moment of a stress that goes straight from p to q. It is that at (2 p + q)/3.
+    way = np.where(c.outlines.block[c.edge] == c.a, 1j, -1j) * c.normal
+    ahead, behind = c.carried
+    at = c.at + 2 / 3 * (ahead**2 - behind**2) / np.maximum(c.length, 1e-300) * way
+    on = np.maximum(stress.signed(at), 0.0) * stress.on(c.normal) * c.normal.conj()
+    if scene.water:
+        on -= np.maximum(scene.water.signed(at), 0.0)
+    on[(c.closure < -TOUCHES * skin) | (c.length < SHORT) | (on.real <= 0)] = 0.0
+    closure, slid = _displaced(joints, np.stack([on.real, on.imag], axis=1)).T
+    if closure.max() > skin:
+        raise ValueError(
+            f"in_situ closes joints by up to {closure.max():.3g} m, but contacts are followed to "
+            f"{skin:.3g} m: set a larger run.skin, or stiffer laws"
+        )
+    tracker.offset = np.where(closure > 0, c.closure - closure, 0.0)
+    return slid
+
+
+def _displaced(joints: Joints, bears: np.ndarray) -> np.ndarray:
+    """Closure and sliding (k, 2) in m at which virgin joints bear normal and shear stress (k, 2).
+
+    Newton's steps. A joint that cannot bear so much shear stress keeps the first of them, with
+    which it bears what it can.
+    """
+    closure = joints.virgin("closure", "stress", bears[:, 0])
+    tried, least = [np.stack([closure, np.zeros(joints.n)], axis=1)], np.full(joints.n, 1e-300)
+    while True:
+        F, C, _ = joints.trial(d := tried[-1])
+        lacks, stiff = bears - F, np.maximum(C[:, 0, 0], 1e-300)
+        done = (np.abs(lacks) <= BALANCED * bears[:, :1]).all(axis=1)
+        if done.all() or len(tried) == TRIALS:
+            return np.where(done[:, None], d, tried[:2][-1])
+        slope = C[:, 1, 1] - C[:, 1, 0] * C[:, 0, 1] / stiff  # at constant normal stress
+        least = np.maximum(least, FLAT * slope)
+        shear = (lacks[:, 1] - C[:, 1, 0] / stiff * lacks[:, 0]) / np.maximum(slope, least)
+        shear[done] = 0.0
+        press = (lacks[:, 0] - C[:, 0, 1] * shear) / stiff
+        tried.append(np.stack([np.maximum(d[:, 0] + press, 0.1 * d[:, 0]), d[:, 1] + shear], 1))
 
 
 def seat(

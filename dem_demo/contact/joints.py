@@ -163,10 +163,9 @@ class Joints:
         started. Then new ones have no bond, and are mated only where their two faces still touch in
         a mated joint, which they then continue.
         """
-        old, new = before >= 0, np.flatnonzero(before < 0)
-        gone = ~np.isin(np.arange(self.n), before)
-        place, touch = np.full(len(before), -1), np.zeros((len(before), 2))
-        place[old], touch[old] = self.place[before[old]], self.touch[before[old]]
+        new, gone = np.flatnonzero(before < 0), ~np.isin(np.arange(self.n), before)
+        place = np.append(self.place, -1)[before]  # -1, the last one, is that of what is new
+        touch = np.vstack([self.touch, [0.0, 0.0]])[before]
         fit = {*map(tuple, self.keys[~self.touch.any(axis=1)].tolist())} if started else set()
         fits = np.array([not started or key in fit for key in map(tuple, keys[new].tolist())], bool)
         for i, held in enumerate(self.held):
@@ -278,8 +277,6 @@ class Joints:
             held.grow(len(rows))
             held.batch.restore(JointState(str(fingerprint), values.T))
             held.free, place[rows] = [], np.arange(len(rows))
-            held.step.F[:] = held.batch.F
-            shares = *held.batch.measures()[:4], held.batch.dissipated_energy, held.batch.damage
-            held.step.shown[:] = np.column_stack([*shares, held.batch.delta])
+            held.batch.take(held.step)  # by nothing: it shows what they are
         self.touch, self.keys = touch.copy(), keys
         self._arrange(law, place)

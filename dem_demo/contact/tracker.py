@@ -62,7 +62,18 @@ class Tracker:
         self.deepest = scene.run.max_overlap * np.array([block.width for block in blocks])
         self.reach = np.array([block.reach for block in blocks])
         self.fixed = np.array([block.fixed for block in blocks])
-        self._read_laws(scene)
+        number = {name: i for i, name in enumerate(scene.laws)}
+        self._default, start = number[scene.default_law], self.outlines.start
+        self._of_edge = np.full(start[-1], -1)
+        for (block, edge), law in scene.edge_laws.items():
+            self._of_edge[start[block] + edge] = number[law]
+        # for the second block of a contact, for its first, and for both: later ones overrule
+        self._of_blocks = [
+            (sides, sorted(meant), number[law])
+            for sides in ([1], [0], [0, 1])
+            for meant, law in scene.pairs.items()
+            if len(meant) == len(sides)
+        ]
         none = np.zeros(0, int)
         self.law, self.keys, self.offset = none, none.reshape(0, 2), np.zeros(0)
         self.urgent = np.zeros(len(blocks), bool)
@@ -84,14 +95,12 @@ class Tracker:
         world.bind(motion=motion, urgent=self.urgent)
         world.call("follow")
 
-    def renew(
-        self, motion: np.ndarray, near: np.ndarray, pressed: bool = True
-    ) -> np.ndarray | None:
+    def renew(self, motion: np.ndarray, near: np.ndarray, pressed: bool = True) -> np.ndarray:
         """Look again at the pairs (p, 2) of near blocks of which one has moved.
 
         Of new contacts that are pressed already, the closure counts (`pressed`, at the start of a
         run) or becomes their closure offset, so that they make no energy. Returns for each contact
-        its place (k,) in the list before, -1 for a new one; None if the list is the same.
+        its place (k,) in the list before, -1 for a new one.
         """
         x, y, turned = motion[:3] - self.renewed_at
         moved = np.hypot(x, y) + np.abs(turned) * self.reach
@@ -110,9 +119,9 @@ class Tracker:
         kept = np.ones(k, bool)
         kept[asked] = False
         kept[old[stays]] = True
-        if kept.all() and not fresh.any():
-            return None
         rows = np.flatnonzero(kept)
+        if len(rows) == k and not fresh.any():
+            return rows
         lost = np.maximum(found.closure[fresh], 0.0) * (not pressed)
         self.keys = np.concatenate([self.keys[rows], keys[fresh]])
         self.law = np.concatenate([self.law[rows], law[fresh]])
@@ -128,21 +137,6 @@ class Tracker:
 
     def _skin(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return 0.5 * (self.skins[a] + self.skins[b])
-
-    def _read_laws(self, scene: Scene) -> None:
-        """Laws by number: of the scene's default, of edges, and of blocks: for the second block of
-        a contact, for its first, and for both; a later one overrules those before."""
-        number = {name: i for i, name in enumerate(scene.laws)}
-        self._default, o = number[scene.default_law], self.outlines
-        self._of_edge = np.full(len(o.block), -1)
-        for (block, edge), law in scene.edge_laws.items():
-            self._of_edge[o.start[block] + edge] = number[law]
-        self._of_blocks = [
-            (sides, sorted(meant), number[law])
-            for sides in ([1], [0], [0, 1])
-            for meant, law in scene.pairs.items()
-            if len(meant) == len(sides)
-        ]
 
     def laws_of(self, edges: np.ndarray) -> np.ndarray:
         """Number (k,) of the law of edges (k, 2) that meet, in the order of their blocks.

@@ -74,16 +74,13 @@ class Blocks:
             1, 1, begin=lambda arbiter, *_: self._near.add(code(arbiter)),
             separate=lambda arbiter, *_: self._near.discard(code(arbiter)),
         )  # fmt: skip
-        self._held = self.motion[:3].copy()  # where pymunk holds the bodies
         self._space.step(1e-9)
 
     def near(self) -> np.ndarray:
         """Pairs (p, 2) of blocks whose gap is below the sum of their skins, or almost."""
-        moved = np.abs(self.motion[:3] - self._held) > 0.0
-        for i in np.flatnonzero(moved.any(axis=0) & self.moves).tolist():
+        for i in np.flatnonzero(self.moves).tolist():
             x, y, angle = self.motion[:3, i].tolist()
             self._bodies[i].position, self._bodies[i].angle = (x, y), angle
-        self._held[:] = self.motion[:3]
         self._space.step(1e-9)  # pymunk looks for pairs in a step, in which nothing moves
         codes = np.sort(np.fromiter(self._near, np.int64, len(self._near)))
         pairs = np.stack(np.divmod(codes, len(self._bodies)), axis=1)

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..compiled import World
 from ..contact import STALE, Contacts, Joints, Tracker
 from ..errors import Refused
 from ..scene import Scene
@@ -89,7 +88,8 @@ class Simulation:
         if self.scene.stages:
             self._dig()
         if world.moved or world.stale:
-            world = self._renew()
+            self._renew()
+            world = self.world
         if world.deep >= 0:
             pair = self.contacts.a[world.deep], self.contacts.b[world.deep]
             self.tracker.refuse(pair, self.contacts.closure[world.deep])
@@ -203,23 +203,17 @@ class Simulation:
         self.why = [*FRACTIONS][0 if falls else 1 if driven else 2]
         return FRACTIONS[self.why] * limit
 
-    def _renew(self) -> World:
-        """Joints, ledger and limit where contacts went on, and where new ones are looked for.
-
-        Returns the `World` of the contacts of now, ready for the law.
-        """
+    def _renew(self) -> None:
+        """Joints, ledger and limit where contacts went on, and where new ones are looked for."""
         blocks, tracker, world = self.blocks, self.tracker, self.world
         if world.moved:
             self._transfer()
         if world.stale:
             if self.dt > NEAR * self.limit.now:  # lever arms have changed
                 self.limit.checked[:] = 0.0
-            before = tracker.renew(blocks.motion, blocks.near(), pressed=False)
-            if before is not None:
-                self._rearrange(before)
+            self._rearrange(tracker.renew(blocks.motion, blocks.near(), pressed=False))
             self.ledger.load(blocks, press(self.scene, blocks, tracker), self.dt)
         self.world.call("press", self.dt)
-        return self.world
 
     def _transfer(self) -> None:
         """Joints and ledger for contacts whose corners went on to other edges.
@@ -246,12 +240,12 @@ class Simulation:
     def _rearrange(self, before: np.ndarray) -> None:
         """Joints, ledger and limit for a new list of contacts, which were at the rows `before`."""
         ledger, joints, limit = self.ledger, self.joints, self.limit
-        stored, old = ledger.area * joints.stored, before >= 0
-        stored[before[old]] = 0.0
+        stored = ledger.area * joints.stored
+        stored[before[before >= 0]] = 0.0
         ledger.energy[DROPPED] += stored.sum()
-        area, checked = np.zeros((2, len(before)))
-        area[old], checked[old] = ledger.area[before[old]], limit.checked[before[old]]
-        ledger.area, limit.checked = area, checked
+        ledger.area, limit.checked = (
+            np.append(old, 0.0)[before] for old in (ledger.area, limit.checked)
+        )
         joints.rearrange(before, self.tracker.law, self.tracker.keys, started=True)
         ledger.lost = joints.lost.copy()
         self.bind()

@@ -21,9 +21,7 @@ def begin(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> np.
     """Find the contacts of blocks as drawn; their joints are virgin. Returns the sliding (k,) in m
     with which they start, and keeps as the tracker's offset the closure: both are those of the
     in-situ stress, zero without one."""
-    before = tracker.renew(blocks.motion, blocks.near())
-    if before is not None:
-        joints.rearrange(before, tracker.law, tracker.keys)
+    joints.rearrange(tracker.renew(blocks.motion, blocks.near()), tracker.law, tracker.keys)
     press(scene, blocks, tracker)
     stress, c, skin = scene.in_situ, tracker.contacts, scene.skins.min()
     if stress is None or not joints.n:
@@ -83,9 +81,8 @@ def seat(
         tracker.follow(blocks.motion)
         tracker.urgent[:] = True  # it is cheap here, and nothing is missed
         before = tracker.renew(blocks.motion, pairs)
-        if before is not None:
-            joints.rearrange(before, tracker.law, tracker.keys)
-            slid = np.where(before >= 0, slid[before], 0.0)
+        joints.rearrange(before, tracker.law, tracker.keys)
+        slid = np.append(slid, 0.0)[before]
         press(scene, blocks, tracker)
         force = blocks.gravity + blocks.loads
         if again:

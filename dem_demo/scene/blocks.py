@@ -78,14 +78,9 @@ def box(width: float, height: float, at=(0.0, 0.0), angle: float = 0.0) -> np.nd
     return half @ turn(np.radians(angle)).T + np.asarray(at, float)
 
 
-def next_of(corners: np.ndarray, step: int = 1) -> np.ndarray:
-    """For each of the rows its next one around, or with step -1 the one before."""
-    return np.concatenate([corners[step:], corners[:step]])
-
-
 def smallest_width(corners: np.ndarray) -> float:
     """Smallest width (m) over the directions of the edges between corners (m, 2)."""
-    edge = next_of(corners) - corners
+    edge = np.roll(corners, -1, axis=0) - corners
     edge = edge[np.hypot(*edge.T) > 0]
     normal = np.stack([-edge[:, 1], edge[:, 0]]) / np.hypot(*edge.T)
     return float(np.ptp(corners @ normal, axis=0).min())
@@ -99,7 +94,7 @@ def turn(angle: float) -> np.ndarray:
 
 def check_convex(corners: np.ndarray) -> str | None:
     """What is wrong with corners (m, 2), three or more; None if nothing is."""
-    edge = next_of(corners) - corners
+    edge = np.roll(corners, -1, axis=0) - corners
     length = np.hypot(*edge.T)
     if length.min() < 1e-6 * length.max():
         return "has two corners (almost) at the same place"

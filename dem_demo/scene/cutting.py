@@ -9,15 +9,16 @@ set may end at those of an earlier one.
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
-from shapely import LineString, Polygon, STRtree, get_exterior_ring, get_parts
+from shapely import LineString, Polygon, STRtree, get_coordinates, get_exterior_ring, get_parts
 from shapely.ops import split, unary_union
 
 from jointlaw.support.progress import track
 
-from .blocks import EXACT, next_of, smallest_width
+from .blocks import EXACT, smallest_width
 
 Line = tuple[int, np.ndarray, float]  # a joint: number of its set, normal, distance n . x in m
 
@@ -89,14 +90,14 @@ def cut(
     parts, rims = [rock], unary_union([Polygon(region).exterior.buffer(tiny) for region in regions])
     for region in map(Polygon, regions):
         parts = [side for part in parts for side in (part - region, part & region)]
-    pieces = [(piece, _rim(piece)) for part in parts for piece in get_parts(part) if piece.area]
+    pieces = [piece for part in parts for piece in get_parts(part) if piece.area]
     for number, joints in enumerate(sets):
         rng = np.random.default_rng([seed, number])
         offsets = joints.offsets(outline, rng)
         for offset in track(offsets, f"cutting, set {number + 1}", len(offsets)):
             lines.append((number, joints.normal, offset))
             pieces = _crossed(pieces, joints.normal, offset, tiny, joints.persistence, rng)
-    pieces = [part for piece, _ in pieces for part in _convex_parts(piece, sets, lines, tiny)]
+    pieces = [part for piece in pieces for part in _convex_parts(piece, sets, lines, tiny)]
     pieces, joined, dropped = _without_slivers(pieces, sets, lines, least_width, tiny, rims)
     shapes = [_corners(piece, tiny) for piece in pieces]
     for corners in shapes:  # of coordinates such as 1e-22 GEOS says overlaps that are not there
@@ -105,28 +106,21 @@ def cut(
     return shapes, [_sets_of(c, lines, tiny) for c in shapes], joined, dropped
 
 
-def _rim(piece: Polygon) -> np.ndarray:
-    """Coordinates (m, 2) of the outer ring, the first one again at the end."""
-    return np.array(piece.exterior.coords)
-
-
+@lru_cache(maxsize=100_000)  # asked for all pieces, for each sliver
 def _width(piece: Polygon) -> float:
-    return smallest_width(_rim(piece))
+    return smallest_width(get_coordinates(piece.exterior))
 
 
-def _crossed(pieces, normal, offset, tiny, persistence, rng):
-    """Pieces with their rims: in place of each that the joint crosses its parts on both sides."""
-    away = np.concatenate([rim for _, rim in pieces]) @ normal - offset
-    ends = np.cumsum([len(rim) for _, rim in pieces])
-    first = np.concatenate([[0], ends[:-1]])
+def _crossed(pieces, normal, offset, tiny, persistence, rng) -> list[Polygon]:
+    """Pieces: in place of each that the joint crosses its parts on both sides."""
+    corners, of = get_coordinates(get_exterior_ring(pieces), return_index=True)
+    away, first = corners @ normal - offset, np.flatnonzero(np.diff(of, prepend=-1))
     met = np.maximum.reduceat(away, first) >= tiny
     met &= np.minimum.reduceat(away, first) <= -tiny
     out = []
-    for pair, meets in zip(pieces, met.tolist(), strict=True):
-        if meets and rng.random() < persistence:
-            out += [(part, _rim(part)) for part in _split(pair[0], normal, offset)]
-        else:
-            out.append(pair)
+    for piece, meets in zip(pieces, met.tolist(), strict=True):
+        cuts = meets and rng.random() < persistence
+        out += _split(piece, normal, offset) if cuts else [piece]
     return out
 
 
@@ -191,7 +185,7 @@ def _neighbours(sliver: Polygon, pieces: list[Polygon], lines, tiny, rims) -> li
     corners, found = _corners(sliver, tiny), []
     rings = get_exterior_ring(pieces)
     near = STRtree(rings)
-    sides = zip(corners, next_of(corners), _sets_of(corners, lines, tiny), strict=True)
+    sides = zip(corners, np.roll(corners, -1, axis=0), _sets_of(corners, lines, tiny), strict=True)
     for start, end, number in sides:
         side = LineString([start, end]).buffer(tiny)
         for j in near.query(side).tolist():
@@ -203,10 +197,10 @@ def _neighbours(sliver: Polygon, pieces: list[Polygon], lines, tiny, rims) -> li
 
 def _corners(piece: Polygon, tiny: float) -> np.ndarray:
     """Corners counter-clockwise, without those that bend nothing."""
-    corners = _rim(piece)[:-1]
+    corners = get_coordinates(piece.exterior)[:-1]
     if not piece.exterior.is_ccw:
         corners = corners[::-1]
-    corners = corners[np.hypot(*(corners - next_of(corners, -1)).T) > tiny]
+    corners = corners[np.hypot(*(corners - np.roll(corners, 1, axis=0)).T) > tiny]
     while (flat := np.abs(_bends(corners)) < tiny).any():
         corners = np.delete(corners, flat.argmax(), axis=0)
     return corners
@@ -214,7 +208,7 @@ def _corners(piece: Polygon, tiny: float) -> np.ndarray:
 
 def _bends(corners: np.ndarray) -> np.ndarray:
     """How far (m) each corner stands out from the line of its neighbours; negative inwards."""
-    before, after = next_of(corners, -1), next_of(corners)
+    before, after = np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0)
     chord, arm = after - before, corners - before
     return (arm[:, 1] * -chord[:, 0] + arm[:, 0] * chord[:, 1]) / np.hypot(*chord.T)
 
@@ -225,5 +219,5 @@ def _sets_of(corners: np.ndarray, lines, tiny: float) -> np.ndarray:
         return np.full(len(corners), -1)
     numbers, normals, offsets = (np.array(part) for part in zip(*lines, strict=True))
     on = np.abs(corners @ normals.T - offsets) < 10 * tiny
-    on &= next_of(on)
+    on &= np.roll(on, -1, axis=0)
     return np.where(on.any(axis=1), numbers[on.argmax(axis=1)], -1)  # the first that cut there

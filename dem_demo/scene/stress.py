@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .blocks import EXACT, Block, next_of
+from .blocks import EXACT, Block
 from .keys import Tables
 
 UNIT_WEIGHT = 9810.0  # N/m3, of water
@@ -68,7 +68,7 @@ def read_stresses(
 def _sides(given: Tables, blocks: list[Block], corners: np.ndarray) -> np.ndarray:
     """Hold the blocks on the sides of a scene as `[in_situ]` says; which edges (c,) are loaded."""
     number = np.repeat(np.arange(len(blocks)), [len(block.corners) for block in blocks])
-    ends = np.concatenate([next_of(block.corners) for block in blocks])
+    ends = np.concatenate([np.roll(block.corners, -1, axis=0) for block in blocks])
     loaded = np.zeros(len(corners), bool)
     for side, (axis, way) in SIDES.items():
         reach, kind = way * np.stack([corners, ends])[..., axis], given.get(side)

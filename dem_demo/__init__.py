@@ -4,18 +4,13 @@ The reference example of how to embed `jointlaw` in a block code; see docs/embed
 Rooms, each using only those above it: scene, contact, dynamics, output, studies; then the commands.
 """
 
-from importlib import import_module
-
 try:
-    for package in ("matplotlib", "PIL", "pymunk", "shapely", "tqdm"):
-        import_module(package)
+    from .dynamics.simulation import Simulation
+    from .errors import Refused
+    from .output.run import run
+    from .scene import Scene, load, parse
 except ImportError as error:  # `python -m` tells it in one line if it is about this package
     needs = f"the block demo lacks a package ({error}): pip install 'jointlaw[demo]'"
     raise ImportError(needs, name=__name__) from error
-
-from .dynamics.simulation import Simulation
-from .errors import Refused
-from .output.run import run
-from .scene import Scene, load, parse
 
 __all__ = ["Refused", "Scene", "Simulation", "load", "parse", "run"]

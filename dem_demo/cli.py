@@ -7,7 +7,6 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
-from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -216,7 +215,7 @@ def _compare(given: argparse.Namespace) -> None:
 
 def _reduce(given: argparse.Namespace) -> None:
     scene, rows = load(given.scene), []
-    if any(isinstance(law, JointLaw) and law.slope_wear < inf for law in scene.laws.values()):
+    if any(isinstance(law, JointLaw) and law.slope_wear < np.inf for law in scene.laws.values()):
         print("slope_wear has no effect on these numbers: they are too high")
     given.out.mkdir(parents=True, exist_ok=True)
     if given.force:

@@ -93,6 +93,11 @@ class Contacts:
         return self.corner * len(self.outlines.block) + self.edge
 
     @property
+    def way(self) -> np.ndarray:
+        """Directions (k,) of the edges."""
+        return self.outlines.turned[self.edge]
+
+    @property
     def edges(self) -> np.ndarray:
         """The edges (k, 2) that meet, in the order of their blocks: of the two at a corner the
         flatter one counts."""

@@ -23,14 +23,11 @@ NEW = (0.0, 0.0, 1.0, 0.0, 0.0)  # what a new joint shows, but for its bond and 
 
 @lru_cache(maxsize=64)
 def unmated_curve(law: Law) -> dict[str, np.ndarray]:
-    """Closure from first touch (m) and work (J/m2) of a joint whose faces have never met; and the
-    closure and sliding (2,) where it begins."""
+    """Closure from first touch (m) and work (J/m2) of a joint whose faces have never met."""
     closure = virgin_curve(law)["closure"]
-    batch = jl.JointBatch(law, len(closure))
-    batch.reset(mated=False)
-    start = batch.delta[0]
+    batch = law.joints(len(closure), mated=False)
     batch.update(np.stack([closure, 0.0 * closure], axis=1), tangent=False)
-    return {"closure": closure, "work": batch.stored_energy, "start": start}
+    return {"closure": closure, "work": batch.stored_energy}
 
 
 @lru_cache(maxsize=64)
@@ -98,7 +95,7 @@ class Held:
     def begin(self, places: np.ndarray, mated: bool, bonded: bool) -> np.ndarray:
         """Let joints start, as new; closure and sliding (2,) in m where they first touch."""
         law = self.batch.law
-        start = np.zeros(2) if mated else unmated_curve(law)["start"]
+        start = np.zeros(2) if mated else law.unmated_start
         self.batch.reset(places, mated)
         if not bonded:
             self.batch.unbond(places)

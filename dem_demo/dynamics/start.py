@@ -28,9 +28,8 @@ def begin(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> np.
         return np.zeros(joints.n)
     # The end p of an overlap bears (2 S(p) + S(q))/3, q the other end: together they have force and
     # moment of a stress that goes straight from p to q. It is that at (2 p + q)/3.
-    way = np.where(c.outlines.block[c.edge] == c.a, 1j, -1j) * c.normal
     ahead, behind = c.carried
-    at = c.at + 2 / 3 * (ahead**2 - behind**2) / np.maximum(c.length, 1e-300) * way
+    at = c.at + 2 / 3 * (ahead**2 - behind**2) / np.maximum(c.length, 1e-300) * c.way
     on = np.maximum(stress.signed(at), 0.0) * stress.on(c.normal) * c.normal.conj()
     if scene.water:
         on -= np.maximum(scene.water.signed(at), 0.0)

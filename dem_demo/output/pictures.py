@@ -60,9 +60,11 @@ class Pictures:
     ) -> None:  # fmt: skip
         self.record, self.title = record, title or record.scene.title
         self.marked, self.mark = record.loose if marked is None else marked, mark
-        blocks, shown = record.scene.blocks, [*outlines(record, 0), *outlines(record, -1)]
-        moving = zip((*blocks, *blocks), shown, strict=True)
-        corners = np.concatenate([shape for block, shape in moving if block.moves])
+        blocks = record.scene.blocks
+        corners = np.concatenate([
+            shape for i in (0, -1)
+            for block, shape in zip(blocks, outlines(record, i), strict=True) if block.moves
+        ])  # fmt: skip
         low, high = np.nanmin(corners, axis=0), np.nanmax(corners, axis=0)
         margin = 0.07 * (high - low).max()
         self.low, self.high = low - margin, high + margin

@@ -87,9 +87,8 @@ class Record:
 
 def named(scene: Scene, which: np.ndarray) -> list[dict]:
     """The blocks of a mask (n,): names and centroids as drawn (m)."""
-    some = [scene.blocks[i] for i in np.flatnonzero(which)]
     return [dict(zip(("block", "x_m", "y_m"), (block.name, *block.centroid.tolist()), strict=True))
-            for block in some]  # fmt: skip
+            for block, meant in zip(scene.blocks, which, strict=True) if meant]  # fmt: skip
 
 
 def told(blocks: list[dict]) -> str:
@@ -107,8 +106,7 @@ def _joints(sim: Simulation) -> dict[str, np.ndarray]:
     # The segment: what each side of the corner carries of it, the rest half and half.
     part = c.carried + 0.5 * (c.length - c.carried.sum(axis=0))
     ahead = part[0] / np.maximum(part.sum(axis=0), 1e-300)
-    along = np.where(c.outlines.block[c.edge] == c.a, 1j, -1j) * c.normal
-    ends = c.at + np.stack([ahead, ahead - 1], axis=0) * c.length * along
+    ends = c.at + np.stack([ahead, ahead - 1], axis=0) * c.length * c.way
     ends = np.stack([ends.real, ends.imag], axis=-1).swapaxes(0, 1)
     columns = {
         "who": np.column_stack([c.a, c.b]), "ends": ends, "law": sim.tracker.law,

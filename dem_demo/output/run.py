@@ -4,7 +4,6 @@ import sys
 import time
 from collections.abc import Callable
 from functools import partial
-from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -63,7 +62,7 @@ def run(
         "loose": named(sim.scene, record.loose),
         "law_points": sim.joints.n,
         "stresses_of_joints": "effective" if sim.scene.wet else "total",
-        "stages_begun_s": [time if time < inf else None for time in sim.begun.tolist()],
+        "stages_begun_s": [time if time < np.inf else None for time in sim.begun.tolist()],
         "energy_J": dict(zip(COLUMNS, record.energy[-1][:-1], strict=True)),
         "energy_error": record.energy[-1][-1],
         "largest_energy_error": max((abs(row[-1]) for row in record.energy[1:]), default=0.0),
@@ -94,11 +93,11 @@ def play(
     stop: Callable[[Record], bool] = lambda record: False,
 ) -> None:
     """Step to `until` (s), or to where `stop` says so, and record on the way. Raises Refused."""
-    end, left, taken, dt = _end(sim, until), steps_to(sim, until), 0, 0.0
+    left, taken, dt = steps_to(sim, until), 0, 0.0
     with tqdm(total=left, desc=sim.scene.title, disable=not sys.stderr.isatty()) as bar:
         while left:
             if sim.dt != dt:  # at the start, and where the time step was halved
-                dt, done, left = sim.dt, 0, round((end - sim.time) / sim.dt)
+                dt, done, left = sim.dt, 0, steps_to(sim, until)
                 every = max(round(min(sim.scene.run.record / dt, left + 1)), 1)
                 bar.reset(left)
             sim.step()
@@ -125,16 +124,13 @@ def to_failure(scene: Scene, until: float) -> tuple[Record, str]:
     return record, refused
 
 
-def _end(sim: Simulation, until: float | None) -> float:
-    return max(sim.scene.run.end, sim.time) if until is None else until
-
-
 def steps_to(sim: Simulation, until: float | None = None) -> int:
     """Steps from now to a model time (s), by default the scene's end: none if that is past.
 
     Raises ValueError for a time given that is past, not finite, or out of reach.
     """
-    now, dt, end = sim.time, sim.dt, _end(sim, until)
+    now, dt = sim.time, sim.dt
+    end = max(sim.scene.run.end, now) if until is None else until
     steps = (end - now) / dt
     if not -0.5 <= steps <= MOST_STEPS:
         raise ValueError(f"until = {end:g} s: {steps:.3g} steps of {dt:.3g} s from {now:.6g} s; "

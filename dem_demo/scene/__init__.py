@@ -4,7 +4,6 @@ keys       the keys of all tables, and what each may be
 blocks     convex blocks
 laws       joint laws and Coulomb's
 drives     prescribed motions
-stress     of water in the ground
 cutting    an outline cut along joint sets
 scene      a scene in memory
 read       a scene from its file
@@ -15,8 +14,7 @@ from .drives import Drives
 from .keys import Tables, overlay
 from .laws import USUAL, WHOLE, Files, Law, build_law, opens_to, springs
 from .read import TEMPLATE, build, load, parse, read_tables, shipped
-from .scene import Run, Scene
-from .stress import Stress
+from .scene import Run, Scene, Stress
 
 __all__ = [
     "TEMPLATE",

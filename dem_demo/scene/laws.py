@@ -3,14 +3,13 @@
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TypeAlias
 
 import jointlaw as jl
 from jointlaw.parameters.rock import require_rock
 
 from .keys import TABLE, Tables, overlay
 
-Law: TypeAlias = jl.JointLaw | jl.CoulombLaw
+Law = jl.JointLaw | jl.CoulombLaw
 WHOLE = "whole rock"  # name of the law of cuts that are no joints
 USUAL = 1e5  # Pa: normal stress of a joint where it is not known
 STRONG = 1e3  # cohesion of whole rock over its tension

@@ -11,16 +11,17 @@ from shapely import Point, Polygon
 from jointlaw.parameters import keys
 from jointlaw.support.checks import one_of, remedy
 
-from .blocks import Block, box, check_convex, usual_width
+from .blocks import EXACT, Block, box, check_convex, usual_width
 from .cutting import CUT, JointSet, cut
 from .drives import read_drives
 from .keys import LIST, NOT_NEGATIVE, SCENE, TABLE, Tables, overlay, some_of, vector
 from .laws import WHOLE, Files, build_law, opens_to, whole_rock
-from .scene import SKIN, Rock, Run, Scene
-from .stress import read_stresses
+from .scene import SKIN, Rock, Run, Scene, Stress
 
 SCENES = Path(__file__).parent / "scenes"
 TEMPLATE = Path(__file__).parent / "template.toml"
+UNIT_WEIGHT = 9810.0  # N/m3, of water
+SIDES = {"left": (0, -1.0), "right": (0, 1.0), "bottom": (1, -1.0), "top": (1, 1.0)}
 GRAVITY, DENSITY = (0.0, -9.81), 2600.0  # m/s2, kg/m3
 CORNER = 0.1  # of the least width of a block
 SOFT = 0.25  # of the skin, that of the narrowest block where none is given
@@ -105,7 +106,7 @@ def build(data: Tables, where: str = "scene", files: Files | None = None, text: 
     usual, digs = {"density": density, "law": default}, top.get("excavate", ())
     rocks = [_rock(table, blocks, edge_laws, usual, digs, where) for table in top.get("rock", ())]
     gravity = top.get("gravity", GRAVITY)
-    water, in_situ = read_stresses(top, blocks, density, gravity, where)
+    water, in_situ = _stresses(top, blocks, density, gravity, where)
     number = {block.name: i for i, block in enumerate(blocks)}
     if len(number) < len(blocks):
         raise ValueError(f"{where}: two blocks have the same name; names must differ")
@@ -152,6 +153,49 @@ def _block(table: Tables, density: float, where: str) -> Block:
     if trouble := check_convex(table["corners"]):
         raise ValueError(f"{name}.corners (or box) {trouble}")
     return Block(**{"density": density, **table, "held": tuple(table.get("held", ()))})
+
+
+def _stresses(
+    top: Tables, blocks: list[Block], density: float, gravity: tuple[float, float], where: str
+) -> tuple[Stress | None, Stress | None]:
+    """The stresses of the tables `[water]` and `[in_situ]` of a scene.
+
+    Blocks on its sides are fixed or held as `[in_situ]` says. On a side that the stress loads there
+    is no water, which is part of the stress. Raises ValueError.
+    """
+    water, given = top.get("water"), top.get("in_situ", {})
+    stress = np.ravel(given.get("stress", ()))
+    if "in_situ" in top and ("k0" in given, len(stress)) not in ((True, 0), (False, 3)):
+        raise ValueError(f"{where}: in_situ: give either k0 or stress = [sxx, syy, sxy]")
+    if (water or "k0" in given) and (gravity[0] or gravity[1] > 0):
+        raise ValueError(f"{where}: gravity = {list(gravity)} must point down, [0, -9.81], for a "
+                         "water table and for k0")  # fmt: skip
+    corners = np.concatenate([block.corners for block in blocks])
+    loaded = _sides(given, blocks, corners)
+    if water:
+        weight = water.get("unit_weight", UNIT_WEIGHT)
+        water = Stress(np.eye(2), water["table"], weight, 0.0, ~loaded)
+    if not given:
+        return water, None
+    uniform, line = len(stress) > 0, given.get("surface", [[0.0, corners[:, 1].max()]])
+    x, y, shear = stress if uniform else (given["k0"], 1.0, 0.0)
+    weight, tensor = -density * gravity[1] * (not uniform), np.array([[x, shear], [shear, y]])
+    return water, Stress(tensor, np.array(line), weight, float(uniform), loaded)
+
+
+def _sides(given: Tables, blocks: list[Block], corners: np.ndarray) -> np.ndarray:
+    """Hold the blocks on the sides of a scene as `[in_situ]` says; which edges (c,) are loaded."""
+    number = np.repeat(np.arange(len(blocks)), [len(block.corners) for block in blocks])
+    ends = np.concatenate([np.roll(block.corners, -1, axis=0) for block in blocks])
+    loaded = np.zeros(len(corners), bool)
+    for side, (axis, way) in SIDES.items():
+        reach, kind = way * np.stack([corners, ends])[..., axis], given.get(side)
+        on = (reach > reach.max() - EXACT * np.ptp(corners)).all(axis=0)
+        loaded |= on & (kind == "loaded")
+        for i in np.unique(number[on & (kind in ("held", "rollers"))]).tolist():
+            fixed, held = blocks[i].fixed or kind == "held", {*blocks[i].held, "xy"[axis], "turn"}
+            blocks[i] = replace(blocks[i], fixed=fixed, held=() if fixed else tuple(sorted(held)))
+    return loaded
 
 
 def _pairs(

@@ -1,4 +1,4 @@
-"""A scene in memory: blocks, laws, drives and how to run them."""
+"""A scene in memory: blocks, laws, drives, stress in the ground, and how to run them."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -9,7 +9,6 @@ from .blocks import Block, usual_width
 from .drives import Drive
 from .keys import Tables
 from .laws import Files, Law
-from .stress import Stress
 
 SKIN, THIN = 0.02, 0.1  # of the usual width of the blocks that move; at most of a block's own
 
@@ -30,6 +29,34 @@ class Run:
     dashpot_shear: float = 0.05
     law_steps: int = 1  # steps of the law per time step; 2 for impacts
     max_overlap: float = 0.1  # share of the smaller block's width
+
+
+@dataclass(frozen=True, eq=False)
+class Stress:
+    """Stress that is given in the ground: of water in joints, or of the rock before an excavation.
+
+    A tensor times a number that grows with the depth below a line, at least 0; their product is
+    in Pa.
+
+    tensor (2, 2), compression positive; line (m, 2): [x, y] (m) of the line, level beyond its ends;
+    weight: growth of the number per m of depth; top: the number on the line; edges (c,): those of
+    all blocks, one after the other, that the stress acts on from outside.
+    """
+
+    tensor: np.ndarray
+    line: np.ndarray
+    weight: float
+    top: float
+    edges: np.ndarray
+
+    def signed(self, at: np.ndarray) -> np.ndarray:
+        """The number at places x + iy (m), below zero where it counts as zero."""
+        return self.top + self.weight * (np.interp(at.real, *self.line.T) - at.imag)
+
+    def on(self, normal: np.ndarray) -> np.ndarray:
+        """The tensor times vectors x + iy."""
+        x, y = [1, 1j] @ self.tensor
+        return x * normal.real + y * normal.imag
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,6 @@ from tqdm import tqdm
 
 import jointlaw as jl
 from jointlaw.support.files import write_json
-from jointlaw.support.pyplot import FORMATS
 
 from ..dynamics.simulation import Simulation
 from ..dynamics.start import displacements
@@ -55,7 +54,8 @@ class Trials:
                 )
 
     def ask(self, name: str, find: Callable[[], Any]) -> Any:
-        """What `find` says, as JSON keeps it; known from before, it is not asked again."""
+        """What `find` says; known from before, it is not asked again. Of the file arrays are
+        lists."""
         if name not in self.known:
             self.known[name] = find()
             if self.path:
@@ -64,11 +64,7 @@ class Trials:
 
 
 def strength_reduction(
-    scene: Scene,
-    until: float,
-    folder: Path,
-    picture_format: str = FORMATS[0],
-    tell: Callable[[str], None] = lambda text: None,
+    scene: Scene, until: float, folder: Path, picture_format: str, tell: Callable[[str], None]
 ) -> Iterator[dict]:
     """Factor of safety and critical tilt of every rock alone, or of a scene without rocks.
 
@@ -198,10 +194,11 @@ def _march(
     step, most, exact = reach
     with tqdm(desc=name, unit="trial", delay=2.0, disable=None, leave=False) as bar:
 
-        def found(x: float, last: float | None, moved: list[float] | None) -> list[float] | None:
-            balance = trials.ask(f"{name} {x} from {last}", lambda: _balance(at(x), moved, loose))
+        def found(x: float, last: float | None, guess: np.ndarray | None) -> np.ndarray | None:
+            key = f"{name} {x} from {last}"
+            moved = trials.ask(key, lambda: displacements(at(x), guess, loose))
             bar.update()
-            return balance
+            return None if moved is None else np.array(moved)
 
         low, failed = 0.0, False
         while (moved := found(low, None, None)) is None:
@@ -218,11 +215,6 @@ def _march(
             else:
                 low, moved = high, further
     return low + step
-
-
-def _balance(scene: Scene, guess: list[float] | None, loose: np.ndarray | None):
-    moved = displacements(scene, None if guess is None else np.array(guess), loose)
-    return None if moved is None else moved.tolist()
 
 
 def alone(scene: Scene, name: str, seed: int | None = None) -> Scene:

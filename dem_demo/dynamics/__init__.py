@@ -5,6 +5,5 @@ energy         the ledger of energies
 timestep       the largest stable step
 equilibrium    the equilibrium, and what it cannot hold
 start          joints that bear the stress of before, displacements that balance the weight
-saved_states   states in memory and in files
-simulation     all of it, for a user
+simulation     all of it, for a user; states in memory and in files
 """

@@ -32,12 +32,11 @@ class Ledger:
         self.forces, self.last = np.zeros((3, blocks, 3)), np.zeros((2, blocks, 3))
         self.area, self.lost = np.zeros(0), np.zeros(0)
 
-    def open(self, blocks: Blocks, joints: Joints, dt: float, area: np.ndarray) -> None:
-        """Begin at time 0, when the velocities of the blocks' motion hold; area (k,) in m2."""
+    def open(self, blocks: Blocks, joints: Joints, dt: float) -> None:
+        """Begin at time 0, when the velocities of the blocks' motion hold."""
         kick, v = 0.5 * dt * self.forces[0] / blocks.inertia, blocks.motion[3:].T
-        self.area[:], self.lost[:] = area, joints.lost
         self.energy[KINETIC] = (0.5 * blocks.inertia * (v**2 - kick**2)).sum()
-        self.energy[STORED] = area @ joints.stored
+        self.energy[STORED] = self.area @ joints.stored
         self.start = float(self.energy[KINETIC] + self.energy[STORED])
         self.energy[TURNED] = self.start
 

@@ -1,18 +1,24 @@
-"""A scene in motion: blocks, contacts and joints, one step after another."""
+"""A scene in motion: blocks, contacts and joints, one step after another; and its states.
 
+`state.npz` holds its version, the text of the scene and of the files that this names, and arrays.
+"""
+
+import io
+import json
 from operator import attrgetter
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
-from ..contact import STALE, Contacts, Joints, Tracker
+from jointlaw.support.files import write_files
+
+from ..contact import PARTS, STALE, Contacts, Joints, Tracker
 from ..errors import Refused
-from ..scene import Scene
-from . import saved_states
+from ..scene import Files, Scene, parse
 from .blocks import MOVED, Blocks, press
 from .energy import DROPPED, Ledger
 from .equilibrium import out_of_balance
-from .saved_states import KEPT, PLACES, STATE, Saved
 from .start import begin, seat
 from .timestep import SAFE, StepLimit, impact_limit
 
@@ -28,6 +34,20 @@ FRACTIONS = {  # of the limit that a time step is, by what can happen
 }
 IMPACT = 1e4  # Pa: normal stress of a first impact, for a time step before anything touches
 HALVINGS = 8  # of a time step that was chosen, until a run is refused
+FILE = "state.npz"
+VERSION = 8  # of state.npz
+KEPT = (  # of what changes in a run, but for the joints: arrays that stay in their place
+    "blocks.motion", "blocks.velocity", "blocks.loads", "blocks.gone", "blocks.support", "begun",
+    "blocks.drives.reversed_at",
+    "tracker.renewed_at", "tracker.urgent", "ledger.energy", "ledger.forces",
+)  # fmt: skip
+STATE = (
+    *KEPT, "t0", "n", "dt", "halvings", "limit.now", "limit.least", "limit.bound", "limit.checked",
+    "tracker.keys", "tracker.law", "tracker.offset",
+    "ledger.start", "ledger.area", "ledger.lost", "loose",
+)  # fmt: skip
+PLACES = "contacts.corner", "contacts.edge"  # from which the contacts are made anew
+Saved = dict[str, np.ndarray]  # a copy of everything that the future depends on
 
 
 class Simulation:
@@ -179,10 +199,11 @@ class Simulation:
         blocks.motion[3:][blocks.drives.axes, blocks.drives.rows] = velocity
         blocks.drives.aim[:] = velocity
         tracker.follow(blocks.motion)
-        self.ledger.area, self.ledger.lost = np.zeros((2, joints.n))
+        self.ledger.area = self.contacts.length * scene.thickness
+        self.ledger.lost = joints.lost.copy()
         self.bind()
         self.world.call("forces", 0.5 * self.dt)
-        self.ledger.open(blocks, joints, self.dt, self.contacts.length * scene.thickness)
+        self.ledger.open(blocks, joints, self.dt)
         kick = 0.5 * self.dt * self.ledger.forces[0] / blocks.inertia * blocks.free
         blocks.motion[3:] += kick.T
         blocks.velocity[:] = blocks.motion[3:]
@@ -290,7 +311,10 @@ class Simulation:
         Raises ValueError for a scene that was changed or made in memory. A state in
         memory needs no text: `Simulation(scene, saved=sim.state())`.
         """
-        saved_states.save(self.scene, saved or self.state(), Path(folder))
+        require_text(self.scene)
+        scene, buffer, files = self.scene.text, io.BytesIO(), json.dumps(self.scene.files)
+        np.savez(buffer, version=VERSION, scene=scene, files=files, **(saved or self.state()))
+        write_files(folder, {FILE: buffer.getvalue()})
 
     @classmethod
     def load(cls, folder: Path, step: float | None = None) -> "Simulation":
@@ -298,5 +322,34 @@ class Simulation:
 
         Raises ValueError if the file is missing, damaged or of another version.
         """
-        scene, saved = saved_states.load(Path(folder))
+        places = (Path(folder) / part / FILE for part in ("", "state", "refused"))
+        file = next((place for place in places if place.is_file()), None)
+        if not file:
+            raise ValueError(f"{str(folder)!r} holds no saved state: {FILE} is missing")
+        try:
+            # a ZIP file: it checks its sums; opened here, for numpy leaves a damaged one open
+            with file.open("rb") as opened, np.load(opened, allow_pickle=False) as stored:
+                data = {name: stored[name] for name in stored.files}
+            if (version := int(data["version"])) == VERSION:
+                files = Files(known=json.loads(str(data["files"])).items())
+                scene = parse(str(data["scene"]), str(file), files)
+                joints = [f"{part}-{i}" for part in PARTS for i in range(len(scene.laws))]
+                saved = {name: data[name] for name in (*STATE, *PLACES, "touch", *joints)}
+        except (OSError, EOFError, LookupError, ValueError, AttributeError, BadZipFile) as error:
+            raise ValueError(f"{file} is damaged ({error}): run the scene again") from None
+        if version != VERSION:
+            raise ValueError(
+                f"{file} has version {version}, this demo reads {VERSION}: go on with the version "
+                "of the demo that wrote it, or run the scene again"
+            )
         return cls(scene, step, saved)
+
+
+def require_text(scene: Scene) -> None:
+    """Refuse a scene without a text. Raises ValueError."""
+    if not scene.text:
+        raise ValueError(
+            "the scene was made or changed in memory, so it has no text to go on from: write the "
+            "change into the TOML text and parse that, or go on in memory with "
+            "Simulation(scene, saved=state)"
+        )

@@ -13,8 +13,7 @@ from jointlaw.support.files import clear_run, write_json
 from jointlaw.support.pyplot import FORMATS
 
 from ..dynamics.energy import COLUMNS
-from ..dynamics.saved_states import require_text
-from ..dynamics.simulation import Simulation
+from ..dynamics.simulation import Simulation, require_text
 from ..errors import Refused
 from ..scene import Scene, usual_size
 from .monitors import look

@@ -209,8 +209,8 @@ def _compare(given: argparse.Namespace) -> None:
             peak, left = np.degrees(np.arctan([law.friction, law.residual_friction or 0.0]))
             print(f"law {name!r} as Coulomb: {peak:.1f} degrees at the peak, {left:.1f} after "
                   f"{1e3 * law.weakening:.2g} mm")  # fmt: skip
-        when = f"seed {row['seed']}, {row['law']:7s} after {row['time_s']:.3g} s"
-        print(f"{when}, {sentence(row)} {row['refused']}", flush=True)
+        print(f"seed {row['seed']}, {row['law']:7s} after {row['time_s']:.3g} s, "
+              f"{sentence(row)} {row['refused']}", flush=True)  # fmt: skip
 
 
 def _reduce(given: argparse.Namespace) -> None:

@@ -36,14 +36,15 @@ class Outlines:
         sizes = np.array([len(block.corners) for block in blocks])
         self.start = np.concatenate([[0], np.cumsum(sizes)])
         self.block = np.repeat(np.arange(len(blocks)), sizes)
-        first, size = self.start[self.block], sizes[self.block]
-        number = np.arange(len(first)) - first
-        self.after, self.before = first + (number + 1) % size, first + (number - 1) % size
+        each = np.split(np.arange(self.start[-1]), self.start[1:-1])
+        self.after, self.before = (
+            np.concatenate([np.roll(corners, by) for corners in each]) for by in (-1, 1)
+        )
         self.local = np.concatenate([block.local for block in blocks]) @ [1, 1j]
         edge = self.local[self.after] - self.local
         self.side = np.abs(edge)
         self.way = edge / self.side
-        self.placed, self.turned = np.empty((2, len(first)), complex)  # corners and ways now
+        self.placed, self.turned = np.empty((2, len(edge)), complex)  # corners and ways now
 
     def world(self) -> World:
         """What the compiled step knows of them."""

@@ -256,8 +256,8 @@ class Joints:
         arrays = {"touch": self.touch.copy()}
         for i, (held, rows) in enumerate(zip(self.held, self.rows, strict=True)):
             state = held.batch.snapshot(self.place[rows])
-            parts = state.values.T, np.array(state.fingerprint)
-            arrays |= {f"{part}-{i}": array for part, array in zip(PARTS, parts, strict=True)}
+            fingerprint = np.array(state.fingerprint)
+            arrays |= {f"states-{i}": state.values.T, f"fingerprint-{i}": fingerprint}
         return arrays
 
     def restore(self, state: dict[str, np.ndarray], law: np.ndarray, keys: np.ndarray) -> None:

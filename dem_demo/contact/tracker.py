@@ -114,12 +114,9 @@ class Tracker:
         old = np.full(len(keys), -1)
         old[again] = asked[place]
         law = self.laws_of(keys)
-        stays = (old >= 0) & ((found.closure > 0) | (self.law[old] == law if k else False))
+        stays = (old >= 0) & ((found.closure > 0) | (np.append(self.law, -1)[old] == law))
         fresh = ~stays & (found.closure > -self._skin(found.a, found.b))
-        kept = np.ones(k, bool)
-        kept[asked] = False
-        kept[old[stays]] = True
-        rows = np.flatnonzero(kept)
+        rows = np.setdiff1d(np.arange(k), np.setdiff1d(asked, old[stays]))  # that are kept
         if len(rows) == k and not fresh.any():
             return rows
         lost = np.maximum(found.closure[fresh], 0.0) * (not pressed)

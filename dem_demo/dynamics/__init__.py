@@ -3,7 +3,6 @@
 blocks         the bodies, everything that touches pymunk, and loads on their edges
 energy         the ledger of energies
 timestep       the largest stable step
-equilibrium    the equilibrium, and what it cannot hold
-start          joints that bear the stress of before, displacements that balance the weight
+equilibrium    the start: stress of before, the equilibrium, and what it cannot hold
 simulation     all of it, for a user; states in memory and in files
 """

@@ -1,4 +1,5 @@
-"""The equilibrium of blocks on their joints, and the blocks that no equilibrium holds.
+"""The start of a scene: joints that bear the stress of before, the equilibrium of blocks on their
+joints, and the blocks that no equilibrium holds.
 
 Newton's method finds the displacements at which all blocks are in balance. Where there are none the
 blocks creep through a drag: drag times movement = unbalanced force, in implicit steps, through less
@@ -16,7 +17,7 @@ from jointlaw.support.progress import track
 
 from ..contact import Contacts, Joints, Tracker
 from ..scene import Scene
-from .blocks import Blocks
+from .blocks import Blocks, press
 from .timestep import rates
 
 BALANCED = 1e-3  # most unbalanced force of a block that is held, as a share of its weight
@@ -33,6 +34,11 @@ SLOW = 0.01  # their drag, as a share of the median stiffness
 EARTH = 9.81  # m/s2
 FOLLOW = 6  # steps in which blocks that a loose one props follow it
 HELD = 1e25  # drag (1/s2) that holds a block where it is
+ROUNDS, SETTLED = 40, 1e-10  # most rounds; which ends them: movement, as a share of the first
+TOUCHES = 0.01  # of the least skin: joints drawn farther open bear nothing
+SHORT = 1e-6  # m: joints that are drawn shorter bear nothing either
+TRIALS, BORNE = 50, 1e-12  # most steps to a stress; what may lack, as a share of the normal one
+FLAT = 0.05  # least slope of the shear stress, as a share of that of the unsheared joint
 
 
 def shares(blocks: Blocks, force: np.ndarray) -> np.ndarray:
@@ -52,35 +58,39 @@ def out_of_balance(scene: Scene, blocks: Blocks, contacts: Contacts, joints: Joi
 
 
 class Equilibrium:
-    """The search for an equilibrium from where the blocks are.
+    """The search for an equilibrium from where the blocks are, with their weight and loads.
 
-    Joints are new but for their closure and what they have slid so far, (k,) in m. force (n, 3):
-    what they have to carry. Displacements y (free motions,) are in unit-mass motions.
+    Joints are new but for their closure and what they have slid so far, (k,) in m; `moved`: their
+    lengths change as well, as the blocks do since they were drawn. Displacements y (free motions,)
+    are in unit-mass motions.
     """
 
     def __init__(
         self, scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints,
-        slid: np.ndarray, force: np.ndarray,
+        slid: np.ndarray, moved: bool = False,
     ) -> None:  # fmt: skip
         self.blocks, self.joints, self.k = blocks, joints, joints.n
         signs, contacts = diags(np.repeat([-1.0, 1.0], self.k)), tracker.contacts
         self.rows: csr_array = signs @ rates(blocks, contacts)  # to closure and shear
         self.area = np.tile(contacts.length * scene.thickness, 2)
         self.start = np.concatenate([tracker.closure, slid])
-        self.free = blocks.free.ravel()
-        self.root = blocks.root.ravel()[self.free]
-        self.block = np.repeat(np.arange(len(blocks.free)), 3)[self.free]
+        self.root, self.block = blocks.root[blocks.free], np.nonzero(blocks.free)[0]
+        force = blocks.gravity + blocks.loads
+        if moved:
+            closed = np.stack([tracker.closure, slid], axis=1) - joints.delta
+            stored, none = joints.trial(closed)[2] * scene.thickness, np.zeros(self.k)
+            force = force + contacts.assemble(blocks.motion, none, none, stored) * blocks.mobile
         pull = np.hypot(*force[:, :2].T) / blocks.inertia[:, 0] / blocks.reach
         self.slow = float(np.median(pull[blocks.free.any(axis=1)]))  # drag: the reach in a step
-        self.force, self.none = force.ravel()[self.free] * self.root, np.zeros(len(self.block))
+        self.force, self.none = force[blocks.free] * self.root, np.zeros(len(self.block))
         touched = abs(self.rows[: self.k]) + abs(self.rows[self.k :])
         self.island = connected_components(touched.T @ touched, directed=False)[1]
 
     def spread(self, parts: np.ndarray) -> np.ndarray:
         """Values (n, 3) of all motions from those (free motions,) of free ones."""
-        out = np.zeros(self.free.size)
-        out[self.free] = parts
-        return out.reshape(-1, 3)
+        out = np.zeros(self.blocks.free.shape)
+        out[self.blocks.free] = parts
+        return out
 
     def attempt(self, guess: np.ndarray, loose: np.ndarray, stay: np.ndarray | bool = False):
         """Displacements at which all blocks but loose ones are in balance, and, if there are none,
@@ -207,3 +217,106 @@ class Equilibrium:
             damp = np.where(active & (damp <= least), 0.0, damp / 10)
             active = active & (size > target)
         return y, r, (size <= 1e3 * target)[island]
+
+
+def begin(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> np.ndarray:
+    """Find the contacts of blocks as drawn; their joints are virgin. Returns the sliding (k,) in m
+    with which they start, and keeps as the tracker's offset the closure: both are those of the
+    in-situ stress, zero without one."""
+    joints.rearrange(tracker.renew(blocks.motion, blocks.near()), tracker.law, tracker.keys)
+    press(scene, blocks, tracker)
+    stress, c, skin = scene.in_situ, tracker.contacts, scene.skins.min()
+    if stress is None or not joints.n:
+        return np.zeros(joints.n)
+    # The end p of an overlap bears (2 S(p) + S(q))/3, q the other end: together they have force and
+    # moment of a stress that goes straight from p to q. It is that at (2 p + q)/3.
+    ahead, behind = c.carried
+    at = c.at + 2 / 3 * (ahead**2 - behind**2) / np.maximum(c.length, 1e-300) * c.way
+    on = np.maximum(stress.signed(at), 0.0) * stress.on(c.normal) * c.normal.conj()
+    if scene.water:
+        on -= np.maximum(scene.water.signed(at), 0.0)
+    on[(c.closure < -TOUCHES * skin) | (c.length < SHORT) | (on.real <= 0)] = 0.0
+    closure, slid = _displaced(joints, np.stack([on.real, on.imag], axis=1)).T
+    if closure.max() > skin:
+        raise ValueError(
+            f"in_situ closes joints by up to {closure.max():.3g} m, but contacts are followed to "
+            f"{skin:.3g} m: set a larger run.skin, or stiffer laws"
+        )
+    tracker.offset = np.where(closure > 0, c.closure - closure, 0.0)
+    return slid
+
+
+def _displaced(joints: Joints, bears: np.ndarray) -> np.ndarray:
+    """Closure and sliding (k, 2) in m at which virgin joints bear normal and shear stress (k, 2).
+
+    Newton's steps. A joint that cannot bear so much shear stress keeps the first of them, with
+    which it bears what it can.
+    """
+    closure = joints.virgin("closure", "stress", bears[:, 0])
+    tried, least = [np.stack([closure, np.zeros(joints.n)], axis=1)], np.full(joints.n, 1e-300)
+    while True:
+        F, C, _ = joints.trial(d := tried[-1])
+        lacks, stiff = bears - F, np.maximum(C[:, 0, 0], 1e-300)
+        done = (np.abs(lacks) <= BORNE * bears[:, :1]).all(axis=1)
+        if done.all() or len(tried) == TRIALS:
+            return np.where(done[:, None], d, tried[:2][-1])
+        slope = C[:, 1, 1] - C[:, 1, 0] * C[:, 0, 1] / stiff  # at constant normal stress
+        least = np.maximum(least, FLAT * slope)
+        shear = (lacks[:, 1] - C[:, 1, 0] / stiff * lacks[:, 0]) / np.maximum(slope, least)
+        shear[done] = 0.0
+        press = (lacks[:, 0] - C[:, 0, 1] * shear) / stiff
+        tried.append(np.stack([np.maximum(d[:, 0] + press, 0.1 * d[:, 0]), d[:, 1] + shear], 1))
+
+
+def seat(
+    scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints, slid: np.ndarray
+) -> np.ndarray:
+    """Move the blocks to where their joints carry them; slid (k,) in m: sliding at first. Returns
+    the sliding with which the joints start.
+
+    Loose blocks, which cannot be held, stay almost where they are drawn; all others are in balance
+    with what the loose ones do to them there.
+    """
+    loose, first, pairs = np.zeros(len(blocks.free), bool), 0.0, blocks.near()
+    for again in range(ROUNDS):  # each at the places just found: joints turn with the blocks
+        tracker.follow(blocks.motion)
+        tracker.urgent[:] = True  # it is cheap here, and nothing is missed
+        before = tracker.renew(blocks.motion, pairs)
+        joints.rearrange(before, tracker.law, tracker.keys)
+        slid = np.append(slid, 0.0)[before]
+        press(scene, blocks, tracker)
+        search = Equilibrium(scene, blocks, tracker, joints, slid, again > 0)
+        start = search.none if again or scene.in_situ is not None else search.unslid()
+        more, known = ~loose, loose
+        while more.any():
+            moved, more = search.attempt(start, loose, known)
+            loose = loose | more
+        slid = slid + (search.rows @ moved)[len(slid) :]
+        blocks.motion[:3] += search.spread(moved * search.root).T
+        most = np.abs(moved[~loose[search.block]]).max(initial=0.0)
+        first = first or most
+        if again and most <= SETTLED * first:
+            break
+    tracker.renewed_at[:] = blocks.motion[:3]
+    return slid
+
+
+def displacements(
+    scene: Scene, guess: np.ndarray | None = None, loose: np.ndarray | None = None
+) -> np.ndarray | None:
+    """Displacements of the free motions at which virgin joints carry a scene as drawn.
+
+    All loads act at once; in unit-mass motions, None where none are found. They are looked for from
+    guess, those of a similar scene, and from those of joints that cannot slide: where bonds break
+    and joints soften, one may find what the other misses. loose (n,): blocks that need not be
+    carried.
+    """
+    blocks, joints = Blocks(scene), Joints(scene)
+    tracker = Tracker(scene, blocks.motion)
+    slid = begin(scene, blocks, tracker, joints)
+    search = Equilibrium(scene, blocks, tracker, joints, slid)
+    known = np.zeros(len(blocks.free), bool) if loose is None else loose
+    moved, more = search.attempt(search.unslid() if guess is None else guess, known)
+    if more.any() and guess is not None:
+        moved, more = search.attempt(search.unslid(), known)
+    return None if more.any() else moved

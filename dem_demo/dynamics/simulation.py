@@ -18,8 +18,7 @@ from ..errors import Refused
 from ..scene import Files, Scene, parse
 from .blocks import MOVED, Blocks, press
 from .energy import DROPPED, Ledger
-from .equilibrium import out_of_balance
-from .start import begin, seat
+from .equilibrium import begin, out_of_balance, seat
 from .timestep import SAFE, StepLimit, impact_limit
 
 NEAR = 0.4  # share of the limit below which no lever arm matters; to which a step is halved
@@ -204,8 +203,9 @@ class Simulation:
         self.bind()
         self.world.call("forces", 0.5 * self.dt)
         self.ledger.open(blocks, joints, self.dt)
-        kick = 0.5 * self.dt * self.ledger.forces[0] / blocks.inertia * blocks.free
-        blocks.motion[3:] += kick.T
+        blocks.motion[3:] += (
+            0.5 * self.dt * self.ledger.forces[0] / blocks.inertia * blocks.free
+        ).T
         blocks.velocity[:] = blocks.motion[3:]
 
     def _chosen_step(self) -> float:
@@ -255,8 +255,8 @@ class Simulation:
             anew, kept[longer] = joints.renew(fresh, held[fresh] / length[fresh], closure)
             tracker.offset[fresh] += closure - anew
             ledger.lost[fresh] = 0.0
-        lost = np.maximum(held[changed] - kept * length[changed], 0.0)
-        ledger.energy[DROPPED] += lost.sum() * thickness
+        lost = held[changed] - kept * length[changed]
+        ledger.energy[DROPPED] += np.maximum(lost, 0.0).sum() * thickness
 
     def _rearrange(self, before: np.ndarray) -> None:
         """Joints, ledger and limit for a new list of contacts, which were at the rows `before`."""

@@ -136,14 +136,12 @@ def slip_angle(scene: Scene, law_name: str, moving: int, length: float) -> dict:
     where the law says nothing: no contact, no gravity, a stress that it cannot carry, water.
     """
     weight, angle = scene.blocks[moving].section.mass * np.hypot(*scene.gravity), 35.0
-    for _ in range(ROUNDS if length > 0 and not scene.wet else 0):
-        before, stress = angle, float(weight / length * np.cos(np.radians(angle)))
-        try:
+    with suppress(ValueError, jl.PathError):
+        for _ in range(ROUNDS if length > 0 and not scene.wet else 0):
+            before, stress = angle, float(weight / length * np.cos(np.radians(angle)))
             angle = friction_angle(scene.laws[law_name], stress)
-        except (ValueError, jl.PathError):
-            break
-        if abs(angle - before) <= 5e-3:
-            return {"predicted_angle": angle, "normal_stress": stress}
+            if abs(angle - before) <= 5e-3:
+                return {"predicted_angle": angle, "normal_stress": stress}
     return {"predicted_angle": None, "normal_stress": None}
 
 

@@ -1,6 +1,7 @@
 """The history of a run, in memory and as files; and what became of each rock mass."""
 
 import csv
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -31,12 +32,8 @@ class Record:
         self.scene, self.slips, self.steps = sim.scene, watched_slips(sim), 0
         self.loose = sim.loose
         self.laws = {pair: law_between(sim, *pair) for pair in (*sim.scene.slip, *sim.scene.shear)}
-        self.times: list[float] = []
-        self.motion: list[np.ndarray] = []
-        self.energy: list[list[float]] = []
-        self.joints: list[dict[str, np.ndarray]] = []
-        self.stresses: list[np.ndarray] = []
-        self.monitored: list[dict[str, float]] = []
+        self.times, self.motion, self.energy = [], [], []
+        self.joints, self.stresses, self.monitored = [], [], []
         self.take(sim)
 
     def take(self, sim: Simulation) -> None:
@@ -176,16 +173,15 @@ def outcomes(record: Record) -> list[dict]:
     return out
 
 
-def sentences(record: Record) -> list[str]:
+def sentences(record: Record) -> Iterator[str]:
     """What a person wants to know at the end: a line for each watched slip and each rock."""
-    found = []
     for slip in record.slips.values():
         angle, alone = slip["slip_angle"], slip["predicted_angle"]
         said = f"slipped at {angle:.2f} degrees" if angle is not None else "no slip"
         said = "had slipped before this run" if slip["slipped_before"] else said
         law = "nothing" if alone is None else f"{alone:.2f} degrees"
-        found.append(f"{slip['block']}: {said}, the law alone says {law}")
-    return [*found, *map(sentence, outcomes(record))]
+        yield f"{slip['block']}: {said}, the law alone says {law}"
+    yield from map(sentence, outcomes(record))
 
 
 def sentence(entry: dict) -> str:

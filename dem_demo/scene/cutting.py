@@ -86,7 +86,7 @@ def cut(
         before, rock = rock.area, rock.difference(Polygon(hole))
         if rock.is_empty or not rock.area < before:
             raise ValueError(f"hole[{i}] must take a part of the rock away and leave another")
-    lines: list[Line] = []
+    lines: list[Line] = [(-1, np.zeros(2), np.inf)]  # on the first one no edge lies
     parts, rims = [rock], unary_union([Polygon(region).exterior.buffer(tiny) for region in regions])
     for region in map(Polygon, regions):
         parts = [side for part in parts for side in (part - region, part & region)]
@@ -215,8 +215,6 @@ def _bends(corners: np.ndarray) -> np.ndarray:
 
 def _sets_of(corners: np.ndarray, lines, tiny: float) -> np.ndarray:
     """Number of the set on whose joint each edge (corner, next corner) lies, or -1."""
-    if not lines:
-        return np.full(len(corners), -1)
     numbers, normals, offsets = (np.array(part) for part in zip(*lines, strict=True))
     on = np.abs(corners @ normals.T - offsets) < 10 * tiny
     on &= np.roll(on, -1, axis=0)

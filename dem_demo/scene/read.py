@@ -73,12 +73,12 @@ def read_tables(text: str, where: str = "scene") -> Tables:
     variants, chosen = data.pop("variants", {}), data.pop("variant", None)
     if chosen is not None:
         data = overlay(data, variants[one_of(f"{where}: variant", chosen, tuple(variants))])
-    return {**data, "rock": _copied(data.get("rock", []), where)}
+    return {**data, "rock": [*_copied(data.get("rock", []), where)]}
 
 
-def _copied(rocks: Any, where: str) -> list[Tables]:
+def _copied(rocks: Any, where: str) -> Iterator[Tables]:
     """Tables of rocks, each with the keys of the rock that it is `like`."""
-    known, whole = {}, []
+    known: dict[str, Tables] = {}
     for i, table in enumerate(LIST(f"{where}: rock", rocks)):
         place = f"{where}: rock[{i}]"
         own, name = {**TABLE(place, table)}, str(table.get("name"))
@@ -88,8 +88,7 @@ def _copied(rocks: Any, where: str) -> list[Tables]:
                                  f"{remedy(like, known)}")  # fmt: skip
             own = {**known[like], **own}
         known[name] = own
-        whole.append(own)
-    return whole
+        yield own
 
 
 def build(data: Tables, where: str = "scene", files: Files | None = None, text: str = "") -> Scene:

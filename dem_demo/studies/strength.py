@@ -18,8 +18,8 @@ from tqdm import tqdm
 import jointlaw as jl
 from jointlaw.support.files import write_json
 
+from ..dynamics.equilibrium import displacements
 from ..dynamics.simulation import Simulation
-from ..dynamics.start import displacements
 from ..output.pictures import Pictures
 from ..output.record import Record, named, told
 from ..output.run import to_failure
@@ -96,8 +96,9 @@ def strength_reduction(
         factor = row["factor_of_safety"] = factor_of_safety(one, trials, name)
         if 0 < len(row["without"]) < free:
             tell(f"{name}: factor of safety without those {len(row['without'])}")
-            factor = factor_of_safety(one, trials, f"{name} without loose blocks", apart)
-            row["factor_without"] = factor
+            factor = row["factor_without"] = factor_of_safety(
+                one, trials, f"{name} without loose blocks", apart
+            )
         tell(f"{name}: critical tilt")
         row |= {"critical_tilt": critical_tilt(one, trials, name), "picture": None}
         if factor:

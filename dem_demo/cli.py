@@ -16,11 +16,10 @@ from jointlaw.support.files import require_free, write_json
 from jointlaw.support.pyplot import FORMATS
 
 from .dynamics.simulation import Simulation
-from .errors import Refused
 from .output.monitors import friction_angle
 from .output.record import named, sentence, sentences, told
 from .output.run import run, steps_to
-from .scene import TEMPLATE, load, shipped
+from .scene import TEMPLATE, Refused, load, shipped
 from .studies import ablate, compare, strength
 
 VERSION = 3  # of strength.json

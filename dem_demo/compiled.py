@@ -12,7 +12,7 @@ import numpy as np
 
 from jointlaw.native.library import load
 
-from .errors import Refused
+from .scene import Refused
 
 SHOWN = 6  # of a joint: shares sliding, slipping, separated; J/m2 stored, lost; damage of its bond
 NUMBERS = "blocks", "corners", "contacts", "driven"

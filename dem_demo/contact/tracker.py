@@ -12,8 +12,7 @@ moved far enough to matter; between such renewals the geometry is plain arrays.
 import numpy as np
 
 from ..compiled import address
-from ..errors import Refused
-from ..scene import Scene
+from ..scene import Refused, Scene
 from .geometry import Contacts, Outlines
 
 TILT = np.sin(np.radians(6.5))  # how far a side of a corner may dip below the edge

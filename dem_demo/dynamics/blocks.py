@@ -9,8 +9,7 @@ import numpy as np
 import pymunk
 
 from ..contact import Contacts, Outlines, Tracker
-from ..errors import Refused
-from ..scene import Drives, Scene, Stress
+from ..scene import Drives, Refused, Scene, Stress
 
 MOVED = 0.25  # most of its skin that a block may move in a step: else contacts could be missed
 
@@ -30,9 +29,8 @@ class Blocks:
     def __init__(self, scene: Scene) -> None:
         blocks = scene.blocks
         self.names, self.skins = [block.name for block in blocks], scene.skins
-        mass = np.array([scene.thickness * block.section.mass for block in blocks])
-        moment = np.array([scene.thickness * block.section.moment for block in blocks])
-        self.inertia = np.stack([mass, mass, moment], axis=1)
+        sections = [block.section for block in blocks]
+        self.inertia = scene.thickness * np.array([[s.mass, s.mass, s.moment] for s in sections])
         self.mobile = np.array([[block.moves] * 3 for block in blocks])
         self.drives = Drives(scene.drives)
         self.free = self.mobile.copy()
@@ -42,7 +40,7 @@ class Blocks:
         self.steady = np.array([[*block.load, 0.0] for block in blocks]) * self.mobile
         self.loads = self.steady.copy()
         self.reach = np.array([block.reach for block in blocks])
-        self.lightness = self.free[:, :2].any(axis=1) / mass
+        self.lightness = self.free[:, :2].any(axis=1) / self.inertia[:, 0]
         self.moves = self.mobile[:, 0].copy()
         places = np.array([[*block.centroid, 0.0] for block in blocks]).T
         start = np.array([[*block.velocity, block.spin] for block in blocks])

@@ -14,8 +14,7 @@ import numpy as np
 from jointlaw.support.files import write_files
 
 from ..contact import PARTS, STALE, Contacts, Joints, Tracker
-from ..errors import Refused
-from ..scene import Files, Scene, parse
+from ..scene import Files, Refused, Scene, parse
 from .blocks import MOVED, Blocks, press
 from .energy import DROPPED, Ledger
 from .equilibrium import begin, out_of_balance, seat
@@ -194,9 +193,8 @@ class Simulation:
         self.limit.look(scene, blocks, self.contacts, joints)
         self.dt = step or scene.run.step or self._chosen_step()
         self.limit.require(self.dt)
-        velocity = blocks.drives.velocity(0.0, self.dt)
-        blocks.motion[3:][blocks.drives.axes, blocks.drives.rows] = velocity
-        blocks.drives.aim[:] = velocity
+        blocks.drives.aim[:] = blocks.drives.velocity(0.0, self.dt)
+        blocks.motion[3:][blocks.drives.axes, blocks.drives.rows] = blocks.drives.aim
         tracker.follow(blocks.motion)
         self.ledger.area = self.contacts.length * scene.thickness
         self.ledger.lost = joints.lost.copy()

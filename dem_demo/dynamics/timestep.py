@@ -16,8 +16,7 @@ from scipy.sparse import csc_array, csr_array, diags
 from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
 from ..contact import Contacts, Joints, Outlines
-from ..errors import Refused
-from ..scene import Scene
+from ..scene import Refused, Scene
 from .blocks import Blocks
 
 DENSE = 24  # degrees of freedom up to which a dense eigenproblem is the faster one

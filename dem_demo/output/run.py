@@ -14,8 +14,7 @@ from jointlaw.support.pyplot import FORMATS
 
 from ..dynamics.energy import COLUMNS
 from ..dynamics.simulation import Simulation, require_text
-from ..errors import Refused
-from ..scene import Scene, usual_size
+from ..scene import Refused, Scene, usual_size
 from .monitors import look
 from .pictures import Pictures, curves
 from .record import Record, named, outcomes

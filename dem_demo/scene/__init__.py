@@ -5,7 +5,7 @@ blocks     convex blocks
 laws       joint laws and Coulomb's
 drives     prescribed motions
 cutting    an outline cut along joint sets
-scene      a scene in memory
+scene      a scene in memory, and what is refused of its states
 read       a scene from its file
 """
 
@@ -14,7 +14,7 @@ from .drives import Drives
 from .keys import Tables, overlay
 from .laws import USUAL, WHOLE, Files, Law, build_law, opens_to, springs
 from .read import TEMPLATE, build, load, parse, read_tables, shipped
-from .scene import Run, Scene, Stress
+from .scene import Refused, Run, Scene, Stress
 
 __all__ = [
     "TEMPLATE",
@@ -24,6 +24,7 @@ __all__ = [
     "Drives",
     "Files",
     "Law",
+    "Refused",
     "Run",
     "Scene",
     "Stress",

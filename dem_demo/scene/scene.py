@@ -13,6 +13,10 @@ from .laws import Files, Law
 SKIN, THIN = 0.02, 0.1  # of the usual width of the blocks that move; at most of a block's own
 
 
+class Refused(RuntimeError):
+    """A state that the method cannot carry; the run leaves a snapshot that replays it."""
+
+
 @dataclass(frozen=True)
 class Run:
     """How to run a scene; times in s, lengths in m."""

@@ -19,10 +19,9 @@ from jointlaw import JointLaw, PathError
 from jointlaw.support.files import clear_run
 
 from ..dynamics.simulation import Simulation
-from ..errors import Refused
 from ..output.record import Record, write_csv
 from ..output.run import run
-from ..scene import Scene, overlay
+from ..scene import Refused, Scene, overlay
 
 COST = ("steps", "time_step_s", "cpu_s", "time_ratio", "note")
 TABLE = "ablation.csv"

@@ -21,7 +21,7 @@ from jointlaw.support.files import write_json
 from ..dynamics.equilibrium import displacements
 from ..dynamics.simulation import Simulation
 from ..output.pictures import Pictures
-from ..output.record import Record, named, told
+from ..output.record import named, told
 from ..output.run import to_failure
 from ..scene import Scene, Tables, build, read_tables, turn, usual_size
 
@@ -124,20 +124,17 @@ def _loose(scene: Scene) -> list[dict]:
 
 
 def _show(scene: Scene, until: float, title: str, path: Path, apart: np.ndarray) -> list[dict]:
-    """Run and draw a scene that fails; returns which blocks move first, but for those apart."""
+    """Run and draw a scene that fails; returns the blocks that move first, but for those of a mask
+    `apart` (n,)."""
     record, _ = to_failure(seated(scene), until)
-    ahead, title = _first(record, apart), f"{title}\nwith strength / {scene.reduction:.3g}"
-    Pictures(record, title, ahead, "moves first").final(path)
-    return named(scene, ahead)
-
-
-def _first(record: Record, apart: np.ndarray) -> np.ndarray:
-    """Mask (n,) of the blocks that move first, but for those of a mask `apart`."""
-    size = usual_size(block for block in record.scene.blocks if not block.fixed)
+    size = usual_size(block for block in scene.blocks if not block.fixed)
     moved = [np.where(apart, 0.0, np.hypot(*(record.displaced(i) - record.displaced(0)).T))
              for i in range(len(record.times))]  # fmt: skip
     away = next((frame for frame in moved if np.nanmax(frame) > FIRST * size), moved[-1])
-    return away > 0.5 * np.nanmax(away)
+    ahead = away > 0.5 * np.nanmax(away)
+    title = f"{title}\nwith strength / {scene.reduction:.3g}"
+    Pictures(record, title, ahead, "moves first").final(path)
+    return named(scene, ahead)
 
 
 def factor_of_safety(

@@ -46,11 +46,12 @@ class Outlines:
         self.way = edge / self.side
         self.placed, self.turned = np.empty((2, len(edge)), complex)  # corners and ways now
 
-    def world(self) -> World:
-        """What the compiled step knows of them."""
-        world = World(blocks=len(self.start) - 1, corners=len(self.block),
+    def world(self, motion: np.ndarray, contacts: int = 0) -> World:
+        """What the compiled step knows of them at a motion (6, n), and of how many contacts."""
+        world = World(blocks=len(self.start) - 1, corners=len(self.block), contacts=contacts,
                       corner_length=self.corner_length, soft=self.soft)  # fmt: skip
-        world.bind(self, "local", "way", "side", "block", "before", "after", "placed", "turned")
+        world.bind(self, "local", "way", "side", "block", "before", "after", "placed", "turned",
+                   motion=np.ascontiguousarray(motion, float))  # fmt: skip
         return world
 
 
@@ -82,10 +83,9 @@ class Contacts:
         )
         self.rise, self.carried, self.inside = np.empty((3, 2, k))
         self.own = np.empty((2, k), bool)
-        self.world = outlines.world()
-        self.world.contacts = k
         arrays = {name: a for name, a in vars(self).items() if isinstance(a, np.ndarray)}
-        self.world.bind(**arrays, out=out, motion=np.ascontiguousarray(motion, float))
+        self.world = outlines.world(motion, k)
+        self.world.bind(**arrays, out=out)
         self.world.call("place")
 
     @property

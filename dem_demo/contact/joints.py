@@ -274,6 +274,8 @@ class Joints:
             held.grow(len(rows))
             held.batch.restore(JointState(str(fingerprint), values.T))
             held.free, place[rows] = [], np.arange(len(rows))
-            held.batch.take(held.step)  # by nothing: it shows what they are
+            held.step.F[:] = held.batch.F
+            shares = *held.batch.measures()[:4], held.batch.dissipated_energy, held.batch.damage
+            held.step.shown[:] = np.column_stack([*shares, held.batch.delta])
         self.touch, self.keys = touch.copy(), keys
         self._arrange(law, place)

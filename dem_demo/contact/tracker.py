@@ -18,8 +18,9 @@ from .geometry import Contacts, Outlines
 TILT = np.sin(np.radians(6.5))  # how far a side of a corner may dip below the edge
 CARRIED = 0.5  # share of an overlap that some joint must see
 ROUNDING = 1e-10  # m: corners stay until their depth is wrong by this, so that none chatters
-STALE = 0.25  # share of its skin that a block may move until its contacts are looked for
-SEEN = 0.001  # of its skin: who has moved less keeps its contacts when others are looked for
+# Shares of its skin: a block that has moved by the first has its contacts looked for; when those of
+# others are, a block keeps its own that has moved by less than the second.
+STALE, SEEN = 0.25, 0.001
 
 
 def _in_range(contacts: Contacts, known: np.ndarray) -> np.ndarray:
@@ -29,15 +30,11 @@ def _in_range(contacts: Contacts, known: np.ndarray) -> np.ndarray:
     """
     ok = (contacts.rise > -TILT).all(axis=0) & (contacts.inside >= -ROUNDING).all(axis=0)
     here = np.flatnonzero(ok & (contacts.inside.min(axis=0) <= ROUNDING))
-    codes, beyond = contacts.codes[here], contacts.following()[here]
-    order = np.argsort(codes)
-    spot = np.minimum(np.searchsorted(codes[order], beyond), max(len(here) - 1, 0))
-    other = here[order[spot]] if len(here) else here
-    paired = contacts.codes[other] == beyond
-    here, other = here[paired], other[paired]
-    first, meant = np.argsort(~known[here], kind="stable"), ok.tolist()
-    for i, j in zip(here[first].tolist(), other[first].tolist(), strict=True):
-        meant[j] &= not meant[i]
+    at_limit = dict(zip(contacts.codes[here].tolist(), here.tolist(), strict=True))
+    first, meant = here[np.argsort(~known[here], kind="stable")], ok.tolist()
+    for i, beyond in zip(first.tolist(), contacts.following()[first].tolist(), strict=True):
+        if beyond in at_limit:
+            meant[at_limit[beyond]] &= not meant[i]
     return np.array(meant, bool)
 
 
@@ -90,9 +87,8 @@ class Tracker:
 
         Corners that have left the range of their edge go on to what is next there.
         """
-        world = self.contacts.world
-        world.bind(motion=motion, urgent=self.urgent)
-        world.call("follow")
+        self.contacts.world.bind(motion=motion, urgent=self.urgent)
+        self.contacts.world.call("follow")
 
     def renew(self, motion: np.ndarray, near: np.ndarray, pressed: bool = True) -> np.ndarray:
         """Look again at the pairs (p, 2) of near blocks of which one has moved.
@@ -160,8 +156,7 @@ class Tracker:
         limit, skin = self.deepest[pairs].min(axis=1), self._skin(*pairs.T)
         near, deepest = 1.5 * skin, 1.5 * limit
         apart, room, most = np.empty((2, n)), 0, 64
-        world = self.outlines.world()
-        world.bind(motion=np.ascontiguousarray(motion, float))
+        world = self.outlines.world(motion)
         pairs, start = np.ascontiguousarray(pairs, np.int64), self.outlines.start
         given = [address(array) for array in (pairs, start, near, deepest)]
         while most > room:  # again where there was no room for all

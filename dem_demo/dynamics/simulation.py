@@ -32,8 +32,7 @@ FRACTIONS = {  # of the limit that a time step is, by what can happen
 }
 IMPACT = 1e4  # Pa: normal stress of a first impact, for a time step before anything touches
 HALVINGS = 8  # of a time step that was chosen, until a run is refused
-FILE = "state.npz"
-VERSION = 8  # of state.npz
+FILE, VERSION = "state.npz", 8
 KEPT = (  # of what changes in a run, but for the joints: arrays that stay in their place
     "blocks.motion", "blocks.velocity", "blocks.loads", "blocks.gone", "blocks.support", "begun",
     "blocks.drives.reversed_at",
@@ -224,14 +223,23 @@ class Simulation:
 
     def _renew(self) -> None:
         """Joints, ledger and limit where contacts went on, and where new ones are looked for."""
-        blocks, tracker, world = self.blocks, self.tracker, self.world
-        if world.moved:
+        blocks, tracker, joints = self.blocks, self.tracker, self.joints
+        ledger, limit = self.ledger, self.limit
+        if self.world.moved:
             self._transfer()
-        if world.stale:
-            if self.dt > NEAR * self.limit.now:  # lever arms have changed
-                self.limit.checked[:] = 0.0
-            self._rearrange(tracker.renew(blocks.motion, blocks.near(), pressed=False))
-            self.ledger.load(blocks, press(self.scene, blocks, tracker), self.dt)
+        if self.world.stale:
+            if self.dt > NEAR * limit.now:  # lever arms have changed
+                limit.checked[:] = 0.0
+            before = tracker.renew(blocks.motion, blocks.near(), pressed=False)
+            stored = ledger.area * joints.stored
+            stored[before[before >= 0]] = 0.0
+            ledger.energy[DROPPED] += stored.sum()
+            ledger.area = np.append(ledger.area, 0.0)[before]
+            limit.checked = np.append(limit.checked, 0.0)[before]
+            joints.rearrange(before, tracker.law, tracker.keys, started=True)
+            ledger.lost = joints.lost.copy()
+            self.bind()
+            ledger.load(blocks, press(self.scene, blocks, tracker), self.dt)
         self.world.call("press", self.dt)
 
     def _transfer(self) -> None:
@@ -255,19 +263,6 @@ class Simulation:
             ledger.lost[fresh] = 0.0
         lost = held[changed] - kept * length[changed]
         ledger.energy[DROPPED] += np.maximum(lost, 0.0).sum() * thickness
-
-    def _rearrange(self, before: np.ndarray) -> None:
-        """Joints, ledger and limit for a new list of contacts, which were at the rows `before`."""
-        ledger, joints, limit = self.ledger, self.joints, self.limit
-        stored = ledger.area * joints.stored
-        stored[before[before >= 0]] = 0.0
-        ledger.energy[DROPPED] += stored.sum()
-        ledger.area, limit.checked = (
-            np.append(old, 0.0)[before] for old in (ledger.area, limit.checked)
-        )
-        joints.rearrange(before, self.tracker.law, self.tracker.keys, started=True)
-        ledger.lost = joints.lost.copy()
-        self.bind()
 
     def shares(self, moving: int, base: int) -> np.ndarray:
         """Share (k,) of each contact in the area of the joint between two blocks; zeros without."""

@@ -12,8 +12,7 @@ from ..scene import Scene, usual_size
 from .monitors import base_of, law_between, readings, watched_slips
 
 FAILED = 0.1  # of the usual size of a rock's blocks: one that has moved farther has failed
-CREEP = 1e-6  # m/s: faster is not at rest
-LOOK_BACK = 1.0  # s over which creep is measured
+CREEP, LOOK_BACK = 1e-6, 1.0  # m/s: faster is not at rest; s over which it is measured
 TOLD = 12  # most blocks that a sentence names
 
 

@@ -29,16 +29,11 @@ def write(record: Record, folder: Path) -> None:
         state = np.array([names.index(name) for name in pictures.states(i)], float)
         _joints(record.joints[i], state).write(folder / f"joints_{i:04d}.vtu")
     for kind in ("blocks", "joints"):
-        _list(record.times, kind).write(folder / f"{kind}.pvd")
-
-
-def _list(times: list[float], kind: str) -> ElementTree:
-    """ParaView's list of the files of all frames."""
-    root = Element("VTKFile", type="Collection", version="0.1")
-    files = SubElement(root, "Collection")
-    for i, time in enumerate(times):
-        SubElement(files, "DataSet", timestep=repr(time), part="0", file=f"{kind}_{i:04d}.vtu")
-    return ElementTree(root)
+        root = Element("VTKFile", type="Collection", version="0.1")
+        files = SubElement(root, "Collection")
+        for i, time in enumerate(record.times):
+            SubElement(files, "DataSet", timestep=repr(time), part="0", file=f"{kind}_{i:04d}.vtu")
+        ElementTree(root).write(folder / f"{kind}.pvd")
 
 
 def _blocks(record: Record, i: int) -> meshio.Mesh:

@@ -135,8 +135,7 @@ def _convex_parts(piece: Polygon, sets, lines, tiny) -> list[Polygon]:
     if _width(piece) < tiny:
         return []
     corners = _corners(piece, tiny)
-    of_holes = (np.array(corner) for ring in piece.interiors for corner in ring.coords)
-    inward = [*corners[_bends(corners) < 0], *of_holes]
+    inward = [*corners[_bends(corners) < 0], *get_coordinates([*piece.interiors])]
     if not inward:
         return [Polygon(corners)]
     for joints in sets:

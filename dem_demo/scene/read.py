@@ -22,7 +22,10 @@ SCENES = Path(__file__).parent / "scenes"
 TEMPLATE = Path(__file__).parent / "template.toml"
 UNIT_WEIGHT = 9810.0  # N/m3, of water
 SIDES = {"left": (0, -1.0), "right": (0, 1.0), "bottom": (1, -1.0), "top": (1, 1.0)}
-GRAVITY, DENSITY = (0.0, -9.81), 2600.0  # m/s2, kg/m3
+USUAL = {  # what a scene has that says nothing else
+    "gravity": (0.0, -9.81), "density": 2600.0, "thickness": 1.0, "watch": {},
+    **dict.fromkeys(("block", "rock", "drive", "joint", "excavate"), ()),
+}  # fmt: skip
 CORNER = 0.1  # of the least width of a block
 SOFT = 0.25  # of the skin, that of the narrowest block where none is given
 SLIVER = 0.7  # of the usual width: narrower blocks do not count
@@ -93,39 +96,36 @@ def _copied(rocks: Any, where: str) -> Iterator[Tables]:
 
 def build(data: Tables, where: str = "scene", files: Files | None = None, text: str = "") -> Scene:
     """A scene from the tables of its file and the files that it names. Raises ValueError."""
-    top, files = keys.checked(data, SCENE, where), Files() if files is None else files
+    top, files = USUAL | keys.checked(data, SCENE, where), Files() if files is None else files
     laws = {name: build_law(table, f"{where}: laws.{name}", files)
             for name, table in top["laws"].items()}  # fmt: skip
     pressure = {name: NOT_NEGATIVE(f"{where}: laws.{name}.pressure", table["pressure"])
                 for name, table in top["laws"].items() if "pressure" in table}  # fmt: skip
-    density = top.get("density", DENSITY)
-    blocks = [_block(table, density, where) for table in top.get("block", ())]
+    default = top.setdefault("law", next(iter(laws), ""))
+    blocks = [_block(table, top["density"], where) for table in top["block"]]
     edge_laws: dict[tuple[int, int], str] = {}
-    default = top.get("law", next(iter(laws), ""))
-    usual, digs = {"density": density, "law": default}, top.get("excavate", ())
-    rocks = [_rock(table, blocks, edge_laws, usual, digs, where) for table in top.get("rock", ())]
-    gravity = top.get("gravity", GRAVITY)
-    water, in_situ = _stresses(top, blocks, density, gravity, where)
+    rocks = [_rock(table, blocks, edge_laws, top, where) for table in top["rock"]]
+    water, in_situ = _stresses(top, blocks, where)
     number = {block.name: i for i, block in enumerate(blocks)}
     if len(number) < len(blocks):
         raise ValueError(f"{where}: two blocks have the same name; names must differ")
     if all(block.fixed for block in blocks):
         raise ValueError(f"{where}: no block can move; give [[block]] or [[rock]], not all fixed")
-    drives = read_drives(top.get("drive", ()), number, blocks, files, where)
-    pairs = _pairs(top.get("joint", ()), number, blocks, where)
+    drives = read_drives(top["drive"], number, blocks, files, where)
+    pairs = _pairs(top["joint"], number, blocks, where)
     least, skin = min(block.width for block in blocks), top["run"].get("skin")
     lengths = {"corner_length": CORNER * max(least, SLIVER * usual_width(blocks)),
                "soft": SOFT * (skin or SKIN * least)}  # fmt: skip
     run = Run(**lengths | top["run"])
-    watched = _watched(top.get("watch", {}), number, blocks, run.corner_length, f"{where}: watch")
+    watched = _watched(top["watch"], number, blocks, run.corner_length, f"{where}: watch")
     jointed = {*edge_laws.values()} - {WHOLE}
     for law in [default, *pairs.values(), *sorted(jointed)]:
         one_of(f"{where}: law", law, tuple(laws))
     scene = Scene(
         top.get("title", where), tuple(blocks), laws, run, default, pairs,
         tuple(replace(r, free=[i for i in r.blocks if not blocks[i].fixed]) for r in rocks),
-        edge_laws, drives, gravity, top.get("thickness", 1.0), water, in_situ, pressure,
-        tuple(_stages(digs, blocks, where)), **watched,
+        edge_laws, drives, top["gravity"], top["thickness"], water, in_situ, pressure,
+        tuple(_stages(top["excavate"], blocks, where)), **watched,
     )  # fmt: skip
     if WHOLE in edge_laws.values():
         joints = [laws[law] for law in jointed or [default]]
@@ -154,15 +154,13 @@ def _block(table: Tables, density: float, where: str) -> Block:
     return Block(**{"density": density, **table, "held": tuple(table.get("held", ()))})
 
 
-def _stresses(
-    top: Tables, blocks: list[Block], density: float, gravity: tuple[float, float], where: str
-) -> tuple[Stress | None, Stress | None]:
+def _stresses(top: Tables, blocks: list[Block], where: str) -> tuple[Stress | None, Stress | None]:
     """The stresses of the tables `[water]` and `[in_situ]` of a scene.
 
     Blocks on its sides are fixed or held as `[in_situ]` says. On a side that the stress loads there
     is no water, which is part of the stress. Raises ValueError.
     """
-    water, given = top.get("water"), top.get("in_situ", {})
+    water, given, gravity = top.get("water"), top.get("in_situ", {}), top["gravity"]
     stress = np.ravel(given.get("stress", ()))
     if "in_situ" in top and ("k0" in given, len(stress)) not in ((True, 0), (False, 3)):
         raise ValueError(f"{where}: in_situ: give either k0 or stress = [sxx, syy, sxy]")
@@ -172,14 +170,15 @@ def _stresses(
     corners = np.concatenate([block.corners for block in blocks])
     loaded = _sides(given, blocks, corners)
     if water:
-        weight = water.get("unit_weight", UNIT_WEIGHT)
-        water = Stress(np.eye(2), water["table"], weight, 0.0, ~loaded)
+        water = Stress(
+            np.eye(2), water["table"], water.get("unit_weight", UNIT_WEIGHT), 0.0, ~loaded
+        )
     if not given:
         return water, None
     uniform, line = len(stress) > 0, given.get("surface", [[0.0, corners[:, 1].max()]])
     x, y, shear = stress if uniform else (given["k0"], 1.0, 0.0)
-    weight, tensor = -density * gravity[1] * (not uniform), np.array([[x, shear], [shear, y]])
-    return water, Stress(tensor, np.array(line), weight, float(uniform), loaded)
+    weight, tensor = -top["density"] * gravity[1], np.array([[x, shear], [shear, y]])
+    return water, Stress(tensor, np.array(line), weight * (not uniform), float(uniform), loaded)
 
 
 def _sides(given: Tables, blocks: list[Block], corners: np.ndarray) -> np.ndarray:
@@ -263,14 +262,12 @@ def _stages(tables: list[Tables], blocks: Sequence[Block], where: str) -> Iterat
 
 
 def _rock(
-    table: Tables, blocks: list[Block], laws: dict[tuple[int, int], str], usual: Tables,
-    digs: list[Tables], where: str,
-) -> Rock:  # fmt: skip
-    """Cut a rock, and add its blocks and the laws of their edges to those of the scene; usual: its
-    density and the law of its sets where they name none. Which can move is left open."""
-    name = table["name"]
-    where = f"{where}: rock[{name!r}]"
-    sets = [JointSet(**{"law": usual["law"], **part}) for part in table["set"]]
+    table: Tables, blocks: list[Block], laws: dict[tuple[int, int], str], top: Tables, where: str
+) -> Rock:
+    """Cut a rock, and add its blocks and the laws of their edges to those of the scene; top: the
+    scene's tables, for what the rock does not say. Which blocks can move is left open."""
+    name, where = table["name"], f"{where}: rock[{table['name']!r}]"
+    sets = [JointSet(**{"law": top["law"], **part}) for part in table["set"]]
     shift, other = np.array(table.get("at", (0.0, 0.0))), table.get("laws", {})
     fixed = [Polygon(part["corners"]) for part in table.get("fixed", ())]
     least = table.get("least_width", LEAST * min((s.spacing for s in sets), default=0.0))
@@ -278,7 +275,7 @@ def _rock(
         raise ValueError(f"{where}.laws: no set of this rock has the law {unknown.pop()!r}")
     try:
         holes = [part["corners"] for part in table.get("hole", ())]
-        regions = [part["corners"] - shift for part in digs]
+        regions = [part["corners"] - shift for part in top["excavate"]]
         shapes, numbers, joined, dropped = cut(
             table["outline"], sets, table.get("seed", 0), least, holes, regions
         )
@@ -287,7 +284,7 @@ def _rock(
     first, names = len(blocks), [other.get(s.law, s.law) for s in sets]
     of_edge = dict(enumerate(names)) | {CUT: table.get("cut_law", WHOLE)}
     for i, (shape, of) in enumerate(zip(shapes, numbers, strict=True)):
-        block = Block(f"{name} {i + 1}", shape + shift, table.get("density", usual["density"]))
+        block = Block(f"{name} {i + 1}", shape + shift, table.get("density", top["density"]))
         stays = any(region.contains(Point(block.centroid - shift)) for region in fixed)
         blocks.append(replace(block, fixed=stays))
         laws.update(((first + i, edge), of_edge[number])

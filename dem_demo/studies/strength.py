@@ -25,8 +25,7 @@ from ..output.record import named, told
 from ..output.run import to_failure
 from ..scene import Scene, Tables, build, read_tables, turn, usual_size
 
-FILE = "trials.json"
-VERSION = 2  # of trials.json
+FILE, VERSION = "trials.json", 2
 TILT = 8.0, 60.0, 0.05  # degrees: first step, largest, to which it is found
 FACTOR = np.log(2.0), np.log(64.0), 0.006  # logarithms: the same of a factor
 TWICE = 2.0  # where all blocks are loose: times the strength, with which fewer are

@@ -102,8 +102,9 @@ class Contacts:
     def edges(self) -> np.ndarray:
         """The edges (k, 2) that meet, in the order of their blocks: of the two at a corner the
         flatter one counts."""
-        before = self.outlines.before[self.corner]
-        flatter = np.where(self.rise[0] < self.rise[1] - TIE, before, self.corner)
+        flatter = np.where(
+            self.rise[0] < self.rise[1] - TIE, self.outlines.before[self.corner], self.corner
+        )
         return np.sort([flatter, self.edge], axis=0).T
 
     def following(self) -> np.ndarray:

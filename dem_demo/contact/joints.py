@@ -18,7 +18,6 @@ from ..compiled import SHOWN, Pool, World, address
 from ..scene import Law, Scene, opens_to
 
 PARTS = "states", "fingerprint"  # of a snapshot of the joints of a law
-NEW = (0.0, 0.0, 1.0, 0.0, 0.0)  # what a new joint shows, but for its bond and where it is
 
 
 @lru_cache(maxsize=64)
@@ -87,10 +86,9 @@ class Held:
 
     def drop(self, places: np.ndarray) -> None:
         """Forget the joints at these places."""
-        if len(places):
-            self.batch.reset(places)
-            self.step.d[places] = 0.0
-            self.free = sorted([*self.free, *places.tolist()], reverse=True)
+        self.batch.reset(places)
+        self.step.d[places] = 0.0
+        self.free = sorted([*self.free, *places.tolist()], reverse=True)
 
     def begin(self, places: np.ndarray, mated: bool, bonded: bool) -> np.ndarray:
         """Let joints start, as new; closure and sliding (2,) in m where they first touch."""
@@ -100,7 +98,8 @@ class Held:
         if not bonded:
             self.batch.unbond(places)
         damage = 0.0 if bonded and "damage" in law.tables.names else 1.0
-        self.step.F[places], self.step.shown[places] = 0.0, [*NEW, damage, *start]
+        shown = 0.0, 0.0, 1.0, 0.0, 0.0, damage, *start  # by SHOWN: it is separated, no more
+        self.step.F[places], self.step.shown[places] = 0.0, shown
         return start
 
     def pool(self) -> Pool:

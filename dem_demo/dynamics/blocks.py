@@ -46,7 +46,7 @@ class Blocks:
         start = np.array([[*block.velocity, block.spin] for block in blocks])
         self.velocity = np.ascontiguousarray((start * self.mobile).T)
         self.motion = np.concatenate([places, self.velocity])
-        self._near: set[int] = set()
+        self._near: set[tuple[int, ...]] = set()
         self._build(scene)
         self.gone, self.support = np.zeros(len(blocks), bool), np.zeros((len(blocks), 3))
         self.remove(list(scene.gone))
@@ -64,13 +64,12 @@ class Blocks:
             self._bodies.append(body)
             self._number[shape] = i
 
-        def code(arbiter: pymunk.Arbiter) -> int:
-            one, other = (self._number[shape] for shape in arbiter.shapes)
-            return min(one, other) * len(self._bodies) + max(one, other)
+        def pair(arbiter: pymunk.Arbiter) -> tuple[int, ...]:
+            return tuple(sorted(self._number[shape] for shape in arbiter.shapes))
 
         self._space.on_collision(
-            1, 1, begin=lambda arbiter, *_: self._near.add(code(arbiter)),
-            separate=lambda arbiter, *_: self._near.discard(code(arbiter)),
+            1, 1, begin=lambda arbiter, *_: self._near.add(pair(arbiter)),
+            separate=lambda arbiter, *_: self._near.discard(pair(arbiter)),
         )  # fmt: skip
         self._space.step(1e-9)
 
@@ -80,8 +79,7 @@ class Blocks:
             x, y, angle = self.motion[:3, i].tolist()
             self._bodies[i].position, self._bodies[i].angle = (x, y), angle
         self._space.step(1e-9)  # pymunk looks for pairs in a step, in which nothing moves
-        codes = np.sort(np.fromiter(self._near, np.int64, len(self._near)))
-        pairs = np.stack(np.divmod(codes, len(self._bodies)), axis=1)
+        pairs = np.array(sorted(self._near), int).reshape(-1, 2)
         return pairs[~self.gone[pairs].any(axis=1)]
 
     def remove(self, rows: list[int]) -> None:

@@ -102,8 +102,7 @@ class Equilibrium:
         """
         drag = max(SLOW * self._median(guess), 1e3 * self.slow)
         least = np.where((loose & stay)[self.block], HELD, drag) * loose[self.block]
-        y = np.where(loose[self.block], 0.0, guess)
-        before = np.inf
+        y, before = np.where(loose[self.block], 0.0, guess), np.inf
         for _ in range(LET_GO if (loose & np.logical_not(stay)).any() else 1):
             moved, r, found = self._step(y, least)
             y = np.where(found, moved, y)
@@ -123,8 +122,7 @@ class Equilibrium:
     def _follow(self, y: np.ndarray, loose: np.ndarray, least: np.ndarray) -> np.ndarray:
         """Blocks (n,) that only the drag `least` of loose ones holds: these move on through less of
         it now, and others that follow are loose as well."""
-        out, drag = 0.0 * loose, WEAK[0] * self._median(y) + self.none
-        drag = np.where(least < HELD, drag, HELD)
+        out, drag = 0.0 * loose, np.where(least < HELD, WEAK[0] * self._median(y), HELD)
         for _ in range(FOLLOW if ((least > 0) & (least < HELD)).any() else 0):
             y, r, found = self._step(y, drag, ROUGH)
             if not found.all():

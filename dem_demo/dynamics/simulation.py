@@ -65,11 +65,9 @@ class Simulation:
             raise ValueError(f"step = {step} s: must be a finite number > 0")
         self.scene, self.blocks = scene, Blocks(scene)
         self.tracker, self.joints = Tracker(scene, self.blocks.motion), Joints(scene)
-        self.limit, self.t0, self.n = StepLimit(), 0.0, 0
-        self.why = ""
+        self.limit, self.t0, self.n, self.why = StepLimit(), 0.0, 0, ""
         self.halvings = 0 if step or scene.run.step or scene.run.fraction else HALVINGS
-        self.ledger = Ledger(len(scene.blocks))
-        self.begun = np.full(len(scene.stages), np.inf)
+        self.ledger, self.begun = Ledger(len(scene.blocks)), np.full(len(scene.stages), np.inf)
         if saved:
             self._unpack(saved, step)
         else:
@@ -324,8 +322,8 @@ class Simulation:
             with file.open("rb") as opened, np.load(opened, allow_pickle=False) as stored:
                 data = {name: stored[name] for name in stored.files}
             if (version := int(data["version"])) == VERSION:
-                files = Files(known=json.loads(str(data["files"])).items())
-                scene = parse(str(data["scene"]), str(file), files)
+                known = json.loads(str(data["files"])).items()
+                scene = parse(str(data["scene"]), str(file), Files(known=known))
                 joints = [f"{part}-{i}" for part in PARTS for i in range(len(scene.laws))]
                 saved = {name: data[name] for name in (*STATE, *PLACES, "touch", *joints)}
         except (OSError, EOFError, LookupError, ValueError, AttributeError, BadZipFile) as error:

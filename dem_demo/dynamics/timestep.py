@@ -41,8 +41,9 @@ class StepLimit:
     ) -> None:
         """Find the limit of a moment from stiffness, dashpots and lever arms, or a bound of it that
         is good enough for a step dt (s)."""
-        stiffness = joints.virgin("stiffness", "closure", contacts.closure)
-        stiffness = np.maximum(joints.stiffness, stiffness)
+        stiffness = np.maximum(
+            joints.stiffness, joints.virgin("stiffness", "closure", contacts.closure)
+        )
         # Joints that barely touch count as touching well, or each touch would ask again.
         area = contacts.length * scene.thickness
         stiffness = np.maximum(stiffness, 0.2 * stiffness.max(initial=0.0))

@@ -14,11 +14,9 @@ SLIP_DISTANCE = 2e-3  # m, for laws without a finite mating length
 ROUNDS = 50  # most trials of an angle; a handful is enough where there is one
 
 
-Slips = dict[tuple[int, int], dict]  # by the moving block and its base
-
-
-def watched_slips(sim: Simulation) -> Slips:
-    """What is known at the start of the slips that the scene's [watch] table names."""
+def watched_slips(sim: Simulation) -> dict[tuple[int, int], dict]:
+    """What is known at the start of the slips that the scene's [watch] table names, by the moving
+    block and its base."""
     slips, scene = {}, sim.scene
     for moving, base in scene.slip:
         name = law_between(sim, moving, base)
@@ -37,8 +35,8 @@ def watched_slips(sim: Simulation) -> Slips:
     return slips
 
 
-def look(slips: Slips, sim: Simulation) -> None:
-    """Note the base angle (degrees) at which a joint passes its slip distance."""
+def look(slips: dict[tuple[int, int], dict], sim: Simulation) -> None:
+    """Note the base angle (degrees) at which a joint of these passes its slip distance."""
     for (moving, base), entry in slips.items():
         waits = entry["slip_angle"] is None and not entry["slipped_before"]
         if waits and sim.slid(moving, base) > entry["slip_distance"]:
@@ -124,8 +122,8 @@ def friction_angle(law: Law, stress: float) -> float:
     """Peak of F2/F1 (degrees) of the law in direct shear at a constant normal stress (Pa)."""
     if isinstance(law, jl.CoulombLaw):
         return float(np.degrees(np.arctan(law.friction + law.cohesion / stress)))
-    far = 1.2 * slip_distance(law)  # friction peaks within a mating length
-    record = jl.direct_shear(law.joint(), to=[far], normal=stress, steps=120)
+    # friction peaks within a mating length
+    record = jl.direct_shear(law.joint(), to=[1.2 * slip_distance(law)], normal=stress, steps=120)
     return float(record.peak_friction_angle)
 
 

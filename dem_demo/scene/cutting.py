@@ -80,8 +80,7 @@ def cut(
     sets stay whole. Else both are cut through their inward corners, if this leaves less of the
     sliver; what no neighbour can take is dropped.
     """
-    tiny = EXACT * float(np.ptp(outline, axis=0).max())
-    rock = Polygon(outline)
+    tiny, rock = EXACT * float(np.ptp(outline, axis=0).max()), Polygon(outline)
     for i, hole in enumerate(holes):
         before, rock = rock.area, rock.difference(Polygon(hole))
         if rock.is_empty or not rock.area < before:
@@ -93,8 +92,7 @@ def cut(
     pieces = [piece for part in parts for piece in get_parts(part) if piece.area]
     for number, joints in enumerate(sets):
         rng = np.random.default_rng([seed, number])
-        offsets = joints.offsets(outline, rng)
-        for offset in track(offsets, f"cutting, set {number + 1}", len(offsets)):
+        for offset in track(joints.offsets(outline, rng), f"cutting, set {number + 1}"):
             lines.append((number, joints.normal, offset))
             pieces = _crossed(pieces, joints.normal, offset, tiny, joints.persistence, rng)
     pieces = [part for piece in pieces for part in _convex_parts(piece, sets, lines, tiny)]

@@ -34,12 +34,17 @@ def vector(name: str, value: Any) -> tuple[float, float]:
     return number(name, value[0]), number(name, value[1])
 
 
+def points(name: str, value: Any) -> list[tuple[float, float]]:
+    """A rule: a list of points, in m."""
+    return [vector(name, point) for point in LIST(name, value)]
+
+
 def corners(name: str, value: Any) -> np.ndarray:
     """A rule: the corners (k, 2) of a polygon that does not cross itself, in m."""
-    points = np.array([vector(name, point) for point in LIST(name, value)])
-    if len(points) < 3 or not Polygon(points).is_valid:
+    ring = np.array(points(name, value))
+    if len(ring) < 3 or not Polygon(ring).is_valid:
         raise ValueError(f"{name}: must be 3 corners [x, y] or more that do not cross or touch")
-    return points
+    return ring
 
 
 def some_of(name: str, value: Any, names: Iterable[str], count: int | None = None) -> list[str]:
@@ -53,16 +58,15 @@ def some_of(name: str, value: Any, names: Iterable[str], count: int | None = Non
 
 def polyline(name: str, value: Any) -> np.ndarray:
     """A rule: points (m, 2) of a line that goes to the right, in m."""
-    points = np.array([vector(name, point) for point in LIST(name, value)]).reshape(-1, 2)
-    if not len(points) or (np.diff(points[:, 0]) <= 0).any():
+    line = np.array(points(name, value)).reshape(-1, 2)
+    if not len(line) or (np.diff(line[:, 0]) <= 0).any():
         raise ValueError(f"{name}: must be points [x, y] from left to right, x increasing")
-    return points
+    return line
 
 
 AXES = {"x": 0, "y": 1, "turn": 2}
 TEXT, FLAG, LIST, TABLE = (partial(of_kind, kind=kind) for kind in (str, bool, list, dict))
 POSITIVE, NOT_NEGATIVE = partial(more_than, bound=0), partial(at_least, bound=0)
-SIDE = partial(one_of, choices=("held", "rollers", "loaded"))
 DENSITY = partial(within, low=50.0, high=30000.0, unit="kg/m3; 2.6 g/cm3 is 2600 kg/m3")
 
 BLOCK = {
@@ -105,10 +109,11 @@ SCENE = {
     "excavate": [{"corners!": corners, "at": NOT_NEGATIVE, "over!": POSITIVE}],
     "in_situ": {
         "k0": NOT_NEGATIVE, "stress": partial(finite, unit="Pa"), "surface": polyline,
-        **dict.fromkeys(("left", "right", "bottom", "top"), SIDE),
+        **dict.fromkeys(("left", "right", "bottom", "top"),
+                        partial(one_of, choices=("held", "rollers", "loaded"))),
     },
     "water": {"table!": polyline, "unit_weight": POSITIVE},
-    "watch": {"slip": LIST, "shear": LIST, "pins": LIST, "joints": LIST},
+    "watch": {"slip": LIST, "shear": LIST, "pins": points, "joints": points},
 }  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from jointlaw.support.checks import one_of, remedy
 from .blocks import EXACT, Block, box, check_convex, usual_width
 from .cutting import CUT, JointSet, cut
 from .drives import read_drives
-from .keys import LIST, NOT_NEGATIVE, SCENE, TABLE, Tables, overlay, some_of, vector
+from .keys import LIST, NOT_NEGATIVE, SCENE, TABLE, Tables, overlay, some_of
 from .laws import WHOLE, Files, build_law, opens_to, whole_rock
 from .scene import SKIN, Rock, Run, Scene, Stress
 
@@ -22,7 +22,7 @@ SCENES = Path(__file__).parent / "scenes"
 TEMPLATE = Path(__file__).parent / "template.toml"
 UNIT_WEIGHT = 9810.0  # N/m3, of water
 SIDES = {"left": (0, -1.0), "right": (0, 1.0), "bottom": (1, -1.0), "top": (1, 1.0)}
-USUAL = {  # what a scene has that says nothing else
+DEFAULTS = {  # what a scene has that says nothing else
     "gravity": (0.0, -9.81), "density": 2600.0, "thickness": 1.0, "watch": {},
     **dict.fromkeys(("block", "rock", "drive", "joint", "excavate"), ()),
 }  # fmt: skip
@@ -50,8 +50,9 @@ def load(source: str | Path) -> Scene:
     """A scene by name, or from a TOML file. Raises ValueError."""
     path, chosen = shipped().get(source, (Path(source), ""))
     if not path.is_file():
-        known = remedy(source, shipped(), "give a TOML file or one of")
-        raise ValueError(f"no scene {str(source)!r}: {known}")
+        raise ValueError(
+            f"no scene {str(source)!r}: {remedy(source, shipped(), 'give a TOML file or one of')}"
+        )
     try:
         return parse(chosen + path.read_text(encoding="utf-8"), path.name, Files(path.parent))
     except UnicodeDecodeError as error:
@@ -96,7 +97,7 @@ def _copied(rocks: Any, where: str) -> Iterator[Tables]:
 
 def build(data: Tables, where: str = "scene", files: Files | None = None, text: str = "") -> Scene:
     """A scene from the tables of its file and the files that it names. Raises ValueError."""
-    top, files = USUAL | keys.checked(data, SCENE, where), Files() if files is None else files
+    top, files = DEFAULTS | keys.checked(data, SCENE, where), Files() if files is None else files
     laws = {name: build_law(table, f"{where}: laws.{name}", files)
             for name, table in top["laws"].items()}  # fmt: skip
     pressure = {name: NOT_NEGATIVE(f"{where}: laws.{name}.pressure", table["pressure"])
@@ -230,11 +231,9 @@ def _watched(
     joints = {*watched["slip"], *watched["shear"]}
     if len({moving for moving, _ in joints}) < len(joints):
         raise ValueError(f"{where}: slip and shear watch one block on two bases; name one")
-    points = [vector(f"{where}.pins", point) for point in table.get("pins", ())]
-    pins = tuple((_block_at(f"{where}.pins", point, blocks), point) for point in points)
-    points = [vector(f"{where}.joints", point) for point in table.get("joints", ())]
-    near = tuple(_joint_at(f"{where}.joints", point, blocks, reach) for point in points)
-    return watched | {"pins": pins, "near": near}
+    pins = [(_block_at(f"{where}.pins", at, blocks), at) for at in table.get("pins", ())]
+    near = [_joint_at(f"{where}.joints", at, blocks, reach) for at in table.get("joints", ())]
+    return watched | {"pins": tuple(pins), "near": tuple(near)}
 
 
 def _joint_at(

@@ -102,8 +102,8 @@ def strength_reduction(
         row |= {"critical_tilt": critical_tilt(one, trials, name), "picture": None}
         if factor:
             row["picture"] = f"failing-{name}.{picture_format}"
-            title = f"{name}: factor of safety {factor:.3g}"
             path, weak = folder / row["picture"], weakened(one, SHOWN * factor)
+            title = f"{name}: factor of safety {factor:.3g}\nwith strength / {weak.reduction:.3g}"
             tell(f"{name}: running it with strength / {weak.reduction:.3g}")
             row["first"] = trials.ask(
                 row["picture"], partial(_show, weak, until, title, path, apart)
@@ -131,7 +131,6 @@ def _show(scene: Scene, until: float, title: str, path: Path, apart: np.ndarray)
              for i in range(len(record.times))]  # fmt: skip
     away = next((frame for frame in moved if np.nanmax(frame) > FIRST * size), moved[-1])
     ahead = away > 0.5 * np.nanmax(away)
-    title = f"{title}\nwith strength / {scene.reduction:.3g}"
     Pictures(record, title, ahead, "moves first").final(path)
     return named(scene, ahead)
 

@@ -231,8 +231,8 @@ def _watched(
     joints = {*watched["slip"], *watched["shear"]}
     if len({moving for moving, _ in joints}) < len(joints):
         raise ValueError(f"{where}: slip and shear watch one block on two bases; name one")
-    pins = [(_block_at(f"{where}.pins", at, blocks), at) for at in table.get("pins", ())]
-    near = [_joint_at(f"{where}.joints", at, blocks, reach) for at in table.get("joints", ())]
+    pins = ((_block_at(f"{where}.pins", at, blocks), at) for at in table.get("pins", ()))
+    near = (_joint_at(f"{where}.joints", at, blocks, reach) for at in table.get("joints", ()))
     return watched | {"pins": tuple(pins), "near": tuple(near)}
 
 

@@ -129,8 +129,8 @@ def _announce(sim: Simulation, until: float | None = None) -> None:
     )
     if seconds := _pace(sim) * steps:
         size = (seconds >= 100) + (seconds >= 6000)
-        lasts = f"{seconds / 60**size:.2g} {('s', 'min', 'hours')[size]}"
-        print(f"about {lasts} without pictures, by its first steps")
+        print(f"about {seconds / 60**size:.2g} {('s', 'min', 'hours')[size]} without pictures, "
+              "by its first steps")  # fmt: skip
     for rock in sim.scene.rocks:
         print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
               f"{len(rock.blocks) - len(rock.free)} fixed", *rock.told, sep="\n  ")  # fmt: skip

@@ -18,9 +18,8 @@ from .geometry import Contacts, Outlines
 TILT = np.sin(np.radians(6.5))  # how far a side of a corner may dip below the edge
 CARRIED = 0.5  # share of an overlap that some joint must see
 ROUNDING = 1e-10  # m: corners stay until their depth is wrong by this, so that none chatters
-# Shares of its skin: a block that has moved by the first has its contacts looked for; when those of
-# others are, a block keeps its own that has moved by less than the second.
-STALE, SEEN = 0.25, 0.001
+STALE = 0.25  # share of its skin that a block may move until its contacts are looked for
+SEEN = 0.001  # of its skin: who has moved less keeps its contacts when others are looked for
 
 
 def _in_range(contacts: Contacts, known: np.ndarray) -> np.ndarray:

@@ -110,7 +110,8 @@ class Tracker:
         law = self.laws_of(keys)
         stays = (old >= 0) & ((found.closure > 0) | (np.append(self.law, -1)[old] == law))
         fresh = ~stays & (found.closure > -self._skin(found.a, found.b))
-        rows = np.setdiff1d(np.arange(k), np.setdiff1d(asked, old[stays]))  # that are kept
+        gone = np.setdiff1d(asked, old[stays], assume_unique=True)
+        rows = np.setdiff1d(np.arange(k), gone, assume_unique=True)
         if len(rows) == k and not fresh.any():
             return rows
         lost = np.maximum(found.closure[fresh], 0.0) * (not pressed)

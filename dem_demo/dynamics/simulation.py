@@ -322,8 +322,9 @@ class Simulation:
             with file.open("rb") as opened, np.load(opened, allow_pickle=False) as stored:
                 data = {name: stored[name] for name in stored.files}
             if (version := int(data["version"])) == VERSION:
-                files = Files(known=json.loads(str(data["files"])).items())
-                scene = parse(str(data["scene"]), str(file), files)
+                scene = parse(
+                    str(data["scene"]), str(file), Files(known=json.loads(str(data["files"])))
+                )
                 joints = [f"{part}-{i}" for part in PARTS for i in range(len(scene.laws))]
                 saved = {name: data[name] for name in (*STATE, *PLACES, "touch", *joints)}
         except (OSError, EOFError, LookupError, ValueError, AttributeError, BadZipFile) as error:

@@ -161,8 +161,10 @@ def _lines(table: Tables, number: dict[str, int], unit: float, where: str) -> di
         raise ValueError(f"{where}.times: must increase, one for each of `values`")
     line = {"times": tuple(times), "values": tuple(unit * values), "ease": table.get("ease", 0.1)}
     if back := table.get("back"):
-        block = one_of(f"{where}.back.block", back["block"], tuple(number))
-        line["back"] = {**back, "block": number[block], "by": unit * back["by"]}
+        line["back"] = {
+            **back, "block": number[one_of(f"{where}.back.block", back["block"], tuple(number))],
+            "by": unit * back["by"],
+        }  # fmt: skip
     return line
 
 

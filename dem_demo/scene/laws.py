@@ -21,8 +21,8 @@ class Files(dict[str, str]):
     A name is a path relative to the scene's file.
     """
 
-    def __init__(self, folder: str | Path = "", known: Iterable[tuple[str, str]] = ()) -> None:
-        super().__init__(known)
+    def __init__(self, folder: str | Path = "", known: dict[str, str] | None = None) -> None:
+        super().__init__(known or {})
         self.folder = Path(folder)
 
     def __missing__(self, name: str) -> str:

@@ -86,8 +86,10 @@ def strength_reduction(
         tell(f"{name}: {len(loose)} of {free} blocks cannot be held: {told(loose)}")
         row: dict = {"rock": name, "loose": loose, "without": loose}
         if len(loose) == free:
-            ask = partial(_loose, weakened(one, 1 / TWICE))
-            row["without"] = trials.ask(f"{name}: loose with strength * {TWICE:g}", ask)
+            row["without"] = trials.ask(
+                f"{name}: loose with strength * {TWICE:g}",
+                partial(_loose, weakened(one, 1 / TWICE)),
+            )
             tell(f"{name}: {len(row['without'])} of them with {TWICE:g} times the strength "
                  f"neither: {told(row['without'])}")  # fmt: skip
         apart = np.isin([block.name for block in one.blocks], [b["block"] for b in row["without"]])
@@ -191,8 +193,9 @@ def _march(
     with tqdm(desc=name, unit="trial", delay=2.0, disable=None, leave=False) as bar:
 
         def found(x: float, last: float | None, guess: np.ndarray | None) -> np.ndarray | None:
-            key = f"{name} {x} from {last}"
-            moved = trials.ask(key, lambda: displacements(at(x), guess, loose))
+            moved = trials.ask(
+                f"{name} {x} from {last}", lambda: displacements(at(x), guess, loose)
+            )
             bar.update()
             return None if moved is None else np.array(moved)
 

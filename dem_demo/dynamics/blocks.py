@@ -1,8 +1,9 @@
-"""The blocks in motion, and the loads on them. pymunk finds pairs that are near, all of it here.
+"""The blocks in motion, and the loads on their edges.
 
-Shapes are sensors with a skin, so pymunk reports which blocks come near each other and never moves
-them: the compiled step does, by symplectic Euler (positions with the velocities that they have,
-then velocities with the forces at the new positions).
+pymunk holds their shapes and finds pairs that are near, all of it here. Shapes are sensors with a
+skin, so pymunk reports which blocks come near each other and never moves them: the compiled step
+does, by symplectic Euler (positions with the velocities that they have, then velocities with the
+forces at the new positions).
 """
 
 import numpy as np

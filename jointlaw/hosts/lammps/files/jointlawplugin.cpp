@@ -582,7 +582,7 @@ void PairJointlaw::advance(const Contact &c)
     const Vector axis = across(c.n);
     std::copy(axis.begin(), axis.end(), head + AXIS);
     if ((law->bonded || law->coulomb) && !update->setupflag)    // faces that meet anew: the last number is its damage
-      own.at(which, size)[jlaw_state_size(law) - 1] = 1.0;
+      own.at(which, size)[jlaw_state_size(law) - 1] = jlaw_parted_(law);
   }
   const int flag = fresh ? -1 : visits.back().flags + which;
   if (!fresh) seen[flag] = MET;

@@ -54,17 +54,17 @@ FILES = {
     "friction-30.toml": SCENE.replace("friction = 0.3", "friction = 30"),
     "density.toml": SCENE.replace("2600.0", "2.6"),
     "plane-90.toml": SCENE.replace("plane = 0.0", "plane = 90"),
+    "done/summary.json": '{"files": ["shear.csv"]}',
+    "done/shear.csv": "of an earlier run",
+    "done/notes.txt": "mine",
 }
 
 
 @pytest.fixture(autouse=True)
 def _files(tmp_path):
     for name, text in FILES.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
-    (tmp_path / "done").mkdir()
-    (tmp_path / "done" / "summary.json").write_text('{"files": ["shear.csv"]}')
-    (tmp_path / "done" / "shear.csv").write_text("of an earlier run")
-    (tmp_path / "done" / "notes.txt").write_text("mine")
 
 
 @pytest.mark.parametrize(

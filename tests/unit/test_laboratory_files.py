@@ -157,8 +157,10 @@ CURVE = {
     datasets.SHEAR: U, datasets.SHEAR_STRESS: TAU, datasets.NORMAL: 0 * U + 2,
     datasets.OPENING: OPENED,
 }  # fmt: skip
-PEAK = dict(zip(datasets.PEAKS, ([1.25], [0.05], [0.8], [9.9]), strict=True))
-PEAK |= {datasets.NORMAL: [2.0]}
+PEAK = {
+    **dict(zip(datasets.PEAKS, ([1.25], [0.05], [0.8], [9.9]), strict=True)),
+    datasets.NORMAL: [2.0],
+}
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,6 @@ BUILT = "jointlaw/native/built"
 COVERAGE = """\
 [run]
 source = jointlaw, dem_demo
-context = ${PYTEST_CURRENT_TEST-}
 parallel = true
 patch = subprocess
 [json]
@@ -172,7 +171,7 @@ class Copy:
 
 
 def tests_of_lines(marks):
-    """For each file the tests that run each of its lines, those of a command included."""
+    """For each file the tests that run each of its lines; none for what only a command runs."""
     copied = Copy("map")
     paths = [path for path in sorted(copied.at.rglob("*.py")) if path.name != Path(__file__).name]
     made = hashlib.sha256(b"".join([marks.encode(), *(path.read_bytes() for path in paths)]))
@@ -184,10 +183,9 @@ def tests_of_lines(marks):
         if status:
             raise SystemExit(f"tests fail without a fault:\n{said[-1000:]}")
         (copied.at / "lines.json").rename(data)
-    end = re.compile(r"(\|(setup|run|teardown)| \((setup|call|teardown)\).*)$")
     return {
         file: {
-            int(line): {end.sub("", one) for one in contexts if "::" in one}
+            int(line): {one.rpartition("|")[0] for one in contexts if "::" in one}
             for line, contexts in found["contexts"].items()
         }
         for file, found in json.loads(data.read_text())["files"].items()

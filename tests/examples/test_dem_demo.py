@@ -5,6 +5,7 @@ import itertools
 import json
 import re
 from dataclasses import replace
+from operator import attrgetter
 from shutil import rmtree
 from unittest.mock import Mock
 from xml.etree import ElementTree
@@ -317,18 +318,17 @@ def test_a_watched_joint_has_the_law_of_the_faces_that_meet():
     assert list(record.laws.values()) == ["bedding", "cross"]
 
 
-DAMAGE = ", yield_interference = 2e-4"
-
-
-@pytest.mark.parametrize("damage", ["", pytest.param(DAMAGE, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "damage", ["", pytest.param(", yield_interference = 2e-4", marks=pytest.mark.slow)]
+)
 def test_resume_is_bit_identical(tmp_path, damage):
     """Stop and go on from files, in the middle of impacts and renewed contacts."""
     text = TEXT.replace("mu = 0.4", f"mu = 0.4{damage}").replace("-0.05]", "-0.3]")
     advanced(Simulation(parse(text)), 170).save(tmp_path)
     (tmp_path / "notes.txt").write_text("mine")
     again, whole = advanced(Simulation.load(tmp_path), 230), advanced(Simulation(parse(text)), 400)
-    np.testing.assert_equal(again.state(), whole.state())
-    assert (again.joints.traction == whole.joints.traction).all()
+    for name in ("blocks.motion", "joints.traction", "time", "ledger.value", "limit.least"):
+        np.testing.assert_equal(*(attrgetter(name)(sim) for sim in (again, whole)))
     batch = again.joints.held[again.joints.names.index("rock/rough")].batch
     assert bool(damage) == (batch.plastic_work.max() > 0.0)
     assert (tmp_path / "notes.txt").read_text() == "mine"

@@ -201,10 +201,10 @@ TWICE = '[[joint]]\nbetween = ["base", "top"]\nlaw = "plain"\n[watch]'
         ),
         (TEXT, ROCK, 'from = "no.toml"\n', r"'no\.toml' is neither a preset"),
         (
-            TEXT,
+            ROCKS,
             "[watch]",
-            "[watch]\njoints = [[9.0, 9.0]]",
-            r"joints = \[9.0, 9.0\]: must lie at a joint",
+            "[watch]\njoints = [[9.0, -9.0]]",
+            r"joints = \[9.0, -9.0\]: must lie at a joint of a block",
         ),
         (FLAT, '"flat"', '"flt"', "variant = 'flt' is unknown; did you mean 'flat'"),
         (FLAT, "seed = 7", "sead = 7", "sead' is unknown; did you mean 'seed'"),

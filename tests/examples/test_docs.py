@@ -87,8 +87,11 @@ LONG = {
     "python -m dem_demo strength-reduction": "tests/verification/test_strength_reduction.py",
     "python -m dem_demo tilt": "tests/verification/test_blocks_tilt.py",
 }
-MINE = re.compile(r"(jointlaw|python -m (?:jointlaw|dem_demo)) ")
-FOUND = sorted({line for page in PAGES for line in commands(page) if MINE.match(line)})
+FOUND = sorted(
+    line
+    for line in {line for page in PAGES for line in commands(page)}
+    if re.match(r"(jointlaw|python -m (jointlaw|dem_demo)) ", line)
+)
 
 
 @pytest.fixture

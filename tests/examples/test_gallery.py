@@ -113,7 +113,7 @@ def test_example_runs(name):
 
 def test_gallery_is_in_order_and_complete():
     settings = (DOCS / "conf.py").read_text(encoding="utf-8")
-    order = settings.split("ORDER = (")[1].split(")")[0]
+    (order,) = re.findall(r"ORDER = \((.*?)\)", settings, re.DOTALL)
     assert sorted(re.findall(r"\w+", order)) == sorted(GALLERY)
 
 

@@ -154,8 +154,9 @@ def test_a_slip_is_told_in_one_line(capsys, line, told):
 def test_ctrl_c_ends_a_command_in_one_line(line, where, capsys, monkeypatch):
     monkeypatch.setattr(f"jointlaw.cli.{where}", Mock(side_effect=KeyboardInterrupt))
     assert jointlaw_main(line.split()) == 130
-    told = f"jointlaw {line.split()[0]}: interrupted; nothing more is written\n"
-    assert capsys.readouterr().err == told
+    assert capsys.readouterr().err == (
+        f"jointlaw {line.split()[0]}: interrupted; nothing more is written\n"
+    )
     assert not Path("out").exists()
 
 

@@ -28,7 +28,7 @@ def native(monkeypatch):
 
 
 def path(law, seed, steps, n=N):
-    """Increments (steps, n, dim): a closure, then all sizes and zero itself, apart in the middle."""
+    """Increments (steps, n, dim): a closure, then all sizes and zeros, apart in the middle."""
     rng = np.random.default_rng(100 + seed)
     d = rng.normal(0.0, 10.0 ** rng.uniform(-9.0, -6.0, (steps, n, 1)), (steps, n, law.dim))
     d[rng.random(d.shape) < 0.1] = 0.0

@@ -64,9 +64,23 @@ def test_what_is_no_distribution_of_heights_is_refused(make_law, exponential):
         def breakpoints(self):
             return np.array([1e-6, 0.0])
 
+    class Listed(exponential):
+        def breakpoints(self):
+            return [0.0, 1e-6]
+
+    class Nameless(exponential):
+        __repr__ = object.__repr__
+
+    class PerMicrometre(exponential):
+        def pdf(self, r):
+            return 1e-6 * super().pdf(r)
+
     for heights, told in {
         3: "has no overlap",
-        ByAddress(1e-6): "must be equal and hash alike",
+        ByAddress(1e-6): "must be equal, hash and print alike",
+        Nameless(1e-6): "must be equal, hash and print alike",
+        Listed(1e-6): "must be an array of two or more",
+        PerMicrometre(1e-6): r"pdf\(r\) in 1/m must be >= 0 and the slope of cdf\(r\)",
         exponential(1e-6, -1e-6): "heights.overlap = -1e-06",
         exponential(1e-6, 0.0, "both"): "heights.formation = 'both'",
         Falling(1e-6): "ascending heights",

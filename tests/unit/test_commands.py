@@ -122,6 +122,8 @@ def test_every_host_gets_its_files_and_is_told_what_to_type(host, tmp_path, caps
         ("rough-2", "rough_2"),
         ("7 b.", "joint_7_b"),
         ("---", "joint"),
+        ("double", "joint_double"),
+        ("jointlaw-1", "joint_jointlaw_1"),
         ("jing-replica", "jing_replica"),
     ],
 )

@@ -89,6 +89,8 @@ def test_a_snapshot_restores_a_pool_and_what_is_refused_changes_none(law):
         other.restore("b", state)
     with pytest.raises(KeyError, match="x"):
         other.drop(["b", "x"])
+    with pytest.raises(ValueError, match="mated=False"):
+        other.assign("cd", mated=False)
     assert other.keys == ["b", "c"]
     np.testing.assert_array_equal(other.batch.delta[other.places], pool.batch.delta[pool.places])
 

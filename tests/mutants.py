@@ -4,16 +4,16 @@
 
 A first run tells which test runs which line; it is kept for the same sources. Then each fault is
 run against the tests of its line; of its file, where the line runs at import; of all joints or
-blocks, where it is in C. All this in copies under the temporary folder. No part of CI. Needs
-`pip install pytest-cov`.
+blocks, where it is in C. All this in copies, under the temporary folder, of what git holds, staged
+changes included. No part of CI. Needs `pip install pytest-cov`.
 """
 
 import argparse
 import ast
 import collections
-import copy
 import hashlib
 import itertools
+import json
 import os
 import random
 import re
@@ -24,13 +24,18 @@ import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from queue import Queue
 
 ROOT = Path(__file__).parents[1]
 HOME = Path(tempfile.gettempdir()) / f"mutants-{hashlib.sha256(bytes(ROOT)).hexdigest()[:8]}"
 BUILT = "jointlaw/native/built"
-COVERAGE = "[run]\nsource = jointlaw, dem_demo\ncontext = ${PYTEST_CURRENT_TEST-}\n"
-COVERAGE += "parallel = true\npatch = subprocess\ndata_file = "
+COVERAGE = """\
+[run]
+source = jointlaw, dem_demo
+parallel = true
+patch = subprocess
+[json]
+show_contexts = true
+"""
 IN_C = (
     (r" \+ ", " - "), (r" - ", " + "), (r" \* ", " / "), (r" / ", " * "), (r" < ", " <= "),
     (r" > ", " >= "), (r" ([<>])= ", r" \1 "), (r" == ", " != "), (r" && ", " || "),
@@ -50,9 +55,7 @@ OTHER = {
 
 def changed(node, **fields):
     """A copy of a node with other fields."""
-    new = copy.copy(node)
-    vars(new).update(fields)
-    return new
+    return type(node)(**(vars(node) | fields))
 
 
 def faults_of(node):
@@ -122,25 +125,23 @@ class Copy:
     def __init__(self, name):
         self.at = HOME / name
         shutil.rmtree(self.at, ignore_errors=True)
-        listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True)
-        for path in map(Path, listed.stdout.splitlines()):
-            (self.at / path.parent).mkdir(parents=True, exist_ok=True)
-            shutil.copy(ROOT / path, self.at / path)
+        command = ["git", "checkout-index", "--all", f"--prefix={self.at}/"]
+        subprocess.run(command, cwd=ROOT, check=True)
         shutil.copytree(ROOT / BUILT, self.at / BUILT)
 
     def python(self, *arguments, limit=None):
         """Run Python there, with 4 GiB of memory; exit status and what it wrote."""
-        variables = os.environ | {"PYTHONPATH": str(self.at), "PYTHONDONTWRITEBYTECODE": "1"}
-        command = [sys.executable, "-m", *arguments]
         done = subprocess.run(
-            command, cwd=self.at, env=variables, timeout=limit, text=True, capture_output=True,
+            [sys.executable, "-m", *arguments], cwd=self.at, timeout=limit, text=True,
+            env=os.environ | {"PYTHONPATH": str(self.at), "PYTHONDONTWRITEBYTECODE": "1"},
+            capture_output=True,
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_DATA, (1 << 32, 1 << 32)),
         )  # fmt: skip
         return done.returncode, done.stdout + done.stderr
 
     def pytest(self, *arguments, **limit):
-        without = "-p", "no:cacheprovider", "-p", "no:randomly"
-        return self.python("pytest", "-q", *without, *arguments, **limit)
+        plain = "-q", "-p", "no:cacheprovider", "-p", "no:randomly"
+        return self.python("pytest", *plain, *arguments, **limit)
 
     def library(self):
         """The bytes of the library without the hash of its sources."""
@@ -170,30 +171,24 @@ class Copy:
 
 
 def tests_of_lines(marks):
-    """For each file the tests that run each of its lines, those of a command included."""
+    """For each file the tests that run each of its lines; none for what only a command runs."""
     copied = Copy("map")
     paths = [path for path in sorted(copied.at.rglob("*.py")) if path.name != Path(__file__).name]
     made = hashlib.sha256(b"".join([marks.encode(), *(path.read_bytes() for path in paths)]))
-    data = HOME / f"lines-{made.hexdigest()[:12]}"
+    data = HOME / f"lines-{made.hexdigest()[:12]}.json"
     if not data.exists():
-        (copied.at / "coverage.ini").write_text(f"{COVERAGE}{data}.part\n")
-        options = "--cov", "--cov-config=coverage.ini", "--cov-context=test", "--cov-report="
-        status, said = copied.pytest("-m", marks, *options)
+        (copied.at / "coverage.ini").write_text(COVERAGE)
+        options = "--cov", "--cov-config=coverage.ini", "--cov-context=test"
+        status, said = copied.pytest("-m", marks, *options, "--cov-report=json:lines.json")
         if status:
             raise SystemExit(f"tests fail without a fault:\n{said[-1000:]}")
-        copied.python("coverage", "combine", "--rcfile=coverage.ini")
-        data.with_suffix(".part").rename(data)
-    from coverage import CoverageData
-
-    found = CoverageData(str(data))
-    found.read()
-    end = re.compile(r"(\|(setup|run|teardown)| \((setup|call|teardown)\).*)$")
+        (copied.at / "lines.json").rename(data)
     return {
-        str(Path(file).relative_to(copied.at)): {
-            line: {end.sub("", one) for one in contexts if "::" in one}
-            for line, contexts in found.contexts_by_lineno(file).items()
+        file: {
+            int(line): {one.rpartition("|")[0] for one in contexts if "::" in one}
+            for line, contexts in found["contexts"].items()
         }
-        for file in found.measured_files()
+        for file, found in json.loads(data.read_text())["files"].items()
     }
 
 
@@ -207,37 +202,36 @@ def main():
     options = parser.parse_args()
     lines = tests_of_lines("" if options.slow else "not slow")
     every = set().union(*(tests for file in lines.values() for tests in file.values()))
-    found = collections.defaultdict(set)  # by file and line
-    for where in (ROOT / one for one in options.where):
+    copies, found = [Copy(f"copy-{i}") for i in range(2)], collections.defaultdict(set)
+    root, counts = copies[0].at, collections.Counter()
+    for where in (root / one for one in options.where):
         for path in [where] if where.is_file() else sorted(where.rglob("*.*")):
             if path.suffix in (".py", ".c", ".h") and BUILT not in str(path):
                 made = (in_python if path.suffix == ".py" else in_c)(path.read_bytes())
                 for line, *fault in made:
-                    found[str(path.relative_to(ROOT)), line].add(tuple(fault))
-    draw, copies, counts = random.Random(options.seed), Queue(), collections.Counter()
+                    found[str(path.relative_to(root)), line].add(tuple(fault))
+    draw = random.Random(options.seed)
     drawn = [(*place, *draw.choice(sorted(found[place])))
              for place in draw.sample(sorted(found), min(options.count, len(found)))]  # fmt: skip
-    for i in range(2):
-        copies.put(Copy(f"copy-{i}"))
 
-    def run(name, line, statement, start, end, new):
-        text, runs = (ROOT / name).read_bytes(), name
-        if not statement:
-            runs = "dem_demo/compiled.py" if "blocks" in name else "jointlaw/kernels/engine.py"
-        of_file = lines.get(runs, {})
-        ran = not statement or statement in of_file
-        tests = ran and (of_file.get(statement) or set().union(*of_file.values()) or every)
-        order = sorted(tests, key=lambda test: ("/unit/" not in test, test)) if tests else []
-        fault, copied = text[:start] + new.encode() + text[end:], copies.get()
-        fate = copied.judge(name, fault, order, options.limit) if tests else ("not run", "")
-        copies.put(copied)
-        counts[fate[0]] += 1
-        was = text.splitlines()[line - 1].decode().strip()
-        change = " ".join(f"{text[start:end].decode()} -> {new}".split())
-        print(*fate, f"\n  {name}:{line}: {was}\n  {change}", flush=True)
+    def run(copied, drawn):
+        for name, line, statement, start, end, new in drawn:
+            text, runs = (copied.at / name).read_bytes(), name
+            if not statement:
+                runs = "dem_demo/compiled.py" if "blocks" in name else "jointlaw/kernels/engine.py"
+            of_file = lines.get(runs, {})
+            ran = not statement or statement in of_file
+            tests = ran and (of_file.get(statement) or set().union(*of_file.values()) or every)
+            order = sorted(tests, key=lambda test: ("/unit/" not in test, test)) if tests else []
+            fault = text[:start] + new.encode() + text[end:]
+            fate = copied.judge(name, fault, order, options.limit) if tests else ("not run", "")
+            counts[fate[0]] += 1
+            was = text.splitlines()[line - 1].decode().strip()
+            change = " ".join(f"{text[start:end].decode()} -> {new}".split())
+            print(*fate, f"\n  {name}:{line}: {was}\n  {change}", flush=True)
 
     with ThreadPoolExecutor(2) as pool:
-        list(pool.map(lambda place: run(*place), drawn))
+        list(pool.map(run, copies, (drawn[::2], drawn[1::2])))
     print(f"{len(found)} lines; {', '.join(f'{n} {fate}' for fate, n in counts.items())}")
 
 

@@ -147,10 +147,14 @@ def tractions(law: JointLaw, d: Array) -> Array:
 def errors(F: Array, reference: Array, counts: Any = True) -> Array:
     """Largest |F - reference| (steps, paths, dim) over each path's largest |reference|: (paths,).
 
-    counts: (steps, paths), which steps count; all by default.
+    counts: (steps, paths), which steps count; all by default. 0 for a path that nothing resists:
+    few asperities may reach so high.
     """
-    off: Array = np.linalg.norm(F - reference, axis=2).max(axis=0, where=counts, initial=0.0)
-    return off / np.linalg.norm(reference, axis=2).max(axis=0, where=counts, initial=0.0)
+    off, most = (
+        np.linalg.norm(f, axis=2).max(axis=0, where=counts, initial=0.0)
+        for f in (F - reference, reference)
+    )
+    return np.divide(off, most, out=np.zeros_like(off), where=most > 0.0)
 
 
 def _paths(law: JointLaw, stress: float) -> tuple[tuple[str, ...], Array, Array]:

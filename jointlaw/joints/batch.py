@@ -150,7 +150,8 @@ class JointBatch:
         Raises ValueError for a wrong index, if the law has any.
         """
         if (row := self.law.tables.first.get("damage")) is not None:
-            self._state[at(self._state, self._index(index), row)] = 1.0
+            parted = max(element.parted for element in self.law.tables.elements)
+            self._state[at(self._state, self._index(index), row)] = parted
 
     def resize(self, n: int) -> None:
         """Change the number of joints to n; joints beyond the old number are new and mated.
@@ -235,7 +236,7 @@ class JointBatch:
     @property
     def damage(self) -> Array:
         """Damage (n,) of bond or cohesion: 0 whole, 1 broken, and 1 where the law has none."""
-        return self._part("damage", absent=1.0)
+        return np.minimum(self._part("damage", absent=1.0), 1.0)
 
     # --------------------------------------------------------------- internals
 

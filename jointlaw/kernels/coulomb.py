@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..support.checks import Array
-from ..support.thresholds import LIMIT, ROUNDED, STICKS, STRONGEST
+from ..support.thresholds import LIMIT, PARTED, ROUNDED, STICKS, STRONGEST
 from .element import Element, Measures, Share
 
 
@@ -25,9 +25,12 @@ class Coulomb(Element):
     """A spring in closure and a spring in shear, which slides where |q| is the strength.
 
     The strength is c + mu sigma, sigma the normal stress, from cohesion and friction of the intact
-    joint (w = 0) to the residual ones (w = 1). Rows of the state: shear stress q (dim - 1) in Pa,
-    w. Of p it takes the parameters of `jl.CoulombLaw`; a residual value None keeps the value.
+    joint (w = 0) to the residual ones (w = 1). Once faces have parted (w = 2) c is zero. Rows of
+    the state: shear stress q (dim - 1) in Pa, w. Of p it takes the parameters of `jl.CoulombLaw`; a
+    residual value None keeps the value.
     """
+
+    parted = PARTED
 
     def __init__(self, p: Any, dim: int) -> None:
         self.dim, self.rows = dim, {"shear": dim - 1, "damage": 1}
@@ -59,12 +62,12 @@ class Coulomb(Element):
         """As `Element.step`; the normal stress sigma = kn u, u the closure, goes straight.
 
         1. An intact joint bears sigma >= -tension with |q| <= c + mu sigma. A straight step leaves
-           this set once, for it is convex. One that leaves it under tension tears the joint: w = 1,
+           this set once, for it is convex. One that leaves it under tension tears the joint: w = 2,
            q = sigma = 0, and what both springs stored is lost.
         2. What follows counts while faces touch: from u = 0 on, with q = 0, where they were apart;
            up to u = 0 where they part. Under tension only an intact joint counts as touching.
         3. In that part q grows by ks d_s and is cut to the strength (`slide`).
-        4. Where faces part, what q stored is lost, and q = 0, w = 1.
+        4. Where faces part, what q stored is lost, and q = 0, w = 2.
         5. Tangent of the branch where the step ends, with the moment of touch held (`tangent`).
         """
         q, w = state[:-1], state[-1]
@@ -90,15 +93,15 @@ class Coulomb(Element):
         share = np.where(apart, np.maximum(after, 0.0), np.where(parts, before, moved)) / moved
         start, end = np.where(apart, 0.0, before), np.where(touches, after, 0.0)
         dq = self.shear * d[1:] * share
-        slid = self.slide(np.where(apart, 0.0, q), np.where(apart, 1.0, w), dq, start, end)
+        slid = self.slide(np.where(apart, 0.0, q), np.where(apart, PARTED, w), dq, start, end)
 
         lost = np.where(tears, torn, 0.0) + slid.lost
         lost = lost + np.where(parts, 0.5 * squared(slid.q) / self.shear, 0.0)
         new[:-1] = np.where(touches, slid.q, 0.0)
-        new[-1] = np.where(touches, slid.w, 1.0)
+        new[-1] = np.where(touches, slid.w, PARTED)
         F, C = np.concatenate([end[None], new[:-1]]), None
         if tangent:
-            C = self.tangent(np.where(apart, 1.0, w), end, self.shear * share, slid)
+            C = self.tangent(np.where(apart, PARTED, w), end, self.shear * share, slid)
             C = np.where(touches, C, 0.0)
         return Share(F, lost, C)
 
@@ -120,10 +123,10 @@ class Coulomb(Element):
         way = self.shear * self.weakening  # of |q*| - k, from w = 0 to 1
         beyond = np.where(slides, size - cap, 0.0)
         far = w + beyond / way if way > 0.0 else np.where(slides, 1.0, w)
-        now = np.minimum(far, 1.0)
+        now = np.maximum(w, np.minimum(far, 1.0))
         hold = self.strength(now, end)
 
-        ends, done = leaving(q, dq, first + way * (1.0 - w), cap - first)
+        ends, done = leaving(q, dq, first + way * np.maximum(1.0 - w, 0.0), cap - first)
         done = np.where(slides & ends, np.maximum(done, at), 1.0)  # where w becomes 1
         begin = self.strength(w, start + at * (end - start))
         middle = self.strength(0.5 * (w + now), start + 0.5 * (at + done) * (end - start))
@@ -163,11 +166,12 @@ class Coulomb(Element):
     def strength(self, w: Array, sigma: Array) -> Array:
         """Strength in shear (B,) in Pa at this w and this normal stress."""
         c = self.cohesion + (self.residual_cohesion - self.cohesion) * w
+        c = np.where(w > 1.0, 0.0, c)
         return np.maximum(c + self.friction_at(w) * sigma, 0.0)
 
     def friction_at(self, w: Array) -> Array:
         """Coefficient of friction (B,) at this w."""
-        return self.friction + (self.residual_friction - self.friction) * w
+        return self.friction + (self.residual_friction - self.friction) * np.minimum(w, 1.0)
 
     def stiffness(self, delta: Array, state: Array) -> Array:
         """Upper bound (B,) of `|C|` in Pa/m; a joint that weakens may exceed it, for its shear

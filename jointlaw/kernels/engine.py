@@ -118,7 +118,7 @@ class NumpyEngine:
                 state[place] = new.T
             if step.shown is not None:
                 now = reference.parts(self.tables, new)
-                damage = getattr(now, "damage", np.ones(len(F.T)))
+                damage = np.minimum(getattr(now, "damage", np.ones(len(F.T))), 1.0)
                 shares = reference.measures(self.tables, new)[:4]
                 all_shown = np.stack([*shares, now.dissipated, damage, *now.delta])
                 step.shown[part] = all_shown.T

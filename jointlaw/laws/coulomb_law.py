@@ -18,8 +18,8 @@ class CoulombLaw(Law, kind="coulomb"):
     """A joint of constant stiffness that slides at shear stress c + mu sigma (Coulomb).
 
     In opening it bears tension while it is intact, then nothing. By default cohesion and friction
-    stay while it slides; residual values follow the peak at once, or over `weakening`. There is no
-    dilation. docs/theory-incremental.md, "Coulomb's joint", tells how it differs from a `Bond`.
+    stay while it slides; residual values follow the peak at once, or over `weakening`. Faces that
+    have parted, or that meet anew, have no cohesion any more. There is no dilation. docs/theory-incremental.md, "Coulomb's joint", tells how it differs from a `Bond`.
 
     Raises ValueError when a parameter is out of bounds.
 

@@ -30,7 +30,8 @@ static void show(const jlaw_batch *b, jl_numbers n, const jl_amounts *all, doubl
     to[JLAW_SEPARATED] = JL_JOINT(all->separated, l);
     to[JLAW_STORED] = JL_JOINT(all->stored, l);
     to[JLAW_LOST] = s[(size_t) dim * n.stride];
-    to[JLAW_DAMAGE] = jl_element_rows(b->law) ? s[(size_t) last * n.stride] : 1.0;
+    const double damage = jl_element_rows(b->law) ? s[(size_t) last * n.stride] : 1.0;
+    to[JLAW_DAMAGE] = damage < 1.0 ? damage : 1.0; /* more where Coulomb's faces have parted */
     for (int i = 0; i < dim; i++) to[JLAW_SHOWN + i] = s[(size_t) i * n.stride];
   }
 }

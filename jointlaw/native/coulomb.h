@@ -8,7 +8,8 @@ typedef struct {                     /* the part of a step in which faces touch 
 
 JL_IN double jl_coulomb_friction(const jlaw_law *law, double w)
 {
-  return law->coulomb_friction + (law->coulomb_residual_friction - law->coulomb_friction) * w;
+  const double slid = w < 1.0 ? w : 1.0;
+  return law->coulomb_friction + (law->coulomb_residual_friction - law->coulomb_friction) * slid;
 }
 
 /* Strength in shear at this w and this normal stress */
@@ -16,7 +17,7 @@ JL_IN double jl_coulomb_strength(const jlaw_law *law, double w, double sigma)
 {
   const double c =
       law->coulomb_cohesion + (law->coulomb_residual_cohesion - law->coulomb_cohesion) * w;
-  const double cap = c + jl_coulomb_friction(law, w) * sigma;
+  const double cap = (w > 1.0 ? 0.0 : c) + jl_coulomb_friction(law, w) * sigma;
   return cap > 0.0 ? cap : 0.0;
 }
 
@@ -56,9 +57,9 @@ JL_IN void jl_slip_on(const jlaw_law *law, jl_slip *s)
 
   const double way = law->coulomb_shear * law->coulomb_weakening; /* of |q*| - k, w from 0 to 1 */
   const double far = way > 0.0 ? s->w + (s->size - cap) / way : 1.0;
-  s->w1 = far < 1.0 ? far : 1.0;
+  s->w1 = far < 1.0 ? far : s->w > 1.0 ? s->w : 1.0;
   s->hold = jl_coulomb_strength(law, s->w1, s->end);
-  const int ends = jl_leaving(s->q, s->dq, first + way * (1.0 - s->w), cap - first, &done);
+  const int ends = jl_leaving(s->q, s->dq, first + way * (s->w < 1.0 ? 1.0 - s->w : 0.0), cap - first, &done);
   if (ends && done < at) done = at;
   const double begin = jl_coulomb_strength(law, s->w, s->start + at * change);
   const double middle =
@@ -131,7 +132,7 @@ JL_IN double jl_coulomb_step(const jlaw_law *law, jl_part *p, int tangent)
   double share = parts ? before / moved : 1.0;
   if (apart) {
     share = (after > 0.0 ? after : 0.0) / moved;
-    s.start = 0.0, s.w = 1.0, s.q[0] = s.q[1] = 0.0;
+    s.start = 0.0, s.w = JLAW_PARTED, s.q[0] = s.q[1] = 0.0;
   }
   s.end = touches ? after : 0.0;
   for (int i = 0; i < last; i++) s.dq[i] = ks * p->d[i + 1] * share;
@@ -140,7 +141,7 @@ JL_IN double jl_coulomb_step(const jlaw_law *law, jl_part *p, int tangent)
   p->lost = torn + s.lost + (parts ? shear : 0.0);
   for (int i = 0; i < last; i++) p->F[i + 1] = p->row[i] = touches ? s.now[i] : 0.0;
   p->F[0] = s.end;
-  p->row[last] = touches ? s.w1 : 1.0;
+  p->row[last] = touches ? s.w1 : JLAW_PARTED;
   if (tangent && touches) jl_coulomb_tangent(law, &s, ks * share, p->C);
   return touches ? 0.5 * kn * u * u + shear : 0.0;
 }

@@ -285,6 +285,12 @@ static JLAW_FUNCTION int jlaw_sound_(const double *q, int n)
 #define JL_ROWS(name) law->name ? jl_##name##_rows(law) : 0,
 #define JLAW_ROWS_OF(law) {JLAW_ELEMENTS(JL_ROWS) - 1} /* each element's rows, 0 without it; -1 */
 
+/* Damage of joints whose faces meet anew, which have neither bond nor cohesion */
+static JLAW_FUNCTION double jlaw_parted_(const jlaw_law *law)
+{
+  return law->coulomb ? JLAW_PARTED : 1.0;
+}
+
 /* Whether energies, flattened depths, wear and damage of a state are numbers of this law */
 static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
 {
@@ -299,7 +305,7 @@ static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
   const int rows[] = JLAW_ROWS_OF(law);
   for (int i = 0; rows[i] >= 0; i++)
     for (int left = rows[i]; left > 0; left--, row++)
-      good = good && (left > 1 ? fabs(*row) < JLAW_STRONGEST : *row >= 0.0 && *row <= 1.0);
+      good = good && (left > 1 ? fabs(*row) < JLAW_STRONGEST : *row >= 0.0 && *row <= jlaw_parted_(law));
   return good && jlaw_sound_(s + jl_slider_row(law), jl_rest_row(law) - jl_slider_row(law));
 }
 
@@ -384,7 +390,7 @@ JLAW_FUNCTION int jlaw_unmated(const jlaw_law *law, double *s)
   double *row = s + jl_element_row(law);
   const int rows[] = JLAW_ROWS_OF(law);
   for (int i = 0; rows[i] >= 0; row += rows[i++])
-    if (rows[i]) row[rows[i] - 1] = 1.0; /* broken */
+    if (rows[i]) row[rows[i] - 1] = jlaw_parted_(law);
   return far ? 0 : -1;
 }
 JLAW_FUNCTION double jlaw_dissipated(const jlaw_law *law, const double *s) { return s[law->dim]; }

@@ -101,7 +101,7 @@ def check(values: Any, path: str = "") -> None:
         elif said.kind is int:
             object.__setattr__(values, name, integer(where, value, int(said.low)))
         elif said.choices:
-            one_of(where, value, said.choices)
+            object.__setattr__(values, name, one_of(where, value, said.choices))
         elif said.kind is bool and not isinstance(value, bool):
             raise ValueError(f"{where} = {value!r} must be True or False")
         elif isinstance(said.kind, type) and not isinstance(value, said.kind):

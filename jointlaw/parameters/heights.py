@@ -127,6 +127,7 @@ class Heights:
 HeightDistribution: TypeAlias = Any  # see `require_heights`
 # Kinds of heights by the names that files have, the default first
 KINDS = {"gamma": GammaHeights, "histogram": Heights}
+ROUGHLY = 0.1  # share of the asperities: a density may be infinite at a breakpoint
 _ASKED = ("overlap", "formation", "pdf", "cdf", "breakpoints")
 
 
@@ -145,16 +146,37 @@ def require_heights(heights: Any) -> None:
             f"heights = {heights!r} has no {', '.join(missing)}: give GammaHeights, Heights, None, "
             "or a class with these (a histogram in Heights stands for any other distribution)"
         )
-    if getattr(type(heights), "__hash__", None) in (None, object.__hash__):
+    kind = type(heights)
+    if kind.__hash__ in (None, object.__hash__) or kind.__repr__ is object.__repr__:
         raise ValueError(
-            f"heights = {heights!r}: two of equal numbers must be equal and hash alike; make "
-            f"{type(heights).__name__} a frozen dataclass"
+            f"heights = {heights!r}: two of equal numbers must be equal, hash and print alike; "
+            f"make {kind.__name__} a frozen dataclass"
         )
     at_least("heights.overlap", heights.overlap, 0.0)
     one_of("heights.formation", heights.formation, FORMATIONS)
-    points = finite("heights.breakpoints()", heights.breakpoints(), "m")
-    if points.ndim != 1 or points.size < 2 or (np.diff(points) <= 0).any() or points[0] < 0:
-        raise ValueError("heights.breakpoints() must be two or more ascending heights, >= 0 m")
+    points = heights.breakpoints()
+    if not isinstance(points, np.ndarray) or points.ndim != 1 or points.size < 2:
+        raise ValueError("heights.breakpoints() must be an array of two or more heights in m")
+    finite("heights.breakpoints()", points, "m")
+    if (np.diff(points) <= 0).any() or points[0] < 0:
+        raise ValueError("heights.breakpoints() must be ascending heights, >= 0 m")
+    if kind not in KINDS.values():
+        _require_slope(heights, points)
+
+
+def _require_slope(heights: Any, points: Array) -> None:
+    """Refuse a density that is plainly not the slope of the share in touch."""
+    x, weight = np.polynomial.legendre.leggauss(16)
+    half = 0.5 * np.diff(points)
+    density = np.asarray(heights.pdf(points[:-1, None] + half[:, None] * (x + 1.0)), float)
+    found, told = half * (density @ weight), np.diff(heights.cdf(points))
+    if not (np.abs(found - told) <= ROUGHLY).all() or (density < 0.0).any():
+        worst = int(np.argmax(np.nan_to_num(np.abs(found - told), nan=np.inf)))
+        raise ValueError(
+            f"heights: pdf(r) in 1/m must be >= 0 and the slope of cdf(r), but from "
+            f"{points[worst]:g} to {points[worst + 1]:g} m it adds up to {found[worst]:.4g}, and "
+            f"cdf grows by {told[worst]:.4g}"
+        )
 
 
 def _histogram(pair: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -15,7 +15,7 @@ from scene_text import PLAIN, ROCK
 import jointlaw as jl
 from dem_demo import load, parse
 from dem_demo.output import monitors
-from dem_demo.scene import Files, build, build_law
+from dem_demo.scene import TEMPLATE, Files, build, build_law, read_tables
 from dem_demo.scene.read import SCENES
 from dem_demo.studies.strength import alone
 from jointlaw import PathError
@@ -52,85 +52,133 @@ law_steps = 2
 """
 BOX = "box = [1.0, 0.5]\nat = [0.0, 0.25]"
 LINES = "times = [0.0, 0.1]\nvalues = [0.0, 1e-3]"
+ROCKS = TEMPLATE.read_text()
+VARIANT = """
+[variants.flat]
+title = "Flat"
+laws = { joint = { mating_length = 1e-3 } }
+[[variants.flat.rock]]
+seed = 7
+set = [{ dip = 5.0 }]
+"""
+FLAT = f'variant = "flat"\n{ROCKS}{VARIANT}'
 TWICE = '[[joint]]\nbetween = ["base", "top"]\nlaw = "plain"\n[watch]'
+WRONG = [
+    ('name = "top"', 'name = "top"\ndensty = 3', "densty' is unknown; did you mean 'density'"),
+    ("end = 0.002", "", "run.end' is missing"),
+    ("end = 0.002", "end = 0.0", "run.end = 0.0 .* must be > 0"),
+    ("end = 0.002", "end = 1" + 400 * "0", "end = .* not a number"),
+    ("end = 0.002", 'end = "2"', "end = '2' is not a number"),
+    ("step = 1e-4", "fraction = 2.0", "fraction = 2.0: must be from 1e-06 to 0.95"),
+    ("law_steps = 2", "law_steps = 2.9", "law_steps = 2.9 .* whole number >= 1"),
+    ("[run]", "[run", "at line 34"),
+    ("[laws.plain]", "[laws]\nx = 1\n[laws.plain]", "laws.x = 1: must be a table"),
+    ("mu = 0.4", "mu = -0.4", "mu"),
+    ("mating_length = 2e-3", "closure_only = true", "closure_only = true: .* leave it out"),
+    (
+        'kind = "coulomb"',
+        'kind = "glue"',
+        "kind = 'glue' is unknown; choose one of joint, coulomb",
+    ),
+    ("friction = 0.3", "friction = -0.3", "friction = -0.3 .* must be >= 0"),
+    ("friction = 0.3", "friction = true", "friction = True is not a number"),
+    (
+        "normal_stiffness = 1000000000.0",
+        "normal_stiffness = 5.0",
+        "normal_stiffness = 5 Pa/m is outside .*1e.06 to 1e.15 Pa/m.: 1 GPa/m is 1e9",
+    ),
+    ("K = 9.5e6", "K = 9.5e16", "laws.rock: stiffness at 1 MPa = .* Pa/m is outside"),
+    ('law = "rock"', 'law = "rocks"', "law = 'rocks' is unknown; did you mean 'rock'"),
+    ("gravity = [0.0, -9.81]", "gravity = 9.81", "gravity = 9.81: must be two numbers"),
+    ("box = [1.0, 0.5]", "box = [1.0, -0.5]", "or box. must be convex"),
+    (BOX, "corners = [[0, 0], [0, 1], [1, 0]]", "counter-clockwise"),
+    ("box = [1.0, 0.5]", 'corners = [["0", 0], [1, 0], [0, 1]]', "'0' is not a number"),
+    ("box = [1.0, 0.5]", "spin = 1.0", "give `corners` alone, or `box` with"),
+    (
+        "box = [1.0, 0.5]",
+        "corners = [[0, 0], [1, 0], [0, 1]]",
+        "give `corners` alone, or `box`",
+    ),
+    ('name = "top"', 'name = "base"', "two blocks have the same name"),
+    ('held = ["turn"]', "fixed = true", "no block can move"),
+    ('held = ["turn"]', 'held = ["x", "x"]', "held = .* some of x, y, turn, each once"),
+    ('held = ["turn"]', 'held = ["x"]', "a motion of a block is prescribed twice"),
+    ('slip = [["top", "base"]]', 'slip = [["top", "top"]]', "slip = .* must be 2 of base, top"),
+    (
+        'slip = [["top", "base"]]',
+        "pins = [[9.0, 0.0]]",
+        "pins = .*inside a block that can move",
+    ),
+    ('between = ["top", "base"]', 'between = [["top"], "base"]', "between = .* must be 2 of"),
+    ("[watch]", TWICE, r"joint\[1\]: another \[\[joint\]\] gives these blocks another law"),
+    (
+        'block = "top"',
+        'block = "bse"',
+        "drive.0..block = 'bse' is unknown; did you mean 'base'",
+    ),
+    (
+        'block = "top"\nmotion = "x"',
+        'motion = "turn"',
+        "drive.0..block: name one; without it all",
+    ),
+    ("times = [0.0, 0.1]", "scale = 2.0\ntimes = [0.0, 0.1]", "scale, times, values do not go"),
+    ("times = [0.0, 0.1]", "times = [0.1, 0.1]", "times: must increase, one for each"),
+    ("values = [0.0, 1e-3]", "values = [0.0, nan]", "values = .* is not finite"),
+    (LINES, "sine = { acceleration = 1.0, frequency = 5.0, cycles = 0 }", "cycles = 0 .* >= 1"),
+    (ROCK, 'from = "no.toml"\n', r"'no\.toml' is neither a preset"),
+]
+WRONG_ROCKS = [
+    ("dip = 36.0", "dip = 96.0", r"rock\[0\].set\[0\].dip = 96.0: must be from -90"),
+    ("dip = 36.0", "dipp = 36.0", "dipp' is unknown"),
+    ("spacing = 1.3", "spacing = 0.0", r"set\[0\].spacing = 0.0 .* must be > 0"),
+    ("scatter = 0.2", "scatter = 1.0", r"scatter = 1.0: must be from 0 to 0.999"),
+    ("persistence = 0.7", "persistance = 0.7", "did you mean 'persistence'"),
+    ("seed = 1", "seed = 1.5", "seed = 1.5 .* whole number"),
+    ("[4.0, 1.0], [1.5, 1.0]", "[-9.0, 9.0], [1.5, 1.0]", "outline: .* do not cross"),
+    ('name = "slope"', 'name = "slope"\nlike = "hill"', "like = 'hill': no rock further up"),
+    ('name = "slope"', 'name = "slope"\nlaws = { rough = "joint" }', "no set .* law 'rough'"),
+    ("pins = [[-2.0, 7.5]", "pins = [[-2.0, 17.5]", r"pins = \[-2.0, 17.5\]: must lie inside"),
+    ("[watch]", "[[joint]]\naround = [50.0, 0.0]\nlaw = 'joint'\n[watch]", "around = .*inside"),
+    (
+        'persistence = 0.7\nlaw = "joint"',
+        'persistence = 0.7\nlaw = "j"',
+        "law = 'j' is unknown",
+    ),
+    ("[watch]", "[watch]\njoints = [[9.0, -9.0]]", r"joints = \[9.0, -9.0\]: must lie at a joint"),
+]
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "message"),
+    ("text", "old", "new", "message"),
     [
-        ('name = "top"', 'name = "top"\ndensty = 3', "densty' is unknown; did you mean 'density'"),
-        ("end = 0.002", "", "run.end' is missing"),
-        ("end = 0.002", "end = 0.0", "run.end = 0.0 .* must be > 0"),
-        ("end = 0.002", "end = 1" + 400 * "0", "end = .* not a number"),
-        ("end = 0.002", 'end = "2"', "end = '2' is not a number"),
-        ("step = 1e-4", "fraction = 2.0", "fraction = 2.0: must be from 1e-06 to 0.95"),
-        ("law_steps = 2", "law_steps = 2.9", "law_steps = 2.9 .* whole number >= 1"),
-        ("[run]", "[run", "at line 34"),
-        ("[laws.plain]", "[laws]\nx = 1\n[laws.plain]", "laws.x = 1: must be a table"),
-        ("mu = 0.4", "mu = -0.4", "mu"),
-        ("mating_length = 2e-3", "closure_only = true", "closure_only = true: .* leave it out"),
-        (
-            'kind = "coulomb"',
-            'kind = "glue"',
-            "kind = 'glue' is unknown; choose one of joint, coulomb",
-        ),
-        ("friction = 0.3", "friction = -0.3", "friction = -0.3 .* must be >= 0"),
-        ("friction = 0.3", "friction = true", "friction = True is not a number"),
-        (
-            "normal_stiffness = 1000000000.0",
-            "normal_stiffness = 5.0",
-            "normal_stiffness = 5 Pa/m is outside .*1e.06 to 1e.15 Pa/m.: 1 GPa/m is 1e9",
-        ),
-        ("K = 9.5e6", "K = 9.5e16", "laws.rock: stiffness at 1 MPa = .* Pa/m is outside"),
-        ('law = "rock"', 'law = "rocks"', "law = 'rocks' is unknown; did you mean 'rock'"),
-        ("gravity = [0.0, -9.81]", "gravity = 9.81", "gravity = 9.81: must be two numbers"),
-        ("box = [1.0, 0.5]", "box = [1.0, -0.5]", "or box. must be convex"),
-        (BOX, "corners = [[0, 0], [0, 1], [1, 0]]", "counter-clockwise"),
-        ("box = [1.0, 0.5]", 'corners = [["0", 0], [1, 0], [0, 1]]', "'0' is not a number"),
-        ("box = [1.0, 0.5]", "spin = 1.0", "give `corners` alone, or `box` with"),
-        (
-            "box = [1.0, 0.5]",
-            "corners = [[0, 0], [1, 0], [0, 1]]",
-            "give `corners` alone, or `box`",
-        ),
-        ('name = "top"', 'name = "base"', "two blocks have the same name"),
-        ('held = ["turn"]', "fixed = true", "no block can move"),
-        ('held = ["turn"]', 'held = ["x", "x"]', "held = .* some of x, y, turn, each once"),
-        ('held = ["turn"]', 'held = ["x"]', "a motion of a block is prescribed twice"),
-        ('slip = [["top", "base"]]', 'slip = [["top", "top"]]', "slip = .* must be 2 of base, top"),
-        (
-            'slip = [["top", "base"]]',
-            "pins = [[9.0, 0.0]]",
-            "pins = .*inside a block that can move",
-        ),
-        ('between = ["top", "base"]', 'between = [["top"], "base"]', "between = .* must be 2 of"),
-        ("[watch]", TWICE, r"joint\[1\]: another \[\[joint\]\] gives these blocks another law"),
-        (
-            'block = "top"',
-            'block = "bse"',
-            "drive.0..block = 'bse' is unknown; did you mean 'base'",
-        ),
-        (
-            'block = "top"\nmotion = "x"',
-            'motion = "turn"',
-            "drive.0..block: name one; without it all",
-        ),
-        ("times = [0.0, 0.1]", "scale = 2.0\ntimes = [0.0, 0.1]", "scale, times, values do not go"),
-        ("times = [0.0, 0.1]", "times = [0.1, 0.1]", "times: must increase, one for each"),
-        ("values = [0.0, 1e-3]", "values = [0.0, nan]", "values = .* is not finite"),
-        (LINES, "sine = { acceleration = 1.0, frequency = 5.0, cycles = 0 }", "cycles = 0 .* >= 1"),
+        *((TEXT, *row) for row in WRONG),
+        *((ROCKS, *row) for row in WRONG_ROCKS),
+        (FLAT, '"flat"', '"flt"', "variant = 'flt' is unknown; did you mean 'flat'"),
+        (FLAT, "seed = 7", "sead = 7", "sead' is unknown; did you mean 'seed'"),
     ],
 )
-def test_nonsense_is_named(old, new, message):
-    assert old in TEXT
+def test_nonsense_is_named(text, old, new, message):
+    assert old in text
     with pytest.raises(ValueError, match=message):
-        parse(TEXT.replace(old, new, 1))
+        parse(text.replace(old, new, 1), "scene.toml")
 
 
 @pytest.mark.parametrize("table", ["joint", "block", "drive", "rock"])
 def test_lists_of_tables_hold_tables(table):
     with pytest.raises(ValueError, match=rf"scene: .*{table}\[0\].* must be a table"):
         build({**tomllib.loads(TEXT), table: [1]})
+
+
+def test_a_variant_changes_what_it_names():
+    """Tables key by key, lists of tables in order, all else as it stands."""
+    scene, flat = read_tables(ROCKS + VARIANT), read_tables(FLAT)
+    assert flat["title"] == "Flat"
+    assert flat["laws"]["joint"] == {**scene["laws"]["joint"], "mating_length": 1e-3}
+    (rock,) = flat["rock"]
+    assert [joints["dip"] for joints in rock["set"]] == [5.0, -60.0]
+    sets = [{**scene["rock"][0]["set"][0], "dip": 5.0}, scene["rock"][0]["set"][1]]
+    assert rock == {**scene["rock"][0], "seed": 7, "set": sets}
+    assert {key for key in scene if flat[key] != scene[key]} == {"title", "laws", "rock"}
 
 
 def test_a_file_that_is_no_text_is_named(tmp_path):
@@ -182,13 +230,6 @@ def test_the_unit_says_what_a_record_holds(tmp_path, titles, unit, order):
     assert (drive.order, drive.values) == (order, (0.0, 2.0 * unit))
 
 
-def test_a_record_of_displacement_begins_and_ends_at_rest(tmp_path):
-    """A clamped cubic of one span is 3 s**2 - 2 s**3 of its rise."""
-    drive = driven(tmp_path, "time_s,u_mm\n1,0\n3,2\n", "scale = 0.5")
-    found = [drive(t) for t in (0.0, 1.0, 1.5, 2.0, 3.0, 9.0)]
-    np.testing.assert_allclose(found, [0.0, 0.0, 1e-3 * 10 / 64, 5e-4, 1e-3, 1e-3], atol=1e-15)
-
-
 @pytest.mark.parametrize("order", [1, 2])
 def test_base_correction_ends_at_rest_and_takes_drift_away(tmp_path, order):
     """A line in acceleration, a parabola in velocity: what is left does not depend on it."""
@@ -204,26 +245,42 @@ def test_base_correction_ends_at_rest_and_takes_drift_away(tmp_path, order):
     np.testing.assert_allclose(*left, atol=1e-13)
 
 
-# at 0, 0.1 ... 0.6 s: the integral of the record, doubled by `scale`; and the integral of that,
-# 5 s**3/6 while it rises, then a parabola, then a line
-ONCE = [0.0, 0.0, 0.025, 0.1, 0.2, 0.3, 0.4]
-TWICE = [0.0, 0.0, 5e-3 / 6, 0.04 / 6, 0.04 / 6 + 0.015, 0.04 / 6 + 0.04, 0.04 / 6 + 0.07]
+TENTHS = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6]  # s
+# the integral of the record, doubled by `scale`; and the integral of that, 5 s**3/6 while it rises,
+# then a parabola, then a line
+MOVED = [0.0, 0.0, 0.025, 0.1, 0.2, 0.3, 0.4]
+ACCELERATED = [
+    0.0,
+    0.0,
+    5e-3 / 6,
+    0.04 / 6,
+    0.04 / 6 + 0.015,
+    0.04 / 6 + 0.04,
+    0.04 / 6 + 0.07,
+]
+# a clamped cubic of one span is 3 s**2 - 2 s**3 of its rise: it begins and ends at rest
+CUBIC = [0.0, 0.0, 1e-3 * 10 / 64, 5e-4, 1e-3, 1e-3]
+RISE = "\n0.1,0.0\n0.3,0.5\n0.5,0.5\n"
 
 
-@pytest.mark.parametrize(("title", "exact"), [("velocity_m/s", ONCE), ("acceleration_m/s2", TWICE)])
-def test_a_record_moves_its_block(tmp_path, title, exact):
+@pytest.mark.parametrize(
+    ("record", "scale", "times", "exact"),
+    [
+        (f"time_s, velocity_m/s{RISE}", 2.0, TENTHS, MOVED),
+        (f"time_s, acceleration_m/s2{RISE}", 2.0, TENTHS, ACCELERATED),
+        ("time_s,u_mm\n1,0\n3,2\n", 0.5, [0.0, 1.0, 1.5, 2.0, 3.0, 9.0], CUBIC),
+    ],
+)
+def test_a_record_moves_its_block(tmp_path, record, scale, times, exact):
     """Straight lines between accelerations, or velocities, by hand; then at constant velocity."""
-    drive = driven(tmp_path, f"time_s, {title}\n0.1,0.0\n0.3,0.5\n0.5,0.5\n", "scale = 2.0")
-    found = [drive(at) for at in (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)]
-    np.testing.assert_allclose(found, exact, atol=1e-15)
+    drive = driven(tmp_path, record, f"scale = {scale}")
+    np.testing.assert_allclose([drive(at) for at in times], exact, atol=1e-15)
 
 
 def test_a_law_by_name_and_the_keys_that_replace_its_own():
     given = jl.presets.load("westerly-rough")
     law = build_law({"from": "westerly-rough", "asperity": {"mu": 0.5}}, "law", Files())
     assert law == replace(given, plane=0.0, asperity=replace(given.asperity, mu=0.5))
-    with pytest.raises(ValueError, match=r"'no\.toml' is neither a preset"):
-        parse(TEXT.replace(ROCK, 'from = "no.toml"\n'))
 
 
 def test_an_angle_that_is_not_found_is_given_up(monkeypatch):

@@ -1,19 +1,61 @@
-"""Every example of the gallery runs as the site runs it, and its pictures show what they say.
+"""Examples run: those of docstrings, which name arguments and errors; those of the gallery, whose
+pictures show what they say; the figures of the paper, with known points of their curves.
 
-The site runs an example cell by cell (`# %%`), takes the pictures after each cell and closes them.
+The site runs an example of the gallery cell by cell (`# %%`), takes the pictures after each cell
+and closes them.
 """
 
+import doctest
+import inspect
 import re
+import runpy
 import warnings
+from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
-from pages import ROOT
 
+import jointlaw as jl
 from jointlaw.support.pyplot import style
 
-pytestmark = pytest.mark.slow  # a minute and a half in all
+DOCS = Path(__file__).parents[2] / "docs"
+WITHOUT = {"JointTable", "NonFiniteError", "PathError", "Record", "load_table"}  # made by others
+NAMES = {name: getattr(jl, name) for name in jl.__all__ if not inspect.ismodule(getattr(jl, name))}
+CALLED = NAMES | {
+    f"{name}.{own}": getattr(thing, own)
+    for name, thing in NAMES.items()
+    for own in (vars(thing) if inspect.isclass(thing) else ())
+    if not own.startswith("_") and callable(getattr(thing, own))
+}
 
-GALLERY = {path.stem.removeprefix("plot_"): path for path in ROOT.glob("docs/gallery/plot_*.py")}
+
+@pytest.mark.parametrize("name", CALLED)
+def test_docstrings_name_arguments_and_errors(name):
+    text, thing = inspect.getdoc(CALLED[name]), CALLED[name]
+    # an error holds what it was raised with
+    arguments = () if name.endswith("Error") else inspect.signature(thing).parameters
+    named = [one for one in arguments if one not in ("self", "args")]
+    assert [one for one in named if not re.search(rf"\b{one}\b", text)] == []
+    assert inspect.isclass(thing) or not named or re.search(r"\b[Rr]aises\b", text)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_examples_run(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    law = jl.presets.load("westerly-smooth")
+    sheared = jl.direct_shear(law.joint(), 1e-6, normal=5e6)
+    space = {
+        "jl": jl, "np": np, "replace": replace, "law": law, "joint": law.joint(),
+        "record": jl.closure_test(law.joint(), 5e6), "sheared": sheared,
+        "curve": jl.ShearCurve(sheared.shear[1:], sheared.shear_stress[1:], 5e6),
+    }  # fmt: skip
+    found = doctest.DocTestFinder().find(NAMES[name], name, globs=space)
+    assert name in WITHOUT or any(one.examples for one in found)
+    assert not any(doctest.DocTestRunner().run(one).failed for one in found)
+
+
+GALLERY = {path.stem.removeprefix("plot_"): path for path in DOCS.glob("gallery/plot_*.py")}
 
 
 WITHOUT_UNIT = re.compile(r"iteration|branch: .*|.+ over .+")  # counts and ratios
@@ -58,6 +100,7 @@ def faults(axes, parts):
             yield f"label {label!r} without a unit"
 
 
+@pytest.mark.slow  # a minute and a half in all
 @pytest.mark.parametrize("name", sorted(GALLERY))
 def test_example_runs(name):
     with style() as plt, warnings.catch_warnings():
@@ -69,6 +112,40 @@ def test_example_runs(name):
 
 
 def test_gallery_is_in_order_and_complete():
-    settings = (ROOT / "docs" / "conf.py").read_text(encoding="utf-8")
-    order = settings.split("ORDER = (")[1].split(")")[0]
+    settings = (DOCS / "conf.py").read_text(encoding="utf-8")
+    (order,) = re.findall(r"ORDER = \((.*?)\)", settings, re.DOTALL)
     assert sorted(re.findall(r"\w+", order)) == sorted(GALLERY)
+
+
+FIGURES = {int(path.stem[-2:]): path for path in DOCS.glob("paper/plot_fig_*.py")}
+TOTAL, LAW = "total form (as printed)", "incremental law (this package)"
+# panel, curve, row, y; by hand from Table 1, or as test_paper_*.py has them
+KNOWN = {
+    8: ("(a) Kₛ/Kₙ = 0.5", "b = −1", 0, 0.7 / 0.6),
+    9: ("", "c = 1/3", 45, 0.9),
+    10: ("share that slides, Kₛ = Kₙ", "a = 2, total", 12, np.cos(2 * np.arctan(0.6))),
+    14: (TOTAL, "a = 3", -1, 0.9356),
+    15: (TOTAL, "linear, a = 6", -1, 0.6939),
+    17: (LAW, "rough", -1, 0.661),
+    18: (TOTAL, "every normal stress", 12, 30.6),
+    19: (LAW, "slip of 1 mm, 0°", 0, 46.9),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", sorted(FIGURES))
+def test_figure(number, monkeypatch):
+    monkeypatch.syspath_prepend(FIGURES[number].parent)
+    panels = runpy.run_path(str(FIGURES[number]))["panels"]
+    for curve in (curve for lines in panels.values() for curve in lines.values()):
+        assert np.isfinite(np.array(curve, float)).all()
+    if number >= 11:  # loading: both forms of the law
+        titles = " ".join(panels)
+        assert TOTAL in titles and LAW in titles  # noqa: PT018
+    if number in KNOWN:
+        panel, curve, row, y = KNOWN[number]
+        assert panels[panel][curve][1][row] == pytest.approx(y, rel=2e-3)
+
+
+def test_every_figure_with_something_to_compute_is_drawn():
+    assert sorted(FIGURES) == [3, 4, 5, *range(7, 20)]  # 1 and 2 are sketches; 6 is with 4

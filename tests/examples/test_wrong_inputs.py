@@ -54,17 +54,17 @@ FILES = {
     "friction-30.toml": SCENE.replace("friction = 0.3", "friction = 30"),
     "density.toml": SCENE.replace("2600.0", "2.6"),
     "plane-90.toml": SCENE.replace("plane = 0.0", "plane = 90"),
+    "done/summary.json": '{"files": ["shear.csv"]}',
+    "done/shear.csv": "of an earlier run",
+    "done/notes.txt": "mine",
 }
 
 
 @pytest.fixture(autouse=True)
 def _files(tmp_path):
     for name, text in FILES.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
-    (tmp_path / "done").mkdir()
-    (tmp_path / "done" / "summary.json").write_text('{"files": ["shear.csv"]}')
-    (tmp_path / "done" / "shear.csv").write_text("of an earlier run")
-    (tmp_path / "done" / "notes.txt").write_text("mine")
 
 
 @pytest.mark.parametrize(
@@ -154,8 +154,9 @@ def test_a_slip_is_told_in_one_line(capsys, line, told):
 def test_ctrl_c_ends_a_command_in_one_line(line, where, capsys, monkeypatch):
     monkeypatch.setattr(f"jointlaw.cli.{where}", Mock(side_effect=KeyboardInterrupt))
     assert jointlaw_main(line.split()) == 130
-    told = f"jointlaw {line.split()[0]}: interrupted; nothing more is written\n"
-    assert capsys.readouterr().err == told
+    assert capsys.readouterr().err == (
+        f"jointlaw {line.split()[0]}: interrupted; nothing more is written\n"
+    )
     assert not Path("out").exists()
 
 

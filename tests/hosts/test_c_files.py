@@ -258,7 +258,7 @@ def test_examples_of_fewer_components(tmp_path, law, plane):
 
 
 def test_names(tmp_path, law):
-    for name in ("3mm", "a-b", "", "x" * 60):
+    for name in ("3mm", "a-b", "", "x" * 60, "double", "class", "jlaw_read"):
         with pytest.raises(ValueError, match="is no identifier of C; take letters"):
             jl.export_c(law, tmp_path / "new", name)
     assert not (tmp_path / "new").exists()

@@ -46,9 +46,11 @@ def scene(apart, speed, opening=1e-4, law="bonded"):
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_pulled_apart(folder, law):
-    """The force is that of the law at each opening: up to tension times area, then none."""
-    run(folder, scene(2 * R - 1e-9, "1.0 0.0 0.0", law=law))
+@pytest.mark.parametrize("closed", [1e-9, -4e-18])
+def test_pulled_apart(folder, law, closed):
+    """The force is that of the law at each opening: up to tension times area, then none. Spheres
+    that are drawn to touch do, whichever way the distance is rounded."""
+    run(folder, scene(2 * R - closed, "1.0 0.0 0.0", law=law))
     frames = dumped(folder / "out")
     opening, force = frames[:, 1, 1] - 2 * R, frames[:, 0, 2]
     area, joint = np.pi * R * R, LAWS[law].joint()

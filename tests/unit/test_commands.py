@@ -1,6 +1,7 @@
-"""The commands, as a newcomer types them."""
+"""The commands, as a newcomer types them, and the quantities that they take."""
 
 import json
+import math
 import re
 import shlex
 import subprocess
@@ -9,12 +10,14 @@ from importlib import resources
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 import jointlaw as jl
 from jointlaw import hosts
 from jointlaw.cli.export import START
 from jointlaw.cli.main import COMMANDS, main
 from jointlaw.hosts.c.export import identifier, require_name
+from jointlaw.support import units
 
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 
@@ -65,11 +68,12 @@ def test_presets_are_listed_and_start_a_file(tmp_path, capsys):
     assert jl.JointLaw.from_toml(tmp_path / "o" / "law.toml") == jl.presets.load(name)
 
 
-def test_every_command_has_an_example(capsys):
+def test_every_command_has_an_example_and_there_is_a_version(capsys):
     commands = re.findall(r"^    (\w+) ", asked("--help", capsys), re.MULTILINE)
     assert commands == [command.name for command in COMMANDS]
     for typed in [*commands, *(f"export {host}" for host in START)]:
         assert example(typed, capsys)[: typed.count(" ") + 1] == typed.split()
+    assert asked("--version", capsys).endswith(f"{jl.__version__}\n")
 
 
 def test_all_options_of_shear(tmp_path):
@@ -118,16 +122,14 @@ def test_every_host_gets_its_files_and_is_told_what_to_type(host, tmp_path, caps
         ("rough-2", "rough_2"),
         ("7 b.", "joint_7_b"),
         ("---", "joint"),
+        ("double", "joint_double"),
+        ("jointlaw-1", "joint_jointlaw_1"),
         ("jing-replica", "jing_replica"),
     ],
 )
 def test_a_name_of_tables_is_an_identifier_of_c(text, name):
     assert identifier(text) == name
     require_name(name)
-
-
-def test_version(capsys):
-    assert asked("--version", capsys).endswith(f"{jl.__version__}\n")
 
 
 def test_as_a_module(tmp_path):
@@ -139,3 +141,158 @@ def test_as_a_module(tmp_path):
         assert told in done.stderr
         assert len(done.stderr.splitlines()) == bool(told)
     assert (tmp_path / "o" / "shear.png").is_file()
+
+
+@pytest.fixture
+def cycle(tmp_path):
+    """Loading from (0, 0) and unloading, made by the law itself, in a file."""
+    record = jl.closure_test(jl.presets.load("biegel-smooth").joint(), 10e6, steps=12)
+    record.to_csv(tmp_path / "loop.csv")
+    return record
+
+
+def summary_of(folder):
+    return json.loads((folder / "summary.json").read_text())
+
+
+def test_the_first_loading_is_fitted_and_the_rest_predicted(tmp_path, cycle, capsys):
+    """From zero stress, so the seating closure is known."""
+    assert main(["fit", "loop.csv", "--set", "alpha=3.8", "--up-to", "5MPa", "--out", "o"]) == 0
+    out = capsys.readouterr().out
+    summary = summary_of(tmp_path / "o")
+    assert (summary["version"], summary["parameters_SI"]["seating"]) == (2, 0.0)
+    above = np.count_nonzero(cycle.F1[:13] > 5e6)
+    assert f"Held out: {above} points" in out
+    assert f"off by {100 * summary['error_at_largest_stress']:+.1f} %" in out
+    assert (tmp_path / "o" / "fit.png").read_bytes().startswith(b"\x89PNG")
+    law = jl.JointLaw.from_toml(tmp_path / "o" / "law.toml")
+    assert law.heights.beta == summary["parameters_SI"]["beta"]
+
+
+def test_without_matplotlib_all_but_the_picture_is_written(tmp_path, cycle, capsys, monkeypatch):
+    """With the law that gives all that is not fitted, the formation of contacts too."""
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    law = jl.presets.load("westerly-smooth")
+    line = "fit loop.csv --set alpha=3.8 --law westerly-smooth --out o"
+    assert main(line.split()) == 0
+    captured = capsys.readouterr()
+    assert "no picture: pictures need matplotlib" in captured.err
+    assert "wrote law.toml, report.md, summary.json to o" in captured.out
+    found = jl.JointLaw.from_toml(tmp_path / "o" / "law.toml")
+    assert (found.asperity, found.heights.overlap) == (law.asperity, law.heights.overlap)
+    assert found.heights.formation == law.heights.formation == "population"
+
+
+def test_no_friction_angle_of_a_surface_that_the_law_does_not_describe(tmp_path, capsys):
+    """Waves five times as long along the rows: at both sampling lengths."""
+    z = 400e-6 * gaussian_filter(np.random.default_rng(0).standard_normal((400, 400)), (5, 25))
+    np.save(tmp_path / "z.npy", z)
+    assert main(["scan", "z.npy", "--spacing", "20um", "--height-unit", "m", "--out", "o"]) == 0
+    told = [line for line in capsys.readouterr().out.splitlines() if "not told" in line]
+    assert len(told) == 2
+    assert "°" not in "".join(told)
+
+
+def test_a_scan_needs_only_the_contacts_to_be_a_law(tmp_path, capsys):
+    rng = np.random.default_rng(0)
+    z = 400e-6 * gaussian_filter(rng.standard_normal((400, 400)), 5)
+    np.save(tmp_path / "z.npy", 1e6 * z)
+    assert main(["scan", "z.npy", "--spacing", "20um", "--height-unit", "um", "--out", "o"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    told = {length: line for length in ("0.08", "0.16") for line in lines if f"| {length} " in line}
+    assert len(told) == 2
+    summary = summary_of(tmp_path / "o")
+    assert summary["version"] == 2
+    assert summary["parameters_SI"] == pytest.approx(jl.from_surface(z, 20e-6).parameters)
+    shear = "shear o/surface.toml --normal-stress 1MPa --to 80um --steps 100 --out p"
+    assert main(shear.split()) == 2
+    assert "add the table [asperity] with K" in capsys.readouterr().err
+    assert main([*shear.split(), "--default-rock"]) == 0
+    law = jl.JointLaw.from_toml(tmp_path / "p" / "law.toml")
+    assert summary["parameters_SI"]["a"] == law.orientation.a
+    assert summary["parameters_SI"]["asperity_density"] == law.asperity_density
+    found = summary_of(tmp_path / "p")["result"]
+    # the report's joint moves along the rows alone, in the same nodes: 0.1 degrees are rounding
+    angle = float(told["0.08"].split("|")[3].strip("° "))
+    assert found["peak_friction_angle_deg"] == pytest.approx(angle, abs=0.6)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        (" 1.5 GPa ", "Pa", 1.5e9),
+        ("10e6", "Pa", 10e6),  # a bare number is SI
+        ("2N/mm2", "Pa", 2e6),
+        ("3kN/m²", "Pa", 3e3),
+        ("4bar", "Pa", 4e5),
+        ("-2um", "m", -2e-6),
+        ("2µm", "m", 2e-6),
+        ("2μm", "m", 2e-6),
+        (".5cm", "m", 5e-3),
+        ("+7nm", "m", 7e-9),
+        ("1e-6m", "m", 1e-6),
+        ("5MPa/mm", "Pa/m", 5e9),
+        ("30deg", "rad", math.pi / 6),
+        ("30°", "rad", math.pi / 6),
+        ("0.5rad", "rad", 0.5),
+    ],
+)
+def test_quantities(text, unit, value):
+    assert units.parse(text, unit) == pytest.approx(value, rel=1e-15)
+
+
+PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
+
+
+@pytest.mark.parametrize(
+    ("row", "unit"),
+    [
+        (row, unit)
+        for unit in ("m", "N", "Pa", "m2")
+        for row in units._FACTORS[unit]
+        if row != "bar"
+    ],
+)
+def test_every_row_of_the_tables_of_units(row, unit):
+    """By the parts of its name: kN/m2 is a thousand newtons on a square metre."""
+    plain = re.sub("[µμ]", "u", row.replace("²", "2"))
+    prefix, of_area = re.fullmatch("(.?)(?:m2|m|N|Pa)(?:/(.?)m2)?", plain).groups(default="")
+    exact = PREFIXES[prefix] ** (2 if unit == "m2" else 1) / PREFIXES[of_area] ** 2
+    assert units.parse(f"1{row}", unit) == pytest.approx(exact, rel=1e-15)
+
+
+def test_every_unit_has_a_common_unit():
+    for unit, common in units.COMMON.items():
+        assert units.parse(f"1{common}", unit) > 0
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [
+        ("", "Pa"),
+        ("10 mpa", "Pa"),
+        ("10um", "Pa"),
+        ("10MPa10", "Pa"),
+        ("1,5MPa", "Pa"),
+        ("nan", "Pa"),
+        ("0x10", "m"),
+        ("--2um", "m"),
+        ("5GPa", "Pa/m"),
+        ("5Pa/", "Pa/m"),
+        ("30mrad", "rad"),
+        *(("x", unit) for unit in units.COMMON),
+    ],
+)
+def test_what_is_no_quantity(text, unit):
+    with pytest.raises(ValueError, match=f"is not a quantity in {unit}; write") as error:
+        units.parse(text, unit)
+    assert repr(text) in str(error.value)
+    assert units.parse(str(error.value).rsplit(" ", 1)[-1], unit) > 0  # the example that it gives
+
+
+def test_what_a_person_types_has_a_unit():
+    assert units.typed("0", "Pa") == 0.0
+    assert units.typed("5MPa", "Pa", positive=True) == 5e6
+    for text, told in (("5", "write for example 5MPa"), ("0", "> 0 Pa"), ("1e400Pa", "finite")):
+        with pytest.raises(ValueError, match=told):
+            units.typed(text, "Pa", positive=True)

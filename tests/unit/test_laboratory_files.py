@@ -15,15 +15,10 @@ TAU = np.array([0.0, 0.875, 1.25, 1.75, 1.625, 1.5])  # MPa
 NORMAL = {"normal_stress": 2e6}
 
 
-@pytest.fixture
-def shear_of(tmp_path):
-    """Writes a text to a file and reads its tests of shear."""
-
-    def read(text, **told):
-        (tmp_path / "lab.csv").write_text(text, encoding="utf-8")
-        return read_shear(tmp_path / "lab.csv", **told)
-
-    return read
+def read(folder, text, reader=read_shear, encoding="utf-8", **told):
+    """Write a text to a file, and what the reader finds in it."""
+    (folder / "lab.csv").write_text(text, encoding=encoding, newline="")
+    return reader(folder / "lab.csv", **told)
 
 
 def rows(*columns, mark=",", decimal="."):
@@ -90,8 +85,7 @@ def test_read_right(name, encoding, tmp_path):
     text = (
         text if encoding != "cp1252" else text.translate({0x2212: "-", 0x202F: "\xa0", 0xFEFF: ""})
     )
-    (tmp_path / "lab.csv").write_text(text, encoding=encoding, newline="")
-    (found,) = read_shear(tmp_path / "lab.csv", **told)
+    (found,) = read(tmp_path, text, encoding=encoding, **told)
     assert found.normal == pytest.approx(2e6)
     sense = np.sign(found.shear[-1])
     np.testing.assert_allclose(sense * found.shear, 1e-3 * U, atol=1e-15)
@@ -99,8 +93,8 @@ def test_read_right(name, encoding, tmp_path):
 
 
 def test_closure_is_read_alike(tmp_path):
-    (tmp_path / "c.csv").write_text("Disp;sigmaZ\n/mm;/kPa\n" + rows(U, 1e3 * U, mark=";"))
-    stress, closure, notes = read_closure(tmp_path / "c.csv")
+    text = "Disp;sigmaZ\n/mm;/kPa\n" + rows(U, 1e3 * U, mark=";")
+    stress, closure, notes = read(tmp_path, text, read_closure)
     assert not notes
     np.testing.assert_allclose(closure, 1e-3 * U)
     np.testing.assert_allclose(stress, 1e6 * U)
@@ -141,13 +135,13 @@ def test_several_tests_of_one_file(kind, tmp_path):
 
 def test_a_table_of_peaks_is_a_test_a_row(tmp_path):
     """Titles as in a published set of sandstone joints."""
-    path = tmp_path / "peaks.csv"
-    path.write_text(
+    one, two = read(
+        tmp_path,
         "curve_id,normal_stress_mpa,peak_shear_stress_mpa,peak_shear_displacement_mm,"
         "final_shear_stress_mpa,final_shear_displacement_mm\n"
-        "JA_1,1.0,1.28,1.937,0.862,9.97\nJA_2,2.0,2.31,2.365,1.775,10.0\n"
+        "JA_1,1.0,1.28,1.937,0.862,9.97\nJA_2,2.0,2.31,2.365,1.775,10.0\n",
+        read_peaks,
     )
-    one, two = read_peaks(path)
     np.testing.assert_allclose(two.shear, [0, 2.365e-3, 10e-3])
     np.testing.assert_allclose(one.shear_stress, [0, 1.28e6, 0.862e6])
     assert (one.normal[0], two.normal[0]) == (1e6, 2e6)
@@ -157,8 +151,10 @@ CURVE = {
     datasets.SHEAR: U, datasets.SHEAR_STRESS: TAU, datasets.NORMAL: 0 * U + 2,
     datasets.OPENING: OPENED,
 }  # fmt: skip
-PEAK = dict(zip(datasets.PEAKS, ([1.25], [0.05], [0.8], [9.9]), strict=True))
-PEAK |= {datasets.NORMAL: [2.0]}
+PEAK = {
+    **dict(zip(datasets.PEAKS, ([1.25], [0.05], [0.8], [9.9]), strict=True)),
+    datasets.NORMAL: [2.0],
+}
 
 
 @pytest.mark.parametrize(
@@ -170,24 +166,24 @@ def test_every_known_name_of_a_column_is_read(table, asked, name, tmp_path):
     titles = [name.upper() if one is asked else one.names[0] for one in table]
     units = [{"m": "mm", "Pa": "MPa"}[one.base] for one in table]
     header = ",".join(f"{title} [{unit}]" for title, unit in zip(titles, units, strict=True))
-    (tmp_path / "t.csv").write_text(f"{header}\n{rows(*table.values())}")
-    (found,) = (read_peaks if table is PEAK else read_shear)(tmp_path / "t.csv")
+    reader = read_peaks if table is PEAK else read_shear
+    (found,) = read(tmp_path, f"{header}\n{rows(*table.values())}", reader)
     assert found.normal == pytest.approx(2e6)
     assert found.shear[1] == pytest.approx(0.05e-3)
     assert found.shear_stress[2 - (table is PEAK)] == pytest.approx(1.25e6)
 
 
-def test_a_normal_stress_that_varies_is_taken_row_by_row(shear_of):
-    (test,) = shear_of("us [mm],tau [MPa],sn [MPa]\n" + rows(U, TAU, 1 + U))
+def test_a_normal_stress_that_varies_is_taken_row_by_row(tmp_path):
+    (test,) = read(tmp_path, "us [mm],tau [MPa],sn [MPa]\n" + rows(U, TAU, 1 + U))
     np.testing.assert_allclose(test.normal, 1e6 * (1 + U))
 
 
-def test_tare_is_subtracted_and_told(shear_of):
+def test_tare_is_subtracted_and_told(tmp_path):
     """0.1 MPa that the load cell showed before the test; 1 % is scatter of the first row."""
-    (test,) = shear_of("us [mm],tau [MPa]\n" + rows(U, TAU + 0.1), **NORMAL)
+    (test,) = read(tmp_path, "us [mm],tau [MPa]\n" + rows(U, TAU + 0.1), **NORMAL)
     np.testing.assert_allclose(test.shear_stress, 1e6 * TAU)
     assert "begins at 5.4 % of its largest value, which is subtracted" in test.notes[0]
-    (test,) = shear_of("us [mm],tau [MPa]\n" + rows(U, TAU + 0.01), **NORMAL)
+    (test,) = read(tmp_path, "us [mm],tau [MPa]\n" + rows(U, TAU + 0.01), **NORMAL)
     np.testing.assert_allclose(test.shear_stress, 1e6 * TAU + 1e4)
     assert not test.notes
 
@@ -205,13 +201,13 @@ ODD = {  # a file with a row that is no measurement, and what is told of it
 
 
 @pytest.mark.parametrize("kind", ODD)
-def test_rows_that_are_no_measurement_are_named_until_an_option_settles_it(kind, shear_of):
+def test_rows_that_are_no_measurement_are_named_until_an_option_settles_it(kind, tmp_path):
     text, told = "No,us [mm],tau [MPa]\n" + ODD[kind][0], ODD[kind][1]
     with pytest.raises(ValueError, match=rf"{re.escape(told)}\. .*--outliers skip"):
-        shear_of(text, **NORMAL)
-    (skipped,) = shear_of(text, **NORMAL, outliers="skip")
+        read(tmp_path, text, **NORMAL)
+    (skipped,) = read(tmp_path, text, **NORMAL, outliers="skip")
     if kind != "a sentinel":
-        (kept,) = shear_of(text, **NORMAL, outliers="keep")
+        (kept,) = read(tmp_path, text, **NORMAL, outliers="keep")
         assert kept.shear.size == skipped.shear.size + 1
     np.testing.assert_allclose(skipped.shear_stress, 2e9 * skipped.shear, atol=1e-6)
     assert told in skipped.notes[0]
@@ -220,8 +216,8 @@ def test_rows_that_are_no_measurement_are_named_until_an_option_settles_it(kind,
 def test_the_steep_foot_of_two_cycles_is_no_jump(tmp_path):
     """Unloading to zero stress takes back a third of the closure in one row."""
     stress = np.array([0.5, 2, 4, 2, 0.1, 0, 0.1, 2, 4, 8])
-    (tmp_path / "c.csv").write_text("s [MPa],closure [um]\n" + rows(stress, 50 * stress**0.2))
-    assert read_closure(tmp_path / "c.csv", "s:MPa")[0].size == 10
+    text = "s [MPa],closure [um]\n" + rows(stress, 50 * stress**0.2)
+    assert read(tmp_path, text, read_closure, stress="s:MPa")[0].size == 10
 
 
 def test_preload_cycles_are_first_loading_where_the_stress_is_new():
@@ -279,10 +275,10 @@ MAY_BE_THOUSANDS = [
     ],
 )
 def test_decimal_commas_are_read_where_a_number_or_the_caller_shows_them(
-    cells, decimal, stress, shear_of
+    cells, decimal, stress, tmp_path
 ):
     text = "us [mm];tau [MPa]\n0;0\n" + cells
-    (test,) = shear_of(text, normal_stress=5e7, decimal=decimal)
+    (test,) = read(tmp_path, text, normal_stress=5e7, decimal=decimal)
     assert test.shear_stress[2] == stress
 
 

@@ -1,14 +1,69 @@
-"""Parameters are values: what laws share is read-only, equal laws have one fingerprint."""
+"""Parameters are values: equal laws have one fingerprint, files keep every digit. The presets hold
+the numbers that the paper prints, in its own units, converted here."""
 
 import dataclasses
+import math
+import re
 
+import kinds
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import jointlaw as jl
-from jointlaw.parameters.resolution import named
+from jointlaw.calibration.priors import PRIORS, TRANSFORMS
+from jointlaw.parameters.resolution import NAMED, NAMED_FLAT, NAMED_LATE, NAMED_SHORT, named
+
+LAWS = kinds.LAWS | {
+    "thirds": kinds.make_law(
+        heights=jl.Heights(([1, 2.5, 1 / 3], [0.1e-6, 2e-6, 4e-6, 5e-6]), 1e-6, "individual"),
+        K=1e8 / 3,
+    ),
+    "brittle bond": kinds.make_law(bond=jl.Bond(1e10, 1 / 3e-10, 0.0, 1e6)),
+    "own resolution": kinds.make_law(resolution=jl.Resolution(3, 5, 7)),
+    "cells for small loads": kinds.make_law(resolution=jl.Resolution(3, 5, 7, lowest=0.02)),
+    "named resolution": kinds.make_law(resolution="fine"),
+    "default range": kinds.make_law(closure_range=None),
+}
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_file_round_trip(law, tmp_path):
+    path = tmp_path / "law.toml"
+    assert law.to_toml(path) == path.read_text(encoding="utf-8")
+    back = jl.JointLaw.from_toml(path)
+    assert (back, back.fingerprint) == (law, law.fingerprint)
+
+
+@given(
+    a=st.floats(1, 1e3), b=st.floats(-1, 2), share=st.floats(-1, 1), K=st.floats(1e-100, 1e100),
+    mu=st.floats(0, 1e3), plane=st.none() | st.floats(-10, 10), slip=st.floats(1e-7, math.inf),
+)  # fmt: skip
+def test_every_number_is_kept_to_the_last_bit(make_law, a, b, share, K, mu, plane, slip):
+    law = make_law(a=a, b=b, c=share * (1 / 3 - b / 6), K=K, mu=mu, plane=plane, mating_length=slip)
+    assert jl.JointLaw.from_text(law.to_toml()) == law
+
+
+@pytest.mark.parametrize(
+    "write",
+    [lambda law, path: law.to_toml(path), lambda law, path: law.joint().snapshot().save(path)],
+)
+def test_an_interrupted_write_leaves_the_old_file(law, make_law, tmp_path, monkeypatch, write):
+    """The disk is full after nine bytes."""
+    path = tmp_path / "old.npz"
+    write(law, path)
+    before, write_bytes = path.read_bytes(), type(path).write_bytes
+
+    def fail(file, data):
+        write_bytes(file, data[:9])
+        raise OSError("disk full")
+
+    monkeypatch.setattr(type(path), "write_bytes", fail)
+    with pytest.raises(OSError, match="disk full"):
+        write(make_law(a=5.0), path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_tables_that_laws_share_are_not_writeable(any_law):
@@ -66,3 +121,59 @@ def test_linear_asperities_have_the_stiffness_given(make_law):
     _, C = law.joint().update([1e-7, 0.0, 0.0])  # nearly flat: every facet faces the joint normal
     # 1e-9: inclinations up to pi/2e6 rad leave errors of their square
     np.testing.assert_allclose(np.diag(C), 1e10 * np.array([3e5, 2e5, 2e5]), rtol=1e-9)
+
+
+def test_lists_of_names_that_belong_together():
+    """What replaces a resolution has its name; a prior is of what a fit can find."""
+    assert {*NAMED_SHORT, *NAMED_LATE, *NAMED_FLAT} <= set(NAMED)
+    assert set(PRIORS) <= set(TRANSFORMS)
+
+
+UM, MM, GPA = 1e-6, 1e-3, 1e9
+
+# K in GPa um^(1/2) (section 4.1 to 4.3), r0 and beta in um unless noted, N in 1/um2
+HERTZ_200 = {"K": 200, "lam": 1.2, "eta": 0.5}
+SMOOTH = {"alpha": 3.82, "beta": 1.15, "overlap": 2.0}
+ROUGH = {"alpha": 6.14, "beta": 3.52, "overlap": 12.0}
+PRINTED = {
+    "westerly-smooth": ((6.0, 0.0, 0.0), HERTZ_200, SMOOTH, UM),
+    "westerly-rough": ((3.0, 0.0, 0.0), HERTZ_200, ROUGH, UM),
+    "biegel-smooth": ((3.0, 0.5, 0.0), HERTZ_200 | {"mu": 0.3}, SMOOTH, UM),
+    "biegel-rough": ((2.5, 2.0, 0.0), HERTZ_200 | {"mu": 0.3}, ROUGH, UM),
+    "jing-replica": (
+        (3.0, -1.0, -0.3), {"K": 300, "lam": 0.33, "eta": 0.5, "mu": 0.47},
+        SMOOTH | {"overlap": 3.0}, MM,
+    ),
+    "linear-a2": ((2.0, 0.0, 0.0), {"lam": 1.0, "eta": 0.0, "mu": 0.6}, None, UM),
+    "linear-a3": ((3.0, 0.0, 0.0), {"lam": 1.0, "eta": 0.0, "mu": 0.6}, None, UM),
+    "linear-a6": ((6.0, 0.0, 0.0), {"lam": 1.0, "eta": 0.0, "mu": 0.6}, None, UM),
+    "linear-a9": ((9.0, 0.0, 0.0), {"lam": 1.0, "eta": 0.0, "mu": 0.6}, None, UM),
+    "nonlinear-a3": ((3.0, 0.0, 0.0), {"K": 100, "lam": 1.0, "eta": 0.5, "mu": 0.6}, None, UM),
+    "nonlinear-a6": ((6.0, 0.0, 0.0), {"K": 100, "lam": 1.0, "eta": 0.5, "mu": 0.6}, None, UM),
+}  # fmt: skip
+
+
+def test_every_printed_set_is_a_preset_and_every_preset_is_printed():
+    assert jl.presets.names() == sorted(PRINTED)
+
+
+@pytest.mark.parametrize("name", PRINTED)
+def test_numbers_of_the_paper(name):
+    """Each is a file with its source, and a law that closes and shears."""
+    shape, asperity, heights, length = PRINTED[name]
+    law = jl.presets.load(name)
+    assert law.orientation == jl.Orientation(*shape)
+    # K in GPa um^(1/2), for every length scale of the heights
+    sizes = {"K": GPA * UM**0.5, "beta": length, "overlap": length}
+    for part, values in ((law.asperity, asperity), (law.heights, heights or {})):
+        printed = {key: value * sizes.get(key, 1.0) for key, value in values.items()}
+        assert {key: getattr(part, key) for key in values} == pytest.approx(printed, rel=1e-12)
+    if heights is None:
+        assert (law.heights, law.closure_range) == (None, 1 * UM)  # the closure of Fig. 14 to 16
+    else:
+        assert law.heights.formation == "population"
+    assert jl.JointLaw.from_text(jl.presets.text(name)) == law
+    assert re.match(r"Misra 1999, .*section 4\.", jl.presets.about(name)["source"])
+    F, C = law.joint().update([law.closure_range, 0.1 * law.closure_range, 0.0])
+    assert (F[:2] > 0).all()
+    assert np.isfinite(C).all()

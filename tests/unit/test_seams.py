@@ -15,9 +15,7 @@ import jointlaw as jl
 from jointlaw.calibration.forward import build, log_stress, parameters
 from jointlaw.kernels import reference
 
-PAGES = Path(__file__).parents[2] / "docs"
 STEP = 2e-7  # m
-OPENS = ((-0.15, 0.0, 0.0), (-0.15, 0.0, 0.0), (-0.5, 0.0, 0.0))
 
 
 @pytest.fixture(scope="module", params=PARAMETERS)
@@ -43,7 +41,7 @@ def test_it_acts(pair):
     for law in pair:
         joint, other = law.joint(), law.joint()
         way = [joint.update(d)[0].tolist() for d in steps(law)]
-        opens = STEP * np.array(OPENS)[:, : law.dim]
+        opens = np.outer(STEP * np.array([-0.15, -0.15, -0.5]), np.eye(law.dim)[0])
         tractions.append([*way, *(other.update(d)[0].tolist() for d in opens)])
     law, base = pair
     isotropic = law.tables.asperities is None and law.plane != base.plane
@@ -124,7 +122,8 @@ def test_a_fit_keeps_it_or_refuses(pair):
 
 def test_pages_tell_it():
     """The theory, or a page of how to use it, names every parameter."""
-    text = "\n".join(page.read_text(encoding="utf-8") for page in PAGES.glob("*.md"))
+    docs = Path(__file__).parents[2] / "docs"
+    text = "\n".join(page.read_text(encoding="utf-8") for page in docs.glob("*.md"))
     names = {path: rf"`(bond\.)?{path.rpartition('.')[2]}\b" for _, path, _ in PARAMETERS.values()}
     missing = [path for path, name in names.items() if not re.search(name, text)]
     assert not missing, f"no page of docs names {missing}"

@@ -73,6 +73,20 @@ def test_tension_is_cut_and_faces_close_again_at_mate(given, bears, share, dim):
     np.testing.assert_allclose(joint.F, [1e6, *np.zeros(dim - 1)], rtol=1e-9)
 
 
+def test_faces_that_part_or_never_met_have_no_cohesion():
+    """Friction alone, also where slip leaves the cohesion as it is, or a residual one is given."""
+    for more in ({}, {"residual_cohesion": 0.5 * C, "weakening": 1e-3}):
+        law = coulomb(**more)
+        joints = law.joints(4, mated=[True, True, True, False])
+        joints.unbond([1])
+        joints.update([[-1e-3, 0.0], *3 * [[0.0, 0.0]]])
+        joints.update([[1e-3 + 1e-4, 0.0], *3 * [[1e-4, 0.0]]])
+        F, _ = joints.update([[0.0, 1e-2]] * 4)
+        assert F[[0, 1, 3], 1] == pytest.approx(MU * 1e6)
+        assert F[2, 1] == pytest.approx(MU * 1e6 + (0.5 if more else 1.0) * C)
+        assert joints.damage.tolist() == [1.0] * 4
+
+
 def test_shear_counts_from_touch():
     """Faces that were apart meet in mid-step, in one step or in ten."""
     law = coulomb(cohesion=9e6, tension=0.0)
@@ -112,13 +126,16 @@ def tiny_steps(law, legs, n):
 
             def strength(w, sigma=sigma):
                 intact = law.cohesion + law.friction * sigma
-                return intact + w * (law.residual_cohesion + law.residual_friction * sigma - intact)
+                weak = law.residual_cohesion + law.residual_friction * sigma
+                return intact + w * (weak - intact) if w < 2 else law.residual_friction * sigma
 
             if sigma < (0.0 if w else -min(law.tension, law.cohesion / law.friction)):
-                w, q, sigma = 1.0, 0.0 * q, 0.0
+                w, q, sigma = 2.0, 0.0 * q, 0.0
             elif size > strength(w):
                 if sigma < 0.0:
-                    w, q, sigma = 1.0, 0.0 * q, 0.0
+                    w, q, sigma = 2.0, 0.0 * q, 0.0
+                elif w == 2.0:
+                    q = q * (strength(w) / size)
                 else:
                     slip = (size - strength(w)) / law.shear_stiffness
                     w = min(1.0, w + slip / law.weakening) if law.weakening else 1.0
@@ -145,7 +162,7 @@ def test_tiny_steps_in_plain_numbers(kind, dim, seed):
             joint.update(leg / 500, tangent=False)
         scale = max(C, np.abs(F).max())
         np.testing.assert_allclose(joint.F, F, atol=2e-3 * scale)  # first order of either
-        assert joint.damage == pytest.approx(w, abs=2e-3)
+        assert joint.damage == pytest.approx(min(w, 1.0), abs=2e-3)
         assert joint.dissipated_energy == pytest.approx(lost, rel=2e-3, abs=1e-6)
 
 

@@ -43,8 +43,10 @@ int main(int count, char **words)
   double *state = (double *) calloc((size_t) jlaw_state_size(law), sizeof *state);
   double *next = (double *) calloc((size_t) jlaw_state_size(law), sizeof *next);
   double F[3], d[3] = {jlaw_closure(law, stress), 0.0, 0.0}, shares[3];
-  int wrong = !state || !next || jlaw_update(law, state, state, d, F, NULL, message, sizeof message);
-  if (wrong) failed(state && next ? message : "there is no memory");
+  strcpy(message, state && next ? "asperities yield: give a smaller stress" : "there is no memory");
+  int wrong = !state || !next || !(d[0] >= 0.0)
+              || jlaw_update(law, state, state, d, F, NULL, message, sizeof message);
+  if (wrong) failed(message);
   if (!wrong) printf("shear_um,closure_um,normal_MPa,shear_MPa,sliding,dissipated_J_m2\n");
   for (int i = 1; !wrong && i <= (dim > 1 ? 2 * steps : 1); i++) {
     const double shear = i <= steps ? end / steps : -end / steps;

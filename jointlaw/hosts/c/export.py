@@ -14,6 +14,14 @@ FILES = ("jointlaw.c", "example.c", "example.cpp", "example.f90", "Makefile", "C
          "README.md")  # fmt: skip
 HEADER = "jointlaw.h"
 _CONSTANT = "static JLAW_FUNCTION const"  # which on a device lies in its memory
+_TAKEN = frozenset(  # words of C and C++
+    "alignas alignof and asm auto bitand bitor bool break case catch char class compl const "
+    "consteval constexpr constinit continue decltype default delete do double else enum explicit "
+    "export extern false float for friend goto if inline int long main mutable namespace new "
+    "noexcept not nullptr NULL operator or private protected public register requires restrict "
+    "return short signed sizeof static struct switch template this throw true try typedef typeid "
+    "typename union unsigned using virtual void volatile while xor".split()
+)
 _MODEL = "granite"  # the name of the tables in these files
 
 
@@ -48,17 +56,23 @@ def file_text(file: str) -> str:
 
 def require_name(name: str) -> None:
     """Refuse a name of tables that C cannot have, or that a file of the law has."""
-    if not re.fullmatch(r"(?!jointlaw)[A-Za-z][A-Za-z0-9_]{0,40}", name):
+    if not _free(name):
         raise ValueError(
             f"name = {name!r} is no identifier of C; take letters, digits and underscores, a "
-            "letter first, at most 41; names of the law's own files begin with jointlaw"
+            "letter first, at most 41, and no word of C or C++; names of the law's own begin with "
+            "jointlaw or jlaw"
         )
+
+
+def _free(name: str) -> bool:
+    named = re.fullmatch(r"(?!jointlaw|jlaw)[A-Za-z][A-Za-z0-9_]{0,40}", name)
+    return named is not None and name not in _TAKEN
 
 
 def identifier(text: str) -> str:
     """A name for tables out of any text: letters, digits and underscores, a letter first."""
     name = re.sub(r"[^A-Za-z0-9]+", "_", text).strip("_")[:40]
-    return name if name[:1].isalpha() else f"joint_{name}".rstrip("_")
+    return name if _free(name) else f"joint_{name}".rstrip("_")
 
 
 def table_text(law: Law) -> str:

@@ -10,7 +10,7 @@ from ...support.files import write_files
 from ..c import export as c
 
 SEATING = 10e3  # Pa
-NORMAL = 2e6  # Pa: of the direct shear tests
+NORMAL = 2e6  # Pa: of the direct shear tests, or half of what the joint bears in its closure range
 
 
 def export_fem(
@@ -46,7 +46,8 @@ def export_fem(
     }
     start = [*law.joint(normal_stress=seating).snapshot().values[0].tolist(), 1.0]
     names = [f'"State{i}"' for i in range(1, len(start))] + ['"Begun"']
-    shear = 5.0 * float(law.closure(NORMAL))
+    normal = min(NORMAL, 0.5 * float(law.normal_stress(law.closure_range)))
+    shear = 5.0 * float(law.closure(normal))
     marks = {  # what stands for the @WORDS@ of the files
         "DIM": str(law.dim),
         "STATE": str(len(start)),
@@ -54,7 +55,7 @@ def export_fem(
         "START": fill(", ".join(map(repr, start)), 96),
         "ZEROS": ", ".join(["0.0"] * len(start)),
         "SEATING": f"{seating:g}",
-        "NORMAL": f"{NORMAL:g}",
+        "NORMAL": f"{normal:.3g}",
         "SHEAR": repr(shear),
         "BACK": repr(shear / 2),
     }

@@ -17,7 +17,7 @@ def export_lammps(law: Law, directory: str | Path, name: str = "joint") -> list[
     """Write all that an unmodified LAMMPS needs to run this joint; the folder may be copied away.
 
     law: a law in 3-D (`plane=None`). directory: made if missing; files of the same names are
-    replaced. name: of the tables, letters, digits and underscores.
+    replaced. name: of the tables, an identifier of C.
 
     Writes `NAME.jlaw` (the tables), `jointlaw.h` (the law), the plug-in's source and `build.sh`,
     the script `in.tower`, `joint.in` (what it needs to know of this law), `law.toml` and
@@ -27,6 +27,7 @@ def export_lammps(law: Law, directory: str | Path, name: str = "joint") -> list[
     >>> names = jl.export_lammps(law, "joint-for-lammps")
     """
     require_3d(law, "motion in LAMMPS")
+    c.require_name(name)
     source = Path(__file__).with_name("files")
     files: dict[str, str | bytes] = {
         f"{name}.jlaw": c.table_text(law),

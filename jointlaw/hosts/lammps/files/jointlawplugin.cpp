@@ -250,12 +250,20 @@ void PairJointlaw::settings(int narg, char **arg)
   if (allocated) memset(&setflag[0][0], 0, sizeof(int) * (atom->ntypes + 1) * (atom->ntypes + 1));
 }
 
+// Closure under this normal stress (Pa), or under as much of it as asperities that yield bear
+static double closure_under(const jlaw_law *law, double stress)
+{
+  double closure;
+  while (!std::isfinite(closure = jlaw_closure(law, stress))) stress *= 0.5;
+  return closure;
+}
+
 // Whether the closed joint is as stiff against shear along axis 2 as along axis 3. Facets at three
 // azimuths or more make it so, but for a law with c other than 0.
 static bool isotropic(const jlaw_law *law)
 {
   std::vector<double> state(jlaw_state_size(law), 0.0);
-  const double d[3] = {jlaw_closure(law, 1e5), 0.0, 0.0};
+  const double d[3] = {closure_under(law, 1e5), 0.0, 0.0};
   double F[3], C[9];
   jlaw_update(law, state.data(), state.data(), d, F, C, nullptr, 0);
   return fabs(C[4] - C[8]) <= 1e-9 * fabs(C[4]);
@@ -573,16 +581,19 @@ void PairJointlaw::advance(const Contact &c)
   int which = 0;
   while (which < own.n && to_whole(own.at(which, size)[rows + KEY]) != c.key) which++;
   const bool fresh = which == own.n;
+  const bool holds = law->bonded || law->coulomb;
   if (fresh) {
-    if (!(c.closure > 0.0)) return;
+    // what is drawn to touch does so but for rounding, and may have a bond
+    const double touch = holds && update->setupflag ? -1e-9 * sqrt(dot(c.arm_i, c.arm_i)) : 0.0;
+    if (!(c.closure > touch)) return;
     own.resize(which + 1, size);
     double *head = own.at(which, size) + rows;
     head[KEY] = from_whole(c.key);
     head[OF_AREA] = c.area;
     const Vector axis = across(c.n);
     std::copy(axis.begin(), axis.end(), head + AXIS);
-    if ((law->bonded || law->coulomb) && !update->setupflag)    // faces that meet anew: the last number is its damage
-      own.at(which, size)[jlaw_state_size(law) - 1] = 1.0;
+    if (holds && !update->setupflag)    // faces that meet anew: the last number is its damage
+      own.at(which, size)[jlaw_state_size(law) - 1] = jlaw_parted_(law);
   }
   const int flag = fresh ? -1 : visits.back().flags + which;
   if (!fresh) seen[flag] = MET;
@@ -732,7 +743,7 @@ double PairJointlaw::foreseen() const
     double stiff = 0.0;
     for (int other = 1; other <= atom->ntypes; other++)
       if (const jlaw_law *law = law_between(type, other))
-        stiff = std::max(stiff, jlaw_max_stiffness(law, jlaw_closure(law, FORESEEN)));
+        stiff = std::max(stiff, jlaw_max_stiffness(law, closure_under(law, FORESEEN)));
     for (int i = 0; i < atom->nlocal; i++)
       if (atom->type[i] == type)
         most = std::max(most, frequency_squared(area_of(i, i) * stiff, atom->rmass[i]));

@@ -1,4 +1,5 @@
-"""Records: columns, files, and summary figures against hand-computed ones."""
+"""Laboratory tests: the normal condition, turning points, unloading, and what stops them. Their
+records: columns, files, pictures, and summary figures against hand-computed ones."""
 
 import math
 
@@ -7,6 +8,65 @@ import pytest
 
 import jointlaw as jl
 from jointlaw.laboratory.record import UNITS
+
+N = 10e6  # Pa
+
+
+@pytest.mark.parametrize(("stress", "spring"), [(1.0, 0.0), (10e6, 0.0), (1e9, 0.0), (10e6, 2e13)])
+def test_the_normal_condition_is_kept(any_sheared_law, stress, spring):
+    """Constant normal stress, and constant normal stiffness, which dilation loads."""
+    law = any_sheared_law
+    record = jl.direct_shear(law.joint(), [5e-7, -2e-7], stress, stiffness=spring, steps=30)
+    asked = stress + spring * (record.closure[0] - record.closure)
+    # 1e-9, or what one rounding of a closure of some 5e-7 m makes in the stiffest joint
+    rounding = 2e-16 * 1e-6 * law.max_stiffness(1e-6)
+    np.testing.assert_allclose(record.F1, asked, rtol=1e-9, atol=rounding)
+    loaded = spring > 0 and law.tables.asperities is not None
+    assert (np.ptp(record.F1) > 0.001 * stress) == loaded
+
+
+@pytest.mark.parametrize("azimuth", [math.radians(30), -2.5])
+def test_reversals_end_where_they_should(law, azimuth):
+    to = [6e-7, -4e-7, 0.0, 2e-7]
+    joint = law.joint()
+    record = jl.direct_shear(joint, to, N, azimuth=azimuth, steps=25)
+    assert len(record) == 1 + 25 * len(to)
+    # 1e-12 of the longest leg: 25 equal increments are summed
+    np.testing.assert_allclose(record.shear[25::25], to, atol=1e-18)
+    across = record.shear_3 * math.cos(azimuth) - record.shear_2 * math.sin(azimuth)
+    np.testing.assert_allclose(across, 0.0, atol=1e-18)
+    np.testing.assert_allclose(joint.delta[1:], [record.shear_2[-1], record.shear_3[-1]])
+    assert (np.diff(record.dissipated) >= 0).all()
+
+
+def test_a_law_with_a_plane_is_recorded_in_three_dimensions(make_law):
+    record = jl.direct_shear(make_law(plane=0.4).joint(), 5e-7, N, steps=10)
+    assert record.azimuth == 0.4
+    assert record.shear_3[-1] == pytest.approx(5e-7 * math.sin(0.4))
+
+
+def test_closure_test_loads_and_unloads(any_law):
+    joint = any_law.joint()
+    record = jl.closure_test(joint, 20e6, steps=30)
+    assert record.F1[[0, 30, -1]] == pytest.approx([0.0, 20e6, 0.0], abs=20e6 * 1e-9)
+    assert (np.diff(record.F1[:31]) > 0).all()
+    assert (np.diff(record.F1[30:]) < 0).all()
+    assert (np.diff(record.dissipated) >= 0).all()
+    # summed in another order, both round in the last digits of the largest stress
+    np.testing.assert_allclose(joint.F[0], record.F1[-1], atol=20e6 * 1e-14)
+
+
+def test_a_path_error_keeps_the_record_so_far(law):
+    """The third turning point is so far away that the tractions overflow."""
+    joint = law.joint()
+    with pytest.raises(jl.PathError, match="stopped after 21 rows") as error:
+        jl.direct_shear(joint, [1e-7, -1e-7, 1e301], N, steps=10)
+    record = error.value.record
+    assert len(record) == 21
+    assert record.shear[-1] == pytest.approx(-1e-7)
+    # rounding: the record holds what the update returned, joint.F sums the state again
+    last = [record.F1[-1], record.F2[-1], record.F3[-1]]
+    np.testing.assert_allclose(joint.F, last, rtol=0, atol=1e-14 * N)
 
 
 def analytic(azimuth=0.0, sense=1.0):
@@ -81,27 +141,22 @@ def test_csv_round_trip(tmp_path):
         np.testing.assert_allclose(table[title], record.columns[name], rtol=1e-11)
     np.testing.assert_allclose(table["friction_angle_deg"], record.friction_angle, rtol=1e-11)
     np.testing.assert_allclose(table["opening_m"], record.closure[0] - record.closure, rtol=1e-11)
+    assert set(UNITS.values()) == {"m", "Pa", "J/m2", "1"}
     with pytest.raises(ValueError, match="'1furlong' is not a quantity in m"):
         record.to_csv(tmp_path / "r.csv", length="furlong")
 
 
-@pytest.mark.parametrize(("backend", "left"), [("agg", 1), ("inline", 0)])
-def test_a_notebook_shows_a_picture_once(backend, left, monkeypatch):
-    """A cell shows the figure that it returns, and every figure that is left open."""
+@pytest.mark.parametrize(("backend", "left", "size"), [("agg", 1, 0.0), ("inline", 0, 1.0)])
+def test_a_picture_is_labelled_and_a_notebook_shows_it_once(backend, left, size, monkeypatch):
+    """Of a closure test, of a shear test. A cell shows the figure that it returns, and every figure
+    that is left open.
+    """
     pyplot = pytest.importorskip("matplotlib.pyplot")
     monkeypatch.setattr(pyplot, "get_backend", lambda: f"module://matplotlib_{backend}")
     pyplot.close("all")
-    assert analytic().plot().axes
-    assert len(pyplot.get_fignums()) == left
-    pyplot.close("all")
-
-
-@pytest.mark.parametrize("size", [0.0, 1.0])
-def test_every_panel_of_a_picture_is_labelled(size):
-    """Of a closure test and of a shear test."""
-    pyplot = pytest.importorskip("matplotlib.pyplot")
     columns = analytic().columns
     axes = jl.Record(columns | {"shear_2": size * columns["shear_2"]}).plot().axes
+    assert len(pyplot.get_fignums()) == left
     assert len(axes) == (4 if size else 2)
     assert all(axis.get_ylabel() for axis in axes)
     assert all(axis.get_legend() for axis in axes if len(axis.lines) > 1)

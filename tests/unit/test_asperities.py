@@ -1,13 +1,93 @@
-"""The virgin curve against its definition, its derivative, its inverse, its counts."""
+"""Heights of asperities (Eq. 11 to 13, and as a histogram). The virgin curve of a law with them
+against its definition, its derivative, its inverse."""
 
 import math
+from dataclasses import dataclass
+from pathlib import Path
+from textwrap import dedent
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
 from slow_virgin import virgin
 
 import jointlaw as jl
+
+GAMMA = stats.gamma(4.0, scale=1e-6)
+
+
+@given(alpha=st.floats(-0.9, 30.0), beta=st.floats(1e-9, 1e-3))
+def test_from_moments(alpha, beta):
+    h = jl.GammaHeights(alpha, beta, 2e-6, "individual")
+    back = jl.GammaHeights.from_moments(h.mean, h.variance, 2e-6, "individual")
+    # 1e-12 of alpha + 1, which is what the moments hold
+    assert back.alpha == pytest.approx(h.alpha, rel=1e-12, abs=1e-12)
+    assert back.beta == pytest.approx(h.beta, rel=1e-12)
+    assert (back.overlap, back.formation) == (2e-6, "individual")
+    assert (h.pdf(-1e-6), h.cdf(-1e-6)) == (0.0, 0.0)  # no height is below zero
+
+
+def test_histogram_as_numpy_gives_it():
+    sample, r = GAMMA.rvs(20000, random_state=1), np.linspace(0.0, 2e-5, 101)
+    heights = jl.Heights(np.histogram(sample, bins=50), 0.0, "individual")
+    # 1.63/sqrt(n) is the 1 % bound of Kolmogorov for a sample of n
+    assert np.abs(heights.cdf(r) - GAMMA.cdf(r)).max() < 1.63 / 20000**0.5
+
+
+@pytest.fixture(scope="module")
+def exponential():
+    """The class of CONTRIBUTING.md."""
+    page = (Path(__file__).parents[2] / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    code = page[page.index("    @dataclass") : page.index("    law =")]
+    names = {"np": np, "dataclass": dataclass}
+    exec(dedent(code), names)
+    return names["Exponential"]
+
+
+def test_a_class_of_the_user_works_and_no_file_can_name_it(make_law, exponential):
+    law = make_law(heights=exponential(3e-6))
+    same = make_law(heights=jl.GammaHeights(0.0, 3e-6, 0.0, "individual"))
+    ours, exact = (one.joint().update([5e-7, 2e-7, 0.0])[0] for one in (law, same))
+    np.testing.assert_allclose(ours, exact, rtol=1e-8, atol=1.0)
+    with pytest.raises(ValueError, match=r"^heights = .*no file can name Exponential"):
+        law.to_toml()
+
+
+def test_what_is_no_distribution_of_heights_is_refused(make_law, exponential):
+    class ByAddress(exponential):
+        __hash__ = object.__hash__
+
+    class Falling(exponential):
+        def breakpoints(self):
+            return np.array([1e-6, 0.0])
+
+    class Listed(exponential):
+        def breakpoints(self):
+            return [0.0, 1e-6]
+
+    class Nameless(exponential):
+        __repr__ = object.__repr__
+
+    class PerMicrometre(exponential):
+        def pdf(self, r):
+            return 1e-6 * super().pdf(r)
+
+    for heights, told in {
+        3: "has no overlap",
+        ByAddress(1e-6): "must be equal, hash and print alike",
+        Nameless(1e-6): "must be equal, hash and print alike",
+        Listed(1e-6): "must be an array of two or more",
+        PerMicrometre(1e-6): r"pdf\(r\) in 1/m must be >= 0 and the slope of cdf\(r\)",
+        exponential(1e-6, -1e-6): "heights.overlap = -1e-06",
+        exponential(1e-6, 0.0, "both"): "heights.formation = 'both'",
+        Falling(1e-6): "ascending heights",
+    }.items():
+        with pytest.raises(ValueError, match=told):
+            make_law(heights=heights)
+
 
 CASES = {
     "population": jl.GammaHeights(3.82, 1.15e-6, 2e-6),
@@ -102,16 +182,16 @@ def test_least_exponent_of_the_printed_heights(make_law, heights, least):
     assert f"asperity.eta = {least - 0.001:g}" in str(error.value)
 
 
-@pytest.mark.parametrize("eta", [0.0, 1.0])
 @pytest.mark.parametrize(
-    "heights", [SMOOTH, ROUGH, SMOOTH | {"beta": 1e-9}, ROUGH | {"overlap": 0}]
+    ("heights", "eta"),
+    [
+        *(
+            (jl.GammaHeights(**heights, formation="individual"), eta)
+            for heights in (SMOOTH, ROUGH, SMOOTH | {"beta": 1e-9}, ROUGH | {"overlap": 0})
+            for eta in (0.0, 1.0)
+        ),
+        *((jl.Heights(np.histogram(GAMMA.rvs(5000, random_state=n), n)), 0.5) for n in (5, 20)),
+    ],
 )
-def test_individual_is_always_convex(make_law, heights, eta):
-    make_law(heights=jl.GammaHeights(**heights, formation="individual"), eta=eta)
-
-
-@pytest.mark.parametrize("overlap", [0.0, 9.9e-6])
-def test_a_density_that_ends_in_a_step_is_refused(make_law, overlap):
-    """Its slope falls at the very end, beyond every quantile."""
-    with pytest.raises(ValueError, match="not convex"):
-        make_law(heights=jl.Heights(([1], [0.0, 1e-5]), overlap, "population"))
+def test_individual_is_always_convex_and_the_default_for_any_histogram(make_law, heights, eta):
+    make_law(heights=heights, eta=eta)

@@ -128,6 +128,8 @@ class Joints:
         self.reduction = np.array([1.0, scene.reduction])
         self.names = [*scene.laws]
         self.held = [Held(law, scene.reduction) for law in scene.laws.values()]
+        holds = [law if isinstance(law, jl.CoulombLaw) else law.bond for law in scene.laws.values()]
+        self.pulls = np.array([part.normal_stiffness if part else 0.0 for part in holds])  # Pa/m
         self.touch, self.keys = np.zeros((0, 2)), np.zeros((0, 2), int)
         self._arrange(np.zeros(0, int), np.zeros(0, int))
 
@@ -209,14 +211,16 @@ class Joints:
     def unslid(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """As `trial` of virgin joints that cannot slide: tractions and tangents."""
         closure, sign, shear = np.maximum(np.abs(d[:, 0]), 1e-9), np.sign(d[:, 0]), d[:, 1]
+        pulls = self.pulls[self.law] * (self.damage < 1)  # what is open bears nothing, a bond does
         (stress, ss), above, below = (
             np.array([self.virgin(of, "closure", closure * at) for of in ("stress", "stiffness")])
             for at in (1.0, 1.01, 0.99)
         )
         rises, stiffens = (above - below) / (0.02 * closure)
-        acts = (d[:, 0] > 0) | (self.damage < 1)  # a joint that is open bears nothing, a bond does
-        C = np.stack([rises * acts, 0.0 * rises, stiffens * sign * shear, ss], axis=1)
-        return np.stack([stress * acts * sign, ss * shear], axis=1), C.reshape(-1, 2, 2)
+        opened = d[:, 0] <= 0
+        normal, rises = np.where(opened, [pulls * d[:, 0], pulls], [stress, rises])
+        C = np.stack([rises, 0.0 * rises, stiffens * sign * shear, ss], axis=1)
+        return np.stack([normal, ss * shear], axis=1), C.reshape(-1, 2, 2)
 
     def virgin(self, of: str, by: str, x: np.ndarray) -> np.ndarray:
         """A column of the virgin curves, such as "stress", where another one is x (k,)."""

@@ -164,7 +164,7 @@ class Joints:
         new, gone = np.flatnonzero(before < 0), ~np.isin(np.arange(self.n), before)
         place = np.append(self.place, -1)[before]  # -1, the last one, is that of what is new
         touch = np.vstack([self.touch, [0.0, 0.0]])[before]
-        mates = self.keys[~self.touch.any(axis=1)] @ [1, 1j]
+        mates = self.keys[~self.touch.any(axis=1)] @ [1, 1j]  # two edges as one number
         fits = np.isin(keys[new] @ [1, 1j], mates) | (not started)
         for i, held in enumerate(self.held):
             held.drop(self.place[gone & (self.law == i)])

@@ -22,7 +22,7 @@ SCENES = Path(__file__).parent / "scenes"
 TEMPLATE = Path(__file__).parent / "template.toml"
 UNIT_WEIGHT = 9810.0  # N/m3, of water
 SIDES = {"left": (0, -1.0), "right": (0, 1.0), "bottom": (1, -1.0), "top": (1, 1.0)}
-DEFAULTS = {  # what a scene has that says nothing else
+DEFAULTS = {  # of a scene that says nothing else; m/s2, kg/m3, m
     "gravity": (0.0, -9.81), "density": 2600.0, "thickness": 1.0, "watch": {},
     **dict.fromkeys(("block", "rock", "drive", "joint", "excavate"), ()),
 }  # fmt: skip

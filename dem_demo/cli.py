@@ -134,7 +134,7 @@ def _announce(sim: Simulation, until: float | None = None) -> None:
     for rock in sim.scene.rocks:
         print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
               f"{len(rock.blocks) - len(rock.free)} fixed", *rock.told, sep="\n  ")  # fmt: skip
-    if sim.loose.any() and sim.scene.run.seat:
+    if sim.loose.any() and sim.scene.run.seat and not sim.time:
         print(f"{sim.loose.sum()} blocks cannot be held and move from the first step: "
               f"{told(named(sim.scene, sim.loose))}")  # fmt: skip
 
@@ -203,7 +203,8 @@ def _compare(given: argparse.Namespace) -> None:
     scene = load(given.scene)
     if not scene.rocks:
         raise ValueError(f"{given.scene} has no [[rock]] to compare")
-    for row in compare.compare(scene, given.seeds, given.until or scene.run.end):
+    until = scene.run.end if given.until is None else given.until
+    for row in compare.compare(scene, given.seeds, until):
         for name, law in row["laws"].items():
             peak, left = np.degrees(np.arctan([law.friction, law.residual_friction or 0.0]))
             print(f"law {name!r} as Coulomb: {peak:.1f} degrees at the peak, {left:.1f} after "

@@ -191,6 +191,6 @@ class Tracker:
         raise Refused(
             f"blocks {one!r} and {other!r} overlap by {depth:.3g} m: must stay below "
             f"{self.deepest[list(pair)].min():.3g} m (a share of the smaller block's width); "
-            "resume with a smaller step, or use stiffer joints, lower loads or speeds, a larger "
-            "run.corner_length or run.max_overlap"
+            "draw them apart, resume with a smaller step, or use stiffer joints, lower loads or "
+            "speeds, a larger run.corner_length or run.max_overlap"
         )

@@ -41,7 +41,7 @@ KEPT = (  # of what changes in a run, but for the joints: arrays that stay in th
 STATE = (
     *KEPT, "t0", "n", "dt", "halvings", "limit.now", "limit.least", "limit.bound", "limit.checked",
     "tracker.keys", "tracker.law", "tracker.offset",
-    "ledger.start", "ledger.area", "ledger.lost", "loose",
+    "ledger.start", "ledger.area", "ledger.lost", "loose", "initial",
 )  # fmt: skip
 PLACES = "contacts.corner", "contacts.edge"  # from which the contacts are made anew
 Saved = dict[str, np.ndarray]  # a copy of everything that the future depends on
@@ -52,10 +52,10 @@ class Simulation:
 
     step: time step (s), instead of the scene's; saved: a state to go on from. blocks: where they
     are; tracker: their contacts; joints: the law; ledger: the energies; limit: of the time step dt
-    (s), chosen for the reason `why`; loose (blocks,): those that nothing held at time 0;
-    begun (stages,): when stages of the excavation began, inf before (s). Where
-    neither `step` nor the scene sets the time step, it is halved when joints close too far for it,
-    or blocks become too fast.
+    (s), chosen for the reason `why`; loose (blocks,): those that nothing held at step 0; initial
+    (6, blocks): motion there; begun (stages,): when stages of the excavation began, inf
+    before (s). Where neither `step` nor the scene sets the time step, it is halved when joints
+    close too far for it, or blocks become too fast.
     Raises ValueError for a step that is no finite number > 0 and for a state of another scene,
     Refused for a start that the method cannot carry.
     """
@@ -185,6 +185,7 @@ class Simulation:
         if scene.run.seat and joints.n and blocks.free.any():
             slid = seat(scene, blocks, tracker, joints, slid)
         tracker.follow(blocks.motion)
+        self.initial = blocks.motion.copy()
         joints.update(tracker.closure, slid)
         self.loose = out_of_balance(scene, blocks, self.contacts, joints)
         self.limit.look(scene, blocks, self.contacts, joints)

@@ -119,7 +119,7 @@ class Pictures:
         """Frame i: blocks, colour and arrow by displacement; joints, colour by state, width by
         normal stress; a note below the title."""
         record, blocks, shapes = self.record, self.record.scene.blocks, outlines(self.record, i)
-        moved = record.displaced(i) - record.displaced(0)
+        moved = record.displaced(i)
         colours = MOVED(np.hypot(*moved.T) / self.most)
         colours[~self.free] = to_rgba(FIXED)
         for which, edge, width in ((~self.marked, "0.45", 0.6), (self.marked, MARKED, 2.0)):

@@ -24,12 +24,13 @@ class Record:
     contact carries; "law" (k,) its number in the scene; and numbers (k,) with their unit in the
     name. stresses[f] (3, n): xx, yy, xy of the blocks (Pa). monitored[f]: what the scene's [watch]
     asks for; slips: of its joints; laws: of the watched joints; state: that of the last frame, to
-    return to; steps: of the run; loose (n,): blocks that nothing held at the start.
+    return to; steps: of the run; loose (n,): blocks that nothing held at step 0; initial (6, n):
+    motion there, also of a run that is resumed.
     """
 
     def __init__(self, sim: Simulation) -> None:
         self.scene, self.slips, self.steps = sim.scene, watched_slips(sim), 0
-        self.loose = sim.loose
+        self.loose, self.initial = sim.loose, sim.initial
         self.laws = {pair: law_between(sim, *pair) for pair in (*sim.scene.slip, *sim.scene.shear)}
         self.times, self.motion, self.energy = [], [], []
         self.joints, self.stresses, self.monitored = [], [], []
@@ -45,15 +46,21 @@ class Record:
         self.monitored.append(readings(sim))
         self.state = sim.state()
 
-    def displaced(self, i: int) -> np.ndarray:
-        """Displacements (n, 2) from the drawing to frame i, relative to the base (m)."""
+    @property
+    def settled(self) -> np.ndarray:
+        """Displacements (n, 2) from the drawing to step 0, relative to the base (m)."""
         drawn = np.array([block.centroid for block in self.scene.blocks])
-        return self.motion[i][:2].T - drawn - base_of(self.scene, self.motion[i])[:2]
+        return self.initial[:2].T - drawn - base_of(self.scene, self.initial)[:2]
+
+    def displaced(self, i: int) -> np.ndarray:
+        """Displacements (n, 2) from step 0 to frame i, relative to the base (m)."""
+        base = base_of(self.scene, self.motion[i]) - base_of(self.scene, self.initial)
+        return (self.motion[i][:2] - self.initial[:2]).T - base[:2]
 
     @property
     def moved(self) -> np.ndarray:
-        """Distance (n,) that the blocks have moved since the first frame (m)."""
-        return np.hypot(*(self.displaced(-1) - self.displaced(0)).T)
+        """Distance (n,) that the blocks have moved since step 0 (m)."""
+        return np.hypot(*self.displaced(-1).T)
 
     def column(self, name: str) -> np.ndarray:
         """A monitored quantity over all frames."""
@@ -67,14 +74,14 @@ class Record:
 
     def write_blocks(self, path: Path) -> None:
         """blocks.csv: where each block is at the end, and how it moved since step 0."""
-        last, away = self.motion[-1].T, self.displaced(-1) - self.displaced(0)
+        last, away = self.motion[-1].T, self.displaced(-1)
         slip, joints = np.zeros(len(last)), self.joints[-1]
         np.maximum.at(slip, joints["who"], np.abs(joints["shear_m"])[:, None])
         columns = {
             "block": [block.name for block in self.scene.blocks], "x_m": last[:, 0],
             "y_m": last[:, 1], "displacement_m": np.hypot(*away.T), "displacement_x_m": away[:, 0],
             "displacement_y_m": away[:, 1],
-            "rotation_deg": np.degrees(last[:, 2] - self.motion[0][2]),
+            "rotation_deg": np.degrees(last[:, 2] - self.initial[2]),
             "speed_m/s": np.hypot(*last[:, 3:5].T), "largest_joint_slip_m": slip,
             "loose_at_start": self.loose.astype(int),
         }  # fmt: skip
@@ -116,7 +123,7 @@ def _joints(sim: Simulation) -> dict[str, np.ndarray]:
 
 def block_stresses(sim: Simulation) -> np.ndarray:
     """Mean stress xx, yy, xy (3, n) in each block (Pa, compression positive): force times arm of
-    its joints, over its volume."""
+    its joints, over its volume. NaN where other forces hold or load a block."""
     c, blocks = sim.contacts, sim.scene.blocks
     push, shear = (sim.joints.traction * c.length[:, None]).T
     on_b, block = (push + 1j * shear) * c.normal, np.concatenate([c.a, c.b])
@@ -124,7 +131,10 @@ def block_stresses(sim: Simulation) -> np.ndarray:
     arm = np.tile(c.at, 2) - (sim.blocks.motion[0] + 1j * sim.blocks.motion[1])[block]
     parts = fx * arm.real, fy * arm.imag, 0.5 * (fx * arm.imag + fy * arm.real)
     sums = np.array([np.bincount(block, part, len(blocks)) for part in parts])
-    return sums / [one.section.area for one in blocks]
+    other = np.array([block.fixed or bool(block.held) for block in blocks])
+    if stress := sim.scene.in_situ:
+        other[c.outlines.block[stress.edges]] = True
+    return np.where(other, np.nan, sums / [one.section.area for one in blocks])
 
 
 def write_csv(path: Path, header, rows) -> None:
@@ -145,7 +155,7 @@ def outcomes(record: Record) -> list[dict]:
     out, times = [], np.array(record.times)
     since = int(np.searchsorted(times, times[-1] - LOOK_BACK + 1e-9))
     before = max(min(since, len(times) - 2), 0)
-    first, then, last = (record.displaced(i) for i in (0, before, -1))
+    then, last = (record.displaced(i) for i in (before, -1))
     crept = np.hypot(*(last - then).T) / max(times[-1] - times[before], 1e-300)
     groups, blocks = {rock.name: rock.free for rock in record.scene.rocks}, record.scene.blocks
     rest = {i for i, block in enumerate(blocks) if not (block.fixed or block.held)}
@@ -154,7 +164,7 @@ def outcomes(record: Record) -> list[dict]:
         free = [i for i in group if np.isfinite(last[i, 0])]
         if not free:
             continue
-        moved, creep = np.hypot(*(last - first)[free].T), float(crept[free].max())
+        moved, creep = record.moved[free], float(crept[free].max())
         limit = FAILED * usual_size(blocks[i] for i in free)
         failed = int((moved > limit).sum())
         out.append(
@@ -162,7 +172,7 @@ def outcomes(record: Record) -> list[dict]:
                 "rock": name,
                 "state": "fails" if failed else "stands" if creep < CREEP else "moves",
                 "blocks": len(free),
-                "settled_m": float(np.hypot(*first[free].T).max()),
+                "settled_m": float(np.hypot(*record.settled[free].T).max()),
                 "moved_m": float(moved.max()),
                 "failed": failed,
                 "failed_beyond_m": limit,

@@ -41,16 +41,17 @@ def _blocks(record: Record, i: int) -> meshio.Mesh:
     first = np.cumsum([0, *map(len, shapes)])
     cells = [("polygon", np.arange(a, b)[None]) for a, b in pairwise(first)]
     xx, yy, xy = record.stresses[i]
-    values, ways = np.linalg.eigh(np.stack([xx, xy, xy, yy], axis=1).reshape(-1, 2, 2))
+    mean, half = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
+    turn = 0.5 * np.arctan2(2 * xy, xx - yy)  # of the larger principal stress
     columns = {
         "block": np.arange(len(motion.T), dtype=float),
-        "displacement_m": _in_space(record.displaced(i) - record.displaced(0)),
-        "turn_rad": motion[2] - record.motion[0][2],
+        "displacement_m": _in_space(record.displaced(i)),
+        "turn_rad": motion[2] - record.initial[2],
         "velocity_m/s": _in_space(motion[3:5].T),
         "spin_rad/s": motion[5],
-        "stress_1_Pa": values[:, 1],
-        "stress_2_Pa": values[:, 0],
-        "along_stress_1_Pa": _in_space(values[:, 1:] * ways[:, :, 1]),
+        "stress_1_Pa": mean + half,
+        "stress_2_Pa": mean - half,
+        "along_stress_1_Pa": _in_space(((mean + half) * [np.cos(turn), np.sin(turn)]).T),
         "loose": record.loose.astype(float),
     }
     data = {

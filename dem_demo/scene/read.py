@@ -150,6 +150,8 @@ def _block(table: Tables, density: float, where: str) -> Block:
     if "box" in table:
         at, angle = table.pop("at", (0.0, 0.0)), table.pop("angle", 0.0)
         table["corners"] = box(*table.pop("box"), at, angle)
+    if table.get("fixed") and {"velocity", "spin"} & {*table}:
+        raise ValueError(f"{name}: a fixed block has no velocity or spin; let a [[drive]] move it")
     if trouble := check_convex(table["corners"]):
         raise ValueError(f"{name}.corners (or box) {trouble}")
     return Block(**{"density": density, **table, "held": tuple(table.get("held", ()))})
@@ -269,7 +271,8 @@ def _rock(
     sets = [JointSet(**{"law": top["law"], **part}) for part in table["set"]]
     shift, other = np.array(table.get("at", (0.0, 0.0))), table.get("laws", {})
     fixed = [Polygon(part["corners"]) for part in table.get("fixed", ())]
-    least = table.get("least_width", LEAST * min((s.spacing for s in sets), default=0.0))
+    wide = min([float(np.ptp(table["outline"], axis=0).min()), *(s.spacing for s in sets)])
+    least = table.get("least_width", LEAST * wide * bool(sets))
     if unknown := set(other) - {s.law for s in sets}:
         raise ValueError(f"{where}.laws: no set of this rock has the law {unknown.pop()!r}")
     try:
@@ -280,6 +283,10 @@ def _rock(
         )
     except ValueError as error:
         raise ValueError(f"{where}.outline: {error}") from None
+    if not shapes:
+        raise ValueError(
+            f"{where}: all of it is slivers, narrower than {least:.3g} m: give a smaller least_width"
+        )
     first, names = len(blocks), [other.get(s.law, s.law) for s in sets]
     of_edge = dict(enumerate(names)) | {CUT: table.get("cut_law", WHOLE)}
     for i, (shape, of) in enumerate(zip(shapes, numbers, strict=True)):

@@ -11,8 +11,10 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
+from shapely import Point, Polygon
 from tqdm import tqdm
 
 import jointlaw as jl
@@ -83,6 +85,7 @@ def strength_reduction(
         tell(f"{name}: looking for blocks that cannot be held")
         loose = trials.ask(f"{name}: loose", partial(_loose, one))
         free = sum(not block.fixed for block in one.blocks)
+        free -= sum(not one.blocks[i].fixed for i in one.gone)
         tell(f"{name}: {len(loose)} of {free} blocks cannot be held: {told(loose)}")
         row: dict = {"rock": name, "loose": loose, "without": loose}
         if len(loose) == free:
@@ -103,12 +106,13 @@ def strength_reduction(
         tell(f"{name}: critical tilt")
         row |= {"critical_tilt": critical_tilt(one, trials, name), "picture": None}
         if factor:
-            row["picture"] = f"failing-{name}.{picture_format}"
+            row["picture"] = f"failing-{quote(name, safe=' ')}.{picture_format}"
             path, weak = folder / row["picture"], weakened(one, SHOWN * factor)
             title = f"{name}: factor of safety {factor:.3g}\nwith strength / {weak.reduction:.3g}"
             tell(f"{name}: running it with strength / {weak.reduction:.3g}")
             row["first"] = trials.ask(
-                row["picture"], partial(_show, weak, until, title, path, apart)
+                row["picture"],
+                partial(_show, weak, until, title, path, apart & (apart.sum() < free)),
             )
             tell(f"{name}: first to move: {told(row['first'])}")
         yield row
@@ -129,8 +133,9 @@ def _show(scene: Scene, until: float, title: str, path: Path, apart: np.ndarray)
     `apart` (n,)."""
     record, _ = to_failure(seated(scene), until)
     size = usual_size(block for block in scene.blocks if not block.fixed)
-    moved = [np.where(apart, 0.0, np.hypot(*(record.displaced(i) - record.displaced(0)).T))
-             for i in range(len(record.times))]  # fmt: skip
+    moved = [
+        np.where(apart, 0.0, np.hypot(*record.displaced(i).T)) for i in range(len(record.times))
+    ]
     away = next((frame for frame in moved if np.nanmax(frame) > FIRST * size), moved[-1])
     ahead = away > 0.5 * np.nanmax(away)
     Pictures(record, title, ahead, "moves first").final(path)
@@ -227,14 +232,15 @@ def alone(scene: Scene, name: str, seed: int | None = None) -> Scene:
     own = {"seed": 0, **rock} | ({} if seed is None else {"seed": seed})
     same = own["seed"] == rock.get("seed", 0)
     blocks = {block["name"] for block in data.get("block", [])}
-    low, high = np.quantile(np.add(rock["outline"], rock.get("at", [0, 0])), [0, 1], axis=0)
+    outline = Polygon(np.add(rock["outline"], rock.get("at", [0, 0])))
 
     def belongs(joint: Tables) -> bool:
         if around := joint.get("around"):
-            return bool((low < around).all() and (around < high).all())
+            return bool(outline.contains(Point(around)))
         others = set(joint["between"]) - blocks
         return all(other.rpartition(" ")[0] == name for other in others) and (same or not others)
 
-    digs = (dig for dig in data.get("excavate", []) if belongs({"around": dig["corners"][0]}))
-    kept = {"joint": [*filter(belongs, data.get("joint", []))], "excavate": [*digs]}
+    digs = [dig for dig in data.get("excavate", [])
+            if outline.intersection(Polygon(dig["corners"])).area > 0]  # fmt: skip
+    kept = {"joint": [*filter(belongs, data.get("joint", []))], "excavate": digs}
     return build({**data, **kept, "rock": [own], "watch": {}}, files=scene.files)

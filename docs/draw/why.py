@@ -166,13 +166,13 @@ def strength_surface(plt):
     solid.plot_surface(x, y, normal[:, None] + 0 * x, color=OURS, alpha=0.55, lw=0)
     for k in (2, 5, 8):
         solid.plot(x[k], y[k], normal[k], color="k", lw=1.5)
-    solid.set(xlabel="$τ_2$ (MPa)", ylabel="$τ_3$ (MPa)", zlabel="σ (MPa)", yticks=(-5, 0, 5))
+    solid.set(xlabel="τ₂ (MPa)", ylabel="τ₃ (MPa)", zlabel="σ (MPa)", yticks=(-5, 0, 5))
     solid.set_box_aspect((1, 1, 0.7), zoom=0.95)
     above, beside = figure.add_subplot(2, 2, 3), figure.add_subplot(2, 2, 4)
     for k in (2, 5, 8):
         above.plot(x[k], y[k], color="k", lw=1.5)
         above.text(0, y[k].max() - 0.3, f"{normal[k]:.0f} MPa", ha="center", va="top", fontsize=10)
-    above.set(aspect="equal", xlabel="$τ_2$ (MPa)", ylabel="$τ_3$ (MPa)")
+    above.set(aspect="equal", xlabel="τ₂ (MPa)", ylabel="τ₃ (MPa)")
     for k, name, colour in ((0, "along axis 2", OURS), (6, "along axis 3", OTHER)):
         beside.plot(normal, strength[:, k], color=colour, label=name)
     beside.set(xlabel="σ (MPa)", ylabel="strength (MPa)")

@@ -23,6 +23,7 @@ STYLE: dict[str, Any] = {
     "lines.linewidth": 1.5,
     "lines.markersize": 4,
     "savefig.dpi": 150,
+    "text.parse_math": False,  # titles and names are the user's, and may hold $
 }
 
 

@@ -14,10 +14,10 @@ def found(name, path=None):
     return program
 
 
-def output(*command, code=0, **options):
-    """What a program prints that must end with this code."""
+def output(*command, code=0, timeout=500, **options):
+    """What a program prints that must end with this code; timeout: in s."""
     done = subprocess.run(
-        [str(word) for word in command], capture_output=True, text=True, timeout=500,
+        [str(word) for word in command], capture_output=True, text=True, timeout=timeout,
         stdin=subprocess.DEVNULL, **options,
     )  # fmt: skip
     told = done.stdout + done.stderr

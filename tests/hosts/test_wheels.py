@@ -26,7 +26,7 @@ def wheels(tmp_path_factory):
     for name in ("build", "lief", "ziglang"):  # of the extra `wheels`
         pytest.importorskip(name)
     folder = tmp_path_factory.mktemp("wheels")
-    output(sys.executable, ROOT / "builder" / "wheels.py", folder)
+    output(sys.executable, ROOT / "builder" / "wheels.py", folder, timeout=3000)
     return folder
 
 

@@ -310,8 +310,9 @@ class Joints:
         c.update(n=n, t2=t2, c1=c1, c2=c2, closure=closure, F=F)
         force[:, fresh] -= self._switch_off(fresh)
         self._apply(force, c1, c2)
-        for k in np.flatnonzero((closure < -self.forget) & ~F.any(axis=0)):
-            O.interactions.erase(int(c["id1"][k]), int(c["id2"][k]))
+        if self.forget < np.inf:
+            for k in np.flatnonzero((closure < -self.forget) & ~F.any(axis=0)):
+                O.interactions.erase(int(c["id1"][k]), int(c["id2"][k]))
 
     def _geometry(self, x, q1):
         """Normal, overlap, and the contact point seen from either centre."""
@@ -480,15 +481,16 @@ class Joints:
         for state in list(self.states.values())[self.x.shape[1] :]:
             angle = state.angVel.norm() * O.dt
             axis = state.angVel.normalized() if angle > 0 else Vector3(0, 0, 1)
-            x.append(state.pos - state.vel * O.dt)
-            q.append(Quaternion(axis, -angle) * state.ori)
+            x.append((state.pos - state.vel * O.dt).__getinitargs__())
+            q.append((Quaternion(axis, -angle) * state.ori).__getinitargs__())
         self.x = np.concatenate([self.x, columns(x, 3)], axis=1)
         self.q = np.concatenate([self.q, columns(q, 4)], axis=1)
 
     def _read(self):
         """Positions (3, b) and orientations (4, b; w first) of the bodies with joints."""
         states = self.states.values()
-        return columns([s.pos for s in states], 3), columns([s.ori for s in states], 4)
+        x = columns([s.pos.__getinitargs__() for s in states], 3)
+        return x, columns([s.ori.__getinitargs__() for s in states], 4)
 
     # ------------------------------------------------------------ save and show
 
@@ -555,9 +557,8 @@ def key(i):
     return i.id1, i.id2, i.iterMadeReal
 
 
-def columns(vectors, size):
-    """Array (size, n) of YADE's vectors or quaternions."""
-    rows = [v.__getinitargs__() for v in vectors]
+def columns(rows, size):
+    """Array (size, n) of n rows."""
     return np.reshape(rows, (-1, size)).T.copy()
 
 

@@ -18,7 +18,6 @@ PRESSED, TURN, END = 10, 50, 70  # steps
 # all, but never keeps the new state of a law: each step would start from the virgin joint.
 SHARE = 0.5
 
-
 model = Kratos.Model()
 Kratos.Logger.GetDefaultOutput().SetSeverity(Kratos.Logger.Severity.WARNING)
 variable = Kratos.KratosGlobals.GetVariable

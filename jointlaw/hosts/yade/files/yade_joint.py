@@ -489,8 +489,10 @@ class Joints:
     def _read(self):
         """Positions (3, b) and orientations (4, b; w first) of the bodies with joints."""
         states = self.states.values()
-        x = columns([s.pos.__getinitargs__() for s in states], 3)
-        return x, columns([s.ori.__getinitargs__() for s in states], 4)
+        return (
+            columns([s.pos.__getinitargs__() for s in states], 3),
+            columns([s.ori.__getinitargs__() for s in states], 4),
+        )
 
     # ------------------------------------------------------------ save and show
 

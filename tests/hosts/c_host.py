@@ -1,12 +1,10 @@
 """Builds jointlaw.h with the system's compilers, and calls it from Python."""
 
 import ctypes
-import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
-import pytest
+from programs import found, output
 
 import jointlaw as jl
 from jointlaw.hosts.c.export import table_text
@@ -18,34 +16,14 @@ SOURCE = '#define JOINTLAW_IMPLEMENTATION\n#include "jointlaw.h"\n'
 HERE = Path(__file__).parent / "c"
 
 
-def compiler(name="cc"):
-    """The compiler's path; skips the test where there is none."""
-    found = shutil.which(name)
-    if found is None:
-        pytest.skip(f"no C compiler `{name}` on this machine (Debian: apt-get install gcc clang)")
-    return found
-
-
 def build(folder, source, *flags, cc="cc", name="program"):
     """Compile a source file or text in the folder; the program's path."""
     path = source
     if not isinstance(source, Path):
         path = folder / ("source.cpp" if cc.endswith("++") else "source.c")
         path.write_text(source)
-    out = folder / name
-    command = [compiler(cc), *flags, f"-I{BUILT}", str(path), "-o", str(out), "-lm"]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, f"{' '.join(command)}\n{done.stderr}"
-    return out
-
-
-def run(program, *arguments):
-    """Run a program that must succeed; what it prints."""
-    done = subprocess.run(
-        [str(program), *map(str, arguments)], capture_output=True, text=True, timeout=500
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
+    output(found(cc), *flags, f"-I{BUILT}", path, "-o", folder / name, "-lm")
+    return folder / name
 
 
 def library(folder, *flags, cc="cc", more=""):
@@ -87,11 +65,12 @@ class CLaw:
             raise ValueError(self.message.value.decode())
         return F, C
 
-    def shares(self):
-        """sliding, slipping, separated."""
-        shares = np.zeros(3)
-        self.lib.jlaw_shares(self.law, at(self.state), at(shares))
-        return shares
+    def measures(self):
+        """sliding, slipping, separated; stored and dissipated energy."""
+        shares, state = np.zeros(3), at(self.state)
+        self.lib.jlaw_shares(self.law, state, at(shares))
+        energies = (f(self.law, state) for f in (self.lib.jlaw_stored, self.lib.jlaw_dissipated))
+        return [*shares, *energies]
 
 
 def at(array):

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from fem_host import export
-from lammps_host import build, soft
+from lammps_host import build
 
 
 def pytest_collection_modifyitems(items):
@@ -17,8 +17,10 @@ def pytest_collection_modifyitems(items):
 
 @pytest.fixture(scope="session")
 def plugin(tmp_path_factory):
-    """A folder with LAMMPS' plug-in, built, and rock.jlaw, a soft joint in space."""
-    return build(tmp_path_factory.mktemp("lammps"), soft())
+    """A folder with LAMMPS' plug-in, built, and NAME.jlaw of each of `lammps_host.LAWS`."""
+    folder = tmp_path_factory.mktemp("lammps")
+    build(folder / "other", "-O0 -DJOINTLAW_LAMMPS=20240829")  # for another LAMMPS
+    return build(folder)
 
 
 @pytest.fixture(scope="session")

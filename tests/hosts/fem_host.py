@@ -1,108 +1,73 @@
 """Exports a law to finite elements, builds it, and calls its behaviours as MGIS does."""
 
 import ctypes
-import subprocess
 
 import numpy as np
-from c_host import FAST, STRICT, compiler
+from c_host import FAST, STRICT, at
+from programs import found, output
 
 import jointlaw as jl
 
 LAW = jl.presets.load("westerly-rough")
 SEATING = 1e4  # Pa
-NUMBER, TEXT = ctypes.POINTER(ctypes.c_double), ctypes.c_char_p
-STATE_VIEW = ("gradients", "forces", "density", "properties", "state", "stored", "dissipated")
+STATE_VIEW = (
+    "gradients", "forces", "density", "properties", "state", "stored", "dissipated", "external",
+)  # fmt: skip
 
 
 class View(ctypes.Structure):
     """`mgis_bv_BehaviourDataView` of MGIS 1.2.2 to 3.1."""
 
     _fields_ = [
-        ("message", TEXT),
+        ("message", ctypes.c_void_p),
         ("dt", ctypes.c_double),
-        *((name, NUMBER) for name in ("K", "rdt", "speed_of_sound")),
-        *((f"{name}{end}", NUMBER) for end in "01" for name in (*STATE_VIEW, "external")),
+        *((name, ctypes.c_void_p) for name in ("K", "rdt", "speed_of_sound")),
+        *((f"{name}{end}", ctypes.c_void_p) for end in "01" for name in STATE_VIEW),
     ]
 
 
 def export(folder, law=LAW, level="-O3", target="all"):
     """Export a law as rock and build its libraries, without a warning."""
-    compiler("cc")
     jl.export_fem(law, folder, "rock", SEATING)
     quiet = ["-Wno-psabi", "-Wno-maybe-uninitialized"]  # of the header, not of these files
     flags = f"CFLAGS={' '.join([level, '-std=c99', *FAST[1:], *STRICT, *quiet])}"
-    done = subprocess.run(["make", "-C", folder, target, flags], capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
+    output(found("make"), "-C", folder, target, flags)
     return folder
 
 
-def is_the_test_in_python(slip, opening, shear, pressed, turn):
-    """Direct shear of a host at 2 MPa, from step `pressed` forth to step `turn`, then back."""
-    joint = LAW.joint(normal_stress=SEATING)
-    start = joint.delta[0]
-    forth = jl.direct_shear(joint, slip[turn], normal=2e6, steps=turn - pressed)
-    back = jl.direct_shear(joint, slip[-1] - slip[turn], normal=2e6, steps=len(slip) - 1 - turn)
-    peak, rise = forth.shear_stress.max(), np.ptp(forth.closure)
-    for rows, record in ((slice(pressed, turn + 1), forth), (slice(turn, None), back)):
-        assert np.abs(shear[rows] - record.shear_stress).max() < 1e-3 * peak
-        assert np.abs(opening[rows] - (start - record.closure)).max() < 1e-3 * rise
-    assert forth.shear_stress[-1] - back.shear_stress[-1] > peak / 2, "the way back must differ"
-
-
 class Behaviour:
-    """One point of a behaviour, loaded by its symbols; `update` and `revert` as a host has them."""
+    """One point of a behaviour, loaded by its symbols; a step that is done is kept."""
 
     def __init__(self, folder, name="rock", hypothesis="Tridimensional", properties=()):
-        self.lib, self.name = ctypes.CDLL(str(folder / "librock_mgis.so")), name
-        self.function = self.lib[f"{name}_{hypothesis}"]
-        size = {
-            1: {"Tridimensional": 6}.get(hypothesis, 4),
-            2: 3 - (hypothesis != "Tridimensional"),
-        }
-        self.size = n = size[self.types("Gradients")[0]]
-        rows, made = self.number("nInternalStateVariables"), np.zeros
-        self.old = {"gradients": made(n), "forces": made(n), "state": made(rows)}
-        self.old |= {"properties": np.array(properties, float), "stored": made(1)}
-        self.old |= {"dissipated": made(1), "density": made(1), "external": made(1)}
+        self.lib = ctypes.CDLL(str(folder / "librock_mgis.so"))
+        self.function, space = self.lib[f"{name}_{hypothesis}"], hypothesis == "Tridimensional"
+        self.size = (3 if space else 2) if name == "rock" else (6 if space else 4)
+        rows = ctypes.c_ushort.in_dll(self.lib, f"{name}_nInternalStateVariables").value
+        sizes = {"gradients": self.size, "forces": self.size, "state": rows}
+        self.old = {key: np.zeros(sizes.get(key, 1)) for key in STATE_VIEW}
+        self.old["properties"] = np.array(properties, float)
         self.new = {key: value.copy() for key, value in self.old.items()}
         self.state = self.new["state"]
         self.rdt, self.message = np.ones(1), ctypes.create_string_buffer(512)
 
-    def number(self, name):
-        return ctypes.c_ushort.in_dll(self.lib, f"{self.name}_{name}").value
-
-    def text(self, name):
-        return TEXT.in_dll(self.lib, f"{self.name}_{name}").value.decode()
-
-    def names(self, name):
-        array = (TEXT * self.number(f"n{name}")).in_dll(self.lib, f"{self.name}_{name}")
-        return [word.decode() for word in array]
-
-    def types(self, name):
-        array = ctypes.c_int * self.number(f"n{name}")
-        return list(array.in_dll(self.lib, f"{self.name}_{name}Types"))
-
     def integrate(self, gradients, want=4.0):
         """What the function returns, and K (size, size), NaN where it was not written."""
         self.new["gradients"][:] = gradients
-        K = np.full((self.size, self.size), np.nan)
+        K, speed = np.full((self.size, self.size), np.nan), np.zeros(1)
         K[0, 0] = want
-        view = View(dt=1.0, K=at(K), rdt=at(self.rdt), speed_of_sound=at(np.zeros(1)))
+        view = View(dt=1.0, K=at(K), rdt=at(self.rdt), speed_of_sound=at(speed))
         view.message = ctypes.addressof(self.message)
         for end, data in enumerate((self.old, self.new)):
             for key, array in data.items():
                 setattr(view, f"{key}{end}", at(array))
         return self.function(ctypes.byref(view)), K
 
-    def update(self):
-        for key, array in self.new.items():
-            self.old[key][:] = array
-
     def step(self, by):
         """Advance by a difference of gradients; forces and K."""
         done, K = self.integrate(self.old["gradients"] + by)
         assert done == 1, self.message.value.decode()
-        self.update()
+        for key, array in self.new.items():
+            self.old[key][:] = array
         return self.new["forces"].copy(), K
 
     @property
@@ -116,11 +81,7 @@ class Umat:
 
     def __init__(self, folder, n):
         self.function, self.size = ctypes.CDLL(str(folder / "librock_umat.so")).umat_, n
-        self.stress, self.state, self.K = (
-            np.zeros(n),
-            np.zeros(LAW.state_size + 1),
-            np.zeros((n, n)),
-        )
+        self.stress, self.state, self.K = map(np.zeros, (n, LAW.state_size + 1, (n, n)))
         self.energies, self.pnewdt = np.zeros(2), np.ones(1)
 
     def step(self, by, rows=LAW.state_size + 1):
@@ -133,8 +94,3 @@ class Umat:
             arguments[place] = ctypes.byref(ctypes.c_int(whole))
         self.function(*arguments)
         return self.stress.copy(), self.K.T.copy()  # its columns come first in Fortran
-
-
-def at(array):
-    """Pointer to an array's numbers."""
-    return array.ctypes.data_as(NUMBER)

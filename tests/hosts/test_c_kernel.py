@@ -1,13 +1,18 @@
-"""The law in C gives the bits of the law in Python, and turns the axes of a joint."""
+"""The law in C gives the bits of the law in Python, and turns the axes of a joint.
 
+Every declared parameter, off its default, too: through the exported header and table file.
+"""
+
+import contextlib
 import ctypes
 
 import numpy as np
 import pytest
 from c_host import FAST, CLaw, at, library, random_law, random_path
-from kinds import LAWS, make_law
+from kinds import LAWS, PARAMETERS, make_law, off_default
 
 import jointlaw as jl
+from jointlaw.hosts.c.export import header_text
 
 BUILDS = {  # test_native.py tells the same of the library, which is made of the same text
     "gcc": ("gcc", [*FAST, "-std=c99"]),
@@ -16,6 +21,12 @@ BUILDS = {  # test_native.py tells the same of the library, which is made of the
     "clang, this machine": ("clang", [*FAST, "-march=native", "-DJOINTLAW_MANY"]),
     "C++": ("g++", [*FAST, "-std=c++17", "-march=x86-64-v3", "-DJOINTLAW_MANY"]),
 }
+DECLARED = [off_default(name)[0] for name in PARAMETERS]
+DECLARED.append(random_law(6))  # heights of a density that is infinite at the point of contact
+CONSTANTS = """#include "law_{0}.h"
+const jlaw_law *constants_{0}(void);
+const jlaw_law *constants_{0}(void) {{ return &law_{0}; }}
+"""
 
 
 def many_are_one_by_one(built, one, law):
@@ -40,50 +51,80 @@ def many_are_one_by_one(built, one, law):
 
 @pytest.fixture(scope="module")
 def lib(tmp_path_factory):
-    cc, flags = BUILDS["gcc"]
-    return library(tmp_path_factory.mktemp("c"), *flags, cc=cc)
+    """The law in C, with the tables of all declared parameters as constants."""
+    folder = tmp_path_factory.mktemp("c")
+    for i, law in enumerate(DECLARED):
+        (folder / f"law_{i}.h").write_text(header_text(law, f"law_{i}"))
+    more = "".join(map(CONSTANTS.format, range(len(DECLARED))))
+    flags = "-O1", "-DJOINTLAW_PLAIN", "-ffp-contract=off", f"-I{folder}"
+    return library(folder, *flags, more=more)
+
+
+def goes_as_in_python(one, law, seed):
+    """F, C, state, energies and shares; the state of a Python joint goes on in C."""
+    path, joint = random_path(one.dim, seed), law.joint()
+    for step in path[:10]:
+        joint.update(step)
+    one.state[:] = joint.snapshot().values[0]
+    for step in path[10:]:
+        for a, b in zip(one.step(step), joint.update(step), strict=True):
+            np.testing.assert_array_equal(a, b)
+        np.testing.assert_array_equal(one.state, joint.snapshot().values[0])
+        shares, energies = np.split(one.measures(), [3])
+        assert shares == pytest.approx(joint.measures()[:3], abs=1e-9)
+        asked = [joint.stored_energy, joint.dissipated_energy]
+        assert energies == pytest.approx(asked, rel=1e-12, abs=1e-300)
 
 
 @pytest.mark.parametrize("name", BUILDS)
-def test_the_bits_of_python(lib, tmp_path, name):
-    """F, C, state, energies and shares; the state of a Python joint goes on in C."""
+def test_the_bits_of_python(tmp_path, name):
     cc, flags = BUILDS[name]
-    built = lib if name == "gcc" else library(tmp_path, *flags, cc=cc)
+    built = library(tmp_path, *flags, cc=cc)
     laws = map(random_law, (0, 3, 7, 10, 13, 14, 20))  # yielding, wear and both, planes
     for seed, law in enumerate([LAWS["coulomb"], LAWS["coulomb in a plane"], *laws]):
-        one, joint = CLaw(built, law, tmp_path), law.joint()
-        path = random_path(one.dim, seed)
-        for step in path[:10]:
-            joint.update(step)
-        one.state[:] = joint.snapshot().values[0]
-        for step in path[10:]:
-            for a, b in zip(one.step(step), joint.update(step), strict=True):
-                np.testing.assert_array_equal(a, b)
-            np.testing.assert_array_equal(one.state, joint.snapshot().values[0])
-            shares = joint.measures()[:3]
-            assert one.shares() == pytest.approx(shares, abs=1e-9)
-            energies = [
-                f(one.law, at(one.state)) for f in (built.jlaw_stored, built.jlaw_dissipated)
-            ]
-            asked = [joint.stored_energy, joint.dissipated_energy]
-            assert energies == pytest.approx(asked, rel=1e-12, abs=1e-300)
+        one = CLaw(built, law, tmp_path)
+        goes_as_in_python(one, law, seed)
         many_are_one_by_one(built, one, law)
 
 
-def test_a_refused_step_moves_nothing_and_tells_why(lib, tmp_path):
+@pytest.mark.parametrize("i", range(len(DECLARED)))
+def test_both_forms_of_the_tables_give_what_python_gives(lib, tmp_path, i):
+    law, read, compiled = DECLARED[i], *(CLaw(lib, DECLARED[i], tmp_path) for _ in range(2))
+    constants = getattr(lib, f"constants_{i}")
+    constants.restype = ctypes.c_void_p
+    compiled.law = ctypes.c_void_p(constants())
+    for one in (read, compiled):
+        goes_as_in_python(one, law, i)
+        for closure in (-1e-6, 0.0, 1e-9, 3e-7, 2e-6):
+            asked = law.normal_stress(closure), law.max_stiffness(closure)
+            told = (f(one.law, closure) for f in (lib.jlaw_normal_stress, lib.jlaw_max_stiffness))
+            assert [*told] == pytest.approx(asked, rel=1e-12)
+        for stress in (0.0, 1e3, 5e6):
+            assert lib.jlaw_closure(one.law, stress) == pytest.approx(law.closure(stress), 1e-12)
+        assert lib.jlaw_fingerprint(one.law).decode() == law.fingerprint
+        assert np.isnan([lib.jlaw_closure(one.law, bad) for bad in (np.nan, -1.0, np.inf)]).all()
+        assert np.isnan(lib.jlaw_normal_stress(one.law, 2 * law.largest_reach))
+        apart = law.joint()
+        with contextlib.suppress(ValueError):  # of a law whose faces always fit
+            apart = law.joint(mated=False)
+        assert lib.jlaw_unmated(one.law, at(one.state)) == (0 if apart.delta.any() else -1)
+        np.testing.assert_array_equal(one.state, apart.snapshot().values[0])
+
+
+@pytest.mark.parametrize(
+    ("bad", "words"),
+    [
+        (np.nan, "is not finite; nothing was moved"),
+        (-np.inf, "is not finite; nothing was moved"),
+        (1e200, "beyond the reach of .* m, where forces overflow; nothing was moved. Take a sma"),
+    ],
+)
+def test_a_refused_step_tells_why(lib, tmp_path, bad, words):
+    """That nothing moved is told by fuzz.c."""
     joint = CLaw(lib, random_law(0), tmp_path)
-    joint.step(np.full(joint.dim, 1e-7))
-    before = joint.state.copy()
-    cases = {
-        np.nan: "is not finite; nothing was moved",
-        -np.inf: "is not finite; nothing was moved",
-        1e200: "beyond the reach of .* m, where forces overflow; nothing was moved. Take a smaller",
-    }
-    for bad, words in cases.items():
-        for slot in range(joint.dim):
-            with pytest.raises(ValueError, match=words):
-                joint.step(np.where(np.arange(joint.dim) == slot, bad, 1e-8))
-            np.testing.assert_array_equal(joint.state, before)
+    for slot in range(joint.dim):
+        with pytest.raises(ValueError, match=words):
+            joint.step(np.where(np.arange(joint.dim) == slot, bad, 1e-8))
     joint.state[0] = np.nan
     with pytest.raises(ValueError, match="the state holds numbers that are not finite"):
         joint.step(np.full(joint.dim, 1e-8))
@@ -102,38 +143,32 @@ def isotropic(phi, **changes):
     return make_law(b=0.4, c=0.0, mu=0.4, heights=None, resolution=resolution, **changes)
 
 
-def as_from_the_start(lib, law, folder, seed, R, turn, *angle):
-    """What is turned in mid-path goes on as what has moved in axes R from the start."""
-    one, two = CLaw(lib, law, folder), CLaw(lib, law, folder)
-    path = random_path(law.dim, seed, 30)
+# exact for every law: where bodies change their roles, shear along axis 2 changes its sign alone
+CASES = [(random_law(seed), np.diag([1, -1, 1]), "swap_bodies", ()) for seed in (1, 2, 4, 7, 9)]
+CASES += [  # by whole azimuths
+    (isotropic(4, mating_length=length), turned(angle), "rotate", (angle,))
+    for length in (np.inf, 8e-7)
+    for angle in (np.pi / 4, -3 * np.pi / 4, np.pi)
+]
+
+
+@pytest.mark.parametrize(("law", "R", "turn", "angle"), CASES)
+def test_turned_in_mid_path_is_as_in_turned_axes_from_the_start(lib, tmp_path, law, R, turn, angle):
+    one, two = CLaw(lib, law, tmp_path), CLaw(lib, law, tmp_path)
+    path = random_path(law.dim, 5, 30)
     for step in path[:15]:
         one.step(step)
-        two.step(R @ step)
-    turn(one.law, at(one.state), *angle)
+        two.step(R[: law.dim, : law.dim] @ step)
+    getattr(lib, f"jlaw_{turn}")(one.law, at(one.state), *angle)
     F, F_two = ([joint.step(step)[0] for step in path[15:]] for joint in (one, two))
     for mine, other in ((one.state, two.state), (F, F_two)):
         assert np.abs(np.subtract(mine, other)).max() <= 1e-11 * np.abs(other).max()
 
 
-@pytest.mark.parametrize("mating_length", [np.inf, 8e-7])
-@pytest.mark.parametrize("places", [1, -3, 4])
-def test_axes_turned_by_whole_azimuths(lib, tmp_path, mating_length, places):
-    law, angle = isotropic(4, mating_length=mating_length), places * np.pi / 4
-    as_from_the_start(lib, law, tmp_path, 5, turned(angle), lib.jlaw_rotate, angle)
-
-
-@pytest.mark.parametrize("seed", [1, 2, 4, 7, 9])
-def test_bodies_that_change_their_roles(lib, tmp_path, seed):
-    """Exact for every law: shear along axis 2 changes its sign, along axis 3 not."""
-    law = random_law(seed)
-    sign = np.diag([1.0, -1.0, 1.0][: law.dim])
-    as_from_the_start(lib, law, tmp_path, seed, sign, lib.jlaw_swap_bodies)
-
-
-def in_sliders(joint, sliders):
-    """Energy stored in the shear springs, whose forces are these rows of the state."""
+def in_sliders(joint, end):
+    """Energy stored in the shear springs, whose forces are the rows from 4 to `end`."""
     without = joint.state.copy()
-    without[sliders] = 0.0
+    without[4:end] = 0.0
     return np.subtract(*(joint.lib.jlaw_stored(joint.law, at(s)) for s in (joint.state, without)))
 
 
@@ -146,17 +181,16 @@ def test_axes_turned_between_azimuths(lib, tmp_path, damage):
         joint, end = CLaw(lib, law, tmp_path), 4 + law.tables.names["q"]
         for _ in range(5):
             F, _ = joint.step([1e-7, 5e-8, 2e-8])
-        sliders, depths = slice(4, end), slice(end, -1)
-        stored, before = in_sliders(joint, sliders), joint.state.copy()
+        stored, before = in_sliders(joint, end), joint.state.copy()
         lib.jlaw_rotate(joint.law, at(joint.state), 0.3)
         F_turned, _ = joint.step(np.zeros(3), keep=False)
         errors.append(np.abs(F_turned - turned(0.3) @ F).max() / np.abs(F).max())
         lost = joint.state[3] - before[3]
         assert lost >= 0.0
-        assert in_sliders(joint, sliders) + lost == pytest.approx(stored, rel=1e-12)
+        assert in_sliders(joint, end) + lost == pytest.approx(stored, rel=1e-12)
         assert np.hypot(*joint.state[1:3]) == pytest.approx(np.hypot(*before[1:3]), rel=1e-15)
         if damage:
-            assert 0 < joint.state[depths].max() <= before[depths].max()
+            assert 0 < joint.state[end:-1].max() <= before[end:-1].max()
     assert errors[2] < errors[1] < errors[0]
     # depths between azimuths lie on straight lines, off by an eighth of the square of the spacing
     assert errors[2] < (5e-3 if damage else 2e-3)

@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lammps_host import HEAD, run, soft, thermo
+from lammps_host import HEAD, LAWS, run, thermo
 
 import jointlaw as jl
-from jointlaw.hosts.c.export import table_text
 from jointlaw.hosts.lammps.export import export_lammps
 
 SPACING, AREA = 0.05, 0.0025
@@ -44,25 +43,13 @@ compute ke all ke
 )
 
 
-def rock(plugin):
-    """A joint under the weight of a block: its law, and the tables in the folder."""
-    law = soft(
-        asperity_density=1e4,
-        heights=jl.GammaHeights(alpha=3.82, beta=1.15e-3, overlap=3e-3),
-        mating_length=5e-4,
-        resolution="fast",
-    )
-    (plugin / "block.jlaw").write_text(table_text(law))
-    return law
-
-
 def test_points_hand_their_state_on(plugin):
     """Slip over nearly two spacings, over the border of two processors, with a tilt of the base.
 
     The block's 16 points own the joints (lower molecule ID); the base slides below them, tilted by
     theta, so that each column of points sees its own closure, linear in time.
     """
-    law, closure, theta, speed, dt, steps = rock(plugin), 5e-5, 1e-5, 0.9, 2.5e-5, 4000
+    law, closure, theta, speed, dt, steps = LAWS["block"], 5e-5, 1e-5, 0.9, 2.5e-5, 4000
     more = f"""group base type 1
 displace_atoms base rotate 0 0 -0.025 0 1 0 {float(np.degrees(theta))!r} units box
 fix move base move linear {speed} 0 0 units box
@@ -92,7 +79,7 @@ run {steps}"""
 
 def test_two_joint_sets(plugin):
     """A block in a corner: hybrid/overlay of two jointlaw with different normals and closures."""
-    law, deep, wide, sides = rock(plugin), 3e-5, 5e-5, ROWS * LAYERS
+    law, deep, wide, sides = LAWS["block"], 3e-5, 5e-5, ROWS * LAYERS
     one = "jointlaw opening 0.01 area 0.0025 plane {} closure0 {!r}"
     more = f"""region wall block -0.05 0 0 0.2 0 0.1 units box
 create_atoms 1 region wall
@@ -121,6 +108,7 @@ def test_tower(plugin):
     """in.tower as exported, with a short and hard shake, on one processor and on two."""
     law = replace(jl.presets.load("jing-replica"), resolution="fast")
     export_lammps(law, plugin, "tower")
+    assert jl.JointLaw.from_toml(plugin / "law.toml") == law
     shake = {"steps": 4000, "settle": 1000, "peak": 4.0}
     one, two = (thermo(run(plugin, "in.tower", n, **shake))[-1] for n in (1, 2))
     fed = np.abs(one["v_work"]).max() + np.abs(one["v_fallen"]).max()

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lammps_host import HEAD, dumped, run, soft, thermo
+from lammps_host import HEAD, LAWS, dumped, run, thermo
 
 PAGE = Path(__file__).parents[2] / "docs" / "particles.md"
 R = 0.01
@@ -116,12 +116,12 @@ clear
     tables = thermo(run(plugin, PRESSED + READ.format(damping=0.5) + steps + again))
     _, still, moving, without, restarted = tables
     closure = 2 * R - still["v_apart"][0]
-    expected = AREA * float(soft().normal_stress(closure))
+    expected = AREA * float(LAWS["rock"].normal_stress(closure))
     for table in (still, without, restarted):
         assert table["v_force"][0] == pytest.approx(expected, rel=1e-9)
     assert still["c_stress[1]"][0] * 0.2**3 == pytest.approx(expected * (2 * R - closure), rel=1e-9)
     assert abs(still["c_stress[2]"][0]) < 1e-12  # Pa
-    joint = soft().joint()
+    joint = LAWS["rock"].joint()
     joint.update([closure, 0.0, 0.0])
     _, C = joint.update([0.0, 0.0, 0.0])
     push = 2 * 0.5 * np.sqrt(AREA * C[0, 0] * MASS / 2) * 0.3
@@ -155,7 +155,7 @@ variable whole equal pe+c_ke+c_spin+v_high+c_joint[2]+c_joint[3]+c_joint[4]
 thermo_style custom step pe c_ke v_whole c_joint[1] c_joint[2] c_joint[3] c_joint[6]
 run 2000"""
     text = run(plugin, HEAD + start + MOTION + more, 2)
-    table, law = thermo(text)[0], soft()
+    table, law = thermo(text)[0], LAWS["rock"]
     assert "nothing touches yet" in text
     step = law.critical_time_step(MASS / 7, AREA, law.closure(1e6))
     assert table["c_joint[6]"][0] == pytest.approx(step, rel=1e-9)

@@ -1,10 +1,7 @@
 """Bad input and what the plug-in cannot do: one line each and exit 1, on two processors."""
 
 import pytest
-from lammps_host import HEAD, build, lammps, run, soft
-
-import jointlaw as jl
-from jointlaw.hosts.c.export import table_text
+from lammps_host import HEAD, run
 
 GOOD = (
     HEAD
@@ -36,7 +33,7 @@ CASES = {
     "another LAMMPS": ("load .", "load ./other", "was built for LAMMPS 20240829, this is 20250722"),
     "law of a plane": (COEFF, "pair_coeff * * plane.jlaw", "a law for motion in a plane"),
     "law with a direction": (COEFF, "pair_coeff * * directed.jlaw", "has a preferred direction"),
-    "two laws": (COEFF, COEFF + "\npair_coeff 1 2 other/rock.jlaw", "types 1 2 have a law already"),
+    "two laws": (COEFF, COEFF + "\npair_coeff 1 2 block.jlaw", "types 1 2 have a law already"),
     "no law for a pair": (COEFF, "pair_coeff 1 1 rock.jlaw\npair_coeff 2 2 rock.jlaw",
                           "types 1 2 have no pair_coeff; give a law or NULL"),
     "too many words": (COEFF, COEFF + " 3", "pair_coeff for jointlaw: I J FILE.jlaw"),
@@ -68,34 +65,25 @@ CASES = {
     "rerun": ("run 2", "dump 1 all custom 1 seen id x y z\nrun 2\nrerun seen dump x y z",
               "rerun cannot follow a joint"),
     "suffix": ("units si", "package omp 1\nsuffix omp\nunits si", "no version for the suffix omp"),
-    "law changed": ("run 2", f"run 2\n{STYLE}\npair_coeff * * other/rock.jlaw\nrun 2",
+    "law changed": ("run 2", f"run 2\n{STYLE}\npair_coeff * * block.jlaw\nrun 2",
                     "there are joints of other laws"),
+    "bond": (f"1e-3\n{COEFF}", "3e-5\npair_coeff * * bonded.jlaw", "holds until the joint is 4"),
+    "tension": (f"1e-3\n{COEFF}", "9e-6\npair_coeff * * coulomb.jlaw",
+                "bears tension until the joint is 1e-05 m"),
 }  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def folder(plugin):
-    """With laws that are refused, and a plug-in that was built for another LAMMPS."""
-    (plugin / "plane.jlaw").write_text(table_text(soft(plane=0.0)))
-    directed = soft("fast", orientation=jl.Orientation(4.0, c=0.1))
-    (plugin / "directed.jlaw").write_text(table_text(directed))
-    build(plugin / "other", soft("fast"), flags="-O0 -DJOINTLAW_LAMMPS=20240829")
-    return plugin
-
-
-def test_the_good_script_runs(folder):
+def test_the_good_script_runs(plugin):
     """Also found without `plugin load`, in the folder that the entry point gives to LAMMPS."""
-    run(folder, GOOD)
-    run(folder, GOOD.replace("plugin load ./jointlawplugin.so", ""), 2, plugins=folder)
+    run(plugin, GOOD)
+    run(plugin, GOOD.replace("plugin load ./jointlawplugin.so", ""), 2, plugins=plugin)
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_one_line_and_exit_1(folder, case):
+def test_one_line_and_exit_1(plugin, case):
     old, new, line = CASES[case]
     script = GOOD.replace(old, new) if old else ATOMIC
     assert script != GOOD
-    done = lammps(folder, script, 2)
-    errors = [line for line in done.stdout.splitlines() if line.startswith("ERROR")]
-    assert done.returncode == 1, done.stdout[-2000:]
-    assert len(errors) == 1, errors
-    assert line in errors[0]
+    told = run(plugin, script, 2, code=1).splitlines()
+    (error,) = (one for one in told if one.startswith("ERROR"))
+    assert line in error

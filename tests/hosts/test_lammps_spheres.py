@@ -1,8 +1,9 @@
-"""Two free spinning spheres in LAMMPS against an integration in Python; borders and restarts."""
+"""Two spheres in LAMMPS: free and spinning, against an integration in Python, over borders and
+restarts; bonded and pulled apart, where the joint is kept until the bond is broken."""
 
 import numpy as np
 import pytest
-from lammps_host import HEAD, dumped, run, soft
+from lammps_host import HEAD, LAWS, T, dumped, run
 
 R, DENSITY, DT, STEPS = 1e-2, 2600.0, 4e-7, 400
 MASS = DENSITY * 4.0 / 3.0 * np.pi * R**3
@@ -89,7 +90,7 @@ def differ(a, b):
 
 def test_two_free_spinning_spheres(plugin):
     """1e-12 of the largest of each, over an oblique collision: approach, slip, parting."""
-    expected = in_python(soft())
+    expected = in_python(LAWS["rock"])
     run(plugin, scene())
     found = dumped(plugin / "out")[1:, :, 1:13]
     touching = np.flatnonzero(np.abs(expected[..., 9:]).max(axis=(1, 2)))
@@ -148,3 +149,54 @@ def test_two_processors_and_restart(plugin, kind):
             run(plugin, RESTARTED.format(steps=STEPS - moment), after)
             rest = dumped(plugin / "rest")[1:, :, 1:13]
             assert differ(rest, whole[moment + 1 :]) < 1e-12, (before, after)
+
+
+PULLED = (
+    HEAD
+    + """boundary f f f
+region box block -0.2 0.225 -0.2 0.2 -0.2 0.2
+create_box 1 box
+create_atoms 1 single 0.0 0.0 0.0
+create_atoms 1 single {apart!r} 0.0 0.0
+set type 1 diameter 0.02 density 2600
+plugin load ./jointlawplugin.so
+pair_style jointlaw opening 1e-4 damping 0.5
+pair_coeff * * {law}.jlaw
+neighbor 0.002 bin
+timestep 1e-7
+group moving id 2
+dump 1 all custom 1 out type x fx id y fy
+dump_modify 1 sort id format float %.17g
+fix 1 moving move linear {motion}
+"""
+)
+
+
+def pulled(folder, motion, apart, law="bonded"):
+    """Opening (m) of two spheres, one of which is moved, and the force on the other."""
+    run(folder, PULLED.format(apart=apart, law=law, motion=motion))
+    frames = dumped(folder / "out")
+    return frames[:, 1, 1] - 2 * R, frames[:, 0, 2]
+
+
+@pytest.mark.parametrize("law", ["bonded", "coulomb"])
+@pytest.mark.parametrize("closed", [1e-9, -4e-18])
+def test_pulled_apart(plugin, law, closed):
+    """The force is that of the law at each opening: up to tension times area, then none. Spheres
+    that are drawn to touch do, whichever way the distance is rounded."""
+    opening, force = pulled(plugin, "1.0 0.0 0.0\nrun 600", 2 * R - closed, law)
+    area, joint = np.pi * R * R, LAWS[law].joint()
+    steps = np.diff(-opening, prepend=0.0)
+    expected = [-area * joint.update([d, 0.0, 0.0])[0][0] for d in steps]
+    np.testing.assert_allclose(force, expected, atol=1e-6 * T * area)
+    assert force.max() == pytest.approx(T * area, rel=0.01)
+    assert not force[opening > 4.1e-5].any()
+
+
+def test_spheres_that_meet_have_no_bond(plugin):
+    """They touch in the run, and part again by themselves: nothing holds them."""
+    back = "unfix 1\nfix 1 moving move linear 1.0 0.0 0.0\nrun 900"
+    opening, force = pulled(plugin, f"-1.0 0.0 0.0\nrun 60\n{back}", 2 * R + 1e-6)
+    assert (force[:61] < 0.0).any()
+    assert opening[-1] > 1e-5
+    assert (force <= 0.0).all()

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from c_host import HERE, compiler, random_law, random_path
+from c_host import HERE, random_law, random_path
+from programs import found, output
 
 from jointlaw.hosts.c.export import table_text
 from jointlaw.native import build
@@ -25,9 +26,7 @@ def wheels(tmp_path_factory):
     for name in ("build", "lief", "ziglang"):  # of the extra `wheels`
         pytest.importorskip(name)
     folder = tmp_path_factory.mktemp("wheels")
-    command = [sys.executable, ROOT / "builder" / "wheels.py", folder]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
+    output(sys.executable, ROOT / "builder" / "wheels.py", folder, timeout=3000)
     return folder
 
 
@@ -38,7 +37,7 @@ def test_a_wheel_for_each_machine(wheels):
 
 def test_arm_gives_the_bits_of_this_machine(wheels, tmp_path):
     """The library of the wheel, which there gives those of the header: laws of all kinds."""
-    qemu = compiler("qemu-aarch64")
+    qemu = found("qemu-aarch64")
     wheel = next(wheels.glob(f"*{build.TARGETS[ARM]}.whl"))
     library = zipfile.ZipFile(wheel).extract("jointlaw/native/built/libjointlaw.so", tmp_path)
     program, flags = tmp_path / "library", [*build.FLAGS, f"-I{build.BUILT}", f"-I{build.HERE}"]

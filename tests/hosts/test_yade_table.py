@@ -185,8 +185,6 @@ def test_normal_force_and_shear_follow_the_table(scenes, jing, legs):
     for leg, force in zip(legs, scenes["paths"], strict=True):
         F = table.follow(leg * TWICE)
         assert np.abs(force - AREA * F).max() < 1e-9 * peak
-    closure, normal = legs[0, :, 0], np.array(scenes["paths"][0])[:, 0]
-    assert np.abs(normal - AREA * table.lookup(closure).normal_stress).max() < 1e-9 * peak
     assert np.abs(F[:, 1:]).max() > 0.1 * table.normal_stress[-1]
 
 
@@ -256,7 +254,7 @@ def test_exported_script_runs_without_jointlaw(jing):
     assert float(settled.rsplit(" ", 1)[1]) < 1e-5
     lines = [line for line in text.splitlines() if line.startswith("azimuth")]
     assert [line.split(" deg: ")[2].split(" ")[0] for line in lines] == ["sticks", "slides"] * 3
-    mistyped = run_yade(jing[0], "settle_and_incline.py", "lvie")
+    mistyped = run_yade(jing[0], "settle_and_incline.py", "lvie", code=1)
     assert "lvie is unknown; write live, or nothing for the table" in mistyped
     assert "settled" not in mistyped
 

@@ -2,12 +2,10 @@
 
 import json
 import os
-import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
-import pytest
+from programs import found, output
 
 import jointlaw as jl
 from jointlaw.hosts.yade.export import copy_files
@@ -74,30 +72,20 @@ def attempt(name, action):
 """
 
 
-def run_yade(folder, script, *args, live=False):
+def run_yade(folder, script, *args, live=False, code=0):
     """What YADE prints when it runs this script of the folder, which is also where it runs."""
-    program = shutil.which("yade")
-    if program is None:
-        pytest.skip("YADE is not installed (Debian: apt-get install yade)")
-    env = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME")}
-    env |= {"OMP_NUM_THREADS": "1", "MPLBACKEND": "Agg"}
-    if live:
-        env |= {"PYTHONPATH": str(Path(jl.__file__).parents[1])}
-    done = subprocess.run(
-        [program, "-n", "-x", str(folder / script), *args],
-        cwd=folder, env=env, capture_output=True, text=True, timeout=300, stdin=subprocess.DEVNULL,
-    )  # fmt: skip
-    return done.stdout + done.stderr
+    env = os.environ | {"OMP_NUM_THREADS": "1", "MPLBACKEND": "Agg"}
+    env["PYTHONPATH"] = str(Path(jl.__file__).parents[1]) if live else ""
+    return output(found("yade"), "-n", "-x", script, *args, code=code, cwd=folder, env=env)
 
 
 def run_scene(folder, script, live=False, preamble=PREAMBLE):
     """What a scene passed to `result(...)`, by name."""
     (folder / "scene.py").write_text(preamble + script)
     copy_files(folder)
-    text = run_yade(folder, "scene.py", live=live)
-    found = [line for line in text.splitlines() if line.startswith(MARK)]
-    assert found, f"the scene gave no result:\n{text}"
-    return json.loads(found[-1][len(MARK) :])
+    _, mark, rest = run_yade(folder, "scene.py", live=live).rpartition(MARK)
+    assert mark, rest
+    return json.loads(rest.splitlines()[0])
 
 
 def make_table(path, kn=1e8, ks=5e7, mu=0.4, eta=0.0, end=1e-2, uneven=0.0, uneven_mu=0.0):

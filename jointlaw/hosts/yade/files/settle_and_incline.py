@@ -43,7 +43,8 @@ if unknown := set(sys.argv[1:]) - {"live"}:
     )
 live = "live" in sys.argv[1:]
 STEPS = 4000 if live else 1000  # of a change of load: shear makes the law itself soft, so slow
-table = TableLaw(os.path.join(folder, "joint.txt")).table
+path = os.path.join(folder, "joint.txt")
+table = TableLaw(path).table
 stress = 0.1 * table.normal_stress[-1]
 if live:
     from jointlaw import JointLaw, direct_shear
@@ -68,7 +69,7 @@ def settle():
         ),
         NewtonIntegrator(damping=0.4),
     ]
-    joints = Joints(LiveLaw(law) if live else TableLaw(os.path.join(folder, "joint.txt")))
+    joints = Joints(LiveLaw(law) if live else TableLaw(path))
     joints.attach()
     O.dt = joints.time_step(safety=1)  # made for rolling and six contacts: here there is one
     pull((0, 0, 0), (0, 0, -stress * AREA))
@@ -83,8 +84,8 @@ def tilt(angle, azimuth):
     """
     z = R - settle()
     shear, psi = stress * AREA * np.tan(np.radians(angle)), np.radians(azimuth)
-    x, y = -shear * np.cos(psi), -shear * np.sin(psi)
-    pull((0, 0, -stress * AREA), (x, y, -stress * AREA))
+    start = np.array([0, 0, -stress * AREA])
+    pull(start, start - shear * np.array([np.cos(psi), np.sin(psi), 0]))
     before = O.bodies[1].state.pos
     O.run(500, True)
     at = O.bodies[1].state.pos
@@ -93,8 +94,7 @@ def tilt(angle, azimuth):
 
 def pull(start, end):
     """Change the force on the sphere from start to end, without a jerk, and let it come to rest."""
-    for time in np.linspace(0, np.pi, STEPS + 1):
-        share = (1 - np.cos(time)) / 2
+    for share in (1 - np.cos(np.linspace(0, np.pi, STEPS + 1))) / 2:
         force = (1 - share) * np.array(start) + share * np.array(end)
         O.forces.setPermF(1, force.tolist())
         O.step()
@@ -103,9 +103,9 @@ def pull(start, end):
 
 closure = settle()
 there = law.normal_stress(closure) if live else table.lookup(closure).normal_stress
-name, off = "law" if live else "table", abs(there / stress - 1)
-print(f"settled: closure {closure:.12g} m, where the {name}'s normal stress is {there:.12g} Pa; "
-      f"relative difference to the load {off:.1e}")  # fmt: skip
+off = abs(there / stress - 1)
+print(f"settled: closure {closure:.12g} m, where the {'law' if live else 'table'} has the normal "
+      f"stress {there:.12g} Pa; relative difference to the load {off:.1e}")  # fmt: skip
 if live:
     test = direct_shear(law.joint(), law.closure_range, normal=stress, steps=1000)
     for angle in (15.0, 30.0):
@@ -116,8 +116,8 @@ if live:
               f"shear test: {expected:.5g} m, {up:.5g} m")  # fmt: skip
 else:
     for azimuth in (0.0, 45.0, 90.0):
-        friction = table.lookup(closure, np.radians(azimuth)).peak_friction
-        angle = np.degrees(np.arctan(friction))
+        there = table.lookup(closure, np.radians(azimuth))
+        angle = np.degrees(np.arctan(there.peak_friction))
         for more in (-0.1, 0.1):
             moved = tilt(angle + more, azimuth)[0] / closure
             print(f"azimuth {azimuth:.0f} deg: friction angle {angle:.4f} deg, {more:+.1f} deg: "

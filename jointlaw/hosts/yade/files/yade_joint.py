@@ -20,19 +20,20 @@ SI units: m, Pa, N, s, kg.
 
 import numpy as np
 from joint_table import load_table
-from yade import FrictPhys, O, PyRunner, Quaternion, ScGeom, Sphere, Vector3
+from yade import Body, FrictPhys, O, PyRunner, Quaternion, ScGeom, Sphere, Vector3
 
 VERSION = 1  # of the files that `Joints.save` writes
 
-_running = {}  # name -> Joints: what the PyRunner of each adapter calls
+_running = {}  # name -> Joints that were attached or loaded: what the PyRunner of each calls
 
 
 def run(name):
     """One step of the adapter called `name`: the command of its PyRunner."""
     if name not in _running:
         raise RuntimeError(
-            f"no joints called {name!r} in this process: after O.load create Joints(..., "
-            f"name={name!r}) again and call .load(file)"
+            f"no joints {name!r} are attached or loaded in this process: to continue a saved run, "
+            f"create Joints(..., name={name!r}) after O.load and call .load(file). For new joints "
+            f"remove the engine joint_{name} from O.engines and call .attach()"
         )
     _running[name].step()
 
@@ -88,8 +89,8 @@ class LiveLaw:
     Memory belongs to a contact as long as YADE keeps it, so `Law2...(neverErase=True)` is needed:
     a sheared joint dilates and carries stress at negative closure. A new contact counts the shear
     made in touch only. The memory turns with body id1. `law` is a law of jointlaw, or the path of
-    its file. `ledger` adds up the energy that friction takes, for `batch.dissipated_energy`, at
-    some cost.
+    its file. `ledger` adds up the energy that friction takes, for
+    `batch.dissipated_energy`, at some cost; `pool.places` tell the joints of the contacts there.
     """
 
     mode = "live"
@@ -103,12 +104,7 @@ class LiveLaw:
                 "contacts in YADE shear in 3-D: set law.plane=None, closure_only=False"
             )
         self.law, self.pool = law, JointPool(law, ledger)
-        self.numbered = 0  # contacts so far: the keys of the pool are their numbers
-
-    @property
-    def batch(self):
-        """The joints; `pool.places` are those of the contacts."""
-        return self.pool.batch
+        self.find()
 
     def stiffness(self, closure=None):
         """Upper bound of the stiffness (Pa/m) up to `closure`, closure_range by default."""
@@ -123,13 +119,10 @@ class LiveLaw:
 
         bonded: whether they have the bond of the law.
         """
-        first, self.numbered = self.numbered, self.numbered + len(closure)
-        start = np.zeros((len(closure), 3))
-        start[:, 0] = closure
-        new = self.pool.add(range(first, self.numbered))
+        new = self.pool.add([object() for _ in closure])  # keys; contacts are told by their order
         if not bonded:
             self.batch.unbond(new)
-        self.batch.update(start, where=new, tangent=False)
+        self.batch.update(np.outer(closure, [1.0, 0.0, 0.0]), where=new, tangent=False)
         self.find()
 
     def keep(self, mask):
@@ -138,8 +131,8 @@ class LiveLaw:
         self.find()
 
     def find(self):
-        """Find the places of all contacts; None if they are all of the batch, in order."""
-        places = self.pool.places
+        """Find the joints and the places of all contacts; None if these are all, in order."""
+        self.batch, places = self.pool.batch, self.pool.places
         self.where = None if np.array_equal(places, np.arange(len(self.batch))) else places
 
     def state(self):
@@ -151,17 +144,17 @@ class LiveLaw:
         """Take up such arrays. Raises ValueError if another law wrote them."""
         from jointlaw.joints.state import JointState
 
-        state = JointState(str(data["fingerprint"]), data["values"].T)
-        self.pool.restore(range(len(state)), state)
-        self.numbered = len(state)
+        values = data["values"].T
+        self.pool.restore([object() for _ in values], JointState(str(data["fingerprint"]), values))
         self.find()
 
 
 # ---------------------------------------------------------------- the adapter
 
-# Numbers per contact, shape (n,): ids, step that made it, places of the bodies, radii, area
+# Numbers per contact, shape (n,): ids, step that made it, places of the bodies; radii, area
 # ball: two spheres?; zero: overlap at zero closure
-PER_CONTACT = ["id1", "id2", "made", "b1", "b2", "R1", "R2", "area", "ball", "zero", "closure"]
+PER_CONTACT = {int: ["id1", "id2", "made", "b1", "b2"],
+               float: ["R1", "R2", "area", "ball", "zero", "closure"]}  # fmt: skip
 VECTORS = ["n", "t2", "c1", "c2", "axis", "plane", "F"]  # shape (3, n)
 
 
@@ -189,22 +182,16 @@ class Joints:
             raise ValueError(f"area = {area} m2 must be > 0 and finite")
         if not forget >= 0:
             raise ValueError(f"forget = {forget} m must be >= 0")
-        self.azimuth = unit(np.array(azimuth, float))
-        self.plane = None if plane is None else unit(np.array(plane, float))
+        self.azimuth = unit(np.reshape(azimuth, (3, 1)).astype(float))
+        self.plane = None if plane is None else unit(np.reshape(plane, (3, 1)).astype(float))
         self.mated, self.forget = mated, forget
-        self.attached = False
-        self._clear()
-        _running[name] = self
-
-    def _clear(self):
-        self.c = {key: np.zeros(0, int if key in ("id1", "id2", "made", "b1", "b2") else float)
-                  for key in PER_CONTACT}  # fmt: skip
-        self.c.update({key: np.zeros((3, 0)) for key in VECTORS})
-        self.own, self.others = [], []  # interactions that are joints, and that are not
-        self.states, self.ids, self.index = [], [], {}  # bodies with joints
+        _running.pop(name, None)  # of an earlier scene
+        self.c = {one: np.zeros(0, kind) for kind, names in PER_CONTACT.items() for one in names}
+        self.c.update({one: np.zeros((3, 0)) for one in VECTORS})
+        self.own, self.others = [], {}  # interactions that are joints; that are not, by `key`
+        self.states = {}  # of bodies with joints, by their ids; None until a loaded scene is there
         self.x, self.q = np.zeros((3, 0)), np.zeros((4, 0))
         self.last = None  # O.iter of the last step
-        self.loaded = None  # contacts that are no joints, of a state that waits for its scene
         self.bodies = len(O.bodies)
 
     @property
@@ -246,9 +233,8 @@ class Joints:
             iterPeriod=1, initRun=True, label=f"joint_{self.name}",
             updateGlobals=False,  # else YADE writes the caller's local variables into the globals
         )  # fmt: skip
-        engines.insert(at + 1, runner)
-        O.engines = engines
-        self.attached = True
+        O.engines = [*engines[: at + 1], runner, *engines[at + 1 :]]
+        _running[self.name] = self
 
     def time_step(self, safety=0.25, closure=None):
         """A fixed step (s): `safety` of the shortest stable one over all free spheres.
@@ -267,13 +253,11 @@ class Joints:
         total = np.bincount(place, areas, minlength=len(O.bodies))
         largest = np.zeros(len(O.bodies))
         np.maximum.at(largest, place, areas)
+        default = areas.max() if callable(self.area) else self.area
         for body in O.bodies:
             if body is None or not isinstance(body.shape, Sphere) or body.state.mass <= 0:
                 continue
-            if callable(self.area):
-                one = largest[body.id] or areas.max()
-            else:
-                one = np.pi * body.shape.radius**2 if self.area is None else self.area
+            one = np.pi * body.shape.radius**2 if self.area is None else largest[body.id] or default
             carried = max(6 * one, total[body.id])
             # two bodies (2), rolling (1 + m R^2/I = 3.5 for a sphere)
             shortest = min(shortest, 2 * np.sqrt(body.state.mass / (2 * 3.5 * k * carried)))
@@ -286,28 +270,19 @@ class Joints:
     def step(self):
         """Advance all joints; the PyRunner calls this once per step."""
         now = O.iter
-        if self.last is None and not self.attached:
-            raise RuntimeError(
-                f"joints {self.name!r}: neither attached nor loaded. Call .load(file) to continue "
-                "a saved run. For new joints remove the engine joint_" + self.name + " from "
-                "O.engines and call .attach()"
-            )
         if self.last is not None and now != self.last + 1:
             raise RuntimeError(
                 f"joints {self.name!r}: O.iter went from {self.last} to {now}. The adapter must "
                 "run in every step (iterPeriod=1); after O.load call .load(file)"
             )
-        if self.loaded is not None:
-            self._bind()
-        self._find(now)
-        if self.own:
-            self._advance()
-        elif self.ids:
-            self.x, self.q = self._read()
+        self._advance(self._find(now))
         self.last = now
 
-    def _advance(self):
-        """Displacements since the last step, the law's tractions, forces on the bodies."""
+    def _advance(self, fresh):
+        """Displacements since the last step, the law's tractions, forces on the bodies.
+
+        fresh: places of the new contacts, the last ones.
+        """
         c, x0, q0 = self.c, self.x, self.q
         x, q = self.x, self.q = self._read()
         b1, b2 = c["b1"], c["b2"]
@@ -324,7 +299,6 @@ class Joints:
         middle, across = unit(n + c["n"]), unit(t2 + c["t2"])
         d = np.array([closure - c["closure"], dot(du, across), dot(du, cross(middle, across))])
         spin = self._spin(n, t2, w1 + w2) if self.law.mode == "table" else None
-        fresh = self.fresh
         if fresh.size:
             before = closure[fresh] - dot(du[:, fresh], n[:, fresh])
             if self.mated:
@@ -334,8 +308,7 @@ class Joints:
         F = self.law.step(d, closure, spin)
         force = (n * F[0] + t2 * F[1] + cross(n, t2) * F[2]) * -c["area"]
         c.update(n=n, t2=t2, c1=c1, c2=c2, closure=closure, F=F)
-        if fresh.size:
-            force[:, fresh] -= self._switch_off(fresh)
+        force[:, fresh] -= self._switch_off(fresh)
         self._apply(force, c1, c2)
         if self.forget < np.inf:
             for k in np.flatnonzero((closure < -self.forget) & ~F.any(axis=0)):
@@ -353,12 +326,11 @@ class Joints:
         length = np.sqrt(dot(r, r))
         n = r / length
         un = R1 + R2 - length
-        faces = [(k, self.own[k].geom) for k in np.flatnonzero(c["ball"] == 0).tolist()]
-        for k, geom in faces:
-            n[:, k], un[k] = geom.normal.__getinitargs__(), geom.penetrationDepth
         c1 = n * (R1 - un / 2)
         c2 = c1 - r
-        for k, geom in faces:
+        for k in np.flatnonzero(c["ball"] == 0).tolist():
+            geom = self.own[k].geom
+            n[:, k], un[k] = geom.normal.__getinitargs__(), geom.penetrationDepth
             point = np.array(geom.contactPoint.__getinitargs__())
             c1[:, k], c2[:, k] = point - x[:, c["b1"][k]], point - x[:, c["b2"][k]]
         return n, un, c1, c2
@@ -368,14 +340,12 @@ class Joints:
         c = self.c
         a = rotate(q1, c["axis"])
         t2 = a - n * dot(a, n)
-        size = np.sqrt(dot(t2, t2))
-        steep = np.flatnonzero(size < 0.5)
-        if steep.size:  # rolled so far that the reference nears the normal: go on with the last
-            old = c["t2"][:, steep] - n[:, steep] * dot(c["t2"][:, steep], n[:, steep])
-            t2[:, steep] = old
-            size[steep] = np.sqrt(dot(old, old))
-            c["axis"][:, steep] = rotate(conjugate(q1[:, steep]), old / size[steep])
-        return t2 / size
+        # rolled so far that the reference is within 30 degrees of the normal: go on with the last
+        steep = np.flatnonzero(dot(t2, t2) < 0.25)
+        old = c["t2"][:, steep]
+        t2[:, steep] = unit(old - n[:, steep] * dot(old, n[:, steep]))
+        c["axis"][:, steep] = rotate(conjugate(q1[:, steep]), t2[:, steep])
+        return unit(t2)
 
     def _spin(self, n, t2, w):
         """Angle by which shear forces turn in the frame: minimal turn of n, mean spin about it."""
@@ -397,51 +367,41 @@ class Joints:
 
     def _apply(self, force, c1, c2):
         """Add the forces on id1, their opposites on id2, and their torques to the bodies."""
-        c, size = self.c, len(self.ids)
+        c, size = self.c, len(self.states)
         torque1, torque2 = cross(c1, force), cross(force, c2)
         total = [np.bincount(c["b1"], f, size) - np.bincount(c["b2"], f, size) for f in force]
         turn = [np.bincount(c["b1"], t1, size) + np.bincount(c["b2"], t2, size)
                 for t1, t2 in zip(torque1, torque2)]  # fmt: skip
         forces = O.forces
-        for k, f, t in zip(self.ids, np.array(total).T.tolist(), np.array(turn).T.tolist()):
+        for k, f, t in zip(self.states, np.array(total).T.tolist(), np.array(turn).T.tolist()):
             forces.addF(k, f)
             forces.addT(k, t)
 
     # ---------------------------------------------------------------- contacts
 
     def _find(self, now):
-        """Follow YADE's list of contacts: some went, some came."""
-        self.fresh = np.zeros(0, int)
+        """Follow YADE's list of contacts, some of which went, some came; the places of these."""
         if len(O.bodies) != self.bodies:
-            self._join(self._match())
-            return
+            return self._join(self._match())
         real = [i.isReal for i in self.own]
         if not all(real):
             self._keep(np.array(real))
-        self.others = [i for i in self.others if i.isReal]
+        self.others = {one: i for one, i in self.others.items() if i.isReal}
         missing = O.interactions.countReal() - len(self.own) - len(self.others)
-        if missing:
-            new = [i for i in O.interactions.all(True) if i.iterMadeReal == now]
-            self._join(new if len(new) == missing else self._match())
+        new = [i for i in O.interactions.all(True) if i.iterMadeReal == now] if missing else []
+        return self._join(new if len(new) == missing else self._match())
 
     def _match(self):
-        """The slow way: compare with what YADE has, by ids and by the step that made them."""
-        c = self.c
-        have = {key: k for k, key in enumerate(zip(c["id1"], c["id2"], c["made"]))}
-        place, others = {}, {(i.id1, i.id2, i.iterMadeReal) for i in self.others}
-        new, self.others = [], []
-        for i in O.interactions.all(True):
-            key = (i.id1, i.id2, i.iterMadeReal)
-            if key in have:
-                place[have[key]] = i
-            elif key in others:
-                self.others.append(i)
-            else:
-                new.append(i)
-        self._keep(np.isin(np.arange(len(c["made"])), list(place)))
-        self.own = [place[k] for k in sorted(place)]
+        """The slow way: compare with what YADE has, by `key`. New contacts."""
+        real, c = {key(i): i for i in O.interactions.all(True)}, self.c
+        own = list(zip(c["id1"].tolist(), c["id2"].tolist(), c["made"].tolist()))
+        self._keep(np.array([one in real for one in own], bool))
+        self.own = [real.pop(one) for one in own if one in real]
+        self.others = {one: real.pop(one) for one in self.others if one in real}
+        # a body that was erased before the state was saved has no contacts
+        self.states = {k: one or (O.bodies[k] or Body()).state for k, one in self.states.items()}
         self.bodies = len(O.bodies)
-        return new
+        return list(real.values())
 
     def _keep(self, mask):
         """Forget the contacts where `mask` is False."""
@@ -450,11 +410,11 @@ class Joints:
         self.law.keep(mask)
 
     def _join(self, contacts):
-        """New contacts: choose the joints among them and set up what stays constant."""
+        """Choose the joints among new contacts, set up what stays constant; their places."""
         own, rows = [], []
         for i in contacts:
             if self.select is not None and not self.select(i):
-                self.others.append(i)
+                self.others[key(i)] = i
                 continue
             if not isinstance(i.geom, ScGeom) or type(i.phys) is not FrictPhys:
                 raise TypeError(
@@ -463,20 +423,22 @@ class Joints:
                     "FrictMat_FrictPhys, Law2_ScGeom_FrictPhys_CundallStrack); select= excludes it"
                 )
             own.append(i)
-            rows.append((i.id1, i.id2, i.iterMadeReal, *self._radii(i)))
+            rows.append((*key(i), *self._radii(i)))
+        fresh = np.arange(len(self), len(self) + len(own))
         if not own:
-            return
-        first, m = len(self.own), len(own)
+            return fresh
         self.own += own
         new = dict(zip(("id1", "id2", "made", "R1", "R2", "ball", "area"), zip(*rows)))
-        new["b1"], new["b2"] = ([self._body(k) for k in new[key]] for key in ("id1", "id2"))
+        for k in (*new["id1"], *new["id2"]):
+            self.states.setdefault(k, O.bodies[k].state)
         self._add_bodies()
-        for key, value in self.c.items():
-            tail = np.zeros((*value.shape[:-1], m), value.dtype)
-            tail[...] = new.get(key, 0)
-            self.c[key] = np.concatenate([value, tail], axis=-1)
-        self.fresh = np.arange(first, first + m)
-        self._orient(self.fresh)
+        place = {k: n for n, k in enumerate(self.states)}
+        new["b1"], new["b2"] = ([place[k] for k in new[ids]] for ids in ("id1", "id2"))
+        for name, value in self.c.items():
+            more = np.broadcast_to(new.get(name, 0), (*value.shape[:-1], len(own)))
+            self.c[name] = np.concatenate([value, more], axis=-1)
+        self._orient(fresh)
+        return fresh
 
     def _orient(self, fresh):
         """Reference directions of new contacts in the axes of body id1, and their first frame."""
@@ -485,15 +447,14 @@ class Joints:
         q1 = q[:, c["b1"]]
         if self.plane is not None:
             r = x[:, c["b2"][fresh]] - x[:, c["b1"][fresh]]
-            local = np.repeat(self.plane[:, None], len(fresh), axis=1)
-            across = dot(rotate(q1[:, fresh], local), r)
-            c["plane"][:, fresh] = local * np.where(across < 0, -1.0, 1.0)
+            across = dot(rotate(q1[:, fresh], self.plane), r)
+            c["plane"][:, fresh] = self.plane * np.where(across < 0, -1.0, 1.0)
         n, un, c1, c2 = self._geometry(x, q1)
         n, q1 = n[:, fresh], q1[:, fresh]
-        a = rotate(q1, np.repeat(self.azimuth[:, None], len(fresh), axis=1))
+        a = rotate(q1, self.azimuth)
         t2 = a - n * dot(a, n)
         bad = dot(t2, t2) < 0.01  # the reference is the normal itself: take the next body axis
-        a[:, bad] = rotate(q1[:, bad], np.repeat(np.roll(self.azimuth, 1)[:, None], bad.sum(), 1))
+        a[:, bad] = rotate(q1[:, bad], np.roll(self.azimuth, 1))
         t2 = unit(a - n * dot(a, n))
         c["axis"][:, fresh] = rotate(conjugate(q1), t2)
         c["n"][:, fresh], c["t2"][:, fresh] = n, t2
@@ -503,55 +464,46 @@ class Joints:
 
     def _radii(self, i):
         """Radii, whether both bodies are spheres, and the contact area."""
-        shapes = [O.bodies[k].shape for k in (i.id1, i.id2)]
-        R = [s.radius if isinstance(s, Sphere) else np.nan for s in shapes]
-        ball = not np.isnan(R).any()
+        ball = all(isinstance(O.bodies[k].shape, Sphere) for k in (i.id1, i.id2))
         if self.plane is not None and not ball:
             raise TypeError(f"contact {i.id1}-{i.id2}: plane= needs two spheres; see select=")
         if self.area is None:
-            area = np.pi * np.nanmin([*R, i.geom.refR1, i.geom.refR2]) ** 2
+            area = np.pi * min(i.geom.refR1, i.geom.refR2) ** 2
         else:
             area = float(self.area(i)) if callable(self.area) else self.area
         if not 0 < area < np.inf:
             raise ValueError(f"area = {area} m2 of contact {i.id1}-{i.id2} must be > 0 and finite")
-        return (*(R if ball else (i.geom.refR1, i.geom.refR2)), ball, area)
-
-    def _body(self, k):
-        """Place of body k among the bodies with joints."""
-        if k not in self.index:
-            self.index[k] = len(self.ids)
-            self.ids.append(k)
-            self.states.append(O.bodies[k].state)
-        return self.index[k]
+        return i.geom.refR1, i.geom.refR2, ball, area
 
     def _add_bodies(self):
         """Positions of new bodies one step ago, from their velocities (YADE's leapfrog)."""
         x, q = [], []
-        for state in self.states[self.x.shape[1] :]:
+        for state in list(self.states.values())[self.x.shape[1] :]:
             angle = state.angVel.norm() * O.dt
             axis = state.angVel.normalized() if angle > 0 else Vector3(0, 0, 1)
             x.append((state.pos - state.vel * O.dt).__getinitargs__())
             q.append((Quaternion(axis, -angle) * state.ori).__getinitargs__())
-        self.x = np.concatenate([self.x, np.reshape(x, (-1, 3)).T], axis=1)
-        self.q = np.concatenate([self.q, np.reshape(q, (-1, 4)).T], axis=1)
+        self.x = np.concatenate([self.x, columns(x, 3)], axis=1)
+        self.q = np.concatenate([self.q, columns(q, 4)], axis=1)
 
     def _read(self):
         """Positions (3, b) and orientations (4, b; w first) of the bodies with joints."""
-        x = np.array([s.pos.__getinitargs__() for s in self.states]).T
-        return x.copy(), np.array([s.ori.__getinitargs__() for s in self.states]).T.copy()
+        states = self.states.values()
+        return (
+            columns([s.pos.__getinitargs__() for s in states], 3),
+            columns([s.ori.__getinitargs__() for s in states], 4),
+        )
 
     # ------------------------------------------------------------ save and show
 
     def save(self, path):
         """Write the adapter's state (NPZ): call it with every O.save, between two runs."""
-        if self.loaded is not None:
-            self._bind()
         data = {f"contact_{key}": value for key, value in self.c.items()}
         data.update({f"law_{key}": value for key, value in self.law.state().items()})
-        data["others"] = np.array([(i.id1, i.id2, i.iterMadeReal) for i in self.others], int)
+        data["others"] = np.array(list(self.others), int)
         data["last"] = -1 if self.last is None else self.last
         with open(path, "wb") as file:
-            np.savez(file, version=VERSION, ids=self.ids, x=self.x, q=self.q, **data)
+            np.savez(file, version=VERSION, ids=list(self.states), x=self.x, q=self.q, **data)
 
     def load(self, path):
         """Take up a state that `save` wrote: call it after O.load, before the next step.
@@ -574,20 +526,13 @@ class Joints:
                 f"create Joints({law}, ...) and load the file into them"
             )
         self.law.restore({key[4:]: value for key, value in data.items() if key.startswith("law_")})
-        self._clear()
+        self.own = []
         self.c = {key[8:]: value for key, value in data.items() if key.startswith("contact_")}
-        self.ids, self.x, self.q = data["ids"].tolist(), data["x"], data["q"]
-        self.index = {k: place for place, k in enumerate(self.ids)}
+        self.states, self.x, self.q = dict.fromkeys(data["ids"].tolist()), data["x"], data["q"]
         self.last = int(data["last"]) if data["last"] >= 0 else None
-        self.loaded, self.attached = data["others"], True
-
-    def _bind(self):
-        """Find the bodies of a loaded state and the contacts that are no joints, in this scene."""
-        other = {tuple(row) for row in self.loaded.reshape(-1, 3).tolist()}
-        self.states = [O.bodies[k].state for k in self.ids]
-        contacts = O.interactions.all(True)
-        self.others = [i for i in contacts if (i.id1, i.id2, i.iterMadeReal) in other]
-        self.loaded, self.bodies = None, -1  # _find then finds the joints by their ids
+        self.others = dict.fromkeys(map(tuple, data["others"].reshape(-1, 3).tolist()))
+        self.bodies = -1  # the next step matches these with the scene
+        _running[self.name] = self
 
     def contacts(self):
         """Arrays: ids (n, 2), closure (n,), traction (n, 3) in Pa, normal (n, 3), area (n,)."""
@@ -606,7 +551,17 @@ class Joints:
             i.phys.normalForce, i.phys.shearForce = Vector3(*a), Vector3(*b)
 
 
-# ------------------------------------------------------- vectors and rotations
+# ------------------------------------------------ contacts, vectors and rotations
+
+
+def key(i):
+    """What tells an interaction from all others, and from an earlier one of the same bodies."""
+    return i.id1, i.id2, i.iterMadeReal
+
+
+def columns(rows, size):
+    """Array (size, n) of n rows."""
+    return np.reshape(rows, (-1, size)).T.copy()
 
 
 def dot(a, b):

@@ -1,24 +1,51 @@
-"""The exported projects in the real OpenGeoSys, against the laboratory test in Python."""
+"""The exported projects in the real OpenGeoSys and Kratos, against a laboratory test in Python."""
 
 import re
 import shutil
-import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import meshio
 import numpy as np
 import pytest
-from fem_host import is_the_test_in_python
+from fem_host import LAW, SEATING
+from programs import found, output
 
-OGS = Path(sys.prefix) / "bin" / "ogs"
+import jointlaw as jl
+
 PRESSED, TURN, END = 10, 50, 70  # steps
+
+
+def is_the_test_in_python(slip, opening, shear, pressed):
+    """Direct shear of a host at 2 MPa, from row `pressed` on: 40 steps forth, 20 back."""
+    joint, turn = LAW.joint(normal_stress=SEATING), pressed + TURN - PRESSED
+    start = joint.delta[0]
+    forth = jl.direct_shear(joint, slip[turn], normal=2e6, steps=turn - pressed)
+    back = jl.direct_shear(joint, slip[-1] - slip[turn], normal=2e6, steps=END - TURN)
+    peak, rise = forth.shear_stress.max(), np.ptp(forth.closure)
+    for rows, record in ((slice(pressed, turn + 1), forth), (slice(turn, None), back)):
+        assert np.abs(shear[rows] - record.shear_stress).max() < 1e-3 * peak
+        assert np.abs(opening[rows] - (start - record.closure)).max() < 1e-3 * rise
+    assert forth.shear_stress[-1] - back.shear_stress[-1] > peak / 2, "the way back must differ"
+
+
+def test_an_interface_element_in_kratos(finite_elements):
+    if find_spec("KratosMultiphysics") is None:
+        pytest.skip("Kratos is not installed (pip install 'jointlaw[fem]')")
+    output(sys.executable, "kratos.py", cwd=finite_elements)
+    test = np.genfromtxt(finite_elements / "kratos.csv", delimiter=",", names=True)
+    assert test["iterations"].max() <= 6
+    # closure: each load, on a joint of its own
+    loads = -test["normal_Pa"][:PRESSED]
+    closed = LAW.closure(SEATING) - test["opening_m"][:PRESSED]
+    assert np.abs(loads / LAW.normal_stress(closed) - 1).max() < 1e-3
+    assert np.abs(loads / np.linspace(2e5, 2e6, PRESSED) - 1).max() < 1e-3
+    is_the_test_in_python(test["slip_m"], test["opening_m"], test["shear_Pa"], PRESSED - 1)
 
 
 def run(folder, dim, edits=(), steps=END):
     """Run a project, its text changed by (old, new); jumps (m) and stresses (Pa) of the layer."""
-    if not OGS.exists():
-        pytest.skip("OpenGeoSys is not installed (pip install 'jointlaw[fem]')")
     project = "opengeosys_2d.prj" if dim == 2 else "opengeosys_3d.xml"
     text = (folder / project).read_text()
     for old, new in edits:
@@ -28,26 +55,21 @@ def run(folder, dim, edits=(), steps=END):
     (folder / test).write_text(text)
     out = folder / "results"
     out.mkdir(exist_ok=True)
-    command = [OGS, test, "-o", "results"]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stdout[-2000:] + done.stderr
+    ogs = found("ogs", path=Path(sys.prefix) / "bin")
+    log = output(ogs, test, "-o", "results", cwd=folder)
     files = [meshio.read(out / f"shear_{dim}d_{i}.vtu") for i in range(steps + 1)]
-    jumps = [jump(file.point_data["displacement"], dim) for file in files]
+    # lower block, layer's lower and upper face, upper block
+    faces = [file.point_data["displacement"].reshape(4, -1, dim)[1:3] for file in files]
+    jumps = np.diff(faces, axis=1)[:, 0].mean(axis=1)
     stresses = [np.split(file.field_data["sigma_ip"], 3)[1].mean(axis=0) for file in files]
-    return np.array(jumps), np.array(stresses), done.stdout
-
-
-def jump(displacement, dim):
-    """Mean displacement of the layer's upper face against its lower one."""
-    lower, upper = displacement.reshape(4, -1, dim)[1:3]
-    return (upper - lower).mean(axis=0)
+    return jumps, np.array(stresses), log
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-def test_direct_shear_at_constant_normal_stress(finite_elements, dim):
+def test_direct_shear_in_opengeosys(finite_elements, dim):
     jumps, stress, log = run(finite_elements, dim)
     shear = stress[:, 3 if dim == 2 else 5]  # xx yy zz xy yz xz
-    is_the_test_in_python(jumps[:, 0], jumps[:, dim - 1], shear, PRESSED, TURN)
+    is_the_test_in_python(jumps[:, 0], jumps[:, dim - 1], shear, PRESSED)
     assert np.abs(stress[PRESSED:, dim - 1] + 2e6).max() < 1e-3 * 2e6
     steps = re.split(r"Time step #\d+ started", log)[2:]
     iterations = [step.count("|dx|=") for step in steps]
@@ -55,7 +77,7 @@ def test_direct_shear_at_constant_normal_stress(finite_elements, dim):
     assert np.median(iterations) <= 6
 
 
-def test_restart(finite_elements):
+def test_restart_in_opengeosys(finite_elements):
     whole, stress, _ = run(finite_elements, 2)
     saved = finite_elements / "results" / "shear_2d_30.vtu"
     (finite_elements / "saved.vtu").write_bytes(saved.read_bytes())
@@ -73,39 +95,33 @@ def test_restart(finite_elements):
     np.testing.assert_allclose(again, stress[30:], rtol=0, atol=1e-9 * np.abs(stress).max())
 
 
-def moved(folder, down, along):
-    """Edits by which the upper block is moved, not pressed: curves of its two displacements (m)."""
-    text = (folder / "opengeosys_2d.prj").read_text()
+def moved(folder, *ways):
+    """Edits by which the upper block is moved, not pressed: down and along (m) at three times."""
+    old = re.findall(r"<coords>.*?</values>", (folder / "opengeosys_2d.prj").read_text(), re.DOTALL)
+    curve = "<coords>0 20 70</coords><values>{!r} {!r} {!r}</values>"
     return (
         ("<mesh>top_2d</mesh><type>Neumann</type>", "<mesh>upper_2d</mesh><type>Dirichlet</type>"),
-        *zip(re.findall(r"<coords>.*?</values>", text, re.DOTALL), (down, along), strict=True),
+        *zip(old, (curve.format(*way) for way in ways), strict=True),
     )
-
-
-def curve(times, values):
-    words = (" ".join(map(repr, numbers)) for numbers in (times, values))
-    return "<coords>{}</coords><values>{}</values>".format(*words)
 
 
 def test_a_layer_that_is_not_level(finite_elements, tmp_path):
     """Turned by 30 degrees with all that moves it, by the lines of the page: the same stress."""
     page = (Path(__file__).parents[2] / "docs" / "native.md").read_text()
     axes, vectors = re.findall(r"```xml\n(.*?)```", page, re.DOTALL)
-    times, down, along = [0, 20, 70], [0.0, -2e-6, -2e-6], [0.0, 0.0, 3e-6]
-    level = moved(finite_elements, curve(times, down), curve(times, along))
-    _, there, _ = run(finite_elements, 2, level)
+    down, along = [0.0, -2e-6, -2e-6], [0.0, 0.0, 3e-6]
+    _, there, _ = run(finite_elements, 2, moved(finite_elements, down, along))
     shutil.copytree(finite_elements, tmp_path / "turned")
-    turn = np.array([[3**0.5 / 2, -0.5], [0.5, 3**0.5 / 2]])  # columns: the two axes
-    assert re.findall(r"<values>(.*?)</values>", vectors) == ["0.8660254 0.5", "-0.5 0.8660254"]
-    for row, axis in zip(turn.T, ("0.8660254 0.5", "-0.5 0.8660254"), strict=True):
-        vectors = vectors.replace(f">{axis}<", f">{row[0].item()!r} {row[1].item()!r}<")
+    c = 3**0.5 / 2
+    turn = np.array([[c, -0.5], [0.5, c]])  # columns: the two axes
+    vectors = vectors.replace("0.8660254", repr(c))  # OpenGeoSys asks for all digits
     for path in (tmp_path / "turned").glob("*_2d.vtu"):
         mesh = meshio.read(path)
         mesh.points[:, :2] = mesh.points[:, :2] @ turn.T
         mesh.write(path)
     x, y = (turn @ [along, down]).tolist()
     edits = (
-        *moved(finite_elements, curve(times, y), curve(times, x)),
+        *moved(finite_elements, y, x),
         ("  <parameters>", f"{axes}  <parameters>{vectors}"),
     )
     _, stress, _ = run(tmp_path / "turned", 2, edits)

@@ -285,7 +285,7 @@ def _rock(
         raise ValueError(f"{where}.outline: {error}") from None
     if not shapes:
         raise ValueError(
-            f"{where}: all of it is slivers, narrower than {least:.3g} m: give a smaller least_width"
+            f"{where}: all blocks would be slivers: give a least_width below {least:.3g} m"
         )
     first, names = len(blocks), [other.get(s.law, s.law) for s in sets]
     of_edge = dict(enumerate(names)) | {CUT: table.get("cut_law", WHOLE)}

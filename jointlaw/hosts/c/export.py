@@ -14,13 +14,14 @@ FILES = ("jointlaw.c", "example.c", "example.cpp", "example.f90", "Makefile", "C
          "README.md")  # fmt: skip
 HEADER = "jointlaw.h"
 _CONSTANT = "static JLAW_FUNCTION const"  # which on a device lies in its memory
-_TAKEN = frozenset(  # words of C and C++
-    "alignas alignof and asm auto bitand bitor bool break case catch char class compl const "
-    "consteval constexpr constinit continue decltype default delete do double else enum explicit "
-    "export extern false float for friend goto if inline int long main mutable namespace new "
-    "noexcept not nullptr NULL operator or private protected public register requires restrict "
-    "return short signed sizeof static struct switch template this throw true try typedef typeid "
-    "typename union unsigned using virtual void volatile while xor".split()
+_TAKEN = re.compile(  # words of C and C++
+    r"alignas|alignof|and|asm|auto|bitand|bitor|bool|break|case|catch|char|class|"
+    r"compl|const|consteval|constexpr|constinit|continue|decltype|default|delete|do|"
+    r"double|else|enum|explicit|export|extern|false|float|for|friend|goto|if|inline|"
+    r"int|long|main|mutable|namespace|new|noexcept|not|nullptr|NULL|operator|or|"
+    r"private|protected|public|register|requires|restrict|return|short|signed|sizeof|"
+    r"static|struct|switch|template|this|throw|true|try|typedef|typeid|typename|"
+    r"union|unsigned|using|virtual|void|volatile|while|xor"
 )
 _MODEL = "granite"  # the name of the tables in these files
 
@@ -66,7 +67,7 @@ def require_name(name: str) -> None:
 
 def _free(name: str) -> bool:
     named = re.fullmatch(r"(?!jointlaw|jlaw)[A-Za-z][A-Za-z0-9_]{0,40}", name)
-    return named is not None and name not in _TAKEN
+    return named is not None and not _TAKEN.fullmatch(name)
 
 
 def identifier(text: str) -> str:

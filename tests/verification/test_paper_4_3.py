@@ -9,8 +9,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from builders import law
-from paper_laws import preset
+from builders import law, preset
 from scipy.optimize import brentq
 
 import jointlaw as jl

@@ -72,6 +72,17 @@ def test_angle_of_the_base_is_that_against_gravity(given, angle):
     assert base_angle(Simulation(block(**given)), 1, 0) == pytest.approx(angle, abs=1e-6)
 
 
+def test_a_drive_goes_back_once_its_block_has_slid():
+    """The base turns from 25 to 32 degrees against gravity, but for the block: from 26.6 on, that
+    is from 1.6 of the drive's 7 degrees, it slides, and the base goes back."""
+    back = 'back = { block = "top", slid = 1e-3, by = -3.0, over = 0.06 }\n[watch]'
+    text = block(gravity=-25.0, driven=7.0).text.replace("[watch]", back)
+    sim = Simulation(parse(text))
+    turned = until(sim, 0.6, lambda: np.degrees(sim.blocks.motion[2, 0]))
+    assert 1.6 < max(turned) < 6.5
+    assert turned[-1] < max(turned) - 1.5  # on its way back
+
+
 @pytest.mark.slow
 def test_slip_at_the_peak_friction_of_the_law():
     """Tables that tilt at 0.05 degrees per second. Two law points under a slab carry 60 and 40 % of

@@ -1,6 +1,6 @@
-"""Blocks at the start. Rock under a stress is in balance and does not move, and its joints bear that
-stress; who cannot be held is named, and all others are in balance, around a cavern too. Then rock
-is taken away in stages: what it bore goes bit by bit, and the rest answers.
+"""Blocks at the start. Rock under a stress is in balance and does not move, and its joints bear it;
+who cannot be held is named, and all others are in balance, around a cavern too. Then rock is taken
+away in stages: what it bore goes bit by bit, and the rest answers.
 
 A block whose edges all bear a stress with div S = weight is in balance, and each joint bears S on
 its direction.

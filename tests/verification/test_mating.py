@@ -93,18 +93,6 @@ def test_closure_has_a_closed_form(formation, eta, interference):
     assert joint.stored_energy >= 0.0
 
 
-def test_both_sides_of_an_asperity_are_flattened_where_slopes_fade():
-    """Else slopes that wear would press springs that only the other side has lost."""
-    whole = law(mating_length=2.0, damage={"yield_interference": 0.1}).tables
-    d, k = np.array([[0.5], [0.8], [0.3]]), whole.asperities
-    state = kernel.step(whole, np.zeros((whole.rows, 1)), d, False)[0]
-    depth = kernel.parts(whole, state).depth[:, 0]
-    turned = k.n * [[1.0], [-1.0], [-1.0]]
-    opposite = np.argmax(turned.T @ k.n, axis=1)
-    assert np.ptp(depth) > 0.1
-    np.testing.assert_array_equal(depth, depth[opposite])
-
-
 def test_a_joint_closed_beyond_its_highest_asperity_gives_a_warning():
     """99.99 % of the heights of this preset end at a closure of 17.1 mm."""
     stiff = jl.presets.load("jing-replica")

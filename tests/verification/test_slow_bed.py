@@ -1,5 +1,5 @@
 """Accuracy that is promised is kept: on random paths against the slow bed, and tolerances. In small
-cycles: many depth cells against a closed form, what the named resolutions miss, what is forgotten."""
+cycles: many depth cells against a closed form, what named resolutions miss, what is forgotten."""
 
 from dataclasses import replace
 

@@ -1,5 +1,5 @@
-"""Factor of safety and critical tilt against calculations by hand, with the strength of the law; and
-water in joints and on faces: forces by quadrature, energy, factors of safety."""
+"""Factor of safety and critical tilt against calculations by hand, with the strength of the law; in
+water too, whose forces are held against quadrature and energy."""
 
 import json
 import math
@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from running import until
 from scene_text import ROCK, block, coulomb, dipping, lines, on_base
-from scipy.optimize import brentq
 from shapely import Polygon
 
 import jointlaw as jl
@@ -177,12 +176,6 @@ def test_a_stopped_search_goes_on(tmp_path, monkeypatch, capsys):
     assert "trials of another scene" in capsys.readouterr().err
 
 
-def test_critical_tilt_of_a_block_is_that_of_the_law_alone():
-    alone = brentq(lambda tilt: angle(1.0, DIP + tilt) - DIP - tilt, 0.0, 15.0, xtol=1e-3)
-    # degrees: 0.05 of the search, 0.03 of one step in place of many, ends that press unlike
-    assert critical_tilt(parse(SCENE)) == pytest.approx(alone, abs=0.15)
-
-
 @pytest.mark.parametrize("degrees", [58.0, 62.0])
 def test_a_tilt_near_the_steepest_is_found(degrees):
     """A flat slab slides at its friction angle, also where the last step of the search is short."""
@@ -297,21 +290,16 @@ def test_pressure_given_for_a_law_is_taken_from_the_stress_of_its_joints():
 
 
 @pytest.mark.parametrize(
-    ("law_keys", "wrong", "told"),
+    ("keys", "wrong", "told"),
     [
         ("", "[water]\ntable = [[0.0, 1.0], [0.0, 2.0]]", "x increasing"),
         ("", "[water]\ntable = []", "must be points"),
         ("", "[water]\nunit_weight = 1e4", "water.table"),
         ("", "[water]\ntable = [[0.0, 1.0]]\n[gone]", "unknown"),
-        ("pressure = -1.0\n", "", r"laws\.j\.pressure = -1\.0"),
+        ("", "[laws.wet]\n" + coulomb(pressure=-1.0), r"laws\.wet\.pressure = -1\.0"),
+        ("gravity = [1.0, -9.0]\n", "[water]\ntable = [[0.0, 0.0]]", "must point down"),
     ],
 )
-def test_wrong_water_is_refused(law_keys, wrong, told):
+def test_wrong_water_is_refused(keys, wrong, told):
     with pytest.raises(ValueError, match=told):
-        parse(law("j", 0.5) + law_keys + block("stone", corners=STONE) + RUN + wrong)
-
-
-def test_a_table_needs_gravity_that_points_down():
-    text = "gravity = [1.0, -9.0]\n" + law("j", 0.5) + block("stone", corners=STONE) + RUN
-    with pytest.raises(ValueError, match="must point down"):
-        parse(text + "[water]\ntable = [[0.0, 0.0]]\n")
+        parse(keys + law("j", 0.5) + block("stone", corners=STONE) + RUN + wrong)

@@ -1,5 +1,5 @@
-"""The tangent against central differences: a V-curve of slope 2, then rounding. The bound of |C| and
-the explicit time step that follows from it: in touch, open, sheared far."""
+"""The tangent against central differences: a V-curve of slope 2, then rounding. The bound of |C|
+and the explicit time step that follows from it: in touch, open, sheared far."""
 
 import math
 from dataclasses import replace

@@ -8,10 +8,11 @@ import collections
 import numpy as np
 import pytest
 from running import steps, until
-from scene_text import PLAIN, ROCK, block, coulomb, on_base
+from scene_text import PLAIN, ROCK, block, coulomb, lines, on_base
 
 import jointlaw as jl
 from dem_demo import Simulation, parse
+from dem_demo.scene import turn
 
 REPLICA = ROCK.replace("a = 3.0", "a = 4.0")
 COULOMB = coulomb(0.6, 1e9, 8e8)
@@ -57,32 +58,19 @@ SHAPES = [
 ]
 
 
-def heap():
-    """Five irregular blocks, 3 to 5 corners each, dropped into a trough."""
+@pytest.mark.slow
+def test_tumbling_heap():
+    """Five irregular blocks, 3 to 5 corners each, dropped into a trough: corners meet edges,
+    corners and sides of all tilts at 3 to 5 m/s. The books close within the 0.5 % of an impact, and
+    nothing dissipated comes back."""
     text = f"[laws.rock]\n{coulomb(0.6, 1e9, 8e8)}"
     for name, size, at in (("floor", [4.0, 0.4], [0.0, -0.2]), ("left", [0.4, 3.0], [-1.3, 1.5]),
                            ("right", [0.4, 3.0], [1.3, 1.5])):  # fmt: skip
         text += block(name, box=size, at=at, fixed=True)
     for i, corners in enumerate(SHAPES):
         text += block(f"{i}", corners=corners, spin=0.5 * i - 1)
-    return parse(f"""{text}
-[run]
-end = 1.0
-seat = false
-step = 1e-4
-law_steps = 8
-max_overlap = 0.1
-corner_length = 0.05
-dashpot_normal = 0.0
-dashpot_shear = 0.0
-""")
-
-
-@pytest.mark.slow
-def test_tumbling_heap():
-    """Corners meet edges, corners and sides of all tilts at 3 to 5 m/s: the books close within the
-    0.5 % of an impact, and nothing dissipated comes back."""
-    sim = Simulation(heap())
+    run = lines(end=1.0, seat=False, step=1e-4, law_steps=8, max_overlap=0.1, corner_length=0.05)
+    sim = Simulation(parse(f"{text}[run]\n{run}dashpot_normal = 0.0\ndashpot_shear = 0.0\n"))
     gone, most, twice, potential = [], 0, 0, []
     for _ in range(6000):
         sim.step()
@@ -151,27 +139,25 @@ dashpot_shear = 0.0
 
 
 ELASTIC = coulomb(0.0, 1e9, 8e8)
-COULOMB = coulomb(1.0, 1e9, 8e8)
-JOINT = ROCK.replace("a = 3.0", "a = 4.0")
 
 
-def scene(law, width, height, at, run, **more):
-    """One block on a fixed base whose top is y = 0, without dashpots."""
-    text = on_base(law, [width, height], at=at, base=(10.0, 1.0), end=10.0, **more)
-    return parse(f"{text}seat = false\ndashpot_normal = 0.0\ndashpot_shear = 0.0\n{run}")
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("law", "spin", "steps", "within"),
+    [(ELASTIC, 3.5, 1, 2e-3), (coulomb(1.0, 1e9, 8e8), 2.0, 24, 4e-3), (REPLICA, 2.0, 24, 5e-3)],
+    ids=["elastic", "coulomb", "joint"],
+)
+def test_tumbling_block_keeps_its_energy(law, spin, steps, within):
+    """Set spinning at 20 degrees, it goes over its corner and lands on its next side at 2 m/s.
 
-
-def on_corner(law, width, height, tilt, spin, run):
-    """Turned clockwise by `tilt` degrees about the lower right corner, which is at the origin."""
-    c, s = np.cos(np.radians(tilt)), np.sin(np.radians(tilt))
-    x, y = -0.5 * width * c + 0.5 * height * s, 0.5 * width * s + 0.5 * height * c
-    more = {"angle": -tilt, "velocity": (spin * y, -spin * x), "spin": -spin}
-    return scene(law, width, height, (x, y), run, **more)
-
-
-def play(sim, tilt, end):
-    """Run on: tilts (degrees), energies of the balance and potential energies (J), pressed joints,
-    each by its place and how many contacts have had that."""
+    The law's friction work is first order in its own step: it takes many of them in the landing.
+    """
+    # clockwise about the lower right corner, which is at the origin
+    at = turn(np.radians(-20.0)) @ [-0.5, 0.5]
+    way = {"angle": -20.0, "velocity": [spin * at[1], -spin * at[0]], "spin": -spin}
+    text = on_base(law, [1.0, 1.0], at=at.tolist(), base=(10.0, 1.0), end=10.0, **way)
+    text += "seat = false\ndashpot_normal = 0.0\ndashpot_shear = 0.0\nstep = 1e-4\n"
+    sim = Simulation(parse(f"{text}law_steps = {steps}"))
     had, (held,) = collections.Counter(), sim.joints.held
     take = held.take
 
@@ -181,29 +167,15 @@ def play(sim, tilt, end):
         return places
 
     def see():
+        # pressed joints, each by its place and how many contacts have had that
         places = sim.joints.place[sim.joints.traction[:, 0] > 0].tolist()
         pressed = {(place, had[place]) for place in places}
-        energies = sim.ledger.total - sim.ledger.start, sim.ledger.value["potential"]
-        return tilt - np.degrees(sim.blocks.motion[2, 1]), *energies, pressed
+        value = sim.ledger.total - sim.ledger.start, sim.ledger.value["potential"]
+        return 20.0 - np.degrees(sim.blocks.motion[2, 1]), *value, pressed
 
     held.take = counted
-    *numbers, pressed = zip(*until(sim, end, see), strict=True)
-    return *np.array(numbers), pressed
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("law", "spin", "steps", "within"),
-    [(ELASTIC, 3.5, 1, 2e-3), (COULOMB, 2.0, 24, 4e-3), (JOINT, 2.0, 24, 5e-3)],
-    ids=["elastic", "coulomb", "joint"],
-)
-def test_tumbling_block_keeps_its_energy(law, spin, steps, within):
-    """Set spinning at 20 degrees, it goes over its corner and lands on its next side at 2 m/s.
-
-    The law's friction work is first order in its own step: it takes many of them in the landing.
-    """
-    sim = Simulation(on_corner(law, 1.0, 1.0, 20.0, spin, f"step = 1e-4\nlaw_steps = {steps}"))
-    tilts, total, potential, pressed = play(sim, 20.0, 0.72)
+    *numbers, pressed = zip(*until(sim, 0.72, see), strict=True)
+    tilts, total, potential = np.array(numbers)
     in_play = np.ptp(potential)
     landing = int((tilts > 88.0).argmax())
     assert landing < len(tilts) - 400
@@ -215,12 +187,11 @@ def test_tumbling_block_keeps_its_energy(law, spin, steps, within):
     assert stood <= set().union(*pressed[landing:])
 
 
-LAW = (
-    ROCK.replace("a = 3.0", "a = 4.0")
-    + "plane = 0.0\nresolution = { u = 4, phi = 10, depth = 1 }\n"
-)
-TEXT = (
-    on_base(LAW, [2.0, 1.0], at=[-1.0, 0.5], held=["turn"], end=0.5)
+SCENE = parse(
+    on_base(
+        REPLICA + "plane = 0.0\nresolution = { u = 4, phi = 10, depth = 1 }\n",
+        [2.0, 1.0], at=[-1.0, 0.5], held=["turn"], end=0.5,
+    )
     + """\
 step = 2e-4
 skin = 0.02
@@ -231,8 +202,7 @@ motion = "x"
 times = [0.0, 0.1, 0.5]
 values = [0.0, 0.0, 1e-3]
 """
-)
-SCENE = parse(TEXT)
+)  # fmt: skip
 
 
 def put(sim, across, up):

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from c_host import random_bond
 from scipy.integrate import quad, trapezoid
 from scipy.optimize import brentq
 from test_tangent import STEPS, descent_slope, v_curve
@@ -140,12 +141,6 @@ def test_tiny_steps_in_plain_numbers(kind, dim, seed):
         assert joint.dissipated_energy == pytest.approx(lost, rel=2e-3, abs=1e-6)
 
 
-def energy_scale(one, delta, d):
-    """Elastic energy (B,) that no rounding can exceed."""
-    size = np.sum(np.abs(delta) + np.abs(d), axis=0)
-    return max(one.normal * (1.0 + one.friction), one.shear) * size**2 + one.cohesion * size
-
-
 def random_law(rng, dim):
     """A law whose strengths are met by displacements of about one, some of them zero."""
     kn, ks = 10.0 ** rng.uniform(-1.0, 1.0, 2)
@@ -171,7 +166,9 @@ def test_energy_of_closed_cycles(seed, dim):
     corners[4, 0] = corners[3, 0]
     state, total, closest = np.zeros((dim, n)), np.zeros(n), 0.0
     for delta, d in zip(corners, np.diff(corners, axis=0), strict=False):
-        new, scale = state.copy(), energy_scale(one, delta, d)
+        new, size = state.copy(), np.sum(np.abs(delta) + np.abs(d), axis=0)
+        # elastic energy that no rounding can exceed
+        scale = max(one.normal * (1.0 + one.friction), one.shear) * size**2 + one.cohesion * size
         F, lost, tangent = one.step(delta, d, state, new, True)
         assert (lost >= 0.0).all()
         gained = one.stored(delta + d, new) - one.stored(delta, state)
@@ -318,10 +315,8 @@ def test_mixed_opening_and_shear(name, angle):
 def test_no_energy_from_closed_cycles(seed):
     """2000 cycles of a random bond: along straight steps the work is at least what is stored."""
     rng = np.random.default_rng(seed)
-    stiffness, strength = 10.0 ** rng.uniform(8, 11, 2), 10.0 ** rng.uniform(5, 7, 2)
-    tough = np.where(rng.random(2) < 0.3, 1.0, 10.0 ** rng.uniform(0.0, 2.0, 2))
-    bond = jl.Bond(*stiffness, *strength, *(tough * 0.5 * strength**2 / stiffness))
-    size = (2.0 * tough * strength / stiffness).max() * 10.0 ** rng.uniform(-2.0, 2.0, 2000)
+    bond = random_bond(rng)
+    size = 10.0 ** rng.uniform(-2.0, 2.0, 2000) / bond.limits[1].min()  # of where it is broken
     corners = rng.normal(size=(5, 3, 2000)) * size
     corners[0] = corners[-1] = 0.0
     one, damage, work, scale = Bonded(bond), np.zeros((1, 2000)), 0.0, 0.0

@@ -248,30 +248,27 @@ BACK = -(HEIGHT - CRACK) / tan(PLANE)  # x of the crack; the toe is at 0, 0
 SLIDE = [(0, 0), (CREST, HEIGHT), (BACK, HEIGHT), (BACK, HEIGHT - CRACK)]
 
 
-def planar(friction, cohesion, depth):
-    """The slide with water in its crack, whose pressure falls in a line along the plane to 0."""
-    level = HEIGHT - CRACK + depth
-    table = f"[water]\ntable = [[-99.0, {level}], [{BACK}, {level}], [0.0, 0.0]]\n"
-    base = [(-60, -1), (0, -1), (0, 0), (BACK, HEIGHT - CRACK), (-60, HEIGHT - CRACK)]
-    behind = [(-60, HEIGHT - CRACK), SLIDE[3], SLIDE[2], (-60, HEIGHT)]
-    text = law("j", friction, cohesion) + law("crack", 0.0) + (table if depth else "")
-    text += block("base", corners=base, fixed=True) + block("behind", corners=behind, fixed=True)
-    joint = '[[joint]]\nbetween = ["slide", "behind"]\nlaw = "crack"\n'
-    return parse(text + block("slide", corners=SLIDE) + joint + RUN)
-
-
 @pytest.mark.parametrize("depth", [0.0, 0.5 * CRACK, CRACK])
 @pytest.mark.parametrize(("phi", "cohesion"), [(40, 0.0), (30, 5e4), (40, 3e4)])
 def test_a_planar_slide_with_a_tension_crack(phi, cohesion, depth):
     """F = (c A + (W cos p - U - V sin p) tan phi) / (W sin p + V cos p) (Hoek and Bray 1981, 7):
-    U lifts the slide from its plane, V pushes it out of the crack. The search finds F to 0.6 %."""
+    U lifts the slide from its plane, V pushes it out of the crack, in which water stands; its
+    pressure falls in a line along the plane to 0. The search finds F to 0.6 %."""
     length = hypot(BACK, HEIGHT - CRACK)
     weight = 2600 * 9.81 * Polygon(SLIDE).area
     up, out = 0.5 * WATER * depth * length, 0.5 * WATER * depth**2
     presses = weight * cos(PLANE) - up - out * sin(PLANE)
     bears = cohesion * length + presses * tan(radians(phi))
     factor = bears / (weight * sin(PLANE) + out * cos(PLANE))
-    found = factor_of_safety(planar(tan(radians(phi)), cohesion, depth))
+    level = HEIGHT - CRACK + depth
+    table = f"[water]\ntable = [[-99.0, {level}], [{BACK}, {level}], [0.0, 0.0]]\n"
+    base = [(-60, -1), (0, -1), (0, 0), (BACK, HEIGHT - CRACK), (-60, HEIGHT - CRACK)]
+    behind = [(-60, HEIGHT - CRACK), SLIDE[3], SLIDE[2], (-60, HEIGHT)]
+    text = law("j", tan(radians(phi)), cohesion) + law("crack", 0.0) + (table if depth else "")
+    text += block("base", corners=base, fixed=True) + block("behind", corners=behind, fixed=True)
+    text += block("slide", corners=SLIDE)
+    text += '[[joint]]\nbetween = ["slide", "behind"]\nlaw = "crack"\n'
+    found = factor_of_safety(parse(text + RUN))
     assert found == pytest.approx(factor, rel=0.01)
 
 

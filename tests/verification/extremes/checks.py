@@ -4,6 +4,7 @@ import numpy as np
 
 from jointlaw.kernels import asperities
 from jointlaw.kernels import reference as kernel
+from jointlaw.kernels.asperities import effective_closure
 from jointlaw.kernels.mating import offset, planes
 
 ROUNDING = 1e-12  # of the facet's normal force: a cell's G is a difference of numbers of that size
@@ -18,7 +19,7 @@ def sliders_within_friction(batch):
     """
     k = batch.law.tables.asperities
     now = kernel.parts(batch.law.tables, batch.snapshot().values.T)
-    y = asperities.effective_closure(k, now.delta, now.slopes)
+    y = effective_closure(k, now.delta, now.slopes)
     virgin = asperities.cells(k, y)
     cells = asperities.flattened(virgin, asperities.cells(k, now.depth) if k.yields else None)
     strength = asperities.strength(k, planes(k, now.delta[1:], now.slopes).gamma)[:, 0]
@@ -32,14 +33,6 @@ def sliders_within_friction(batch):
     touches = y + ROUNDING * reach > (now.depth if k.yields else 0)
     lifted = np.where(~touches[:, None] & (size > 0), np.inf, 0.0)
     return float(np.max(np.maximum(excess / whole, lifted), initial=0.0))
-
-
-def elastic_force(batch):
-    """Forces (n,) in Pa that facets would bear, friction included, if they had not yielded."""
-    k = batch.law.tables.asperities
-    now = kernel.parts(batch.law.tables, batch.snapshot().values.T)
-    force, _ = k.curve.force(asperities.effective_closure(k, now.delta, now.slopes))
-    return (1.0 + k.mu) * np.sum(k.area[:, None] * force, axis=0)
 
 
 def path(rng, n, steps, size):
@@ -70,8 +63,13 @@ def run(law, size, seed, n=8, steps=32):
         gained, stored = joints.dissipated_energy - lost, joints.stored_energy
         lost, peak = lost + gained, np.maximum(peak, stored)
         forces = np.maximum(forces, np.abs(F).max(axis=1))
-        if law.tables.yields:  # a small difference of large forces
-            forces = np.maximum(forces, elastic_force(joints))
+        if law.tables.yields:  # a small difference of those that would be borne by elastic facets
+            facets, now = (
+                law.tables.asperities,
+                kernel.parts(law.tables, joints.snapshot().values.T),
+            )
+            force, _ = facets.curve.force(effective_closure(facets, now.delta, now.slopes))
+            forces = np.maximum(forces, (1.0 + facets.mu) * (facets.area @ force))
         excess = sliders_within_friction(joints)
         _, slow, _ = kernel.step(law.tables, before.T, d.T, False)
         gap = np.max(np.abs(slow.T - F) / np.maximum(forces, NOTHING)[:, None])

@@ -179,16 +179,6 @@ U = np.concatenate([np.linspace(0, 0.5e-3, 9), np.linspace(0.75e-3, 3e-3, 10)]) 
 NOISE = 0.005  # of the largest shear stress
 
 
-def write_shear(path, law, normal, rng):
-    """A file as a spreadsheet saves it in half of Europe; normal stress in MPa."""
-    columns = [1e3 * U]
-    for x, unit in zip(measured(law, U, 1e6 * normal), (1e3, 1e-3), strict=True):
-        columns.append((x + NOISE * x.max() * rng.standard_normal(x.shape) * (U > 0)) / unit)
-    rows = [f"{u:.4f};{t:.2f};{up:.5f};{normal}" for u, t, up in zip(*columns, strict=True)]
-    text = "\n".join(["us;tau;un;sn", "[mm];[kPa];[mm];[MPa]", *rows])
-    path.write_text(text.replace(".", ","))
-
-
 @pytest.mark.slow
 @pytest.mark.usefixtures("in_an_empty_folder")
 def test_three_shear_files_and_a_closure_file_predict_a_fourth(tmp_path, law, capsys):
@@ -196,8 +186,13 @@ def test_three_shear_files_and_a_closure_file_predict_a_fourth(tmp_path, law, ca
     of a plateau unknown; 2 % holds that and the step of the record."""
     rng = np.random.default_rng(3)
     law = replace(law, orientation=jl.Orientation(4.0), mating_length=0.4e-3)
-    for n in (1, 3, 5):
-        write_shear(tmp_path / f"s{n}.csv", law, n, rng)
+    for n in (1, 3, 5):  # MPa; as a spreadsheet saves it in half of Europe
+        columns = [1e3 * U]
+        for x, unit in zip(measured(law, U, 1e6 * n), (1e3, 1e-3), strict=True):
+            columns.append((x + NOISE * x.max() * rng.standard_normal(x.shape) * (U > 0)) / unit)
+        rows = [f"{u:.4f};{t:.2f};{up:.5f};{n}" for u, t, up in zip(*columns, strict=True)]
+        text = "\n".join(["us;tau;un;sn", "[mm];[kPa];[mm];[MPa]", *rows])
+        (tmp_path / f"s{n}.csv").write_text(text.replace(".", ","))
     stress = np.geomspace(0.2e6, 8e6, 14)
     closure = law.closure(stress)
     closure = (closure - closure[0]) * (1 + 0.003 * rng.standard_normal(14))

@@ -32,14 +32,6 @@ PLAIN = {
 }
 
 
-def angle(factor, dip):
-    """Friction angle (degrees) of the scene's law with its mu divided, at the slab's weight."""
-    scene = parse(SCENE)
-    law = scene.laws["rock"]
-    weak = replace(law, asperity=replace(law.asperity, mu=law.asperity.mu / factor))
-    return friction_angle(weak, 2600.0 * 9.81 * math.cos(math.radians(dip)))
-
-
 def bears(law, stress):
     """Peak shear stress (Pa) of direct shear at a normal stress (Pa)."""
     record = jl.direct_shear(law.joint(), to=[3e-3], normal=stress, steps=150)
@@ -160,7 +152,8 @@ def test_a_stopped_search_goes_on(tmp_path, monkeypatch, capsys):
     told = capsys.readouterr().out
     found = re.search(r"scene: factor of safety ([\d.]+), critical tilt in degrees ([\d.]+)", told)
     factor, tilt = map(float, found.groups())
-    steepest = angle(1.0, DIP)
+    pressed = 2600.0 * 9.81 * math.cos(math.radians(DIP))  # Pa, by the slab's weight
+    steepest = friction_angle(parse(SCENE).laws["rock"], pressed)
     by_hand = math.tan(math.radians(steepest)) / math.tan(math.radians(DIP))
     # FOUND, and three printed digits
     assert (factor, DIP + tilt) == pytest.approx((by_hand, steepest), rel=0.015)

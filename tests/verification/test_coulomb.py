@@ -81,18 +81,6 @@ def test_tension_is_cut_and_faces_close_again_at_mate(given, bears, share, dim):
     np.testing.assert_allclose(joint.F, [1e6, *np.zeros(dim - 1)], rtol=1e-9)
 
 
-def test_shear_counts_from_touch():
-    """Faces that were apart meet in mid-step, in one step or in ten."""
-    law = coulomb(cohesion=9e6, tension=0.0)
-    for steps in (1, 10):
-        joint = law.joint()
-        joint.update([-1e-3, 0.0])
-        for _ in range(steps):
-            F = joint.update(np.array([3e-3, 1.5e-3]) / steps)[0]
-        np.testing.assert_allclose(F, [2e-3 * KN, 1e-3 * KS], rtol=1e-12)
-        assert joint.dissipated_energy == 0.0
-
-
 def tiny_steps(law, legs, n):
     """Coulomb's words in plain numbers, n steps a leg: yields F, w and what was lost after each."""
     u, q, w, work, old = 0.0, np.zeros(len(legs[0]) - 1), 0.0, 0.0, np.zeros(len(legs[0]))

@@ -170,11 +170,6 @@ def test_cohesion_shows_in_shear_and_tension_where_the_joint_opens(law):
     assert fit.shape_differs == (True,)
 
 
-def test_strengths_of_a_bond_need_a_bond(law):
-    with pytest.raises(ValueError, match="cohesion is that of a bond: give a law with a bond"):
-        jl.fit_curves([ShearCurve(SHEAR, SHEAR, 5e6)], law=law, free=("cohesion", "mu"))
-
-
 U = np.concatenate([np.linspace(0, 0.5e-3, 9), np.linspace(0.75e-3, 3e-3, 10)])  # m
 NOISE = 0.005  # of the largest shear stress
 

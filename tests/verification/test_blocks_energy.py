@@ -15,21 +15,16 @@ from dem_demo import Simulation, parse
 from dem_demo.scene import turn
 
 REPLICA = ROCK.replace("a = 3.0", "a = 4.0")
-COULOMB = coulomb(0.6, 1e9, 8e8)
 
 
-def one_block(law, dip=0.0, at=None, run=""):
-    """A block 1.0 by 0.5 m over a fixed base."""
-    return parse(on_base(law, [1.0, 0.5], dip, (6.0, 1.0), at) + f"fraction = 0.3\n{run}")
-
-
-@pytest.mark.parametrize("law", [COULOMB, REPLICA], ids=["coulomb", "joint"])
+@pytest.mark.parametrize("law", [coulomb(0.6, 1e9, 8e8), REPLICA], ids=["coulomb", "joint"])
 def test_sliding_block(law):
     """A dip of 48 degrees, more than either joint holds: friction eats most of the work.
 
     The first 0.02 s wind the joints up; the ledger must close to 1e-4 over the whole slide.
     """
-    sim = Simulation(one_block(law, 48.0, at=(-1.0, 0.25)))
+    text = on_base(law, [1.0, 0.5], 48.0, at=(-1.0, 0.25))
+    sim = Simulation(parse(f"{text}fraction = 0.3\n"))
     lost = [0.0, *steps(sim, 1100, lambda: sim.ledger.value["friction"])]
     assert sim.blocks.motion[0, 1] > -0.9
     assert np.diff(lost).min() >= -1e-9 * lost[-1]
@@ -42,8 +37,8 @@ def test_linear_joint_conserves_to_round_off():
 
     A block that is let go on its base bounces 3 um deep.
     """
-    run = "dashpot_normal = 0.0\ndashpot_shear = 0.0\nseat = false"
-    sim = Simulation(one_block(COULOMB.replace("0.6", "inf"), run=run))
+    run = "fraction = 0.3\ndashpot_normal = 0.0\ndashpot_shear = 0.0\nseat = false"
+    sim = Simulation(parse(on_base(coulomb(np.inf, 1e9, 8e8), [1.0, 0.5]) + run))
     steps(sim, 1000)
     # Joules, of 0.1 that come and go: places are known to 5e-17 m, times a weight of 13 kN.
     assert sim.ledger.total == pytest.approx(sim.ledger.start, abs=2e-11)

@@ -72,8 +72,8 @@ FORGETTING = "test_small_normal_cycles_forget_locked_in_shear_at_a_known_rate"
 TABLES = {
     "matrix": (matrix, [f"extremes.py::test_{name}" for name in MATRIX]),
     "exact": (exact, ["extremes_exact.py"]),
-    "forgetting": (forgetting, [f"small_cycles.py::{FORGETTING}"]),
-    "impact": (impact, ["extremes_dynamics.py"]),
+    "forgetting": (forgetting, [f"slow_bed.py::{FORGETTING}"]),
+    "impact": (impact, ["extremes_exact.py"]),
 }  # fmt: skip
 
 if __name__ == "__main__":

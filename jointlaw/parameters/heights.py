@@ -147,7 +147,8 @@ def require_heights(heights: Any) -> None:
             "or a class with these (a histogram in Heights stands for any other distribution)"
         )
     kind = type(heights)
-    if kind.__hash__ in (None, object.__hash__) or kind.__repr__ is object.__repr__:
+    own = {getattr(kind, name) for name in ("__hash__", "__repr__")}
+    if own & {None, object.__hash__, object.__repr__}:
         raise ValueError(
             f"heights = {heights!r}: two of equal numbers must be equal, hash and print alike; "
             f"make {kind.__name__} a frozen dataclass"

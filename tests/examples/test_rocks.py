@@ -80,6 +80,7 @@ def test_failure_is_counted_by_the_size_of_the_blocks(size):
     end[0, rock.free[:2]] += [0.2 * size, 0.05 * size]  # of blocks of about 1 m2 times size**2
     record = object.__new__(Record)
     record.scene, record.times, record.motion = scene, [0.0, 1.0], [start, end]
+    record.initial = start
     assert [entry["failed"] for entry in outcomes(record)] == [1, 0]
 
 

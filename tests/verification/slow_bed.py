@@ -7,7 +7,7 @@ with it.
 """
 
 import numpy as np
-from paper_laws import directions
+from builders import directions
 from slow_virgin import SlowGamma, virgin
 
 

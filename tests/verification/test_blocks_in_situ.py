@@ -1,16 +1,23 @@
-"""Stress before an excavation: rock in balance that does not move, and its joints bear that stress.
-Then rock is taken away in stages: what it bore goes bit by bit, and the rest answers.
+"""Blocks at the start. Rock under a stress is in balance and does not move, and its joints bear it;
+who cannot be held is named, and all others are in balance, around a cavern too. Then rock is taken
+away in stages: what it bore goes bit by bit, and the rest answers.
 
 A block whose edges all bear a stress with div S = weight is in balance, and each joint bears S on
 its direction.
 """
 
+import csv
+import json
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from running import contact_forces, until
-from scene_text import ROCK, block, coulomb
+from running import until
+from scene_text import ROCK, block, coulomb, dipping, on_base
 
 from dem_demo import Simulation, load
+from dem_demo.cli import main
+from dem_demo.output.monitors import friction_angle
 from dem_demo.scene import parse, turn
 
 PLAIN = coulomb(0.8)
@@ -26,17 +33,6 @@ outline = [[0, 0], [10, 0], [10, 10], [0, 10]]
 set = [{ dip = 35, spacing = 1.5, scatter = 0.3, law = "j" },
        { dip = -60, spacing = 1.7, scatter = 0.3, law = "j" }]
 """
-
-
-def bricks(angle, k0, law):
-    """5 x 5 bricks in a running bond, turned by an angle (degrees), in a ring of fixed ones."""
-    text = f"[laws.j]\n{LAWS[law]}{RUN}[in_situ]\nk0 = {k0}\nsurface = [[0, 20.0]]\n"
-    for row, column in np.ndindex(7, 7):
-        left = column + 0.5 * (row % 2)
-        box = np.array([[left, row], [left + 1, row], [left + 1, row + 1], [left, row + 1]])
-        corners, fixed = box @ turn(np.radians(angle)).T, not (0 < row < 6 and 0 < column < 6)
-        text += block(f"{row} {column}", corners=corners, fixed=fixed)
-    return parse(text)
 
 
 def cut(stress, sides, law="plain", more=""):
@@ -62,9 +58,16 @@ def wrong(sim, stress):
 @pytest.mark.parametrize("k0", [0.5, 1.0, 2.0])
 @pytest.mark.parametrize("angle", [0, 30])
 def test_bricks_do_not_move(angle, k0):
-    """1e-9 m at a depth of 15 m. What is left grows with the square of the stress: a joint's energy
-    changes with its length, as one block slides off another."""
-    sim = Simulation(bricks(angle, k0, "plain"))
+    """5 x 5 bricks in a running bond, turned by an angle (degrees), in a ring of fixed ones: 1e-9 m
+    at a depth of 15 m. What is left grows with the square of the stress: a joint's energy changes
+    with its length, as one block slides off another."""
+    text = f"[laws.j]\n{PLAIN}{RUN}[in_situ]\nk0 = {k0}\nsurface = [[0, 20.0]]\n"
+    for row, column in np.ndindex(7, 7):
+        left = column + 0.5 * (row % 2)
+        box = np.array([[left, row], [left + 1, row], [left + 1, row + 1], [left, row + 1]])
+        corners, fixed = box @ turn(np.radians(angle)).T, not (0 < row < 6 and 0 < column < 6)
+        text += block(f"{row} {column}", corners=corners, fixed=fixed)
+    sim = Simulation(parse(text))
     assert not sim.loose.any()
     assert moved(sim) < 1e-9
     weights = np.abs(sim.ledger.forces[0]).max() / np.abs(sim.blocks.gravity).max()
@@ -100,7 +103,10 @@ def test_the_floor_bears_the_weight_and_the_load_above(sides):
     fixed = np.array([block.fixed for block in sim.scene.blocks])
     load = -WEIGHT * (DEPTH - 10) * 10
     assert sim.blocks.loads[~fixed, 1].sum() == pytest.approx(load, rel=1e-4)
-    carried = contact_forces(sim)[fixed, 1].sum()
+    stress, shear = sim.joints.traction.T
+    stored = sim.joints.stored * sim.scene.thickness  # what a change of length costs
+    area, motion = sim.ledger.area, sim.blocks.motion
+    carried = sim.contacts.assemble(motion, area * stress, -area * shear, stored)[fixed, 1].sum()
     above = (sim.blocks.gravity + sim.blocks.loads)[~fixed, 1].sum()
     assert carried == pytest.approx(above, rel=1e-4)
 
@@ -232,3 +238,114 @@ GIVE = "give either k0 or stress"
 def test_wrong_stresses_and_excavations_are_refused(make, told):
     with pytest.raises(ValueError, match=told):
         make()
+
+
+BLOCK = (
+    on_base(coulomb(np.tan(np.radians(35.0))), [3.0, 1.5], 25.0, end=0.02)
+    + """\
+record = 0.01
+[[block]]
+name = "stuck to its face"
+corners = [[1.5, 0.2], [2.0, 0.4], [2.0, 1.0], [1.5, 1.2]]
+"""
+)
+
+
+def unbalanced(sim):
+    """Unbalanced forces (n,) at step 0, as shares of the weights."""
+    force = np.hypot(*(sim.ledger.forces[0] * sim.blocks.free)[:, :2].T)
+    return force / np.hypot(*sim.blocks.gravity[:, :2].T).clip(1e-300)
+
+
+def test_a_loose_block_leaves_the_one_that_it_touches_in_balance():
+    sim = Simulation(parse(BLOCK))
+    assert sim.loose.tolist() == [False, False, True]  # the one that is stuck to its face
+    lacking = unbalanced(sim)
+    assert lacking[1] < 1e-9
+    assert lacking[2] == pytest.approx(1.0, abs=0.01)  # nothing holds it
+    again = Simulation(sim.scene, saved=sim.state())
+    assert (again.loose == sim.loose).all()
+
+
+def test_a_weakened_block_in_water_starts_in_balance():
+    text = on_base(coulomb(0.7), [3.0, 1.5], load=[2e4, 0.0])
+    sim = Simulation(
+        replace(parse(text + "[water]\ntable = [[-9, 0.5], [9, 0.6]]\n"), reduction=1.3)
+    )
+    assert sim.blocks.loads[1, 1] > 1e4  # N, uplift
+    assert unbalanced(sim)[1] < 1e-9
+
+
+def test_a_block_that_slides_lacks_what_friction_does_not_hold():
+    """At 40 degrees: sin - cos tan 35, of its weight."""
+    steep = np.radians(40.0)
+    sim = Simulation(replace(parse(BLOCK), gravity=tuple(dipping(40.0))))
+    lacking = np.sin(steep) - np.cos(steep) * np.tan(np.radians(35.0))
+    assert sim.loose.tolist() == [False, True, True]
+    assert unbalanced(sim)[1] == pytest.approx(lacking, rel=0.03)
+
+
+def test_the_run_names_loose_blocks_and_says_how_each_block_moved(tmp_path, capsys):
+    (tmp_path / "scene.toml").write_text(BLOCK)
+    out = tmp_path / "out"
+    assert main([str(tmp_path / "scene.toml"), "--out", str(out), "--no-pictures"]) == 0
+    said = capsys.readouterr().out
+    assert "1 blocks cannot be held" in said
+    assert "stuck to its face (1.73, 0.70)" in said
+    assert "blocks: " in said  # a verdict without a [[rock]]
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["started_in_equilibrium"] is False
+    assert [block["block"] for block in summary["loose"]] == ["stuck to its face"]
+    rows = list(csv.DictReader((out / "blocks.csv").read_text().splitlines()))
+    assert [row["block"] for row in rows] == ["base", "block", "stuck to its face"]
+    assert [row["loose_at_start"] for row in rows] == ["0", "0", "1"]
+    fell = float(rows[2]["displacement_m"])
+    assert fell == pytest.approx(0.5 * 9.81 * 0.02**2, rel=0.1)
+    assert float(rows[2]["speed_m/s"]) == pytest.approx(9.81 * 0.02, rel=0.1)
+    assert float(rows[1]["displacement_m"]) < 1e-6
+
+
+def test_strength_reduction_with_and_without_loose_blocks(tmp_path, capsys):
+    (tmp_path / "scene.toml").write_text(BLOCK)
+    out = tmp_path / "out"
+    words = [str(tmp_path / "scene.toml"), "--out", str(out), "--until", "0.3"]
+    assert main(["strength-reduction", *words]) == 0
+    (row,) = json.loads((out / "strength.json").read_text())["rows"]
+    assert [block["block"] for block in row["loose"]] == ["stuck to its face"]
+    assert row["factor_of_safety"] is None
+    assert row["factor_without"] == pytest.approx(
+        np.tan(np.radians(35)) / np.tan(np.radians(25)), rel=0.01
+    )
+    assert [block["block"] for block in row["first"]] == ["block"]
+    said = capsys.readouterr().out
+    assert said.index("cannot be held") < said.index("factor of safety without")
+
+
+HALF = np.arctan(1.25 / 2.0)  # rad: of the wedge at its apex, 32 degrees
+
+
+@pytest.mark.slow
+def test_a_roof_wedge_falls_where_its_joints_are_smoother_than_it_is_steep():
+    """A force N on a side pushes a wedge of half angle A down by N (sin A - tan phi cos A): where
+    phi is below A it falls, and the sooner the higher the horizontal stress. Above A each side
+    bears N (tan phi cos A - sin A): more than half the weight, with 200 kPa over 2 m of height.
+    (Brady and Brown 2004, 9.5.)
+
+    The wedge that hangs is in balance to rounding; the other falls no slower than a loose block.
+    """
+    fallen, time = {}, 0.2
+    for name, law in (("cavern", "rough"), ("cavern-smooth", "smooth")):
+        scene = load(name)
+        phi = np.radians(friction_angle(scene.laws[law], 2e5))
+        sim = Simulation(scene)
+        n = [block.name for block in scene.blocks].index("wedge")
+        assert (unbalanced(sim) < 1e-6)[~sim.loose].all()
+        start = sim.blocks.motion[1, n]
+        thrust = 2e5 * 2.0 / np.cos(phi - HALF)  # N, on a side, by the horizontal stress
+        bears = 2 * thrust * np.sin(phi - HALF) + sim.blocks.gravity[n, 1]
+        until(sim, time)
+        fallen[name] = bears, start - sim.blocks.motion[1, n]
+    (left, hangs), (lacking, falls) = fallen.values()
+    assert left > 0 > lacking
+    assert abs(hangs) < 1e-8
+    assert falls > 0.95 * 0.5 * 9.81 * time**2

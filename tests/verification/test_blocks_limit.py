@@ -5,11 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from limit_analysis import upper_factor
 from running import until
 from scene_text import coulomb, dipping, on_base
+from scipy.optimize import bisect, linprog
+from scipy.sparse import diags, hstack
 
 from dem_demo import Simulation, load, parse
+from dem_demo.contact import Tracker
+from dem_demo.dynamics.blocks import Blocks
+from dem_demo.dynamics.timestep import rates
 from dem_demo.output.run import to_failure
 from dem_demo.studies.strength import FACTOR, factor_of_safety, seated, weakened
 
@@ -35,6 +39,40 @@ corners = [[-40, -5], [13, -5], [13, 0.2], [0.3, 0.31], [-34, 20.12], [-40, 20]]
 [run]
 end = 1.0
 """
+
+
+def upper_factor(scene, low=0.25, high=4.0, exact=1e-3):
+    """Largest factor by which Coulomb's friction can be divided, by bisection; no cohesion.
+
+    A scene holds only if there are forces in its joints, pressing and within the friction cone,
+    that balance every block. Whether there are any is a linear program, whatever the joints'
+    stiffnesses. So no scene that is held by friction has a higher factor than this, the largest at
+    which there are some. It is also what the joints would have that dilate by their friction angle
+    (associated flow); joints without dilation may fail before, because they cannot choose among the
+    forces.
+    """
+    blocks = Blocks(scene)
+    tracker = Tracker(scene, blocks.motion)
+    tracker.renew(blocks.motion, blocks.near())
+    contacts = tracker.contacts
+    carries = np.flatnonzero(contacts.length > 0)
+    k, free = len(contacts.length), blocks.free.ravel()
+    ways = rates(blocks, contacts)[np.concatenate([carries, k + carries])].T  # of N, and of shear
+    friction = np.array([law.friction for law in scene.laws.values()])[tracker.law[carries]]
+    n = len(carries)
+    press, shear = ways[:, :n], ways[:, n:]
+    load = ((blocks.gravity + blocks.loads) * blocks.root).ravel()[free]
+    scale = np.abs(load).max()
+
+    def holds(factor):
+        # What a joint bears is a sum, with no negative part, of forces along its normal and along
+        # the two edges of its cone.
+        across = press @ diags(factor / friction)
+        balance = hstack([press, across + shear, across - shear]).tocsr()
+        found = linprog(np.zeros(3 * n), A_eq=balance, b_eq=-load / scale, bounds=(0, None))
+        return 1.0 if found.status == 0 else -1.0
+
+    return bisect(holds, low, high, xtol=exact)
 
 
 def slope(**keys):
@@ -178,38 +216,6 @@ def test_a_block_held_by_cohesion(dip, phi, cohesion, brittle):
     assert factor_of_safety(parse(on_base(law, [3.0, 1.5], dip))) == pytest.approx(
         expected, rel=0.01
     )
-
-
-G, RHO, T = 9.81, 2600.0, 2e5  # m/s2, kg/m3, Pa
-LAW = coulomb(0.6, 2e9, 2e9, tension=T, cohesion=4e5)
-
-
-def test_a_block_that_hangs_holds_to_the_tension():
-    """Loaded slowly: what it bears before it falls is tension times area."""
-    sim = Simulation(parse(on_base(LAW, [1.0, 1.0], 180.0)))  # under a roof
-    weight = RHO * G
-    assert sim.joints.traction[:, 0] == pytest.approx(-weight)
-    held = 0.0
-    for share in np.linspace(weight / T, 1.01, 4000):
-        sim.blocks.loads[1, 1] = share * T - weight
-        sim.step()
-        if (sim.joints.damage < 1.0).all():
-            held = share
-    assert 0.99 < held <= 1.01
-    while sim.joints.n:  # it falls out of reach
-        sim.step()
-    assert sim.ledger.error == pytest.approx(0.0, abs=1e-3)
-
-
-def test_faces_that_meet_anew_have_no_cohesion():
-    """A block that falls onto its base bounces off: nothing holds it."""
-    scene = parse(on_base(LAW, [1.0, 1.0]))
-    drawn = replace(scene.blocks[1], corners=np.add(scene.blocks[1].corners, [0.0, 0.05]))
-    run = replace(scene.run, seat=False)
-    sim = Simulation(replace(scene, blocks=(scene.blocks[0], drawn), run=run))
-    while not (sim.joints.traction[:, 0] > 0.0).any():
-        sim.step()
-    assert (sim.joints.damage == 1.0).all()
 
 
 @pytest.mark.slow

@@ -1,14 +1,22 @@
-"""Coulomb's joint: closed forms, tiny steps in plain numbers, energy of every step, tangent."""
+"""Joints that hold tension. Coulomb's: closed forms, tiny steps in plain numbers, energy of every
+step, tangent. The bond: strength, energies of fracture, no healing, no energy made, peak with
+friction."""
 
 import math
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from c_host import random_bond
+from scipy.integrate import quad, trapezoid
+from scipy.optimize import brentq
 from test_tangent import STEPS, descent_slope, v_curve
 from work import work_of_step
 
 import jointlaw as jl
 from jointlaw.kernels import reference
+from jointlaw.kernels.bond import Bonded
 
 KN, KS, MU, C, T = 1e10, 4e9, 0.6, 1e6, 4e5  # Pa/m, Pa
 BRITTLE = {"residual_friction": 0.4, "residual_cohesion": 0.3e6}
@@ -87,34 +95,6 @@ def test_faces_that_part_or_never_met_have_no_cohesion():
         assert joints.damage.tolist() == [1.0] * 4
 
 
-def test_shear_counts_from_touch():
-    """Faces that were apart meet in mid-step, in one step or in ten."""
-    law = coulomb(cohesion=9e6, tension=0.0)
-    for steps in (1, 10):
-        joint = law.joint()
-        joint.update([-1e-3, 0.0])
-        for _ in range(steps):
-            F = joint.update(np.array([3e-3, 1.5e-3]) / steps)[0]
-        np.testing.assert_allclose(F, [2e-3 * KN, 1e-3 * KS], rtol=1e-12)
-        assert joint.dissipated_energy == 0.0
-
-
-def test_shear_stress_turns_into_the_direction_of_motion():
-    """At constant strength S the angle between them falls by tan(a/2) = exp(-ks s/S) tan(a0/2)."""
-    law, stress, way = coulomb(None), 2e6, 5e-4
-    strength, errors = C + MU * stress, []
-    for steps in (100, 200, 400):
-        joint = law.joint(stress)
-        joint.update([0.0, 1e-2, 0.0])
-        for _ in range(steps):
-            F = joint.update([0.0, 0.0, way / steps])[0]
-        angle = 2.0 * math.atan(math.exp(-KS * way / strength))
-        assert np.hypot(*F[1:]) == pytest.approx(strength, rel=ROUNDING)
-        errors.append(abs(math.atan2(F[1], F[2]) - angle))
-    assert errors[-1] < 1e-3
-    assert np.diff(np.log2(errors)) == pytest.approx(-1.0, abs=0.05)
-
-
 def tiny_steps(law, legs, n):
     """Coulomb's words in plain numbers, n steps a leg: yields F, w and what was lost after each."""
     u, q, w, work, old = 0.0, np.zeros(len(legs[0]) - 1), 0.0, 0.0, np.zeros(len(legs[0]))
@@ -166,12 +146,6 @@ def test_tiny_steps_in_plain_numbers(kind, dim, seed):
         assert joint.dissipated_energy == pytest.approx(lost, rel=2e-3, abs=1e-6)
 
 
-def energy_scale(one, delta, d):
-    """Elastic energy (B,) that no rounding can exceed."""
-    size = np.sum(np.abs(delta) + np.abs(d), axis=0)
-    return max(one.normal * (1.0 + one.friction), one.shear) * size**2 + one.cohesion * size
-
-
 def random_law(rng, dim):
     """A law whose strengths are met by displacements of about one, some of them zero."""
     kn, ks = 10.0 ** rng.uniform(-1.0, 1.0, 2)
@@ -197,7 +171,9 @@ def test_energy_of_closed_cycles(seed, dim):
     corners[4, 0] = corners[3, 0]
     state, total, closest = np.zeros((dim, n)), np.zeros(n), 0.0
     for delta, d in zip(corners, np.diff(corners, axis=0), strict=False):
-        new, scale = state.copy(), energy_scale(one, delta, d)
+        new, size = state.copy(), np.sum(np.abs(delta) + np.abs(d), axis=0)
+        # elastic energy that no rounding can exceed
+        scale = max(one.normal * (1.0 + one.friction), one.shear) * size**2 + one.cohesion * size
         F, lost, tangent = one.step(delta, d, state, new, True)
         assert (lost >= 0.0).all()
         gained = one.stored(delta + d, new) - one.stored(delta, state)
@@ -249,3 +225,152 @@ def test_tangent(state, dim):
     assert errors.min() < 1e-8
     if dim == 3 and state not in ("stick", "tension"):  # q turns, all else is quadratic at most
         assert descent_slope(errors) == pytest.approx(2.0, abs=0.1)
+
+
+STIFFNESS, STRENGTH = (1e10, 5e9), (2e6, 3e6)  # Pa/m, Pa
+DUCTILE = jl.Bond(*STIFFNESS, *STRENGTH, energy_I=1e3, energy_II=2e4)  # elastic 200 and 900 J/m2
+BONDS = {
+    "brittle": jl.Bond(*STIFFNESS, *STRENGTH),
+    "ductile": DUCTILE,
+    "brittle in opening": jl.Bond(*STIFFNESS, *STRENGTH, energy_II=1e4),
+}
+EXACT = 1e-10  # rounding of sums over a few hundred steps
+WAYS = {"opening": (0, [-1.0, 0.0, 0.0]), "shear": (1, [0.0, 0.6, -0.8])}
+
+
+@pytest.fixture(scope="module")
+def rough():
+    """A joint in space that carries in shear as well, coarse."""
+    return replace(
+        jl.presets.load("jing-replica"), mating_length=1e-2, resolution=jl.Resolution(2, 4, 2)
+    )
+
+
+def energies(bond):
+    """Energies of fracture in opening and in shear."""
+    given = bond.energy_I, bond.energy_II
+    elastic = [0.5 * t**2 / k for k, t in zip(STIFFNESS, STRENGTH, strict=True)]
+    return [e if g is None else g for g, e in zip(given, elastic, strict=True)]
+
+
+def hold(bond, delta, old):
+    """Damage and loss (B,) of a bond after a step to delta (3, B)."""
+    new = np.empty((1, len(old)))
+    return new[0], Bonded(bond).step(np.zeros_like(delta), delta, old[None], new, False).lost
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("name", BONDS)
+def test_peak_and_area_of_one_mode(name, way, rough):
+    """The asperities, a twin without a bond, are taken off: in opening they carry nothing."""
+    bond, (mode, direction) = BONDS[name], WAYS[way]
+    k, strength, energy = STIFFNESS[mode], STRENGTH[mode], energies(bond)[mode]
+    begin, end = strength / k, 2.0 * energy / strength
+    at = np.unique([*np.linspace(0.0, begin, 4), *np.linspace(begin, end, 200), 1.2 * end])
+    joint, plain = replace(rough, bond=bond).joint(), rough.joint()
+    steps = np.diff(at)[:, None] * direction
+    along = np.array([joint.update(d)[0] - plain.update(d)[0] for d in steps]) @ direction
+    assert along.max() == pytest.approx(strength, rel=EXACT)
+    area = trapezoid([0.0, *along], at)
+    if end > begin * (1.0 + EXACT):  # the traction is a polygon whose corners are among the points
+        assert area == pytest.approx(energy, rel=EXACT)
+        assert along[np.searchsorted(at, begin) :].min() == pytest.approx(0.0, abs=EXACT * strength)
+    lost = joint.dissipated_energy - plain.dissipated_energy
+    assert lost == pytest.approx(energy, rel=EXACT)
+    assert joint.damage == 1.0
+    if mode == 0:
+        assert not plain.F.any()
+        half = replace(rough, bond=bond).normal_stress(-0.5 * begin)
+        assert half == pytest.approx(-0.5 * strength, rel=EXACT)
+
+
+@pytest.mark.parametrize("angle", [0.2, 0.7, 1.3])
+@pytest.mark.parametrize("name", BONDS)
+def test_mixed_opening_and_shear(name, angle):
+    """Damage begins on the ellipse; the energy is the integral of psi over the damage."""
+    bond, u = BONDS[name], np.array([-np.sin(angle), np.cos(angle)])
+    shares = np.abs(u) * STIFFNESS / np.array(STRENGTH)
+    begin = 1.0 / np.hypot(*shares)  # a step that ends here is on the ellipse
+
+    def after(length):
+        return hold(bond, length * u[:, None], np.zeros(1))[0]
+
+    assert after((1.0 - 1e-9) * begin) == 0.0 < after((1.0 + 1e-9) * begin)
+    ends = [2.0 * e / t for e, t in zip(energies(bond), STRENGTH, strict=True)]
+    end = 1.0 / np.hypot(*(np.abs(u) / ends))
+    steps, old, lost = np.linspace(begin, 1.001 * end, 4001), np.zeros(1), 0.0
+    for length in steps:
+        old, more = hold(bond, length * u[:, None], old)
+        lost = lost + float(more[0])
+    soft = [k / t - 1.0 / e for k, t, e in zip(STIFFNESS, STRENGTH, ends, strict=True)]
+
+    def strength(d):
+        """Length at which the ellipse of damage d is met."""
+        axes = [k / t - d * s for k, t, s in zip(STIFFNESS, STRENGTH, soft, strict=True)]
+        return brentq(lambda x: np.hypot(*(x * u * axes)) - 1.0, 0.0, 2.0 * end, xtol=1e-16)
+
+    psi = 0.5 * np.sum(np.array(STIFFNESS) * u**2)
+    integral = quad(lambda d: psi * strength(d) ** 2, 0.0, 1.0, epsabs=0.0, epsrel=1e-10)[0]
+    assert old[0] == 1.0
+    assert lost == pytest.approx(integral, rel=1e-5)  # second order of 4000 steps
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10))
+def test_no_energy_from_closed_cycles(seed):
+    """2000 cycles of a random bond: along straight steps the work is at least what is stored."""
+    rng = np.random.default_rng(seed)
+    bond = random_bond(rng)
+    size = 10.0 ** rng.uniform(-2.0, 2.0, 2000) / bond.limits[1].min()  # of where it is broken
+    corners = rng.normal(size=(5, 3, 2000)) * size
+    corners[0] = corners[-1] = 0.0
+    one, damage, work, scale = Bonded(bond), np.zeros((1, 2000)), 0.0, 0.0
+    for at, end in pairwise(corners):
+        new, scale = damage.copy(), np.maximum(scale, one.stored(end, np.zeros((1, 2000))))
+        assert (one.step(at, end - at, damage, new, False).lost >= 0.0).all()
+        assert (new >= damage).all()  # nothing heals
+        work = work + work_of_step(one, at, end - at, damage, 1e-14 * scale)
+        damage = new
+        assert (work >= one.stored(end, damage) - 1e-10 * scale).all()
+    assert (damage > 0.0).mean() > 0.5
+
+
+@pytest.mark.parametrize("name", ["westerly-rough", "jing-replica"])
+@pytest.mark.parametrize("tough", [1.0, 30.0])
+def test_peak_with_friction_and_residual(name, tough):
+    """At constant normal stress: dilation puts the bond in tension and presses the asperities."""
+    plain = replace(jl.presets.load(name), plane=0.0)
+    # no step of 0.1 closure ranges ends where the bond breaks: rounding would decide
+    T, c, length = 1e6, 3e6, 0.31 * plain.closure_range
+    bond = jl.Bond(T / length, c / length, T, c, tough * T * length / 2, tough * c * length / 2)
+    way = 40.0 * plain.closure_range
+    for stress in (0.3e6, 1e6, 3e6, 10e6, 30e6):
+        one, two = (
+            jl.direct_shear(law.joint(), way, stress, steps=400)
+            for law in (plain, replace(plain, bond=bond))
+        )
+        slope = one.shear_stress.max() / stress
+        peak = two.shear_stress.max()
+        assert one.shear_stress.max() <= peak <= stress * slope + np.hypot(c, T * slope)
+        assert two.shear_stress[-1] == pytest.approx(one.shear_stress[-1], rel=1e-6)
+        if stress <= 1e6:
+            assert peak > one.shear_stress.max() + 0.5 * c
+
+
+def test_an_unmated_joint_starts_far_from_mate_and_has_no_bond(rough):
+    """With a mating length, without one, and where faces meet anew in a batch; and so has Coulomb's
+    joint no cohesion."""
+    bonded = replace(rough, bond=DUCTILE)
+    for law in (bonded, replace(bonded, mating_length=math.inf), coulomb(None)):
+        joint = law.joint(mated=False)
+        opened = joint.update([-1e-3, 1e-4, 0.0])[0]
+        assert joint.damage == 1.0
+        assert not opened.any()
+        pool = jl.JointPool(law)
+        pool.add(["first"])
+        pool.add(["second"], mated=False)
+        one = law.joint(mated=False).snapshot().values[0]
+        np.testing.assert_array_equal(one[:3], law.unmated_start)
+        np.testing.assert_array_equal(pool.snapshot().values, [np.zeros_like(one), one])
+        pool.batch.reset(pool.places[:1], mated=False)
+        np.testing.assert_array_equal(pool.snapshot().values, [one, one])

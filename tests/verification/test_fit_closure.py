@@ -1,5 +1,6 @@
 """Fits of closure curves and whole cycles: held-out stresses, honest intervals, what one curve
-cannot tell, what yielding explains, and the compliance of rock and machine."""
+cannot tell, what yielding explains, and the compliance of rock and machine. And a law from field
+values against the relations of Barton that it stands for."""
 
 import pickle
 from dataclasses import replace
@@ -14,6 +15,7 @@ import jointlaw.calibration.fit
 from jointlaw.calibration import datasets
 from jointlaw.calibration.measured import first_loading
 from jointlaw.calibration.problem import pose
+from jointlaw.cli.main import main
 
 
 @pytest.fixture(scope="module")
@@ -146,6 +148,7 @@ def test_what_is_fitted_follows_from_the_tests(grimsel):
         ({"stress": [1e5, 2e5, 5e5, 3e5, 1e5]}, "first loading alone"),
         ({"stress": [-1e5, 2e5, 3e5, 4e5, 5e5]}, ">= 0"),
         ({"free": ("alpha", "gamma")}, "'gamma' is unknown"),
+        ({"free": ("cohesion", "mu")}, "cohesion is that of a bond: give a law with a bond"),
         ({"fixed": {"beta": -1.0}}, "beta = -1.0 m is out of bounds"),
         ({"fixed": {"c": 0.45}}, r"c = 0.45 .* 1/3 - b/6 = 0.333333333"),
         ({"priors": {"alpha": (5, 1)}}, "ascending"),
@@ -161,13 +164,6 @@ def test_bad_input_is_named(change, words):
     test |= {name: value for name, value in change.items() if name not in of_fit}
     with pytest.raises(ValueError, match=words):
         jl.fit_curves([jl.ClosureCurve(**test)], **of_fit)
-
-
-LAW = jl.JointLaw(
-    orientation=jl.Orientation(3.0), heights=jl.GammaHeights(3.0, 2e-5, 0.0, "individual"),
-    asperity=jl.Asperity(1e9, 1.17, 0.5, 0.6, yield_interference=2e-5), asperity_density=1e6,
-    closure_only=True,
-)  # fmt: skip
 
 
 def loss(stress, closure):
@@ -204,15 +200,58 @@ def test_one_length_explains_the_loop_of_the_measured_cycle():
 
 
 @pytest.mark.slow
-def test_parameters_come_back_from_two_cycles_that_they_made():
-    record = jl.closure_test(LAW.joint(), [5e6, 10e6], steps=12)
+def test_parameters_come_back_from_two_cycles_that_they_made(law):
+    asperity = replace(law.asperity, yield_interference=2e-5)
+    weak = replace(law, asperity=asperity, closure_only=True)
+    record = jl.closure_test(weak.joint(), [5e6, 10e6], steps=12)
     rock = 3e-12
     closure = record.closure + rock * record.F1
     curve = jl.ClosureCurve(record.F1, closure, noise=0.01, cycle=True, compliance=rock)
-    fit = jl.fit_curves([curve], law=LAW, free=("asperity_density", "yield_interference"))
+    fit = jl.fit_curves([curve], law=weak, free=("asperity_density", "yield_interference"))
     # shear forces fall with normal ones in the forward model: a few per cent
     assert fit.parameters["yield_interference"] == pytest.approx(2e-5, rel=0.08)
     assert fit.parameters["seating"] == 0.0  # the test begins at zero stress
     # shares of the largest stress are fitted: at a small one the law is as uncertain in Pa
     low, high = fit.band(np.array([0.3, 1.0]) * record.closure.max())
     assert (high > low).all()
+
+
+GIVEN = {"jcs": 100e6, "length": 0.1, "normal_stress": 1e6, "normal_stiffness": 30e9}
+
+
+@pytest.mark.parametrize("jrc", [4.0, 10.0, 16.0])
+def test_the_peak_is_that_of_barton(jrc):
+    """Angle by 30 + JRC log10(JCS/stress), displacement within a third (a peak is flat)."""
+    law = jl.from_field(jrc=jrc, **GIVEN)
+    slip = 0.1 / 500 * (jrc / 0.1) ** 0.33
+    record = jl.direct_shear(law.joint(), 4 * slip, 1e6)
+    assert record.peak_friction_angle == pytest.approx(30 + 2 * jrc, abs=0.5)
+    assert record.shear[np.argmax(record.shear_stress)] == pytest.approx(slip, rel=1 / 3)
+    for stress in (2e6, 5e6) if jrc == 10 else ():  # as docs/field.md says
+        peak = jl.direct_shear(law.joint(), 4 * slip, stress, steps=200).peak_friction_angle
+        assert peak == pytest.approx(30 + jrc * np.log10(100e6 / stress), abs=0.7)
+    _, C = law.joint().update([law.closure(1e6), 0.0, 0.0])
+    assert C[0, 0] == pytest.approx(30e9, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"jcs": 1e6}, "climb by 0 degrees above 30"),
+        ({"jrc": 40.0}, "climb by 80 degrees above 30: it must be 1 to 50"),
+        ({"normal_stiffness": 1e8}, "a joint so soft"),
+        ({"length": 0.0}, "length = 0.0 is out of bounds"),
+    ],
+)
+def test_what_no_law_has_is_named(change, told):
+    with pytest.raises(ValueError, match=told):
+        jl.from_field(**{"jrc": 10.0, **GIVEN, **change})
+
+
+def test_the_command_says_what_it_assumed(tmp_path, capsys):
+    values = "--jrc 10 --jcs 100MPa --length 10cm --normal-stress 1MPa --normal-stiffness 30GPa/m"
+    assert main(f"field {values} --out {tmp_path}".split()) == 0
+    printed = capsys.readouterr().out
+    assert "peak friction angle 50.0 deg" in printed
+    assert "Assumed, for no field value tells them" in printed
+    assert jl.JointLaw.from_toml(tmp_path / "law.toml").asperity.mu == pytest.approx(3**-0.5)

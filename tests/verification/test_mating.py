@@ -1,13 +1,16 @@
-"""Slopes that fade with the distance from mate, slopes that wear, asperities that yield; against
-the slow bed: test_slow_bed.py."""
+"""Slopes that fade with the distance from mate, slopes that wear, asperities that yield, in closed
+forms; against the slow bed: test_slow_bed.py. And no step of theirs, nor of elastic asperities,
+creates energy, by the work along the step's own geometry (docs/theory-incremental.md, "No step
+creates energy").
+"""
 
-import dataclasses
 import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import law
+from builders import law, random_corners
+from work import begun, step_work, walk
 
 import jointlaw as jl
 from jointlaw.kernels import reference as kernel
@@ -17,39 +20,30 @@ PRESETS = "westerly-rough", "jing-replica"
 FINE = jl.Resolution(12, 12, 12)
 
 
-def sheared(name, lengths, stress, way, **more):
-    """Law and record of a shear test to `way` mating lengths, each of `lengths` closure ranges."""
-    law = jl.presets.load(name)
-    D = lengths * law.closure_range
-    law = replace(law, mating_length=D, plane=0.0, resolution=FINE, **more)
-    steps = np.concatenate([np.geomspace(1e-3, 1.0, 60), np.linspace(1.05, way, 60)]) * D
-    return law, shear_along(law.joint(), steps, stress)
-
-
-def shear_along(joint, places, stress):
-    """Shear (k,), ratio F2/F1 (k,) and closure (k,) of a joint that is sheared to these places."""
-    rows = []
-    for place in places:
-        record = jl.direct_shear(joint, [place - joint.delta[1]], normal=stress, steps=1)
-        rows.append((place, record.F2[-1] / record.F1[-1], joint.delta[0]))
-    return np.array(rows).T
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("stress", [0.1e6, 1e6, 3e6, 30e6])
 @pytest.mark.parametrize("name", PRESETS)
 def test_friction_is_that_of_the_asperities_and_the_dilation(name, stress):
-    """At and after the peak; springs still fill at it, the more the higher the stress."""
+    """At and after the peak; springs still fill at it, the more the higher the stress. Sheared back
+    to its origin the joint is mated."""
     for lengths in (12.0, 100.0):
-        law, (way, ratio, closure) = sheared(name, lengths, stress, 10.0)
-        friction, D = np.degrees(np.arctan(ratio)), law.mating_length
+        law, rows = jl.presets.load(name), []
+        D = lengths * law.closure_range
+        joint = replace(law, mating_length=D, plane=0.0, resolution=FINE).joint()
+        way = D * np.concatenate([np.geomspace(1e-3, 1.0, 60), np.linspace(1.05, 10.0, 60)])
+        for place in (*way, *way[::-1], 0.0):
+            record = jl.direct_shear(joint, [place - joint.delta[1]], normal=stress, steps=1)
+            rows.append([record.friction_angle[-1], joint.delta[0]])
+        friction, closure = np.array(rows).T
+        lift = closure[0] - closure
+        assert abs(lift[-1]) < (0.04 if stress > 3e6 else 0.01) * lift.max()
+        friction, closure = friction[: len(way)], closure[: len(way)]
         dilation = np.degrees(np.arctan(-np.gradient(closure, way)))
         away = np.abs(friction - np.degrees(np.arctan(law.asperity.mu)) - dilation)
         top = int(np.argmax(friction))
-        later = way > way[top] + D
         assert away[top:-1].max() < (4.2 if stress > 3e6 else 3.3)
         if stress <= 3e6:
-            assert away[later][:-1].max() < 1.2
+            assert away[way > way[top] + D][:-1].max() < 1.2
 
 
 @pytest.mark.slow
@@ -66,21 +60,6 @@ def test_far_from_mate_only_the_friction_of_the_asperities_is_left(name, stress,
         jl.direct_shear(joint, [way], normal=stress, azimuth=turn, steps=40)
         angle = np.degrees(np.arctan2(joint.F[1:] @ e, joint.F[0]))
         assert angle == pytest.approx(np.degrees(np.arctan(law.asperity.mu)), abs=0.3)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("stress", "left"), [(0.1e6, 0.01), (1e6, 0.01), (3e6, 0.01), (30e6, 0.04)]
-)
-@pytest.mark.parametrize("name", PRESETS)
-def test_back_at_its_origin_the_joint_is_mated(name, stress, left):
-    law = jl.presets.load(name)
-    law = replace(law, mating_length=12 * law.closure_range, plane=0.0, resolution=FINE)
-    joint, D = law.joint(), law.mating_length
-    there = np.concatenate([[0.0], np.geomspace(1e-2, 10.0, 60)]) * D
-    _, _, closure = shear_along(joint, [*there, *there[::-1]], stress)
-    lift = closure[0] - closure
-    assert abs(lift[-1]) < (0.04 if stress > 3e6 else 0.01) * lift.max()
 
 
 @pytest.mark.parametrize("interference", [1e-12, 0.05, 0.3])
@@ -114,23 +93,11 @@ def test_closure_has_a_closed_form(formation, eta, interference):
     assert joint.stored_energy >= 0.0
 
 
-def test_both_sides_of_an_asperity_are_flattened_where_slopes_fade():
-    """Else slopes that wear would press springs that only the other side has lost."""
-    whole = law(mating_length=2.0, damage={"yield_interference": 0.1}).tables
-    d, k = np.array([[0.5], [0.8], [0.3]]), whole.asperities
-    state = kernel.step(whole, np.zeros((whole.rows, 1)), d, False)[0]
-    depth = kernel.parts(whole, state).depth[:, 0]
-    turned = k.n * [[1.0], [-1.0], [-1.0]]
-    opposite = np.argmax(turned.T @ k.n, axis=1)
-    assert np.ptp(depth) > 0.1
-    np.testing.assert_array_equal(depth, depth[opposite])
-
-
 def test_a_joint_closed_beyond_its_highest_asperity_gives_a_warning():
     """99.99 % of the heights of this preset end at a closure of 17.1 mm."""
     stiff = jl.presets.load("jing-replica")
-    asperity = dataclasses.replace(stiff.asperity, yield_interference=0.1 * stiff.closure_range)
-    weak = dataclasses.replace(stiff, asperity=asperity)
+    asperity = replace(stiff.asperity, yield_interference=0.1 * stiff.closure_range)
+    weak = replace(stiff, asperity=asperity)
     with pytest.warns(UserWarning, match="closure = 0.0176 m: 99.99 % .* law ends"):
         weak.joint(30e6)
     with warnings.catch_warnings():
@@ -139,21 +106,16 @@ def test_a_joint_closed_beyond_its_highest_asperity_gives_a_warning():
         stiff.joint(30e6)
 
 
-def test_shear_without_friction_wears_no_slopes():
-    joint = law(mu=0.0, mating_length=3.0, slope_wear=1e-3, plane=0.0).joint(0.3)
-    joint.update([0.0, 0.5])
-    joint.update([0.0, 0.5])
-    assert joint.F[1] > 0.0  # it climbs
-    assert joint.slopes == 1.0
-
-
-def test_closing_and_opening_wear_no_slopes():
+@pytest.mark.parametrize(
+    ("mu", "path"),
+    [(0.0, 2 * [[0.0, 0.5]]), (0.4, 20 * [[0.6, 0.0], [0.6, 0.0], [-0.6, 0.0], [-0.6, 0.0]])],
+)
+def test_neither_shear_without_friction_nor_closing_wears_slopes(mu, path):
     """Facets rub where a joint closes; real joints keep their slopes without shear."""
-    one = law(mu=0.4, mating_length=3.0, slope_wear=1e-3, plane=0.0)
-    joint = one.joint()
-    for way in 20 * (0.1, 0.1, -0.1, -0.1):
-        joint.update([6.0 * way, 0.0])
-    assert joint.dissipated_energy > 1e-3  # friction was lost
+    joint = law(mu=mu, mating_length=3.0, slope_wear=1e-3, plane=0.0).joint(0.3)
+    for d in path:
+        joint.update(d)
+    assert max(joint.F[1], joint.dissipated_energy) > 1e-3  # it climbs, or friction was lost
     assert joint.slopes == 1.0
 
 
@@ -172,3 +134,118 @@ def test_slopes_wear_by_the_work_of_shear():
     expected = 0.6 + joint.slopes * climbed * one.tables.asperities.m[1]
     assert joint.slopes < 0.9
     np.testing.assert_allclose(y, expected, rtol=1e-12)
+
+
+PATHS, CYCLES = 34, 10  # of each of six kinds of law; docs/measure/gains.py searches on 60
+SEEDS = [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, PATHS))]
+
+
+def random_joint(rng, fades, wears, yields=True):
+    """Any law of few facets, and the state (rows, 1) of a new joint; slopes that wear fade, too,
+    and where slopes fade one of three joints has never been mated."""
+    a = float(rng.choice([1.0, rng.uniform(1.0, 1.6), rng.uniform(1.6, 5.0), 10.0]))
+    b, mu = rng.uniform(-1.0, 2.0), rng.choice([0.0, rng.uniform(0.0, 1.2), rng.uniform(1.2, 4.0)])
+    formation = [None, "population", "individual"][rng.integers(3)]
+    # the printed heights are convex as a population from eta = 0.287
+    eta = rng.uniform(0.3, 1.0) if formation == "population" else rng.choice([0.0, 0.5, 1.0])
+    damage = {"yield_interference": 10.0 ** rng.uniform(-2.5, 0.5)} if yields else {}
+    more = {"mating_length": 10.0 ** rng.uniform(-1.0, 1.0)} if fades or wears else {}
+    if wears:
+        more |= {"slope_wear": 10.0 ** rng.uniform(-2.0, 1.0), "slope_residual": 0.5 * rng.random()}
+    one = law(
+        a=a, b=b, c=rng.uniform(-1.0, 1.0) * (1 / 3 - b / 6), lam=rng.uniform(0.3, 2.0),
+        eta=float(eta), mu=float(mu), damage=damage, formation=formation,
+        resolution=jl.Resolution(int(rng.integers(1, 4)), int(rng.integers(3, 5)), 3),
+        plane=[None, None, 0.7][rng.integers(3)], **more,
+    )  # fmt: skip
+    state = np.zeros((one.tables.rows, 1))
+    if one.tables.fades and rng.random() < 1 / 3:
+        state[: one.dim, 0] = one.unmated_start
+    return one, state
+
+
+def stored(k, states):
+    """Stored energies (n,) in J/m2."""
+    return kernel.measures(k, states).stored
+
+
+def scale(k, states):
+    """Largest energy (J/m2) in the springs of a joint on its way, had none yielded: what is stored
+    is a small difference of such energies, and has their rounding."""
+    now, facets = kernel.parts(k, states), k.asperities
+    y = effective_closure(facets, now.delta, now.slopes)
+    return max(np.max((facets.area * facets.c1) @ facets.curve.energy(y)), stored(k, states).max())
+
+
+def gains(k, states, d):
+    """Energy (n,) that steps d (n, dim) between states (rows, n + 1) make, as a share of `scale`,
+    and what of it is rounding: of the energies of virgin curves that are tabulated, and of sums."""
+    most, rounding = scale(k, states), 1e-9 if len(k.asperities.curve.S) > 1 else 1e-11
+    begin, held = begun(k, states[:, :-1]), stored(k, states)
+    lowered = stored(k, begin) - held[:-1]  # by slopes that wear: no work is done
+    work = step_work(k, begin, d.T, np.full(len(d), 1e-3 * rounding * most))
+    made = held[1:] - held[:-1] - lowered - work
+    return np.maximum(np.maximum(made, made + lowered), lowered) / most, rounding
+
+
+@pytest.mark.parametrize("yields", [False, True])
+@pytest.mark.parametrize(("fades", "wears"), [(False, False), (True, False), (True, True)])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_no_step_of_a_random_path_makes_energy(seed, fades, wears, yields):
+    """Steps of a hundredth of the closure range to ten mating lengths, apart and shut again."""
+    rng = np.random.default_rng(seed)
+    one, state = random_joint(rng, fades, wears, yields)
+    k, corners = one.tables, random_corners(rng, 1)[0][:, : one.dim]
+    corners[:, 1:] *= 10.0 ** rng.uniform(-0.5, 1.5)
+    legs = np.diff(corners, axis=0, prepend=0.0)
+    d = np.concatenate([leg * rng.dirichlet(np.full(3, 0.5))[:, None] for leg in legs])
+    states = walk(k, state, d)
+    made, rounding = gains(k, states, d)
+    assert made.max() <= rounding
+    assert np.diff(kernel.parts(k, states).dissipated).min() >= -1e-12 * scale(k, states)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.05, 0.3])
+def test_the_ledger_tends_to_the_loss_and_is_nothing_without_friction(mu):
+    """Legs of 1, 10 and 100 steps: at most so many times the loss of 100 steps, and no less."""
+    rough = replace(jl.presets.load("westerly-rough"), plane=0.0)
+    one, lost = replace(rough, asperity=replace(rough.asperity, mu=mu)), []
+    legs = one.closure_range * np.array([[0.5, 0.5], [0.0, -1.0], [0.3, 0.5]])
+    for count in (1, 10, 100):
+        joint = one.joint()
+        for d in np.repeat(legs / count, count, axis=0):
+            joint.update(d, tangent=False)
+        lost.append(joint.dissipated_energy)
+    assert (lost[2] > 0.0) == (mu > 0.0)
+    assert lost[2] <= lost[1] <= 1.03 * lost[2]
+    assert lost[1] <= lost[0] <= 1.3 * lost[2]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(CYCLES))
+def test_no_cycle_that_is_searched_for_returns_work(seed):
+    """An adversary: of many triangles from one state that with the least loss, and its children."""
+    rng = np.random.default_rng(seed)
+    one, state = random_joint(rng, bool(seed % 2), bool(seed // 2 % 2))
+    first = random_corners(rng, 1, legs=3)[0][:, : one.dim]
+    first[-1, 0] = rng.uniform(0.2, 0.8)  # in touch
+    d, k, n = np.diff(first, axis=0, prepend=0.0), one.tables, 60
+    begin = np.tile(walk(k, state, d)[:, -1:], (1, n))
+    legs, size = rng.normal(size=(n, 2, one.dim)) * 10.0 ** rng.uniform(-2, 0, (n, 1, 1)), 1.0
+    best, least = legs[0], np.inf
+    for _ in range(6):
+        states, work = begin, 0.0
+        squares = np.sum(legs**2, axis=(1, 2))  # elastic energies go with them
+        for leg in (legs[:, 0], legs[:, 1], -legs.sum(axis=1)):
+            work = work + step_work(k, begun(k, states), leg.T, 1e-4 * squares)
+            states = kernel.step(k, states, leg.T, False)[0]
+        lost = (work - stored(k, states) + stored(k, begin)) / squares
+        if lost.min() < least:
+            best, least = legs[lost.argmin()], lost.min()
+        size *= 0.6
+        legs = best * (1.0 + size * rng.normal(size=legs.shape))
+    cycle = np.vstack([best, -best.sum(axis=0)])
+    d = np.vstack([d, cycle, cycle, cycle])
+    made, rounding = gains(k, walk(k, state, d), d)
+    assert max(made) <= rounding
+    assert sum(made[3:]) <= rounding

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from paper_laws import directions, shapes
+from builders import directions, shapes
 from scipy.integrate import quad
 
 import jointlaw as jl

@@ -9,8 +9,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from builders import law
-from paper_laws import preset
+from builders import law, preset
 from scipy.optimize import brentq
 
 import jointlaw as jl
@@ -179,13 +178,6 @@ def yield_angle(stress, azimuth):
     return record.friction_angle[all_slide(record)]
 
 
-def total_angle(shear, closure, azimuth=0.0):
-    """Friction angle (degrees) of the replica at a shear and a closure (m), total form."""
-    return math.degrees(
-        math.atan(total(preset("jing-replica"), shear, closure, azimuth=azimuth)[0])
-    )
-
-
 def test_friction_angle_depends_on_direction():
     """Fig. 18: friction angle of the replica depends on direction
     Holds: when all in touch slide, at 0, 45, 90° it is 26.8°, 28.7°, 30.6° in the total form,
@@ -193,8 +185,9 @@ def test_friction_angle_depends_on_direction():
     """
     turns = np.radians([0, 45, 90])
     all_slide_at = math.tan(math.pi / 6 + math.atan(0.47 * 0.33))  # shear over closure
-    printed = [total_angle(1e-4 * all_slide_at, 1e-4, azimuth) for azimuth in turns]
-    assert printed == pytest.approx([26.8, 28.7, 30.6], abs=0.05)
+    replica, shear = preset("jing-replica"), 1e-4 * all_slide_at
+    printed = [total(replica, shear, closure=1e-4, azimuth=azimuth)[0] for azimuth in turns]
+    assert np.degrees(np.arctan(printed)) == pytest.approx([26.8, 28.7, 30.6], abs=0.05)
     # the first row at which all slide is found to a step, 0.015 closures: about 0.3 deg
     assert [yield_angle(1e6, x) for x in turns] == pytest.approx([27.6, 28.3, 29.1], abs=0.3)
 
@@ -222,7 +215,8 @@ def test_friction_angle_against_normal_stress():
     limit = math.degrees(math.atan(0.47)) + 30.0
     assert limit == pytest.approx(55.2, abs=0.05)
     opening = 1e-3 * math.tan(0.98 * math.pi / 6)
-    assert total_angle(1e-3, -opening) == pytest.approx(limit, abs=0.6)
+    (printed,) = total(preset("jing-replica"), 1e-3, closure=-opening)
+    assert math.degrees(math.atan(printed)) == pytest.approx(limit, abs=0.6)
 
 
 def test_averages_do_not_determine_the_behavior():

@@ -46,7 +46,8 @@ def export_fem(
     }
     start = [*law.joint(normal_stress=seating).snapshot().values[0].tolist(), 1.0]
     names = [f'"State{i}"' for i in range(1, len(start))] + ['"Begun"']
-    normal = min(NORMAL, 0.5 * float(law.normal_stress(law.closure_range)))
+    reached = law.closure_range  # type: ignore[attr-defined]  # each class of laws has it
+    normal = min(NORMAL, 0.5 * float(law.normal_stress(reached)))
     shear = 5.0 * float(law.closure(normal))
     marks = {  # what stands for the @WORDS@ of the files
         "DIM": str(law.dim),

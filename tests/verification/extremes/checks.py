@@ -1,9 +1,10 @@
-"""What must hold after every step of every law: `faults` names what does not."""
+"""What must hold after every step of every law: `run` names what does not."""
 
 import numpy as np
 
 from jointlaw.kernels import asperities
 from jointlaw.kernels import reference as kernel
+from jointlaw.kernels.asperities import effective_closure
 from jointlaw.kernels.mating import offset, planes
 
 ROUNDING = 1e-12  # of the facet's normal force: a cell's G is a difference of numbers of that size
@@ -18,7 +19,7 @@ def sliders_within_friction(batch):
     """
     k = batch.law.tables.asperities
     now = kernel.parts(batch.law.tables, batch.snapshot().values.T)
-    y = asperities.effective_closure(k, now.delta, now.slopes)
+    y = effective_closure(k, now.delta, now.slopes)
     virgin = asperities.cells(k, y)
     cells = asperities.flattened(virgin, asperities.cells(k, now.depth) if k.yields else None)
     strength = asperities.strength(k, planes(k, now.delta[1:], now.slopes).gamma)[:, 0]
@@ -32,50 +33,6 @@ def sliders_within_friction(batch):
     touches = y + ROUNDING * reach > (now.depth if k.yields else 0)
     lifted = np.where(~touches[:, None] & (size > 0), np.inf, 0.0)
     return float(np.max(np.maximum(excess / whole, lifted), initial=0.0))
-
-
-def elastic_force(batch):
-    """Forces (n,) in Pa that facets would bear, friction included, if they had not yielded."""
-    k = batch.law.tables.asperities
-    now = kernel.parts(batch.law.tables, batch.snapshot().values.T)
-    force, _ = k.curve.force(asperities.effective_closure(k, now.delta, now.slopes))
-    return (1.0 + k.mu) * np.sum(k.area[:, None] * force, axis=0)
-
-
-class Watch:
-    """A batch with what it showed before the step."""
-
-    def __init__(self, law, n):
-        self.batch = law.joints(n)
-        self.lost, self.peak, self.forces = np.zeros((3, n))
-
-    def step(self, d):
-        """Advance by d (n, 3); the list of what is wrong afterwards."""
-        before = self.batch.snapshot().values
-        F, C = self.batch.update(d)
-        lost, stored = self.batch.dissipated_energy, self.batch.stored_energy
-        self.peak = np.maximum(self.peak, stored)
-        self.forces = np.maximum(self.forces, np.abs(F).max(axis=1))
-        if self.batch.law.tables.yields:  # a small difference of large forces
-            self.forces = np.maximum(self.forces, elastic_force(self.batch))
-        excess, gap = sliders_within_friction(self.batch), self._other_kernel(before, d, F)
-        gained, self.lost = lost - self.lost, lost
-        holds = {
-            "F is not finite": np.isfinite(F).all(),
-            "C is not finite": np.isfinite(C).all(),
-            f"dissipation {gained.min():.1e} of {self.peak.max():.1e}": (gained >= 0.0).all(),
-            f"stored energy {stored.min():.1e}": (np.isfinite(stored) & (stored >= 0.0)).all(),
-            f"a slider exceeds friction by {excess:.1e}": excess <= ROUNDING,
-            "the state is not finite": np.isfinite(self.batch.snapshot().values).all(),
-            f"the two kernels differ by {gap:.1e}": gap <= KERNELS,
-        }
-        return [fault for fault, held in holds.items() if not held]
-
-    def _other_kernel(self, before, d, F):
-        """How far the reference kernel is from F, as a share of the largest traction so far."""
-        _, reference, _ = kernel.step(self.batch.law.tables, before.T, d.T, False)
-        peak = np.maximum(self.forces, NOTHING)
-        return float(np.max(np.abs(reference.T - F) / peak[:, None], initial=0.0))
 
 
 def path(rng, n, steps, size):
@@ -96,9 +53,34 @@ def path(rng, n, steps, size):
 
 def run(law, size, seed, n=8, steps=32):
     """All faults along random paths of n joints, each with its step."""
-    watch, found = Watch(law, n), []
+    joints, found = law.joints(n), []
+    lost, peak, forces = np.zeros((3, n))
     paths = path(np.random.default_rng(seed), n, steps, size)
     for k, (d, home) in enumerate(zip(*paths, strict=True)):
-        d[home] = -watch.batch.delta[home] * [1.0, 0.0, 0.0]
-        found += [f"step {k}: {fault}" for fault in watch.step(d)]
+        d[home] = -joints.delta[home] * [1.0, 0.0, 0.0]
+        before = joints.snapshot().values
+        F, C = joints.update(d)
+        gained, stored = joints.dissipated_energy - lost, joints.stored_energy
+        lost, peak = lost + gained, np.maximum(peak, stored)
+        forces = np.maximum(forces, np.abs(F).max(axis=1))
+        if law.tables.yields:  # a small difference of those that would be borne by elastic facets
+            facets, now = (
+                law.tables.asperities,
+                kernel.parts(law.tables, joints.snapshot().values.T),
+            )
+            force, _ = facets.curve.force(effective_closure(facets, now.delta, now.slopes))
+            forces = np.maximum(forces, (1.0 + facets.mu) * (facets.area @ force))
+        excess = sliders_within_friction(joints)
+        _, slow, _ = kernel.step(law.tables, before.T, d.T, False)
+        gap = np.max(np.abs(slow.T - F) / np.maximum(forces, NOTHING)[:, None])
+        holds = {
+            "F is not finite": np.isfinite(F).all(),
+            "C is not finite": np.isfinite(C).all(),
+            f"dissipation {gained.min():.1e} of {peak.max():.1e}": (gained >= 0.0).all(),
+            f"stored energy {stored.min():.1e}": (np.isfinite(stored) & (stored >= 0.0)).all(),
+            f"a slider exceeds friction by {excess:.1e}": excess <= ROUNDING,
+            "the state is not finite": np.isfinite(joints.snapshot().values).all(),
+            f"the two kernels differ by {gap:.1e}": gap <= KERNELS,
+        }
+        found += [f"step {k}: {fault}" for fault, held in holds.items() if not held]
     return found

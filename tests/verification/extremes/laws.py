@@ -1,5 +1,11 @@
-"""Laws at the ends of what the parameters allow: one extreme at a time, in pairs, at random."""
+"""Laws at the ends of what the parameters allow: one extreme at a time, in pairs, at random.
 
+The tests record their figures as properties of their report (`pytest --junitxml`), from which
+docs/measure/recorded.py makes tables; docs/validation.md has their figures. With JOINTLAW_FULL=1
+in the environment they run at the full length of these tables.
+"""
+
+import os
 from itertools import combinations
 
 import numpy as np
@@ -7,6 +13,7 @@ import numpy as np
 import jointlaw as jl
 from jointlaw.kernels.engine import NativeEngine, engine
 
+FULL = os.environ.get("JOINTLAW_FULL") == "1"
 SCALE = 2e-6  # m: closure range and asperity height of the ordinary law
 ORDINARY = {
     "a": 3.0, "b": 0.5, "c": 0.1, "K": 2e8, "lam": 1.2, "eta": 0.5, "mu": 0.4, "density": 1e10,

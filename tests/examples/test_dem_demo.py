@@ -332,6 +332,9 @@ def test_resume_is_bit_identical(tmp_path, damage):
         np.testing.assert_equal(*(attrgetter(name)(sim) for sim in (again, whole)))
     batch = again.joints.held[again.joints.names.index("rock/rough")].batch
     assert bool(damage) == (batch.plastic_work.max() > 0.0)
+    # also the one that goes on tells how far blocks have moved since step 0
+    np.testing.assert_array_equal(Record(again).moved, Record(whole).moved)
+    assert Record(again).moved.max() > 1e-3
     assert (tmp_path / "notes.txt").read_text() == "mine"
 
 

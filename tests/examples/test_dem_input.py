@@ -101,6 +101,7 @@ WRONG = [
     ),
     ('name = "top"', 'name = "base"', "two blocks have the same name"),
     ('held = ["turn"]', "fixed = true", "no block can move"),
+    ('held = ["turn"]', "fixed = true\nspin = 1.0", "a fixed block has no velocity or spin"),
     ('held = ["turn"]', 'held = ["x", "x"]', "held = .* some of x, y, turn, each once"),
     ('held = ["turn"]', 'held = ["x"]', "a motion of a block is prescribed twice"),
     ('slip = [["top", "base"]]', 'slip = [["top", "top"]]', "slip = .* must be 2 of base, top"),
@@ -144,6 +145,7 @@ WRONG_ROCKS = [
         'persistence = 0.7\nlaw = "j"',
         "law = 'j' is unknown",
     ),
+    ('name = "slope"', 'name = "slope"\nleast_width = 1e3', "would be slivers: give a least_width"),
     ("[watch]", "[watch]\njoints = [[9.0, -9.0]]", r"joints = \[9.0, -9.0\]: must lie at a joint"),
 ]
 
@@ -302,6 +304,15 @@ def test_a_rock_alone_keeps_its_joints():
     scene = parse(text + wall + "".join(joint.format(*pair) for pair in pairs))
     for seed, kept in ((None, {(1, 2), (0, 1)}), (2, set())):
         assert {tuple(sorted(pair)) for pair in alone(scene, "rough", seed).pairs} == kept
+
+
+@pytest.mark.parametrize("first", range(4))
+def test_a_rock_alone_keeps_what_is_taken_from_it(first):
+    """Wherever the corners begin, also where they reach beyond the rock."""
+    corners = np.roll([[9.0, -9.0], [13.0, -9.0], [13.0, 0.0], [9.0, 0.0]], first, axis=0)
+    dig = "[[excavate]]\nover = 0.1\ncorners = "
+    given = parse((SCENES / "tunnel.toml").read_text() + f"{dig}{corners.tolist()}\n")
+    assert len(given.stages) == len(alone(given, "rock").stages) == 3
 
 
 def test_a_missing_package_is_told_in_one_line(tmp_path):

@@ -317,6 +317,7 @@ def test_strength_reduction_with_and_without_loose_blocks(tmp_path, capsys):
         np.tan(np.radians(35)) / np.tan(np.radians(25)), rel=0.01
     )
     assert [block["block"] for block in row["first"]] == ["block"]
+    assert (out / row["picture"]).exists()
     said = capsys.readouterr().out
     assert said.index("cannot be held") < said.index("factor of safety without")
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from running import until
-from scene_text import coulomb, dipping, on_base
+from scene_text import ROCK, block, coulomb, dipping, on_base
 from scipy.optimize import bisect, linprog
 from scipy.sparse import diags, hstack
 
@@ -191,6 +191,21 @@ def test_a_roof_wedge_drawn_with_its_apex(half_angle, phi, push):
         push * np.sin(angle) + half * np.cos(angle),
     )
     assert factor_of_safety(scene) == pytest.approx(mu * normal / shear, rel=FOUND)
+
+
+@pytest.mark.parametrize("energy", ["", "energy_I = 200.0, energy_II = 200.0, "])
+@pytest.mark.parametrize("times", [1.05, 2.0, 4.0, 10.0])
+def test_a_block_hangs_from_a_bond(times, energy):
+    """At W/kn, with its bond whole, though the asperities beside it are a hundred times softer."""
+    weight = 2600 * 9.81
+    strength = f"tension = {times * weight}, cohesion = {times * weight}, {energy}"
+    law = f"{ROCK}bond = {{ {strength}normal_stiffness = 1e9, shear_stiffness = 5e8 }}\n"
+    roof = block("roof", box=[4.0, 1.0], at=[0.0, 1.0], fixed=True)
+    text = f"[laws.j]\n{law}{roof}{block('b', box=[1.0, 1.0])}[run]\nend = 1.0\n"
+    sim = Simulation(parse(text))
+    assert not sim.loose.any()
+    assert not sim.joints.damage.any()
+    assert sim.blocks.motion[1, 1] == pytest.approx(-weight / 1e9, rel=1e-6)
 
 
 @pytest.mark.slow

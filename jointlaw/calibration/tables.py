@@ -8,7 +8,7 @@
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import permutations
 from pathlib import Path
 from typing import NamedTuple
@@ -34,9 +34,12 @@ _TITLE = re.compile(
     rf"(.*?)(?:\s*[\[(]\s*([^\])]*?)\s*[\])]|(?:\s*/\s*|\s+in\s+|,\s*|_|\s+)({_UNIT}))\s*"
 )
 _LETTERS = re.compile(r"[^\W\d_]")
-_SENTINEL = re.compile(r"-?9{3,}(\.0*|\.9+|\.25)?")  # what loggers write where they read nothing
+# what loggers write where they read nothing, or more than they can
+_SENTINEL = re.compile(r"-99\.0|-?(9{3,}(\.0|\.9+|\.25)|(3276[78]|65535)\.0)")
 _WORD = re.compile(r"(?i)(?!nan|none|null).*[^\W\d_]{3}.*")
-JUMP, STILL = 0.2, 0.02  # of the range: what a point jumps by, while the other column stands still
+APART = 0.1  # of the range of all others: how far from them such a number stands
+JUMP, STILL = 0.2, 0.1  # of the range; of the jump, what the other column is off by
+RUN = 5  # equal values that may jump together, a quarter of the rows at most
 Rows = dict[int, list[str]]
 
 
@@ -121,36 +124,52 @@ class Table(NamedTuple):
     ) -> tuple[list[Array], list[str]]:
         """The rows in which all these columns hold a number, and what was left out of them.
 
-        Odd rows are those of `odd`, values such as -999, and points where one column jumps and
-        returns while another stands still. outliers: what to do with them, "skip" or "keep".
-        Raises ValueError naming them without it, and for fewer than three rows.
+        Odd rows are those of `odd_rows`, and points where one column jumps and returns while
+        another stands still. Raises ValueError as that, and for fewer than three rows.
         """
         whole = np.isfinite([c.values for c in columns]).all(axis=0)
         lines, values = np.array(self.lines)[whole], [c.values[whole] for c in columns]
-        odd = self.odd | {n: why for c in columns for n, why in c.odd.items()}
-        seen = ~np.isin(lines, list(odd))
+        seen = ~np.isin(lines, [*self.odd, *(n for c in columns for n in c.odd)])
+        jumps = dict[int, str]()
         for (_, x), (c, y) in permutations(zip(columns, values, strict=True), 2):
-            jumps = lines[seen][_jumps(x[seen], y[seen])].tolist()
-            odd |= dict.fromkeys(jumps, f"{c.title} jumps and returns")
-        odd = {n: why for n, why in odd.items() if n in lines}
-        told = "; ".join(f"line {n}: {why}" for n, why in sorted(odd.items())[:3])
+            there = lines[seen][_jumps(x[seen], y[seen])].tolist()
+            jumps |= dict.fromkeys(there, f"{c.title} jumps and returns")
+        skipped, told = self.odd_rows(columns, outliers, lines.tolist(), jumps)
+        values = [x[~np.isin(lines, skipped)] for x in values]
+        empty, notes = int(np.sum(~whole)), list[str]()
+        if empty:
+            notes.append(f"{empty} of {whole.size} rows without all numbers are not used")
+        notes += told
+        if values[0].size < 3:
+            raise ValueError(
+                f"{self.name}: has {values[0].size} rows with both numbers; give 3 or more"
+            )
+        return values, notes
+
+    def odd_rows(
+        self,
+        columns: Sequence[Column],
+        outliers: str | None,
+        lines: Iterable[int],
+        more: dict[int, str],
+    ) -> tuple[list[int], list[str]]:
+        """Those of these lines to leave out as no measurement, and a note of them if there are any.
+
+        They are those of `odd`, values such as -999, and `more` with its reasons. outliers: what to
+        do with them, "skip" or "keep". Raises ValueError naming them without it.
+        """
+        odd = self.odd | {n: why for c in columns for n, why in c.odd.items()} | more
+        odd = {n: odd[n] for n in sorted(odd.keys() & set(lines))}
+        told = "; ".join(f"line {n}: {why}" for n, why in [*odd.items()][:3])
         told += f"; and {len(odd) - 3} more" if len(odd) > 3 else ""
         if odd and outliers is None:
             raise ValueError(
                 f"{self.name}: {told}. Are these measurements? Write --outliers skip to leave such "
                 "rows out, or --outliers keep"
             )
-        empty, notes = int(np.sum(~whole)), list[str]()
-        if empty:
-            notes.append(f"{empty} of {whole.size} rows without all numbers are not used")
-        if odd and outliers == "skip":
-            notes.append(f"{len(odd)} rows are left out as outliers ({told})")
-            values = [x[~np.isin(lines, list(odd))] for x in values]
-        if values[0].size < 3:
-            raise ValueError(
-                f"{self.name}: has {values[0].size} rows with both numbers; give 3 or more"
-            )
-        return values, notes
+        if not odd or outliers == "keep":
+            return [], []
+        return [*odd], [f"{len(odd)} rows are left out as outliers ({told})"]
 
 
 def read_tables(path: Path, decimal: str | None = None) -> list[Table]:
@@ -264,31 +283,53 @@ def _column(
 ) -> tuple[Column, dict[int, str]]:
     """A column from its cells by line; and lines that hold a word, such as Max, among numbers."""
     found = {n: marks.value(cell) for n, cell in cells.items()}
-    known = {n: abs(x) for n, x in found.items() if np.isfinite(x)}
+    known = {n: x for n, x in found.items() if np.isfinite(x)}
     texts = {n: cell for n, cell in cells.items() if cell and n not in known}
     wrong = (
         f"line {n} holds {cell!r}, which {AMBIGUOUS if EITHER.fullmatch(cell) else 'is no number'}"
         for n, cell in texts.items()
     )
     words = {n: f"{title} is {cell!r}" for n, cell in texts.items() if _WORD.fullmatch(cell)}
-    sent = [n for n in known if _SENTINEL.fullmatch(cells[n])]
-    usual = max((x for n, x in known.items() if n not in sent), default=0.0)
-    odd = {n: f"{title} is {cells[n]}" for n in sent if known[n] > 5 * usual}
+    sent = {n: x for n, x in known.items() if _SENTINEL.fullmatch(str(x))}
+    others = np.array([x for n, x in known.items() if n not in sent])
+    near = {x for x in set(sent.values()) if others.size and _near(x, others)}
+    odd = {n: f"{title} is {cells[n]}" for n, x in sent.items() if x not in near}
     values = np.array([*found.values()])
     column = Column(title, *_read_title(title, unit), values, next(wrong, ""), odd)
     return column, words if len(texts) < len(known) else {}
 
 
+def _near(x: float, others: Array) -> bool:
+    """Whether a number stands so near the others (n,) that it may be a measurement as they are."""
+    return bool(np.min(np.abs(others - x)) <= APART * _scale(others))
+
+
+def _scale(y: Array) -> float:
+    """Range of values; what hardly changes scatters, and a fifth of its size counts."""
+    return float(max(np.ptp(y), 0.2 * np.max(np.abs(y))))
+
+
 def _jumps(x: Array, y: Array) -> NDArray[np.bool_]:
-    """Points (n,) where y leaves its neighbours, which agree, while x goes on between its own."""
+    """Points (n,) where y leaves its neighbours, which agree, while x goes on between its own.
+
+    Up to `RUN` points of equal y leave them together, as where a logger repeats what it lost.
+    """
     found = np.zeros(x.size, bool)
     if x.size < 5 or not np.ptp(x) or not np.ptp(y):
         return found
-    scale = max(np.ptp(y), 0.2 * np.max(np.abs(y)))  # what hardly changes scatters
-    off_x, off_y = (np.abs(z[1:-1] - (z[2:] + z[:-2]) / 2) for z in (x / np.ptp(x), y / scale))
-    apart = np.abs(y[2:] - y[:-2]) / scale
-    goes_on = np.diff(x)[1:] * np.diff(x)[:-1] >= 0  # and does not turn, as at the end of unloading
-    found[1:-1] = (off_y > JUMP) & (apart < 0.25 * off_y) & (off_x < STILL) & goes_on
+    first = np.flatnonzero(np.diff(y, prepend=np.nan) != 0)  # rows of each run of equal values
+    last = np.append(first[1:], x.size) - 1
+    size, first, last = (last - first + 1)[1:-1], first[1:-1], last[1:-1]
+    before, after = first - 1, last + 1
+    off_y = np.abs(y[first] - (y[after] + y[before]) / 2) / _scale(y)
+    off_x = np.abs(x[first] + x[last] - x[after] - x[before]) / 2 / np.ptp(x)
+    apart = np.abs(y[after] - y[before]) / _scale(y)
+    # and does not turn, as at the end of unloading
+    turns = np.append(0, np.cumsum(np.diff(x)[1:] * np.diff(x)[:-1] < 0))
+    jump = (off_y > JUMP) & (apart < 0.25 * off_y) & (off_x < STILL * off_y)
+    jump &= (size <= min(RUN, x.size / 4)) & (turns[last] == turns[before])
+    for one, end in zip(first[jump], last[jump], strict=True):
+        found[one : end + 1] = True
     return found
 
 

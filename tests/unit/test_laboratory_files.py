@@ -1,6 +1,7 @@
 """Text files of laboratories: read right, or refused with the option that cures it."""
 
 import re
+from itertools import product
 
 import numpy as np
 import pytest
@@ -211,6 +212,87 @@ def test_rows_that_are_no_measurement_are_named_until_an_option_settles_it(kind,
         assert kept.shear.size == skipped.shear.size + 1
     np.testing.assert_allclose(skipped.shear_stress, 2e9 * skipped.shear, atol=1e-6)
     assert told in skipped.notes[0]
+
+
+WAY = np.linspace(0, 2, 41)  # mm
+KILO = np.round(1250 * (1 - np.exp(-WAY / 0.2)) - 5 * (WAY == 0), 1)  # kPa; the first is scatter
+
+
+def kilo(tau, normal=1000.0):
+    return "us [mm],tau [kPa],sn [kPa]\n" + rows(WAY, tau, normal + 0 * WAY)
+
+
+@pytest.mark.parametrize(
+    ("value", "lost"),
+    [
+        *product([-99.0, 0.0], [[20, 21], [20, 21, 22, 23]]),
+        *product([-999.0, -9999.99, 9999.0, 32767.0], [[20, 21], [20, 21, 22, 23], [39, 40], [40]]),
+    ],
+)
+def test_readings_that_a_logger_lost_are_named(value, lost, tmp_path):
+    """Stresses in kPa are as large as what stands for a lost one; -99 is small there."""
+    tau = KILO.copy()
+    tau[lost] = value
+    with pytest.raises(ValueError, match=f"line {lost[0] + 2}: tau .kPa. (is|jumps)"):
+        read(tmp_path, kilo(tau))
+    (test,) = read(tmp_path, kilo(tau), outliers="skip")
+    np.testing.assert_allclose(test.shear_stress, 1e3 * np.delete(KILO, lost))
+
+
+@pytest.mark.parametrize(
+    ("tau", "normal"),
+    [
+        (KILO, np.where(WAY == 1, 999.0, 1000.0)),
+        (np.minimum(KILO, 999.0), 1000.0),
+        (KILO, np.where(abs(WAY - 1) < 0.3, 2000.0, 1000.0)),  # a stage of 11 rows
+    ],
+)
+def test_measurements_that_look_like_lost_readings_are_read(tau, normal, tmp_path):
+    assert read(tmp_path, kilo(tau, normal))[0].shear.size == 41
+
+
+def test_a_joint_closes_while_it_shears_if_the_user_says_so(tmp_path):
+    text = "us [mm],tau [MPa],sn [MPa],dn [mm]\n" + rows(U, TAU, 0 * U + 10, -0.1 * U)
+    with pytest.raises(ValueError, match=r'does close, write --opening-column "dn:1mm"'):
+        read(tmp_path, text)
+    (test,) = read(tmp_path, text, opening="dn:1mm")
+    np.testing.assert_allclose(test.opening, -1e-4 * U)
+
+
+@pytest.mark.parametrize("gauge", ["us", "dn"])
+def test_a_gauge_off_zero_under_shear_needs_the_row_where_shear_began(gauge, tmp_path):
+    """62 % of the shear stress in the first row; with a row of zero stress all is known."""
+    off = {"us": 12.53, "dn": 12.53} if gauge == "us" else {"us": 0.01, "dn": 3.0}
+    begun = np.maximum(TAU, 1.1)
+    text = "us [mm],tau [MPa],sn [MPa],dn [mm]\n"
+    table = rows(U + off["us"], begun, 0 * U + 2, OPENED + off["dn"])
+    told = rf"column '{gauge} \[mm\]' begins at .* 63 % .*: add a first row"
+    with pytest.raises(ValueError, match=told):
+        read(tmp_path, text + table)
+    (test,) = read(tmp_path, f"{text}{off['us'] - 0.01},0,2,{off['dn']}\n{table}")
+    np.testing.assert_allclose(test.shear[1:], 1e-3 * (U + 0.01))
+    np.testing.assert_allclose(test.opening[1:], 1e-3 * OPENED, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("row", "told"),
+    [
+        ("1,1200,1.5,800,10", "line 3: peak shear stress over normal stress = 1200 is outside"),
+        ("1,1.2,10,0.8,1.5", r"line 3: the peak, .* are columns exchanged\?"),
+        ("1,0.8,1.5,1.2,10", r"line 3: the peak, .* are columns exchanged\?"),
+        ("1,1.2,1.5,0.8,1.5", "line 3: the peak, .* must .* come before it"),
+        ("1,1.2,1.5,,", "line 3: 'tau_r .MPa.' is empty or not > 0; give all five numbers"),
+        ("1,1.2,0,0.8,10", "line 3: 'u_p .mm.' is empty or not > 0"),
+        ("1,1.2,1.5,-999,-999", "line 3: u_r .mm. is -999.*--outliers skip"),
+        ("0.000001,0.0000012,1.5,0.0000008,10", "line 3: shear stress = 1.2 Pa is outside"),
+    ],
+)
+def test_rows_that_are_no_test_of_peak_and_residual(row, told, tmp_path):
+    good = "sn [MPa],tau_p [MPa],u_p [mm],tau_r [MPa],u_r [mm]\n2,2.2,1.6,1.7,10\n"
+    with pytest.raises(ValueError, match=rf"lab\.csv: {told}"):
+        read(tmp_path, good + row, read_peaks)
+    if "-999" in row:
+        assert len(read(tmp_path, good + row, read_peaks, outliers="skip")) == 1
 
 
 def test_the_steep_foot_of_two_cycles_is_no_jump(tmp_path):

@@ -100,7 +100,7 @@ def read_closure(
 
     Raises ValueError naming file, column or line, and the option of the command that helps.
     """
-    table, *more = read_tables(Path(path), decimal)
+    table, *more = read_tables(Path(path), [(STRESS, stress), (CLOSURE, closure)], decimal)
     if more:
         raise ValueError(f"{path}: holds {1 + len(more)} tests; give a file with one closure test")
     s, u = table.column(STRESS, stress), table.column(CLOSURE, closure)
@@ -128,7 +128,9 @@ def read_shear(path: str | Path, decimal: str | None = None, **how: Any) -> list
 
     Raises ValueError as `read_closure`.
     """
-    return [_shear_test(table, **how) for table in read_tables(Path(path), decimal)]
+    of_stress = SHEAR_STRESS if how.get("area") is None else SHEAR_FORCE
+    needed = [(SHEAR, how.get("shear")), (of_stress, how.get("stress"))]
+    return [_shear_test(table, **how) for table in read_tables(Path(path), needed, decimal)]
 
 
 def _shear_test(
@@ -147,7 +149,7 @@ def _shear_test(
     asked = {"shear": (SHEAR, shear), "stress": (of_stress, stress)}
     if normal_stress is None:
         asked["normal"] = of_normal, normal
-    if opening is not None or table.has(OPENING):
+    if opening is not None or table.named(OPENING):
         asked["opening"] = OPENING, opening
     columns = {name: table.column(*one) for name, one in asked.items()}
     values, notes = table.rows([*columns.values()], outliers)
@@ -210,12 +212,13 @@ def read_peaks(
     for a row that is no such test or has an empty cell, naming its line.
     """
     found = []
-    for table in read_tables(Path(path), decimal):
+    for table in read_tables(Path(path), [(one, None) for one in PEAKS], decimal):
         columns = [table.column(one) for one in (NORMAL, *PEAKS)]
-        skipped, notes = table.odd_rows(columns, outliers, table.lines, {})
+        skipped, told = table.odd_rows(columns, outliers, table.lines, {})
+        notes = *table.notes, *told
         for line, *row in zip(table.lines, *(column.values for column in columns), strict=True):
             if line not in skipped:
-                found.append(_peak_test(row, columns, f"{table.name}: line {line}", tuple(notes)))
+                found.append(_peak_test(row, columns, f"{table.name}: line {line}", notes))
     return found
 
 

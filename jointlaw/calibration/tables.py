@@ -4,14 +4,16 @@
   "tau in kPa", "tau_kPa". A column without a unit is asked for, never guessed.
 - Lines of text above the names are skipped. A sheet holds several tests if the names come again,
   beside the first ones or below them; a workbook holds those of all its sheets.
-- Separators, decimal marks and marks between thousands: `jointlaw.support.text_numbers`.
+- Separators, decimal marks and marks between thousands: `jointlaw.support.text_numbers`, also for
+  cells of text in a workbook.
 """
 
 import re
 from collections.abc import Iterable, Sequence
 from itertools import permutations
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
+from zipfile import ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +39,10 @@ _LETTERS = re.compile(r"[^\W\d_]")
 # what loggers write where they read nothing, or more than they can
 _SENTINEL = re.compile(r"-99\.0|-?(9{3,}(\.0|\.9+|\.25)|(3276[78]|65535)\.0)")
 _WORD = re.compile(r"(?i)(?!nan|none|null).*[^\W\d_]{3}.*")
+# a formula in a sheet of a workbook, saved by a program that cannot compute
+_NO_VALUE = re.compile(
+    rb'<c(?![^>]*t="str")[^>]*><f[^>]*(?:/>|>[^<]*</f>)\s*(?:<v\s*/>|<v></v>)?\s*</c>'
+)
 APART = 0.1  # of the range of all others: how far from them such a number stands
 JUMP, STILL = 0.2, 0.1  # of the range; of the jump, what the other column is off by
 RUN = 5  # equal values that may jump together, a quarter of the rows at most
@@ -74,27 +80,21 @@ class Asked(NamedTuple):
 
 class Table(NamedTuple):
     """One test of a file: what to call it, its columns, the line (or row) of each of their values,
-    and lines that are no measurement, with the reason.
+    lines that are no measurement, with the reason, and notes on what else is in the file.
     """
 
     name: str
     columns: list[Column]
     lines: list[int]
     odd: dict[int, str]
+    notes: tuple[str, ...] = ()
 
     def column(self, asked: Asked, given: str | None = None) -> Column:
         """The column of a quantity, in SI units. Raises ValueError with the option that helps.
 
         given: name and unit from the command line, "Disp:mm", or None.
         """
-        name, _, unit = (given or "").partition(":")
-        alike = sum(_factor(c.unit, asked.base) is not None for c in self.columns)
-        vague = asked.vague if alike < 2 else ()  # not one of several displacements
-        wanted = (*asked.names, *vague) if given is None else (_plain(name),)
-        matches = (
-            [c for c in self.columns if w in (_plain(c.name), _plain(c.title))] for w in wanted
-        )
-        found = next((match for match in matches if match), [])
+        unit, found = (given or "").partition(":")[2], self.named(asked, given)
         example = f'{asked.option} "NAME:{units.COMMON[asked.base]}"'
         if len(found) != 1:
             many = f"{len(found)} columns of one name: " if found else ""
@@ -115,9 +115,15 @@ class Table(NamedTuple):
             )
         return column._replace(values=column.values * factor)
 
-    def has(self, asked: Asked) -> bool:
-        """Whether a column has one of the names of a quantity."""
-        return any(_plain(name) in asked.names for c in self.columns for name in (c.name, c.title))
+    def named(self, asked: Asked, given: str | None = None) -> list[Column]:
+        """The columns of that name given, or of the first of its names that any column has."""
+        alike = sum(_factor(c.unit, asked.base) is not None for c in self.columns)
+        vague = asked.vague if alike < 2 else ()  # not one of several displacements
+        wanted = (*asked.names, *vague) if given is None else (_plain(given.partition(":")[0]),)
+        matches = (
+            [c for c in self.columns if w in (_plain(c.name), _plain(c.title))] for w in wanted
+        )
+        return next((match for match in matches if match), [])
 
     def rows(
         self, columns: Sequence[Column], outliers: str | None
@@ -136,7 +142,7 @@ class Table(NamedTuple):
             jumps |= dict.fromkeys(there, f"{c.title} jumps and returns")
         skipped, told = self.odd_rows(columns, outliers, lines.tolist(), jumps)
         values = [x[~np.isin(lines, skipped)] for x in values]
-        empty, notes = int(np.sum(~whole)), list[str]()
+        empty, notes = int(np.sum(~whole)), [*self.notes]
         if empty:
             notes.append(f"{empty} of {whole.size} rows without all numbers are not used")
         notes += told
@@ -172,14 +178,18 @@ class Table(NamedTuple):
         return [*odd], [f"{len(odd)} rows are left out as outliers ({told})"]
 
 
-def read_tables(path: Path, decimal: str | None = None) -> list[Table]:
+def read_tables(
+    path: Path, needed: Sequence[tuple[Asked, str | None]], decimal: str | None = None
+) -> list[Table]:
     """The tests of a file, by the rules above.
 
-    decimal: the decimal mark, "comma" or "point"; None finds it, if a number of the file shows it.
-    Raises ValueError naming file, line and remedy.
+    needed: quantities and what is given for them, as `Table.column` takes them: a table with none
+    of them is no test, and left out with a note, if another has one. decimal: the decimal mark,
+    "comma" or "point"; None finds it, if a number of the file shows it. Raises ValueError naming
+    file, line and remedy.
     """
     if path.suffix.lower() in (".xlsx", ".xlsm"):
-        sheets, decimal = _workbook(path), decimal or "point"
+        sheets = _workbook(path, decimal)
     else:
         lines = lines_of(path)
         mark = table_separator(lines)
@@ -197,10 +207,13 @@ def read_tables(path: Path, decimal: str | None = None) -> list[Table]:
             f"{path}: must hold a line of names with units, such as us [mm],tau [MPa], and numbers "
             "in the lines below it"
         )
-    return tables
+    tests = [table for table in tables if any(table.named(*one) for one in needed)] or tables
+    names = {table.name for table in tests}
+    notes = [f"{one.name}: no test, not read" for one in tables if one.name not in names]
+    return [tests[0]._replace(notes=tuple(notes)), *tests[1:]]
 
 
-def _workbook(path: Path) -> dict[str, Rows]:
+def _workbook(path: Path, decimal: str | None) -> dict[str, Rows]:
     """The cells of all sheets as text. Raises ImportError with the remedy without openpyxl."""
     try:
         from openpyxl import load_workbook
@@ -210,16 +223,33 @@ def _workbook(path: Path) -> dict[str, Rows]:
         ) from error
     try:
         book = load_workbook(path, read_only=True, data_only=True)
+        with ZipFile(path) as parts:
+            sheets = [one for one in parts.namelist() if one.startswith("xl/worksheets/")]
+            bare = any(_NO_VALUE.search(parts.read(one)) for one in sheets)
     except Exception as error:  # of many kinds, for a file that is none
         raise ValueError(f"{path}: cannot be read as a spreadsheet ({error})") from None
-    return {
-        sheet.title: {
-            n: ["" if cell is None else str(cell).strip() for cell in row]
-            for n, row in enumerate(sheet.iter_rows(values_only=True), 1)
-            if any(cell is not None for cell in row)
-        }
-        for sheet in book.worksheets
-    }
+    if bare:
+        raise ValueError(
+            f"{path}: holds formulas without their values; open it in a spreadsheet program and "
+            "save it again"
+        )
+    found = dict[str, Rows]()
+    for sheet in book.worksheets:
+        cells = [*enumerate(sheet.iter_rows(values_only=True), 1)]
+        texts = (cell.strip() for _, row in cells for cell in row if isinstance(cell, str))
+        comma = marks_of(texts, decimal).decimal == ","
+        rows = {n: [_text(cell, comma) for cell in row] for n, row in cells}
+        found[sheet.title] = {n: row for n, row in rows.items() if any(row)}
+    return found
+
+
+def _text(cell: Any, comma: bool) -> str:
+    """A cell of a workbook as a text file would have it, with decimal commas or without."""
+    text = "" if cell is None else str(cell).strip()
+    if isinstance(cell, float):
+        text += "0" * bool(EITHER.fullmatch(text))  # 1.201 is no 1201: it shows the decimal mark
+        text = text.replace(".", ",") if comma else text
+    return text
 
 
 def _below(rows: Rows, marks: Marks) -> list[tuple[list[str], list[str], Rows]]:

@@ -117,13 +117,10 @@ SEVERAL = {  # two tests of one file
 def test_several_tests_of_one_file(kind, tmp_path):
     path, text = tmp_path / "lab.csv", SEVERAL[kind]
     if text is None:
-        book = pytest.importorskip("openpyxl").Workbook()
         titles = ["us [mm]", "tau [MPa]", "sn [MPa]", "dn [mm]"]
         table = np.column_stack([U, TAU, 0 * U + 2, OPENED]).tolist()
-        for sheet in (book.active, book.create_sheet("other")):
-            for row in (["Joint 7"], [], titles, *table):
-                sheet.append(row)
-        book.save(path := tmp_path / "lab.xlsx")
+        cells = [["Joint 7"], [], titles, *table]
+        path = workbook(tmp_path / "lab.xlsx", A=cells, other=cells)
     else:
         path.write_text(text)
     tests = read_shear(path)
@@ -146,6 +143,68 @@ def test_a_table_of_peaks_is_a_test_a_row(tmp_path):
     np.testing.assert_allclose(two.shear, [0, 2.365e-3, 10e-3])
     np.testing.assert_allclose(one.shear_stress, [0, 1.28e6, 0.862e6])
     assert (one.normal[0], two.normal[0]) == (1e6, 2e6)
+
+
+def workbook(path, **sheets):
+    """A workbook with these rows of cells."""
+    book = pytest.importorskip("openpyxl").Workbook()
+    book.remove(book.active)
+    for name, cells in sheets.items():
+        sheet = book.create_sheet(name)
+        for row in cells:
+            sheet.append(row)
+    book.save(path)
+    return path
+
+
+TITLES = ["us [mm]", "tau [kPa]", "sn [kPa]"]
+
+
+@pytest.mark.parametrize(
+    ("cell", "decimal", "stress"),
+    [
+        ("1,201", "comma", 1.201e3),
+        ("1,201", "point", 1.201e6),
+        ("1201,5", None, 1201.5e3),
+        ("1,201.5", None, 1201.5e3),
+        (1.201, None, 1.201e3),
+        (1.201, "comma", 1.201e3),
+    ],
+)
+def test_text_in_a_workbook_is_read_as_in_a_text_file(cell, decimal, stress, tmp_path):
+    """Numbers beside it show the decimal mark of no text."""
+    path = workbook(tmp_path / "lab.xlsx", A=[TITLES, [0, 0, 50], [1, 1.125, 50], [2, cell, 50]])
+    (test,) = read_shear(path, decimal=decimal)
+    np.testing.assert_allclose(test.shear_stress, [0, 1125, stress])
+
+
+def test_text_that_may_be_thousands_is_refused_in_a_workbook_too(tmp_path):
+    path = workbook(tmp_path / "lab.xlsx", A=[TITLES, [0, 0, 2], [1, 1.5, 2], [2, "1,201", 2]])
+    with pytest.raises(ValueError, match=r"line 4 holds '1,201', which may .*--decimal comma"):
+        read_shear(path)
+
+
+def test_sheets_that_hold_no_test_are_told_and_skipped(tmp_path):
+    summary = [["Test", "peak [kPa]"], ["A", 875.0]]
+    table = [TITLES, *np.column_stack([U, 1e3 * TAU, 0 * U + 2e3]).tolist()]
+    path = workbook(tmp_path / "lab.xlsx", Summary=summary, A=table, B=table)
+    one, two = read_shear(path)
+    assert one.notes == (f"{path}, sheet Summary: no test, not read",)
+    assert not two.notes
+    with pytest.raises(ValueError, match="sheet Summary: which column is the shear displ"):
+        read_shear(workbook(path, Summary=summary))
+
+
+def test_spreadsheets_without_values_and_of_other_kinds(tmp_path):
+    path = workbook(tmp_path / "lab.xlsx", A=[TITLES, *([k, f"=A{k}*2", 2] for k in range(2, 6))])
+    with pytest.raises(ValueError, match="formulas without their values; open it in"):
+        read_shear(path)
+    for head in (b"\xd0\xcf\x11\xe0", b"PK\x03\x04"):
+        (tmp_path / "lab.xls").write_bytes(head + bytes(600))
+        with pytest.raises(
+            ValueError, match=r"lab.xls: is no text but a spreadsheet; save it as CSV"
+        ):
+            read_shear(tmp_path / "lab.xls")
 
 
 CURVE = {

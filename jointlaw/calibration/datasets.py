@@ -1,11 +1,13 @@
 """Tests on joints in files, those of the package and those of laboratories, with stated rules.
 
 - Shear stress that begins at 2 to 10 % of its largest value is taken as tare, and subtracted; less
-  is scatter. Then, and below 2 %, displacement and opening count from the first row.
+  is scatter. Then, and below 2 %, displacement and opening count from the first row. If it begins
+  higher, shear began before the first row: gauges that are not near zero there are refused.
 - A normal stress that changes by 5 % at most is its mean, else that of each row.
 - What is done to a record, and rows that are not used, are in the `notes` of a curve.
 """
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +67,7 @@ PEAKS = (
 )  # fmt: skip
 STEADY = 0.05  # largest change of a normal stress that counts as constant, as a share of it
 SCATTER, TARE = 0.02, 0.1  # of the largest shear stress: see above
+OFF = {"shear": 0.1, "opening": 0.5}  # of the range of a gauge: how far it begins from zero
 
 
 def names() -> list[str]:
@@ -97,7 +100,7 @@ def read_closure(
 
     Raises ValueError naming file, column or line, and the option of the command that helps.
     """
-    table, *more = read_tables(Path(path), decimal)
+    table, *more = read_tables(Path(path), [(STRESS, stress), (CLOSURE, closure)], decimal)
     if more:
         raise ValueError(f"{path}: holds {1 + len(more)} tests; give a file with one closure test")
     s, u = table.column(STRESS, stress), table.column(CLOSURE, closure)
@@ -116,7 +119,8 @@ def read_shear(path: str | Path, decimal: str | None = None, **how: Any) -> list
     ----------
     path, decimal: as in `read_closure`.
     shear, stress, normal, opening: names of columns with units if the file gives none ("tau:MPa",
-        or "tau:-1MPa" to turn a sign); by default those of the usual names.
+        or "tau:-1MPa" to turn a sign); by default those of the usual names. A joint may close
+        while it shears: a factor, "dn:1mm", says that the sign of the opening is meant.
     normal_stress: Pa, of all tests of the file instead of a column.
     outliers: as in `read_closure`.
     area: m2 that the forces act on, of a file with forces; side: length (m) of that area along
@@ -124,7 +128,9 @@ def read_shear(path: str | Path, decimal: str | None = None, **how: Any) -> list
 
     Raises ValueError as `read_closure`.
     """
-    return [_shear_test(table, **how) for table in read_tables(Path(path), decimal)]
+    of_stress = SHEAR_STRESS if how.get("area") is None else SHEAR_FORCE
+    needed = [(SHEAR, how.get("shear")), (of_stress, how.get("stress"))]
+    return [_shear_test(table, **how) for table in read_tables(Path(path), needed, decimal)]
 
 
 def _shear_test(
@@ -143,7 +149,7 @@ def _shear_test(
     asked = {"shear": (SHEAR, shear), "stress": (of_stress, stress)}
     if normal_stress is None:
         asked["normal"] = of_normal, normal
-    if opening is not None or table.has(OPENING):
+    if opening is not None or table.named(OPENING):
         asked["opening"] = OPENING, opening
     columns = {name: table.column(*one) for name, one in asked.items()}
     values, notes = table.rows([*columns.values()], outliers)
@@ -158,12 +164,21 @@ def _shear_test(
             )
             y = y - y[0]
         x, opened = x - x[0], None if opened is None else opened - opened[0]
+    for name, share in OFF.items():  # else
+        gauge = {"shear": x, "opening": opened}[name]
+        if gauge is not None and abs(gauge[0]) > share * np.ptp(gauge):
+            raise ValueError(
+                f"{table.name}: column {columns[name].title!r} begins at {gauge[0]:.4g} m, with "
+                f"{100 * abs(y[0]) / largest:.2g} % of the largest shear stress, so shear began "
+                "before: add a first row with the readings there and zero shear stress"
+            )
     pressed = found.get("normal", np.full(x.shape, normal_stress))
     if area is not None:
         now = area * (1 - np.abs(x) / (side or np.inf))
         y, pressed = y / now, pressed / (now if normal_stress is None else 1.0)
     work = np.sum(np.diff(x) * (y[1:] + y[:-1]))
-    opens = opened is None or opened[np.argmax(np.abs(x))] >= 0
+    meant = re.search(r":[-+.\d]", opening or "")  # a factor
+    opens = opened is None or meant or opened[np.argmax(np.abs(x))] >= 0
     signs = {
         "normal": (np.mean(pressed) > 0, "has compression negative"),
         "stress": (work > 0, "opposes the displacement"),
@@ -177,6 +192,7 @@ def _shear_test(
         {
             "shear displacement": float(np.ptp(x)),
             "shear stress": float(np.abs(y).max()),
+            "normal stress": mean,
             "peak shear stress over normal stress": float(np.max(np.abs(y) / pressed)),
         },
         f"{table.name}: ",
@@ -186,27 +202,62 @@ def _shear_test(
     return ShearCurve(x, y, steady, opening=opened, name=label, notes=tuple(notes))
 
 
-def read_peaks(path: str | Path, decimal: str | None = None) -> list[ShearCurve]:
+def read_peaks(
+    path: str | Path, decimal: str | None = None, outliers: str | None = None
+) -> list[ShearCurve]:
     """Direct shear tests of which peak and last shear stress are known, one test a row.
 
     Columns: normal stress, peak shear stress, its displacement, last shear stress, its
-    displacement. Raises ValueError as `read_closure`.
+    displacement; all > 0. decimal, outliers: as in `read_closure`. Raises ValueError as that, and
+    for a row that is no such test or has an empty cell, naming its line.
     """
     found = []
-    for table in read_tables(Path(path), decimal):
+    for table in read_tables(Path(path), [(one, None) for one in PEAKS], decimal):
         columns = [table.column(one) for one in (NORMAL, *PEAKS)]
-        for normal, peak, at, last, end in zip(*(column.values for column in columns), strict=True):
-            name = f"{Path(path).name}, {normal / 1e6:.3g} MPa"
-            require_rock({"shear displacement": end, "shear stress": peak}, f"{name}: ")
-            x, y = np.array([0.0, at, end]), np.array([0.0, peak, last])
-            found.append(ShearCurve(x, y, normal, name=name))
+        skipped, told = table.odd_rows(columns, outliers, table.lines, {})
+        notes = *table.notes, *told
+        for line, *row in zip(table.lines, *(column.values for column in columns), strict=True):
+            if line not in skipped:
+                found.append(_peak_test(row, columns, f"{table.name}: line {line}", notes))
     return found
 
 
-def _require_sign(right: Any, column: Column, asked: Asked, what: str, table: Table) -> None:
-    """Refuse a column whose sign is not ours, with the option that turns it."""
-    if not right:
+def _peak_test(
+    row: list[float], columns: list[Column], where: str, notes: tuple[str, ...]
+) -> ShearCurve:
+    """The test of one row, by `read_peaks`."""
+    for value, column in zip(row, columns, strict=True):
+        if not value > 0:
+            raise ValueError(
+                f"{where}: {column.title!r} is empty or not > 0; give all five numbers of a test, "
+                "or remove the row"
+            )
+    normal, peak, at, last, end = row
+    if last > peak or at > end or (at == end and last < peak):
         raise ValueError(
-            f"{table.name}: column {column.title!r} {what}; turn its sign: "
-            f'{asked.option} "{column.name}:-1{column.unit or "UNIT"}"'
+            f"{where}: the peak, {peak:.4g} Pa at {at:.4g} m, must be no less than the last shear "
+            f"stress, {last:.4g} Pa at {end:.4g} m, and come before it; are columns exchanged?"
+        )
+    require_rock(
+        {
+            "shear displacement": end,
+            "shear stress": peak,
+            "normal stress": normal,
+            "peak shear stress over normal stress": peak / normal,
+        },
+        f"{where}: ",
+    )
+    name = f"{Path(where.partition(': ')[0]).name}, {normal / 1e6:.3g} MPa"
+    x, y = np.array([0.0, at, end]), np.array([0.0, peak, last])
+    return ShearCurve(x, y, normal, name=name, notes=notes)
+
+
+def _require_sign(right: Any, column: Column, asked: Asked, what: str, table: Table) -> None:
+    """Refuse a column whose sign is not ours, with the option that turns it or means it."""
+    if not right:
+        turn = f'{asked.option} "{column.name}:-1{column.unit or "UNIT"}"'
+        meant = f"; if the joint does close, write {turn.replace(':-1', ':1')}"
+        raise ValueError(
+            f"{table.name}: column {column.title!r} {what}; turn its sign: {turn}"
+            + meant * (asked is OPENING)
         )

@@ -4,14 +4,16 @@
   "tau in kPa", "tau_kPa". A column without a unit is asked for, never guessed.
 - Lines of text above the names are skipped. A sheet holds several tests if the names come again,
   beside the first ones or below them; a workbook holds those of all its sheets.
-- Separators, decimal marks and marks between thousands: `jointlaw.support.text_numbers`.
+- Separators, decimal marks and marks between thousands: `jointlaw.support.text_numbers`, also for
+  cells of text in a workbook.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import permutations
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
+from zipfile import ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,9 +36,16 @@ _TITLE = re.compile(
     rf"(.*?)(?:\s*[\[(]\s*([^\])]*?)\s*[\])]|(?:\s*/\s*|\s+in\s+|,\s*|_|\s+)({_UNIT}))\s*"
 )
 _LETTERS = re.compile(r"[^\W\d_]")
-_SENTINEL = re.compile(r"-?9{3,}(\.0*|\.9+|\.25)?")  # what loggers write where they read nothing
+# what loggers write where they read nothing, or more than they can
+_SENTINEL = re.compile(r"-99\.0|-?(9{3,}(\.0|\.9+|\.25)|(3276[78]|65535)\.0)")
 _WORD = re.compile(r"(?i)(?!nan|none|null).*[^\W\d_]{3}.*")
-JUMP, STILL = 0.2, 0.02  # of the range: what a point jumps by, while the other column stands still
+# a formula in a sheet of a workbook, saved by a program that cannot compute
+_NO_VALUE = re.compile(
+    rb'<c(?![^>]*t="str")[^>]*><f[^>]*(?:/>|>[^<]*</f>)\s*(?:<v\s*/>|<v></v>)?\s*</c>'
+)
+APART = 0.1  # of the range of all others: how far from them such a number stands
+JUMP, STILL = 0.2, 0.1  # of the range; of the jump, what the other column is off by
+RUN = 5  # equal values that may jump together, a quarter of the rows at most
 Rows = dict[int, list[str]]
 
 
@@ -71,27 +80,21 @@ class Asked(NamedTuple):
 
 class Table(NamedTuple):
     """One test of a file: what to call it, its columns, the line (or row) of each of their values,
-    and lines that are no measurement, with the reason.
+    lines that are no measurement, with the reason, and notes on what else is in the file.
     """
 
     name: str
     columns: list[Column]
     lines: list[int]
     odd: dict[int, str]
+    notes: tuple[str, ...] = ()
 
     def column(self, asked: Asked, given: str | None = None) -> Column:
         """The column of a quantity, in SI units. Raises ValueError with the option that helps.
 
         given: name and unit from the command line, "Disp:mm", or None.
         """
-        name, _, unit = (given or "").partition(":")
-        alike = sum(_factor(c.unit, asked.base) is not None for c in self.columns)
-        vague = asked.vague if alike < 2 else ()  # not one of several displacements
-        wanted = (*asked.names, *vague) if given is None else (_plain(name),)
-        matches = (
-            [c for c in self.columns if w in (_plain(c.name), _plain(c.title))] for w in wanted
-        )
-        found = next((match for match in matches if match), [])
+        unit, found = (given or "").partition(":")[2], self.named(asked, given)
         example = f'{asked.option} "NAME:{units.COMMON[asked.base]}"'
         if len(found) != 1:
             many = f"{len(found)} columns of one name: " if found else ""
@@ -112,55 +115,81 @@ class Table(NamedTuple):
             )
         return column._replace(values=column.values * factor)
 
-    def has(self, asked: Asked) -> bool:
-        """Whether a column has one of the names of a quantity."""
-        return any(_plain(name) in asked.names for c in self.columns for name in (c.name, c.title))
+    def named(self, asked: Asked, given: str | None = None) -> list[Column]:
+        """The columns of that name given, or of the first of its names that any column has."""
+        alike = sum(_factor(c.unit, asked.base) is not None for c in self.columns)
+        vague = asked.vague if alike < 2 else ()  # not one of several displacements
+        wanted = (*asked.names, *vague) if given is None else (_plain(given.partition(":")[0]),)
+        matches = (
+            [c for c in self.columns if w in (_plain(c.name), _plain(c.title))] for w in wanted
+        )
+        return next((match for match in matches if match), [])
 
     def rows(
         self, columns: Sequence[Column], outliers: str | None
     ) -> tuple[list[Array], list[str]]:
         """The rows in which all these columns hold a number, and what was left out of them.
 
-        Odd rows are those of `odd`, values such as -999, and points where one column jumps and
-        returns while another stands still. outliers: what to do with them, "skip" or "keep".
-        Raises ValueError naming them without it, and for fewer than three rows.
+        Odd rows are those of `odd_rows`, and points where one column jumps and returns while
+        another stands still. Raises ValueError as that, and for fewer than three rows.
         """
         whole = np.isfinite([c.values for c in columns]).all(axis=0)
         lines, values = np.array(self.lines)[whole], [c.values[whole] for c in columns]
-        odd = self.odd | {n: why for c in columns for n, why in c.odd.items()}
-        seen = ~np.isin(lines, list(odd))
+        seen = ~np.isin(lines, [*self.odd, *(n for c in columns for n in c.odd)])
+        jumps = dict[int, str]()
         for (_, x), (c, y) in permutations(zip(columns, values, strict=True), 2):
-            jumps = lines[seen][_jumps(x[seen], y[seen])].tolist()
-            odd |= dict.fromkeys(jumps, f"{c.title} jumps and returns")
-        odd = {n: why for n, why in odd.items() if n in lines}
-        told = "; ".join(f"line {n}: {why}" for n, why in sorted(odd.items())[:3])
-        told += f"; and {len(odd) - 3} more" if len(odd) > 3 else ""
-        if odd and outliers is None:
-            raise ValueError(
-                f"{self.name}: {told}. Are these measurements? Write --outliers skip to leave such "
-                "rows out, or --outliers keep"
-            )
-        empty, notes = int(np.sum(~whole)), list[str]()
+            there = lines[seen][_jumps(x[seen], y[seen])].tolist()
+            jumps |= dict.fromkeys(there, f"{c.title} jumps and returns")
+        skipped, told = self.odd_rows(columns, outliers, lines.tolist(), jumps)
+        values = [x[~np.isin(lines, skipped)] for x in values]
+        empty, notes = int(np.sum(~whole)), [*self.notes]
         if empty:
             notes.append(f"{empty} of {whole.size} rows without all numbers are not used")
-        if odd and outliers == "skip":
-            notes.append(f"{len(odd)} rows are left out as outliers ({told})")
-            values = [x[~np.isin(lines, list(odd))] for x in values]
+        notes += told
         if values[0].size < 3:
             raise ValueError(
                 f"{self.name}: has {values[0].size} rows with both numbers; give 3 or more"
             )
         return values, notes
 
+    def odd_rows(
+        self,
+        columns: Sequence[Column],
+        outliers: str | None,
+        lines: Iterable[int],
+        more: dict[int, str],
+    ) -> tuple[list[int], list[str]]:
+        """Those of these lines to leave out as no measurement, and a note of them if there are any.
 
-def read_tables(path: Path, decimal: str | None = None) -> list[Table]:
+        They are those of `odd`, values such as -999, and `more` with its reasons. outliers: what to
+        do with them, "skip" or "keep". Raises ValueError naming them without it.
+        """
+        odd = self.odd | {n: why for c in columns for n, why in c.odd.items()} | more
+        odd = {n: odd[n] for n in sorted(odd.keys() & set(lines))}
+        told = "; ".join(f"line {n}: {why}" for n, why in [*odd.items()][:3])
+        told += f"; and {len(odd) - 3} more" if len(odd) > 3 else ""
+        if odd and outliers is None:
+            raise ValueError(
+                f"{self.name}: {told}. Are these measurements? Write --outliers skip to leave such "
+                "rows out, or --outliers keep"
+            )
+        if not odd or outliers == "keep":
+            return [], []
+        return [*odd], [f"{len(odd)} rows are left out as outliers ({told})"]
+
+
+def read_tables(
+    path: Path, needed: Sequence[tuple[Asked, str | None]], decimal: str | None = None
+) -> list[Table]:
     """The tests of a file, by the rules above.
 
-    decimal: the decimal mark, "comma" or "point"; None finds it, if a number of the file shows it.
-    Raises ValueError naming file, line and remedy.
+    needed: quantities and what is given for them, as `Table.column` takes them: a table with none
+    of them is no test, and left out with a note, if another has one. decimal: the decimal mark,
+    "comma" or "point"; None finds it, if a number of the file shows it. Raises ValueError naming
+    file, line and remedy.
     """
     if path.suffix.lower() in (".xlsx", ".xlsm"):
-        sheets, decimal = _workbook(path), decimal or "point"
+        sheets = _workbook(path, decimal)
     else:
         lines = lines_of(path)
         mark = table_separator(lines)
@@ -178,10 +207,13 @@ def read_tables(path: Path, decimal: str | None = None) -> list[Table]:
             f"{path}: must hold a line of names with units, such as us [mm],tau [MPa], and numbers "
             "in the lines below it"
         )
-    return tables
+    tests = [table for table in tables if any(table.named(*one) for one in needed)] or tables
+    names = {table.name for table in tests}
+    notes = [f"{one.name}: no test, not read" for one in tables if one.name not in names]
+    return [tests[0]._replace(notes=tuple(notes)), *tests[1:]]
 
 
-def _workbook(path: Path) -> dict[str, Rows]:
+def _workbook(path: Path, decimal: str | None) -> dict[str, Rows]:
     """The cells of all sheets as text. Raises ImportError with the remedy without openpyxl."""
     try:
         from openpyxl import load_workbook
@@ -191,16 +223,33 @@ def _workbook(path: Path) -> dict[str, Rows]:
         ) from error
     try:
         book = load_workbook(path, read_only=True, data_only=True)
+        with ZipFile(path) as parts:
+            sheets = [one for one in parts.namelist() if one.startswith("xl/worksheets/")]
+            bare = any(_NO_VALUE.search(parts.read(one)) for one in sheets)
     except Exception as error:  # of many kinds, for a file that is none
         raise ValueError(f"{path}: cannot be read as a spreadsheet ({error})") from None
-    return {
-        sheet.title: {
-            n: ["" if cell is None else str(cell).strip() for cell in row]
-            for n, row in enumerate(sheet.iter_rows(values_only=True), 1)
-            if any(cell is not None for cell in row)
-        }
-        for sheet in book.worksheets
-    }
+    if bare:
+        raise ValueError(
+            f"{path}: holds formulas without their values; open it in a spreadsheet program and "
+            "save it again"
+        )
+    found = dict[str, Rows]()
+    for sheet in book.worksheets:
+        cells = [*enumerate(sheet.iter_rows(values_only=True), 1)]
+        texts = (cell.strip() for _, row in cells for cell in row if isinstance(cell, str))
+        comma = marks_of(texts, decimal).decimal == ","
+        rows = {n: [_text(cell, comma) for cell in row] for n, row in cells}
+        found[sheet.title] = {n: row for n, row in rows.items() if any(row)}
+    return found
+
+
+def _text(cell: Any, comma: bool) -> str:
+    """A cell of a workbook as a text file would have it, with decimal commas or without."""
+    text = "" if cell is None else str(cell).strip()
+    if isinstance(cell, float):
+        text += "0" * bool(EITHER.fullmatch(text))  # 1.201 is no 1201: it shows the decimal mark
+        text = text.replace(".", ",") if comma else text
+    return text
 
 
 def _below(rows: Rows, marks: Marks) -> list[tuple[list[str], list[str], Rows]]:
@@ -264,31 +313,53 @@ def _column(
 ) -> tuple[Column, dict[int, str]]:
     """A column from its cells by line; and lines that hold a word, such as Max, among numbers."""
     found = {n: marks.value(cell) for n, cell in cells.items()}
-    known = {n: abs(x) for n, x in found.items() if np.isfinite(x)}
+    known = {n: x for n, x in found.items() if np.isfinite(x)}
     texts = {n: cell for n, cell in cells.items() if cell and n not in known}
     wrong = (
         f"line {n} holds {cell!r}, which {AMBIGUOUS if EITHER.fullmatch(cell) else 'is no number'}"
         for n, cell in texts.items()
     )
     words = {n: f"{title} is {cell!r}" for n, cell in texts.items() if _WORD.fullmatch(cell)}
-    sent = [n for n in known if _SENTINEL.fullmatch(cells[n])]
-    usual = max((x for n, x in known.items() if n not in sent), default=0.0)
-    odd = {n: f"{title} is {cells[n]}" for n in sent if known[n] > 5 * usual}
+    sent = {n: x for n, x in known.items() if _SENTINEL.fullmatch(str(x))}
+    others = np.array([x for n, x in known.items() if n not in sent])
+    near = {x for x in set(sent.values()) if others.size and _near(x, others)}
+    odd = {n: f"{title} is {cells[n]}" for n, x in sent.items() if x not in near}
     values = np.array([*found.values()])
     column = Column(title, *_read_title(title, unit), values, next(wrong, ""), odd)
     return column, words if len(texts) < len(known) else {}
 
 
+def _near(x: float, others: Array) -> bool:
+    """Whether a number stands so near the others (n,) that it may be a measurement as they are."""
+    return bool(np.min(np.abs(others - x)) <= APART * _scale(others))
+
+
+def _scale(y: Array) -> float:
+    """Range of values; what hardly changes scatters, and a fifth of its size counts."""
+    return float(max(np.ptp(y), 0.2 * np.max(np.abs(y))))
+
+
 def _jumps(x: Array, y: Array) -> NDArray[np.bool_]:
-    """Points (n,) where y leaves its neighbours, which agree, while x goes on between its own."""
+    """Points (n,) where y leaves its neighbours, which agree, while x goes on between its own.
+
+    Up to `RUN` points of equal y leave them together, as where a logger repeats what it lost.
+    """
     found = np.zeros(x.size, bool)
     if x.size < 5 or not np.ptp(x) or not np.ptp(y):
         return found
-    scale = max(np.ptp(y), 0.2 * np.max(np.abs(y)))  # what hardly changes scatters
-    off_x, off_y = (np.abs(z[1:-1] - (z[2:] + z[:-2]) / 2) for z in (x / np.ptp(x), y / scale))
-    apart = np.abs(y[2:] - y[:-2]) / scale
-    goes_on = np.diff(x)[1:] * np.diff(x)[:-1] >= 0  # and does not turn, as at the end of unloading
-    found[1:-1] = (off_y > JUMP) & (apart < 0.25 * off_y) & (off_x < STILL) & goes_on
+    first = np.flatnonzero(np.diff(y, prepend=np.nan) != 0)  # rows of each run of equal values
+    last = np.append(first[1:], x.size) - 1
+    size, first, last = (last - first + 1)[1:-1], first[1:-1], last[1:-1]
+    before, after = first - 1, last + 1
+    off_y = np.abs(y[first] - (y[after] + y[before]) / 2) / _scale(y)
+    off_x = np.abs(x[first] + x[last] - x[after] - x[before]) / 2 / np.ptp(x)
+    apart = np.abs(y[after] - y[before]) / _scale(y)
+    # and does not turn, as at the end of unloading
+    turns = np.append(0, np.cumsum(np.diff(x)[1:] * np.diff(x)[:-1] < 0))
+    jump = (off_y > JUMP) & (apart < 0.25 * off_y) & (off_x < STILL * off_y)
+    jump &= (size <= min(RUN, x.size / 4)) & (turns[last] == turns[before])
+    for one, end in zip(first[jump], last[jump], strict=True):
+        found[one : end + 1] = True
     return found
 
 

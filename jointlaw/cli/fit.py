@@ -136,7 +136,11 @@ def _shear_curves(options: argparse.Namespace) -> tuple[list[ShearCurve], list[S
         for path, normal in zip(options.shear, normals, strict=True)
         for test in datasets.read_shear(path, normal_stress=normal, **how)
     ]
-    tests += datasets.read_peaks(options.peaks, options.decimal) if options.peaks else []
+    tests += (
+        datasets.read_peaks(options.peaks, options.decimal, options.outliers)
+        if options.peaks
+        else []
+    )
     if options.fit is None:
         return tests, []
     given = [float(np.mean(test.normal)) for test in tests]

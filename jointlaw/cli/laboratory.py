@@ -12,6 +12,7 @@ import numpy as np
 from ..laboratory.experiments import PathError, closure_test, direct_shear
 from ..laboratory.record import UNITS, Record
 from ..laws.joint_law import JointLaw
+from ..parameters.rock import require_rock
 from .command import (
     LAW,
     OUT,
@@ -28,6 +29,7 @@ from .command import (
 
 
 def _shear(options: argparse.Namespace) -> None:
+    require_rock({"normal stress": options.normal_stress}, "--normal-stress: ")
     law = read_law(options)
     record = _run(
         law,
@@ -51,6 +53,8 @@ def _shear(options: argparse.Namespace) -> None:
 
 
 def _closure(options: argparse.Namespace) -> None:
+    for stress in options.normal_stress:
+        require_rock({"normal stress": stress}, "--normal-stress: ")
     law = read_law(options)
     joint = replace(law, plane=None, closure_only=True).joint()  # the same numbers, sooner
     record = _run(law, options, closure_test, joint, options.normal_stress, options.steps)

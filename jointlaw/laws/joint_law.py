@@ -133,7 +133,7 @@ class JointLaw(Law, kind="joint"):
 
     def crushed(self, closure: float) -> float:
         """As `Law.crushed` at this closure (m). Raises nothing."""
-        if self.heights is None or math.isinf(self.asperity.yield_interference):
+        if self.heights is None:
             return 0.0
         return float(self.contacts(closure) / self.asperity_density)
 

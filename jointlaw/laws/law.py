@@ -160,7 +160,7 @@ class Law:
         return closure_at(self._first_loading, stress, farthest)[()]
 
     def crushed(self, closure: float) -> float:
-        """Share of the asperities in touch at this closure (m), if they yield; else 0."""
+        """Share of the asperities in touch at this closure (m), if they have heights; else 0."""
         return 0.0
 
     # ------------------------------------------------- stiffness and time step

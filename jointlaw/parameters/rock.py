@@ -39,6 +39,7 @@ RANGES = {
     # beyond the strength of any rock, or below the weight of a sheet of paper on it
     "shear stress": (10.0, 5e9, " Pa", f'{_OTHER} --shear-stress-column "NAME:MPa"'),
     "stress": (10.0, 5e9, " Pa", f'{_OTHER} --stress-column "NAME:MPa"'),
+    "normal stress": (10.0, 5e9, " Pa", "is it in the unit that was read or given?"),
     # joints at 10 kPa have reached 10
     "peak shear stress over normal stress": (
         0.02,

@@ -78,6 +78,8 @@ def lines_of(path: Path) -> dict[int, str]:
         data = path.read_bytes()
     except OSError as error:
         raise ValueError(f"{path}: cannot be read ({error}); give a CSV file") from None
+    if data.startswith((b"PK\x03\x04", b"\xd0\xcf\x11\xe0")):  # .ods and others, .xls
+        raise ValueError(f"{path}: is no text but a spreadsheet; save it as CSV, or as .xlsx")
     wide = data[:2] in (b"\xff\xfe", b"\xfe\xff")
     try:
         text = data.decode("utf-16" if wide else "utf-8-sig")

@@ -87,6 +87,14 @@ def _files(tmp_path):
         ("jointlaw fit opening.csv --out out", '--closure-column "closure:-1um"'),
         ("jointlaw fit --out out", "0 closure files: give one"),
         ("jointlaw shear biegel-rough --to 2 --out out", "--to: 2 has no unit"),
+        (
+            "jointlaw shear biegel-rough --to 2um --normal-stress 5Pa --out out",
+            "--normal-stress: normal stress = 5 Pa is outside the range of rock joints",
+        ),
+        (
+            "jointlaw closure biegel-rough --normal-stress 5MPa,5000GPa --out out",
+            "--normal-stress: normal stress = 5e+12 Pa is outside the range of rock joints",
+        ),
         ("jointlaw shear law-mu-35.toml --to 2um --out out", "tan(35 degrees) = 0.7"),
         ("jointlaw shear biegel-rough --to 2um --out done", "done holds another run"),
         ("dem_demo check mu-35.toml", "mu-35.toml: laws.rock.asperity.mu = 35 is outside"),

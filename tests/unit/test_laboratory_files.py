@@ -1,6 +1,7 @@
 """Text files of laboratories: read right, or refused with the option that cures it."""
 
 import re
+from itertools import product
 
 import numpy as np
 import pytest
@@ -116,13 +117,10 @@ SEVERAL = {  # two tests of one file
 def test_several_tests_of_one_file(kind, tmp_path):
     path, text = tmp_path / "lab.csv", SEVERAL[kind]
     if text is None:
-        book = pytest.importorskip("openpyxl").Workbook()
         titles = ["us [mm]", "tau [MPa]", "sn [MPa]", "dn [mm]"]
         table = np.column_stack([U, TAU, 0 * U + 2, OPENED]).tolist()
-        for sheet in (book.active, book.create_sheet("other")):
-            for row in (["Joint 7"], [], titles, *table):
-                sheet.append(row)
-        book.save(path := tmp_path / "lab.xlsx")
+        cells = [["Joint 7"], [], titles, *table]
+        path = workbook(tmp_path / "lab.xlsx", A=cells, other=cells)
     else:
         path.write_text(text)
     tests = read_shear(path)
@@ -145,6 +143,68 @@ def test_a_table_of_peaks_is_a_test_a_row(tmp_path):
     np.testing.assert_allclose(two.shear, [0, 2.365e-3, 10e-3])
     np.testing.assert_allclose(one.shear_stress, [0, 1.28e6, 0.862e6])
     assert (one.normal[0], two.normal[0]) == (1e6, 2e6)
+
+
+def workbook(path, **sheets):
+    """A workbook with these rows of cells."""
+    book = pytest.importorskip("openpyxl").Workbook()
+    book.remove(book.active)
+    for name, cells in sheets.items():
+        sheet = book.create_sheet(name)
+        for row in cells:
+            sheet.append(row)
+    book.save(path)
+    return path
+
+
+TITLES = ["us [mm]", "tau [kPa]", "sn [kPa]"]
+
+
+@pytest.mark.parametrize(
+    ("cell", "decimal", "stress"),
+    [
+        ("1,201", "comma", 1.201e3),
+        ("1,201", "point", 1.201e6),
+        ("1201,5", None, 1201.5e3),
+        ("1,201.5", None, 1201.5e3),
+        (1.201, None, 1.201e3),
+        (1.201, "comma", 1.201e3),
+    ],
+)
+def test_text_in_a_workbook_is_read_as_in_a_text_file(cell, decimal, stress, tmp_path):
+    """Numbers beside it show the decimal mark of no text."""
+    path = workbook(tmp_path / "lab.xlsx", A=[TITLES, [0, 0, 50], [1, 1.125, 50], [2, cell, 50]])
+    (test,) = read_shear(path, decimal=decimal)
+    np.testing.assert_allclose(test.shear_stress, [0, 1125, stress])
+
+
+def test_text_that_may_be_thousands_is_refused_in_a_workbook_too(tmp_path):
+    path = workbook(tmp_path / "lab.xlsx", A=[TITLES, [0, 0, 2], [1, 1.5, 2], [2, "1,201", 2]])
+    with pytest.raises(ValueError, match=r"line 4 holds '1,201', which may .*--decimal comma"):
+        read_shear(path)
+
+
+def test_sheets_that_hold_no_test_are_told_and_skipped(tmp_path):
+    summary = [["Test", "peak [kPa]"], ["A", 875.0]]
+    table = [TITLES, *np.column_stack([U, 1e3 * TAU, 0 * U + 2e3]).tolist()]
+    path = workbook(tmp_path / "lab.xlsx", Summary=summary, A=table, B=table)
+    one, two = read_shear(path)
+    assert one.notes == (f"{path}, sheet Summary: no test, not read",)
+    assert not two.notes
+    with pytest.raises(ValueError, match="sheet Summary: which column is the shear displ"):
+        read_shear(workbook(path, Summary=summary))
+
+
+def test_spreadsheets_without_values_and_of_other_kinds(tmp_path):
+    path = workbook(tmp_path / "lab.xlsx", A=[TITLES, *([k, f"=A{k}*2", 2] for k in range(2, 6))])
+    with pytest.raises(ValueError, match="formulas without their values; open it in"):
+        read_shear(path)
+    for head in (b"\xd0\xcf\x11\xe0", b"PK\x03\x04"):
+        (tmp_path / "lab.xls").write_bytes(head + bytes(600))
+        with pytest.raises(
+            ValueError, match=r"lab.xls: is no text but a spreadsheet; save it as CSV"
+        ):
+            read_shear(tmp_path / "lab.xls")
 
 
 CURVE = {
@@ -211,6 +271,87 @@ def test_rows_that_are_no_measurement_are_named_until_an_option_settles_it(kind,
         assert kept.shear.size == skipped.shear.size + 1
     np.testing.assert_allclose(skipped.shear_stress, 2e9 * skipped.shear, atol=1e-6)
     assert told in skipped.notes[0]
+
+
+WAY = np.linspace(0, 2, 41)  # mm
+KILO = np.round(1250 * (1 - np.exp(-WAY / 0.2)) - 5 * (WAY == 0), 1)  # kPa; the first is scatter
+
+
+def kilo(tau, normal=1000.0):
+    return "us [mm],tau [kPa],sn [kPa]\n" + rows(WAY, tau, normal + 0 * WAY)
+
+
+@pytest.mark.parametrize(
+    ("value", "lost"),
+    [
+        *product([-99.0, 0.0], [[20, 21], [20, 21, 22, 23]]),
+        *product([-999.0, -9999.99, 9999.0, 32767.0], [[20, 21], [20, 21, 22, 23], [39, 40], [40]]),
+    ],
+)
+def test_readings_that_a_logger_lost_are_named(value, lost, tmp_path):
+    """Stresses in kPa are as large as what stands for a lost one; -99 is small there."""
+    tau = KILO.copy()
+    tau[lost] = value
+    with pytest.raises(ValueError, match=f"line {lost[0] + 2}: tau .kPa. (is|jumps)"):
+        read(tmp_path, kilo(tau))
+    (test,) = read(tmp_path, kilo(tau), outliers="skip")
+    np.testing.assert_allclose(test.shear_stress, 1e3 * np.delete(KILO, lost))
+
+
+@pytest.mark.parametrize(
+    ("tau", "normal"),
+    [
+        (KILO, np.where(WAY == 1, 999.0, 1000.0)),
+        (np.minimum(KILO, 999.0), 1000.0),
+        (KILO, np.where(abs(WAY - 1) < 0.3, 2000.0, 1000.0)),  # a stage of 11 rows
+    ],
+)
+def test_measurements_that_look_like_lost_readings_are_read(tau, normal, tmp_path):
+    assert read(tmp_path, kilo(tau, normal))[0].shear.size == 41
+
+
+def test_a_joint_closes_while_it_shears_if_the_user_says_so(tmp_path):
+    text = "us [mm],tau [MPa],sn [MPa],dn [mm]\n" + rows(U, TAU, 0 * U + 10, -0.1 * U)
+    with pytest.raises(ValueError, match=r'does close, write --opening-column "dn:1mm"'):
+        read(tmp_path, text)
+    (test,) = read(tmp_path, text, opening="dn:1mm")
+    np.testing.assert_allclose(test.opening, -1e-4 * U)
+
+
+@pytest.mark.parametrize("gauge", ["us", "dn"])
+def test_a_gauge_off_zero_under_shear_needs_the_row_where_shear_began(gauge, tmp_path):
+    """62 % of the shear stress in the first row; with a row of zero stress all is known."""
+    off = {"us": 12.53, "dn": 12.53} if gauge == "us" else {"us": 0.01, "dn": 3.0}
+    begun = np.maximum(TAU, 1.1)
+    text = "us [mm],tau [MPa],sn [MPa],dn [mm]\n"
+    table = rows(U + off["us"], begun, 0 * U + 2, OPENED + off["dn"])
+    told = rf"column '{gauge} \[mm\]' begins at .* 63 % .*: add a first row"
+    with pytest.raises(ValueError, match=told):
+        read(tmp_path, text + table)
+    (test,) = read(tmp_path, f"{text}{off['us'] - 0.01},0,2,{off['dn']}\n{table}")
+    np.testing.assert_allclose(test.shear[1:], 1e-3 * (U + 0.01))
+    np.testing.assert_allclose(test.opening[1:], 1e-3 * OPENED, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("row", "told"),
+    [
+        ("1,1200,1.5,800,10", "line 3: peak shear stress over normal stress = 1200 is outside"),
+        ("1,1.2,10,0.8,1.5", r"line 3: the peak, .* are columns exchanged\?"),
+        ("1,0.8,1.5,1.2,10", r"line 3: the peak, .* are columns exchanged\?"),
+        ("1,1.2,1.5,0.8,1.5", "line 3: the peak, .* must .* come before it"),
+        ("1,1.2,1.5,,", "line 3: 'tau_r .MPa.' is empty or not > 0; give all five numbers"),
+        ("1,1.2,0,0.8,10", "line 3: 'u_p .mm.' is empty or not > 0"),
+        ("1,1.2,1.5,-999,-999", "line 3: u_r .mm. is -999.*--outliers skip"),
+        ("0.000001,0.0000012,1.5,0.0000008,10", "line 3: shear stress = 1.2 Pa is outside"),
+    ],
+)
+def test_rows_that_are_no_test_of_peak_and_residual(row, told, tmp_path):
+    good = "sn [MPa],tau_p [MPa],u_p [mm],tau_r [MPa],u_r [mm]\n2,2.2,1.6,1.7,10\n"
+    with pytest.raises(ValueError, match=rf"lab\.csv: {told}"):
+        read(tmp_path, good + row, read_peaks)
+    if "-999" in row:
+        assert len(read(tmp_path, good + row, read_peaks, outliers="skip")) == 1
 
 
 def test_the_steep_foot_of_two_cycles_is_no_jump(tmp_path):

@@ -100,6 +100,8 @@ def test_a_joint_closed_beyond_its_highest_asperity_gives_a_warning():
     weak = replace(stiff, asperity=asperity)
     with pytest.warns(UserWarning, match="closure = 0.0176 m: 99.99 % .* law ends"):
         weak.joint(30e6)
+    with pytest.warns(UserWarning, match="100.00 % of the asperities touch"):
+        stiff.joint(4e9)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         weak.joint(10e6)

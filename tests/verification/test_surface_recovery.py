@@ -169,6 +169,7 @@ def files_of(z):
         "names.txt": "a b c d\n" + matrix,
         "decimal_commas.csv": matrix.replace(" ", ";").replace(".", ","),
         "grid.asc": f"ncols 4\nnrows 3\ncellsize 20\nNODATA_value -9999\n{matrix}",
+        "pixels.asc": f"ncols 4\nnrows 3\ndx 20\ndy 20\n{matrix}",
         "points.xyz": "x y z\n" + "\n".join(points),
     }
 
@@ -199,7 +200,15 @@ def test_files_give_the_array_back(tmp_path):
             "cellsize 0.02\n1.5 2\n",
             "its cellsize 0.02 is 2e-08 m .*but --spacing is 2e-05",
         ),
-        ("n.csv", "1,5,6,5\n2,6,5,6\n3,5,6,5\n", "its first column counts the rows"),
+        ("z.asc", "dx 20\ndy 40\n1.5 2\n", "its points are no square grid: dx 20, dy 40"),
+        ("z.asc", "dx 40\ndy 40\n1.5 2\n", "its cellsize 40 is 4e-05 m .*--spacing is 2e-05"),
+        ("n.csv", "1,5,6,5\n2,6,5,6\n3,5,6,5\n4,7,6,6\n", "its first column counts"),
+        ("p.csv", "0,.02,.04,.06,.08\n5,5,6,5,8\n2,6,5,6,7\n3,9,6,4,5\n", "its first row counts"),
+        (
+            "h.xyz",
+            "\n".join(f"{20 * x} {40 * y} {x * y}" for x in range(4) for y in range(4)),
+            "no square grid .* along x the points are 20 apart, along y 40",
+        ),
         (
             "z.xyz",
             "0 0 1\n20 0 1\n0 20 1\n17 20 1\n",
@@ -212,6 +221,20 @@ def test_files_that_cannot_be_read(name, text, told, tmp_path):
         (tmp_path / name).write_text(text)
     with pytest.raises(ValueError, match=told):
         read_scan(tmp_path / name, 1e-6, SPACING)
+
+
+@pytest.mark.parametrize("lost", [-9999.0, -99.0, 0.0, 32767.0])
+def test_a_number_for_points_without_a_height_is_named(lost, tmp_path):
+    """In 25 patches; without them, and where a scanner rounds or cuts off, the scan is read."""
+    z, places = np.round(1e6 * rough(1.0), 2), np.random.default_rng(2).integers(1, 250, (25, 2))
+    for whole in (z, np.round(z / 20), np.clip(z, -150, 100)):
+        np.save(tmp_path / "z.npy", whole)
+        assert read_scan(tmp_path / "z.npy", 1e-6, SPACING).shape == z.shape
+    for i, j in places:
+        z[i : i + 3, j : j + 2] = lost
+    np.save(tmp_path / "z.npy", z)
+    with pytest.raises(ValueError, match=f"{lost:g} stands 15[0-9] times, far above or below"):
+        read_scan(tmp_path / "z.npy", 1e-6, SPACING)
 
 
 @pytest.mark.parametrize(

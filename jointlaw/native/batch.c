@@ -6,6 +6,7 @@
 #include "batch.h"
 #include "lanes.h"
 #include "elements.h"
+#define JL_OF_KIND static __attribute__((noinline))
 #include "law.h"
 #include <stdlib.h>
 #include <string.h>
@@ -51,7 +52,8 @@ static void advance_block(const jlaw_batch *b, double *block, size_t ahead, long
       for (int l = 0; d && l < some; l++) JL_JOINT(p[i], l) = d[(at + l) * dim + i];
     }
     jl_amounts all;
-    jl_step_of_kind(b->law, n, p, f, c, b->ledger, C != NULL, kept, b->shown ? &all : NULL);
+    jl_step_of_kind(b->law, n, p, f, c, b->ledger, C != NULL, kept, b->shown && !C ? &all : NULL);
+    if (b->shown && C) all = jl_measure(b->law, n);
     if (b->shown) show(b, n, &all, b->shown + (first + at) * (JLAW_SHOWN + dim), some);
     for (int l = 0; l < some; l++) {
       for (int i = 0; i < dim; i++) F[(at + l) * dim + i] = JL_JOINT(f[i], l);

@@ -118,6 +118,7 @@ JLAW_FUNCTION const char *jlaw_fingerprint(const jlaw_law *law);
 #endif
 #ifdef __CUDACC_RTC__
 #define DBL_MAX 1.7976931348623157e308
+#define NAN (0.0 / 0.0)
 #ifndef NULL
 #define NULL 0
 #endif
@@ -223,13 +224,11 @@ static JLAW_FUNCTION void jlaw_say_number_(jlaw_text_ *text, double x)
   }
   for (; x >= 10.0; exponent++) x /= 10.0;
   for (; x > 0.0 && x < 1.0; exponent--) x *= 10.0;
-  x += 0.00005;
-  for (; x >= 10.0; exponent++) x /= 10.0;
-  for (int i = 0; i < 5; i++) {
-    const int digit = (int) x;
-    digits[n++] = (char) ('0' + digit);
-    if (i == 0) digits[n++] = '.';
-    x = 10.0 * (x - digit);
+  int number = (int) (1e4 * x + 0.5);
+  if (number > 99999) number /= 10, exponent++;
+  for (int unit = 10000; unit; unit /= 10) {
+    digits[n++] = (char) ('0' + number / unit % 10);
+    if (n == 1) digits[n++] = '.';
   }
   digits[n++] = 'e';
   digits[n++] = exponent < 0 ? '-' : '+';
@@ -242,13 +241,6 @@ static JLAW_FUNCTION void jlaw_say_number_(jlaw_text_ *text, double x)
 
 /* ------------------------------------------------------------------------ the step */
 
-/* NaN, where the C library may have none */
-static JLAW_FUNCTION double jlaw_none_(void)
-{
-  const double zero = 0.0;
-  return zero / zero;
-}
-
 /* Phi and Phi' at one y */
 static JLAW_FUNCTION double jlaw_virgin_one_(const jlaw_law *law, double y, double *slope)
 {
@@ -260,8 +252,7 @@ static JLAW_FUNCTION double jlaw_virgin_one_(const jlaw_law *law, double y, doub
 
 static JLAW_FUNCTION double jlaw_of_facet_(const jlaw_law *law, int facet, int at)
 {
-  const int lane = facet % JLAW_LANES;
-  return law->facet[(facet - lane) * JLAW_COLUMNS + at * JLAW_LANES + lane];
+  return jl_facet_of(law, facet)[at * JLAW_LANES];
 }
 
 JLAW_CLONES JLAW_FUNCTION void jlaw_step(const jlaw_law *law, double *s, size_t stride,
@@ -325,16 +316,14 @@ static JLAW_FUNCTION int jlaw_refuse_(const jlaw_law *law, const double *s, cons
     jlaw_say_number_(&text, d[i]);
     finite = finite && fabs(d[i]) <= DBL_MAX;
   }
-  if (!finite) {
-    jlaw_say_(&text,
-              ") m is not finite; nothing was moved. Look for the fault in the host's motion");
-  } else {
-    jlaw_say_(&text, ") m leads from closure ");
-    jlaw_say_number_(&text, s[0]);
-    jlaw_say_(&text, " m beyond the reach of ");
-    jlaw_say_number_(&text, law->largest_reach);
-    jlaw_say_(&text, " m, where forces overflow; nothing was moved. Take a smaller step");
-  }
+  jlaw_say_(&text, finite ? ") m leads from closure "
+                          : ") m is not finite; nothing was moved. Look for the fault in the "
+                            "host's motion");
+  if (!finite) return -1;
+  jlaw_say_number_(&text, s[0]);
+  jlaw_say_(&text, " m beyond the reach of ");
+  jlaw_say_number_(&text, law->largest_reach);
+  jlaw_say_(&text, " m, where forces overflow; nothing was moved. Take a smaller step");
   return -1;
 }
 
@@ -419,7 +408,7 @@ JLAW_FUNCTION void jlaw_shares(const jlaw_law *law, const double *s, double shar
 JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure)
 {
   double slope, late = 0.0;
-  if (!(closure <= law->largest_reach)) return jlaw_none_();
+  if (!(closure <= law->largest_reach)) return NAN;
   for (int f = 0; law->yields && f < law->facets; f++) /* what yielding takes off first loading */
     for (int i = JLAW_LATE; i < JLAW_LATE + 4; i += 2) {
       const double depth = jlaw_of_facet_(law, f, i + 1);
@@ -441,7 +430,7 @@ JLAW_FUNCTION double jlaw_normal_stress(const jlaw_law *law, double closure)
 JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure)
 {
   double slope = 0.0;
-  if (!(closure <= law->largest_reach)) return jlaw_none_();
+  if (!(closure <= law->largest_reach)) return NAN;
   const double force = law->asperities ? jlaw_virgin_one_(law, closure, &slope) : 0.0;
   return law->stiffness_factor * JL_LANE(jl_stiffness_over(law, jl_each(slope)), 0)
          + law->bending_factor * force + jl_stiffness_of_elements(law, NULL, 0, 1);
@@ -450,8 +439,7 @@ JLAW_FUNCTION double jlaw_max_stiffness(const jlaw_law *law, double closure)
 JLAW_FUNCTION double jlaw_closure(const jlaw_law *law, double normal_stress)
 {
   double low = 0.0, high = law->farthest;
-  if (!(normal_stress >= 0.0) || !(jlaw_normal_stress(law, high) >= normal_stress))
-    return jlaw_none_();
+  if (!(normal_stress >= 0.0 && jlaw_normal_stress(law, high) >= normal_stress)) return NAN;
   while (1) { /* the stress rises: halve the exponent first, then the number */
     const double middle =
         high > 4.0 * low && high > 1e-300 ? sqrt(high * fmax(low, 1e-300)) : 0.5 * (low + high);

@@ -179,11 +179,9 @@ typedef jl_real jl_of_joint;
 JL_IN jl_of_facet jl_column(const double *block, int c) { return block[c * JLAW_LANES]; }
 JL_IN jl_real jl_take_joint(jl_numbers n, int row)
 {
-#if JL_W == 1
-  return n.s[(size_t) row * n.stride];
-#elif defined(JL_APART)
-  jl_real x = {0.0};
-  for (int l = 0; l < JL_W; l++) x[l] = JL_OF_LANE(n, l)[row];
+#if JL_W == 1 || defined(JL_APART)
+  jl_real x = jl_each(0.0);
+  for (int l = 0; l < JL_W; l++) JL_LANE(x, l) = JL_OF_LANE(n, l)[(size_t) row * n.stride];
   return x;
 #else
   const double *from = n.s + (size_t) row * n.stride;
@@ -193,10 +191,8 @@ JL_IN jl_real jl_take_joint(jl_numbers n, int row)
 }
 JL_IN void jl_put_joint(jl_numbers n, int row, jl_real x)
 {
-#if JL_W == 1
-  n.s[(size_t) row * n.stride] = x;
-#elif defined(JL_APART)
-  for (int l = 0; l < JL_W; l++) JL_OF_LANE(n, l)[row] = x[l];
+#if JL_W == 1 || defined(JL_APART)
+  for (int l = 0; l < JL_W; l++) JL_OF_LANE(n, l)[(size_t) row * n.stride] = JL_LANE(x, l);
 #else
   *(jl_loose *) (n.s + (size_t) row * n.stride) = (jl_loose) x;
 #endif

@@ -11,7 +11,7 @@
  * log are avoided: zig links its own, which differ from those of the system. */
 
 typedef struct { /* constants of a step: the compiler leaves out what they exclude */
-  int dim, yields, fades, wears, ledger, tangent;
+  int dim, yields, fades, wears, tangent, ledger;
   int kept; /* whether Phi and Phi' lie beside the state */
 } jl_kind;
 
@@ -357,7 +357,7 @@ JL_IN void jl_wear_sliders(const double *cell, jl_facets *o, const jl_sliders *c
   const jl_real r = 1.0 / (a * b * Q), was = jl_only(had, b * Q * r), is = jl_only(has, a * Q * r);
   jl_real share = jl_pick(kappa > c->k0, c->k0 * was, 1.0);
   const jl_yes beyond = share * share * q2 > cap2;
-  if (jl_somewhere(beyond)) share = jl_pick(beyond, jl_root(cap2 * (a * b * r)), share);
+  share = jl_pick(beyond, jl_root(cap2 * (a * b * r)), share);
   o->worn += q2 * (was - share * share * is);
   *qs = share * *qs;
   *qt = share * *qt;
@@ -444,11 +444,9 @@ JL_IN void jl_load(const double *f, const jl_facets *o, jl_sliders *c, jl_real *
   c->chord = jl_smaller(jl_larger(mean, c->k0), c->k1); /* k1 where it falls */
   c->old2 = *qs * *qs + *qt * *qt;
   const jl_yes falls = c->k1 < c->k0;
-  if (jl_somewhere(falls)) {
-    const jl_real kept = jl_pick(falls, c->k1 / jl_pick(falls, c->k0, 1.0), 1.0);
-    *qs = *qs * kept;
-    *qt = *qt * kept;
-  }
+  const jl_real kept = jl_pick(falls, c->k1 / jl_pick(falls, c->k0, 1.0), 1.0);
+  *qs = *qs * kept;
+  *qt = *qt * kept;
   const jl_real add = jl_column(f, JLAW_STIFF) * c->chord;
   c->ts = *qs + add * o->es;
   c->tt = *qt + add * o->et;
@@ -887,37 +885,60 @@ JL_IN jl_of_joint jl_stiffness(const jlaw_law *law, jl_numbers n)
 
 /* ------------------------------------------------------------- kinds of a step */
 
-JL_IN jl_kind jl_kind_of(int dim, int yields, int fades, int wears, int ledger, int tangent,
-                         int kept)
-{
-  const jl_kind k = {dim, yields, fades, wears, ledger, tangent, kept};
-  return k;
-}
+/* The step, compiled for each kind, each a function of its own where many joints share it: compilers
+ * find registers for one kind at a time. A plane costs half of space; a tangent, a ledger or `all`
+ * that is not asked for costs nothing. Where asperities yield or slopes wear, the law needs the
+ * ledger. */
+#ifndef JL_OF_KIND
+#define JL_OF_KIND JL_IN
+#endif
+#define JL_STEP_AS(name, tangent, seen, ...)                                                \
+  JL_OF_KIND void jl_step_##name(const jlaw_law *law, jl_numbers n, const jl_of_joint d[3], \
+                                 jl_of_joint F[3], jl_of_joint C[9], int ledger, int kept,  \
+                                 jl_amounts *all)                                           \
+  {                                                                                         \
+    const jl_kind k = {__VA_ARGS__, tangent, ledger, kept};                                 \
+    jl_step(law, n, d, F, C, k, (seen) ? all : NULL);                                       \
+  }
+#define JL_KIND(name, ...)                   \
+  JL_STEP_AS(name, 0, 0, __VA_ARGS__)        \
+  JL_STEP_AS(name##_seen, 0, 1, __VA_ARGS__) \
+  JL_STEP_AS(name##_C, 1, 0, __VA_ARGS__)
+JL_KIND(plane, 2, 0, 0, 0)
+JL_KIND(plane_fades, 2, 0, 1, 0)
+JL_KIND(plane_wears, 2, 0, 1, 1)
+JL_KIND(space, 3, 0, 0, 0)
+JL_KIND(space_fades, 3, 0, 1, 0)
+JL_KIND(space_wears, 3, 0, 1, 1)
+JL_KIND(rare, law->dim, law->yields, 0, 0) /* asperities yield, or closure only */
+JL_KIND(rare_fades, law->dim, law->yields, 1, law->wears)
 
-/* The step, compiled for each kind: a plane costs half of space; a tangent or ledger that is not
- * asked for costs nothing. Where asperities yield or slopes wear, the law needs the ledger. */
+/* What joints then amount to is asked for by `all`, not together with a tangent */
 JL_IN void jl_step_of_kind(const jlaw_law *law, jl_numbers n, const jl_of_joint d[3],
                            jl_of_joint F[3], jl_of_joint C[9], int ledger, int tangent, int kept,
                            jl_amounts *all)
 {
-  jl_of_joint from[3];
-  for (int i = 0; i < law->dim; i++) from[i] = jl_take_joint(n, i);
-#define JL_STEP(dim, yields, fades, wears, ledger)                                             \
-  (tangent                                                                                     \
-       ? jl_step(law, n, d, F, C, jl_kind_of(dim, yields, fades, wears, ledger, 1, kept), all) \
-       : jl_step(law, n, d, F, C, jl_kind_of(dim, yields, fades, wears, ledger, 0, kept), all))
   const int dim = law->dim, y = law->yields, w = law->wears;
-  if (law->fades && (y || w || dim == 1)) JL_STEP(dim, y, 1, w, 1);
-  else if (law->fades && dim == 3) JL_STEP(3, 0, 1, 0, ledger);
-  else if (law->fades) JL_STEP(2, 0, 1, 0, ledger);
-  else if (y || dim == 1) JL_STEP(dim, y, 0, 0, 1);
-  else if (dim == 3 && ledger) JL_STEP(3, 0, 0, 0, 1);
-  else if (dim == 3) JL_STEP(3, 0, 0, 0, 0);
-  else if (ledger) JL_STEP(2, 0, 0, 0, 1);
-  else JL_STEP(2, 0, 0, 0, 0);
+  jl_of_joint from[3];
+  for (int i = 0; i < dim; i++) from[i] = jl_take_joint(n, i);
+  ledger = ledger || y || w;
+#define JL_STEP(name)                                                        \
+  {                                                                          \
+    if (tangent) jl_step_##name##_C(law, n, d, F, C, ledger, kept, all);     \
+    else if (all) jl_step_##name##_seen(law, n, d, F, C, ledger, kept, all); \
+    else jl_step_##name(law, n, d, F, C, ledger, kept, all);                 \
+  }
+  if (law->fades && (y || dim == 1)) JL_STEP(rare_fades)
+  else if (y || dim == 1) JL_STEP(rare)
+  else if (dim == 2 && w) JL_STEP(plane_wears)
+  else if (dim == 2 && law->fades) JL_STEP(plane_fades)
+  else if (dim == 2) JL_STEP(plane)
+  else if (w) JL_STEP(space_wears)
+  else if (law->fades) JL_STEP(space_fades)
+  else JL_STEP(space)
 #undef JL_STEP
   if (!jl_element_rows(law)) return;
   const jl_of_joint stored =
-      jl_step_elements(law, n, jl_element_row(law), from, d, F, C, tangent, ledger || y || w);
+      jl_step_elements(law, n, jl_element_row(law), from, d, F, C, tangent, ledger);
   if (all) jl_add_elements(law, n, stored, all);
 }

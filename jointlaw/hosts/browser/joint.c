@@ -43,8 +43,8 @@ OUT(update) int update(const double *s0, double *s1, const double *d, double *F,
   if (!jlaw_allowed_(&law, s0, d, &damaged))
     return jlaw_refuse_(&law, s0, d, damaged, message, JLAW_MESSAGE);
   memcpy(s1, s0, (size_t) jl_state_rows(&law) * sizeof *s1);
-  if (law.fades) jl_step(&law, n, d, F, F + 3, jl_kind_of(3, 0, 1, 0, 1, 1, 0), NULL);
-  else jl_step(&law, n, d, F, F + 3, jl_kind_of(3, 0, 0, 0, 1, 1, 0), NULL);
+  if (law.fades) jl_step_space_fades_C(&law, n, d, F, F + 3, 1, 0, NULL);
+  else jl_step_space_C(&law, n, d, F, F + 3, 1, 0, NULL);
   return 0;
 }
 

@@ -203,8 +203,7 @@ def _compare(given: argparse.Namespace) -> None:
     scene = load(given.scene)
     if not scene.rocks:
         raise ValueError(f"{given.scene} has no [[rock]] to compare")
-    until = scene.run.end if given.until is None else given.until
-    for row in compare.compare(scene, given.seeds, until):
+    for row in compare.compare(scene, given.seeds, given.until):
         for name, law in row["laws"].items():
             peak, left = np.degrees(np.arctan([law.friction, law.residual_friction or 0.0]))
             print(f"law {name!r} as Coulomb: {peak:.1f} degrees at the peak, {left:.1f} after "

@@ -211,14 +211,13 @@ class Joints:
     def unslid(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """As `trial` of virgin joints that cannot slide: tractions and tangents."""
         closure, sign, shear = np.maximum(np.abs(d[:, 0]), 1e-9), np.sign(d[:, 0]), d[:, 1]
-        pulls = self.pulls[self.law] * (self.damage < 1)  # what is open bears nothing, a bond does
         (stress, ss), above, below = (
             np.array([self.virgin(of, "closure", closure * at) for of in ("stress", "stiffness")])
             for at in (1.0, 1.01, 0.99)
         )
         rises, stiffens = (above - below) / (0.02 * closure)
-        opened = d[:, 0] <= 0
-        normal, rises = np.where(opened, [pulls * d[:, 0], pulls], [stress, rises])
+        pulls = self.pulls[self.law] * (self.damage < 1)  # what is open bears nothing, a bond does
+        normal, rises = np.where(d[:, 0] <= 0, [pulls * d[:, 0], pulls], [stress, rises])
         C = np.stack([rises, 0.0 * rises, stiffens * sign * shear, ss], axis=1)
         return np.stack([normal, ss * shear], axis=1), C.reshape(-1, 2, 2)
 

@@ -46,12 +46,6 @@ class Record:
         self.monitored.append(readings(sim))
         self.state = sim.state()
 
-    @property
-    def settled(self) -> np.ndarray:
-        """Displacements (n, 2) from the drawing to step 0, relative to the base (m)."""
-        drawn = np.array([block.centroid for block in self.scene.blocks])
-        return self.initial[:2].T - drawn - base_of(self.scene, self.initial)[:2]
-
     def displaced(self, i: int) -> np.ndarray:
         """Displacements (n, 2) from step 0 to frame i, relative to the base (m)."""
         base = base_of(self.scene, self.motion[i]) - base_of(self.scene, self.initial)
@@ -158,6 +152,8 @@ def outcomes(record: Record) -> list[dict]:
     then, last = (record.displaced(i) for i in (before, -1))
     crept = np.hypot(*(last - then).T) / max(times[-1] - times[before], 1e-300)
     groups, blocks = {rock.name: rock.free for rock in record.scene.rocks}, record.scene.blocks
+    drawn = [block.centroid + base_of(record.scene, record.initial)[:2] for block in blocks]
+    settled = np.hypot(*(record.initial[:2].T - drawn).T)
     rest = {i for i, block in enumerate(blocks) if not (block.fixed or block.held)}
     groups |= {"other blocks" if groups else "blocks": sorted(rest.difference(*groups.values()))}
     for name, group in groups.items():
@@ -172,7 +168,7 @@ def outcomes(record: Record) -> list[dict]:
                 "rock": name,
                 "state": "fails" if failed else "stands" if creep < CREEP else "moves",
                 "blocks": len(free),
-                "settled_m": float(np.hypot(*record.settled[free].T).max()),
+                "settled_m": float(settled[free].max()),
                 "moved_m": float(moved.max()),
                 "failed": failed,
                 "failed_beyond_m": limit,

@@ -110,9 +110,9 @@ def play(
                     break
 
 
-def to_failure(scene: Scene, until: float) -> tuple[Record, str]:
-    """A run to `until` (s), or until a block has moved by the usual size of a block; and why it was
-    refused, if it was: what is recorded by then is kept."""
+def to_failure(scene: Scene, until: float | None) -> tuple[Record, str]:
+    """A run to `until` (s, default the scene's end), or until a block has moved by the usual size
+    of a block; and why it was refused, if it was: what is recorded by then is kept."""
     sim, size = Simulation(scene), usual_size(block for block in scene.blocks if not block.fixed)
     record, refused = Record(sim), ""
     try:

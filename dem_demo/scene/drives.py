@@ -187,7 +187,9 @@ def read_record(files: Files, name: str, table: Tables) -> Tables:
         lines = files[table["file"]].splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise ValueError(f"{where} cannot be read ({error}); give a CSV file in UTF-8") from None
-    units = [_unit(title) for title in lines[0].split(",")] if lines else []
+    # what a title ends in: time_s, Time (s), Acc [m/s^2]
+    units = [re.split(r"[\s_(\[]", title.strip(" \t\"')]").lower())[-1].replace("^", "")
+             for title in "".join(lines[:1]).split(",")]  # fmt: skip
     if len(units) != 2 or units[0] != "s" or units[1] not in UNITS or len(lines) < 3:
         raise ValueError(
             f"{where}: must be a line such as 'time_s,velocity_m/s' or 'Time (s),Acc (g)', then "
@@ -202,11 +204,6 @@ def read_record(files: Files, name: str, table: Tables) -> Tables:
         values = _at_rest(times, values, order)
     return {"times": tuple(times.tolist()), "values": tuple(values.tolist()), "order": order,
             "smooth": order == 0}  # fmt: skip
-
-
-def _unit(title: str) -> str:
-    """What a title of a column ends in: time_s, Time (s), Acc [m/s^2]."""
-    return re.split(r"[\s_(\[]", title.strip(" \t\"')]").lower())[-1].replace("^", "")
 
 
 def _numbers(lines: list[str], where: str) -> np.ndarray:

@@ -22,11 +22,11 @@ from .strength import alone
 FAR = 20.0  # slip distances: where the strength of a law is its residual one
 
 
-def compare(scene: Scene, seeds: Sequence[int], until: float) -> Iterator[dict]:
+def compare(scene: Scene, seeds: Sequence[int], until: float | None) -> Iterator[dict]:
     """Every rock of a scene, for each seed and each kind of law; yields outcomes, and `laws`:
     Coulomb's joints that stand for joint laws.
 
-    until: model time to stop at (s).
+    until: model time to stop at (s), by default the scene's end.
     """
     for name in [rock.name for rock in scene.rocks]:
         for seed in seeds:

@@ -84,8 +84,7 @@ def strength_reduction(
         one = (alone(scene, name) if scene.rocks else scene).excavated
         tell(f"{name}: looking for blocks that cannot be held")
         loose = trials.ask(f"{name}: loose", partial(_loose, one))
-        free = sum(not block.fixed for block in one.blocks)
-        free -= sum(not one.blocks[i].fixed for i in one.gone)
+        free = sum(not b.fixed and i not in one.gone for i, b in enumerate(one.blocks))
         tell(f"{name}: {len(loose)} of {free} blocks cannot be held: {told(loose)}")
         row: dict = {"rock": name, "loose": loose, "without": loose}
         if len(loose) == free:

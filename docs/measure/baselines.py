@@ -9,7 +9,8 @@
 are fitted to the stress itself, the usual way and the one that serves them best beyond the data:
 fitted to its logarithm, as the joint law is, the hyperbola runs away even earlier. Printed are the
 errors on the Grimsel fracture above 5.3 MPa, which the fits did not see; and the range of those of
-the joint law over nine choices: three priors of alpha, and data up to three stresses.
+the joint law over nine choices: three priors of alpha, and data up to three stresses. Then the
+same with the deformation of rock and machine taken off, of which the measured closure is a third.
 """
 
 import numpy as np
@@ -57,23 +58,29 @@ def fitted(name, stress, closure):
 CHOICES = [(top, alpha) for top in (3.2e6, 4.2e6, 5.3e6) for alpha in ((0, 20), (1, 10), (0, 100))]
 
 
+ROCK = 42.8e-6 / 10.27e6  # m/Pa: of the rock and the machine of this specimen
+
+
 def main():
-    stress, closure = first_loading(*datasets.load("grimsel_vd1_closure"))
-    seen = stress <= 5.3e6
-    points = stress[seen], closure[seen]
-    laws = {"jointlaw": jl.fit_curves([jl.ClosureCurve(*points)]).predict}
-    laws |= {name: fitted(name, *points) for name in LAWS}
+    stress, measured = first_loading(*datasets.load("grimsel_vd1_closure"))
     rows = []
-    for name, law in laws.items():
-        error = 100 * (law(closure[~seen]) / stress[~seen] - 1)
-        rows.append([name, f"{error[-1]:+.1f} %", f"{np.sqrt(np.mean(error**2)):.1f} %"])
-    choices = []
-    for top, alpha in CHOICES:
-        seen = stress <= top
-        curve = jl.ClosureCurve(stress[seen], closure[seen])
-        fit = jl.fit_curves([curve], priors={"alpha": alpha})
-        choices.append(100 * (fit.predict(closure[-1]) / stress[-1] - 1))
-    rows.append(["jointlaw, nine choices", f"{min(choices):+.1f} to {max(choices):+.1f} %", ""])
+    for what, closure in (("", measured), ("fracture alone: ", measured - ROCK * stress)):
+        seen = stress <= 5.3e6
+        points = stress[seen], closure[seen]
+        laws = {"jointlaw": jl.fit_curves([jl.ClosureCurve(*points)]).predict}
+        laws |= {name: fitted(name, *points) for name in LAWS}
+        for name, law in laws.items():
+            error = 100 * (law(closure[~seen]) / stress[~seen] - 1)
+            rms = np.sqrt(np.mean(error**2))
+            rows.append([what + name, f"{error[-1]:+.1f} %", f"{rms:.1f} %"])
+        choices = []
+        for top, alpha in CHOICES:
+            seen = stress <= top
+            curve = jl.ClosureCurve(stress[seen], closure[seen])
+            fit = jl.fit_curves([curve], priors={"alpha": alpha})
+            choices.append(100 * (fit.predict(closure[-1]) / stress[-1] - 1))
+        choices = f"{min(choices):+.1f} to {max(choices):+.1f} %"
+        rows.append([f"{what}jointlaw, nine choices", choices, ""])
     print(table(["law", "error at 10.3 MPa", "rms from 6 to 10.3 MPa"], rows))
 
 

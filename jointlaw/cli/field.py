@@ -1,6 +1,7 @@
 """`jointlaw field`: a law from JRC, JCS, a friction angle and a stiffness."""
 
 import argparse
+import math
 
 from ..calibration.field import ASSUMED, from_field, peak_displacement, tested
 from .command import OUT, PICTURES, Command, Written, in_unit, option, write_results
@@ -12,11 +13,14 @@ _STRESS = in_unit("Pa", positive=True)
 def _run(options: argparse.Namespace) -> None:
     given = {name: getattr(options, name) for name in GIVEN}
     law, slip = from_field(**given), peak_displacement(options.jrc, options.length)
-    record, stiffness = tested(law, options.normal_stress, slip)
+    record, reached, stiffness = tested(law, options.normal_stress, slip)
+    half = options.jrc * math.log10(options.jcs / options.normal_stress) / 2
     text = (
-        f"At {options.normal_stress / 1e6:.4g} MPa: peak friction angle "
-        f"{record.peak_friction_angle:.1f} deg, largest dilation angle "
-        f"{record.peak_dilation_angle:.1f} deg, normal stiffness {stiffness / 1e9:.3g} GPa/m.\n"
+        f"A joint of {options.length:.4g} m at {options.normal_stress / 1e6:.4g} MPa: peak "
+        f"friction angle {record.peak_friction_angle:.1f} deg at a shear displacement of "
+        f"{1e3 * reached:.3g} mm (Barton: {1e3 * slip:.3g}), largest dilation angle "
+        f"{record.peak_dilation_angle:.1f} deg (Barton: {half:.1f}), normal stiffness "
+        f"{stiffness / 1e9:.3g} GPa/m.\n"
         f"mu = {law.asperity.mu:.3g}, a = {law.orientation.a:.3g}, asperity_density = "
         f"{law.asperity_density:.3g} per m2, mating_length = {law.mating_length:.3g} m.\n\n"
         f"{ASSUMED}\n"
@@ -35,8 +39,19 @@ COMMAND = Command(
     "--normal-stiffness 30GPa/m --out out",
     _run,
     (
-        option("--jrc", type=float, required=True, help="joint roughness coefficient, such as 10"),
-        option("--jcs", type=_STRESS, required=True, help="strength of the joint wall: 100MPa"),
+        option(
+            "--jrc",
+            type=float,
+            required=True,
+            help="joint roughness coefficient of a joint of this --length, such as 10; "
+            "docs/field.md scales that of a sample to it",
+        ),
+        option(
+            "--jcs",
+            type=_STRESS,
+            required=True,
+            help="strength of the joint wall, of this --length too: 100MPa",
+        ),
         option(
             "--length", type=in_unit("m", positive=True), required=True, help="of the joint: 10cm"
         ),

@@ -1,6 +1,6 @@
 """The largest energy that steps and closed cycles with a mating length gain: searched for.
 
-    python docs/measure/gains.py [--laws 60]
+    python docs/measure/gains.py [--laws 60] [--first 0]
 
 No step gains by the work of the joint's own traction in the limit of small steps, nor does a closed
 cycle. Differential evolution looks for the opposite on random laws: for the step, the step there
@@ -123,8 +123,8 @@ def largest(size, seed):
 
 
 if __name__ == "__main__":
-    laws, rows = asked(__doc__, laws=60).laws, []
+    given, rows = asked(__doc__, laws=60, first=0), []
     for size in (1.0, 0.25, 0.1, 0.01):
-        found = [largest(size, seed) for seed in range(laws)]
+        found = [largest(size, given.first + i) for i in range(given.laws)]
         rows.append([f"{size:g}", *(f"{most:.1e}" for most in np.max(found, axis=0))])
     print(table(HEAD, rows))

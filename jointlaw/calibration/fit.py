@@ -71,7 +71,7 @@ class Fit(Estimates):
         lines += ["", "Held: " + ", ".join(f"{n} = {values[n]:.4g}" for n in held) + "."]
         lines += ["", "Not fixed by these data:", ""] if left else []
         lines += [f"- {name}: {reason}" for name, reason in left.items()]
-        if self.too_many:
+        if self.too_many and not self.traded:  # else that is said, with its remedy
             lines += ["", f"**{TOO_MANY.format(', '.join(self.too_many), self.too_many[0])}**"]
         names = [f"{one.name}, {part.what}" for one in self.problem.curves for part in one.series]
         series = zip(names, self.problem.series, self.solution.noise, strict=True)

@@ -49,7 +49,7 @@ class JointPool:
         keys, mated: as of `add`, which raises the same.
         """
         wanted = list(keys)
-        self._require(mated)
+        _ = mated or self.batch.law.unmated_start  # refused before anything changes
         self.drop(self._place.keys() - set(wanted))
         return self.add(wanted, mated)
 
@@ -60,7 +60,7 @@ class JointPool:
         met (`JointLaw.joint`). Raises ValueError where a law is always mated.
         """
         wanted = list(keys)
-        self._require(mated)
+        _ = mated or self.batch.law.unmated_start
         new = [key for key in dict.fromkeys(wanted) if key not in self._place]
         missing = len(new) - len(self._free)
         if missing > 0:
@@ -72,11 +72,6 @@ class JointPool:
         if not mated:
             self.batch.reset([self._place[key] for key in new], mated=False)
         return np.array([self._place[key] for key in wanted], np.intp)
-
-    def _require(self, mated: bool) -> None:
-        """Refuse unmated joints of a law that is always mated, before anything changes."""
-        if not mated:
-            _ = self.batch.law.unmated_start
 
     def drop(self, keys: Iterable[Hashable]) -> None:
         """Forget the contacts of these `keys`. Raises KeyError for a key that is not held."""

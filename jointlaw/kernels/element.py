@@ -32,12 +32,11 @@ class Element(ABC):
 
     Arrays have physical axes first and B joints last. `delta` (dim, B) is the displacement from the
     mated position in m, `state` (rows, B) the element's own rows of the state; zeros are virgin.
-    A row that is called damage is `parted` in joints whose faces meet anew.
     """
 
     dim = 1  # components of a displacement that it needs, at least
     rows: dict[str, int]  # of its state: how many, by name
-    parted = 1.0
+    parted = 1.0  # damage of joints whose faces meet anew
     stretch = 1.0  # bound of the closure that it feels over the size of the displacement
     reach = math.inf  # m: up to this closure its forces, energies and their squares stay finite
     farthest = 1e304  # m: largest closure that a normal stress is looked for in

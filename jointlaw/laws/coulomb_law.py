@@ -19,8 +19,8 @@ class CoulombLaw(Law, kind="coulomb"):
 
     In opening it bears tension while it is intact, then nothing. By default cohesion and friction
     stay while it slides; residual values follow the peak at once, or over `weakening`. Faces that
-    have parted, or that meet anew, have no cohesion any more. There is no dilation. docs/theory-
-    incremental.md, "Coulomb's joint", tells how it differs from a `Bond`.
+    have parted, or that meet anew, have no cohesion any more. There is no dilation.
+    docs/theory-incremental.md, "Coulomb's joint", tells how it differs from a `Bond`.
 
     Raises ValueError when a parameter is out of bounds.
 

@@ -30,7 +30,7 @@ class Law:
     """A law: a frozen dataclass of parameters. `JointLaw` is one, `CoulombLaw` another.
 
     Reading and writing of files, and all that follows from the tables of a law, is here. Each class
-    has `plane` and `closure_range` besides.
+    has `plane` besides.
     """
 
     kinds: ClassVar[dict[str, type[Law]]] = {}  # by the names that files have
@@ -38,6 +38,11 @@ class Law:
     def __init_subclass__(cls, kind: str, **others: Any) -> None:
         super().__init_subclass__(**others)
         Law.kinds[kind] = cls
+
+    @property
+    @abstractmethod
+    def closure_range(self) -> float:
+        """Largest closure (m) that the law is made for."""
 
     @cached_property
     @abstractmethod

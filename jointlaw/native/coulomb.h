@@ -59,7 +59,8 @@ JL_IN void jl_slip_on(const jlaw_law *law, jl_slip *s)
   const double far = way > 0.0 ? s->w + (s->size - cap) / way : 1.0;
   s->w1 = far < 1.0 ? far : s->w > 1.0 ? s->w : 1.0;
   s->hold = jl_coulomb_strength(law, s->w1, s->end);
-  const int ends = jl_leaving(s->q, s->dq, first + way * (s->w < 1.0 ? 1.0 - s->w : 0.0), cap - first, &done);
+  const double left = s->w < 1.0 ? 1.0 - s->w : 0.0;
+  const int ends = jl_leaving(s->q, s->dq, first + way * left, cap - first, &done);
   if (ends && done < at) done = at;
   const double begin = jl_coulomb_strength(law, s->w, s->start + at * change);
   const double middle =

@@ -296,7 +296,9 @@ static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
   const int rows[] = JLAW_ROWS_OF(law);
   for (int i = 0; rows[i] >= 0; i++)
     for (int left = rows[i]; left > 0; left--, row++)
-      good = good && (left > 1 ? fabs(*row) < JLAW_STRONGEST : *row >= 0.0 && *row <= jlaw_parted_(law));
+      good = good
+             && (left > 1 ? fabs(*row) < JLAW_STRONGEST
+                          : *row >= 0.0 && *row <= jlaw_parted_(law));
   return good && jlaw_sound_(s + jl_slider_row(law), jl_rest_row(law) - jl_slider_row(law));
 }
 

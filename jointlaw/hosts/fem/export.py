@@ -46,8 +46,7 @@ def export_fem(
     }
     start = [*law.joint(normal_stress=seating).snapshot().values[0].tolist(), 1.0]
     names = [f'"State{i}"' for i in range(1, len(start))] + ['"Begun"']
-    reached = law.closure_range  # type: ignore[attr-defined]  # each class of laws has it
-    normal = min(NORMAL, 0.5 * float(law.normal_stress(reached)))
+    normal = min(NORMAL, 0.5 * float(law.normal_stress(law.closure_range)))
     shear = 5.0 * float(law.closure(normal))
     marks = {  # what stands for the @WORDS@ of the files
         "DIM": str(law.dim),

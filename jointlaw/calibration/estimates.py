@@ -80,8 +80,12 @@ class Estimates:
 
     @cached_property
     def too_many(self) -> tuple[str, ...]:
-        """Fitted parameters to hold, the vaguest first, so that the data alone fix the others."""
-        kept, held = [k for k, name in enumerate(self.free) if name != "seating"], list[str]()
+        """Fitted parameters to hold, the vaguest first, so that the data alone fix the others.
+
+        Without any opening friction is held before all others.
+        """
+        held = ["mu"] if self.traded else []
+        kept = [k for k, name in enumerate(self.free) if name not in {"seating", *held}]
         while kept:
             C = np.linalg.inv(self.solution.information[np.ix_(kept, kept)])
             vague = np.sqrt(np.diag(C)) / self._widest[kept]

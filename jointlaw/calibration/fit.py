@@ -13,7 +13,7 @@ from ..support.checks import Array
 from ..support.markdown import table
 from ..support.progress import track
 from ..support.pyplot import pyplot, style, written
-from .estimates import Estimates
+from .estimates import TRADED, Estimates
 from .forward import log_stress
 from .measured import ClosureCurve, ShearCurve
 from .priors import TRANSFORMS, Ranges, Values
@@ -71,7 +71,7 @@ class Fit(Estimates):
         lines += ["", "Held: " + ", ".join(f"{n} = {values[n]:.4g}" for n in held) + "."]
         lines += ["", "Not fixed by these data:", ""] if left else []
         lines += [f"- {name}: {reason}" for name, reason in left.items()]
-        if self.too_many and not self.traded:  # else that is said, with its remedy
+        if set(self.too_many) - (set(TRADED) if self.traded else set()):  # else said below
             lines += ["", f"**{TOO_MANY.format(', '.join(self.too_many), self.too_many[0])}**"]
         names = [f"{one.name}, {part.what}" for one in self.problem.curves for part in one.series]
         series = zip(names, self.problem.series, self.solution.noise, strict=True)

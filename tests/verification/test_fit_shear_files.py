@@ -232,7 +232,7 @@ def test_the_saved_law_has_the_fitted_peaks(tmp_path, capsys):
         (tmp_path / f"{normal}.csv").write_text("\n".join(["us [mm],tau [MPa],sn [MPa]", *rows]))
     assert main(["fit", "--shear", "1.0.csv", "3.0.csv", "5.0.csv", "--out", "o"]) == 0
     printed = capsys.readouterr().out
-    assert "Hold asperity_density: give what you know" in printed
+    assert "Hold mu, asperity_density: give what you know" in printed
     assert float(printed.partition("changes these figures by ")[2].split()[0]) < 0.5
     drawn = [line.split("|")[3] for line in printed.splitlines() if line.startswith("| ")][-3:]
     peaks = {n: float(cell.partition(",")[0]) for n, cell in zip(fitted, drawn, strict=True)}

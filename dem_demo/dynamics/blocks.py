@@ -19,12 +19,12 @@ class Blocks:
     """The blocks of a scene; arrays (n, 3) run over blocks and motions x, y, turn.
 
     motion (6, n): positions, angles, and the velocities that led there; velocity (3, n): those to
-    go on with. inertia: mass, mass, moment; mobile: motions of blocks that move, driven rock too;
-    free: those that forces move; gravity, steady: forces that do not change (N); loads: these
-    without gravity and with what presses on edges (`press`); root: 1/sqrt(inertia) of the
-    free motions, else 0; moves (n,): blocks that do; lightness (n,): 1/kg, of what can give way;
-    gone (n,): blocks that were taken away; support (n, 3): what is left of what these bore on the
-    others (N). The compiled step writes to the first two: change them in place.
+    go on with. inertia: mass, mass, moment; mobile (n, 1): blocks that move, driven rock too;
+    free: motions that forces move; gravity, steady: forces that do not change (N); loads: these
+    without gravity and with what presses on edges (`press`); root: 1/sqrt(inertia) of the free
+    motions, else 0; lightness (n,): 1/kg, of what can give way; gone (n,): blocks that were taken
+    away; support (n, 3): what is left of what these bore on the others (N). The compiled step
+    writes to the first two: change them in place.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -32,9 +32,9 @@ class Blocks:
         self.names, self.skins = [block.name for block in blocks], scene.skins
         sections = [block.section for block in blocks]
         self.inertia = scene.thickness * np.array([[s.mass, s.mass, s.moment] for s in sections])
-        self.mobile = np.array([[block.moves] * 3 for block in blocks])
+        self.mobile = np.array([[block.moves] for block in blocks])
         self.drives = Drives(scene.drives)
-        self.free = self.mobile.copy()
+        self.free = self.mobile.repeat(3, axis=1)
         self.free[self.drives.rows, self.drives.axes] = False
         self.root = np.where(self.free, 1 / np.sqrt(self.inertia), 0.0)
         self.gravity = self.mobile * self.inertia * [*scene.gravity, 0.0]
@@ -42,7 +42,6 @@ class Blocks:
         self.loads = self.steady.copy()
         self.reach = np.array([block.reach for block in blocks])
         self.lightness = self.free[:, :2].any(axis=1) / self.inertia[:, 0]
-        self.moves = self.mobile[:, 0].copy()
         places = np.array([[*block.centroid, 0.0] for block in blocks]).T
         start = np.array([[*block.velocity, block.spin] for block in blocks])
         self.velocity = np.ascontiguousarray((start * self.mobile).T)
@@ -76,7 +75,7 @@ class Blocks:
 
     def near(self) -> np.ndarray:
         """Pairs (p, 2) of blocks whose gap is below the sum of their skins, or almost."""
-        for i in np.flatnonzero(self.moves).tolist():
+        for i in np.flatnonzero(self.mobile).tolist():
             x, y, angle = self.motion[:3, i].tolist()
             self._bodies[i].position, self._bodies[i].angle = (x, y), angle
         self._space.step(1e-9)  # pymunk looks for pairs in a step, in which nothing moves
@@ -86,7 +85,7 @@ class Blocks:
     def remove(self, rows: list[int]) -> None:
         """Take blocks away: nothing moves or meets them any more."""
         self.gone[rows] = True
-        for array in (self.mobile, self.free, self.root, self.lightness, self.moves):
+        for array in (self.mobile, self.free, self.root, self.lightness):
             array[rows] = 0
         self.motion[3:, rows] = self.velocity[:, rows] = 0.0
 

@@ -58,5 +58,4 @@ class Ledger:
     @property
     def error(self) -> float:
         """Imbalance as a share of the energy turned over."""
-        turned = float(self.energy[TURNED])
-        return (self.total - self.start) / turned if turned else 0.0
+        return (self.total - self.start) / max(float(self.energy[TURNED]), 1e-300)

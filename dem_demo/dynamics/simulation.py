@@ -158,8 +158,9 @@ class Simulation:
     def _change_step(self, dt: float) -> None:
         """Velocities are half a step ahead of the places: bring them to half of a step dt (s)."""
         blocks, drives, now = self.blocks, self.blocks.drives, self.time
-        change = 0.5 * (dt - self.dt) * self.ledger.forces[0] / blocks.inertia
-        blocks.velocity += (change * blocks.free).T
+        blocks.velocity += (
+            0.5 * (dt - self.dt) * self.ledger.forces[0] / blocks.inertia * blocks.free
+        ).T
         blocks.velocity[drives.axes, drives.rows] = drives.velocity(now, dt)
         self.t0, self.n, self.dt = now, 0, dt
 
@@ -171,7 +172,7 @@ class Simulation:
         world.dashpot_normal, world.dashpot_shear = run.dashpot_normal, run.dashpot_shear
         world.max_path, world.max_stale, world.driven = MOVED, STALE, len(blocks.drives.rows)
         world.bind(blocks, "motion", "velocity", "inertia", "gravity", "loads", "lightness",
-                   "reach", skin=blocks.skins, mobile=blocks.moves)  # fmt: skip
+                   "reach", "mobile", skin=blocks.skins)  # fmt: skip
         world.bind(blocks.drives, "rows", "axes", "aim")
         world.bind(tracker, "deepest", "offset", "urgent", renewed=tracker.renewed_at)
         world.bind(ledger, "last", "area", "lost", "energy", force=ledger.forces)
@@ -208,8 +209,10 @@ class Simulation:
         """By the scene's fraction of the limit, or else by one for what can happen."""
         scene, limit = self.scene, self.limit.now
         if not np.isfinite(limit):  # nothing touches yet
-            curves = (held.curve for held in self.joints.held)
-            stiffness = max(float(np.interp(IMPACT, c["stress"], c["stiffness"])) for c in curves)
+            stiffness = max(
+                float(np.interp(IMPACT, held.curve["stress"], held.curve["stiffness"]))
+                for held in self.joints.held
+            )
             limit = impact_limit(scene, self.blocks, self.tracker.outlines, stiffness)
         if not np.isfinite(limit):
             raise Refused("forces move no block, so no time step follows: set run.step (s)")

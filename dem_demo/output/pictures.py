@@ -182,8 +182,10 @@ def curves(record: Record, path: Path) -> None:
     upper, lower = figure.subplots(2, sharex=True)
     for moving, base in record.scene.shear:
         name = record.scene.blocks[moving].name
-        keys = ("slid_m", "closure_m", "normal_Pa", "shear_Pa")
-        slid, closure, stress, tau = (record.column(f"{name}: {key}") for key in keys)
+        slid, closure, stress, tau = (
+            record.column(f"{name}: {key}")
+            for key in ("slid_m", "closure_m", "normal_Pa", "shear_Pa")
+        )
         unit, told = pressure(float(stress.max()))
         upper.plot(1e3 * slid, unit * tau, label=f"{name} (blocks)")
         lower.plot(1e3 * slid, 1e3 * (closure[0] - closure))

@@ -90,11 +90,8 @@ def named(scene: Scene, which: np.ndarray) -> list[dict]:
 
 def told(blocks: list[dict]) -> str:
     """Names and centroids of some blocks, for a person."""
-    first = [
-        f"{block['block']} ({block['x_m']:.2f}, {block['y_m']:.2f})" for block in blocks[:TOLD]
-    ]
-    more = [f"and {len(blocks) - TOLD} more"] * (len(blocks) > TOLD)
-    return ", ".join([*first, *more]) or "none"
+    said = [f"{one['block']} ({one['x_m']:.2f}, {one['y_m']:.2f})" for one in blocks[:TOLD]]
+    return ", ".join(said + [f"and {len(blocks) - TOLD} more"] * (len(blocks) > TOLD)) or "none"
 
 
 def _joints(sim: Simulation) -> dict[str, np.ndarray]:

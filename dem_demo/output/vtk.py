@@ -62,11 +62,10 @@ def _blocks(record: Record, i: int) -> meshio.Mesh:
 
 
 def _joints(joints: dict[str, np.ndarray], state: np.ndarray) -> meshio.Mesh:
-    columns = {k: v for k, v in joints.items() if k not in ("who", "ends")} | {"state": state}
+    columns = {k: [v] for k, v in joints.items() if k not in ("who", "ends")} | {"state": [state]}
     ends = joints["ends"].reshape(-1, 2)
     cells = [("line", np.arange(len(ends)).reshape(-1, 2))]
-    data = {name: [values] for name, values in columns.items()}
-    return meshio.Mesh(_in_space(ends), cells, cell_data=data)
+    return meshio.Mesh(_in_space(ends), cells, cell_data=columns)
 
 
 def _in_space(points: np.ndarray) -> np.ndarray:

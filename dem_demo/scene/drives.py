@@ -159,13 +159,14 @@ def _lines(table: Tables, number: dict[str, int], unit: float, where: str) -> di
     same = times.ndim == 1 and times.size and times.shape == values.shape
     if not same or (np.diff(times) <= 0).any():
         raise ValueError(f"{where}.times: must increase, one for each of `values`")
-    line = {"times": tuple(times), "values": tuple(unit * values), "ease": table.get("ease", 0.1)}
-    if back := table.get("back"):
-        line["back"] = {
+    back = table.get("back")
+    return {
+        "times": tuple(times), "values": tuple(unit * values), "ease": table.get("ease", 0.1),
+        "back": back and {
             **back, "block": number[one_of(f"{where}.back.block", back["block"], tuple(number))],
             "by": unit * back["by"],
-        }  # fmt: skip
-    return line
+        },
+    }  # fmt: skip
 
 
 def _sine(acceleration: float, frequency: float, cycles: int = 10) -> dict:
@@ -208,17 +209,15 @@ def read_record(files: Files, name: str, table: Tables) -> Tables:
 
 def _numbers(lines: list[str], where: str) -> np.ndarray:
     """Times and values (2, n) of the lines below the first."""
-    rows: list[np.ndarray] = []
+    rows: list[tuple[float, float]] = []
     for n, line in enumerate(lines[1:], 2):
         try:
-            row = finite("line", [float(part) for part in line.split(",")], "SI units")
+            time, value = finite("line", [float(part) for part in line.split(",")], "SI units")
         except ValueError:
-            row = np.zeros(0)
-        if len(row) != 2:
-            raise ValueError(f"{where}, line {n}: {line!r} must be two numbers")
-        if row[0] < 0 or (rows and row[0] <= rows[-1][0]):
-            raise ValueError(f"{where}, line {n}: time {row[0]:g} s must be >= 0 and increase")
-        rows.append(row)
+            raise ValueError(f"{where}, line {n}: {line!r} must be two numbers") from None
+        if time < 0 or (rows and time <= rows[-1][0]):
+            raise ValueError(f"{where}, line {n}: time {time:g} s must be >= 0 and increase")
+        rows.append((time, value))
     return np.transpose(rows)
 
 

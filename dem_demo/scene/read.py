@@ -296,10 +296,9 @@ def _rock(
         laws.update(((first + i, edge), of_edge[number])
                     for edge, number in enumerate(of.tolist()) if number >= 0)  # fmt: skip
     cuts = sum(int((of == CUT).sum()) for of in numbers) // 2
-    told = [
+    return Rock(name, range(first, len(blocks)), [], [
         f"{joined} slivers joined to neighbours",
         *(f"a gap of {sliver.area:.2g} m2 at ({sliver.centroid.x + shift[0]:.3g}, "
           f"{sliver.centroid.y + shift[1]:.3g}), a sliver left out" for sliver in dropped),
         *[f"{cuts} cuts that are no joints, at inward corners: law {of_edge[CUT]!r}"] * (cuts > 0),
-    ]  # fmt: skip
-    return Rock(name, range(first, len(blocks)), [], told)
+    ])  # fmt: skip

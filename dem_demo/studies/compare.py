@@ -34,9 +34,11 @@ def compare(scene: Scene, seeds: Sequence[int], until: float | None) -> Iterator
             record, refused = to_failure(own, until)
             yield {"law": "joint", "seed": seed, "laws": {}, **_row(record, refused)}
             run = replace(own.run, max_overlap=0.1)  # constant springs are soft in impacts
-            stresses = zip(own.laws.items(), _stresses(record), strict=True)
-            laws = {name: of_strength(law, stress) for (name, law), stress in stresses
-                    if isinstance(law, jl.JointLaw)}  # fmt: skip
+            laws = {
+                name: of_strength(law, stress)
+                for (name, law), stress in zip(own.laws.items(), _stresses(record), strict=True)
+                if isinstance(law, jl.JointLaw)
+            }
             case = to_failure(replace(own, laws=own.laws | laws, run=run), until)
             yield {"law": "coulomb", "seed": seed, "laws": laws, **_row(*case)}
 
@@ -56,8 +58,9 @@ def _stresses(record: Record) -> list[float]:
 def of_strength(law: jl.JointLaw, stress: float) -> jl.CoulombLaw:
     """Coulomb's joint with the peak and residual friction of a joint law at a normal stress (Pa),
     which it loses with the same work; its bond as cohesion and tension."""
-    bare = replace(law, bond=None).joint()
-    record = jl.direct_shear(bare, to=[FAR * slip_distance(law)], normal=stress, steps=800)
+    record = jl.direct_shear(
+        replace(law, bond=None).joint(), to=[FAR * slip_distance(law)], normal=stress, steps=800
+    )
     friction, slid = record.shear_stress / stress, record.shear_2
     top, residual = int(friction.argmax()), float(friction[-1])
     fall = float(friction[top] - residual)

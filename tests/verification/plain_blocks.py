@@ -128,7 +128,7 @@ def plain_step(sim, velocity, dt):
     area, motion = contacts.length * scene.thickness, blocks.motion
     stress, shear = (area * part for part in joints.traction.T)
     energy = joints.stored * scene.thickness  # J/m: what a change of the length costs
-    out = np.zeros((3, *blocks.mobile.shape))
+    out = np.zeros((3, *blocks.free.shape))
     critical = blocks.damping(contacts, joints.stiffness * area)
     least = np.where(joints.damage < 1, -np.inf, -stress)
     push = np.maximum(-scene.run.dashpot_normal * critical * contacts.opening, least)

@@ -23,6 +23,7 @@ WIDEST = math.log(2) / 1.96  # standard error of a logarithm: a factor of 2 eith
 OPEN = 1e6  # upper over lower end of the interval of what nothing fixes
 SOFTENING = 3  # points of one test on the fall of the bond, to know its cohesion by
 AT_BOUND = 1e-6  # of the distance of the bounds
+SMALL = 0.01  # of the largest stress or opening: from there down a band is no longer of logarithms
 TRADED = ("mu", "a")  # friction and slopes, which shear stress alone cannot tell apart
 
 
@@ -168,17 +169,20 @@ class Estimates:
 
     @property
     def openings(self) -> Array:
-        """95 % interval, low and high (2, 2), of the opening (m) in the shear test of the lowest
-        normal stress, and of the tangent of its largest dilation angle; NaN where it only closes.
+        """95 % interval, low and high (2, 2), of the largest opening (m) in the shear test of the
+        lowest normal stress, that of `shear_band`, and of the tangent of its largest dilation
+        angle; NaN where it only closes.
         """
         curve = min(self.problem.shears, key=lambda one: np.mean(one.normal))
+        (best,) = self.predict_shear(curve)
 
         def model(values: Values) -> Array:
             (test,) = sheared([curve], values, self.problem.settings)
             with np.errstate(invalid="ignore"):
-                return np.log([np.ptp(test.opening), test.dilation])
+                return np.log([test.dilation])
 
-        return np.exp(self._band(model))
+        opening = self.shear_band(curve)[1][:, np.argmax(best.opening)]
+        return np.stack([opening, np.exp(self._band(model))[:, 0]], axis=1)
 
     def predict_shear(self, *curves: ShearCurve) -> list[Sheared]:
         """These tests by the fitted law."""
@@ -194,13 +198,18 @@ class Estimates:
         return np.exp(self._band(lambda v: log_stress(v, v["seating"] + u, settings)))
 
     def shear_band(self, curve: ShearCurve) -> Array:
-        """The same of shear stress and opening of a test (2, 2, rows): low and high of each."""
+        """The same of shear stress and opening of a test (2, 2, rows): low and high of each.
+
+        That of their logarithms, but for what is small, which may be below zero.
+        """
 
         def model(values: Values) -> Array:
             (test,) = sheared([curve], values, self.problem.settings)
             return np.stack([test.stress, test.opening])
 
-        return self._band(model).swapaxes(0, 1)
+        largest = np.abs(model(self.parameters)).max(axis=1, keepdims=True)
+        small = np.maximum(SMALL * largest, 1e-300)
+        return (small * np.sinh(self._band(lambda v: np.arcsinh(model(v) / small)))).swapaxes(0, 1)
 
     def _band(self, model: Callable[[Values], Array]) -> Array:
         """The 95 % band, low and high, of what a model gives of the parameters."""

@@ -36,6 +36,7 @@ TOO_MANY = (
     "These data do not fix so many parameters. Hold {}: give what you know (--set {}=VALUE), or "
     "leave it out of --free. Then the data fix the others."
 )
+HELD = "Held, and the intervals are for these values: {}."
 UNMEASURED = (
     "**No opening was measured.** {}Less friction and more dilation give the same shear stress. "
     "Give the normal displacement of the tests, or hold mu (from a tilt test of saw-cut faces) or "
@@ -68,7 +69,7 @@ class Fit(Estimates):
         ]
         unworn = {"slope_residual"} if np.isinf(values["slope_wear"]) else set()
         held = [n for n in values if n not in {*self.free, *unworn} and np.isfinite(values[n])]
-        lines += ["", "Held: " + ", ".join(f"{n} = {values[n]:.4g}" for n in held) + "."]
+        lines += ["", HELD.format(", ".join(f"{n} = {values[n]:.4g}" for n in held))]
         lines += ["", "Not fixed by these data:", ""] if left else []
         lines += [f"- {name}: {reason}" for name, reason in left.items()]
         if set(self.too_many) - (set(TRADED) if self.traded else set()):  # else said below

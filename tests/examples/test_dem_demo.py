@@ -13,12 +13,14 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
+from matplotlib.collections import LineCollection
 from scene_text import PLAIN, ROCK, block
 from scipy.sparse.linalg import ArpackNoConvergence
 
 from dem_demo import Refused, Simulation, load, parse, run
 from dem_demo.cli import TRIED, main
 from dem_demo.dynamics import timestep
+from dem_demo.output.pictures import Pictures
 from dem_demo.output.record import Record
 from dem_demo.scene import shipped
 
@@ -63,6 +65,18 @@ def test_run_writes_everything(tmp_path):
     header, first, *_ = (done / "history.csv").read_text().splitlines()
     assert header.startswith("time_s,kinetic_J,potential_J")
     assert len(first.split(",")) == len(header.split(","))
+
+
+def test_joints_are_drawn_as_wide_as_they_bear():
+    record, _ = run(Simulation(parse(SHORT)), None, 0.02)
+    pictures, borne = Pictures(record), record.joints[-1]["normal_stress_Pa"]
+    _, axes = pictures.figure()
+    pictures.draw(axes, -1)
+    lines = [drawn for drawn in axes.collections if isinstance(drawn, LineCollection)]
+    widths = np.concatenate([line.get_linewidths() for line in lines if len(line.get_segments())])
+    wide = np.interp(borne, [0.0, 1.2 * pictures.stress], [0.7, 3.1])
+    assert sorted(widths) == pytest.approx(sorted(wide))
+    assert wide.max() > 2.0
 
 
 def test_vtk_files_hold_what_the_record_holds(tmp_path):
@@ -209,7 +223,7 @@ def test_failed_runs_are_resumed_with_a_smaller_step(tmp_path, capsys, height, s
     assert re.search(why, json.loads((out / "summary.json").read_text())["stopped"])
     assert main([str(file), "--out", str(out)]) == 2
     assert "holds another run (summary.json, history.csv, refused)" in capsys.readouterr().err
-    words = ["resume", str(out / "refused"), "--step", "1e-4", "--no-pictures", "--out", str(more)]
+    words = ["resume", str(out), "--step", "1e-4", "--no-pictures", "--out", str(more)]
     assert main(words) == 0
     summary = json.loads((more / "summary.json").read_text())
     assert summary["model_time_s"] == pytest.approx(0.05, abs=1e-4)

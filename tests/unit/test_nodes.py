@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import jointlaw as jl
+from jointlaw.accuracy.slip import LEG, distance, slip
 from jointlaw.accuracy.suite import standard_suite
 from jointlaw.accuracy.tradeoff import _time
 from jointlaw.discretisation.facets import facets
@@ -95,6 +96,20 @@ def test_each_resolution_has_its_price(found):
     for name in ("worst", "friction", "dilation"):
         one, fast, balanced = [getattr(row, name) for row in found.rows]
         assert one > fast > balanced > 0.0, name
+
+
+def test_slip_tells_friction_and_dilation_along_its_way(make_law):
+    """At half the stress, across the axis of c, there and back: as a test of one joint says."""
+    law = make_law(5.0, 0.0, 0.3, resolution="fast")
+    told = slip(law, law.closure_range, 1e6, np.array([[0.5, 90.0, 1.0]]))
+    far = distance(law.mating_length, law.closure_range)
+    record = jl.direct_shear(law.joint(), [far, 0.0], 5e5, azimuth=np.pi / 2, steps=400)
+    friction = np.degrees(np.arctan(record.shear_stress / 5e5))
+    assert told.friction[[LEG - 1, -1], 0] == pytest.approx(
+        [friction[400], -friction[800]], abs=0.1
+    )
+    dilation = np.degrees(np.arctan(-np.diff(record.closure) / (far / 400)))
+    assert told.dilation[LEG - 1, 0] == pytest.approx(dilation[399], abs=0.5)
 
 
 def test_the_frontier_falls(found):

@@ -43,6 +43,9 @@ def test_the_upper_half_of_the_measured_curve_is_predicted_within_one_percent(gr
     assert (low <= held).all()
     assert (held <= high).all()
     assert (high[-1] - low[-1]) / held[-1] < 0.25  # and still says something
+    (axes,) = fit.plot(held_out=(held, u)).axes
+    dots = {line.get_label(): line.get_xydata() for line in axes.lines}
+    assert dots["measured, not fitted"] == pytest.approx(np.column_stack([1e6 * u, held / 1e6]))
 
 
 def test_one_curve_cannot_fix_heights_and_says_so(grimsel):

@@ -63,9 +63,8 @@ ROCK = 42.8e-6 / 10.27e6  # m/Pa: of the rock and the machine of this specimen
 
 def main():
     stress, measured = first_loading(*datasets.load("grimsel_vd1_closure"))
-    rows = []
+    rows, seen = [], stress <= 5.3e6
     for what, closure in (("", measured), ("fracture alone: ", measured - ROCK * stress)):
-        seen = stress <= 5.3e6
         points = stress[seen], closure[seen]
         laws = {"jointlaw": jl.fit_curves([jl.ClosureCurve(*points)]).predict}
         laws |= {name: fitted(name, *points) for name in LAWS}
@@ -75,12 +74,11 @@ def main():
             rows.append([what + name, f"{error[-1]:+.1f} %", f"{rms:.1f} %"])
         choices = []
         for top, alpha in CHOICES:
-            seen = stress <= top
-            curve = jl.ClosureCurve(stress[seen], closure[seen])
+            curve = jl.ClosureCurve(stress[stress <= top], closure[stress <= top])
             fit = jl.fit_curves([curve], priors={"alpha": alpha})
             choices.append(100 * (fit.predict(closure[-1]) / stress[-1] - 1))
-        choices = f"{min(choices):+.1f} to {max(choices):+.1f} %"
-        rows.append([f"{what}jointlaw, nine choices", choices, ""])
+        spread = f"{min(choices):+.1f} to {max(choices):+.1f} %"
+        rows.append([f"{what}jointlaw, nine choices", spread, ""])
     print(table(["law", "error at 10.3 MPa", "rms from 6 to 10.3 MPa"], rows))
 
 

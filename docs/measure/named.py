@@ -12,8 +12,7 @@ from jointlaw.parameters.resolution import NAMED
 
 asked(__doc__)
 
-sliders = dict.fromkeys(NAMED, 0)
-rows = []
+sliders, rows = dict.fromkeys(NAMED, 0), []
 for preset in jl.presets.names():
     law = replace(jl.presets.load(preset), plane=0.0)
     suite, cells = standard_suite(law, excursions=EXCURSIONS), []
@@ -22,5 +21,4 @@ for preset in jl.presets.names():
         sliders[name] = max(sliders[name], made.tables.sliders)
         cells.append(f"{100 * suite.miss(made).largest.max():.2f}")
     rows.append([preset, *cells])
-most = ["sliders, at most", *sliders.values()]
-print(table(["preset", *NAMED], [*rows, most]))
+print(table(["preset", *NAMED], [*rows, ["sliders, at most", *sliders.values()]]))

@@ -18,8 +18,8 @@ for rule in RULES:
     for stress in (26e3, 6e3):
         for name in ("along", "across"):
             law = replace(laws[name], resolution=jl.Resolution(*rule))
-            way = [1.2 * law.mating_length]  # friction peaks within a mating length
-            record = jl.direct_shear(law.joint(), to=way, normal=stress, steps=120)
+            # friction peaks within a mating length
+            record = jl.direct_shear(law.joint(), 1.2 * law.mating_length, stress, steps=120)
             found.append(f"{record.peak_friction_angle:.2f}")
     rows.append([", ".join(map(str, rule)), *found])
 print(table(HEAD, rows))

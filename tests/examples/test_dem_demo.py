@@ -243,6 +243,20 @@ def test_history_survives_a_gap():
     assert (sim.joints.place == places).all()
 
 
+BOND = "bond = { normal_stiffness = 1e9, shear_stiffness = 1e9, tension = 1e4, cohesion = 1e5 }\n"
+
+
+def test_what_meets_in_a_run_has_no_bond():
+    """One block lies on another with its bond; a third falls on it from beyond the skin."""
+    falls = block("two", box=[0.5, 0.3], at=[0.0, 0.72], velocity=[0.0, -1.0])
+    text = f"[laws.rock]\n{ROCK}{BOND}{BASE}{ONE}{falls}[run]\nend = 0.2\nmax_overlap = 0.3\n"
+    sim = Simulation(parse(text))
+    while not sim.joints.traction[sim.tracker.between(1, 2), 0].any():
+        sim.step()
+    assert (sim.joints.damage[sim.tracker.between(1, 2)] == 1).all()
+    assert (sim.joints.damage[sim.tracker.between(0, 1)] < 1).all()
+
+
 TEXT = f"""
 gravity = [3.0, -9.0]
 [laws."rock/rough"]

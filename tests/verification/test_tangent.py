@@ -144,6 +144,15 @@ def test_the_tangent_stays_below_both_bounds(seed):
     assert closest > 0.2  # a bound, but not an empty one
 
 
+def test_the_bound_of_heights_of_one_group_has_no_further_part(make_law):
+    """On the virgin curve it is (1 + mu) times the stiffness of the springs: h1 = h2 = 0."""
+    law = make_law()
+    closure = law.closure_range * np.linspace(0.2, 1.0, 5)
+    k, mu = law.tables.asperities, law.asperity.mu
+    springs = law.curve.force(closure)[1] * np.sum(k.area / k.c1)
+    assert law.max_stiffness(closure) == pytest.approx((1.0 + mu) * springs, rel=1e-12)
+
+
 @pytest.mark.parametrize("eta", [0.0, 0.5])
 def test_heights_of_two_groups_are_bounded(eta):
     """Few asperities touch long before many do: |C| is far above the bound of other heights."""

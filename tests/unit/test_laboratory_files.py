@@ -273,6 +273,11 @@ def test_rows_that_are_no_measurement_are_named_until_an_option_settles_it(kind,
     assert told in skipped.notes[0]
 
 
+def test_a_lost_reading_in_a_row_without_a_stress_needs_no_option(tmp_path):
+    text = "No,us [mm],tau [MPa]\n" + rows(range(21), LONG, 2 * LONG) + "\n21,-999,"
+    assert read(tmp_path, text, **NORMAL)[0].shear.size == 21
+
+
 WAY = np.linspace(0, 2, 41)  # mm
 KILO = np.round(1250 * (1 - np.exp(-WAY / 0.2)) - 5 * (WAY == 0), 1)  # kPa; the first is scatter
 

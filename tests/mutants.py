@@ -144,7 +144,7 @@ class Copy:
         return self.python("pytest", *plain, *arguments, **limit)
 
     def library(self):
-        """The bytes of the library without the hash of its sources, and what a linker makes of it."""
+        """The bytes of the library without the hash of its sources and the linker's."""
         (made,) = (self.at / BUILT).glob("libjointlaw.*")
         return re.sub(rb"[0-9a-f]{16}|GNU\0.{20}", b"", made.read_bytes(), flags=re.DOTALL)
 

@@ -227,23 +227,30 @@ def test_the_saved_law_has_the_fitted_peaks(tmp_path, capsys):
     peaks lie within 6 %, those at 2 and 4 MPa, that were not fitted, too; what is left at 10 mm
     within 3 %, the displacements of the peaks, which are flat, within a third.
     """
-    fitted = (1.0, 3.0, 5.0)
-    for normal in fitted:
-        peak, at, residual = MEASURED[normal]
+    for normal, (peak, at, residual) in MEASURED.items():
         rows = [f"{way},{stress},{normal}" for way, stress in ((0, 0), (at, peak), (10, residual))]
         (tmp_path / f"{normal}.csv").write_text("\n".join(["us [mm],tau [MPa],sn [MPa]", *rows]))
-    assert main(["fit", "--shear", "1.0.csv", "3.0.csv", "5.0.csv", "--out", "o"]) == 0
+    files = [f"{normal}.csv" for normal in MEASURED]
+    assert main(["fit", "--shear", *files, "--fit", "1MPa,3MPa,5MPa", "--out", "o"]) == 0
     printed = capsys.readouterr().out
     assert "Hold mu, asperity_density: give what you know" in printed
     assert float(printed.partition("changes these figures by ")[2].split()[0]) < 0.5
-    drawn = [line.split("|")[3] for line in printed.splitlines() if line.startswith("| ")][-3:]
-    peaks = {n: float(cell.partition(",")[0]) for n, cell in zip(fitted, drawn, strict=True)}
+    cells = [line.split("|")[1:] for line in printed.splitlines() if line.startswith("| ")]
+    of = {name.strip(): [cell.split(",") for cell in more] for name, *more in cells}
+    assert [form.strip() for (form,) in of["test"][2:5]] == ["Coulomb", "Barton", "power law"]
+    line = np.polyfit([1, 3, 5], [MEASURED[normal][0] for normal in (1, 3, 5)], 1)
     law = jl.JointLaw.from_toml("o/law.toml")
     for normal, (peak, at, residual) in MEASURED.items():
         record = jl.direct_shear(law.joint(), [10e-3], 1e6 * normal, steps=1000)
         top = int(np.argmax(record.shear_stress))
         found = 1e-6 * record.shear_stress
-        assert found[top] == pytest.approx(peaks.get(normal, found[top]), rel=0.03)
+        told = of[f"{normal}.csv, {normal:g} MPa"]
+        if normal in (2.0, 4.0):
+            off = 100 * (np.polyval(line, normal) / peak - 1)
+            assert float(told[2][0]) == pytest.approx(off, abs=0.06)
+            assert found[top] == pytest.approx(peak * (1 + float(told[1][0]) / 100), rel=0.03)
+        else:
+            assert found[top] == pytest.approx(float(told[1][0]), rel=0.03)
         assert found[top] == pytest.approx(peak, rel=0.06)
         assert found[-1] == pytest.approx(residual, rel=0.03)
         assert record.shear[top] == pytest.approx(1e-3 * at, rel=1 / 3)

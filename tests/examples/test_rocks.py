@@ -310,6 +310,9 @@ def test_what_cannot_be_built_or_run_is_a_row_with_its_reason_but_for_the_scene_
     long = replace(scene.run, step=1.8 * Simulation(scene).limit.now)
     row, none = _run("twice the time step", lambda: replace(scene, run=long), None)
     assert row["note"].startswith("refused: time step")
+    rock = parse(f"[laws.joint]\n{coulomb(0.1, 1e9, 1e9)}" + NOTCHED.replace("CUT", ""))
+    row, _ = _run("a rock has columns of its own", lambda: rock, 1e-3)
+    assert (row["beam, state"], row["beam, moved_m"]) == ("stands", pytest.approx(0.0, abs=1e-9))
     # a block that starts deep in its base, which no time step mends
     with pytest.raises(Refused, match="overlap by"):
         ablate(parse(SLOPE.replace("0.15]", "0.1]")))

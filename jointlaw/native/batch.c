@@ -7,6 +7,7 @@
 #include "lanes.h"
 #include "elements.h"
 #define JL_OF_KIND static __attribute__((noinline))
+#define JL_MANY 1
 #include "law.h"
 #include <stdlib.h>
 #include <string.h>

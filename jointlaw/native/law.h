@@ -888,17 +888,22 @@ JL_IN jl_of_joint jl_stiffness(const jlaw_law *law, jl_numbers n)
 /* The step, compiled for each kind, each a function of its own where many joints share it: compilers
  * find registers for one kind at a time. A plane costs half of space; a tangent, a ledger or `all`
  * that is not asked for costs nothing. Where asperities yield or slopes wear, the law needs the
- * ledger. */
+ * ledger. JL_MANY: more kinds, for who advances many joints by one library; a header compiles fewer,
+ * with a ledger or without, and never asks for `all`. */
 #ifndef JL_OF_KIND
 #define JL_OF_KIND JL_IN
+#define JL_MANY 0
 #endif
 #define JL_STEP_AS(name, tangent, seen, ...)                                                \
   JL_OF_KIND void jl_step_##name(const jlaw_law *law, jl_numbers n, const jl_of_joint d[3], \
                                  jl_of_joint F[3], jl_of_joint C[9], int ledger, int kept,  \
                                  jl_amounts *all)                                           \
   {                                                                                         \
-    const jl_kind k = {__VA_ARGS__, tangent, ledger, kept};                                 \
-    jl_step(law, n, d, F, C, k, (seen) ? all : NULL);                                       \
+    const jl_kind plain = {__VA_ARGS__, tangent, 0, kept};                                  \
+    const jl_kind k = {__VA_ARGS__, tangent, JL_MANY || ledger, kept};                      \
+    if (!(seen)) all = NULL;                                                                \
+    if (JL_MANY && !ledger && !k.wears) jl_step(law, n, d, F, C, plain, all);               \
+    else jl_step(law, n, d, F, C, k, all);                                                  \
   }
 #define JL_KIND(name, ...)                   \
   JL_STEP_AS(name, 0, 0, __VA_ARGS__)        \
@@ -924,16 +929,17 @@ JL_IN void jl_step_of_kind(const jlaw_law *law, jl_numbers n, const jl_of_joint 
   ledger = ledger || y || w;
 #define JL_STEP(name)                                                        \
   {                                                                          \
-    if (tangent) jl_step_##name##_C(law, n, d, F, C, ledger, kept, all);     \
-    else if (all) jl_step_##name##_seen(law, n, d, F, C, ledger, kept, all); \
-    else jl_step_##name(law, n, d, F, C, ledger, kept, all);                 \
+    if (tangent) jl_step_##name##_C(law, n, d, F, C, ledger, kept, NULL);    \
+    else if (JL_MANY && all)                                                 \
+      jl_step_##name##_seen(law, n, d, F, C, ledger, kept, all);             \
+    else jl_step_##name(law, n, d, F, C, ledger, kept, NULL);                \
   }
-  if (law->fades && (y || dim == 1)) JL_STEP(rare_fades)
+  if (law->fades && (y || dim == 1 || (w && !JL_MANY))) JL_STEP(rare_fades)
   else if (y || dim == 1) JL_STEP(rare)
-  else if (dim == 2 && w) JL_STEP(plane_wears)
+  else if (JL_MANY && dim == 2 && w) JL_STEP(plane_wears)
   else if (dim == 2 && law->fades) JL_STEP(plane_fades)
   else if (dim == 2) JL_STEP(plane)
-  else if (w) JL_STEP(space_wears)
+  else if (JL_MANY && w) JL_STEP(space_wears)
   else if (law->fades) JL_STEP(space_fades)
   else JL_STEP(space)
 #undef JL_STEP

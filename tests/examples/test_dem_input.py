@@ -227,7 +227,6 @@ def test_a_motion_by_lines_is_rounded_over_its_ease():
     """1 mm in 0.1 s, averaged over the last 0.04 s, or over 0.1 s if nothing is said."""
     for keys, ease in (("ease = 0.04", 0.04), ("", 0.1)):
         *_, drive = parse(TEXT.replace(LINES, f"{LINES}\n{keys}")).drives
-        assert drive.ease == ease
         assert drive(0.5 * ease) == pytest.approx(1e-2 * 0.125 * ease)
         assert drive(0.1 + ease) == pytest.approx(1e-3)
 

@@ -23,7 +23,7 @@ WIDEST = math.log(2) / 1.96  # standard error of a logarithm: a factor of 2 eith
 OPEN = 1e6  # upper over lower end of the interval of what nothing fixes
 SOFTENING = 3  # points of one test on the fall of the bond, to know its cohesion by
 AT_BOUND = 1e-6  # of the distance of the bounds
-SMALL = 0.01  # of the largest stress or opening: from there down a band is no longer of logarithms
+SMALL = 0.01  # of the largest stress or opening: larger ones have the bands of their logarithms
 TRADED = ("mu", "a")  # friction and slopes, which shear stress alone cannot tell apart
 
 
@@ -169,20 +169,20 @@ class Estimates:
 
     @property
     def openings(self) -> Array:
-        """95 % interval, low and high (2, 2), of the largest opening (m) in the shear test of the
-        lowest normal stress, that of `shear_band`, and of the tangent of its largest dilation
-        angle; NaN where it only closes.
+        """95 % interval, low and high (2, 2), of the opening (m) in the shear test of the lowest
+        normal stress, where `shear_band` reaches highest, and of the tangent of the largest
+        dilation angle; NaN where the joint only closes.
         """
         curve = min(self.problem.shears, key=lambda one: np.mean(one.normal))
-        (best,) = self.predict_shear(curve)
 
         def model(values: Values) -> Array:
             (test,) = sheared([curve], values, self.problem.settings)
             with np.errstate(invalid="ignore"):
                 return np.log([test.dilation])
 
-        opening = self.shear_band(curve)[1][:, np.argmax(best.opening)]
-        return np.stack([opening, np.exp(self._band(model))[:, 0]], axis=1)
+        opening = self.shear_band(curve)[1]
+        most = opening[:, np.argmax(opening[1])]
+        return np.stack([most, np.exp(self._band(model))[:, 0]], axis=1)
 
     def predict_shear(self, *curves: ShearCurve) -> list[Sheared]:
         """These tests by the fitted law."""
@@ -200,7 +200,8 @@ class Estimates:
     def shear_band(self, curve: ShearCurve) -> Array:
         """The same of shear stress and opening of a test (2, 2, rows): low and high of each.
 
-        That of their logarithms, but for what is small, which may be below zero.
+        Worked out for arcsinh(value / small), which is the logarithm of large values but for a
+        constant, and lets small ones change their sign.
         """
 
         def model(values: Values) -> Array:

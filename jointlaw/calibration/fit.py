@@ -13,7 +13,7 @@ from ..support.checks import Array
 from ..support.markdown import table
 from ..support.progress import track
 from ..support.pyplot import pyplot, style, written
-from .estimates import TRADED, Estimates
+from .estimates import Estimates
 from .forward import log_stress
 from .measured import ClosureCurve, ShearCurve
 from .priors import TRANSFORMS, Ranges, Values
@@ -36,7 +36,7 @@ TOO_MANY = (
     "These data do not fix so many parameters. Hold {}: give what you know (--set {}=VALUE), or "
     "leave it out of --free. Then the data fix the others."
 )
-HELD = "Held, and the intervals are for these values: {}."
+HELD = "Held; the intervals are those for these values alone: {}."
 UNMEASURED = (
     "**No opening was measured.** {}Less friction and more dilation give the same shear stress. "
     "Give the normal displacement of the tests, or hold mu (from a tilt test of saw-cut faces) or "
@@ -72,7 +72,7 @@ class Fit(Estimates):
         lines += ["", HELD.format(", ".join(f"{n} = {values[n]:.4g}" for n in held))]
         lines += ["", "Not fixed by these data:", ""] if left else []
         lines += [f"- {name}: {reason}" for name, reason in left.items()]
-        if set(self.too_many) - (set(TRADED) if self.traded else set()):  # else said below
+        if len(self.too_many) > self.traded:  # that mu, or a, is to be held is said below
             lines += ["", f"**{TOO_MANY.format(', '.join(self.too_many), self.too_many[0])}**"]
         names = [f"{one.name}, {part.what}" for one in self.problem.curves for part in one.series]
         series = zip(names, self.problem.series, self.solution.noise, strict=True)

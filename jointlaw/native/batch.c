@@ -6,8 +6,7 @@
 #include "batch.h"
 #include "lanes.h"
 #include "elements.h"
-#define JL_OF_KIND static __attribute__((noinline))
-#define JL_MANY 1
+#define JL_BATCH 1
 #include "law.h"
 #include <stdlib.h>
 #include <string.h>

@@ -885,14 +885,16 @@ JL_IN jl_of_joint jl_stiffness(const jlaw_law *law, jl_numbers n)
 
 /* ------------------------------------------------------------- kinds of a step */
 
-/* The step, compiled for each kind, each a function of its own where many joints share it: compilers
- * find registers for one kind at a time. A plane costs half of space; a tangent, a ledger or `all`
- * that is not asked for costs nothing. Where asperities yield or slopes wear, the law needs the
- * ledger. JL_MANY: more kinds, for who advances many joints by one library; a header compiles fewer,
- * with a ledger or without, and never asks for `all`. */
-#ifndef JL_OF_KIND
+/* The step, compiled for each kind. A plane costs half of space; a tangent, a ledger or `all` that is
+ * not asked for costs nothing. Where asperities yield or slopes wear, the law needs the ledger.
+ * Batches (JL_BATCH) have each kind with a ledger and without one, kinds of their own for slopes that
+ * wear, and a function for each: compilers find registers for one kind at a time. The header has
+ * fewer kinds, for the memory that compiling takes, and never asks for `all`. */
+#ifdef JL_BATCH
+#define JL_OF_KIND static __attribute__((noinline))
+#else
+#define JL_BATCH 0
 #define JL_OF_KIND JL_IN
-#define JL_MANY 0
 #endif
 #define JL_STEP_AS(name, tangent, seen, ...)                                                \
   JL_OF_KIND void jl_step_##name(const jlaw_law *law, jl_numbers n, const jl_of_joint d[3], \
@@ -900,9 +902,9 @@ JL_IN jl_of_joint jl_stiffness(const jlaw_law *law, jl_numbers n)
                                  jl_amounts *all)                                           \
   {                                                                                         \
     const jl_kind plain = {__VA_ARGS__, tangent, 0, kept};                                  \
-    const jl_kind k = {__VA_ARGS__, tangent, JL_MANY || ledger, kept};                      \
+    const jl_kind k = {__VA_ARGS__, tangent, JL_BATCH || ledger, kept};                     \
     if (!(seen)) all = NULL;                                                                \
-    if (JL_MANY && !ledger && !k.wears) jl_step(law, n, d, F, C, plain, all);               \
+    if (JL_BATCH && !ledger && !k.wears) jl_step(law, n, d, F, C, plain, all);              \
     else jl_step(law, n, d, F, C, k, all);                                                  \
   }
 #define JL_KIND(name, ...)                   \
@@ -929,17 +931,17 @@ JL_IN void jl_step_of_kind(const jlaw_law *law, jl_numbers n, const jl_of_joint 
   ledger = ledger || y || w;
 #define JL_STEP(name)                                                        \
   {                                                                          \
-    if (tangent) jl_step_##name##_C(law, n, d, F, C, ledger, kept, NULL);    \
-    else if (JL_MANY && all)                                                 \
+    if (tangent) jl_step_##name##_C(law, n, d, F, C, ledger, kept, all);     \
+    else if (JL_BATCH && all)                                                \
       jl_step_##name##_seen(law, n, d, F, C, ledger, kept, all);             \
-    else jl_step_##name(law, n, d, F, C, ledger, kept, NULL);                \
+    else jl_step_##name(law, n, d, F, C, ledger, kept, all);                 \
   }
-  if (law->fades && (y || dim == 1 || (w && !JL_MANY))) JL_STEP(rare_fades)
+  if (law->fades && (y || dim == 1 || (w && !JL_BATCH))) JL_STEP(rare_fades)
   else if (y || dim == 1) JL_STEP(rare)
-  else if (JL_MANY && dim == 2 && w) JL_STEP(plane_wears)
+  else if (JL_BATCH && dim == 2 && w) JL_STEP(plane_wears)
   else if (dim == 2 && law->fades) JL_STEP(plane_fades)
   else if (dim == 2) JL_STEP(plane)
-  else if (JL_MANY && w) JL_STEP(space_wears)
+  else if (JL_BATCH && w) JL_STEP(space_wears)
   else if (law->fades) JL_STEP(space_fades)
   else JL_STEP(space)
 #undef JL_STEP

@@ -251,9 +251,9 @@ def test_what_meets_in_a_run_has_no_bond():
     falls = block("two", box=[0.5, 0.3], at=[0.0, 0.72], velocity=[0.0, -1.0])
     text = f"[laws.rock]\n{ROCK}{BOND}{BASE}{ONE}{falls}[run]\nend = 0.2\nmax_overlap = 0.3\n"
     sim = Simulation(parse(text))
-    while not sim.joints.traction[sim.tracker.between(1, 2), 0].any():
+    while sim.time < 0.2 and not sim.joints.traction[sim.tracker.between(1, 2), 0].any():
         sim.step()
-    assert (sim.joints.damage[sim.tracker.between(1, 2)] == 1).all()
+    assert sim.joints.damage[sim.tracker.between(1, 2)].tolist() == [1.0, 1.0]
     assert (sim.joints.damage[sim.tracker.between(0, 1)] < 1).all()
 
 

@@ -40,17 +40,43 @@ def virgin_curve(law: Law) -> dict[str, np.ndarray]:
     top = float(law.closure(2e9))
     closure = np.concatenate([[0.0], np.geomspace(1e-8 * top, top, 600)])
     stress = law.normal_stress(closure)
-    stiffness = law.max_stiffness(closure)
-    if isinstance(law, jl.CoulombLaw):
-        # The law's bound has mu in it, for the coupling of shear to closure. That has no eigenvalue
-        # of its own: (kn, 0; mu kn, 0) has kn and 0.
-        stiffness = np.full(len(closure), max(law.normal_stiffness, law.shear_stiffness))
     return {
         "closure": closure,
         "stress": stress,
-        "stiffness": stiffness,
+        "stiffness": stiffness_bound(law, closure, 1.0),
         "work": cumulative_trapezoid(stress, closure, initial=0.0),
     }
+
+
+def stiffness_bound(law: Law, closure: np.ndarray, reduction: float) -> np.ndarray:
+    """Upper bound (k,) in Pa/m of the stiffness of joints closed to `closure` (k,) in m.
+
+    Their shear stress is divided by F = `reduction` and their sliding multiplied by it. A facet at
+    inclination theta then has the normal (cos, sin/F) and the tangent (-sin, cos/F), so its elastic
+    stiffness is the largest eigenvalue of a 2 x 2 matrix. Friction adds at most mu times the square
+    of the length of the normal.
+    """
+    F = reduction
+    if isinstance(law, jl.CoulombLaw):
+        # The coupling of shear to closure has no eigenvalue of its own: those of
+        # (kn, 0; mu kn, 0) are kn and 0.
+        return np.full(len(closure), max(law.normal_stiffness, law.shear_stiffness / F**2))
+    bound = law.max_stiffness(closure)
+    if F == 1.0:
+        return bound
+    cemented = 0.0
+    if bond := law.bond:
+        bound = bound - max(bond.normal_stiffness, bond.shear_stiffness)
+        cemented = max(bond.normal_stiffness, bond.shear_stiffness / F**2)
+    lam, mu = law.asperity.lam, law.asperity.mu
+    theta = np.linspace(0.0, np.pi / (2 * law.orientation.a), 65)
+    normal = np.cos(theta) ** 2 + np.sin(theta) ** 2 / F**2  # squares of the lengths
+    tangent = np.sin(theta) ** 2 + np.cos(theta) ** 2 / F**2
+    mixed = (np.cos(theta) * np.sin(theta) * (1 / F**2 - 1)) ** 2  # square of their product
+    spread = np.sqrt((normal - tangent / lam) ** 2 + 4 * mixed / lam)
+    elastic = 0.5 * (normal + tangent / lam + spread)
+    largest = float((elastic + mu * normal).max())
+    return bound * largest / (max(1.0, 1 / lam) + mu) + cemented
 
 
 class Held:
@@ -64,7 +90,7 @@ class Held:
     def __init__(self, law: Law, reduction: float) -> None:
         self.batch, self.free = jl.JointBatch(law, 0), []
         self.curve = {**virgin_curve(law)}
-        self.curve["stiffness"] = self.curve["stiffness"] * max(1.0, reduction**-2)
+        self.curve["stiffness"] = stiffness_bound(law, self.curve["closure"], reduction)
         self.grow(0)
 
     def grow(self, n: int) -> None:

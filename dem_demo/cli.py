@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from jointlaw import JointLaw, PathError, direct_shear
-from jointlaw.support.files import require_free, write_json
+from jointlaw.support.files import write_json
 from jointlaw.support.pyplot import FORMATS
 
 from .dynamics.simulation import Simulation
+from .output.folder import ABLATION, STRENGTH, require_free
 from .output.monitors import friction_angle
 from .output.record import named, sentence, sentences, told
 from .output.run import run, steps_to
@@ -196,7 +197,7 @@ def _warn_of_bond(name: str, law: JointLaw, stress: float) -> None:
 def _ablate(given: argparse.Namespace) -> None:
     given.out.mkdir(parents=True, exist_ok=True)  # a folder that cannot be is known before the work
     print(ablate.write(ablate.ablate(load(given.scene), given.until), given.out))
-    print(f"results in {given.out}: {ablate.TABLE}")
+    print(f"results in {given.out}: {ABLATION}")
 
 
 def _compare(given: argparse.Namespace) -> None:
@@ -240,8 +241,8 @@ def _reduce(given: argparse.Namespace) -> None:
             f"interrupted; {given.out / strength.FILE} has all finished trials: the same command "
             "goes on"
         ) from None
-    write_json(given.out / "strength.json", {"version": VERSION, "rows": rows})
-    print(f"strength.json and pictures of the failure in {given.out}")
+    write_json(given.out / STRENGTH, {"version": VERSION, "rows": rows})
+    print(f"{STRENGTH} and pictures of the failure in {given.out}")
 
 
 RUN = "--out", "--force", "--until", "--no-pictures", "--format", "--vtk"

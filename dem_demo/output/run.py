@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from jointlaw.support.files import clear_run, write_json
+from jointlaw.support.files import write_json
 from jointlaw.support.pyplot import FORMATS
 
 from ..dynamics.energy import COLUMNS
 from ..dynamics.simulation import Simulation, require_text
 from ..scene import Refused, Scene, usual_size
+from .folder import BLOCKS, HISTORY, clear_run
 from .monitors import look
 from .pictures import Pictures, curves
 from .record import Record, named, outcomes
@@ -22,7 +23,6 @@ from .record import Record, named, outcomes
 MOST_STEPS = 1e8  # of a run: days for a hundred blocks
 LOOKS = 8  # steps between two looks for slip
 VERSION = 2  # of summary.json
-HISTORY, BLOCKS = "history.csv", "blocks.csv"
 
 
 def run(

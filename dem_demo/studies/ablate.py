@@ -16,15 +16,14 @@ from typing import Any
 import numpy as np
 
 from jointlaw import JointLaw, PathError
-from jointlaw.support.files import clear_run
 
 from ..dynamics.simulation import Simulation
+from ..output.folder import ABLATION, clear_run
 from ..output.record import Record, write_csv
 from ..output.run import run
 from ..scene import Refused, Scene, overlay
 
 COST = ("steps", "time_step_s", "cpu_s", "time_ratio", "note")
-TABLE = "ablation.csv"
 
 SINGLE = {"formation": "individual"}  # population curves are not convex at eta = 0
 STIFFENS = {"orientation", "asperity", "heights"}  # parts that the stiffness depends on
@@ -160,7 +159,7 @@ def write(rows: list[dict], folder: Path) -> str:
     """ablation.csv of some rows; returns what each changed, a line a row."""
     clear_run(folder)
     columns = [*dict.fromkeys(key for row in rows for key in row if key not in COST), *COST]
-    write_csv(folder / TABLE, columns, ([row.get(c) for c in columns] for row in rows))
+    write_csv(folder / ABLATION, columns, ([row.get(c) for c in columns] for row in rows))
     return "\n".join(
         f"{row['without']}: " + (row["note"] or f"ends {row.get('end, apart_mm', 0.0):.3g} mm "
                                  f"apart, time x {row['time_ratio']:.2f}")

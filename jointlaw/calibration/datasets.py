@@ -67,6 +67,13 @@ PEAKS = (
 )  # fmt: skip
 STEADY = 0.05  # largest change of a normal stress that counts as constant, as a share of it
 SCATTER, TARE = 0.02, 0.1  # of the largest shear stress: see above
+# for a column of another unit than the one that was read
+REMEDIES = {
+    "stress": f'is the column in another unit? Name it: {STRESS.option} "NAME:MPa"',
+    "closure": f'is the column in another unit? Name it: {CLOSURE.option} "NAME:um"',
+    "shear stress": f'is the column in another unit? Name it: {SHEAR_STRESS.option} "NAME:MPa"',
+    "shear displacement": f'is the column in another unit? Name it: {SHEAR.option} "NAME:mm"',
+}
 OFF = {"shear": 0.1, "opening": 0.5}  # of the range of a gauge: how far it begins from zero
 
 
@@ -108,7 +115,7 @@ def read_closure(
     top = int(np.argmax(np.abs(pressed)))
     _require_sign(pressed[top] > 0, s, STRESS, "has compression negative", table)
     _require_sign(closed[top] >= closed[0], u, CLOSURE, "falls while the stress rises", table)
-    require_rock({"stress": pressed[top], "closure": float(np.ptp(closed))}, f"{path}: ")
+    require_rock({"stress": pressed[top], "closure": float(np.ptp(closed))}, f"{path}: ", REMEDIES)
     return pressed, closed, notes
 
 
@@ -196,6 +203,7 @@ def _shear_test(
             "peak shear stress over normal stress": float(np.max(np.abs(y) / pressed)),
         },
         f"{table.name}: ",
+        REMEDIES,
     )
     label = f"{Path(table.name).name}, {mean / 1e6:.3g} MPa"
     steady = mean if np.ptp(pressed) <= STEADY * mean else pressed

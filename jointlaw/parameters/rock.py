@@ -1,6 +1,6 @@
-"""What rock joints can be: numbers far outside are slips of units, refused by commands and scenes.
+"""Ranges of rock joints: commands and scenes refuse numbers far outside as mistakes of units.
 
-The law itself takes any number: it has no unit of its own.
+The law itself accepts any number.
 """
 
 import math
@@ -8,17 +8,17 @@ from collections.abc import Mapping
 
 from .asperity import Asperity
 
-# Where nothing is known: shear modulus 20 GPa, Poisson's ratio 0.25, asperities of 1 mm radius
+# Contacts of an unknown rock: shear modulus 20 GPa, Poisson's ratio 0.25, asperities of 1 mm radius
 # (Eq. 34), friction 0.6 (Byerlee 1978)
 ROCK = Asperity.hertz_mindlin(G=20e9, nu=0.25, R=1e-3, mu=0.6)
-_OTHER = "is the column in another unit? Name it:"
+_UNIT = "is it in the unit that was read or given?"
 _SCALE = "are the columns in the units that were read or given?"
 #: Highest coefficient of friction: 79 degrees, beyond any rock
 STEEPEST = 5.0
 # from soft infill under paper to lapped granite under a mountain
 _STIFFNESS = (1e6, 1e15, " Pa/m", "1 GPa/m is 1e9 Pa/m")
 _FRICTION = (0.0, STEEPEST, "", "it is a coefficient, tan(angle): tan(35 degrees) = 0.7")
-# lowest, highest, unit, and the likely cause of a number outside
+# lowest value, highest value, unit, and the likely cause of a number outside
 RANGES = {
     "mu": _FRICTION,
     "friction": _FRICTION,
@@ -34,12 +34,12 @@ RANGES = {
     "asperity_density": (1e-3, 1e14, " /m2", "heights and spacing in the same unit?"),
     # 90/a degrees is the steepest inclination
     "a": (1.05, 1e3, "", "are the heights and the spacing in the units that were given?"),
-    "closure": (1e-9, 0.02, " m", f'{_OTHER} --closure-column "NAME:um"'),
-    "shear displacement": (1e-8, 2.0, " m", f'{_OTHER} --shear-column "NAME:mm"'),
+    "closure": (1e-9, 0.02, " m", _UNIT),
+    "shear displacement": (1e-8, 2.0, " m", _UNIT),
     # beyond the strength of any rock, or below the weight of a sheet of paper on it
-    "shear stress": (10.0, 5e9, " Pa", f'{_OTHER} --shear-stress-column "NAME:MPa"'),
-    "stress": (10.0, 5e9, " Pa", f'{_OTHER} --stress-column "NAME:MPa"'),
-    "normal stress": (10.0, 5e9, " Pa", "is it in the unit that was read or given?"),
+    "shear stress": (10.0, 5e9, " Pa", _UNIT),
+    "stress": (10.0, 5e9, " Pa", _UNIT),
+    "normal stress": (10.0, 5e9, " Pa", _UNIT),
     # joints at 10 kPa have reached 10
     "peak shear stress over normal stress": (
         0.02,
@@ -51,8 +51,14 @@ RANGES = {
 }
 
 
-def require_rock(values: Mapping[str, float], where: str = "") -> None:
-    """Refuse numbers outside `RANGES`; those without a range, and NaN or infinite ones, pass.
+def require_rock(
+    values: Mapping[str, float], where: str = "", remedies: Mapping[str, str] | None = None
+) -> None:
+    """Refuse numbers outside `RANGES`. Names without a range, NaN and infinite numbers pass.
+
+    values: numbers by the name of their range, in SI units.
+    where: begins the message; it names the file or the option.
+    remedies: by name, what to write instead of the cause in `RANGES`.
 
     Raises ValueError naming the value, the bounds and the likely cause.
     """
@@ -63,5 +69,5 @@ def require_rock(values: Mapping[str, float], where: str = "") -> None:
         if not low <= value <= high:
             raise ValueError(
                 f"{where}{name} = {value:.6g}{unit} is outside the range of rock joints "
-                f"({low:.4g} to {high:.4g}{unit}): {cause}"
+                f"({low:.4g} to {high:.4g}{unit}): {(remedies or {}).get(name, cause)}"
             )

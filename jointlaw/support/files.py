@@ -1,23 +1,20 @@
-"""Files that are written whole or not at all."""
+"""Atomic writing of files, and the folder of a run: it is created, checked and cleared here."""
 
 import contextlib
 import json
 import os
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-# What a run leaves beside what its summary lists; a folder that has one of these holds a run
-LEFT = ("summary.json", "history.csv", "ablation.csv", "state/scene.toml", "state/state.npz",
-        "refused/scene.toml", "refused/state.npz")  # fmt: skip
-MARKS = (*dict.fromkeys(name.partition("/")[0] for name in LEFT), "strength.json")
+SUMMARY = "summary.json"  # lists the other files of a run under "files"
 
 
 def replace_file(path: Path, data: bytes) -> None:
-    """Write a file whole or not at all."""
-    mine = f"{os.getpid()}-{threading.get_ident()}"  # another thread may write the same file
-    temporary = path.with_name(f".{path.name}.{mine}.tmp")
+    """Write a file atomically: a reader finds the old content or the new one, never a part."""
+    writer = f"{os.getpid()}-{threading.get_ident()}"  # another thread may write the same file
+    temporary = path.with_name(f".{path.name}.{writer}.tmp")
     try:
         temporary.write_bytes(data)
         os.replace(temporary, path)
@@ -25,8 +22,11 @@ def replace_file(path: Path, data: bytes) -> None:
         temporary.unlink(missing_ok=True)
 
 
-def made(folder: Path) -> Path:
-    """The folder, made if it is missing. Raises ValueError where it cannot be."""
+def make_folder(folder: Path) -> Path:
+    """Create a folder and its parents if they are missing; returns it.
+
+    Raises ValueError naming the folder and the reason.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -38,39 +38,59 @@ def made(folder: Path) -> Path:
 
 
 def write_files(directory: str | Path, files: Mapping[str, str | bytes]) -> Path:
-    """Write files by name into a folder, which is made if missing; returns it."""
-    folder = made(Path(directory))
-    for name, data in files.items():
-        replace_file(folder / name, data.encode() if isinstance(data, str) else data)
+    """Write files by name into a folder, which is created if it is missing; returns the folder.
+
+    files: content by name; text is written as UTF-8. Each file is written atomically.
+
+    Raises ValueError where the folder cannot be created.
+    """
+    folder = make_folder(Path(directory))
+    for name, content in files.items():
+        replace_file(folder / name, content.encode() if isinstance(content, str) else content)
     return folder
 
 
-def require_free(folder: Path) -> None:
-    """Refuse a folder that holds another run. Raises ValueError with the remedy."""
-    if held := [name for name in MARKS if (folder / name).exists()]:
+def require_free(folder: Path, marks: Iterable[str] = (SUMMARY,)) -> None:
+    """Refuse a folder that holds the results of another run.
+
+    marks: names of files or folders each of which shows that a run has written here.
+
+    Raises ValueError naming the marks that were found, and the remedy.
+    """
+    found = [name for name in marks if (folder / name).exists()]
+    if found:
         raise ValueError(
-            f"{folder} holds another run ({', '.join(held)}): give another --out, or --force to "
+            f"{folder} holds another run ({', '.join(found)}): give another --out, or --force to "
             "replace it"
         )
 
 
-def clear_run(folder: Path) -> None:
-    """Make a folder for results; of a run that it holds what that wrote is removed, and no more."""
-    made(folder)
-    paths = [*(folder / name for name in LEFT), *folder.glob("vtk/*.vtu")]
+def clear_run(folder: Path, patterns: Iterable[str] = ()) -> None:
+    """Create a folder for results, or remove the results of an earlier run from it.
+
+    Removed are `summary.json`, the files that it lists, the files that match `patterns` (as
+    `Path.glob` reads them), and folders named in the patterns that are empty then. All other files
+    stay.
+    """
+    make_folder(folder)
+    paths = [folder / SUMMARY]
     with contextlib.suppress(OSError, ValueError):  # an interrupted run has no summary
-        written = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["files"]
-        paths += [folder / Path(name).name for name in written]
+        listed = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))["files"]
+        paths += [folder / Path(name).name for name in listed]
+    subfolders = set[str]()
+    for pattern in patterns:
+        paths += folder.glob(pattern)
+        subfolders.add(pattern.rpartition("/")[0])
     for path in paths:
         if path.is_file():
             path.unlink()
-    for name in ("state", "refused", "vtk"):
-        with contextlib.suppress(OSError):  # it is not empty: other files are in it
+    for name in subfolders - {""}:
+        with contextlib.suppress(OSError):  # missing, or not empty: files of the user are in it
             (folder / name).rmdir()
 
 
 def write_json(path: Path, data: Any) -> None:
-    """Strict JSON: what is not finite becomes null, numpy's numbers and arrays plain ones."""
-    plain = json.dumps(data, default=lambda one: one.tolist())
-    finite = json.loads(plain, parse_constant=lambda name: None)
+    """Write strict JSON: NaN and infinity become null, numpy numbers and arrays plain ones."""
+    text = json.dumps(data, default=lambda array: array.tolist())
+    finite = json.loads(text, parse_constant=lambda constant: None)
     replace_file(path, (json.dumps(finite, indent=2, ensure_ascii=False) + "\n").encode())

@@ -13,7 +13,7 @@ from .joints.joint import Joint
 from .joints.pool import JointPool
 from .joints.state import NonFiniteError, load_state
 from .laboratory.experiments import PathError, closure_test, direct_shear
-from .laboratory.record import Record
+from .laboratory.record import TestRecord
 from .laws.coulomb_law import CoulombLaw
 from .laws.joint_law import JointLaw
 from .paper import closed_form
@@ -52,9 +52,9 @@ __all__ = [
     "NonFiniteError",
     "Orientation",
     "PathError",
-    "Record",
     "Resolution",
     "ShearCurve",
+    "TestRecord",
     "closed_form",
     "closure_test",
     "direct_shear",

@@ -143,7 +143,7 @@ def slip_angle(scene: Scene, law_name: str, moving: int, length: float) -> dict:
     return {"predicted_angle": None, "normal_stress": None}
 
 
-def shear_curve(law: Law, stress: float, slid: np.ndarray) -> jl.Record | None:
+def shear_curve(law: Law, stress: float, slid: np.ndarray) -> jl.TestRecord | None:
     """Direct shear of the law alone along the turning points of `slid` (m), at a normal stress.
 
     None for plain Coulomb and where the law cannot be sheared like this: no normal stress, no

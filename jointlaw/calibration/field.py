@@ -1,12 +1,13 @@
-"""A law from field values: JRC, JCS, a friction angle and a stiffness at one normal stress."""
+"""A law from field values: JRC, JCS, a basic friction angle and a stiffness at a normal stress."""
 
 import math
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ..laboratory.experiments import direct_shear
-from ..laboratory.record import Record
+from ..laboratory.record import TestRecord
 from ..laws.joint_law import JointLaw
 from ..parameters.heights import GammaHeights
 from ..parameters.orientation import Orientation
@@ -14,17 +15,21 @@ from ..parameters.rock import ROCK
 from ..support.checks import more_than
 
 ASSUMED = (
-    "Assumed, for no field value tells them: contacts of asperities of 1 mm radius in rock of "
-    "G = 20 GPa and nu = 0.25, heights of a gamma density (alpha = 4, beta = 30 um), slopes that "
-    "wear over 1.25 mating lengths, no direction. JRC and JCS are taken as those of a joint of "
-    "this length: scale those of a laboratory sample first (docs/field.md). Dilation is not fitted "
-    "to Barton's: asperities of the law climb and do not break, so most of the peak above the "
-    "basic friction is dilation, where he takes half. The law holds near this normal stress; a "
-    "closure and a shear test tell more (jointlaw fit)."
+    "Assumed (not constrained by field values): contacts of asperities of 1 mm radius in rock of "
+    "G = 20 GPa and nu = 0.25, a gamma density of heights (alpha = 4, beta = 30 um), asperity "
+    "degradation over 1.25 mating lengths, no direction dependence. JRC and JCS must be values of "
+    "a joint of this length: scale the values of a laboratory sample first (docs/field.md). "
+    "Dilation is not fitted to Barton's: asperities of the law do not break, so most of the peak "
+    "strength above the basic friction is dilation, where Barton assumes half. The law holds near "
+    "this normal stress; for other stresses fit a closure and a shear test (jointlaw fit)."
 )
-_ROUNDS, _WAY = 30, 4.0  # of correction; peak displacements that a joint is sheared by
-# what may be missed: degrees of the peak, shares of its displacement and of the stiffness
-_ANGLE, _SLIP, _STIFFNESS = 0.1, 0.1, 0.01
+_MAX_ITERATIONS = 30
+_SHEAR_PER_PEAK = 4.0  # shear displacement of a test over the peak displacement
+_MAX_ANGLE_ERROR = 0.1  # degrees, of the peak friction angle
+_MAX_DISPLACEMENT_ERROR = 0.1  # relative, of the peak displacement
+_MAX_STIFFNESS_ERROR = 0.01  # relative, of the normal stiffness
+_MIN_ROUGHNESS_ANGLE = 1.0  # degrees
+_MAX_FRICTION_ANGLE = 80.0  # degrees
 
 
 def from_field(
@@ -38,68 +43,98 @@ def from_field(
 ) -> JointLaw:
     """The law with Barton's peak friction angle and peak displacement at one normal stress.
 
+    The peak friction angle is met within 0.1 degrees, the peak displacement within 10 % and the
+    stiffness within 1 %. `ASSUMED` lists the assumptions for all other parameters.
+
     Parameters
     ----------
     jrc: joint roughness coefficient of a joint of this length, > 0 (docs/field.md scales it).
-    jcs: strength of the joint wall in Pa, of this length too, above the normal stress.
-    length: of the joint in m.
-    normal_stress: in Pa; the law is right there, and less so at others (docs/field.md).
-    normal_stiffness: tangent stiffness at that stress in Pa/m.
-    basic_friction: friction angle of the flat rock in rad.
+    jcs: joint wall compressive strength in Pa at this length, above the normal stress.
+    length: length of the joint in m.
+    normal_stress: in Pa; the law is less accurate at other normal stresses (docs/field.md).
+    normal_stiffness: tangent stiffness at this normal stress in Pa/m.
+    basic_friction: friction angle of the flat rock surface in rad.
 
-    The peak is within 0.1 degrees, its displacement within 10 % and the stiffness within 1 %;
-    `ASSUMED` says what else is in it. Raises ValueError for values that no such law has.
+    Returns the law. Raises ValueError if no such law has these values.
 
-    Source: Barton & Choubey 1977 (peak angle), Barton & Bandis 1982 (its displacement).
+    Source: Barton & Choubey 1977 (peak angle), Barton & Bandis 1982 (peak displacement).
 
     >>> made = jl.from_field(jrc=10, jcs=100e6, length=0.1, normal_stress=1e6,
     ...                      normal_stiffness=30e9, basic_friction=np.radians(30))
     """
-    for name, value in (("jrc", jrc), ("jcs", jcs), ("length", length),
-                        ("normal_stress", normal_stress), ("normal_stiffness", normal_stiffness),
-                        ("basic_friction", basic_friction)):  # fmt: skip
+    arguments = {
+        "jrc": jrc,
+        "jcs": jcs,
+        "length": length,
+        "normal_stress": normal_stress,
+        "normal_stiffness": normal_stiffness,
+        "basic_friction": basic_friction,
+    }
+    for name, value in arguments.items():
         more_than(name, value, 0.0)
-    basic, climb = math.degrees(basic_friction), jrc * math.log10(jcs / normal_stress)
-    if not 1.0 <= climb <= 80 - basic:
+    basic_angle = math.degrees(basic_friction)
+    roughness_angle = jrc * math.log10(jcs / normal_stress)
+    max_roughness_angle = _MAX_FRICTION_ANGLE - basic_angle
+    if not _MIN_ROUGHNESS_ANGLE <= roughness_angle <= max_roughness_angle:
         raise ValueError(
-            f"jrc = {jrc:g} and jcs = {jcs:g} Pa at {normal_stress:g} Pa make joints climb by "
-            f"{climb:.3g} degrees above {basic:.3g}: it must be 1 to {80 - basic:.3g}; give a "
-            "normal stress at which roughness matters, or check the units"
+            f"jrc = {jrc:g} and jcs = {jcs:g} Pa at {normal_stress:g} Pa give a roughness angle of "
+            f"{roughness_angle:.3g} degrees above {basic_angle:.3g}: it must be 1 to "
+            f"{max_roughness_angle:.3g}; give a normal stress at which roughness matters, or check "
+            "the units"
         )
-    slip = peak_displacement(jrc, length)
-    law = JointLaw(
-        orientation=Orientation(90 / climb),
-        asperity=replace(ROCK, mu=math.tan(basic_friction)),
-        heights=GammaHeights(4.0, 30e-6, formation="individual"),
-        asperity_density=1e5,
-        mating_length=_WAY * slip,
-        slope_wear=1.25 * _WAY * slip * normal_stress * math.tan(math.radians(basic + climb)),
-    )
+    peak_angle = basic_angle + roughness_angle
+    target_displacement = peak_displacement(jrc, length)
+    law = _initial_law(basic_friction, roughness_angle, normal_stress, target_displacement)
     try:
-        for _ in range(_ROUNDS):  # each number by the ratio of what is wanted to what it gives
-            record, reached, stiffness = tested(law, normal_stress, slip)
-            missed = record.peak_friction_angle - basic - climb
-            slips, stiff = slip / reached, normal_stiffness / stiffness
-            if abs(missed) < _ANGLE and abs(slips - 1) < _SLIP and abs(stiff - 1) < _STIFFNESS:
+        for _ in range(_MAX_ITERATIONS):  # each parameter is scaled by target over result
+            result = shear_past_peak(law, normal_stress, target_displacement)
+            angle_error = result.record.peak_friction_angle - basic_angle - roughness_angle
+            displacement_ratio = target_displacement / result.peak_displacement
+            stiffness_ratio = normal_stiffness / result.normal_stiffness
+            if (
+                abs(angle_error) < _MAX_ANGLE_ERROR
+                and abs(displacement_ratio - 1) < _MAX_DISPLACEMENT_ERROR
+                and abs(stiffness_ratio - 1) < _MAX_STIFFNESS_ERROR
+            ):
                 return law
             law = replace(
                 law,
-                orientation=Orientation(law.orientation.a * (1 + missed / climb)),
-                asperity_density=law.asperity_density * stiff,
-                mating_length=law.mating_length * slips,
-                slope_wear=law.slope_wear * slips,  # or wear alone would make the peak, too early
+                orientation=Orientation(law.orientation.a * (1 + angle_error / roughness_angle)),
+                asperity_density=law.asperity_density * stiffness_ratio,
+                mating_length=law.mating_length * displacement_ratio,
+                # with the mating length, or degradation alone would cause the peak, too early
+                slope_wear=law.slope_wear * displacement_ratio,
                 closure_range=None,  # type: ignore[arg-type]
             )
-        nearest = (
-            f"the nearest misses the peak by {missed:+.2g} degrees, its displacement by "
-            f"{100 / slips - 100:+.2g} % and the stiffness by {100 / stiff - 100:+.2g} %"
+        reason = (
+            f"the nearest law misses the peak by {angle_error:+.2g} degrees, its displacement by "
+            f"{100 / displacement_ratio - 100:+.2g} % and the stiffness by "
+            f"{100 / stiffness_ratio - 100:+.2g} %"
         )
     except ValueError as error:
-        nearest = str(error)
+        reason = str(error)
     raise ValueError(
-        f"normal_stiffness = {normal_stiffness:g} Pa/m, length = {length:g} m: no law has them and "
-        f"a peak of {basic + climb:.3g} degrees at {1e3 * slip:.3g} mm ({nearest}); a joint "
-        "too soft closes by more than its peak displacement, one too stiff has its peak before it"
+        f"normal_stiffness = {normal_stiffness:g} Pa/m, length = {length:g} m: no law has this "
+        f"stiffness and a peak of {peak_angle:.3g} degrees at {1e3 * target_displacement:.3g} mm "
+        f"({reason}); the closure of a joint that is too soft exceeds its peak displacement, a "
+        "joint that is too stiff has its peak at a smaller displacement; check both values"
+    )
+
+
+def _initial_law(
+    basic_friction: float, roughness_angle: float, normal_stress: float, displacement: float
+) -> JointLaw:
+    """The first guess: inclinations from the roughness angle, lengths from the displacement."""
+    peak_angle = math.degrees(basic_friction) + roughness_angle
+    mating_length = _SHEAR_PER_PEAK * displacement
+    peak_friction = math.tan(math.radians(peak_angle))
+    return JointLaw(
+        orientation=Orientation(90 / roughness_angle),
+        asperity=replace(ROCK, mu=math.tan(basic_friction)),
+        heights=GammaHeights(4.0, 30e-6, formation="individual"),
+        asperity_density=1e5,
+        mating_length=mating_length,
+        slope_wear=1.25 * mating_length * normal_stress * peak_friction,
     )
 
 
@@ -108,11 +143,25 @@ def peak_displacement(jrc: float, length: float) -> float:
     return length / 500 * (jrc / length) ** 0.33
 
 
-def tested(law: JointLaw, normal_stress: float, slip: float) -> tuple[Record, float, float]:
-    """Shear to `_WAY` peak displacements `slip` (m), the displacement at the peak (m), and the
-    normal stiffness (Pa/m) before.
+class PeakTest(NamedTuple):
+    """A simulated direct shear test beyond its peak."""
+
+    record: TestRecord
+    peak_displacement: float  # m
+    normal_stiffness: float  # Pa/m, tangent before shear
+
+
+def shear_past_peak(law: JointLaw, normal_stress: float, displacement: float) -> PeakTest:
+    """Shear a new joint of a law to four times an expected peak displacement.
+
+    Parameters
+    ----------
+    law: the law.
+    normal_stress: constant normal stress in Pa.
+    displacement: expected shear displacement at the peak in m.
     """
     _, C = law.joint().update([law.closure(normal_stress), 0.0, 0.0])
     assert C is not None
-    record = direct_shear(law.joint(), _WAY * slip, normal_stress)
-    return record, float(record.shear[np.argmax(record.shear_stress)]), float(C[0, 0])
+    record = direct_shear(law.joint(), _SHEAR_PER_PEAK * displacement, normal_stress)
+    peak_row = np.argmax(record.shear_stress)
+    return PeakTest(record, float(record.shear[peak_row]), float(C[0, 0]))

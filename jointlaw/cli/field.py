@@ -3,7 +3,7 @@
 import argparse
 import math
 
-from ..calibration.field import ASSUMED, from_field, peak_displacement, tested
+from ..calibration.field import ASSUMED, from_field, peak_displacement, shear_past_peak
 from .command import OUT, PICTURES, Command, Written, in_unit, option, write_results
 
 GIVEN = ("jrc", "jcs", "length", "normal_stress", "normal_stiffness", "basic_friction")
@@ -13,7 +13,7 @@ _STRESS = in_unit("Pa", positive=True)
 def _run(options: argparse.Namespace) -> None:
     given = {name: getattr(options, name) for name in GIVEN}
     law, slip = from_field(**given), peak_displacement(options.jrc, options.length)
-    record, reached, stiffness = tested(law, options.normal_stress, slip)
+    record, reached, stiffness = shear_past_peak(law, options.normal_stress, slip)
     half = options.jrc * math.log10(options.jcs / options.normal_stress) / 2
     text = (
         f"A joint of {options.length:.4g} m at {options.normal_stress / 1e6:.4g} MPa: peak "

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..laboratory.experiments import PathError, closure_test, direct_shear
-from ..laboratory.record import UNITS, Record
+from ..laboratory.record import UNITS, TestRecord
 from ..laws.joint_law import JointLaw
 from ..parameters.rock import require_rock
 from .command import (
@@ -66,8 +66,8 @@ def _closure(options: argparse.Namespace) -> None:
 
 
 def _run(
-    law: JointLaw, options: argparse.Namespace, test: Callable[..., Record], *arguments: Any
-) -> Record:
+    law: JointLaw, options: argparse.Namespace, test: Callable[..., TestRecord], *arguments: Any
+) -> TestRecord:
     """Run a test and write its record, also that of a test that stopped early."""
     try:
         record = test(*arguments)
@@ -79,7 +79,7 @@ def _run(
     return record
 
 
-def _write(record: Record, law: JointLaw, options: argparse.Namespace) -> None:
+def _write(record: TestRecord, law: JointLaw, options: argparse.Namespace) -> None:
     """Curve (CSV), picture, law and summary of a test."""
     name, (length, stress) = options.command, options.units.split(",")
     files: Written = {

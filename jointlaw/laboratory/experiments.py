@@ -1,4 +1,8 @@
-"""Laboratory tests on one joint: closure and direct shear under normal control."""
+"""Simulated laboratory tests on one joint: closure tests and direct shear tests.
+
+The normal stress is controlled: in every step the closure increment is solved for at which the
+normal traction has its prescribed value (`joints.normal_control`).
+"""
 
 import math
 from collections.abc import Sequence
@@ -11,13 +15,16 @@ from ..joints.normal_control import NormalCondition, closing_increments
 from ..joints.state import NonFiniteError
 from ..support.checks import Array, at_least, integer, more_than, number, numbers
 from ..support.progress import track
-from .record import UNITS, Record
+from .record import UNITS, TestRecord
 
 
 class PathError(RuntimeError):
-    """A test could not go on, as `message` says; `record` holds all rows measured so far."""
+    """A test stopped before its end, for the reason in the message.
 
-    def __init__(self, message: str, record: Record) -> None:
+    `record` is the `TestRecord` of all completed steps.
+    """
+
+    def __init__(self, message: str, record: TestRecord) -> None:
         super().__init__(message, record)  # both, so that it can be pickled
         self.record = record
 
@@ -25,25 +32,26 @@ class PathError(RuntimeError):
         return str(self.args[0])
 
 
-def closure_test(joint: Joint, stress: float | Sequence[float], steps: int = 100) -> Record:
-    """Close a joint to a normal stress, from the one it carries, and open it again.
+def closure_test(joint: Joint, stress: float | Sequence[float], steps: int = 100) -> TestRecord:
+    """Load a joint from its present normal stress to a larger one, and unload it to zero.
 
     Parameters
     ----------
-    joint: the joint; it is left in the state at the end of the test.
-    stress: largest normal stress in Pa, > 0, or one for each cycle.
-    steps: steps per branch; rows crowd towards small stress as the stiffness does.
+    joint: the joint; after the test it is in the final state of the test.
+    stress: largest normal stress in Pa, > 0; a sequence gives one for each load cycle.
+    steps: steps per loading or unloading branch. They are shorter at small stress, where the joint
+        is softer.
 
-    Returns the Record, its first row the joint as it was given. Raises ValueError for a bad
-    argument and PathError, with the record so far, when a stress cannot be reached.
+    Returns a `TestRecord`, whose first row is the initial state of the joint. Raises ValueError for
+    an invalid argument, and PathError with the record so far if a stress cannot be reached.
 
     >>> record = jl.closure_test(law.joint(), 5e6)
-    >>> closed = record.closure.max()
+    >>> max_closure = record.closure.max()
     """
-    peaks = [more_than("stress", s, 0.0) for s in _series("stress", stress, "Pa")]
+    peaks = [more_than("stress", peak, 0.0) for peak in _as_series("stress", stress, "Pa")]
     steps = integer("steps", steps, 1)
     asperities = joint.law.tables.asperities
-    # stress grows with this power of closure where all asperities touch
+    # when all asperities are in contact, stress is proportional to closure^(1 + eta)
     power = 1.0 if asperities is None else 1.0 + asperities.curve.eta
     grading = (np.arange(1, steps + 1) / steps) ** power
     levels: list[float] = []
@@ -51,11 +59,12 @@ def closure_test(joint: Joint, stress: float | Sequence[float], steps: int = 100
     for peak in peaks:
         levels += [*(start + (peak - start) * grading), *(peak * grading[-2::-1]), 0.0]
         start = 0.0
-    log = _Log(joint, 0.0, "closure test")
-    log.measure(joint.F)
+    test = _Test(joint, 0.0, "closure test")
+    test.append_row(joint.F)
+    no_shear = np.zeros(joint.law.dim - 1)
     for level in track(levels, "closure test", len(levels)):
-        log.advance(np.zeros(joint.law.dim - 1), NormalCondition(level, max(peaks)))
-    return log.record()
+        test.apply_step(no_shear, NormalCondition(level, max(peaks)))
+    return test.record()
 
 
 def direct_shear(
@@ -65,23 +74,26 @@ def direct_shear(
     stiffness: float = 0.0,
     azimuth: float = 0.0,
     steps: int = 200,
-) -> Record:
-    """Seat a joint at a normal stress and shear it to one or more turning points.
+) -> TestRecord:
+    """Load a joint to a normal stress, then shear it to one or more reversal points.
 
     Parameters
     ----------
-    joint: the joint; it is left in the state at the end of the test.
-    to: turning points of the shear displacement in m, along the azimuth from where the joint
-        stands: one number, or several for reversals. No motion across the azimuth.
-    normal: normal stress in Pa at which the joint is seated, > 0.
-    stiffness: normal stiffness of the surroundings in Pa/m: the normal stress grows by it times
-        the dilation. Zero keeps the normal stress, infinity keeps the closure.
-    azimuth: direction of shear in rad, from axis 2 towards axis 3; a law with a plane shears
-        along that plane.
-    steps: steps per leg.
+    joint: the joint; after the test it is in the final state of the test.
+    to: reversal points of the shear displacement in m, along the azimuth and relative to the
+        initial displacement of the joint: one number, or a sequence for shear reversals. There is
+        no displacement across the azimuth.
+    normal: normal stress in Pa at the start of shear, > 0.
+    stiffness: normal stiffness of the surroundings in Pa/m. The normal stress increases by the
+        stiffness times the dilation: zero keeps the normal stress constant (CNL), a positive value
+        is constant normal stiffness (CNS), and infinity keeps the closure constant.
+    azimuth: direction of shear in rad, from axis 2 towards axis 3. A law with a plane shears along
+        this plane.
+    steps: steps between two reversal points.
 
-    Returns the Record, its first row the seated joint. Raises ValueError for a bad argument and
-    PathError, with the record so far, when the normal condition cannot be met.
+    Returns a `TestRecord`, whose first row is the joint under the normal stress before shear.
+    Raises ValueError for an invalid argument, and PathError with the record so far if the normal
+    condition cannot be met.
 
     >>> record = jl.direct_shear(law.joint(), to=[1e-6, -1e-6], normal=5e6)
     >>> angle = record.peak_friction_angle
@@ -89,7 +101,7 @@ def direct_shear(
     normal = more_than("normal", normal, 0.0)
     stiffness = at_least("stiffness", stiffness, 0.0, infinite=True)
     steps = integer("steps", steps, 1)
-    points = [number("to", p) for p in _series("to", to, "m")]
+    reversals = [number("to", point) for point in _as_series("to", to, "m")]
     azimuth = number("azimuth", azimuth)
     if joint.law.dim == 1:
         raise ValueError("joint: its law has closure_only; direct shear needs a law without")
@@ -99,38 +111,51 @@ def direct_shear(
             f"azimuth = {azimuth:g} rad: this law moves in its plane at {plane:g} rad only; "
             "use a law with plane=None"
         )
-    log = _Log(joint, azimuth if plane is None else plane, "direct shear")
-    along = np.array([math.cos(azimuth), math.sin(azimuth)]) if plane is None else np.ones(1)
-    log.advance(np.zeros_like(along), NormalCondition(normal, normal))  # seated without shear
-    condition = NormalCondition(normal, normal, stiffness, float(joint.delta[0]))
-    legs = np.repeat(np.diff(points, prepend=0.0) / steps, steps)
-    for length in track(legs, "direct shear", len(legs)):
-        log.advance(length * along, None if math.isinf(stiffness) else condition)
-    return log.record()
+    if plane is None:
+        direction = np.array([math.cos(azimuth), math.sin(azimuth)])
+        test = _Test(joint, azimuth, "direct shear")
+    else:
+        direction = np.ones(1)
+        test = _Test(joint, plane, "direct shear")
+    test.apply_step(np.zeros_like(direction), NormalCondition(normal, normal))
+    closure_before_shear = float(joint.delta[0])
+    condition = NormalCondition(normal, normal, stiffness, closure_before_shear)
+    increments = np.repeat(np.diff(reversals, prepend=0.0) / steps, steps)
+    for increment in track(increments, "direct shear", len(increments)):
+        test.apply_step(increment * direction, None if math.isinf(stiffness) else condition)
+    return test.record()
 
 
-def _series(name: str, value: float | Sequence[float], unit: str) -> Array:
-    """One number or several as a one-dimensional array."""
+def _as_series(name: str, value: float | Sequence[float], unit: str) -> Array:
+    """One number or a sequence of numbers as an array of one dimension."""
     series = np.atleast_1d(numbers(name, value, unit))
     if series.ndim != 1 or series.size == 0:
         raise ValueError(f"{name} = {value!r} must be one number ({unit}) or a sequence of them")
     return series
 
 
-class _Log:
-    """Rows of a test in progress, and the steps that add them."""
+class _Test:
+    """A test in progress: applies steps to the joint and collects the rows of the record."""
 
     def __init__(self, joint: Joint, azimuth: float, name: str) -> None:
-        self.joint, self.azimuth, self.name = joint, azimuth, name
+        self.joint = joint
+        self.azimuth = azimuth
+        self.name = name
         self.rows: list[Array] = []
-        dim, shear = joint.law.dim, [0.0, math.cos(azimuth), math.sin(azimuth)]
-        # the axes of the joint in space (dim, 3)
-        self.axes = np.eye(3) if dim == 3 else np.array([[1.0, 0.0, 0.0], shear])[:dim]
+        # unit vectors of the degrees of freedom of the joint in 3-D, (dim, 3)
+        if joint.law.dim == 3:
+            self.axes = np.eye(3)
+        else:
+            shear_axis = [0.0, math.cos(azimuth), math.sin(azimuth)]
+            self.axes = np.array([[1.0, 0.0, 0.0], shear_axis])[: joint.law.dim]
 
-    def advance(self, shear: Array, condition: NormalCondition | None) -> None:
-        """One step with the in-plane increment `shear` that meets the normal condition."""
+    def apply_step(self, shear: Array, condition: NormalCondition | None) -> None:
+        """Apply a shear increment (dim - 1,) in m, and the closure increment of the condition.
+
+        Without a condition the closure stays constant. Appends a row. Raises PathError.
+        """
+        step = np.concatenate([[0.0], shear])
         try:
-            step = np.concatenate([[0.0], shear])
             if condition is not None:
                 (step[0],) = closing_increments(self.joint._batch, step[None], condition)
             F, _ = self.joint.update(step, tangent=False)
@@ -138,16 +163,22 @@ class _Log:
             raise PathError(
                 f"{self.name} stopped after {len(self.rows)} rows: {error}", self.record()
             ) from error
-        self.measure(F)
+        self.append_row(F)
 
-    def measure(self, F: Array) -> None:
-        """Add a row from the joint's state and its traction F."""
-        joint, now = self.joint, self.joint.measures()
-        numbers = (now.sliding, now.separated, now.stored, joint.dissipated_energy)
-        self.rows.append(np.hstack([joint.delta @ self.axes, F @ self.axes, *numbers]))
+    def append_row(self, F: Array) -> None:
+        """Append a row with the state of the joint and its traction F."""
+        joint = self.joint
+        measures = joint.measures()
+        scalars = (
+            measures.sliding,
+            measures.separated,
+            measures.stored,
+            joint.dissipated_energy,
+        )
+        self.rows.append(np.hstack([joint.delta @ self.axes, F @ self.axes, *scalars]))
 
-    def record(self) -> Record:
-        """The rows so far."""
+    def record(self) -> TestRecord:
+        """The record of all rows so far."""
         table = np.array(self.rows).reshape(-1, len(UNITS))
         warn_if_crushed(self.joint.law, table[:, 0])
-        return Record(dict(zip(UNITS, table.T, strict=True)), self.azimuth, self.name)
+        return TestRecord(dict(zip(UNITS, table.T, strict=True)), self.azimuth, self.name)

@@ -1,5 +1,5 @@
-"""Laboratory tests: the normal condition, turning points, unloading, and what stops them. Their
-records: columns, files, pictures, and summary figures against hand-computed ones."""
+"""Simulated laboratory tests: normal condition, reversal points, unloading, early stops; and their
+records: columns, files, figures, and summaries against values computed by hand."""
 
 import math
 
@@ -9,27 +9,27 @@ import pytest
 import jointlaw as jl
 from jointlaw.laboratory.record import UNITS
 
-N = 10e6  # Pa
+NORMAL_STRESS = 10e6  # Pa
 
 
 @pytest.mark.parametrize(("stress", "spring"), [(1.0, 0.0), (10e6, 0.0), (1e9, 0.0), (10e6, 2e13)])
-def test_the_normal_condition_is_kept(any_sheared_law, stress, spring):
-    """Constant normal stress, and constant normal stiffness, which dilation loads."""
+def test_normal_condition_is_met(any_sheared_law, stress, spring):
+    """At constant normal stress (CNL), and at constant normal stiffness (CNS)."""
     law = any_sheared_law
     record = jl.direct_shear(law.joint(), [5e-7, -2e-7], stress, stiffness=spring, steps=30)
-    asked = stress + spring * (record.closure[0] - record.closure)
-    # 1e-9, or what one rounding of a closure of some 5e-7 m makes in the stiffest joint
+    prescribed = stress + spring * (record.closure[0] - record.closure)
+    # 1e-9, or the stress of one rounding error of a closure of about 5e-7 m in the stiffest joint
     rounding = 2e-16 * 1e-6 * law.max_stiffness(1e-6)
-    np.testing.assert_allclose(record.F1, asked, rtol=1e-9, atol=rounding)
-    loaded = spring > 0 and law.tables.asperities is not None
-    assert (np.ptp(record.F1) > 0.001 * stress) == loaded
+    np.testing.assert_allclose(record.F1, prescribed, rtol=1e-9, atol=rounding)
+    dilates = law.tables.asperities is not None
+    assert (np.ptp(record.F1) > 0.001 * stress) == (spring > 0 and dilates)
 
 
 @pytest.mark.parametrize("azimuth", [math.radians(30), -2.5])
-def test_reversals_end_where_they_should(law, azimuth):
+def test_shear_reaches_the_reversal_points(law, azimuth):
     to = [6e-7, -4e-7, 0.0, 2e-7]
     joint = law.joint()
-    record = jl.direct_shear(joint, to, N, azimuth=azimuth, steps=25)
+    record = jl.direct_shear(joint, to, NORMAL_STRESS, azimuth=azimuth, steps=25)
     assert len(record) == 1 + 25 * len(to)
     # 1e-12 of the longest leg: 25 equal increments are summed
     np.testing.assert_allclose(record.shear[25::25], to, atol=1e-18)
@@ -40,7 +40,7 @@ def test_reversals_end_where_they_should(law, azimuth):
 
 
 def test_a_law_with_a_plane_is_recorded_in_three_dimensions(make_law):
-    record = jl.direct_shear(make_law(plane=0.4).joint(), 5e-7, N, steps=10)
+    record = jl.direct_shear(make_law(plane=0.4).joint(), 5e-7, NORMAL_STRESS, steps=10)
     assert record.azimuth == 0.4
     assert record.shear_3[-1] == pytest.approx(5e-7 * math.sin(0.4))
 
@@ -56,21 +56,21 @@ def test_closure_test_loads_and_unloads(any_law):
     np.testing.assert_allclose(joint.F[0], record.F1[-1], atol=20e6 * 1e-14)
 
 
-def test_a_path_error_keeps_the_record_so_far(law):
-    """The third turning point is so far away that the tractions overflow."""
+def test_path_error_holds_the_record_so_far(law):
+    """The third reversal point is so far away that the tractions overflow."""
     joint = law.joint()
     with pytest.raises(jl.PathError, match="stopped after 21 rows") as error:
-        jl.direct_shear(joint, [1e-7, -1e-7, 1e301], N, steps=10)
+        jl.direct_shear(joint, [1e-7, -1e-7, 1e301], NORMAL_STRESS, steps=10)
     record = error.value.record
     assert len(record) == 21
     assert record.shear[-1] == pytest.approx(-1e-7)
-    # rounding: the record holds what the update returned, joint.F sums the state again
-    last = [record.F1[-1], record.F2[-1], record.F3[-1]]
-    np.testing.assert_allclose(joint.F, last, rtol=0, atol=1e-14 * N)
+    # rounding: the record holds the traction of the update, joint.F is summed from the state
+    last_traction = [record.F1[-1], record.F2[-1], record.F3[-1]]
+    np.testing.assert_allclose(joint.F, last_traction, rtol=0, atol=1e-14 * NORMAL_STRESS)
 
 
-def analytic(azimuth=0.0, sense=1.0):
-    """Shear to 4 um at 10 MPa: friction peaks at 45 degrees at 2 um, ends at 30; opens at 1:2."""
+def record_of_known_figures(azimuth=0.0, sense=1.0):
+    """Shear to 4 um at 10 MPa: friction angle 45 degrees at 2 um, 30 at the end; dilation 1:2."""
     shear = np.array([0.0, 1e-6, 2e-6, 3e-6, 4e-6])
     stress = 10e6 * np.array([0.0, 0.5, 1.0, 0.8, math.tan(math.radians(30))])
     closure = np.array([1.0, 1.1, 1.0, 0.5, 0.25]) * 1e-6
@@ -84,18 +84,20 @@ def analytic(azimuth=0.0, sense=1.0):
         "stored": np.linspace(1.0, 2.0, 5),
         "dissipated": np.linspace(0.0, 3.0, 5),
     }
-    return jl.Record(columns, azimuth)
+    return jl.TestRecord(columns, azimuth)
 
 
 @pytest.mark.parametrize(("azimuth", "sense"), [(0.7, 1.0), (math.pi, -1.0)])
 def test_summary_figures(azimuth, sense):
-    record = analytic(azimuth, sense)
+    record = record_of_known_figures(azimuth, sense)
     assert record.peak_friction_angle == pytest.approx(45.0, rel=1e-12)
     assert record.residual_friction_angle == pytest.approx(30.0, rel=1e-12)
-    # steepest between 2 and 3 um: 0.5 um of opening on 1 um of shear
+    # the largest is between 2 and 3 um: 0.5 um of opening over 1 um of shear
     assert record.peak_dilation_angle == pytest.approx(math.degrees(math.atan(0.5)), rel=1e-9)
     assert record.dilation_angle.shape == record.friction_angle.shape == (5,)
-    assert "5 rows: to 4e-06 m, peak friction angle 45.0 deg, largest dilation" in repr(record)
+    assert "shear displacement to 4e-06 m, peak friction angle 45.0 deg, largest dilation" in repr(
+        record
+    )
     assert record.secant_stiffness == pytest.approx(10e6 / 2e-6, rel=1e-12)
     np.testing.assert_allclose(record.shear, sense * np.arange(5) * 1e-6, atol=1e-20)
     assert record.summary() == {
@@ -115,23 +117,23 @@ def test_summary_figures(azimuth, sense):
 @pytest.mark.parametrize(
     ("shear", "stress", "peak"),
     [
-        ([0, 1, 2, 3], [0, 2, 3, 3], False),  # still rises, or stays, where the test ends
+        ([0, 1, 2, 3], [0, 2, 3, 3], False),  # increases or stays constant to the end
         ([0, 1, 2, 3], [0, 3, 2, 2], True),
-        ([0, 1, 2, 1, 0], [0, 2, 3, 1, 0], False),  # falls only because shear turns
+        ([0, 1, 2, 1, 0], [0, 2, 3, 1, 0], False),  # decreases only after the shear reversal
         ([0, 1, 2, 1, 0], [0, 3, 2.5, 1, 0], True),
         ([0, -1, -2, -1], [0, -3, -2.9, -1], True),
         ([0, 1, 2, 3], [0, 3, 2.999, 2.999], False),  # less than 0.1 % is rounding
     ],
 )
-def test_a_curve_without_a_peak_is_told(shear, stress, peak):
+def test_has_peak(shear, stress, peak):
     columns = {name: np.zeros(len(shear)) for name in UNITS}
-    given = {"shear_2": shear, "F1": np.full(len(shear), 10), "F2": stress}
-    columns |= {name: np.array(column, float) for name, column in given.items()}
-    assert jl.Record(columns).has_peak is peak
+    test = {"shear_2": shear, "F1": np.full(len(shear), 10), "F2": stress}
+    columns |= {name: np.array(column, float) for name, column in test.items()}
+    assert jl.TestRecord(columns).has_peak is peak
 
 
 def test_csv_round_trip(tmp_path):
-    record = analytic(0.3)
+    record = record_of_known_figures(0.3)
     record.to_csv(tmp_path / "r.csv")
     table = np.genfromtxt(tmp_path / "r.csv", delimiter=",", names=True)
     derived = ("shear_stress_Pa", "opening_m", "friction_angle_deg", "dilation_angle_deg")
@@ -146,17 +148,15 @@ def test_csv_round_trip(tmp_path):
         record.to_csv(tmp_path / "r.csv", length="furlong")
 
 
-@pytest.mark.parametrize(("backend", "left", "size"), [("agg", 1, 0.0), ("inline", 0, 1.0)])
-def test_a_picture_is_labelled_and_a_notebook_shows_it_once(backend, left, size, monkeypatch):
-    """Of a closure test, of a shear test. A cell shows the figure that it returns, and every figure
-    that is left open.
-    """
+@pytest.mark.parametrize(("backend", "open_figures", "size"), [("agg", 1, 0.0), ("inline", 0, 1.0)])
+def test_figure_has_labels_and_a_notebook_shows_it_once(backend, open_figures, size, monkeypatch):
+    """A notebook cell shows the figure that it returns, and every figure that is not closed."""
     pyplot = pytest.importorskip("matplotlib.pyplot")
     monkeypatch.setattr(pyplot, "get_backend", lambda: f"module://matplotlib_{backend}")
     pyplot.close("all")
-    columns = analytic().columns
-    axes = jl.Record(columns | {"shear_2": size * columns["shear_2"]}).plot().axes
-    assert len(pyplot.get_fignums()) == left
+    columns = record_of_known_figures().columns
+    axes = jl.TestRecord(columns | {"shear_2": size * columns["shear_2"]}).plot().axes
+    assert len(pyplot.get_fignums()) == open_figures
     assert len(axes) == (4 if size else 2)
     assert all(axis.get_ylabel() for axis in axes)
     assert all(axis.get_legend() for axis in axes if len(axis.lines) > 1)

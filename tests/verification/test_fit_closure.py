@@ -260,5 +260,5 @@ def test_the_command_says_what_it_assumed(tmp_path, capsys):
     printed = capsys.readouterr().out
     assert "angle 50.0 deg at a shear displacement of 0.914 mm (Barton: 0.914)" in printed
     assert "dilation angle 16.6 deg (Barton: 10.0)" in printed
-    assert "Assumed, for no field value tells them" in printed
+    assert "Assumed (not constrained by field values)" in printed
     assert jl.JointLaw.from_toml(tmp_path / "law.toml").asperity.mu == pytest.approx(3**-0.5)

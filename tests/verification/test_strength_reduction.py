@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from running import until
 from scene_text import ROCK, block, coulomb, dipping, lines, on_base
+from scipy.optimize import brentq
 from shapely import Polygon
 
 import jointlaw as jl
@@ -19,7 +20,7 @@ from dem_demo.cli import main
 from dem_demo.output.monitors import friction_angle
 from dem_demo.scene import load, parse, turn
 from dem_demo.studies import strength
-from dem_demo.studies.strength import alone, critical_tilt, factor_of_safety, weakened
+from dem_demo.studies.strength import alone, critical_tilt, factor_of_safety, stiffened, weakened
 
 DIP = 32.0
 LAW = ROCK.replace("a = 3.0", "a = 4.0, b = 0.0, c = 0.3")
@@ -33,17 +34,23 @@ PLAIN = {
 
 
 def bears(law, stress):
-    """Peak shear stress (Pa) of direct shear at a normal stress (Pa)."""
-    record = jl.direct_shear(law.joint(), to=[3e-3], normal=stress, steps=150)
+    """Peak shear stress (Pa) of direct shear at a normal stress (Pa), by fine steps up to the slip
+    at which a brittle bond breaks."""
+    bond = getattr(law, "bond", None)
+    to = [1.01 * bond.cohesion / bond.shear_stiffness, 3e-3] if bond else [3e-3]
+    record = jl.direct_shear(law.joint(), to=to, normal=stress, steps=150)
     return float(record.shear_stress.max())
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("bonded", [False, True], ids=["joint", "bond"])
 def test_factor_of_safety_of_a_block_on_a_plane(bonded):
-    """Strength of the joint at its normal stress over the shear stress of the weight; that of a
-    brittle bond beside asperities that climb is their joint peak. Coulomb's joint:
-    test_blocks_limit.py."""
+    """Strength of the joint at its normal stress over the shear stress of the weight.
+
+    A brittle bond beside asperities keeps its stiffness in a reduction as they do. It then breaks
+    at a smaller slip, where the asperities bear less, so the peak of their sum falls by more than
+    the factor. Coulomb's joint: test_blocks_limit.py.
+    """
     scene = parse(SCENE)
     law = scene.laws["rock"]
     if bonded:
@@ -51,8 +58,20 @@ def test_factor_of_safety_of_a_block_on_a_plane(bonded):
         law = replace(law, mating_length=5e-3, bond=bond, resolution=few)
     dip, weight = math.radians(DIP), 2600.0 * 9.81
     found = factor_of_safety(replace(scene, laws={"rock": law}))
-    by_hand = bears(law, weight * math.cos(dip)) / (weight * math.sin(dip))
-    assert found == pytest.approx(by_hand, rel=FOUND)
+    normal_stress, shear_stress = weight * math.cos(dip), weight * math.sin(dip)
+    if not bonded:
+        by_hand = bears(law, normal_stress) / shear_stress
+        assert found == pytest.approx(by_hand, rel=FOUND)
+        return
+
+    def surplus(factor):
+        return bears(stiffened(law, factor), normal_stress) / factor - shear_stress
+
+    by_hand = brentq(surplus, 1.5, 2.5, xtol=1e-3)
+    assert by_hand < 0.95 * bears(law, normal_stress) / shear_stress
+    # The search loads the joint in one step, in which asperities that still stick bear less than
+    # where they were closed before they are sheared.
+    assert 0.92 * by_hand < found < by_hand
 
 
 @pytest.mark.slow

@@ -16,7 +16,13 @@ from numpy.typing import NDArray
 from ..discretisation.first_loading import FirstLoading
 from ..discretisation.tables import FacetTables, largest_reach
 from ..support.checks import Array
-from ..support.thresholds import LIMIT, NEAR, ROUNDED, TINY, UNDERFLOW
+from ..support.thresholds import (
+    FRICTION_TOLERANCE,
+    MIN_CHORD_STEP,
+    MIN_DIVISOR,
+    ROUNDING_TOLERANCE,
+    UNDERFLOW,
+)
 from .cells import Cells, cells, compliance, reciprocal
 from .element import Element, Measures, Share
 from .mating import Planes, Turning, first_touch, offset, planes, turning
@@ -148,7 +154,9 @@ class Asperities(Element):
 
         de = np.einsum("edmb,db->emb", middle.basis, d)[:, :, None]  # in the facet (2, M, 1, B)
         sliders = load(k, before, gained, after, strength(k, end.gamma), q, de)
-        resolved = sliders.size**2 > TINY  # squares of smaller forces underflow: they count as zero
+        resolved = (
+            sliders.size**2 > MIN_DIVISOR
+        )  # squares of smaller forces underflow: they count as zero
         new_.q[:] = np.where(resolved, sliders.share, 0.0) * sliders.trial
         F = resultant(k, end, after.force, new_.q)
 
@@ -270,7 +278,7 @@ def load(
     """
     kappa0, kappa1 = before.kappa, after.kappa
     dy = (after.y - before.y)[:, None]
-    near = np.abs(dy) <= NEAR * np.abs(after.y)[:, None]
+    near = np.abs(dy) <= MIN_CHORD_STEP * np.abs(after.y)[:, None]
     if k.yields:  # all flattened springs touch at one closure: the mean is wrong in that step
         near = near & ((kappa0 > 0) | (kappa1 == 0))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -304,7 +312,7 @@ def at_limit(size: Array, strength: Array, G: Array, force: Array) -> Flags:
 
     force: Phi (M, B) of the virgin curve, whose rounding G has.
     """
-    return size >= strength * (G * (1 - LIMIT) - ROUNDED * force[:, None])
+    return size >= strength * (G * (1 - FRICTION_TOLERANCE) - ROUNDING_TOLERANCE * force[:, None])
 
 
 def friction_loss(k: FacetTables, before: Cells, after: Cells, q: Array, sliders: Sliders) -> Array:
@@ -316,9 +324,11 @@ def friction_loss(k: FacetTables, before: Cells, after: Cells, q: Array, sliders
     kappa0, chord, share = before.kappa, sliders.chord, sliders.share
     q2, trial2 = q[0] ** 2 + q[1] ** 2, sliders.size**2
     r0, r1, rc = reciprocal(kappa0), reciprocal(after.kappa), reciprocal(chord)
-    hardening = share * (share * trial2) * (rc - r1) + np.where(kappa0 > TINY, q2 * (r0 - rc), 0.0)
+    hardening = share * (share * trial2) * (rc - r1) + np.where(
+        kappa0 > MIN_DIVISOR, q2 * (r0 - rc), 0.0
+    )
     softening = (kappa0 - after.kappa) * r0 * (q2 * r0)
-    lost = np.where(sliders.grows, np.where(chord > TINY, hardening, 0.0), softening)
+    lost = np.where(sliders.grows, np.where(chord > MIN_DIVISOR, hardening, 0.0), softening)
     lost = lost + 2 * share * (1 - share) * (trial2 * np.where(sliders.grows, rc, r1))
     return np.sum(compliance(k) * lost, axis=(0, 1))
 
@@ -339,7 +349,7 @@ def stiffness(
     with np.errstate(divide="ignore", invalid="ignore"):
         chord_slope = np.where(sliders.near, p / 2, (kappa - chord) / (y - before.y)[:, None])
     # rounding must not decide: a facet that did not close has not grown; q at its limit slips
-    stiffer = grows & ((y - before.y) > ROUNDED * np.abs(y))[:, None]
+    stiffer = grows & ((y - before.y) > ROUNDING_TOLERANCE * np.abs(y))[:, None]
     v = np.where(stiffer, a * chord_slope * de, p * reciprocal(kappa) * trial)
     beta = np.where(sliders.cap > 0, a * np.where(grows, chord, kappa), 0.0)
     slips, unit = sliders.slips, sliders.unit

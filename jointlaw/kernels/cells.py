@@ -6,7 +6,7 @@ import numpy as np
 
 from ..discretisation.tables import FacetTables
 from ..support.checks import Array
-from ..support.thresholds import TINY
+from ..support.thresholds import MIN_DIVISOR
 
 
 class Cells(NamedTuple):
@@ -44,4 +44,4 @@ def compliance(k: FacetTables) -> Array:
 
 def reciprocal(kappa: Array) -> Array:
     """1/kappa, 0 where there is no stiffness."""
-    return np.divide(1.0, kappa, out=np.zeros_like(kappa), where=kappa > TINY)
+    return np.divide(1.0, kappa, out=np.zeros_like(kappa), where=kappa > MIN_DIVISOR)

@@ -6,7 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..support.checks import Array
-from ..support.thresholds import LIMIT, PARTED, ROUNDED, STICKS, STRONGEST
+from ..support.thresholds import (
+    FRICTION_TOLERANCE,
+    INFINITE_FRICTION,
+    MAX_STRENGTH,
+    ROUNDING_TOLERANCE,
+    SEPARATED_STATE,
+)
 from .element import Element, Measures, Share
 
 
@@ -30,20 +36,22 @@ class Coulomb(Element):
     residual value None keeps the value.
     """
 
-    parted = PARTED
+    parted = SEPARATED_STATE
 
     def __init__(self, p: Any, dim: int) -> None:
         self.dim, self.rows = dim, {"shear": dim - 1, "damage": 1}
         self.normal, self.shear = p.normal_stiffness, p.shear_stiffness
-        self.friction = min(p.friction, STICKS)
+        self.friction = min(p.friction, INFINITE_FRICTION)
         self.cohesion, self.weakening = p.cohesion, p.weakening
         left = p.residual_friction, p.residual_cohesion
-        self.residual_friction = self.friction if left[0] is None else min(left[0], STICKS)
+        self.residual_friction = (
+            self.friction if left[0] is None else min(left[0], INFINITE_FRICTION)
+        )
         self.residual_cohesion = self.cohesion if left[1] is None else left[1]
         # beyond cohesion/friction there is no strength in shear
         apex = self.cohesion / self.friction if self.friction > 0.0 else np.inf
         self.tension = min(p.tension, apex)
-        self.reach = STRONGEST / max(self.normal * (1.0 + self.friction), self.shear, 1.0)
+        self.reach = MAX_STRENGTH / max(self.normal * (1.0 + self.friction), self.shear, 1.0)
         self.farthest = self.reach
 
     def numbers(self) -> dict[str, float]:
@@ -76,7 +84,7 @@ class Coulomb(Element):
         moved = np.where(change == 0.0, 1.0, np.abs(change))
 
         intact = w == 0.0
-        pulled = after < -self.tension * (1.0 + ROUNDED)
+        pulled = after < -self.tension * (1.0 + ROUNDING_TOLERANCE)
         until = np.where(pulled, np.clip((before + self.tension) / moved, 0.0, 1.0), 1.0)
         end = np.where(pulled, -self.tension, after)
         dq = self.shear * d[1:] * until
@@ -93,15 +101,17 @@ class Coulomb(Element):
         share = np.where(apart, np.maximum(after, 0.0), np.where(parts, before, moved)) / moved
         start, end = np.where(apart, 0.0, before), np.where(touches, after, 0.0)
         dq = self.shear * d[1:] * share
-        slid = self.slide(np.where(apart, 0.0, q), np.where(apart, PARTED, w), dq, start, end)
+        slid = self.slide(
+            np.where(apart, 0.0, q), np.where(apart, SEPARATED_STATE, w), dq, start, end
+        )
 
         lost = np.where(tears, torn, 0.0) + slid.lost
         lost = lost + np.where(parts, 0.5 * squared(slid.q) / self.shear, 0.0)
         new[:-1] = np.where(touches, slid.q, 0.0)
-        new[-1] = np.where(touches, slid.w, PARTED)
+        new[-1] = np.where(touches, slid.w, SEPARATED_STATE)
         F, C = np.concatenate([end[None], new[:-1]]), None
         if tangent:
-            C = self.tangent(np.where(apart, PARTED, w), end, self.shear * share, slid)
+            C = self.tangent(np.where(apart, SEPARATED_STATE, w), end, self.shear * share, slid)
             C = np.where(touches, C, 0.0)
         return Share(F, lost, C)
 
@@ -180,7 +190,7 @@ class Coulomb(Element):
         """
         w = state[-1] if self.weakening > 0.0 else np.ones_like(state[-1])
         mu = self.friction_at(w)
-        slides = self.normal * np.hypot(1.0, np.where(mu < STICKS, mu, 0.0))
+        slides = self.normal * np.hypot(1.0, np.where(mu < INFINITE_FRICTION, mu, 0.0))
         bound = np.maximum(slides, self.shear)
         return np.where((state[-1] > 0.0) & (delta[0] < 0.0), 0.0, bound)
 
@@ -188,7 +198,7 @@ class Coulomb(Element):
         q, w, u = state[:-1], state[-1], delta[0]
         apart = (w > 0.0) & (u < 0.0)
         cap = self.strength(w, self.normal * u)
-        sliding = (~apart & (np.sqrt(squared(q)) >= cap * (1.0 - LIMIT))).astype(float)
+        sliding = (~apart & (np.sqrt(squared(q)) >= cap * (1.0 - FRICTION_TOLERANCE))).astype(float)
         held = np.where(apart, 0.0, u)
         stored = 0.5 * self.normal * held * held + 0.5 * squared(q) / self.shear
         return Measures(sliding, sliding, apart.astype(float), stored, u)
@@ -205,7 +215,7 @@ def leaving(q: Array, dq: Array, cap: Array, rise: Array) -> tuple[NDArray[np.bo
     |q| <= cap at t = 0, and |q + t dq| is convex in t: it grows beyond once. The root of
     A t^2 + 2 B t = C, free of cancellation.
     """
-    leaves = np.sqrt(squared(q + dq)) > (cap + rise) * (1.0 + ROUNDED)
+    leaves = np.sqrt(squared(q + dq)) > (cap + rise) * (1.0 + ROUNDING_TOLERANCE)
     cap, rise = np.where(leaves, [cap, rise], 0.0)  # squares of the others may overflow
     A = squared(dq) - rise * rise
     B = np.sum(q * dq, axis=0) - cap * rise

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..discretisation.tables import FacetTables
 from ..support.checks import Array
-from ..support.thresholds import FAR, ROUNDED
+from ..support.thresholds import ROUNDING_TOLERANCE, UNMATED_DISTANCE
 
 
 class Planes(NamedTuple):
@@ -51,9 +51,9 @@ def first_touch(k: FacetTables) -> Array:
             "give the law a finite one"
         )
     p = np.zeros((k.dim - 1, 1))
-    p[0] = FAR * k.mating_length
+    p[0] = UNMATED_DISTANCE * k.mating_length
     highest = np.max(k.m[1:].T @ offset(k, p))
-    return np.array([-(1 + ROUNDED) * highest, *p[:, 0]])
+    return np.array([-(1 + ROUNDING_TOLERANCE) * highest, *p[:, 0]])
 
 
 def planes(k: FacetTables, p: Array, slopes: Array) -> Planes:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..discretisation.tables import FacetTables
 from ..support.checks import Array
-from ..support.thresholds import BEND, UNDERFLOW
+from ..support.thresholds import MAX_OFFSET_CURVATURE, UNDERFLOW
 
 
 def stiffness_of(k: FacetTables, y: Array) -> Array:
@@ -23,7 +23,9 @@ def bend_of(k: FacetTables) -> Array:
 
     Normal force, sliders and friction limit turn and grow with the slope.
     """
-    return (BEND / k.mating_length) * k.area * k.steep * (k.c1 + k.mu * (1.0 + k.c1))
+    return (
+        (MAX_OFFSET_CURVATURE / k.mating_length) * k.area * k.steep * (k.c1 + k.mu * (1.0 + k.c1))
+    )
 
 
 @lru_cache(maxsize=64)

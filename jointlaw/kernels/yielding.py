@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..discretisation.tables import FacetTables
 from ..support.checks import Array
-from ..support.thresholds import ROUNDED
+from ..support.thresholds import ROUNDING_TOLERANCE
 from .cells import Cells
 from .mating import Planes
 
@@ -38,7 +38,7 @@ def flattens_itself(k: FacetTables, y1: Array, z1: Array) -> NDArray[np.bool_]:
 
     Both do, but for rounding, where the shear does not move them, as at a right angle to it.
     """
-    return y1 - k.yield_depth[:, None] >= z1 - ROUNDED * np.abs(y1)
+    return y1 - k.yield_depth[:, None] >= z1 - ROUNDING_TOLERANCE * np.abs(y1)
 
 
 def plastic_work(k: FacetTables, y0: Array, y1: Array, flat0: Cells, flat1: Cells) -> Array:
@@ -60,7 +60,7 @@ def softening(
 
     push: derivative (2, M, D, B) of q by G in slipping sliders. end: the planes after the step.
     """
-    moves = (flat1.y - flat0.y > ROUNDED * flat1.y) & (after.kappa > 0).any(axis=1)
+    moves = (flat1.y - flat0.y > ROUNDING_TOLERANCE * flat1.y) & (after.kappa > 0).any(axis=1)
     own = flattens_itself(k, after.y, flat1.y)
     shear = np.sum(push * np.where(after.kappa > 0, flat1.kappa, 0.0), axis=2)
     along = end.n * (k.area[:, None] * flat1.slope)

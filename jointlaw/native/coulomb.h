@@ -32,7 +32,7 @@ JL_IN double jl_squared(const double q[2], double t, const double dq[2])
 JL_IN int jl_leaving(const double q[2], const double dq[2], double cap, double rise, double *at)
 {
   *at = 1.0;
-  if (!(sqrt(jl_squared(q, 1.0, dq)) > (cap + rise) * (1.0 + JLAW_ROUNDED))) return 0;
+  if (!(sqrt(jl_squared(q, 1.0, dq)) > (cap + rise) * (1.0 + JLAW_ROUNDING_TOLERANCE))) return 0;
   const double A = (dq[0] * dq[0] + dq[1] * dq[1]) - rise * rise;
   const double B = (q[0] * dq[0] + q[1] * dq[1]) - cap * rise;
   const double within = cap * cap - (q[0] * q[0] + q[1] * q[1]), C = within > 0.0 ? within : 0.0;
@@ -111,7 +111,7 @@ JL_IN double jl_coulomb_step(const jlaw_law *law, jl_part *p, int tangent)
   for (int i = 0; i < last; i++) s.q[i] = p->row[i];
 
   /* an intact joint leaves what it bears once; under tension it tears */
-  const int pulled = after < -T * (1.0 + JLAW_ROUNDED);
+  const int pulled = after < -T * (1.0 + JLAW_ROUNDING_TOLERANCE);
   double torn = 0.0, at, until = 1.0, to = after;
   int leaves = 0, tears = 0;
   if (intact) {
@@ -133,7 +133,7 @@ JL_IN double jl_coulomb_step(const jlaw_law *law, jl_part *p, int tangent)
   double share = parts ? before / moved : 1.0;
   if (apart) {
     share = (after > 0.0 ? after : 0.0) / moved;
-    s.start = 0.0, s.w = JLAW_PARTED, s.q[0] = s.q[1] = 0.0;
+    s.start = 0.0, s.w = JLAW_SEPARATED_STATE, s.q[0] = s.q[1] = 0.0;
   }
   s.end = touches ? after : 0.0;
   for (int i = 0; i < last; i++) s.dq[i] = ks * p->d[i + 1] * share;
@@ -142,7 +142,7 @@ JL_IN double jl_coulomb_step(const jlaw_law *law, jl_part *p, int tangent)
   p->lost = torn + s.lost + (parts ? shear : 0.0);
   for (int i = 0; i < last; i++) p->F[i + 1] = p->row[i] = touches ? s.now[i] : 0.0;
   p->F[0] = s.end;
-  p->row[last] = touches ? s.w1 : JLAW_PARTED;
+  p->row[last] = touches ? s.w1 : JLAW_SEPARATED_STATE;
   if (tangent && touches) jl_coulomb_tangent(law, &s, ks * share, p->C);
   return touches ? 0.5 * kn * u * u + shear : 0.0;
 }
@@ -153,7 +153,8 @@ JL_IN double jl_coulomb_stiffness(const jlaw_law *law, double damage, double clo
 {
   if (damage > 0.0 && closure < 0.0) return 0.0; /* apart */
   const double mu = jl_coulomb_friction(law, law->coulomb_weakening > 0.0 ? damage : 1.0);
-  const double slides = law->coulomb_normal * (mu < JLAW_STICKS ? sqrt(1.0 + mu * mu) : 1.0);
+  const double slides
+      = law->coulomb_normal * (mu < JLAW_INFINITE_FRICTION ? sqrt(1.0 + mu * mu) : 1.0);
   return slides > law->coulomb_shear ? slides : law->coulomb_shear;
 }
 
@@ -165,6 +166,7 @@ JL_IN void jl_coulomb_shares(const jlaw_law *law, const double *s, size_t stride
   const double w = row[(size_t) (dim - 1) * stride], q[2] = {row[0], dim > 2 ? row[stride] : 0.0};
   const double none[2] = {0.0, 0.0}, cap = jl_coulomb_strength(law, w, law->coulomb_normal * u);
   const int apart = w > 0.0 && u < 0.0;
-  shares[0] = shares[1] = !apart && sqrt(jl_squared(q, 0.0, none)) >= cap * (1.0 - JLAW_LIMIT);
+  shares[0] = shares[1]
+      = !apart && sqrt(jl_squared(q, 0.0, none)) >= cap * (1.0 - JLAW_FRICTION_TOLERANCE);
   shares[2] = apart;
 }

@@ -1,7 +1,7 @@
 /* elements.h: the elements beside the asperities of a joint, one joint at a time; symbols and order
  * of kernels/bond.py and kernels/coulomb.py. Its rows in a state are a vector in the plane of the
- * joint (Pa), or none, and last its damage, 0 to 1, or JLAW_PARTED. An element NAME of layout.h has
- * here
+ * joint (Pa), or none, and last its damage, 0 to 1, or
+ * JLAW_SEPARATED_STATE. An element NAME of layout.h has here
  *
  *   jl_NAME_rows       number of its rows
  *   jl_NAME_step       a step, which returns the stored energy after it

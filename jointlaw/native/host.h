@@ -279,7 +279,7 @@ static JLAW_FUNCTION int jlaw_sound_(const double *q, int n)
 /* Damage of joints whose faces meet anew, which have neither bond nor cohesion */
 static JLAW_FUNCTION double jlaw_parted_(const jlaw_law *law)
 {
-  return law->coulomb ? JLAW_PARTED : 1.0;
+  return law->coulomb ? JLAW_SEPARATED_STATE : 1.0;
 }
 
 /* Whether energies, flattened depths, wear and damage of a state are numbers of this law */
@@ -297,7 +297,7 @@ static JLAW_FUNCTION int jlaw_proper_(const jlaw_law *law, const double *s)
   for (int i = 0; rows[i] >= 0; i++)
     for (int left = rows[i]; left > 0; left--, row++)
       good = good
-             && (left > 1 ? fabs(*row) < JLAW_STRONGEST
+             && (left > 1 ? fabs(*row) < JLAW_MAX_STRENGTH
                           : *row >= 0.0 && *row <= jlaw_parted_(law));
   return good && jlaw_sound_(s + jl_slider_row(law), jl_rest_row(law) - jl_slider_row(law));
 }
@@ -377,7 +377,7 @@ JLAW_FUNCTION int jlaw_unmated(const jlaw_law *law, double *s)
 {
   const int far = law->fades && law->dim > 1;
   for (int i = 0; i < jl_state_rows(law); i++) s[i] = 0.0;
-  if (far) s[0] = law->first_touch, s[1] = JLAW_FAR * law->mating_length;
+  if (far) s[0] = law->first_touch, s[1] = JLAW_UNMATED_DISTANCE * law->mating_length;
   double *row = s + jl_element_row(law);
   const int rows[] = JLAW_ROWS_OF(law);
   for (int i = 0; rows[i] >= 0; row += rows[i++])

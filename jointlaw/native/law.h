@@ -232,7 +232,7 @@ JL_IN void jl_press(const jlaw_law *law, const double *f, jl_numbers n, int kept
  * the shear does not move them, as at a right angle to it. */
 JL_IN jl_yes jl_flattens_itself(const double *f, const jl_facets *o)
 {
-  return o->y1 - jl_column(f, JLAW_YIELD) >= o->z1 - JLAW_ROUNDED * jl_size_of(o->y1);
+  return o->y1 - jl_column(f, JLAW_YIELD) >= o->z1 - JLAW_ROUNDING_TOLERANCE * jl_size_of(o->y1);
 }
 
 /* Plastic work of facets over A c1: exact where they press themselves flat, else by the mean */
@@ -351,9 +351,10 @@ JL_IN void jl_wear_sliders(const double *cell, jl_facets *o, const jl_sliders *c
   jl_real G, kappa;
   jl_hold_cell(cell, o->yw, o->fw, o->kw, o->z0, o->fz0, o->kz0, k.yields, &G, &kappa);
   const jl_real q2 = *qs * *qs + *qt * *qt, cap2 = o->limit2 * (c->G0 * c->G0);
-  const jl_yes had = kappa * kappa > JLAW_FAINT, has = c->k0 * c->k0 > JLAW_FAINT;
+  const jl_yes had = kappa * kappa > JLAW_MIN_STIFFNESS_PRODUCT;
+  const jl_yes has = c->k0 * c->k0 > JLAW_MIN_STIFFNESS_PRODUCT;
   const jl_real a = jl_pick(had, kappa, 1.0), b = jl_pick(has, c->k0, 1.0);
-  const jl_real Q = jl_pick(q2 > JLAW_FAINT, q2, 1.0);
+  const jl_real Q = jl_pick(q2 > JLAW_MIN_STIFFNESS_PRODUCT, q2, 1.0);
   const jl_real r = 1.0 / (a * b * Q), was = jl_only(had, b * Q * r), is = jl_only(has, a * Q * r);
   jl_real share = jl_pick(kappa > c->k0, c->k0 * was, 1.0);
   const jl_yes beyond = share * share * q2 > cap2;
@@ -393,9 +394,11 @@ JL_IN void jl_measure_facets(const jlaw_law *law, jl_numbers n, int at, const jl
     const jl_real qs = jl_take(n, row, D, some), qt = jl_take(n, row + M * D, D, some);
     const jl_real q2 = qs * qs + qt * qt;
     jl_hold_cell(cell, o->y1, o->f1, o->k1, o->z1, o->fz1, o->kz1, law->yields, &G, &kappa);
-    const jl_yes stiff = kappa > JLAW_TINY;
+    const jl_yes stiff = kappa > JLAW_MIN_DIVISOR;
     const jl_yes limited =
-        jl_root(q2) >= o->strength * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * o->f1);
+        jl_root(q2) >= o->strength
+                           * (G * (1.0 - JLAW_FRICTION_TOLERANCE)
+                              - JLAW_ROUNDING_TOLERANCE * o->f1);
     held += jl_only(limited, G);
     slips = jl_only(limited, slips);
     sheared += jl_only(stiff, q2 / jl_pick(stiff, kappa, 1.0));
@@ -456,11 +459,11 @@ JL_IN void jl_load(const double *f, const jl_facets *o, jl_sliders *c, jl_real *
   c->unit = jl_each(0.0);
   c->share = jl_each(1.0);
   if (k.tangent || jl_somewhere(c->slips)) {
-    c->unit = jl_only(c->new2 > JLAW_TINY, 1.0 / jl_root(c->new2));
+    c->unit = jl_only(c->new2 > JLAW_MIN_DIVISOR, 1.0 / jl_root(c->new2));
     c->share = jl_pick(c->slips, jl_smaller(c->cap * c->unit, jl_each(1.0)), 1.0);
   }
   const jl_real part =
-      jl_only(c->new2 > JLAW_TINY, c->share); /* squares of smaller forces underflow */
+      jl_only(c->new2 > JLAW_MIN_DIVISOR, c->share); /* squares of smaller forces underflow */
   *qs = part * c->ts;
   *qt = part * c->tt;
 }
@@ -470,11 +473,12 @@ JL_IN jl_real jl_friction_loss(const jl_sliders *c)
 {
   const jl_real high = jl_larger(c->chord, c->k0), low = jl_smaller(c->k0, c->k1);
   const jl_real a = c->k0 * high, b = c->k1 * c->chord;
-  const jl_real A = jl_pick(a > JLAW_FAINT, a, 1.0), B = jl_pick(b > JLAW_FAINT, b, 1.0);
+  const jl_real A = jl_pick(a > JLAW_MIN_STIFFNESS_PRODUCT, a, 1.0);
+  const jl_real B = jl_pick(b > JLAW_MIN_STIFFNESS_PRODUCT, b, 1.0);
   const jl_real r = 1.0 / (A * B); /* one division for both */
   const jl_real rub = c->share * (c->share * (c->k1 - c->chord) + 2.0 * (1.0 - c->share) * c->k1);
-  return jl_only(a > JLAW_FAINT, c->old2 * ((high - low) * (B * r)))
-         + jl_only(b > JLAW_FAINT, c->new2 * (rub * (A * r)));
+  return jl_only(a > JLAW_MIN_STIFFNESS_PRODUCT, c->old2 * ((high - low) * (B * r)))
+         + jl_only(b > JLAW_MIN_STIFFNESS_PRODUCT, c->new2 * (rub * (A * r)));
 }
 
 /* "The tangent": J_q = beta (I - s s^T) E + v g^T of sliders */
@@ -488,11 +492,13 @@ JL_IN void jl_slide_tangent(const double *f, const double *cell, const jl_slider
   jl_yes near = o->near;
   if (k.yields) near = near & ((c->k0 > 0.0) | (c->k1 <= 0.0));
   const jl_real chord1 = jl_pick(near, 0.5 * bend, (c->k1 - c->chord) * o->rdy);
-  const jl_yes stiff = c->k1 > JLAW_TINY;
+  const jl_yes stiff = c->k1 > JLAW_MIN_DIVISOR;
   const jl_real fade = jl_only(stiff, bend / jl_pick(stiff, c->k1, 1.0));
   /* rounding must not decide: what did not close has not grown, what is at its limit slips */
-  const jl_yes stiffer = (c->k1 > c->k0) & (o->dy > JLAW_ROUNDED * jl_size_of(o->y1));
-  const jl_real least = c->strength * (c->G1 * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * o->f1);
+  const jl_yes stiffer = (c->k1 > c->k0) & (o->dy > JLAW_ROUNDING_TOLERANCE * jl_size_of(o->y1));
+  const jl_real least = c->strength
+                        * (c->G1 * (1.0 - JLAW_FRICTION_TOLERANCE)
+                           - JLAW_ROUNDING_TOLERANCE * o->f1);
   const jl_yes limited = c->new2 >= jl_larger(least, jl_each(0.0)) * jl_larger(least, jl_each(0.0));
   const jl_real vs = jl_pick(stiffer, a * chord1 * o->es, fade * c->ts);
   const jl_real vt = jl_pick(stiffer, a * chord1 * o->et, fade * c->tt);
@@ -542,7 +548,7 @@ JL_IN void jl_slide(const double *f, const double *cell, jl_facets *o, jl_real *
 JL_IN void jl_add_tangent(const jlaw_law *law, const double *f, const jl_facets *o, jl_sums *sum,
                           jl_kind k)
 {
-  const jl_yes moves = (o->z1 - o->z0 > JLAW_ROUNDED * o->z1) & (o->open > 0.0);
+  const jl_yes moves = (o->z1 - o->z0 > JLAW_ROUNDING_TOLERANCE * o->z1) & (o->open > 0.0);
   const jl_yes own = jl_flattens_itself(f, o);
   for (int i = 0; i < k.dim; i++) {
     const jl_of_facet n = jl_column(f, JLAW_N + i) * jl_column(f, JLAW_A);
@@ -568,7 +574,7 @@ JL_IN void jl_add_tangent(const jlaw_law *law, const double *f, const jl_facets 
 JL_IN void jl_add_fading_tangent(const jlaw_law *law, const double *f, const jl_motion *m,
                                  const jl_facets *o, jl_sums *sum, jl_kind k)
 {
-  const jl_yes moves = (o->z1 - o->z0 > JLAW_ROUNDED * o->z1) & (o->open > 0.0);
+  const jl_yes moves = (o->z1 - o->z0 > JLAW_ROUNDING_TOLERANCE * o->z1) & (o->open > 0.0);
   const jl_yes own = jl_flattens_itself(f, o);
   const jl_plane *s = &o->end, *r = &o->middle;
   const jl_real soft = jl_each(law->soft), none = jl_each(0.0),
@@ -655,7 +661,7 @@ JL_IN void jl_step_facets(const jlaw_law *law, int at, const jl_motion *m, jl_nu
   o.y1 = jl_resolved(o.y1);
   o.dy = o.y1 - o.y0;
   o.rdy = 1.0 / o.dy;
-  o.near = jl_size_of(o.dy) <= JLAW_NEAR * jl_size_of(o.y1);
+  o.near = jl_size_of(o.dy) <= JLAW_MIN_CHORD_STEP * jl_size_of(o.y1);
   o.qs = o.qt = o.lost = o.vs = o.vt = o.bss = o.bst = o.btt = o.ws = o.wt = o.open = jl_each(0.0);
   o.gs = o.gt = o.us = o.ut = o.worn = jl_each(0.0);
   if (k.kept) {
@@ -861,7 +867,7 @@ JL_IN jl_real jl_stiffness_over(const jlaw_law *law, jl_real slope)
 /* Bound of |C| (Pa/m) of joints as they are */
 JL_IN jl_of_joint jl_stiffness(const jlaw_law *law, jl_numbers n)
 {
-  const double turn = JLAW_BEND / law->mating_length;
+  const double turn = JLAW_MAX_OFFSET_CURVATURE / law->mating_length;
   struct {
     jl_real bound;
   } sum[JL_SUMS];

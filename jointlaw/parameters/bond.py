@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..support.checks import Array
-from ..support.thresholds import ROUNDED
+from ..support.thresholds import ROUNDING_TOLERANCE
 from .declared import check, declared, parameter
 
 LARGEST = 1e100  # of stiffness and strength: squares of forces and displacements stay finite
@@ -63,7 +63,7 @@ class Bond:
                     f"bond.{strength} = {most!r} Pa"
                 )
             value, elastic = getattr(self, energy), 0.5 * most * (most / k) if most else 0.0
-            least = elastic * (1.0 - ROUNDED)
+            least = elastic * (1.0 - ROUNDING_TOLERANCE)
             if value is not None and not least <= value <= LONGEST * elastic:
                 raise ValueError(
                     f"bond.{energy} = {value!r} J/m2 is out of bounds: it must be >= {elastic:g}, "

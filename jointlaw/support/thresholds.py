@@ -1,13 +1,18 @@
-"""Thresholds of the step, the same in every kernel; native/layout.py writes them into C."""
+"""Thresholds of the constitutive update, the same in Python and in C (native/layout.py).
 
-UNDERFLOW = 1e-140  # m, and Pa/m: counts as zero, for powers and squares below it underflow
-TINY = 1e-290  # a stiffness whose reciprocal might overflow, or a square that underflows: zero
-FAINT = 1e-150  # a product of two stiffnesses, likewise
-NEAR = 1e-5  # of y: below such a change of y the chord of G is lost in rounding, the mean is not
-LIMIT = 1e-9  # of the friction limit: a slider this close is at it, less the rounding of q
-ROUNDED = 1e-12  # of Phi and of y: as much may be lost in a G next to a node, and in dy
-FAR = 100.0  # mating lengths from mate, where unmated joints start: no slope is left to feel
-STICKS = 1e30  # a friction of Coulomb's joint from here on counts as infinite
-PARTED = 2.0  # w of a Coulomb's joint whose faces have parted or meet anew: friction alone
-STRONGEST = 1e70  # Pa: fourth powers of stresses of Coulomb's joint beyond it overflow
-BEND = 0.8587  # largest |d2o/dp2| times the mating length: 1.5/1.25^2.5, half a length from mate
+A number below a threshold counts as zero, so that powers, squares and reciprocals stay finite.
+"""
+
+UNDERFLOW = 1e-140  # m or Pa/m: squares and powers of smaller numbers underflow
+MIN_DIVISOR = 1e-290  # smallest stiffness that is divided by, smallest squared force
+MIN_STIFFNESS_PRODUCT = 1e-150  # smallest product of two stiffnesses that is divided by
+MIN_CHORD_STEP = (
+    1e-5  # relative change of y: below it rounding spoils the chord of G, not its slope
+)
+FRICTION_TOLERANCE = 1e-9  # of the friction limit: a slider this close below it counts as sliding
+ROUNDING_TOLERANCE = 1e-12  # of Phi or y: rounding error allowed in G near a node and in dy
+UNMATED_DISTANCE = 100.0  # mating lengths at which unmated joints start: no interlock is left
+INFINITE_FRICTION = 1e30  # coefficient of Coulomb's joint that counts as infinite
+SEPARATED_STATE = 2.0  # state w of a Coulomb joint after separation: friction only, no cohesion
+MAX_STRENGTH = 1e70  # Pa: fourth powers of larger stresses of Coulomb's joint overflow
+MAX_OFFSET_CURVATURE = 0.8587  # largest |d2o/dp2| mating lengths, at p = 1/2 of one: 1.5/1.25^2.5

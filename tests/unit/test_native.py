@@ -16,8 +16,9 @@ from jointlaw.native import build, library
 # Either kernel sums a few hundred terms per facet in its own order and carries q over the path: a
 # few hundred times the rounding of 1e-16. That is the share of the largest value that may differ.
 SAME, SAME_C = 1e-12, 1e-10  # q of a slider carries three times as much
-# C holds d(chord)/dy, a second difference of G: rounding grows by (y/dy)^2, up to (1/NEAR)^2 =
-# 1e10, in the few facets that a step hardly opens or closes, and is usual in nearly all joints.
+# C holds d(chord)/dy, a second difference of G: rounding grows by (y/dy)^2, up to
+# MIN_CHORD_STEP^-2 = 1e10, in the few facets that a step hardly opens or closes; most joints agree
+# far better.
 WORST_C, USUAL_C = 2e-6, 1e-12
 N = 17 * engine.LANES + 3  # blocks of joints and part of another
 

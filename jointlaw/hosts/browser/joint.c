@@ -67,7 +67,9 @@ OUT(look) void look(double *s, double *to)
       const int of = jl_slider_row(&law) + at * D + i;
       jl_hold_cell(cell, o.y1, o.f1, o.k1, o.z1, o.fz1, o.kz1, law.yields, &G, &kappa);
       const double q = jl_root(s[of] * s[of] + s[of + M * D] * s[of + M * D]);
-      const double limit = o.strength * (G * (1.0 - JLAW_LIMIT) - JLAW_ROUNDED * o.f1);
+      const double limit = o.strength
+                           * (G * (1.0 - JLAW_FRICTION_TOLERANCE)
+                              - JLAW_ROUNDING_TOLERANCE * o.f1);
       if (G > 0.0 && q >= limit) held += G;
       row[5 + 2 * i] = jl_column(f, JLAW_COSINE) * (jl_column(cell, JLAW_LOW) - o.y1);
       row[6 + 2 * i] = G > 0.0 ? (q >= limit ? 1.0 : q / (o.strength * G)) : 0.0;

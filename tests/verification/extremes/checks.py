@@ -8,7 +8,9 @@ from jointlaw.kernels.asperities import effective_closure
 from jointlaw.kernels.mating import offset, planes
 
 ROUNDING = 1e-12  # of the facet's normal force: a cell's G is a difference of numbers of that size
-KERNELS = 1e-11  # of the largest traction: rounding of y, 1e-16, over a step of NEAR y, 1e-5
+KERNELS = (
+    1e-11  # of the largest traction: rounding of y, 1e-16, over a step of MIN_CHORD_STEP y, 1e-5
+)
 NOTHING = 1e-60  # Pa; far below, forces of sliders count as none: their squares underflow
 
 

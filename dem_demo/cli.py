@@ -119,12 +119,14 @@ def _run(given: argparse.Namespace) -> None:
 
 
 def _announce(sim: Simulation, until: float | None = None) -> None:
-    steps, dt, limit = steps_to(sim, until), sim.dt, sim.limit.now
+    steps, dt, limit = steps_to(sim, until), sim.dt, sim.limit.current
     print(
         f"{sim.scene.title}: {sum(not block.fixed for block in sim.scene.blocks)} moving blocks, "
         f"{sim.joints.n} law points in reach"
     )
-    why = f"; fraction {dt / limit:.2g}, because {sim.why}" if sim.why else ""
+    why = (
+        f"; fraction {dt / limit:.2g}, because {sim.fraction_reason}" if sim.fraction_reason else ""
+    )
     print(
         f"time step {dt:.3g} s, limit {limit:.3g} s (margin {limit / dt:.2f}{why}), {steps} steps"
     )
@@ -135,9 +137,9 @@ def _announce(sim: Simulation, until: float | None = None) -> None:
     for rock in sim.scene.rocks:
         print(f"rock {rock.name!r}: {len(rock.free)} blocks that can move, "
               f"{len(rock.blocks) - len(rock.free)} fixed", *rock.told, sep="\n  ")  # fmt: skip
-    if sim.loose.any() and sim.scene.run.seat and not sim.time:
-        print(f"{sim.loose.sum()} blocks cannot be held and move from the first step: "
-              f"{told(named(sim.scene, sim.loose))}")  # fmt: skip
+    if sim.unstable.any() and sim.scene.run.seat and not sim.time:
+        print(f"{sim.unstable.sum()} blocks cannot be held and move from the first step: "
+              f"{told(named(sim.scene, sim.unstable))}")  # fmt: skip
 
 
 def _pace(sim: Simulation) -> float:

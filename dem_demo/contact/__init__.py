@@ -1,12 +1,20 @@
 """Contact: corners on edges, the identity of contacts, the joints between blocks.
 
 geometry       closure, sliding and length of joint at corners on edges
-tracker        which corners are over which edges, and the identity of each through time
+manager        which corners are over which edges, and the identity of each through time
 joints         one batch of joints for each law, and its virgin curve
 """
 
 from .geometry import Contacts, Outlines
-from .joints import PARTS, Joints, virgin_curve
-from .tracker import STALE, Tracker
+from .joints import PARTS, Joints, tabulate_first_loading
+from .manager import STALE, ContactManager
 
-__all__ = ["PARTS", "STALE", "Contacts", "Joints", "Outlines", "Tracker", "virgin_curve"]
+__all__ = [
+    "PARTS",
+    "STALE",
+    "ContactManager",
+    "Contacts",
+    "Joints",
+    "Outlines",
+    "tabulate_first_loading",
+]

@@ -21,16 +21,16 @@ PARTS = "states", "fingerprint"  # of a snapshot of the joints of a law
 
 
 @lru_cache(maxsize=64)
-def unmated_curve(law: Law) -> dict[str, np.ndarray]:
+def tabulate_unmated_loading(law: Law) -> dict[str, np.ndarray]:
     """Closure from first touch (m) and work (J/m2) of a joint whose faces have never met."""
-    closure = virgin_curve(law)["closure"]
+    closure = tabulate_first_loading(law)["closure"]
     batch = law.joints(len(closure), mated=False)
     batch.update(np.stack([closure, 0.0 * closure], axis=1), tangent=False)
     return {"closure": closure, "work": batch.stored_energy}
 
 
 @lru_cache(maxsize=64)
-def virgin_curve(law: Law) -> dict[str, np.ndarray]:
+def tabulate_first_loading(law: Law) -> dict[str, np.ndarray]:
     """Closure (m), stress (Pa) and work (J/m2) of a virgin joint from no closure to 2 GPa, more
     than any corner of rock stands, and an upper bound of its stiffness (Pa/m) there.
 
@@ -79,7 +79,7 @@ def stiffness_bound(law: Law, closure: np.ndarray, reduction: float) -> np.ndarr
     return bound * largest / (max(1.0, 1 / lam) + mu) + cemented
 
 
-class Held:
+class LawJoints:
     """The joints of one law: batch, and by their places there what the compiled step needs.
 
     step: d (places, 2) in m, F (places, 2) in Pa and shown (places, 8), of one step of all; silent:
@@ -89,7 +89,7 @@ class Held:
 
     def __init__(self, law: Law, reduction: float) -> None:
         self.batch, self.free = jl.JointBatch(law, 0), []
-        self.curve = {**virgin_curve(law)}
+        self.curve = {**tabulate_first_loading(law)}
         self.curve["stiffness"] = stiffness_bound(law, self.curve["closure"], reduction)
         self.grow(0)
 
@@ -152,8 +152,8 @@ class Joints:
 
     def __init__(self, scene: Scene) -> None:
         self.reduction = np.array([1.0, scene.reduction])
-        self.names = [*scene.laws]
-        self.held = [Held(law, scene.reduction) for law in scene.laws.values()]
+        self.law_names = [*scene.laws]
+        self.by_law = [LawJoints(law, scene.reduction) for law in scene.laws.values()]
         holds = [law if isinstance(law, jl.CoulombLaw) else law.bond for law in scene.laws.values()]
         self.pulls = np.array([part.normal_stiffness if part else 0.0 for part in holds])  # Pa/m
         self.touch, self.keys = np.zeros((0, 2)), np.zeros((0, 2), int)
@@ -162,13 +162,13 @@ class Joints:
     def _arrange(self, law: np.ndarray, place: np.ndarray) -> None:
         """Arrays for contacts with these laws, their joints at these places."""
         self.law, self.place, self.n = law.astype(np.int64), place.astype(np.int64), len(law)
-        self.rows = [np.flatnonzero(law == i) for i in range(len(self.held))]
+        self.rows = [np.flatnonzero(law == i) for i in range(len(self.by_law))]
         self.traction, self.delta = np.zeros((2, self.n, 2))
         self.shares = np.zeros((SHOWN, self.n))
-        self.sliding, self.slipping, self.separated, self.stored, self.lost, self.damage = (
+        self.sliding, self.slipping, self.separated, self.stored_energy, self.lost, self.damage = (
             self.shares
         )
-        self._pools = (Pool * len(self.held))(*(held.pool() for held in self.held))
+        self._pools = (Pool * len(self.by_law))(*(held.pool() for held in self.by_law))
         self.world = World(contacts=self.n)
         self.bind(self.world)
         self.world.call("read")
@@ -192,7 +192,7 @@ class Joints:
         touch = np.vstack([self.touch, [0.0, 0.0]])[before]
         mates = self.keys[~self.touch.any(axis=1)] @ [1, 1j]  # two edges as one number
         fits = np.isin(keys[new] @ [1, 1j], mates) | (not started)
-        for i, held in enumerate(self.held):
+        for i, held in enumerate(self.by_law):
             held.drop(self.place[gone & (self.law == i)])
             mated = fits | (not held.batch.law.tables.fades)
             for kind in (True, False):
@@ -206,7 +206,7 @@ class Joints:
     def update(self, closure: np.ndarray, sliding: np.ndarray) -> None:
         """Advance every joint to a closure (m), and by a sliding (m), in one step."""
         d = np.stack([closure - self.delta[:, 0], sliding], axis=1) / self.reduction
-        for held, rows in zip(self.held, self.rows, strict=True):
+        for held, rows in zip(self.by_law, self.rows, strict=True):
             held.step.d[self.place[rows]] = d[rows]
         self.advance(1)
         self.world.call("read")
@@ -216,7 +216,7 @@ class Joints:
 
         The law's friction work is first order in its step: more parts balance energy better.
         """
-        for held, rows in zip(self.held, self.rows, strict=True):
+        for held, rows in zip(self.by_law, self.rows, strict=True):
             if len(rows):
                 for step in [held.silent] * (parts - 1) + [held.step]:
                     held.batch.take(step)
@@ -226,7 +226,7 @@ class Joints:
         (k, 2), leaving the state alone."""
         F, C, by = np.empty((self.n, 2)), np.empty((self.n, 2, 2)), self.reduction
         shown = np.empty((self.n, SHOWN + 2))
-        for held, rows in zip(self.held, self.rows, strict=True):
+        for held, rows in zip(self.by_law, self.rows, strict=True):
             m = len(rows)
             step = Step(d[rows] / by, np.empty((m, 2)), np.empty((m, 2, 2)), self.place[rows],
                         False, np.empty((m, SHOWN + 2)))  # fmt: skip
@@ -234,7 +234,7 @@ class Joints:
             F[rows], C[rows], shown[rows] = step.F, step.C, step.shown
         return F / by, C / np.outer(by, by), shown[:, 3]
 
-    def unslid(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def stick_predictor(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """As `trial` of virgin joints that cannot slide: tractions and tangents."""
         closure, sign, shear = np.maximum(np.abs(d[:, 0]), 1e-9), np.sign(d[:, 0]), d[:, 1]
         (stress, ss), above, below = (
@@ -250,7 +250,7 @@ class Joints:
     def virgin(self, of: str, by: str, x: np.ndarray) -> np.ndarray:
         """A column of the virgin curves, such as "stress", where another one is x (k,)."""
         out = np.empty(self.n)
-        for held, rows in zip(self.held, self.rows, strict=True):
+        for held, rows in zip(self.by_law, self.rows, strict=True):
             out[rows] = np.interp(x[rows], held.curve[by], held.curve[of])
         return out
 
@@ -267,11 +267,11 @@ class Joints:
         `work` (m,), or at which they are closed by `most` (m,) if that is less.
         """
         out, mated = np.empty((2, len(rows))), ~self.touch[rows].any(axis=1)
-        for i, held in enumerate(self.held):
+        for i, held in enumerate(self.by_law):
             for kind in (True, False):
                 mine = (self.law[rows] == i) & (mated == kind)
                 if mine.any():
-                    curve = held.curve if kind else unmated_curve(held.batch.law)
+                    curve = held.curve if kind else tabulate_unmated_loading(held.batch.law)
                     anew = np.interp(work[mine], curve["work"], curve["closure"])
                     anew = np.minimum(anew, most[mine])
                     out[:, mine] = anew, np.interp(anew, curve["closure"], curve["work"])
@@ -282,7 +282,7 @@ class Joints:
     def snapshot(self) -> dict[str, np.ndarray]:
         """A copy of all state; the laws are numbered, their names may be no names of arrays."""
         arrays = {"touch": self.touch.copy()}
-        for i, (held, rows) in enumerate(zip(self.held, self.rows, strict=True)):
+        for i, (held, rows) in enumerate(zip(self.by_law, self.rows, strict=True)):
             state = held.batch.snapshot(self.place[rows])
             fingerprint = np.array(state.fingerprint)
             arrays |= {f"states-{i}": state.values.T, f"fingerprint-{i}": fingerprint}
@@ -292,7 +292,7 @@ class Joints:
         """Back to a snapshot, of contacts with these laws and keys. Raises ValueError for
         another's."""
         place, touch = np.zeros(len(law), int), state["touch"]
-        for i, held in enumerate(self.held):
+        for i, held in enumerate(self.by_law):
             rows = np.flatnonzero(law == i)
             values, fingerprint = (state[f"{part}-{i}"] for part in PARTS)
             if len(values.T) != len(rows) or len(touch) != len(law):

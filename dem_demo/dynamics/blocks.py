@@ -9,7 +9,7 @@ forces at the new positions).
 import numpy as np
 import pymunk
 
-from ..contact import Contacts, Outlines, Tracker
+from ..contact import ContactManager, Contacts, Outlines
 from ..scene import Drives, Refused, Scene, Stress
 
 MOVED = 0.25  # most of its skin that a block may move in a step: else contacts could be missed
@@ -21,7 +21,7 @@ class Blocks:
     motion (6, n): positions, angles, and the velocities that led there; velocity (3, n): those to
     go on with. inertia: mass, mass, moment; mobile (n, 1): blocks that move, driven rock too;
     free: motions that forces move; gravity, steady: forces that do not change (N); loads: these
-    without gravity and with what presses on edges (`press`); root: 1/sqrt(inertia) of the free
+    without gravity, with pressures on edges (`apply_loads`); root: 1/sqrt(inertia) of the free
     motions, else 0; lightness (n,): 1/kg, of what can give way; gone (n,): blocks that were taken
     away; support (n, 3): what is left of what these bore on the others (N). The compiled step
     writes to the first two: change them in place.
@@ -105,7 +105,7 @@ class Blocks:
         )
 
 
-def press(scene: Scene, blocks: Blocks, tracker: Tracker) -> np.ndarray:
+def apply_loads(scene: Scene, blocks: Blocks, manager: ContactManager) -> np.ndarray:
     """Bring the loads of the blocks to what they are with their edges where these are now; returns
     how much more they are (n, 3).
 
@@ -116,10 +116,10 @@ def press(scene: Scene, blocks: Blocks, tracker: Tracker) -> np.ndarray:
     given = [stress for stress in (scene.water, scene.in_situ) if stress]
     if not (given or scene.wet or scene.stages):
         return 0.0 * blocks.loads
-    contacts, loads, before = tracker.contacts, blocks.steady + blocks.support, blocks.loads.copy()
+    contacts, loads, before = manager.contacts, blocks.steady + blocks.support, blocks.loads.copy()
     for stress in given:
         loads += scene.thickness * _on_edges(stress, contacts.outlines, blocks.motion)
-    pressure = np.array([scene.pressure.get(name, 0.0) for name in scene.laws])[tracker.law]
+    pressure = np.array([scene.pressure.get(name, 0.0) for name in scene.laws])[manager.law]
     push = pressure * contacts.carried.sum(axis=0) * scene.thickness
     loads += contacts.assemble(blocks.motion, push, 0.0 * push)
     blocks.loads[:] = loads * blocks.mobile

@@ -15,9 +15,9 @@ from scipy.sparse.linalg import spsolve
 
 from jointlaw.support.progress import track
 
-from ..contact import Contacts, Joints, Tracker
+from ..contact import ContactManager, Contacts, Joints
 from ..scene import Scene
-from .blocks import Blocks, press
+from .blocks import Blocks, apply_loads
 from .timestep import rates
 
 BALANCED = 1e-3  # most unbalanced force of a block that is held, as a share of its weight
@@ -53,7 +53,7 @@ def shares(blocks: Blocks, force: np.ndarray) -> np.ndarray:
 def out_of_balance(scene: Scene, blocks: Blocks, contacts: Contacts, joints: Joints) -> np.ndarray:
     """Which blocks (n,) their joints do not carry now, apart from dashpots and drives."""
     push, slide = (joints.traction * contacts.length[:, None] * scene.thickness).T
-    held = contacts.assemble(blocks.motion, push, -slide, joints.stored * scene.thickness)
+    held = contacts.assemble(blocks.motion, push, -slide, joints.stored_energy * scene.thickness)
     return shares(blocks, held + blocks.gravity + blocks.loads) > BALANCED
 
 
@@ -66,18 +66,18 @@ class Equilibrium:
     """
 
     def __init__(
-        self, scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints,
+        self, scene: Scene, blocks: Blocks, manager: ContactManager, joints: Joints,
         slid: np.ndarray, moved: bool = False,
     ) -> None:  # fmt: skip
         self.blocks, self.joints, self.k = blocks, joints, joints.n
-        signs, contacts = diags(np.repeat([-1.0, 1.0], self.k)), tracker.contacts
+        signs, contacts = diags(np.repeat([-1.0, 1.0], self.k)), manager.contacts
         self.rows: csr_array = signs @ rates(blocks, contacts)  # to closure and shear
         self.area = np.tile(contacts.length * scene.thickness, 2)
-        self.start = np.concatenate([tracker.closure, slid])
+        self.start = np.concatenate([manager.closure, slid])
         self.root, self.block = blocks.root[blocks.free], np.nonzero(blocks.free)[0]
         force = blocks.gravity + blocks.loads
         if moved:
-            closed = np.stack([tracker.closure, slid], axis=1) - joints.delta
+            closed = np.stack([manager.closure, slid], axis=1) - joints.delta
             stored, none = joints.trial(closed)[2] * scene.thickness, np.zeros(self.k)
             force = force + contacts.assemble(blocks.motion, none, none, stored) * blocks.mobile
         pull = np.hypot(*force[:, :2].T) / blocks.inertia[:, 0] / blocks.reach
@@ -136,7 +136,7 @@ class Equilibrium:
     def _stiffness(self, C) -> csc_array:
         return (self.rows.T @ (diags(self.area) @ C) @ self.rows).tocsc()
 
-    def unslid(self) -> np.ndarray:
+    def stick_predictor(self) -> np.ndarray:
         """Displacements to begin with: those of joints that cannot slide, in a step through a drag
         in which a block that nothing holds falls by a tenth of its reach; none where that is not
         found."""
@@ -172,7 +172,7 @@ class Equilibrium:
     def _unbalanced(self, y: np.ndarray, slides: bool = True):
         """Unbalanced forces (free motions,), and the stiffness (2 k, 2 k) of the joints."""
         d = (self.start + self.rows @ y).reshape(2, -1).T
-        F, C = self.joints.trial(d)[:2] if slides else self.joints.unslid(d)
+        F, C = self.joints.trial(d)[:2] if slides else self.joints.stick_predictor(d)
         nn, ns, sn, ss = (diags(part) for part in C.reshape(-1, 4).T)
         stiffness = csr_array(bmat([[nn, ns], [sn, ss]]))
         return self.force - self.rows.T @ (self.area * F.T.ravel()), stiffness
@@ -217,13 +217,13 @@ class Equilibrium:
         return y, r, (size <= 1e3 * target)[island]
 
 
-def begin(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> np.ndarray:
+def begin(scene: Scene, blocks: Blocks, manager: ContactManager, joints: Joints) -> np.ndarray:
     """Find the contacts of blocks as drawn; their joints are virgin. Returns the sliding (k,) in m
-    with which they start, and keeps as the tracker's offset the closure: both are those of the
+    with which they start, and keeps as the manager's offset the closure: both are those of the
     in-situ stress, zero without one."""
-    joints.rearrange(tracker.renew(blocks.motion, blocks.near()), tracker.law, tracker.keys)
-    press(scene, blocks, tracker)
-    stress, c, skin = scene.in_situ, tracker.contacts, scene.skins.min()
+    joints.rearrange(manager.renew(blocks.motion, blocks.near()), manager.law, manager.keys)
+    apply_loads(scene, blocks, manager)
+    stress, c, skin = scene.in_situ, manager.contacts, scene.skins.min()
     if stress is None or not joints.n:
         return np.zeros(joints.n)
     # The end p of an overlap bears (2 S(p) + S(q))/3, q the other end: together they have force and
@@ -240,7 +240,7 @@ def begin(scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints) -> np.
             f"in_situ closes joints by up to {closure.max():.3g} m, but contacts are followed to "
             f"{skin:.3g} m: set a larger run.skin, or stiffer laws"
         )
-    tracker.offset = np.where(closure > 0, c.closure - closure, 0.0)
+    manager.offset = np.where(closure > 0, c.closure - closure, 0.0)
     return slid
 
 
@@ -267,7 +267,7 @@ def _displaced(joints: Joints, bears: np.ndarray) -> np.ndarray:
 
 
 def seat(
-    scene: Scene, blocks: Blocks, tracker: Tracker, joints: Joints, slid: np.ndarray
+    scene: Scene, blocks: Blocks, manager: ContactManager, joints: Joints, slid: np.ndarray
 ) -> np.ndarray:
     """Move the blocks to where their joints carry them; slid (k,) in m: sliding at first. Returns
     the sliding with which the joints start.
@@ -277,14 +277,14 @@ def seat(
     """
     loose, first, pairs = np.zeros(len(blocks.free), bool), 0.0, blocks.near()
     for again in range(ROUNDS):  # each at the places just found: joints turn with the blocks
-        tracker.follow(blocks.motion)
-        tracker.urgent[:] = True  # it is cheap here, and nothing is missed
-        before = tracker.renew(blocks.motion, pairs)
-        joints.rearrange(before, tracker.law, tracker.keys)
+        manager.follow(blocks.motion)
+        manager.urgent[:] = True  # it is cheap here, and nothing is missed
+        before = manager.renew(blocks.motion, pairs)
+        joints.rearrange(before, manager.law, manager.keys)
         slid = np.append(slid, 0.0)[before]
-        press(scene, blocks, tracker)
-        search = Equilibrium(scene, blocks, tracker, joints, slid, again > 0)
-        start = search.none if again or scene.in_situ is not None else search.unslid()
+        apply_loads(scene, blocks, manager)
+        search = Equilibrium(scene, blocks, manager, joints, slid, again > 0)
+        start = search.none if again or scene.in_situ is not None else search.stick_predictor()
         more, known = ~loose, loose
         while more.any():
             moved, more = search.attempt(start, loose, known)
@@ -295,7 +295,7 @@ def seat(
         first = first or most
         if again and most <= SETTLED * first:
             break
-    tracker.renewed_at[:] = blocks.motion[:3]
+    manager.renewed_at[:] = blocks.motion[:3]
     return slid
 
 
@@ -310,11 +310,11 @@ def displacements(
     carried.
     """
     blocks, joints = Blocks(scene), Joints(scene)
-    tracker = Tracker(scene, blocks.motion)
-    slid = begin(scene, blocks, tracker, joints)
-    search = Equilibrium(scene, blocks, tracker, joints, slid)
+    manager = ContactManager(scene, blocks.motion)
+    slid = begin(scene, blocks, manager, joints)
+    search = Equilibrium(scene, blocks, manager, joints, slid)
     known = np.zeros(len(blocks.free), bool) if loose is None else loose
-    moved, more = search.attempt(search.unslid() if guess is None else guess, known)
+    moved, more = search.attempt(search.stick_predictor() if guess is None else guess, known)
     if more.any() and guess is not None:
-        moved, more = search.attempt(search.unslid(), known)
+        moved, more = search.attempt(search.stick_predictor(), known)
     return None if more.any() else moved

@@ -13,10 +13,10 @@ import numpy as np
 
 from jointlaw.support.files import write_files
 
-from ..contact import PARTS, STALE, Contacts, Joints, Tracker
+from ..contact import PARTS, STALE, ContactManager, Contacts, Joints
 from ..scene import Files, Refused, Scene, parse
-from .blocks import MOVED, Blocks, press
-from .energy import DROPPED, Ledger
+from .blocks import MOVED, Blocks, apply_loads
+from .energy_balance import DROPPED, EnergyBalance
 from .equilibrium import begin, out_of_balance, seat
 from .timestep import SAFE, StepLimit, impact_limit
 
@@ -32,16 +32,17 @@ FRACTIONS = {  # of the limit that a time step is, by what can happen
 }
 IMPACT = 1e4  # Pa: normal stress of a first impact, for a time step before anything touches
 HALVINGS = 8  # of a time step that was chosen, until a run is refused
-FILE, VERSION = "state.npz", 8
+FILE, VERSION = "state.npz", 9
 KEPT = (  # of what changes in a run, but for the joints: arrays that stay in their place
-    "blocks.motion", "blocks.velocity", "blocks.loads", "blocks.gone", "blocks.support", "begun",
-    "blocks.drives.reversed_at",
-    "tracker.renewed_at", "tracker.urgent", "ledger.energy", "ledger.forces",
+    "blocks.motion", "blocks.velocity", "blocks.loads", "blocks.gone", "blocks.support",
+    "blocks.drives.reversed_at", "stage_start_times",
+    "manager.renewed_at", "manager.urgent", "energy_balance.energy", "energy_balance.forces",
 )  # fmt: skip
 STATE = (
-    *KEPT, "t0", "n", "dt", "halvings", "limit.now", "limit.least", "limit.bound", "limit.checked",
-    "tracker.keys", "tracker.law", "tracker.offset",
-    "ledger.start", "ledger.area", "ledger.lost", "loose", "initial",
+    *KEPT, "t0", "n", "dt", "halvings",
+    "limit.current", "limit.lowest", "limit.bound", "limit.checked_stiffness",
+    "manager.keys", "manager.law", "manager.offset",
+    "energy_balance.start", "energy_balance.area", "energy_balance.lost", "unstable", "initial",
 )  # fmt: skip
 PLACES = "contacts.corner", "contacts.edge"  # from which the contacts are made anew
 Saved = dict[str, np.ndarray]  # a copy of everything that the future depends on
@@ -51,11 +52,11 @@ class Simulation:
     """A scene in motion. `step()` advances it; from a `state()` it goes on bit for bit.
 
     step: time step (s), instead of the scene's; saved: a state to go on from. blocks: where they
-    are; tracker: their contacts; joints: the law; ledger: the energies; limit: of the time step dt
-    (s), chosen for the reason `why`; loose (blocks,): those that nothing held at step 0; initial
-    (6, blocks): motion there; begun (stages,): when stages of the excavation began, inf
-    before (s). Where neither `step` nor the scene sets the time step, it is halved when joints
-    close too far for it, or blocks become too fast.
+    are; manager: their contacts; joints: the law; energy_balance: the energies; limit: of the time
+    step dt (s), chosen for the reason `fraction_reason`; unstable (blocks,): without static
+    equilibrium at step 0; initial (6, blocks): motion there; stage_start_times (stages,): when
+    stages of the excavation began, inf before (s). Where neither `step` nor the scene sets the time
+    step, it is halved when joints close too far for it, or blocks become too fast.
     Raises ValueError for a step that is no finite number > 0 and for a state of another scene,
     Refused for a start that the method cannot carry.
     """
@@ -64,10 +65,13 @@ class Simulation:
         if step is not None and not 0 < step < np.inf:
             raise ValueError(f"step = {step} s: must be a finite number > 0")
         self.scene, self.blocks = scene, Blocks(scene)
-        self.tracker, self.joints = Tracker(scene, self.blocks.motion), Joints(scene)
-        self.limit, self.t0, self.n, self.why = StepLimit(), 0.0, 0, ""
+        self.manager, self.joints = ContactManager(scene, self.blocks.motion), Joints(scene)
+        self.limit, self.t0, self.n, self.fraction_reason = StepLimit(), 0.0, 0, ""
         self.halvings = 0 if step or scene.run.step or scene.run.fraction else HALVINGS
-        self.ledger, self.begun = Ledger(len(scene.blocks)), np.full(len(scene.stages), np.inf)
+        self.energy_balance, self.stage_start_times = (
+            EnergyBalance(len(scene.blocks)),
+            np.full(len(scene.stages), np.inf),
+        )
         if saved:
             self._unpack(saved, step)
         else:
@@ -81,7 +85,7 @@ class Simulation:
     @property
     def contacts(self) -> Contacts:
         """The contacts at the blocks' places of now."""
-        return self.tracker.contacts
+        return self.manager.contacts
 
     def step(self) -> None:
         """One time step. Raises Refused for a state that the method cannot carry.
@@ -107,42 +111,46 @@ class Simulation:
             world = self.world
         if world.deep >= 0:
             pair = self.contacts.a[world.deep], self.contacts.b[world.deep]
-            self.tracker.refuse(pair, self.contacts.closure[world.deep])
+            self.manager.refuse(pair, self.contacts.closure[world.deep])
         self.joints.advance(self.scene.run.law_steps)
         self.n += 1
         drives.aim[:] = drives.velocity(self.time, self.dt)
         world.call("after", self.dt)
         if world.stiffer:
             self.limit.look(self.scene, self.blocks, self.contacts, self.joints, self.dt)
-            if self.dt > SAFE * self.limit.now:
-                while self.dt > NEAR * self.limit.now and self._halve():
+            if self.dt > SAFE * self.limit.current:
+                while self.dt > NEAR * self.limit.current and self._halve():
                     pass
             self.limit.require(self.dt)
-            world.bind(self.limit, "checked")
+            world.bind(checked=self.limit.checked_stiffness)
         if self.n % LOOKS == 0:
-            drives.reverse(self.time, self.slid)
+            drives.reverse(self.time, self.shear_displacement)
 
     def _dig(self) -> None:
         """Take away the blocks of a stage when its time has come, or, if it has none, when the rock
         is at rest; then let go what they bore."""
-        blocks, stages, n = self.blocks, self.scene.stages, int(np.isfinite(self.begun).sum())
+        blocks, stages, n = (
+            self.blocks,
+            self.scene.stages,
+            int(np.isfinite(self.stage_start_times).sum()),
+        )
         due = self.n % LOOKS == 0 and n < len(stages)
         if due and (self._rests() if (at := stages[n]["at"]) is None else self.time >= at):
             taken, c, joints = stages[n]["blocks"], self.contacts, self.joints
             mine = (np.isin(c.a, taken) | np.isin(c.b, taken)) * self.scene.thickness
             stress, shear = mine * c.length * joints.traction.T
-            blocks.support += c.assemble(blocks.motion, stress, -shear, mine * joints.stored)
+            blocks.support += c.assemble(blocks.motion, stress, -shear, mine * joints.stored_energy)
             blocks.remove(taken)
-            self.tracker.urgent[taken], self.world.stale = True, 1
-            self.begun[n], n = self.time, n + 1
+            self.manager.urgent[taken], self.world.stale = True, 1
+            self.stage_start_times[n], n = self.time, n + 1
         if blocks.support.any():
-            left = self.begun[n - 1] + stages[n - 1]["over"] - self.time
+            left = self.stage_start_times[n - 1] + stages[n - 1]["over"] - self.time
             blocks.support *= max(left, 0.0) / max(left + self.dt, self.dt)
-            self.ledger.load(blocks, press(self.scene, blocks, self.tracker), self.dt)
+            self.energy_balance.load(blocks, apply_loads(self.scene, blocks, self.manager), self.dt)
 
     def _rests(self) -> bool:
         """Is no support going, and are almost all blocks slow and in balance?"""
-        blocks, force = self.blocks, self.ledger.forces[0].T[:2]
+        blocks, force = self.blocks, self.energy_balance.forces[0].T[:2]
         speed, pull = np.hypot(*blocks.velocity[:2]), np.hypot(*force) / blocks.inertia[:, 0]
         moves = np.maximum(speed / SLOW, pull / EVEN)[blocks.mobile[:, 0]]
         return not blocks.support.any() and bool(np.quantile(moves, RESTING) < 1)
@@ -159,14 +167,19 @@ class Simulation:
         """Velocities are half a step ahead of the places: bring them to half of a step dt (s)."""
         blocks, drives, now = self.blocks, self.blocks.drives, self.time
         blocks.velocity += (
-            0.5 * (dt - self.dt) * self.ledger.forces[0] / blocks.inertia * blocks.free
+            0.5 * (dt - self.dt) * self.energy_balance.forces[0] / blocks.inertia * blocks.free
         ).T
         blocks.velocity[drives.axes, drives.rows] = drives.velocity(now, dt)
         self.t0, self.n, self.dt = now, 0, dt
 
     def bind(self) -> None:
         """Tell the compiled step where all arrays lie, after each change of the contacts."""
-        run, blocks, tracker, ledger = self.scene.run, self.blocks, self.tracker, self.ledger
+        run, blocks, manager, energy_balance = (
+            self.scene.run,
+            self.blocks,
+            self.manager,
+            self.energy_balance,
+        )
         self.world = world = self.contacts.world
         world.thickness, world.parts = self.scene.thickness, run.law_steps
         world.dashpot_normal, world.dashpot_shear = run.dashpot_normal, run.dashpot_shear
@@ -174,106 +187,106 @@ class Simulation:
         world.bind(blocks, "motion", "velocity", "inertia", "gravity", "loads", "lightness",
                    "reach", "mobile", skin=blocks.skins)  # fmt: skip
         world.bind(blocks.drives, "rows", "axes", "aim")
-        world.bind(tracker, "deepest", "offset", "urgent", renewed=tracker.renewed_at)
-        world.bind(ledger, "last", "area", "lost", "energy", force=ledger.forces)
-        world.bind(self.limit, "checked")
+        world.bind(manager, "deepest", "offset", "urgent", renewed=manager.renewed_at)
+        world.bind(energy_balance, "last", "area", "lost", "energy", force=energy_balance.forces)
+        world.bind(checked=self.limit.checked_stiffness)
         self.joints.bind(world)
 
     def _start(self, step: float | None) -> None:
         """From the drawing to step 0: equilibrium, a time step, velocities half a step on."""
-        scene, blocks, tracker, joints = self.scene, self.blocks, self.tracker, self.joints
-        slid = begin(scene, blocks, tracker, joints)
+        scene, blocks, manager, joints = self.scene, self.blocks, self.manager, self.joints
+        slid = begin(scene, blocks, manager, joints)
         if scene.run.seat and joints.n and blocks.free.any():
-            slid = seat(scene, blocks, tracker, joints, slid)
-        tracker.follow(blocks.motion)
+            slid = seat(scene, blocks, manager, joints, slid)
+        manager.follow(blocks.motion)
         self.initial = blocks.motion.copy()
-        joints.update(tracker.closure, slid)
-        self.loose = out_of_balance(scene, blocks, self.contacts, joints)
+        joints.update(manager.closure, slid)
+        self.unstable = out_of_balance(scene, blocks, self.contacts, joints)
         self.limit.look(scene, blocks, self.contacts, joints)
         self.dt = step or scene.run.step or self._chosen_step()
         self.limit.require(self.dt)
         blocks.drives.aim[:] = blocks.drives.velocity(0.0, self.dt)
         blocks.motion[3:][blocks.drives.axes, blocks.drives.rows] = blocks.drives.aim
-        tracker.follow(blocks.motion)
-        self.ledger.area = self.contacts.length * scene.thickness
-        self.ledger.lost = joints.lost.copy()
+        manager.follow(blocks.motion)
+        self.energy_balance.area = self.contacts.length * scene.thickness
+        self.energy_balance.lost = joints.lost.copy()
         self.bind()
         self.world.call("forces", 0.5 * self.dt)
-        self.ledger.open(blocks, joints, self.dt)
+        self.energy_balance.open(blocks, joints, self.dt)
         blocks.motion[3:] += (
-            0.5 * self.dt * self.ledger.forces[0] / blocks.inertia * blocks.free
+            0.5 * self.dt * self.energy_balance.forces[0] / blocks.inertia * blocks.free
         ).T
         blocks.velocity[:] = blocks.motion[3:]
 
     def _chosen_step(self) -> float:
         """By the scene's fraction of the limit, or else by one for what can happen."""
-        scene, limit = self.scene, self.limit.now
+        scene, limit = self.scene, self.limit.current
         if not np.isfinite(limit):  # nothing touches yet
             stiffness = max(
                 float(np.interp(IMPACT, held.curve["stress"], held.curve["stiffness"]))
-                for held in self.joints.held
+                for held in self.joints.by_law
             )
-            limit = impact_limit(scene, self.blocks, self.tracker.outlines, stiffness)
+            limit = impact_limit(scene, self.blocks, self.manager.outlines, stiffness)
         if not np.isfinite(limit):
             raise Refused("forces move no block, so no time step follows: set run.step (s)")
         if scene.run.fraction:
             return scene.run.fraction * limit
-        falls = not scene.run.seat or self.loose.any() or self.blocks.velocity.any()
+        falls = not scene.run.seat or self.unstable.any() or self.blocks.velocity.any()
         driven = any(len(drive.times) > 1 for drive in scene.drives)
-        self.why = [*FRACTIONS][0 if falls else 1 if driven else 2]
-        return FRACTIONS[self.why] * limit
+        self.fraction_reason = [*FRACTIONS][0 if falls else 1 if driven else 2]
+        return FRACTIONS[self.fraction_reason] * limit
 
     def _renew(self) -> None:
-        """Joints, ledger and limit where contacts went on, and where new ones are looked for."""
-        blocks, tracker, joints = self.blocks, self.tracker, self.joints
-        ledger, limit = self.ledger, self.limit
+        """Update joints, energies and limit for transferred and new contacts."""
+        blocks, manager, joints = self.blocks, self.manager, self.joints
+        energy_balance, limit = self.energy_balance, self.limit
         if self.world.moved:
             self._transfer()
         if self.world.stale:
-            if self.dt > NEAR * limit.now:  # lever arms have changed
-                limit.checked[:] = 0.0
-            before = tracker.renew(blocks.motion, blocks.near(), pressed=False)
-            stored = ledger.area * joints.stored
+            if self.dt > NEAR * limit.current:  # lever arms have changed
+                limit.checked_stiffness[:] = 0.0
+            before = manager.renew(blocks.motion, blocks.near(), pressed=False)
+            stored = energy_balance.area * joints.stored_energy
             stored[before[before >= 0]] = 0.0
-            ledger.energy[DROPPED] += stored.sum()
-            ledger.area = np.append(ledger.area, 0.0)[before]
-            limit.checked = np.append(limit.checked, 0.0)[before]
-            joints.rearrange(before, tracker.law, tracker.keys, started=True)
-            ledger.lost = joints.lost.copy()
+            energy_balance.energy[DROPPED] += stored.sum()
+            energy_balance.area = np.append(energy_balance.area, 0.0)[before]
+            limit.checked_stiffness = np.append(limit.checked_stiffness, 0.0)[before]
+            joints.rearrange(before, manager.law, manager.keys, started=True)
+            energy_balance.lost = joints.lost.copy()
             self.bind()
-            ledger.load(blocks, press(self.scene, blocks, tracker), self.dt)
+            energy_balance.load(blocks, apply_loads(self.scene, blocks, manager), self.dt)
         self.world.call("press", self.dt)
 
     def _transfer(self) -> None:
-        """Joints and ledger for contacts whose corners went on to other edges.
+        """Joints and energy_balance for contacts whose corners went on to other edges.
 
         Lengths match wherever an edge that lies on another, or a corner that stands on an edge,
         goes on to the same. Else a joint that became shorter drops what it stored on the rest. One
         that became longer would create energy: it starts anew instead, at a closure at which it
         holds what the shorter one held; the rest of the depth becomes its closure offset.
         """
-        ledger, tracker, joints = self.ledger, self.tracker, self.joints
+        energy_balance, manager, joints = self.energy_balance, self.manager, self.joints
         thickness, length, before = self.scene.thickness, self.contacts.length, self.contacts.was
-        held, ratio = joints.stored * before, length / np.maximum(before, TINY)
+        held, ratio = joints.stored_energy * before, length / np.maximum(before, TINY)
         changed = np.flatnonzero((np.abs(ratio - 1) > MATCH) & (held > 0))
-        longer, kept = ratio[changed] > 1, joints.stored[changed]
-        ledger.area[changed] = length[changed] * thickness
+        longer, kept = ratio[changed] > 1, joints.stored_energy[changed]
+        energy_balance.area[changed] = length[changed] * thickness
         if longer.any():
-            fresh, closure = changed[longer], tracker.closure[changed[longer]]
+            fresh, closure = changed[longer], manager.closure[changed[longer]]
             anew, kept[longer] = joints.renew(fresh, held[fresh] / length[fresh], closure)
-            tracker.offset[fresh] += closure - anew
-            ledger.lost[fresh] = 0.0
+            manager.offset[fresh] += closure - anew
+            energy_balance.lost[fresh] = 0.0
         lost = held[changed] - kept * length[changed]
-        ledger.energy[DROPPED] += np.maximum(lost, 0.0).sum() * thickness
+        energy_balance.energy[DROPPED] += np.maximum(lost, 0.0).sum() * thickness
 
-    def shares(self, moving: int, base: int) -> np.ndarray:
+    def area_fractions(self, moving: int, base: int) -> np.ndarray:
         """Share (k,) of each contact in the area of the joint between two blocks; zeros without."""
-        area = self.ledger.area * self.tracker.between(moving, base)
+        area = self.energy_balance.area * self.manager.between(moving, base)
         return area / max(area.sum(), TINY)
 
-    def slid(self, moving: int, base: int) -> float:
+    def shear_displacement(self, moving: int, base: int) -> float:
         """Shear displacement (m) of the joint between two blocks, mean over its area."""
-        return abs(float(self.shares(moving, base) @ self.joints.delta[:, 1]))
+        return abs(float(self.area_fractions(moving, base) @ self.joints.delta[:, 1]))
 
     def state(self) -> Saved:
         """A copy of everything that the future depends on."""
@@ -289,11 +302,11 @@ class Simulation:
                 getattr(of, name)[:] = value
             else:
                 setattr(of, name, value.copy() if value.ndim else value.item())
-        tracker, blocks = self.tracker, self.blocks
+        manager, blocks = self.manager, self.blocks
         blocks.remove(np.flatnonzero(blocks.gone).tolist())
         places = (saved[path] for path in PLACES)
-        tracker.contacts = Contacts(tracker.outlines, *places, blocks.motion)
-        self.joints.restore(saved, tracker.law, tracker.keys)
+        manager.contacts = Contacts(manager.outlines, *places, blocks.motion)
+        self.joints.restore(saved, manager.law, manager.keys)
         if step:
             self._change_step(step)
             self.limit.look(self.scene, blocks, self.contacts, self.joints)

@@ -26,15 +26,16 @@ FALLEN = 0.95  # share of the lowest bound below which the limit is worked out a
 
 
 class StepLimit:
-    """Largest stable step (s): now, a lower bound of it; bound, the lowest one so far at which the
-    limit was worked out; least, the lowest limit worked out.
+    """Largest stable time step.
 
-    checked (k,): stiffness times area (N/m) of the contacts up to which the time step is good.
+    current: a lower bound of it (s); bound: the lowest bound (s) at which it was computed from all
+    eigenvalues; lowest: the lowest value (s) so computed; checked_stiffness (k,): stiffness times
+    area (N/m) of the contacts up to which the present time step is stable.
     """
 
     def __init__(self) -> None:
-        self.now = self.least = self.bound = np.inf
-        self.checked = np.zeros(0)
+        self.current = self.lowest = self.bound = np.inf
+        self.checked_stiffness = np.zeros(0)
 
     def look(
         self, scene: Scene, blocks: Blocks, contacts: Contacts, joints: Joints, dt: float = np.inf
@@ -50,26 +51,28 @@ class StepLimit:
         stiffness = stiffness * np.maximum(area, 0.02 * area.max(initial=0.0))
         run, critical = scene.run, blocks.damping(contacts, stiffness)
         share = max(run.dashpot_normal, run.dashpot_shear)
-        self.checked = stiffness
-        self.now = bound_of_blocks(blocks, contacts, stiffness, share * critical)
-        if dt <= SAFE * self.now and self.now > FALLEN * self.bound:
+        self.checked_stiffness = stiffness
+        self.current = bound_of_blocks(blocks, contacts, stiffness, share * critical)
+        if dt <= SAFE * self.current and self.current > FALLEN * self.bound:
             return
-        self.bound = min(self.bound, self.now)
+        self.bound = min(self.bound, self.current)
         dashpots = np.concatenate([run.dashpot_normal * critical, run.dashpot_shear * critical])
-        self.now = largest_step(rates(blocks, contacts), np.tile(stiffness, 2), dashpots)
-        self.least = min(self.least, self.now)
+        self.current = largest_step(rates(blocks, contacts), np.tile(stiffness, 2), dashpots)
+        self.lowest = min(self.lowest, self.current)
 
     def require(self, dt: float) -> None:
         """Refuse a time step (s) beyond the limit; else note how far joints may stiffen.
 
         The limit falls at most as the square root of the largest growth of any joint's stiffness.
         """
-        if dt > SAFE * self.now:
+        if dt > SAFE * self.current:
             raise Refused(
                 f"time step {dt:.3g} s: must stay below {SAFE} of the limit, which has fallen "
-                f"to {self.now:.3g} s as the joints closed; resume with a smaller step"
+                f"to {self.current:.3g} s as the joints closed; resume with a smaller step"
             )
-        self.checked = min(HEADROOM, (SAFE * self.now / dt) ** 2) * self.checked
+        self.checked_stiffness = (
+            min(HEADROOM, (SAFE * self.current / dt) ** 2) * self.checked_stiffness
+        )
 
 
 def _largest(sums: np.ndarray, root: np.ndarray) -> float:

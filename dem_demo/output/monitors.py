@@ -21,7 +21,7 @@ def watched_slips(sim: Simulation) -> dict[tuple[int, int], dict]:
     for moving, base in scene.slip:
         name = law_between(sim, moving, base)
         distance = slip_distance(scene.laws[name])
-        length = float(sim.contacts.length[sim.tracker.between(moving, base)].sum())
+        length = float(sim.contacts.length[sim.manager.between(moving, base)].sum())
         slips[moving, base] = {
             "block": scene.blocks[moving].name,
             "base": scene.blocks[base].name,
@@ -29,7 +29,7 @@ def watched_slips(sim: Simulation) -> dict[tuple[int, int], dict]:
             "slip_distance": distance,
             "slip_angle": None,
             "slip_time": None,
-            "slipped_before": sim.slid(moving, base) > distance,
+            "slipped_before": sim.shear_displacement(moving, base) > distance,
             **slip_angle(scene, name, moving, length),
         }
     return slips
@@ -39,7 +39,7 @@ def look(slips: dict[tuple[int, int], dict], sim: Simulation) -> None:
     """Note the base angle (degrees) at which a joint of these passes its slip distance."""
     for (moving, base), entry in slips.items():
         waits = entry["slip_angle"] is None and not entry["slipped_before"]
-        if waits and sim.slid(moving, base) > entry["slip_distance"]:
+        if waits and sim.shear_displacement(moving, base) > entry["slip_distance"]:
             entry |= {"slip_angle": base_angle(sim, moving, base), "slip_time": sim.time}
 
 
@@ -57,7 +57,7 @@ def law_between(sim: Simulation, moving: int, base: int) -> str:
     """Name of the law of the joint between the faces with which two blocks face each other."""
     one, other = sorted((moving, base))
     edges = [_face(sim, one, other)[0], _face(sim, other, one)[0]]
-    return sim.joints.names[sim.tracker.laws_of(np.array([edges]))[0]]
+    return sim.joints.law_names[sim.manager.laws_of(np.array([edges]))[0]]
 
 
 def _face(sim: Simulation, block: int, other: int) -> tuple[int, np.ndarray]:
@@ -68,7 +68,7 @@ def _face(sim: Simulation, block: int, other: int) -> tuple[int, np.ndarray]:
     along = np.roll(corners, -1, axis=0) - corners
     outward = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
     face = int(((sim.blocks.motion[:2, other] - corners) * outward).sum(axis=1).argmax())
-    return sim.tracker.outlines.start[block] + face, outward[face]
+    return sim.manager.outlines.start[block] + face, outward[face]
 
 
 def readings(sim: Simulation) -> dict[str, float]:
@@ -106,7 +106,7 @@ def base_of(scene: Scene, motion: np.ndarray) -> np.ndarray:
 
 def _joint(sim: Simulation, moving: int, base: int) -> dict[str, float]:
     """Mean over the joint between two blocks: stresses, closure, sliding, sliding share."""
-    joints, share = sim.joints, sim.shares(moving, base)
+    joints, share = sim.joints, sim.area_fractions(moving, base)
     columns = [*joints.traction.T, *joints.delta.T, joints.sliding]
     keys = "normal_Pa", "shear_Pa", "closure_m", "slid_m", "sliding_share"
     return {key: float(share @ column) for key, column in zip(keys, columns, strict=True)}

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..dynamics.energy import COLUMNS
+from ..dynamics.energy_balance import COLUMNS
 from ..dynamics.simulation import Simulation
 from ..scene import Scene, usual_size
 from .monitors import base_of, law_between, readings, watched_slips
@@ -30,7 +30,7 @@ class Record:
 
     def __init__(self, sim: Simulation) -> None:
         self.scene, self.slips, self.steps = sim.scene, watched_slips(sim), 0
-        self.loose, self.initial = sim.loose, sim.initial
+        self.loose, self.initial = sim.unstable, sim.initial
         self.laws = {pair: law_between(sim, *pair) for pair in (*sim.scene.slip, *sim.scene.shear)}
         self.times, self.motion, self.energy = [], [], []
         self.joints, self.stresses, self.monitored = [], [], []
@@ -40,7 +40,7 @@ class Record:
         """Add the present as a frame."""
         self.times.append(sim.time)
         self.motion.append(np.where(sim.blocks.gone, np.nan, sim.blocks.motion))
-        self.energy.append([*sim.ledger.energy.tolist(), sim.ledger.error])
+        self.energy.append([*sim.energy_balance.energy.tolist(), sim.energy_balance.error])
         self.joints.append(_joints(sim))
         self.stresses.append(block_stresses(sim))
         self.monitored.append(readings(sim))
@@ -103,7 +103,7 @@ def _joints(sim: Simulation) -> dict[str, np.ndarray]:
     ends = c.at + np.stack([ahead, ahead - 1], axis=0) * c.length * c.way
     ends = np.stack([ends.real, ends.imag], axis=-1).swapaxes(0, 1)
     columns = {
-        "who": np.column_stack([c.a, c.b]), "ends": ends, "law": sim.tracker.law,
+        "who": np.column_stack([c.a, c.b]), "ends": ends, "law": sim.manager.law,
         "closure_m": c.closure, "shear_m": joints.delta[:, 1],
         "normal_stress_Pa": joints.traction[:, 0], "shear_stress_Pa": joints.traction[:, 1],
         "sliding": joints.sliding, "slipping": joints.slipping, "separated": joints.separated,

@@ -12,7 +12,7 @@ from tqdm import tqdm
 from jointlaw.support.files import write_json
 from jointlaw.support.pyplot import FORMATS
 
-from ..dynamics.energy import COLUMNS
+from ..dynamics.energy_balance import COLUMNS
 from ..dynamics.simulation import Simulation, require_text
 from ..scene import Refused, Scene, usual_size
 from .folder import BLOCKS, HISTORY, clear_run
@@ -54,13 +54,15 @@ def run(
         "model_time_s": record.times[-1],
         "steps": record.steps,
         "time_step_s": sim.dt,
-        "step_limit_s": sim.limit.least,
-        "time_step_margin": sim.limit.least / sim.dt,
+        "step_limit_s": sim.limit.lowest,
+        "time_step_margin": sim.limit.lowest / sim.dt,
         "started_in_equilibrium": not record.loose.any(),
         "loose": named(sim.scene, record.loose),
         "law_points": sim.joints.n,
         "stresses_of_joints": "effective" if sim.scene.wet else "total",
-        "stages_begun_s": [time if time < np.inf else None for time in sim.begun.tolist()],
+        "stages_begun_s": [
+            time if time < np.inf else None for time in sim.stage_start_times.tolist()
+        ],
         "energy_J": dict(zip(COLUMNS, record.energy[-1][:-1], strict=True)),
         "energy_error": record.energy[-1][-1],
         "largest_energy_error": max((abs(row[-1]) for row in record.energy[1:]), default=0.0),

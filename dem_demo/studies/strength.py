@@ -124,7 +124,7 @@ def seated(scene: Scene) -> Scene:
 
 
 def _loose(scene: Scene) -> list[dict]:
-    return named(scene, Simulation(seated(scene)).loose)
+    return named(scene, Simulation(seated(scene)).unstable)
 
 
 def _show(scene: Scene, until: float, title: str, path: Path, apart: np.ndarray) -> list[dict]:

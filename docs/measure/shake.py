@@ -74,7 +74,7 @@ def slip(given):
     sim, rows = dem_demo.Simulation(given), []
     while sim.time < (CYCLES + 1) / FREQUENCY:
         sim.step()
-        rows.append([sim.time, sim.slid(SLAB, BASE)])
+        rows.append([sim.time, sim.shear_displacement(SLAB, BASE)])
     return np.transpose(rows)
 
 

@@ -16,7 +16,7 @@ from shapely import Point, Polygon
 import jointlaw as jl
 from dem_demo import Refused, Simulation, load, parse, run
 from dem_demo.cli import main
-from dem_demo.contact import Tracker
+from dem_demo.contact import ContactManager
 from dem_demo.dynamics.blocks import Blocks
 from dem_demo.output.monitors import friction_angle, law_between
 from dem_demo.output.record import Record, outcomes
@@ -155,11 +155,11 @@ def test_joints_have_the_law_of_their_set():
         text.replace("[watch]", "[[joint]]\naround = [-3.0, 7.0]\nlaw = 'plain'\n[watch]")
     )
     block = [Polygon(one.corners).contains(Point(-3.0, 7.0)) for one in scene.blocks].index(True)
-    tracker = Tracker(scene, Blocks(scene).motion)
-    start, of = tracker.outlines.start, tracker.outlines.block
+    manager = ContactManager(scene, Blocks(scene).motion)
+    start, of = manager.outlines.start, manager.outlines.block
     laws = {int(start[one] + edge): law for (one, edge), law in scene.edge_laws.items()}
     pairs = np.array([*itertools.combinations(sorted(laws), 2)])
-    found = [[*scene.laws][law] for law in tracker.laws_of(pairs)]
+    found = [[*scene.laws][law] for law in manager.laws_of(pairs)]
     for (one, other), law in zip(pairs.tolist(), found, strict=True):
         alike = laws[one] if laws[one] == laws[other] else "joint"
         assert law == ("plain" if block in (of[one], of[other]) else alike)
@@ -180,7 +180,7 @@ def test_two_blocks_with_laws_of_their_own_are_told_and_moved_by_the_same():
     )
     sim = Simulation(scene)
     assert law_between(sim, 0, 1) == law_between(sim, 1, 0) == "soft"
-    assert {sim.joints.names[law] for law in sim.joints.law} == {"soft"}
+    assert {sim.joints.law_names[law] for law in sim.joints.law} == {"soft"}
 
 
 def test_coulomb_in_compare_has_the_strength_of_the_law():
@@ -305,7 +305,7 @@ def test_what_cannot_be_built_or_run_is_a_row_with_its_reason_but_for_the_scene_
     row, none = _run("b = 0", dict(variants(scene, record))["b = 0"], None)
     assert row["note"].startswith("cannot be built: orientation.c")
     assert none is None
-    long = replace(scene.run, step=1.8 * Simulation(scene).limit.now)
+    long = replace(scene.run, step=1.8 * Simulation(scene).limit.current)
     row, none = _run("twice the time step", lambda: replace(scene, run=long), None)
     assert row["note"].startswith("refused: time step")
     rock = parse(f"[laws.joint]\n{coulomb(0.1, 1e9, 1e9)}" + NOTCHED.replace("CUT", ""))

@@ -127,7 +127,7 @@ def plain_step(sim, velocity, dt):
     scene, blocks, contacts, joints = sim.scene, sim.blocks, sim.contacts, sim.joints
     area, motion = contacts.length * scene.thickness, blocks.motion
     stress, shear = (area * part for part in joints.traction.T)
-    energy = joints.stored * scene.thickness  # J/m: what a change of the length costs
+    energy = joints.stored_energy * scene.thickness  # J/m: what a change of the length costs
     out = np.zeros((3, *blocks.free.shape))
     critical = blocks.damping(contacts, joints.stiffness * area)
     least = np.where(joints.damage < 1, -np.inf, -stress)
@@ -146,9 +146,9 @@ def plain_step(sim, velocity, dt):
     booked = {
         "kinetic": 0.5 * (went * (blocks.inertia * went + dt * out[0])).sum(),
         "potential": -dt * (blocks.gravity * went).sum(),
-        "stored": area @ joints.stored,
-        "dashpots": -0.5 * dt * ((sim.ledger.last[0] + out[1]) * went).sum(),
-        "work": 0.5 * dt * ((sim.ledger.last[1] + out[2]) * went).sum()
+        "stored": area @ joints.stored_energy,
+        "dashpots": -0.5 * dt * ((sim.energy_balance.last[0] + out[1]) * went).sum(),
+        "work": 0.5 * dt * ((sim.energy_balance.last[1] + out[2]) * went).sum()
         + dt * (blocks.loads * went).sum(),
     }
     return out, booked, (went + dt * out[0] / blocks.inertia * blocks.mobile).T

@@ -25,11 +25,11 @@ def test_sliding_block(law):
     """
     text = on_base(law, [1.0, 0.5], 48.0, at=(-1.0, 0.25))
     sim = Simulation(parse(f"{text}fraction = 0.3\n"))
-    lost = [0.0, *steps(sim, 1100, lambda: sim.ledger.value["friction"])]
+    lost = [0.0, *steps(sim, 1100, lambda: sim.energy_balance.value["friction"])]
     assert sim.blocks.motion[0, 1] > -0.9
     assert np.diff(lost).min() >= -1e-9 * lost[-1]
-    assert lost[-1] > 0.3 * sim.ledger.value["turned"]
-    assert abs(sim.ledger.error) < 1e-4
+    assert lost[-1] > 0.3 * sim.energy_balance.value["turned"]
+    assert abs(sim.energy_balance.error) < 1e-4
 
 
 def test_linear_joint_conserves_to_round_off():
@@ -41,7 +41,7 @@ def test_linear_joint_conserves_to_round_off():
     sim = Simulation(parse(on_base(coulomb(np.inf, 1e9, 8e8), [1.0, 0.5]) + run))
     steps(sim, 1000)
     # Joules, of 0.1 that come and go: places are known to 5e-17 m, times a weight of 13 kN.
-    assert sim.ledger.total == pytest.approx(sim.ledger.start, abs=2e-11)
+    assert sim.energy_balance.total == pytest.approx(sim.energy_balance.start, abs=2e-11)
 
 
 SHAPES = [
@@ -69,7 +69,7 @@ def test_tumbling_heap():
     gone, most, twice, potential = [], 0, 0, []
     for _ in range(6000):
         sim.step()
-        c, v = sim.contacts, sim.ledger.value
+        c, v = sim.contacts, sim.energy_balance.value
         most = max(most, int((sim.joints.traction[:, 0] > 0).sum()))
         twice += len(set(zip(c.corner.tolist(), c.edge.tolist(), strict=True))) < len(c.corner)
         gone.append([v["friction"], v["dropped"]])
@@ -77,7 +77,7 @@ def test_tumbling_heap():
     assert most >= 3
     assert twice <= 2  # of two that arrive at one corner one is dropped in the next step
     assert np.diff(gone, axis=0).min() >= -1e-9 * np.ptp(potential)
-    assert abs(sim.ledger.total - sim.ledger.start) < 5e-3 * np.ptp(potential)
+    assert abs(sim.energy_balance.total - sim.energy_balance.start) < 5e-3 * np.ptp(potential)
 
 
 @pytest.mark.slow
@@ -121,7 +121,7 @@ dashpot_shear = 0.0
     )
     sim = Simulation(scene)
     booked = until(
-        sim, scene.run.end, lambda: (sim.ledger.value, sim.tracker.offset.max(initial=0))
+        sim, scene.run.end, lambda: (sim.energy_balance.value, sim.manager.offset.max(initial=0))
     )
     dropped, stored, work = np.array([[v["dropped"], v["stored"], v["work"]] for v, _ in booked]).T
     assert stored.max() > 100
@@ -130,7 +130,7 @@ dashpot_shear = 0.0
     assert max(offset for _, offset in booked) > 1e-3
     assert work[-1] == pytest.approx(dropped[-1], rel=1e-2)  # all that the drive spent
     # The corner is 7 micrometres past the other when it gives way, of 1 cm: a share of that order.
-    assert abs(sim.ledger.error) < 1e-3
+    assert abs(sim.energy_balance.error) < 1e-3
 
 
 ELASTIC = coulomb(0.0, 1e9, 8e8)
@@ -153,7 +153,7 @@ def test_tumbling_block_keeps_its_energy(law, spin, steps, within):
     text = on_base(law, [1.0, 1.0], at=at.tolist(), base=(10.0, 1.0), end=10.0, **way)
     text += "seat = false\ndashpot_normal = 0.0\ndashpot_shear = 0.0\nstep = 1e-4\n"
     sim = Simulation(parse(f"{text}law_steps = {steps}"))
-    had, (held,) = collections.Counter(), sim.joints.held
+    had, (held,) = collections.Counter(), sim.joints.by_law
     take = held.take
 
     def counted(m):
@@ -165,7 +165,10 @@ def test_tumbling_block_keeps_its_energy(law, spin, steps, within):
         # pressed joints, each by its place and how many contacts have had that
         places = sim.joints.place[sim.joints.traction[:, 0] > 0].tolist()
         pressed = {(place, had[place]) for place in places}
-        value = sim.ledger.total - sim.ledger.start, sim.ledger.value["potential"]
+        value = (
+            sim.energy_balance.total - sim.energy_balance.start,
+            sim.energy_balance.value["potential"],
+        )
         return 20.0 - np.degrees(sim.blocks.motion[2, 1]), *value, pressed
 
     held.take = counted
@@ -211,7 +214,7 @@ def put(sim, across, up):
 def friction(sim):
     """Largest friction angle (degrees) while the block is driven along."""
     until(sim, 0.2)
-    forces = np.array(until(sim, 0.5, lambda: sim.ledger.area @ sim.joints.traction))
+    forces = np.array(until(sim, 0.5, lambda: sim.energy_balance.area @ sim.joints.traction))
     return np.degrees(np.arctan(np.abs(forces[:, 1]) / forces[:, 0])).max()
 
 
@@ -247,8 +250,10 @@ def test_a_contact_that_is_pressed_when_found_starts_with_nothing():
     put(sim, 0.0, at_rest - 1e-4 - sim.blocks.motion[1, 1])
     sim.step()
     assert sim.contacts.closure.min() > 0.9e-4
-    assert sim.tracker.closure.max() < 1e-6
-    assert sim.ledger.value["stored"] == pytest.approx(0.0, abs=1e-6 * sim.ledger.value["turned"])
+    assert sim.manager.closure.max() < 1e-6
+    assert sim.energy_balance.value["stored"] == pytest.approx(
+        0.0, abs=1e-6 * sim.energy_balance.value["turned"]
+    )
 
 
 def test_a_sliver_rules_neither_the_search_nor_the_corners_of_the_others():

@@ -17,7 +17,7 @@ from scene_text import ROCK, block, coulomb, lines, on_base
 import jointlaw
 from dem_demo import Refused, Simulation, load, parse
 from dem_demo.compiled import Pool, World
-from dem_demo.contact import virgin_curve
+from dem_demo.contact import tabulate_first_loading
 from dem_demo.dynamics import simulation
 from dem_demo.scene import Files, build_law
 
@@ -57,10 +57,10 @@ def test_a_compiled_step_is_that_of_plain_numpy(name, steps):
     sim = Simulation(parse(name) if "[run]" in name else load(name))
     for steps_on in steps:
         for _ in range(steps_on):
-            before = sim.ledger.value
+            before = sim.energy_balance.value
             sim.step()
         c, drives, dt = sim.contacts, sim.blocks.drives, sim.dt
-        plain = PlainContacts(sim.tracker.outlines, c.corner, c.edge, sim.blocks.motion)
+        plain = PlainContacts(sim.manager.outlines, c.corner, c.edge, sim.blocks.motion)
         for part in GEOMETRY:
             ours, theirs = getattr(c, part), getattr(plain, part)
             size = max(float(np.abs(theirs).max(initial=0.0)), 1e-3)
@@ -69,13 +69,13 @@ def test_a_compiled_step_is_that_of_plain_numpy(name, steps):
         force, booked, velocity = plain_step(sim, drives.aim, dt)
         scale = np.abs(c.length[:, None] * sim.joints.traction).max(initial=0.0)
         scale = max(scale, float(np.abs(sim.blocks.gravity).max()))
-        np.testing.assert_allclose(sim.ledger.forces, force, rtol=0, atol=1e-12 * scale)
+        np.testing.assert_allclose(sim.energy_balance.forces, force, rtol=0, atol=1e-12 * scale)
         tiny = 1e-12 * scale * dt / sim.blocks.inertia.min()
         np.testing.assert_allclose(sim.blocks.velocity, velocity, rtol=0, atol=tiny)
-        for entry, now in sim.ledger.value.items():
+        for entry, now in sim.energy_balance.value.items():
             if entry in booked:
                 gained = now - before[entry] * (entry not in ("kinetic", "stored"))
-                turned = max(sim.ledger.value["turned"], 1e-9)
+                turned = max(sim.energy_balance.value["turned"], 1e-9)
                 assert gained == pytest.approx(booked[entry], abs=1e-13 * turned), entry
 
 
@@ -111,8 +111,8 @@ def test_rounding_of_the_drawing_does_not_choose_between_equal_corners():
 def ring(scene, share, steps):
     """Largest velocity after small pushes, per step, at a share of the predicted limit."""
     sim = Simulation(scene, step=1e-9)
-    sim.limit.checked[:] = np.inf  # it would refuse what is tested here
-    sim.dt = share * sim.limit.now
+    sim.limit.checked_stiffness[:] = np.inf  # it would refuse what is tested here
+    sim.dt = share * sim.limit.current
     rng = np.random.default_rng(3)
     sim.blocks.motion[3:] = (
         1e-7 * rng.standard_normal(sim.blocks.motion[3:].shape) * sim.blocks.mobile.T
@@ -151,7 +151,7 @@ def test_bounded_below_the_limit_and_not_above(blocks, zeta):
 def test_stiffness_at_stress_bounds_a_sheared_joint():
     """The time step takes stiffness from normal stress: the unsheared joint must be stiffest."""
     law = build_law(tomllib.loads(ROCK), "law", Files())
-    curve, rng = virgin_curve(law), np.random.default_rng(5)
+    curve, rng = tabulate_first_loading(law), np.random.default_rng(5)
     batch, closure = law.joints(40), law.closure(np.geomspace(5e3, 3e5, 40))
     batch.update(np.column_stack([closure, np.zeros(40)]), tangent=False)
     worst = 0.0
@@ -181,7 +181,7 @@ def test_a_chosen_step_is_halved_in_an_impact_and_time_goes_on(monkeypatch):
     assert fast.dt <= 0.5 * first
     assert steps.max() < first * (1 + 1e-6)  # no time is lost or told twice
     assert steps.min() > 0.999 * fast.dt
-    assert abs(fast.ledger.error) < 5e-3
+    assert abs(fast.energy_balance.error) < 5e-3
     slow = Simulation(parse(FALL), step=0.25 * fast.dt)
     until(slow, fast.time)
     assert fast.blocks.motion[:2, 1] == pytest.approx(slow.blocks.motion[:2, 1], abs=2e-3)
@@ -189,7 +189,7 @@ def test_a_chosen_step_is_halved_in_an_impact_and_time_goes_on(monkeypatch):
     chosen = Simulation(parse(FALL))
     assert chosen.dt < first
     until(chosen, fast.time)
-    assert abs(chosen.ledger.error) < 1e-2  # a longer step
+    assert abs(chosen.energy_balance.error) < 1e-2  # a longer step
     assert chosen.blocks.motion[:2, 1] == pytest.approx(slow.blocks.motion[:2, 1], abs=2e-3)
     given = Simulation(parse(FALL), step=first)
     with pytest.raises(Refused, match="must stay below"):

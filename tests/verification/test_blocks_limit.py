@@ -11,7 +11,7 @@ from scipy.optimize import bisect, linprog
 from scipy.sparse import diags, hstack
 
 from dem_demo import Simulation, load, parse
-from dem_demo.contact import Tracker
+from dem_demo.contact import ContactManager
 from dem_demo.dynamics.blocks import Blocks
 from dem_demo.dynamics.timestep import rates
 from dem_demo.output.run import to_failure
@@ -52,13 +52,13 @@ def upper_factor(scene, low=0.25, high=4.0, exact=1e-3):
     forces.
     """
     blocks = Blocks(scene)
-    tracker = Tracker(scene, blocks.motion)
-    tracker.renew(blocks.motion, blocks.near())
-    contacts = tracker.contacts
+    manager = ContactManager(scene, blocks.motion)
+    manager.renew(blocks.motion, blocks.near())
+    contacts = manager.contacts
     carries = np.flatnonzero(contacts.length > 0)
     k, free = len(contacts.length), blocks.free.ravel()
     ways = rates(blocks, contacts)[np.concatenate([carries, k + carries])].T  # of N, and of shear
-    friction = np.array([law.friction for law in scene.laws.values()])[tracker.law[carries]]
+    friction = np.array([law.friction for law in scene.laws.values()])[manager.law[carries]]
     n = len(carries)
     press, shear = ways[:, :n], ways[:, n:]
     load = ((blocks.gravity + blocks.loads) * blocks.root).ravel()[free]
@@ -203,7 +203,7 @@ def test_a_block_hangs_from_a_bond(times, energy):
     roof = block("roof", box=[4.0, 1.0], at=[0.0, 1.0], fixed=True)
     text = f"[laws.j]\n{law}{roof}{block('b', box=[1.0, 1.0])}[run]\nend = 1.0\n"
     sim = Simulation(parse(text))
-    assert not sim.loose.any()
+    assert not sim.unstable.any()
     assert not sim.joints.damage.any()
     assert sim.blocks.motion[1, 1] == pytest.approx(-weight / 1e9, rel=1e-6)
 
@@ -241,7 +241,7 @@ def test_slope_with_rock_bridges_fails_step_by_step_as_its_strength_falls():
     joints, and fails a little above.
     """
     scene = load("bridges")
-    assert Simulation(load("bridges-weathered")).loose.any()
+    assert Simulation(load("bridges-weathered")).unstable.any()
     factor = factor_of_safety(scene)
     calm = replace(scene.run, fraction=0.5, law_steps=1, dashpot_normal=0.3, dashpot_shear=0.3)
     sim = Simulation(replace(weakened(scene, 1.15 * factor), reduction=1.0, run=calm))

@@ -142,7 +142,7 @@ def test_factor_of_safety_of_a_slope_is_that_of_coulomb_of_the_same_strength():
             laws[name] = jl.CoulombLaw(stiff, stiff / law.asperity.lam, friction, plane=0.0)
         pairs[pair] = name
     alike = factor_of_safety(replace(one, laws=laws, pairs=pairs))
-    assert not sim.loose.any()
+    assert not sim.unstable.any()
     assert found == pytest.approx(alike, rel=0.03)
 
 
@@ -246,9 +246,9 @@ def test_a_sinking_block_gets_from_the_water_what_its_potential_loses():
         return WATER * wet.area * (0.1 * (at.x + 9) - 1.2 - at.y) if wet.area else 0.0
 
     start = potential()
-    seen = until(sim, 0.7, lambda: (sim.ledger.value["work"], start - potential()))
+    seen = until(sim, 0.7, lambda: (sim.energy_balance.value["work"], start - potential()))
     work, gained = np.array(seen).T
-    assert abs(sim.ledger.error) < 1e-12
+    assert abs(sim.energy_balance.error) < 1e-12
     assert np.ptp(gained) > 1e4  # J: 2.2 m2 of water lifted by a metre
     assert work == pytest.approx(gained, abs=3e-3 * np.ptp(gained))
 

@@ -1,4 +1,4 @@
-"""The energy ledger: where every joule went, consistent with the leapfrog's half steps.
+"""The energy energy_balance: where every joule went, consistent with the leapfrog's half steps.
 
 Velocities live between positions, so the kinetic energy at a position is half of mass times the
 product of the velocities before and after it; its change over a step is then exactly the trapezoid
@@ -16,7 +16,7 @@ KINETIC, STORED, DROPPED, WORK, TURNED = (
 )
 
 
-class Ledger:
+class EnergyBalance:
     """Energies in J: kinetic + potential + stored + friction + dashpots + dropped = start + work.
 
     energy (8,): by COLUMNS. friction: dissipated in the joints; dropped: stored in contacts that
@@ -36,7 +36,7 @@ class Ledger:
         """Begin at time 0, when the velocities of the blocks' motion hold."""
         kick, v = 0.5 * dt * self.forces[0] / blocks.inertia, blocks.motion[3:].T
         self.energy[KINETIC] = (0.5 * blocks.inertia * (v**2 - kick**2)).sum()
-        self.energy[STORED] = self.area @ joints.stored
+        self.energy[STORED] = self.area @ joints.stored_energy
         self.start = float(self.energy[KINETIC] + self.energy[STORED])
         self.energy[TURNED] = self.start
 

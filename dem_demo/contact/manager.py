@@ -37,7 +37,7 @@ def _in_range(contacts: Contacts, known: np.ndarray) -> np.ndarray:
     return np.array(meant, bool)
 
 
-class Tracker:
+class ContactManager:
     """Follows the contacts of a scene.
 
     contacts: at the motion followed to, on corner and edge (k,); keys (k, 2): edges that met when

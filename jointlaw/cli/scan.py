@@ -41,7 +41,7 @@ def _friction(fit: SurfaceFit, z: Array) -> str:
         try:
             one = from_surface(z, fit.spacing, length)
             cells = ["not told: the law does not describe this surface, see Z2"] * 2
-            if one.describes:
+            if one.orientation_is_representative:
                 joints = (one.law(ROCK, plane=plane).joint() for plane in (0.0, math.pi / 2))
                 tests = (direct_shear(j, one.asperities.size, STRESS, steps=100) for j in joints)
                 cells = [f"{test.peak_friction_angle:.1f}°" for test in tests]

@@ -1,10 +1,10 @@
-"""Scans of joint surfaces, in the order in which heights become a law.
+"""Scans of joint surfaces: from heights to the parameters of a law.
 
     scan_files      matrices of heights in text and NPY files
     asperities      summits and facets of a surface
-    densities       gamma heights through summit depths, moments of Eq. 14 through facet slopes
+    densities       gamma heights fitted to summit depths, Eq. 14 fitted to facet slopes
     roughness       rms slopes of scans and of Eq. 14, spikes
-    fit             from_surface and its result: a law, what the scan leaves open, words, a picture
+    fit             from_surface and its result: law, report, parameters that are not identifiable
 
-Each file imports from those above it only.
+Each file imports only from the files above it.
 """

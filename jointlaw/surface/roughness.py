@@ -1,4 +1,4 @@
-"""Roughness of a surface and of the law: rms slopes (Z2) along and across, and spikes of a scan."""
+"""Roughness: rms slopes (Z2) of surfaces and of Eq. 14, and spikes of a scan."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,39 +7,45 @@ from scipy import ndimage
 from ..parameters.orientation import Orientation
 from ..support.checks import Array
 
-SPIKE = 3.0  # median steps between neighbours along both axes: farther out a point is a spike
+SPIKE_HEIGHT = 3.0  # sum of the median steps along both axes: higher points are spikes
 
 
 def rms_slope(orientation: Orientation, azimuth: float = 0.0) -> float:
-    """Root mean square slope (Z2) of profiles along an azimuth (rad), by facets of Eq. 14.
+    """Root mean square slope (Z2) of profiles along an azimuth (rad) for facets of Eq. 14.
 
     The facets cover equal areas of the joint plane.
     """
     theta = np.pi / (2 * orientation.a) * (np.arange(200)[:, None] + 0.5) / 200
     phi = 2 * np.pi * (np.arange(16) + 0.5) / 16
-    share = orientation.density(theta, phi) * np.sin(theta)
-    along = np.tan(theta) * np.cos(phi - azimuth)
-    return float(np.sqrt(np.sum(share * along**2) / np.sum(share)))
+    weight = orientation.density(theta, phi) * np.sin(theta)
+    slope = np.tan(theta) * np.cos(phi - azimuth)
+    return float(np.sqrt(np.sum(weight * slope**2) / np.sum(weight)))
 
 
 def measured_slopes(z: Array, spacing: float, samples: int) -> tuple[float, float]:
-    """The same of level heights (ny, nx) in m, along the rows and across them.
+    """Root mean square slopes (Z2) of a measured surface, along the rows and across them.
 
-    Of planes through squares of `samples` points, the facets of the whole surface.
+    They are slopes of planes fitted to adjoining squares, the facets of the whole surface.
+
+    Parameters
+    ----------
+    z: heights (ny, nx) in m relative to their mean plane.
+    spacing: spacing of the points in m.
+    samples: points along the edge of a square.
     """
     ny, nx = (n // samples for n in z.shape)
     squares = z[: ny * samples, : nx * samples].reshape(ny, samples, nx, samples)
     arm = np.arange(samples) - (samples - 1) / 2
-    rise = [np.einsum(f"isjt,{axis}->ij", squares, arm) for axis in "ts"]
-    run = samples * float(arm @ arm) * spacing
-    return float(np.sqrt(np.mean(rise[0] ** 2))) / run, float(np.sqrt(np.mean(rise[1] ** 2))) / run
+    moment = samples * float(arm @ arm) * spacing
+    along, across = (np.einsum(f"isjt,{axis}->ij", squares, arm) for axis in "ts")
+    return float(np.sqrt(np.mean(along**2))) / moment, float(np.sqrt(np.mean(across**2))) / moment
 
 
-def spikes(z: Array) -> NDArray[np.intp]:
-    """Grid indices (n, 2) of points that lie far above or below all of their eight neighbours."""
-    around = np.ones((3, 3), bool)
-    around[1, 1] = False
-    above = z - ndimage.maximum_filter(z, footprint=around, mode="nearest")
-    below = ndimage.minimum_filter(z, footprint=around, mode="nearest") - z
-    usual = np.median(np.abs(np.diff(z, axis=1))) + np.median(np.abs(np.diff(z, axis=0)))
-    return np.argwhere(np.maximum(above, below) > SPIKE * usual)
+def find_spikes(z: Array) -> NDArray[np.intp]:
+    """Grid indices (n, 2) of points that are far above or far below all eight neighbours."""
+    neighbours = np.ones((3, 3), bool)
+    neighbours[1, 1] = False
+    above = z - ndimage.maximum_filter(z, footprint=neighbours, mode="nearest")
+    below = ndimage.minimum_filter(z, footprint=neighbours, mode="nearest") - z
+    median_step = np.median(np.abs(np.diff(z, axis=1))) + np.median(np.abs(np.diff(z, axis=0)))
+    return np.argwhere(np.maximum(above, below) > SPIKE_HEIGHT * median_step)

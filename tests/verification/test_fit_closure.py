@@ -242,9 +242,9 @@ def test_the_peak_is_that_of_barton(jrc, jcs):
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        ({"jcs": 1e6}, "climb by 0 degrees above 30"),
-        ({"jrc": 40.0}, "climb by 80 degrees above 30: it must be 1 to 50"),
-        ({"normal_stiffness": 1e8}, "a joint too soft"),
+        ({"jcs": 1e6}, "angle of 0 degrees above 30"),
+        ({"jrc": 40.0}, "angle of 80 degrees above 30: it must be 1 to 50"),
+        ({"normal_stiffness": 1e8}, "a joint that is too soft"),
         ({"jrc": 20.0, "length": 1.0, "normal_stiffness": 1e11}, "misses .* its displacement by -"),
         ({"length": 0.0}, "length = 0.0 is out of bounds"),
     ],

@@ -1,4 +1,4 @@
-"""Scans of surfaces whose asperities are known."""
+"""Scans of synthetic surfaces with known asperities, and files of scans."""
 
 import numpy as np
 import pytest
@@ -7,30 +7,32 @@ import jointlaw as jl
 from jointlaw.surface.roughness import measured_slopes, rms_slope
 from jointlaw.surface.scan_files import read_scan
 
-SPACING = 20e-6
-ORIENTATION, HEIGHTS = jl.Orientation(3.0, 0.5, 0.1), jl.GammaHeights(4.0, 1e-5)
+SPACING = 20e-6  # m
+ORIENTATION = jl.Orientation(3.0, 0.5, 0.1)
+HEIGHTS = jl.GammaHeights(4.0, 1e-5)
 
 
 def synthetic_surface(orientation, heights, n=24, spacing=20e-6, noise=0.3e-6, seed=0, samples=20):
-    """Heights (n samples, n samples) in m of a surface drawn from the law's densities.
+    """Heights (n samples, n samples) in m of a surface drawn from the densities of a law.
 
-    Every square of `samples` x `samples` points carries one asperity at a random place near its
-    middle, its summit at a depth from `heights`; in each of its four quadrants one plane facet
-    falls away from it, of an inclination and azimuth from `orientation`. noise: standard deviation
+    Every square of `samples` x `samples` points has one asperity at a random position near its
+    centre, with a summit depth from `heights`. In each of its four quadrants one plane facet
+    descends from it, with an inclination and azimuth from `orientation`. noise: standard deviation
     of a height in m.
     """
     rng = np.random.default_rng(seed)
     z = np.empty((n, samples, n, samples))
     depth = rng.gamma(heights.alpha + 1, heights.beta, (n, n))
-    place = np.arange(samples) - samples // 2
+    axis = np.arange(samples) - samples // 2
     for i, j in np.ndindex(n, n):
-        off = rng.integers(-1, 2, 2)
-        y, x = np.meshgrid(place - off[0], place - off[1], indexing="ij")
+        offset = rng.integers(-1, 2, 2)
+        y, x = np.meshgrid(axis - offset[0], axis - offset[1], indexing="ij")
         theta, phi = draw_directions(orientation, 4, rng)
         quadrant = (x < 0).astype(int) + 2 * (y < 0)
         # the azimuth in the first quadrant that has the same cos 2 phi
         folded = np.arctan2(np.abs(np.sin(phi)), np.abs(np.cos(phi)))
-        slope, azimuth = np.tan(theta)[quadrant], folded[quadrant]
+        slope = np.tan(theta)[quadrant]
+        azimuth = folded[quadrant]
         fall = slope * (np.abs(x) * np.cos(azimuth) + np.abs(y) * np.sin(azimuth))
         z[i, :, j, :] = -depth[i, j] - spacing * fall
     z = z.reshape(n * samples, n * samples)
@@ -39,12 +41,14 @@ def synthetic_surface(orientation, heights, n=24, spacing=20e-6, noise=0.3e-6, s
 
 def draw_directions(orientation, n, rng):
     """Inclinations and azimuths (n,) in rad drawn from Eq. 14, by rejection in u = cos(a theta)."""
-    b, c = orientation.b, orientation.c
-    u, phi = rng.uniform(size=60 * n), rng.uniform(0, 2 * np.pi, 60 * n)
+    b = orientation.b
+    c = orientation.c
+    u = rng.uniform(size=60 * n)
+    phi = rng.uniform(0, 2 * np.pi, 60 * n)
     density = 1 + b / 2 * (3 * u**2 - 1) + 3 * c * (1 - u**2) * np.cos(2 * phi)
-    highest = 1 + max(b, -b / 2) + 3 * abs(c)
-    keep = np.flatnonzero(rng.uniform(size=60 * n) * highest < density)[:n]
-    return np.arccos(u[keep]) / orientation.a, phi[keep]
+    max_density = 1 + max(b, -b / 2) + 3 * abs(c)
+    accepted = np.flatnonzero(rng.uniform(size=60 * n) * max_density < density)[:n]
+    return np.arccos(u[accepted]) / orientation.a, phi[accepted]
 
 
 @pytest.fixture(scope="module")
@@ -61,10 +65,10 @@ def surface():
         (jl.Orientation(2.0, -0.5, -0.2), jl.GammaHeights(2.0, 3e-5)),
     ],
 )
-def test_known_parameters_are_covered_by_their_errors(orientation, heights):
-    """0.3 um of noise: the 95 % intervals hold the truth in 45 to 50 of 50 scans.
+def test_intervals_contain_the_true_parameters(orientation, heights):
+    """0.3 um of noise: the 95 % intervals contain the true value in 45 to 50 of 50 scans.
 
-    Of five parameters in three surfaces one that misses more often has a probability of 3 %.
+    That any of five parameters of three surfaces has more misses has a probability of 3 %.
     """
     truth = {
         "a": orientation.a, "b": orientation.b, "c": orientation.c,
@@ -80,45 +84,47 @@ def test_known_parameters_are_covered_by_their_errors(orientation, heights):
     assert not set(truth) & set(fit.not_identifiable)
 
 
-def test_a_scan_makes_a_law(surface):
-    """One scan: what was put in lies within three standard errors, and makes a law."""
+def test_law_of_a_scan(surface):
+    """The true parameters are within three standard errors, and a law can be made."""
     fit = jl.from_surface(surface, SPACING)
     truth = {"a": 3.0, "b": 0.5, "c": 0.1, "alpha": 4.0, "beta": 1e-5}
     for name, value in truth.items():
         one = fit.estimates[name]
         assert abs(one.value - value) < 3 * one.standard_error, name
-        assert not one.left_open
-    # noise adds a few to the 24 x 24; they keep off the rim, which is not counted as area: 5 % more
+        assert not one.not_identifiable
+    # noise adds a few to the 24 x 24; none is in the rim, which is not part of the area: 5 % more
     assert fit.asperities.depth.size == pytest.approx(576, rel=0.01)
     assert fit.parameters["asperity_density"] == pytest.approx(1 / (20 * SPACING) ** 2, rel=0.07)
     law = fit.law(jl.Asperity.hertz_mindlin(G=20e9, nu=0.25, R=1e-3, mu=0.6))
-    # the overlap puts zero closure at the highest summit: about one of them touches
+    # with the overlap the highest summit touches at zero closure: about one contact
     assert law.contacts(0.0) / law.asperity_density * fit.asperities.depth.size < 10
 
 
-def test_depths_of_summits_are_those_of_the_heights_that_are_given(surface):
-    """Above the mean plane, by least squares."""
-    found = jl.from_surface(surface, SPACING).asperities
-    place = np.stack([np.ones(surface.size), *np.indices(surface.shape).reshape(2, -1)], axis=1)
-    plane = place @ np.linalg.lstsq(place, surface.ravel(), rcond=None)[0]
-    height = (surface - plane.reshape(surface.shape))[tuple(found.places.T)]
-    np.testing.assert_allclose(found.depth, height.max() - height, atol=1e-12)
+def test_summit_depths_are_measured_from_the_mean_plane(surface):
+    """The mean plane by least squares."""
+    asperities = jl.from_surface(surface, SPACING).asperities
+    basis = np.stack([np.ones(surface.size), *np.indices(surface.shape).reshape(2, -1)], axis=1)
+    plane = basis @ np.linalg.lstsq(basis, surface.ravel(), rcond=None)[0]
+    height = (surface - plane.reshape(surface.shape))[tuple(asperities.grid_indices.T)]
+    np.testing.assert_allclose(asperities.depth, height.max() - height, atol=1e-12)
 
 
-def test_turning_the_scan_turns_the_anisotropy(surface):
+def test_transposed_scan_has_transposed_anisotropy(surface):
     along, across = (jl.from_surface(z, SPACING).parameters["c"] for z in (surface, surface.T))
-    assert along == pytest.approx(-across, abs=1e-3)  # quadrants are left out in another order
+    assert along == pytest.approx(
+        -across, abs=1e-3
+    )  # duplicate facets are left out in another order
     assert along > 0.05
 
 
 @pytest.mark.parametrize("factor", [1e3, 1e6])
-def test_heights_in_another_unit_fix_no_direction(factor):
-    """Taken as m what is in mm or um: all facets stand on edge, and no direction is known."""
+def test_wrong_height_unit_makes_directions_not_identifiable(factor):
+    """Heights in mm or um read as m: all facets are nearly vertical."""
     fit = jl.from_surface(factor * synthetic_surface(ORIENTATION, HEIGHTS, n=8), SPACING)
     assert {"a", "b"} <= set(fit.not_identifiable)
 
 
-def rough(stretch, seed=0, n=256):
+def self_affine_surface(stretch, seed=0, n=256):
     """A self-affine surface (Hurst exponent 0.8), `stretch` times as long along the rows."""
     k = np.hypot(stretch * np.fft.fftfreq(n)[None, :], np.fft.fftfreq(n)[:, None])
     k[0, 0] = 1.0
@@ -127,41 +133,41 @@ def rough(stretch, seed=0, n=256):
     return 1e-4 * z / z.std()
 
 
-def test_a_surface_that_no_orientation_describes_is_told_by_its_slopes():
-    """Eq. 18 allows no more than a factor of 2 or so between the slopes along both axes."""
-    found = jl.from_surface(rough(1.0), SPACING)
-    assert found.describes
-    assert found.slopes == pytest.approx(found.law_slopes, rel=0.2)
-    stretched = jl.from_surface(rough(3.0), SPACING)
-    assert not stretched.describes
+def test_orientation_with_other_slopes_is_not_representative():
+    """Eq. 18 limits the ratio of the slopes along both axes to about 2."""
+    isotropic = jl.from_surface(self_affine_surface(1.0), SPACING)
+    assert isotropic.orientation_is_representative
+    assert isotropic.slopes == pytest.approx(isotropic.law_slopes, rel=0.2)
+    stretched = jl.from_surface(self_affine_surface(3.0), SPACING)
+    assert not stretched.orientation_is_representative
     assert stretched.slopes[0] < 0.5 * stretched.law_slopes[0]
     assert f"| measured | {stretched.slopes[0]:.3g} |" in stretched.report()
 
 
 def test_rms_slopes_of_a_wave_and_of_eq_14():
-    """A wave of 100 points: pi sqrt(2) height/length along it; Eq. 14 by drawing facets."""
+    """A wave of 100 points has pi sqrt(2) height/length; Eq. 14 against randomly drawn facets."""
     x = np.arange(400)
     wave = np.tile(1e-4 * np.sin(2 * np.pi * x / 100), (40, 1))
     along, across = measured_slopes(wave, SPACING, 4)
     assert along == pytest.approx(np.pi * np.sqrt(2) * 1e-4 / (100 * SPACING), rel=5e-3)
     assert across == pytest.approx(0.0, abs=1e-12)
     theta, phi = draw_directions(ORIENTATION, 100_000, np.random.default_rng(0))
-    drawn = np.sqrt(np.mean((np.tan(theta) * np.cos(phi)) ** 2))
-    assert rms_slope(ORIENTATION) == pytest.approx(drawn, rel=0.01)
+    sample_slope = np.sqrt(np.mean((np.tan(theta) * np.cos(phi)) ** 2))
+    assert rms_slope(ORIENTATION) == pytest.approx(sample_slope, rel=0.01)
 
 
-def test_spikes_are_counted_and_cliffs_are_none(surface):
+def test_spikes_are_counted_and_cliffs_are_not(surface):
     assert not len(jl.from_surface(surface, SPACING).spikes)
-    z = rough(1.0)
-    places = np.random.default_rng(1).integers(1, 255, (30, 2))
-    z[tuple(places.T)] += 2e-4
-    found = jl.from_surface(z, SPACING)
-    assert {tuple(one) for one in found.spikes} == {tuple(one) for one in places}
-    assert "Warning: 30 points are spikes" in found.report()
+    z = self_affine_surface(1.0)
+    spikes = np.random.default_rng(1).integers(1, 255, (30, 2))
+    z[tuple(spikes.T)] += 2e-4
+    fit = jl.from_surface(z, SPACING)
+    assert {tuple(one) for one in fit.spikes} == {tuple(one) for one in spikes}
+    assert "Warning: 30 points are spikes" in fit.report()
 
 
-def files_of(z):
-    """A scan (ny, nx), points 20 apart, as text of each kind."""
+def text_files(z):
+    """A scan (ny, nx) with a spacing of 20 as text in each supported format."""
     matrix = "\n".join(" ".join(map(str, row)) for row in z)
     points = [f"{20 * x} {20 * y} {z[y, x]}" for y, x in np.ndindex(z.shape)][::-1]
     return {
@@ -174,19 +180,19 @@ def files_of(z):
     }
 
 
-def test_files_give_the_array_back(tmp_path):
+def test_every_format_gives_the_same_array(tmp_path):
     z = np.arange(12.0).reshape(3, 4) / 8
     np.save(tmp_path / "z.npy", z)
-    for name, text in files_of(z).items():
+    for name, text in text_files(z).items():
         (tmp_path / name).write_text(text)
-    for name in ("z.npy", *files_of(z)):
+    for name in ("z.npy", *text_files(z)):
         np.testing.assert_array_equal(read_scan(tmp_path / name, 1e-6, SPACING), 1e-6 * z)
-    (tmp_path / "grid.asc").write_text(files_of(z)["grid.asc"].replace("1.375", "-9999"))
+    (tmp_path / "grid.asc").write_text(text_files(z)["grid.asc"].replace("1.375", "-9999"))
     assert np.isnan(read_scan(tmp_path / "grid.asc", 1e-6, SPACING)[2, 3])
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "told"),
+    ("name", "text", "message"),
     [
         (
             "t.csv",
@@ -207,7 +213,7 @@ def test_files_give_the_array_back(tmp_path):
         (
             "h.xyz",
             "\n".join(f"{20 * x} {40 * y} {x * y}" for x in range(4) for y in range(4)),
-            "no square grid .* along x the points are 20 apart, along y 40",
+            "no square grid .* the points are 20 apart along x and 40 along y",
         ),
         (
             "z.xyz",
@@ -216,29 +222,30 @@ def test_files_give_the_array_back(tmp_path):
         ),
     ],
 )
-def test_files_that_cannot_be_read(name, text, told, tmp_path):
+def test_unreadable_files_are_refused(name, text, message, tmp_path):
     if text is not None:
         (tmp_path / name).write_text(text)
-    with pytest.raises(ValueError, match=told):
+    with pytest.raises(ValueError, match=message):
         read_scan(tmp_path / name, 1e-6, SPACING)
 
 
-@pytest.mark.parametrize("lost", [-9999.0, -99.0, 0.0, 32767.0])
-def test_a_number_for_points_without_a_height_is_named(lost, tmp_path):
-    """In 25 patches; without them, and where a scanner rounds or cuts off, the scan is read."""
-    z, places = np.round(1e6 * rough(1.0), 2), np.random.default_rng(2).integers(1, 250, (25, 2))
-    for whole in (z, np.round(z / 20), np.clip(z, -150, 100)):
-        np.save(tmp_path / "z.npy", whole)
+@pytest.mark.parametrize("sentinel", [-9999.0, -99.0, 0.0, 32767.0])
+def test_sentinel_for_missing_heights_is_named(sentinel, tmp_path):
+    """In 25 patches. Without them the scan is read, also if the heights are rounded or clipped."""
+    z = np.round(1e6 * self_affine_surface(1.0), 2)
+    patches = np.random.default_rng(2).integers(1, 250, (25, 2))
+    for valid in (z, np.round(z / 20), np.clip(z, -150, 100)):
+        np.save(tmp_path / "z.npy", valid)
         assert read_scan(tmp_path / "z.npy", 1e-6, SPACING).shape == z.shape
-    for i, j in places:
-        z[i : i + 3, j : j + 2] = lost
+    for i, j in patches:
+        z[i : i + 3, j : j + 2] = sentinel
     np.save(tmp_path / "z.npy", z)
-    with pytest.raises(ValueError, match=f"{lost:g} stands 15[0-9] times, far above or below"):
+    with pytest.raises(ValueError, match=f"{sentinel:g} occurs 15[0-9] times, far above or below"):
         read_scan(tmp_path / "z.npy", 1e-6, SPACING)
 
 
 @pytest.mark.parametrize(
-    ("z", "length", "words"),
+    ("z", "length", "message"),
     [
         (np.zeros((100, 100)), None, "not flat"),
         (np.arange(100.0), None, "a profile has one direction only"),
@@ -257,6 +264,6 @@ def test_a_number_for_points_without_a_height_is_named(lost, tmp_path):
         (np.eye(100), 3.5 * SPACING, "spacings: it must be a whole number of at least 3"),
     ],
 )
-def test_bad_scans_are_named(z, length, words):
-    with pytest.raises(ValueError, match=words):
+def test_invalid_scans_are_refused(z, length, message):
+    with pytest.raises(ValueError, match=message):
         jl.from_surface(z, SPACING, length)

@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 from ..support import units
 from ..support.checks import Array
 from ..support.text_numbers import (
-    AMBIGUOUS,
-    EITHER,
-    Marks,
-    cells_of,
-    lines_of,
-    marks_of,
-    table_separator,
+    AMBIGUITY_REMEDY,
+    AMBIGUOUS_NUMBER,
+    NumberFormat,
+    detect_format,
+    find_table_separator,
+    read_lines,
+    split_cells,
 )
 
 _UNIT = r"(?:[numkcMGµμ]?(?:Pa|m)|N/mm[2²]|[kM]N/m[2²]|bar|[kmg]pa|[kM]N)"
@@ -191,12 +191,12 @@ def read_tables(
     if path.suffix.lower() in (".xlsx", ".xlsm"):
         sheets = _workbook(path, decimal)
     else:
-        lines = lines_of(path)
-        mark = table_separator(lines)
-        sheets = {"": dict(zip(lines, cells_of([*lines.values()], mark), strict=True))}
+        lines = read_lines(path)
+        mark = find_table_separator(lines)
+        sheets = {"": dict(zip(lines, split_cells([*lines.values()], mark), strict=True))}
     tables: list[Table] = []
     for sheet, rows in sheets.items():
-        marks = marks_of((cell for row in rows.values() for cell in row), decimal)
+        marks = detect_format((cell for row in rows.values() for cell in row), decimal)
         name = f"{path}{', sheet ' * bool(sheet)}{sheet}"
         blocks = [one for block in _below(rows, marks) for one in _beside(*block)]
         for k, (titles, below, numbers) in enumerate(blocks, 1):
@@ -237,7 +237,7 @@ def _workbook(path: Path, decimal: str | None) -> dict[str, Rows]:
     for sheet in book.worksheets:
         cells = [*enumerate(sheet.iter_rows(values_only=True), 1)]
         texts = (cell.strip() for _, row in cells for cell in row if isinstance(cell, str))
-        comma = marks_of(texts, decimal).decimal == ","
+        comma = detect_format(texts, decimal).decimal == ","
         rows = {n: [_text(cell, comma) for cell in row] for n, row in cells}
         found[sheet.title] = {n: row for n, row in rows.items() if any(row)}
     return found
@@ -247,16 +247,19 @@ def _text(cell: Any, comma: bool) -> str:
     """A cell of a workbook as a text file would have it, with decimal commas or without."""
     text = "" if cell is None else str(cell).strip()
     if isinstance(cell, float):
-        text += "0" * bool(EITHER.fullmatch(text))  # 1.201 is no 1201: it shows the decimal mark
+        # the decimal mark of a spreadsheet's number is a point: 1.2010 shows it, 1.201 does not
+        text += "0" * bool(AMBIGUOUS_NUMBER.fullmatch(text))
         text = text.replace(".", ",") if comma else text
     return text
 
 
-def _below(rows: Rows, marks: Marks) -> list[tuple[list[str], list[str], Rows]]:
+def _below(rows: Rows, marks: NumberFormat) -> list[tuple[list[str], list[str], Rows]]:
     """Names, units and rows of the tables that stand below one another."""
     found: list[tuple[list[str], list[str], Rows]] = []
     for line, row in rows.items():
-        numeric = any(np.isfinite(marks.value(cell)) or EITHER.fullmatch(cell) for cell in row)
+        numeric = any(
+            np.isfinite(marks.value(cell)) or AMBIGUOUS_NUMBER.fullmatch(cell) for cell in row
+        )
         words = [cell for cell in row if _LETTERS.search(cell)]
         if found and not found[-1][2] and not numeric and all(map(_ROW_UNIT.fullmatch, row)):
             found[-1] = (found[-1][0], [cell.strip("[]()/- ") for cell in row], {})
@@ -289,7 +292,9 @@ def _beside(
     ]
 
 
-def _table(name: str, titles: list[str], below: list[str], rows: Rows, marks: Marks) -> Table:
+def _table(
+    name: str, titles: list[str], below: list[str], rows: Rows, marks: NumberFormat
+) -> Table:
     """The columns of one test."""
     wide = len(titles)
     for line, row in rows.items():
@@ -308,17 +313,19 @@ def _table(name: str, titles: list[str], below: list[str], rows: Rows, marks: Ma
     return Table(name, columns, [*rows], odd)
 
 
+def _number_fault(cell: str) -> str:
+    """Why a cell is not read as a number, for a message."""
+    return AMBIGUITY_REMEDY if AMBIGUOUS_NUMBER.fullmatch(cell) else "is no number"
+
+
 def _column(
-    title: str, unit: str, cells: dict[int, str], marks: Marks
+    title: str, unit: str, cells: dict[int, str], marks: NumberFormat
 ) -> tuple[Column, dict[int, str]]:
     """A column from its cells by line; and lines that hold a word, such as Max, among numbers."""
     found = {n: marks.value(cell) for n, cell in cells.items()}
     known = {n: x for n, x in found.items() if np.isfinite(x)}
     texts = {n: cell for n, cell in cells.items() if cell and n not in known}
-    wrong = (
-        f"line {n} holds {cell!r}, which {AMBIGUOUS if EITHER.fullmatch(cell) else 'is no number'}"
-        for n, cell in texts.items()
-    )
+    wrong = (f"line {n} holds {cell!r}, which {_number_fault(cell)}" for n, cell in texts.items())
     words = {n: f"{title} is {cell!r}" for n, cell in texts.items() if _WORD.fullmatch(cell)}
     sent = {n: x for n, x in known.items() if _SENTINEL.fullmatch(str(x))}
     others = np.array([x for n, x in known.items() if n not in sent])

@@ -50,7 +50,7 @@ def in_unit(unit: str, *, positive: bool = False) -> Callable[[str], float]:
 
     def read(text: str) -> float:
         try:
-            return units.typed(text, unit, positive=positive)
+            return units.parse_option(text, unit, positive=positive)
         except ValueError as error:
             raise argparse.ArgumentTypeError(str(error)) from None
 

@@ -16,7 +16,7 @@ from ..calibration.measured import ClosureCurve, ShearCurve, first_loading
 from ..parameters.rock import require_rock
 from ..support.checks import Array, one_of
 from ..support.markdown import table
-from ..support.text_numbers import DECIMAL
+from ..support.text_numbers import DECIMAL_MARKS
 from .command import OUT, PICTURES, Command, Written, in_unit, option, several, write_results
 
 MOST = 60  # points of a shear test that are fitted: a logger writes thousands, each costs a step
@@ -225,7 +225,7 @@ COMMAND = Command(
         ),
         option(
             "--decimal",
-            choices=tuple(DECIMAL),
+            choices=tuple(DECIMAL_MARKS),
             help="the decimal mark of files whose numbers do not show it, as 1,201 and 1.201 do "
             "not",
         ),

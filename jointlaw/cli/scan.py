@@ -9,7 +9,7 @@ from ..parameters.rock import ROCK, require_rock
 from ..parameters.toml import VERSION
 from ..support.checks import Array
 from ..support.markdown import table
-from ..support.text_numbers import DECIMAL
+from ..support.text_numbers import DECIMAL_MARKS
 from ..surface.fit import SAMPLES, SurfaceFit, from_surface
 from ..surface.scan_files import read_scan
 from .command import DEFAULT_ROCK, OUT, Command, Written, in_unit, option, write_results
@@ -90,7 +90,7 @@ COMMAND = Command(
             required=True,
             help="of the heights, such as um",
         ),
-        option("--decimal", choices=tuple(DECIMAL), help="the decimal mark of the file"),
+        option("--decimal", choices=tuple(DECIMAL_MARKS), help="the decimal mark of the file"),
         option(
             "--sampling-length",
             type=in_unit("m", positive=True),

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ..parameters.asperity import Asperity
 from ..parameters.orientation import Orientation, shape
-from ..support.checks import Array, frozen
+from ..support.checks import Array, read_only
 from .nodes import azimuths, inclinations
 
 
@@ -85,7 +85,7 @@ def facets(
     ]
     opposite = np.concatenate([k + ring for k, ring in zip(first, turned, strict=True)])
     arrays = (theta, P, np.maximum(weight, 0.0), n[:dim], s[:dim], t[:dim], depth, opposite)
-    return Facets(*frozen(arrays))
+    return Facets(*read_only(arrays))
 
 
 def _ring(m: int, full: bool) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..parameters.orientation import shape
-from ..support.checks import Array, frozen
+from ..support.checks import Array, read_only
 from .virgin_curve import VirginCurve
 
 # Tried on random laws. A cell of width h misses Phi by Phi'' h^2/8, so cells have equal shares of
@@ -51,7 +51,7 @@ def inclinations(b: float, count: int) -> tuple[Array, Array]:
     matrix = np.diag(middle) + np.diag(side[:-1], 1) + np.diag(side[:-1], -1)
     places, vectors = np.linalg.eigh(matrix)
     places, shares = np.clip(places, 0.0, 1.0) ** power, vectors[0] ** 2
-    return frozen((places, shares))
+    return read_only((places, shares))
 
 
 def azimuths(rings: int, phi: int) -> list[int]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..parameters.asperity import Asperity
-from ..support.checks import Array, frozen
+from ..support.checks import Array, read_only
 from .facets import Facets
 from .nodes import UNUSED, depth_nodes
 from .virgin_curve import VirginCurve
@@ -45,7 +45,7 @@ class FacetTables(Facets):
     slope_residual: float
 
     def __post_init__(self) -> None:
-        frozen(tuple(vars(self).values()))
+        read_only(tuple(vars(self).values()))
 
     @property
     def lam(self) -> float:

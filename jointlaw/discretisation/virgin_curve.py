@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..parameters.heights import HeightDistribution
-from ..support.checks import Array, frozen
+from ..support.checks import Array, read_only
 from .formation import factor, rise
 
 TABLE_ERROR = 1e-10  # asked of S, relative to its largest value
@@ -110,7 +110,7 @@ def virgin_curve(eta: float, heights: HeightDistribution | None) -> VirginCurve:
     """
     if heights is None:
         flat = np.array([[1.0, 0.0, 0.0, 0.0]])
-        return frozen(VirginCurve(eta, 1.0, flat, flat / (2 + eta), 0.0))
+        return read_only(VirginCurve(eta, 1.0, flat, flat / (2 + eta), 0.0))
     r0, points = heights.overlap, heights.breakpoints()
     far = float(points[-1]) - r0 if points[-1] > r0 else r0
     middle = float(points[len(points) // 2]) - r0
@@ -132,7 +132,7 @@ def virgin_curve(eta: float, heights: HeightDistribution | None) -> VirginCurve:
             "(cut it)"
         )
     energy = _energy_table(eta, scale, table, power)
-    return frozen(VirginCurve(eta, scale, table, energy, error, power))
+    return read_only(VirginCurve(eta, scale, table, energy, error, power))
 
 
 def exact_force(y: Array, eta: float, heights: HeightDistribution | None) -> tuple[Array, Array]:

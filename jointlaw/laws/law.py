@@ -20,7 +20,7 @@ from ..kernels.engine import Step, engine
 from ..kernels.reference import Tables
 from ..parameters import keys, toml
 from ..parameters.declared import fingerprint, parameters_of
-from ..support.checks import Array, finite, truths
+from ..support.checks import Array, booleans, finite
 from ..support.files import replace_file
 
 DEFAULT_STRESS = 20e6  # Pa; its closure is the default closure_range
@@ -76,7 +76,7 @@ class Law:
         dissipated energy is not added up, which is faster.
         """
         batch = JointBatch(self, n, ledger)
-        far, stress = ~truths("mated", mated, n), finite("normal_stress", normal_stress, "Pa")
+        far, stress = ~booleans("mated", mated, n), finite("normal_stress", normal_stress, "Pa")
         if far.any():
             if stress.any():
                 raise ValueError(

@@ -1,4 +1,4 @@
-"""Checks on numbers that come from outside: each error names parameter, value, bound and remedy."""
+"""Validation of arguments and file values: an error names parameter, value, bound and remedy."""
 
 import math
 from collections.abc import Iterable
@@ -11,14 +11,17 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Arrays = TypeVar("Arrays", bound="tuple[Any, ...]")
 
-# Types that float() would take, but that nobody means as a number ("3" in a file, a flag)
-_NO_NUMBERS = (bool, np.bool_, str, bytes, complex, np.complexfloating)
+# float() accepts these types, but they are mistakes in place of a number ("3" in a file, a flag)
+_NOT_NUMBERS = (bool, np.bool_, str, bytes, complex, np.complexfloating)
 
 
 def number(name: str, value: Any, *, infinite: bool = False) -> float:
-    """Return `value` as a float, or say which parameter is not a finite real number."""
+    """Return `value` as a float. Raises ValueError unless it is a finite real number.
+
+    name: of the parameter, for the message. infinite: whether infinity is accepted.
+    """
     try:
-        if isinstance(value, _NO_NUMBERS) or np.ndim(value) != 0:
+        if isinstance(value, _NOT_NUMBERS) or np.ndim(value) != 0:
             raise TypeError
         result = float(value)
     except (TypeError, ValueError, OverflowError):
@@ -29,7 +32,7 @@ def number(name: str, value: Any, *, infinite: bool = False) -> float:
 
 
 def more_than(name: str, value: Any, bound: float) -> float:
-    """Return `value` as a float that is strictly larger than `bound`."""
+    """Return `value` as a float. Raises ValueError unless it is > `bound` and finite."""
     result = number(name, value)
     if not result > bound:
         raise ValueError(f"{name} = {result!r} is out of bounds: it must be > {bound:g}")
@@ -37,29 +40,29 @@ def more_than(name: str, value: Any, bound: float) -> float:
 
 
 def at_least(name: str, value: Any, bound: float, *, infinite: bool = False) -> float:
-    """Return `value` as a float that is not smaller than `bound`."""
+    """Return `value` as a float. Raises ValueError unless it is >= `bound`."""
     result = number(name, value, infinite=infinite)
     if not result >= bound:
         raise ValueError(f"{name} = {result!r} is out of bounds: it must be >= {bound:g}")
     return result
 
 
-def remedy(given: Any, known: Iterable[str], otherwise: str = "choose one of") -> str:
-    """What to write for an unknown name: the nearest known one, or any of all."""
-    names = list(known)
-    near = get_close_matches(str(given), names, 1)
-    return f"did you mean {near[0]!r}?" if near else f"{otherwise} {', '.join(names)}"
+def remedy(name: Any, choices: Iterable[str], introduction: str = "choose one of") -> str:
+    """Text that suggests the most similar choice for an unknown name, or lists all choices."""
+    names = list(choices)
+    similar = get_close_matches(str(name), names, 1)
+    return f"did you mean {similar[0]!r}?" if similar else f"{introduction} {', '.join(names)}"
 
 
 def one_of(name: str, value: Any, choices: tuple[str, ...]) -> str:
-    """Return `value` if it is one of the named choices."""
+    """Return `value`. Raises ValueError unless it is one of the choices."""
     if value not in choices:
         raise ValueError(f"{name} = {value!r} is unknown; {remedy(value, choices)}")
     return str(value)
 
 
 def integer(name: str, value: Any, bound: int) -> int:
-    """Return `value` as an int that is not smaller than `bound`."""
+    """Return `value` as an int. Raises ValueError unless it is a whole number >= `bound`."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < bound:
         raise ValueError(
             f"{name} = {value!r} is out of bounds: it must be a whole number >= {bound}"
@@ -68,7 +71,10 @@ def integer(name: str, value: Any, bound: int) -> int:
 
 
 def numbers(name: str, value: Any, unit: str) -> Array:
-    """Return `value` as an array of floats, finite or not; text, flags and objects are refused."""
+    """Return `value` as an array of floats, which may be infinite or NaN.
+
+    unit: for the message. Raises ValueError for text, booleans, objects and masked values.
+    """
     try:
         array = np.asarray(value)
         if array.dtype.kind not in "iuf":
@@ -84,23 +90,23 @@ def numbers(name: str, value: Any, unit: str) -> Array:
 
 
 def finite(name: str, value: Any, unit: str) -> Array:
-    """Return `value` as an array of finite floats."""
+    """Return `value` as an array of floats. Raises ValueError unless all of them are finite."""
     array = numbers(name, value, unit)
     if not np.isfinite(array).all():
         raise ValueError(f"{name} = {value!r} is not finite; give finite values in {unit}")
     return array
 
 
-def truths(name: str, value: Any, n: int) -> NDArray[np.bool_]:
-    """Return `value`, one truth or n of them, as (n,) truths."""
+def booleans(name: str, value: Any, n: int) -> NDArray[np.bool_]:
+    """Return `value`, one boolean or n of them, as an array (n,). Raises ValueError otherwise."""
     array = np.asarray(value)
     if array.dtype != bool or array.shape not in ((), (n,)):
         raise ValueError(f"{name} = {value!r} must be True or False, or an array ({n},) of them")
     return np.broadcast_to(array, n)
 
 
-def frozen(arrays: Arrays) -> Arrays:
-    """Return a tuple whose arrays nobody can write to any more: laws share them."""
+def read_only(arrays: Arrays) -> Arrays:
+    """Make the arrays in a tuple read-only, since laws share them; returns the tuple."""
     for array in arrays:
         if isinstance(array, np.ndarray):
             array.flags.writeable = False

@@ -57,10 +57,10 @@ def require_free(folder: Path, marks: Iterable[str] = (SUMMARY,)) -> None:
 
     Raises ValueError naming the marks that were found, and the remedy.
     """
-    found = [name for name in marks if (folder / name).exists()]
-    if found:
+    present = [name for name in marks if (folder / name).exists()]
+    if present:
         raise ValueError(
-            f"{folder} holds another run ({', '.join(found)}): give another --out, or --force to "
+            f"{folder} holds another run ({', '.join(present)}): give another --out, or --force to "
             "replace it"
         )
 

@@ -1,16 +1,19 @@
-"""A progress bar on a terminal for work longer than two seconds; silent in a pipe."""
+"""A progress bar on a terminal for work that takes longer than two seconds; none in a pipe."""
 
 from collections.abc import Iterable
 from typing import TypeVar
 
 T = TypeVar("T")
-PATIENCE = 2.0  # s of silence
+DELAY = 2.0  # s before the bar appears
 
 
 def track(items: Iterable[T], label: str, total: int | None = None) -> Iterable[T]:
-    """`items`, with a bar if tqdm is installed (extra `plot`)."""
+    """`items`, with a progress bar if tqdm is installed (extra `plot`).
+
+    label: text beside the bar. total: number of items, for iterables without a length.
+    """
     try:
         from tqdm import tqdm
     except ImportError:
         return items
-    return tqdm(items, desc=label, total=total, delay=PATIENCE, disable=None, leave=False)
+    return tqdm(items, desc=label, total=total, delay=DELAY, disable=None, leave=False)

@@ -1,9 +1,9 @@
-"""Quantities as people write them: 10MPa, 2um, 30deg, 5GPa/m; a bare number is SI."""
+"""Parsing of quantities with units: 10MPa, 2um, 30deg, 5GPa/m; a number alone is in SI units."""
 
 import math
 import re
 
-COMMON = {  # a unit that people use
+COMMON = {  # a practical unit for each SI unit, for examples in messages
     "Pa": "MPa", "m": "mm", "Pa/m": "GPa/m", "rad": "deg", "N": "kN", "m2": "cm2",
 }  # fmt: skip
 _PREFIX = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2, "": 1.0,
@@ -24,7 +24,10 @@ _PATTERN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s
 
 
 def parse(text: str, unit: str) -> float:
-    """The SI value of `text`, whose suffix must be `unit` ("Pa", "m", "Pa/m", "rad") or none.
+    """The value of a quantity in SI units.
+
+    text: a number, alone or followed by a unit.
+    unit: SI unit of the result, a key of `COMMON`; units that convert to it are accepted.
 
     Raises ValueError naming the text, the unit and an example.
     """
@@ -36,13 +39,16 @@ def parse(text: str, unit: str) -> float:
     )
 
 
-def typed(text: str, unit: str, *, positive: bool = False) -> float:
-    """The SI value of what a person typed for an option: only zero needs no unit.
+def parse_option(text: str, unit: str, *, positive: bool = False) -> float:
+    """The value in SI units of an option of the command line, where only zero needs no unit.
 
-    Raises ValueError for text that `parse` refuses, a number without its unit, a number beyond
-    those of a computer and, if it must be positive, any other.
+    text, unit: as in `parse`. positive: whether the value must be > 0.
+
+    Raises ValueError for text that `parse` refuses, a number without its unit, a number that
+    overflows and, with `positive`, a number <= 0.
     """
-    value, short = parse(text, unit), text.strip()
+    value = parse(text, unit)
+    short = text.strip()
     if math.isinf(value):
         raise ValueError(f"{text} is not finite; give a finite number")
     if value and short[-1] in "0123456789.":

@@ -11,13 +11,13 @@ import numpy as np
 
 from ..support.checks import Array
 from ..support.text_numbers import (
-    AMBIGUOUS,
-    EITHER,
-    SWAPPED,
-    cells_of,
-    lines_of,
-    marks_of,
-    separator,
+    AMBIGUITY_REMEDY,
+    AMBIGUOUS_NUMBER,
+    SWAP_MARKS,
+    detect_format,
+    find_separator,
+    read_lines,
+    split_cells,
 )
 
 _SUFFIXES = {".csv", ".txt", ".dat", ".asc", ".xyz"}
@@ -110,19 +110,19 @@ def _read_text(path: Path, decimal: str | None) -> tuple[Array, float | None]:
 
     Points without a height (NODATA_value) are NaN.
     """
-    lines = list(lines_of(path).values())
-    mark = separator(lines[-1] if lines else "")
+    lines = list(read_lines(path).values())
+    mark = find_separator(lines[-1] if lines else "")
     header = {}
     while lines and _is_name(lines[0].replace(mark or " ", " ").split()[0].strip('"')):
         name, *value = lines.pop(0).replace(mark or " ", " ").split()
         header[name.lower()] = value
-    sample = [cell for row in cells_of(lines[:_SAMPLE_LINES], mark) for cell in row]
-    marks = marks_of(sample, decimal)
-    ambiguous = [cell for cell in sample if EITHER.fullmatch(cell)]
+    sample = [cell for row in split_cells(lines[:_SAMPLE_LINES], mark) for cell in row]
+    marks = detect_format(sample, decimal)
+    ambiguous = [cell for cell in sample if AMBIGUOUS_NUMBER.fullmatch(cell)]
     if marks.decimal is None and ambiguous:
-        raise ValueError(f"{ambiguous[0]!r} {AMBIGUOUS}")
+        raise ValueError(f"{ambiguous[0]!r} {AMBIGUITY_REMEDY}")
     if marks.decimal == ",":
-        lines = [line.translate(SWAPPED) for line in lines]
+        lines = [line.translate(SWAP_MARKS) for line in lines]
     z = np.loadtxt(lines, delimiter=mark, ndmin=2)
     if "nodata_value" in header:
         z[z == marks.value(header["nodata_value"][0])] = np.nan

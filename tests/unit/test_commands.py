@@ -291,8 +291,8 @@ def test_what_is_no_quantity(text, unit):
 
 
 def test_what_a_person_types_has_a_unit():
-    assert units.typed("0", "Pa") == 0.0
-    assert units.typed("5MPa", "Pa", positive=True) == 5e6
+    assert units.parse_option("0", "Pa") == 0.0
+    assert units.parse_option("5MPa", "Pa", positive=True) == 5e6
     for text, told in (("5", "write for example 5MPa"), ("0", "> 0 Pa"), ("1e400Pa", "finite")):
         with pytest.raises(ValueError, match=told):
-            units.typed(text, "Pa", positive=True)
+            units.parse_option(text, "Pa", positive=True)

@@ -202,7 +202,7 @@ def test_spreadsheets_without_values_and_of_other_kinds(tmp_path):
     for head in (b"\xd0\xcf\x11\xe0", b"PK\x03\x04"):
         (tmp_path / "lab.xls").write_bytes(head + bytes(600))
         with pytest.raises(
-            ValueError, match=r"lab.xls: is no text but a spreadsheet; save it as CSV"
+            ValueError, match=r"lab.xls: is a spreadsheet, not text; save it as CSV"
         ):
             read_shear(tmp_path / "lab.xls")
 
